@@ -1,0 +1,27 @@
+/* The exact distance of a point to the scene: Embree's point query proposes, double precision decides.
+ *
+ * The query runs in a float frame about the scene's centre with every radius widened by that frame's rounding,
+ * so no triangle that could be nearest is missed; the distance itself is point-to-triangle in double
+ * (closest-point regions, Ericson, Real-Time Collision Detection, 5.1.5). */
+#ifndef CORE_DISTANCE_H
+#define CORE_DISTANCE_H
+
+#include "core/scene.h"
+
+struct distance;
+
+struct distance_hit {
+    double distance_m;
+    double point_m[3];  /* the nearest point of the mesh, prcs */
+    uint32_t triangle;
+};
+
+/* The scene must outlive the index. */
+int distance_create(const struct scene *scene, struct distance **out, struct sh_err *err);
+void distance_free(struct distance *index);
+
+/* Nearest point of the mesh within max_m. Returns 1 and fills hit, or 0 when nothing is that near.
+ * Thread: any number at once. */
+int distance_query(const struct distance *index, const double p_prcs[3], double max_m, struct distance_hit *hit);
+
+#endif

@@ -1,0 +1,40 @@
+/* The one error scheme: 0 or a negative SH_E code, and one line of text for the user.
+ *
+ * A function that can fail for a reason the user can act on takes a `struct sh_err *` as its last
+ * argument, fills it through sh_fail() and returns the code. The text is one line: what, where, what is
+ * allowed. Nothing below main prints it. Thread: a sh_err belongs to its caller; sh_fail allocates nothing. */
+#ifndef CORE_ERR_H
+#define CORE_ERR_H
+
+enum sh_code {
+    SH_OK = 0,
+    SH_EINPUT = -1,   /* wrong usage, configuration or input file: exit status 2 */
+    SH_EIO = -2,      /* the operating system or a peer failed: exit status 1 */
+    SH_ENOMEM = -3,   /* no memory: exit status 1 */
+    SH_EPERM = -4,    /* a permission is missing; the text says which */
+    SH_ETIMEOUT = -5, /* nothing happened in time */
+    SH_ECLOSED = -6,  /* the other end is gone */
+    SH_EFORMAT = -7,  /* bytes that are not what the protocol says */
+    SH_ESTATE = -8,   /* not possible in the present state */
+};
+
+struct sh_err {
+    int code;
+    char text[512];
+};
+
+/* Fills err (which may be NULL) and returns code, so that `return sh_fail(err, SH_EINPUT, ...)` reads well.
+ * A text too long for the buffer is cut at its end. */
+int sh_fail(struct sh_err *err, int code, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
+
+/* How long work tells about itself. Each member may be NULL. Called from the thread that does the work. */
+struct sh_report {
+    void *ctx;
+    void (*warn)(void *ctx, const char *text);                       /* one line, without a newline */
+    void (*progress)(void *ctx, const char *what, double fraction);  /* 0..1; negative where unknown */
+};
+
+void sh_warn(const struct sh_report *report, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
+void sh_progress(const struct sh_report *report, const char *what, double fraction);
+
+#endif

@@ -1,0 +1,33 @@
+#include "core/line.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+int line_block_alloc(struct line_block *block, uint32_t capacity, struct sh_err *err)
+{
+    memset(block, 0, sizeof *block);
+    block->capacity = capacity;
+    block->dt_ns = calloc(capacity, sizeof *block->dt_ns);
+    block->a = calloc(capacity, sizeof *block->a);
+    block->b = calloc(capacity, sizeof *block->b);
+    block->c = calloc(capacity, sizeof *block->c);
+    block->refl_cdb = calloc(capacity, sizeof *block->refl_cdb);
+    block->echo = calloc(capacity, sizeof *block->echo);
+    block->label = calloc(capacity, sizeof *block->label);
+    if (block->dt_ns && block->a && block->b && block->c && block->refl_cdb && block->echo && block->label)
+        return SH_OK;
+    line_block_free(block);
+    return sh_fail(err, SH_ENOMEM, "line: no memory for a block of %u points", capacity);
+}
+
+void line_block_free(struct line_block *block)
+{
+    free(block->dt_ns);
+    free(block->a);
+    free(block->b);
+    free(block->c);
+    free(block->refl_cdb);
+    free(block->echo);
+    free(block->label);
+    memset(block, 0, sizeof *block);
+}

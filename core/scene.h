@@ -1,0 +1,69 @@
+/* The scene: meshes from files, in the project frame (prcs), exact vertices in double.
+ *
+ * Frame: prcs, metres, z up. A file's vertex v becomes R(up) * v * scale + offset_m, in double.
+ * `up: z` leaves the axes as they are; `up: y` turns (x, y, z) to (x, -z, y).
+ * Ownership: scene_load allocates everything, scene_free releases it. After the load a scene is constant and
+ * may be read from any thread. */
+#ifndef CORE_SCENE_H
+#define CORE_SCENE_H
+
+#include <stdint.h>
+#include <stddef.h>
+
+#include "core/err.h"
+
+enum scene_up { SCENE_UP_Z, SCENE_UP_Y };
+
+enum {
+    SCENE_NAME_LEN = 64,        /* of an object or a material, with its NUL; longer names are cut, counted */
+    SCENE_MAX_SURFACES = 65534, /* labels are 16 bits on the wire; 0xffff means "none" */
+};
+
+struct scene_mesh_spec {
+    const char *file;   /* ending chooses the reader: .obj .ply in double; .stl .gltf .glb .fbx .dae .ifc by Assimp */
+    enum scene_up up;
+    double scale;       /* metres per unit of the file, > 0 */
+    double offset_m[3]; /* added after axes and scale */
+};
+
+/* One surface label: an object of the file with one material. */
+struct scene_surface {
+    char object[SCENE_NAME_LEN];
+    char material[SCENE_NAME_LEN];
+};
+
+/* What the import left out or changed; each kind that is not 0 is also reported as one warning per file. */
+struct scene_counts {
+    uint64_t zero_area;      /* triangles without area, left out */
+    uint64_t not_triangles;  /* points and lines, left out */
+    uint64_t names_cut;      /* object or material names cut to SCENE_NAME_LEN - 1 bytes */
+};
+
+struct scene {
+    uint32_t n_vertices, n_triangles, n_surfaces, n_meshes;
+    double (*vertex_m)[3];         /* [n_vertices] prcs */
+    uint32_t (*triangle)[3];       /* [n_triangles] indices into vertex_m */
+    uint16_t *label;               /* [n_triangles] index into surface */
+    struct scene_surface *surface; /* [n_surfaces] */
+    double min_m[3], max_m[3];     /* bounds of the used vertices, prcs */
+    struct scene_counts counts;
+};
+
+/* Loads all meshes into one scene.
+ * tolerance_m: what a vertex may be off; a file read in single precision (all but .obj and .ply) whose largest
+ *   |coordinate| * scale * 6e-8 exceeds it is refused, with the figure.
+ * Errors (SH_EINPUT, naming the file): missing or unreadable, not a mesh, no triangles, a coordinate that is
+ *   not finite, an index out of range, |coordinate| beyond 1e9 m, too many surfaces or triangles (2^32-1).
+ * Progress goes to report about four times a second once a load takes longer than a second. */
+int scene_load(const struct scene_mesh_spec *specs, size_t n_specs, double tolerance_m,
+               const struct sh_report *report, struct scene **out, struct sh_err *err);
+
+/* Builds a scene from arrays (tests and generated scenes). Copies everything; same checks as scene_load.
+ * label and surface may be NULL: then there is one surface, "object"/"material". */
+int scene_from_arrays(const double (*vertex_m)[3], uint32_t n_vertices, const uint32_t (*triangle)[3],
+                      uint32_t n_triangles, const uint16_t *label, const struct scene_surface *surface,
+                      uint32_t n_surfaces, struct scene **out, struct sh_err *err);
+
+void scene_free(struct scene *scene);
+
+#endif

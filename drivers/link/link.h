@@ -1,0 +1,73 @@
+/* Links: bytes <-> world. One ops struct, one file each; a link knows nothing of frames.
+ *
+ * A link has sessions: readers and commanders that come and go (a pty or a file has one, TCP several). One thread
+ * owns a link and makes all calls on it; nothing but poll() waits, and write() of `file` and `null`, which may. */
+#ifndef DRIVERS_LINK_LINK_H
+#define DRIVERS_LINK_LINK_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include <sys/types.h>
+
+#include "core/err.h"
+
+enum { LINK_MAX_SESSIONS = 8, LINK_MAX_EVENTS = 2 * LINK_MAX_SESSIONS + 2 };
+
+enum link_type { LINK_NULL, LINK_FILE, LINK_PTY, LINK_TCP, LINK_FD };
+
+struct link_spec {
+    enum link_type type;
+    char path[256];    /* file: where to write; pty: symlink to the slave, may be empty */
+    char address[64];  /* tcp: numeric or name; empty: 127.0.0.1 */
+    int port;          /* tcp: 0 lets the system choose */
+    int max_sessions;  /* tcp: 1..LINK_MAX_SESSIONS */
+    int fd;            /* fd: a connected stream descriptor (socket pair), taken over */
+};
+
+enum link_event_kind {
+    LINK_OPENED,   /* a session began: it will read, and may command */
+    LINK_CLOSED,   /* it is gone; what was queued for it is void; its number may be used again */
+    LINK_READABLE, /* read() has something */
+    LINK_WRITABLE, /* write() will take something (only for sessions in want_write) */
+    LINK_WOKEN,    /* wake_fd was signalled; poll has drained it (eventfd) */
+    LINK_REFUSED,  /* somebody was turned away: all sessions taken */
+};
+
+struct link_event {
+    enum link_event_kind kind;
+    int session;      /* 0..max_sessions-1 */
+    char peer[64];    /* for LINK_OPENED, LINK_CLOSED, LINK_REFUSED: who, for the log */
+};
+
+struct link_ops {
+    const char *name;
+
+    /* Opens as spec says, and nothing is left behind when it fails. The text of err names the endpoint. */
+    int (*open)(const struct link_spec *spec, void **link, struct sh_err *err);
+
+    /* The endpoint as a client would name it: "tty:/dev/pts/3", "tcp:127.0.0.1:40123", "file:/x/y". */
+    void (*endpoint)(const void *link, char *buf, size_t len);
+
+    /* Largest number of bytes per second this link can carry, 0 where there is no fixed limit. */
+    double (*capacity)(const void *link);
+
+    /* Waits up to timeout_ms (-1: for ever) and fills at most max events; returns how many, or a negative SH_E.
+     * want_write: bit s set = tell when session s can take bytes. A session whose reader does not read must not
+     * make poll return at once. */
+    int (*poll)(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *events, int max);
+
+    /* Never block (except as said above). Bytes moved; 0: none now; SH_ECLOSED: the session is gone (a
+     * LINK_CLOSED follows from poll). */
+    ssize_t (*read)(void *link, int session, void *buf, size_t len);
+    ssize_t (*write)(void *link, int session, const void *buf, size_t len);
+
+    /* Closes everything, removes what open made (symlink). link is void afterwards. */
+    void (*close)(void *link);
+};
+
+/* The only list of links. NULL for an unknown type. */
+const struct link_ops *link_ops_get(enum link_type type);
+/* By name ("pty", "tcp", "file", "null"); -1 when unknown. */
+int link_type_parse(const char *name);
+
+#endif

@@ -1,0 +1,181 @@
+/* The native protocol: frames as PROTOCOL.md describes them, byte by byte. Frame constants and the pure parser.
+ *
+ * Nothing here does I/O, allocates or keeps global state. All integers are little-endian on the wire.
+ * Encoding (line -> bytes) is in native_encode.h, so that a client needs only this header. */
+#ifndef DRIVERS_PROTOCOL_NATIVE_H
+#define DRIVERS_PROTOCOL_NATIVE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+enum {
+    NATIVE_SYNC = 0xd5,
+    NATIVE_VERSION = 1,
+    NATIVE_HEADER_LEN = 28,
+    NATIVE_MAX_PAYLOAD = 65536,
+    NATIVE_MAX_FRAME = NATIVE_HEADER_LEN + NATIVE_MAX_PAYLOAD,
+    NATIVE_POINT_LEN = 20,
+    NATIVE_POINTS_HEAD_LEN = 40,
+    NATIVE_MAX_POINTS = (NATIVE_MAX_PAYLOAD - NATIVE_POINTS_HEAD_LEN) / NATIVE_POINT_LEN,
+    NATIVE_MAX_TEXT = 512, /* longest reply line, with its CR LF */
+};
+
+enum native_type {
+    NATIVE_DESCRIPTOR = 1, /* device, format, head geometry */
+    NATIVE_ANCHOR = 2,     /* CRS, double anchor, scale, head -> scene rotation */
+    NATIVE_POINTS = 3,     /* part of one line */
+    NATIVE_LINE_END = 4,
+    NATIVE_TELEMETRY = 5,
+    NATIVE_EVENT = 6,
+    NATIVE_SURFACES = 7,   /* names of some labels */
+};
+
+enum native_flags {
+    NATIVE_REPEAT = 1 << 0, /* said before (descriptor, anchor): not in the stream hash */
+    NATIVE_LOCAL = 1 << 1,  /* made for this reader only: seq is 0 and not counted */
+};
+
+/* Frame header, 28 bytes:
+ *  0 u8  sync 0xd5      1 u8 type     2 u8 version    3 u8 flags
+ *  4 u32 payload length 8 u32 seq    12 u32 CRC-32C of the payload
+ * 16 i64 device time, ns since power-up (of the first pulse, for points)
+ * 24 u32 CRC-32C of bytes 0..23 */
+struct native_header {
+    uint8_t type, version, flags;
+    uint32_t length, seq, payload_crc;
+    int64_t t_ns;
+};
+
+enum native_layout { NATIVE_POLAR = 0, NATIVE_GEO = 1 };
+
+struct native_descriptor {
+    char idn[96];              /* what *IDN? answers */
+    char profile[32];
+    uint32_t layout;           /* enum native_layout */
+    uint32_t isa;              /* packet width the stream was cast with: 1, 4, 8, 16 */
+    uint64_t prr_uhz, lines_uhz, pan_udeg_s;             /* micro-hertz, micro-degrees per second */
+    int64_t fov_min_udeg, sweep_udeg;                    /* whole sweep: where it starts, how far it goes */
+    int64_t line_start_udeg, line_stop_udeg;             /* pulses outside are fired, counted, not cast */
+    int64_t pan_start_udeg, pan_stop_udeg;
+    double mirror_counts_per_turn, pan_counts_per_turn;  /* encoder counts; angle = 2 pi count / counts_per_turn */
+    double range_scale_m;      /* polar: metres per count */
+    double range_min_m, range_max_m;
+    uint32_t max_echoes, n_surfaces, frames, scan;       /* frames per scan (0: endless); scan number from 1 */
+    uint64_t seed;
+};
+
+enum native_crs { NATIVE_CRS_LOCAL = 0, NATIVE_CRS_ECEF = 1, NATIVE_CRS_UTM = 2 };
+
+struct native_anchor {
+    uint32_t crs;              /* enum native_crs */
+    uint32_t epsg;             /* 0 for local */
+    uint32_t station;          /* number, from 1 */
+    uint32_t reserved;
+    double anchor[3];          /* of the station in the CRS, metres */
+    double scale_m;            /* geo: position = anchor + scale_m * (x, y, z) */
+    double lat_deg, lon_deg, height_m;
+    double station_m[3];       /* of the station in the scene frame */
+    double rotation[9];        /* socs -> scene frame, row by row: p_prcs = station_m + rotation * p_socs */
+};
+
+struct native_points {         /* head of a points payload, 40 bytes, then n points of 20 */
+    uint32_t frame, line;
+    uint64_t pulse0;
+    int64_t t0_ns, line_t0_ns; /* since the scan's start */
+    uint32_t n_pulses, n_points;
+};
+
+/* 20 bytes: 0 u32 a, 4 u32 b, 8 u32 c, 12 i16 reflectance 0.01 dB, 14 u16 label,
+ * 16 u32: bits 0..23 time after t0_ns in ns, 24..27 echo number, 28..31 echo count */
+struct native_point {
+    uint32_t a, b, c;
+    int16_t refl_cdb;
+    uint16_t label;
+    uint32_t dt_ns;
+    uint8_t echo, echo_count;  /* both 0: shot without echo */
+};
+
+struct native_line_end {
+    uint32_t frame, line;
+    uint64_t pulse0;
+    int64_t t0_ns, t1_ns;
+    uint32_t n_fired, n_cast, n_echoes, mirror_count, pan_count, status;
+};
+
+struct native_telemetry {
+    uint32_t state;            /* enum head_state, in its order */
+    uint32_t scan;
+    uint64_t pulses, echoes, lines, lost_pulses, late_blocks;
+    uint32_t late_max_us, errors_queued;
+    uint64_t reader_lost_frames; /* of the reader who gets this frame; 0 in the common stream */
+    int64_t utc_ns;            /* UTC of this frame's device time, ns since 1970, 0 when unknown */
+};
+
+enum native_event_code {
+    NATIVE_EV_STATE = 1,       /* a: new state, b: state before */
+    NATIVE_EV_SCAN_START = 2,  /* a: scan number, b: device time of pulse 0, ns */
+    NATIVE_EV_SCAN_END = 3,    /* a: scan number, b: pulses fired, c: pulses lost */
+    NATIVE_EV_OVERRUN = 4,     /* the head could not keep up; a: first lost pulse, b: pulses lost, c: ticks lost */
+    NATIVE_EV_READER_LOST = 5, /* this reader could not follow; a: frames lost now, b: bytes lost now, c: frames lost in all */
+    NATIVE_EV_CONTROL = 6,     /* who may command; a: session number, 0: nobody */
+    NATIVE_EV_ERROR = 7,       /* a: SCPI error number (two's complement) */
+    NATIVE_EV_SETTINGS = 8,    /* a: first pulse with the new settings */
+};
+struct native_event {
+    uint32_t code, reserved;
+    uint64_t a, b, c;
+    char text[96];
+};
+
+/* ---- payload decoding: 0, or SH_EFORMAT when length or content is wrong. No pointer is kept. */
+int native_decode_descriptor(const uint8_t *payload, size_t len, struct native_descriptor *out);
+int native_decode_anchor(const uint8_t *payload, size_t len, struct native_anchor *out);
+int native_decode_points(const uint8_t *payload, size_t len, struct native_points *out);
+void native_decode_point(const uint8_t *payload, uint32_t i, struct native_point *out); /* i < n_points */
+int native_decode_line_end(const uint8_t *payload, size_t len, struct native_line_end *out);
+int native_decode_telemetry(const uint8_t *payload, size_t len, struct native_telemetry *out);
+int native_decode_event(const uint8_t *payload, size_t len, struct native_event *out);
+/* Surfaces payload: u32 first label, u32 count, then per label: u8 len, object, u8 len, material (no NUL).
+ * Calls fn for each; names are NUL-terminated copies that live during the call. */
+int native_decode_surfaces(const uint8_t *payload, size_t len,
+                           void (*fn)(void *ctx, uint32_t label, const char *object, const char *material),
+                           void *ctx);
+
+/* ---- the parser: bytes in, frames and reply lines out, in order.
+ *
+ * Usage: native_parser_room() gives where to put the next bytes and how many fit; native_parser_added() says how
+ * many came; native_parser_next() then gives items until it returns NATIVE_MORE.
+ * Resynchronisation: a sync byte counts only with a correct header CRC; a frame whose payload CRC is wrong is not
+ * skipped but searched from its second byte on, so that losing any bytes costs only the frames they belonged to.
+ * Text is taken only in step: after garbage, reply lines are ignored until the next good frame. */
+enum native_item { NATIVE_MORE = 0, NATIVE_FRAME = 1, NATIVE_TEXT = 2 };
+
+struct native_stats {
+    uint64_t frames, bytes, texts;
+    uint64_t bad_payload, bad_bytes;   /* frames with a wrong payload CRC; bytes skipped in search of a frame */
+    uint64_t seq_gaps, seq_lost;       /* jumps in seq, and frames missing by them */
+};
+
+struct native_parser {
+    uint8_t buf[2 * NATIVE_MAX_FRAME];
+    size_t start, end;
+    int in_step, have_seq;
+    uint32_t next_seq;
+    struct native_stats stats;
+    /* the item found last: valid until the next call of any parser function */
+    struct native_header header;
+    const uint8_t *frame;   /* header and payload as on the wire */
+    const uint8_t *payload;
+    char text[NATIVE_MAX_TEXT]; /* without CR LF */
+};
+
+void native_parser_init(struct native_parser *parser);
+uint8_t *native_parser_room(struct native_parser *parser, size_t *room); /* room is never 0 after NATIVE_MORE */
+void native_parser_added(struct native_parser *parser, size_t n);
+enum native_item native_parser_next(struct native_parser *parser);
+
+/* 1 if a frame with this header belongs to stream_sha256: the hash runs over u8 type, u32 length (LE) and the payload
+ * of each descriptor, anchor, points and line-end frame that has neither NATIVE_REPEAT nor NATIVE_LOCAL. */
+int native_is_hashed(const struct native_header *header);
+
+#endif

@@ -1,0 +1,99 @@
+/* The configuration: YAML through libyaml's document API and one table (config_table.c) of key, type, unit, default,
+ * range and help, which alone gives parsing, defaults, errors, `--help` text and the reference.
+ *
+ * Units: as the key's name says (hz, deg, m). Everything is checked; an error is one line:
+ *   FILE:LINE: KEY: what is wrong; what is allowed
+ * Unknown keys, duplicate keys, trailing text ("30 kHz"), NaN, wrong types and values out of range are errors.
+ * Relative paths in a file are relative to that file. */
+#ifndef FIRMWARE_SIM_CONFIG_H
+#define FIRMWARE_SIM_CONFIG_H
+
+#include <stdint.h>
+#include <stdio.h>
+
+#include "core/err.h"
+#include "core/georef.h"
+#include "core/line.h"
+#include "core/scene.h"
+#include "drivers/link/link.h"
+#include "firmware_sim/head.h"
+
+enum { CONFIG_MAX_MESHES = 64, CONFIG_MAX_LINKS = 8, CONFIG_MAX_STATIONS = 64, CONFIG_PATH_LEN = 512 };
+
+enum config_pace { PACE_REALTIME, PACE_FAST, PACE_STEP };
+
+/* A head profile, config/heads/NAME.yaml: each figure is written `{ value: V, from: data sheet|assumed }`. */
+struct config_profile {
+    char name[32], maker[32], model[64];
+    int64_t prr_min_uhz, prr_max_uhz, lines_min_uhz, lines_max_uhz, pan_max_udeg_s;
+    int64_t fov_min_udeg, fov_max_udeg; /* line angle: 0 forward, 90 up, above 90 backward over the zenith */
+    int64_t pan_min_udeg, pan_max_udeg;
+    uint32_t facets;                    /* lines per turn of the mirror */
+    double optical_gain;                /* beam degrees per mirror degree: 2 polygon, 1 45-degree mirror */
+    double range_min_m, range_max_m;
+    double range_sigma_m, range_sigma_ppm; /* one sigma of the range noise: fixed part, and part per distance */
+    double mirror_counts, pan_counts;   /* encoder counts per turn of the beam angle; 0: ideal (2^32 counts) */
+    uint32_t max_echoes;
+    double boot_s, spin_up_s, spin_down_s;
+};
+
+struct config_mesh {
+    char file[CONFIG_PATH_LEN];
+    enum scene_up up;
+    double scale, offset_m[3];
+};
+
+struct config_station {
+    char name[32];
+    double position_m[3];   /* of the head's origin in the scene frame */
+    double heading_deg;     /* of the head's y axis, clockwise from the scene's y axis (north) */
+    double lat_deg, lon_deg, height_m; /* of the head's origin */
+};
+
+struct config {
+    char file[CONFIG_PATH_LEN];
+    char profile_file[CONFIG_PATH_LEN];
+    struct config_profile profile;
+    /* head: settings at power-up, within the profile (checked) */
+    struct head_settings settings;
+    char serial[32];
+    /* scene */
+    struct config_mesh mesh[CONFIG_MAX_MESHES];
+    uint32_t n_meshes;
+    double scene_tolerance_m;
+    /* stations */
+    struct config_station station[CONFIG_MAX_STATIONS];
+    uint32_t n_stations;
+    /* output */
+    enum georef_crs crs;
+    int utm_zone;
+    enum line_layout layout;
+    double scale_m;         /* 0: the finest of 1e-6 x 10^n m that holds range_max_m in 31 bits */
+    /* links */
+    struct link_spec link[CONFIG_MAX_LINKS];
+    uint32_t n_links;
+    /* noise */
+    int noise_on;           /* 0: exact ranges */
+    uint64_t seed;
+    /* loop */
+    double tick_hz;         /* 100..10000, a divisor of 1e9 */
+    double ahead_ms, queue_ms, late_ms;
+    uint32_t threads;       /* casters; 0: one per processor */
+    enum config_pace pace;
+    double utc_epoch_s;     /* UTC of power-up, s since 1970; 0: unknown */
+};
+
+/* Reads path, its profile, then the `key=value` settings in order (as from --set, each checked the same way, named
+ * `--set KEY` in errors). On failure cfg is unspecified. cfg is large: allocate it. */
+int config_load(const char *path, const char *const *sets, int n_sets, struct config *cfg, struct sh_err *err);
+
+/* The reference: every key with type, unit, default, range and help. */
+void config_print_reference(FILE *out);
+
+/* The profiles in a directory, one line each (name, model, what is data sheet and what is assumed). Returns how many. */
+int config_list_profiles(const char *dir, FILE *out, struct sh_err *err);
+
+/* Finds the directory of profiles: $SCANHEAD_HEADS, beside the configuration (heads/), the installed or the source
+ * one. A profile is named by `head.profile: NAME`, looked up there, or by a path that ends in .yaml. */
+
+#endif
