@@ -1,0 +1,63 @@
+/* Casting: a run of pulses -> echoes. Embree proposes a triangle from float rays in packets of the machine's native
+ * width; the range comes from the triangle's plane in double, kept beside the BVH.
+ *
+ * Frames: the BVH is built in a local frame (prcs minus origin_m), where float is safe; the station is a point of it. Ray
+ * packets are SCHEDULE_PACKET pulses, cut by pulse number. */
+#ifndef CORE_CAST_H
+#define CORE_CAST_H
+
+#include <stdint.h>
+
+#include "core/err.h"
+#include "core/georef.h"
+#include "core/line.h"
+#include "core/scene.h"
+#include "core/schedule.h"
+
+struct bvh;
+
+struct bvh_info {
+    uint32_t packet;     /* rays per Embree call: 16, 8 or 4 */
+    double build_s;
+    uint64_t bytes;      /* BVH and planes */
+};
+
+/* The scene must outlive the BVH. Built with `threads` threads (0: all). */
+int bvh_create(const struct scene *scene, const double origin_m[3], unsigned threads, const struct sh_report *report,
+               struct bvh **out, struct sh_err *err);
+void bvh_free(struct bvh *bvh);
+void bvh_get_info(const struct bvh *bvh, struct bvh_info *info);
+void bvh_origin(const struct bvh *bvh, double origin_m[3]);
+
+/* What stays the same for all pulses of a scan. */
+struct cast_setup {
+    const struct bvh *bvh;
+    const struct georef *georef;   /* geo layout */
+    double station_m[3];           /* the head's origin, prcs */
+    double rotation[9];            /* socs -> prcs, row by row */
+    double range_min_m, range_max_m;
+    int noise_on;
+    double range_sigma_m, range_sigma_ppm;
+    uint64_t noise_key;            /* rng_key(seed, RNG_RANGE) */
+    double mirror_counts, pan_counts; /* encoder counts per turn; 2^32: ideal, positions take the true angle */
+    enum line_layout layout;
+    double range_scale_m, xyz_scale_m;
+};
+
+struct caster;
+
+/* Working memory of one thread. A run may have up to max_pulses pulses. */
+int caster_create(uint32_t max_pulses, struct caster **out, struct sh_err *err);
+void caster_free(struct caster *caster);
+
+/* Fills block (capacity >= run->n) from the run. Returns the number of echoes. Allocates nothing. */
+uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
+                     struct line_block *block);
+
+/* socs -> prcs of a levelled head whose y axis points to heading_rad, clockwise from the scene's y axis. */
+void cast_rotation(double heading_rad, double rotation[9]);
+
+/* Encoder reading of an angle: whole counts, modulo a turn. */
+uint32_t cast_encoder_count(double turn, double counts_per_turn);
+
+#endif

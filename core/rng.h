@@ -1,0 +1,43 @@
+/* The one random generator: counter-based, so that a number depends on (seed, pulse, purpose) and on nothing else.
+ *
+ * Two rounds of the SplitMix64 finaliser (Steele, Lea, Flood, OOPSLA 2014; constants by Stafford, "mix 13") over the pulse
+ * number, each keyed. Pure; any thread. */
+#ifndef CORE_RNG_H
+#define CORE_RNG_H
+
+#include <math.h>
+#include <stdint.h>
+
+#include "core/vecmath.h"
+
+enum rng_purpose { RNG_RANGE = 1 };
+
+VEC_INLINE uint64_t rng_mix(uint64_t x)
+{
+    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
+    x = (x ^ (x >> 27)) * 0x94d049bb133111ebULL;
+    return x ^ (x >> 31);
+}
+
+/* Key of a stream; once per scan, not per pulse. */
+VEC_INLINE uint64_t rng_key(uint64_t seed, enum rng_purpose purpose)
+{
+    return rng_mix(rng_mix(seed + 0x9e3779b97f4a7c15ULL) + (uint64_t)purpose * 0xd1b54a32d192ed03ULL);
+}
+
+VEC_INLINE uint64_t rng_u64(uint64_t key, uint64_t pulse)
+{
+    return rng_mix(rng_mix(pulse * 0x9e3779b97f4a7c15ULL + key) ^ key);
+}
+
+/* Standard normal, by Box and Muller: radius from the upper 32 bits, angle from the lower 32. The largest is 6.7. */
+VEC_INLINE double rng_normal(uint64_t key, uint64_t pulse)
+{
+    uint64_t bits = rng_u64(key, pulse);
+    double u = ((double)(int64_t)(bits >> 32) + 0.5) * 0x1p-32;
+    double sine, cosine;
+    vec_sincos_turn((double)(int64_t)(bits & 0xffffffffU) * 0x1p-32, &sine, &cosine);
+    return sqrt(-2.0 * vec_log(u)) * cosine;
+}
+
+#endif

@@ -1,0 +1,83 @@
+/* Arithmetic that compilers turn into vectors: branch-free, the same bits on every instruction set (no FMA contraction,
+ * see the Makefile), for loops over arrays. */
+#ifndef CORE_VECMATH_H
+#define CORE_VECMATH_H
+
+#include <stdint.h>
+#include <string.h>
+
+/* The best version of a loop for the CPU at hand, chosen once at start. Sanitizers can't follow the resolver. */
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(SH_SANITIZE)
+#define VEC_CLONES __attribute__((target_clones("arch=skylake-avx512", "arch=haswell", "default")))
+#else
+#define VEC_CLONES
+#endif
+#define VEC_INLINE static inline __attribute__((always_inline))
+
+static const double VEC_TURN_RAD = 6.283185307179586477;
+
+/* Nearest whole number of |x| < 2^51, ties to even, as a double and in the low bits of *bits. */
+VEC_INLINE double vec_round(double x, uint64_t *bits)
+{
+    const double magic = 6755399441055744.0; /* 1.5 * 2^52 */
+    double shifted = x + magic;
+    memcpy(bits, &shifted, sizeof *bits);
+    return shifted - magic;
+}
+
+/* Sine and cosine of an angle in turns, |turn| < 2^49: reduction to an eighth of a turn is exact, then Taylor series to
+ * y^15 and y^16 with |y| <= pi/4, whose remainders are below 5e-17. Error below 2.5e-16 (tests/unit/test_vecmath.c). */
+VEC_INLINE void vec_sincos_turn(double turn, double *sine, double *cosine)
+{
+    uint64_t quadrant;
+    double q = vec_round(4.0 * turn, &quadrant);
+    double y = (turn - 0.25 * q) * 6.283185307179586477;
+    double z = y * y;
+    double s = -1.0 / 1307674368000.0;
+    s = s * z + 1.0 / 6227020800.0;
+    s = s * z - 1.0 / 39916800.0;
+    s = s * z + 1.0 / 362880.0;
+    s = s * z - 1.0 / 5040.0;
+    s = s * z + 1.0 / 120.0;
+    s = s * z - 1.0 / 6.0;
+    s = y + y * (z * s);
+    double c = 1.0 / 20922789888000.0;
+    c = c * z - 1.0 / 87178291200.0;
+    c = c * z + 1.0 / 479001600.0;
+    c = c * z - 1.0 / 3628800.0;
+    c = c * z + 1.0 / 40320.0;
+    c = c * z - 1.0 / 720.0;
+    c = c * z + 1.0 / 24.0;
+    c = c * z - 0.5;
+    c = 1.0 + z * c;
+    double a = quadrant & 1 ? c : s, b = quadrant & 1 ? s : c;
+    *sine = quadrant & 2 ? -a : a;
+    *cosine = (quadrant + 1) & 2 ? -b : b;
+}
+
+/* Natural logarithm of a normal positive number: x = 2^e m, m in [sqrt(1/2), sqrt(2)), log m = 2 artanh((m-1)/(m+1)) by its
+ * series to the 21st power, whose remainder is below 1e-17; relative error below 1e-15 away from x = 1. */
+VEC_INLINE double vec_log(double x)
+{
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    uint64_t shifted = bits - 0x3fe6a09e667f3bcdULL; /* bits of sqrt(1/2) */
+    int64_t e = (int64_t)(shifted & 0xfff0000000000000ULL);
+    uint64_t mbits = bits - (uint64_t)e;
+    double m, k = (double)(int32_t)(e >> 52);
+    memcpy(&m, &mbits, sizeof m);
+    double t = (m - 1.0) / (m + 1.0), z = t * t;
+    double p = 1.0 / 21.0;
+    p = p * z + 1.0 / 19.0;
+    p = p * z + 1.0 / 17.0;
+    p = p * z + 1.0 / 15.0;
+    p = p * z + 1.0 / 13.0;
+    p = p * z + 1.0 / 11.0;
+    p = p * z + 1.0 / 9.0;
+    p = p * z + 1.0 / 7.0;
+    p = p * z + 1.0 / 5.0;
+    p = p * z + 1.0 / 3.0;
+    return k * 0.693147180559945309 + 2.0 * (t + t * (z * p));
+}
+
+#endif

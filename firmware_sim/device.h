@@ -1,0 +1,92 @@
+/* The device: commands, states and the scan program, in device time. What a head's main processor does.
+ *
+ * Time is counted in ticks. Casters claim ticks in order, some way ahead of release; a claim carries the state machine and
+ * the scan program to that tick and says what the tick consists of. A command takes effect at the first tick that isn't
+ * claimed yet. Readers of the state see it as of the last released tick, not as of the last claimed one.
+ *
+ * Thread: any; one lock inside, held for microseconds. The pacing thread never takes it. */
+#ifndef FIRMWARE_SIM_DEVICE_H
+#define FIRMWARE_SIM_DEVICE_H
+
+#include <stdatomic.h>
+#include <stdint.h>
+
+#include "core/cast.h"
+#include "drivers/protocol/native.h"
+#include "firmware_sim/command.h"
+#include "firmware_sim/config.h"
+#include "firmware_sim/journal.h"
+#include "firmware_sim/site.h"
+
+enum { DEVICE_MAX_EVENTS = 24 };
+
+/* Counters that casters, pacing thread and readers share. */
+struct device_counters {
+    _Atomic uint64_t pulses, fired, echoes, lines; /* released; pulses: cast ones */
+    _Atomic uint64_t lost_pulses, lost_ticks;      /* cast pulses and ticks that could not be computed in time */
+    _Atomic uint64_t late_blocks, late_max_ns;
+    _Atomic uint64_t reader_lost_frames;
+};
+
+/* What one tick consists of; all copies, so that nobody waits for anybody. Frames leave in the order of the members. */
+struct device_work {
+    uint64_t tick;
+    int64_t t_ns;                     /* device time at the tick's start */
+    uint32_t n_events_before;         /* of event[]: those that go before the points; the rest behind */
+    uint32_t n_events;
+    struct native_event event[DEVICE_MAX_EVENTS];
+    int describe, describe_flags;     /* descriptor and anchor frames, with these flags */
+    struct native_descriptor descriptor;
+    struct native_anchor anchor;
+    uint32_t surfaces_first, surfaces_n; /* names to send; 0: none */
+    int scanning;
+    int64_t scan_t0_ns;               /* device time of the scan's start */
+    struct schedule_segment segment;
+    uint64_t pulse0, pulse_end;       /* pulses of this tick */
+    int cut_short;                    /* the scan stops at pulse_end, within a line */
+    uint32_t station;
+    int telemetry;
+    struct native_telemetry telemetry_frame;
+};
+
+struct device;
+
+struct device_options {
+    int start;               /* scan at once when booted */
+    int one_scan;            /* end the run when the first scan is over */
+    double duration_s;       /* > 0: end the run after this time, from the first scan's start with `start`, else from power-up */
+    const char *journal;     /* NULL: none */
+    const char *replay;      /* NULL: none */
+};
+
+/* site must outlive the device. */
+int device_create(const struct site *site, const struct device_options *options, struct device **out, struct sh_err *err);
+void device_free(struct device *device);
+
+struct device_counters *device_counters(struct device *device);
+
+/* The next tick's work. Returns 0, or 1 when the run is over and there is no next tick. `released`: ticks released so far. */
+int device_claim(struct device *device, uint64_t released, struct device_work *work);
+/* A claimed tick was lost: what it said besides points is said again in a later one. */
+void device_lost(struct device *device, const struct device_work *work);
+/* True while nothing happens without a command: off the clock, the paces `fast` and `step` wait then. */
+int device_is_idle(struct device *device);
+/* Ends the run: a running scan is stopped first. Async-signal-unsafe. */
+void device_end(struct device *device);
+
+/* Carries out one command line for a session (from 1). */
+void device_command(struct device *device, uint32_t session, const char *line, uint64_t released,
+                    struct command_result *out);
+/* A line too long for the command set ended. */
+void device_overlong(struct device *device, uint32_t session, struct command_result *out);
+/* A session has gone; partial: in the middle of a command. Gives control back. */
+void device_session_closed(struct device *device, uint32_t session, const char *who, int partial);
+/* Something for the error queue (enum command_error), and an event on the wire. */
+void device_report(struct device *device, int number, const char *text);
+
+/* Scans begun so far. */
+uint64_t device_scans(struct device *device);
+
+double device_tick_ns(const struct device *device);
+
+#endif

@@ -1,0 +1,169 @@
+/* The device and its commands: making it, carrying commands out, journal and replay. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "firmware_sim/device_private.h"
+
+static void change_settings(struct device *device)
+{
+    if (!device->scanning) return;
+    struct schedule_spec spec;
+    device_fill_spec(device, &spec);
+    schedule_change(&device->segment, &device->segment, &spec, device->pulse_next);
+    device->describe = 1;
+    device_push_event(device, NATIVE_EV_SETTINGS, device->pulse_next, 0, 0, "");
+}
+
+static void stop(struct device *device, enum head_event event, uint64_t tick)
+{
+    if (device->scanning)
+        device->stop_requested = 1; /* the next claim ends the scan and tells the state machine */
+    else
+        device_transition(device, event, tick);
+}
+
+static void carry_out(struct device *device, enum command_effect effect, uint64_t released)
+{
+    switch (effect) {
+    case COMMAND_SETTINGS:
+        change_settings(device);
+        break;
+    case COMMAND_START:
+        device_transition(device, HEAD_EV_START, released);
+        break;
+    case COMMAND_STOP:
+        stop(device, HEAD_EV_STOP, released);
+        break;
+    case COMMAND_RESET:
+        stop(device, HEAD_EV_RESET, released);
+        break;
+    case COMMAND_RELEASE:
+        device_push_event(device, NATIVE_EV_CONTROL, 0, 0, 0, "released");
+        break;
+    case COMMAND_STEP:
+    case COMMAND_NONE:
+        break;
+    }
+}
+
+void device_do_command(struct device *device, uint32_t session, const char *line, uint64_t released,
+                       struct command_result *out)
+{
+    struct command_device *cmd = &device->cmd;
+    cmd->state = device_visible_state(device, released);
+    cmd->t_ns = (int64_t)released * device->tick_ns;
+    command_execute(cmd, session, line, out);
+    if (out->took_control) device_push_event(device, NATIVE_EV_CONTROL, session, 0, 0, "taken");
+    if (out->error != 0)
+        device_push_event(device, NATIVE_EV_ERROR, (uint64_t)(int64_t)out->error, session, 0,
+                          command_error_text(out->error));
+    else if (out->changes && device->journal != NULL && out->effect != COMMAND_STEP)
+        journal_write(device->journal, device->next_tick, cmd->t_ns, session, line);
+    if (out->error == 0) carry_out(device, out->effect, released);
+}
+
+void device_command(struct device *device, uint32_t session, const char *line, uint64_t released,
+                    struct command_result *out)
+{
+    pthread_mutex_lock(&device->lock);
+    device_do_command(device, session, line, released, out);
+    pthread_mutex_unlock(&device->lock);
+}
+
+void device_report(struct device *device, int number, const char *text)
+{
+    pthread_mutex_lock(&device->lock);
+    command_queue_push(&device->cmd.queue, number, text);
+    device_push_event(device, NATIVE_EV_ERROR, (uint64_t)(int64_t)number, 0, 0, text);
+    pthread_mutex_unlock(&device->lock);
+}
+
+void device_overlong(struct device *device, uint32_t session, struct command_result *out)
+{
+    memset(out, 0, sizeof *out);
+    char text[96];
+    snprintf(text, sizeof text, "session %u, longest line %d bytes", session, COMMAND_MAX_LINE);
+    device_report(device, CMD_E_OVERRUN, text);
+    out->error = CMD_E_OVERRUN;
+    snprintf(out->reply, sizeof out->reply, "ERR %d,\"%s; %s\"", CMD_E_OVERRUN, command_error_text(CMD_E_OVERRUN), text);
+}
+
+void device_session_closed(struct device *device, uint32_t session, const char *who, int partial)
+{
+    pthread_mutex_lock(&device->lock);
+    int in_control = device->cmd.control == session;
+    if (in_control) {
+        device->cmd.control = 0;
+        device_push_event(device, NATIVE_EV_CONTROL, 0, 0, 0, "client gone");
+    }
+    int scanning = device->scanning;
+    pthread_mutex_unlock(&device->lock);
+    char text[96];
+    snprintf(text, sizeof text, "session %u, %.60s", session, who);
+    if (partial) device_report(device, CMD_E_PARTIAL, text);
+    if (in_control || scanning) device_report(device, CMD_E_CLIENT_LOST, text);
+}
+
+static void set_limits(struct device *device)
+{
+    const struct config *cfg = device->site->cfg;
+    const struct config_profile *p = &cfg->profile;
+    device->cmd.limits = (struct head_limits){.prr_min_uhz = p->prr_min_uhz,
+                                              .prr_max_uhz = p->prr_max_uhz,
+                                              .lines_min_uhz = p->lines_min_uhz,
+                                              .lines_max_uhz = p->lines_max_uhz,
+                                              .pan_max_udeg_s = p->pan_max_udeg_s,
+                                              .fov_min_udeg = p->fov_min_udeg,
+                                              .fov_max_udeg = p->fov_max_udeg,
+                                              .pan_min_udeg = p->pan_min_udeg,
+                                              .pan_max_udeg = p->pan_max_udeg,
+                                              .n_stations = cfg->n_stations};
+    device->cmd.settings = device->cmd.defaults = cfg->settings;
+    snprintf(device->idn, sizeof device->idn, "%s,%s,%s,scanhead native %d", p->maker, p->model, cfg->serial,
+             NATIVE_VERSION);
+    device->cmd.idn = device->idn;
+    device->cmd.step_allowed = cfg->pace == PACE_STEP;
+}
+
+static int open_journals(struct device *device, struct sh_err *err)
+{
+    int rc = SH_OK;
+    if (device->options.replay != NULL) rc = journal_read(device->options.replay, &device->replay, &device->n_replay, err);
+    if (rc == SH_OK && device->options.journal != NULL) rc = journal_open(device->options.journal, &device->journal, err);
+    return rc;
+}
+
+int device_create(const struct site *site, const struct device_options *options, struct device **out, struct sh_err *err)
+{
+    *out = NULL;
+    struct device *device = calloc(1, sizeof *device);
+    if (device == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
+    pthread_mutex_init(&device->lock, NULL);
+    device->site = site;
+    device->options = *options;
+    device->tick_hz = (uint64_t)llround(site->cfg->tick_hz);
+    device->tick_ns = 1000000000 / (int64_t)device->tick_hz;
+    device->due_tick = device->end_tick = UINT64_MAX;
+    if (options->duration_s > 0.0 && !options->start)
+        device->end_tick = (uint64_t)ceil(options->duration_s * (double)device->tick_hz);
+    set_limits(device);
+    int rc = open_journals(device, err);
+    if (rc != SH_OK) {
+        device_free(device);
+        return rc;
+    }
+    device_transition(device, HEAD_EV_POWER_ON, 0);
+    *out = device;
+    return SH_OK;
+}
+
+void device_free(struct device *device)
+{
+    if (device == NULL) return;
+    if (device->journal != NULL) journal_close(device->journal);
+    journal_free(device->replay, device->n_replay);
+    pthread_mutex_destroy(&device->lock);
+    free(device);
+}

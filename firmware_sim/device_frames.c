@@ -1,0 +1,95 @@
+/* What the device says of itself: descriptor, anchor, telemetry. */
+#include <math.h>
+#include <string.h>
+
+#include "firmware_sim/device_private.h"
+
+static int64_t sweep_udeg(const struct config_profile *profile)
+{
+    return llround(360e6 * profile->optical_gain / profile->facets);
+}
+
+void device_fill_spec(const struct device *device, struct schedule_spec *spec)
+{
+    const struct head_settings *s = &device->cmd.settings;
+    const struct config_profile *profile = &device->site->cfg->profile;
+    *spec = (struct schedule_spec){.prr_uhz = s->prr_uhz,
+                                   .lines_uhz = s->lines_uhz,
+                                   .pan_udeg_s = s->pan_udeg_s,
+                                   .fov_min_udeg = profile->fov_min_udeg,
+                                   .sweep_udeg = sweep_udeg(profile),
+                                   .line_start_udeg = s->line_start_udeg,
+                                   .line_stop_udeg = s->line_stop_udeg,
+                                   .pan_start_udeg = s->pan_start_udeg,
+                                   .pan_stop_udeg = s->pan_stop_udeg,
+                                   .frames = s->frames};
+}
+
+void device_fill_descriptor(const struct device *device, struct native_descriptor *d)
+{
+    const struct config *cfg = device->site->cfg;
+    const struct schedule_spec *spec = &device->segment.spec;
+    struct cast_setup setup;
+    struct bvh_info info;
+    site_cast_setup(device->site, device->station, &setup);
+    bvh_get_info(setup.bvh, &info);
+    memset(d, 0, sizeof *d);
+    memcpy(d->idn, device->idn, sizeof d->idn);
+    memcpy(d->profile, cfg->profile.name, sizeof d->profile);
+    d->layout = cfg->layout == LINE_GEO ? NATIVE_GEO : NATIVE_POLAR;
+    d->isa = info.packet;
+    d->prr_uhz = (uint64_t)spec->prr_uhz;
+    d->lines_uhz = (uint64_t)spec->lines_uhz;
+    d->pan_udeg_s = (uint64_t)spec->pan_udeg_s;
+    d->fov_min_udeg = spec->fov_min_udeg;
+    d->sweep_udeg = spec->sweep_udeg;
+    d->line_start_udeg = spec->line_start_udeg;
+    d->line_stop_udeg = spec->line_stop_udeg;
+    d->pan_start_udeg = spec->pan_start_udeg;
+    d->pan_stop_udeg = spec->pan_stop_udeg;
+    d->mirror_counts_per_turn = setup.mirror_counts;
+    d->pan_counts_per_turn = setup.pan_counts;
+    d->range_scale_m = setup.range_scale_m;
+    d->range_min_m = setup.range_min_m;
+    d->range_max_m = setup.range_max_m;
+    d->max_echoes = cfg->profile.max_echoes;
+    d->n_surfaces = device->site->scene->n_surfaces;
+    d->frames = spec->frames;
+    d->scan = device->scan;
+    d->seed = cfg->seed;
+}
+
+void device_fill_anchor(const struct device *device, struct native_anchor *a)
+{
+    static const uint32_t crs[] = {[GEOREF_LOCAL] = NATIVE_CRS_LOCAL, [GEOREF_ECEF] = NATIVE_CRS_ECEF,
+                                   [GEOREF_UTM] = NATIVE_CRS_UTM};
+    const struct site_station *s = &device->site->station[device->station];
+    memset(a, 0, sizeof *a);
+    a->crs = crs[device->site->cfg->crs];
+    a->epsg = (uint32_t)georef_epsg(s->georef);
+    a->station = device->station + 1;
+    georef_anchor(s->georef, a->anchor);
+    a->scale_m = device->site->scale_m;
+    a->lat_deg = s->station->lat_deg;
+    a->lon_deg = s->station->lon_deg;
+    a->height_m = s->station->height_m;
+    memcpy(a->station_m, s->station->position_m, sizeof a->station_m);
+    memcpy(a->rotation, s->rotation, sizeof a->rotation);
+}
+
+void device_fill_telemetry(const struct device *device, uint64_t tick, struct native_telemetry *t)
+{
+    const struct device_counters *c = &device->counters;
+    double epoch_s = device->site->cfg->utc_epoch_s;
+    memset(t, 0, sizeof *t);
+    t->state = (uint32_t)device->state;
+    t->scan = device->scan;
+    t->pulses = atomic_load(&c->pulses);
+    t->echoes = atomic_load(&c->echoes);
+    t->lines = atomic_load(&c->lines);
+    t->lost_pulses = atomic_load(&c->lost_pulses);
+    t->late_blocks = atomic_load(&c->late_blocks);
+    t->late_max_us = (uint32_t)(atomic_load(&c->late_max_ns) / 1000);
+    t->errors_queued = device->cmd.queue.count;
+    t->utc_ns = epoch_s > 0.0 ? llround(epoch_s * 1e6) * 1000 + (int64_t)tick * device->tick_ns : 0;
+}

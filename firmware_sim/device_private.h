@@ -1,0 +1,65 @@
+/* Private to device*.c. */
+#ifndef FIRMWARE_SIM_DEVICE_PRIVATE_H
+#define FIRMWARE_SIM_DEVICE_PRIVATE_H
+
+#include <pthread.h>
+
+#include "firmware_sim/device.h"
+
+enum { DEVICE_MAX_PENDING = 256, DEVICE_MAX_CHANGES = 32, DEVICE_SURFACES_A_FRAME = 64 };
+
+struct device {
+    pthread_mutex_t lock;
+    const struct site *site;
+    struct device_options options;
+    struct device_counters counters;
+    struct command_device cmd;
+    char idn[96];
+    uint64_t tick_hz;
+    int64_t tick_ns;
+
+    uint64_t next_tick;            /* to be claimed */
+    enum head_state state;         /* as of next_tick */
+    uint64_t due_tick;             /* of the next timed transition; UINT64_MAX: none */
+    struct {
+        uint64_t tick;
+        enum head_state state;
+    } change[DEVICE_MAX_CHANGES];  /* the last changes: what a reader sees lags behind the claims */
+    uint32_t n_changes;
+
+    int scanning;
+    uint32_t scan;                 /* number, from 1 */
+    uint64_t scan_tick0, pulse_next, scan_lost0;
+    struct schedule_segment segment;
+    uint32_t station;              /* of the scan at hand, from 0 */
+    int describe;                  /* descriptor and anchor are due, as news */
+    int stop_requested;
+
+    struct native_event pending[DEVICE_MAX_PENDING];
+    uint32_t n_pending, pending_dropped;
+    uint64_t lost_said;            /* lost ticks that an event has told of */
+    uint64_t lost_pulses_said;
+
+    int ending, over;
+    uint64_t end_tick;             /* UINT64_MAX: none */
+    struct journal *journal;
+    struct journal_entry *replay;
+    size_t n_replay, replay_at;
+};
+
+/* With the lock held: */
+void device_push_event(struct device *device, enum native_event_code code, uint64_t a, uint64_t b, uint64_t c,
+                       const char *text);
+/* Applies a state event at a tick; does nothing where the machine refuses it. */
+void device_transition(struct device *device, enum head_event event, uint64_t tick);
+enum head_state device_visible_state(const struct device *device, uint64_t released);
+void device_do_command(struct device *device, uint32_t session, const char *line, uint64_t released,
+                       struct command_result *out);
+
+/* device_frames.c: what the frames say. */
+void device_fill_descriptor(const struct device *device, struct native_descriptor *d);
+void device_fill_anchor(const struct device *device, struct native_anchor *a);
+void device_fill_telemetry(const struct device *device, uint64_t tick, struct native_telemetry *t);
+void device_fill_spec(const struct device *device, struct schedule_spec *spec);
+
+#endif

@@ -1,0 +1,200 @@
+/* Casters and the pacing thread. */
+#include <errno.h>
+#include <sched.h>
+#include <string.h>
+
+#include "drivers/protocol/native_encode.h"
+#include "firmware_sim/clock.h"
+#include "firmware_sim/loop_private.h"
+
+void loop_poke(struct loop *loop)
+{
+    for (uint32_t i = 0; i < loop->n_threads; i++)
+        sem_post(&loop->work);
+    if (loop_waits(loop)) {
+        sem_post(&loop->ready);
+        sem_post(&loop->progress);
+    }
+}
+
+/* With claim_lock held. */
+static int may_claim(struct loop *loop)
+{
+    uint64_t released = atomic_load(&loop->ring.released);
+    if (loop->next_tick >= released + loop->ahead_ticks) return 0;
+    if (loop->cfg->pace == PACE_STEP && loop->next_tick >= atomic_load(&loop->granted)) return 0;
+    return loop->cfg->pace != PACE_FAST || !device_is_idle(loop->device);
+}
+
+static void tick_lost(struct loop *loop, const struct device_work *work)
+{
+    atomic_fetch_add(&loop->counters->lost_pulses, worker_count_cast(work));
+    atomic_fetch_add(&loop->counters->lost_ticks, 1);
+    device_lost(loop->device, work);
+}
+
+/* Claims the next tick. 1: work and slot are set (slot NULL: lost already); 0: not now; -1: the run is over. */
+static int claim(struct loop *loop, struct device_work *work, struct ring_slot **slot)
+{
+    int got = 0;
+    pthread_mutex_lock(&loop->claim_lock);
+    if (atomic_load(&loop->stopping)) {
+        got = -1;
+    } else if (may_claim(loop)) {
+        if (device_claim(loop->device, atomic_load(&loop->ring.released), work) != 0) {
+            atomic_store(&loop->final_tick, loop->next_tick);
+            got = -1;
+        } else {
+            *slot = ring_claim(&loop->ring, work->tick);
+            loop->next_tick = work->tick + 1;
+            got = 1;
+        }
+    }
+    pthread_mutex_unlock(&loop->claim_lock);
+    return got;
+}
+
+void *loop_caster_main(void *arg)
+{
+    struct loop_caster *caster = arg;
+    struct loop *loop = caster->loop;
+    struct device_work work;
+    for (;;) {
+        struct ring_slot *slot = NULL;
+        int got = claim(loop, &work, &slot);
+        if (got < 0) break;
+        if (got == 0) {
+            while (sem_wait(&loop->work) != 0 && errno == EINTR)
+                continue;
+            continue;
+        }
+        if (slot != NULL) worker_fill(caster->worker, &work, slot, loop->slot_bytes);
+        if (slot == NULL || !ring_ready(&loop->ring, slot, work.tick)) tick_lost(loop, &work);
+        if (loop_waits(loop)) sem_post(&loop->ready);
+    }
+    if (loop_waits(loop)) sem_post(&loop->ready);
+    sem_post(&loop->work); /* the next one learns of the end, too */
+    return NULL;
+}
+
+static uint32_t late_bucket(uint64_t ns)
+{
+    if (ns < 8) return (uint32_t)ns;
+    uint32_t top = 63U - (uint32_t)__builtin_clzll(ns);
+    return (top - 2) * 8 + (uint32_t)(ns >> (top - 3) & 7);
+}
+
+static void wake_all(struct loop *loop)
+{
+    for (uint32_t i = 0; i < loop->n_pumps; i++)
+        pump_wake(loop->pump[i]);
+    if (loop->hasher != NULL) hasher_wake(loop->hasher);
+}
+
+/* Line ends get their number of echoes; 0 says that blocks of the line are missing. */
+static void finish_lines(struct loop *loop, struct ring_slot *slot)
+{
+    for (uint32_t i = 0; i < slot->n_marks; i++) {
+        struct ring_mark *mark = &slot->mark[i];
+        mark->end.n_echoes = loop->line_broken ? 0 : loop->line_echoes + mark->echoes_before;
+        native_encode_line_end(slot->bytes + mark->frame_at, loop->slot_bytes - mark->frame_at, &mark->end,
+                               mark->scan_t0_ns);
+        loop->line_echoes = 0;
+        loop->line_broken = 0;
+    }
+    loop->line_echoes += slot->echoes_tail;
+}
+
+static void count(struct loop *loop, const struct ring_slot *slot, int64_t now_ns)
+{
+    struct device_counters *c = loop->counters;
+    atomic_fetch_add(&c->pulses, slot->n_cast);
+    atomic_fetch_add(&c->fired, slot->n_fired);
+    atomic_fetch_add(&c->echoes, slot->n_echoes);
+    atomic_fetch_add(&c->lines, slot->n_lines);
+    if (slot->n_fired == 0) return;
+    if (atomic_load(&loop->first_pulse_ns) == 0) atomic_store(&loop->first_pulse_ns, now_ns);
+    atomic_store(&loop->last_pulse_ns, now_ns);
+}
+
+static void release(struct loop *loop, struct ring_slot *slot, uint64_t tick, int64_t now_ns)
+{
+    finish_lines(loop, slot);
+    slot->first_seq = loop->seq;
+    for (uint32_t at = 0; at < slot->len;)
+        at += (uint32_t)native_seal(slot->bytes + at, loop->seq++);
+    count(loop, slot, now_ns);
+    int wake = slot->len != 0 || loop->cfg->pace == PACE_STEP;
+    ring_release(&loop->ring, tick);
+    if (wake) wake_all(loop);
+    sem_post(&loop->work);
+}
+
+static void note_late(struct loop *loop, int64_t late_ns)
+{
+    uint64_t ns = late_ns > 0 ? (uint64_t)late_ns : 0;
+    atomic_fetch_add(&loop->late[late_bucket(ns)], 1);
+    if (late_ns > loop->tick_ns) atomic_fetch_add(&loop->counters->late_blocks, 1);
+    if (ns > atomic_load(&loop->counters->late_max_ns)) atomic_store(&loop->counters->late_max_ns, ns);
+}
+
+static void pace_realtime(struct loop *loop)
+{
+    const int64_t late_ns = (int64_t)(loop->cfg->late_ms * 1e6);
+    int64_t epoch_ns = clock_now_ns(), credit_ns = 0;
+    for (uint64_t tick = 0; !atomic_load(&loop->stopping) && tick != atomic_load(&loop->final_tick);) {
+        int64_t due_ns = epoch_ns + (int64_t)(tick + 1) * loop->tick_ns;
+        int64_t now_ns = clock_now_ns();
+        /* Not ready in time: look again on the next beat of the clock. */
+        int64_t wake_ns = due_ns > now_ns ? due_ns : now_ns + loop->tick_ns - (now_ns - epoch_ns) % loop->tick_ns;
+        if (due_ns > now_ns || ring_peek(&loop->ring, tick) == NULL) {
+            clock_sleep_until_ns(wake_ns);
+            now_ns = clock_now_ns();
+            if (now_ns - wake_ns > credit_ns) credit_ns = now_ns - wake_ns;
+        }
+        struct ring_slot *slot = ring_peek(&loop->ring, tick);
+        if (slot != NULL) {
+            note_late(loop, now_ns - due_ns);
+            if (now_ns - due_ns <= loop->tick_ns) credit_ns = 0;
+            release(loop, slot, tick++, now_ns);
+        } else if (now_ns - due_ns > late_ns + credit_ns && ring_lose(&loop->ring, tick)) {
+            tick++;
+            loop->line_broken = 1;
+            sem_post(&loop->work);
+        }
+    }
+}
+
+static int readers_have_room(struct loop *loop, uint64_t tick)
+{
+    for (int i = 0; i < RING_MAX_READERS; i++)
+        if (atomic_load(&loop->reader[i].active) && atomic_load(&loop->reader[i].cursor) + loop->ring.queue_ticks <= tick + 1)
+            return 0;
+    return 1;
+}
+
+static void pace_waiting(struct loop *loop)
+{
+    for (uint64_t tick = 0; !atomic_load(&loop->stopping) && tick != atomic_load(&loop->final_tick);) {
+        struct ring_slot *slot = ring_peek(&loop->ring, tick);
+        if (slot == NULL) {
+            sem_wait(&loop->ready);
+        } else if (!readers_have_room(loop, tick)) {
+            sem_wait(&loop->progress);
+        } else {
+            release(loop, slot, tick++, clock_now_ns());
+        }
+    }
+}
+
+void *loop_pacer_main(void *arg)
+{
+    struct loop *loop = arg;
+    if (loop_waits(loop))
+        pace_waiting(loop);
+    else
+        pace_realtime(loop);
+    atomic_store(&loop->pacer_done, 1);
+    wake_all(loop);
+    return NULL;
+}

@@ -1,0 +1,360 @@
+/* A link with its thread: frames and replies out, command lines in, for each of the link's sessions.
+ *
+ * A session has a cursor into the ring and a private copy of what it is writing, so that a slow reader holds up nobody:
+ * when the ring has gone on too far it loses whole frames, is told so in a frame of its own, and goes on with the present. */
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include "drivers/protocol/native_encode.h"
+#include "firmware_sim/clock.h"
+#include "firmware_sim/loop_private.h"
+
+enum {
+    REPLY_ROOM = 8192,
+    BATCH_BYTES = 131072,  /* small ticks are written together up to this */
+    READ_BYTES = 4096,
+    DRAIN_NS = 2000000000, /* at the end a reader may take this long between two bytes */
+};
+
+struct session {
+    int open, lagging;
+    uint32_t id;            /* from 1, over all links */
+    int reader;
+    uint64_t cursor;
+    int have_seq;
+    uint32_t next_seq;
+    uint64_t lost_frames;
+    struct command_lines lines;
+    uint8_t *out;
+    uint32_t out_len, out_pos;
+    char reply[REPLY_ROOM];
+    uint32_t reply_len;
+    int replies_dropped;
+    int stepping;           /* the reply to TIME:STEP waits until this tick is released */
+    uint64_t step_tick;
+    char step_reply[COMMAND_MAX_REPLY];
+    char peer[64];
+    int64_t moved_ns;       /* when a byte last went out */
+};
+
+struct pump {
+    struct loop *loop;
+    const struct link_ops *ops;
+    void *link;
+    int wake_fd;
+    uint32_t out_cap;
+    struct session session[LINK_MAX_SESSIONS];
+    pthread_t thread;
+    int running;
+    int busy;
+};
+
+int pump_open(struct loop *loop, uint32_t index, const struct link_spec *spec, struct pump **out, struct sh_err *err)
+{
+    *out = NULL;
+    struct pump *pump = calloc(1, sizeof *pump);
+    if (pump == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
+    pump->loop = loop;
+    pump->ops = link_ops_get(spec->type);
+    pump->out_cap = loop->slot_bytes + BATCH_BYTES + REPLY_ROOM;
+    pump->wake_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    int rc = pump->wake_fd < 0 ? sh_fail(err, SH_EIO, "eventfd: %s", strerror(errno)) : SH_OK;
+    for (uint32_t i = 0; i < LINK_MAX_SESSIONS && rc == SH_OK; i++) {
+        struct session *s = &pump->session[i];
+        s->id = index * LINK_MAX_SESSIONS + i + 1;
+        s->reader = (int)(s->id - 1);
+    }
+    if (rc == SH_OK) rc = pump->ops->open(spec, &pump->link, err);
+    if (rc != SH_OK) {
+        pump_close(pump);
+        return rc;
+    }
+    *out = pump;
+    return SH_OK;
+}
+
+void pump_close(struct pump *pump)
+{
+    if (pump == NULL) return;
+    if (pump->link != NULL) pump->ops->close(pump->link);
+    if (pump->wake_fd >= 0) close(pump->wake_fd);
+    for (uint32_t i = 0; i < LINK_MAX_SESSIONS; i++)
+        free(pump->session[i].out);
+    free(pump);
+}
+
+void pump_endpoint(const struct pump *pump, char *buf, size_t len)
+{
+    pump->ops->endpoint(pump->link, buf, len);
+}
+
+const char *pump_type(const struct pump *pump)
+{
+    return pump->ops->name;
+}
+
+void pump_wake(struct pump *pump)
+{
+    uint64_t one = 1;
+    ssize_t n = write(pump->wake_fd, &one, sizeof one);
+    (void)n; /* a full counter is a wake-up, too */
+}
+
+static void set_active(struct pump *pump, struct session *s, int active)
+{
+    struct loop_reader *reader = &pump->loop->reader[s->reader];
+    atomic_store(&reader->cursor, s->cursor);
+    atomic_store(&reader->active, active);
+    if (loop_waits(pump->loop)) sem_post(&pump->loop->progress);
+}
+
+static void open_session(struct pump *pump, struct session *s, const char *peer)
+{
+    if (s->out == NULL) s->out = malloc(pump->out_cap);
+    if (s->out == NULL) {
+        device_report(pump->loop->device, CMD_E_REFUSED, "no memory for a session");
+        return;
+    }
+    s->open = 1;
+    s->cursor = atomic_load(&pump->loop->ring.released);
+    s->have_seq = s->lagging = s->stepping = s->replies_dropped = 0;
+    s->lost_frames = 0;
+    s->out_len = s->out_pos = s->reply_len = 0;
+    s->moved_ns = clock_now_ns();
+    memset(&s->lines, 0, sizeof s->lines);
+    snprintf(s->peer, sizeof s->peer, "%s", peer);
+    set_active(pump, s, 1);
+}
+
+static void close_session(struct pump *pump, struct session *s)
+{
+    if (!s->open) return;
+    s->open = 0;
+    set_active(pump, s, 0);
+    device_session_closed(pump->loop->device, s->id, s->peer, s->lines.len != 0 || s->lines.overrun);
+    loop_poke(pump->loop);
+}
+
+static void add_reply(struct session *s, const char *text)
+{
+    size_t n = strlen(text);
+    if (n == 0) return;
+    if (s->reply_len + n + 2 > REPLY_ROOM) {
+        s->replies_dropped++;
+        return;
+    }
+    memcpy(s->reply + s->reply_len, text, n);
+    memcpy(s->reply + s->reply_len + n, "\r\n", 2);
+    s->reply_len += (uint32_t)n + 2;
+}
+
+static void start_step(struct pump *pump, struct session *s, const struct command_result *result)
+{
+    struct loop *loop = pump->loop;
+    uint64_t total = atomic_fetch_add(&loop->granted_ns, (uint64_t)result->step_ns) + (uint64_t)result->step_ns;
+    s->step_tick = total / (uint64_t)loop->tick_ns;
+    atomic_store(&loop->granted, s->step_tick);
+    s->stepping = 1;
+    memcpy(s->step_reply, result->reply, sizeof s->step_reply);
+}
+
+static void do_line(struct pump *pump, struct session *s, enum command_line_kind kind)
+{
+    struct command_result result;
+    uint64_t released = atomic_load(&pump->loop->ring.released);
+    if (kind == COMMAND_LINE_OVERRUN)
+        device_overlong(pump->loop->device, s->id, &result);
+    else
+        device_command(pump->loop->device, s->id, s->lines.buf, released, &result);
+    if (result.effect == COMMAND_STEP)
+        start_step(pump, s, &result);
+    else
+        add_reply(s, result.reply);
+    loop_poke(pump->loop);
+}
+
+/* Reads what there is, as long as replies have room: a client that never reads its replies stops being heard. */
+static void read_commands(struct pump *pump, struct session *s, int index)
+{
+    unsigned char buf[READ_BYTES];
+    ssize_t n = pump->ops->read(pump->link, index, buf, sizeof buf);
+    for (ssize_t i = 0; i < n; i++) {
+        enum command_line_kind kind = command_lines_feed(&s->lines, buf[i]);
+        if (kind != COMMAND_LINE_NONE) do_line(pump, s, kind);
+    }
+    if (s->replies_dropped != 0) {
+        device_report(pump->loop->device, CMD_E_OVERRUN, "a client does not read its replies; some were dropped");
+        s->replies_dropped = 0;
+    }
+}
+
+/* Tells the reader, in a frame of its own, and the error queue once per episode. */
+static void say_lost(struct pump *pump, struct session *s, uint32_t frames)
+{
+    struct loop *loop = pump->loop;
+    s->lost_frames += frames;
+    atomic_fetch_add(&loop->counters->reader_lost_frames, frames);
+    struct native_event event = {.code = NATIVE_EV_READER_LOST, .a = frames, .c = s->lost_frames};
+    snprintf(event.text, sizeof event.text, "%u frames lost: the reader is too slow", frames);
+    int64_t t_ns = (int64_t)atomic_load(&loop->ring.released) * loop->tick_ns;
+    s->out_len += (uint32_t)native_encode_event(s->out + s->out_len, pump->out_cap - s->out_len, &event, t_ns, NATIVE_LOCAL);
+    if (!s->lagging) {
+        char text[96];
+        snprintf(text, sizeof text, "session %u, %.50s", s->id, s->peer);
+        device_report(loop->device, CMD_E_READER, text);
+    }
+    s->lagging = 1;
+}
+
+/* One tick into the buffer. Returns 0 when there is none or no room. */
+static int take_tick(struct pump *pump, struct session *s)
+{
+    struct loop *loop = pump->loop;
+    uint32_t len = 0, n_frames = 0, first_seq = 0;
+    uint32_t at = s->out_len + REPLY_ROOM / 8; /* leaves room for a frame that says what was lost */
+    if (at >= pump->out_cap) return 0;
+    enum ring_read got =
+        ring_read(&loop->ring, s->reader, s->cursor, s->out + at, pump->out_cap - at, &len, &n_frames, &first_seq);
+    if (got == RING_NONE || (got == RING_READ && len > pump->out_cap - at)) return 0;
+    uint64_t released = atomic_load(&loop->ring.released);
+    if (got == RING_LOST && s->cursor + loop->ring.queue_ticks < released) {
+        s->cursor = released - loop->ring.queue_ticks / 2; /* half a queue of room to recover */
+        return 1;
+    }
+    s->cursor++;
+    if (got != RING_READ || n_frames == 0) return 1;
+    if (s->have_seq && first_seq != s->next_seq)
+        say_lost(pump, s, first_seq - s->next_seq);
+    else if (released - s->cursor < loop->ring.queue_ticks / 8)
+        s->lagging = 0;
+    s->have_seq = 1;
+    s->next_seq = first_seq + n_frames;
+    memmove(s->out + s->out_len, s->out + at, len);
+    s->out_len += len;
+    return 1;
+}
+
+static void fill(struct pump *pump, struct session *s)
+{
+    s->out_len = s->out_pos = 0;
+    uint64_t released = atomic_load(&pump->loop->ring.released);
+    if (s->stepping && (released >= s->step_tick || atomic_load(&pump->loop->pacer_done))) {
+        s->stepping = 0;
+        add_reply(s, s->step_reply);
+    }
+    memcpy(s->out, s->reply, s->reply_len);
+    s->out_len = s->reply_len;
+    s->reply_len = 0;
+    while (s->out_len < BATCH_BYTES && take_tick(pump, s))
+        continue;
+    struct loop_reader *reader = &pump->loop->reader[s->reader];
+    atomic_store(&reader->cursor, s->cursor);
+    if (loop_waits(pump->loop)) sem_post(&pump->loop->progress);
+}
+
+/* Writes until the link is full (1) or there is nothing left (0). */
+static int write_out(struct pump *pump, struct session *s, int index)
+{
+    for (;;) {
+        if (s->out_pos == s->out_len) fill(pump, s);
+        if (s->out_pos == s->out_len) return 0;
+        ssize_t n = pump->ops->write(pump->link, index, s->out + s->out_pos, s->out_len - s->out_pos);
+        if (n == 0) return 1;
+        if (n < 0) {
+            if (n != SH_ECLOSED) {
+                struct sh_err why;
+                sh_fail(&why, (int)n, "link %s: writing failed", pump->ops->name);
+                sh_warn(pump->loop->options.report, "%s", why.text);
+            }
+            close_session(pump, s);
+            return 0;
+        }
+        s->out_pos += (uint32_t)n;
+        s->moved_ns = clock_now_ns();
+    }
+}
+
+static void handle(struct pump *pump, const struct link_event *event)
+{
+    struct session *s = &pump->session[event->session];
+    switch (event->kind) {
+    case LINK_OPENED:
+        open_session(pump, s, event->peer);
+        break;
+    case LINK_CLOSED:
+        close_session(pump, s);
+        break;
+    case LINK_READABLE:
+        if (s->open) read_commands(pump, s, event->session);
+        break;
+    case LINK_REFUSED:
+        device_report(pump->loop->device, CMD_E_REFUSED, event->peer);
+        loop_poke(pump->loop);
+        break;
+    case LINK_WRITABLE:
+    case LINK_WOKEN:
+        break;
+    }
+}
+
+/* True while some session has something to bring out and its reader takes it. */
+static int has_more(struct pump *pump)
+{
+    uint64_t released = atomic_load(&pump->loop->ring.released);
+    for (int i = 0; i < LINK_MAX_SESSIONS; i++) {
+        struct session *s = &pump->session[i];
+        int pending = s->open && (s->out_pos < s->out_len || s->cursor < released || s->reply_len != 0);
+        if (pending && clock_now_ns() - s->moved_ns < DRAIN_NS) return 1;
+    }
+    return 0;
+}
+
+static void *pump_main(void *arg)
+{
+    struct pump *pump = arg;
+    struct loop *loop = pump->loop;
+    struct link_event events[LINK_MAX_EVENTS];
+    uint32_t want_write = 0;
+    for (;;) {
+        int over = atomic_load(&loop->pacer_done);
+        if (over && !has_more(pump)) break;
+        int n = pump->ops->poll(pump->link, pump->wake_fd, want_write, over ? 50 : -1, events, LINK_MAX_EVENTS);
+        if (n < 0) {
+            sh_warn(loop->options.report, "link %s: poll failed; the link is given up", pump->ops->name);
+            break;
+        }
+        for (int i = 0; i < n; i++)
+            handle(pump, &events[i]);
+        want_write = 0;
+        for (int i = 0; i < LINK_MAX_SESSIONS; i++)
+            if (pump->session[i].open && write_out(pump, &pump->session[i], i)) want_write |= 1U << i;
+    }
+    for (int i = 0; i < LINK_MAX_SESSIONS; i++)
+        if (pump->session[i].open) set_active(pump, &pump->session[i], 0);
+    atomic_fetch_sub(&loop->pumps_busy, 1);
+    return NULL;
+}
+
+int pump_start(struct pump *pump, struct sh_err *err)
+{
+    atomic_fetch_add(&pump->loop->pumps_busy, 1);
+    int rc = pthread_create(&pump->thread, NULL, pump_main, pump);
+    if (rc != 0) {
+        atomic_fetch_sub(&pump->loop->pumps_busy, 1);
+        return sh_fail(err, SH_EIO, "link %s: no thread: %s", pump->ops->name, strerror(rc));
+    }
+    pump->running = 1;
+    return SH_OK;
+}
+
+void pump_join(struct pump *pump)
+{
+    if (!pump->running) return;
+    pump_wake(pump);
+    pthread_join(pump->thread, NULL);
+    pump->running = 0;
+}

@@ -1,0 +1,121 @@
+#include "firmware_sim/site.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/rng.h"
+
+static int load_scene(struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    struct scene_mesh_spec spec[CONFIG_MAX_MESHES];
+    for (uint32_t i = 0; i < cfg->n_meshes; i++) {
+        const struct config_mesh *mesh = &cfg->mesh[i];
+        spec[i] = (struct scene_mesh_spec){.file = mesh->file, .up = mesh->up, .scale = mesh->scale};
+        memcpy(spec[i].offset_m, mesh->offset_m, sizeof spec[i].offset_m);
+    }
+    return scene_load(spec, cfg->n_meshes, cfg->scene_tolerance_m, report, &site->scene, err);
+}
+
+static double distance_m(const double a[3], const double b[3])
+{
+    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
+}
+
+static int find_bvh(struct site *site, const double station_m[3], const struct sh_report *report, struct bvh **out,
+                    struct sh_err *err)
+{
+    for (uint32_t i = 0; i < site->n_bvh; i++) {
+        double origin_m[3];
+        bvh_origin(site->bvh[i], origin_m);
+        if (distance_m(origin_m, station_m) <= SITE_BVH_REACH_M) {
+            *out = site->bvh[i];
+            return SH_OK;
+        }
+    }
+    int rc = bvh_create(site->scene, station_m, site->cfg->threads, report, out, err);
+    if (rc == SH_OK) site->bvh[site->n_bvh++] = *out;
+    return rc;
+}
+
+static int add_station(struct site *site, const struct config_station *station, const struct sh_report *report,
+                       struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    struct site_station *s = &site->station[site->n_stations];
+    struct georef_spec spec = {.crs = cfg->crs, .utm_zone = cfg->utm_zone, .lat_deg = station->lat_deg,
+                               .lon_deg = station->lon_deg, .height_m = station->height_m};
+    memcpy(spec.station_m, station->position_m, sizeof spec.station_m);
+    s->station = station;
+    cast_rotation(station->heading_deg * M_PI / 180.0, s->rotation);
+    int rc = find_bvh(site, station->position_m, report, &s->bvh, err);
+    if (rc == SH_OK) rc = georef_create(&spec, &s->georef, err);
+    if (rc == SH_OK) site->n_stations++;
+    return rc;
+}
+
+/* The finest 1e-6 x 10^n m with which the head's whole range fits into 31 bits, with 1 % left for scale and noise. */
+static double choose_scale(const struct config *cfg)
+{
+    if (cfg->scale_m > 0.0) return cfg->scale_m;
+    double scale_m = 1e-6;
+    while (cfg->profile.range_max_m * 1.01 / scale_m > 2147483647.0)
+        scale_m *= 10.0;
+    return scale_m;
+}
+
+int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err)
+{
+    *out = NULL;
+    struct site *site = calloc(1, sizeof *site);
+    if (site == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
+    site->cfg = cfg;
+    site->scale_m = choose_scale(cfg);
+    int rc = load_scene(site, report, err);
+    for (uint32_t i = 0; i < cfg->n_stations && rc == SH_OK; i++)
+        rc = add_station(site, &cfg->station[i], report, err);
+    if (rc != SH_OK) {
+        site_free(site);
+        return rc;
+    }
+    *out = site;
+    return SH_OK;
+}
+
+void site_free(struct site *site)
+{
+    if (site == NULL) return;
+    for (uint32_t i = 0; i < site->n_stations; i++)
+        georef_free(site->station[i].georef);
+    for (uint32_t i = 0; i < site->n_bvh; i++)
+        bvh_free(site->bvh[i]);
+    scene_free(site->scene);
+    free(site);
+}
+
+static double counts_or_ideal(double counts)
+{
+    return counts > 0.0 ? counts : 4294967296.0;
+}
+
+void site_cast_setup(const struct site *site, uint32_t station, struct cast_setup *setup)
+{
+    const struct config_profile *profile = &site->cfg->profile;
+    const struct site_station *s = &site->station[station];
+    memset(setup, 0, sizeof *setup);
+    setup->bvh = s->bvh;
+    setup->georef = s->georef;
+    memcpy(setup->station_m, s->station->position_m, sizeof setup->station_m);
+    memcpy(setup->rotation, s->rotation, sizeof setup->rotation);
+    setup->range_min_m = profile->range_min_m;
+    setup->range_max_m = profile->range_max_m;
+    setup->noise_on = site->cfg->noise_on;
+    setup->range_sigma_m = profile->range_sigma_m;
+    setup->range_sigma_ppm = profile->range_sigma_ppm;
+    setup->noise_key = rng_key(site->cfg->seed, RNG_RANGE);
+    setup->mirror_counts = counts_or_ideal(profile->mirror_counts);
+    setup->pan_counts = counts_or_ideal(profile->pan_counts);
+    setup->layout = site->cfg->layout;
+    setup->range_scale_m = setup->xyz_scale_m = site->scale_m;
+}

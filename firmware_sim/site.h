@@ -1,0 +1,38 @@
+/* The site: what a configuration loads once and all scans share, constant afterwards. The scene, its BVHs, and per
+ * station the place of the head. */
+#ifndef FIRMWARE_SIM_SITE_H
+#define FIRMWARE_SIM_SITE_H
+
+#include "core/cast.h"
+#include "core/georef.h"
+#include "core/scene.h"
+#include "firmware_sim/config.h"
+
+struct site_station {
+    const struct config_station *station;
+    struct bvh *bvh;            /* shared where stations are near each other */
+    struct georef *georef;
+    double rotation[9];         /* socs -> prcs */
+};
+
+struct site {
+    const struct config *cfg;
+    struct scene *scene;
+    struct bvh *bvh[CONFIG_MAX_STATIONS];
+    uint32_t n_bvh;
+    struct site_station station[CONFIG_MAX_STATIONS];
+    uint32_t n_stations;
+    double scale_m;             /* of positions and ranges on the wire, metres per count */
+};
+
+/* Stations further than this from a BVH's origin get one of their own: a float there has steps of 0.06 mm. */
+#define SITE_BVH_REACH_M 1000.0
+
+/* cfg must outlive the site. */
+int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err);
+void site_free(struct site *site);
+
+/* What the casters need to scan from a station (0..n_stations-1). */
+void site_cast_setup(const struct site *site, uint32_t station, struct cast_setup *setup);
+
+#endif

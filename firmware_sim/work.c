@@ -1,0 +1,204 @@
+#include "firmware_sim/work.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "drivers/protocol/native_encode.h"
+
+struct worker {
+    const struct site *site;
+    struct caster *caster;
+    struct line_block block;
+    struct cast_setup setup;
+    uint32_t setup_station; /* 1 + the station that setup is for; 0: none yet */
+};
+
+enum {
+    MAX_DT_NS = (1 << 24) - 1, /* a point's time within its frame has 24 bits */
+    OVERHEAD_BYTES = 24576,    /* events, descriptor, anchor, names, telemetry of one tick, generously */
+    LINE_END_BYTES = 128,
+};
+
+static uint32_t max_pulses(const struct config *cfg)
+{
+    return (uint32_t)ceil((double)cfg->profile.prr_max_uhz * 1e-6 / cfg->tick_hz) + 2 * SCHEDULE_PACKET;
+}
+
+int worker_create(const struct site *site, struct worker **out, struct sh_err *err)
+{
+    *out = NULL;
+    struct worker *worker = calloc(1, sizeof *worker);
+    if (worker == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
+    worker->site = site;
+    uint32_t n = max_pulses(site->cfg);
+    int rc = caster_create(n, &worker->caster, err);
+    if (rc == SH_OK) rc = line_block_alloc(&worker->block, n, err);
+    if (rc != SH_OK) {
+        worker_free(worker);
+        return rc;
+    }
+    *out = worker;
+    return SH_OK;
+}
+
+void worker_free(struct worker *worker)
+{
+    if (worker == NULL) return;
+    caster_free(worker->caster);
+    line_block_free(&worker->block);
+    free(worker);
+}
+
+uint32_t worker_slot_bytes(const struct config *cfg)
+{
+    uint32_t lines = (uint32_t)ceil((double)cfg->profile.lines_max_uhz * 1e-6 / cfg->tick_hz) + 2;
+    /* Each line part is a frame of its own. */
+    return OVERHEAD_BYTES + (uint32_t)native_points_bound(max_pulses(cfg)) +
+           lines * (LINE_END_BYTES + NATIVE_HEADER_LEN + NATIVE_POINTS_HEAD_LEN);
+}
+
+static void added(struct ring_slot *slot, size_t len, uint32_t frames)
+{
+    slot->len += (uint32_t)len;
+    if (len != 0) slot->n_frames += frames;
+}
+
+struct names {
+    const struct scene *scene;
+};
+
+static void surface_name(void *ctx, uint32_t label, const char **object, const char **material)
+{
+    const struct names *names = ctx;
+    *object = names->scene->surface[label].object;
+    *material = names->scene->surface[label].material;
+}
+
+static void fill_heads(struct worker *worker, const struct device_work *work, struct ring_slot *slot, uint32_t cap)
+{
+    for (uint32_t i = 0; i < work->n_events_before; i++)
+        added(slot, native_encode_event(slot->bytes + slot->len, cap - slot->len, &work->event[i], work->t_ns, 0), 1);
+    if (work->describe) {
+        int flags = work->describe_flags;
+        added(slot, native_encode_descriptor(slot->bytes + slot->len, cap - slot->len, &work->descriptor, work->t_ns, flags), 1);
+        added(slot, native_encode_anchor(slot->bytes + slot->len, cap - slot->len, &work->anchor, work->t_ns, flags), 1);
+    }
+    uint32_t first = work->surfaces_first, left = work->surfaces_n;
+    struct names names = {worker->site->scene};
+    while (left != 0) {
+        uint32_t done = 0;
+        size_t len = native_encode_surfaces(slot->bytes + slot->len, cap - slot->len, first, left, 8192, surface_name,
+                                            &names, work->t_ns, 0, &done);
+        if (len == 0 || done == 0) break;
+        added(slot, len, 1);
+        first += done;
+        left -= done;
+    }
+}
+
+static uint32_t frames_in(const uint8_t *bytes, size_t len)
+{
+    uint32_t n = 0;
+    for (size_t at = 0; at < len; n++)
+        at += NATIVE_HEADER_LEN + ((size_t)bytes[at + 4] | (size_t)bytes[at + 5] << 8 | (size_t)bytes[at + 6] << 16);
+    return n;
+}
+
+static void cast_run(struct worker *worker, const struct device_work *work, const struct schedule_line *line, uint64_t k,
+                     uint64_t end, struct ring_slot *slot, uint32_t cap)
+{
+    uint64_t longest = (uint64_t)(MAX_DT_NS / (work->segment.ns_quot + 1));
+    if (longest == 0) longest = 1;
+    while (k < end) {
+        struct schedule_run run;
+        uint64_t n = end - k < longest ? end - k : longest;
+        schedule_get_run(&work->segment, line, k, (uint32_t)n, &run);
+        uint32_t echoes = caster_cast(worker->caster, &worker->setup, &run, &worker->block);
+        uint8_t *at = slot->bytes + slot->len;
+        size_t len = native_encode_points(at, cap - slot->len, &worker->block, work->scan_t0_ns);
+        added(slot, len, frames_in(at, len));
+        slot->n_cast += n;
+        slot->n_echoes += echoes;
+        slot->echoes_tail += echoes;
+        k += n;
+    }
+}
+
+/* Writes the line-end frame. Its number of echoes is filled in at release: blocks may come from several ticks. */
+static void end_line(const struct worker *worker, const struct device_work *work, const struct schedule_line *line,
+                     uint64_t end, struct ring_slot *slot, uint32_t cap)
+{
+    const struct schedule_segment *seg = &work->segment;
+    const struct cast_setup *setup = &worker->setup;
+    int partial = end < line->pulse_end;
+    uint64_t cast_end = line->cast_end < end ? line->cast_end : end;
+    uint64_t last = end - 1;
+    struct ring_mark *mark = &slot->mark[slot->n_marks++];
+    mark->end = (struct line_end){.frame = line->frame,
+                                  .line = (uint32_t)line->line,
+                                  .pulse0 = line->pulse0,
+                                  .n_fired = (uint32_t)(end - line->pulse0),
+                                  .n_cast = cast_end > line->cast0 ? (uint32_t)(cast_end - line->cast0) : 0,
+                                  .t0_ns = schedule_time_ns(seg, line->pulse0),
+                                  .t1_ns = schedule_time_ns(seg, end),
+                                  .mirror_count = cast_encoder_count(schedule_mirror_turn(seg, last), setup->mirror_counts),
+                                  .pan_count = cast_encoder_count(schedule_pan_turn(seg, last), setup->pan_counts),
+                                  .status = partial               ? (uint32_t)LINE_PARTIAL
+                                            : line->last_of_frame ? (uint32_t)LINE_LAST_OF_FRAME
+                                                                  : 0U};
+    mark->frame_at = slot->len;
+    mark->echoes_before = slot->echoes_tail;
+    mark->scan_t0_ns = work->scan_t0_ns;
+    slot->echoes_tail = 0;
+    slot->n_lines++;
+    added(slot, native_encode_line_end(slot->bytes + slot->len, cap - slot->len, &mark->end, work->scan_t0_ns), 1);
+}
+
+static void fill_pulses(struct worker *worker, const struct device_work *work, struct ring_slot *slot, uint32_t cap)
+{
+    if (worker->setup_station != work->station + 1) {
+        site_cast_setup(worker->site, work->station, &worker->setup);
+        worker->setup_station = work->station + 1;
+    }
+    for (uint64_t k = work->pulse0; k < work->pulse_end;) {
+        struct schedule_line line;
+        schedule_get_line(&work->segment, schedule_line_of(&work->segment, k), &line);
+        uint64_t end = line.pulse_end < work->pulse_end ? line.pulse_end : work->pulse_end;
+        uint64_t cast0 = k > line.cast0 ? k : line.cast0;
+        uint64_t cast_end = end < line.cast_end ? end : line.cast_end;
+        if (cast0 < cast_end) cast_run(worker, work, &line, cast0, cast_end, slot, cap);
+        slot->n_fired += end - k;
+        if (end == line.pulse_end || (work->cut_short && end == work->pulse_end))
+            end_line(worker, work, &line, end, slot, cap);
+        k = end;
+    }
+}
+
+void worker_fill(struct worker *worker, const struct device_work *work, struct ring_slot *slot, uint32_t slot_bytes)
+{
+    fill_heads(worker, work, slot, slot_bytes);
+    if (work->scanning) fill_pulses(worker, work, slot, slot_bytes);
+    for (uint32_t i = work->n_events_before; i < work->n_events; i++)
+        added(slot, native_encode_event(slot->bytes + slot->len, slot_bytes - slot->len, &work->event[i], work->t_ns, 0), 1);
+    if (work->telemetry)
+        added(slot,
+              native_encode_telemetry(slot->bytes + slot->len, slot_bytes - slot->len, &work->telemetry_frame, work->t_ns, 0),
+              1);
+}
+
+uint64_t worker_count_cast(const struct device_work *work)
+{
+    uint64_t n = 0;
+    if (!work->scanning) return 0;
+    for (uint64_t k = work->pulse0; k < work->pulse_end;) {
+        struct schedule_line line;
+        schedule_get_line(&work->segment, schedule_line_of(&work->segment, k), &line);
+        uint64_t end = line.pulse_end < work->pulse_end ? line.pulse_end : work->pulse_end;
+        uint64_t cast0 = k > line.cast0 ? k : line.cast0;
+        uint64_t cast_end = end < line.cast_end ? end : line.cast_end;
+        if (cast0 < cast_end) n += cast_end - cast0;
+        k = end;
+    }
+    return n;
+}

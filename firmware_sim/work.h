@@ -1,0 +1,23 @@
+/* One tick's work: casting its pulses and writing its frames into a slot. */
+#ifndef FIRMWARE_SIM_WORK_H
+#define FIRMWARE_SIM_WORK_H
+
+#include "firmware_sim/device.h"
+#include "firmware_sim/ring.h"
+
+struct worker;
+
+/* Working memory of one caster thread. */
+int worker_create(const struct site *site, struct worker **out, struct sh_err *err);
+void worker_free(struct worker *worker);
+
+/* Bytes that a slot needs for the busiest tick that the profile allows. */
+uint32_t worker_slot_bytes(const struct config *cfg);
+
+/* Fills the slot. Allocates nothing. */
+void worker_fill(struct worker *worker, const struct device_work *work, struct ring_slot *slot, uint32_t slot_bytes);
+
+/* Pulses of the tick that would have been cast. */
+uint64_t worker_count_cast(const struct device_work *work);
+
+#endif
