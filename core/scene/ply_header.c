@@ -38,7 +38,9 @@ static int read_element(struct ply_header *h, struct text *t, struct scene_build
     size_t len = text_word(t, &name);
     int64_t count;
     text_skip_blanks(t);
-    if (len == 0 || !text_integer(t, &count) || count < 0 || !text_at_line_end(t))
+    bool ok = text_integer(t, &count) && count >= 0;
+    text_skip_blanks(t);
+    if (len == 0 || !ok || !text_at_line_end(t))
         return fail(t, b, err, "element takes a name and a count; this one is", name, len);
     if (h->n_elements == PLY_MAX_ELEMENTS)
         return build_fail(b, SH_EINPUT, err, "more than %d elements", PLY_MAX_ELEMENTS);
@@ -141,6 +143,7 @@ int ply_header_read(struct ply_header *h, struct text *t, struct scene_build *b,
     *h = (struct ply_header){0};
     const char *word;
     size_t len = text_word(t, &word);
+    text_skip_blanks(t);
     if (!is(word, len, "ply") || !text_at_line_end(t))
         return build_fail(b, SH_EINPUT, err, "not a PLY file: the first line has to be 'ply'");
     bool has_format = false;

@@ -127,6 +127,14 @@ static uint32_t forced_corner(struct triangulate *t, uint32_t start)
     return convex;
 }
 
+/* Ears turn left; if what is left over at last turns right, by more than rounding, edges have crossed. */
+static bool is_turned_over(const struct triangulate *t, uint32_t a, uint32_t b, uint32_t c)
+{
+    double u = t->uv[b][0] - t->uv[a][0], v = t->uv[b][1] - t->uv[a][1];
+    double s = t->uv[c][0] - t->uv[a][0], w = t->uv[c][1] - t->uv[a][1];
+    return turn(t, a, b, c) < -1e-12 * (u * u + v * v + s * s + w * w);
+}
+
 void triangulate_polygon(struct triangulate *t, uint32_t n)
 {
     t->simple = true;
@@ -155,5 +163,6 @@ void triangulate_polygon(struct triangulate *t, uint32_t n)
         }
         i = next;
     }
+    if (is_turned_over(t, t->prev[i], i, t->next[i])) t->simple = false;
     clip(t, i, &n_out);
 }
