@@ -1,0 +1,235 @@
+/* STL, glTF, FBX, Collada and IFC through Assimp's C interface, node tree and all.
+ *
+ * No post-processing: polygons are cut by our own triangulation, and node transforms are applied in double,
+ * one level after the other, so that the largest coordinate on the way is known: that is what single
+ * precision has rounded. */
+#include <math.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
+
+#include <assimp/cimport.h>
+#include <assimp/config.h>
+#include <assimp/scene.h>
+
+#include "core/scene/scene_build.h"
+
+enum { MAX_DEPTH = 256 };
+
+static const double SINGLE_ROUNDING = 6e-8; /* 2^-24: of the nearest float */
+
+/* What Assimp says while it reads; some of it is geometry that it left out. */
+struct import_log {
+    unsigned n;
+    char first[160];
+};
+
+struct import {
+    struct scene_build *b;
+    const struct aiScene *in;
+    const struct aiMatrix4x4
+        *level[MAX_DEPTH]; /* of the node and above it, root first; identities left out */
+    int n_levels;
+    double largest;   /* |coordinate| at any level, file units */
+    uint32_t *corner; /* of one face */
+    size_t cap_corners;
+    uint64_t n_faces, n_done; /* for the progress */
+};
+
+static void keep_log(const char *message, char *user)
+{
+    struct import_log *log = (struct import_log *)(void *)user;
+    if (strncmp(message, "Warn", 4) != 0 && strncmp(message, "Error", 5) != 0) return;
+    if (log->n++ > 0) return;
+    const char *text = strchr(message, ':');
+    text = text != NULL ? text + 1 : message;
+    text += strspn(text, " ");
+    size_t len = strcspn(text, "\r\n");
+    if (len >= sizeof log->first) len = sizeof log->first - 1;
+    memcpy(log->first, text, len);
+}
+
+static bool is_identity(const struct aiMatrix4x4 *m)
+{
+    return m->a1 == 1 && m->a2 == 0 && m->a3 == 0 && m->a4 == 0 && m->b1 == 0 && m->b2 == 1 && m->b3 == 0 &&
+           m->b4 == 0 && m->c1 == 0 && m->c2 == 0 && m->c3 == 1 && m->c4 == 0;
+}
+
+static void transform(const struct aiMatrix4x4 *m, double v[3])
+{
+    double x = v[0], y = v[1], z = v[2];
+    v[0] = (double)m->a1 * x + (double)m->a2 * y + (double)m->a3 * z + (double)m->a4;
+    v[1] = (double)m->b1 * x + (double)m->b2 * y + (double)m->b3 * z + (double)m->b4;
+    v[2] = (double)m->c1 * x + (double)m->c2 * y + (double)m->c3 * z + (double)m->c4;
+}
+
+static double largest_of(const double v[3], double largest)
+{
+    for (int k = 0; k < 3; k++)
+        if (fabs(v[k]) > largest) largest = fabs(v[k]);
+    return largest;
+}
+
+static int add_vertices(struct import *im, const struct aiMesh *mesh, struct sh_err *err)
+{
+    im->b->mesh_vertex0 = im->b->scene->n_vertices;
+    int rc = build_reserve(im->b, mesh->mNumVertices, mesh->mNumFaces, err);
+    for (unsigned i = 0; i < mesh->mNumVertices && rc == SH_OK; i++) {
+        const struct aiVector3D *in = &mesh->mVertices[i];
+        double v[3] = {(double)in->x, (double)in->y, (double)in->z};
+        im->largest = largest_of(v, im->largest);
+        for (int k = im->n_levels - 1; k >= 0; k--) {
+            transform(im->level[k], v);
+            im->largest = largest_of(v, im->largest);
+        }
+        rc = build_vertex(im->b, v, err);
+    }
+    return rc;
+}
+
+static int add_face(struct import *im, const struct aiFace *face, const struct aiMesh *mesh, uint16_t label,
+                    struct sh_err *err)
+{
+    struct scene_build *b = im->b;
+    if (face->mNumIndices < 3) {
+        b->counts.not_triangles++;
+        return SH_OK;
+    }
+    if (face->mNumIndices > im->cap_corners) {
+        size_t cap = (size_t)face->mNumIndices * 2;
+        void *corner = realloc(im->corner, cap * sizeof *im->corner);
+        if (corner == NULL) return build_fail(b, SH_ENOMEM, err, "no memory for a face");
+        im->corner = corner;
+        im->cap_corners = cap;
+    }
+    for (unsigned i = 0; i < face->mNumIndices; i++) {
+        if (face->mIndices[i] >= mesh->mNumVertices)
+            return build_fail(b, SH_EINPUT, err, "index %u out of range; there are %u vertices",
+                              face->mIndices[i], mesh->mNumVertices);
+        im->corner[i] = b->mesh_vertex0 + face->mIndices[i];
+    }
+    return build_polygon(b, im->corner, face->mNumIndices, label, err);
+}
+
+static int label_of(struct import *im, const struct aiNode *node, const struct aiMesh *mesh, uint16_t *label,
+                    struct sh_err *err)
+{
+    const struct aiString *object = node->mName.length > 0 ? &node->mName : &mesh->mName;
+    struct aiString material = {0};
+    if (mesh->mMaterialIndex < im->in->mNumMaterials)
+        aiGetMaterialString(im->in->mMaterials[mesh->mMaterialIndex], AI_MATKEY_NAME, &material);
+    return build_label(im->b, object->data, strnlen(object->data, object->length), material.data,
+                       strnlen(material.data, material.length), label, err);
+}
+
+static int add_mesh(struct import *im, const struct aiNode *node, const struct aiMesh *mesh,
+                    struct sh_err *err)
+{
+    uint16_t label;
+    im->b->mesh = mesh->mName.length > 0 ? mesh->mName.data : node->mName.data;
+    int rc = label_of(im, node, mesh, &label, err);
+    if (rc == SH_OK) rc = add_vertices(im, mesh, err);
+    for (unsigned i = 0; i < mesh->mNumFaces && rc == SH_OK; i++) {
+        rc = add_face(im, &mesh->mFaces[i], mesh, label, err);
+        if ((im->n_done++ & 0xffff) == 0) build_progress(im->b, (double)im->n_done / (double)im->n_faces);
+    }
+    im->b->scene->n_meshes++;
+    im->b->mesh = NULL;
+    return rc;
+}
+
+static int add_node(struct import *im, const struct aiNode *node, int depth, struct sh_err *err)
+{
+    if (depth == MAX_DEPTH)
+        return build_fail(im->b, SH_EINPUT, err, "nodes are nested deeper than %d", MAX_DEPTH);
+    bool moved = !is_identity(&node->mTransformation);
+    if (moved) im->level[im->n_levels++] = &node->mTransformation;
+    int rc = SH_OK;
+    for (unsigned i = 0; i < node->mNumMeshes && rc == SH_OK; i++)
+        rc = add_mesh(im, node, im->in->mMeshes[node->mMeshes[i]], err);
+    for (unsigned i = 0; i < node->mNumChildren && rc == SH_OK; i++)
+        rc = add_node(im, node->mChildren[i], depth + 1, err);
+    if (moved) im->n_levels--;
+    return rc;
+}
+
+/* Every instance counts, as it does in the loop that reports. */
+static uint64_t count_faces(const struct aiScene *in, const struct aiNode *node)
+{
+    uint64_t n = 0;
+    for (unsigned i = 0; i < node->mNumMeshes; i++)
+        n += in->mMeshes[node->mMeshes[i]]->mNumFaces;
+    for (unsigned i = 0; i < node->mNumChildren; i++)
+        n += count_faces(in, node->mChildren[i]);
+    return n;
+}
+
+static int check_precision(const struct import *im, struct sh_err *err)
+{
+    double off_m = im->largest * im->b->spec->scale * SINGLE_ROUNDING;
+    if (off_m <= im->b->tolerance_m) return SH_OK;
+    return build_fail(
+        im->b, SH_EINPUT, err,
+        "coordinates up to %.9g are read in single precision, which may be off by %.2g m; allowed "
+        "are %.2g m: move the mesh near its origin, or convert it to .obj or .ply",
+        im->largest, off_m, im->b->tolerance_m);
+}
+
+/* An IFC file that was cut off reads without an error, with less in it. */
+static int check_ifc_end(struct scene_build *b, struct sh_err *err)
+{
+    static const char last[] = "END-ISO-10303-21;";
+    char tail[1024] = "";
+    size_t len = strlen(b->spec->file);
+    if (strcasecmp(b->spec->file + len - 4, ".ifc") != 0) return SH_OK;
+    FILE *f = fopen(b->spec->file, "rb");
+    if (f == NULL) return SH_OK; /* Assimp says why */
+    if (fseek(f, -(long)(sizeof tail), SEEK_END) != 0) rewind(f);
+    size_t got = fread(tail, 1, sizeof tail, f);
+    fclose(f);
+    if (memmem(tail, got, last, sizeof last - 1) != NULL) return SH_OK;
+    return build_fail(b, SH_EINPUT, err, "cut off: it doesn't end with %s", last);
+}
+
+/* The logger and the text of the last error are Assimp's globals, hence the lock. */
+static const struct aiScene *import_file(struct scene_build *b, struct import_log *log, struct sh_err *err)
+{
+    static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
+    struct aiLogStream stream = {.callback = keep_log, .user = (char *)(void *)log};
+    pthread_mutex_lock(&lock);
+    aiAttachLogStream(&stream);
+    const struct aiScene *in = aiImportFile(b->spec->file, 0);
+    aiDetachLogStream(&stream);
+    if (in == NULL || in->mRootNode == NULL) {
+        const char *why = in == NULL ? aiGetErrorString() : "nothing in it";
+        build_fail(b, SH_EINPUT, err, "%s", *why != '\0' ? why : "not readable");
+        if (in != NULL) aiReleaseImport(in);
+        in = NULL;
+    }
+    pthread_mutex_unlock(&lock);
+    return in;
+}
+
+int import_assimp(struct scene_build *b, struct sh_err *err)
+{
+    struct import im = {.b = b};
+    struct import_log log = {0};
+    struct stat st;
+    int rc = check_ifc_end(b, err);
+    if (rc != SH_OK) return rc;
+    /* Assimp's C interface has no progress: say once that a large file will take a while. */
+    if (stat(b->spec->file, &st) == 0 && st.st_size > 8 << 20) build_announce(b);
+    im.in = import_file(b, &log, err);
+    if (im.in == NULL) return SH_EINPUT;
+    im.n_faces = count_faces(im.in, im.in->mRootNode);
+    rc = add_node(&im, im.in->mRootNode, 0, err);
+    if (rc == SH_OK) rc = check_precision(&im, err);
+    if (rc == SH_OK && log.n > 0)
+        sh_warn(b->report, "%s: %u warnings while read, the first: %s", b->name, log.n, log.first);
+    free(im.corner);
+    aiReleaseImport(im.in);
+    return rc;
+}

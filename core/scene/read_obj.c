@@ -1,0 +1,228 @@
+/* Wavefront OBJ in double: v, f, o, g, usemtl. Points and lines are counted; what has no shape is passed
+ * over. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/scene/text.h"
+
+struct span {
+    const char *text;
+    size_t len;
+};
+
+struct obj {
+    struct scene_build *b;
+    struct text t;
+    uint32_t *corner; /* of one face */
+    size_t cap_corners;
+    struct span object, material;
+    uint16_t label;
+    bool label_known;
+    uint64_t n_unknown, unknown_line;
+    char unknown[32];
+};
+
+/* Bytes of a broken word for a message. */
+static int shown(size_t len)
+{
+    return len < 40 ? (int)len : 40;
+}
+
+static int fail_at(struct obj *o, struct sh_err *err, const char *what)
+{
+    const char *word;
+    size_t len = text_word(&o->t, &word);
+    o->b->line = o->t.line;
+    if (len == 0) return build_fail(o->b, SH_EINPUT, err, "%s, found the end of the line", what);
+    return build_fail(o->b, SH_EINPUT, err, "%s, found '%.*s'", what, shown(len), word);
+}
+
+/* A comment may also follow on a line of numbers. */
+static bool at_statement_end(struct obj *o)
+{
+    text_skip_blanks(&o->t);
+    return text_at_line_end(&o->t) || *o->t.p == '#';
+}
+
+/* x y z, then at most w or a colour, which are read and left alone: a weight is for curves only. */
+static int read_vertex(struct obj *o, struct sh_err *err)
+{
+    double v[8];
+    int n = 0;
+    while (!at_statement_end(o)) {
+        if (n == 8 || !text_number(&o->t, &v[n])) return fail_at(o, err, "v takes 3 to 8 numbers");
+        n++;
+    }
+    if (n < 3) return fail_at(o, err, "v takes 3 to 8 numbers");
+    o->b->line = o->t.line;
+    return build_vertex(o->b, v, err);
+}
+
+/* One v, v/vt, v//vn or v/vt/vn; only v counts. */
+static int read_corner(struct obj *o, uint32_t *corner, struct sh_err *err)
+{
+    struct text at = o->t;
+    int64_t index, other;
+    bool ok = text_integer(&o->t, &index);
+    for (int slash = 0; ok && slash < 2 && *o->t.p == '/'; slash++) {
+        o->t.p++;
+        if (slash == 0 && *o->t.p == '/') continue;
+        ok = text_integer(&o->t, &other);
+    }
+    if (!ok || !text_at_word_end(&o->t)) {
+        o->t = at;
+        return fail_at(o, err, "f takes v, v/vt, v//vn or v/vt/vn");
+    }
+    int64_t n = o->b->scene->n_vertices - o->b->vertex0;
+    int64_t number = index < 0 ? n + index : index - 1;
+    if (index == 0 || number < 0 || number >= n) {
+        o->b->line = o->t.line;
+        return build_fail(o->b, SH_EINPUT, err, "index %lld out of range; %lld vertices so far",
+                          (long long)index, (long long)n);
+    }
+    *corner = o->b->vertex0 + (uint32_t)number;
+    return SH_OK;
+}
+
+static int use_label(struct obj *o, struct sh_err *err)
+{
+    if (o->label_known) return SH_OK;
+    o->label_known = true;
+    return build_label(o->b, o->object.text, o->object.len, o->material.text, o->material.len, &o->label,
+                       err);
+}
+
+static int read_face(struct obj *o, struct sh_err *err)
+{
+    size_t n = 0;
+    int rc = SH_OK;
+    while (rc == SH_OK && !at_statement_end(o)) {
+        if (n == o->cap_corners) {
+            size_t cap = o->cap_corners * 2 + 16;
+            void *corner = realloc(o->corner, cap * sizeof *o->corner);
+            if (corner == NULL) return build_fail(o->b, SH_ENOMEM, err, "no memory for a face");
+            o->corner = corner;
+            o->cap_corners = cap;
+        }
+        rc = read_corner(o, &o->corner[n++], err);
+    }
+    if (rc != SH_OK) return rc;
+    if (n == 0) return fail_at(o, err, "f takes three corners or more");
+    o->b->line = o->t.line;
+    if (n < 3) {
+        o->b->counts.not_triangles++;
+        return SH_OK;
+    }
+    rc = use_label(o, err);
+    return rc == SH_OK ? build_polygon(o->b, o->corner, n, o->label, err) : rc;
+}
+
+static int read_name(struct obj *o, struct span *name)
+{
+    name->len = text_rest(&o->t, &name->text);
+    o->label_known = false;
+    return SH_OK;
+}
+
+static void skip_statement(struct obj *o)
+{
+    const char *word;
+    while (!at_statement_end(o))
+        text_word(&o->t, &word);
+}
+
+/* Points count one by one, a line or a free-form curve or surface as one. */
+static int count_left_out(struct obj *o, bool points)
+{
+    const char *word;
+    uint64_t n = 0;
+    while (!at_statement_end(o)) {
+        text_word(&o->t, &word);
+        n++;
+    }
+    o->b->counts.not_triangles += points ? n : 1;
+    return SH_OK;
+}
+
+static bool is_word(const char *word, size_t len, const char *const *list)
+{
+    for (; *list != NULL; list++)
+        if (strlen(*list) == len && memcmp(*list, word, len) == 0) return true;
+    return false;
+}
+
+static int read_other(struct obj *o, const char *word, size_t len)
+{
+    static const char *const numbers[] = {"vt",  "vn",  "vp",  "s",    "parm", "trim",   "hole", "scrv", "sp",
+                                          "end", "con", "deg", "bmat", "step", "cstype", "mg",   NULL};
+    static const char *const texts[] = {"mtllib",    "usemap",   "maplib", "lod",   "bevel",
+                                        "c_interp",  "d_interp", "ctech",  "stech", "shadow_obj",
+                                        "trace_obj", "call",     "csh",    NULL};
+    static const char *const free_form[] = {"l", "curv", "curv2", "surf", NULL};
+    if (is_word(word, len, free_form)) return count_left_out(o, false);
+    if (is_word(word, len, numbers)) {
+        skip_statement(o);
+    } else if (!is_word(word, len, texts)) {
+        if (o->n_unknown++ == 0) {
+            o->unknown_line = o->t.line;
+            size_t n = len < sizeof o->unknown ? len : sizeof o->unknown - 1;
+            memcpy(o->unknown, word, n);
+        }
+    }
+    return SH_OK; /* text statements: a backslash there may be a path's */
+}
+
+static int read_statement(struct obj *o, struct sh_err *err)
+{
+    const char *word;
+    size_t len = text_word(&o->t, &word);
+    if (len == 0 || *word == '#') return SH_OK;
+    if (len == 1) {
+        switch (*word) {
+        case 'v':
+            return read_vertex(o, err);
+        case 'f':
+            return read_face(o, err);
+        case 'o':
+        case 'g':
+            return read_name(o, &o->object);
+        case 'p':
+            return count_left_out(o, true);
+        default:
+            break;
+        }
+    }
+    if (len == 6 && memcmp(word, "usemtl", 6) == 0) return read_name(o, &o->material);
+    return read_other(o, word, len);
+}
+
+static int read_statements(struct obj *o, struct sh_err *err)
+{
+    static const char utf8_mark[] = "\xef\xbb\xbf";
+    if (o->t.size >= 3 && memcmp(o->t.p, utf8_mark, 3) == 0) o->t.p += 3;
+    if (memchr(o->t.p, '\0', o->t.size < 512 ? o->t.size : 512) != NULL)
+        return build_fail(o->b, SH_EINPUT, err, "not a text in UTF-8 or ASCII");
+    int rc = SH_OK;
+    for (uint64_t i = 0; o->t.p < o->t.end && rc == SH_OK; i++) {
+        rc = read_statement(o, err);
+        text_next_line(&o->t);
+        if ((i & 0xffff) == 0) build_progress(o->b, (double)(o->t.p - o->t.data) / (double)o->t.size);
+    }
+    return rc;
+}
+
+int read_obj(struct scene_build *b, struct sh_err *err)
+{
+    struct obj o = {.b = b, .material = {"", 0}};
+    build_base_name(b, &o.object.text, &o.object.len);
+    int rc = text_open(&o.t, b, err);
+    o.t.continued = true;
+    if (rc == SH_OK) rc = read_statements(&o, err);
+    if (rc == SH_OK && o.n_unknown > 0)
+        sh_warn(b->report, "%s: %llu unknown statements passed over; the first is '%s' in line %llu", b->name,
+                (unsigned long long)o.n_unknown, o.unknown, (unsigned long long)o.unknown_line);
+    b->scene->n_meshes++;
+    free(o.corner);
+    text_close(&o.t);
+    return rc;
+}

@@ -1,0 +1,132 @@
+#include "core/scene.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
+
+#include "core/scene/scene_build.h"
+
+static const struct {
+    const char *ending;
+    int (*read)(struct scene_build *b, struct sh_err *err);
+} readers[] = {
+    {".obj", read_obj},      {".ply", read_ply},      {".stl", import_assimp}, {".gltf", import_assimp},
+    {".glb", import_assimp}, {".fbx", import_assimp}, {".dae", import_assimp}, {".ifc", import_assimp},
+};
+
+static int check_spec(struct scene_build *b, struct sh_err *err)
+{
+    const struct scene_mesh_spec *spec = b->spec;
+    if (!(spec->scale > 0) || !isfinite(spec->scale))
+        return build_fail(b, SH_EINPUT, err, "scale %g; allowed are numbers above 0", spec->scale);
+    for (int k = 0; k < 3; k++)
+        if (!isfinite(spec->offset_m[k]))
+            return build_fail(b, SH_EINPUT, err, "offset %g; allowed are finite numbers", spec->offset_m[k]);
+    struct stat st;
+    if (stat(spec->file, &st) != 0) return build_fail(b, SH_EINPUT, err, "%s", strerror(errno));
+    if (!S_ISREG(st.st_mode)) return build_fail(b, SH_EINPUT, err, "not a file");
+    return SH_OK;
+}
+
+static int load_file(struct scene_build *b, const struct scene_mesh_spec *spec, struct sh_err *err)
+{
+    build_begin_file(b, spec);
+    size_t len = strlen(spec->file);
+    for (size_t i = 0; i < sizeof readers / sizeof readers[0]; i++) {
+        size_t ending_len = strlen(readers[i].ending);
+        if (len <= ending_len || strcasecmp(spec->file + len - ending_len, readers[i].ending) != 0) continue;
+        int rc = check_spec(b, err);
+        if (rc == SH_OK) rc = readers[i].read(b, err);
+        return rc == SH_OK ? build_end_file(b, err) : rc;
+    }
+    return build_fail(b, SH_EINPUT, err,
+                      "unknown ending; allowed are .obj .ply .stl .gltf .glb .fbx .dae .ifc");
+}
+
+int scene_load(const struct scene_mesh_spec *specs, size_t n_specs, double tolerance_m,
+               const struct sh_report *report, struct scene **out, struct sh_err *err)
+{
+    struct scene_build b;
+    *out = NULL;
+    int rc = build_init(&b, tolerance_m, report, err);
+    for (size_t i = 0; i < n_specs && rc == SH_OK; i++)
+        rc = load_file(&b, &specs[i], err);
+    if (rc == SH_OK) rc = build_finish(&b, out, err);
+    build_release(&b);
+    return rc;
+}
+
+static int copy_surfaces(struct scene_build *b, const struct scene_surface *surface, uint32_t n,
+                         struct sh_err *err)
+{
+    static const struct scene_surface only = {"object", "material"};
+    if (surface == NULL) {
+        surface = &only;
+        n = 1;
+    }
+    if (n == 0 || n > SCENE_MAX_SURFACES)
+        return build_fail(b, SH_EINPUT, err, "%u surfaces; allowed are 1 to %d", n, SCENE_MAX_SURFACES);
+    memcpy(b->scene->surface, surface, n * sizeof *surface);
+    for (uint32_t i = 0; i < n; i++)
+        if (memchr(surface[i].object, '\0', SCENE_NAME_LEN) == NULL ||
+            memchr(surface[i].material, '\0', SCENE_NAME_LEN) == NULL)
+            return build_fail(b, SH_EINPUT, err, "surface %u: a name has no end", i);
+    b->scene->n_surfaces = n;
+    return SH_OK;
+}
+
+static int copy_triangles(struct scene_build *b, const uint32_t (*triangle)[3], uint32_t n,
+                          const uint16_t *label, struct sh_err *err)
+{
+    int rc = build_reserve(b, 0, n, err);
+    for (uint32_t i = 0; i < n && rc == SH_OK; i++) {
+        for (int k = 0; k < 3; k++)
+            if (triangle[i][k] >= b->scene->n_vertices)
+                return build_fail(b, SH_EINPUT, err,
+                                  "triangle %u: index %u out of range; there are %u vertices", i,
+                                  triangle[i][k], b->scene->n_vertices);
+        if (label != NULL && label[i] >= b->scene->n_surfaces)
+            return build_fail(b, SH_EINPUT, err, "triangle %u: label %u out of range; there are %u surfaces",
+                              i, label[i], b->scene->n_surfaces);
+        rc = build_triangle(b, triangle[i], label != NULL ? label[i] : 0, err);
+    }
+    return rc;
+}
+
+int scene_from_arrays(const double (*vertex_m)[3], uint32_t n_vertices, const uint32_t (*triangle)[3],
+                      uint32_t n_triangles, const uint16_t *label, const struct scene_surface *surface,
+                      uint32_t n_surfaces, struct scene **out, struct sh_err *err)
+{
+    static const struct scene_mesh_spec as_it_is = {.file = "arrays", .scale = 1};
+    struct scene_build b;
+    *out = NULL;
+    int rc = build_init(&b, 0, NULL, err);
+    if (rc == SH_OK) {
+        build_begin_file(&b, &as_it_is);
+        rc = copy_surfaces(&b, surface, n_surfaces, err);
+    }
+    if (rc == SH_OK) rc = build_reserve(&b, n_vertices, 0, err);
+    for (uint32_t i = 0; i < n_vertices && rc == SH_OK; i++)
+        rc = build_vertex(&b, vertex_m[i], err);
+    if (rc == SH_OK) rc = copy_triangles(&b, triangle, n_triangles, label, err);
+    if (rc == SH_OK) {
+        b.scene->n_meshes = 1;
+        rc = build_end_file(&b, err);
+    }
+    if (rc == SH_OK) rc = build_finish(&b, out, err);
+    build_release(&b);
+    return rc;
+}
+
+void scene_free(struct scene *scene)
+{
+    if (scene == NULL) return;
+    free(scene->vertex_m);
+    free(scene->triangle);
+    free(scene->label);
+    free(scene->surface);
+    free(scene);
+}

@@ -1,0 +1,50 @@
+/* A mesh file in memory, and reading text from it: words, numbers, lines.
+ *
+ * Numbers are exact (nearest double) and don't depend on the locale. */
+#ifndef CORE_SCENE_TEXT_H
+#define CORE_SCENE_TEXT_H
+
+#include <locale.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "core/scene/scene_build.h"
+
+struct text {
+    char *data; /* the whole file, with a NUL after it */
+    size_t size;
+    const char *p, *end;
+    uint64_t line;  /* of p, from 1 */
+    bool continued; /* a backslash before the line's end joins the next one (OBJ) */
+    locale_t c_locale;
+};
+
+int text_open(struct text *t, struct scene_build *b, struct sh_err *err);
+void text_close(struct text *t);
+
+/* Blanks, and line ends that a backslash hides. */
+void text_skip_blanks(struct text *t);
+
+/* Does a word end at p? */
+bool text_at_word_end(const struct text *t);
+
+/* At the end of the line (LF, CR LF or CR), or of the file? */
+bool text_at_line_end(const struct text *t);
+
+/* Past the end of this line, whatever is still on it. */
+void text_next_line(struct text *t);
+
+/* The next run of characters that are not blank; 0 at the line's end. */
+size_t text_word(struct text *t, const char **word);
+
+/* The rest of the line, without blanks at either end. */
+size_t text_rest(struct text *t, const char **rest);
+
+/* A number that fills the word at p; false and p unmoved when it isn't one. nan and inf are numbers here. */
+bool text_number(struct text *t, double *value);
+
+/* Decimal digits with a sign, up to 10^18; what follows is the caller's. */
+bool text_integer(struct text *t, int64_t *value);
+
+#endif

@@ -1,0 +1,33 @@
+/* Polygons -> triangles by ear clipping, in double.
+ *
+ * The polygon is projected along the largest axis of its Newell normal. Points that lie on an edge keep their
+ * place (no triangle skips them, so neighbours still meet), and holes may be joined by a keyhole edge.
+ * n - 2 triangles always come out; those of a polygon that crosses itself overlap; `simple` is false where that was noticed.
+ * Cost: n for convex polygons, n times the number of reflex corners otherwise. */
+#ifndef CORE_SCENE_TRIANGULATE_H
+#define CORE_SCENE_TRIANGULATE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+/* One work space serves any number of polygons. Zero-initialise; release with triangulate_free. */
+struct triangulate {
+    size_t cap;
+    double (*p)[3];          /* in: the corners */
+    uint32_t (*triangle)[3]; /* out: numbers of corners, in the polygon's sense of rotation */
+    bool simple;             /* out */
+    double (*uv)[2];
+    uint32_t *next, *prev, *reflex;
+    size_t n_reflex;
+};
+
+/* Makes room for n corners. 0 or SH_ENOMEM; the old room stays valid then. */
+int triangulate_reserve(struct triangulate *t, size_t n);
+
+/* Cuts the n >= 3 corners in t->p into n - 2 triangles. */
+void triangulate_polygon(struct triangulate *t, uint32_t n);
+
+void triangulate_free(struct triangulate *t);
+
+#endif
