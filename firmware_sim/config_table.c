@@ -1,0 +1,165 @@
+/* The table of keys. Parsing, defaults, errors, --set and the reference come from here alone. */
+#include "firmware_sim/config_private.h"
+
+#define LEN(array)           (sizeof(array) / sizeof((array)[0]))
+#define MEMBER(type, member) .offset = offsetof(type, member), .size = sizeof(((type *)0)->member)
+#define IN_CONFIG(member)    MEMBER(struct config, member)
+#define IN_MESH(member)      MEMBER(struct config_mesh, member)
+#define IN_STATION(member)   MEMBER(struct config_station, member)
+#define IN_LINK(member)      MEMBER(struct link_spec, member)
+#define IN_PROFILE(member)   MEMBER(struct config_profile, member)
+#define LIST_OF(array, count)                                                                 \
+    .offset = offsetof(struct config, array), .size = sizeof(((struct config *)0)->array[0]), \
+    .count_offset = offsetof(struct config, count)
+/* Limits of a setting: two figures of the profile. */
+#define WITHIN(low, high) .min = -9e12, .max = 9e12, .min_key = low, .max_key = high
+
+static const char *const up_names[] = {[SCENE_UP_Z] = "z", [SCENE_UP_Y] = "y", NULL};
+static const char *const crs_names[] = {
+    [GEOREF_LOCAL] = "local", [GEOREF_ECEF] = "ecef", [GEOREF_UTM] = "utm", NULL};
+static const char *const layout_names[] = {[LINE_POLAR] = "polar", [LINE_GEO] = "geo", NULL};
+static const char *const link_names[] = {
+    [LINK_NULL] = "null", [LINK_FILE] = "file", [LINK_PTY] = "pty", [LINK_TCP] = "tcp", NULL};
+static const char *const pace_names[] = {
+    [PACE_REALTIME] = "realtime", [PACE_FAST] = "fast", [PACE_STEP] = "step", NULL};
+
+/* clang-format off */
+static const struct cfg_key config_keys[] = {
+    {"head", CFG_MAP, .help = "The head and its settings at power-up."},
+    {"head.profile", CFG_TEXT, IN_CONFIG(profile_file), .allowed = "the name of a profile, or a path that ends in .yaml",
+     .help = "Head profile, looked up in $SCANHEAD_HEADS, heads/ beside this file, the installed and the source directory."},
+    {"head.serial", CFG_TEXT, .def = "SIM-0001", IN_CONFIG(serial), .flags = CFG_ASCII,
+     .help = "Serial number, as in *IDN?."},
+    {"head.prr_hz", CFG_MICRO, "Hz", "@prr_max_hz", WITHIN("prr_min_hz", "prr_max_hz"), IN_CONFIG(settings.prr_uhz),
+     .help = "Pulse repetition rate; counts every firing, also in the blind part of a sweep."},
+    {"head.lines_hz", CFG_MICRO, "Hz", "@lines_max_hz", WITHIN("lines_min_hz", "lines_max_hz"),
+     IN_CONFIG(settings.lines_uhz), .help = "Lines per second; at most prr_hz."},
+    {"head.pan_deg_s", CFG_MICRO, "deg/s", "@pan_max_deg_s", 0, 9e12, NULL, "pan_max_deg_s",
+     IN_CONFIG(settings.pan_udeg_s), .help = "Pan speed. 0: the head stands still, which needs frames: 0."},
+    {"head.line_start_deg", CFG_MICRO, "deg", "@fov_min_deg", WITHIN("fov_min_deg", "fov_max_deg"),
+     IN_CONFIG(settings.line_start_udeg), .help = "First line angle cast: 0 forward, 90 up, above 90 backward."},
+    {"head.line_stop_deg", CFG_MICRO, "deg", "@fov_max_deg", WITHIN("fov_min_deg", "fov_max_deg"),
+     IN_CONFIG(settings.line_stop_udeg), .help = "Last line angle cast; above line_start_deg."},
+    {"head.pan_start_deg", CFG_MICRO, "deg", "@pan_min_deg", WITHIN("pan_min_deg", "pan_max_deg"),
+     IN_CONFIG(settings.pan_start_udeg), .help = "Pan angle where a frame starts."},
+    {"head.pan_stop_deg", CFG_MICRO, "deg", "@pan_max_deg", WITHIN("pan_min_deg", "pan_max_deg"),
+     IN_CONFIG(settings.pan_stop_udeg), .help = "Pan angle where a frame ends; at most a turn after pan_start_deg."},
+    {"head.frames", CFG_COUNT, NULL, "1", 0, 1000000, IN_CONFIG(settings.frames),
+     .help = "Frames (pan sweeps) per scan; 0: until stopped."},
+    {"head.station", CFG_COUNT, NULL, "1", 1, CONFIG_MAX_STATIONS, IN_CONFIG(settings.station),
+     .help = "Station where the head stands, counted from 1."},
+
+    {"scene", CFG_MAP, .help = "What is scanned."},
+    {"scene.tolerance_m", CFG_REAL, "m", "1e-6", 1e-9, 1, IN_CONFIG(scene_tolerance_m),
+     .help = "What a vertex may be off: a mesh format of single precision with larger coordinates is refused."},
+    {"scene.meshes", CFG_LIST, .min = 1, .max = CONFIG_MAX_MESHES, LIST_OF(mesh, n_meshes),
+     .help = "Mesh files; together they are the scene."},
+    {"scene.meshes[]", CFG_MAP, .help = "A mesh file."},
+    {"scene.meshes[].file", CFG_PATH, IN_MESH(file), .help = "Path: .obj .ply .stl .gltf .glb .fbx .dae .ifc"},
+    {"scene.meshes[].up", CFG_ENUM, .names = up_names, IN_MESH(up),
+     .help = "Axis that points up in the file; y turns (x, y, z) to (x, -z, y)."},
+    {"scene.meshes[].scale", CFG_REAL, "m/unit", NULL, 1e-9, 1e9, IN_MESH(scale), .help = "Metres per unit of the file."},
+    {"scene.meshes[].offset_m", CFG_VEC3, "m", "[0, 0, 0]", -1e9, 1e9, IN_MESH(offset_m),
+     .help = "Added after axes and scale."},
+
+    {"stations", CFG_LIST, .min = 1, .max = CONFIG_MAX_STATIONS, LIST_OF(station, n_stations),
+     .help = "Places where the head can stand."},
+    {"stations[]", CFG_MAP, .help = "A station."},
+    {"stations[].name", CFG_TEXT, .def = "", IN_STATION(name), .help = "Name; station-N when not given."},
+    {"stations[].position_m", CFG_VEC3, "m", NULL, -1e9, 1e9, IN_STATION(position_m),
+     .help = "The head's origin in the scene frame."},
+    {"stations[].heading_deg", CFG_REAL, "deg", "0", -360, 360, IN_STATION(heading_deg),
+     .help = "Of the head's y axis, clockwise from the scene's y axis (north)."},
+    {"stations[].lat_deg", CFG_REAL, "deg", "0", -90, 90, IN_STATION(lat_deg),
+     .help = "Geodetic latitude of the head's origin, WGS 84; required unless output.crs is local."},
+    {"stations[].lon_deg", CFG_REAL, "deg", "0", -180, 180, IN_STATION(lon_deg),
+     .help = "Longitude; required unless output.crs is local."},
+    {"stations[].height_m", CFG_REAL, "m", "0", -1000, 10000, IN_STATION(height_m),
+     .help = "Height above the ellipsoid; required unless output.crs is local."},
+
+    {"output", CFG_MAP, .help = "Form of the points."},
+    {"output.crs", CFG_ENUM, .def = "local", .names = crs_names, IN_CONFIG(crs),
+     .help = "Coordinate reference system of the anchor and of geo points."},
+    {"output.utm_zone", CFG_COUNT, NULL, "0", 0, 60, IN_CONFIG(utm_zone),
+     .help = "UTM zone, only with crs: utm; 0: by position, UPS near the poles."},
+    {"output.layout", CFG_ENUM, .def = "polar", .names = layout_names, IN_CONFIG(layout),
+     .help = "polar: range and encoders, as a head measures; geo: coordinates from the anchor."},
+    {"output.scale_m", CFG_REAL, "m", "0", 0, 1, IN_CONFIG(scale_m), .allowed = "0 (automatic) or 1e-6 to 1 m",
+     .help = "Metres per count of a coordinate; range_max_m of the profile must fit into 31 bits."},
+
+    {"links", CFG_LIST, .min = 0, .max = CONFIG_MAX_LINKS, LIST_OF(link, n_links),
+     .help = "Where the head can be reached; none is needed to record off line."},
+    {"links[]", CFG_MAP, .help = "A link."},
+    {"links[].type", CFG_ENUM, .names = link_names, IN_LINK(type), .help = "Kind of link."},
+    {"links[].path", CFG_PATH, .def = "", IN_LINK(path),
+     .help = "pty: symbolic link to the terminal (optional); file: file to write (required)."},
+    {"links[].address", CFG_TEXT, .def = "", IN_LINK(address), .help = "tcp: address to listen on; 127.0.0.1 when not given."},
+    {"links[].port", CFG_COUNT, NULL, "0", 0, 65535, IN_LINK(port), .help = "tcp: port; 0: the system chooses."},
+    {"links[].max_sessions", CFG_COUNT, NULL, "4", 1, LINK_MAX_SESSIONS, IN_LINK(max_sessions),
+     .help = "tcp: clients at a time."},
+
+    {"noise", CFG_MAP, .help = "Noise of the measurement."},
+    {"noise.range", CFG_BOOL, .def = "off", IN_CONFIG(noise_on),
+     .help = "Range noise after the profile's range_sigma; off: exact ranges."},
+    {"noise.seed", CFG_COUNT, NULL, "1", 0, 18446744073709551615.0, IN_CONFIG(seed), .help = "Seed of the random numbers."},
+
+    {"loop", CFG_MAP, .help = "The fixed-rate loop."},
+    {"loop.tick_hz", CFG_REAL, "Hz", "1000", 100, 10000, IN_CONFIG(tick_hz),
+     .allowed = "a divisor of 1e9 from 100 to 10000 Hz, such as 500, 1000, 2000", .help = "Rate of the loop."},
+    {"loop.ahead_ms", CFG_REAL, "ms", "64", 2, 90, IN_CONFIG(ahead_ms),
+     .help = "How far casting runs ahead of the beam; a command takes that long to reach the beam."},
+    {"loop.queue_ms", CFG_REAL, "ms", "250", 10, 10000, IN_CONFIG(queue_ms), .help = "What each link can hold back."},
+    {"loop.late_ms", CFG_REAL, "ms", "100", 0, 10000, IN_CONFIG(late_ms),
+     .help = "Lateness up to which blocks are still sent; pulses later than that are lost, counted and announced."},
+    {"loop.threads", CFG_COUNT, NULL, "0", 0, 64, IN_CONFIG(threads), .help = "Casting threads; 0: one per processor."},
+    {"loop.pace", CFG_ENUM, .def = "realtime", .names = pace_names, IN_CONFIG(pace),
+     .help = "realtime: by the clock; fast: as fast as it computes; step: a client grants time."},
+    {"loop.utc_epoch_s", CFG_REAL, "s", "0", 0, 8589934592.0, IN_CONFIG(utc_epoch_s),
+     .help = "UTC of power-up, seconds since 1970; 0: unknown."},
+};
+
+#define FIGURE .flags = CFG_FIGURE
+static const struct cfg_key profile_keys[] = {
+    {"maker", CFG_TEXT, IN_PROFILE(maker), .flags = CFG_ASCII, .help = "Maker, as in *IDN?."},
+    {"model", CFG_TEXT, IN_PROFILE(model), .flags = CFG_ASCII, .help = "Model, as in *IDN?."},
+    {"prr_min_hz", CFG_MICRO, "Hz", NULL, 1, 1e7, IN_PROFILE(prr_min_uhz), FIGURE, .help = "Lowest pulse rate."},
+    {"prr_max_hz", CFG_MICRO, "Hz", NULL, 1, 1e7, IN_PROFILE(prr_max_uhz), FIGURE, .help = "Highest pulse rate."},
+    {"lines_min_hz", CFG_MICRO, "Hz", NULL, 0.25, 1e4, IN_PROFILE(lines_min_uhz), FIGURE,
+     .help = "Slowest line rate; a line lasts 4 s at most."},
+    {"lines_max_hz", CFG_MICRO, "Hz", NULL, 0.25, 1e4, IN_PROFILE(lines_max_uhz), FIGURE, .help = "Fastest line rate."},
+    {"pan_max_deg_s", CFG_MICRO, "deg/s", NULL, 0, 3600, IN_PROFILE(pan_max_udeg_s), FIGURE, .help = "Fastest pan."},
+    {"fov_min_deg", CFG_MICRO, "deg", NULL, -180, 360, IN_PROFILE(fov_min_udeg), FIGURE,
+     .help = "Line field of view: 0 forward, 90 up, above 90 backward over the zenith."},
+    {"fov_max_deg", CFG_MICRO, "deg", NULL, -180, 360, IN_PROFILE(fov_max_udeg), FIGURE,
+     .help = "End of the line field of view; it fits into a sweep, 360 / facets * optical_gain."},
+    {"pan_min_deg", CFG_MICRO, "deg", NULL, -360, 360, IN_PROFILE(pan_min_udeg), FIGURE, .help = "Smallest pan angle."},
+    {"pan_max_deg", CFG_MICRO, "deg", NULL, -360, 360, IN_PROFILE(pan_max_udeg), FIGURE,
+     .help = "Largest pan angle; at most a turn from pan_min_deg."},
+    {"facets", CFG_COUNT, NULL, NULL, 1, 360, IN_PROFILE(facets), FIGURE, .help = "Lines per turn of the mirror."},
+    {"optical_gain", CFG_REAL, NULL, NULL, 0.01, 100, IN_PROFILE(optical_gain), FIGURE,
+     .help = "Beam degrees per mirror degree: 2 for a polygon, 1 for a 45-degree mirror."},
+    {"range_min_m", CFG_REAL, "m", NULL, 0, 1e5, IN_PROFILE(range_min_m), FIGURE, .help = "Shortest range."},
+    {"range_max_m", CFG_REAL, "m", NULL, 0.001, 1e5, IN_PROFILE(range_max_m), FIGURE, .help = "Longest range."},
+    {"range_sigma_m", CFG_REAL, "m", NULL, 0, 10, IN_PROFILE(range_sigma_m), FIGURE,
+     .help = "One sigma of the range noise, fixed part."},
+    {"range_sigma_ppm", CFG_REAL, "ppm", NULL, 0, 1e4, IN_PROFILE(range_sigma_ppm), FIGURE,
+     .help = "One sigma of the range noise, part per distance."},
+    {"mirror_counts", CFG_REAL, NULL, NULL, 0, 4294967296.0, IN_PROFILE(mirror_counts), FIGURE,
+     .help = "Encoder counts per turn of the line angle; 0: ideal."},
+    {"pan_counts", CFG_REAL, NULL, NULL, 0, 4294967296.0, IN_PROFILE(pan_counts), FIGURE,
+     .help = "Encoder counts per turn of the pan; 0: ideal."},
+    {"max_echoes", CFG_COUNT, NULL, NULL, 1, LINE_MAX_ECHOES, IN_PROFILE(max_echoes), FIGURE, .help = "Echoes per pulse."},
+    {"boot_s", CFG_REAL, "s", NULL, 0, 600, IN_PROFILE(boot_s), FIGURE, .help = "Power-on to ready."},
+    {"spin_up_s", CFG_REAL, "s", NULL, 0, 600, IN_PROFILE(spin_up_s), FIGURE, .help = "Start command to mirror at speed."},
+    {"spin_down_s", CFG_REAL, "s", NULL, 0, 600, IN_PROFILE(spin_down_s), FIGURE, .help = "Stop to mirror at rest."},
+};
+/* clang-format on */
+
+_Static_assert(LEN(config_keys) <= CFG_MAX_ROWS && LEN(profile_keys) <= CFG_MAX_ROWS, "room for every row");
+_Static_assert((int)CONFIG_MAX_MESHES <= (int)CFG_MAX_ITEMS &&
+                   (int)CONFIG_MAX_STATIONS <= (int)CFG_MAX_ITEMS &&
+                   (int)CONFIG_MAX_LINKS <= (int)CFG_MAX_ITEMS,
+               "room for every element");
+
+const struct cfg_table cfg_config_table = {config_keys, LEN(config_keys)};
+const struct cfg_table cfg_profile_table = {profile_keys, LEN(profile_keys)};
