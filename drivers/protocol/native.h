@@ -159,7 +159,7 @@ struct native_stats {
 struct native_parser {
     uint8_t buf[2 * NATIVE_MAX_FRAME];
     size_t start, end;
-    int in_step, have_seq;
+    int in_step, have_seq, finished;
     uint32_t next_seq;
     struct native_stats stats;
     /* the item found last: valid until the next call of any parser function */
@@ -173,6 +173,9 @@ void native_parser_init(struct native_parser *parser);
 uint8_t *native_parser_room(struct native_parser *parser, size_t *room); /* room is never 0 after NATIVE_MORE */
 void native_parser_added(struct native_parser *parser, size_t n);
 enum native_item native_parser_next(struct native_parser *parser);
+/* Nothing more will be added: what waits for more bytes is searched as garbage, so that whole frames behind a cut one
+ * come out at the end of a recording too. */
+void native_parser_finish(struct native_parser *parser);
 
 /* 1 if a frame with this header belongs to stream_sha256: the hash runs over u8 type, u32 length (LE) and the payload
  * of each descriptor, anchor, points and line-end frame that has neither NATIVE_REPEAT nor NATIVE_LOCAL. */

@@ -1,7 +1,8 @@
 /* line -> native frames. Pure; writes only into dst; allocates nothing; real-time safe.
  *
  * Each function writes one whole frame (points: as many as needed) at dst and returns its length, or 0 when cap is
- * too small. Frames leave with seq 0 and a header CRC to match; native_seal sets what is known only at release. */
+ * too small, or when the input breaks a limit of the wire (a block's dt_ns of 2^24 or more, a name beyond 255 bytes).
+ * Frames leave with seq 0 and a header CRC to match; native_seal sets what is known only at release. */
 #ifndef DRIVERS_PROTOCOL_NATIVE_ENCODE_H
 #define DRIVERS_PROTOCOL_NATIVE_ENCODE_H
 

@@ -1,0 +1,136 @@
+/* One command line out, one reply line back, while frames go on coming. */
+#include <errno.h>
+#include <poll.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "drivers/host/host.h"
+
+enum { COMMAND_MAX = 1024, STALE_READS = 32 };
+
+/* Keeps the frames that are in the parser. 1: the parser is at a text. */
+static int take_items(struct scanhead *sh)
+{
+    for (;;) {
+        enum native_item item = native_parser_next(&sh->parser);
+        if (item == NATIVE_TEXT) return 1;
+        if (item == NATIVE_MORE) return 0;
+        int rc = host_keep(sh);
+        if (rc != 0) return rc;
+    }
+}
+
+/* A line that came before the command can't be its reply: it answers one that was given up. Frames may arrive
+ * without end, so this looks at a few buffers only. */
+static int discard_stale(struct scanhead *sh)
+{
+    for (int i = 0; i < STALE_READS; i++) {
+        int rc;
+        while ((rc = take_items(sh)) == 1) {
+        }
+        if (rc != 0 || sh->ended) return rc;
+        rc = host_fill(sh, 0);
+        if (rc == SH_ETIMEOUT) return 0;
+        if (rc != 0) return rc;
+    }
+    return 0;
+}
+
+static ssize_t put(struct scanhead *sh, const char *data, size_t len)
+{
+    return sh->source.is_socket ? send(sh->source.fd, data, len, MSG_NOSIGNAL)
+                                : write(sh->source.fd, data, len);
+}
+
+static int gone(struct scanhead *sh)
+{
+    return sh_fail(&sh->err, SCANHEAD_ECLOSED, "%s: the head is gone", sh->source.name);
+}
+
+/* Reads on while it waits to write: a head that is itself waiting to write must not lock up both. */
+static int wait_writable(struct scanhead *sh, int64_t deadline_ns)
+{
+    short revents;
+    int rc = host_wait(sh, POLLIN | POLLOUT, deadline_ns, &revents);
+    if (rc != 0 || (revents & POLLIN) == 0) return rc;
+    rc = host_fill(sh, deadline_ns);
+    while (rc == 0 && (rc = take_items(sh)) == 1)
+        rc = 0;
+    return rc == 0 && sh->ended ? gone(sh) : rc;
+}
+
+static int send_all(struct scanhead *sh, const char *data, size_t len, int64_t deadline_ns)
+{
+    size_t done = 0;
+    while (done < len) {
+        ssize_t n = put(sh, data + done, len - done);
+        int rc = 0;
+        if (n > 0)
+            done += (size_t)n;
+        else if (n < 0 && errno == EAGAIN)
+            rc = wait_writable(sh, deadline_ns);
+        else if (n < 0 && (errno == EPIPE || errno == ECONNRESET || errno == EIO))
+            rc = gone(sh);
+        else if (n < 0 && errno != EINTR)
+            rc = sh_fail(&sh->err, SH_EIO, "%s: cannot write: %s", sh->source.name, strerror(errno));
+        if (rc != 0) {
+            sh->stuck = done > 0;
+            return rc;
+        }
+    }
+    return 0;
+}
+
+static int check_command(struct scanhead *sh, const char *command, size_t len)
+{
+    if (sh->source.is_file)
+        return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: a recording takes no commands", sh->source.name);
+    if (sh->stuck)
+        return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: half a command went out before; open the head anew",
+                       sh->source.name);
+    int blank = 1, printable = 1;
+    for (size_t i = 0; i < len; i++) {
+        if (command[i] != ' ') blank = 0;
+        if (command[i] < 0x20 || command[i] > 0x7e) printable = 0;
+    }
+    if (blank || !printable || len > COMMAND_MAX)
+        return sh_fail(&sh->err, SCANHEAD_EINPUT,
+                       "not a command: one line of at most %d printable ASCII characters", COMMAND_MAX);
+    return 0;
+}
+
+static int copy_reply(struct scanhead *sh, char *reply, size_t reply_len)
+{
+    size_t len = strlen(sh->parser.text);
+    if (len >= reply_len)
+        return sh_fail(&sh->err, SCANHEAD_EINPUT, "a reply of %zu characters does not fit into %zu", len,
+                       reply_len);
+    memcpy(reply, sh->parser.text, len + 1);
+    return SCANHEAD_OK;
+}
+
+int scanhead_command(struct scanhead *sh, const char *command, char *reply, size_t reply_len, int timeout_ms)
+{
+    char line[COMMAND_MAX + 1];
+    size_t len = strlen(command);
+    sh->payload = NULL;
+    int rc = check_command(sh, command, len);
+    if (rc != 0) return rc;
+    memcpy(line, command, len);
+    line[len] = '\n';
+    int64_t deadline_ns = host_deadline_ns(timeout_ms);
+    rc = discard_stale(sh);
+    if (rc == 0) rc = sh->ended ? gone(sh) : send_all(sh, line, len + 1, deadline_ns);
+    while (rc == 0) {
+        rc = take_items(sh);
+        if (rc == 1) return copy_reply(sh, reply, reply_len);
+        if (rc != 0) break;
+        if (sh->ended) return gone(sh);
+        rc = deadline_ns < host_deadline_ns(0) ? SH_ETIMEOUT : host_fill(sh, deadline_ns);
+    }
+    if (rc == SH_ETIMEOUT)
+        return sh_fail(&sh->err, SCANHEAD_ETIMEOUT, "%s: no reply to '%s' within %d ms", sh->source.name,
+                       command, timeout_ms);
+    return rc;
+}

@@ -1,0 +1,202 @@
+#include "drivers/host/host.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "drivers/protocol/bytes.h"
+
+_Static_assert(SCANHEAD_EINPUT == (int)SH_EINPUT && SCANHEAD_EIO == (int)SH_EIO &&
+                   SCANHEAD_ENOMEM == (int)SH_ENOMEM && SCANHEAD_EPERM == (int)SH_EPERM &&
+                   SCANHEAD_ETIMEOUT == (int)SH_ETIMEOUT && SCANHEAD_ECLOSED == (int)SH_ECLOSED &&
+                   SCANHEAD_EFORMAT == (int)SH_EFORMAT && SCANHEAD_ESTATE == (int)SH_ESTATE,
+               "the library's errors are those of core/err.h");
+_Static_assert(SCANHEAD_POINTS == (int)NATIVE_POINTS && SCANHEAD_SURFACES == (int)NATIVE_SURFACES &&
+                   SCANHEAD_EV_SETTINGS == (int)NATIVE_EV_SETTINGS && SCANHEAD_LOCAL == (int)NATIVE_LOCAL,
+               "types, events and flags are those on the wire");
+
+int scanhead_open(const char *source, struct scanhead **out, char *err, size_t err_len)
+{
+    struct sh_err why = {0};
+    int rc;
+    struct scanhead *sh = calloc(1, sizeof *sh);
+    *out = NULL;
+    if (sh == NULL) {
+        rc = sh_fail(&why, SH_ENOMEM, "no memory for a scan head handle");
+    } else if ((rc = host_source_open(source, &sh->source, &why)) != 0) {
+        free(sh);
+    } else {
+        native_parser_init(&sh->parser);
+        host_turn_table(sh);
+        *out = sh;
+    }
+    if (err != NULL && err_len > 0) snprintf(err, err_len, "%s", why.text);
+    return rc;
+}
+
+static void free_nodes(struct host_node *node)
+{
+    while (node != NULL) {
+        struct host_node *next = node->next;
+        free(node);
+        node = next;
+    }
+}
+
+void scanhead_close(struct scanhead *sh)
+{
+    if (sh == NULL) return;
+    close(sh->source.fd);
+    free_nodes(sh->first);
+    free(sh->current);
+    for (uint32_t i = 0; i < sh->n_surfaces; i++) {
+        free(sh->surface[i].object);
+        free(sh->surface[i].material);
+    }
+    free(sh->surface);
+    free(sh);
+}
+
+const char *scanhead_error(const struct scanhead *sh)
+{
+    return sh->err.text;
+}
+
+static void read_header(const uint8_t *raw, struct native_header *header)
+{
+    *header = (struct native_header){
+        .type = raw[1],
+        .version = raw[2],
+        .flags = raw[3],
+        .length = le_get32(raw + 4),
+        .seq = le_get32(raw + 8),
+        .payload_crc = le_get32(raw + 12),
+        .t_ns = (int64_t)le_get64(raw + 16),
+    };
+}
+
+static struct host_node *pop(struct scanhead *sh)
+{
+    struct host_node *node = sh->first;
+    sh->first = node->next;
+    if (sh->first == NULL) sh->last = NULL;
+    sh->queued_bytes -= sizeof *node + node->len;
+    return node;
+}
+
+/* The oldest goes, but what it says of the stream stays known, and it stays in the hash. */
+static int drop_oldest(struct scanhead *sh)
+{
+    struct host_node *node = pop(sh);
+    struct native_header header;
+    read_header(node->raw, &header);
+    int rc = host_absorb(sh, &header, node->raw + NATIVE_HEADER_LEN);
+    sh->dropped++;
+    free(node);
+    return rc;
+}
+
+int host_keep(struct scanhead *sh)
+{
+    size_t len = NATIVE_HEADER_LEN + (size_t)sh->parser.header.length;
+    struct host_node *node = malloc(sizeof *node + len);
+    if (node == NULL) return sh_fail(&sh->err, SH_ENOMEM, "no memory to keep a frame of %zu bytes", len);
+    node->next = NULL;
+    node->len = len;
+    memcpy(node->raw, sh->parser.frame, len);
+    if (sh->last != NULL)
+        sh->last->next = node;
+    else
+        sh->first = node;
+    sh->last = node;
+    sh->queued_bytes += sizeof *node + len;
+    int rc = 0;
+    while (sh->queued_bytes > HOST_QUEUE_BYTES && rc == 0)
+        rc = drop_oldest(sh);
+    return rc;
+}
+
+static void fill_points(struct scanhead_frame *frame)
+{
+    struct native_points points;
+    if (native_decode_points(frame->payload, frame->payload_len, &points) != 0) return;
+    frame->scan_frame = points.frame;
+    frame->scan_line = points.line;
+    frame->n_points = points.n_points;
+    frame->n_pulses = points.n_pulses;
+    frame->pulse0 = points.pulse0;
+    frame->scan_t0_ns = points.t0_ns;
+    frame->line_t0_ns = points.line_t0_ns;
+}
+
+static void fill_event(struct scanhead_frame *frame)
+{
+    struct native_event event;
+    if (native_decode_event(frame->payload, frame->payload_len, &event) != 0) return;
+    frame->event = event.code;
+    frame->event_value[0] = event.a;
+    frame->event_value[1] = event.b;
+    frame->event_value[2] = event.c;
+    memcpy(frame->event_text, event.text, sizeof frame->event_text);
+}
+
+static int hand_out(struct scanhead *sh, const uint8_t *raw, struct scanhead_frame *frame)
+{
+    struct native_header header;
+    read_header(raw, &header);
+    int rc = host_absorb(sh, &header, raw + NATIVE_HEADER_LEN);
+    if (rc != 0) return rc;
+    *frame = (struct scanhead_frame){
+        .type = header.type,
+        .flags = header.flags,
+        .seq = header.seq,
+        .t_ns = header.t_ns,
+        .payload = raw + NATIVE_HEADER_LEN,
+        .payload_len = header.length,
+        .raw = raw,
+        .raw_len = NATIVE_HEADER_LEN + (size_t)header.length,
+    };
+    if (header.type == NATIVE_POINTS) fill_points(frame);
+    if (header.type == NATIVE_EVENT) fill_event(frame);
+    sh->payload = frame->payload;
+    return SCANHEAD_OK;
+}
+
+static int closed(struct scanhead *sh)
+{
+    const struct native_stats *s = &sh->parser.stats;
+    if (s->bytes > 0 && s->frames == 0 && s->texts == 0)
+        return sh_fail(&sh->err, SCANHEAD_EFORMAT,
+                       "%s: not one frame in %llu bytes: not a scan head's stream", sh->source.name,
+                       (unsigned long long)s->bytes);
+    return sh_fail(&sh->err, SCANHEAD_ECLOSED,
+                   sh->source.is_file ? "%s: end of the recording" : "%s: the head is gone", sh->source.name);
+}
+
+int scanhead_next(struct scanhead *sh, struct scanhead_frame *frame, int timeout_ms)
+{
+    memset(frame, 0, sizeof *frame);
+    sh->payload = NULL;
+    free(sh->current);
+    sh->current = NULL;
+    if (sh->first != NULL) {
+        sh->current = pop(sh);
+        return hand_out(sh, sh->current->raw, frame);
+    }
+    int64_t deadline_ns = 0; /* asked for only when there is something to wait for */
+    for (;;) {
+        enum native_item item;
+        while ((item = native_parser_next(&sh->parser)) == NATIVE_TEXT) {
+            /* the reply to a command that was given up: nobody waits for it any more */
+        }
+        if (item == NATIVE_FRAME) return hand_out(sh, sh->parser.frame, frame);
+        if (sh->ended) return closed(sh);
+        if (deadline_ns == 0)
+            deadline_ns = host_deadline_ns(timeout_ms);
+        else if (deadline_ns < host_deadline_ns(0) && timeout_ms != 0)
+            return sh_fail(&sh->err, SCANHEAD_ETIMEOUT, "%s: no frame in time", sh->source.name);
+        int rc = host_fill(sh, deadline_ns);
+        if (rc != 0) return rc;
+    }
+}

@@ -1,0 +1,74 @@
+/* The insides of a scanhead handle, shared by the files of this folder. */
+#ifndef DRIVERS_HOST_HOST_H
+#define DRIVERS_HOST_HOST_H
+
+#include <nettle/sha2.h>
+
+#include "core/err.h"
+#include "drivers/host/scanhead.h"
+#include "drivers/protocol/native.h"
+
+enum { HOST_QUEUE_BYTES = 64 << 20, HOST_TURN_PARTS = 256 };
+
+/* A frame kept while a command waits for its reply. */
+struct host_node {
+    struct host_node *next;
+    size_t len;
+    uint8_t raw[];
+};
+
+struct host_surface {
+    char *object, *material; /* NULL: not seen */
+};
+
+struct host_source {
+    int fd;
+    int is_file, is_socket;
+    char name[256]; /* for messages */
+};
+
+struct scanhead {
+    struct host_source source;
+    int ended; /* no more bytes will come */
+    int stuck; /* half a command went out: nothing sensible can follow */
+    struct native_parser parser;
+    struct host_node *first, *last, *current; /* kept frames; the one that was handed out */
+    size_t queued_bytes;
+    const uint8_t *payload; /* of the frame that scanhead_next returned last */
+
+    /* what the stream has said, as of the frame handed out last */
+    int have_descriptor, have_anchor, have_pulse;
+    struct native_descriptor descriptor;
+    struct native_anchor anchor;
+    uint64_t last_pulse0;
+    struct host_surface *surface;
+    uint32_t n_surfaces;
+
+    uint64_t dropped, reader_lost, pulses_lost;
+    int hashing;
+    struct sha256_ctx sha256;
+    struct sh_err err;
+    double sin_part[HOST_TURN_PARTS], cos_part[HOST_TURN_PARTS]; /* of whole parts of a turn */
+};
+
+/* Opens what `source` names, non-blocking. */
+int host_source_open(const char *source, struct host_source *out, struct sh_err *err);
+
+/* Takes a frame into the state: descriptor, anchor, names, counters, hash. Called once per frame, in stream
+ * order. */
+int host_absorb(struct scanhead *sh, const struct native_header *header, const uint8_t *payload);
+
+/* Nanoseconds of the monotonic clock at which timeout_ms from now is over; INT64_MAX for a negative one. */
+int64_t host_deadline_ns(int timeout_ms);
+/* Waits for `events` on the source: 0, SH_ETIMEOUT (also for a signal when there is no deadline), SH_EIO. */
+int host_wait(struct scanhead *sh, short events, int64_t deadline_ns, short *revents);
+/* Reads what is there into the parser, waiting for it until the deadline. 0 also at the end: then sh->ended
+ * is set. */
+int host_fill(struct scanhead *sh, int64_t deadline_ns);
+
+/* Keeps the frame that the parser is at, for scanhead_next. */
+int host_keep(struct scanhead *sh);
+
+void host_turn_table(struct scanhead *sh);
+
+#endif

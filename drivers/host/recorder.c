@@ -1,0 +1,24 @@
+#include "drivers/host/recorder.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <strings.h>
+
+#include "drivers/host/recorder_list.h"
+
+static const struct recorder_ops *const recorders[] = {&recorder_ply, &recorder_shs};
+
+enum { N_RECORDERS = sizeof recorders / sizeof recorders[0] };
+
+const struct recorder_ops *recorder_find(const char *path, struct sh_err *err)
+{
+    size_t len = strlen(path);
+    char known[128] = "";
+    for (size_t i = 0; i < N_RECORDERS; i++) {
+        size_t n = strlen(recorders[i]->ending);
+        if (len > n && strcasecmp(path + len - n, recorders[i]->ending) == 0) return recorders[i];
+        snprintf(known + strlen(known), sizeof known - strlen(known), " %s", recorders[i]->ending);
+    }
+    sh_fail(err, SH_EINPUT, "%s: no recorder for this ending; known are%s", path, known);
+    return NULL;
+}

@@ -1,0 +1,9 @@
+/* The recorders there are; recorder.c makes the one list of them. */
+#ifndef DRIVERS_HOST_RECORDER_LIST_H
+#define DRIVERS_HOST_RECORDER_LIST_H
+
+#include "drivers/host/recorder.h"
+
+extern const struct recorder_ops recorder_ply, recorder_shs;
+
+#endif

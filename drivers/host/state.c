@@ -1,0 +1,222 @@
+/* What the stream says of itself: descriptor, anchor, names, losses, hash. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "drivers/host/host.h"
+#include "drivers/protocol/bytes.h"
+
+static int bad(struct scanhead *sh, const char *what)
+{
+    return sh_fail(&sh->err, SH_EFORMAT, "%s: a frame with a good CRC holds %s", sh->source.name, what);
+}
+
+static int absorb_descriptor(struct scanhead *sh, const struct native_header *header, const uint8_t *payload)
+{
+    struct native_descriptor d;
+    if (native_decode_descriptor(payload, header->length, &d) != 0) return bad(sh, "a wrong descriptor");
+    if (d.layout == NATIVE_POLAR &&
+        !(d.mirror_counts_per_turn > 0 && d.pan_counts_per_turn > 0 && d.range_scale_m > 0))
+        return bad(sh, "a polar descriptor without scales");
+    if (d.n_surfaces > SCANHEAD_NO_LABEL) return bad(sh, "a descriptor with more surfaces than labels");
+    /* The anchor of another scan may be that of another station; a descriptor that is not a repetition begins
+     * a scan. */
+    int same_scan =
+        sh->have_descriptor && sh->descriptor.scan == d.scan && (header->flags & NATIVE_REPEAT) != 0;
+    if (!same_scan) sh->have_anchor = sh->have_pulse = 0;
+    sh->descriptor = d;
+    sh->have_descriptor = 1;
+    return 0;
+}
+
+static int absorb_anchor(struct scanhead *sh, const struct native_header *header, const uint8_t *payload)
+{
+    struct native_anchor a;
+    if (native_decode_anchor(payload, header->length, &a) != 0) return bad(sh, "a wrong anchor");
+    sh->anchor = a;
+    /* without the descriptor of its scan an anchor can't be told from one of the scan before */
+    sh->have_anchor = sh->have_descriptor;
+    return 0;
+}
+
+/* A new scan whose descriptor did not reach us: what we know belongs to the scan before. */
+static void forget(struct scanhead *sh)
+{
+    sh->have_descriptor = sh->have_anchor = 0;
+}
+
+static int absorb_points(struct scanhead *sh, const struct native_header *header, const uint8_t *payload)
+{
+    struct native_points points;
+    if (native_decode_points(payload, header->length, &points) != 0) return bad(sh, "wrong points");
+    if (sh->have_pulse && points.pulse0 < sh->last_pulse0) forget(sh);
+    sh->have_pulse = 1;
+    sh->last_pulse0 = points.pulse0;
+    return 0;
+}
+
+static int absorb_event(struct scanhead *sh, const struct native_header *header, const uint8_t *payload)
+{
+    struct native_event event;
+    if (native_decode_event(payload, header->length, &event) != 0) return bad(sh, "a wrong event");
+    if (event.code == NATIVE_EV_READER_LOST) sh->reader_lost = event.c;
+    if (event.code == NATIVE_EV_OVERRUN) sh->pulses_lost += event.b;
+    if (event.code == NATIVE_EV_SCAN_START && sh->have_descriptor && event.a != sh->descriptor.scan)
+        forget(sh);
+    return 0;
+}
+
+struct naming {
+    struct scanhead *sh;
+    int no_memory;
+};
+
+static int grow_surfaces(struct scanhead *sh, uint32_t n)
+{
+    if (n <= sh->n_surfaces) return 0;
+    struct host_surface *more = realloc(sh->surface, n * sizeof *more);
+    if (more == NULL) return SH_ENOMEM;
+    memset(more + sh->n_surfaces, 0, (n - sh->n_surfaces) * sizeof *more);
+    sh->surface = more;
+    sh->n_surfaces = n;
+    return 0;
+}
+
+static void set_surface(void *ctx, uint32_t label, const char *object, const char *material)
+{
+    struct naming *naming = ctx;
+    struct host_surface *s = &naming->sh->surface[label];
+    if (s->object != NULL && strcmp(s->object, object) == 0 && strcmp(s->material, material) == 0) return;
+    struct host_surface named = {strdup(object), strdup(material)};
+    if (named.object == NULL || named.material == NULL) {
+        free(named.object);
+        free(named.material);
+        naming->no_memory = 1;
+        return;
+    }
+    free(s->object);
+    free(s->material);
+    *s = named;
+}
+
+static void count_label(void *ctx, uint32_t label, const char *object, const char *material)
+{
+    (void)object, (void)material;
+    *(uint32_t *)ctx = label + 1;
+}
+
+static int absorb_surfaces(struct scanhead *sh, const struct native_header *header, const uint8_t *payload)
+{
+    uint32_t n = 0;
+    if (native_decode_surfaces(payload, header->length, count_label, &n) != 0)
+        return bad(sh, "wrong surface names");
+    struct naming naming = {sh, grow_surfaces(sh, n) != 0};
+    if (!naming.no_memory) native_decode_surfaces(payload, header->length, set_surface, &naming);
+    if (naming.no_memory) return sh_fail(&sh->err, SH_ENOMEM, "no memory for %u surface names", n);
+    return 0;
+}
+
+static void absorb_hash(struct scanhead *sh, const struct native_header *header, const uint8_t *payload)
+{
+    if (!sh->hashing || !native_is_hashed(header)) return;
+    uint8_t head[5] = {header->type};
+    le_put32(head + 1, header->length);
+    sha256_update(&sh->sha256, sizeof head, head);
+    sha256_update(&sh->sha256, header->length, payload);
+}
+
+int host_absorb(struct scanhead *sh, const struct native_header *header, const uint8_t *payload)
+{
+    absorb_hash(sh, header, payload);
+    if (header->version != NATIVE_VERSION)
+        return sh_fail(&sh->err, SH_EFORMAT,
+                       "%s: the head speaks version %u of the protocol; this library reads %d",
+                       sh->source.name, header->version, NATIVE_VERSION);
+    switch (header->type) {
+    case NATIVE_DESCRIPTOR:
+        return absorb_descriptor(sh, header, payload);
+    case NATIVE_ANCHOR:
+        return absorb_anchor(sh, header, payload);
+    case NATIVE_POINTS:
+        return absorb_points(sh, header, payload);
+    case NATIVE_EVENT:
+        return absorb_event(sh, header, payload);
+    case NATIVE_SURFACES:
+        return absorb_surfaces(sh, header, payload);
+    default: /* line end and telemetry change nothing; unknown types are for later readers */
+        return 0;
+    }
+}
+
+int scanhead_get_info(const struct scanhead *sh, struct scanhead_info *info)
+{
+    memset(info, 0, sizeof *info);
+    if (!sh->have_descriptor || !sh->have_anchor) return SCANHEAD_ESTATE;
+    const struct native_descriptor *d = &sh->descriptor;
+    const struct native_anchor *a = &sh->anchor;
+    info->idn = d->idn;
+    info->profile = d->profile;
+    info->geo = d->layout == NATIVE_GEO;
+    info->crs = (int)a->crs;
+    info->epsg = (int)a->epsg;
+    info->scale_m = a->scale_m;
+    info->lat_deg = a->lat_deg;
+    info->lon_deg = a->lon_deg;
+    info->height_m = a->height_m;
+    memcpy(info->anchor, a->anchor, sizeof info->anchor);
+    memcpy(info->station_m, a->station_m, sizeof info->station_m);
+    memcpy(info->rotation, a->rotation, sizeof info->rotation);
+    info->prr_hz = (double)d->prr_uhz / 1e6;
+    info->lines_hz = (double)d->lines_uhz / 1e6;
+    info->pan_deg_s = (double)d->pan_udeg_s / 1e6;
+    info->range_min_m = d->range_min_m;
+    info->range_max_m = d->range_max_m;
+    info->station = a->station;
+    info->n_surfaces = d->n_surfaces;
+    info->frames = d->frames;
+    info->scan = d->scan;
+    return SCANHEAD_OK;
+}
+
+int scanhead_surface(const struct scanhead *sh, uint32_t label, const char **object, const char **material)
+{
+    if (label >= sh->n_surfaces || sh->surface[label].object == NULL) return 0;
+    *object = sh->surface[label].object;
+    *material = sh->surface[label].material;
+    return 1;
+}
+
+void scanhead_get_stats(const struct scanhead *sh, struct scanhead_stats *stats)
+{
+    const struct native_stats *s = &sh->parser.stats;
+    *stats = (struct scanhead_stats){
+        .bytes = s->bytes,
+        .frames = s->frames,
+        .bad_payload = s->bad_payload,
+        .bad_bytes = s->bad_bytes,
+        .seq_gaps = s->seq_gaps,
+        .seq_lost = s->seq_lost,
+        .dropped = sh->dropped,
+        .reader_lost = sh->reader_lost,
+        .pulses_lost = sh->pulses_lost,
+    };
+}
+
+void scanhead_hash_start(struct scanhead *sh)
+{
+    sha256_init(&sh->sha256);
+    sh->hashing = 1;
+}
+
+void scanhead_hash_hex(const struct scanhead *sh, char hex[65])
+{
+    static const char digits[] = "0123456789abcdef";
+    struct sha256_ctx ctx = sh->sha256; /* a copy: taking the digest ends it */
+    if (!sh->hashing) sha256_init(&ctx);
+    uint8_t digest[SHA256_DIGEST_SIZE];
+    sha256_digest(&ctx, sizeof digest, digest);
+    for (size_t i = 0; i < sizeof digest; i++) {
+        hex[2 * i] = digits[digest[i] >> 4];
+        hex[2 * i + 1] = digits[digest[i] & 15];
+    }
+    hex[64] = 0;
+}

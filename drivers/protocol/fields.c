@@ -1,0 +1,159 @@
+#include "drivers/protocol/fields.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/err.h"
+#include "drivers/protocol/bytes.h"
+#include "drivers/protocol/native.h"
+
+#define UNIT_FIELD_32   4
+#define UNIT_FIELD_64   8
+#define UNIT_FIELD_REAL 8
+#define UNIT_FIELD_TEXT 1
+#define ROW(type, member, kind)                                                               \
+    {                                                                                         \
+        offsetof(struct type, member), kind, sizeof(((struct type *)0)->member) / UNIT_##kind \
+    }
+#define TABLE(rows, type, wire)                                         \
+    {                                                                   \
+        rows, sizeof(rows) / sizeof(rows)[0], wire, sizeof(struct type) \
+    }
+
+#define DESC(member, kind) ROW(native_descriptor, member, kind)
+static const struct field descriptor[] = {
+    DESC(idn, FIELD_TEXT),
+    DESC(profile, FIELD_TEXT),
+    DESC(layout, FIELD_32),
+    DESC(isa, FIELD_32),
+    DESC(prr_uhz, FIELD_64),
+    DESC(lines_uhz, FIELD_64),
+    DESC(pan_udeg_s, FIELD_64),
+    DESC(fov_min_udeg, FIELD_64),
+    DESC(sweep_udeg, FIELD_64),
+    DESC(line_start_udeg, FIELD_64),
+    DESC(line_stop_udeg, FIELD_64),
+    DESC(pan_start_udeg, FIELD_64),
+    DESC(pan_stop_udeg, FIELD_64),
+    DESC(mirror_counts_per_turn, FIELD_REAL),
+    DESC(pan_counts_per_turn, FIELD_REAL),
+    DESC(range_scale_m, FIELD_REAL),
+    DESC(range_min_m, FIELD_REAL),
+    DESC(range_max_m, FIELD_REAL),
+    DESC(max_echoes, FIELD_32),
+    DESC(n_surfaces, FIELD_32),
+    DESC(frames, FIELD_32),
+    DESC(scan, FIELD_32),
+    DESC(seed, FIELD_64),
+};
+
+#define ANCHOR(member, kind) ROW(native_anchor, member, kind)
+static const struct field anchor[] = {
+    ANCHOR(crs, FIELD_32),         ANCHOR(epsg, FIELD_32),       ANCHOR(station, FIELD_32),
+    ANCHOR(reserved, FIELD_32),    ANCHOR(anchor, FIELD_REAL),   ANCHOR(scale_m, FIELD_REAL),
+    ANCHOR(lat_deg, FIELD_REAL),   ANCHOR(lon_deg, FIELD_REAL),  ANCHOR(height_m, FIELD_REAL),
+    ANCHOR(station_m, FIELD_REAL), ANCHOR(rotation, FIELD_REAL),
+};
+
+#define POINTS(member, kind) ROW(native_points, member, kind)
+static const struct field points[] = {
+    POINTS(frame, FIELD_32),    POINTS(line, FIELD_32),       POINTS(pulse0, FIELD_64),
+    POINTS(t0_ns, FIELD_64),    POINTS(line_t0_ns, FIELD_64), POINTS(n_pulses, FIELD_32),
+    POINTS(n_points, FIELD_32),
+};
+
+#define END(member, kind) ROW(native_line_end, member, kind)
+static const struct field line_end[] = {
+    END(frame, FIELD_32),        END(line, FIELD_32),      END(pulse0, FIELD_64), END(t0_ns, FIELD_64),
+    END(t1_ns, FIELD_64),        END(n_fired, FIELD_32),   END(n_cast, FIELD_32), END(n_echoes, FIELD_32),
+    END(mirror_count, FIELD_32), END(pan_count, FIELD_32), END(status, FIELD_32),
+};
+
+#define TELE(member, kind) ROW(native_telemetry, member, kind)
+static const struct field telemetry[] = {
+    TELE(state, FIELD_32),         TELE(scan, FIELD_32),
+    TELE(pulses, FIELD_64),        TELE(echoes, FIELD_64),
+    TELE(lines, FIELD_64),         TELE(lost_pulses, FIELD_64),
+    TELE(late_blocks, FIELD_64),   TELE(late_max_us, FIELD_32),
+    TELE(errors_queued, FIELD_32), TELE(reader_lost_frames, FIELD_64),
+    TELE(utc_ns, FIELD_64),
+};
+
+#define EVENT(member, kind) ROW(native_event, member, kind)
+static const struct field event[] = {
+    EVENT(code, FIELD_32), EVENT(reserved, FIELD_32), EVENT(a, FIELD_64),
+    EVENT(b, FIELD_64),    EVENT(c, FIELD_64),        EVENT(text, FIELD_TEXT),
+};
+
+const struct field_table fields_descriptor = TABLE(descriptor, native_descriptor, 272);
+const struct field_table fields_anchor = TABLE(anchor, native_anchor, 168);
+const struct field_table fields_points = TABLE(points, native_points, NATIVE_POINTS_HEAD_LEN);
+const struct field_table fields_line_end = TABLE(line_end, native_line_end, 56);
+const struct field_table fields_telemetry = TABLE(telemetry, native_telemetry, 72);
+const struct field_table fields_event = TABLE(event, native_event, 128);
+
+static size_t encode_field(const struct field *field, const char *from, uint8_t *wire)
+{
+    if (field->kind == FIELD_TEXT) {
+        /* zero the rest ourselves: what stands behind the NUL in the struct must not reach the wire */
+        size_t len = strnlen(from, field->count - 1u);
+        memcpy(wire, from, len);
+        memset(wire + len, 0, field->count - len);
+        return field->count;
+    }
+    size_t unit = field->kind == FIELD_32 ? 4 : 8;
+    for (size_t i = 0; i < field->count; i++) {
+        if (unit == 4) {
+            uint32_t v;
+            memcpy(&v, from + i * unit, sizeof v);
+            le_put32(wire + i * unit, v);
+        } else {
+            uint64_t v;
+            memcpy(&v, from + i * unit, sizeof v);
+            le_put64(wire + i * unit, v);
+        }
+    }
+    return unit * field->count;
+}
+
+static int decode_field(const struct field *field, const uint8_t *wire, char *to)
+{
+    if (field->kind == FIELD_TEXT) {
+        size_t len = strnlen((const char *)wire, field->count);
+        if (len == field->count) return SH_EFORMAT;
+        memcpy(to, wire, len);
+        return field->count;
+    }
+    int unit = field->kind == FIELD_32 ? 4 : 8;
+    for (int i = 0; i < field->count; i++) {
+        if (unit == 4) {
+            uint32_t v = le_get32(wire + i * unit);
+            memcpy(to + i * unit, &v, sizeof v);
+            continue;
+        }
+        uint64_t v = le_get64(wire + i * unit);
+        double d;
+        memcpy(&d, &v, sizeof d);
+        if (field->kind == FIELD_REAL && !isfinite(d)) return SH_EFORMAT;
+        memcpy(to + i * unit, &v, sizeof v);
+    }
+    return unit * field->count;
+}
+
+void fields_encode(const struct field_table *table, const void *from, uint8_t *wire)
+{
+    for (size_t i = 0; i < table->n_fields; i++)
+        wire += encode_field(&table->field[i], (const char *)from + table->field[i].offset, wire);
+}
+
+int fields_decode(const struct field_table *table, const uint8_t *wire, size_t len, void *to)
+{
+    if (len < table->wire_len) return SH_EFORMAT;
+    memset(to, 0, table->struct_len);
+    for (size_t i = 0; i < table->n_fields; i++) {
+        int n = decode_field(&table->field[i], wire, (char *)to + table->field[i].offset);
+        if (n < 0) return n;
+        wire += n;
+    }
+    return 0;
+}

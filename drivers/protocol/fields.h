@@ -1,0 +1,37 @@
+/* Fixed payloads as tables: one row per struct member, in wire order without gaps. The same table encodes and
+ * decodes, so the two can't drift apart; PROTOCOL.md gives the resulting offsets and the unit test holds
+ * them. */
+#ifndef DRIVERS_PROTOCOL_FIELDS_H
+#define DRIVERS_PROTOCOL_FIELDS_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+enum field_kind {
+    FIELD_32,   /* uint32_t */
+    FIELD_64,   /* uint64_t, int64_t */
+    FIELD_REAL, /* double; a value that is not finite is refused on decoding */
+    FIELD_TEXT, /* char array: NUL-terminated, padded with NUL */
+};
+
+struct field {
+    uint16_t offset; /* in the struct */
+    uint8_t kind, count;
+};
+
+struct field_table {
+    const struct field *field;
+    size_t n_fields, wire_len, struct_len;
+};
+
+extern const struct field_table fields_descriptor, fields_anchor, fields_points, fields_line_end,
+    fields_telemetry, fields_event;
+
+/* Writes exactly table->wire_len bytes. */
+void fields_encode(const struct field_table *table, const void *from, uint8_t *wire);
+
+/* 0, or SH_EFORMAT for a payload too short, a text without NUL or a number that is not finite. A payload may
+ * be longer than the table: later versions grow at the end. */
+int fields_decode(const struct field_table *table, const uint8_t *wire, size_t len, void *to);
+
+#endif

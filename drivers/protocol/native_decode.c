@@ -1,0 +1,94 @@
+#include "core/err.h"
+#include "drivers/protocol/bytes.h"
+#include "drivers/protocol/fields.h"
+#include "drivers/protocol/native.h"
+
+int native_decode_descriptor(const uint8_t *payload, size_t len, struct native_descriptor *out)
+{
+    int rc = fields_decode(&fields_descriptor, payload, len, out);
+    if (rc == 0 && out->layout != NATIVE_POLAR && out->layout != NATIVE_GEO) rc = SH_EFORMAT;
+    return rc;
+}
+
+int native_decode_anchor(const uint8_t *payload, size_t len, struct native_anchor *out)
+{
+    int rc = fields_decode(&fields_anchor, payload, len, out);
+    if (rc == 0 && out->crs > NATIVE_CRS_UTM) rc = SH_EFORMAT;
+    return rc;
+}
+
+int native_decode_points(const uint8_t *payload, size_t len, struct native_points *out)
+{
+    int rc = fields_decode(&fields_points, payload, len, out);
+    if (rc == 0 && out->n_points > (len - NATIVE_POINTS_HEAD_LEN) / NATIVE_POINT_LEN) rc = SH_EFORMAT;
+    return rc;
+}
+
+void native_decode_point(const uint8_t *payload, uint32_t i, struct native_point *out)
+{
+    const uint8_t *p = payload + NATIVE_POINTS_HEAD_LEN + (size_t)i * NATIVE_POINT_LEN;
+    uint32_t tail = le_get32(p + 16);
+    out->a = le_get32(p);
+    out->b = le_get32(p + 4);
+    out->c = le_get32(p + 8);
+    out->refl_cdb = (int16_t)le_get16(p + 12);
+    out->label = le_get16(p + 14);
+    out->dt_ns = tail & 0xffffffu;
+    out->echo = (uint8_t)(tail >> 24 & 15u);
+    out->echo_count = (uint8_t)(tail >> 28);
+}
+
+int native_decode_line_end(const uint8_t *payload, size_t len, struct native_line_end *out)
+{
+    return fields_decode(&fields_line_end, payload, len, out);
+}
+
+int native_decode_telemetry(const uint8_t *payload, size_t len, struct native_telemetry *out)
+{
+    return fields_decode(&fields_telemetry, payload, len, out);
+}
+
+int native_decode_event(const uint8_t *payload, size_t len, struct native_event *out)
+{
+    return fields_decode(&fields_event, payload, len, out);
+}
+
+/* One name at *at: copies it with a NUL and moves *at behind it. */
+static int take_name(const uint8_t *payload, size_t len, size_t *at, char name[256])
+{
+    if (*at >= len) return SH_EFORMAT;
+    size_t n = payload[(*at)++];
+    if (n > len - *at || memchr(payload + *at, 0, n) != NULL) return SH_EFORMAT;
+    memcpy(name, payload + *at, n);
+    name[n] = 0;
+    *at += n;
+    return 0;
+}
+
+int native_decode_surfaces(const uint8_t *payload, size_t len,
+                           void (*fn)(void *ctx, uint32_t label, const char *object, const char *material),
+                           void *ctx)
+{
+    if (len < 8) return SH_EFORMAT;
+    uint32_t first = le_get32(payload), count = le_get32(payload + 4);
+    if (count > 0xffff || first > 0xffff - count) return SH_EFORMAT;
+    /* twice, so that a payload that is wrong somewhere has no effect at all */
+    for (int pass = 0; pass < 2; pass++) {
+        size_t at = 8;
+        for (uint32_t i = 0; i < count; i++) {
+            char object[256], material[256];
+            int rc = take_name(payload, len, &at, object);
+            if (rc == 0) rc = take_name(payload, len, &at, material);
+            if (rc != 0) return rc;
+            if (pass == 1) fn(ctx, first + i, object, material);
+        }
+    }
+    return 0;
+}
+
+int native_is_hashed(const struct native_header *header)
+{
+    if ((header->flags & (NATIVE_REPEAT | NATIVE_LOCAL)) != 0) return 0;
+    return header->type == NATIVE_DESCRIPTOR || header->type == NATIVE_ANCHOR ||
+           header->type == NATIVE_POINTS || header->type == NATIVE_LINE_END;
+}

@@ -1,0 +1,198 @@
+#include "drivers/protocol/native_encode.h"
+
+#include <string.h>
+
+#include "drivers/protocol/bytes.h"
+#include "drivers/protocol/crc32c.h"
+#include "drivers/protocol/fields.h"
+
+/* Header in front of the payload that already stands at dst + NATIVE_HEADER_LEN. */
+static size_t put_header(uint8_t *dst, enum native_type type, int flags, size_t payload_len, int64_t t_ns)
+{
+    dst[0] = NATIVE_SYNC;
+    dst[1] = (uint8_t)type;
+    dst[2] = NATIVE_VERSION;
+    dst[3] = (uint8_t)flags;
+    le_put32(dst + 4, (uint32_t)payload_len);
+    le_put32(dst + 12, crc32c(0, dst + NATIVE_HEADER_LEN, payload_len));
+    le_put64(dst + 16, (uint64_t)t_ns);
+    return native_seal(dst, 0);
+}
+
+size_t native_seal(uint8_t *frame, uint32_t seq)
+{
+    le_put32(frame + 8, seq);
+    le_put32(frame + 24, crc32c(0, frame, 24));
+    return NATIVE_HEADER_LEN + (size_t)le_get32(frame + 4);
+}
+
+static size_t encode_fixed(uint8_t *dst, size_t cap, enum native_type type, const struct field_table *table,
+                           const void *from, int64_t t_ns, int flags)
+{
+    if (cap < NATIVE_HEADER_LEN + table->wire_len) return 0;
+    fields_encode(table, from, dst + NATIVE_HEADER_LEN);
+    return put_header(dst, type, flags, table->wire_len, t_ns);
+}
+
+size_t native_encode_descriptor(uint8_t *dst, size_t cap, const struct native_descriptor *d, int64_t t_ns,
+                                int flags)
+{
+    return encode_fixed(dst, cap, NATIVE_DESCRIPTOR, &fields_descriptor, d, t_ns, flags);
+}
+
+size_t native_encode_anchor(uint8_t *dst, size_t cap, const struct native_anchor *a, int64_t t_ns, int flags)
+{
+    return encode_fixed(dst, cap, NATIVE_ANCHOR, &fields_anchor, a, t_ns, flags);
+}
+
+size_t native_encode_telemetry(uint8_t *dst, size_t cap, const struct native_telemetry *t, int64_t t_ns,
+                               int flags)
+{
+    return encode_fixed(dst, cap, NATIVE_TELEMETRY, &fields_telemetry, t, t_ns, flags);
+}
+
+size_t native_encode_event(uint8_t *dst, size_t cap, const struct native_event *e, int64_t t_ns, int flags)
+{
+    return encode_fixed(dst, cap, NATIVE_EVENT, &fields_event, e, t_ns, flags);
+}
+
+size_t native_encode_line_end(uint8_t *dst, size_t cap, const struct line_end *end, int64_t scan_t0_ns)
+{
+    const struct native_line_end wire = {
+        .frame = end->frame,
+        .line = end->line,
+        .pulse0 = end->pulse0,
+        .t0_ns = end->t0_ns,
+        .t1_ns = end->t1_ns,
+        .n_fired = end->n_fired,
+        .n_cast = end->n_cast,
+        .n_echoes = end->n_echoes,
+        .mirror_count = end->mirror_count,
+        .pan_count = end->pan_count,
+        .status = end->status,
+    };
+    return encode_fixed(dst, cap, NATIVE_LINE_END, &fields_line_end, &wire, scan_t0_ns + end->t1_ns, 0);
+}
+
+size_t native_points_bound(uint32_t n_points)
+{
+    /* a cut goes back to the start of a pulse: at most LINE_MAX_ECHOES - 1 points */
+    const size_t least = NATIVE_MAX_POINTS - (LINE_MAX_ECHOES - 1);
+    size_t frames = n_points == 0 ? 1 : (n_points + least - 1) / least;
+    return frames * (NATIVE_HEADER_LEN + NATIVE_POINTS_HEAD_LEN) + (size_t)n_points * NATIVE_POINT_LEN;
+}
+
+/* Every pulse has an entry whose echo number is 0 or 1, and it is its first. */
+static int starts_pulse(uint8_t echo)
+{
+    return (echo & 15) <= 1;
+}
+
+/* How many points from `first` on go into one frame. 0: a pulse of more echoes than a frame holds. */
+static uint32_t points_that_fit(const struct line_block *block, uint32_t first)
+{
+    uint32_t n = block->n_points - first;
+    if (n <= NATIVE_MAX_POINTS) return n;
+    n = NATIVE_MAX_POINTS;
+    while (n > 0 && !starts_pulse(block->echo[first + n]))
+        n--;
+    return n;
+}
+
+/* The hot loop; its cost is the number of stores, so three wide ones. Returns the bits that any time had
+ * beyond the 24 there are room for. */
+static uint32_t put_points(uint8_t *restrict dst, const struct line_block *block, uint32_t first, uint32_t n,
+                           uint32_t dt0_ns)
+{
+    const uint32_t *restrict a = block->a + first, *restrict b = block->b + first,
+                             *restrict c = block->c + first;
+    const uint32_t *restrict dt_ns = block->dt_ns + first;
+    const int16_t *restrict refl = block->refl_cdb + first;
+    const uint16_t *restrict label = block->label + first;
+    const uint8_t *restrict echo = block->echo + first;
+    uint32_t bits = 0;
+    for (uint32_t i = 0; i < n; i++, dst += NATIVE_POINT_LEN) {
+        uint32_t dt = dt_ns[i] - dt0_ns;
+        bits |= dt;
+        uint64_t surface = (uint16_t)refl[i] | (uint32_t)label[i] << 16;
+        le_put64(dst, a[i] | (uint64_t)b[i] << 32);
+        le_put64(dst + 8, c[i] | surface << 32);
+        le_put32(dst + 16, dt | (uint32_t)echo[i] << 24);
+    }
+    return bits >> 24;
+}
+
+static uint32_t count_pulses(const uint8_t *echo, uint32_t n)
+{
+    uint32_t pulses = 0;
+    for (uint32_t i = 0; i < n; i++)
+        pulses += (uint32_t)starts_pulse(echo[i]);
+    return pulses;
+}
+
+size_t native_encode_points(uint8_t *dst, size_t cap, const struct line_block *block, int64_t scan_t0_ns)
+{
+    size_t done = 0;
+    uint32_t first = 0, pulses = 0;
+    do {
+        uint32_t n = points_that_fit(block, first);
+        int last = first + n == block->n_points;
+        size_t payload_len = NATIVE_POINTS_HEAD_LEN + (size_t)n * NATIVE_POINT_LEN;
+        if ((n == 0 && !last) || cap - done < NATIVE_HEADER_LEN + payload_len) return 0;
+        uint32_t dt0_ns = first == 0 ? 0 : block->dt_ns[first];
+        const struct native_points head = {
+            .frame = block->frame,
+            .line = block->line,
+            .pulse0 = block->pulse0 + pulses,
+            .t0_ns = block->t0_ns + dt0_ns,
+            .line_t0_ns = block->line_t0_ns,
+            .n_pulses = last ? block->n_pulses - pulses : count_pulses(block->echo + first, n),
+            .n_points = n,
+        };
+        uint8_t *payload = dst + done + NATIVE_HEADER_LEN;
+        fields_encode(&fields_points, &head, payload);
+        if (put_points(payload + NATIVE_POINTS_HEAD_LEN, block, first, n, dt0_ns) != 0) return 0;
+        done += put_header(dst + done, NATIVE_POINTS, 0, payload_len, scan_t0_ns + head.t0_ns);
+        pulses += head.n_pulses;
+        first += n;
+    } while (first < block->n_points);
+    return done;
+}
+
+/* A name with its length in front; 0 when it is too long for either. */
+static size_t put_name(uint8_t *dst, size_t room, const char *name)
+{
+    size_t len = strnlen(name, 256);
+    if (len > 255 || room < len + 1) return 0;
+    dst[0] = (uint8_t)len;
+    memcpy(dst + 1, name, len);
+    return len + 1;
+}
+
+size_t native_encode_surfaces(uint8_t *dst, size_t cap, uint32_t first, uint32_t n, size_t max_payload,
+                              void (*name)(void *ctx, uint32_t label, const char **object,
+                                           const char **material),
+                              void *ctx, int64_t t_ns, int flags, uint32_t *n_done)
+{
+    *n_done = 0;
+    if (cap < NATIVE_HEADER_LEN + 8 || max_payload < 8) return 0;
+    if (max_payload > NATIVE_MAX_PAYLOAD) max_payload = NATIVE_MAX_PAYLOAD;
+    if (max_payload > cap - NATIVE_HEADER_LEN) max_payload = cap - NATIVE_HEADER_LEN;
+    uint8_t *payload = dst + NATIVE_HEADER_LEN;
+    size_t len = 8;
+    uint32_t i;
+    for (i = 0; i < n; i++) {
+        const char *object, *material;
+        name(ctx, first + i, &object, &material);
+        size_t n_object = put_name(payload + len, max_payload - len, object);
+        if (n_object == 0) break;
+        size_t n_material = put_name(payload + len + n_object, max_payload - len - n_object, material);
+        if (n_material == 0) break;
+        len += n_object + n_material;
+    }
+    if (i == 0 && n > 0) return 0;
+    le_put32(payload, first);
+    le_put32(payload + 4, i);
+    *n_done = i;
+    return put_header(dst, NATIVE_SURFACES, flags, len, t_ns);
+}
