@@ -3,9 +3,9 @@
  * The map looks down on prcs: x to the right, y (north) up, metres. Per pixel it keeps which height levels
  * were hit and the lowest point. Lightness shows structure: a pixel with points on many levels (a wall) is
  * dark, one with floor and ceiling only is light, one without points is white. This does not depend on how
- * dense the points lie, so far walls stand out as near ones do. Hue shows the height of the lowest point
- * above the lowest of the map. Lightness and hue are even steps of CIE L*a*b*. Below the map: scale bar,
- * legend of heights, north arrow.
+ * dense the points lie, so far walls stand out as near ones do; each point is drawn three pixels wide. Hue
+ * shows the height of the lowest point above the lowest of the map. Lightness and hue are even steps of CIE
+ * L*a*b*. Below the map: scale bar, legend of heights, north arrow.
  *
  * Ownership: map_create allocates everything, map_free releases it. Thread: one at a time. Not real-time
  * safe. */
@@ -22,7 +22,7 @@ enum {
     MAP_MAX_SIDE_PX = 16384,   /* longest side of the map */
     MAP_MAX_PIXELS = 16777216, /* of the map: 16 bytes each while it is made, 256 MiB */
     MAP_MAX_STATIONS = 64,
-    MAP_MIN_WIDTH_PX = 480, /* of the image; a narrower map is centred */
+    MAP_MIN_WIDTH_PX = 512, /* of the image; a narrower map is centred */
 };
 
 struct map_spec {

@@ -9,6 +9,7 @@ enum {
     WALL_LEVELS = 14, /* height levels hit that make a pixel as dark as it gets */
     FREE_LEVELS = 4,  /* floor and ceiling, each across the border of two levels: not structure */
     HISTOGRAM_BINS = 1024,
+    BAR_PX = 240,   /* longest scale bar */
     STATION_PX = 9, /* from the centre of a station mark to its corners */
     DOT_PX = 2,     /* of the letters */
 };
@@ -53,17 +54,37 @@ static double height_share(struct height_range range, double height_m)
     return fmin(1, fmax(0, (height_m - range.low_m) / (range.high_m - range.low_m)));
 }
 
+/* What the 3 x 3 pixels about a place hold: the most levels and the lowest point. A wall is then three pixels
+ * wide and scan lines close up; where floor and ceiling alternate, the floor shows. Returns 0 where there is
+ * no point. */
+static int gather(const struct map *map, uint32_t column, uint32_t row, int *levels, double *low_m)
+{
+    int hit = 0;
+    *levels = 0;
+    *low_m = INFINITY;
+    for (uint32_t r = row > 0 ? row - 1 : 0; r <= row + 1 && r < map->height; r++)
+        for (uint32_t c = column > 0 ? column - 1 : 0; c <= column + 1 && c < map->width; c++) {
+            const struct map_pixel *pixel = &map->pixel[(size_t)r * map->width + c];
+            if (!pixel->hit) continue;
+            const int n = __builtin_popcountll(pixel->levels);
+            if (n > *levels) *levels = n;
+            *low_m = fmin(*low_m, (double)pixel->low_m);
+            hit = 1;
+        }
+    return hit;
+}
+
 static void draw_pixels(const struct map *map, struct height_range range, const struct map_layout *at,
                         struct map_image *image)
 {
     for (uint32_t row = 0; row < map->height; row++) {
         uint8_t *rgb = image->rgb + ((size_t)(at->top + map->height - 1 - row) * image->width + at->left) * 3;
         for (uint32_t column = 0; column < map->width; column++, rgb += 3) {
-            const struct map_pixel *pixel = &map->pixel[(size_t)row * map->width + column];
-            if (!pixel->hit) continue;
-            const int levels = __builtin_popcountll(pixel->levels) - FREE_LEVELS;
-            const double structure = fmin(1, fmax(0, levels) / (WALL_LEVELS - FREE_LEVELS));
-            map_colour(structure, height_share(range, (double)pixel->low_m), rgb);
+            int levels;
+            double low_m;
+            if (!gather(map, column, row, &levels, &low_m)) continue;
+            const double structure = (double)(levels - FREE_LEVELS) / (WALL_LEVELS - FREE_LEVELS);
+            map_colour(fmin(1, fmax(0, structure)), height_share(range, low_m), rgb);
         }
     }
 }
@@ -95,7 +116,7 @@ static double bar_length(double pixel_m, double max_px)
 
 static void draw_scale(const struct map *map, long column, long row, struct map_image *image)
 {
-    const double length_m = bar_length(map->pixel_m, 160);
+    const double length_m = bar_length(map->pixel_m, BAR_PX);
     const long length = lrint(length_m / map->pixel_m);
     char text[32];
     map_image_fill(image, column, row, length, 4, ink);
@@ -149,7 +170,7 @@ int map_draw(const struct map *map, struct map_image *out, struct sh_err *err)
     draw_pixels(map, range, &at, out);
     draw_stations(map, &at, out);
     draw_scale(map, margin, row, out);
-    if (range.high_m > range.low_m) draw_heights(range, margin + 200, row, out);
+    if (range.high_m > range.low_m) draw_heights(range, margin + BAR_PX + 30, row, out);
     draw_north((long)at.width - margin - 30, row, out);
     return SH_OK;
 }
