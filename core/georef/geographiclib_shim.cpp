@@ -1,0 +1,148 @@
+#include "core/georef/geographiclib_shim.h"
+
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <limits>
+#include <vector>
+
+#include <GeographicLib/Geocentric.hpp>
+#include <GeographicLib/LocalCartesian.hpp>
+#include <GeographicLib/PolarStereographic.hpp>
+#include <GeographicLib/TransverseMercator.hpp>
+#include <GeographicLib/UTMUPS.hpp>
+
+using GeographicLib::Geocentric;
+using GeographicLib::LocalCartesian;
+using GeographicLib::PolarStereographic;
+using GeographicLib::TransverseMercator;
+using GeographicLib::UTMUPS;
+
+/* UTMUPS chooses and checks zone and hemisphere for the station, once. Points go through the projections that
+ * it uses itself: UTMUPS would add 10,000 km to a point beyond the equator and throw beyond the edge of its
+ * table. */
+struct shim_grid {
+    LocalCartesian local;
+    int zone; /* 0: UPS */
+    bool north;
+    double lon0_deg;
+    double anchor[3]; /* with false origin */
+    double x0, y0;    /* of the station, without */
+    double height_m;
+
+    void project(double lat, double lon, double &x, double &y) const
+    {
+        double convergence, scale;
+        if (zone == 0)
+            PolarStereographic::UPS().Forward(north, lat, lon, x, y, convergence, scale);
+        else
+            TransverseMercator::UTM().Forward(lon0_deg, lat, lon, x, y, convergence, scale);
+    }
+
+    void unproject(double x, double y, double &lat, double &lon) const
+    {
+        double convergence, scale;
+        if (zone == 0)
+            PolarStereographic::UPS().Reverse(north, x, y, lat, lon, convergence, scale);
+        else
+            TransverseMercator::UTM().Reverse(lon0_deg, x, y, lat, lon, convergence, scale);
+    }
+};
+
+static const double nan_m = std::numeric_limits<double>::quiet_NaN();
+
+void shim_ecef(double lat_deg, double lon_deg, double height_m, double p_ecef[3], double rotation[9])
+{
+    for (int i = 0; i < 3; i++)
+        p_ecef[i] = nan_m;
+    try {
+        std::vector<double> m(9);
+        Geocentric::WGS84().Forward(lat_deg, lon_deg, height_m, p_ecef[0], p_ecef[1], p_ecef[2], m);
+        for (size_t i = 0; i < 9; i++)
+            rotation[i] = m[i];
+    } catch (...) {
+        for (int i = 0; i < 9; i++)
+            rotation[i] = nan_m;
+    }
+}
+
+struct shim_grid *shim_grid_create(double lat_deg, double lon_deg, double height_m, int zone, char *why,
+                                   size_t len)
+{
+    struct shim_grid *grid = nullptr;
+    try {
+        grid = new shim_grid;
+        grid->local.Reset(lat_deg, lon_deg, height_m);
+        UTMUPS::Forward(lat_deg, lon_deg, grid->zone, grid->north, grid->anchor[0], grid->anchor[1],
+                        zone == 0 ? int(UTMUPS::STANDARD) : zone);
+        grid->anchor[2] = height_m;
+        grid->height_m = height_m;
+        grid->lon0_deg = 6.0 * grid->zone - 183.0;
+        grid->project(lat_deg, lon_deg, grid->x0, grid->y0);
+        return grid;
+    } catch (const std::exception &e) {
+        std::snprintf(why, len, "%s", e.what());
+    } catch (...) {
+        std::snprintf(why, len, "unknown failure in GeographicLib");
+    }
+    delete grid;
+    return nullptr;
+}
+
+void shim_grid_free(struct shim_grid *grid)
+{
+    delete grid;
+}
+
+void shim_grid_anchor(const struct shim_grid *grid, double anchor[3])
+{
+    for (int i = 0; i < 3; i++)
+        anchor[i] = grid->anchor[i];
+}
+
+int shim_grid_epsg(const struct shim_grid *grid)
+{
+    try {
+        return UTMUPS::EncodeEPSG(grid->zone, grid->north);
+    } catch (...) {
+        return 0;
+    }
+}
+
+void shim_grid_forward(const struct shim_grid *grid, size_t n, const double *dx, const double *dy,
+                       const double *dz, double *out_x, double *out_y, double *out_z)
+{
+    for (size_t i = 0; i < n; i++) {
+        double x = nan_m, y = nan_m, z = nan_m;
+        /* Asked first: the projections turn some not-a-number into plain numbers. */
+        if (std::isfinite(dx[i]) && std::isfinite(dy[i]) && std::isfinite(dz[i])) {
+            try {
+                double lat, lon, height;
+                grid->local.Reverse(dx[i], dy[i], dz[i], lat, lon, height);
+                grid->project(lat, lon, x, y);
+                x -= grid->x0;
+                y -= grid->y0;
+                z = height - grid->height_m;
+            } catch (...) {
+                x = y = z = nan_m;
+            }
+        }
+        out_x[i] = x;
+        out_y[i] = y;
+        out_z[i] = z;
+    }
+}
+
+void shim_grid_reverse(const struct shim_grid *grid, const double d_grid[3], double d_local[3])
+{
+    const double x = d_grid[0], y = d_grid[1], z = d_grid[2];
+    d_local[0] = d_local[1] = d_local[2] = nan_m;
+    if (!std::isfinite(x) || !std::isfinite(y) || !std::isfinite(z)) return;
+    try {
+        double lat, lon;
+        grid->unproject(x + grid->x0, y + grid->y0, lat, lon);
+        grid->local.Forward(lat, lon, z + grid->height_m, d_local[0], d_local[1], d_local[2]);
+    } catch (...) {
+        d_local[0] = d_local[1] = d_local[2] = nan_m;
+    }
+}

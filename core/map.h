@@ -1,0 +1,70 @@
+/* The scan map: points from above, as a PNG (libpng).
+ *
+ * The map looks down on prcs: x to the right, y (north) up, metres. Per pixel it keeps which height levels
+ * were hit and the lowest point. Lightness shows structure: a pixel with points on many levels (a wall) is
+ * dark, one with floor and ceiling only is light, one without points is white. This does not depend on how
+ * dense the points lie, so far walls stand out as near ones do; each point is drawn three pixels wide. Hue
+ * shows the height of the lowest point above the lowest of the map. Lightness and hue are even steps of CIE
+ * L*a*b*. Below the map: scale bar, legend of heights, north arrow.
+ *
+ * Ownership: map_create allocates everything, map_free releases it. Thread: one at a time. Not real-time
+ * safe. */
+#ifndef CORE_MAP_H
+#define CORE_MAP_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "core/err.h"
+
+enum {
+    MAP_DEFAULT_PX = 1200,     /* longer side of the map where the pixel size is not given */
+    MAP_MAX_SIDE_PX = 16384,   /* longest side of the map */
+    MAP_MAX_PIXELS = 16777216, /* of the map: 16 bytes each while it is made, 256 MiB */
+    MAP_MAX_STATIONS = 64,
+    MAP_MIN_WIDTH_PX = 512, /* of the image; a narrower map is centred */
+};
+
+struct map_spec {
+    double min_m[2],
+        max_m[2];   /* x and y of the area, prcs; max >= min, the area may be a line but not a point */
+    double pixel_m; /* side of a pixel; 0: so that the longer side has MAP_DEFAULT_PX */
+};
+
+struct map;
+
+/* SH_EINPUT: limits that are not finite or the wrong way round, an area too large for its pixel size (with
+ * the smallest pixel size that is allowed). */
+int map_create(const struct map_spec *spec, struct map **out, struct sh_err *err);
+void map_free(struct map *map);
+
+/* n points in prcs. A point with a coordinate that is not finite is a shot without echo: it is left out. */
+void map_add_points(struct map *map, size_t n, const double *x_m, const double *y_m, const double *z_m);
+
+/* A red triangle at a station. SH_EINPUT outside the area or beyond MAP_MAX_STATIONS. */
+int map_add_station(struct map *map, double x_m, double y_m, struct sh_err *err);
+
+struct map_counts {
+    uint64_t drawn;   /* points that lie in the area */
+    uint64_t outside; /* points beyond the area */
+    uint64_t empty;   /* points that are not finite */
+};
+void map_get_counts(const struct map *map, struct map_counts *counts);
+
+/* Where things are in the image, in pixels from its upper left corner. */
+struct map_layout {
+    uint32_t width, height;         /* of the image */
+    uint32_t left, top;             /* of the map in the image */
+    uint32_t map_width, map_height; /* of the map */
+    double pixel_m;                 /* as chosen */
+};
+void map_get_layout(const struct map *map, struct map_layout *layout);
+
+/* The pixel of a place: 1 and column and row in the image, or 0 when it lies outside the area. */
+int map_find_pixel(const struct map *map, double x_m, double y_m, uint32_t *column, uint32_t *row);
+
+/* Writes the image: to path.part beside it first, then renamed, so that path is whole or as it was. A map
+ * without points is drawn as well. Errors name the path. */
+int map_write_png(const struct map *map, const char *path, struct sh_err *err);
+
+#endif

@@ -1,0 +1,128 @@
+/* The file link: one session, the stream as it is into a file.
+ *
+ * Regular files and character devices (/dev/null, /dev/full) are taken; a directory, a FIFO or a socket is
+ * refused: a FIFO would block in open until a reader comes, which a pty or TCP does better. The first failed
+ * write (disk full) ends the session; its LINK_CLOSED carries the reason as the peer. */
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "drivers/link/link_util.h"
+
+struct file_link {
+    int fd;
+    int told_opened, told_closed;
+    int failed; /* errno of the write that failed, 0: none */
+    char path[256];
+};
+
+static int file_fail(struct sh_err *err, const char *path, int error)
+{
+    int code = error == EACCES || error == EPERM || error == EROFS ? SH_EPERM
+               : error == ENOENT || error == ENOTDIR || error == EISDIR || error == ENXIO || error == ELOOP
+                   ? SH_EINPUT
+                   : SH_EIO;
+    return sh_fail(err, code, "link file:%s: cannot be opened for writing: %s", path, strerror(error));
+}
+
+/* Not blocking, so that a FIFO cannot hold us; truncated only once it is known to be a file. */
+static int file_open_fd(const char *path, int *out, struct sh_err *err)
+{
+    struct stat st;
+    int fd = open(path, O_WRONLY | O_CREAT | O_APPEND | O_NONBLOCK | O_NOCTTY | O_CLOEXEC, 0666);
+    if (fd < 0 && errno == ENXIO) goto kind; /* a FIFO without a reader, or a socket */
+    if (fd < 0) return file_fail(err, path, errno);
+    if (fstat(fd, &st) != 0 || fcntl(fd, F_SETFL, O_APPEND) != 0) goto system;
+    if (!S_ISREG(st.st_mode) && !S_ISCHR(st.st_mode)) goto kind;
+    if (S_ISREG(st.st_mode) && ftruncate(fd, 0) != 0) goto system;
+    *out = fd;
+    return SH_OK;
+system:
+    sh_fail(err, SH_EIO, "link file:%s: %s", path, strerror(errno));
+    close(fd);
+    return SH_EIO;
+kind:
+    if (fd >= 0) close(fd);
+    return sh_fail(err, SH_EINPUT,
+                   "link file:%s: neither a regular file nor a character device; use a pty or tcp link",
+                   path);
+}
+
+static int file_open(const struct link_spec *spec, void **link, struct sh_err *err)
+{
+    if (spec->path[0] == '\0') return sh_fail(err, SH_EINPUT, "link file: a path is needed");
+    struct file_link *file = calloc(1, sizeof *file);
+    if (file == NULL) return sh_fail(err, SH_ENOMEM, "link file:%s: no memory", spec->path);
+    snprintf(file->path, sizeof file->path, "%s", spec->path);
+    int rc = file_open_fd(file->path, &file->fd, err);
+    if (rc != SH_OK) {
+        free(file);
+        return rc;
+    }
+    *link = file;
+    return SH_OK;
+}
+
+static void file_endpoint(const void *link, char *buf, size_t len)
+{
+    const struct file_link *file = link;
+    snprintf(buf, len, "file:%s", file->path);
+}
+
+static double file_capacity(const void *link)
+{
+    (void)link;
+    return 0;
+}
+
+static int file_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event,
+                     int max)
+{
+    struct file_link *file = link;
+    struct link_events events = {event, 0, max};
+    if (!file->told_opened) file->told_opened = link_events_push(&events, LINK_OPENED, 0, file->path);
+    if (file->failed != 0 && !file->told_closed)
+        file->told_closed = link_events_push(&events, LINK_CLOSED, 0, strerror(file->failed));
+    return link_poll_sink(wake_fd, (want_write & 1u) != 0 && file->failed == 0, timeout_ms, &events);
+}
+
+static ssize_t file_read(void *link, int session, void *buf, size_t len)
+{
+    const struct file_link *file = link;
+    (void)buf;
+    (void)len;
+    return session == 0 && file->failed == 0 ? 0 : SH_ECLOSED;
+}
+
+static ssize_t file_write(void *link, int session, const void *buf, size_t len)
+{
+    struct file_link *file = link;
+    if (session != 0 || file->failed != 0) return SH_ECLOSED;
+    ssize_t n = write(file->fd, buf, len);
+    if (n >= 0) return n;
+    if (errno == EINTR || errno == EAGAIN) return 0;
+    file->failed = errno;
+    return SH_EIO;
+}
+
+static void file_close(void *link)
+{
+    struct file_link *file = link;
+    close(file->fd);
+    free(file);
+}
+
+const struct link_ops link_file = {
+    .name = "file",
+    .open = file_open,
+    .endpoint = file_endpoint,
+    .capacity = file_capacity,
+    .poll = file_poll,
+    .read = file_read,
+    .write = file_write,
+    .close = file_close,
+};

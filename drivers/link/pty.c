@@ -1,0 +1,226 @@
+/* The pty link: one session, a virtual serial port that clients open and close as they like.
+ *
+ * When does a session begin and end? The kernel offers two signals, each with a weakness:
+ *   hang-up   poll(2) on the master tells POLLHUP exactly while nobody has the slave open. It is a level: a
+ * close followed by an open before we look leaves no trace. And it is always reported, so a master that hangs
+ *             up must stay out of the set of descriptors we wait for, and cannot tell when somebody comes.
+ *   inotify   tells each open and close of the slave, in order; but equal events in a row are merged into one
+ * as long as we have not read them, so opens and closes cannot be counted when clients overlap. So: inotify
+ * wakes us, the hang-up decides.
+ *   - We keep no descriptor on the slave: it would hide the hang-up. Settings and data survive without one,
+ * because the slave lives as long as the master. pty_device_rest opens it for a moment, while we do not watch
+ * it.
+ *   - No session: we wait for inotify only. An open event starts a session, even if the hang-up says that the
+ * client left already: what it wrote is still to be read (echo '*RST' > /dev/pts/3).
+ *   - Session: we wait for the master as well. It ends when the master hangs up and all that was written is
+ * read. A close event is queued before the close takes effect, and an open event after the open did. An open
+ * that comes after our hang-up is therefore always still unread when the watch is set up again, or seen as
+ * "no hang-up".
+ *   - Session, and inotify tells that the last client went and another came before we looked: the hang-up
+ * never showed. Clients that come one after the other give open, close, open, ... without equal neighbours,
+ * nothing is merged, the count is exact, and we tell LINK_CLOSED and LINK_OPENED. Only clients that overlap
+ * can make the count wrong: then two sessions may be told as one, or one as two; the next hang-up sets it
+ * right. */
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/inotify.h>
+#include <unistd.h>
+
+#include "drivers/link/link_util.h"
+#include "drivers/link/pty_device.h"
+
+struct pty_link {
+    struct pty_device device;
+    int inotify, watch;
+    int open;                     /* a session is on, as the caller knows or is about to be told */
+    unsigned count;               /* clients of the session; 0 with open set: the last seems to be gone */
+    int tell_closed, tell_opened; /* events the caller still has to get, in this order */
+};
+
+static int pty_watch(struct pty_link *pty)
+{
+    pty->watch = inotify_add_watch(pty->inotify, pty->device.slave, IN_OPEN | IN_CLOSE);
+    return pty->watch < 0 ? SH_EIO : SH_OK;
+}
+
+static int pty_open(const struct link_spec *spec, void **link, struct sh_err *err)
+{
+    struct pty_link *pty = calloc(1, sizeof *pty);
+    if (pty == NULL) return sh_fail(err, SH_ENOMEM, "link pty:%s: no memory", spec->path);
+    pty->inotify = inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
+    if (pty->inotify < 0) {
+        int error = errno;
+        free(pty);
+        return sh_fail(err, SH_EIO, "link pty:%s: inotify: %s%s", spec->path, strerror(error),
+                       error == EMFILE ? "; see /proc/sys/fs/inotify/max_user_instances" : "");
+    }
+    int rc = pty_device_open(&pty->device, spec->path, err);
+    if (rc == SH_OK && pty_watch(pty) != SH_OK) {
+        rc = sh_fail(err, SH_EIO, "link pty:%s: inotify on %s: %s", spec->path, pty->device.slave,
+                     strerror(errno));
+        pty_device_close(&pty->device);
+    }
+    if (rc != SH_OK) {
+        close(pty->inotify);
+        free(pty);
+        return rc;
+    }
+    *link = pty;
+    return SH_OK;
+}
+
+static void pty_endpoint(const void *link, char *buf, size_t len)
+{
+    const struct pty_link *pty = link;
+    snprintf(buf, len, "tty:%s", pty->device.path[0] != '\0' ? pty->device.path : pty->device.slave);
+}
+
+static double pty_capacity(const void *link)
+{
+    (void)link;
+    return 0;
+}
+
+static void pty_begin(struct pty_link *pty, unsigned count)
+{
+    pty->open = 1;
+    pty->count = count;
+    pty->tell_opened = 1;
+}
+
+static void pty_note(struct pty_link *pty, uint32_t mask)
+{
+    if ((mask & IN_CLOSE) != 0 && pty->count > 0) pty->count--;
+    if ((mask & (IN_OPEN | IN_Q_OVERFLOW)) == 0) return;
+    if (!pty->open) {
+        pty_begin(pty, 1);
+    } else if (pty->count > 0) {
+        pty->count++;
+    } else {
+        /* A session the caller has not heard of yet is not worth two events: its client is gone. */
+        if (!pty->tell_opened) pty->tell_closed = 1;
+        pty_device_drop_output(&pty->device);
+        pty_begin(pty, 1);
+    }
+}
+
+/* Reads all that inotify has; with note = 0 throws it away. */
+static void pty_read_inotify(struct pty_link *pty, int note)
+{
+    _Alignas(struct inotify_event) char buf[4096];
+    ssize_t n;
+    while ((n = read(pty->inotify, buf, sizeof buf)) > 0) {
+        for (ssize_t at = 0; at < n;) {
+            const struct inotify_event *event = (const void *)(buf + at);
+            if (note && (event->wd == pty->watch || event->wd == -1)) pty_note(pty, event->mask);
+            at += (ssize_t)(sizeof *event + event->len);
+        }
+    }
+}
+
+static short pty_now(const struct pty_link *pty)
+{
+    struct pollfd slot = {.fd = pty->device.master, .events = POLLIN};
+    return poll(&slot, 1, 0) >= 0 ? slot.revents : (short)0;
+}
+
+/* All clients are gone and what they wrote is read. Clients that come meanwhile are found at the end. */
+static int pty_end(struct pty_link *pty)
+{
+    pty->open = 0;
+    pty->count = 0;
+    pty->tell_closed = 1;
+    inotify_rm_watch(pty->inotify, pty->watch);
+    pty_read_inotify(pty, 0);
+    int rc = pty_device_rest(&pty->device);
+    if (rc == SH_OK) rc = pty_watch(pty);
+    if (rc != SH_OK) return rc;
+    short now = pty_now(pty);
+    if ((now & POLLHUP) == 0 || (now & POLLIN) != 0) {
+        pty_read_inotify(pty, 0); /* one client is counted by what the master says */
+        pty_begin(pty, 1);
+    }
+    return SH_OK;
+}
+
+/* Returns 1 when nothing is left to tell. */
+static int pty_tell(struct pty_link *pty, struct link_events *events)
+{
+    const char *name = pty->device.slave;
+    if (pty->tell_closed) pty->tell_closed = !link_events_push(events, LINK_CLOSED, 0, name);
+    if (!pty->tell_closed && pty->tell_opened)
+        pty->tell_opened = !link_events_push(events, LINK_OPENED, 0, name);
+    return !pty->tell_closed && !pty->tell_opened;
+}
+
+static int pty_ended(const struct pty_link *pty, short revents)
+{
+    if ((revents & POLLHUP) == 0 || (revents & POLLIN) != 0) return 0;
+    /* The bytes and the hang-up are not looked at in one step: now that nobody is there, look again for
+     * bytes. */
+    revents = pty_now(pty);
+    return (revents & POLLHUP) != 0 && (revents & POLLIN) == 0;
+}
+
+static int pty_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event,
+                    int max)
+{
+    struct pty_link *pty = link;
+    struct link_events events = {event, 0, max};
+    int told = pty_tell(pty, &events);
+    struct pollfd fds[3] = {{.fd = wake_fd, .events = POLLIN},
+                            {.fd = pty->inotify, .events = POLLIN},
+                            {.fd = pty->open ? pty->device.master : -1, .events = POLLIN}};
+    if ((want_write & 1u) != 0) fds[2].events |= POLLOUT;
+    if (link_wait(fds, 3, events.n > 0 || !told ? 0 : timeout_ms) != SH_OK) return SH_EIO;
+    link_take_wake(&fds[0], &events);
+    if ((fds[1].revents & POLLIN) != 0) pty_read_inotify(pty, 1);
+    if (!pty_tell(pty, &events) || !pty->open || fds[2].fd < 0) return events.n;
+    if (pty_ended(pty, fds[2].revents)) {
+        int rc = pty_end(pty);
+        pty_tell(pty, &events);
+        return rc != SH_OK ? rc : events.n;
+    }
+    if ((fds[2].revents & POLLIN) != 0) link_events_push(&events, LINK_READABLE, 0, NULL);
+    if ((fds[2].revents & POLLOUT) != 0) link_events_push(&events, LINK_WRITABLE, 0, NULL);
+    return events.n;
+}
+
+static ssize_t pty_read(void *link, int session, void *buf, size_t len)
+{
+    struct pty_link *pty = link;
+    if (session != 0 || !pty->open) return SH_ECLOSED;
+    ssize_t n = read(pty->device.master, buf, len);
+    if (n >= 0) return n;
+    return errno == EAGAIN || errno == EINTR ? 0 : SH_ECLOSED; /* EIO: hung up, and all is read */
+}
+
+static ssize_t pty_write(void *link, int session, const void *buf, size_t len)
+{
+    struct pty_link *pty = link;
+    if (session != 0 || !pty->open) return SH_ECLOSED;
+    ssize_t n = write(pty->device.master, buf, len);
+    if (n >= 0) return n;
+    return errno == EAGAIN || errno == EINTR ? 0 : SH_ECLOSED;
+}
+
+static void pty_close(void *link)
+{
+    struct pty_link *pty = link;
+    close(pty->inotify);
+    pty_device_close(&pty->device);
+    free(pty);
+}
+
+const struct link_ops link_pty = {
+    .name = "pty",
+    .open = pty_open,
+    .endpoint = pty_endpoint,
+    .capacity = pty_capacity,
+    .poll = pty_poll,
+    .read = pty_read,
+    .write = pty_write,
+    .close = pty_close,
+};

@@ -1,0 +1,160 @@
+#include "drivers/link/pty_device.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static int pair_open(int *master, char *slave, size_t slave_len)
+{
+    *master = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+    if (*master < 0) return -1;
+    if (grantpt(*master) == 0 && unlockpt(*master) == 0 && ptsname_r(*master, slave, slave_len) == 0)
+        return 0;
+    int error = errno;
+    close(*master);
+    errno = error;
+    return -1;
+}
+
+/* The master's ioctls for settings act on the slave; TCSAFLUSH drops what the slave's line discipline holds,
+ * and TCOFLUSH before it what is still on its way there. Unlike tcflush on the slave they need no open slave.
+ */
+static void drop_output(int master, const struct termios *settings)
+{
+    tcflush(master, TCOFLUSH);
+    tcsetattr(master, TCSAFLUSH, settings);
+}
+
+void pty_device_drop_output(struct pty_device *device)
+{
+    struct termios now;
+    if (tcgetattr(device->master, &now) == 0) drop_output(device->master, &now);
+}
+
+/* Opening and closing the slave once also makes the master report the hang-up from then on. */
+static int slave_rest(struct pty_device *device)
+{
+    struct termios raw;
+    if (tcgetattr(device->master, &raw) != 0) return -1;
+    cfmakeraw(&raw);
+    int fd = open(device->slave, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+    if (fd < 0) {
+        drop_output(device->master, &raw);
+        return errno == EMFILE || errno == ENFILE || errno == ENOMEM ? 0 : -1;
+    }
+    ioctl(fd, TIOCNXCL);
+    tcflow(fd, TCOON);
+    drop_output(device->master, &raw);
+    close(fd);
+    return 0;
+}
+
+static int link_refuse(const char *path, const char *why, struct sh_err *err)
+{
+    return sh_fail(err, SH_EINPUT, "link pty:%s: exists and %s; remove it or choose another path", path, why);
+}
+
+static int link_errno(const char *path, struct sh_err *err)
+{
+    int code = errno == EACCES || errno == EPERM || errno == EROFS                              ? SH_EPERM
+               : errno == ENOENT || errno == ENOTDIR || errno == ELOOP || errno == ENAMETOOLONG ? SH_EINPUT
+                                                                                                : SH_EIO;
+    return sh_fail(err, code, "link pty:%s: the symlink cannot be made: %s", path, strerror(errno));
+}
+
+/* 1: there is nothing at path, 0: a symlink that may be replaced, or an error. */
+static int link_look(const char *path, const char *slave, struct sh_err *err)
+{
+    struct stat self, target;
+    char text[256];
+    if (lstat(path, &self) != 0) return errno == ENOENT ? 1 : link_errno(path, err);
+    if (!S_ISLNK(self.st_mode)) return link_refuse(path, "is not a symlink", err);
+    ssize_t n = readlink(path, text, sizeof text - 1);
+    if (n < 0) return link_errno(path, err);
+    text[n] = '\0';
+    if (strcmp(text, slave) == 0 || stat(path, &target) != 0) return 0;
+    return link_refuse(path,
+                       S_ISCHR(target.st_mode) ? "leads to a terminal in use by another program"
+                                               : "leads to something that is not a terminal of ours",
+                       err);
+}
+
+/* Both ways are atomic: a client finds the old target, ours, or nothing. */
+static int link_make(const char *path, const char *slave, struct sh_err *err)
+{
+    int rc = link_look(path, slave, err);
+    if (rc < 0) return rc;
+    if (rc == 1) return symlink(slave, path) == 0 ? SH_OK : link_errno(path, err);
+    char beside[300];
+    snprintf(beside, sizeof beside, "%s.%ld.tmp", path, (long)getpid());
+    if (symlink(slave, beside) != 0) return link_errno(path, err);
+    if (rename(beside, path) == 0) return SH_OK;
+    rc = link_errno(path, err);
+    unlink(beside);
+    return rc;
+}
+
+static int link_is_ours(const struct pty_device *device)
+{
+    char text[sizeof device->slave + 1];
+    ssize_t n = readlink(device->path, text, sizeof text - 1);
+    if (n < 0) return 0;
+    text[n] = '\0';
+    return strcmp(text, device->slave) == 0;
+}
+
+int pty_device_open(struct pty_device *device, const char *path, struct sh_err *err)
+{
+    memset(device, 0, sizeof *device);
+    const char *name = path[0] != '\0' ? path : "(no symlink)";
+    if (pair_open(&device->master, device->slave, sizeof device->slave) != 0)
+        return sh_fail(err, SH_EIO, "link pty:%s: no pseudo terminal to be had: %s", name, strerror(errno));
+    int rc = SH_OK;
+    if (slave_rest(device) != 0)
+        rc = sh_fail(err, SH_EIO, "link pty:%s: %s cannot be set up: %s", name, device->slave,
+                     strerror(errno));
+    else if (path[0] != '\0')
+        rc = link_make(path, device->slave, err);
+    if (rc != SH_OK) {
+        close(device->master);
+        return rc;
+    }
+    snprintf(device->path, sizeof device->path, "%s", path);
+    return SH_OK;
+}
+
+int pty_device_rest(struct pty_device *device)
+{
+    if (slave_rest(device) == 0) return SH_OK;
+    struct pty_device fresh = *device;
+    if (pair_open(&fresh.master, fresh.slave, sizeof fresh.slave) != 0) return SH_EIO;
+    int ours = device->path[0] != '\0' && link_is_ours(device);
+    if (slave_rest(&fresh) != 0) goto fail;
+    if (ours) {
+        /* The old slave exists until its master is closed, so the new link goes over the old one unlooked. */
+        char beside[300];
+        snprintf(beside, sizeof beside, "%s.%ld.tmp", fresh.path, (long)getpid());
+        if (symlink(fresh.slave, beside) != 0) goto fail;
+        if (rename(beside, fresh.path) != 0) {
+            unlink(beside);
+            goto fail;
+        }
+    }
+    close(device->master);
+    *device = fresh;
+    return SH_OK;
+fail:
+    close(fresh.master);
+    return SH_EIO;
+}
+
+void pty_device_close(struct pty_device *device)
+{
+    if (device->path[0] != '\0' && link_is_ours(device)) unlink(device->path);
+    close(device->master);
+}

@@ -1,0 +1,32 @@
+/* The terminal behind the pty link: the pair, its resting state and the symlink to its slave. Private to the
+ * link. */
+#ifndef DRIVERS_LINK_PTY_DEVICE_H
+#define DRIVERS_LINK_PTY_DEVICE_H
+
+#include <termios.h>
+
+#include "core/err.h"
+
+struct pty_device {
+    int master;     /* not blocking */
+    char slave[64]; /* "/dev/pts/3" */
+    char path[256]; /* the symlink to the slave; empty: none */
+};
+
+/* Makes the pair, at rest, and the symlink (path may be empty). An existing path is replaced only where it is
+ * a symlink that dangles or names our own slave; anything else is SH_EINPUT. */
+int pty_device_open(struct pty_device *device, const char *path, struct sh_err *err);
+
+/* Brings the slave back to how a fresh client expects it: raw, nothing to read, no exclusive use, not
+ * stopped. To be called while no client has it open. Opens and closes the slave, which inotify sees. A slave
+ * that refuses us (a client left TIOCEXCL behind, which only root may undo) is replaced by a new pair under
+ * the same symlink; slave is then another name. SH_EIO when that fails as well. */
+int pty_device_rest(struct pty_device *device);
+
+/* As far as it goes with a client present: what was sent and not read is dropped, settings stay. */
+void pty_device_drop_output(struct pty_device *device);
+
+/* Closes the pair and removes the symlink, if it still is ours. */
+void pty_device_close(struct pty_device *device);
+
+#endif
