@@ -125,10 +125,7 @@ void command_reply(struct command_call *call, const char *fmt, ...) __attribute_
 void command_setting_query(struct command_call *call);
 void command_setting_change(struct command_call *call);
 
-/* call->value in the row's unit, or -222 (then returns -1). */
-int command_value_to_int(struct command_call *call, int64_t *value);
-
-/* Checks min <= value <= max, or gives -222 with the range (then returns -1). */
-int command_check_range(struct command_call *call, int64_t value, int64_t min, int64_t max);
+/* The number in call->value in the row's unit, or -222 with what is allowed (then returns -1). */
+int command_value_in_range(struct command_call *call, int64_t min, int64_t max, int64_t *value);
 
 #endif

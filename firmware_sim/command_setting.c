@@ -1,5 +1,6 @@
 #include "firmware_sim/command_private.h"
 
+#include <stdio.h>
 #include <string.h>
 
 enum { NUMBER_LEN = 32 };
@@ -68,45 +69,52 @@ void command_setting_query(struct command_call *call)
     command_reply(call, "%s", number);
 }
 
-int command_value_to_int(struct command_call *call, int64_t *value)
-{
-    const struct command_unit *unit = call->row->unit;
-    const char *wrong = NULL;
-    char smallest[NUMBER_LEN], clip[COMMAND_CLIP_LEN];
-    switch (command_decimal_to_int(&call->value.decimal, call->value.shift + unit->decimals, value)) {
-    case COMMAND_FIT_EXACT:
-        return 0;
-    case COMMAND_FIT_FINE:
-        wrong = "not a multiple of";
-        break;
-    case COMMAND_FIT_BIG:
-        wrong = "beyond all numbers of";
-        break;
-    }
-    command_format_fixed(smallest, sizeof smallest, 1, unit->decimals);
-    command_clip(clip, call->param, strlen(call->param));
-    command_fail(call, CMD_E_RANGE, "%s %s, %s %s%s%s", call->row->header, clip, wrong, smallest,
-                 unit->name[0] != '\0' ? " " : "", unit->name);
-    return -1;
-}
-
-/* `HEADER VALUE UNIT, allowed MIN to MAX`, the same for both kinds of refusal. */
-static void refuse(struct command_call *call, int number, int64_t value, int64_t min, int64_t max,
+/* `HEADER VALUE, allowed MIN to MAX`; value is what the command said, or its number with the unit. */
+static void refuse(struct command_call *call, int number, const char *value, int64_t min, int64_t max,
                    const char *with)
 {
-    const struct command_unit *unit = call->row->unit;
-    char text[3][NUMBER_LEN];
-    command_format_fixed(text[0], NUMBER_LEN, value, unit->decimals);
-    command_format_fixed(text[1], NUMBER_LEN, min, unit->decimals);
-    command_format_fixed(text[2], NUMBER_LEN, max, unit->decimals);
-    command_fail(call, number, "%s %s%s%s, allowed %s to %s%s", call->row->header, text[0],
-                 unit->name[0] != '\0' ? " " : "", unit->name, text[1], text[2], with);
+    char low[NUMBER_LEN], high[NUMBER_LEN];
+    command_format_fixed(low, sizeof low, min, call->row->unit->decimals);
+    command_format_fixed(high, sizeof high, max, call->row->unit->decimals);
+    command_fail(call, number, "%s %s, allowed %s to %s%s", call->row->header, value, low, high, with);
 }
 
-int command_check_range(struct command_call *call, int64_t value, int64_t min, int64_t max)
+static void refuse_number(struct command_call *call, int number, int64_t value, int64_t min, int64_t max,
+                          const char *with)
 {
-    if (value >= min && value <= max) return 0;
-    refuse(call, CMD_E_RANGE, value, min, max, "");
+    const struct command_unit *unit = call->row->unit;
+    char digits[NUMBER_LEN], text[NUMBER_LEN + 8];
+    command_format_fixed(digits, sizeof digits, value, unit->decimals);
+    snprintf(text, sizeof text, "%s%s%s", digits, unit->name[0] != '\0' ? " " : "", unit->name);
+    refuse(call, number, text, min, max, with);
+}
+
+static void refuse_fraction(struct command_call *call, const char *value)
+{
+    const struct command_unit *unit = call->row->unit;
+    char finest[NUMBER_LEN];
+    command_format_fixed(finest, sizeof finest, 1, unit->decimals);
+    if (unit->decimals == 0)
+        command_fail(call, CMD_E_RANGE, "%s %s, allowed whole numbers%s%s", call->row->header, value,
+                     unit->name[0] != '\0' ? " of " : "", unit->name);
+    else
+        command_fail(call, CMD_E_RANGE, "%s %s, allowed multiples of %s %s", call->row->header, value, finest,
+                     unit->name);
+}
+
+int command_value_in_range(struct command_call *call, int64_t min, int64_t max, int64_t *value)
+{
+    char clip[COMMAND_CLIP_LEN];
+    command_clip(clip, call->param, strlen(call->param));
+    const enum command_fit fit =
+        command_decimal_to_int(&call->value.decimal, call->value.shift + call->row->unit->decimals, value);
+    if (fit == COMMAND_FIT_EXACT && *value >= min && *value <= max) return 0;
+    if (fit == COMMAND_FIT_FINE)
+        refuse_fraction(call, clip);
+    else if (fit == COMMAND_FIT_BIG)
+        refuse(call, CMD_E_RANGE, clip, min, max, "");
+    else
+        refuse_number(call, CMD_E_RANGE, *value, min, max, "");
     return -1;
 }
 
@@ -116,14 +124,13 @@ static int check_other(struct command_call *call, int64_t value)
     int64_t min, max;
     current_range(call, &min, &max);
     if (value >= min && value <= max) return 0;
-    char with[80], number[NUMBER_LEN];
-    command_format_fixed(number, sizeof number, read_other(call), call->row->unit->decimals);
-    with[0] = '\0';
-    strncat(with, " as ", sizeof with - 1);
-    strncat(with, call->row->setting->other, sizeof with - 1 - strlen(with));
-    strncat(with, " is ", sizeof with - 1 - strlen(with));
-    strncat(with, number, sizeof with - 1 - strlen(with));
-    refuse(call, CMD_E_SETTINGS, value, min, max, with);
+    const char *other = call->row->setting->other;
+    char with[NUMBER_LEN + 24] = "", number[NUMBER_LEN];
+    if (other != NULL) {
+        command_format_fixed(number, sizeof number, read_other(call), call->row->unit->decimals);
+        snprintf(with, sizeof with, " as %s is %s", other, number);
+    }
+    refuse_number(call, CMD_E_SETTINGS, value, min, max, with);
     return -1;
 }
 
@@ -133,10 +140,8 @@ void command_setting_change(struct command_call *call)
     int64_t value;
     if (call->value.kind != COMMAND_VALUE_NUMBER)
         value = special_value(call);
-    else if (command_value_to_int(call, &value) != 0)
-        return;
-    if (command_check_range(call, value, read_bound(call, &setting->min), read_bound(call, &setting->max)) !=
-        0)
+    else if (command_value_in_range(call, read_bound(call, &setting->min), read_bound(call, &setting->max),
+                                    &value) != 0)
         return;
     if (check_other(call, value) != 0) return;
     const enum head_state state = call->dev->state;
