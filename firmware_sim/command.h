@@ -1,10 +1,14 @@
 /* The command set: SCPI-style lines in, one reply line each, and the error queue of SCPI-99 (21.8).
  *
  *   *IDN?  *RST  *CLS  *OPC?  *STB?  SYSTem:ERRor[:NEXT]?  SYSTem:ERRor:COUNt?  SYSTem:VERSion?  SYSTem:CONTrol:RELease
- *   SYSTem:CONTrol?  HEAD:PRR  HEAD:LINes  HEAD:PAN  HEAD:STATe?  HEAD:STATion  SCAN:LINE:STARt  SCAN:LINE:STOP
+ *   SYSTem:CONTrol?  HEAD:PRR  HEAD:LINes  HEAD:PAN  HEAD:STATe?  HEAD:STATION  SCAN:LINE:STARt  SCAN:LINE:STOP
  *   SCAN:PAN:STARt  SCAN:PAN:STOP  SCAN:FRAMes  SCAN:STARt  SCAN:STOP  SCAN:COUNt?  HELP?  TIME?  TIME:STEP
- * Short and long forms, any case; a query ends in '?'. MIN, MAX and DEF are taken as a number; a setting's
- * query takes MIN, MAX and DEF too ("HEAD:PRR? MAX"). A setting may carry its unit as a suffix (HZ, KHZ, MHZ; DEG).
+ * Short and long forms, any case (HEAD:STATION has no short one: STAT is STATe); a query ends in '?'. MIN, MAX and DEF
+ * are taken as a number; a setting's query takes MIN, MAX and DEF too ("HEAD:PRR? MAX"). MIN and MAX are the limits as
+ * the profile and the other settings leave them now, so they are never refused. A setting may carry its unit as a
+ * suffix: HZ, KHZ, MHZ (mega, as SCPI has it); DEG; DEG/S; a step is in nanoseconds or NS, US, MS, S. Numbers are taken
+ * exactly or refused, never rounded. *STB?: 4 errors are queued, 128 scanning.
+ * Outside the profile is -222; against another setting or the state -221. *CLS, like SYSTem:ERRor?, needs no control.
  * Reply: the value, or "OK", or `ERR -222,"Data out of range; HEAD:PRR 5000000 Hz, allowed 1000 to 1200000"`.
  *
  * Pure: no clock, no I/O, no thread; the loop owns the device, calls in one thread and carries out the effect. */
@@ -95,7 +99,8 @@ struct command_lines {
 };
 enum command_line_kind { COMMAND_LINE_NONE, COMMAND_LINE_READY, COMMAND_LINE_OVERRUN };
 /* Feeds one byte. READY: the line is in buf, NUL-terminated, until the next call. OVERRUN: a line too long just ended.
- * Bytes that are not printable ASCII stay in the line as '?', so that it fails as what it is: a wrong command. */
+ * A tab becomes a blank. Other bytes that are not printable ASCII stay in the line as '~', which no command has, so that
+ * it fails as what it is: a wrong command. */
 enum command_line_kind command_lines_feed(struct command_lines *lines, unsigned char byte);
 
 #endif

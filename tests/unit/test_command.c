@@ -1,0 +1,342 @@
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "drivers/protocol/native.h"
+#include "tests/unit/command_device.h"
+
+#define N_OF(array) (sizeof(array) / sizeof(array)[0])
+
+static struct command_result result;
+
+static const char *say(struct command_device *dev, const char *line)
+{
+    command_execute(dev, 1, line, &result);
+    return result.reply;
+}
+
+/* The line gives exactly one ERR reply and the same text in the queue, and changes nothing else. */
+static void expect_error(struct command_device *dev, uint32_t session, const char *line, int number)
+{
+    const struct head_settings before = dev->settings;
+    const uint32_t control = dev->control;
+    char popped[COMMAND_MAX_REPLY], expected[COMMAND_MAX_REPLY + 8];
+    memset(&dev->queue, 0, sizeof dev->queue);
+    command_execute(dev, session, line, &result);
+    if (result.error != number)
+        fail_msg("'%s' gives %d (%s), not %d", line, result.error, result.reply, number);
+    assert_int_equal(dev->queue.count, 1);
+    command_queue_pop(&dev->queue, popped, sizeof popped);
+    snprintf(expected, sizeof expected, "ERR %s", popped);
+    assert_string_equal(result.reply, expected);
+    assert_int_equal(atoi(popped), number);
+    assert_int_equal(result.effect, COMMAND_NONE);
+    assert_false(result.changes || result.took_control);
+    assert_int_equal(dev->control, control);
+    assert_memory_equal(&before, &dev->settings, sizeof before);
+}
+
+static void expect(struct command_device *dev, const char *line, const char *reply)
+{
+    const char *got = say(dev, line);
+    if (strcmp(got, reply) != 0) fail_msg("'%s' gives '%s', not '%s'", line, got, reply);
+}
+
+/* Long and short forms, written out by hand from the set's description. */
+static const struct {
+    const char *full, *brief;
+    int query, set; /* which forms there are */
+    const char *value;
+} commands[] = {
+    {"*IDN", "*IDN", 1, 0, ""},
+    {"*RST", "*RST", 0, 1, ""},
+    {"*CLS", "*CLS", 0, 1, ""},
+    {"*OPC", "*OPC", 1, 0, ""},
+    {"*STB", "*STB", 1, 0, ""},
+    {"SYSTEM:ERROR:NEXT", "SYST:ERR", 1, 0, ""},
+    {"SYSTEM:ERROR:COUNT", "SYST:ERR:COUN", 1, 0, ""},
+    {"SYSTEM:VERSION", "SYST:VERS", 1, 0, ""},
+    {"SYSTEM:CONTROL", "SYST:CONT", 1, 0, ""},
+    {"SYSTEM:CONTROL:RELEASE", "SYST:CONT:REL", 0, 1, ""},
+    {"HEAD:PRR", "HEAD:PRR", 1, 1, " 200000"},
+    {"HEAD:LINES", "HEAD:LIN", 1, 1, " 50"},
+    {"HEAD:PAN", "HEAD:PAN", 1, 1, " 9"},
+    {"HEAD:STATE", "HEAD:STAT", 1, 0, ""},
+    {"HEAD:STATION", "HEAD:STATION", 1, 1, " 2"},
+    {"SCAN:LINE:START", "SCAN:LINE:STAR", 1, 1, " -20"},
+    {"SCAN:LINE:STOP", "SCAN:LINE:STOP", 1, 1, " 20"},
+    {"SCAN:PAN:START", "SCAN:PAN:STAR", 1, 1, " 10"},
+    {"SCAN:PAN:STOP", "SCAN:PAN:STOP", 1, 1, " 90"},
+    {"SCAN:FRAMES", "SCAN:FRAM", 1, 1, " 4"},
+    {"SCAN:START", "SCAN:STAR", 0, 1, ""},
+    {"SCAN:STOP", "SCAN:STOP", 0, 1, ""},
+    {"SCAN:COUNT", "SCAN:COUN", 1, 0, ""},
+    {"HELP", "HELP", 1, 0, ""},
+    {"TIME", "TIME", 1, 0, ""},
+    {"TIME:STEP", "TIME:STEP", 0, 1, " 5"},
+};
+
+static struct command_device device_for(const char *header)
+{
+    struct command_device dev = command_test_device();
+    dev.step_allowed = 1;
+    if (strcmp(header, "SCAN:STOP") == 0) dev.state = HEAD_SCANNING;
+    return dev;
+}
+
+static void try_forms(size_t i, const char *header, int good)
+{
+    static const char *const lead[] = {"", ":", "  ", "\t :"};
+    char line[COMMAND_MAX_LINE];
+    for (size_t k = 0; k < N_OF(lead); k++) {
+        const int colon = strchr(lead[k], ':') != NULL && header[0] == '*'; /* no tree, no root */
+        for (int query = 0; query < 2; query++) {
+            struct command_device dev = device_for(commands[i].full);
+            snprintf(line, sizeof line, "%s%s%s ", lead[k], header, query ? "?" : commands[i].value);
+            say(&dev, line);
+            const int expected = good && !colon && (query ? commands[i].query : commands[i].set);
+            if ((result.error == 0) != expected) fail_msg("'%s' gives '%s'", line, result.reply);
+            assert_true(result.reply[0] != '\0');
+        }
+    }
+}
+
+static void long_and_short_forms_in_any_case(void **ctx)
+{
+    (void)ctx;
+    for (size_t i = 0; i < N_OF(commands); i++) {
+        char mixed[64];
+        snprintf(mixed, sizeof mixed, "%s", commands[i].full);
+        for (size_t k = 0; mixed[k] != '\0'; k += 2)
+            if (mixed[k] >= 'A' && mixed[k] <= 'Z') mixed[k] = (char)(mixed[k] + 32);
+        try_forms(i, commands[i].full, 1);
+        try_forms(i, commands[i].brief, 1);
+        try_forms(i, mixed, 1);
+    }
+}
+
+/* Copies the k-th word of a header; 0 when it has fewer. */
+static int word_of(const char *header, int k, char word[32])
+{
+    for (; k > 0; k--) {
+        header = strchr(header, ':');
+        if (header == NULL) return 0;
+        header++;
+    }
+    snprintf(word, 32, "%.*s", (int)strcspn(header, ":"), header);
+    return 1;
+}
+
+/* Each word long or short, as one likes. */
+static int is_form_of(const char *header, const char *full, const char *brief)
+{
+    char got[32], word[32];
+    int k = 0;
+    for (; word_of(header, k, got); k++) {
+        if (word_of(full, k, word) && strcmp(got, word) == 0) continue;
+        if (word_of(brief, k, word) && strcmp(got, word) == 0) continue;
+        return 0;
+    }
+    return !word_of(full, k, word);
+}
+
+static int is_command(const char *header)
+{
+    for (size_t i = 0; i < N_OF(commands); i++)
+        if (is_form_of(header, commands[i].full, commands[i].brief)) return 1;
+    return is_form_of(header, "SYSTEM:ERROR", "SYST:ERR"); /* [:NEXT] */
+}
+
+static void nothing_between_or_beyond_the_forms(void **ctx)
+{
+    (void)ctx;
+    for (size_t i = 0; i < N_OF(commands); i++) {
+        char cut[64];
+        for (size_t len = strlen(commands[i].full) - 1; len > 1; len--) {
+            snprintf(cut, sizeof cut, "%.*s", (int)len, commands[i].full);
+            if (!is_command(cut)) try_forms(i, cut, 0);
+        }
+        snprintf(cut, sizeof cut, "%sX", commands[i].full);
+        try_forms(i, cut, 0);
+        snprintf(cut, sizeof cut, "%s:", commands[i].full);
+        try_forms(i, cut, 0);
+        snprintf(cut, sizeof cut, "X:%s", commands[i].full);
+        try_forms(i, cut, 0);
+    }
+}
+
+static void replies_of_queries(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = command_test_device();
+    expect(&dev, "*IDN?", "Maker,Model,Serial,1.0");
+    expect(&dev, "*OPC?", "1");
+    expect(&dev, "SYST:VERS?", "1999.0");
+    expect(&dev, "SYST:ERR?", "0,\"No error\"");
+    expect(&dev, "SYST:ERR:COUN?", "0");
+    expect(&dev, "SYST:CONT?", "0");
+    expect(&dev, "HEAD:PRR?", "300000");
+    expect(&dev, "HEAD:LIN?", "100");
+    expect(&dev, "SCAN:LINE:STAR?", "-30");
+    expect(&dev, "SCAN:COUN?", "7");
+    expect(&dev, "TIME?", "1234567890123");
+    dev.settings.line_start_udeg = -1;
+    expect(&dev, "SCAN:LINE:STAR?", "-0.000001");
+    dev.settings.line_start_udeg = -1500000;
+    expect(&dev, "SCAN:LINE:STAR?", "-1.5");
+    expect(&dev, "", "");
+    expect(&dev, " \t ", "");
+    assert_int_equal(dev.queue.count, 0);
+    assert_int_equal(dev.control, 0); /* looking is not taking */
+}
+
+static void status_byte(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = command_test_device();
+    expect(&dev, "*STB?", "0");
+    dev.state = HEAD_SCANNING;
+    expect(&dev, "*STB?", "128");
+    command_queue_push(&dev.queue, CMD_E_PULSES, NULL);
+    expect(&dev, "*STB?", "132");
+    dev.state = HEAD_SPIN_DOWN;
+    expect(&dev, "*STB?", "4");
+    expect(&dev, "*CLS", "OK");
+    expect(&dev, "*STB?", "0");
+}
+
+static void state_names_and_control(void **ctx)
+{
+    (void)ctx;
+    static const char *const names[] = {"off", "boot", "idle", "spin-up", "scanning", "spin-down", "fault"};
+    struct command_device dev = command_test_device();
+    for (int state = 0; state < HEAD_N_STATES; state++) {
+        dev.state = (enum head_state)state;
+        expect(&dev, "HEAD:STAT?", names[state]);
+    }
+}
+
+static void wrong_lines_give_one_error(void **ctx)
+{
+    (void)ctx;
+    static const struct {
+        const char *line;
+        int number;
+    } cases[] = {
+        {";", CMD_E_SYNTAX},
+        {"*IDN?;*RST", CMD_E_SYNTAX},
+        {"HEAD:PRR 300000;", CMD_E_SYNTAX},
+        {"?", CMD_E_SYNTAX},
+        {"300000", CMD_E_HEADER},
+        {"HEAD:PRR?MAX", CMD_E_SYNTAX},
+        {"HEAD:PRR,300000", CMD_E_SYNTAX},
+        {"HEAD:PRR~", CMD_E_SYNTAX},
+        {"\x01\x02", CMD_E_SYNTAX},
+        {"HEAD:PRR\xc2\xa0"
+         "5",
+         CMD_E_SYNTAX},
+        {":*IDN?", CMD_E_SYNTAX},
+        {"*", CMD_E_HEADER},
+        {":", CMD_E_SYNTAX},
+        {"FOO", CMD_E_HEADER},
+        {"HEAD::PRR 5", CMD_E_HEADER},
+        {"HEAD:PRR: 5", CMD_E_HEADER},
+        {"SYST:NEXT?", CMD_E_HEADER},
+        {"SYST:ERR:NEXT:NEXT?", CMD_E_HEADER},
+        {"HEAD:STAT 2", CMD_E_HEADER},
+        {"*RST?", CMD_E_HEADER},
+        {"TIME:STEP?", CMD_E_HEADER},
+        {"*IDN", CMD_E_HEADER},
+        {"*RST 1", CMD_E_NOT_ALLOWED},
+        {"*IDN? 1", CMD_E_NOT_ALLOWED},
+        {"SCAN:START 5", CMD_E_NOT_ALLOWED},
+        {"HEAD:PRR 1,2", CMD_E_NOT_ALLOWED},
+        {"HEAD:PRR 1,", CMD_E_NOT_ALLOWED},
+        {"HEAD:PRR? 300000", CMD_E_NOT_ALLOWED},
+        {"HEAD:PRR? MAX,MIN", CMD_E_NOT_ALLOWED},
+        {"HEAD:STAT? MAX", CMD_E_NOT_ALLOWED},
+        {"HEAD:PRR", CMD_E_MISSING},
+        {"TIME:STEP ", CMD_E_MISSING},
+        {"HEAD:PRR fast", CMD_E_DATA_TYPE},
+        {"HEAD:PRR \"300000\"", CMD_E_DATA_TYPE},
+        {"HEAD:PRR #HFFFF", CMD_E_DATA_TYPE},
+        {"HEAD:PRR 300 000", CMD_E_DATA_TYPE},
+        {"HEAD:PRR 1.2.3", CMD_E_DATA_TYPE},
+        {"HEAD:PRR .", CMD_E_DATA_TYPE},
+        {"HEAD:PRR +-5", CMD_E_DATA_TYPE},
+        {"HEAD:PRR - 5", CMD_E_DATA_TYPE},
+        {"HEAD:PRR e5", CMD_E_DATA_TYPE},
+        {"HEAD:PRR NAN", CMD_E_DATA_TYPE},
+        {"HEAD:PRR INF", CMD_E_DATA_TYPE},
+        {"HEAD:PRR MAXI", CMD_E_DATA_TYPE},
+        {"HEAD:PRR ?", CMD_E_DATA_TYPE},
+        {"TIME:STEP MAX", CMD_E_DATA_TYPE},
+        {"HEAD:PRR 0x1000", CMD_E_SUFFIX},
+        {"HEAD:PRR 300000 DEG", CMD_E_SUFFIX},
+        {"HEAD:PRR 300000 HZ HZ", CMD_E_SUFFIX},
+        {"HEAD:PRR 300000e", CMD_E_SUFFIX},
+        {"HEAD:PRR 3e+ HZ", CMD_E_SUFFIX},
+        {"SCAN:LINE:STOP 1 HZ", CMD_E_SUFFIX},
+        {"HEAD:PAN 1 DEG", CMD_E_SUFFIX},
+        {"SCAN:FRAMES 2 HZ", CMD_E_SUFFIX},
+        {"TIME:STEP 5", CMD_E_SETTINGS},
+    };
+    struct command_device dev = command_test_device();
+    for (size_t i = 0; i < N_OF(cases); i++)
+        expect_error(&dev, 1, cases[i].line, cases[i].number);
+}
+
+static void a_line_too_long_is_dropped_whole(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = command_test_device();
+    char line[COMMAND_MAX_LINE + 2];
+    memset(line, ' ', sizeof line);
+    memcpy(line, "HEAD:PRR 5000", 13);
+    line[COMMAND_MAX_LINE] = '\0';
+    expect(&dev, line, "OK");
+    assert_int_equal(dev.settings.prr_uhz, 5000 * MICRO);
+    line[COMMAND_MAX_LINE] = ' ';
+    line[COMMAND_MAX_LINE + 1] = '\0';
+    expect_error(&dev, 1, line, CMD_E_OVERRUN);
+}
+
+static void help_lists_every_header_in_one_line(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = command_test_device();
+    say(&dev, "HELP?");
+    assert_true(strlen(result.reply) < COMMAND_MAX_REPLY - 1); /* not cut */
+    assert_true(strlen(result.reply) + 2 < NATIVE_MAX_TEXT);   /* and fits the wire with CR LF */
+    char copy[COMMAND_MAX_REPLY], *save = NULL;
+    snprintf(copy, sizeof copy, "%s", result.reply);
+    size_t n = 0;
+    for (char *word = strtok_r(copy, " ", &save); word != NULL; word = strtok_r(NULL, " ", &save), n++) {
+        char plain[64] = "";
+        for (const char *p = word; *p != '\0'; p++)
+            if (strchr("[]?", *p) == NULL) plain[strlen(plain)] = *p >= 'a' ? (char)(*p - 32) : *p;
+        if (!is_command(plain)) fail_msg("HELP? lists '%s'", word);
+    }
+    assert_int_equal(n, N_OF(commands));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(long_and_short_forms_in_any_case),
+        cmocka_unit_test(nothing_between_or_beyond_the_forms),
+        cmocka_unit_test(replies_of_queries),
+        cmocka_unit_test(status_byte),
+        cmocka_unit_test(state_names_and_control),
+        cmocka_unit_test(wrong_lines_give_one_error),
+        cmocka_unit_test(a_line_too_long_is_dropped_whole),
+        cmocka_unit_test(help_lists_every_header_in_one_line),
+    };
+    return cmocka_run_group_tests_name("command", tests, NULL, NULL);
+}

@@ -1,0 +1,308 @@
+/* Numbers, ranges, control and effects of the command set. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "tests/unit/command_device.h"
+
+#define N_OF(array) (sizeof(array) / sizeof(array)[0])
+
+static struct command_result result;
+
+static const char *say(struct command_device *dev, uint32_t session, const char *line)
+{
+    command_execute(dev, session, line, &result);
+    return result.reply;
+}
+
+static void expect(struct command_device *dev, const char *line, const char *reply)
+{
+    const char *got = say(dev, 1, line);
+    if (strcmp(got, reply) != 0) fail_msg("'%s' gives '%s', not '%s'", line, got, reply);
+}
+
+static void expect_error(struct command_device *dev, uint32_t session, const char *line, int number,
+                         const char *part)
+{
+    const struct head_settings before = dev->settings;
+    const uint32_t control = dev->control, queued = dev->queue.count;
+    say(dev, session, line);
+    if (result.error != number || strstr(result.reply, part) == NULL)
+        fail_msg("'%s' gives '%s', not %d with '%s'", line, result.reply, number, part);
+    assert_int_equal(dev->queue.count, queued + 1);
+    assert_int_equal(dev->control, control);
+    assert_int_equal(result.effect, COMMAND_NONE);
+    assert_false(result.took_control || result.changes);
+    assert_memory_equal(&before, &dev->settings, sizeof before);
+}
+
+static void numbers_in_nrf_forms_are_exact(void **ctx)
+{
+    (void)ctx;
+    static const struct {
+        const char *text;
+        int64_t prr_uhz;
+    } cases[] = {
+        {"300000", INT64_C(300000000000)},
+        {"+300000", INT64_C(300000000000)},
+        {"300000.", INT64_C(300000000000)},
+        {"0300000.000000000", INT64_C(300000000000)},
+        {"3e5", INT64_C(300000000000)},
+        {"3E+05", INT64_C(300000000000)},
+        {"3 E 5", INT64_C(300000000000)},
+        {".3e6", INT64_C(300000000000)},
+        {"300000000000e-6", INT64_C(300000000000)},
+        {"12345.678901", INT64_C(12345678901)},
+        {"1000.1", INT64_C(1000100000)}, /* no double is 1000.1: the text must not go through one */
+        {"1199999.999999", INT64_C(1199999999999)},
+        {"300000HZ", INT64_C(300000000000)},
+        {"300000 Hz", INT64_C(300000000000)},
+        {"300 kHz", INT64_C(300000000000)},
+        {"0.3MHZ", INT64_C(300000000000)},
+        {"3e-1 mhz", INT64_C(300000000000)},
+        {"1.000000001 KHZ", INT64_C(1000000001)},
+        {"MIN", INT64_C(1000000000)},
+        {"minimum", INT64_C(1000000000)},
+        {"Max", INT64_C(1200000000000)},
+        {"MAXIMUM", INT64_C(1200000000000)},
+    };
+    for (size_t i = 0; i < N_OF(cases); i++) {
+        struct command_device dev = command_test_device();
+        char line[80];
+        snprintf(line, sizeof line, "HEAD:PRR %s", cases[i].text);
+        expect(&dev, line, "OK");
+        if (dev.settings.prr_uhz != cases[i].prr_uhz)
+            fail_msg("%s is %lld uHz", line, (long long)dev.settings.prr_uhz);
+        assert_int_equal(result.effect, COMMAND_SETTINGS);
+    }
+}
+
+static void what_is_not_exact_is_refused_not_rounded(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = command_test_device();
+    expect_error(&dev, 1, "HEAD:PRR 5000.0000001", CMD_E_RANGE,
+                 "5000.0000001, allowed multiples of 0.000001 Hz");
+    expect_error(&dev, 1, "HEAD:PRR 5.0000000001 KHZ", CMD_E_RANGE, "multiples of 0.000001 Hz");
+    expect_error(&dev, 1, "HEAD:PRR 5e-99999999999", CMD_E_RANGE, "multiples of");
+    expect_error(&dev, 1, "SCAN:FRAMES 1.5", CMD_E_RANGE, "1.5, allowed whole numbers");
+    expect_error(&dev, 1, "HEAD:STATION 0.1e1.", CMD_E_DATA_TYPE, "not '0.1e1.'");
+    expect(&dev, "SCAN:FRAMES 0.2e1", "OK");
+    assert_int_equal(dev.settings.frames, 2);
+    expect(&dev, "SCAN:FRAMES 0e-99999", "OK"); /* nought is nought */
+    assert_int_equal(dev.settings.frames, 0);
+}
+
+static void numbers_beyond_64_bits_are_out_of_range(void **ctx)
+{
+    (void)ctx;
+    static const char *const numbers[] = {"1e99999999999",         "-1e30",
+                                          "9223372036854.775808",  "18446744073709.551616",
+                                          "18446744073710.551616", "99999999999999999999999999999999999999"};
+    struct command_device dev = command_test_device();
+    for (size_t i = 0; i < N_OF(numbers); i++) {
+        char line[80];
+        snprintf(line, sizeof line, "HEAD:PRR %s", numbers[i]);
+        expect_error(&dev, 1, line, CMD_E_RANGE, ", allowed 1000 to 1200000\"");
+    }
+    /* Four frames more than 2^32 must not come out as four. */
+    expect_error(&dev, 1, "SCAN:FRAMES 4294967300", CMD_E_RANGE, "allowed 0 to 4294967295");
+    expect(&dev, "SCAN:FRAMES 4294967295", "OK");
+    expect_error(&dev, 1, "HEAD:STATION 4294967297", CMD_E_RANGE, "allowed 1 to 3");
+}
+
+/* Each range from both ends; the values are the test profile's and the narrowing of the other setting. */
+static void each_range_holds_at_both_ends(void **ctx)
+{
+    (void)ctx;
+    static const struct {
+        const char *header, *below, *min, *max, *above;
+        int below_error, above_error;
+    } ranges[] = {
+        {"HEAD:PRR", "999.999999", "1000", "1200000", "1200000.000001", -222, -222},
+        {"HEAD:LINES", "0.999999", "1", "2000", "2000.000001", -222, -222},
+        {"HEAD:PAN", "-0.000001", "0", "60", "60.000001", -222, -222},
+        {"HEAD:STATION", "0", "1", "3", "4", -222, -222},
+        {"SCAN:FRAMES", "-1", "0", "4294967295", "4294967296", -222, -222},
+        {"SCAN:LINE:START", "-40.000001", "-40", "49.999999", "50", -222, -221},
+        {"SCAN:LINE:STOP", "-30", "-29.999999", "60", "60.000001", -221, -222},
+        {"SCAN:PAN:START", "-180.000001", "-180", "179.999999", "180", -222, -221},
+        {"SCAN:PAN:STOP", "0", "0.000001", "360", "360.000001", -221, -222},
+    };
+    for (size_t i = 0; i < N_OF(ranges); i++) {
+        struct command_device dev = command_test_device();
+        char line[80], allowed[80];
+        snprintf(allowed, sizeof allowed, "allowed %s to %s", ranges[i].min, ranges[i].max);
+        if (ranges[i].below_error == -222 && ranges[i].above_error == -222) {
+            snprintf(line, sizeof line, "%s %s", ranges[i].header, ranges[i].below);
+            expect_error(&dev, 1, line, -222, allowed);
+        }
+        snprintf(line, sizeof line, "%s %s", ranges[i].header, ranges[i].below);
+        expect_error(&dev, 1, line, ranges[i].below_error, ", allowed ");
+        snprintf(line, sizeof line, "%s %s", ranges[i].header, ranges[i].above);
+        expect_error(&dev, 1, line, ranges[i].above_error, ", allowed ");
+        snprintf(line, sizeof line, "%s? MIN", ranges[i].header);
+        expect(&dev, line, ranges[i].min);
+        snprintf(line, sizeof line, "%s? MAX", ranges[i].header);
+        expect(&dev, line, ranges[i].max);
+        const char *const good[] = {ranges[i].min, ranges[i].max};
+        for (size_t k = 0; k < 2; k++) {
+            snprintf(line, sizeof line, "%s %s", ranges[i].header, good[k]);
+            expect(&dev, line, "OK");
+            snprintf(line, sizeof line, "%s?", ranges[i].header);
+            expect(&dev, line, good[k]);
+        }
+    }
+}
+
+static void settings_narrow_each_other(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = command_test_device();
+    dev.limits.lines_max_uhz = 5000 * MICRO;
+    expect(&dev, "HEAD:PRR 2000", "OK");
+    expect_error(&dev, 1, "HEAD:LINES 2000.000001", CMD_E_SETTINGS,
+                 "HEAD:LINes 2000.000001 Hz, allowed 1 to 2000 as HEAD:PRR is 2000");
+    expect(&dev, "HEAD:LINES MAX", "OK");
+    expect(&dev, "HEAD:LINES?", "2000");
+    expect_error(&dev, 1, "HEAD:PRR 1999", CMD_E_SETTINGS, "allowed 2000 to 1200000 as HEAD:LINes is 2000");
+    /* A turn is the most that pan may span. */
+    expect(&dev, "SCAN:PAN:STOP 360", "OK");
+    expect_error(&dev, 1, "SCAN:PAN:START -0.000001", CMD_E_SETTINGS, "allowed 0 to 359.999999");
+    expect(&dev, "SCAN:PAN:STOP 100", "OK");
+    expect(&dev, "SCAN:PAN:START -180", "OK");
+    expect_error(&dev, 1, "SCAN:PAN:STOP 181", CMD_E_SETTINGS, "allowed -179.999999 to 180");
+    /* A default may be in conflict; then it is refused like any number. */
+    expect(&dev, "SCAN:PAN:START -180", "OK");
+    expect(&dev, "SCAN:PAN:STOP -90", "OK");
+    expect_error(&dev, 1, "SCAN:PAN:START DEF", CMD_E_SETTINGS, "SCAN:PAN:STARt 0 deg");
+    expect(&dev, "SCAN:PAN:START? DEFAULT", "0");
+    expect(&dev, "SCAN:PAN:STOP DEF", "OK");
+    expect(&dev, "SCAN:PAN:STOP?", "180");
+}
+
+static void control_goes_to_the_first_who_changes(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = command_test_device();
+    expect_error(&dev, 3, "HEAD:PRR 1", CMD_E_RANGE, "HEAD:PRR"); /* a refused change takes nothing */
+    assert_string_equal(say(&dev, 3, "HEAD:PRR?"), "300000");
+    assert_int_equal(dev.control, 0);
+    assert_string_equal(say(&dev, 3, "HEAD:PRR 5000"), "OK");
+    assert_true(result.took_control && result.changes);
+    assert_string_equal(say(&dev, 2, "SYST:CONT?"), "3");
+    static const char *const changing[] = {"HEAD:PRR 6000", "*RST", "SCAN:START", "SYST:CONT:REL",
+                                           "SCAN:FRAMES MAX"};
+    for (size_t i = 0; i < N_OF(changing); i++)
+        expect_error(&dev, 2, changing[i], CMD_E_PROTECTED, "session 3 has control, this is session 2");
+    expect_error(&dev, 2, "HEAD:PRR x", CMD_E_DATA_TYPE, "x"); /* what is no command is told first */
+    assert_string_equal(say(&dev, 2, "HEAD:PRR?"), "5000");
+    assert_string_equal(say(&dev, 2, "*CLS"), "OK");
+    assert_string_equal(say(&dev, 3, "HEAD:PRR 6000"), "OK");
+    assert_false(result.took_control);
+    assert_string_equal(say(&dev, 3, "SYST:CONT:REL"), "OK");
+    assert_int_equal(result.effect, COMMAND_RELEASE);
+    assert_false(result.changes || result.took_control);
+    assert_string_equal(say(&dev, 3, "SYST:CONT:REL"), "OK"); /* nothing left to give back */
+    assert_int_equal(result.effect, COMMAND_NONE);
+    assert_string_equal(say(&dev, 2, "SCAN:START"), "OK");
+    assert_int_equal(dev.control, 2);
+}
+
+static void the_device_itself_needs_no_control(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = command_test_device();
+    assert_string_equal(say(&dev, 0, "HEAD:PRR 5000"), "OK");
+    assert_int_equal(dev.control, 0);
+    assert_true(result.changes && !result.took_control);
+    dev.control = 2;
+    assert_string_equal(say(&dev, 0, "HEAD:PRR 6000"), "OK");
+    assert_int_equal(dev.control, 2);
+}
+
+/* What each state answers, from the state diagram: S start, P stop, R reset; '.' refused. */
+static void effects_follow_the_state_machine(void **ctx)
+{
+    (void)ctx;
+    static const char *const accepted[HEAD_N_STATES] = {"...", "...", "S.R", ".PR", ".PR", "..R", "..R"};
+    static const char *const lines[] = {"SCAN:START", "SCAN:STOP", "*RST"};
+    static const enum command_effect effects[] = {COMMAND_START, COMMAND_STOP, COMMAND_RESET};
+    for (int state = 0; state < HEAD_N_STATES; state++)
+        for (size_t i = 0; i < 3; i++) {
+            struct command_device dev = command_test_device();
+            dev.state = (enum head_state)state;
+            dev.settings.frames = 9;
+            if (accepted[state][i] == '.') {
+                expect_error(&dev, 1, lines[i], CMD_E_SETTINGS, head_state_name(dev.state));
+                continue;
+            }
+            expect(&dev, lines[i], "OK");
+            assert_int_equal(result.effect, effects[i]);
+            assert_true(result.changes);
+            assert_int_equal(dev.state, state); /* the loop's to change */
+            assert_int_equal(dev.settings.frames, effects[i] == COMMAND_RESET ? 1 : 9);
+        }
+}
+
+static void a_station_stays_during_a_scan(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = command_test_device();
+    for (int state = HEAD_SPIN_UP; state <= HEAD_SCANNING; state++) {
+        dev.state = (enum head_state)state;
+        expect_error(&dev, 1, "HEAD:STATION 2", CMD_E_SETTINGS, head_state_name(dev.state));
+        expect(&dev, "HEAD:STATION 1", "OK"); /* it is there already */
+        expect(&dev, "HEAD:PRR 5000", "OK");
+    }
+    dev.state = HEAD_SPIN_DOWN;
+    expect(&dev, "HEAD:STATION 2", "OK");
+}
+
+static void steps_of_time(void **ctx)
+{
+    (void)ctx;
+    static const struct {
+        const char *line;
+        int64_t step_ns;
+    } steps[] = {{"TIME:STEP 1", 1},           {"TIME:STEP 1000000", 1000000},
+                 {"TIME:STEP 2.5 US", 2500},   {"TIME:STEP 20 ms", 20000000},
+                 {"TIME:STEP 1S", 1000000000}, {"TIME:STEP 9223372036854775806", INT64_MAX - 1}};
+    struct command_device dev = command_test_device();
+    expect_error(&dev, 1, "TIME:STEP 1", CMD_E_SETTINGS, "pace step");
+    dev.step_allowed = 1;
+    dev.t_ns = 1;
+    for (size_t i = 0; i < N_OF(steps); i++) {
+        expect(&dev, steps[i].line, "OK");
+        assert_int_equal(result.effect, COMMAND_STEP);
+        assert_true(result.step_ns == steps[i].step_ns && result.changes);
+    }
+    expect_error(&dev, 1, "TIME:STEP 0", CMD_E_RANGE, "allowed 1 to 9223372036854775806");
+    expect_error(&dev, 1, "TIME:STEP -5", CMD_E_RANGE, "TIME:STEP -5 ns");
+    expect_error(&dev, 1, "TIME:STEP 0.5", CMD_E_RANGE, "whole numbers of ns");
+    expect_error(&dev, 1, "TIME:STEP 9223372036854775807", CMD_E_RANGE,
+                 "allowed 1 to"); /* t_ns would overflow */
+    expect_error(&dev, 1, "TIME:STEP 9223372036854775808", CMD_E_RANGE, "allowed 1 to");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(numbers_in_nrf_forms_are_exact),
+        cmocka_unit_test(what_is_not_exact_is_refused_not_rounded),
+        cmocka_unit_test(numbers_beyond_64_bits_are_out_of_range),
+        cmocka_unit_test(each_range_holds_at_both_ends),
+        cmocka_unit_test(settings_narrow_each_other),
+        cmocka_unit_test(control_goes_to_the_first_who_changes),
+        cmocka_unit_test(the_device_itself_needs_no_control),
+        cmocka_unit_test(effects_follow_the_state_machine),
+        cmocka_unit_test(a_station_stays_during_a_scan),
+        cmocka_unit_test(steps_of_time),
+    };
+    return cmocka_run_group_tests_name("command values", tests, NULL, NULL);
+}
