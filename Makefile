@@ -1,9 +1,18 @@
 # scanhead: build/scanhead, build/libscanhead.{a,so}; make demo, make test do all their own set-up.
 BUILD ?= build
-CC ?= gcc
-CXX ?= g++
+ifeq ($(origin CC),default)
+CC = gcc
+endif
+ifeq ($(origin CXX),default)
+CXX = g++
+endif
+V ?= 0
+Q_0 = @
+Q = $(Q_$(V))
 PREFIX ?= /usr/local
-PKGS = libyaml libpng nettle
+PKGS = yaml-0.1 libpng nettle
+PKG_CFLAGS := $(shell pkg-config --cflags $(PKGS) 2>/dev/null)
+PKG_LIBS := $(shell pkg-config --libs $(PKGS) 2>/dev/null)
 OPT ?= -O3
 WARN = -Wall -Wextra -Wconversion -Wshadow -Wstrict-prototypes -Wmissing-prototypes
 CXXWARN = -Wall -Wextra -Wconversion -Wshadow
@@ -12,9 +21,9 @@ WERROR ?= -Werror
 # No contraction to FMA: the same numbers on every instruction set. errno and traps of libm are not used.
 FP = -ffp-contract=off -fno-math-errno -fno-trapping-math
 CPPFLAGS += -I. -D_GNU_SOURCE -MMD -MP
-CFLAGS += -std=c11 $(OPT) -g $(FP) $(WARN) $(WERROR) -fPIC -pthread $(SAN) $(shell pkg-config --cflags $(PKGS))
+CFLAGS += -std=c11 $(OPT) -g $(FP) $(WARN) $(WERROR) -fPIC -pthread $(SAN) $(PKG_CFLAGS)
 CXXFLAGS += -std=c++17 $(OPT) -g $(FP) $(CXXWARN) $(WERROR) -fPIC -pthread $(SAN)
-LDLIBS = -lembree3 -lassimp -lGeographic $(shell pkg-config --libs $(PKGS)) -lstdc++ -lm -pthread
+LDLIBS = -lembree3 -lassimp -lGeographic $(PKG_LIBS) -lstdc++ -lm -pthread
 
 CORE = $(wildcard core/*.c core/*/*.c)
 SHIM = $(wildcard core/*/*.cpp)
@@ -30,24 +39,31 @@ all: $(BUILD)/scanhead $(BUILD)/libscanhead.a $(BUILD)/libscanhead.so
 
 $(BUILD)/%.c.o: %.c
 	@mkdir -p $(@D)
-	$(CC) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
+	@echo "  CC    $<"
+	$(Q)$(CC) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
 $(BUILD)/%.cpp.o: %.cpp
 	@mkdir -p $(@D)
-	$(CXX) $(CPPFLAGS) $(CXXFLAGS) -c $< -o $@
+	@echo "  CXX   $<"
+	$(Q)$(CXX) $(CPPFLAGS) $(CXXFLAGS) -c $< -o $@
 
 $(BUILD)/libscanhead_all.a: $(OBJ)
 	@rm -f $@
-	$(AR) rcs $@ $^
+	@echo "  AR    $@"
+	$(Q)$(AR) rcs $@ $^
 $(BUILD)/libscanhead.a: $(LIBOBJ)
 	@rm -f $@
-	$(AR) rcs $@ $^
+	@echo "  AR    $@"
+	$(Q)$(AR) rcs $@ $^
 $(BUILD)/libscanhead.so: $(LIBOBJ)
-	$(CC) -shared $(SAN) -o $@ $^ $(shell pkg-config --libs nettle) -lm
+	@echo "  LD    $@"
+	$(Q)$(CC) -shared $(SAN) -o $@ $^ -lnettle -Wl,--version-script=drivers/host/libscanhead.map -Wl,--no-undefined -lm
 $(BUILD)/scanhead: $(BUILD)/firmware_sim/main.c.o $(BUILD)/libscanhead_all.a
-	$(CC) $(SAN) -o $@ $^ $(LDLIBS)
+	@echo "  LD    $@"
+	$(Q)$(CC) $(SAN) -o $@ $^ $(LDLIBS)
 $(BUILD)/tests/%: tests/unit/%.c $(BUILD)/libscanhead_all.a
 	@mkdir -p $(@D)
-	$(CC) $(CPPFLAGS) $(CFLAGS) -MF $@.d -o $@ $< $(BUILD)/libscanhead_all.a -lcmocka $(LDLIBS)
+	@echo "  TEST  $@"
+	$(Q)$(CC) $(CPPFLAGS) $(CFLAGS) -MF $@.d -o $@ $< $(BUILD)/libscanhead_all.a -lcmocka $(LDLIBS)
 
 test-unit: $(UNIT)
 	@for t in $(UNIT); do CMOCKA_MESSAGE_OUTPUT=TAP $$t || true; done

@@ -62,6 +62,8 @@ struct device_options {
 /* site must outlive the device. */
 int device_create(const struct site *site, const struct device_options *options, struct device **out, struct sh_err *err);
 void device_free(struct device *device);
+/* Closes the journal, if there is one, and says what went wrong in writing it. After the loop is joined. */
+int device_close_journal(struct device *device, struct sh_err *err);
 
 struct device_counters *device_counters(struct device *device);
 

@@ -131,8 +131,9 @@ static int open_journals(struct device *device, struct sh_err *err)
 {
     int rc = SH_OK;
     if (device->options.replay != NULL) rc = journal_read(device->options.replay, &device->replay, &device->n_replay, err);
-    if (rc == SH_OK && device->options.journal != NULL) rc = journal_open(device->options.journal, &device->journal, err);
-    return rc;
+    if (rc != SH_OK || device->options.journal == NULL) return rc;
+    device->journal = journal_open(device->options.journal, err);
+    return device->journal != NULL ? SH_OK : err->code;
 }
 
 int device_create(const struct site *site, const struct device_options *options, struct device **out, struct sh_err *err)
@@ -159,11 +160,18 @@ int device_create(const struct site *site, const struct device_options *options,
     return SH_OK;
 }
 
+int device_close_journal(struct device *device, struct sh_err *err)
+{
+    int rc = journal_close(device->journal, err);
+    device->journal = NULL;
+    return rc;
+}
+
 void device_free(struct device *device)
 {
     if (device == NULL) return;
-    if (device->journal != NULL) journal_close(device->journal);
-    journal_free(device->replay, device->n_replay);
+    journal_close(device->journal, NULL);
+    journal_free(device->replay);
     pthread_mutex_destroy(&device->lock);
     free(device);
 }
