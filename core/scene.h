@@ -2,6 +2,11 @@
  *
  * Frame: prcs, metres, z up. A file's vertex v becomes R(up) * v * scale + offset_m, in double.
  * `up: z` leaves the axes as they are; `up: y` turns (x, y, z) to (x, -z, y).
+ * Units and axes are what the spec says, never guessed. What Assimp (5.2) itself does before that: Collada comes in
+ * metres and y up, its unit and up_axis applied; IFC comes in metres and y up; FBX keeps the file's unit (mostly
+ * centimetres: scale 0.01) and axes (mostly y up); glTF is metres and y up by definition; STL has neither.
+ * Every placement of a mesh in a node tree counts: an object that is there five times gives its triangles five times.
+ * Polygons are cut into triangles; a pair of object and material that is there already keeps its label.
  * Ownership: scene_load allocates everything, scene_free releases it. After the load a scene is constant and
  * may be read from any thread. */
 #ifndef CORE_SCENE_H
@@ -26,7 +31,9 @@ struct scene_mesh_spec {
     double offset_m[3]; /* added after axes and scale */
 };
 
-/* One surface label: an object of the file with one material. */
+/* One surface label: an object of the file with one material.
+ * Object: .obj the last o or g, else (and for .ply) the file's name without folder and ending; for the others the
+ * node's name, or the mesh's where that is empty. */
 struct scene_surface {
     char object[SCENE_NAME_LEN];
     char material[SCENE_NAME_LEN];
@@ -40,7 +47,8 @@ struct scene_counts {
 };
 
 struct scene {
-    uint32_t n_vertices, n_triangles, n_surfaces, n_meshes;
+    uint32_t n_vertices, n_triangles, n_surfaces;
+    uint32_t n_meshes;             /* placements in node trees; one for each .obj or .ply */
     double (*vertex_m)[3];         /* [n_vertices] prcs */
     uint32_t (*triangle)[3];       /* [n_triangles] indices into vertex_m */
     uint16_t *label;               /* [n_triangles] index into surface */

@@ -201,7 +201,12 @@ static const struct aiScene *import_file(struct scene_build *b, struct import_lo
     struct aiLogStream stream = {.callback = keep_log, .user = (char *)(void *)log};
     pthread_mutex_lock(&lock);
     aiAttachLogStream(&stream);
-    const struct aiScene *in = aiImportFile(b->spec->file, 0);
+    struct aiPropertyStore *options = aiCreatePropertyStore();
+    aiSetImportPropertyInteger(options, AI_CONFIG_IMPORT_COLLADA_USE_COLLADA_NAMES, 1); /* not the ids */
+    aiSetImportPropertyInteger(options, AI_CONFIG_IMPORT_IFC_SKIP_SPACE_REPRESENTATIONS,
+                               1); /* air is no surface */
+    const struct aiScene *in = aiImportFileExWithProperties(b->spec->file, 0, NULL, options);
+    aiReleasePropertyStore(options);
     aiDetachLogStream(&stream);
     if (in == NULL || in->mRootNode == NULL) {
         const char *why = in == NULL ? aiGetErrorString() : "nothing in it";

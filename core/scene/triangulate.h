@@ -2,8 +2,8 @@
  *
  * The polygon is projected along the largest axis of its Newell normal. Points that lie on an edge keep their
  * place (no triangle skips them, so neighbours still meet), and holes may be joined by a keyhole edge.
- * n - 2 triangles always come out; those of a polygon that crosses itself overlap; `simple` is false where that was noticed.
- * Cost: n for convex polygons, n times the number of reflex corners otherwise. */
+ * n - 2 triangles always come out; those of a polygon that crosses itself overlap; `simple` is false where
+ * that was noticed. Cost: n for convex polygons, n times the number of reflex corners otherwise. */
 #ifndef CORE_SCENE_TRIANGULATE_H
 #define CORE_SCENE_TRIANGULATE_H
 

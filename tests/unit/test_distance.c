@@ -27,8 +27,9 @@ static quad dotq(const quad a[3], const quad b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Ericson, Real-Time Collision Detection, 5.1.5, by regions: sound in this precision, also for needles. */
-static double reference_distance(const double p[3], const double ca[3], const double cb[3], const double cc[3])
+/* Ericson, Real-Time Collision Detection, 5.1.5, by regions. */
+static double reference_distance(const double p[3], const double ca[3], const double cb[3],
+                                 const double cc[3])
 {
     quad ab[3], ac[3], ap[3], bp[3], cp[3], v = 0, w = 0;
     for (int k = 0; k < 3; k++) {
@@ -54,8 +55,11 @@ static double reference_distance(const double p[3], const double ca[3], const do
         w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
         v = 1 - w;
     } else {
-        v = vb / (va + vb + vc);
-        w = vc / (va + vb + vc);
+        /* v and w from the areas would lose needles even here; the distance from the plane doesn't */
+        quad n[3] = {ab[1] * ac[2] - ab[2] * ac[1], ab[2] * ac[0] - ab[0] * ac[2],
+                     ab[0] * ac[1] - ab[1] * ac[0]};
+        quad height = dotq(n, ap);
+        return (double)sqrtl((long double)(height * height / dotq(n, n)));
     }
     quad r[3];
     for (int k = 0; k < 3; k++)
@@ -78,7 +82,8 @@ static double brute_force(const struct scene *s, const double p[3], uint32_t *ne
 
 static double apart(const double a[3], const double b[3])
 {
-    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
+    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) +
+                (a[2] - b[2]) * (a[2] - b[2]));
 }
 
 /* The farthest corner of one triangle: what the rounding of its distance is relative to. */
@@ -98,8 +103,8 @@ static struct scene *make_scene(double (*v)[3], uint32_t n_triangles)
     for (uint32_t i = 0; i < n_triangles; i++)
         for (uint32_t c = 0; c < 3; c++)
             t[i][c] = i * 3 + c;
-    int rc = scene_from_arrays((const double(*)[3])v, n_triangles * 3, (const uint32_t(*)[3])t, n_triangles, NULL,
-                               NULL, 0, &scene, &err);
+    int rc = scene_from_arrays((const double(*)[3])v, n_triangles * 3, (const uint32_t(*)[3])t, n_triangles,
+                               NULL, NULL, 0, &scene, &err);
     free(t);
     if (rc != SH_OK) fail_msg("%s", err.text);
     assert_int_equal(scene->n_triangles, n_triangles);
@@ -175,8 +180,8 @@ static void random_points_at_utm(void **state)
     random_scene((double[3]){500000, 5800000, 100}, 400);
 }
 
-/* 16 sheets, 1 um apart, 200 m from the centre, where a float's step is 15 um: in float they fall together, so
- * which one is nearest is only found if no candidate is lost to rounding. */
+/* 16 sheets, 1 um apart, 200 m from the centre, where a float's step is 15 um: in float they fall together,
+ * so which one is nearest is only found if no candidate is lost to rounding. */
 static void sheets_that_float_cannot_tell(void **state)
 {
     (void)state;
@@ -233,8 +238,8 @@ static void points_on_the_surface(void **state)
                 p[k] = v[0][k] + (v[1][k] - v[0][k]) * a + (v[2][k] - v[0][k]) * b;
             struct distance_hit hit;
             assert_int_equal(distance_query(index, p, 1, &hit), 1);
-            /* Three roundings at most on each of three axes, half a unit of the largest coordinate each, and of
-             * the differences (below 20) */
+            /* Three roundings at most on each of three axes, half a unit of the largest coordinate each, and
+             * of the differences (below 20) */
             double largest = turn % 2 ? 5800010 : 10;
             double bound = sqrt(3) * (1.5 * largest * 0x1p-52 + 3 * 20 * 0x1p-53) + ROUNDING * 20;
             if (hit.distance_m > bound) fail_msg("%g m off the surface, bound %g", hit.distance_m, bound);
@@ -245,8 +250,8 @@ static void points_on_the_surface(void **state)
     }
 }
 
-/* Height over length from 1e-2 to 1e-11, with the tip at an end and in the middle. The normal of the latter turns
- * by up to t = 4 * 2^-53 * length / height, which lengthens a distance d by at most d t^2 / 2. */
+/* Height over length from 1e-2 to 1e-11, with the tip at an end and in the middle. The normal of the latter
+ * turns by up to t = 4 * 2^-53 * length / height, which lengthens a distance d by at most d t^2 / 2. */
 static void needles(void **state)
 {
     (void)state;

@@ -1,4 +1,5 @@
-/* The scene: our own readers (OBJ, PLY), polygons, checks, names, axes. Formats by Assimp: test_scene_import.c. */
+/* The scene: our own readers (OBJ, PLY), polygons, checks, names, axes. Formats by Assimp:
+ * test_scene_import.c. */
 #include <locale.h>
 #include <math.h>
 
@@ -58,11 +59,13 @@ static void obj_without_names(void **state)
 }
 
 /* The compiler's conversion of the same digits is the independent source. */
-#define NUMBERS                                                                                                  \
-    N(500000.12345678901)                                                                                        \
-    N(5800000.00000000093) N(-5812345.678901234) N(0.1) N(.5) N(5.) N(1e22) N(1e-22) N(123456789012345e-22)      \
-    N(9007199254740993e-9) N(4.35e-6) N(+7.25) N(-0.0) N(1.7976931348623157e-300) N(00000000000000000000000.125) \
-    N(0.10000000000000000555111512312578270) N(123456.7890123456789E+2) N(4.9e-324) N(9007199254740993.0)
+#define NUMBERS                                                                                             \
+    N(500000.12345678901)                                                                                   \
+    N(5800000.00000000093)                                                                                  \
+    N(-5812345.678901234) N(0.1) N(.5) N(5.) N(1e22) N(1e-22) N(123456789012345e-22) N(9007199254740993e-9) \
+        N(4.35e-6) N(+7.25) N(-0.0) N(1.7976931348623157e-300) N(00000000000000000000000.125)               \
+            N(0.10000000000000000555111512312578270) N(123456.7890123456789E+2) N(4.9e-324)                 \
+                N(9007199254740993.0)
 
 static void obj_numbers_are_exact(void **state)
 {
@@ -96,7 +99,8 @@ static void obj_random_numbers_are_exact(void **state)
     char *text = malloc(COUNT * 64 + 64), *p = text;
     srand(7);
     for (int i = 0; i < COUNT; i++) {
-        static const char *const formats[] = {"v %.17g 0 0\n", "v %.15g 0 0\n", "v %.9f 0 0\n", "v %.3e 0 0\n"};
+        static const char *const formats[] = {"v %.17g 0 0\n", "v %.15g 0 0\n", "v %.9f 0 0\n",
+                                              "v %.3e 0 0\n"};
         double v = (rand() - RAND_MAX / 2.0) * pow(10, rand() % 9 - 10) * (1 + rand() / (RAND_MAX + 1.0));
         int n = sprintf(p, formats[i % 4], v);
         expected[i] = strtod(p + 2, NULL);
@@ -191,13 +195,13 @@ static void ply_is_read_exactly(void **state)
         for (size_t cut = 0; cut < n; cut += 13)
             refuse("cut.ply", data, cut, "");
     }
-    check_utm_scene(load_text("utm.ply",
-                              "ply\r\nformat ascii 1.0\r\nelement vertex 5 \r\nproperty double x\r\n"
-                              "property double y\r\nproperty double z\r\nproperty uchar red\r\n"
-                              "element face 2\r\nproperty list uchar int vertex_indices\r\nend_header\r\n"
-                              "500000.1 5800000.2 30.3 1\r\n500001.00000000012 5800000.2 30.3 2\r\n"
-                              "500001.1 5800001.2000000011 30.3 3\r\n500000.1 5800001.2 30.300000000000004 4\r\n"
-                              "\r\n500000.7 5800002.9 31 5\r\n4 0 1 2 3\r\n3 3 2 4"));
+    check_utm_scene(load_text(
+        "utm.ply", "ply\r\nformat ascii 1.0\r\nelement vertex 5 \r\nproperty double x\r\n"
+                   "property double y\r\nproperty double z\r\nproperty uchar red\r\n"
+                   "element face 2\r\nproperty list uchar int vertex_indices\r\nend_header\r\n"
+                   "500000.1 5800000.2 30.3 1\r\n500001.00000000012 5800000.2 30.3 2\r\n"
+                   "500001.1 5800001.2000000011 30.3 3\r\n500000.1 5800001.2 30.300000000000004 4\r\n"
+                   "\r\n500000.7 5800002.9 31 5\r\n4 0 1 2 3\r\n3 3 2 4"));
 }
 
 static void obj_is_read_exactly(void **state)
@@ -215,9 +219,10 @@ static void ply_in_float_warns(void **state)
 {
     (void)state;
     char data[512];
-    size_t n = (size_t)sprintf(data, "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\n"
-                                     "property float y\nproperty float z\nelement face 1\n"
-                                     "property list uchar uchar vertex_indices\nend_header\n");
+    size_t n =
+        (size_t)sprintf(data, "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\n"
+                              "property float y\nproperty float z\nelement face 1\n"
+                              "property list uchar uchar vertex_indices\nend_header\n");
     static const float v[3][3] = {{500000, 5800000, 0}, {500001, 5800000, 0}, {500000, 5800001, 0}};
     memcpy(data + n, v, sizeof v);
     memcpy(data + n + sizeof v, "\3\0\1\2", 4);
@@ -233,7 +238,9 @@ static void axes_scale_offset(void **state)
     struct scene *s;
     struct sh_err err;
     struct scene_mesh_spec spec = {.file = write_text("a.obj", "v 1 2 3\nv 4 5 6\nv 7 8 10\nf 1 2 3\n"),
-                                   .up = SCENE_UP_Y, .scale = 0.5, .offset_m = {100, 200, 300}};
+                                   .up = SCENE_UP_Y,
+                                   .scale = 0.5,
+                                   .offset_m = {100, 200, 300}};
     assert_int_equal(load_spec(&spec, 1, &s, &err), SH_OK);
     static const double turned[3][3] = {{100.5, 198.5, 301}, {102, 197, 302.5}, {103.5, 195, 304}};
     assert_memory_equal(s->vertex_m, turned, sizeof turned);
@@ -257,7 +264,8 @@ static void files_add_up(void **state)
     (void)state;
     char a[128], b[128];
     strcpy(a, write_text("a.obj", "v 9 9 9\nv 0 0 0\nv 1 0 0\nv 0 1 0\no x\nusemtl m\nf 2 3 4\nf 2 3 3\n"));
-    strcpy(b, write_text("b.obj", "v 0 0 1\nv 1 0 1\nv 0 1 1\no y\nf 1 2 3\no x\nusemtl m\nf 1 2 -1\nf 1 1 2\n"));
+    strcpy(b, write_text("b.obj",
+                         "v 0 0 1\nv 1 0 1\nv 0 1 1\no y\nf 1 2 3\no x\nusemtl m\nf 1 2 -1\nf 1 1 2\n"));
     const struct scene_mesh_spec specs[2] = {{.file = a, .scale = 1}, {.file = b, .scale = 2}};
     struct scene *s;
     struct sh_err err;
@@ -279,7 +287,8 @@ static void files_add_up(void **state)
     unlink(b);
 }
 
-/* Area by the shoelace formula; the triangles' own areas add up to it only when none overlaps or sticks out. */
+/* Area by the shoelace formula; the triangles' own areas add up to it only when none overlaps or sticks out.
+ */
 static void check_polygon(const double (*uv)[2], int n, bool at_utm)
 {
     char *text = malloc((size_t)n * 128 + 64), *p = text;
@@ -310,10 +319,10 @@ static void polygons_keep_their_area(void **state)
     static const double l_shape[][2] = {{0, 0}, {4, 0}, {4, 1}, {1, 1}, {1, 3}, {0, 3}};
     static const double dart[][2] = {{0, 0}, {3, -2}, {1, 0}, {3, 2}};
     static const double on_edges[][2] = {{0, 0}, {1, 0}, {2, 0}, {3, 0}, {3, 3}, {1.5, 3}, {0, 3}, {0, 1}};
-    static const double comb[][2] = {{0, 0}, {9, 0}, {9, 5}, {8, 1}, {7, 5}, {6, 1}, {5, 5}, {4, 1}, {3, 5},
-                                     {2, 1}, {1, 5}, {0.5, 1}};
-    static const double keyhole[][2] = {{0, 0}, {1, 1}, {1, 2}, {2, 2}, {2, 1}, {1, 1}, {0, 0}, {3, 0}, {3, 3},
-                                        {0, 3}};
+    static const double comb[][2] = {{0, 0}, {9, 0}, {9, 5}, {8, 1}, {7, 5}, {6, 1},
+                                     {5, 5}, {4, 1}, {3, 5}, {2, 1}, {1, 5}, {0.5, 1}};
+    static const double keyhole[][2] = {{0, 0}, {1, 1}, {1, 2}, {2, 2}, {2, 1},
+                                        {1, 1}, {0, 0}, {3, 0}, {3, 3}, {0, 3}};
     static const double repeated[][2] = {{0, 0}, {2, 0}, {2, 0}, {2, 2}, {1, 1}, {0, 2}, {0, 2}};
     for (int at_utm = 0; at_utm < 2; at_utm++) {
         check_polygon(l_shape, 6, at_utm);
@@ -349,8 +358,8 @@ static void crossing_polygon_is_told(void **state)
 static void zero_area_is_counted(void **state)
 {
     (void)state;
-    /* a point, a repeated corner, three in line (also where 1/3 rounds), then needles that are real: 100 m long
-     * and 1 nm wide, and a wire of 0.1 mm over 1 km */
+    /* a point, a repeated corner, three in line (also where 1/3 rounds), then needles that are real: 100 m
+     * long and 1 nm wide, and a wire of 0.1 mm over 1 km */
     struct scene *s = load_text("zero.obj", "v 0 0 0\nv 1 1 1\nv 3 3 3\nv 0.1 0.3 0.7\nv 0.2 0.6 1.4\n"
                                             "v 100 0 0\nv 50 1e-9 0\nv 1000 0 0\nv 1000 1e-4 0\n"
                                             "f 1 1 1\nf 1 2 2\nf 1 2 3\nf 1 4 5\nf 1 6 7\nf 1 8 9\n");
@@ -392,11 +401,11 @@ static void surfaces_have_a_limit(void **state)
     free(text);
 }
 
-#define TRI "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+#define TRI  "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 #define HEAD "ply\nformat ascii 1.0\n"
-#define XYZ "property float x\nproperty float y\nproperty float z\n"
+#define XYZ  "property float x\nproperty float y\nproperty float z\n"
 #define FACE "property list uchar int vertex_indices\n"
-#define PLY HEAD "element vertex 3\n" XYZ "element face 1\n" FACE "end_header\n"
+#define PLY  HEAD "element vertex 3\n" XYZ "element face 1\n" FACE "end_header\n"
 
 static void malformed_files_are_refused(void **state)
 {
@@ -435,10 +444,12 @@ static void malformed_files_are_refused(void **state)
         {"a.ply", HEAD "element vertex 3\nproperty real x\n", "unknown property type 'real'"},
         {"a.ply", HEAD "element vertex 3\nproperty list float int x\n", "count can't be of type 'float'"},
         {"a.ply", HEAD "element vertex 3\nproperty float x\nproperty float x\n", "twice: 'x'"},
-        {"a.ply", HEAD "element vertex 3\nproperty float x\nend_header\n", "lacks one of the properties x, y, z"},
+        {"a.ply", HEAD "element vertex 3\nproperty float x\nend_header\n",
+         "lacks one of the properties x, y, z"},
         {"a.ply", HEAD "element face 1\n" FACE "end_header\n", "face comes before element vertex"},
         {"a.ply", HEAD "element vertex 1\n" XYZ "end_header\n0 0 0\n", "points are not a mesh"},
-        {"a.ply", HEAD "element vertex 1\n" XYZ "element face 1\nproperty int a\nend_header\n", "lacks the list"},
+        {"a.ply", HEAD "element vertex 1\n" XYZ "element face 1\nproperty int a\nend_header\n",
+         "lacks the list"},
         {"a.ply", HEAD "element vertex 999999999999\n" XYZ "element face 1\n" FACE "end_header\n0 0 0\n",
          "999999999999 of element vertex need 6 bytes or more each; 7 are left"},
         {"a.ply", PLY "0 0 0\n1 0 0\n0 nan 0\n3 0 1 2\n", "line 12: vertex 3 (0 nan 0) is not finite"},
@@ -482,9 +493,9 @@ static void arrays_become_a_scene(void **state)
     struct scene_surface surface[2] = {{"a", "b"}, {"c", "d"}};
     struct scene *s;
     struct sh_err err;
-    assert_int_equal(scene_from_arrays((const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, label, surface, 2, &s,
-                                       &err),
-                     SH_OK);
+    assert_int_equal(
+        scene_from_arrays((const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, label, surface, 2, &s, &err),
+        SH_OK);
     assert_int_equal(s->n_triangles, 2);
     assert_int_equal(s->counts.zero_area, 1);
     assert_int_equal(s->label[0], 1);
@@ -493,22 +504,25 @@ static void arrays_become_a_scene(void **state)
     assert_true(s->max_m[0] == 1);
     scene_free(s);
     assert_int_equal(
-        scene_from_arrays((const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, NULL, NULL, 0, &s, &err), SH_OK);
+        scene_from_arrays((const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, NULL, NULL, 0, &s, &err),
+        SH_OK);
     assert_string_equal(s->surface[0].object, "object");
     assert_string_equal(s->surface[0].material, "material");
     scene_free(s);
     label[2] = 2;
-    assert_int_equal(scene_from_arrays((const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, label, surface, 2, &s,
-                                       &err),
-                     SH_EINPUT);
+    assert_int_equal(
+        scene_from_arrays((const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, label, surface, 2, &s, &err),
+        SH_EINPUT);
     assert_non_null(strstr(err.text, "triangle 2: label 2 out of range"));
     t[2][1] = 4;
     assert_int_equal(
-        scene_from_arrays((const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, NULL, NULL, 0, &s, &err), SH_EINPUT);
+        scene_from_arrays((const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, NULL, NULL, 0, &s, &err),
+        SH_EINPUT);
     assert_non_null(strstr(err.text, "triangle 2: index 4 out of range"));
     v[3][1] = NAN;
     assert_int_equal(
-        scene_from_arrays((const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, NULL, NULL, 0, &s, &err), SH_EINPUT);
+        scene_from_arrays((const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, NULL, NULL, 0, &s, &err),
+        SH_EINPUT);
     assert_non_null(strstr(err.text, "vertex 4 (5 nan 5) is not finite"));
     assert_null(s);
 }

@@ -1,0 +1,287 @@
+/* Formats that come through Assimp: node tree, names, axes and units, single precision, broken files. */
+#include <fcntl.h>
+#include <math.h>
+#include <sys/stat.h>
+
+#include <assimp/cimport.h>
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+
+#include "tests/unit/scene_files.h"
+
+#define MODELS "/usr/share/assimp/models/"
+
+/* Models of Debian's assimp-testmodels. */
+static bool is_missing(const char *file)
+{
+    if (access(file, R_OK) == 0) return false;
+    print_message("skipped: %s is missing (package assimp-testmodels)\n", file);
+    return true;
+}
+
+#define SKIP_WITHOUT(file)            \
+    do {                              \
+        if (is_missing(file)) skip(); \
+    } while (0)
+
+static const char *stl_text(double x, double y, const char *z)
+{
+    static char text[512];
+    snprintf(text, sizeof text,
+             "solid hall\nfacet normal 0 0 1\nouter loop\nvertex %.1f %.1f 0\nvertex %.1f %.1f %s\n"
+             "vertex %.1f %.1f 0\nendloop\nendfacet\nendsolid hall\n",
+             x, y, x + 1, y, z, x, y + 1);
+    return text;
+}
+
+static void stl_is_read(void **state)
+{
+    (void)state;
+    struct scene *s = load_text("a.STL", stl_text(10, 20, "0.5"));
+    static const double v[3][3] = {{10, 20, 0}, {11, 20, 0.5}, {10, 21, 0}};
+    assert_int_equal(s->n_triangles, 1);
+    assert_int_equal(s->n_meshes, 1);
+    assert_memory_equal(s->vertex_m, v, sizeof v);
+    assert_string_equal(s->surface[0].object, "hall");
+    assert_int_equal(n_warnings, 0);
+    scene_free(s);
+}
+
+/* 5.8e6 * 6e-8 = 0.35 m: refused where that is not allowed, with the figures. */
+static void single_precision_is_refused(void **state)
+{
+    (void)state;
+    const char *text = stl_text(500000, 5800000, "0");
+    refuse("utm.stl", text, strlen(text),
+           "coordinates up to 5800001 are read in single precision, which may be "
+           "off by 0.35 m; allowed are 0.001 m");
+    struct scene *s;
+    struct sh_err err;
+    struct scene_mesh_spec spec = {.file = write_text("utm.stl", text), .scale = 1};
+    assert_int_equal(load_spec(&spec, 0.36, &s, &err), SH_OK);
+    scene_free(s);
+    spec.scale = 1e-3; /* in millimetres it is good enough */
+    assert_int_equal(load_spec(&spec, 1e-3, &s, &err), SH_OK);
+    scene_free(s);
+    unlink(path);
+}
+
+/* A large shift that a node below takes back has rounded the coordinates all the same. */
+static void single_precision_within_the_tree(void **state)
+{
+    (void)state;
+    static const char text[] =
+        "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":["
+        "{\"name\":\"out\",\"translation\":[-500000,0,0],\"children\":[1]},"
+        "{\"name\":\"back\",\"translation\":[500000,0,0],\"mesh\":0}],"
+        "\"meshes\":[{\"name\":\"m\",\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],"
+        "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}],"
+        "\"bufferViews\":[{\"buffer\":0,\"byteLength\":36}],"
+        "\"buffers\":[{\"byteLength\":36,\"uri\":\"data:application/octet-stream;base64,"
+        "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA\"}]}";
+    refuse("tree.gltf", text, sizeof text - 1, "coordinates up to 500001 are read in single precision");
+    struct scene *s;
+    struct sh_err err;
+    const struct scene_mesh_spec spec = {.file = write_text("tree.gltf", text), .scale = 1};
+    assert_int_equal(load_spec(&spec, 1, &s, &err), SH_OK);
+    unlink(path);
+    static const double v[3][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    assert_memory_equal(s->vertex_m, v, sizeof v);
+    assert_string_equal(s->surface[0].object, "back");
+    scene_free(s);
+}
+
+static void broken_files_are_refused(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"a.stl", "a.gltf", "a.glb", "a.fbx", "a.dae", "a.ifc"};
+    for (size_t i = 0; i < 6; i++) {
+        refuse(names[i], "", 0, ": ");
+        refuse(names[i], "garbage\nin two lines\n", 21, ": ");
+    }
+    const char *text = stl_text(0, 0, "nan");
+    refuse("nan.stl", text, strlen(text), "vertex 2 (1 0 nan) is not finite");
+    text = stl_text(2e9, 0, "0");
+    struct scene *s;
+    struct sh_err err;
+    struct scene_mesh_spec spec = {.file = write_text("far.stl", text), .scale = 1};
+    assert_int_equal(load_spec(&spec, 1e6, &s, &err), SH_EINPUT);
+    unlink(path);
+    assert_non_null(strstr(err.text, "far.stl"));
+    assert_non_null(strstr(err.text, "allowed are coordinates up to 1e+09 m"));
+    refuse("cut.ifc", "ISO-10303-21;\nHEADER;\n", 22, "cut off: it doesn't end with END-ISO-10303-21;");
+    spec.file = "/nowhere/a.stl";
+    assert_int_equal(load_spec(&spec, 1, &s, &err), SH_EINPUT);
+    assert_string_equal(err.text, "/nowhere/a.stl: No such file or directory");
+}
+
+/* Khronos' boxes: a cube of edge 1 about the origin. */
+static void boxes(void **state)
+{
+    (void)state;
+    static const char *const files[] = {MODELS "glTF2/BoxTextured-glTF-Binary/BoxTextured.glb",
+                                        MODELS "glTF2/BoxTextured-glTF/BoxTextured.gltf",
+                                        MODELS "Collada/cube_triangulate.dae", MODELS "FBX/phong_cube.fbx"};
+    for (size_t i = 0; i < 4; i++) {
+        SKIP_WITHOUT(files[i]);
+        struct scene *s = load(files[i]);
+        assert_int_equal(s->n_triangles, 12);
+        assert_int_equal(s->n_surfaces, 1);
+        for (int k = 0; k < 3; k++) /* floats: 2^-24 of the size */
+            assert_true(fabs(s->min_m[k] + 0.5) < 1e-7 && fabs(s->max_m[k] - 0.5) < 1e-7);
+        assert_true(fabs(total_area(s) - 6) < 1e-6);
+        scene_free(s);
+    }
+}
+
+/* Assimp applies Collada's unit (cube_triangulate.dae has centimetres and an edge of 100) and turns to y up;
+ * it leaves FBX's unit alone (global_settings.fbx has a factor of 500 and a cube from about -4 to 7). */
+static void units(void **state)
+{
+    (void)state;
+    const char *file = MODELS "FBX/global_settings.fbx";
+    SKIP_WITHOUT(file);
+    struct scene *s = load(file);
+    assert_true(s->max_m[0] > 1 && s->max_m[0] < 50);
+    scene_free(s);
+    static const char z_up[] =
+        "<?xml version=\"1.0\"?><COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\" "
+        "version=\"1.4.1\">"
+        "<asset><unit meter=\"0.5\"/><up_axis>Z_UP</up_axis></asset><library_geometries><geometry "
+        "id=\"g\"><mesh>"
+        "<source id=\"p\"><float_array id=\"pa\" count=\"9\">0 0 8 2 0 8 0 4 "
+        "8</float_array><technique_common>"
+        "<accessor source=\"#pa\" count=\"3\" stride=\"3\"><param name=\"X\" type=\"float\"/>"
+        "<param name=\"Y\" type=\"float\"/><param name=\"Z\" "
+        "type=\"float\"/></accessor></technique_common></source>"
+        "<vertices id=\"v\"><input semantic=\"POSITION\" source=\"#p\"/></vertices><triangles count=\"1\">"
+        "<input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/><p>0 1 2</p></triangles></mesh></geometry>"
+        "</library_geometries><library_visual_scenes><visual_scene id=\"s\"><node id=\"n\" name=\"wall\">"
+        "<instance_geometry url=\"#g\"/></node></visual_scene></library_visual_scenes>"
+        "<scene><instance_visual_scene url=\"#s\"/></scene></COLLADA>";
+    struct sh_err err;
+    struct scene_mesh_spec spec = {.file = write_text("z.dae", z_up), .up = SCENE_UP_Y, .scale = 1};
+    assert_int_equal(load_spec(&spec, 1e-3, &s, &err), SH_OK);
+    unlink(path);
+    static const double v[3][3] = {{0, 0, 4}, {1, 0, 4}, {0, 2, 4}};
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            assert_true(s->vertex_m[i][k] == v[i][k]);
+    assert_string_equal(s->surface[0].object, "wall");
+    scene_free(s);
+}
+
+/* Assimp's own flattening of the node tree, its own triangulation: two things that the loader does itself. */
+static void check_against_flattened(const char *file)
+{
+    SKIP_WITHOUT(file);
+    struct scene *s = load(file);
+    const struct aiScene *flat = aiImportFile(file, aiProcess_Triangulate | aiProcess_PreTransformVertices);
+    assert_non_null(flat);
+    uint64_t n_triangles = 0;
+    double area = 0, low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (unsigned m = 0; m < flat->mNumMeshes; m++) {
+        const struct aiMesh *mesh = flat->mMeshes[m];
+        for (unsigned f = 0; f < mesh->mNumFaces; f++) {
+            if (mesh->mFaces[f].mNumIndices != 3) continue;
+            n_triangles++;
+            double p[3][3];
+            for (int c = 0; c < 3; c++) {
+                const struct aiVector3D *v = &mesh->mVertices[mesh->mFaces[f].mIndices[c]];
+                p[c][0] = (double)v->x;
+                p[c][1] = (double)v->y;
+                p[c][2] = (double)v->z;
+                for (int k = 0; k < 3; k++) {
+                    low[k] = fmin(low[k], p[c][k]);
+                    high[k] = fmax(high[k], p[c][k]);
+                }
+            }
+            static const uint32_t corner[1][3] = {{0, 1, 2}};
+            struct scene one = {
+                .vertex_m = p, .triangle = (uint32_t(*)[3])(uintptr_t)corner, .n_triangles = 1};
+            area += triangle_area(&one, 0);
+        }
+    }
+    aiReleaseImport(flat);
+    assert_int_equal(s->n_triangles + s->counts.zero_area, n_triangles);
+    double size = 0;
+    for (int k = 0; k < 3; k++)
+        size = fmax(size, fmax(fabs(low[k]), fabs(high[k])));
+    /* Assimp multiplies the tree in float: some roundings of 6e-8 for each level */
+    for (int k = 0; k < 3; k++)
+        assert_true(fabs(s->min_m[k] - low[k]) < 2e-6 * size && fabs(s->max_m[k] - high[k]) < 2e-6 * size);
+    if (fabs(total_area(s) - area) > 1e-4 * area)
+        fail_msg("%s: area %.9g, not %.9g", file, total_area(s), area);
+    scene_free(s);
+}
+
+static void node_trees(void **state)
+{
+    (void)state;
+    check_against_flattened(MODELS "glTF2/2CylinderEngine-glTF-Binary/2CylinderEngine.glb");
+    check_against_flattened(MODELS "glTF2/textureTransform/TextureTransformTest.gltf");
+    check_against_flattened(MODELS "Collada/teapot_instancenodes.DAE");
+    check_against_flattened(MODELS "Collada/ConcavePolygon.dae");
+    check_against_flattened(MODELS "FBX/cubes_with_mirroring_and_pivot.fbx");
+}
+
+static void ifc_house(void **state)
+{
+    (void)state;
+    const char *file = MODELS "IFC/AC14-FZK-Haus.ifc";
+    SKIP_WITHOUT(file);
+    check_against_flattened(file);
+    assert_non_null(strstr(warnings, "warnings while read, the first: IFC: skipping"));
+}
+
+/* Nothing below main prints, Assimp's logger included. */
+static void nothing_is_printed(void **state)
+{
+    (void)state;
+    static const char *const files[] = {MODELS "IFC/AC14-FZK-Haus.ifc",
+                                        MODELS "FBX/spider.fbx",
+                                        MODELS "STL/Spider_ascii.stl",
+                                        MODELS "Collada/cube_emptyTags.dae",
+                                        MODELS "glTF2/MissingBin/BoxTextured.gltf",
+                                        MODELS "FBX/transparentTest.fbx"};
+    SKIP_WITHOUT(files[0]);
+    char name[96];
+    snprintf(name, sizeof name, "%s/printed", folder);
+    int sink = open(name, O_RDWR | O_CREAT | O_TRUNC, 0600);
+    fflush(NULL);
+    int out = dup(1), error = dup(2);
+    dup2(sink, 1);
+    dup2(sink, 2);
+    for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
+        struct scene *s;
+        const struct scene_mesh_spec spec = {.file = files[i], .scale = 1};
+        scene_load(&spec, 1, 1, NULL, &s, NULL);
+        scene_free(s);
+    }
+    fflush(NULL);
+    dup2(out, 1);
+    dup2(error, 2);
+    struct stat st;
+    assert_int_equal(fstat(sink, &st), 0);
+    close(sink);
+    close(out);
+    close(error);
+    unlink(name);
+    assert_int_equal(st.st_size, 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(stl_is_read),
+        cmocka_unit_test(single_precision_is_refused),
+        cmocka_unit_test(single_precision_within_the_tree),
+        cmocka_unit_test(broken_files_are_refused),
+        cmocka_unit_test(boxes),
+        cmocka_unit_test(units),
+        cmocka_unit_test(node_trees),
+        cmocka_unit_test(ifc_house),
+        cmocka_unit_test(nothing_is_printed),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
