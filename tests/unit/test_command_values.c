@@ -101,9 +101,10 @@ static void what_is_not_exact_is_refused_not_rounded(void **ctx)
 static void numbers_beyond_64_bits_are_out_of_range(void **ctx)
 {
     (void)ctx;
+    /* The last two would be 5000 after a wrap of the 64 bits of the value, or of the 32 of the exponent. */
     static const char *const numbers[] = {"1e99999999999",         "-1e30",
-                                          "9223372036854.775808",  "18446744073709.551616",
-                                          "18446744073710.551616", "99999999999999999999999999999999999999"};
+                                          "9223372036854.775808",  "99999999999999999999999999999999999999",
+                                          "18446744078709.551616", "5e4294967299"};
     struct command_device dev = command_test_device();
     for (size_t i = 0; i < N_OF(numbers); i++) {
         char line[80];
@@ -288,6 +289,8 @@ static void steps_of_time(void **ctx)
     expect_error(&dev, 1, "TIME:STEP 9223372036854775807", CMD_E_RANGE,
                  "allowed 1 to"); /* t_ns would overflow */
     expect_error(&dev, 1, "TIME:STEP 9223372036854775808", CMD_E_RANGE, "allowed 1 to");
+    expect_error(&dev, 1, "TIME:STEP -9300000000000000000", CMD_E_RANGE,
+                 "STEP -9300000000000000000, allowed 1 to");
 }
 
 int main(void)

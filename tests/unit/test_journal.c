@@ -1,0 +1,248 @@
+#include <setjmp.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "firmware_sim/journal.h"
+
+static char dir[] = "/tmp/scanhead-journal-XXXXXX";
+static char path[64];
+
+static int make_dir(void **ctx)
+{
+    (void)ctx;
+    if (mkdtemp(dir) == NULL) return -1;
+    snprintf(path, sizeof path, "%s/j.txt", dir);
+    return 0;
+}
+
+static int remove_dir(void **ctx)
+{
+    (void)ctx;
+    unlink(path);
+    return rmdir(dir);
+}
+
+static void write_text(const char *text, size_t len)
+{
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    assert_int_equal(fwrite(text, 1, len, file), len);
+    assert_int_equal(fclose(file), 0);
+}
+
+static void what_is_written_is_read(void **ctx)
+{
+    (void)ctx;
+    static const struct journal_entry in[] = {
+        {0, 0, 0, "*RST"},
+        {1, 1000000, 1, "HEAD:PRR 1.2 MHZ"},
+        {1, 1000000, 1, "  scan:start  "},
+        {UINT64_MAX, INT64_MAX, UINT32_MAX, "SCAN:STOP"},
+    };
+    struct sh_err err = {0};
+    struct journal *journal = journal_open(path, &err);
+    assert_non_null(journal);
+    for (size_t i = 0; i < 4; i++)
+        assert_int_equal(journal_write(journal, in[i].tick, in[i].t_ns, in[i].session, in[i].line), 0);
+    /* Each line is in the file at once: a second reader sees them before the journal is closed. */
+    struct journal_entry *out;
+    size_t n;
+    assert_int_equal(journal_read(path, &out, &n, &err), 0);
+    assert_int_equal(n, 4);
+    journal_free(out);
+    assert_int_equal(journal_close(journal, &err), 0);
+    assert_int_equal(journal_read(path, &out, &n, &err), 0);
+    assert_int_equal(n, 4);
+    for (size_t i = 0; i < 4; i++)
+        assert_memory_equal(&out[i], &in[i], sizeof in[i]);
+    journal_free(out);
+}
+
+static void the_format_is_as_documented(void **ctx)
+{
+    (void)ctx;
+    struct journal *journal = journal_open(path, NULL);
+    assert_non_null(journal);
+    assert_int_equal(journal_write(journal, 12, 12000000, 2, "HEAD:PRR 300000"), 0);
+    assert_int_equal(journal_close(journal, NULL), 0);
+    char text[128] = "";
+    FILE *file = fopen(path, "r");
+    assert_non_null(file);
+    text[fread(text, 1, sizeof text - 1, file)] = '\0';
+    fclose(file);
+    assert_string_equal(text, "# scanhead journal 1\n12 12000000 2 HEAD:PRR 300000\n");
+}
+
+static void sorted_by_tick_and_else_as_in_the_file(void **ctx)
+{
+    (void)ctx;
+    static const char text[] = "# scanhead journal 1\n"
+                               "# a note\n\n"
+                               "5 5 1 a\n3 3 1 b\n5 5 2 c\n3 3 2 d\n1 1 1 e\n5 5 3 f\n";
+    struct journal_entry *out;
+    size_t n;
+    write_text(text, sizeof text - 1);
+    assert_int_equal(journal_read(path, &out, &n, NULL), 0);
+    char order[16] = "";
+    for (size_t i = 0; i < n; i++)
+        strncat(order, out[i].line, 1);
+    assert_string_equal(order, "ebdacf");
+    journal_free(out);
+    write_text(text, 21);
+    assert_int_equal(journal_read(path, &out, &n, NULL), 0);
+    assert_int_equal(n, 0); /* a session without commands */
+    journal_free(out);
+}
+
+static void malformed_lines_are_named(void **ctx)
+{
+    (void)ctx;
+    static const struct {
+        const char *line, *why;
+    } cases[] = {
+        {"x 0 1 a", "no tick"},
+        {"-1 0 1 a", "no tick"},
+        {"+1 0 1 a", "no tick"},
+        {" 1 0 1 a", "no tick"},
+        {"1", "no tick"},
+        {"18446744073709551616 0 1 a", "no tick"},
+        {"1.5 0 1 a", "no tick"},
+        {"1\t0\t1\ta", "no tick"},
+        {"1  0 1 a", "no device time"},
+        {"1 -5 1 a", "no device time"},
+        {"1 9223372036854775808 1 a", "no device time"},
+        {"1 1e3 1 a", "no device time"},
+        {"1 0 4294967296 a", "no session"},
+        {"1 0 one a", "no session"},
+        {"1 0 1", "no session"},
+        {"1 0 1 ", "no command"},
+        {"1 0 1 a\r", "no command"},
+        {"1 0 1 \x80", "no command"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        char text[256], place[128];
+        struct sh_err err = {0};
+        struct journal_entry *out;
+        size_t n;
+        const int len = snprintf(text, sizeof text, "# scanhead journal 1\n1 0 1 ok\n%s\n", cases[i].line);
+        write_text(text, (size_t)len);
+        assert_int_equal(journal_read(path, &out, &n, &err), SH_EINPUT);
+        assert_null(out);
+        assert_int_equal(n, 0);
+        snprintf(place, sizeof place, "%s:3: ", path);
+        if (strstr(err.text, place) == NULL || strstr(err.text, cases[i].why) == NULL)
+            fail_msg("'%s': %s", cases[i].line, err.text);
+    }
+}
+
+static void expect_unreadable(const char *text, size_t len, const char *why)
+{
+    struct sh_err err = {0};
+    struct journal_entry *out;
+    size_t n;
+    write_text(text, len);
+    assert_int_equal(journal_read(path, &out, &n, &err), SH_EINPUT);
+    if (strstr(err.text, why) == NULL) fail_msg("%s, not '%s'", err.text, why);
+    assert_null(strchr(err.text, '\n'));
+}
+
+static void what_is_no_journal_is_refused(void **ctx)
+{
+    (void)ctx;
+    char line[COMMAND_MAX_LINE + 64];
+    expect_unreadable("", 0, ":1: not a journal");
+    expect_unreadable("\n", 1, ":1: not a journal");
+    expect_unreadable("# scanhead journal 2\n", 21, ":1: not a journal");
+    expect_unreadable("# scanhead journal 1", 20, ":1: the last line is cut");
+    /* The crash of the writer in the middle of 300000. */
+    expect_unreadable("# scanhead journal 1\n1 0 1 HEAD:PRR 3000", 40, ":2: the last line is cut");
+    expect_unreadable("# scanhead journal 1\n1 0 1 a\0b\n", 31, ":2: a NUL byte");
+    const int at = snprintf(line, sizeof line, "# scanhead journal 1\n1 0 1 ");
+    memset(line + at, 'x', COMMAND_MAX_LINE + 1);
+    line[at + COMMAND_MAX_LINE + 1] = '\n';
+    expect_unreadable(line, (size_t)at + COMMAND_MAX_LINE + 2, ":2: no command");
+    struct sh_err err = {0};
+    struct journal_entry *out;
+    size_t n;
+    assert_int_equal(journal_read("/nonexistent/j", &out, &n, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "/nonexistent/j: No such file"));
+    assert_int_equal(journal_read("/tmp", &out, &n, &err), SH_EIO);
+    assert_non_null(strstr(err.text, "/tmp: Is a directory"));
+}
+
+static void the_writer_refuses_what_the_reader_would(void **ctx)
+{
+    (void)ctx;
+    char line[COMMAND_MAX_LINE + 2];
+    memset(line, 'x', sizeof line);
+    line[COMMAND_MAX_LINE + 1] = '\0';
+    struct journal *journal = journal_open(path, NULL);
+    assert_non_null(journal);
+    assert_int_equal(journal_write(journal, 0, -1, 0, "a"), SH_EINPUT);
+    assert_int_equal(journal_write(journal, 0, 0, 0, ""), SH_EINPUT);
+    assert_int_equal(journal_write(journal, 0, 0, 0, "a\n1 0 1 *RST"), SH_EINPUT);
+    assert_int_equal(journal_write(journal, 0, 0, 0, line), SH_EINPUT);
+    line[COMMAND_MAX_LINE] = '\0';
+    assert_int_equal(journal_write(journal, 0, 0, 0, line), 0); /* and the longest goes through */
+    assert_int_equal(journal_close(journal, NULL), 0);
+    struct journal_entry *out;
+    size_t n;
+    assert_int_equal(journal_read(path, &out, &n, NULL), 0);
+    assert_int_equal(n, 1);
+    assert_string_equal(out[0].line, line);
+    journal_free(out);
+}
+
+static void a_full_disk_is_reported(void **ctx)
+{
+    (void)ctx;
+    struct sh_err err = {0};
+    assert_null(journal_open("/dev/full", &err));
+    assert_int_equal(err.code, SH_EIO);
+    assert_non_null(strstr(err.text, "/dev/full: No space left"));
+    assert_null(journal_open("/nonexistent/j", &err));
+    assert_non_null(strstr(err.text, "/nonexistent/j: No such file"));
+    /* Later: the file may grow to 100 bytes, so the second of these lines does not fit. */
+    struct rlimit before, small;
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);
+    small = before;
+    small.rlim_cur = 100;
+    signal(SIGXFSZ, SIG_IGN);
+    struct journal *journal = journal_open(path, &err);
+    assert_non_null(journal);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &small), 0);
+    const int first = journal_write(journal, 1, 1, 1, "HEAD:PRR 300000 ........................");
+    const int second = journal_write(journal, 2, 2, 1, "HEAD:PRR 300000 ........................");
+    const int third = journal_write(journal, 3, 3, 1, "a");
+    const int closed = journal_close(journal, &err);
+    setrlimit(RLIMIT_FSIZE, &before);
+    signal(SIGXFSZ, SIG_DFL);
+    assert_int_equal(first, 0);
+    assert_int_equal(second, SH_EIO);
+    assert_int_equal(third, SH_EIO);
+    assert_int_equal(closed, SH_EIO);
+    assert_non_null(strstr(err.text, "j.txt: File too large"));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_is_written_is_read),
+        cmocka_unit_test(the_format_is_as_documented),
+        cmocka_unit_test(sorted_by_tick_and_else_as_in_the_file),
+        cmocka_unit_test(malformed_lines_are_named),
+        cmocka_unit_test(what_is_no_journal_is_refused),
+        cmocka_unit_test(the_writer_refuses_what_the_reader_would),
+        cmocka_unit_test(a_full_disk_is_reported),
+    };
+    return cmocka_run_group_tests_name("journal", tests, make_dir, remove_dir);
+}
