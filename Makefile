@@ -23,7 +23,7 @@ FP = -ffp-contract=off -fno-math-errno -fno-trapping-math
 CPPFLAGS += -I. -D_GNU_SOURCE -MMD -MP
 CFLAGS += -std=c11 $(OPT) -g $(FP) $(WARN) $(WERROR) -fPIC -pthread $(SAN) $(PKG_CFLAGS)
 CXXFLAGS += -std=c++17 $(OPT) -g $(FP) $(CXXWARN) $(WERROR) -fPIC -pthread $(SAN)
-LDLIBS = -lembree3 -lassimp -lGeographic $(PKG_LIBS) -lstdc++ -lm -pthread
+LDLIBS = -lembree3 -lassimp -lGeographicLib $(PKG_LIBS) -lstdc++ -lm -pthread
 
 CORE = $(wildcard core/*.c core/*/*.c)
 SHIM = $(wildcard core/*/*.cpp)

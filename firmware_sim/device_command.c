@@ -106,7 +106,7 @@ void device_session_closed(struct device *device, uint32_t session, const char *
     if (in_control || scanning) device_report(device, CMD_E_CLIENT_LOST, text);
 }
 
-static void set_limits(struct device *device)
+static int set_limits(struct device *device, struct sh_err *err)
 {
     const struct config *cfg = device->site->cfg;
     const struct config_profile *p = &cfg->profile;
@@ -121,10 +121,15 @@ static void set_limits(struct device *device)
                                               .pan_max_udeg = p->pan_max_udeg,
                                               .n_stations = cfg->n_stations};
     device->cmd.settings = device->cmd.defaults = cfg->settings;
-    snprintf(device->idn, sizeof device->idn, "%s,%s,%s,scanhead native %d", p->maker, p->model, cfg->serial,
-             NATIVE_VERSION);
+    char idn[256];
+    snprintf(idn, sizeof idn, "%s,%s,%s,scanhead native %d", p->maker, p->model, cfg->serial, NATIVE_VERSION);
+    if (strlen(idn) >= sizeof device->idn)
+        return sh_fail(err, SH_EINPUT, "%s: maker, model and head.serial are together too long for *IDN?; at most %zu bytes",
+                       cfg->file, sizeof device->idn - 1 - strlen(",,,scanhead native 1"));
+    strcpy(device->idn, idn);
     device->cmd.idn = device->idn;
     device->cmd.step_allowed = cfg->pace == PACE_STEP;
+    return SH_OK;
 }
 
 static int open_journals(struct device *device, struct sh_err *err)
@@ -149,8 +154,8 @@ int device_create(const struct site *site, const struct device_options *options,
     device->due_tick = device->end_tick = UINT64_MAX;
     if (options->duration_s > 0.0 && !options->start)
         device->end_tick = (uint64_t)ceil(options->duration_s * (double)device->tick_hz);
-    set_limits(device);
-    int rc = open_journals(device, err);
+    int rc = set_limits(device, err);
+    if (rc == SH_OK) rc = open_journals(device, err);
     if (rc != SH_OK) {
         device_free(device);
         return rc;

@@ -1,0 +1,106 @@
+/* scanhead check and scanhead list: nothing runs. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "firmware_sim/cmd.h"
+
+static const char HELP[] = "scanhead check CONFIG [--set KEY=VALUE ...]: validate configuration, scene and links; nothing runs\n\n"
+                           "Configuration keys:\n\n";
+
+static const struct option OPTIONS[] = {
+    {"set", required_argument, NULL, 's'}, {"help", no_argument, NULL, 'h'}, {NULL, 0, NULL, 0}};
+
+/* Opens and closes each link, so that a taken port or a wrong path shows now. */
+static int check_links(const struct config *cfg, struct sh_err *err)
+{
+    for (uint32_t i = 0; i < cfg->n_links; i++) {
+        const struct link_ops *ops = link_ops_get(cfg->link[i].type);
+        if (cfg->link[i].type == LINK_FILE) continue; /* opening it would empty it */
+        void *link = NULL;
+        int rc = ops->open(&cfg->link[i], &link, err);
+        if (rc != SH_OK) return rc;
+        ops->close(link);
+    }
+    return SH_OK;
+}
+
+static void print_summary(const struct config *cfg, const struct site *site)
+{
+    const struct scene *scene = site->scene;
+    printf("%s: ok\n", cfg->file);
+    printf("head      %s %s (%s), %g Hz pulses, %g lines/s, pan %g deg/s\n", cfg->profile.maker, cfg->profile.model,
+           cfg->profile.name, (double)cfg->settings.prr_uhz * 1e-6, (double)cfg->settings.lines_uhz * 1e-6,
+           (double)cfg->settings.pan_udeg_s * 1e-6);
+    printf("scene     %u triangles, %u surfaces, x %.3f..%.3f  y %.3f..%.3f  z %.3f..%.3f m\n", scene->n_triangles,
+           scene->n_surfaces, scene->min_m[0], scene->max_m[0], scene->min_m[1], scene->max_m[1], scene->min_m[2],
+           scene->max_m[2]);
+    for (uint32_t i = 0; i < site->n_stations; i++) {
+        double anchor[3];
+        georef_anchor(site->station[i].georef, anchor);
+        printf("station %u %s, EPSG %d, anchor %.6f %.6f %.6f\n", i + 1, site->station[i].station->name,
+               georef_epsg(site->station[i].georef), anchor[0], anchor[1], anchor[2]);
+    }
+    printf("output    %s, %g m per count\n", cfg->layout == LINE_GEO ? "geo" : "polar", site->scale_m);
+}
+
+static int check(const struct cmd_sets *sets, const char *path)
+{
+    int status = CMD_OK;
+    struct sh_err err = {0};
+    struct site *site = NULL;
+    struct config *cfg = cmd_load_config(path, sets, &status);
+    if (cfg == NULL) return status;
+    int rc = site_load(cfg, &cmd_report_stderr, &site, &err);
+    if (rc == SH_OK) rc = check_links(cfg, &err);
+    if (rc == SH_OK) print_summary(cfg, site);
+    site_free(site);
+    free(cfg);
+    return rc == SH_OK ? CMD_OK : cmd_fail(&err);
+}
+
+int cmd_check(int argc, char **argv)
+{
+    struct cmd_sets sets;
+    memset(&sets, 0, sizeof sets);
+    int opt;
+    opterr = 0;
+    while ((opt = getopt_long(argc, argv, ":h", OPTIONS, NULL)) != -1) {
+        if (opt == 'h') {
+            fputs(HELP, stdout);
+            config_print_reference(stdout);
+            return CMD_OK;
+        }
+        int status = opt == 's' ? cmd_add_set(&sets, optarg) : cmd_bad_option("check", opt, argv);
+        if (status != CMD_OK) return status;
+    }
+    if (optind != argc - 1) return cmd_usage("check", "one CONFIG is needed");
+    return check(&sets, argv[optind]);
+}
+
+static const char *heads_dir(void)
+{
+    const char *dir = getenv("SCANHEAD_HEADS");
+    if (dir != NULL && dir[0] != '\0') return dir;
+#ifdef SCANHEAD_HEADS_DIR
+    if (access(SCANHEAD_HEADS_DIR, R_OK) == 0) return SCANHEAD_HEADS_DIR;
+#endif
+    return "config/heads";
+}
+
+int cmd_list(int argc, char **argv)
+{
+    if (argc == 2 && (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0)) {
+        puts("scanhead list: head profiles ($SCANHEAD_HEADS, else the installed ones, else config/heads) and kinds of links");
+        return CMD_OK;
+    }
+    if (argc != 1) return cmd_usage("list", "it takes no arguments");
+    struct sh_err err = {0};
+    const char *dir = heads_dir();
+    printf("profiles in %s:\n", dir);
+    int n = config_list_profiles(dir, stdout, &err);
+    if (n < 0) return cmd_fail(&err);
+    puts("links: pty (virtual serial port), tcp, file, null");
+    return CMD_OK;
+}

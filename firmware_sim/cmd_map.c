@@ -1,0 +1,159 @@
+/* scanhead map: a scan map from above, scanned off line. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/map.h"
+#include "firmware_sim/cmd.h"
+#include "firmware_sim/recording.h"
+
+static const char HELP[] =
+    "scanhead map CONFIG -o FILE.png [options]: scan map of the stations, from above\n\n"
+    "Scans one frame from each station off line and draws the points: dark where many heights were hit (walls), hue by\n"
+    "height. The area is that of the scene and the stations.\n\n"
+    "  -o FILE.png      where to write\n"
+    "  --pixel-m M      side of a pixel; default: 1200 pixels on the longer side\n"
+    "  --set KEY=VALUE  any configuration key; may be repeated\n"
+    "  --quiet          no progress\n";
+
+enum { OPT_PIXEL = 256, OPT_SET, OPT_QUIET, BATCH = 4096 };
+
+static const struct option OPTIONS[] = {{"pixel-m", required_argument, NULL, OPT_PIXEL},
+                                        {"set", required_argument, NULL, OPT_SET},
+                                        {"quiet", no_argument, NULL, OPT_QUIET},
+                                        {"output", required_argument, NULL, 'o'},
+                                        {"help", no_argument, NULL, 'h'},
+                                        {NULL, 0, NULL, 0}};
+
+struct map_run {
+    struct cmd_sets sets;
+    const char *config, *output;
+    double pixel_m;
+    int quiet;
+    struct map *map;
+    struct scanhead_point point[BATCH];
+    double x[BATCH], y[BATCH], z[BATCH];
+};
+
+static int parse(struct map_run *run, int argc, char **argv)
+{
+    int opt, status = CMD_OK;
+    opterr = 0;
+    while ((opt = getopt_long(argc, argv, ":ho:", OPTIONS, NULL)) != -1 && status == CMD_OK) {
+        if (opt == 'h') {
+            fputs(HELP, stdout);
+            return CMD_OK;
+        }
+        if (opt == 'o')
+            run->output = optarg;
+        else if (opt == OPT_PIXEL)
+            status = cmd_parse_double("map", "--pixel-m", optarg, 1e-4, 1e4, &run->pixel_m);
+        else if (opt == OPT_SET)
+            status = cmd_add_set(&run->sets, optarg);
+        else if (opt == OPT_QUIET)
+            run->quiet = 1;
+        else
+            status = cmd_bad_option("map", opt, argv);
+    }
+    if (status != CMD_OK) return status;
+    if (optind != argc - 1) return cmd_usage("map", "one CONFIG is needed");
+    if (run->output == NULL) return cmd_usage("map", "-o FILE.png is needed");
+    run->config = argv[optind];
+    return -1;
+}
+
+static int add_frame(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
+{
+    struct map_run *run = ctx;
+    if (frame->type != SCANHEAD_POINTS) return SH_OK;
+    for (uint32_t first = 0; first < frame->n_points;) {
+        int n = scanhead_points(sh, frame, first, run->point, BATCH);
+        if (n <= 0) return sh_fail(err, SH_ESTATE, "map: %s", scanhead_error(sh));
+        for (int i = 0; i < n; i++) {
+            run->x[i] = run->point[i].x;
+            run->y[i] = run->point[i].y;
+            run->z[i] = run->point[i].z;
+        }
+        map_add_points(run->map, (size_t)n, run->x, run->y, run->z);
+        first += (uint32_t)n;
+    }
+    return SH_OK;
+}
+
+static int create_map(struct map_run *run, const struct config *cfg, const struct scene *scene, struct sh_err *err)
+{
+    struct map_spec spec = {.pixel_m = run->pixel_m};
+    double span_m = 0.0;
+    for (int i = 0; i < 2; i++) {
+        spec.min_m[i] = scene->min_m[i];
+        spec.max_m[i] = scene->max_m[i];
+        for (uint32_t s = 0; s < cfg->n_stations; s++) {
+            spec.min_m[i] = fmin(spec.min_m[i], cfg->station[s].position_m[i]);
+            spec.max_m[i] = fmax(spec.max_m[i], cfg->station[s].position_m[i]);
+        }
+        span_m = fmax(span_m, spec.max_m[i] - spec.min_m[i]);
+    }
+    for (int i = 0; i < 2; i++) { /* a margin, so that nothing sticks to the border */
+        spec.min_m[i] -= 0.03 * span_m;
+        spec.max_m[i] += 0.03 * span_m;
+    }
+    int rc = map_create(&spec, &run->map, err);
+    for (uint32_t s = 0; s < cfg->n_stations && rc == SH_OK; s++)
+        rc = map_add_station(run->map, cfg->station[s].position_m[0], cfg->station[s].position_m[1], err);
+    return rc;
+}
+
+static int interrupted(void)
+{
+    return cmd_interrupted;
+}
+
+static int draw(struct map_run *run, struct config *cfg, struct sh_err *err)
+{
+    struct offline *offline = NULL;
+    struct recording_result result;
+    struct recording_options options = {.first_station = 1, .last_station = cfg->n_stations, .frames = 1,
+                                        .progress = !run->quiet, .report = &cmd_report_stderr, .frame = add_frame,
+                                        .ctx = run, .interrupted = interrupted};
+    int rc = offline_open(cfg, &cmd_report_stderr, &offline, err);
+    if (rc == SH_OK) rc = create_map(run, cfg, offline_scene(offline), err);
+    if (rc == SH_OK) rc = recording_run(offline_scanhead(offline), &options, &result, err);
+    if (rc == SH_OK && cmd_interrupted) rc = sh_fail(err, SH_EIO, "interrupted; nothing written");
+    if (rc == SH_OK) rc = map_write_png(run->map, run->output, err);
+    if (rc == SH_OK && !run->quiet) {
+        struct map_counts counts;
+        map_get_counts(run->map, &counts);
+        fprintf(stderr, "scanhead: %s: %llu points drawn, %llu outside of the area\n", run->output,
+                (unsigned long long)counts.drawn, (unsigned long long)counts.outside);
+    }
+    map_free(run->map);
+    offline_close(offline);
+    return rc;
+}
+
+int cmd_map(int argc, char **argv)
+{
+    struct map_run *run = calloc(1, sizeof *run);
+    struct sh_err err = {0};
+    if (run == NULL) {
+        sh_fail(&err, SH_ENOMEM, "no memory");
+        return cmd_fail(&err);
+    }
+    int status = parse(run, argc, argv);
+    if (status < 0) {
+        /* The map is in the scene's frame, whatever the configuration sends to its clients. */
+        status = cmd_add_set(&run->sets, "output.crs=local");
+        if (status == CMD_OK) status = cmd_add_set(&run->sets, "output.layout=geo");
+        if (status == CMD_OK) status = cmd_add_set(&run->sets, "output.utm_zone=0");
+        struct config *cfg = status == CMD_OK ? cmd_load_config(run->config, &run->sets, &status) : NULL;
+        if (cfg != NULL) {
+            cmd_catch_signals();
+            int rc = draw(run, cfg, &err);
+            status = rc == SH_OK ? CMD_OK : cmd_fail(&err);
+            free(cfg);
+        }
+    }
+    free(run);
+    return status;
+}

@@ -1,0 +1,312 @@
+/* scanhead record: points of a scan to files. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "drivers/host/recorder.h"
+#include "firmware_sim/clock.h"
+#include "firmware_sim/cmd.h"
+#include "firmware_sim/json.h"
+#include "firmware_sim/recording.h"
+
+static const char HELP[] =
+    "scanhead record SOURCE -o FILE [-o FILE ...] [options]: write the points of a scan to files\n\n"
+    "SOURCE is tty:/dev/..., tcp:host:port, FILE.shs (a raw stream), or a CONFIG: then the head runs off line in this\n"
+    "process, as fast as it computes. FILE is .ply (points) or .shs (raw stream).\n\n"
+    "  -o FILE          where to write; may be repeated\n"
+    "  --station N|all  scan from station N, or from all one after the other into the same files\n"
+    "  --frames N       frames per scan\n"
+    "  --duration S     stop each scan after S seconds of device time\n"
+    "  --listen         send no command: record what comes until the stream ends or Ctrl-C\n"
+    "  --ascii          PLY as text\n"
+    "  --empty-shots    keep shots without echo, with NaN coordinates\n"
+    "  --stats FILE     write what was received as JSON; - is standard output\n"
+    "  --set KEY=VALUE  any configuration key (CONFIG only); may be repeated\n"
+    "  --crs CRS        local, ecef or utm (CONFIG only)\n"
+    "  --threads N      casters (CONFIG only)\n"
+    "  --quiet          no progress\n\n"
+    "Exit status 1 when the stream ended before the scan did; what came until then is kept in FILE.\n";
+
+enum { MAX_FILES = 8 };
+enum { OPT_STATION = 256, OPT_FRAMES, OPT_DURATION, OPT_LISTEN, OPT_ASCII, OPT_EMPTY, OPT_STATS, OPT_SET, OPT_CRS,
+       OPT_THREADS, OPT_QUIET };
+
+static const struct option OPTIONS[] = {{"station", required_argument, NULL, OPT_STATION},
+                                        {"frames", required_argument, NULL, OPT_FRAMES},
+                                        {"duration", required_argument, NULL, OPT_DURATION},
+                                        {"listen", no_argument, NULL, OPT_LISTEN},
+                                        {"ascii", no_argument, NULL, OPT_ASCII},
+                                        {"empty-shots", no_argument, NULL, OPT_EMPTY},
+                                        {"stats", required_argument, NULL, OPT_STATS},
+                                        {"set", required_argument, NULL, OPT_SET},
+                                        {"crs", required_argument, NULL, OPT_CRS},
+                                        {"threads", required_argument, NULL, OPT_THREADS},
+                                        {"quiet", no_argument, NULL, OPT_QUIET},
+                                        {"output", required_argument, NULL, 'o'},
+                                        {"help", no_argument, NULL, 'h'},
+                                        {NULL, 0, NULL, 0}};
+
+struct file {
+    const char *path;
+    const struct recorder_ops *ops;
+    void *rec;
+};
+
+struct record {
+    const char *source, *stats;
+    struct file file[MAX_FILES];
+    int n_files;
+    int all_stations;
+    long station;
+    struct cmd_sets sets;
+    struct recorder_options recorder;
+    struct recording_options recording;
+};
+
+static int parse_station(struct record *r, const char *text)
+{
+    if (strcmp(text, "all") == 0) {
+        r->all_stations = 1;
+        return CMD_OK;
+    }
+    return cmd_parse_long("record", "--station", text, 1, CONFIG_MAX_STATIONS, &r->station);
+}
+
+static int add_file(struct record *r, const char *path)
+{
+    struct sh_err err = {0};
+    if (r->n_files == MAX_FILES) return cmd_usage("record", "at most %d files", MAX_FILES);
+    r->file[r->n_files].path = path;
+    r->file[r->n_files].ops = recorder_find(path, &err);
+    if (r->file[r->n_files].ops == NULL) return cmd_fail(&err);
+    r->n_files++;
+    return CMD_OK;
+}
+
+static int parse_option(struct record *r, int opt, char **argv)
+{
+    switch (opt) {
+    case 'o':
+        return add_file(r, optarg);
+    case OPT_STATION:
+        return parse_station(r, optarg);
+    case OPT_FRAMES:
+        return cmd_parse_long("record", "--frames", optarg, 0, 1000000000, &r->recording.frames);
+    case OPT_DURATION:
+        return cmd_parse_double("record", "--duration", optarg, 0.001, 1e8, &r->recording.duration_s);
+    case OPT_LISTEN:
+        r->recording.listen = 1;
+        return CMD_OK;
+    case OPT_ASCII:
+        r->recorder.ascii = 1;
+        return CMD_OK;
+    case OPT_EMPTY:
+        r->recorder.empty_shots = 1;
+        return CMD_OK;
+    case OPT_STATS:
+        r->stats = optarg;
+        return CMD_OK;
+    case OPT_SET:
+        return cmd_add_set(&r->sets, optarg);
+    case OPT_CRS:
+        return cmd_add_key(&r->sets, "output.crs", optarg);
+    case OPT_THREADS:
+        return cmd_add_key(&r->sets, "loop.threads", optarg);
+    case OPT_QUIET:
+        r->recording.progress = 0;
+        return CMD_OK;
+    default:
+        return cmd_bad_option("record", opt, argv);
+    }
+}
+
+static int parse(struct record *r, int argc, char **argv)
+{
+    int opt;
+    opterr = 0;
+    while ((opt = getopt_long(argc, argv, ":ho:", OPTIONS, NULL)) != -1) {
+        if (opt == 'h') {
+            fputs(HELP, stdout);
+            return CMD_OK;
+        }
+        int status = parse_option(r, opt, argv);
+        if (status != CMD_OK) return status;
+    }
+    if (optind != argc - 1) return cmd_usage("record", "one SOURCE is needed");
+    if (r->n_files == 0 && r->stats == NULL) return cmd_usage("record", "-o FILE is needed");
+    r->source = argv[optind];
+    return -1;
+}
+
+static int open_files(struct record *r, struct sh_err *err)
+{
+    int rc = SH_OK;
+    for (int i = 0; i < r->n_files && rc == SH_OK; i++)
+        rc = r->file[i].ops->open(r->file[i].path, &r->recorder, &r->file[i].rec, err);
+    return rc;
+}
+
+static int close_files(struct record *r, int keep, struct sh_err *err)
+{
+    int rc = SH_OK;
+    for (int i = 0; i < r->n_files; i++) {
+        struct sh_err why = {0};
+        if (r->file[i].rec == NULL) continue;
+        int e = r->file[i].ops->close(r->file[i].rec, keep, &why);
+        r->file[i].rec = NULL;
+        if (e != SH_OK && rc == SH_OK) rc = sh_fail(err, e, "%s", why.text);
+    }
+    return rc;
+}
+
+static int write_frame(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
+{
+    struct record *r = ctx;
+    for (int i = 0; i < r->n_files; i++) {
+        int rc = r->file[i].ops->frame(r->file[i].rec, sh, frame, err);
+        if (rc != SH_OK) return rc;
+    }
+    return SH_OK;
+}
+
+static int write_stats(const struct record *r, struct scanhead *sh, const struct recording_result *result, double wall_s,
+                       struct sh_err *err)
+{
+    struct scanhead_stats s;
+    char hex[65];
+    scanhead_get_stats(sh, &s);
+    scanhead_hash_hex(sh, hex);
+    FILE *out = strcmp(r->stats, "-") == 0 ? stdout : fopen(r->stats, "w");
+    if (out == NULL) return sh_fail(err, SH_EIO, "%s: can't be written", r->stats);
+    struct json json;
+    json_begin(&json, out);
+    json_open_object(&json, NULL);
+    json_uint(&json, "points", result->points);
+    json_uint(&json, "empty_shots", result->empty);
+    json_uint(&json, "pulses", result->pulses);
+    json_uint(&json, "scans", result->scans);
+    json_uint(&json, "frames", s.frames);
+    json_uint(&json, "bytes", s.bytes);
+    json_uint(&json, "bad_payload", s.bad_payload);
+    json_uint(&json, "bad_bytes", s.bad_bytes);
+    json_uint(&json, "seq_lost", s.seq_lost);
+    json_uint(&json, "dropped", s.dropped);
+    json_uint(&json, "reader_lost_frames", s.reader_lost);
+    json_uint(&json, "lost_pulses", result->lost_pulses);
+    json_double(&json, "wall_s", wall_s);
+    json_double(&json, "cpu_s", clock_cpu_s());
+    json_double(&json, "pulses_per_s", wall_s > 0.0 ? (double)result->pulses / wall_s : 0.0);
+    json_string(&json, "stream_sha256", hex);
+    json_close_object(&json);
+    int rc = json_end(&json, err);
+    if (out != stdout && fclose(out) != 0 && rc == SH_OK) rc = sh_fail(err, SH_EIO, "%s: can't be written", r->stats);
+    return rc;
+}
+
+static void say_result(const struct record *r, struct scanhead *sh, const struct recording_result *result)
+{
+    struct scanhead_stats s;
+    scanhead_get_stats(sh, &s);
+    uint64_t lost = s.bad_payload + s.seq_lost + s.dropped + s.reader_lost;
+    if (lost != 0 || result->lost_pulses != 0)
+        fprintf(stderr, "scanhead: warning: not complete: %llu frames lost to this reader, %llu pulses by the head\n",
+                (unsigned long long)lost, (unsigned long long)result->lost_pulses);
+    if (r->recording.progress)
+        fprintf(stderr, "scanhead: %llu points, %llu shots without echo, %llu scans\n", (unsigned long long)result->points,
+                (unsigned long long)result->empty, (unsigned long long)result->scans);
+}
+
+static int interrupted(void)
+{
+    return cmd_interrupted;
+}
+
+static int record(struct record *r, struct scanhead *sh, struct sh_err *err)
+{
+    struct recording_result result = {0};
+    if (r->stats != NULL) scanhead_hash_start(sh);
+    int rc = open_files(r, err);
+    if (rc != SH_OK) {
+        close_files(r, 0, NULL);
+        return rc;
+    }
+    r->recording.frame = write_frame;
+    r->recording.ctx = r;
+    r->recording.interrupted = interrupted;
+    r->recording.report = &cmd_report_stderr;
+    int64_t start_ns = clock_now_ns();
+    rc = recording_run(sh, &r->recording, &result, err);
+    double wall_s = 1e-9 * (double)(clock_now_ns() - start_ns);
+    struct sh_err why = {0};
+    int closed = close_files(r, result.points != 0 || rc == SH_OK, &why);
+    if (rc == SH_OK && closed != SH_OK) rc = sh_fail(err, closed, "%s", why.text);
+    if (rc == SH_OK && r->stats != NULL) rc = write_stats(r, sh, &result, wall_s, err);
+    if (rc == SH_OK || result.points != 0) say_result(r, sh, &result);
+    return rc;
+}
+
+static int is_config(const char *source)
+{
+    size_t n = strlen(source);
+    return strncmp(source, "tty:", 4) != 0 && strncmp(source, "tcp:", 4) != 0 && strncmp(source, "fd:", 3) != 0 &&
+           !(n > 4 && strcmp(source + n - 4, ".shs") == 0);
+}
+
+static int record_config(struct record *r, struct sh_err *err)
+{
+    int status = CMD_OK;
+    struct config *cfg = cmd_load_config(r->source, &r->sets, &status);
+    if (cfg == NULL) return status;
+    struct offline *offline = NULL;
+    if (r->all_stations) {
+        r->recording.first_station = 1;
+        r->recording.last_station = cfg->n_stations;
+    }
+    uint32_t frames = r->recording.frames >= 0 ? (uint32_t)r->recording.frames : cfg->settings.frames;
+    int rc = SH_OK;
+    if (frames == 0 && !(r->recording.duration_s > 0.0))
+        rc = sh_fail(err, SH_EINPUT, "%s: head.frames is 0, a scan without end; give --frames or --duration", cfg->file);
+    if (rc == SH_OK) rc = offline_open(cfg, &cmd_report_stderr, &offline, err);
+    if (rc == SH_OK) rc = record(r, offline_scanhead(offline), err);
+    offline_close(offline);
+    free(cfg);
+    return rc == SH_OK ? CMD_OK : cmd_fail(err);
+}
+
+static int record_stream(struct record *r, struct sh_err *err)
+{
+    struct scanhead *sh = NULL;
+    char why[256];
+    if (r->sets.n != 0) return cmd_usage("record", "--set, --crs and --threads need a CONFIG as SOURCE");
+    int rc = scanhead_open(r->source, &sh, why, sizeof why);
+    if (rc != SCANHEAD_OK) {
+        sh_fail(err, rc, "%s", why);
+        return cmd_fail(err);
+    }
+    size_t n = strlen(r->source);
+    if (strcmp(r->source + (n > 4 ? n - 4 : 0), ".shs") == 0) r->recording.listen = 1;
+    if (r->all_stations && !r->recording.listen) {
+        char reply[512];
+        rc = scanhead_command(sh, "HEAD:STATION? MAX", reply, sizeof reply, 5000);
+        r->recording.first_station = 1;
+        if (rc != SCANHEAD_OK || sscanf(reply, "%u", &r->recording.last_station) != 1)
+            rc = sh_fail(err, SH_EIO, "%s: no number of stations: %s", r->source, rc == SCANHEAD_OK ? reply : scanhead_error(sh));
+    }
+    if (rc == SH_OK) rc = record(r, sh, err);
+    scanhead_close(sh);
+    return rc == SH_OK ? CMD_OK : cmd_fail(err);
+}
+
+int cmd_record(int argc, char **argv)
+{
+    struct record r;
+    memset(&r, 0, sizeof r);
+    r.recording.frames = -1;
+    r.recording.progress = 1;
+    int status = parse(&r, argc, argv);
+    if (status >= 0) return status;
+    r.recording.first_station = r.recording.last_station = (uint32_t)r.station;
+    cmd_catch_signals();
+    struct sh_err err = {0};
+    return is_config(r.source) ? record_config(&r, &err) : record_stream(&r, &err);
+}

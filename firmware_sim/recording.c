@@ -1,0 +1,162 @@
+#include "firmware_sim/recording.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "drivers/protocol/native.h"
+#include "firmware_sim/clock.h"
+
+enum { REPLY_MS = 5000, NEXT_MS = 250, END_MS = 5000, BOOT_MS = 30000 };
+
+struct recording {
+    struct scanhead *sh;
+    const struct recording_options *o;
+    struct recording_result *result;
+    int64_t next_report_ns, scan_t0_ns; /* monotonic; device time of the scan's start, -1 before it */
+    int stopping;
+    int scan_over, idle;
+};
+
+static int command(struct recording *r, const char *line, char *reply, size_t len, struct sh_err *err)
+{
+    int rc = scanhead_command(r->sh, line, reply, len, REPLY_MS);
+    if (rc != SCANHEAD_OK) return sh_fail(err, rc, "%s: %s", line, scanhead_error(r->sh));
+    if (strncmp(reply, "ERR", 3) == 0) return sh_fail(err, SH_ESTATE, "the head refused %s: %s", line, reply);
+    return SH_OK;
+}
+
+static int set(struct recording *r, const char *header, long value, struct sh_err *err)
+{
+    char line[64], reply[512];
+    snprintf(line, sizeof line, "%s %ld", header, value);
+    return command(r, line, reply, sizeof reply, err);
+}
+
+static int wait_idle(struct recording *r, struct sh_err *err);
+
+static void count_points(struct recording *r, const struct scanhead_frame *frame)
+{
+    /* The last byte of a point holds the echo's number and the count: 0 for a shot without echo. */
+    const uint8_t *last = frame->payload + NATIVE_POINTS_HEAD_LEN + NATIVE_POINT_LEN - 1;
+    uint64_t empty = 0;
+    for (uint32_t i = 0; i < frame->n_points; i++)
+        empty += last[(size_t)i * NATIVE_POINT_LEN] == 0;
+    r->result->empty += empty;
+    r->result->points += frame->n_points - empty;
+}
+
+static void look_at(struct recording *r, const struct scanhead_frame *frame)
+{
+    r->result->frames++;
+    if (frame->type == SCANHEAD_POINTS) {
+        r->result->pulses += frame->n_pulses;
+        if (r->scan_t0_ns < 0) r->scan_t0_ns = frame->t_ns - frame->scan_t0_ns;
+    }
+    if (frame->type != SCANHEAD_EVENT) return;
+    if (frame->event == SCANHEAD_EV_SCAN_START) r->scan_t0_ns = (int64_t)frame->event_value[1];
+    if (frame->event == SCANHEAD_EV_SCAN_END) {
+        r->scan_over = 1;
+        r->result->scans++;
+        r->result->lost_pulses += frame->event_value[2];
+    }
+    if (frame->event == SCANHEAD_EV_STATE) r->idle = strcmp(frame->event_text, "idle") == 0;
+}
+
+static void report(struct recording *r)
+{
+    int64_t now_ns = clock_now_ns();
+    if (!r->o->progress || now_ns < r->next_report_ns) return;
+    r->next_report_ns = now_ns + 1000000000;
+    char text[96];
+    snprintf(text, sizeof text, "recording: %.2f M points, %.2f M pulses", 1e-6 * (double)r->result->points,
+             1e-6 * (double)r->result->pulses);
+    sh_progress(r->o->report, text, -1.0);
+}
+
+/* One frame. 1: got one; 0: none in time; negative: over. */
+static int step(struct recording *r, int timeout_ms, struct sh_err *err)
+{
+    struct scanhead_frame frame;
+    int rc = scanhead_next(r->sh, &frame, timeout_ms);
+    report(r);
+    if (rc == SCANHEAD_ETIMEOUT) return 0;
+    if (rc != SCANHEAD_OK) return sh_fail(err, rc, "%s", scanhead_error(r->sh));
+    look_at(r, &frame);
+    if (frame.type == SCANHEAD_POINTS) count_points(r, &frame);
+    int64_t into_ns = frame.t_ns - r->scan_t0_ns;
+    if (r->o->duration_s > 0.0 && r->scan_t0_ns >= 0 && (double)into_ns >= 1e9 * r->o->duration_s) r->stopping = 1;
+    rc = r->o->frame(r->o->ctx, r->sh, &frame, err);
+    return rc == SH_OK ? 1 : rc;
+}
+
+static int wait_idle(struct recording *r, struct sh_err *err)
+{
+    int64_t deadline_ns = clock_now_ns() + (int64_t)BOOT_MS * 1000000;
+    char reply[512];
+    while (clock_now_ns() < deadline_ns) {
+        int rc = command(r, "HEAD:STAT?", reply, sizeof reply, err);
+        if (rc != SH_OK) return rc;
+        if (strcmp(reply, "idle") == 0) return SH_OK;
+        if (strcmp(reply, "scanning") == 0 || strcmp(reply, "fault") == 0 || strcmp(reply, "off") == 0)
+            return sh_fail(err, SH_ESTATE, "the head is %s; --listen records what it does on its own", reply);
+        rc = step(r, 20, err); /* frames go on meanwhile */
+        if (rc < 0) return rc;
+    }
+    return sh_fail(err, SH_ETIMEOUT, "the head was not idle within %d s", BOOT_MS / 1000);
+}
+
+static int follow(struct recording *r, struct sh_err *err)
+{
+    int64_t end_ns = INT64_MAX;
+    int asked = 0;
+    while (!r->scan_over) {
+        if (r->o->interrupted != NULL && r->o->interrupted()) r->stopping = 1;
+        if (r->stopping && r->o->listen) return SH_OK;
+        if (r->stopping && !asked) {
+            char reply[512];
+            int rc = scanhead_command(r->sh, "SCAN:STOP", reply, sizeof reply, REPLY_MS);
+            if (rc != SCANHEAD_OK) return sh_fail(err, rc, "SCAN:STOP: %s", scanhead_error(r->sh));
+            asked = 1; /* a refusal says that the scan has just ended by itself */
+            end_ns = clock_now_ns() + (int64_t)END_MS * 1000000;
+        }
+        if (clock_now_ns() > end_ns) return sh_fail(err, SH_ETIMEOUT, "the head did not end the scan within %d s", END_MS / 1000);
+        int rc = step(r, NEXT_MS, err);
+        if (rc < 0) return rc;
+    }
+    return SH_OK;
+}
+
+static int record_scan(struct recording *r, uint32_t station, struct sh_err *err)
+{
+    char reply[512];
+    r->scan_over = 0;
+    r->scan_t0_ns = -1;
+    int rc = r->o->listen ? SH_OK : wait_idle(r, err);
+    if (rc == SH_OK && station != 0) rc = set(r, "HEAD:STATION", (long)station, err);
+    if (rc == SH_OK && r->o->frames >= 0) rc = set(r, "SCAN:FRAM", r->o->frames, err);
+    r->scan_over = 0;
+    if (rc == SH_OK && !r->o->listen) rc = command(r, "SCAN:STAR", reply, sizeof reply, err);
+    if (rc == SH_OK) rc = follow(r, err);
+    return rc;
+}
+
+int recording_run(struct scanhead *sh, const struct recording_options *options, struct recording_result *result,
+                  struct sh_err *err)
+{
+    memset(result, 0, sizeof *result);
+    struct recording r = {.sh = sh, .o = options, .result = result, .next_report_ns = clock_now_ns() + 1000000000};
+    uint32_t station = options->first_station;
+    int rc;
+    do {
+        rc = record_scan(&r, station, err);
+        /* Listening, a scan's end is not the end: more may follow until the stream ends. */
+        while (rc == SH_OK && options->listen && !r.stopping) {
+            r.scan_over = 0;
+            rc = follow(&r, err);
+        }
+    } while (rc == SH_OK && !r.stopping && station != 0 && station++ < options->last_station);
+    if (rc == SH_ECLOSED && options->listen) rc = SH_OK;
+    result->ended_early = rc == SH_ECLOSED;
+    return rc;
+}
