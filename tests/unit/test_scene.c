@@ -59,6 +59,7 @@ static void obj_without_names(void **state)
 }
 
 /* The compiler's conversion of the same digits is the independent source. */
+/* clang-format off */
 #define NUMBERS                                                                                             \
     N(500000.12345678901)                                                                                   \
     N(5800000.00000000093)                                                                                  \
@@ -66,6 +67,7 @@ static void obj_without_names(void **state)
         N(4.35e-6) N(+7.25) N(-0.0) N(1.7976931348623157e-300) N(00000000000000000000000.125)               \
             N(0.10000000000000000555111512312578270) N(123456.7890123456789E+2) N(4.9e-324)                 \
                 N(9007199254740993.0)
+/* clang-format on */
 
 static void obj_numbers_are_exact(void **state)
 {
@@ -287,74 +289,6 @@ static void files_add_up(void **state)
     unlink(b);
 }
 
-/* Area by the shoelace formula; the triangles' own areas add up to it only when none overlaps or sticks out.
- */
-static void check_polygon(const double (*uv)[2], int n, bool at_utm)
-{
-    char *text = malloc((size_t)n * 128 + 64), *p = text;
-    double area = 0, c = cos(0.4), s = sin(0.4);
-    for (int i = 0; i < n; i++) {
-        const double *a = uv[i], *b = uv[(i + 1) % n];
-        area += (a[0] * b[1] - a[1] * b[0]) / 2;
-        double shift = at_utm ? 5800000 : 0;
-        p += sprintf(p, "v %.17g %.17g %.17g\n", a[0] * c + shift, a[1] + shift, a[0] * s);
-    }
-    p += sprintf(p, "f");
-    for (int i = 0; i < n; i++)
-        p += sprintf(p, " %d", i + 1);
-    struct scene *scene = load_text("polygon.obj", text);
-    free(text);
-    assert_int_equal(scene->n_triangles + scene->counts.zero_area, n - 2);
-    assert_null(strstr(warnings, "cross"));
-    /* coordinates are rounded to ulp(5.8e6) / 2 = 4.7e-10, along a boundary shorter than 200 */
-    double tolerance = at_utm ? 200 * 4.7e-10 * 2 : 1e-12 * fabs(area);
-    if (fabs(total_area(scene) - fabs(area)) > tolerance)
-        fail_msg("%d corners: area %.15g, not %.15g", n, total_area(scene), area);
-    scene_free(scene);
-}
-
-static void polygons_keep_their_area(void **state)
-{
-    (void)state;
-    static const double l_shape[][2] = {{0, 0}, {4, 0}, {4, 1}, {1, 1}, {1, 3}, {0, 3}};
-    static const double dart[][2] = {{0, 0}, {3, -2}, {1, 0}, {3, 2}};
-    static const double on_edges[][2] = {{0, 0}, {1, 0}, {2, 0}, {3, 0}, {3, 3}, {1.5, 3}, {0, 3}, {0, 1}};
-    static const double comb[][2] = {{0, 0}, {9, 0}, {9, 5}, {8, 1}, {7, 5}, {6, 1},
-                                     {5, 5}, {4, 1}, {3, 5}, {2, 1}, {1, 5}, {0.5, 1}};
-    static const double keyhole[][2] = {{0, 0}, {1, 1}, {1, 2}, {2, 2}, {2, 1},
-                                        {1, 1}, {0, 0}, {3, 0}, {3, 3}, {0, 3}};
-    static const double repeated[][2] = {{0, 0}, {2, 0}, {2, 0}, {2, 2}, {1, 1}, {0, 2}, {0, 2}};
-    for (int at_utm = 0; at_utm < 2; at_utm++) {
-        check_polygon(l_shape, 6, at_utm);
-        check_polygon(dart, 4, at_utm);
-        check_polygon(on_edges, 8, at_utm);
-        check_polygon(comb, 12, at_utm);
-        check_polygon(keyhole, 10, at_utm);
-        check_polygon(repeated, 7, at_utm);
-    }
-    double star[500][2];
-    srand(3);
-    for (int turn = 0; turn < 20; turn++) {
-        int n = 5 + rand() % 495;
-        for (int i = 0; i < n; i++) { /* star-shaped about the origin, so it can't cross itself */
-            double r = 0.05 + rand() / (double)RAND_MAX, angle = 2 * M_PI * i / n * (turn % 2 ? 1 : -1);
-            star[i][0] = r * cos(angle);
-            star[i][1] = r * sin(angle);
-        }
-        check_polygon((const double(*)[2])star, n, false);
-    }
-}
-
-static void crossing_polygon_is_told(void **state)
-{
-    (void)state;
-    struct scene *s = load_text("bow.obj", "v 0 0 0\nv 2 2 0\nv 2 0 0\nv 0 3 0\nf 1 2 3 4\n");
-    assert_int_equal(s->n_triangles, 2);
-    assert_int_equal(n_warnings, 1);
-    assert_non_null(strstr(warnings, "bow.obj: 1 polygons cross themselves"));
-    scene_free(s);
-}
-
 static void zero_area_is_counted(void **state)
 {
     (void)state;
@@ -539,8 +473,6 @@ int main(void)
         cmocka_unit_test(ply_in_float_warns),
         cmocka_unit_test(axes_scale_offset),
         cmocka_unit_test(files_add_up),
-        cmocka_unit_test(polygons_keep_their_area),
-        cmocka_unit_test(crossing_polygon_is_told),
         cmocka_unit_test(zero_area_is_counted),
         cmocka_unit_test(long_names_are_cut),
         cmocka_unit_test(surfaces_have_a_limit),
