@@ -4,7 +4,7 @@
  * Units: as the key's name says (hz, deg, m). Everything is checked; an error is one line:
  *   FILE:LINE: KEY: what is wrong; what is allowed
  * Unknown keys, duplicate keys, trailing text ("30 kHz"), NaN, wrong types and values out of range are errors.
- * Relative paths in a file are relative to that file. */
+ * Relative paths in a file are relative to that file; in --set, to the working directory. */
 #ifndef FIRMWARE_SIM_CONFIG_H
 #define FIRMWARE_SIM_CONFIG_H
 
@@ -90,7 +90,8 @@ int config_load(const char *path, const char *const *sets, int n_sets, struct co
 /* The reference: every key with type, unit, default, range and help. */
 void config_print_reference(FILE *out);
 
-/* The profiles in a directory, one line each (name, model, what is data sheet and what is assumed). Returns how many. */
+/* The profiles in a directory, one line each (name, model, what is data sheet and what is assumed). Returns how many.
+ * dir NULL: the first directory of the lookup below that exists, without a configuration. */
 int config_list_profiles(const char *dir, FILE *out, struct sh_err *err);
 
 /* Finds the directory of profiles: $SCANHEAD_HEADS, beside the configuration (heads/), the installed or the source

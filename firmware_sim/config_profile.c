@@ -161,7 +161,7 @@ static int find_profile(struct cfg_reader *rd, struct config *cfg)
         if (strlen(path) >= sizeof cfg->profile_file)
             return cfg_fail_key(rd, "head.profile", 0, "its path is too long; allowed up to %zu bytes",
                                 sizeof cfg->profile_file - 1);
-        snprintf(cfg->profile_file, sizeof cfg->profile_file, "%s", path);
+        memcpy(cfg->profile_file, path, strlen(path) + 1);
         return SH_OK;
     }
     return fail_lookup(rd, cfg, &dirs);

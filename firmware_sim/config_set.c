@@ -92,7 +92,9 @@ int cfg_apply_set(struct cfg_reader *rd, const char *text)
     for (char *p = set.name; *p != '\0'; p++)
         if ((unsigned char)*p < 0x20 || *p == 0x7f) *p = '?';
     const struct cfg_key *key = cfg_find(&rd->table, set.path);
-    if (key == NULL || strstr(set.name, "[]") != NULL) return fail_unknown(rd, &set);
+    if (strstr(set.name, "[]") != NULL)
+        return cfg_fail(rd, CFG_FROM_SET, set.name, "no index; allowed as in links[0].type");
+    if (key == NULL) return fail_unknown(rd, &set);
     if (key->type == CFG_MAP || key->type == CFG_LIST)
         return cfg_fail(rd, CFG_FROM_SET, set.name, "is %s; set one of its keys",
                         key->type == CFG_MAP ? "a section" : "a list");

@@ -7,7 +7,7 @@
 #include <string.h>
 #include <yaml.h>
 
-enum { FILE_MAX = 1 << 20, NAME_MAX_LEN = CFG_PATH_MAX };
+enum { FILE_MAX = 1 << 20, MAX_DEPTH = 16, MAX_ANCHORS = 256 };
 
 struct walk {
     struct cfg_reader *rd;
@@ -179,7 +179,7 @@ static int read_value(struct walk *w, const struct cfg_key *key, uint32_t item, 
 /* The row of a key below path, or NULL. A dotted key ("head.prr_hz: 1") is no way to write a section. */
 static const struct cfg_key *row_below(const struct walk *w, const char *path, const yaml_node_t *word)
 {
-    char full[NAME_MAX_LEN];
+    char full[CFG_PATH_MAX];
     if (word->data.scalar.length != strlen(text_of(word)) || strpbrk(text_of(word), ".[]") != NULL)
         return NULL;
     int len = snprintf(full, sizeof full, "%s%s%s", path, path[0] != '\0' ? "." : "", text_of(word));
@@ -270,6 +270,49 @@ static int fail_syntax(const struct cfg_reader *rd, const yaml_parser_t *parser,
                    parser->context != NULL ? " " : "", parser->context != NULL ? parser->context : "", hint);
 }
 
+/* A byte order mark is skipped here: libyaml would count it as a column and find the first line indented. */
+static int start_parser(const struct cfg_reader *rd, yaml_parser_t *parser, const unsigned char *bytes,
+                        size_t len)
+{
+    size_t skip = len >= 3 && memcmp(bytes, "\xef\xbb\xbf", 3) == 0 ? 3 : 0;
+    if (!yaml_parser_initialize(parser))
+        return sh_fail(rd->err, SH_ENOMEM, "%s: no memory to parse it", rd->file);
+    yaml_parser_set_encoding(parser, YAML_UTF8_ENCODING);
+    yaml_parser_set_input_string(parser, bytes + skip, len - skip);
+    return SH_OK;
+}
+
+/* libyaml's scanner takes time with the square of the depth of "[[[[", and of the number of anchors: both are
+ * bounded by a first pass over the events. What else is wrong is left to the second. */
+static int check_depth(const struct cfg_reader *rd, const unsigned char *bytes, size_t len)
+{
+    yaml_parser_t parser;
+    yaml_event_t event;
+    int depth = 0, anchors = 0, code = SH_OK, done = 0;
+    if (!yaml_parser_initialize(&parser))
+        return sh_fail(rd->err, SH_ENOMEM, "%s: no memory to parse it", rd->file);
+    yaml_parser_set_encoding(&parser, YAML_UTF8_ENCODING);
+    yaml_parser_set_input_string(&parser, bytes, len);
+    while (code == SH_OK && !done && yaml_parser_parse(&parser, &event)) {
+        int line = (int)event.start_mark.line + 1;
+        done = event.type == YAML_STREAM_END_EVENT;
+        depth += event.type == YAML_SEQUENCE_START_EVENT || event.type == YAML_MAPPING_START_EVENT;
+        depth -= event.type == YAML_SEQUENCE_END_EVENT || event.type == YAML_MAPPING_END_EVENT;
+        anchors += (event.type == YAML_SCALAR_EVENT && event.data.scalar.anchor != NULL) ||
+                   (event.type == YAML_SEQUENCE_START_EVENT && event.data.sequence_start.anchor != NULL) ||
+                   (event.type == YAML_MAPPING_START_EVENT && event.data.mapping_start.anchor != NULL);
+        yaml_event_delete(&event);
+        if (depth > MAX_DEPTH)
+            code = sh_fail(rd->err, SH_EINPUT, "%s:%d: nested too deep; allowed %d levels", rd->file, line,
+                           MAX_DEPTH);
+        else if (anchors > MAX_ANCHORS)
+            code = sh_fail(rd->err, SH_EINPUT, "%s:%d: too many anchors; allowed %d", rd->file, line,
+                           MAX_ANCHORS);
+    }
+    yaml_parser_delete(&parser);
+    return code;
+}
+
 static int read_document(struct cfg_reader *rd, yaml_document_t *doc)
 {
     struct walk w = {.rd = rd, .doc = doc};
@@ -284,35 +327,32 @@ static int read_document(struct cfg_reader *rd, yaml_document_t *doc)
     return read_map(&w, root, "", 0);
 }
 
+static int read_documents(struct cfg_reader *rd, yaml_parser_t *parser, const unsigned char *bytes,
+                          size_t len)
+{
+    yaml_document_t doc, next;
+    if (!yaml_parser_load(parser, &doc)) return fail_syntax(rd, parser, bytes, len);
+    int code = read_document(rd, &doc);
+    yaml_document_delete(&doc);
+    if (code != SH_OK) return code;
+    if (!yaml_parser_load(parser, &next)) return fail_syntax(rd, parser, bytes, len);
+    const yaml_node_t *more = yaml_document_get_root_node(&next);
+    if (more != NULL)
+        code = sh_fail(rd->err, SH_EINPUT, "%s:%d: a second document; allowed one", rd->file, line_of(more));
+    yaml_document_delete(&next);
+    return code;
+}
+
 int cfg_read_file(struct cfg_reader *rd)
 {
     unsigned char *bytes = NULL;
     size_t len = 0;
     yaml_parser_t parser;
-    yaml_document_t doc, next;
     int code = read_bytes(rd, &bytes, &len);
+    if (code == SH_OK) code = check_depth(rd, bytes, len);
+    if (code == SH_OK) code = start_parser(rd, &parser, bytes, len);
     if (code != SH_OK) goto free_bytes;
-    code = sh_fail(rd->err, SH_ENOMEM, "%s: no memory to parse it", rd->file);
-    if (!yaml_parser_initialize(&parser)) goto free_bytes;
-    yaml_parser_set_encoding(&parser, YAML_UTF8_ENCODING);
-    yaml_parser_set_input_string(&parser, bytes, len);
-    if (!yaml_parser_load(&parser, &doc)) {
-        code = fail_syntax(rd, &parser, bytes, len);
-        goto delete_parser;
-    }
-    code = read_document(rd, &doc);
-    if (code != SH_OK || yaml_document_get_root_node(&doc) == NULL) goto delete_document;
-    if (!yaml_parser_load(&parser, &next)) {
-        code = fail_syntax(rd, &parser, bytes, len);
-        goto delete_document;
-    }
-    const yaml_node_t *more = yaml_document_get_root_node(&next);
-    if (more != NULL)
-        code = sh_fail(rd->err, SH_EINPUT, "%s:%d: a second document; allowed one", rd->file, line_of(more));
-    yaml_document_delete(&next);
-delete_document:
-    yaml_document_delete(&doc);
-delete_parser:
+    code = read_documents(rd, &parser, bytes, len);
     yaml_parser_delete(&parser);
 free_bytes:
     free(bytes);

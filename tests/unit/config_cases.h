@@ -1,0 +1,182 @@
+/* Cases of test_config.c: a configuration that loads, and edits of it that must not. */
+#ifndef TESTS_UNIT_CONFIG_CASES_H
+#define TESTS_UNIT_CONFIG_CASES_H
+
+#include <stddef.h>
+
+/* clang-format off */
+static const char base[] = "head:\n"                        /* 1 */
+                           "  profile: riegl-vz400i\n"      /* 2 */
+                           "  prr_hz: 500000\n"             /* 3 */
+                           "  lines_hz: 100\n"              /* 4 */
+                           "scene:\n"                       /* 5 */
+                           "  meshes:\n"                    /* 6 */
+                           "    - file: cube.obj\n"         /* 7 */
+                           "      up: z\n"                  /* 8 */
+                           "      scale: 1\n"               /* 9 */
+                           "stations:\n"                    /* 10 */
+                           "  - position_m: [1, 2, 3]\n"    /* 11 */
+                           "    heading_deg: 90\n"          /* 12 */
+                           "links:\n"                       /* 13 */
+                           "  - type: tcp\n"                /* 14 */
+                           "    port: 0\n"                  /* 15 */
+                           "output:\n"                      /* 16 */
+                           "  crs: local\n";                /* 17 */
+
+struct bad {
+    const char *old, *with; /* edit of base; old NULL: with is the whole file */
+    int line;
+    const char *key;        /* NULL: the error is about the file */
+    const char *fragment;
+};
+
+#define PRR "  prr_hz: 500000\n"
+#define LINES "  lines_hz: 100\n"
+#define FRAMES_AT_4(text) LINES, "  " text "\n" LINES
+static const struct bad bad[] = {
+    /* numbers */
+    {PRR, "  prr_hz: 30 kHz\n", 3, "head.prr_hz", "allowed prr_min_hz to prr_max_hz"},
+    {PRR, "  prr_hz: 300000 Hz\n", 3, "head.prr_hz", "\"300000 Hz\" is not a number"},
+    {PRR, "  prr_hz: nan\n", 3, "head.prr_hz", "not a number"},
+    {PRR, "  prr_hz: .nan\n", 3, "head.prr_hz", "not a number"},
+    {PRR, "  prr_hz: inf\n", 3, "head.prr_hz", "not a number"},
+    {PRR, "  prr_hz: 0x10\n", 3, "head.prr_hz", "not a number"},
+    {PRR, "  prr_hz: 300_000\n", 3, "head.prr_hz", "not a number"},
+    {PRR, "  prr_hz: 300,000\n", 3, "head.prr_hz", "not a number"},
+    {PRR, "  prr_hz: 0300000\n", 3, "head.prr_hz", "not a number"},
+    {PRR, "  prr_hz: 5.\n", 3, "head.prr_hz", "not a number"},
+    {PRR, "  prr_hz: 1e\n", 3, "head.prr_hz", "not a number"},
+    {PRR, "  prr_hz: --5\n", 3, "head.prr_hz", "not a number"},
+    {PRR, "  prr_hz: 500000.0000001\n", 3, "head.prr_hz", "finer than 6 decimals"},
+    {PRR, "  prr_hz: 1e30\n", 3, "head.prr_hz", "out of range"},
+    {PRR, "  prr_hz: 99999999999999999999999999999999999999999\n", 3, "head.prr_hz", "out of range"},
+    {PRR, "  prr_hz: \"500000\"\n", 3, "head.prr_hz", "in quotes"},
+    {PRR, "  prr_hz:\n", 3, "head.prr_hz", "here stands nothing"},
+    {PRR, "  prr_hz: [1]\n", 3, "head.prr_hz", "here stands a list"},
+    {PRR, "  prr_hz: {a: 1}\n", 3, "head.prr_hz", "here stands a section"},
+    {PRR, "  prr_hz: !!int 5\n", 3, "head.prr_hz", "tag"},
+    {"heading_deg: 90", "heading_deg: 1e999", 12, "stations[0].heading_deg", "allowed -360 to 360 deg"},
+    {"heading_deg: 90", "heading_deg: 361", 12, "stations[0].heading_deg", "allowed -360 to 360 deg"},
+    {"heading_deg: 90", "lat_deg: -90.5", 12, "stations[0].lat_deg", "allowed -90 to 90 deg"},
+    {"heading_deg: 90", "lon_deg: 181", 12, "stations[0].lon_deg", "allowed -180 to 180 deg"},
+    {"heading_deg: 90", "height_m: 10001", 12, "stations[0].height_m", "allowed -1000 to 10000 m"},
+    {"scale: 1", "scale: 0", 9, "scene.meshes[0].scale", "allowed 1e-09 to"},
+    {"scale: 1", "scale: -1", 9, "scene.meshes[0].scale", "out of range"},
+    {"port: 0", "port: 65536", 15, "links[0].port", "0 to 65535"},
+    {"port: 0", "port: 1.5", 15, "links[0].port", "not a whole number"},
+    {"port: 0", "max_sessions: 9", 15, "links[0].max_sessions", "1 to 8"},
+    {"port: 0", "max_sessions: 0", 15, "links[0].max_sessions", "1 to 8"},
+    {"crs: local", "utm_zone: 61", 17, "output.utm_zone", "0 to 60"},
+    {FRAMES_AT_4("frames: -1"), 4, "head.frames", "0 to 1000000"},
+    {"output:", "noise: {seed: 18446744073709551616}\noutput:", 16, "noise.seed", "0 to 18446744073709551615"},
+    {"output:", "noise: {seed: -1}\noutput:", 16, "noise.seed", "0 to 18446744073709551615"},
+    {"output:", "loop: {ahead_ms: 91}\noutput:", 16, "loop.ahead_ms", "allowed 2 to 90 ms"},
+    {"output:", "loop: {queue_ms: 9}\noutput:", 16, "loop.queue_ms", "allowed 10 to 10000 ms"},
+    {"output:", "loop: {late_ms: -1}\noutput:", 16, "loop.late_ms", "allowed 0 to 10000 ms"},
+    {"output:", "loop: {threads: 65}\noutput:", 16, "loop.threads", "0 to 64"},
+    /* words, texts, vectors */
+    {"up: z", "up: x", 8, "scene.meshes[0].up", "allowed z, y"},
+    {"up: z", "up: Z", 8, "scene.meshes[0].up", "allowed z, y"},
+    {"crs: local", "crs: wgs84", 17, "output.crs", "allowed local, ecef, utm"},
+    {"crs: local", "layout: xyz", 17, "output.layout", "allowed polar, geo"},
+    {"type: tcp", "type: usb", 14, "links[0].type", "allowed null, file, pty, tcp"},
+    {"output:", "loop: {pace: slow}\noutput:", 16, "loop.pace", "allowed realtime, fast, step"},
+    {"output:", "noise: {range: 1}\noutput:", 16, "noise.range", "allowed on or off"},
+    {"[1, 2, 3]", "[1, 2]", 11, "stations[0].position_m", "2 numbers instead of 3"},
+    {"[1, 2, 3]", "[1, 2, 3, 4]", 11, "stations[0].position_m", "4 numbers instead of 3"},
+    {"[1, 2, 3]", "[1, 2, nan]", 11, "stations[0].position_m", "\"nan\" is not a number"},
+    {"[1, 2, 3]", "[1, [2], 3]", 11, "stations[0].position_m", "here stands a list"},
+    {"[1, 2, 3]", "[1, 2, 1e10]", 11, "stations[0].position_m", "each -1000000000 to 1000000000 m"},
+    {"[1, 2, 3]", "5", 11, "stations[0].position_m", "[x, y, z]"},
+    {"heading_deg: 90", "name: 12345678901234567890123456789012", 12, "stations[0].name", "text of 1 to 31 bytes"},
+    {"heading_deg: 90", "name: ''", 12, "stations[0].name", "text of 1 to 31 bytes"},
+    {"heading_deg: 90", "name: \"a\\nb\"", 12, "stations[0].name", "control characters"},
+    {"heading_deg: 90", "name: \"a\\0b\"", 12, "stations[0].name", "control characters"},
+    {FRAMES_AT_4("serial: a,b"), 4, "head.serial", "without comma"},
+    /* keys */
+    {PRR, "  prr: 500000\n", 3, "head.prr", "did you mean head.prr_hz?"},
+    {PRR, "  pr_hz: 500000\n", 3, "head.pr_hz", "did you mean head.prr_hz?"},
+    {PRR, "  zzz: 500000\n", 3, "head.zzz", "allowed profile, serial, prr_hz, lines_hz"},
+    {"output:", "lines_hz: 5\noutput:", 16, "lines_hz", "did you mean head.lines_hz?"},
+    {"output:", "station:\noutput:", 16, "station", "did you mean stations?"},
+    {"output:", "head.serial: a\noutput:", 16, "head.serial", "unknown key"},
+    {"output:", "\"links[]\": {type: pty}\noutput:", 16, "links[]", "unknown key"},
+    {"output:", "? [a]\n: b\noutput:", 16, "configuration", "a key that is a list"},
+    {"up: z", "upp: z", 8, "scene.meshes[0].upp", "did you mean scene.meshes[0].up?"},
+    {"heading_deg: 90", "heading: 90", 12, "stations[0].heading", "did you mean stations[0].heading_deg?"},
+    {LINES, LINES PRR, 5, "head.prr_hz", "given twice, first on line 3"},
+    {"output:", "head: {frames: 1}\noutput:", 16, "head", "given twice, first on line 1"},
+    {"output:", "<<: {a: 1}\noutput:", 16, "<<", "unknown key"},
+    /* kinds of nodes */
+    {NULL, "head: 5\n", 1, "head", "allowed a section with keys"},
+    {NULL, "head: [1]\n", 1, "head", "allowed a section with keys"},
+    {NULL, "links: {a: 1}\n", 1, "links", "allowed a list of 0 to 8"},
+    {NULL, "links:\n  - 5\n", 2, "links[0]", "allowed a section with keys"},
+    {NULL, "links: [{type: tcp}, {type: tcp}, {type: tcp}, {type: tcp}, {type: tcp}, {type: tcp}, {type: tcp}, "
+           "{type: tcp}, {type: tcp}]\n",
+     1, "links", "9 elements are too many; allowed a list of 0 to 8"},
+    {NULL, "head: &a\n  head: *a\n", 2, "head.head", "unknown key"},
+    {NULL, "links: &a\n  - *a\n", 1, "links[0]", "here stands a list"},
+    {NULL, "head: !map {prr_hz: 1}\n", 1, "head", "has a tag"},
+    {NULL, "- 1\n", 1, NULL, "allowed sections with keys"},
+    {NULL, "text\n", 1, NULL, "allowed sections with keys"},
+    /* missing */
+    {"  profile: riegl-vz400i\n", "", 1, "head.profile", "missing"},
+    {"      scale: 1\n", "", 7, "scene.meshes[0].scale", "missing"},
+    {"      up: z\n", "", 7, "scene.meshes[0].up", "missing"},
+    {"  - type: tcp\n    port: 0", "  - port: 0", 14, "links[0].type", "missing"},
+    {"  - position_m: [1, 2, 3]\n    ", "  - ", 11, "stations[0].position_m", "missing"},
+    {"  meshes:\n    - file: cube.obj\n      up: z\n      scale: 1\n", "  meshes: []\n", 6, "scene.meshes", "list of 1 to 64"},
+    {"stations:\n  - position_m: [1, 2, 3]\n    heading_deg: 90\n", "", 1, "stations", "list of 1 to 64"},
+    {"crs: local", "crs: utm", 11, "stations[0].lat_deg", "required, allowed -90 to 90 deg"},
+    /* YAML itself */
+    {PRR, "\tprr_hz: 500000\n", 3, NULL, "not with tabs"},
+    {PRR, "  prr_hz: [1\n", 4, NULL, "not YAML"},
+    {PRR, "  prr_hz: *nowhere\n", 3, NULL, "undefined alias"},
+    {PRR, "  profile: \xff\xfe\n", 3, NULL, "UTF-8"},
+    {"output:", "--- {}\noutput:", 16, NULL, "second document"},
+    {NULL, "head: {}\n...\n---\nhead: {}\n", 4, NULL, "second document"},
+    {NULL, "", 1, NULL, "empty"},
+    {NULL, "# nothing\n", 1, NULL, "empty"},
+    {NULL, "\xff\xfeh\n", 1, NULL, "UTF-8"},
+    {NULL, "\n\nhead: \x01\n", 3, NULL, "control characters"},
+    /* within the profile: VZ-400i, 100 kHz to 1.2 MHz, 3 to 240 lines/s, -40 to 60 deg, 0 to 360 deg */
+    {PRR, "  prr_hz: 1200000.000001\n", 3, "head.prr_hz", "allowed 100000 to 1200000 Hz"},
+    {PRR, "  prr_hz: 99999.999999\n", 3, "head.prr_hz", "99999.999999 is outside of head profile riegl-vz400i"},
+    {LINES, "  lines_hz: 241\n", 4, "head.lines_hz", "allowed 3 to 240 Hz"},
+    {LINES, "  line_start_deg: -40.000001\n", 4, "head.line_start_deg", "allowed -40 to 60 deg"},
+    {LINES, "  line_stop_deg: 61\n", 4, "head.line_stop_deg", "allowed -40 to 60 deg"},
+    {LINES, "  pan_stop_deg: 361\n", 4, "head.pan_stop_deg", "allowed 0 to 360 deg"},
+    {LINES, "  pan_deg_s: 151\n", 4, "head.pan_deg_s", "allowed 0 to 150 deg/s"},
+    {LINES, "  pan_deg_s: -1\n", 4, "head.pan_deg_s", "allowed 0 to"},
+    {LINES, "  profile_x: 1\n", 4, "head.profile_x", "did you mean head.profile?"},
+    /* between keys */
+    {LINES, "  line_start_deg: 20\n  line_stop_deg: 20\n", 5, "head.line_stop_deg", "below line_stop_deg"},
+    {LINES, "  line_start_deg: 60\n", 4, "head.line_start_deg", "below line_stop_deg"},
+    {LINES, "  pan_start_deg: 20\n  pan_stop_deg: 10\n", 5, "head.pan_stop_deg", "at most pan_stop_deg"},
+    {LINES, "  pan_deg_s: 0\n", 4, "head.pan_deg_s", "frames: 0"},
+    {LINES, "  station: 2\n", 4, "head.station", "allowed 1 to 1"},
+    {LINES, "  station: 0\n", 4, "head.station", "1 to 64"},
+    {"crs: local", "utm_zone: 33", 17, "output.utm_zone", "only with crs: utm"},
+    /* 800 m / 2^31 = 3.7e-7 m fits; the row's lower limit is 1e-6 */
+    {"crs: local", "scale_m: 1e-7", 17, "output.scale_m", "1e-6 to 1 m"},
+    {"output:", "loop:\n  tick_hz: 300\noutput:", 17, "loop.tick_hz", "a divisor of 1e9"},
+    {"output:", "loop:\n  tick_hz: 312.5\noutput:", 17, "loop.tick_hz", "a divisor of 1e9"},
+    {"output:", "loop:\n  tick_hz: 50\noutput:", 17, "loop.tick_hz", "from 100 to 10000"},
+    {"type: tcp", "type: pty", 15, "links[0].port", "a pty link has no such key; allowed type, path"},
+    {"type: tcp", "type: null", 15, "links[0].port", "a null link has no such key"},
+    {"port: 0", "path: /tmp/x", 15, "links[0].path", "a tcp link has no such key; allowed type, address, port"},
+    {"type: tcp\n    port: 0", "type: file", 14, "links[0].path", "required for a file link"},
+    {"type: tcp\n    port: 0", "type: file\n    path: a\n  - type: file\n    path: a", 17, "links[1].path", "same path"},
+    {"heading_deg: 90", "name: a\n  - position_m: [0, 0, 0]\n    name: a", 14, "stations[1].name", "same name"},
+    {"cube.obj", "none.obj", 7, "scene.meshes[0].file", "No such file"},
+    {"cube.obj", "cube.xyz", 7, "scene.meshes[0].file", "allowed .obj .ply .stl"},
+    {"cube.obj", "cube", 7, "scene.meshes[0].file", "no known ending"},
+    {"cube.obj", "dir.obj", 7, "scene.meshes[0].file", "is not a file"},
+    {"riegl-vz400i", "riegl-vz400", 2, "head.profile", "full-sweep, leica-rtc360, riegl-vz400i, riegl-vz600i"},
+    {"riegl-vz400i", "heads/none.yaml", 2, "head.profile", "no profile"},
+    {"riegl-vz400i", "../heads/x", 2, "head.profile", "no profile"},
+};
+/* clang-format on */
+
+#endif
