@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "core/cloud.h"
@@ -41,6 +42,7 @@ struct report {
     const char *cloud_path;
     int json;
     double tolerance_m, max_m;
+    double told_s; /* when progress was told last */
     struct cmd_sets sets;
     struct config *cfg;
     struct site *site;
@@ -52,9 +54,35 @@ struct report {
     struct cloud_coverage coverage;
 };
 
+static double now_s(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
+}
+
+/* core/cloud tells about every piece of its work; a line a second is enough for a terminal, and none for
+ * short work. */
+static void tell_each_second(void *ctx, const char *what, double fraction)
+{
+    struct report *r = ctx;
+    double now = now_s();
+    if (now - r->told_s < 1) return;
+    r->told_s = now;
+    sh_progress(&cmd_report_stderr, what, fraction);
+}
+
+static void warn(void *ctx, const char *text)
+{
+    (void)ctx;
+    sh_warn(&cmd_report_stderr, "%s", text);
+}
+
 static int load(struct report *r, struct sh_err *err)
 {
-    int rc = cloud_read(r->cloud_path, &cmd_report_stderr, &r->cloud, err);
+    const struct sh_report progress = {r, warn, tell_each_second};
+    r->told_s = now_s();
+    int rc = cloud_read(r->cloud_path, &progress, &r->cloud, err);
     if (rc == SH_OK) rc = site_load(r->cfg, &cmd_report_stderr, &r->site, err);
     if (rc == SH_OK) rc = distance_create(r->site->scene, &r->index, err);
     return rc;
@@ -78,12 +106,14 @@ static int compare(struct report *r, struct sh_err *err)
                                      .n_stations = site->n_stations,
                                      .max_m = r->max_m,
                                      .threads = thread_count(r->cfg)};
+    const struct sh_report progress = {r, warn, tell_each_second};
     struct sh_err why = {0};
+    r->told_s = now_s();
     r->distance_m = malloc((r->cloud.n + 1) * sizeof *r->distance_m);
     r->triangle = malloc((r->cloud.n + 1) * sizeof *r->triangle);
     if (r->distance_m == NULL || r->triangle == NULL)
         return sh_fail(err, SH_ENOMEM, "no memory for %zu distances", r->cloud.n);
-    int rc = cloud_compare(&r->cloud, &setup, &cmd_report_stderr, r->distance_m, r->triangle, &why);
+    int rc = cloud_compare(&r->cloud, &setup, &progress, r->distance_m, r->triangle, &why);
     if (rc == SH_OK) rc = cloud_cover(&r->cloud, site->scene, r->triangle, &r->coverage, &why);
     if (rc != SH_OK) return sh_fail(err, rc, "%s: %.300s", r->cloud_path, why.text);
     cloud_stats(r->distance_m, r->cloud.n, r->tolerance_m, &r->stats);

@@ -6,8 +6,9 @@
 
 enum { CHUNK = 4096, MAX_THREADS = 256 };
 
-/* The search starts this near, since points of a scan lie on the scene, and its cost grows with the reach. */
-static const double FIRST_REACH_M = 0.001;
+/* The search starts with this and grows tenfold: its cost grows with the reach, and points of a scan lie on
+ * the scene but for the head's noise. */
+static const double FIRST_REACH_M = 0.01;
 
 struct work {
     const struct cloud *cloud;
