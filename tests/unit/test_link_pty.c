@@ -3,6 +3,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <poll.h>
 #include <signal.h>
 #include <sys/ioctl.h>
 #include <sys/prctl.h>
@@ -278,6 +279,54 @@ static void test_quick_cycles(void **state)
     bench_close(&bench);
 }
 
+/* Opens, asks, waits for the answer, closes, and comes back at once: into whatever we do at the end of a
+ * session. A client may ask again after a second, as real ones do. */
+static void ask_again_and_again(const char *path, int cycles)
+{
+    for (int i = 0; i < cycles; i++) {
+        struct pollfd slot = {.fd = open(path, O_RDWR | O_NOCTTY), .events = POLLIN};
+        int answered = 0;
+        char byte = 'x';
+        if (slot.fd < 0) _exit(1);
+        for (int tries = 0; tries < 3 && !answered; tries++) {
+            if (write(slot.fd, &byte, 1) != 1) _exit(2);
+            answered = poll(&slot, 1, 1000) == 1 && read(slot.fd, &byte, 1) == 1;
+        }
+        if (!answered) _exit(3);
+        close(slot.fd);
+    }
+    _exit(0);
+}
+
+static void test_nobody_missed(void **state)
+{
+    (void)state;
+    struct bench bench = bench_open(&plain);
+    const char *path = pty_path(&bench);
+    pid_t child = fork_child();
+    if (child == 0) ask_again_and_again(path, 3000);
+    int status = 0, open_now = 0, sessions = 0;
+    for (const int64_t end_ms = now_ms() + DEADLINE_MS; waitpid(child, &status, WNOHANG) == 0;) {
+        assert_true(now_ms() < end_ms);
+        bench.n_queue = 0;
+        bench_poll(&bench, 0, 100);
+        for (int i = 0; i < bench.n_queue; i++) {
+            const enum link_event_kind kind = bench.queue[i].kind;
+            if (kind == LINK_OPENED) assert_int_equal(open_now++, 0);
+            if (kind == LINK_CLOSED) assert_int_equal(open_now--, 1);
+            sessions += kind == LINK_OPENED;
+        }
+        char data[16];
+        ssize_t n = open_now ? bench.ops->read(bench.link, 0, data, sizeof data) : 0;
+        if (n > 0) assert_int_equal(bench.ops->write(bench.link, 0, data, (size_t)n), n);
+    }
+    assert_true(WIFEXITED(status));
+    assert_int_equal(WEXITSTATUS(status), 0);
+    assert_in_range(sessions, 2950, 3000); /* one each; a few may be told as one where we were held up */
+    if (open_now) read_to_end(&bench);
+    bench_close(&bench);
+}
+
 /* A child is killed while it writes and does not read; another one keeps the session up. */
 static void test_kill(void **state)
 {
@@ -427,8 +476,9 @@ int main(void)
         cmocka_unit_test(test_raw_both_ways),  cmocka_unit_test(test_full),
         cmocka_unit_test(test_fresh_for_next), cmocka_unit_test(test_written_and_gone),
         cmocka_unit_test(test_unseen_change),  cmocka_unit_test(test_many_at_once),
-        cmocka_unit_test(test_quick_cycles),   cmocka_unit_test(test_kill),
-        cmocka_unit_test(test_symlink),        cmocka_unit_test(test_exclusive),
+        cmocka_unit_test(test_quick_cycles),   cmocka_unit_test(test_nobody_missed),
+        cmocka_unit_test(test_kill),           cmocka_unit_test(test_symlink),
+        cmocka_unit_test(test_exclusive),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
