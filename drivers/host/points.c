@@ -16,8 +16,8 @@ void host_turn_table(struct scanhead *sh)
 }
 
 /* sin and cos of u >= 0 turns: the table gives whole 1/256 turns, the series the rest. |r| <= pi/256, so the
- * first terms left out, r^9/9! and r^8/8!, are below 2^-66 and 2^-65: the result is as good as its roundings,
- * in a quarter of the time of libm (the range is reduced by the encoder's turns, exactly). */
+ * first terms left out, r^9/9! and r^8/8!, are below 2^-75 and 2^-66: nothing against the rounding of u
+ * itself, in a quarter of libm's time. */
 static inline void sincos_turns(const struct scanhead *sh, double u, double *s, double *c)
 {
     double part = u * HOST_TURN_PARTS;
