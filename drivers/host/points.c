@@ -17,7 +17,7 @@ void host_turn_table(struct scanhead *sh)
 
 /* sin and cos of u >= 0 turns: the table gives whole 1/256 turns, the series the rest. |r| <= pi/256, so the
  * first terms left out, r^7/7! and r^8/8!, are below 2^-56 and 2^-66: nothing against the rounding of u
- * itself, in a quarter of libm's time. */
+ * itself, and nothing has to be reduced by a pi that is not exact. */
 static inline void sincos_turns(const struct scanhead *sh, double u, double *s, double *c)
 {
     double part = u * HOST_TURN_PARTS;
