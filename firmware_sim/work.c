@@ -133,14 +133,15 @@ static void end_line(const struct worker *worker, const struct device_work *work
     const struct cast_setup *setup = &worker->setup;
     int partial = end < line->pulse_end;
     uint64_t cast_end = line->cast_end < end ? line->cast_end : end;
+    uint64_t cast_here = cast_end > line->cast0 ? cast_end - line->cast0 : 0;
     uint64_t last = end - 1;
     struct ring_mark *mark = &slot->mark[slot->n_marks++];
     mark->end = (struct line_end){.frame = line->frame,
                                   .line = (uint32_t)line->line,
-                                  .pulse0 = line->pulse0,
-                                  .n_fired = (uint32_t)(end - line->pulse0),
-                                  .n_cast = cast_end > line->cast0 ? (uint32_t)(cast_end - line->cast0) : 0,
-                                  .t0_ns = schedule_time_ns(seg, line->pulse0),
+                                  .pulse0 = line->begin,
+                                  .n_fired = (uint32_t)(end - line->begin),
+                                  .n_cast = (uint32_t)(line->cast_before + cast_here),
+                                  .t0_ns = line->begin_ns,
                                   .t1_ns = schedule_time_ns(seg, end),
                                   .mirror_count = cast_encoder_count(schedule_mirror_turn(seg, last), setup->mirror_counts),
                                   .pan_count = cast_encoder_count(schedule_pan_turn(seg, last), setup->pan_counts),
