@@ -1,5 +1,7 @@
-# scanhead: build/scanhead, build/libscanhead.{a,so}; make demo, make test do all their own set-up.
+# scanhead. `make` builds build/scanhead and build/libscanhead.{a,so}.
+# `make demo` and `make test` install what is missing (Debian; sudo when not root), build and run.
 BUILD ?= build
+PREFIX ?= /usr/local
 ifeq ($(origin CC),default)
 CC = gcc
 endif
@@ -9,44 +11,54 @@ endif
 V ?= 0
 Q_0 = @
 Q = $(Q_$(V))
-PREFIX ?= /usr/local
+
+# What a fresh Debian 12 needs. Building and the demo:
+DEPS_BUILD = gcc g++ make pkg-config libc6-dev libembree-dev libassimp-dev libgeographiclib-dev libyaml-dev libpng-dev \
+	nettle-dev assimp-testmodels
+# and the tests, with the second compiler and its sanitizers:
+DEPS_TEST = $(DEPS_BUILD) libcmocka-dev clang libclang-rt-dev
+
 PKGS = yaml-0.1 libpng nettle
-PKG_CFLAGS := $(shell pkg-config --cflags $(PKGS) 2>/dev/null)
-PKG_LIBS := $(shell pkg-config --libs $(PKGS) 2>/dev/null)
+PKG_CFLAGS = $(eval PKG_CFLAGS := $$(shell pkg-config --cflags $(PKGS)))$(PKG_CFLAGS)
+PKG_LIBS = $(eval PKG_LIBS := $$(shell pkg-config --libs $(PKGS)))$(PKG_LIBS)
 OPT ?= -O3
-WARN = -Wall -Wextra -Wconversion -Wshadow -Wstrict-prototypes -Wmissing-prototypes
-CXXWARN = -Wall -Wextra -Wconversion -Wshadow
+WARN = -Wall -Wextra -Wconversion -Wshadow
+CWARN = $(WARN) -Wstrict-prototypes -Wmissing-prototypes
+# `make test` turns warnings into errors; a user's newer compiler may warn in peace.
+WERROR ?=
 SAN ?=
-WERROR ?= -Werror
 # No contraction to FMA: the same numbers on every instruction set. errno and traps of libm are not used.
 FP = -ffp-contract=off -fno-math-errno -fno-trapping-math
-CPPFLAGS += -I. -D_GNU_SOURCE -MMD -MP
-CFLAGS += -std=c11 $(OPT) -g $(FP) $(WARN) $(WERROR) -fPIC -pthread $(SAN) $(PKG_CFLAGS)
-CXXFLAGS += -std=c++17 $(OPT) -g $(FP) $(CXXWARN) $(WERROR) -fPIC -pthread $(SAN)
-LDLIBS = -lembree3 -lassimp -lGeographicLib $(PKG_LIBS) -lstdc++ -lm -pthread
+HEADS_DIR = $(PREFIX)/share/scanhead/heads
+ALL_CPPFLAGS = -I. -D_GNU_SOURCE -DSCANHEAD_HEADS_DIR='"$(HEADS_DIR)"' -MMD -MP $(CPPFLAGS)
+ALL_CFLAGS = -std=c11 $(OPT) -g $(FP) $(CWARN) $(WERROR) -fPIC -pthread $(SAN) $(PKG_CFLAGS) $(CFLAGS)
+ALL_CXXFLAGS = -std=c++17 $(OPT) -g $(FP) $(WARN) $(WERROR) -fPIC -pthread $(SAN) $(CXXFLAGS)
+EMBREE = $(if $(wildcard /usr/include/embree4/rtcore.h),-lembree4,-lembree3)
+LDLIBS = $(EMBREE) -lassimp -lGeographicLib $(PKG_LIBS) -lstdc++ -lm -pthread
 
-CORE = $(wildcard core/*.c core/*/*.c)
-SHIM = $(wildcard core/*/*.cpp)
+CORE = $(wildcard core/*.c core/*/*.c) core/georef/geographiclib_shim.cpp
 PROTO = $(wildcard drivers/protocol/*.c)
-LINK = $(wildcard drivers/link/*.c)
 HOST = $(wildcard drivers/host/*.c)
 FIRM = $(filter-out firmware_sim/main.c,$(wildcard firmware_sim/*.c))
-OBJ = $(patsubst %,$(BUILD)/%.o,$(CORE) $(SHIM) $(PROTO) $(LINK) $(HOST) $(FIRM))
+SRC = $(CORE) $(PROTO) $(HOST) $(wildcard drivers/link/*.c) $(FIRM)
+OBJ = $(SRC:%=$(BUILD)/%.o)
 LIBOBJ = $(patsubst %,$(BUILD)/%.o,core/err.c $(PROTO) $(HOST))
-UNIT = $(patsubst tests/unit/%.c,$(BUILD)/tests/%,$(wildcard tests/unit/test_*.c))
+UNIT = $(patsubst tests/unit/%.c,$(BUILD)/tests/unit/%,$(wildcard tests/unit/test_*.c))
+WIRE = $(patsubst tests/wire/%.c,$(BUILD)/tests/wire/%,$(wildcard tests/wire/test_*.c))
+EVERYTHING = $(OBJ) $(BUILD)/firmware_sim/main.c.o
 
 all: $(BUILD)/scanhead $(BUILD)/libscanhead.a $(BUILD)/libscanhead.so
 
 $(BUILD)/%.c.o: %.c
 	@mkdir -p $(@D)
 	@echo "  CC    $<"
-	$(Q)$(CC) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
+	$(Q)$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -c $< -o $@
 $(BUILD)/%.cpp.o: %.cpp
 	@mkdir -p $(@D)
 	@echo "  CXX   $<"
-	$(Q)$(CXX) $(CPPFLAGS) $(CXXFLAGS) -c $< -o $@
-
-$(BUILD)/libscanhead_all.a: $(OBJ)
+	$(Q)$(CXX) $(ALL_CPPFLAGS) $(ALL_CXXFLAGS) -c $< -o $@
+# All modules for the program and the tests, and the client library alone.
+$(BUILD)/modules.a: $(OBJ)
 	@rm -f $@
 	@echo "  AR    $@"
 	$(Q)$(AR) rcs $@ $^
@@ -54,21 +66,68 @@ $(BUILD)/libscanhead.a: $(LIBOBJ)
 	@rm -f $@
 	@echo "  AR    $@"
 	$(Q)$(AR) rcs $@ $^
-$(BUILD)/libscanhead.so: $(LIBOBJ)
+$(BUILD)/libscanhead.so: $(LIBOBJ) drivers/host/libscanhead.map
 	@echo "  LD    $@"
-	$(Q)$(CC) -shared $(SAN) -o $@ $^ -lnettle -Wl,--version-script=drivers/host/libscanhead.map -Wl,--no-undefined -lm
-$(BUILD)/scanhead: $(BUILD)/firmware_sim/main.c.o $(BUILD)/libscanhead_all.a
+	$(Q)$(CC) -shared $(SAN) -Wl,--version-script=drivers/host/libscanhead.map -Wl,-soname,libscanhead.so.1 \
+		-o $@ $(LIBOBJ) -lnettle -lm
+$(BUILD)/scanhead: $(BUILD)/firmware_sim/main.c.o $(BUILD)/modules.a
 	@echo "  LD    $@"
 	$(Q)$(CC) $(SAN) -o $@ $^ $(LDLIBS)
-$(BUILD)/tests/%: tests/unit/%.c $(BUILD)/libscanhead_all.a
+$(BUILD)/tests/%: tests/%.c $(BUILD)/modules.a
 	@mkdir -p $(@D)
 	@echo "  TEST  $@"
-	$(Q)$(CC) $(CPPFLAGS) $(CFLAGS) -MF $@.d -o $@ $< $(BUILD)/libscanhead_all.a -lcmocka $(LDLIBS)
+	$(Q)$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -MF $@.d -o $@ $< $(BUILD)/modules.a -lcmocka $(LDLIBS)
 
-test-unit: $(UNIT)
-	@for t in $(UNIT); do CMOCKA_MESSAGE_OUTPUT=TAP $$t || true; done
+# ---- what is missing, and only that
+define install_missing
+	@missing=; for p in $(1); do dpkg-query -W -f='$${Status}' $$p 2>/dev/null | grep -q 'ok installed' || missing="$$missing $$p"; done; \
+	if [ -n "$$missing" ]; then \
+		echo "installing:$$missing"; \
+		if [ "$$(id -u)" = 0 ]; then sudo=; elif command -v sudo >/dev/null; then sudo=sudo; \
+		else echo "these packages are missing and neither root nor sudo is at hand:$$missing" >&2; exit 1; fi; \
+		$$sudo apt-get update -qq && $$sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $$missing >/dev/null; \
+	fi
+endef
+deps:
+	$(call install_missing,$(DEPS_TEST))
+deps-build:
+	$(call install_missing,$(DEPS_BUILD))
+
+demo: deps-build
+	@$(MAKE) --no-print-directory -j2 all
+	@sh config/demo.sh $(BUILD)/scanhead $(BUILD)/demo
+
+# ---- tests. Everything is built with warnings as errors, by both compilers, and again with sanitizers.
+STRICT = WERROR=-Werror
+ASAN = $(STRICT) BUILD=$(BUILD)/asan OPT=-O1 CPPFLAGS=-DSH_SANITIZE SAN="-fsanitize=address,undefined -fno-sanitize-recover=all"
+CLANG = $(STRICT) BUILD=$(BUILD)/clang CC=clang CXX=clang++ OPT=-O1
+test: deps
+	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test test-programs
+	@$(MAKE) --no-print-directory -j2 $(CLANG) objects
+	@$(MAKE) --no-print-directory -j2 $(ASAN) all test-unit-programs
+	@SCANHEAD=$(BUILD)/test/scanhead sh tests/run_all.sh $(BUILD)
+test-unit: deps
+	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test test-unit-programs
+	@SCANHEAD=$(BUILD)/test/scanhead sh tests/run_all.sh $(BUILD) unit
+test-wire: deps
+	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test test-programs
+	@SCANHEAD=$(BUILD)/test/scanhead sh tests/run_all.sh $(BUILD) wire
+objects: $(EVERYTHING)
+test-unit-programs: $(UNIT)
+test-programs: all $(UNIT) $(WIRE)
+
+install: all
+	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib $(DESTDIR)$(PREFIX)/include $(DESTDIR)$(HEADS_DIR)
+	install $(BUILD)/scanhead $(DESTDIR)$(PREFIX)/bin/
+	install -m 644 $(BUILD)/libscanhead.a $(DESTDIR)$(PREFIX)/lib/
+	install $(BUILD)/libscanhead.so $(DESTDIR)$(PREFIX)/lib/libscanhead.so.1
+	ln -sf libscanhead.so.1 $(DESTDIR)$(PREFIX)/lib/libscanhead.so
+	install -m 644 drivers/host/scanhead.h $(DESTDIR)$(PREFIX)/include/
+	install -m 644 config/heads/*.yaml $(DESTDIR)$(HEADS_DIR)/
+format:
+	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')
 clean:
 	rm -rf $(BUILD)
-.PHONY: all test-unit clean
+.PHONY: all deps deps-build demo test test-unit test-wire objects test-unit-programs test-programs install format clean
 .SECONDARY:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)

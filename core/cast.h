@@ -1,5 +1,6 @@
 /* Casting: a run of pulses -> echoes. Embree proposes a triangle from float rays in packets of the machine's native
- * width; the range comes from the triangle's plane in double, kept beside the BVH.
+ * width; the range comes from the triangle's plane in double, kept beside the BVH, and where the ray passes so near to a
+ * triangle's border that float can't be trusted, the triangle is chosen again in double.
  *
  * Frames: the BVH is built in a local frame (prcs minus origin_m), where float is safe; the station is a point of it. Ray
  * packets are SCHEDULE_PACKET pulses, cut by pulse number. */
@@ -22,9 +23,10 @@ struct bvh_info {
     uint64_t bytes;      /* BVH and planes */
 };
 
-/* The scene must outlive the BVH. Built with `threads` threads (0: all). */
-int bvh_create(const struct scene *scene, const double origin_m[3], unsigned threads, const struct sh_report *report,
-               struct bvh **out, struct sh_err *err);
+/* The scene must outlive the BVH. Rays may begin up to station_reach_m from origin_m; the nearer, the less has to be decided
+ * again. Built with `threads` threads (0: all). */
+int bvh_create(const struct scene *scene, const double origin_m[3], double station_reach_m, unsigned threads,
+               const struct sh_report *report, struct bvh **out, struct sh_err *err);
 void bvh_free(struct bvh *bvh);
 void bvh_get_info(const struct bvh *bvh, struct bvh_info *info);
 void bvh_origin(const struct bvh *bvh, double origin_m[3]);
@@ -44,6 +46,14 @@ struct cast_setup {
     double range_scale_m, xyz_scale_m;
 };
 
+/* How often the exact stage had to look twice. */
+struct cast_counters {
+    uint64_t near_border; /* proposals near a border, looked at in double */
+    uint64_t decided;     /* of these, not inside the proposed triangle: its neighbourhood was searched */
+    uint64_t went_on;     /* of these, nothing there after all: the ray went on behind */
+    uint64_t undecided;   /* nearer to an edge than double precision can tell: counted as hit */
+};
+
 struct caster;
 
 /* Working memory of one thread. A run may have up to max_pulses pulses. */
@@ -53,6 +63,8 @@ void caster_free(struct caster *caster);
 /* Fills block (capacity >= run->n) from the run. Returns the number of echoes. Allocates nothing. */
 uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
                      struct line_block *block);
+
+void caster_get_counters(const struct caster *caster, struct cast_counters *counters);
 
 /* socs -> prcs of a levelled head whose y axis points to heading_rad, clockwise from the scene's y axis. */
 void cast_rotation(double heading_rad, double rotation[9]);

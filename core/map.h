@@ -17,6 +17,8 @@
 
 #include "core/err.h"
 
+#define MAP_MAX_Z_M 1e9 /* as the scene's limit for coordinates */
+
 enum {
     MAP_DEFAULT_PX = 1200,     /* longer side of the map where the pixel size is not given */
     MAP_MAX_SIDE_PX = 16384,   /* longest side of the map */
@@ -46,7 +48,7 @@ int map_add_station(struct map *map, double x_m, double y_m, struct sh_err *err)
 
 struct map_counts {
     uint64_t drawn;   /* points that lie in the area */
-    uint64_t outside; /* points beyond the area */
+    uint64_t outside; /* points beyond the area, or with |z| above MAP_MAX_Z_M */
     uint64_t empty;   /* points that are not finite */
 };
 void map_get_counts(const struct map *map, struct map_counts *counts);

@@ -29,6 +29,7 @@ void cmd_catch_signals(void)
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
     signal(SIGPIPE, SIG_IGN);
+    signal(SIGXFSZ, SIG_IGN); /* a file at its limit is an error of write, not the end */
 }
 
 int cmd_fail(const struct sh_err *err)

@@ -2,7 +2,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "firmware_sim/cmd.h"
 
@@ -79,16 +78,6 @@ int cmd_check(int argc, char **argv)
     return check(&sets, argv[optind]);
 }
 
-static const char *heads_dir(void)
-{
-    const char *dir = getenv("SCANHEAD_HEADS");
-    if (dir != NULL && dir[0] != '\0') return dir;
-#ifdef SCANHEAD_HEADS_DIR
-    if (access(SCANHEAD_HEADS_DIR, R_OK) == 0) return SCANHEAD_HEADS_DIR;
-#endif
-    return "config/heads";
-}
-
 int cmd_list(int argc, char **argv)
 {
     if (argc == 2 && (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0)) {
@@ -97,10 +86,7 @@ int cmd_list(int argc, char **argv)
     }
     if (argc != 1) return cmd_usage("list", "it takes no arguments");
     struct sh_err err = {0};
-    const char *dir = heads_dir();
-    printf("profiles in %s:\n", dir);
-    int n = config_list_profiles(dir, stdout, &err);
-    if (n < 0) return cmd_fail(&err);
+    if (config_list_profiles(NULL, stdout, &err) < 0) return cmd_fail(&err);
     puts("links: pty (virtual serial port), tcp, file, null");
     return CMD_OK;
 }

@@ -23,6 +23,17 @@ static double distance_m(const double a[3], const double b[3])
     return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
 }
 
+/* How far the stations that will share a BVH lie from its origin. */
+static double station_reach(const struct config *cfg, const double origin_m[3])
+{
+    double reach_m = 0.0;
+    for (uint32_t i = 0; i < cfg->n_stations; i++) {
+        double d = distance_m(cfg->station[i].position_m, origin_m);
+        if (d <= SITE_BVH_REACH_M && d > reach_m) reach_m = d;
+    }
+    return reach_m;
+}
+
 static int find_bvh(struct site *site, const double station_m[3], const struct sh_report *report, struct bvh **out,
                     struct sh_err *err)
 {
@@ -34,7 +45,7 @@ static int find_bvh(struct site *site, const double station_m[3], const struct s
             return SH_OK;
         }
     }
-    int rc = bvh_create(site->scene, station_m, site->cfg->threads, report, out, err);
+    int rc = bvh_create(site->scene, station_m, station_reach(site->cfg, station_m), site->cfg->threads, report, out, err);
     if (rc == SH_OK) site->bvh[site->n_bvh++] = *out;
     return rc;
 }

@@ -1,39 +1,80 @@
-/* Private to core/cast: the BVH with the exact planes beside it. */
+/* Private to core/cast: the BVH that proposes, and the exact triangles that decide.
+ *
+ * Embree works in float: vertices, origin and direction are rounded, and so is its edge test. Near the edge of a triangle
+ * it may therefore call a hit a miss, and a ray may slip through a closed mesh or past a silhouette. Here the float
+ * triangles are wider than the real ones, each edge moved outward in its plane by more than all of that rounding
+ * (BVH_WIDEN): whatever a ray really hits, Embree proposes. Proposals well inside a triangle stand. Those near its border
+ * are decided again in double (decide.c).
+ *
+ * The budget, in units of 2^-24 of the farthest coordinate in play (vertex of the triangle from the BVH's origin, plus
+ * the ray's origin from it): rounding of a vertex 1, of the ray's origin 1, of its direction 1, Pluecker edge functions
+ * in float (a difference, a cross and a dot product of three terms) at most 5. Sum 8. */
 #ifndef CORE_CAST_BVH_H
 #define CORE_CAST_BVH_H
 
 #include "core/cast.h"
 #include "core/embree.h"
 
-/* Unit normal and distance of a triangle's plane in the local frame: n . p = d. One cache line holds two. */
-struct bvh_plane {
-    double n[3], d;
-};
+#define BVH_WIDEN (8.0 * 0x1p-24)
+enum { BVH_MAX_MITER = 64 }; /* a sharp corner moves out by at most this many widths */
+
+/* One cache line per triangle. */
+struct bvh_triangle {
+    double n[3];    /* e1 x e2 in double, local frame: length is twice the area */
+    double d;       /* n . p = d */
+    float guard;    /* a hit is safe where min(u, v, 1-u-v) * |n . dir| >= guard */
+    float widen_m;  /* how far the edges are moved outward */
+    uint16_t label;
+    uint16_t unused[3];
+    uint32_t pad[2];
+} __attribute__((aligned(64)));
 
 struct bvh {
     RTCDevice device;
     RTCScene rtc;
     const struct scene *scene;
-    struct bvh_plane *plane;
+    struct bvh_triangle *triangle;
     double origin_m[3];
-    double reach_m;       /* largest |coordinate| in the local frame */
+    double station_reach_m; /* rays begin at most this far from the origin */
     struct bvh_info info;
-    int64_t bytes;        /* as Embree reports */
+    int64_t bytes;          /* as Embree reports */
 };
 
-/* Rays of one chunk in arrays; prim is RTC_INVALID_GEOMETRY_ID for a miss, t Embree's own distance. */
+/* Rays of one chunk in arrays, padded to whole packets; prim is RTC_INVALID_GEOMETRY_ID for a miss. t, u, v are Embree's
+ * own, of the widened triangle. */
 struct bvh_rays {
-    float org[3], t_max;
-    const double *dx, *dy, *dz;
+    float org[3], t_min, t_max;
+    const float *dx, *dy, *dz;
     uint32_t *prim;
-    float *t;
+    float *t, *u, *v;
 };
 
 /* Casts n rays from one origin, in packets of the native width, ragged ends masked. */
 void bvh_intersect(const struct bvh *bvh, const struct bvh_rays *rays, uint32_t n);
+/* One ray from t_min on. */
+void bvh_intersect_one(const struct bvh *bvh, const float org[3], const float dir[3], float t_min, float t_max,
+                       uint32_t *prim, float *t);
 
-/* Range of the point of triangle `prim` nearest to the ray o + t*dir: for a ray that Embree puts just inside and double
- * precision just outside of a triangle seen at a grazing angle, where the plane runs away from the triangle. */
-double bvh_clamped_range(const struct bvh *bvh, uint32_t prim, const double o_local[3], const double dir[3]);
+/* Fills the float buffers of a geometry with widened triangles, and bvh->triangle. */
+int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err);
+
+/* ---- decide.c */
+struct decide_ray {
+    const struct bvh *bvh;
+    double station_m[3];  /* origin of the ray, prcs: vertices minus this is exact arithmetic's starting point */
+    double o_local[3];    /* the same in the local frame */
+    double dir[3];
+    float t_max;
+};
+struct decide_hit {
+    uint32_t prim;        /* RTC_INVALID_GEOMETRY_ID: the ray hits nothing */
+    double range_m;
+};
+/* What Embree proposed near a border, decided in double: the nearest triangle that the ray really meets.
+ * Every triangle near the proposed point is tried with edge functions that two triangles of an edge share bit by bit, so that
+ * no ray passes between them; of those that are hit at the same range (to 1e-12) the lowest number wins. When none is hit
+ * the ray goes on behind them. */
+void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct cast_counters *counters,
+                struct decide_hit *hit);
 
 #endif

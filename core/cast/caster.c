@@ -14,9 +14,11 @@ struct caster {
     double mirror_turn[CHUNK], pan_turn[CHUNK];
     double dx[CHUNK], dy[CHUNK], dz[CHUNK]; /* true direction, then the one the encoders read; prcs */
     double range_m[CHUNK];
+    float fx[CHUNK], fy[CHUNK], fz[CHUNK];  /* the direction as Embree gets it */
     uint32_t prim[CHUNK];
-    float t[CHUNK];
-    uint32_t max_pulses;
+    float t[CHUNK], u[CHUNK], v[CHUNK];
+    uint8_t doubt[CHUNK];                   /* the proposal has to be decided in double */
+    struct cast_counters counters;
 };
 
 int caster_create(uint32_t max_pulses, struct caster **out, struct sh_err *err)
@@ -24,13 +26,18 @@ int caster_create(uint32_t max_pulses, struct caster **out, struct sh_err *err)
     *out = aligned_alloc(64, (sizeof **out + 63) / 64 * 64);
     if (*out == NULL) return sh_fail(err, SH_ENOMEM, "cast: no memory for a caster");
     memset(*out, 0, sizeof **out);
-    (*out)->max_pulses = max_pulses;
+    (void)max_pulses; /* chunks have one size */
     return SH_OK;
 }
 
 void caster_free(struct caster *caster)
 {
     free(caster);
+}
+
+void caster_get_counters(const struct caster *caster, struct cast_counters *counters)
+{
+    *counters = caster->counters;
 }
 
 void cast_rotation(double heading_rad, double rotation[9])
@@ -72,23 +79,51 @@ static void directions(struct caster *c, const double m[9], uint32_t n)
     }
 }
 
-/* Exact range R = (d - n.o) / (n.dir) from the plane of the triangle that Embree found. */
-static void ranges(struct caster *c, const struct bvh *bvh, const double o[3], uint32_t n)
+VEC_CLONES
+static void to_float(struct caster *c, uint32_t n)
 {
     for (uint32_t i = 0; i < n; i++) {
-        uint32_t prim = c->prim[i];
-        if (prim == RTC_INVALID_GEOMETRY_ID) {
-            c->range_m[i] = NAN;
-            continue;
-        }
-        const struct bvh_plane *p = &bvh->plane[prim];
-        double dir[3] = {c->dx[i], c->dy[i], c->dz[i]};
-        double range = (p->d - (p->n[0] * o[0] + p->n[1] * o[1] + p->n[2] * o[2])) /
-                       (p->n[0] * dir[0] + p->n[1] * dir[1] + p->n[2] * dir[2]);
-        double t = (double)c->t[i];
-        /* Embree's own distance is good to about 1e-6 of it where the plane is not grazed. */
-        if (!(fabs(range - t) <= 1e-5 * t)) range = bvh_clamped_range(bvh, prim, o, dir);
-        c->range_m[i] = range;
+        c->fx[i] = (float)c->dx[i];
+        c->fy[i] = (float)c->dy[i];
+        c->fz[i] = (float)c->dz[i];
+    }
+}
+
+/* Exact range R = (d - n.o) / (n.dir) from the plane of the triangle that Embree proposed, NaN for none; and whether the
+ * hit is so near to the border, across the ray, that the proposal is in doubt. */
+VEC_CLONES
+static void refine(struct caster *c, const struct bvh *bvh, const double o[3], uint32_t n)
+{
+    const struct bvh_triangle *triangle = bvh->triangle;
+    double ox = o[0], oy = o[1], oz = o[2];
+    for (uint32_t i = 0; i < n; i++) {
+        uint32_t miss = c->prim[i] == RTC_INVALID_GEOMETRY_ID;
+        const struct bvh_triangle *tri = &triangle[miss ? 0 : c->prim[i]];
+        double along = tri->n[0] * c->dx[i] + tri->n[1] * c->dy[i] + tri->n[2] * c->dz[i];
+        double range = (tri->d - (tri->n[0] * ox + tri->n[1] * oy + tri->n[2] * oz)) / along;
+        float w = 1.0f - c->u[i] - c->v[i];
+        float least = c->u[i] < c->v[i] ? c->u[i] : c->v[i];
+        least = w < least ? w : least;
+        float margin = least * (float)fabs(along);
+        c->range_m[i] = miss ? NAN : range;
+        c->doubt[i] = !miss & !(margin >= tri->guard);
+    }
+}
+
+static void decide(struct caster *c, const struct cast_setup *s, const double o[3], uint32_t n, float t_max)
+{
+    struct decide_ray ray = {.bvh = s->bvh, .t_max = t_max};
+    memcpy(ray.station_m, s->station_m, sizeof ray.station_m);
+    memcpy(ray.o_local, o, sizeof ray.o_local);
+    for (uint32_t i = 0; i < n; i++) {
+        if (!c->doubt[i]) continue;
+        struct decide_hit hit;
+        ray.dir[0] = c->dx[i];
+        ray.dir[1] = c->dy[i];
+        ray.dir[2] = c->dz[i];
+        decide_hit(&ray, c->prim[i], c->t[i], &c->counters, &hit);
+        c->prim[i] = hit.prim;
+        c->range_m[i] = hit.prim == RTC_INVALID_GEOMETRY_ID ? (double)NAN : hit.range_m;
     }
 }
 
@@ -104,12 +139,12 @@ static void add_noise(struct caster *c, const struct cast_setup *s, uint64_t pul
 /* An echo is there when the true range lies within the head's limits. Returns how many. */
 static uint32_t detect(struct caster *c, const struct cast_setup *s, struct line_block *block, uint32_t at, uint32_t n)
 {
-    const uint16_t *label = s->bvh->scene->label;
+    const struct bvh_triangle *triangle = s->bvh->triangle;
     uint32_t echoes = 0;
     for (uint32_t i = 0; i < n; i++) {
         int hit = c->range_m[i] >= s->range_min_m && c->range_m[i] <= s->range_max_m;
         block->echo[at + i] = hit ? 0x11 : 0;
-        block->label[at + i] = hit ? label[c->prim[i]] : LINE_LABEL_NONE;
+        block->label[at + i] = hit ? triangle[c->prim[i]].label : LINE_LABEL_NONE;
         block->refl_cdb[at + i] = LINE_REFL_NONE;
         if (!hit) c->range_m[i] = NAN;
         echoes += (uint32_t)hit;
@@ -211,11 +246,13 @@ static uint32_t cast_chunk(struct caster *c, const struct cast_setup *s, const s
         o[i] = s->station_m[i] - s->bvh->origin_m[i];
     struct bvh_rays rays = {.org = {(float)o[0], (float)o[1], (float)o[2]},
                             .t_max = (float)(s->range_max_m * 1.001),
-                            .dx = c->dx, .dy = c->dy, .dz = c->dz, .prim = c->prim, .t = c->t};
+                            .dx = c->fx, .dy = c->fy, .dz = c->fz, .prim = c->prim, .t = c->t, .u = c->u, .v = c->v};
     angles(c, run, at, n);
     directions(c, s->rotation, n);
+    to_float(c, n);
     bvh_intersect(s->bvh, &rays, n);
-    ranges(c, s->bvh, o, n);
+    refine(c, s->bvh, o, n);
+    decide(c, s, o, n, rays.t_max);
     uint32_t echoes = detect(c, s, block, at, n);
     if (s->noise_on) add_noise(c, s, run->pulse0 + at, n);
     if (s->layout == LINE_POLAR)

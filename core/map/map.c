@@ -94,15 +94,15 @@ void map_add_points(struct map *map, size_t n, const double *x_m, const double *
             map->counts.empty++;
             continue;
         }
-        if (!locate(map, x_m[i], y_m[i], &column, &row)) {
+        if (!locate(map, x_m[i], y_m[i], &column, &row) || fabs(z_m[i]) > MAP_MAX_Z_M) {
             map->counts.outside++;
             continue;
         }
         if (map->counts.drawn++ == 0) map->z0_m = z_m[i];
         struct map_pixel *pixel = &map->pixel[(size_t)row * map->width + column];
         const double height_m = z_m[i] - map->z0_m;
-        const double level = floor(height_m / map->level_m);
-        pixel->levels |= (uint64_t)1 << (unsigned)(level - 64 * floor(level / 64));
+        const double level = fmod(floor(height_m / map->level_m), 64);
+        pixel->levels |= (uint64_t)1 << (unsigned)(level < 0 ? level + 64 : level);
         if (!pixel->hit || (float)height_m < pixel->low_m) pixel->low_m = (float)height_m;
         pixel->hit = 1;
     }

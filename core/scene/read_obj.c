@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/scene/scene_build.h"
 #include "core/scene/text.h"
 
 struct span {
@@ -211,11 +212,16 @@ static int read_statements(struct obj *o, struct sh_err *err)
     return rc;
 }
 
+static void tick(void *build)
+{
+    build_progress(build, -1);
+}
+
 int read_obj(struct scene_build *b, struct sh_err *err)
 {
     struct obj o = {.b = b, .material = {"", 0}};
     build_base_name(b, &o.object.text, &o.object.len);
-    int rc = text_open(&o.t, b, err);
+    int rc = text_open(&o.t, b->spec->file, tick, b, err);
     o.t.continued = true;
     if (rc == SH_OK) rc = read_statements(&o, err);
     if (rc == SH_OK && o.n_unknown > 0)

@@ -1,45 +1,64 @@
 #include "core/scene/text.h"
 
 #include <errno.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 
 /* Read, not mapped: a file that shrinks while it is mapped would end the process. */
-static int read_whole(struct text *t, FILE *f, struct scene_build *b, struct sh_err *err)
+static int read_whole(struct text *t, FILE *f, void (*tick)(void *ctx), void *ctx, struct sh_err *err)
 {
     struct stat st;
-    if (fstat(fileno(f), &st) != 0) return build_fail(b, SH_EINPUT, err, "%s", strerror(errno));
+    if (fstat(fileno(f), &st) != 0) return text_fail(t, 0, SH_EINPUT, err, "%s", strerror(errno));
+    if (!S_ISREG(st.st_mode)) return text_fail(t, 0, SH_EINPUT, err, "not a file");
     t->size = (size_t)st.st_size;
     t->data = malloc(t->size + 1);
-    if (t->data == NULL) return build_fail(b, SH_ENOMEM, err, "no memory for %zu bytes", t->size);
+    if (t->data == NULL) return text_fail(t, 0, SH_ENOMEM, err, "no memory for %zu bytes", t->size);
     const size_t step = (size_t)16 << 20;
     for (size_t at = 0; at < t->size;) {
         size_t want = t->size - at < step ? t->size - at : step;
         size_t got = fread(t->data + at, 1, want, f);
         if (got < want)
-            return build_fail(b, SH_EINPUT, err, "%s",
-                              ferror(f) ? strerror(errno) : "got shorter while read");
+            return text_fail(t, 0, SH_EINPUT, err, "%s",
+                             ferror(f) ? strerror(errno) : "got shorter while read");
         at += got;
-        build_progress(b, -1);
+        if (tick != NULL) tick(ctx);
     }
     t->data[t->size] = '\0';
     return SH_OK;
 }
 
-int text_open(struct text *t, struct scene_build *b, struct sh_err *err)
+int text_fail(const struct text *t, uint64_t line, int code, struct sh_err *err, const char *fmt, ...)
 {
-    *t = (struct text){.line = 1};
-    FILE *f = fopen(b->spec->file, "rb");
-    if (f == NULL) return build_fail(b, SH_EINPUT, err, "%s", strerror(errno));
-    int rc = read_whole(t, f, b, err);
+    enum { LONGEST = 120 };
+    size_t len = strlen(t->path);
+    bool cut = len > LONGEST;
+    char place[48] = "", what[320];
+    if (line > 0) snprintf(place, sizeof place, ", line %llu", (unsigned long long)line);
+    va_list ap;
+    va_start(ap, fmt);
+    vsnprintf(what, sizeof what, fmt, ap);
+    va_end(ap);
+    for (char *c = what; *c != '\0'; c++)
+        if ((unsigned char)*c < ' ') *c = '?'; /* a broken file may hold anything: one line it stays */
+    return sh_fail(err, code, "%s%s%s: %s", cut ? "..." : "", t->path + (cut ? len - LONGEST : 0), place,
+                   what);
+}
+
+int text_open(struct text *t, const char *path, void (*tick)(void *ctx), void *ctx, struct sh_err *err)
+{
+    *t = (struct text){.path = path, .line = 1};
+    FILE *f = fopen(path, "rb");
+    if (f == NULL) return text_fail(t, 0, SH_EINPUT, err, "%s", strerror(errno));
+    int rc = read_whole(t, f, tick, ctx, err);
     fclose(f);
     if (rc != SH_OK) return rc;
     t->p = t->data;
     t->end = t->data + t->size;
     t->c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
-    if (t->c_locale == (locale_t)0) return build_fail(b, SH_ENOMEM, err, "no memory for a locale");
+    if (t->c_locale == (locale_t)0) return text_fail(t, 0, SH_ENOMEM, err, "no memory for a locale");
     return SH_OK;
 }
 

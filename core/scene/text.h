@@ -1,4 +1,4 @@
-/* A mesh file in memory, and reading text from it: words, numbers, lines.
+/* A file in memory, and reading text from it: words, numbers, lines.
  *
  * Numbers are exact (nearest double) and don't depend on the locale. */
 #ifndef CORE_SCENE_TEXT_H
@@ -9,10 +9,11 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "core/scene/scene_build.h"
+#include "core/err.h"
 
 struct text {
-    char *data; /* the whole file, with a NUL after it */
+    const char *path; /* the caller's */
+    char *data;       /* the whole file, with a NUL after it */
     size_t size;
     const char *p, *end;
     uint64_t line;  /* of p, from 1 */
@@ -20,8 +21,13 @@ struct text {
     locale_t c_locale;
 };
 
-int text_open(struct text *t, struct scene_build *b, struct sh_err *err);
+/* Reads the whole file; tick (may be NULL) is called every 16 MiB. text_close is due in any case. */
+int text_open(struct text *t, const char *path, void (*tick)(void *ctx), void *ctx, struct sh_err *err);
 void text_close(struct text *t);
+
+/* Fails with "FILE, line N: text", or without the line when it is 0. Returns code. */
+int text_fail(const struct text *t, uint64_t line, int code, struct sh_err *err, const char *fmt, ...)
+    __attribute__((format(printf, 5, 6)));
 
 /* Blanks, and line ends that a backslash hides. */
 void text_skip_blanks(struct text *t);

@@ -16,14 +16,14 @@ void host_turn_table(struct scanhead *sh)
 }
 
 /* sin and cos of u >= 0 turns: the table gives whole 1/256 turns, the series the rest. |r| <= pi/256, so the
- * first terms left out, r^9/9! and r^8/8!, are below 2^-66 and 2^-65: the result is as good as its roundings,
- * in a quarter of the time of libm (the range is reduced by the encoder's turns, exactly). */
+ * first terms left out, r^7/7! and r^8/8!, are below 2^-56 and 2^-66: nothing against the rounding of u
+ * itself, and nothing has to be reduced by a pi that is not exact. */
 static inline void sincos_turns(const struct scanhead *sh, double u, double *s, double *c)
 {
     double part = u * HOST_TURN_PARTS;
     int64_t k = (int64_t)(part + 0.5);
     double r = (part - (double)k) * (TWO_PI / HOST_TURN_PARTS), r2 = r * r;
-    double sin_r = r + r * r2 * (-1.0 / 6 + r2 * (1.0 / 120 - r2 * (1.0 / 5040)));
+    double sin_r = r + r * r2 * (-1.0 / 6 + r2 * (1.0 / 120));
     double cos_r_1 = r2 * (-0.5 + r2 * (1.0 / 24 - r2 * (1.0 / 720)));
     double sk = sh->sin_part[k & (HOST_TURN_PARTS - 1)], ck = sh->cos_part[k & (HOST_TURN_PARTS - 1)];
     *s = sk + (ck * sin_r + sk * cos_r_1);

@@ -192,6 +192,10 @@ static ssize_t pty_read(void *link, int session, void *buf, size_t len)
 {
     struct pty_link *pty = link;
     if (session != 0 || !pty->open) return SH_ECLOSED;
+    /* Bytes of a client that has come meanwhile belong to its own session: answers to them must not be
+     * dropped with what is left of this one. */
+    pty_read_inotify(pty, 1);
+    if (pty->tell_closed || pty->tell_opened) return 0;
     ssize_t n = read(pty->device.master, buf, len);
     if (n >= 0) return n;
     return errno == EAGAIN || errno == EINTR ? 0 : SH_ECLOSED; /* EIO: hung up, and all is read */

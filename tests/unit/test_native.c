@@ -711,8 +711,9 @@ static void test_parser_every_byte_added(void **state)
     for (size_t at = 0; at <= stream_len; at++) {
         memcpy(hurt, stream, at);
         hurt[at] = added[at % 3];
-        /* inside a frame, a byte like the one it comes before could as well stand behind it */
-        if (at < stream_len && hurt[at] == stream[at]) hurt[at] ^= 0x55;
+        /* a byte like a neighbour could as well stand on that neighbour's other side, outside the frame */
+        while (at < stream_len && (hurt[at] == stream[at] || (at > 0 && hurt[at] == stream[at - 1])))
+            hurt[at]++;
         memcpy(hurt + at + 1, stream + at, stream_len - at);
         /* a byte before the first byte of a frame hurts nothing */
         size_t inside = at;
@@ -743,19 +744,34 @@ static void test_parser_every_cut(void **state)
         run_hurt(stream, at, at, stream_len);
 }
 
-/* Losing [from, to) and losing the same stretch one byte earlier leave the same bytes where the bytes before
- * both ends are equal (headers begin alike). If such a shift makes the loss end where a piece begins, that
- * piece is whole. */
+static int is_boundary(size_t at)
+{
+    for (int i = 0; i < n_pieces; i++)
+        if (piece[i].at == at) return 1;
+    return at == stream_len;
+}
+
+/* Losing [from, to) leaves the same bytes as losing that stretch some bytes later, where the bytes after both
+ * ends are equal, or earlier, where those before are (headers begin alike, payloads end in zeros). If such a
+ * shift makes the loss begin where a piece ends, or end where one begins, that piece is whole after all; the
+ * first of two takes the bytes. */
 static void slide_to_piece(size_t *from, size_t *to)
 {
-    for (size_t back = 0; back <= *from; back++) {
-        for (int i = 0; i < n_pieces; i++) {
-            if (piece[i].at != *to - back) continue;
-            *from -= back;
-            *to -= back;
+    for (size_t n = 0;; n++) {
+        if (is_boundary(*from + n)) {
+            *from += n;
+            *to += n;
             return;
         }
-        if (back == *from || stream[*from - back - 1] != stream[*to - back - 1]) return;
+        if (*to + n >= stream_len || stream[*from + n] != stream[*to + n]) break;
+    }
+    for (size_t n = 0; n <= *from; n++) {
+        if (is_boundary(*to - n)) {
+            *from -= n;
+            *to -= n;
+            return;
+        }
+        if (n == *from || stream[*from - n - 1] != stream[*to - n - 1]) return;
     }
 }
 

@@ -1,0 +1,193 @@
+/* Near a border: which triangle does the ray really meet? In double. */
+#include <math.h>
+#include <stdbool.h>
+
+#include "core/cast/bvh.h"
+
+enum { DECIDE_MAX_ROUNDS = 32 };
+
+struct search {
+    const struct decide_ray *ray;
+    uint32_t prim;             /* best so far */
+    double range_m;
+    uint32_t near_prim;        /* the one that the ray misses by least; gap 1: double precision can't tell */
+    double near_gap, near_range_m;
+};
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static int before(const double a[3], const double b[3])
+{
+    for (int i = 0; i < 3; i++)
+        if (a[i] != b[i]) return a[i] < b[i];
+    return 0;
+}
+
+/* On which side of the edge a-b the ray passes, as the distance across the ray times the edge's length; corners relative to
+ * the ray's origin. Taken in one order of the corners whatever triangle asks, so that two triangles of an edge get the same
+ * number with opposite signs. */
+static double edge_side(const double a[3], const double b[3], const double dir[3])
+{
+    int swap = before(b, a);
+    const double *p = swap ? b : a, *q = swap ? a : b;
+    double e[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]};
+    double side = dir[0] * (p[1] * e[2] - p[2] * e[1]) + dir[1] * (p[2] * e[0] - p[0] * e[2]) +
+                  dir[2] * (p[0] * e[1] - p[1] * e[0]);
+    return swap ? -side : side;
+}
+
+static double edge_length(const double a[3], const double b[3])
+{
+    double e[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+    return sqrt(dot(e, e));
+}
+
+static double plane_range(const struct decide_ray *ray, uint32_t prim)
+{
+    const struct bvh_triangle *tri = &ray->bvh->triangle[prim];
+    return (tri->d - dot(tri->n, ray->o_local)) / dot(tri->n, ray->dir);
+}
+
+/* Range along the ray of the point where it comes nearest to the segment. */
+static double edge_range(const double a[3], const double b[3], const double dir[3])
+{
+    double e[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+    double ee = dot(e, e), ed = dot(e, dir), ae = dot(a, e), ad = dot(a, dir), dd = dot(dir, dir);
+    double det = ee * dd - ed * ed;
+    double s = det > 0.0 ? (ed * ad - dd * ae) / det : 0.0;
+    s = s < 0.0 ? 0.0 : s > 1.0 ? 1.0 : s;
+    return (ad + s * ed) / dd;
+}
+
+/* Range to a triangle that the ray does meet. Where the ray lies almost in its plane the plane's range runs away: it is
+ * kept between the triangle's ends. */
+static double held_range(const struct decide_ray *ray, uint32_t prim, double v[3][3])
+{
+    double lo = INFINITY, hi = -INFINITY, range = plane_range(ray, prim);
+    for (int i = 0; i < 3; i++) {
+        double along = dot(v[i], ray->dir);
+        lo = fmin(lo, along);
+        hi = fmax(hi, along);
+    }
+    if (range >= lo && range <= hi) return range;
+    if (range > hi) return hi;
+    return isfinite(lo) ? lo : range;
+}
+
+/* Corners relative to the ray's origin, and on which side of each edge the ray passes. */
+static void look_at(const struct decide_ray *ray, uint32_t prim, double v[3][3], double side[3])
+{
+    const struct scene *scene = ray->bvh->scene;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            v[i][j] = scene->vertex_m[scene->triangle[prim][i]][j] - ray->station_m[j];
+    for (int i = 0; i < 3; i++)
+        side[i] = edge_side(v[i], v[(i + 1) % 3], ray->dir);
+}
+
+static int is_inside(const double side[3])
+{
+    return (side[0] >= 0.0 && side[1] >= 0.0 && side[2] >= 0.0) || (side[0] <= 0.0 && side[1] <= 0.0 && side[2] <= 0.0);
+}
+
+/* Remembers the triangle that the ray misses by least, in units of what double precision can tell at its edges. */
+static void note_miss(struct search *s, uint32_t prim, double v[3][3], const double side[3])
+{
+    const double *dir = s->ray->dir;
+    double sign = side[0] + side[1] + side[2] < 0.0 ? -1.0 : 1.0; /* of n . dir */
+    double gap = -INFINITY, range = 0.0;
+    for (int i = 0; i < 3; i++) {
+        const double *a = v[i], *b = v[(i + 1) % 3];
+        double blur = 8.0 * 0x1p-53 * sqrt(fmax(dot(a, a), dot(b, b))) * edge_length(a, b);
+        if (-sign * side[i] <= gap * blur) continue;
+        gap = -sign * side[i] / blur;
+        range = edge_range(a, b, dir);
+    }
+    if (gap >= s->near_gap || range < 0.0) return;
+    s->near_gap = gap;
+    s->near_prim = prim;
+    s->near_range_m = range;
+}
+
+static void try_triangle(struct search *s, uint32_t prim)
+{
+    double v[3][3], side[3];
+    look_at(s->ray, prim, v, side);
+    if (!is_inside(side)) {
+        note_miss(s, prim, v, side);
+        return;
+    }
+    double range = held_range(s->ray, prim, v);
+    if (side[0] == 0.0 && side[1] == 0.0 && side[2] == 0.0) /* the ray lies in the plane: it meets an edge first */
+        range = fmin(fmin(edge_range(v[0], v[1], s->ray->dir), edge_range(v[1], v[2], s->ray->dir)),
+                     edge_range(v[2], v[0], s->ray->dir));
+    if (!(range >= 0.0)) return;
+    double same = 1e-12 * range;
+    if (range < s->range_m - same || (range <= s->range_m + same && prim < s->prim)) {
+        s->prim = prim;
+        s->range_m = range;
+    }
+}
+
+static bool visit(struct RTCPointQueryFunctionArguments *args)
+{
+    try_triangle(args->userPtr, args->primID);
+    return false;
+}
+
+/* All triangles near the point at range_m on the ray. */
+static void try_around(struct search *s, double range_m, double radius_m)
+{
+    struct RTCPointQueryContext context;
+    struct RTCPointQuery query = {.radius = (float)radius_m};
+    const struct decide_ray *ray = s->ray;
+    rtcInitPointQueryContext(&context);
+    query.x = (float)(ray->o_local[0] + range_m * ray->dir[0]);
+    query.y = (float)(ray->o_local[1] + range_m * ray->dir[1]);
+    query.z = (float)(ray->o_local[2] + range_m * ray->dir[2]);
+    rtcPointQuery(ray->bvh->rtc, &query, &context, visit, s);
+}
+
+/* How far from the proposed point along the ray an edge's neighbours may be met: the width, stretched by the incidence. */
+static double search_radius(const struct decide_ray *ray, uint32_t prim, double range_m)
+{
+    const struct bvh_triangle *tri = &ray->bvh->triangle[prim];
+    double cosine = fabs(dot(tri->n, ray->dir)) / sqrt(dot(tri->n, tri->n));
+    double radius = 4.0 * (double)tri->widen_m * (1.0 + 1.0 / fmax(cosine, 1e-3));
+    return fmin(radius, 0.01 * range_m + 4.0 * (double)tri->widen_m);
+}
+
+void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct cast_counters *counters,
+                struct decide_hit *hit)
+{
+    struct search s = {.ray = ray, .range_m = INFINITY, .prim = RTC_INVALID_GEOMETRY_ID,
+                       .near_prim = RTC_INVALID_GEOMETRY_ID, .near_gap = INFINITY};
+    counters->near_border++;
+    for (int round = 0; round < DECIDE_MAX_ROUNDS && prim != RTC_INVALID_GEOMETRY_ID; round++) {
+        try_triangle(&s, prim);
+        if (s.prim == prim) break; /* inside in double as well: the common case */
+        counters->decided++;
+        double range_m = (double)t, radius_m = search_radius(ray, prim, range_m);
+        try_around(&s, range_m, radius_m);
+        if (s.prim != RTC_INVALID_GEOMETRY_ID || s.near_gap <= 1.0) break;
+        counters->went_on++;
+        float org[3], dir[3];
+        for (int i = 0; i < 3; i++) {
+            org[i] = (float)ray->o_local[i];
+            dir[i] = (float)ray->dir[i];
+        }
+        float from = nextafterf((float)(range_m + 0.5 * radius_m), INFINITY);
+        bvh_intersect_one(ray->bvh, org, dir, from, ray->t_max, &prim, &t);
+    }
+    /* So near to an edge that double precision can't tell its sides apart: the edge is hit, nothing passes. */
+    if (s.near_gap <= 1.0 && !(s.range_m <= s.near_range_m)) {
+        counters->undecided++;
+        s.prim = s.near_prim;
+        s.range_m = s.near_range_m;
+    }
+    hit->prim = s.prim;
+    hit->range_m = s.range_m;
+}

@@ -1,0 +1,84 @@
+/* A recorded point cloud, and how far it lies from the scene.
+ *
+ * A cloud is read from a PLY file (ASCII, or binary of either byte order, any number types). Element vertex
+ * has the properties x, y, z and, where they are there, station (from 1), echo and label, as our recorder
+ * writes them; all else is passed over. Ownership: cloud_read allocates, cloud_free releases. A cloud that is
+ * read is constant and may be used from any thread. */
+#ifndef CORE_CLOUD_H
+#define CORE_CLOUD_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "core/distance.h"
+#include "core/err.h"
+#include "core/georef.h"
+
+enum {
+    CLOUD_LABEL_NONE = 0xffff,
+    CLOUD_EPSG_UNKNOWN = -1,
+    CLOUD_TRIANGLE_NONE = 0xffffffff,
+};
+
+struct cloud {
+    size_t n;
+    double (*xyz_m)[3]; /* [n] as in the file; three times not-a-number: a shot without echo */
+    uint16_t *station;  /* [n] from 1; NULL: the file has none */
+    uint16_t *label;    /* [n] CLOUD_LABEL_NONE: none; NULL: the file has none */
+    uint8_t *echo;      /* [n] 0: shot without echo; NULL: the file has none */
+    int64_t epsg; /* of the header's comment "epsg N", 0: scene frame; CLOUD_EPSG_UNKNOWN: it has none */
+};
+
+/* Errors (SH_EINPUT, naming file and line, or byte): missing or unreadable, not a PLY file, x, y or z
+ * missing, a count the file can't hold, truncated, infinite coordinates or only some of the three not a
+ * number, a station, echo or label that is not a whole number in its range. Warns of other elements and of
+ * bytes after the last one. */
+int cloud_read(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err);
+void cloud_free(struct cloud *cloud);
+
+/* How cloud_compare takes a point to the scene. */
+struct cloud_site {
+    const struct distance *index;
+    const struct georef *const
+        *georef; /* [n_stations], by station - 1; NULL: the cloud is in the scene frame already */
+    uint32_t n_stations;
+    double max_m;     /* how far to look */
+    unsigned threads; /* at least 1; the result does not depend on it */
+};
+
+/* Per point: its distance from the nearest triangle (not-a-number: shot without echo; INFINITY: nothing
+ * within max_m) and that triangle's number, or CLOUD_TRIANGLE_NONE. Points without a station are of the first
+ * one. SH_EINPUT: a point's station is not among n_stations. */
+int cloud_compare(const struct cloud *cloud, const struct cloud_site *site, const struct sh_report *report,
+                  double *distance_m, uint32_t *triangle, struct sh_err *err);
+
+struct cloud_coverage {
+    uint32_t surfaces_hit, triangles_hit;
+};
+
+/* The surface of point i: its label, or where the file has none its nearest triangle's; CLOUD_LABEL_NONE when
+ * there is no such triangle. */
+uint16_t cloud_surface(const struct cloud *cloud, const struct scene *scene, const uint32_t *triangle,
+                       size_t i);
+
+/* How many of the scene's surfaces and triangles have points (far ones have no triangle).
+ * SH_EINPUT: a label the scene doesn't have. */
+int cloud_cover(const struct cloud *cloud, const struct scene *scene, const uint32_t *triangle,
+                struct cloud_coverage *out, struct sh_err *err);
+
+/* A percentile is the nearest rank: the smallest value that at least so many of all do not exceed. Mean, RMS,
+ * percentiles and maximum are over the points that are not far, and not-a-number when there are none. */
+struct cloud_stats {
+    size_t points; /* with coordinates, far ones included */
+    size_t empty;  /* shots without echo */
+    size_t far;    /* nothing within the reach of the search */
+    size_t beyond; /* farther than the tolerance, far ones included */
+    double mean_m, rms_m, p50_m, p95_m, p999_m, max_m;
+    size_t worst; /* the first point at max_m, the first far one if there is one; n when no point has
+                     coordinates */
+};
+
+/* distance_m as cloud_compare gives it; not negative. */
+void cloud_stats(const double *distance_m, size_t n, double tolerance_m, struct cloud_stats *out);
+
+#endif

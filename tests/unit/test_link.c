@@ -1,0 +1,415 @@
+/* The links null, file, fd and tcp; the pty has its own program. */
+#include "tests/unit/link_test.h"
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <netinet/in.h>
+#include <signal.h>
+#include <sys/eventfd.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+
+static void test_table(void **state)
+{
+    (void)state;
+    const char *const names[] = {"null", "file", "pty", "tcp", "fd"};
+    const enum link_type types[] = {LINK_NULL, LINK_FILE, LINK_PTY, LINK_TCP, LINK_FD};
+    for (int i = 0; i < 5; i++) {
+        assert_int_equal(link_type_parse(names[i]), types[i]);
+        assert_string_equal(link_ops_get(types[i])->name, names[i]);
+        assert_true(link_ops_get(types[i])->capacity(NULL) == 0);
+    }
+    assert_int_equal(link_type_parse("udp"), -1);
+    assert_null(link_ops_get((enum link_type)5));
+    assert_null(link_ops_get((enum link_type) - 1));
+}
+
+static void test_null(void **state)
+{
+    (void)state;
+    struct link_spec spec = {.type = LINK_NULL};
+    struct bench bench = bench_open(&spec);
+    char text[32];
+    bench.ops->endpoint(bench.link, text, sizeof text);
+    assert_string_equal(text, "null");
+    bench_expect(&bench, LINK_OPENED, 0);
+    bench_expect(&bench, LINK_WRITABLE, 1);
+    assert_int_equal(bench_poll(&bench, 0, 0), 0);
+    assert_int_equal(bench.ops->write(bench.link, 0, text, 32), 32);
+    assert_int_equal(bench.ops->read(bench.link, 0, text, 32), 0);
+    bench_close(&bench);
+}
+
+/* A thousand signals are one event, and a link without sessions hears it as well. */
+static void test_wake(void **state)
+{
+    (void)state;
+    const enum link_type types[] = {LINK_NULL, LINK_PTY, LINK_TCP};
+    for (int i = 0; i < 3; i++) {
+        struct link_spec spec = {.type = types[i], .max_sessions = 1};
+        struct bench bench = bench_open(&spec);
+        if (types[i] == LINK_NULL) bench_expect(&bench, LINK_OPENED, 0);
+        bench.wake = eventfd(0, EFD_CLOEXEC);
+        for (int k = 0; k < 1000; k++)
+            assert_int_equal(eventfd_write(bench.wake, 1), 0);
+        bench_expect(&bench, LINK_WOKEN, 0);
+        assert_int_equal(bench_poll(&bench, 0, 0), 0);
+        close(bench.wake);
+        bench_close(&bench);
+    }
+}
+
+static void test_file(void **state)
+{
+    (void)state;
+    struct link_spec spec = {.type = LINK_FILE};
+    char *dir = test_dir(), text[300], want[300], back[16];
+    snprintf(spec.path, sizeof spec.path, "%s/stream.shs", dir);
+    for (int round = 0; round < 2; round++) { /* the second time the file is there, and is truncated */
+        struct bench bench = bench_open(&spec);
+        bench.ops->endpoint(bench.link, text, sizeof text);
+        snprintf(want, sizeof want, "file:%s", spec.path);
+        assert_string_equal(text, want);
+        bench_expect(&bench, LINK_OPENED, 0);
+        bench_write_all(&bench, 0, "abc", 3);
+        bench_write_all(&bench, 0, "defg", 4);
+        assert_int_equal(bench.ops->read(bench.link, 0, text, 3), 0);
+        bench_close(&bench);
+    }
+    int fd = open(spec.path, O_RDONLY);
+    assert_int_equal(read(fd, back, sizeof back), 7);
+    assert_memory_equal(back, "abcdefg", 7);
+    close(fd);
+    unlink(spec.path);
+    rmdir(dir);
+}
+
+static void expect_refused(const struct link_spec *spec, int code, const char *part)
+{
+    struct sh_err err = {0, ""};
+    void *link = NULL;
+    assert_int_equal(link_ops_get(spec->type)->open(spec, &link, &err), code);
+    assert_null(link);
+    if (strstr(err.text, part) == NULL || strchr(err.text, '\n') != NULL)
+        fail_msg("'%s' without '%s'", err.text, part);
+}
+
+static void test_file_refusals(void **state)
+{
+    (void)state;
+    char *dir = test_dir();
+    struct link_spec spec = {.type = LINK_FILE};
+    expect_refused(&spec, SH_EINPUT, "path");
+    snprintf(spec.path, sizeof spec.path, "%s", dir);
+    expect_refused(&spec, SH_EINPUT, dir);
+    snprintf(spec.path, sizeof spec.path, "%s/no/such", dir);
+    expect_refused(&spec, SH_EINPUT, spec.path);
+    snprintf(spec.path, sizeof spec.path, "%s/fifo", dir);
+    assert_int_equal(mkfifo(spec.path, 0600), 0);
+    expect_refused(&spec, SH_EINPUT, "regular file"); /* nobody reads: must not block */
+    int reader = open(spec.path, O_RDONLY | O_NONBLOCK);
+    expect_refused(&spec, SH_EINPUT, "regular file");
+    close(reader);
+    unlink(spec.path);
+    rmdir(dir);
+}
+
+/* /dev/full is a full disk. */
+static void test_file_full(void **state)
+{
+    (void)state;
+    struct link_spec spec = {.type = LINK_FILE, .path = "/dev/full"};
+    struct bench bench = bench_open(&spec);
+    bench_expect(&bench, LINK_OPENED, 0);
+    assert_int_equal(bench.ops->write(bench.link, 0, "x", 1), SH_EIO);
+    assert_string_equal(bench_expect(&bench, LINK_CLOSED, 0).peer, "No space left on device");
+    assert_int_equal(bench_poll(&bench, 1, 0), 0);
+    assert_int_equal(bench.ops->write(bench.link, 0, "x", 1), SH_ECLOSED);
+    bench_close(&bench);
+}
+
+static void fill_bytes(uint8_t *data, size_t len)
+{
+    for (size_t i = 0; i < len; i++)
+        data[i] = (uint8_t)(i ^ i >> 8);
+}
+
+static void exchange(struct bench *bench, int session, int fd)
+{
+    uint8_t out[2048], back[2048];
+    fill_bytes(out, sizeof out);
+    bench_write_all(bench, session, out, sizeof out);
+    fd_read_all(fd, back, sizeof back);
+    assert_memory_equal(out, back, sizeof out);
+    memset(back, 0, sizeof back);
+    assert_int_equal(write(fd, out, sizeof out), sizeof out);
+    bench_read_all(bench, session, back, sizeof back);
+    assert_memory_equal(out, back, sizeof out);
+}
+
+static void test_fd(void **state)
+{
+    (void)state;
+    int pair[2];
+    assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair), 0);
+    struct link_spec spec = {.type = LINK_FD, .fd = pair[0]};
+    struct bench bench = bench_open(&spec);
+    bench_expect(&bench, LINK_OPENED, 0);
+    exchange(&bench, 0, pair[1]);
+    size_t held = bench_fill(&bench, 0);
+    fd_drain(pair[1], held);
+    bench_expect(&bench, LINK_WRITABLE, 1);
+    close(pair[1]);
+    bench_expect(&bench, LINK_CLOSED, 1);
+    assert_int_equal(bench.ops->write(bench.link, 0, "x", 1), SH_ECLOSED); /* and no SIGPIPE */
+    assert_int_equal(bench_poll(&bench, 1, 0), 0);
+    bench_close(&bench);
+
+    int pipes[2];
+    assert_int_equal(pipe(pipes), 0);
+    spec.fd = pipes[0];
+    expect_refused(&spec, SH_EINPUT, "socket");
+    close(pipes[0]);
+    close(pipes[1]);
+    spec.fd = -1;
+    expect_refused(&spec, SH_EINPUT, "fd:-1");
+}
+
+static int tcp_port(const struct bench *bench)
+{
+    char text[96];
+    int port = 0;
+    bench->ops->endpoint(bench->link, text, sizeof text);
+    assert_int_equal(sscanf(text, "tcp:127.0.0.1:%d", &port), 1);
+    assert_in_range(port, 1, 65535);
+    return port;
+}
+
+static int tcp_client(int port)
+{
+    struct sockaddr_in at = {.sin_family = AF_INET, .sin_port = htons((uint16_t)port)};
+    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    assert_int_equal(connect(fd, (struct sockaddr *)&at, sizeof at), 0);
+    return fd;
+}
+
+static void test_tcp_sessions(void **state)
+{
+    (void)state;
+    struct link_spec spec = {.type = LINK_TCP, .max_sessions = 2};
+    struct bench bench = bench_open(&spec);
+    const int port = tcp_port(&bench);
+    int a = tcp_client(port);
+    assert_int_equal(bench_expect(&bench, LINK_OPENED, 0).session, 0);
+    int b = tcp_client(port);
+    struct link_event event = bench_expect(&bench, LINK_OPENED, 0);
+    assert_int_equal(event.session, 1);
+    assert_int_equal(strncmp(event.peer, "127.0.0.1:", 10), 0);
+    exchange(&bench, 0, a);
+    exchange(&bench, 1, b);
+    int c = tcp_client(port);
+    bench_expect(&bench, LINK_REFUSED, 0);
+    char byte;
+    assert_int_equal(read(c, &byte, 1), 0); /* told, not left waiting */
+    close(c);
+    exchange(&bench, 1, b);
+    close(a);
+    assert_int_equal(bench_expect(&bench, LINK_CLOSED, 3).session, 0);
+    assert_int_equal(bench.ops->write(bench.link, 0, "x", 1), SH_ECLOSED);
+    a = tcp_client(port);
+    assert_int_equal(bench_expect(&bench, LINK_OPENED, 0).session, 0);
+    exchange(&bench, 0, a);
+    assert_int_equal(bench.ops->write(bench.link, 7, "x", 1), SH_ECLOSED);
+    assert_int_equal(bench.ops->read(bench.link, -1, &byte, 1), SH_ECLOSED);
+    close(a);
+    close(b);
+    bench_close(&bench);
+}
+
+static void test_tcp_endings(void **state)
+{
+    (void)state;
+    struct link_spec spec = {.type = LINK_TCP, .max_sessions = 1};
+    struct bench bench = bench_open(&spec);
+    char byte;
+    /* half closed, with something still to read */
+    int fd = tcp_client(tcp_port(&bench));
+    bench_expect(&bench, LINK_OPENED, 0);
+    assert_int_equal(write(fd, "q", 1), 1);
+    assert_int_equal(shutdown(fd, SHUT_WR), 0);
+    bench_read_all(&bench, 0, &byte, 1);
+    assert_int_equal(byte, 'q');
+    bench_expect(&bench, LINK_CLOSED, 0);
+    assert_int_equal(read(fd, &byte, 1), 0);
+    close(fd);
+    /* reset, while frames are on their way */
+    fd = tcp_client(tcp_port(&bench));
+    bench_expect(&bench, LINK_OPENED, 0);
+    bench_fill(&bench, 0);
+    const struct linger reset = {.l_onoff = 1, .l_linger = 0};
+    setsockopt(fd, SOL_SOCKET, SO_LINGER, &reset, sizeof reset);
+    close(fd);
+    bench_expect(&bench, LINK_CLOSED, 1);
+    /* noticed by write before poll came to it */
+    fd = tcp_client(tcp_port(&bench));
+    bench_expect(&bench, LINK_OPENED, 0);
+    setsockopt(fd, SOL_SOCKET, SO_LINGER, &reset, sizeof reset);
+    close(fd);
+    ssize_t n = 0;
+    for (const int64_t end_ms = now_ms() + DEADLINE_MS; n >= 0 && now_ms() < end_ms;)
+        n = bench.ops->write(bench.link, 0, "x", 1);
+    assert_int_equal(n, SH_ECLOSED);
+    bench_expect(&bench, LINK_CLOSED, 0);
+    assert_int_equal(bench_poll(&bench, 1, 0), 0);
+    bench_close(&bench);
+}
+
+static void test_tcp_full(void **state)
+{
+    (void)state;
+    struct link_spec spec = {.type = LINK_TCP, .max_sessions = 2};
+    struct bench bench = bench_open(&spec);
+    int lazy = tcp_client(tcp_port(&bench));
+    bench_expect(&bench, LINK_OPENED, 0);
+    int other = tcp_client(tcp_port(&bench));
+    bench_expect(&bench, LINK_OPENED, 0);
+    size_t held = bench_fill(&bench, 0);
+    exchange(&bench, 1, other); /* one lazy reader does not hold up another */
+    fd_drain(lazy, held);
+    assert_int_equal(bench_expect(&bench, LINK_WRITABLE, 1).session, 0);
+    close(lazy);
+    close(other);
+    bench_close(&bench);
+}
+
+/* The child is killed in the middle of its reading and writing. */
+static void test_tcp_kill(void **state)
+{
+    (void)state;
+    struct link_spec spec = {.type = LINK_TCP, .max_sessions = 1};
+    struct bench bench = bench_open(&spec);
+    int fd = tcp_client(tcp_port(&bench));
+    bench_expect(&bench, LINK_OPENED, 0);
+    pid_t child = fork();
+    if (child == 0) {
+        char data[4096];
+        while (read(fd, data, sizeof data) > 0 && write(fd, data, 16) > 0)
+            ;
+        _exit(0);
+    }
+    close(fd);
+    char data[10000] = "";
+    bench_write_all(&bench, 0, data, sizeof data);
+    bench_read_all(&bench, 0, data, 16);
+    kill(child, SIGKILL);
+    waitpid(child, NULL, 0);
+    for (int closed = 0; !closed;) { /* what the child wrote comes first */
+        while (bench.ops->read(bench.link, 0, data, sizeof data) > 0)
+            ;
+        bench.n_queue = 0;
+        bench_poll(&bench, 0, DEADLINE_MS);
+        assert_true(bench.n_queue > 0);
+        closed = bench.queue[0].kind == LINK_CLOSED;
+    }
+    bench_close(&bench);
+}
+
+/* Without a free descriptor the client is turned away and poll waits again. */
+static void test_tcp_descriptors(void **state)
+{
+    (void)state;
+    struct link_spec spec = {.type = LINK_TCP, .max_sessions = 4};
+    struct bench bench = bench_open(&spec);
+    int fd = tcp_client(tcp_port(&bench)), hog[64], n = 0;
+    struct rlimit before, few;
+    getrlimit(RLIMIT_NOFILE, &before);
+    few = (struct rlimit){.rlim_cur = (rlim_t)fd + 8, .rlim_max = before.rlim_max};
+    assert_int_equal(setrlimit(RLIMIT_NOFILE, &few), 0);
+    while (n < 64 && (hog[n] = dup(fd)) >= 0)
+        n++;
+    bench_expect(&bench, LINK_REFUSED, 0);
+    assert_int_equal(bench_poll(&bench, 0, 0), 0);
+    while (n > 0)
+        close(hog[--n]);
+    setrlimit(RLIMIT_NOFILE, &before);
+    char byte;
+    assert_int_equal(read(fd, &byte, 1), 0);
+    close(fd);
+    fd = tcp_client(tcp_port(&bench));
+    bench_expect(&bench, LINK_OPENED, 0);
+    exchange(&bench, 0, fd);
+    close(fd);
+    bench_close(&bench);
+}
+
+/* Events that do not fit into the caller's array come with the next call. */
+static void test_tcp_small_array(void **state)
+{
+    (void)state;
+    struct link_spec spec = {.type = LINK_TCP, .max_sessions = 2};
+    struct bench bench = bench_open(&spec);
+    struct link_event event;
+    int fd[3], seen[6] = {0};
+    for (int i = 0; i < 3; i++)
+        fd[i] = tcp_client(tcp_port(&bench));
+    for (int i = 0; i < 3; i++) {
+        assert_int_equal(bench.ops->poll(bench.link, -1, 0, DEADLINE_MS, &event, 1), 1);
+        seen[event.kind]++;
+    }
+    for (int i = 0; i < 3; i++)
+        close(fd[i]);
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(bench.ops->poll(bench.link, -1, 0, DEADLINE_MS, &event, 1), 1);
+        seen[event.kind]++;
+    }
+    assert_int_equal(seen[LINK_OPENED], 2);
+    assert_int_equal(seen[LINK_REFUSED], 1);
+    assert_int_equal(seen[LINK_CLOSED], 2);
+    bench_close(&bench);
+}
+
+static void test_tcp_refusals(void **state)
+{
+    (void)state;
+    struct link_spec spec = {.type = LINK_TCP, .max_sessions = 1};
+    struct bench bench = bench_open(&spec);
+    char want[64];
+    spec.port = tcp_port(&bench);
+    snprintf(want, sizeof want, "tcp:127.0.0.1:%d: cannot listen: Address already in use", spec.port);
+    expect_refused(&spec, SH_EINPUT, want);
+    bench_close(&bench);
+    spec.port = 65536;
+    expect_refused(&spec, SH_EINPUT, "0 to 65535");
+    spec.port = 0;
+    spec.max_sessions = LINK_MAX_SESSIONS + 1;
+    expect_refused(&spec, SH_EINPUT, "1 to 8");
+    spec.max_sessions = 1;
+    snprintf(spec.address, sizeof spec.address, "300.1.1.1");
+    expect_refused(&spec, SH_EINPUT, "tcp:300.1.1.1:0");
+    snprintf(spec.address, sizeof spec.address, "192.0.2.1"); /* TEST-NET: never an address of ours */
+    expect_refused(&spec, SH_EINPUT, "tcp:192.0.2.1:0: cannot listen");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_table),
+        cmocka_unit_test(test_null),
+        cmocka_unit_test(test_wake),
+        cmocka_unit_test(test_file),
+        cmocka_unit_test(test_file_refusals),
+        cmocka_unit_test(test_file_full),
+        cmocka_unit_test(test_fd),
+        cmocka_unit_test(test_tcp_sessions),
+        cmocka_unit_test(test_tcp_endings),
+        cmocka_unit_test(test_tcp_full),
+        cmocka_unit_test(test_tcp_kill),
+        cmocka_unit_test(test_tcp_descriptors),
+        cmocka_unit_test(test_tcp_small_array),
+        cmocka_unit_test(test_tcp_refusals),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
