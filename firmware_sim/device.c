@@ -126,6 +126,29 @@ static void say_overrun(struct device *device)
     device->lost_pulses_said = pulses;
 }
 
+uint32_t device_tick_pulses(const struct config *cfg)
+{
+    uint32_t n = (uint32_t)ceil((double)cfg->profile.prr_max_uhz * 1e-6 / cfg->tick_hz);
+    return n + n / 8 + 2 * SCHEDULE_PACKET; /* an eighth: to catch up with */
+}
+
+uint32_t device_tick_lines(const struct config *cfg)
+{
+    return (uint32_t)ceil((double)cfg->profile.lines_max_uhz * 1e-6 / cfg->tick_hz) + 2;
+}
+
+/* First pulse that is too many for this tick. When the rates jump up, what is due since the last cut, up to 15 pulses at the
+ * old rate, comes at the new one and may fill several ticks. */
+static uint64_t tick_room_end(const struct device *device)
+{
+    const struct schedule_segment *seg = &device->segment;
+    struct schedule_line line;
+    uint64_t last_line = schedule_line_of(seg, device->pulse_next) + device_tick_lines(device->site->cfg) - 1;
+    schedule_get_line(seg, last_line, &line);
+    uint64_t end = device->pulse_next + device_tick_pulses(device->site->cfg);
+    return line.pulse_end < end ? line.pulse_end : schedule_cut(seg, end);
+}
+
 /* Pulses of this tick; ends the scan when it is complete or was told to stop. Returns 1 when the scan is over. */
 static int claim_pulses(struct device *device, uint64_t tick, struct device_work *work)
 {
@@ -138,8 +161,11 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
     work->station = device->station;
     work->pulse0 = device->pulse_next;
     /* A stop keeps what was fired before this tick began; else the cut leaves whole packets for the next tick. */
-    uint64_t end = stop ? schedule_pulse_at(seg, since) : schedule_cut(seg, schedule_pulse_at(seg, since + device->tick_ns));
-    int done = schedule_pulse_at(seg, since + device->tick_ns) >= seg->end_pulse && !stop;
+    uint64_t due = schedule_pulse_at(seg, stop ? since : since + device->tick_ns);
+    uint64_t room_end = tick_room_end(device);
+    if (due > room_end) due = room_end;
+    uint64_t end = stop ? due : schedule_cut(seg, due);
+    int done = due >= seg->end_pulse && !stop;
     if (done || end > seg->end_pulse) end = seg->end_pulse;
     if (end < work->pulse0) end = work->pulse0;
     work->pulse_end = device->pulse_next = end;
@@ -162,7 +188,7 @@ static void describe(struct device *device, uint64_t tick, struct device_work *w
         device->describe = 0;
     }
     /* All names at the scan's start, then round and round for those who join late. */
-    uint32_t n = device->site->scene->n_surfaces;
+    uint32_t n = device->site->n_surfaces;
     uint64_t chunks = (n + DEVICE_SURFACES_A_FRAME - 1) / DEVICE_SURFACES_A_FRAME;
     uint64_t period = device->tick_hz >= 4 ? device->tick_hz / 4 : 1;
     if (since < chunks || since % period == 0) {

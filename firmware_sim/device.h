@@ -91,4 +91,8 @@ uint64_t device_scans(struct device *device);
 
 double device_tick_ns(const struct device *device);
 
+/* The most pulses that one tick consists of, and lines that end in it, whatever the settings: a slot has to hold them. */
+uint32_t device_tick_pulses(const struct config *cfg);
+uint32_t device_tick_lines(const struct config *cfg);
+
 #endif
