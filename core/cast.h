@@ -28,6 +28,9 @@ struct bvh_info {
 int bvh_create(const struct scene *scene, const double origin_m[3], double station_reach_m, unsigned threads,
                const struct sh_report *report, struct bvh **out, struct sh_err *err);
 void bvh_free(struct bvh *bvh);
+/* Rays per Embree call: 1, 4, 8 or 16; for measuring and tests. Another width than the native one may find another triangle
+ * where a ray passes through an edge; ranges agree. */
+void bvh_set_packet(struct bvh *bvh, uint32_t rays);
 void bvh_get_info(const struct bvh *bvh, struct bvh_info *info);
 void bvh_origin(const struct bvh *bvh, double origin_m[3]);
 
@@ -56,13 +59,21 @@ struct cast_counters {
 
 struct caster;
 
-/* Working memory of one thread. A run may have up to max_pulses pulses. */
-int caster_create(uint32_t max_pulses, struct caster **out, struct sh_err *err);
+/* Working memory of one thread. */
+int caster_create(struct caster **out, struct sh_err *err);
 void caster_free(struct caster *caster);
 
 /* Fills block (capacity >= run->n) from the run. Returns the number of echoes. Allocates nothing. */
 uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
                      struct line_block *block);
+
+enum { CAST_NO_TRIANGLE = 0xffffffff };
+
+/* Exact hits of n rays from the station: unit directions in prcs -> range along the ray (NaN where it meets nothing) and
+ * triangle of the scene (CAST_NO_TRIANGLE). The station lies within the BVH's station_reach_m; hits beyond range_max_m may or
+ * may not be told. Range error: see tests/accuracy. Allocates nothing. */
+void caster_hits(struct caster *caster, const struct bvh *bvh, const double station_m[3], double range_max_m, uint32_t n,
+                 const double *dx, const double *dy, const double *dz, double *range_m, uint32_t *triangle);
 
 void caster_get_counters(const struct caster *caster, struct cast_counters *counters);
 

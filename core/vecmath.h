@@ -7,8 +7,10 @@
 #include <string.h>
 
 /* The best version of a loop for the CPU at hand, chosen once at start. Sanitizers can't follow the resolver. */
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(SH_SANITIZE)
-#define VEC_CLONES __attribute__((target_clones("arch=skylake-avx512", "arch=haswell", "default")))
+#if defined(__x86_64__) && !defined(SH_SANITIZE) && defined(__clang__)
+#define VEC_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))
+#elif defined(__x86_64__) && !defined(SH_SANITIZE) && defined(__GNUC__)
+#define VEC_CLONES __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
 #else
 #define VEC_CLONES
 #endif

@@ -26,7 +26,7 @@ int worker_create(const struct site *site, struct worker **out, struct sh_err *e
     if (worker == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     worker->site = site;
     uint32_t n = device_tick_pulses(site->cfg);
-    int rc = caster_create(n, &worker->caster, err);
+    int rc = caster_create(&worker->caster, err);
     if (rc == SH_OK) rc = line_block_alloc(&worker->block, n, err);
     if (rc != SH_OK) {
         worker_free(worker);

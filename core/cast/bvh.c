@@ -92,6 +92,11 @@ void bvh_get_info(const struct bvh *bvh, struct bvh_info *info)
     *info = bvh->info;
 }
 
+void bvh_set_packet(struct bvh *bvh, uint32_t rays)
+{
+    bvh->info.packet = rays;
+}
+
 void bvh_origin(const struct bvh *bvh, double origin_m[3])
 {
     for (int i = 0; i < 3; i++)

@@ -18,22 +18,21 @@
 #define BVH_WIDEN (8.0 * 0x1p-24)
 enum { BVH_MAX_MITER = 64 }; /* a sharp corner moves out by at most this many widths */
 
-/* One cache line per triangle. */
+/* One cache line per triangle; the doubles are gathered by their place (kernels.c). */
 struct bvh_triangle {
     double n[3];    /* e1 x e2 in double, local frame: length is twice the area */
     double d;       /* n . p = d */
-    float guard;    /* a hit is safe where min(u, v, 1-u-v) * |n . dir| >= guard */
-    float widen_m;  /* how far the edges are moved outward */
+    double guard;   /* a hit is safe where min(u, v, 1-u-v) * |n . dir| >= guard */
+    double widen_m; /* how far the edges are moved outward */
     uint16_t label;
-    uint16_t unused[3];
-    uint32_t pad[2];
 } __attribute__((aligned(64)));
+_Static_assert(sizeof(struct bvh_triangle) == 64, "one cache line");
 
 struct bvh {
     RTCDevice device;
     RTCScene rtc;
     const struct scene *scene;
-    struct bvh_triangle *triangle;
+    struct bvh_triangle *triangle; /* one more than there are: the last stands for a miss, all NaN */
     double origin_m[3];
     double station_reach_m; /* rays begin at most this far from the origin */
     struct bvh_info info;
@@ -52,8 +51,12 @@ struct bvh_rays {
 /* Casts n rays from one origin, in packets of the native width, ragged ends masked. */
 void bvh_intersect(const struct bvh *bvh, const struct bvh_rays *rays, uint32_t n);
 /* One ray from t_min on. */
-void bvh_intersect_one(const struct bvh *bvh, const float org[3], const float dir[3], float t_min, float t_max,
-                       uint32_t *prim, float *t);
+struct bvh_one {
+    float t_min, t_max;  /* in */
+    uint32_t prim;       /* out */
+    float t, u, v;
+};
+void bvh_intersect_one(const struct bvh *bvh, const float org[3], const float dir[3], struct bvh_one *one);
 
 /* Fills the float buffers of a geometry with widened triangles, and bvh->triangle. */
 int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err);

@@ -4,9 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/cast/bvh.h"
-#include "core/rng.h"
-#include "core/vecmath.h"
+#include "core/cast/kernels.h"
 
 enum { CHUNK = 256 }; /* pulses worked on at a time: all arrays together stay in the first-level cache */
 
@@ -15,18 +13,17 @@ struct caster {
     double dx[CHUNK], dy[CHUNK], dz[CHUNK]; /* true direction, then the one the encoders read; prcs */
     double range_m[CHUNK];
     float fx[CHUNK], fy[CHUNK], fz[CHUNK];  /* the direction as Embree gets it */
-    uint32_t prim[CHUNK];
+    uint32_t prim[CHUNK], hit[CHUNK];       /* as proposed; as decided */
     float t[CHUNK], u[CHUNK], v[CHUNK];
-    uint8_t doubt[CHUNK];                   /* the proposal has to be decided in double */
+    uint32_t doubt[CHUNK];                  /* the proposal has to be decided in double */
     struct cast_counters counters;
 };
 
-int caster_create(uint32_t max_pulses, struct caster **out, struct sh_err *err)
+int caster_create(struct caster **out, struct sh_err *err)
 {
     *out = aligned_alloc(64, (sizeof **out + 63) / 64 * 64);
     if (*out == NULL) return sh_fail(err, SH_ENOMEM, "cast: no memory for a caster");
     memset(*out, 0, sizeof **out);
-    (void)max_pulses; /* chunks have one size */
     return SH_OK;
 }
 
@@ -54,116 +51,39 @@ uint32_t cast_encoder_count(double turn, double counts_per_turn)
     return count >= counts_per_turn ? 0 : (uint32_t)(uint64_t)count;
 }
 
-VEC_CLONES
-static void angles(struct caster *c, const struct schedule_run *run, uint32_t first, uint32_t n)
+static void decide(struct caster *c, struct decide_ray *ray, const struct kernel_hits *hits, uint32_t *prim, uint32_t n)
 {
-    uint64_t r0 = run->r + first * run->num;
-    double place0 = (double)(run->in_line + first);
-    for (uint32_t i = 0; i < n; i++) {
-        c->mirror_turn[i] = run->mirror0_turn + (double)(int64_t)(r0 + i * run->num) * run->mirror_turn_per_r;
-        c->pan_turn[i] = run->pan0_turn + (place0 + (double)(int32_t)i) * run->pan_step_turn;
-    }
-}
-
-VEC_CLONES
-static void directions(struct caster *c, const double m[9], uint32_t n)
-{
-    for (uint32_t i = 0; i < n; i++) {
-        double sm, cm, sp, cp;
-        vec_sincos_turn(c->mirror_turn[i], &sm, &cm);
-        vec_sincos_turn(c->pan_turn[i], &sp, &cp);
-        double x = sp * cm, y = cp * cm;
-        c->dx[i] = m[0] * x + m[1] * y + m[2] * sm;
-        c->dy[i] = m[3] * x + m[4] * y + m[5] * sm;
-        c->dz[i] = m[6] * x + m[7] * y + m[8] * sm;
-    }
-}
-
-VEC_CLONES
-static void to_float(struct caster *c, uint32_t n)
-{
-    for (uint32_t i = 0; i < n; i++) {
-        c->fx[i] = (float)c->dx[i];
-        c->fy[i] = (float)c->dy[i];
-        c->fz[i] = (float)c->dz[i];
-    }
-}
-
-/* Exact range R = (d - n.o) / (n.dir) from the plane of the triangle that Embree proposed, NaN for none; and whether the
- * hit is so near to the border, across the ray, that the proposal is in doubt. */
-VEC_CLONES
-static void refine(struct caster *c, const struct bvh *bvh, const double o[3], uint32_t n)
-{
-    const struct bvh_triangle *triangle = bvh->triangle;
-    double ox = o[0], oy = o[1], oz = o[2];
-    for (uint32_t i = 0; i < n; i++) {
-        uint32_t miss = c->prim[i] == RTC_INVALID_GEOMETRY_ID;
-        const struct bvh_triangle *tri = &triangle[miss ? 0 : c->prim[i]];
-        double along = tri->n[0] * c->dx[i] + tri->n[1] * c->dy[i] + tri->n[2] * c->dz[i];
-        double range = (tri->d - (tri->n[0] * ox + tri->n[1] * oy + tri->n[2] * oz)) / along;
-        float w = 1.0f - c->u[i] - c->v[i];
-        float least = c->u[i] < c->v[i] ? c->u[i] : c->v[i];
-        least = w < least ? w : least;
-        float margin = least * (float)fabs(along);
-        c->range_m[i] = miss ? NAN : range;
-        c->doubt[i] = !miss & !(margin >= tri->guard);
-    }
-}
-
-static void decide(struct caster *c, const struct cast_setup *s, const double o[3], uint32_t n, float t_max)
-{
-    struct decide_ray ray = {.bvh = s->bvh, .t_max = t_max};
-    memcpy(ray.station_m, s->station_m, sizeof ray.station_m);
-    memcpy(ray.o_local, o, sizeof ray.o_local);
     for (uint32_t i = 0; i < n; i++) {
         if (!c->doubt[i]) continue;
         struct decide_hit hit;
-        ray.dir[0] = c->dx[i];
-        ray.dir[1] = c->dy[i];
-        ray.dir[2] = c->dz[i];
-        decide_hit(&ray, c->prim[i], c->t[i], &c->counters, &hit);
-        c->prim[i] = hit.prim;
-        c->range_m[i] = hit.prim == RTC_INVALID_GEOMETRY_ID ? (double)NAN : hit.range_m;
+        ray->dir[0] = hits->dx[i];
+        ray->dir[1] = hits->dy[i];
+        ray->dir[2] = hits->dz[i];
+        decide_hit(ray, prim[i], c->t[i], &c->counters, &hit);
+        prim[i] = hit.prim;
+        hits->range_m[i] = hit.prim == RTC_INVALID_GEOMETRY_ID ? (double)NAN : hit.range_m;
     }
 }
 
-VEC_CLONES
-static void add_noise(struct caster *c, const struct cast_setup *s, uint64_t pulse0, uint32_t n)
+void caster_hits(struct caster *c, const struct bvh *bvh, const double station_m[3], double range_max_m, uint32_t n,
+                 const double *dx, const double *dy, const double *dz, double *range_m, uint32_t *triangle)
 {
-    for (uint32_t i = 0; i < n; i++) {
-        double sigma = s->range_sigma_m + 1e-6 * s->range_sigma_ppm * c->range_m[i];
-        c->range_m[i] += sigma * rng_normal(s->noise_key, pulse0 + i);
+    struct decide_ray ray = {.bvh = bvh, .t_max = (float)(range_max_m * 1.001)};
+    struct bvh_rays rays = {.t_max = ray.t_max, .dx = c->fx, .dy = c->fy, .dz = c->fz, .t = c->t, .u = c->u, .v = c->v,
+                            .prim = c->prim};
+    for (int i = 0; i < 3; i++) {
+        ray.station_m[i] = station_m[i];
+        ray.o_local[i] = station_m[i] - bvh->origin_m[i];
+        rays.org[i] = (float)ray.o_local[i];
     }
-}
-
-/* An echo is there when the true range lies within the head's limits. Returns how many. */
-static uint32_t detect(struct caster *c, const struct cast_setup *s, struct line_block *block, uint32_t at, uint32_t n)
-{
-    const struct bvh_triangle *triangle = s->bvh->triangle;
-    uint32_t echoes = 0;
-    for (uint32_t i = 0; i < n; i++) {
-        int hit = c->range_m[i] >= s->range_min_m && c->range_m[i] <= s->range_max_m;
-        block->echo[at + i] = hit ? 0x11 : 0;
-        block->label[at + i] = hit ? triangle[c->prim[i]].label : LINE_LABEL_NONE;
-        block->refl_cdb[at + i] = LINE_REFL_NONE;
-        if (!hit) c->range_m[i] = NAN;
-        echoes += (uint32_t)hit;
-    }
-    return echoes;
-}
-
-static void times(const struct schedule_run *run, struct line_block *block)
-{
-    uint64_t acc = run->ns_acc;
-    uint32_t dt = 0, quot = (uint32_t)run->ns_quot;
-    for (uint32_t i = 0; i < run->n; i++) {
-        block->dt_ns[i] = dt;
-        acc += run->ns_rem;
-        dt += quot;
-        if (acc >= run->ns_den) {
-            acc -= run->ns_den;
-            dt++;
-        }
+    for (uint32_t at = 0; at < n; at += CHUNK) {
+        uint32_t m = n - at < CHUNK ? n - at : CHUNK;
+        struct kernel_hits hits = {.dx = dx + at, .dy = dy + at, .dz = dz + at, .prim = c->prim, .u = c->u, .v = c->v,
+                                   .range_m = range_m + at, .doubt = c->doubt};
+        kernel_to_float(hits.dx, hits.dy, hits.dz, m, c->fx, c->fy, c->fz);
+        bvh_intersect(bvh, &rays, m);
+        if (kernel_refine(bvh, &hits, ray.o_local, m) != 0) decide(c, &ray, &hits, c->prim, m);
+        memcpy(triangle + at, c->prim, m * sizeof *triangle);
     }
 }
 
@@ -172,91 +92,38 @@ static int is_ideal(const struct cast_setup *s)
     return s->mirror_counts >= 4294967296.0 && s->pan_counts >= 4294967296.0;
 }
 
-VEC_INLINE uint32_t count_of(double turn, double counts)
-{
-    uint64_t bits;
-    double below = vec_round(turn - 0.5, &bits);      /* floor, up to a tie that the next line undoes */
-    double within = turn - below;
-    within = within >= 1.0 ? within - 1.0 : within;
-    double count = vec_round(within * counts, &bits);
-    return count >= counts ? 0 : (uint32_t)bits;
-}
-
-VEC_CLONES
-static void fill_polar(const struct caster *c, const struct cast_setup *s, struct line_block *block, uint32_t at, uint32_t n)
-{
-    double per_m = 1.0 / s->range_scale_m;
-    for (uint32_t i = 0; i < n; i++) {
-        uint64_t bits;
-        double range = c->range_m[i] > 0.0 ? c->range_m[i] : 0.0; /* NaN and noise below zero read 0 */
-        vec_round(range * per_m, &bits);
-        block->a[at + i] = (uint32_t)bits;
-        block->b[at + i] = count_of(c->mirror_turn[i], s->mirror_counts);
-        block->c[at + i] = count_of(c->pan_turn[i], s->pan_counts);
-    }
-}
-
-/* Angles as the encoders read them: whole counts. */
-VEC_CLONES
-static void read_encoders(struct caster *c, double mirror_counts, double pan_counts, uint32_t n)
-{
-    for (uint32_t i = 0; i < n; i++) {
-        uint64_t bits;
-        c->mirror_turn[i] = vec_round(c->mirror_turn[i] * mirror_counts, &bits) / mirror_counts;
-        c->pan_turn[i] = vec_round(c->pan_turn[i] * pan_counts, &bits) / pan_counts;
-    }
-}
-
-VEC_CLONES
-static void fill_geo(struct caster *c, const struct cast_setup *s, struct line_block *block, uint32_t at, uint32_t n)
-{
-    double per_m = 1.0 / s->xyz_scale_m;
-    for (uint32_t i = 0; i < n; i++) {
-        uint64_t x, y, z;
-        vec_round(c->dx[i] * per_m, &x);
-        vec_round(c->dy[i] * per_m, &y);
-        vec_round(c->dz[i] * per_m, &z);
-        int miss = block->echo[at + i] == 0;
-        block->a[at + i] = miss ? (uint32_t)LINE_XYZ_NONE : (uint32_t)x;
-        block->b[at + i] = miss ? (uint32_t)LINE_XYZ_NONE : (uint32_t)y;
-        block->c[at + i] = miss ? (uint32_t)LINE_XYZ_NONE : (uint32_t)z;
-    }
-}
-
+/* Positions as a head computes them: from the range and from what its encoders read. */
 static void positions(struct caster *c, const struct cast_setup *s, struct line_block *block, uint32_t at, uint32_t n)
 {
     if (!is_ideal(s)) {
-        read_encoders(c, s->mirror_counts, s->pan_counts, n);
-        directions(c, s->rotation, n);
+        kernel_read_encoders(c->mirror_turn, c->pan_turn, s->mirror_counts, s->pan_counts, n);
+        kernel_directions(c->mirror_turn, c->pan_turn, s->rotation, n, c->dx, c->dy, c->dz);
     }
-    for (uint32_t i = 0; i < n; i++) {
-        c->dx[i] *= c->range_m[i];
-        c->dy[i] *= c->range_m[i];
-        c->dz[i] *= c->range_m[i];
-    }
+    kernel_scale(c->range_m, n, c->dx, c->dy, c->dz);
     georef_forward(s->georef, n, c->dx, c->dy, c->dz, c->dx, c->dy, c->dz);
-    fill_geo(c, s, block, at, n);
+    kernel_geo(c->dx, c->dy, c->dz, s->xyz_scale_m, n, block->a + at, block->b + at, block->c + at);
+}
+
+static void labels(const struct caster *c, const struct cast_setup *s, struct line_block *block, uint32_t at, uint32_t n)
+{
+    const struct bvh_triangle *triangle = s->bvh->triangle;
+    for (uint32_t i = 0; i < n; i++) {
+        block->label[at + i] = block->echo[at + i] != 0 ? triangle[c->hit[i]].label : (uint16_t)LINE_LABEL_NONE;
+        block->refl_cdb[at + i] = LINE_REFL_NONE;
+    }
 }
 
 static uint32_t cast_chunk(struct caster *c, const struct cast_setup *s, const struct schedule_run *run,
                            struct line_block *block, uint32_t at, uint32_t n)
 {
-    double o[3];
-    for (int i = 0; i < 3; i++)
-        o[i] = s->station_m[i] - s->bvh->origin_m[i];
-    struct bvh_rays rays = {.org = {(float)o[0], (float)o[1], (float)o[2]},
-                            .t_max = (float)(s->range_max_m * 1.001),
-                            .dx = c->fx, .dy = c->fy, .dz = c->fz, .prim = c->prim, .t = c->t, .u = c->u, .v = c->v};
-    angles(c, run, at, n);
-    directions(c, s->rotation, n);
-    to_float(c, n);
-    bvh_intersect(s->bvh, &rays, n);
-    refine(c, s->bvh, o, n);
-    decide(c, s, o, n, rays.t_max);
-    uint32_t echoes = detect(c, s, block, at, n);
-    if (s->noise_on) add_noise(c, s, run->pulse0 + at, n);
+    kernel_angles(run, at, n, c->mirror_turn, c->pan_turn);
+    kernel_directions(c->mirror_turn, c->pan_turn, s->rotation, n, c->dx, c->dy, c->dz);
+    caster_hits(c, s->bvh, s->station_m, s->range_max_m, n, c->dx, c->dy, c->dz, c->range_m, c->hit);
+    uint32_t echoes = kernel_detect(c->range_m, s->range_min_m, s->range_max_m, n, block->echo + at);
+    labels(c, s, block, at, n);
+    if (s->noise_on) kernel_noise(s, run->pulse0 + at, n, c->range_m);
     if (s->layout == LINE_POLAR)
-        fill_polar(c, s, block, at, n);
+        kernel_polar(s, c->range_m, c->mirror_turn, c->pan_turn, n, block->a + at, block->b + at, block->c + at);
     else
         positions(c, s, block, at, n);
     return echoes;
@@ -274,7 +141,7 @@ uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, cons
     block->line_t0_ns = run->line_t0_ns;
     block->layout = setup->layout;
     block->n_points = run->n;
-    times(run, block);
+    kernel_times(run, block->dt_ns);
     /* The first packet of a run may begin within a packet of the line; later chunks begin at one. */
     uint32_t lead = run->in_line % SCHEDULE_PACKET;
     for (uint32_t at = 0; at < run->n;) {

@@ -156,8 +156,8 @@ static double search_radius(const struct decide_ray *ray, uint32_t prim, double 
 {
     const struct bvh_triangle *tri = &ray->bvh->triangle[prim];
     double cosine = fabs(dot(tri->n, ray->dir)) / sqrt(dot(tri->n, tri->n));
-    double radius = 4.0 * (double)tri->widen_m * (1.0 + 1.0 / fmax(cosine, 1e-3));
-    return fmin(radius, 0.01 * range_m + 4.0 * (double)tri->widen_m);
+    double radius = 4.0 * tri->widen_m * (1.0 + 1.0 / fmax(cosine, 1e-3));
+    return fmin(radius, 0.01 * range_m + 4.0 * tri->widen_m);
 }
 
 void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct cast_counters *counters,
@@ -179,8 +179,10 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct cas
             org[i] = (float)ray->o_local[i];
             dir[i] = (float)ray->dir[i];
         }
-        float from = nextafterf((float)(range_m + 0.5 * radius_m), INFINITY);
-        bvh_intersect_one(ray->bvh, org, dir, from, ray->t_max, &prim, &t);
+        struct bvh_one one = {.t_min = nextafterf((float)(range_m + 0.5 * radius_m), INFINITY), .t_max = ray->t_max};
+        bvh_intersect_one(ray->bvh, org, dir, &one);
+        prim = one.prim;
+        t = one.t;
     }
     /* So near to an edge that double precision can't tell its sides apart: the edge is hit, nothing passes. */
     if (s.near_gap <= 1.0 && !(s.range_m <= s.near_range_m)) {

@@ -22,6 +22,7 @@
     static void intersect_##W(const struct bvh *bvh, const struct bvh_rays *rays, uint32_t n)                         \
     {                                                                                                                 \
         PACKET_CONTEXT(context);                                                                                      \
+        const uint32_t last = bvh->scene->n_triangles;                                                                \
         struct RTCRayHit##W packet __attribute__((aligned(64)));                                                      \
         int valid[W] __attribute__((aligned(64)));                                                                    \
         for (uint32_t i = 0; i < W; i++) {                                                                            \
@@ -54,6 +55,7 @@
                 rays->t[base + i] = packet.ray.tfar[i];                                                               \
                 rays->u[base + i] = packet.hit.u[i];                                                                  \
                 rays->v[base + i] = packet.hit.v[i];                                                                  \
+                __builtin_prefetch(&bvh->triangle[packet.hit.primID[i] < last ? packet.hit.primID[i] : last]);        \
             }                                                                                                         \
         }                                                                                                             \
     }
@@ -62,25 +64,42 @@ PACKET_FUNCTION(4)
 PACKET_FUNCTION(8)
 PACKET_FUNCTION(16)
 
+void bvh_intersect_one(const struct bvh *bvh, const float org[3], const float dir[3], struct bvh_one *one)
+{
+    PACKET_CONTEXT(context);
+    struct RTCRayHit ray = {.ray = {.org_x = org[0], .org_y = org[1], .org_z = org[2], .tnear = one->t_min,
+                                    .dir_x = dir[0], .dir_y = dir[1], .dir_z = dir[2], .tfar = one->t_max,
+                                    .mask = 0xffffffffU},
+                            .hit = {.geomID = RTC_INVALID_GEOMETRY_ID, .primID = RTC_INVALID_GEOMETRY_ID}};
+    ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    PACKET_ONE(bvh->rtc, &context, &ray);
+    one->prim = ray.hit.primID;
+    one->t = ray.ray.tfar;
+    one->u = ray.hit.u;
+    one->v = ray.hit.v;
+}
+
+static void intersect_1(const struct bvh *bvh, const struct bvh_rays *rays, uint32_t n)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        const float dir[3] = {rays->dx[i], rays->dy[i], rays->dz[i]};
+        struct bvh_one one = {.t_min = rays->t_min, .t_max = rays->t_max};
+        bvh_intersect_one(bvh, rays->org, dir, &one);
+        rays->prim[i] = one.prim;
+        rays->t[i] = one.t;
+        rays->u[i] = one.u;
+        rays->v[i] = one.v;
+    }
+}
+
 void bvh_intersect(const struct bvh *bvh, const struct bvh_rays *rays, uint32_t n)
 {
     if (bvh->info.packet == 16)
         intersect_16(bvh, rays, n);
     else if (bvh->info.packet == 8)
         intersect_8(bvh, rays, n);
-    else
+    else if (bvh->info.packet == 4)
         intersect_4(bvh, rays, n);
-}
-
-void bvh_intersect_one(const struct bvh *bvh, const float org[3], const float dir[3], float t_min, float t_max,
-                       uint32_t *prim, float *t)
-{
-    PACKET_CONTEXT(context);
-    struct RTCRayHit one = {.ray = {.org_x = org[0], .org_y = org[1], .org_z = org[2], .tnear = t_min, .dir_x = dir[0],
-                                    .dir_y = dir[1], .dir_z = dir[2], .tfar = t_max, .mask = 0xffffffffU},
-                            .hit = {.geomID = RTC_INVALID_GEOMETRY_ID, .primID = RTC_INVALID_GEOMETRY_ID}};
-    one.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    PACKET_ONE(bvh->rtc, &context, &one);
-    *prim = one.hit.primID;
-    *t = one.ray.tfar;
+    else
+        intersect_1(bvh, rays, n);
 }

@@ -79,8 +79,8 @@ static void fill_triangle(struct bvh *bvh, uint32_t prim, float *vertex)
      * bary_i are those of its own, with the same edges; the factor 1.1 covers the difference, needles are always decided. */
     double height_m = sqrt(dot(tri->n, tri->n) / longest2);
     double guard = 1.1 * 2.0 * width_m * sqrt(longest2);
-    tri->guard = height_m > 64.0 * width_m ? (float)guard : INFINITY;
-    tri->widen_m = (float)width_m;
+    tri->guard = height_m > 64.0 * width_m ? guard : INFINITY;
+    tri->widen_m = width_m;
     tri->label = bvh->scene->label[prim];
 }
 
@@ -88,7 +88,7 @@ int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err)
 {
     const struct scene *scene = bvh->scene;
     size_t n = scene->n_triangles;
-    bvh->triangle = aligned_alloc(64, n * sizeof *bvh->triangle);
+    bvh->triangle = aligned_alloc(64, (n + 1) * sizeof *bvh->triangle);
     float *vertex = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), 3 * n);
     uint32_t *index = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t), n);
     if (bvh->triangle == NULL || vertex == NULL || index == NULL)
@@ -97,5 +97,6 @@ int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err)
         fill_triangle(bvh, i, vertex + 9 * (size_t)i);
     for (uint32_t i = 0; i < 3 * n; i++)
         index[i] = i;
+    bvh->triangle[n] = (struct bvh_triangle){.n = {NAN, NAN, NAN}, .d = NAN, .guard = NAN, .label = LINE_LABEL_NONE};
     return SH_OK;
 }

@@ -1,0 +1,192 @@
+#include "core/cast/kernels.h"
+
+#include <math.h>
+
+#include "core/rng.h"
+#include "core/vecmath.h"
+
+VEC_CLONES
+void kernel_angles(const struct schedule_run *run, uint32_t first, uint32_t n, double *restrict mirror_turn,
+                   double *restrict pan_turn)
+{
+    const double mirror0 = run->mirror0_turn, per_r = run->mirror_turn_per_r, pan0 = run->pan0_turn;
+    const double step = run->pan_step_turn, place0 = (double)(run->in_line + first);
+    const int64_t r0 = (int64_t)(run->r + first * run->num), num = (int64_t)run->num;
+    for (uint32_t i = 0; i < n; i++) {
+        mirror_turn[i] = mirror0 + (double)(r0 + (int64_t)i * num) * per_r;
+        pan_turn[i] = pan0 + (place0 + (double)(int32_t)i) * step;
+    }
+}
+
+VEC_CLONES
+void kernel_read_encoders(double *restrict mirror_turn, double *restrict pan_turn, double mirror_counts, double pan_counts,
+                          uint32_t n)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        uint64_t bits;
+        mirror_turn[i] = vec_round(mirror_turn[i] * mirror_counts, &bits) / mirror_counts;
+        pan_turn[i] = vec_round(pan_turn[i] * pan_counts, &bits) / pan_counts;
+    }
+}
+
+VEC_CLONES
+void kernel_directions(const double *restrict mirror_turn, const double *restrict pan_turn, const double m[9], uint32_t n,
+                       double *restrict dx, double *restrict dy, double *restrict dz)
+{
+    const double m0 = m[0], m1 = m[1], m2 = m[2], m3 = m[3], m4 = m[4], m5 = m[5], m6 = m[6], m7 = m[7], m8 = m[8];
+    for (uint32_t i = 0; i < n; i++) {
+        double sm, cm, sp, cp;
+        vec_sincos_turn(mirror_turn[i], &sm, &cm);
+        vec_sincos_turn(pan_turn[i], &sp, &cp);
+        double x = sp * cm, y = cp * cm;
+        dx[i] = m0 * x + m1 * y + m2 * sm;
+        dy[i] = m3 * x + m4 * y + m5 * sm;
+        dz[i] = m6 * x + m7 * y + m8 * sm;
+    }
+}
+
+VEC_CLONES
+void kernel_to_float(const double *restrict dx, const double *restrict dy, const double *restrict dz, uint32_t n,
+                     float *restrict fx, float *restrict fy, float *restrict fz)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        fx[i] = (float)dx[i];
+        fy[i] = (float)dy[i];
+        fz[i] = (float)dz[i];
+    }
+}
+
+/* A miss has the highest number there is and reads the record behind the last triangle, which is all NaN. */
+VEC_CLONES
+static uint32_t refine(const double *restrict tri, uint32_t n_triangles, const uint32_t *restrict prim,
+                       const double *restrict dx, const double *restrict dy, const double *restrict dz,
+                       const float *restrict u, const float *restrict v, const double o[3], uint32_t n,
+                       double *restrict range_m, uint32_t *restrict doubt)
+{
+    const double ox = o[0], oy = o[1], oz = o[2];
+    uint32_t doubts = 0;
+    for (uint32_t i = 0; i < n; i++) {
+        int64_t at = (int64_t)(prim[i] < n_triangles ? prim[i] : n_triangles) * 8;
+        double nx = tri[at], ny = tri[at + 1], nz = tri[at + 2];
+        double along = nx * dx[i] + ny * dy[i] + nz * dz[i];
+        range_m[i] = (tri[at + 3] - (nx * ox + ny * oy + nz * oz)) / along;
+        float w = 1.0f - u[i] - v[i];
+        float least = u[i] < v[i] ? u[i] : v[i];
+        least = w < least ? w : least;
+        uint32_t near = (double)least * fabs(along) < tri[at + 4];
+        doubt[i] = near;
+        doubts += near;
+    }
+    return doubts;
+}
+
+uint32_t kernel_refine(const struct bvh *bvh, const struct kernel_hits *hits, const double o[3], uint32_t n)
+{
+    return refine((const double *)bvh->triangle, bvh->scene->n_triangles, hits->prim, hits->dx, hits->dy, hits->dz, hits->u,
+                  hits->v, o, n, hits->range_m, hits->doubt);
+}
+
+VEC_CLONES
+static void noise(double sigma0, double sigma1, uint64_t key, uint64_t pulse0, uint32_t n, double *restrict range_m)
+{
+    for (uint32_t i = 0; i < n; i++)
+        range_m[i] += (sigma0 + sigma1 * range_m[i]) * rng_normal(key, pulse0 + i);
+}
+
+void kernel_noise(const struct cast_setup *setup, uint64_t pulse0, uint32_t n, double *range_m)
+{
+    noise(setup->range_sigma_m, 1e-6 * setup->range_sigma_ppm, setup->noise_key, pulse0, n, range_m);
+}
+
+VEC_CLONES
+uint32_t kernel_detect(double *restrict range_m, double min_m, double max_m, uint32_t n, uint8_t *restrict echo)
+{
+    uint32_t echoes = 0;
+    for (uint32_t i = 0; i < n; i++) {
+        uint32_t hit = (range_m[i] >= min_m) & (range_m[i] <= max_m);
+        range_m[i] = hit ? range_m[i] : (double)NAN;
+        echo[i] = (uint8_t)(hit * 0x11);
+        echoes += hit;
+    }
+    return echoes;
+}
+
+/* Whole counts of an angle modulo a turn. */
+VEC_INLINE uint32_t count_of(double turn, double counts)
+{
+    uint64_t bits;
+    double below = vec_round(turn - 0.5, &bits); /* floor, up to a tie that the next line undoes */
+    double within = turn - below;
+    within = within >= 1.0 ? within - 1.0 : within;
+    double count = vec_round(within * counts, &bits);
+    bits = count >= counts ? 0 : bits;
+    return (uint32_t)bits;
+}
+
+VEC_CLONES
+static void polar(const double *restrict range_m, const double *restrict mirror_turn, const double *restrict pan_turn,
+                  double per_m, double mirror_counts, double pan_counts, uint32_t n, uint32_t *restrict a,
+                  uint32_t *restrict b, uint32_t *restrict c)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        uint64_t bits;
+        double range = range_m[i] > 0.0 ? range_m[i] : 0.0; /* NaN, and noise below zero, read 0 */
+        vec_round(range * per_m, &bits);
+        a[i] = (uint32_t)bits;
+    }
+    for (uint32_t i = 0; i < n; i++)
+        b[i] = count_of(mirror_turn[i], mirror_counts);
+    for (uint32_t i = 0; i < n; i++)
+        c[i] = count_of(pan_turn[i], pan_counts);
+}
+
+void kernel_polar(const struct cast_setup *setup, const double *range_m, const double *mirror_turn, const double *pan_turn,
+                  uint32_t n, uint32_t *a, uint32_t *b, uint32_t *c)
+{
+    polar(range_m, mirror_turn, pan_turn, 1.0 / setup->range_scale_m, setup->mirror_counts, setup->pan_counts, n, a, b, c);
+}
+
+VEC_CLONES
+static void counts_of(const double *restrict x, double per_m, uint32_t n, uint32_t *restrict out)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        uint64_t bits;
+        vec_round(x[i] * per_m, &bits);
+        bits = x[i] == x[i] ? bits : (uint64_t)(uint32_t)LINE_XYZ_NONE;
+        out[i] = (uint32_t)bits;
+    }
+}
+
+void kernel_geo(const double *x, const double *y, const double *z, double scale_m, uint32_t n, uint32_t *a, uint32_t *b,
+                uint32_t *c)
+{
+    counts_of(x, 1.0 / scale_m, n, a);
+    counts_of(y, 1.0 / scale_m, n, b);
+    counts_of(z, 1.0 / scale_m, n, c);
+}
+
+VEC_CLONES
+void kernel_scale(const double *restrict range_m, uint32_t n, double *restrict x, double *restrict y, double *restrict z)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        x[i] *= range_m[i];
+        y[i] *= range_m[i];
+        z[i] *= range_m[i];
+    }
+}
+
+/* The remainder is below the divisor, so each step adds the quotient or one more. */
+void kernel_times(const struct schedule_run *run, uint32_t *dt_ns)
+{
+    uint64_t acc = run->ns_acc;
+    const uint64_t rem = run->ns_rem, den = run->ns_den;
+    uint32_t dt = 0;
+    const uint32_t quot = (uint32_t)run->ns_quot;
+    for (uint32_t i = 0; i < run->n; i++) {
+        dt_ns[i] = dt;
+        acc += rem;
+        uint64_t carry = acc >= den;
+        acc -= carry ? den : 0;
+        dt += quot + (uint32_t)carry;
+    }
+}

@@ -1,0 +1,46 @@
+/* Private to core/cast: the arithmetic around the cast, as loops over arrays that compilers turn into vectors. */
+#ifndef CORE_CAST_KERNELS_H
+#define CORE_CAST_KERNELS_H
+
+#include "core/cast/bvh.h"
+
+/* Mirror and pan angle of n pulses of a run, from its pulse `first` on. */
+void kernel_angles(const struct schedule_run *run, uint32_t first, uint32_t n, double *mirror_turn, double *pan_turn);
+
+/* Angles as the encoders read them: whole counts. In place. */
+void kernel_read_encoders(double *mirror_turn, double *pan_turn, double mirror_counts, double pan_counts, uint32_t n);
+
+/* Directions in prcs: rotation times (sin p cos m, cos p cos m, sin m). */
+void kernel_directions(const double *mirror_turn, const double *pan_turn, const double rotation[9], uint32_t n, double *dx,
+                       double *dy, double *dz);
+void kernel_to_float(const double *dx, const double *dy, const double *dz, uint32_t n, float *fx, float *fy, float *fz);
+
+/* What Embree proposed, and what double precision makes of it. */
+struct kernel_hits {
+    const double *dx, *dy, *dz;
+    const uint32_t *prim;
+    const float *u, *v;
+    double *range_m;  /* out: (d - n.o) / (n.dir) of the proposed triangle's plane; NaN for none */
+    uint32_t *doubt;  /* out: 1 where the hit is so near to the border, across the ray, that the proposal is in doubt */
+};
+/* Returns how many are in doubt. */
+uint32_t kernel_refine(const struct bvh *bvh, const struct kernel_hits *hits, const double o[3], uint32_t n);
+
+/* Gaussian range noise on n ranges; NaN stays NaN. */
+void kernel_noise(const struct cast_setup *setup, uint64_t pulse0, uint32_t n, double *range_m);
+
+/* Echo byte and NaN for ranges outside of the head's limits. Returns the number of echoes. */
+uint32_t kernel_detect(double *range_m, double min_m, double max_m, uint32_t n, uint8_t *echo);
+
+/* Wire numbers. a: range in counts, 0 for none; b, c: encoder counts modulo a turn. */
+void kernel_polar(const struct cast_setup *setup, const double *range_m, const double *mirror_turn, const double *pan_turn,
+                  uint32_t n, uint32_t *a, uint32_t *b, uint32_t *c);
+/* Coordinates in counts of scale_m, LINE_XYZ_NONE for NaN. */
+void kernel_geo(const double *x, const double *y, const double *z, double scale_m, uint32_t n, uint32_t *a, uint32_t *b,
+                uint32_t *c);
+void kernel_scale(const double *range_m, uint32_t n, double *x, double *y, double *z);
+
+/* Firing times after the run's first pulse: j * quot + floor((acc + j * rem) / den). */
+void kernel_times(const struct schedule_run *run, uint32_t *dt_ns);
+
+#endif
