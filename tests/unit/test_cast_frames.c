@@ -309,8 +309,8 @@ static void a_station_far_from_the_bvh_s_origin_is_as_exact(void **state)
     static uint32_t triangle[RAYS];
     struct scene *scene = box_scene(LO, HI);
     struct sh_err err;
-    struct bvh *bvh;
-    struct caster *caster;
+    struct bvh *bvh = NULL;
+    struct caster *caster = NULL;
     any_rays(3);
     if (bvh_create(scene, origin, 1000.0, 1, NULL, &bvh, &err) != 0 || caster_create(&caster, &err) != 0)
         fail_msg("%s", err.text);
