@@ -188,7 +188,7 @@ static void describe(struct device *device, uint64_t tick, struct device_work *w
         device->describe = 0;
     }
     /* All names at the scan's start, then round and round for those who join late. */
-    uint32_t n = device->site->scene->n_surfaces;
+    uint32_t n = device->site->n_surfaces;
     uint64_t chunks = (n + DEVICE_SURFACES_A_FRAME - 1) / DEVICE_SURFACES_A_FRAME;
     uint64_t period = device->tick_hz >= 4 ? device->tick_hz / 4 : 1;
     if (since < chunks || since % period == 0) {

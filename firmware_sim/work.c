@@ -57,15 +57,11 @@ static void added(struct ring_slot *slot, size_t len, uint32_t frames)
     if (len != 0) slot->n_frames += frames;
 }
 
-struct names {
-    const struct scene *scene;
-};
-
 static void surface_name(void *ctx, uint32_t label, const char **object, const char **material)
 {
-    const struct names *names = ctx;
-    *object = names->scene->surface[label].object;
-    *material = names->scene->surface[label].material;
+    const struct scene_surface *surface = site_surface(ctx, label);
+    *object = surface->object;
+    *material = surface->material;
 }
 
 static void fill_heads(struct worker *worker, const struct device_work *work, struct ring_slot *slot, uint32_t cap)
@@ -78,11 +74,10 @@ static void fill_heads(struct worker *worker, const struct device_work *work, st
         added(slot, native_encode_anchor(slot->bytes + slot->len, cap - slot->len, &work->anchor, work->t_ns, flags), 1);
     }
     uint32_t first = work->surfaces_first, left = work->surfaces_n;
-    struct names names = {worker->site->scene};
     while (left != 0) {
         uint32_t done = 0;
         size_t len = native_encode_surfaces(slot->bytes + slot->len, cap - slot->len, first, left, 8192, surface_name,
-                                            &names, work->t_ns, 0, &done);
+                                            (void *)(uintptr_t)worker->site, work->t_ns, 0, &done);
         if (len == 0 || done == 0) break;
         added(slot, len, 1);
         first += done;
@@ -155,6 +150,7 @@ static void fill_pulses(struct worker *worker, const struct device_work *work, s
         site_cast_setup(worker->site, work->station, &worker->setup);
         worker->setup_station = work->station + 1;
     }
+    if (worker->site->n_movers != 0) site_move(worker->site, 1e-9 * (double)(work->t_ns - work->scan_t0_ns), &worker->setup);
     for (uint64_t k = work->pulse0; k < work->pulse_end;) {
         struct schedule_line line;
         schedule_get_line(&work->segment, schedule_line_of(&work->segment, k), &line);
