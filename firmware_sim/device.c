@@ -230,7 +230,7 @@ int device_claim(struct device *device, uint64_t released, struct device_work *w
 {
     (void)released;
     pthread_mutex_lock(&device->lock);
-    if (device->over) {
+    if (device->over && device->n_pending == 0) { /* what is still to be said has a tick more */
         pthread_mutex_unlock(&device->lock);
         return 1;
     }

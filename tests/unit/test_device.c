@@ -238,6 +238,26 @@ static void a_reset_ends_the_scan_and_restores_the_defaults(void **state)
     rig_close(rig);
 }
 
+/* A tick holds 24 events; those of a client that is wrong all the time must not cost the scan's end. */
+static void the_last_events_are_said_however_many(void **state)
+{
+    (void)state;
+    struct rig *rig = rig_open(&(struct device_options){.start = 1, .one_scan = 1}, NULL, 0);
+    struct command_result result;
+    rig_go_to(rig, 230 + 499);
+    for (int i = 0; i < 100; i++)
+        device_command(rig->device, 1, "nonsense", rig->next, &result);
+    int errors = 0, ends = 0;
+    while (rig_claim(rig))
+        for (uint32_t i = 0; i < rig->work.n_events; i++) {
+            errors += rig->work.event[i].code == NATIVE_EV_ERROR;
+            ends += rig->work.event[i].code == NATIVE_EV_SCAN_END;
+        }
+    assert_int_equal(errors, 100);
+    assert_int_equal(ends, 1);
+    rig_close(rig);
+}
+
 /* --- journal and replay --- */
 
 enum { SESSION_TICKS = 1500 };
@@ -315,6 +335,7 @@ int main(void)
         cmocka_unit_test(all_names_are_said_round_and_round),
         cmocka_unit_test(a_lost_tick_says_its_events_again),
         cmocka_unit_test(a_reset_ends_the_scan_and_restores_the_defaults),
+        cmocka_unit_test(the_last_events_are_said_however_many),
         cmocka_unit_test(a_journal_replayed_gives_the_same_work),
     };
     return cmocka_run_group_tests_name("device", tests, make_folder, remove_folder);

@@ -272,6 +272,50 @@ static void an_end_from_outside_stops_the_scan_first(void **state)
     rig_close(rig);
 }
 
+/* Commands at random, scan after scan: whatever changes and whenever, the frames of each scan add up. */
+static void whatever_is_commanded_adds_up(void **state)
+{
+    (void)state;
+    static const char *const line[] = {"SCAN:STOP",         "*RST",
+                                       "SCAN:FRAMES 0",     "SCAN:FRAMES 2",
+                                       "HEAD:PRR MIN",      "HEAD:PRR MAX",
+                                       "HEAD:LINES MIN",    "HEAD:LINES MAX",
+                                       "HEAD:PAN 0",        "HEAD:PAN MAX",
+                                       "SCAN:LINE:STOP 0",  "SCAN:LINE:STOP MAX",
+                                       "SCAN:PAN:STOP 3",   "SCAN:PAN:STOP MAX",
+                                       "SCAN:PAN:START MIN"};
+    struct rig *rig = rig_open(NULL, NULL, 0);
+    struct tally tally = {0};
+    uint64_t seed = 5, ended = 0;
+    for (int i = 0; i < 6000 && rig_claim(rig); i++) {
+        if (rig_event(rig, NATIVE_EV_SCAN_START) != NULL) memset(&tally, 0, sizeof tally);
+        tally_tick(rig, &tally);
+        const struct native_event *end = rig_event(rig, NATIVE_EV_SCAN_END);
+        if (end != NULL) {
+            check_tally(&tally, end->b);
+            ended++;
+        }
+        struct command_result result;
+        char text[40];
+        int64_t what = case_between(&seed, 0, 59);
+        if (what < 15) {
+            device_command(rig->device, 0, line[what], rig->next, &result);
+        } else if (what < 18) {
+            snprintf(text, sizeof text, "HEAD:PRR %d.%06d", (int)case_between(&seed, 1000, 100000),
+                     (int)case_between(&seed, 0, 999999));
+            device_command(rig->device, 0, text, rig->next, &result);
+        } else if (what < 20) {
+            snprintf(text, sizeof text, "HEAD:LINES %d.%03d", (int)case_between(&seed, 1, 1000),
+                     (int)case_between(&seed, 0, 999));
+            device_command(rig->device, 0, text, rig->next, &result);
+        } else if (!rig->work.scanning) {
+            device_command(rig->device, 0, "SCAN:START", rig->next, &result);
+        }
+    }
+    assert_true(ended > 10);
+    rig_close(rig);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -282,6 +326,7 @@ int main(void)
         cmocka_unit_test(many_lines_a_tick_fit_into_the_slots),
         cmocka_unit_test(a_run_ends_after_its_duration),
         cmocka_unit_test(an_end_from_outside_stops_the_scan_first),
+        cmocka_unit_test(whatever_is_commanded_adds_up),
     };
     return cmocka_run_group_tests_name("device lines", tests, make_folder, remove_folder);
 }

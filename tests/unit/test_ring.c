@@ -181,6 +181,48 @@ static void a_claimed_slot_is_empty(void **state)
     }
 }
 
+static _Atomic int claimed;
+
+static void *claim_one(void *arg)
+{
+    struct ring_slot *slot = ring_claim(&ring, *(uint64_t *)arg);
+    atomic_store(&claimed, slot != NULL ? 1 : -1);
+    return NULL;
+}
+
+/* Starts the claim, lets it run a thousand times as long as it needs, and sees that it waits; then lets go
+ * what holds it. */
+static void check_claim_waits(uint64_t tick, _Atomic uint64_t *hazard, _Atomic int *busy)
+{
+    pthread_t thread;
+    atomic_store(&claimed, 0);
+    assert_int_equal(pthread_create(&thread, NULL, claim_one, &tick), 0);
+    for (int i = 0; i < 20000; i++)
+        sched_yield();
+    int early = atomic_load(&claimed);
+    if (hazard != NULL) atomic_store(hazard, 0);
+    if (busy != NULL) atomic_store(busy, 0);
+    pthread_join(thread, NULL);
+    assert_int_equal(early, 0);
+    assert_int_equal(atomic_load(&claimed), 1);
+}
+
+/* A reader in the middle of a copy, and a caster that still writes for a tick long lost. */
+static void a_slot_in_use_is_not_claimed(void **state)
+{
+    (void)state;
+    for (uint64_t tick = 0; tick < ring.n_slots; tick++)
+        publish(tick, "text");
+    atomic_store(&ring.hazard[5], 0 + 1);
+    check_claim_waits(ring.n_slots, &ring.hazard[5], NULL);
+    struct ring_slot *slot = ring_peek(&ring, 1);
+    assert_non_null(slot);
+    atomic_store(&slot->busy, 1);
+    check_claim_waits(ring.n_slots + 1, NULL, &slot->busy);
+    atomic_store(&ring.hazard[5], 3 + 1); /* of another slot: no reason to wait */
+    assert_non_null(ring_claim(&ring, ring.n_slots + 2));
+}
+
 /* ---- all threads at once. Two casters fill slots with what only a tick's number tells; the pacing thread
  * releases them, numbers their frames, and gives up what is not ready where the test says so; it waits for
  * two of the readers, as in the pace `fast`, and not for the third. */
@@ -361,6 +403,7 @@ int main(void)
         WITH_RING(a_tick_that_is_ready_is_not_lost),
         WITH_RING(what_does_not_fit_is_not_copied),
         WITH_RING(a_claimed_slot_is_empty),
+        WITH_RING(a_slot_in_use_is_not_claimed),
         WITH_RING(no_tick_is_torn_with_all_threads_at_work),
     };
     return cmocka_run_group_tests_name("ring", tests, NULL, NULL);
