@@ -124,7 +124,8 @@ static void release(struct loop *loop, struct ring_slot *slot, uint64_t tick, in
     for (uint32_t at = 0; at < slot->len;)
         at += (uint32_t)native_seal(slot->bytes + at, loop->seq++);
     count(loop, slot, now_ns);
-    int wake = slot->len != 0 || loop->cfg->pace == PACE_STEP;
+    /* Where the pacing thread waits for readers, they must see empty ticks pass, too. */
+    int wake = slot->len != 0 || loop_waits(loop);
     ring_release(&loop->ring, tick);
     if (wake) wake_all(loop);
     sem_post(&loop->work);
