@@ -181,9 +181,10 @@ void worker_fill(struct worker *worker, const struct device_work *work, struct r
               1);
 }
 
-uint64_t worker_count_cast(const struct device_work *work)
+uint64_t worker_count_cast(const struct device_work *work, uint64_t *first)
 {
     uint64_t n = 0;
+    *first = UINT64_MAX;
     if (!work->scanning) return 0;
     for (uint64_t k = work->pulse0; k < work->pulse_end;) {
         struct schedule_line line;
@@ -192,6 +193,7 @@ uint64_t worker_count_cast(const struct device_work *work)
         uint64_t cast0 = k > line.cast0 ? k : line.cast0;
         uint64_t cast_end = end < line.cast_end ? end : line.cast_end;
         if (cast0 < cast_end) n += cast_end - cast0;
+        if (cast0 < cast_end && *first == UINT64_MAX) *first = cast0;
         k = end;
     }
     return n;
