@@ -45,8 +45,9 @@ FIRM = $(filter-out firmware_sim/main.c,$(wildcard firmware_sim/*.c))
 SRC = $(CORE) $(PROTO) $(HOST) $(wildcard drivers/link/*.c) $(FIRM)
 OBJ = $(SRC:%=$(BUILD)/%.o)
 LIBOBJ = $(patsubst %,$(BUILD)/%.o,core/err.c $(PROTO) $(HOST))
-UNIT = $(patsubst tests/unit/%.c,$(BUILD)/tests/unit/%,$(wildcard tests/unit/test_*.c))
-WIRE = $(patsubst tests/wire/%.c,$(BUILD)/tests/wire/%,$(wildcard tests/wire/test_*.c))
+PROGRAMS = $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/$(1)/test_*.c))
+UNIT = $(call PROGRAMS,unit)
+TESTS = $(UNIT) $(call PROGRAMS,wire) $(call PROGRAMS,accuracy) $(call PROGRAMS,stability)
 EVERYTHING = $(OBJ) $(BUILD)/firmware_sim/main.c.o
 
 all: $(BUILD)/scanhead $(BUILD)/libscanhead.a $(BUILD)/libscanhead.so
@@ -75,10 +76,13 @@ $(BUILD)/libscanhead.so: $(LIBOBJ) drivers/host/libscanhead.map
 $(BUILD)/scanhead: $(BUILD)/firmware_sim/main.c.o $(BUILD)/modules.a
 	@echo "  LD    $@"
 	$(Q)$(CC) $(SAN) -o $@ $^ $(LDLIBS)
-$(BUILD)/tests/%: tests/%.c $(BUILD)/modules.a
+# A test program, with what its folder has besides test programs.
+BESIDE = $(patsubst %,$(BUILD)/%.o,$(filter-out $(wildcard tests/$(1)/test_*.c),$(wildcard tests/$(1)/*.c)))
+.SECONDEXPANSION:
+$(BUILD)/tests/%: tests/%.c $(BUILD)/modules.a $$(call BESIDE,$$(*D))
 	@mkdir -p $(@D)
 	@echo "  TEST  $@"
-	$(Q)$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -MF $@.d -o $@ $< $(BUILD)/modules.a -lcmocka $(LDLIBS)
+	$(Q)$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -MF $@.d -o $@ $< $(call BESIDE,$(*D)) $(BUILD)/modules.a -lcmocka $(LDLIBS)
 
 # ---- what is missing, and only that
 define install_missing
@@ -108,15 +112,12 @@ test: deps
 	@$(MAKE) --no-print-directory -j2 $(CLANG) objects
 	@$(MAKE) --no-print-directory -j2 $(ASAN) all test-unit-programs
 	@SCANHEAD=$(BUILD)/test/scanhead sh tests/run_all.sh $(BUILD)
-test-unit: deps
-	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test test-unit-programs
-	@SCANHEAD=$(BUILD)/test/scanhead sh tests/run_all.sh $(BUILD) unit
-test-wire: deps
+test-unit test-wire test-accuracy test-stability: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test test-programs
-	@SCANHEAD=$(BUILD)/test/scanhead sh tests/run_all.sh $(BUILD) wire
+	@SCANHEAD=$(BUILD)/test/scanhead sh tests/run_all.sh $(BUILD) $(@:test-%=%)
 objects: $(EVERYTHING)
 test-unit-programs: $(UNIT)
-test-programs: all $(UNIT) $(WIRE)
+test-programs: all $(TESTS)
 
 install: all
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib $(DESTDIR)$(PREFIX)/include $(DESTDIR)$(HEADS_DIR)
@@ -130,6 +131,6 @@ format:
 	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')
 clean:
 	rm -rf $(BUILD)
-.PHONY: all deps deps-build demo test test-unit test-wire objects test-unit-programs test-programs install format clean
+.PHONY: all deps deps-build demo test test-unit test-wire test-accuracy test-stability objects test-unit-programs test-programs install format clean
 .SECONDARY:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)

@@ -34,7 +34,17 @@ void bvh_set_packet(struct bvh *bvh, uint32_t rays);
 void bvh_get_info(const struct bvh *bvh, struct bvh_info *info);
 void bvh_origin(const struct bvh *bvh, double origin_m[3]);
 
-/* What stays the same for all pulses of a scan. */
+enum { CAST_MAX_MOVERS = 16 };
+
+/* A rigid body that moves, with a BVH of its own, built at rest: p_prcs = rotation * p_rest + shift_m. The pose holds for
+ * the runs that are cast with it; rays that pass by the sphere around the body cost one test a chunk. */
+struct cast_mover {
+    const struct bvh *bvh;
+    double centre_m[3], radius_m;  /* sphere around the body at rest */
+    double rotation[9], shift_m[3];
+};
+
+/* What stays the same for all pulses of a scan (the movers' poses: of a run). */
 struct cast_setup {
     const struct bvh *bvh;
     const struct georef *georef;   /* geo layout */
@@ -47,6 +57,8 @@ struct cast_setup {
     double mirror_counts, pan_counts; /* encoder counts per turn; 2^32: ideal, positions take the true angle */
     enum line_layout layout;
     double range_scale_m, xyz_scale_m;
+    uint32_t n_movers;
+    struct cast_mover mover[CAST_MAX_MOVERS];
 };
 
 /* How often the exact stage had to look twice. */

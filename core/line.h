@@ -50,7 +50,7 @@ struct line_end {
     uint32_t n_cast;       /* of these, cast */
     uint32_t n_echoes;     /* echoes sent; 0 also where blocks of the line were lost */
     int64_t t0_ns, t1_ns;  /* first pulse of this line, first pulse of the next, since the scan's start */
-    uint32_t mirror_count, pan_count; /* encoder readings at t1_ns */
+    uint32_t mirror_count, pan_count; /* encoder readings at the last pulse of this line */
     uint32_t status;       /* LINE_LAST_OF_FRAME, LINE_PARTIAL */
 };
 enum {

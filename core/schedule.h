@@ -29,6 +29,9 @@ struct schedule_segment {
     uint64_t k0;             /* first pulse, in the scan */
     int64_t t0_ns;           /* its time since the scan's start, exact */
     uint64_t line0, r0;      /* its line, and place in the sweep as r0/den */
+    uint64_t line0_begin;    /* first pulse of line0, before k0 where the line began in an earlier segment ... */
+    int64_t line0_begin_ns;
+    uint64_t line0_cast;     /* ... and how many of its pulses were cast there */
     uint64_t num, den;       /* lines per pulse */
     int64_t ns_quot;         /* pulse period = ns_quot + ns_rem / prr_uhz nanoseconds */
     uint64_t ns_rem;
@@ -59,6 +62,8 @@ struct schedule_line {
     uint64_t line, pulse0, pulse_end;  /* in the scan; clipped to the segment's start and the scan's end */
     uint64_t cast0, cast_end;          /* cast pulses: cast0 <= k < cast_end */
     uint64_t r_first_pulse;            /* r of pulse0 */
+    uint64_t begin, cast_before;       /* the line's first pulse, maybe in an earlier segment; pulses cast there */
+    int64_t begin_ns;                  /* time of begin */
     uint32_t frame;
     int last_of_frame;
 };
@@ -67,8 +72,8 @@ struct schedule_line {
 void schedule_start(struct schedule_segment *seg, const struct schedule_spec *spec);
 
 /* The segment that begins with pulse k of the one before, with a new spec: the pulse keeps its time, the mirror its phase
- * (to 1/den of a line), the pan its angle (to 2^-24 micro-degrees); the frame goes on to the new pan stop. No pulse is lost
- * or doubled. seg may be `before`. */
+ * (to 1/den of a line), the pan its angle (to 2^-24 micro-degrees); the frame goes on to the first end of a line at or behind
+ * the new pan stop. No pulse is lost or doubled. seg may be `before`. */
 void schedule_change(struct schedule_segment *seg, const struct schedule_segment *before, const struct schedule_spec *spec,
                      uint64_t k);
 

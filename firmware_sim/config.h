@@ -41,6 +41,9 @@ struct config_mesh {
     char file[CONFIG_PATH_LEN];
     enum scene_up up;
     double scale, offset_m[3];
+    /* Motion, at time t of the scan: turned by turn_deg_s * t about the vertical through pivot_m, clockwise seen from above,
+     * then shifted by move_m_s * t; with cycle_s, forth and back. All zero: the mesh stands still. */
+    double move_m_s[3], turn_deg_s, pivot_m[3], cycle_s;
 };
 
 struct config_station {

@@ -61,6 +61,13 @@ static const struct cfg_key config_keys[] = {
     {"scene.meshes[].scale", CFG_REAL, "m/unit", NULL, 1e-9, 1e9, IN_MESH(scale), .help = "Metres per unit of the file."},
     {"scene.meshes[].offset_m", CFG_VEC3, "m", "[0, 0, 0]", -1e9, 1e9, IN_MESH(offset_m),
      .help = "Added after axes and scale."},
+    {"scene.meshes[].move_m_s", CFG_VEC3, "m/s", "[0, 0, 0]", -1000, 1000, IN_MESH(move_m_s),
+     .help = "The mesh moves: velocity, from the scan's start."},
+    {"scene.meshes[].turn_deg_s", CFG_REAL, "deg/s", "0", -36000, 36000, IN_MESH(turn_deg_s),
+     .help = "The mesh turns about the vertical through pivot_m, clockwise seen from above."},
+    {"scene.meshes[].pivot_m", CFG_VEC3, "m", "[0, 0, 0]", -1e9, 1e9, IN_MESH(pivot_m), .help = "Where it turns."},
+    {"scene.meshes[].cycle_s", CFG_REAL, "s", "0", 0, 86400, IN_MESH(cycle_s),
+     .help = "Motion goes forth and back within this time; 0: on and on."},
 
     {"stations", CFG_LIST, .min = 1, .max = CONFIG_MAX_STATIONS, LIST_OF(station, n_stations),
      .help = "Places where the head can stand."},

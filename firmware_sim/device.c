@@ -111,19 +111,47 @@ static void run_replay(struct device *device, uint64_t tick)
     }
 }
 
-static void say_overrun(struct device *device)
+/* The event each time, the error once per episode: a second without a loss ends one. */
+static void say_overrun(struct device *device, uint64_t tick)
 {
     uint64_t ticks = atomic_load(&device->counters.lost_ticks);
     if (ticks == device->lost_said) return;
     uint64_t pulses = atomic_load(&device->counters.lost_pulses);
+    uint64_t first = device->lost_first != UINT64_MAX ? device->lost_first : device->pulse_next;
     char text[96];
     uint64_t more = pulses - device->lost_pulses_said;
     snprintf(text, sizeof text, "%llu pulses in %llu ticks not computed in time", (unsigned long long)more,
              (unsigned long long)(ticks - device->lost_said));
-    device_push_event(device, NATIVE_EV_OVERRUN, device->pulse_next, more, ticks - device->lost_said, text);
-    command_queue_push(&device->cmd.queue, CMD_E_PULSES, text);
+    device_push_event(device, NATIVE_EV_OVERRUN, first, more, ticks - device->lost_said, text);
+    if (device->overrun_tick == 0 || tick - device->overrun_tick > device->tick_hz)
+        command_queue_push(&device->cmd.queue, CMD_E_PULSES, text);
+    device->overrun_tick = tick;
     device->lost_said = ticks;
     device->lost_pulses_said = pulses;
+    device->lost_first = UINT64_MAX;
+}
+
+uint32_t device_tick_pulses(const struct config *cfg)
+{
+    uint32_t n = (uint32_t)ceil((double)cfg->profile.prr_max_uhz * 1e-6 / cfg->tick_hz);
+    return n + n / 8 + 2 * SCHEDULE_PACKET; /* an eighth: to catch up with */
+}
+
+uint32_t device_tick_lines(const struct config *cfg)
+{
+    return (uint32_t)ceil((double)cfg->profile.lines_max_uhz * 1e-6 / cfg->tick_hz) + 2;
+}
+
+/* First pulse that is too many for this tick. When the rates jump up, what is due since the last cut, up to 15 pulses at the
+ * old rate, comes at the new one and may fill several ticks. */
+static uint64_t tick_room_end(const struct device *device)
+{
+    const struct schedule_segment *seg = &device->segment;
+    struct schedule_line line;
+    uint64_t last_line = schedule_line_of(seg, device->pulse_next) + device_tick_lines(device->site->cfg) - 1;
+    schedule_get_line(seg, last_line, &line);
+    uint64_t end = device->pulse_next + device_tick_pulses(device->site->cfg);
+    return line.pulse_end < end ? line.pulse_end : schedule_cut(seg, end);
 }
 
 /* Pulses of this tick; ends the scan when it is complete or was told to stop. Returns 1 when the scan is over. */
@@ -138,8 +166,11 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
     work->station = device->station;
     work->pulse0 = device->pulse_next;
     /* A stop keeps what was fired before this tick began; else the cut leaves whole packets for the next tick. */
-    uint64_t end = stop ? schedule_pulse_at(seg, since) : schedule_cut(seg, schedule_pulse_at(seg, since + device->tick_ns));
-    int done = schedule_pulse_at(seg, since + device->tick_ns) >= seg->end_pulse && !stop;
+    uint64_t due = schedule_pulse_at(seg, stop ? since : since + device->tick_ns);
+    uint64_t room_end = tick_room_end(device);
+    if (due > room_end) due = room_end;
+    uint64_t end = stop ? due : schedule_cut(seg, due);
+    int done = due >= seg->end_pulse && !stop;
     if (done || end > seg->end_pulse) end = seg->end_pulse;
     if (end < work->pulse0) end = work->pulse0;
     work->pulse_end = device->pulse_next = end;
@@ -162,7 +193,7 @@ static void describe(struct device *device, uint64_t tick, struct device_work *w
         device->describe = 0;
     }
     /* All names at the scan's start, then round and round for those who join late. */
-    uint32_t n = device->site->scene->n_surfaces;
+    uint32_t n = device->site->n_surfaces;
     uint64_t chunks = (n + DEVICE_SURFACES_A_FRAME - 1) / DEVICE_SURFACES_A_FRAME;
     uint64_t period = device->tick_hz >= 4 ? device->tick_hz / 4 : 1;
     if (since < chunks || since % period == 0) {
@@ -204,7 +235,8 @@ int device_claim(struct device *device, uint64_t released, struct device_work *w
 {
     (void)released;
     pthread_mutex_lock(&device->lock);
-    if (device->over) {
+    /* What is still to be said has a tick more. */
+    if (device->over && device->n_pending == 0 && device->lost_said == atomic_load(&device->counters.lost_ticks)) {
         pthread_mutex_unlock(&device->lock);
         return 1;
     }
@@ -216,7 +248,7 @@ int device_claim(struct device *device, uint64_t released, struct device_work *w
     work->t_ns = (int64_t)tick * device->tick_ns;
     run_replay(device, tick);
     run_timers(device, tick);
-    say_overrun(device);
+    say_overrun(device, tick);
     take_events(device, work);
     work->n_events_before = work->n_events;
     if (device->scanning) {
@@ -236,12 +268,37 @@ int device_claim(struct device *device, uint64_t released, struct device_work *w
     return 0;
 }
 
-void device_lost(struct device *device, const struct device_work *work)
+/* Events of a lost tick go before those that came later. An overrun event is taken back instead: the next one tells its
+ * losses together with this one, so that a long overload can't fill the room for events. */
+static void take_back(struct device *device, const struct device_work *work)
+{
+    uint32_t n = 0;
+    struct native_event event[DEVICE_MAX_EVENTS];
+    for (uint32_t i = 0; i < work->n_events; i++) {
+        const struct native_event *e = &work->event[i];
+        if (e->code != NATIVE_EV_OVERRUN) {
+            event[n++] = *e;
+            continue;
+        }
+        device->lost_pulses_said -= e->b;
+        device->lost_said -= e->c;
+        if (e->b != 0 && e->a < device->lost_first) device->lost_first = e->a;
+    }
+    uint32_t room = DEVICE_MAX_PENDING - device->n_pending;
+    if (n > room) device->pending_dropped += n - room;
+    if (n > room) n = room;
+    memmove(device->pending + n, device->pending, device->n_pending * sizeof device->pending[0]);
+    memcpy(device->pending, event, n * sizeof event[0]);
+    device->n_pending += n;
+}
+
+void device_lost(struct device *device, const struct device_work *work, uint64_t n_cast, uint64_t first_cast)
 {
     pthread_mutex_lock(&device->lock);
-    for (uint32_t i = 0; i < work->n_events; i++)
-        device_push_event(device, (enum native_event_code)work->event[i].code, work->event[i].a, work->event[i].b,
-                          work->event[i].c, work->event[i].text);
+    atomic_fetch_add(&device->counters.lost_pulses, n_cast);
+    atomic_fetch_add(&device->counters.lost_ticks, 1);
+    if (first_cast < device->lost_first) device->lost_first = first_cast;
+    take_back(device, work);
     if (work->describe && work->describe_flags == 0 && device->scanning) device->describe = 1;
     pthread_mutex_unlock(&device->lock);
 }

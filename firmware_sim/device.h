@@ -69,8 +69,9 @@ struct device_counters *device_counters(struct device *device);
 
 /* The next tick's work. Returns 0, or 1 when the run is over and there is no next tick. `released`: ticks released so far. */
 int device_claim(struct device *device, uint64_t released, struct device_work *work);
-/* A claimed tick was lost: what it said besides points is said again in a later one. */
-void device_lost(struct device *device, const struct device_work *work);
+/* A claimed tick was lost, and with it n_cast pulses to be cast, from first_cast on: counted, and what it said besides
+ * points is said again in a later one. */
+void device_lost(struct device *device, const struct device_work *work, uint64_t n_cast, uint64_t first_cast);
 /* True while nothing happens without a command: off the clock, the paces `fast` and `step` wait then. */
 int device_is_idle(struct device *device);
 /* Ends the run: a running scan is stopped first. Async-signal-unsafe. */
@@ -90,5 +91,9 @@ void device_report(struct device *device, int number, const char *text);
 uint64_t device_scans(struct device *device);
 
 double device_tick_ns(const struct device *device);
+
+/* The most pulses that one tick consists of, and lines that end in it, whatever the settings: a slot has to hold them. */
+uint32_t device_tick_pulses(const struct config *cfg);
+uint32_t device_tick_lines(const struct config *cfg);
 
 #endif

@@ -151,7 +151,7 @@ int device_create(const struct site *site, const struct device_options *options,
     device->options = *options;
     device->tick_hz = (uint64_t)llround(site->cfg->tick_hz);
     device->tick_ns = 1000000000 / (int64_t)device->tick_hz;
-    device->due_tick = device->end_tick = UINT64_MAX;
+    device->due_tick = device->end_tick = device->lost_first = UINT64_MAX;
     if (options->duration_s > 0.0 && !options->start)
         device->end_tick = (uint64_t)ceil(options->duration_s * (double)device->tick_hz);
     int rc = set_limits(device, err);

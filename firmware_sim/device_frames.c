@@ -53,7 +53,7 @@ void device_fill_descriptor(const struct device *device, struct native_descripto
     d->range_min_m = setup.range_min_m;
     d->range_max_m = setup.range_max_m;
     d->max_echoes = cfg->profile.max_echoes;
-    d->n_surfaces = device->site->scene->n_surfaces;
+    d->n_surfaces = device->site->n_surfaces;
     d->frames = spec->frames;
     d->scan = device->scan;
     d->seed = cfg->seed;

@@ -39,6 +39,8 @@ struct device {
     uint32_t n_pending, pending_dropped;
     uint64_t lost_said;            /* lost ticks that an event has told of */
     uint64_t lost_pulses_said;
+    uint64_t lost_first;           /* first lost pulse that no event has told of; UINT64_MAX: none */
+    uint64_t overrun_tick;         /* of the last overrun event */
 
     int ending, over;
     uint64_t end_tick;             /* UINT64_MAX: none */

@@ -45,6 +45,7 @@ struct loop {
     uint32_t n_casters_running;
     pthread_mutex_t claim_lock;
     uint64_t next_tick;                /* under claim_lock */
+    _Atomic uint32_t n_computing;      /* claimed ticks, neither ready nor told lost yet */
     sem_t work;                        /* a tick may be claimed */
     sem_t ready;                       /* a tick is ready; only in the paces that wait */
     sem_t progress;                    /* a reader went on, or time was granted; likewise */

@@ -28,9 +28,8 @@ static int may_claim(struct loop *loop)
 
 static void tick_lost(struct loop *loop, const struct device_work *work)
 {
-    atomic_fetch_add(&loop->counters->lost_pulses, worker_count_cast(work));
-    atomic_fetch_add(&loop->counters->lost_ticks, 1);
-    device_lost(loop->device, work);
+    uint64_t first, n_cast = worker_count_cast(work, &first);
+    device_lost(loop->device, work, n_cast, first);
 }
 
 /* Claims the next tick. 1: work and slot are set (slot NULL: lost already); 0: not now; -1: the run is over. */
@@ -42,9 +41,13 @@ static int claim(struct loop *loop, struct device_work *work, struct ring_slot *
         got = -1;
     } else if (may_claim(loop)) {
         if (device_claim(loop->device, atomic_load(&loop->ring.released), work) != 0) {
-            atomic_store(&loop->final_tick, loop->next_tick);
-            got = -1;
+            /* A tick that is still computed may yet be lost; what it says then needs one more. */
+            if (atomic_load(&loop->n_computing) == 0) {
+                atomic_store(&loop->final_tick, loop->next_tick);
+                got = -1;
+            }
         } else {
+            atomic_fetch_add(&loop->n_computing, 1);
             *slot = ring_claim(&loop->ring, work->tick);
             loop->next_tick = work->tick + 1;
             got = 1;
@@ -70,6 +73,7 @@ void *loop_caster_main(void *arg)
         }
         if (slot != NULL) worker_fill(caster->worker, &work, slot, loop->slot_bytes);
         if (slot == NULL || !ring_ready(&loop->ring, slot, work.tick)) tick_lost(loop, &work);
+        atomic_fetch_sub(&loop->n_computing, 1);
         if (loop_waits(loop)) sem_post(&loop->ready);
     }
     if (loop_waits(loop)) sem_post(&loop->ready);
@@ -124,7 +128,8 @@ static void release(struct loop *loop, struct ring_slot *slot, uint64_t tick, in
     for (uint32_t at = 0; at < slot->len;)
         at += (uint32_t)native_seal(slot->bytes + at, loop->seq++);
     count(loop, slot, now_ns);
-    int wake = slot->len != 0 || loop->cfg->pace == PACE_STEP;
+    /* Where the pacing thread waits for readers, they must see empty ticks pass, too. */
+    int wake = slot->len != 0 || loop_waits(loop);
     ring_release(&loop->ring, tick);
     if (wake) wake_all(loop);
     sem_post(&loop->work);

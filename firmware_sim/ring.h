@@ -18,7 +18,8 @@
 #include "core/err.h"
 #include "core/line.h"
 
-enum { RING_MAX_READERS = 72, RING_MAX_MARKS = 64 };
+/* Marks: 10,000 lines a second in ticks of 10 ms, and device_tick_lines' two more, fit. */
+enum { RING_MAX_READERS = 72, RING_MAX_MARKS = 104 };
 
 /* A line-end frame that lacks its number of echoes until the tick is released: blocks before it may come from elsewhere. */
 struct ring_mark {

@@ -6,16 +6,92 @@
 
 #include "core/rng.h"
 
+static int is_moving(const struct config_mesh *mesh)
+{
+    return mesh->turn_deg_s != 0.0 || mesh->move_m_s[0] != 0.0 || mesh->move_m_s[1] != 0.0 || mesh->move_m_s[2] != 0.0;
+}
+
+static struct scene_mesh_spec mesh_spec(const struct config_mesh *mesh)
+{
+    struct scene_mesh_spec spec = {.file = mesh->file, .up = mesh->up, .scale = mesh->scale};
+    memcpy(spec.offset_m, mesh->offset_m, sizeof spec.offset_m);
+    return spec;
+}
+
+/* A body by itself: its sphere, its BVH in its own frame, its labels behind those there are. */
+static int add_mover(struct site *site, const struct config_mesh *mesh, const struct sh_report *report, struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    if (site->n_movers == CAST_MAX_MOVERS)
+        return sh_fail(err, SH_EINPUT, "%s: scene.meshes: too many that move; at most %d", cfg->file, CAST_MAX_MOVERS);
+    struct site_mover *m = &site->mover[site->n_movers++];
+    struct scene_mesh_spec spec = mesh_spec(mesh);
+    double half2 = 0.0;
+    m->mesh = mesh;
+    int rc = scene_load(&spec, 1, cfg->scene_tolerance_m, report, &m->scene, err);
+    if (rc != SH_OK) return rc;
+    if (site->n_surfaces + m->scene->n_surfaces > SCENE_MAX_SURFACES)
+        return sh_fail(err, SH_EINPUT, "%s: too many surfaces; at most %d", mesh->file, SCENE_MAX_SURFACES);
+    for (uint32_t i = 0; i < m->scene->n_triangles; i++)
+        m->scene->label[i] = (uint16_t)(m->scene->label[i] + site->n_surfaces);
+    site->n_surfaces += m->scene->n_surfaces;
+    for (int i = 0; i < 3; i++) {
+        double half = 0.5 * (m->scene->max_m[i] - m->scene->min_m[i]);
+        m->centre_m[i] = m->scene->min_m[i] + half;
+        half2 += half * half;
+    }
+    m->radius_m = sqrt(half2) * (1.0 + 1e-9) + 1e-6;
+    return bvh_create(m->scene, m->centre_m, cfg->profile.range_max_m, cfg->threads, report, &m->bvh, err);
+}
+
 static int load_scene(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
     struct scene_mesh_spec spec[CONFIG_MAX_MESHES];
-    for (uint32_t i = 0; i < cfg->n_meshes; i++) {
-        const struct config_mesh *mesh = &cfg->mesh[i];
-        spec[i] = (struct scene_mesh_spec){.file = mesh->file, .up = mesh->up, .scale = mesh->scale};
-        memcpy(spec[i].offset_m, mesh->offset_m, sizeof spec[i].offset_m);
+    size_t n = 0;
+    for (uint32_t i = 0; i < cfg->n_meshes; i++)
+        if (!is_moving(&cfg->mesh[i])) spec[n++] = mesh_spec(&cfg->mesh[i]);
+    if (n == 0)
+        return sh_fail(err, SH_EINPUT, "%s: scene.meshes: all of them move; at least one has to stand still", cfg->file);
+    int rc = scene_load(spec, n, cfg->scene_tolerance_m, report, &site->scene, err);
+    if (rc == SH_OK) site->n_surfaces = site->scene->n_surfaces;
+    for (uint32_t i = 0; i < cfg->n_meshes && rc == SH_OK; i++)
+        if (is_moving(&cfg->mesh[i])) rc = add_mover(site, &cfg->mesh[i], report, err);
+    return rc;
+}
+
+const struct scene_surface *site_surface(const struct site *site, uint32_t label)
+{
+    const struct scene *scene = site->scene;
+    for (uint32_t i = 0; label >= scene->n_surfaces; i++) {
+        label -= scene->n_surfaces;
+        scene = site->mover[i].scene;
     }
-    return scene_load(spec, cfg->n_meshes, cfg->scene_tolerance_m, report, &site->scene, err);
+    return &scene->surface[label];
+}
+
+void site_move(const struct site *site, double t_s, struct cast_setup *setup)
+{
+    setup->n_movers = site->n_movers;
+    for (uint32_t k = 0; k < site->n_movers; k++) {
+        const struct site_mover *m = &site->mover[k];
+        struct cast_mover *out = &setup->mover[k];
+        const struct config_mesh *mesh = m->mesh;
+        double t = t_s;
+        if (mesh->cycle_s > 0.0) { /* forth and back */
+            t = fmod(t_s, mesh->cycle_s);
+            if (t > 0.5 * mesh->cycle_s) t = mesh->cycle_s - t;
+        }
+        cast_rotation(fmod(mesh->turn_deg_s * t, 360.0) * M_PI / 180.0, out->rotation);
+        out->bvh = m->bvh;
+        out->radius_m = m->radius_m;
+        memcpy(out->centre_m, m->centre_m, sizeof out->centre_m);
+        for (int i = 0; i < 3; i++) {
+            const double *row = out->rotation + 3 * i;
+            double turned = row[0] * mesh->pivot_m[0] + row[1] * mesh->pivot_m[1] + row[2] * mesh->pivot_m[2];
+            out->shift_m[i] = mesh->pivot_m[i] - turned + mesh->move_m_s[i] * t;
+        }
+    }
 }
 
 static double distance_m(const double a[3], const double b[3])
@@ -101,6 +177,10 @@ void site_free(struct site *site)
         georef_free(site->station[i].georef);
     for (uint32_t i = 0; i < site->n_bvh; i++)
         bvh_free(site->bvh[i]);
+    for (uint32_t i = 0; i < site->n_movers; i++) {
+        bvh_free(site->mover[i].bvh);
+        scene_free(site->mover[i].scene);
+    }
     scene_free(site->scene);
     free(site);
 }

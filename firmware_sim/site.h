@@ -15,9 +15,18 @@ struct site_station {
     double rotation[9];         /* socs -> prcs */
 };
 
+struct site_mover {
+    const struct config_mesh *mesh;
+    struct scene *scene;
+    struct bvh *bvh;
+    double centre_m[3], radius_m;
+};
+
 struct site {
     const struct config *cfg;
-    struct scene *scene;
+    struct scene *scene;        /* what stands still */
+    struct site_mover mover[CAST_MAX_MOVERS];
+    uint32_t n_movers, n_surfaces; /* surfaces of the scene, then of the movers */
     struct bvh *bvh[CONFIG_MAX_STATIONS];
     uint32_t n_bvh;
     struct site_station station[CONFIG_MAX_STATIONS];
@@ -31,6 +40,12 @@ struct site {
 /* cfg must outlive the site. */
 int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err);
 void site_free(struct site *site);
+
+/* Names of a label below n_surfaces. */
+const struct scene_surface *site_surface(const struct site *site, uint32_t label);
+
+/* Poses of all movers at a time of the scan. */
+void site_move(const struct site *site, double t_s, struct cast_setup *setup);
 
 /* What the casters need to scan from a station (0..n_stations-1). */
 void site_cast_setup(const struct site *site, uint32_t station, struct cast_setup *setup);

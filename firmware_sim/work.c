@@ -1,6 +1,5 @@
 #include "firmware_sim/work.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -20,18 +19,13 @@ enum {
     LINE_END_BYTES = 128,
 };
 
-static uint32_t max_pulses(const struct config *cfg)
-{
-    return (uint32_t)ceil((double)cfg->profile.prr_max_uhz * 1e-6 / cfg->tick_hz) + 2 * SCHEDULE_PACKET;
-}
-
 int worker_create(const struct site *site, struct worker **out, struct sh_err *err)
 {
     *out = NULL;
     struct worker *worker = calloc(1, sizeof *worker);
     if (worker == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     worker->site = site;
-    uint32_t n = max_pulses(site->cfg);
+    uint32_t n = device_tick_pulses(site->cfg);
     int rc = caster_create(&worker->caster, err);
     if (rc == SH_OK) rc = line_block_alloc(&worker->block, n, err);
     if (rc != SH_OK) {
@@ -52,10 +46,9 @@ void worker_free(struct worker *worker)
 
 uint32_t worker_slot_bytes(const struct config *cfg)
 {
-    uint32_t lines = (uint32_t)ceil((double)cfg->profile.lines_max_uhz * 1e-6 / cfg->tick_hz) + 2;
     /* Each line part is a frame of its own. */
-    return OVERHEAD_BYTES + (uint32_t)native_points_bound(max_pulses(cfg)) +
-           lines * (LINE_END_BYTES + NATIVE_HEADER_LEN + NATIVE_POINTS_HEAD_LEN);
+    return OVERHEAD_BYTES + (uint32_t)native_points_bound(device_tick_pulses(cfg)) +
+           device_tick_lines(cfg) * (LINE_END_BYTES + NATIVE_HEADER_LEN + NATIVE_POINTS_HEAD_LEN);
 }
 
 static void added(struct ring_slot *slot, size_t len, uint32_t frames)
@@ -64,15 +57,11 @@ static void added(struct ring_slot *slot, size_t len, uint32_t frames)
     if (len != 0) slot->n_frames += frames;
 }
 
-struct names {
-    const struct scene *scene;
-};
-
 static void surface_name(void *ctx, uint32_t label, const char **object, const char **material)
 {
-    const struct names *names = ctx;
-    *object = names->scene->surface[label].object;
-    *material = names->scene->surface[label].material;
+    const struct scene_surface *surface = site_surface(ctx, label);
+    *object = surface->object;
+    *material = surface->material;
 }
 
 static void fill_heads(struct worker *worker, const struct device_work *work, struct ring_slot *slot, uint32_t cap)
@@ -85,11 +74,10 @@ static void fill_heads(struct worker *worker, const struct device_work *work, st
         added(slot, native_encode_anchor(slot->bytes + slot->len, cap - slot->len, &work->anchor, work->t_ns, flags), 1);
     }
     uint32_t first = work->surfaces_first, left = work->surfaces_n;
-    struct names names = {worker->site->scene};
     while (left != 0) {
         uint32_t done = 0;
         size_t len = native_encode_surfaces(slot->bytes + slot->len, cap - slot->len, first, left, 8192, surface_name,
-                                            &names, work->t_ns, 0, &done);
+                                            (void *)(uintptr_t)worker->site, work->t_ns, 0, &done);
         if (len == 0 || done == 0) break;
         added(slot, len, 1);
         first += done;
@@ -133,14 +121,15 @@ static void end_line(const struct worker *worker, const struct device_work *work
     const struct cast_setup *setup = &worker->setup;
     int partial = end < line->pulse_end;
     uint64_t cast_end = line->cast_end < end ? line->cast_end : end;
-    uint64_t last = end - 1;
+    uint64_t cast_here = cast_end > line->cast0 ? cast_end - line->cast0 : 0;
+    uint64_t last = end > seg->k0 ? end - 1 : end; /* stopped at once after a change of settings: there is no nearer pulse */
     struct ring_mark *mark = &slot->mark[slot->n_marks++];
     mark->end = (struct line_end){.frame = line->frame,
                                   .line = (uint32_t)line->line,
-                                  .pulse0 = line->pulse0,
-                                  .n_fired = (uint32_t)(end - line->pulse0),
-                                  .n_cast = cast_end > line->cast0 ? (uint32_t)(cast_end - line->cast0) : 0,
-                                  .t0_ns = schedule_time_ns(seg, line->pulse0),
+                                  .pulse0 = line->begin,
+                                  .n_fired = (uint32_t)(end - line->begin),
+                                  .n_cast = (uint32_t)(line->cast_before + cast_here),
+                                  .t0_ns = line->begin_ns,
                                   .t1_ns = schedule_time_ns(seg, end),
                                   .mirror_count = cast_encoder_count(schedule_mirror_turn(seg, last), setup->mirror_counts),
                                   .pan_count = cast_encoder_count(schedule_pan_turn(seg, last), setup->pan_counts),
@@ -161,6 +150,7 @@ static void fill_pulses(struct worker *worker, const struct device_work *work, s
         site_cast_setup(worker->site, work->station, &worker->setup);
         worker->setup_station = work->station + 1;
     }
+    if (worker->site->n_movers != 0) site_move(worker->site, 1e-9 * (double)(work->t_ns - work->scan_t0_ns), &worker->setup);
     for (uint64_t k = work->pulse0; k < work->pulse_end;) {
         struct schedule_line line;
         schedule_get_line(&work->segment, schedule_line_of(&work->segment, k), &line);
@@ -169,10 +159,14 @@ static void fill_pulses(struct worker *worker, const struct device_work *work, s
         uint64_t cast_end = end < line.cast_end ? end : line.cast_end;
         if (cast0 < cast_end) cast_run(worker, work, &line, cast0, cast_end, slot, cap);
         slot->n_fired += end - k;
-        if (end == line.pulse_end || (work->cut_short && end == work->pulse_end))
-            end_line(worker, work, &line, end, slot, cap);
+        if (end == line.pulse_end) end_line(worker, work, &line, end, slot, cap);
         k = end;
     }
+    if (!work->cut_short) return;
+    /* The line that was stopped in, be some of its pulses in this tick or all in earlier ones. */
+    struct schedule_line line;
+    schedule_get_line(&work->segment, schedule_line_of(&work->segment, work->pulse_end), &line);
+    if (line.begin < work->pulse_end) end_line(worker, work, &line, work->pulse_end, slot, cap);
 }
 
 void worker_fill(struct worker *worker, const struct device_work *work, struct ring_slot *slot, uint32_t slot_bytes)
@@ -187,9 +181,10 @@ void worker_fill(struct worker *worker, const struct device_work *work, struct r
               1);
 }
 
-uint64_t worker_count_cast(const struct device_work *work)
+uint64_t worker_count_cast(const struct device_work *work, uint64_t *first)
 {
     uint64_t n = 0;
+    *first = UINT64_MAX;
     if (!work->scanning) return 0;
     for (uint64_t k = work->pulse0; k < work->pulse_end;) {
         struct schedule_line line;
@@ -198,6 +193,7 @@ uint64_t worker_count_cast(const struct device_work *work)
         uint64_t cast0 = k > line.cast0 ? k : line.cast0;
         uint64_t cast_end = end < line.cast_end ? end : line.cast_end;
         if (cast0 < cast_end) n += cast_end - cast0;
+        if (cast0 < cast_end && *first == UINT64_MAX) *first = cast0;
         k = end;
     }
     return n;

@@ -17,7 +17,7 @@ uint32_t worker_slot_bytes(const struct config *cfg);
 /* Fills the slot. Allocates nothing. */
 void worker_fill(struct worker *worker, const struct device_work *work, struct ring_slot *slot, uint32_t slot_bytes);
 
-/* Pulses of the tick that would have been cast. */
-uint64_t worker_count_cast(const struct device_work *work);
+/* Pulses of the tick that would have been cast, and the first of them (UINT64_MAX: none). */
+uint64_t worker_count_cast(const struct device_work *work, uint64_t *first);
 
 #endif

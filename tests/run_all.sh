@@ -1,17 +1,20 @@
 #!/bin/sh
-# Runs the tests that `make test` has built: sh tests/run_all.sh BUILD [unit|wire]. Ends with one line of counts.
+# Runs the tests that make has built: sh tests/run_all.sh BUILD [unit|wire|accuracy|stability]. Without a part all of them,
+# and the unit tests once more with the sanitizers in. Ends with one line of counts.
 set -eu
 build=$1
-part=${2:-all}
+part=${2:-}
 set --
-if [ "$part" != wire ]; then
-    set -- "$@" tests/check_includes.sh "$build"/test/tests/unit/test_*[!.d]
-fi
-if [ "$part" != unit ]; then
-    set -- "$@" "$build"/test/tests/wire/test_*[!.d]
-fi
-# The same unit tests with the sanitizers in.
-if [ "$part" = all ]; then
-    set -- "$@" "$build"/asan/tests/unit/test_*[!.d]
+for folder in unit accuracy stability wire; do
+    [ -z "$part" ] || [ "$part" = $folder ] || continue
+    [ $folder != unit ] || set -- "$@" tests/check_includes.sh
+    for source in tests/$folder/test_*.c; do
+        [ ! -e "$source" ] || set -- "$@" "$build/test/${source%.c}"
+    done
+done
+if [ -z "$part" ]; then
+    for source in tests/unit/test_*.c; do
+        set -- "$@" "$build/asan/${source%.c}"
+    done
 fi
 exec bash tests/run_tap.sh "$@"

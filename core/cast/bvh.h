@@ -61,6 +61,9 @@ void bvh_intersect_one(const struct bvh *bvh, const float org[3], const float di
 /* Fills the float buffers of a geometry with widened triangles, and bvh->triangle. */
 int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err);
 
+/* twins.c: of faces with the same three corners, however they are written, all take the plane and the label of the first. */
+int bvh_unite_twins(struct bvh *bvh, struct sh_err *err);
+
 /* ---- decide.c */
 struct decide_ray {
     const struct bvh *bvh;

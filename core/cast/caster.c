@@ -8,6 +8,11 @@
 
 enum { CHUNK = 256 }; /* pulses worked on at a time: all arrays together stay in the first-level cache */
 
+struct mover_rays {
+    double dx[CHUNK], dy[CHUNK], dz[CHUNK], range_m[CHUNK];
+    uint32_t hit[CHUNK];
+};
+
 struct caster {
     double mirror_turn[CHUNK], pan_turn[CHUNK];
     double dx[CHUNK], dy[CHUNK], dz[CHUNK]; /* true direction, then the one the encoders read; prcs */
@@ -16,6 +21,8 @@ struct caster {
     uint32_t prim[CHUNK], hit[CHUNK];       /* as proposed; as decided */
     float t[CHUNK], u[CHUNK], v[CHUNK];
     uint32_t doubt[CHUNK];                  /* the proposal has to be decided in double */
+    uint16_t label[CHUNK];
+    struct mover_rays mover;                /* touched only where something moves */
     struct cast_counters counters;
 };
 
@@ -104,12 +111,33 @@ static void positions(struct caster *c, const struct cast_setup *s, struct line_
     kernel_geo(c->dx, c->dy, c->dz, s->xyz_scale_m, n, block->a + at, block->b + at, block->c + at);
 }
 
-static void labels(const struct caster *c, const struct cast_setup *s, struct line_block *block, uint32_t at, uint32_t n)
+/* Label by triangle; the record behind the last one stands for a miss. */
+static void take_labels(struct caster *c, const struct bvh *bvh, uint32_t n)
 {
-    const struct bvh_triangle *triangle = s->bvh->triangle;
+    uint32_t last = bvh->scene->n_triangles;
+    for (uint32_t i = 0; i < n; i++)
+        c->label[i] = bvh->triangle[c->hit[i] < last ? c->hit[i] : last].label;
+}
+
+/* A moving body, cast in its own frame: what it hides gives way. */
+static void cast_mover(struct caster *c, const struct cast_setup *s, const struct cast_mover *m, uint32_t n)
+{
+    double v[3], station_m[3], w[3];
+    for (int i = 0; i < 3; i++) {
+        const double *row = m->rotation + 3 * i;
+        v[i] = row[0] * m->centre_m[0] + row[1] * m->centre_m[1] + row[2] * m->centre_m[2] + m->shift_m[i] - s->station_m[i];
+        w[i] = s->station_m[i] - m->shift_m[i];
+    }
+    if (!kernel_meets_sphere(c->dx, c->dy, c->dz, n, v, m->radius_m)) return;
+    for (int i = 0; i < 3; i++)
+        station_m[i] = m->rotation[i] * w[0] + m->rotation[3 + i] * w[1] + m->rotation[6 + i] * w[2];
+    struct mover_rays *r = &c->mover;
+    kernel_turn_back(c->dx, c->dy, c->dz, m->rotation, n, r->dx, r->dy, r->dz);
+    caster_hits(c, m->bvh, station_m, s->range_max_m, n, r->dx, r->dy, r->dz, r->range_m, r->hit);
     for (uint32_t i = 0; i < n; i++) {
-        block->label[at + i] = block->echo[at + i] != 0 ? triangle[c->hit[i]].label : (uint16_t)LINE_LABEL_NONE;
-        block->refl_cdb[at + i] = LINE_REFL_NONE;
+        if (!(r->range_m[i] < c->range_m[i]) && !(isnan(c->range_m[i]) && !isnan(r->range_m[i]))) continue;
+        c->range_m[i] = r->range_m[i];
+        c->label[i] = m->bvh->triangle[r->hit[i]].label;
     }
 }
 
@@ -119,8 +147,14 @@ static uint32_t cast_chunk(struct caster *c, const struct cast_setup *s, const s
     kernel_angles(run, at, n, c->mirror_turn, c->pan_turn);
     kernel_directions(c->mirror_turn, c->pan_turn, s->rotation, n, c->dx, c->dy, c->dz);
     caster_hits(c, s->bvh, s->station_m, s->range_max_m, n, c->dx, c->dy, c->dz, c->range_m, c->hit);
+    take_labels(c, s->bvh, n);
+    for (uint32_t i = 0; i < s->n_movers; i++)
+        cast_mover(c, s, &s->mover[i], n);
     uint32_t echoes = kernel_detect(c->range_m, s->range_min_m, s->range_max_m, n, block->echo + at);
-    labels(c, s, block, at, n);
+    for (uint32_t i = 0; i < n; i++) {
+        block->label[at + i] = block->echo[at + i] != 0 ? c->label[i] : (uint16_t)LINE_LABEL_NONE;
+        block->refl_cdb[at + i] = LINE_REFL_NONE;
+    }
     if (s->noise_on) kernel_noise(s, run->pulse0 + at, n, c->range_m);
     if (s->layout == LINE_POLAR)
         kernel_polar(s, c->range_m, c->mirror_turn, c->pan_turn, n, block->a + at, block->b + at, block->c + at);

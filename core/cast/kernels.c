@@ -87,6 +87,32 @@ uint32_t kernel_refine(const struct bvh *bvh, const struct kernel_hits *hits, co
 }
 
 VEC_CLONES
+int kernel_meets_sphere(const double *restrict dx, const double *restrict dy, const double *restrict dz, uint32_t n,
+                        const double v[3], double radius_m)
+{
+    const double x = v[0], y = v[1], z = v[2], v2 = x * x + y * y + z * z, r2 = radius_m * radius_m;
+    uint64_t meets = v2 <= r2;
+    for (uint32_t i = 0; i < n; i++) {
+        double along = x * dx[i] + y * dy[i] + z * dz[i];
+        uint64_t near = v2 - along * along <= r2, ahead = along > 0.0;
+        meets |= near & ahead;
+    }
+    return meets != 0;
+}
+
+VEC_CLONES
+void kernel_turn_back(const double *restrict dx, const double *restrict dy, const double *restrict dz, const double m[9],
+                      uint32_t n, double *restrict ex, double *restrict ey, double *restrict ez)
+{
+    const double m0 = m[0], m1 = m[1], m2 = m[2], m3 = m[3], m4 = m[4], m5 = m[5], m6 = m[6], m7 = m[7], m8 = m[8];
+    for (uint32_t i = 0; i < n; i++) {
+        ex[i] = m0 * dx[i] + m3 * dy[i] + m6 * dz[i];
+        ey[i] = m1 * dx[i] + m4 * dy[i] + m7 * dz[i];
+        ez[i] = m2 * dx[i] + m5 * dy[i] + m8 * dz[i];
+    }
+}
+
+VEC_CLONES
 static void noise(double sigma0, double sigma1, uint64_t key, uint64_t pulse0, uint32_t n, double *restrict range_m)
 {
     for (uint32_t i = 0; i < n; i++)

@@ -26,6 +26,12 @@ struct kernel_hits {
 /* Returns how many are in doubt. */
 uint32_t kernel_refine(const struct bvh *bvh, const struct kernel_hits *hits, const double o[3], uint32_t n);
 
+/* True when one of the rays may meet the sphere at v (from the rays' origin). */
+int kernel_meets_sphere(const double *dx, const double *dy, const double *dz, uint32_t n, const double v[3], double radius_m);
+/* Directions turned by the inverse of a rotation. */
+void kernel_turn_back(const double *dx, const double *dy, const double *dz, const double rotation[9], uint32_t n, double *ex,
+                      double *ey, double *ez);
+
 /* Gaussian range noise on n ranges; NaN stays NaN. */
 void kernel_noise(const struct cast_setup *setup, uint64_t pulse0, uint32_t n, double *range_m);
 

@@ -22,13 +22,15 @@ static uint64_t ceil_div(u128 a, u128 b)
     return (uint64_t)((a + b - 1) / b);
 }
 
-/* Lines that the pan needs for span_fine (2^-24 micro-degrees); at least one. */
-static uint64_t lines_for_span(const struct schedule_spec *spec, int64_t span_fine)
+/* Lines that the pan needs for span_fine (2^-24 micro-degrees), the first of them from r0/den on; at least one. */
+static uint64_t lines_for_span(const struct schedule_segment *seg, int64_t span_fine)
 {
+    const struct schedule_spec *spec = &seg->spec;
     if (spec->pan_udeg_s <= 0 || span_fine <= 0) return 1;
     u128 lines = (u128)(uint64_t)span_fine * (uint64_t)spec->lines_uhz;
-    uint64_t n = ceil_div(lines, ((u128)(uint64_t)spec->pan_udeg_s * 1000000) << 24);
-    return n > 0 ? n : 1;
+    u128 unit = ((u128)(uint64_t)spec->pan_udeg_s * 1000000) << 24;
+    /* Whole lines apart, so that the rest times den stays within 128 bits. */
+    return (uint64_t)(lines / unit) + ceil_div(lines % unit * seg->den + seg->r0 * unit, unit * seg->den);
 }
 
 static int pan_is_still(const struct schedule_spec *spec)
@@ -49,7 +51,7 @@ static void set_rates(struct schedule_segment *seg, const struct schedule_spec *
     uint64_t sweep = (uint64_t)spec->sweep_udeg;
     seg->r_first = ceil_div((u128)(uint64_t)(spec->line_start_udeg - spec->fov_min_udeg) * seg->den, sweep);
     seg->r_last = (uint64_t)((u128)(uint64_t)(spec->line_stop_udeg - spec->fov_min_udeg) * seg->den / sweep);
-    seg->frame_lines = lines_for_span(&seg->spec, (spec->pan_stop_udeg - spec->pan_start_udeg) << 24);
+    seg->frame_lines = lines_for_span(seg, (spec->pan_stop_udeg - spec->pan_start_udeg) * (1 << 24));
 }
 
 /* First pulse of line n in the scan: the smallest i with r0 + i*num >= (n - line0)*den. */
@@ -60,14 +62,17 @@ static uint64_t line_first_pulse(const struct schedule_segment *seg, uint64_t n)
     return seg->k0 + ceil_div(need, seg->num);
 }
 
+/* More pulses than 64 bits can count are without end. */
 static void set_end(struct schedule_segment *seg)
 {
     if (seg->spec.frames == 0) {
         seg->end_pulse = UINT64_MAX;
         return;
     }
-    uint64_t frames = seg->spec.frames > seg->frame0 ? seg->spec.frames : seg->frame0 + 1;
-    seg->end_pulse = line_first_pulse(seg, seg->frame0_end + (frames - seg->frame0 - 1) * seg->frame_lines);
+    uint64_t frames = seg->spec.frames > seg->frame0 ? seg->spec.frames : (uint64_t)seg->frame0 + 1;
+    u128 line = seg->frame0_end + (u128)(frames - seg->frame0 - 1) * seg->frame_lines;
+    u128 pulses = line > UINT64_MAX ? line : seg->k0 + (line - seg->line0) * seg->den / seg->num;
+    seg->end_pulse = pulses < UINT64_MAX ? line_first_pulse(seg, (uint64_t)line) : UINT64_MAX;
 }
 
 void schedule_start(struct schedule_segment *seg, const struct schedule_spec *spec)
@@ -90,7 +95,8 @@ static uint32_t frame_of_line(const struct schedule_segment *seg, uint64_t n, ui
     return seg->frame0 + 1 + (uint32_t)f;
 }
 
-/* Pan at pulse k, which belongs to the frame that begins with first_line: whole micro-degrees and 2^-24 parts. */
+/* Pan at pulse k, which belongs to the frame that begins with first_line: whole micro-degrees and 2^-24 parts, rounded up,
+ * so that a frame that a change cuts in two never needs a line more for what was rounded off. */
 static int64_t pan_fine(const struct schedule_segment *seg, uint64_t k, uint64_t first_line)
 {
     int64_t base = first_line == seg->line0 ? seg->pan0_fine : seg->spec.pan_start_udeg * (1 << 24);
@@ -98,7 +104,7 @@ static int64_t pan_fine(const struct schedule_segment *seg, uint64_t k, uint64_t
     u128 turned = (u128)i * (uint64_t)seg->spec.pan_udeg_s * 1000000;
     uint64_t prr = (uint64_t)seg->spec.prr_uhz;
     uint64_t whole = (uint64_t)(turned / prr), rest = (uint64_t)(turned % prr);
-    uint64_t fine = (uint64_t)(((u128)rest << 24) / prr);
+    uint64_t fine = ceil_div((u128)rest << 24, prr);
     return base + (int64_t)((whole << 24) + fine);
 }
 
@@ -107,6 +113,8 @@ void schedule_change(struct schedule_segment *seg, const struct schedule_segment
 {
     uint64_t first_line, n = schedule_line_of(before, k);
     uint32_t frame = frame_of_line(before, n, &first_line);
+    struct schedule_line was;
+    schedule_get_line(before, n, &was);
     u128 r = (u128)before->r0 + (u128)(k - before->k0) * before->num - (u128)(n - before->line0) * before->den;
 
     struct schedule_segment next;
@@ -118,8 +126,11 @@ void schedule_change(struct schedule_segment *seg, const struct schedule_segment
     next.r0 = (uint64_t)(r * next.den / before->den);
     next.frame0 = frame;
     next.pan0_fine = pan_fine(before, k, first_line);
-    int64_t left = spec->pan_stop_udeg * (1 << 24) - next.pan0_fine;
-    next.frame0_end = n + lines_for_span(&next.spec, left);
+    next.frame0_end = n + lines_for_span(&next, spec->pan_stop_udeg * (1 << 24) - next.pan0_fine);
+    next.line0_begin = was.begin;
+    next.line0_begin_ns = was.begin_ns;
+    uint64_t cast_end = k < was.cast_end ? k : was.cast_end;
+    next.line0_cast = was.cast_before + (cast_end > was.cast0 ? cast_end - was.cast0 : 0);
     set_end(&next);
     *seg = next;
 }
@@ -158,6 +169,10 @@ void schedule_get_line(const struct schedule_segment *seg, uint64_t n, struct sc
     line->cast_end = line->pulse0 + upto;
     if (line->cast_end > line->pulse_end) line->cast_end = line->pulse_end;
     if (line->cast0 > line->cast_end) line->cast0 = line->cast_end;
+    int at_start = n <= seg->line0;
+    line->begin = at_start ? seg->line0_begin : line->pulse0;
+    line->begin_ns = at_start ? seg->line0_begin_ns : schedule_time_ns(seg, line->pulse0);
+    line->cast_before = at_start ? seg->line0_cast : 0;
     uint64_t first_line, first_next;
     line->frame = frame_of_line(seg, n, &first_line);
     line->last_of_frame = frame_of_line(seg, n + 1, &first_next) != line->frame;
@@ -183,7 +198,7 @@ void schedule_get_run(const struct schedule_segment *seg, const struct schedule_
     run->frame = line->frame;
     run->line = (uint32_t)line->line;
     run->t0_ns = schedule_time_ns(seg, k);
-    run->line_t0_ns = schedule_time_ns(seg, line->pulse0);
+    run->line_t0_ns = line->begin_ns;
     run->mirror0_turn = (double)seg->spec.fov_min_udeg / (double)TURN_UDEG;
     run->mirror_turn_per_r = (double)seg->spec.sweep_udeg / (double)TURN_UDEG / (double)seg->den;
     run->r = line->r_first_pulse + in_line * seg->num;

@@ -16,7 +16,7 @@
 
 #include "drivers/link/link_util.h"
 
-enum { SEND_BUFFER_BYTES = 1 << 20, BACKLOG = 16 };
+enum { SEND_BUFFER_BYTES = 1 << 20, BACKLOG = 128 };
 
 enum tcp_state { TCP_FREE, TCP_OPEN, TCP_ENDED /* LINK_CLOSED is still to be told */ };
 

@@ -1,0 +1,171 @@
+/* Readers that come late and streams that lost bytes: what is needed comes again, and only what was hit is missing. */
+#include "tests/wire/room.h"
+
+#include "drivers/protocol/native.h"
+
+static const struct room_config ENDLESS = {.prr_hz = 200000, .lines_hz = 100, .pan_deg_s = 20, .pan_stop_deg = 360,
+                                           .frames = 0, .links = LINK_YAML_BOTH,
+                                           .more = "loop: {queue_ms: 3000, late_ms: 10000}\n"};
+
+/* From the first frame on: nothing missing, and descriptor, anchor and names within a second of device time (and the
+ * tick that the repetition falls in); points can be had from then on. */
+static void follow(struct scanhead *sh)
+{
+    struct scanhead_frame frame;
+    struct scanhead_info info;
+    struct scanhead_point point;
+    const char *object, *material;
+    int64_t first_ns = 0;
+    uint32_t next_seq = 0;
+    int named = 0, after = 0;
+    for (int n = 0; after < 200; n++) {
+        client_next(sh, &frame);
+        if (n == 0) first_ns = frame.t_ns;
+        if (n != 0) assert_int_equal(frame.seq, next_seq);
+        next_seq = frame.seq + 1;
+        int ready = scanhead_get_info(sh, &info) == SCANHEAD_OK;
+        named |= scanhead_surface(sh, 0, &object, &material);
+        if (!ready || !named) assert_true(frame.t_ns - first_ns <= 1001000000);
+        if (frame.type != SCANHEAD_POINTS) continue;
+        assert_int_equal(scanhead_points(sh, &frame, 0, &point, 1), ready ? 1 : SCANHEAD_ESTATE);
+        after += ready && named;
+    }
+    assert_true(info.prr_hz == 200000.0 && info.scan == 1 && info.n_surfaces == 6);
+    assert_memory_equal(info.station_m, STATION, sizeof STATION);
+    assert_true(scanhead_surface(sh, 5, &object, &material));
+    assert_string_equal(object, "ceiling");
+}
+
+static void test_late_reader(void **state)
+{
+    struct wire *wire = *state;
+    struct scanhead_frame frame;
+    room_write(wire);
+    const char *const more[] = {"--start", NULL};
+    struct head head = head_start(wire, room_config_write(wire, &ENDLESS), more);
+    struct scanhead *tcp = client_open(head_endpoint(&head, "tcp"));
+    client_wait_state(tcp, "scanning");
+    for (int n = 0; n < 200; n += frame.type == SCANHEAD_POINTS)
+        client_next(tcp, &frame);
+    struct scanhead *late = client_open(head_endpoint(&head, "tcp")), *pty = client_open(head_endpoint(&head, "pty"));
+    follow(late);
+    follow(pty);
+    scanhead_close(late);
+    scanhead_close(pty);
+    scanhead_close(tcp);
+    head_end(&head, SIGTERM);
+}
+
+/* ---- one byte lost, in a recording that the file link wrote */
+
+enum { MAX_FRAMES = 4000 };
+
+struct recording {
+    uint8_t *bytes;
+    size_t len;
+    int n_frames;
+    size_t at[MAX_FRAMES + 1]; /* of each frame; the last entry is the end */
+};
+
+static void record(struct wire *wire, struct recording *r)
+{
+    struct room_config config = {.profile = "riegl-vz400i", .prr_hz = 100000, .lines_hz = 200, .pan_deg_s = 150,
+                                 .pan_stop_deg = 60, .frames = 1, .links = "links: [{type: file, path: stream.shs}]\n"};
+    room_write(wire);
+    const char *const more[] = {"--start", "--frames", "1", "--pace", "fast", NULL};
+    struct head head = head_start(wire, room_config_write(wire, &config), more);
+    head_end(&head, 0);
+    r->bytes = (uint8_t *)wire_read(wire_path(wire, "stream.shs"), &r->len);
+    for (size_t at = 0; at < r->len; r->n_frames++) { /* as PROTOCOL.md has it: the length is at 4 */
+        assert_true(r->n_frames < MAX_FRAMES);
+        assert_int_equal(r->bytes[at], NATIVE_SYNC);
+        r->at[r->n_frames] = at;
+        at += NATIVE_HEADER_LEN + (r->bytes[at + 4] | (size_t)r->bytes[at + 5] << 8 | (size_t)r->bytes[at + 6] << 16);
+    }
+    r->at[r->n_frames] = r->len;
+}
+
+/* Parses the frames first .. last - 1 without the byte at `lost`; every frame but the one it was in must come, as it was.
+ * The one exception: a frame whose last byte looks like a sync byte is whole again with the next one's, which then is
+ * what is missing. */
+static void check_without(const struct recording *r, int first, int last, size_t lost)
+{
+    static struct native_parser parser;
+    native_parser_init(&parser);
+    size_t in = r->at[first], end = r->at[last];
+    int next = first, missing = -1;
+    while (in < end || !parser.finished) {
+        size_t room;
+        uint8_t *to = native_parser_room(&parser, &room);
+        size_t upto = in <= lost ? lost : end, n = upto - in < room ? upto - in : room;
+        memcpy(to, r->bytes + in, n);
+        in += n;
+        if (in == lost) in++;
+        native_parser_added(&parser, n);
+        if (in >= end) native_parser_finish(&parser);
+        for (enum native_item item; (item = native_parser_next(&parser)) != NATIVE_MORE; next++) {
+            assert_int_equal(item, NATIVE_FRAME);
+            size_t len = NATIVE_HEADER_LEN + parser.header.length;
+            if (len != r->at[next + 1] - r->at[next] || memcmp(parser.frame, r->bytes + r->at[next], len) != 0) {
+                assert_int_equal(missing, -1);
+                missing = next++;
+                assert_int_equal(len, r->at[next + 1] - r->at[next]);
+                assert_memory_equal(parser.frame, r->bytes + r->at[next], len);
+            }
+        }
+    }
+    if (next == last - 1) missing = next++;
+    assert_int_equal(next, last);
+    assert_true(missing >= 0);
+    int hit = lost >= r->at[missing] && lost < r->at[missing + 1];
+    assert_true(hit || (lost == r->at[missing] - 1 && r->bytes[lost] == NATIVE_SYNC));
+}
+
+static void test_lost_byte(void **state)
+{
+    struct recording r = {0};
+    record(*state, &r);
+    assert_true(r.n_frames > 200);
+    uint64_t x = 88172645463325252u; /* xorshift64, a fixed seed */
+    for (int i = 0; i < 200; i++) {
+        x ^= x << 13, x ^= x >> 7, x ^= x << 17;
+        check_without(&r, 0, r.n_frames, x % r.len);
+    }
+    for (int i = 0; i < r.n_frames; i++) /* every byte of every header, among the frames around it */
+        for (size_t k = 0; k < NATIVE_HEADER_LEN; k++)
+            check_without(&r, i > 2 ? i - 2 : 0, i + 3 < r.n_frames ? i + 3 : r.n_frames, r.at[i] + k);
+    free(r.bytes);
+}
+
+/* The same file through the library, whole: the recording of the file link is what was sent, and hashes to it. */
+static void test_recording_is_whole(void **state)
+{
+    struct wire *wire = *state;
+    struct recording r = {0};
+    struct scanhead_frame frame;
+    char head[65], client[65];
+    record(wire, &r);
+    struct scanhead *sh = client_open(wire_path(wire, "stream.shs"));
+    scanhead_hash_start(sh);
+    int n = 0;
+    uint64_t pulses = 0;
+    for (; scanhead_next(sh, &frame, 0) == SCANHEAD_OK; n++)
+        pulses += frame.type == SCANHEAD_POINTS ? frame.n_pulses : 0;
+    scanhead_hash_hex(sh, client);
+    scanhead_close(sh);
+    stats_hash(wire, head);
+    assert_string_equal(client, head);
+    assert_int_equal(n, r.n_frames);
+    assert_int_equal(pulses, stats_uint(wire, "pulses"));
+    free(r.bytes);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_late_reader, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_lost_byte, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_recording_is_whole, wire_setup, wire_teardown),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

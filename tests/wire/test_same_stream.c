@@ -1,0 +1,202 @@
+/* stream_sha256 is the same for every pace, number of threads and link, as the head computes it, as a client hears it and
+ * as `record` makes it off line; and a journal brings back a whole session. */
+#include "tests/wire/room.h"
+
+static const struct room_config SHORT = {.profile = "riegl-vz400i", .prr_hz = 399999.9, .lines_hz = 97.7, .pan_deg_s = 150,
+                                         .pan_stop_deg = 60, .frames = 1, .links = LINK_YAML_BOTH,
+                                         .more = "loop: {queue_ms: 5000, late_ms: 10000}\n"};
+
+/* What a session leaves: the hash of the head, of the client, and what was scanned. */
+struct result {
+    char head[65], client[65];
+    uint64_t pulses, echoes;
+};
+
+static struct scanhead *listen_to(const struct head *head, const char *link)
+{
+    struct scanhead *sh = client_open(head_endpoint(head, link));
+    scanhead_hash_start(sh);
+    client_wait_state(sh, "idle");
+    return sh;
+}
+
+static void finish(struct head *head, struct scanhead *sh, struct result *result)
+{
+    struct scanhead_stats stats;
+    scanhead_get_stats(sh, &stats);
+    assert_int_equal(stats.bad_payload + stats.bad_bytes + stats.seq_lost + stats.dropped, 0);
+    scanhead_hash_hex(sh, result->client);
+    scanhead_close(sh);
+    head_end(head, SIGTERM);
+    stats_hash(head->wire, result->head);
+    assert_string_equal(result->client, result->head);
+    assert_int_equal(stats_uint(head->wire, "lost_pulses"), 0);
+    result->pulses = stats_uint(head->wire, "pulses");
+    result->echoes = stats_uint(head->wire, "echoes");
+}
+
+static void scan(struct wire *wire, const char *config, const char *pace, const char *threads, const char *link,
+                 struct result *result)
+{
+    const char *const more[] = {"--pace", pace, "--threads", threads, NULL};
+    struct head head = head_start(wire, config, more);
+    struct scanhead *sh = listen_to(&head, link);
+    struct scanhead_frame frame;
+    client_tell(sh, "SCAN:STAR");
+    client_until(sh, SCANHEAD_EV_SCAN_END, &frame);
+    finish(&head, sh, result);
+}
+
+static void record(struct wire *wire, const char *config, const char *threads, struct result *result)
+{
+    char stats[352];
+    snprintf(stats, sizeof stats, "%s", wire_path(wire, "stats.json"));
+    const char *const args[] = {"record", config, "--stats", stats, "--threads", threads, "--quiet", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "head.out", "head.err", -1)), 0);
+    stats_hash(wire, result->head);
+    result->pulses = stats_uint(wire, "pulses");
+    result->echoes = stats_uint(wire, "points");
+}
+
+static void test_pace_threads_link(void **state)
+{
+    static const struct {
+        const char *pace, *threads, *link;
+    } runs[] = {{"fast", "1", "tcp"},     {"fast", "2", "pty"},     {"realtime", "1", "pty"},
+                {"realtime", "2", "tcp"}, {"realtime", "2", "pty"}, {"fast", "3", "tcp"}};
+    struct wire *wire = *state;
+    struct result first, other;
+    char config[352];
+    room_write(wire);
+    snprintf(config, sizeof config, "%s", room_config_write(wire, &SHORT));
+    record(wire, config, "2", &first);
+    struct oracle oracle = oracle_of(&SHORT, -40, 60, 240);
+    assert_int_equal(first.pulses, oracle_count_cast(&oracle, 0, oracle_end(&oracle)));
+    for (size_t i = 0; i < sizeof runs / sizeof runs[0]; i++) {
+        scan(wire, config, runs[i].pace, runs[i].threads, runs[i].link, &other);
+        if (strcmp(first.head, other.head) != 0)
+            fail_msg("%s, %s threads, %s: another stream", runs[i].pace, runs[i].threads, runs[i].link);
+        assert_int_equal(first.pulses, other.pulses);
+        assert_int_equal(first.echoes, other.echoes);
+    }
+    record(wire, config, "1", &other);
+    assert_string_equal(first.head, other.head);
+}
+
+/* The hash is no constant: noise and its seed, layout and rate all change it. */
+static void test_hash_tells_streams_apart(void **state)
+{
+    static const char *const sets[] = {"noise.seed=1",        "noise.range=on",          "output.layout=geo",
+                                       "head.prr_hz=399999.8", "stations[0].position_m=[0.310001, -0.42, 0.17]"};
+    struct wire *wire = *state;
+    struct result result;
+    char stats[352], config[352], seen[6][65];
+    room_write(wire);
+    snprintf(config, sizeof config, "%s", room_config_write(wire, &SHORT));
+    snprintf(stats, sizeof stats, "%s", wire_path(wire, "stats.json"));
+    for (int i = 0; i < 6; i++) {
+        const char *set = i < 5 ? sets[i] : "noise.range=on", *seed = i < 5 ? "noise.seed=1" : "noise.seed=2";
+        const char *const args[] = {"record", config, "--stats", stats, "--quiet", "--set", set, "--set", seed, NULL};
+        assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "head.out", "head.err", -1)), 0);
+        stats_hash(wire, result.head);
+        strcpy(seen[i], result.head);
+        for (int k = 0; k < i; k++)
+            assert_string_not_equal(seen[i], seen[k]);
+    }
+}
+
+static void take_points(struct scanhead *sh, int frames)
+{
+    struct scanhead_frame frame;
+    for (int n = 0; n < frames;) {
+        client_next(sh, &frame);
+        n += frame.type == SCANHEAD_POINTS;
+    }
+}
+
+/* A session in real time: settings change in mid-scan, each at a moment that the clock chose; the first scan is stopped,
+ * a second one runs to its end; one command is refused. */
+static void live_session(struct wire *wire, const char *config, const char *journal, struct result *result)
+{
+    static const char *const changes[] = {"HEAD:PRR 250000.5", "HEAD:LIN 33.3",     "HEAD:PAN 77.7", "HEAD:PRR 812345.678901",
+                                          "SCAN:LINE:STOP 41", "SCAN:LINE:STAR -9", "HEAD:LIN 120",  "SCAN:PAN:STOP 300"};
+    const char *const more[] = {"--pace", "realtime", "--threads", "2", "--journal", journal, NULL};
+    struct head head = head_start(wire, config, more);
+    struct scanhead *sh = listen_to(&head, "tcp");
+    struct scanhead_frame frame;
+    client_tell(sh, "SCAN:FRAM 0");
+    client_tell(sh, "SCAN:STAR");
+    for (size_t i = 0; i < sizeof changes / sizeof changes[0]; i++) {
+        take_points(sh, 20);
+        client_tell(sh, changes[i]);
+        if (i == 3) assert_int_equal(strncmp(client_ask(sh, "HEAD:PRR 1"), "ERR -222", 8), 0);
+    }
+    take_points(sh, 30);
+    client_tell(sh, "SCAN:STOP");
+    client_until(sh, SCANHEAD_EV_SCAN_END, &frame);
+    client_wait_state(sh, "idle");
+    client_tell(sh, "*RST");
+    client_tell(sh, "HEAD:PAN 100");
+    client_tell(sh, "SCAN:PAN:STOP 10.5");
+    client_tell(sh, "SCAN:STAR");
+    client_until(sh, SCANHEAD_EV_SCAN_END, &frame);
+    assert_int_equal(frame.event_value[0], 2);
+    client_wait_state(sh, "idle");
+    finish(&head, sh, result);
+}
+
+/* duration: device time by which the session was over, with room. */
+static void replay(struct wire *wire, const char *config, const char *journal, const char *pace, const char *threads,
+                   const char *duration, struct result *result)
+{
+    const char *const more[] = {"--pace", pace,       "--threads", threads, "--replay-journal", journal, "--duration",
+                                duration, NULL};
+    struct head head = head_start(wire, config, more);
+    head_end(&head, 0);
+    stats_hash(wire, result->head);
+    result->pulses = stats_uint(wire, "pulses");
+    result->echoes = stats_uint(wire, "echoes");
+}
+
+static double journal_end_s(const char *journal)
+{
+    char *text = wire_read(journal, NULL), *last = text;
+    for (char *at = text; (at = strchr(at, '\n')) != NULL && at[1] != '\0';)
+        last = ++at;
+    uint64_t tick;
+    int64_t t_ns;
+    assert_int_equal(sscanf(last, "%" SCNu64 " %" SCNd64, &tick, &t_ns), 2);
+    free(text);
+    return 1e-9 * (double)t_ns;
+}
+
+static void test_journal_brings_back_a_session(void **state)
+{
+    struct wire *wire = *state;
+    struct result live, again;
+    char config[352], journal[352], duration[32];
+    room_write(wire);
+    snprintf(config, sizeof config, "%s", room_config_write(wire, &SHORT));
+    snprintf(journal, sizeof journal, "%s", wire_path(wire, "session.journal"));
+    live_session(wire, config, journal, &live);
+    /* after the last command, a start: 0.1 s of scanning, spin-up and spin-down of 0.23 s; so 1 s is room enough */
+    snprintf(duration, sizeof duration, "%.3f", journal_end_s(journal) + 1.0);
+    replay(wire, config, journal, "fast", "1", duration, &again);
+    assert_string_equal(again.head, live.head);
+    assert_int_equal(again.pulses, live.pulses);
+    replay(wire, config, journal, "fast", "3", duration, &again);
+    assert_string_equal(again.head, live.head);
+    replay(wire, config, journal, "realtime", "1", duration, &again);
+    assert_string_equal(again.head, live.head);
+    assert_int_equal(again.echoes, live.echoes);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_pace_threads_link, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_hash_tells_streams_apart, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_journal_brings_back_a_session, wire_setup, wire_teardown),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,175 @@
+/* A reader that cannot follow: in real time it loses whole frames and is told exactly how many, and nobody else loses
+ * any; at the pace `fast` the run waits for it and nothing is lost. */
+#include "tests/wire/room.h"
+
+#include <pthread.h>
+#include <stdatomic.h>
+
+/* 20 MB/s: while the slow reader reads nothing, the buffers on its way (1 MiB of the head, at most 6 of the kernel's for
+ * a receiver that asks for none) and the queue of 50 ms fill in less than half a second. */
+static const struct room_config RATE = {.prr_hz = 1000000, .lines_hz = 200, .pan_deg_s = 90, .pan_stop_deg = 360,
+                                        .frames = 0, .links = LINK_YAML_TCP};
+enum { HOLD_BYTES = 40 << 20 };
+
+/* What a reader has seen. */
+struct tally {
+    struct scanhead *sh;
+    uint64_t frames, local, pulses, told_lost, told_events, told_total;
+    uint32_t first_seq, last_seq;
+    int over;
+    int hold_fd; /* written to once HOLD_BYTES have come; -1: not */
+    uint64_t bytes;
+    _Atomic int stop; /* asks it to end the scan, being in control */
+    const char *wrong;
+};
+
+static void take(struct tally *t, const struct scanhead_frame *frame)
+{
+    t->bytes += frame->raw_len;
+    t->local += (frame->flags & SCANHEAD_LOCAL) != 0;
+    if (is_event(frame, SCANHEAD_EV_READER_LOST)) {
+        if ((frame->flags & SCANHEAD_LOCAL) == 0) t->wrong = "a loss of one reader was told to all";
+        t->told_lost += frame->event_value[0];
+        t->told_total = frame->event_value[2];
+        t->told_events++;
+        return;
+    }
+    if ((frame->flags & SCANHEAD_LOCAL) != 0) return;
+    if (t->frames != 0 && frame->seq <= t->last_seq) t->wrong = "frames went back";
+    if (t->frames++ == 0) t->first_seq = frame->seq;
+    t->last_seq = frame->seq;
+    if (frame->type == SCANHEAD_POINTS) t->pulses += frame->n_pulses;
+    t->over |= is_event(frame, SCANHEAD_EV_SCAN_END);
+}
+
+static void *follow(void *arg)
+{
+    struct tally *t = arg;
+    struct scanhead_frame frame;
+    while (!t->over && t->wrong == NULL) {
+        if (scanhead_next(t->sh, &frame, DEADLINE_MS) != SCANHEAD_OK) {
+            t->wrong = scanhead_error(t->sh);
+            break;
+        }
+        take(t, &frame);
+        char reply[600];
+        if (atomic_exchange(&t->stop, 0) != 0 &&
+            scanhead_command(t->sh, "SCAN:STOP", reply, sizeof reply, DEADLINE_MS) != SCANHEAD_OK)
+            t->wrong = scanhead_error(t->sh);
+        if (t->hold_fd < 0 || (t->bytes < HOLD_BYTES && !t->over)) continue;
+        if (write(t->hold_fd, "h", 1) != 1) t->wrong = "pipe";
+        t->hold_fd = -1;
+    }
+    return NULL;
+}
+
+static void check_nothing_bad(const struct tally *t)
+{
+    struct scanhead_stats stats;
+    if (t->wrong != NULL) fail_msg("%s", t->wrong);
+    scanhead_get_stats(t->sh, &stats);
+    assert_int_equal(stats.bad_payload, 0);
+    assert_int_equal(stats.bad_bytes, 0); /* whole frames only */
+    assert_int_equal(stats.dropped, 0);
+}
+
+static void check_lost_nothing(const struct tally *t)
+{
+    check_nothing_bad(t);
+    assert_int_equal(t->told_events, 0);
+    assert_int_equal(t->last_seq - t->first_seq + 1, t->frames);
+}
+
+static void test_realtime(void **state)
+{
+    struct wire *wire = *state;
+    struct room_config config = RATE;
+    /* The fast one has the same queue of 50 ms, but a receive buffer of megabytes and a thread that does nothing else. */
+    config.more = "loop: {queue_ms: 50, late_ms: 10000}\n";
+    room_write(wire);
+    struct head head = head_start(wire, room_config_write(wire, &config), NULL);
+    struct tally fast = {.sh = client_open(head_endpoint(&head, "tcp"))}, slow = {.hold_fd = -1};
+    int slow_fd = raw_connect(head_endpoint(&head, "tcp"));
+    slow.sh = client_from_fd(slow_fd);
+    client_ask(slow.sh, "*OPC?");
+    client_wait_state(fast.sh, "idle");
+    int hold[2];
+    char byte;
+    assert_int_equal(pipe2(hold, O_CLOEXEC), 0);
+    fast.hold_fd = hold[1];
+    client_tell(fast.sh, "SCAN:STAR");
+    pthread_t thread;
+    assert_int_equal(pthread_create(&thread, NULL, follow, &fast), 0);
+    assert_int_equal(read(hold[0], &byte, 1), 1); /* meanwhile the slow one reads nothing */
+    struct scanhead_frame frame;
+    while (slow.told_events == 0) {
+        client_next(slow.sh, &frame);
+        take(&slow, &frame);
+    }
+    struct scanhead *third = client_open(head_endpoint(&head, "tcp"));
+    assert_int_equal(atoi(client_ask(third, "SYST:ERR?")), 102);
+    assert_int_equal(atoi(client_ask(third, "SYST:ERR?")), 0); /* once per episode */
+    scanhead_close(third);
+    atomic_store(&fast.stop, 1);
+    follow(&slow);
+    pthread_join(thread, NULL);
+    check_lost_nothing(&fast);
+    check_nothing_bad(&slow);
+    assert_true(slow.told_lost > 0);
+    assert_int_equal(slow.told_total, slow.told_lost);
+    assert_int_equal(slow.last_seq - slow.first_seq + 1, slow.frames + slow.told_lost);
+    assert_int_equal(slow.last_seq, fast.last_seq);
+    struct scanhead_stats stats;
+    scanhead_get_stats(slow.sh, &stats);
+    assert_int_equal(stats.seq_lost, slow.told_lost); /* both ways of counting agree */
+    assert_int_equal(stats.reader_lost, slow.told_lost);
+    scanhead_close(fast.sh);
+    scanhead_close(slow.sh);
+    close(hold[0]);
+    close(hold[1]);
+    head_end(&head, SIGTERM);
+    assert_int_equal(stats_uint(wire, "reader_lost_frames"), slow.told_lost);
+    assert_int_equal(stats_uint(wire, "pulses"), fast.pulses);
+    assert_int_equal(stats_uint(wire, "lost_pulses"), 0);
+}
+
+static void test_fast(void **state)
+{
+    struct wire *wire = *state;
+    struct room_config config = RATE;
+    struct scanhead_frame frame;
+    config.frames = 1;
+    config.pan_stop_deg = 90; /* a million pulses */
+    config.more = "loop: {pace: fast, queue_ms: 50}\n";
+    room_write(wire);
+    struct head head = head_start(wire, room_config_write(wire, &config), NULL);
+    struct tally fast = {.sh = client_open(head_endpoint(&head, "tcp")), .hold_fd = -1}, slow = {.hold_fd = -1};
+    slow.sh = client_from_fd(raw_connect(head_endpoint(&head, "tcp")));
+    client_ask(slow.sh, "*OPC?");
+    client_wait_state(fast.sh, "idle");
+    client_tell(fast.sh, "SCAN:STAR");
+    while (scanhead_next(fast.sh, &frame, 1000) == SCANHEAD_OK && !fast.over) /* until the run is held back */
+        take(&fast, &frame);
+    assert_false(fast.over);
+    pthread_t thread;
+    assert_int_equal(pthread_create(&thread, NULL, follow, &fast), 0);
+    follow(&slow);
+    pthread_join(thread, NULL);
+    check_lost_nothing(&fast);
+    check_lost_nothing(&slow);
+    assert_int_equal(fast.pulses, slow.pulses);
+    scanhead_close(fast.sh);
+    scanhead_close(slow.sh);
+    head_end(&head, SIGTERM);
+    assert_int_equal(stats_uint(wire, "pulses"), slow.pulses);
+    assert_int_equal(stats_uint(wire, "reader_lost_frames"), 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_realtime, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_fast, wire_setup, wire_teardown),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
