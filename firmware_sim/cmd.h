@@ -29,6 +29,7 @@ int cmd_map(int argc, char **argv);
 int cmd_report(int argc, char **argv);
 int cmd_check(int argc, char **argv);
 int cmd_list(int argc, char **argv);
+int cmd_bench(int argc, char **argv);
 
 /* Settings collected from --set and the options that stand for one. */
 struct cmd_sets {

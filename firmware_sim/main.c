@@ -10,6 +10,7 @@ const struct cmd cmd_table[] = {
     {"map", "CONFIG -o FILE.png [options]", "scan map of the stations, from above", cmd_map},
     {"report", "CONFIG CLOUD [options]", "distance of a recording's points from the scene", cmd_report},
     {"check", "CONFIG [options]", "validate configuration, scene and links; nothing runs", cmd_check},
+    {"bench", "[options]", "speed figures as JSON on standard output", cmd_bench},
     {"list", "", "head profiles and kinds of links", cmd_list},
     {NULL, NULL, NULL, NULL},
 };

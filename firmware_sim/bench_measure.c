@@ -1,0 +1,208 @@
+/* One thread: Embree, the exact cast, the whole pipeline, the pipeline by stages, in turns. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "drivers/protocol/native_encode.h"
+#include "firmware_sim/bench.h"
+#include "firmware_sim/clock.h"
+
+const char *const bench_stage_name[BENCH_STAGES] = {"schedule", "directions", "embree", "refine", "decide",
+                                                    "detect",   "noise",      "georef", "encode", "crc"};
+
+enum { EMBREE, CAST, PIPELINE, IDEAL, STAGED, N_METHODS };
+
+struct measure {
+    const struct bench_case *c;
+    struct bench_result *out;
+    struct cast_setup setup, ideal;
+    struct georef *georef;
+    struct caster *caster;
+    struct line_block block;
+    struct bench_stages *stages;
+    double *range_m;
+    uint32_t *prim;
+    uint8_t *sink, *staged; /* the null link: the last line's bytes */
+    size_t cap;
+    double ns[N_METHODS][BENCH_MAX_ROUNDS], stage_ns[BENCH_STAGES][BENCH_MAX_ROUNDS];
+};
+
+static int set_up(struct measure *m, struct sh_err *err)
+{
+    const struct bench_case *c = m->c;
+    int rc = bench_georef(c->target, &m->georef, err);
+    if (rc == SH_OK) rc = caster_create(&m->caster, err);
+    if (rc == SH_OK) rc = bench_stages_create(&m->stages, err);
+    if (rc == SH_OK) rc = line_block_alloc(&m->block, BENCH_LINE_PULSES, err);
+    if (rc != SH_OK) return rc;
+    bench_setup(c, m->georef, &m->setup);
+    m->ideal = m->setup;
+    m->ideal.mirror_counts = m->ideal.pan_counts = 4294967296.0;
+    m->cap = native_points_bound(BENCH_LINE_PULSES);
+    m->sink = malloc(m->cap);
+    m->staged = malloc(m->cap);
+    m->range_m = aligned_alloc(64, c->rays->n * sizeof *m->range_m);
+    m->prim = aligned_alloc(64, c->rays->n * sizeof *m->prim);
+    if (m->sink == NULL || m->staged == NULL || m->range_m == NULL || m->prim == NULL)
+        return sh_fail(err, SH_ENOMEM, "bench: no memory");
+    return SH_OK;
+}
+
+static void tear_down(struct measure *m)
+{
+    georef_free(m->georef);
+    caster_free(m->caster);
+    bench_stages_free(m->stages);
+    line_block_free(&m->block);
+    free(m->sink);
+    free(m->staged);
+    free(m->range_m);
+    free(m->prim);
+}
+
+/* A line as a worker of the loop makes it. */
+static size_t whole_line(struct measure *m, const struct cast_setup *setup, uint32_t l)
+{
+    const struct schedule_segment *segment = &m->c->rays->segment;
+    struct schedule_line line;
+    struct schedule_run run;
+    schedule_get_line(segment, l, &line);
+    schedule_get_run(segment, &line, line.cast0, (uint32_t)(line.cast_end - line.cast0), &run);
+    caster_cast(m->caster, setup, &run, &m->block);
+    return native_encode_points(m->sink, m->cap, &m->block, 0);
+}
+
+static void staged_pass(struct measure *m, uint32_t round)
+{
+    const struct bench_rays *rays = m->c->rays;
+    uint64_t cycles[BENCH_STAGES] = {0}, start = bench_cycles();
+    int64_t start_ns = clock_now_ns();
+    for (uint32_t l = 0; l < rays->lines; l++)
+        bench_stages_line(m->stages, &m->setup, &rays->segment, l, cycles, &m->block, m->staged, m->cap);
+    double ns = (double)(clock_now_ns() - start_ns) / (double)(bench_cycles() - start) / rays->n;
+    for (int s = 0; s < BENCH_STAGES; s++)
+        m->stage_ns[s][round] = (double)cycles[s] * ns;
+}
+
+static void pass(struct measure *m, int method, uint32_t round)
+{
+    const struct bench_case *c = m->c;
+    const struct bench_rays *rays = c->rays;
+    if (method == EMBREE)
+        bench_embree_pass(c->embree, m->out->embree_width, m->out->embree_feed, 0, rays->n);
+    else if (method == CAST)
+        caster_hits(m->caster, c->bvh, m->setup.station_m, BENCH_RANGE_MAX_M, rays->n, rays->dx, rays->dy, rays->dz,
+                    m->range_m, m->prim);
+    else if (method == STAGED)
+        staged_pass(m, round);
+    else
+        for (uint32_t l = 0; l < rays->lines; l++)
+            whole_line(m, method == IDEAL ? &m->ideal : &m->setup, l);
+}
+
+static double timed_pass(struct measure *m, int method, uint32_t round)
+{
+    double start_s = bench_thread_s();
+    pass(m, method, round);
+    return 1e9 * (bench_thread_s() - start_s) / m->c->rays->n;
+}
+
+/* Embree at its best: packets of 4, 8 or 16, from memory or filled on the way. */
+static int choose_embree(struct measure *m, struct sh_err *err)
+{
+    static const uint32_t widths[] = {4, 8, 16};
+    double best = 0.0;
+    uint32_t best_width = 0;
+    enum bench_feed best_feed = BENCH_PREPARED;
+    for (int i = 0; i < 6; i++) {
+        m->out->embree_width = widths[i / 2];
+        m->out->embree_feed = i % 2 == 0 ? BENCH_PREPARED : BENCH_LOADED;
+        int rc = bench_embree_prepare(m->c->embree, m->out->embree_width, m->out->embree_feed, err);
+        if (rc != SH_OK) return rc;
+        double ns[3];
+        for (uint32_t k = 0; k < 3; k++)
+            ns[k] = timed_pass(m, EMBREE, 0);
+        double median = bench_median(ns, 3);
+        if (best_width != 0 && median >= best) continue;
+        best = median;
+        best_width = m->out->embree_width;
+        best_feed = m->out->embree_feed;
+    }
+    m->out->embree_width = best_width;
+    m->out->embree_feed = best_feed;
+    return bench_embree_prepare(m->c->embree, best_width, best_feed, err);
+}
+
+static int check_same(struct measure *m)
+{
+    uint64_t cycles[BENCH_STAGES] = {0};
+    const struct bench_rays *rays = m->c->rays;
+    for (uint32_t l = 0; l < rays->lines; l += 7) {
+        size_t n = whole_line(m, &m->setup, l);
+        size_t n_staged = bench_stages_line(m->stages, &m->setup, &rays->segment, l, cycles, &m->block, m->staged, m->cap);
+        if (n == 0 || n != n_staged || memcmp(m->sink, m->staged, n) != 0) return 0;
+    }
+    return 1;
+}
+
+/* Embree's time by this method's. */
+static double ratio(const struct measure *m, int method)
+{
+    double r[BENCH_MAX_ROUNDS];
+    for (uint32_t i = 0; i < m->out->rounds; i++)
+        r[i] = m->ns[EMBREE][i] / m->ns[method][i];
+    return bench_median(r, m->out->rounds);
+}
+
+static void summarise(struct measure *m)
+{
+    struct bench_result *out = m->out;
+    out->cast_ratio = ratio(m, CAST); /* before the medians: those sort */
+    out->pipeline_ratio = ratio(m, PIPELINE);
+    out->ideal_ratio = ratio(m, IDEAL);
+    out->embree_ns = bench_median(m->ns[EMBREE], out->rounds);
+    out->cast_ns = bench_median(m->ns[CAST], out->rounds);
+    out->pipeline_ns = bench_median(m->ns[PIPELINE], out->rounds);
+    out->ideal_ns = bench_median(m->ns[IDEAL], out->rounds);
+    out->staged_ns = bench_median(m->ns[STAGED], out->rounds);
+    for (int s = 0; s < BENCH_STAGES; s++)
+        out->stage_ns[s] = bench_median(m->stage_ns[s], out->rounds);
+}
+
+static int run(struct measure *m, struct sh_err *err)
+{
+    struct cast_counters before, *n = &m->out->counters;
+    int rc = choose_embree(m, err);
+    if (rc != SH_OK) return rc;
+    caster_get_counters(m->caster, &before);
+    pass(m, CAST, 0);
+    caster_get_counters(m->caster, n);
+    n->near_border -= before.near_border;
+    n->decided -= before.decided;
+    n->went_on -= before.went_on;
+    n->undecided -= before.undecided;
+    m->out->same_bytes = check_same(m);
+    int64_t start_ns = clock_now_ns();
+    for (uint32_t round = 0; round < BENCH_MAX_ROUNDS; round++) {
+        if (round >= BENCH_MIN_ROUNDS && (double)(clock_now_ns() - start_ns) > 1e9 * m->c->seconds) break;
+        for (int method = 0; method < N_METHODS; method++)
+            m->ns[method][round] = timed_pass(m, method, round);
+        m->out->rounds = round + 1;
+    }
+    summarise(m);
+    return SH_OK;
+}
+
+int bench_measure(const struct bench_case *c, struct bench_result *out, struct sh_err *err)
+{
+    memset(out, 0, sizeof *out);
+    out->pulses = c->rays->n;
+    struct measure *m = calloc(1, sizeof *m);
+    if (m == NULL) return sh_fail(err, SH_ENOMEM, "bench: no memory");
+    m->c = c;
+    m->out = out;
+    int rc = set_up(m, err);
+    if (rc == SH_OK) rc = run(m, err);
+    tear_down(m);
+    free(m);
+    return rc;
+}
