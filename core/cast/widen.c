@@ -2,6 +2,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 
 #include "core/cast/bvh.h"
 
@@ -107,11 +108,21 @@ static void fill_triangle(struct bvh *bvh, uint32_t prim, float *vertex)
     set_exact(&bvh->triangle[prim], v, width_m, bvh->scene->label[prim]);
 }
 
+/* Large pages where the system has them: hits are spread over all triangles, and page walks would cost as much as the data. */
+static void *huge_alloc(size_t size)
+{
+    const size_t page = (size_t)2 << 20;
+    size_t align = size < page ? 64 : page;
+    void *p = aligned_alloc(align, (size + align - 1) / align * align);
+    if (p != NULL && align == page) madvise(p, size, MADV_HUGEPAGE);
+    return p;
+}
+
 int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err)
 {
     const struct scene *scene = bvh->scene;
     size_t n = scene->n_triangles;
-    bvh->triangle = aligned_alloc(64, (n + 2) / 2 * 64);
+    bvh->triangle = huge_alloc((n + 1) * sizeof *bvh->triangle);
     float *vertex = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), 3 * n);
     uint32_t *index = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t), n);
     if (bvh->triangle == NULL || vertex == NULL || index == NULL)
