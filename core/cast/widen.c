@@ -2,9 +2,9 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
 
 #include "core/cast/bvh.h"
+#include "core/huge.h"
 
 static double dot(const double a[3], const double b[3])
 {
@@ -106,16 +106,6 @@ static void fill_triangle(struct bvh *bvh, uint32_t prim, float *vertex)
     for (int i = 0; i < 3; i++)
         widen_corner(v, i, width_m, vertex + 3 * i);
     set_exact(&bvh->triangle[prim], v, width_m, bvh->scene->label[prim]);
-}
-
-/* Large pages where the system has them: hits are spread over all triangles, and page walks would cost as much as the data. */
-static void *huge_alloc(size_t size)
-{
-    const size_t page = (size_t)2 << 20;
-    size_t align = size < page ? 64 : page;
-    void *p = aligned_alloc(align, (size + align - 1) / align * align);
-    if (p != NULL && align == page) madvise(p, size, MADV_HUGEPAGE);
-    return p;
 }
 
 int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err)
