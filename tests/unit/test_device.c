@@ -196,21 +196,19 @@ static void a_lost_tick_says_its_events_again(void **state)
     rig_wait(rig, NATIVE_EV_SCAN_START, 100);
     assert_true(rig->work.describe && rig->work.describe_flags == 0);
     struct device_work lost = rig->work;
-    struct device_counters *counters = device_counters(rig->device);
-    atomic_fetch_add(&counters->lost_pulses, worker_count_cast(&lost));
-    atomic_fetch_add(&counters->lost_ticks, 1);
-    device_lost(rig->device, &lost);
+    uint64_t first, n_cast = worker_count_cast(&lost, &first);
+    device_lost(rig->device, &lost, n_cast, first);
     assert_true(rig_claim(rig));
     assert_true(rig->work.describe && rig->work.describe_flags == 0);
     const struct native_event *again = rig_event(rig, NATIVE_EV_SCAN_START);
     assert_true(again != NULL && again->a == 1 && again->b == (uint64_t)lost.scan_t0_ns);
     assert_non_null(rig_event(rig, NATIVE_EV_STATE));
     const struct native_event *overrun = rig_event(rig, NATIVE_EV_OVERRUN);
-    assert_true(overrun != NULL && overrun->b == worker_count_cast(&lost) && overrun->c == 1);
+    assert_true(overrun != NULL && overrun->b == n_cast && overrun->c == 1);
     assert_true(rig->work.pulse0 == lost.pulse_end); /* the pulses themselves are gone */
     assert_non_null(strstr(rig_tell(rig, "SYST:ERR?", rig->next), "103,"));
     const struct native_event *end = rig_wait(rig, NATIVE_EV_SCAN_END, 600);
-    assert_true(end->b == 150000 && end->c == worker_count_cast(&lost));
+    assert_true(end->b == 150000 && end->c == n_cast);
     rig_close(rig);
 }
 

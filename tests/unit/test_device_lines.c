@@ -35,7 +35,8 @@ static void tally_tick(struct rig *rig, struct tally *tally)
     }
     tally->n_cast += slot->n_cast;
     tally->n_fired += slot->n_fired;
-    assert_true(worker_count_cast(&rig->work) == slot->n_cast);
+    uint64_t first;
+    assert_true(worker_count_cast(&rig->work, &first) == slot->n_cast);
     uint32_t frames = 0;
     for (uint32_t at = 0; at < slot->len; frames++) {
         const uint8_t *frame = slot->bytes + at, *payload = frame + NATIVE_HEADER_LEN;

@@ -32,7 +32,7 @@ static void needles_write(const struct wire *wire)
 struct account {
     struct oracle oracle;
     uint64_t received, next, gaps, missing; /* pulses; the last two from jumps of the pulse number */
-    uint64_t first_missing, told, told_first; /* by overrun events; told_first: of the first one */
+    uint64_t first_missing, told, told_first; /* by overrun events */
     int events, scan_over;
     int64_t t_ns, line;
     uint64_t whole_lines, broken_lines;
@@ -69,7 +69,8 @@ static void take_points(struct account *a, struct scanhead *sh, const struct sca
         a->echoes += point[i].echo_count != 0;
 }
 
-/* A line that came whole says how many echoes it has; else, it says 0 rather than something wrong. */
+/* A line that came whole says how many echoes it has; else, it says 0 rather than something wrong. (So may the first
+ * line, when a tick before the scan was lost.) */
 static void take_line_end(struct account *a, const struct scanhead_frame *frame)
 {
     struct native_line_end end;
@@ -77,7 +78,7 @@ static void take_line_end(struct account *a, const struct scanhead_frame *frame)
     note_gap(a, end.pulse0 + end.n_fired);
     int skipped = a->line != end.line || oracle_count_cast(&a->oracle, end.pulse0, end.pulse0 + end.n_fired) != end.n_cast;
     if (!a->line_broken && !skipped) {
-        assert_int_equal(end.n_echoes, a->echoes);
+        if (end.line != 0 || end.n_echoes != 0) assert_int_equal(end.n_echoes, a->echoes);
         a->whole_lines++;
     } else {
         assert_int_equal(end.n_echoes, 0);
@@ -94,7 +95,7 @@ static void take(struct account *a, struct scanhead *sh, const struct scanhead_f
     if (frame->type == SCANHEAD_POINTS) take_points(a, sh, frame);
     if (frame->type == SCANHEAD_LINE_END) take_line_end(a, frame);
     if (is_event(frame, SCANHEAD_EV_OVERRUN)) {
-        if (a->events++ == 0) a->told_first = frame->event_value[0];
+        if (a->events++ == 0 || frame->event_value[0] < a->told_first) a->told_first = frame->event_value[0];
         a->told += frame->event_value[1];
     }
     if (is_event(frame, SCANHEAD_EV_SCAN_END)) {
@@ -108,7 +109,7 @@ static const struct room_config CONFIG = {.prr_hz = 1999999.9, .lines_hz = 333.3
                                           .more = "loop: {ahead_ms: 60, late_ms: 60, queue_ms: 10000}\n"};
 
 /* Follows one scan to its end and on until the head is idle and has told of all it lost. */
-static void follow(struct account *a, struct head *head, struct scanhead *sh)
+static void follow(struct account *a, struct scanhead *sh)
 {
     struct scanhead_frame frame;
     struct scanhead_stats stats;
@@ -124,7 +125,6 @@ static void follow(struct account *a, struct head *head, struct scanhead *sh)
     scanhead_get_stats(sh, &stats);
     assert_int_equal(stats.bad_payload + stats.bad_bytes + stats.seq_lost + stats.dropped + stats.reader_lost, 0);
     assert_int_equal(stats.pulses_lost, a->told);
-    (void)head;
 }
 
 static void check_balance(const struct account *a, const struct wire *wire)
@@ -146,7 +146,7 @@ static void overload(struct wire *wire, const char *threads)
     struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
     client_wait_state(sh, "idle");
     client_tell(sh, "SCAN:STAR");
-    follow(&a, &head, sh);
+    follow(&a, sh);
     assert_true(a.missing > a.received); /* a caster computes about a seventh of them in time */
     assert_int_equal(a.told_first, a.first_missing);
     assert_true(a.received > 0);
@@ -191,7 +191,7 @@ static void test_stall(void **state)
         clock_nanosleep(CLOCK_MONOTONIC, 0, &(struct timespec){.tv_nsec = 400000000}, NULL); /* the stall itself */
         assert_int_equal(kill(head.pid, SIGCONT), 0);
     }
-    follow(&a, &head, sh);
+    follow(&a, sh);
     assert_true(a.received > 0 && a.whole_lines > 0);
     scanhead_close(sh);
     head_end(&head, SIGTERM);
@@ -219,7 +219,7 @@ static void test_stall_with_patience(void **state)
     assert_int_equal(kill(head.pid, SIGSTOP), 0);
     clock_nanosleep(CLOCK_MONOTONIC, 0, &(struct timespec){.tv_nsec = 400000000}, NULL); /* the stall itself */
     assert_int_equal(kill(head.pid, SIGCONT), 0);
-    follow(&a, &head, sh);
+    follow(&a, sh);
     assert_int_equal(a.missing, 0);
     assert_int_equal(a.broken_lines, 0);
     scanhead_close(sh);

@@ -1,0 +1,314 @@
+/* Where plain float coordinates fail: large ones, short and long ranges, grazing incidence. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "core/generate.h"
+#include "tests/stability/rig.h"
+
+static const double NOWHERE[3] = {0.0, 0.0, 0.0};
+
+/* ---- scenes at large coordinates, from files */
+
+struct place {
+    const char *name;
+    double rotation[9], offset_m[3];
+};
+
+/* Local east, north, up to ECEF at 52.5 N 13.4 E, an ordinary place with coordinates of several thousand
+ * kilometres. */
+static void to_ecef(struct place *place)
+{
+    const double lat = 0.9163, lon = 0.2339, earth_m = 6.371e6;
+    const double sa = sin(lat), ca = cos(lat), so = sin(lon), co = cos(lon);
+    const double rotation[9] = {-so, -sa * co, ca * co, co, -sa * so, ca * so, 0.0, ca, sa};
+    memcpy(place->rotation, rotation, sizeof rotation);
+    for (int k = 0; k < 3; k++)
+        place->offset_m[k] = earth_m * rotation[3 * k + 2];
+}
+
+/* The test's own vertices, whole multiples of 2^-10 m: ten decimals hold them exactly. */
+static void make_site(const struct place *place, struct mesh *mesh)
+{
+    const double centre[2] = {0.0, 0.0};
+    struct scene *scene;
+    struct sh_err err;
+    if (generate_terrain(2000, 60.0, 2.0, centre, 11, &scene, &err) != SH_OK) fail_msg("%s", err.text);
+    mesh_add_scene(mesh, scene, 0);
+    scene_free(scene);
+    mesh_move(mesh, 0, place->rotation, place->offset_m);
+    for (uint32_t i = 0; i < mesh->n_vertices; i++)
+        for (int k = 0; k < 3; k++)
+            mesh->vertex[i][k] = floor(mesh->vertex[i][k] * 1024.0) / 1024.0;
+}
+
+static void write_obj(FILE *f, const struct mesh *m)
+{
+    for (uint32_t i = 0; i < m->n_vertices; i++)
+        fprintf(f, "v %.10f %.10f %.10f\n", m->vertex[i][0], m->vertex[i][1], m->vertex[i][2]);
+    for (uint32_t i = 0; i < m->n_triangles; i++)
+        fprintf(f, "f %u %u %u\n", m->triangle[i][0] + 1, m->triangle[i][1] + 1, m->triangle[i][2] + 1);
+}
+
+static void write_ply_head(FILE *f, const struct mesh *m, const char *format)
+{
+    fprintf(
+        f, "ply\nformat %s 1.0\nelement vertex %u\nproperty double x\nproperty double y\nproperty double z\n",
+        format, m->n_vertices);
+    fprintf(f, "element face %u\nproperty list uchar int vertex_indices\nend_header\n", m->n_triangles);
+}
+
+static void write_ply_text(FILE *f, const struct mesh *m)
+{
+    write_ply_head(f, m, "ascii");
+    for (uint32_t i = 0; i < m->n_vertices; i++)
+        fprintf(f, "%.10f %.10f %.10f\n", m->vertex[i][0], m->vertex[i][1], m->vertex[i][2]);
+    for (uint32_t i = 0; i < m->n_triangles; i++)
+        fprintf(f, "3 %u %u %u\n", m->triangle[i][0], m->triangle[i][1], m->triangle[i][2]);
+}
+
+static void write_ply_binary(FILE *f, const struct mesh *m)
+{
+    const unsigned char three = 3;
+    write_ply_head(f, m, "binary_little_endian"); /* as the machines this runs on */
+    fwrite(m->vertex, sizeof *m->vertex, m->n_vertices, f);
+    for (uint32_t i = 0; i < m->n_triangles; i++) {
+        fwrite(&three, 1, 1, f);
+        fwrite(m->triangle[i], sizeof m->triangle[i], 1, f);
+    }
+}
+
+static void write_stl(FILE *f, const struct mesh *m)
+{
+    fprintf(f, "solid site\n");
+    for (uint32_t i = 0; i < m->n_triangles; i++) {
+        fprintf(f, "facet normal 0 0 0\nouter loop\n");
+        for (int k = 0; k < 3; k++) {
+            const double *v = m->vertex[m->triangle[i][k]];
+            fprintf(f, "vertex %.10f %.10f %.10f\n", v[0], v[1], v[2]);
+        }
+        fprintf(f, "endloop\nendfacet\n");
+    }
+    fprintf(f, "endsolid site\n");
+}
+
+static int load_site(const struct mesh *mesh, const char *ending,
+                     void (*write)(FILE *f, const struct mesh *m), struct scene **scene, struct sh_err *err)
+{
+    char folder[] = "/tmp/scanhead-stability-XXXXXX", path[64];
+    if (mkdtemp(folder) == NULL) fail_msg("no folder under /tmp");
+    snprintf(path, sizeof path, "%s/site%s", folder, ending);
+    FILE *f = fopen(path, "wb");
+    if (f == NULL) fail_msg("can't write %s", path);
+    write(f, mesh);
+    int bad = ferror(f);
+    bad |= fclose(f);
+    if (bad) fail_msg("can't write %s", path);
+    const struct scene_mesh_spec spec = {.file = path, .scale = 1.0};
+    int rc = scene_load(&spec, 1, 1e-3, NULL, scene, err);
+    unlink(path);
+    rmdir(folder);
+    return rc;
+}
+
+/* Ranges go up to 42 m and rays meet the ground at up to about 89.9 degrees. Ours: vertices minus station are
+ * exact (both are multiples of 2^-10 m), so the double arithmetic after them errs by 16 x 2^-53 x 42 m / cos
+ * i < 1e-10 m; the micrometre promised holds with much to spare. Naive: floats at 5.8e6 m are 0.5 m apart. */
+static void site_row(const struct place *place, const struct mesh *mesh, const char *ending,
+                     const char *format, void (*write)(FILE *f, const struct mesh *m))
+{
+    struct scene *scene;
+    struct sh_err err;
+    struct rig rig;
+    char regime[64];
+    if (load_site(mesh, ending, write, &scene, &err) != SH_OK) fail_msg("%s", err.text);
+    assert_int_equal(scene->n_vertices, mesh->n_vertices);
+    assert_int_equal(scene->n_triangles, mesh->n_triangles);
+    assert_memory_equal(scene->vertex_m, mesh->vertex, mesh->n_vertices * sizeof *mesh->vertex);
+    double station_m[3];
+    for (int k = 0; k < 3; k++) /* 3 m up in the middle */
+        station_m[k] = floor((place->offset_m[k] + 3.0 * place->rotation[3 * k + 2]) * 1024.0) / 1024.0;
+    rig_open(&rig, scene, station_m, station_m);
+    rig_aim_at_sphere(&rig, 4000, 21);
+    snprintf(regime, sizeof regime, "site at %s coordinates, %s", place->name, format);
+    rig_row_of_ranges(&rig, regime, NOWHERE, RIG_MICROMETRE);
+    rig_close(&rig);
+}
+
+/* A format of floats can't hold such coordinates. The naive method reads them all the same. */
+static void refused_row(const struct place *place, const struct mesh *mesh)
+{
+    struct scene *scene;
+    struct sh_err err;
+    double worst_m = 0.0;
+    char regime[64];
+    int rc = load_site(mesh, ".stl", write_stl, &scene, &err);
+    double ours_m = rc == SH_EINPUT && scene == NULL ? 0.0 : INFINITY;
+    if (rc == SH_OK) scene_free(scene);
+    for (uint32_t i = 0; i < 3 * mesh->n_vertices; i++) {
+        double x = mesh->vertex[i / 3][i % 3];
+        worst_m = fmax(worst_m, fabs((double)(float)x - x));
+    }
+    snprintf(regime, sizeof regime, "site at %s coordinates, STL: refused", place->name);
+    table_row(regime, "read as floats: vertices", worst_m, ours_m, 0.0, "m");
+}
+
+static void test_large_coordinates(void **state)
+{
+    (void)state;
+    struct place place[2] = {{"UTM", {1, 0, 0, 0, 1, 0, 0, 0, 1}, {391431.0, 5819712.0, 34.0}},
+                             {.name = "ECEF"}};
+    to_ecef(&place[1]);
+    for (int i = 0; i < 2; i++) {
+        struct mesh mesh = {0};
+        make_site(&place[i], &mesh);
+        site_row(&place[i], &mesh, ".obj", "OBJ", write_obj);
+        site_row(&place[i], &mesh, ".ply", "PLY ascii", write_ply_text);
+        site_row(&place[i], &mesh, ".ply", "PLY binary", write_ply_binary);
+        refused_row(&place[i], &mesh);
+        mesh_free(&mesh);
+    }
+    table_check();
+}
+
+/* ---- ranges: a hull about the station, 1.2 km from the scene's origin */
+
+/* The rough hull's facets stand at up to 80 degrees to the ray. Ours: 16 x 2^-53 x R / cos i is 1e-10 m at 10
+ * km; vertices about the station round by 2^-53 x 1.2 km before. So the micrometre holds throughout, 10 km
+ * included. Naive: floats at 1.2 km are 6e-5 m off whatever the range, and 5e-4 m at 10 km. The BVH's own
+ * frame may be about the station or about the scene's origin, which a station far from it has to bear. */
+static void range_row(double radius_m, double rough)
+{
+    const double centre[3] = {1000.0, -700.0, 30.0};
+    struct mesh mesh = {0};
+    struct rig rig;
+    char regime[64];
+    double station_m[3];
+    mesh_sphere(&mesh, centre, radius_m, rough, 4, 0);
+    for (int k = 0; k < 3; k++)
+        station_m[k] = centre[k] + 0.15 * radius_m;
+    struct scene *scene = mesh_scene(&mesh);
+    rig_open(&rig, scene, station_m, station_m);
+    rig_aim_at_sphere(&rig, 3000, 31);
+    snprintf(regime, sizeof regime, "range %g m, %s hull", radius_m, rough > 0.0 ? "rough" : "smooth");
+    rig_row_of_ranges(&rig, regime, NOWHERE, RIG_MICROMETRE);
+    rig_rebuild(&rig, NOWHERE, 1);
+    strcat(regime, ", BVH 1.2 km off");
+    rig_row_of_ranges(&rig, regime, NOWHERE, RIG_MICROMETRE);
+    rig_close(&rig);
+    mesh_free(&mesh);
+}
+
+static void test_ranges(void **state)
+{
+    (void)state;
+    const double radius_m[] = {0.1, 1.0, 10.0, 100.0, 1000.0, 2000.0, 10000.0};
+    for (size_t i = 0; i < sizeof radius_m / sizeof radius_m[0]; i++) {
+        range_row(radius_m[i], 0.0);
+        range_row(radius_m[i], 0.05);
+    }
+    table_check();
+}
+
+/* ---- incidence: an exactly flat, tessellated slope at UTM coordinates, z = x/8 + y/4 */
+
+static const double UTM_E_M = 391431.0, UTM_N_M = 5819712.0;
+static const double CELL_M = 6.25;
+
+static struct scene *make_slope(void)
+{
+    struct mesh mesh = {0};
+    const double corner[3] = {-100.0, 0.0, -12.5}, u[3] = {200.0, 0.0, 25.0}, v[3] = {0.0, 2200.0, 550.0};
+    mesh_sheet(&mesh, corner, u, v, (uint32_t)(200.0 / CELL_M), (uint32_t)(2200.0 / CELL_M), 0);
+    for (uint32_t i = 0; i < mesh.n_vertices; i++) { /* multiples of 2^-5 m: exact */
+        double *p = mesh.vertex[i];
+        if (p[2] != p[0] / 8.0 + p[1] / 4.0) fail_msg("vertex %u doesn't lie in the plane", i);
+        p[0] += UTM_E_M;
+        p[1] += UTM_N_M;
+    }
+    struct scene *scene = mesh_scene(&mesh);
+    mesh_free(&mesh);
+    return scene;
+}
+
+/* From (0, 0) on the slope, lifted along its normal so that points at range_m are met at the given incidence.
+ */
+static void stand_on_slope(double range_m, double incidence_deg, double station_m[3])
+{
+    const double normal_length = sqrt(1.0 + 1.0 / 64.0 + 1.0 / 16.0);
+    double lift = range_m * cos(incidence_deg * acos(-1.0) / 180.0) / normal_length;
+    station_m[0] = UTM_E_M + lift * -0.125;
+    station_m[1] = UTM_N_M + 1.0 + lift * -0.25;
+    station_m[2] = 0.25 + lift;
+}
+
+static void aim_along_slope(struct rig *rig, double range_m)
+{
+    for (uint64_t i = 0; i < 20000; i++) {
+        double y = (0.95 + 0.05 * rig_unit(41, 2 * i)) * range_m * 0.97,
+               x = (rig_unit(41, 2 * i + 1) - 0.5) * 0.1 * range_m;
+        rig_aim(rig, (const double[3]){UTM_E_M + x, UTM_N_M + y, x / 8.0 + y / 4.0});
+    }
+}
+
+/* The plane's range by its formula, in long double from the very station and direction that were cast. */
+static double slope_error_m(const struct rig *rig)
+{
+    long double z =
+        (rig->station_m[0] - (long double)UTM_E_M) / 8 + (rig->station_m[1] - (long double)UTM_N_M) / 4;
+    double worst_m = 0.0;
+    for (uint32_t i = 0; i < rig->n; i++) {
+        long double down =
+            (long double)rig->dx[i] / 8 + (long double)rig->dy[i] / 4 - (long double)rig->dz[i];
+        double error_m = (double)fabsl((rig->station_m[2] - z) / down - (long double)rig->range_m[i]);
+        worst_m = isnan(error_m) ? (double)INFINITY : fmax(worst_m, error_m);
+    }
+    return worst_m;
+}
+
+/* Range = h / cos i, with n . dir and n . v0 as sums of three products in double: each off by at most 3
+ * roundings of its largest product (below range x |n|), n itself by 2 more: 8 x 2^-53 x R / cos i, twice
+ * (numerator and denominator). At 2 km and 89.99 degrees that is 2e-8 m: below the micrometre promised up
+ * to 89.9 degrees. The frame is about the station; its corners are differences of UTM coordinates, off by up
+ * to 2^-31 m in the station's own place, which is exact in both. */
+static void incidence_row(struct scene *scene, double range_m, double incidence_deg)
+{
+    struct rig rig;
+    char regime[64];
+    double station_m[3];
+    stand_on_slope(range_m, incidence_deg, station_m);
+    rig_open(&rig, scene, station_m, station_m);
+    aim_along_slope(&rig, range_m);
+    double bound_m = 16.0 * 0x1p-53 * range_m / cos(incidence_deg * acos(-1.0) / 180.0);
+    rig_cast_naive(&rig, station_m, 1, 16);
+    double naive_m = slope_error_m(&rig);
+    rig_cast(&rig);
+    snprintf(regime, sizeof regime, "incidence %g degrees at %g m", incidence_deg, range_m);
+    table_row(regime, "float rays, local frame", naive_m, slope_error_m(&rig), fmin(bound_m, RIG_MICROMETRE),
+              "m");
+    rig_close(&rig);
+}
+
+static void test_incidence(void **state)
+{
+    (void)state;
+    const double incidence_deg[] = {80.0, 85.0, 88.0, 89.0, 89.5, 89.9, 89.99};
+    for (size_t i = 0; i < sizeof incidence_deg / sizeof incidence_deg[0]; i++) {
+        incidence_row(make_slope(), 100.0, incidence_deg[i]);
+        incidence_row(make_slope(), 2000.0, incidence_deg[i]);
+    }
+    table_check();
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_large_coordinates),
+        cmocka_unit_test(test_ranges),
+        cmocka_unit_test(test_incidence),
+    };
+    table_head("stability: coordinates, ranges, incidence");
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
