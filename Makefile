@@ -115,6 +115,24 @@ test: deps
 test-unit test-wire test-accuracy test-stability: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test test-programs
 	@SCANHEAD=$(BUILD)/test/scanhead sh tests/run_all.sh $(BUILD) $(@:test-%=%)
+# ---- figures: speed and leaks; speed against accuracy, each method
+DEPS_CHART = gnuplot-nox
+bench: deps-build
+	@$(MAKE) --no-print-directory -j2 $(BUILD)/scanhead
+	@mkdir -p $(BUILD)/bench
+	@$(BUILD)/scanhead bench --scenes 10k,100k,1M,10M,house --leaks 1e8 -o $(BUILD)/bench/bench.json
+# Each program of the chart writes its panel's rows; the first one the head of the table.
+CHART = $(BUILD)/chart/speed_accuracy
+$(BUILD)/tests/bench/chart: tests/bench/chart.c tests/bench/reference.c $(BUILD)/modules.a
+	@mkdir -p $(@D)
+	@echo "  CHART $@"
+	$(Q)$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -o $@ $^ $(LDLIBS)
+chart: deps-build
+	$(call install_missing,$(DEPS_CHART))
+	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/chart
+	@mkdir -p $(BUILD)/chart
+	$(BUILD)/tests/bench/chart > $(CHART).csv
+	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)'" tests/bench/chart.gp
 objects: $(EVERYTHING)
 test-unit-programs: $(UNIT)
 test-programs: all $(TESTS)
@@ -131,6 +149,6 @@ format:
 	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')
 clean:
 	rm -rf $(BUILD)
-.PHONY: all deps deps-build demo test test-unit test-wire test-accuracy test-stability objects test-unit-programs test-programs install format clean
+.PHONY: all deps deps-build demo test test-unit test-wire test-accuracy test-stability objects test-unit-programs test-programs bench chart install format clean
 .SECONDARY:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)

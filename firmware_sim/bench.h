@@ -11,7 +11,8 @@
 enum { BENCH_LINES = 400, BENCH_LINE_PULSES = 2500, BENCH_MIN_ROUNDS = 7, BENCH_MAX_ROUNDS = 101 };
 
 /* Beyond any wall of the scenes; the same for Embree and for us. */
-#define BENCH_RANGE_MAX_M 2000.0
+#define BENCH_RANGE_MAX_M 10000.0
+#define BENCH_SCALE_M     1e-5 /* with which that fits into 31 bits */
 
 /* ---- bench_scene.c: where is scanned */
 struct bench_target {

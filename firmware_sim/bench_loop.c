@@ -144,7 +144,7 @@ int bench_loop(const struct bench_case *c, const struct bench_result *one, uint3
     fill_config(cfg, c, out->threads, frames);
     /* A site of what is there already; nothing of it is released here but the georeference. */
     struct site site = {.cfg = cfg, .scene = c->target->scene, .n_surfaces = c->target->scene->n_surfaces, .bvh = {c->bvh},
-                        .n_bvh = 1, .n_stations = 1, .scale_m = 1e-6};
+                        .n_bvh = 1, .n_stations = 1, .scale_m = BENCH_SCALE_M};
     struct site_station *station = &site.station[0];
     memcpy(cfg->station[0].position_m, c->target->station_m, sizeof cfg->station[0].position_m);
     station->station = &cfg->station[0];

@@ -24,8 +24,8 @@ void bench_setup(const struct bench_case *c, const struct georef *georef, struct
                                  .mirror_counts = BENCH_ENCODER,
                                  .pan_counts = BENCH_ENCODER,
                                  .layout = LINE_GEO,
-                                 .range_scale_m = 1e-6,
-                                 .xyz_scale_m = 1e-6};
+                                 .range_scale_m = BENCH_SCALE_M,
+                                 .xyz_scale_m = BENCH_SCALE_M};
     memcpy(setup->station_m, c->target->station_m, sizeof setup->station_m);
     cast_rotation(0.0, setup->rotation);
 }

@@ -1,0 +1,77 @@
+# Speed against accuracy: gnuplot -e "csv='FILE.csv'; base='OUT'" chart.gp draws OUT.svg and OUT.png.
+#
+# One plot for each panel and scene of the table, two in a row. A method's name is its family, which has a symbol, and as the last
+# word what is varied in it, which stands beside the symbol. Errors of 0 are drawn at 1e-17 m.
+set datafile separator ","
+set datafile missing "nan"
+
+rows(condition, print_what) = system("awk -F, 'NR > 1 && " . condition . " { " . print_what . " }' '" . csv . "'")
+family = "f = $2; sub(/ [^ ]*$/, \"\", f); "
+panel_of(i) = word(plots, 2 * i - 1)
+scene_of(i) = word(plots, 2 * i)
+here(i) = "$1 == \"" . panel_of(i) . "\" && $3 == \"" . scene_of(i) . "\""
+plots = rows("1", "if (!seen[$1, $3]++) print \"\\042\" $1 \"\\042\", \"\\042\" $3 \"\\042\"")
+families(i) = rows(here(i), family . "if (!seen[f]++) print \"\\042\" f \"\\042\"")
+# "< awk" makes a table of one family: ns, p99.9, max, what is varied
+part(i, f) = "< awk -F, 'NR > 1 && " . here(i) . " { " . family . "n = split($2, w, \" \"); if (f ~ /^" . f . \
+    "$/) print $4 \",\" ($5 > 0 ? $5 : 1e-17) \",\" ($6 > 0 ? $6 : 1e-17) \",\" (n > 1 ? w[n] : \"\") }' '" . csv . "'"
+marked(i, column) = "< awk -F, 'NR > 1 && " . here(i) . " && $" . column . " == 1 { print $4 \",\" ($5 > 0 ? $5 : 1e-17) }' '" . \
+    csv . "' | sort -t, -g"
+
+n_plots = words(plots) / 2
+n_rows = (n_plots + 1) / 2
+
+array colour[8] = ["#d55e00", "#e69f00", "#0072b2", "#56b4e9", "#009e73", "#cc79a7", "#666666", "#000000"]
+array symbol[8] = [8, 9, 6, 7, 5, 11, 13, 3]
+# Labels in lanes below the symbols: families that lie within two decades of each other have lanes of their own.
+array lane[8]
+array level[8]
+lane_offset(k) = 0.1 - 1.05 * lane[k]
+
+set style line 20 lc rgb "#dddddd" lw 1
+set logscale xy
+set format y "10^{%T}"
+set grid xtics ytics ls 20
+set xlabel "ns per pulse, one thread" offset 0, 0.4
+set ylabel "error of the range in m" offset 1, 0
+set key bmargin center horizontal maxrows 2 samplen 1 width -2 font ",10"
+set bmargin 6.6
+set xtics add (15, 20, 30, 50, 70, 150, 200, 300, 500, 700, 2000, 3000, 5000, 0.2, 0.3, 0.5, 2, 3, 5, 7)
+how_to_read = "Symbol: 99.9th percentile of the error; bar: up to the largest error; number: what varies in a family (cast: rays per packet)\n" \
+    . "Dashed: front, nothing is faster and as exact; circle: default; an error of 0 is drawn at 10^{-17} m; a miss counts as the whole range"
+
+do for [out in "svg png"] {
+    if (out eq "svg") {
+        set terminal svg size 1200, 620 * n_rows font "DejaVu Sans,13" background "#ffffff"
+    } else {
+        set terminal pngcairo size 1200, 620 * n_rows font "DejaVu Sans,11"
+    }
+    set output base . "." . out
+    set multiplot layout n_rows, 2 title how_to_read font ",12" offset 0, -0.3
+    do for [i = 1:n_plots] {
+        set title panel_of(i) . ": " . scene_of(i) font ",14" offset 0, -0.4
+        names = families(i)
+        n = words(names)
+        set xrange [*:*]
+        set yrange [*:*]
+        stats part(i, ".*") using 1:2 nooutput name "low"
+        stats part(i, ".*") using 1:3 nooutput name "high"
+        decades = log10(high_max_y / low_min_y)
+        do for [k = 1:n] {
+            stats part(i, word(names, k)) using 2 nooutput name "own"
+            level[k] = log10(own_min)
+            lane[k] = 1
+            do for [j = 1:k-1] { lane[k] = lane[k] + (abs(level[j] - level[k]) < 2) }
+        }
+        set xrange [low_min_x * 0.8 : low_max_x * 1.25]
+        set yrange [low_min_y * 10 ** (-0.3 - 0.17 * decades) : high_max_y * 10 ** (0.3 + 0.03 * decades)]
+        plot marked(i, 7) using 1:2 with lines lc rgb "#000000" lw 1.5 dt 2 title "front", \
+            marked(i, 8) using 1:2 with points pt 6 ps 3 lw 2 lc rgb "#000000" title "default", \
+            for [k = 1:n] part(i, word(names, k)) using 1:2:2:3 with yerrorbars pt symbol[k] ps 1.2 lw 1 lc rgb colour[k] \
+            notitle, \
+            for [k = 1:n] NaN with points pt symbol[k] ps 1.4 lc rgb colour[k] title word(names, k), \
+            for [k = 1:n] part(i, word(names, k)) using 1:2:4 with labels offset 0, lane_offset(k) font ",9" tc rgb colour[k] notitle
+    }
+    unset multiplot
+    unset output
+}

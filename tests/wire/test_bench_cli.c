@@ -1,0 +1,114 @@
+/* scanhead bench: the JSON has the keys that scripts rely on, figures that can be, and stages that add up. */
+#include "tests/wire/wire.h"
+
+#include <math.h>
+
+static int bench(struct wire *wire, const char *const *args)
+{
+    return wire_wait(wire, wire_spawn(wire, args, "out", "err", -1));
+}
+
+/* The number behind "key": at or after `from`. */
+static double number_of(const char *from, const char *key)
+{
+    char quoted[64], *end;
+    snprintf(quoted, sizeof quoted, "\"%s\": ", key);
+    const char *at = strstr(from, quoted);
+    if (at == NULL) fail_msg("no %s in the JSON", quoted);
+    double value = strtod(at + strlen(quoted), &end);
+    if (end == at + strlen(quoted)) fail_msg("%s: not a number", key);
+    return value;
+}
+
+static void test_keys(void **state)
+{
+    static const char *const args[] = {"bench", "--scenes", "10k", "--seconds", "0.1", NULL};
+    static const char *const stages[] = {"schedule", "directions", "embree", "refine", "decide", "detect",
+                                         "noise",    "georef",     "encode", "crc",    "rest"};
+    struct wire *wire = *state;
+    assert_int_equal(bench(wire, args), 0);
+    char *text = wire_read(wire_path(wire, "out"), NULL);
+    const char *scenes = strstr(text, "\"scenes\": [");
+    assert_non_null(scenes);
+    assert_non_null(strstr(scenes, "\"scene\": \"10k\""));
+    double n = number_of(scenes, "triangles");
+    assert_true(n > 9000 && n < 11000);
+    assert_true(number_of(scenes, "embree_mrays_s") > 0.0);
+    double cast = number_of(scenes, "cast_ratio"), pipeline = number_of(scenes, "pipeline_ratio");
+    assert_true(cast > 0.0 && pipeline > 0.0);
+    /* The pipeline does all that the cast does and more; a tenth is left for what else the machine does meanwhile. */
+    assert_true(pipeline < 1.1 * cast);
+    const char *ns = strstr(scenes, "\"ns_per_pulse\": {");
+    assert_non_null(ns);
+    double sum = 0.0;
+    for (size_t i = 0; i < sizeof stages / sizeof stages[0]; i++)
+        sum += number_of(ns, stages[i]);
+    assert_true(fabs(sum - number_of(scenes, "pipeline_ns")) < 1e-6 * sum); /* with the rest they are the whole, up to rounding */
+    assert_non_null(strstr(scenes, "\"stages_give_same_bytes\": true"));
+    assert_true(number_of(scenes, "pulses_per_s_all_threads") > 0.0);
+    free(text);
+}
+
+static void test_leaks(void **state)
+{
+    static const char *const args[] = {"bench", "--leaks", "40000", NULL};
+    struct wire *wire = *state;
+    assert_int_equal(bench(wire, args), 0);
+    char *text = wire_read(wire_path(wire, "out"), NULL), *at = strstr(text, "\"leaks\": [");
+    assert_non_null(at);
+    double plain_leaks = 0.0;
+    for (int i = 0; i < 4; i++) {
+        at = strstr(at + 1, "\"mesh\": ");
+        assert_non_null(at);
+        assert_true(number_of(at, "rays") == 10000.0);
+        assert_true(number_of(at, "leaks") == 0.0);
+        plain_leaks += number_of(at, "plain_leaks");
+    }
+    assert_true(plain_leaks > 0.0); /* else the rays are not aimed well enough to show anything */
+    free(text);
+}
+
+static void test_file(void **state)
+{
+    struct wire *wire = *state;
+    char json[352];
+    snprintf(json, sizeof json, "%s", wire_path(wire, "bench.json"));
+    const char *const args[] = {"bench", "--leaks", "400", "-o", json, NULL};
+    assert_int_equal(bench(wire, args), 0);
+    char *text = wire_read(json, NULL), *table = wire_read(wire_path(wire, "out"), NULL);
+    assert_int_equal(text[0], '{');
+    assert_non_null(strstr(table, "box in box"));
+    free(text);
+    free(table);
+}
+
+static void test_wrong_usage(void **state)
+{
+    static const char *const wrong[][4] = {{"bench", "--scenes", "10q", NULL},   {"bench", "--scenes", "", NULL},
+                                           {"bench", "--scenes", "10k,,1M", NULL}, {"bench", "--scenes", "-10k", NULL},
+                                           {"bench", "--scenes", "200M", NULL},  {"bench", "--threads", "0", NULL},
+                                           {"bench", "--seconds", "nan", NULL},  {"bench", "--leaks", "-1", NULL},
+                                           {"bench", "something", NULL, NULL},   {"bench", "--what", NULL, NULL}};
+    struct wire *wire = *state;
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        assert_int_equal(bench(wire, wrong[i]), 2);
+        char *text = wire_read(wire_path(wire, "err"), NULL);
+        assert_ptr_equal(strchr(text, '\n'), text + strlen(text) - 1); /* one line */
+        assert_int_equal(strncmp(text, "scanhead", 8), 0);
+        free(text);
+    }
+    static const char *const absent[] = {"bench", "--scenes", "house", "--house", "/nonexistent.ifc", NULL};
+    assert_int_equal(bench(wire, absent), 2);
+}
+
+int main(void)
+{
+    static const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_keys, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_leaks, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_file, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_wrong_usage, wire_setup, wire_teardown),
+    };
+    cmocka_set_message_output(CM_OUTPUT_TAP);
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
