@@ -87,6 +87,15 @@ enum { CAST_NO_TRIANGLE = 0xffffffff };
 void caster_hits(struct caster *caster, const struct bvh *bvh, const double station_m[3], double range_max_m, uint32_t n,
                  const double *dx, const double *dy, const double *dz, double *range_m, uint32_t *triangle);
 
+/* Cost by stage, for measuring: `now` counts in any unit and is read between the stages of each chunk. */
+enum cast_stage { CAST_DIRECTIONS, CAST_EMBREE, CAST_REFINE, CAST_DECIDE, CAST_DETECT, CAST_NOISE, CAST_POSITIONS, CAST_STAGES };
+struct cast_profile {
+    uint64_t (*now)(void);
+    uint64_t last, spent[CAST_STAGES];
+};
+/* NULL: off, which costs nothing that could be measured. The profile stays the caller's. */
+void caster_set_profile(struct caster *caster, struct cast_profile *profile);
+
 void caster_get_counters(const struct caster *caster, struct cast_counters *counters);
 
 /* socs -> prcs of a levelled head whose y axis points to heading_rad, clockwise from the scene's y axis. */

@@ -36,6 +36,9 @@ void georef_anchor(const struct georef *georef, double anchor[3]);
 /* EPSG code of the CRS: 4978 for ECEF, 326zz/327zz for UTM, 32661/32761 for UPS, 0 for local. */
 int georef_epsg(const struct georef *georef);
 
+/* Where differences from the anchor are a rotation of those in prcs (local, ecef): 1 and its matrix, row by row. Else 0. */
+int georef_rotation(const struct georef *georef, double rotation[9]);
+
 /* n points, d_prcs relative to the station (metres) -> difference from the anchor. In place is allowed.
  * Not-a-number goes through. */
 void georef_forward(const struct georef *georef, size_t n, const double *dx, const double *dy, const double *dz,

@@ -12,21 +12,36 @@
 #ifndef CORE_CAST_BVH_H
 #define CORE_CAST_BVH_H
 
+#include <string.h>
+
 #include "core/cast.h"
 #include "core/embree.h"
 
 #define BVH_WIDEN (8.0 * 0x1p-24)
 enum { BVH_MAX_MITER = 64 }; /* a sharp corner moves out by at most this many widths */
 
-/* One cache line per triangle; the doubles are gathered by their place (kernels.c). */
+/* The exact plane of a triangle, two to a cache line; gathered as doubles (kernels.c).
+ * The lowest 12 bits of each component of n carry something else: of n[0] the guard (a double's upper 12 bits, rounded up),
+ * of n[1] and n[2] the label. They are part of n, and d goes with that n, so the plane still passes exactly through the
+ * triangle; it is tilted by less than 2^-40, which at the far end of a triangle of 100 m is 0.1 nm. */
 struct bvh_triangle {
-    double n[3];    /* e1 x e2 in double, local frame: length is twice the area */
-    double d;       /* n . p = d */
-    double guard;   /* a hit is safe where min(u, v, 1-u-v) * |n . dir| >= guard */
-    double widen_m; /* how far the edges are moved outward */
-    uint16_t label;
-} __attribute__((aligned(64)));
-_Static_assert(sizeof(struct bvh_triangle) == 64, "one cache line");
+    double n[3]; /* e1 x e2, local frame: length is twice the area */
+    double d;    /* n . p = d */
+} __attribute__((aligned(32)));
+_Static_assert(sizeof(struct bvh_triangle) == 32, "half a cache line");
+enum { BVH_SPARE_BITS = 12, BVH_GUARD_SHIFT = 51 };
+
+static inline uint32_t bvh_spare(double x)
+{
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return (uint32_t)(bits & ((1U << BVH_SPARE_BITS) - 1));
+}
+
+static inline uint16_t bvh_label(const struct bvh_triangle *tri)
+{
+    return (uint16_t)(bvh_spare(tri->n[1]) | bvh_spare(tri->n[2]) << BVH_SPARE_BITS);
+}
 
 struct bvh {
     RTCDevice device;
@@ -57,6 +72,9 @@ struct bvh_one {
     float t, u, v;
 };
 void bvh_intersect_one(const struct bvh *bvh, const float org[3], const float dir[3], struct bvh_one *one);
+
+/* How far the edges of a triangle were moved outward. */
+double bvh_width_m(const struct bvh *bvh, uint32_t prim);
 
 /* Fills the float buffers of a geometry with widened triangles, and bvh->triangle. */
 int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err);

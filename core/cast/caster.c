@@ -15,7 +15,8 @@ struct mover_rays {
 
 struct caster {
     double mirror_turn[CHUNK], pan_turn[CHUNK];
-    double dx[CHUNK], dy[CHUNK], dz[CHUNK]; /* true direction, then the one the encoders read; prcs */
+    double dx[CHUNK], dy[CHUNK], dz[CHUNK]; /* direction of the beam, prcs */
+    double ex[CHUNK], ey[CHUNK], ez[CHUNK]; /* direction as the encoders read it, then the position; geo layout */
     double range_m[CHUNK];
     float fx[CHUNK], fy[CHUNK], fz[CHUNK];  /* the direction as Embree gets it */
     uint32_t prim[CHUNK], hit[CHUNK];       /* as proposed; as decided */
@@ -24,7 +25,22 @@ struct caster {
     uint16_t label[CHUNK];
     struct mover_rays mover;                /* touched only where something moves */
     struct cast_counters counters;
+    struct cast_profile *profile;
 };
+
+/* What has passed since the stage before belongs to this one. */
+static inline void ends(struct caster *c, enum cast_stage stage)
+{
+    if (c->profile == NULL) return;
+    uint64_t now = c->profile->now();
+    c->profile->spent[stage] += now - c->profile->last;
+    c->profile->last = now;
+}
+
+void caster_set_profile(struct caster *caster, struct cast_profile *profile)
+{
+    caster->profile = profile;
+}
 
 int caster_create(struct caster **out, struct sh_err *err)
 {
@@ -88,27 +104,36 @@ void caster_hits(struct caster *c, const struct bvh *bvh, const double station_m
         struct kernel_hits hits = {.dx = dx + at, .dy = dy + at, .dz = dz + at, .prim = c->prim, .u = c->u, .v = c->v,
                                    .range_m = range_m + at, .doubt = c->doubt};
         kernel_to_float(hits.dx, hits.dy, hits.dz, m, c->fx, c->fy, c->fz);
+        ends(c, CAST_DIRECTIONS);
         bvh_intersect(bvh, &rays, m);
-        if (kernel_refine(bvh, &hits, ray.o_local, m) != 0) decide(c, &ray, &hits, c->prim, m);
+        ends(c, CAST_EMBREE);
+        uint32_t doubts = kernel_refine(bvh, &hits, ray.o_local, m);
+        ends(c, CAST_REFINE);
+        if (doubts != 0) decide(c, &ray, &hits, c->prim, m);
         memcpy(triangle + at, c->prim, m * sizeof *triangle);
+        ends(c, CAST_DECIDE);
     }
 }
 
-static int is_ideal(const struct cast_setup *s)
+/* Socs to where positions go: straight to the CRS where that is a rotation, else to prcs. Returns 1 in the first case. */
+static int reading_rotation(const struct cast_setup *s, double to_crs[9])
 {
-    return s->mirror_counts >= 4294967296.0 && s->pan_counts >= 4294967296.0;
+    double g[9];
+    int linear = georef_rotation(s->georef, g);
+    memcpy(to_crs, s->rotation, 9 * sizeof *to_crs);
+    for (int i = 0; i < 9 && linear; i++)
+        to_crs[i] = g[i / 3 * 3] * s->rotation[i % 3] + g[i / 3 * 3 + 1] * s->rotation[3 + i % 3] +
+                    g[i / 3 * 3 + 2] * s->rotation[6 + i % 3];
+    return linear;
 }
 
 /* Positions as a head computes them: from the range and from what its encoders read. */
-static void positions(struct caster *c, const struct cast_setup *s, struct line_block *block, uint32_t at, uint32_t n)
+static void positions(struct caster *c, const struct cast_setup *s, int linear, struct line_block *block, uint32_t at,
+                      uint32_t n)
 {
-    if (!is_ideal(s)) {
-        kernel_read_encoders(c->mirror_turn, c->pan_turn, s->mirror_counts, s->pan_counts, n);
-        kernel_directions(c->mirror_turn, c->pan_turn, s->rotation, n, c->dx, c->dy, c->dz);
-    }
-    kernel_scale(c->range_m, n, c->dx, c->dy, c->dz);
-    georef_forward(s->georef, n, c->dx, c->dy, c->dz, c->dx, c->dy, c->dz);
-    kernel_geo(c->dx, c->dy, c->dz, s->xyz_scale_m, n, block->a + at, block->b + at, block->c + at);
+    kernel_scale(c->range_m, n, c->ex, c->ey, c->ez);
+    if (!linear) georef_forward(s->georef, n, c->ex, c->ey, c->ez, c->ex, c->ey, c->ez);
+    kernel_geo(c->ex, c->ey, c->ez, s->xyz_scale_m, n, block->a + at, block->b + at, block->c + at);
 }
 
 /* Label by triangle; the record behind the last one stands for a miss. */
@@ -116,7 +141,7 @@ static void take_labels(struct caster *c, const struct bvh *bvh, uint32_t n)
 {
     uint32_t last = bvh->scene->n_triangles;
     for (uint32_t i = 0; i < n; i++)
-        c->label[i] = bvh->triangle[c->hit[i] < last ? c->hit[i] : last].label;
+        c->label[i] = bvh_label(&bvh->triangle[c->hit[i] < last ? c->hit[i] : last]);
 }
 
 /* A moving body, cast in its own frame: what it hides gives way. */
@@ -137,15 +162,21 @@ static void cast_mover(struct caster *c, const struct cast_setup *s, const struc
     for (uint32_t i = 0; i < n; i++) {
         if (!(r->range_m[i] < c->range_m[i]) && !(isnan(c->range_m[i]) && !isnan(r->range_m[i]))) continue;
         c->range_m[i] = r->range_m[i];
-        c->label[i] = m->bvh->triangle[r->hit[i]].label;
+        c->label[i] = bvh_label(&m->bvh->triangle[r->hit[i]]);
     }
 }
 
 static uint32_t cast_chunk(struct caster *c, const struct cast_setup *s, const struct schedule_run *run,
                            struct line_block *block, uint32_t at, uint32_t n)
 {
+    if (c->profile != NULL) c->profile->last = c->profile->now();
     kernel_angles(run, at, n, c->mirror_turn, c->pan_turn);
-    kernel_directions(c->mirror_turn, c->pan_turn, s->rotation, n, c->dx, c->dy, c->dz);
+    double to_crs[9];
+    int geo = s->layout == LINE_GEO, linear = geo ? reading_rotation(s, to_crs) : 0;
+    if (geo)
+        kernel_directions_read(s, c->mirror_turn, c->pan_turn, to_crs, n, c->dx, c->dy, c->dz, c->ex, c->ey, c->ez);
+    else
+        kernel_directions(c->mirror_turn, c->pan_turn, s->rotation, n, c->dx, c->dy, c->dz);
     caster_hits(c, s->bvh, s->station_m, s->range_max_m, n, c->dx, c->dy, c->dz, c->range_m, c->hit);
     take_labels(c, s->bvh, n);
     for (uint32_t i = 0; i < s->n_movers; i++)
@@ -155,11 +186,14 @@ static uint32_t cast_chunk(struct caster *c, const struct cast_setup *s, const s
         block->label[at + i] = block->echo[at + i] != 0 ? c->label[i] : (uint16_t)LINE_LABEL_NONE;
         block->refl_cdb[at + i] = LINE_REFL_NONE;
     }
+    ends(c, CAST_DETECT);
     if (s->noise_on) kernel_noise(s, run->pulse0 + at, n, c->range_m);
-    if (s->layout == LINE_POLAR)
-        kernel_polar(s, c->range_m, c->mirror_turn, c->pan_turn, n, block->a + at, block->b + at, block->c + at);
+    ends(c, CAST_NOISE);
+    if (geo)
+        positions(c, s, linear, block, at, n);
     else
-        positions(c, s, block, at, n);
+        kernel_polar(s, c->range_m, c->mirror_turn, c->pan_turn, n, block->a + at, block->b + at, block->c + at);
+    ends(c, CAST_POSITIONS);
     return echoes;
 }
 

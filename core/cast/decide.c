@@ -156,8 +156,9 @@ static double search_radius(const struct decide_ray *ray, uint32_t prim, double 
 {
     const struct bvh_triangle *tri = &ray->bvh->triangle[prim];
     double cosine = fabs(dot(tri->n, ray->dir)) / sqrt(dot(tri->n, tri->n));
-    double radius = 4.0 * tri->widen_m * (1.0 + 1.0 / fmax(cosine, 1e-3));
-    return fmin(radius, 0.01 * range_m + 4.0 * tri->widen_m);
+    double width_m = bvh_width_m(ray->bvh, prim);
+    double radius = 4.0 * width_m * (1.0 + 1.0 / fmax(cosine, 1e-3));
+    return fmin(radius, 0.01 * range_m + 4.0 * width_m);
 }
 
 void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct cast_counters *counters,

@@ -19,17 +19,6 @@ void kernel_angles(const struct schedule_run *run, uint32_t first, uint32_t n, d
 }
 
 VEC_CLONES
-void kernel_read_encoders(double *restrict mirror_turn, double *restrict pan_turn, double mirror_counts, double pan_counts,
-                          uint32_t n)
-{
-    for (uint32_t i = 0; i < n; i++) {
-        uint64_t bits;
-        mirror_turn[i] = vec_round(mirror_turn[i] * mirror_counts, &bits) / mirror_counts;
-        pan_turn[i] = vec_round(pan_turn[i] * pan_counts, &bits) / pan_counts;
-    }
-}
-
-VEC_CLONES
 void kernel_directions(const double *restrict mirror_turn, const double *restrict pan_turn, const double m[9], uint32_t n,
                        double *restrict dx, double *restrict dy, double *restrict dz)
 {
@@ -43,6 +32,46 @@ void kernel_directions(const double *restrict mirror_turn, const double *restric
         dy[i] = m3 * x + m4 * y + m5 * sm;
         dz[i] = m6 * x + m7 * y + m8 * sm;
     }
+}
+
+/* An encoder is off by at most half a count, d: sin(a + d) = sin a + d cos a - d^2/2 sin a leaves d^3/6, below 1e-12 for
+ * 2^12 counts per turn and more. */
+VEC_CLONES
+static void directions_read(const double *restrict mirror_turn, const double *restrict pan_turn, double mirror_counts,
+                            double pan_counts, double use, const double m[9], const double q[9], uint32_t n,
+                            double *restrict dx, double *restrict dy, double *restrict dz, double *restrict ex,
+                            double *restrict ey, double *restrict ez)
+{
+    const double m0 = m[0], m1 = m[1], m2 = m[2], m3 = m[3], m4 = m[4], m5 = m[5], m6 = m[6], m7 = m[7], m8 = m[8];
+    const double q0 = q[0], q1 = q[1], q2 = q[2], q3 = q[3], q4 = q[4], q5 = q[5], q6 = q[6], q7 = q[7], q8 = q[8];
+    const double mirror_step = use * VEC_TURN_RAD / mirror_counts, pan_step = use * VEC_TURN_RAD / pan_counts;
+    for (uint32_t i = 0; i < n; i++) {
+        double sm, cm, sp, cp;
+        uint64_t bits;
+        vec_sincos_turn(mirror_turn[i], &sm, &cm);
+        vec_sincos_turn(pan_turn[i], &sp, &cp);
+        double x = sp * cm, y = cp * cm;
+        dx[i] = m0 * x + m1 * y + m2 * sm;
+        dy[i] = m3 * x + m4 * y + m5 * sm;
+        dz[i] = m6 * x + m7 * y + m8 * sm;
+        double mc = mirror_turn[i] * mirror_counts, pc = pan_turn[i] * pan_counts;
+        double dm = (vec_round(mc, &bits) - mc) * mirror_step, dp = (vec_round(pc, &bits) - pc) * pan_step;
+        double hm = 1.0 - 0.5 * dm * dm, hp = 1.0 - 0.5 * dp * dp;
+        double rsm = sm * hm + cm * dm, rcm = cm * hm - sm * dm, rsp = sp * hp + cp * dp, rcp = cp * hp - sp * dp;
+        double rx = rsp * rcm, ry = rcp * rcm;
+        ex[i] = q0 * rx + q1 * ry + q2 * rsm;
+        ey[i] = q3 * rx + q4 * ry + q5 * rsm;
+        ez[i] = q6 * rx + q7 * ry + q8 * rsm;
+    }
+}
+
+void kernel_directions_read(const struct cast_setup *setup, const double *mirror_turn, const double *pan_turn,
+                            const double to_crs[9], uint32_t n, double *dx, double *dy, double *dz, double *ex, double *ey,
+                            double *ez)
+{
+    int ideal = setup->mirror_counts >= 4294967296.0 && setup->pan_counts >= 4294967296.0;
+    directions_read(mirror_turn, pan_turn, setup->mirror_counts, setup->pan_counts, ideal ? 0.0 : 1.0, setup->rotation, to_crs,
+                    n, dx, dy, dz, ex, ey, ez);
 }
 
 VEC_CLONES
@@ -66,14 +95,19 @@ static uint32_t refine(const double *restrict tri, uint32_t n_triangles, const u
     const double ox = o[0], oy = o[1], oz = o[2];
     uint32_t doubts = 0;
     for (uint32_t i = 0; i < n; i++) {
-        int64_t at = (int64_t)(prim[i] < n_triangles ? prim[i] : n_triangles) * 8;
+        int64_t at = (int64_t)(prim[i] < n_triangles ? prim[i] : n_triangles) * 4;
         double nx = tri[at], ny = tri[at + 1], nz = tri[at + 2];
         double along = nx * dx[i] + ny * dy[i] + nz * dz[i];
         range_m[i] = (tri[at + 3] - (nx * ox + ny * oy + nz * oz)) / along;
         float w = 1.0f - u[i] - v[i];
         float least = u[i] < v[i] ? u[i] : v[i];
         least = w < least ? w : least;
-        uint32_t near = (double)least * fabs(along) < tri[at + 4];
+        uint64_t bits;
+        double guard;
+        memcpy(&bits, &nx, sizeof bits);
+        bits = (bits & ((1U << BVH_SPARE_BITS) - 1)) << BVH_GUARD_SHIFT;
+        memcpy(&guard, &bits, sizeof guard);
+        uint32_t near = (double)least * fabs(along) < guard;
         doubt[i] = near;
         doubts += near;
     }

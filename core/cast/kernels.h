@@ -7,12 +7,13 @@
 /* Mirror and pan angle of n pulses of a run, from its pulse `first` on. */
 void kernel_angles(const struct schedule_run *run, uint32_t first, uint32_t n, double *mirror_turn, double *pan_turn);
 
-/* Angles as the encoders read them: whole counts. In place. */
-void kernel_read_encoders(double *mirror_turn, double *pan_turn, double mirror_counts, double pan_counts, uint32_t n);
-
 /* Directions in prcs: rotation times (sin p cos m, cos p cos m, sin m). */
 void kernel_directions(const double *mirror_turn, const double *pan_turn, const double rotation[9], uint32_t n, double *dx,
                        double *dy, double *dz);
+/* The same, and beside it e: the directions as the encoders read them (whole counts), turned by to_crs instead. */
+void kernel_directions_read(const struct cast_setup *setup, const double *mirror_turn, const double *pan_turn,
+                            const double to_crs[9], uint32_t n, double *dx, double *dy, double *dz, double *ex, double *ey,
+                            double *ez);
 void kernel_to_float(const double *dx, const double *dy, const double *dz, uint32_t n, float *fx, float *fy, float *fz);
 
 /* What Embree proposed, and what double precision makes of it. */

@@ -56,39 +56,62 @@ static void widen_corner(double v[3][3], int i, double width, float out[3])
         out[j] = (float)(v[i][j] - scale * move[j]);
 }
 
-static void fill_triangle(struct bvh *bvh, uint32_t prim, float *vertex)
+double bvh_width_m(const struct bvh *bvh, uint32_t prim)
 {
-    double v[3][3], e1[3], e2[3], longest2 = 0.0;
-    double reach_m = corners(bvh, prim, v) + bvh->station_reach_m;
-    double width_m = BVH_WIDEN * reach_m;
-    struct bvh_triangle *tri = &bvh->triangle[prim];
+    double v[3][3];
+    return BVH_WIDEN * (corners(bvh, prim, v) + bvh->station_reach_m);
+}
+
+static double with_spare(double x, uint32_t spare)
+{
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    bits = (bits & ~(uint64_t)((1U << BVH_SPARE_BITS) - 1)) | spare;
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}
+
+/* Plane, guard and label. The distance from a ray to edge i, across the ray, is at least bary_i |n . dir| / longest edge. It
+ * has to exceed the width by which the border was moved and once more the rounding. Embree's bary_i are those of the widened
+ * triangle, which is larger; 1.1 covers the difference, and needles are always decided. */
+static void set_exact(struct bvh_triangle *tri, double v[3][3], double width_m, uint16_t label)
+{
+    double e1[3], e2[3], longest2 = 0.0;
     for (int i = 0; i < 3; i++) {
         double l2 = 0.0;
         for (int j = 0; j < 3; j++)
             l2 += (v[(i + 1) % 3][j] - v[i][j]) * (v[(i + 1) % 3][j] - v[i][j]);
         longest2 = fmax(longest2, l2);
-        widen_corner(v, i, width_m, vertex + 3 * i);
         e1[i] = v[1][i] - v[0][i];
         e2[i] = v[2][i] - v[0][i];
     }
-    memset(tri, 0, sizeof *tri);
     cross(e1, e2, tri->n);
-    tri->d = dot(tri->n, v[0]);
-    /* Distance from the ray to edge i, across the ray, is at least bary_i |n . dir| / longest edge. It has to exceed the
-     * width by which the border was moved and once more the rounding. The area of the widened triangle is larger: Embree's
-     * bary_i are those of its own, with the same edges; the factor 1.1 covers the difference, needles are always decided. */
     double height_m = sqrt(dot(tri->n, tri->n) / longest2);
-    double guard = 1.1 * 2.0 * width_m * sqrt(longest2);
-    tri->guard = height_m > 64.0 * width_m ? guard : INFINITY;
-    tri->widen_m = width_m;
-    tri->label = bvh->scene->label[prim];
+    double guard = height_m > 64.0 * width_m ? 1.1 * 2.0 * width_m * sqrt(longest2) : INFINITY;
+    uint64_t bits;
+    memcpy(&bits, &guard, sizeof bits);
+    tri->n[0] = with_spare(tri->n[0], (uint32_t)((bits + ((1ULL << BVH_GUARD_SHIFT) - 1)) >> BVH_GUARD_SHIFT));
+    tri->n[1] = with_spare(tri->n[1], label & ((1U << BVH_SPARE_BITS) - 1));
+    tri->n[2] = with_spare(tri->n[2], (uint32_t)label >> BVH_SPARE_BITS);
+    double centre[3];
+    for (int j = 0; j < 3; j++)
+        centre[j] = v[0][j] + (e1[j] + e2[j]) / 3.0;
+    tri->d = dot(tri->n, centre);
+}
+
+static void fill_triangle(struct bvh *bvh, uint32_t prim, float *vertex)
+{
+    double v[3][3], width_m = BVH_WIDEN * (corners(bvh, prim, v) + bvh->station_reach_m);
+    for (int i = 0; i < 3; i++)
+        widen_corner(v, i, width_m, vertex + 3 * i);
+    set_exact(&bvh->triangle[prim], v, width_m, bvh->scene->label[prim]);
 }
 
 int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err)
 {
     const struct scene *scene = bvh->scene;
     size_t n = scene->n_triangles;
-    bvh->triangle = aligned_alloc(64, (n + 1) * sizeof *bvh->triangle);
+    bvh->triangle = aligned_alloc(64, (n + 2) / 2 * 64);
     float *vertex = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), 3 * n);
     uint32_t *index = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t), n);
     if (bvh->triangle == NULL || vertex == NULL || index == NULL)
@@ -97,6 +120,7 @@ int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err)
         fill_triangle(bvh, i, vertex + 9 * (size_t)i);
     for (uint32_t i = 0; i < 3 * n; i++)
         index[i] = i;
-    bvh->triangle[n] = (struct bvh_triangle){.n = {NAN, NAN, NAN}, .d = NAN, .guard = NAN, .label = LINE_LABEL_NONE};
+    bvh->triangle[n] = (struct bvh_triangle){
+        .n = {NAN, with_spare(NAN, LINE_LABEL_NONE & 0xfff), with_spare(NAN, LINE_LABEL_NONE >> BVH_SPARE_BITS)}, .d = NAN};
     return SH_OK;
 }

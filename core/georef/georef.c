@@ -104,6 +104,14 @@ int georef_epsg(const struct georef *georef)
     return georef->epsg;
 }
 
+int georef_rotation(const struct georef *georef, double rotation[9])
+{
+    static const double same[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+    if (georef->crs == GEOREF_UTM) return 0;
+    memcpy(rotation, georef->crs == GEOREF_ECEF ? georef->rotation : same, sizeof same);
+    return 1;
+}
+
 static void rotate(const double r[9], size_t n, const double *dx, const double *dy, const double *dz,
                    double *out_x, double *out_y, double *out_z)
 {
