@@ -156,6 +156,7 @@ int loop_is_over(const struct loop *loop)
 void loop_end(struct loop *loop)
 {
     device_end(loop->device);
+    atomic_store(&loop->ending, 1);
     if (loop->cfg->pace == PACE_STEP) atomic_store(&loop->granted, UINT64_MAX);
     loop_poke(loop);
 }

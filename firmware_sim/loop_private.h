@@ -55,6 +55,7 @@ struct loop {
     _Atomic uint64_t granted;          /* step: ticks that may pass */
     _Atomic uint64_t granted_ns;       /* step: the sum of all grants */
     _Atomic uint64_t final_tick;       /* first tick that will never be; UINT64_MAX while unknown */
+    _Atomic int ending;                /* the run was told to end: no patience with readers who stand still */
     _Atomic int stopping;              /* give up waiting for anything */
     _Atomic int pacer_done;
     _Atomic uint32_t pumps_busy;       /* pumps that still have something to bring out */

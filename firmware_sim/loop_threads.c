@@ -2,10 +2,13 @@
 #include <errno.h>
 #include <sched.h>
 #include <string.h>
+#include <time.h>
 
 #include "drivers/protocol/native_encode.h"
 #include "firmware_sim/clock.h"
 #include "firmware_sim/loop_private.h"
+
+static const int64_t PATIENCE_NS = 2000000000;
 
 void loop_poke(struct loop *loop)
 {
@@ -170,12 +173,31 @@ static void pace_realtime(struct loop *loop)
     }
 }
 
-static int readers_have_room(struct loop *loop, uint64_t tick)
+static int holds_back(const struct loop *loop, int reader, uint64_t tick)
+{
+    const struct loop_reader *r = &loop->reader[reader];
+    return atomic_load(&r->active) && atomic_load(&r->cursor) + loop->ring.queue_ticks <= tick + 1;
+}
+
+static int readers_have_room(const struct loop *loop, uint64_t tick)
 {
     for (int i = 0; i < RING_MAX_READERS; i++)
-        if (atomic_load(&loop->reader[i].active) && atomic_load(&loop->reader[i].cursor) + loop->ring.queue_ticks <= tick + 1)
-            return 0;
+        if (holds_back(loop, i, tick)) return 0;
     return 1;
+}
+
+/* Until a reader goes on. Once the run is to end, readers who let PATIENCE_NS pass hold back nothing any more. */
+static void wait_for_readers(struct loop *loop, uint64_t tick)
+{
+    if (!atomic_load(&loop->ending)) {
+        sem_wait(&loop->progress);
+        return;
+    }
+    int64_t until_ns = clock_now_ns() + PATIENCE_NS;
+    struct timespec until = {.tv_sec = until_ns / 1000000000, .tv_nsec = until_ns % 1000000000};
+    if (sem_clockwait(&loop->progress, CLOCK_MONOTONIC, &until) == 0 || errno != ETIMEDOUT) return;
+    for (int i = 0; i < RING_MAX_READERS; i++)
+        if (holds_back(loop, i, tick)) atomic_store(&loop->reader[i].active, 0);
 }
 
 static void pace_waiting(struct loop *loop)
@@ -185,7 +207,7 @@ static void pace_waiting(struct loop *loop)
         if (slot == NULL) {
             sem_wait(&loop->ready);
         } else if (!readers_have_room(loop, tick)) {
-            sem_wait(&loop->progress);
+            wait_for_readers(loop, tick);
         } else {
             release(loop, slot, tick++, clock_now_ns());
         }
