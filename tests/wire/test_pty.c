@@ -1,0 +1,182 @@
+/* The virtual serial port under clients that know nothing of it: opened with whatever settings it has, closed in the middle
+ * of a frame. The next one never sees what was meant for the one before. */
+#include "tests/wire/room.h"
+
+#include <termios.h>
+
+#include "drivers/protocol/native.h"
+
+static const struct room_config ENDLESS = {.prr_hz = 200000, .lines_hz = 100, .pan_deg_s = 20, .pan_stop_deg = 360,
+                                           .frames = 0, .links = LINK_YAML_BOTH,
+                                           .more = "loop: {queue_ms: 3000, late_ms: 10000}\n"};
+
+static int port_open(const struct wire *wire)
+{
+    int fd = open(wire_path(wire, "port"), O_RDWR | O_NOCTTY | O_CLOEXEC);
+    if (fd < 0) fail_msg("open: %s", strerror(errno));
+    return fd;
+}
+
+/* What a client got at its place in the stream. */
+struct look {
+    struct native_parser parser;
+    uint64_t texts;
+    int64_t first_ns;
+    uint32_t first_seq, last_seq;
+    int n;
+};
+
+/* Reads as cat would, until `frames` frames have come. */
+static void look_at(struct look *look, int fd, int frames)
+{
+    native_parser_init(&look->parser);
+    look->n = 0;
+    look->texts = 0;
+    while (look->n < frames) {
+        size_t room;
+        struct pollfd slot = {.fd = fd, .events = POLLIN};
+        uint8_t *to = native_parser_room(&look->parser, &room);
+        if (poll(&slot, 1, DEADLINE_MS) != 1) fail_msg("nothing to read");
+        ssize_t got = read(fd, to, room);
+        assert_true(got > 0);
+        native_parser_added(&look->parser, (size_t)got);
+        for (enum native_item item; (item = native_parser_next(&look->parser)) != NATIVE_MORE;) {
+            if (item == NATIVE_TEXT) {
+                look->texts++;
+                continue;
+            }
+            if (look->n++ == 0) {
+                look->first_ns = look->parser.header.t_ns;
+                look->first_seq = look->parser.header.seq;
+            }
+            look->last_seq = look->parser.header.seq;
+        }
+    }
+}
+
+static void expect_clean(const struct look *look)
+{
+    assert_int_equal(look->parser.stats.bad_payload, 0);
+    assert_int_equal(look->parser.stats.bad_bytes, 0); /* it begins with a frame, and every byte belongs to one */
+    assert_int_equal(look->parser.stats.seq_lost, 0);
+}
+
+static void test_clients_with_default_settings(void **state)
+{
+    struct wire *wire = *state;
+    static struct look look;
+    room_write(wire);
+    struct head head = head_start(wire, room_config_write(wire, &ENDLESS), (const char *const[]){"--start", NULL});
+    struct scanhead *watch = client_open(head_endpoint(&head, "tcp"));
+    client_wait_state(watch, "scanning");
+    uint32_t next_seq = 0;
+    for (int i = 0; i < 20; i++) {
+        int64_t now_ns = atoll(client_ask(watch, "TIME?"));
+        int fd = port_open(wire); /* no tcsetattr: as cat, dd or a shell's redirection do */
+        look_at(&look, fd, 5 + i);
+        expect_clean(&look);
+        assert_int_equal(look.texts, 0);
+        assert_true(look.first_seq >= next_seq);
+        assert_true(look.first_ns + 2000000 >= now_ns); /* nothing of before it was opened, to a tick or two */
+        next_seq = look.last_seq + 1;
+        close(fd); /* with whatever is on its way */
+    }
+    scanhead_close(watch);
+    head_end(&head, SIGTERM);
+}
+
+/* Someone leaves with a full pipe behind and a reply he never read; someone else leaves a terminal in cooked mode. */
+static void test_nothing_stale(void **state)
+{
+    struct wire *wire = *state;
+    static struct look look;
+    room_write(wire);
+    struct head head = head_start(wire, room_config_write(wire, &ENDLESS), (const char *const[]){"--start", NULL});
+    struct scanhead *watch = client_open(head_endpoint(&head, "tcp"));
+    struct scanhead_frame frame;
+    client_wait_state(watch, "scanning");
+    for (int i = 0; i < 10; i++) {
+        int fd = port_open(wire);
+        raw_write(fd, "*IDN?\nHEAD:PRR?\n", 16);
+        /* 50 frames later the terminal's buffer is full. */
+        for (int n = 0; n < 50; n++)
+            client_next(watch, &frame);
+        if (i % 2 == 0) {
+            struct termios cooked;
+            assert_int_equal(tcgetattr(fd, &cooked), 0);
+            cooked.c_lflag |= ICANON | ECHO | ISIG;
+            cooked.c_iflag |= ICRNL | IXON | IXOFF;
+            cooked.c_oflag |= OPOST | ONLCR;
+            assert_int_equal(tcsetattr(fd, TCSANOW, &cooked), 0);
+        }
+        close(fd);
+        int64_t now_ns = atoll(client_ask(watch, "TIME?"));
+        fd = port_open(wire);
+        look_at(&look, fd, 20);
+        expect_clean(&look);
+        assert_int_equal(look.texts, 0); /* the replies were for the one before */
+        assert_true(look.first_ns + 2000000 >= now_ns);
+        struct termios now;
+        assert_int_equal(tcgetattr(fd, &now), 0);
+        assert_int_equal(now.c_lflag & (ICANON | ECHO | ISIG), 0);
+        assert_int_equal(now.c_oflag & OPOST, 0);
+        close(fd);
+    }
+    assert_int_equal(strncmp(client_ask(watch, "SYST:ERR?"), "101,", 4), 0); /* clients went away in mid-scan */
+    scanhead_close(watch);
+    head_end(&head, SIGTERM);
+    assert_int_equal(stats_uint(wire, "lost_pulses"), 0);
+}
+
+/* Opened and closed as fast as it goes, with a command or without: the head is there for the one who stays. */
+static void test_fast_open_and_close(void **state)
+{
+    struct wire *wire = *state;
+    room_write(wire);
+    struct head head = head_start(wire, room_config_write(wire, &ENDLESS), NULL);
+    for (int i = 0; i < 200; i++) {
+        int fd = port_open(wire);
+        if (i % 3 == 0) raw_write(fd, "*OPC?\n", 6);
+        if (i % 7 == 0) raw_write(fd, "HEAD:PR", 7);
+        close(fd);
+    }
+    struct scanhead *sh = client_open(head_endpoint(&head, "pty"));
+    struct scanhead_frame frame;
+    client_wait_state(sh, "idle");
+    client_tell(sh, "SCAN:STAR");
+    for (int n = 0; n < 50; n += frame.type == SCANHEAD_POINTS)
+        client_next(sh, &frame);
+    client_tell(sh, "SCAN:STOP");
+    client_until(sh, SCANHEAD_EV_SCAN_END, &frame);
+    scanhead_close(sh);
+    head_end(&head, SIGTERM);
+}
+
+/* A command by a shell's redirection is carried out, though its client is gone before the head looks. */
+static void test_command_by_redirection(void **state)
+{
+    struct wire *wire = *state;
+    room_write(wire);
+    struct head head = head_start(wire, room_config_write(wire, &ENDLESS), NULL);
+    struct scanhead *watch = client_open(head_endpoint(&head, "tcp"));
+    struct scanhead_frame frame;
+    client_wait_state(watch, "idle");
+    int fd = port_open(wire);
+    raw_write(fd, "HEAD:PRR 54321\nSCAN:STAR\n", 25);
+    close(fd);
+    client_until(watch, SCANHEAD_EV_SCAN_START, &frame);
+    assert_string_equal(client_ask(watch, "HEAD:PRR?"), "54321");
+    scanhead_close(watch);
+    head_end(&head, SIGTERM);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_clients_with_default_settings, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_nothing_stale, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_fast_open_and_close, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_command_by_redirection, wire_setup, wire_teardown),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

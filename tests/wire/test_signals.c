@@ -1,0 +1,188 @@
+/* SIGTERM and SIGINT end the program in good order wherever it is: status 0, statistics written, symlink gone, files whole. */
+#include "tests/wire/room.h"
+
+static const struct room_config ENDLESS = {.profile = "riegl-vz400i", .prr_hz = 200000, .lines_hz = 100, .pan_deg_s = 20,
+                                           .pan_stop_deg = 360, .frames = 0, .links = LINK_YAML_BOTH,
+                                           .more = "loop: {queue_ms: 3000, late_ms: 10000}\n"};
+
+static void expect_symlink(const struct wire *wire, int there)
+{
+    struct stat st;
+    assert_int_equal(lstat(wire_path(wire, "port"), &st) == 0, there);
+}
+
+/* With nobody there, in the middle of boot. */
+static void test_at_once(void **state)
+{
+    struct wire *wire = *state;
+    static const int signals[] = {SIGTERM, SIGINT};
+    room_write(wire);
+    for (int i = 0; i < 2; i++) {
+        struct head head = head_start(wire, room_config_write(wire, &ENDLESS), NULL);
+        expect_symlink(wire, 1);
+        head_end(&head, signals[i]);
+        expect_symlink(wire, 0);
+        assert_int_equal(stats_uint(wire, "scans"), 0);
+        remove(wire_path(wire, "stats.json"));
+    }
+}
+
+/* In mid-scan, at each pace, with a reader, who gets everything up to the end of the scan; and with one who does not read. */
+static void in_mid_scan(struct wire *wire, const char *pace, int signal_number)
+{
+    struct scanhead_frame frame;
+    const char *const more[] = {"--pace", pace, NULL};
+    struct head head = head_start(wire, room_config_write(wire, &ENDLESS), more);
+    struct scanhead *sh = client_open(head_endpoint(&head, "pty"));
+    client_wait_state(sh, "idle");
+    client_tell(sh, "SCAN:STAR");
+    uint64_t pulses = 0;
+    int n = 0;
+    do {
+        client_next(sh, &frame);
+        pulses += frame.type == SCANHEAD_POINTS ? frame.n_pulses : 0;
+        if (++n == 300) assert_int_equal(kill(head.pid, signal_number), 0);
+    } while (!is_event(&frame, SCANHEAD_EV_SCAN_END));
+    head_end(&head, 0);
+    scanhead_close(sh);
+    expect_symlink(wire, 0);
+    assert_int_equal(stats_uint(wire, "scans"), 1);
+    assert_int_equal(stats_uint(wire, "pulses"), pulses);
+    assert_int_equal(stats_uint(wire, "fired_pulses"), frame.event_value[1]);
+}
+
+static void test_in_mid_scan(void **state)
+{
+    room_write(*state);
+    in_mid_scan(*state, "realtime", SIGTERM);
+    in_mid_scan(*state, "fast", SIGINT);
+}
+
+static void test_with_a_reader_who_does_not_read(void **state)
+{
+    struct wire *wire = *state;
+    struct room_config config = ENDLESS;
+    struct scanhead_frame frame;
+    config.prr_hz = 1200000;
+    config.more = "loop: {pace: fast, queue_ms: 50}\n";
+    room_write(wire);
+    struct head head = head_start(wire, room_config_write(wire, &config), (const char *const[]){"--start", NULL});
+    int idle = raw_connect(head_endpoint(&head, "tcp"));
+    struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
+    while (scanhead_next(sh, &frame, 1000) == SCANHEAD_OK) { /* until the run is held back */
+    }
+    int64_t start_ms = wire_now_ms();
+    head_end(&head, SIGTERM);
+    assert_true(wire_now_ms() - start_ms < 10000); /* it gives such a reader 2 s, not for ever */
+    close(idle);
+    scanhead_close(sh);
+    assert_int_equal(stats_uint(wire, "scans"), 1);
+}
+
+static void test_at_pace_step(void **state)
+{
+    struct wire *wire = *state;
+    room_write(wire);
+    struct head head = head_start(wire, room_config_write(wire, &ENDLESS), (const char *const[]){"--pace", "step", NULL});
+    struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
+    client_tell(sh, "TIME:STEP 300 MS");
+    client_tell(sh, "SCAN:STAR");
+    client_tell(sh, "TIME:STEP 100 MS");
+    head_end(&head, SIGTERM);
+    scanhead_close(sh);
+    expect_symlink(wire, 0);
+    assert_int_equal(stats_uint(wire, "scans"), 1);
+}
+
+/* ---- record */
+
+/* The points of a binary PLY by its own header: the file must be as long as that says. */
+static uint64_t ply_points(const struct wire *wire, const char *name)
+{
+    static const struct {
+        const char *type;
+        size_t size;
+    } types[] = {{"double", 8}, {"float64", 8}, {"float", 4}, {"float32", 4}, {"uint", 4}, {"uint32", 4}, {"int", 4},
+                 {"int32", 4}, {"ushort", 2}, {"uint16", 2}, {"short", 2}, {"int16", 2}, {"uchar", 1}, {"uint8", 1}};
+    size_t len, record = 0;
+    char *text = wire_read(wire_path(wire, name), &len), *end = strstr(text, "\nend_header\n"), type[32];
+    unsigned long long n = 0;
+    assert_int_equal(strncmp(text, "ply\nformat binary_little_endian 1.0\n", 36), 0);
+    assert_non_null(end);
+    for (char *at = text; at < end; at = strchr(at, '\n') + 1) {
+        sscanf(at, "element vertex %llu", &n);
+        if (sscanf(at, "property %31s", type) != 1) continue;
+        for (size_t i = 0; i < sizeof types / sizeof types[0]; i++)
+            if (strcmp(type, types[i].type) == 0) record += types[i].size;
+    }
+    assert_true(record >= 12);
+    assert_int_equal(len - (size_t)(end + 12 - text), n * record);
+    free(text);
+    return n;
+}
+
+/* Starts `record SOURCE -o FILE` and interrupts it once the file grows: waits by watching what is being written. */
+static void interrupt_record(struct wire *wire, const char *const *args, int signal_number)
+{
+    pid_t pid = wire_spawn(wire, args, "out", "err", -1);
+    int64_t end_ms = wire_now_ms() + DEADLINE_MS;
+    for (int growing = 0; !growing;) {
+        DIR *dir = opendir(wire->dir);
+        for (struct dirent *entry; (entry = readdir(dir)) != NULL;) {
+            struct stat st;
+            if (strstr(entry->d_name, ".ply") != NULL && stat(wire_path(wire, entry->d_name), &st) == 0)
+                growing |= st.st_size > 100000;
+        }
+        closedir(dir);
+        if (wire_now_ms() > end_ms) fail_msg("nothing is being written");
+        poll(NULL, 0, 5);
+    }
+    assert_int_equal(kill(pid, signal_number), 0);
+    int status = wire_wait(wire, pid);
+    if (status != 0) wire_show(wire, "err");
+    assert_int_equal(status, 0);
+}
+
+static void test_record_off_line(void **state)
+{
+    struct wire *wire = *state;
+    char config[352], ply[352];
+    room_write(wire);
+    snprintf(config, sizeof config, "%s", room_config_write(wire, &ENDLESS));
+    snprintf(ply, sizeof ply, "%s", wire_path(wire, "x.ply"));
+    interrupt_record(wire, (const char *const[]){"record", config, "-o", ply, "--duration", "1e6", "--stats",
+                                                 wire_path(wire, "stats.json"), NULL}, SIGINT);
+    assert_int_equal(ply_points(wire, "x.ply"), stats_uint(wire, "points"));
+    assert_true(stats_uint(wire, "points") > 1000);
+}
+
+static void test_record_from_a_head(void **state)
+{
+    struct wire *wire = *state;
+    char source[352], ply[352], stats[352];
+    room_write(wire);
+    struct head head = head_start(wire, room_config_write(wire, &ENDLESS), NULL);
+    snprintf(source, sizeof source, "%s", head_endpoint(&head, "pty"));
+    snprintf(ply, sizeof ply, "%s", wire_path(wire, "x.ply"));
+    snprintf(stats, sizeof stats, "%s", wire_path(wire, "record.json"));
+    interrupt_record(wire, (const char *const[]){"record", source, "-o", ply, "--stats", stats, NULL}, SIGTERM);
+    struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
+    client_wait_state(sh, "idle"); /* it has stopped the scan it began */
+    scanhead_close(sh);
+    head_end(&head, SIGTERM);
+    assert_true(ply_points(wire, "x.ply") > 1000);
+    assert_int_equal(ply_points(wire, "x.ply"), stats_uint(wire, "echoes")); /* to the last one */
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_at_once, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_in_mid_scan, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_with_a_reader_who_does_not_read, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_at_pace_step, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_record_off_line, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_record_from_a_head, wire_setup, wire_teardown),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
