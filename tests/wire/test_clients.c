@@ -1,11 +1,16 @@
-/* Clients that die, babble, crowd or go quiet: the head carries on, tells what happened, and serves the next one. */
+/* Clients that die, babble, crowd or go quiet: the head carries on, tells what happened, and serves the next
+ * one. */
 #include "tests/wire/room.h"
 
 #include <termios.h>
 
-static const struct room_config ENDLESS = {.prr_hz = 100000, .lines_hz = 50, .pan_deg_s = 20, .pan_stop_deg = 360,
-                                           .frames = 0, .links = "links: [{type: tcp, port: 0, max_sessions: 4}, "
-                                                                 "{type: pty, path: port}]\n",
+static const struct room_config ENDLESS = {.prr_hz = 100000,
+                                           .lines_hz = 50,
+                                           .pan_deg_s = 20,
+                                           .pan_stop_deg = 360,
+                                           .frames = 0,
+                                           .links = "links: [{type: tcp, port: 0, max_sessions: 4}, "
+                                                    "{type: pty, path: port}]\n",
                                            .more = "loop: {queue_ms: 3000, late_ms: 10000}\n"};
 
 static struct head start_endless(struct wire *wire)
@@ -42,15 +47,16 @@ static int is_among(int number, const int *list)
     return *list != 0;
 }
 
-/* Takes errors off the queue until one of this number comes; those before it must be among the allowed ones (0 ends the
- * list). */
+/* Takes errors off the queue until one of this number comes; those before it must be among the allowed ones
+ * (0 ends the list). */
 static void expect_error(struct scanhead *sh, int number, const int *allowed)
 {
     int64_t end_ms = wire_now_ms() + DEADLINE_MS;
     struct scanhead_frame frame;
     for (;;) {
         int got = atoi(client_ask(sh, "SYST:ERR?"));
-        if (got != 0 && got != number && !is_among(got, allowed)) fail_msg("error %d instead of %d", got, number);
+        if (got != 0 && got != number && !is_among(got, allowed))
+            fail_msg("error %d instead of %d", got, number);
         if (got == number) return;
         if (wire_now_ms() > end_ms) fail_msg("no error %d", number);
         if (got == 0) scanhead_next(sh, &frame, 10); /* not told yet: frames take the time */
@@ -161,7 +167,8 @@ static void babbling_client(struct wire *wire, const char *link)
     raw_expect(sh, "HEAD:PRR", "ERR -109");
     raw_expect(sh, "SCAN:STAR 1", "ERR -108");
     raw_expect(sh, "HEAD:PRR 100 MM", "ERR -131");
-    for (const char *const *code = (const char *const[]){"-113", "-113", "-104", "-102", "-109", "-108", "-131", "0", NULL};
+    for (const char *const *code =
+             (const char *const[]){"-113", "-113", "-104", "-102", "-109", "-108", "-131", "0", NULL};
          *code != NULL; code++)
         assert_int_equal(atoi(client_ask(watch, "SYST:ERR?")), atoi(*code));
 
@@ -175,7 +182,8 @@ static void babbling_client(struct wire *wire, const char *link)
     scanhead_close(sh);
     expect_error(watch, 101, NONE);
 
-    /* Bytes of all values and away without a line's end. As many as give fewer errors than the queue holds. */
+    /* Bytes of all values and away without a line's end. As many as give fewer errors than the queue holds.
+     */
     int fd = raw_open(&head, link);
     unsigned char garbage[2500];
     uint32_t x = 12345;
@@ -232,9 +240,9 @@ static void test_two_clients(void **state)
     struct scanhead *first = client_open(head_endpoint(&head, "tcp"));
     struct scanhead *second = client_open(head_endpoint(&head, "tcp"));
     start_scan(first); /* that takes control */
-    static const char *const changing[] = {"HEAD:PRR 200000", "HEAD:LIN 10",  "HEAD:PAN 5",       "SCAN:STOP",
-                                           "*RST",            "SCAN:FRAM 3",  "SCAN:LINE:STOP 9", "SCAN:PAN:STAR 3",
-                                           "HEAD:STATION 1",  "SYST:CONT:REL"};
+    static const char *const changing[] = {
+        "HEAD:PRR 200000", "HEAD:LIN 10",      "HEAD:PAN 5",      "SCAN:STOP",      "*RST",
+        "SCAN:FRAM 3",     "SCAN:LINE:STOP 9", "SCAN:PAN:STAR 3", "HEAD:STATION 1", "SYST:CONT:REL"};
     for (size_t i = 0; i < sizeof changing / sizeof changing[0]; i++) {
         raw_expect(second, changing[i], "ERR -203,\"Command protected");
         expect_error(second, -203, NONE);
@@ -291,7 +299,8 @@ static void test_fifth_client_is_refused(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* 200 clients come and go while one watches; every fourth asks something, every eighth leaves with a reset. */
+/* 200 clients come and go while one watches; every fourth asks something, every eighth leaves with a reset.
+ */
 static void test_many_short_clients(void **state)
 {
     struct wire *wire = *state;
@@ -310,7 +319,8 @@ static void test_many_short_clients(void **state)
     expect_points(watch, 50);
     struct scanhead *last = client_open(endpoint);
     struct scanhead_frame frame;
-    while (scanhead_next(last, &frame, DEADLINE_MS) == SCANHEAD_ECLOSED) { /* those before are still being seen off */
+    while (scanhead_next(last, &frame, DEADLINE_MS) ==
+           SCANHEAD_ECLOSED) { /* those before are still being seen off */
         scanhead_close(last);
         last = client_open(endpoint);
     }
@@ -339,7 +349,8 @@ static void test_dead_weight_at_pace_fast(void **state)
     int idle = raw_connect(head_endpoint(&head, "tcp")); /* never reads, never writes */
     start_scan(sh);
     uint64_t got = 0;
-    /* 1.5 s without a frame can be nothing but the run held back, since the next one would take milliseconds. */
+    /* 1.5 s without a frame can be nothing but the run held back, since the next one would take milliseconds.
+     */
     while (scanhead_next(sh, &frame, 1500) == SCANHEAD_OK) {
         got += frame.type == SCANHEAD_POINTS ? frame.n_pulses : 0;
         assert_false(is_event(&frame, SCANHEAD_EV_SCAN_END));

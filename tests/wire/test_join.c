@@ -1,14 +1,19 @@
-/* Readers that come late and streams that lost bytes: what is needed comes again, and only what was hit is missing. */
+/* Readers that come late and streams that lost bytes: what is needed comes again, and only what was hit is
+ * missing. */
 #include "tests/wire/room.h"
 
 #include "drivers/protocol/native.h"
 
-static const struct room_config ENDLESS = {.prr_hz = 200000, .lines_hz = 100, .pan_deg_s = 20, .pan_stop_deg = 360,
-                                           .frames = 0, .links = LINK_YAML_BOTH,
+static const struct room_config ENDLESS = {.prr_hz = 200000,
+                                           .lines_hz = 100,
+                                           .pan_deg_s = 20,
+                                           .pan_stop_deg = 360,
+                                           .frames = 0,
+                                           .links = LINK_YAML_BOTH,
                                            .more = "loop: {queue_ms: 3000, late_ms: 10000}\n"};
 
-/* From the first frame on: nothing missing, and descriptor, anchor and names within a second of device time (and the
- * tick that the repetition falls in); points can be had from then on. */
+/* From the first frame on: nothing missing, and descriptor, anchor and names within a second of device time
+ * (and the tick that the repetition falls in); points can be had from then on. */
 static void follow(struct scanhead *sh)
 {
     struct scanhead_frame frame;
@@ -47,7 +52,8 @@ static void test_late_reader(void **state)
     client_wait_state(tcp, "scanning");
     for (int n = 0; n < 200; n += frame.type == SCANHEAD_POINTS)
         client_next(tcp, &frame);
-    struct scanhead *late = client_open(head_endpoint(&head, "tcp")), *pty = client_open(head_endpoint(&head, "pty"));
+    struct scanhead *late = client_open(head_endpoint(&head, "tcp")),
+                    *pty = client_open(head_endpoint(&head, "pty"));
     follow(late);
     follow(pty);
     scanhead_close(late);
@@ -69,8 +75,13 @@ struct recording {
 
 static void record(struct wire *wire, struct recording *r)
 {
-    struct room_config config = {.profile = "riegl-vz400i", .prr_hz = 100000, .lines_hz = 200, .pan_deg_s = 150,
-                                 .pan_stop_deg = 60, .frames = 1, .links = "links: [{type: file, path: stream.shs}]\n"};
+    struct room_config config = {.profile = "riegl-vz400i",
+                                 .prr_hz = 100000,
+                                 .lines_hz = 200,
+                                 .pan_deg_s = 150,
+                                 .pan_stop_deg = 60,
+                                 .frames = 1,
+                                 .links = "links: [{type: file, path: stream.shs}]\n"};
     room_write(wire);
     const char *const more[] = {"--start", "--frames", "1", "--pace", "fast", NULL};
     struct head head = head_start(wire, room_config_write(wire, &config), more);
@@ -80,14 +91,15 @@ static void record(struct wire *wire, struct recording *r)
         assert_true(r->n_frames < MAX_FRAMES);
         assert_int_equal(r->bytes[at], NATIVE_SYNC);
         r->at[r->n_frames] = at;
-        at += NATIVE_HEADER_LEN + (r->bytes[at + 4] | (size_t)r->bytes[at + 5] << 8 | (size_t)r->bytes[at + 6] << 16);
+        at += NATIVE_HEADER_LEN +
+              (r->bytes[at + 4] | (size_t)r->bytes[at + 5] << 8 | (size_t)r->bytes[at + 6] << 16);
     }
     r->at[r->n_frames] = r->len;
 }
 
-/* Parses the frames first .. last - 1 without the byte at `lost`; every frame but the one it was in must come, as it was.
- * The one exception: a frame whose last byte looks like a sync byte is whole again with the next one's, which then is
- * what is missing. */
+/* Parses the frames first .. last - 1 without the byte at `lost`; every frame but the one it was in must
+ * come, as it was. The one exception: a frame whose last byte looks like a sync byte is whole again with the
+ * next one's, which then is what is missing. */
 static void check_without(const struct recording *r, int first, int last, size_t lost)
 {
     static struct native_parser parser;
@@ -106,7 +118,8 @@ static void check_without(const struct recording *r, int first, int last, size_t
         for (enum native_item item; (item = native_parser_next(&parser)) != NATIVE_MORE; next++) {
             assert_int_equal(item, NATIVE_FRAME);
             size_t len = NATIVE_HEADER_LEN + parser.header.length;
-            if (len != r->at[next + 1] - r->at[next] || memcmp(parser.frame, r->bytes + r->at[next], len) != 0) {
+            if (len != r->at[next + 1] - r->at[next] ||
+                memcmp(parser.frame, r->bytes + r->at[next], len) != 0) {
                 assert_int_equal(missing, -1);
                 missing = next++;
                 assert_int_equal(len, r->at[next + 1] - r->at[next]);
@@ -137,7 +150,8 @@ static void test_lost_byte(void **state)
     free(r.bytes);
 }
 
-/* The same file through the library, whole: the recording of the file link is what was sent, and hashes to it. */
+/* The same file through the library, whole: the recording of the file link is what was sent, and hashes to
+ * it. */
 static void test_recording_is_whole(void **state)
 {
     struct wire *wire = *state;

@@ -1,11 +1,17 @@
-/* From command to beam: a start, a change and a stop take effect within 100 ms of device time, with the settings a head
- * has by default. Device time is a property of the program; wall time would be one of the machine. */
+/* From command to beam: a start, a change and a stop take effect within 100 ms of device time, with the
+ * settings a head has by default. Device time is a property of the program; wall time would be one of the
+ * machine. */
 #include "tests/wire/room.h"
 
 enum { EFFECT_NS = 100000000 };
 
-static const struct room_config ENDLESS = {.profile = "riegl-vz400i", .prr_hz = 300000, .lines_hz = 100, .pan_deg_s = 50,
-                                           .pan_stop_deg = 360, .frames = 0, .links = LINK_YAML_TCP};
+static const struct room_config ENDLESS = {.profile = "riegl-vz400i",
+                                           .prr_hz = 300000,
+                                           .lines_hz = 100,
+                                           .pan_deg_s = 50,
+                                           .pan_stop_deg = 360,
+                                           .frames = 0,
+                                           .links = LINK_YAML_TCP};
 
 struct session {
     struct wire *wire;
@@ -33,8 +39,8 @@ static void close_session(struct session *s)
     head_end(&s->head, SIGTERM);
 }
 
-/* Sends a command that has an effect and returns the device time of its arrival as the journal has it, which must lie
- * between what the head said before and what it says after. */
+/* Sends a command that has an effect and returns the device time of its arrival as the journal has it, which
+ * must lie between what the head said before and what it says after. */
 static int64_t command(struct session *s, const char *line)
 {
     int64_t before_ns = atoll(client_ask(s->sh, "TIME?"));
@@ -97,8 +103,10 @@ static void test_start_and_stop(void **state)
     close_session(&s);
 }
 
-/* The oracle counts pulses from the change before, so each change starts from the time that the first new pulse had. */
-static void change(struct session *s, const char *line, double *prr_hz, double new_prr_hz, uint64_t *pulse0, int64_t *t0_ns)
+/* The oracle counts pulses from the change before, so each change starts from the time that the first new
+ * pulse had. */
+static void change(struct session *s, const char *line, double *prr_hz, double new_prr_hz, uint64_t *pulse0,
+                   int64_t *t0_ns)
 {
     struct scanhead_frame frame;
     struct scanhead_point point[64];

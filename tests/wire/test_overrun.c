@@ -1,10 +1,11 @@
-/* A head that cannot keep up, and one that stood still: what is lost is announced, and the accounts balance to the pulse.
- * Cast pulses by exact arithmetic = pulses received + pulses lost, whatever happened. */
+/* A head that cannot keep up, and one that stood still: what is lost is announced, and the accounts balance
+ * to the pulse. Cast pulses by exact arithmetic = pulses received + pulses lost, whatever happened. */
 #include "tests/wire/room.h"
 
 #include "drivers/protocol/native.h"
 
-/* Thin triangles across a room of 40 m: their boxes all overlap, which no bounding volume hierarchy can sort. */
+/* Thin triangles across a room of 40 m: their boxes all overlap, which no bounding volume hierarchy can sort.
+ */
 enum { NEEDLES = 5000 };
 
 static double between(uint64_t *x, double lo, double hi)
@@ -22,8 +23,8 @@ static void needles_write(const struct wire *wire)
         double p[6];
         for (int k = 0; k < 6; k++)
             p[k] = between(&x, -20, 20);
-        fprintf(f, "v %.4f %.4f %.4f\nv %.4f %.4f %.4f\nv %.4f %.4f %.4f\nf -3 -2 -1\n", p[0], p[1], p[2], p[3], p[4], p[5],
-                p[3] + 0.01, p[4], p[5]);
+        fprintf(f, "v %.4f %.4f %.4f\nv %.4f %.4f %.4f\nv %.4f %.4f %.4f\nf -3 -2 -1\n", p[0], p[1], p[2],
+                p[3], p[4], p[5], p[3] + 0.01, p[4], p[5]);
     }
     assert_int_equal(fclose(f), 0);
 }
@@ -31,7 +32,7 @@ static void needles_write(const struct wire *wire)
 /* What a client can know of a scan. */
 struct account {
     struct oracle oracle;
-    uint64_t received, next, gaps, missing; /* pulses; the last two from jumps of the pulse number */
+    uint64_t received, next, gaps, missing;   /* pulses; the last two from jumps of the pulse number */
     uint64_t first_missing, told, told_first; /* by overrun events */
     int events, scan_over;
     int64_t t_ns, line;
@@ -69,14 +70,15 @@ static void take_points(struct account *a, struct scanhead *sh, const struct sca
         a->echoes += point[i].echo_count != 0;
 }
 
-/* A line that came whole says how many echoes it has; else, it says 0 rather than something wrong. (So may the first
- * line, when a tick before the scan was lost.) */
+/* A line that came whole says how many echoes it has; else, it says 0 rather than something wrong. (So may
+ * the first line, when a tick before the scan was lost.) */
 static void take_line_end(struct account *a, const struct scanhead_frame *frame)
 {
     struct native_line_end end;
     assert_int_equal(native_decode_line_end(frame->payload, frame->payload_len, &end), 0);
     note_gap(a, end.pulse0 + end.n_fired);
-    int skipped = a->line != end.line || oracle_count_cast(&a->oracle, end.pulse0, end.pulse0 + end.n_fired) != end.n_cast;
+    int skipped = a->line != end.line ||
+                  oracle_count_cast(&a->oracle, end.pulse0, end.pulse0 + end.n_fired) != end.n_cast;
     if (!a->line_broken && !skipped) {
         if (end.line != 0 || end.n_echoes != 0) assert_int_equal(end.n_echoes, a->echoes);
         a->whole_lines++;
@@ -104,8 +106,12 @@ static void take(struct account *a, struct scanhead *sh, const struct scanhead_f
     }
 }
 
-static const struct room_config CONFIG = {.prr_hz = 1999999.9, .lines_hz = 333.3, .pan_deg_s = 360, .pan_stop_deg = 180,
-                                          .frames = 1, .links = LINK_YAML_TCP,
+static const struct room_config CONFIG = {.prr_hz = 1999999.9,
+                                          .lines_hz = 333.3,
+                                          .pan_deg_s = 360,
+                                          .pan_stop_deg = 90,
+                                          .frames = 1,
+                                          .links = LINK_YAML_TCP,
                                           .more = "loop: {ahead_ms: 60, late_ms: 60, queue_ms: 10000}\n"};
 
 /* Follows one scan to its end and on until the head is idle and has told of all it lost. */
@@ -119,11 +125,13 @@ static void follow(struct account *a, struct scanhead *sh)
     }
     note_gap(a, oracle_end(&a->oracle));
     for (int64_t end_ms = wire_now_ms() + DEADLINE_MS; a->told < a->missing;) {
-        if (wire_now_ms() > end_ms) fail_msg("%" PRIu64 " of %" PRIu64 " lost pulses told", a->told, a->missing);
+        if (wire_now_ms() > end_ms)
+            fail_msg("%" PRIu64 " of %" PRIu64 " lost pulses told", a->told, a->missing);
         if (scanhead_next(sh, &frame, 100) == SCANHEAD_OK) take(a, sh, &frame);
     }
     scanhead_get_stats(sh, &stats);
-    assert_int_equal(stats.bad_payload + stats.bad_bytes + stats.seq_lost + stats.dropped + stats.reader_lost, 0);
+    assert_int_equal(stats.bad_payload + stats.bad_bytes + stats.seq_lost + stats.dropped + stats.reader_lost,
+                     0);
     assert_int_equal(stats.pulses_lost, a->told);
 }
 
@@ -188,7 +196,8 @@ static void test_stall(void **state)
             take(&a, sh, &frame);
         }
         assert_int_equal(kill(head.pid, SIGSTOP), 0);
-        clock_nanosleep(CLOCK_MONOTONIC, 0, &(struct timespec){.tv_nsec = 400000000}, NULL); /* the stall itself */
+        clock_nanosleep(CLOCK_MONOTONIC, 0, &(struct timespec){.tv_nsec = 400000000},
+                        NULL); /* the stall itself */
         assert_int_equal(kill(head.pid, SIGCONT), 0);
     }
     follow(&a, sh);
@@ -198,7 +207,8 @@ static void test_stall(void **state)
     check_balance(&a, wire);
 }
 
-/* A stall alone costs nothing with the lateness that a head has by default: what was due is sent when it goes on. */
+/* A stall alone costs nothing with the lateness that a head has by default: what was due is sent when it goes
+ * on. */
 static void test_stall_with_patience(void **state)
 {
     struct wire *wire = *state;
@@ -217,7 +227,8 @@ static void test_stall_with_patience(void **state)
         take(&a, sh, &frame);
     }
     assert_int_equal(kill(head.pid, SIGSTOP), 0);
-    clock_nanosleep(CLOCK_MONOTONIC, 0, &(struct timespec){.tv_nsec = 400000000}, NULL); /* the stall itself */
+    clock_nanosleep(CLOCK_MONOTONIC, 0, &(struct timespec){.tv_nsec = 400000000},
+                    NULL); /* the stall itself */
     assert_int_equal(kill(head.pid, SIGCONT), 0);
     follow(&a, sh);
     assert_int_equal(a.missing, 0);
@@ -236,7 +247,8 @@ static void test_end_of_an_overloaded_run(void **state)
     struct scanhead_frame frame;
     needles_write(wire);
     config.pan_stop_deg = 36;
-    config.more = "loop: {ahead_ms: 2, late_ms: 1, queue_ms: 10000}\n"; /* nearly every block comes too late */
+    config.more =
+        "loop: {ahead_ms: 2, late_ms: 1, queue_ms: 10000}\n"; /* nearly every block comes too late */
     const char *const more[] = {"--start", "--frames", "1", "--threads", "2", NULL};
     struct head head = head_start(wire, room_config_write(wire, &config), more);
     struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));

@@ -1,18 +1,20 @@
-/* A whole scan through the real program, over a pty and over TCP, against what geometry and exact arithmetic say. */
+/* A whole scan through the real program, over a pty and over TCP, against what geometry and exact arithmetic
+ * say. */
 #include "tests/wire/room.h"
 
 #include "drivers/protocol/native.h"
 
 enum { MAX_POINTS = 4096 };
 
-/* The encoders tell the angles to half a count, so the range of a point is only known within what half a count either
- * way makes of it. Where one wall is met the range is monotonic over that square of 6e-6 rad (its curvature, R * 1e-11,
- * is below SLACK_M), so the corners bound it; where walls meet, the nearest wall is the least of several such ranges.
- * To that come half a range count and the roundings of the doubles, SLACK_M. */
+/* The encoders tell the angles to half a count, so the range of a point is only known within what half a
+ * count either way makes of it. Where one wall is met the range is monotonic over that square of 6e-6 rad
+ * (its curvature, R * 1e-11, is below SLACK_M), so the corners bound it; where walls meet, the nearest wall
+ * is the least of several such ranges. To that come half a range count and the roundings of the doubles,
+ * SLACK_M. */
 static const double SLACK_M = 1e-9;
 
-static void bounds(const struct scanhead_point *p, double half_mirror_rad, double half_pan_rad, double *lo, double *hi,
-                   int possible[6])
+static void bounds(const struct scanhead_point *p, double half_mirror_rad, double half_pan_rad, double *lo,
+                   double *hi, int possible[6])
 {
     double most[6] = {0};
     *lo = INFINITY;
@@ -33,9 +35,9 @@ static void bounds(const struct scanhead_point *p, double half_mirror_rad, doubl
 
 struct check {
     struct oracle oracle;
-    int ground;           /* open ground instead of the room */
+    int ground; /* open ground instead of the room */
     double half_mirror_rad, half_pan_rad, scale_m;
-    uint64_t next;        /* pulse expected next */
+    uint64_t next; /* pulse expected next */
     uint64_t line, line_echoes, echoes, empty, lines;
     int64_t scan_t0_ns;
     int wall_of_label[8];
@@ -56,8 +58,8 @@ static void check_room_point(struct check *c, const struct scanhead_point *p, ui
         fail_msg("pulse %" PRIu64 ": label %u is %s", k, p->label, WALLS[c->wall_of_label[p->label]]);
 }
 
-/* The ground has an echo where the ray goes down and its range is below 800 m. Within half a mirror count of that angle
- * both are right; the range there is as steep as 800 m / tan, so it is not compared. */
+/* The ground has an echo where the ray goes down and its range is below 800 m. Within half a mirror count of
+ * that angle both are right; the range there is as steep as 800 m / tan, so it is not compared. */
 static void check_ground_point(struct check *c, const struct scanhead_point *p, uint64_t k)
 {
     double below = STATION[2] + 1.7;
@@ -68,15 +70,18 @@ static void check_ground_point(struct check *c, const struct scanhead_point *p, 
         assert_true(isnan(p->range_m) && isnan(p->x) && p->label == SCANHEAD_NO_LABEL);
         return;
     }
-    double near = below / sin(down + 2.0 * c->half_mirror_rad), far = below / sin(down - 2.0 * c->half_mirror_rad);
+    double near = below / sin(down + 2.0 * c->half_mirror_rad),
+           far = below / sin(down - 2.0 * c->half_mirror_rad);
     assert_true(p->range_m >= near - c->scale_m && p->range_m <= far + c->scale_m);
     assert_int_equal(p->label, 0);
 }
 
-/* An angle on the wire is the exact one to half a count; 1e-9 rad are the roundings of doubles on both sides. */
+/* An angle on the wire is the exact one to half a count; 1e-9 rad are the roundings of doubles on both sides.
+ */
 static void check_angles(const struct check *c, const struct scanhead_point *p, uint64_t k)
 {
-    double mirror = oracle_mirror_deg(&c->oracle, k) * M_PI / 180.0, pan = oracle_pan_deg(&c->oracle, k) * M_PI / 180.0;
+    double mirror = oracle_mirror_deg(&c->oracle, k) * M_PI / 180.0,
+           pan = oracle_pan_deg(&c->oracle, k) * M_PI / 180.0;
     assert_true(fabs(p->mirror_rad - mirror) <= c->half_mirror_rad + 1e-9);
     assert_true(fabs(remainder(p->pan_rad - pan, 2.0 * M_PI)) <= c->half_pan_rad + 1e-9);
 }
@@ -186,9 +191,11 @@ static void take(struct check *c, struct scanhead *sh, struct scanhead_frame *fr
 }
 
 /* One scan by command, every frame of it checked; then the statistics of both sides. */
-static void scan(struct wire *wire, const struct room_config *config, struct check *c, const char *link, const char *pace)
+static void scan(struct wire *wire, const struct room_config *config, struct check *c, const char *link,
+                 const char *pace)
 {
-    const char *const more[] = {"--pace", pace, "--set", "loop.queue_ms=5000", "--set", "loop.late_ms=10000", NULL};
+    const char *const more[] = {"--pace", pace, "--set", "loop.queue_ms=5000", "--set", "loop.late_ms=10000",
+                                NULL};
     struct head head = head_start(wire, room_config_write(wire, config), more);
     struct scanhead *sh = client_open(head_endpoint(&head, link));
     struct scanhead_frame frame;
@@ -216,11 +223,16 @@ static void scan(struct wire *wire, const struct room_config *config, struct che
     assert_int_equal(stats_uint(wire, "lost_pulses"), 0);
 }
 
-/* Rates that divide nothing: pulse period and pulses per line are fractions, lines begin at any phase. The window cuts
- * the line within the profile's 100 of 240 deg. */
-static const struct room_config ODD = {.profile = "riegl-vz400i", .prr_hz = 299999.7, .lines_hz = 101.3,
-                                       .pan_deg_s = 149.9, .pan_stop_deg = 40.1, .line_start_deg = -35.5,
-                                       .line_stop_deg = 58.25, .frames = 2};
+/* Rates that divide nothing: pulse period and pulses per line are fractions, lines begin at any phase. The
+ * window cuts the line within the profile's 100 of 240 deg. */
+static const struct room_config ODD = {.profile = "riegl-vz400i",
+                                       .prr_hz = 299999.7,
+                                       .lines_hz = 101.3,
+                                       .pan_deg_s = 149.9,
+                                       .pan_stop_deg = 40.1,
+                                       .line_start_deg = -35.5,
+                                       .line_stop_deg = 58.25,
+                                       .frames = 2};
 
 static void test_room_over_pty(void **state)
 {
@@ -234,7 +246,11 @@ static void test_room_over_pty(void **state)
 
 static void test_room_over_tcp(void **state)
 {
-    struct room_config config = {.prr_hz = 1200000, .lines_hz = 240, .pan_deg_s = 360, .pan_stop_deg = 360, .frames = 1,
+    struct room_config config = {.prr_hz = 1200000,
+                                 .lines_hz = 240,
+                                 .pan_deg_s = 360,
+                                 .pan_stop_deg = 360,
+                                 .frames = 1,
                                  .links = LINK_YAML_TCP};
     struct check check = {.oracle = oracle_of(&config, -40, 60, 100)};
     room_write(*state);

@@ -1,9 +1,14 @@
-/* stream_sha256 is the same for every pace, number of threads and link, as the head computes it, as a client hears it and
- * as `record` makes it off line; and a journal brings back a whole session. */
+/* stream_sha256 is the same for every pace, number of threads and link, as the head computes it, as a client
+ * hears it and as `record` makes it off line; and a journal brings back a whole session. */
 #include "tests/wire/room.h"
 
-static const struct room_config SHORT = {.profile = "riegl-vz400i", .prr_hz = 399999.9, .lines_hz = 97.7, .pan_deg_s = 150,
-                                         .pan_stop_deg = 60, .frames = 1, .links = LINK_YAML_BOTH,
+static const struct room_config SHORT = {.profile = "riegl-vz400i",
+                                         .prr_hz = 399999.9,
+                                         .lines_hz = 97.7,
+                                         .pan_deg_s = 150,
+                                         .pan_stop_deg = 60,
+                                         .frames = 1,
+                                         .links = LINK_YAML_BOTH,
                                          .more = "loop: {queue_ms: 5000, late_ms: 10000}\n"};
 
 /* What a session leaves: the hash of the head, of the client, and what was scanned. */
@@ -35,8 +40,8 @@ static void finish(struct head *head, struct scanhead *sh, struct result *result
     result->echoes = stats_uint(head->wire, "echoes");
 }
 
-static void scan(struct wire *wire, const char *config, const char *pace, const char *threads, const char *link,
-                 struct result *result)
+static void scan(struct wire *wire, const char *config, const char *pace, const char *threads,
+                 const char *link, struct result *result)
 {
     const char *const more[] = {"--pace", pace, "--threads", threads, NULL};
     struct head head = head_start(wire, config, more);
@@ -86,8 +91,9 @@ static void test_pace_threads_link(void **state)
 /* The hash is no constant: noise and its seed, layout and rate all change it. */
 static void test_hash_tells_streams_apart(void **state)
 {
-    static const char *const sets[] = {"noise.seed=1",        "noise.range=on",          "output.layout=geo",
-                                       "head.prr_hz=399999.8", "stations[0].position_m=[0.310001, -0.42, 0.17]"};
+    static const char *const sets[] = {"noise.seed=1", "noise.range=on", "output.layout=geo",
+                                       "head.prr_hz=399999.8",
+                                       "stations[0].position_m=[0.310001, -0.42, 0.17]"};
     struct wire *wire = *state;
     struct result result;
     char stats[352], config[352], seen[6][65];
@@ -96,13 +102,28 @@ static void test_hash_tells_streams_apart(void **state)
     snprintf(stats, sizeof stats, "%s", wire_path(wire, "stats.json"));
     for (int i = 0; i < 6; i++) {
         const char *set = i < 5 ? sets[i] : "noise.range=on", *seed = i < 5 ? "noise.seed=1" : "noise.seed=2";
-        const char *const args[] = {"record", config, "--stats", stats, "--quiet", "--set", set, "--set", seed, NULL};
+        const char *const args[] = {"record", config, "--stats", stats, "--quiet",
+                                    "--set",  set,    "--set",   seed,  NULL};
         assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "head.out", "head.err", -1)), 0);
         stats_hash(wire, result.head);
         strcpy(seen[i], result.head);
         for (int k = 0; k < i; k++)
             assert_string_not_equal(seen[i], seen[k]);
     }
+}
+
+/* A head that idles for longer than its queue still has a hash: that of no bytes (FIPS 180-4's example
+ * values). */
+static void test_hash_of_an_idle_head(void **state)
+{
+    struct wire *wire = *state;
+    char hash[65];
+    room_write(wire);
+    const char *const more[] = {"--duration", "1.1", "--set", "loop.queue_ms=50", NULL};
+    struct head head = head_start(wire, room_config_write(wire, &SHORT), more);
+    head_end(&head, 0);
+    stats_hash(wire, hash);
+    assert_string_equal(hash, "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
 }
 
 static void take_points(struct scanhead *sh, int frames)
@@ -114,12 +135,13 @@ static void take_points(struct scanhead *sh, int frames)
     }
 }
 
-/* A session in real time: settings change in mid-scan, each at a moment that the clock chose; the first scan is stopped,
- * a second one runs to its end; one command is refused. */
+/* A session in real time: settings change in mid-scan, each at a moment that the clock chose; the first scan
+ * is stopped, a second one runs to its end; one command is refused. */
 static void live_session(struct wire *wire, const char *config, const char *journal, struct result *result)
 {
-    static const char *const changes[] = {"HEAD:PRR 250000.5", "HEAD:LIN 33.3",     "HEAD:PAN 77.7", "HEAD:PRR 812345.678901",
-                                          "SCAN:LINE:STOP 41", "SCAN:LINE:STAR -9", "HEAD:LIN 120",  "SCAN:PAN:STOP 300"};
+    static const char *const changes[] = {"HEAD:PRR 250000.5",      "HEAD:LIN 33.3",     "HEAD:PAN 77.7",
+                                          "HEAD:PRR 812345.678901", "SCAN:LINE:STOP 41", "SCAN:LINE:STAR -9",
+                                          "HEAD:LIN 120",           "SCAN:PAN:STOP 300"};
     const char *const more[] = {"--pace", "realtime", "--threads", "2", "--journal", journal, NULL};
     struct head head = head_start(wire, config, more);
     struct scanhead *sh = listen_to(&head, "tcp");
@@ -146,11 +168,11 @@ static void live_session(struct wire *wire, const char *config, const char *jour
 }
 
 /* duration: device time by which the session was over, with room. */
-static void replay(struct wire *wire, const char *config, const char *journal, const char *pace, const char *threads,
-                   const char *duration, struct result *result)
+static void replay(struct wire *wire, const char *config, const char *journal, const char *pace,
+                   const char *threads, const char *duration, struct result *result)
 {
-    const char *const more[] = {"--pace", pace,       "--threads", threads, "--replay-journal", journal, "--duration",
-                                duration, NULL};
+    const char *const more[] = {"--pace", pace,         "--threads", threads, "--replay-journal",
+                                journal,  "--duration", duration,    NULL};
     struct head head = head_start(wire, config, more);
     head_end(&head, 0);
     stats_hash(wire, result->head);
@@ -179,7 +201,8 @@ static void test_journal_brings_back_a_session(void **state)
     snprintf(config, sizeof config, "%s", room_config_write(wire, &SHORT));
     snprintf(journal, sizeof journal, "%s", wire_path(wire, "session.journal"));
     live_session(wire, config, journal, &live);
-    /* after the last command, a start: 0.1 s of scanning, spin-up and spin-down of 0.23 s; so 1 s is room enough */
+    /* after the last command, a start: 0.1 s of scanning, spin-up and spin-down of 0.23 s; so 1 s is room
+     * enough */
     snprintf(duration, sizeof duration, "%.3f", journal_end_s(journal) + 1.0);
     replay(wire, config, journal, "fast", "1", duration, &again);
     assert_string_equal(again.head, live.head);
@@ -196,6 +219,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_pace_threads_link, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_hash_tells_streams_apart, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_hash_of_an_idle_head, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_journal_brings_back_a_session, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

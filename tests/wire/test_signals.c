@@ -1,8 +1,14 @@
-/* SIGTERM and SIGINT end the program in good order wherever it is: status 0, statistics written, symlink gone, files whole. */
+/* SIGTERM and SIGINT end the program in good order wherever it is: status 0, statistics written, symlink
+ * gone, files whole. */
 #include "tests/wire/room.h"
 
-static const struct room_config ENDLESS = {.profile = "riegl-vz400i", .prr_hz = 200000, .lines_hz = 100, .pan_deg_s = 20,
-                                           .pan_stop_deg = 360, .frames = 0, .links = LINK_YAML_BOTH,
+static const struct room_config ENDLESS = {.profile = "riegl-vz400i",
+                                           .prr_hz = 200000,
+                                           .lines_hz = 100,
+                                           .pan_deg_s = 20,
+                                           .pan_stop_deg = 360,
+                                           .frames = 0,
+                                           .links = LINK_YAML_BOTH,
                                            .more = "loop: {queue_ms: 3000, late_ms: 10000}\n"};
 
 static void expect_symlink(const struct wire *wire, int there)
@@ -27,7 +33,8 @@ static void test_at_once(void **state)
     }
 }
 
-/* In mid-scan, at each pace, with a reader, who gets everything up to the end of the scan; and with one who does not read. */
+/* In mid-scan, at each pace, with a reader, who gets everything up to the end of the scan; and with one who
+ * does not read. */
 static void in_mid_scan(struct wire *wire, const char *pace, int signal_number)
 {
     struct scanhead_frame frame;
@@ -66,7 +73,8 @@ static void test_with_a_reader_who_does_not_read(void **state)
     config.prr_hz = 1200000;
     config.more = "loop: {pace: fast, queue_ms: 50}\n";
     room_write(wire);
-    struct head head = head_start(wire, room_config_write(wire, &config), (const char *const[]){"--start", NULL});
+    struct head head =
+        head_start(wire, room_config_write(wire, &config), (const char *const[]){"--start", NULL});
     int idle = raw_connect(head_endpoint(&head, "tcp"));
     struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
     while (scanhead_next(sh, &frame, 1000) == SCANHEAD_OK) { /* until the run is held back */
@@ -83,7 +91,8 @@ static void test_at_pace_step(void **state)
 {
     struct wire *wire = *state;
     room_write(wire);
-    struct head head = head_start(wire, room_config_write(wire, &ENDLESS), (const char *const[]){"--pace", "step", NULL});
+    struct head head =
+        head_start(wire, room_config_write(wire, &ENDLESS), (const char *const[]){"--pace", "step", NULL});
     struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
     client_tell(sh, "TIME:STEP 300 MS");
     client_tell(sh, "SCAN:STAR");
@@ -102,8 +111,9 @@ static uint64_t ply_points(const struct wire *wire, const char *name)
     static const struct {
         const char *type;
         size_t size;
-    } types[] = {{"double", 8}, {"float64", 8}, {"float", 4}, {"float32", 4}, {"uint", 4}, {"uint32", 4}, {"int", 4},
-                 {"int32", 4}, {"ushort", 2}, {"uint16", 2}, {"short", 2}, {"int16", 2}, {"uchar", 1}, {"uint8", 1}};
+    } types[] = {{"double", 8}, {"float64", 8}, {"float", 4}, {"float32", 4}, {"uint", 4},
+                 {"uint32", 4}, {"int", 4},     {"int32", 4}, {"ushort", 2},  {"uint16", 2},
+                 {"short", 2},  {"int16", 2},   {"uchar", 1}, {"uint8", 1}};
     size_t len, record = 0;
     char *text = wire_read(wire_path(wire, name), &len), *end = strstr(text, "\nend_header\n"), type[32];
     unsigned long long n = 0;
@@ -121,7 +131,8 @@ static uint64_t ply_points(const struct wire *wire, const char *name)
     return n;
 }
 
-/* Starts `record SOURCE -o FILE` and interrupts it once the file grows: waits by watching what is being written. */
+/* Starts `record SOURCE -o FILE` and interrupts it once the file grows: waits by watching what is being
+ * written. */
 static void interrupt_record(struct wire *wire, const char *const *args, int signal_number)
 {
     pid_t pid = wire_spawn(wire, args, "out", "err", -1);
@@ -150,8 +161,10 @@ static void test_record_off_line(void **state)
     room_write(wire);
     snprintf(config, sizeof config, "%s", room_config_write(wire, &ENDLESS));
     snprintf(ply, sizeof ply, "%s", wire_path(wire, "x.ply"));
-    interrupt_record(wire, (const char *const[]){"record", config, "-o", ply, "--duration", "1e6", "--stats",
-                                                 wire_path(wire, "stats.json"), NULL}, SIGINT);
+    interrupt_record(wire,
+                     (const char *const[]){"record", config, "-o", ply, "--duration", "1e6", "--stats",
+                                           wire_path(wire, "stats.json"), NULL},
+                     SIGINT);
     assert_int_equal(ply_points(wire, "x.ply"), stats_uint(wire, "points"));
     assert_true(stats_uint(wire, "points") > 1000);
 }
@@ -165,7 +178,8 @@ static void test_record_from_a_head(void **state)
     snprintf(source, sizeof source, "%s", head_endpoint(&head, "pty"));
     snprintf(ply, sizeof ply, "%s", wire_path(wire, "x.ply"));
     snprintf(stats, sizeof stats, "%s", wire_path(wire, "record.json"));
-    interrupt_record(wire, (const char *const[]){"record", source, "-o", ply, "--stats", stats, NULL}, SIGTERM);
+    interrupt_record(wire, (const char *const[]){"record", source, "-o", ply, "--stats", stats, NULL},
+                     SIGTERM);
     struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
     client_wait_state(sh, "idle"); /* it has stopped the scan it began */
     scanhead_close(sh);

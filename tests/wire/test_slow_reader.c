@@ -1,14 +1,18 @@
-/* A reader that cannot follow: in real time it loses whole frames and is told exactly how many, and nobody else loses
- * any; at the pace `fast` the run waits for it and nothing is lost. */
+/* A reader that cannot follow: in real time it loses whole frames and is told exactly how many, and nobody
+ * else loses any; at the pace `fast` the run waits for it and nothing is lost. */
 #include "tests/wire/room.h"
 
 #include <pthread.h>
 #include <stdatomic.h>
 
-/* 20 MB/s: while the slow reader reads nothing, the buffers on its way (1 MiB of the head, at most 6 of the kernel's for
- * a receiver that asks for none) and the queue of 50 ms fill in less than half a second. */
-static const struct room_config RATE = {.prr_hz = 1000000, .lines_hz = 200, .pan_deg_s = 90, .pan_stop_deg = 360,
-                                        .frames = 0, .links = LINK_YAML_TCP};
+/* 20 MB/s: while the slow reader reads nothing, the buffers on its way (1 MiB of the head, at most 6 of the
+ * kernel's for a receiver that asks for none) and the queue of 50 ms fill in less than half a second. */
+static const struct room_config RATE = {.prr_hz = 1000000,
+                                        .lines_hz = 200,
+                                        .pan_deg_s = 90,
+                                        .pan_stop_deg = 360,
+                                        .frames = 0,
+                                        .links = LINK_YAML_TCP};
 enum { HOLD_BYTES = 40 << 20 };
 
 /* What a reader has seen. */
@@ -84,7 +88,8 @@ static void test_realtime(void **state)
 {
     struct wire *wire = *state;
     struct room_config config = RATE;
-    /* The fast one has the same queue of 50 ms, but a receive buffer of megabytes and a thread that does nothing else. */
+    /* The fast one has the same queue of 50 ms, but a receive buffer of megabytes and a thread that does
+     * nothing else. */
     config.more = "loop: {queue_ms: 50, late_ms: 10000}\n";
     room_write(wire);
     struct head head = head_start(wire, room_config_write(wire, &config), NULL);
@@ -143,7 +148,8 @@ static void test_fast(void **state)
     config.more = "loop: {pace: fast, queue_ms: 50}\n";
     room_write(wire);
     struct head head = head_start(wire, room_config_write(wire, &config), NULL);
-    struct tally fast = {.sh = client_open(head_endpoint(&head, "tcp")), .hold_fd = -1}, slow = {.hold_fd = -1};
+    struct tally fast = {.sh = client_open(head_endpoint(&head, "tcp")), .hold_fd = -1},
+                 slow = {.hold_fd = -1};
     slow.sh = client_from_fd(raw_connect(head_endpoint(&head, "tcp")));
     client_ask(slow.sh, "*OPC?");
     client_wait_state(fast.sh, "idle");

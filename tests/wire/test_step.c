@@ -3,8 +3,13 @@
 
 #include "drivers/protocol/native.h"
 
-static const struct room_config SHORT = {.profile = "riegl-vz400i", .prr_hz = 333333.3, .lines_hz = 97.7, .pan_deg_s = 150,
-                                         .pan_stop_deg = 30, .frames = 1, .links = LINK_YAML_BOTH,
+static const struct room_config SHORT = {.profile = "riegl-vz400i",
+                                         .prr_hz = 333333.3,
+                                         .lines_hz = 97.7,
+                                         .pan_deg_s = 150,
+                                         .pan_stop_deg = 30,
+                                         .frames = 1,
+                                         .links = LINK_YAML_BOTH,
                                          .more = "loop: {queue_ms: 100}\n"};
 
 static int64_t time_ns(struct scanhead *sh)
@@ -12,7 +17,8 @@ static int64_t time_ns(struct scanhead *sh)
     return atoll(client_ask(sh, "TIME?"));
 }
 
-/* Takes the frames that came before the last reply; all must be of granted time. Returns 1 once the scan was over. */
+/* Takes the frames that came before the last reply; all must be of granted time. Returns 1 once the scan was
+ * over. */
 static int take_frames(struct scanhead *sh, int64_t granted_ns, uint64_t *pulses)
 {
     struct scanhead_frame frame;
@@ -116,11 +122,12 @@ static void test_nothing_moves_by_itself(void **state)
 static void test_refusals(void **state)
 {
     struct head head = start(*state, "step");
-    struct scanhead *first = client_open(head_endpoint(&head, "tcp")), *second = client_open(head_endpoint(&head, "tcp"));
+    struct scanhead *first = client_open(head_endpoint(&head, "tcp")),
+                    *second = client_open(head_endpoint(&head, "tcp"));
     client_tell(first, "TIME:STEP 1 MS");
-    static const char *const wrong[][2] = {{"TIME:STEP 0", "ERR -222"},     {"TIME:STEP -5", "ERR -222"},
-                                           {"TIME:STEP", "ERR -109"},       {"TIME:STEP 1 HZ", "ERR -131"},
-                                           {"TIME:STEP 0.5", "ERR -222"},   {"TIME:STEP 1E30", "ERR -222"},
+    static const char *const wrong[][2] = {{"TIME:STEP 0", "ERR -222"},   {"TIME:STEP -5", "ERR -222"},
+                                           {"TIME:STEP", "ERR -109"},     {"TIME:STEP 1 HZ", "ERR -131"},
+                                           {"TIME:STEP 0.5", "ERR -222"}, {"TIME:STEP 1E30", "ERR -222"},
                                            {"TIME:STEP soon", "ERR -104"}};
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         const char *reply = client_ask(first, wrong[i][0]);
@@ -133,11 +140,13 @@ static void test_refusals(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* Lines sent ahead are carried out and answered one after the other: each reply says what was true in its turn. */
+/* Lines sent ahead are carried out and answered one after the other: each reply says what was true in its
+ * turn. */
 static void test_commands_sent_ahead(void **state)
 {
     struct head head = start(*state, "step");
-    static const char lines[] = "TIME:STEP 40 MS\nTIME?\nTIME:STEP 60 MS\nTIME?\nTIME:STEP 900 MS\nHEAD:STAT?\nTIME?\n";
+    static const char lines[] =
+        "TIME:STEP 40 MS\nTIME?\nTIME:STEP 60 MS\nTIME?\nTIME:STEP 900 MS\nHEAD:STAT?\nTIME?\n";
     static const char *const want[] = {"OK", "40000000", "OK", "100000000", "OK", "idle", "1000000000"};
     int fd = raw_connect(head_endpoint(&head, "tcp"));
     raw_write(fd, lines, strlen(lines));

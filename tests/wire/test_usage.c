@@ -1,18 +1,19 @@
-/* Wrong input through the real program: exit status 2, one line on stderr that says what, where and what is allowed,
- * nothing on stdout, no file left behind. */
+/* Wrong input through the real program: exit status 2, one line on stderr that says what, where and what is
+ * allowed, nothing on stdout, no file left behind. */
 #include "tests/wire/room.h"
 
 #include <sys/resource.h>
 
 /* ---- the files that the cases need, written into each test's folder */
 
-static const char GOOD[] = "head: {profile: full-sweep, prr_hz: 100000, lines_hz: 50, pan_deg_s: 100, frames: 1}\n"
-                           "scene:\n"
-                           "  meshes:\n"
-                           "    - {file: room.obj, up: z, scale: 1}\n"
-                           "stations:\n"
-                           "  - {position_m: [0, 0, 0]}\n"
-                           "links: [{type: \"null\"}]\n";
+static const char GOOD[] =
+    "head: {profile: full-sweep, prr_hz: 100000, lines_hz: 50, pan_deg_s: 100, frames: 1}\n"
+    "scene:\n"
+    "  meshes:\n"
+    "    - {file: room.obj, up: z, scale: 1}\n"
+    "stations:\n"
+    "  - {position_m: [0, 0, 0]}\n"
+    "links: [{type: \"null\"}]\n";
 
 /* How many files the folder holds. */
 static int count_files(const struct wire *wire)
@@ -42,15 +43,19 @@ static int complaints;
 
 #define complain(...) (complaints++, print_message(__VA_ARGS__), print_message("\n"))
 
-/* Runs the program; its status must be `status`, and its one line of error must have all of `says` (ends with NULL). */
-static void expect(struct wire *wire, const char *what, const char *const *args, int status, const char *const *says)
+/* Runs the program; its status must be `status`, and its one line of error must have all of `says` (ends with
+ * NULL). */
+static void expect(struct wire *wire, const char *what, const char *const *args, int status,
+                   const char *const *says)
 {
     int before = count_files(wire);
     int got = wire_wait(wire, wire_spawn(wire, args, "out", "err", -1));
-    char *err = wire_read(wire_path(wire, "err"), NULL), *out = wire_read(wire_path(wire, "out"), NULL), *line = err;
+    char *err = wire_read(wire_path(wire, "err"), NULL), *out = wire_read(wire_path(wire, "out"), NULL),
+         *line = err;
     remove(wire_path(wire, "err"));
     remove(wire_path(wire, "out"));
-    int left = count_files(wire), ends = err[0] != '\0' && err[strlen(err) - 1] == '\n', n = count_errors(err, &line);
+    int left = count_files(wire), ends = err[0] != '\0' && err[strlen(err) - 1] == '\n',
+        n = count_errors(err, &line);
     if (got != status) complain("# %s: status %d, not %d: %s", what, got, status, line);
     if (n != 1 || !ends) complain("# %s: %d lines of error: %s", what, n, line);
     if (strncmp(line, "scanhead", 8) != 0) complain("# %s: who says that? %s", what, line);
@@ -83,22 +88,45 @@ static const struct config_case CONFIGS[] = {
     {"unknown key", "frames: 1", "frame: 1", {"config.yaml:1:", "head.frame", "frames"}},
     {"unknown section", "links:", "wires:", {"config.yaml:7:", "wires", "links"}},
     {"duplicate key", "frames: 1", "frames: 1, frames: 2", {"config.yaml:1:", "head.frames"}},
-    {"unit in the value", "prr_hz: 100000", "prr_hz: 100 kHz", {"config.yaml:1:", "head.prr_hz", "not a number", "prr_min_hz to prr_max_hz"}},
-    {"NaN", "prr_hz: 100000", "prr_hz: .nan", {"config.yaml:1:", "head.prr_hz", "not a number", "prr_min_hz to prr_max_hz"}},
+    {"unit in the value",
+     "prr_hz: 100000",
+     "prr_hz: 100 kHz",
+     {"config.yaml:1:", "head.prr_hz", "not a number", "prr_min_hz to prr_max_hz"}},
+    {"NaN",
+     "prr_hz: 100000",
+     "prr_hz: .nan",
+     {"config.yaml:1:", "head.prr_hz", "not a number", "prr_min_hz to prr_max_hz"}},
     {"nan", "prr_hz: 100000", "prr_hz: nan", {"config.yaml:1:", "head.prr_hz"}},
-    {"infinity", "lines_hz: 50", "lines_hz: .inf", {"config.yaml:1:", "head.lines_hz", "lines_min_hz to lines_max_hz"}},
-    {"above the profile", "prr_hz: 100000", "prr_hz: 2200000.1", {"config.yaml:1:", "head.prr_hz", "1000 to 2200000 Hz"}},
-    {"below the profile", "lines_hz: 50", "lines_hz: 3.9", {"config.yaml:1:", "head.lines_hz", "4 to 1000 Hz"}},
-    {"negative speed", "pan_deg_s: 100", "pan_deg_s: -1", {"config.yaml:1:", "head.pan_deg_s", "0 to pan_max_deg_s"}},
+    {"infinity",
+     "lines_hz: 50",
+     "lines_hz: .inf",
+     {"config.yaml:1:", "head.lines_hz", "lines_min_hz to lines_max_hz"}},
+    {"above the profile",
+     "prr_hz: 100000",
+     "prr_hz: 2200000.1",
+     {"config.yaml:1:", "head.prr_hz", "1000 to 2200000 Hz"}},
+    {"below the profile",
+     "lines_hz: 50",
+     "lines_hz: 3.9",
+     {"config.yaml:1:", "head.lines_hz", "4 to 1000 Hz"}},
+    {"negative speed",
+     "pan_deg_s: 100",
+     "pan_deg_s: -1",
+     {"config.yaml:1:", "head.pan_deg_s", "0 to pan_max_deg_s"}},
     {"finer than a micro-unit", "lines_hz: 50", "lines_hz: 50.0000001", {"config.yaml:1:", "head.lines_hz"}},
     {"a list for a number", "lines_hz: 50", "lines_hz: [50]", {"config.yaml:1:", "head.lines_hz"}},
     {"text for a number", "lines_hz: 50", "lines_hz: fifty", {"config.yaml:1:", "head.lines_hz", "fifty"}},
     {"empty value", "lines_hz: 50", "lines_hz: ", {"config.yaml:1:", "head.lines_hz"}},
     {"half a frame", "frames: 1", "frames: 1.5", {"config.yaml:1:", "head.frames", "0 to 1000000"}},
     {"frames at rest", "pan_deg_s: 100", "pan_deg_s: 0", {"config.yaml:1:", "head.frames", "0"}},
-    {"line start above stop", "frames: 1", "frames: 1, line_start_deg: 20, line_stop_deg: 10",
+    {"line start above stop",
+     "frames: 1",
+     "frames: 1, line_start_deg: 20, line_stop_deg: 10",
      {"config.yaml:1:", "head.line_st", "below"}},
-    {"pan out of order", "frames: 1", "frames: 1, pan_start_deg: 20, pan_stop_deg: 10", {"config.yaml:1:", "head.pan_st"}},
+    {"pan out of order",
+     "frames: 1",
+     "frames: 1, pan_start_deg: 20, pan_stop_deg: 10",
+     {"config.yaml:1:", "head.pan_st"}},
     {"no such station", "frames: 1", "frames: 1, station: 2", {"config.yaml:1:", "head.station", "1 to 1"}},
     {"no profile", "profile: full-sweep, ", "", {"config.yaml:", "head.profile"}},
     {"unknown profile", "full-sweep", "half-sweep", {"config.yaml:1:", "head.profile", "half-sweep"}},
@@ -110,19 +138,37 @@ static const struct config_case CONFIGS[] = {
     {"no position", "position_m: [0, 0, 0]", "name: here", {"config.yaml:6:", "stations[0].position_m"}},
     {"two coordinates", "[0, 0, 0]", "[0, 0]", {"config.yaml:6:", "stations[0].position_m"}},
     {"NaN coordinate", "[0, 0, 0]", "[0, .nan, 0]", {"config.yaml:6:", "stations[0].position_m"}},
-    {"UTM without latitude", "links:", "output: {crs: utm}\nlinks:", {"config.yaml:6:", "stations[0].lat_deg", "-90 to 90 deg"}},
-    {"unknown CRS", "links:", "output: {crs: mercator}\nlinks:", {"config.yaml:7:", "output.crs", "local", "ecef", "utm"}},
+    {"UTM without latitude",
+     "links:",
+     "output: {crs: utm}\nlinks:",
+     {"config.yaml:6:", "stations[0].lat_deg", "-90 to 90 deg"}},
+    {"unknown CRS",
+     "links:",
+     "output: {crs: mercator}\nlinks:",
+     {"config.yaml:7:", "output.crs", "local", "ecef", "utm"}},
     {"zone 61", "links:", "output: {utm_zone: 61}\nlinks:", {"config.yaml:7:", "output.utm_zone", "0 to 60"}},
-    {"too fine a scale", "links:", "output: {scale_m: 1e-9}\nlinks:", {"config.yaml:7:", "output.scale_m", "1e-6 to 1 m"}},
+    {"too fine a scale",
+     "links:",
+     "output: {scale_m: 1e-9}\nlinks:",
+     {"config.yaml:7:", "output.scale_m", "1e-6 to 1 m"}},
     {"unknown link", "\"null\"", "udp", {"config.yaml:7:", "links[0].type", "pty", "tcp", "file"}},
     {"port 65536", "\"null\"", "tcp, port: 65536", {"config.yaml:7:", "links[0].port", "0 to 65535"}},
     {"port of a pty", "\"null\"", "pty, port: 1", {"config.yaml:7:", "links[0].port", "type, path"}},
     {"9 sessions", "\"null\"", "tcp, max_sessions: 9", {"config.yaml:7:", "links[0].max_sessions", "1 to 8"}},
     {"file link without path", "\"null\"", "file", {"config.yaml:7:", "links[0].path"}},
-    {"tick rate 999", "links:", "loop: {tick_hz: 999}\nlinks:", {"config.yaml:7:", "loop.tick_hz", "divisor"}},
-    {"ahead too far", "links:", "loop: {ahead_ms: 91}\nlinks:", {"config.yaml:7:", "loop.ahead_ms", "2 to 90 ms"}},
+    {"tick rate 999",
+     "links:",
+     "loop: {tick_hz: 999}\nlinks:",
+     {"config.yaml:7:", "loop.tick_hz", "divisor"}},
+    {"ahead too far",
+     "links:",
+     "loop: {ahead_ms: 91}\nlinks:",
+     {"config.yaml:7:", "loop.ahead_ms", "2 to 90 ms"}},
     {"65 threads", "links:", "loop: {threads: 65}\nlinks:", {"config.yaml:7:", "loop.threads", "0 to 64"}},
-    {"unknown pace", "links:", "loop: {pace: quick}\nlinks:", {"config.yaml:7:", "loop.pace", "realtime", "fast", "step"}},
+    {"unknown pace",
+     "links:",
+     "loop: {pace: quick}\nlinks:",
+     {"config.yaml:7:", "loop.pace", "realtime", "fast", "step"}},
     {"noise maybe", "links:", "noise: {range: maybe}\nlinks:", {"config.yaml:7:", "noise.range"}},
     {"broken YAML", "links:", "\tlinks:", {"config.yaml:"}},
     {"YAML left open", "links: [{", "links: [[{", {"config.yaml:"}},
@@ -149,8 +195,9 @@ static void test_configurations(void **state)
 static const char CUT_PLY[] = "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\n"
                               "property float y\nproperty float z\nelement face 1\n"
                               "property list uchar int vertex_indices\nend_header\n0123456789";
-#define STL_FACET(x)                                                                                                  \
-    "solid s\nfacet normal 0 0 1\nouter loop\nvertex " x " 5800000 0\nvertex 500001 5800000 0\nvertex 500001 5800001 0\n" \
+#define STL_FACET(x)                                                 \
+    "solid s\nfacet normal 0 0 1\nouter loop\nvertex " x             \
+    " 5800000 0\nvertex 500001 5800000 0\nvertex 500001 5800001 0\n" \
     "endloop\nendfacet\nendsolid s\n"
 
 static const struct {
@@ -192,8 +239,8 @@ static void test_meshes(void **state)
         write_config(wire, "file: room.obj", mesh);
         snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
         expect(wire, MESHES[i].what, (const char *const[]){i % 2 == 0 ? "run" : "check", config, NULL}, 2,
-               (const char *const[]){MESHES[i].says[0], MESHES[i].says[1], MESHES[i].says[1] != NULL ? MESHES[i].says[2] : NULL,
-                                     NULL});
+               (const char *const[]){MESHES[i].says[0], MESHES[i].says[1],
+                                     MESHES[i].says[1] != NULL ? MESHES[i].says[2] : NULL, NULL});
         remove(wire_path(wire, MESHES[i].name));
     }
     assert_int_equal(mkdir(wire_path(wire, "dir.obj"), 0700), 0);
@@ -279,8 +326,8 @@ static void test_options(void **state)
             args[k] = fill_in(wire, OPTIONS[i].args[k], word[k], sizeof word[k]);
             snprintf(what + strlen(what), sizeof what - strlen(what), "%s ", OPTIONS[i].args[k]);
         }
-        const char *const says[] = {OPTIONS[i].says[0], OPTIONS[i].says[1], OPTIONS[i].says[1] ? OPTIONS[i].says[2] : NULL,
-                                    NULL};
+        const char *const says[] = {OPTIONS[i].says[0], OPTIONS[i].says[1],
+                                    OPTIONS[i].says[1] ? OPTIONS[i].says[2] : NULL, NULL};
         expect(wire, what, args, 2, says);
     }
     assert_int_equal(complaints, 0);
@@ -303,7 +350,8 @@ static void test_links(void **state)
     char link[128];
     room_write(wire);
     wire_write_text(wire, "plain", "keep me\n");
-    expect_link(wire, "symlink path that is a file", "{type: pty, path: plain}", 2, "plain: exists and is not a symlink");
+    expect_link(wire, "symlink path that is a file", "{type: pty, path: plain}", 2,
+                "plain: exists and is not a symlink");
     char *kept = wire_read(wire_path(wire, "plain"), NULL);
     assert_string_equal(kept, "keep me\n");
     free(kept);
@@ -338,19 +386,23 @@ static void test_system_failures(void **state)
     room_write(wire);
     snprintf(config, sizeof config, "%s", wire_write_text(wire, "config.yaml", GOOD));
     expect(wire, "statistics on a full disk",
-           (const char *const[]){"run", config, "--duration", "0.1", "--pace", "fast", "--quiet", "--stats", "/dev/full", NULL}, 1,
-           (const char *const[]){"No space left", NULL});
+           (const char *const[]){"run", config, "--duration", "0.1", "--pace", "fast", "--quiet", "--stats",
+                                 "/dev/full", NULL},
+           1, (const char *const[]){"No space left", NULL});
     expect(wire, "statistics in no folder",
-           (const char *const[]){"run", config, "--duration", "0.1", "--pace", "fast", "--quiet", "--stats", "/none/x", NULL}, 1,
-           (const char *const[]){"/none/x", "No such file", NULL});
+           (const char *const[]){"run", config, "--duration", "0.1", "--pace", "fast", "--quiet", "--stats",
+                                 "/none/x", NULL},
+           1, (const char *const[]){"/none/x", "No such file", NULL});
     struct sockaddr_in at = {.sin_family = AF_INET};
     socklen_t len = sizeof at;
     int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0); /* bound, not listening: nobody is there */
+    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at),
+                     0); /* bound, not listening: nobody is there */
     getsockname(fd, (struct sockaddr *)&at, &len);
     snprintf(port, sizeof port, "tcp:127.0.0.1:%d", ntohs(at.sin_port));
-    expect(wire, "nobody listens", (const char *const[]){"record", port, "-o", wire_path(wire, "x.ply"), NULL}, 1,
+    expect(wire, "nobody listens",
+           (const char *const[]){"record", port, "-o", wire_path(wire, "x.ply"), NULL}, 1,
            (const char *const[]){port, "Connection refused", NULL});
     close(fd);
     assert_int_equal(complaints, 0);

@@ -1,8 +1,8 @@
 /* What the wire tests share: a folder of their own, the real program started in it, its endpoints, its end.
  *
- * Nothing here sleeps to let something happen: every wait is on a descriptor (ready line, frame, reply, pidfd) and
- * DEADLINE_MS is only when the test gives up. The program dies with the test (PR_SET_PDEATHSIG), a failed test
- * included: the teardown ends what is left. */
+ * Nothing here sleeps to let something happen: every wait is on a descriptor (ready line, frame, reply,
+ * pidfd) and DEADLINE_MS is only when the test gives up. The program dies with the test (PR_SET_PDEATHSIG), a
+ * failed test included: the teardown ends what is left. */
 #ifndef TESTS_WIRE_WIRE_H
 #define TESTS_WIRE_WIRE_H
 
@@ -83,7 +83,8 @@ static inline const char *wire_path(const struct wire *wire, const char *name)
     return path[turn];
 }
 
-/* Removes the files in the folder; the tests make no folders in it but empty ones. Returns how many there were. */
+/* Removes the files in the folder; the tests make no folders in it but empty ones. Returns how many there
+ * were. */
 static inline int wire_empty(const struct wire *wire)
 {
     DIR *dir = opendir(wire->dir);
@@ -165,9 +166,10 @@ static inline pid_t wire_fork(struct wire *wire)
     return 0;
 }
 
-/* Starts the program with args (ends with NULL); out, err: files in the folder for the two streams; ready_fd: given
- * to it as descriptor 3, or -1. */
-static inline pid_t wire_spawn(struct wire *wire, const char *const *args, const char *out, const char *err, int ready_fd)
+/* Starts the program with args (ends with NULL); out, err: files in the folder for the two streams; ready_fd:
+ * given to it as descriptor 3, or -1. */
+static inline pid_t wire_spawn(struct wire *wire, const char *const *args, const char *out, const char *err,
+                               int ready_fd)
 {
     char *argv[WIRE_MAX_ARGS + 2] = {(char *)(uintptr_t)wire_program()};
     int n = 1;
@@ -221,7 +223,8 @@ static inline void wire_show(const struct wire *wire, const char *name)
 static inline struct head head_start(struct wire *wire, const char *config, const char *const *more)
 {
     struct head head = {.wire = wire};
-    const char *args[WIRE_MAX_ARGS] = {"run", config, "--ready-fd", "3", "--stats", wire_path(wire, "stats.json")};
+    const char *args[WIRE_MAX_ARGS] = {"run", config,    "--ready-fd",
+                                       "3",   "--stats", wire_path(wire, "stats.json")};
     char stats[352];
     snprintf(stats, sizeof stats, "%s", args[5]);
     args[5] = stats;
@@ -334,7 +337,8 @@ static inline void client_until(struct scanhead *sh, uint32_t code, struct scanh
     while (!is_event(frame, code));
 }
 
-/* Waits for the state by asking; each answer comes from the head, so this is no busy loop. Frames are taken. */
+/* Waits for the state by asking; each answer comes from the head, so this is no busy loop. Frames are taken.
+ */
 static inline void client_wait_state(struct scanhead *sh, const char *state)
 {
     int64_t end_ms = wire_now_ms() + DEADLINE_MS;
@@ -353,7 +357,8 @@ static inline int raw_connect(const char *endpoint)
     at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     assert_true(fd >= 0);
-    if (connect(fd, (struct sockaddr *)&at, sizeof at) != 0) fail_msg("connect %s: %s", endpoint, strerror(errno));
+    if (connect(fd, (struct sockaddr *)&at, sizeof at) != 0)
+        fail_msg("connect %s: %s", endpoint, strerror(errno));
     return fd;
 }
 
