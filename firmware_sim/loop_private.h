@@ -50,6 +50,8 @@ struct loop {
     sem_t ready;                       /* a tick is ready; only in the paces that wait */
     sem_t progress;                    /* a reader went on, or time was granted; likewise */
 
+    _Atomic uint64_t drop_until;       /* ticks before this one are not worth computing any more */
+
     pthread_t pacer_thread;
     int pacer_running;
     _Atomic uint64_t granted;          /* step: ticks that may pass */

@@ -60,6 +60,28 @@ static int claim(struct loop *loop, struct device_work *work, struct ring_slot *
     return got;
 }
 
+/* A block that was computed in vain: the next ones are as late. Taking up each in turn just before its time is over would
+ * lose them all; so leave out as many as give those behind them half the time ahead. */
+static void skip_ahead(struct loop *loop)
+{
+    atomic_store(&loop->drop_until, atomic_load(&loop->ring.released) + loop->ahead_ticks / 2);
+}
+
+/* 1: the tick is ready. */
+static int compute(struct loop_caster *caster, const struct device_work *work, struct ring_slot *slot)
+{
+    struct loop *loop = caster->loop;
+    if (slot == NULL) return 0;
+    if (work->tick < atomic_load(&loop->drop_until)) {
+        ring_drop(slot);
+        return 0;
+    }
+    worker_fill(caster->worker, work, slot, loop->slot_bytes);
+    if (ring_ready(&loop->ring, slot, work->tick)) return 1;
+    skip_ahead(loop);
+    return 0;
+}
+
 void *loop_caster_main(void *arg)
 {
     struct loop_caster *caster = arg;
@@ -74,8 +96,7 @@ void *loop_caster_main(void *arg)
                 continue;
             continue;
         }
-        if (slot != NULL) worker_fill(caster->worker, &work, slot, loop->slot_bytes);
-        if (slot == NULL || !ring_ready(&loop->ring, slot, work.tick)) tick_lost(loop, &work);
+        if (!compute(caster, &work, slot)) tick_lost(loop, &work);
         atomic_fetch_sub(&loop->n_computing, 1);
         if (loop_waits(loop)) sem_post(&loop->ready);
     }

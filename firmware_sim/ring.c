@@ -73,6 +73,11 @@ int ring_ready(struct ring *ring, struct ring_slot *slot, uint64_t tick)
     return ready;
 }
 
+void ring_drop(struct ring_slot *slot)
+{
+    atomic_store(&slot->busy, 0);
+}
+
 struct ring_slot *ring_peek(struct ring *ring, uint64_t tick)
 {
     struct ring_slot *slot = slot_of(ring, tick);

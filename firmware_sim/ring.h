@@ -56,6 +56,8 @@ void ring_free(struct ring *ring);
 struct ring_slot *ring_claim(struct ring *ring, uint64_t tick);
 /* The slot is filled, or given up by its caster. 0 when the tick was lost meanwhile. */
 int ring_ready(struct ring *ring, struct ring_slot *slot, uint64_t tick);
+/* Its caster lets the slot go without making it ready: the pacing thread will lose the tick when its time is over. */
+void ring_drop(struct ring_slot *slot);
 
 /* The slot of the next tick to release when it is ready, else NULL. */
 struct ring_slot *ring_peek(struct ring *ring, uint64_t tick);
