@@ -6,7 +6,7 @@
 
 /* Thin triangles across a room of 40 m: their boxes all overlap, which no bounding volume hierarchy can sort.
  */
-enum { NEEDLES = 5000 };
+enum { NEEDLES = 4000 };
 
 static double between(uint64_t *x, double lo, double hi)
 {
@@ -35,6 +35,7 @@ struct account {
     uint64_t received, next, gaps, missing;   /* pulses; the last two from jumps of the pulse number */
     uint64_t first_missing, told, told_first; /* by overrun events */
     int events, scan_over;
+    int in_second_half; /* points frames */
     int64_t t_ns, line;
     uint64_t whole_lines, broken_lines;
     uint32_t echoes;
@@ -64,6 +65,7 @@ static void take_points(struct account *a, struct scanhead *sh, const struct sca
     if (frame->scan_line != a->line) a->echoes = 0;
     a->line = frame->scan_line;
     a->received += frame->n_pulses;
+    a->in_second_half += frame->pulse0 > oracle_end(&a->oracle) / 2;
     a->next = frame->pulse0 + frame->n_pulses;
     int n = scanhead_points(sh, frame, 0, point, 4096);
     for (int i = 0; i < n; i++) /* no points before descriptor and anchor: then n is negative */
@@ -109,10 +111,10 @@ static void take(struct account *a, struct scanhead *sh, const struct scanhead_f
 static const struct room_config CONFIG = {.prr_hz = 1999999.9,
                                           .lines_hz = 333.3,
                                           .pan_deg_s = 360,
-                                          .pan_stop_deg = 90,
+                                          .pan_stop_deg = 180,
                                           .frames = 1,
                                           .links = LINK_YAML_TCP,
-                                          .more = "loop: {ahead_ms: 60, late_ms: 60, queue_ms: 10000}\n"};
+                                          .more = "loop: {queue_ms: 10000}\n"};
 
 /* Follows one scan to its end and on until the head is idle and has told of all it lost. */
 static void follow(struct account *a, struct scanhead *sh)
@@ -155,9 +157,10 @@ static void overload(struct wire *wire, const char *threads)
     client_wait_state(sh, "idle");
     client_tell(sh, "SCAN:STAR");
     follow(&a, sh);
-    assert_true(a.missing > a.received); /* a caster computes about a seventh of them in time */
+    assert_true(a.missing > 0); /* a caster computes about a seventh of them in time */
     assert_int_equal(a.told_first, a.first_missing);
-    assert_true(a.received > 0);
+    /* What can be computed goes on coming; it does not end with what was computed ahead at the start. */
+    assert_true(a.in_second_half >= 5);
     assert_int_equal(atoi(client_ask(sh, "SYST:ERR?")), 103);
     assert_int_equal(atoi(client_ask(sh, "SYST:ERR?")), 0); /* once per episode */
     scanhead_close(sh);
@@ -181,7 +184,6 @@ static void test_stall(void **state)
     struct wire *wire = *state;
     struct room_config config = CONFIG;
     config.prr_hz = 500000;
-    config.pan_deg_s = 180;
     config.more = "loop: {ahead_ms: 2, late_ms: 1, queue_ms: 10000}\n";
     struct account a = {.oracle = oracle_of(&config, -40, 60, 100)};
     struct scanhead_frame frame;
