@@ -1,7 +1,8 @@
 /* Rays aimed at edges and corners of closed meshes, from inside: does any slip through?
  *
- * A ray leaks when it hits nothing, when it reports the outer wall of nested meshes, or when behind its target it hits a face
- * from outside: then it has left the mesh. What passes a silhouette by and goes on within the mesh is no leak, but counted. */
+ * A ray leaks when it hits nothing, when it reports the outer wall of nested meshes, or when behind its
+ * target it hits a face from outside: then it has left the mesh. What passes a silhouette by and goes on
+ * within the mesh is no leak, but counted. */
 #include <math.h>
 #include <stdio.h>
 #include <pthread.h>
@@ -21,8 +22,8 @@ struct job {
     const struct bench_mesh *mesh;
     struct bvh *bvh;
     uint64_t n, key;
-    _Atomic uint64_t next;           /* first ray that nobody has taken yet */
-    pthread_mutex_t lock;            /* of what follows */
+    _Atomic uint64_t next; /* first ray that nobody has taken yet */
+    pthread_mutex_t lock;  /* of what follows */
     struct bench_leaks *out;
     double cpu_s;
 };
@@ -69,8 +70,8 @@ static int hits_outside(const struct bench_mesh *mesh, uint32_t prim, const doub
 }
 
 /* 1: leaked; 2: passed by. tolerance: of the range, in shares. */
-static int judge(const struct bench_mesh *mesh, const struct batch *b, uint32_t k, double range_m, uint32_t prim,
-                 double tolerance)
+static int judge(const struct bench_mesh *mesh, const struct batch *b, uint32_t k, double range_m,
+                 uint32_t prim, double tolerance)
 {
     const double dir[3] = {b->dx[k], b->dy[k], b->dz[k]};
     if (prim >= mesh->scene->n_triangles || prim >= mesh->n_inner) return 1;
@@ -95,7 +96,8 @@ static void *job_main(void *arg)
         uint32_t n = job->n - first < BATCH ? (uint32_t)(job->n - first) : BATCH;
         for (uint32_t k = 0; k < n; k++)
             aim(job, first + k, b, k);
-        caster_hits(caster, job->bvh, job->mesh->station_m, BENCH_RANGE_MAX_M, n, b->dx, b->dy, b->dz, b->range_m, b->prim);
+        caster_hits(caster, job->bvh, job->mesh->station_m, BENCH_RANGE_MAX_M, n, b->dx, b->dy, b->dz,
+                    b->range_m, b->prim);
         for (uint32_t k = 0; k < n; k++)
             counts[judge(job->mesh, b, k, b->range_m[k], b->prim[k], 1e-9)]++;
     }
@@ -140,7 +142,8 @@ static int run_job(struct job *job, uint32_t threads, const struct sh_report *re
     }
     for (uint32_t i = 0; i < begun; i++)
         pthread_join(thread[i], NULL);
-    if (job->out->rays != job->n) return sh_fail(err, SH_ENOMEM, "bench: no memory or no thread for the rays");
+    if (job->out->rays != job->n)
+        return sh_fail(err, SH_ENOMEM, "bench: no memory or no thread for the rays");
     job->out->ns_per_ray = 1e9 * job->cpu_s / (double)job->n;
     return SH_OK;
 }
@@ -175,7 +178,8 @@ static int one_mesh(int which, uint64_t rays, uint64_t seed, uint32_t threads, c
                     struct bench_leaks *out, struct sh_err *err)
 {
     struct bench_mesh mesh;
-    struct job job = {.mesh = &mesh, .n = rays, .key = rng_key(seed, RNG_SCENE) + 2 * (uint64_t)which, .out = out};
+    struct job job = {
+        .mesh = &mesh, .n = rays, .key = rng_key(seed, RNG_SCENE) + 2 * (uint64_t)which, .out = out};
     pthread_mutex_init(&job.lock, NULL);
     int rc = bench_mesh_create(which, &mesh, err);
     if (rc == SH_OK) rc = bvh_create(mesh.scene, mesh.station_m, 0.0, 0, report, &job.bvh, err);
