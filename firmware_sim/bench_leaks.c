@@ -16,7 +16,7 @@
 #include "firmware_sim/bench_mesh.h"
 #include "firmware_sim/clock.h"
 
-enum { BATCH = 4096, MAX_THREADS = 64, PLAIN_RAYS = 1000000 / BENCH_LEAK_MESHES };
+enum { BATCH = 4096, ROW = 256, MAX_THREADS = 64, PLAIN_RAYS = 1000000 / BENCH_LEAK_MESHES };
 
 struct job {
     const struct bench_mesh *mesh;
@@ -34,12 +34,14 @@ struct batch {
     uint32_t prim[BATCH];
 };
 
-/* Ray number i: to a corner, or to a point of an edge, of a random triangle of the mesh. */
+/* Ray number i: to a corner, or to a point of an edge. Four rays each to a row of neighbouring triangles,
+ * which begins anywhere: rays of a packet are near each other, as in a scan. */
 static void aim(const struct job *job, uint64_t i, struct batch *b, uint32_t k)
 {
     const struct scene *scene = job->mesh->scene;
     uint64_t r = rng_u64(job->key, i);
-    uint32_t prim = (uint32_t)((uint64_t)(uint32_t)r * job->mesh->n_aim >> 32);
+    uint64_t row = rng_u64(job->key + 2 * BENCH_LEAK_MESHES, i / ROW) >> 32;
+    uint32_t n = job->mesh->n_aim, prim = ((uint32_t)(row * n >> 32) + (uint32_t)(i % ROW) / 4) % n;
     uint32_t corner = (uint32_t)(r >> 32) % 3;
     const double *p = scene->vertex_m[scene->triangle[prim][corner]];
     const double *q = scene->vertex_m[scene->triangle[prim][(corner + 1) % 3]];
