@@ -30,14 +30,21 @@ VEC_INLINE uint64_t rng_u64(uint64_t key, uint64_t pulse)
     return rng_mix(rng_mix(pulse * 0x9e3779b97f4a7c15ULL + key) ^ key);
 }
 
-/* Standard normal, by Box and Muller: radius from the upper 32 bits, angle from the lower 32. The largest is 6.7. */
+/* Standard normal, by Box and Muller: radius from the upper 32 bits, angle from the lower 32. The largest is 6.7.
+ * cos(2 pi a) = sin(2 pi y), y = |a - 1/2| - 1/4, by the Taylor series to the 15th power: error below 7e-12 at the ends. */
 VEC_INLINE double rng_normal(uint64_t key, uint64_t pulse)
 {
     uint64_t bits = rng_u64(key, pulse);
     double u = ((double)(int64_t)(bits >> 32) + 0.5) * 0x1p-32;
-    double sine, cosine;
-    vec_sincos_turn((double)(int64_t)(bits & 0xffffffffU) * 0x1p-32, &sine, &cosine);
-    return sqrt(-2.0 * vec_log(u)) * cosine;
+    double y = VEC_TURN_RAD * (fabs((double)(int64_t)(bits & 0xffffffffU) * 0x1p-32 - 0.5) - 0.25), z = y * y;
+    double s = -1.0 / 1307674368000.0;
+    s = s * z + 1.0 / 6227020800.0;
+    s = s * z - 1.0 / 39916800.0;
+    s = s * z + 1.0 / 362880.0;
+    s = s * z - 1.0 / 5040.0;
+    s = s * z + 1.0 / 120.0;
+    s = s * z - 1.0 / 6.0;
+    return sqrt(-2.0 * vec_log(u)) * (y + y * (z * s));
 }
 
 #endif

@@ -29,12 +29,14 @@ struct session {
     uint32_t next_seq;
     uint64_t lost_frames;
     struct command_lines lines;
+    unsigned char in[READ_BYTES]; /* read, and from in_pos on not looked at yet */
+    uint32_t in_len, in_pos;
     uint8_t *out;
     uint32_t out_len, out_pos;
     char reply[REPLY_ROOM];
     uint32_t reply_len;
     int replies_dropped;
-    int stepping;           /* the reply to TIME:STEP waits until this tick is released */
+    int stepping;           /* the reply to TIME:STEP waits until all before this tick has gone out */
     uint64_t step_tick;
     char step_reply[COMMAND_MAX_REPLY];
     char peer[64];
@@ -123,7 +125,7 @@ static void open_session(struct pump *pump, struct session *s, const char *peer)
     s->cursor = atomic_load(&pump->loop->ring.released);
     s->have_seq = s->lagging = s->stepping = s->replies_dropped = 0;
     s->lost_frames = 0;
-    s->out_len = s->out_pos = s->reply_len = 0;
+    s->out_len = s->out_pos = s->reply_len = s->in_len = s->in_pos = 0;
     s->moved_ns = clock_now_ns();
     memset(&s->lines, 0, sizeof s->lines);
     snprintf(s->peer, sizeof s->peer, "%s", peer);
@@ -177,15 +179,24 @@ static void do_line(struct pump *pump, struct session *s, enum command_line_kind
     loop_poke(pump->loop);
 }
 
+/* Lines wait while a step goes on: each is carried out, and answered, after the one before. */
+static void take_lines(struct pump *pump, struct session *s)
+{
+    while (s->in_pos < s->in_len && !s->stepping) {
+        enum command_line_kind kind = command_lines_feed(&s->lines, s->in[s->in_pos++]);
+        if (kind != COMMAND_LINE_NONE) do_line(pump, s, kind);
+    }
+}
+
 /* Reads what there is, as long as replies have room: a client that never reads its replies stops being heard. */
 static void read_commands(struct pump *pump, struct session *s, int index)
 {
-    unsigned char buf[READ_BYTES];
-    ssize_t n = pump->ops->read(pump->link, index, buf, sizeof buf);
-    for (ssize_t i = 0; i < n; i++) {
-        enum command_line_kind kind = command_lines_feed(&s->lines, buf[i]);
-        if (kind != COMMAND_LINE_NONE) do_line(pump, s, kind);
-    }
+    memmove(s->in, s->in + s->in_pos, s->in_len - s->in_pos);
+    s->in_len -= s->in_pos;
+    s->in_pos = 0;
+    ssize_t n = s->in_len < READ_BYTES ? pump->ops->read(pump->link, index, s->in + s->in_len, READ_BYTES - s->in_len) : 0;
+    if (n > 0) s->in_len += (uint32_t)n;
+    take_lines(pump, s);
     if (s->replies_dropped != 0) {
         device_report(pump->loop->device, CMD_E_OVERRUN, "a client does not read its replies; some were dropped");
         s->replies_dropped = 0;
@@ -238,19 +249,28 @@ static int take_tick(struct pump *pump, struct session *s)
     return 1;
 }
 
+/* Replies into the buffer; what has no room now comes with the next. */
+static void take_replies(struct pump *pump, struct session *s)
+{
+    if (s->reply_len > pump->out_cap - s->out_len) return;
+    memcpy(s->out + s->out_len, s->reply, s->reply_len);
+    s->out_len += s->reply_len;
+    s->reply_len = 0;
+}
+
 static void fill(struct pump *pump, struct session *s)
 {
     s->out_len = s->out_pos = 0;
-    uint64_t released = atomic_load(&pump->loop->ring.released);
-    if (s->stepping && (released >= s->step_tick || atomic_load(&pump->loop->pacer_done))) {
-        s->stepping = 0;
-        add_reply(s, s->step_reply);
-    }
-    memcpy(s->out, s->reply, s->reply_len);
-    s->out_len = s->reply_len;
-    s->reply_len = 0;
+    take_replies(pump, s);
     while (s->out_len < BATCH_BYTES && take_tick(pump, s))
         continue;
+    /* The frames of a step go out before its reply: who has that has them all. */
+    while (s->stepping && (s->cursor >= s->step_tick || atomic_load(&pump->loop->pacer_done))) {
+        s->stepping = 0;
+        add_reply(s, s->step_reply);
+        take_lines(pump, s);
+    }
+    take_replies(pump, s);
     struct loop_reader *reader = &pump->loop->reader[s->reader];
     atomic_store(&reader->cursor, s->cursor);
     if (loop_waits(pump->loop)) sem_post(&pump->loop->progress);

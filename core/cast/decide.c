@@ -9,7 +9,7 @@ enum { DECIDE_MAX_ROUNDS = 32 };
 struct search {
     const struct decide_ray *ray;
     uint32_t prim;             /* best so far */
-    double range_m;
+    double range_m, border_m;  /* its range, and how far the ray passes from its nearest edge */
     uint32_t near_prim;        /* the one that the ray misses by least; gap 1: double precision can't tell */
     double near_gap, near_range_m;
 };
@@ -88,6 +88,15 @@ static void look_at(const struct decide_ray *ray, uint32_t prim, double v[3][3],
         side[i] = edge_side(v[i], v[(i + 1) % 3], ray->dir);
 }
 
+/* How far the ray passes from the nearest edge, across the ray. */
+static double edge_distance(double v[3][3], const double side[3])
+{
+    double least = INFINITY;
+    for (int i = 0; i < 3; i++)
+        least = fmin(least, fabs(side[i]) / edge_length(v[i], v[(i + 1) % 3]));
+    return least;
+}
+
 static int is_inside(const double side[3])
 {
     return (side[0] >= 0.0 && side[1] >= 0.0 && side[2] >= 0.0) || (side[0] <= 0.0 && side[1] <= 0.0 && side[2] <= 0.0);
@@ -129,6 +138,7 @@ static void try_triangle(struct search *s, uint32_t prim)
     if (range < s->range_m - same || (range <= s->range_m + same && prim < s->prim)) {
         s->prim = prim;
         s->range_m = range;
+        s->border_m = edge_distance(v, side);
     }
 }
 
@@ -169,7 +179,9 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct cas
     counters->near_border++;
     for (int round = 0; round < DECIDE_MAX_ROUNDS && prim != RTC_INVALID_GEOMETRY_ID; round++) {
         try_triangle(&s, prim);
-        if (s.prim == prim) break; /* inside in double as well: the common case */
+        /* Inside in double as well, and further from the border than float can blur: the common case. Nearer, another
+         * triangle of the edge may lie in front of it by less than float can tell. */
+        if (s.prim == prim && s.border_m > bvh_width_m(ray->bvh, prim)) break;
         counters->decided++;
         double range_m = (double)t, radius_m = search_radius(ray, prim, range_m);
         try_around(&s, range_m, radius_m);

@@ -1,4 +1,6 @@
 /* Packets of 4, 8 and 16 rays into Embree: the same code by width. */
+#include <string.h>
+
 #include "core/cast/bvh.h"
 
 #if RTC_VERSION_MAJOR >= 4
@@ -25,8 +27,10 @@
         const uint32_t last = bvh->scene->n_triangles;                                                                \
         struct RTCRayHit##W packet __attribute__((aligned(64)));                                                      \
         int valid[W] __attribute__((aligned(64)));                                                                    \
+        float t_max[W] __attribute__((aligned(64)));                                                                  \
         for (uint32_t i = 0; i < W; i++) {                                                                            \
             valid[i] = -1;                                                                                            \
+            t_max[i] = rays->t_max;                                                                                   \
             packet.ray.org_x[i] = rays->org[0];                                                                       \
             packet.ray.org_y[i] = rays->org[1];                                                                       \
             packet.ray.org_z[i] = rays->org[2];                                                                       \
@@ -38,25 +42,22 @@
             packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;                                                        \
         }                                                                                                             \
         for (uint32_t base = 0; base < n; base += W) {                                                                \
-            for (uint32_t i = 0; i < W; i++) {                                                                        \
-                packet.ray.dir_x[i] = rays->dx[base + i];                                                             \
-                packet.ray.dir_y[i] = rays->dy[base + i];                                                             \
-                packet.ray.dir_z[i] = rays->dz[base + i];                                                             \
-                packet.ray.tfar[i] = rays->t_max;                                                                     \
-                packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;                                                       \
-                packet.hit.primID[i] = RTC_INVALID_GEOMETRY_ID;                                                       \
-            }                                                                                                         \
+            memcpy(packet.ray.dir_x, rays->dx + base, sizeof packet.ray.dir_x);                                       \
+            memcpy(packet.ray.dir_y, rays->dy + base, sizeof packet.ray.dir_y);                                       \
+            memcpy(packet.ray.dir_z, rays->dz + base, sizeof packet.ray.dir_z);                                       \
+            memcpy(packet.ray.tfar, t_max, sizeof packet.ray.tfar);                                                   \
+            memset(packet.hit.geomID, 0xff, sizeof packet.hit.geomID);                                                \
+            memset(packet.hit.primID, 0xff, sizeof packet.hit.primID);                                                \
             if (n - base < W)                                                                                         \
                 for (uint32_t i = 0; i < W; i++)                                                                      \
                     valid[i] = i < n - base ? -1 : 0;                                                                 \
             PACKET_CALL(W, valid, bvh->rtc, &context, &packet);                                                       \
-            for (uint32_t i = 0; i < W; i++) {                                                                        \
-                rays->prim[base + i] = packet.hit.primID[i];                                                          \
-                rays->t[base + i] = packet.ray.tfar[i];                                                               \
-                rays->u[base + i] = packet.hit.u[i];                                                                  \
-                rays->v[base + i] = packet.hit.v[i];                                                                  \
+            memcpy(rays->prim + base, packet.hit.primID, sizeof packet.hit.primID);                                   \
+            memcpy(rays->t + base, packet.ray.tfar, sizeof packet.ray.tfar);                                          \
+            memcpy(rays->u + base, packet.hit.u, sizeof packet.hit.u);                                                \
+            memcpy(rays->v + base, packet.hit.v, sizeof packet.hit.v);                                                \
+            for (uint32_t i = 0; i < W; i++)                                                                          \
                 __builtin_prefetch(&bvh->triangle[packet.hit.primID[i] < last ? packet.hit.primID[i] : last]);        \
-            }                                                                                                         \
         }                                                                                                             \
     }
 

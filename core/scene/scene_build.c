@@ -8,6 +8,8 @@
 #include <string.h>
 #include <time.h>
 
+#include "core/huge.h"
+
 static const double MAX_COORDINATE_M = 1e9;
 
 static int64_t now_ns(void)
@@ -94,10 +96,14 @@ int build_end_file(struct scene_build *b, struct sh_err *err)
     return SH_OK;
 }
 
-static void shrink(void **array, size_t n, size_t size)
+/* The array as it stays: without the room to grow, and where lookups all over it are quick. */
+static void settle(void **array, size_t n, size_t size)
 {
-    void *smaller = realloc(*array, n * size);
-    if (smaller != NULL) *array = smaller;
+    void *last = huge_alloc(n * size);
+    if (last == NULL) return;
+    memcpy(last, *array, n * size);
+    free(*array);
+    *array = last;
 }
 
 int build_finish(struct scene_build *b, struct scene **out, struct sh_err *err)
@@ -106,10 +112,10 @@ int build_finish(struct scene_build *b, struct scene **out, struct sh_err *err)
     if (s->n_triangles == 0) return sh_fail(err, SH_EINPUT, "the scene has no triangles");
     if (b->surface_tree != NULL) tdestroy(b->surface_tree, keep_surface);
     b->surface_tree = NULL;
-    shrink((void **)&s->surface, s->n_surfaces, sizeof *s->surface);
-    shrink((void **)&s->vertex_m, s->n_vertices, sizeof *s->vertex_m);
-    shrink((void **)&s->triangle, s->n_triangles, sizeof *s->triangle);
-    shrink((void **)&s->label, s->n_triangles, sizeof *s->label);
+    settle((void **)&s->surface, s->n_surfaces, sizeof *s->surface);
+    settle((void **)&s->vertex_m, s->n_vertices, sizeof *s->vertex_m);
+    settle((void **)&s->triangle, s->n_triangles, sizeof *s->triangle);
+    settle((void **)&s->label, s->n_triangles, sizeof *s->label);
     for (int k = 0; k < 3; k++) {
         s->min_m[k] = INFINITY;
         s->max_m[k] = -INFINITY;

@@ -1,0 +1,15 @@
+#include "core/huge.h"
+
+#include <stdlib.h>
+#include <sys/mman.h>
+
+void *huge_alloc(size_t size)
+{
+    const size_t page = (size_t)2 << 20;
+    size_t align = size < page ? 64 : page;
+    void *p = aligned_alloc(align, (size + align - 1) / align * align);
+#ifdef MADV_HUGEPAGE
+    if (p != NULL && align == page) madvise(p, size, MADV_HUGEPAGE); /* a wish: refused, it works all the same */
+#endif
+    return p;
+}
