@@ -1,5 +1,6 @@
-/* Private to cmd_bench.c and bench_*.c (tests/bench borrows the scenes, the rays and the plain Embree): what is measured, and the
- * things it is measured with. Nothing here is part of a scan. tests/bench/README.md tells the method. */
+/* Private to cmd_bench.c and bench_*.c (tests/bench borrows the scenes, the rays and the plain Embree): what
+ * is measured, and the things it is measured with. Nothing here is part of a scan. tests/bench/README.md
+ * tells the method. */
 #ifndef FIRMWARE_SIM_BENCH_H
 #define FIRMWARE_SIM_BENCH_H
 
@@ -23,23 +24,25 @@ struct bench_target {
 };
 /* Triangles that a name like 10k, 1M or 25000 stands for; 0: it is no number of 100 to 100M. */
 uint32_t bench_count(const char *name);
-/* "house" reads the IFC file; a number makes closed terrain, 200 m wide and 3 m rough, seen from 4.7 m above its middle. */
-int bench_target_load(const char *name, const char *house, const struct sh_report *report, struct bench_target *out,
-                      struct sh_err *err);
+/* "house" reads the IFC file; a number makes closed terrain, 200 m wide and 3 m rough, seen from 4.7 m above
+ * its middle. */
+int bench_target_load(const char *name, const char *house, const struct sh_report *report,
+                      struct bench_target *out, struct sh_err *err);
 void bench_target_free(struct bench_target *target);
 
 /* ---- bench_rays.c: a normal scan: lines of 100 degrees, 2500 pulses each, spread over a turn of the pan */
 struct bench_rays {
     struct schedule_segment segment;
-    uint32_t lines, n;      /* lines * BENCH_LINE_PULSES */
-    double *dx, *dy, *dz;   /* unit vectors, prcs */
-    float *fx, *fy, *fz;    /* the same for Embree */
+    uint32_t lines, n;    /* lines * BENCH_LINE_PULSES */
+    double *dx, *dy, *dz; /* unit vectors, prcs */
+    float *fx, *fy, *fz;  /* the same for Embree */
 };
 void bench_schedule(uint32_t lines, uint32_t frames, struct schedule_spec *spec);
 int bench_rays_create(uint32_t lines, struct bench_rays *out, struct sh_err *err);
 void bench_rays_free(struct bench_rays *rays);
 
-/* ---- bench_embree.c: Embree as it comes: the mesh with shared vertices, rounded to float in the frame of the station */
+/* ---- bench_embree.c: Embree as it comes: the mesh with shared vertices, rounded to float in the frame of
+ * the station */
 enum bench_feed {
     BENCH_PREPARED, /* packets lie in memory, ready; only tfar and geomID are set again */
     BENCH_LOADED,   /* one packet, filled from arrays of directions */
@@ -48,22 +51,23 @@ struct bench_embree {
     RTCDevice device;
     RTCScene rtc;
     double build_s;
-    uint32_t n;                   /* rays below */
-    const float *fx, *fy, *fz;    /* of the rays; not owned */
-    uint32_t width;               /* of the packets that lie ready; 0: none */
+    uint32_t n;                /* rays below */
+    const float *fx, *fy, *fz; /* of the rays; not owned */
+    uint32_t width;            /* of the packets that lie ready; 0: none */
     void *packets;
-    uint32_t *prim;               /* results of BENCH_LOADED */
+    uint32_t *prim; /* results of BENCH_LOADED */
     float *t;
 };
-int bench_embree_create(const struct scene *scene, const double origin_m[3], int robust, struct bench_embree *out,
-                        struct sh_err *err);
+int bench_embree_create(const struct scene *scene, const double origin_m[3], int robust,
+                        struct bench_embree *out, struct sh_err *err);
 /* Takes n rays from the origin; the arrays stay the caller's, and n is a multiple of 16. */
 int bench_embree_rays(struct bench_embree *e, const float *fx, const float *fy, const float *fz, uint32_t n,
                       struct sh_err *err);
 /* Makes ready for passes of this width (1, 4, 8 or 16) and feed. */
 int bench_embree_prepare(struct bench_embree *e, uint32_t width, enum bench_feed feed, struct sh_err *err);
 /* Casts rays first .. first+n-1 (multiples of 16), results in prim and t for BENCH_LOADED. */
-void bench_embree_pass(const struct bench_embree *e, uint32_t width, enum bench_feed feed, uint32_t first, uint32_t n);
+void bench_embree_pass(const struct bench_embree *e, uint32_t width, enum bench_feed feed, uint32_t first,
+                       uint32_t n);
 void bench_embree_free(struct bench_embree *e);
 const char *bench_isa(void);
 long bench_embree_version(void);
@@ -74,13 +78,13 @@ struct bench_case {
     const struct bench_rays *rays;
     struct bench_embree *embree;
     struct bvh *bvh;
-    double seconds;                        /* measure for so long, but at least BENCH_MIN_ROUNDS */
+    double seconds; /* measure for so long, but at least BENCH_MIN_ROUNDS */
 };
-#define BENCH_ENCODER 1048576.0            /* counts per turn of all profiles in config/heads */
+#define BENCH_ENCODER 1048576.0 /* counts per turn of all profiles in config/heads */
 /* Station at 52.5 N, 13.4 E, positions in ECEF. */
 int bench_georef(const struct bench_target *target, struct georef **out, struct sh_err *err);
 void bench_setup(const struct bench_case *c, const struct georef *georef, struct cast_setup *setup);
-double bench_thread_s(void);               /* processor time of this thread */
+double bench_thread_s(void);                     /* processor time of this thread */
 double bench_median(double *values, uint32_t n); /* sorts them */
 
 /* ---- bench_measure.c: one thread, everything in turns, medians of the rounds' ratios */
@@ -92,22 +96,22 @@ enum bench_stage {
     STAGE_DECIDE,     /* those in doubt */
     STAGE_DETECT,     /* limits, echo, label */
     STAGE_NOISE,
-    STAGE_GEOREF,     /* what the encoders read, its sines, position, CRS, counts */
-    STAGE_ENCODE,     /* the frame but its checksum */
+    STAGE_GEOREF, /* what the encoders read, its sines, position, CRS, counts */
+    STAGE_ENCODE, /* the frame but its checksum */
     STAGE_CRC,
     BENCH_STAGES
 };
 extern const char *const bench_stage_name[BENCH_STAGES];
 
 struct bench_result {
-    uint32_t rounds, pulses;               /* pulses of a pass */
+    uint32_t rounds, pulses; /* pulses of a pass */
     uint32_t embree_width;
     enum bench_feed embree_feed;
     double embree_ns, cast_ns, pipeline_ns, ideal_ns, staged_ns; /* per pulse: medians */
     double cast_ratio, pipeline_ratio, ideal_ratio; /* Embree's time by ours: medians of the rounds' ratios */
     double stage_ns[BENCH_STAGES];
-    int same_bytes;                        /* the staged pipeline gave the bytes of the whole one */
-    struct cast_counters counters;         /* of one pass */
+    int same_bytes;                /* the staged pipeline gave the bytes of the whole one */
+    struct cast_counters counters; /* of one pass */
 };
 /* Pin the thread first. */
 int bench_measure(const struct bench_case *c, struct bench_result *out, struct sh_err *err);
@@ -116,29 +120,32 @@ int bench_measure(const struct bench_case *c, struct bench_result *out, struct s
 struct bench_stages;
 int bench_stages_create(struct bench_stages **out, struct sh_err *err);
 void bench_stages_free(struct bench_stages *stages);
-/* One line; adds the cycles of each stage. The block and its bytes are as the pipeline makes them. Returns the bytes. */
-size_t bench_stages_line(struct bench_stages *stages, const struct cast_setup *setup, const struct schedule_segment *segment,
-                         uint64_t line, uint64_t cycles[BENCH_STAGES], struct line_block *block, uint8_t *bytes, size_t cap);
+/* One line; adds the cycles of each stage. The block and its bytes are as the pipeline makes them. Returns
+ * the bytes. */
+size_t bench_stages_line(struct bench_stages *stages, const struct cast_setup *setup,
+                         const struct schedule_segment *segment, uint64_t line, uint64_t cycles[BENCH_STAGES],
+                         struct line_block *block, uint8_t *bytes, size_t cap);
 uint64_t bench_cycles(void);
 
-/* ---- bench_loop.c: the real loop with the null link, as fast as it goes, against Embree on as many threads */
+/* ---- bench_loop.c: the real loop with the null link, as fast as it goes, against Embree on as many threads
+ */
 struct bench_threads {
     uint32_t threads;
     double embree_mrays_s, pulses_per_s, ratio; /* ratio: median of the rounds */
     double cpu_ns;                              /* processor time of all threads per pulse */
 };
-int bench_loop(const struct bench_case *c, const struct bench_result *one, uint32_t threads, struct bench_threads *out,
-               struct sh_err *err);
+int bench_loop(const struct bench_case *c, const struct bench_result *one, uint32_t threads,
+               struct bench_threads *out, struct sh_err *err);
 
 /* ---- bench_leaks.c: rays aimed at edges and corners of closed meshes */
 enum { BENCH_LEAK_MESHES = 4 };
 struct bench_leaks {
     const char *mesh;
     uint32_t triangles;
-    uint64_t rays, leaks, passed;        /* passed: behind the target after all, legally: by a silhouette */
-    double ns_per_ray;                   /* processor time */
+    uint64_t rays, leaks, passed; /* passed: behind the target after all, legally: by a silhouette */
+    double ns_per_ray;            /* processor time */
     struct cast_counters counters;
-    uint64_t plain_rays, plain_leaks;    /* Embree alone, robust, in packets */
+    uint64_t plain_rays, plain_leaks; /* Embree alone, robust, in packets */
 };
 int bench_leaks(uint64_t rays, uint64_t seed, uint32_t threads, const struct sh_report *report,
                 struct bench_leaks out[BENCH_LEAK_MESHES], struct sh_err *err);

@@ -6,16 +6,16 @@
 #include "firmware_sim/clock.h"
 
 #if RTC_VERSION_MAJOR >= 4
-#define CONTEXT(name)                                                                                        \
-    struct RTCIntersectArguments name;                                                                       \
-    rtcInitIntersectArguments(&name);                                                                        \
+#define CONTEXT(name)                  \
+    struct RTCIntersectArguments name; \
+    rtcInitIntersectArguments(&name);  \
     name.flags = RTC_RAY_QUERY_FLAG_COHERENT
 #define CALL(w, valid, scene, ctx, rays) rtcIntersect##w(valid, scene, rays, ctx)
 #define CALL_ONE(scene, ctx, ray)        rtcIntersect1(scene, ray, ctx)
 #else
-#define CONTEXT(name)                                                                                        \
-    struct RTCIntersectContext name;                                                                         \
-    rtcInitIntersectContext(&name);                                                                          \
+#define CONTEXT(name)                \
+    struct RTCIntersectContext name; \
+    rtcInitIntersectContext(&name);  \
     name.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT
 #define CALL(w, valid, scene, ctx, rays) rtcIntersect##w(valid, scene, ctx, rays)
 #define CALL_ONE(scene, ctx, ray)        rtcIntersect1(scene, ctx, ray)
@@ -23,10 +23,11 @@
 
 static const float T_MAX = (float)BENCH_RANGE_MAX_M;
 
-static int fill_geometry(RTCGeometry geometry, const struct scene *scene, const double origin_m[3], struct sh_err *err)
+static int fill_geometry(RTCGeometry geometry, const struct scene *scene, const double origin_m[3],
+                         struct sh_err *err)
 {
-    float *vertex = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float),
-                                            scene->n_vertices);
+    float *vertex = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                            3 * sizeof(float), scene->n_vertices);
     uint32_t *index = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                               3 * sizeof(uint32_t), scene->n_triangles);
     if (vertex == NULL || index == NULL) return sh_fail(err, SH_ENOMEM, "bench: no memory for Embree's mesh");
@@ -37,8 +38,8 @@ static int fill_geometry(RTCGeometry geometry, const struct scene *scene, const 
     return SH_OK;
 }
 
-int bench_embree_create(const struct scene *scene, const double origin_m[3], int robust, struct bench_embree *out,
-                        struct sh_err *err)
+int bench_embree_create(const struct scene *scene, const double origin_m[3], int robust,
+                        struct bench_embree *out, struct sh_err *err)
 {
     memset(out, 0, sizeof *out);
     out->device = rtcNewDevice(NULL);
@@ -54,7 +55,8 @@ int bench_embree_create(const struct scene *scene, const double origin_m[3], int
         rtcSetSceneBuildQuality(out->rtc, RTC_BUILD_QUALITY_HIGH);
         rtcAttachGeometry(out->rtc, geometry);
         rtcCommitScene(out->rtc);
-        if (rtcGetDeviceError(out->device) != RTC_ERROR_NONE) rc = sh_fail(err, SH_ENOMEM, "bench: Embree's build failed");
+        if (rtcGetDeviceError(out->device) != RTC_ERROR_NONE)
+            rc = sh_fail(err, SH_ENOMEM, "bench: Embree's build failed");
     }
     rtcReleaseGeometry(geometry);
     out->build_s = 1e-9 * (double)(clock_now_ns() - start_ns);
@@ -86,71 +88,73 @@ int bench_embree_rays(struct bench_embree *e, const float *fx, const float *fy, 
     e->fz = fz;
     e->prim = aligned_alloc(64, n * sizeof *e->prim);
     e->t = aligned_alloc(64, n * sizeof *e->t);
-    return e->prim != NULL && e->t != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "bench: no memory for %u rays", n);
+    return e->prim != NULL && e->t != NULL ? SH_OK
+                                           : sh_fail(err, SH_ENOMEM, "bench: no memory for %u rays", n);
 }
 
 /* What the cast of a packet leaves as it is is set once. Misaligned packets or masks make Embree crash. */
-#define PACKET_FUNCTIONS(W)                                                                                          \
-    static void set_##W(struct RTCRayHit##W *p)                                                                      \
-    {                                                                                                                \
-        memset(p, 0, sizeof *p);                                                                                     \
-        for (uint32_t i = 0; i < W; i++) {                                                                           \
-            p->ray.mask[i] = 0xffffffffU;                                                                            \
-            p->hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;                                                           \
-        }                                                                                                            \
-    }                                                                                                                \
-    static void load_##W(struct RTCRayHit##W *p, const struct bench_embree *e, uint32_t base)                        \
-    {                                                                                                                \
-        for (uint32_t i = 0; i < W; i++) {                                                                           \
-            p->ray.dir_x[i] = e->fx[base + i];                                                                       \
-            p->ray.dir_y[i] = e->fy[base + i];                                                                       \
-            p->ray.dir_z[i] = e->fz[base + i];                                                                       \
-        }                                                                                                            \
-    }                                                                                                                \
-    static void reset_##W(struct RTCRayHit##W *p)                                                                    \
-    {                                                                                                                \
-        for (uint32_t i = 0; i < W; i++) {                                                                           \
-            p->ray.tfar[i] = T_MAX;                                                                                  \
-            p->hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;                                                              \
-        }                                                                                                            \
-    }                                                                                                                \
-    static void pass_prepared_##W(const struct bench_embree *e, uint32_t first, uint32_t n)                          \
-    {                                                                                                                \
-        CONTEXT(context);                                                                                            \
-        int valid[W] __attribute__((aligned(64)));                                                                   \
-        struct RTCRayHit##W *packet = (struct RTCRayHit##W *)e->packets + first / W;                                 \
-        memset(valid, 0xff, sizeof valid);                                                                           \
-        for (uint32_t base = 0; base < n; base += W, packet++) {                                                     \
-            reset_##W(packet);                                                                                       \
-            CALL(W, valid, e->rtc, &context, packet);                                                                \
-        }                                                                                                            \
-    }                                                                                                                \
-    static void pass_loaded_##W(const struct bench_embree *e, uint32_t first, uint32_t n)                            \
-    {                                                                                                                \
-        CONTEXT(context);                                                                                            \
-        int valid[W] __attribute__((aligned(64)));                                                                   \
-        struct RTCRayHit##W packet __attribute__((aligned(64)));                                                     \
-        memset(valid, 0xff, sizeof valid);                                                                           \
-        set_##W(&packet);                                                                                            \
-        for (uint32_t base = first; base < first + n; base += W) {                                                   \
-            load_##W(&packet, e, base);                                                                              \
-            reset_##W(&packet);                                                                                      \
-            CALL(W, valid, e->rtc, &context, &packet);                                                               \
-            for (uint32_t i = 0; i < W; i++) {                                                                       \
-                e->prim[base + i] =                                                                                  \
-                    packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID ? RTC_INVALID_GEOMETRY_ID : packet.hit.primID[i]; \
-                e->t[base + i] = packet.ray.tfar[i];                                                                 \
-            }                                                                                                        \
-        }                                                                                                            \
-    }                                                                                                                \
-    static void *prepare_##W(const struct bench_embree *e)                                                           \
-    {                                                                                                                \
-        struct RTCRayHit##W *packet = aligned_alloc(64, e->n / W * sizeof *packet);                                  \
-        for (uint32_t i = 0; packet != NULL && i < e->n / W; i++) {                                                  \
-            set_##W(packet + i);                                                                                     \
-            load_##W(packet + i, e, i * W);                                                                          \
-        }                                                                                                            \
-        return packet;                                                                                               \
+#define PACKET_FUNCTIONS(W)                                                                   \
+    static void set_##W(struct RTCRayHit##W *p)                                               \
+    {                                                                                         \
+        memset(p, 0, sizeof *p);                                                              \
+        for (uint32_t i = 0; i < W; i++) {                                                    \
+            p->ray.mask[i] = 0xffffffffU;                                                     \
+            p->hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;                                    \
+        }                                                                                     \
+    }                                                                                         \
+    static void load_##W(struct RTCRayHit##W *p, const struct bench_embree *e, uint32_t base) \
+    {                                                                                         \
+        for (uint32_t i = 0; i < W; i++) {                                                    \
+            p->ray.dir_x[i] = e->fx[base + i];                                                \
+            p->ray.dir_y[i] = e->fy[base + i];                                                \
+            p->ray.dir_z[i] = e->fz[base + i];                                                \
+        }                                                                                     \
+    }                                                                                         \
+    static void reset_##W(struct RTCRayHit##W *p)                                             \
+    {                                                                                         \
+        for (uint32_t i = 0; i < W; i++) {                                                    \
+            p->ray.tfar[i] = T_MAX;                                                           \
+            p->hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;                                       \
+        }                                                                                     \
+    }                                                                                         \
+    static void pass_prepared_##W(const struct bench_embree *e, uint32_t first, uint32_t n)   \
+    {                                                                                         \
+        CONTEXT(context);                                                                     \
+        int valid[W] __attribute__((aligned(64)));                                            \
+        struct RTCRayHit##W *packet = (struct RTCRayHit##W *)e->packets + first / W;          \
+        memset(valid, 0xff, sizeof valid);                                                    \
+        for (uint32_t base = 0; base < n; base += W, packet++) {                              \
+            reset_##W(packet);                                                                \
+            CALL(W, valid, e->rtc, &context, packet);                                         \
+        }                                                                                     \
+    }                                                                                         \
+    static void pass_loaded_##W(const struct bench_embree *e, uint32_t first, uint32_t n)     \
+    {                                                                                         \
+        CONTEXT(context);                                                                     \
+        int valid[W] __attribute__((aligned(64)));                                            \
+        struct RTCRayHit##W packet __attribute__((aligned(64)));                              \
+        memset(valid, 0xff, sizeof valid);                                                    \
+        set_##W(&packet);                                                                     \
+        for (uint32_t base = first; base < first + n; base += W) {                            \
+            load_##W(&packet, e, base);                                                       \
+            reset_##W(&packet);                                                               \
+            CALL(W, valid, e->rtc, &context, &packet);                                        \
+            for (uint32_t i = 0; i < W; i++) {                                                \
+                e->prim[base + i] = packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID           \
+                                        ? RTC_INVALID_GEOMETRY_ID                             \
+                                        : packet.hit.primID[i];                               \
+                e->t[base + i] = packet.ray.tfar[i];                                          \
+            }                                                                                 \
+        }                                                                                     \
+    }                                                                                         \
+    static void *prepare_##W(const struct bench_embree *e)                                    \
+    {                                                                                         \
+        struct RTCRayHit##W *packet = aligned_alloc(64, e->n / W * sizeof *packet);           \
+        for (uint32_t i = 0; packet != NULL && i < e->n / W; i++) {                           \
+            set_##W(packet + i);                                                              \
+            load_##W(packet + i, e, i * W);                                                   \
+        }                                                                                     \
+        return packet;                                                                        \
     }
 
 PACKET_FUNCTIONS(4)
@@ -186,7 +190,8 @@ int bench_embree_prepare(struct bench_embree *e, uint32_t width, enum bench_feed
     return e->packets != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "bench: no memory for %u rays", e->n);
 }
 
-void bench_embree_pass(const struct bench_embree *e, uint32_t width, enum bench_feed feed, uint32_t first, uint32_t n)
+void bench_embree_pass(const struct bench_embree *e, uint32_t width, enum bench_feed feed, uint32_t first,
+                       uint32_t n)
 {
     static void (*const pass[2][3])(const struct bench_embree *, uint32_t, uint32_t) = {
         [BENCH_PREPARED] = {pass_prepared_4, pass_prepared_8, pass_prepared_16},

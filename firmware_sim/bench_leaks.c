@@ -1,7 +1,8 @@
 /* Rays aimed at edges and corners of closed meshes, from inside: does any slip through?
  *
- * A ray leaks when it hits nothing, when it reports the outer wall of nested meshes, or when behind its target it hits a face
- * from outside: then it has left the mesh. What passes a silhouette by and goes on within the mesh is no leak, but counted. */
+ * A ray leaks when it hits nothing, when it reports the outer wall of nested meshes, or when behind its
+ * target it hits a face from outside: then it has left the mesh. What passes a silhouette by and goes on
+ * within the mesh is no leak, but counted. */
 #include <math.h>
 #include <stdio.h>
 #include <pthread.h>
@@ -15,14 +16,14 @@
 #include "firmware_sim/bench_mesh.h"
 #include "firmware_sim/clock.h"
 
-enum { BATCH = 4096, MAX_THREADS = 64, PLAIN_RAYS = 1000000 / BENCH_LEAK_MESHES };
+enum { BATCH = 4096, ROW = 256, MAX_THREADS = 64, PLAIN_RAYS = 1000000 / BENCH_LEAK_MESHES };
 
 struct job {
     const struct bench_mesh *mesh;
     struct bvh *bvh;
     uint64_t n, key;
-    _Atomic uint64_t next;           /* first ray that nobody has taken yet */
-    pthread_mutex_t lock;            /* of what follows */
+    _Atomic uint64_t next; /* first ray that nobody has taken yet */
+    pthread_mutex_t lock;  /* of what follows */
     struct bench_leaks *out;
     double cpu_s;
 };
@@ -33,12 +34,14 @@ struct batch {
     uint32_t prim[BATCH];
 };
 
-/* Ray number i: to a corner, or to a point of an edge, of a random triangle of the mesh. */
+/* Ray number i: to a corner, or to a point of an edge. Four rays each to a row of neighbouring triangles,
+ * which begins anywhere: rays of a packet are near each other, as in a scan. */
 static void aim(const struct job *job, uint64_t i, struct batch *b, uint32_t k)
 {
     const struct scene *scene = job->mesh->scene;
     uint64_t r = rng_u64(job->key, i);
-    uint32_t prim = (uint32_t)((uint64_t)(uint32_t)r * job->mesh->n_aim >> 32);
+    uint64_t row = rng_u64(job->key + 2 * BENCH_LEAK_MESHES, i / ROW) >> 32;
+    uint32_t n = job->mesh->n_aim, prim = ((uint32_t)(row * n >> 32) + (uint32_t)(i % ROW) / 4) % n;
     uint32_t corner = (uint32_t)(r >> 32) % 3;
     const double *p = scene->vertex_m[scene->triangle[prim][corner]];
     const double *q = scene->vertex_m[scene->triangle[prim][(corner + 1) % 3]];
@@ -69,8 +72,8 @@ static int hits_outside(const struct bench_mesh *mesh, uint32_t prim, const doub
 }
 
 /* 1: leaked; 2: passed by. tolerance: of the range, in shares. */
-static int judge(const struct bench_mesh *mesh, const struct batch *b, uint32_t k, double range_m, uint32_t prim,
-                 double tolerance)
+static int judge(const struct bench_mesh *mesh, const struct batch *b, uint32_t k, double range_m,
+                 uint32_t prim, double tolerance)
 {
     const double dir[3] = {b->dx[k], b->dy[k], b->dz[k]};
     if (prim >= mesh->scene->n_triangles || prim >= mesh->n_inner) return 1;
@@ -95,7 +98,8 @@ static void *job_main(void *arg)
         uint32_t n = job->n - first < BATCH ? (uint32_t)(job->n - first) : BATCH;
         for (uint32_t k = 0; k < n; k++)
             aim(job, first + k, b, k);
-        caster_hits(caster, job->bvh, job->mesh->station_m, BENCH_RANGE_MAX_M, n, b->dx, b->dy, b->dz, b->range_m, b->prim);
+        caster_hits(caster, job->bvh, job->mesh->station_m, BENCH_RANGE_MAX_M, n, b->dx, b->dy, b->dz,
+                    b->range_m, b->prim);
         for (uint32_t k = 0; k < n; k++)
             counts[judge(job->mesh, b, k, b->range_m[k], b->prim[k], 1e-9)]++;
     }
@@ -140,7 +144,8 @@ static int run_job(struct job *job, uint32_t threads, const struct sh_report *re
     }
     for (uint32_t i = 0; i < begun; i++)
         pthread_join(thread[i], NULL);
-    if (job->out->rays != job->n) return sh_fail(err, SH_ENOMEM, "bench: no memory or no thread for the rays");
+    if (job->out->rays != job->n)
+        return sh_fail(err, SH_ENOMEM, "bench: no memory or no thread for the rays");
     job->out->ns_per_ray = 1e9 * job->cpu_s / (double)job->n;
     return SH_OK;
 }
@@ -175,7 +180,8 @@ static int one_mesh(int which, uint64_t rays, uint64_t seed, uint32_t threads, c
                     struct bench_leaks *out, struct sh_err *err)
 {
     struct bench_mesh mesh;
-    struct job job = {.mesh = &mesh, .n = rays, .key = rng_key(seed, RNG_SCENE) + 2 * (uint64_t)which, .out = out};
+    struct job job = {
+        .mesh = &mesh, .n = rays, .key = rng_key(seed, RNG_SCENE) + 2 * (uint64_t)which, .out = out};
     pthread_mutex_init(&job.lock, NULL);
     int rc = bench_mesh_create(which, &mesh, err);
     if (rc == SH_OK) rc = bvh_create(mesh.scene, mesh.station_m, 0.0, 0, report, &job.bvh, err);

@@ -32,7 +32,8 @@ static void *slice_main(void *arg)
 }
 
 /* Rays per second of Embree alone, the rays dealt out to the threads. 0: no threads to be had. */
-static double embree_rays_s(const struct bench_case *c, const struct bench_result *one, uint32_t threads, uint32_t passes)
+static double embree_rays_s(const struct bench_case *c, const struct bench_result *one, uint32_t threads,
+                            uint32_t passes)
 {
     pthread_t thread[MAX_THREADS];
     struct slice slice[MAX_THREADS];
@@ -58,18 +59,33 @@ static void fill_config(struct config *cfg, const struct bench_case *c, uint32_t
     struct schedule_spec spec;
     bench_schedule(c->rays->lines, frames, &spec);
     memset(cfg, 0, sizeof *cfg);
-    cfg->profile = (struct config_profile){.name = "bench", .maker = "scanhead", .model = "bench",
-                                           .prr_min_uhz = spec.prr_uhz, .prr_max_uhz = spec.prr_uhz,
-                                           .lines_min_uhz = spec.lines_uhz, .lines_max_uhz = spec.lines_uhz,
-                                           .pan_max_udeg_s = spec.pan_udeg_s, .fov_min_udeg = spec.fov_min_udeg,
-                                           .fov_max_udeg = spec.line_stop_udeg, .pan_max_udeg = spec.pan_stop_udeg,
-                                           .facets = 1, .optical_gain = (double)spec.sweep_udeg / 360e6,
-                                           .range_min_m = 0.5, .range_max_m = BENCH_RANGE_MAX_M, .range_sigma_m = 0.005,
-                                           .mirror_counts = BENCH_ENCODER, .pan_counts = BENCH_ENCODER, .max_echoes = 1};
-    cfg->settings = (struct head_settings){.prr_uhz = spec.prr_uhz, .lines_uhz = spec.lines_uhz,
-                                           .pan_udeg_s = spec.pan_udeg_s, .line_start_udeg = spec.line_start_udeg,
-                                           .line_stop_udeg = spec.line_stop_udeg, .pan_stop_udeg = spec.pan_stop_udeg,
-                                           .frames = frames, .station = 1};
+    cfg->profile = (struct config_profile){.name = "bench",
+                                           .maker = "scanhead",
+                                           .model = "bench",
+                                           .prr_min_uhz = spec.prr_uhz,
+                                           .prr_max_uhz = spec.prr_uhz,
+                                           .lines_min_uhz = spec.lines_uhz,
+                                           .lines_max_uhz = spec.lines_uhz,
+                                           .pan_max_udeg_s = spec.pan_udeg_s,
+                                           .fov_min_udeg = spec.fov_min_udeg,
+                                           .fov_max_udeg = spec.line_stop_udeg,
+                                           .pan_max_udeg = spec.pan_stop_udeg,
+                                           .facets = 1,
+                                           .optical_gain = (double)spec.sweep_udeg / 360e6,
+                                           .range_min_m = 0.5,
+                                           .range_max_m = BENCH_RANGE_MAX_M,
+                                           .range_sigma_m = 0.005,
+                                           .mirror_counts = BENCH_ENCODER,
+                                           .pan_counts = BENCH_ENCODER,
+                                           .max_echoes = 1};
+    cfg->settings = (struct head_settings){.prr_uhz = spec.prr_uhz,
+                                           .lines_uhz = spec.lines_uhz,
+                                           .pan_udeg_s = spec.pan_udeg_s,
+                                           .line_start_udeg = spec.line_start_udeg,
+                                           .line_stop_udeg = spec.line_stop_udeg,
+                                           .pan_stop_udeg = spec.pan_stop_udeg,
+                                           .frames = frames,
+                                           .station = 1};
     cfg->n_stations = 1;
     cfg->crs = GEOREF_ECEF;
     cfg->layout = LINE_GEO;
@@ -106,8 +122,8 @@ static int run_loop(const struct site *site, struct loop_stats *stats, double *c
     return rc;
 }
 
-static int rounds(const struct bench_case *c, const struct bench_result *one, const struct site *site, uint32_t frames,
-                  struct bench_threads *out, struct sh_err *err)
+static int rounds(const struct bench_case *c, const struct bench_result *one, const struct site *site,
+                  uint32_t frames, struct bench_threads *out, struct sh_err *err)
 {
     double rays_s[ROUNDS], pulses_s[ROUNDS], ratio[ROUNDS], cpu_ns[ROUNDS];
     for (uint32_t i = 0; i < ROUNDS; i++) {
@@ -131,8 +147,8 @@ static int rounds(const struct bench_case *c, const struct bench_result *one, co
     return SH_OK;
 }
 
-int bench_loop(const struct bench_case *c, const struct bench_result *one, uint32_t threads, struct bench_threads *out,
-               struct sh_err *err)
+int bench_loop(const struct bench_case *c, const struct bench_result *one, uint32_t threads,
+               struct bench_threads *out, struct sh_err *err)
 {
     memset(out, 0, sizeof *out);
     out->threads = threads < MAX_THREADS ? threads : MAX_THREADS;
@@ -143,8 +159,13 @@ int bench_loop(const struct bench_case *c, const struct bench_result *one, uint3
     if (cfg == NULL) return sh_fail(err, SH_ENOMEM, "bench: no memory");
     fill_config(cfg, c, out->threads, frames);
     /* A site of what is there already; nothing of it is released here but the georeference. */
-    struct site site = {.cfg = cfg, .scene = c->target->scene, .n_surfaces = c->target->scene->n_surfaces, .bvh = {c->bvh},
-                        .n_bvh = 1, .n_stations = 1, .scale_m = BENCH_SCALE_M};
+    struct site site = {.cfg = cfg,
+                        .scene = c->target->scene,
+                        .n_surfaces = c->target->scene->n_surfaces,
+                        .bvh = {c->bvh},
+                        .n_bvh = 1,
+                        .n_stations = 1,
+                        .scale_m = BENCH_SCALE_M};
     struct site_station *station = &site.station[0];
     memcpy(cfg->station[0].position_m, c->target->station_m, sizeof cfg->station[0].position_m);
     station->station = &cfg->station[0];

@@ -14,7 +14,8 @@ struct bench_stages {
 /* Where a stage of the caster is told. */
 static const enum bench_stage STAGE_OF[CAST_STAGES] = {
     [CAST_DIRECTIONS] = STAGE_DIRECTIONS, [CAST_EMBREE] = STAGE_EMBREE, [CAST_REFINE] = STAGE_REFINE,
-    [CAST_DECIDE] = STAGE_DECIDE, [CAST_DETECT] = STAGE_DETECT, [CAST_NOISE] = STAGE_NOISE, [CAST_POSITIONS] = STAGE_GEOREF};
+    [CAST_DECIDE] = STAGE_DECIDE,         [CAST_DETECT] = STAGE_DETECT, [CAST_NOISE] = STAGE_NOISE,
+    [CAST_POSITIONS] = STAGE_GEOREF};
 
 uint64_t bench_cycles(void)
 {
@@ -43,7 +44,8 @@ void bench_stages_free(struct bench_stages *stages)
 }
 
 /* What the caster spent goes to its stages, the rest of the time between the marks to `other`. */
-static void share(struct bench_stages *s, uint64_t from, uint64_t to, enum bench_stage other, uint64_t cycles[BENCH_STAGES])
+static void share(struct bench_stages *s, uint64_t from, uint64_t to, enum bench_stage other,
+                  uint64_t cycles[BENCH_STAGES])
 {
     uint64_t rest = to - from;
     for (int i = 0; i < CAST_STAGES; i++) {
@@ -54,8 +56,9 @@ static void share(struct bench_stages *s, uint64_t from, uint64_t to, enum bench
     cycles[other] += rest;
 }
 
-size_t bench_stages_line(struct bench_stages *s, const struct cast_setup *setup, const struct schedule_segment *segment,
-                         uint64_t line, uint64_t cycles[BENCH_STAGES], struct line_block *block, uint8_t *bytes, size_t cap)
+size_t bench_stages_line(struct bench_stages *s, const struct cast_setup *setup,
+                         const struct schedule_segment *segment, uint64_t line, uint64_t cycles[BENCH_STAGES],
+                         struct line_block *block, uint8_t *bytes, size_t cap)
 {
     struct schedule_line place;
     struct schedule_run run;
@@ -67,7 +70,8 @@ size_t bench_stages_line(struct bench_stages *s, const struct cast_setup *setup,
     share(s, start, cast, STAGE_SCHEDULE, cycles); /* times of the pulses belong to the schedule */
     size_t len = native_encode_points(bytes, cap, block, 0);
     uint64_t encoded = bench_cycles();
-    /* The checksum, made within the encoder, once more by itself: its time is taken from that of the encoder. */
+    /* The checksum, made within the encoder, once more by itself: its time is taken from that of the encoder.
+     */
     volatile uint32_t crc = crc32c(0, bytes + NATIVE_HEADER_LEN, len - NATIVE_HEADER_LEN);
     (void)crc;
     uint64_t spent = bench_cycles() - encoded, encode = encoded - cast;

@@ -15,17 +15,22 @@
 
 static const char HELP[] =
     "scanhead bench [options]: speed figures as JSON on standard output\n\n"
-    "  --scenes LIST   of generated closed terrain by its number of triangles (10k, 2M, 25000), and house, the IFC\n"
+    "  --scenes LIST   of generated closed terrain by its number of triangles (10k, 2M, 25000), and house, "
+    "the IFC\n"
     "                  model; default " DEFAULT_SCENES "\n"
     "  --house FILE    the IFC model; default " HOUSE_FILE "\n"
     "  --seconds S     measure each scene for S seconds, but at least seven rounds; default 3\n"
     "  --threads N     casters of the run on all threads; default: one per processor\n"
-    "  --leaks N       aim N rays at edges and corners of closed meshes and count those that slip through (fails when\n"
+    "  --leaks N       aim N rays at edges and corners of closed meshes and count those that slip through "
+    "(fails when\n"
     "                  one does); without --scenes nothing else is done\n"
     "  -o FILE         JSON to FILE, and a table to standard output\n\n"
-    "In one run and in turns, pinned to one processor: Embree alone on prepared rays at its best packet width; the exact\n"
-    "cast of the same rays (cast_ratio); everything from the schedule to the frame's checksum (pipeline_ratio). Ratios are\n"
-    "medians over the rounds of Embree's time by ours. Then the same through the real loop with the null link.\n";
+    "In one run and in turns, pinned to one processor: Embree alone on prepared rays at its best packet "
+    "width; the exact\n"
+    "cast of the same rays (cast_ratio); everything from the schedule to the frame's checksum "
+    "(pipeline_ratio). Ratios are\n"
+    "medians over the rounds of Embree's time by ours. Then the same through the real loop with the null "
+    "link.\n";
 
 struct bench_options {
     const char *scenes, *house, *out;
@@ -83,8 +88,10 @@ static int check_scenes(const char *list)
     if (*list == '\0') return cmd_usage("bench", "--scenes: a list is needed, such as %s", DEFAULT_SCENES);
     while ((list = next_name(list, name, sizeof name)) != NULL)
         if ((strcmp(name, "house") != 0 && bench_count(name) == 0) || ++n > BENCH_MAX_SCENES)
-            return cmd_usage("bench", "--scenes %s: allowed are up to %d of house and numbers of triangles from 100 to 100M", name,
-                             BENCH_MAX_SCENES);
+            return cmd_usage(
+                "bench",
+                "--scenes %s: allowed are up to %d of house and numbers of triangles from 100 to 100M", name,
+                BENCH_MAX_SCENES);
     return CMD_OK;
 }
 
@@ -129,8 +136,8 @@ static uint32_t all_threads(const struct bench_options *o)
     return n < 1 ? 1 : n > 64 ? 64 : (uint32_t)n;
 }
 
-static int measure_case(const struct bench_options *o, const struct bench_case *c, struct bench_scene_report *out,
-                        struct sh_err *err)
+static int measure_case(const struct bench_options *o, const struct bench_case *c,
+                        struct bench_scene_report *out, struct sh_err *err)
 {
     cpu_set_t before;
     pin(&before);
@@ -144,8 +151,8 @@ static int measure_case(const struct bench_options *o, const struct bench_case *
     return rc;
 }
 
-static int measure_target(const struct bench_options *o, const struct bench_target *target, struct bench_scene_report *out,
-                          struct sh_err *err)
+static int measure_target(const struct bench_options *o, const struct bench_target *target,
+                          struct bench_scene_report *out, struct sh_err *err)
 {
     struct bench_embree embree = {0};
     struct bench_rays rays = {0};
@@ -153,7 +160,8 @@ static int measure_target(const struct bench_options *o, const struct bench_targ
     int rc = bench_rays_create(BENCH_LINES, &rays, err);
     if (rc == SH_OK) rc = bench_embree_create(target->scene, target->station_m, 1, &embree, err);
     if (rc == SH_OK) rc = bench_embree_rays(&embree, rays.fx, rays.fy, rays.fz, rays.n, err);
-    if (rc == SH_OK) rc = bvh_create(target->scene, target->station_m, 0.0, 0, &cmd_report_stderr, &c.bvh, err);
+    if (rc == SH_OK)
+        rc = bvh_create(target->scene, target->station_m, 0.0, 0, &cmd_report_stderr, &c.bvh, err);
     if (rc == SH_OK) {
         snprintf(out->name, sizeof out->name, "%s", target->name);
         out->triangles = target->scene->n_triangles;
@@ -168,13 +176,15 @@ static int measure_target(const struct bench_options *o, const struct bench_targ
     return rc;
 }
 
-static int measure_scene(const struct bench_options *o, const char *name, struct bench_report *report, struct sh_err *err)
+static int measure_scene(const struct bench_options *o, const char *name, struct bench_report *report,
+                         struct sh_err *err)
 {
     struct bench_target target;
     const char *house = o->house != NULL ? o->house : HOUSE_FILE;
     if (strcmp(name, "house") == 0 && o->house == NULL && access(house, R_OK) != 0) {
         snprintf(report->note[report->n_notes++ % BENCH_MAX_NOTES], sizeof report->note[0],
-                 "house left out: %s: %s (Debian: assimp-testmodels; or --house FILE)", house, strerror(errno));
+                 "house left out: %s: %s (Debian: assimp-testmodels; or --house FILE)", house,
+                 strerror(errno));
         return SH_OK;
     }
     fprintf(stderr, "scanhead: bench: %s\n", name);

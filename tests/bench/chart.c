@@ -1,4 +1,5 @@
-/* Speed against accuracy of the ways to cast: rows of the chart's table to standard output. README.md tells how to read it.
+/* Speed against accuracy of the ways to cast: rows of the chart's table to standard output. README.md tells
+ * how to read it.
  *
  * A method's name is its family and, as the last word, what is varied in it: "robust decided 16". */
 #include <math.h>
@@ -33,8 +34,9 @@ struct chart_scene {
     double side_m, rough_m;
     int at_edges;
 };
-/* Near: ranges to 100 m. Far: flat ground to 1.5 km seen from 4.7 m above it, up to 89.9 degrees of incidence. At edges: as near,
- * but each ray goes to a corner, or to a point of an edge, of the triangle that it would hit. */
+/* Near: ranges to 100 m. Far: flat ground to 1.5 km seen from 4.7 m above it, up to 89.9 degrees of
+ * incidence. At edges: as near, but each ray goes to a corner, or to a point of an edge, of the triangle that
+ * it would hit. */
 static const struct chart_scene SCENES[] = {{"terrain 200 m wide", 100000, 200.0, 3.0, 0},
                                             {"terrain 3 km wide", 100000, 3000.0, 3.0, 0},
                                             {"200 m; each ray at an edge or corner", 100000, 200.0, 3.0, 1}};
@@ -47,7 +49,7 @@ struct chart {
     struct bench_embree embree[2]; /* not robust, robust */
     struct bvh *bvh;
     struct caster *caster;
-    double *plane;                 /* n, d of each triangle from the station; one more, all NaN, for misses */
+    double *plane; /* n, d of each triangle from the station; one more, all NaN, for misses */
     double *range_m;
     uint32_t *prim;
     uint32_t native;
@@ -94,8 +96,8 @@ static int fill_planes(struct chart *c)
 
 VEC_CLONES
 static void refine(const double *restrict plane, uint32_t n_triangles, const uint32_t *restrict prim,
-                   const double *restrict dx, const double *restrict dy, const double *restrict dz, uint32_t n,
-                   double *restrict range_m)
+                   const double *restrict dx, const double *restrict dy, const double *restrict dz,
+                   uint32_t n, double *restrict range_m)
 {
     for (uint32_t i = 0; i < n; i++) {
         int64_t at = (int64_t)(prim[i] < n_triangles ? prim[i] : n_triangles) * 4;
@@ -109,14 +111,16 @@ static void cast(struct chart *c, const struct method *m)
     const struct bench_rays *rays = &c->rays;
     if (m->kind == DECIDED) {
         bvh_set_packet(c->bvh, m->width);
-        caster_hits(c->caster, c->bvh, c->station_m, BENCH_RANGE_MAX_M, rays->n, rays->dx, rays->dy, rays->dz, c->range_m, c->prim);
+        caster_hits(c->caster, c->bvh, c->station_m, BENCH_RANGE_MAX_M, rays->n, rays->dx, rays->dy, rays->dz,
+                    c->range_m, c->prim);
         return;
     }
     for (uint32_t at = 0; at < rays->n; at += CHUNK) {
         uint32_t n = rays->n - at < CHUNK ? rays->n - at : CHUNK;
         bench_embree_pass(e, m->width, BENCH_LOADED, at, n);
         if (m->kind == REFINED)
-            refine(c->plane, c->scene->n_triangles, e->prim + at, rays->dx + at, rays->dy + at, rays->dz + at, n, c->range_m + at);
+            refine(c->plane, c->scene->n_triangles, e->prim + at, rays->dx + at, rays->dy + at, rays->dz + at,
+                   n, c->range_m + at);
     }
 }
 
@@ -133,7 +137,7 @@ static void measure_error(struct chart *c, struct method *m)
     cast(c, m);
     for (uint32_t i = 0; i < c->n_sample; i++) {
         uint32_t at = c->sample[i];
-        double range_m = m->kind != FLOAT                                     ? c->range_m[at]
+        double range_m = m->kind != FLOAT                         ? c->range_m[at]
                          : e->prim[at] == RTC_INVALID_GEOMETRY_ID ? (double)NAN
                                                                   : (double)e->t[at];
         c->error_m[i] = isnan(range_m) ? c->reference_m[i] : fabs(range_m - c->reference_m[i]);
@@ -220,7 +224,8 @@ static int set_up(struct chart *c, struct sh_err *err)
     static const double centre_m[2] = {0.0, 0.0};
     struct bvh_info info;
     c->station_m[2] = 4.7;
-    int rc = generate_terrain(c->spec->triangles, c->spec->side_m, c->spec->rough_m, centre_m, 1, &c->scene, err);
+    int rc =
+        generate_terrain(c->spec->triangles, c->spec->side_m, c->spec->rough_m, centre_m, 1, &c->scene, err);
     if (rc == SH_OK) rc = bench_rays_create(LINES, &c->rays, err);
     for (int robust = 0; robust < 2 && rc == SH_OK; robust++) {
         struct bench_embree *e = &c->embree[robust];
@@ -260,8 +265,8 @@ static void print_rows(const struct chart *c)
     static const char *const kind[] = {"float", "refined", "decided"};
     for (int i = 0; i < METHODS; i++) {
         const struct method *m = &c->method[i];
-        printf("cast,%s %s %u,%s,%.3f,%.3g,%.3g,%d,%d\n", m->robust ? "robust" : "plain", kind[m->kind], m->width, c->spec->name,
-               m->ns_median, m->err_p999_m, m->err_max_m, m->front, m->is_default);
+        printf("cast,%s %s %u,%s,%.3f,%.3g,%.3g,%d,%d\n", m->robust ? "robust" : "plain", kind[m->kind],
+               m->width, c->spec->name, m->ns_median, m->err_p999_m, m->err_max_m, m->front, m->is_default);
     }
 }
 

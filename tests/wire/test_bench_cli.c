@@ -36,14 +36,16 @@ static void test_keys(void **state)
     assert_true(number_of(scenes, "embree_mrays_s") > 0.0);
     double cast = number_of(scenes, "cast_ratio"), pipeline = number_of(scenes, "pipeline_ratio");
     assert_true(cast > 0.0 && pipeline > 0.0);
-    /* The pipeline does all that the cast does and more; a tenth is left for what else the machine does meanwhile. */
+    /* The pipeline does all that the cast does and more; a tenth is left for what else the machine does
+     * meanwhile. */
     assert_true(pipeline < 1.1 * cast);
     const char *ns = strstr(scenes, "\"ns_per_pulse\": {");
     assert_non_null(ns);
     double sum = 0.0;
     for (size_t i = 0; i < sizeof stages / sizeof stages[0]; i++)
         sum += number_of(ns, stages[i]);
-    assert_true(fabs(sum - number_of(scenes, "pipeline_ns")) < 1e-6 * sum); /* with the rest they are the whole, up to rounding */
+    assert_true(fabs(sum - number_of(scenes, "pipeline_ns")) <
+                1e-6 * sum); /* with the rest they are the whole, up to rounding */
     assert_non_null(strstr(scenes, "\"stages_give_same_bytes\": true"));
     assert_true(number_of(scenes, "pulses_per_s_all_threads") > 0.0);
     free(text);
@@ -84,11 +86,12 @@ static void test_file(void **state)
 
 static void test_wrong_usage(void **state)
 {
-    static const char *const wrong[][4] = {{"bench", "--scenes", "10q", NULL},   {"bench", "--scenes", "", NULL},
-                                           {"bench", "--scenes", "10k,,1M", NULL}, {"bench", "--scenes", "-10k", NULL},
-                                           {"bench", "--scenes", "200M", NULL},  {"bench", "--threads", "0", NULL},
-                                           {"bench", "--seconds", "nan", NULL},  {"bench", "--leaks", "-1", NULL},
-                                           {"bench", "something", NULL, NULL},   {"bench", "--what", NULL, NULL}};
+    static const char *const wrong[][4] = {
+        {"bench", "--scenes", "10q", NULL},     {"bench", "--scenes", "", NULL},
+        {"bench", "--scenes", "10k,,1M", NULL}, {"bench", "--scenes", "-10k", NULL},
+        {"bench", "--scenes", "200M", NULL},    {"bench", "--threads", "0", NULL},
+        {"bench", "--seconds", "nan", NULL},    {"bench", "--leaks", "-1", NULL},
+        {"bench", "something", NULL, NULL},     {"bench", "--what", NULL, NULL}};
     struct wire *wire = *state;
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         assert_int_equal(bench(wire, wrong[i]), 2);
