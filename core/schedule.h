@@ -1,7 +1,7 @@
 /* The schedule: pulse number -> time, mirror angle, pan angle. Integers and exact ratios; nothing accumulates.
  *
  * A scan is a list of segments; each change of a setting opens one. Within a segment pulse i (from its first pulse) fires at
- *   t(i) = t0_ns + floor(i * 1e15 / prr_uhz) ns,
+ *   t(i) = t0_ns + floor((t0_acc + i * 1e15) / prr_uhz) ns,
  * its place in the mirror sweep is the ratio r(i)/den with r(i) = r0 + i*num - n*den, n the lines passed and num/den =
  * lines_uhz/prr_uhz reduced, and the pan turns with time: pan_udeg_s * i / prr from the frame's first pulse. The products
  * are formed in 128 bits: exact for pulse numbers to 2^50 (15 years at 2.2 MHz).
@@ -27,7 +27,8 @@ struct schedule_spec {
 struct schedule_segment {
     struct schedule_spec spec;
     uint64_t k0;             /* first pulse, in the scan */
-    int64_t t0_ns;           /* its time since the scan's start, exact */
+    int64_t t0_ns;           /* its time since the scan's start: t0_ns + t0_acc / prr_uhz nanoseconds */
+    uint64_t t0_acc;
     uint64_t line0, r0;      /* its line, and place in the sweep as r0/den */
     uint64_t line0_begin;    /* first pulse of line0, before k0 where the line began in an earlier segment ... */
     int64_t line0_begin_ns;

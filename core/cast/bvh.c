@@ -18,9 +18,6 @@ static int build(struct bvh *bvh, struct sh_err *err)
     RTCGeometry geometry = rtcNewGeometry(bvh->device, RTC_GEOMETRY_TYPE_TRIANGLE);
     int rc = bvh_fill(bvh, geometry, err);
     if (rc == SH_OK) {
-        rc = bvh_unite_twins(bvh, err);
-    }
-    if (rc == SH_OK) {
         rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_HIGH);
         rtcCommitGeometry(geometry);
         bvh->rtc = rtcNewScene(bvh->device);

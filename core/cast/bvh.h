@@ -2,13 +2,17 @@
  *
  * Embree works in float: vertices, origin and direction are rounded, and so is its edge test. Near the edge of a triangle
  * it may therefore call a hit a miss, and a ray may slip through a closed mesh or past a silhouette. Here the float
- * triangles are wider than the real ones, each edge moved outward in its plane by more than all of that rounding
- * (BVH_WIDEN): whatever a ray really hits, Embree proposes. Proposals well inside a triangle stand. Those near its border
- * are decided again in double (decide.c).
+ * triangles are wider than the real ones: in its own plane each is stretched so that, seen from the BVH's origin, its edges
+ * lie further out by more than all of that rounding (BVH_WIDEN). Whatever a ray really hits, Embree proposes. Proposals
+ * well inside a triangle stand. Those near its border are decided again in double (decide.c). Rays from elsewhere (stations
+ * that share a BVH) find the same guarantee except at borders seen at a grazing angle.
  *
  * The budget, in units of 2^-24 of the farthest coordinate in play (vertex of the triangle from the BVH's origin, plus
  * the ray's origin from it): rounding of a vertex 1, of the ray's origin 1, of its direction 1, Pluecker edge functions
- * in float (a difference, a cross and a dot product of three terms) at most 5. Sum 8. */
+ * in float (a difference, a cross and a dot product of three terms) at most 5. Sum 8.
+ *
+ * What float still decides is the order of two surfaces that lie within its resolution behind each other, about
+ * 5e-7 of the range over the cosine of the incidence, away from their borders. */
 #ifndef CORE_CAST_BVH_H
 #define CORE_CAST_BVH_H
 
@@ -18,7 +22,10 @@
 #include "core/embree.h"
 
 #define BVH_WIDEN (8.0 * 0x1p-24)
-enum { BVH_MAX_MITER = 64 }; /* a sharp corner moves out by at most this many widths */
+enum {
+    BVH_MAX_MITER = 4096, /* a sharp corner moves out by at most this many widths */
+    BVH_MAX_SLIDE = 8192, /* and along the line of sight, to stay in a grazed plane, by at most this many */
+};
 
 /* The exact plane of a triangle, two to a cache line; gathered as doubles (kernels.c).
  * The lowest 12 bits of each component of n carry something else: of n[0] the guard (a double's upper 12 bits, rounded up),
@@ -73,14 +80,14 @@ struct bvh_one {
 };
 void bvh_intersect_one(const struct bvh *bvh, const float org[3], const float dir[3], struct bvh_one *one);
 
-/* How far the edges of a triangle were moved outward. */
+/* How far the edges of a triangle were moved outward, as seen from the origin. */
 double bvh_width_m(const struct bvh *bvh, uint32_t prim);
 
 /* Fills the float buffers of a geometry with widened triangles, and bvh->triangle. */
 int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err);
 
-/* twins.c: of faces with the same three corners, however they are written, all take the plane and the label of the first. */
-int bvh_unite_twins(struct bvh *bvh, struct sh_err *err);
+/* twins.c: of faces with the same three corners, however they are written, only the first stays in the float buffer. */
+int bvh_drop_twins(const struct bvh *bvh, float *vertex, struct sh_err *err);
 
 /* ---- decide.c */
 struct decide_ray {

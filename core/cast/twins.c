@@ -1,4 +1,5 @@
-/* Faces that stand in a mesh twice: Embree may propose either, so the later one becomes the earlier one. */
+/* Faces that stand in a mesh twice: Embree may propose either, so the later ones are taken from it. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -36,7 +37,7 @@ static int same_corners(const double *const a[3], const double *const b[3])
     return 1;
 }
 
-int bvh_unite_twins(struct bvh *bvh, struct sh_err *err)
+int bvh_drop_twins(const struct bvh *bvh, float *vertex, struct sh_err *err)
 {
     const struct scene *scene = bvh->scene;
     uint64_t size = 16;
@@ -52,7 +53,8 @@ int bvh_unite_twins(struct bvh *bvh, struct sh_err *err)
         for (; table[at] != UINT32_MAX; at = (at + 1) & (size - 1)) {
             sorted_corners(scene, table[at], other);
             if (!same_corners(corner, other)) continue;
-            bvh->triangle[prim] = bvh->triangle[table[at]];
+            for (int i = 0; i < 9; i++)
+                vertex[9 * (size_t)prim + (size_t)i] = NAN; /* Embree leaves out what is not finite */
             break;
         }
         if (table[at] == UINT32_MAX) table[at] = prim;

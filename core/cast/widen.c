@@ -6,8 +6,6 @@
 #include "core/cast/bvh.h"
 #include "core/huge.h"
 
-static const double BVH_MAX_STRETCH = 1e4; /* reached at 89.994 degrees of incidence */
-
 static double dot(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -33,46 +31,41 @@ static double corners(const struct bvh *bvh, uint32_t prim, double v[3][3])
     return sqrt(reach2);
 }
 
-/* How far edge i has to move outward in the triangle's plane so that it moves by width_m across the rays: a
- * shift w in the plane is one of w |n . p| |e| / (|n| |e x p|) across the ray to a point p of the edge, and
- * both products are the same for all its points. Without this, edges of faces seen at grazing incidence
- * hardly move, and rays slip between them. Only rays from the origin have one such figure for each edge.
- * Other stations share the plain width. Who sees a triangle so edge-on that BVH_MAX_STRETCH widths are too
- * few may see past it. */
-static double edge_move(double v[3][3], int i, const double n[3], double width_m, double reach_m)
+/* Part of e across the unit vector a; returns its length. */
+static double across(const double e[3], const double a[3], double out[3])
 {
-    const double *a = v[i], *b = v[(i + 1) % 3];
-    double e[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, c[3];
-    if (reach_m > 0.0) return width_m;
-    cross(e, a, c);
-    double across = sqrt(dot(c, c) * dot(n, n)), along = fabs(dot(n, a)) * sqrt(dot(e, e));
-    double stretch = across < BVH_MAX_STRETCH * along ? across / along : BVH_MAX_STRETCH;
-    return width_m * fmax(stretch, 1.0);
+    double along = dot(e, a);
+    for (int j = 0; j < 3; j++)
+        out[j] = e[j] - along * a[j];
+    return sqrt(dot(out, out));
 }
 
-/* Moves corner i outward so that the edges to the next and to the one before move by to_next and from_before;
- * along each of them by the other's move / sin(angle), cut where the corner is sharp. */
-static void widen_corner(double v[3][3], int i, double to_next, double from_before, float out[3])
+/* Moves corner i outward so that, seen from the origin, both its edges move by `width`: across the line of sight along the
+ * sum of the edges as they are seen there, width / sin(angle), and then along the line of sight back into the triangle's plane,
+ * so that the plane stays what it is. Sharp corners and grazed planes end at BVH_MAX_MITER and BVH_MAX_SLIDE widths. */
+static void widen_corner(double v[3][3], const double unit_n[3], int i, double width, double out[3])
 {
-    double e1[3], e2[3], c[3], l1 = 0.0, l2 = 0.0;
+    double sight[3], e1[3], e2[3], f1[3], f2[3], c[3], move[3];
+    double far = sqrt(dot(v[i], v[i]));
     for (int j = 0; j < 3; j++) {
+        sight[j] = far > 0.0 ? v[i][j] / far : unit_n[j];
         e1[j] = v[(i + 1) % 3][j] - v[i][j];
         e2[j] = v[(i + 2) % 3][j] - v[i][j];
-        l1 += e1[j] * e1[j];
-        l2 += e2[j] * e2[j];
     }
-    l1 = 1.0 / sqrt(l1);
-    l2 = 1.0 / sqrt(l2);
-    cross(e1, e2, c);
-    double sine = sqrt(dot(c, c)) * l1 * l2, sum2 = 0.0, move[3];
+    double l1 = across(e1, sight, f1), l2 = across(e2, sight, f2);
     for (int j = 0; j < 3; j++) {
-        move[j] = (from_before * e1[j] * l1 + to_next * e2[j] * l2) / sine;
-        sum2 += move[j] * move[j];
+        f1[j] = l1 > 0.0 ? f1[j] / l1 : 0.0;
+        f2[j] = l2 > 0.0 ? f2[j] / l2 : 0.0;
+        move[j] = f1[j] + f2[j];
     }
-    double limit = BVH_MAX_MITER * fmax(to_next, from_before),
-           scale = sum2 > limit * limit ? limit / sqrt(sum2) : 1.0;
+    cross(f1, f2, c);
+    double sine = sqrt(dot(c, c)), length = sqrt(dot(move, move));
+    double miter = length < BVH_MAX_MITER * sine ? 1.0 / sine : length > 0.0 ? BVH_MAX_MITER / length : 0.0;
+    double off = -width * miter * dot(move, unit_n), towards = dot(sight, unit_n);
+    double slide = fabs(off) < BVH_MAX_SLIDE * width * fabs(towards) ? -off / towards : 0.0;
+    if (slide == 0.0 && off != 0.0) slide = copysign(BVH_MAX_SLIDE * width, -off * towards);
     for (int j = 0; j < 3; j++)
-        out[j] = (float)(v[i][j] - scale * move[j]);
+        out[j] = v[i][j] - width * miter * move[j] + slide * sight[j];
 }
 
 double bvh_width_m(const struct bvh *bvh, uint32_t prim)
@@ -90,11 +83,8 @@ static double with_spare(double x, uint32_t spare)
     return x;
 }
 
-/* Plane, guard and label. The distance from a ray to edge i, across the ray, is at least bary_i |n . dir| /
- * longest edge. It has to exceed the width by which the border was moved and once more the rounding. Embree's
- * bary_i are those of the widened triangle, which is larger; 1.1 covers the difference, and needles are
- * always decided. */
-static void set_exact(struct bvh_triangle *tri, double v[3][3], double width_m, uint16_t label)
+/* Twice the area of a triangle, its normal so long, and its longest edge. */
+static double measure(double v[3][3], double n[3], double *longest)
 {
     double e1[3], e2[3], longest2 = 0.0;
     for (int i = 0; i < 3; i++) {
@@ -105,35 +95,48 @@ static void set_exact(struct bvh_triangle *tri, double v[3][3], double width_m, 
         e1[i] = v[1][i] - v[0][i];
         e2[i] = v[2][i] - v[0][i];
     }
-    cross(e1, e2, tri->n);
-    double height_m = sqrt(dot(tri->n, tri->n) / longest2);
-    double guard = height_m > 64.0 * width_m ? 1.1 * 2.0 * width_m * sqrt(longest2) : INFINITY;
+    cross(e1, e2, n);
+    *longest = sqrt(longest2);
+    return sqrt(dot(n, n));
+}
+
+/* Plane, guard and label. Seen from the origin, the distance from a ray to edge i of the widened triangle is at least
+ * bary_i * area' * cos / longest', bary_i as Embree gives them. It has to exceed what the edge was moved by and once more the
+ * rounding: then the ray is inside of the real triangle, whatever is rounded. */
+static void set_exact(struct bvh_triangle *tri, double v[3][3], double guard, uint16_t label)
+{
+    double centre[3];
     uint64_t bits;
     memcpy(&bits, &guard, sizeof bits);
-    tri->n[0] =
-        with_spare(tri->n[0], (uint32_t)((bits + ((1ULL << BVH_GUARD_SHIFT) - 1)) >> BVH_GUARD_SHIFT));
+    tri->n[0] = with_spare(tri->n[0], (uint32_t)((bits + ((1ULL << BVH_GUARD_SHIFT) - 1)) >> BVH_GUARD_SHIFT));
     tri->n[1] = with_spare(tri->n[1], label & ((1U << BVH_SPARE_BITS) - 1));
     tri->n[2] = with_spare(tri->n[2], (uint32_t)label >> BVH_SPARE_BITS);
-    double centre[3];
     for (int j = 0; j < 3; j++)
-        centre[j] = v[0][j] + (e1[j] + e2[j]) / 3.0;
+        centre[j] = v[0][j] + ((v[1][j] - v[0][j]) + (v[2][j] - v[0][j])) / 3.0;
     tri->d = dot(tri->n, centre);
 }
 
 static void fill_triangle(struct bvh *bvh, uint32_t prim, float *vertex)
 {
-    double v[3][3], e1[3], e2[3], n[3], move[3],
-        width_m = BVH_WIDEN * (corners(bvh, prim, v) + bvh->station_reach_m);
-    for (int j = 0; j < 3; j++) {
-        e1[j] = v[1][j] - v[0][j];
-        e2[j] = v[2][j] - v[0][j];
+    double v[3][3], wide[3][3], unit[3], wide_n[3], longest, wide_longest, moved = 0.0;
+    struct bvh_triangle *tri = &bvh->triangle[prim];
+    double width_m = BVH_WIDEN * (corners(bvh, prim, v) + bvh->station_reach_m);
+    double area2 = measure(v, tri->n, &longest);
+    for (int j = 0; j < 3; j++)
+        unit[j] = tri->n[j] / area2;
+    for (int i = 0; i < 3; i++) {
+        double d2 = 0.0;
+        widen_corner(v, unit, i, width_m, wide[i]);
+        for (int j = 0; j < 3; j++) {
+            vertex[3 * i + j] = (float)wide[i][j];
+            d2 += (wide[i][j] - v[i][j]) * (wide[i][j] - v[i][j]);
+        }
+        moved = fmax(moved, sqrt(d2));
     }
-    cross(e1, e2, n);
-    for (int i = 0; i < 3; i++)
-        move[i] = edge_move(v, i, n, width_m, bvh->station_reach_m);
-    for (int i = 0; i < 3; i++)
-        widen_corner(v, i, move[i], move[(i + 2) % 3], vertex + 3 * i);
-    set_exact(&bvh->triangle[prim], v, width_m, bvh->scene->label[prim]);
+    /* From elsewhere than the origin an edge may seem to have moved by all that it did. */
+    double seen = bvh->station_reach_m > 0.0 ? moved : width_m;
+    double guard = (seen + width_m) * area2 / measure(wide, wide_n, &wide_longest);
+    set_exact(tri, v, guard * wide_longest, bvh->scene->label[prim]);
 }
 
 int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err)
@@ -141,18 +144,15 @@ int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err)
     const struct scene *scene = bvh->scene;
     size_t n = scene->n_triangles;
     bvh->triangle = huge_alloc((n + 1) * sizeof *bvh->triangle);
-    float *vertex = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                            3 * sizeof(float), 3 * n);
-    uint32_t *index = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                              3 * sizeof(uint32_t), n);
+    float *vertex = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), 3 * n);
+    uint32_t *index = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t), n);
     if (bvh->triangle == NULL || vertex == NULL || index == NULL)
         return sh_fail(err, SH_ENOMEM, "cast: no memory for %zu triangles", n);
     for (uint32_t i = 0; i < n; i++)
         fill_triangle(bvh, i, vertex + 9 * (size_t)i);
     for (uint32_t i = 0; i < 3 * n; i++)
         index[i] = i;
-    bvh->triangle[n] = (struct bvh_triangle){.n = {NAN, with_spare(NAN, LINE_LABEL_NONE & 0xfff),
-                                                   with_spare(NAN, LINE_LABEL_NONE >> BVH_SPARE_BITS)},
-                                             .d = NAN};
-    return SH_OK;
+    bvh->triangle[n] = (struct bvh_triangle){
+        .n = {NAN, with_spare(NAN, LINE_LABEL_NONE & 0xfff), with_spare(NAN, LINE_LABEL_NONE >> BVH_SPARE_BITS)}, .d = NAN};
+    return bvh_drop_twins(bvh, vertex, err);
 }

@@ -122,6 +122,9 @@ void schedule_change(struct schedule_segment *seg, const struct schedule_segment
     set_rates(&next, spec);
     next.k0 = k;
     next.t0_ns = schedule_time_ns(before, k);
+    /* The rest of a nanosecond goes over to the new rate, cut to a part of 1 / prr_uhz: it does not add up. */
+    u128 rest = (before->t0_acc + (u128)(k - before->k0) * before->ns_rem) % (uint64_t)before->spec.prr_uhz;
+    next.t0_acc = (uint64_t)(rest * (uint64_t)spec->prr_uhz / (uint64_t)before->spec.prr_uhz);
     next.line0 = n;
     next.r0 = (uint64_t)(r * next.den / before->den);
     next.frame0 = frame;
@@ -138,7 +141,7 @@ void schedule_change(struct schedule_segment *seg, const struct schedule_segment
 int64_t schedule_time_ns(const struct schedule_segment *seg, uint64_t k)
 {
     uint64_t i = k - seg->k0;
-    uint64_t part = (uint64_t)((u128)i * seg->ns_rem / (uint64_t)seg->spec.prr_uhz);
+    uint64_t part = (uint64_t)((seg->t0_acc + (u128)i * seg->ns_rem) / (uint64_t)seg->spec.prr_uhz);
     return seg->t0_ns + (int64_t)(i * (uint64_t)seg->ns_quot + part);
 }
 
@@ -146,7 +149,8 @@ uint64_t schedule_pulse_at(const struct schedule_segment *seg, int64_t t_ns)
 {
     if (t_ns <= seg->t0_ns) return seg->k0;
     /* floor(i*1e15/prr) >= x  <=>  i >= x*prr/1e15, x whole */
-    return seg->k0 + ceil_div((u128)(uint64_t)(t_ns - seg->t0_ns) * (uint64_t)seg->spec.prr_uhz, NS_TIMES_UHZ);
+    u128 since = (u128)(uint64_t)(t_ns - seg->t0_ns) * (uint64_t)seg->spec.prr_uhz;
+    return seg->k0 + ceil_div(since - seg->t0_acc, NS_TIMES_UHZ);
 }
 
 uint64_t schedule_line_of(const struct schedule_segment *seg, uint64_t k)
@@ -209,7 +213,7 @@ void schedule_get_run(const struct schedule_segment *seg, const struct schedule_
     run->ns_quot = seg->ns_quot;
     run->ns_rem = seg->ns_rem;
     run->ns_den = prr;
-    run->ns_acc = (uint64_t)((u128)(k - seg->k0) * seg->ns_rem % prr);
+    run->ns_acc = (uint64_t)((seg->t0_acc + (u128)(k - seg->k0) * seg->ns_rem) % prr);
 }
 
 double schedule_pan_turn(const struct schedule_segment *seg, uint64_t k)
