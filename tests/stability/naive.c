@@ -62,16 +62,16 @@ void naive_free(struct naive *naive)
 #if RTC_VERSION_MAJOR >= 4
 #define CALL(w, valid, rtc, rays) rtcIntersect##w(valid, rtc, rays, &context)
 #define CALL_ONE(rtc, ray)        rtcIntersect1(rtc, ray, &context)
-#define CONTEXT                                                                                                        \
-    struct RTCIntersectArguments context;                                                                              \
-    rtcInitIntersectArguments(&context);                                                                               \
+#define CONTEXT                           \
+    struct RTCIntersectArguments context; \
+    rtcInitIntersectArguments(&context);  \
     context.flags = RTC_RAY_QUERY_FLAG_COHERENT
 #else
 #define CALL(w, valid, rtc, rays) rtcIntersect##w(valid, rtc, &context, rays)
 #define CALL_ONE(rtc, ray)        rtcIntersect1(rtc, &context, ray)
 #define CONTEXT                         \
     struct RTCIntersectContext context; \
-    rtcInitIntersectContext(&context);                                                                                 \
+    rtcInitIntersectContext(&context);  \
     context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT
 #endif
 

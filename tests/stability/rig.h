@@ -57,8 +57,9 @@ struct rig_errors rig_errors_of(const struct rig *rig, int judge);
 /* Casts both ways: ours, and float packets of 16 (robust) about naive_origin_m; a row of the largest errors
  * in metres. */
 void rig_row_of_ranges(struct rig *rig, const char *regime, const double naive_origin_m[3], double bound_m);
-/* The same as a row of the number of rays: ours that are off by more than a micrometre; of the naive ones only those which
- * are off by more than a centimetre, so that they count as another surface and not for their float range. */
+/* The same as a row of the number of rays: ours that are off by more than a micrometre; of the naive ones
+ * only those which are off by more than a centimetre, so that they count as another surface and not for their
+ * float range. */
 void rig_row_of_rays(struct rig *rig, const char *regime, const double naive_origin_m[3]);
 
 /* Uniform in 0..1, from a counter. */

@@ -1,5 +1,5 @@
-/* Where the head stands and what it stands in: against a wall, in a solid, in a face's plane, among kilometres and
- * millimetres, before surfaces that cross. */
+/* Where the head stands and what it stands in: against a wall, in a solid, in a face's plane, among
+ * kilometres and millimetres, before surfaces that cross. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -27,10 +27,11 @@ static void turn_about(struct mesh *mesh, const double station_m[3], double turn
     mesh_free(&point);
 }
 
-/* A room 8 m wide, 1 km from the scene's origin, the head 1 mm from a wall of 2 m cells: ranges from 1 mm, incidence to 90
- * degrees. Ours: 16 x 2^-53 x (range + 1 km) / cos i with range x cos i = 1 mm at least on that wall, so a ray that meets it
- * at 8 m stands at cos i = 1.2e-4: below 2e-8 m. Naive: the wall and the head round by 3e-5 m each in the scene's own
- * coordinates, 3 % of what the head measures. The BVH's frame is about the station, or about the scene's origin. */
+/* A room 8 m wide, 1 km from the scene's origin, the head 1 mm from a wall of 2 m cells: ranges from 1 mm,
+ * incidence to 90 degrees. Ours: 16 x 2^-53 x (range + 1 km) / cos i with range x cos i = 1 mm at least on
+ * that wall, so a ray that meets it at 8 m stands at cos i = 1.2e-4: below 2e-8 m. Naive: the wall and the
+ * head round by 3e-5 m each in the scene's own coordinates, 3 % of what the head measures. The BVH's frame is
+ * about the station, or about the scene's origin. */
 static void test_against_wall(void **state)
 {
     (void)state;
@@ -59,8 +60,9 @@ static void test_against_wall(void **state)
     table_check();
 }
 
-/* Inside of a closed body that stands in a closed room: its inner side is what the head sees. Naive: a cast that skips the
- * first millimetre, as such casts do against hits on their own surface, with the head 0.5 mm from the body's skin. */
+/* Inside of a closed body that stands in a closed room: its inner side is what the head sees. Naive: a cast
+ * that skips the first millimetre, as such casts do against hits on their own surface, with the head 0.5 mm
+ * from the body's skin. */
 static void test_inside_solid(void **state)
 {
     (void)state;
@@ -79,9 +81,10 @@ static void test_inside_solid(void **state)
     table_check();
 }
 
-/* ---- rays within the plane of faces: the head at the height of a table's top, looking level. The ray may meet the top, whose
- * edge-on plane double precision can't tell from the ray: anywhere between its near and its far edge; or pass over it to the
- * wall. Nothing else is right. `turned`: about no axis in particular, so that the plane holds the ray up to rounding alone. */
+/* ---- rays within the plane of faces: the head at the height of a table's top, looking level. The ray may
+ * meet the top, whose edge-on plane double precision can't tell from the ray: anywhere between its near and
+ * its far edge; or pass over it to the wall. Nothing else is right. `turned`: about no axis in particular, so
+ * that the plane holds the ray up to rounding alone. */
 struct level {
     double near_m, end_m, wall_m; /* along the ray */
 };
@@ -107,8 +110,8 @@ static void along_face_row(int turned)
     double station_m[3], rotation[9];
     struct level *level = malloc(RAYS * sizeof *level);
     mesh_box(&mesh, (const double[3]){-4.0, 6.0, 1.0}, (const double[3]){4.0, 9.0, 1.1}, 0);
-    mesh_sheet(&mesh, (const double[3]){-200.0, 140.0, -200.0}, (const double[3]){400.0, 0, 0}, (const double[3]){0, 0, 400.0},
-               10, 10, 7);
+    mesh_sheet(&mesh, (const double[3]){-200.0, 140.0, -200.0}, (const double[3]){400.0, 0, 0},
+               (const double[3]){0, 0, 400.0}, 10, 10, 7);
     memcpy(station_m, head_m, sizeof station_m);
     mesh_any_rotation(rotation);
     if (turned) turn_about(&mesh, station_m, station_m);
@@ -116,10 +119,12 @@ static void along_face_row(int turned)
     for (uint64_t i = 0; i < RAYS; i++) {
         double x = (rig_unit(151, i) - 0.5) * 0.8, length = sqrt(1.0 + x * x);
         if (turned)
-            rig_direct(&rig, rotation[0] * x + rotation[1], rotation[3] * x + rotation[4], rotation[6] * x + rotation[7]);
+            rig_direct(&rig, rotation[0] * x + rotation[1], rotation[3] * x + rotation[4],
+                       rotation[6] * x + rotation[7]);
         else
             rig_direct(&rig, x, 1.0, 0.0);
-        level[i] = (struct level){(6.0 - head_m[1]) * length, (9.0 - head_m[1]) * length, (140.0 - head_m[1]) * length};
+        level[i] = (struct level){(6.0 - head_m[1]) * length, (9.0 - head_m[1]) * length,
+                                  (140.0 - head_m[1]) * length};
     }
     rig_cast_naive(&rig, NOWHERE, 1, 16);
     double naive_m = along_face_error(&rig, level);
@@ -139,8 +144,9 @@ static void test_along_face(void **state)
     table_check();
 }
 
-/* ---- kilometres and millimetres: the head of a screw, 2 mm wide, 0.5 mm high, stands out of a slope of 4 km made of two
- * triangles, 5 m from the head. Embree meets the slope with floats of kilometres, off by tenths of a millimetre. */
+/* ---- kilometres and millimetres: the head of a screw, 2 mm wide, 0.5 mm high, stands out of a slope of 4 km
+ * made of two triangles, 5 m from the head. Embree meets the slope with floats of kilometres, off by tenths
+ * of a millimetre. */
 static void test_mixed_sizes(void **state)
 {
     (void)state;
@@ -169,19 +175,20 @@ static void test_mixed_sizes(void **state)
     table_check();
 }
 
-/* ---- surfaces that cross: a pole through a floor. Both are met near the line where they cross, at ranges nearer to each
- * other than floats can order. */
+/* ---- surfaces that cross: a pole through a floor. Both are met near the line where they cross, at ranges
+ * nearer to each other than floats can order. */
 static void crossing_row(double distance_m)
 {
     struct mesh mesh = {0}, spot = {0};
     struct rig rig;
-    char regime[64];
+    char regime[96];
     const double half_m = 0.05, d = distance_m;
     double station_m[3] = {0.0, 0.0, 0.2 * d};
     mesh_box(&mesh, (const double[3]){-half_m, d, -0.5}, (const double[3]){half_m, d + 2.0 * half_m, 1.0}, 0);
     mesh_sheet(&mesh, (const double[3]){-d, 0.1 * d, 0.0}, (const double[3]){2.0 * d, 0.0, 0.0},
                (const double[3]){0.0, 2.0 * d, 0.0}, 20, 20, 1);
-    for (uint32_t i = 0; i < RAYS; i++) { /* above and below the front's foot, by powers of ten from 1 cm to 10 nm */
+    for (uint32_t i = 0; i < RAYS;
+         i++) { /* above and below the front's foot, by powers of ten from 1 cm to 10 nm */
         double off_m = 1e-2 * pow(10.0, -6.0 * rig_unit(171, 2 * (uint64_t)i + 1));
         mesh_vertex(&spot, 1.9 * half_m * (rig_unit(171, 2 * (uint64_t)i) - 0.5), d, i % 2 ? off_m : -off_m);
     }
@@ -214,9 +221,10 @@ static void test_thin_plate(void **state)
     for (int i = 0; i < 3; i++) {
         struct mesh mesh = {0};
         struct rig rig;
-        char regime[64];
+        char regime[96];
         double station_m[3] = {0.0, 0.0, 0.0};
-        mesh_box(&mesh, (const double[3]){-80.0, 200.0, -80.0}, (const double[3]){80.0, 200.0 + thick_m[i], 80.0}, 0);
+        mesh_box(&mesh, (const double[3]){-80.0, 200.0, -80.0},
+                 (const double[3]){80.0, 200.0 + thick_m[i], 80.0}, 0);
         turn_about(&mesh, station_m, station_m);
         rig_open(&rig, mesh_scene(&mesh), station_m, station_m);
         rig_aim_at_sphere(&rig, 5 * RAYS, 181);
@@ -231,8 +239,9 @@ static void test_thin_plate(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_against_wall), cmocka_unit_test(test_inside_solid), cmocka_unit_test(test_along_face),
-        cmocka_unit_test(test_mixed_sizes),  cmocka_unit_test(test_crossing),     cmocka_unit_test(test_thin_plate),
+        cmocka_unit_test(test_against_wall), cmocka_unit_test(test_inside_solid),
+        cmocka_unit_test(test_along_face),   cmocka_unit_test(test_mixed_sizes),
+        cmocka_unit_test(test_crossing),     cmocka_unit_test(test_thin_plate),
     };
     table_head("stability: places");
     return cmocka_run_group_tests(tests, NULL, NULL);

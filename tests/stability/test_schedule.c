@@ -13,14 +13,18 @@ static const uint64_t DAY_S = 86400;
 
 static struct schedule_spec spec_of(int64_t prr_uhz, int64_t lines_uhz)
 {
-    return (struct schedule_spec){.prr_uhz = prr_uhz, .lines_uhz = lines_uhz, .pan_udeg_s = 0,
-                                  .sweep_udeg = 360000000, .line_stop_udeg = 100000000};
+    return (struct schedule_spec){.prr_uhz = prr_uhz,
+                                  .lines_uhz = lines_uhz,
+                                  .pan_udeg_s = 0,
+                                  .sweep_udeg = 360000000,
+                                  .line_stop_udeg = 100000000};
 }
 
 /* ---- a day */
 
-/* Adds a period n times, without n additions: while the sum stays within one power of two each addition rounds to the same
- * multiple of its last place (ties too, once the sum's last bit is even), so two real additions tell the step of all. */
+/* Adds a period n times, without n additions: while the sum stays within one power of two each addition
+ * rounds to the same multiple of its last place (ties too, once the sum's last bit is even), so two real
+ * additions tell the step of all. */
 static double add_up(double period, uint64_t n)
 {
     double sum = 0.0;
@@ -60,8 +64,8 @@ static void test_shortcut(void **state)
     }
 }
 
-/* Pulse n of each second fires at that second exactly, and any pulse at the floor of its own time in whole nanoseconds:
- * told here from the quotient by seconds, not from the program's formula. */
+/* Pulse n of each second fires at that second exactly, and any pulse at the floor of its own time in whole
+ * nanoseconds: told here from the quotient by seconds, not from the program's formula. */
 static double worst_time_ns(const struct schedule_segment *seg, uint64_t prr_hz)
 {
     double worst_ns = 0.0;
@@ -86,18 +90,21 @@ static void test_day(void **state)
     schedule_start(&seg, &spec);
     assert_true(schedule_time_ns(&seg, n) == (int64_t)(DAY_S * 1000000000));
     double ours_ns = worst_time_ns(&seg, prr_hz);
-    table_row("a day at 2.2 MHz", "period added up, double seconds", fabs(1e9 * add_up(1.0 / 2.2e6, n) - day_ns), ours_ns, 0.0,
-              "ns");
-    table_row("a day at 2.2 MHz", "period added up, double ns", fabs(add_up(1e9 / 2.2e6, n) - day_ns), ours_ns, 0.0, "ns");
+    table_row("a day at 2.2 MHz", "period added up, double seconds",
+              fabs(1e9 * add_up(1.0 / 2.2e6, n) - day_ns), ours_ns, 0.0, "ns");
+    table_row("a day at 2.2 MHz", "period added up, double ns", fabs(add_up(1e9 / 2.2e6, n) - day_ns),
+              ours_ns, 0.0, "ns");
     table_row("a day at 2.2 MHz", "period added up, float seconds",
               fabs(1e9 * (double)add_up_float(1.0f / 2.2e6f, n) - day_ns), ours_ns, 0.0, "ns");
-    table_row("a day at 2.2 MHz", "period in whole ns", fabs((double)n * round(1e9 / 2.2e6) - day_ns), ours_ns, 0.0, "ns");
+    table_row("a day at 2.2 MHz", "period in whole ns", fabs((double)n * round(1e9 / 2.2e6) - day_ns),
+              ours_ns, 0.0, "ns");
     table_check();
 }
 
 /* ---- changes in mid-scan */
 
-/* Rates whose periods are n/231 of 10000 ns, so that the sum of all pulses so far is a whole number of parts. */
+/* Rates whose periods are n/231 of 10000 ns, so that the sum of all pulses so far is a whole number of parts.
+ */
 static const uint64_t PART = 231; /* 3 x 7 x 11 */
 static const int64_t CHANGE_PRR_HZ[] = {2200000, 300000, 700000, 550000, 2100000, 100000};
 enum { CHANGES = 100000, N_RATES = 6 };
@@ -107,8 +114,8 @@ static uint64_t parts_of(int64_t prr_hz)
     return PART * 1000000000 * 10 / (uint64_t)prr_hz; /* period in 1/2310 ns: whole for each of the rates */
 }
 
-/* Each change keeps the time of its pulse, whole nanoseconds: the naive clock rounds each segment's length in seconds to
- * double; ours may show no drift of a nanosecond after 10^5 changes, in 17 minutes. */
+/* Each change keeps the time of its pulse, whole nanoseconds: the naive clock rounds each segment's length in
+ * seconds to double; ours may show no drift of a nanosecond after 10^5 changes, in 17 minutes. */
 static void test_changes(void **state)
 {
     (void)state;
@@ -132,16 +139,18 @@ static void test_changes(void **state)
         ours_ns = fmax(ours_ns, fabs((double)(schedule_time_ns(&seg, k) - expected)));
     }
     double true_ns = (double)parts / (double)(PART * 10);
-    table_row("100000 changes of the pulse rate", "float seconds per segment", fabs(1e9 * float_s - true_ns), ours_ns, 1.0, "ns");
-    table_row("100000 changes of the pulse rate", "periods in whole ns", fabs(whole_ns - true_ns), ours_ns, 1.0, "ns");
+    table_row("100000 changes of the pulse rate", "float seconds per segment", fabs(1e9 * float_s - true_ns),
+              ours_ns, 1.0, "ns");
+    table_row("100000 changes of the pulse rate", "periods in whole ns", fabs(whole_ns - true_ns), ours_ns,
+              1.0, "ns");
     table_check();
 }
 
 /* ---- lines that do not divide the pulses */
 
-/* Mirror angle after an hour against k * lines / pulses modulo 1 in whole numbers. Ours: the ratio r/den and two products
- * round by 2^-53 of a turn each: 4 x 2^-53 turns = 2.8e-15 rad. Naive: the line has the nearest whole number of pulses; or
- * the mirror's step is added up in double. */
+/* Mirror angle after an hour against k * lines / pulses modulo 1 in whole numbers. Ours: the ratio r/den and
+ * two products round by 2^-53 of a turn each: 4 x 2^-53 turns = 2.8e-15 rad. Naive: the line has the nearest
+ * whole number of pulses; or the mirror's step is added up in double. */
 static void line_row(int64_t prr_hz, int64_t lines_uhz)
 {
     const double turn_rad = 2.0 * acos(-1.0);
@@ -150,7 +159,7 @@ static void line_row(int64_t prr_hz, int64_t lines_uhz)
     uint64_t n = (uint64_t)prr_hz * 3600;
     uint64_t whole = (uint64_t)round((double)prr_hz * 1e6 / (double)lines_uhz);
     double ours_rad = 0.0, naive_rad = 0.0, off_lines;
-    char regime[64];
+    char regime[96];
     schedule_start(&seg, &spec);
     for (uint64_t i = 0; i < 20000; i++) {
         uint64_t k = n - rng_u64(4, i) % n, prr_uhz = (uint64_t)prr_hz * 1000000;
@@ -160,7 +169,8 @@ static void line_row(int64_t prr_hz, int64_t lines_uhz)
         off_lines = fabs((double)(k % whole) / (double)whole - (double)expected);
         naive_rad = fmax(naive_rad, turn_rad * fmin(off_lines, 1.0 - off_lines));
     }
-    snprintf(regime, sizeof regime, "%.6g lines/s at %g MHz, an hour", 1e-6 * (double)lines_uhz, 1e-6 * (double)prr_hz);
+    snprintf(regime, sizeof regime, "%.6g lines/s at %g MHz, an hour", 1e-6 * (double)lines_uhz,
+             1e-6 * (double)prr_hz);
     table_row(regime, "whole pulses per line", naive_rad, ours_rad, 4.0 * 0x1p-53 * turn_rad, "rad");
     double step = (double)lines_uhz / ((double)prr_hz * 1e6), sum = 0.0;
     for (uint32_t k = 0; k < 10000000; k++) /* some seconds of it will do */
@@ -183,7 +193,9 @@ static void test_lines(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_shortcut), cmocka_unit_test(test_day),   cmocka_unit_test(test_changes),
+        cmocka_unit_test(test_shortcut),
+        cmocka_unit_test(test_day),
+        cmocka_unit_test(test_changes),
         cmocka_unit_test(test_lines),
     };
     table_head("stability: schedule");

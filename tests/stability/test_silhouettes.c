@@ -1,4 +1,5 @@
-/* Rays that pass the outline of something in front of something else so closely that floats see the wrong one. */
+/* Rays that pass the outline of something in front of something else so closely that floats see the wrong
+ * one. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -13,12 +14,14 @@ enum { RAYS = 2000 };
 enum { RAYS = 30000 };
 #endif
 
-/* Places between `from` and `to`, and off them by up to 1e-7 of the distance, across the ray: half of them evenly, half by
- * powers of ten down to 1e-17, where double precision ends. */
-static void aim_beside_edge(struct rig *rig, const double from[3], const double to[3], uint32_t n, uint64_t seed)
+/* Places between `from` and `to`, and off them by up to 1e-7 of the distance, across the ray: half of them
+ * evenly, half by powers of ten down to 1e-17, where double precision ends. */
+static void aim_beside_edge(struct rig *rig, const double from[3], const double to[3], uint32_t n,
+                            uint64_t seed)
 {
     for (uint32_t i = 0; i < n; i++) {
-        double part = rig_unit(seed, 4 * (uint64_t)i), p[3], edge[3], across[3], off = rig_unit(seed, 4 * (uint64_t)i + 1);
+        double part = rig_unit(seed, 4 * (uint64_t)i), p[3], edge[3], across[3],
+               off = rig_unit(seed, 4 * (uint64_t)i + 1);
         double length2 = 0.0, across2 = 0.0, size = i % 2 ? 1e-7 * off : 1e-7 * pow(10.0, -10.0 * off);
         if (rig_unit(seed, 4 * (uint64_t)i + 2) < 0.5) size = -size;
         for (int k = 0; k < 3; k++) {
@@ -63,8 +66,8 @@ static void aim_beside_all_edges(struct rig *rig, const struct mesh *mesh, uint1
         edges += mesh->label[t] == label ? 3 : 0;
     for (uint32_t t = 0; t < mesh->n_triangles; t++)
         for (int e = 0; e < 3 && mesh->label[t] == label; e++, at++)
-            aim_beside_edge(rig, mesh->vertex[mesh->triangle[t][e]], mesh->vertex[mesh->triangle[t][(e + 1) % 3]],
-                            rays / edges, 61 + at);
+            aim_beside_edge(rig, mesh->vertex[mesh->triangle[t][e]],
+                            mesh->vertex[mesh->triangle[t][(e + 1) % 3]], rays / edges, 61 + at);
 }
 
 static void row(struct mesh *mesh, uint16_t label, const double station_m[3], const char *regime)
@@ -79,15 +82,16 @@ static void row(struct mesh *mesh, uint16_t label, const double station_m[3], co
 
 static const double STATION_M[3] = {0.0, 0.0, 0.0};
 
-/* The bound of all rows is 0 rays that are wrong, other than those which pass an edge within 16 x 2^-53 of the distance of
- * its farther end: there the reference in long double may see the other side of the edge than any double arithmetic. */
+/* The bound of all rows is 0 rays that are wrong, other than those which pass an edge within 16 x 2^-53 of
+ * the distance of its farther end: there the reference in long double may see the other side of the edge than
+ * any double arithmetic. */
 static void test_solids(void **state)
 {
     (void)state;
     const double distance_m[] = {2.0, 50.0, 1000.0};
     for (int i = 0; i < 3; i++) {
         struct mesh mesh = {0};
-        char regime[64];
+        char regime[96];
         double d = distance_m[i], min[3] = {-0.1 * d, d, -0.07 * d}, max[3] = {0.08 * d, 1.1 * d, 0.09 * d};
         mesh_box(&mesh, min, max, 0);
         add_wall(&mesh, 1.5 * d);
@@ -101,7 +105,8 @@ static void test_solids(void **state)
     table_check();
 }
 
-/* The top of a table from hardly above it: its far edge stands at 89 degrees to the ray, the wall is 20 m behind. */
+/* The top of a table from hardly above it: its far edge stands at 89 degrees to the ray, the wall is 20 m
+ * behind. */
 static void test_grazed_edge(void **state)
 {
     (void)state;
@@ -109,7 +114,7 @@ static void test_grazed_edge(void **state)
     for (int i = 0; i < 2; i++) {
         struct mesh mesh = {0};
         struct rig rig;
-        char regime[64];
+        char regime[96];
         double min[3] = {-1.0, 4.0, -0.05}, max[3] = {1.0, 10.0, 0.0};
         double above_m = 10.0 / tan(incidence_deg[i] * acos(-1.0) / 180.0);
         mesh_box(&mesh, min, max, 0);
@@ -129,8 +134,8 @@ static void test_open_edges(void **state)
 {
     (void)state;
     struct mesh mesh = {0};
-    mesh_sheet(&mesh, (const double[3]){-1.0, 10.0, -1.0}, (const double[3]){2.0, 1.0, 0.0}, (const double[3]){0.0, 0.5, 2.0},
-               8, 8, 0);
+    mesh_sheet(&mesh, (const double[3]){-1.0, 10.0, -1.0}, (const double[3]){2.0, 1.0, 0.0},
+               (const double[3]){0.0, 0.5, 2.0}, 8, 8, 0);
     for (uint32_t t = 0; t < mesh.n_triangles; t += 5) { /* every fifth triangle is a hole */
         mesh.n_triangles--;
         memcpy(mesh.triangle[t], mesh.triangle[mesh.n_triangles], sizeof *mesh.triangle);
@@ -140,9 +145,10 @@ static void test_open_edges(void **state)
 
     const double thick_m[] = {1e-2, 1e-4, 1e-6};
     for (int i = 0; i < 3; i++) {
-        char regime[64];
+        char regime[96];
         double half = 0.5 * thick_m[i];
-        mesh_box(&mesh, (const double[3]){0.5 - half, 20.0, -1.0}, (const double[3]){0.5 + half, 21.0, 1.0}, 0);
+        mesh_box(&mesh, (const double[3]){0.5 - half, 20.0, -1.0}, (const double[3]){0.5 + half, 21.0, 1.0},
+                 0);
         add_wall(&mesh, 30.0);
         snprintf(regime, sizeof regime, "edges of a fin %g m thin at 20 m", thick_m[i]);
         row(&mesh, 0, STATION_M, regime);
