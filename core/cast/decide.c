@@ -102,21 +102,6 @@ static int is_inside(const double side[3])
     return (side[0] >= 0.0 && side[1] >= 0.0 && side[2] >= 0.0) || (side[0] <= 0.0 && side[1] <= 0.0 && side[2] <= 0.0);
 }
 
-/* What double precision can tell of a side: its rounding, 8 units. */
-static double edge_blur(const double a[3], const double b[3])
-{
-    return 8.0 * 0x1p-53 * sqrt(fmax(dot(a, a), dot(b, b))) * edge_length(a, b);
-}
-
-/* Does the ray lie in the triangle's plane, as far as double precision can tell? Then it doesn't meet the triangle but, at
- * its edges, those beside it; where along the ray it would meet the triangle itself is anyone's guess. */
-static int is_edge_on(double v[3][3], const double side[3])
-{
-    for (int i = 0; i < 3; i++)
-        if (fabs(side[i]) > edge_blur(v[i], v[(i + 1) % 3])) return 0;
-    return 1;
-}
-
 /* Remembers the triangle that the ray misses by least, in units of what double precision can tell at its edges. */
 static void note_miss(struct search *s, uint32_t prim, double v[3][3], const double side[3])
 {
@@ -125,7 +110,7 @@ static void note_miss(struct search *s, uint32_t prim, double v[3][3], const dou
     double gap = -INFINITY, range = 0.0;
     for (int i = 0; i < 3; i++) {
         const double *a = v[i], *b = v[(i + 1) % 3];
-        double blur = edge_blur(a, b);
+        double blur = 8.0 * 0x1p-53 * sqrt(fmax(dot(a, a), dot(b, b))) * edge_length(a, b);
         if (-sign * side[i] <= gap * blur) continue;
         gap = -sign * side[i] / blur;
         range = edge_range(a, b, dir);
@@ -140,12 +125,14 @@ static void try_triangle(struct search *s, uint32_t prim)
 {
     double v[3][3], side[3];
     look_at(s->ray, prim, v, side);
-    if (is_edge_on(v, side)) return;
     if (!is_inside(side)) {
         note_miss(s, prim, v, side);
         return;
     }
     double range = held_range(s->ray, prim, v);
+    if (side[0] == 0.0 && side[1] == 0.0 && side[2] == 0.0) /* the ray lies in the plane: it meets an edge first */
+        range = fmin(fmin(edge_range(v[0], v[1], s->ray->dir), edge_range(v[1], v[2], s->ray->dir)),
+                     edge_range(v[2], v[0], s->ray->dir));
     if (!(range >= 0.0)) return;
     double same = 1e-12 * range;
     if (range < s->range_m - same || (range <= s->range_m + same && prim < s->prim)) {
