@@ -64,6 +64,7 @@ struct config {
     struct config_mesh mesh[CONFIG_MAX_MESHES];
     uint32_t n_meshes;
     double scene_tolerance_m;
+    int order_exactly;      /* surfaces that overlap are ordered in double */
     /* stations */
     struct config_station station[CONFIG_MAX_STATIONS];
     uint32_t n_stations;

@@ -52,6 +52,8 @@ static const struct cfg_key config_keys[] = {
     {"scene", CFG_MAP, .help = "What is scanned."},
     {"scene.tolerance_m", CFG_REAL, "m", "1e-6", 1e-9, 1, IN_CONFIG(scene_tolerance_m),
      .help = "What a vertex may be off: a mesh format of single precision with larger coordinates is refused."},
+    {"scene.order_exactly", CFG_BOOL, .def = "off", IN_CONFIG(order_exactly),
+     .help = "Order surfaces that overlap or cross in double; costs loading time, and speed where they do."},
     {"scene.meshes", CFG_LIST, .min = 1, .max = CONFIG_MAX_MESHES, LIST_OF(mesh, n_meshes),
      .help = "Mesh files; together they are the scene."},
     {"scene.meshes[]", CFG_MAP, .help = "A mesh file."},

@@ -41,7 +41,8 @@ static int add_mover(struct site *site, const struct config_mesh *mesh, const st
         half2 += half * half;
     }
     m->radius_m = sqrt(half2) * (1.0 + 1e-9) + 1e-6;
-    return bvh_create(m->scene, m->centre_m, cfg->profile.range_max_m, cfg->threads, report, &m->bvh, err);
+    rc = bvh_create(m->scene, m->centre_m, cfg->profile.range_max_m, cfg->threads, report, &m->bvh, err);
+    return rc == SH_OK && cfg->order_exactly ? bvh_order_exactly(m->bvh, err) : rc;
 }
 
 static int load_scene(struct site *site, const struct sh_report *report, struct sh_err *err)
@@ -122,8 +123,9 @@ static int find_bvh(struct site *site, const double station_m[3], const struct s
         }
     }
     int rc = bvh_create(site->scene, station_m, station_reach(site->cfg, station_m), site->cfg->threads, report, out, err);
-    if (rc == SH_OK) site->bvh[site->n_bvh++] = *out;
-    return rc;
+    if (rc != SH_OK) return rc;
+    site->bvh[site->n_bvh++] = *out;
+    return site->cfg->order_exactly ? bvh_order_exactly(*out, err) : SH_OK;
 }
 
 static int add_station(struct site *site, const struct config_station *station, const struct sh_report *report,

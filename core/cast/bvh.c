@@ -84,6 +84,8 @@ void bvh_free(struct bvh *bvh)
     if (bvh->rtc != NULL) rtcReleaseScene(bvh->rtc);
     rtcReleaseDevice(bvh->device);
     free(bvh->triangle);
+    free(bvh->rival_first);
+    free(bvh->rival);
     free(bvh);
 }
 

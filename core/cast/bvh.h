@@ -11,8 +11,9 @@
  * the ray's origin from it): rounding of a vertex 1, of the ray's origin 1, of its direction 1, Pluecker edge functions
  * in float (a difference, a cross and a dot product of three terms) at most 5. Sum 8.
  *
- * What float still decides is the order of two surfaces that lie within its resolution behind each other, about
- * 5e-7 of the range over the cosine of the incidence, away from their borders. */
+ * What float still decides is the order of two surfaces that lie within its resolution behind each other, about 5e-7 of the
+ * range over the cosine of the incidence, away from their borders; unless bvh_order_exactly was called: then such rivals are
+ * known from the start (rivals.c), and a hit on one compares its plane with those of the others. */
 #ifndef CORE_CAST_BVH_H
 #define CORE_CAST_BVH_H
 
@@ -29,7 +30,7 @@ enum {
 
 /* The exact plane of a triangle, two to a cache line; gathered as doubles (kernels.c).
  * The lowest 12 bits of each component of n carry something else: of n[0] the guard (a double's upper 12 bits, rounded up),
- * of n[1] and n[2] the label. They are part of n, and d goes with that n, so the plane still passes exactly through the
+ * of n[1] and n[2] the label and whether it has rivals. They are part of n, and d goes with that n, so the plane still passes exactly through the
  * triangle; it is tilted by less than 2^-40, which at the far end of a triangle of 100 m is 0.1 nm. */
 struct bvh_triangle {
     double n[3]; /* e1 x e2, local frame: length is twice the area */
@@ -47,8 +48,11 @@ static inline uint32_t bvh_spare(double x)
 
 static inline uint16_t bvh_label(const struct bvh_triangle *tri)
 {
-    return (uint16_t)(bvh_spare(tri->n[1]) | bvh_spare(tri->n[2]) << BVH_SPARE_BITS);
+    return (uint16_t)(bvh_spare(tri->n[1]) | (bvh_spare(tri->n[2]) & 15) << BVH_SPARE_BITS);
 }
+
+/* The last spare bit of n[2]: the triangle has rivals. */
+enum { BVH_RIVAL_BIT = 1 << (BVH_SPARE_BITS - 1) };
 
 struct bvh {
     RTCDevice device;
@@ -56,6 +60,7 @@ struct bvh {
     const struct scene *scene;
     struct bvh_triangle *triangle; /* one more than there are: the last stands for a miss, all NaN */
     double origin_m[3];
+    uint32_t *rival_first, *rival; /* rivals of triangle i: rival[rival_first[i] .. rival_first[i + 1]); NULL: there are none */
     double station_reach_m; /* rays begin at most this far from the origin */
     struct bvh_info info;
     int64_t bytes;          /* as Embree reports */
@@ -89,6 +94,8 @@ int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err);
 /* twins.c: of faces with the same three corners, however they are written, only the first stays in the float buffer. */
 int bvh_drop_twins(const struct bvh *bvh, float *vertex, struct sh_err *err);
 
+/* Marks a triangle as having rivals; its plane is made anew to go with that. */
+void bvh_mark_rival(struct bvh *bvh, uint32_t prim);
 /* ---- decide.c */
 struct decide_ray {
     const struct bvh *bvh;

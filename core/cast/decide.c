@@ -129,10 +129,10 @@ static void try_triangle(struct search *s, uint32_t prim)
         note_miss(s, prim, v, side);
         return;
     }
+    /* A ray within the plane does not meet the triangle; what stands on its edges it does meet. */
+    if (fabs(side[0] + side[1] + side[2]) <= 0x1p-50 * sqrt(dot(s->ray->bvh->triangle[prim].n, s->ray->bvh->triangle[prim].n)))
+        return;
     double range = held_range(s->ray, prim, v);
-    if (side[0] == 0.0 && side[1] == 0.0 && side[2] == 0.0) /* the ray lies in the plane: it meets an edge first */
-        range = fmin(fmin(edge_range(v[0], v[1], s->ray->dir), edge_range(v[1], v[2], s->ray->dir)),
-                     edge_range(v[2], v[0], s->ray->dir));
     if (!(range >= 0.0)) return;
     double same = 1e-12 * range;
     if (range < s->range_m - same || (range <= s->range_m + same && prim < s->prim)) {
@@ -171,6 +171,25 @@ static double search_radius(const struct decide_ray *ray, uint32_t prim, double 
     return fmin(radius, 0.01 * range_m + 4.0 * width_m);
 }
 
+/* Rivals whose planes the ray meets within what float can't order are tried; the others lie clearly before or behind. */
+static void try_rivals(struct search *s, uint32_t prim, double range_m)
+{
+    const struct decide_ray *ray = s->ray;
+    const struct bvh *bvh = ray->bvh;
+    if (bvh->rival_first == NULL) return;
+    const struct bvh_triangle *own = &bvh->triangle[prim];
+    uint32_t end = bvh->rival_first[prim + 1];
+    if (bvh->rival_first[prim] == end) return;
+    double width_m = 4.0 * bvh_width_m(bvh, prim);
+    double steep = sqrt(dot(own->n, own->n)) / fabs(dot(own->n, ray->dir));
+    for (uint32_t k = bvh->rival_first[prim]; k < end; k++) {
+        const struct bvh_triangle *tri = &bvh->triangle[bvh->rival[k]];
+        double along = fabs(dot(tri->n, ray->dir)), length = sqrt(dot(tri->n, tri->n));
+        double gap = fabs((tri->d - dot(tri->n, ray->o_local)) / dot(tri->n, ray->dir) - range_m);
+        if (!(gap * along > width_m * (steep * along + length))) try_triangle(s, bvh->rival[k]);
+    }
+}
+
 void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct cast_counters *counters,
                 struct decide_hit *hit)
 {
@@ -181,7 +200,10 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct cas
         try_triangle(&s, prim);
         /* Inside in double as well, and further from the border than float can blur: the common case. Nearer, another
          * triangle of the edge may lie in front of it by less than float can tell. */
-        if (s.prim == prim && s.border_m > bvh_width_m(ray->bvh, prim)) break;
+        if (s.prim == prim && s.border_m > bvh_width_m(ray->bvh, prim)) {
+            try_rivals(&s, prim, s.range_m);
+            break;
+        }
         counters->decided++;
         double range_m = (double)t, radius_m = search_radius(ray, prim, range_m);
         try_around(&s, range_m, radius_m);

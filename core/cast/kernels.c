@@ -107,7 +107,9 @@ static uint32_t refine(const double *restrict tri, uint32_t n_triangles, const u
         memcpy(&bits, &nx, sizeof bits);
         bits = (bits & ((1U << BVH_SPARE_BITS) - 1)) << BVH_GUARD_SHIFT;
         memcpy(&guard, &bits, sizeof guard);
-        uint32_t near = (double)least * fabs(along) < guard;
+        uint64_t more;
+        memcpy(&more, &nz, sizeof more);
+        uint32_t near = ((double)least * fabs(along) < guard) | (uint32_t)((more & BVH_RIVAL_BIT) != 0);
         doubt[i] = near;
         doubts += near;
     }

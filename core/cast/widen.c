@@ -100,20 +100,35 @@ static double measure(double v[3][3], double n[3], double *longest)
     return sqrt(dot(n, n));
 }
 
+/* The plane with normal n, as it is stored, passes through the triangle's centre. */
+static void set_offset(struct bvh_triangle *tri, double v[3][3])
+{
+    double centre[3];
+    for (int j = 0; j < 3; j++)
+        centre[j] = v[0][j] + ((v[1][j] - v[0][j]) + (v[2][j] - v[0][j])) / 3.0;
+    tri->d = dot(tri->n, centre);
+}
+
 /* Plane, guard and label. Seen from the origin, the distance from a ray to edge i of the widened triangle is at least
  * bary_i * area' * cos / longest', bary_i as Embree gives them. It has to exceed what the edge was moved by and once more the
  * rounding: then the ray is inside of the real triangle, whatever is rounded. */
 static void set_exact(struct bvh_triangle *tri, double v[3][3], double guard, uint16_t label)
 {
-    double centre[3];
     uint64_t bits;
     memcpy(&bits, &guard, sizeof bits);
     tri->n[0] = with_spare(tri->n[0], (uint32_t)((bits + ((1ULL << BVH_GUARD_SHIFT) - 1)) >> BVH_GUARD_SHIFT));
     tri->n[1] = with_spare(tri->n[1], label & ((1U << BVH_SPARE_BITS) - 1));
     tri->n[2] = with_spare(tri->n[2], (uint32_t)label >> BVH_SPARE_BITS);
-    for (int j = 0; j < 3; j++)
-        centre[j] = v[0][j] + ((v[1][j] - v[0][j]) + (v[2][j] - v[0][j])) / 3.0;
-    tri->d = dot(tri->n, centre);
+    set_offset(tri, v);
+}
+
+void bvh_mark_rival(struct bvh *bvh, uint32_t prim)
+{
+    struct bvh_triangle *tri = &bvh->triangle[prim];
+    double v[3][3];
+    corners(bvh, prim, v);
+    tri->n[2] = with_spare(tri->n[2], bvh_spare(tri->n[2]) | BVH_RIVAL_BIT);
+    set_offset(tri, v);
 }
 
 static void fill_triangle(struct bvh *bvh, uint32_t prim, float *vertex)
