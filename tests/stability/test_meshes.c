@@ -308,6 +308,12 @@ static void test_duplicates(void **state)
         rig_close(&rig);
         mesh_free(&mesh);
     }
+    table_check();
+}
+
+static void test_coplanar(void **state)
+{
+    (void)state;
     struct mesh mesh = {0};
     struct rig rig;
     const double corner[3] = {-4.0, 8.0, -4.0}, u[3] = {8.0, 1.0, 0.0}, v[3] = {0.0, 2.0, 8.0};
@@ -329,7 +335,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_needles), cmocka_unit_test(test_fan),        cmocka_unit_test(test_t_junctions),
-        cmocka_unit_test(test_soup),    cmocka_unit_test(test_duplicates),
+        cmocka_unit_test(test_soup),    cmocka_unit_test(test_duplicates), cmocka_unit_test(test_coplanar),
     };
     table_head("stability: meshes as they come");
     return cmocka_run_group_tests(tests, NULL, NULL);
