@@ -62,19 +62,37 @@ static double edge_range(const double a[3], const double b[3], const double dir[
     return (ad + s * ed) / dd;
 }
 
+/* Distance of the point at range t on the ray from the segment. */
+static double edge_gap(const double a[3], const double b[3], const double dir[3], double t)
+{
+    double e[3], w[3];
+    for (int i = 0; i < 3; i++) {
+        e[i] = b[i] - a[i];
+        w[i] = t * dir[i] - a[i];
+    }
+    double s = dot(w, e) / dot(e, e);
+    s = s < 0.0 ? 0.0 : s > 1.0 ? 1.0 : s;
+    for (int i = 0; i < 3; i++)
+        w[i] -= s * e[i];
+    return sqrt(dot(w, w));
+}
+
 /* Range to a triangle that the ray does meet. Where the ray lies almost in its plane the plane's range runs away: it is
- * kept between the triangle's ends. */
+ * kept between the edges that the ray passes. */
 static double held_range(const struct decide_ray *ray, uint32_t prim, double v[3][3])
 {
-    double lo = INFINITY, hi = -INFINITY, range = plane_range(ray, prim);
+    const double *n = ray->bvh->triangle[prim].n;
+    double range = plane_range(ray, prim), lo = INFINITY, hi = -INFINITY;
+    if (fabs(dot(n, ray->dir)) > 1e-6 * sqrt(dot(n, n))) return range;
     for (int i = 0; i < 3; i++) {
-        double along = dot(v[i], ray->dir);
-        lo = fmin(lo, along);
-        hi = fmax(hi, along);
+        const double *a = v[i], *b = v[(i + 1) % 3];
+        double t = edge_range(a, b, ray->dir), blur = 0x1p-40 * edge_length(a, b) + 0x1p-46 * fabs(t);
+        if (edge_gap(a, b, ray->dir, t) > blur + 1e-6 * edge_length(a, b)) continue; /* the ray does not pass here */
+        lo = fmin(lo, t);
+        hi = fmax(hi, t);
     }
-    if (range >= lo && range <= hi) return range;
-    if (range > hi) return hi;
-    return isfinite(lo) ? lo : range;
+    if (!(lo <= hi)) return range;
+    return range < lo || isnan(range) ? lo : range > hi ? hi : range;
 }
 
 /* Corners relative to the ray's origin, and on which side of each edge the ray passes. */
@@ -102,6 +120,18 @@ static int is_inside(const double side[3])
     return (side[0] >= 0.0 && side[1] >= 0.0 && side[2] >= 0.0) || (side[0] <= 0.0 && side[1] <= 0.0 && side[2] <= 0.0);
 }
 
+/* What double precision can tell of an edge's side. */
+static double blur(const double a[3], const double b[3])
+{
+    return 8.0 * 0x1p-53 * sqrt(fmax(dot(a, a), dot(b, b))) * edge_length(a, b);
+}
+
+/* A ray within the plane, as far as double precision can tell, does not meet the triangle; what stands on its edges it does. */
+static int is_edge_on(double v[3][3], const double side[3])
+{
+    return fabs(side[0] + side[1] + side[2]) <= blur(v[0], v[1]) + blur(v[1], v[2]) + blur(v[2], v[0]);
+}
+
 /* Remembers the triangle that the ray misses by least, in units of what double precision can tell at its edges. */
 static void note_miss(struct search *s, uint32_t prim, double v[3][3], const double side[3])
 {
@@ -110,9 +140,9 @@ static void note_miss(struct search *s, uint32_t prim, double v[3][3], const dou
     double gap = -INFINITY, range = 0.0;
     for (int i = 0; i < 3; i++) {
         const double *a = v[i], *b = v[(i + 1) % 3];
-        double blur = 8.0 * 0x1p-53 * sqrt(fmax(dot(a, a), dot(b, b))) * edge_length(a, b);
-        if (-sign * side[i] <= gap * blur) continue;
-        gap = -sign * side[i] / blur;
+        double out = -sign * side[i] / blur(a, b);
+        if (out <= gap) continue;
+        gap = out;
         range = edge_range(a, b, dir);
     }
     if (gap >= s->near_gap || range < 0.0) return;
@@ -125,13 +155,11 @@ static void try_triangle(struct search *s, uint32_t prim)
 {
     double v[3][3], side[3];
     look_at(s->ray, prim, v, side);
+    if (is_edge_on(v, side)) return;
     if (!is_inside(side)) {
         note_miss(s, prim, v, side);
         return;
     }
-    /* A ray within the plane does not meet the triangle; what stands on its edges it does meet. */
-    if (fabs(side[0] + side[1] + side[2]) <= 0x1p-50 * sqrt(dot(s->ray->bvh->triangle[prim].n, s->ray->bvh->triangle[prim].n)))
-        return;
     double range = held_range(s->ray, prim, v);
     if (!(range >= 0.0)) return;
     double same = 1e-12 * range;
@@ -180,12 +208,13 @@ static void try_rivals(struct search *s, uint32_t prim, double range_m)
     const struct bvh_triangle *own = &bvh->triangle[prim];
     uint32_t end = bvh->rival_first[prim + 1];
     if (bvh->rival_first[prim] == end) return;
-    double width_m = 4.0 * bvh_width_m(bvh, prim);
+    double own_m = bvh_width_m(bvh, prim);
     double steep = sqrt(dot(own->n, own->n)) / fabs(dot(own->n, ray->dir));
     for (uint32_t k = bvh->rival_first[prim]; k < end; k++) {
         const struct bvh_triangle *tri = &bvh->triangle[bvh->rival[k]];
         double along = fabs(dot(tri->n, ray->dir)), length = sqrt(dot(tri->n, tri->n));
         double gap = fabs((tri->d - dot(tri->n, ray->o_local)) / dot(tri->n, ray->dir) - range_m);
+        double width_m = 4.0 * fmax(own_m, bvh_width_m(bvh, bvh->rival[k]));
         if (!(gap * along > width_m * (steep * along + length))) try_triangle(s, bvh->rival[k]);
     }
 }
@@ -200,10 +229,7 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct cas
         try_triangle(&s, prim);
         /* Inside in double as well, and further from the border than float can blur: the common case. Nearer, another
          * triangle of the edge may lie in front of it by less than float can tell. */
-        if (s.prim == prim && s.border_m > bvh_width_m(ray->bvh, prim)) {
-            try_rivals(&s, prim, s.range_m);
-            break;
-        }
+        if (s.prim == prim && s.border_m > bvh_width_m(ray->bvh, prim)) break;
         counters->decided++;
         double range_m = (double)t, radius_m = search_radius(ray, prim, range_m);
         try_around(&s, range_m, radius_m);
@@ -219,6 +245,7 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct cas
         prim = one.prim;
         t = one.t;
     }
+    if (s.prim != RTC_INVALID_GEOMETRY_ID) try_rivals(&s, s.prim, s.range_m);
     /* So near to an edge that double precision can't tell its sides apart: the edge is hit, nothing passes. */
     if (s.near_gap <= 1.0 && !(s.range_m <= s.near_range_m)) {
         counters->undecided++;
