@@ -166,6 +166,7 @@ static void test_mixed_sizes(void **state)
                     1e-3 * rig_unit(161, 3 * (uint64_t)i + 2));
     turn_about(&spot, NOWHERE, (double[3]){0});
     rig_open(&rig, mesh_scene(&mesh), station_m, station_m);
+    rig_order_exactly(&rig);
     for (uint32_t i = 0; i < spot.n_vertices; i++)
         rig_aim(&rig, spot.vertex[i]);
     rig_row_of_ranges(&rig, "2 mm screw on ground of 4 km, from 5 m", station_m, RIG_MICROMETRE);
@@ -195,6 +196,7 @@ static void crossing_row(double distance_m)
     turn_about(&spot, NOWHERE, (double[3]){0});
     turn_about(&mesh, station_m, station_m);
     rig_open(&rig, mesh_scene(&mesh), station_m, station_m);
+    rig_order_exactly(&rig);
     for (uint32_t i = 0; i < spot.n_vertices; i++)
         rig_aim(&rig, spot.vertex[i]);
     snprintf(regime, sizeof regime, "pole through a floor at %g m", distance_m);
@@ -227,6 +229,7 @@ static void test_thin_plate(void **state)
                  (const double[3]){80.0, 200.0 + thick_m[i], 80.0}, 0);
         turn_about(&mesh, station_m, station_m);
         rig_open(&rig, mesh_scene(&mesh), station_m, station_m);
+        rig_order_exactly(&rig);
         rig_aim_at_sphere(&rig, 5 * RAYS, 181);
         snprintf(regime, sizeof regime, "plate %g m thick at 200 m", thick_m[i]);
         rig_row_of_ranges(&rig, regime, station_m, RIG_MICROMETRE);
