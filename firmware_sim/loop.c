@@ -123,7 +123,6 @@ static int start_pacer(struct loop *loop, struct sh_err *err)
     return SH_OK;
 }
 
-/* A link that waits for nobody has its session at once: it must not miss the first tick. */
 static int start_pumps(struct loop *loop, struct sh_err *err)
 {
     int rc = SH_OK;

@@ -361,6 +361,11 @@ static void *pump_main(void *arg)
 
 int pump_start(struct pump *pump, struct sh_err *err)
 {
+    /* Sessions that are there from the start (a file's) begin with the first tick, however late the thread comes. */
+    struct link_event events[LINK_MAX_EVENTS];
+    int n = pump->ops->poll(pump->link, pump->wake_fd, 0, 0, events, LINK_MAX_EVENTS);
+    for (int i = 0; i < n; i++)
+        handle(pump, &events[i]);
     atomic_fetch_add(&pump->loop->pumps_busy, 1);
     int rc = pthread_create(&pump->thread, NULL, pump_main, pump);
     if (rc != 0) {

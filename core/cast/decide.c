@@ -8,9 +8,9 @@ enum { DECIDE_MAX_ROUNDS = 32 };
 
 struct search {
     const struct decide_ray *ray;
-    uint32_t prim;            /* best so far */
-    double range_m, border_m; /* its range, and how far the ray passes from its nearest edge */
-    uint32_t near_prim;       /* the one that the ray misses by least; gap 1: double precision can't tell */
+    uint32_t prim;             /* best so far */
+    double range_m, border_m;  /* its range, and how far the ray passes from its nearest edge */
+    uint32_t near_prim;        /* the one that the ray misses by least; gap 1: double precision can't tell */
     double near_gap, near_range_m;
 };
 
@@ -26,9 +26,9 @@ static int before(const double a[3], const double b[3])
     return 0;
 }
 
-/* On which side of the edge a-b the ray passes, as the distance across the ray times the edge's length;
- * corners relative to the ray's origin. Taken in one order of the corners whatever triangle asks, so that two
- * triangles of an edge get the same number with opposite signs. */
+/* On which side of the edge a-b the ray passes, as the distance across the ray times the edge's length; corners relative to
+ * the ray's origin. Taken in one order of the corners whatever triangle asks, so that two triangles of an edge get the same
+ * number with opposite signs. */
 static double edge_side(const double a[3], const double b[3], const double dir[3])
 {
     int swap = before(b, a);
@@ -62,8 +62,8 @@ static double edge_range(const double a[3], const double b[3], const double dir[
     return (ad + s * ed) / dd;
 }
 
-/* Range to a triangle that the ray does meet. Where the ray lies almost in its plane the plane's range runs
- * away: it is kept between the triangle's ends. */
+/* Range to a triangle that the ray does meet. Where the ray lies almost in its plane the plane's range runs away: it is
+ * kept between the triangle's ends. */
 static double held_range(const struct decide_ray *ray, uint32_t prim, double v[3][3])
 {
     double lo = INFINITY, hi = -INFINITY, range = plane_range(ray, prim);
@@ -99,8 +99,7 @@ static double edge_distance(double v[3][3], const double side[3])
 
 static int is_inside(const double side[3])
 {
-    return (side[0] >= 0.0 && side[1] >= 0.0 && side[2] >= 0.0) ||
-           (side[0] <= 0.0 && side[1] <= 0.0 && side[2] <= 0.0);
+    return (side[0] >= 0.0 && side[1] >= 0.0 && side[2] >= 0.0) || (side[0] <= 0.0 && side[1] <= 0.0 && side[2] <= 0.0);
 }
 
 /* What double precision can tell of a side: its rounding, 8 units. */
@@ -109,9 +108,8 @@ static double edge_blur(const double a[3], const double b[3])
     return 8.0 * 0x1p-53 * sqrt(fmax(dot(a, a), dot(b, b))) * edge_length(a, b);
 }
 
-/* Does the ray lie in the triangle's plane, as far as double precision can tell? Then it doesn't meet the
- * triangle but, at its edges, those beside it; where along the ray it would meet the triangle itself is
- * anyone's guess. */
+/* Does the ray lie in the triangle's plane, as far as double precision can tell? Then it doesn't meet the triangle but, at
+ * its edges, those beside it; where along the ray it would meet the triangle itself is anyone's guess. */
 static int is_edge_on(double v[3][3], const double side[3])
 {
     for (int i = 0; i < 3; i++)
@@ -119,8 +117,7 @@ static int is_edge_on(double v[3][3], const double side[3])
     return 1;
 }
 
-/* Remembers the triangle that the ray misses by least, in units of what double precision can tell at its
- * edges. */
+/* Remembers the triangle that the ray misses by least, in units of what double precision can tell at its edges. */
 static void note_miss(struct search *s, uint32_t prim, double v[3][3], const double side[3])
 {
     const double *dir = s->ray->dir;
@@ -177,8 +174,7 @@ static void try_around(struct search *s, double range_m, double radius_m)
     rtcPointQuery(ray->bvh->rtc, &query, &context, visit, s);
 }
 
-/* How far from the proposed point along the ray an edge's neighbours may be met: the width, stretched by the
- * incidence. */
+/* How far from the proposed point along the ray an edge's neighbours may be met: the width, stretched by the incidence. */
 static double search_radius(const struct decide_ray *ray, uint32_t prim, double range_m)
 {
     const struct bvh_triangle *tri = &ray->bvh->triangle[prim];
@@ -188,8 +184,7 @@ static double search_radius(const struct decide_ray *ray, uint32_t prim, double 
     return fmin(radius, 0.01 * range_m + 4.0 * width_m);
 }
 
-/* Rivals whose planes the ray meets within what float can't order are tried; the others lie clearly before or
- * behind. */
+/* Rivals whose planes the ray meets within what float can't order are tried; the others lie clearly before or behind. */
 static void try_rivals(struct search *s, uint32_t prim, double range_m)
 {
     const struct decide_ray *ray = s->ray;
@@ -212,16 +207,13 @@ static void try_rivals(struct search *s, uint32_t prim, double range_m)
 void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct cast_counters *counters,
                 struct decide_hit *hit)
 {
-    struct search s = {.ray = ray,
-                       .range_m = INFINITY,
-                       .prim = RTC_INVALID_GEOMETRY_ID,
-                       .near_prim = RTC_INVALID_GEOMETRY_ID,
-                       .near_gap = INFINITY};
+    struct search s = {.ray = ray, .range_m = INFINITY, .prim = RTC_INVALID_GEOMETRY_ID,
+                       .near_prim = RTC_INVALID_GEOMETRY_ID, .near_gap = INFINITY};
     counters->near_border++;
     for (int round = 0; round < DECIDE_MAX_ROUNDS && prim != RTC_INVALID_GEOMETRY_ID; round++) {
         try_triangle(&s, prim);
-        /* Inside in double as well, and further from the border than float can blur: the common case. Nearer,
-         * another triangle of the edge may lie in front of it by less than float can tell. */
+        /* Inside in double as well, and further from the border than float can blur: the common case. Nearer, another
+         * triangle of the edge may lie in front of it by less than float can tell. */
         if (s.prim == prim && s.border_m > bvh_width_m(ray->bvh, prim)) {
             try_rivals(&s, prim, s.range_m);
             break;
@@ -236,14 +228,12 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct cas
             org[i] = (float)ray->o_local[i];
             dir[i] = (float)ray->dir[i];
         }
-        struct bvh_one one = {.t_min = nextafterf((float)(range_m + 0.5 * radius_m), INFINITY),
-                              .t_max = ray->t_max};
+        struct bvh_one one = {.t_min = nextafterf((float)(range_m + 0.5 * radius_m), INFINITY), .t_max = ray->t_max};
         bvh_intersect_one(ray->bvh, org, dir, &one);
         prim = one.prim;
         t = one.t;
     }
-    /* So near to an edge that double precision can't tell its sides apart: the edge is hit, nothing passes.
-     */
+    /* So near to an edge that double precision can't tell its sides apart: the edge is hit, nothing passes. */
     if (s.near_gap <= 1.0 && !(s.range_m <= s.near_range_m)) {
         counters->undecided++;
         s.prim = s.near_prim;

@@ -20,13 +20,13 @@ void rig_rebuild(struct rig *rig, const double origin_m[3], unsigned threads)
     if (bvh_create(rig->scene, origin_m, distance_m(origin_m, rig->station_m), threads, NULL, &rig->bvh,
                    &err) != SH_OK)
         fail_msg("%s", err.text);
-    if (rig->order_exactly && bvh_order_exactly(rig->bvh, &err) != SH_OK) fail_msg("%s", err.text);
+    if (rig->exact_order && bvh_order_exactly(rig->bvh, &err) != SH_OK) fail_msg("%s", err.text);
 }
 
 void rig_order_exactly(struct rig *rig)
 {
     struct sh_err err;
-    rig->order_exactly = 1;
+    rig->exact_order = 1;
     if (bvh_order_exactly(rig->bvh, &err) != SH_OK) fail_msg("%s", err.text);
 }
 

@@ -15,10 +15,10 @@
 struct rig {
     struct scene *scene;
     struct bvh *bvh;
+    int exact_order;      /* overlapping surfaces are ordered in double */
     struct caster *caster;
     struct reference *reference;
     double station_m[3];
-    int order_exactly;
     /* Rays: add with rig_aim or rig_direct, then rig_look. */
     uint32_t n, capacity;
     double *dx, *dy, *dz, *range_m;
@@ -37,8 +37,7 @@ struct rig_errors {
 /* Takes the scene. The BVH's frame is about origin_m. Fails the running test where anything can't be had. */
 void rig_open(struct rig *rig, struct scene *scene, const double station_m[3], const double origin_m[3]);
 void rig_close(struct rig *rig);
-/* From here on surfaces are ordered in double where they lie too near to each other for float
- * (bvh_order_exactly). */
+/* Orders surfaces that overlap in double (bvh_order_exactly): this BVH and those that follow. */
 void rig_order_exactly(struct rig *rig);
 /* Another BVH over the same scene and rays. */
 void rig_rebuild(struct rig *rig, const double origin_m[3], unsigned threads);

@@ -95,6 +95,9 @@ static void record(struct wire *wire, struct recording *r)
               (r->bytes[at + 4] | (size_t)r->bytes[at + 5] << 8 | (size_t)r->bytes[at + 6] << 16);
     }
     r->at[r->n_frames] = r->len;
+    assert_true(r->n_frames > 0);
+    assert_int_equal(r->bytes[8] | r->bytes[9] | r->bytes[10] | r->bytes[11],
+                     0); /* from the very first frame on */
 }
 
 /* Parses the frames first .. last - 1 without the byte at `lost`; every frame but the one it was in must

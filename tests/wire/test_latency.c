@@ -103,21 +103,35 @@ static void test_start_and_stop(void **state)
     close_session(&s);
 }
 
-/* The oracle counts pulses from the change before, so each change starts from the time that the first new
- * pulse had. */
-static void change(struct session *s, const char *line, double *prr_hz, double new_prr_hz, uint64_t *pulse0,
-                   int64_t *t0_ns)
+/* Since the change before: a sum of exact periods. A long double holds a second of nanoseconds to 1e-10. */
+struct rate {
+    int64_t prr_uhz;
+    uint64_t pulse0;
+    long double t0_ns; /* of pulse0 since the scan's start */
+};
+
+static long double time_of(const struct rate *rate, uint64_t pulse)
+{
+    return rate->t0_ns + (long double)(pulse - rate->pulse0) * 1e15L / (long double)rate->prr_uhz;
+}
+
+/* A time on the wire is the exact one, rounded down; the head carries fractions of a nanosecond from one rate
+ * to the next to 1/prr, hence the 1e-6. */
+static void check_time(int64_t t_ns, long double exact_ns)
+{
+    long double rest = exact_ns - (long double)t_ns;
+    assert_true(rest > -1e-6L && rest < 1.0L + 1e-6L);
+}
+
+static void change(struct session *s, const char *line, double prr_hz, struct rate *rate)
 {
     struct scanhead_frame frame;
     struct scanhead_point point[64];
     int64_t sent_ns = command(s, line);
     client_until(s->sh, SCANHEAD_EV_SETTINGS, &frame);
     uint64_t pulse = frame.event_value[0];
-    struct oracle before = {.prr_uhz = micro(*prr_hz)}, after = {.prr_uhz = micro(new_prr_hz)};
-    *t0_ns += oracle_time_ns(&before, pulse - *pulse0);
-    *pulse0 = pulse;
-    *prr_hz = new_prr_hz;
-    int64_t effect_ns = s->scan_t0_ns + *t0_ns;
+    *rate = (struct rate){.prr_uhz = micro(prr_hz), .pulse0 = pulse, .t0_ns = time_of(rate, pulse)};
+    int64_t effect_ns = s->scan_t0_ns + (int64_t)rate->t0_ns;
     assert_true(effect_ns > sent_ns && effect_ns - sent_ns <= EFFECT_NS);
     do
         next_points(s, &frame);
@@ -126,7 +140,7 @@ static void change(struct session *s, const char *line, double *prr_hz, double n
     int n = scanhead_points(s->sh, &frame, 0, point, 64);
     assert_true(n > 0);
     for (int i = 0; i < n; i++) /* each firing at the new rate, from the first one on */
-        assert_int_equal(point[i].t_ns, *t0_ns + oracle_time_ns(&after, frame.pulse0 + (uint64_t)i - pulse));
+        check_time(point[i].t_ns, time_of(rate, frame.pulse0 + (uint64_t)i));
 }
 
 static void test_change_in_mid_scan(void **state)
@@ -134,14 +148,12 @@ static void test_change_in_mid_scan(void **state)
     struct session s;
     open_session(&s, *state);
     start_scan(&s);
-    double prr_hz = ENDLESS.prr_hz;
-    uint64_t pulse0 = 0;
-    int64_t t0_ns = 0;
-    change(&s, "HEAD:PRR 123456.7", &prr_hz, 123456.7, &pulse0, &t0_ns);
-    change(&s, "HEAD:LINES 37.5", &prr_hz, 123456.7, &pulse0, &t0_ns);
-    change(&s, "HEAD:PAN 111", &prr_hz, 123456.7, &pulse0, &t0_ns);
-    change(&s, "HEAD:PRR 1.2 MHZ", &prr_hz, 1200000, &pulse0, &t0_ns);
-    change(&s, "SCAN:LINE:STOP 12", &prr_hz, 1200000, &pulse0, &t0_ns);
+    struct rate rate = {.prr_uhz = micro(ENDLESS.prr_hz)};
+    change(&s, "HEAD:PRR 123456.7", 123456.7, &rate);
+    change(&s, "HEAD:LINES 37.5", 123456.7, &rate);
+    change(&s, "HEAD:PAN 111", 123456.7, &rate);
+    change(&s, "HEAD:PRR 1.2 MHZ", 1200000, &rate);
+    change(&s, "SCAN:LINE:STOP 12", 1200000, &rate);
     close_session(&s);
 }
 
