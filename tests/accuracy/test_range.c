@@ -172,7 +172,7 @@ static void scan(const struct scene *scene, const double station_m[3], const dou
            (unsigned long long)sum.differ, (unsigned long long)sum.undecidable);
     fflush(stdout);
     add(&all_rays, &sum);
-    assert_true(sum.hits > 1000);
+    assert_true(sum.hits > 1000 / SHARE);
     assert_true(sum.differ == 0);
     assert_true(sum.max_m <= BOUND_M);
 }

@@ -8,7 +8,7 @@
 #include "tests/stability/rig.h"
 
 #ifdef SH_SANITIZE
-enum { RAYS = 2000 };
+enum { RAYS = 20000 };
 #else
 enum { RAYS = 100000 };
 #endif

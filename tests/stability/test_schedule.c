@@ -114,8 +114,10 @@ static uint64_t parts_of(int64_t prr_hz)
     return PART * 1000000000 * 10 / (uint64_t)prr_hz; /* period in 1/2310 ns: whole for each of the rates */
 }
 
-/* Each change keeps the time of its pulse, whole nanoseconds: the naive clock rounds each segment's length in
- * seconds to double; ours may show no drift of a nanosecond after 10^5 changes, in 17 minutes. */
+/* Ours: a change cuts the rest of a nanosecond to a part in prr_uhz, 1e-11 ns at the least of these rates, so
+ * 10^5 changes make 1e-6 ns; where the true time is a whole number of nanoseconds or just above, the floor of
+ * ours is then one less. No drift, but a bound of 1 ns. Naive: each segment's length in float seconds, or
+ * periods in whole nanoseconds. */
 static void test_changes(void **state)
 {
     (void)state;

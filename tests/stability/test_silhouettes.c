@@ -9,7 +9,7 @@
 static const double UTM_M[3] = {391431.25, 5819712.5, 34.0};
 
 #ifdef SH_SANITIZE
-enum { RAYS = 2000 };
+enum { RAYS = 20000 };
 #else
 enum { RAYS = 30000 };
 #endif
