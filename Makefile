@@ -115,6 +115,7 @@ test: deps
 test-unit test-wire test-accuracy test-stability: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test test-programs
 	@SCANHEAD=$(BUILD)/test/scanhead sh tests/run_all.sh $(BUILD) $(@:test-%=%)
+
 # ---- figures: speed and leaks; speed against accuracy, each method
 DEPS_CHART = gnuplot-nox
 bench: deps-build

@@ -3,7 +3,8 @@
 #
 #   run_tap.sh [-t SECONDS] PROGRAM...        SECONDS per program; default $TAP_LIMIT_S, or 300
 #
-# One line per program; of one that fails also all it printed but its passed tests. The reasons of skips follow, and
+# One line per program, and the tables of the stability and accuracy programs; of one that fails all it printed but its passed
+# tests. The reasons of skips follow, and
 # the last line is `N passed, N failed, N skipped`. Exit status 1 when anything failed, 2 for wrong usage.
 # What counts as a failure beside `not ok`: fewer results than planned; a status other than 0, a signal or no end
 # within the limit, where no failure says so already; and a program without any result.
@@ -92,7 +93,12 @@ run_one() {
     total_skipped=$((total_skipped + skipped))
     printf '%-4s %-32s %4d ok %4d not ok %4d skip  %d.%03d s%s\n' "$([ "$failed" -eq 0 ] && echo ok || echo FAIL)" \
         "$name" "$passed" "$failed" "$skipped" $(((end_ms - start_ms) / 1000)) $(((end_ms - start_ms) % 1000)) "$why"
-    [ "$failed" -eq 0 ] && return
+    if [ "$failed" -eq 0 ]; then
+        case $program in # their tables are what they are for
+        */stability/* | */accuracy/*) grep -a '^# ' "$work/out" | grep -a -v -E '^# (not )?ok' | sed 's/^# /    /' ;;
+        esac
+        return
+    fi
     grep -a -v -i -E '^ok([[:space:]]|$)|^not ok .*# *skip|^1\.\.[0-9]' "$work/out" | sed 's/^/    /'
     sed 's/^/    /' "$work/err"
 }
