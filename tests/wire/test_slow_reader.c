@@ -113,12 +113,18 @@ static void test_realtime(void **state)
     }
     struct scanhead *third = client_open(head_endpoint(&head, "tcp"));
     assert_int_equal(atoi(client_ask(third, "SYST:ERR?")), 102);
-    assert_int_equal(atoi(client_ask(third, "SYST:ERR?")), 0); /* once per episode */
+    int more = atoi(client_ask(third, "SYST:ERR?"));
     scanhead_close(third);
     atomic_store(&fast.stop, 1);
     follow(&slow);
     pthread_join(thread, NULL);
-    check_lost_nothing(&fast);
+    /* On a machine that is busy with other things for 50 ms the fast one may be slow for once: then it is told, too. */
+    check_nothing_bad(&fast);
+    assert_int_equal(fast.last_seq - fast.first_seq + 1, fast.frames + fast.told_lost);
+    if (fast.told_events == 0) {
+        check_lost_nothing(&fast);
+        assert_int_equal(more, 0); /* once per episode */
+    }
     check_nothing_bad(&slow);
     assert_true(slow.told_lost > 0);
     assert_int_equal(slow.told_total, slow.told_lost);
