@@ -139,8 +139,9 @@ static void test_realtime(void **state)
     close(hold[0]);
     close(hold[1]);
     head_end(&head, SIGTERM);
-    assert_int_equal(stats_uint(wire, "reader_lost_frames"), slow.told_lost);
-    assert_int_equal(stats_uint(wire, "pulses"), fast.pulses);
+    /* The third reader, who only asked, may have lost some as well. */
+    assert_true(stats_uint(wire, "reader_lost_frames") >= slow.told_lost + fast.told_lost);
+    if (fast.told_events == 0) assert_int_equal(stats_uint(wire, "pulses"), fast.pulses);
     assert_int_equal(stats_uint(wire, "lost_pulses"), 0);
 }
 
