@@ -32,7 +32,7 @@ SAN ?=
 # No contraction to FMA: the same numbers on every instruction set. errno and traps of libm are not used.
 FP = -ffp-contract=off -fno-math-errno -fno-trapping-math
 HEADS_DIR = $(PREFIX)/share/scanhead/heads
-ALL_CPPFLAGS = -I. -D_GNU_SOURCE -DSCANHEAD_HEADS_DIR='"$(HEADS_DIR)"' -MMD -MP $(CPPFLAGS)
+ALL_CPPFLAGS = -I. -D_GNU_SOURCE -MMD -MP $(CPPFLAGS)
 ALL_CFLAGS = -std=c11 $(OPT) -g $(FP) $(CWARN) $(WERROR) -fPIC -pthread $(SAN) $(PKG_CFLAGS) $(CFLAGS)
 ALL_CXXFLAGS = -std=c++17 $(OPT) -g $(FP) $(WARN) $(WERROR) -fPIC -pthread $(SAN) $(CXXFLAGS)
 EMBREE = $(if $(wildcard /usr/include/embree4/rtcore.h),-lembree4,-lembree3)

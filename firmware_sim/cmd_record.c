@@ -25,7 +25,8 @@ static const char HELP[] =
     "  --crs CRS        local, ecef or utm (CONFIG only)\n"
     "  --threads N      casters (CONFIG only)\n"
     "  --quiet          no progress\n\n"
-    "Exit status 1 when the stream ended before the scan did; what came until then is kept in FILE.\n";
+    "Exit status 1 when the recording is not complete: the stream ended before the scan did, or frames or pulses were\n"
+    "lost on the way. What came is kept in FILE all the same.\n";
 
 enum { MAX_FILES = 8 };
 enum { OPT_STATION = 256, OPT_FRAMES, OPT_DURATION, OPT_LISTEN, OPT_ASCII, OPT_EMPTY, OPT_STATS, OPT_SET, OPT_CRS,
@@ -76,6 +77,8 @@ static int add_file(struct record *r, const char *path)
 {
     struct sh_err err = {0};
     if (r->n_files == MAX_FILES) return cmd_usage("record", "at most %d files", MAX_FILES);
+    for (int i = 0; i < r->n_files; i++)
+        if (strcmp(r->file[i].path, path) == 0) return cmd_usage("record", "-o %s: given twice", path);
     r->file[r->n_files].path = path;
     r->file[r->n_files].ops = recorder_find(path, &err);
     if (r->file[r->n_files].ops == NULL) return cmd_fail(&err);
@@ -203,14 +206,26 @@ static int write_stats(const struct record *r, struct scanhead *sh, const struct
     return rc;
 }
 
-static void say_result(const struct record *r, struct scanhead *sh, const struct recording_result *result)
+/* Frames that never came: gaps in the sequence; those with a wrong checksum are among them but at the very end. */
+static uint64_t count_lost(struct scanhead *sh)
 {
     struct scanhead_stats s;
     scanhead_get_stats(sh, &s);
-    uint64_t lost = s.bad_payload + s.seq_lost + s.dropped + s.reader_lost;
-    if (lost != 0 || result->lost_pulses != 0)
-        fprintf(stderr, "scanhead: warning: not complete: %llu frames lost to this reader, %llu pulses by the head\n",
-                (unsigned long long)lost, (unsigned long long)result->lost_pulses);
+    return (s.seq_lost > s.bad_payload ? s.seq_lost : s.bad_payload) + s.dropped;
+}
+
+static int check_complete(struct scanhead *sh, const struct recording_result *result, struct sh_err *err)
+{
+    struct scanhead_stats s;
+    scanhead_get_stats(sh, &s);
+    uint64_t pulses = s.pulses_lost > result->lost_pulses ? s.pulses_lost : result->lost_pulses;
+    if (count_lost(sh) == 0 && pulses == 0) return SH_OK;
+    return sh_fail(err, SH_EIO, "the recording is not complete: %llu frames lost to this reader, %llu pulses by the head",
+                   (unsigned long long)count_lost(sh), (unsigned long long)pulses);
+}
+
+static void say_result(const struct record *r, const struct recording_result *result)
+{
     if (r->recording.progress)
         fprintf(stderr, "scanhead: %llu points, %llu shots without echo, %llu scans\n", (unsigned long long)result->points,
                 (unsigned long long)result->empty, (unsigned long long)result->scans);
@@ -241,15 +256,25 @@ static int record(struct record *r, struct scanhead *sh, struct sh_err *err)
     int closed = close_files(r, result.points != 0 || rc == SH_OK, &why);
     if (rc == SH_OK && closed != SH_OK) rc = sh_fail(err, closed, "%s", why.text);
     if (rc == SH_OK && r->stats != NULL) rc = write_stats(r, sh, &result, wall_s, err);
-    if (rc == SH_OK || result.points != 0) say_result(r, sh, &result);
-    return rc;
+    if (rc == SH_OK || result.points != 0) say_result(r, &result);
+    return rc == SH_OK ? check_complete(sh, &result, err) : rc;
+}
+
+static int ends_in(const char *text, const char *ending)
+{
+    size_t n = strlen(text), m = strlen(ending);
+    return n > m && strcmp(text + n - m, ending) == 0;
 }
 
 static int is_config(const char *source)
 {
-    size_t n = strlen(source);
-    return strncmp(source, "tty:", 4) != 0 && strncmp(source, "tcp:", 4) != 0 && strncmp(source, "fd:", 3) != 0 &&
-           !(n > 4 && strcmp(source + n - 4, ".shs") == 0);
+    return ends_in(source, ".yaml") || ends_in(source, ".yml");
+}
+
+static int is_stream(const char *source)
+{
+    return strncmp(source, "tty:", 4) == 0 || strncmp(source, "tcp:", 4) == 0 || strncmp(source, "fd:", 3) == 0 ||
+           ends_in(source, ".shs");
 }
 
 static int record_config(struct record *r, struct sh_err *err)
@@ -283,8 +308,7 @@ static int record_stream(struct record *r, struct sh_err *err)
         sh_fail(err, rc, "%s", why);
         return cmd_fail(err);
     }
-    size_t n = strlen(r->source);
-    if (strcmp(r->source + (n > 4 ? n - 4 : 0), ".shs") == 0) r->recording.listen = 1;
+    if (ends_in(r->source, ".shs")) r->recording.listen = 1;
     if (r->all_stations && !r->recording.listen) {
         char reply[512];
         rc = scanhead_command(sh, "HEAD:STATION? MAX", reply, sizeof reply, 5000);
@@ -308,5 +332,7 @@ int cmd_record(int argc, char **argv)
     r.recording.first_station = r.recording.last_station = (uint32_t)r.station;
     cmd_catch_signals();
     struct sh_err err = {0};
+    if (!is_config(r.source) && !is_stream(r.source))
+        return cmd_usage("record", "SOURCE %s: allowed tty:PATH, tcp:HOST:PORT, FILE.shs, CONFIG.yaml", r.source);
     return is_config(r.source) ? record_config(&r, &err) : record_stream(&r, &err);
 }

@@ -150,6 +150,7 @@ static int serve(const struct run_options *o, struct loop *loop, struct device *
     stats.cpu_s = clock_cpu_s();
     if (rc == SH_OK && o->stats != NULL) rc = cmd_write_stats(o->stats, &stats, err);
     if (rc == SH_OK) rc = device_close_journal(device, err);
+    if (rc == SH_OK) rc = loop_check_links(loop, err);
     if (stats.loop.lost_pulses != 0)
         fprintf(stderr, "scanhead: warning: %llu pulses could not be computed in time\n",
                 (unsigned long long)stats.loop.lost_pulses);

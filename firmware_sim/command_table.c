@@ -150,7 +150,8 @@ static void act_reset(struct command_call *call)
 static void act_step(struct command_call *call)
 {
     int64_t step_ns;
-    if (command_value_in_range(call, 1, INT64_MAX - call->dev->t_ns, &step_ns) != 0) return;
+    const int64_t day_ns = 86400000000000; /* a grant cannot be taken back */
+    if (command_value_in_range(call, 1, day_ns, &step_ns) != 0) return;
     if (!call->dev->step_allowed) {
         command_fail(call, CMD_E_SETTINGS, "%s needs the pace step", call->row->header);
         return;

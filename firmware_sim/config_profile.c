@@ -7,12 +7,29 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { MAX_DIRS = 4 };
+enum { MAX_DIRS = 6 };
 
 struct profile_dirs {
     char dir[MAX_DIRS][CONFIG_PATH_LEN];
     int n;
 };
+
+/* Where an installed program, and one in its build folder, have the profiles: beside it. */
+static void find_beside_program(struct profile_dirs *dirs)
+{
+    static const char *const beside[] = {"../share/scanhead/heads", "../config/heads"};
+    char program[CONFIG_PATH_LEN];
+    ssize_t n = readlink("/proc/self/exe", program, sizeof program - 1);
+    if (n <= 0) return;
+    program[n] = '\0';
+    char *slash = strrchr(program, '/');
+    if (slash == NULL) return;
+    slash[1] = '\0';
+    for (int i = 0; i < 2; i++) {
+        int len = snprintf(dirs->dir[dirs->n], CONFIG_PATH_LEN, "%s%s", program, beside[i]);
+        if (len > 0 && len < CONFIG_PATH_LEN) dirs->n++;
+    }
+}
 
 static void find_dirs(const char *config_file, struct profile_dirs *dirs)
 {
@@ -23,9 +40,7 @@ static void find_dirs(const char *config_file, struct profile_dirs *dirs)
     if (config_file != NULL)
         snprintf(dirs->dir[dirs->n++], CONFIG_PATH_LEN, "%.*sheads", CONFIG_PATH_LEN - 6,
                  cfg_dir_of(config_file, base));
-#ifdef SCANHEAD_HEADS_DIR
-    snprintf(dirs->dir[dirs->n++], CONFIG_PATH_LEN, "%s", SCANHEAD_HEADS_DIR);
-#endif
+    find_beside_program(dirs);
     snprintf(dirs->dir[dirs->n++], CONFIG_PATH_LEN, "config/heads");
 }
 

@@ -7,6 +7,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include "drivers/protocol/native.h"
 #include "firmware_sim/loop_private.h"
 
 enum { PACER_PRIORITY = 80 };
@@ -17,6 +18,27 @@ static uint32_t choose_threads(const struct config *cfg)
     return n < 1 ? 1 : n > LOOP_MAX_THREADS ? LOOP_MAX_THREADS : (uint32_t)n;
 }
 
+/* Bytes per second of the points at the rates that are set; a head can be told to go faster later. */
+static double stream_rate(const struct loop *loop)
+{
+    const struct config *cfg = loop->cfg;
+    const struct head_settings *h = &cfg->settings;
+    double sweep_udeg = 360e6 * cfg->profile.optical_gain / cfg->profile.facets;
+    double used = (double)(h->line_stop_udeg - h->line_start_udeg) / sweep_udeg;
+    return (double)h->prr_uhz * 1e-6 * (used < 1.0 ? used : 1.0) * NATIVE_POINT_LEN;
+}
+
+/* A link that can't carry the stream is refused before it loses any of it. */
+static int check_capacity(const struct loop *loop, const struct pump *pump, struct sh_err *err)
+{
+    double capacity = pump_capacity(pump), rate = stream_rate(loop);
+    char endpoint[300];
+    if (capacity <= 0.0 || capacity >= rate) return SH_OK;
+    pump_endpoint(pump, endpoint, sizeof endpoint);
+    return sh_fail(err, SH_EINPUT, "link %s: the stream has %.2f MB/s, the link carries %.2f MB/s; lower head.prr_hz", endpoint,
+                   1e-6 * rate, 1e-6 * capacity);
+}
+
 static int open_links(struct loop *loop, struct sh_err *err)
 {
     const struct config *cfg = loop->cfg;
@@ -24,7 +46,9 @@ static int open_links(struct loop *loop, struct sh_err *err)
     for (uint32_t i = 0; i < cfg->n_links + (loop->options.extra != NULL) && rc == SH_OK; i++) {
         const struct link_spec *spec = i < cfg->n_links ? &cfg->link[i] : loop->options.extra;
         rc = pump_open(loop, i, spec, &loop->pump[i], err);
-        if (rc == SH_OK) loop->n_pumps++;
+        if (rc != SH_OK) break;
+        loop->n_pumps++;
+        rc = check_capacity(loop, loop->pump[i], err);
     }
     return rc;
 }
@@ -191,6 +215,12 @@ static void fill_stats(struct loop *loop, struct loop_stats *stats)
     stats->late_p50_us = late_quantile_us(loop, 0.5);
     stats->late_p999_us = late_quantile_us(loop, 0.999);
     stats->late_max_us = 1e-3 * (double)atomic_load(&c->late_max_ns);
+}
+
+int loop_check_links(const struct loop *loop, struct sh_err *err)
+{
+    if (!atomic_load(&loop->link_failed)) return SH_OK;
+    return sh_fail(err, loop->link_error.code, "%s", loop->link_error.text);
 }
 
 void loop_join(struct loop *loop, struct loop_stats *stats)

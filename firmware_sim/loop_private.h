@@ -67,6 +67,8 @@ struct loop {
     _Atomic int64_t first_pulse_ns, last_pulse_ns; /* when released; 0: not yet */
 
     struct loop_reader reader[RING_MAX_READERS];
+    _Atomic int link_failed;
+    struct sh_err link_error;          /* of the first link that failed, once link_failed is 1 */
     struct pump *pump[LOOP_MAX_LINKS];
     uint32_t n_pumps;
     struct hasher *hasher;
@@ -90,6 +92,7 @@ void pump_wake(struct pump *pump);      /* real-time safe */
 void pump_join(struct pump *pump);
 void pump_close(struct pump *pump);
 void pump_endpoint(const struct pump *pump, char *buf, size_t len);
+double pump_capacity(const struct pump *pump); /* bytes per second; 0: no fixed limit */
 const char *pump_type(const struct pump *pump);
 
 /* The hash of the stream, a reader of its own (hash.c). */

@@ -16,7 +16,7 @@
 enum {
     REPLY_ROOM = 8192,
     BATCH_BYTES = 131072,  /* small ticks are written together up to this */
-    READ_BYTES = 4096,
+    READ_BYTES = 65536,
     DRAIN_NS = 2000000000, /* at the end a reader may take this long between two bytes */
 };
 
@@ -52,7 +52,7 @@ struct pump {
     struct session session[LINK_MAX_SESSIONS];
     pthread_t thread;
     int running;
-    int busy;
+    int failed; /* a write failed; why is still to be told */
 };
 
 int pump_open(struct loop *loop, uint32_t index, const struct link_spec *spec, struct pump **out, struct sh_err *err)
@@ -92,6 +92,11 @@ void pump_close(struct pump *pump)
 void pump_endpoint(const struct pump *pump, char *buf, size_t len)
 {
     pump->ops->endpoint(pump->link, buf, len);
+}
+
+double pump_capacity(const struct pump *pump)
+{
+    return pump->ops->capacity(pump->link);
 }
 
 const char *pump_type(const struct pump *pump)
@@ -179,16 +184,21 @@ static void do_line(struct pump *pump, struct session *s, enum command_line_kind
     loop_poke(pump->loop);
 }
 
-/* Lines wait while a step goes on: each is carried out, and answered, after the one before. */
+static int has_reply_room(const struct session *s)
+{
+    return s->reply_len + COMMAND_MAX_REPLY + 2 <= REPLY_ROOM || s->in_len - s->in_pos == READ_BYTES;
+}
+
+/* Lines wait while a step goes on, and until earlier replies are on their way: each is carried out, and answered, after the
+ * one before. Only who sends on and on without reading loses replies. */
 static void take_lines(struct pump *pump, struct session *s)
 {
-    while (s->in_pos < s->in_len && !s->stepping) {
+    while (s->in_pos < s->in_len && !s->stepping && has_reply_room(s)) {
         enum command_line_kind kind = command_lines_feed(&s->lines, s->in[s->in_pos++]);
         if (kind != COMMAND_LINE_NONE) do_line(pump, s, kind);
     }
 }
 
-/* Reads what there is, as long as replies have room: a client that never reads its replies stops being heard. */
 static void read_commands(struct pump *pump, struct session *s, int index)
 {
     memmove(s->in, s->in + s->in_pos, s->in_len - s->in_pos);
@@ -198,7 +208,7 @@ static void read_commands(struct pump *pump, struct session *s, int index)
     if (n > 0) s->in_len += (uint32_t)n;
     take_lines(pump, s);
     if (s->replies_dropped != 0) {
-        device_report(pump->loop->device, CMD_E_OVERRUN, "a client does not read its replies; some were dropped");
+        device_report(pump->loop->device, CMD_E_OVERRUN, "a client sends without reading its replies; some were dropped");
         s->replies_dropped = 0;
     }
 }
@@ -270,6 +280,7 @@ static void fill(struct pump *pump, struct session *s)
         add_reply(s, s->step_reply);
         take_lines(pump, s);
     }
+    take_lines(pump, s); /* those that waited for room */
     take_replies(pump, s);
     struct loop_reader *reader = &pump->loop->reader[s->reader];
     atomic_store(&reader->cursor, s->cursor);
@@ -285,17 +296,25 @@ static int write_out(struct pump *pump, struct session *s, int index)
         ssize_t n = pump->ops->write(pump->link, index, s->out + s->out_pos, s->out_len - s->out_pos);
         if (n == 0) return 1;
         if (n < 0) {
-            if (n != SH_ECLOSED) {
-                struct sh_err why;
-                sh_fail(&why, (int)n, "link %s: writing failed", pump->ops->name);
-                sh_warn(pump->loop->options.report, "%s", why.text);
-            }
+            if (n != SH_ECLOSED) pump->failed = 1; /* the reason comes with LINK_CLOSED */
             close_session(pump, s);
             return 0;
         }
         s->out_pos += (uint32_t)n;
         s->moved_ns = clock_now_ns();
     }
+}
+
+/* The first link that could not write what it had to makes the run a failure. */
+static void fail_link(struct pump *pump, const char *why)
+{
+    char endpoint[300];
+    int none = 0;
+    pump->failed = 0;
+    pump->ops->endpoint(pump->link, endpoint, sizeof endpoint);
+    sh_warn(pump->loop->options.report, "link %s: %s; what follows is missing there", endpoint, why);
+    if (atomic_compare_exchange_strong(&pump->loop->link_failed, &none, 1))
+        sh_fail(&pump->loop->link_error, SH_EIO, "link %s: %s; it is cut short", endpoint, why);
 }
 
 static void handle(struct pump *pump, const struct link_event *event)
@@ -306,6 +325,7 @@ static void handle(struct pump *pump, const struct link_event *event)
         open_session(pump, s, event->peer);
         break;
     case LINK_CLOSED:
+        if (pump->failed) fail_link(pump, event->peer);
         close_session(pump, s);
         break;
     case LINK_READABLE:
@@ -333,6 +353,16 @@ static int has_more(struct pump *pump)
     return 0;
 }
 
+/* At the end of the run: what a reader did not get counts as lost. */
+static void leave_session(struct pump *pump, struct session *s)
+{
+    struct loop *loop = pump->loop;
+    uint32_t missing = s->have_seq ? loop->seq - s->next_seq : 0; /* the pacing thread is done with seq */
+    if (s->out_pos < s->out_len) missing++; /* at least the frame it was in the middle of */
+    if (atomic_load(&loop->pacer_done) && missing != 0) atomic_fetch_add(&loop->counters->reader_lost_frames, missing);
+    set_active(pump, s, 0);
+}
+
 static void *pump_main(void *arg)
 {
     struct pump *pump = arg;
@@ -354,7 +384,7 @@ static void *pump_main(void *arg)
             if (pump->session[i].open && write_out(pump, &pump->session[i], i)) want_write |= 1U << i;
     }
     for (int i = 0; i < LINK_MAX_SESSIONS; i++)
-        if (pump->session[i].open) set_active(pump, &pump->session[i], 0);
+        if (pump->session[i].open) leave_session(pump, &pump->session[i]);
     atomic_fetch_sub(&loop->pumps_busy, 1);
     return NULL;
 }

@@ -15,7 +15,7 @@ struct recording {
     struct recording_result *result;
     int64_t next_report_ns, scan_t0_ns; /* monotonic; device time of the scan's start, -1 before it */
     int stopping;
-    int scan_over, idle;
+    int scan_over, idle, within_scan;
 };
 
 static int command(struct recording *r, const char *line, char *reply, size_t len, struct sh_err *err)
@@ -50,6 +50,7 @@ static void look_at(struct recording *r, const struct scanhead_frame *frame)
 {
     r->result->frames++;
     if (frame->type == SCANHEAD_POINTS) {
+        r->within_scan = 1;
         r->result->pulses += frame->n_pulses;
         if (r->scan_t0_ns < 0) r->scan_t0_ns = frame->t_ns - frame->scan_t0_ns;
     }
@@ -57,6 +58,7 @@ static void look_at(struct recording *r, const struct scanhead_frame *frame)
     if (frame->event == SCANHEAD_EV_SCAN_START) r->scan_t0_ns = (int64_t)frame->event_value[1];
     if (frame->event == SCANHEAD_EV_SCAN_END) {
         r->scan_over = 1;
+        r->within_scan = 0;
         r->result->scans++;
         r->result->lost_pulses += frame->event_value[2];
     }
@@ -156,7 +158,9 @@ int recording_run(struct scanhead *sh, const struct recording_options *options, 
             rc = follow(&r, err);
         }
     } while (rc == SH_OK && !r.stopping && station != 0 && station++ < options->last_station);
-    if (rc == SH_ECLOSED && options->listen) rc = SH_OK;
+    if (rc == SH_ECLOSED && options->listen && result->frames == 0)
+        return sh_fail(err, SH_EFORMAT, "the stream ended without a single frame");
+    if (rc == SH_ECLOSED && options->listen && !r.within_scan) return SH_OK;
     result->ended_early = rc == SH_ECLOSED;
-    return rc;
+    return rc == SH_ECLOSED && r.within_scan ? sh_fail(err, rc, "the stream ended in the middle of a scan") : rc;
 }
