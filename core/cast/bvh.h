@@ -29,7 +29,8 @@ enum {
 };
 
 /* The exact plane of a triangle, two to a cache line; gathered as doubles (kernels.c).
- * The lowest 12 bits of each component of n carry something else: of n[0] the guard (a double's upper 12 bits, rounded up),
+ * The lowest 12 bits of each component of n carry something else: of n[0] the guard (8 bits of a double's exponent, 4 of its
+ * mantissa, rounded up),
  * of n[1] and n[2] the label and whether it has rivals. They are part of n, and d goes with that n, so the plane still passes exactly through the
  * triangle; it is tilted by less than 2^-40, which at the far end of a triangle of 100 m is 0.1 nm. */
 struct bvh_triangle {
@@ -37,7 +38,11 @@ struct bvh_triangle {
     double d;    /* n . p = d */
 } __attribute__((aligned(32)));
 _Static_assert(sizeof(struct bvh_triangle) == 32, "half a cache line");
-enum { BVH_SPARE_BITS = 12, BVH_GUARD_SHIFT = 51 };
+enum {
+    BVH_SPARE_BITS = 12,
+    BVH_GUARD_SHIFT = 48,              /* of a double that keeps 4 bits of its mantissa */
+    BVH_GUARD_BASE = (1023 - 100) << 4, /* guards from 2^-100; 2^156 stands for always */
+};
 
 static inline uint32_t bvh_spare(double x)
 {

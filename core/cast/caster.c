@@ -74,17 +74,26 @@ uint32_t cast_encoder_count(double turn, double counts_per_turn)
     return count >= counts_per_turn ? 0 : (uint32_t)(uint64_t)count;
 }
 
+static void decide_one(struct caster *c, struct decide_ray *ray, const struct kernel_hits *hits, uint32_t *prim, uint32_t i)
+{
+    struct decide_hit hit;
+    ray->dir[0] = hits->dx[i];
+    ray->dir[1] = hits->dy[i];
+    ray->dir[2] = hits->dz[i];
+    decide_hit(ray, prim[i], c->t[i], &c->counters, &hit);
+    prim[i] = hit.prim;
+    hits->range_m[i] = hit.prim == RTC_INVALID_GEOMETRY_ID ? (double)NAN : hit.range_m;
+}
+
+/* Doubts are few: whole packets without any are passed at once. */
 static void decide(struct caster *c, struct decide_ray *ray, const struct kernel_hits *hits, uint32_t *prim, uint32_t n)
 {
-    for (uint32_t i = 0; i < n; i++) {
-        if (!c->doubt[i]) continue;
-        struct decide_hit hit;
-        ray->dir[0] = hits->dx[i];
-        ray->dir[1] = hits->dy[i];
-        ray->dir[2] = hits->dz[i];
-        decide_hit(ray, prim[i], c->t[i], &c->counters, &hit);
-        prim[i] = hit.prim;
-        hits->range_m[i] = hit.prim == RTC_INVALID_GEOMETRY_ID ? (double)NAN : hit.range_m;
+    for (uint32_t base = 0; base < n; base += SCHEDULE_PACKET) {
+        uint32_t any = 0, end = n - base < SCHEDULE_PACKET ? n : base + SCHEDULE_PACKET;
+        for (uint32_t i = base; i < base + SCHEDULE_PACKET; i++)
+            any |= c->doubt[i]; /* beyond n: stale, but there; a doubt too many costs a look */
+        for (uint32_t i = base; any != 0 && i < end; i++)
+            if (c->doubt[i]) decide_one(c, ray, hits, prim, i);
     }
 }
 

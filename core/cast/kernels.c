@@ -105,7 +105,7 @@ static uint32_t refine(const double *restrict tri, uint32_t n_triangles, const u
         uint64_t bits;
         double guard;
         memcpy(&bits, &nx, sizeof bits);
-        bits = (bits & ((1U << BVH_SPARE_BITS) - 1)) << BVH_GUARD_SHIFT;
+        bits = ((bits & ((1U << BVH_SPARE_BITS) - 1)) + BVH_GUARD_BASE) << BVH_GUARD_SHIFT;
         memcpy(&guard, &bits, sizeof guard);
         uint64_t more;
         memcpy(&more, &nz, sizeof more);

@@ -112,11 +112,19 @@ static void set_offset(struct bvh_triangle *tri, double v[3][3])
 /* Plane, guard and label. Seen from the origin, the distance from a ray to edge i of the widened triangle is at least
  * bary_i * area' * cos / longest', bary_i as Embree gives them. It has to exceed what the edge was moved by and once more the
  * rounding: then the ray is inside of the real triangle, whatever is rounded. */
-static void set_exact(struct bvh_triangle *tri, double v[3][3], double guard, uint16_t label)
+static uint32_t guard_code(double guard)
 {
+    const int64_t most = (1 << BVH_SPARE_BITS) - 1;
     uint64_t bits;
     memcpy(&bits, &guard, sizeof bits);
-    tri->n[0] = with_spare(tri->n[0], (uint32_t)((bits + ((1ULL << BVH_GUARD_SHIFT) - 1)) >> BVH_GUARD_SHIFT));
+    if (!(guard < INFINITY)) return (uint32_t)most;
+    int64_t code = (int64_t)((bits + ((1ULL << BVH_GUARD_SHIFT) - 1)) >> BVH_GUARD_SHIFT) - BVH_GUARD_BASE;
+    return (uint32_t)(code < 0 ? 0 : code > most ? most : code);
+}
+
+static void set_exact(struct bvh_triangle *tri, double v[3][3], double guard, uint16_t label)
+{
+    tri->n[0] = with_spare(tri->n[0], guard_code(guard));
     tri->n[1] = with_spare(tri->n[1], label & ((1U << BVH_SPARE_BITS) - 1));
     tri->n[2] = with_spare(tri->n[2], (uint32_t)label >> BVH_SPARE_BITS);
     set_offset(tri, v);
