@@ -22,7 +22,7 @@ struct caster {
     uint32_t prim[CHUNK], hit[CHUNK];       /* as proposed; as decided */
     float t[CHUNK], u[CHUNK], v[CHUNK];
     uint32_t doubt[CHUNK];                  /* the proposal has to be decided in double */
-    uint16_t label[CHUNK];
+    uint32_t seen[CHUNK], label[CHUNK];     /* labels of the last hits; of what counts in the end */
     struct mover_rays mover;                /* touched only where something moves */
     struct cast_counters counters;
     struct cast_profile *profile;
@@ -82,6 +82,7 @@ static void decide_one(struct caster *c, struct decide_ray *ray, const struct ke
     ray->dir[2] = hits->dz[i];
     decide_hit(ray, prim[i], c->t[i], &c->counters, &hit);
     prim[i] = hit.prim;
+    hits->label[i] = hit.prim == RTC_INVALID_GEOMETRY_ID ? (uint32_t)LINE_LABEL_NONE : bvh_label(&ray->bvh->triangle[hit.prim]);
     hits->range_m[i] = hit.prim == RTC_INVALID_GEOMETRY_ID ? (double)NAN : hit.range_m;
 }
 
@@ -111,7 +112,7 @@ void caster_hits(struct caster *c, const struct bvh *bvh, const double station_m
     for (uint32_t at = 0; at < n; at += CHUNK) {
         uint32_t m = n - at < CHUNK ? n - at : CHUNK;
         struct kernel_hits hits = {.dx = dx + at, .dy = dy + at, .dz = dz + at, .prim = c->prim, .u = c->u, .v = c->v,
-                                   .range_m = range_m + at, .doubt = c->doubt};
+                                   .range_m = range_m + at, .label = c->seen, .doubt = c->doubt};
         kernel_to_float(hits.dx, hits.dy, hits.dz, m, c->fx, c->fy, c->fz);
         ends(c, CAST_DIRECTIONS);
         bvh_intersect(bvh, &rays, m);
@@ -145,14 +146,6 @@ static void positions(struct caster *c, const struct cast_setup *s, int linear, 
     kernel_geo(c->ex, c->ey, c->ez, s->xyz_scale_m, n, block->a + at, block->b + at, block->c + at);
 }
 
-/* Label by triangle; the record behind the last one stands for a miss. */
-static void take_labels(struct caster *c, const struct bvh *bvh, uint32_t n)
-{
-    uint32_t last = bvh->scene->n_triangles;
-    for (uint32_t i = 0; i < n; i++)
-        c->label[i] = bvh_label(&bvh->triangle[c->hit[i] < last ? c->hit[i] : last]);
-}
-
 /* A moving body, cast in its own frame: what it hides gives way. */
 static void cast_mover(struct caster *c, const struct cast_setup *s, const struct cast_mover *m, uint32_t n)
 {
@@ -171,7 +164,7 @@ static void cast_mover(struct caster *c, const struct cast_setup *s, const struc
     for (uint32_t i = 0; i < n; i++) {
         if (!(r->range_m[i] < c->range_m[i]) && !(isnan(c->range_m[i]) && !isnan(r->range_m[i]))) continue;
         c->range_m[i] = r->range_m[i];
-        c->label[i] = bvh_label(&m->bvh->triangle[r->hit[i]]);
+        c->label[i] = c->seen[i];
     }
 }
 
@@ -187,14 +180,13 @@ static uint32_t cast_chunk(struct caster *c, const struct cast_setup *s, const s
     else
         kernel_directions(c->mirror_turn, c->pan_turn, s->rotation, n, c->dx, c->dy, c->dz);
     caster_hits(c, s->bvh, s->station_m, s->range_max_m, n, c->dx, c->dy, c->dz, c->range_m, c->hit);
-    take_labels(c, s->bvh, n);
+    memcpy(c->label, c->seen, n * sizeof *c->label);
     for (uint32_t i = 0; i < s->n_movers; i++)
         cast_mover(c, s, &s->mover[i], n);
     uint32_t echoes = kernel_detect(c->range_m, s->range_min_m, s->range_max_m, n, block->echo + at);
-    for (uint32_t i = 0; i < n; i++) {
-        block->label[at + i] = block->echo[at + i] != 0 ? c->label[i] : (uint16_t)LINE_LABEL_NONE;
+    kernel_labels(c->label, block->echo + at, n, block->label + at);
+    for (uint32_t i = 0; i < n; i++)
         block->refl_cdb[at + i] = LINE_REFL_NONE;
-    }
     ends(c, CAST_DETECT);
     if (s->noise_on) kernel_noise(s, run->pulse0 + at, n, c->range_m);
     ends(c, CAST_NOISE);

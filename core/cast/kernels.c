@@ -90,7 +90,7 @@ VEC_CLONES
 static uint32_t refine(const double *restrict tri, uint32_t n_triangles, const uint32_t *restrict prim,
                        const double *restrict dx, const double *restrict dy, const double *restrict dz,
                        const float *restrict u, const float *restrict v, const double o[3], uint32_t n,
-                       double *restrict range_m, uint32_t *restrict doubt)
+                       double *restrict range_m, uint32_t *restrict label, uint32_t *restrict doubt)
 {
     const double ox = o[0], oy = o[1], oz = o[2];
     uint32_t doubts = 0;
@@ -107,9 +107,11 @@ static uint32_t refine(const double *restrict tri, uint32_t n_triangles, const u
         memcpy(&bits, &nx, sizeof bits);
         bits = ((bits & ((1U << BVH_SPARE_BITS) - 1)) + BVH_GUARD_BASE) << BVH_GUARD_SHIFT;
         memcpy(&guard, &bits, sizeof guard);
-        uint64_t more;
-        memcpy(&more, &nz, sizeof more);
-        uint32_t near = ((double)least * fabs(along) < guard) | (uint32_t)((more & BVH_RIVAL_BIT) != 0);
+        uint64_t low, high;
+        memcpy(&low, &ny, sizeof low);
+        memcpy(&high, &nz, sizeof high);
+        label[i] = (uint32_t)((low & ((1U << BVH_SPARE_BITS) - 1)) | (high & 15) << BVH_SPARE_BITS);
+        uint32_t near = ((double)least * fabs(along) < guard) | (uint32_t)((high & BVH_RIVAL_BIT) != 0);
         doubt[i] = near;
         doubts += near;
     }
@@ -119,7 +121,7 @@ static uint32_t refine(const double *restrict tri, uint32_t n_triangles, const u
 uint32_t kernel_refine(const struct bvh *bvh, const struct kernel_hits *hits, const double o[3], uint32_t n)
 {
     return refine((const double *)bvh->triangle, bvh->scene->n_triangles, hits->prim, hits->dx, hits->dy, hits->dz, hits->u,
-                  hits->v, o, n, hits->range_m, hits->doubt);
+                  hits->v, o, n, hits->range_m, hits->label, hits->doubt);
 }
 
 VEC_CLONES
@@ -171,6 +173,13 @@ uint32_t kernel_detect(double *restrict range_m, double min_m, double max_m, uin
         echoes += hit;
     }
     return echoes;
+}
+
+VEC_CLONES
+void kernel_labels(const uint32_t *restrict label, const uint8_t *restrict echo, uint32_t n, uint16_t *restrict out)
+{
+    for (uint32_t i = 0; i < n; i++)
+        out[i] = (uint16_t)(echo[i] != 0 ? label[i] : (uint32_t)LINE_LABEL_NONE);
 }
 
 /* Whole counts of an angle modulo a turn. */

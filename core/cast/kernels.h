@@ -22,6 +22,7 @@ struct kernel_hits {
     const uint32_t *prim;
     const float *u, *v;
     double *range_m;  /* out: (d - n.o) / (n.dir) of the proposed triangle's plane; NaN for none */
+    uint32_t *label;  /* out: of the proposed triangle; LINE_LABEL_NONE for none */
     uint32_t *doubt;  /* out: 1 where the hit is so near to the border, across the ray, that the proposal is in doubt */
 };
 /* Returns how many are in doubt. */
@@ -38,6 +39,9 @@ void kernel_noise(const struct cast_setup *setup, uint64_t pulse0, uint32_t n, d
 
 /* Echo byte and NaN for ranges outside of the head's limits. Returns the number of echoes. */
 uint32_t kernel_detect(double *range_m, double min_m, double max_m, uint32_t n, uint8_t *echo);
+
+/* Labels of echoes, LINE_LABEL_NONE for the other shots. */
+void kernel_labels(const uint32_t *label, const uint8_t *echo, uint32_t n, uint16_t *out);
 
 /* Wire numbers. a: range in counts, 0 for none; b, c: encoder counts modulo a turn. */
 void kernel_polar(const struct cast_setup *setup, const double *range_m, const double *mirror_turn, const double *pan_turn,
