@@ -57,7 +57,7 @@
             memcpy(rays->u + base, packet.hit.u, sizeof packet.hit.u);                                                \
             memcpy(rays->v + base, packet.hit.v, sizeof packet.hit.v);                                                \
             for (uint32_t i = 0; i < W; i++)                                                                          \
-                __builtin_prefetch(&bvh->triangle[packet.hit.primID[i] < last ? packet.hit.primID[i] : last]);        \
+                __builtin_prefetch(&bvh->triangle[packet.hit.primID[i] < last ? packet.hit.primID[i] : last], 0, 2);        \
         }                                                                                                             \
     }
 
