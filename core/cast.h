@@ -1,9 +1,9 @@
 /* Casting: a run of pulses -> echoes. Embree proposes a triangle from float rays in packets of the machine's native
- * width; the range comes from the triangle's plane in double, kept beside the BVH, and where the ray passes so near to a
- * triangle's border that float can't be trusted, the triangle is chosen again in double.
+ * width; the range comes from the triangle's plane in double, kept beside the BVH, and where the ray passes so near to
+ * a triangle's border that float can't be trusted, the triangle is chosen again in double.
  *
- * Frames: the BVH is built in a local frame (prcs minus origin_m), where float is safe; the station is a point of it. Ray
- * packets are SCHEDULE_PACKET pulses, cut by pulse number. */
+ * Frames: the BVH is built in a local frame (prcs minus origin_m), where float is safe; the station is a point of it.
+ * Ray packets are SCHEDULE_PACKET pulses, cut by pulse number. */
 #ifndef CORE_CAST_H
 #define CORE_CAST_H
 
@@ -18,49 +18,49 @@
 struct bvh;
 
 struct bvh_info {
-    uint32_t packet;     /* rays per Embree call: 16, 8 or 4 */
+    uint32_t packet; /* rays per Embree call: 16, 8 or 4 */
     double build_s;
-    uint64_t bytes;      /* BVH and planes */
+    uint64_t bytes; /* BVH and planes */
 };
 
-/* The scene must outlive the BVH. Rays may begin up to station_reach_m from origin_m; the nearer, the less has to be decided
- * again. Built with `threads` threads (0: all). */
+/* The scene must outlive the BVH. Rays may begin up to station_reach_m from origin_m; the nearer, the less has to be
+ * decided again. Built with `threads` threads (0: all). */
 int bvh_create(const struct scene *scene, const double origin_m[3], double station_reach_m, unsigned threads,
                const struct sh_report *report, struct bvh **out, struct sh_err *err);
 void bvh_free(struct bvh *bvh);
 
-/* Orders surfaces in double where they overlap, cross, or lie behind each other within float's resolution: their labels no
- * longer hang on how rays are packed, and the range is that of the nearer one. Once, before casting. Costs time here (about 6
- * us per triangle), and in casting about 20 to 50 ns for each triangle that lies so near to the one that is hit: nothing
- * in a plain scene, much in a building model whose walls overlap. Without it such a hit is off by at most the distance
- * between the surfaces. */
+/* Orders surfaces in double where they overlap, cross, or lie behind each other within float's resolution: their labels
+ * no longer hang on how rays are packed, and the range is that of the nearer one. Once, before casting. Costs time here
+ * (about 6 us per triangle), and in casting about 20 to 50 ns for each triangle that lies so near to the one that is
+ * hit: nothing in a plain scene, much in a building model whose walls overlap. Without it such a hit is off by at most
+ * the distance between the surfaces. */
 int bvh_order_exactly(struct bvh *bvh, struct sh_err *err);
-/* Rays per Embree call: 1, 4, 8 or 16; for measuring and tests. Another width than the native one may find another triangle
- * where a ray passes through an edge; ranges agree. */
+/* Rays per Embree call: 1, 4, 8 or 16; for measuring and tests. Another width than the native one may find another
+ * triangle where a ray passes through an edge; ranges agree. */
 void bvh_set_packet(struct bvh *bvh, uint32_t rays);
 void bvh_get_info(const struct bvh *bvh, struct bvh_info *info);
 void bvh_origin(const struct bvh *bvh, double origin_m[3]);
 
 enum { CAST_MAX_MOVERS = 16 };
 
-/* A rigid body that moves, with a BVH of its own, built at rest: p_prcs = rotation * p_rest + shift_m. The pose holds for
- * the runs that are cast with it; rays that pass by the sphere around the body cost one test a chunk. */
+/* A rigid body that moves, with a BVH of its own, built at rest: p_prcs = rotation * p_rest + shift_m. The pose holds
+ * for the runs that are cast with it; rays that pass by the sphere around the body cost one test a chunk. */
 struct cast_mover {
     const struct bvh *bvh;
-    double centre_m[3], radius_m;  /* sphere around the body at rest */
+    double centre_m[3], radius_m; /* sphere around the body at rest */
     double rotation[9], shift_m[3];
 };
 
 /* What stays the same for all pulses of a scan (the movers' poses: of a run). */
 struct cast_setup {
     const struct bvh *bvh;
-    const struct georef *georef;   /* geo layout */
-    double station_m[3];           /* the head's origin, prcs */
-    double rotation[9];            /* socs -> prcs, row by row */
+    const struct georef *georef; /* geo layout */
+    double station_m[3];         /* the head's origin, prcs */
+    double rotation[9];          /* socs -> prcs, row by row */
     double range_min_m, range_max_m;
     int noise_on;
     double range_sigma_m, range_sigma_ppm;
-    uint64_t noise_key;            /* rng_key(seed, RNG_RANGE) */
+    uint64_t noise_key;               /* rng_key(seed, RNG_RANGE) */
     double mirror_counts, pan_counts; /* encoder counts per turn; 2^32: ideal, positions take the true angle */
     enum line_layout layout;
     double range_scale_m, xyz_scale_m;
@@ -88,14 +88,23 @@ uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, cons
 
 enum { CAST_NO_TRIANGLE = 0xffffffff };
 
-/* Exact hits of n rays from the station: unit directions in prcs -> range along the ray (NaN where it meets nothing) and
- * triangle of the scene (CAST_NO_TRIANGLE). The station lies within the BVH's station_reach_m; hits beyond range_max_m may or
- * may not be told. Range error: see tests/accuracy. Allocates nothing. */
-void caster_hits(struct caster *caster, const struct bvh *bvh, const double station_m[3], double range_max_m, uint32_t n,
-                 const double *dx, const double *dy, const double *dz, double *range_m, uint32_t *triangle);
+/* Exact hits of n rays from the station: unit directions in prcs -> range along the ray (NaN where it meets nothing)
+ * and triangle of the scene (CAST_NO_TRIANGLE). The station lies within the BVH's station_reach_m; hits beyond
+ * range_max_m may or may not be told. Range error: see tests/accuracy. Allocates nothing. */
+void caster_hits(struct caster *caster, const struct bvh *bvh, const double station_m[3], double range_max_m,
+                 uint32_t n, const double *dx, const double *dy, const double *dz, double *range_m, uint32_t *triangle);
 
 /* Cost by stage, for measuring: `now` counts in any unit and is read between the stages of each chunk. */
-enum cast_stage { CAST_DIRECTIONS, CAST_EMBREE, CAST_REFINE, CAST_DECIDE, CAST_DETECT, CAST_NOISE, CAST_POSITIONS, CAST_STAGES };
+enum cast_stage {
+    CAST_DIRECTIONS,
+    CAST_EMBREE,
+    CAST_REFINE,
+    CAST_DECIDE,
+    CAST_DETECT,
+    CAST_NOISE,
+    CAST_POSITIONS,
+    CAST_STAGES
+};
 struct cast_profile {
     uint64_t (*now)(void);
     uint64_t last, spent[CAST_STAGES];

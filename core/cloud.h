@@ -26,7 +26,7 @@ struct cloud {
     uint16_t *station;  /* [n] from 1; NULL: the file has none */
     uint16_t *label;    /* [n] CLOUD_LABEL_NONE: none; NULL: the file has none */
     uint8_t *echo;      /* [n] 0: shot without echo; NULL: the file has none */
-    int64_t epsg; /* of the header's comment "epsg N", 0: scene frame; CLOUD_EPSG_UNKNOWN: it has none */
+    int64_t epsg;       /* of the header's comment "epsg N", 0: scene frame; CLOUD_EPSG_UNKNOWN: it has none */
 };
 
 /* Errors (SH_EINPUT, naming file and line, or byte): missing or unreadable, not a PLY file, x, y or z
@@ -58,8 +58,7 @@ struct cloud_coverage {
 
 /* The surface of point i: its label, or where the file has none its nearest triangle's; CLOUD_LABEL_NONE when
  * there is no such triangle. */
-uint16_t cloud_surface(const struct cloud *cloud, const struct scene *scene, const uint32_t *triangle,
-                       size_t i);
+uint16_t cloud_surface(const struct cloud *cloud, const struct scene *scene, const uint32_t *triangle, size_t i);
 
 /* How many of the scene's surfaces and triangles have points (far ones have no triangle).
  * SH_EINPUT: a label the scene doesn't have. */

@@ -13,7 +13,7 @@ struct distance;
 
 struct distance_hit {
     double distance_m;
-    double point_m[3];  /* the nearest point of the mesh, prcs */
+    double point_m[3]; /* the nearest point of the mesh, prcs */
     uint32_t triangle;
 };
 

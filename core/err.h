@@ -30,8 +30,8 @@ int sh_fail(struct sh_err *err, int code, const char *fmt, ...) __attribute__((f
 /* How long work tells about itself. Each member may be NULL. Called from the thread that does the work. */
 struct sh_report {
     void *ctx;
-    void (*warn)(void *ctx, const char *text);                       /* one line, without a newline */
-    void (*progress)(void *ctx, const char *what, double fraction);  /* 0..1; negative where unknown */
+    void (*warn)(void *ctx, const char *text);                      /* one line, without a newline */
+    void (*progress)(void *ctx, const char *what, double fraction); /* 0..1; negative where unknown */
 };
 
 void sh_warn(const struct sh_report *report, const char *fmt, ...) __attribute__((format(printf, 2, 3)));

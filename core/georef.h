@@ -19,10 +19,10 @@ enum georef_crs { GEOREF_LOCAL, GEOREF_ECEF, GEOREF_UTM };
 
 struct georef_spec {
     enum georef_crs crs;
-    double station_m[3];       /* the head's origin in prcs */
-    double lat_deg, lon_deg;   /* geodetic, WGS 84, of the head's origin */
-    double height_m;           /* ellipsoidal */
-    int utm_zone;              /* 1..60, or 0: by position */
+    double station_m[3];     /* the head's origin in prcs */
+    double lat_deg, lon_deg; /* geodetic, WGS 84, of the head's origin */
+    double height_m;         /* ellipsoidal */
+    int utm_zone;            /* 1..60, or 0: by position */
 };
 
 struct georef;
@@ -36,7 +36,8 @@ void georef_anchor(const struct georef *georef, double anchor[3]);
 /* EPSG code of the CRS: 4978 for ECEF, 326zz/327zz for UTM, 32661/32761 for UPS, 0 for local. */
 int georef_epsg(const struct georef *georef);
 
-/* Where differences from the anchor are a rotation of those in prcs (local, ecef): 1 and its matrix, row by row. Else 0. */
+/* Where differences from the anchor are a rotation of those in prcs (local, ecef): 1 and its matrix, row by row. Else
+ * 0. */
 int georef_rotation(const struct georef *georef, double rotation[9]);
 
 /* n points, d_prcs relative to the station (metres) -> difference from the anchor. In place is allowed.

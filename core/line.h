@@ -14,10 +14,10 @@
 #include "core/err.h"
 
 enum {
-    LINE_REFL_NONE = INT16_MIN,  /* reflectance is not modelled */
-    LINE_XYZ_NONE = INT32_MIN,   /* coordinate of a shot without echo */
-    LINE_LABEL_NONE = 0xffff,    /* label of a shot without echo */
-    LINE_MAX_ECHOES = 15,        /* echo number and count are four bits each on the wire */
+    LINE_REFL_NONE = INT16_MIN, /* reflectance is not modelled */
+    LINE_XYZ_NONE = INT32_MIN,  /* coordinate of a shot without echo */
+    LINE_LABEL_NONE = 0xffff,   /* label of a shot without echo */
+    LINE_MAX_ECHOES = 15,       /* echo number and count are four bits each on the wire */
 };
 
 /* What the three numbers of a point are; chosen per stream. */
@@ -25,37 +25,37 @@ enum line_layout { LINE_POLAR, LINE_GEO };
 
 struct line_block {
     /* place in the scan */
-    uint32_t frame;       /* frame (pan sweep) number, from 0 */
-    uint32_t line;        /* line number in the scan, from 0 */
-    uint64_t pulse0;      /* number of the block's first pulse in the scan */
-    uint32_t n_pulses;    /* consecutive pulses covered, all of them cast */
-    int64_t t0_ns;        /* firing time of pulse0 since the scan's start */
-    int64_t line_t0_ns;   /* time of the line's first pulse since the scan's start */
+    uint32_t frame;     /* frame (pan sweep) number, from 0 */
+    uint32_t line;      /* line number in the scan, from 0 */
+    uint64_t pulse0;    /* number of the block's first pulse in the scan */
+    uint32_t n_pulses;  /* consecutive pulses covered, all of them cast */
+    int64_t t0_ns;      /* firing time of pulse0 since the scan's start */
+    int64_t line_t0_ns; /* time of the line's first pulse since the scan's start */
     /* content */
     enum line_layout layout;
     uint32_t n_points, capacity;
-    uint32_t *dt_ns;      /* firing time after t0_ns; below 2^24 */
-    uint32_t *a, *b, *c;  /* polar: range in range_scale_m, mirror counts, pan counts;
-                           * geo: x, y, z as int32 bit patterns, in scale_m from the anchor */
-    int16_t *refl_cdb;    /* 0.01 dB relative to a white Lambertian target; LINE_REFL_NONE */
-    uint8_t *echo;        /* number (1..15) in the low nibble, count in the high one; 0: shot without echo */
-    uint16_t *label;      /* surface label; LINE_LABEL_NONE */
+    uint32_t *dt_ns;     /* firing time after t0_ns; below 2^24 */
+    uint32_t *a, *b, *c; /* polar: range in range_scale_m, mirror counts, pan counts;
+                          * geo: x, y, z as int32 bit patterns, in scale_m from the anchor */
+    int16_t *refl_cdb;   /* 0.01 dB relative to a white Lambertian target; LINE_REFL_NONE */
+    uint8_t *echo;       /* number (1..15) in the low nibble, count in the high one; 0: shot without echo */
+    uint16_t *label;     /* surface label; LINE_LABEL_NONE */
 };
 
 /* One line is over. */
 struct line_end {
     uint32_t frame, line;
-    uint64_t pulse0;       /* the line's first pulse in the scan */
-    uint32_t n_fired;      /* pulses of the whole sweep, the blind part included */
-    uint32_t n_cast;       /* of these, cast */
-    uint32_t n_echoes;     /* echoes sent; 0 also where blocks of the line were lost */
-    int64_t t0_ns, t1_ns;  /* first pulse of this line, first pulse of the next, since the scan's start */
+    uint64_t pulse0;                  /* the line's first pulse in the scan */
+    uint32_t n_fired;                 /* pulses of the whole sweep, the blind part included */
+    uint32_t n_cast;                  /* of these, cast */
+    uint32_t n_echoes;                /* echoes sent; 0 also where blocks of the line were lost */
+    int64_t t0_ns, t1_ns;             /* first pulse of this line, first pulse of the next, since the scan's start */
     uint32_t mirror_count, pan_count; /* encoder readings at the last pulse of this line */
-    uint32_t status;       /* LINE_LAST_OF_FRAME, LINE_PARTIAL */
+    uint32_t status;                  /* LINE_LAST_OF_FRAME, LINE_PARTIAL */
 };
 enum {
     LINE_LAST_OF_FRAME = 1u << 0,
-    LINE_PARTIAL = 1u << 1,  /* the scan was stopped within the line */
+    LINE_PARTIAL = 1u << 1, /* the scan was stopped within the line */
 };
 
 int line_block_alloc(struct line_block *block, uint32_t capacity, struct sh_err *err);

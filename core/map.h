@@ -28,9 +28,8 @@ enum {
 };
 
 struct map_spec {
-    double min_m[2],
-        max_m[2];   /* x and y of the area, prcs; max >= min, the area may be a line but not a point */
-    double pixel_m; /* side of a pixel; 0: so that the longer side has MAP_DEFAULT_PX */
+    double min_m[2], max_m[2]; /* x and y of the area, prcs; max >= min, the area may be a line but not a point */
+    double pixel_m;            /* side of a pixel; 0: so that the longer side has MAP_DEFAULT_PX */
 };
 
 struct map;

@@ -1,7 +1,7 @@
 /* The one random generator: counter-based, so that a number depends on (seed, pulse, purpose) and on nothing else.
  *
- * Two rounds of the SplitMix64 finaliser (Steele, Lea, Flood, OOPSLA 2014; constants by Stafford, "mix 13") over the pulse
- * number, each keyed. Pure; any thread. */
+ * Two rounds of the SplitMix64 finaliser (Steele, Lea, Flood, OOPSLA 2014; constants by Stafford, "mix 13") over the
+ * pulse number, each keyed. Pure; any thread. */
 #ifndef CORE_RNG_H
 #define CORE_RNG_H
 
@@ -31,7 +31,8 @@ VEC_INLINE uint64_t rng_u64(uint64_t key, uint64_t pulse)
 }
 
 /* Standard normal, by Box and Muller: radius from the upper 32 bits, angle from the lower 32. The largest is 6.7.
- * cos(2 pi a) = sin(2 pi y), y = |a - 1/2| - 1/4, by the Taylor series to the 15th power: error below 7e-12 at the ends. */
+ * cos(2 pi a) = sin(2 pi y), y = |a - 1/2| - 1/4, by the Taylor series to the 15th power: error below 7e-12 at the
+ * ends. */
 VEC_INLINE double rng_normal(uint64_t key, uint64_t pulse)
 {
     uint64_t bits = rng_u64(key, pulse);

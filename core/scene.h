@@ -25,7 +25,7 @@ enum {
 };
 
 struct scene_mesh_spec {
-    const char *file;   /* ending chooses the reader: .obj .ply in double; .stl .gltf .glb .fbx .dae .ifc by Assimp */
+    const char *file; /* ending chooses the reader: .obj .ply in double; .stl .gltf .glb .fbx .dae .ifc by Assimp */
     enum scene_up up;
     double scale;       /* metres per unit of the file, > 0 */
     double offset_m[3]; /* added after axes and scale */
@@ -41,9 +41,9 @@ struct scene_surface {
 
 /* What the import left out or changed; each kind that is not 0 is also reported as one warning per file. */
 struct scene_counts {
-    uint64_t zero_area;      /* triangles without area, left out */
-    uint64_t not_triangles;  /* points and lines, left out */
-    uint64_t names_cut;      /* object or material names cut to SCENE_NAME_LEN - 1 bytes */
+    uint64_t zero_area;     /* triangles without area, left out */
+    uint64_t not_triangles; /* points and lines, left out */
+    uint64_t names_cut;     /* object or material names cut to SCENE_NAME_LEN - 1 bytes */
 };
 
 struct scene {
@@ -63,8 +63,8 @@ struct scene {
  * Errors (SH_EINPUT, naming the file): missing or unreadable, not a mesh, no triangles, a coordinate that is
  *   not finite, an index out of range, |coordinate| beyond 1e9 m, too many surfaces or triangles (2^32-1).
  * Progress goes to report about four times a second once a load takes longer than a second. */
-int scene_load(const struct scene_mesh_spec *specs, size_t n_specs, double tolerance_m,
-               const struct sh_report *report, struct scene **out, struct sh_err *err);
+int scene_load(const struct scene_mesh_spec *specs, size_t n_specs, double tolerance_m, const struct sh_report *report,
+               struct scene **out, struct sh_err *err);
 
 /* Builds a scene from arrays (tests and generated scenes). Copies everything; same checks as scene_load.
  * label and surface may be NULL: then there is one surface, "object"/"material". */

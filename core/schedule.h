@@ -1,10 +1,10 @@
 /* The schedule: pulse number -> time, mirror angle, pan angle. Integers and exact ratios; nothing accumulates.
  *
- * A scan is a list of segments; each change of a setting opens one. Within a segment pulse i (from its first pulse) fires at
- *   t(i) = t0_ns + floor((t0_acc + i * 1e15) / prr_uhz) ns,
- * its place in the mirror sweep is the ratio r(i)/den with r(i) = r0 + i*num - n*den, n the lines passed and num/den =
- * lines_uhz/prr_uhz reduced, and the pan turns with time: pan_udeg_s * i / prr from the frame's first pulse. The products
- * are formed in 128 bits: exact for pulse numbers to 2^50 (15 years at 2.2 MHz).
+ * A scan is a list of segments; each change of a setting opens one. Within a segment pulse i (from its first pulse)
+ * fires at t(i) = t0_ns + floor((t0_acc + i * 1e15) / prr_uhz) ns, its place in the mirror sweep is the ratio r(i)/den
+ * with r(i) = r0 + i*num - n*den, n the lines passed and num/den = lines_uhz/prr_uhz reduced, and the pan turns with
+ * time: pan_udeg_s * i / prr from the frame's first pulse. The products are formed in 128 bits: exact for pulse numbers
+ * to 2^50 (15 years at 2.2 MHz).
  *
  * Angles are in turns (1 turn = 2 pi rad) until a sine is needed, so that reduction is exact.
  * A frame is one sweep of the pan and a whole number of lines; with pan speed 0, or no pan range, one line.
@@ -17,54 +17,54 @@
 enum { SCHEDULE_PACKET = 16 }; /* pulses are cut at multiples of this from the line's first pulse */
 
 struct schedule_spec {
-    int64_t prr_uhz, lines_uhz, pan_udeg_s;   /* micro-hertz, micro-degrees per second; lines <= pulses */
-    int64_t fov_min_udeg, sweep_udeg;         /* line angle at phase 0, and how far the whole sweep goes */
-    int64_t line_start_udeg, line_stop_udeg;  /* cast window, both ends included */
+    int64_t prr_uhz, lines_uhz, pan_udeg_s;  /* micro-hertz, micro-degrees per second; lines <= pulses */
+    int64_t fov_min_udeg, sweep_udeg;        /* line angle at phase 0, and how far the whole sweep goes */
+    int64_t line_start_udeg, line_stop_udeg; /* cast window, both ends included */
     int64_t pan_start_udeg, pan_stop_udeg;
-    uint32_t frames;                          /* 0: without end */
+    uint32_t frames; /* 0: without end */
 };
 
 struct schedule_segment {
     struct schedule_spec spec;
-    uint64_t k0;             /* first pulse, in the scan */
-    int64_t t0_ns;           /* its time since the scan's start: t0_ns + t0_acc / prr_uhz nanoseconds */
+    uint64_t k0;   /* first pulse, in the scan */
+    int64_t t0_ns; /* its time since the scan's start: t0_ns + t0_acc / prr_uhz nanoseconds */
     uint64_t t0_acc;
-    uint64_t line0, r0;      /* its line, and place in the sweep as r0/den */
-    uint64_t line0_begin;    /* first pulse of line0, before k0 where the line began in an earlier segment ... */
+    uint64_t line0, r0;   /* its line, and place in the sweep as r0/den */
+    uint64_t line0_begin; /* first pulse of line0, before k0 where the line began in an earlier segment ... */
     int64_t line0_begin_ns;
-    uint64_t line0_cast;     /* ... and how many of its pulses were cast there */
-    uint64_t num, den;       /* lines per pulse */
-    int64_t ns_quot;         /* pulse period = ns_quot + ns_rem / prr_uhz nanoseconds */
+    uint64_t line0_cast; /* ... and how many of its pulses were cast there */
+    uint64_t num, den;   /* lines per pulse */
+    int64_t ns_quot;     /* pulse period = ns_quot + ns_rem / prr_uhz nanoseconds */
     uint64_t ns_rem;
     uint64_t r_first, r_last; /* cast where r_first <= r <= r_last */
-    uint32_t frame0;         /* frame at k0 */
-    uint64_t frame0_end;     /* first line after that frame */
-    uint64_t frame_lines;    /* lines of each later frame */
-    int64_t pan0_fine;       /* pan at k0, in 2^-24 micro-degrees */
-    uint64_t end_pulse;      /* first pulse after the last frame, in the scan; UINT64_MAX without end */
+    uint32_t frame0;          /* frame at k0 */
+    uint64_t frame0_end;      /* first line after that frame */
+    uint64_t frame_lines;     /* lines of each later frame */
+    int64_t pan0_fine;        /* pan at k0, in 2^-24 micro-degrees */
+    uint64_t end_pulse;       /* first pulse after the last frame, in the scan; UINT64_MAX without end */
 };
 
 /* A run of pulses of one line that are cast: what the caster needs. */
 struct schedule_run {
-    uint64_t pulse0;         /* first pulse, in the scan */
-    uint32_t n;              /* pulses */
-    uint32_t in_line;        /* index of pulse0 from the line's first pulse in this segment */
+    uint64_t pulse0;  /* first pulse, in the scan */
+    uint32_t n;       /* pulses */
+    uint32_t in_line; /* index of pulse0 from the line's first pulse in this segment */
     uint32_t frame, line;
     int64_t t0_ns, line_t0_ns;
     double mirror0_turn, mirror_turn_per_r; /* mirror = mirror0 + (r + j*num) * per_r, j from 0 */
     uint64_t r, num;
-    double pan0_turn, pan_step_turn;        /* pan = pan0 + (in_line + j) * step, of the line's first pulse */
-    uint64_t ns_acc, ns_rem, ns_den;        /* dt(j) = j*ns_quot + floor((ns_acc + j*ns_rem) / ns_den) */
+    double pan0_turn, pan_step_turn; /* pan = pan0 + (in_line + j) * step, of the line's first pulse */
+    uint64_t ns_acc, ns_rem, ns_den; /* dt(j) = j*ns_quot + floor((ns_acc + j*ns_rem) / ns_den) */
     int64_t ns_quot;
 };
 
 /* A line's place in a segment. */
 struct schedule_line {
-    uint64_t line, pulse0, pulse_end;  /* in the scan; clipped to the segment's start and the scan's end */
-    uint64_t cast0, cast_end;          /* cast pulses: cast0 <= k < cast_end */
-    uint64_t r_first_pulse;            /* r of pulse0 */
-    uint64_t begin, cast_before;       /* the line's first pulse, maybe in an earlier segment; pulses cast there */
-    int64_t begin_ns;                  /* time of begin */
+    uint64_t line, pulse0, pulse_end; /* in the scan; clipped to the segment's start and the scan's end */
+    uint64_t cast0, cast_end;         /* cast pulses: cast0 <= k < cast_end */
+    uint64_t r_first_pulse;           /* r of pulse0 */
+    uint64_t begin, cast_before;      /* the line's first pulse, maybe in an earlier segment; pulses cast there */
+    int64_t begin_ns;                 /* time of begin */
     uint32_t frame;
     int last_of_frame;
 };
@@ -72,11 +72,11 @@ struct schedule_line {
 /* First segment of a scan: pulse 0 at time 0, line 0, phase 0. The spec must have been checked. */
 void schedule_start(struct schedule_segment *seg, const struct schedule_spec *spec);
 
-/* The segment that begins with pulse k of the one before, with a new spec: the pulse keeps its time, the mirror its phase
- * (to 1/den of a line), the pan its angle (to 2^-24 micro-degrees); the frame goes on to the first end of a line at or behind
- * the new pan stop. No pulse is lost or doubled. seg may be `before`. */
-void schedule_change(struct schedule_segment *seg, const struct schedule_segment *before, const struct schedule_spec *spec,
-                     uint64_t k);
+/* The segment that begins with pulse k of the one before, with a new spec: the pulse keeps its time, the mirror its
+ * phase (to 1/den of a line), the pan its angle (to 2^-24 micro-degrees); the frame goes on to the first end of a line
+ * at or behind the new pan stop. No pulse is lost or doubled. seg may be `before`. */
+void schedule_change(struct schedule_segment *seg, const struct schedule_segment *before,
+                     const struct schedule_spec *spec, uint64_t k);
 
 /* Time of pulse k since the scan's start; k >= seg->k0. */
 int64_t schedule_time_ns(const struct schedule_segment *seg, uint64_t k);
@@ -94,7 +94,8 @@ uint64_t schedule_cut(const struct schedule_segment *seg, uint64_t k);
 void schedule_get_run(const struct schedule_segment *seg, const struct schedule_line *line, uint64_t k, uint32_t n,
                       struct schedule_run *run);
 
-/* Pan angle in turns (0 <= turn < 1 per turn, not reduced below the start) and mirror angle of any pulse: for encoders. */
+/* Pan angle in turns (0 <= turn < 1 per turn, not reduced below the start) and mirror angle of any pulse: for encoders.
+ */
 double schedule_pan_turn(const struct schedule_segment *seg, uint64_t k);
 double schedule_mirror_turn(const struct schedule_segment *seg, uint64_t k);
 

@@ -6,8 +6,8 @@
 #include <stdint.h>
 #include <string.h>
 
-/* The best version of a loop for the CPU at hand, chosen once at start. Sanitizers can't follow the resolver; before version 18
- * clang gives it a name that other files don't find (llvm-project pull request 71706). */
+/* The best version of a loop for the CPU at hand, chosen once at start. Sanitizers can't follow the resolver; before
+ * version 18 clang gives it a name that other files don't find (llvm-project pull request 71706). */
 #if defined(__clang__) && __clang_major__ < 18
 #define VEC_CLONES
 #elif defined(__x86_64__) && !defined(SH_SANITIZE) && defined(__clang__)
@@ -60,8 +60,8 @@ VEC_INLINE void vec_sincos_turn(double turn, double *sine, double *cosine)
     *cosine = (quadrant + 1) & 2 ? -b : b;
 }
 
-/* Natural logarithm of a normal positive number: x = 2^e m, m in [sqrt(1/2), sqrt(2)), log m = 2 artanh((m-1)/(m+1)) by its
- * series to the 21st power, whose remainder is below 1e-17; relative error below 1e-15 away from x = 1. */
+/* Natural logarithm of a normal positive number: x = 2^e m, m in [sqrt(1/2), sqrt(2)), log m = 2 artanh((m-1)/(m+1)) by
+ * its series to the 21st power, whose remainder is below 1e-17; relative error below 1e-15 away from x = 1. */
 VEC_INLINE double vec_log(double x)
 {
     uint64_t bits;

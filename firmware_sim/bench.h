@@ -26,8 +26,8 @@ struct bench_target {
 uint32_t bench_count(const char *name);
 /* "house" reads the IFC file; a number makes closed terrain, 200 m wide and 3 m rough, seen from 4.7 m above
  * its middle. */
-int bench_target_load(const char *name, const char *house, const struct sh_report *report,
-                      struct bench_target *out, struct sh_err *err);
+int bench_target_load(const char *name, const char *house, const struct sh_report *report, struct bench_target *out,
+                      struct sh_err *err);
 void bench_target_free(struct bench_target *target);
 
 /* ---- bench_rays.c: a normal scan: lines of 100 degrees, 2500 pulses each, spread over a turn of the pan */
@@ -58,16 +58,15 @@ struct bench_embree {
     uint32_t *prim; /* results of BENCH_LOADED */
     float *t;
 };
-int bench_embree_create(const struct scene *scene, const double origin_m[3], int robust,
-                        struct bench_embree *out, struct sh_err *err);
+int bench_embree_create(const struct scene *scene, const double origin_m[3], int robust, struct bench_embree *out,
+                        struct sh_err *err);
 /* Takes n rays from the origin; the arrays stay the caller's, and n is a multiple of 16. */
 int bench_embree_rays(struct bench_embree *e, const float *fx, const float *fy, const float *fz, uint32_t n,
                       struct sh_err *err);
 /* Makes ready for passes of this width (1, 4, 8 or 16) and feed. */
 int bench_embree_prepare(struct bench_embree *e, uint32_t width, enum bench_feed feed, struct sh_err *err);
 /* Casts rays first .. first+n-1 (multiples of 16), results in prim and t for BENCH_LOADED. */
-void bench_embree_pass(const struct bench_embree *e, uint32_t width, enum bench_feed feed, uint32_t first,
-                       uint32_t n);
+void bench_embree_pass(const struct bench_embree *e, uint32_t width, enum bench_feed feed, uint32_t first, uint32_t n);
 void bench_embree_free(struct bench_embree *e);
 const char *bench_isa(void);
 long bench_embree_version(void);
@@ -134,8 +133,8 @@ struct bench_threads {
     double embree_mrays_s, pulses_per_s, ratio; /* ratio: median of the rounds */
     double cpu_ns;                              /* processor time of all threads per pulse */
 };
-int bench_loop(const struct bench_case *c, const struct bench_result *one, uint32_t threads,
-               struct bench_threads *out, struct sh_err *err);
+int bench_loop(const struct bench_case *c, const struct bench_result *one, uint32_t threads, struct bench_threads *out,
+               struct sh_err *err);
 
 /* ---- bench_leaks.c: rays aimed at edges and corners of closed meshes */
 enum { BENCH_LEAK_MESHES = 4 };

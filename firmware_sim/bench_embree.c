@@ -23,11 +23,10 @@
 
 static const float T_MAX = (float)BENCH_RANGE_MAX_M;
 
-static int fill_geometry(RTCGeometry geometry, const struct scene *scene, const double origin_m[3],
-                         struct sh_err *err)
+static int fill_geometry(RTCGeometry geometry, const struct scene *scene, const double origin_m[3], struct sh_err *err)
 {
-    float *vertex = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                            3 * sizeof(float), scene->n_vertices);
+    float *vertex = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float),
+                                            scene->n_vertices);
     uint32_t *index = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                               3 * sizeof(uint32_t), scene->n_triangles);
     if (vertex == NULL || index == NULL) return sh_fail(err, SH_ENOMEM, "bench: no memory for Embree's mesh");
@@ -38,8 +37,8 @@ static int fill_geometry(RTCGeometry geometry, const struct scene *scene, const 
     return SH_OK;
 }
 
-int bench_embree_create(const struct scene *scene, const double origin_m[3], int robust,
-                        struct bench_embree *out, struct sh_err *err)
+int bench_embree_create(const struct scene *scene, const double origin_m[3], int robust, struct bench_embree *out,
+                        struct sh_err *err)
 {
     memset(out, 0, sizeof *out);
     out->device = rtcNewDevice(NULL);
@@ -88,73 +87,71 @@ int bench_embree_rays(struct bench_embree *e, const float *fx, const float *fy, 
     e->fz = fz;
     e->prim = aligned_alloc(64, n * sizeof *e->prim);
     e->t = aligned_alloc(64, n * sizeof *e->t);
-    return e->prim != NULL && e->t != NULL ? SH_OK
-                                           : sh_fail(err, SH_ENOMEM, "bench: no memory for %u rays", n);
+    return e->prim != NULL && e->t != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "bench: no memory for %u rays", n);
 }
 
 /* What the cast of a packet leaves as it is is set once. Misaligned packets or masks make Embree crash. */
-#define PACKET_FUNCTIONS(W)                                                                   \
-    static void set_##W(struct RTCRayHit##W *p)                                               \
-    {                                                                                         \
-        memset(p, 0, sizeof *p);                                                              \
-        for (uint32_t i = 0; i < W; i++) {                                                    \
-            p->ray.mask[i] = 0xffffffffU;                                                     \
-            p->hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;                                    \
-        }                                                                                     \
-    }                                                                                         \
-    static void load_##W(struct RTCRayHit##W *p, const struct bench_embree *e, uint32_t base) \
-    {                                                                                         \
-        for (uint32_t i = 0; i < W; i++) {                                                    \
-            p->ray.dir_x[i] = e->fx[base + i];                                                \
-            p->ray.dir_y[i] = e->fy[base + i];                                                \
-            p->ray.dir_z[i] = e->fz[base + i];                                                \
-        }                                                                                     \
-    }                                                                                         \
-    static void reset_##W(struct RTCRayHit##W *p)                                             \
-    {                                                                                         \
-        for (uint32_t i = 0; i < W; i++) {                                                    \
-            p->ray.tfar[i] = T_MAX;                                                           \
-            p->hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;                                       \
-        }                                                                                     \
-    }                                                                                         \
-    static void pass_prepared_##W(const struct bench_embree *e, uint32_t first, uint32_t n)   \
-    {                                                                                         \
-        CONTEXT(context);                                                                     \
-        int valid[W] __attribute__((aligned(64)));                                            \
-        struct RTCRayHit##W *packet = (struct RTCRayHit##W *)e->packets + first / W;          \
-        memset(valid, 0xff, sizeof valid);                                                    \
-        for (uint32_t base = 0; base < n; base += W, packet++) {                              \
-            reset_##W(packet);                                                                \
-            CALL(W, valid, e->rtc, &context, packet);                                         \
-        }                                                                                     \
-    }                                                                                         \
-    static void pass_loaded_##W(const struct bench_embree *e, uint32_t first, uint32_t n)     \
-    {                                                                                         \
-        CONTEXT(context);                                                                     \
-        int valid[W] __attribute__((aligned(64)));                                            \
-        struct RTCRayHit##W packet __attribute__((aligned(64)));                              \
-        memset(valid, 0xff, sizeof valid);                                                    \
-        set_##W(&packet);                                                                     \
-        for (uint32_t base = first; base < first + n; base += W) {                            \
-            load_##W(&packet, e, base);                                                       \
-            reset_##W(&packet);                                                               \
-            CALL(W, valid, e->rtc, &context, &packet);                                        \
-            for (uint32_t i = 0; i < W; i++) {                                                \
-                e->prim[base + i] = packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID           \
-                                        ? RTC_INVALID_GEOMETRY_ID                             \
-                                        : packet.hit.primID[i];                               \
-                e->t[base + i] = packet.ray.tfar[i];                                          \
-            }                                                                                 \
-        }                                                                                     \
-    }                                                                                         \
-    static void *prepare_##W(const struct bench_embree *e)                                    \
-    {                                                                                         \
-        struct RTCRayHit##W *packet = aligned_alloc(64, e->n / W * sizeof *packet);           \
-        for (uint32_t i = 0; packet != NULL && i < e->n / W; i++) {                           \
-            set_##W(packet + i);                                                              \
-            load_##W(packet + i, e, i * W);                                                   \
-        }                                                                                     \
-        return packet;                                                                        \
+#define PACKET_FUNCTIONS(W)                                                                                           \
+    static void set_##W(struct RTCRayHit##W *p)                                                                       \
+    {                                                                                                                 \
+        memset(p, 0, sizeof *p);                                                                                      \
+        for (uint32_t i = 0; i < W; i++) {                                                                            \
+            p->ray.mask[i] = 0xffffffffU;                                                                             \
+            p->hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;                                                            \
+        }                                                                                                             \
+    }                                                                                                                 \
+    static void load_##W(struct RTCRayHit##W *p, const struct bench_embree *e, uint32_t base)                         \
+    {                                                                                                                 \
+        for (uint32_t i = 0; i < W; i++) {                                                                            \
+            p->ray.dir_x[i] = e->fx[base + i];                                                                        \
+            p->ray.dir_y[i] = e->fy[base + i];                                                                        \
+            p->ray.dir_z[i] = e->fz[base + i];                                                                        \
+        }                                                                                                             \
+    }                                                                                                                 \
+    static void reset_##W(struct RTCRayHit##W *p)                                                                     \
+    {                                                                                                                 \
+        for (uint32_t i = 0; i < W; i++) {                                                                            \
+            p->ray.tfar[i] = T_MAX;                                                                                   \
+            p->hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;                                                               \
+        }                                                                                                             \
+    }                                                                                                                 \
+    static void pass_prepared_##W(const struct bench_embree *e, uint32_t first, uint32_t n)                           \
+    {                                                                                                                 \
+        CONTEXT(context);                                                                                             \
+        int valid[W] __attribute__((aligned(64)));                                                                    \
+        struct RTCRayHit##W *packet = (struct RTCRayHit##W *)e->packets + first / W;                                  \
+        memset(valid, 0xff, sizeof valid);                                                                            \
+        for (uint32_t base = 0; base < n; base += W, packet++) {                                                      \
+            reset_##W(packet);                                                                                        \
+            CALL(W, valid, e->rtc, &context, packet);                                                                 \
+        }                                                                                                             \
+    }                                                                                                                 \
+    static void pass_loaded_##W(const struct bench_embree *e, uint32_t first, uint32_t n)                             \
+    {                                                                                                                 \
+        CONTEXT(context);                                                                                             \
+        int valid[W] __attribute__((aligned(64)));                                                                    \
+        struct RTCRayHit##W packet __attribute__((aligned(64)));                                                      \
+        memset(valid, 0xff, sizeof valid);                                                                            \
+        set_##W(&packet);                                                                                             \
+        for (uint32_t base = first; base < first + n; base += W) {                                                    \
+            load_##W(&packet, e, base);                                                                               \
+            reset_##W(&packet);                                                                                       \
+            CALL(W, valid, e->rtc, &context, &packet);                                                                \
+            for (uint32_t i = 0; i < W; i++) {                                                                        \
+                e->prim[base + i] =                                                                                   \
+                    packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID ? RTC_INVALID_GEOMETRY_ID : packet.hit.primID[i]; \
+                e->t[base + i] = packet.ray.tfar[i];                                                                  \
+            }                                                                                                         \
+        }                                                                                                             \
+    }                                                                                                                 \
+    static void *prepare_##W(const struct bench_embree *e)                                                            \
+    {                                                                                                                 \
+        struct RTCRayHit##W *packet = aligned_alloc(64, e->n / W * sizeof *packet);                                   \
+        for (uint32_t i = 0; packet != NULL && i < e->n / W; i++) {                                                   \
+            set_##W(packet + i);                                                                                      \
+            load_##W(packet + i, e, i * W);                                                                           \
+        }                                                                                                             \
+        return packet;                                                                                                \
     }
 
 PACKET_FUNCTIONS(4)
@@ -190,8 +187,7 @@ int bench_embree_prepare(struct bench_embree *e, uint32_t width, enum bench_feed
     return e->packets != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "bench: no memory for %u rays", e->n);
 }
 
-void bench_embree_pass(const struct bench_embree *e, uint32_t width, enum bench_feed feed, uint32_t first,
-                       uint32_t n)
+void bench_embree_pass(const struct bench_embree *e, uint32_t width, enum bench_feed feed, uint32_t first, uint32_t n)
 {
     static void (*const pass[2][3])(const struct bench_embree *, uint32_t, uint32_t) = {
         [BENCH_PREPARED] = {pass_prepared_4, pass_prepared_8, pass_prepared_16},

@@ -72,8 +72,8 @@ static int hits_outside(const struct bench_mesh *mesh, uint32_t prim, const doub
 }
 
 /* 1: leaked; 2: passed by. tolerance: of the range, in shares. */
-static int judge(const struct bench_mesh *mesh, const struct batch *b, uint32_t k, double range_m,
-                 uint32_t prim, double tolerance)
+static int judge(const struct bench_mesh *mesh, const struct batch *b, uint32_t k, double range_m, uint32_t prim,
+                 double tolerance)
 {
     const double dir[3] = {b->dx[k], b->dy[k], b->dz[k]};
     if (prim >= mesh->scene->n_triangles || prim >= mesh->n_inner) return 1;
@@ -98,8 +98,8 @@ static void *job_main(void *arg)
         uint32_t n = job->n - first < BATCH ? (uint32_t)(job->n - first) : BATCH;
         for (uint32_t k = 0; k < n; k++)
             aim(job, first + k, b, k);
-        caster_hits(caster, job->bvh, job->mesh->station_m, BENCH_RANGE_MAX_M, n, b->dx, b->dy, b->dz,
-                    b->range_m, b->prim);
+        caster_hits(caster, job->bvh, job->mesh->station_m, BENCH_RANGE_MAX_M, n, b->dx, b->dy, b->dz, b->range_m,
+                    b->prim);
         for (uint32_t k = 0; k < n; k++)
             counts[judge(job->mesh, b, k, b->range_m[k], b->prim[k], 1e-9)]++;
     }
@@ -144,8 +144,7 @@ static int run_job(struct job *job, uint32_t threads, const struct sh_report *re
     }
     for (uint32_t i = 0; i < begun; i++)
         pthread_join(thread[i], NULL);
-    if (job->out->rays != job->n)
-        return sh_fail(err, SH_ENOMEM, "bench: no memory or no thread for the rays");
+    if (job->out->rays != job->n) return sh_fail(err, SH_ENOMEM, "bench: no memory or no thread for the rays");
     job->out->ns_per_ray = 1e9 * job->cpu_s / (double)job->n;
     return SH_OK;
 }
@@ -180,8 +179,7 @@ static int one_mesh(int which, uint64_t rays, uint64_t seed, uint32_t threads, c
                     struct bench_leaks *out, struct sh_err *err)
 {
     struct bench_mesh mesh;
-    struct job job = {
-        .mesh = &mesh, .n = rays, .key = rng_key(seed, RNG_SCENE) + 2 * (uint64_t)which, .out = out};
+    struct job job = {.mesh = &mesh, .n = rays, .key = rng_key(seed, RNG_SCENE) + 2 * (uint64_t)which, .out = out};
     pthread_mutex_init(&job.lock, NULL);
     int rc = bench_mesh_create(which, &mesh, err);
     if (rc == SH_OK) rc = bvh_create(mesh.scene, mesh.station_m, 0.0, 0, report, &job.bvh, err);

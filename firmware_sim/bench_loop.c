@@ -122,8 +122,8 @@ static int run_loop(const struct site *site, struct loop_stats *stats, double *c
     return rc;
 }
 
-static int rounds(const struct bench_case *c, const struct bench_result *one, const struct site *site,
-                  uint32_t frames, struct bench_threads *out, struct sh_err *err)
+static int rounds(const struct bench_case *c, const struct bench_result *one, const struct site *site, uint32_t frames,
+                  struct bench_threads *out, struct sh_err *err)
 {
     double rays_s[ROUNDS], pulses_s[ROUNDS], ratio[ROUNDS], cpu_ns[ROUNDS];
     for (uint32_t i = 0; i < ROUNDS; i++) {
@@ -147,8 +147,8 @@ static int rounds(const struct bench_case *c, const struct bench_result *one, co
     return SH_OK;
 }
 
-int bench_loop(const struct bench_case *c, const struct bench_result *one, uint32_t threads,
-               struct bench_threads *out, struct sh_err *err)
+int bench_loop(const struct bench_case *c, const struct bench_result *one, uint32_t threads, struct bench_threads *out,
+               struct sh_err *err)
 {
     memset(out, 0, sizeof *out);
     out->threads = threads < MAX_THREADS ? threads : MAX_THREADS;

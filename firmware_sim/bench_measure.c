@@ -91,8 +91,8 @@ static void pass(struct measure *m, int method, uint32_t round)
     if (method == EMBREE)
         bench_embree_pass(c->embree, m->out->embree_width, m->out->embree_feed, 0, rays->n);
     else if (method == CAST)
-        caster_hits(m->caster, c->bvh, m->setup.station_m, BENCH_RANGE_MAX_M, rays->n, rays->dx, rays->dy,
-                    rays->dz, m->range_m, m->prim);
+        caster_hits(m->caster, c->bvh, m->setup.station_m, BENCH_RANGE_MAX_M, rays->n, rays->dx, rays->dy, rays->dz,
+                    m->range_m, m->prim);
     else if (method == STAGED)
         staged_pass(m, round);
     else

@@ -16,8 +16,7 @@ struct builder {
 
 static int reserve(struct builder *b, size_t n_vertices, size_t n_triangles, struct sh_err *err)
 {
-    *b = (struct builder){malloc(n_vertices * sizeof *b->vertex), malloc(n_triangles * sizeof *b->triangle),
-                          0, 0};
+    *b = (struct builder){malloc(n_vertices * sizeof *b->vertex), malloc(n_triangles * sizeof *b->triangle), 0, 0};
     if (b->vertex != NULL && b->triangle != NULL) return SH_OK;
     return sh_fail(err, SH_ENOMEM, "bench: no memory for a mesh");
 }
@@ -25,8 +24,8 @@ static int reserve(struct builder *b, size_t n_vertices, size_t n_triangles, str
 static int finish(struct builder *b, int rc, struct scene **out, struct sh_err *err)
 {
     if (rc == SH_OK)
-        rc = scene_from_arrays((const double(*)[3])b->vertex, b->n_vertices,
-                               (const uint32_t(*)[3])b->triangle, b->n_triangles, NULL, NULL, 0, out, err);
+        rc = scene_from_arrays((const double(*)[3])b->vertex, b->n_vertices, (const uint32_t(*)[3])b->triangle,
+                               b->n_triangles, NULL, NULL, 0, out, err);
     free(b->vertex);
     free(b->triangle);
     return rc;
@@ -106,8 +105,7 @@ static void divide(struct builder *b, double radius_m)
         memcpy(t, b->triangle[i], sizeof t);
         for (int k = 0; k < 3; k++)
             m[k] = middle(b, t[k], t[(k + 1) % 3], radius_m);
-        const uint32_t cut[4][3] = {
-            {t[0], m[0], m[2]}, {t[1], m[1], m[0]}, {t[2], m[2], m[1]}, {m[0], m[1], m[2]}};
+        const uint32_t cut[4][3] = {{t[0], m[0], m[2]}, {t[1], m[1], m[0]}, {t[2], m[2], m[1]}, {m[0], m[1], m[2]}};
         memcpy(b->triangle[i], cut[0], sizeof cut[0]);
         memcpy(b->triangle[b->n_triangles], cut[1], 3 * sizeof cut[0]);
         b->n_triangles += 3;
@@ -123,8 +121,7 @@ static double distance2(const double a[3], const double b[3])
  * outward. */
 static void add_icosahedron(struct builder *b, double radius_m)
 {
-    const double g = 0.5 * (1.0 + sqrt(5.0)), scale = radius_m / sqrt(1.0 + g * g),
-                 near2 = 5.0 * scale * scale;
+    const double g = 0.5 * (1.0 + sqrt(5.0)), scale = radius_m / sqrt(1.0 + g * g), near2 = 5.0 * scale * scale;
     double(*p)[3] = b->vertex;
     for (int i = 0; i < 12; i++) { /* (0, +-1, +-g) and its cyclic turns; edges are 2 long */
         p[i][i / 4] = 0.0;
@@ -135,8 +132,7 @@ static void add_icosahedron(struct builder *b, double radius_m)
     for (uint32_t i = 0; i < 12; i++)
         for (uint32_t j = i + 1; j < 12; j++)
             for (uint32_t k = j + 1; k < 12; k++) {
-                if (distance2(p[i], p[j]) > near2 || distance2(p[j], p[k]) > near2 ||
-                    distance2(p[i], p[k]) > near2)
+                if (distance2(p[i], p[j]) > near2 || distance2(p[j], p[k]) > near2 || distance2(p[i], p[k]) > near2)
                     continue;
                 double volume = p[i][0] * (p[j][1] * p[k][2] - p[j][2] * p[k][1]) +
                                 p[i][1] * (p[j][2] * p[k][0] - p[j][0] * p[k][2]) +
@@ -151,8 +147,7 @@ static int sphere(struct bench_mesh *mesh, struct sh_err *err)
     const double radius_m = 30.0;
     struct builder b;
     size_t n = (size_t)20 << (2 * MAX_DIVIDE);
-    int rc = reserve(&b, 12 + n, n,
-                     err); /* each triangle that is cut makes three new corners and three triangles */
+    int rc = reserve(&b, 12 + n, n, err); /* each triangle that is cut makes three new corners and three triangles */
     if (rc == SH_OK) {
         add_icosahedron(&b, radius_m);
         for (int i = 0; i < MAX_DIVIDE; i++)

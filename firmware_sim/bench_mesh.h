@@ -8,9 +8,9 @@ struct bench_mesh {
     const char *name;
     struct scene *scene;
     double station_m[3];
-    uint32_t n_aim;   /* triangles that are aimed at, from number 0 on */
-    uint32_t n_inner; /* triangles of the mesh around the station, from number 0 on; a hit on a later one is a
-                         leak */
+    uint32_t n_aim;    /* triangles that are aimed at, from number 0 on */
+    uint32_t n_inner;  /* triangles of the mesh around the station, from number 0 on; a hit on a later one is a
+                          leak */
     uint32_t n_turned; /* triangles, from number 0 on, whose normal (first x second edge) points inward; the
                           rest outward */
 };

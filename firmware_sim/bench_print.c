@@ -156,8 +156,8 @@ int bench_print_json(FILE *out, const struct bench_report *report, struct sh_err
 
 static void table_speed(FILE *out, const struct bench_report *report)
 {
-    fprintf(out, "%-8s %11s %9s %6s %9s | %9s %7s %7s | %9s %9s\n", "scene", "triangles", "Embree", "cast",
-            "pipeline", "all thr.", "M/s", "ratio", "build s", "bytes/tri");
+    fprintf(out, "%-8s %11s %9s %6s %9s | %9s %7s %7s | %9s %9s\n", "scene", "triangles", "Embree", "cast", "pipeline",
+            "all thr.", "M/s", "ratio", "build s", "bytes/tri");
     for (uint32_t i = 0; i < report->n_scenes; i++) {
         const struct bench_scene_report *s = &report->scene[i];
         const struct bench_threads *t = &s->loop[s->n_loop != 0 ? s->n_loop - 1 : 0];
@@ -169,8 +169,7 @@ static void table_speed(FILE *out, const struct bench_report *report)
 
 static void table_stages(FILE *out, const struct bench_report *report)
 {
-    fprintf(out,
-            "\nns per pulse, one thread (Embree alone | the stages of the pipeline | their sum)\n%-8s %7s |",
+    fprintf(out, "\nns per pulse, one thread (Embree alone | the stages of the pipeline | their sum)\n%-8s %7s |",
             "scene", "Embree");
     for (int i = 0; i < BENCH_STAGES; i++)
         fprintf(out, " %*s", (int)strlen(bench_stage_name[i]) > 6 ? (int)strlen(bench_stage_name[i]) : 6,
@@ -180,8 +179,7 @@ static void table_stages(FILE *out, const struct bench_report *report)
         const struct bench_result *r = &report->scene[k].result;
         fprintf(out, "%-8s %7.2f |", report->scene[k].name, r->embree_ns);
         for (int i = 0; i < BENCH_STAGES; i++)
-            fprintf(out, " %*.2f",
-                    (int)strlen(bench_stage_name[i]) > 6 ? (int)strlen(bench_stage_name[i]) : 6,
+            fprintf(out, " %*.2f", (int)strlen(bench_stage_name[i]) > 6 ? (int)strlen(bench_stage_name[i]) : 6,
                     r->stage_ns[i]);
         fprintf(out, " %6.2f | %7.2f\n", rest_ns(r), r->pipeline_ns);
     }
@@ -193,10 +191,9 @@ static void table_leaks(FILE *out, const struct bench_report *report)
             "triangles", "rays", "leaks", "decided", "ns/ray", "Embree alone, robust");
     for (int i = 0; i < BENCH_LEAK_MESHES; i++) {
         const struct bench_leaks *l = &report->leaks[i];
-        fprintf(out, "%-14s %10u %12" PRIu64 " %7" PRIu64 " %8.1f%% %8.0f | %" PRIu64 " of %" PRIu64 "\n",
-                l->mesh, l->triangles, l->rays, l->leaks,
-                100.0 * (double)l->counters.decided / (double)l->rays, l->ns_per_ray, l->plain_leaks,
-                l->plain_rays);
+        fprintf(out, "%-14s %10u %12" PRIu64 " %7" PRIu64 " %8.1f%% %8.0f | %" PRIu64 " of %" PRIu64 "\n", l->mesh,
+                l->triangles, l->rays, l->leaks, 100.0 * (double)l->counters.decided / (double)l->rays, l->ns_per_ray,
+                l->plain_leaks, l->plain_rays);
     }
 }
 

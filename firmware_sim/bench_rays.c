@@ -30,8 +30,7 @@ static void fill_line(struct bench_rays *rays, uint32_t l, double *mirror_turn, 
     schedule_get_run(&rays->segment, &line, line.cast0, BENCH_LINE_PULSES, &run);
     kernel_angles(&run, 0, run.n, mirror_turn, pan_turn);
     kernel_directions(mirror_turn, pan_turn, levelled, run.n, rays->dx + at, rays->dy + at, rays->dz + at);
-    kernel_to_float(rays->dx + at, rays->dy + at, rays->dz + at, run.n, rays->fx + at, rays->fy + at,
-                    rays->fz + at);
+    kernel_to_float(rays->dx + at, rays->dy + at, rays->dz + at, run.n, rays->fx + at, rays->fy + at, rays->fz + at);
 }
 
 int bench_rays_create(uint32_t lines, struct bench_rays *out, struct sh_err *err)

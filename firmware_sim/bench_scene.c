@@ -22,8 +22,7 @@ uint32_t bench_count(const char *name)
     return n >= 100 && n <= 100000000 ? (uint32_t)n : 0;
 }
 
-static int load_house(const char *file, const struct sh_report *report, struct bench_target *t,
-                      struct sh_err *err)
+static int load_house(const char *file, const struct sh_report *report, struct bench_target *t, struct sh_err *err)
 {
     static const double living_room_m[3] = {5.5, 2.2, 1.6}; /* of config/demo.yaml */
     struct scene_mesh_spec spec = {.file = file, .up = SCENE_UP_Y, .scale = 1.0};
@@ -31,8 +30,8 @@ static int load_house(const char *file, const struct sh_report *report, struct b
     return scene_load(&spec, 1, 1e-4, report, &t->scene, err);
 }
 
-int bench_target_load(const char *name, const char *house, const struct sh_report *report,
-                      struct bench_target *out, struct sh_err *err)
+int bench_target_load(const char *name, const char *house, const struct sh_report *report, struct bench_target *out,
+                      struct sh_err *err)
 {
     static const double centre_m[2] = {0.0, 0.0};
     memset(out, 0, sizeof *out);

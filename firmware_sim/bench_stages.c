@@ -56,9 +56,9 @@ static void share(struct bench_stages *s, uint64_t from, uint64_t to, enum bench
     cycles[other] += rest;
 }
 
-size_t bench_stages_line(struct bench_stages *s, const struct cast_setup *setup,
-                         const struct schedule_segment *segment, uint64_t line, uint64_t cycles[BENCH_STAGES],
-                         struct line_block *block, uint8_t *bytes, size_t cap)
+size_t bench_stages_line(struct bench_stages *s, const struct cast_setup *setup, const struct schedule_segment *segment,
+                         uint64_t line, uint64_t cycles[BENCH_STAGES], struct line_block *block, uint8_t *bytes,
+                         size_t cap)
 {
     struct schedule_line place;
     struct schedule_run run;

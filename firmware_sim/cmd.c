@@ -86,7 +86,8 @@ int cmd_parse_double(const char *command, const char *option, const char *text, 
     char *end;
     errno = 0;
     double value = strtod(text, &end);
-    if (end == text || *end != '\0' || isspace((unsigned char)text[0]) || !isfinite(value) || value < min || value > max)
+    if (end == text || *end != '\0' || isspace((unsigned char)text[0]) || !isfinite(value) || value < min ||
+        value > max)
         return cmd_usage(command, "%s %s: not a number from %g to %g", option, text, min, max);
     *out = value;
     return CMD_OK;

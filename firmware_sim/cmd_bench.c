@@ -88,10 +88,9 @@ static int check_scenes(const char *list)
     if (*list == '\0') return cmd_usage("bench", "--scenes: a list is needed, such as %s", DEFAULT_SCENES);
     while ((list = next_name(list, name, sizeof name)) != NULL)
         if ((strcmp(name, "house") != 0 && bench_count(name) == 0) || ++n > BENCH_MAX_SCENES)
-            return cmd_usage(
-                "bench",
-                "--scenes %s: allowed are up to %d of house and numbers of triangles from 100 to 100M", name,
-                BENCH_MAX_SCENES);
+            return cmd_usage("bench",
+                             "--scenes %s: allowed are up to %d of house and numbers of triangles from 100 to 100M",
+                             name, BENCH_MAX_SCENES);
     return CMD_OK;
 }
 
@@ -136,8 +135,8 @@ static uint32_t all_threads(const struct bench_options *o)
     return n < 1 ? 1 : n > 64 ? 64 : (uint32_t)n;
 }
 
-static int measure_case(const struct bench_options *o, const struct bench_case *c,
-                        struct bench_scene_report *out, struct sh_err *err)
+static int measure_case(const struct bench_options *o, const struct bench_case *c, struct bench_scene_report *out,
+                        struct sh_err *err)
 {
     cpu_set_t before;
     pin(&before);
@@ -160,8 +159,7 @@ static int measure_target(const struct bench_options *o, const struct bench_targ
     int rc = bench_rays_create(BENCH_LINES, &rays, err);
     if (rc == SH_OK) rc = bench_embree_create(target->scene, target->station_m, 1, &embree, err);
     if (rc == SH_OK) rc = bench_embree_rays(&embree, rays.fx, rays.fy, rays.fz, rays.n, err);
-    if (rc == SH_OK)
-        rc = bvh_create(target->scene, target->station_m, 0.0, 0, &cmd_report_stderr, &c.bvh, err);
+    if (rc == SH_OK) rc = bvh_create(target->scene, target->station_m, 0.0, 0, &cmd_report_stderr, &c.bvh, err);
     if (rc == SH_OK) {
         snprintf(out->name, sizeof out->name, "%s", target->name);
         out->triangles = target->scene->n_triangles;
@@ -183,8 +181,7 @@ static int measure_scene(const struct bench_options *o, const char *name, struct
     const char *house = o->house != NULL ? o->house : HOUSE_FILE;
     if (strcmp(name, "house") == 0 && o->house == NULL && access(house, R_OK) != 0) {
         snprintf(report->note[report->n_notes++ % BENCH_MAX_NOTES], sizeof report->note[0],
-                 "house left out: %s: %s (Debian: assimp-testmodels; or --house FILE)", house,
-                 strerror(errno));
+                 "house left out: %s: %s (Debian: assimp-testmodels; or --house FILE)", house, strerror(errno));
         return SH_OK;
     }
     fprintf(stderr, "scanhead: bench: %s\n", name);

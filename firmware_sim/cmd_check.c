@@ -5,8 +5,9 @@
 
 #include "firmware_sim/cmd.h"
 
-static const char HELP[] = "scanhead check CONFIG [--set KEY=VALUE ...]: validate configuration, scene and links; nothing runs\n\n"
-                           "Configuration keys:\n\n";
+static const char HELP[] =
+    "scanhead check CONFIG [--set KEY=VALUE ...]: validate configuration, scene and links; nothing runs\n\n"
+    "Configuration keys:\n\n";
 
 static const struct option OPTIONS[] = {
     {"set", required_argument, NULL, 's'}, {"help", no_argument, NULL, 'h'}, {NULL, 0, NULL, 0}};
@@ -81,7 +82,8 @@ int cmd_check(int argc, char **argv)
 int cmd_list(int argc, char **argv)
 {
     if (argc == 2 && (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0)) {
-        puts("scanhead list: head profiles ($SCANHEAD_HEADS, else the installed ones, else config/heads) and kinds of links");
+        puts("scanhead list: head profiles ($SCANHEAD_HEADS, else the installed ones, else config/heads) and kinds of "
+             "links");
         return CMD_OK;
     }
     if (argc != 1) return cmd_usage("list", "it takes no arguments");

@@ -8,14 +8,14 @@
 #include "firmware_sim/cmd.h"
 #include "firmware_sim/recording.h"
 
-static const char HELP[] =
-    "scanhead map CONFIG -o FILE.png [options]: scan map of the stations, from above\n\n"
-    "Scans one frame from each station off line and draws the points: dark where many heights were hit (walls), hue by\n"
-    "height. The area is that of the scene and the stations.\n\n"
-    "  -o FILE.png      where to write\n"
-    "  --pixel-m M      side of a pixel; default: 1200 pixels on the longer side\n"
-    "  --set KEY=VALUE  any configuration key; may be repeated\n"
-    "  --quiet          no progress\n";
+static const char HELP[] = "scanhead map CONFIG -o FILE.png [options]: scan map of the stations, from above\n\n"
+                           "Scans one frame from each station off line and draws the points: dark where many heights "
+                           "were hit (walls), hue by\n"
+                           "height. The area is that of the scene and the stations.\n\n"
+                           "  -o FILE.png      where to write\n"
+                           "  --pixel-m M      side of a pixel; default: 1200 pixels on the longer side\n"
+                           "  --set KEY=VALUE  any configuration key; may be repeated\n"
+                           "  --quiet          no progress\n";
 
 enum { OPT_PIXEL = 256, OPT_SET, OPT_QUIET, BATCH = 4096 };
 
@@ -113,9 +113,14 @@ static int draw(struct map_run *run, struct config *cfg, struct sh_err *err)
 {
     struct offline *offline = NULL;
     struct recording_result result;
-    struct recording_options options = {.first_station = 1, .last_station = cfg->n_stations, .frames = 1,
-                                        .progress = !run->quiet, .report = &cmd_report_stderr, .frame = add_frame,
-                                        .ctx = run, .interrupted = interrupted};
+    struct recording_options options = {.first_station = 1,
+                                        .last_station = cfg->n_stations,
+                                        .frames = 1,
+                                        .progress = !run->quiet,
+                                        .report = &cmd_report_stderr,
+                                        .frame = add_frame,
+                                        .ctx = run,
+                                        .interrupted = interrupted};
     int rc = offline_open(cfg, &cmd_report_stderr, &offline, err);
     if (rc == SH_OK) rc = create_map(run, cfg, offline_scene(offline), err);
     if (rc == SH_OK) rc = recording_run(offline_scanhead(offline), &options, &result, err);

@@ -29,8 +29,19 @@ static const char HELP[] =
     "lost on the way. What came is kept in FILE all the same.\n";
 
 enum { MAX_FILES = 8 };
-enum { OPT_STATION = 256, OPT_FRAMES, OPT_DURATION, OPT_LISTEN, OPT_ASCII, OPT_EMPTY, OPT_STATS, OPT_SET, OPT_CRS,
-       OPT_THREADS, OPT_QUIET };
+enum {
+    OPT_STATION = 256,
+    OPT_FRAMES,
+    OPT_DURATION,
+    OPT_LISTEN,
+    OPT_ASCII,
+    OPT_EMPTY,
+    OPT_STATS,
+    OPT_SET,
+    OPT_CRS,
+    OPT_THREADS,
+    OPT_QUIET
+};
 
 static const struct option OPTIONS[] = {{"station", required_argument, NULL, OPT_STATION},
                                         {"frames", required_argument, NULL, OPT_FRAMES},
@@ -172,8 +183,8 @@ static int write_frame(void *ctx, struct scanhead *sh, const struct scanhead_fra
     return SH_OK;
 }
 
-static int write_stats(const struct record *r, struct scanhead *sh, const struct recording_result *result, double wall_s,
-                       struct sh_err *err)
+static int write_stats(const struct record *r, struct scanhead *sh, const struct recording_result *result,
+                       double wall_s, struct sh_err *err)
 {
     struct scanhead_stats s;
     char hex[65];
@@ -220,15 +231,17 @@ static int check_complete(struct scanhead *sh, const struct recording_result *re
     scanhead_get_stats(sh, &s);
     uint64_t pulses = s.pulses_lost > result->lost_pulses ? s.pulses_lost : result->lost_pulses;
     if (count_lost(sh) == 0 && pulses == 0) return SH_OK;
-    return sh_fail(err, SH_EIO, "the recording is not complete: %llu frames lost to this reader, %llu pulses by the head",
+    return sh_fail(err, SH_EIO,
+                   "the recording is not complete: %llu frames lost to this reader, %llu pulses by the head",
                    (unsigned long long)count_lost(sh), (unsigned long long)pulses);
 }
 
 static void say_result(const struct record *r, const struct recording_result *result)
 {
     if (r->recording.progress)
-        fprintf(stderr, "scanhead: %llu points, %llu shots without echo, %llu scans\n", (unsigned long long)result->points,
-                (unsigned long long)result->empty, (unsigned long long)result->scans);
+        fprintf(stderr, "scanhead: %llu points, %llu shots without echo, %llu scans\n",
+                (unsigned long long)result->points, (unsigned long long)result->empty,
+                (unsigned long long)result->scans);
 }
 
 static int interrupted(void)
@@ -290,7 +303,8 @@ static int record_config(struct record *r, struct sh_err *err)
     uint32_t frames = r->recording.frames >= 0 ? (uint32_t)r->recording.frames : cfg->settings.frames;
     int rc = SH_OK;
     if (frames == 0 && !(r->recording.duration_s > 0.0))
-        rc = sh_fail(err, SH_EINPUT, "%s: head.frames is 0, a scan without end; give --frames or --duration", cfg->file);
+        rc =
+            sh_fail(err, SH_EINPUT, "%s: head.frames is 0, a scan without end; give --frames or --duration", cfg->file);
     if (rc == SH_OK) rc = offline_open(cfg, &cmd_report_stderr, &offline, err);
     if (rc == SH_OK) rc = record(r, offline_scanhead(offline), err);
     offline_close(offline);
@@ -314,7 +328,8 @@ static int record_stream(struct record *r, struct sh_err *err)
         rc = scanhead_command(sh, "HEAD:STATION? MAX", reply, sizeof reply, 5000);
         r->recording.first_station = 1;
         if (rc != SCANHEAD_OK || sscanf(reply, "%u", &r->recording.last_station) != 1)
-            rc = sh_fail(err, SH_EIO, "%s: no number of stations: %s", r->source, rc == SCANHEAD_OK ? reply : scanhead_error(sh));
+            rc = sh_fail(err, SH_EIO, "%s: no number of stations: %s", r->source,
+                         rc == SCANHEAD_OK ? reply : scanhead_error(sh));
     }
     if (rc == SH_OK) rc = record(r, sh, err);
     scanhead_close(sh);

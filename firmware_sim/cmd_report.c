@@ -118,8 +118,8 @@ static int compare(struct report *r, struct sh_err *err)
     if (rc != SH_OK) return sh_fail(err, rc, "%s: %.300s", r->cloud_path, why.text);
     cloud_stats(r->distance_m, r->cloud.n, r->tolerance_m, &r->stats);
     if (r->stats.points == 0)
-        return sh_fail(err, SH_EINPUT, "%s: there are no points in it (%zu shots without echo)",
-                       r->cloud_path, r->stats.empty);
+        return sh_fail(err, SH_EINPUT, "%s: there are no points in it (%zu shots without echo)", r->cloud_path,
+                       r->stats.empty);
     return SH_OK;
 }
 

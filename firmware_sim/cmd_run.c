@@ -31,8 +31,19 @@ struct run_options {
     int quiet;
 };
 
-enum { OPT_START = 256, OPT_PACE, OPT_DURATION, OPT_FRAMES, OPT_THREADS, OPT_SET, OPT_STATS, OPT_JOURNAL, OPT_REPLAY,
-       OPT_READY, OPT_QUIET };
+enum {
+    OPT_START = 256,
+    OPT_PACE,
+    OPT_DURATION,
+    OPT_FRAMES,
+    OPT_THREADS,
+    OPT_SET,
+    OPT_STATS,
+    OPT_JOURNAL,
+    OPT_REPLAY,
+    OPT_READY,
+    OPT_QUIET
+};
 
 static const struct option OPTIONS[] = {{"start", no_argument, NULL, OPT_START},
                                         {"pace", required_argument, NULL, OPT_PACE},
@@ -106,9 +117,10 @@ static void say_what_runs(const struct config *cfg, const struct site *site, con
 {
     struct bvh_info info;
     bvh_get_info(site->station[0].bvh, &info);
-    fprintf(stderr, "scanhead: %s %s, %s, %u triangles, %u surfaces; BVH in %.2f s, %.0f bytes per triangle, packets of %u\n",
-            cfg->profile.maker, cfg->profile.model, cfg->profile.name, site->scene->n_triangles, site->scene->n_surfaces,
-            info.build_s, (double)info.bytes / site->scene->n_triangles, info.packet);
+    fprintf(stderr,
+            "scanhead: %s %s, %s, %u triangles, %u surfaces; BVH in %.2f s, %.0f bytes per triangle, packets of %u\n",
+            cfg->profile.maker, cfg->profile.model, cfg->profile.name, site->scene->n_triangles,
+            site->scene->n_surfaces, info.build_s, (double)info.bytes / site->scene->n_triangles, info.packet);
     char endpoint[512];
     for (uint32_t i = 0; loop_endpoint(loop, i, endpoint, sizeof endpoint); i++)
         fprintf(stderr, "scanhead: link %s\n", endpoint);
@@ -155,7 +167,8 @@ static int serve(const struct run_options *o, struct loop *loop, struct device *
         fprintf(stderr, "scanhead: warning: %llu pulses could not be computed in time\n",
                 (unsigned long long)stats.loop.lost_pulses);
     if (stats.loop.reader_lost_frames != 0)
-        fprintf(stderr, "scanhead: warning: readers lost %llu frames\n", (unsigned long long)stats.loop.reader_lost_frames);
+        fprintf(stderr, "scanhead: warning: readers lost %llu frames\n",
+                (unsigned long long)stats.loop.reader_lost_frames);
     return rc;
 }
 
@@ -189,9 +202,9 @@ int cmd_run(int argc, char **argv)
     if (cfg == NULL) return status;
     cmd_catch_signals();
     struct sh_err err = {0};
-    int rc = cfg->n_links == 0
-                 ? sh_fail(&err, SH_EINPUT, "%s: links: none; run needs at least one of pty, tcp, file, null", cfg->file)
-                 : run_with(&o, cfg, &err);
+    int rc = cfg->n_links == 0 ? sh_fail(&err, SH_EINPUT,
+                                         "%s: links: none; run needs at least one of pty, tcp, file, null", cfg->file)
+                               : run_with(&o, cfg, &err);
     free(cfg);
     return rc == SH_OK ? CMD_OK : cmd_fail(&err);
 }

@@ -42,8 +42,7 @@ static int parse_special(const char *param, enum command_value_kind *kind)
     static const struct {
         const char *pattern;
         enum command_value_kind kind;
-    } specials[] = {
-        {"MINimum", COMMAND_VALUE_MIN}, {"MAXimum", COMMAND_VALUE_MAX}, {"DEFault", COMMAND_VALUE_DEF}};
+    } specials[] = {{"MINimum", COMMAND_VALUE_MIN}, {"MAXimum", COMMAND_VALUE_MAX}, {"DEFault", COMMAND_VALUE_DEF}};
     for (size_t i = 0; i < sizeof specials / sizeof specials[0]; i++)
         if (command_word_matches(specials[i].pattern, param)) {
             *kind = specials[i].kind;
@@ -125,8 +124,7 @@ static void do_act(struct command_call *call)
     }
     if (row->unit != NULL && parse_value(call) != 0) return;
     if (!row->open && call->session != 0 && control != 0 && control != call->session) {
-        command_fail(call, CMD_E_PROTECTED, "session %u has control, this is session %u", control,
-                     call->session);
+        command_fail(call, CMD_E_PROTECTED, "session %u has control, this is session %u", control, call->session);
         return;
     }
     row->act(call);
@@ -137,8 +135,7 @@ static void do_act(struct command_call *call)
     out->took_control = 1;
 }
 
-void command_execute(struct command_device *dev, uint32_t session, const char *line,
-                     struct command_result *out)
+void command_execute(struct command_device *dev, uint32_t session, const char *line, struct command_result *out)
 {
     struct command_request req;
     const char *why = NULL;

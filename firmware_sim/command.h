@@ -21,19 +21,24 @@
 #include "firmware_sim/head.h"
 
 enum {
-    COMMAND_MAX_LINE = 256,  /* longest line without its end; longer ones are -363 and dropped whole */
+    COMMAND_MAX_LINE = 256, /* longest line without its end; longer ones are -363 and dropped whole */
     COMMAND_MAX_REPLY = 480,
-    COMMAND_QUEUE_LEN = 32,  /* errors kept; when full the last becomes -350 and counts the rest */
+    COMMAND_QUEUE_LEN = 32, /* errors kept; when full the last becomes -350 and counts the rest */
 };
 
 enum command_error {
     CMD_E_NONE = 0,
-    CMD_E_SYNTAX = -102, CMD_E_DATA_TYPE = -104, CMD_E_NOT_ALLOWED = -108, CMD_E_MISSING = -109,
-    CMD_E_HEADER = -113, CMD_E_SUFFIX = -131,
-    CMD_E_PROTECTED = -203,  /* another session has control */
-    CMD_E_SETTINGS = -221,   /* conflicts with the state or another setting */
+    CMD_E_SYNTAX = -102,
+    CMD_E_DATA_TYPE = -104,
+    CMD_E_NOT_ALLOWED = -108,
+    CMD_E_MISSING = -109,
+    CMD_E_HEADER = -113,
+    CMD_E_SUFFIX = -131,
+    CMD_E_PROTECTED = -203, /* another session has control */
+    CMD_E_SETTINGS = -221,  /* conflicts with the state or another setting */
     CMD_E_RANGE = -222,
-    CMD_E_QUEUE = -350, CMD_E_OVERRUN = -363,
+    CMD_E_QUEUE = -350,
+    CMD_E_OVERRUN = -363,
     /* the device's own, positive (SCPI-99 21.8.2) */
     CMD_E_CLIENT_LOST = 101, /* a client went away */
     CMD_E_READER = 102,      /* a reader could not follow; frames lost */
@@ -43,7 +48,10 @@ enum command_error {
 };
 
 struct command_queue {
-    struct { int number; char text[160]; } entry[COMMAND_QUEUE_LEN];
+    struct {
+        int number;
+        char text[160];
+    } entry[COMMAND_QUEUE_LEN];
     uint32_t first, count, overflow;
 };
 
@@ -57,38 +65,38 @@ const char *command_error_text(int number);
 struct command_device {
     const char *idn;
     struct head_limits limits;
-    struct head_settings settings;  /* as they are now; command_execute changes them only when all is well */
-    struct head_settings defaults;  /* what *RST restores */
+    struct head_settings settings; /* as they are now; command_execute changes them only when all is well */
+    struct head_settings defaults; /* what *RST restores */
     enum head_state state;
     struct command_queue queue;
-    uint32_t control;               /* session that may change things; 0: nobody, the next who does takes it */
-    uint64_t frames_done;           /* of the scan at hand or the last one */
-    int64_t t_ns;                   /* device time */
-    int step_allowed;               /* 1 when the pace is `step` */
+    uint32_t control;     /* session that may change things; 0: nobody, the next who does takes it */
+    uint64_t frames_done; /* of the scan at hand or the last one */
+    int64_t t_ns;         /* device time */
+    int step_allowed;     /* 1 when the pace is `step` */
 };
 
 enum command_effect {
     COMMAND_NONE,
-    COMMAND_SETTINGS,  /* settings changed */
-    COMMAND_START,     /* state event START was accepted by head_next_state */
+    COMMAND_SETTINGS, /* settings changed */
+    COMMAND_START,    /* state event START was accepted by head_next_state */
     COMMAND_STOP,
-    COMMAND_RESET,     /* settings are the defaults again; state event RESET accepted */
-    COMMAND_STEP,      /* let step_ns of device time pass, then send the reply */
-    COMMAND_RELEASE,   /* control was given back */
+    COMMAND_RESET,   /* settings are the defaults again; state event RESET accepted */
+    COMMAND_STEP,    /* let step_ns of device time pass, then send the reply */
+    COMMAND_RELEASE, /* control was given back */
 };
 
 struct command_result {
     enum command_effect effect;
     int64_t step_ns;
-    int error;                        /* 0, or the number that was queued */
-    int took_control;                 /* this command made the session the one in control */
-    int changes;                      /* belongs in the journal: effect is not NONE or RELEASE */
-    char reply[COMMAND_MAX_REPLY];    /* one line without its end; empty for an empty line (no reply at all) */
+    int error;                     /* 0, or the number that was queued */
+    int took_control;              /* this command made the session the one in control */
+    int changes;                   /* belongs in the journal: effect is not NONE or RELEASE */
+    char reply[COMMAND_MAX_REPLY]; /* one line without its end; empty for an empty line (no reply at all) */
 };
 
 /* Carries out one line (without its end) from a session (from 1; 0 is the device itself: never refused control).
- * Changes dev->settings, dev->queue and dev->control; dev->state is changed by the loop. A change of settings is refused
- * whole (-222, -221) and leaves them as they were. While scanning, a station change is -221. */
+ * Changes dev->settings, dev->queue and dev->control; dev->state is changed by the loop. A change of settings is
+ * refused whole (-222, -221) and leaves them as they were. While scanning, a station change is -221. */
 void command_execute(struct command_device *dev, uint32_t session, const char *line, struct command_result *out);
 
 /* Collects bytes into lines: LF, CR or CR LF end a line. */
@@ -99,8 +107,8 @@ struct command_lines {
 };
 enum command_line_kind { COMMAND_LINE_NONE, COMMAND_LINE_READY, COMMAND_LINE_OVERRUN };
 /* Feeds one byte. READY: the line is in buf, NUL-terminated, until the next call. OVERRUN: a line too long just ended.
- * A tab becomes a blank. Other bytes that are not printable ASCII stay in the line as '~', which no command has, so that
- * it fails as what it is: a wrong command. */
+ * A tab becomes a blank. Other bytes that are not printable ASCII stay in the line as '~', which no command has, so
+ * that it fails as what it is: a wrong command. */
 enum command_line_kind command_lines_feed(struct command_lines *lines, unsigned char byte);
 
 #endif

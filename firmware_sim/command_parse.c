@@ -53,8 +53,7 @@ int command_split(const char *line, struct command_request *req, const char **wh
     req->query = *p == '?';
     p += req->query;
     if (req->header_len == 0 || (*p != '\0' && !is_blank(*p))) {
-        *why = req->header_len == 0 ? "a command begins with a letter, ':' or '*'"
-                                    : "a blank must follow the header";
+        *why = req->header_len == 0 ? "a command begins with a letter, ':' or '*'" : "a blank must follow the header";
         return CMD_E_SYNTAX;
     }
     req->param = skip_blanks(p);
@@ -178,6 +177,5 @@ void command_format_fixed(char *buf, size_t len, int64_t value, int decimals)
 void command_clip(char clip[COMMAND_CLIP_LEN], const char *text, size_t len)
 {
     const int whole = len < COMMAND_CLIP_LEN;
-    snprintf(clip, COMMAND_CLIP_LEN, "%.*s%s", whole ? (int)len : COMMAND_CLIP_LEN - 4, text,
-             whole ? "" : "...");
+    snprintf(clip, COMMAND_CLIP_LEN, "%.*s%s", whole ? (int)len : COMMAND_CLIP_LEN - 4, text, whole ? "" : "...");
 }

@@ -116,8 +116,7 @@ struct command_row {
 const struct command_row *command_table(size_t *n);
 
 /* Queues the error and makes it the reply. */
-void command_fail(struct command_call *call, int number, const char *fmt, ...)
-    __attribute__((format(printf, 3, 4)));
+void command_fail(struct command_call *call, int number, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
 
 void command_reply(struct command_call *call, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 

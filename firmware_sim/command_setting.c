@@ -70,8 +70,7 @@ void command_setting_query(struct command_call *call)
 }
 
 /* `HEADER VALUE, allowed MIN to MAX`; value is what the command said, or its number with the unit. */
-static void refuse(struct command_call *call, int number, const char *value, int64_t min, int64_t max,
-                   const char *with)
+static void refuse(struct command_call *call, int number, const char *value, int64_t min, int64_t max, const char *with)
 {
     char low[NUMBER_LEN], high[NUMBER_LEN];
     command_format_fixed(low, sizeof low, min, call->row->unit->decimals);
@@ -140,16 +139,15 @@ void command_setting_change(struct command_call *call)
     int64_t value;
     if (call->value.kind != COMMAND_VALUE_NUMBER)
         value = special_value(call);
-    else if (command_value_in_range(call, read_bound(call, &setting->min), read_bound(call, &setting->max),
-                                    &value) != 0)
+    else if (command_value_in_range(call, read_bound(call, &setting->min), read_bound(call, &setting->max), &value) !=
+             0)
         return;
     if (check_other(call, value) != 0) return;
     const enum head_state state = call->dev->state;
     const int in_scan = state == HEAD_SPIN_UP || state == HEAD_SCANNING;
     if (setting->not_in_scan && in_scan &&
         value != read_field(&call->dev->settings, setting->offset, setting->is_u32)) {
-        command_fail(call, CMD_E_SETTINGS, "%s can't change in state %s", call->row->header,
-                     head_state_name(state));
+        command_fail(call, CMD_E_SETTINGS, "%s can't change in state %s", call->row->header, head_state_name(state));
         return;
     }
     write_field(&call->dev->settings, setting->offset, setting->is_u32, value);

@@ -99,8 +99,8 @@ static void query_help(struct command_call *call)
     size_t n, len = 0;
     const struct command_row *row = command_table(&n);
     for (size_t i = 0; i < n && len < sizeof call->out->reply; i++)
-        len += (size_t)snprintf(call->out->reply + len, sizeof call->out->reply - len, "%s%s%s",
-                                i == 0 ? "" : " ", row[i].header,
+        len += (size_t)snprintf(call->out->reply + len, sizeof call->out->reply - len, "%s%s%s", i == 0 ? "" : " ",
+                                row[i].header,
                                 row[i].query == NULL ? ""
                                 : row[i].act == NULL ? "?"
                                                      : "[?]");

@@ -45,8 +45,7 @@ int config_load(const char *path, const char *const *sets, int n_sets, struct co
     struct cfg_reader rd;
     memset(cfg, 0, sizeof *cfg);
     if (strlen(path) >= sizeof cfg->file)
-        return sh_fail(err, SH_EINPUT, "%.100s...: path too long; allowed up to %zu bytes", path,
-                       sizeof cfg->file - 1);
+        return sh_fail(err, SH_EINPUT, "%.100s...: path too long; allowed up to %zu bytes", path, sizeof cfg->file - 1);
     snprintf(cfg->file, sizeof cfg->file, "%s", path);
     cfg_reader_init(&rd, cfg->file, &cfg_config_table, cfg, err);
     int code = cfg_read_file(&rd);

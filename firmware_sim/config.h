@@ -28,11 +28,11 @@ struct config_profile {
     int64_t prr_min_uhz, prr_max_uhz, lines_min_uhz, lines_max_uhz, pan_max_udeg_s;
     int64_t fov_min_udeg, fov_max_udeg; /* line angle: 0 forward, 90 up, above 90 backward over the zenith */
     int64_t pan_min_udeg, pan_max_udeg;
-    uint32_t facets;                    /* lines per turn of the mirror */
-    double optical_gain;                /* beam degrees per mirror degree: 2 polygon, 1 45-degree mirror */
+    uint32_t facets;     /* lines per turn of the mirror */
+    double optical_gain; /* beam degrees per mirror degree: 2 polygon, 1 45-degree mirror */
     double range_min_m, range_max_m;
     double range_sigma_m, range_sigma_ppm; /* one sigma of the range noise: fixed part, and part per distance */
-    double mirror_counts, pan_counts;   /* encoder counts per turn of the beam angle; 0: ideal (2^32 counts) */
+    double mirror_counts, pan_counts;      /* encoder counts per turn of the beam angle; 0: ideal (2^32 counts) */
     uint32_t max_echoes;
     double boot_s, spin_up_s, spin_down_s;
 };
@@ -41,15 +41,15 @@ struct config_mesh {
     char file[CONFIG_PATH_LEN];
     enum scene_up up;
     double scale, offset_m[3];
-    /* Motion, at time t of the scan: turned by turn_deg_s * t about the vertical through pivot_m, clockwise seen from above,
-     * then shifted by move_m_s * t; with cycle_s, forth and back. All zero: the mesh stands still. */
+    /* Motion, at time t of the scan: turned by turn_deg_s * t about the vertical through pivot_m, clockwise seen from
+     * above, then shifted by move_m_s * t; with cycle_s, forth and back. All zero: the mesh stands still. */
     double move_m_s[3], turn_deg_s, pivot_m[3], cycle_s;
 };
 
 struct config_station {
     char name[32];
-    double position_m[3];   /* of the head's origin in the scene frame */
-    double heading_deg;     /* of the head's y axis, clockwise from the scene's y axis (north) */
+    double position_m[3];              /* of the head's origin in the scene frame */
+    double heading_deg;                /* of the head's y axis, clockwise from the scene's y axis (north) */
     double lat_deg, lon_deg, height_m; /* of the head's origin */
 };
 
@@ -64,7 +64,7 @@ struct config {
     struct config_mesh mesh[CONFIG_MAX_MESHES];
     uint32_t n_meshes;
     double scene_tolerance_m;
-    int order_exactly;      /* surfaces that overlap are ordered in double */
+    int order_exactly; /* surfaces that overlap are ordered in double */
     /* stations */
     struct config_station station[CONFIG_MAX_STATIONS];
     uint32_t n_stations;
@@ -72,19 +72,19 @@ struct config {
     enum georef_crs crs;
     int utm_zone;
     enum line_layout layout;
-    double scale_m;         /* 0: the finest of 1e-6 x 10^n m that holds range_max_m in 31 bits */
+    double scale_m; /* 0: the finest of 1e-6 x 10^n m that holds range_max_m in 31 bits */
     /* links */
     struct link_spec link[CONFIG_MAX_LINKS];
     uint32_t n_links;
     /* noise */
-    int noise_on;           /* 0: exact ranges */
+    int noise_on; /* 0: exact ranges */
     uint64_t seed;
     /* loop */
-    double tick_hz;         /* 100..10000, a divisor of 1e9 */
+    double tick_hz; /* 100..10000, a divisor of 1e9 */
     double ahead_ms, queue_ms, late_ms;
-    uint32_t threads;       /* casters; 0: one per processor */
+    uint32_t threads; /* casters; 0: one per processor */
     enum config_pace pace;
-    double utc_epoch_s;     /* UTC of power-up, s since 1970; 0: unknown */
+    double utc_epoch_s; /* UTC of power-up, s since 1970; 0: unknown */
 };
 
 /* Reads path, its profile, then the `key=value` settings in order (as from --set, each checked the same way, named
@@ -98,8 +98,8 @@ void config_print_reference(FILE *out);
  * dir NULL: the first directory of the lookup below that exists, without a configuration. */
 int config_list_profiles(const char *dir, FILE *out, struct sh_err *err);
 
-/* Finds the directory of profiles: $SCANHEAD_HEADS, beside the configuration (heads/), beside the program (installed or in
- * its build folder), or config/heads here; see config_profile.c. The installed or the source
- * one. A profile is named by `head.profile: NAME`, looked up there, or by a path that ends in .yaml. */
+/* Finds the directory of profiles: $SCANHEAD_HEADS, beside the configuration (heads/), beside the program (installed or
+ * in its build folder), or config/heads here; see config_profile.c. The installed or the source one. A profile is named
+ * by `head.profile: NAME`, looked up there, or by a path that ends in .yaml. */
 
 #endif

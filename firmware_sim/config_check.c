@@ -43,9 +43,8 @@ static int check_limits(const struct cfg_reader *rd, const struct config *cfg)
         int64_t low = key->min_key != NULL ? figure(&cfg->profile, key->min_key) : (int64_t)(key->min * 1e6);
         memcpy(&value, cfg_address(rd, key, 0), sizeof value);
         if (value < low || value > high)
-            return cfg_fail_key(
-                rd, key->path, 0, "%.15g is outside of head profile %s; allowed %.15g to %.15g %s",
-                from_micro(value), cfg->profile.name, from_micro(low), from_micro(high), key->unit);
+            return cfg_fail_key(rd, key->path, 0, "%.15g is outside of head profile %s; allowed %.15g to %.15g %s",
+                                from_micro(value), cfg->profile.name, from_micro(low), from_micro(high), key->unit);
     }
     return SH_OK;
 }
@@ -54,23 +53,20 @@ static int check_head(const struct cfg_reader *rd, const struct config *cfg)
 {
     const struct head_settings *s = &cfg->settings;
     if (s->prr_uhz < s->lines_uhz)
-        return cfg_fail_key(
-            rd, given_of(rd, "head.prr_hz", "head.lines_hz"), 0,
-            "less than a pulse per line, %.15g pulses/s and %.15g lines/s; allowed prr_hz of at least "
-            "lines_hz",
-            from_micro(s->prr_uhz), from_micro(s->lines_uhz));
+        return cfg_fail_key(rd, given_of(rd, "head.prr_hz", "head.lines_hz"), 0,
+                            "less than a pulse per line, %.15g pulses/s and %.15g lines/s; allowed prr_hz of at least "
+                            "lines_hz",
+                            from_micro(s->prr_uhz), from_micro(s->lines_uhz));
     if (s->line_start_udeg >= s->line_stop_udeg)
-        return cfg_fail_key(
-            rd, given_of(rd, "head.line_stop_deg", "head.line_start_deg"), 0,
-            "the line goes from %.15g to %.15g deg; allowed line_start_deg below line_stop_deg",
-            from_micro(s->line_start_udeg), from_micro(s->line_stop_udeg));
+        return cfg_fail_key(rd, given_of(rd, "head.line_stop_deg", "head.line_start_deg"), 0,
+                            "the line goes from %.15g to %.15g deg; allowed line_start_deg below line_stop_deg",
+                            from_micro(s->line_start_udeg), from_micro(s->line_stop_udeg));
     int64_t span_udeg = s->pan_stop_udeg - s->pan_start_udeg;
     if (span_udeg < 0 || span_udeg > 360000000)
-        return cfg_fail_key(
-            rd, given_of(rd, "head.pan_stop_deg", "head.pan_start_deg"), 0,
-            "the pan goes from %.15g to %.15g deg; allowed pan_start_deg at most pan_stop_deg, 360 deg "
-            "apart at most",
-            from_micro(s->pan_start_udeg), from_micro(s->pan_stop_udeg));
+        return cfg_fail_key(rd, given_of(rd, "head.pan_stop_deg", "head.pan_start_deg"), 0,
+                            "the pan goes from %.15g to %.15g deg; allowed pan_start_deg at most pan_stop_deg, 360 deg "
+                            "apart at most",
+                            from_micro(s->pan_start_udeg), from_micro(s->pan_stop_udeg));
     if ((s->pan_udeg_s == 0 || span_udeg == 0) && s->frames != 0)
         return cfg_fail_key(rd, given_of(rd, "head.frames", "head.pan_deg_s"), 0,
                             "a pan at rest never ends a frame; allowed frames: 0, until stopped");
@@ -88,19 +84,16 @@ static int check_mesh(const struct cfg_reader *rd, const struct config_mesh *mes
     struct stat st;
     const char *slash = strrchr(mesh->file, '/'), *dot = strrchr(mesh->file, '.');
     size_t known = 0;
-    while (known < 8 &&
-           (dot == NULL || (slash != NULL && dot < slash) || strcasecmp(dot, endings[known]) != 0))
+    while (known < 8 && (dot == NULL || (slash != NULL && dot < slash) || strcasecmp(dot, endings[known]) != 0))
         known++;
     if (known == 8)
-        return cfg_fail_key(rd, path, i,
-                            "\"%s\" has no known ending; allowed .obj .ply .stl .gltf .glb .fbx .dae .ifc",
+        return cfg_fail_key(rd, path, i, "\"%s\" has no known ending; allowed .obj .ply .stl .gltf .glb .fbx .dae .ifc",
                             cfg_show(mesh->file, shown));
     if (stat(mesh->file, &st) != 0 || (S_ISREG(st.st_mode) && access(mesh->file, R_OK) != 0))
         return cfg_fail_key(rd, path, i, "%.200s: %s; allowed a mesh file that can be read", mesh->file,
                             strerror(errno));
     if (!S_ISREG(st.st_mode))
-        return cfg_fail_key(rd, path, i, "%.200s is not a file; allowed a mesh file that can be read",
-                            mesh->file);
+        return cfg_fail_key(rd, path, i, "%.200s is not a file; allowed a mesh file that can be read", mesh->file);
     return SH_OK;
 }
 
@@ -113,14 +106,14 @@ static int check_stations(const struct cfg_reader *rd, struct config *cfg)
             if (is_given(rd, geodetic[k], i)) continue;
             const struct cfg_key *key = cfg_find(&rd->table, geodetic[k]);
             return cfg_fail_key(rd, geodetic[k], i,
-                                "missing, and output.crs is not local; required, allowed %.10g to %.10g %s",
-                                key->min, key->max, key->unit);
+                                "missing, and output.crs is not local; required, allowed %.10g to %.10g %s", key->min,
+                                key->max, key->unit);
         }
         if (station->name[0] == '\0') snprintf(station->name, sizeof station->name, "station-%u", i + 1);
         for (uint32_t k = 0; k < i; k++)
             if (strcmp(cfg->station[k].name, station->name) == 0)
-                return cfg_fail_key(rd, "stations[].name", i,
-                                    "stations[%u] has the same name; allowed different names", k);
+                return cfg_fail_key(rd, "stations[].name", i, "stations[%u] has the same name; allowed different names",
+                                    k);
     }
     return SH_OK;
 }
@@ -128,12 +121,11 @@ static int check_stations(const struct cfg_reader *rd, struct config *cfg)
 static int check_output(const struct cfg_reader *rd, const struct config *cfg)
 {
     if (cfg->utm_zone != 0 && cfg->crs != GEOREF_UTM)
-        return cfg_fail_key(rd, "output.utm_zone", 0,
-                            "a zone, but output.crs is not utm; allowed only with crs: utm");
+        return cfg_fail_key(rd, "output.utm_zone", 0, "a zone, but output.crs is not utm; allowed only with crs: utm");
     if (cfg->scale_m == 0.0) return SH_OK;
     if (cfg->scale_m < 1e-6)
-        return cfg_fail_key(rd, "output.scale_m", 0,
-                            "%.10g is out of range; allowed 0 (automatic) or 1e-6 to 1 m", cfg->scale_m);
+        return cfg_fail_key(rd, "output.scale_m", 0, "%.10g is out of range; allowed 0 (automatic) or 1e-6 to 1 m",
+                            cfg->scale_m);
     if (cfg->profile.range_max_m / cfg->scale_m >= 0x1p31)
         return cfg_fail_key(
             rd, "output.scale_m", 0,
@@ -162,14 +154,12 @@ static int check_link(const struct cfg_reader *rd, const struct config *cfg, uin
     const char *type = cfg_find(&rd->table, "links[].type")->names[link->type];
     for (size_t k = 0; k < sizeof keys / sizeof keys[0]; k++)
         if (is_given(rd, keys[k].path, i) && !(keys[k].types & 1u << link->type))
-            return cfg_fail_key(rd, keys[k].path, i, "a %s link has no such key; allowed %s", type,
-                                has[link->type]);
+            return cfg_fail_key(rd, keys[k].path, i, "a %s link has no such key; allowed %s", type, has[link->type]);
     if (link->type == LINK_FILE && link->path[0] == '\0')
         return cfg_fail_key(rd, "links[].path", i, "missing; required for a file link is the file to write");
     for (uint32_t k = 0; k < i && link->path[0] != '\0'; k++)
         if (strcmp(cfg->link[k].path, link->path) == 0)
-            return cfg_fail_key(rd, "links[].path", i,
-                                "links[%u] has the same path; allowed a path of its own", k);
+            return cfg_fail_key(rd, "links[].path", i, "links[%u] has the same path; allowed a path of its own", k);
     return SH_OK;
 }
 

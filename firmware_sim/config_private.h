@@ -82,8 +82,7 @@ int cfg_fail_key(const struct cfg_reader *rd, const char *path, uint32_t item, c
     __attribute__((format(printf, 4, 5)));
 /* An unknown key below the section parent ("" for the top): suggests a near one and lists what is known
  * there. */
-int cfg_fail_unknown(const struct cfg_reader *rd, int line, const char *parent, uint32_t item,
-                     const char *word);
+int cfg_fail_unknown(const struct cfg_reader *rd, int line, const char *parent, uint32_t item, const char *word);
 /* text as it can stand in one line of an error: cut, without control characters. buf holds CFG_SHOW_MAX. */
 enum { CFG_SHOW_MAX = 64 };
 const char *cfg_show(const char *text, char *buf);

@@ -105,15 +105,13 @@ static int check_profile(const struct cfg_reader *rd, const struct config_profil
            fov_deg = (double)(p->fov_max_udeg - p->fov_min_udeg) * 1e-6;
     if (sweep_deg > 360.0)
         return cfg_fail_key(rd, "optical_gain", 0,
-                            "a sweep of 360 / facets * optical_gain is %.10g deg; allowed up to 360",
-                            sweep_deg);
+                            "a sweep of 360 / facets * optical_gain is %.10g deg; allowed up to 360", sweep_deg);
     /* Rounding of the quotient and the product is far below one micro-degree. */
     if (fov_deg > sweep_deg + 1e-9)
-        return cfg_fail_key(
-            rd, "fov_max_deg", 0,
-            "a field of view of %.10g deg does not fit into a sweep; allowed up to %.10g deg, "
-            "360 / facets * optical_gain",
-            fov_deg, sweep_deg);
+        return cfg_fail_key(rd, "fov_max_deg", 0,
+                            "a field of view of %.10g deg does not fit into a sweep; allowed up to %.10g deg, "
+                            "360 / facets * optical_gain",
+                            fov_deg, sweep_deg);
     return SH_OK;
 }
 
@@ -125,18 +123,17 @@ static int name_profile(const struct cfg_reader *rd, struct config_profile *prof
     size_t stem = strlen(base) - 5;
     if (stem >= sizeof profile->name)
         return sh_fail(rd->err, SH_EINPUT,
-                       "%s: the file's name is the profile's; allowed up to %zu characters and .yaml",
-                       rd->file, sizeof profile->name - 1);
+                       "%s: the file's name is the profile's; allowed up to %zu characters and .yaml", rd->file,
+                       sizeof profile->name - 1);
     for (size_t i = 0; i < stem; i++)
         if ((unsigned char)base[i] <= 0x20 || (unsigned char)base[i] >= 0x7f)
-            return sh_fail(rd->err, SH_EINPUT,
-                           "%s: the file's name is the profile's; allowed printable ASCII", rd->file);
+            return sh_fail(rd->err, SH_EINPUT, "%s: the file's name is the profile's; allowed printable ASCII",
+                           rd->file);
     memcpy(profile->name, base, stem);
     return SH_OK;
 }
 
-static int read_profile(struct cfg_reader *rd, const char *file, struct config_profile *profile,
-                        struct sh_err *err)
+static int read_profile(struct cfg_reader *rd, const char *file, struct config_profile *profile, struct sh_err *err)
 {
     memset(profile, 0, sizeof *profile);
     cfg_reader_init(rd, file, &cfg_profile_table, profile, err);
@@ -153,8 +150,8 @@ static int fail_lookup(struct cfg_reader *rd, struct config *cfg, const struct p
 {
     char known[300], shown[CFG_SHOW_MAX];
     known_profiles(dirs, known, sizeof known);
-    return cfg_fail_key(rd, "head.profile", 0, "no profile \"%s\"; allowed %s",
-                        cfg_show(cfg->profile_file, shown), known);
+    return cfg_fail_key(rd, "head.profile", 0, "no profile \"%s\"; allowed %s", cfg_show(cfg->profile_file, shown),
+                        known);
 }
 
 static int find_profile(struct cfg_reader *rd, struct config *cfg)
@@ -170,8 +167,7 @@ static int find_profile(struct cfg_reader *rd, struct config *cfg)
             snprintf(path, sizeof path, "%s/%s.yaml", dirs.dir[i], cfg->profile_file);
         else
             snprintf(path, sizeof path, "%s%s",
-                     from_set || cfg->profile_file[0] == '/' ? "" : cfg_dir_of(cfg->file, base),
-                     cfg->profile_file);
+                     from_set || cfg->profile_file[0] == '/' ? "" : cfg_dir_of(cfg->file, base), cfg->profile_file);
         if (access(path, F_OK) != 0) continue;
         if (strlen(path) >= sizeof cfg->profile_file)
             return cfg_fail_key(rd, "head.profile", 0, "its path is too long; allowed up to %zu bytes",
@@ -225,13 +221,11 @@ int config_list_profiles(const char *dir, FILE *out, struct sh_err *err)
         find_dirs(NULL, &dirs);
         for (int i = 0; i < dirs.n && dir == NULL; i++)
             if (access(dirs.dir[i], R_OK) == 0) dir = dirs.dir[i];
-        if (dir == NULL)
-            return sh_fail(err, SH_EINPUT, "no directory of head profiles found; set SCANHEAD_HEADS");
+        if (dir == NULL) return sh_fail(err, SH_EINPUT, "no directory of head profiles found; set SCANHEAD_HEADS");
     }
     struct dirent **entries = NULL;
     int n = scandir(dir, &entries, is_profile, alphasort), code = SH_OK;
-    if (n < 0)
-        return sh_fail(err, SH_EINPUT, "%s: cannot be read; a directory of head profiles is needed", dir);
+    if (n < 0) return sh_fail(err, SH_EINPUT, "%s: cannot be read; a directory of head profiles is needed", dir);
     for (int i = 0; i < n; i++) {
         if (code == SH_OK) code = list_profile(dir, entries[i]->d_name, out, err);
         free(entries[i]);

@@ -179,8 +179,7 @@ static const char *suggest(const struct cfg_table *table, const char *parent, co
         size_t distance = best_distance;
         if (here != NULL) {
             distance = edit_distance(word, here);
-            if (len >= 3 && (strncmp(here, word, len) == 0 || strncmp(here, word, strlen(here)) == 0))
-                distance = 1;
+            if (len >= 3 && (strncmp(here, word, len) == 0 || strncmp(here, word, strlen(here)) == 0)) distance = 1;
         } else if (strcmp(last_word(path), word) == 0) {
             distance = 2;
         }
@@ -191,11 +190,9 @@ static const char *suggest(const struct cfg_table *table, const char *parent, co
     return best;
 }
 
-int cfg_fail_unknown(const struct cfg_reader *rd, int line, const char *parent, uint32_t item,
-                     const char *word)
+int cfg_fail_unknown(const struct cfg_reader *rd, int line, const char *parent, uint32_t item, const char *word)
 {
-    char known[256] = "", section[CFG_PATH_MAX], hint[CFG_PATH_MAX], shown[CFG_SHOW_MAX],
-         name[2 * CFG_PATH_MAX];
+    char known[256] = "", section[CFG_PATH_MAX], hint[CFG_PATH_MAX], shown[CFG_SHOW_MAX], name[2 * CFG_PATH_MAX];
     for (size_t i = 0; i < rd->table.n; i++) {
         const char *here = word_below(rd->table.keys[i].path, parent);
         size_t used = strlen(known);
@@ -205,6 +202,5 @@ int cfg_fail_unknown(const struct cfg_reader *rd, int line, const char *parent, 
     snprintf(name, sizeof name, "%s%s%s", section, section[0] != '\0' ? "." : "", cfg_show(word, shown));
     const char *near = suggest(&rd->table, parent, word);
     if (near == NULL) return cfg_fail(rd, line, name, "unknown key; allowed %s", known);
-    return cfg_fail(rd, line, name, "unknown key, did you mean %s? allowed %s", cfg_name(near, item, hint),
-                    known);
+    return cfg_fail(rd, line, name, "unknown key, did you mean %s? allowed %s", cfg_name(near, item, hint), known);
 }

@@ -67,8 +67,8 @@ static int reach_item(struct cfg_reader *rd, const struct set *set, const struct
     if (set->item < *count) return SH_OK;
     uint32_t last = *count < (uint32_t)list->max ? *count : (uint32_t)list->max - 1;
     if (set->item > last)
-        return cfg_fail(rd, CFG_FROM_SET, set->name, "%s has %u elements; allowed indices 0 to %u%s",
-                        list->path, *count, last, last == *count ? ", the last appends one" : "");
+        return cfg_fail(rd, CFG_FROM_SET, set->name, "%s has %u elements; allowed indices 0 to %u%s", list->path,
+                        *count, last, last == *count ? ", the last appends one" : "");
     char path[CFG_PATH_MAX];
     snprintf(path, sizeof path, "%s[]", list->path);
     rd->line[cfg_row(rd, cfg_find(&rd->table, path))][set->item] = CFG_FROM_SET;
@@ -82,8 +82,8 @@ int cfg_apply_set(struct cfg_reader *rd, const char *text)
     char shown[CFG_SHOW_MAX];
     const char *equals = strchr(text, '=');
     if (equals == NULL || equals == text)
-        return cfg_fail(rd, CFG_FROM_SET, cfg_show(text, shown),
-                        "no %s; allowed KEY=VALUE, as in head.prr_hz=300000", equals == NULL ? "'='" : "key");
+        return cfg_fail(rd, CFG_FROM_SET, cfg_show(text, shown), "no %s; allowed KEY=VALUE, as in head.prr_hz=300000",
+                        equals == NULL ? "'='" : "key");
     if ((size_t)(equals - text) >= sizeof set.name / 2)
         return cfg_fail(rd, CFG_FROM_SET, cfg_show(text, shown), "unknown key; allowed up to %zu characters",
                         sizeof set.name / 2 - 1);

@@ -15,8 +15,7 @@
 #define WITHIN(low, high) .min = -9e12, .max = 9e12, .min_key = low, .max_key = high
 
 static const char *const up_names[] = {[SCENE_UP_Z] = "z", [SCENE_UP_Y] = "y", NULL};
-static const char *const crs_names[] = {
-    [GEOREF_LOCAL] = "local", [GEOREF_ECEF] = "ecef", [GEOREF_UTM] = "utm", NULL};
+static const char *const crs_names[] = {[GEOREF_LOCAL] = "local", [GEOREF_ECEF] = "ecef", [GEOREF_UTM] = "utm", NULL};
 static const char *const layout_names[] = {[LINE_POLAR] = "polar", [LINE_GEO] = "geo", NULL};
 static const char *const link_names[] = {
     [LINK_NULL] = "null", [LINK_FILE] = "file", [LINK_PTY] = "pty", [LINK_TCP] = "tcp", NULL};
@@ -165,8 +164,7 @@ static const struct cfg_key profile_keys[] = {
 /* clang-format on */
 
 _Static_assert(LEN(config_keys) <= CFG_MAX_ROWS && LEN(profile_keys) <= CFG_MAX_ROWS, "room for every row");
-_Static_assert((int)CONFIG_MAX_MESHES <= (int)CFG_MAX_ITEMS &&
-                   (int)CONFIG_MAX_STATIONS <= (int)CFG_MAX_ITEMS &&
+_Static_assert((int)CONFIG_MAX_MESHES <= (int)CFG_MAX_ITEMS && (int)CONFIG_MAX_STATIONS <= (int)CFG_MAX_ITEMS &&
                    (int)CONFIG_MAX_LINKS <= (int)CFG_MAX_ITEMS,
                "room for every element");
 

@@ -84,9 +84,7 @@ static size_t put(char *buf, size_t used, const char *text)
 static void allowed_range(const struct cfg_key *key, char *buf)
 {
     char low[64], high[64];
-    const char *kind = key->type == CFG_COUNT  ? "a whole number, "
-                       : key->type == CFG_VEC3 ? "[x, y, z], each "
-                                               : "";
+    const char *kind = key->type == CFG_COUNT ? "a whole number, " : key->type == CFG_VEC3 ? "[x, y, z], each " : "";
     snprintf(low, sizeof low, "%.10g", key->min);
     snprintf(high, sizeof high, "%.10g", key->max);
     if (key->type == CFG_COUNT && key->max >= 0x1p64) snprintf(high, sizeof high, "%" PRIu64, UINT64_MAX);
@@ -94,8 +92,8 @@ static void allowed_range(const struct cfg_key *key, char *buf)
         snprintf(buf, CFG_ALLOWED_MAX, "allowed %s to %s of the head profile",
                  key->min_key != NULL ? key->min_key : low, key->max_key);
     else
-        snprintf(buf, CFG_ALLOWED_MAX, "allowed %s%s to %s%s%s", kind, low, high,
-                 key->unit != NULL ? " " : "", key->unit != NULL ? key->unit : "");
+        snprintf(buf, CFG_ALLOWED_MAX, "allowed %s%s to %s%s%s", kind, low, high, key->unit != NULL ? " " : "",
+                 key->unit != NULL ? key->unit : "");
 }
 
 const char *cfg_allowed(const struct cfg_key *key, char *buf)
@@ -121,9 +119,8 @@ const char *cfg_allowed(const struct cfg_key *key, char *buf)
         break;
     case CFG_TEXT:
     case CFG_PATH:
-        snprintf(buf, CFG_ALLOWED_MAX, "allowed %s of 1 to %zu bytes%s",
-                 key->type == CFG_PATH ? "a path" : "text", key->size - 1,
-                 key->flags & CFG_ASCII ? ", printable ASCII without comma, ';' and quotes" : "");
+        snprintf(buf, CFG_ALLOWED_MAX, "allowed %s of 1 to %zu bytes%s", key->type == CFG_PATH ? "a path" : "text",
+                 key->size - 1, key->flags & CFG_ASCII ? ", printable ASCII without comma, ';' and quotes" : "");
         break;
     default:
         allowed_range(key, buf);
@@ -180,8 +177,7 @@ static int store_real(const struct place *at, double *dst, const char *text)
     struct decimal d;
     if (!scan_decimal(text, &d)) return refuse(at, text, "not a number");
     double value = strtod(text, NULL);
-    if (!isfinite(value) || value < at->key->min || value > at->key->max)
-        return refuse(at, text, "out of range");
+    if (!isfinite(value) || value < at->key->min || value > at->key->max) return refuse(at, text, "out of range");
     memcpy(dst, &value, sizeof value);
     return SH_OK;
 }

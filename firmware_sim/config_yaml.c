@@ -40,22 +40,20 @@ static const char *kind_of(const yaml_node_t *node)
 /* Tags would change what a value means; none is known here. */
 static int has_tag(const yaml_node_t *node)
 {
-    static const char *const plain[] = {[YAML_SCALAR_NODE] = YAML_STR_TAG,
-                                        [YAML_SEQUENCE_NODE] = YAML_SEQ_TAG,
-                                        [YAML_MAPPING_NODE] = YAML_MAP_TAG};
+    static const char *const plain[] = {
+        [YAML_SCALAR_NODE] = YAML_STR_TAG, [YAML_SEQUENCE_NODE] = YAML_SEQ_TAG, [YAML_MAPPING_NODE] = YAML_MAP_TAG};
     return node->tag != NULL && strcmp((const char *)node->tag, plain[node->type]) != 0;
 }
 
 static int wrong_kind(const struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
 {
     char name[CFG_PATH_MAX], allowed[CFG_ALLOWED_MAX];
-    return cfg_fail(w->rd, line_of(node), cfg_name(key->path, item, name), "here stands %s; %s",
-                    kind_of(node), cfg_allowed(key, allowed));
+    return cfg_fail(w->rd, line_of(node), cfg_name(key->path, item, name), "here stands %s; %s", kind_of(node),
+                    cfg_allowed(key, allowed));
 }
 
 /* A scalar that may stand for a value of this type, or an error. */
-static int check_scalar(const struct walk *w, const struct cfg_key *key, uint32_t item,
-                        const yaml_node_t *node)
+static int check_scalar(const struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
 {
     char name[CFG_PATH_MAX], allowed[CFG_ALLOWED_MAX], shown[CFG_SHOW_MAX];
     if (node->type != YAML_SCALAR_NODE) return wrong_kind(w, key, item, node);
@@ -84,8 +82,8 @@ static int read_vec3(struct walk *w, const struct cfg_key *key, uint32_t item, c
     if (node->type != YAML_SEQUENCE_NODE) return wrong_kind(w, key, item, node);
     const yaml_node_item_t *first = node->data.sequence.items.start, *top = node->data.sequence.items.top;
     if (top - first != 3)
-        return cfg_fail(w->rd, line_of(node), cfg_name(key->path, item, name),
-                        "has %td numbers instead of 3; %s", top - first, cfg_allowed(key, allowed));
+        return cfg_fail(w->rd, line_of(node), cfg_name(key->path, item, name), "has %td numbers instead of 3; %s",
+                        top - first, cfg_allowed(key, allowed));
     for (int axis = 0; axis < 3; axis++) {
         const yaml_node_t *number = yaml_document_get_node(w->doc, first[axis]);
         int code = check_scalar(w, key, item, number);
@@ -115,21 +113,18 @@ static int read_figure(struct walk *w, const struct cfg_key *key, const yaml_nod
     if (node->type != YAML_MAPPING_NODE)
         return cfg_fail(w->rd, line_of(node), key->path, "here stands %s; %s", kind_of(node), form);
     int given[2] = {0, 0};
-    for (const yaml_node_pair_t *pair = node->data.mapping.pairs.start; pair < node->data.mapping.pairs.top;
-         pair++) {
+    for (const yaml_node_pair_t *pair = node->data.mapping.pairs.start; pair < node->data.mapping.pairs.top; pair++) {
         const yaml_node_t *word = yaml_document_get_node(w->doc, pair->key);
         const yaml_node_t *value = yaml_document_get_node(w->doc, pair->value);
         const char *text = word->type == YAML_SCALAR_NODE ? text_of(word) : "";
         int which = strcmp(text, "value") == 0 ? 0 : strcmp(text, "from") == 0 ? 1 : -1;
         if (which < 0 || given[which]++)
-            return cfg_fail(w->rd, line_of(word), key->path, "a key that is unknown or given twice; %s",
-                            form);
+            return cfg_fail(w->rd, line_of(word), key->path, "a key that is unknown or given twice; %s", form);
         int code = which == 0 ? read_scalar(w, key, 0, value) : read_source(w, key, value);
         if (code != SH_OK) return code;
     }
     if (!given[0] || !given[1])
-        return cfg_fail(w->rd, line_of(node), key->path, "\"%s\" is missing; %s", given[0] ? "from" : "value",
-                        form);
+        return cfg_fail(w->rd, line_of(node), key->path, "\"%s\" is missing; %s", given[0] ? "from" : "value", form);
     return SH_OK;
 }
 
@@ -142,8 +137,7 @@ static int read_list(struct walk *w, const struct cfg_key *key, const yaml_node_
     ptrdiff_t n = node->data.sequence.items.top - first;
     char path[CFG_PATH_MAX], allowed[CFG_ALLOWED_MAX];
     if ((double)n > key->max)
-        return cfg_fail(w->rd, line_of(node), key->path, "%td elements are too many; %s", n,
-                        cfg_allowed(key, allowed));
+        return cfg_fail(w->rd, line_of(node), key->path, "%td elements are too many; %s", n, cfg_allowed(key, allowed));
     snprintf(path, sizeof path, "%s[]", key->path);
     const struct cfg_key *element = cfg_find(&w->rd->table, path);
     for (uint32_t i = 0; i < (uint32_t)n; i++) {
@@ -165,8 +159,7 @@ static int read_value(struct walk *w, const struct cfg_key *key, uint32_t item, 
     if (key->flags & CFG_FIGURE) return read_figure(w, key, node);
     switch (key->type) {
     case CFG_MAP:
-        return node->type == YAML_MAPPING_NODE ? read_map(w, node, key->path, item)
-                                               : wrong_kind(w, key, item, node);
+        return node->type == YAML_MAPPING_NODE ? read_map(w, node, key->path, item) : wrong_kind(w, key, item, node);
     case CFG_LIST:
         return read_list(w, key, node);
     case CFG_VEC3:
@@ -180,16 +173,14 @@ static int read_value(struct walk *w, const struct cfg_key *key, uint32_t item, 
 static const struct cfg_key *row_below(const struct walk *w, const char *path, const yaml_node_t *word)
 {
     char full[CFG_PATH_MAX];
-    if (word->data.scalar.length != strlen(text_of(word)) || strpbrk(text_of(word), ".[]") != NULL)
-        return NULL;
+    if (word->data.scalar.length != strlen(text_of(word)) || strpbrk(text_of(word), ".[]") != NULL) return NULL;
     int len = snprintf(full, sizeof full, "%s%s%s", path, path[0] != '\0' ? "." : "", text_of(word));
     return len < (int)sizeof full ? cfg_find(&w->rd->table, full) : NULL;
 }
 
 static int read_map(struct walk *w, const yaml_node_t *node, const char *path, uint32_t item)
 {
-    for (const yaml_node_pair_t *pair = node->data.mapping.pairs.start; pair < node->data.mapping.pairs.top;
-         pair++) {
+    for (const yaml_node_pair_t *pair = node->data.mapping.pairs.start; pair < node->data.mapping.pairs.top; pair++) {
         const yaml_node_t *word = yaml_document_get_node(w->doc, pair->key);
         const yaml_node_t *value = yaml_document_get_node(w->doc, pair->value);
         int line = line_of(word);
@@ -201,8 +192,8 @@ static int read_map(struct walk *w, const yaml_node_t *node, const char *path, u
         int *given = &w->rd->line[cfg_row(w->rd, key)][item];
         char name[CFG_PATH_MAX];
         if (*given != 0)
-            return cfg_fail(w->rd, line, cfg_name(key->path, item, name),
-                            "given twice, first on line %d; allowed once", *given);
+            return cfg_fail(w->rd, line, cfg_name(key->path, item, name), "given twice, first on line %d; allowed once",
+                            *given);
         *given = line;
         int code = read_value(w, key, item, value);
         if (code != SH_OK) return code;
@@ -223,8 +214,7 @@ static int read_bytes(const struct cfg_reader *rd, unsigned char **bytes, size_t
     if (*bytes == NULL) code = sh_fail(rd->err, SH_ENOMEM, "%s: no memory to read it", rd->file);
     *len = code == SH_OK ? fread(*bytes, 1, FILE_MAX + 1, file) : 0;
     if (code == SH_OK && ferror(file))
-        code = sh_fail(rd->err, SH_EINPUT, "%s: cannot be read: %s; a YAML file is needed", rd->file,
-                       strerror(errno));
+        code = sh_fail(rd->err, SH_EINPUT, "%s: cannot be read: %s; a YAML file is needed", rd->file, strerror(errno));
     if (code == SH_OK && *len > FILE_MAX)
         code = sh_fail(rd->err, SH_EINPUT, "%s: larger than 1 MiB; allowed up to 1048576 bytes", rd->file);
     fclose(file);
@@ -252,12 +242,10 @@ static int indented_by_tab(const unsigned char *bytes, size_t len, int line)
 }
 
 /* libyaml gives a mark for what it scans and parses, and a byte offset for bytes that are not UTF-8. */
-static int fail_syntax(const struct cfg_reader *rd, const yaml_parser_t *parser, const unsigned char *bytes,
-                       size_t len)
+static int fail_syntax(const struct cfg_reader *rd, const yaml_parser_t *parser, const unsigned char *bytes, size_t len)
 {
     int line = (int)parser->problem_mark.line + 1;
-    if (parser->error == YAML_MEMORY_ERROR)
-        return sh_fail(rd->err, SH_ENOMEM, "%s: no memory to parse it", rd->file);
+    if (parser->error == YAML_MEMORY_ERROR) return sh_fail(rd->err, SH_ENOMEM, "%s: no memory to parse it", rd->file);
     if (parser->error == YAML_READER_ERROR) {
         line = 1;
         for (size_t i = 0; i < parser->problem_offset && i < len; i++)
@@ -266,17 +254,15 @@ static int fail_syntax(const struct cfg_reader *rd, const yaml_parser_t *parser,
     const char *hint = indented_by_tab(bytes, len, line) ? "; indent with spaces, not with tabs" : "";
     if (parser->error == YAML_READER_ERROR) hint = "; allowed UTF-8 text without control characters";
     return sh_fail(rd->err, SH_EINPUT, "%s:%d: not YAML: %s%s%s%s", rd->file, line,
-                   parser->problem != NULL ? parser->problem : "unknown problem",
-                   parser->context != NULL ? " " : "", parser->context != NULL ? parser->context : "", hint);
+                   parser->problem != NULL ? parser->problem : "unknown problem", parser->context != NULL ? " " : "",
+                   parser->context != NULL ? parser->context : "", hint);
 }
 
 /* A byte order mark is skipped here: libyaml would count it as a column and find the first line indented. */
-static int start_parser(const struct cfg_reader *rd, yaml_parser_t *parser, const unsigned char *bytes,
-                        size_t len)
+static int start_parser(const struct cfg_reader *rd, yaml_parser_t *parser, const unsigned char *bytes, size_t len)
 {
     size_t skip = len >= 3 && memcmp(bytes, "\xef\xbb\xbf", 3) == 0 ? 3 : 0;
-    if (!yaml_parser_initialize(parser))
-        return sh_fail(rd->err, SH_ENOMEM, "%s: no memory to parse it", rd->file);
+    if (!yaml_parser_initialize(parser)) return sh_fail(rd->err, SH_ENOMEM, "%s: no memory to parse it", rd->file);
     yaml_parser_set_encoding(parser, YAML_UTF8_ENCODING);
     yaml_parser_set_input_string(parser, bytes + skip, len - skip);
     return SH_OK;
@@ -289,8 +275,7 @@ static int check_depth(const struct cfg_reader *rd, const unsigned char *bytes, 
     yaml_parser_t parser;
     yaml_event_t event;
     int depth = 0, anchors = 0, code = SH_OK, done = 0;
-    if (!yaml_parser_initialize(&parser))
-        return sh_fail(rd->err, SH_ENOMEM, "%s: no memory to parse it", rd->file);
+    if (!yaml_parser_initialize(&parser)) return sh_fail(rd->err, SH_ENOMEM, "%s: no memory to parse it", rd->file);
     yaml_parser_set_encoding(&parser, YAML_UTF8_ENCODING);
     yaml_parser_set_input_string(&parser, bytes, len);
     while (code == SH_OK && !done && yaml_parser_parse(&parser, &event)) {
@@ -303,11 +288,9 @@ static int check_depth(const struct cfg_reader *rd, const unsigned char *bytes, 
                    (event.type == YAML_MAPPING_START_EVENT && event.data.mapping_start.anchor != NULL);
         yaml_event_delete(&event);
         if (depth > MAX_DEPTH)
-            code = sh_fail(rd->err, SH_EINPUT, "%s:%d: nested too deep; allowed %d levels", rd->file, line,
-                           MAX_DEPTH);
+            code = sh_fail(rd->err, SH_EINPUT, "%s:%d: nested too deep; allowed %d levels", rd->file, line, MAX_DEPTH);
         else if (anchors > MAX_ANCHORS)
-            code = sh_fail(rd->err, SH_EINPUT, "%s:%d: too many anchors; allowed %d", rd->file, line,
-                           MAX_ANCHORS);
+            code = sh_fail(rd->err, SH_EINPUT, "%s:%d: too many anchors; allowed %d", rd->file, line, MAX_ANCHORS);
     }
     yaml_parser_delete(&parser);
     return code;
@@ -317,18 +300,16 @@ static int read_document(struct cfg_reader *rd, yaml_document_t *doc)
 {
     struct walk w = {.rd = rd, .doc = doc};
     const yaml_node_t *root = yaml_document_get_root_node(doc);
-    if (root == NULL)
-        return sh_fail(rd->err, SH_EINPUT, "%s:1: empty; a section with keys is needed", rd->file);
+    if (root == NULL) return sh_fail(rd->err, SH_EINPUT, "%s:1: empty; a section with keys is needed", rd->file);
     cfg_dir_of(rd->file, w.base_dir);
     rd->root_line = line_of(root);
     if (root->type != YAML_MAPPING_NODE)
-        return sh_fail(rd->err, SH_EINPUT, "%s:%d: here stands %s; allowed sections with keys", rd->file,
-                       line_of(root), kind_of(root));
+        return sh_fail(rd->err, SH_EINPUT, "%s:%d: here stands %s; allowed sections with keys", rd->file, line_of(root),
+                       kind_of(root));
     return read_map(&w, root, "", 0);
 }
 
-static int read_documents(struct cfg_reader *rd, yaml_parser_t *parser, const unsigned char *bytes,
-                          size_t len)
+static int read_documents(struct cfg_reader *rd, yaml_parser_t *parser, const unsigned char *bytes, size_t len)
 {
     yaml_document_t doc, next;
     if (!yaml_parser_load(parser, &doc)) return fail_syntax(rd, parser, bytes, len);

@@ -48,7 +48,8 @@ void device_transition(struct device *device, enum head_event event, uint64_t ti
     enum head_state before = device->state;
     device->state = (enum head_state)next;
     note_change(device, tick, device->state);
-    device_push_event(device, NATIVE_EV_STATE, (uint64_t)device->state, (uint64_t)before, 0, head_state_name(device->state));
+    device_push_event(device, NATIVE_EV_STATE, (uint64_t)device->state, (uint64_t)before, 0,
+                      head_state_name(device->state));
     uint64_t from = tick > device->next_tick ? tick : device->next_tick;
     switch (device->state) {
     case HEAD_BOOT:
@@ -142,8 +143,8 @@ uint32_t device_tick_lines(const struct config *cfg)
     return (uint32_t)ceil((double)cfg->profile.lines_max_uhz * 1e-6 / cfg->tick_hz) + 2;
 }
 
-/* First pulse that is too many for this tick. When the rates jump up, what is due since the last cut, up to 15 pulses at the
- * old rate, comes at the new one and may fill several ticks. */
+/* First pulse that is too many for this tick. When the rates jump up, what is due since the last cut, up to 15 pulses
+ * at the old rate, comes at the new one and may fill several ticks. */
 static uint64_t tick_room_end(const struct device *device)
 {
     const struct schedule_segment *seg = &device->segment;

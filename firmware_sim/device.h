@@ -1,8 +1,8 @@
 /* The device: commands, states and the scan program, in device time. What a head's main processor does.
  *
- * Time is counted in ticks. Casters claim ticks in order, some way ahead of release; a claim carries the state machine and
- * the scan program to that tick and says what the tick consists of. A command takes effect at the first tick that isn't
- * claimed yet. Readers of the state see it as of the last released tick, not as of the last claimed one.
+ * Time is counted in ticks. Casters claim ticks in order, some way ahead of release; a claim carries the state machine
+ * and the scan program to that tick and says what the tick consists of. A command takes effect at the first tick that
+ * isn't claimed yet. Readers of the state see it as of the last released tick, not as of the last claimed one.
  *
  * Thread: any; one lock inside, held for microseconds. The pacing thread never takes it. */
 #ifndef FIRMWARE_SIM_DEVICE_H
@@ -31,19 +31,19 @@ struct device_counters {
 /* What one tick consists of; all copies, so that nobody waits for anybody. Frames leave in the order of the members. */
 struct device_work {
     uint64_t tick;
-    int64_t t_ns;                     /* device time at the tick's start */
-    uint32_t n_events_before;         /* of event[]: those that go before the points; the rest behind */
+    int64_t t_ns;             /* device time at the tick's start */
+    uint32_t n_events_before; /* of event[]: those that go before the points; the rest behind */
     uint32_t n_events;
     struct native_event event[DEVICE_MAX_EVENTS];
-    int describe, describe_flags;     /* descriptor and anchor frames, with these flags */
+    int describe, describe_flags; /* descriptor and anchor frames, with these flags */
     struct native_descriptor descriptor;
     struct native_anchor anchor;
     uint32_t surfaces_first, surfaces_n; /* names to send; 0: none */
     int scanning;
-    int64_t scan_t0_ns;               /* device time of the scan's start */
+    int64_t scan_t0_ns; /* device time of the scan's start */
     struct schedule_segment segment;
-    uint64_t pulse0, pulse_end;       /* pulses of this tick */
-    int cut_short;                    /* the scan stops at pulse_end, within a line */
+    uint64_t pulse0, pulse_end; /* pulses of this tick */
+    int cut_short;              /* the scan stops at pulse_end, within a line */
     uint32_t station;
     int telemetry;
     struct native_telemetry telemetry_frame;
@@ -52,22 +52,25 @@ struct device_work {
 struct device;
 
 struct device_options {
-    int start;               /* scan at once when booted */
-    int one_scan;            /* end the run when the first scan is over */
-    double duration_s;       /* > 0: end the run after this time, from the first scan's start with `start`, else from power-up */
-    const char *journal;     /* NULL: none */
-    const char *replay;      /* NULL: none */
+    int start;    /* scan at once when booted */
+    int one_scan; /* end the run when the first scan is over */
+    double
+        duration_s; /* > 0: end the run after this time, from the first scan's start with `start`, else from power-up */
+    const char *journal; /* NULL: none */
+    const char *replay;  /* NULL: none */
 };
 
 /* site must outlive the device. */
-int device_create(const struct site *site, const struct device_options *options, struct device **out, struct sh_err *err);
+int device_create(const struct site *site, const struct device_options *options, struct device **out,
+                  struct sh_err *err);
 void device_free(struct device *device);
 /* Closes the journal, if there is one, and says what went wrong in writing it. After the loop is joined. */
 int device_close_journal(struct device *device, struct sh_err *err);
 
 struct device_counters *device_counters(struct device *device);
 
-/* The next tick's work. Returns 0, or 1 when the run is over and there is no next tick. `released`: ticks released so far. */
+/* The next tick's work. Returns 0, or 1 when the run is over and there is no next tick. `released`: ticks released so
+ * far. */
 int device_claim(struct device *device, uint64_t released, struct device_work *work);
 /* A claimed tick was lost, and with it n_cast pulses to be cast, from first_cast on: counted, and what it said besides
  * points is said again in a later one. */
@@ -92,7 +95,8 @@ uint64_t device_scans(struct device *device);
 
 double device_tick_ns(const struct device *device);
 
-/* The most pulses that one tick consists of, and lines that end in it, whatever the settings: a slot has to hold them. */
+/* The most pulses that one tick consists of, and lines that end in it, whatever the settings: a slot has to hold them.
+ */
 uint32_t device_tick_pulses(const struct config *cfg);
 uint32_t device_tick_lines(const struct config *cfg);
 

@@ -87,7 +87,8 @@ void device_overlong(struct device *device, uint32_t session, struct command_res
     snprintf(text, sizeof text, "session %u, longest line %d bytes", session, COMMAND_MAX_LINE);
     device_report(device, CMD_E_OVERRUN, text);
     out->error = CMD_E_OVERRUN;
-    snprintf(out->reply, sizeof out->reply, "ERR %d,\"%s; %s\"", CMD_E_OVERRUN, command_error_text(CMD_E_OVERRUN), text);
+    snprintf(out->reply, sizeof out->reply, "ERR %d,\"%s; %s\"", CMD_E_OVERRUN, command_error_text(CMD_E_OVERRUN),
+             text);
 }
 
 void device_session_closed(struct device *device, uint32_t session, const char *who, int partial)
@@ -124,8 +125,9 @@ static int set_limits(struct device *device, struct sh_err *err)
     char idn[256];
     snprintf(idn, sizeof idn, "%s,%s,%s,scanhead native %d", p->maker, p->model, cfg->serial, NATIVE_VERSION);
     if (strlen(idn) >= sizeof device->idn)
-        return sh_fail(err, SH_EINPUT, "%s: maker, model and head.serial are together too long for *IDN?; at most %zu bytes",
-                       cfg->file, sizeof device->idn - 1 - strlen(",,,scanhead native 1"));
+        return sh_fail(err, SH_EINPUT,
+                       "%s: maker, model and head.serial are together too long for *IDN?; at most %zu bytes", cfg->file,
+                       sizeof device->idn - 1 - strlen(",,,scanhead native 1"));
     strcpy(device->idn, idn);
     device->cmd.idn = device->idn;
     device->cmd.step_allowed = cfg->pace == PACE_STEP;
@@ -135,13 +137,15 @@ static int set_limits(struct device *device, struct sh_err *err)
 static int open_journals(struct device *device, struct sh_err *err)
 {
     int rc = SH_OK;
-    if (device->options.replay != NULL) rc = journal_read(device->options.replay, &device->replay, &device->n_replay, err);
+    if (device->options.replay != NULL)
+        rc = journal_read(device->options.replay, &device->replay, &device->n_replay, err);
     if (rc != SH_OK || device->options.journal == NULL) return rc;
     device->journal = journal_open(device->options.journal, err);
     return device->journal != NULL ? SH_OK : err->code;
 }
 
-int device_create(const struct site *site, const struct device_options *options, struct device **out, struct sh_err *err)
+int device_create(const struct site *site, const struct device_options *options, struct device **out,
+                  struct sh_err *err)
 {
     *out = NULL;
     struct device *device = calloc(1, sizeof *device);

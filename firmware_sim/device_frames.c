@@ -61,8 +61,8 @@ void device_fill_descriptor(const struct device *device, struct native_descripto
 
 void device_fill_anchor(const struct device *device, struct native_anchor *a)
 {
-    static const uint32_t crs[] = {[GEOREF_LOCAL] = NATIVE_CRS_LOCAL, [GEOREF_ECEF] = NATIVE_CRS_ECEF,
-                                   [GEOREF_UTM] = NATIVE_CRS_UTM};
+    static const uint32_t crs[] = {
+        [GEOREF_LOCAL] = NATIVE_CRS_LOCAL, [GEOREF_ECEF] = NATIVE_CRS_ECEF, [GEOREF_UTM] = NATIVE_CRS_UTM};
     const struct site_station *s = &device->site->station[device->station];
     memset(a, 0, sizeof *a);
     a->crs = crs[device->site->cfg->crs];

@@ -18,32 +18,32 @@ struct device {
     uint64_t tick_hz;
     int64_t tick_ns;
 
-    uint64_t next_tick;            /* to be claimed */
-    enum head_state state;         /* as of next_tick */
-    uint64_t due_tick;             /* of the next timed transition; UINT64_MAX: none */
+    uint64_t next_tick;    /* to be claimed */
+    enum head_state state; /* as of next_tick */
+    uint64_t due_tick;     /* of the next timed transition; UINT64_MAX: none */
     struct {
         uint64_t tick;
         enum head_state state;
-    } change[DEVICE_MAX_CHANGES];  /* the last changes: what a reader sees lags behind the claims */
+    } change[DEVICE_MAX_CHANGES]; /* the last changes: what a reader sees lags behind the claims */
     uint32_t n_changes;
 
     int scanning;
-    uint32_t scan;                 /* number, from 1 */
+    uint32_t scan; /* number, from 1 */
     uint64_t scan_tick0, pulse_next, scan_lost0;
     struct schedule_segment segment;
-    uint32_t station;              /* of the scan at hand, from 0 */
-    int describe;                  /* descriptor and anchor are due, as news */
+    uint32_t station; /* of the scan at hand, from 0 */
+    int describe;     /* descriptor and anchor are due, as news */
     int stop_requested;
 
     struct native_event pending[DEVICE_MAX_PENDING];
     uint32_t n_pending, pending_dropped;
-    uint64_t lost_said;            /* lost ticks that an event has told of */
+    uint64_t lost_said; /* lost ticks that an event has told of */
     uint64_t lost_pulses_said;
-    uint64_t lost_first;           /* first lost pulse that no event has told of; UINT64_MAX: none */
-    uint64_t overrun_tick;         /* of the last overrun event */
+    uint64_t lost_first;   /* first lost pulse that no event has told of; UINT64_MAX: none */
+    uint64_t overrun_tick; /* of the last overrun event */
 
     int ending, over;
-    uint64_t end_tick;             /* UINT64_MAX: none */
+    uint64_t end_tick; /* UINT64_MAX: none */
     struct journal *journal;
     struct journal_entry *replay;
     size_t n_replay, replay_at;

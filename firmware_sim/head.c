@@ -30,8 +30,8 @@ static const signed char next_state[HEAD_N_STATES][HEAD_N_EVENTS] = {
 
 static const char *const state_names[HEAD_N_STATES] = {"off",      "boot",      "idle", "spin-up",
                                                        "scanning", "spin-down", "fault"};
-static const char *const event_names[HEAD_N_EVENTS] = {
-    "power-on", "power-off", "booted", "start", "spun-up", "stop", "done", "spun-down", "fail", "reset"};
+static const char *const event_names[HEAD_N_EVENTS] = {"power-on", "power-off", "booted",    "start", "spun-up",
+                                                       "stop",     "done",      "spun-down", "fail",  "reset"};
 
 int head_next_state(enum head_state state, enum head_event event)
 {

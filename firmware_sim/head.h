@@ -8,20 +8,27 @@
 
 /* The order is on the wire (telemetry, state events). */
 enum head_state {
-    HEAD_OFF, HEAD_BOOT, HEAD_IDLE, HEAD_SPIN_UP, HEAD_SCANNING, HEAD_SPIN_DOWN, HEAD_FAULT, HEAD_N_STATES
+    HEAD_OFF,
+    HEAD_BOOT,
+    HEAD_IDLE,
+    HEAD_SPIN_UP,
+    HEAD_SCANNING,
+    HEAD_SPIN_DOWN,
+    HEAD_FAULT,
+    HEAD_N_STATES
 };
 
 enum head_event {
-    HEAD_EV_POWER_ON,   /* power applied */
-    HEAD_EV_POWER_OFF,  /* power removed, from any state */
-    HEAD_EV_BOOTED,     /* self test done */
-    HEAD_EV_START,      /* command: start a scan */
-    HEAD_EV_SPUN_UP,    /* mirror at speed */
-    HEAD_EV_STOP,       /* command: stop */
-    HEAD_EV_DONE,       /* the commanded number of frames is scanned */
-    HEAD_EV_SPUN_DOWN,  /* mirror at rest */
-    HEAD_EV_FAIL,       /* something broke */
-    HEAD_EV_RESET,      /* command *RST: back to idle, defaults; clears a fault */
+    HEAD_EV_POWER_ON,  /* power applied */
+    HEAD_EV_POWER_OFF, /* power removed, from any state */
+    HEAD_EV_BOOTED,    /* self test done */
+    HEAD_EV_START,     /* command: start a scan */
+    HEAD_EV_SPUN_UP,   /* mirror at speed */
+    HEAD_EV_STOP,      /* command: stop */
+    HEAD_EV_DONE,      /* the commanded number of frames is scanned */
+    HEAD_EV_SPUN_DOWN, /* mirror at rest */
+    HEAD_EV_FAIL,      /* something broke */
+    HEAD_EV_RESET,     /* command *RST: back to idle, defaults; clears a fault */
     HEAD_N_EVENTS
 };
 

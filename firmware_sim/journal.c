@@ -60,8 +60,7 @@ int journal_close(struct journal *journal, struct sh_err *err)
     if (journal == NULL) return SH_OK;
     int error = journal->error;
     if (journal->file != NULL && fclose(journal->file) != 0 && error == 0) error = errno;
-    const int rc =
-        error == 0 ? SH_OK : sh_fail(err, SH_EIO, "journal: %s: %s", journal->path, strerror(error));
+    const int rc = error == 0 ? SH_OK : sh_fail(err, SH_EIO, "journal: %s: %s", journal->path, strerror(error));
     free(journal->path);
     free(journal);
     return rc;
@@ -115,8 +114,8 @@ static int read_line(struct reader *reader, struct sh_err *err)
     if (len < 0) return sh_fail(err, SH_EIO, "journal: %s: %s", reader->path, strerror(errno));
     reader->line_no++;
     if (reader->text[len - 1] != '\n')
-        return sh_fail(err, SH_EINPUT, "journal: %s:%zu: the last line is cut; end it or take it out",
-                       reader->path, reader->line_no);
+        return sh_fail(err, SH_EINPUT, "journal: %s:%zu: the last line is cut; end it or take it out", reader->path,
+                       reader->line_no);
     reader->text[len - 1] = '\0';
     if (strlen(reader->text) != (size_t)len - 1)
         return sh_fail(err, SH_EINPUT, "journal: %s:%zu: a NUL byte", reader->path, reader->line_no);
@@ -134,8 +133,8 @@ static int add_entry(struct reader *reader, struct sh_err *err)
     }
     const char *wrong = parse_entry(reader->text, &reader->entry[reader->n]);
     if (wrong != NULL)
-        return sh_fail(err, SH_EINPUT, "journal: %s:%zu: %s; a line is <tick> <ns> <session> <command>",
-                       reader->path, reader->line_no, wrong);
+        return sh_fail(err, SH_EINPUT, "journal: %s:%zu: %s; a line is <tick> <ns> <session> <command>", reader->path,
+                       reader->line_no, wrong);
     reader->n++;
     return SH_OK;
 }
@@ -145,8 +144,8 @@ static int read_all(struct reader *reader, struct sh_err *err)
     int rc = read_line(reader, err);
     if (rc < 0) return rc;
     if (rc == 0 || strcmp(reader->text, title) != 0)
-        return sh_fail(err, SH_EINPUT, "journal: %s:1: not a journal; the first line must be '%s'",
-                       reader->path, title);
+        return sh_fail(err, SH_EINPUT, "journal: %s:1: not a journal; the first line must be '%s'", reader->path,
+                       title);
     while ((rc = read_line(reader, err)) > 0) {
         if (reader->text[0] == '#' || reader->text[0] == '\0') continue;
         rc = add_entry(reader, err);

@@ -18,7 +18,7 @@ struct json {
     int depth;
     char closer[JSON_MAX_DEPTH];  /* what ends each open level */
     char has_one[JSON_MAX_DEPTH]; /* the level has a member: the next needs a comma */
-    int misused; /* a key in an array, none in an object, a level closed wrongly or left open */
+    int misused;                  /* a key in an array, none in an object, a level closed wrongly or left open */
 };
 
 void json_begin(struct json *json, FILE *out);
@@ -30,7 +30,8 @@ void json_close_array(struct json *json);
 void json_string(struct json *json, const char *key, const char *value);
 void json_int(struct json *json, const char *key, int64_t value);
 void json_uint(struct json *json, const char *key, uint64_t value);
-/* 15 to 17 digits, as many as it takes to read back the same double; null for NaN and the infinities, which JSON has not.
+/* 15 to 17 digits, as many as it takes to read back the same double; null for NaN and the infinities, which JSON has
+ * not.
  */
 void json_double(struct json *json, const char *key, double value);
 void json_bool(struct json *json, const char *key, int value);

@@ -35,8 +35,8 @@ static int check_capacity(const struct loop *loop, const struct pump *pump, stru
     char endpoint[300];
     if (capacity <= 0.0 || capacity >= rate) return SH_OK;
     pump_endpoint(pump, endpoint, sizeof endpoint);
-    return sh_fail(err, SH_EINPUT, "link %s: the stream has %.2f MB/s, the link carries %.2f MB/s; lower head.prr_hz", endpoint,
-                   1e-6 * rate, 1e-6 * capacity);
+    return sh_fail(err, SH_EINPUT, "link %s: the stream has %.2f MB/s, the link carries %.2f MB/s; lower head.prr_hz",
+                   endpoint, 1e-6 * rate, 1e-6 * capacity);
 }
 
 static int open_links(struct loop *loop, struct sh_err *err)
@@ -137,8 +137,8 @@ static int start_pacer(struct loop *loop, struct sh_err *err)
     }
     int rc = pthread_create(&loop->pacer_thread, &attr, loop_pacer_main, loop);
     if (rc == EPERM && rt) {
-        sh_warn(loop->options.report, "no SCHED_FIFO for the pacing thread (%s): raise RLIMIT_RTPRIO to %d", strerror(rc),
-                PACER_PRIORITY);
+        sh_warn(loop->options.report, "no SCHED_FIFO for the pacing thread (%s): raise RLIMIT_RTPRIO to %d",
+                strerror(rc), PACER_PRIORITY);
         rc = pthread_create(&loop->pacer_thread, NULL, loop_pacer_main, loop);
     }
     pthread_attr_destroy(&attr);

@@ -1,10 +1,11 @@
 /* The fixed-rate loop: casters ahead, one pacing thread, one thread per link.
  *
- * Casters claim ticks up to ahead_ms before their time and fill slots. The pacing thread sleeps on an absolute clock and
- * releases each tick when its last pulse has fired; releasing is sealing the frames' sequence numbers, one store and one
- * wake-up a link. A tick that isn't ready late_ms after its time is given up: announced on the wire, counted, and a gap in
- * the pulse numbers. (What the pacing thread itself overslept, because the whole machine stood still, is added to late_ms
- * until it has caught up.) In the paces fast and step nothing is lost: release waits for casters and readers.
+ * Casters claim ticks up to ahead_ms before their time and fill slots. The pacing thread sleeps on an absolute clock
+ * and releases each tick when its last pulse has fired; releasing is sealing the frames' sequence numbers, one store
+ * and one wake-up a link. A tick that isn't ready late_ms after its time is given up: announced on the wire, counted,
+ * and a gap in the pulse numbers. (What the pacing thread itself overslept, because the whole machine stood still, is
+ * added to late_ms until it has caught up.) In the paces fast and step nothing is lost: release waits for casters and
+ * readers.
  *
  * The pacing thread runs at SCHED_FIFO where permitted and touches no lock, allocator or log. */
 #ifndef FIRMWARE_SIM_LOOP_H
@@ -19,15 +20,15 @@
 struct loop;
 
 struct loop_options {
-    int hash;                        /* keep stream_sha256 */
-    const struct link_spec *extra;   /* one more link than the configuration has; NULL: none */
-    const struct sh_report *report;  /* warnings while running (from any thread); NULL: none */
+    int hash;                       /* keep stream_sha256 */
+    const struct link_spec *extra;  /* one more link than the configuration has; NULL: none */
+    const struct sh_report *report; /* warnings while running (from any thread); NULL: none */
 };
 
 struct loop_stats {
     uint64_t pulses, fired_pulses, echoes, lines, scans;
     uint64_t lost_pulses, lost_ticks, late_blocks, reader_lost_frames;
-    double wall_s;                   /* from the release of the first pulse to that of the last */
+    double wall_s; /* from the release of the first pulse to that of the last */
     double late_p50_us, late_p999_us, late_max_us;
     int have_hash;
     char sha256[65];

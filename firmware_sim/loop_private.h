@@ -44,31 +44,31 @@ struct loop {
     struct loop_caster caster_arg[LOOP_MAX_THREADS];
     uint32_t n_casters_running;
     pthread_mutex_t claim_lock;
-    uint64_t next_tick;                /* under claim_lock */
-    _Atomic uint32_t n_computing;      /* claimed ticks, neither ready nor told lost yet */
-    sem_t work;                        /* a tick may be claimed */
-    sem_t ready;                       /* a tick is ready; only in the paces that wait */
-    sem_t progress;                    /* a reader went on, or time was granted; likewise */
+    uint64_t next_tick;           /* under claim_lock */
+    _Atomic uint32_t n_computing; /* claimed ticks, neither ready nor told lost yet */
+    sem_t work;                   /* a tick may be claimed */
+    sem_t ready;                  /* a tick is ready; only in the paces that wait */
+    sem_t progress;               /* a reader went on, or time was granted; likewise */
 
-    _Atomic uint64_t drop_until;       /* ticks before this one are not worth computing any more */
+    _Atomic uint64_t drop_until; /* ticks before this one are not worth computing any more */
 
     pthread_t pacer_thread;
     int pacer_running;
-    _Atomic uint64_t granted;          /* step: ticks that may pass */
-    _Atomic uint64_t granted_ns;       /* step: the sum of all grants */
-    _Atomic uint64_t final_tick;       /* first tick that will never be; UINT64_MAX while unknown */
-    _Atomic int ending;                /* the run was told to end: no patience with readers who stand still */
-    _Atomic int stopping;              /* give up waiting for anything */
+    _Atomic uint64_t granted;    /* step: ticks that may pass */
+    _Atomic uint64_t granted_ns; /* step: the sum of all grants */
+    _Atomic uint64_t final_tick; /* first tick that will never be; UINT64_MAX while unknown */
+    _Atomic int ending;          /* the run was told to end: no patience with readers who stand still */
+    _Atomic int stopping;        /* give up waiting for anything */
     _Atomic int pacer_done;
-    _Atomic uint32_t pumps_busy;       /* pumps that still have something to bring out */
-    uint32_t seq, line_echoes;         /* of the pacing thread */
-    int line_broken;                   /* likewise: a tick was lost since the last line end */
+    _Atomic uint32_t pumps_busy; /* pumps that still have something to bring out */
+    uint32_t seq, line_echoes;   /* of the pacing thread */
+    int line_broken;             /* likewise: a tick was lost since the last line end */
     _Atomic uint64_t late[LATE_BUCKETS];
     _Atomic int64_t first_pulse_ns, last_pulse_ns; /* when released; 0: not yet */
 
     struct loop_reader reader[RING_MAX_READERS];
     _Atomic int link_failed;
-    struct sh_err link_error;          /* of the first link that failed, once link_failed is 1 */
+    struct sh_err link_error; /* of the first link that failed, once link_failed is 1 */
     struct pump *pump[LOOP_MAX_LINKS];
     uint32_t n_pumps;
     struct hasher *hasher;
@@ -88,7 +88,7 @@ void loop_poke(struct loop *loop);
 /* A link with its thread (pump.c). */
 int pump_open(struct loop *loop, uint32_t index, const struct link_spec *spec, struct pump **out, struct sh_err *err);
 int pump_start(struct pump *pump, struct sh_err *err);
-void pump_wake(struct pump *pump);      /* real-time safe */
+void pump_wake(struct pump *pump); /* real-time safe */
 void pump_join(struct pump *pump);
 void pump_close(struct pump *pump);
 void pump_endpoint(const struct pump *pump, char *buf, size_t len);

@@ -60,8 +60,8 @@ static int claim(struct loop *loop, struct device_work *work, struct ring_slot *
     return got;
 }
 
-/* A block that was computed in vain: the next ones are as late. Taking up each in turn just before its time is over would
- * lose them all; so leave out as many as give those behind them half the time ahead. */
+/* A block that was computed in vain: the next ones are as late. Taking up each in turn just before its time is over
+ * would lose them all; so leave out as many as give those behind them half the time ahead. */
 static void skip_ahead(struct loop *loop)
 {
     atomic_store(&loop->drop_until, atomic_load(&loop->ring.released) + loop->ahead_ticks / 2);

@@ -1,7 +1,8 @@
 /* A link with its thread: frames and replies out, command lines in, for each of the link's sessions.
  *
  * A session has a cursor into the ring and a private copy of what it is writing, so that a slow reader holds up nobody:
- * when the ring has gone on too far it loses whole frames, is told so in a frame of its own, and goes on with the present. */
+ * when the ring has gone on too far it loses whole frames, is told so in a frame of its own, and goes on with the
+ * present. */
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,14 +16,14 @@
 
 enum {
     REPLY_ROOM = 8192,
-    BATCH_BYTES = 131072,  /* small ticks are written together up to this */
+    BATCH_BYTES = 131072, /* small ticks are written together up to this */
     READ_BYTES = 65536,
     DRAIN_NS = 2000000000, /* at the end a reader may take this long between two bytes */
 };
 
 struct session {
     int open, lagging;
-    uint32_t id;            /* from 1, over all links */
+    uint32_t id; /* from 1, over all links */
     int reader;
     uint64_t cursor;
     int have_seq;
@@ -36,11 +37,11 @@ struct session {
     char reply[REPLY_ROOM];
     uint32_t reply_len;
     int replies_dropped;
-    int stepping;           /* the reply to TIME:STEP waits until all before this tick has gone out */
+    int stepping; /* the reply to TIME:STEP waits until all before this tick has gone out */
     uint64_t step_tick;
     char step_reply[COMMAND_MAX_REPLY];
     char peer[64];
-    int64_t moved_ns;       /* when a byte last went out */
+    int64_t moved_ns; /* when a byte last went out */
 };
 
 struct pump {
@@ -189,8 +190,8 @@ static int has_reply_room(const struct session *s)
     return s->reply_len + COMMAND_MAX_REPLY + 2 <= REPLY_ROOM || s->in_len - s->in_pos == READ_BYTES;
 }
 
-/* Lines wait while a step goes on, and until earlier replies are on their way: each is carried out, and answered, after the
- * one before. Only who sends on and on without reading loses replies. */
+/* Lines wait while a step goes on, and until earlier replies are on their way: each is carried out, and answered, after
+ * the one before. Only who sends on and on without reading loses replies. */
 static void take_lines(struct pump *pump, struct session *s)
 {
     while (s->in_pos < s->in_len && !s->stepping && has_reply_room(s)) {
@@ -204,11 +205,13 @@ static void read_commands(struct pump *pump, struct session *s, int index)
     memmove(s->in, s->in + s->in_pos, s->in_len - s->in_pos);
     s->in_len -= s->in_pos;
     s->in_pos = 0;
-    ssize_t n = s->in_len < READ_BYTES ? pump->ops->read(pump->link, index, s->in + s->in_len, READ_BYTES - s->in_len) : 0;
+    ssize_t n =
+        s->in_len < READ_BYTES ? pump->ops->read(pump->link, index, s->in + s->in_len, READ_BYTES - s->in_len) : 0;
     if (n > 0) s->in_len += (uint32_t)n;
     take_lines(pump, s);
     if (s->replies_dropped != 0) {
-        device_report(pump->loop->device, CMD_E_OVERRUN, "a client sends without reading its replies; some were dropped");
+        device_report(pump->loop->device, CMD_E_OVERRUN,
+                      "a client sends without reading its replies; some were dropped");
         s->replies_dropped = 0;
     }
 }
@@ -222,7 +225,8 @@ static void say_lost(struct pump *pump, struct session *s, uint32_t frames)
     struct native_event event = {.code = NATIVE_EV_READER_LOST, .a = frames, .c = s->lost_frames};
     snprintf(event.text, sizeof event.text, "%u frames lost: the reader is too slow", frames);
     int64_t t_ns = (int64_t)atomic_load(&loop->ring.released) * loop->tick_ns;
-    s->out_len += (uint32_t)native_encode_event(s->out + s->out_len, pump->out_cap - s->out_len, &event, t_ns, NATIVE_LOCAL);
+    s->out_len +=
+        (uint32_t)native_encode_event(s->out + s->out_len, pump->out_cap - s->out_len, &event, t_ns, NATIVE_LOCAL);
     if (!s->lagging) {
         char text[96];
         snprintf(text, sizeof text, "session %u, %.50s", s->id, s->peer);
@@ -358,7 +362,7 @@ static void leave_session(struct pump *pump, struct session *s)
 {
     struct loop *loop = pump->loop;
     uint32_t missing = s->have_seq ? loop->seq - s->next_seq : 0; /* the pacing thread is done with seq */
-    if (s->out_pos < s->out_len) missing++; /* at least the frame it was in the middle of */
+    if (s->out_pos < s->out_len) missing++;                       /* at least the frame it was in the middle of */
     if (atomic_load(&loop->pacer_done) && missing != 0) atomic_fetch_add(&loop->counters->reader_lost_frames, missing);
     set_active(pump, s, 0);
 }

@@ -122,7 +122,8 @@ static int follow(struct recording *r, struct sh_err *err)
             asked = 1; /* a refusal says that the scan has just ended by itself */
             end_ns = clock_now_ns() + (int64_t)END_MS * 1000000;
         }
-        if (clock_now_ns() > end_ns) return sh_fail(err, SH_ETIMEOUT, "the head did not end the scan within %d s", END_MS / 1000);
+        if (clock_now_ns() > end_ns)
+            return sh_fail(err, SH_ETIMEOUT, "the head did not end the scan within %d s", END_MS / 1000);
         int rc = step(r, NEXT_MS, err);
         if (rc < 0) return rc;
     }

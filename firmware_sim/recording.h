@@ -1,5 +1,5 @@
-/* Taking a scan through libscanhead: start, follow until it ends, stop on time. Off line the head runs in this process, at
- * the pace `fast`, behind a socket pair; the client side is the same. */
+/* Taking a scan through libscanhead: start, follow until it ends, stop on time. Off line the head runs in this process,
+ * at the pace `fast`, behind a socket pair; the client side is the same. */
 #ifndef FIRMWARE_SIM_RECORDING_H
 #define FIRMWARE_SIM_RECORDING_H
 
@@ -10,11 +10,11 @@
 #include "firmware_sim/config.h"
 
 struct recording_options {
-    int listen;            /* send nothing; take what comes until the stream or the time ends */
+    int listen;                           /* send nothing; take what comes until the stream or the time ends */
     uint32_t first_station, last_station; /* scanned one after the other, from 1; 0: as the head is set */
-    long frames;           /* per scan; -1: as the head is set */
-    double duration_s;     /* > 0: stop each scan after this time of scanning */
-    int progress;          /* to the report, about once a second */
+    long frames;                          /* per scan; -1: as the head is set */
+    double duration_s;                    /* > 0: stop each scan after this time of scanning */
+    int progress;                         /* to the report, about once a second */
     const struct sh_report *report;
     /* Each frame, in order. A negative SH_E ends the recording with it. */
     int (*frame)(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
@@ -25,8 +25,8 @@ struct recording_options {
 
 struct recording_result {
     uint64_t points, empty, frames, scans, pulses;
-    uint64_t lost_pulses;  /* as the head says: cast pulses it could not compute */
-    int ended_early;       /* the stream ended before the scan did */
+    uint64_t lost_pulses; /* as the head says: cast pulses it could not compute */
+    int ended_early;      /* the stream ended before the scan did */
 };
 
 int recording_run(struct scanhead *sh, const struct recording_options *options, struct recording_result *result,

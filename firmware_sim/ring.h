@@ -1,13 +1,14 @@
 /* The slots between casters, the pacing thread and the readers: one per tick, each with the tick's frames as bytes.
  *
- * A tick's slot is claimed by one caster, filled, marked ready, and released by the pacing thread when its time has come;
- * a tick that isn't ready in time is marked lost instead. Readers copy released ticks out at their own speed, as long as a
- * tick is among the last queue_ticks released; what is older is lost to them. Nobody waits for a reader here (the loop does,
- * in the paces fast and step). The slots outnumber the ticks in play twice over, and a reader in the middle of a copy says so
- * (hazard), so that a slot is never written while it is read.
+ * A tick's slot is claimed by one caster, filled, marked ready, and released by the pacing thread when its time has
+ * come; a tick that isn't ready in time is marked lost instead. Readers copy released ticks out at their own speed, as
+ * long as a tick is among the last queue_ticks released; what is older is lost to them. Nobody waits for a reader here
+ * (the loop does, in the paces fast and step). The slots outnumber the ticks in play twice over, and a reader in the
+ * middle of a copy says so (hazard), so that a slot is never written while it is read.
  *
- * Threads: claims are serialised by the caller; ready by the claiming caster; release and lose by the pacing thread alone;
- * read by any number of readers, each with its own hazard number. Lock-free, except that claim may yield to a reader. */
+ * Threads: claims are serialised by the caller; ready by the claiming caster; release and lose by the pacing thread
+ * alone; read by any number of readers, each with its own hazard number. Lock-free, except that claim may yield to a
+ * reader. */
 #ifndef FIRMWARE_SIM_RING_H
 #define FIRMWARE_SIM_RING_H
 
@@ -21,7 +22,8 @@
 /* Marks: 10,000 lines a second in ticks of 10 ms, and device_tick_lines' two more, fit. */
 enum { RING_MAX_READERS = 72, RING_MAX_MARKS = 104 };
 
-/* A line-end frame that lacks its number of echoes until the tick is released: blocks before it may come from elsewhere. */
+/* A line-end frame that lacks its number of echoes until the tick is released: blocks before it may come from
+ * elsewhere. */
 struct ring_mark {
     uint32_t frame_at;      /* offset of the frame in bytes */
     uint32_t echoes_before; /* echoes of this slot since the mark before */
@@ -34,9 +36,9 @@ struct ring_slot {
     _Atomic int busy;       /* a caster writes in it, be its tick lost or not */
     uint8_t *bytes;
     uint32_t len, n_frames;
-    uint32_t first_seq;     /* set at release */
+    uint32_t first_seq; /* set at release */
     uint64_t n_fired, n_cast, n_echoes, n_lines;
-    uint32_t echoes_tail;   /* echoes after the last mark */
+    uint32_t echoes_tail; /* echoes after the last mark */
     uint32_t n_marks;
     struct ring_mark mark[RING_MAX_MARKS];
 };
@@ -45,7 +47,7 @@ struct ring {
     struct ring_slot *slot;
     uint64_t n_slots, queue_ticks;
     uint32_t slot_bytes;
-    _Atomic uint64_t released;               /* ticks released or lost so far */
+    _Atomic uint64_t released;                 /* ticks released or lost so far */
     _Atomic uint64_t hazard[RING_MAX_READERS]; /* tick + 1 being read; 0: none */
 };
 
@@ -67,8 +69,8 @@ void ring_release(struct ring *ring, uint64_t tick);
 int ring_lose(struct ring *ring, uint64_t tick);
 
 enum ring_read { RING_READ, RING_NONE, RING_LOST };
-/* Copies the frames of `tick` to buf. RING_READ: *len bytes and *n_frames frames, first_seq is the first one's number (0
- * bytes where the tick had none); RING_NONE: not released yet; RING_LOST: too old, or lost by the head itself.
+/* Copies the frames of `tick` to buf. RING_READ: *len bytes and *n_frames frames, first_seq is the first one's number
+ * (0 bytes where the tick had none); RING_NONE: not released yet; RING_LOST: too old, or lost by the head itself.
  * RING_READ with *len > cap means that it did not fit and was not copied. */
 enum ring_read ring_read(struct ring *ring, int reader, uint64_t tick, uint8_t *buf, uint32_t cap, uint32_t *len,
                          uint32_t *n_frames, uint32_t *first_seq);

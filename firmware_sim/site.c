@@ -19,7 +19,8 @@ static struct scene_mesh_spec mesh_spec(const struct config_mesh *mesh)
 }
 
 /* A body by itself: its sphere, its BVH in its own frame, its labels behind those there are. */
-static int add_mover(struct site *site, const struct config_mesh *mesh, const struct sh_report *report, struct sh_err *err)
+static int add_mover(struct site *site, const struct config_mesh *mesh, const struct sh_report *report,
+                     struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
     if (site->n_movers == CAST_MAX_MOVERS)
@@ -53,7 +54,8 @@ static int load_scene(struct site *site, const struct sh_report *report, struct 
     for (uint32_t i = 0; i < cfg->n_meshes; i++)
         if (!is_moving(&cfg->mesh[i])) spec[n++] = mesh_spec(&cfg->mesh[i]);
     if (n == 0)
-        return sh_fail(err, SH_EINPUT, "%s: scene.meshes: all of them move; at least one has to stand still", cfg->file);
+        return sh_fail(err, SH_EINPUT, "%s: scene.meshes: all of them move; at least one has to stand still",
+                       cfg->file);
     int rc = scene_load(spec, n, cfg->scene_tolerance_m, report, &site->scene, err);
     if (rc == SH_OK) site->n_surfaces = site->scene->n_surfaces;
     for (uint32_t i = 0; i < cfg->n_meshes && rc == SH_OK; i++)
@@ -122,7 +124,8 @@ static int find_bvh(struct site *site, const double station_m[3], const struct s
             return SH_OK;
         }
     }
-    int rc = bvh_create(site->scene, station_m, station_reach(site->cfg, station_m), site->cfg->threads, report, out, err);
+    int rc =
+        bvh_create(site->scene, station_m, station_reach(site->cfg, station_m), site->cfg->threads, report, out, err);
     if (rc != SH_OK) return rc;
     site->bvh[site->n_bvh++] = *out;
     return site->cfg->order_exactly ? bvh_order_exactly(*out, err) : SH_OK;
@@ -133,8 +136,11 @@ static int add_station(struct site *site, const struct config_station *station, 
 {
     const struct config *cfg = site->cfg;
     struct site_station *s = &site->station[site->n_stations];
-    struct georef_spec spec = {.crs = cfg->crs, .utm_zone = cfg->utm_zone, .lat_deg = station->lat_deg,
-                               .lon_deg = station->lon_deg, .height_m = station->height_m};
+    struct georef_spec spec = {.crs = cfg->crs,
+                               .utm_zone = cfg->utm_zone,
+                               .lat_deg = station->lat_deg,
+                               .lon_deg = station->lon_deg,
+                               .height_m = station->height_m};
     memcpy(spec.station_m, station->position_m, sizeof spec.station_m);
     s->station = station;
     cast_rotation(station->heading_deg * M_PI / 180.0, s->rotation);

@@ -10,9 +10,9 @@
 
 struct site_station {
     const struct config_station *station;
-    struct bvh *bvh;            /* shared where stations are near each other */
+    struct bvh *bvh; /* shared where stations are near each other */
     struct georef *georef;
-    double rotation[9];         /* socs -> prcs */
+    double rotation[9]; /* socs -> prcs */
 };
 
 struct site_mover {
@@ -24,14 +24,14 @@ struct site_mover {
 
 struct site {
     const struct config *cfg;
-    struct scene *scene;        /* what stands still */
+    struct scene *scene; /* what stands still */
     struct site_mover mover[CAST_MAX_MOVERS];
     uint32_t n_movers, n_surfaces; /* surfaces of the scene, then of the movers */
     struct bvh *bvh[CONFIG_MAX_STATIONS];
     uint32_t n_bvh;
     struct site_station station[CONFIG_MAX_STATIONS];
     uint32_t n_stations;
-    double scale_m;             /* of positions and ranges on the wire, metres per count */
+    double scale_m; /* of positions and ranges on the wire, metres per count */
 };
 
 /* Stations further than this from a BVH's origin get one of their own: a float there has steps of 0.06 mm. */

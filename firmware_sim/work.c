@@ -70,8 +70,11 @@ static void fill_heads(struct worker *worker, const struct device_work *work, st
         added(slot, native_encode_event(slot->bytes + slot->len, cap - slot->len, &work->event[i], work->t_ns, 0), 1);
     if (work->describe) {
         int flags = work->describe_flags;
-        added(slot, native_encode_descriptor(slot->bytes + slot->len, cap - slot->len, &work->descriptor, work->t_ns, flags), 1);
-        added(slot, native_encode_anchor(slot->bytes + slot->len, cap - slot->len, &work->anchor, work->t_ns, flags), 1);
+        added(slot,
+              native_encode_descriptor(slot->bytes + slot->len, cap - slot->len, &work->descriptor, work->t_ns, flags),
+              1);
+        added(slot, native_encode_anchor(slot->bytes + slot->len, cap - slot->len, &work->anchor, work->t_ns, flags),
+              1);
     }
     uint32_t first = work->surfaces_first, left = work->surfaces_n;
     while (left != 0) {
@@ -93,8 +96,8 @@ static uint32_t frames_in(const uint8_t *bytes, size_t len)
     return n;
 }
 
-static void cast_run(struct worker *worker, const struct device_work *work, const struct schedule_line *line, uint64_t k,
-                     uint64_t end, struct ring_slot *slot, uint32_t cap)
+static void cast_run(struct worker *worker, const struct device_work *work, const struct schedule_line *line,
+                     uint64_t k, uint64_t end, struct ring_slot *slot, uint32_t cap)
 {
     uint64_t longest = (uint64_t)(MAX_DT_NS / (work->segment.ns_quot + 1));
     if (longest == 0) longest = 1;
@@ -122,20 +125,22 @@ static void end_line(const struct worker *worker, const struct device_work *work
     int partial = end < line->pulse_end;
     uint64_t cast_end = line->cast_end < end ? line->cast_end : end;
     uint64_t cast_here = cast_end > line->cast0 ? cast_end - line->cast0 : 0;
-    uint64_t last = end > seg->k0 ? end - 1 : end; /* stopped at once after a change of settings: there is no nearer pulse */
+    uint64_t last =
+        end > seg->k0 ? end - 1 : end; /* stopped at once after a change of settings: there is no nearer pulse */
     struct ring_mark *mark = &slot->mark[slot->n_marks++];
-    mark->end = (struct line_end){.frame = line->frame,
-                                  .line = (uint32_t)line->line,
-                                  .pulse0 = line->begin,
-                                  .n_fired = (uint32_t)(end - line->begin),
-                                  .n_cast = (uint32_t)(line->cast_before + cast_here),
-                                  .t0_ns = line->begin_ns,
-                                  .t1_ns = schedule_time_ns(seg, end),
-                                  .mirror_count = cast_encoder_count(schedule_mirror_turn(seg, last), setup->mirror_counts),
-                                  .pan_count = cast_encoder_count(schedule_pan_turn(seg, last), setup->pan_counts),
-                                  .status = partial               ? (uint32_t)LINE_PARTIAL
-                                            : line->last_of_frame ? (uint32_t)LINE_LAST_OF_FRAME
-                                                                  : 0U};
+    mark->end =
+        (struct line_end){.frame = line->frame,
+                          .line = (uint32_t)line->line,
+                          .pulse0 = line->begin,
+                          .n_fired = (uint32_t)(end - line->begin),
+                          .n_cast = (uint32_t)(line->cast_before + cast_here),
+                          .t0_ns = line->begin_ns,
+                          .t1_ns = schedule_time_ns(seg, end),
+                          .mirror_count = cast_encoder_count(schedule_mirror_turn(seg, last), setup->mirror_counts),
+                          .pan_count = cast_encoder_count(schedule_pan_turn(seg, last), setup->pan_counts),
+                          .status = partial               ? (uint32_t)LINE_PARTIAL
+                                    : line->last_of_frame ? (uint32_t)LINE_LAST_OF_FRAME
+                                                          : 0U};
     mark->frame_at = slot->len;
     mark->echoes_before = slot->echoes_tail;
     mark->scan_t0_ns = work->scan_t0_ns;
@@ -150,7 +155,8 @@ static void fill_pulses(struct worker *worker, const struct device_work *work, s
         site_cast_setup(worker->site, work->station, &worker->setup);
         worker->setup_station = work->station + 1;
     }
-    if (worker->site->n_movers != 0) site_move(worker->site, 1e-9 * (double)(work->t_ns - work->scan_t0_ns), &worker->setup);
+    if (worker->site->n_movers != 0)
+        site_move(worker->site, 1e-9 * (double)(work->t_ns - work->scan_t0_ns), &worker->setup);
     for (uint64_t k = work->pulse0; k < work->pulse_end;) {
         struct schedule_line line;
         schedule_get_line(&work->segment, schedule_line_of(&work->segment, k), &line);
@@ -174,10 +180,12 @@ void worker_fill(struct worker *worker, const struct device_work *work, struct r
     fill_heads(worker, work, slot, slot_bytes);
     if (work->scanning) fill_pulses(worker, work, slot, slot_bytes);
     for (uint32_t i = work->n_events_before; i < work->n_events; i++)
-        added(slot, native_encode_event(slot->bytes + slot->len, slot_bytes - slot->len, &work->event[i], work->t_ns, 0), 1);
+        added(slot,
+              native_encode_event(slot->bytes + slot->len, slot_bytes - slot->len, &work->event[i], work->t_ns, 0), 1);
     if (work->telemetry)
         added(slot,
-              native_encode_telemetry(slot->bytes + slot->len, slot_bytes - slot->len, &work->telemetry_frame, work->t_ns, 0),
+              native_encode_telemetry(slot->bytes + slot->len, slot_bytes - slot->len, &work->telemetry_frame,
+                                      work->t_ns, 0),
               1);
 }
 

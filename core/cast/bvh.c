@@ -26,7 +26,8 @@ static int build(struct bvh *bvh, struct sh_err *err)
         rtcAttachGeometry(bvh->rtc, geometry);
         rtcCommitScene(bvh->rtc);
         int code = (int)rtcGetDeviceError(bvh->device);
-        if (code != RTC_ERROR_NONE) rc = sh_fail(err, SH_ENOMEM, "cast: Embree failed to build the BVH (error %d)", code);
+        if (code != RTC_ERROR_NONE)
+            rc = sh_fail(err, SH_ENOMEM, "cast: Embree failed to build the BVH (error %d)", code);
     }
     rtcReleaseGeometry(geometry);
     return rc;

@@ -6,7 +6,9 @@
 
 #include "core/cast/kernels.h"
 
-enum { CHUNK = 512 }; /* pulses worked on at a time: the arrays stay in the second-level cache, the hits' planes are on their way */
+enum {
+    CHUNK = 512
+}; /* pulses worked on at a time: the arrays stay in the second-level cache, the hits' planes are on their way */
 
 struct mover_rays {
     double dx[CHUNK], dy[CHUNK], dz[CHUNK], range_m[CHUNK];
@@ -18,12 +20,12 @@ struct caster {
     double dx[CHUNK], dy[CHUNK], dz[CHUNK]; /* direction of the beam, prcs */
     double ex[CHUNK], ey[CHUNK], ez[CHUNK]; /* direction as the encoders read it, then the position; geo layout */
     double range_m[CHUNK];
-    float fx[CHUNK], fy[CHUNK], fz[CHUNK];  /* the direction as Embree gets it */
-    uint32_t prim[CHUNK], hit[CHUNK];       /* as proposed; as decided */
+    float fx[CHUNK], fy[CHUNK], fz[CHUNK]; /* the direction as Embree gets it */
+    uint32_t prim[CHUNK], hit[CHUNK];      /* as proposed; as decided */
     float t[CHUNK], u[CHUNK], v[CHUNK];
-    uint32_t doubt[CHUNK];                  /* the proposal has to be decided in double */
-    uint32_t seen[CHUNK], label[CHUNK];     /* labels of the last hits; of what counts in the end */
-    struct mover_rays mover;                /* touched only where something moves */
+    uint32_t doubt[CHUNK];              /* the proposal has to be decided in double */
+    uint32_t seen[CHUNK], label[CHUNK]; /* labels of the last hits; of what counts in the end */
+    struct mover_rays mover;            /* touched only where something moves */
     struct cast_counters counters;
     struct cast_profile *profile;
 };
@@ -74,7 +76,8 @@ uint32_t cast_encoder_count(double turn, double counts_per_turn)
     return count >= counts_per_turn ? 0 : (uint32_t)(uint64_t)count;
 }
 
-static void decide_one(struct caster *c, struct decide_ray *ray, const struct kernel_hits *hits, uint32_t *prim, uint32_t i)
+static void decide_one(struct caster *c, struct decide_ray *ray, const struct kernel_hits *hits, uint32_t *prim,
+                       uint32_t i)
 {
     struct decide_hit hit;
     ray->dir[0] = hits->dx[i];
@@ -82,7 +85,8 @@ static void decide_one(struct caster *c, struct decide_ray *ray, const struct ke
     ray->dir[2] = hits->dz[i];
     decide_hit(ray, prim[i], c->t[i], &c->counters, &hit);
     prim[i] = hit.prim;
-    hits->label[i] = hit.prim == RTC_INVALID_GEOMETRY_ID ? (uint32_t)LINE_LABEL_NONE : bvh_label(&ray->bvh->triangle[hit.prim]);
+    hits->label[i] =
+        hit.prim == RTC_INVALID_GEOMETRY_ID ? (uint32_t)LINE_LABEL_NONE : bvh_label(&ray->bvh->triangle[hit.prim]);
     hits->range_m[i] = hit.prim == RTC_INVALID_GEOMETRY_ID ? (double)NAN : hit.range_m;
 }
 
@@ -102,8 +106,8 @@ void caster_hits(struct caster *c, const struct bvh *bvh, const double station_m
                  const double *dx, const double *dy, const double *dz, double *range_m, uint32_t *triangle)
 {
     struct decide_ray ray = {.bvh = bvh, .t_max = (float)(range_max_m * 1.001)};
-    struct bvh_rays rays = {.t_max = ray.t_max, .dx = c->fx, .dy = c->fy, .dz = c->fz, .t = c->t, .u = c->u, .v = c->v,
-                            .prim = c->prim};
+    struct bvh_rays rays = {
+        .t_max = ray.t_max, .dx = c->fx, .dy = c->fy, .dz = c->fz, .t = c->t, .u = c->u, .v = c->v, .prim = c->prim};
     for (int i = 0; i < 3; i++) {
         ray.station_m[i] = station_m[i];
         ray.o_local[i] = station_m[i] - bvh->origin_m[i];
@@ -111,8 +115,15 @@ void caster_hits(struct caster *c, const struct bvh *bvh, const double station_m
     }
     for (uint32_t at = 0; at < n; at += CHUNK) {
         uint32_t m = n - at < CHUNK ? n - at : CHUNK;
-        struct kernel_hits hits = {.dx = dx + at, .dy = dy + at, .dz = dz + at, .prim = c->prim, .u = c->u, .v = c->v,
-                                   .range_m = range_m + at, .label = c->seen, .doubt = c->doubt};
+        struct kernel_hits hits = {.dx = dx + at,
+                                   .dy = dy + at,
+                                   .dz = dz + at,
+                                   .prim = c->prim,
+                                   .u = c->u,
+                                   .v = c->v,
+                                   .range_m = range_m + at,
+                                   .label = c->seen,
+                                   .doubt = c->doubt};
         kernel_to_float(hits.dx, hits.dy, hits.dz, m, c->fx, c->fy, c->fz);
         ends(c, CAST_DIRECTIONS);
         bvh_intersect(bvh, &rays, m);
@@ -125,7 +136,8 @@ void caster_hits(struct caster *c, const struct bvh *bvh, const double station_m
     }
 }
 
-/* Socs to where positions go: straight to the CRS where that is a rotation, else to prcs. Returns 1 in the first case. */
+/* Socs to where positions go: straight to the CRS where that is a rotation, else to prcs. Returns 1 in the first case.
+ */
 static int reading_rotation(const struct cast_setup *s, double to_crs[9])
 {
     double g[9];
@@ -152,7 +164,8 @@ static void cast_mover(struct caster *c, const struct cast_setup *s, const struc
     double v[3], station_m[3], w[3];
     for (int i = 0; i < 3; i++) {
         const double *row = m->rotation + 3 * i;
-        v[i] = row[0] * m->centre_m[0] + row[1] * m->centre_m[1] + row[2] * m->centre_m[2] + m->shift_m[i] - s->station_m[i];
+        v[i] = row[0] * m->centre_m[0] + row[1] * m->centre_m[1] + row[2] * m->centre_m[2] + m->shift_m[i] -
+               s->station_m[i];
         w[i] = s->station_m[i] - m->shift_m[i];
     }
     if (!kernel_meets_sphere(c->dx, c->dy, c->dz, n, v, m->radius_m)) return;

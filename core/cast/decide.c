@@ -8,9 +8,9 @@ enum { DECIDE_MAX_ROUNDS = 32 };
 
 struct search {
     const struct decide_ray *ray;
-    uint32_t prim;             /* best so far */
-    double range_m, border_m;  /* its range, and how far the ray passes from its nearest edge */
-    uint32_t near_prim;        /* the one that the ray misses by least; gap 1: double precision can't tell */
+    uint32_t prim;            /* best so far */
+    double range_m, border_m; /* its range, and how far the ray passes from its nearest edge */
+    uint32_t near_prim;       /* the one that the ray misses by least; gap 1: double precision can't tell */
     double near_gap, near_range_m;
 };
 
@@ -26,9 +26,9 @@ static int before(const double a[3], const double b[3])
     return 0;
 }
 
-/* On which side of the edge a-b the ray passes, as the distance across the ray times the edge's length; corners relative to
- * the ray's origin. Taken in one order of the corners whatever triangle asks, so that two triangles of an edge get the same
- * number with opposite signs. */
+/* On which side of the edge a-b the ray passes, as the distance across the ray times the edge's length; corners
+ * relative to the ray's origin. Taken in one order of the corners whatever triangle asks, so that two triangles of an
+ * edge get the same number with opposite signs. */
 static double edge_side(const double a[3], const double b[3], const double dir[3])
 {
     int swap = before(b, a);
@@ -126,7 +126,8 @@ static double blur(const double a[3], const double b[3])
     return 8.0 * 0x1p-53 * sqrt(fmax(dot(a, a), dot(b, b))) * edge_length(a, b);
 }
 
-/* A ray within the plane, as far as double precision can tell, does not meet the triangle; what stands on its edges it does. */
+/* A ray within the plane, as far as double precision can tell, does not meet the triangle; what stands on its edges it
+ * does. */
 static int is_edge_on(double v[3][3], const double side[3])
 {
     return fabs(side[0] + side[1] + side[2]) <= blur(v[0], v[1]) + blur(v[1], v[2]) + blur(v[2], v[0]);
@@ -189,7 +190,8 @@ static void try_around(struct search *s, double range_m, double radius_m)
     rtcPointQuery(ray->bvh->rtc, &query, &context, visit, s);
 }
 
-/* How far from the proposed point along the ray an edge's neighbours may be met: the width, stretched by the incidence. */
+/* How far from the proposed point along the ray an edge's neighbours may be met: the width, stretched by the incidence.
+ */
 static double search_radius(const struct decide_ray *ray, uint32_t prim, double range_m)
 {
     const struct bvh_triangle *tri = &ray->bvh->triangle[prim];
@@ -199,7 +201,8 @@ static double search_radius(const struct decide_ray *ray, uint32_t prim, double 
     return fmin(radius, 0.01 * range_m + 4.0 * width_m);
 }
 
-/* Rivals whose planes the ray meets within what float can't order are tried; the others lie clearly before or behind. */
+/* Rivals whose planes the ray meets within what float can't order are tried; the others lie clearly before or behind.
+ */
 static void try_rivals(struct search *s, uint32_t prim, double range_m)
 {
     const struct decide_ray *ray = s->ray;
@@ -222,8 +225,11 @@ static void try_rivals(struct search *s, uint32_t prim, double range_m)
 void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct cast_counters *counters,
                 struct decide_hit *hit)
 {
-    struct search s = {.ray = ray, .range_m = INFINITY, .prim = RTC_INVALID_GEOMETRY_ID,
-                       .near_prim = RTC_INVALID_GEOMETRY_ID, .near_gap = INFINITY};
+    struct search s = {.ray = ray,
+                       .range_m = INFINITY,
+                       .prim = RTC_INVALID_GEOMETRY_ID,
+                       .near_prim = RTC_INVALID_GEOMETRY_ID,
+                       .near_gap = INFINITY};
     counters->near_border++;
     for (int round = 0; round < DECIDE_MAX_ROUNDS && prim != RTC_INVALID_GEOMETRY_ID; round++) {
         try_triangle(&s, prim);

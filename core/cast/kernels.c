@@ -19,8 +19,8 @@ void kernel_angles(const struct schedule_run *run, uint32_t first, uint32_t n, d
 }
 
 VEC_CLONES
-void kernel_directions(const double *restrict mirror_turn, const double *restrict pan_turn, const double m[9], uint32_t n,
-                       double *restrict dx, double *restrict dy, double *restrict dz)
+void kernel_directions(const double *restrict mirror_turn, const double *restrict pan_turn, const double m[9],
+                       uint32_t n, double *restrict dx, double *restrict dy, double *restrict dz)
 {
     const double m0 = m[0], m1 = m[1], m2 = m[2], m3 = m[3], m4 = m[4], m5 = m[5], m6 = m[6], m7 = m[7], m8 = m[8];
     for (uint32_t i = 0; i < n; i++) {
@@ -34,8 +34,8 @@ void kernel_directions(const double *restrict mirror_turn, const double *restric
     }
 }
 
-/* An encoder is off by at most half a count, d: sin(a + d) = sin a + d cos a - d^2/2 sin a leaves d^3/6, below 1e-12 for
- * 2^12 counts per turn and more. */
+/* An encoder is off by at most half a count, d: sin(a + d) = sin a + d cos a - d^2/2 sin a leaves d^3/6, below 1e-12
+ * for 2^12 counts per turn and more. */
 VEC_CLONES
 static void directions_read(const double *restrict mirror_turn, const double *restrict pan_turn, double mirror_counts,
                             double pan_counts, double use, const double m[9], const double q[9], uint32_t n,
@@ -66,12 +66,12 @@ static void directions_read(const double *restrict mirror_turn, const double *re
 }
 
 void kernel_directions_read(const struct cast_setup *setup, const double *mirror_turn, const double *pan_turn,
-                            const double to_crs[9], uint32_t n, double *dx, double *dy, double *dz, double *ex, double *ey,
-                            double *ez)
+                            const double to_crs[9], uint32_t n, double *dx, double *dy, double *dz, double *ex,
+                            double *ey, double *ez)
 {
     int ideal = setup->mirror_counts >= 4294967296.0 && setup->pan_counts >= 4294967296.0;
-    directions_read(mirror_turn, pan_turn, setup->mirror_counts, setup->pan_counts, ideal ? 0.0 : 1.0, setup->rotation, to_crs,
-                    n, dx, dy, dz, ex, ey, ez);
+    directions_read(mirror_turn, pan_turn, setup->mirror_counts, setup->pan_counts, ideal ? 0.0 : 1.0, setup->rotation,
+                    to_crs, n, dx, dy, dz, ex, ey, ez);
 }
 
 VEC_CLONES
@@ -120,8 +120,8 @@ static uint32_t refine(const double *restrict tri, uint32_t n_triangles, const u
 
 uint32_t kernel_refine(const struct bvh *bvh, const struct kernel_hits *hits, const double o[3], uint32_t n)
 {
-    return refine((const double *)bvh->triangle, bvh->scene->n_triangles, hits->prim, hits->dx, hits->dy, hits->dz, hits->u,
-                  hits->v, o, n, hits->range_m, hits->label, hits->doubt);
+    return refine((const double *)bvh->triangle, bvh->scene->n_triangles, hits->prim, hits->dx, hits->dy, hits->dz,
+                  hits->u, hits->v, o, n, hits->range_m, hits->label, hits->doubt);
 }
 
 VEC_CLONES
@@ -139,8 +139,8 @@ int kernel_meets_sphere(const double *restrict dx, const double *restrict dy, co
 }
 
 VEC_CLONES
-void kernel_turn_back(const double *restrict dx, const double *restrict dy, const double *restrict dz, const double m[9],
-                      uint32_t n, double *restrict ex, double *restrict ey, double *restrict ez)
+void kernel_turn_back(const double *restrict dx, const double *restrict dy, const double *restrict dz,
+                      const double m[9], uint32_t n, double *restrict ex, double *restrict ey, double *restrict ez)
 {
     const double m0 = m[0], m1 = m[1], m2 = m[2], m3 = m[3], m4 = m[4], m5 = m[5], m6 = m[6], m7 = m[7], m8 = m[8];
     for (uint32_t i = 0; i < n; i++) {
@@ -211,10 +211,11 @@ static void polar(const double *restrict range_m, const double *restrict mirror_
         c[i] = count_of(pan_turn[i], pan_counts);
 }
 
-void kernel_polar(const struct cast_setup *setup, const double *range_m, const double *mirror_turn, const double *pan_turn,
-                  uint32_t n, uint32_t *a, uint32_t *b, uint32_t *c)
+void kernel_polar(const struct cast_setup *setup, const double *range_m, const double *mirror_turn,
+                  const double *pan_turn, uint32_t n, uint32_t *a, uint32_t *b, uint32_t *c)
 {
-    polar(range_m, mirror_turn, pan_turn, 1.0 / setup->range_scale_m, setup->mirror_counts, setup->pan_counts, n, a, b, c);
+    polar(range_m, mirror_turn, pan_turn, 1.0 / setup->range_scale_m, setup->mirror_counts, setup->pan_counts, n, a, b,
+          c);
 }
 
 VEC_CLONES
@@ -237,7 +238,8 @@ void kernel_geo(const double *x, const double *y, const double *z, double scale_
 }
 
 VEC_CLONES
-void kernel_scale(const double *restrict range_m, uint32_t n, double *restrict x, double *restrict y, double *restrict z)
+void kernel_scale(const double *restrict range_m, uint32_t n, double *restrict x, double *restrict y,
+                  double *restrict z)
 {
     for (uint32_t i = 0; i < n; i++) {
         x[i] *= range_m[i];

@@ -8,12 +8,12 @@
 void kernel_angles(const struct schedule_run *run, uint32_t first, uint32_t n, double *mirror_turn, double *pan_turn);
 
 /* Directions in prcs: rotation times (sin p cos m, cos p cos m, sin m). */
-void kernel_directions(const double *mirror_turn, const double *pan_turn, const double rotation[9], uint32_t n, double *dx,
-                       double *dy, double *dz);
+void kernel_directions(const double *mirror_turn, const double *pan_turn, const double rotation[9], uint32_t n,
+                       double *dx, double *dy, double *dz);
 /* The same, and beside it e: the directions as the encoders read them (whole counts), turned by to_crs instead. */
 void kernel_directions_read(const struct cast_setup *setup, const double *mirror_turn, const double *pan_turn,
-                            const double to_crs[9], uint32_t n, double *dx, double *dy, double *dz, double *ex, double *ey,
-                            double *ez);
+                            const double to_crs[9], uint32_t n, double *dx, double *dy, double *dz, double *ex,
+                            double *ey, double *ez);
 void kernel_to_float(const double *dx, const double *dy, const double *dz, uint32_t n, float *fx, float *fy, float *fz);
 
 /* What Embree proposed, and what double precision makes of it. */
@@ -21,18 +21,19 @@ struct kernel_hits {
     const double *dx, *dy, *dz;
     const uint32_t *prim;
     const float *u, *v;
-    double *range_m;  /* out: (d - n.o) / (n.dir) of the proposed triangle's plane; NaN for none */
-    uint32_t *label;  /* out: of the proposed triangle; LINE_LABEL_NONE for none */
-    uint32_t *doubt;  /* out: 1 where the hit is so near to the border, across the ray, that the proposal is in doubt */
+    double *range_m; /* out: (d - n.o) / (n.dir) of the proposed triangle's plane; NaN for none */
+    uint32_t *label; /* out: of the proposed triangle; LINE_LABEL_NONE for none */
+    uint32_t *doubt; /* out: 1 where the hit is so near to the border, across the ray, that the proposal is in doubt */
 };
 /* Returns how many are in doubt. */
 uint32_t kernel_refine(const struct bvh *bvh, const struct kernel_hits *hits, const double o[3], uint32_t n);
 
 /* True when one of the rays may meet the sphere at v (from the rays' origin). */
-int kernel_meets_sphere(const double *dx, const double *dy, const double *dz, uint32_t n, const double v[3], double radius_m);
+int kernel_meets_sphere(const double *dx, const double *dy, const double *dz, uint32_t n, const double v[3],
+                        double radius_m);
 /* Directions turned by the inverse of a rotation. */
-void kernel_turn_back(const double *dx, const double *dy, const double *dz, const double rotation[9], uint32_t n, double *ex,
-                      double *ey, double *ez);
+void kernel_turn_back(const double *dx, const double *dy, const double *dz, const double rotation[9], uint32_t n,
+                      double *ex, double *ey, double *ez);
 
 /* Gaussian range noise on n ranges; NaN stays NaN. */
 void kernel_noise(const struct cast_setup *setup, uint64_t pulse0, uint32_t n, double *range_m);
@@ -44,8 +45,8 @@ uint32_t kernel_detect(double *range_m, double min_m, double max_m, uint32_t n, 
 void kernel_labels(const uint32_t *label, const uint8_t *echo, uint32_t n, uint16_t *out);
 
 /* Wire numbers. a: range in counts, 0 for none; b, c: encoder counts modulo a turn. */
-void kernel_polar(const struct cast_setup *setup, const double *range_m, const double *mirror_turn, const double *pan_turn,
-                  uint32_t n, uint32_t *a, uint32_t *b, uint32_t *c);
+void kernel_polar(const struct cast_setup *setup, const double *range_m, const double *mirror_turn,
+                  const double *pan_turn, uint32_t n, uint32_t *a, uint32_t *b, uint32_t *c);
 /* Coordinates in counts of scale_m, LINE_XYZ_NONE for NaN. */
 void kernel_geo(const double *x, const double *y, const double *z, double scale_m, uint32_t n, uint32_t *a, uint32_t *b,
                 uint32_t *c);

@@ -1,10 +1,11 @@
-/* Rivals: triangles that lie so near behind each other somewhere that float can't tell which comes first: faces that overlap
- * in one plane, a pole through a floor, a thin sheet. Their pairs are found once; a hit on one of them compares the planes.
+/* Rivals: triangles that lie so near behind each other somewhere that float can't tell which comes first: faces that
+ * overlap in one plane, a pole through a floor, a thin sheet. Their pairs are found once; a hit on one of them compares
+ * the planes.
  *
- * Embree's collision of the scene with itself gives pairs whose boxes meet; of those stay the pairs that no axis separates by
- * more than what float may blur there (separating axes of two triangles: normals, edges crossed, edges in their planes).
- * Neighbours that share a corner are rivals only where they overlap in one plane: at their common border the border test
- * looks anyway. */
+ * Embree's collision of the scene with itself gives pairs whose boxes meet; of those stay the pairs that no axis
+ * separates by more than what float may blur there (separating axes of two triangles: normals, edges crossed, edges in
+ * their planes). Neighbours that share a corner are rivals only where they overlap in one plane: at their common border
+ * the border test looks anyway. */
 #include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
@@ -174,7 +175,8 @@ static int make_lists(struct bvh *bvh, struct pairs *p, struct sh_err *err)
     qsort(p->pair, p->n, sizeof *p->pair, order_pairs);
     bvh->rival_first = calloc((size_t)n + 1, sizeof *bvh->rival_first);
     bvh->rival = malloc(p->n * sizeof *bvh->rival);
-    if (bvh->rival_first == NULL || bvh->rival == NULL) return sh_fail(err, SH_ENOMEM, "cast: no memory for %zu rivals", p->n);
+    if (bvh->rival_first == NULL || bvh->rival == NULL)
+        return sh_fail(err, SH_ENOMEM, "cast: no memory for %zu rivals", p->n);
     uint32_t kept = 0;
     for (size_t k = 0; k < p->n; k++) {
         if (k > 0 && order_pairs(p->pair[k - 1], p->pair[k]) == 0) continue;

@@ -40,9 +40,10 @@ static double across(const double e[3], const double a[3], double out[3])
     return sqrt(dot(out, out));
 }
 
-/* Moves corner i outward so that, seen from the origin, both its edges move by `width`: across the line of sight along the
- * sum of the edges as they are seen there, width / sin(angle), and then along the line of sight back into the triangle's plane,
- * so that the plane stays what it is. Sharp corners and grazed planes end at BVH_MAX_MITER and BVH_MAX_SLIDE widths. */
+/* Moves corner i outward so that, seen from the origin, both its edges move by `width`: across the line of sight along
+ * the sum of the edges as they are seen there, width / sin(angle), and then along the line of sight back into the
+ * triangle's plane, so that the plane stays what it is. Sharp corners and grazed planes end at BVH_MAX_MITER and
+ * BVH_MAX_SLIDE widths. */
 static void widen_corner(double v[3][3], const double unit_n[3], int i, double width, double out[3])
 {
     double sight[3], e1[3], e2[3], f1[3], f2[3], c[3], move[3];
@@ -110,8 +111,8 @@ static void set_offset(struct bvh_triangle *tri, double v[3][3])
 }
 
 /* Plane, guard and label. Seen from the origin, the distance from a ray to edge i of the widened triangle is at least
- * bary_i * area' * cos / longest', bary_i as Embree gives them. It has to exceed what the edge was moved by and once more the
- * rounding: then the ray is inside of the real triangle, whatever is rounded. */
+ * bary_i * area' * cos / longest', bary_i as Embree gives them. It has to exceed what the edge was moved by and once
+ * more the rounding: then the ray is inside of the real triangle, whatever is rounded. */
 static uint32_t guard_code(double guard)
 {
     const int64_t most = (1 << BVH_SPARE_BITS) - 1;
@@ -167,8 +168,10 @@ int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err)
     const struct scene *scene = bvh->scene;
     size_t n = scene->n_triangles;
     bvh->triangle = huge_alloc((n + 1) * sizeof *bvh->triangle);
-    float *vertex = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), 3 * n);
-    uint32_t *index = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t), n);
+    float *vertex =
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), 3 * n);
+    uint32_t *index =
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t), n);
     if (bvh->triangle == NULL || vertex == NULL || index == NULL)
         return sh_fail(err, SH_ENOMEM, "cast: no memory for %zu triangles", n);
     for (uint32_t i = 0; i < n; i++)
@@ -176,6 +179,7 @@ int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err)
     for (uint32_t i = 0; i < 3 * n; i++)
         index[i] = i;
     bvh->triangle[n] = (struct bvh_triangle){
-        .n = {NAN, with_spare(NAN, LINE_LABEL_NONE & 0xfff), with_spare(NAN, LINE_LABEL_NONE >> BVH_SPARE_BITS)}, .d = NAN};
+        .n = {NAN, with_spare(NAN, LINE_LABEL_NONE & 0xfff), with_spare(NAN, LINE_LABEL_NONE >> BVH_SPARE_BITS)},
+        .d = NAN};
     return bvh_drop_twins(bvh, vertex, err);
 }

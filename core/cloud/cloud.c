@@ -53,8 +53,7 @@ static int reserve(struct reading *g, const struct ply_element *e, struct sh_err
     return SH_OK;
 }
 
-static int whole(struct reading *g, enum ply_use use, const char *name, int min, int max, int *out,
-                 struct sh_err *err)
+static int whole(struct reading *g, enum ply_use use, const char *name, int min, int max, int *out, struct sh_err *err)
 {
     double v = g->r.scalar[use];
     if (v >= min && v <= max && v == floor(v)) {
@@ -74,9 +73,8 @@ static int keep_point(struct reading *g, struct sh_err *err)
     int n_nan = isnan(p[0]) + isnan(p[1]) + isnan(p[2]);
     if (n_nan != 3 && !(isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]))) {
         char what[112];
-        snprintf(what, sizeof what,
-                 "(%.9g %.9g %.9g) is no position; a shot without echo has three times nan", p[0], p[1],
-                 p[2]);
+        snprintf(what, sizeof what, "(%.9g %.9g %.9g) is no position; a shot without echo has three times nan", p[0],
+                 p[1], p[2]);
         return ply_rows_fail(&g->r, err, what);
     }
     int rc = SH_OK, station = 0, label = 0, echo = 0;
@@ -107,8 +105,7 @@ static void warn_if_coarse(const struct reading *g, const struct ply_element *e)
         for (int k = 0; k < 3; k++)
             largest = fmax(largest, fabs(g->cloud->xyz_m[i][k]));
     if (largest * 6e-8 > worth_a_word_m)
-        sh_warn(g->report, "%s: stored in single precision, so good to %.2g m only", g->r.t.path,
-                largest * 6e-8);
+        sh_warn(g->report, "%s: stored in single precision, so good to %.2g m only", g->r.t.path, largest * 6e-8);
 }
 
 static int read_element(struct reading *g, int i, struct sh_err *err)
@@ -142,8 +139,7 @@ static int read_body(struct reading *g, struct sh_err *err)
         if (rc != SH_OK) return rc;
     }
     size_t left_over = ply_rows_left_over(&g->r);
-    if (left_over > 0)
-        sh_warn(g->report, "%s: %zu bytes after the last element passed over", g->r.t.path, left_over);
+    if (left_over > 0) sh_warn(g->report, "%s: %zu bytes after the last element passed over", g->r.t.path, left_over);
     return SH_OK;
 }
 

@@ -38,10 +38,9 @@ static int check_stations(const struct cloud *cloud, const struct cloud_site *si
         const struct georef *georef = georef_of(cloud, site, i);
         int epsg = georef != NULL ? georef_epsg(georef) : 0;
         if (cloud->epsg != CLOUD_EPSG_UNKNOWN && cloud->epsg != epsg)
-            return sh_fail(
-                err, SH_EINPUT,
-                "the points are in EPSG %lld, those of station %u have to be in EPSG %d (0: scene frame)",
-                (long long)cloud->epsg, station, epsg);
+            return sh_fail(err, SH_EINPUT,
+                           "the points are in EPSG %lld, those of station %u have to be in EPSG %d (0: scene frame)",
+                           (long long)cloud->epsg, station, epsg);
     }
     return SH_OK;
 }

@@ -2,8 +2,7 @@
 
 #include "core/cloud.h"
 
-uint16_t cloud_surface(const struct cloud *cloud, const struct scene *scene, const uint32_t *triangle,
-                       size_t i)
+uint16_t cloud_surface(const struct cloud *cloud, const struct scene *scene, const uint32_t *triangle, size_t i)
 {
     if (cloud->label != NULL) return cloud->label[i];
     return triangle[i] != CLOUD_TRIANGLE_NONE ? scene->label[triangle[i]] : CLOUD_LABEL_NONE;
@@ -21,8 +20,8 @@ int cloud_cover(const struct cloud *cloud, const struct scene *scene, const uint
     for (size_t i = 0; i < cloud->n && rc == SH_OK; i++) {
         uint16_t label = cloud_surface(cloud, scene, triangle, i);
         if (label != CLOUD_LABEL_NONE && label >= scene->n_surfaces) {
-            rc = sh_fail(err, SH_EINPUT, "point %zu has label %u; the scene has %u surfaces, from 0", i + 1,
-                         label, scene->n_surfaces);
+            rc = sh_fail(err, SH_EINPUT, "point %zu has label %u; the scene has %u surfaces, from 0", i + 1, label,
+                         scene->n_surfaces);
         } else if (label != CLOUD_LABEL_NONE && !surface_hit[label]) {
             surface_hit[label] = 1;
             out->surfaces_hit++;

@@ -20,8 +20,7 @@ static double value_of_rank(const double *v, size_t n, size_t rank)
         size_t count[256] = {0};
         for (size_t i = 0; i < n; i++) {
             uint64_t bits = bits_of(v[i]);
-            if (isfinite(v[i]) && (shift == 56 || bits >> (shift + 8) == prefix))
-                count[bits >> shift & 0xff]++;
+            if (isfinite(v[i]) && (shift == 56 || bits >> (shift + 8) == prefix)) count[bits >> shift & 0xff]++;
         }
         uint64_t digit = 0;
         while (rank > count[digit])

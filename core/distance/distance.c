@@ -61,8 +61,7 @@ static void nearest_on_edge(const double a[3], const double b[3], const double a
         else if (along_b <= 0)
             out[k] = b[k];
         else
-            out[k] =
-                along_a < along_b ? a[k] + ab[k] * (along_a / length2) : b[k] - ab[k] * (along_b / length2);
+            out[k] = along_a < along_b ? a[k] + ab[k] * (along_a / length2) : b[k] - ab[k] * (along_b / length2);
     }
 }
 
@@ -145,8 +144,7 @@ static double farthest_from(const double centre[3], const double p[3])
     return g;
 }
 
-int distance_query(const struct distance *index, const double p_prcs[3], double max_m,
-                   struct distance_hit *hit)
+int distance_query(const struct distance *index, const double p_prcs[3], double max_m, struct distance_hit *hit)
 {
     if (!isfinite(p_prcs[0]) || !isfinite(p_prcs[1]) || !isfinite(p_prcs[2]) || !(max_m >= 0)) return 0;
     double reach = farthest_from(index->centre_m, p_prcs);
@@ -199,8 +197,8 @@ static int build_bvh(struct distance *d, struct sh_err *err)
     if (d->device == NULL) return sh_fail(err, SH_EIO, "Embree found no device it can use");
     d->bvh = rtcNewScene(d->device);
     RTCGeometry mesh = rtcNewGeometry(d->device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    float(*vertex)[3] = rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                                sizeof *vertex, d->scene->n_vertices);
+    float(*vertex)[3] = rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof *vertex,
+                                                d->scene->n_vertices);
     rtcSetSharedGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, d->scene->triangle, 0,
                                sizeof *d->scene->triangle, d->scene->n_triangles);
     if (vertex != NULL) {

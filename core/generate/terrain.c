@@ -34,8 +34,8 @@ static double height(double x, double y, double side_m, double rough_m, uint64_t
 }
 
 /* A sheet of cells x cells quads; the border is flat, so that walls can stand on it. */
-static void add_sheet(struct builder *b, uint32_t cells, double side_m, double rough_m, double lift_m, const double c[2],
-                      uint64_t key)
+static void add_sheet(struct builder *b, uint32_t cells, double side_m, double rough_m, double lift_m,
+                      const double c[2], uint64_t key)
 {
     uint32_t row = cells + 1, base = b->n_vertices;
     for (uint32_t j = 0; j <= cells; j++)
@@ -89,7 +89,7 @@ int generate_terrain(uint32_t n_triangles, double side_m, double rough_m, const 
         add_sheet(&b, cells, side_m, rough_m, 0.0, centre_m, key);
         add_sheet(&b, cells, side_m, rough_m, 0.3 * side_m, centre_m, key);
         add_walls(&b, cells);
-        rc = scene_from_arrays((const double (*)[3])b.vertex, b.n_vertices, (const uint32_t (*)[3])b.triangle,
+        rc = scene_from_arrays((const double(*)[3])b.vertex, b.n_vertices, (const uint32_t(*)[3])b.triangle,
                                b.n_triangles, NULL, NULL, 0, out, err);
     }
     free(b.vertex);

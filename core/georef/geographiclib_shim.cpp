@@ -66,8 +66,7 @@ void shim_ecef(double lat_deg, double lon_deg, double height_m, double p_ecef[3]
     }
 }
 
-struct shim_grid *shim_grid_create(double lat_deg, double lon_deg, double height_m, int zone, char *why,
-                                   size_t len)
+struct shim_grid *shim_grid_create(double lat_deg, double lon_deg, double height_m, int zone, char *why, size_t len)
 {
     struct shim_grid *grid = nullptr;
     try {
@@ -109,8 +108,8 @@ int shim_grid_epsg(const struct shim_grid *grid)
     }
 }
 
-void shim_grid_forward(const struct shim_grid *grid, size_t n, const double *dx, const double *dy,
-                       const double *dz, double *out_x, double *out_y, double *out_z)
+void shim_grid_forward(const struct shim_grid *grid, size_t n, const double *dx, const double *dy, const double *dz,
+                       double *out_x, double *out_y, double *out_z)
 {
     for (size_t i = 0; i < n; i++) {
         double x = nan_m, y = nan_m, z = nan_m;

@@ -17,8 +17,7 @@ struct shim_grid;
 
 /* zone: 1..60, or 0 for the standard zone, which beyond 84 N and 80 S is UPS. NULL on failure, with the
  * reason. */
-struct shim_grid *shim_grid_create(double lat_deg, double lon_deg, double height_m, int zone, char *why,
-                                   size_t len);
+struct shim_grid *shim_grid_create(double lat_deg, double lon_deg, double height_m, int zone, char *why, size_t len);
 void shim_grid_free(struct shim_grid *grid);
 
 /* Easting and northing with false origin, ellipsoidal height; EPSG code. */
@@ -26,8 +25,8 @@ void shim_grid_anchor(const struct shim_grid *grid, double anchor[3]);
 int shim_grid_epsg(const struct shim_grid *grid);
 
 /* east, north, up in metres <-> differences from the anchor. In place is allowed. */
-void shim_grid_forward(const struct shim_grid *grid, size_t n, const double *dx, const double *dy,
-                       const double *dz, double *out_x, double *out_y, double *out_z);
+void shim_grid_forward(const struct shim_grid *grid, size_t n, const double *dx, const double *dy, const double *dz,
+                       double *out_x, double *out_y, double *out_z);
 void shim_grid_reverse(const struct shim_grid *grid, const double d_grid[3], double d_local[3]);
 
 #ifdef __cplusplus

@@ -19,8 +19,7 @@ struct georef {
     int epsg;
 };
 
-static int check_range(const char *what, double value, double min, double max, const char *unit,
-                       struct sh_err *err)
+static int check_range(const char *what, double value, double min, double max, const char *unit, struct sh_err *err)
 {
     if (value >= min && value <= max) return SH_OK; /* false for not-a-number */
     return sh_fail(err, SH_EINPUT, "georef: %s %g %s; allowed %g to %g", what, value, unit, min, max);
@@ -30,23 +29,20 @@ static int check_spec(const struct georef_spec *spec, struct sh_err *err)
 {
     for (int i = 0; i < 3; i++)
         if (!isfinite(spec->station_m[i]))
-            return sh_fail(err, SH_EINPUT, "georef: station position %c is not a finite number of metres",
-                           "xyz"[i]);
+            return sh_fail(err, SH_EINPUT, "georef: station position %c is not a finite number of metres", "xyz"[i]);
     if (spec->crs == GEOREF_LOCAL) return SH_OK;
     int rc = check_range("latitude", spec->lat_deg, -90, 90, "deg", err);
     if (rc == SH_OK) rc = check_range("longitude", spec->lon_deg, -180, 360, "deg", err);
     if (rc == SH_OK) rc = check_range("height", spec->height_m, HEIGHT_MIN_M, HEIGHT_MAX_M, "m", err);
     if (rc == SH_OK && spec->crs == GEOREF_UTM && (spec->utm_zone < 0 || spec->utm_zone > 60))
-        rc = sh_fail(err, SH_EINPUT, "georef: UTM zone %d; allowed 1 to 60, or 0: by position",
-                     spec->utm_zone);
+        rc = sh_fail(err, SH_EINPUT, "georef: UTM zone %d; allowed 1 to 60, or 0: by position", spec->utm_zone);
     return rc;
 }
 
 static int set_up_utm(struct georef *georef, const struct georef_spec *spec, struct sh_err *err)
 {
     char why[256] = "";
-    georef->grid =
-        shim_grid_create(spec->lat_deg, spec->lon_deg, spec->height_m, spec->utm_zone, why, sizeof why);
+    georef->grid = shim_grid_create(spec->lat_deg, spec->lon_deg, spec->height_m, spec->utm_zone, why, sizeof why);
     if (georef->grid == NULL)
         return sh_fail(err, SH_EINPUT,
                        "georef: UTM zone %d does not reach latitude %g, longitude %g (%s); 0: by position",
@@ -76,8 +72,8 @@ int georef_create(const struct georef_spec *spec, struct georef **out, struct sh
         rc = set_up_utm(georef, spec, err);
         break;
     default:
-        rc = sh_fail(err, SH_EINPUT, "georef: coordinate reference system %d; allowed local, ecef, utm",
-                     (int)spec->crs);
+        rc =
+            sh_fail(err, SH_EINPUT, "georef: coordinate reference system %d; allowed local, ecef, utm", (int)spec->crs);
     }
     if (rc != SH_OK) {
         georef_free(georef);
@@ -112,8 +108,8 @@ int georef_rotation(const struct georef *georef, double rotation[9])
     return 1;
 }
 
-static void rotate(const double r[9], size_t n, const double *dx, const double *dy, const double *dz,
-                   double *out_x, double *out_y, double *out_z)
+static void rotate(const double r[9], size_t n, const double *dx, const double *dy, const double *dz, double *out_x,
+                   double *out_y, double *out_z)
 {
     for (size_t i = 0; i < n; i++) {
         const double x = dx[i], y = dy[i], z = dz[i];
@@ -123,8 +119,8 @@ static void rotate(const double r[9], size_t n, const double *dx, const double *
     }
 }
 
-void georef_forward(const struct georef *georef, size_t n, const double *dx, const double *dy,
-                    const double *dz, double *out_x, double *out_y, double *out_z)
+void georef_forward(const struct georef *georef, size_t n, const double *dx, const double *dy, const double *dz,
+                    double *out_x, double *out_y, double *out_z)
 {
     switch (georef->crs) {
     case GEOREF_LOCAL:

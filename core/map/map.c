@@ -14,19 +14,18 @@ enum { MARGIN_PX = 24, CAPTION_PX = 72 };
 static int check_area(const struct map_spec *spec, struct sh_err *err)
 {
     for (int i = 0; i < 2; i++) {
-        if (!isfinite(spec->min_m[i]) || !isfinite(spec->max_m[i]) ||
-            !isfinite(spec->max_m[i] - spec->min_m[i]))
+        if (!isfinite(spec->min_m[i]) || !isfinite(spec->max_m[i]) || !isfinite(spec->max_m[i] - spec->min_m[i]))
             return sh_fail(err, SH_EINPUT, "map: the limits in %c are not finite numbers of metres", "xy"[i]);
         if (spec->max_m[i] < spec->min_m[i])
-            return sh_fail(err, SH_EINPUT, "map: %c from %g m to %g m; the second must not be smaller",
-                           "xy"[i], spec -> min_m[i], spec -> max_m[i]);
+            return sh_fail(err, SH_EINPUT, "map: %c from %g m to %g m; the second must not be smaller", "xy"[i],
+                           spec -> min_m[i], spec -> max_m[i]);
     }
     if (!(spec->pixel_m >= 0) || !isfinite(spec->pixel_m))
         return sh_fail(err, SH_EINPUT, "map: pixel size %g m; allowed are sizes above 0, or 0: by the area",
                        spec->pixel_m);
     if (spec->max_m[0] <= spec->min_m[0] && spec->max_m[1] <= spec->min_m[1])
-        return sh_fail(err, SH_EINPUT, "map: the area is a point (x %g m, y %g m); it needs an extent",
-                       spec->min_m[0], spec->min_m[1]);
+        return sh_fail(err, SH_EINPUT, "map: the area is a point (x %g m, y %g m); it needs an extent", spec->min_m[0],
+                       spec->min_m[1]);
     return SH_OK;
 }
 
@@ -45,11 +44,9 @@ int map_create(const struct map_spec *spec, struct map **out, struct sh_err *err
     const double pixel_m = spec->pixel_m > 0 ? spec->pixel_m : fmax(w_m, h_m) / MAP_DEFAULT_PX;
     const double width = side_px(spec, 0, pixel_m), height = side_px(spec, 1, pixel_m);
     if (!(width <= MAP_MAX_SIDE_PX) || !(height <= MAP_MAX_SIDE_PX) || !(width * height <= MAP_MAX_PIXELS)) {
-        const double least_m =
-            fmax(fmax(w_m, h_m) / (MAP_MAX_SIDE_PX - 1), sqrt(w_m * h_m / (0.99 * MAP_MAX_PIXELS)));
-        return sh_fail(err, SH_EINPUT,
-                       "map: %g x %g m at %g m per pixel are %.0f x %.0f pixels; use %.2g m or more", w_m,
-                       h_m, pixel_m, width, height, least_m * 1.05);
+        const double least_m = fmax(fmax(w_m, h_m) / (MAP_MAX_SIDE_PX - 1), sqrt(w_m * h_m / (0.99 * MAP_MAX_PIXELS)));
+        return sh_fail(err, SH_EINPUT, "map: %g x %g m at %g m per pixel are %.0f x %.0f pixels; use %.2g m or more",
+                       w_m, h_m, pixel_m, width, height, least_m * 1.05);
     }
     struct map *map = calloc(1, sizeof *map);
     if (map == NULL) return sh_fail(err, SH_ENOMEM, "map: no memory");
@@ -78,8 +75,7 @@ void map_free(struct map *map)
 /* Column and row counted from min_m; false also for what is not a number. */
 static int locate(const struct map *map, double x_m, double y_m, uint32_t *column, uint32_t *row)
 {
-    if (!(x_m >= map->min_m[0] && x_m <= map->max_m[0] && y_m >= map->min_m[1] && y_m <= map->max_m[1]))
-        return 0;
+    if (!(x_m >= map->min_m[0] && x_m <= map->max_m[0] && y_m >= map->min_m[1] && y_m <= map->max_m[1])) return 0;
     const double c = (x_m - map->min_m[0]) / map->pixel_m, r = (y_m - map->min_m[1]) / map->pixel_m;
     *column = c < map->width ? (uint32_t)c : map->width - 1;
     *row = r < map->height ? (uint32_t)r : map->height - 1;
@@ -114,8 +110,8 @@ int map_add_station(struct map *map, double x_m, double y_m, struct sh_err *err)
     if (map->n_stations == MAP_MAX_STATIONS)
         return sh_fail(err, SH_EINPUT, "map: more than %d stations", (int)MAP_MAX_STATIONS);
     if (!locate(map, x_m, y_m, &column, &row))
-        return sh_fail(err, SH_EINPUT, "map: station at x %g m, y %g m; allowed x %g to %g, y %g to %g", x_m,
-                       y_m, map->min_m[0], map->max_m[0], map->min_m[1], map->max_m[1]);
+        return sh_fail(err, SH_EINPUT, "map: station at x %g m, y %g m; allowed x %g to %g, y %g to %g", x_m, y_m,
+                       map->min_m[0], map->max_m[0], map->min_m[1], map->max_m[1]);
     map->station_m[map->n_stations][0] = x_m;
     map->station_m[map->n_stations][1] = y_m;
     map->n_stations++;

@@ -33,12 +33,10 @@ static struct height_range find_heights(const struct map *map)
         high_m = fmax(high_m, (double)map->pixel[i].low_m);
         used++;
     }
-    if (used == 0 || high_m <= low_m)
-        return (struct height_range){used > 0 ? low_m : 0, used > 0 ? low_m : 0};
+    if (used == 0 || high_m <= low_m) return (struct height_range){used > 0 ? low_m : 0, used > 0 ? low_m : 0};
     const double bin_m = (high_m - low_m) / HISTOGRAM_BINS;
     for (size_t i = 0; i < n; i++)
-        if (map->pixel[i].hit)
-            count[(int)fmin(HISTOGRAM_BINS - 1, ((double)map->pixel[i].low_m - low_m) / bin_m)]++;
+        if (map->pixel[i].hit) count[(int)fmin(HISTOGRAM_BINS - 1, ((double)map->pixel[i].low_m - low_m) / bin_m)]++;
     uint64_t below = 0, above = 0;
     int first = 0, last = HISTOGRAM_BINS - 1;
     while ((below += count[first]) * 200 < used)
@@ -89,11 +87,9 @@ static void draw_pixels(const struct map *map, struct height_range range, const 
     }
 }
 
-static void draw_triangle_about(struct map_image *image, double x, double y, double size,
-                                const uint8_t rgb[3])
+static void draw_triangle_about(struct map_image *image, double x, double y, double size, const uint8_t rgb[3])
 {
-    const double corner[3][2] = {
-        {x, y - size}, {x + 0.87 * size, y + 0.5 * size}, {x - 0.87 * size, y + 0.5 * size}};
+    const double corner[3][2] = {{x, y - size}, {x + 0.87 * size, y + 0.5 * size}, {x - 0.87 * size, y + 0.5 * size}};
     map_image_triangle(image, corner, rgb);
 }
 
@@ -162,8 +158,7 @@ int map_draw(const struct map *map, struct map_image *out, struct sh_err *err)
     out->width = at.width;
     out->height = at.height;
     out->rgb = malloc(bytes);
-    if (out->rgb == NULL)
-        return sh_fail(err, SH_ENOMEM, "map: no memory for %u x %u pixels", at.width, at.height);
+    if (out->rgb == NULL) return sh_fail(err, SH_ENOMEM, "map: no memory for %u x %u pixels", at.width, at.height);
     memset(out->rgb, 255, bytes);
     const struct height_range range = find_heights(map);
     const long margin = at.left < 24 ? (long)at.left : 24, row = (long)(at.top + at.map_height) + 30;

@@ -20,8 +20,7 @@ static double lab_inverse(double t)
 static void lab_to_srgb(double l, double a, double b, uint8_t rgb[3])
 {
     const double fy = (l + 16) / 116;
-    const double x = 0.95047 * lab_inverse(fy + a / 500), y = lab_inverse(fy),
-                 z = 1.08883 * lab_inverse(fy - b / 200);
+    const double x = 0.95047 * lab_inverse(fy + a / 500), y = lab_inverse(fy), z = 1.08883 * lab_inverse(fy - b / 200);
     const double linear[3] = {3.2404542 * x - 1.5371385 * y - 0.4985314 * z,
                               -0.9692660 * x + 1.8760108 * y + 0.0415560 * z,
                               0.0556434 * x - 0.2040259 * y + 1.0572252 * z};
@@ -47,8 +46,7 @@ void map_image_blend(struct map_image *image, long column, long row, const uint8
         at[i] = (uint8_t)lrint(at[i] + (rgb[i] - at[i]) * coverage);
 }
 
-void map_image_fill(struct map_image *image, long column, long row, long width, long height,
-                    const uint8_t rgb[3])
+void map_image_fill(struct map_image *image, long column, long row, long width, long height, const uint8_t rgb[3])
 {
     for (long r = row; r < row + height; r++)
         for (long c = column; c < column + width; c++)
@@ -68,8 +66,7 @@ static const uint8_t glyph[][7] = {
     {0x10, 0x10, 0x12, 0x14, 0x18, 0x14, 0x12}, {0x11, 0x19, 0x19, 0x15, 0x13, 0x13, 0x11},
 };
 
-long map_image_text(struct map_image *image, long column, long row, long dot, const uint8_t rgb[3],
-                    const char *text)
+long map_image_text(struct map_image *image, long column, long row, long dot, const uint8_t rgb[3], const char *text)
 {
     const long start = column;
     for (; *text != '\0'; text++, column += 6 * dot) {
@@ -107,8 +104,7 @@ void map_image_triangle(struct map_image *image, const double corner[3][2], cons
         for (long column = (long)floor(min_x); column <= (long)max_x; column++) {
             int hits = 0;
             for (int s = 0; s < SUB * SUB; s++)
-                hits += inside(corner, (double)column + (s % SUB + 0.5) / SUB,
-                               (double)row + (s / SUB + 0.5) / SUB);
+                hits += inside(corner, (double)column + (s % SUB + 0.5) / SUB, (double)row + (s / SUB + 0.5) / SUB);
             if (hits > 0) map_image_blend(image, column, row, rgb, (double)hits / (SUB * SUB));
         }
 }

@@ -79,8 +79,7 @@ int map_png_write(const struct map_image *image, const char *path, struct sh_err
     if (fclose(file) != 0 && rc == SH_OK)
         rc = sh_fail(err, SH_EIO, "map %s: cannot be written: %s", path, strerror(errno));
     if (rc == SH_OK && rename(part, path) != 0)
-        rc = sh_fail(err, errno == EISDIR ? SH_EINPUT : SH_EIO, "map %s: cannot be written: %s", path,
-                     strerror(errno));
+        rc = sh_fail(err, errno == EISDIR ? SH_EINPUT : SH_EIO, "map %s: cannot be written: %s", path, strerror(errno));
     if (rc != SH_OK) remove(part);
 out:
     free(part);

@@ -30,8 +30,7 @@ struct import_log {
 struct import {
     struct scene_build *b;
     const struct aiScene *in;
-    const struct aiMatrix4x4
-        *level[MAX_DEPTH]; /* of the node and above it, root first; identities left out */
+    const struct aiMatrix4x4 *level[MAX_DEPTH]; /* of the node and above it, root first; identities left out */
     int n_levels;
     double largest;   /* |coordinate| at any level, file units */
     uint32_t *corner; /* of one face */
@@ -107,8 +106,8 @@ static int add_face(struct import *im, const struct aiFace *face, const struct a
     }
     for (unsigned i = 0; i < face->mNumIndices; i++) {
         if (face->mIndices[i] >= mesh->mNumVertices)
-            return build_fail(b, SH_EINPUT, err, "index %u out of range; there are %u vertices",
-                              face->mIndices[i], mesh->mNumVertices);
+            return build_fail(b, SH_EINPUT, err, "index %u out of range; there are %u vertices", face->mIndices[i],
+                              mesh->mNumVertices);
         im->corner[i] = b->mesh_vertex0 + face->mIndices[i];
     }
     return build_polygon(b, im->corner, face->mNumIndices, label, err);
@@ -125,8 +124,7 @@ static int label_of(struct import *im, const struct aiNode *node, const struct a
                        strnlen(material.data, material.length), label, err);
 }
 
-static int add_mesh(struct import *im, const struct aiNode *node, const struct aiMesh *mesh,
-                    struct sh_err *err)
+static int add_mesh(struct import *im, const struct aiNode *node, const struct aiMesh *mesh, struct sh_err *err)
 {
     uint16_t label;
     im->b->mesh = mesh->mName.length > 0 ? mesh->mName.data : node->mName.data;
@@ -143,8 +141,7 @@ static int add_mesh(struct import *im, const struct aiNode *node, const struct a
 
 static int add_node(struct import *im, const struct aiNode *node, int depth, struct sh_err *err)
 {
-    if (depth == MAX_DEPTH)
-        return build_fail(im->b, SH_EINPUT, err, "nodes are nested deeper than %d", MAX_DEPTH);
+    if (depth == MAX_DEPTH) return build_fail(im->b, SH_EINPUT, err, "nodes are nested deeper than %d", MAX_DEPTH);
     bool moved = !is_identity(&node->mTransformation);
     if (moved) im->level[im->n_levels++] = &node->mTransformation;
     int rc = SH_OK;
@@ -171,11 +168,10 @@ static int check_precision(const struct import *im, struct sh_err *err)
 {
     double off_m = im->largest * im->b->spec->scale * SINGLE_ROUNDING;
     if (off_m <= im->b->tolerance_m) return SH_OK;
-    return build_fail(
-        im->b, SH_EINPUT, err,
-        "coordinates up to %.9g are read in single precision, which may be off by %.2g m; allowed "
-        "are %.2g m: move the mesh near its origin, or convert it to .obj or .ply",
-        im->largest, off_m, im->b->tolerance_m);
+    return build_fail(im->b, SH_EINPUT, err,
+                      "coordinates up to %.9g are read in single precision, which may be off by %.2g m; allowed "
+                      "are %.2g m: move the mesh near its origin, or convert it to .obj or .ply",
+                      im->largest, off_m, im->b->tolerance_m);
 }
 
 /* An IFC file that was cut off reads without an error, with less in it. */
@@ -202,9 +198,8 @@ static const struct aiScene *import_file(struct scene_build *b, struct import_lo
     pthread_mutex_lock(&lock);
     aiAttachLogStream(&stream);
     struct aiPropertyStore *options = aiCreatePropertyStore();
-    aiSetImportPropertyInteger(options, AI_CONFIG_IMPORT_COLLADA_USE_COLLADA_NAMES, 1); /* not the ids */
-    aiSetImportPropertyInteger(options, AI_CONFIG_IMPORT_IFC_SKIP_SPACE_REPRESENTATIONS,
-                               1); /* air is no surface */
+    aiSetImportPropertyInteger(options, AI_CONFIG_IMPORT_COLLADA_USE_COLLADA_NAMES, 1);      /* not the ids */
+    aiSetImportPropertyInteger(options, AI_CONFIG_IMPORT_IFC_SKIP_SPACE_REPRESENTATIONS, 1); /* air is no surface */
     const struct aiScene *in = aiImportFileExWithProperties(b->spec->file, 0, NULL, options);
     aiReleasePropertyStore(options);
     aiDetachLogStream(&stream);

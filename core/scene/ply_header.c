@@ -50,9 +50,8 @@ static int read_element(struct ply_header *h, struct text *t, struct sh_err *err
 
 static int read_type(struct text *t, enum ply_type *type, const char *word, size_t len, struct sh_err *err)
 {
-    static const char *const names[] = {"char",  "uchar",  "short",   "ushort", "int",   "uint",
-                                        "float", "double", "int8",    "uint8",  "int16", "uint16",
-                                        "int32", "uint32", "float32", "float64"};
+    static const char *const names[] = {"char", "uchar", "short", "ushort", "int",   "uint",   "float",   "double",
+                                        "int8", "uint8", "int16", "uint16", "int32", "uint32", "float32", "float64"};
     for (unsigned i = 0; i < 16; i++) {
         if (!is(word, len, names[i])) continue;
         *type = (enum ply_type)(i % 8);
@@ -61,14 +60,12 @@ static int read_type(struct text *t, enum ply_type *type, const char *word, size
     return fail(t, err, "unknown property type", word, len);
 }
 
-static enum ply_use use_of(const struct ply_element *e, const struct ply_property *p, const char *name,
-                           size_t len)
+static enum ply_use use_of(const struct ply_element *e, const struct ply_property *p, const char *name, size_t len)
 {
     static const char *const scalar[PLY_SCALARS] = {
         [PLY_X] = "x",       [PLY_Y] = "y",        [PLY_Z] = "z", [PLY_STATION] = "station",
         [PLY_ECHO] = "echo", [PLY_LABEL] = "label"};
-    if (e->kind == PLY_FACE && p->is_list &&
-        (is(name, len, "vertex_indices") || is(name, len, "vertex_index")))
+    if (e->kind == PLY_FACE && p->is_list && (is(name, len, "vertex_indices") || is(name, len, "vertex_index")))
         return PLY_CORNERS;
     if (e->kind != PLY_VERTEX || p->is_list) return PLY_SKIP;
     for (unsigned i = PLY_X; i < PLY_SCALARS; i++)
@@ -123,10 +120,8 @@ static int check_header(const struct ply_header *h, const struct text *t, struct
             return text_fail(t, t->line, SH_EINPUT, err, "element %s is there twice", e->name);
         if (e->n_properties == 0 && e->count > 0)
             return text_fail(t, t->line, SH_EINPUT, err, "element %s has no properties", e->name);
-        if (e->kind == PLY_VERTEX &&
-            !(ply_find(h, e, PLY_X) && ply_find(h, e, PLY_Y) && ply_find(h, e, PLY_Z)))
-            return text_fail(t, t->line, SH_EINPUT, err,
-                             "element vertex lacks one of the properties x, y, z");
+        if (e->kind == PLY_VERTEX && !(ply_find(h, e, PLY_X) && ply_find(h, e, PLY_Y) && ply_find(h, e, PLY_Z)))
+            return text_fail(t, t->line, SH_EINPUT, err, "element vertex lacks one of the properties x, y, z");
     }
     return SH_OK;
 }

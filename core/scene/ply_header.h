@@ -51,7 +51,6 @@ extern const uint8_t ply_type_size[8]; /* bytes, by ply_type */
 int ply_header_read(struct ply_header *h, struct text *t, struct sh_err *err);
 
 /* The element's property of that use, or NULL. */
-const struct ply_property *ply_find(const struct ply_header *h, const struct ply_element *e,
-                                    enum ply_use use);
+const struct ply_property *ply_find(const struct ply_header *h, const struct ply_element *e, enum ply_use use);
 
 #endif

@@ -5,8 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-int ply_rows_open(struct ply_rows *r, const char *path, void (*tick)(void *ctx), void *ctx,
-                  struct sh_err *err)
+int ply_rows_open(struct ply_rows *r, const char *path, void (*tick)(void *ctx), void *ctx, struct sh_err *err)
 {
     *r = (struct ply_rows){0};
     int rc = text_open(&r->t, path, tick, ctx, err);
@@ -73,11 +72,9 @@ static int read_scalar(struct ply_rows *r, enum ply_type type, double *value, st
     if (r->h.format == PLY_ASCII) {
         text_skip_blanks(&r->t);
         if (text_number(&r->t, value)) return SH_OK;
-        return ply_rows_fail(r, err,
-                             text_at_line_end(&r->t) ? "a value is missing" : "a value is not a number");
+        return ply_rows_fail(r, err, text_at_line_end(&r->t) ? "a value is missing" : "a value is not a number");
     }
-    if ((size_t)(r->t.end - r->t.p) < ply_type_size[type])
-        return ply_rows_fail(r, err, "the file ends within it");
+    if ((size_t)(r->t.end - r->t.p) < ply_type_size[type]) return ply_rows_fail(r, err, "the file ends within it");
     *value = load_binary((const unsigned char *)r->t.p, type, r->h.format == PLY_BIG);
     r->t.p += ply_type_size[type];
     return SH_OK;
@@ -148,9 +145,8 @@ int ply_rows_begin(struct ply_rows *r, int i, struct sh_err *err)
     }
     uint64_t rest = (uint64_t)(r->t.end - r->t.p) + ascii; /* no line end at the end */
     if (e->count == 0 || e->count <= rest / least) return SH_OK;
-    return text_fail(
-        &r->t, 0, SH_EINPUT, err, "%llu of element %s need %llu bytes or more each; %llu are left",
-        (unsigned long long)e->count, e->name, (unsigned long long)least, (unsigned long long)rest);
+    return text_fail(&r->t, 0, SH_EINPUT, err, "%llu of element %s need %llu bytes or more each; %llu are left",
+                     (unsigned long long)e->count, e->name, (unsigned long long)least, (unsigned long long)rest);
 }
 
 size_t ply_rows_left_over(struct ply_rows *r)

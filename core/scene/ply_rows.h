@@ -16,8 +16,7 @@ struct ply_rows {
 };
 
 /* Opens the file and reads the header; path has to stay. ply_rows_close is due in any case. */
-int ply_rows_open(struct ply_rows *r, const char *path, void (*tick)(void *ctx), void *ctx,
-                  struct sh_err *err);
+int ply_rows_open(struct ply_rows *r, const char *path, void (*tick)(void *ctx), void *ctx, struct sh_err *err);
 void ply_rows_close(struct ply_rows *r);
 
 /* Goes to element i, which has to follow the one before; fails when the rest of the file can't hold its rows.

@@ -78,8 +78,8 @@ static int read_corner(struct obj *o, uint32_t *corner, struct sh_err *err)
     int64_t number = index < 0 ? n + index : index - 1;
     if (index == 0 || number < 0 || number >= n) {
         o->b->line = o->t.line;
-        return build_fail(o->b, SH_EINPUT, err, "index %lld out of range; %lld vertices so far",
-                          (long long)index, (long long)n);
+        return build_fail(o->b, SH_EINPUT, err, "index %lld out of range; %lld vertices so far", (long long)index,
+                          (long long)n);
     }
     *corner = o->b->vertex0 + (uint32_t)number;
     return SH_OK;
@@ -89,8 +89,7 @@ static int use_label(struct obj *o, struct sh_err *err)
 {
     if (o->label_known) return SH_OK;
     o->label_known = true;
-    return build_label(o->b, o->object.text, o->object.len, o->material.text, o->material.len, &o->label,
-                       err);
+    return build_label(o->b, o->object.text, o->object.len, o->material.text, o->material.len, &o->label, err);
 }
 
 static int read_face(struct obj *o, struct sh_err *err)
@@ -156,9 +155,8 @@ static int read_other(struct obj *o, const char *word, size_t len)
 {
     static const char *const numbers[] = {"vt",  "vn",  "vp",  "s",    "parm", "trim",   "hole", "scrv", "sp",
                                           "end", "con", "deg", "bmat", "step", "cstype", "mg",   NULL};
-    static const char *const texts[] = {"mtllib",    "usemap",   "maplib", "lod",   "bevel",
-                                        "c_interp",  "d_interp", "ctech",  "stech", "shadow_obj",
-                                        "trace_obj", "call",     "csh",    NULL};
+    static const char *const texts[] = {"mtllib", "usemap", "maplib",     "lod",       "bevel", "c_interp", "d_interp",
+                                        "ctech",  "stech",  "shadow_obj", "trace_obj", "call",  "csh",      NULL};
     static const char *const free_form[] = {"l", "curv", "curv2", "surf", NULL};
     if (is_word(word, len, free_form)) return count_left_out(o, false);
     if (is_word(word, len, numbers)) {

@@ -111,8 +111,7 @@ static int read_body(struct ply *y, struct sh_err *err)
         rc = read_element_rows(y, i, err);
     if (rc != SH_OK) return rc;
     size_t left_over = ply_rows_left_over(&y->r);
-    if (left_over > 0)
-        sh_warn(y->b->report, "%s: %zu bytes after the last element passed over", y->b->name, left_over);
+    if (left_over > 0) sh_warn(y->b->report, "%s: %zu bytes after the last element passed over", y->b->name, left_over);
     warn_if_coarse(y);
     y->b->scene->n_meshes++;
     return SH_OK;

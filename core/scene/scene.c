@@ -42,12 +42,11 @@ static int load_file(struct scene_build *b, const struct scene_mesh_spec *spec, 
         if (rc == SH_OK) rc = readers[i].read(b, err);
         return rc == SH_OK ? build_end_file(b, err) : rc;
     }
-    return build_fail(b, SH_EINPUT, err,
-                      "unknown ending; allowed are .obj .ply .stl .gltf .glb .fbx .dae .ifc");
+    return build_fail(b, SH_EINPUT, err, "unknown ending; allowed are .obj .ply .stl .gltf .glb .fbx .dae .ifc");
 }
 
-int scene_load(const struct scene_mesh_spec *specs, size_t n_specs, double tolerance_m,
-               const struct sh_report *report, struct scene **out, struct sh_err *err)
+int scene_load(const struct scene_mesh_spec *specs, size_t n_specs, double tolerance_m, const struct sh_report *report,
+               struct scene **out, struct sh_err *err)
 {
     struct scene_build b;
     *out = NULL;
@@ -59,8 +58,7 @@ int scene_load(const struct scene_mesh_spec *specs, size_t n_specs, double toler
     return rc;
 }
 
-static int copy_surfaces(struct scene_build *b, const struct scene_surface *surface, uint32_t n,
-                         struct sh_err *err)
+static int copy_surfaces(struct scene_build *b, const struct scene_surface *surface, uint32_t n, struct sh_err *err)
 {
     static const struct scene_surface only = {"object", "material"};
     if (surface == NULL) {
@@ -78,19 +76,18 @@ static int copy_surfaces(struct scene_build *b, const struct scene_surface *surf
     return SH_OK;
 }
 
-static int copy_triangles(struct scene_build *b, const uint32_t (*triangle)[3], uint32_t n,
-                          const uint16_t *label, struct sh_err *err)
+static int copy_triangles(struct scene_build *b, const uint32_t (*triangle)[3], uint32_t n, const uint16_t *label,
+                          struct sh_err *err)
 {
     int rc = build_reserve(b, 0, n, err);
     for (uint32_t i = 0; i < n && rc == SH_OK; i++) {
         for (int k = 0; k < 3; k++)
             if (triangle[i][k] >= b->scene->n_vertices)
-                return build_fail(b, SH_EINPUT, err,
-                                  "triangle %u: index %u out of range; there are %u vertices", i,
+                return build_fail(b, SH_EINPUT, err, "triangle %u: index %u out of range; there are %u vertices", i,
                                   triangle[i][k], b->scene->n_vertices);
         if (label != NULL && label[i] >= b->scene->n_surfaces)
-            return build_fail(b, SH_EINPUT, err, "triangle %u: label %u out of range; there are %u surfaces",
-                              i, label[i], b->scene->n_surfaces);
+            return build_fail(b, SH_EINPUT, err, "triangle %u: label %u out of range; there are %u surfaces", i,
+                              label[i], b->scene->n_surfaces);
         rc = build_triangle(b, triangle[i], label != NULL ? label[i] : 0, err);
     }
     return rc;

@@ -77,8 +77,7 @@ int build_end_file(struct scene_build *b, struct sh_err *err)
         sh_warn(b->report, "%s: %llu triangles without area left out", b->name,
                 (unsigned long long)b->counts.zero_area);
     if (b->counts.not_triangles > 0)
-        sh_warn(b->report, "%s: %llu points and lines left out", b->name,
-                (unsigned long long)b->counts.not_triangles);
+        sh_warn(b->report, "%s: %llu points and lines left out", b->name, (unsigned long long)b->counts.not_triangles);
     if (b->counts.names_cut > 0)
         sh_warn(b->report, "%s: %llu names cut to %d bytes", b->name, (unsigned long long)b->counts.names_cut,
                 SCENE_NAME_LEN - 1);
@@ -91,8 +90,7 @@ int build_end_file(struct scene_build *b, struct sh_err *err)
     if (b->told_ns > b->file_ns) tell(b, 1);
     if (b->scene->n_triangles == b->triangle0)
         return build_fail(b, SH_EINPUT, err, "no triangles in it (%llu without area, %llu points and lines)",
-                          (unsigned long long)b->counts.zero_area,
-                          (unsigned long long)b->counts.not_triangles);
+                          (unsigned long long)b->counts.zero_area, (unsigned long long)b->counts.not_triangles);
     return SH_OK;
 }
 
@@ -146,8 +144,7 @@ int build_fail(struct scene_build *b, int code, struct sh_err *err, const char *
     vsnprintf(text, sizeof text, fmt, ap);
     va_end(ap);
     for (char *c = text; *c != '\0'; c++)
-        if ((unsigned char)*c < ' ')
-            *c = '?'; /* what a broken file says may hold anything: one line it stays */
+        if ((unsigned char)*c < ' ') *c = '?'; /* what a broken file says may hold anything: one line it stays */
     return sh_fail(err, code, "%s%s: %s", b->name, place, text);
 }
 
@@ -200,8 +197,7 @@ int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err)
     const struct scene_mesh_spec *spec = b->spec;
     unsigned long long number = s->n_vertices - b->mesh_vertex0 + 1ull;
     if (!isfinite(v[0]) || !isfinite(v[1]) || !isfinite(v[2]))
-        return build_fail(b, SH_EINPUT, err, "vertex %llu (%g %g %g) is not finite", number, v[0], v[1],
-                          v[2]);
+        return build_fail(b, SH_EINPUT, err, "vertex %llu (%g %g %g) is not finite", number, v[0], v[1], v[2]);
     if (s->n_vertices >= b->cap_vertices) {
         int rc = grow_vertices(b, s->n_vertices + 1ull, err);
         if (rc != SH_OK) return rc;
@@ -212,8 +208,8 @@ int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err)
     for (int k = 0; k < 3; k++) {
         p[k] = turned[k] * spec->scale + spec->offset_m[k];
         if (!(fabs(p[k]) <= MAX_COORDINATE_M))
-            return build_fail(b, SH_EINPUT, err, "vertex %llu is at %g m; allowed are coordinates up to %g m",
-                              number, p[k], MAX_COORDINATE_M);
+            return build_fail(b, SH_EINPUT, err, "vertex %llu is at %g m; allowed are coordinates up to %g m", number,
+                              p[k], MAX_COORDINATE_M);
     }
     s->n_vertices++;
     return SH_OK;
@@ -257,8 +253,7 @@ int build_polygon(struct scene_build *b, const uint32_t *corner, size_t n, uint1
 {
     if (n == 3) return build_triangle(b, corner, label, err);
     if (n > SCENE_MAX_CORNERS)
-        return build_fail(b, SH_EINPUT, err, "a polygon has %zu corners; allowed are up to %d", n,
-                          SCENE_MAX_CORNERS);
+        return build_fail(b, SH_EINPUT, err, "a polygon has %zu corners; allowed are up to %d", n, SCENE_MAX_CORNERS);
     struct triangulate *t = &b->polygon;
     if (triangulate_reserve(t, n) != SH_OK)
         return build_fail(b, SH_ENOMEM, err, "no memory for a polygon of %zu corners", n);
@@ -295,8 +290,8 @@ static unsigned copy_name(char out[SCENE_NAME_LEN], const char *name, size_t len
     return cut ? 1 : 0;
 }
 
-int build_label(struct scene_build *b, const char *object, size_t object_len, const char *material,
-                size_t material_len, uint16_t *label, struct sh_err *err)
+int build_label(struct scene_build *b, const char *object, size_t object_len, const char *material, size_t material_len,
+                uint16_t *label, struct sh_err *err)
 {
     struct scene *s = b->scene;
     struct scene_surface *fresh = &s->surface[s->n_surfaces]; /* room for one more than allowed */

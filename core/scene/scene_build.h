@@ -48,12 +48,11 @@ int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err);
 
 /* corner: indices into the scene, which the caller has checked. */
 int build_triangle(struct scene_build *b, const uint32_t corner[3], uint16_t label, struct sh_err *err);
-int build_polygon(struct scene_build *b, const uint32_t *corner, size_t n, uint16_t label,
-                  struct sh_err *err);
+int build_polygon(struct scene_build *b, const uint32_t *corner, size_t n, uint16_t label, struct sh_err *err);
 
 /* The label of a pair of names (not terminated); a new pair gets the next number. */
-int build_label(struct scene_build *b, const char *object, size_t object_len, const char *material,
-                size_t material_len, uint16_t *label, struct sh_err *err);
+int build_label(struct scene_build *b, const char *object, size_t object_len, const char *material, size_t material_len,
+                uint16_t *label, struct sh_err *err);
 
 /* Reports "reading FILE" about four times a second, once the load takes longer than a second. */
 void build_progress(struct scene_build *b, double fraction);

@@ -21,8 +21,7 @@ static int read_whole(struct text *t, FILE *f, void (*tick)(void *ctx), void *ct
         size_t want = t->size - at < step ? t->size - at : step;
         size_t got = fread(t->data + at, 1, want, f);
         if (got < want)
-            return text_fail(t, 0, SH_EINPUT, err, "%s",
-                             ferror(f) ? strerror(errno) : "got shorter while read");
+            return text_fail(t, 0, SH_EINPUT, err, "%s", ferror(f) ? strerror(errno) : "got shorter while read");
         at += got;
         if (tick != NULL) tick(ctx);
     }
@@ -43,8 +42,7 @@ int text_fail(const struct text *t, uint64_t line, int code, struct sh_err *err,
     va_end(ap);
     for (char *c = what; *c != '\0'; c++)
         if ((unsigned char)*c < ' ') *c = '?'; /* a broken file may hold anything: one line it stays */
-    return sh_fail(err, code, "%s%s%s: %s", cut ? "..." : "", t->path + (cut ? len - LONGEST : 0), place,
-                   what);
+    return sh_fail(err, code, "%s%s%s: %s", cut ? "..." : "", t->path + (cut ? len - LONGEST : 0), place, what);
 }
 
 int text_open(struct text *t, const char *path, void (*tick)(void *ctx), void *ctx, struct sh_err *err)

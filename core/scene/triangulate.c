@@ -146,8 +146,7 @@ void triangulate_polygon(struct triangulate *t, uint32_t n)
     }
     for (uint32_t i = 0; i < n; i++)
         if (!(turn(t, t->prev[i], i, t->next[i]) > 0)) t->reflex[t->n_reflex++] = i;
-    uint32_t n_out = 0, left = n, tried = 0,
-             i = 1; /* from 1: a convex polygon becomes a fan about corner 0 */
+    uint32_t n_out = 0, left = n, tried = 0, i = 1; /* from 1: a convex polygon becomes a fan about corner 0 */
     while (left > 3) {
         uint32_t next = t->next[i];
         if (is_ear(t, i)) {

@@ -95,8 +95,8 @@ static uint32_t frame_of_line(const struct schedule_segment *seg, uint64_t n, ui
     return seg->frame0 + 1 + (uint32_t)f;
 }
 
-/* Pan at pulse k, which belongs to the frame that begins with first_line: whole micro-degrees and 2^-24 parts, rounded up,
- * so that a frame that a change cuts in two never needs a line more for what was rounded off. */
+/* Pan at pulse k, which belongs to the frame that begins with first_line: whole micro-degrees and 2^-24 parts, rounded
+ * up, so that a frame that a change cuts in two never needs a line more for what was rounded off. */
 static int64_t pan_fine(const struct schedule_segment *seg, uint64_t k, uint64_t first_line)
 {
     int64_t base = first_line == seg->line0 ? seg->pan0_fine : seg->spec.pan_start_udeg * (1 << 24);
@@ -108,8 +108,8 @@ static int64_t pan_fine(const struct schedule_segment *seg, uint64_t k, uint64_t
     return base + (int64_t)((whole << 24) + fine);
 }
 
-void schedule_change(struct schedule_segment *seg, const struct schedule_segment *before, const struct schedule_spec *spec,
-                     uint64_t k)
+void schedule_change(struct schedule_segment *seg, const struct schedule_segment *before,
+                     const struct schedule_spec *spec, uint64_t k)
 {
     uint64_t first_line, n = schedule_line_of(before, k);
     uint32_t frame = frame_of_line(before, n, &first_line);

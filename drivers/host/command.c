@@ -39,8 +39,7 @@ static int discard_stale(struct scanhead *sh)
 
 static ssize_t put(struct scanhead *sh, const char *data, size_t len)
 {
-    return sh->source.is_socket ? send(sh->source.fd, data, len, MSG_NOSIGNAL)
-                                : write(sh->source.fd, data, len);
+    return sh->source.is_socket ? send(sh->source.fd, data, len, MSG_NOSIGNAL) : write(sh->source.fd, data, len);
 }
 
 static int gone(struct scanhead *sh)
@@ -95,8 +94,8 @@ static int check_command(struct scanhead *sh, const char *command, size_t len)
         if (command[i] < 0x20 || command[i] > 0x7e) printable = 0;
     }
     if (blank || !printable || len > COMMAND_MAX)
-        return sh_fail(&sh->err, SCANHEAD_EINPUT,
-                       "not a command: one line of at most %d printable ASCII characters", COMMAND_MAX);
+        return sh_fail(&sh->err, SCANHEAD_EINPUT, "not a command: one line of at most %d printable ASCII characters",
+                       COMMAND_MAX);
     return 0;
 }
 
@@ -104,8 +103,7 @@ static int copy_reply(struct scanhead *sh, char *reply, size_t reply_len)
 {
     size_t len = strlen(sh->parser.text);
     if (len >= reply_len)
-        return sh_fail(&sh->err, SCANHEAD_EINPUT, "a reply of %zu characters does not fit into %zu", len,
-                       reply_len);
+        return sh_fail(&sh->err, SCANHEAD_EINPUT, "a reply of %zu characters does not fit into %zu", len, reply_len);
     memcpy(reply, sh->parser.text, len + 1);
     return SCANHEAD_OK;
 }
@@ -130,7 +128,7 @@ int scanhead_command(struct scanhead *sh, const char *command, char *reply, size
         rc = deadline_ns < host_deadline_ns(0) ? SH_ETIMEOUT : host_fill(sh, deadline_ns);
     }
     if (rc == SH_ETIMEOUT)
-        return sh_fail(&sh->err, SCANHEAD_ETIMEOUT, "%s: no reply to '%s' within %d ms", sh->source.name,
-                       command, timeout_ms);
+        return sh_fail(&sh->err, SCANHEAD_ETIMEOUT, "%s: no reply to '%s' within %d ms", sh->source.name, command,
+                       timeout_ms);
     return rc;
 }

@@ -7,10 +7,10 @@
 
 #include "drivers/protocol/bytes.h"
 
-_Static_assert(SCANHEAD_EINPUT == (int)SH_EINPUT && SCANHEAD_EIO == (int)SH_EIO &&
-                   SCANHEAD_ENOMEM == (int)SH_ENOMEM && SCANHEAD_EPERM == (int)SH_EPERM &&
-                   SCANHEAD_ETIMEOUT == (int)SH_ETIMEOUT && SCANHEAD_ECLOSED == (int)SH_ECLOSED &&
-                   SCANHEAD_EFORMAT == (int)SH_EFORMAT && SCANHEAD_ESTATE == (int)SH_ESTATE,
+_Static_assert(SCANHEAD_EINPUT == (int)SH_EINPUT && SCANHEAD_EIO == (int)SH_EIO && SCANHEAD_ENOMEM == (int)SH_ENOMEM &&
+                   SCANHEAD_EPERM == (int)SH_EPERM && SCANHEAD_ETIMEOUT == (int)SH_ETIMEOUT &&
+                   SCANHEAD_ECLOSED == (int)SH_ECLOSED && SCANHEAD_EFORMAT == (int)SH_EFORMAT &&
+                   SCANHEAD_ESTATE == (int)SH_ESTATE,
                "the library's errors are those of core/err.h");
 _Static_assert(SCANHEAD_POINTS == (int)NATIVE_POINTS && SCANHEAD_SURFACES == (int)NATIVE_SURFACES &&
                    SCANHEAD_EV_SETTINGS == (int)NATIVE_EV_SETTINGS && SCANHEAD_LOCAL == (int)NATIVE_LOCAL,
@@ -167,11 +167,10 @@ static int closed(struct scanhead *sh)
 {
     const struct native_stats *s = &sh->parser.stats;
     if (s->bytes > 0 && s->frames == 0 && s->texts == 0)
-        return sh_fail(&sh->err, SCANHEAD_EFORMAT,
-                       "%s: not one frame in %llu bytes: not a scan head's stream", sh->source.name,
-                       (unsigned long long)s->bytes);
-    return sh_fail(&sh->err, SCANHEAD_ECLOSED,
-                   sh->source.is_file ? "%s: end of the recording" : "%s: the head is gone", sh->source.name);
+        return sh_fail(&sh->err, SCANHEAD_EFORMAT, "%s: not one frame in %llu bytes: not a scan head's stream",
+                       sh->source.name, (unsigned long long)s->bytes);
+    return sh_fail(&sh->err, SCANHEAD_ECLOSED, sh->source.is_file ? "%s: end of the recording" : "%s: the head is gone",
+                   sh->source.name);
 }
 
 int scanhead_next(struct scanhead *sh, struct scanhead_frame *frame, int timeout_ms)

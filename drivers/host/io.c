@@ -60,8 +60,7 @@ int host_fill(struct scanhead *sh, int64_t deadline_ns)
             return 0;
         }
         if (errno == EINTR) continue;
-        if (errno != EAGAIN)
-            return sh_fail(&sh->err, SH_EIO, "%s: cannot read: %s", sh->source.name, strerror(errno));
+        if (errno != EAGAIN) return sh_fail(&sh->err, SH_EIO, "%s: cannot read: %s", sh->source.name, strerror(errno));
         short revents;
         int rc = host_wait(sh, POLLIN, deadline_ns, &revents);
         if (rc != 0) return rc;

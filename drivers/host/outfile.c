@@ -31,9 +31,7 @@ int outfile_open(struct outfile *file, const char *path, struct sh_err *err)
     }
     file->fd = open(file->part, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
     if (file->fd >= 0) return 0;
-    int code = errno == EACCES || errno == EPERM || errno == EROFS ? SH_EPERM
-               : errno == ENOENT                                   ? SH_EINPUT
-                                                                   : SH_EIO;
+    int code = errno == EACCES || errno == EPERM || errno == EROFS ? SH_EPERM : errno == ENOENT ? SH_EINPUT : SH_EIO;
     sh_fail(err, code, "%s: cannot create: %s", file->part, strerror(errno));
     release(file);
     return code;
@@ -44,8 +42,7 @@ static int write_all(struct outfile *file, const uint8_t *data, size_t len, stru
     while (len > 0) {
         ssize_t n = write(file->fd, data, len);
         if (n < 0 && errno == EINTR) continue;
-        if (n <= 0)
-            return sh_fail(err, SH_EIO, "%s: cannot write: %s", file->part, strerror(n < 0 ? errno : ENOSPC));
+        if (n <= 0) return sh_fail(err, SH_EIO, "%s: cannot write: %s", file->part, strerror(n < 0 ? errno : ENOSPC));
         data += n;
         len -= (size_t)n;
         file->written += (uint64_t)n;
@@ -94,8 +91,7 @@ int outfile_patch(struct outfile *file, uint64_t at, const void *data, size_t le
     while (len > 0) {
         ssize_t n = pwrite(file->fd, p, len, (off_t)at);
         if (n < 0 && errno == EINTR) continue;
-        if (n <= 0)
-            return sh_fail(err, SH_EIO, "%s: cannot write: %s", file->part, strerror(n < 0 ? errno : ENOSPC));
+        if (n <= 0) return sh_fail(err, SH_EIO, "%s: cannot write: %s", file->part, strerror(n < 0 ? errno : ENOSPC));
         p += n;
         at += (uint64_t)n;
         len -= (size_t)n;

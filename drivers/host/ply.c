@@ -53,8 +53,7 @@ static int begin(struct ply *ply, const struct scanhead *sh, uint32_t n_surfaces
     int rc = ply_names_grow(&ply->names, n_surfaces, err);
     for (uint32_t i = 0; rc == 0 && i < n_surfaces; i++) {
         const char *object, *material;
-        if (scanhead_surface(sh, i, &object, &material))
-            rc = ply_names_set(&ply->names, i, object, material, err);
+        if (scanhead_surface(sh, i, &object, &material)) rc = ply_names_set(&ply->names, i, object, material, err);
     }
     if (rc != 0) return rc;
     ply->header_len = ply_header_reserve(&ply->facts, &ply->names);
@@ -78,8 +77,8 @@ static int check_info(struct ply *ply, const struct scanhead_info *info, struct 
         return sh_fail(err, SH_EFORMAT, "%s: the stream went from EPSG %d to %d; a PLY file holds one CRS",
                        ply->file.path, facts->epsg, epsg);
     if (info->station > 0xffff)
-        return sh_fail(err, SH_EFORMAT, "%s: station %u; a PLY file holds stations up to 65535",
-                       ply->file.path, info->station);
+        return sh_fail(err, SH_EFORMAT, "%s: station %u; a PLY file holds stations up to 65535", ply->file.path,
+                       info->station);
     facts->have_crs = 1;
     facts->crs = crs;
     facts->epsg = epsg;
@@ -126,8 +125,7 @@ static size_t put_ascii(char *to, const struct scanhead_point *p, unsigned stati
     const struct {
         double v;
         int digits;
-    } number[] = {
-        {p->x, 6}, {p->y, 6}, {p->z, 6}, {p->range_m, 6}, {p->reflectance_db, 2}, {(double)p->t_ns / 1e9, 9}};
+    } number[] = {{p->x, 6}, {p->y, 6}, {p->z, 6}, {p->range_m, 6}, {p->reflectance_db, 2}, {(double)p->t_ns / 1e9, 9}};
     size_t n = 0;
     for (size_t i = 0; i < sizeof number / sizeof number[0] && n < TEXT_LEN; i++)
         n += put_number(to + n, TEXT_LEN - n, number[i].digits, number[i].v);
@@ -148,8 +146,8 @@ static int put_batch(struct ply *ply, const struct scanhead_info *info, int n, s
         size_t len = ply->options.ascii ? put_ascii((char *)to + used, p, info->station)
                                         : put_binary(to + used, p, info->station);
         if (len > TEXT_LEN)
-            return sh_fail(err, SH_EFORMAT, "%s: a coordinate beyond all measure: %g %g %g", ply->file.path,
-                           p->x, p->y, p->z);
+            return sh_fail(err, SH_EFORMAT, "%s: a coordinate beyond all measure: %g %g %g", ply->file.path, p->x, p->y,
+                           p->z);
         used += len;
         ply->facts.n_vertices++;
     }
@@ -157,8 +155,7 @@ static int put_batch(struct ply *ply, const struct scanhead_info *info, int n, s
     return 0;
 }
 
-static int put_points(struct ply *ply, struct scanhead *sh, const struct scanhead_frame *frame,
-                      struct sh_err *err)
+static int put_points(struct ply *ply, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
 {
     struct scanhead_info info;
     if (scanhead_get_info(sh, &info) != 0) {
@@ -185,8 +182,7 @@ struct naming {
 static void take_name(void *ctx, uint32_t label, const char *object, const char *material)
 {
     struct naming *naming = ctx;
-    if (naming->rc == 0)
-        naming->rc = ply_names_set(&naming->ply->names, label, object, material, naming->err);
+    if (naming->rc == 0) naming->rc = ply_names_set(&naming->ply->names, label, object, material, naming->err);
 }
 
 static int ply_frame(void *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)

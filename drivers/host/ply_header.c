@@ -30,8 +30,7 @@ int ply_names_grow(struct ply_names *names, uint32_t n, struct sh_err *err)
     return 0;
 }
 
-int ply_names_set(struct ply_names *names, uint32_t label, const char *object, const char *material,
-                  struct sh_err *err)
+int ply_names_set(struct ply_names *names, uint32_t label, const char *object, const char *material, struct sh_err *err)
 {
     char *line;
     int rc = ply_names_grow(names, label + 1, err);
@@ -77,8 +76,7 @@ static void put_comments(FILE *out, const struct ply_facts *facts, const struct 
     fputs("comment echo and echo_count 0: shot without echo; label 65535: none\n", out);
     fprintf(out, "comment empty_shots %s\n", facts->empty_shots ? "kept" : "left out");
     fprintf(out,
-            "comment frames_lost %" PRIu64 " reader_lost %" PRIu64 " dropped %" PRIu64 " bad_payload %" PRIu64
-            "\n",
+            "comment frames_lost %" PRIu64 " reader_lost %" PRIu64 " dropped %" PRIu64 " bad_payload %" PRIu64 "\n",
             s->seq_lost, s->reader_lost, s->dropped, s->bad_payload);
     fprintf(out, "comment pulses_lost %" PRIu64 " points_before_descriptor %" PRIu64 "\n", s->pulses_lost,
             facts->n_unplaced);
@@ -96,8 +94,7 @@ static void put_padding(FILE *out, size_t n)
     }
 }
 
-static void put_header(FILE *out, const struct ply_facts *facts, const struct ply_names *names,
-                       size_t padding)
+static void put_header(FILE *out, const struct ply_facts *facts, const struct ply_names *names, size_t padding)
 {
     fprintf(out, "ply\nformat %s 1.0\n", facts->ascii ? "ascii" : "binary_little_endian");
     put_comments(out, facts, names);
@@ -109,8 +106,8 @@ static void put_header(FILE *out, const struct ply_facts *facts, const struct pl
           out);
 }
 
-int ply_header_make(const struct ply_facts *facts, const struct ply_names *names, size_t size, char **text,
-                    size_t *len, struct sh_err *err)
+int ply_header_make(const struct ply_facts *facts, const struct ply_names *names, size_t size, char **text, size_t *len,
+                    struct sh_err *err)
 {
     size_t padding = 0;
     for (int pass = 0; pass < 2; pass++) {

@@ -34,7 +34,7 @@ size_t ply_header_reserve(const struct ply_facts *facts, const struct ply_names 
 
 /* The header, padded by comment lines to `size` bytes. *len is what it takes, which is more than size where
  * it does not fit, or would by less than the shortest line. Free *text. */
-int ply_header_make(const struct ply_facts *facts, const struct ply_names *names, size_t size, char **text,
-                    size_t *len, struct sh_err *err);
+int ply_header_make(const struct ply_facts *facts, const struct ply_names *names, size_t size, char **text, size_t *len,
+                    struct sh_err *err);
 
 #endif

@@ -66,8 +66,8 @@ static inline double fold(double u, double lo)
     return u - (whole > v ? whole - 1 : whole);
 }
 
-static void points_polar(const struct scanhead *sh, const uint8_t *rec, int64_t t0_ns,
-                         struct scanhead_point *p, uint32_t n)
+static void points_polar(const struct scanhead *sh, const uint8_t *rec, int64_t t0_ns, struct scanhead_point *p,
+                         uint32_t n)
 {
     const struct native_descriptor *d = &sh->descriptor;
     /* The mirror angle is given in the turn around the middle of the line, so that it runs through without a
@@ -97,8 +97,8 @@ int scanhead_points(struct scanhead *sh, const struct scanhead_frame *frame, uin
     if (frame->type != SCANHEAD_POINTS || frame->payload == NULL || frame->payload != sh->payload)
         return sh_fail(&sh->err, SCANHEAD_EINPUT, "not the points frame that scanhead_next returned last");
     if (!sh->have_descriptor || !sh->have_anchor)
-        return sh_fail(&sh->err, SCANHEAD_ESTATE,
-                       "%s: points before the descriptor and the anchor of their scan", sh->source.name);
+        return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: points before the descriptor and the anchor of their scan",
+                       sh->source.name);
     if (first >= frame->n_points) return 0;
     uint32_t n = frame->n_points - first;
     if (n > max) n = max;

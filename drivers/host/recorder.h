@@ -6,12 +6,12 @@
 #include "drivers/host/scanhead.h"
 
 struct recorder_options {
-    int ascii;         /* PLY as text */
-    int empty_shots;   /* keep shots without echo, where the format can */
+    int ascii;       /* PLY as text */
+    int empty_shots; /* keep shots without echo, where the format can */
 };
 
 struct recorder_ops {
-    const char *ending;   /* ".ply" */
+    const char *ending; /* ".ply" */
     /* Opens path for writing. Nothing is written to path itself before close succeeds: the data go to a file beside it
      * (".part") that is renamed at the end; options are copied. */
     int (*open)(const char *path, const struct recorder_options *options, void **rec, struct sh_err *err);

@@ -18,8 +18,8 @@ extern "C" {
 
 enum scanhead_error {
     SCANHEAD_OK = 0,
-    SCANHEAD_EINPUT = -1,   /* a bad argument or source */
-    SCANHEAD_EIO = -2,      /* the operating system said no */
+    SCANHEAD_EINPUT = -1, /* a bad argument or source */
+    SCANHEAD_EIO = -2,    /* the operating system said no */
     SCANHEAD_ENOMEM = -3,
     SCANHEAD_EPERM = -4,
     SCANHEAD_ETIMEOUT = -5, /* nothing came in time; call again */
@@ -42,30 +42,41 @@ const char *scanhead_error(const struct scanhead *sh);
 int scanhead_command(struct scanhead *sh, const char *command, char *reply, size_t reply_len, int timeout_ms);
 
 enum scanhead_frame_type { /* as on the wire */
-    SCANHEAD_DESCRIPTOR = 1, SCANHEAD_ANCHOR = 2, SCANHEAD_POINTS = 3, SCANHEAD_LINE_END = 4,
-    SCANHEAD_TELEMETRY = 5, SCANHEAD_EVENT = 6, SCANHEAD_SURFACES = 7,
+                           SCANHEAD_DESCRIPTOR = 1,
+                           SCANHEAD_ANCHOR = 2,
+                           SCANHEAD_POINTS = 3,
+                           SCANHEAD_LINE_END = 4,
+                           SCANHEAD_TELEMETRY = 5,
+                           SCANHEAD_EVENT = 6,
+                           SCANHEAD_SURFACES = 7,
 };
 enum scanhead_frame_flags { SCANHEAD_REPEAT = 1, SCANHEAD_LOCAL = 2 };
 
 enum scanhead_event_code {
-    SCANHEAD_EV_STATE = 1, SCANHEAD_EV_SCAN_START = 2, SCANHEAD_EV_SCAN_END = 3, SCANHEAD_EV_OVERRUN = 4,
-    SCANHEAD_EV_READER_LOST = 5, SCANHEAD_EV_CONTROL = 6, SCANHEAD_EV_ERROR = 7, SCANHEAD_EV_SETTINGS = 8,
+    SCANHEAD_EV_STATE = 1,
+    SCANHEAD_EV_SCAN_START = 2,
+    SCANHEAD_EV_SCAN_END = 3,
+    SCANHEAD_EV_OVERRUN = 4,
+    SCANHEAD_EV_READER_LOST = 5,
+    SCANHEAD_EV_CONTROL = 6,
+    SCANHEAD_EV_ERROR = 7,
+    SCANHEAD_EV_SETTINGS = 8,
 };
 
 struct scanhead_frame {
     int type, flags;
     uint32_t seq;
-    int64_t t_ns;            /* device time */
-    const uint8_t *payload;  /* valid until the next call on this handle */
+    int64_t t_ns;           /* device time */
+    const uint8_t *payload; /* valid until the next call on this handle */
     size_t payload_len;
-    const uint8_t *raw;      /* the frame as on the wire, header and payload; valid as payload is */
+    const uint8_t *raw; /* the frame as on the wire, header and payload; valid as payload is */
     size_t raw_len;
     /* SCANHEAD_POINTS */
     uint32_t scan_frame, scan_line, n_points, n_pulses;
     uint64_t pulse0;
-    int64_t scan_t0_ns, line_t0_ns;  /* since the scan's start: of pulse0, of the line's first pulse */
+    int64_t scan_t0_ns, line_t0_ns; /* since the scan's start: of pulse0, of the line's first pulse */
     /* SCANHEAD_EVENT */
-    uint32_t event;          /* enum scanhead_event_code */
+    uint32_t event; /* enum scanhead_event_code */
     uint64_t event_value[3];
     char event_text[96];
 };
@@ -76,30 +87,30 @@ int scanhead_next(struct scanhead *sh, struct scanhead_frame *frame, int timeout
 enum { SCANHEAD_NO_LABEL = 0xffff };
 
 struct scanhead_point {
-    double x, y, z;          /* in the stream's CRS (geo), or the head's frame SOCS (polar); NaN for an empty shot */
-    double range_m;          /* NaN for an empty shot */
+    double x, y, z;             /* in the stream's CRS (geo), or the head's frame SOCS (polar); NaN for an empty shot */
+    double range_m;             /* NaN for an empty shot */
     double mirror_rad, pan_rad; /* encoders; NaN in the geo layout */
-    double reflectance_db;   /* NaN where not modelled */
-    int64_t t_ns;            /* firing time since the scan's start */
-    uint8_t echo, echo_count; /* 0, 0: shot without echo */
-    uint16_t label;          /* surface, or SCANHEAD_NO_LABEL */
+    double reflectance_db;      /* NaN where not modelled */
+    int64_t t_ns;               /* firing time since the scan's start */
+    uint8_t echo, echo_count;   /* 0, 0: shot without echo */
+    uint16_t label;             /* surface, or SCANHEAD_NO_LABEL */
 };
 
 /* Points of the frame that scanhead_next returned last: at most max, from the index `first`. Returns how many, or
- * SCANHEAD_ESTATE before the descriptor and the anchor of the stream were seen. In the geo layout range_m is the distance
- * from the anchor, which is the station. */
+ * SCANHEAD_ESTATE before the descriptor and the anchor of the stream were seen. In the geo layout range_m is the
+ * distance from the anchor, which is the station. */
 int scanhead_points(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                     struct scanhead_point *points, uint32_t max);
 
 /* What the stream has said of itself. Strings belong to the handle. 0, or SCANHEAD_ESTATE when not seen yet. */
 struct scanhead_info {
     const char *idn, *profile;
-    int geo;                 /* 1: geo layout, 0: polar */
-    int crs;                 /* 0 local (scene frame), 1 ECEF, 2 UTM/UPS */
-    int epsg;                /* 0 for local */
+    int geo;  /* 1: geo layout, 0: polar */
+    int crs;  /* 0 local (scene frame), 1 ECEF, 2 UTM/UPS */
+    int epsg; /* 0 for local */
     double anchor[3], scale_m;
     double lat_deg, lon_deg, height_m, station_m[3];
-    double rotation[9];      /* socs -> scene frame, row by row */
+    double rotation[9]; /* socs -> scene frame, row by row */
     double prr_hz, lines_hz, pan_deg_s, range_min_m, range_max_m;
     uint32_t station, n_surfaces, frames, scan;
 };
@@ -110,9 +121,9 @@ int scanhead_surface(const struct scanhead *sh, uint32_t label, const char **obj
 
 struct scanhead_stats {
     uint64_t bytes, frames, bad_payload, bad_bytes, seq_gaps, seq_lost; /* of this connection */
-    uint64_t dropped;        /* frames dropped here while waiting for a reply */
-    uint64_t reader_lost;    /* frames the head says it could not give us */
-    uint64_t pulses_lost;    /* pulses the head says it could not compute */
+    uint64_t dropped;     /* frames dropped here while waiting for a reply */
+    uint64_t reader_lost; /* frames the head says it could not give us */
+    uint64_t pulses_lost; /* pulses the head says it could not compute */
 };
 void scanhead_get_stats(const struct scanhead *sh, struct scanhead_stats *stats);
 

@@ -20,10 +20,9 @@ enum { CONNECT_TIMEOUT_MS = 10000, RECEIVE_BUFFER = 4 << 20 };
 static int fail_open(struct sh_err *err, const char *name)
 {
     int code = errno == EACCES || errno == EPERM ? SH_EPERM : errno == ENOENT ? SH_EINPUT : SH_EIO;
-    return sh_fail(
-        err, code,
-        "%s: cannot open: %s (a source is tty:PATH, tcp:HOST:PORT, fd:N or the path of a .shs file)", name,
-        strerror(errno));
+    return sh_fail(err, code,
+                   "%s: cannot open: %s (a source is tty:PATH, tcp:HOST:PORT, fd:N or the path of a .shs file)", name,
+                   strerror(errno));
 }
 
 static int open_tty(const char *path, struct host_source *out, struct sh_err *err)
@@ -56,11 +55,9 @@ static int split_address(const char *address, char host[256], char port[8], stru
     int bad = end == NULL || *colon != ':' || end == begin || end - begin > 255;
     if (!bad && *address != '[' && memchr(begin, ':', (size_t)(end - begin)) != NULL) bad = 1;
     size_t digits = bad ? 0 : strspn(colon + 1, "0123456789");
-    if (bad || digits < 1 || digits > 5 || colon[1 + digits] != 0 || atoi(colon + 1) < 1 ||
-        atoi(colon + 1) > 65535)
+    if (bad || digits < 1 || digits > 5 || colon[1 + digits] != 0 || atoi(colon + 1) < 1 || atoi(colon + 1) > 65535)
         return sh_fail(err, SH_EINPUT,
-                       "tcp:%s: not an address; write tcp:HOST:PORT or tcp:[IPV6]:PORT, port 1 to 65535",
-                       address);
+                       "tcp:%s: not an address; write tcp:HOST:PORT or tcp:[IPV6]:PORT, port 1 to 65535", address);
     memcpy(host, begin, (size_t)(end - begin));
     host[end - begin] = 0;
     memcpy(port, colon + 1, digits + 1);

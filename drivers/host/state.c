@@ -14,14 +14,12 @@ static int absorb_descriptor(struct scanhead *sh, const struct native_header *he
 {
     struct native_descriptor d;
     if (native_decode_descriptor(payload, header->length, &d) != 0) return bad(sh, "a wrong descriptor");
-    if (d.layout == NATIVE_POLAR &&
-        !(d.mirror_counts_per_turn > 0 && d.pan_counts_per_turn > 0 && d.range_scale_m > 0))
+    if (d.layout == NATIVE_POLAR && !(d.mirror_counts_per_turn > 0 && d.pan_counts_per_turn > 0 && d.range_scale_m > 0))
         return bad(sh, "a polar descriptor without scales");
     if (d.n_surfaces > SCANHEAD_NO_LABEL) return bad(sh, "a descriptor with more surfaces than labels");
     /* The anchor of another scan may be that of another station; a descriptor that is not a repetition begins
      * a scan. */
-    int same_scan =
-        sh->have_descriptor && sh->descriptor.scan == d.scan && (header->flags & NATIVE_REPEAT) != 0;
+    int same_scan = sh->have_descriptor && sh->descriptor.scan == d.scan && (header->flags & NATIVE_REPEAT) != 0;
     if (!same_scan) sh->have_anchor = sh->have_pulse = 0;
     sh->descriptor = d;
     sh->have_descriptor = 1;
@@ -60,8 +58,7 @@ static int absorb_event(struct scanhead *sh, const struct native_header *header,
     if (native_decode_event(payload, header->length, &event) != 0) return bad(sh, "a wrong event");
     if (event.code == NATIVE_EV_READER_LOST) sh->reader_lost = event.c;
     if (event.code == NATIVE_EV_OVERRUN) sh->pulses_lost += event.b;
-    if (event.code == NATIVE_EV_SCAN_START && sh->have_descriptor && event.a != sh->descriptor.scan)
-        forget(sh);
+    if (event.code == NATIVE_EV_SCAN_START && sh->have_descriptor && event.a != sh->descriptor.scan) forget(sh);
     return 0;
 }
 
@@ -107,8 +104,7 @@ static void count_label(void *ctx, uint32_t label, const char *object, const cha
 static int absorb_surfaces(struct scanhead *sh, const struct native_header *header, const uint8_t *payload)
 {
     uint32_t n = 0;
-    if (native_decode_surfaces(payload, header->length, count_label, &n) != 0)
-        return bad(sh, "wrong surface names");
+    if (native_decode_surfaces(payload, header->length, count_label, &n) != 0) return bad(sh, "wrong surface names");
     struct naming naming = {sh, grow_surfaces(sh, n) != 0};
     if (!naming.no_memory) native_decode_surfaces(payload, header->length, set_surface, &naming);
     if (naming.no_memory) return sh_fail(&sh->err, SH_ENOMEM, "no memory for %u surface names", n);
@@ -128,8 +124,7 @@ int host_absorb(struct scanhead *sh, const struct native_header *header, const u
 {
     absorb_hash(sh, header, payload);
     if (header->version != NATIVE_VERSION)
-        return sh_fail(&sh->err, SH_EFORMAT,
-                       "%s: the head speaks version %u of the protocol; this library reads %d",
+        return sh_fail(&sh->err, SH_EFORMAT, "%s: the head speaks version %u of the protocol; this library reads %d",
                        sh->source.name, header->version, NATIVE_VERSION);
     switch (header->type) {
     case NATIVE_DESCRIPTOR:

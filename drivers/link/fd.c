@@ -43,8 +43,7 @@ static double fd_capacity(const void *link)
     return 0;
 }
 
-static int fd_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event,
-                   int max)
+static int fd_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event, int max)
 {
     struct fd_link *self = link;
     struct link_events events = {event, 0, max};

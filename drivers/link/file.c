@@ -22,10 +22,9 @@ struct file_link {
 
 static int file_fail(struct sh_err *err, const char *path, int error)
 {
-    int code = error == EACCES || error == EPERM || error == EROFS ? SH_EPERM
-               : error == ENOENT || error == ENOTDIR || error == EISDIR || error == ENXIO || error == ELOOP
-                   ? SH_EINPUT
-                   : SH_EIO;
+    int code = error == EACCES || error == EPERM || error == EROFS                                          ? SH_EPERM
+               : error == ENOENT || error == ENOTDIR || error == EISDIR || error == ENXIO || error == ELOOP ? SH_EINPUT
+                                                                                                            : SH_EIO;
     return sh_fail(err, code, "link file:%s: cannot be opened for writing: %s", path, strerror(error));
 }
 
@@ -47,8 +46,7 @@ system:
     return SH_EIO;
 kind:
     if (fd >= 0) close(fd);
-    return sh_fail(err, SH_EINPUT,
-                   "link file:%s: neither a regular file nor a character device; use a pty or tcp link",
+    return sh_fail(err, SH_EINPUT, "link file:%s: neither a regular file nor a character device; use a pty or tcp link",
                    path);
 }
 
@@ -79,8 +77,7 @@ static double file_capacity(const void *link)
     return 0;
 }
 
-static int file_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event,
-                     int max)
+static int file_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event, int max)
 {
     struct file_link *file = link;
     struct link_events events = {event, 0, max};

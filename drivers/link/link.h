@@ -17,11 +17,11 @@ enum link_type { LINK_NULL, LINK_FILE, LINK_PTY, LINK_TCP, LINK_FD };
 
 struct link_spec {
     enum link_type type;
-    char path[256];    /* file: where to write; pty: symlink to the slave, may be empty */
-    char address[64];  /* tcp: numeric or name; empty: 127.0.0.1 */
-    int port;          /* tcp: 0 lets the system choose */
-    int max_sessions;  /* tcp: 1..LINK_MAX_SESSIONS */
-    int fd;            /* fd: a connected stream descriptor (socket pair), taken over */
+    char path[256];   /* file: where to write; pty: symlink to the slave, may be empty */
+    char address[64]; /* tcp: numeric or name; empty: 127.0.0.1 */
+    int port;         /* tcp: 0 lets the system choose */
+    int max_sessions; /* tcp: 1..LINK_MAX_SESSIONS */
+    int fd;           /* fd: a connected stream descriptor (socket pair), taken over */
 };
 
 enum link_event_kind {
@@ -35,8 +35,8 @@ enum link_event_kind {
 
 struct link_event {
     enum link_event_kind kind;
-    int session;      /* 0..max_sessions-1 */
-    char peer[64];    /* for LINK_OPENED, LINK_CLOSED, LINK_REFUSED: who, for the log */
+    int session;   /* 0..max_sessions-1 */
+    char peer[64]; /* for LINK_OPENED, LINK_CLOSED, LINK_REFUSED: who, for the log */
 };
 
 struct link_ops {

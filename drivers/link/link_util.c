@@ -59,8 +59,7 @@ ssize_t link_stream_write(int fd, const void *buf, size_t len)
     ssize_t n = send(fd, buf, len, MSG_DONTWAIT | MSG_NOSIGNAL);
     if (n >= 0) return n;
     /* ENOBUFS and ENOMEM: the system is short of memory for now, the connection is sound. */
-    if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR || errno == ENOBUFS || errno == ENOMEM)
-        return 0;
+    if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR || errno == ENOBUFS || errno == ENOMEM) return 0;
     return SH_ECLOSED;
 }
 
@@ -75,8 +74,8 @@ int link_stream_ended(int fd, short revents)
 void link_address_text(const struct sockaddr *address, unsigned len, char *buf, size_t size)
 {
     char host[64], port[8];
-    int rc = getnameinfo(address, (socklen_t)len, host, sizeof host, port, sizeof port,
-                         NI_NUMERICHOST | NI_NUMERICSERV);
+    int rc =
+        getnameinfo(address, (socklen_t)len, host, sizeof host, port, sizeof port, NI_NUMERICHOST | NI_NUMERICSERV);
     if (rc != 0)
         snprintf(buf, size, "unknown address");
     else if (strchr(host, ':') != NULL)

@@ -29,8 +29,7 @@ static double null_capacity(const void *link)
     return 0;
 }
 
-static int null_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event,
-                     int max)
+static int null_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event, int max)
 {
     struct null_link *null = link;
     struct link_events events = {event, 0, max};

@@ -58,8 +58,7 @@ static int pty_open(const struct link_spec *spec, void **link, struct sh_err *er
     }
     int rc = pty_device_open(&pty->device, spec->path, err);
     if (rc == SH_OK && pty_watch(pty) != SH_OK) {
-        rc = sh_fail(err, SH_EIO, "link pty:%s: inotify on %s: %s", spec->path, pty->device.slave,
-                     strerror(errno));
+        rc = sh_fail(err, SH_EIO, "link pty:%s: inotify on %s: %s", spec->path, pty->device.slave, strerror(errno));
         pty_device_close(&pty->device);
     }
     if (rc != SH_OK) {
@@ -150,8 +149,7 @@ static int pty_tell(struct pty_link *pty, struct link_events *events)
 {
     const char *name = pty->device.slave;
     if (pty->tell_closed) pty->tell_closed = !link_events_push(events, LINK_CLOSED, 0, name);
-    if (!pty->tell_closed && pty->tell_opened)
-        pty->tell_opened = !link_events_push(events, LINK_OPENED, 0, name);
+    if (!pty->tell_closed && pty->tell_opened) pty->tell_opened = !link_events_push(events, LINK_OPENED, 0, name);
     return !pty->tell_closed && !pty->tell_opened;
 }
 
@@ -164,8 +162,7 @@ static int pty_ended(const struct pty_link *pty, short revents)
     return (revents & POLLHUP) != 0 && (revents & POLLIN) == 0;
 }
 
-static int pty_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event,
-                    int max)
+static int pty_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event, int max)
 {
     struct pty_link *pty = link;
     struct link_events events = {event, 0, max};

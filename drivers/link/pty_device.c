@@ -13,8 +13,7 @@ static int pair_open(int *master, char *slave, size_t slave_len)
 {
     *master = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
     if (*master < 0) return -1;
-    if (grantpt(*master) == 0 && unlockpt(*master) == 0 && ptsname_r(*master, slave, slave_len) == 0)
-        return 0;
+    if (grantpt(*master) == 0 && unlockpt(*master) == 0 && ptsname_r(*master, slave, slave_len) == 0) return 0;
     int error = errno;
     close(*master);
     errno = error;
@@ -116,8 +115,7 @@ int pty_device_open(struct pty_device *device, const char *path, struct sh_err *
         return sh_fail(err, SH_EIO, "link pty:%s: no pseudo terminal to be had: %s", name, strerror(errno));
     int rc = SH_OK;
     if (slave_rest(device) != 0)
-        rc = sh_fail(err, SH_EIO, "link pty:%s: %s cannot be set up: %s", name, device->slave,
-                     strerror(errno));
+        rc = sh_fail(err, SH_EIO, "link pty:%s: %s cannot be set up: %s", name, device->slave, strerror(errno));
     else if (path[0] != '\0')
         rc = link_make(path, device->slave, err);
     if (rc != SH_OK) {

@@ -52,8 +52,7 @@ static int tcp_listen_any(const char *host, int port, int *out, struct sh_err *e
 {
     char service[8];
     snprintf(service, sizeof service, "%u", (unsigned)port & 0xffffu);
-    struct addrinfo hints = {.ai_socktype = SOCK_STREAM, .ai_flags = AI_PASSIVE | AI_NUMERICSERV},
-                    *list = NULL;
+    struct addrinfo hints = {.ai_socktype = SOCK_STREAM, .ai_flags = AI_PASSIVE | AI_NUMERICSERV}, *list = NULL;
     int rc = getaddrinfo(host, service, &hints, &list);
     if (rc != 0)
         return sh_fail(err, SH_EINPUT, "link tcp:%s:%d: no such address: %s", host, port,
@@ -68,9 +67,7 @@ static int tcp_listen_any(const char *host, int port, int *out, struct sh_err *e
         *out = fd;
         return SH_OK;
     }
-    int code = error == EACCES                                 ? SH_EPERM
-               : error == EADDRINUSE || error == EADDRNOTAVAIL ? SH_EINPUT
-                                                               : SH_EIO;
+    int code = error == EACCES ? SH_EPERM : error == EADDRINUSE || error == EADDRNOTAVAIL ? SH_EINPUT : SH_EIO;
     return sh_fail(err, code, "link tcp:%s:%d: cannot listen: %s%s", host, port, strerror(error),
                    error == EADDRINUSE ? "; port 0 lets the system choose" : "");
 }
@@ -174,8 +171,7 @@ static int tcp_tell_closed(struct tcp_session *session, int slot, struct link_ev
     return 1;
 }
 
-static int tcp_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event,
-                    int max)
+static int tcp_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event, int max)
 {
     struct tcp_link *tcp = link;
     struct link_events events = {event, 0, max};

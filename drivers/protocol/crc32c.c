@@ -28,9 +28,8 @@ uint32_t crc32c_table(uint32_t crc, const void *data, size_t len)
     crc = ~crc;
     for (; len >= 8; len -= 8, p += 8) {
         uint32_t lo = le_get32(p) ^ crc, hi = le_get32(p + 4);
-        crc = table[7][lo & 255u] ^ table[6][lo >> 8 & 255u] ^ table[5][lo >> 16 & 255u] ^
-              table[4][lo >> 24] ^ table[3][hi & 255u] ^ table[2][hi >> 8 & 255u] ^
-              table[1][hi >> 16 & 255u] ^ table[0][hi >> 24];
+        crc = table[7][lo & 255u] ^ table[6][lo >> 8 & 255u] ^ table[5][lo >> 16 & 255u] ^ table[4][lo >> 24] ^
+              table[3][hi & 255u] ^ table[2][hi >> 8 & 255u] ^ table[1][hi >> 16 & 255u] ^ table[0][hi >> 24];
     }
     for (; len > 0; len--, p++)
         crc = crc >> 8 ^ table[0][(crc ^ *p) & 255u];

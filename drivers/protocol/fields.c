@@ -57,9 +57,8 @@ static const struct field anchor[] = {
 
 #define POINTS(member, kind) ROW(native_points, member, kind)
 static const struct field points[] = {
-    POINTS(frame, FIELD_32),    POINTS(line, FIELD_32),       POINTS(pulse0, FIELD_64),
-    POINTS(t0_ns, FIELD_64),    POINTS(line_t0_ns, FIELD_64), POINTS(n_pulses, FIELD_32),
-    POINTS(n_points, FIELD_32),
+    POINTS(frame, FIELD_32),      POINTS(line, FIELD_32),     POINTS(pulse0, FIELD_64),   POINTS(t0_ns, FIELD_64),
+    POINTS(line_t0_ns, FIELD_64), POINTS(n_pulses, FIELD_32), POINTS(n_points, FIELD_32),
 };
 
 #define END(member, kind) ROW(native_line_end, member, kind)

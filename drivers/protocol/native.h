@@ -27,7 +27,7 @@ enum native_type {
     NATIVE_LINE_END = 4,
     NATIVE_TELEMETRY = 5,
     NATIVE_EVENT = 6,
-    NATIVE_SURFACES = 7,   /* names of some labels */
+    NATIVE_SURFACES = 7, /* names of some labels */
 };
 
 enum native_flags {
@@ -49,36 +49,36 @@ struct native_header {
 enum native_layout { NATIVE_POLAR = 0, NATIVE_GEO = 1 };
 
 struct native_descriptor {
-    char idn[96];              /* what *IDN? answers */
+    char idn[96]; /* what *IDN? answers */
     char profile[32];
-    uint32_t layout;           /* enum native_layout */
-    uint32_t isa;              /* packet width the stream was cast with: 1, 4, 8, 16 */
-    uint64_t prr_uhz, lines_uhz, pan_udeg_s;             /* micro-hertz, micro-degrees per second */
-    int64_t fov_min_udeg, sweep_udeg;                    /* whole sweep: where it starts, how far it goes */
-    int64_t line_start_udeg, line_stop_udeg;             /* pulses outside are fired, counted, not cast */
+    uint32_t layout;                         /* enum native_layout */
+    uint32_t isa;                            /* packet width the stream was cast with: 1, 4, 8, 16 */
+    uint64_t prr_uhz, lines_uhz, pan_udeg_s; /* micro-hertz, micro-degrees per second */
+    int64_t fov_min_udeg, sweep_udeg;        /* whole sweep: where it starts, how far it goes */
+    int64_t line_start_udeg, line_stop_udeg; /* pulses outside are fired, counted, not cast */
     int64_t pan_start_udeg, pan_stop_udeg;
-    double mirror_counts_per_turn, pan_counts_per_turn;  /* encoder counts; angle = 2 pi count / counts_per_turn */
-    double range_scale_m;      /* polar: metres per count */
+    double mirror_counts_per_turn, pan_counts_per_turn; /* encoder counts; angle = 2 pi count / counts_per_turn */
+    double range_scale_m;                               /* polar: metres per count */
     double range_min_m, range_max_m;
-    uint32_t max_echoes, n_surfaces, frames, scan;       /* frames per scan (0: endless); scan number from 1 */
+    uint32_t max_echoes, n_surfaces, frames, scan; /* frames per scan (0: endless); scan number from 1 */
     uint64_t seed;
 };
 
 enum native_crs { NATIVE_CRS_LOCAL = 0, NATIVE_CRS_ECEF = 1, NATIVE_CRS_UTM = 2 };
 
 struct native_anchor {
-    uint32_t crs;              /* enum native_crs */
-    uint32_t epsg;             /* 0 for local */
-    uint32_t station;          /* number, from 1 */
+    uint32_t crs;     /* enum native_crs */
+    uint32_t epsg;    /* 0 for local */
+    uint32_t station; /* number, from 1 */
     uint32_t reserved;
-    double anchor[3];          /* of the station in the CRS, metres */
-    double scale_m;            /* geo: position = anchor + scale_m * (x, y, z) */
+    double anchor[3]; /* of the station in the CRS, metres */
+    double scale_m;   /* geo: position = anchor + scale_m * (x, y, z) */
     double lat_deg, lon_deg, height_m;
-    double station_m[3];       /* of the station in the scene frame */
-    double rotation[9];        /* socs -> scene frame, row by row: p_prcs = station_m + rotation * p_socs */
+    double station_m[3]; /* of the station in the scene frame */
+    double rotation[9];  /* socs -> scene frame, row by row: p_prcs = station_m + rotation * p_socs */
 };
 
-struct native_points {         /* head of a points payload, 40 bytes, then n points of 20 */
+struct native_points { /* head of a points payload, 40 bytes, then n points of 20 */
     uint32_t frame, line;
     uint64_t pulse0;
     int64_t t0_ns, line_t0_ns; /* since the scan's start */
@@ -92,7 +92,7 @@ struct native_point {
     int16_t refl_cdb;
     uint16_t label;
     uint32_t dt_ns;
-    uint8_t echo, echo_count;  /* both 0: shot without echo */
+    uint8_t echo, echo_count; /* both 0: shot without echo */
 };
 
 struct native_line_end {
@@ -103,12 +103,12 @@ struct native_line_end {
 };
 
 struct native_telemetry {
-    uint32_t state;            /* enum head_state, in its order */
+    uint32_t state; /* enum head_state, in its order */
     uint32_t scan;
     uint64_t pulses, echoes, lines, lost_pulses, late_blocks;
     uint32_t late_max_us, errors_queued;
     uint64_t reader_lost_frames; /* of the reader who gets this frame; 0 in the common stream */
-    int64_t utc_ns;            /* UTC of this frame's device time, ns since 1970, 0 when unknown */
+    int64_t utc_ns;              /* UTC of this frame's device time, ns since 1970, 0 when unknown */
 };
 
 enum native_event_code {
@@ -138,8 +138,7 @@ int native_decode_event(const uint8_t *payload, size_t len, struct native_event 
 /* Surfaces payload: u32 first label, u32 count, then per label: u8 len, object, u8 len, material (no NUL).
  * Calls fn for each; names are NUL-terminated copies that live during the call. */
 int native_decode_surfaces(const uint8_t *payload, size_t len,
-                           void (*fn)(void *ctx, uint32_t label, const char *object, const char *material),
-                           void *ctx);
+                           void (*fn)(void *ctx, uint32_t label, const char *object, const char *material), void *ctx);
 
 /* ---- the parser: bytes in, frames and reply lines out, in order.
  *
@@ -152,8 +151,8 @@ enum native_item { NATIVE_MORE = 0, NATIVE_FRAME = 1, NATIVE_TEXT = 2 };
 
 struct native_stats {
     uint64_t frames, bytes, texts;
-    uint64_t bad_payload, bad_bytes;   /* frames with a wrong payload CRC; bytes skipped in search of a frame */
-    uint64_t seq_gaps, seq_lost;       /* jumps in seq, and frames missing by them */
+    uint64_t bad_payload, bad_bytes; /* frames with a wrong payload CRC; bytes skipped in search of a frame */
+    uint64_t seq_gaps, seq_lost;     /* jumps in seq, and frames missing by them */
 };
 
 struct native_parser {
@@ -164,7 +163,7 @@ struct native_parser {
     struct native_stats stats;
     /* the item found last: valid until the next call of any parser function */
     struct native_header header;
-    const uint8_t *frame;   /* header and payload as on the wire */
+    const uint8_t *frame; /* header and payload as on the wire */
     const uint8_t *payload;
     char text[NATIVE_MAX_TEXT]; /* without CR LF */
 };

@@ -66,8 +66,7 @@ static int take_name(const uint8_t *payload, size_t len, size_t *at, char name[2
 }
 
 int native_decode_surfaces(const uint8_t *payload, size_t len,
-                           void (*fn)(void *ctx, uint32_t label, const char *object, const char *material),
-                           void *ctx)
+                           void (*fn)(void *ctx, uint32_t label, const char *object, const char *material), void *ctx)
 {
     if (len < 8) return SH_EFORMAT;
     uint32_t first = le_get32(payload), count = le_get32(payload + 4);
@@ -89,6 +88,6 @@ int native_decode_surfaces(const uint8_t *payload, size_t len,
 int native_is_hashed(const struct native_header *header)
 {
     if ((header->flags & (NATIVE_REPEAT | NATIVE_LOCAL)) != 0) return 0;
-    return header->type == NATIVE_DESCRIPTOR || header->type == NATIVE_ANCHOR ||
-           header->type == NATIVE_POINTS || header->type == NATIVE_LINE_END;
+    return header->type == NATIVE_DESCRIPTOR || header->type == NATIVE_ANCHOR || header->type == NATIVE_POINTS ||
+           header->type == NATIVE_LINE_END;
 }

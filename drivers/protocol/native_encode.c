@@ -34,8 +34,7 @@ static size_t encode_fixed(uint8_t *dst, size_t cap, enum native_type type, cons
     return put_header(dst, type, flags, table->wire_len, t_ns);
 }
 
-size_t native_encode_descriptor(uint8_t *dst, size_t cap, const struct native_descriptor *d, int64_t t_ns,
-                                int flags)
+size_t native_encode_descriptor(uint8_t *dst, size_t cap, const struct native_descriptor *d, int64_t t_ns, int flags)
 {
     return encode_fixed(dst, cap, NATIVE_DESCRIPTOR, &fields_descriptor, d, t_ns, flags);
 }
@@ -45,8 +44,7 @@ size_t native_encode_anchor(uint8_t *dst, size_t cap, const struct native_anchor
     return encode_fixed(dst, cap, NATIVE_ANCHOR, &fields_anchor, a, t_ns, flags);
 }
 
-size_t native_encode_telemetry(uint8_t *dst, size_t cap, const struct native_telemetry *t, int64_t t_ns,
-                               int flags)
+size_t native_encode_telemetry(uint8_t *dst, size_t cap, const struct native_telemetry *t, int64_t t_ns, int flags)
 {
     return encode_fixed(dst, cap, NATIVE_TELEMETRY, &fields_telemetry, t, t_ns, flags);
 }
@@ -104,8 +102,7 @@ static uint32_t points_that_fit(const struct line_block *block, uint32_t first)
 static uint32_t put_points(uint8_t *restrict dst, const struct line_block *block, uint32_t first, uint32_t n,
                            uint32_t dt0_ns)
 {
-    const uint32_t *restrict a = block->a + first, *restrict b = block->b + first,
-                             *restrict c = block->c + first;
+    const uint32_t *restrict a = block->a + first, *restrict b = block->b + first, *restrict c = block->c + first;
     const uint32_t *restrict dt_ns = block->dt_ns + first;
     const int16_t *restrict refl = block->refl_cdb + first;
     const uint16_t *restrict label = block->label + first;
@@ -170,8 +167,7 @@ static size_t put_name(uint8_t *dst, size_t room, const char *name)
 }
 
 size_t native_encode_surfaces(uint8_t *dst, size_t cap, uint32_t first, uint32_t n, size_t max_payload,
-                              void (*name)(void *ctx, uint32_t label, const char **object,
-                                           const char **material),
+                              void (*name)(void *ctx, uint32_t label, const char **object, const char **material),
                               void *ctx, int64_t t_ns, int flags, uint32_t *n_done)
 {
     *n_done = 0;

@@ -61,8 +61,7 @@ static void look(const struct reference *r, uint32_t triangle, const double orig
 
 /* In double, with a margin of twice its rounding: sure that the ray misses? Saves nearly all of the long
  * double work. */
-static int surely_misses(const struct reference *r, uint32_t triangle, const double origin[3],
-                         const double dir[3])
+static int surely_misses(const struct reference *r, uint32_t triangle, const double origin[3], const double dir[3])
 {
     double v[3][3], side[3], size = 0.0;
     for (int i = 0; i < 3; i++) {
@@ -84,8 +83,8 @@ static int surely_misses(const struct reference *r, uint32_t triangle, const dou
     return plus && minus;
 }
 
-static void try_triangle(const struct reference *r, uint32_t triangle, const double origin[3],
-                         const double dir[3], struct reference_hit *best)
+static void try_triangle(const struct reference *r, uint32_t triangle, const double origin[3], const double dir[3],
+                         struct reference_hit *best)
 {
     if (surely_misses(r, triangle, origin, dir)) return;
     struct view v;
@@ -182,8 +181,7 @@ static uint32_t lay_out(struct reference *r)
     return (uint32_t)(r->cells[0] * r->cells[1] * r->cells[2]);
 }
 
-struct reference *reference_create(const double (*vertex_m)[3], const uint32_t (*triangle)[3],
-                                   uint32_t n_triangles)
+struct reference *reference_create(const double (*vertex_m)[3], const uint32_t (*triangle)[3], uint32_t n_triangles)
 {
     struct reference *r = calloc(1, sizeof *r);
     if (r == NULL) return NULL;
@@ -321,8 +319,7 @@ int reference_is_undecidable(const struct reference *r, const double origin_m[3]
     return 0;
 }
 
-double reference_margin_m(const struct reference *r, const double origin_m[3], const double dir[3],
-                          uint32_t triangle)
+double reference_margin_m(const struct reference *r, const double origin_m[3], const double dir[3], uint32_t triangle)
 {
     const ext d[3] = {dir[0], dir[1], dir[2]};
     struct view v;

@@ -23,15 +23,12 @@ struct reference_hit {
 };
 
 /* The arrays must outlive the reference. NULL: no memory. */
-struct reference *reference_create(const double (*vertex_m)[3], const uint32_t (*triangle)[3],
-                                   uint32_t n_triangles);
+struct reference *reference_create(const double (*vertex_m)[3], const uint32_t (*triangle)[3], uint32_t n_triangles);
 void reference_free(struct reference *reference);
 
 /* The nearest triangle that the ray meets, borders included. Thread: any number at once. */
-struct reference_hit reference_cast(const struct reference *reference, const double origin_m[3],
-                                    const double dir[3]);
-struct reference_hit reference_brute(const struct reference *reference, const double origin_m[3],
-                                     const double dir[3]);
+struct reference_hit reference_cast(const struct reference *reference, const double origin_m[3], const double dir[3]);
+struct reference_hit reference_brute(const struct reference *reference, const double origin_m[3], const double dir[3]);
 
 /* Metres between a measured range (NaN: nothing met) and the true one; infinite where only one of them met
  * something. */

@@ -46,8 +46,7 @@ static const struct place PLACE[] = {
 enum { N_PLACES = 4 };
 
 struct tally {
-    uint64_t rays, hits, differ,
-        undecidable; /* differ: off by more than the bound, and double precision could tell */
+    uint64_t rays, hits, differ, undecidable; /* differ: off by more than the bound, and double precision could tell */
     double max_m, farthest_m, nearest_m;
 };
 
@@ -71,8 +70,7 @@ static double unit(uint64_t key, uint64_t i)
 static void aim(struct job *j, uint64_t number, uint32_t at)
 {
     double limit = number % 8 == 0 ? 1.0 : sin(acos(-1.0) / 3.0);
-    double z = limit * (2.0 * unit(j->seed, 2 * number) - 1.0),
-           turn = 2.0 * acos(-1.0) * unit(j->seed, 2 * number + 1);
+    double z = limit * (2.0 * unit(j->seed, 2 * number) - 1.0), turn = 2.0 * acos(-1.0) * unit(j->seed, 2 * number + 1);
     double r = sqrt(1.0 - z * z);
     j->dx[at] = r * cos(turn);
     j->dy[at] = r * sin(turn);
@@ -94,8 +92,8 @@ static void judge(struct job *j, uint32_t i)
             return;
         }
         if (t->differ++ < 3)
-            printf("# ray %.17g %.17g %.17g: %.12g m, triangle %u; truth %.12Lg m, triangle %u\n", dir[0],
-                   dir[1], dir[2], j->range_m[i], j->triangle[i], truth.range_m, truth.triangle);
+            printf("# ray %.17g %.17g %.17g: %.12g m, triangle %u; truth %.12Lg m, triangle %u\n", dir[0], dir[1],
+                   dir[2], j->range_m[i], j->triangle[i], truth.range_m, truth.triangle);
     }
     if (truth.triangle == REFERENCE_NONE) return;
     t->max_m = fmax(t->max_m, error_m);
@@ -131,8 +129,8 @@ static void add(struct tally *sum, const struct tally *t)
 static struct tally all_rays; /* of all scans, for the share that double precision can't tell */
 
 /* Scans from a station with the BVH's frame about origin_m. */
-static void scan(const struct scene *scene, const double station_m[3], const double origin_m[3],
-                 uint32_t rays, const char *what)
+static void scan(const struct scene *scene, const double station_m[3], const double origin_m[3], uint32_t rays,
+                 const char *what)
 {
     struct tally sum = {.nearest_m = INFINITY};
     struct sh_err err;
@@ -168,8 +166,8 @@ static void scan(const struct scene *scene, const double station_m[3], const dou
     reference_free(reference);
     bvh_free(bvh);
     printf("# %-44s %8llu rays, %.3g to %.4g m: largest error %8.2g m, %llu differ, %llu undecidable\n", what,
-           (unsigned long long)sum.rays, sum.nearest_m, sum.farthest_m, sum.max_m,
-           (unsigned long long)sum.differ, (unsigned long long)sum.undecidable);
+           (unsigned long long)sum.rays, sum.nearest_m, sum.farthest_m, sum.max_m, (unsigned long long)sum.differ,
+           (unsigned long long)sum.undecidable);
     fflush(stdout);
     add(&all_rays, &sum);
     assert_true(sum.hits > 1000 / SHARE);
@@ -197,8 +195,8 @@ static void test_grid_is_brute_force(void **state)
         double origin_m[3] = {centre[0] + 3.0, centre[1] - 7.0, 5.0}, dir[3], target_m[3];
         if (i % 3 == 0) origin_m[0] += 100.0; /* from outside: rays that pass by, too */
         for (int k = 0; k < 3; k++)
-            target_m[k] = scene->min_m[k] +
-                          (1.4 * unit(key, 4 * i + (uint64_t)k) - 0.2) * (scene->max_m[k] - scene->min_m[k]);
+            target_m[k] =
+                scene->min_m[k] + (1.4 * unit(key, 4 * i + (uint64_t)k) - 0.2) * (scene->max_m[k] - scene->min_m[k]);
         if (i % 5 == 0) /* a vertex */
             memcpy(target_m, scene->vertex_m[rng_u64(key, 4 * i + 3) % scene->n_vertices], sizeof target_m);
         for (int k = 0; k < 3; k++)
@@ -238,8 +236,7 @@ static void test_brute_force_is_analytic(void **state)
         int inside = range > 0 && x >= -8 && y >= -8 && x + y <= 16;
         assert_true(inside == (hit.triangle == 0));
         if (inside)
-            assert_true(fabsl(hit.range_m - range) <=
-                        64 * 0x1p-64L * range * fabsl(range)); /* 1/cos <= 4 range */
+            assert_true(fabsl(hit.range_m - range) <= 64 * 0x1p-64L * range * fabsl(range)); /* 1/cos <= 4 range */
         hits += (uint32_t)inside;
     }
     assert_true(hits > 1000);
@@ -271,8 +268,8 @@ static struct scene *make_room(const double offset_m[3])
             nt += 2;
         }
     }
-    assert_int_equal(scene_from_arrays((const double(*)[3])vertex, nv, (const uint32_t(*)[3])triangle, nt,
-                                       NULL, NULL, 0, &scene, &err),
+    assert_int_equal(scene_from_arrays((const double(*)[3])vertex, nv, (const uint32_t(*)[3])triangle, nt, NULL, NULL,
+                                       0, &scene, &err),
                      SH_OK);
     return scene;
 }

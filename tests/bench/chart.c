@@ -96,8 +96,8 @@ static int fill_planes(struct chart *c)
 
 VEC_CLONES
 static void refine(const double *restrict plane, uint32_t n_triangles, const uint32_t *restrict prim,
-                   const double *restrict dx, const double *restrict dy, const double *restrict dz,
-                   uint32_t n, double *restrict range_m)
+                   const double *restrict dx, const double *restrict dy, const double *restrict dz, uint32_t n,
+                   double *restrict range_m)
 {
     for (uint32_t i = 0; i < n; i++) {
         int64_t at = (int64_t)(prim[i] < n_triangles ? prim[i] : n_triangles) * 4;
@@ -119,8 +119,8 @@ static void cast(struct chart *c, const struct method *m)
         uint32_t n = rays->n - at < CHUNK ? rays->n - at : CHUNK;
         bench_embree_pass(e, m->width, BENCH_LOADED, at, n);
         if (m->kind == REFINED)
-            refine(c->plane, c->scene->n_triangles, e->prim + at, rays->dx + at, rays->dy + at, rays->dz + at,
-                   n, c->range_m + at);
+            refine(c->plane, c->scene->n_triangles, e->prim + at, rays->dx + at, rays->dy + at, rays->dz + at, n,
+                   c->range_m + at);
     }
 }
 
@@ -224,8 +224,7 @@ static int set_up(struct chart *c, struct sh_err *err)
     static const double centre_m[2] = {0.0, 0.0};
     struct bvh_info info;
     c->station_m[2] = 4.7;
-    int rc =
-        generate_terrain(c->spec->triangles, c->spec->side_m, c->spec->rough_m, centre_m, 1, &c->scene, err);
+    int rc = generate_terrain(c->spec->triangles, c->spec->side_m, c->spec->rough_m, centre_m, 1, &c->scene, err);
     if (rc == SH_OK) rc = bench_rays_create(LINES, &c->rays, err);
     for (int robust = 0; robust < 2 && rc == SH_OK; robust++) {
         struct bench_embree *e = &c->embree[robust];
@@ -265,8 +264,8 @@ static void print_rows(const struct method *method, const char *scene)
     static const char *const kind[] = {"float", "refined", "decided"};
     for (int i = 0; i < METHODS; i++) {
         const struct method *m = &method[i];
-        printf("cast,%s %s %u,%s,%.3f,%.3g,%.3g,%d,%d\n", m->robust ? "robust" : "plain", kind[m->kind],
-               m->width, scene, m->ns_median, m->err_p999_m, m->err_max_m, m->front, m->is_default);
+        printf("cast,%s %s %u,%s,%.3f,%.3g,%.3g,%d,%d\n", m->robust ? "robust" : "plain", kind[m->kind], m->width,
+               scene, m->ns_median, m->err_p999_m, m->err_max_m, m->front, m->is_default);
     }
 }
 

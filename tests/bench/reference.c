@@ -105,10 +105,9 @@ static long double dot(const long double a[3], const long double b[3])
 
 /* What a ray has met so far. */
 struct met {
-    long double range; /* of the first triangle; its border belongs to it, and a little around it, so that
-                        * there is no gap between neighbours in long double */
-    long double
-        around[2]; /* of the first one that it meets or just misses, seen from its front, from its back */
+    long double range;     /* of the first triangle; its border belongs to it, and a little around it, so that
+                            * there is no gap between neighbours in long double */
+    long double around[2]; /* of the first one that it meets or just misses, seen from its front, from its back */
 };
 
 static void hit(const struct reference *r, uint32_t prim, const long double dir[3], struct met *met)
@@ -117,8 +116,7 @@ static void hit(const struct reference *r, uint32_t prim, const long double dir[
     long double v[3][3], e1[3], e2[3], p[3], q[3], s[3];
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
-            v[i][j] = (long double)r->scene->vertex_m[r->scene->triangle[prim][i]][j] -
-                      (long double)r->station_m[j];
+            v[i][j] = (long double)r->scene->vertex_m[r->scene->triangle[prim][i]][j] - (long double)r->station_m[j];
     for (int j = 0; j < 3; j++) {
         e1[j] = v[1][j] - v[0][j];
         e2[j] = v[2][j] - v[0][j];
@@ -153,8 +151,7 @@ long double reference_range(const struct reference *r, const double dir[3], int 
     struct met met = {none, {none, none}};
     for (int y = 0; y < CELLS; y++) {
         double lo = r->min_m[1] + y * r->cell_m[1], t0, t1;
-        if (!part_within(dir[1], lo - r->margin_m, lo + r->cell_m[1] + r->margin_m, r->reach_m, &t0, &t1))
-            continue;
+        if (!part_within(dir[1], lo - r->margin_m, lo + r->cell_m[1] + r->margin_m, r->reach_m, &t0, &t1)) continue;
         int from, to;
         cells_of(r, 0, fmin(t0 * dir[0], t1 * dir[0]), fmax(t0 * dir[0], t1 * dir[0]), &from, &to);
         for (int x = from; x <= to; x++)

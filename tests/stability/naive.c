@@ -14,10 +14,10 @@ struct naive {
 
 static int fill(RTCGeometry geometry, const struct scene *scene, const double origin_m[3])
 {
-    float *vertex = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                            3 * sizeof *vertex, scene->n_vertices);
-    uint32_t *index = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                              3 * sizeof *index, scene->n_triangles);
+    float *vertex = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof *vertex,
+                                            scene->n_vertices);
+    uint32_t *index = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof *index,
+                                              scene->n_triangles);
     if (vertex == NULL || index == NULL) return -1;
     for (size_t i = 0; i < 3 * (size_t)scene->n_vertices; i++)
         vertex[i] = (float)(scene->vertex_m[i / 3][i % 3] - origin_m[i % 3]);
@@ -26,8 +26,7 @@ static int fill(RTCGeometry geometry, const struct scene *scene, const double or
     return 0;
 }
 
-struct naive *naive_create(const struct scene *scene, const double origin_m[3], int robust,
-                           unsigned build_threads)
+struct naive *naive_create(const struct scene *scene, const double origin_m[3], int robust, unsigned build_threads)
 {
     struct naive *naive = calloc(1, sizeof *naive);
     char config[32];
@@ -75,57 +74,55 @@ void naive_free(struct naive *naive)
     context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT
 #endif
 
-#define PACKETS_OF(W)                                                                                 \
-    static void hits_##W(const struct naive *naive, const float org[3], uint32_t n, const double *dx, \
-                         const double *dy, const double *dz, double *range_m, uint32_t *triangle)     \
-    {                                                                                                 \
-        CONTEXT;                                                                                      \
-        for (uint32_t base = 0; base < n; base += W) {                                                \
-            struct RTCRayHit##W packet __attribute__((aligned(64))) = {0};                            \
-            int valid[W] __attribute__((aligned(64)));                                                \
-            for (uint32_t i = 0; i < W; i++) {                                                        \
-                uint32_t at = base + i < n ? base + i : base;                                         \
-                valid[i] = base + i < n ? -1 : 0;                                                     \
-                packet.ray.org_x[i] = org[0];                                                         \
-                packet.ray.org_y[i] = org[1];                                                         \
-                packet.ray.org_z[i] = org[2];                                                         \
-                packet.ray.dir_x[i] = (float)dx[at];                                                  \
-                packet.ray.dir_y[i] = (float)dy[at];                                                  \
-                packet.ray.dir_z[i] = (float)dz[at];                                                  \
-                packet.ray.tfar[i] = INFINITY;                                                        \
-                packet.ray.mask[i] = 0xffffffffU;                                                     \
-                packet.hit.geomID[i] = packet.hit.primID[i] = RTC_INVALID_GEOMETRY_ID;                \
-                packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;                                    \
-            }                                                                                         \
-            CALL(W, valid, naive->rtc, &packet);                                                      \
-            for (uint32_t i = 0; i < W && base + i < n; i++) {                                        \
-                triangle[base + i] = packet.hit.primID[i];                                            \
-                range_m[base + i] = packet.hit.primID[i] == RTC_INVALID_GEOMETRY_ID                   \
-                                        ? (double)NAN                                                 \
-                                        : (double)packet.ray.tfar[i];                                 \
-            }                                                                                         \
-        }                                                                                             \
+#define PACKETS_OF(W)                                                                                           \
+    static void hits_##W(const struct naive *naive, const float org[3], uint32_t n, const double *dx,           \
+                         const double *dy, const double *dz, double *range_m, uint32_t *triangle)               \
+    {                                                                                                           \
+        CONTEXT;                                                                                                \
+        for (uint32_t base = 0; base < n; base += W) {                                                          \
+            struct RTCRayHit##W packet __attribute__((aligned(64))) = {0};                                      \
+            int valid[W] __attribute__((aligned(64)));                                                          \
+            for (uint32_t i = 0; i < W; i++) {                                                                  \
+                uint32_t at = base + i < n ? base + i : base;                                                   \
+                valid[i] = base + i < n ? -1 : 0;                                                               \
+                packet.ray.org_x[i] = org[0];                                                                   \
+                packet.ray.org_y[i] = org[1];                                                                   \
+                packet.ray.org_z[i] = org[2];                                                                   \
+                packet.ray.dir_x[i] = (float)dx[at];                                                            \
+                packet.ray.dir_y[i] = (float)dy[at];                                                            \
+                packet.ray.dir_z[i] = (float)dz[at];                                                            \
+                packet.ray.tfar[i] = INFINITY;                                                                  \
+                packet.ray.mask[i] = 0xffffffffU;                                                               \
+                packet.hit.geomID[i] = packet.hit.primID[i] = RTC_INVALID_GEOMETRY_ID;                          \
+                packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;                                              \
+            }                                                                                                   \
+            CALL(W, valid, naive->rtc, &packet);                                                                \
+            for (uint32_t i = 0; i < W && base + i < n; i++) {                                                  \
+                triangle[base + i] = packet.hit.primID[i];                                                      \
+                range_m[base + i] =                                                                             \
+                    packet.hit.primID[i] == RTC_INVALID_GEOMETRY_ID ? (double)NAN : (double)packet.ray.tfar[i]; \
+            }                                                                                                   \
+        }                                                                                                       \
     }
 
 PACKETS_OF(4)
 PACKETS_OF(8)
 PACKETS_OF(16)
 
-static void hits_1(const struct naive *naive, const float org[3], uint32_t n, const double *dx,
-                   const double *dy, const double *dz, double *range_m, uint32_t *triangle)
+static void hits_1(const struct naive *naive, const float org[3], uint32_t n, const double *dx, const double *dy,
+                   const double *dz, double *range_m, uint32_t *triangle)
 {
     CONTEXT;
     for (uint32_t i = 0; i < n; i++) {
-        struct RTCRayHit ray = {
-            .ray = {.org_x = org[0],
-                    .org_y = org[1],
-                    .org_z = org[2],
-                    .dir_x = (float)dx[i],
-                    .dir_y = (float)dy[i],
-                    .dir_z = (float)dz[i],
-                    .tfar = INFINITY,
-                    .mask = 0xffffffffU},
-            .hit = {.geomID = RTC_INVALID_GEOMETRY_ID, .primID = RTC_INVALID_GEOMETRY_ID}};
+        struct RTCRayHit ray = {.ray = {.org_x = org[0],
+                                        .org_y = org[1],
+                                        .org_z = org[2],
+                                        .dir_x = (float)dx[i],
+                                        .dir_y = (float)dy[i],
+                                        .dir_z = (float)dz[i],
+                                        .tfar = INFINITY,
+                                        .mask = 0xffffffffU},
+                                .hit = {.geomID = RTC_INVALID_GEOMETRY_ID, .primID = RTC_INVALID_GEOMETRY_ID}};
         ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
         CALL_ONE(naive->rtc, &ray);
         triangle[i] = ray.hit.primID;
@@ -133,8 +130,8 @@ static void hits_1(const struct naive *naive, const float org[3], uint32_t n, co
     }
 }
 
-void naive_hits(const struct naive *naive, unsigned packet, const double station_m[3], uint32_t n,
-                const double *dx, const double *dy, const double *dz, double *range_m, uint32_t *triangle)
+void naive_hits(const struct naive *naive, unsigned packet, const double station_m[3], uint32_t n, const double *dx,
+                const double *dy, const double *dz, double *range_m, uint32_t *triangle)
 {
     float org[3];
     for (int k = 0; k < 3; k++)

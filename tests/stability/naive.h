@@ -10,13 +10,12 @@
 struct naive;
 
 /* The mesh minus origin_m in float; origin 0: the scene's own coordinates. NULL: no memory. */
-struct naive *naive_create(const struct scene *scene, const double origin_m[3], int robust,
-                           unsigned build_threads);
+struct naive *naive_create(const struct scene *scene, const double origin_m[3], int robust, unsigned build_threads);
 void naive_free(struct naive *naive);
 
 /* packet: 1, 4, 8 or 16 rays per call. Range NaN and triangle UINT32_MAX where nothing is met. Thread: any
  * number at once. */
-void naive_hits(const struct naive *naive, unsigned packet, const double station_m[3], uint32_t n,
-                const double *dx, const double *dy, const double *dz, double *range_m, uint32_t *triangle);
+void naive_hits(const struct naive *naive, unsigned packet, const double station_m[3], uint32_t n, const double *dx,
+                const double *dy, const double *dz, double *range_m, uint32_t *triangle);
 
 #endif

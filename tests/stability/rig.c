@@ -17,8 +17,7 @@ void rig_rebuild(struct rig *rig, const double origin_m[3], unsigned threads)
     struct sh_err err;
     bvh_free(rig->bvh);
     rig->bvh = NULL;
-    if (bvh_create(rig->scene, origin_m, distance_m(origin_m, rig->station_m), threads, NULL, &rig->bvh,
-                   &err) != SH_OK)
+    if (bvh_create(rig->scene, origin_m, distance_m(origin_m, rig->station_m), threads, NULL, &rig->bvh, &err) != SH_OK)
         fail_msg("%s", err.text);
     if (rig->exact_order && bvh_order_exactly(rig->bvh, &err) != SH_OK) fail_msg("%s", err.text);
 }
@@ -37,8 +36,8 @@ void rig_open(struct rig *rig, struct scene *scene, const double station_m[3], c
     memcpy(rig->station_m, station_m, sizeof rig->station_m);
     rig_rebuild(rig, origin_m, 1);
     if (caster_create(&rig->caster, &err) != SH_OK) fail_msg("%s", err.text);
-    rig->reference = reference_create((const double(*)[3])scene->vertex_m,
-                                      (const uint32_t(*)[3])scene->triangle, scene->n_triangles);
+    rig->reference = reference_create((const double(*)[3])scene->vertex_m, (const uint32_t(*)[3])scene->triangle,
+                                      scene->n_triangles);
     if (rig->reference == NULL) fail_msg("no memory for the reference");
 }
 
@@ -153,11 +152,11 @@ void rig_row_of_ranges(struct rig *rig, const char *regime, const double naive_o
     struct rig_errors naive = rig_errors_of(rig, 0);
     rig_cast(rig);
     struct rig_errors ours = rig_errors_of(rig, 1);
-    table_row(regime, "float rays and vertices", naive.max_m,
-              ours.missed != 0 ? (double)INFINITY : ours.max_m, bound_m, "m");
+    table_row(regime, "float rays and vertices", naive.max_m, ours.missed != 0 ? (double)INFINITY : ours.max_m, bound_m,
+              "m");
     if (ours.undecidable != 0)
-        table_note("%llu of %u rays pass an edge too near for double precision",
-                   (unsigned long long)ours.undecidable, rig->n);
+        table_note("%llu of %u rays pass an edge too near for double precision", (unsigned long long)ours.undecidable,
+                   rig->n);
 }
 
 void rig_row_of_rays(struct rig *rig, const char *regime, const double naive_origin_m[3])

@@ -15,7 +15,7 @@
 struct rig {
     struct scene *scene;
     struct bvh *bvh;
-    int exact_order;      /* overlapping surfaces are ordered in double */
+    int exact_order; /* overlapping surfaces are ordered in double */
     struct caster *caster;
     struct reference *reference;
     double station_m[3];

@@ -10,8 +10,7 @@ void table_head(const char *title)
     printf("# %s\n# %-50s %-34s %10s %10s %10s\n", title, "regime", "naive method", "naive", "ours", "bound");
 }
 
-void table_row(const char *regime, const char *naive_method, double naive, double ours, double bound,
-               const char *unit)
+void table_row(const char *regime, const char *naive_method, double naive, double ours, double bound, const char *unit)
 {
     const char *verdict = "";
     if (!(ours <= bound))
@@ -19,8 +18,7 @@ void table_row(const char *regime, const char *naive_method, double naive, doubl
     else if (!(naive > bound))
         verdict = "  THE NAIVE METHOD HOLDS: proves nothing";
     failed_rows += verdict[0] != '\0';
-    printf("# %-50s %-34s %10.3g %10.3g %10.3g %s%s\n", regime, naive_method, naive, ours, bound, unit,
-           verdict);
+    printf("# %-50s %-34s %10.3g %10.3g %10.3g %s%s\n", regime, naive_method, naive, ours, bound, unit, verdict);
     fflush(stdout);
 }
 

@@ -14,8 +14,7 @@
 /* Column heads; once per program. */
 void table_head(const char *title);
 /* unit: "m", "ns", "rays" and so on; the same for all three figures. */
-void table_row(const char *regime, const char *naive_method, double naive, double ours, double bound,
-               const char *unit);
+void table_row(const char *regime, const char *naive_method, double naive, double ours, double bound, const char *unit);
 /* A line of words below a row. */
 void table_note(const char *format, ...) __attribute__((format(printf, 1, 2)));
 /* Fails the running test if a row since the last call failed: so that all rows are seen. */

@@ -54,9 +54,8 @@ static void write_obj(FILE *f, const struct mesh *m)
 
 static void write_ply_head(FILE *f, const struct mesh *m, const char *format)
 {
-    fprintf(
-        f, "ply\nformat %s 1.0\nelement vertex %u\nproperty double x\nproperty double y\nproperty double z\n",
-        format, m->n_vertices);
+    fprintf(f, "ply\nformat %s 1.0\nelement vertex %u\nproperty double x\nproperty double y\nproperty double z\n",
+            format, m->n_vertices);
     fprintf(f, "element face %u\nproperty list uchar int vertex_indices\nend_header\n", m->n_triangles);
 }
 
@@ -94,8 +93,8 @@ static void write_stl(FILE *f, const struct mesh *m)
     fprintf(f, "endsolid site\n");
 }
 
-static int load_site(const struct mesh *mesh, const char *ending,
-                     void (*write)(FILE *f, const struct mesh *m), struct scene **scene, struct sh_err *err)
+static int load_site(const struct mesh *mesh, const char *ending, void (*write)(FILE *f, const struct mesh *m),
+                     struct scene **scene, struct sh_err *err)
 {
     char folder[] = "/tmp/scanhead-stability-XXXXXX", path[64];
     if (mkdtemp(folder) == NULL) fail_msg("no folder under /tmp");
@@ -116,8 +115,8 @@ static int load_site(const struct mesh *mesh, const char *ending,
 /* Ranges go up to 42 m and rays meet the ground at up to about 89.9 degrees. Ours: vertices minus station are
  * exact (both are multiples of 2^-10 m), so the double arithmetic after them errs by 16 x 2^-53 x 42 m / cos
  * i < 1e-10 m; the micrometre promised holds with much to spare. Naive: floats at 5.8e6 m are 0.5 m apart. */
-static void site_row(const struct place *place, const struct mesh *mesh, const char *ending,
-                     const char *format, void (*write)(FILE *f, const struct mesh *m))
+static void site_row(const struct place *place, const struct mesh *mesh, const char *ending, const char *format,
+                     void (*write)(FILE *f, const struct mesh *m))
 {
     struct scene *scene;
     struct sh_err err;
@@ -158,8 +157,7 @@ static void refused_row(const struct place *place, const struct mesh *mesh)
 static void test_large_coordinates(void **state)
 {
     (void)state;
-    struct place place[2] = {{"UTM", {1, 0, 0, 0, 1, 0, 0, 0, 1}, {391431.0, 5819712.0, 34.0}},
-                             {.name = "ECEF"}};
+    struct place place[2] = {{"UTM", {1, 0, 0, 0, 1, 0, 0, 0, 1}, {391431.0, 5819712.0, 34.0}}, {.name = "ECEF"}};
     to_ecef(&place[1]);
     for (int i = 0; i < 2; i++) {
         struct mesh mesh = {0};
@@ -230,8 +228,7 @@ static struct scene *make_slope(double cell_m)
         p[1] += UTM_N_M;
     }
     struct scene *scene = mesh_scene(&mesh);
-    for (uint32_t t = 0; t < scene->n_triangles;
-         t++) /* of all sizes: planes carry them in their lowest bits */
+    for (uint32_t t = 0; t < scene->n_triangles; t++) /* of all sizes: planes carry them in their lowest bits */
         scene->label[t] = (uint16_t)(48611 * (t + 1) % SCENE_MAX_SURFACES);
     mesh_free(&mesh);
     return scene;
@@ -260,12 +257,10 @@ static void aim_along_slope(struct rig *rig, double range_m)
 /* The plane's range by its formula, in long double from the very station and direction that were cast. */
 static double slope_error_m(const struct rig *rig)
 {
-    long double z =
-        (rig->station_m[0] - (long double)UTM_E_M) / 8 + (rig->station_m[1] - (long double)UTM_N_M) / 4;
+    long double z = (rig->station_m[0] - (long double)UTM_E_M) / 8 + (rig->station_m[1] - (long double)UTM_N_M) / 4;
     double worst_m = 0.0;
     for (uint32_t i = 0; i < rig->n; i++) {
-        long double down =
-            (long double)rig->dx[i] / 8 + (long double)rig->dy[i] / 4 - (long double)rig->dz[i];
+        long double down = (long double)rig->dx[i] / 8 + (long double)rig->dy[i] / 4 - (long double)rig->dz[i];
         double error_m = (double)fabsl((rig->station_m[2] - z) / down - (long double)rig->range_m[i]);
         worst_m = isnan(error_m) ? (double)INFINITY : fmax(worst_m, error_m);
     }
@@ -281,8 +276,7 @@ static double slope_error_m(const struct rig *rig)
 static double incidence_bound_m(double cell_m, double range_m, double incidence_deg)
 {
     double longest_m = cell_m > 0.0 ? 1.5 * cell_m : 2300.0;
-    double bound_m =
-        (16.0 * 0x1p-53 * range_m + 0x1p-40 * longest_m) / cos(incidence_deg * acos(-1.0) / 180.0);
+    double bound_m = (16.0 * 0x1p-53 * range_m + 0x1p-40 * longest_m) / cos(incidence_deg * acos(-1.0) / 180.0);
     return incidence_deg <= 89.9 ? fmin(bound_m, RIG_MICROMETRE) : bound_m;
 }
 

@@ -9,11 +9,7 @@
 #include "core/rng.h"
 #include "tests/stability/rig.h"
 
-enum {
-    BATCH = 4096,
-    THREADS = 2,
-    NAIVE_SHARE = 4
-}; /* the naive casts get a quarter of the rays: it is enough */
+enum { BATCH = 4096, THREADS = 2, NAIVE_SHARE = 4 }; /* the naive casts get a quarter of the rays: it is enough */
 
 /* SH_SANITIZE: sanitizers are for the code, not for the count. */
 #ifdef SH_SANITIZE

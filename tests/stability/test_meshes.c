@@ -178,12 +178,10 @@ static void test_t_junctions(void **state)
     add_wall(&mesh, 20.0);
     turn(&mesh);
     rig_open(&rig, mesh_scene(&mesh), NOWHERE, NOWHERE);
-    for (uint64_t i = 0; i < RAYS;
-         i++) { /* along the seam: at its corners and between; not at its two ends */
+    for (uint64_t i = 0; i < RAYS; i++) { /* along the seam: at its corners and between; not at its two ends */
         uint32_t row = 1 + (uint32_t)(rig_unit(101, 2 * i) * 63.0);
         double part = i % 2 ? 0.0 : rig_unit(101, 2 * i + 1), p[3];
-        const double *a = mesh.vertex[fine + 65 * row],
-                     *b = mesh.vertex[fine + 65 * (row > 1 ? row - 1 : row + 1)];
+        const double *a = mesh.vertex[fine + 65 * row], *b = mesh.vertex[fine + 65 * (row > 1 ? row - 1 : row + 1)];
         for (int k = 0; k < 3; k++)
             p[k] = a[k] + part * (b[k] - a[k]);
         rig_aim(&rig, p);
@@ -205,8 +203,7 @@ static void test_soup(void **state)
         mesh_sphere(&mesh, (const double[3]){0.0, 0.0, 0.0}, 8.0, 0.0, 3, 7);
         rig_open(&rig, mesh_scene(&mesh), NOWHERE, NOWHERE);
         aim_at_screen(&rig, RAYS, corner, 111);
-        leak_row(&rig,
-                 corner == 1 ? "unwelded soup, rays at its edges" : "unwelded soup, rays at its corners");
+        leak_row(&rig, corner == 1 ? "unwelded soup, rays at its edges" : "unwelded soup, rays at its corners");
         rig_close(&rig);
         mesh_free(&mesh);
     }
@@ -227,8 +224,7 @@ static uint64_t compare_labels(const struct rig *rig, struct labels *first, int 
     for (uint32_t i = 0; i < rig->n; i++) {
         uint32_t t = rig->triangle[i];
         uint16_t label = 0xffff;
-        if (t < rig->scene->n_triangles)
-            label = ours ? bvh_label(&rig->bvh->triangle[t]) : rig->scene->label[t];
+        if (t < rig->scene->n_triangles) label = ours ? bvh_label(&rig->bvh->triangle[t]) : rig->scene->label[t];
         if (first->n == 0)
             first->label[i] = label;
         else
@@ -251,8 +247,7 @@ static void cast_cut(struct rig *rig, uint32_t cut)
 static void label_row(struct rig *rig, const char *regime)
 {
     static const uint32_t width[] = {16, 8, 4, 1}, cut[] = {4096, 1, 7, 33};
-    struct labels ours = {malloc(rig->n * sizeof(uint16_t)), 0},
-                  naive = {malloc(rig->n * sizeof(uint16_t)), 0};
+    struct labels ours = {malloc(rig->n * sizeof(uint16_t)), 0}, naive = {malloc(rig->n * sizeof(uint16_t)), 0};
     uint64_t by_width = 0, by_cut = 0, by_threads = 0, naive_differ = 0;
     for (int i = 0; i < 4; i++) {
         rig_cast_naive(rig, rig->station_m, 1, width[i]);
@@ -272,11 +267,10 @@ static void label_row(struct rig *rig, const char *regime)
     bvh_set_packet(rig->bvh, width[0]);
     rig_cast(rig);
     by_threads += compare_labels(rig, &ours, 1);
-    table_row(regime, "local frame, robust: by width", (double)naive_differ,
-              (double)(by_width + by_cut + by_threads), 0.0, "labels");
-    table_note(
-        "of %u rays; ours differ for packets of 8, 4, 1: %llu, other cuts: %llu, 2 build threads: %llu",
-        rig->n, (unsigned long long)by_width, (unsigned long long)by_cut, (unsigned long long)by_threads);
+    table_row(regime, "local frame, robust: by width", (double)naive_differ, (double)(by_width + by_cut + by_threads),
+              0.0, "labels");
+    table_note("of %u rays; ours differ for packets of 8, 4, 1: %llu, other cuts: %llu, 2 build threads: %llu", rig->n,
+               (unsigned long long)by_width, (unsigned long long)by_cut, (unsigned long long)by_threads);
     free(ours.label);
     free(naive.label);
 }
@@ -323,8 +317,7 @@ static void test_coplanar(void **state)
     rig_order_exactly(&rig);
     for (uint64_t i = 0; i < RAYS / 4; i++) {
         double a = rig_unit(123, 2 * i), b = rig_unit(123, 2 * i + 1);
-        rig_aim(&rig, (const double[3]){corner[0] + a * u[0], corner[1] + a * u[1] + b * v[1],
-                                        corner[2] + b * v[2]});
+        rig_aim(&rig, (const double[3]){corner[0] + a * u[0], corner[1] + a * u[1] + b * v[1], corner[2] + b * v[2]});
     }
     label_row(&rig, "coplanar faces that overlap");
     rig_close(&rig);

@@ -123,8 +123,7 @@ static void along_face_row(int turned)
                        rotation[6] * x + rotation[7]);
         else
             rig_direct(&rig, x, 1.0, 0.0);
-        level[i] = (struct level){(6.0 - head_m[1]) * length, (9.0 - head_m[1]) * length,
-                                  (140.0 - head_m[1]) * length};
+        level[i] = (struct level){(6.0 - head_m[1]) * length, (9.0 - head_m[1]) * length, (140.0 - head_m[1]) * length};
     }
     rig_cast_naive(&rig, NOWHERE, 1, 16);
     double naive_m = along_face_error(&rig, level);
@@ -188,8 +187,7 @@ static void crossing_row(double distance_m)
     mesh_box(&mesh, (const double[3]){-half_m, d, -0.5}, (const double[3]){half_m, d + 2.0 * half_m, 1.0}, 0);
     mesh_sheet(&mesh, (const double[3]){-d, 0.1 * d, 0.0}, (const double[3]){2.0 * d, 0.0, 0.0},
                (const double[3]){0.0, 2.0 * d, 0.0}, 20, 20, 1);
-    for (uint32_t i = 0; i < RAYS;
-         i++) { /* above and below the front's foot, by powers of ten from 1 cm to 10 nm */
+    for (uint32_t i = 0; i < RAYS; i++) { /* above and below the front's foot, by powers of ten from 1 cm to 10 nm */
         double off_m = 1e-2 * pow(10.0, -6.0 * rig_unit(171, 2 * (uint64_t)i + 1));
         mesh_vertex(&spot, 1.9 * half_m * (rig_unit(171, 2 * (uint64_t)i) - 0.5), d, i % 2 ? off_m : -off_m);
     }
@@ -225,8 +223,7 @@ static void test_thin_plate(void **state)
         struct rig rig;
         char regime[96];
         double station_m[3] = {0.0, 0.0, 0.0};
-        mesh_box(&mesh, (const double[3]){-80.0, 200.0, -80.0},
-                 (const double[3]){80.0, 200.0 + thick_m[i], 80.0}, 0);
+        mesh_box(&mesh, (const double[3]){-80.0, 200.0, -80.0}, (const double[3]){80.0, 200.0 + thick_m[i], 80.0}, 0);
         turn_about(&mesh, station_m, station_m);
         rig_open(&rig, mesh_scene(&mesh), station_m, station_m);
         rig_order_exactly(&rig);
@@ -242,9 +239,8 @@ static void test_thin_plate(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_against_wall), cmocka_unit_test(test_inside_solid),
-        cmocka_unit_test(test_along_face),   cmocka_unit_test(test_mixed_sizes),
-        cmocka_unit_test(test_crossing),     cmocka_unit_test(test_thin_plate),
+        cmocka_unit_test(test_against_wall), cmocka_unit_test(test_inside_solid), cmocka_unit_test(test_along_face),
+        cmocka_unit_test(test_mixed_sizes),  cmocka_unit_test(test_crossing),     cmocka_unit_test(test_thin_plate),
     };
     table_head("stability: places");
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -16,8 +16,7 @@ enum { RAYS = 30000 };
 
 /* Places between `from` and `to`, and off them by up to 1e-7 of the distance, across the ray: half of them
  * evenly, half by powers of ten down to 1e-17, where double precision ends. */
-static void aim_beside_edge(struct rig *rig, const double from[3], const double to[3], uint32_t n,
-                            uint64_t seed)
+static void aim_beside_edge(struct rig *rig, const double from[3], const double to[3], uint32_t n, uint64_t seed)
 {
     for (uint32_t i = 0; i < n; i++) {
         double part = rig_unit(seed, 4 * (uint64_t)i), p[3], edge[3], across[3],
@@ -66,8 +65,8 @@ static void aim_beside_all_edges(struct rig *rig, const struct mesh *mesh, uint1
         edges += mesh->label[t] == label ? 3 : 0;
     for (uint32_t t = 0; t < mesh->n_triangles; t++)
         for (int e = 0; e < 3 && mesh->label[t] == label; e++, at++)
-            aim_beside_edge(rig, mesh->vertex[mesh->triangle[t][e]],
-                            mesh->vertex[mesh->triangle[t][(e + 1) % 3]], rays / edges, 61 + at);
+            aim_beside_edge(rig, mesh->vertex[mesh->triangle[t][e]], mesh->vertex[mesh->triangle[t][(e + 1) % 3]],
+                            rays / edges, 61 + at);
 }
 
 static void row(struct mesh *mesh, uint16_t label, const double station_m[3], const char *regime)
@@ -147,8 +146,7 @@ static void test_open_edges(void **state)
     for (int i = 0; i < 3; i++) {
         char regime[96];
         double half = 0.5 * thick_m[i];
-        mesh_box(&mesh, (const double[3]){0.5 - half, 20.0, -1.0}, (const double[3]){0.5 + half, 21.0, 1.0},
-                 0);
+        mesh_box(&mesh, (const double[3]){0.5 - half, 20.0, -1.0}, (const double[3]){0.5 + half, 21.0, 1.0}, 0);
         add_wall(&mesh, 30.0);
         snprintf(regime, sizeof regime, "edges of a fin %g m thin at 20 m", thick_m[i]);
         row(&mesh, 0, STATION_M, regime);

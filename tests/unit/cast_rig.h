@@ -52,15 +52,15 @@ static inline struct scene *box_scene(const double lo[3], const double hi[3])
         snprintf(surface[f].object, sizeof surface[f].object, "wall-%d", f);
         strcpy(surface[f].material, "plain");
     }
-    if (scene_from_arrays((const double(*)[3])vertex, 8, (const uint32_t(*)[3])triangle, 12, label, surface,
-                          6, &scene, &err) != 0)
+    if (scene_from_arrays((const double(*)[3])vertex, 8, (const uint32_t(*)[3])triangle, 12, label, surface, 6, &scene,
+                          &err) != 0)
         fail_msg("%s", err.text);
     return scene;
 }
 
 /* Range from o along d to the box's inside, and the wall met. */
-static inline long double box_range(const double lo[3], const double hi[3], const double o[3],
-                                    const long double d[3], int *wall)
+static inline long double box_range(const double lo[3], const double hi[3], const double o[3], const long double d[3],
+                                    int *wall)
 {
     long double best = INFINITY;
     for (int i = 0; i < 3; i++) {
@@ -120,8 +120,7 @@ static inline void cast_rig_close(struct cast_rig *rig)
 }
 
 /* Casts pulses k .. k+n-1 of line `line` into the rig's block. */
-static inline uint32_t cast_some(struct cast_rig *rig, const struct schedule_line *line, uint64_t k,
-                                 uint64_t n)
+static inline uint32_t cast_some(struct cast_rig *rig, const struct schedule_line *line, uint64_t k, uint64_t n)
 {
     struct schedule_run run;
     assert_true(n <= RIG_LINE);
@@ -137,11 +136,10 @@ static inline uint32_t cast_line(struct cast_rig *rig, uint64_t n, struct schedu
 }
 
 /* Angles of pulse k of the scan in turns, from the spec alone (a scan without changes). */
-static inline void true_angles(const struct schedule_spec *spec, uint64_t k, long double *mirror,
-                               long double *pan)
+static inline void true_angles(const struct schedule_spec *spec, uint64_t k, long double *mirror, long double *pan)
 {
-    long double phase = fmodl((long double)k * (long double)spec->lines_uhz, (long double)spec->prr_uhz) /
-                        (long double)spec->prr_uhz;
+    long double phase =
+        fmodl((long double)k * (long double)spec->lines_uhz, (long double)spec->prr_uhz) / (long double)spec->prr_uhz;
     *mirror = ((long double)spec->fov_min_udeg + (long double)spec->sweep_udeg * phase) / 360e6L;
     *pan = ((long double)spec->pan_start_udeg +
             (long double)k * (long double)spec->pan_udeg_s * HZ / (long double)spec->prr_uhz) /

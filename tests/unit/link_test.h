@@ -50,8 +50,7 @@ static inline void bench_close(struct bench *bench)
 static inline int bench_poll(struct bench *bench, uint32_t want_write, int timeout_ms)
 {
     int room = (int)(sizeof bench->queue / sizeof bench->queue[0]) - bench->n_queue;
-    int n = bench->ops->poll(bench->link, bench->wake, want_write, timeout_ms, bench->queue + bench->n_queue,
-                             room);
+    int n = bench->ops->poll(bench->link, bench->wake, want_write, timeout_ms, bench->queue + bench->n_queue, room);
     assert_true(n >= 0 && n <= room);
     bench->n_queue += n;
     return n;
@@ -59,8 +58,7 @@ static inline int bench_poll(struct bench *bench, uint32_t want_write, int timeo
 
 /* Takes the first event of the queue; only levels (READABLE, WRITABLE) before the one waited for are passed
  * over. */
-static inline struct link_event bench_expect(struct bench *bench, enum link_event_kind kind,
-                                             uint32_t want_write)
+static inline struct link_event bench_expect(struct bench *bench, enum link_event_kind kind, uint32_t want_write)
 {
     const int64_t end_ms = now_ms() + DEADLINE_MS;
     for (;;) {
@@ -69,8 +67,7 @@ static inline struct link_event bench_expect(struct bench *bench, enum link_even
             memmove(bench->queue, bench->queue + 1, (size_t)--bench->n_queue * sizeof event);
             if (event.kind == kind) return event;
             if (event.kind != LINK_READABLE && event.kind != LINK_WRITABLE)
-                fail_msg("event %d of session %d (%s) instead of %d", event.kind, event.session, event.peer,
-                         kind);
+                fail_msg("event %d of session %d (%s) instead of %d", event.kind, event.session, event.peer, kind);
         }
         if (now_ms() > end_ms) fail_msg("no event %d in time", kind);
         bench_poll(bench, want_write, 1000);

@@ -94,8 +94,7 @@ static inline void refuse(const char *name, const void *data, size_t len, const 
     int rc = load_spec(&spec, 1e-3, &scene, &err);
     unlink(path);
     if (rc != SH_EINPUT || scene != NULL) fail_msg("%s, for '%s': returned %d", name, expected, rc);
-    if (strstr(err.text, name) == NULL || strstr(err.text, expected) == NULL ||
-        strchr(err.text, '\n') != NULL)
+    if (strstr(err.text, name) == NULL || strstr(err.text, expected) == NULL || strchr(err.text, '\n') != NULL)
         fail_msg("'%s' doesn't say '%s' of %s in one line", err.text, expected, name);
 }
 

@@ -49,10 +49,9 @@ static void ranges_in_a_room_are_exact_to_the_planes_tilt(void **state)
             int wall = -1;
             const long double d[3] = {dx[i], dy[i], dz[i]};
             long double error = fabsl((long double)range[i] - box_range(lo, hi, station, d, &wall));
-            /* A stored normal is tilted by up to 2^-40 (core/cast/bvh.h) about the triangle's middle, at most 4.3 km from
-             * here; the incidence's cosine is at least 0.05: 4300 * 2^-40 / 0.05 = 8e-8 m. */
-            if (!(error < 8e-8L))
-                fail_msg("room %d, ray %d: range %.12g, %.3Lg m off", r, i, range[i], error);
+            /* A stored normal is tilted by up to 2^-40 (core/cast/bvh.h) about the triangle's middle, at most 4.3 km
+             * from here; the incidence's cosine is at least 0.05: 4300 * 2^-40 / 0.05 = 8e-8 m. */
+            if (!(error < 8e-8L)) fail_msg("room %d, ray %d: range %.12g, %.3Lg m off", r, i, range[i], error);
             assert_int_equal(rig->scene->label[triangle[i]], wall);
             if (error > worst) worst = error;
         }
@@ -83,8 +82,7 @@ static void ranges_to_a_tilted_plane_are_exact_to_the_planes_tilt(void **state)
         for (int c = 0; c < 4; c++)
             for (int i = 0; i < 3; i++)
                 vertex[c][i] =
-                    off * axis[i] +
-                    3000.0 / length * ((c == 1 || c == 2 ? 1 : -1) * u[i] + (c >= 2 ? 1 : -1) * v[i]);
+                    off * axis[i] + 3000.0 / length * ((c == 1 || c == 2 ? 1 : -1) * u[i] + (c >= 2 ? 1 : -1) * v[i]);
         struct scene *scene;
         struct sh_err err;
         static const double origin[3] = {0};
@@ -112,10 +110,9 @@ static void ranges_to_a_tilted_plane_are_exact_to_the_planes_tilt(void **state)
                 nd += n[i] * d[i];
             }
             long double error = fabsl((long double)range - no / nd);
-            /* A stored normal is tilted by up to 2^-40 (core/cast/bvh.h) about the triangle's middle, at most 4.3 km from
-             * here; the incidence's cosine is at least 0.05: 4300 * 2^-40 / 0.05 = 8e-8 m. */
-            if (!(error < 8e-8L))
-                fail_msg("plane %d, ray %d: range %.12g, %.3Lg m off", p, ray, range, error);
+            /* A stored normal is tilted by up to 2^-40 (core/cast/bvh.h) about the triangle's middle, at most 4.3 km
+             * from here; the incidence's cosine is at least 0.05: 4300 * 2^-40 / 0.05 = 8e-8 m. */
+            if (!(error < 8e-8L)) fail_msg("plane %d, ray %d: range %.12g, %.3Lg m off", p, ray, range, error);
             if (error > worst) worst = error;
         }
         cast_rig_close(rig);
@@ -220,8 +217,7 @@ static void cuts_leave_no_trace(void **state)
 static void blocks_carry_the_schedule_s_times(void **state)
 {
     (void)state;
-    static const int64_t rate[] = {2200000 * HZ, 333333333333, 999983 * HZ,
-                                   142857142857, 1000 * HZ,    1299709 * HZ};
+    static const int64_t rate[] = {2200000 * HZ, 333333333333, 999983 * HZ, 142857142857, 1000 * HZ, 1299709 * HZ};
     struct cast_rig *rig = room();
     struct schedule_line line;
     uint64_t k = 0;
@@ -237,12 +233,10 @@ static void blocks_carry_the_schedule_s_times(void **state)
             for (uint64_t at = line.cast0; at < line.cast_end;) {
                 uint64_t n = line.cast_end - at < 333 ? line.cast_end - at : 333;
                 cast_some(rig, &line, at, n);
-                assert_true(rig->block.n_points == n && rig->block.pulse0 == at &&
-                            rig->block.line == line.line);
+                assert_true(rig->block.n_points == n && rig->block.pulse0 == at && rig->block.line == line.line);
                 assert_true(rig->block.line_t0_ns == line.begin_ns);
                 for (uint32_t j = 0; j < n; j++)
-                    assert_true(rig->block.t0_ns + rig->block.dt_ns[j] ==
-                                schedule_time_ns(&rig->segment, at + j));
+                    assert_true(rig->block.t0_ns + rig->block.dt_ns[j] == schedule_time_ns(&rig->segment, at + j));
                 at += n;
             }
             k = i < 2 ? line.pulse_end : line.pulse_end + 1234;
@@ -263,8 +257,7 @@ static void limits_block_or_swallow_the_echo(void **state)
     static const struct {
         double min, max;
         int hit;
-    } limit[] = {{0, 10, 1},    {1.001, 10, 0}, {0.999, 10, 1}, {1, 1, 1},
-                 {0, 0.999, 0}, {2, 6, 0},      {0, 1.001, 1}};
+    } limit[] = {{0, 10, 1}, {1.001, 10, 0}, {0.999, 10, 1}, {1, 1, 1}, {0, 0.999, 0}, {2, 6, 0}, {0, 1.001, 1}};
     struct scene *scene;
     struct sh_err err;
     if (scene_from_arrays(vertex, 8, triangle, 4, NULL, NULL, 0, &scene, &err) != 0) fail_msg("%s", err.text);
@@ -291,8 +284,7 @@ static void limits_block_or_swallow_the_echo(void **state)
         rig->setup.layout = LINE_GEO;
         cast_some(rig, &line, 500, 1);
         if (!limit[i].hit)
-            assert_true((int32_t)rig->block.a[0] == LINE_XYZ_NONE &&
-                        (int32_t)rig->block.b[0] == LINE_XYZ_NONE &&
+            assert_true((int32_t)rig->block.a[0] == LINE_XYZ_NONE && (int32_t)rig->block.b[0] == LINE_XYZ_NONE &&
                         (int32_t)rig->block.c[0] == LINE_XYZ_NONE);
         rig->setup.layout = LINE_POLAR;
     }

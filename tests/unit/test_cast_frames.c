@@ -28,14 +28,13 @@ static void the_beam_goes_where_the_angles_say(void **state)
     (void)state;
     static const struct {
         int mirror_deg, pan_deg, heading_deg, wall;
-    } way[] = {{0, 0, 0, 3},   {0, 90, 0, 1},    {0, 180, 0, 2},  {0, 270, 0, 0},  {90, 0, 0, 5},
-               {-89, 0, 0, 4}, {0, 0, 90, 1},    {0, 0, 180, 2},  {0, 0, 270, 0},  {0, 0, -90, 0},
-               {0, 90, 90, 2}, {0, -90, 90, 3},  {179, 0, 0, 2},  {180, 90, 0, 0}, {170, 0, 90, 0},
-               {100, 0, 0, 5}, {0, 360, 360, 3}, {-10, 45, 45, 1}};
+    } way[] = {{0, 0, 0, 3},   {0, 90, 0, 1},   {0, 180, 0, 2},  {0, 270, 0, 0}, {90, 0, 0, 5},    {-89, 0, 0, 4},
+               {0, 0, 90, 1},  {0, 0, 180, 2},  {0, 0, 270, 0},  {0, 0, -90, 0}, {0, 90, 90, 2},   {0, -90, 90, 3},
+               {179, 0, 0, 2}, {180, 90, 0, 0}, {170, 0, 90, 0}, {100, 0, 0, 5}, {0, 360, 360, 3}, {-10, 45, 45, 1}};
     struct cast_rig *rig = room();
     for (size_t i = 0; i < sizeof way / sizeof *way; i++) {
-        assert_int_equal(
-            fire(rig, way[i].mirror_deg * DEG, way[i].pan_deg * DEG, way[i].heading_deg * M_PI / 180.0), 1);
+        assert_int_equal(fire(rig, way[i].mirror_deg * DEG, way[i].pan_deg * DEG, way[i].heading_deg * M_PI / 180.0),
+                         1);
         if (rig->block.label[0] != way[i].wall)
             fail_msg("way %zu meets wall %d, not %d", i, rig->block.label[0], way[i].wall);
     }
@@ -100,16 +99,14 @@ static void points_have_the_encoders_counts(void **state)
         double counts[] = {0x1p32, 0x1p20, 36000, 7};
         rig->setup.mirror_counts = counts[i % 4];
         rig->setup.pan_counts = counts[i / 4 % 4];
-        int64_t mirror = case_between(&seed, -180 * DEG, 360 * DEG),
-                pan = case_between(&seed, -360 * DEG, 720 * DEG);
+        int64_t mirror = case_between(&seed, -180 * DEG, 360 * DEG), pan = case_between(&seed, -360 * DEG, 720 * DEG);
         if (i % 7 == 0) mirror -= mirror % (90 * DEG);
         if (i % 11 == 0) pan -= pan % (90 * DEG);
         fire(rig, mirror, pan, 0.0);
         /* nearest whole count in exact integers, unless two are as near: 2 turns in a
          * double are good to 1e-6 of 2^32 counts */
         for (int axis = 0; axis < 2; axis++) {
-            int64_t udeg = axis ? pan : mirror,
-                    n = (int64_t)(axis ? rig->setup.pan_counts : rig->setup.mirror_counts);
+            int64_t udeg = axis ? pan : mirror, n = (int64_t)(axis ? rig->setup.pan_counts : rig->setup.mirror_counts);
             int64_t within = (udeg % (360 * DEG) + 360 * DEG) % (360 * DEG);
             int64_t twice = 2 * within * (n / 4), rest; /* n / 4 keeps 64 bits; n = 7 has its own way */
             if (n == 7) continue;
@@ -117,8 +114,7 @@ static void points_have_the_encoders_counts(void **state)
             int64_t count = (twice / (180 * DEG) + (rest > 90 * DEG)) % n;
             if (llabs(rest - 90 * DEG) < 1000) continue;
             uint32_t got = axis ? rig->block.c[0] : rig->block.b[0];
-            if (got != (uint32_t)count)
-                fail_msg("%lld udeg of %lld counts: %u", (long long)udeg, (long long)n, got);
+            if (got != (uint32_t)count) fail_msg("%lld udeg of %lld counts: %u", (long long)udeg, (long long)n, got);
             assert_int_equal(cast_encoder_count((double)udeg / 360e6, (double)n), count);
         }
         if (rig->setup.mirror_counts == 7.0) assert_true(rig->block.b[0] < 7);
@@ -236,8 +232,7 @@ static void any_rays(uint64_t seed)
     }
 }
 
-static void hits(const double lo[3], const double hi[3], const double origin[3], const double station[3],
-                 double *range)
+static void hits(const double lo[3], const double hi[3], const double origin[3], const double station[3], double *range)
 {
     static uint32_t triangle[RAYS];
     struct cast_rig *rig = cast_rig_open(box_scene(lo, hi), origin);
@@ -289,9 +284,7 @@ static void rounded_coordinates_cost_no_more_than_their_rounding(void **state)
         const long double d[3] = {ray[0][i], ray[1][i], ray[2][i]};
         int wall = -1;
         box_range(lo, hi, here, d, &wall);
-        double cosine = (double)fabsl(d[wall / 2]), step = wall / 2 == 1   ? 0x1p-30
-                                                           : wall / 2 == 0 ? 0x1p-34
-                                                                           : 0x1p-46;
+        double cosine = (double)fabsl(d[wall / 2]), step = wall / 2 == 1 ? 0x1p-30 : wall / 2 == 0 ? 0x1p-34 : 0x1p-46;
         double off = fabs(near[i] - far[i]);
         if (!(off <= step / cosine + 1e-12)) fail_msg("ray %d: %.3g m off, cosine %.3g", i, off, cosine);
         worst = fmax(worst, off);

@@ -94,8 +94,8 @@ static void make_text(struct bytes *b)
         b->n += (size_t)sprintf(b->data + b->n, "%d %.17g %d ", POINT[i].label, POINT[i].z, POINT[i].n_tags);
         for (int k = 0; k < POINT[i].n_tags; k++)
             b->n += (size_t)sprintf(b->data + b->n, "-7 ");
-        b->n += (size_t)sprintf(b->data + b->n, "%d %.17g -12.5 %.17g %d\r\n", POINT[i].echo, POINT[i].x,
-                                POINT[i].y, POINT[i].station);
+        b->n += (size_t)sprintf(b->data + b->n, "%d %.17g -12.5 %.17g %d\r\n", POINT[i].echo, POINT[i].x, POINT[i].y,
+                                POINT[i].station);
     }
     b->n += (size_t)sprintf(b->data + b->n, "1 99\n\n");
 }
@@ -169,22 +169,17 @@ static void malformed_files_are_refused(void **state)
         {TEXT "element vertex 1\nproperty list uchar float x\nproperty float y\nproperty float "
               "z\nend_header\n1 1 2 3\n",
          "lacks one of the properties x, y, z"},
-        {TEXT "element vertex 0\n" XYZ "property int label\nproperty int label\nend_header\n",
-         "twice: 'label'"},
+        {TEXT "element vertex 0\n" XYZ "property int label\nproperty int label\nend_header\n", "twice: 'label'"},
         {TEXT "element vertex 0\n" XYZ "element vertex 0\n" XYZ "end_header\n", "vertex is there twice"},
-        {TEXT "element vertex 100000000000000000\n" XYZ "end_header\n1 2 3\n",
-         "100000000000000000 of element vertex"},
+        {TEXT "element vertex 100000000000000000\n" XYZ "end_header\n1 2 3\n", "100000000000000000 of element vertex"},
         {TEXT "element vertex 3\n" XYZ "end_header\n1 2 3\n4 5 6\n", "3 of element vertex need"},
-        {TEXT "element vertex 2\n" XYZ "end_header\n1 2 3000000\n",
-         "line 9: vertex 2 of 2: the file ends before it"},
+        {TEXT "element vertex 2\n" XYZ "end_header\n1 2 3000000\n", "line 9: vertex 2 of 2: the file ends before it"},
         {TEXT "element vertex 1\n" XYZ "end_header\n1 2\n3\n", "line 8: vertex 1 of 1: a value is missing"},
         {TEXT "element vertex 1\n" XYZ "end_header\n1 2 3 4\n", "there are more values"},
         {TEXT "element vertex 1\n" XYZ "end_header\n1 2 3m\n", "not a number"},
-        {TEXT "element vertex 1\n" XYZ "end_header\n1 inf 3\n",
-         "line 8: vertex 1 of 1: (1 inf 3) is no position"},
+        {TEXT "element vertex 1\n" XYZ "end_header\n1 inf 3\n", "line 8: vertex 1 of 1: (1 inf 3) is no position"},
         {TEXT "element vertex 1\n" XYZ "end_header\nnan nan 3\n", "(nan nan 3) is no position"},
-        {TEXT "element vertex 1\n" XYZ "property int station\nend_header\n1 2 3 0\n",
-         "station 0; allowed are whole"},
+        {TEXT "element vertex 1\n" XYZ "property int station\nend_header\n1 2 3 0\n", "station 0; allowed are whole"},
         {TEXT "element vertex 1\n" XYZ "property int station\nend_header\n1 2 3 65536\n", "from 1 to 65535"},
         {TEXT "element vertex 1\n" XYZ "property float label\nend_header\n1 2 3 0.5\n", "label 0.5; allowed"},
         {TEXT "element vertex 1\n" XYZ "property float label\nend_header\n1 2 3 nan\n", "label nan; allowed"},
@@ -217,8 +212,7 @@ static void broken_bytes_do_no_harm(void **state)
         for (int k = rand() % 4; k >= 0; k--)
             b.data[(size_t)rand() % b.n] = (char)(rand() % 2 ? rand() : "0123456789 -\n"[rand() % 13]);
         int rc = read_cloud("broken.ply", b.data, b.n, &c, &err);
-        if (rc != SH_OK &&
-            (rc != SH_EINPUT || c.xyz_m != NULL || err.text[0] == '\0' || strchr(err.text, '\n')))
+        if (rc != SH_OK && (rc != SH_EINPUT || c.xyz_m != NULL || err.text[0] == '\0' || strchr(err.text, '\n')))
             fail_msg("round %d: returned %d, '%s'", i, rc, err.text);
         n_refused += rc != SH_OK;
         cloud_free(&c);

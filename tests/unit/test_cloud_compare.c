@@ -42,8 +42,8 @@ static void offsets_from_a_plate(void **state)
         {-3, -4, 0}, {4, 1, 10},           {4, 1, 10.0009765625}, {4, 1, -1e300},  {1, 7, 0.0078125},
     };
     static const double expected[] = {0, 0.0009765625, 0.25, NAN, 5, 5, 10, INFINITY, INFINITY, 0.0078125};
-    static const uint32_t nearest[] = {
-        0, 0, 1, CLOUD_TRIANGLE_NONE, 0, 0, 0, CLOUD_TRIANGLE_NONE, CLOUD_TRIANGLE_NONE, 1};
+    static const uint32_t nearest[] = {0, 0, 1, CLOUD_TRIANGLE_NONE, 0, 0, 0, CLOUD_TRIANGLE_NONE, CLOUD_TRIANGLE_NONE,
+                                       1};
     enum { N = LENGTH(expected) };
     struct scene *s = make_plate();
     struct distance *d = make_index(s);
@@ -219,8 +219,7 @@ static void statistics_of_little(void **state)
     static const double one[] = {0.25}, same[] = {0.5, 0.5, 0.5}, none[] = {NAN, INFINITY};
     struct cloud_stats s;
     cloud_stats(one, 1, 1, &s);
-    assert_true(s.mean_m == 0.25 && s.rms_m == 0.25 && s.p50_m == 0.25 && s.p999_m == 0.25 &&
-                s.max_m == 0.25);
+    assert_true(s.mean_m == 0.25 && s.rms_m == 0.25 && s.p50_m == 0.25 && s.p999_m == 0.25 && s.max_m == 0.25);
     assert_int_equal(s.worst, 0);
     cloud_stats(same, 3, 0, &s);
     assert_true(s.p50_m == 0.5 && s.p95_m == 0.5);

@@ -29,8 +29,7 @@ static void expect_error(struct command_device *dev, uint32_t session, const cha
     char popped[COMMAND_MAX_REPLY], expected[COMMAND_MAX_REPLY + 8];
     memset(&dev->queue, 0, sizeof dev->queue);
     command_execute(dev, session, line, &result);
-    if (result.error != number)
-        fail_msg("'%s' gives %d (%s), not %d", line, result.error, result.reply, number);
+    if (result.error != number) fail_msg("'%s' gives %d (%s), not %d", line, result.error, result.reply, number);
     assert_int_equal(dev->queue.count, 1);
     command_queue_pop(&dev->queue, popped, sizeof popped);
     snprintf(expected, sizeof expected, "ERR %s", popped);

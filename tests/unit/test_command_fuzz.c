@@ -44,8 +44,8 @@ static void check_settings(const struct command_device *dev, const char *line)
         s->pan_udeg_s > l->pan_max_udeg_s || s->line_start_udeg < l->fov_min_udeg ||
         s->line_stop_udeg > l->fov_max_udeg || s->line_start_udeg >= s->line_stop_udeg ||
         s->pan_start_udeg < l->pan_min_udeg || s->pan_stop_udeg > l->pan_max_udeg ||
-        s->pan_start_udeg >= s->pan_stop_udeg || s->pan_stop_udeg - s->pan_start_udeg > 360 * MICRO ||
-        s->station < 1 || s->station > l->n_stations)
+        s->pan_start_udeg >= s->pan_stop_udeg || s->pan_stop_udeg - s->pan_start_udeg > 360 * MICRO || s->station < 1 ||
+        s->station > l->n_stations)
         fail_msg("'%s' leaves settings out of range", line);
 }
 
@@ -68,12 +68,10 @@ static void one(struct command_device *dev, const char *line)
     if ((out.reply[0] == '\0') != is_blank_line(line)) fail_msg("'%s': reply '%s'", line, out.reply);
     if (is_error) {
         const int kept = dev->queue.count == queued + 1 && dev->queue.overflow == lost;
-        const int dropped =
-            queued == COMMAND_QUEUE_LEN && dev->queue.count == queued && dev->queue.overflow >= 2;
+        const int dropped = queued == COMMAND_QUEUE_LEN && dev->queue.count == queued && dev->queue.overflow >= 2;
         if (kept == dropped) fail_msg("'%s': %u errors queued after %u", line, dev->queue.count, queued);
         if (memcmp(&before, &dev->settings, sizeof before) != 0) fail_msg("'%s': refused, but changed", line);
-        if (out.effect != COMMAND_NONE || out.took_control || out.changes)
-            fail_msg("'%s': refused with effect", line);
+        if (out.effect != COMMAND_NONE || out.took_control || out.changes) fail_msg("'%s': refused with effect", line);
         seen.overflowed += (unsigned)dropped;
     } else if (dev->queue.count > queued) {
         fail_msg("'%s': no error, but one is queued", line);
@@ -105,8 +103,7 @@ static void random_lines(void **ctx)
     for (int i = 0; i < N_RANDOM; i++) {
         const uint32_t len = random_below(random_below(8) == 0 ? sizeof line - 1 : 24);
         for (uint32_t k = 0; k < len; k++)
-            line[k] =
-                (char)(i % 2 ? 1 + random_below(255) : (uint32_t)alphabet[random_below(sizeof alphabet - 1)]);
+            line[k] = (char)(i % 2 ? 1 + random_below(255) : (uint32_t)alphabet[random_below(sizeof alphabet - 1)]);
         line[len] = '\0';
         one(&dev, line);
     }
@@ -182,8 +179,7 @@ static void mutate(char *line, size_t size)
         compose(line, size, at, rest, rest); /* double a part */
         break;
     default:
-        compose(line, size, at, valid[random_below(sizeof valid / sizeof valid[0])],
-                ""); /* join two commands */
+        compose(line, size, at, valid[random_below(sizeof valid / sizeof valid[0])], ""); /* join two commands */
         break;
     }
 }

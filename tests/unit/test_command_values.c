@@ -26,8 +26,7 @@ static void expect(struct command_device *dev, const char *line, const char *rep
     if (strcmp(got, reply) != 0) fail_msg("'%s' gives '%s', not '%s'", line, got, reply);
 }
 
-static void expect_error(struct command_device *dev, uint32_t session, const char *line, int number,
-                         const char *part)
+static void expect_error(struct command_device *dev, uint32_t session, const char *line, int number, const char *part)
 {
     const struct head_settings before = dev->settings;
     const uint32_t control = dev->control, queued = dev->queue.count;
@@ -76,8 +75,7 @@ static void numbers_in_nrf_forms_are_exact(void **ctx)
         char line[80];
         snprintf(line, sizeof line, "HEAD:PRR %s", cases[i].text);
         expect(&dev, line, "OK");
-        if (dev.settings.prr_uhz != cases[i].prr_uhz)
-            fail_msg("%s is %lld uHz", line, (long long)dev.settings.prr_uhz);
+        if (dev.settings.prr_uhz != cases[i].prr_uhz) fail_msg("%s is %lld uHz", line, (long long)dev.settings.prr_uhz);
         assert_int_equal(result.effect, COMMAND_SETTINGS);
     }
 }
@@ -86,8 +84,7 @@ static void what_is_not_exact_is_refused_not_rounded(void **ctx)
 {
     (void)ctx;
     struct command_device dev = command_test_device();
-    expect_error(&dev, 1, "HEAD:PRR 5000.0000001", CMD_E_RANGE,
-                 "5000.0000001, allowed multiples of 0.000001 Hz");
+    expect_error(&dev, 1, "HEAD:PRR 5000.0000001", CMD_E_RANGE, "5000.0000001, allowed multiples of 0.000001 Hz");
     expect_error(&dev, 1, "HEAD:PRR 5.0000000001 KHZ", CMD_E_RANGE, "multiples of 0.000001 Hz");
     expect_error(&dev, 1, "HEAD:PRR 5e-99999999999", CMD_E_RANGE, "multiples of");
     expect_error(&dev, 1, "SCAN:FRAMES 1.5", CMD_E_RANGE, "1.5, allowed whole numbers");
@@ -197,8 +194,7 @@ static void control_goes_to_the_first_who_changes(void **ctx)
     assert_string_equal(say(&dev, 3, "HEAD:PRR 5000"), "OK");
     assert_true(result.took_control && result.changes);
     assert_string_equal(say(&dev, 2, "SYST:CONT?"), "3");
-    static const char *const changing[] = {"HEAD:PRR 6000", "*RST", "SCAN:START", "SYST:CONT:REL",
-                                           "SCAN:FRAMES MAX"};
+    static const char *const changing[] = {"HEAD:PRR 6000", "*RST", "SCAN:START", "SYST:CONT:REL", "SCAN:FRAMES MAX"};
     for (size_t i = 0; i < N_OF(changing); i++)
         expect_error(&dev, 2, changing[i], CMD_E_PROTECTED, "session 3 has control, this is session 2");
     expect_error(&dev, 2, "HEAD:PRR x", CMD_E_DATA_TYPE, "x"); /* what is no command is told first */
@@ -288,8 +284,7 @@ static void steps_of_time(void **ctx)
     expect_error(&dev, 1, "TIME:STEP 0.5", CMD_E_RANGE, "whole numbers of ns");
     expect_error(&dev, 1, "TIME:STEP 86400000000001", CMD_E_RANGE, "allowed 1 to"); /* more than a day */
     expect_error(&dev, 1, "TIME:STEP 9223372036854775808", CMD_E_RANGE, "allowed 1 to");
-    expect_error(&dev, 1, "TIME:STEP -9300000000000000000", CMD_E_RANGE,
-                 "STEP -9300000000000000000, allowed 1 to");
+    expect_error(&dev, 1, "TIME:STEP -9300000000000000000", CMD_E_RANGE, "STEP -9300000000000000000, allowed 1 to");
 }
 
 int main(void)

@@ -88,8 +88,7 @@ static void malformed_configurations_are_refused(void **state)
         if (bad[i].key != NULL) snprintf(start + n, sizeof start - (size_t)n, "%s: ", bad[i].key);
         if (code != SH_EINPUT || err.code != code) fail_msg("case %zu (%s): code %d", i, bad[i].with, code);
         if (strncmp(err.text, start, strlen(start)) != 0 || strstr(err.text, bad[i].fragment) == NULL)
-            fail_msg("case %zu (%s): \"%s\", expected \"%s...%s\"", i, bad[i].with, err.text, start,
-                     bad[i].fragment);
+            fail_msg("case %zu (%s): \"%s\", expected \"%s...%s\"", i, bad[i].with, err.text, start, bad[i].fragment);
         if (strpbrk(err.text, "\n\r") != NULL) fail_msg("case %zu: more than one line: %s", i, err.text);
     }
 }
@@ -147,8 +146,7 @@ static void decimals_are_exact(void **state)
     };
     for (size_t i = 0; i < sizeof good / sizeof good[0]; i++) {
         __int128 value = -1;
-        if (cfg_parse_decimal(good[i].text, good[i].decimals, &value) != CFG_NUMBER_OK ||
-            value != good[i].value)
+        if (cfg_parse_decimal(good[i].text, good[i].decimals, &value) != CFG_NUMBER_OK || value != good[i].value)
             fail_msg("%s: got %lld", good[i].text, (long long)value);
     }
     static const struct {
@@ -185,8 +183,7 @@ static void values_arrive(void **state)
 {
     (void)state;
     char file[128];
-    assert_loads(
-        load_edited(LINES, "  lines_hz: 99.999999\n  pan_stop_deg: 0.1\n  serial: K-7\n  frames: 1e3\n"));
+    assert_loads(load_edited(LINES, "  lines_hz: 99.999999\n  pan_stop_deg: 0.1\n  serial: K-7\n  frames: 1e3\n"));
     snprintf(file, sizeof file, "%s/cube.obj", dir);
     assert_int_equal(cfg->settings.prr_uhz, 500000000000);
     assert_int_equal(cfg->settings.lines_uhz, 99999999);
@@ -242,8 +239,8 @@ static void odd_but_right_configurations_load(void **state)
     assert_loads(load_edited("head:", "\xef\xbb\xbfhead:")); /* byte order mark */
     assert_loads(load_edited("heading_deg: 90", "name: K\xc3\xbc"
                                                 "che"));
-    assert_loads(load_edited("heading_deg: 90",
-                             "heading_deg: &turn 90\n  - position_m: [0, 0, 0]\n    heading_deg: *turn"));
+    assert_loads(
+        load_edited("heading_deg: 90", "heading_deg: &turn 90\n  - position_m: [0, 0, 0]\n    heading_deg: *turn"));
     assert_true(cfg->station[1].heading_deg == 90);
     assert_loads(load_edited("type: tcp\n    port: 0", "type: null"));
     assert_int_equal(cfg->link[0].type, LINK_NULL);
@@ -285,9 +282,8 @@ static void set_changes_values(void **state)
 static void set_appends_elements(void **state)
 {
     (void)state;
-    static const char *const sets[] = {
-        "links[1].path=out.bin", "links[1].type=file", "stations.1.position_m=0,0,2",
-        "head.station=2",        "head.station=1",     "head.station=2"};
+    static const char *const sets[] = {"links[1].path=out.bin", "links[1].type=file", "stations.1.position_m=0,0,2",
+                                       "head.station=2",        "head.station=1",     "head.station=2"};
     write_file(config_path, base, sizeof base - 1);
     assert_loads(load_sets(sets, 6));
     assert_int_equal(cfg->n_links, 2);
@@ -315,10 +311,8 @@ static void set_refuses(void **state)
         {"head=5", "head", "is a section"},
         {"links=[]", "links", "is a list"},
         {"links[0]=tcp", "links[0]", "is a section"},
-        {"stations[2].heading_deg=0", "stations[2].heading_deg",
-         "allowed indices 0 to 1, the last appends one"},
-        {"links[99999999999999999999].type=tcp", "links[99999999999999999999].type",
-         "allowed indices 0 to 1"},
+        {"stations[2].heading_deg=0", "stations[2].heading_deg", "allowed indices 0 to 1, the last appends one"},
+        {"links[99999999999999999999].type=tcp", "links[99999999999999999999].type", "allowed indices 0 to 1"},
         {"links[-1].type=tcp", "links[-1].type", "unknown key"},
         {"links[].type=tcp", "links[].type", "no index"},
         {"links[0.type=tcp", "links[0.type", "unknown key"},
@@ -340,11 +334,9 @@ static void set_refuses(void **state)
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         char start[128], in_file[192];
         snprintf(start, sizeof start, "--set %s: ", wrong[i].key);
-        snprintf(in_file, sizeof in_file,
-                 "%s:", config_path); /* where the file is at fault together with --set */
+        snprintf(in_file, sizeof in_file, "%s:", config_path); /* where the file is at fault together with --set */
         if (load_set(wrong[i].set) != SH_EINPUT) fail_msg("%s was taken", wrong[i].set);
-        int elsewhere =
-            strcmp(wrong[i].set, "output.crs=utm") == 0 || strcmp(wrong[i].set, "links[0].type=pty") == 0;
+        int elsewhere = strcmp(wrong[i].set, "output.crs=utm") == 0 || strcmp(wrong[i].set, "links[0].type=pty") == 0;
         const char *expected = elsewhere ? in_file : start;
         if (strncmp(err.text, expected, strlen(expected)) != 0) fail_msg("%s: %s", wrong[i].set, err.text);
         assert_says(wrong[i].fragment);
@@ -433,16 +425,11 @@ static void malformed_profiles_are_refused(void **state)
         {"{ value: 130, from: data sheet }", "{ from: assumed }", "range_max_m", "\"value\" is missing"},
         {"{ value: 130, from: data sheet }", "{ value: 130, from: hearsay }", "range_max_m",
          "allowed data sheet, assumed"},
-        {"{ value: 130, from: data sheet }", "{ value: 130, from: [] }", "range_max_m",
-         "allowed data sheet, assumed"},
-        {"{ value: 130, from: data sheet }", "{ value: 130 m, from: assumed }", "range_max_m",
-         "not a number"},
-        {"{ value: 130, from: data sheet }", "{ value: 1, value: 2, from: assumed }", "range_max_m",
-         "given twice"},
-        {"{ value: 130, from: data sheet }", "{ value: 1, note: 2, from: assumed }", "range_max_m",
-         "unknown"},
-        {"{ value: 130, from: data sheet }", "{ value: 0.4, from: assumed }", "range_min_m",
-         "below range_max_m"},
+        {"{ value: 130, from: data sheet }", "{ value: 130, from: [] }", "range_max_m", "allowed data sheet, assumed"},
+        {"{ value: 130, from: data sheet }", "{ value: 130 m, from: assumed }", "range_max_m", "not a number"},
+        {"{ value: 130, from: data sheet }", "{ value: 1, value: 2, from: assumed }", "range_max_m", "given twice"},
+        {"{ value: 130, from: data sheet }", "{ value: 1, note: 2, from: assumed }", "range_max_m", "unknown"},
+        {"{ value: 130, from: data sheet }", "{ value: 0.4, from: assumed }", "range_min_m", "below range_max_m"},
         {"range_max_m:", "range_mx_m:", "range_mx_m", "did you mean range_max_m?"},
         {"range_max_m: { value: 130, from: data sheet }\n", "", "range_max_m", "missing"},
         {"facets: { value: 1,", "facets: { value: 2,", "fov_max_deg", "allowed up to 180 deg"},
@@ -491,8 +478,8 @@ static void a_slow_pulse_rate_needs_slow_lines(void **state)
 {
     (void)state;
     assert_loads(load_profile("prr_min_hz: { value: 100000,", "prr_min_hz: { value: 10,"));
-    char *text = edited("riegl-vz400i\n  prr_hz: 500000\n  lines_hz: 100",
-                        "mine\n  prr_hz: 100\n  lines_hz: 100.000001");
+    char *text =
+        edited("riegl-vz400i\n  prr_hz: 500000\n  lines_hz: 100", "mine\n  prr_hz: 100\n  lines_hz: 100.000001");
     assert_int_equal(load_text(text), SH_EINPUT);
     assert_says(":3: head.prr_hz: less than a pulse per line");
     free(text);
@@ -527,8 +514,7 @@ static void profiles_are_listed(void **state)
     assert_int_equal(config_list_profiles("config/heads", out, &err), 4);
     fclose(out);
     assert_non_null(strstr(text, "leica-rtc360"));
-    assert_non_null(
-        strstr(text, "Leica RTC360; data sheet: range_min_m, range_max_m, range_sigma_m, range_sigma_ppm"));
+    assert_non_null(strstr(text, "Leica RTC360; data sheet: range_min_m, range_max_m, range_sigma_m, range_sigma_ppm"));
     int lines = 0;
     for (const char *p = text; *p != '\0'; p++)
         lines += *p == '\n';
@@ -553,8 +539,7 @@ static void the_reference_names_every_key(void **state)
         for (size_t i = 0; i < tables[t]->n; i++) {
             const struct cfg_key *key = &tables[t]->keys[i];
             snprintf(line, sizeof line, "\n%s\n", key->path);
-            if (strstr(text, line) == NULL || strstr(text, key->help) == NULL)
-                fail_msg("%s is not there", key->path);
+            if (strstr(text, line) == NULL || strstr(text, key->help) == NULL) fail_msg("%s is not there", key->path);
         }
     free(text);
 }
@@ -573,8 +558,7 @@ static void rows_are_sound(void **state)
                                                                          : 1;
             if (!sized) fail_msg("%s: its member has another size than its type", key->path);
             if (cfg_find(tables[t], key->path) != key) fail_msg("%s stands twice", key->path);
-            if (key->def != NULL && key->def[0] == '@')
-                assert_non_null(cfg_find(&cfg_profile_table, key->def + 1));
+            if (key->def != NULL && key->def[0] == '@') assert_non_null(cfg_find(&cfg_profile_table, key->def + 1));
             if (key->max_key != NULL) assert_non_null(cfg_find(&cfg_profile_table, key->max_key));
             if (key->min_key != NULL) assert_non_null(cfg_find(&cfg_profile_table, key->min_key));
             if (strstr(key->path, "[]") != NULL) assert_non_null(cfg_list_of(tables[t], key));

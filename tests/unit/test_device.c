@@ -138,11 +138,9 @@ static void no_command_leads_to_off_or_fault(void **state)
         }
         struct command_result result;
         if (case_between(&seed, 0, 9) == 0)
-            device_command(rig->device, (uint32_t)case_between(&seed, 0, 2),
-                           line[case_u64(&seed) % (sizeof line / sizeof *line)],
-                           rig->next -
-                               (uint64_t)case_between(&seed, 0, rig->next < 65 ? (int64_t)rig->next : 65),
-                           &result);
+            device_command(
+                rig->device, (uint32_t)case_between(&seed, 0, 2), line[case_u64(&seed) % (sizeof line / sizeof *line)],
+                rig->next - (uint64_t)case_between(&seed, 0, rig->next < 65 ? (int64_t)rig->next : 65), &result);
     }
     assert_true(device_scans(rig->device) > 50);
     rig_close(rig);
@@ -292,8 +290,7 @@ static void check_same_segment(const struct schedule_segment *a, const struct sc
     /* field by field: padding is anything */
     assert_memory_equal(&a->spec, &b->spec, offsetof(struct schedule_spec, frames) + sizeof a->spec.frames);
     assert_true(a->k0 == b->k0 && a->t0_ns == b->t0_ns && a->line0 == b->line0 && a->r0 == b->r0);
-    assert_true(a->line0_begin == b->line0_begin && a->line0_cast == b->line0_cast &&
-                a->pan0_fine == b->pan0_fine);
+    assert_true(a->line0_begin == b->line0_begin && a->line0_cast == b->line0_cast && a->pan0_fine == b->pan0_fine);
     assert_true(a->frame0 == b->frame0 && a->frame0_end == b->frame0_end && a->end_pulse == b->end_pulse);
 }
 

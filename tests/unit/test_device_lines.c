@@ -192,8 +192,7 @@ static void a_jump_of_the_rates_fits_into_the_slots(void **state)
             /* caught up: what fired by the tick's end is there, but for less than a packet */
             int64_t by = (int64_t)rig->next * 1000000 - rig->work.scan_t0_ns;
             if (tick == 199 || tick == 399)
-                assert_true(schedule_pulse_at(&rig->work.segment, by) - rig->work.pulse_end <
-                            SCHEDULE_PACKET);
+                assert_true(schedule_pulse_at(&rig->work.segment, by) - rig->work.pulse_end < SCHEDULE_PACKET);
         }
         rig_tell(rig, "SCAN:STOP", rig->next);
         assert_true(rig_claim(rig));

@@ -28,8 +28,7 @@ static quad dotq(const quad a[3], const quad b[3])
 }
 
 /* Ericson, Real-Time Collision Detection, 5.1.5, by regions. */
-static double reference_distance(const double p[3], const double ca[3], const double cb[3],
-                                 const double cc[3])
+static double reference_distance(const double p[3], const double ca[3], const double cb[3], const double cc[3])
 {
     quad ab[3], ac[3], ap[3], bp[3], cp[3], v = 0, w = 0;
     for (int k = 0; k < 3; k++) {
@@ -56,8 +55,7 @@ static double reference_distance(const double p[3], const double ca[3], const do
         v = 1 - w;
     } else {
         /* v and w from the areas would lose needles even here; the distance from the plane doesn't */
-        quad n[3] = {ab[1] * ac[2] - ab[2] * ac[1], ab[2] * ac[0] - ab[0] * ac[2],
-                     ab[0] * ac[1] - ab[1] * ac[0]};
+        quad n[3] = {ab[1] * ac[2] - ab[2] * ac[1], ab[2] * ac[0] - ab[0] * ac[2], ab[0] * ac[1] - ab[1] * ac[0]};
         quad height = dotq(n, ap);
         return (double)sqrtl((long double)(height * height / dotq(n, n)));
     }
@@ -82,8 +80,7 @@ static double brute_force(const struct scene *s, const double p[3], uint32_t *ne
 
 static double apart(const double a[3], const double b[3])
 {
-    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) +
-                (a[2] - b[2]) * (a[2] - b[2]));
+    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
 }
 
 /* The farthest corner of one triangle: what the rounding of its distance is relative to. */
@@ -103,8 +100,8 @@ static struct scene *make_scene(double (*v)[3], uint32_t n_triangles)
     for (uint32_t i = 0; i < n_triangles; i++)
         for (uint32_t c = 0; c < 3; c++)
             t[i][c] = i * 3 + c;
-    int rc = scene_from_arrays((const double(*)[3])v, n_triangles * 3, (const uint32_t(*)[3])t, n_triangles,
-                               NULL, NULL, 0, &scene, &err);
+    int rc = scene_from_arrays((const double(*)[3])v, n_triangles * 3, (const uint32_t(*)[3])t, n_triangles, NULL, NULL,
+                               0, &scene, &err);
     free(t);
     if (rc != SH_OK) fail_msg("%s", err.text);
     assert_int_equal(scene->n_triangles, n_triangles);
@@ -129,8 +126,8 @@ static void check_query(const struct distance *index, const struct scene *s, con
     double size = fmax(farthest_corner(s, nearest, p), farthest_corner(s, hit.triangle, p));
     double bound = ROUNDING * size;
     if (fabs(hit.distance_m - expected) > bound)
-        fail_msg("distance %.17g, not %.17g: off by %g, bound %g", hit.distance_m, expected,
-                 hit.distance_m - expected, bound);
+        fail_msg("distance %.17g, not %.17g: off by %g, bound %g", hit.distance_m, expected, hit.distance_m - expected,
+                 bound);
     double largest = fmax(fmax(fabs(p[0]), fabs(p[1])), fabs(p[2])) + size;
     /* the point itself is rounded to its coordinates' last place, on three axes */
     if (fabs(apart(p, hit.point_m) - expected) > bound + 2 * largest * 0x1p-53)
@@ -277,11 +274,10 @@ static void needles(void **state)
         struct distance *index = make_index(s);
         for (int i = 0; i < 20; i++) {
             double at = uniform(-0.2, 1.2), off = i % 2 ? pow(10, uniform(-12, 0)) : 0, p[3];
-            double up = i % 3 ? 0 : pow(10, uniform(-12, 0)) * length,
-                   in = i % 3 ? 0 : 0.1 * ratio * at * length;
+            double up = i % 3 ? 0 : pow(10, uniform(-12, 0)) * length, in = i % 3 ? 0 : 0.1 * ratio * at * length;
             for (int k = 0; k < 3; k++)
-                p[k] = v[0][k] + (v[1][k] - v[0][k]) * at + uniform(-off, off) * (i % 3 ? length : 0) +
-                       e[k] * in + normal[k] * up;
+                p[k] = v[0][k] + (v[1][k] - v[0][k]) * at + uniform(-off, off) * (i % 3 ? length : 0) + e[k] * in +
+                       normal[k] * up;
             struct distance_hit hit;
             double expected = reference_distance(p, s->vertex_m[0], s->vertex_m[1], s->vertex_m[2]);
             double bound = ROUNDING * farthest_corner(s, 0, p);

@@ -32,8 +32,7 @@ static struct georef *make(enum georef_crs crs, double lat_deg, double lon_deg, 
 
 static void expect_near(double got, double want, double tolerance)
 {
-    if (!(fabs(got - want) <= tolerance))
-        fail_msg("%.12g instead of %.12g, off by %.3g", got, want, got - want);
+    if (!(fabs(got - want) <= tolerance)) fail_msg("%.12g instead of %.12g, off by %.3g", got, want, got - want);
 }
 
 static void expect_point(const double got[3], double x, double y, double z, double tolerance)
@@ -148,8 +147,7 @@ static void test_utm_central_meridian(void **state)
         double anchor[3];
         struct georef *georef = make(GEOREF_UTM, lat_deg, 9, 123.5, 32);
         georef_anchor(georef, anchor);
-        expect_point(anchor, 500000, 0.9996 * meridian_arc_m(lat_deg) + (lat_deg < 0 ? 1e7 : 0), 123.5,
-                     TOL_M);
+        expect_point(anchor, 500000, 0.9996 * meridian_arc_m(lat_deg) + (lat_deg < 0 ? 1e7 : 0), 123.5, TOL_M);
         assert_int_equal(georef_epsg(georef), lat_deg < 0 ? 32732 : 32632);
         georef_free(georef);
     }
@@ -163,9 +161,8 @@ static void test_utm_scale(void **state)
     (void)state;
     const double lat = 48.2 * PI / 180, c = cos(lat), eta2 = E2 / (1 - E2) * c * c, t2 = tan(lat) * tan(lat);
     const double a = 2 * PI / 180 * c;
-    const double k =
-        0.9996 * (1 + (1 + eta2) * a * a / 2 +
-                  (5 - 4 * t2 + 42 * eta2 + 13 * eta2 * eta2 - 28 * E2 / (1 - E2)) * pow(a, 4) / 24);
+    const double k = 0.9996 * (1 + (1 + eta2) * a * a / 2 +
+                               (5 - 4 * t2 + 42 * eta2 + 13 * eta2 * eta2 - 28 * E2 / (1 - E2)) * pow(a, 4) / 24);
     struct georef *georef = make(GEOREF_UTM, 48.2, 11, 0, 32);
     double e[3], n[3], w[3], s[3];
     forward_one(georef, (const double[3]){1, 0, 0}, e);
@@ -186,18 +183,16 @@ static void test_zones(void **state)
         double lat_deg, lon_deg;
         int epsg;
     } at[] = {
-        {33.3, 44.4, 32638},  {-33.9, 151.2, 32756}, {0, -180, 32601},     {10, 179.99, 32660},
-        {48.2, 16.37, 32633}, {48.2, 196.37, 32603}, {60.39, 5.32, 32632}, {63.9, 3.1, 32632},
-        {64.1, 3.1, 32631},                                                                   /* Norway */
-        {78.2, 15.6, 32633},  {78, 8.9, 32631},      {78, 9.1, 32633},     {78, 33.1, 32637}, /* Svalbard */
-        {84.5, 20, 32661},    {-80.5, 20, 32761},    {90, 0, 32661},       {-90, 0, 32761},
-        {83.9, 20, 32633},    {-79.9, 20, 32734},
+        {33.3, 44.4, 32638},   {-33.9, 151.2, 32756}, {0, -180, 32601},   {10, 179.99, 32660}, {48.2, 16.37, 32633},
+        {48.2, 196.37, 32603}, {60.39, 5.32, 32632},  {63.9, 3.1, 32632}, {64.1, 3.1, 32631}, /* Norway */
+        {78.2, 15.6, 32633},   {78, 8.9, 32631},      {78, 9.1, 32633},   {78, 33.1, 32637},  /* Svalbard */
+        {84.5, 20, 32661},     {-80.5, 20, 32761},    {90, 0, 32661},     {-90, 0, 32761},     {83.9, 20, 32633},
+        {-79.9, 20, 32734},
     };
     for (size_t i = 0; i < sizeof at / sizeof at[0]; i++) {
         struct georef *georef = make(GEOREF_UTM, at[i].lat_deg, at[i].lon_deg, 0, 0);
         if (georef_epsg(georef) != at[i].epsg)
-            fail_msg("%g %g: EPSG %d instead of %d", at[i].lat_deg, at[i].lon_deg, georef_epsg(georef),
-                     at[i].epsg);
+            fail_msg("%g %g: EPSG %d instead of %d", at[i].lat_deg, at[i].lon_deg, georef_epsg(georef), at[i].epsg);
         georef_free(georef);
     }
     double anchor[3]; /* the poles are at 2000 km, 2000 km by definition of UPS */
@@ -288,8 +283,7 @@ static void test_nan_and_in_place(void **state)
         georef_forward(georef, 5, x, y, z, x, y, z);
         for (int i = 0; i < 5; i++) {
             assert_int_equal(isnan(x[i]) || isnan(y[i]) || isnan(z[i]), i > 0 && i < 4);
-            if (crs[c] != GEOREF_LOCAL)
-                assert_int_equal(isnan(ox[i]) && isnan(oy[i]) && isnan(oz[i]), i > 0 && i < 4);
+            if (crs[c] != GEOREF_LOCAL) assert_int_equal(isnan(ox[i]) && isnan(oy[i]) && isnan(oz[i]), i > 0 && i < 4);
             if (!isnan(ox[i])) assert_true(ox[i] == x[i]);
             if (!isnan(oy[i])) assert_true(oy[i] == y[i]);
             if (!isnan(oz[i])) assert_true(oz[i] == z[i]);

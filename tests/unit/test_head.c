@@ -10,8 +10,8 @@
 #include "firmware_sim/head.h"
 
 /* All pairs, by name, as a person would write them on paper; "-" is refused. */
-static const char *const event_order[HEAD_N_EVENTS] = {
-    "power-on", "power-off", "booted", "start", "spun-up", "stop", "done", "spun-down", "fail", "reset"};
+static const char *const event_order[HEAD_N_EVENTS] = {"power-on", "power-off", "booted",    "start", "spun-up",
+                                                       "stop",     "done",      "spun-down", "fail",  "reset"};
 static const struct {
     const char *state;
     const char *next[HEAD_N_EVENTS];

@@ -221,10 +221,8 @@ static void test_frames(void **state)
     assert_string_equal(info.profile, "model");
     assert_true(info.geo == 1 && info.crs == 1 && info.epsg == 4978 && info.station == 2 && info.scan == 3);
     assert_true(info.prr_hz == 300000 && info.lines_hz == 100.5 && info.pan_deg_s == 18);
-    assert_true(info.anchor[2] == 4.8e6 && info.station_m[1] == 2 && info.rotation[3] == -1 &&
-                info.scale_m == 1e-5);
-    assert_true(info.range_min_m == 1.5 && info.range_max_m == 600 && info.n_surfaces == 2 &&
-                info.frames == 9);
+    assert_true(info.anchor[2] == 4.8e6 && info.station_m[1] == 2 && info.rotation[3] == -1 && info.scale_m == 1e-5);
+    assert_true(info.range_min_m == 1.5 && info.range_max_m == 600 && info.n_surfaces == 2 && info.frames == 9);
     close(head);
     assert_int_equal(scanhead_next(sh, &f, -1), SCANHEAD_ECLOSED);
     assert_int_equal(scanhead_next(sh, &f, -1), SCANHEAD_ECLOSED);
@@ -286,8 +284,8 @@ static void name_of(void *ctx, uint32_t i, const char **object, const char **mat
 static void put_surfaces(int fd, const char *const (*names)[2], uint32_t first, uint32_t n)
 {
     uint32_t done;
-    size_t len = native_encode_surfaces(out, sizeof out, first, n, 4096, name_of, (void *)(uintptr_t)names, 1,
-                                        0, &done);
+    size_t len =
+        native_encode_surfaces(out, sizeof out, first, n, 4096, name_of, (void *)(uintptr_t)names, 1, 0, &done);
     assert_int_equal(done, n);
     put_all(fd, out, len);
 }
@@ -362,8 +360,7 @@ static void test_polar_points(void **state)
     refl[8] = INT16_MIN;
     assert_int_equal(decode(0, n, p), n);
     for (uint32_t i = 0; i < n; i++) {
-        long double m = 2 * acosl(-1.0L) * b[i] / 3600000, pan = 2 * acosl(-1.0L) * c[i] / 7200000,
-                    r = a[i] * 1e-4L;
+        long double m = 2 * acosl(-1.0L) * b[i] / 3600000, pan = 2 * acosl(-1.0L) * c[i] / 7200000, r = a[i] * 1e-4L;
         /* the turn around the middle of -40..220 degrees is -90..270 */
         long double shown = b[i] >= 2700000 ? m - 2 * acosl(-1.0L) : m;
         /* count * (1 / counts_per_turn) rounds twice, 2^-52 of a turn: 1.4e-15 rad for each angle; sine,
@@ -396,9 +393,8 @@ static void test_polar_directions(void **state)
     static const struct {
         uint32_t mirror, pan;
         double x, y, z;
-    } want[] = {{0, 0, 0, 1, 0},        {0, 1800000, 1, 0, 0},  {900000, 1234567, 0, 0, 1},
-                {1800000, 0, 0, -1, 0}, {2700000, 0, 0, 0, -1}, {3600000, 0, 0, 1, 0},
-                {0, 3600000, 0, -1, 0}};
+    } want[] = {{0, 0, 0, 1, 0},        {0, 1800000, 1, 0, 0}, {900000, 1234567, 0, 0, 1}, {1800000, 0, 0, -1, 0},
+                {2700000, 0, 0, 0, -1}, {3600000, 0, 0, 1, 0}, {0, 3600000, 0, -1, 0}};
     struct scanhead_point p[7];
     for (int i = 0; i < 7; i++) {
         a[i] = 10000;
@@ -497,17 +493,12 @@ static void test_command(void **state)
     memset(dt, 0, sizeof dt);
     put_points(head, 1, 1000);
     put_all(head, "LATE\r\n", 6); /* the reply to a command given up: never taken for a new one's */
-    struct script s = {.fd = head,
-                       .expect = "*IDN?",
-                       .frames_before = 5,
-                       .frames_after = 3,
-                       .reply = "Maker,Model,SN1,1.0\r\n"};
+    struct script s = {
+        .fd = head, .expect = "*IDN?", .frames_before = 5, .frames_after = 3, .reply = "Maker,Model,SN1,1.0\r\n"};
     assert_int_equal(run_command(sh, &s, reply, sizeof reply), 0);
     assert_string_equal(reply, "Maker,Model,SN1,1.0");
-    struct script e = {.fd = head,
-                       .expect = "HEAD:PRR 5000000",
-                       .frames_before = 1,
-                       .reply = "ERR -222,\"Data out of range\"\r\n"};
+    struct script e = {
+        .fd = head, .expect = "HEAD:PRR 5000000", .frames_before = 1, .reply = "ERR -222,\"Data out of range\"\r\n"};
     assert_int_equal(run_command(sh, &e, reply, sizeof reply), 0);
     assert_string_equal(reply, "ERR -222,\"Data out of range\"");
     static const uint64_t pulses[] = {1000, 0, 1, 2, 3, 4, 5, 6, 7, 0};
@@ -748,8 +739,7 @@ static void check_tcp(int family, const char *host)
     assert_int_equal(listen(fd, 1), 0);
     getsockname(fd, (struct sockaddr *)&address, &len);
     char source[64], err[256], reply[32];
-    snprintf(source, sizeof source, "tcp:%s:%d", host,
-             ntohs(family == AF_INET ? v4->sin_port : v6->sin6_port));
+    snprintf(source, sizeof source, "tcp:%s:%d", host, ntohs(family == AF_INET ? v4->sin_port : v6->sin6_port));
     struct scanhead *sh;
     struct scanhead_frame f;
     assert_int_equal(scanhead_open(source, &sh, err, sizeof err), 0);

@@ -92,8 +92,7 @@ static void expect_refused(const struct link_spec *spec, int code, const char *p
     void *link = NULL;
     assert_int_equal(link_ops_get(spec->type)->open(spec, &link, &err), code);
     assert_null(link);
-    if (strstr(err.text, part) == NULL || strchr(err.text, '\n') != NULL)
-        fail_msg("'%s' without '%s'", err.text, part);
+    if (strstr(err.text, part) == NULL || strchr(err.text, '\n') != NULL) fail_msg("'%s' without '%s'", err.text, part);
 }
 
 static void test_file_refusals(void **state)

@@ -87,8 +87,7 @@ static void test_size(void **state)
     struct picture picture = draw(map);
     assert_int_equal(picture.width, layout.width);
     assert_int_equal(picture.height, layout.height);
-    assert_true(layout.left + layout.map_width <= layout.width &&
-                layout.top + layout.map_height < layout.height);
+    assert_true(layout.left + layout.map_width <= layout.width && layout.top + layout.map_height < layout.height);
     free(picture.rgb);
     map_free(map);
     map = make(0, 0, 10, 7.04, 0.5); /* 20 x 14.08 pixels: the part of one counts */
@@ -115,8 +114,7 @@ static void test_place(void **state)
     const struct {
         double x, y;
         uint32_t column, row;
-    } points[] = {
-        {-1.95, 7.95, 0, 0}, {1.95, 5.05, 39, 29}, {0.05, 6.05, 20, 19}, {-2, 5, 0, 29}, {2, 8, 39, 0}};
+    } points[] = {{-1.95, 7.95, 0, 0}, {1.95, 5.05, 39, 29}, {0.05, 6.05, 20, 19}, {-2, 5, 0, 29}, {2, 8, 39, 0}};
     for (size_t i = 0; i < sizeof points / sizeof points[0]; i++) {
         struct map *map = make(-2, 5, 2, 8, 0.1);
         struct map_layout layout;
@@ -129,8 +127,7 @@ static void test_place(void **state)
         struct picture picture = draw(map);
         for (uint32_t r = 0; r < layout.map_height; r++)
             for (uint32_t c = 0; c < layout.map_width; c++) {
-                const int near =
-                    abs((int)r - (int)points[i].row) <= 1 && abs((int)c - (int)points[i].column) <= 1;
+                const int near = abs((int)r - (int)points[i].row) <= 1 && abs((int)c - (int)points[i].column) <= 1;
                 assert_int_equal(is_white(at(&picture, layout.left + c, layout.top + r)), !near);
             }
         free(picture.rgb);
@@ -205,8 +202,7 @@ static void test_station(void **state)
     assert_non_null(strstr(err.text, "x 5.5 m"));
     assert_int_equal(map_add_station(map, NAN, 0, &err), SH_EINPUT);
     for (int i = 1; i < MAP_MAX_STATIONS; i++)
-        assert_int_equal(map_add_station(map, -5, 5, &err),
-                         SH_OK); /* marks at the corner stay in the image */
+        assert_int_equal(map_add_station(map, -5, 5, &err), SH_OK); /* marks at the corner stay in the image */
     assert_int_equal(map_add_station(map, 0, 0, &err), SH_EINPUT);
     picture = draw(map);
     free(picture.rgb);
@@ -245,8 +241,7 @@ static void test_counts(void **state)
 {
     (void)state;
     struct map *map = make(0, 0, 1, 1, 0.1);
-    const double x[] = {0.5, NAN, 0.5, 0.5, 2, 0.5, 0, 1, 0.5},
-                 y[] = {0.5, 0.5, INFINITY, 0.5, 0.5, -1e-9, 0, 1, 0.5};
+    const double x[] = {0.5, NAN, 0.5, 0.5, 2, 0.5, 0, 1, 0.5}, y[] = {0.5, 0.5, INFINITY, 0.5, 0.5, -1e-9, 0, 1, 0.5};
     const double z[] = {1e6, 0, 0, NAN, 0, 0, -1e6, 0, -1e300};
     struct map_counts counts;
     map_add_points(map, 9, x, y, z);

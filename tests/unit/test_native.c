@@ -34,8 +34,7 @@ static double wire_double(const uint8_t *p, size_t at)
     return d;
 }
 
-static void check_frame(const uint8_t *frame, size_t len, int type, int flags, size_t payload_len,
-                        int64_t t_ns)
+static void check_frame(const uint8_t *frame, size_t len, int type, int flags, size_t payload_len, int64_t t_ns)
 {
     assert_int_equal(len, NATIVE_HEADER_LEN + payload_len);
     assert_int_equal(frame[0], 0xd5);
@@ -166,8 +165,7 @@ static void test_anchor(void **state)
     assert_int_equal(wire(p, 4, 4), 32632);
     assert_int_equal(wire(p, 8, 4), UINT32_MAX);
     assert_int_equal(wire(p, 12, 4), 0);
-    assert_true(wire_double(p, 16) == 500000.125 && wire_double(p, 24) == 6e6 &&
-                wire_double(p, 32) == -11000.5);
+    assert_true(wire_double(p, 16) == 500000.125 && wire_double(p, 24) == 6e6 && wire_double(p, 32) == -11000.5);
     assert_true(wire_double(p, 40) == 1e-5);
     assert_true(wire_double(p, 48) == -90 && wire_double(p, 56) == 180 && wire_double(p, 64) == 8848.86);
     assert_true(wire_double(p, 72) == 1.5 && wire_double(p, 80) == -2.5 && wire_double(p, 88) == 3.5);
@@ -231,12 +229,7 @@ static void test_telemetry(void **state)
 static void test_event(void **state)
 {
     (void)state;
-    struct native_event e = {.code = NATIVE_EV_OVERRUN,
-                             .a = UINT64_MAX,
-                             .b = 2,
-                             .c = 3,
-                             .text = "100 pulses"},
-                        back;
+    struct native_event e = {.code = NATIVE_EV_OVERRUN, .a = UINT64_MAX, .b = 2, .c = 3, .text = "100 pulses"}, back;
     size_t len = native_encode_event(out, sizeof out, &e, 9, 0);
     check_frame(out, len, 6, 0, 128, 9);
     const uint8_t *p = out + 28;
@@ -371,8 +364,7 @@ static void test_point_extremes(void **state)
     size_t len = native_encode_points(out, sizeof out, &block, 1000);
     check_frame(out, len, 3, 0, 40 + 80, 1000 + block.t0_ns);
     assert_memory_equal(out + 28 + 40 + 40,
-                        "\x04\x03\x02\x01\x08\x07\x06\x05\x0c\x0b\x0a\x09\xff\xff\x0e\x0d\x33\x22\x11\xff",
-                        20);
+                        "\x04\x03\x02\x01\x08\x07\x06\x05\x0c\x0b\x0a\x09\xff\xff\x0e\x0d\x33\x22\x11\xff", 20);
     struct native_points head;
     assert_int_equal(native_decode_points(out + 28, 120, &head), 0);
     assert_int_equal(head.frame, 3);

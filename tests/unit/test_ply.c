@@ -27,11 +27,8 @@ static FILE *shs;
 
 /* ---- a stream to record */
 
-static const int32_t xyz[N][3] = {{300000, -400000, 1200000},
-                                  {-1, 1, 0},
-                                  {INT32_MAX, -INT32_MAX, 7},
-                                  {0, 0, 0},
-                                  {123456789, 5, -987654321}};
+static const int32_t xyz[N][3] = {
+    {300000, -400000, 1200000}, {-1, 1, 0}, {INT32_MAX, -INT32_MAX, 7}, {0, 0, 0}, {123456789, 5, -987654321}};
 static uint32_t a[N], b[N], c[N], dt[N] = {0, 1000, 2000, 3000, 0xffffff};
 static int16_t refl[N] = {-1234, INT16_MIN, 0, 5, 32767};
 static uint16_t label[N] = {0, 1, 2, 0xffff, 1};
@@ -198,17 +195,16 @@ static void read_ascii(void)
         struct vertex *v = &vertex[i];
         int used = 0;
         assert_int_equal(sscanf(at, "%lf %lf %lf %lf %f %lf %u %u %u %u\n%n", &v->x, &v->y, &v->z, &v->range,
-                                &v->reflectance, &v->time, &v->echo, &v->echo_count, &v->label, &v->station,
-                                &used),
+                                &v->reflectance, &v->time, &v->echo, &v->echo_count, &v->label, &v->station, &used),
                          10);
         at += used;
     }
     assert_int_equal(*at, 0);
 }
 
-static const char *const properties[] = {
-    "double x",    "double y",   "double z",         "double range", "float reflectance",
-    "double time", "uchar echo", "uchar echo_count", "ushort label", "ushort station"};
+static const char *const properties[] = {"double x",          "double y",      "double z",   "double range",
+                                         "float reflectance", "double time",   "uchar echo", "uchar echo_count",
+                                         "ushort label",      "ushort station"};
 
 /* Line by line, as strict as a reader may be: no line beyond 200 bytes, properties as they are, comments
  * anywhere. */

@@ -346,8 +346,7 @@ static void *reader_main(void *arg)
             break;
         case RING_READ:
             all.got[me]++;
-            if (!is_whole(tick, bytes, len, n_frames, first_seq) || first_seq < next_seq)
-                atomic_fetch_add(&all.bad, 1);
+            if (!is_whole(tick, bytes, len, n_frames, first_seq) || first_seq < next_seq) atomic_fetch_add(&all.bad, 1);
             if (me != SLOW && first_seq != next_seq) atomic_fetch_add(&all.bad, 1);
             next_seq = first_seq + n_frames;
             for (int i = 0; me == SLOW && i < 20; i++)
@@ -380,8 +379,8 @@ static void no_tick_is_torn_with_all_threads_at_work(void **state)
     uint64_t head_lost = 0;
     for (int i = 0; i < TICKS; i++)
         head_lost += all.head_lost[i];
-    print_message("# %u ticks, %u lost by the head; the slow reader got %u\n", (unsigned)TICKS,
-                  (unsigned)head_lost, (unsigned)all.got[SLOW]);
+    print_message("# %u ticks, %u lost by the head; the slow reader got %u\n", (unsigned)TICKS, (unsigned)head_lost,
+                  (unsigned)all.got[SLOW]);
     assert_true(atomic_load(&all.bad) == 0);
     for (int i = 0; i < READERS; i++) {
         assert_true(all.got[i] + all.too_old[i] + all.lost_by_head[i] == TICKS);

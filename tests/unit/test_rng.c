@@ -25,9 +25,8 @@ static double *normals(uint64_t key)
 static void the_finaliser_is_that_of_splitmix64(void **state)
 {
     (void)state;
-    static const uint64_t expected[] = {6457827717110365317ULL, 3203168211198807973ULL,
-                                        9817491932198370423ULL, 4593380528125082431ULL,
-                                        16408922859458223821ULL};
+    static const uint64_t expected[] = {6457827717110365317ULL, 3203168211198807973ULL, 9817491932198370423ULL,
+                                        4593380528125082431ULL, 16408922859458223821ULL};
     for (uint64_t i = 0; i < 5; i++)
         assert_true(rng_mix(1234567 + (i + 1) * 0x9e3779b97f4a7c15ULL) == expected[i]);
 }
@@ -62,8 +61,8 @@ static void moments_are_those_of_a_normal(void **state)
     free(x);
     double z[] = {mean * sqrt(N), (m2 - 1.0) / sqrt(2.0 / N), m3 / pow(m2, 1.5) / sqrt(6.0 / N),
                   (m4 / (m2 * m2) - 3.0) / sqrt(24.0 / N)};
-    print_message("# mean, variance, skewness, kurtosis: %.2f %.2f %.2f %.2f standard errors off\n", z[0],
-                  z[1], z[2], z[3]);
+    print_message("# mean, variance, skewness, kurtosis: %.2f %.2f %.2f %.2f standard errors off\n", z[0], z[1], z[2],
+                  z[3]);
     for (int i = 0; i < 4; i++)
         assert_true(fabs(z[i]) < Z_LIMIT);
 }

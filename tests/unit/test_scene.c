@@ -101,8 +101,7 @@ static void obj_random_numbers_are_exact(void **state)
     char *text = malloc(COUNT * 64 + 64), *p = text;
     srand(7);
     for (int i = 0; i < COUNT; i++) {
-        static const char *const formats[] = {"v %.17g 0 0\n", "v %.15g 0 0\n", "v %.9f 0 0\n",
-                                              "v %.3e 0 0\n"};
+        static const char *const formats[] = {"v %.17g 0 0\n", "v %.15g 0 0\n", "v %.9f 0 0\n", "v %.3e 0 0\n"};
         double v = (rand() - RAND_MAX / 2.0) * pow(10, rand() % 9 - 10) * (1 + rand() / (RAND_MAX + 1.0));
         int n = sprintf(p, formats[i % 4], v);
         expected[i] = strtod(p + 2, NULL);
@@ -197,13 +196,13 @@ static void ply_is_read_exactly(void **state)
         for (size_t cut = 0; cut < n; cut += 13)
             refuse("cut.ply", data, cut, "");
     }
-    check_utm_scene(load_text(
-        "utm.ply", "ply\r\nformat ascii 1.0\r\nelement vertex 5 \r\nproperty double x\r\n"
-                   "property double y\r\nproperty double z\r\nproperty uchar red\r\n"
-                   "element face 2\r\nproperty list uchar int vertex_indices\r\nend_header\r\n"
-                   "500000.1 5800000.2 30.3 1\r\n500001.00000000012 5800000.2 30.3 2\r\n"
-                   "500001.1 5800001.2000000011 30.3 3\r\n500000.1 5800001.2 30.300000000000004 4\r\n"
-                   "\r\n500000.7 5800002.9 31 5\r\n4 0 1 2 3\r\n3 3 2 4"));
+    check_utm_scene(load_text("utm.ply",
+                              "ply\r\nformat ascii 1.0\r\nelement vertex 5 \r\nproperty double x\r\n"
+                              "property double y\r\nproperty double z\r\nproperty uchar red\r\n"
+                              "element face 2\r\nproperty list uchar int vertex_indices\r\nend_header\r\n"
+                              "500000.1 5800000.2 30.3 1\r\n500001.00000000012 5800000.2 30.3 2\r\n"
+                              "500001.1 5800001.2000000011 30.3 3\r\n500000.1 5800001.2 30.300000000000004 4\r\n"
+                              "\r\n500000.7 5800002.9 31 5\r\n4 0 1 2 3\r\n3 3 2 4"));
 }
 
 static void obj_is_read_exactly(void **state)
@@ -221,10 +220,9 @@ static void ply_in_float_warns(void **state)
 {
     (void)state;
     char data[512];
-    size_t n =
-        (size_t)sprintf(data, "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\n"
-                              "property float y\nproperty float z\nelement face 1\n"
-                              "property list uchar uchar vertex_indices\nend_header\n");
+    size_t n = (size_t)sprintf(data, "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\n"
+                                     "property float y\nproperty float z\nelement face 1\n"
+                                     "property list uchar uchar vertex_indices\nend_header\n");
     static const float v[3][3] = {{500000, 5800000, 0}, {500001, 5800000, 0}, {500000, 5800001, 0}};
     memcpy(data + n, v, sizeof v);
     memcpy(data + n + sizeof v, "\3\0\1\2", 4);
@@ -266,8 +264,7 @@ static void files_add_up(void **state)
     (void)state;
     char a[128], b[128];
     strcpy(a, write_text("a.obj", "v 9 9 9\nv 0 0 0\nv 1 0 0\nv 0 1 0\no x\nusemtl m\nf 2 3 4\nf 2 3 3\n"));
-    strcpy(b, write_text("b.obj",
-                         "v 0 0 1\nv 1 0 1\nv 0 1 1\no y\nf 1 2 3\no x\nusemtl m\nf 1 2 -1\nf 1 1 2\n"));
+    strcpy(b, write_text("b.obj", "v 0 0 1\nv 1 0 1\nv 0 1 1\no y\nf 1 2 3\no x\nusemtl m\nf 1 2 -1\nf 1 1 2\n"));
     const struct scene_mesh_spec specs[2] = {{.file = a, .scale = 1}, {.file = b, .scale = 2}};
     struct scene *s;
     struct sh_err err;
@@ -378,12 +375,10 @@ static void malformed_files_are_refused(void **state)
         {"a.ply", HEAD "element vertex 3\nproperty real x\n", "unknown property type 'real'"},
         {"a.ply", HEAD "element vertex 3\nproperty list float int x\n", "count can't be of type 'float'"},
         {"a.ply", HEAD "element vertex 3\nproperty float x\nproperty float x\n", "twice: 'x'"},
-        {"a.ply", HEAD "element vertex 3\nproperty float x\nend_header\n",
-         "lacks one of the properties x, y, z"},
+        {"a.ply", HEAD "element vertex 3\nproperty float x\nend_header\n", "lacks one of the properties x, y, z"},
         {"a.ply", HEAD "element face 1\n" FACE "end_header\n", "face comes before element vertex"},
         {"a.ply", HEAD "element vertex 1\n" XYZ "end_header\n0 0 0\n", "points are not a mesh"},
-        {"a.ply", HEAD "element vertex 1\n" XYZ "element face 1\nproperty int a\nend_header\n",
-         "lacks the list"},
+        {"a.ply", HEAD "element vertex 1\n" XYZ "element face 1\nproperty int a\nend_header\n", "lacks the list"},
         {"a.ply", HEAD "element vertex 999999999999\n" XYZ "element face 1\n" FACE "end_header\n0 0 0\n",
          "999999999999 of element vertex need 6 bytes or more each; 7 are left"},
         {"a.ply", PLY "0 0 0\n1 0 0\n0 nan 0\n3 0 1 2\n", "line 12: vertex 3 (0 nan 0) is not finite"},
@@ -428,8 +423,7 @@ static void arrays_become_a_scene(void **state)
     struct scene *s;
     struct sh_err err;
     assert_int_equal(
-        scene_from_arrays((const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, label, surface, 2, &s, &err),
-        SH_OK);
+        scene_from_arrays((const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, label, surface, 2, &s, &err), SH_OK);
     assert_int_equal(s->n_triangles, 2);
     assert_int_equal(s->counts.zero_area, 1);
     assert_int_equal(s->label[0], 1);
@@ -437,9 +431,8 @@ static void arrays_become_a_scene(void **state)
     assert_string_equal(s->surface[1].material, "d");
     assert_true(s->max_m[0] == 1);
     scene_free(s);
-    assert_int_equal(
-        scene_from_arrays((const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, NULL, NULL, 0, &s, &err),
-        SH_OK);
+    assert_int_equal(scene_from_arrays((const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, NULL, NULL, 0, &s, &err),
+                     SH_OK);
     assert_string_equal(s->surface[0].object, "object");
     assert_string_equal(s->surface[0].material, "material");
     scene_free(s);
@@ -449,14 +442,12 @@ static void arrays_become_a_scene(void **state)
         SH_EINPUT);
     assert_non_null(strstr(err.text, "triangle 2: label 2 out of range"));
     t[2][1] = 4;
-    assert_int_equal(
-        scene_from_arrays((const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, NULL, NULL, 0, &s, &err),
-        SH_EINPUT);
+    assert_int_equal(scene_from_arrays((const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, NULL, NULL, 0, &s, &err),
+                     SH_EINPUT);
     assert_non_null(strstr(err.text, "triangle 2: index 4 out of range"));
     v[3][1] = NAN;
-    assert_int_equal(
-        scene_from_arrays((const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, NULL, NULL, 0, &s, &err),
-        SH_EINPUT);
+    assert_int_equal(scene_from_arrays((const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, NULL, NULL, 0, &s, &err),
+                     SH_EINPUT);
     assert_non_null(strstr(err.text, "vertex 4 (5 nan 5) is not finite"));
     assert_null(s);
 }

@@ -197,8 +197,7 @@ static void check_against_flattened(const char *file)
                 }
             }
             static const uint32_t corner[1][3] = {{0, 1, 2}};
-            struct scene one = {
-                .vertex_m = p, .triangle = (uint32_t(*)[3])(uintptr_t)corner, .n_triangles = 1};
+            struct scene one = {.vertex_m = p, .triangle = (uint32_t(*)[3])(uintptr_t)corner, .n_triangles = 1};
             area += triangle_area(&one, 0);
         }
     }
@@ -210,8 +209,7 @@ static void check_against_flattened(const char *file)
     /* Assimp multiplies the tree in float: some roundings of 6e-8 for each level */
     for (int k = 0; k < 3; k++)
         assert_true(fabs(s->min_m[k] - low[k]) < 2e-6 * size && fabs(s->max_m[k] - high[k]) < 2e-6 * size);
-    if (fabs(total_area(s) - area) > 1e-4 * area)
-        fail_msg("%s: area %.9g, not %.9g", file, total_area(s), area);
+    if (fabs(total_area(s) - area) > 1e-4 * area) fail_msg("%s: area %.9g, not %.9g", file, total_area(s), area);
     scene_free(s);
 }
 

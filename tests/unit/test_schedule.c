@@ -74,8 +74,7 @@ static void check_time(const struct schedule_segment *seg, uint64_t k)
     u128 ns = (u128)k * 1000000000000000U / (u128)seg->spec.prr_uhz;
     if (ns > INT64_MAX) return; /* beyond 292 years */
     if (schedule_time_ns(seg, k) != (int64_t)ns)
-        fail_msg("%" PRId64 " uHz, pulse %" PRIu64 ": %" PRId64 " ns", seg->spec.prr_uhz, k,
-                 schedule_time_ns(seg, k));
+        fail_msg("%" PRId64 " uHz, pulse %" PRIu64 ": %" PRId64 " ns", seg->spec.prr_uhz, k, schedule_time_ns(seg, k));
 }
 
 static void times_are_exact_floors(void **state)
@@ -122,8 +121,7 @@ static void pulse_at_is_the_first_at_or_after(void **state)
             uint64_t k = schedule_pulse_at(&seg, t);
             if (k < UINT64_C(1) << 50) assert_true(schedule_time_ns(&seg, k) >= t);
             assert_true(k > 0 && schedule_time_ns(&seg, k - 1) < t);
-            if (k < UINT64_C(1)
-                        << 50) { /* a pulse's own time finds it, or an earlier one of the same nanosecond */
+            if (k < UINT64_C(1) << 50) { /* a pulse's own time finds it, or an earlier one of the same nanosecond */
                 uint64_t again = schedule_pulse_at(&seg, schedule_time_ns(&seg, k));
                 assert_true(again <= k && schedule_time_ns(&seg, again) == schedule_time_ns(&seg, k));
             }
@@ -142,8 +140,7 @@ static void check_run_times(const struct schedule_segment *seg, uint64_t n_line)
     schedule_get_run(seg, &line, line.pulse0, (uint32_t)n, &run);
     assert_true(run.ns_acc < run.ns_den && run.ns_rem < run.ns_den);
     for (uint64_t j = 0; j < n; j++) {
-        int64_t dt =
-            (int64_t)j * run.ns_quot + (int64_t)(((u128)run.ns_acc + (u128)j * run.ns_rem) / run.ns_den);
+        int64_t dt = (int64_t)j * run.ns_quot + (int64_t)(((u128)run.ns_acc + (u128)j * run.ns_rem) / run.ns_den);
         if (run.t0_ns + dt != schedule_time_ns(seg, run.pulse0 + j))
             fail_msg("pulse %" PRIu64 " of line %" PRIu64, j, n_line);
     }
@@ -187,8 +184,7 @@ static void check_line(const struct schedule_segment *seg, uint64_t n, struct sc
                 line->pulse_end == (end < seg->end_pulse ? end : seg->end_pulse));
     assert_true(schedule_line_of(seg, first) == n && schedule_line_of(seg, end - 1) == n &&
                 schedule_line_of(seg, end) == n + 1);
-    assert_true(line->pulse0 <= line->cast0 && line->cast0 <= line->cast_end &&
-                line->cast_end <= line->pulse_end);
+    assert_true(line->pulse0 <= line->cast0 && line->cast0 <= line->cast_end && line->cast_end <= line->pulse_end);
     assert_true((i128)line->r_first_pulse * s->prr_uhz == (i128)model_phase(s, first) * (i128)seg->den);
 }
 
@@ -338,8 +334,7 @@ static void a_frame_has_the_lines_that_its_sweep_needs(void **state)
             schedule_get_line(&seg, first + lines - 1, &line);
             assert_true(line.frame == f && line.last_of_frame);
         }
-        assert_true(seg.end_pulse ==
-                    (uint64_t)ceil_of((i128)(lines * spec.frames) * spec.prr_uhz, spec.lines_uhz));
+        assert_true(seg.end_pulse == (uint64_t)ceil_of((i128)(lines * spec.frames) * spec.prr_uhz, spec.lines_uhz));
         schedule_get_line(&seg, lines * spec.frames - 1, &line);
         assert_true(line.pulse_end == seg.end_pulse);
     }
@@ -410,15 +405,13 @@ static void mirror_and_pan_turn_as_the_rates_say(void **state)
         spec.pan_stop_udeg = spec.pan_start_udeg + 360 * DEG;
         spec.frames = 0;
         schedule_start(&seg, &spec);
-        uint64_t k =
-            (uint64_t)case_between(&seed, 0, spec.prr_uhz / HZ * 6); /* within the first 6 s and 360 deg */
-        long double mirror =
-            (spec.fov_min_udeg +
-             (long double)spec.sweep_udeg * (long double)model_phase(&spec, k) / (long double)spec.prr_uhz) /
+        uint64_t k = (uint64_t)case_between(&seed, 0, spec.prr_uhz / HZ * 6); /* within the first 6 s and 360 deg */
+        long double mirror = (spec.fov_min_udeg + (long double)spec.sweep_udeg * (long double)model_phase(&spec, k) /
+                                                      (long double)spec.prr_uhz) /
+                             360e6L;
+        long double pan =
+            (spec.pan_start_udeg + (long double)k * (long double)spec.pan_udeg_s * HZ / (long double)spec.prr_uhz) /
             360e6L;
-        long double pan = (spec.pan_start_udeg +
-                           (long double)k * (long double)spec.pan_udeg_s * HZ / (long double)spec.prr_uhz) /
-                          360e6L;
         /* At most half a turn and a few roundings of 2^-53; the pan is a whole number of 2^-24 udeg (1.7e-16
          * turns). */
         assert_true(fabsl(schedule_mirror_turn(&seg, k) - mirror) < 5e-16L);

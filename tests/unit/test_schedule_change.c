@@ -34,10 +34,9 @@ static struct schedule_spec any_spec(uint64_t *seed, struct schedule_spec s)
 {
     s.prr_uhz = case_between(seed, 0, 3) == 0 ? case_between(seed, 1, 2200) * 1000 * HZ
                                               : case_between(seed, 1000 * HZ, 2200000 * HZ);
-    s.lines_uhz = case_between(seed, 0, 1) == 0 ? case_between(seed, 3, 240) * HZ
-                                                : case_between(seed, 3 * HZ, 240 * HZ);
-    s.pan_udeg_s =
-        case_between(seed, 0, 3) == 0 ? case_between(seed, 1, 60) * DEG : case_between(seed, 1000, 60 * DEG);
+    s.lines_uhz =
+        case_between(seed, 0, 1) == 0 ? case_between(seed, 3, 240) * HZ : case_between(seed, 3 * HZ, 240 * HZ);
+    s.pan_udeg_s = case_between(seed, 0, 3) == 0 ? case_between(seed, 1, 60) * DEG : case_between(seed, 1000, 60 * DEG);
     s.line_start_udeg = case_between(seed, s.fov_min_udeg, s.fov_min_udeg + s.sweep_udeg);
     s.line_stop_udeg = case_between(seed, s.line_start_udeg, s.fov_min_udeg + s.sweep_udeg);
     s.pan_start_udeg = case_between(seed, -180 * DEG, 180 * DEG);
@@ -68,8 +67,7 @@ static long double exact_pan(const struct schedule_segment *seg, uint64_t k, con
     return (long double)base + turned * FINE;
 }
 
-static void check_continuity(const struct schedule_segment *before, const struct schedule_segment *after,
-                             uint64_t k)
+static void check_continuity(const struct schedule_segment *before, const struct schedule_segment *after, uint64_t k)
 {
     struct schedule_line was, is;
     assert_true(after->k0 == k && schedule_time_ns(after, k) == schedule_time_ns(before, k));
@@ -96,10 +94,9 @@ static void check_frame_end(const struct schedule_segment *seg)
         return;
     }
     long double per_line = (long double)seg->spec.pan_udeg_s * HZ / (long double)seg->spec.lines_uhz * FINE;
-    long double at_end = (long double)seg->pan0_fine +
-                         ((long double)lines - (long double)seg->r0 / (long double)seg->den) * per_line;
-    if (at_end < stop - 2.0L)
-        fail_msg("the frame ends %.3Lg lines short of the stop", (stop - at_end) / per_line);
+    long double at_end =
+        (long double)seg->pan0_fine + ((long double)lines - (long double)seg->r0 / (long double)seg->den) * per_line;
+    if (at_end < stop - 2.0L) fail_msg("the frame ends %.3Lg lines short of the stop", (stop - at_end) / per_line);
     if (lines > 1 && at_end - per_line > stop + 2.0L)
         fail_msg("the frame goes %.3Lg lines beyond the stop", (at_end - stop) / per_line);
 }
@@ -197,8 +194,7 @@ static void a_change_of_nothing_changes_nothing(void **state)
         for (int j = 0; j < 5; j++) {
             uint64_t later = (uint64_t)case_between(&seed, (int64_t)k, (int64_t)seg.end_pulse - 1);
             assert_true(schedule_line_of(&seg, later) == schedule_line_of(&next, later));
-            assert_true(llabs(schedule_time_ns(&seg, later) - schedule_time_ns(&next, later)) <=
-                        1); /* two floors */
+            assert_true(llabs(schedule_time_ns(&seg, later) - schedule_time_ns(&next, later)) <= 1); /* two floors */
             assert_true(fabs(schedule_pan_turn(&seg, later) - schedule_pan_turn(&next, later)) < 6e-16);
             assert_true(schedule_mirror_turn(&seg, later) == schedule_mirror_turn(&next, later));
         }
@@ -313,8 +309,7 @@ static void whatever_is_allowed_is_consistent(void **state)
             uint64_t k = seg.k0 + (case_u64(&seed) % room >> case_between(&seed, 0, 47));
             check_consistency(&seg, k);
             if (k >= seg.end_pulse) break;
-            int64_t fov = spec.fov_min_udeg,
-                    sweep = spec.sweep_udeg; /* the profile's, the same for the whole run */
+            int64_t fov = spec.fov_min_udeg, sweep = spec.sweep_udeg; /* the profile's, the same for the whole run */
             spec = wild_spec(&seed);
             spec.fov_min_udeg = spec.line_start_udeg = fov;
             spec.sweep_udeg = sweep;

@@ -37,8 +37,7 @@ static void polygons_keep_their_area(void **state)
     static const double on_edges[][2] = {{0, 0}, {1, 0}, {2, 0}, {3, 0}, {3, 3}, {1.5, 3}, {0, 3}, {0, 1}};
     static const double comb[][2] = {{0, 0}, {9, 0}, {9, 5}, {8, 1}, {7, 5}, {6, 1},
                                      {5, 5}, {4, 1}, {3, 5}, {2, 1}, {1, 5}, {0.5, 1}};
-    static const double keyhole[][2] = {{0, 0}, {1, 1}, {1, 2}, {2, 2}, {2, 1},
-                                        {1, 1}, {0, 0}, {3, 0}, {3, 3}, {0, 3}};
+    static const double keyhole[][2] = {{0, 0}, {1, 1}, {1, 2}, {2, 2}, {2, 1}, {1, 1}, {0, 0}, {3, 0}, {3, 3}, {0, 3}};
     static const double repeated[][2] = {{0, 0}, {2, 0}, {2, 0}, {2, 2}, {1, 1}, {0, 2}, {0, 2}};
     for (int at_utm = 0; at_utm < 2; at_utm++) {
         check_polygon(l_shape, 6, at_utm);

@@ -176,8 +176,7 @@ static void rounding_takes_ties_to_even(void **state)
     for (size_t i = 0; i < sizeof is / sizeof *is; i++) {
         uint64_t bits;
         double rounded = vec_round(is[i].x, &bits);
-        if (rounded != is[i].rounded)
-            fail_msg("%.17g rounds to %.17g, not %.17g", is[i].x, rounded, is[i].rounded);
+        if (rounded != is[i].rounded) fail_msg("%.17g rounds to %.17g, not %.17g", is[i].x, rounded, is[i].rounded);
         assert_int_equal((uint32_t)bits, (uint32_t)(int64_t)is[i].rounded);
     }
 }

@@ -20,13 +20,12 @@ static inline void room_write(const struct wire *wire)
     FILE *f = fopen(wire_path(wire, "room.obj"), "w");
     assert_non_null(f);
     for (int i = 0; i < 8; i++)
-        fprintf(f, "v %.17g %.17g %.17g\n", i & 1 ? ROOM_MAX[0] : ROOM_MIN[0],
-                i & 2 ? ROOM_MAX[1] : ROOM_MIN[1], i & 4 ? ROOM_MAX[2] : ROOM_MIN[2]);
-    static const int quad[6][4] = {{1, 3, 7, 5}, {2, 6, 8, 4}, {1, 5, 6, 2},
-                                   {3, 4, 8, 7}, {1, 2, 4, 3}, {5, 7, 8, 6}};
+        fprintf(f, "v %.17g %.17g %.17g\n", i & 1 ? ROOM_MAX[0] : ROOM_MIN[0], i & 2 ? ROOM_MAX[1] : ROOM_MIN[1],
+                i & 4 ? ROOM_MAX[2] : ROOM_MIN[2]);
+    static const int quad[6][4] = {{1, 3, 7, 5}, {2, 6, 8, 4}, {1, 5, 6, 2}, {3, 4, 8, 7}, {1, 2, 4, 3}, {5, 7, 8, 6}};
     for (int w = 0; w < 6; w++)
-        fprintf(f, "o %s\nusemtl paint-%s\nf %d %d %d %d\n", WALLS[w], WALLS[w], quad[w][0], quad[w][1],
-                quad[w][2], quad[w][3]);
+        fprintf(f, "o %s\nusemtl paint-%s\nf %d %d %d %d\n", WALLS[w], WALLS[w], quad[w][0], quad[w][1], quad[w][2],
+                quad[w][3]);
     assert_int_equal(fclose(f), 0);
 }
 
@@ -59,16 +58,13 @@ static inline const char *room_config_write(const struct wire *wire, const struc
     const char *path = wire_path(wire, "config.yaml");
     FILE *f = fopen(path, "w");
     assert_non_null(f);
-    fprintf(
-        f,
-        "head:\n  profile: %s\n  prr_hz: %.6f\n  lines_hz: %.6f\n  pan_deg_s: %.6f\n  pan_stop_deg: %.6f\n",
-        c->profile != NULL ? c->profile : "full-sweep", c->prr_hz, c->lines_hz, c->pan_deg_s,
-        c->pan_stop_deg);
+    fprintf(f, "head:\n  profile: %s\n  prr_hz: %.6f\n  lines_hz: %.6f\n  pan_deg_s: %.6f\n  pan_stop_deg: %.6f\n",
+            c->profile != NULL ? c->profile : "full-sweep", c->prr_hz, c->lines_hz, c->pan_deg_s, c->pan_stop_deg);
     if (c->line_start_deg != c->line_stop_deg)
         fprintf(f, "  line_start_deg: %.6f\n  line_stop_deg: %.6f\n", c->line_start_deg, c->line_stop_deg);
     fprintf(f, "  frames: %u\nscene:\n  meshes:\n    - {file: room.obj, up: z, scale: 1}\n", c->frames);
-    fprintf(f, "stations:\n  - {position_m: [%.17g, %.17g, %.17g], heading_deg: %.17g}\n", STATION[0],
-            STATION[1], STATION[2], HEADING_DEG);
+    fprintf(f, "stations:\n  - {position_m: [%.17g, %.17g, %.17g], heading_deg: %.17g}\n", STATION[0], STATION[1],
+            STATION[2], HEADING_DEG);
     fprintf(f, "noise: {range: off}\n%s%s", c->links, c->more != NULL ? c->more : "");
     assert_int_equal(fclose(f), 0);
     return path;

@@ -86,12 +86,11 @@ static void test_file(void **state)
 
 static void test_wrong_usage(void **state)
 {
-    static const char *const wrong[][4] = {
-        {"bench", "--scenes", "10q", NULL},     {"bench", "--scenes", "", NULL},
-        {"bench", "--scenes", "10k,,1M", NULL}, {"bench", "--scenes", "-10k", NULL},
-        {"bench", "--scenes", "200M", NULL},    {"bench", "--threads", "0", NULL},
-        {"bench", "--seconds", "nan", NULL},    {"bench", "--leaks", "-1", NULL},
-        {"bench", "something", NULL, NULL},     {"bench", "--what", NULL, NULL}};
+    static const char *const wrong[][4] = {{"bench", "--scenes", "10q", NULL},     {"bench", "--scenes", "", NULL},
+                                           {"bench", "--scenes", "10k,,1M", NULL}, {"bench", "--scenes", "-10k", NULL},
+                                           {"bench", "--scenes", "200M", NULL},    {"bench", "--threads", "0", NULL},
+                                           {"bench", "--seconds", "nan", NULL},    {"bench", "--leaks", "-1", NULL},
+                                           {"bench", "something", NULL, NULL},     {"bench", "--what", NULL, NULL}};
     struct wire *wire = *state;
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         assert_int_equal(bench(wire, wrong[i]), 2);

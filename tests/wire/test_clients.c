@@ -55,8 +55,7 @@ static void expect_error(struct scanhead *sh, int number, const int *allowed)
     struct scanhead_frame frame;
     for (;;) {
         int got = atoi(client_ask(sh, "SYST:ERR?"));
-        if (got != 0 && got != number && !is_among(got, allowed))
-            fail_msg("error %d instead of %d", got, number);
+        if (got != 0 && got != number && !is_among(got, allowed)) fail_msg("error %d instead of %d", got, number);
         if (got == number) return;
         if (wire_now_ms() > end_ms) fail_msg("no error %d", number);
         if (got == 0) scanhead_next(sh, &frame, 10); /* not told yet: frames take the time */
@@ -319,8 +318,7 @@ static void test_many_short_clients(void **state)
     expect_points(watch, 50);
     struct scanhead *last = client_open(endpoint);
     struct scanhead_frame frame;
-    while (scanhead_next(last, &frame, DEADLINE_MS) ==
-           SCANHEAD_ECLOSED) { /* those before are still being seen off */
+    while (scanhead_next(last, &frame, DEADLINE_MS) == SCANHEAD_ECLOSED) { /* those before are still being seen off */
         scanhead_close(last);
         last = client_open(endpoint);
     }

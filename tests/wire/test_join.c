@@ -52,8 +52,7 @@ static void test_late_reader(void **state)
     client_wait_state(tcp, "scanning");
     for (int n = 0; n < 200; n += frame.type == SCANHEAD_POINTS)
         client_next(tcp, &frame);
-    struct scanhead *late = client_open(head_endpoint(&head, "tcp")),
-                    *pty = client_open(head_endpoint(&head, "pty"));
+    struct scanhead *late = client_open(head_endpoint(&head, "tcp")), *pty = client_open(head_endpoint(&head, "pty"));
     follow(late);
     follow(pty);
     scanhead_close(late);
@@ -91,13 +90,11 @@ static void record(struct wire *wire, struct recording *r)
         assert_true(r->n_frames < MAX_FRAMES);
         assert_int_equal(r->bytes[at], NATIVE_SYNC);
         r->at[r->n_frames] = at;
-        at += NATIVE_HEADER_LEN +
-              (r->bytes[at + 4] | (size_t)r->bytes[at + 5] << 8 | (size_t)r->bytes[at + 6] << 16);
+        at += NATIVE_HEADER_LEN + (r->bytes[at + 4] | (size_t)r->bytes[at + 5] << 8 | (size_t)r->bytes[at + 6] << 16);
     }
     r->at[r->n_frames] = r->len;
     assert_true(r->n_frames > 0);
-    assert_int_equal(r->bytes[8] | r->bytes[9] | r->bytes[10] | r->bytes[11],
-                     0); /* from the very first frame on */
+    assert_int_equal(r->bytes[8] | r->bytes[9] | r->bytes[10] | r->bytes[11], 0); /* from the very first frame on */
 }
 
 /* Parses the frames first .. last - 1 without the byte at `lost`; every frame but the one it was in must
@@ -121,8 +118,7 @@ static void check_without(const struct recording *r, int first, int last, size_t
         for (enum native_item item; (item = native_parser_next(&parser)) != NATIVE_MORE; next++) {
             assert_int_equal(item, NATIVE_FRAME);
             size_t len = NATIVE_HEADER_LEN + parser.header.length;
-            if (len != r->at[next + 1] - r->at[next] ||
-                memcmp(parser.frame, r->bytes + r->at[next], len) != 0) {
+            if (len != r->at[next + 1] - r->at[next] || memcmp(parser.frame, r->bytes + r->at[next], len) != 0) {
                 assert_int_equal(missing, -1);
                 missing = next++;
                 assert_int_equal(len, r->at[next + 1] - r->at[next]);

@@ -23,8 +23,8 @@ static void needles_write(const struct wire *wire)
         double p[6];
         for (int k = 0; k < 6; k++)
             p[k] = between(&x, -20, 20);
-        fprintf(f, "v %.4f %.4f %.4f\nv %.4f %.4f %.4f\nv %.4f %.4f %.4f\nf -3 -2 -1\n", p[0], p[1], p[2],
-                p[3], p[4], p[5], p[3] + 0.01, p[4], p[5]);
+        fprintf(f, "v %.4f %.4f %.4f\nv %.4f %.4f %.4f\nv %.4f %.4f %.4f\nf -3 -2 -1\n", p[0], p[1], p[2], p[3], p[4],
+                p[5], p[3] + 0.01, p[4], p[5]);
     }
     assert_int_equal(fclose(f), 0);
 }
@@ -79,8 +79,8 @@ static void take_line_end(struct account *a, const struct scanhead_frame *frame)
     struct native_line_end end;
     assert_int_equal(native_decode_line_end(frame->payload, frame->payload_len, &end), 0);
     note_gap(a, end.pulse0 + end.n_fired);
-    int skipped = a->line != end.line ||
-                  oracle_count_cast(&a->oracle, end.pulse0, end.pulse0 + end.n_fired) != end.n_cast;
+    int skipped =
+        a->line != end.line || oracle_count_cast(&a->oracle, end.pulse0, end.pulse0 + end.n_fired) != end.n_cast;
     if (!a->line_broken && !skipped) {
         if (end.line != 0 || end.n_echoes != 0) assert_int_equal(end.n_echoes, a->echoes);
         a->whole_lines++;
@@ -127,13 +127,11 @@ static void follow(struct account *a, struct scanhead *sh)
     }
     note_gap(a, oracle_end(&a->oracle));
     for (int64_t end_ms = wire_now_ms() + DEADLINE_MS; a->told < a->missing;) {
-        if (wire_now_ms() > end_ms)
-            fail_msg("%" PRIu64 " of %" PRIu64 " lost pulses told", a->told, a->missing);
+        if (wire_now_ms() > end_ms) fail_msg("%" PRIu64 " of %" PRIu64 " lost pulses told", a->told, a->missing);
         if (scanhead_next(sh, &frame, 100) == SCANHEAD_OK) take(a, sh, &frame);
     }
     scanhead_get_stats(sh, &stats);
-    assert_int_equal(stats.bad_payload + stats.bad_bytes + stats.seq_lost + stats.dropped + stats.reader_lost,
-                     0);
+    assert_int_equal(stats.bad_payload + stats.bad_bytes + stats.seq_lost + stats.dropped + stats.reader_lost, 0);
     assert_int_equal(stats.pulses_lost, a->told);
 }
 
@@ -198,8 +196,7 @@ static void test_stall(void **state)
             take(&a, sh, &frame);
         }
         assert_int_equal(kill(head.pid, SIGSTOP), 0);
-        clock_nanosleep(CLOCK_MONOTONIC, 0, &(struct timespec){.tv_nsec = 400000000},
-                        NULL); /* the stall itself */
+        clock_nanosleep(CLOCK_MONOTONIC, 0, &(struct timespec){.tv_nsec = 400000000}, NULL); /* the stall itself */
         assert_int_equal(kill(head.pid, SIGCONT), 0);
     }
     follow(&a, sh);
@@ -229,8 +226,7 @@ static void test_stall_with_patience(void **state)
         take(&a, sh, &frame);
     }
     assert_int_equal(kill(head.pid, SIGSTOP), 0);
-    clock_nanosleep(CLOCK_MONOTONIC, 0, &(struct timespec){.tv_nsec = 400000000},
-                    NULL); /* the stall itself */
+    clock_nanosleep(CLOCK_MONOTONIC, 0, &(struct timespec){.tv_nsec = 400000000}, NULL); /* the stall itself */
     assert_int_equal(kill(head.pid, SIGCONT), 0);
     follow(&a, sh);
     assert_int_equal(a.missing, 0);
@@ -249,8 +245,7 @@ static void test_end_of_an_overloaded_run(void **state)
     struct scanhead_frame frame;
     needles_write(wire);
     config.pan_stop_deg = 36;
-    config.more =
-        "loop: {ahead_ms: 2, late_ms: 1, queue_ms: 10000}\n"; /* nearly every block comes too late */
+    config.more = "loop: {ahead_ms: 2, late_ms: 1, queue_ms: 10000}\n"; /* nearly every block comes too late */
     const char *const more[] = {"--start", "--frames", "1", "--threads", "2", NULL};
     struct head head = head_start(wire, room_config_write(wire, &config), more);
     struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));

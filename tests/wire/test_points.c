@@ -13,8 +13,8 @@ enum { MAX_POINTS = 4096 };
  * SLACK_M. */
 static const double SLACK_M = 1e-9;
 
-static void bounds(const struct scanhead_point *p, double half_mirror_rad, double half_pan_rad, double *lo,
-                   double *hi, int possible[6])
+static void bounds(const struct scanhead_point *p, double half_mirror_rad, double half_pan_rad, double *lo, double *hi,
+                   int possible[6])
 {
     double most[6] = {0};
     *lo = INFINITY;
@@ -70,8 +70,7 @@ static void check_ground_point(struct check *c, const struct scanhead_point *p, 
         assert_true(isnan(p->range_m) && isnan(p->x) && p->label == SCANHEAD_NO_LABEL);
         return;
     }
-    double near = below / sin(down + 2.0 * c->half_mirror_rad),
-           far = below / sin(down - 2.0 * c->half_mirror_rad);
+    double near = below / sin(down + 2.0 * c->half_mirror_rad), far = below / sin(down - 2.0 * c->half_mirror_rad);
     assert_true(p->range_m >= near - c->scale_m && p->range_m <= far + c->scale_m);
     assert_int_equal(p->label, 0);
 }
@@ -80,8 +79,7 @@ static void check_ground_point(struct check *c, const struct scanhead_point *p, 
  */
 static void check_angles(const struct check *c, const struct scanhead_point *p, uint64_t k)
 {
-    double mirror = oracle_mirror_deg(&c->oracle, k) * M_PI / 180.0,
-           pan = oracle_pan_deg(&c->oracle, k) * M_PI / 180.0;
+    double mirror = oracle_mirror_deg(&c->oracle, k) * M_PI / 180.0, pan = oracle_pan_deg(&c->oracle, k) * M_PI / 180.0;
     assert_true(fabs(p->mirror_rad - mirror) <= c->half_mirror_rad + 1e-9);
     assert_true(fabs(remainder(p->pan_rad - pan, 2.0 * M_PI)) <= c->half_pan_rad + 1e-9);
 }
@@ -194,8 +192,7 @@ static void take(struct check *c, struct scanhead *sh, struct scanhead_frame *fr
 static void scan(struct wire *wire, const struct room_config *config, struct check *c, const char *link,
                  const char *pace)
 {
-    const char *const more[] = {"--pace", pace, "--set", "loop.queue_ms=5000", "--set", "loop.late_ms=10000",
-                                NULL};
+    const char *const more[] = {"--pace", pace, "--set", "loop.queue_ms=5000", "--set", "loop.late_ms=10000", NULL};
     struct head head = head_start(wire, room_config_write(wire, config), more);
     struct scanhead *sh = client_open(head_endpoint(&head, link));
     struct scanhead_frame frame;
@@ -246,12 +243,8 @@ static void test_room_over_pty(void **state)
 
 static void test_room_over_tcp(void **state)
 {
-    struct room_config config = {.prr_hz = 1200000,
-                                 .lines_hz = 240,
-                                 .pan_deg_s = 360,
-                                 .pan_stop_deg = 360,
-                                 .frames = 1,
-                                 .links = LINK_YAML_TCP};
+    struct room_config config = {
+        .prr_hz = 1200000, .lines_hz = 240, .pan_deg_s = 360, .pan_stop_deg = 360, .frames = 1, .links = LINK_YAML_TCP};
     struct check check = {.oracle = oracle_of(&config, -40, 60, 100)};
     room_write(*state);
     scan(*state, &config, &check, "tcp", "fast");

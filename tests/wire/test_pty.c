@@ -77,8 +77,7 @@ static void look_at(struct look *look, int fd, int frames)
 static void expect_clean(const struct look *look)
 {
     assert_int_equal(look->parser.stats.bad_payload, 0);
-    assert_int_equal(look->parser.stats.bad_bytes,
-                     0); /* it begins with a frame, and every byte belongs to one */
+    assert_int_equal(look->parser.stats.bad_bytes, 0); /* it begins with a frame, and every byte belongs to one */
     assert_int_equal(look->parser.stats.seq_lost, 0);
 }
 
@@ -87,8 +86,7 @@ static void test_clients_with_default_settings(void **state)
     struct wire *wire = *state;
     static struct look look;
     room_write(wire);
-    struct head head =
-        head_start(wire, room_config_write(wire, &ENDLESS), (const char *const[]){"--start", NULL});
+    struct head head = head_start(wire, room_config_write(wire, &ENDLESS), (const char *const[]){"--start", NULL});
     struct scanhead *watch = client_open(head_endpoint(&head, "tcp"));
     client_wait_state(watch, "scanning");
     uint32_t next_seq = 0;
@@ -99,8 +97,7 @@ static void test_clients_with_default_settings(void **state)
         expect_clean(&look);
         assert_int_equal(look.texts, 0);
         assert_true(look.first_seq >= next_seq);
-        assert_true(look.first_ns + 2000000 >=
-                    now_ns); /* nothing of before it was opened, to a tick or two */
+        assert_true(look.first_ns + 2000000 >= now_ns); /* nothing of before it was opened, to a tick or two */
         next_seq = look.last_seq + 1;
         close_seen(fd, watch);
     }
@@ -115,8 +112,7 @@ static void test_nothing_stale(void **state)
     struct wire *wire = *state;
     static struct look look;
     room_write(wire);
-    struct head head =
-        head_start(wire, room_config_write(wire, &ENDLESS), (const char *const[]){"--start", NULL});
+    struct head head = head_start(wire, room_config_write(wire, &ENDLESS), (const char *const[]){"--start", NULL});
     struct scanhead *watch = client_open(head_endpoint(&head, "tcp"));
     struct scanhead_frame frame;
     client_wait_state(watch, "scanning");
@@ -160,8 +156,7 @@ static void test_taken_over_at_once(void **state)
     struct wire *wire = *state;
     static struct look look;
     room_write(wire);
-    struct head head =
-        head_start(wire, room_config_write(wire, &ENDLESS), (const char *const[]){"--start", NULL});
+    struct head head = head_start(wire, room_config_write(wire, &ENDLESS), (const char *const[]){"--start", NULL});
     int fd = port_open(wire);
     look_at(&look, fd, 30);
     for (int i = 0; i < 30; i++) {

@@ -40,8 +40,8 @@ static void finish(struct head *head, struct scanhead *sh, struct result *result
     result->echoes = stats_uint(head->wire, "echoes");
 }
 
-static void scan(struct wire *wire, const char *config, const char *pace, const char *threads,
-                 const char *link, struct result *result)
+static void scan(struct wire *wire, const char *config, const char *pace, const char *threads, const char *link,
+                 struct result *result)
 {
     const char *const more[] = {"--pace", pace, "--threads", threads, NULL};
     struct head head = head_start(wire, config, more);
@@ -91,8 +91,7 @@ static void test_pace_threads_link(void **state)
 /* The hash is no constant: noise and its seed, layout and rate all change it. */
 static void test_hash_tells_streams_apart(void **state)
 {
-    static const char *const sets[] = {"noise.seed=1", "noise.range=on", "output.layout=geo",
-                                       "head.prr_hz=399999.8",
+    static const char *const sets[] = {"noise.seed=1", "noise.range=on", "output.layout=geo", "head.prr_hz=399999.8",
                                        "stations[0].position_m=[0.310001, -0.42, 0.17]"};
     struct wire *wire = *state;
     struct result result;
@@ -102,8 +101,7 @@ static void test_hash_tells_streams_apart(void **state)
     snprintf(stats, sizeof stats, "%s", wire_path(wire, "stats.json"));
     for (int i = 0; i < 6; i++) {
         const char *set = i < 5 ? sets[i] : "noise.range=on", *seed = i < 5 ? "noise.seed=1" : "noise.seed=2";
-        const char *const args[] = {"record", config, "--stats", stats, "--quiet",
-                                    "--set",  set,    "--set",   seed,  NULL};
+        const char *const args[] = {"record", config, "--stats", stats, "--quiet", "--set", set, "--set", seed, NULL};
         assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "head.out", "head.err", -1)), 0);
         stats_hash(wire, result.head);
         strcpy(seen[i], result.head);
@@ -168,8 +166,8 @@ static void live_session(struct wire *wire, const char *config, const char *jour
 }
 
 /* duration: device time by which the session was over, with room. */
-static void replay(struct wire *wire, const char *config, const char *journal, const char *pace,
-                   const char *threads, const char *duration, struct result *result)
+static void replay(struct wire *wire, const char *config, const char *journal, const char *pace, const char *threads,
+                   const char *duration, struct result *result)
 {
     const char *const more[] = {"--pace", pace,         "--threads", threads, "--replay-journal",
                                 journal,  "--duration", duration,    NULL};

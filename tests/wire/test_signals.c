@@ -73,8 +73,7 @@ static void test_with_a_reader_who_does_not_read(void **state)
     config.prr_hz = 1200000;
     config.more = "loop: {pace: fast, queue_ms: 50}\n";
     room_write(wire);
-    struct head head =
-        head_start(wire, room_config_write(wire, &config), (const char *const[]){"--start", NULL});
+    struct head head = head_start(wire, room_config_write(wire, &config), (const char *const[]){"--start", NULL});
     int idle = raw_connect(head_endpoint(&head, "tcp"));
     struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
     while (scanhead_next(sh, &frame, 1000) == SCANHEAD_OK) { /* until the run is held back */
@@ -178,8 +177,7 @@ static void test_record_from_a_head(void **state)
     snprintf(source, sizeof source, "%s", head_endpoint(&head, "pty"));
     snprintf(ply, sizeof ply, "%s", wire_path(wire, "x.ply"));
     snprintf(stats, sizeof stats, "%s", wire_path(wire, "record.json"));
-    interrupt_record(wire, (const char *const[]){"record", source, "-o", ply, "--stats", stats, NULL},
-                     SIGTERM);
+    interrupt_record(wire, (const char *const[]){"record", source, "-o", ply, "--stats", stats, NULL}, SIGTERM);
     struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
     client_wait_state(sh, "idle"); /* it has stopped the scan it began */
     scanhead_close(sh);

@@ -7,12 +7,8 @@
 
 /* 20 MB/s: while the slow reader reads nothing, the buffers on its way (1 MiB of the head, at most 6 of the
  * kernel's for a receiver that asks for none) and the queue of 50 ms fill in less than half a second. */
-static const struct room_config RATE = {.prr_hz = 1000000,
-                                        .lines_hz = 200,
-                                        .pan_deg_s = 90,
-                                        .pan_stop_deg = 360,
-                                        .frames = 0,
-                                        .links = LINK_YAML_TCP};
+static const struct room_config RATE = {
+    .prr_hz = 1000000, .lines_hz = 200, .pan_deg_s = 90, .pan_stop_deg = 360, .frames = 0, .links = LINK_YAML_TCP};
 enum { HOLD_BYTES = 40 << 20 };
 
 /* What a reader has seen. */
@@ -155,8 +151,7 @@ static void test_fast(void **state)
     config.more = "loop: {pace: fast, queue_ms: 50}\n";
     room_write(wire);
     struct head head = head_start(wire, room_config_write(wire, &config), NULL);
-    struct tally fast = {.sh = client_open(head_endpoint(&head, "tcp")), .hold_fd = -1},
-                 slow = {.hold_fd = -1};
+    struct tally fast = {.sh = client_open(head_endpoint(&head, "tcp")), .hold_fd = -1}, slow = {.hold_fd = -1};
     slow.sh = client_from_fd(raw_connect(head_endpoint(&head, "tcp")));
     client_ask(slow.sh, "*OPC?");
     client_wait_state(fast.sh, "idle");

@@ -6,14 +6,13 @@
 
 /* ---- the files that the cases need, written into each test's folder */
 
-static const char GOOD[] =
-    "head: {profile: full-sweep, prr_hz: 100000, lines_hz: 50, pan_deg_s: 100, frames: 1}\n"
-    "scene:\n"
-    "  meshes:\n"
-    "    - {file: room.obj, up: z, scale: 1}\n"
-    "stations:\n"
-    "  - {position_m: [0, 0, 0]}\n"
-    "links: [{type: \"null\"}]\n";
+static const char GOOD[] = "head: {profile: full-sweep, prr_hz: 100000, lines_hz: 50, pan_deg_s: 100, frames: 1}\n"
+                           "scene:\n"
+                           "  meshes:\n"
+                           "    - {file: room.obj, up: z, scale: 1}\n"
+                           "stations:\n"
+                           "  - {position_m: [0, 0, 0]}\n"
+                           "links: [{type: \"null\"}]\n";
 
 /* How many files the folder holds. */
 static int count_files(const struct wire *wire)
@@ -45,17 +44,14 @@ static int complaints;
 
 /* Runs the program; its status must be `status`, and its one line of error must have all of `says` (ends with
  * NULL). */
-static void expect(struct wire *wire, const char *what, const char *const *args, int status,
-                   const char *const *says)
+static void expect(struct wire *wire, const char *what, const char *const *args, int status, const char *const *says)
 {
     int before = count_files(wire);
     int got = wire_wait(wire, wire_spawn(wire, args, "out", "err", -1));
-    char *err = wire_read(wire_path(wire, "err"), NULL), *out = wire_read(wire_path(wire, "out"), NULL),
-         *line = err;
+    char *err = wire_read(wire_path(wire, "err"), NULL), *out = wire_read(wire_path(wire, "out"), NULL), *line = err;
     remove(wire_path(wire, "err"));
     remove(wire_path(wire, "out"));
-    int left = count_files(wire), ends = err[0] != '\0' && err[strlen(err) - 1] == '\n',
-        n = count_errors(err, &line);
+    int left = count_files(wire), ends = err[0] != '\0' && err[strlen(err) - 1] == '\n', n = count_errors(err, &line);
     if (got != status) complain("# %s: status %d, not %d: %s", what, got, status, line);
     if (n != 1 || !ends) complain("# %s: %d lines of error: %s", what, n, line);
     if (strncmp(line, "scanhead", 8) != 0) complain("# %s: who says that? %s", what, line);
@@ -97,22 +93,13 @@ static const struct config_case CONFIGS[] = {
      "prr_hz: .nan",
      {"config.yaml:1:", "head.prr_hz", "not a number", "prr_min_hz to prr_max_hz"}},
     {"nan", "prr_hz: 100000", "prr_hz: nan", {"config.yaml:1:", "head.prr_hz"}},
-    {"infinity",
-     "lines_hz: 50",
-     "lines_hz: .inf",
-     {"config.yaml:1:", "head.lines_hz", "lines_min_hz to lines_max_hz"}},
+    {"infinity", "lines_hz: 50", "lines_hz: .inf", {"config.yaml:1:", "head.lines_hz", "lines_min_hz to lines_max_hz"}},
     {"above the profile",
      "prr_hz: 100000",
      "prr_hz: 2200000.1",
      {"config.yaml:1:", "head.prr_hz", "1000 to 2200000 Hz"}},
-    {"below the profile",
-     "lines_hz: 50",
-     "lines_hz: 3.9",
-     {"config.yaml:1:", "head.lines_hz", "4 to 1000 Hz"}},
-    {"negative speed",
-     "pan_deg_s: 100",
-     "pan_deg_s: -1",
-     {"config.yaml:1:", "head.pan_deg_s", "0 to pan_max_deg_s"}},
+    {"below the profile", "lines_hz: 50", "lines_hz: 3.9", {"config.yaml:1:", "head.lines_hz", "4 to 1000 Hz"}},
+    {"negative speed", "pan_deg_s: 100", "pan_deg_s: -1", {"config.yaml:1:", "head.pan_deg_s", "0 to pan_max_deg_s"}},
     {"finer than a micro-unit", "lines_hz: 50", "lines_hz: 50.0000001", {"config.yaml:1:", "head.lines_hz"}},
     {"a list for a number", "lines_hz: 50", "lines_hz: [50]", {"config.yaml:1:", "head.lines_hz"}},
     {"text for a number", "lines_hz: 50", "lines_hz: fifty", {"config.yaml:1:", "head.lines_hz", "fifty"}},
@@ -156,14 +143,8 @@ static const struct config_case CONFIGS[] = {
     {"port of a pty", "\"null\"", "pty, port: 1", {"config.yaml:7:", "links[0].port", "type, path"}},
     {"9 sessions", "\"null\"", "tcp, max_sessions: 9", {"config.yaml:7:", "links[0].max_sessions", "1 to 8"}},
     {"file link without path", "\"null\"", "file", {"config.yaml:7:", "links[0].path"}},
-    {"tick rate 999",
-     "links:",
-     "loop: {tick_hz: 999}\nlinks:",
-     {"config.yaml:7:", "loop.tick_hz", "divisor"}},
-    {"ahead too far",
-     "links:",
-     "loop: {ahead_ms: 91}\nlinks:",
-     {"config.yaml:7:", "loop.ahead_ms", "2 to 90 ms"}},
+    {"tick rate 999", "links:", "loop: {tick_hz: 999}\nlinks:", {"config.yaml:7:", "loop.tick_hz", "divisor"}},
+    {"ahead too far", "links:", "loop: {ahead_ms: 91}\nlinks:", {"config.yaml:7:", "loop.ahead_ms", "2 to 90 ms"}},
     {"65 threads", "links:", "loop: {threads: 65}\nlinks:", {"config.yaml:7:", "loop.threads", "0 to 64"}},
     {"unknown pace",
      "links:",
@@ -390,19 +371,17 @@ static void test_system_failures(void **state)
                                  "/dev/full", NULL},
            1, (const char *const[]){"No space left", NULL});
     expect(wire, "statistics in no folder",
-           (const char *const[]){"run", config, "--duration", "0.1", "--pace", "fast", "--quiet", "--stats",
-                                 "/none/x", NULL},
+           (const char *const[]){"run", config, "--duration", "0.1", "--pace", "fast", "--quiet", "--stats", "/none/x",
+                                 NULL},
            1, (const char *const[]){"/none/x", "No such file", NULL});
     struct sockaddr_in at = {.sin_family = AF_INET};
     socklen_t len = sizeof at;
     int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at),
-                     0); /* bound, not listening: nobody is there */
+    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0); /* bound, not listening: nobody is there */
     getsockname(fd, (struct sockaddr *)&at, &len);
     snprintf(port, sizeof port, "tcp:127.0.0.1:%d", ntohs(at.sin_port));
-    expect(wire, "nobody listens",
-           (const char *const[]){"record", port, "-o", wire_path(wire, "x.ply"), NULL}, 1,
+    expect(wire, "nobody listens", (const char *const[]){"record", port, "-o", wire_path(wire, "x.ply"), NULL}, 1,
            (const char *const[]){port, "Connection refused", NULL});
     close(fd);
     assert_int_equal(complaints, 0);

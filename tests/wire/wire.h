@@ -223,8 +223,7 @@ static inline void wire_show(const struct wire *wire, const char *name)
 static inline struct head head_start(struct wire *wire, const char *config, const char *const *more)
 {
     struct head head = {.wire = wire};
-    const char *args[WIRE_MAX_ARGS] = {"run", config,    "--ready-fd",
-                                       "3",   "--stats", wire_path(wire, "stats.json")};
+    const char *args[WIRE_MAX_ARGS] = {"run", config, "--ready-fd", "3", "--stats", wire_path(wire, "stats.json")};
     char stats[352];
     snprintf(stats, sizeof stats, "%s", args[5]);
     args[5] = stats;
@@ -357,8 +356,7 @@ static inline int raw_connect(const char *endpoint)
     at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     assert_true(fd >= 0);
-    if (connect(fd, (struct sockaddr *)&at, sizeof at) != 0)
-        fail_msg("connect %s: %s", endpoint, strerror(errno));
+    if (connect(fd, (struct sockaddr *)&at, sizeof at) != 0) fail_msg("connect %s: %s", endpoint, strerror(errno));
     return fd;
 }
 
