@@ -33,8 +33,6 @@ static int set(struct recording *r, const char *header, long value, struct sh_er
     return command(r, line, reply, sizeof reply, err);
 }
 
-static int wait_idle(struct recording *r, struct sh_err *err);
-
 static void count_points(struct recording *r, const struct scanhead_frame *frame)
 {
     /* The last byte of a point holds the echo's number and the count: 0 for a shot without echo. */
