@@ -99,7 +99,7 @@ void config_print_reference(FILE *out);
 int config_list_profiles(const char *dir, FILE *out, struct sh_err *err);
 
 /* Finds the directory of profiles: $SCANHEAD_HEADS, beside the configuration (heads/), beside the program (installed or
- * in its build folder), or config/heads here; see config_profile.c. The installed or the source one. A profile is named
- * by `head.profile: NAME`, looked up there, or by a path that ends in .yaml. */
+ * in its build folder), or config/heads here. A profile is named by `head.profile: NAME`, looked up there, or by a path
+ * that ends in .yaml. */
 
 #endif

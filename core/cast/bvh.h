@@ -91,6 +91,8 @@ struct bvh_one {
 };
 void bvh_intersect_one(const struct bvh *bvh, const float org[3], const float dir[3], struct bvh_one *one);
 
+/* Corners of a triangle in the local frame; returns the largest distance from its origin. */
+double bvh_corners(const struct bvh *bvh, uint32_t prim, double v[3][3]);
 /* How far the edges of a triangle were moved outward, as seen from the origin. */
 double bvh_width_m(const struct bvh *bvh, uint32_t prim);
 

@@ -3,6 +3,7 @@
 #include <stdbool.h>
 
 #include "core/cast/bvh.h"
+#include "core/vec3.h"
 
 enum { DECIDE_MAX_ROUNDS = 32 };
 
@@ -13,11 +14,6 @@ struct search {
     uint32_t near_prim;       /* the one that the ray misses by least; gap 1: double precision can't tell */
     double near_gap, near_range_m;
 };
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 static int before(const double a[3], const double b[3])
 {
@@ -42,20 +38,21 @@ static double edge_side(const double a[3], const double b[3], const double dir[3
 static double edge_length(const double a[3], const double b[3])
 {
     double e[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
-    return sqrt(dot(e, e));
+    return sqrt(vec3_dot(e, e));
 }
 
 static double plane_range(const struct decide_ray *ray, uint32_t prim)
 {
     const struct bvh_triangle *tri = &ray->bvh->triangle[prim];
-    return (tri->d - dot(tri->n, ray->o_local)) / dot(tri->n, ray->dir);
+    return (tri->d - vec3_dot(tri->n, ray->o_local)) / vec3_dot(tri->n, ray->dir);
 }
 
 /* Range along the ray of the point where it comes nearest to the segment. */
 static double edge_range(const double a[3], const double b[3], const double dir[3])
 {
     double e[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
-    double ee = dot(e, e), ed = dot(e, dir), ae = dot(a, e), ad = dot(a, dir), dd = dot(dir, dir);
+    double ee = vec3_dot(e, e), ed = vec3_dot(e, dir), ae = vec3_dot(a, e), ad = vec3_dot(a, dir),
+           dd = vec3_dot(dir, dir);
     double det = ee * dd - ed * ed;
     double s = det > 0.0 ? (ed * ad - dd * ae) / det : 0.0;
     s = s < 0.0 ? 0.0 : s > 1.0 ? 1.0 : s;
@@ -70,11 +67,11 @@ static double edge_gap(const double a[3], const double b[3], const double dir[3]
         e[i] = b[i] - a[i];
         w[i] = t * dir[i] - a[i];
     }
-    double s = dot(w, e) / dot(e, e);
+    double s = vec3_dot(w, e) / vec3_dot(e, e);
     s = s < 0.0 ? 0.0 : s > 1.0 ? 1.0 : s;
     for (int i = 0; i < 3; i++)
         w[i] -= s * e[i];
-    return sqrt(dot(w, w));
+    return sqrt(vec3_dot(w, w));
 }
 
 /* Range to a triangle that the ray does meet. Where the ray lies almost in its plane the plane's range runs away: it is
@@ -83,7 +80,7 @@ static double held_range(const struct decide_ray *ray, uint32_t prim, double v[3
 {
     const double *n = ray->bvh->triangle[prim].n;
     double range = plane_range(ray, prim), lo = INFINITY, hi = -INFINITY;
-    if (fabs(dot(n, ray->dir)) > 1e-6 * sqrt(dot(n, n))) return range;
+    if (fabs(vec3_dot(n, ray->dir)) > 1e-6 * sqrt(vec3_dot(n, n))) return range;
     for (int i = 0; i < 3; i++) {
         const double *a = v[i], *b = v[(i + 1) % 3];
         double t = edge_range(a, b, ray->dir), blur = 0x1p-40 * edge_length(a, b) + 0x1p-46 * fabs(t);
@@ -123,7 +120,7 @@ static int is_inside(const double side[3])
 /* What double precision can tell of an edge's side. */
 static double blur(const double a[3], const double b[3])
 {
-    return 8.0 * 0x1p-53 * sqrt(fmax(dot(a, a), dot(b, b))) * edge_length(a, b);
+    return 8.0 * 0x1p-53 * sqrt(fmax(vec3_dot(a, a), vec3_dot(b, b))) * edge_length(a, b);
 }
 
 /* A ray within the plane, as far as double precision can tell, does not meet the triangle; what stands on its edges it
@@ -195,7 +192,7 @@ static void try_around(struct search *s, double range_m, double radius_m)
 static double search_radius(const struct decide_ray *ray, uint32_t prim, double range_m)
 {
     const struct bvh_triangle *tri = &ray->bvh->triangle[prim];
-    double cosine = fabs(dot(tri->n, ray->dir)) / sqrt(dot(tri->n, tri->n));
+    double cosine = fabs(vec3_dot(tri->n, ray->dir)) / sqrt(vec3_dot(tri->n, tri->n));
     double width_m = bvh_width_m(ray->bvh, prim);
     double radius = 4.0 * width_m * (1.0 + 1.0 / fmax(cosine, 1e-3));
     return fmin(radius, 0.01 * range_m + 4.0 * width_m);
@@ -212,11 +209,11 @@ static void try_rivals(struct search *s, uint32_t prim, double range_m)
     uint32_t end = bvh->rival_first[prim + 1];
     if (bvh->rival_first[prim] == end) return;
     double own_m = bvh_width_m(bvh, prim);
-    double steep = sqrt(dot(own->n, own->n)) / fabs(dot(own->n, ray->dir));
+    double steep = sqrt(vec3_dot(own->n, own->n)) / fabs(vec3_dot(own->n, ray->dir));
     for (uint32_t k = bvh->rival_first[prim]; k < end; k++) {
         const struct bvh_triangle *tri = &bvh->triangle[bvh->rival[k]];
-        double along = fabs(dot(tri->n, ray->dir)), length = sqrt(dot(tri->n, tri->n));
-        double gap = fabs((tri->d - dot(tri->n, ray->o_local)) / dot(tri->n, ray->dir) - range_m);
+        double along = fabs(vec3_dot(tri->n, ray->dir)), length = sqrt(vec3_dot(tri->n, tri->n));
+        double gap = fabs((tri->d - vec3_dot(tri->n, ray->o_local)) / vec3_dot(tri->n, ray->dir) - range_m);
         double width_m = 4.0 * fmax(own_m, bvh_width_m(bvh, bvh->rival[k]));
         if (!(gap * along > width_m * (steep * along + length))) try_triangle(s, bvh->rival[k]);
     }

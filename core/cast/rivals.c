@@ -12,6 +12,7 @@
 #include <string.h>
 
 #include "core/cast/bvh.h"
+#include "core/vec3.h"
 
 struct pairs {
     const struct bvh *bvh;
@@ -21,32 +22,13 @@ struct pairs {
     int failed;
 };
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void cross(const double a[3], const double b[3], double out[3])
-{
-    out[0] = a[1] * b[2] - a[2] * b[1];
-    out[1] = a[2] * b[0] - a[0] * b[2];
-    out[2] = a[0] * b[1] - a[1] * b[0];
-}
-
-static void corners(const struct bvh *bvh, uint32_t prim, double v[3][3])
-{
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            v[i][j] = bvh->scene->vertex_m[bvh->scene->triangle[prim][i]][j] - bvh->origin_m[j];
-}
-
 /* Gap between the triangles along an axis; negative where they overlap by more than that. -inf for no axis. */
 static double gap_along(double a[3][3], double b[3][3], const double axis[3])
 {
-    double length = sqrt(dot(axis, axis)), lo[2] = {INFINITY, INFINITY}, hi[2] = {-INFINITY, -INFINITY};
+    double length = sqrt(vec3_dot(axis, axis)), lo[2] = {INFINITY, INFINITY}, hi[2] = {-INFINITY, -INFINITY};
     if (!(length > 0.0)) return -INFINITY;
     for (int i = 0; i < 3; i++) {
-        double x = dot(a[i], axis), y = dot(b[i], axis);
+        double x = vec3_dot(a[i], axis), y = vec3_dot(b[i], axis);
         lo[0] = fmin(lo[0], x);
         hi[0] = fmax(hi[0], x);
         lo[1] = fmin(lo[1], y);
@@ -61,11 +43,11 @@ struct shape {
 
 static void look_at(const struct bvh *bvh, uint32_t prim, struct shape *s)
 {
-    corners(bvh, prim, s->v);
+    bvh_corners(bvh, prim, s->v);
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
             s->e[i][j] = s->v[(i + 1) % 3][j] - s->v[i][j];
-    cross(s->e[0], s->e[1], s->n);
+    vec3_cross(s->e[0], s->e[1], s->n);
 }
 
 /* True when the triangles come nearer than blur_m; within == 1: when they overlap in their planes by more than that. */
@@ -74,14 +56,14 @@ static int no_axis_separates(struct shape *a, struct shape *b, double blur_m, in
     double axis[3], limit = within ? -blur_m : blur_m;
     if (gap_along(a->v, b->v, a->n) > blur_m || gap_along(a->v, b->v, b->n) > blur_m) return 0;
     for (int i = 0; i < 3; i++) {
-        cross(a->e[i], a->n, axis);
+        vec3_cross(a->e[i], a->n, axis);
         if (gap_along(a->v, b->v, axis) > limit) return 0;
-        cross(b->e[i], b->n, axis);
+        vec3_cross(b->e[i], b->n, axis);
         if (gap_along(a->v, b->v, axis) > limit) return 0;
         for (int j = 0; j < 3 && !within; j++) {
-            cross(a->e[i], b->e[j], axis);
+            vec3_cross(a->e[i], b->e[j], axis);
             /* Edges that are almost parallel have no axis of their own to speak of. */
-            if (dot(axis, axis) < 1e-12 * dot(a->e[i], a->e[i]) * dot(b->e[j], b->e[j])) continue;
+            if (vec3_dot(axis, axis) < 1e-12 * vec3_dot(a->e[i], a->e[i]) * vec3_dot(b->e[j], b->e[j])) continue;
             if (gap_along(a->v, b->v, axis) > blur_m) return 0;
         }
     }
@@ -105,8 +87,8 @@ static int are_rivals(const struct bvh *bvh, uint32_t i, uint32_t j)
     int corner = share_a_corner(&a, &b);
     if (corner) { /* only where one lies flat on the other */
         double c[3];
-        cross(a.n, b.n, c);
-        if (dot(c, c) > 1e-6 * dot(a.n, a.n) * dot(b.n, b.n)) return 0;
+        vec3_cross(a.n, b.n, c);
+        if (vec3_dot(c, c) > 1e-6 * vec3_dot(a.n, a.n) * vec3_dot(b.n, b.n)) return 0;
     }
     return no_axis_separates(&a, &b, blur_m, corner);
 }
@@ -147,7 +129,7 @@ static void box_of(const struct RTCBoundsFunctionArguments *args)
     const struct bvh *bvh = args->geometryUserPtr;
     struct RTCBounds *box = args->bounds_o;
     double v[3][3], blur_m = 2.0 * bvh_width_m(bvh, args->primID), lo[3], hi[3];
-    corners(bvh, args->primID, v);
+    bvh_corners(bvh, args->primID, v);
     for (int j = 0; j < 3; j++) {
         lo[j] = fmin(v[0][j], fmin(v[1][j], v[2][j])) - blur_m;
         hi[j] = fmax(v[0][j], fmax(v[1][j], v[2][j])) + blur_m;

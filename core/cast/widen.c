@@ -4,29 +4,17 @@
 #include <string.h>
 
 #include "core/cast/bvh.h"
+#include "core/vec3.h"
 #include "core/huge.h"
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void cross(const double a[3], const double b[3], double out[3])
-{
-    out[0] = a[1] * b[2] - a[2] * b[1];
-    out[1] = a[2] * b[0] - a[0] * b[2];
-    out[2] = a[0] * b[1] - a[1] * b[0];
-}
-
-/* Corners in the local frame; returns the largest distance from its origin. */
-static double corners(const struct bvh *bvh, uint32_t prim, double v[3][3])
+double bvh_corners(const struct bvh *bvh, uint32_t prim, double v[3][3])
 {
     double reach2 = 0.0;
     for (int i = 0; i < 3; i++) {
         const double *p = bvh->scene->vertex_m[bvh->scene->triangle[prim][i]];
         for (int j = 0; j < 3; j++)
             v[i][j] = p[j] - bvh->origin_m[j];
-        reach2 = fmax(reach2, dot(v[i], v[i]));
+        reach2 = fmax(reach2, vec3_dot(v[i], v[i]));
     }
     return sqrt(reach2);
 }
@@ -34,10 +22,10 @@ static double corners(const struct bvh *bvh, uint32_t prim, double v[3][3])
 /* Part of e across the unit vector a; returns its length. */
 static double across(const double e[3], const double a[3], double out[3])
 {
-    double along = dot(e, a);
+    double along = vec3_dot(e, a);
     for (int j = 0; j < 3; j++)
         out[j] = e[j] - along * a[j];
-    return sqrt(dot(out, out));
+    return sqrt(vec3_dot(out, out));
 }
 
 /* Moves corner i outward so that, seen from the origin, both its edges move by `width`: across the line of sight along
@@ -47,7 +35,7 @@ static double across(const double e[3], const double a[3], double out[3])
 static void widen_corner(double v[3][3], const double unit_n[3], int i, double width, double out[3])
 {
     double sight[3], e1[3], e2[3], f1[3], f2[3], c[3], move[3];
-    double far = sqrt(dot(v[i], v[i]));
+    double far = sqrt(vec3_dot(v[i], v[i]));
     for (int j = 0; j < 3; j++) {
         sight[j] = far > 0.0 ? v[i][j] / far : unit_n[j];
         e1[j] = v[(i + 1) % 3][j] - v[i][j];
@@ -59,10 +47,10 @@ static void widen_corner(double v[3][3], const double unit_n[3], int i, double w
         f2[j] = l2 > 0.0 ? f2[j] / l2 : 0.0;
         move[j] = f1[j] + f2[j];
     }
-    cross(f1, f2, c);
-    double sine = sqrt(dot(c, c)), length = sqrt(dot(move, move));
+    vec3_cross(f1, f2, c);
+    double sine = sqrt(vec3_dot(c, c)), length = sqrt(vec3_dot(move, move));
     double miter = length < BVH_MAX_MITER * sine ? 1.0 / sine : length > 0.0 ? BVH_MAX_MITER / length : 0.0;
-    double off = -width * miter * dot(move, unit_n), towards = dot(sight, unit_n);
+    double off = -width * miter * vec3_dot(move, unit_n), towards = vec3_dot(sight, unit_n);
     double slide = fabs(off) < BVH_MAX_SLIDE * width * fabs(towards) ? -off / towards : 0.0;
     if (slide == 0.0 && off != 0.0) slide = copysign(BVH_MAX_SLIDE * width, -off * towards);
     for (int j = 0; j < 3; j++)
@@ -72,7 +60,7 @@ static void widen_corner(double v[3][3], const double unit_n[3], int i, double w
 double bvh_width_m(const struct bvh *bvh, uint32_t prim)
 {
     double v[3][3];
-    return BVH_WIDEN * (corners(bvh, prim, v) + bvh->station_reach_m);
+    return BVH_WIDEN * (bvh_corners(bvh, prim, v) + bvh->station_reach_m);
 }
 
 static double with_spare(double x, uint32_t spare)
@@ -96,9 +84,9 @@ static double measure(double v[3][3], double n[3], double *longest)
         e1[i] = v[1][i] - v[0][i];
         e2[i] = v[2][i] - v[0][i];
     }
-    cross(e1, e2, n);
+    vec3_cross(e1, e2, n);
     *longest = sqrt(longest2);
-    return sqrt(dot(n, n));
+    return sqrt(vec3_dot(n, n));
 }
 
 /* The plane with normal n, as it is stored, passes through the triangle's centre. */
@@ -107,7 +95,7 @@ static void set_offset(struct bvh_triangle *tri, double v[3][3])
     double centre[3];
     for (int j = 0; j < 3; j++)
         centre[j] = v[0][j] + ((v[1][j] - v[0][j]) + (v[2][j] - v[0][j])) / 3.0;
-    tri->d = dot(tri->n, centre);
+    tri->d = vec3_dot(tri->n, centre);
 }
 
 /* Plane, guard and label. Seen from the origin, the distance from a ray to edge i of the widened triangle is at least
@@ -135,7 +123,7 @@ void bvh_mark_rival(struct bvh *bvh, uint32_t prim)
 {
     struct bvh_triangle *tri = &bvh->triangle[prim];
     double v[3][3];
-    corners(bvh, prim, v);
+    bvh_corners(bvh, prim, v);
     tri->n[2] = with_spare(tri->n[2], bvh_spare(tri->n[2]) | BVH_RIVAL_BIT);
     set_offset(tri, v);
 }
@@ -144,7 +132,7 @@ static void fill_triangle(struct bvh *bvh, uint32_t prim, float *vertex)
 {
     double v[3][3], wide[3][3], unit[3], wide_n[3], longest, wide_longest, moved = 0.0;
     struct bvh_triangle *tri = &bvh->triangle[prim];
-    double width_m = BVH_WIDEN * (corners(bvh, prim, v) + bvh->station_reach_m);
+    double width_m = BVH_WIDEN * (bvh_corners(bvh, prim, v) + bvh->station_reach_m);
     double area2 = measure(v, tri->n, &longest);
     for (int j = 0; j < 3; j++)
         unit[j] = tri->n[j] / area2;

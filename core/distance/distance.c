@@ -12,6 +12,7 @@
 #include <stdlib.h>
 
 #include "core/embree.h"
+#include "core/vec3.h"
 
 struct distance {
     const struct scene *scene;
@@ -30,22 +31,10 @@ struct search {
     int found;
 };
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 static void sub(const double a[3], const double b[3], double out[3])
 {
     for (int k = 0; k < 3; k++)
         out[k] = a[k] - b[k];
-}
-
-static void cross(const double a[3], const double b[3], double out[3])
-{
-    out[0] = a[1] * b[2] - a[2] * b[1];
-    out[1] = a[2] * b[0] - a[0] * b[2];
-    out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
 /* Points and edges from here on are relative to the query point, which is the origin: nothing of the large
@@ -54,7 +43,7 @@ static void cross(const double a[3], const double b[3], double out[3])
 /* The point nearest to the origin on the edge from a along ab. Measured from whichever end is nearer. */
 static void nearest_on_edge(const double a[3], const double b[3], const double ab[3], double out[3])
 {
-    double along_a = -dot(a, ab), along_b = dot(b, ab), length2 = along_a + along_b;
+    double along_a = -vec3_dot(a, ab), along_b = vec3_dot(b, ab), length2 = along_a + along_b;
     for (int k = 0; k < 3; k++) {
         if (along_a <= 0 || !(length2 > 0))
             out[k] = a[k];
@@ -70,8 +59,8 @@ static int is_inside(double corner[3][3], double edge[3][3], const double normal
 {
     for (int i = 0; i < 3; i++) {
         double side[3];
-        cross(corner[i], edge[i], side);
-        if (!(dot(side, normal) >= 0)) return 0;
+        vec3_cross(corner[i], edge[i], side);
+        if (!(vec3_dot(side, normal) >= 0)) return 0;
     }
     return 1;
 }
@@ -88,19 +77,19 @@ static double nearest_on_triangle(double corner[3][3], double nearest[3])
         int j = (i + 1) % 3;
         sub(corner[j], corner[i], edge[i]);
         nearest_on_edge(corner[i], corner[j], edge[i], q);
-        double d2 = dot(q, q);
+        double d2 = vec3_dot(q, q);
         if (d2 >= best2) continue;
         best2 = d2;
         for (int k = 0; k < 3; k++)
             nearest[k] = q[k];
     }
-    cross(edge[0], edge[1], normal);
-    double n2 = dot(normal, normal);
+    vec3_cross(edge[0], edge[1], normal);
+    double n2 = vec3_dot(normal, normal);
     if (!(n2 > 0) || !is_inside(corner, edge, normal)) return sqrt(best2);
-    double height = dot(nearest, normal) / n2, foot[3];
+    double height = vec3_dot(nearest, normal) / n2, foot[3];
     for (int k = 0; k < 3; k++)
         foot[k] = normal[k] * height;
-    double foot2 = dot(foot, foot);
+    double foot2 = vec3_dot(foot, foot);
     if (foot2 >= best2) return sqrt(best2);
     for (int k = 0; k < 3; k++)
         nearest[k] = foot[k];
