@@ -116,7 +116,8 @@ static void test_realtime(void **state)
     pthread_join(thread, NULL);
     /* On a machine that is busy with other things for 50 ms the fast one may be slow for once: then it is told, too. */
     check_nothing_bad(&fast);
-    assert_int_equal(fast.last_seq - fast.first_seq + 1, fast.frames + fast.told_lost);
+    /* What it was told may begin before the first frame that is counted here, never end before a gap. */
+    assert_true(fast.frames + fast.told_lost >= fast.last_seq - fast.first_seq + 1);
     if (fast.told_events == 0) {
         check_lost_nothing(&fast);
         assert_int_equal(more, 0); /* once per episode */
