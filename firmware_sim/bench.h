@@ -40,6 +40,13 @@ struct bench_rays {
 void bench_schedule(uint32_t lines, uint32_t frames, struct schedule_spec *spec);
 int bench_rays_create(uint32_t lines, struct bench_rays *out, struct sh_err *err);
 void bench_rays_free(struct bench_rays *rays);
+/* A block of them, to be worked on while it lies in the cache, as the pipeline has its rays. */
+enum { BENCH_BLOCK = 2000 }; /* divides what 4 lines have, is a multiple of 16 */
+struct bench_block {
+    double dx[BENCH_BLOCK], dy[BENCH_BLOCK], dz[BENCH_BLOCK];
+    float fx[BENCH_BLOCK], fy[BENCH_BLOCK], fz[BENCH_BLOCK];
+};
+void bench_rays_block(const struct bench_rays *rays, uint32_t first, struct bench_block *out);
 
 /* ---- bench_embree.c: Embree as it comes: the mesh with shared vertices, rounded to float in the frame of
  * the station */
@@ -65,6 +72,8 @@ int bench_embree_rays(struct bench_embree *e, const float *fx, const float *fy, 
                       struct sh_err *err);
 /* Makes ready for passes of this width (1, 4, 8 or 16) and feed. */
 int bench_embree_prepare(struct bench_embree *e, uint32_t width, enum bench_feed feed, struct sh_err *err);
+/* The rays' directions have changed: the packets that lie ready get them. */
+void bench_embree_refill(const struct bench_embree *e);
 /* Casts rays first .. first+n-1 (multiples of 16), results in prim and t for BENCH_LOADED. */
 void bench_embree_pass(const struct bench_embree *e, uint32_t width, enum bench_feed feed, uint32_t first, uint32_t n);
 void bench_embree_free(struct bench_embree *e);

@@ -144,13 +144,17 @@ int bench_embree_rays(struct bench_embree *e, const float *fx, const float *fy, 
             }                                                                                                         \
         }                                                                                                             \
     }                                                                                                                 \
+    static void refill_##W(const struct bench_embree *e)                                                              \
+    {                                                                                                                 \
+        struct RTCRayHit##W *packet = e->packets;                                                                     \
+        for (uint32_t i = 0; i < e->n / W; i++)                                                                       \
+            load_##W(packet + i, e, i * W);                                                                           \
+    }                                                                                                                 \
     static void *prepare_##W(const struct bench_embree *e)                                                            \
     {                                                                                                                 \
         struct RTCRayHit##W *packet = aligned_alloc(64, e->n / W * sizeof *packet);                                   \
-        for (uint32_t i = 0; packet != NULL && i < e->n / W; i++) {                                                   \
+        for (uint32_t i = 0; packet != NULL && i < e->n / W; i++)                                                     \
             set_##W(packet + i);                                                                                      \
-            load_##W(packet + i, e, i * W);                                                                           \
-        }                                                                                                             \
         return packet;                                                                                                \
     }
 
@@ -184,7 +188,15 @@ int bench_embree_prepare(struct bench_embree *e, uint32_t width, enum bench_feed
     free(e->packets);
     e->packets = width == 4 ? prepare_4(e) : width == 8 ? prepare_8(e) : prepare_16(e);
     e->width = e->packets != NULL ? width : 0;
+    bench_embree_refill(e);
     return e->packets != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "bench: no memory for %u rays", e->n);
+}
+
+void bench_embree_refill(const struct bench_embree *e)
+{
+    if (e->width == 4) refill_4(e);
+    if (e->width == 8) refill_8(e);
+    if (e->width == 16) refill_16(e);
 }
 
 void bench_embree_pass(const struct bench_embree *e, uint32_t width, enum bench_feed feed, uint32_t first, uint32_t n)

@@ -172,6 +172,8 @@ int bench_loop(const struct bench_case *c, const struct bench_result *one, uint3
     station->bvh = c->bvh;
     cast_rotation(0.0, station->rotation);
     int rc = bench_georef(c->target, &station->georef, err);
+    if (rc == SH_OK) rc = bench_embree_rays(c->embree, c->rays->fx, c->rays->fy, c->rays->fz, c->rays->n, err);
+    if (rc == SH_OK) rc = bench_embree_prepare(c->embree, one->embree_width, one->embree_feed, err);
     if (rc == SH_OK) rc = rounds(c, one, &site, frames, out, err);
     georef_free(station->georef);
     free(cfg);

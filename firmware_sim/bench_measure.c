@@ -19,8 +19,9 @@ struct measure {
     struct caster *caster;
     struct line_block block;
     struct bench_stages *stages;
-    double *range_m;
-    uint32_t *prim;
+    struct bench_block *rays;
+    double range_m[BENCH_BLOCK];
+    uint32_t prim[BENCH_BLOCK];
     uint8_t *sink, *staged; /* the null link: the last line's bytes */
     size_t cap;
     double ns[N_METHODS][BENCH_MAX_ROUNDS], stage_ns[BENCH_STAGES][BENCH_MAX_ROUNDS];
@@ -40,11 +41,9 @@ static int set_up(struct measure *m, struct sh_err *err)
     m->cap = native_points_bound(BENCH_LINE_PULSES);
     m->sink = malloc(m->cap);
     m->staged = malloc(m->cap);
-    m->range_m = aligned_alloc(64, c->rays->n * sizeof *m->range_m);
-    m->prim = aligned_alloc(64, c->rays->n * sizeof *m->prim);
-    if (m->sink == NULL || m->staged == NULL || m->range_m == NULL || m->prim == NULL)
-        return sh_fail(err, SH_ENOMEM, "bench: no memory");
-    return SH_OK;
+    m->rays = aligned_alloc(64, (sizeof *m->rays + 63) / 64 * 64);
+    if (m->sink == NULL || m->staged == NULL || m->rays == NULL) return sh_fail(err, SH_ENOMEM, "bench: no memory");
+    return bench_embree_rays(c->embree, m->rays->fx, m->rays->fy, m->rays->fz, BENCH_BLOCK, err);
 }
 
 static void tear_down(struct measure *m)
@@ -55,8 +54,7 @@ static void tear_down(struct measure *m)
     line_block_free(&m->block);
     free(m->sink);
     free(m->staged);
-    free(m->range_m);
-    free(m->prim);
+    free(m->rays);
 }
 
 /* A line as a worker of the loop makes it. */
@@ -84,27 +82,42 @@ static void staged_pass(struct measure *m, uint32_t round)
         m->stage_ns[s][round] = (double)cycles[s] * ns;
 }
 
-static void pass(struct measure *m, int method, uint32_t round)
+/* Embree and the cast get their rays as the pipeline has them: a block at a time, in the cache; the clock stands while a
+ * block is laid out. */
+static double timed_blocks(struct measure *m, int method)
 {
     const struct bench_case *c = m->c;
-    const struct bench_rays *rays = c->rays;
-    if (method == EMBREE)
-        bench_embree_pass(c->embree, m->out->embree_width, m->out->embree_feed, 0, rays->n);
-    else if (method == CAST)
-        caster_hits(m->caster, c->bvh, m->setup.station_m, BENCH_RANGE_MAX_M, rays->n, rays->dx, rays->dy, rays->dz,
-                    m->range_m, m->prim);
-    else if (method == STAGED)
+    double spent_s = 0.0;
+    for (uint32_t first = 0; first < c->rays->n; first += BENCH_BLOCK) {
+        const struct bench_block *b = m->rays;
+        bench_rays_block(c->rays, first, m->rays);
+        if (m->out->embree_feed == BENCH_PREPARED) bench_embree_refill(c->embree);
+        double start_s = bench_thread_s();
+        if (method == EMBREE)
+            bench_embree_pass(c->embree, m->out->embree_width, m->out->embree_feed, 0, BENCH_BLOCK);
+        else
+            caster_hits(m->caster, c->bvh, m->setup.station_m, BENCH_RANGE_MAX_M, BENCH_BLOCK, b->dx, b->dy, b->dz,
+                        m->range_m, m->prim);
+        spent_s += bench_thread_s() - start_s;
+    }
+    return spent_s;
+}
+
+static double timed_lines(struct measure *m, int method, uint32_t round)
+{
+    double start_s = bench_thread_s();
+    if (method == STAGED)
         staged_pass(m, round);
     else
-        for (uint32_t l = 0; l < rays->lines; l++)
+        for (uint32_t l = 0; l < m->c->rays->lines; l++)
             whole_line(m, method == IDEAL ? &m->ideal : &m->setup, l);
+    return bench_thread_s() - start_s;
 }
 
 static double timed_pass(struct measure *m, int method, uint32_t round)
 {
-    double start_s = bench_thread_s();
-    pass(m, method, round);
-    return 1e9 * (bench_thread_s() - start_s) / m->c->rays->n;
+    double s = method == EMBREE || method == CAST ? timed_blocks(m, method) : timed_lines(m, method, round);
+    return 1e9 * s / m->c->rays->n;
 }
 
 /* Embree at its best: packets of 4, 8 or 16, from memory or filled on the way. */
@@ -176,7 +189,7 @@ static int run(struct measure *m, struct sh_err *err)
     int rc = choose_embree(m, err);
     if (rc != SH_OK) return rc;
     caster_get_counters(m->caster, &before);
-    pass(m, CAST, 0);
+    timed_blocks(m, CAST);
     caster_get_counters(m->caster, n);
     n->near_border -= before.near_border;
     n->decided -= before.decided;

@@ -59,6 +59,16 @@ int bench_rays_create(uint32_t lines, struct bench_rays *out, struct sh_err *err
     return SH_OK;
 }
 
+void bench_rays_block(const struct bench_rays *rays, uint32_t first, struct bench_block *out)
+{
+    memcpy(out->dx, rays->dx + first, sizeof out->dx);
+    memcpy(out->dy, rays->dy + first, sizeof out->dy);
+    memcpy(out->dz, rays->dz + first, sizeof out->dz);
+    memcpy(out->fx, rays->fx + first, sizeof out->fx);
+    memcpy(out->fy, rays->fy + first, sizeof out->fy);
+    memcpy(out->fz, rays->fz + first, sizeof out->fz);
+}
+
 void bench_rays_free(struct bench_rays *rays)
 {
     free(rays->dx);

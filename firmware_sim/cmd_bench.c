@@ -158,7 +158,6 @@ static int measure_target(const struct bench_options *o, const struct bench_targ
     struct bench_case c = {.target = target, .rays = &rays, .embree = &embree, .seconds = o->seconds};
     int rc = bench_rays_create(BENCH_LINES, &rays, err);
     if (rc == SH_OK) rc = bench_embree_create(target->scene, target->station_m, 1, &embree, err);
-    if (rc == SH_OK) rc = bench_embree_rays(&embree, rays.fx, rays.fy, rays.fz, rays.n, err);
     if (rc == SH_OK) rc = bvh_create(target->scene, target->station_m, 0.0, 0, &cmd_report_stderr, &c.bvh, err);
     if (rc == SH_OK) {
         snprintf(out->name, sizeof out->name, "%s", target->name);
