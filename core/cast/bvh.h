@@ -3,17 +3,24 @@
  * Embree works in float: vertices, origin and direction are rounded, and so is its edge test. Near the edge of a
  * triangle it may therefore call a hit a miss, and a ray may slip through a closed mesh or past a silhouette. Here the
  * float triangles are wider than the real ones: in its own plane each is stretched so that, seen from the BVH's origin,
- * its edges lie further out by more than all of that rounding (BVH_WIDEN). Whatever a ray really hits, Embree proposes.
+ * its edges lie further out by more than all of that rounding. Whatever a ray really hits, Embree proposes.
  * Proposals well inside a triangle stand. Those near its border are decided again in double (decide.c). Rays from
  * elsewhere (stations that share a BVH) find the same guarantee except at borders seen at a grazing angle.
  *
- * The budget, in units of 2^-24 of the farthest coordinate in play (vertex of the triangle from the BVH's origin, plus
- * the ray's origin from it): rounding of a vertex 1, of the ray's origin 1, of its direction 1, Pluecker edge functions
- * in float (a difference, a cross and a dot product of three terms) at most 5. Sum 8.
+ * So Embree need not be robust, and its faster test (Moeller and Trumbore 1997) will do. The budget, in units of 2^-24
+ * of the farthest coordinate in play, R (vertex of the triangle from the BVH's origin, plus the ray's origin from it):
+ * rounding of a vertex 1, of the ray's direction 1, of its origin 1 (none where it is the BVH's).
+ * U = (C x D) . e, with C = v0 - o and e an edge at v0, against |e|: the cross product 2.2 (its products 1.2, its
+ * differences 1), C itself 1.2 (none where o = 0), the dot product of three terms 3, e 1. Sum 6.2, or 7.4; 6.5 and 8 are
+ * used. The third edge is tested by what is left of the denominator, (e1 x e2) . D - U - V: the errors of U and V, and
+ * 9 |e1| |e2|, all against the length of that edge, L: 6.5 (|e1| + |e2|) / L R + 9 |e1| |e2| / L. It is therefore always
+ * the longest one, so that it is at most twice as bad as the others. The weights, u = U / |den| with a reciprocal good
+ * to 3 units, are off by 6 |e1| |e2| / L more. The boxes: a slab's distance is off by at most 6 units, and a ray
+ * through a point m inside of all edges of a triangle spends at least 2 m within its box; m >= 6.5.
  *
  * What float still decides is the order of two surfaces that lie within its resolution behind each other, about 5e-7 of
- * the range over the cosine of the incidence, away from their borders; unless bvh_order_exactly was called: then such
- * rivals are known from the start (rivals.c), and a hit on one compares its plane with those of the others. */
+ * the range over the cosine of the incidence; unless bvh_order_exactly was called: then such rivals are known from the
+ * start (rivals.c), and a hit on one compares its plane with those of the others. */
 #ifndef CORE_CAST_BVH_H
 #define CORE_CAST_BVH_H
 
@@ -22,7 +29,6 @@
 #include "core/cast.h"
 #include "core/embree.h"
 
-#define BVH_WIDEN (8.0 * 0x1p-24)
 enum {
     BVH_MAX_MITER = 4096, /* a sharp corner moves out by at most this many widths */
     BVH_MAX_SLIDE = 8192, /* and along the line of sight, to stay in a grazed plane, by at most this many */
@@ -65,11 +71,26 @@ struct bvh {
     const struct scene *scene;
     struct bvh_triangle *triangle; /* one more than there are: the last stands for a miss, all NaN */
     double origin_m[3];
+    uint32_t *fan_first, *fan; /* triangles at vertex i: fan[fan_first[i] .. fan_first[i + 1]) */
     uint32_t *rival_first,
         *rival; /* rivals of triangle i: rival[rival_first[i] .. rival_first[i + 1]); NULL: there are none */
     double station_reach_m; /* rays begin at most this far from the origin */
     struct bvh_info info;
     int64_t bytes; /* as Embree reports */
+};
+
+/* Rays are cast a chunk at a time, from one origin. Their packets lie side by side: what Embree has just written with a
+ * mask is slow to read, a few packets later it isn't. What a cast leaves as it is is set once, until the origin, the
+ * near end or the width change. */
+enum { BVH_CHUNK = 512 };
+struct bvh_packets {
+    union {
+        struct RTCRayHit4 by4[BVH_CHUNK / 4];
+        struct RTCRayHit8 by8[BVH_CHUNK / 8];
+        struct RTCRayHit16 by16[BVH_CHUNK / 16];
+    } at __attribute__((aligned(64)));
+    float org[3], t_min; /* as set */
+    uint32_t width;      /* 0: not yet */
 };
 
 /* Rays of one chunk in arrays, padded to whole packets; prim is RTC_INVALID_GEOMETRY_ID for a miss. t, u, v are
@@ -81,8 +102,8 @@ struct bvh_rays {
     float *t, *u, *v;
 };
 
-/* Casts n rays from one origin, in packets of the native width, ragged ends masked. */
-void bvh_intersect(const struct bvh *bvh, const struct bvh_rays *rays, uint32_t n);
+/* Casts n <= BVH_CHUNK rays, in packets of the native width, ragged ends masked. */
+void bvh_intersect(const struct bvh *bvh, struct bvh_packets *packets, const struct bvh_rays *rays, uint32_t n);
 /* One ray from t_min on. */
 struct bvh_one {
     float t_min, t_max; /* in */
@@ -93,11 +114,14 @@ void bvh_intersect_one(const struct bvh *bvh, const float org[3], const float di
 
 /* Corners of a triangle in the local frame; returns the largest distance from its origin. */
 double bvh_corners(const struct bvh *bvh, uint32_t prim, double v[3][3]);
-/* How far the edges of a triangle were moved outward, as seen from the origin. */
+/* How far the edges of a triangle were moved outward, as seen from the origin (those of the very smallest further). */
 double bvh_width_m(const struct bvh *bvh, uint32_t prim);
 
 /* Fills the float buffers of a geometry with widened triangles, and bvh->triangle. */
 int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err);
+
+/* fans.c: fills fan_first and fan. */
+int bvh_fill_fans(struct bvh *bvh, struct sh_err *err);
 
 /* twins.c: of faces with the same three corners, however they are written, only the first stays in the float buffer. */
 int bvh_drop_twins(const struct bvh *bvh, float *vertex, struct sh_err *err);

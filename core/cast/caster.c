@@ -6,9 +6,8 @@
 
 #include "core/cast/kernels.h"
 
-enum {
-    CHUNK = 512
-}; /* pulses worked on at a time: the arrays stay in the second-level cache, the hits' planes are on their way */
+/* Pulses worked on at a time: the arrays stay in the second-level cache, the hits' planes are on their way. */
+enum { CHUNK = BVH_CHUNK };
 
 struct mover_rays {
     double dx[CHUNK], dy[CHUNK], dz[CHUNK], range_m[CHUNK];
@@ -16,6 +15,7 @@ struct mover_rays {
 };
 
 struct caster {
+    struct bvh_packets packets;
     double mirror_turn[CHUNK], pan_turn[CHUNK];
     double dx[CHUNK], dy[CHUNK], dz[CHUNK]; /* direction of the beam, prcs */
     double ex[CHUNK], ey[CHUNK], ez[CHUNK]; /* direction as the encoders read it, then the position; geo layout */
@@ -126,7 +126,7 @@ void caster_hits(struct caster *c, const struct bvh *bvh, const double station_m
                                    .doubt = c->doubt};
         kernel_to_float(hits.dx, hits.dy, hits.dz, m, c->fx, c->fy, c->fz);
         ends(c, CAST_DIRECTIONS);
-        bvh_intersect(bvh, &rays, m);
+        bvh_intersect(bvh, &c->packets, &rays, m);
         ends(c, CAST_EMBREE);
         uint32_t doubts = kernel_refine(bvh, &hits, ray.o_local, m);
         ends(c, CAST_REFINE);

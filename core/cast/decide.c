@@ -5,7 +5,7 @@
 #include "core/cast/bvh.h"
 #include "core/vec3.h"
 
-enum { DECIDE_MAX_ROUNDS = 32 };
+enum { DECIDE_MAX_ROUNDS = 32, DECIDE_MAX_FAN = 32 };
 
 struct search {
     const struct decide_ray *ray;
@@ -187,6 +187,46 @@ static void try_around(struct search *s, double range_m, double radius_m)
     rtcPointQuery(ray->bvh->rtc, &query, &context, visit, s);
 }
 
+static int has_corner(const struct scene *scene, uint32_t prim, uint32_t vertex)
+{
+    const uint32_t *t = scene->triangle[prim];
+    return t[0] == vertex || t[1] == vertex || t[2] == vertex;
+}
+
+/* Tries the triangles at a vertex that have the other one, too. Returns 0 where they are too many. */
+static int try_fan(struct search *s, uint32_t prim, uint32_t vertex, uint32_t other)
+{
+    const struct bvh *bvh = s->ray->bvh;
+    const uint32_t *first = &bvh->fan_first[vertex];
+    if (first[1] - first[0] > DECIDE_MAX_FAN) return 0;
+    for (uint32_t k = first[0]; k < first[1]; k++)
+        if (bvh->fan[k] != prim && has_corner(bvh->scene, bvh->fan[k], other)) try_triangle(s, bvh->fan[k]);
+    return 1;
+}
+
+/* Mostly the ray passes near one edge or one corner of the proposed triangle, and the true one has that edge or corner.
+ * Returns 0 where it isn't so simple. */
+static int try_neighbours(struct search *s, uint32_t prim, double width_m)
+{
+    double v[3][3], side[3];
+    int near = 0, last = 0, apart = 0;
+    look_at(s->ray, prim, v, side);
+    double sign = side[0] + side[1] + side[2] < 0.0 ? -1.0 : 1.0;
+    for (int i = 0; i < 3; i++) {
+        double in = sign * side[i] / edge_length(v[i], v[(i + 1) % 3]);
+        if (in < -4.0 * width_m) return 0;
+        if (in > 2.0 * width_m) {
+            apart = i;
+            continue;
+        }
+        near++;
+        last = i;
+    }
+    const uint32_t *t = s->ray->bvh->scene->triangle[prim];
+    if (near == 1) return try_fan(s, prim, t[last], t[(last + 1) % 3]);
+    return near == 2 && try_fan(s, prim, t[(apart + 2) % 3], t[(apart + 2) % 3]);
+}
+
 /* How far from the proposed point along the ray an edge's neighbours may be met: the width, stretched by the incidence.
  */
 static double search_radius(const struct decide_ray *ray, uint32_t prim, double range_m)
@@ -232,8 +272,11 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct cas
         try_triangle(&s, prim);
         /* Inside in double as well, and further from the border than float can blur: the common case. Nearer, another
          * triangle of the edge may lie in front of it by less than float can tell. */
-        if (s.prim == prim && s.border_m > bvh_width_m(ray->bvh, prim)) break;
+        double width_m = bvh_width_m(ray->bvh, prim);
+        if (s.prim == prim && s.border_m > width_m) break;
         counters->decided++;
+        if (try_neighbours(&s, prim, width_m) && s.prim != RTC_INVALID_GEOMETRY_ID) break;
+        counters->searched++;
         double range_m = (double)t, radius_m = search_radius(ray, prim, range_m);
         try_around(&s, range_m, radius_m);
         if (s.prim != RTC_INVALID_GEOMETRY_ID || s.near_gap <= 1.0) break;

@@ -19,46 +19,60 @@
 #define PACKET_ONE(scene, ctx, ray)             rtcIntersect1(scene, ctx, ray)
 #endif
 
-/* What Embree leaves as it is is set once; directions, far end and the mark of a miss anew for each packet. */
-#define PACKET_FUNCTION(W)                                                                                           \
-    static void intersect_##W(const struct bvh *bvh, const struct bvh_rays *rays, uint32_t n)                        \
-    {                                                                                                                \
-        PACKET_CONTEXT(context);                                                                                     \
-        const uint32_t last = bvh->scene->n_triangles;                                                               \
-        struct RTCRayHit##W packet __attribute__((aligned(64)));                                                     \
-        int valid[W] __attribute__((aligned(64)));                                                                   \
-        float t_max[W] __attribute__((aligned(64)));                                                                 \
-        for (uint32_t i = 0; i < W; i++) {                                                                           \
-            valid[i] = -1;                                                                                           \
-            t_max[i] = rays->t_max;                                                                                  \
-            packet.ray.org_x[i] = rays->org[0];                                                                      \
-            packet.ray.org_y[i] = rays->org[1];                                                                      \
-            packet.ray.org_z[i] = rays->org[2];                                                                      \
-            packet.ray.tnear[i] = rays->t_min;                                                                       \
-            packet.ray.time[i] = 0.0f;                                                                               \
-            packet.ray.mask[i] = 0xffffffffU;                                                                        \
-            packet.ray.id[i] = 0;                                                                                    \
-            packet.ray.flags[i] = 0;                                                                                 \
-            packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;                                                       \
-        }                                                                                                            \
-        for (uint32_t base = 0; base < n; base += W) {                                                               \
-            memcpy(packet.ray.dir_x, rays->dx + base, sizeof packet.ray.dir_x);                                      \
-            memcpy(packet.ray.dir_y, rays->dy + base, sizeof packet.ray.dir_y);                                      \
-            memcpy(packet.ray.dir_z, rays->dz + base, sizeof packet.ray.dir_z);                                      \
-            memcpy(packet.ray.tfar, t_max, sizeof packet.ray.tfar);                                                  \
-            memset(packet.hit.geomID, 0xff, sizeof packet.hit.geomID);                                               \
-            memset(packet.hit.primID, 0xff, sizeof packet.hit.primID);                                               \
-            if (n - base < W)                                                                                        \
-                for (uint32_t i = 0; i < W; i++)                                                                     \
-                    valid[i] = i < n - base ? -1 : 0;                                                                \
-            PACKET_CALL(W, valid, bvh->rtc, &context, &packet);                                                      \
-            memcpy(rays->prim + base, packet.hit.primID, sizeof packet.hit.primID);                                  \
-            memcpy(rays->t + base, packet.ray.tfar, sizeof packet.ray.tfar);                                         \
-            memcpy(rays->u + base, packet.hit.u, sizeof packet.hit.u);                                               \
-            memcpy(rays->v + base, packet.hit.v, sizeof packet.hit.v);                                               \
-            for (uint32_t i = 0; i < W; i++)                                                                         \
-                __builtin_prefetch(&bvh->triangle[packet.hit.primID[i] < last ? packet.hit.primID[i] : last], 0, 2); \
-        }                                                                                                            \
+/* The planes of what a packet has hit are asked for when the next one has been cast: to read them at once would mean to
+ * wait for what Embree has only just written. */
+#define PACKET_FUNCTION(W)                                                                                 \
+    static void set_up_##W(struct RTCRayHit##W *packet, const struct bvh_rays *rays)                       \
+    {                                                                                                      \
+        for (uint32_t p = 0; p < BVH_CHUNK / W; p++)                                                       \
+            for (uint32_t i = 0; i < W; i++) {                                                             \
+                packet[p].ray.org_x[i] = rays->org[0];                                                     \
+                packet[p].ray.org_y[i] = rays->org[1];                                                     \
+                packet[p].ray.org_z[i] = rays->org[2];                                                     \
+                packet[p].ray.tnear[i] = rays->t_min;                                                      \
+                packet[p].ray.time[i] = 0.0f;                                                              \
+                packet[p].ray.mask[i] = 0xffffffffU;                                                       \
+                packet[p].ray.id[i] = 0;                                                                   \
+                packet[p].ray.flags[i] = 0;                                                                \
+                packet[p].hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;                                      \
+            }                                                                                              \
+    }                                                                                                      \
+    static void prefetch_##W(const struct bvh *bvh, const struct RTCRayHit##W *packet)                     \
+    {                                                                                                      \
+        const uint32_t last = bvh->scene->n_triangles;                                                     \
+        for (uint32_t i = 0; i < W; i++)                                                                   \
+            __builtin_prefetch(&bvh->triangle[packet->hit.primID[i] < last ? packet->hit.primID[i] : last], 0, 2);\
+    }                                                                                                      \
+    static void intersect_##W(const struct bvh *bvh, struct RTCRayHit##W *packet, const struct bvh_rays *rays, uint32_t n) \
+    {                                                                                                      \
+        PACKET_CONTEXT(context);                                                                           \
+        int valid[W] __attribute__((aligned(64)));                                                         \
+        const uint32_t packets = (n + W - 1) / W;                                                          \
+        for (uint32_t p = 0; p < packets; p++) {                                                           \
+            memcpy(packet[p].ray.dir_x, rays->dx + p * W, sizeof packet->ray.dir_x);                       \
+            memcpy(packet[p].ray.dir_y, rays->dy + p * W, sizeof packet->ray.dir_y);                       \
+            memcpy(packet[p].ray.dir_z, rays->dz + p * W, sizeof packet->ray.dir_z);                       \
+            for (uint32_t i = 0; i < W; i++)                                                               \
+                packet[p].ray.tfar[i] = rays->t_max;                                                       \
+            memset(packet[p].hit.geomID, 0xff, sizeof packet->hit.geomID);                                 \
+            memset(packet[p].hit.primID, 0xff, sizeof packet->hit.primID);                                 \
+        }                                                                                                  \
+        for (uint32_t i = 0; i < W; i++)                                                                   \
+            valid[i] = -1;                                                                                 \
+        for (uint32_t p = 0; p < packets; p++) {                                                           \
+            if (n - p * W < W)                                                                             \
+                for (uint32_t i = 0; i < W; i++)                                                           \
+                    valid[i] = i < n - p * W ? -1 : 0;                                                     \
+            PACKET_CALL(W, valid, bvh->rtc, &context, &packet[p]);                                         \
+            if (p > 0) prefetch_##W(bvh, &packet[p - 1]);                                                  \
+        }                                                                                                  \
+        prefetch_##W(bvh, &packet[packets - 1]);                                                           \
+        for (uint32_t p = 0; p < packets; p++) {                                                           \
+            memcpy(rays->prim + p * W, packet[p].hit.primID, sizeof packet->hit.primID);                   \
+            memcpy(rays->t + p * W, packet[p].ray.tfar, sizeof packet->ray.tfar);                          \
+            memcpy(rays->u + p * W, packet[p].hit.u, sizeof packet->hit.u);                                \
+            memcpy(rays->v + p * W, packet[p].hit.v, sizeof packet->hit.v);                                \
+        }                                                                                                  \
     }
 
 PACKET_FUNCTION(4)
@@ -99,14 +113,34 @@ static void intersect_1(const struct bvh *bvh, const struct bvh_rays *rays, uint
     }
 }
 
-void bvh_intersect(const struct bvh *bvh, const struct bvh_rays *rays, uint32_t n)
+static void set_up(struct bvh_packets *packets, const struct bvh_rays *rays, uint32_t width)
 {
-    if (bvh->info.packet == 16)
-        intersect_16(bvh, rays, n);
-    else if (bvh->info.packet == 8)
-        intersect_8(bvh, rays, n);
-    else if (bvh->info.packet == 4)
-        intersect_4(bvh, rays, n);
+    if (packets->width == width && packets->t_min == rays->t_min && memcmp(packets->org, rays->org, sizeof rays->org) == 0)
+        return;
+    if (width == 16)
+        set_up_16(packets->at.by16, rays);
+    else if (width == 8)
+        set_up_8(packets->at.by8, rays);
     else
+        set_up_4(packets->at.by4, rays);
+    memcpy(packets->org, rays->org, sizeof rays->org);
+    packets->t_min = rays->t_min;
+    packets->width = width;
+}
+
+void bvh_intersect(const struct bvh *bvh, struct bvh_packets *packets, const struct bvh_rays *rays, uint32_t n)
+{
+    const uint32_t width = bvh->info.packet;
+    if (n == 0) return;
+    if (width == 1) {
         intersect_1(bvh, rays, n);
+        return;
+    }
+    set_up(packets, rays, width);
+    if (width == 16)
+        intersect_16(bvh, packets->at.by16, rays, n);
+    else if (width == 8)
+        intersect_8(bvh, packets->at.by8, rays, n);
+    else
+        intersect_4(bvh, packets->at.by4, rays, n);
 }

@@ -57,10 +57,34 @@ static void widen_corner(double v[3][3], const double unit_n[3], int i, double w
         out[j] = v[i][j] - width * miter * move[j] + slide * sight[j];
 }
 
+static void edge_lengths(double v[3][3], double length[3])
+{
+    for (int i = 0; i < 3; i++) {
+        double e[3];
+        for (int j = 0; j < 3; j++)
+            e[j] = v[(i + 1) % 3][j] - v[i][j];
+        length[i] = sqrt(vec3_dot(e, e));
+    }
+}
+
+/* All that float may be off by at the edges of a triangle, as a distance across the ray (bvh.h). far_m: of its farthest
+ * corner from any origin of rays. */
+static double float_error_m(const struct bvh *bvh, double far_m, const double length[3])
+{
+    double longest = fmax(fmax(length[0], length[1]), length[2]);
+    double sum = length[0] + length[1] + length[2] - longest;
+    double product = length[0] * length[1] * length[2] / (longest * longest);
+    double function = bvh->station_reach_m > 0.0 ? 8.0 : 6.5, vertices = bvh->station_reach_m > 0.0 ? 3.0 : 2.0;
+    double at_v0 = (function + vertices) * far_m;
+    double opposite = (function * sum / longest + vertices) * far_m + 15.0 * product;
+    return 0x1p-24 * fmax(at_v0, opposite);
+}
+
 double bvh_width_m(const struct bvh *bvh, uint32_t prim)
 {
-    double v[3][3];
-    return BVH_WIDEN * (bvh_corners(bvh, prim, v) + bvh->station_reach_m);
+    double v[3][3], length[3], far_m = bvh_corners(bvh, prim, v) + bvh->station_reach_m;
+    edge_lengths(v, length);
+    return float_error_m(bvh, far_m, length);
 }
 
 static double with_spare(double x, uint32_t spare)
@@ -128,27 +152,45 @@ void bvh_mark_rival(struct bvh *bvh, uint32_t prim)
     set_offset(tri, v);
 }
 
+/* The triangle with its edges further out; returns how far a corner went at most. */
+static double widen(double v[3][3], const double unit_n[3], double width_m, double wide[3][3])
+{
+    double moved2 = 0.0;
+    for (int i = 0; i < 3; i++) {
+        double d2 = 0.0;
+        widen_corner(v, unit_n, i, width_m, wide[i]);
+        for (int j = 0; j < 3; j++)
+            d2 += (wide[i][j] - v[i][j]) * (wide[i][j] - v[i][j]);
+        moved2 = fmax(moved2, d2);
+    }
+    return sqrt(moved2);
+}
+
 static void fill_triangle(struct bvh *bvh, uint32_t prim, float *vertex)
 {
-    double v[3][3], wide[3][3], unit[3], wide_n[3], longest, wide_longest, moved = 0.0;
+    double v[3][3], wide[3][3], unit[3], wide_n[3], length[3], longest;
     struct bvh_triangle *tri = &bvh->triangle[prim];
-    double width_m = BVH_WIDEN * (bvh_corners(bvh, prim, v) + bvh->station_reach_m);
+    double far_m = bvh_corners(bvh, prim, v) + bvh->station_reach_m;
     double area2 = measure(v, tri->n, &longest);
     for (int j = 0; j < 3; j++)
         unit[j] = tri->n[j] / area2;
-    for (int i = 0; i < 3; i++) {
-        double d2 = 0.0;
-        widen_corner(v, unit, i, width_m, wide[i]);
-        for (int j = 0; j < 3; j++) {
-            vertex[3 * i + j] = (float)wide[i][j];
-            d2 += (wide[i][j] - v[i][j]) * (wide[i][j] - v[i][j]);
-        }
-        moved = fmax(moved, sqrt(d2));
+    edge_lengths(v, length);
+    double width_m = float_error_m(bvh, far_m, length), moved_m = widen(v, unit, width_m, wide);
+    edge_lengths(wide, length);
+    if (float_error_m(bvh, far_m, length) > width_m) { /* very small or thin: two sides make at most twice the third */
+        const double worst[3] = {longest, longest, longest};
+        width_m = 1.01 * float_error_m(bvh, far_m, worst);
+        moved_m = widen(v, unit, width_m, wide);
+        edge_lengths(wide, length);
     }
+    int first = length[0] >= length[1] && length[0] >= length[2] ? 2 : length[1] >= length[2] ? 0 : 1;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            vertex[3 * i + j] = (float)wide[(first + i) % 3][j];
     /* From elsewhere than the origin an edge may seem to have moved by all that it did. */
-    double seen = bvh->station_reach_m > 0.0 ? moved : width_m;
-    double guard = (seen + width_m) * area2 / measure(wide, wide_n, &wide_longest);
-    set_exact(tri, v, guard * wide_longest, bvh->scene->label[prim]);
+    double seen = bvh->station_reach_m > 0.0 ? moved_m : width_m;
+    double guard = (seen + width_m) * area2 / measure(wide, wide_n, &longest);
+    set_exact(tri, v, guard * longest, bvh->scene->label[prim]);
 }
 
 int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err)
