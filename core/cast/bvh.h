@@ -30,8 +30,8 @@
 #include "core/embree.h"
 
 enum {
-    BVH_MAX_MITER = 4096, /* a sharp corner moves out by at most this many widths */
-    BVH_MAX_SLIDE = 8192, /* and along the line of sight, to stay in a grazed plane, by at most this many */
+    BVH_MAX_SLANT = 65536, /* a plane is taken to be seen at no smaller angle than 1 / this */
+    BVH_MAX_MOVE = 32768,  /* a corner moves by at most this many widths: a few percent of R */
 };
 
 /* The exact plane of a triangle, two to a cache line; gathered as doubles (kernels.c).

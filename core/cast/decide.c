@@ -234,7 +234,7 @@ static double search_radius(const struct decide_ray *ray, uint32_t prim, double 
     const struct bvh_triangle *tri = &ray->bvh->triangle[prim];
     double cosine = fabs(vec3_dot(tri->n, ray->dir)) / sqrt(vec3_dot(tri->n, tri->n));
     double width_m = bvh_width_m(ray->bvh, prim);
-    double radius = 4.0 * width_m * (1.0 + 1.0 / fmax(cosine, 1e-3));
+    double radius = 4.0 * width_m * (1.0 + 1.0 / fmax(cosine, 1e-5));
     return fmin(radius, 0.01 * range_m + 4.0 * width_m);
 }
 
@@ -259,6 +259,15 @@ static void try_rivals(struct search *s, uint32_t prim, double range_m)
     }
 }
 
+/* What was tried may lie anywhere on the ray; it counts up to limit_m, for behind that not everything was tried. */
+static int is_found(struct search *s, double limit_m)
+{
+    if (s->range_m <= limit_m || (s->near_gap <= 1.0 && s->near_range_m <= limit_m)) return 1;
+    s->prim = s->near_prim = RTC_INVALID_GEOMETRY_ID;
+    s->range_m = s->near_gap = INFINITY;
+    return 0;
+}
+
 void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct cast_counters *counters,
                 struct decide_hit *hit)
 {
@@ -275,11 +284,11 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct cas
         double width_m = bvh_width_m(ray->bvh, prim);
         if (s.prim == prim && s.border_m > width_m) break;
         counters->decided++;
-        if (try_neighbours(&s, prim, width_m) && s.prim != RTC_INVALID_GEOMETRY_ID) break;
-        counters->searched++;
         double range_m = (double)t, radius_m = search_radius(ray, prim, range_m);
+        if (try_neighbours(&s, prim, width_m) && s.range_m <= range_m + radius_m) break;
+        counters->searched++;
         try_around(&s, range_m, radius_m);
-        if (s.prim != RTC_INVALID_GEOMETRY_ID || s.near_gap <= 1.0) break;
+        if (is_found(&s, range_m + radius_m)) break;
         counters->went_on++;
         float org[3], dir[3];
         for (int i = 0; i < 3; i++) {

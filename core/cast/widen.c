@@ -19,42 +19,27 @@ double bvh_corners(const struct bvh *bvh, uint32_t prim, double v[3][3])
     return sqrt(reach2);
 }
 
-/* Part of e across the unit vector a; returns its length. */
-static double across(const double e[3], const double a[3], double out[3])
+/* Moves corner i outward within the plane, so that both its edges move by `offset_m`: along the sum of their directions,
+ * offset / sin(angle); a sharp corner ends at most_m. */
+static void widen_corner(double v[3][3], int i, double offset_m, double most_m, double out[3])
 {
-    double along = vec3_dot(e, a);
-    for (int j = 0; j < 3; j++)
-        out[j] = e[j] - along * a[j];
-    return sqrt(vec3_dot(out, out));
-}
-
-/* Moves corner i outward so that, seen from the origin, both its edges move by `width`: across the line of sight along
- * the sum of the edges as they are seen there, width / sin(angle), and then along the line of sight back into the
- * triangle's plane, so that the plane stays what it is. Sharp corners and grazed planes end at BVH_MAX_MITER and
- * BVH_MAX_SLIDE widths. */
-static void widen_corner(double v[3][3], const double unit_n[3], int i, double width, double out[3])
-{
-    double sight[3], e1[3], e2[3], f1[3], f2[3], c[3], move[3];
-    double far = sqrt(vec3_dot(v[i], v[i]));
+    double e1[3], e2[3], c[3], move[3], l1, l2;
     for (int j = 0; j < 3; j++) {
-        sight[j] = far > 0.0 ? v[i][j] / far : unit_n[j];
         e1[j] = v[(i + 1) % 3][j] - v[i][j];
         e2[j] = v[(i + 2) % 3][j] - v[i][j];
     }
-    double l1 = across(e1, sight, f1), l2 = across(e2, sight, f2);
+    l1 = sqrt(vec3_dot(e1, e1));
+    l2 = sqrt(vec3_dot(e2, e2));
     for (int j = 0; j < 3; j++) {
-        f1[j] = l1 > 0.0 ? f1[j] / l1 : 0.0;
-        f2[j] = l2 > 0.0 ? f2[j] / l2 : 0.0;
-        move[j] = f1[j] + f2[j];
+        e1[j] /= l1;
+        e2[j] /= l2;
+        move[j] = e1[j] + e2[j];
     }
-    vec3_cross(f1, f2, c);
+    vec3_cross(e1, e2, c);
     double sine = sqrt(vec3_dot(c, c)), length = sqrt(vec3_dot(move, move));
-    double miter = length < BVH_MAX_MITER * sine ? 1.0 / sine : length > 0.0 ? BVH_MAX_MITER / length : 0.0;
-    double off = -width * miter * vec3_dot(move, unit_n), towards = vec3_dot(sight, unit_n);
-    double slide = fabs(off) < BVH_MAX_SLIDE * width * fabs(towards) ? -off / towards : 0.0;
-    if (slide == 0.0 && off != 0.0) slide = copysign(BVH_MAX_SLIDE * width, -off * towards);
+    double factor = offset_m * length < most_m * sine ? offset_m / sine : length > 0.0 ? most_m / length : 0.0;
     for (int j = 0; j < 3; j++)
-        out[j] = v[i][j] - width * miter * move[j] + slide * sight[j];
+        out[j] = v[i][j] - factor * move[j];
 }
 
 static void edge_lengths(double v[3][3], double length[3])
@@ -152,18 +137,18 @@ void bvh_mark_rival(struct bvh *bvh, uint32_t prim)
     set_offset(tri, v);
 }
 
-/* The triangle with its edges further out; returns how far a corner went at most. */
-static double widen(double v[3][3], const double unit_n[3], double width_m, double wide[3][3])
+/* How far the edges have to move within the plane, so that seen from the origin, at a slant, they have moved by width_m:
+ * width / cosine of the incidence, which at the farthest corner is the plane's distance by the corner's. */
+static double offset_m(double v[3][3], const double unit_n[3], double width_m, double far_m)
 {
-    double moved2 = 0.0;
-    for (int i = 0; i < 3; i++) {
-        double d2 = 0.0;
-        widen_corner(v, unit_n, i, width_m, wide[i]);
-        for (int j = 0; j < 3; j++)
-            d2 += (wide[i][j] - v[i][j]) * (wide[i][j] - v[i][j]);
-        moved2 = fmax(moved2, d2);
-    }
-    return sqrt(moved2);
+    double above_m = fabs(vec3_dot(v[0], unit_n));
+    return width_m * (above_m * BVH_MAX_SLANT > far_m ? far_m / above_m : BVH_MAX_SLANT);
+}
+
+static void widen(double v[3][3], double offset, double width_m, double wide[3][3])
+{
+    for (int i = 0; i < 3; i++)
+        widen_corner(v, i, offset, BVH_MAX_MOVE * width_m, wide[i]);
 }
 
 static void fill_triangle(struct bvh *bvh, uint32_t prim, float *vertex)
@@ -175,12 +160,14 @@ static void fill_triangle(struct bvh *bvh, uint32_t prim, float *vertex)
     for (int j = 0; j < 3; j++)
         unit[j] = tri->n[j] / area2;
     edge_lengths(v, length);
-    double width_m = float_error_m(bvh, far_m, length), moved_m = widen(v, unit, width_m, wide);
+    double width_m = float_error_m(bvh, far_m, length), offset = offset_m(v, unit, width_m, far_m);
+    widen(v, offset, width_m, wide);
     edge_lengths(wide, length);
     if (float_error_m(bvh, far_m, length) > width_m) { /* very small or thin: two sides make at most twice the third */
         const double worst[3] = {longest, longest, longest};
         width_m = 1.01 * float_error_m(bvh, far_m, worst);
-        moved_m = widen(v, unit, width_m, wide);
+        offset = offset_m(v, unit, width_m, far_m);
+        widen(v, offset, width_m, wide);
         edge_lengths(wide, length);
     }
     int first = length[0] >= length[1] && length[0] >= length[2] ? 2 : length[1] >= length[2] ? 0 : 1;
@@ -188,7 +175,7 @@ static void fill_triangle(struct bvh *bvh, uint32_t prim, float *vertex)
         for (int j = 0; j < 3; j++)
             vertex[3 * i + j] = (float)wide[(first + i) % 3][j];
     /* From elsewhere than the origin an edge may seem to have moved by all that it did. */
-    double seen = bvh->station_reach_m > 0.0 ? moved_m : width_m;
+    double seen = bvh->station_reach_m > 0.0 ? offset : width_m;
     double guard = (seen + width_m) * area2 / measure(wide, wide_n, &longest);
     set_exact(tri, v, guard * longest, bvh->scene->label[prim]);
 }
