@@ -82,7 +82,7 @@ struct bvh {
 /* Rays are cast a chunk at a time, from one origin. Their packets lie side by side: what Embree has just written with a
  * mask is slow to read, a few packets later it isn't. What a cast leaves as it is is set once, until the origin, the
  * near end or the width change. */
-enum { BVH_CHUNK = 512 };
+enum { BVH_CHUNK = 1024 };
 struct bvh_packets {
     union {
         struct RTCRayHit4 by4[BVH_CHUNK / 4];
@@ -140,6 +140,9 @@ struct decide_hit {
     uint32_t prim; /* RTC_INVALID_GEOMETRY_ID: the ray hits nothing */
     double range_m;
 };
+/* Brings what deciding prim[ray[0 .. n-1]] is going to read, step by step for all of them at once. */
+void decide_prefetch(const struct bvh *bvh, const uint32_t *prim, const uint32_t *ray, uint32_t n);
+
 /* What Embree proposed near a border, decided in double: the nearest triangle that the ray really meets.
  * Every triangle near the proposed point is tried with edge functions that two triangles of an edge share bit by bit,
  * so that no ray passes between them; of those that are hit at the same range (to 1e-12) the lowest number wins. When

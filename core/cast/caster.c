@@ -90,16 +90,21 @@ static void decide_one(struct caster *c, struct decide_ray *ray, const struct ke
     hits->range_m[i] = hit.prim == RTC_INVALID_GEOMETRY_ID ? (double)NAN : hit.range_m;
 }
 
-/* Doubts are few: whole packets without any are passed at once. */
+/* Doubts are few: whole packets without any are passed at once. Each costs a chain of cache misses, so they are looked
+ * up together. */
 static void decide(struct caster *c, struct decide_ray *ray, const struct kernel_hits *hits, uint32_t *prim, uint32_t n)
 {
+    uint32_t doubts = 0, in_doubt[CHUNK];
     for (uint32_t base = 0; base < n; base += SCHEDULE_PACKET) {
         uint32_t any = 0, end = n - base < SCHEDULE_PACKET ? n : base + SCHEDULE_PACKET;
         for (uint32_t i = base; i < base + SCHEDULE_PACKET; i++)
             any |= c->doubt[i]; /* beyond n: stale, but there; a doubt too many costs a look */
         for (uint32_t i = base; any != 0 && i < end; i++)
-            if (c->doubt[i]) decide_one(c, ray, hits, prim, i);
+            if (c->doubt[i]) in_doubt[doubts++] = i;
     }
+    decide_prefetch(ray->bvh, prim, in_doubt, doubts);
+    for (uint32_t k = 0; k < doubts; k++)
+        decide_one(c, ray, hits, prim, in_doubt[k]);
 }
 
 void caster_hits(struct caster *c, const struct bvh *bvh, const double station_m[3], double range_max_m, uint32_t n,

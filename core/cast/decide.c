@@ -259,6 +259,28 @@ static void try_rivals(struct search *s, uint32_t prim, double range_m)
     }
 }
 
+static void prefetch_corners(const struct scene *scene, uint32_t prim)
+{
+    for (int j = 0; j < 3; j++)
+        __builtin_prefetch(scene->vertex_m[scene->triangle[prim][j]], 0, 3);
+}
+
+void decide_prefetch(const struct bvh *bvh, const uint32_t *prim, const uint32_t *ray, uint32_t n)
+{
+    const struct scene *scene = bvh->scene;
+    for (uint32_t k = 0; k < n; k++)
+        __builtin_prefetch(scene->triangle[prim[ray[k]]], 0, 3);
+    for (uint32_t k = 0; k < n; k++) {
+        const uint32_t *t = scene->triangle[prim[ray[k]]];
+        prefetch_corners(scene, prim[ray[k]]);
+        for (int j = 0; j < 3; j++)
+            __builtin_prefetch(&bvh->fan_first[t[j]], 0, 3);
+    }
+    for (uint32_t k = 0; k < n; k++)
+        for (int j = 0; j < 3; j++)
+            __builtin_prefetch(&bvh->fan[bvh->fan_first[scene->triangle[prim[ray[k]]][j]]], 0, 3);
+}
+
 /* What was tried may lie anywhere on the ray; it counts up to limit_m, for behind that not everything was tried. */
 static int is_found(struct search *s, double limit_m)
 {
