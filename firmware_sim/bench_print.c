@@ -90,6 +90,7 @@ static void put_scene(struct json *json, const struct bench_scene_report *s)
     json_double(json, "embree_mrays_s", 1e3 / r->embree_ns);
     json_double(json, "cast_ratio", r->cast_ratio);
     json_double(json, "pipeline_ratio", r->pipeline_ratio);
+    json_double(json, "cast_ratio_not_robust", r->fast_ratio);
     json_double(json, "pipeline_ratio_ideal_encoders", r->ideal_ratio);
     json_double(json, "cast_mrays_s", 1e3 / r->cast_ns);
     json_double(json, "pipeline_mpulses_s", 1e3 / r->pipeline_ns);
@@ -99,6 +100,7 @@ static void put_scene(struct json *json, const struct bench_scene_report *s)
     json_double(json, "rest", rest_ns(r));
     json_close_object(json);
     json_double(json, "embree_ns", r->embree_ns);
+    json_double(json, "embree_not_robust_ns", r->fast_ns);
     json_double(json, "cast_ns", r->cast_ns);
     json_double(json, "pipeline_ns", r->pipeline_ns);
     json_bool(json, "stages_give_same_bytes", r->same_bytes);

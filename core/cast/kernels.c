@@ -89,7 +89,7 @@ void kernel_to_float(const double *restrict dx, const double *restrict dy, const
 VEC_CLONES
 static uint32_t refine(const double *restrict tri, uint32_t n_triangles, const uint32_t *restrict prim,
                        const double *restrict dx, const double *restrict dy, const double *restrict dz,
-                       const float *restrict u, const float *restrict v, const double o[3], uint32_t n,
+                       const float *restrict u, const float *restrict v, const double o[3], int slanted, uint32_t n,
                        double *restrict range_m, uint32_t *restrict label, uint32_t *restrict doubt)
 {
     const double ox = o[0], oy = o[1], oz = o[2];
@@ -111,7 +111,9 @@ static uint32_t refine(const double *restrict tri, uint32_t n_triangles, const u
         memcpy(&low, &ny, sizeof low);
         memcpy(&high, &nz, sizeof high);
         label[i] = (uint32_t)((low & ((1U << BVH_SPARE_BITS) - 1)) | (high & 15) << BVH_SPARE_BITS);
-        uint32_t near = ((double)least * fabs(along) < guard) | (uint32_t)((high & BVH_RIVAL_BIT) != 0);
+        double weight = (double)least * (slanted ? fabs(along) : 1.0);
+        uint32_t in_doubt = (weight < guard) | (uint32_t)((high & BVH_RIVAL_BIT) != 0);
+        uint32_t near = in_doubt & (uint32_t)(prim[i] < n_triangles);
         doubt[i] = near;
         doubts += near;
     }
@@ -121,7 +123,7 @@ static uint32_t refine(const double *restrict tri, uint32_t n_triangles, const u
 uint32_t kernel_refine(const struct bvh *bvh, const struct kernel_hits *hits, const double o[3], uint32_t n)
 {
     return refine((const double *)bvh->triangle, bvh->scene->n_triangles, hits->prim, hits->dx, hits->dy, hits->dz,
-                  hits->u, hits->v, o, n, hits->range_m, hits->label, hits->doubt);
+                  hits->u, hits->v, o, bvh->station_reach_m > 0.0, n, hits->range_m, hits->label, hits->doubt);
 }
 
 VEC_CLONES
