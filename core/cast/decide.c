@@ -227,15 +227,13 @@ static int try_neighbours(struct search *s, uint32_t prim, double width_m)
     return near == 2 && try_fan(s, prim, t[(apart + 2) % 3], t[(apart + 2) % 3]);
 }
 
-/* How far from the proposed point along the ray an edge's neighbours may be met: the width, stretched by the incidence.
- */
-static double search_radius(const struct decide_ray *ray, uint32_t prim, double range_m)
+/* How far from the proposed point along the ray an edge's neighbours may be met, and the plane itself: the width,
+ * stretched by the incidence. */
+static double slack_m(const struct decide_ray *ray, uint32_t prim, double width_m)
 {
     const struct bvh_triangle *tri = &ray->bvh->triangle[prim];
     double cosine = fabs(vec3_dot(tri->n, ray->dir)) / sqrt(vec3_dot(tri->n, tri->n));
-    double width_m = bvh_width_m(ray->bvh, prim);
-    double radius = 4.0 * width_m * (1.0 + 1.0 / fmax(cosine, 1e-5));
-    return fmin(radius, 0.01 * range_m + 4.0 * width_m);
+    return 4.0 * width_m * (1.0 + 1.0 / fmax(cosine, 1e-6));
 }
 
 /* Rivals whose planes the ray meets within what float can't order are tried; the others lie clearly before or behind.
@@ -306,11 +304,12 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct cas
         double width_m = bvh_width_m(ray->bvh, prim);
         if (s.prim == prim && s.border_m > width_m) break;
         counters->decided++;
-        double range_m = (double)t, radius_m = search_radius(ray, prim, range_m);
-        if (try_neighbours(&s, prim, width_m) && s.range_m <= range_m + radius_m) break;
+        double range_m = (double)t, slack = slack_m(ray, prim, width_m), limit_m = range_m + slack;
+        double radius_m = fmin(slack, 0.01 * range_m + 4.0 * width_m);
+        if (try_neighbours(&s, prim, width_m) && s.range_m <= limit_m) break;
         counters->searched++;
         try_around(&s, range_m, radius_m);
-        if (is_found(&s, range_m + radius_m)) break;
+        if (is_found(&s, limit_m)) break;
         counters->went_on++;
         float org[3], dir[3];
         for (int i = 0; i < 3; i++) {
