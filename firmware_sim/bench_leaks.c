@@ -111,7 +111,6 @@ static void *job_main(void *arg)
     job->out->passed += counts[2];
     job->out->counters.near_border += c.near_border;
     job->out->counters.decided += c.decided;
-    job->out->counters.searched += c.searched;
     job->out->counters.went_on += c.went_on;
     job->out->counters.undecided += c.undecided;
     pthread_mutex_unlock(&job->lock);

@@ -200,7 +200,6 @@ static int run(struct measure *m, struct sh_err *err)
     caster_get_counters(m->caster, n);
     n->near_border -= before.near_border;
     n->decided -= before.decided;
-    n->searched -= before.searched;
     n->went_on -= before.went_on;
     n->undecided -= before.undecided;
     m->out->same_bytes = check_same(m);
