@@ -2,10 +2,12 @@
  *
  * Embree works in float: vertices, origin and direction are rounded, and so is its edge test. Near the edge of a
  * triangle it may therefore call a hit a miss, and a ray may slip through a closed mesh or past a silhouette. Here the
- * float triangles are wider than the real ones: in its own plane each is stretched so that, seen from the BVH's origin,
- * its edges lie further out by more than all of that rounding. Whatever a ray really hits, Embree proposes.
- * Proposals well inside a triangle stand. Those near its border are decided again in double (decide.c). Rays from
- * elsewhere (stations that share a BVH) find the same guarantee except at borders seen at a grazing angle.
+ * float triangles are wider than the real ones: in its own plane each has its edges further out by more than all of
+ * that rounding, a distance across the ray, over the cosine of the incidence as seen from the BVH's origin. (Also for
+ * edges seen end-on: their test is off by more, across the ray, but for the same reason they move by more.) Whatever a
+ * ray really hits, Embree proposes. Proposals well inside a triangle stand. Those near its border are decided again in
+ * double (decide.c). Rays from elsewhere (stations that share a BVH) find the same guarantee except at borders that
+ * they see at a far smaller angle than the origin does.
  *
  * So Embree need not be robust, and its faster test (Moeller and Trumbore 1997) will do. The budget, in units of 2^-24
  * of the farthest coordinate in play, R (vertex of the triangle from the BVH's origin, plus the ray's origin from it):
