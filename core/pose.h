@@ -3,8 +3,8 @@
  * Attitude, the one convention of the project: a rotation R takes the body's frame (x right, y forward, z up) to the
  * scene frame (x east, y north, z up),
  *     R = Rz(-heading) Rx(pitch) Ry(roll),
- * heading clockwise from north (the scene's y axis) seen from above, pitch positive with the nose up, roll positive with
- * the right side down. Quaternions are (w, x, y, z), of length one, q and -q the same: q = qz(-heading) qx(pitch)
+ * heading clockwise from north (the scene's y axis) seen from above, pitch positive with the nose up, roll positive
+ * with the right side down. Quaternions are (w, x, y, z), of length one, q and -q the same: q = qz(-heading) qx(pitch)
  * qy(roll), products by Hamilton's rule.
  *
  * Between two poses the position goes along the straight line and the attitude the shorter way about one fixed axis at
@@ -77,9 +77,9 @@ int trajectory_from_samples(const struct pose_sample *sample, size_t n, struct t
  * begin with '#' and empty lines don't count. Everything else is an error with file and line. */
 int trajectory_read_csv(const char *path, struct trajectory **out, struct sh_err *err);
 
-/* Way-points, a CSV file likewise: x_m, y_m, z_m, speed_m_s, and pause_s where wanted. The platform goes through them on
- * the cubic Hermite curve described above, the way to the next point taking chord / speed_m_s (the last one's speed does
- * not matter, but must be there), and stands at a point for pause_s. Heading along the path, pitch and roll 0. */
+/* Way-points, a CSV file likewise: x_m, y_m, z_m, speed_m_s, and pause_s where wanted. The platform goes through them
+ * on the cubic Hermite curve described above, the way to the next point taking chord / speed_m_s (the last one's speed
+ * does not matter, but must be there), and stands at a point for pause_s. Heading along the path, pitch and roll 0. */
 int trajectory_read_waypoints(const char *path, struct trajectory **out, struct sh_err *err);
 
 void trajectory_free(struct trajectory *trajectory);
@@ -88,8 +88,8 @@ void trajectory_at(const struct trajectory *trajectory, double t_s, struct pose 
 
 /* The knots of a head that is mounted on the platform, from start_s (time 0 of the knots) to the trajectory's end: at
  * the samples, and as many between two as keep what pose_between makes of them within tolerance_m of the curve (closed
- * bound: acceleration and lever arm times interval^2 / 8; the attitude is the same), at most longest_ns apart. Allocates
- * *out. error_m: the bound that holds, more than tolerance_m only where POSE_MIN_STEP_US is the limit. */
+ * bound: acceleration and lever arm times interval^2 / 8; the attitude is the same), at most longest_ns apart.
+ * Allocates *out. error_m: the bound that holds, more than tolerance_m only where POSE_MIN_STEP_US is the limit. */
 int trajectory_knots(const struct trajectory *trajectory, double start_s, const struct pose *mount, double tolerance_m,
                      int64_t longest_ns, struct pose_knot **out, size_t *n, double *error_m, struct sh_err *err);
 

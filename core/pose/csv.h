@@ -8,12 +8,12 @@ enum { CSV_MAX_COLUMNS = 16 };
 
 struct csv {
     struct text text;
-    const char *const *known; /* names of columns, NULL at the end; index is the column's number for csv_value */
+    const char *const *known;    /* names of columns, NULL at the end; index is the column's number for csv_value */
     int column[CSV_MAX_COLUMNS]; /* of the file: which known one */
     int n_columns;
-    uint32_t has;                   /* bit per known column */
-    double value[CSV_MAX_COLUMNS];  /* of the line read last, by known column; 0 where there is none */
-    uint64_t line;                  /* its number */
+    uint32_t has;                  /* bit per known column */
+    double value[CSV_MAX_COLUMNS]; /* of the line read last, by known column; 0 where there is none */
+    uint64_t line;                 /* its number */
 };
 
 /* Reads the header; csv_close is due in any case. Unknown or doubled names are errors. */

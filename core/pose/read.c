@@ -32,8 +32,8 @@ static struct pose_sample *add_sample(struct samples *s)
 /* ---- samples */
 
 enum { T, X, Y, Z, HEADING, PITCH, ROLL, QW, QX, QY, QZ, FRAME };
-static const char *const sample_columns[] = {"t_s",      "x_m", "y_m", "z_m", "heading_deg", "pitch_deg",
-                                             "roll_deg", "qw",  "qx",  "qy",  "qz",          "frame", NULL};
+static const char *const sample_columns[] = {"t_s", "x_m", "y_m", "z_m", "heading_deg", "pitch_deg", "roll_deg",
+                                             "qw",  "qx",  "qy",  "qz",  "frame",       NULL};
 
 static int has_all(const struct csv *csv, uint32_t mask)
 {
@@ -44,7 +44,8 @@ static int check_columns(const struct csv *csv, struct sh_err *err)
 {
     const uint32_t place = 1u << T | 1u << X | 1u << Y | 1u << Z, quat = 1u << QW | 1u << QX | 1u << QY | 1u << QZ;
     const uint32_t angles = 1u << HEADING | 1u << PITCH | 1u << ROLL;
-    int by_quat = has_all(csv, quat) && !(csv->has & angles), by_angles = has_all(csv, 1u << HEADING) && !(csv->has & quat);
+    int by_quat = has_all(csv, quat) && !(csv->has & angles),
+        by_angles = has_all(csv, 1u << HEADING) && !(csv->has & quat);
     if (has_all(csv, place) && (by_quat || by_angles)) return SH_OK;
     return text_fail(&csv->text, csv->line, SH_EINPUT, err,
                      "the columns have to be t_s, x_m, y_m, z_m and either heading_deg (with pitch_deg, roll_deg) or "
@@ -124,7 +125,8 @@ static int add_waypoint(const struct csv *csv, double speed_m_s, struct samples 
     if (samples->n > 1) {
         double chord2 = 0.0;
         for (int k = 0; k < 3; k++)
-            chord2 += (s->pose.position_m[k] - s[-1].pose.position_m[k]) * (s->pose.position_m[k] - s[-1].pose.position_m[k]);
+            chord2 +=
+                (s->pose.position_m[k] - s[-1].pose.position_m[k]) * (s->pose.position_m[k] - s[-1].pose.position_m[k]);
         double way_s = sqrt(chord2) / speed_m_s;
         if (!(way_s >= 1e-6 * POSE_MIN_STEP_US && way_s < 1e6))
             return text_fail(&csv->text, csv->line, SH_EINPUT, err,

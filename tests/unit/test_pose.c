@@ -147,9 +147,9 @@ static double distance(const double a[3], const double b[3])
     return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
 }
 
-/* With x = RATE * STEP_S: the parabola's derivative on a circle is the true one times sin(x)/x. Put into the cubic, that
- * is off along the way by R x^3/6 times the largest of f(1-f)(1-2f), 0.0962, and across it by R x^4 3/128; higher powers
- * of x = 0.1 add below 2 %. By chords it would be R x^2/8. */
+/* With x = RATE * STEP_S: the parabola's derivative on a circle is the true one times sin(x)/x. Put into the cubic,
+ * that is off along the way by R x^3/6 times the largest of f(1-f)(1-2f), 0.0962, and across it by R x^4 3/128; higher
+ * powers of x = 0.1 add below 2 %. By chords it would be R x^2/8. */
 static void test_constant_turn(void **state)
 {
     (void)state;
@@ -175,7 +175,8 @@ static void test_constant_turn(void **state)
     trajectory_free(tr);
 }
 
-/* Between its knots the head moves as pose_between says: within the stated bound of the trajectory, lever arm included. */
+/* Between its knots the head moves as pose_between says: within the stated bound of the trajectory, lever arm included.
+ */
 static void test_knots(void **state)
 {
     (void)state;
@@ -249,8 +250,9 @@ static void test_csv(void **state)
     pose_from_angles(10 * DEG, -6 * DEG, 5 * DEG, b.quat);
     assert_true(pose_angle_between(a.quat, b.quat) < 1e-14 && a.position_m[1] == 2.0);
     char text[300]; /* the same by quaternions, columns in another order, with frames */
-    snprintf(text, sizeof text, "frame,qw,qx,qy,qz,z_m,y_m,x_m,t_s\n7,%.17g,%.17g,%.17g,%.17g,3,2,1,0\n8,1,0,0,0,3,2,3,2\n",
-             b.quat[0], b.quat[1], b.quat[2], b.quat[3]);
+    snprintf(text, sizeof text,
+             "frame,qw,qx,qy,qz,z_m,y_m,x_m,t_s\n7,%.17g,%.17g,%.17g,%.17g,3,2,1,0\n8,1,0,0,0,3,2,3,2\n", b.quat[0],
+             b.quat[1], b.quat[2], b.quat[3]);
     write_file(text);
     if (trajectory_read_csv(path, &quats, &err) != SH_OK) fail_msg("%s", err.text);
     trajectory_at(quats, 0.0, &b, &frame);
@@ -314,7 +316,8 @@ static void test_waypoints(void **state)
     assert_true(first == 0.0 && fabs(last - 11.0) < 1e-12);
     trajectory_at(tr, 1.0, &p, &frame);
     pose_to_angles(p.quat, &h, &pitch, &roll);
-    assert_true(fabs(p.position_m[1] - 5) < 1e-3 && fabs(frame - 0.5) < 1e-3 && fabs(h) < 1e-12 && p.position_m[2] == 1);
+    assert_true(fabs(p.position_m[1] - 5) < 1e-3 && fabs(frame - 0.5) < 1e-3 && fabs(h) < 1e-12 &&
+                p.position_m[2] == 1);
     for (double t = 4.0; t <= 6.0; t += 0.1) { /* it stands, exactly */
         trajectory_at(tr, t, &p, &frame);
         assert_true(fabs(p.position_m[1] - 20) < 1e-12 && fabs(frame - 2) < 1e-12);
@@ -330,10 +333,9 @@ static void test_waypoints(void **state)
     pose_to_angles(p.quat, &h, &pitch, &roll);
     assert_true(fabs(h - 90 * DEG) < 1e-3);
     trajectory_free(tr);
-    static const char *const wrong[] = {"x_m,y_m,z_m\n0,0,0\n", "x_m,y_m,z_m,speed_m_s\n0,0,0,1\n",
-                                        "x_m,y_m,z_m,speed_m_s\n0,0,0,0\n1,0,0,1\n",
-                                        "x_m,y_m,z_m,speed_m_s\n0,0,0,1\n0,0,0,1\n",
-                                        "x_m,y_m,z_m,speed_m_s,pause_s\n0,0,0,1,-1\n1,0,0,1,0\n"};
+    static const char *const wrong[] = {
+        "x_m,y_m,z_m\n0,0,0\n", "x_m,y_m,z_m,speed_m_s\n0,0,0,1\n", "x_m,y_m,z_m,speed_m_s\n0,0,0,0\n1,0,0,1\n",
+        "x_m,y_m,z_m,speed_m_s\n0,0,0,1\n0,0,0,1\n", "x_m,y_m,z_m,speed_m_s,pause_s\n0,0,0,1,-1\n1,0,0,1,0\n"};
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         write_file(wrong[i]);
         assert_int_equal(trajectory_read_waypoints(path, &tr, &err), SH_EINPUT);
@@ -344,8 +346,8 @@ static void test_waypoints(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_convention),    cmocka_unit_test(test_between), cmocka_unit_test(test_straight_line),
-        cmocka_unit_test(test_constant_turn), cmocka_unit_test(test_knots),   cmocka_unit_test(test_csv),
+        cmocka_unit_test(test_convention),    cmocka_unit_test(test_between),   cmocka_unit_test(test_straight_line),
+        cmocka_unit_test(test_constant_turn), cmocka_unit_test(test_knots),     cmocka_unit_test(test_csv),
         cmocka_unit_test(test_csv_errors),    cmocka_unit_test(test_waypoints),
     };
     return cmocka_run_group_tests(tests, make_file, remove_file);
