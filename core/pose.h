@@ -41,7 +41,6 @@ enum pose_flags {
     POSE_EXTRAPOLATED = 1u << 0, /* beyond the last pose that had come */
     POSE_LATE = 1u << 1,         /* too far beyond it: the platform is taken to stand there */
     POSE_NONE = 1u << 2,         /* none had come yet: the station's */
-    POSE_OUTSIDE = 1u << 3,      /* farther out than the scene was prepared for: edges are less certain */
 };
 
 void pose_from_angles(double heading_rad, double pitch_rad, double roll_rad, double quat[4]);

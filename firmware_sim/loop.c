@@ -210,6 +210,8 @@ static void fill_stats(struct loop *loop, struct loop_stats *stats)
     stats->lost_ticks = atomic_load(&c->lost_ticks);
     stats->late_blocks = atomic_load(&c->late_blocks);
     stats->reader_lost_frames = atomic_load(&c->reader_lost_frames);
+    stats->late_poses = atomic_load(&c->late_poses);
+    stats->bad_poses = atomic_load(&c->bad_poses);
     stats->scans = device_scans(loop->device);
     stats->wall_s = 1e-9 * (double)(atomic_load(&loop->last_pulse_ns) - atomic_load(&loop->first_pulse_ns));
     stats->late_p50_us = late_quantile_us(loop, 0.5);

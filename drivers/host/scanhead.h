@@ -132,7 +132,6 @@ enum scanhead_pose_flags {
     SCANHEAD_POSE_EXTRAPOLATED = 1, /* beyond the last pose that the head had been given */
     SCANHEAD_POSE_LATE = 2,         /* too far beyond it: the head took itself to stand */
     SCANHEAD_POSE_NONE = 4,         /* it had not been given any yet */
-    SCANHEAD_POSE_OUTSIDE = 8,      /* outside of where it was told to be */
 };
 /* The pose at a time since the scan's start, of the points that came last or some seconds before. SCANHEAD_ESTATE where
  * the stream has not said it, or the head stands still. */

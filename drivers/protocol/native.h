@@ -110,7 +110,6 @@ enum native_pose_flags { /* the values of core/pose.h */
                          NATIVE_POSE_EXTRAPOLATED = 1,
                          NATIVE_POSE_LATE = 2,
                          NATIVE_POSE_NONE = 4,
-                         NATIVE_POSE_OUTSIDE = 8,
 };
 struct native_pose {
     int64_t t_ns;         /* since the scan's start */
