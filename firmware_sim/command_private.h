@@ -99,8 +99,8 @@ struct command_call {
     struct command_device *dev;
     uint32_t session;
     const struct command_row *row;
-    char *param; /* as written; of a step, up to the pose */
-    const char *pose;  /* what follows the step; NULL: nothing */
+    char *param;      /* as written; of a step, up to the pose */
+    const char *pose; /* what follows the step; NULL: nothing */
     struct command_value value;
     struct command_result *out;
 };

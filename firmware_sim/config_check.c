@@ -166,12 +166,18 @@ static int check_platform(const struct cfg_reader *rd, const struct config *cfg)
         const char *path;
         unsigned kinds; /* bit per kind of platform that has the key */
     } keys[] = {
-        {"platform.file", 1u << PLATFORM_TRAJECTORY},    {"platform.waypoints", 1u << PLATFORM_TRAJECTORY},
-        {"platform.start_s", 1u << PLATFORM_TRAJECTORY}, {"platform.at_end", 1u << PLATFORM_TRAJECTORY},
-        {"platform.reach_m", 1u << PLATFORM_LIVE},       {"platform.extrapolate_ms", 1u << PLATFORM_LIVE},
-        {"platform.address", 1u << PLATFORM_LIVE},       {"platform.port", 1u << PLATFORM_LIVE},
-        {"platform.mount_m", ~1u},                       {"platform.mount_heading_deg", ~1u},
-        {"platform.mount_pitch_deg", ~1u},               {"platform.mount_roll_deg", ~1u},
+        {"platform.file", 1u << PLATFORM_TRAJECTORY},
+        {"platform.waypoints", 1u << PLATFORM_TRAJECTORY},
+        {"platform.start_s", 1u << PLATFORM_TRAJECTORY},
+        {"platform.at_end", 1u << PLATFORM_TRAJECTORY},
+        {"platform.reach_m", 1u << PLATFORM_LIVE},
+        {"platform.extrapolate_ms", 1u << PLATFORM_LIVE},
+        {"platform.address", 1u << PLATFORM_LIVE},
+        {"platform.port", 1u << PLATFORM_LIVE},
+        {"platform.mount_m", ~1u},
+        {"platform.mount_heading_deg", ~1u},
+        {"platform.mount_pitch_deg", ~1u},
+        {"platform.mount_roll_deg", ~1u},
     };
     static const char *const has[] = {
         [PLATFORM_STATIC] = "kind alone; the station says where the head stands",

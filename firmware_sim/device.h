@@ -90,8 +90,8 @@ void device_command(struct device *device, uint32_t session, const char *line, u
 void device_overlong(struct device *device, uint32_t session, struct command_result *out);
 /* A session has gone; partial: in the middle of a command. Gives control back. */
 void device_session_closed(struct device *device, uint32_t session, const char *who, int partial);
-/* Where a live platform is at a device time (of its own, before the mount): from TIME:STEP or the socket. Returns 0, or 1
- * where it can't be used (not later than the one before, or out of reach): then it is counted. */
+/* Where a live platform is at a device time (of its own, before the mount): from TIME:STEP or the socket. Returns 0, or
+ * 1 where it can't be used (not later than the one before, or out of reach): then it is counted. */
 int device_pose(struct device *device, int64_t t_ns, const struct pose *pose);
 
 /* Something for the error queue (enum command_error), and an event on the wire. */

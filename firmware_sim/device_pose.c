@@ -51,7 +51,8 @@ int device_pose(struct device *device, int64_t t_ns, const struct pose *pose)
 static uint32_t extrapolate(const struct device *device, int64_t t_ns, struct pose *out)
 {
     const struct device_live *live = &device->live;
-    int64_t last_ns = sample_t(live, live->n - 1), most_ns = (int64_t)(device->site->cfg->platform.extrapolate_ms * 1e6);
+    int64_t last_ns = sample_t(live, live->n - 1),
+            most_ns = (int64_t)(device->site->cfg->platform.extrapolate_ms * 1e6);
     uint32_t flags = t_ns - last_ns > most_ns ? POSE_LATE : POSE_EXTRAPOLATED;
     *out = *sample_pose(live, live->n - 1);
     if (live->n < 2) return flags;
@@ -72,7 +73,8 @@ static uint32_t platform_at(const struct device *device, int64_t t_ns, struct po
     for (uint64_t i = live->n - 1; i + kept > live->n; i--) {
         int64_t a_ns = sample_t(live, i - 1), b_ns = sample_t(live, i);
         if (t_ns < a_ns) continue;
-        pose_between(sample_pose(live, i - 1), sample_pose(live, i), (double)(t_ns - a_ns) / (double)(b_ns - a_ns), out);
+        pose_between(sample_pose(live, i - 1), sample_pose(live, i), (double)(t_ns - a_ns) / (double)(b_ns - a_ns),
+                     out);
         return 0;
     }
     *out = *sample_pose(live, live->n - kept); /* before the first that is known */
@@ -101,13 +103,13 @@ static void count_late(struct device *device, const struct pose_knot *knot, stru
     struct device_live *live = &device->live;
     if ((knot->flags & (POSE_LATE | POSE_NONE)) == 0) return;
     uint64_t n = atomic_fetch_add(&device->counters.late_poses, 1) + 1;
-    int64_t since_ns = live->n == 0 ? 0
-                                    : (int64_t)device->scan_tick0 * device->tick_ns + knot->t_ns -
-                                          sample_t(live, live->n - 1);
+    int64_t since_ns =
+        live->n == 0 ? 0 : (int64_t)device->scan_tick0 * device->tick_ns + knot->t_ns - sample_t(live, live->n - 1);
     if (live->said_tick == 0 || work->tick - live->said_tick > device->tick_hz) {
         char text[96];
-        snprintf(text, sizeof text, live->n == 0 ? "no pose yet: the head is taken to be at the station"
-                                                 : "no pose in time: the platform is taken to stand");
+        snprintf(text, sizeof text,
+                 live->n == 0 ? "no pose yet: the head is taken to be at the station"
+                              : "no pose in time: the platform is taken to stand");
         device_push_event(device, NATIVE_EV_POSE_LATE, n, 0, (uint64_t)since_ns, text);
     }
     live->said_tick = work->tick;

@@ -9,12 +9,12 @@
 /* Poses of a live platform. Each tick begins with one of the head, made once, from those that had come. */
 struct device_live {
     struct {
-        int64_t t_ns; /* device time */
+        int64_t t_ns;     /* device time */
         struct pose pose; /* of the platform */
     } sample[64];
     uint64_t n; /* that came; number i at i % 64 */
     struct pose_knot knot[2 * DEVICE_MAX_POSES];
-    int64_t next; /* knots of this scan that are made; number i, at i ticks of the scan, at i % LEN(knot) */
+    int64_t next;       /* knots of this scan that are made; number i, at i ticks of the scan, at i % LEN(knot) */
     uint64_t said_tick; /* of the last event about late poses */
 };
 

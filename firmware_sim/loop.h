@@ -29,7 +29,7 @@ struct loop_stats {
     uint64_t pulses, fired_pulses, echoes, lines, scans;
     uint64_t lost_pulses, lost_ticks, late_blocks, reader_lost_frames;
     uint64_t late_poses, bad_poses; /* of a live platform */
-    double wall_s; /* from the release of the first pulse to that of the last */
+    double wall_s;                  /* from the release of the first pulse to that of the last */
     double late_p50_us, late_p999_us, late_max_us;
     int have_hash;
     char sha256[65];

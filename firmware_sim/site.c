@@ -154,7 +154,8 @@ static int add_station(struct site *site, const struct config_station *station, 
     return rc;
 }
 
-/* The finest 1e-6 x 10^n m with which the head's whole range, from all of its path, fits into 31 bits, with 1 % left for scale and noise. */
+/* The finest 1e-6 x 10^n m with which the head's whole range, from all of its path, fits into 31 bits, with 1 % left
+ * for scale and noise. */
 static double choose_scale(const struct config *cfg, double path_reach_m)
 {
     if (cfg->scale_m > 0.0) return cfg->scale_m;
@@ -168,9 +169,10 @@ static int check_path_fits(const struct site *site, struct sh_err *err)
 {
     double most_m = site->cfg->profile.range_max_m + site->path_reach_m;
     if (!site->moving || site->cfg->layout != LINE_GEO || most_m * 1.01 / site->scale_m < 0x1p31) return SH_OK;
-    return sh_fail(err, SH_EINPUT,
-                   "%s: output.scale_m: points up to %.0f m from the station do not fit into 31 bits; allowed above %.2g m",
-                   site->cfg->file, most_m, most_m * 1.01 / 0x1p31);
+    return sh_fail(
+        err, SH_EINPUT,
+        "%s: output.scale_m: points up to %.0f m from the station do not fit into 31 bits; allowed above %.2g m",
+        site->cfg->file, most_m, most_m * 1.01 / 0x1p31);
 }
 
 int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err)

@@ -40,14 +40,14 @@ struct site {
     uint32_t n_stations;
     /* A moving head; the stations then only say where on Earth the scene lies. */
     int moving;
-    struct pose mount;           /* of the head on the platform */
-    struct pose_knot *knot;      /* trajectory: the head's poses from the scan's start on */
-    size_t n_knots;              /* 0: live */
-    double knot_error_m;         /* what the head's path differs from the trajectory by, at most */
+    struct pose mount;            /* of the head on the platform */
+    struct pose_knot *knot;       /* trajectory: the head's poses from the scan's start on */
+    size_t n_knots;               /* 0: live */
+    double knot_error_m;          /* what the head's path differs from the trajectory by, at most */
     struct site_stretch *stretch; /* in order of time */
     size_t n_stretches;
     double path_reach_m; /* from any station */
-    double scale_m; /* of positions and ranges on the wire, metres per count */
+    double scale_m;      /* of positions and ranges on the wire, metres per count */
 };
 
 /* Stations further than this from a BVH's origin get one of their own: a float there has steps of 0.06 mm. */

@@ -26,7 +26,8 @@ static int load_knots(struct site *site, const struct sh_report *report, struct 
                               &site->n_knots, &site->knot_error_m, err);
     trajectory_free(trajectory);
     if (rc == SH_OK && site->knot_error_m > TOLERANCE_M * 1.001)
-        sh_warn(report, "the trajectory bends more than poses %g ms apart can follow: the head is off it by up to %.2g m",
+        sh_warn(report,
+                "the trajectory bends more than poses %g ms apart can follow: the head is off it by up to %.2g m",
                 1e-3 * POSE_MIN_STEP_US, site->knot_error_m);
     return rc;
 }

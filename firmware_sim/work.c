@@ -100,8 +100,8 @@ static uint32_t frames_in(const uint8_t *bytes, size_t len)
     return n;
 }
 
-/* All poses from the last at or before the first pulse to the first at or behind the last one. Of a trajectory with more
- * than a frame holds (pulses far apart) only some: what goes out is what is cast with in any case. */
+/* All poses from the last at or before the first pulse to the first at or behind the last one. Of a trajectory with
+ * more than a frame holds (pulses far apart) only some: what goes out is what is cast with in any case. */
 static uint32_t choose_knots(struct worker *worker, int64_t from_ns, int64_t to_ns)
 {
     const struct site *site = worker->site;
@@ -147,7 +147,8 @@ static void take_poses(struct worker *worker, const struct device_work *work, st
         memcpy(p->quat, k->pose.quat, sizeof p->quat);
     }
     added(slot,
-          native_encode_poses(slot->bytes + slot->len, cap - slot->len, worker->pose, setup->n_knots, work->t_ns, 0), 1);
+          native_encode_poses(slot->bytes + slot->len, cap - slot->len, worker->pose, setup->n_knots, work->t_ns, 0),
+          1);
 }
 
 static void cast_run(struct worker *worker, const struct device_work *work, const struct schedule_line *line,

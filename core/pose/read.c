@@ -31,9 +31,9 @@ static struct pose_sample *add_sample(struct samples *s)
 
 /* ---- samples */
 
-enum { T, X, Y, Z, HEADING, PITCH, ROLL, QW, QX, QY, QZ, FRAME };
-static const char *const sample_columns[] = {"t_s", "x_m", "y_m", "z_m", "heading_deg", "pitch_deg", "roll_deg",
-                                             "qw",  "qx",  "qy",  "qz",  "frame",       NULL};
+enum { T, X, Y, Z, HEADING, PITCH, ROLL, QW, QX, QY, QZ, FRAME, SCAN, FLAGS };
+static const char *const sample_columns[] = {"t_s", "x_m", "y_m", "z_m",   "heading_deg", "pitch_deg", "roll_deg", "qw",
+                                             "qx",  "qy",  "qz",  "frame", "scan",        "flags",     NULL};
 
 static int has_all(const struct csv *csv, uint32_t mask)
 {

@@ -145,7 +145,7 @@ static int put_batch(struct ply *ply, const struct scanhead_info *info, int n, s
         struct scanhead_point *p = &ply->batch[i];
         if (p->echo_count == 0 && !ply->options.empty_shots) continue;
         if (p->echo_count != 0 && isnan(p->x)) { /* no pose: counted, not guessed */
-            ply->facts.n_unplaced++;
+            ply->facts.n_without_pose++;
             continue;
         }
         const double *frame = info->moving ? &ply->frame[i] : NULL;

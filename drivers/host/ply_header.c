@@ -75,7 +75,10 @@ static void put_comments(FILE *out, const struct ply_facts *facts, const struct 
     fputs("comment reflectance in dB, nan: not modelled\n", out);
     fputs("comment echo and echo_count 0: shot without echo; label 65535: none\n", out);
     if (facts->moving)
-        fputs("comment the head moved, each point has its own pose; frame: frame scalar of the trajectory\n", out);
+        fprintf(out,
+                "comment the head moved, each point has its own pose; frame: frame scalar of the trajectory\n"
+                "comment points_without_pose %" PRIu64 "\n",
+                facts->n_without_pose);
     fprintf(out, "comment empty_shots %s\n", facts->empty_shots ? "kept" : "left out");
     fprintf(out,
             "comment frames_lost %" PRIu64 " reader_lost %" PRIu64 " dropped %" PRIu64 " bad_payload %" PRIu64 "\n",

@@ -37,7 +37,8 @@ int host_absorb_poses(struct scanhead *sh, const uint8_t *payload, size_t len)
 }
 
 /* Two poses of a frame with a time between them, the latest such; 0 where there is none. */
-static int find(const struct host_poses *poses, int64_t t_ns, const struct native_pose **a, const struct native_pose **b)
+static int find(const struct host_poses *poses, int64_t t_ns, const struct native_pose **a,
+                const struct native_pose **b)
 {
     uint64_t n = poses != NULL ? poses->n : 0, first = n > KEEP ? n - KEEP : 0;
     for (uint64_t i = n; i > first + 1; i--) {

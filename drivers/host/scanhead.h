@@ -119,8 +119,8 @@ struct scanhead_info {
 };
 int scanhead_get_info(const struct scanhead *sh, struct scanhead_info *info);
 
-/* Where a moving head was. Between two poses of a frame of SCANHEAD_POSES the position goes along the straight line, and
- * the attitude the shorter way about one fixed axis at constant rate (slerp); the head itself moves just so. */
+/* Where a moving head was. Between two poses of a frame of SCANHEAD_POSES the position goes along the straight line,
+ * and the attitude the shorter way about one fixed axis at constant rate (slerp); the head itself moves just so. */
 struct scanhead_pose {
     int64_t t_ns;         /* since the scan's start */
     double position_m[3]; /* scene frame */

@@ -72,7 +72,8 @@ size_t native_encode_line_end(uint8_t *dst, size_t cap, const struct line_end *e
     return encode_fixed(dst, cap, NATIVE_LINE_END, &fields_line_end, &wire, scan_t0_ns + end->t1_ns, 0);
 }
 
-size_t native_encode_poses(uint8_t *dst, size_t cap, const struct native_pose *pose, uint32_t n, int64_t t_ns, int flags)
+size_t native_encode_poses(uint8_t *dst, size_t cap, const struct native_pose *pose, uint32_t n, int64_t t_ns,
+                           int flags)
 {
     size_t len = NATIVE_POSES_HEAD_LEN + (size_t)n * NATIVE_POSE_LEN;
     if (n > NATIVE_MAX_POSES || cap < NATIVE_HEADER_LEN + len) return 0;

@@ -130,7 +130,8 @@ static uint64_t sum_block(const struct line_block *b, uint32_t from, uint32_t n,
     return sum;
 }
 
-/* The pose hangs on the pulse's time alone: not on how runs are cut, on ray packets, or on what the caster did before. */
+/* The pose hangs on the pulse's time alone: not on how runs are cut, on ray packets, or on what the caster did before.
+ */
 static void test_same_bytes(void **state)
 {
     (void)state;
@@ -223,7 +224,8 @@ static void test_moving_body(void **state)
             int meets = d[1] > 0 && fabsl(o[2] + face * d[2]) < 1.0L;
             long double want = meets ? face : room;
             if (d[1] > 0 && fabsl(fabsl(o[2] + face * d[2]) - 1.0L) < 1e-3L) continue; /* its edge */
-            if (d[1] > 0 && d[2] < 0 && !meets && fabsl(d[2]) > 0 && o[2] + face * d[2] < -1.0L) continue; /* below it */
+            if (d[1] > 0 && d[2] < 0 && !meets && fabsl(d[2]) > 0 && o[2] + face * d[2] < -1.0L)
+                continue;                     /* below it */
             if (d[1] > 0 && !meets) continue; /* may meet its top */
             hits += (uint32_t)meets;
             assert_true(fabs(rig->block.a[j] * 1e-5 - (double)want) < 5e-6 + 1e-9);
