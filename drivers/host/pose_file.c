@@ -48,7 +48,8 @@ int pose_file_frame(struct pose_file *file, struct scanhead *sh, const struct sc
     if (!file->begun || info.scan != file->scan) file->last_ns = INT64_MIN;
     file->begun = 1;
     file->scan = info.scan;
-    for (uint32_t first = 0; (n = scanhead_poses(sh, frame, first, pose, BATCH)) > 0 && rc == SH_OK; first += (uint32_t)n) {
+    for (uint32_t first = 0; (n = scanhead_poses(sh, frame, first, pose, BATCH)) > 0 && rc == SH_OK;
+         first += (uint32_t)n) {
         static const char gap[] = "# poses are missing here\n";
         if (first == 0 && file->last_ns != INT64_MIN && pose[0].t_ns > file->last_ns)
             rc = outfile_write(&file->out, gap, sizeof gap - 1, err);
