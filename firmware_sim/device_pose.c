@@ -120,7 +120,7 @@ void device_take_poses(struct device *device, struct device_work *work)
     struct device_live *live = &device->live;
     if (device->site->cfg->platform.kind != PLATFORM_LIVE || work->pulse_end == work->pulse0) return;
     int64_t from = schedule_time_ns(&work->segment, work->pulse0) / device->tick_ns;
-    int64_t to = schedule_time_ns(&work->segment, work->pulse_end) / device->tick_ns + 1;
+    int64_t to = schedule_time_ns(&work->segment, work->pulse_end - 1) / device->tick_ns + 1;
     if (live->next == 0) memset(live->knot, 0, sizeof live->knot);
     for (; live->next <= to; live->next++) {
         struct pose_knot *knot = &live->knot[live->next % LEN(live->knot)];

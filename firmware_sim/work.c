@@ -138,7 +138,7 @@ static void take_poses(struct worker *worker, const struct device_work *work, st
         memcpy(worker->knot, work->pose, work->n_poses * sizeof *work->pose);
     else
         setup->n_knots = choose_knots(worker, schedule_time_ns(&work->segment, work->pulse0),
-                                      schedule_time_ns(&work->segment, work->pulse_end));
+                                      schedule_time_ns(&work->segment, work->pulse_end - 1));
     for (uint32_t i = 0; i < setup->n_knots; i++) {
         const struct pose_knot *k = &worker->knot[i];
         struct native_pose *p = &worker->pose[i];
