@@ -320,7 +320,11 @@ static int record_config(struct record *r, struct sh_err *err)
     uint32_t frames = r->recording.frames >= 0 ? (uint32_t)r->recording.frames : cfg->settings.frames;
     int rc = SH_OK;
     int arrives = cfg->platform.kind == PLATFORM_TRAJECTORY && cfg->platform.at_end == PLATFORM_STOP;
-    if (frames == 0 && !arrives && !(r->recording.duration_s > 0.0))
+    if (cfg->platform.kind == PLATFORM_LIVE)
+        rc = sh_fail(err, SH_EINPUT,
+                     "%s: platform.kind: a live platform can't be recorded off line; run it, and record its link",
+                     cfg->file);
+    if (rc == SH_OK && frames == 0 && !arrives && !(r->recording.duration_s > 0.0))
         rc =
             sh_fail(err, SH_EINPUT, "%s: head.frames is 0, a scan without end; give --frames or --duration", cfg->file);
     if (rc == SH_OK) rc = offline_open(cfg, &cmd_report_stderr, &offline, err);

@@ -65,7 +65,7 @@ struct config_platform {
     double mount_m[3], mount_heading_deg, mount_pitch_deg, mount_roll_deg; /* of the head on the platform */
     double reach_m, extrapolate_ms;                                        /* live */
     char address[64];
-    uint32_t port; /* live: UDP; 0: none */
+    uint32_t port; /* live, in real time: UDP; 0: the system chooses */
 };
 
 struct config {

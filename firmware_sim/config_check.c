@@ -189,6 +189,9 @@ static int check_platform(const struct cfg_reader *rd, const struct config *cfg)
         if (is_given(rd, keys[k].path, 0) && !(keys[k].kinds & 1u << p->kind))
             return cfg_fail_key(rd, keys[k].path, 0, "a %s platform has no such key; allowed %s",
                                 cfg_find(&rd->table, "platform.kind")->names[p->kind], has[p->kind]);
+    if (p->kind == PLATFORM_LIVE && cfg->pace == PACE_FAST)
+        return cfg_fail_key(rd, "loop.pace", 0,
+                            "nobody can say in time where a live platform is; allowed realtime, step");
     if (p->kind != PLATFORM_TRAJECTORY) return SH_OK;
     if ((p->file[0] != '\0') == (p->waypoints[0] != '\0'))
         return cfg_fail_key(rd, p->file[0] != '\0' ? "platform.waypoints" : "platform.kind", 0,

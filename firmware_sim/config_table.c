@@ -91,7 +91,7 @@ static const struct cfg_key config_keys[] = {
 
     {"platform", CFG_MAP, .help = "What the head stands on: a tripod, or something that moves."},
     {"platform.kind", CFG_ENUM, .def = "static", .names = platform_names, IN_CONFIG(platform.kind),
-     .help = "static: at the station; trajectory: along a file; live: as a peer says (TIME:STEP, or UDP)."},
+     .help = "static: at the station; trajectory: along a file; live: as a peer says, by UDP or (pace step) with TIME:STEP."},
     {"platform.file", CFG_PATH, .def = "", IN_CONFIG(platform.file),
      .help = "trajectory: CSV with t_s,x_m,y_m,z_m,roll_deg,pitch_deg,heading_deg (or qw,qx,qy,qz), scene frame."},
     {"platform.waypoints", CFG_PATH, .def = "", IN_CONFIG(platform.waypoints),
@@ -113,8 +113,8 @@ static const struct cfg_key config_keys[] = {
     {"platform.extrapolate_ms", CFG_REAL, "ms", "100", 0, 10000, IN_CONFIG(platform.extrapolate_ms),
      .help = "live: how long the last two poses are taken to go on; later the platform stands, and is late."},
     {"platform.address", CFG_TEXT, .def = "127.0.0.1", IN_CONFIG(platform.address),
-     .help = "live: address where poses come in by UDP, lines of t_s x y z roll pitch heading."},
-    {"platform.port", CFG_COUNT, NULL, "0", 0, 65535, IN_CONFIG(platform.port), .help = "live: its port; 0: no socket."},
+     .help = "live, in real time: address where poses come in by UDP, lines of t_s x y z roll pitch heading."},
+    {"platform.port", CFG_COUNT, NULL, "0", 0, 65535, IN_CONFIG(platform.port), .help = "live: its port; 0: the system chooses."},
 
     {"output", CFG_MAP, .help = "Form of the points."},
     {"output.crs", CFG_ENUM, .def = "local", .names = crs_names, IN_CONFIG(crs),

@@ -41,7 +41,7 @@ int loop_create(const struct site *site, struct device *device, const struct loo
 
 /* One JSON line with the endpoints of all links. */
 void loop_print_endpoints(const struct loop *loop, FILE *out);
-/* "tty:..." and so on of link i, or 0 when there is no such link. */
+/* "tty:..." and so on of link i, behind the links of the socket for poses, or 0 when there is no such link. */
 int loop_endpoint(const struct loop *loop, uint32_t i, char *buf, size_t len);
 
 /* Starts the threads. */

@@ -116,9 +116,9 @@ static void ride_once(struct wire *wire, const char *pace, const char *threads, 
 }
 
 /* The encoders read to half of 2^-20 turns in both axes, 3.0e-6 rad each, and the room's farthest corner is 15 m away:
- * 15 * 3.0e-6 * sqrt(2) = 6.4e-5 m; ranges are rounded to 5e-7 m. What interpolation adds is rounding. In the geo layout
- * the same encoders were read by the head. Poses follow the circle to 1e-4 m (the head's own bound), and the cubic
- * between samples of 10 ms to R (rate dt)^3 / 62 = 2e-7 m. */
+ * 15 * 3.0e-6 * sqrt(2) = 6.4e-5 m; ranges are rounded to 5e-7 m. What interpolation adds is rounding. In the geo
+ * layout the same encoders were read by the head. Poses follow the circle to 1e-4 m (the head's own bound), and the
+ * cubic between samples of 10 ms to R (rate dt)^3 / 62 = 2e-7 m. */
 static void test_undistorted(void **state)
 {
     struct wire *wire = *state;
@@ -127,8 +127,9 @@ static void test_undistorted(void **state)
     write_ride(wire);
     room_config_write(wire, &RIDE);
     ride_once(wire, "fast", "1", "noise.seed=1", &ride);
-    print_message("# %llu points of a ride: off the walls by %.4f mm, with one pose per line by %.0f mm; poses by %.4f mm\n",
-                  (unsigned long long)ride.points, 1e3 * ride.worst_m, 1e3 * ride.naive_m, 1e3 * ride.pose_m);
+    print_message(
+        "# %llu points of a ride: off the walls by %.4f mm, with one pose per line by %.0f mm; poses by %.4f mm\n",
+        (unsigned long long)ride.points, 1e3 * ride.worst_m, 1e3 * ride.naive_m, 1e3 * ride.pose_m);
     assert_true(ride.worst_m < 6.5e-5);
     assert_true(ride.naive_m > 0.02); /* 3.4 m/s, 10 ms a line */
     assert_true(ride.pose_m < 1.0e-4 + 1e-6 && ride.pose_m > 1e-6);
@@ -142,7 +143,8 @@ static void test_undistorted(void **state)
     assert_string_not_equal(other.head, ride.head);
 }
 
-/* At the trajectory's end the scan is over: 1.5 s of it, less where it starts later; or the platform holds its place. */
+/* At the trajectory's end the scan is over: 1.5 s of it, less where it starts later; or the platform holds its place.
+ */
 static void test_end_of_the_path(void **state)
 {
     struct wire *wire = *state;
@@ -161,8 +163,8 @@ static void test_end_of_the_path(void **state)
         char stats[352], poses[352];
         snprintf(stats, sizeof stats, "%s", wire_path(wire, "stats.json"));
         snprintf(poses, sizeof poses, "%s", wire_path(wire, "poses.csv"));
-        const char *const args[] = {"record", config, "--stats", stats,  "--poses", poses,        "--quiet",
-                                    "--set",  runs[i].set, "--set", runs[i].more, NULL};
+        const char *const args[] = {"record",  config,  "--stats",   stats,   "--poses",    poses,
+                                    "--quiet", "--set", runs[i].set, "--set", runs[i].more, NULL};
         assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "head.out", "head.err", -1)), 0);
         double pulses = (double)stats_uint(wire, "pulses");
         /* all of the sweep is cast; a frame ends with its last line, of 1/97.7 s */
@@ -191,17 +193,19 @@ static void test_house(void **state)
         print_message("# %s is missing (Debian: assimp-testmodels)\n", house);
         skip();
     }
-    wire_write_text(wire, "way.csv", "x_m,y_m,z_m,speed_m_s,pause_s\n-8,-5,0.2,8,0\n6,-5,0.2,8,0\n18,-4,0.2,6,0.1\n"
-                                     "19,5,0.2,8,0\n18,14,0.2,8,0\n6,15,0.2,8,0\n");
+    wire_write_text(wire, "way.csv",
+                    "x_m,y_m,z_m,speed_m_s,pause_s\n-8,-5,0.2,8,0\n6,-5,0.2,8,0\n18,-4,0.2,6,0.1\n"
+                    "19,5,0.2,8,0\n18,14,0.2,8,0\n6,15,0.2,8,0\n");
     char config[352], cloud[352], *text;
     snprintf(cloud, sizeof cloud, "%s", wire_path(wire, "car.ply"));
-    snprintf(config, sizeof config, "%s",
-             wire_write_text(wire, "car.yaml",
-                             "head: {profile: full-sweep, prr_hz: 50000, lines_hz: 100, pan_deg_s: 0, frames: 0}\n"
-                             "scene: {meshes: [{file: /usr/share/assimp/models/IFC/AC14-FZK-Haus.ifc, up: y, scale: 1}]}\n"
-                             "stations: [{position_m: [0, 0, 0]}]\n"
-                             "platform: {kind: trajectory, waypoints: way.csv, mount_m: [0, 0.5, 1.5],"
-                             " mount_heading_deg: -90}\n"));
+    snprintf(
+        config, sizeof config, "%s",
+        wire_write_text(wire, "car.yaml",
+                        "head: {profile: full-sweep, prr_hz: 50000, lines_hz: 100, pan_deg_s: 0, frames: 0}\n"
+                        "scene: {meshes: [{file: /usr/share/assimp/models/IFC/AC14-FZK-Haus.ifc, up: y, scale: 1}]}\n"
+                        "stations: [{position_m: [0, 0, 0]}]\n"
+                        "platform: {kind: trajectory, waypoints: way.csv, mount_m: [0, 0.5, 1.5],"
+                        " mount_heading_deg: -90}\n"));
     const char *const record[] = {"record", config, "-o", cloud, "--quiet", NULL};
     assert_int_equal(wire_wait(wire, wire_spawn(wire, record, "head.out", "head.err", -1)), 0);
     const char *const report[] = {"report", config, cloud, "--json", "--tolerance-m", "0.001", NULL};
@@ -215,12 +219,129 @@ static void test_house(void **state)
     free(text);
 }
 
+/* ---- poses over UDP */
+
+static int udp_to(const char *endpoint)
+{
+    struct sockaddr_in at = {.sin_family = AF_INET, .sin_port = htons((uint16_t)atoi(strrchr(endpoint, ':') + 1))};
+    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    assert_true(fd >= 0);
+    assert_int_equal(connect(fd, (struct sockaddr *)&at, sizeof at), 0);
+    return fd;
+}
+
+/* A minute of a slow ride, told ahead, so that it does not matter when the scan begins: x = 0.01 m/s t, heading 3 deg/s
+ * t. Two wrong lines at the end: when the error is in the queue, all before it has been taken. */
+static void tell_ride(struct scanhead *sh, int fd)
+{
+    char text[8192];
+    int n = 0;
+    for (int t = 0; t <= 60; t++)
+        n += snprintf(text + n, sizeof text - (size_t)n, "%d %.4f 0.2,-0.3 0 1.5 %d\n", t, 0.01 * t, 3 * t);
+    n += snprintf(text + n, sizeof text - (size_t)n, "59 0 0 0 0 0 0\n61 0 0 0 0 nonsense\n");
+    assert_int_equal(send(fd, text, (size_t)n, 0), n);
+    int64_t end_ms = wire_now_ms() + DEADLINE_MS;
+    while (strcmp(client_ask(sh, "SYST:ERR:COUN?"), "0") == 0)
+        assert_true(wire_now_ms() < end_ms);
+}
+
+static void test_poses_over_udp(void **state)
+{
+    static const struct room_config live = {.prr_hz = 50000,
+                                            .lines_hz = 100,
+                                            .pan_deg_s = 100,
+                                            .pan_stop_deg = 40,
+                                            .frames = 1,
+                                            .links = LINK_YAML_TCP,
+                                            .more = "platform: {kind: live, reach_m: 5, port: 0}\n"
+                                                    "loop: {queue_ms: 5000, late_ms: 10000}\n"};
+    struct wire *wire = *state;
+    struct scanhead_frame frame;
+    struct scanhead_point point[256];
+    struct scanhead_pose pose;
+    room_write(wire);
+    struct head head = head_start(wire, room_config_write(wire, &live), NULL);
+    int fd = udp_to(head_endpoint(&head, "pose")), n;
+    struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
+    uint64_t points = 0;
+    int64_t t0_ns = 0;
+    tell_ride(sh, fd);
+    client_wait_state(sh, "idle");
+    client_tell(sh, "SCAN:STAR");
+    do {
+        client_next(sh, &frame);
+        assert_false(is_event(&frame, SCANHEAD_EV_POSE_LATE));
+        if (is_event(&frame, SCANHEAD_EV_SCAN_START)) t0_ns = (int64_t)frame.event_value[1];
+        for (uint32_t first = 0;
+             frame.type == SCANHEAD_POINTS && (n = scanhead_points(sh, &frame, first, point, 256)) > 0;
+             first += (uint32_t)n) {
+            assert_int_equal(scanhead_to_scene(sh, point, (uint32_t)n, NULL), 0);
+            for (int i = 0; i < n; i++)
+                assert_true(off_wall(&point[i], point[i].label) < 6.5e-5);
+            assert_int_equal(scanhead_pose(sh, point[0].t_ns, &pose), SCANHEAD_OK);
+            double t = 1e-9 * (double)(point[0].t_ns + t0_ns), half = 1.5 * t * M_PI / 180.0;
+            double pitch = 0.75 * M_PI / 180.0;
+            assert_int_equal(pose.flags, 0);
+            assert_true(fabs(pose.position_m[0] - 0.01 * t) < 1e-9 && fabs(pose.position_m[2] + 0.3) < 1e-12);
+            /* q = qz(-heading) qx(pitch): w = cos cos, z = -sin cos */
+            assert_true(fabs(pose.quat[0] - cos(half) * cos(pitch)) < 1e-9);
+            assert_true(fabs(pose.quat[3] + sin(half) * cos(pitch)) < 1e-9);
+            points += (uint64_t)n;
+        }
+    } while (!is_event(&frame, SCANHEAD_EV_SCAN_END));
+    assert_true(points > 10000);
+    close(fd);
+    scanhead_close(sh);
+    head_end(&head, SIGTERM);
+    assert_int_equal(stats_uint(wire, "bad_poses"), 2);
+    assert_int_equal(stats_uint(wire, "late_poses"), 0);
+}
+
+/* Without any pose the head takes itself to be at the station, and says so. */
+static void test_no_pose_at_all(void **state)
+{
+    static const struct room_config live = {.prr_hz = 50000,
+                                            .lines_hz = 100,
+                                            .pan_deg_s = 100,
+                                            .pan_stop_deg = 20,
+                                            .frames = 1,
+                                            .links = LINK_YAML_TCP,
+                                            .more = "platform: {kind: live}\nloop: {queue_ms: 5000, late_ms: 10000}\n"};
+    struct wire *wire = *state;
+    struct scanhead_frame frame;
+    struct scanhead_pose pose;
+    room_write(wire);
+    struct head head = head_start(wire, room_config_write(wire, &live), NULL);
+    struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
+    int told = 0, poses = 0;
+    client_wait_state(sh, "idle");
+    client_tell(sh, "SCAN:STAR");
+    do {
+        client_next(sh, &frame);
+        told += is_event(&frame, SCANHEAD_EV_POSE_LATE);
+        if (frame.type != SCANHEAD_POSES) continue;
+        assert_true(scanhead_poses(sh, &frame, 0, &pose, 1) == 1);
+        assert_int_equal(pose.flags, SCANHEAD_POSE_NONE);
+        for (int k = 0; k < 3; k++)
+            assert_true(pose.position_m[k] == STATION[k]);
+        poses++;
+    } while (!is_event(&frame, SCANHEAD_EV_SCAN_END));
+    assert_true(poses > 100);
+    assert_int_equal(told, 1);
+    scanhead_close(sh);
+    head_end(&head, SIGTERM);
+    assert_true(stats_uint(wire, "late_poses") > 100);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_undistorted, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_end_of_the_path, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_house, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_poses_over_udp, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_no_pose_at_all, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -193,8 +193,8 @@ static void step_with_pose(struct scanhead *sh, int64_t *granted_ns, int64_t ste
     char line[200];
     *granted_ns += step_ns;
     vehicle(1e-9 * (double)*granted_ns, at);
-    snprintf(line, sizeof line, "TIME:STEP %lld NS, %.12g, %.12g,%.12g , %.12g, %.12g, %.12g", (long long)step_ns, at[0],
-             at[1], at[2], at[3], at[4], at[5]);
+    snprintf(line, sizeof line, "TIME:STEP %lld NS, %.12g, %.12g,%.12g , %.12g, %.12g, %.12g", (long long)step_ns,
+             at[0], at[1], at[2], at[3], at[4], at[5]);
     client_tell(sh, line);
 }
 
@@ -209,7 +209,8 @@ static void take_live(struct scanhead *sh, int64_t *scan_t0_ns, uint64_t *points
         if (is_event(&frame, SCANHEAD_EV_SCAN_START)) *scan_t0_ns = (int64_t)frame.event_value[1];
         *late_events += is_event(&frame, SCANHEAD_EV_POSE_LATE);
         for (uint32_t first = 0;
-             frame.type == SCANHEAD_POINTS && (n = scanhead_points(sh, &frame, first, point, 256)) > 0; first += (uint32_t)n) {
+             frame.type == SCANHEAD_POINTS && (n = scanhead_points(sh, &frame, first, point, 256)) > 0;
+             first += (uint32_t)n) {
             assert_int_equal(scanhead_to_scene(sh, point, (uint32_t)n, NULL), 0);
             for (int i = 0; i < n; i++) {
                 const double at[3] = {point[i].x, point[i].y, point[i].z};
