@@ -98,8 +98,7 @@ static int bind_to(struct pose_feed *feed, const char *address, unsigned port, s
     snprintf(service, sizeof service, "%u", port & 0xffffu);
     struct addrinfo hints = {.ai_socktype = SOCK_DGRAM, .ai_flags = AI_PASSIVE | AI_NUMERICSERV}, *at = NULL;
     int rc = getaddrinfo(address, service, &hints, &at);
-    if (rc != 0)
-        return sh_fail(err, SH_EINPUT, "platform.address %s: no such address: %s", address, gai_strerror(rc));
+    if (rc != 0) return sh_fail(err, SH_EINPUT, "platform.address %s: no such address: %s", address, gai_strerror(rc));
     feed->fd = socket(at->ai_family, at->ai_socktype | SOCK_CLOEXEC, at->ai_protocol);
     if (feed->fd < 0 || bind(feed->fd, at->ai_addr, at->ai_addrlen) != 0)
         rc = sh_fail(err, errno == EADDRINUSE || errno == EADDRNOTAVAIL ? SH_EINPUT : SH_EIO,

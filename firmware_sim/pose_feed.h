@@ -2,9 +2,9 @@
  *
  *   t_s x y z roll pitch heading
  *
- * device time in seconds (TIME? asks for it), metres in the scene frame, degrees as core/pose.h has them; blanks or commas
- * between. A thread of its own takes them in. Lines that are wrong, out of reach or not later than the one before are
- * counted (bad_poses), and told once per second at most. */
+ * device time in seconds (TIME? asks for it), metres in the scene frame, degrees as core/pose.h has them; blanks or
+ * commas between. A thread of its own takes them in. Lines that are wrong, out of reach or not later than the one
+ * before are counted (bad_poses), and told once per second at most. */
 #ifndef FIRMWARE_SIM_POSE_FEED_H
 #define FIRMWARE_SIM_POSE_FEED_H
 

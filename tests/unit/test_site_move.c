@@ -139,15 +139,16 @@ static void test_wall_that_goes_away(void **state)
     free(cfg);
 }
 
-/* A door of 2 m on a hinge at (0, 6), at rest along x; clockwise from above it swings towards the head: after an angle a it
- * points to (cos a, -sin a). A ray to azimuth b meets it at r with r (sin b, cos b) = (0, 6) + s (cos a, -sin a). */
+/* A door of 2 m on a hinge at (0, 6), at rest along x; clockwise from above it swings towards the head: after an angle
+ * a it points to (cos a, -sin a). A ray to azimuth b meets it at r with r (sin b, cos b) = (0, 6) + s (cos a, -sin a).
+ */
 static void test_door(void **state)
 {
     (void)state;
     struct config *cfg = calloc(1, sizeof *cfg);
     struct look *l = malloc(sizeof *l);
-    struct site *site = load("o door\nv 0 6 -1\nv 2 6 -1\nv 2 6 1\nv 0 6 1\nf 1 2 3 4\n",
-                             ", turn_deg_s: 30, pivot_m: [0, 6, 0]", cfg);
+    struct site *site =
+        load("o door\nv 0 6 -1\nv 2 6 -1\nv 2 6 1\nv 0 6 1\nf 1 2 3 4\n", ", turn_deg_s: 30, pivot_m: [0, 6, 0]", cfg);
     static const double times[] = {0.0, 0.5, 1.0, 2.0, 2.9, 10.0, 12.5};
     uint32_t hits = 0;
     for (int n = 0; n < 7; n++) {
