@@ -79,7 +79,8 @@ int trajectory_read_csv(const char *path, struct trajectory **out, struct sh_err
 
 /* Way-points, a CSV file likewise: x_m, y_m, z_m, speed_m_s, and pause_s where wanted. The platform goes through them
  * on the cubic Hermite curve described above, the way to the next point taking chord / speed_m_s (the last one's speed
- * does not matter, but must be there), and stands at a point for pause_s. Heading along the path, pitch and roll 0. */
+ * does not matter, but must be there), and stands at a point for pause_s, where it comes to rest and starts smoothly.
+ * Heading along the path, pitch and roll 0. */
 int trajectory_read_waypoints(const char *path, struct trajectory **out, struct sh_err *err);
 
 void trajectory_free(struct trajectory *trajectory);

@@ -114,62 +114,74 @@ int trajectory_read_csv(const char *path, struct trajectory **out, struct sh_err
 enum { WX, WY, WZ, SPEED, PAUSE };
 static const char *const waypoint_columns[] = {"x_m", "y_m", "z_m", "speed_m_s", "pause_s", NULL};
 
-/* Adds a way-point as one sample, or two around its pause; speed_m_s: of the way to it. */
-static int add_waypoint(const struct csv *csv, double speed_m_s, struct samples *samples, struct sh_err *err)
+/* The points as samples, their times without the pauses; and these. */
+struct way {
+    struct samples points;
+    double *pause_s;
+};
+
+static int check_waypoint(const struct csv *csv, struct sh_err *err)
 {
-    const double *v = csv->value;
-    struct pose_sample *s = add_sample(samples);
-    if (s == NULL) return text_fail(&csv->text, 0, SH_ENOMEM, err, "no memory for its way-points");
-    memcpy(s->pose.position_m, v + WX, sizeof s->pose.position_m);
-    s->pose.quat[0] = 1.0;
-    if (samples->n > 1) {
-        double chord2 = 0.0;
-        for (int k = 0; k < 3; k++)
-            chord2 +=
-                (s->pose.position_m[k] - s[-1].pose.position_m[k]) * (s->pose.position_m[k] - s[-1].pose.position_m[k]);
-        double way_s = sqrt(chord2) / speed_m_s;
-        if (!(way_s >= 1e-6 * POSE_MIN_STEP_US && way_s < 1e6))
-            return text_fail(&csv->text, csv->line, SH_EINPUT, err,
-                             "%.6g m from the way-point before, %.6g s at its speed; allowed %g s and more",
-                             sqrt(chord2), way_s, 1e-6 * POSE_MIN_STEP_US);
-        s->t_s = s[-1].t_s + way_s;
-    }
-    if (v[PAUSE] == 0.0) return SH_OK;
-    struct pose_sample *leave = add_sample(samples);
-    if (leave == NULL) return text_fail(&csv->text, 0, SH_ENOMEM, err, "no memory for its way-points");
-    *leave = leave[-1];
-    leave->t_s += v[PAUSE];
+    const double *v = csv->value, least_s = 1e-6 * POSE_MIN_STEP_US;
+    if (!(v[SPEED] >= SLOWEST_M_S && v[SPEED] <= 1000.0))
+        return text_fail(&csv->text, csv->line, SH_EINPUT, err, "speed_m_s %.6g; allowed %g to 1000", v[SPEED],
+                         SLOWEST_M_S);
+    if (v[PAUSE] != 0.0 && !(v[PAUSE] >= least_s && v[PAUSE] <= 86400.0))
+        return text_fail(&csv->text, csv->line, SH_EINPUT, err, "pause_s %.6g; allowed 0, or %g to 86400", v[PAUSE],
+                         least_s);
+    for (int k = WX; k <= WZ; k++)
+        if (fabs(v[k]) > 1e9)
+            return text_fail(&csv->text, csv->line, SH_EINPUT, err, "%s %.6g; allowed -1e9 to 1e9", waypoint_columns[k],
+                             v[k]);
     return SH_OK;
 }
 
-static int read_waypoints(struct csv *csv, struct samples *samples, struct sh_err *err)
+/* speed_m_s: of the way to it. */
+static int add_waypoint(const struct csv *csv, double speed_m_s, struct way *way, struct sh_err *err)
+{
+    const double *v = csv->value;
+    struct pose_sample *s = add_sample(&way->points);
+    double *pauses = realloc(way->pause_s, way->points.room * sizeof *pauses);
+    if (pauses != NULL) way->pause_s = pauses;
+    if (s == NULL || pauses == NULL) return text_fail(&csv->text, 0, SH_ENOMEM, err, "no memory for its way-points");
+    pauses[way->points.n - 1] = v[PAUSE];
+    memcpy(s->pose.position_m, v + WX, sizeof s->pose.position_m);
+    s->pose.quat[0] = 1.0;
+    s->frame = (double)(way->points.n - 1);
+    if (way->points.n == 1) return SH_OK;
+    double chord2 = 0.0;
+    for (int k = 0; k < 3; k++) {
+        double d = s->pose.position_m[k] - s[-1].pose.position_m[k];
+        chord2 += d * d;
+    }
+    double way_s = sqrt(chord2) / speed_m_s;
+    if (!(way_s >= 1e-6 * POSE_MIN_STEP_US && way_s < 1e6))
+        return text_fail(&csv->text, csv->line, SH_EINPUT, err,
+                         "%.6g m from the way-point before, %.6g s at its speed; allowed %g to 1e6 s", sqrt(chord2),
+                         way_s, 1e-6 * POSE_MIN_STEP_US);
+    s->t_s = s[-1].t_s + way_s;
+    return SH_OK;
+}
+
+static int read_waypoints(struct csv *csv, struct way *way, struct sh_err *err)
 {
     double speed_m_s = 0.0;
     if (!has_all(csv, 1u << WX | 1u << WY | 1u << WZ | 1u << SPEED))
         return text_fail(&csv->text, csv->line, SH_EINPUT, err,
                          "the columns have to be x_m, y_m, z_m, speed_m_s, and pause_s where wanted");
     for (;;) {
-        int got = csv_next(csv, err);
-        if (got <= 0) return got;
-        const double *v = csv->value;
-        if (!(v[SPEED] >= SLOWEST_M_S && v[SPEED] <= 1000.0))
-            return text_fail(&csv->text, csv->line, SH_EINPUT, err, "speed_m_s %.6g; allowed %g to 1000", v[SPEED],
-                             SLOWEST_M_S);
-        if (v[PAUSE] != 0.0 && !(v[PAUSE] >= 1e-6 * POSE_MIN_STEP_US && v[PAUSE] <= 86400.0))
-            return text_fail(&csv->text, csv->line, SH_EINPUT, err, "pause_s %.6g; allowed 0, or %g to 86400", v[PAUSE],
-                             1e-6 * POSE_MIN_STEP_US);
-        for (int k = WX; k <= WZ; k++)
-            if (fabs(v[k]) > 1e9)
-                return text_fail(&csv->text, csv->line, SH_EINPUT, err, "%s %.6g; allowed -1e9 to 1e9",
-                                 waypoint_columns[k], v[k]);
-        int rc = add_waypoint(csv, speed_m_s, samples, err);
+        int rc = csv_next(csv, err);
+        if (rc == 0 && way->points.n < 2) return text_fail(&csv->text, 0, SH_EINPUT, err, "fewer than two way-points");
+        if (rc <= 0) return rc;
+        rc = check_waypoint(csv, err);
+        if (rc == SH_OK) rc = add_waypoint(csv, speed_m_s, way, err);
         if (rc != SH_OK) return rc;
-        speed_m_s = v[SPEED];
+        speed_m_s = csv->value[SPEED];
     }
 }
 
-/* Heading of the way around t_s; 0 where the platform stands. */
-static int heading_at(const struct trajectory *curve, double t_s, double *heading_rad)
+/* Heading of the way around t_s; left as it is where that goes straight up. */
+static void heading_at(const struct trajectory *curve, double t_s, double *heading_rad)
 {
     const double d = 1e-4;
     struct pose a, b;
@@ -177,62 +189,65 @@ static int heading_at(const struct trajectory *curve, double t_s, double *headin
     trajectory_at(curve, t_s - d, &a, &frame);
     trajectory_at(curve, t_s + d, &b, &frame);
     double dx = b.position_m[0] - a.position_m[0], dy = b.position_m[1] - a.position_m[1];
-    if (!(hypot(dx, dy) > 2.0 * d * SLOWEST_M_S)) return 0;
-    *heading_rad = atan2(dx, dy);
-    return 1;
+    if (hypot(dx, dy) > d * SLOWEST_M_S) *heading_rad = atan2(dx, dy);
 }
 
-/* The curve as samples that are near each other, heading along it. Standing, the platform keeps the heading it came
- * with; at the start, the one it leaves with. */
-static int follow(const struct trajectory *curve, struct samples *out)
+/* How far along an interval the platform is after its share f of the time: f, but from or to a standstill smoothly. */
+static double along(double f, int from_rest, int to_rest)
 {
-    double heading_rad = 0.0;
-    for (size_t i = 0; i + 1 < curve->n && !heading_at(curve, curve->sample[i].t_s + 0.001, &heading_rad); i++)
-        continue;
-    for (size_t i = 0; i < curve->n; i++) {
-        double t_s = curve->sample[i].t_s, h = i + 1 < curve->n ? curve->sample[i + 1].t_s - t_s : 0.0;
-        size_t parts = h > STEP_S ? (size_t)ceil(h / STEP_S) : 1;
-        for (size_t j = 0; j < parts; j++) {
-            struct pose_sample *s = add_sample(out);
-            if (s == NULL) return SH_ENOMEM;
-            s->t_s = t_s + h * ((double)j / (double)parts);
-            trajectory_at(curve, s->t_s, &s->pose, &s->frame);
-            heading_at(curve, s->t_s, &heading_rad);
-            pose_from_angles(heading_rad, 0.0, 0.0, s->pose.quat);
-        }
-    }
+    double g = 1.0 - f;
+    return f + f * g * (f * to_rest - g * from_rest);
+}
+
+static int put_sample(const struct trajectory *curve, double curve_s, double t_s, double *heading_rad,
+                      struct samples *out)
+{
+    struct pose_sample *s = add_sample(out);
+    if (s == NULL) return SH_ENOMEM;
+    s->t_s = t_s;
+    trajectory_at(curve, curve_s, &s->pose, &s->frame);
+    heading_at(curve, curve_s, heading_rad);
+    pose_from_angles(*heading_rad, 0.0, 0.0, s->pose.quat);
     return SH_OK;
 }
 
-/* The frame scalar counts way-points, a pause not at all. */
-static void number(struct samples *points)
+/* The curve as samples that are near each other, heading along it, with the pauses. */
+static int follow(const struct trajectory *curve, const double *pause_s, struct samples *out)
 {
-    double frame = 0.0;
-    for (size_t i = 0; i < points->n; i++) {
-        if (i > 0 && memcmp(points->at[i].pose.position_m, points->at[i - 1].pose.position_m,
-                            sizeof points->at[i].pose.position_m) != 0)
-            frame += 1.0;
-        points->at[i].frame = frame;
+    double heading_rad = 0.0, t_s = 0.0;
+    int rc = SH_OK;
+    for (size_t i = 0; i < curve->n && rc == SH_OK; i++) {
+        double at_s = curve->sample[i].t_s, h = i + 1 < curve->n ? curve->sample[i + 1].t_s - at_s : 0.0;
+        size_t parts = h > STEP_S ? (size_t)ceil(h / STEP_S) : 1;
+        if (pause_s[i] > 0.0) rc = put_sample(curve, at_s, t_s, &heading_rad, out);
+        t_s += pause_s[i];
+        for (size_t j = 0; j < parts && rc == SH_OK; j++) {
+            double f = (double)j / (double)parts;
+            double on = along(f, pause_s[i] > 0.0, i + 1 < curve->n && pause_s[i + 1] > 0.0);
+            rc = put_sample(curve, at_s + h * on, t_s + h * f, &heading_rad, out);
+        }
+        t_s += h;
     }
+    return rc;
 }
 
 int trajectory_read_waypoints(const char *path, struct trajectory **out, struct sh_err *err)
 {
     struct csv csv;
-    struct samples points = {0}, samples = {0};
+    struct way way = {{0}, NULL};
+    struct samples samples = {0};
     struct trajectory *curve = NULL;
     *out = NULL;
     int rc = csv_open(&csv, path, waypoint_columns, err);
-    if (rc == SH_OK) rc = read_waypoints(&csv, &points, err);
-    if (rc == SH_OK && points.n < 2) rc = text_fail(&csv.text, 0, SH_EINPUT, err, "fewer than two way-points");
-    number(&points);
-    if (rc == SH_OK) rc = trajectory_from_samples(points.at, points.n, &curve, err);
-    if (rc == SH_OK && follow(curve, &samples) != SH_OK)
+    if (rc == SH_OK) rc = read_waypoints(&csv, &way, err);
+    if (rc == SH_OK) rc = trajectory_from_samples(way.points.at, way.points.n, &curve, err);
+    if (rc == SH_OK && follow(curve, way.pause_s, &samples) != SH_OK)
         rc = text_fail(&csv.text, 0, SH_ENOMEM, err, "no memory for its samples");
     if (rc == SH_OK) rc = trajectory_from_samples(samples.at, samples.n, out, err);
     trajectory_free(curve);
     csv_close(&csv);
-    free(points.at);
+    free(way.points.at);
+    free(way.pause_s);
     free(samples.at);
     return rc;
 }

@@ -323,6 +323,18 @@ static void test_waypoints(void **state)
         assert_true(fabs(p.position_m[1] - 20) < 1e-12 && fabs(frame - 2) < 1e-12);
     }
     trajectory_free(tr);
+    /* A pause in a bend: the car stands as it came and leaves as it stands, without a jerk of its nose. */
+    write_file("x_m,y_m,z_m,speed_m_s,pause_s\n0,0,0,5,0\n0,20,0,5,1\n20,20,0,5,0\n");
+    if (trajectory_read_waypoints(path, &tr, &err) != SH_OK) fail_msg("%s", err.text);
+    struct pose before;
+    trajectory_at(tr, 0.0, &before, &frame);
+    for (double t = 0.01; t <= 9.0; t += 0.01) {
+        trajectory_at(tr, t, &p, &frame);
+        assert_true(pose_angle_between(before.quat, p.quat) < 0.01);   /* 45 degrees in 4 s, at most 1 rad/s anywhere */
+        assert_true(distance(before.position_m, p.position_m) < 0.15); /* at most three times the mean speed */
+        before = p;
+    }
+    trajectory_free(tr);
     /* A corner: heading turns from north to east, in the end along the last leg. */
     write_file("x_m,y_m,z_m,speed_m_s\n0,0,0,10\n0,50,0,10\n50,50,0,10\n100,50,0,10\n");
     if (trajectory_read_waypoints(path, &tr, &err) != SH_OK) fail_msg("%s", err.text);
