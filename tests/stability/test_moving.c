@@ -129,8 +129,8 @@ static void test_pose_of_each_pulse(void **state)
     table_check();
 }
 
-/* A trajectory of 10 Hz, as a navigation filter gives it: between its samples by chords, or by the cubic. The bound is that
- * of tests/unit/test_pose.c, R (rate step)^3 / 62 in the level, for the climb as much again. */
+/* A trajectory of 10 Hz, as a navigation filter gives it: between its samples by chords, or by the cubic. The bound is
+ * that of tests/unit/test_pose.c, R (rate step)^3 / 62 in the level, for the climb as much again. */
 static void test_between_samples(void **state)
 {
     (void)state;
@@ -154,8 +154,8 @@ static void test_between_samples(void **state)
         chord_m = fmax(chord_m, distance(want.position_m, got.position_m));
     }
     trajectory_free(tr);
-    table_row("trajectory of 10 Hz, the same car", "straight between samples", chord_m, cubic_m, 2.0 * 10.0 * 1e-3 / 62.0,
-              "m");
+    table_row("trajectory of 10 Hz, the same car", "straight between samples", chord_m, cubic_m,
+              2.0 * 10.0 * 1e-3 / 62.0, "m");
     table_check();
 }
 

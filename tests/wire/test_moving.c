@@ -219,6 +219,63 @@ static void test_house(void **state)
     free(text);
 }
 
+static void record_hash(struct wire *wire, const char *config, const char *threads, const char *set, char hash[65])
+{
+    char stats[352], cloud[352];
+    snprintf(stats, sizeof stats, "%s", wire_path(wire, "stats.json"));
+    snprintf(cloud, sizeof cloud, "%s", wire_path(wire, "long.ply"));
+    const char *const args[] = {"record",  config,  "--stats", stats, "--threads", threads,
+                                "--quiet", "--set", set,       "-o",  cloud,       NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "head.out", "head.err", -1)), 0);
+    stats_hash(wire, hash);
+}
+
+static void write_long(struct wire *wire, const char *name, const char *gate, char config[352])
+{
+    char text[1024];
+    snprintf(text, sizeof text,
+             "head: {profile: full-sweep, prr_hz: 3000, lines_hz: 20, pan_deg_s: 0, frames: 0}\n"
+             "scene:\n  meshes:\n    - {file: wall.obj, up: z, scale: 1}\n%s"
+             "stations: [{position_m: [0, 0, 0]}]\n"
+             "platform: {kind: trajectory, waypoints: way.csv, mount_heading_deg: -90}\n",
+             gate);
+    snprintf(config, 352, "%s", wire_write_text(wire, name, text));
+}
+
+/* 5 km at 100 m/s along a wall 12 m away, and past a gate that slides: more than one BVH reaches, by any number of
+ * threads the same. */
+static void test_long_path(void **state)
+{
+    struct wire *wire = *state;
+    char config[352], one[65], other[65], cloud[352];
+    wire_write_text(wire, "wall.obj", "o wall\nv -100 12 -30\nv 6000 12 -30\nv 6000 12 30\nv -100 12 30\nf 1 2 3 4\n");
+    wire_write_text(wire, "gate.obj", "o gate\nv 2000 12 -9\nv 3000 12 -9\nv 3000 12 9\nv 2000 12 9\nf 1 2 3 4\n");
+    wire_write_text(wire, "way.csv", "x_m,y_m,z_m,speed_m_s\n0,0,0,100\n2500,0,0,100\n5000,1,0,100\n");
+    write_long(wire, "long.yaml",
+               "    - {file: gate.obj, up: z, scale: 1, offset_m: [0, -1, 0], move_m_s: [3, 0, 0]}\n", config);
+    record_hash(wire, config, "1", "noise.seed=1", one);
+    for (int i = 2; i <= 3; i++) {
+        record_hash(wire, config, i == 2 ? "2" : "3", "noise.seed=1", other);
+        assert_string_equal(other, one);
+    }
+    const char *const check[] = {"check", config, NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, check, "check.txt", "head.err", -1)), 0);
+    char *text = wire_read(wire_path(wire, "check.txt"), NULL);
+    assert_non_null(strstr(text, "; 3 BVH")); /* of 2 km each */
+    free(text);
+    /* Without the gate, which `scanhead report` does not know. The wall is 12 m away, and up to 30 m up: encoders. */
+    write_long(wire, "still.yaml", "", config);
+    record_hash(wire, config, "2", "noise.seed=1", other);
+    assert_string_not_equal(other, one);
+    snprintf(cloud, sizeof cloud, "%s", wire_path(wire, "long.ply"));
+    const char *const report[] = {"report", config, cloud, "--json", "--tolerance-m", "0.001", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, report, "report.json", "head.err", -1)), 0);
+    text = wire_read(wire_path(wire, "report.json"), NULL);
+    const char *most = strstr(text, "\"max_m\":");
+    assert_true(most != NULL && atof(most + 8) < 2e-4);
+    free(text);
+}
+
 /* ---- poses over UDP */
 
 static int udp_to(const char *endpoint)
@@ -340,6 +397,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_undistorted, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_end_of_the_path, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_house, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_long_path, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_poses_over_udp, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_no_pose_at_all, wire_setup, wire_teardown),
     };
