@@ -93,6 +93,8 @@ void device_session_closed(struct device *device, uint32_t session, const char *
 /* Where a live platform is at a device time (of its own, before the mount): from TIME:STEP or the socket. Returns 0, or
  * 1 where it can't be used (not later than the one before, or out of reach): then it is counted. */
 int device_pose(struct device *device, int64_t t_ns, const struct pose *pose);
+/* The same from x, y, z (m), roll, pitch, heading (degrees). */
+int device_pose_numbers(struct device *device, int64_t t_ns, const double v[6]);
 
 /* Something for the error queue (enum command_error), and an event on the wire. */
 void device_report(struct device *device, int number, const char *text);

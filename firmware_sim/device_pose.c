@@ -47,6 +47,14 @@ int device_pose(struct device *device, int64_t t_ns, const struct pose *pose)
     return bad;
 }
 
+int device_pose_numbers(struct device *device, int64_t t_ns, const double v[6])
+{
+    const double deg = M_PI / 180.0;
+    struct pose pose = {.position_m = {v[0], v[1], v[2]}};
+    pose_from_angles(v[5] * deg, v[4] * deg, v[3] * deg, pose.quat);
+    return device_pose(device, t_ns, &pose);
+}
+
 /* Beyond the last pose: as the last two go on, for some time and within reach; then it stands. */
 static uint32_t extrapolate(const struct device *device, int64_t t_ns, struct pose *out)
 {

@@ -27,10 +27,9 @@ struct pose_feed {
     char text[DATAGRAM + 1];
 };
 
-int pose_feed_parse(const char *line, int64_t *t_ns, struct pose *pose)
+int pose_feed_parse(const char *line, int64_t *t_ns, double pose[6])
 {
     static const double most[7] = {1e9, 1e9, 1e9, 1e9, 360.0, 90.0, 360.0};
-    const double deg = M_PI / 180.0;
     double v[7];
     for (int i = 0; i < 7; i++) {
         char *end;
@@ -42,8 +41,7 @@ int pose_feed_parse(const char *line, int64_t *t_ns, struct pose *pose)
     }
     if (line[strspn(line, " \t\r")] != '\0') return -1;
     *t_ns = llround(1e9 * v[0]);
-    memcpy(pose->position_m, v + 1, sizeof pose->position_m);
-    pose_from_angles(v[6] * deg, v[5] * deg, v[4] * deg, pose->quat);
+    memcpy(pose, v + 1, 6 * sizeof *pose);
     return 0;
 }
 
@@ -58,12 +56,12 @@ static void tell_bad(struct pose_feed *feed, const char *what)
 static void take_line(struct pose_feed *feed, const char *line)
 {
     int64_t t_ns;
-    struct pose pose;
+    double pose[6];
     if (line[strspn(line, " \t\r")] == '\0') return;
-    if (pose_feed_parse(line, &t_ns, &pose) != 0) {
+    if (pose_feed_parse(line, &t_ns, pose) != 0) {
         atomic_fetch_add(&device_counters(feed->device)->bad_poses, 1);
         tell_bad(feed, "a pose that is not t_s x y z roll pitch heading");
-    } else if (device_pose(feed->device, t_ns, &pose) != 0) {
+    } else if (device_pose_numbers(feed->device, t_ns, pose) != 0) {
         tell_bad(feed, "a pose out of platform.reach_m, or not later than the one before");
     }
 }

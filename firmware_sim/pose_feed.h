@@ -22,7 +22,7 @@ void pose_feed_endpoint(const struct pose_feed *feed, char *buf, size_t len);
 /* Ends the thread; feed may be NULL. */
 void pose_feed_close(struct pose_feed *feed);
 
-/* One line; 0, or -1 when it is none. For tests, too. */
-int pose_feed_parse(const char *line, int64_t *t_ns, struct pose *pose);
+/* One line as time and x, y, z, roll, pitch, heading; 0, or -1 when it is none. */
+int pose_feed_parse(const char *line, int64_t *t_ns, double v[6]);
 
 #endif

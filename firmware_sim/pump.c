@@ -4,7 +4,6 @@
  * when the ring has gone on too far it loses whole frames, is told so in a frame of its own, and goes on with the
  * present. */
 #include <errno.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -161,21 +160,13 @@ static void add_reply(struct session *s, const char *text)
     s->reply_len += (uint32_t)n + 2;
 }
 
-/* Before its time is granted: a tick is cast with the pose at its end. */
-static void give_pose(struct loop *loop, int64_t t_ns, const double v[6])
-{
-    const double deg = M_PI / 180.0;
-    struct pose pose = {.position_m = {v[0], v[1], v[2]}};
-    pose_from_angles(v[5] * deg, v[4] * deg, v[3] * deg, pose.quat);
-    device_pose(loop->device, t_ns, &pose);
-}
-
 static void start_step(struct pump *pump, struct session *s, const struct command_result *result)
 {
     struct loop *loop = pump->loop;
     uint64_t total = atomic_fetch_add(&loop->granted_ns, (uint64_t)result->step_ns) + (uint64_t)result->step_ns;
     s->step_tick = total / (uint64_t)loop->tick_ns;
-    if (result->have_pose) give_pose(loop, (int64_t)total, result->pose);
+    if (result->have_pose)
+        device_pose_numbers(loop->device, (int64_t)total, result->pose); /* before its time is granted */
     atomic_store(&loop->granted, s->step_tick);
     s->stepping = 1;
     memcpy(s->step_reply, result->reply, sizeof s->step_reply);

@@ -130,6 +130,7 @@ static void decide(struct caster *c, struct decide_ray *ray, const struct origin
         for (uint32_t i = base; any != 0 && i < end; i++)
             if (c->doubt[i]) in_doubt[doubts++] = i;
     }
+    if (doubts == 0) return;
     decide_prefetch(ray->bvh, prim, in_doubt, doubts);
     for (uint32_t k = 0; k < doubts; k++)
         decide_one(c, ray, from, hits, prim, in_doubt[k]);
