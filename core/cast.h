@@ -78,8 +78,7 @@ struct cast_setup {
 /* How often the exact stage had to look twice. */
 struct cast_counters {
     uint64_t near_border; /* proposals near a border, looked at in double */
-    uint64_t decided;     /* of these, not clearly inside the proposed triangle: its neighbours were asked, too */
-    uint64_t searched;    /* of these, all triangles around the point were asked */
+    uint64_t decided;     /* of these, not clearly inside the proposed triangle: all triangles around were asked */
     uint64_t went_on;     /* of these, nothing there after all: the ray went on behind */
     uint64_t undecided;   /* nearer to an edge than double precision can tell: counted as hit */
 };

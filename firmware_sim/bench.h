@@ -84,7 +84,7 @@ long bench_embree_version(void);
 struct bench_case {
     const struct bench_target *target;
     const struct bench_rays *rays;
-    struct bench_embree *embree;
+    struct bench_embree *embree, *fast; /* robust: the measure of all; without that flag */
     struct bvh *bvh;
     double seconds; /* measure for so long, but at least BENCH_MIN_ROUNDS */
 };
@@ -115,8 +115,9 @@ struct bench_result {
     uint32_t rounds, pulses; /* pulses of a pass */
     uint32_t embree_width;
     enum bench_feed embree_feed;
-    double embree_ns, cast_ns, pipeline_ns, ideal_ns, staged_ns; /* per pulse: medians */
-    double cast_ratio, pipeline_ratio, ideal_ratio; /* Embree's time by ours: medians of the rounds' ratios */
+    double embree_ns, fast_ns, cast_ns, pipeline_ns, ideal_ns, staged_ns; /* per pulse: medians */
+    double cast_ratio, pipeline_ratio, ideal_ratio,
+        fast_ratio; /* Embree's time by ours: medians of the rounds' ratios */
     double stage_ns[BENCH_STAGES];
     int same_bytes;                /* the staged pipeline gave the bytes of the whole one */
     struct cast_counters counters; /* of one pass */
@@ -150,7 +151,7 @@ enum { BENCH_LEAK_MESHES = 4 };
 struct bench_leaks {
     const char *mesh;
     uint32_t triangles;
-    uint64_t rays, leaks, passed; /* passed: behind the target after all, legally: by a silhouette */
+    uint64_t rays, leaks, passed; /* passed: met the inside of the mesh behind the target; wrong as well */
     double ns_per_ray;            /* processor time */
     struct cast_counters counters;
     uint64_t plain_rays, plain_leaks; /* Embree alone, robust, in packets */

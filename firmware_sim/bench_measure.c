@@ -1,4 +1,4 @@
-/* One thread: Embree, the exact cast, the whole pipeline, the pipeline by stages, in turns. */
+/* One thread: Embree, robust and not, the exact cast, the whole pipeline, the pipeline by stages, in turns. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -9,7 +9,7 @@
 const char *const bench_stage_name[BENCH_STAGES] = {"schedule", "directions", "embree", "refine", "decide",
                                                     "detect",   "noise",      "georef", "encode", "crc"};
 
-enum { EMBREE, CAST, PIPELINE, IDEAL, STAGED, N_METHODS };
+enum { EMBREE, FAST, CAST, PIPELINE, IDEAL, STAGED, N_METHODS };
 
 struct measure {
     const struct bench_case *c;
@@ -43,7 +43,9 @@ static int set_up(struct measure *m, struct sh_err *err)
     m->staged = malloc(m->cap);
     m->rays = aligned_alloc(64, (sizeof *m->rays + 63) / 64 * 64);
     if (m->sink == NULL || m->staged == NULL || m->rays == NULL) return sh_fail(err, SH_ENOMEM, "bench: no memory");
-    return bench_embree_rays(c->embree, m->rays->fx, m->rays->fy, m->rays->fz, BENCH_BLOCK, err);
+    rc = bench_embree_rays(c->embree, m->rays->fx, m->rays->fy, m->rays->fz, BENCH_BLOCK, err);
+    if (rc == SH_OK) rc = bench_embree_rays(c->fast, m->rays->fx, m->rays->fy, m->rays->fz, BENCH_BLOCK, err);
+    return rc;
 }
 
 static void tear_down(struct measure *m)
@@ -91,10 +93,11 @@ static double timed_blocks(struct measure *m, int method)
     for (uint32_t first = 0; first < c->rays->n; first += BENCH_BLOCK) {
         const struct bench_block *b = m->rays;
         bench_rays_block(c->rays, first, m->rays);
-        if (m->out->embree_feed == BENCH_PREPARED) bench_embree_refill(c->embree);
+        const struct bench_embree *e = method == FAST ? c->fast : c->embree;
+        if (m->out->embree_feed == BENCH_PREPARED) bench_embree_refill(e);
         double start_s = bench_thread_s();
-        if (method == EMBREE)
-            bench_embree_pass(c->embree, m->out->embree_width, m->out->embree_feed, 0, BENCH_BLOCK);
+        if (method != CAST)
+            bench_embree_pass(e, m->out->embree_width, m->out->embree_feed, 0, BENCH_BLOCK);
         else
             caster_hits(m->caster, c->bvh, m->setup.station_m, BENCH_RANGE_MAX_M, BENCH_BLOCK, b->dx, b->dy, b->dz,
                         m->range_m, m->prim);
@@ -116,7 +119,7 @@ static double timed_lines(struct measure *m, int method, uint32_t round)
 
 static double timed_pass(struct measure *m, int method, uint32_t round)
 {
-    double s = method == EMBREE || method == CAST ? timed_blocks(m, method) : timed_lines(m, method, round);
+    double s = method <= CAST ? timed_blocks(m, method) : timed_lines(m, method, round);
     return 1e9 * s / m->c->rays->n;
 }
 
@@ -143,7 +146,9 @@ static int choose_embree(struct measure *m, struct sh_err *err)
     }
     m->out->embree_width = best_width;
     m->out->embree_feed = best_feed;
-    return bench_embree_prepare(m->c->embree, best_width, best_feed, err);
+    int rc = bench_embree_prepare(m->c->embree, best_width, best_feed, err);
+    if (rc == SH_OK) rc = bench_embree_prepare(m->c->fast, best_width, best_feed, err);
+    return rc;
 }
 
 static int check_same(struct measure *m)
@@ -159,22 +164,24 @@ static int check_same(struct measure *m)
     return 1;
 }
 
-/* Embree's time by this method's. */
-static double ratio(const struct measure *m, int method)
+/* One method's time by another's. */
+static double ratio(const struct measure *m, int base, int method)
 {
     double r[BENCH_MAX_ROUNDS];
     for (uint32_t i = 0; i < m->out->rounds; i++)
-        r[i] = m->ns[EMBREE][i] / m->ns[method][i];
+        r[i] = m->ns[base][i] / m->ns[method][i];
     return bench_median(r, m->out->rounds);
 }
 
 static void summarise(struct measure *m)
 {
     struct bench_result *out = m->out;
-    out->cast_ratio = ratio(m, CAST); /* before the medians: those sort */
-    out->pipeline_ratio = ratio(m, PIPELINE);
-    out->ideal_ratio = ratio(m, IDEAL);
+    out->cast_ratio = ratio(m, EMBREE, CAST); /* before the medians: those sort */
+    out->pipeline_ratio = ratio(m, EMBREE, PIPELINE);
+    out->ideal_ratio = ratio(m, EMBREE, IDEAL);
+    out->fast_ratio = ratio(m, FAST, CAST);
     out->embree_ns = bench_median(m->ns[EMBREE], out->rounds);
+    out->fast_ns = bench_median(m->ns[FAST], out->rounds);
     out->cast_ns = bench_median(m->ns[CAST], out->rounds);
     out->pipeline_ns = bench_median(m->ns[PIPELINE], out->rounds);
     out->ideal_ns = bench_median(m->ns[IDEAL], out->rounds);
@@ -193,7 +200,6 @@ static int run(struct measure *m, struct sh_err *err)
     caster_get_counters(m->caster, n);
     n->near_border -= before.near_border;
     n->decided -= before.decided;
-    n->searched -= before.searched;
     n->went_on -= before.went_on;
     n->undecided -= before.undecided;
     m->out->same_bytes = check_same(m);

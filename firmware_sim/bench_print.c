@@ -56,7 +56,6 @@ static void put_counters(struct json *json, const char *key, const struct cast_c
     json_open_object(json, key);
     json_double(json, "near_border", (double)c->near_border * per_million);
     json_double(json, "decided", (double)c->decided * per_million);
-    json_double(json, "searched", (double)c->searched * per_million);
     json_double(json, "went_on", (double)c->went_on * per_million);
     json_double(json, "undecided", (double)c->undecided * per_million);
     json_close_object(json);
@@ -90,6 +89,7 @@ static void put_scene(struct json *json, const struct bench_scene_report *s)
     json_double(json, "embree_mrays_s", 1e3 / r->embree_ns);
     json_double(json, "cast_ratio", r->cast_ratio);
     json_double(json, "pipeline_ratio", r->pipeline_ratio);
+    json_double(json, "cast_ratio_not_robust", r->fast_ratio);
     json_double(json, "pipeline_ratio_ideal_encoders", r->ideal_ratio);
     json_double(json, "cast_mrays_s", 1e3 / r->cast_ns);
     json_double(json, "pipeline_mpulses_s", 1e3 / r->pipeline_ns);
@@ -99,6 +99,7 @@ static void put_scene(struct json *json, const struct bench_scene_report *s)
     json_double(json, "rest", rest_ns(r));
     json_close_object(json);
     json_double(json, "embree_ns", r->embree_ns);
+    json_double(json, "embree_not_robust_ns", r->fast_ns);
     json_double(json, "cast_ns", r->cast_ns);
     json_double(json, "pipeline_ns", r->pipeline_ns);
     json_bool(json, "stages_give_same_bytes", r->same_bytes);

@@ -153,11 +153,12 @@ static int measure_case(const struct bench_options *o, const struct bench_case *
 static int measure_target(const struct bench_options *o, const struct bench_target *target,
                           struct bench_scene_report *out, struct sh_err *err)
 {
-    struct bench_embree embree = {0};
+    struct bench_embree embree = {0}, fast = {0};
     struct bench_rays rays = {0};
-    struct bench_case c = {.target = target, .rays = &rays, .embree = &embree, .seconds = o->seconds};
+    struct bench_case c = {.target = target, .rays = &rays, .embree = &embree, .fast = &fast, .seconds = o->seconds};
     int rc = bench_rays_create(BENCH_LINES, &rays, err);
     if (rc == SH_OK) rc = bench_embree_create(target->scene, target->station_m, 1, &embree, err);
+    if (rc == SH_OK) rc = bench_embree_create(target->scene, target->station_m, 0, &fast, err);
     if (rc == SH_OK) rc = bvh_create(target->scene, target->station_m, 0.0, 0, &cmd_report_stderr, &c.bvh, err);
     if (rc == SH_OK) {
         snprintf(out->name, sizeof out->name, "%s", target->name);
@@ -169,6 +170,7 @@ static int measure_target(const struct bench_options *o, const struct bench_targ
     }
     bvh_free(c.bvh);
     bench_embree_free(&embree);
+    bench_embree_free(&fast);
     bench_rays_free(&rays);
     return rc;
 }
@@ -218,9 +220,9 @@ static int write_out(const struct bench_options *o, const struct bench_report *r
 
 static int judge(const struct bench_report *report, struct sh_err *err)
 {
-    uint64_t leaks = 0;
+    uint64_t leaks = 0; /* what passes its target by has slipped through, too */
     for (int i = 0; i < BENCH_LEAK_MESHES && report->have_leaks; i++)
-        leaks += report->leaks[i].leaks;
+        leaks += report->leaks[i].leaks + report->leaks[i].passed;
     return leaks == 0 ? SH_OK : sh_fail(err, SH_ESTATE, "bench: %llu rays leaked", (unsigned long long)leaks);
 }
 

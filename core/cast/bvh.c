@@ -17,7 +17,6 @@ static int build(struct bvh *bvh, struct sh_err *err)
 {
     RTCGeometry geometry = rtcNewGeometry(bvh->device, RTC_GEOMETRY_TYPE_TRIANGLE);
     int rc = bvh_fill(bvh, geometry, err);
-    if (rc == SH_OK) rc = bvh_fill_fans(bvh, err);
     if (rc == SH_OK) {
         rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_HIGH);
         rtcCommitGeometry(geometry);
@@ -75,9 +74,7 @@ int bvh_create(const struct scene *scene, const double origin_m[3], double stati
     }
     bvh->info.packet = native_packet(bvh->device);
     bvh->info.build_s = seconds() - start;
-    bvh->info.bytes = (uint64_t)bvh->bytes +
-                      (uint64_t)scene->n_triangles * (sizeof *bvh->triangle + 3 * sizeof *bvh->fan) +
-                      (uint64_t)scene->n_vertices * sizeof *bvh->fan_first;
+    bvh->info.bytes = (uint64_t)bvh->bytes + (uint64_t)scene->n_triangles * sizeof *bvh->triangle;
     *out = bvh;
     return SH_OK;
 }
@@ -88,8 +85,6 @@ void bvh_free(struct bvh *bvh)
     if (bvh->rtc != NULL) rtcReleaseScene(bvh->rtc);
     rtcReleaseDevice(bvh->device);
     free(bvh->triangle);
-    free(bvh->fan_first);
-    free(bvh->fan);
     free(bvh->rival_first);
     free(bvh->rival);
     free(bvh);

@@ -71,7 +71,6 @@ struct bvh {
     const struct scene *scene;
     struct bvh_triangle *triangle; /* one more than there are: the last stands for a miss, all NaN */
     double origin_m[3];
-    uint32_t *fan_first, *fan; /* triangles at vertex i: fan[fan_first[i] .. fan_first[i + 1]) */
     uint32_t *rival_first,
         *rival; /* rivals of triangle i: rival[rival_first[i] .. rival_first[i + 1]); NULL: there are none */
     double station_reach_m; /* rays begin at most this far from the origin */
@@ -121,9 +120,6 @@ double bvh_width_m(const struct bvh *bvh, uint32_t prim);
 
 /* Fills the float buffers of a geometry with widened triangles, and bvh->triangle. */
 int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err);
-
-/* fans.c: fills fan_first and fan. */
-int bvh_fill_fans(struct bvh *bvh, struct sh_err *err);
 
 /* twins.c: of faces with the same three corners, however they are written, only the first stays in the float buffer. */
 int bvh_drop_twins(const struct bvh *bvh, float *vertex, struct sh_err *err);

@@ -5,10 +5,12 @@
 #include "core/cast/bvh.h"
 #include "core/vec3.h"
 
-enum { DECIDE_MAX_ROUNDS = 32, DECIDE_MAX_FAN = 32 };
+enum { DECIDE_MAX_ROUNDS = 32 };
 
 struct search {
     const struct decide_ray *ray;
+    double point_m[3], radius_m; /* of the query, local frame */
+    uint32_t proposed;
     uint32_t prim;            /* best so far */
     double range_m, border_m; /* its range, and how far the ray passes from its nearest edge */
     uint32_t near_prim;       /* the one that the ray misses by least; gap 1: double precision can't tell */
@@ -168,9 +170,15 @@ static void try_triangle(struct search *s, uint32_t prim)
     }
 }
 
+/* Embree names all triangles whose boxes, or those of their leaf, are near. What lies further than the query's radius
+ * is left out by its plane. */
 static bool visit(struct RTCPointQueryFunctionArguments *args)
 {
-    try_triangle(args->userPtr, args->primID);
+    const struct search *s = args->userPtr;
+    const struct bvh_triangle *tri = &s->ray->bvh->triangle[args->primID];
+    double off = vec3_dot(tri->n, s->point_m) - tri->d, reach = s->radius_m;
+    if (args->primID != s->proposed && off * off <= reach * reach * vec3_dot(tri->n, tri->n))
+        try_triangle(args->userPtr, args->primID);
     return false;
 }
 
@@ -181,61 +189,22 @@ static void try_around(struct search *s, double range_m, double radius_m)
     struct RTCPointQuery query = {.radius = (float)radius_m};
     const struct decide_ray *ray = s->ray;
     rtcInitPointQueryContext(&context);
-    query.x = (float)(ray->o_local[0] + range_m * ray->dir[0]);
-    query.y = (float)(ray->o_local[1] + range_m * ray->dir[1]);
-    query.z = (float)(ray->o_local[2] + range_m * ray->dir[2]);
+    for (int i = 0; i < 3; i++)
+        s->point_m[i] = ray->o_local[i] + range_m * ray->dir[i];
+    s->radius_m = radius_m;
+    query.x = (float)s->point_m[0];
+    query.y = (float)s->point_m[1];
+    query.z = (float)s->point_m[2];
     rtcPointQuery(ray->bvh->rtc, &query, &context, visit, s);
 }
 
-static int has_corner(const struct scene *scene, uint32_t prim, uint32_t vertex)
-{
-    const uint32_t *t = scene->triangle[prim];
-    return t[0] == vertex || t[1] == vertex || t[2] == vertex;
-}
-
-/* Tries the triangles at a vertex that have the other one, too. Returns 0 where they are too many. */
-static int try_fan(struct search *s, uint32_t prim, uint32_t vertex, uint32_t other)
-{
-    const struct bvh *bvh = s->ray->bvh;
-    const uint32_t *first = &bvh->fan_first[vertex];
-    if (first[1] - first[0] > DECIDE_MAX_FAN) return 0;
-    for (uint32_t k = first[0]; k < first[1]; k++)
-        if (bvh->fan[k] != prim && has_corner(bvh->scene, bvh->fan[k], other)) try_triangle(s, bvh->fan[k]);
-    return 1;
-}
-
-/* Mostly the ray passes near one edge or one corner of the proposed triangle, and the true one has that edge or corner.
- * Returns 0 where it isn't so simple. */
-static int try_neighbours(struct search *s, uint32_t prim, double width_m)
-{
-    double v[3][3], side[3];
-    int near = 0, last = 0, apart = 0;
-    look_at(s->ray, prim, v, side);
-    double sign = side[0] + side[1] + side[2] < 0.0 ? -1.0 : 1.0;
-    for (int i = 0; i < 3; i++) {
-        double in = sign * side[i] / edge_length(v[i], v[(i + 1) % 3]);
-        if (in < -4.0 * width_m) return 0;
-        if (in > 2.0 * width_m) {
-            apart = i;
-            continue;
-        }
-        near++;
-        last = i;
-    }
-    const uint32_t *t = s->ray->bvh->scene->triangle[prim];
-    if (near == 1) return try_fan(s, prim, t[last], t[(last + 1) % 3]);
-    return near == 2 && try_fan(s, prim, t[(apart + 2) % 3], t[(apart + 2) % 3]);
-}
-
-/* How far from the proposed point along the ray an edge's neighbours may be met: the width, stretched by the incidence.
- */
-static double search_radius(const struct decide_ray *ray, uint32_t prim, double range_m)
+/* How far from the proposed point along the ray an edge's neighbours may be met, and the plane itself: the width,
+ * stretched by the incidence. */
+static double slack_m(const struct decide_ray *ray, uint32_t prim, double width_m)
 {
     const struct bvh_triangle *tri = &ray->bvh->triangle[prim];
     double cosine = fabs(vec3_dot(tri->n, ray->dir)) / sqrt(vec3_dot(tri->n, tri->n));
-    double width_m = bvh_width_m(ray->bvh, prim);
-    double radius = 4.0 * width_m * (1.0 + 1.0 / fmax(cosine, 1e-5));
-    return fmin(radius, 0.01 * range_m + 4.0 * width_m);
+    return 4.0 * width_m * (1.0 + 1.0 / fmax(cosine, 1e-6));
 }
 
 /* Rivals whose planes the ray meets within what float can't order are tried; the others lie clearly before or behind.
@@ -259,26 +228,14 @@ static void try_rivals(struct search *s, uint32_t prim, double range_m)
     }
 }
 
-static void prefetch_corners(const struct scene *scene, uint32_t prim)
-{
-    for (int j = 0; j < 3; j++)
-        __builtin_prefetch(scene->vertex_m[scene->triangle[prim][j]], 0, 3);
-}
-
 void decide_prefetch(const struct bvh *bvh, const uint32_t *prim, const uint32_t *ray, uint32_t n)
 {
     const struct scene *scene = bvh->scene;
     for (uint32_t k = 0; k < n; k++)
         __builtin_prefetch(scene->triangle[prim[ray[k]]], 0, 3);
-    for (uint32_t k = 0; k < n; k++) {
-        const uint32_t *t = scene->triangle[prim[ray[k]]];
-        prefetch_corners(scene, prim[ray[k]]);
-        for (int j = 0; j < 3; j++)
-            __builtin_prefetch(&bvh->fan_first[t[j]], 0, 3);
-    }
     for (uint32_t k = 0; k < n; k++)
         for (int j = 0; j < 3; j++)
-            __builtin_prefetch(&bvh->fan[bvh->fan_first[scene->triangle[prim[ray[k]]][j]]], 0, 3);
+            __builtin_prefetch(scene->vertex_m[scene->triangle[prim[ray[k]]][j]], 0, 3);
 }
 
 /* What was tried may lie anywhere on the ray; it counts up to limit_m, for behind that not everything was tried. */
@@ -300,17 +257,17 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct cas
                        .near_gap = INFINITY};
     counters->near_border++;
     for (int round = 0; round < DECIDE_MAX_ROUNDS && prim != RTC_INVALID_GEOMETRY_ID; round++) {
+        s.proposed = prim;
         try_triangle(&s, prim);
         /* Inside in double as well, and further from the border than float can blur: the common case. Nearer, another
          * triangle of the edge may lie in front of it by less than float can tell. */
         double width_m = bvh_width_m(ray->bvh, prim);
         if (s.prim == prim && s.border_m > width_m) break;
         counters->decided++;
-        double range_m = (double)t, radius_m = search_radius(ray, prim, range_m);
-        if (try_neighbours(&s, prim, width_m) && s.range_m <= range_m + radius_m) break;
-        counters->searched++;
+        double range_m = (double)t, slack = slack_m(ray, prim, width_m), limit_m = range_m + slack;
+        double radius_m = fmin(slack, 0.01 * range_m + 4.0 * width_m);
         try_around(&s, range_m, radius_m);
-        if (is_found(&s, range_m + radius_m)) break;
+        if (is_found(&s, limit_m)) break;
         counters->went_on++;
         float org[3], dir[3];
         for (int i = 0; i < 3; i++) {

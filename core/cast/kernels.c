@@ -85,8 +85,9 @@ void kernel_to_float(const double *restrict dx, const double *restrict dy, const
     }
 }
 
-/* Whether a hit is so near to its triangle's border that the proposal is in doubt, and the triangle's label. */
-VEC_INLINE uint32_t in_doubt(double nx, double ny, double nz, double along, float u, float v, uint32_t *label)
+/* Whether a hit is so near to its triangle's border that the proposal is in doubt, and the triangle's label. slope:
+ * what the guard counts in, bvh.h. */
+VEC_INLINE uint32_t in_doubt(double nx, double ny, double nz, double slope, float u, float v, int hit, uint32_t *label)
 {
     float w = 1.0f - u - v;
     float least = u < v ? u : v;
@@ -100,14 +101,15 @@ VEC_INLINE uint32_t in_doubt(double nx, double ny, double nz, double along, floa
     memcpy(&low, &ny, sizeof low);
     memcpy(&high, &nz, sizeof high);
     *label = (uint32_t)((low & ((1U << BVH_SPARE_BITS) - 1)) | (high & 15) << BVH_SPARE_BITS);
-    return ((double)least * fabs(along) < guard) | (uint32_t)((high & BVH_RIVAL_BIT) != 0);
+    uint32_t near = ((double)least * slope < guard) | (uint32_t)((high & BVH_RIVAL_BIT) != 0);
+    return near & (uint32_t)hit;
 }
 
 /* A miss has the highest number there is and reads the record behind the last triangle, which is all NaN. */
 VEC_CLONES
 static uint32_t refine(const double *restrict tri, uint32_t n_triangles, const uint32_t *restrict prim,
                        const double *restrict dx, const double *restrict dy, const double *restrict dz,
-                       const float *restrict u, const float *restrict v, const double o[3], uint32_t n,
+                       const float *restrict u, const float *restrict v, const double o[3], int slanted, uint32_t n,
                        double *restrict range_m, uint32_t *restrict label, uint32_t *restrict doubt)
 {
     const double ox = o[0], oy = o[1], oz = o[2];
@@ -117,7 +119,7 @@ static uint32_t refine(const double *restrict tri, uint32_t n_triangles, const u
         double nx = tri[at], ny = tri[at + 1], nz = tri[at + 2];
         double along = nx * dx[i] + ny * dy[i] + nz * dz[i];
         range_m[i] = (tri[at + 3] - (nx * ox + ny * oy + nz * oz)) / along;
-        doubt[i] = in_doubt(nx, ny, nz, along, u[i], v[i], &label[i]);
+        doubt[i] = in_doubt(nx, ny, nz, slanted ? fabs(along) : 1.0, u[i], v[i], prim[i] < n_triangles, &label[i]);
         doubts += doubt[i];
     }
     return doubts;
@@ -126,10 +128,10 @@ static uint32_t refine(const double *restrict tri, uint32_t n_triangles, const u
 uint32_t kernel_refine(const struct bvh *bvh, const struct kernel_hits *hits, const double o[3], uint32_t n)
 {
     return refine((const double *)bvh->triangle, bvh->scene->n_triangles, hits->prim, hits->dx, hits->dy, hits->dz,
-                  hits->u, hits->v, o, n, hits->range_m, hits->label, hits->doubt);
+                  hits->u, hits->v, o, bvh->station_reach_m > 0.0, n, hits->range_m, hits->label, hits->doubt);
 }
 
-/* refine with an origin for each ray; kept apart, so that the common case stays as fast as it is. */
+/* refine with an origin for each ray, and so slanted; kept apart, so that the common case stays as fast as it is. */
 VEC_CLONES
 static uint32_t refine_from(const double *restrict tri, uint32_t n_triangles, const uint32_t *restrict prim,
                             const double *restrict dx, const double *restrict dy, const double *restrict dz,
@@ -143,7 +145,7 @@ static uint32_t refine_from(const double *restrict tri, uint32_t n_triangles, co
         double nx = tri[at], ny = tri[at + 1], nz = tri[at + 2];
         double along = nx * dx[i] + ny * dy[i] + nz * dz[i];
         range_m[i] = (tri[at + 3] - (nx * ox[i] + ny * oy[i] + nz * oz[i])) / along;
-        doubt[i] = in_doubt(nx, ny, nz, along, u[i], v[i], &label[i]);
+        doubt[i] = in_doubt(nx, ny, nz, fabs(along), u[i], v[i], prim[i] < n_triangles, &label[i]);
         doubts += doubt[i];
     }
     return doubts;

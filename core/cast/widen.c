@@ -107,9 +107,18 @@ static void set_offset(struct bvh_triangle *tri, double v[3][3])
     tri->d = vec3_dot(tri->n, centre);
 }
 
-/* Plane, guard and label. Seen from the origin, the distance from a ray to edge i of the widened triangle is at least
- * bary_i * area' * cos / longest', bary_i as Embree gives them. It has to exceed what the edge was moved by and once
- * more the rounding: then the ray is inside of the real triangle, whatever is rounded. */
+/* What the smallest of Embree's weights has to reach for a hit to be safe. Within the plane, the distance to edge i of
+ * the widened triangle is at least weight_i * area2' / longest'. It has to exceed what the edge was moved by, and once
+ * more that by which float is off there, width / cosine of the incidence: seen from the origin no more than the offset.
+ * From elsewhere the incidence is another one, so there the weight is multiplied by area2 * cosine first (kernels.c).
+ */
+static double guard(const struct bvh *bvh, double offset, double width_m, double longest_wide, double area2_wide,
+                    double area2)
+{
+    if (bvh->station_reach_m > 0.0) return (offset + width_m) * longest_wide * area2 / area2_wide;
+    return offset < BVH_MAX_SLANT * width_m ? 2.0 * offset * longest_wide / area2_wide : (double)INFINITY;
+}
+
 static uint32_t guard_code(double guard)
 {
     const int64_t most = (1 << BVH_SPARE_BITS) - 1;
@@ -174,10 +183,8 @@ static void fill_triangle(struct bvh *bvh, uint32_t prim, float *vertex)
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
             vertex[3 * i + j] = (float)wide[(first + i) % 3][j];
-    /* From elsewhere than the origin an edge may seem to have moved by all that it did. */
-    double seen = bvh->station_reach_m > 0.0 ? offset : width_m;
-    double guard = (seen + width_m) * area2 / measure(wide, wide_n, &longest);
-    set_exact(tri, v, guard * longest, bvh->scene->label[prim]);
+    double area2_wide = measure(wide, wide_n, &longest);
+    set_exact(tri, v, guard(bvh, offset, width_m, longest, area2_wide, area2), bvh->scene->label[prim]);
 }
 
 int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err)
