@@ -3,7 +3,8 @@
  * a triangle's border that float can't be trusted, the triangle is chosen again in double.
  *
  * Frames: the BVH is built in a local frame (prcs minus origin_m), where float is safe; the station is a point of it.
- * Ray packets are SCHEDULE_PACKET pulses, cut by pulse number. */
+ * Ray packets are SCHEDULE_PACKET pulses, cut by pulse number. On a moving platform each pulse has its own origin and
+ * rotation, from its firing time alone; a head that stands still pays nothing for that. */
 #ifndef CORE_CAST_H
 #define CORE_CAST_H
 
@@ -12,6 +13,7 @@
 #include "core/err.h"
 #include "core/georef.h"
 #include "core/line.h"
+#include "core/pose.h"
 #include "core/scene.h"
 #include "core/schedule.h"
 
@@ -66,6 +68,11 @@ struct cast_setup {
     double range_scale_m, xyz_scale_m;
     uint32_t n_movers;
     struct cast_mover mover[CAST_MAX_MOVERS];
+    /* A moving head: poses of the head (socs -> prcs) in order of time, pose_between them. They cover the firing times
+     * of the runs; before the first and behind the last the head stands. station_m is then only what geo positions are
+     * relative to, and rotation is not used. n_knots 0: the head stands still at station_m. */
+    uint32_t n_knots;
+    const struct pose_knot *knot;
 };
 
 /* How often the exact stage had to look twice. */

@@ -156,6 +156,8 @@ static void put_stats(struct json *json, const struct cmd_stats *stats)
     json_uint(json, "lost_ticks", s->lost_ticks);
     json_uint(json, "reader_lost_frames", s->reader_lost_frames);
     json_uint(json, "late_blocks", s->late_blocks);
+    json_uint(json, "late_poses", s->late_poses);
+    json_uint(json, "bad_poses", s->bad_poses);
     json_double(json, "late_p50_us", s->late_p50_us);
     json_double(json, "late_p999_us", s->late_p999_us);
     json_double(json, "late_max_us", s->late_max_us);

@@ -1,4 +1,5 @@
 /* scanhead check and scanhead list: nothing runs. */
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -26,6 +27,21 @@ static int check_links(const struct config *cfg, struct sh_err *err)
     return SH_OK;
 }
 
+static void print_platform(const struct site *site)
+{
+    const struct config_platform *p = &site->cfg->platform;
+    if (p->kind == PLATFORM_LIVE) printf("platform  live, up to %g m from station 1\n", p->reach_m);
+    if (p->kind != PLATFORM_TRAJECTORY) return;
+    double way_m = 0.0;
+    for (size_t i = 1; i < site->n_knots; i++) {
+        const double *a = site->knot[i - 1].pose.position_m, *b = site->knot[i].pose.position_m;
+        way_m += sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]) + (b[2] - a[2]) * (b[2] - a[2]));
+    }
+    printf("platform  trajectory of %.3f s, %.3f m; %zu poses keep the head within %.3g m of it; %zu BVH\n",
+           1e-9 * (double)site->knot[site->n_knots - 1].t_ns, way_m, site->n_knots, site->knot_error_m,
+           site->n_stretches);
+}
+
 static void print_summary(const struct config *cfg, const struct site *site)
 {
     const struct scene *scene = site->scene;
@@ -42,6 +58,7 @@ static void print_summary(const struct config *cfg, const struct site *site)
         printf("station %u %s, EPSG %d, anchor %.6f %.6f %.6f\n", i + 1, site->station[i].station->name,
                georef_epsg(site->station[i].georef), anchor[0], anchor[1], anchor[2]);
     }
+    print_platform(site);
     printf("output    %s, %g m per count\n", cfg->layout == LINE_GEO ? "geo" : "polar", site->scale_m);
 }
 

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "drivers/host/pose_file.h"
 #include "drivers/host/recorder.h"
 #include "firmware_sim/clock.h"
 #include "firmware_sim/cmd.h"
@@ -18,6 +19,7 @@ static const char HELP[] =
     "  --frames N       frames per scan\n"
     "  --duration S     stop each scan after S seconds of device time\n"
     "  --listen         send no command: record what comes until the stream ends or Ctrl-C\n"
+    "  --poses FILE     write the poses of a moving head as CSV; a trajectory file of its own\n"
     "  --ascii          PLY as text\n"
     "  --empty-shots    keep shots without echo, with NaN coordinates\n"
     "  --stats FILE     write what was received as JSON; - is standard output\n"
@@ -34,6 +36,7 @@ enum {
     OPT_FRAMES,
     OPT_DURATION,
     OPT_LISTEN,
+    OPT_POSES,
     OPT_ASCII,
     OPT_EMPTY,
     OPT_STATS,
@@ -47,6 +50,7 @@ static const struct option OPTIONS[] = {{"station", required_argument, NULL, OPT
                                         {"frames", required_argument, NULL, OPT_FRAMES},
                                         {"duration", required_argument, NULL, OPT_DURATION},
                                         {"listen", no_argument, NULL, OPT_LISTEN},
+                                        {"poses", required_argument, NULL, OPT_POSES},
                                         {"ascii", no_argument, NULL, OPT_ASCII},
                                         {"empty-shots", no_argument, NULL, OPT_EMPTY},
                                         {"stats", required_argument, NULL, OPT_STATS},
@@ -65,7 +69,8 @@ struct file {
 };
 
 struct record {
-    const char *source, *stats;
+    const char *source, *stats, *poses_path;
+    struct pose_file *poses;
     struct file file[MAX_FILES];
     int n_files;
     int all_stations;
@@ -111,6 +116,9 @@ static int parse_option(struct record *r, int opt, char **argv)
     case OPT_LISTEN:
         r->recording.listen = 1;
         return CMD_OK;
+    case OPT_POSES:
+        r->poses_path = optarg;
+        return CMD_OK;
     case OPT_ASCII:
         r->recorder.ascii = 1;
         return CMD_OK;
@@ -147,7 +155,7 @@ static int parse(struct record *r, int argc, char **argv)
         if (status != CMD_OK) return status;
     }
     if (optind != argc - 1) return cmd_usage("record", "one SOURCE is needed");
-    if (r->n_files == 0 && r->stats == NULL) return cmd_usage("record", "-o FILE is needed");
+    if (r->n_files == 0 && r->stats == NULL && r->poses_path == NULL) return cmd_usage("record", "-o FILE is needed");
     r->source = argv[optind];
     return -1;
 }
@@ -157,6 +165,7 @@ static int open_files(struct record *r, struct sh_err *err)
     int rc = SH_OK;
     for (int i = 0; i < r->n_files && rc == SH_OK; i++)
         rc = r->file[i].ops->open(r->file[i].path, &r->recorder, &r->file[i].rec, err);
+    if (rc == SH_OK && r->poses_path != NULL) rc = pose_file_open(r->poses_path, &r->poses, err);
     return rc;
 }
 
@@ -170,12 +179,20 @@ static int close_files(struct record *r, int keep, struct sh_err *err)
         r->file[i].rec = NULL;
         if (e != SH_OK && rc == SH_OK) rc = sh_fail(err, e, "%s", why.text);
     }
+    struct sh_err why = {0};
+    int e = pose_file_close(r->poses, keep, &why);
+    r->poses = NULL;
+    if (e != SH_OK && rc == SH_OK) rc = sh_fail(err, e, "%s", why.text);
     return rc;
 }
 
 static int write_frame(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
 {
     struct record *r = ctx;
+    if (frame->type == SCANHEAD_POSES && r->poses != NULL) {
+        int rc = pose_file_frame(r->poses, sh, frame, err);
+        if (rc != SH_OK) return rc;
+    }
     for (int i = 0; i < r->n_files; i++) {
         int rc = r->file[i].ops->frame(r->file[i].rec, sh, frame, err);
         if (rc != SH_OK) return rc;
@@ -302,7 +319,12 @@ static int record_config(struct record *r, struct sh_err *err)
     }
     uint32_t frames = r->recording.frames >= 0 ? (uint32_t)r->recording.frames : cfg->settings.frames;
     int rc = SH_OK;
-    if (frames == 0 && !(r->recording.duration_s > 0.0))
+    int arrives = cfg->platform.kind == PLATFORM_TRAJECTORY && cfg->platform.at_end == PLATFORM_STOP;
+    if (cfg->platform.kind == PLATFORM_LIVE)
+        rc = sh_fail(err, SH_EINPUT,
+                     "%s: platform.kind: a live platform can't be recorded off line; run it, and record its link",
+                     cfg->file);
+    if (rc == SH_OK && frames == 0 && !arrives && !(r->recording.duration_s > 0.0))
         rc =
             sh_fail(err, SH_EINPUT, "%s: head.frames is 0, a scan without end; give --frames or --duration", cfg->file);
     if (rc == SH_OK) rc = offline_open(cfg, &cmd_report_stderr, &offline, err);

@@ -71,13 +71,19 @@ static int parse_value(struct command_call *call)
 {
     const struct command_row *row = call->row;
     char clip[COMMAND_CLIP_LEN];
-    command_clip(clip, call->param, strlen(call->param));
-    if (strchr(call->param, ',') != NULL) {
+    char *comma = strchr(call->param, ',');
+    if (comma != NULL && row->pose) {
+        call->pose = comma + 1;
+        while (comma > call->param && (comma[-1] == ' ' || comma[-1] == '\t'))
+            comma--;
+        *comma = '\0';
+    } else if (comma != NULL) {
         command_fail(call, CMD_E_NOT_ALLOWED, "%s takes one value", row->header);
         return -1;
     }
     if (row->setting != NULL && parse_special(call->param, &call->value.kind)) return 0;
     call->value.kind = COMMAND_VALUE_NUMBER;
+    command_clip(clip, call->param, strlen(call->param));
     const char *suffix = command_parse_decimal(call->param, &call->value.decimal);
     if (suffix == NULL || (*suffix != '\0' && !is_letter(*suffix))) {
         command_fail(call, CMD_E_DATA_TYPE, "%s takes a number%s, not '%s'", row->header,

@@ -7,9 +7,11 @@
  * are taken as a number; a setting's query takes MIN, MAX and DEF too ("HEAD:PRR? MAX"). MIN and MAX are the limits as
  * the profile and the other settings leave them now, so they are never refused. A setting may carry its unit as a
  * suffix: HZ, KHZ, MHZ (mega, as SCPI has it); DEG; DEG/S; a step is in nanoseconds or NS, US, MS, S. Numbers are taken
- * exactly or refused, never rounded. *STB?: 4 errors are queued, 128 scanning.
- * Outside the profile is -222; against another setting or the state -221. *CLS, like SYSTem:ERRor?, needs no control.
- * Reply: the value, or "OK", or `ERR -222,"Data out of range; HEAD:PRR 5000000 Hz, allowed 1000 to 1200000"`.
+ * exactly or refused, never rounded. With a live platform a step may carry its pose at the step's end:
+ * `TIME:STEP 10 MS, x, y, z, roll, pitch, heading`, metres in the scene frame and degrees (core/pose.h). *STB?: 4
+ * errors are queued, 128 scanning. Outside the profile is -222; against another setting or the state -221. *CLS, like
+ * SYSTem:ERRor?, needs no control. Reply: the value, or "OK", or `ERR -222,"Data out of range; HEAD:PRR 5000000 Hz,
+ * allowed 1000 to 1200000"`.
  *
  * Pure: no clock, no I/O, no thread; the loop owns the device, calls in one thread and carries out the effect. */
 #ifndef FIRMWARE_SIM_COMMAND_H
@@ -69,10 +71,12 @@ struct command_device {
     struct head_settings defaults; /* what *RST restores */
     enum head_state state;
     struct command_queue queue;
-    uint32_t control;     /* session that may change things; 0: nobody, the next who does takes it */
-    uint64_t frames_done; /* of the scan at hand or the last one */
-    int64_t t_ns;         /* device time */
-    int step_allowed;     /* 1 when the pace is `step` */
+    uint32_t control;                      /* session that may change things; 0: nobody, the next who does takes it */
+    uint64_t frames_done;                  /* of the scan at hand or the last one */
+    int64_t t_ns;                          /* device time */
+    int step_allowed;                      /* 1 when the pace is `step` */
+    int pose_allowed;                      /* 1 when the platform is live: a step may carry its pose ... */
+    double pose_centre_m[3], pose_reach_m; /* ... so far from there at most */
 };
 
 enum command_effect {
@@ -88,9 +92,11 @@ enum command_effect {
 struct command_result {
     enum command_effect effect;
     int64_t step_ns;
-    int error;                     /* 0, or the number that was queued */
-    int took_control;              /* this command made the session the one in control */
-    int changes;                   /* belongs in the journal: effect is not NONE or RELEASE */
+    int have_pose;
+    double pose[6];   /* of the platform at the end of the step: x, y, z (m), roll, pitch, heading (degrees) */
+    int error;        /* 0, or the number that was queued */
+    int took_control; /* this command made the session the one in control */
+    int changes;      /* belongs in the journal: effect is not NONE or RELEASE */
     char reply[COMMAND_MAX_REPLY]; /* one line without its end; empty for an empty line (no reply at all) */
 };
 

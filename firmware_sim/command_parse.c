@@ -56,7 +56,7 @@ int command_split(const char *line, struct command_request *req, const char **wh
         *why = req->header_len == 0 ? "a command begins with a letter, ':' or '*'" : "a blank must follow the header";
         return CMD_E_SYNTAX;
     }
-    req->param = skip_blanks(p);
+    req->param = req->text + (skip_blanks(p) - req->text);
     return CMD_E_NONE;
 }
 

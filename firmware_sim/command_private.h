@@ -22,7 +22,7 @@ struct command_request {
     const char *header; /* without a leading colon and the '?' */
     size_t header_len;
     int query;
-    const char *param; /* the rest without blanks around it; "" when there is none */
+    char *param; /* the rest without blanks around it; "" when there is none */
 };
 
 /* Returns 0, or the error number and its reason. A blank line gives header_len 0 and 0. */
@@ -99,7 +99,8 @@ struct command_call {
     struct command_device *dev;
     uint32_t session;
     const struct command_row *row;
-    const char *param; /* as written */
+    char *param;      /* as written; of a step, up to the pose */
+    const char *pose; /* what follows the step; NULL: nothing */
     struct command_value value;
     struct command_result *out;
 };
@@ -111,9 +112,13 @@ struct command_row {
     const struct command_unit *unit;          /* of act's one number; NULL: act takes none */
     const struct command_setting *setting;    /* NULL: MIN, MAX and DEF have no meaning */
     int open;                                 /* act is open to all sessions */
+    int pose;                                 /* a pose may follow the number */
 };
 
 const struct command_row *command_table(size_t *n);
+
+/* command_pose.c: call->pose as six numbers into call->out. Returns -1 when it failed. */
+int command_take_pose(struct command_call *call);
 
 /* Queues the error and makes it the reply. */
 void command_fail(struct command_call *call, int number, const char *fmt, ...) __attribute__((format(printf, 3, 4)));

@@ -152,6 +152,7 @@ static void act_step(struct command_call *call)
     int64_t step_ns;
     const int64_t day_ns = 86400000000000; /* a grant cannot be taken back */
     if (command_value_in_range(call, 1, day_ns, &step_ns) != 0) return;
+    if (call->pose != NULL && command_take_pose(call) != 0) return;
     if (!call->dev->step_allowed) {
         command_fail(call, CMD_E_SETTINGS, "%s needs the pace step", call->row->header);
         return;
@@ -162,10 +163,10 @@ static void act_step(struct command_call *call)
 }
 
 /* clang-format off */
-#define QUERY(header, query)       {header, query, NULL, NULL, NULL, 0}
-#define ACTION(header, act, open)  {header, NULL, act, NULL, NULL, open}
+#define QUERY(header, query)       {header, query, NULL, NULL, NULL, 0, 0}
+#define ACTION(header, act, open)  {header, NULL, act, NULL, NULL, open, 0}
 #define VALUE(header, unit, which) \
-    {header, command_setting_query, command_setting_change, &(unit), &settings[which], 0}
+    {header, command_setting_query, command_setting_change, &(unit), &settings[which], 0, 0}
 
 static const struct command_row rows[] = {
     QUERY("*IDN", query_idn),
@@ -193,7 +194,7 @@ static const struct command_row rows[] = {
     QUERY("SCAN:COUNt", query_count),
     QUERY("HELP", query_help),
     QUERY("TIME", query_time),
-    {"TIME:STEP", NULL, act_step, &unit_ns, NULL, 0},
+    {"TIME:STEP", NULL, act_step, &unit_ns, NULL, 0, 1},
 };
 /* clang-format on */
 

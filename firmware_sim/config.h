@@ -53,6 +53,21 @@ struct config_station {
     double lat_deg, lon_deg, height_m; /* of the head's origin */
 };
 
+enum config_platform_kind { PLATFORM_STATIC, PLATFORM_TRAJECTORY, PLATFORM_LIVE };
+enum config_at_end { PLATFORM_STOP, PLATFORM_HOLD };
+
+/* What the head stands on. Attitudes as core/pose.h has them. */
+struct config_platform {
+    enum config_platform_kind kind;
+    char file[CONFIG_PATH_LEN], waypoints[CONFIG_PATH_LEN]; /* trajectory: one of them */
+    double start_s;                                         /* of the trajectory, after its first sample */
+    enum config_at_end at_end;
+    double mount_m[3], mount_heading_deg, mount_pitch_deg, mount_roll_deg; /* of the head on the platform */
+    double reach_m, extrapolate_ms;                                        /* live */
+    char address[64];
+    uint32_t port; /* live, in real time: UDP; 0: the system chooses */
+};
+
 struct config {
     char file[CONFIG_PATH_LEN];
     char profile_file[CONFIG_PATH_LEN];
@@ -68,6 +83,7 @@ struct config {
     /* stations */
     struct config_station station[CONFIG_MAX_STATIONS];
     uint32_t n_stations;
+    struct config_platform platform;
     /* output */
     enum georef_crs crs;
     int utm_zone;

@@ -67,9 +67,6 @@ static int check_head(const struct cfg_reader *rd, const struct config *cfg)
                             "the pan goes from %.15g to %.15g deg; allowed pan_start_deg at most pan_stop_deg, 360 deg "
                             "apart at most",
                             from_micro(s->pan_start_udeg), from_micro(s->pan_stop_udeg));
-    if ((s->pan_udeg_s == 0 || span_udeg == 0) && s->frames != 0)
-        return cfg_fail_key(rd, given_of(rd, "head.frames", "head.pan_deg_s"), 0,
-                            "a pan at rest never ends a frame; allowed frames: 0, until stopped");
     if (s->station > cfg->n_stations)
         return cfg_fail_key(rd, "head.station", 0, "there is no station %u; allowed 1 to %u", s->station,
                             cfg->n_stations);
@@ -163,6 +160,45 @@ static int check_link(const struct cfg_reader *rd, const struct config *cfg, uin
     return SH_OK;
 }
 
+static int check_platform(const struct cfg_reader *rd, const struct config *cfg)
+{
+    static const struct {
+        const char *path;
+        unsigned kinds; /* bit per kind of platform that has the key */
+    } keys[] = {
+        {"platform.file", 1u << PLATFORM_TRAJECTORY},
+        {"platform.waypoints", 1u << PLATFORM_TRAJECTORY},
+        {"platform.start_s", 1u << PLATFORM_TRAJECTORY},
+        {"platform.at_end", 1u << PLATFORM_TRAJECTORY},
+        {"platform.reach_m", 1u << PLATFORM_LIVE},
+        {"platform.extrapolate_ms", 1u << PLATFORM_LIVE},
+        {"platform.address", 1u << PLATFORM_LIVE},
+        {"platform.port", 1u << PLATFORM_LIVE},
+        {"platform.mount_m", ~1u},
+        {"platform.mount_heading_deg", ~1u},
+        {"platform.mount_pitch_deg", ~1u},
+        {"platform.mount_roll_deg", ~1u},
+    };
+    static const char *const has[] = {
+        [PLATFORM_STATIC] = "kind alone; the station says where the head stands",
+        [PLATFORM_TRAJECTORY] = "file or waypoints, start_s, at_end, mount_...",
+        [PLATFORM_LIVE] = "reach_m, extrapolate_ms, address, port, mount_...",
+    };
+    const struct config_platform *p = &cfg->platform;
+    for (size_t k = 0; k < sizeof keys / sizeof keys[0]; k++)
+        if (is_given(rd, keys[k].path, 0) && !(keys[k].kinds & 1u << p->kind))
+            return cfg_fail_key(rd, keys[k].path, 0, "a %s platform has no such key; allowed %s",
+                                cfg_find(&rd->table, "platform.kind")->names[p->kind], has[p->kind]);
+    if (p->kind == PLATFORM_LIVE && cfg->pace == PACE_FAST)
+        return cfg_fail_key(rd, "loop.pace", 0,
+                            "nobody can say in time where a live platform is; allowed realtime, step");
+    if (p->kind != PLATFORM_TRAJECTORY) return SH_OK;
+    if ((p->file[0] != '\0') == (p->waypoints[0] != '\0'))
+        return cfg_fail_key(rd, p->file[0] != '\0' ? "platform.waypoints" : "platform.kind", 0,
+                            "a trajectory comes from one file; allowed either platform.file or platform.waypoints");
+    return SH_OK;
+}
+
 static int check_loop(const struct cfg_reader *rd, const struct config *cfg)
 {
     if (fmod(1e9, cfg->tick_hz) == 0.0 && floor(cfg->tick_hz) == cfg->tick_hz) return SH_OK;
@@ -180,6 +216,7 @@ int cfg_check(const struct cfg_reader *rd, struct config *cfg)
         code = check_mesh(rd, &cfg->mesh[i], i);
     if (code == SH_OK) code = check_stations(rd, cfg);
     if (code == SH_OK) code = check_output(rd, cfg);
+    if (code == SH_OK) code = check_platform(rd, cfg);
     for (uint32_t i = 0; i < cfg->n_links && code == SH_OK; i++)
         code = check_link(rd, cfg, i);
     if (code == SH_OK) code = check_loop(rd, cfg);

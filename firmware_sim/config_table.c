@@ -22,6 +22,10 @@ static const char *const link_names[] = {
 static const char *const pace_names[] = {
     [PACE_REALTIME] = "realtime", [PACE_FAST] = "fast", [PACE_STEP] = "step", NULL};
 
+static const char *const platform_names[] = {
+    [PLATFORM_STATIC] = "static", [PLATFORM_TRAJECTORY] = "trajectory", [PLATFORM_LIVE] = "live", NULL};
+static const char *const at_end_names[] = {[PLATFORM_STOP] = "stop", [PLATFORM_HOLD] = "hold", NULL};
+
 /* clang-format off */
 static const struct cfg_key config_keys[] = {
     {"head", CFG_MAP, .help = "The head and its settings at power-up."},
@@ -34,7 +38,7 @@ static const struct cfg_key config_keys[] = {
     {"head.lines_hz", CFG_MICRO, "Hz", "@lines_max_hz", WITHIN("lines_min_hz", "lines_max_hz"),
      IN_CONFIG(settings.lines_uhz), .help = "Lines per second; at most prr_hz."},
     {"head.pan_deg_s", CFG_MICRO, "deg/s", "@pan_max_deg_s", 0, 9e12, NULL, "pan_max_deg_s",
-     IN_CONFIG(settings.pan_udeg_s), .help = "Pan speed. 0: the head stands still, which needs frames: 0."},
+     IN_CONFIG(settings.pan_udeg_s), .help = "Pan speed. 0: the pan stands still, each line is a frame."},
     {"head.line_start_deg", CFG_MICRO, "deg", "@fov_min_deg", WITHIN("fov_min_deg", "fov_max_deg"),
      IN_CONFIG(settings.line_start_udeg), .help = "First line angle cast: 0 forward, 90 up, above 90 backward."},
     {"head.line_stop_deg", CFG_MICRO, "deg", "@fov_max_deg", WITHIN("fov_min_deg", "fov_max_deg"),
@@ -84,6 +88,33 @@ static const struct cfg_key config_keys[] = {
      .help = "Longitude; required unless output.crs is local."},
     {"stations[].height_m", CFG_REAL, "m", "0", -1000, 10000, IN_STATION(height_m),
      .help = "Height above the ellipsoid; required unless output.crs is local."},
+
+    {"platform", CFG_MAP, .help = "What the head stands on: a tripod, or something that moves."},
+    {"platform.kind", CFG_ENUM, .def = "static", .names = platform_names, IN_CONFIG(platform.kind),
+     .help = "static: at the station; trajectory: along a file; live: as a peer says, by UDP or (pace step) with TIME:STEP."},
+    {"platform.file", CFG_PATH, .def = "", IN_CONFIG(platform.file),
+     .help = "trajectory: CSV with t_s,x_m,y_m,z_m,roll_deg,pitch_deg,heading_deg (or qw,qx,qy,qz), scene frame."},
+    {"platform.waypoints", CFG_PATH, .def = "", IN_CONFIG(platform.waypoints),
+     .help = "trajectory: CSV with x_m,y_m,z_m,speed_m_s[,pause_s] instead; heading along the path."},
+    {"platform.start_s", CFG_REAL, "s", "0", 0, 1e9, IN_CONFIG(platform.start_s),
+     .help = "trajectory: where a scan starts on it, after its first sample."},
+    {"platform.at_end", CFG_ENUM, .def = "stop", .names = at_end_names, IN_CONFIG(platform.at_end),
+     .help = "trajectory: at its end the scan stops, or the platform holds its last pose."},
+    {"platform.mount_m", CFG_VEC3, "m", "[0, 0, 0]", -1000, 1000, IN_CONFIG(platform.mount_m),
+     .help = "The head's origin on the platform: right, forward, up."},
+    {"platform.mount_heading_deg", CFG_REAL, "deg", "0", -360, 360, IN_CONFIG(platform.mount_heading_deg),
+     .help = "Of the head on the platform, clockwise; then pitch, then roll."},
+    {"platform.mount_pitch_deg", CFG_REAL, "deg", "0", -90, 90, IN_CONFIG(platform.mount_pitch_deg),
+     .help = "Positive: nose up."},
+    {"platform.mount_roll_deg", CFG_REAL, "deg", "0", -360, 360, IN_CONFIG(platform.mount_roll_deg),
+     .help = "Positive: right side down."},
+    {"platform.reach_m", CFG_REAL, "m", "100", 1, 1000, IN_CONFIG(platform.reach_m),
+     .help = "live: how far from the station the head may come."},
+    {"platform.extrapolate_ms", CFG_REAL, "ms", "100", 0, 10000, IN_CONFIG(platform.extrapolate_ms),
+     .help = "live: how long the last two poses are taken to go on; later the platform stands, and is late."},
+    {"platform.address", CFG_TEXT, .def = "127.0.0.1", IN_CONFIG(platform.address),
+     .help = "live, in real time: address where poses come in by UDP, lines of t_s x y z roll pitch heading."},
+    {"platform.port", CFG_COUNT, NULL, "0", 0, 65535, IN_CONFIG(platform.port), .help = "live: its port; 0: the system chooses."},
 
     {"output", CFG_MAP, .help = "Form of the points."},
     {"output.crs", CFG_ENUM, .def = "local", .names = crs_names, IN_CONFIG(crs),

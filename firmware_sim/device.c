@@ -81,6 +81,7 @@ static void begin_scan(struct device *device, uint64_t tick)
     device->station = device->cmd.settings.station - 1;
     device->describe = 1;
     device->cmd.frames_done = 0;
+    device->live.next = 0;
     device_push_event(device, NATIVE_EV_SCAN_START, device->scan, tick * (uint64_t)device->tick_ns, 0, "");
     if (device->options.start && device->options.duration_s > 0.0 && device->scan == 1)
         device->end_tick = tick + ticks_of(device, device->options.duration_s);
@@ -167,19 +168,25 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
     work->station = device->station;
     work->pulse0 = device->pulse_next;
     /* A stop keeps what was fired before this tick began; else the cut leaves whole packets for the next tick. */
-    uint64_t due = schedule_pulse_at(seg, stop ? since : since + device->tick_ns);
+    int64_t path_end_ns = device_path_end_ns(device), until_ns = stop ? since : since + device->tick_ns;
+    int arrives = path_end_ns <= until_ns; /* at the end of a trajectory */
+    uint64_t due = schedule_pulse_at(seg, arrives ? path_end_ns : until_ns);
     uint64_t room_end = tick_room_end(device);
-    if (due > room_end) due = room_end;
-    uint64_t end = stop ? due : schedule_cut(seg, due);
+    if (due > room_end) {
+        due = room_end;
+        arrives = 0;
+    }
+    uint64_t end = stop || arrives ? due : schedule_cut(seg, due);
     int done = due >= seg->end_pulse && !stop;
     if (done || end > seg->end_pulse) end = seg->end_pulse;
     if (end < work->pulse0) end = work->pulse0;
     work->pulse_end = device->pulse_next = end;
-    work->cut_short = stop && end < seg->end_pulse;
+    work->cut_short = (stop || arrives) && end < seg->end_pulse;
+    device_take_poses(device, work);
     struct schedule_line line;
     schedule_get_line(seg, schedule_line_of(seg, end), &line);
     device->cmd.frames_done = end >= seg->end_pulse && seg->spec.frames != 0 ? seg->spec.frames : line.frame;
-    return done || stop;
+    return done || stop || arrives;
 }
 
 static void describe(struct device *device, uint64_t tick, struct device_work *work)
@@ -244,7 +251,7 @@ int device_claim(struct device *device, uint64_t released, struct device_work *w
     uint64_t tick = device->next_tick;
     memset(work, 0, offsetof(struct device_work, event));
     work->describe = work->scanning = work->telemetry = work->cut_short = 0;
-    work->surfaces_n = 0;
+    work->surfaces_n = work->n_poses = 0;
     work->tick = tick;
     work->t_ns = (int64_t)tick * device->tick_ns;
     run_replay(device, tick);

@@ -18,7 +18,7 @@
 #include "firmware_sim/journal.h"
 #include "firmware_sim/site.h"
 
-enum { DEVICE_MAX_EVENTS = 24 };
+enum { DEVICE_MAX_EVENTS = 24, DEVICE_MAX_POSES = 256 };
 
 /* Counters that casters, pacing thread and readers share. */
 struct device_counters {
@@ -26,6 +26,7 @@ struct device_counters {
     _Atomic uint64_t lost_pulses, lost_ticks;      /* cast pulses and ticks that could not be computed in time */
     _Atomic uint64_t late_blocks, late_max_ns;
     _Atomic uint64_t reader_lost_frames;
+    _Atomic uint64_t late_poses, bad_poses; /* live: made up for want of one in time; that came and could not be used */
 };
 
 /* What one tick consists of; all copies, so that nobody waits for anybody. Frames leave in the order of the members. */
@@ -45,6 +46,8 @@ struct device_work {
     uint64_t pulse0, pulse_end; /* pulses of this tick */
     int cut_short;              /* the scan stops at pulse_end, within a line */
     uint32_t station;
+    uint32_t n_poses; /* live: the head's poses of this tick; 0: a head that stands still, or goes along a trajectory */
+    struct pose_knot pose[DEVICE_MAX_POSES];
     int telemetry;
     struct native_telemetry telemetry_frame;
 };
@@ -87,6 +90,12 @@ void device_command(struct device *device, uint32_t session, const char *line, u
 void device_overlong(struct device *device, uint32_t session, struct command_result *out);
 /* A session has gone; partial: in the middle of a command. Gives control back. */
 void device_session_closed(struct device *device, uint32_t session, const char *who, int partial);
+/* Where a live platform is at a device time (of its own, before the mount): from TIME:STEP or the socket. Returns 0, or
+ * 1 where it can't be used (not later than the one before, or out of reach): then it is counted. */
+int device_pose(struct device *device, int64_t t_ns, const struct pose *pose);
+/* The same from x, y, z (m), roll, pitch, heading (degrees). */
+int device_pose_numbers(struct device *device, int64_t t_ns, const double v[6]);
+
 /* Something for the error queue (enum command_error), and an event on the wire. */
 void device_report(struct device *device, int number, const char *text);
 

@@ -107,6 +107,16 @@ void device_session_closed(struct device *device, uint32_t session, const char *
     if (in_control || scanning) device_report(device, CMD_E_CLIENT_LOST, text);
 }
 
+/* The first pulse of a tick may be 15 periods old. */
+static int check_live(const struct device *device, struct sh_err *err)
+{
+    const struct config *cfg = device->site->cfg;
+    double ticks = SCHEDULE_PACKET * 1e6 / (double)cfg->profile.prr_min_uhz * (double)device->tick_hz + 3.0;
+    if (cfg->platform.kind != PLATFORM_LIVE || ticks <= DEVICE_MAX_POSES) return SH_OK;
+    return sh_fail(err, SH_EINPUT, "%s: platform.kind: live needs prr_min_hz of head profile %s to be at least %.0f",
+                   cfg->file, cfg->profile.name, SCHEDULE_PACKET * (double)device->tick_hz / (DEVICE_MAX_POSES - 3.0));
+}
+
 static int set_limits(struct device *device, struct sh_err *err)
 {
     const struct config *cfg = device->site->cfg;
@@ -131,6 +141,9 @@ static int set_limits(struct device *device, struct sh_err *err)
     strcpy(device->idn, idn);
     device->cmd.idn = device->idn;
     device->cmd.step_allowed = cfg->pace == PACE_STEP;
+    device->cmd.pose_allowed = cfg->platform.kind == PLATFORM_LIVE;
+    memcpy(device->cmd.pose_centre_m, cfg->station[0].position_m, sizeof device->cmd.pose_centre_m);
+    device->cmd.pose_reach_m = cfg->platform.reach_m;
     return SH_OK;
 }
 
@@ -159,6 +172,7 @@ int device_create(const struct site *site, const struct device_options *options,
     if (options->duration_s > 0.0 && !options->start)
         device->end_tick = (uint64_t)ceil(options->duration_s * (double)device->tick_hz);
     int rc = set_limits(device, err);
+    if (rc == SH_OK) rc = check_live(device, err);
     if (rc == SH_OK) rc = open_journals(device, err);
     if (rc != SH_OK) {
         device_free(device);

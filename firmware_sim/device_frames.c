@@ -75,6 +75,7 @@ void device_fill_anchor(const struct device *device, struct native_anchor *a)
     a->height_m = s->station->height_m;
     memcpy(a->station_m, s->station->position_m, sizeof a->station_m);
     memcpy(a->rotation, s->rotation, sizeof a->rotation);
+    a->moving = (uint32_t)device->site->moving;
 }
 
 void device_fill_telemetry(const struct device *device, uint64_t tick, struct native_telemetry *t)

@@ -6,6 +6,18 @@
 
 #include "firmware_sim/device.h"
 
+/* Poses of a live platform. Each tick begins with one of the head, made once, from those that had come. */
+struct device_live {
+    struct {
+        int64_t t_ns;     /* device time */
+        struct pose pose; /* of the platform */
+    } sample[64];
+    uint64_t n; /* that came; number i at i % 64 */
+    struct pose_knot knot[2 * DEVICE_MAX_POSES];
+    int64_t next;       /* knots of this scan that are made; number i, at i ticks of the scan, at i % LEN(knot) */
+    uint64_t said_tick; /* of the last event about late poses */
+};
+
 enum { DEVICE_MAX_PENDING = 256, DEVICE_MAX_CHANGES = 32, DEVICE_SURFACES_A_FRAME = 64 };
 
 struct device {
@@ -42,6 +54,7 @@ struct device {
     uint64_t lost_first;   /* first lost pulse that no event has told of; UINT64_MAX: none */
     uint64_t overrun_tick; /* of the last overrun event */
 
+    struct device_live live;
     int ending, over;
     uint64_t end_tick; /* UINT64_MAX: none */
     struct journal *journal;
@@ -57,6 +70,11 @@ void device_transition(struct device *device, enum head_event event, uint64_t ti
 enum head_state device_visible_state(const struct device *device, uint64_t released);
 void device_do_command(struct device *device, uint32_t session, const char *line, uint64_t released,
                        struct command_result *out);
+
+/* device_pose.c: with the lock held. The end of the head's path, since the scan's start; INT64_MAX: there is none. */
+int64_t device_path_end_ns(const struct device *device);
+/* Poses of a live head for the pulses that the work holds. */
+void device_take_poses(struct device *device, struct device_work *work);
 
 /* device_frames.c: what the frames say. */
 void device_fill_descriptor(const struct device *device, struct native_descriptor *d);

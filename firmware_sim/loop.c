@@ -79,6 +79,8 @@ int loop_create(const struct site *site, struct device *device, const struct loo
     for (uint32_t i = 0; i < loop->n_threads && rc == SH_OK; i++)
         rc = worker_create(site, &loop->worker[i], err);
     if (rc == SH_OK) rc = open_links(loop, err);
+    if (rc == SH_OK && cfg->platform.kind == PLATFORM_LIVE && cfg->pace == PACE_REALTIME)
+        rc = pose_feed_open(device, cfg, &loop->feed, err);
     if (rc != SH_OK) {
         loop_free(loop);
         return rc;
@@ -90,6 +92,7 @@ int loop_create(const struct site *site, struct device *device, const struct loo
 void loop_free(struct loop *loop)
 {
     if (loop == NULL) return;
+    pose_feed_close(loop->feed);
     for (uint32_t i = 0; i < loop->n_pumps; i++)
         pump_close(loop->pump[i]);
     for (uint32_t i = 0; i < loop->n_threads; i++)
@@ -104,6 +107,10 @@ void loop_free(struct loop *loop)
 
 int loop_endpoint(const struct loop *loop, uint32_t i, char *buf, size_t len)
 {
+    if (i == loop->n_pumps && loop->feed != NULL) {
+        pose_feed_endpoint(loop->feed, buf, len);
+        return 1;
+    }
     if (i >= loop->n_pumps) return 0;
     pump_endpoint(loop->pump[i], buf, len);
     return 1;
@@ -116,6 +123,11 @@ void loop_print_endpoints(const struct loop *loop, FILE *out)
         char text[512];
         pump_endpoint(loop->pump[i], text, sizeof text);
         fprintf(out, "%s{\"type\":\"%s\",\"endpoint\":\"%s\"}", i == 0 ? "" : ",", pump_type(loop->pump[i]), text);
+    }
+    if (loop->feed != NULL) {
+        char text[512];
+        pose_feed_endpoint(loop->feed, text, sizeof text);
+        fprintf(out, "%s{\"type\":\"pose\",\"endpoint\":\"%s\"}", loop->n_pumps == 0 ? "" : ",", text);
     }
     fprintf(out, "]}\n");
 }
@@ -158,6 +170,7 @@ static int start_pumps(struct loop *loop, struct sh_err *err)
 int loop_start(struct loop *loop, struct sh_err *err)
 {
     int rc = loop->options.hash ? hasher_start(loop, &loop->hasher, err) : SH_OK;
+    if (rc == SH_OK && loop->feed != NULL) rc = pose_feed_start(loop->feed, err);
     if (rc == SH_OK) rc = start_pumps(loop, err);
     if (rc == SH_OK) rc = start_pacer(loop, err);
     for (uint32_t i = 0; i < loop->n_threads && rc == SH_OK; i++) {
@@ -210,6 +223,8 @@ static void fill_stats(struct loop *loop, struct loop_stats *stats)
     stats->lost_ticks = atomic_load(&c->lost_ticks);
     stats->late_blocks = atomic_load(&c->late_blocks);
     stats->reader_lost_frames = atomic_load(&c->reader_lost_frames);
+    stats->late_poses = atomic_load(&c->late_poses);
+    stats->bad_poses = atomic_load(&c->bad_poses);
     stats->scans = device_scans(loop->device);
     stats->wall_s = 1e-9 * (double)(atomic_load(&loop->last_pulse_ns) - atomic_load(&loop->first_pulse_ns));
     stats->late_p50_us = late_quantile_us(loop, 0.5);

@@ -28,7 +28,8 @@ struct loop_options {
 struct loop_stats {
     uint64_t pulses, fired_pulses, echoes, lines, scans;
     uint64_t lost_pulses, lost_ticks, late_blocks, reader_lost_frames;
-    double wall_s; /* from the release of the first pulse to that of the last */
+    uint64_t late_poses, bad_poses; /* of a live platform */
+    double wall_s;                  /* from the release of the first pulse to that of the last */
     double late_p50_us, late_p999_us, late_max_us;
     int have_hash;
     char sha256[65];
@@ -40,7 +41,7 @@ int loop_create(const struct site *site, struct device *device, const struct loo
 
 /* One JSON line with the endpoints of all links. */
 void loop_print_endpoints(const struct loop *loop, FILE *out);
-/* "tty:..." and so on of link i, or 0 when there is no such link. */
+/* "tty:..." and so on of link i, behind the links of the socket for poses, or 0 when there is no such link. */
 int loop_endpoint(const struct loop *loop, uint32_t i, char *buf, size_t len);
 
 /* Starts the threads. */

@@ -6,6 +6,7 @@
 #include <semaphore.h>
 
 #include "firmware_sim/loop.h"
+#include "firmware_sim/pose_feed.h"
 #include "firmware_sim/ring.h"
 #include "firmware_sim/work.h"
 
@@ -72,6 +73,7 @@ struct loop {
     struct pump *pump[LOOP_MAX_LINKS];
     uint32_t n_pumps;
     struct hasher *hasher;
+    struct pose_feed *feed; /* of a live platform in real time; NULL: none */
 };
 
 static inline int loop_waits(const struct loop *loop)

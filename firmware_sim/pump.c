@@ -165,6 +165,8 @@ static void start_step(struct pump *pump, struct session *s, const struct comman
     struct loop *loop = pump->loop;
     uint64_t total = atomic_fetch_add(&loop->granted_ns, (uint64_t)result->step_ns) + (uint64_t)result->step_ns;
     s->step_tick = total / (uint64_t)loop->tick_ns;
+    if (result->have_pose)
+        device_pose_numbers(loop->device, (int64_t)total, result->pose); /* before its time is granted */
     atomic_store(&loop->granted, s->step_tick);
     s->stepping = 1;
     memcpy(s->step_reply, result->reply, sizeof s->step_reply);

@@ -1,4 +1,4 @@
-#include "firmware_sim/site.h"
+#include "firmware_sim/site_platform.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -144,20 +144,35 @@ static int add_station(struct site *site, const struct config_station *station, 
     memcpy(spec.station_m, station->position_m, sizeof spec.station_m);
     s->station = station;
     cast_rotation(station->heading_deg * M_PI / 180.0, s->rotation);
-    int rc = find_bvh(site, station->position_m, report, &s->bvh, err);
+    int rc = SH_OK;
+    if (site->moving)
+        s->bvh = site->bvh[0];
+    else
+        rc = find_bvh(site, station->position_m, report, &s->bvh, err);
     if (rc == SH_OK) rc = georef_create(&spec, &s->georef, err);
     if (rc == SH_OK) site->n_stations++;
     return rc;
 }
 
-/* The finest 1e-6 x 10^n m with which the head's whole range fits into 31 bits, with 1 % left for scale and noise. */
-static double choose_scale(const struct config *cfg)
+/* The finest 1e-6 x 10^n m with which the head's whole range, from all of its path, fits into 31 bits, with 1 % left
+ * for scale and noise. */
+static double choose_scale(const struct config *cfg, double path_reach_m)
 {
     if (cfg->scale_m > 0.0) return cfg->scale_m;
     double scale_m = 1e-6;
-    while (cfg->profile.range_max_m * 1.01 / scale_m > 2147483647.0)
+    while ((cfg->profile.range_max_m + path_reach_m) * 1.01 / scale_m > 2147483647.0)
         scale_m *= 10.0;
     return scale_m;
+}
+
+static int check_path_fits(const struct site *site, struct sh_err *err)
+{
+    double most_m = site->cfg->profile.range_max_m + site->path_reach_m;
+    if (!site->moving || site->cfg->layout != LINE_GEO || most_m * 1.01 / site->scale_m < 0x1p31) return SH_OK;
+    return sh_fail(
+        err, SH_EINPUT,
+        "%s: output.scale_m: points up to %.0f m from the station do not fit into 31 bits; allowed above %.2g m",
+        site->cfg->file, most_m, most_m * 1.01 / 0x1p31);
 }
 
 int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err)
@@ -166,8 +181,11 @@ int site_load(const struct config *cfg, const struct sh_report *report, struct s
     struct site *site = calloc(1, sizeof *site);
     if (site == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     site->cfg = cfg;
-    site->scale_m = choose_scale(cfg);
+    site->moving = cfg->platform.kind != PLATFORM_STATIC;
     int rc = load_scene(site, report, err);
+    if (rc == SH_OK && site->moving) rc = site_load_platform(site, report, err);
+    site->scale_m = choose_scale(cfg, site->path_reach_m);
+    if (rc == SH_OK) rc = check_path_fits(site, err);
     for (uint32_t i = 0; i < cfg->n_stations && rc == SH_OK; i++)
         rc = add_station(site, &cfg->station[i], report, err);
     if (rc != SH_OK) {
@@ -181,6 +199,8 @@ int site_load(const struct config *cfg, const struct sh_report *report, struct s
 void site_free(struct site *site)
 {
     if (site == NULL) return;
+    free(site->knot);
+    free(site->stretch);
     for (uint32_t i = 0; i < site->n_stations; i++)
         georef_free(site->station[i].georef);
     for (uint32_t i = 0; i < site->n_bvh; i++)

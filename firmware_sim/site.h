@@ -5,6 +5,7 @@
 
 #include "core/cast.h"
 #include "core/georef.h"
+#include "core/pose.h"
 #include "core/scene.h"
 #include "firmware_sim/config.h"
 
@@ -22,6 +23,12 @@ struct site_mover {
     double centre_m[3], radius_m;
 };
 
+/* A stretch of a moving head's path, with a BVH that reaches all of it. */
+struct site_stretch {
+    int64_t until_ns; /* since the scan's start */
+    struct bvh *bvh;
+};
+
 struct site {
     const struct config *cfg;
     struct scene *scene; /* what stands still */
@@ -31,7 +38,16 @@ struct site {
     uint32_t n_bvh;
     struct site_station station[CONFIG_MAX_STATIONS];
     uint32_t n_stations;
-    double scale_m; /* of positions and ranges on the wire, metres per count */
+    /* A moving head; the stations then only say where on Earth the scene lies. */
+    int moving;
+    struct pose mount;            /* of the head on the platform */
+    struct pose_knot *knot;       /* trajectory: the head's poses from the scan's start on */
+    size_t n_knots;               /* 0: live */
+    double knot_error_m;          /* what the head's path differs from the trajectory by, at most */
+    struct site_stretch *stretch; /* in order of time */
+    size_t n_stretches;
+    double path_reach_m; /* from any station */
+    double scale_m;      /* of positions and ranges on the wire, metres per count */
 };
 
 /* Stations further than this from a BVH's origin get one of their own: a float there has steps of 0.06 mm. */
@@ -43,6 +59,9 @@ void site_free(struct site *site);
 
 /* Names of a label below n_surfaces. */
 const struct scene_surface *site_surface(const struct site *site, uint32_t label);
+
+/* The BVH for a moving head at a time of the scan. */
+struct bvh *site_bvh_at(const struct site *site, int64_t t_ns);
 
 /* Poses of all movers at a time of the scan. */
 void site_move(const struct site *site, double t_s, struct cast_setup *setup);

@@ -11,6 +11,9 @@ struct worker {
     struct line_block block;
     struct cast_setup setup;
     uint32_t setup_station; /* 1 + the station that setup is for; 0: none yet */
+    /* a moving head: its poses for the pulses at hand, and as they go out */
+    struct pose_knot knot[NATIVE_MAX_POSES];
+    struct native_pose pose[NATIVE_MAX_POSES];
 };
 
 enum {
@@ -47,7 +50,8 @@ void worker_free(struct worker *worker)
 uint32_t worker_slot_bytes(const struct config *cfg)
 {
     /* Each line part is a frame of its own. */
-    return OVERHEAD_BYTES + (uint32_t)native_points_bound(device_tick_pulses(cfg)) +
+    uint32_t poses = cfg->platform.kind != PLATFORM_STATIC ? NATIVE_MAX_FRAME : 0;
+    return OVERHEAD_BYTES + poses + (uint32_t)native_points_bound(device_tick_pulses(cfg)) +
            device_tick_lines(cfg) * (LINE_END_BYTES + NATIVE_HEADER_LEN + NATIVE_POINTS_HEAD_LEN);
 }
 
@@ -96,6 +100,57 @@ static uint32_t frames_in(const uint8_t *bytes, size_t len)
     return n;
 }
 
+/* All poses from the last at or before the first pulse to the first at or behind the last one. Of a trajectory with
+ * more than a frame holds (pulses far apart) only some: what goes out is what is cast with in any case. */
+static uint32_t choose_knots(struct worker *worker, int64_t from_ns, int64_t to_ns)
+{
+    const struct site *site = worker->site;
+    const struct pose_knot *knot = site->knot;
+    size_t lo = 0, hi = site->n_knots;
+    while (hi - lo > 1) {
+        size_t mid = lo + (hi - lo) / 2;
+        if (knot[mid].t_ns <= from_ns)
+            lo = mid;
+        else
+            hi = mid;
+    }
+    for (hi = lo; hi + 1 < site->n_knots && knot[hi].t_ns < to_ns;)
+        hi++;
+    size_t stride = (hi - lo) / (NATIVE_MAX_POSES - 2) + 1;
+    uint32_t n = 0;
+    for (size_t i = lo; i < hi; i += stride)
+        worker->knot[n++] = knot[i];
+    worker->knot[n++] = knot[hi];
+    if (n == 1 || knot[hi].t_ns < to_ns) { /* behind its end the head stands */
+        worker->knot[n] = knot[hi];
+        worker->knot[n++].t_ns = to_ns > knot[hi].t_ns ? to_ns : knot[hi].t_ns + 1;
+    }
+    return n;
+}
+
+static void take_poses(struct worker *worker, const struct device_work *work, struct ring_slot *slot, uint32_t cap)
+{
+    if (!worker->site->moving || work->pulse_end == work->pulse0) return;
+    struct cast_setup *setup = &worker->setup;
+    setup->knot = worker->knot;
+    setup->n_knots = work->n_poses;
+    if (work->n_poses != 0)
+        memcpy(worker->knot, work->pose, work->n_poses * sizeof *work->pose);
+    else
+        setup->n_knots = choose_knots(worker, schedule_time_ns(&work->segment, work->pulse0),
+                                      schedule_time_ns(&work->segment, work->pulse_end - 1));
+    for (uint32_t i = 0; i < setup->n_knots; i++) {
+        const struct pose_knot *k = &worker->knot[i];
+        struct native_pose *p = &worker->pose[i];
+        *p = (struct native_pose){.t_ns = k->t_ns, .frame = k->frame, .flags = k->flags};
+        memcpy(p->position_m, k->pose.position_m, sizeof p->position_m);
+        memcpy(p->quat, k->pose.quat, sizeof p->quat);
+    }
+    added(slot,
+          native_encode_poses(slot->bytes + slot->len, cap - slot->len, worker->pose, setup->n_knots, work->t_ns, 0),
+          1);
+}
+
 static void cast_run(struct worker *worker, const struct device_work *work, const struct schedule_line *line,
                      uint64_t k, uint64_t end, struct ring_slot *slot, uint32_t cap)
 {
@@ -105,6 +160,7 @@ static void cast_run(struct worker *worker, const struct device_work *work, cons
         struct schedule_run run;
         uint64_t n = end - k < longest ? end - k : longest;
         schedule_get_run(&work->segment, line, k, (uint32_t)n, &run);
+        if (worker->site->moving) worker->setup.bvh = site_bvh_at(worker->site, run.t0_ns);
         uint32_t echoes = caster_cast(worker->caster, &worker->setup, &run, &worker->block);
         uint8_t *at = slot->bytes + slot->len;
         size_t len = native_encode_points(at, cap - slot->len, &worker->block, work->scan_t0_ns);
@@ -157,6 +213,7 @@ static void fill_pulses(struct worker *worker, const struct device_work *work, s
     }
     if (worker->site->n_movers != 0)
         site_move(worker->site, 1e-9 * (double)(work->t_ns - work->scan_t0_ns), &worker->setup);
+    take_poses(worker, work, slot, cap);
     for (uint64_t k = work->pulse0; k < work->pulse_end;) {
         struct schedule_line line;
         schedule_get_line(&work->segment, schedule_line_of(&work->segment, k), &line);

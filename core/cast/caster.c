@@ -14,6 +14,22 @@ struct mover_rays {
     uint32_t hit[CHUNK];
 };
 
+/* Of a moving head only. */
+struct moving_rays {
+    double sx[CHUNK], sy[CHUNK], sz[CHUNK]; /* direction, socs */
+    double rx[CHUNK], ry[CHUNK], rz[CHUNK]; /* as the encoders read it, socs; geo layout */
+    double px[CHUNK], py[CHUNK], pz[CHUNK]; /* origin, prcs */
+    double ox[CHUNK], oy[CHUNK], oz[CHUNK]; /* origin, local frame of the BVH at hand */
+    float fx[CHUNK], fy[CHUNK], fz[CHUNK];  /* likewise, as Embree gets it */
+    double qx[CHUNK], qy[CHUNK], qz[CHUNK]; /* origin in a moving body's frame */
+};
+
+/* Where rays begin: all at one point (px NULL), or each at its own; prcs. */
+struct origins {
+    double at_m[3];
+    const double *px, *py, *pz;
+};
+
 struct caster {
     struct bvh_packets packets;
     double mirror_turn[CHUNK], pan_turn[CHUNK];
@@ -26,6 +42,7 @@ struct caster {
     uint32_t doubt[CHUNK];              /* the proposal has to be decided in double */
     uint32_t seen[CHUNK], label[CHUNK]; /* labels of the last hits; of what counts in the end */
     struct mover_rays mover;            /* touched only where something moves */
+    struct moving_rays moving;          /* touched only where the head moves */
     struct cast_counters counters;
     struct cast_profile *profile;
 };
@@ -76,10 +93,20 @@ uint32_t cast_encoder_count(double turn, double counts_per_turn)
     return count >= counts_per_turn ? 0 : (uint32_t)(uint64_t)count;
 }
 
-static void decide_one(struct caster *c, struct decide_ray *ray, const struct kernel_hits *hits, uint32_t *prim,
-                       uint32_t i)
+static void set_origin(struct decide_ray *ray, double x, double y, double z)
+{
+    const double at[3] = {x, y, z};
+    for (int i = 0; i < 3; i++) {
+        ray->station_m[i] = at[i];
+        ray->o_local[i] = at[i] - ray->bvh->origin_m[i];
+    }
+}
+
+static void decide_one(struct caster *c, struct decide_ray *ray, const struct origins *from,
+                       const struct kernel_hits *hits, uint32_t *prim, uint32_t i)
 {
     struct decide_hit hit;
+    if (from->px != NULL) set_origin(ray, from->px[i], from->py[i], from->pz[i]);
     ray->dir[0] = hits->dx[i];
     ray->dir[1] = hits->dy[i];
     ray->dir[2] = hits->dz[i];
@@ -92,7 +119,8 @@ static void decide_one(struct caster *c, struct decide_ray *ray, const struct ke
 
 /* Doubts are few: whole packets without any are passed at once. Each costs a chain of cache misses, so they are looked
  * up together. */
-static void decide(struct caster *c, struct decide_ray *ray, const struct kernel_hits *hits, uint32_t *prim, uint32_t n)
+static void decide(struct caster *c, struct decide_ray *ray, const struct origins *from, const struct kernel_hits *hits,
+                   uint32_t *prim, uint32_t n)
 {
     uint32_t doubts = 0, in_doubt[CHUNK];
     for (uint32_t base = 0; base < n; base += SCHEDULE_PACKET) {
@@ -105,20 +133,43 @@ static void decide(struct caster *c, struct decide_ray *ray, const struct kernel
     if (doubts == 0) return;
     decide_prefetch(ray->bvh, prim, in_doubt, doubts);
     for (uint32_t k = 0; k < doubts; k++)
-        decide_one(c, ray, hits, prim, in_doubt[k]);
+        decide_one(c, ray, from, hits, prim, in_doubt[k]);
 }
 
-void caster_hits(struct caster *c, const struct bvh *bvh, const double station_m[3], double range_max_m, uint32_t n,
-                 const double *dx, const double *dy, const double *dz, double *range_m, uint32_t *triangle)
+/* One chunk: what Embree proposes and double precision makes of it. */
+static void cast_rays(struct caster *c, struct decide_ray *ray, struct bvh_rays *rays, const struct origins *from,
+                      const struct kernel_hits *hits, uint32_t n)
+{
+    struct moving_rays *m = &c->moving;
+    const struct bvh *bvh = ray->bvh;
+    kernel_to_float(hits->dx, hits->dy, hits->dz, n, c->fx, c->fy, c->fz);
+    if (from->px != NULL) {
+        kernel_subtract(from->px, from->py, from->pz, bvh->origin_m, n, m->ox, m->oy, m->oz);
+        kernel_to_float(m->ox, m->oy, m->oz, n, m->fx, m->fy, m->fz);
+        rays->ox = m->fx;
+        rays->oy = m->fy;
+        rays->oz = m->fz;
+    }
+    ends(c, CAST_DIRECTIONS);
+    bvh_intersect(bvh, &c->packets, rays, n);
+    ends(c, CAST_EMBREE);
+    uint32_t doubts = from->px != NULL ? kernel_refine_from(bvh, hits, m->ox, m->oy, m->oz, n)
+                                       : kernel_refine(bvh, hits, ray->o_local, n);
+    ends(c, CAST_REFINE);
+    if (doubts != 0) decide(c, ray, from, hits, c->prim, n);
+}
+
+/* n rays from one point, or (n <= CHUNK) each from its own. */
+static void hits_from(struct caster *c, const struct bvh *bvh, const struct origins *from, double range_max_m,
+                      uint32_t n, const double *dx, const double *dy, const double *dz, double *range_m,
+                      uint32_t *triangle)
 {
     struct decide_ray ray = {.bvh = bvh, .t_max = (float)(range_max_m * 1.001)};
     struct bvh_rays rays = {
         .t_max = ray.t_max, .dx = c->fx, .dy = c->fy, .dz = c->fz, .t = c->t, .u = c->u, .v = c->v, .prim = c->prim};
-    for (int i = 0; i < 3; i++) {
-        ray.station_m[i] = station_m[i];
-        ray.o_local[i] = station_m[i] - bvh->origin_m[i];
+    set_origin(&ray, from->at_m[0], from->at_m[1], from->at_m[2]);
+    for (int i = 0; i < 3; i++)
         rays.org[i] = (float)ray.o_local[i];
-    }
     for (uint32_t at = 0; at < n; at += CHUNK) {
         uint32_t m = n - at < CHUNK ? n - at : CHUNK;
         struct kernel_hits hits = {.dx = dx + at,
@@ -130,16 +181,17 @@ void caster_hits(struct caster *c, const struct bvh *bvh, const double station_m
                                    .range_m = range_m + at,
                                    .label = c->seen,
                                    .doubt = c->doubt};
-        kernel_to_float(hits.dx, hits.dy, hits.dz, m, c->fx, c->fy, c->fz);
-        ends(c, CAST_DIRECTIONS);
-        bvh_intersect(bvh, &c->packets, &rays, m);
-        ends(c, CAST_EMBREE);
-        uint32_t doubts = kernel_refine(bvh, &hits, ray.o_local, m);
-        ends(c, CAST_REFINE);
-        if (doubts != 0) decide(c, &ray, &hits, c->prim, m);
+        cast_rays(c, &ray, &rays, from, &hits, m);
         memcpy(triangle + at, c->prim, m * sizeof *triangle);
         ends(c, CAST_DECIDE);
     }
+}
+
+void caster_hits(struct caster *c, const struct bvh *bvh, const double station_m[3], double range_max_m, uint32_t n,
+                 const double *dx, const double *dy, const double *dz, double *range_m, uint32_t *triangle)
+{
+    const struct origins from = {.at_m = {station_m[0], station_m[1], station_m[2]}};
+    hits_from(c, bvh, &from, range_max_m, n, dx, dy, dz, range_m, triangle);
 }
 
 /* Socs to where positions go: straight to the CRS where that is a rotation, else to prcs. Returns 1 in the first case.
@@ -159,27 +211,53 @@ static int reading_rotation(const struct cast_setup *s, double to_crs[9])
 static void positions(struct caster *c, const struct cast_setup *s, int linear, struct line_block *block, uint32_t at,
                       uint32_t n)
 {
-    kernel_scale(c->range_m, n, c->ex, c->ey, c->ez);
+    const struct moving_rays *m = &c->moving;
+    if (s->n_knots != 0)
+        kernel_scale_from(c->range_m, m->px, m->py, m->pz, s->station_m, n, c->ex, c->ey, c->ez);
+    else
+        kernel_scale(c->range_m, n, c->ex, c->ey, c->ez);
     if (!linear) georef_forward(s->georef, n, c->ex, c->ey, c->ez, c->ex, c->ey, c->ez);
     kernel_geo(c->ex, c->ey, c->ez, s->xyz_scale_m, n, block->a + at, block->b + at, block->c + at);
 }
 
-/* A moving body, cast in its own frame: what it hides gives way. */
-static void cast_mover(struct caster *c, const struct cast_setup *s, const struct cast_mover *m, uint32_t n)
+/* How far the origins lie from the first of them. */
+static double spread_m(const struct origins *from, uint32_t n)
 {
-    double v[3], station_m[3], w[3];
+    double most2 = 0.0;
+    for (uint32_t i = 1; i < n; i++) {
+        double x = from->px[i] - from->px[0], y = from->py[i] - from->py[0], z = from->pz[i] - from->pz[0];
+        most2 = fmax(most2, x * x + y * y + z * z);
+    }
+    return sqrt(most2);
+}
+
+/* A moving body, cast in its own frame: what it hides gives way. */
+static void cast_mover(struct caster *c, const struct cast_setup *s, const struct cast_mover *m,
+                       const struct origins *from, uint32_t n)
+{
+    double v[3], w[3];
+    struct origins own = {.px = NULL};
     for (int i = 0; i < 3; i++) {
         const double *row = m->rotation + 3 * i;
-        v[i] = row[0] * m->centre_m[0] + row[1] * m->centre_m[1] + row[2] * m->centre_m[2] + m->shift_m[i] -
-               s->station_m[i];
-        w[i] = s->station_m[i] - m->shift_m[i];
+        double at = from->px != NULL ? (i == 0 ? from->px : i == 1 ? from->py : from->pz)[0] : from->at_m[i];
+        v[i] = row[0] * m->centre_m[0] + row[1] * m->centre_m[1] + row[2] * m->centre_m[2] + m->shift_m[i] - at;
+        w[i] = at - m->shift_m[i];
     }
-    if (!kernel_meets_sphere(c->dx, c->dy, c->dz, n, v, m->radius_m)) return;
+    double radius_m = m->radius_m + (from->px != NULL ? spread_m(from, n) : 0.0);
+    if (!kernel_meets_sphere(c->dx, c->dy, c->dz, n, v, radius_m)) return;
     for (int i = 0; i < 3; i++)
-        station_m[i] = m->rotation[i] * w[0] + m->rotation[3 + i] * w[1] + m->rotation[6 + i] * w[2];
+        own.at_m[i] = m->rotation[i] * w[0] + m->rotation[3 + i] * w[1] + m->rotation[6 + i] * w[2];
+    if (from->px != NULL) {
+        struct moving_rays *o = &c->moving;
+        kernel_subtract(from->px, from->py, from->pz, m->shift_m, n, o->ox, o->oy, o->oz);
+        kernel_turn_back(o->ox, o->oy, o->oz, m->rotation, n, o->qx, o->qy, o->qz);
+        own.px = o->qx;
+        own.py = o->qy;
+        own.pz = o->qz;
+    }
     struct mover_rays *r = &c->mover;
     kernel_turn_back(c->dx, c->dy, c->dz, m->rotation, n, r->dx, r->dy, r->dz);
-    caster_hits(c, m->bvh, station_m, s->range_max_m, n, r->dx, r->dy, r->dz, r->range_m, r->hit);
+    hits_from(c, m->bvh, &own, s->range_max_m, n, r->dx, r->dy, r->dz, r->range_m, r->hit);
     for (uint32_t i = 0; i < n; i++) {
         if (!(r->range_m[i] < c->range_m[i]) && !(isnan(c->range_m[i]) && !isnan(r->range_m[i]))) continue;
         c->range_m[i] = r->range_m[i];
@@ -187,21 +265,83 @@ static void cast_mover(struct caster *c, const struct cast_setup *s, const struc
     }
 }
 
+/* The last pose at or before t_ns, or the first. */
+static uint32_t find_knot(const struct cast_setup *s, int64_t t_ns)
+{
+    uint32_t lo = 0, hi = s->n_knots;
+    while (hi - lo > 1) {
+        uint32_t mid = lo + (hi - lo) / 2;
+        if (s->knot[mid].t_ns <= t_ns)
+            lo = mid;
+        else
+            hi = mid;
+    }
+    return lo;
+}
+
+/* Directions and origins of pulses first .. first + n of a run, from what its socs directions are; stretch by stretch
+ * between two poses. */
+static void move(struct caster *c, const struct cast_setup *s, int64_t t0_ns, const uint32_t *dt_ns, uint32_t n,
+                 int geo)
+{
+    struct moving_rays *m = &c->moving;
+    for (uint32_t i = 0, k = find_knot(s, t0_ns + dt_ns[0]); i < n; k++) {
+        int last = k + 1 >= s->n_knots, before = s->knot[k].t_ns > t0_ns + (int64_t)dt_ns[i];
+        uint32_t end = i;
+        while (end < n && (last || t0_ns + (int64_t)dt_ns[end] < s->knot[before ? k : k + 1].t_ns))
+            end++;
+        struct kernel_leg leg;
+        kernel_leg(&s->knot[k], &s->knot[last || before ? k : k + 1], t0_ns, &leg);
+        uint32_t part = end - i;
+        const uint32_t *dt = dt_ns + i;
+        kernel_turn_leg(&leg, dt, part, m->sx + i, m->sy + i, m->sz + i, c->dx + i, c->dy + i, c->dz + i);
+        if (geo) kernel_turn_leg(&leg, dt, part, m->rx + i, m->ry + i, m->rz + i, c->ex + i, c->ey + i, c->ez + i);
+        kernel_place_leg(&leg, dt, part, m->px + i, m->py + i, m->pz + i);
+        if (before) k--;
+        i = end;
+    }
+}
+
+/* Where the beams go and begin. Returns whether e is in the CRS already. */
+static int aim(struct caster *c, const struct cast_setup *s, const struct schedule_run *run, const uint32_t *dt_ns,
+               uint32_t at, uint32_t n, struct origins *from)
+{
+    static const double none[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+    struct moving_rays *m = &c->moving;
+    int geo = s->layout == LINE_GEO, linear = 0;
+    double to_crs[9];
+    kernel_angles(run, at, n, c->mirror_turn, c->pan_turn);
+    *from = (struct origins){.at_m = {s->station_m[0], s->station_m[1], s->station_m[2]}};
+    if (s->n_knots != 0) {
+        if (geo)
+            kernel_directions_read(s, c->mirror_turn, c->pan_turn, none, none, n, m->sx, m->sy, m->sz, m->rx, m->ry,
+                                   m->rz);
+        else
+            kernel_directions(c->mirror_turn, c->pan_turn, none, n, m->sx, m->sy, m->sz);
+        move(c, s, run->t0_ns, dt_ns + at, n, geo);
+        from->px = m->px;
+        from->py = m->py;
+        from->pz = m->pz;
+    } else if (geo) {
+        linear = reading_rotation(s, to_crs);
+        kernel_directions_read(s, c->mirror_turn, c->pan_turn, s->rotation, to_crs, n, c->dx, c->dy, c->dz, c->ex,
+                               c->ey, c->ez);
+    } else {
+        kernel_directions(c->mirror_turn, c->pan_turn, s->rotation, n, c->dx, c->dy, c->dz);
+    }
+    return linear;
+}
+
 static uint32_t cast_chunk(struct caster *c, const struct cast_setup *s, const struct schedule_run *run,
                            struct line_block *block, uint32_t at, uint32_t n)
 {
+    struct origins from;
     if (c->profile != NULL) c->profile->last = c->profile->now();
-    kernel_angles(run, at, n, c->mirror_turn, c->pan_turn);
-    double to_crs[9];
-    int geo = s->layout == LINE_GEO, linear = geo ? reading_rotation(s, to_crs) : 0;
-    if (geo)
-        kernel_directions_read(s, c->mirror_turn, c->pan_turn, to_crs, n, c->dx, c->dy, c->dz, c->ex, c->ey, c->ez);
-    else
-        kernel_directions(c->mirror_turn, c->pan_turn, s->rotation, n, c->dx, c->dy, c->dz);
-    caster_hits(c, s->bvh, s->station_m, s->range_max_m, n, c->dx, c->dy, c->dz, c->range_m, c->hit);
+    int linear = aim(c, s, run, block->dt_ns, at, n, &from);
+    hits_from(c, s->bvh, &from, s->range_max_m, n, c->dx, c->dy, c->dz, c->range_m, c->hit);
     memcpy(c->label, c->seen, n * sizeof *c->label);
     for (uint32_t i = 0; i < s->n_movers; i++)
-        cast_mover(c, s, &s->mover[i], n);
+        cast_mover(c, s, &s->mover[i], &from, n);
     uint32_t echoes = kernel_detect(c->range_m, s->range_min_m, s->range_max_m, n, block->echo + at);
     kernel_labels(c->label, block->echo + at, n, block->label + at);
     for (uint32_t i = 0; i < n; i++)
@@ -209,7 +349,7 @@ static uint32_t cast_chunk(struct caster *c, const struct cast_setup *s, const s
     ends(c, CAST_DETECT);
     if (s->noise_on) kernel_noise(s, run->pulse0 + at, n, c->range_m);
     ends(c, CAST_NOISE);
-    if (geo)
+    if (s->layout == LINE_GEO)
         positions(c, s, linear, block, at, n);
     else
         kernel_polar(s, c->range_m, c->mirror_turn, c->pan_turn, n, block->a + at, block->b + at, block->c + at);

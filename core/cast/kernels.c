@@ -66,12 +66,12 @@ static void directions_read(const double *restrict mirror_turn, const double *re
 }
 
 void kernel_directions_read(const struct cast_setup *setup, const double *mirror_turn, const double *pan_turn,
-                            const double to_crs[9], uint32_t n, double *dx, double *dy, double *dz, double *ex,
-                            double *ey, double *ez)
+                            const double rotation[9], const double to_crs[9], uint32_t n, double *dx, double *dy,
+                            double *dz, double *ex, double *ey, double *ez)
 {
     int ideal = setup->mirror_counts >= 4294967296.0 && setup->pan_counts >= 4294967296.0;
-    directions_read(mirror_turn, pan_turn, setup->mirror_counts, setup->pan_counts, ideal ? 0.0 : 1.0, setup->rotation,
-                    to_crs, n, dx, dy, dz, ex, ey, ez);
+    directions_read(mirror_turn, pan_turn, setup->mirror_counts, setup->pan_counts, ideal ? 0.0 : 1.0, rotation, to_crs,
+                    n, dx, dy, dz, ex, ey, ez);
 }
 
 VEC_CLONES
@@ -83,6 +83,26 @@ void kernel_to_float(const double *restrict dx, const double *restrict dy, const
         fy[i] = (float)dy[i];
         fz[i] = (float)dz[i];
     }
+}
+
+/* Whether a hit is so near to its triangle's border that the proposal is in doubt, and the triangle's label. slope:
+ * what the guard counts in, bvh.h. */
+VEC_INLINE uint32_t in_doubt(double nx, double ny, double nz, double slope, float u, float v, int hit, uint32_t *label)
+{
+    float w = 1.0f - u - v;
+    float least = u < v ? u : v;
+    least = w < least ? w : least;
+    uint64_t bits;
+    double guard;
+    memcpy(&bits, &nx, sizeof bits);
+    bits = ((bits & ((1U << BVH_SPARE_BITS) - 1)) + BVH_GUARD_BASE) << BVH_GUARD_SHIFT;
+    memcpy(&guard, &bits, sizeof guard);
+    uint64_t low, high;
+    memcpy(&low, &ny, sizeof low);
+    memcpy(&high, &nz, sizeof high);
+    *label = (uint32_t)((low & ((1U << BVH_SPARE_BITS) - 1)) | (high & 15) << BVH_SPARE_BITS);
+    uint32_t near = ((double)least * slope < guard) | (uint32_t)((high & BVH_RIVAL_BIT) != 0);
+    return near & (uint32_t)hit;
 }
 
 /* A miss has the highest number there is and reads the record behind the last triangle, which is all NaN. */
@@ -99,23 +119,8 @@ static uint32_t refine(const double *restrict tri, uint32_t n_triangles, const u
         double nx = tri[at], ny = tri[at + 1], nz = tri[at + 2];
         double along = nx * dx[i] + ny * dy[i] + nz * dz[i];
         range_m[i] = (tri[at + 3] - (nx * ox + ny * oy + nz * oz)) / along;
-        float w = 1.0f - u[i] - v[i];
-        float least = u[i] < v[i] ? u[i] : v[i];
-        least = w < least ? w : least;
-        uint64_t bits;
-        double guard;
-        memcpy(&bits, &nx, sizeof bits);
-        bits = ((bits & ((1U << BVH_SPARE_BITS) - 1)) + BVH_GUARD_BASE) << BVH_GUARD_SHIFT;
-        memcpy(&guard, &bits, sizeof guard);
-        uint64_t low, high;
-        memcpy(&low, &ny, sizeof low);
-        memcpy(&high, &nz, sizeof high);
-        label[i] = (uint32_t)((low & ((1U << BVH_SPARE_BITS) - 1)) | (high & 15) << BVH_SPARE_BITS);
-        double weight = (double)least * (slanted ? fabs(along) : 1.0);
-        uint32_t in_doubt = (weight < guard) | (uint32_t)((high & BVH_RIVAL_BIT) != 0);
-        uint32_t near = in_doubt & (uint32_t)(prim[i] < n_triangles);
-        doubt[i] = near;
-        doubts += near;
+        doubt[i] = in_doubt(nx, ny, nz, slanted ? fabs(along) : 1.0, u[i], v[i], prim[i] < n_triangles, &label[i]);
+        doubts += doubt[i];
     }
     return doubts;
 }
@@ -124,6 +129,33 @@ uint32_t kernel_refine(const struct bvh *bvh, const struct kernel_hits *hits, co
 {
     return refine((const double *)bvh->triangle, bvh->scene->n_triangles, hits->prim, hits->dx, hits->dy, hits->dz,
                   hits->u, hits->v, o, bvh->station_reach_m > 0.0, n, hits->range_m, hits->label, hits->doubt);
+}
+
+/* refine with an origin for each ray, and so slanted; kept apart, so that the common case stays as fast as it is. */
+VEC_CLONES
+static uint32_t refine_from(const double *restrict tri, uint32_t n_triangles, const uint32_t *restrict prim,
+                            const double *restrict dx, const double *restrict dy, const double *restrict dz,
+                            const float *restrict u, const float *restrict v, const double *restrict ox,
+                            const double *restrict oy, const double *restrict oz, uint32_t n, double *restrict range_m,
+                            uint32_t *restrict label, uint32_t *restrict doubt)
+{
+    uint32_t doubts = 0;
+    for (uint32_t i = 0; i < n; i++) {
+        int64_t at = (int64_t)(prim[i] < n_triangles ? prim[i] : n_triangles) * 4;
+        double nx = tri[at], ny = tri[at + 1], nz = tri[at + 2];
+        double along = nx * dx[i] + ny * dy[i] + nz * dz[i];
+        range_m[i] = (tri[at + 3] - (nx * ox[i] + ny * oy[i] + nz * oz[i])) / along;
+        doubt[i] = in_doubt(nx, ny, nz, fabs(along), u[i], v[i], prim[i] < n_triangles, &label[i]);
+        doubts += doubt[i];
+    }
+    return doubts;
+}
+
+uint32_t kernel_refine_from(const struct bvh *bvh, const struct kernel_hits *hits, const double *ox, const double *oy,
+                            const double *oz, uint32_t n)
+{
+    return refine_from((const double *)bvh->triangle, bvh->scene->n_triangles, hits->prim, hits->dx, hits->dy, hits->dz,
+                       hits->u, hits->v, ox, oy, oz, n, hits->range_m, hits->label, hits->doubt);
 }
 
 VEC_CLONES

@@ -12,8 +12,8 @@ void kernel_directions(const double *mirror_turn, const double *pan_turn, const 
                        double *dx, double *dy, double *dz);
 /* The same, and beside it e: the directions as the encoders read them (whole counts), turned by to_crs instead. */
 void kernel_directions_read(const struct cast_setup *setup, const double *mirror_turn, const double *pan_turn,
-                            const double to_crs[9], uint32_t n, double *dx, double *dy, double *dz, double *ex,
-                            double *ey, double *ez);
+                            const double rotation[9], const double to_crs[9], uint32_t n, double *dx, double *dy,
+                            double *dz, double *ex, double *ey, double *ez);
 void kernel_to_float(const double *dx, const double *dy, const double *dz, uint32_t n, float *fx, float *fy, float *fz);
 
 /* What Embree proposed, and what double precision makes of it. */
@@ -27,6 +27,30 @@ struct kernel_hits {
 };
 /* Returns how many are in doubt. */
 uint32_t kernel_refine(const struct bvh *bvh, const struct kernel_hits *hits, const double o[3], uint32_t n);
+
+/* The same for rays with origins of their own (local frame). */
+uint32_t kernel_refine_from(const struct bvh *bvh, const struct kernel_hits *hits, const double *ox, const double *oy,
+                            const double *oz, uint32_t n);
+
+/* ---- kernels_moving.c: pulses between two poses of a moving head */
+struct kernel_leg {
+    double before_ns, span_ns;         /* from the first pose to the run's t0; to the second pose */
+    double position_m[3], shift_m[3];  /* at the first pose; from there to the second */
+    double rotation[9], axis[3], turn; /* socs -> prcs at the first; about this axis of socs by `turn` turns */
+};
+void kernel_leg(const struct pose_knot *a, const struct pose_knot *b, int64_t t0_ns, struct kernel_leg *leg);
+/* Directions s (socs) -> d (prcs) of n pulses, dt_ns after the run's t0. */
+void kernel_turn_leg(const struct kernel_leg *leg, const uint32_t *dt_ns, uint32_t n, const double *sx,
+                     const double *sy, const double *sz, double *dx, double *dy, double *dz);
+/* Their origins, prcs. */
+void kernel_place_leg(const struct kernel_leg *leg, const uint32_t *dt_ns, uint32_t n, double *px, double *py,
+                      double *pz);
+/* p - from */
+void kernel_subtract(const double *px, const double *py, const double *pz, const double from[3], uint32_t n, double *ox,
+                     double *oy, double *oz);
+/* e * range + p - station. */
+void kernel_scale_from(const double *range_m, const double *px, const double *py, const double *pz,
+                       const double station_m[3], uint32_t n, double *ex, double *ey, double *ez);
 
 /* True when one of the rays may meet the sphere at v (from the rays' origin). */
 int kernel_meets_sphere(const double *dx, const double *dy, const double *dz, uint32_t n, const double v[3],

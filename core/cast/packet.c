@@ -37,6 +37,14 @@
                 packet[p].hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;                                              \
             }                                                                                                      \
     }                                                                                                              \
+    static void place_##W(struct RTCRayHit##W *packet, const struct bvh_rays *rays, uint32_t n)                    \
+    {                                                                                                              \
+        for (uint32_t p = 0; p < (n + W - 1) / W; p++) {                                                           \
+            memcpy(packet[p].ray.org_x, rays->ox + p * W, sizeof packet->ray.org_x);                               \
+            memcpy(packet[p].ray.org_y, rays->oy + p * W, sizeof packet->ray.org_y);                               \
+            memcpy(packet[p].ray.org_z, rays->oz + p * W, sizeof packet->ray.org_z);                               \
+        }                                                                                                          \
+    }                                                                                                              \
     static void prefetch_##W(const struct bvh *bvh, const struct RTCRayHit##W *packet)                             \
     {                                                                                                              \
         const uint32_t last = bvh->scene->n_triangles;                                                             \
@@ -106,7 +114,10 @@ static void intersect_1(const struct bvh *bvh, const struct bvh_rays *rays, uint
     for (uint32_t i = 0; i < n; i++) {
         const float dir[3] = {rays->dx[i], rays->dy[i], rays->dz[i]};
         struct bvh_one one = {.t_min = rays->t_min, .t_max = rays->t_max};
-        bvh_intersect_one(bvh, rays->org, dir, &one);
+        const float own[3] = {rays->ox != NULL ? rays->ox[i] : rays->org[0],
+                              rays->ox != NULL ? rays->oy[i] : rays->org[1],
+                              rays->ox != NULL ? rays->oz[i] : rays->org[2]};
+        bvh_intersect_one(bvh, own, dir, &one);
         rays->prim[i] = one.prim;
         rays->t[i] = one.t;
         rays->u[i] = one.u;
@@ -130,6 +141,19 @@ static void set_up(struct bvh_packets *packets, const struct bvh_rays *rays, uin
     packets->width = width;
 }
 
+/* Origins of their own: the next chunk with a common one has to be set up again. */
+static void place(struct bvh_packets *packets, const struct bvh_rays *rays, uint32_t n)
+{
+    const uint32_t width = packets->width;
+    if (width == 16)
+        place_16(packets->at.by16, rays, n);
+    else if (width == 8)
+        place_8(packets->at.by8, rays, n);
+    else
+        place_4(packets->at.by4, rays, n);
+    packets->placed = 1;
+}
+
 void bvh_intersect(const struct bvh *bvh, struct bvh_packets *packets, const struct bvh_rays *rays, uint32_t n)
 {
     const uint32_t width = bvh->info.packet;
@@ -139,6 +163,7 @@ void bvh_intersect(const struct bvh *bvh, struct bvh_packets *packets, const str
         return;
     }
     set_up(packets, rays, width);
+    if (rays->ox != NULL) place(packets, rays, n);
     if (width == 16)
         intersect_16(bvh, packets->at.by16, rays, n);
     else if (width == 8)

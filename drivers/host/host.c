@@ -12,8 +12,9 @@ _Static_assert(SCANHEAD_EINPUT == (int)SH_EINPUT && SCANHEAD_EIO == (int)SH_EIO 
                    SCANHEAD_ECLOSED == (int)SH_ECLOSED && SCANHEAD_EFORMAT == (int)SH_EFORMAT &&
                    SCANHEAD_ESTATE == (int)SH_ESTATE,
                "the library's errors are those of core/err.h");
-_Static_assert(SCANHEAD_POINTS == (int)NATIVE_POINTS && SCANHEAD_SURFACES == (int)NATIVE_SURFACES &&
-                   SCANHEAD_EV_SETTINGS == (int)NATIVE_EV_SETTINGS && SCANHEAD_LOCAL == (int)NATIVE_LOCAL,
+_Static_assert(SCANHEAD_POINTS == (int)NATIVE_POINTS && SCANHEAD_POSES == (int)NATIVE_POSES &&
+                   SCANHEAD_EV_POSE_LATE == (int)NATIVE_EV_POSE_LATE && SCANHEAD_POSE_NONE == (int)NATIVE_POSE_NONE &&
+                   SCANHEAD_LOCAL == (int)NATIVE_LOCAL,
                "types, events and flags are those on the wire");
 
 int scanhead_open(const char *source, struct scanhead **out, char *err, size_t err_len)
@@ -55,6 +56,7 @@ void scanhead_close(struct scanhead *sh)
         free(sh->surface[i].material);
     }
     free(sh->surface);
+    free(sh->poses);
     free(sh);
 }
 

@@ -41,6 +41,7 @@ struct scanhead {
     struct native_descriptor descriptor;
     struct native_anchor anchor;
     uint64_t last_pulse0;
+    struct host_poses *poses; /* NULL: none came yet */
     struct host_surface *surface;
     uint32_t n_surfaces;
 
@@ -68,6 +69,10 @@ int host_fill(struct scanhead *sh, int64_t deadline_ns);
 
 /* Keeps the frame that the parser is at, for scanhead_next. */
 int host_keep(struct scanhead *sh);
+
+/* poses.c: takes a poses frame in; forgets all (another scan). */
+int host_absorb_poses(struct scanhead *sh, const uint8_t *payload, size_t len);
+void host_forget_poses(struct scanhead *sh);
 
 void host_turn_table(struct scanhead *sh);
 

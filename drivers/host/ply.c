@@ -1,6 +1,6 @@
 /* .ply: one vertex per echo. The format is described in the header's own comments.
  *
- * Positions are in the stream's CRS (geo), or in the scene frame (polar): p = station_m + rotation * p_socs.
+ * Positions are in the stream's CRS (geo), or in the scene frame (polar), as scanhead_to_scene has it.
  *
  * The header comes first in the file but is known last (count, names, losses). When the first points arrive
  * the head has told how many surfaces there are, so room is left for the header: no byte of the points is
@@ -19,7 +19,7 @@
 #include "drivers/protocol/bytes.h"
 #include "drivers/protocol/native.h"
 
-enum { RECORD_LEN = 4 * 8 + 4 + 8 + 1 + 1 + 2 + 2, BATCH = 256, TEXT_LEN = 512 };
+enum { RECORD_LEN = 4 * 8 + 4 + 8 + 1 + 1 + 2 + 2, FRAME_LEN = 8, BATCH = 256, TEXT_LEN = 512 };
 
 struct ply {
     struct outfile file;
@@ -29,6 +29,7 @@ struct ply {
     int begun;         /* room for the header is made */
     size_t header_len; /* bytes of that room */
     struct scanhead_point batch[BATCH];
+    double frame[BATCH]; /* of a moving head: frame scalar */
 };
 
 static int ply_open(const char *path, const struct recorder_options *options, void **rec, struct sh_err *err)
@@ -79,6 +80,10 @@ static int check_info(struct ply *ply, const struct scanhead_info *info, struct 
     if (info->station > 0xffff)
         return sh_fail(err, SH_EFORMAT, "%s: station %u; a PLY file holds stations up to 65535", ply->file.path,
                        info->station);
+    if (facts->have_crs && facts->moving != info->moving)
+        return sh_fail(err, SH_EFORMAT, "%s: the stream went on with a head that %s; a PLY file holds either",
+                       ply->file.path, info->moving ? "moves" : "stands still");
+    facts->moving = info->moving;
     facts->have_crs = 1;
     facts->crs = crs;
     facts->epsg = epsg;
@@ -87,16 +92,8 @@ static int check_info(struct ply *ply, const struct scanhead_info *info, struct 
     return 0;
 }
 
-static void to_scene(const struct scanhead_info *info, struct scanhead_point *p)
-{
-    const double *r = info->rotation, *s = info->station_m;
-    double x = p->x, y = p->y, z = p->z;
-    p->x = s[0] + (r[0] * x + r[1] * y + r[2] * z);
-    p->y = s[1] + (r[3] * x + r[4] * y + r[5] * z);
-    p->z = s[2] + (r[6] * x + r[7] * y + r[8] * z);
-}
-
-static size_t put_binary(uint8_t *to, const struct scanhead_point *p, unsigned station)
+/* frame: NULL where there is no such property. */
+static size_t put_binary(uint8_t *to, const struct scanhead_point *p, unsigned station, const double *frame)
 {
     le_put_double(to, p->x);
     le_put_double(to + 8, p->y);
@@ -108,7 +105,9 @@ static size_t put_binary(uint8_t *to, const struct scanhead_point *p, unsigned s
     to[45] = p->echo_count;
     le_put16(to + 46, p->label);
     le_put16(to + 48, (uint16_t)station);
-    return RECORD_LEN;
+    if (frame == NULL) return RECORD_LEN;
+    le_put_double(to + RECORD_LEN, *frame);
+    return RECORD_LEN + FRAME_LEN;
 }
 
 /* Micrometres are the finest scale of the wire, 0.01 dB and nanoseconds its units: more digits would say
@@ -120,7 +119,7 @@ static size_t put_number(char *to, size_t room, int digits, double v)
 }
 
 /* The length, or more than TEXT_LEN where numbers are absurdly long. */
-static size_t put_ascii(char *to, const struct scanhead_point *p, unsigned station)
+static size_t put_ascii(char *to, const struct scanhead_point *p, unsigned station, const double *frame)
 {
     const struct {
         double v;
@@ -130,8 +129,11 @@ static size_t put_ascii(char *to, const struct scanhead_point *p, unsigned stati
     for (size_t i = 0; i < sizeof number / sizeof number[0] && n < TEXT_LEN; i++)
         n += put_number(to + n, TEXT_LEN - n, number[i].digits, number[i].v);
     if (n >= TEXT_LEN) return TEXT_LEN + 1;
-    int end = snprintf(to + n, TEXT_LEN - n, "%u %u %u %u\n", p->echo, p->echo_count, p->label, station);
-    return n + (size_t)end;
+    n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u %u %u %u", p->echo, p->echo_count, p->label, station);
+    if (frame != NULL && n < TEXT_LEN) n += (size_t)snprintf(to + n, TEXT_LEN - n, " %.9g", *frame);
+    if (n >= TEXT_LEN) return TEXT_LEN + 1;
+    to[n++] = '\n';
+    return n;
 }
 
 static int put_batch(struct ply *ply, const struct scanhead_info *info, int n, struct sh_err *err)
@@ -142,9 +144,13 @@ static int put_batch(struct ply *ply, const struct scanhead_info *info, int n, s
     for (int i = 0; i < n; i++) {
         struct scanhead_point *p = &ply->batch[i];
         if (p->echo_count == 0 && !ply->options.empty_shots) continue;
-        if (!info->geo) to_scene(info, p);
-        size_t len = ply->options.ascii ? put_ascii((char *)to + used, p, info->station)
-                                        : put_binary(to + used, p, info->station);
+        if (p->echo_count != 0 && isnan(p->x)) { /* no pose: counted, not guessed */
+            ply->facts.n_without_pose++;
+            continue;
+        }
+        const double *frame = info->moving ? &ply->frame[i] : NULL;
+        size_t len = ply->options.ascii ? put_ascii((char *)to + used, p, info->station, frame)
+                                        : put_binary(to + used, p, info->station, frame);
         if (len > TEXT_LEN)
             return sh_fail(err, SH_EFORMAT, "%s: a coordinate beyond all measure: %g %g %g", ply->file.path, p->x, p->y,
                            p->z);
@@ -153,6 +159,14 @@ static int put_batch(struct ply *ply, const struct scanhead_info *info, int n, s
     }
     outfile_used(&ply->file, used);
     return 0;
+}
+
+/* Positions of the geo layout need no pose, the frame scalar does. */
+static void set_geo_frames(struct ply *ply, struct scanhead *sh, const struct scanhead_info *info, int n)
+{
+    struct scanhead_pose pose;
+    for (int i = 0; i < n && info->geo && info->moving; i++)
+        ply->frame[i] = scanhead_pose(sh, ply->batch[i].t_ns, &pose) == SCANHEAD_OK ? pose.frame : 0.0;
 }
 
 static int put_points(struct ply *ply, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
@@ -167,6 +181,9 @@ static int put_points(struct ply *ply, struct scanhead *sh, const struct scanhea
     for (uint32_t first = 0; rc == 0 && first < frame->n_points;) {
         int n = scanhead_points(sh, frame, first, ply->batch, BATCH);
         if (n < 0) return sh_fail(err, n, "%s: %s", ply->file.path, scanhead_error(sh));
+        if (!info.geo && scanhead_to_scene(sh, ply->batch, (uint32_t)n, ply->frame) < 0)
+            return sh_fail(err, SH_EFORMAT, "%s: %s", ply->file.path, scanhead_error(sh));
+        set_geo_frames(ply, sh, &info, n);
         rc = put_batch(ply, &info, n, err);
         first += (uint32_t)n;
     }

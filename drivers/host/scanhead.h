@@ -49,6 +49,7 @@ enum scanhead_frame_type { /* as on the wire */
                            SCANHEAD_TELEMETRY = 5,
                            SCANHEAD_EVENT = 6,
                            SCANHEAD_SURFACES = 7,
+                           SCANHEAD_POSES = 8,
 };
 enum scanhead_frame_flags { SCANHEAD_REPEAT = 1, SCANHEAD_LOCAL = 2 };
 
@@ -61,6 +62,7 @@ enum scanhead_event_code {
     SCANHEAD_EV_CONTROL = 6,
     SCANHEAD_EV_ERROR = 7,
     SCANHEAD_EV_SETTINGS = 8,
+    SCANHEAD_EV_POSE_LATE = 9,
 };
 
 struct scanhead_frame {
@@ -98,7 +100,7 @@ struct scanhead_point {
 
 /* Points of the frame that scanhead_next returned last: at most max, from the index `first`. Returns how many, or
  * SCANHEAD_ESTATE before the descriptor and the anchor of the stream were seen. In the geo layout range_m is the
- * distance from the anchor, which is the station. */
+ * distance from the anchor, which is the station; NaN where the head moves. */
 int scanhead_points(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                     struct scanhead_point *points, uint32_t max);
 
@@ -113,8 +115,34 @@ struct scanhead_info {
     double rotation[9]; /* socs -> scene frame, row by row */
     double prr_hz, lines_hz, pan_deg_s, range_min_m, range_max_m;
     uint32_t station, n_surfaces, frames, scan;
+    int moving; /* 1: the head moves; station_m and rotation do not say where it is, poses do */
 };
 int scanhead_get_info(const struct scanhead *sh, struct scanhead_info *info);
+
+/* Where a moving head was. Between two poses of a frame of SCANHEAD_POSES the position goes along the straight line,
+ * and the attitude the shorter way about one fixed axis at constant rate (slerp); the head itself moves just so. */
+struct scanhead_pose {
+    int64_t t_ns;         /* since the scan's start */
+    double position_m[3]; /* scene frame */
+    double quat[4];       /* w x y z: head's frame SOCS -> scene frame */
+    double frame;         /* frame scalar of the trajectory */
+    int flags;            /* enum scanhead_pose_flags; between two poses those of either */
+};
+enum scanhead_pose_flags {
+    SCANHEAD_POSE_EXTRAPOLATED = 1, /* beyond the last pose that the head had been given */
+    SCANHEAD_POSE_LATE = 2,         /* too far beyond it: the head took itself to stand */
+    SCANHEAD_POSE_NONE = 4,         /* it had not been given any yet */
+};
+/* The pose at a time since the scan's start, of the points that came last or some seconds before. SCANHEAD_ESTATE where
+ * the stream has not said it, or the head stands still. */
+int scanhead_pose(struct scanhead *sh, int64_t t_ns, struct scanhead_pose *pose);
+/* Poses of the frame of SCANHEAD_POSES that scanhead_next returned last: at most max, from the index `first`. */
+int scanhead_poses(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first, struct scanhead_pose *poses,
+                   uint32_t max);
+/* Points of the polar layout from the head's frame to the scene frame: x, y, z in place, each with the pose of its own
+ * time where the head moves. frame (may be NULL): the frame scalar of each, 0 where it stands. Returns how many points
+ * had no pose, because frames were lost: their coordinates are NaN. A negative error for another layout. */
+int scanhead_to_scene(struct scanhead *sh, struct scanhead_point *points, uint32_t n, double *frame);
 
 /* Name of a label: 1 and the two names (owned by the handle), or 0 when not seen yet. */
 int scanhead_surface(const struct scanhead *sh, uint32_t label, const char **object, const char **material);

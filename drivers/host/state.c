@@ -20,7 +20,10 @@ static int absorb_descriptor(struct scanhead *sh, const struct native_header *he
     /* The anchor of another scan may be that of another station; a descriptor that is not a repetition begins
      * a scan. */
     int same_scan = sh->have_descriptor && sh->descriptor.scan == d.scan && (header->flags & NATIVE_REPEAT) != 0;
-    if (!same_scan) sh->have_anchor = sh->have_pulse = 0;
+    if (!same_scan) {
+        sh->have_anchor = sh->have_pulse = 0;
+        host_forget_poses(sh);
+    }
     sh->descriptor = d;
     sh->have_descriptor = 1;
     return 0;
@@ -40,6 +43,7 @@ static int absorb_anchor(struct scanhead *sh, const struct native_header *header
 static void forget(struct scanhead *sh)
 {
     sh->have_descriptor = sh->have_anchor = 0;
+    host_forget_poses(sh);
 }
 
 static int absorb_points(struct scanhead *sh, const struct native_header *header, const uint8_t *payload)
@@ -133,6 +137,9 @@ int host_absorb(struct scanhead *sh, const struct native_header *header, const u
         return absorb_anchor(sh, header, payload);
     case NATIVE_POINTS:
         return absorb_points(sh, header, payload);
+    case NATIVE_POSES:
+        if (host_absorb_poses(sh, payload, header->length) == SH_EFORMAT) return bad(sh, "wrong poses");
+        return sh->poses != NULL ? 0 : sh_fail(&sh->err, SH_ENOMEM, "no memory for poses");
     case NATIVE_EVENT:
         return absorb_event(sh, header, payload);
     case NATIVE_SURFACES:
@@ -169,6 +176,7 @@ int scanhead_get_info(const struct scanhead *sh, struct scanhead_info *info)
     info->n_surfaces = d->n_surfaces;
     info->frames = d->frames;
     info->scan = d->scan;
+    info->moving = a->moving & 1;
     return SCANHEAD_OK;
 }
 

@@ -50,7 +50,7 @@ static const struct field descriptor[] = {
 #define ANCHOR(member, kind) ROW(native_anchor, member, kind)
 static const struct field anchor[] = {
     ANCHOR(crs, FIELD_32),         ANCHOR(epsg, FIELD_32),       ANCHOR(station, FIELD_32),
-    ANCHOR(reserved, FIELD_32),    ANCHOR(anchor, FIELD_REAL),   ANCHOR(scale_m, FIELD_REAL),
+    ANCHOR(moving, FIELD_32),      ANCHOR(anchor, FIELD_REAL),   ANCHOR(scale_m, FIELD_REAL),
     ANCHOR(lat_deg, FIELD_REAL),   ANCHOR(lon_deg, FIELD_REAL),  ANCHOR(height_m, FIELD_REAL),
     ANCHOR(station_m, FIELD_REAL), ANCHOR(rotation, FIELD_REAL),
 };
@@ -84,11 +84,18 @@ static const struct field event[] = {
     EVENT(b, FIELD_64),    EVENT(c, FIELD_64),        EVENT(text, FIELD_TEXT),
 };
 
+#define POSE(member, kind) ROW(native_pose, member, kind)
+static const struct field pose[] = {
+    POSE(t_ns, FIELD_64),    POSE(position_m, FIELD_REAL), POSE(quat, FIELD_REAL),
+    POSE(frame, FIELD_REAL), POSE(flags, FIELD_32),        POSE(reserved, FIELD_32),
+};
+
 const struct field_table fields_descriptor = TABLE(descriptor, native_descriptor, 272);
 const struct field_table fields_anchor = TABLE(anchor, native_anchor, 168);
 const struct field_table fields_points = TABLE(points, native_points, NATIVE_POINTS_HEAD_LEN);
 const struct field_table fields_line_end = TABLE(line_end, native_line_end, 56);
 const struct field_table fields_telemetry = TABLE(telemetry, native_telemetry, 72);
+const struct field_table fields_pose = TABLE(pose, native_pose, NATIVE_POSE_LEN);
 const struct field_table fields_event = TABLE(event, native_event, 128);
 
 static size_t encode_field(const struct field *field, const char *from, uint8_t *wire)

@@ -25,7 +25,7 @@ struct field_table {
 };
 
 extern const struct field_table fields_descriptor, fields_anchor, fields_points, fields_line_end, fields_telemetry,
-    fields_event;
+    fields_event, fields_pose;
 
 /* Writes exactly table->wire_len bytes. */
 void fields_encode(const struct field_table *table, const void *from, uint8_t *wire);

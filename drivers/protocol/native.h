@@ -17,6 +17,9 @@ enum {
     NATIVE_POINT_LEN = 20,
     NATIVE_POINTS_HEAD_LEN = 40,
     NATIVE_MAX_POINTS = (NATIVE_MAX_PAYLOAD - NATIVE_POINTS_HEAD_LEN) / NATIVE_POINT_LEN,
+    NATIVE_POSES_HEAD_LEN = 8,
+    NATIVE_POSE_LEN = 80,
+    NATIVE_MAX_POSES = (NATIVE_MAX_PAYLOAD - NATIVE_POSES_HEAD_LEN) / NATIVE_POSE_LEN,
     NATIVE_MAX_TEXT = 512, /* longest reply line, with its CR LF */
 };
 
@@ -28,6 +31,7 @@ enum native_type {
     NATIVE_TELEMETRY = 5,
     NATIVE_EVENT = 6,
     NATIVE_SURFACES = 7, /* names of some labels */
+    NATIVE_POSES = 8,    /* where a moving head is while it measures what follows */
 };
 
 enum native_flags {
@@ -70,7 +74,7 @@ struct native_anchor {
     uint32_t crs;     /* enum native_crs */
     uint32_t epsg;    /* 0 for local */
     uint32_t station; /* number, from 1 */
-    uint32_t reserved;
+    uint32_t moving;  /* bit 0: the head moves, see NATIVE_POSES; the other bits 0 */
     double anchor[3]; /* of the station in the CRS, metres */
     double scale_m;   /* geo: position = anchor + scale_m * (x, y, z) */
     double lat_deg, lon_deg, height_m;
@@ -102,6 +106,19 @@ struct native_line_end {
     uint32_t n_fired, n_cast, n_echoes, mirror_count, pan_count, status;
 };
 
+enum native_pose_flags { /* the values of core/pose.h */
+                         NATIVE_POSE_EXTRAPOLATED = 1,
+                         NATIVE_POSE_LATE = 2,
+                         NATIVE_POSE_NONE = 4,
+};
+struct native_pose {
+    int64_t t_ns;         /* since the scan's start */
+    double position_m[3]; /* of the head, scene frame */
+    double quat[4];       /* w x y z, of length one: head's frame -> scene frame */
+    double frame;         /* frame scalar of the trajectory */
+    uint32_t flags, reserved;
+};
+
 struct native_telemetry {
     uint32_t state; /* enum head_state, in its order */
     uint32_t scan;
@@ -120,6 +137,7 @@ enum native_event_code {
     NATIVE_EV_CONTROL = 6,     /* who may command; a: session number, 0: nobody */
     NATIVE_EV_ERROR = 7,       /* a: SCPI error number (two's complement) */
     NATIVE_EV_SETTINGS = 8,    /* a: first pulse with the new settings */
+    NATIVE_EV_POSE_LATE = 9,   /* no pose in time; a: poses made up so far, c: ns since the last one that came */
 };
 struct native_event {
     uint32_t code, reserved;
@@ -135,6 +153,9 @@ void native_decode_point(const uint8_t *payload, uint32_t i, struct native_point
 int native_decode_line_end(const uint8_t *payload, size_t len, struct native_line_end *out);
 int native_decode_telemetry(const uint8_t *payload, size_t len, struct native_telemetry *out);
 int native_decode_event(const uint8_t *payload, size_t len, struct native_event *out);
+/* Poses payload: u32 n (2 and more), u32 0, then n poses of 80 bytes, their times rising. */
+int native_decode_poses(const uint8_t *payload, size_t len, uint32_t *n);
+void native_decode_pose(const uint8_t *payload, uint32_t i, struct native_pose *out); /* i < n of checked poses */
 /* Surfaces payload: u32 first label, u32 count, then per label: u8 len, object, u8 len, material (no NUL).
  * Calls fn for each; names are NUL-terminated copies that live during the call. */
 int native_decode_surfaces(const uint8_t *payload, size_t len,
@@ -177,7 +198,7 @@ enum native_item native_parser_next(struct native_parser *parser);
 void native_parser_finish(struct native_parser *parser);
 
 /* 1 if a frame with this header belongs to stream_sha256: the hash runs over u8 type, u32 length (LE) and the payload
- * of each descriptor, anchor, points and line-end frame that has neither NATIVE_REPEAT nor NATIVE_LOCAL. */
+ * of each descriptor, anchor, points, line-end and poses frame that has neither NATIVE_REPEAT nor NATIVE_LOCAL. */
 int native_is_hashed(const struct native_header *header);
 
 #endif

@@ -53,6 +53,29 @@ int native_decode_event(const uint8_t *payload, size_t len, struct native_event 
     return fields_decode(&fields_event, payload, len, out);
 }
 
+int native_decode_poses(const uint8_t *payload, size_t len, uint32_t *n)
+{
+    if (len < NATIVE_POSES_HEAD_LEN) return SH_EFORMAT;
+    *n = le_get32(payload);
+    if (*n < 2 || *n > (len - NATIVE_POSES_HEAD_LEN) / NATIVE_POSE_LEN) return SH_EFORMAT;
+    int64_t before_ns = 0;
+    for (uint32_t i = 0; i < *n; i++) {
+        struct native_pose pose;
+        size_t at = NATIVE_POSES_HEAD_LEN + (size_t)i * NATIVE_POSE_LEN;
+        if (fields_decode(&fields_pose, payload + at, len - at, &pose) != 0) return SH_EFORMAT;
+        const double *q = pose.quat;
+        double norm2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+        if (!(norm2 > 1.0 - 1e-9 && norm2 < 1.0 + 1e-9) || (i > 0 && pose.t_ns <= before_ns)) return SH_EFORMAT;
+        before_ns = pose.t_ns;
+    }
+    return 0;
+}
+
+void native_decode_pose(const uint8_t *payload, uint32_t i, struct native_pose *out)
+{
+    fields_decode(&fields_pose, payload + NATIVE_POSES_HEAD_LEN + (size_t)i * NATIVE_POSE_LEN, NATIVE_POSE_LEN, out);
+}
+
 /* One name at *at: copies it with a NUL and moves *at behind it. */
 static int take_name(const uint8_t *payload, size_t len, size_t *at, char name[256])
 {
@@ -89,5 +112,5 @@ int native_is_hashed(const struct native_header *header)
 {
     if ((header->flags & (NATIVE_REPEAT | NATIVE_LOCAL)) != 0) return 0;
     return header->type == NATIVE_DESCRIPTOR || header->type == NATIVE_ANCHOR || header->type == NATIVE_POINTS ||
-           header->type == NATIVE_LINE_END;
+           header->type == NATIVE_LINE_END || header->type == NATIVE_POSES;
 }

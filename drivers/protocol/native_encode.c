@@ -72,6 +72,19 @@ size_t native_encode_line_end(uint8_t *dst, size_t cap, const struct line_end *e
     return encode_fixed(dst, cap, NATIVE_LINE_END, &fields_line_end, &wire, scan_t0_ns + end->t1_ns, 0);
 }
 
+size_t native_encode_poses(uint8_t *dst, size_t cap, const struct native_pose *pose, uint32_t n, int64_t t_ns,
+                           int flags)
+{
+    size_t len = NATIVE_POSES_HEAD_LEN + (size_t)n * NATIVE_POSE_LEN;
+    if (n > NATIVE_MAX_POSES || cap < NATIVE_HEADER_LEN + len) return 0;
+    uint8_t *payload = dst + NATIVE_HEADER_LEN;
+    le_put32(payload, n);
+    le_put32(payload + 4, 0);
+    for (uint32_t i = 0; i < n; i++)
+        fields_encode(&fields_pose, &pose[i], payload + NATIVE_POSES_HEAD_LEN + (size_t)i * NATIVE_POSE_LEN);
+    return put_header(dst, NATIVE_POSES, flags, len, t_ns);
+}
+
 size_t native_points_bound(uint32_t n_points)
 {
     /* a cut goes back to the start of a pulse: at most LINE_MAX_ECHOES - 1 points */

@@ -19,6 +19,10 @@ size_t native_encode_event(uint8_t *dst, size_t cap, const struct native_event *
 size_t native_encode_points(uint8_t *dst, size_t cap, const struct line_block *block, int64_t scan_t0_ns);
 size_t native_encode_line_end(uint8_t *dst, size_t cap, const struct line_end *end, int64_t scan_t0_ns);
 
+/* n <= NATIVE_MAX_POSES poses in one frame. */
+size_t native_encode_poses(uint8_t *dst, size_t cap, const struct native_pose *pose, uint32_t n, int64_t t_ns,
+                           int flags);
+
 /* Names of labels first.. as many as fit into one frame of at most max_payload bytes; *n_done is how many. name(ctx, i)
  * gives object and material. */
 size_t native_encode_surfaces(uint8_t *dst, size_t cap, uint32_t first, uint32_t n, size_t max_payload,

@@ -247,7 +247,11 @@ static void odd_but_right_configurations_load(void **state)
     assert_loads(load_edited("output:", "noise: {range: true, seed: 18446744073709551615}\noutput:"));
     assert_int_equal(cfg->noise_on, 1);
     assert_true(cfg->seed == UINT64_MAX);
+    /* A pan at rest, as SCPI has it, too: each line is a frame. */
     assert_loads(load_edited(LINES, "  pan_deg_s: 0\n  frames: 0\n"));
+    assert_loads(load_edited(LINES, "  pan_deg_s: 0\n  frames: 7\n"));
+    assert_loads(load_edited("output:", "platform: {kind: live, port: 7000}\noutput:"));
+    assert_int_equal(cfg->platform.kind, PLATFORM_LIVE);
 }
 
 /* ---- --set */

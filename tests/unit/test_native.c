@@ -10,6 +10,7 @@
 #include <string.h>
 #include <cmocka.h>
 
+#include "drivers/protocol/bytes.h"
 #include "drivers/protocol/crc32c.h"
 #include "drivers/protocol/native_encode.h"
 
@@ -892,13 +893,60 @@ static void test_parser_resync_cost(void **state)
     assert_true(parser.stats.bad_bytes > sizeof out - NATIVE_HEADER_LEN);
 }
 
+/* PROTOCOL.md, 8 poses: each byte of a pose where the table says, and what is refused. */
+static void test_poses(void **state)
+{
+    (void)state;
+    const struct native_pose pose[2] = {
+        {.t_ns = -2, .position_m = {1.0, -2.5, 1e-3}, .quat = {1, 0, 0, 0}, .frame = 7.25, .flags = 3},
+        {.t_ns = INT64_C(0x123456789a), .position_m = {4, 5, 6}, .quat = {0.6, 0, 0, -0.8}, .frame = 8},
+    };
+    uint8_t *payload = out + NATIVE_HEADER_LEN;
+    struct native_pose back;
+    uint32_t n;
+    size_t len = native_encode_poses(out, sizeof out, pose, 2, 99, 0);
+    assert_int_equal(len, NATIVE_HEADER_LEN + 8 + 2 * 80);
+    assert_int_equal(out[1], 8);
+    static const uint8_t head[8] = {2};
+    assert_memory_equal(payload, head, 8);
+    const uint8_t *second = payload + 8 + 80;
+    assert_true(le_get64(second) == 0x123456789a);
+    static const double want[] = {4, 5, 6, 0.6, 0, 0, -0.8, 8};
+    for (int i = 0; i < 8; i++) {
+        uint64_t bits;
+        memcpy(&bits, &want[i], sizeof bits);
+        assert_true(le_get64(second + 8 + 8 * (size_t)i) == bits);
+    }
+    assert_int_equal(le_get32(payload + 8 + 72), 3);
+    assert_int_equal(le_get32(payload + 8 + 76), 0);
+    size_t body = len - NATIVE_HEADER_LEN;
+    assert_int_equal(native_decode_poses(payload, body, &n), 0);
+    assert_int_equal(n, 2);
+    native_decode_pose(payload, 0, &back);
+    assert_memory_equal(&back, &pose[0], sizeof back);
+    assert_int_equal(native_decode_poses(payload, body - 1, &n), SH_EFORMAT);
+    assert_int_equal(native_decode_poses(payload, 7, &n), SH_EFORMAT);
+    assert_int_equal(native_encode_poses(out, len - 1, pose, 2, 99, 0), 0);
+    assert_int_equal(native_encode_poses(out, sizeof out, pose, NATIVE_MAX_POSES + 1, 99, 0), 0);
+    struct native_pose wrong[2] = {pose[0], pose[1]};
+    wrong[1].t_ns = wrong[0].t_ns; /* times rise */
+    native_encode_poses(out, sizeof out, wrong, 2, 99, 0);
+    assert_int_equal(native_decode_poses(payload, body, &n), SH_EFORMAT);
+    wrong[1] = pose[1];
+    wrong[1].quat[0] = 0.7; /* a rotation */
+    native_encode_poses(out, sizeof out, wrong, 2, 99, 0);
+    assert_int_equal(native_decode_poses(payload, body, &n), SH_EFORMAT);
+    native_encode_poses(out, sizeof out, pose, 1, 99, 0); /* one alone says nothing of the time around it */
+    assert_int_equal(native_decode_poses(payload, 8 + 80, &n), SH_EFORMAT);
+}
+
 static void test_is_hashed(void **state)
 {
     (void)state;
     for (int type = 0; type < 256; type++)
         for (int flags = 0; flags < 8; flags++) {
             struct native_header h = {.type = (uint8_t)type, .flags = (uint8_t)flags};
-            int want = type >= 1 && type <= 4 && (flags & 3) == 0;
+            int want = ((type >= 1 && type <= 4) || type == NATIVE_POSES) && (flags & 3) == 0;
             assert_int_equal(native_is_hashed(&h), want);
         }
 }
@@ -931,6 +979,7 @@ int main(void)
         cmocka_unit_test(test_seq_jumps_back),
         cmocka_unit_test(test_parser_resync_cost),
         cmocka_unit_test(test_is_hashed),
+        cmocka_unit_test(test_poses),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -166,6 +166,132 @@ static void test_commands_sent_ahead(void **state)
     head_end(&head, SIGTERM);
 }
 
+/* ---- a pose with each grant */
+
+static const struct room_config LIVE = {.profile = NULL,
+                                        .prr_hz = 100000,
+                                        .lines_hz = 100,
+                                        .pan_deg_s = 100,
+                                        .pan_stop_deg = 360,
+                                        .frames = 0,
+                                        .links = LINK_YAML_TCP,
+                                        .more = "platform: {kind: live, reach_m: 5, extrapolate_ms: 20}\n"};
+
+/* The vehicle of the other simulator, t seconds after power-up: to and fro, turning, heading clockwise. */
+static void vehicle(double t, double p[6])
+{
+    p[0] = 0.3 + 1.2 * sin(2 * t);
+    p[1] = -0.4 - 0.7 * t;
+    p[2] = 0.1 * t;
+    p[3] = 4 * sin(9 * t);
+    p[4] = -6 * t;
+    p[5] = 20 + 90 * t;
+}
+
+static void step_with_pose(struct scanhead *sh, int64_t *granted_ns, int64_t step_ns, double at[6])
+{
+    char line[200];
+    *granted_ns += step_ns;
+    vehicle(1e-9 * (double)*granted_ns, at);
+    snprintf(line, sizeof line, "TIME:STEP %lld NS, %.12g, %.12g,%.12g , %.12g, %.12g, %.12g", (long long)step_ns,
+             at[0], at[1], at[2], at[3], at[4], at[5]);
+    client_tell(sh, line);
+}
+
+/* Frames up to the reply: points must lie on the walls (encoders: 1e-4 m, see test_moving.c), flags are counted. */
+static void take_live(struct scanhead *sh, int64_t *scan_t0_ns, uint64_t *points, uint32_t flags[4], int *late_events)
+{
+    struct scanhead_frame frame;
+    struct scanhead_point point[256];
+    struct scanhead_pose pose[64];
+    int n;
+    while (scanhead_next(sh, &frame, 0) == SCANHEAD_OK) {
+        if (is_event(&frame, SCANHEAD_EV_SCAN_START)) *scan_t0_ns = (int64_t)frame.event_value[1];
+        *late_events += is_event(&frame, SCANHEAD_EV_POSE_LATE);
+        for (uint32_t first = 0;
+             frame.type == SCANHEAD_POINTS && (n = scanhead_points(sh, &frame, first, point, 256)) > 0;
+             first += (uint32_t)n) {
+            assert_int_equal(scanhead_to_scene(sh, point, (uint32_t)n, NULL), 0);
+            for (int i = 0; i < n; i++) {
+                const double at[3] = {point[i].x, point[i].y, point[i].z};
+                int wall = point[i].label;
+                assert_true(fabs(at[wall / 2] - (wall & 1 ? ROOM_MAX : ROOM_MIN)[wall / 2]) < 1e-4);
+            }
+            *points += (uint64_t)n;
+        }
+        for (n = frame.type == SCANHEAD_POSES ? scanhead_poses(sh, &frame, 0, pose, 64) : 0; n > 0; n--)
+            for (int bit = 0; bit < 4; bit++)
+                flags[bit] += (uint32_t)pose[n - 1].flags >> bit & 1;
+    }
+}
+
+static void test_pose_with_each_grant(void **state)
+{
+    struct wire *wire = *state;
+    struct scanhead_pose pose;
+    const char *const more[] = {"--pace", "step", NULL};
+    room_write(wire);
+    struct head head = head_start(wire, room_config_write(wire, &LIVE), more);
+    struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
+    int64_t granted_ns = 0, t0_ns = 0;
+    uint64_t points = 0;
+    uint32_t flags[4] = {0};
+    int late_events = 0;
+    double at[6];
+    while (strcmp(client_ask(sh, "HEAD:STAT?"), "idle") != 0)
+        step_with_pose(sh, &granted_ns, 50000000, at);
+    client_tell(sh, "SCAN:STAR");
+    while (strcmp(client_ask(sh, "HEAD:STAT?"), "scanning") != 0)
+        step_with_pose(sh, &granted_ns, 10000000, at);
+    for (int i = 0; i < 30; i++) {
+        int64_t step_ns = i % 3 == 0 ? 10000000 : i % 3 == 1 ? 3000000 : 17000000;
+        step_with_pose(sh, &granted_ns, step_ns, at);
+        take_live(sh, &t0_ns, &points, flags, &late_events);
+        /* At the grant's end the head was where the grant said: pose for pose, to the digits sent. The heading has a
+         * quaternion (cos, 0, 0, -sin) of its half, pitch and roll join in. */
+        assert_int_equal(scanhead_pose(sh, granted_ns - t0_ns, &pose), SCANHEAD_OK);
+        for (int k = 0; k < 3; k++)
+            assert_true(fabs(pose.position_m[k] - at[k]) < 1e-10);
+        const double *q = pose.quat;
+        double forward[3] = {2 * (q[1] * q[2] - q[0] * q[3]), 1 - 2 * (q[1] * q[1] + q[3] * q[3]),
+                             2 * (q[2] * q[3] + q[0] * q[1])};
+        double heading = at[5] * M_PI / 180, pitch = at[4] * M_PI / 180, roll = at[3] * M_PI / 180;
+        assert_true(fabs(forward[0] - sin(heading) * cos(pitch)) < 1e-10 && fabs(forward[2] - sin(pitch)) < 1e-10);
+        double right_z = 2 * (q[1] * q[3] - q[0] * q[2]);
+        assert_true(fabs(right_z + sin(roll) * cos(pitch)) < 1e-10);
+    }
+    assert_true(points > 25000); /* 100,000 a second, 300 ms */
+    assert_int_equal(flags[0] + flags[1] + flags[2] + (uint32_t)late_events, 0);
+    /* Grants without a pose: the motion goes on for 20 ms, then the platform stands, which is told and counted. */
+    client_tell(sh, "TIME:STEP 20 MS");
+    take_live(sh, &t0_ns, &points, flags, &late_events);
+    assert_true(flags[0] > 10 && flags[1] == 0 && late_events == 0);
+    client_tell(sh, "TIME:STEP 30 MS");
+    take_live(sh, &t0_ns, &points, flags, &late_events);
+    assert_true(flags[1] > 10);
+    assert_int_equal(late_events, 1);
+    static const char *const wrong[][2] = {
+        {"TIME:STEP 1 MS, 1, 2, 3", "ERR -109"},          {"TIME:STEP 1 MS, 1, 2, 3, 4, 5, 6, 7", "ERR -108"},
+        {"TIME:STEP 1 MS, 1, 2, x, 4, 5, 6", "ERR -104"}, {"TIME:STEP 1 MS, 1, 2, 3, 4, 95, 6", "ERR -222"},
+        {"TIME:STEP 1 MS, 9, 2, 3, 4, 5, 6", "ERR -222"}, {"TIME:STEP 1 MS, 1, , 3, 4, 5, 6", "ERR -104"},
+        {"TIME:STEP , 1, 2, 3, 4, 5, 6", "ERR -104"}};
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        const char *reply = client_ask(sh, wrong[i][0]);
+        if (strncmp(reply, wrong[i][1], 8) != 0) fail_msg("%s: %s", wrong[i][0], reply);
+    }
+    granted_ns += 50000000;
+    assert_int_equal(time_ns(sh), granted_ns); /* what is refused grants nothing */
+    scanhead_close(sh);
+    head_end(&head, SIGTERM);
+    assert_true(stats_uint(wire, "late_poses") >= 10);
+    /* A head that stands still takes no pose. */
+    head = start(wire, "step");
+    sh = client_open(head_endpoint(&head, "tcp"));
+    assert_int_equal(strncmp(client_ask(sh, "TIME:STEP 1 MS, 1, 2, 3, 4, 5, 6"), "ERR -221", 8), 0);
+    scanhead_close(sh);
+    head_end(&head, SIGTERM);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -173,6 +299,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_nothing_moves_by_itself, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_refusals, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_commands_sent_ahead, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_pose_with_each_grant, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -105,7 +105,6 @@ static const struct config_case CONFIGS[] = {
     {"text for a number", "lines_hz: 50", "lines_hz: fifty", {"config.yaml:1:", "head.lines_hz", "fifty"}},
     {"empty value", "lines_hz: 50", "lines_hz: ", {"config.yaml:1:", "head.lines_hz"}},
     {"half a frame", "frames: 1", "frames: 1.5", {"config.yaml:1:", "head.frames", "0 to 1000000"}},
-    {"frames at rest", "pan_deg_s: 100", "pan_deg_s: 0", {"config.yaml:1:", "head.frames", "0"}},
     {"line start above stop",
      "frames: 1",
      "frames: 1, line_start_deg: 20, line_stop_deg: 10",

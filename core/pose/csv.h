@@ -1,0 +1,25 @@
+/* Private to core/pose: a CSV file of numbers whose first line names the columns. */
+#ifndef CORE_POSE_CSV_H
+#define CORE_POSE_CSV_H
+
+#include "core/scene/text.h"
+
+enum { CSV_MAX_COLUMNS = 16 };
+
+struct csv {
+    struct text text;
+    const char *const *known;    /* names of columns, NULL at the end; index is the column's number for csv_value */
+    int column[CSV_MAX_COLUMNS]; /* of the file: which known one */
+    int n_columns;
+    uint32_t has;                  /* bit per known column */
+    double value[CSV_MAX_COLUMNS]; /* of the line read last, by known column; 0 where there is none */
+    uint64_t line;                 /* its number */
+};
+
+/* Reads the header; csv_close is due in any case. Unknown or doubled names are errors. */
+int csv_open(struct csv *csv, const char *path, const char *const *known, struct sh_err *err);
+void csv_close(struct csv *csv);
+/* 1: a line is in value; 0: the end; or a negative error. */
+int csv_next(struct csv *csv, struct sh_err *err);
+
+#endif

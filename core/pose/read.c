@@ -1,0 +1,253 @@
+/* Trajectories from files: samples, and way-points. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/pose/csv.h"
+#include "core/pose/trajectory.h"
+
+static const double DEG = M_PI / 180.0;
+static const double STEP_S = 0.02; /* of the samples that way-points are turned into */
+static const double SLOWEST_M_S = 1e-3;
+
+struct samples {
+    struct pose_sample *at;
+    size_t n, room;
+};
+
+static struct pose_sample *add_sample(struct samples *s)
+{
+    if (s->n == s->room) {
+        size_t room = s->room == 0 ? 256 : 2 * s->room;
+        struct pose_sample *more = realloc(s->at, room * sizeof *more);
+        if (more == NULL) return NULL;
+        s->at = more;
+        s->room = room;
+    }
+    struct pose_sample *sample = &s->at[s->n++];
+    memset(sample, 0, sizeof *sample);
+    return sample;
+}
+
+/* ---- samples */
+
+enum { T, X, Y, Z, HEADING, PITCH, ROLL, QW, QX, QY, QZ, FRAME, SCAN, FLAGS };
+static const char *const sample_columns[] = {"t_s", "x_m", "y_m", "z_m",   "heading_deg", "pitch_deg", "roll_deg", "qw",
+                                             "qx",  "qy",  "qz",  "frame", "scan",        "flags",     NULL};
+
+static int has_all(const struct csv *csv, uint32_t mask)
+{
+    return (csv->has & mask) == mask;
+}
+
+static int check_columns(const struct csv *csv, struct sh_err *err)
+{
+    const uint32_t place = 1u << T | 1u << X | 1u << Y | 1u << Z, quat = 1u << QW | 1u << QX | 1u << QY | 1u << QZ;
+    const uint32_t angles = 1u << HEADING | 1u << PITCH | 1u << ROLL;
+    int by_quat = has_all(csv, quat) && !(csv->has & angles),
+        by_angles = has_all(csv, 1u << HEADING) && !(csv->has & quat);
+    if (has_all(csv, place) && (by_quat || by_angles)) return SH_OK;
+    return text_fail(&csv->text, csv->line, SH_EINPUT, err,
+                     "the columns have to be t_s, x_m, y_m, z_m and either heading_deg (with pitch_deg, roll_deg) or "
+                     "qw, qx, qy, qz");
+}
+
+static int take_sample(const struct csv *csv, const struct pose_sample *before, struct pose_sample *s,
+                       struct sh_err *err)
+{
+    const double *v = csv->value;
+    s->t_s = v[T];
+    memcpy(s->pose.position_m, v + X, sizeof s->pose.position_m);
+    if (csv->has & 1u << QW) {
+        double norm2 = v[QW] * v[QW] + v[QX] * v[QX] + v[QY] * v[QY] + v[QZ] * v[QZ];
+        if (!(fabs(norm2 - 1.0) < 1e-3))
+            return text_fail(&csv->text, csv->line, SH_EINPUT, err, "a quaternion of length %.6g; allowed 1 to 0.0005",
+                             sqrt(norm2));
+        memcpy(s->pose.quat, v + QW, sizeof s->pose.quat);
+    } else {
+        if (fabs(v[PITCH]) > 90.0 || fabs(v[HEADING]) > 1e6 || fabs(v[ROLL]) > 360.0)
+            return text_fail(&csv->text, csv->line, SH_EINPUT, err,
+                             "an attitude out of range; allowed pitch_deg -90 to 90, roll_deg -360 to 360");
+        pose_from_angles(fmod(v[HEADING], 360.0) * DEG, v[PITCH] * DEG, v[ROLL] * DEG, s->pose.quat);
+    }
+    for (int k = X; k <= Z; k++)
+        if (fabs(v[k]) > 1e9)
+            return text_fail(&csv->text, csv->line, SH_EINPUT, err, "%s %.6g; allowed -1e9 to 1e9", sample_columns[k],
+                             v[k]);
+    if (before != NULL && !(s->t_s - before->t_s > 0.999e-6 * POSE_MIN_STEP_US))
+        return text_fail(&csv->text, csv->line, SH_EINPUT, err,
+                         "t_s %.9g after %.9g; allowed rising times, at least %g s apart", s->t_s, before->t_s,
+                         1e-6 * POSE_MIN_STEP_US);
+    return SH_OK;
+}
+
+static int read_samples(struct csv *csv, struct samples *samples, struct sh_err *err)
+{
+    int rc = check_columns(csv, err);
+    while (rc == SH_OK) {
+        int got = csv_next(csv, err);
+        if (got <= 0) return got;
+        struct pose_sample *s = add_sample(samples);
+        if (s == NULL) return text_fail(&csv->text, 0, SH_ENOMEM, err, "no memory for its samples");
+        s->frame = csv->has & 1u << FRAME ? csv->value[FRAME] : (double)(samples->n - 1);
+        rc = take_sample(csv, samples->n > 1 ? s - 1 : NULL, s, err);
+    }
+    return rc;
+}
+
+int trajectory_read_csv(const char *path, struct trajectory **out, struct sh_err *err)
+{
+    struct csv csv;
+    struct samples samples = {0};
+    *out = NULL;
+    int rc = csv_open(&csv, path, sample_columns, err);
+    if (rc == SH_OK) rc = read_samples(&csv, &samples, err);
+    if (rc == SH_OK && samples.n == 0) rc = text_fail(&csv.text, 0, SH_EINPUT, err, "no samples below the first line");
+    if (rc == SH_OK) rc = trajectory_from_samples(samples.at, samples.n, out, err);
+    csv_close(&csv);
+    free(samples.at);
+    return rc;
+}
+
+/* ---- way-points */
+
+enum { WX, WY, WZ, SPEED, PAUSE };
+static const char *const waypoint_columns[] = {"x_m", "y_m", "z_m", "speed_m_s", "pause_s", NULL};
+
+/* The points as samples, their times without the pauses; and these. */
+struct way {
+    struct samples points;
+    double *pause_s;
+};
+
+static int check_waypoint(const struct csv *csv, struct sh_err *err)
+{
+    const double *v = csv->value, least_s = 1e-6 * POSE_MIN_STEP_US;
+    if (!(v[SPEED] >= SLOWEST_M_S && v[SPEED] <= 1000.0))
+        return text_fail(&csv->text, csv->line, SH_EINPUT, err, "speed_m_s %.6g; allowed %g to 1000", v[SPEED],
+                         SLOWEST_M_S);
+    if (v[PAUSE] != 0.0 && !(v[PAUSE] >= least_s && v[PAUSE] <= 86400.0))
+        return text_fail(&csv->text, csv->line, SH_EINPUT, err, "pause_s %.6g; allowed 0, or %g to 86400", v[PAUSE],
+                         least_s);
+    for (int k = WX; k <= WZ; k++)
+        if (fabs(v[k]) > 1e9)
+            return text_fail(&csv->text, csv->line, SH_EINPUT, err, "%s %.6g; allowed -1e9 to 1e9", waypoint_columns[k],
+                             v[k]);
+    return SH_OK;
+}
+
+/* speed_m_s: of the way to it. */
+static int add_waypoint(const struct csv *csv, double speed_m_s, struct way *way, struct sh_err *err)
+{
+    const double *v = csv->value;
+    struct pose_sample *s = add_sample(&way->points);
+    double *pauses = realloc(way->pause_s, way->points.room * sizeof *pauses);
+    if (pauses != NULL) way->pause_s = pauses;
+    if (s == NULL || pauses == NULL) return text_fail(&csv->text, 0, SH_ENOMEM, err, "no memory for its way-points");
+    pauses[way->points.n - 1] = v[PAUSE];
+    memcpy(s->pose.position_m, v + WX, sizeof s->pose.position_m);
+    s->pose.quat[0] = 1.0;
+    s->frame = (double)(way->points.n - 1);
+    if (way->points.n == 1) return SH_OK;
+    double chord2 = 0.0;
+    for (int k = 0; k < 3; k++) {
+        double d = s->pose.position_m[k] - s[-1].pose.position_m[k];
+        chord2 += d * d;
+    }
+    double way_s = sqrt(chord2) / speed_m_s;
+    if (!(way_s >= 1e-6 * POSE_MIN_STEP_US && way_s < 1e6))
+        return text_fail(&csv->text, csv->line, SH_EINPUT, err,
+                         "%.6g m from the way-point before, %.6g s at its speed; allowed %g to 1e6 s", sqrt(chord2),
+                         way_s, 1e-6 * POSE_MIN_STEP_US);
+    s->t_s = s[-1].t_s + way_s;
+    return SH_OK;
+}
+
+static int read_waypoints(struct csv *csv, struct way *way, struct sh_err *err)
+{
+    double speed_m_s = 0.0;
+    if (!has_all(csv, 1u << WX | 1u << WY | 1u << WZ | 1u << SPEED))
+        return text_fail(&csv->text, csv->line, SH_EINPUT, err,
+                         "the columns have to be x_m, y_m, z_m, speed_m_s, and pause_s where wanted");
+    for (;;) {
+        int rc = csv_next(csv, err);
+        if (rc == 0 && way->points.n < 2) return text_fail(&csv->text, 0, SH_EINPUT, err, "fewer than two way-points");
+        if (rc <= 0) return rc;
+        rc = check_waypoint(csv, err);
+        if (rc == SH_OK) rc = add_waypoint(csv, speed_m_s, way, err);
+        if (rc != SH_OK) return rc;
+        speed_m_s = csv->value[SPEED];
+    }
+}
+
+/* Heading of the way around t_s; left as it is where that goes straight up. */
+static void heading_at(const struct trajectory *curve, double t_s, double *heading_rad)
+{
+    const double d = 1e-4;
+    struct pose a, b;
+    double frame;
+    trajectory_at(curve, t_s - d, &a, &frame);
+    trajectory_at(curve, t_s + d, &b, &frame);
+    double dx = b.position_m[0] - a.position_m[0], dy = b.position_m[1] - a.position_m[1];
+    if (hypot(dx, dy) > d * SLOWEST_M_S) *heading_rad = atan2(dx, dy);
+}
+
+/* How far along an interval the platform is after its share f of the time: f, but from or to a standstill smoothly. */
+static double along(double f, int from_rest, int to_rest)
+{
+    double g = 1.0 - f;
+    return f + f * g * (f * to_rest - g * from_rest);
+}
+
+static int put_sample(const struct trajectory *curve, double curve_s, double t_s, double *heading_rad,
+                      struct samples *out)
+{
+    struct pose_sample *s = add_sample(out);
+    if (s == NULL) return SH_ENOMEM;
+    s->t_s = t_s;
+    trajectory_at(curve, curve_s, &s->pose, &s->frame);
+    heading_at(curve, curve_s, heading_rad);
+    pose_from_angles(*heading_rad, 0.0, 0.0, s->pose.quat);
+    return SH_OK;
+}
+
+/* The curve as samples that are near each other, heading along it, with the pauses. */
+static int follow(const struct trajectory *curve, const double *pause_s, struct samples *out)
+{
+    double heading_rad = 0.0, t_s = 0.0;
+    int rc = SH_OK;
+    for (size_t i = 0; i < curve->n && rc == SH_OK; i++) {
+        double at_s = curve->sample[i].t_s, h = i + 1 < curve->n ? curve->sample[i + 1].t_s - at_s : 0.0;
+        size_t parts = h > STEP_S ? (size_t)ceil(h / STEP_S) : 1;
+        if (pause_s[i] > 0.0) rc = put_sample(curve, at_s, t_s, &heading_rad, out);
+        t_s += pause_s[i];
+        for (size_t j = 0; j < parts && rc == SH_OK; j++) {
+            double f = (double)j / (double)parts;
+            double on = along(f, pause_s[i] > 0.0, i + 1 < curve->n && pause_s[i + 1] > 0.0);
+            rc = put_sample(curve, at_s + h * on, t_s + h * f, &heading_rad, out);
+        }
+        t_s += h;
+    }
+    return rc;
+}
+
+int trajectory_read_waypoints(const char *path, struct trajectory **out, struct sh_err *err)
+{
+    struct csv csv;
+    struct way way = {{0}, NULL};
+    struct samples samples = {0};
+    struct trajectory *curve = NULL;
+    *out = NULL;
+    int rc = csv_open(&csv, path, waypoint_columns, err);
+    if (rc == SH_OK) rc = read_waypoints(&csv, &way, err);
+    if (rc == SH_OK) rc = trajectory_from_samples(way.points.at, way.points.n, &curve, err);
+    if (rc == SH_OK && follow(curve, way.pause_s, &samples) != SH_OK)
+        rc = text_fail(&csv.text, 0, SH_ENOMEM, err, "no memory for its samples");
+    if (rc == SH_OK) rc = trajectory_from_samples(samples.at, samples.n, out, err);
+    trajectory_free(curve);
+    csv_close(&csv);
+    free(way.points.at);
+    free(way.pause_s);
+    free(samples.at);
+    return rc;
+}

@@ -1,0 +1,196 @@
+/* Samples over time -> the pose at any time, and the knots that a scan uses. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/pose/trajectory.h"
+
+static double chord_rate(const struct trajectory *tr, size_t i, int axis)
+{
+    return (tr->sample[i + 1].pose.position_m[axis] - tr->sample[i].pose.position_m[axis]) /
+           (tr->sample[i + 1].t_s - tr->sample[i].t_s);
+}
+
+static int stands(const struct trajectory *tr, size_t i)
+{
+    return memcmp(tr->sample[i].pose.position_m, tr->sample[i + 1].pose.position_m,
+                  sizeof tr->sample[i].pose.position_m) == 0;
+}
+
+/* Derivative at sample i of the parabola through it and its neighbours (at an end: its two nearest). */
+static double velocity(const struct trajectory *tr, size_t i, int axis)
+{
+    size_t last = tr->n - 1;
+    if (last == 0 || (i > 0 && stands(tr, i - 1)) || (i < last && stands(tr, i))) return 0.0;
+    if (last == 1) return chord_rate(tr, 0, axis);
+    size_t mid = i == 0 ? 1 : i == last ? last - 1 : i;
+    double h0 = tr->sample[mid].t_s - tr->sample[mid - 1].t_s, h1 = tr->sample[mid + 1].t_s - tr->sample[mid].t_s;
+    double d0 = chord_rate(tr, mid - 1, axis), d1 = chord_rate(tr, mid, axis);
+    double bend = (d1 - d0) / (h0 + h1); /* half the second derivative */
+    if (i == 0) return d0 - bend * h0;
+    if (i == last) return d1 + bend * h1;
+    return d0 + bend * h0;
+}
+
+static int check_sample(const struct pose_sample *s, const struct pose_sample *before, size_t i, struct sh_err *err)
+{
+    double norm2 = 0.0;
+    int finite = isfinite(s->t_s) && isfinite(s->frame);
+    for (int k = 0; k < 3; k++)
+        finite = finite && isfinite(s->pose.position_m[k]);
+    for (int k = 0; k < 4; k++)
+        norm2 += s->pose.quat[k] * s->pose.quat[k];
+    if (!finite || !isfinite(norm2)) return sh_fail(err, SH_EINPUT, "sample %zu: not a finite number", i);
+    if (!(norm2 > 1e-12)) return sh_fail(err, SH_EINPUT, "sample %zu: a quaternion of length 0", i);
+    if (before != NULL && !(s->t_s - before->t_s > 0.999e-6 * POSE_MIN_STEP_US))
+        return sh_fail(err, SH_EINPUT, "sample %zu: %.9g s after the one before; allowed at least %g s", i,
+                       s->t_s - before->t_s, 1e-6 * POSE_MIN_STEP_US);
+    return SH_OK;
+}
+
+int trajectory_from_samples(const struct pose_sample *sample, size_t n, struct trajectory **out, struct sh_err *err)
+{
+    *out = NULL;
+    if (n == 0) return sh_fail(err, SH_EINPUT, "a trajectory without samples");
+    for (size_t i = 0; i < n; i++) {
+        int rc = check_sample(&sample[i], i > 0 ? &sample[i - 1] : NULL, i, err);
+        if (rc != SH_OK) return rc;
+    }
+    struct trajectory *tr = calloc(1, sizeof *tr);
+    if (tr != NULL) tr->sample = malloc(n * sizeof *tr->sample);
+    if (tr != NULL) tr->velocity_m_s = malloc(n * sizeof *tr->velocity_m_s);
+    if (tr == NULL || tr->sample == NULL || tr->velocity_m_s == NULL) {
+        trajectory_free(tr);
+        return sh_fail(err, SH_ENOMEM, "no memory for a trajectory of %zu samples", n);
+    }
+    tr->n = n;
+    memcpy(tr->sample, sample, n * sizeof *sample);
+    for (size_t i = 0; i < n; i++) {
+        double *q = tr->sample[i].pose.quat, norm = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+        for (int k = 0; k < 4; k++)
+            q[k] /= norm;
+        for (int k = 0; k < 3; k++)
+            tr->velocity_m_s[i][k] = velocity(tr, i, k);
+    }
+    *out = tr;
+    return SH_OK;
+}
+
+void trajectory_free(struct trajectory *tr)
+{
+    if (tr == NULL) return;
+    free(tr->sample);
+    free(tr->velocity_m_s);
+    free(tr);
+}
+
+void trajectory_span(const struct trajectory *tr, double *first_s, double *last_s)
+{
+    *first_s = tr->sample[0].t_s;
+    *last_s = tr->sample[tr->n - 1].t_s;
+}
+
+/* The last sample at or before t_s, but never the very last one; t_s lies within the span. */
+static size_t find(const struct trajectory *tr, double t_s)
+{
+    size_t lo = 0, hi = tr->n - 1;
+    while (hi - lo > 1) {
+        size_t mid = lo + (hi - lo) / 2;
+        if (tr->sample[mid].t_s <= t_s)
+            lo = mid;
+        else
+            hi = mid;
+    }
+    return lo;
+}
+
+void trajectory_at(const struct trajectory *tr, double t_s, struct pose *pose, double *frame)
+{
+    const struct pose_sample *first = &tr->sample[0], *last = &tr->sample[tr->n - 1];
+    if (!(t_s > first->t_s) || t_s >= last->t_s) {
+        const struct pose_sample *end = t_s >= last->t_s ? last : first;
+        *pose = end->pose;
+        *frame = end->frame;
+        return;
+    }
+    size_t i = find(tr, t_s);
+    const struct pose_sample *a = &tr->sample[i], *b = &tr->sample[i + 1];
+    double h = b->t_s - a->t_s, f = (t_s - a->t_s) / h, g = 1.0 - f;
+    pose_between(&a->pose, &b->pose, f, pose);
+    *frame = a->frame + f * (b->frame - a->frame);
+    for (int k = 0; k < 3; k++) {
+        double d = b->pose.position_m[k] - a->pose.position_m[k];
+        double va = h * tr->velocity_m_s[i][k] - d, vb = h * tr->velocity_m_s[i + 1][k] - d;
+        pose->position_m[k] += f * g * (g * va - f * vb);
+    }
+}
+
+/* Largest acceleration within an interval: of a cubic at one of its ends. */
+static double acceleration(const struct trajectory *tr, size_t i)
+{
+    const struct pose_sample *a = &tr->sample[i], *b = &tr->sample[i + 1];
+    double h = b->t_s - a->t_s, at_a = 0.0, at_b = 0.0;
+    for (int k = 0; k < 3; k++) {
+        double d = (b->pose.position_m[k] - a->pose.position_m[k]) / h;
+        double va = tr->velocity_m_s[i][k], vb = tr->velocity_m_s[i + 1][k];
+        double from = (6.0 * d - 4.0 * va - 2.0 * vb) / h, to = (2.0 * va + 4.0 * vb - 6.0 * d) / h;
+        at_a += from * from;
+        at_b += to * to;
+    }
+    return sqrt(fmax(at_a, at_b));
+}
+
+/* Parts that interval i is cut in, and what stays of the deviation. */
+static size_t parts_of(const struct trajectory *tr, size_t i, double arm_m, double tolerance_m, double longest_s,
+                       double *error_m)
+{
+    double h = tr->sample[i + 1].t_s - tr->sample[i].t_s;
+    double rate = pose_angle_between(tr->sample[i].pose.quat, tr->sample[i + 1].pose.quat) / h;
+    double sag = (acceleration(tr, i) + rate * rate * arm_m) * h * h / 8.0; /* of the interval in one part */
+    double parts = fmax(ceil(sqrt(sag / tolerance_m)), ceil(h / longest_s * (1.0 - 1e-9)));
+    double most = floor(h / (1e-6 * POSE_MIN_STEP_US));
+    if (parts > most) parts = most;
+    if (parts < 1.0) parts = 1.0;
+    *error_m = fmax(*error_m, sag / (parts * parts));
+    return (size_t)parts;
+}
+
+static void set_knot(const struct trajectory *tr, double start_s, int64_t t_ns, const struct pose *mount,
+                     struct pose_knot *knot)
+{
+    struct pose body;
+    *knot = (struct pose_knot){.t_ns = t_ns};
+    trajectory_at(tr, start_s + 1e-9 * (double)t_ns, &body, &knot->frame);
+    pose_mount(&body, mount, &knot->pose);
+}
+
+int trajectory_knots(const struct trajectory *tr, double start_s, const struct pose *mount, double tolerance_m,
+                     int64_t longest_ns, struct pose_knot **out, size_t *n, double *error_m, struct sh_err *err)
+{
+    const double *arm = mount->position_m;
+    double arm_m = sqrt(arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2]), end_s = tr->sample[tr->n - 1].t_s;
+    size_t room = 1;
+    *error_m = 0.0;
+    for (size_t i = 0; i + 1 < tr->n; i++)
+        if (tr->sample[i + 1].t_s > start_s) {
+            double ignored = 0.0;
+            room += parts_of(tr, i, arm_m, tolerance_m, 1e-9 * (double)longest_ns, &ignored) + 1;
+        }
+    struct pose_knot *knot = malloc(room * sizeof *knot);
+    if (knot == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %zu poses of a trajectory", room);
+    size_t k = 0;
+    set_knot(tr, start_s, 0, mount, &knot[k++]);
+    for (size_t i = 0; i + 1 < tr->n && start_s < end_s; i++) {
+        double a_s = tr->sample[i].t_s, b_s = tr->sample[i + 1].t_s;
+        if (b_s <= start_s) continue;
+        size_t parts = parts_of(tr, i, arm_m, tolerance_m, 1e-9 * (double)longest_ns, error_m);
+        for (size_t j = 1; j <= parts; j++) {
+            double t_s = j == parts ? b_s : a_s + (b_s - a_s) * ((double)j / (double)parts);
+            int64_t t_ns = llround(1e9 * (t_s - start_s));
+            if (t_ns > knot[k - 1].t_ns) set_knot(tr, start_s, t_ns, mount, &knot[k++]);
+        }
+    }
+    *out = knot;
+    *n = k;
+    return SH_OK;
+}

@@ -1,0 +1,188 @@
+/* Poses of a moving head: kept for a while, and points taken to the scene with them. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "drivers/host/host.h"
+
+/* Room for some seconds, and for the longest frame. */
+enum { KEEP = 8192 };
+_Static_assert(KEEP > 2 * NATIVE_MAX_POSES, "a frame has room beside the one before");
+
+struct host_poses {
+    uint64_t n; /* that came; the last KEEP are there, number i at i % KEEP */
+    struct {
+        struct native_pose pose;
+        int begins; /* first of its frame: nothing is known between this and the one before */
+    } at[KEEP];
+};
+
+void host_forget_poses(struct scanhead *sh)
+{
+    if (sh->poses != NULL) sh->poses->n = 0;
+}
+
+int host_absorb_poses(struct scanhead *sh, const uint8_t *payload, size_t len)
+{
+    uint32_t n;
+    if (native_decode_poses(payload, len, &n) != 0) return SH_EFORMAT;
+    if (sh->poses == NULL) sh->poses = calloc(1, sizeof *sh->poses);
+    if (sh->poses == NULL) return SH_ENOMEM;
+    for (uint32_t i = 0; i < n; i++) {
+        uint64_t at = sh->poses->n++ % KEEP;
+        native_decode_pose(payload, i, &sh->poses->at[at].pose);
+        sh->poses->at[at].begins = i == 0;
+    }
+    return 0;
+}
+
+/* Two poses of a frame with a time between them, the latest such; 0 where there is none. */
+static int find(const struct host_poses *poses, int64_t t_ns, const struct native_pose **a,
+                const struct native_pose **b)
+{
+    uint64_t n = poses != NULL ? poses->n : 0, first = n > KEEP ? n - KEEP : 0;
+    for (uint64_t i = n; i > first + 1; i--) {
+        *a = &poses->at[(i - 2) % KEEP].pose;
+        *b = &poses->at[(i - 1) % KEEP].pose;
+        if (!poses->at[(i - 1) % KEEP].begins && (*a)->t_ns <= t_ns && t_ns <= (*b)->t_ns) return 1;
+    }
+    return 0;
+}
+
+/* From pose a to pose b: the rotation at a, and the axis (head's frame) and angle of the turn from there. */
+struct leg {
+    const struct native_pose *a, *b;
+    double rotation[9], axis[3], angle_rad;
+};
+
+static void set_rotation(const double q[4], double r[9])
+{
+    const double w = q[0], x = q[1], y = q[2], z = q[3];
+    const double m[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
+                         2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+                         2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
+    memcpy(r, m, sizeof m);
+}
+
+static void multiply(const double a[4], const double b[4], double out[4])
+{
+    out[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3];
+    out[1] = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2];
+    out[2] = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1];
+    out[3] = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0];
+}
+
+static void set_leg(struct leg *leg, const struct native_pose *a, const struct native_pose *b)
+{
+    const double back[4] = {a->quat[0], -a->quat[1], -a->quat[2], -a->quat[3]};
+    double d[4];
+    multiply(back, b->quat, d);
+    double sign = d[0] < 0 ? -1 : 1, sine = sqrt(d[1] * d[1] + d[2] * d[2] + d[3] * d[3]);
+    leg->a = a;
+    leg->b = b;
+    leg->angle_rad = 2 * atan2(sine, sign * d[0]);
+    for (int i = 0; i < 3; i++)
+        leg->axis[i] = sine > 0 ? sign * d[1 + i] / sine : i == 0;
+    set_rotation(a->quat, leg->rotation);
+}
+
+static double fraction(const struct leg *leg, int64_t t_ns)
+{
+    return (double)(t_ns - leg->a->t_ns) / (double)(leg->b->t_ns - leg->a->t_ns);
+}
+
+int scanhead_pose(struct scanhead *sh, int64_t t_ns, struct scanhead_pose *pose)
+{
+    const struct native_pose *a, *b;
+    struct leg leg;
+    memset(pose, 0, sizeof *pose);
+    if (!find(sh->poses, t_ns, &a, &b))
+        return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: no pose of the head at %.9f s of the scan", sh->source.name,
+                       1e-9 * (double)t_ns);
+    set_leg(&leg, a, b);
+    double f = fraction(&leg, t_ns), s = sin(0.5 * f * leg.angle_rad);
+    const double turn[4] = {cos(0.5 * f * leg.angle_rad), s * leg.axis[0], s * leg.axis[1], s * leg.axis[2]};
+    multiply(a->quat, turn, pose->quat);
+    for (int i = 0; i < 3; i++)
+        pose->position_m[i] = a->position_m[i] + f * (b->position_m[i] - a->position_m[i]);
+    pose->t_ns = t_ns;
+    pose->frame = a->frame + f * (b->frame - a->frame);
+    pose->flags = (int)(a->flags | b->flags);
+    return SCANHEAD_OK;
+}
+
+int scanhead_poses(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first, struct scanhead_pose *poses,
+                   uint32_t max)
+{
+    uint32_t n, i = 0;
+    if (frame->type != SCANHEAD_POSES || frame->payload == NULL || frame->payload != sh->payload)
+        return sh_fail(&sh->err, SCANHEAD_EINPUT, "not the poses frame that scanhead_next returned last");
+    if (native_decode_poses(frame->payload, frame->payload_len, &n) != 0) return SCANHEAD_EFORMAT;
+    for (; i < max && first + i < n; i++) {
+        struct native_pose p;
+        native_decode_pose(frame->payload, first + i, &p);
+        poses[i] = (struct scanhead_pose){.t_ns = p.t_ns, .frame = p.frame, .flags = (int)p.flags};
+        memcpy(poses[i].position_m, p.position_m, sizeof p.position_m);
+        memcpy(poses[i].quat, p.quat, sizeof p.quat);
+    }
+    return (int)i;
+}
+
+static void place(const double r[9], const double at[3], struct scanhead_point *p)
+{
+    double x = p->x, y = p->y, z = p->z;
+    p->x = at[0] + (r[0] * x + r[1] * y + r[2] * z);
+    p->y = at[1] + (r[3] * x + r[4] * y + r[5] * z);
+    p->z = at[2] + (r[6] * x + r[7] * y + r[8] * z);
+}
+
+/* Rodrigues' formula in the head's frame, then the rotation at the leg's begin. */
+static void place_moving(const struct leg *leg, double f, struct scanhead_point *p)
+{
+    const double *k = leg->axis, angle = f * leg->angle_rad, s = sin(angle), v = 1 - cos(angle);
+    double ux = k[1] * p->z - k[2] * p->y, uy = k[2] * p->x - k[0] * p->z, uz = k[0] * p->y - k[1] * p->x, at[3];
+    double wx = k[1] * uz - k[2] * uy, wy = k[2] * ux - k[0] * uz, wz = k[0] * uy - k[1] * ux;
+    p->x += s * ux + v * wx;
+    p->y += s * uy + v * wy;
+    p->z += s * uz + v * wz;
+    for (int i = 0; i < 3; i++)
+        at[i] = leg->a->position_m[i] + f * (leg->b->position_m[i] - leg->a->position_m[i]);
+    place(leg->rotation, at, p);
+}
+
+static int to_scene_moving(struct scanhead *sh, struct scanhead_point *points, uint32_t n, double *frame)
+{
+    struct leg leg = {.a = NULL};
+    int lost = 0;
+    for (uint32_t i = 0; i < n; i++) {
+        struct scanhead_point *p = &points[i];
+        const struct native_pose *a, *b;
+        if (leg.a == NULL || p->t_ns < leg.a->t_ns || p->t_ns >= leg.b->t_ns) {
+            leg.a = NULL;
+            if (find(sh->poses, p->t_ns, &a, &b)) set_leg(&leg, a, b);
+        }
+        if (leg.a == NULL) {
+            p->x = p->y = p->z = NAN;
+            if (frame != NULL) frame[i] = 0;
+            lost++;
+            continue;
+        }
+        double f = fraction(&leg, p->t_ns);
+        place_moving(&leg, f, p);
+        if (frame != NULL) frame[i] = leg.a->frame + f * (leg.b->frame - leg.a->frame);
+    }
+    return lost;
+}
+
+int scanhead_to_scene(struct scanhead *sh, struct scanhead_point *points, uint32_t n, double *frame)
+{
+    if (!sh->have_descriptor || !sh->have_anchor || sh->descriptor.layout != NATIVE_POLAR)
+        return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: only points of the polar layout can be taken to the scene frame",
+                       sh->source.name);
+    if (sh->anchor.moving & 1) return to_scene_moving(sh, points, n, frame);
+    for (uint32_t i = 0; i < n; i++) {
+        place(sh->anchor.rotation, sh->anchor.station_m, &points[i]);
+        if (frame != NULL) frame[i] = 0;
+    }
+    return 0;
+}

@@ -1,0 +1,134 @@
+/* The path of a moving head: its poses, and BVHs along it. */
+#include "firmware_sim/site_platform.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* What the head's own path may differ from the trajectory by, and how far apart its poses are at most. */
+static const double TOLERANCE_M = 1e-4;
+static const int64_t LONGEST_NS = 10000000;
+
+static int load_knots(struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    const struct config_platform *p = &site->cfg->platform;
+    struct trajectory *trajectory;
+    double first_s, last_s;
+    int rc = p->file[0] != '\0' ? trajectory_read_csv(p->file, &trajectory, err)
+                                : trajectory_read_waypoints(p->waypoints, &trajectory, err);
+    if (rc != SH_OK) return rc;
+    trajectory_span(trajectory, &first_s, &last_s);
+    if (p->start_s > last_s - first_s)
+        rc = sh_fail(err, SH_EINPUT, "%s: platform.start_s: %.9g s is behind the trajectory's end; allowed 0 to %.9g",
+                     site->cfg->file, p->start_s, last_s - first_s);
+    if (rc == SH_OK)
+        rc = trajectory_knots(trajectory, first_s + p->start_s, &site->mount, TOLERANCE_M, LONGEST_NS, &site->knot,
+                              &site->n_knots, &site->knot_error_m, err);
+    trajectory_free(trajectory);
+    if (rc == SH_OK && site->knot_error_m > TOLERANCE_M * 1.001)
+        sh_warn(report,
+                "the trajectory bends more than poses %g ms apart can follow: the head is off it by up to %.2g m",
+                1e-3 * POSE_MIN_STEP_US, site->knot_error_m);
+    return rc;
+}
+
+static double distance_m(const double a[3], const double b[3])
+{
+    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
+}
+
+/* Poses from `first` on whose box fits into the reach; returns the first that does not, centre and radius. */
+static size_t gather(const struct site *site, size_t first, double centre_m[3], double *radius_m)
+{
+    double lo[3], hi[3];
+    size_t i = first;
+    *radius_m = 0.0;
+    memcpy(lo, site->knot[first].pose.position_m, sizeof lo);
+    memcpy(hi, lo, sizeof hi);
+    for (; i < site->n_knots; i++) {
+        double next_lo[3], next_hi[3], half2 = 0.0;
+        for (int k = 0; k < 3; k++) {
+            next_lo[k] = fmin(lo[k], site->knot[i].pose.position_m[k]);
+            next_hi[k] = fmax(hi[k], site->knot[i].pose.position_m[k]);
+            half2 += 0.25 * (next_hi[k] - next_lo[k]) * (next_hi[k] - next_lo[k]);
+        }
+        if (half2 > SITE_BVH_REACH_M * SITE_BVH_REACH_M) break;
+        memcpy(lo, next_lo, sizeof lo);
+        memcpy(hi, next_hi, sizeof hi);
+        *radius_m = sqrt(half2);
+    }
+    for (int k = 0; k < 3; k++)
+        centre_m[k] = lo[k] + 0.5 * (hi[k] - lo[k]);
+    return i;
+}
+
+static int add_stretch(struct site *site, const double centre_m[3], double reach_m, int64_t until_ns,
+                       const struct sh_report *report, struct sh_err *err)
+{
+    if (site->n_bvh == CONFIG_MAX_STATIONS)
+        return sh_fail(err, SH_EINPUT, "%s: platform: the path is too long; allowed %d stretches of %.0f m across",
+                       site->cfg->file, CONFIG_MAX_STATIONS, 2.0 * SITE_BVH_REACH_M);
+    struct site_stretch *more = realloc(site->stretch, (site->n_stretches + 1) * sizeof *more);
+    if (more == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the path");
+    site->stretch = more;
+    struct bvh **bvh = &site->bvh[site->n_bvh];
+    int rc = bvh_create(site->scene, centre_m, reach_m, site->cfg->threads, report, bvh, err);
+    if (rc != SH_OK) return rc;
+    site->n_bvh++;
+    site->stretch[site->n_stretches++] = (struct site_stretch){until_ns, *bvh};
+    return site->cfg->order_exactly ? bvh_order_exactly(*bvh, err) : SH_OK;
+}
+
+/* A stretch ends between two poses; pulses of the block at hand may lie some blocks' way behind. */
+static int cover_path(struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    int rc = SH_OK;
+    for (size_t i = 0; i < site->n_knots && rc == SH_OK;) {
+        double centre_m[3], radius_m;
+        size_t end = gather(site, i, centre_m, &radius_m);
+        double beyond_m = 0.0;
+        int64_t until_ns = end < site->n_knots ? site->knot[end - 1].t_ns : INT64_MAX;
+        for (size_t k = end; k < site->n_knots && site->knot[k - 1].t_ns < until_ns + 100000000; k++)
+            beyond_m = fmax(beyond_m, distance_m(site->knot[k].pose.position_m, site->knot[end - 1].pose.position_m));
+        rc = add_stretch(site, centre_m, radius_m + beyond_m + 1e-3, until_ns, report, err);
+        i = end == site->n_knots || end == i + 1 ? end : end - 1; /* they share a pose */
+    }
+    return rc;
+}
+
+static void measure_path(struct site *site)
+{
+    for (uint32_t s = 0; s < site->cfg->n_stations; s++)
+        for (size_t i = 0; i < site->n_knots; i++)
+            site->path_reach_m =
+                fmax(site->path_reach_m, distance_m(site->cfg->station[s].position_m, site->knot[i].pose.position_m));
+}
+
+int site_load_platform(struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    const struct config_platform *p = &cfg->platform;
+    const double deg = M_PI / 180.0;
+    memcpy(site->mount.position_m, p->mount_m, sizeof p->mount_m);
+    pose_from_angles(p->mount_heading_deg * deg, p->mount_pitch_deg * deg, p->mount_roll_deg * deg, site->mount.quat);
+    if (p->kind == PLATFORM_LIVE) {
+        double reach_m = 0.0;
+        for (uint32_t i = 1; i < cfg->n_stations; i++)
+            reach_m = fmax(reach_m, distance_m(cfg->station[0].position_m, cfg->station[i].position_m));
+        const double *arm = p->mount_m;
+        double head_m = p->reach_m + sqrt(arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2]);
+        site->path_reach_m = head_m + reach_m;
+        return add_stretch(site, cfg->station[0].position_m, head_m, INT64_MAX, report, err);
+    }
+    int rc = load_knots(site, report, err);
+    if (rc == SH_OK) measure_path(site);
+    return rc == SH_OK ? cover_path(site, report, err) : rc;
+}
+
+struct bvh *site_bvh_at(const struct site *site, int64_t t_ns)
+{
+    size_t i = 0;
+    while (i + 1 < site->n_stretches && t_ns >= site->stretch[i].until_ns)
+        i++;
+    return site->stretch[i].bvh;
+}

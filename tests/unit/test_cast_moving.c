@@ -1,0 +1,249 @@
+/* A head that moves while it casts: each pulse from its own place, in its own direction. Against long double. */
+#include "tests/unit/cast_rig.h"
+
+#include "core/pose.h"
+
+static const double LO[3] = {-4.0, -6.0, -1.5}, HI[3] = {5.0, 7.0, 2.5};
+static const double CENTRE[3] = {0.0, 0.0, 0.0};
+
+enum { KNOTS = 12 };
+
+/* A jolting ride: 1.5 m in 110 ms, turning about all axes. */
+static void make_knots(struct pose_knot knot[KNOTS])
+{
+    uint64_t random = 11;
+    int64_t t_ns = 0;
+    for (int i = 0; i < KNOTS; i++) {
+        knot[i] = (struct pose_knot){.t_ns = t_ns};
+        for (int k = 0; k < 3; k++)
+            knot[i].pose.position_m[k] = 0.1 * i * (k == 0) + 0.2 * (case_unit(&random) - 0.5);
+        pose_from_angles(0.3 * i + case_unit(&random), case_unit(&random) - 0.5, case_unit(&random) - 0.5,
+                         knot[i].pose.quat);
+        t_ns += case_between(&random, 2000000, 14000000);
+    }
+}
+
+/* The rule of core/pose.h in long double, by the classic formula (sin((1-f)a) qa + sin(fa) qb) / sin a. */
+static void true_pose(const struct pose_knot *knot, int n, int64_t t_ns, long double p[3], long double r[9])
+{
+    int i = 0;
+    while (i + 2 < n && knot[i + 1].t_ns <= t_ns)
+        i++;
+    const struct pose_knot *a = &knot[i], *b = &knot[i + 1];
+    long double f = (long double)(t_ns - a->t_ns) / (long double)(b->t_ns - a->t_ns), dot = 0, q[4], norm = 0;
+    if (f < 0) f = 0;
+    if (f > 1) f = 1;
+    for (int k = 0; k < 4; k++)
+        dot += (long double)a->pose.quat[k] * (long double)b->pose.quat[k];
+    long double sign = dot < 0 ? -1 : 1, angle = acosl(fminl(1, sign * dot));
+    for (int k = 0; k < 4; k++) {
+        q[k] = angle > 1e-9L ? (sinl((1 - f) * angle) * a->pose.quat[k] + sign * sinl(f * angle) * b->pose.quat[k])
+                             : a->pose.quat[k];
+        norm += q[k] * q[k];
+    }
+    norm = sqrtl(norm);
+    long double w = q[0] / norm, x = q[1] / norm, y = q[2] / norm, z = q[3] / norm;
+    const long double m[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
+                              2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+                              2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
+    memcpy(r, m, sizeof m);
+    for (int k = 0; k < 3; k++)
+        p[k] = a->pose.position_m[k] + f * ((long double)b->pose.position_m[k] - a->pose.position_m[k]);
+}
+
+/* Pulse k's origin and direction in the scene. */
+static void true_ray(const struct cast_rig *rig, uint64_t k, double o[3], long double d[3])
+{
+    long double mirror, pan, s[3], p[3], r[9];
+    true_angles(&rig->spec, k, &mirror, &pan);
+    true_direction(mirror, pan, 0.0L, s);
+    true_pose(rig->setup.knot, (int)rig->setup.n_knots, schedule_time_ns(&rig->segment, k), p, r);
+    for (int i = 0; i < 3; i++) {
+        o[i] = (double)p[i];
+        d[i] = r[3 * i] * s[0] + r[3 * i + 1] * s[1] + r[3 * i + 2] * s[2];
+    }
+}
+
+static struct cast_rig *open_room(struct pose_knot knot[KNOTS])
+{
+    struct cast_rig *rig = cast_rig_open(box_scene(LO, HI), CENTRE);
+    struct sh_err err;
+    bvh_free(rig->bvh);
+    if (bvh_create(rig->scene, CENTRE, 2.0, 1, NULL, &rig->bvh, &err) != 0) fail_msg("%s", err.text);
+    rig->setup.bvh = rig->bvh;
+    make_knots(knot);
+    rig->setup.knot = knot;
+    rig->setup.n_knots = KNOTS;
+    return rig;
+}
+
+/* Ten lines of 10 ms, which the knots cover. The range is exact to a rounding of 1e-5 m counts; 1e-9 m is for the
+ * encoders' arithmetic. Where a ray passes within 1e-9 of an edge of the room the wall may be either. */
+static void test_room(void **state)
+{
+    (void)state;
+    struct pose_knot knot[KNOTS];
+    struct cast_rig *rig = open_room(knot);
+    double worst = 0, naive = 0;
+    assert_true(knot[KNOTS - 1].t_ns > 60000000);
+    for (uint64_t n = 0; n < 6; n++) {
+        struct schedule_line line;
+        uint32_t echoes = cast_line(rig, n, &line); /* a closed room: nothing slips through */
+        assert_int_equal(echoes, rig->block.n_pulses);
+        for (uint32_t j = 0; j < rig->block.n_points; j++) {
+            double o[3];
+            long double d[3], p[3], r[9], s[3], mirror, pan;
+            int wall = -1, other = -1;
+            true_ray(rig, line.cast0 + j, o, d);
+            long double range = box_range(LO, HI, o, d, &wall);
+            double got = rig->block.a[j] * 1e-5;
+            worst = fmax(worst, fabs(got - (double)range));
+            if (rig->block.label[j] != wall) {
+                long double near = range + 1e-6L;
+                int on_edge = 0;
+                for (int i = 0; i < 3; i++)
+                    on_edge += fabsl(o[i] + near * d[i] - LO[i]) < 1e-5L || fabsl(o[i] + near * d[i] - HI[i]) < 1e-5L;
+                assert_true(on_edge >= 2);
+            }
+            /* One pose per line instead: what the naive method makes of it. */
+            true_pose(knot, KNOTS, line.begin_ns, p, r);
+            true_angles(&rig->spec, line.cast0 + j, &mirror, &pan);
+            true_direction(mirror, pan, 0.0L, s);
+            for (int i = 0; i < 3; i++) {
+                o[i] = (double)p[i];
+                d[i] = r[3 * i] * s[0] + r[3 * i + 1] * s[1] + r[3 * i + 2] * s[2];
+            }
+            naive = fmax(naive, fabs(got - (double)box_range(LO, HI, o, d, &other)));
+        }
+    }
+    print_message("# room from a jolting head: off by %.2g um of 5 um rounding; with one pose per line %.0f mm\n",
+                  1e6 * (worst - 5e-6), 1e3 * naive);
+    assert_true(worst < 5e-6 + 1e-9);
+    assert_true(naive > 0.1);
+    cast_rig_close(rig);
+}
+
+static uint64_t sum_block(const struct line_block *b, uint32_t from, uint32_t n, uint64_t sum)
+{
+    for (uint32_t i = from; i < from + n; i++)
+        sum = rng_mix(sum + b->a[i]) + rng_mix(b->b[i] ^ (uint64_t)b->c[i] << 32) + b->label[i];
+    return sum;
+}
+
+/* The pose hangs on the pulse's time alone: not on how runs are cut, on ray packets, or on what the caster did before.
+ */
+static void test_same_bytes(void **state)
+{
+    (void)state;
+    struct pose_knot knot[KNOTS];
+    struct cast_rig *rig = open_room(knot);
+    static const uint32_t widths[] = {0, 16, 8, 4, 1}; /* 0: the native one */
+    static const uint32_t cuts[] = {RIG_LINE, 16, 2048, 48};
+    struct bvh_info info;
+    bvh_get_info(rig->bvh, &info);
+    uint64_t want = 0;
+    for (int w = 0; w < 5; w++) {
+        if (widths[w] > info.packet) continue;
+        if (widths[w] != 0) bvh_set_packet(rig->bvh, widths[w]);
+        for (int c = 0; c < 4; c++) {
+            uint64_t sum = 1;
+            struct schedule_line line;
+            schedule_get_line(&rig->segment, 2, &line);
+            for (uint64_t k = line.cast0; k < line.cast_end;) {
+                uint64_t n = line.cast_end - k < cuts[c] ? line.cast_end - k : cuts[c];
+                cast_some(rig, &line, k, n);
+                sum = sum_block(&rig->block, 0, (uint32_t)n, sum);
+                k += n;
+            }
+            if (want == 0) want = sum;
+            assert_int_equal(sum, want);
+            /* A static cast between: the origins of the packets are set anew. */
+            double d[3] = {0, 0, 1}, range;
+            uint32_t hit;
+            caster_hits(rig->caster, rig->bvh, CENTRE, 100.0, 1, &d[0], &d[1], &d[2], &range, &hit);
+            assert_true(fabs(range - HI[2]) < 1e-12);
+        }
+    }
+    cast_rig_close(rig);
+}
+
+/* Positions of the geo layout lie on the walls: the head's place is in them. */
+static void test_geo(void **state)
+{
+    (void)state;
+    struct pose_knot knot[KNOTS];
+    struct cast_rig *rig = open_room(knot);
+    struct schedule_line line;
+    rig->setup.layout = LINE_GEO;
+    rig->setup.xyz_scale_m = 1e-6;
+    for (uint64_t n = 0; n < 6; n++) {
+        cast_line(rig, n, &line);
+        for (uint32_t j = 0; j < rig->block.n_points; j++) {
+            const int32_t at[3] = {(int32_t)rig->block.a[j], (int32_t)rig->block.b[j], (int32_t)rig->block.c[j]};
+            uint16_t wall = rig->block.label[j];
+            double plane = (wall & 1 ? HI : LO)[wall / 2];
+            assert_true(fabs(at[wall / 2] * 1e-6 - plane) < 0.5e-6 + 1e-9);
+        }
+    }
+    cast_rig_close(rig);
+}
+
+/* A wall that moves away from a head that moves along: its range by hand. */
+static void test_moving_body(void **state)
+{
+    (void)state;
+    static const double lo[3] = {-0.5, 3.0, -1.0}, hi[3] = {0.5, 3.5, 1.0}, centre[3] = {0.0, 3.25, 0.0};
+    struct pose_knot knot[2] = {{.t_ns = 0}, {.t_ns = 100000000}};
+    struct cast_rig *rig = open_room((struct pose_knot[KNOTS]){{0}});
+    struct scene *body = box_scene(lo, hi);
+    struct bvh *bvh;
+    struct sh_err err;
+    if (bvh_create(body, centre, 100.0, 1, NULL, &bvh, &err) != 0) fail_msg("%s", err.text);
+    for (int i = 0; i < 2; i++)
+        knot[i].pose = (struct pose){.position_m = {0.0, 1.0 * i, 0.0}, .quat = {1, 0, 0, 0}};
+    rig->setup.knot = knot;
+    rig->setup.n_knots = 2;
+    rig->setup.n_movers = 1;
+    rig->setup.mover[0] = (struct cast_mover){.bvh = bvh, .centre_m = {0.0, 3.25, 0.0}, .radius_m = 1.2};
+    cast_rotation(0.0, rig->setup.mover[0].rotation);
+    rig->setup.mover[0].shift_m[1] = 2.0; /* its face is at y = 5 */
+    rig->spec.pan_udeg_s = 0;
+    schedule_start(&rig->segment, &rig->spec);
+    uint32_t hits = 0;
+    for (uint64_t n = 0; n < 9; n++) {
+        struct schedule_line line;
+        cast_line(rig, n, &line);
+        for (uint32_t j = 0; j < rig->block.n_points; j++) {
+            long double mirror, pan, d[3];
+            double o[3];
+            int wall;
+            true_angles(&rig->spec, line.cast0 + j, &mirror, &pan);
+            true_direction(mirror, pan, 0.0L, d);
+            true_ray(rig, line.cast0 + j, o, d);
+            long double room = box_range(LO, HI, o, d, &wall), face = (5.0L - o[1]) / d[1];
+            int meets = d[1] > 0 && fabsl(o[2] + face * d[2]) < 1.0L;
+            long double want = meets ? face : room;
+            if (d[1] > 0 && fabsl(fabsl(o[2] + face * d[2]) - 1.0L) < 1e-3L) continue; /* its edge */
+            if (d[1] > 0 && d[2] < 0 && !meets && fabsl(d[2]) > 0 && o[2] + face * d[2] < -1.0L)
+                continue;                     /* below it */
+            if (d[1] > 0 && !meets) continue; /* may meet its top */
+            hits += (uint32_t)meets;
+            assert_true(fabs(rig->block.a[j] * 1e-5 - (double)want) < 5e-6 + 1e-9);
+        }
+    }
+    assert_true(hits > 500);
+    bvh_free(bvh);
+    scene_free(body);
+    cast_rig_close(rig);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_room),
+        cmocka_unit_test(test_same_bytes),
+        cmocka_unit_test(test_geo),
+        cmocka_unit_test(test_moving_body),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
