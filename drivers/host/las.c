@@ -40,6 +40,7 @@ static int las_open(const char *path, const struct recorder_options *options, vo
     las->report = options->report;
     las->track.path = las->file.path;
     las->facts.scale_m = 1;
+    strcpy(las->facts.profile, "OTHER"); /* until points have come */
     *rec = las;
     return 0;
 }
