@@ -1,5 +1,7 @@
 /* Recordings as readers see them that are not ours: a scan of two stations in UTM, written in each format at once, read
  * back by other people's software, point by point against the raw stream. A reader that is not installed is skipped. */
+#include "core/georef.h"
+#include "drivers/host/crs_wkt.h"
 #include "tests/wire/room.h"
 
 enum { N_STATIONS = 2, MAX_POINTS = 200000 };
@@ -275,11 +277,42 @@ static void test_crs(void **state)
     free(las);
 }
 
+/* Every kind of CRS, by PROJ against GeographicLib. */
+static void test_all_crs(void **state)
+{
+    (void)state;
+    static const struct georef_spec spec[] = {{.crs = GEOREF_ECEF, .lat_deg = -33.9, .lon_deg = 18.4, .height_m = 55},
+                                              {.crs = GEOREF_UTM, .lat_deg = -33.9, .lon_deg = 18.4, .height_m = 55},
+                                              {.crs = GEOREF_UTM, .lat_deg = 83.5, .lon_deg = -179, .height_m = -3},
+                                              {.crs = GEOREF_UTM, .lat_deg = 87, .lon_deg = -120, .height_m = 8},
+                                              {.crs = GEOREF_UTM, .lat_deg = -85, .lon_deg = 70, .height_m = 2800}};
+    for (size_t i = 0; i < sizeof spec / sizeof spec[0]; i++) {
+        struct georef *georef;
+        struct sh_err err = {0};
+        char wkt[CRS_WKT_MAX], from[128];
+        double want[3], p[3];
+        assert_int_equal(georef_create(&spec[i], &georef, &err), 0);
+        georef_anchor(georef, want);
+        crs_wkt(georef_epsg(georef), wkt);
+        georef_free(georef);
+        snprintf(from, sizeof from, "%.8f %.8f %.1f\n", spec[i].lat_deg, spec[i].lon_deg, spec[i].height_m);
+        wire_write_text(wire, "station.txt", from);
+        const char *const argv[] = {"cs2cs", "-f", "%.6f", "EPSG:4979", wkt, "station.txt", NULL};
+        run_well(argv);
+        char *out = wire_read(wire_path(wire, "tool.out"), NULL);
+        assert_int_equal(sscanf(out, "%lf %lf %lf", &p[0], &p[1], &p[2]), 3);
+        for (int k = 0; k < 3; k++)
+            if (!(fabs(p[k] - want[k]) < 1e-5)) fail_msg("case %zu axis %d: %.6f, not %.6f", i, k, p[k], want[k]);
+        free(out);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_las), cmocka_unit_test(test_e57),     cmocka_unit_test(test_ptx),
-        cmocka_unit_test(test_ply), cmocka_unit_test(test_ply_pcl), cmocka_unit_test(test_crs),
+        cmocka_unit_test(test_las),     cmocka_unit_test(test_e57),     cmocka_unit_test(test_ptx),
+        cmocka_unit_test(test_ply),     cmocka_unit_test(test_ply_pcl), cmocka_unit_test(test_crs),
+        cmocka_unit_test(test_all_crs),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
