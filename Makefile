@@ -101,7 +101,7 @@ deps: deps-test $(READERS)/installed
 $(READERS)/installed: $(wildcard tests/readers/*) | deps-test
 	@mkdir -p $(@D)
 	@cp tests/readers/* $(@D)
-	@if (cd $(@D) && npm ci --no-audit --no-fund --loglevel=error) >$(@D)/npm.log 2>&1; then touch $@; \
+	@if (cd $(@D) && npm ci --no-audit --no-fund --loglevel=error --fetch-retries=0 --fetch-timeout=30000) >$(@D)/npm.log 2>&1; then touch $@; \
 	else echo "npm could not install the readers for LAS and E57 ($(@D)/npm.log): their tests will be skipped"; fi
 deps-test:
 	$(call install_missing,$(DEPS_TEST))

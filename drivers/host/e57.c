@@ -139,6 +139,7 @@ static void put_bits(uint8_t *stream, unsigned bits, unsigned i, unsigned v)
 static int put_xyz(struct e57 *e, const double p[3], struct sh_err *err)
 {
     struct e57_scan *s = e->scan;
+    int32_t n[3];
     for (int i = 0; i < 3; i++) {
         double counts = rint(p[i] / s->scale_m);
         if (!(fabs(counts) <= INT32_MAX))
@@ -147,10 +148,12 @@ static int put_xyz(struct e57 *e, const double p[3], struct sh_err *err)
                 "%s: a point at (%.3f %.3f %.3f) from the head is beyond the %.0f m of 32 bits in steps of %g "
                 "m; give the head a coarser output.scale_m",
                 e->file.path, p[0], p[1], p[2], 2147483647 * s->scale_m, s->scale_m);
-        int32_t n = (int32_t)counts;
-        if (s->n_points == 0 || n < s->min[i]) s->min[i] = n;
-        if (s->n_points == 0 || n > s->max[i]) s->max[i] = n;
-        le_put32(e->stream[X + i] + 4 * (size_t)e->n, (uint32_t)n ^ 0x80000000u); /* counted from the minimum */
+        n[i] = (int32_t)counts;
+    }
+    for (int i = 0; i < 3; i++) {
+        if (s->n_points == 0 || n[i] < s->min[i]) s->min[i] = n[i];
+        if (s->n_points == 0 || n[i] > s->max[i]) s->max[i] = n[i];
+        le_put32(e->stream[X + i] + 4 * (size_t)e->n, (uint32_t)n[i] ^ 0x80000000u); /* counted from the minimum */
     }
     s->n_points++;
     return 0;

@@ -97,13 +97,16 @@ static uint16_t intensity(double reflectance_db)
 static int put_xyz(struct las *las, uint8_t *to, const double p[3], struct sh_err *err)
 {
     struct las_facts *f = &las->facts;
+    int32_t n[3];
     for (int i = 0; i < 3; i++) {
         double counts = rint((p[i] - f->offset_m[i]) / f->scale_m);
         if (!(fabs(counts) <= INT32_MAX)) return too_far(las, p, err);
-        int32_t n = (int32_t)counts;
-        if (f->n_points == 0 || n < f->min[i]) f->min[i] = n;
-        if (f->n_points == 0 || n > f->max[i]) f->max[i] = n;
-        le_put32(to + 4 * i, (uint32_t)n);
+        n[i] = (int32_t)counts;
+    }
+    for (int i = 0; i < 3; i++) {
+        if (f->n_points == 0 || n[i] < f->min[i]) f->min[i] = n[i];
+        if (f->n_points == 0 || n[i] > f->max[i]) f->max[i] = n[i];
+        le_put32(to + 4 * i, (uint32_t)n[i]);
     }
     return 0;
 }
@@ -126,7 +129,8 @@ static int put_point(struct las *las, uint8_t *to, const struct scanhead_point *
         pose_reverse(&t->pose, p_socs);
     else
         pose_forward(&t->pose, p_crs);
-    int rc = put_xyz(las, to, p_crs, err);
+    int rc = put_time(las, to + 22, point->t_ns, err);
+    if (rc == 0) rc = put_xyz(las, to, p_crs, err);
     le_put16(to + 12, intensity(point->reflectance_db));
     to[14] = (uint8_t)(point->echo | point->echo_count << 4);
     to[15] = 0;
@@ -134,7 +138,6 @@ static int put_point(struct las *las, uint8_t *to, const struct scanhead_point *
     to[17] = 0;
     le_put16(to + 18, scan_angle(p_socs));
     le_put16(to + 20, (uint16_t)t->info.station);
-    if (rc == 0) rc = put_time(las, to + 22, point->t_ns, err);
     le_put16(to + 30, point->label);
     return rc;
 }
@@ -144,20 +147,21 @@ static int las_points(void *rec, int n, struct sh_err *err)
     struct las *las = rec;
     uint8_t *to = outfile_room(&las->file, TRACK_BATCH * LAS_POINT_LEN, err), *at = to;
     if (to == NULL) return SH_EIO;
+    int rc = 0;
     for (int i = 0; i < n; i++) {
         const struct scanhead_point *p = &las->track.point[i];
         if (p->echo_count == 0) {
             las->n_empty++;
             continue;
         }
-        int rc = put_point(las, at, p, err);
-        if (rc != 0) return rc;
+        rc = put_point(las, at, p, err);
+        if (rc != 0) break;
         at += LAS_POINT_LEN;
         las->facts.n_points++;
         if (p->echo >= 1) las->facts.n_by_return[p->echo - 1]++;
     }
-    outfile_used(&las->file, (size_t)(at - to));
-    return 0;
+    outfile_used(&las->file, (size_t)(at - to)); /* also before a failure: the file may be kept */
+    return rc;
 }
 
 static int las_frame(void *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)

@@ -85,6 +85,9 @@ int ptx_grid_drain(struct ptx_grid *grid,
         rc = fill(grid, (uint32_t)at, column, &cell, &left, err);
         if (rc == 0) rc = fn(ctx, column, n_rows, err);
     }
+    if (rc == 0 && left > 0)
+        rc = sh_fail(err, SH_EFORMAT, "%s: lines of a scan went back; %llu echoes have no place", grid->path,
+                     (unsigned long long)left);
     free(column);
     rewind(grid->spool);
     grid->n_shots = grid->n_cells = 0;

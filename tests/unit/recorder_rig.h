@@ -125,6 +125,9 @@ static inline void rig_warn(void *ctx, const char *text)
     snprintf(rig_notes + at, sizeof rig_notes - at, "%s\n", text);
 }
 
+/* keep: RIG_KEEP_ALWAYS also after a failure, as `record` does with what has come. */
+enum { RIG_KEEP = 1, RIG_KEEP_ALWAYS = 2 };
+
 /* Records the stream; the code of the call that failed, or of close. */
 static inline int rig_record(const char *path, struct recorder_options options, int keep, struct sh_err *err)
 {
@@ -143,7 +146,7 @@ static inline int rig_record(const char *path, struct recorder_options options, 
     if (rc == 0) {
         while (rc == 0 && scanhead_next(sh, &frame, -1) == 0)
             rc = ops->frame(rec, sh, &frame, err);
-        int closed = ops->close(rec, rc == 0 && keep, err);
+        int closed = ops->close(rec, keep == RIG_KEEP_ALWAYS || (rc == 0 && keep), rc == 0 ? err : NULL);
         if (rc == 0) rc = closed;
     }
     scanhead_close(sh);

@@ -148,6 +148,14 @@ static void test_stations(void **state)
     assert_int_equal(rig_record(rig_path("a.las"), (struct recorder_options){0}, 1, &err), SH_EFORMAT);
     assert_non_null(strstr(err.text, "station 2"));
     assert_non_null(strstr(err.text, "output.scale_m"));
+    /* kept all the same, the file holds what came before: of the second station two points, 3 m nearer */
+    assert_int_equal(rig_record(rig_path("a.las"), (struct recorder_options){0}, RIG_KEEP_ALWAYS, &err), SH_EFORMAT);
+    free(las);
+    las = rig_read(rig_path("a.las"), &las_len);
+    unlink(rig_path("a.las"));
+    check_header("model");
+    assert_int_equal(rig_uint(las + 247, 8), 6);
+    assert_true(fabs(rig_double(las + 187) - (a.anchor[0] - 2147481)) < 1e-9);
 }
 
 /* In the polar layout points are placed in the scene by the pose, and there is no CRS. */
