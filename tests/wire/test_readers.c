@@ -26,13 +26,14 @@ static const double LAT_LON_H[N_STATIONS][3] = {{52.5167, 13.4, 110.2}, {52.5167
 static struct wire *wire;
 static double (*truth)[3];      /* the stream's points, in UTM */
 static size_t n_truth, n_first; /* n_first of the first station */
+static size_t n_frames;
 static double scale_m, anchor[N_STATIONS][3];
 
 /* ---- the recording, once for all tests */
 
 static void record_all(void)
 {
-    static const char *const name[] = {"f.shs", "f.las", "f.ptx", "f.e57", "f.ply", "f.poses.csv"};
+    static const char *const name[] = {"f.shs", "f.las", "f.ptx", "f.e57", "f.ply", "f.poses.csv", "f.pcapng"};
     enum { N = sizeof name / sizeof name[0] };
     static char path[N][352], config[352];
     const char *args[4 + 2 * N + 3] = {"record", config, "--station", "all"};
@@ -68,6 +69,22 @@ static void keep_points(struct scanhead *sh, const struct scanhead_frame *frame)
     }
 }
 
+/* Of the first ones, time and length. */
+static struct {
+    int64_t t_ns;
+    size_t len;
+} frames[1024];
+
+static void keep_frame(struct scanhead *sh, const struct scanhead_frame *frame)
+{
+    if (frame->type == SCANHEAD_POINTS) keep_points(sh, frame);
+    if (n_frames < 1024) {
+        frames[n_frames].t_ns = frame->t_ns;
+        frames[n_frames].len = frame->raw_len;
+    }
+    n_frames++;
+}
+
 static int set_up(void **state)
 {
     struct scanhead_frame frame;
@@ -77,7 +94,7 @@ static int set_up(void **state)
     record_all();
     struct scanhead *sh = client_open(wire_path(wire, "f.shs"));
     while (scanhead_next(sh, &frame, -1) == 0)
-        if (frame.type == SCANHEAD_POINTS) keep_points(sh, &frame);
+        keep_frame(sh, &frame);
     scanhead_close(sh);
     assert_true(n_first > 10000 && n_truth - n_first > 10000);
     return 0;
@@ -242,6 +259,30 @@ static void test_ply_pcl(void **state)
     free(text);
 }
 
+/* As many packets as frames, of their length, with their times to the nanosecond. */
+static void test_pcapng(void **state)
+{
+    (void)state;
+    const char *const argv[] = {"tshark",           "-n", "-r",        "f.pcapng", "-T", "fields", "-e",
+                                "frame.time_epoch", "-e", "frame.len", NULL};
+    run_well(argv);
+    char *text = wire_read(wire_path(wire, "tool.out"), NULL), *at = text;
+    size_t n = 0;
+    for (; *at != 0; n++) {
+        long long s, ns;
+        size_t len;
+        int used;
+        assert_int_equal(sscanf(at, "%lld.%9lld %zu%n", &s, &ns, &len, &used), 3);
+        if (n < 1024) {
+            assert_int_equal(s * 1000000000 + ns, frames[n].t_ns);
+            assert_int_equal(len, frames[n].len);
+        }
+        at += used + 1;
+    }
+    assert_int_equal(n, n_frames);
+    free(text);
+}
+
 /* The LAS file's CRS, by PROJ: it takes the stations' degrees to the positions that .poses.csv has. */
 static void test_crs(void **state)
 {
@@ -310,9 +351,9 @@ static void test_all_crs(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_las),     cmocka_unit_test(test_e57),     cmocka_unit_test(test_ptx),
-        cmocka_unit_test(test_ply),     cmocka_unit_test(test_ply_pcl), cmocka_unit_test(test_crs),
-        cmocka_unit_test(test_all_crs),
+        cmocka_unit_test(test_las), cmocka_unit_test(test_e57),     cmocka_unit_test(test_ptx),
+        cmocka_unit_test(test_ply), cmocka_unit_test(test_ply_pcl), cmocka_unit_test(test_pcapng),
+        cmocka_unit_test(test_crs), cmocka_unit_test(test_all_crs),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
