@@ -1,5 +1,6 @@
 /* .e57: ASTM E2807, one data3D per scan: points in the head's frame as counts of the stream's scale, and the pose that
  * takes them to the recording's frame (pose.h). Intensity is the reflectance in dB; row and column are shot and line.
+ * The label is a field of an extension, which readers pass over that don't know it.
  *
  * A binary section is a header and packets; in a packet each field has a stream of its own, of as many bits per record
  * as its range needs. All packets but the last hold a number of records that is a multiple of 8, so that no stream of
@@ -21,11 +22,11 @@ enum {
     FILE_HEADER_LEN = 48,
     SECTION_HEADER_LEN = 32,
     PACKET_HEADER_LEN = 6,
-    PACKET_RECORDS = 2000, /* a multiple of 8; their packet is shorter than 64 KiB */
+    PACKET_RECORDS = 1920, /* a multiple of 8; their packet is shorter than 64 KiB */
     PACKET_MAX = 65536,
 };
-enum stream { X, Y, Z, INVALID, INTENSITY, NO_INTENSITY, TIME, RETURN, RETURNS, ROW, COLUMN, N_STREAMS };
-static const unsigned stream_bits[N_STREAMS] = {32, 32, 32, 2, 16, 1, 64, 4, 4, 32, 32};
+enum stream { X, Y, Z, INVALID, INTENSITY, NO_INTENSITY, TIME, RETURN, RETURNS, ROW, COLUMN, LABEL, N_STREAMS };
+static const unsigned stream_bits[N_STREAMS] = {32, 32, 32, 2, 16, 1, 64, 4, 4, 32, 32, 16};
 
 struct e57 {
     struct outfile file;
@@ -213,6 +214,7 @@ static int e57_points(void *rec, int n, struct sh_err *err)
         put_intensity(e, p->reflectance_db);
         le_put_double(e->stream[TIME] + 8 * (size_t)e->n, (double)p->t_ns / 1e9);
         put_index(e, p, e->track.row[i]);
+        le_put16(e->stream[LABEL] + 2 * (size_t)e->n, p->label);
         if (++e->n == PACKET_RECORDS) rc = put_packet(e, err);
         if (rc != 0) return rc;
     }

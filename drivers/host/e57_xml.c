@@ -128,6 +128,7 @@ static void put_prototype(FILE *out, const struct e57_facts *facts, const struct
           "<returnCount type=\"Integer\" minimum=\"0\" maximum=\"15\">0</returnCount>\n"
           "<rowIndex type=\"Integer\" minimum=\"0\" maximum=\"4294967295\">0</rowIndex>\n"
           "<columnIndex type=\"Integer\" minimum=\"0\" maximum=\"4294967295\">0</columnIndex>\n"
+          "<sh:label type=\"Integer\" minimum=\"0\" maximum=\"65535\">0</sh:label>\n"
           "</prototype>\n",
           out);
 }
@@ -154,7 +155,8 @@ static void put_root(FILE *out, const struct e57_facts *facts)
 {
     char wkt[CRS_WKT_MAX];
     fputs("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
-          "<e57Root type=\"Structure\" xmlns=\"http://www.astm.org/COMMIT/E57/2010-e57-v1.0\">\n",
+          "<e57Root type=\"Structure\" xmlns=\"http://www.astm.org/COMMIT/E57/2010-e57-v1.0\" "
+          "xmlns:sh=\"urn:scanhead:e57\">\n",
           out);
     put_string(out, "formatName", "ASTM E57 3D Imaging Data File");
     put_guid(out, facts->scan, facts->n_scans * sizeof *facts->scan);

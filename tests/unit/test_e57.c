@@ -1,7 +1,7 @@
 /* E57 files by a small reader of their own: pages, sections, packets and bit streams as ASTM E2807 has them. */
 #include "tests/unit/recorder_rig.h"
 
-enum { PAGE = 1024, CONTENT = 1020, MAX_STREAMS = 11 };
+enum { PAGE = 1024, CONTENT = 1020, MAX_STREAMS = 12 };
 
 static uint8_t *content; /* without the CRCs */
 static size_t content_len, physical_len;
@@ -63,6 +63,7 @@ struct record {
     double x, y, z, intensity, t_s;
     unsigned invalid, no_intensity, echo, echoes;
     uint32_t row, column;
+    unsigned label;
 };
 static struct record record[8192];
 static size_t n_records;
@@ -116,7 +117,7 @@ static void read_scan(int k, int empty_shots)
     size_t section = offset / PAGE * CONTENT + offset % PAGE;
     data = rig_uint(content + section + 16, 8);
     assert_int_equal(data / PAGE * CONTENT + data % PAGE, section + 32);
-    read_packets(content + section, empty_shots ? 11 : 10);
+    read_packets(content + section, empty_shots ? 12 : 11);
     n_records = count;
     for (size_t i = 0; i < count; i++) {
         struct record *r = &record[i];
@@ -133,6 +134,7 @@ static void read_scan(int k, int empty_shots)
         r->echoes = (unsigned)bits(s++, i, 4);
         r->row = (uint32_t)bits(s++, i, 32);
         r->column = (uint32_t)bits(s++, i, 32);
+        r->label = (unsigned)bits(s++, i, 16);
     }
 }
 
@@ -170,6 +172,7 @@ static void check_points(size_t first, int empty_shots, uint32_t column, uint32_
         assert_int_equal(r->echo, want->echo > 0 ? want->echo - 1 : 0); /* counted from 0 */
         assert_int_equal(r->echoes, want->count);
         assert_int_equal(r->column, column);
+        assert_int_equal(r->label, want->label);
         assert_int_equal(r->row, row + (uint32_t)pulse);
     }
 }
