@@ -13,7 +13,7 @@ _Static_assert(SCANHEAD_EINPUT == (int)SH_EINPUT && SCANHEAD_EIO == (int)SH_EIO 
                    SCANHEAD_ESTATE == (int)SH_ESTATE,
                "the library's errors are those of core/err.h");
 _Static_assert(SCANHEAD_POINTS == (int)NATIVE_POINTS && SCANHEAD_SURFACES == (int)NATIVE_SURFACES &&
-                   SCANHEAD_EV_SETTINGS == (int)NATIVE_EV_SETTINGS && SCANHEAD_LOCAL == (int)NATIVE_LOCAL,
+                   SCANHEAD_EV_PPS == (int)NATIVE_EV_PPS && SCANHEAD_LOCAL == (int)NATIVE_LOCAL,
                "types, events and flags are those on the wire");
 
 int scanhead_open(const char *source, struct scanhead **out, char *err, size_t err_len)

@@ -41,6 +41,9 @@ struct scanhead {
     struct native_descriptor descriptor;
     struct native_anchor anchor;
     uint64_t last_pulse0;
+    int have_scan_t0, have_gps;
+    int64_t scan_t0_ns;        /* device time of the scan's start */
+    int64_t gps_at_ns, gps_ns; /* a device time, and the GPS time the head's clock had then */
     struct host_surface *surface;
     uint32_t n_surfaces;
 
