@@ -48,4 +48,8 @@ void georef_forward(const struct georef *georef, size_t n, const double *dx, con
 /* One point back: difference from the anchor -> prcs (absolute). For checks and clients, not for speed. */
 void georef_reverse(const struct georef *georef, const double d_crs[3], double p_prcs[3]);
 
+/* A point east, north and up (metres) in the tangent frame at a place on WGS 84 -> its own latitude and longitude (deg,
+ * longitude -180..180) and ellipsoidal height (m). GeographicLib's LocalCartesian; for single points, not for speed. */
+void georef_geodetic(double lat_deg, double lon_deg, double height_m, const double d_enu[3], double geodetic[3]);
+
 #endif

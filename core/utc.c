@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { DAY_S = 86400, FIRST_YEAR = 1972, LAST_YEAR = 2261 };
+enum { DAY_S = 86400, FIRST_YEAR = 1972, LAST_YEAR = 2199 };
 static const int64_t GPS_EPOCH_TAI_S = 315964800 + 19; /* 1980-01-06, ten years and 7 days of 1970's, TAI-UTC 19 s */
 static const int64_t NTP_TO_POSIX_S = 2208988800;      /* 1900 to 1970: 70 years, 17 leap days */
 static const int64_t WEEK_NS = 604800 * UTC_SECOND_NS;

@@ -29,7 +29,7 @@ enum cfg_flags {
     CFG_ASCII = 2,  /* goes into *IDN?: printable ASCII without comma and quotes */
 };
 
-enum { CFG_MAX_ROWS = 64, CFG_MAX_ITEMS = 64, CFG_PATH_MAX = 96, CFG_FROM_SET = -1 };
+enum { CFG_MAX_ROWS = 128, CFG_MAX_ITEMS = 64, CFG_PATH_MAX = 96, CFG_FROM_SET = -1 };
 
 struct cfg_key {
     const char *path;

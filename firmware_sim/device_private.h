@@ -5,6 +5,8 @@
 #include <pthread.h>
 
 #include "firmware_sim/device.h"
+#include "firmware_sim/gnss.h"
+#include "firmware_sim/head_clock.h"
 
 enum { DEVICE_MAX_PENDING = 256, DEVICE_MAX_CHANGES = 32, DEVICE_SURFACES_A_FRAME = 64 };
 
@@ -14,6 +16,8 @@ struct device {
     struct device_options options;
     struct device_counters counters;
     struct command_device cmd;
+    struct head_clock clock;
+    struct gnss gnss;
     char idn[96];
     uint64_t tick_hz;
     int64_t tick_ns;
@@ -57,6 +61,14 @@ void device_transition(struct device *device, enum head_event event, uint64_t ti
 enum head_state device_visible_state(const struct device *device, uint64_t released);
 void device_do_command(struct device *device, uint32_t session, const char *line, uint64_t released,
                        struct command_result *out);
+
+/* device_time.c: the head's clock and the receiver. */
+/* GPS time, ns, of a device time by the head's clock; 0: unknown. */
+int64_t device_gps_ns(const struct device *device, int64_t t_ns);
+/* An event for the full second that begins in the tick, if one does. */
+void device_say_pps(struct device *device, uint64_t tick);
+/* What TIME:UTC? and TIME:GPS? answer at cmd.t_ns. */
+void device_set_time_texts(struct device *device);
 
 /* device_frames.c: what the frames say. */
 void device_fill_descriptor(const struct device *device, struct native_descriptor *d);

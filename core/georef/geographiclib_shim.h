@@ -12,6 +12,9 @@ extern "C" {
 /* WGS 84 geocentric position, and the rotation (row by row) of east, north, up at it to X, Y, Z. */
 void shim_ecef(double lat_deg, double lon_deg, double height_m, double p_ecef[3], double rotation[9]);
 
+/* east, north, up at a place -> latitude, longitude, height. */
+void shim_geodetic(double lat_deg, double lon_deg, double height_m, const double d_local[3], double geodetic[3]);
+
 /* A local tangent frame and one grid zone. */
 struct shim_grid;
 

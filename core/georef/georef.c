@@ -150,3 +150,8 @@ void georef_reverse(const struct georef *georef, const double d_crs[3], double p
     for (int i = 0; i < 3; i++)
         p_prcs[i] = georef->station_m[i] + d[i];
 }
+
+void georef_geodetic(double lat_deg, double lon_deg, double height_m, const double d_enu[3], double geodetic[3])
+{
+    shim_geodetic(lat_deg, lon_deg, height_m, d_enu, geodetic);
+}

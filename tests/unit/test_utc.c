@@ -60,12 +60,12 @@ static void published_dates(void **state)
     }
 }
 
-/* gmtime_r of the C library, which knows no leap seconds in the default zone, over all days of 300 years. */
+/* gmtime_r of the C library, which knows no leap seconds in the default zone, over all days of 228 years. */
 static void calendar_as_the_library_has_it(void **state)
 {
     (void)state;
     const struct utc_table *table = utc_table_builtin();
-    for (int64_t s = 63072000 + 43210; s < 9214560000; s += 86400) {
+    for (int64_t s = 63072000 + 43210; s < 7258118400; s += 86400) {
         int64_t tai_ns = utc_tai_from_posix(table, s * UTC_SECOND_NS), back_ns;
         time_t posix = (time_t)s;
         struct tm tm;
@@ -134,7 +134,7 @@ static void what_is_no_time(void **state)
                                        "2026-01-01T00:00:00Z ",
                                        "2026-1-01T00:00:00Z",
                                        "+026-01-01T00:00:00Z"};
-    static const char *const date[] = {"1971-12-31T23:59:59Z", "2262-01-01T00:00:00Z", "2026-00-01T00:00:00Z",
+    static const char *const date[] = {"1971-12-31T23:59:59Z", "2200-01-01T00:00:00Z", "2026-00-01T00:00:00Z",
                                        "2026-13-01T00:00:00Z", "2026-02-29T00:00:00Z", "2100-02-29T00:00:00Z",
                                        "2026-04-31T00:00:00Z", "2026-01-00T00:00:00Z", "2026-01-01T24:00:00Z",
                                        "2026-01-01T00:60:00Z", "2026-01-01T00:00:61Z", "2016-12-31T22:59:60Z",
