@@ -57,7 +57,8 @@ static void warn_expired(struct head_clock *clock)
     utc_from_tai(&clock->table, end_ns, &end);
     utc_format(&end, 0, day);
     snprintf(clock->warning, sizeof clock->warning,
-             "leap seconds are known up to %.10s only: UTC and GPS time may differ by one more since (renew tzdata)", day);
+             "leap seconds are known up to %.10s only: UTC and GPS time may differ by one more since (renew tzdata)",
+             day);
 }
 
 int head_clock_create(const struct config *cfg, struct head_clock *clock, struct sh_err *err)

@@ -1,7 +1,7 @@
 /* The head's clock: device time -> time of day.
  *
- * Device time is the simulation's own, exact: pulses, poses, moving things and the GNSS receiver go by it, and what time
- * of day it truly is at power-up is `time.epoch`. The head's clock is what the head believes: the true time, plus
+ * Device time is the simulation's own, exact: pulses, poses, moving things and the GNSS receiver go by it, and what
+ * time of day it truly is at power-up is `time.epoch`. The head's clock is what the head believes: the true time, plus
  * time.offset_s, plus time.drift_ppm of the time since power-up, plus time.jump_s from time.jump_at_s on. With all of
  * them 0 the two are the same.
  *   by the head's clock  PPS events, the GPS time of SCAN_START (and with them scanhead_gps_time), UTC in telemetry,
@@ -31,7 +31,8 @@ int head_clock_parse(const char *epoch, const struct utc_table *table, enum head
 
 /* Takes the table of leap seconds that is known longer: the built-in one, or the system's. */
 int head_clock_create(const struct config *cfg, struct head_clock *clock, struct sh_err *err);
-/* Device time 0 is at this time of clock_now_ns(): sets the true time by the system's clock where that is the source. */
+/* Device time 0 is at this time of clock_now_ns(): sets the true time by the system's clock where that is the source.
+ */
 int head_clock_power_up(struct head_clock *clock, int64_t now_ns, struct sh_err *err);
 
 /* TAI at a device time: the true one, and the head's. Real-time safe. */
@@ -39,8 +40,8 @@ int64_t head_clock_true_ns(const struct head_clock *clock, int64_t t_ns);
 int64_t head_clock_ns(const struct head_clock *clock, int64_t t_ns);
 
 /* The full second of the head's clock that begins at a device time in [from_ns, to_ns), at most a second apart: 1, the
- * first nanosecond of it and the TAI second, or 0. A jump is no edge; of two edges in the interval, which only a jump can
- * make, the later is given. */
+ * first nanosecond of it and the TAI second, or 0. A jump is no edge; of two edges in the interval, which only a jump
+ * can make, the later is given. */
 int head_clock_edge(const struct head_clock *clock, int64_t from_ns, int64_t to_ns, int64_t *edge_ns, int64_t *tai_s);
 
 #endif

@@ -51,7 +51,8 @@ struct pump {
 void pump_count_lost(struct pump *pump, struct session *s, uint32_t n);
 
 /* pump_nmea.c: a session of the GNSS receiver. Its cursor is the tick up to which it has everything. */
-/* Sentences of what was released into the buffer; where the reader is too far behind, those of half a queue are lost. */
+/* Sentences of what was released into the buffer; where the reader is too far behind, those of half a queue are lost.
+ */
 void pump_take_nmea(struct pump *pump, struct session *s);
 /* Throws away what a client sends: a receiver that is asked in another maker's language. */
 void pump_skip_nmea(struct pump *pump, int index);
