@@ -130,7 +130,7 @@ static const struct cfg_key config_keys[] = {
     {"time", CFG_MAP, .help = "Time of day: UTC and PPS; and errors of the head's clock, for tests of synchronisation."},
     {"time.epoch", CFG_TEXT, .def = "none", IN_CONFIG(time.epoch),
      .allowed = "none, utc, tai, or a time after 1980-01-06 such as 2026-01-01T00:00:00Z",
-     .help = "UTC of power-up: a time, or utc or tai for the system's clock at that moment; none: the head doesn't know."},
+     .help = "Time of power-up: UTC, or utc or tai for the system's clock at that moment; none: the head doesn't know."},
     {"time.offset_s", CFG_REAL, "s", "0", -1e6, 1e6, IN_CONFIG(time.offset_s),
      .help = "The head's clock is ahead of the true time. Concerns UTC, GPS time and PPS of the head, not the receiver."},
     {"time.drift_ppm", CFG_REAL, "ppm", "0", -1000, 1000, IN_CONFIG(time.drift_ppm), .help = "And gains, from power-up."},

@@ -8,7 +8,9 @@
  *                        TIME:UTC?, TIME:GPS?
  *   by the true time     GNSS sentences
  *   neither              device times and pulse times on the wire: they count from power-up and from the scan's start
- * Times of day are TAI in ns (core/utc.h). Constant after head_clock_power_up; then any thread. */
+ * The system's clock (utc, tai) is read once, at power-up. Device time then runs with CLOCK_MONOTONIC, which follows
+ * what PTP or NTP do to the rate of the system's clocks, but not steps of them. Times of day are TAI in ns
+ * (core/utc.h). Constant after head_clock_power_up; then any thread. */
 #ifndef FIRMWARE_SIM_HEAD_CLOCK_H
 #define FIRMWARE_SIM_HEAD_CLOCK_H
 

@@ -17,15 +17,21 @@ uint32_t pump_nmea_backlog(const struct pump *pump, const struct session *s)
     return sentences_between(pump, s->cursor, atomic_load(&pump->loop->ring.released));
 }
 
-/* As for frames: a reader more than a queue behind goes on with what is half a queue old. */
+/* The tick of the first position from the cursor on. */
+static uint64_t next_tick(const struct pump *pump, const struct session *s)
+{
+    const struct device *device = pump->loop->device;
+    return (uint64_t)(device_gnss_time_ns(device, count_at(pump, s->cursor)) / pump->loop->tick_ns);
+}
+
+/* As for frames: what is more than a queue old is lost, and the reader goes on with what is half a queue old. */
 static void lose_old(struct pump *pump, struct session *s, uint64_t released)
 {
     uint64_t queue_ticks = pump->loop->ring.queue_ticks;
-    if (loop_waits(pump->loop) || s->cursor + queue_ticks >= released) return;
+    if (loop_waits(pump->loop) || next_tick(pump, s) + queue_ticks >= released) return;
     uint64_t to = released - queue_ticks / 2;
-    uint32_t lost = sentences_between(pump, s->cursor, to);
+    pump_count_lost(pump, s, sentences_between(pump, s->cursor, to));
     s->cursor = to;
-    if (lost != 0) pump_count_lost(pump, s, lost);
 }
 
 void pump_take_nmea(struct pump *pump, struct session *s)
@@ -34,8 +40,7 @@ void pump_take_nmea(struct pump *pump, struct session *s)
     uint64_t released = atomic_load(&loop->ring.released);
     lose_old(pump, s, released);
     while (s->cursor < released && s->out_len + NMEA_MAX_ALL < BATCH_BYTES) {
-        uint64_t index = count_at(pump, s->cursor);
-        uint64_t tick = (uint64_t)(device_gnss_time_ns(loop->device, index) / loop->tick_ns);
+        uint64_t index = count_at(pump, s->cursor), tick = next_tick(pump, s);
         if (tick >= released) {
             s->cursor = released;
             s->lagging = 0;

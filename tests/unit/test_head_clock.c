@@ -2,6 +2,7 @@
 #include "tests/unit/device_rig.h"
 
 #include <math.h>
+#include <sys/timex.h>
 #include <time.h>
 
 #include "firmware_sim/head_clock.h"
@@ -144,6 +145,29 @@ static void the_systems_clock(void **state)
                 after.tv_sec * UTC_SECOND_NS + after.tv_nsec + 1000000); /* slewing, never so much in a moment */
 }
 
+/* CLOCK_TAI is taken where the system has set its offset, and refused where it is a UTC. */
+static void the_systems_tai(void **state)
+{
+    (void)state;
+    static struct config cfg;
+    struct head_clock clock;
+    struct sh_err err;
+    struct timespec before;
+    struct timex timex = {.modes = 0};
+    strcpy(cfg.time.epoch, "tai");
+    adjtimex(&timex);
+    clock_gettime(CLOCK_TAI, &before);
+    int rc = head_clock_create(&cfg, &clock, &err);
+    if (timex.tai == 0) {
+        assert_int_equal(rc, SH_ESTATE);
+        assert_non_null(strstr(err.text, "time.epoch: tai"));
+        return;
+    }
+    need(rc, &err);
+    int64_t late_ns = head_clock_ns(&clock, 0) - (before.tv_sec * UTC_SECOND_NS + before.tv_nsec);
+    assert_true(late_ns >= -1000000); /* as above */
+}
+
 /* A device from 23:59:57.75 on, over the leap second, its clock 0.25 s ahead and 100 ppm fast. */
 static void the_device_goes_by_it(void **state)
 {
@@ -212,6 +236,7 @@ int main(void)
         cmocka_unit_test(jumps),
         cmocka_unit_test(epochs),
         cmocka_unit_test(the_systems_clock),
+        cmocka_unit_test(the_systems_tai),
         cmocka_unit_test(the_device_goes_by_it),
         cmocka_unit_test(a_device_that_does_not_know),
     };
