@@ -1,10 +1,10 @@
 /* The GNSS receiver beside the head: where its antenna is at full fractions of the second, as NMEA 0183 sentences.
  *
- * It runs from power-up on, whether or not the head scans, and knows the true time (head_clock.h): its positions are
- * those at multiples of 1/rate_hz of UTC. What it says comes after the moment that it names.
- * The antenna is at the head's origin plus gnss.lever_arm_m, turned as the head stands. Noise, where there is any, is
- * normal and independent east, north and up, keyed by noise.seed and the number of the position since power-up.
- * Thread: constant after the clock is powered up. */
+ * It runs from power-up on, whether or not the head scans (but device time itself stands still in the pace fast while
+ * the head has nothing to do), and knows the true time (head_clock.h): its positions are those at multiples of
+ * 1/rate_hz of UTC. What it says comes after the moment that it names. The antenna is at the head's origin plus
+ * gnss.lever_arm_m, turned as the head stands. Noise, where there is any, is normal and independent east, north and up,
+ * keyed by noise.seed and the number of the position since power-up. Thread: constant after the clock is powered up. */
 #ifndef FIRMWARE_SIM_GNSS_H
 #define FIRMWARE_SIM_GNSS_H
 

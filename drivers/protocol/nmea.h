@@ -1,8 +1,8 @@
 /* A GNSS fix -> NMEA 0183 sentences. Pure; writes only into dst; allocates nothing; real-time safe.
  *
- * Sentences as NMEA 0183 4.10 has them: "$" talker and type, fields with commas between, "*" and the XOR of all
- * characters between the two as two upper-case hex digits, CR LF. Two things go beyond the standard, as they do with
- * survey receivers: minutes have 7 decimals (a step is 0.19 mm) and heights 4, so that a GGA may be longer than 82
+ * Sentences as NMEA 0183 has them from 2.3 to 4.0: "$" talker and type, fields with commas between, "*" and the XOR of
+ * all characters between the two as two upper-case hex digits, CR LF. Two things go beyond the standard, as they do
+ * with survey receivers: minutes have 7 decimals (a step is 0.19 mm) and heights 4, so that a GGA may be longer than 82
  * characters. A field that isn't known is empty; without a fix (quality 0) all of the position is.
  * Each function returns the length of the sentence with its end (and a NUL behind), or 0 when cap is too small. */
 #ifndef DRIVERS_PROTOCOL_NMEA_H
