@@ -9,9 +9,10 @@
 void gnss_init(struct gnss *gnss, const struct site *site, const struct head_clock *clock)
 {
     const struct config *cfg = site->cfg;
-    *gnss = (struct gnss){.site = site, .clock = clock, .period_ns = UTC_SECOND_NS / cfg->gnss.rate_hz};
+    *gnss = (struct gnss){.site = site, .clock = clock};
     for (uint32_t i = 0; i < cfg->n_links; i++)
         if (cfg->link[i].protocol == PROTOCOL_NMEA) gnss->on = 1;
+    if (gnss->on) gnss->period_ns = UTC_SECOND_NS / cfg->gnss.rate_hz;
 }
 
 /* Number of the first position at or after a time since 1970; TAI's full seconds are UTC's. */

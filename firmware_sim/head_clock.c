@@ -16,6 +16,7 @@ int head_clock_parse(const char *epoch, const struct utc_table *table, enum head
     static const char *const words[] = {[HEAD_CLOCK_NONE] = "none", [HEAD_CLOCK_UTC] = "utc", [HEAD_CLOCK_TAI] = "tai"};
     struct utc_time utc;
     int64_t tai_ns = 0;
+    if (epoch[0] == '\0') epoch = words[HEAD_CLOCK_NONE];
     for (size_t i = 0; i < sizeof words / sizeof *words; i++)
         if (words[i] != NULL && strcmp(epoch, words[i]) == 0) {
             *source = (enum head_clock_source)i;

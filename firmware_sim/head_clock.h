@@ -27,7 +27,7 @@ struct head_clock {
     char warning[160]; /* something the user should know; empty: nothing */
 };
 
-/* What time.epoch says; the date (for EPOCH) is checked. tai0_ns may be NULL. */
+/* What time.epoch says (an empty text is none); the date (for EPOCH) is checked. tai0_ns may be NULL. */
 int head_clock_parse(const char *epoch, const struct utc_table *table, enum head_clock_source *source, int64_t *tai0_ns,
                      struct sh_err *err);
 

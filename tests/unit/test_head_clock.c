@@ -124,7 +124,7 @@ static void epochs(void **state)
     assert_true(source == HEAD_CLOCK_EPOCH &&
                 tai_ns == INT64_C(1483228836500000000)); /* 2017-01-01 less 0.5 s, and 37 */
     assert_int_equal(head_clock_parse("now", table, &source, NULL, &err), SH_EINPUT);
-    assert_int_equal(head_clock_parse("", table, &source, NULL, &err), SH_EINPUT);
+    assert_true(head_clock_parse("", table, &source, NULL, &err) == SH_OK && source == HEAD_CLOCK_NONE);
 }
 
 /* The system's clock is between what it was before and after. */
