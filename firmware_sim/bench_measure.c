@@ -82,8 +82,8 @@ static void staged_pass(struct measure *m, uint32_t round)
         m->stage_ns[s][round] = (double)cycles[s] * ns;
 }
 
-/* Embree and the cast get their rays as the pipeline has them: a block at a time, in the cache; the clock stands while
- * a block is laid out. */
+/* Embree and the cast get their rays as the pipeline has them: a block at a time, in the cache; the clock stands while a
+ * block is laid out. */
 static double timed_blocks(struct measure *m, int method)
 {
     const struct bench_case *c = m->c;

@@ -75,8 +75,7 @@ int bvh_create(const struct scene *scene, const double origin_m[3], double stati
     }
     bvh->info.packet = native_packet(bvh->device);
     bvh->info.build_s = seconds() - start;
-    bvh->info.bytes = (uint64_t)bvh->bytes +
-                      (uint64_t)scene->n_triangles * (sizeof *bvh->triangle + 3 * sizeof *bvh->fan) +
+    bvh->info.bytes = (uint64_t)bvh->bytes + (uint64_t)scene->n_triangles * (sizeof *bvh->triangle + 3 * sizeof *bvh->fan) +
                       (uint64_t)scene->n_vertices * sizeof *bvh->fan_first;
     *out = bvh;
     return SH_OK;

@@ -11,12 +11,12 @@
  * of the farthest coordinate in play, R (vertex of the triangle from the BVH's origin, plus the ray's origin from it):
  * rounding of a vertex 1, of the ray's direction 1, of its origin 1 (none where it is the BVH's).
  * U = (C x D) . e, with C = v0 - o and e an edge at v0, against |e|: the cross product 2.2 (its products 1.2, its
- * differences 1), C itself 1.2 (none where o = 0), the dot product of three terms 3, e 1. Sum 6.2, or 7.4; 6.5 and 8
- * are used. The third edge is tested by what is left of the denominator, (e1 x e2) . D - U - V: the errors of U and V,
- * and 9 |e1| |e2|, all against the length of that edge, L: 6.5 (|e1| + |e2|) / L R + 9 |e1| |e2| / L. It is therefore
- * always the longest one, so that it is at most twice as bad as the others. The weights, u = U / |den| with a
- * reciprocal good to 3 units, are off by 6 |e1| |e2| / L more. The boxes: a slab's distance is off by at most 6 units,
- * and a ray through a point m inside of all edges of a triangle spends at least 2 m within its box; m >= 6.5.
+ * differences 1), C itself 1.2 (none where o = 0), the dot product of three terms 3, e 1. Sum 6.2, or 7.4; 6.5 and 8 are
+ * used. The third edge is tested by what is left of the denominator, (e1 x e2) . D - U - V: the errors of U and V, and
+ * 9 |e1| |e2|, all against the length of that edge, L: 6.5 (|e1| + |e2|) / L R + 9 |e1| |e2| / L. It is therefore always
+ * the longest one, so that it is at most twice as bad as the others. The weights, u = U / |den| with a reciprocal good
+ * to 3 units, are off by 6 |e1| |e2| / L more. The boxes: a slab's distance is off by at most 6 units, and a ray
+ * through a point m inside of all edges of a triangle spends at least 2 m within its box; m >= 6.5.
  *
  * What float still decides is the order of two surfaces that lie within its resolution behind each other, about 5e-7 of
  * the range over the cosine of the incidence; unless bvh_order_exactly was called: then such rivals are known from the

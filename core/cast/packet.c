@@ -21,59 +21,58 @@
 
 /* The planes of what a packet has hit are asked for when the next one has been cast: to read them at once would mean to
  * wait for what Embree has only just written. */
-#define PACKET_FUNCTION(W)                                                                                         \
-    static void set_up_##W(struct RTCRayHit##W *packet, const struct bvh_rays *rays)                               \
-    {                                                                                                              \
-        for (uint32_t p = 0; p < BVH_CHUNK / W; p++)                                                               \
-            for (uint32_t i = 0; i < W; i++) {                                                                     \
-                packet[p].ray.org_x[i] = rays->org[0];                                                             \
-                packet[p].ray.org_y[i] = rays->org[1];                                                             \
-                packet[p].ray.org_z[i] = rays->org[2];                                                             \
-                packet[p].ray.tnear[i] = rays->t_min;                                                              \
-                packet[p].ray.time[i] = 0.0f;                                                                      \
-                packet[p].ray.mask[i] = 0xffffffffU;                                                               \
-                packet[p].ray.id[i] = 0;                                                                           \
-                packet[p].ray.flags[i] = 0;                                                                        \
-                packet[p].hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;                                              \
-            }                                                                                                      \
-    }                                                                                                              \
-    static void prefetch_##W(const struct bvh *bvh, const struct RTCRayHit##W *packet)                             \
-    {                                                                                                              \
-        const uint32_t last = bvh->scene->n_triangles;                                                             \
-        for (uint32_t i = 0; i < W; i++)                                                                           \
-            __builtin_prefetch(&bvh->triangle[packet->hit.primID[i] < last ? packet->hit.primID[i] : last], 0, 2); \
-    }                                                                                                              \
-    static void intersect_##W(const struct bvh *bvh, struct RTCRayHit##W *packet, const struct bvh_rays *rays,     \
-                              uint32_t n)                                                                          \
-    {                                                                                                              \
-        PACKET_CONTEXT(context);                                                                                   \
-        int valid[W] __attribute__((aligned(64)));                                                                 \
-        const uint32_t packets = (n + W - 1) / W;                                                                  \
-        for (uint32_t p = 0; p < packets; p++) {                                                                   \
-            memcpy(packet[p].ray.dir_x, rays->dx + p * W, sizeof packet->ray.dir_x);                               \
-            memcpy(packet[p].ray.dir_y, rays->dy + p * W, sizeof packet->ray.dir_y);                               \
-            memcpy(packet[p].ray.dir_z, rays->dz + p * W, sizeof packet->ray.dir_z);                               \
-            for (uint32_t i = 0; i < W; i++)                                                                       \
-                packet[p].ray.tfar[i] = rays->t_max;                                                               \
-            memset(packet[p].hit.geomID, 0xff, sizeof packet->hit.geomID);                                         \
-            memset(packet[p].hit.primID, 0xff, sizeof packet->hit.primID);                                         \
-        }                                                                                                          \
-        for (uint32_t i = 0; i < W; i++)                                                                           \
-            valid[i] = -1;                                                                                         \
-        for (uint32_t p = 0; p < packets; p++) {                                                                   \
-            if (n - p * W < W)                                                                                     \
-                for (uint32_t i = 0; i < W; i++)                                                                   \
-                    valid[i] = i < n - p * W ? -1 : 0;                                                             \
-            PACKET_CALL(W, valid, bvh->rtc, &context, &packet[p]);                                                 \
-            if (p > 0) prefetch_##W(bvh, &packet[p - 1]);                                                          \
-        }                                                                                                          \
-        prefetch_##W(bvh, &packet[packets - 1]);                                                                   \
-        for (uint32_t p = 0; p < packets; p++) {                                                                   \
-            memcpy(rays->prim + p * W, packet[p].hit.primID, sizeof packet->hit.primID);                           \
-            memcpy(rays->t + p * W, packet[p].ray.tfar, sizeof packet->ray.tfar);                                  \
-            memcpy(rays->u + p * W, packet[p].hit.u, sizeof packet->hit.u);                                        \
-            memcpy(rays->v + p * W, packet[p].hit.v, sizeof packet->hit.v);                                        \
-        }                                                                                                          \
+#define PACKET_FUNCTION(W)                                                                                 \
+    static void set_up_##W(struct RTCRayHit##W *packet, const struct bvh_rays *rays)                       \
+    {                                                                                                      \
+        for (uint32_t p = 0; p < BVH_CHUNK / W; p++)                                                       \
+            for (uint32_t i = 0; i < W; i++) {                                                             \
+                packet[p].ray.org_x[i] = rays->org[0];                                                     \
+                packet[p].ray.org_y[i] = rays->org[1];                                                     \
+                packet[p].ray.org_z[i] = rays->org[2];                                                     \
+                packet[p].ray.tnear[i] = rays->t_min;                                                      \
+                packet[p].ray.time[i] = 0.0f;                                                              \
+                packet[p].ray.mask[i] = 0xffffffffU;                                                       \
+                packet[p].ray.id[i] = 0;                                                                   \
+                packet[p].ray.flags[i] = 0;                                                                \
+                packet[p].hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;                                      \
+            }                                                                                              \
+    }                                                                                                      \
+    static void prefetch_##W(const struct bvh *bvh, const struct RTCRayHit##W *packet)                     \
+    {                                                                                                      \
+        const uint32_t last = bvh->scene->n_triangles;                                                     \
+        for (uint32_t i = 0; i < W; i++)                                                                   \
+            __builtin_prefetch(&bvh->triangle[packet->hit.primID[i] < last ? packet->hit.primID[i] : last], 0, 2);\
+    }                                                                                                      \
+    static void intersect_##W(const struct bvh *bvh, struct RTCRayHit##W *packet, const struct bvh_rays *rays, uint32_t n) \
+    {                                                                                                      \
+        PACKET_CONTEXT(context);                                                                           \
+        int valid[W] __attribute__((aligned(64)));                                                         \
+        const uint32_t packets = (n + W - 1) / W;                                                          \
+        for (uint32_t p = 0; p < packets; p++) {                                                           \
+            memcpy(packet[p].ray.dir_x, rays->dx + p * W, sizeof packet->ray.dir_x);                       \
+            memcpy(packet[p].ray.dir_y, rays->dy + p * W, sizeof packet->ray.dir_y);                       \
+            memcpy(packet[p].ray.dir_z, rays->dz + p * W, sizeof packet->ray.dir_z);                       \
+            for (uint32_t i = 0; i < W; i++)                                                               \
+                packet[p].ray.tfar[i] = rays->t_max;                                                       \
+            memset(packet[p].hit.geomID, 0xff, sizeof packet->hit.geomID);                                 \
+            memset(packet[p].hit.primID, 0xff, sizeof packet->hit.primID);                                 \
+        }                                                                                                  \
+        for (uint32_t i = 0; i < W; i++)                                                                   \
+            valid[i] = -1;                                                                                 \
+        for (uint32_t p = 0; p < packets; p++) {                                                           \
+            if (n - p * W < W)                                                                             \
+                for (uint32_t i = 0; i < W; i++)                                                           \
+                    valid[i] = i < n - p * W ? -1 : 0;                                                     \
+            PACKET_CALL(W, valid, bvh->rtc, &context, &packet[p]);                                         \
+            if (p > 0) prefetch_##W(bvh, &packet[p - 1]);                                                  \
+        }                                                                                                  \
+        prefetch_##W(bvh, &packet[packets - 1]);                                                           \
+        for (uint32_t p = 0; p < packets; p++) {                                                           \
+            memcpy(rays->prim + p * W, packet[p].hit.primID, sizeof packet->hit.primID);                   \
+            memcpy(rays->t + p * W, packet[p].ray.tfar, sizeof packet->ray.tfar);                          \
+            memcpy(rays->u + p * W, packet[p].hit.u, sizeof packet->hit.u);                                \
+            memcpy(rays->v + p * W, packet[p].hit.v, sizeof packet->hit.v);                                \
+        }                                                                                                  \
     }
 
 PACKET_FUNCTION(4)
@@ -116,8 +115,7 @@ static void intersect_1(const struct bvh *bvh, const struct bvh_rays *rays, uint
 
 static void set_up(struct bvh_packets *packets, const struct bvh_rays *rays, uint32_t width)
 {
-    if (packets->width == width && packets->t_min == rays->t_min &&
-        memcmp(packets->org, rays->org, sizeof rays->org) == 0)
+    if (packets->width == width && packets->t_min == rays->t_min && memcmp(packets->org, rays->org, sizeof rays->org) == 0)
         return;
     if (width == 16)
         set_up_16(packets->at.by16, rays);

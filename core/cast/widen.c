@@ -19,8 +19,8 @@ double bvh_corners(const struct bvh *bvh, uint32_t prim, double v[3][3])
     return sqrt(reach2);
 }
 
-/* Moves corner i outward within the plane, so that both its edges move by `offset_m`: along the sum of their
- * directions, offset / sin(angle); a sharp corner ends at most_m. */
+/* Moves corner i outward within the plane, so that both its edges move by `offset_m`: along the sum of their directions,
+ * offset / sin(angle); a sharp corner ends at most_m. */
 static void widen_corner(double v[3][3], int i, double offset_m, double most_m, double out[3])
 {
     double e1[3], e2[3], c[3], move[3], l1, l2;
@@ -137,8 +137,8 @@ void bvh_mark_rival(struct bvh *bvh, uint32_t prim)
     set_offset(tri, v);
 }
 
-/* How far the edges have to move within the plane, so that seen from the origin, at a slant, they have moved by
- * width_m: width / cosine of the incidence, which at the farthest corner is the plane's distance by the corner's. */
+/* How far the edges have to move within the plane, so that seen from the origin, at a slant, they have moved by width_m:
+ * width / cosine of the incidence, which at the farthest corner is the plane's distance by the corner's. */
 static double offset_m(double v[3][3], const double unit_n[3], double width_m, double far_m)
 {
     double above_m = fabs(vec3_dot(v[0], unit_n));
