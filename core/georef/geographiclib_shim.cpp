@@ -145,3 +145,57 @@ void shim_grid_reverse(const struct shim_grid *grid, const double d_grid[3], dou
         d_local[0] = d_local[1] = d_local[2] = nan_m;
     }
 }
+
+void shim_grid_to_local(const struct shim_grid *grid, size_t n, const double *dx, const double *dy, const double *dz,
+                        double *out_x, double *out_y, double *out_z)
+{
+    for (size_t i = 0; i < n; i++) {
+        double d_local[3];
+        const double d_grid[3] = {dx[i], dy[i], dz[i]};
+        shim_grid_reverse(grid, d_grid, d_local);
+        out_x[i] = d_local[0];
+        out_y[i] = d_local[1];
+        out_z[i] = d_local[2];
+    }
+}
+
+int shim_ecef_reverse(const double p_ecef[3], double *lat_deg, double *lon_deg, double *height_m)
+{
+    *lat_deg = *lon_deg = *height_m = nan_m;
+    try {
+        Geocentric::WGS84().Reverse(p_ecef[0], p_ecef[1], p_ecef[2], *lat_deg, *lon_deg, *height_m);
+        return 0;
+    } catch (...) {
+        return -1;
+    }
+}
+
+int shim_utm_reverse(int zone, int north, double easting_m, double northing_m, double *lat_deg, double *lon_deg,
+                     char *why, size_t len)
+{
+    try {
+        UTMUPS::Reverse(zone, north != 0, easting_m, northing_m, *lat_deg, *lon_deg);
+        return 0;
+    } catch (const std::exception &e) {
+        std::snprintf(why, len, "%s", e.what());
+    } catch (...) {
+        std::snprintf(why, len, "unknown failure in GeographicLib");
+    }
+    return -1;
+}
+
+int shim_utm_forward(double lat_deg, double lon_deg, int zone, struct shim_utm *out, char *why, size_t len)
+{
+    try {
+        bool north;
+        UTMUPS::Forward(lat_deg, lon_deg, out->zone, north, out->easting_m, out->northing_m, out->convergence_deg,
+                        out->scale, zone == 0 ? int(UTMUPS::STANDARD) : zone);
+        out->north = north;
+        return 0;
+    } catch (const std::exception &e) {
+        std::snprintf(why, len, "%s", e.what());
+    } catch (...) {
+        std::snprintf(why, len, "unknown failure in GeographicLib");
+    }
+    return -1;
+}

@@ -28,6 +28,21 @@ int shim_grid_epsg(const struct shim_grid *grid);
 void shim_grid_forward(const struct shim_grid *grid, size_t n, const double *dx, const double *dy, const double *dz,
                        double *out_x, double *out_y, double *out_z);
 void shim_grid_reverse(const struct shim_grid *grid, const double d_grid[3], double d_local[3]);
+/* The same for n points, in place or not. */
+void shim_grid_to_local(const struct shim_grid *grid, size_t n, const double *dx, const double *dy, const double *dz,
+                        double *out_x, double *out_y, double *out_z);
+
+/* ---- single places (locate.c). 0, or -1 with the reason. */
+int shim_ecef_reverse(const double p_ecef[3], double *lat_deg, double *lon_deg, double *height_m);
+/* zone: 1..60, or 0: UPS */
+int shim_utm_reverse(int zone, int north, double easting_m, double northing_m, double *lat_deg, double *lon_deg,
+                     char *why, size_t len);
+struct shim_utm {
+    int zone, north; /* zone 0: UPS */
+    double easting_m, northing_m, convergence_deg, scale;
+};
+/* zone: 1..60, or 0: by position */
+int shim_utm_forward(double lat_deg, double lon_deg, int zone, struct shim_utm *out, char *why, size_t len);
 
 #ifdef __cplusplus
 }
