@@ -81,16 +81,17 @@ static int add_frame(void *ctx, struct scanhead *sh, const struct scanhead_frame
     return SH_OK;
 }
 
-static int create_map(struct map_run *run, const struct config *cfg, const struct scene *scene, struct sh_err *err)
+static int create_map(struct map_run *run, const struct site *site, struct sh_err *err)
 {
+    const struct scene *scene = site->scene;
     struct map_spec spec = {.pixel_m = run->pixel_m};
     double span_m = 0.0;
     for (int i = 0; i < 2; i++) {
         spec.min_m[i] = scene->min_m[i];
         spec.max_m[i] = scene->max_m[i];
-        for (uint32_t s = 0; s < cfg->n_stations; s++) {
-            spec.min_m[i] = fmin(spec.min_m[i], cfg->station[s].position_m[i]);
-            spec.max_m[i] = fmax(spec.max_m[i], cfg->station[s].position_m[i]);
+        for (uint32_t s = 0; s < site->n_stations; s++) {
+            spec.min_m[i] = fmin(spec.min_m[i], site->station[s].at.position_m[i]);
+            spec.max_m[i] = fmax(spec.max_m[i], site->station[s].at.position_m[i]);
         }
         span_m = fmax(span_m, spec.max_m[i] - spec.min_m[i]);
     }
@@ -99,8 +100,8 @@ static int create_map(struct map_run *run, const struct config *cfg, const struc
         spec.max_m[i] += 0.03 * span_m;
     }
     int rc = map_create(&spec, &run->map, err);
-    for (uint32_t s = 0; s < cfg->n_stations && rc == SH_OK; s++)
-        rc = map_add_station(run->map, cfg->station[s].position_m[0], cfg->station[s].position_m[1], err);
+    for (uint32_t s = 0; s < site->n_stations && rc == SH_OK; s++)
+        rc = map_add_station(run->map, site->station[s].at.position_m[0], site->station[s].at.position_m[1], err);
     return rc;
 }
 
@@ -122,7 +123,7 @@ static int draw(struct map_run *run, struct config *cfg, struct sh_err *err)
                                         .ctx = run,
                                         .interrupted = interrupted};
     int rc = offline_open(cfg, &cmd_report_stderr, &offline, err);
-    if (rc == SH_OK) rc = create_map(run, cfg, offline_scene(offline), err);
+    if (rc == SH_OK) rc = create_map(run, offline_site(offline), err);
     if (rc == SH_OK) rc = recording_run(offline_scanhead(offline), &options, &result, err);
     if (rc == SH_OK && cmd_interrupted) rc = sh_fail(err, SH_EIO, "interrupted; nothing written");
     if (rc == SH_OK) rc = map_write_png(run->map, run->output, err);

@@ -7,12 +7,13 @@
 #include "core/georef.h"
 #include "core/scene.h"
 #include "firmware_sim/config.h"
+#include "firmware_sim/placement.h"
 
 struct site_station {
     const struct config_station *station;
     struct bvh *bvh; /* shared where stations are near each other */
     struct georef *georef;
-    double rotation[9]; /* socs -> prcs */
+    struct placement at;
 };
 
 struct site_mover {
@@ -25,6 +26,7 @@ struct site_mover {
 struct site {
     const struct config *cfg;
     struct scene *scene; /* what stands still */
+    struct placement_anchor anchor;
     struct site_mover mover[CAST_MAX_MOVERS];
     uint32_t n_movers, n_surfaces; /* surfaces of the scene, then of the movers */
     struct bvh *bvh[CONFIG_MAX_STATIONS];
