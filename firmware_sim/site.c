@@ -140,8 +140,7 @@ static int place_stations(struct site *site, const struct sh_report *report, str
     return rc;
 }
 
-/* One zone for all stations of an anchored scene: that of the anchor, or of the first station; 0 as it was. */
-static int choose_zone(const struct site *site)
+int site_utm_zone(const struct site *site)
 {
     const struct geoframe *frame = &site->anchor.frame;
     const struct placement *first = &site->station[0].at;
@@ -158,7 +157,7 @@ static int add_station(struct site *site, const struct sh_report *report, struct
     const struct config *cfg = site->cfg;
     uint32_t i = site->n_stations;
     struct site_station *s = &site->station[i];
-    struct georef_spec spec = {.crs = cfg->crs, .utm_zone = choose_zone(site)};
+    struct georef_spec spec = {.crs = cfg->crs, .utm_zone = site_utm_zone(site)};
     s->station = &cfg->station[i];
     int rc = placement_georef(&s->at, &site->anchor, &spec, err);
     if (rc == SH_OK) rc = find_bvh(site, s->at.position_m, report, &s->bvh, err);
