@@ -48,6 +48,14 @@ static int see(const struct geoframe *frame, enum georef_crs crs, int zone, cons
     for (int i = 0; i < 3; i++)
         d[i] = point_m[i] - station_m[i];
     georef_forward(georef, 1, &d[0], &d[1], &d[2], &p[0], &p[1], &p[2]);
+    double turn[9], linear[3];
+    if (georef_rotation(georef, turn)) { /* the short way that casting takes */
+        mat3_apply(turn, d, linear);
+        for (int i = 0; i < 3; i++)
+            assert_near(linear[i], p[i], 1e-12);
+    } else {
+        assert_int_equal(crs == GEOREF_UTM || frame->kind == GEOFRAME_GRID, 1);
+    }
     georef_reverse(georef, p, back);
     for (int i = 0; i < 3; i++)
         assert_near(back[i], point_m[i], 3e-8); /* two ways of 5 nm and rounding at 5e6 m */
