@@ -17,7 +17,7 @@
 
 #include "core/err.h"
 
-enum georef_crs { GEOREF_LOCAL, GEOREF_ECEF, GEOREF_UTM };
+enum georef_crs { GEOREF_LOCAL, GEOREF_ECEF, GEOREF_UTM, GEOREF_GEODETIC };
 
 struct georef_spec {
     enum georef_crs crs;
@@ -31,6 +31,24 @@ struct georef_spec {
     int prcs_zone;      /* its zone: 1..60, or 0: UPS */
     int prcs_north;     /* its hemisphere: 1 or 0 */
 };
+
+/* A place on WGS 84. */
+struct georef_place {
+    double lat_deg, lon_deg; /* -90..90, -180..180 */
+    double height_m;         /* ellipsoidal */
+};
+
+/* Where a position in another system lies. zone 1..60, or 0: UPS; north: hemisphere of the false origin; easting and
+ * northing with it; height ellipsoidal. SH_EINPUT: not finite, or outside of what UTMUPS takes. GeographicLib. */
+int georef_locate_utm(int zone, int north, double easting_m, double northing_m, double height_m,
+                      struct georef_place *out, struct sh_err *err);
+int georef_locate_ecef(const double p_ecef[3], struct georef_place *out, struct sh_err *err);
+
+/* And back. Not-a-number outside of -90..90 degrees of latitude. zone 0: by position, and *zone_used 0 where that is
+ * UPS; the three out-parameters may be NULL but grid (easting, northing, height). */
+void georef_geodetic_to_ecef(const struct georef_place *place, double p_ecef[3]);
+int georef_geodetic_to_utm(const struct georef_place *place, int zone, int *zone_used, int *north, double grid[3],
+                           struct sh_err *err);
 
 struct georef;
 

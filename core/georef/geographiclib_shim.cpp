@@ -66,6 +66,45 @@ void shim_ecef(double lat_deg, double lon_deg, double height_m, double p_ecef[3]
     }
 }
 
+void shim_locate_ecef(const double p_ecef[3], double place[3])
+{
+    try {
+        Geocentric::WGS84().Reverse(p_ecef[0], p_ecef[1], p_ecef[2], place[0], place[1], place[2]);
+    } catch (...) {
+        place[0] = place[1] = place[2] = nan_m;
+    }
+}
+
+/* Runs what may throw; the reason becomes a text. */
+template <typename F> static int attempt(char *why, size_t len, F f)
+{
+    try {
+        f();
+        return 0;
+    } catch (const std::exception &e) {
+        std::snprintf(why, len, "%s", e.what());
+    } catch (...) {
+        std::snprintf(why, len, "unknown failure in GeographicLib");
+    }
+    return -1;
+}
+
+int shim_locate_utm(int zone, int north, const double grid[2], double lat_lon_deg[2], char *why, size_t len)
+{
+    return attempt(why, len,
+                   [&] { UTMUPS::Reverse(zone, north != 0, grid[0], grid[1], lat_lon_deg[0], lat_lon_deg[1]); });
+}
+
+int shim_to_utm(const double lat_lon_deg[2], int *zone, int *north, double grid[2], char *why, size_t len)
+{
+    return attempt(why, len, [&] {
+        bool n = false;
+        UTMUPS::Forward(lat_lon_deg[0], lat_lon_deg[1], *zone, n, grid[0], grid[1],
+                        *zone == 0 ? int(UTMUPS::STANDARD) : *zone);
+        *north = n;
+    });
+}
+
 struct shim_grid *shim_grid_create(double lat_deg, double lon_deg, double height_m, int zone, char *why, size_t len)
 {
     struct shim_grid *grid = nullptr;

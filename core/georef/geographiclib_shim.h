@@ -12,6 +12,13 @@ extern "C" {
 /* WGS 84 geocentric position, and the rotation (row by row) of east, north, up at it to X, Y, Z. */
 void shim_ecef(double lat_deg, double lon_deg, double height_m, double p_ecef[3], double rotation[9]);
 
+/* Geodetic place (degrees, degrees, metres) of a geocentric position; not-a-number on failure. */
+void shim_locate_ecef(const double p_ecef[3], double place[3]);
+/* UTM zone, or UPS for zone 0, to degrees and back: 0, or -1 with the reason. zone 0 on the way there: by
+ * position. */
+int shim_locate_utm(int zone, int north, const double grid[2], double lat_lon_deg[2], char *why, size_t len);
+int shim_to_utm(const double lat_lon_deg[2], int *zone, int *north, double grid[2], char *why, size_t len);
+
 /* A local tangent frame and one grid zone. */
 struct shim_grid;
 

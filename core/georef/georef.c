@@ -135,6 +135,7 @@ int georef_create(const struct georef_spec *spec, struct georef **out, struct sh
     case GEOREF_UTM:
         if (georef->prcs != PRCS_IS_CRS) rc = set_up_utm(georef, spec, err);
         break;
+    case GEOREF_GEODETIC:
     default:
         rc =
             sh_fail(err, SH_EINPUT, "georef: coordinate reference system %d; allowed local, ecef, utm", (int)spec->crs);
@@ -204,6 +205,7 @@ void georef_forward(const struct georef *georef, size_t n, const double *dx, con
     case GEOREF_ECEF:
         rotate(georef->rotation, n, dx, dy, dz, out_x, out_y, out_z);
         break;
+    case GEOREF_GEODETIC:
     case GEOREF_UTM:
         shim_grid_forward(georef->grid, n, dx, dy, dz, out_x, out_y, out_z);
         break;
