@@ -25,20 +25,14 @@ struct geoframe {
     int zone, north; /* grid; zone 0: UPS */
 };
 
-struct geoframe_geodetic {
-    double lat_deg, lon_deg, height_m;
-};
-
-int geoframe_set_tangent(struct geoframe *frame, const double origin_m[3], const struct geoframe_geodetic *at,
+int geoframe_set_tangent(struct geoframe *frame, const double origin_m[3], const struct georef_place *at,
                          double north_deg, struct sh_err *err);
 int geoframe_set_grid(struct geoframe *frame, int zone, int north, struct sh_err *err);
 void geoframe_set_ecef(struct geoframe *frame);
 
 /* Point of the scene -> place on the Earth, and back. SH_EINPUT where there is none, as off a grid's table. */
-int geoframe_locate(const struct geoframe *frame, const double p_prcs[3], struct geoframe_geodetic *at,
-                    struct sh_err *err);
-int geoframe_find(const struct geoframe *frame, const struct geoframe_geodetic *at, double p_prcs[3],
-                  struct sh_err *err);
+int geoframe_locate(const struct geoframe *frame, const double p_prcs[3], struct georef_place *at, struct sh_err *err);
+int geoframe_find(const struct geoframe *frame, const struct georef_place *at, double p_prcs[3], struct sh_err *err);
 
 /* Rotation of the axes that a levelled head of heading 0 has at p_prcs to prcs, row by row: the unit matrix but for
  * ecef. Its third column is up. */

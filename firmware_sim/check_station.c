@@ -54,7 +54,7 @@ static int axis_enu(const struct site *site, uint32_t i, int k, double enu[3], s
     return rc;
 }
 
-static void print_utm(const struct georef_utm *utm, double height_m, FILE *out)
+static void print_utm(const struct locate_grid *utm, double height_m, FILE *out)
 {
     if (utm->zone == 0)
         fprintf(out, "  ups       %s", utm->north ? "north" : "south");
@@ -71,10 +71,10 @@ static int print_grid_ranges(const struct site *site, const double p_prcs[3], FI
     double p_ecef[2][3];
     for (int i = 0; i < 2; i++) {
         const double p[3] = {p_prcs[0] + (i == 0 ? -50.0 : 50.0), p_prcs[1], p_prcs[2]};
-        struct geoframe_geodetic at;
+        struct georef_place at;
         int rc = geoframe_locate(&site->anchor.frame, p, &at, err);
-        if (rc == SH_OK) rc = georef_geodetic_to_ecef(at.lat_deg, at.lon_deg, at.height_m, p_ecef[i], NULL, err);
         if (rc != SH_OK) return rc;
+        georef_geodetic_to_ecef(&at, p_ecef[i]);
     }
     const double d[3] = {p_ecef[1][0] - p_ecef[0][0], p_ecef[1][1] - p_ecef[0][1], p_ecef[1][2] - p_ecef[0][2]};
     double off = 100.0 / sqrt(vec3_dot(d, d)) - 1.0, range_m = site->cfg->profile.range_max_m;
@@ -88,14 +88,15 @@ static int print_on_earth(const struct site *site, uint32_t i, FILE *out, struct
     const struct placement *at = &site->station[i].at;
     const struct geoframe *frame = &site->anchor.frame;
     double p_ecef[3], forward[3], up[3];
-    struct georef_utm utm;
+    struct locate_grid utm;
     int grid = site->anchor.known && frame->kind == GEOFRAME_GRID;
     int zone = site->cfg->utm_zone != 0 ? site->cfg->utm_zone : grid ? frame->zone : site_utm_zone(site);
-    int rc = georef_geodetic_to_ecef(at->lat_deg, at->lon_deg, at->height_m, p_ecef, NULL, err);
-    if (rc == SH_OK) rc = georef_geodetic_to_utm(at->lat_deg, at->lon_deg, zone, &utm, err);
+    const struct georef_place place = {at->lat_deg, at->lon_deg, at->height_m};
+    int rc = locate_in_grid(&place, zone, &utm, err);
     if (rc == SH_OK) rc = axis_enu(site, i, 1, forward, err);
     if (rc == SH_OK) rc = axis_enu(site, i, 2, up, err);
     if (rc != SH_OK) return rc;
+    georef_geodetic_to_ecef(&place, p_ecef);
     fprintf(out, "  geodetic  lat %.9f lon %.9f deg, height %.4f m\n", at->lat_deg, at->lon_deg, at->height_m);
     print_utm(&utm, at->height_m, out);
     if (grid) rc = print_grid_ranges(site, at->position_m, out, err);

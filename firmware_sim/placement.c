@@ -60,7 +60,7 @@ static int anchor_by_ifc(const struct config *cfg, const struct sh_report *repor
     if (site.has_map)
         sh_warn(report, "%s: its IFCMAPCONVERSION is not read; the anchor is IFCSITE's latitude and longitude",
                 mesh->file);
-    const struct geoframe_geodetic at = {site.lat_deg, site.lon_deg, height_m};
+    const struct georef_place at = {site.lat_deg, site.lon_deg, height_m};
     return geoframe_set_tangent(frame, origin_m, &at, site.north_deg, err);
 }
 
@@ -68,7 +68,7 @@ int placement_find_anchor(const struct config *cfg, const struct sh_report *repo
                           struct sh_err *err)
 {
     const struct config_anchor *a = &cfg->anchor;
-    const struct geoframe_geodetic at = {a->lat_deg, a->lon_deg, a->height_m};
+    const struct georef_place at = {a->lat_deg, a->lon_deg, a->height_m};
     memset(anchor, 0, sizeof *anchor);
     anchor->known = a->source != ANCHOR_NONE;
     switch (a->source) {
@@ -88,19 +88,19 @@ int placement_find_anchor(const struct config *cfg, const struct sh_report *repo
 }
 
 /* The place on the Earth as it is given. */
-static int given_place(const struct config_station *s, struct geoframe_geodetic *at, struct sh_err *err)
+static int given_place(const struct config_station *s, struct georef_place *at, struct sh_err *err)
 {
-    *at = (struct geoframe_geodetic){s->lat_deg, s->lon_deg, s->height_m};
+    int rc = SH_OK;
+    *at = (struct georef_place){s->lat_deg, s->lon_deg, s->height_m};
     if (s->place == PLACE_UTM)
-        return georef_locate_utm((int)s->utm_zone, s->north, s->easting_m, s->northing_m, s->height_m, &at->lat_deg,
-                                 &at->lon_deg, err);
-    if (s->place == PLACE_ECEF) return georef_locate_ecef(s->ecef_m, &at->lat_deg, &at->lon_deg, &at->height_m, err);
-    return SH_OK;
+        rc = georef_locate_utm((int)s->utm_zone, s->north, s->easting_m, s->northing_m, s->height_m, at, err);
+    if (s->place == PLACE_ECEF) rc = georef_locate_ecef(s->ecef_m, at, err);
+    return rc == SH_OK ? locate_check(at, err) : rc;
 }
 
 /* A UTM place in a scene of the same grid, and an ECEF place in a scene in ECEF, are the scene's to the last bit. */
-static int find_position(const struct config_station *s, const struct geoframe *frame,
-                         const struct geoframe_geodetic *at, double position_m[3], struct sh_err *err)
+static int find_position(const struct config_station *s, const struct geoframe *frame, const struct georef_place *at,
+                         double position_m[3], struct sh_err *err)
 {
     if (frame->kind == GEOFRAME_ECEF && s->place == PLACE_ECEF) {
         memcpy(position_m, s->ecef_m, sizeof s->ecef_m);
@@ -139,7 +139,7 @@ static int stand_on_floor(const struct config_station *s, const double level[9],
 static int find(const struct config_station *s, const struct placement_anchor *anchor, const struct scene *scene,
                 struct placement *out, struct sh_err *err)
 {
-    struct geoframe_geodetic at;
+    struct georef_place at;
     double level[9], attitude[9];
     int rc = given_place(s, &at, err);
     memcpy(out->position_m, s->position_m, sizeof out->position_m);

@@ -144,11 +144,12 @@ int site_utm_zone(const struct site *site)
 {
     const struct geoframe *frame = &site->anchor.frame;
     const struct placement *first = &site->station[0].at;
-    struct georef_utm utm;
+    struct locate_grid utm;
     if (site->cfg->utm_zone != 0 || !site->anchor.known || frame->kind == GEOFRAME_GRID) return site->cfg->utm_zone;
     int tangent = frame->kind == GEOFRAME_TANGENT;
-    int rc = georef_geodetic_to_utm(tangent ? frame->lat_deg : first->lat_deg,
-                                    tangent ? frame->lon_deg : first->lon_deg, 0, &utm, NULL);
+    const struct georef_place at = {tangent ? frame->lat_deg : first->lat_deg,
+                                    tangent ? frame->lon_deg : first->lon_deg, 0.0};
+    int rc = locate_in_grid(&at, 0, &utm, NULL);
     return rc == SH_OK ? utm.zone : 0;
 }
 

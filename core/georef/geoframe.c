@@ -6,7 +6,7 @@
 #include "core/locate.h"
 #include "core/mat3.h"
 
-int geoframe_set_tangent(struct geoframe *frame, const double origin_m[3], const struct geoframe_geodetic *at,
+int geoframe_set_tangent(struct geoframe *frame, const double origin_m[3], const struct georef_place *at,
                          double north_deg, struct sh_err *err)
 {
     memset(frame, 0, sizeof *frame);
@@ -22,7 +22,7 @@ int geoframe_set_tangent(struct geoframe *frame, const double origin_m[3], const
     for (int i = 0; i < 3; i++)
         if (!isfinite(origin_m[i]) || !isfinite(north_deg))
             return sh_fail(err, SH_EINPUT, "the anchor's origin or direction is not a finite number");
-    int rc = georef_geodetic_to_ecef(at->lat_deg, at->lon_deg, at->height_m, frame->ecef_m, enu, err);
+    int rc = locate_axes(at, frame->ecef_m, enu, err);
     if (rc == SH_OK) mat3_multiply(enu, turn, frame->rotation);
     return rc;
 }
@@ -43,15 +43,11 @@ void geoframe_set_ecef(struct geoframe *frame)
     frame->kind = GEOFRAME_ECEF;
 }
 
-int geoframe_locate(const struct geoframe *frame, const double p_prcs[3], struct geoframe_geodetic *at,
-                    struct sh_err *err)
+static int locate(const struct geoframe *frame, const double p_prcs[3], struct georef_place *at, struct sh_err *err)
 {
     double p_ecef[3], d[3];
-    if (frame->kind == GEOFRAME_GRID) {
-        at->height_m = p_prcs[2];
-        return georef_locate_utm(frame->zone, frame->north, p_prcs[0], p_prcs[1], p_prcs[2], &at->lat_deg, &at->lon_deg,
-                                 err);
-    }
+    if (frame->kind == GEOFRAME_GRID)
+        return georef_locate_utm(frame->zone, frame->north, p_prcs[0], p_prcs[1], p_prcs[2], at, err);
     memcpy(p_ecef, p_prcs, sizeof p_ecef);
     if (frame->kind == GEOFRAME_TANGENT) {
         for (int i = 0; i < 3; i++)
@@ -60,15 +56,23 @@ int geoframe_locate(const struct geoframe *frame, const double p_prcs[3], struct
         for (int i = 0; i < 3; i++)
             p_ecef[i] += frame->ecef_m[i];
     }
-    return georef_locate_ecef(p_ecef, &at->lat_deg, &at->lon_deg, &at->height_m, err);
+    return georef_locate_ecef(p_ecef, at, err);
+}
+
+int geoframe_locate(const struct geoframe *frame, const double p_prcs[3], struct georef_place *at, struct sh_err *err)
+{
+    struct sh_err why = {0, ""};
+    int rc = locate(frame, p_prcs, at, err);
+    if (rc != SH_OK || locate_check(at, &why) == SH_OK) return rc;
+    return sh_fail(err, SH_EINPUT, "scene point %.10g %.10g %.10g: %s", p_prcs[0], p_prcs[1], p_prcs[2], why.text);
 }
 
 /* The zone is forced; the northing counts from the frame's own side of the equator. */
-static int find_in_grid(const struct geoframe *frame, const struct geoframe_geodetic *at, double p_prcs[3],
+static int find_in_grid(const struct geoframe *frame, const struct georef_place *at, double p_prcs[3],
                         struct sh_err *err)
 {
-    struct georef_utm utm;
-    int rc = georef_geodetic_to_utm(at->lat_deg, at->lon_deg, frame->zone, &utm, err);
+    struct locate_grid utm;
+    int rc = locate_in_grid(at, frame->zone, &utm, err);
     if (rc != SH_OK) return rc;
     if (utm.zone != frame->zone || (utm.zone == 0 && utm.north != frame->north))
         return sh_fail(err, SH_EINPUT, "latitude %.10g, longitude %.10g is not in the scene's grid, UPS %s",
@@ -79,13 +83,13 @@ static int find_in_grid(const struct geoframe *frame, const struct geoframe_geod
     return SH_OK;
 }
 
-int geoframe_find(const struct geoframe *frame, const struct geoframe_geodetic *at, double p_prcs[3],
-                  struct sh_err *err)
+int geoframe_find(const struct geoframe *frame, const struct georef_place *at, double p_prcs[3], struct sh_err *err)
 {
     double p_ecef[3], d[3];
     if (frame->kind == GEOFRAME_GRID) return find_in_grid(frame, at, p_prcs, err);
-    int rc = georef_geodetic_to_ecef(at->lat_deg, at->lon_deg, at->height_m, p_ecef, NULL, err);
+    int rc = locate_check(at, err);
     if (rc != SH_OK) return rc;
+    georef_geodetic_to_ecef(at, p_ecef);
     memcpy(p_prcs, p_ecef, sizeof p_ecef);
     if (frame->kind == GEOFRAME_ECEF) return SH_OK;
     for (int i = 0; i < 3; i++)
@@ -106,11 +110,11 @@ int geoframe_level(const struct geoframe *frame, const double p_prcs[3], double 
     return rc;
 }
 
-static int grid_to_enu(const struct geoframe *frame, const struct geoframe_geodetic *at, double rotation[9],
+static int grid_to_enu(const struct geoframe *frame, const struct georef_place *at, double rotation[9],
                        struct sh_err *err)
 {
-    struct georef_utm utm;
-    int rc = georef_geodetic_to_utm(at->lat_deg, at->lon_deg, frame->zone, &utm, err);
+    struct locate_grid utm;
+    int rc = locate_in_grid(at, frame->zone, &utm, err);
     if (rc != SH_OK) return rc;
     /* grid north bears convergence: it is (s, c) in east and north */
     double s = sin(utm.convergence_deg * M_PI / 180.0), c = cos(utm.convergence_deg * M_PI / 180.0);
@@ -121,12 +125,12 @@ static int grid_to_enu(const struct geoframe *frame, const struct geoframe_geode
 
 int geoframe_to_enu(const struct geoframe *frame, const double p_prcs[3], double rotation[9], struct sh_err *err)
 {
-    struct geoframe_geodetic at;
+    struct georef_place at;
     double p_ecef[3], enu[9], back[9];
     int rc = geoframe_locate(frame, p_prcs, &at, err);
     if (rc != SH_OK) return rc;
     if (frame->kind == GEOFRAME_GRID) return grid_to_enu(frame, &at, rotation, err);
-    rc = georef_geodetic_to_ecef(at.lat_deg, at.lon_deg, at.height_m, p_ecef, enu, err);
+    rc = locate_axes(&at, p_ecef, enu, err);
     if (rc != SH_OK) return rc;
     mat3_transpose(enu, back);
     mat3_multiply(back, frame->kind == GEOFRAME_TANGENT ? frame->rotation : mat3_unit, rotation);
@@ -135,7 +139,7 @@ int geoframe_to_enu(const struct geoframe *frame, const double p_prcs[3], double
 
 int geoframe_fill(const struct geoframe *frame, const double p_prcs[3], struct georef_spec *spec, struct sh_err *err)
 {
-    struct geoframe_geodetic at;
+    struct georef_place at;
     int rc = geoframe_locate(frame, p_prcs, &at, err);
     if (rc != SH_OK) return rc;
     memcpy(spec->station_m, p_prcs, sizeof spec->station_m);

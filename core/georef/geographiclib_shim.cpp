@@ -198,43 +198,12 @@ void shim_grid_to_local(const struct shim_grid *grid, size_t n, const double *dx
     }
 }
 
-int shim_ecef_reverse(const double p_ecef[3], double *lat_deg, double *lon_deg, double *height_m)
-{
-    *lat_deg = *lon_deg = *height_m = nan_m;
-    try {
-        Geocentric::WGS84().Reverse(p_ecef[0], p_ecef[1], p_ecef[2], *lat_deg, *lon_deg, *height_m);
-        return 0;
-    } catch (...) {
-        return -1;
-    }
-}
-
-int shim_utm_reverse(int zone, int north, double easting_m, double northing_m, double *lat_deg, double *lon_deg,
-                     char *why, size_t len)
-{
-    try {
-        UTMUPS::Reverse(zone, north != 0, easting_m, northing_m, *lat_deg, *lon_deg);
-        return 0;
-    } catch (const std::exception &e) {
-        std::snprintf(why, len, "%s", e.what());
-    } catch (...) {
-        std::snprintf(why, len, "unknown failure in GeographicLib");
-    }
-    return -1;
-}
-
 int shim_utm_forward(double lat_deg, double lon_deg, int zone, struct shim_utm *out, char *why, size_t len)
 {
-    try {
-        bool north;
+    return attempt(why, len, [&] {
+        bool north = false;
         UTMUPS::Forward(lat_deg, lon_deg, out->zone, north, out->easting_m, out->northing_m, out->convergence_deg,
                         out->scale, zone == 0 ? int(UTMUPS::STANDARD) : zone);
         out->north = north;
-        return 0;
-    } catch (const std::exception &e) {
-        std::snprintf(why, len, "%s", e.what());
-    } catch (...) {
-        std::snprintf(why, len, "unknown failure in GeographicLib");
-    }
-    return -1;
+    });
 }

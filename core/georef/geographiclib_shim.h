@@ -39,11 +39,7 @@ void shim_grid_reverse(const struct shim_grid *grid, const double d_grid[3], dou
 void shim_grid_to_local(const struct shim_grid *grid, size_t n, const double *dx, const double *dy, const double *dz,
                         double *out_x, double *out_y, double *out_z);
 
-/* ---- single places (locate.c). 0, or -1 with the reason. */
-int shim_ecef_reverse(const double p_ecef[3], double *lat_deg, double *lon_deg, double *height_m);
-/* zone: 1..60, or 0: UPS */
-int shim_utm_reverse(int zone, int north, double easting_m, double northing_m, double *lat_deg, double *lon_deg,
-                     char *why, size_t len);
+/* A place in a grid (locate.c): 0, or -1 with the reason. */
 struct shim_utm {
     int zone, north; /* zone 0: UPS */
     double easting_m, northing_m, convergence_deg, scale;

@@ -32,7 +32,7 @@ static void assert_near(double got, double want, double tolerance)
 static void tangent(struct geoframe *frame, double lat_deg, double lon_deg, double north_deg)
 {
     const double origin_m[3] = {100, -50, 7};
-    const struct geoframe_geodetic at = {lat_deg, lon_deg, 110};
+    const struct georef_place at = {lat_deg, lon_deg, 110};
     ok(geoframe_set_tangent(frame, origin_m, &at, north_deg, &err));
 }
 
@@ -129,11 +129,11 @@ static void frame_and_georeference_agree(void **state)
     ok(geoframe_set_grid(&frame[1], 33, 1, &err));
     geoframe_set_ecef(&frame[2]);
     for (int k = 0; k < 3; k++) {
-        struct geoframe_geodetic at;
+        struct georef_place at;
         const double corner[3] = {station[k][0] + 40, station[k][1] - 30, station[k][2] + 20};
         double p[3], q[3], back[3];
         ok(geoframe_locate(&frame[k], corner, &at, &err));
-        ok(georef_geodetic_to_ecef(at.lat_deg, at.lon_deg, at.height_m, p, NULL, &err));
+        georef_geodetic_to_ecef(&at, p);
         see(&frame[k], GEOREF_ECEF, 0, station[k], corner, q);
         ok(geoframe_find(&frame[k], &at, back, &err));
         for (int i = 0; i < 3; i++) {
@@ -164,7 +164,7 @@ static void north_is_clockwise_from_y(void **state)
 {
     (void)state;
     struct geoframe frame;
-    struct geoframe_geodetic at;
+    struct georef_place at;
     tangent(&frame, 40, 20, 30);
     const double ahead[3] = {100 + 10 * sin(M_PI / 6), -50 + 10 * cos(M_PI / 6), 7};
     ok(geoframe_locate(&frame, ahead, &at, &err));
@@ -180,8 +180,8 @@ static void a_grid_is_turned_by_its_convergence(void **state)
     struct geoframe frame;
     const double lat_deg[] = {52.5, -33, 70}, lon_deg[] = {13.4, 17.5, 16.9}, step_deg = 1e-4;
     for (int k = 0; k < 3; k++) {
-        struct geoframe_geodetic at = {lat_deg[k], lon_deg[k], 0}, north = {lat_deg[k] + step_deg, lon_deg[k], 0};
-        struct geoframe_geodetic south = {lat_deg[k] - step_deg, lon_deg[k], 0};
+        struct georef_place at = {lat_deg[k], lon_deg[k], 0}, north = {lat_deg[k] + step_deg, lon_deg[k], 0};
+        struct georef_place south = {lat_deg[k] - step_deg, lon_deg[k], 0};
         double p[3], n[3], s[3], turn[9], enu[3];
         ok(geoframe_set_grid(&frame, 33, lat_deg[k] > 0, &err));
         ok(geoframe_find(&frame, &at, p, &err));
@@ -228,25 +228,25 @@ static void a_head_in_ecef_stands_upright(void **state)
 static void places_from_other_forms(void **state)
 {
     (void)state;
-    double lat_deg, lon_deg, height_m;
-    struct georef_utm utm;
-    ok(georef_locate_ecef((const double[3]){0, 0, B_M + 12}, &lat_deg, &lon_deg, &height_m, &err));
-    assert_near(lat_deg, 90, 0);
-    assert_near(height_m, 12, 1e-8);
-    ok(georef_locate_ecef((const double[3]){-A_M, 0, 0}, &lat_deg, &lon_deg, &height_m, &err));
-    assert_near(fabs(lon_deg), 180, 0);
-    assert_near(lat_deg, 0, 0);
-    ok(georef_locate_utm(33, 1, 500000, 0, 5, &lat_deg, &lon_deg, &err)); /* zone 33: 12 to 18 deg */
-    assert_near(lat_deg, 0, 1e-13);
-    assert_near(lon_deg, 15, 1e-13);
-    ok(georef_locate_utm(60, 0, 500000, 1e7, 5, &lat_deg, &lon_deg, &err));
-    assert_near(lat_deg, 0, 1e-13);
-    assert_near(lon_deg, 177, 1e-13);
-    ok(georef_locate_utm(0, 0, 2e6, 2e6, 5, &lat_deg, &lon_deg, &err)); /* UPS has the pole at 2000 km, 2000 km */
-    assert_near(lat_deg, -90, 1e-13);
-    ok(georef_geodetic_to_utm(48, 180, 0, &utm, &err)); /* 180 E is 180 W, the first zone */
+    struct georef_place at;
+    struct locate_grid utm;
+    ok(georef_locate_ecef((const double[3]){0, 0, B_M + 12}, &at, &err));
+    assert_near(at.lat_deg, 90, 0);
+    assert_near(at.height_m, 12, 1e-8);
+    ok(georef_locate_ecef((const double[3]){-A_M, 0, 0}, &at, &err));
+    assert_near(fabs(at.lon_deg), 180, 0);
+    assert_near(at.lat_deg, 0, 0);
+    ok(georef_locate_utm(33, 1, 500000, 0, 5, &at, &err)); /* zone 33: 12 to 18 deg */
+    assert_near(at.lat_deg, 0, 1e-13);
+    assert_near(at.lon_deg, 15, 1e-13);
+    ok(georef_locate_utm(60, 0, 500000, 1e7, 5, &at, &err));
+    assert_near(at.lat_deg, 0, 1e-13);
+    assert_near(at.lon_deg, 177, 1e-13);
+    ok(georef_locate_utm(0, 0, 2e6, 2e6, 5, &at, &err)); /* UPS has the pole at 2000 km, 2000 km */
+    assert_near(at.lat_deg, -90, 1e-13);
+    ok(locate_in_grid(&(struct georef_place){48, 180, 0}, 0, &utm, &err)); /* 180 E is 180 W, the first zone */
     assert_int_equal(utm.zone, 1);
-    ok(georef_geodetic_to_utm(48, 12.1, 32, &utm, &err)); /* forced */
+    ok(locate_in_grid(&(struct georef_place){48, 12.1, 0}, 32, &utm, &err)); /* forced */
     assert_int_equal(utm.zone, 32);
     assert_true(utm.convergence_deg > 0 && utm.easting_m > 700000); /* east of the central meridian, 9 E */
 }
@@ -254,27 +254,25 @@ static void places_from_other_forms(void **state)
 static void what_is_nowhere_is_refused(void **state)
 {
     (void)state;
-    double a, b, c;
     static const double inside[][3] = {{0, 0, 0}, {6e6, 0, 0}, {7e6, 0, 0}, {NAN, 0, 0}};
-    static const char *const said[] = {"not near the Earth's surface", "not near the Earth's surface",
-                                       "not near the Earth's surface", "not a finite"};
-    for (int i = 0; i < 4; i++) {
-        assert_int_equal(georef_locate_ecef(inside[i], &a, &b, &c, &err), SH_EINPUT);
-        assert_non_null(strstr(err.text, said[i]));
-    }
-    assert_int_equal(georef_locate_utm(33, 1, 1.1e6, 5e6, 0, &a, &b, &err), SH_EINPUT);
-    assert_non_null(strstr(err.text, "UTM zone 33, north: easting 1100000 m, northing 5000000 m lie off the grid"));
-    assert_int_equal(georef_locate_utm(33, 1, -1e5, 5e6, 0, &a, &b, &err), SH_EINPUT);
-    assert_int_equal(georef_locate_utm(33, 1, 5e5, 1e7, 0, &a, &b, &err), SH_EINPUT);
-    assert_int_equal(georef_locate_utm(61, 1, 5e5, 5e6, 0, &a, &b, &err), SH_EINPUT);
-    assert_int_equal(georef_locate_utm(33, 1, 5e5, 5e6, 2e5, &a, &b, &err), SH_EINPUT);
-    assert_int_equal(georef_locate_utm(33, 1, NAN, 5e6, 0, &a, &b, &err), SH_EINPUT);
-    struct georef_utm utm;
-    assert_int_equal(georef_geodetic_to_utm(48, 100, 33, &utm, &err), SH_EINPUT);
-    assert_int_equal(georef_geodetic_to_utm(91, 0, 0, &utm, &err), SH_EINPUT);
     struct geoframe frame;
+    struct georef_place at;
+    geoframe_set_ecef(&frame);
+    for (int i = 0; i < 4; i++) {
+        assert_int_equal(geoframe_locate(&frame, inside[i], &at, &err), SH_EINPUT);
+        assert_non_null(strstr(err.text, i < 3 ? "not near the Earth's surface" : "not finite"));
+    }
+    assert_int_equal(georef_locate_utm(33, 1, 1.1e6, 5e6, 0, &at, &err), SH_EINPUT);
+    assert_int_equal(georef_locate_utm(33, 1, -1e5, 5e6, 0, &at, &err), SH_EINPUT);
+    assert_int_equal(georef_locate_utm(33, 1, 5e5, 1e7, 0, &at, &err), SH_EINPUT);
+    assert_int_equal(georef_locate_utm(61, 1, 5e5, 5e6, 0, &at, &err), SH_EINPUT);
+    assert_int_equal(georef_locate_utm(33, 1, NAN, 5e6, 0, &at, &err), SH_EINPUT);
+    struct locate_grid utm;
+    assert_int_equal(locate_in_grid(&(struct georef_place){48, 100, 0}, 33, &utm, &err), SH_EINPUT);
+    assert_int_equal(locate_in_grid(&(struct georef_place){91, 0, 0}, 0, &utm, &err), SH_EINPUT);
+    assert_int_equal(locate_check(&(struct georef_place){48, 9, 2e5}, &err), SH_EINPUT);
     double p[3];
-    const struct geoframe_geodetic far_away = {48, 100, 0}, berlin = {52, 13, 0};
+    const struct georef_place far_away = {48, 100, 0}, berlin = {52, 13, 0};
     assert_int_equal(geoframe_set_grid(&frame, 61, 1, &err), SH_EINPUT);
     ok(geoframe_set_grid(&frame, 33, 1, &err));
     assert_int_equal(geoframe_find(&frame, &far_away, p, &err), SH_EINPUT);
@@ -293,7 +291,7 @@ static void a_grid_reaches_beyond_the_equator(void **state)
 {
     (void)state;
     struct geoframe frame;
-    struct geoframe_geodetic at = {-0.01, 15, 0}, back;
+    struct georef_place at = {-0.01, 15, 0}, back;
     double p[3];
     ok(geoframe_set_grid(&frame, 33, 1, &err));
     ok(geoframe_find(&frame, &at, p, &err));

@@ -106,14 +106,15 @@ static void each_form_leads_to_the_same_place(void **state)
     static const char anchor[] = "  anchor: {source: explicit, origin_m: [5, 6, 7], lat_deg: 52.5, lon_deg: 13.4, "
                                  "height_m: 100, north_deg: 20}";
     static const char *const crs[] = {"ecef", "utm"};
-    struct georef_utm utm;
+    struct locate_grid utm;
     double p[3];
     char stations[512];
     write_floor(0, 0, 0);
     ok(load(anchor, "  - {position_m: [15, -20, 2]}", "local"));
     const struct placement at = site->station[0].at;
-    ok(georef_geodetic_to_utm(at.lat_deg, at.lon_deg, 0, &utm, &err));
-    ok(georef_geodetic_to_ecef(at.lat_deg, at.lon_deg, at.height_m, p, NULL, &err));
+    const struct georef_place place = {at.lat_deg, at.lon_deg, at.height_m};
+    ok(locate_in_grid(&place, 0, &utm, &err));
+    georef_geodetic_to_ecef(&place, p);
     snprintf(stations, sizeof stations,
              "  - {position_m: [15, -20, 2]}\n  - {lat_deg: %.10f, lon_deg: %.10f, height_m: %.4f}\n"
              "  - {utm_zone: %d, hemisphere: north, easting_m: %.4f, northing_m: %.4f, height_m: %.4f}\n"
@@ -216,7 +217,7 @@ static void what_has_no_place_is_refused(void **state)
         {"  anchor: {source: utm, utm_zone: 33, hemisphere: north}", "  - {lat_deg: 52, lon_deg: 120, height_m: 0}",
          "UTM zone 33 does not reach latitude 52, longitude 120"},
         {"  anchor: {source: utm, utm_zone: 33, hemisphere: north}",
-         "  - {easting_m: 2e6, northing_m: 5e6, height_m: 0}", "lie off the grid"},
+         "  - {easting_m: 2e6, northing_m: 5e6, height_m: 0}", "is not in UTM zone 33N"},
         {"  anchor: {source: ecef}", "  - {position_m: [1, 2, 3]}", "not near the Earth's surface"},
         {"  anchor: {source: ifc}", "  - {position_m: [1, 2, 3]}", "no mesh is an .ifc file"},
         {"", "  - {position_m: [0, 0, 1], ecef_m: [1, 2, 3]}", "not near the Earth's surface"},
@@ -254,9 +255,9 @@ static void headings_and_convergence(void **state)
     read_azimuths(&azimuth_deg, &from_grid_deg); /* 18 E: the first of zone 34, whose meridian is 21 E, 3 deg away */
     assert_near(azimuth_deg, 30, 1e-6);
     assert_near(from_grid_deg, 30 + convergence_deg, 3e-4);
-    struct georef_utm utm;
+    struct locate_grid utm;
     char text[256];
-    ok(georef_geodetic_to_utm(50, 18, 33, &utm, &err)); /* the other side: 3 deg east of 15 E */
+    ok(locate_in_grid(&(struct georef_place){50, 18, 0}, 33, &utm, &err)); /* the other side: 3 deg east of 15 E */
     write_floor(utm.easting_m, utm.northing_m, 0);
     snprintf(text, sizeof text, "  - {easting_m: %.4f, northing_m: %.4f, height_m: 2, heading_deg: 50}", utm.easting_m,
              utm.northing_m);
@@ -300,8 +301,10 @@ static void the_house_has_its_site(void **state)
         const char *up;
         double scale;
         const char *height, *part;
-    } at[] = {
-        {"y", 1, "", NULL}, {"y", 1, ", height_m: 110", NULL}, {"z", 1, "", "allowed up: y"}, {"y", 0.5, "", "scale: 1"}};
+    } at[] = {{"y", 1, "", NULL},
+              {"y", 1, ", height_m: 110", NULL},
+              {"z", 1, "", "allowed up: y"},
+              {"y", 0.5, "", "scale: 1"}};
     for (int i = 0; i < 4; i++) {
         char edited[1024];
         snprintf(edited, sizeof edited, text, at[i].up, at[i].scale, at[i].height);
