@@ -131,6 +131,39 @@ static int find_bvh(struct site *site, const double station_m[3], const struct s
     return site->cfg->order_exactly ? bvh_order_exactly(*out, err) : SH_OK;
 }
 
+/* Where points can be, seen from a station: within the scene, and within the head's range. A hundredth more, and ten
+ * sigma, for noise. */
+static void extent_from(const struct site *site, const double station_m[3], struct plan_georef_need *need)
+{
+    const struct config_profile *p = &site->cfg->profile;
+    double reach_m = p->range_max_m * SITE_MARGIN, far[3];
+    double noise_m = 10.0 * (p->range_sigma_m + 1e-6 * p->range_sigma_ppm * p->range_max_m);
+    for (int i = 0; i < 3; i++) {
+        double low = station_m[i] - site->scene->min_m[i], high = site->scene->max_m[i] - station_m[i];
+        far[i] = fmax(low, high) * SITE_MARGIN + noise_m;
+    }
+    need->radius_m = need->height_m = reach_m;
+    if (site->n_movers > 0) return; /* they may go anywhere */
+    need->radius_m = fmin(reach_m, hypot(far[0], far[1]));
+    need->height_m = fmin(reach_m, far[2]);
+}
+
+static int plan_station(const struct site *site, struct site_station *s, const struct sh_report *report,
+                        struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    struct plan_georef_need need = {.tolerance_m = cfg->tolerance_m, .forced = cfg->georef};
+    enum georef_method method;
+    struct sh_err why;
+    extent_from(site, s->station->position_m, &need);
+    int rc = plan_georef(s->georef, &need, &method, &s->plan, &why);
+    if (rc != SH_OK) return sh_fail(err, rc, "%s: output.georef: %.300s", cfg->file, why.text);
+    if (s->plan.error_m > need.tolerance_m && cfg->layout == LINE_GEO)
+        sh_warn(report, "station %s: georeferencing by %s may be off by %.2g m, more than output.tolerance_m",
+                s->station->name, s->plan.method, s->plan.error_m);
+    return georef_set_method(s->georef, method, err);
+}
+
 static int add_station(struct site *site, const struct config_station *station, const struct sh_report *report,
                        struct sh_err *err)
 {
@@ -140,24 +173,58 @@ static int add_station(struct site *site, const struct config_station *station, 
                                .utm_zone = cfg->utm_zone,
                                .lat_deg = station->lat_deg,
                                .lon_deg = station->lon_deg,
-                               .height_m = station->height_m};
+                               .height_m = station->height_m,
+                               .geoid = site->geoid};
     memcpy(spec.station_m, station->position_m, sizeof spec.station_m);
     s->station = station;
     cast_rotation(station->heading_deg * M_PI / 180.0, s->rotation);
     int rc = find_bvh(site, station->position_m, report, &s->bvh, err);
     if (rc == SH_OK) rc = georef_create(&spec, &s->georef, err);
-    if (rc == SH_OK) site->n_stations++;
+    if (rc != SH_OK) return rc;
+    site->n_stations++;
+    return plan_station(site, s, report, err);
+}
+
+static int open_geoid(struct site *site, struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    struct sh_err why;
+    int has_heights = cfg->crs == GEOREF_UTM || cfg->crs == GEOREF_GEODETIC;
+    if (cfg->heights == HEIGHTS_ELLIPSOID || !has_heights) return SH_OK;
+    int rc = georef_geoid_open(&site->geoid, &why);
+    if (rc == SH_OK || cfg->heights == HEIGHTS_AUTO) return SH_OK;
+    return sh_fail(err, rc, "%s: output.heights: %.400s", cfg->file, why.text);
+}
+
+/* Per station; whether they all fit. Polar points have no coordinates that need to. */
+static int scale_stations(struct site *site, double scale_m, struct sh_err *err)
+{
+    int rc = SH_OK;
+    struct sh_err why;
+    site->scale_m = scale_m;
+    for (uint32_t i = 0; i < site->n_stations && rc == SH_OK; i++) {
+        struct site_station *s = &site->station[i];
+        rc = georef_scale(s->georef, scale_m, site->cfg->profile.range_max_m * SITE_MARGIN, s->scale, &why);
+        if (site->cfg->layout == LINE_POLAR) rc = SH_OK;
+        if (rc != SH_OK)
+            sh_fail(err, rc, "%s: output.scale_m: station %s: %.300s", site->cfg->file, s->station->name, why.text);
+    }
     return rc;
 }
 
-/* The finest 1e-6 x 10^n m with which the head's whole range fits into 31 bits, with 1 % left for scale and noise. */
-static double choose_scale(const struct config *cfg)
+/* The finest 1e-6 x 10^n m with which the head's whole range fits into 31 bits, with a hundredth left for noise, unless
+ * the configuration names a scale. */
+static int choose_scale(struct site *site, struct sh_err *err)
 {
-    if (cfg->scale_m > 0.0) return cfg->scale_m;
+    const struct config *cfg = site->cfg;
+    if (cfg->scale_m > 0.0) return scale_stations(site, cfg->scale_m, err);
     double scale_m = 1e-6;
-    while (cfg->profile.range_max_m * 1.01 / scale_m > 2147483647.0)
+    while (cfg->profile.range_max_m * SITE_MARGIN / scale_m > 2147483647.0)
         scale_m *= 10.0;
-    return scale_m;
+    int rc = scale_stations(site, scale_m, err);
+    while (rc != SH_OK && scale_m < 1.0)
+        rc = scale_stations(site, scale_m *= 10.0, err);
+    return rc;
 }
 
 int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err)
@@ -166,10 +233,11 @@ int site_load(const struct config *cfg, const struct sh_report *report, struct s
     struct site *site = calloc(1, sizeof *site);
     if (site == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     site->cfg = cfg;
-    site->scale_m = choose_scale(cfg);
-    int rc = load_scene(site, report, err);
+    int rc = open_geoid(site, err);
+    if (rc == SH_OK) rc = load_scene(site, report, err);
     for (uint32_t i = 0; i < cfg->n_stations && rc == SH_OK; i++)
         rc = add_station(site, &cfg->station[i], report, err);
+    if (rc == SH_OK) rc = choose_scale(site, err);
     if (rc != SH_OK) {
         site_free(site);
         return rc;
@@ -190,6 +258,7 @@ void site_free(struct site *site)
         scene_free(site->mover[i].scene);
     }
     scene_free(site->scene);
+    georef_geoid_free(site->geoid);
     free(site);
 }
 
@@ -216,5 +285,6 @@ void site_cast_setup(const struct site *site, uint32_t station, struct cast_setu
     setup->mirror_counts = counts_or_ideal(profile->mirror_counts);
     setup->pan_counts = counts_or_ideal(profile->pan_counts);
     setup->layout = site->cfg->layout;
-    setup->range_scale_m = setup->xyz_scale_m = site->scale_m;
+    setup->range_scale_m = site->scale_m;
+    memcpy(setup->xyz_scale, s->scale, sizeof setup->xyz_scale);
 }

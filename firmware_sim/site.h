@@ -5,6 +5,7 @@
 
 #include "core/cast.h"
 #include "core/georef.h"
+#include "core/plan.h"
 #include "core/scene.h"
 #include "firmware_sim/config.h"
 
@@ -12,7 +13,9 @@ struct site_station {
     const struct config_station *station;
     struct bvh *bvh; /* shared where stations are near each other */
     struct georef *georef;
-    double rotation[9]; /* socs -> prcs */
+    double rotation[9];   /* socs -> prcs */
+    double scale[3];      /* of geo points on the wire, units of the CRS per count */
+    struct plan_row plan; /* how the georef's method was chosen */
 };
 
 struct site_mover {
@@ -31,11 +34,15 @@ struct site {
     uint32_t n_bvh;
     struct site_station station[CONFIG_MAX_STATIONS];
     uint32_t n_stations;
-    double scale_m; /* of positions and ranges on the wire, metres per count */
+    struct georef_geoid *geoid; /* NULL: heights are ellipsoidal */
+    double scale_m;             /* of positions and ranges on the wire, metres per count */
 };
 
 /* Stations further than this from a BVH's origin get one of their own: a float there has steps of 0.06 mm. */
 #define SITE_BVH_REACH_M 1000.0
+
+/* Room left beyond the head's largest range, for noise. */
+#define SITE_MARGIN 1.01
 
 /* cfg must outlive the site. */
 int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err);

@@ -11,7 +11,7 @@
 struct ply_facts {
     int ascii, empty_shots;
     uint64_t n_vertices, n_unplaced; /* points before their descriptor and anchor were seen */
-    int have_crs, crs, epsg;
+    int have_crs, crs, epsg, geoid_heights;
     char idn[96], profile[32];
     struct scanhead_stats stats;
 };
