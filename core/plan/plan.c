@@ -61,12 +61,64 @@ int plan_georef(const struct georef *georef, const struct plan_georef_need *need
     snprintf(row->method, sizeof row->method, "%s", methods[*method].name);
     row->error_m = bound_m;
     row->cost_ns = cost_ns(georef, *method);
-    const char *why = need->forced != GEOREF_AUTO   ? "asked for"
-                      : bound_m > need->tolerance_m ? "nothing meets"
-                      : *method != GEOREF_EXACT     ? "the cheapest one that meets"
-                      : georef_has_geoid(georef)    ? "the geoid is interpolated for each point, for"
-                                                    : "no polynomial meets";
-    snprintf(row->why, sizeof row->why, "%s tolerance %.3g m within %.5g m and %.5g m up or down", why,
-             need->tolerance_m, need->radius_m, need->height_m);
+    const char *why = need->forced != GEOREF_AUTO       ? "asked for by output.georef"
+                      : !(bound_m <= need->tolerance_m) ? "nothing meets the tolerance"
+                      : *method != GEOREF_EXACT         ? "the cheapest that meets the tolerance"
+                      : georef_has_geoid(georef)        ? "the geoid is interpolated for each point"
+                                                        : "no polynomial meets the tolerance";
+    snprintf(row->why, sizeof row->why, "%s: %.3g m within %.5g m, %.5g m up or down", why, need->tolerance_m,
+             need->radius_m, need->height_m);
     return SH_OK;
+}
+
+void plan_georef_polar(struct plan_row *row)
+{
+    *row = (struct plan_row){.stage = "georef", .method = "none"};
+    snprintf(row->why, sizeof row->why,
+             "output.layout is polar: points leave as range and angles, the anchor says where");
+}
+
+static struct plan_row *add(struct plan_row *row, const char *stage, const char *method, double error_m, double cost_ns,
+                            const char *why)
+{
+    *row = (struct plan_row){.error_m = error_m, .cost_ns = cost_ns};
+    snprintf(row->stage, sizeof row->stage, "%s", stage);
+    snprintf(row->method, sizeof row->method, "%s", method);
+    snprintf(row->why, sizeof row->why, "%s", why);
+    return row + 1;
+}
+
+/* Within how much of the range float can't tell two surfaces apart. */
+static const double FLOAT_ORDER = 5e-7;
+/* What the cast promises for incidence up to 89.9 degrees; tests/stability holds it to that. */
+static const double CAST_ERROR_M = 1e-6;
+
+size_t plan_head(const struct plan_head *head, struct plan_row rows[PLAN_HEAD_ROWS])
+{
+    struct plan_row *row = rows;
+    char method[32], why[192];
+    snprintf(method, sizeof method, "packets of %u, decided", head->packet);
+    row = add(row, "cast", method, CAST_ERROR_M, (double)NAN,
+              "the widest packets of this CPU; triangle and range in double where float can't tell; cost: make bench");
+    if (head->order_exactly)
+        row = add(row, "order", "double", 0.0, (double)NAN, "scene.order_exactly: surfaces that overlap are ordered");
+    else {
+        snprintf(why, sizeof why,
+                 "scene.order_exactly is off: of surfaces within %.2g m of each other at %.4g m any one",
+                 FLOAT_ORDER * head->range_max_m, head->range_max_m);
+        row = add(row, "order", "none", FLOAT_ORDER * head->range_max_m, 0.0, why);
+    }
+    if (head->n_movers > 0)
+        row = add(row, "movers", "cast on their own", CAST_ERROR_M, (double)NAN, "meshes that move");
+    else
+        row = add(row, "movers", "none", 0.0, 0.0, "no mesh moves");
+    row = add(row, "beam", "none", 0.0, 0.0, "one ray per pulse: nothing asks for a footprint");
+    if (head->noise_on) {
+        snprintf(why, sizeof why, "noise.range: sigma %.3g m and %.3g ppm, which are the head's, not an error",
+                 head->range_sigma_m, head->range_sigma_ppm);
+        row = add(row, "noise", "gauss", 0.0, 1.5, why);
+    } else {
+        row = add(row, "noise", "none", 0.0, 0.0, "noise.range is off");
+    }
+    return (size_t)(row - rows);
 }
