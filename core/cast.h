@@ -121,8 +121,20 @@ void caster_set_profile(struct caster *caster, struct cast_profile *profile);
 
 void caster_get_counters(const struct caster *caster, struct cast_counters *counters);
 
-/* socs -> prcs of a levelled head whose y axis points to heading_rad, clockwise from the scene's y axis. */
+/* socs -> levelled frame (x, y horizontal, z up) of a head turned by heading, then pitch, then roll, each about the
+ * axes as they are by then: rotation = Rz(-heading) Rx(pitch) Ry(roll), right-handed, column vectors, row by row: ch cr
+ * + sh sp sr   sh cp   ch sr - sh sp cr -sh cr + ch sp sr   ch cp  -sh sr - ch sp cr -cp sr              sp      cp cr
+ * heading: of the head's y axis, clockwise seen from above, from the frame's y axis; pitch: the y axis (forward) rises;
+ * roll: the x axis (right) sinks. */
+void cast_attitude(double heading_rad, double pitch_rad, double roll_rad, double rotation[9]);
+
+/* The same of a levelled head. */
 void cast_rotation(double heading_rad, double rotation[9]);
+
+/* The first surface of the scene from from_m along the unit vector down: its distance in *range_m, NaN when there is
+ * none. Exact as caster_hits. For setting up: looks at every triangle once. */
+int cast_floor(const struct scene *scene, const double from_m[3], const double down[3], double *range_m,
+               struct sh_err *err);
 
 /* Encoder reading of an angle: whole counts, modulo a turn. */
 uint32_t cast_encoder_count(double turn, double counts_per_turn);

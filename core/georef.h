@@ -1,7 +1,9 @@
 /* Scene frame -> coordinate reference system, through GeographicLib (georef/geographiclib_shim.cpp is the only C++).
  *
  * The scene frame is the local tangent frame of the station: x east, y north, z up along the ellipsoid's normal,
- * with the station's prcs position at (lat, lon, height). Coordinates leave as differences from the anchor, the
+ * with the station's prcs position at (lat, lon, height); or that of another place, turned against it (rotation); or a
+ * grid, whose points go through its projection one by one, except to the same grid: there they are what they are, and
+ * utm_zone 0 means that grid. Coordinates leave as differences from the anchor, the
  * station in the CRS, so that nothing is lost to large numbers; the sum anchor + difference is the position.
  *   local  prcs as it is: metres in the mesh's frame
  *   ecef   WGS 84 geocentric X, Y, Z: a rotation and a shift, exact
@@ -15,7 +17,7 @@
 
 #include "core/err.h"
 
-enum georef_crs { GEOREF_LOCAL, GEOREF_ECEF, GEOREF_UTM };
+enum georef_crs { GEOREF_LOCAL, GEOREF_ECEF, GEOREF_UTM, GEOREF_GEODETIC };
 
 struct georef_spec {
     enum georef_crs crs;
@@ -23,7 +25,30 @@ struct georef_spec {
     double lat_deg, lon_deg; /* geodetic, WGS 84, of the head's origin */
     double height_m;         /* ellipsoidal */
     int utm_zone;            /* 1..60, or 0: by position */
+    /* How prcs lies at the station, where it is not its tangent frame (see core/geoframe.h): */
+    double rotation[9]; /* differences in prcs -> east, north, up at the station, row by row; all 0: the same axes */
+    int prcs_is_grid;   /* 1: prcs is easting, northing, height of a grid, and station_m the station's */
+    int prcs_zone;      /* its zone: 1..60, or 0: UPS */
+    int prcs_north;     /* its hemisphere: 1 or 0 */
 };
+
+/* A place on WGS 84. */
+struct georef_place {
+    double lat_deg, lon_deg; /* -90..90, -180..180 */
+    double height_m;         /* ellipsoidal */
+};
+
+/* Where a position in another system lies. zone 1..60, or 0: UPS; north: hemisphere of the false origin; easting and
+ * northing with it; height ellipsoidal. SH_EINPUT: not finite, or outside of what UTMUPS takes. GeographicLib. */
+int georef_locate_utm(int zone, int north, double easting_m, double northing_m, double height_m,
+                      struct georef_place *out, struct sh_err *err);
+int georef_locate_ecef(const double p_ecef[3], struct georef_place *out, struct sh_err *err);
+
+/* And back. Not-a-number outside of -90..90 degrees of latitude. zone 0: by position, and *zone_used 0 where that is
+ * UPS; the three out-parameters may be NULL but grid (easting, northing, height). */
+void georef_geodetic_to_ecef(const struct georef_place *place, double p_ecef[3]);
+int georef_geodetic_to_utm(const struct georef_place *place, int zone, int *zone_used, int *north, double grid[3],
+                           struct sh_err *err);
 
 struct georef;
 

@@ -48,6 +48,7 @@ void pose_from_angles(double heading_rad, double pitch_rad, double roll_rad, dou
 void pose_to_angles(const double quat[4], double *heading_rad, double *pitch_rad, double *roll_rad);
 /* R, row by row. */
 void pose_matrix(const double quat[4], double rotation[9]);
+void pose_from_matrix(const double rotation[9], double quat[4]);
 void pose_multiply(const double a[4], const double b[4], double out[4]);
 void pose_rotate(const double quat[4], const double v[3], double out[3]);
 /* Angle between two attitudes, in [0, pi]. */

@@ -46,11 +46,32 @@ struct config_mesh {
     double move_m_s[3], turn_deg_s, pivot_m[3], cycle_s;
 };
 
+/* How the scene lies on the Earth; core/geoframe.h. */
+enum config_anchor_source { ANCHOR_NONE, ANCHOR_EXPLICIT, ANCHOR_IFC, ANCHOR_UTM, ANCHOR_ECEF };
+struct config_anchor {
+    enum config_anchor_source source;
+    double origin_m[3], lat_deg, lon_deg, height_m, north_deg;
+    uint32_t utm_zone; /* 0: UPS */
+    int north;         /* hemisphere */
+    int height_given;  /* ifc: height_m stands in for RefElevation */
+};
+
+/* In which form a station's place on the Earth is given. */
+enum config_place { PLACE_NONE, PLACE_GEODETIC, PLACE_UTM, PLACE_ECEF };
+
 struct config_station {
     char name[32];
-    double position_m[3];              /* of the head's origin in the scene frame */
-    double heading_deg;                /* of the head's y axis, clockwise from the scene's y axis (north) */
-    double lat_deg, lon_deg, height_m; /* of the head's origin */
+    double position_m[3];                    /* of the head's origin in the scene frame */
+    int has_position;                        /* 0: it follows from the place on the Earth, through the anchor */
+    double heading_deg, pitch_deg, roll_deg; /* cast_attitude */
+    double instrument_height_m;              /* of the head's origin above the floor below position_m */
+    int has_instrument_height;
+    enum config_place place;
+    double lat_deg, lon_deg, height_m; /* of the head's origin; height_m also with PLACE_UTM */
+    uint32_t utm_zone;                 /* 0: UPS */
+    int north;                         /* hemisphere */
+    double easting_m, northing_m;
+    double ecef_m[3];
 };
 
 enum config_platform_kind { PLATFORM_STATIC, PLATFORM_TRAJECTORY, PLATFORM_LIVE };
@@ -80,6 +101,7 @@ struct config {
     uint32_t n_meshes;
     double scene_tolerance_m;
     int order_exactly; /* surfaces that overlap are ordered in double */
+    struct config_anchor anchor;
     /* stations */
     struct config_station station[CONFIG_MAX_STATIONS];
     uint32_t n_stations;

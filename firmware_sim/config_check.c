@@ -10,15 +10,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-static int is_given(const struct cfg_reader *rd, const char *path, uint32_t item)
-{
-    return rd->line[cfg_row(rd, cfg_find(&rd->table, path))][item] != 0;
-}
-
 /* Of two keys that contradict, the one to name: the first unless only the second was given. */
 static const char *given_of(const struct cfg_reader *rd, const char *first, const char *second)
 {
-    return !is_given(rd, first, 0) && is_given(rd, second, 0) ? second : first;
+    return !cfg_is_given(rd, first, 0) && cfg_is_given(rd, second, 0) ? second : first;
 }
 
 static double from_micro(int64_t micro)
@@ -94,18 +89,10 @@ static int check_mesh(const struct cfg_reader *rd, const struct config_mesh *mes
     return SH_OK;
 }
 
-static int check_stations(const struct cfg_reader *rd, struct config *cfg)
+static int check_names(const struct cfg_reader *rd, struct config *cfg)
 {
-    static const char *const geodetic[] = {"stations[].lat_deg", "stations[].lon_deg", "stations[].height_m"};
     for (uint32_t i = 0; i < cfg->n_stations; i++) {
         struct config_station *station = &cfg->station[i];
-        for (int k = 0; k < 3 && cfg->crs != GEOREF_LOCAL; k++) {
-            if (is_given(rd, geodetic[k], i)) continue;
-            const struct cfg_key *key = cfg_find(&rd->table, geodetic[k]);
-            return cfg_fail_key(rd, geodetic[k], i,
-                                "missing, and output.crs is not local; required, allowed %.10g to %.10g %s", key->min,
-                                key->max, key->unit);
-        }
         if (station->name[0] == '\0') snprintf(station->name, sizeof station->name, "station-%u", i + 1);
         for (uint32_t k = 0; k < i; k++)
             if (strcmp(cfg->station[k].name, station->name) == 0)
@@ -150,7 +137,7 @@ static int check_link(const struct cfg_reader *rd, const struct config *cfg, uin
     const struct link_spec *link = &cfg->link[i];
     const char *type = cfg_find(&rd->table, "links[].type")->names[link->type];
     for (size_t k = 0; k < sizeof keys / sizeof keys[0]; k++)
-        if (is_given(rd, keys[k].path, i) && !(keys[k].types & 1u << link->type))
+        if (cfg_is_given(rd, keys[k].path, i) && !(keys[k].types & 1u << link->type))
             return cfg_fail_key(rd, keys[k].path, i, "a %s link has no such key; allowed %s", type, has[link->type]);
     if (link->type == LINK_FILE && link->path[0] == '\0')
         return cfg_fail_key(rd, "links[].path", i, "missing; required for a file link is the file to write");
@@ -186,7 +173,7 @@ static int check_platform(const struct cfg_reader *rd, const struct config *cfg)
     };
     const struct config_platform *p = &cfg->platform;
     for (size_t k = 0; k < sizeof keys / sizeof keys[0]; k++)
-        if (is_given(rd, keys[k].path, 0) && !(keys[k].kinds & 1u << p->kind))
+        if (cfg_is_given(rd, keys[k].path, 0) && !(keys[k].kinds & 1u << p->kind))
             return cfg_fail_key(rd, keys[k].path, 0, "a %s platform has no such key; allowed %s",
                                 cfg_find(&rd->table, "platform.kind")->names[p->kind], has[p->kind]);
     if (p->kind == PLATFORM_LIVE && cfg->pace == PACE_FAST)
@@ -214,7 +201,8 @@ int cfg_check(const struct cfg_reader *rd, struct config *cfg)
     if (code == SH_OK) code = check_head(rd, cfg);
     for (uint32_t i = 0; i < cfg->n_meshes && code == SH_OK; i++)
         code = check_mesh(rd, &cfg->mesh[i], i);
-    if (code == SH_OK) code = check_stations(rd, cfg);
+    if (code == SH_OK) code = cfg_check_places(rd, cfg);
+    if (code == SH_OK) code = check_names(rd, cfg);
     if (code == SH_OK) code = check_output(rd, cfg);
     if (code == SH_OK) code = check_platform(rd, cfg);
     for (uint32_t i = 0; i < cfg->n_links && code == SH_OK; i++)

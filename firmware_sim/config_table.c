@@ -16,6 +16,9 @@
 
 static const char *const up_names[] = {[SCENE_UP_Z] = "z", [SCENE_UP_Y] = "y", NULL};
 static const char *const crs_names[] = {[GEOREF_LOCAL] = "local", [GEOREF_ECEF] = "ecef", [GEOREF_UTM] = "utm", NULL};
+static const char *const anchor_names[] = {[ANCHOR_NONE] = "none", [ANCHOR_EXPLICIT] = "explicit", [ANCHOR_IFC] = "ifc",
+                                           [ANCHOR_UTM] = "utm",   [ANCHOR_ECEF] = "ecef",         NULL};
+static const char *const hemisphere_names[] = {"south", "north", NULL};
 static const char *const layout_names[] = {[LINE_POLAR] = "polar", [LINE_GEO] = "geo", NULL};
 static const char *const link_names[] = {
     [LINK_NULL] = "null", [LINK_FILE] = "file", [LINK_PTY] = "pty", [LINK_TCP] = "tcp", NULL};
@@ -74,20 +77,54 @@ static const struct cfg_key config_keys[] = {
     {"scene.meshes[].cycle_s", CFG_REAL, "s", "0", 0, 86400, IN_MESH(cycle_s),
      .help = "Motion goes forth and back within this time; 0: on and on."},
 
+    {"scene.anchor", CFG_MAP, .help = "How the scene lies on the Earth; all stations follow from it."},
+    {"scene.anchor.source", CFG_ENUM, .def = "none", .names = anchor_names, IN_CONFIG(anchor.source),
+     .help = "none: each station stands for itself; explicit: origin_m is at lat_deg, lon_deg, height_m; ifc: as the IFC "
+             "mesh's IFCSITE says; utm, ecef: the meshes' own coordinates are UTM (or UPS), ECEF."},
+    {"scene.anchor.origin_m", CFG_VEC3, "m", "[0, 0, 0]", -1e9, 1e9, IN_CONFIG(anchor.origin_m),
+     .help = "explicit: the scene's point that lies at lat_deg, lon_deg, height_m."},
+    {"scene.anchor.lat_deg", CFG_REAL, "deg", "", -90, 90, IN_CONFIG(anchor.lat_deg), .help = "explicit: its latitude, WGS 84."},
+    {"scene.anchor.lon_deg", CFG_REAL, "deg", "", -180, 180, IN_CONFIG(anchor.lon_deg), .help = "explicit: its longitude."},
+    {"scene.anchor.height_m", CFG_REAL, "m", "", -1000, 10000, IN_CONFIG(anchor.height_m),
+     .help = "explicit: its height above the ellipsoid; ifc: the same, in place of RefElevation, which counts from the sea."},
+    {"scene.anchor.north_deg", CFG_REAL, "deg", "0", -360, 360, IN_CONFIG(anchor.north_deg),
+     .help = "explicit: where true north lies, clockwise from the scene's y axis."},
+    {"scene.anchor.utm_zone", CFG_COUNT, NULL, "", 0, 60, IN_CONFIG(anchor.utm_zone),
+     .help = "utm: zone of the meshes' coordinates; 0: UPS. Required there."},
+    {"scene.anchor.hemisphere", CFG_ENUM, .def = "", .names = hemisphere_names, IN_CONFIG(anchor.north),
+     .help = "utm: where their northing counts from. Required there."},
+
     {"stations", CFG_LIST, .min = 1, .max = CONFIG_MAX_STATIONS, LIST_OF(station, n_stations),
      .help = "Places where the head can stand."},
     {"stations[]", CFG_MAP, .help = "A station."},
     {"stations[].name", CFG_TEXT, .def = "", IN_STATION(name), .help = "Name; station-N when not given."},
-    {"stations[].position_m", CFG_VEC3, "m", NULL, -1e9, 1e9, IN_STATION(position_m),
-     .help = "The head's origin in the scene frame."},
+    {"stations[].position_m", CFG_VEC3, "m", "", -1e9, 1e9, IN_STATION(position_m),
+     .help = "The head's origin in the scene frame; required, unless scene.anchor gives it from the place on the Earth."},
+    {"stations[].instrument_height_m", CFG_REAL, "m", "", 0, 1000, IN_STATION(instrument_height_m),
+     .help = "The head's origin stands this high above the first surface below its place; z (or the height) then is only "
+             "where the search downward begins, with 1 cm to spare."},
     {"stations[].heading_deg", CFG_REAL, "deg", "0", -360, 360, IN_STATION(heading_deg),
-     .help = "Of the head's y axis, clockwise from the scene's y axis (north)."},
-    {"stations[].lat_deg", CFG_REAL, "deg", "0", -90, 90, IN_STATION(lat_deg),
-     .help = "Geodetic latitude of the head's origin, WGS 84; required unless output.crs is local."},
-    {"stations[].lon_deg", CFG_REAL, "deg", "0", -180, 180, IN_STATION(lon_deg),
-     .help = "Longitude; required unless output.crs is local."},
-    {"stations[].height_m", CFG_REAL, "m", "0", -1000, 10000, IN_STATION(height_m),
-     .help = "Height above the ellipsoid; required unless output.crs is local."},
+     .help = "Of the head's y axis, clockwise from the scene's y axis: north without scene.anchor, grid north with utm, "
+             "true north with ecef."},
+    {"stations[].pitch_deg", CFG_REAL, "deg", "0", -90, 90, IN_STATION(pitch_deg),
+     .help = "After the heading, about the head's x axis: the y axis (forward) rises."},
+    {"stations[].roll_deg", CFG_REAL, "deg", "0", -180, 180, IN_STATION(roll_deg),
+     .help = "After the pitch, about the head's y axis: the x axis (right) sinks."},
+    {"stations[].lat_deg", CFG_REAL, "deg", "", -90, 90, IN_STATION(lat_deg),
+     .help = "Geodetic latitude of the head's origin, WGS 84. A place on the Earth, in one form, is required without "
+             "scene.anchor unless output.crs is local."},
+    {"stations[].lon_deg", CFG_REAL, "deg", "", -180, 180, IN_STATION(lon_deg), .help = "Longitude; with lat_deg."},
+    {"stations[].height_m", CFG_REAL, "m", "", -1000, 10000, IN_STATION(height_m),
+     .help = "Height above the ellipsoid; with lat_deg or easting_m."},
+    {"stations[].utm_zone", CFG_COUNT, NULL, "", 0, 60, IN_STATION(utm_zone),
+     .help = "UTM zone, 0: UPS; with easting_m. That of a scene.anchor of source utm when not given."},
+    {"stations[].hemisphere", CFG_ENUM, .def = "", .names = hemisphere_names, IN_STATION(north),
+     .help = "Of the zone; as utm_zone."},
+    {"stations[].easting_m", CFG_REAL, "m", "", -1e7, 1e7, IN_STATION(easting_m),
+     .help = "UTM or UPS easting of the head's origin, with false origin."},
+    {"stations[].northing_m", CFG_REAL, "m", "", -1e7, 2e7, IN_STATION(northing_m), .help = "Northing; with easting_m."},
+    {"stations[].ecef_m", CFG_VEC3, "m", "", -1e7, 1e7, IN_STATION(ecef_m),
+     .help = "The head's origin in ECEF, WGS 84: X, Y, Z."},
 
     {"platform", CFG_MAP, .help = "What the head stands on: a tripod, or something that moves."},
     {"platform.kind", CFG_ENUM, .def = "static", .names = platform_names, IN_CONFIG(platform.kind),

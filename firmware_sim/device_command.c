@@ -142,7 +142,7 @@ static int set_limits(struct device *device, struct sh_err *err)
     device->cmd.idn = device->idn;
     device->cmd.step_allowed = cfg->pace == PACE_STEP;
     device->cmd.pose_allowed = cfg->platform.kind == PLATFORM_LIVE;
-    memcpy(device->cmd.pose_centre_m, cfg->station[0].position_m, sizeof device->cmd.pose_centre_m);
+    memcpy(device->cmd.pose_centre_m, device->site->station[0].at.position_m, sizeof device->cmd.pose_centre_m);
     device->cmd.pose_reach_m = cfg->platform.reach_m;
     return SH_OK;
 }

@@ -70,11 +70,11 @@ void device_fill_anchor(const struct device *device, struct native_anchor *a)
     a->station = device->station + 1;
     georef_anchor(s->georef, a->anchor);
     a->scale_m = device->site->scale_m;
-    a->lat_deg = s->station->lat_deg;
-    a->lon_deg = s->station->lon_deg;
-    a->height_m = s->station->height_m;
-    memcpy(a->station_m, s->station->position_m, sizeof a->station_m);
-    memcpy(a->rotation, s->rotation, sizeof a->rotation);
+    a->lat_deg = s->at.lat_deg;
+    a->lon_deg = s->at.lon_deg;
+    a->height_m = s->at.height_m;
+    memcpy(a->station_m, s->at.position_m, sizeof a->station_m);
+    memcpy(a->rotation, s->at.rotation, sizeof a->rotation);
     a->moving = (uint32_t)device->site->moving;
 }
 

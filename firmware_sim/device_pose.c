@@ -26,7 +26,7 @@ static const struct pose *sample_pose(const struct device_live *live, uint64_t i
 
 static int is_near(const struct device *device, const struct pose *pose)
 {
-    const double *station_m = device->site->cfg->station[0].position_m;
+    const double *station_m = device->site->station[0].at.position_m;
     double d2 = 0.0;
     for (int i = 0; i < 3; i++)
         d2 += (pose->position_m[i] - station_m[i]) * (pose->position_m[i] - station_m[i]);
@@ -94,9 +94,9 @@ static void make_knot(struct device *device, int64_t t_ns, struct pose_knot *kno
     const struct site *site = device->site;
     *knot = (struct pose_knot){.t_ns = t_ns};
     if (device->live.n == 0) {
-        const struct config_station *station = site->station[device->station].station;
-        memcpy(knot->pose.position_m, station->position_m, sizeof station->position_m);
-        pose_from_angles(station->heading_deg * M_PI / 180.0, 0.0, 0.0, knot->pose.quat);
+        const struct placement *at = &site->station[device->station].at;
+        memcpy(knot->pose.position_m, at->position_m, sizeof at->position_m);
+        pose_from_matrix(at->rotation, knot->pose.quat);
         knot->flags = POSE_NONE;
         return;
     }

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/locate.h"
 #include "core/rng.h"
 
 static int is_moving(const struct config_mesh *mesh)
@@ -103,11 +104,11 @@ static double distance_m(const double a[3], const double b[3])
 }
 
 /* How far the stations that will share a BVH lie from its origin. */
-static double station_reach(const struct config *cfg, const double origin_m[3])
+static double station_reach(const struct site *site, const double origin_m[3])
 {
     double reach_m = 0.0;
-    for (uint32_t i = 0; i < cfg->n_stations; i++) {
-        double d = distance_m(cfg->station[i].position_m, origin_m);
+    for (uint32_t i = 0; i < site->cfg->n_stations; i++) {
+        double d = distance_m(site->station[i].at.position_m, origin_m);
         if (d <= SITE_BVH_REACH_M && d > reach_m) reach_m = d;
     }
     return reach_m;
@@ -124,34 +125,54 @@ static int find_bvh(struct site *site, const double station_m[3], const struct s
             return SH_OK;
         }
     }
-    int rc =
-        bvh_create(site->scene, station_m, station_reach(site->cfg, station_m), site->cfg->threads, report, out, err);
+    int rc = bvh_create(site->scene, station_m, station_reach(site, station_m), site->cfg->threads, report, out, err);
     if (rc != SH_OK) return rc;
     site->bvh[site->n_bvh++] = *out;
     return site->cfg->order_exactly ? bvh_order_exactly(*out, err) : SH_OK;
 }
 
-static int add_station(struct site *site, const struct config_station *station, const struct sh_report *report,
-                       struct sh_err *err)
+/* All places are known before the first BVH is built. */
+static int place_stations(struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    int rc = placement_find_anchor(site->cfg, report, &site->anchor, err);
+    for (uint32_t i = 0; i < site->cfg->n_stations && rc == SH_OK; i++)
+        rc = placement_find(site->cfg, i, &site->anchor, site->scene, &site->station[i].at, err);
+    return rc;
+}
+
+int site_utm_zone(const struct site *site)
+{
+    const struct geoframe *frame = &site->anchor.frame;
+    const struct placement *first = &site->station[0].at;
+    struct locate_grid utm;
+    if (site->cfg->utm_zone != 0 || !site->anchor.known || frame->kind == GEOFRAME_GRID) return site->cfg->utm_zone;
+    int tangent = frame->kind == GEOFRAME_TANGENT;
+    const struct georef_place at = {tangent ? frame->lat_deg : first->lat_deg,
+                                    tangent ? frame->lon_deg : first->lon_deg, 0.0};
+    int rc = locate_in_grid(&at, 0, &utm, NULL);
+    return rc == SH_OK ? utm.zone : 0;
+}
+
+static int add_station(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
-    struct site_station *s = &site->station[site->n_stations];
-    struct georef_spec spec = {.crs = cfg->crs,
-                               .utm_zone = cfg->utm_zone,
-                               .lat_deg = station->lat_deg,
-                               .lon_deg = station->lon_deg,
-                               .height_m = station->height_m};
-    memcpy(spec.station_m, station->position_m, sizeof spec.station_m);
-    s->station = station;
-    cast_rotation(station->heading_deg * M_PI / 180.0, s->rotation);
-    int rc = SH_OK;
+    uint32_t i = site->n_stations;
+    struct site_station *s = &site->station[i];
+    struct georef_spec spec = {.crs = cfg->crs, .utm_zone = site_utm_zone(site)};
+    s->station = &cfg->station[i];
+    int rc = placement_georef(&s->at, &site->anchor, &spec, err);
     if (site->moving)
         s->bvh = site->bvh[0];
-    else
-        rc = find_bvh(site, station->position_m, report, &s->bvh, err);
+    else if (rc == SH_OK)
+        rc = find_bvh(site, s->at.position_m, report, &s->bvh, err);
     if (rc == SH_OK) rc = georef_create(&spec, &s->georef, err);
-    if (rc == SH_OK) site->n_stations++;
-    return rc;
+    if (rc != SH_OK) return rc;
+    site->n_stations++;
+    int epsg = georef_epsg(s->georef), first = georef_epsg(site->station[0].georef);
+    if (epsg != first)
+        sh_warn(report, "%s: station %s is in EPSG %d, station %s in %d: their points do not fit together", cfg->file,
+                s->station->name, epsg, site->station[0].station->name, first);
+    return SH_OK;
 }
 
 /* The finest 1e-6 x 10^n m with which the head's whole range, from all of its path, fits into 31 bits, with 1 % left
@@ -183,11 +204,12 @@ int site_load(const struct config *cfg, const struct sh_report *report, struct s
     site->cfg = cfg;
     site->moving = cfg->platform.kind != PLATFORM_STATIC;
     int rc = load_scene(site, report, err);
+    if (rc == SH_OK) rc = place_stations(site, report, err);
     if (rc == SH_OK && site->moving) rc = site_load_platform(site, report, err);
     site->scale_m = choose_scale(cfg, site->path_reach_m);
     if (rc == SH_OK) rc = check_path_fits(site, err);
     for (uint32_t i = 0; i < cfg->n_stations && rc == SH_OK; i++)
-        rc = add_station(site, &cfg->station[i], report, err);
+        rc = add_station(site, report, err);
     if (rc != SH_OK) {
         site_free(site);
         return rc;
@@ -225,8 +247,8 @@ void site_cast_setup(const struct site *site, uint32_t station, struct cast_setu
     memset(setup, 0, sizeof *setup);
     setup->bvh = s->bvh;
     setup->georef = s->georef;
-    memcpy(setup->station_m, s->station->position_m, sizeof setup->station_m);
-    memcpy(setup->rotation, s->rotation, sizeof setup->rotation);
+    memcpy(setup->station_m, s->at.position_m, sizeof setup->station_m);
+    memcpy(setup->rotation, s->at.rotation, sizeof setup->rotation);
     setup->range_min_m = profile->range_min_m;
     setup->range_max_m = profile->range_max_m;
     setup->noise_on = site->cfg->noise_on;

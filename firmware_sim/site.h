@@ -8,12 +8,13 @@
 #include "core/pose.h"
 #include "core/scene.h"
 #include "firmware_sim/config.h"
+#include "firmware_sim/placement.h"
 
 struct site_station {
     const struct config_station *station;
     struct bvh *bvh; /* shared where stations are near each other */
     struct georef *georef;
-    double rotation[9]; /* socs -> prcs */
+    struct placement at;
 };
 
 struct site_mover {
@@ -32,6 +33,7 @@ struct site_stretch {
 struct site {
     const struct config *cfg;
     struct scene *scene; /* what stands still */
+    struct placement_anchor anchor;
     struct site_mover mover[CAST_MAX_MOVERS];
     uint32_t n_movers, n_surfaces; /* surfaces of the scene, then of the movers */
     struct bvh *bvh[CONFIG_MAX_STATIONS];
@@ -56,6 +58,10 @@ struct site {
 /* cfg must outlive the site. */
 int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err);
 void site_free(struct site *site);
+
+/* UTM zone for all stations of an anchored scene: that of the anchor, or of the first station; else, and where
+ * output.utm_zone or the scene's own grid says it, as the configuration has it (0: by position). */
+int site_utm_zone(const struct site *site);
 
 /* Names of a label below n_surfaces. */
 const struct scene_surface *site_surface(const struct site *site, uint32_t label);

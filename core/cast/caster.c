@@ -79,11 +79,27 @@ void caster_get_counters(const struct caster *caster, struct cast_counters *coun
     *counters = caster->counters;
 }
 
+void cast_attitude(double heading_rad, double pitch_rad, double roll_rad, double rotation[9])
+{
+    double sh = sin(heading_rad), ch = cos(heading_rad), sp = sin(pitch_rad), cp = cos(pitch_rad);
+    double sr = sin(roll_rad), cr = cos(roll_rad);
+    const double r[9] = {ch * cr + sh * sp * sr,
+                         sh * cp,
+                         ch * sr - sh * sp * cr,
+                         -sh * cr + ch * sp * sr,
+                         ch * cp,
+                         -sh * sr - ch * sp * cr,
+                         -cp * sr,
+                         sp,
+                         cp * cr};
+    memcpy(rotation, r, sizeof r);
+}
+
 void cast_rotation(double heading_rad, double rotation[9])
 {
-    double s = sin(heading_rad), c = cos(heading_rad);
-    const double r[9] = {c, s, 0.0, -s, c, 0.0, 0.0, 0.0, 1.0};
-    memcpy(rotation, r, sizeof r);
+    cast_attitude(heading_rad, 0.0, 0.0, rotation);
+    for (int i = 0; i < 9; i++)
+        rotation[i] += 0.0; /* no negative zeros */
 }
 
 uint32_t cast_encoder_count(double turn, double counts_per_turn)

@@ -66,6 +66,45 @@ void shim_ecef(double lat_deg, double lon_deg, double height_m, double p_ecef[3]
     }
 }
 
+void shim_locate_ecef(const double p_ecef[3], double place[3])
+{
+    try {
+        Geocentric::WGS84().Reverse(p_ecef[0], p_ecef[1], p_ecef[2], place[0], place[1], place[2]);
+    } catch (...) {
+        place[0] = place[1] = place[2] = nan_m;
+    }
+}
+
+/* Runs what may throw; the reason becomes a text. */
+template <typename F> static int attempt(char *why, size_t len, F f)
+{
+    try {
+        f();
+        return 0;
+    } catch (const std::exception &e) {
+        std::snprintf(why, len, "%s", e.what());
+    } catch (...) {
+        std::snprintf(why, len, "unknown failure in GeographicLib");
+    }
+    return -1;
+}
+
+int shim_locate_utm(int zone, int north, const double grid[2], double lat_lon_deg[2], char *why, size_t len)
+{
+    return attempt(why, len,
+                   [&] { UTMUPS::Reverse(zone, north != 0, grid[0], grid[1], lat_lon_deg[0], lat_lon_deg[1]); });
+}
+
+int shim_to_utm(const double lat_lon_deg[2], int *zone, int *north, double grid[2], char *why, size_t len)
+{
+    return attempt(why, len, [&] {
+        bool n = false;
+        UTMUPS::Forward(lat_lon_deg[0], lat_lon_deg[1], *zone, n, grid[0], grid[1],
+                        *zone == 0 ? int(UTMUPS::STANDARD) : *zone);
+        *north = n;
+    });
+}
+
 struct shim_grid *shim_grid_create(double lat_deg, double lon_deg, double height_m, int zone, char *why, size_t len)
 {
     struct shim_grid *grid = nullptr;
@@ -144,4 +183,27 @@ void shim_grid_reverse(const struct shim_grid *grid, const double d_grid[3], dou
     } catch (...) {
         d_local[0] = d_local[1] = d_local[2] = nan_m;
     }
+}
+
+void shim_grid_to_local(const struct shim_grid *grid, size_t n, const double *dx, const double *dy, const double *dz,
+                        double *out_x, double *out_y, double *out_z)
+{
+    for (size_t i = 0; i < n; i++) {
+        double d_local[3];
+        const double d_grid[3] = {dx[i], dy[i], dz[i]};
+        shim_grid_reverse(grid, d_grid, d_local);
+        out_x[i] = d_local[0];
+        out_y[i] = d_local[1];
+        out_z[i] = d_local[2];
+    }
+}
+
+int shim_utm_forward(double lat_deg, double lon_deg, int zone, struct shim_utm *out, char *why, size_t len)
+{
+    return attempt(why, len, [&] {
+        bool north = false;
+        UTMUPS::Forward(lat_deg, lon_deg, out->zone, north, out->easting_m, out->northing_m, out->convergence_deg,
+                        out->scale, zone == 0 ? int(UTMUPS::STANDARD) : zone);
+        out->north = north;
+    });
 }

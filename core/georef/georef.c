@@ -5,6 +5,8 @@
 #include <string.h>
 
 #include "core/georef/geographiclib_shim.h"
+#include "core/mat3.h"
+#include "core/vec3.h"
 
 /* Lowest land and sea bed to the edge of space: beyond, a unit or a sign is wrong. */
 #define HEIGHT_MIN_M (-12000.0)
@@ -16,6 +18,10 @@ struct georef {
     double anchor[3];
     double rotation[9]; /* ecef: east, north, up -> X, Y, Z, row by row */
     struct shim_grid *grid;
+    /* prcs -> east, north, up at the station comes first: nothing, a rotation, or out of a grid */
+    enum { PRCS_TANGENT, PRCS_TURNED, PRCS_GRID, PRCS_IS_CRS } prcs;
+    double turn[9];
+    struct shim_grid *prcs_grid;
     int epsg;
 };
 
@@ -52,6 +58,64 @@ static int set_up_utm(struct georef *georef, const struct georef_spec *spec, str
     return SH_OK;
 }
 
+/* What differs from a unit matrix is wrong by more than rounding. */
+static int check_rotation(const double r[9], struct sh_err *err)
+{
+    for (int i = 0; i < 9; i++) {
+        int row = i / 3, other = i % 3;
+        double dot = vec3_dot(r + 3 * row, r + 3 * other);
+        if (!(fabs(dot - (row == other)) <= 1e-9))
+            return sh_fail(err, SH_EINPUT, "georef: the rotation of the scene frame is none");
+    }
+    return SH_OK;
+}
+
+static int set_up_grid_prcs(struct georef *georef, const struct georef_spec *spec, struct sh_err *err)
+{
+    char why[256] = "";
+    if (spec->prcs_zone < 0 || spec->prcs_zone > 60)
+        return sh_fail(err, SH_EINPUT, "georef: zone %d of the scene frame; allowed 1 to 60, or 0: UPS",
+                       spec->prcs_zone);
+    int epsg = spec->prcs_zone == 0 ? (spec->prcs_north ? 32661 : 32761)
+                                    : (spec->prcs_north ? 32600 : 32700) + spec->prcs_zone;
+    if (spec->crs == GEOREF_UTM && (spec->utm_zone == 0 || spec->utm_zone == spec->prcs_zone)) {
+        georef->prcs = PRCS_IS_CRS;
+        memcpy(georef->anchor, spec->station_m, sizeof georef->anchor);
+        georef->epsg = epsg;
+        return SH_OK;
+    }
+    georef->prcs = PRCS_GRID;
+    georef->prcs_grid =
+        shim_grid_create(spec->lat_deg, spec->lon_deg, spec->height_m, spec->prcs_zone, why, sizeof why);
+    int ups = georef->prcs_grid != NULL && shim_grid_epsg(georef->prcs_grid) % 100 == 61;
+    if (georef->prcs_grid != NULL && ups == (spec->prcs_zone == 0)) return SH_OK;
+    return sh_fail(err, SH_EINPUT, "georef: the scene's grid does not reach latitude %g, longitude %g%s%s%s",
+                   spec->lat_deg, spec->lon_deg, why[0] != '\0' ? " (" : "", why, why[0] != '\0' ? ")" : "");
+}
+
+static int set_up_prcs(struct georef *georef, const struct georef_spec *spec, struct sh_err *err)
+{
+    static const double none[9];
+    if (spec->crs == GEOREF_LOCAL) return SH_OK;
+    if (spec->prcs_is_grid) return set_up_grid_prcs(georef, spec, err);
+    if (memcmp(spec->rotation, none, sizeof none) == 0) return SH_OK;
+    georef->prcs = PRCS_TURNED;
+    memcpy(georef->turn, spec->rotation, sizeof georef->turn);
+    return check_rotation(georef->turn, err);
+}
+
+static void set_up_ecef(struct georef *georef, const struct georef_spec *spec)
+{
+    double enu[9];
+    shim_ecef(spec->lat_deg, spec->lon_deg, spec->height_m, georef->anchor, enu);
+    memcpy(georef->rotation, enu, sizeof enu);
+    if (georef->prcs == PRCS_TURNED) {
+        mat3_multiply(enu, georef->turn, georef->rotation);
+        georef->prcs = PRCS_TANGENT; /* it is part of the rotation now */
+    }
+    georef->epsg = 4978;
+}
+
 int georef_create(const struct georef_spec *spec, struct georef **out, struct sh_err *err)
 {
     int rc = check_spec(spec, err);
@@ -60,17 +124,18 @@ int georef_create(const struct georef_spec *spec, struct georef **out, struct sh
     if (georef == NULL) return sh_fail(err, SH_ENOMEM, "georef: no memory");
     georef->crs = spec->crs;
     memcpy(georef->station_m, spec->station_m, sizeof georef->station_m);
-    switch (spec->crs) {
+    rc = set_up_prcs(georef, spec, err);
+    switch (rc == SH_OK ? spec->crs : GEOREF_LOCAL) {
     case GEOREF_LOCAL:
         memcpy(georef->anchor, spec->station_m, sizeof georef->anchor);
         break;
     case GEOREF_ECEF:
-        shim_ecef(spec->lat_deg, spec->lon_deg, spec->height_m, georef->anchor, georef->rotation);
-        georef->epsg = 4978;
+        set_up_ecef(georef, spec);
         break;
     case GEOREF_UTM:
-        rc = set_up_utm(georef, spec, err);
+        if (georef->prcs != PRCS_IS_CRS) rc = set_up_utm(georef, spec, err);
         break;
+    case GEOREF_GEODETIC:
     default:
         rc =
             sh_fail(err, SH_EINPUT, "georef: coordinate reference system %d; allowed local, ecef, utm", (int)spec->crs);
@@ -87,6 +152,7 @@ void georef_free(struct georef *georef)
 {
     if (georef == NULL) return;
     shim_grid_free(georef->grid);
+    shim_grid_free(georef->prcs_grid);
     free(georef);
 }
 
@@ -102,9 +168,8 @@ int georef_epsg(const struct georef *georef)
 
 int georef_rotation(const struct georef *georef, double rotation[9])
 {
-    static const double same[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
-    if (georef->crs == GEOREF_UTM) return 0;
-    memcpy(rotation, georef->crs == GEOREF_ECEF ? georef->rotation : same, sizeof same);
+    if (georef->prcs == PRCS_GRID || (georef->crs == GEOREF_UTM && georef->prcs != PRCS_IS_CRS)) return 0;
+    memcpy(rotation, georef->crs == GEOREF_ECEF ? georef->rotation : mat3_unit, sizeof mat3_unit);
     return 1;
 }
 
@@ -122,7 +187,16 @@ static void rotate(const double r[9], size_t n, const double *dx, const double *
 void georef_forward(const struct georef *georef, size_t n, const double *dx, const double *dy, const double *dz,
                     double *out_x, double *out_y, double *out_z)
 {
-    switch (georef->crs) {
+    if (georef->prcs == PRCS_TURNED || georef->prcs == PRCS_GRID) {
+        if (georef->prcs == PRCS_TURNED)
+            rotate(georef->turn, n, dx, dy, dz, out_x, out_y, out_z);
+        else
+            shim_grid_to_local(georef->prcs_grid, n, dx, dy, dz, out_x, out_y, out_z);
+        dx = out_x;
+        dy = out_y;
+        dz = out_z;
+    }
+    switch (georef->prcs == PRCS_IS_CRS ? GEOREF_LOCAL : georef->crs) {
     case GEOREF_LOCAL:
         memmove(out_x, dx, n * sizeof *out_x);
         memmove(out_y, dy, n * sizeof *out_y);
@@ -131,6 +205,7 @@ void georef_forward(const struct georef *georef, size_t n, const double *dx, con
     case GEOREF_ECEF:
         rotate(georef->rotation, n, dx, dy, dz, out_x, out_y, out_z);
         break;
+    case GEOREF_GEODETIC:
     case GEOREF_UTM:
         shim_grid_forward(georef->grid, n, dx, dy, dz, out_x, out_y, out_z);
         break;
@@ -139,14 +214,14 @@ void georef_forward(const struct georef *georef, size_t n, const double *dx, con
 
 void georef_reverse(const struct georef *georef, const double d_crs[3], double p_prcs[3])
 {
-    double d[3] = {d_crs[0], d_crs[1], d_crs[2]};
-    if (georef->crs == GEOREF_UTM) {
-        shim_grid_reverse(georef->grid, d_crs, d);
-    } else if (georef->crs == GEOREF_ECEF) {
-        const double *r = georef->rotation;
-        for (int i = 0; i < 3; i++)
-            d[i] = r[i] * d_crs[0] + r[i + 3] * d_crs[1] + r[i + 6] * d_crs[2];
-    }
+    double enu[3] = {d_crs[0], d_crs[1], d_crs[2]}, d[3];
+    if (georef->crs == GEOREF_UTM && georef->prcs != PRCS_IS_CRS)
+        shim_grid_reverse(georef->grid, d_crs, enu);
+    else if (georef->crs == GEOREF_ECEF)
+        mat3_apply_transposed(georef->rotation, d_crs, enu);
+    memcpy(d, enu, sizeof d);
+    if (georef->prcs == PRCS_TURNED) mat3_apply_transposed(georef->turn, enu, d);
+    if (georef->prcs == PRCS_GRID) shim_grid_forward(georef->prcs_grid, 1, &d[0], &d[1], &d[2], &d[0], &d[1], &d[2]);
     for (int i = 0; i < 3; i++)
         p_prcs[i] = georef->station_m[i] + d[i];
 }

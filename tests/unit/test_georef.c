@@ -23,7 +23,12 @@
 
 static struct georef *make(enum georef_crs crs, double lat_deg, double lon_deg, double height_m, int zone)
 {
-    struct georef_spec spec = {crs, {10, 20, 30}, lat_deg, lon_deg, height_m, zone};
+    struct georef_spec spec = {.crs = crs,
+                               .station_m = {10, 20, 30},
+                               .lat_deg = lat_deg,
+                               .lon_deg = lon_deg,
+                               .height_m = height_m,
+                               .utm_zone = zone};
     struct georef *georef = NULL;
     struct sh_err err = {0, ""};
     if (georef_create(&spec, &georef, &err) != SH_OK) fail_msg("%s", err.text);
@@ -244,7 +249,8 @@ static void test_borders(void **state)
               {83.9999, 9, 0}, {84, 9, 0},   {-80, 9, 0},   {0, 17.0, 31}};
     for (size_t i = 0; i < sizeof at / sizeof at[0]; i++) {
         struct sh_err err = {0, ""};
-        struct georef_spec spec = {GEOREF_UTM, {0, 0, 0}, at[i].lat_deg, at[i].lon_deg, 0, at[i].zone};
+        struct georef_spec spec = {
+            .crs = GEOREF_UTM, .lat_deg = at[i].lat_deg, .lon_deg = at[i].lon_deg, .utm_zone = at[i].zone};
         struct georef *georef = NULL;
         if (at[i].zone != 0) { /* as far east of the central meridian as is allowed */
             double low = 3, high = 17;
@@ -301,18 +307,18 @@ static void test_refusals(void **state)
         struct georef_spec spec;
         const char *part;
     } bad[] = {
-        {{GEOREF_ECEF, {0, 0, 0}, 90.001, 0, 0, 0}, "latitude 90.001 deg; allowed -90 to 90"},
-        {{GEOREF_ECEF, {0, 0, 0}, NAN, 0, 0, 0}, "latitude"},
-        {{GEOREF_UTM, {0, 0, 0}, 0, 361, 0, 0}, "longitude 361 deg; allowed -180 to 360"},
-        {{GEOREF_UTM, {0, 0, 0}, 0, -181, 0, 0}, "longitude"},
-        {{GEOREF_ECEF, {0, 0, 0}, 0, 0, 1e6, 0}, "height"},
-        {{GEOREF_ECEF, {0, 0, 0}, 0, 0, INFINITY, 0}, "height"},
-        {{GEOREF_UTM, {0, 0, 0}, 0, 0, 0, 61}, "zone 61; allowed 1 to 60"},
-        {{GEOREF_UTM, {0, 0, 0}, 0, 0, 0, -1}, "zone -1"},
-        {{GEOREF_UTM, {0, 0, 0}, 48, 16, 0, 10}, "zone 10 does not reach"},
-        {{GEOREF_UTM, {0, 0, 0}, 89, 16, 0, 33}, "zone 33 does not reach"},
-        {{GEOREF_LOCAL, {0, NAN, 0}, 0, 0, 0, 0}, "station position y"},
-        {{(enum georef_crs)7, {0, 0, 0}, 0, 0, 0, 0}, "allowed local, ecef, utm"},
+        {{.crs = GEOREF_ECEF, .lat_deg = 90.001}, "latitude 90.001 deg; allowed -90 to 90"},
+        {{.crs = GEOREF_ECEF, .lat_deg = NAN}, "latitude"},
+        {{.crs = GEOREF_UTM, .lon_deg = 361}, "longitude 361 deg; allowed -180 to 360"},
+        {{.crs = GEOREF_UTM, .lon_deg = -181}, "longitude"},
+        {{.crs = GEOREF_ECEF, .height_m = 1e6}, "height"},
+        {{.crs = GEOREF_ECEF, .height_m = INFINITY}, "height"},
+        {{.crs = GEOREF_UTM, .utm_zone = 61}, "zone 61; allowed 1 to 60"},
+        {{.crs = GEOREF_UTM, .utm_zone = -1}, "zone -1"},
+        {{.crs = GEOREF_UTM, .lat_deg = 48, .lon_deg = 16, .utm_zone = 10}, "zone 10 does not reach"},
+        {{.crs = GEOREF_UTM, .lat_deg = 89, .lon_deg = 16, .utm_zone = 33}, "zone 33 does not reach"},
+        {{.crs = GEOREF_LOCAL, .station_m = {0, NAN, 0}}, "station position y"},
+        {{.crs = (enum georef_crs)7}, "allowed local, ecef, utm"},
     };
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         struct georef *georef = NULL;
