@@ -125,14 +125,18 @@ bench: deps-build
 # Each program of the chart writes its panel's rows; the first one the head of the table.
 CHART = $(BUILD)/chart/speed_accuracy
 $(BUILD)/tests/bench/chart: tests/bench/chart.c tests/bench/reference.c $(BUILD)/modules.a
+$(BUILD)/tests/bench/chart_georef: tests/bench/chart_georef.c $(BUILD)/modules.a
+CHARTS = $(BUILD)/tests/bench/chart $(BUILD)/tests/bench/chart_georef
+$(CHARTS):
 	@mkdir -p $(@D)
 	@echo "  CHART $@"
 	$(Q)$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -o $@ $^ $(LDLIBS)
 chart: deps-build
 	$(call install_missing,$(DEPS_CHART))
-	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/chart
+	@$(MAKE) --no-print-directory -j2 $(CHARTS)
 	@mkdir -p $(BUILD)/chart
 	$(BUILD)/tests/bench/chart > $(CHART).csv
+	$(BUILD)/tests/bench/chart_georef >> $(CHART).csv
 	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)'" tests/bench/chart.gp
 objects: $(EVERYTHING)
 test-unit-programs: $(UNIT)

@@ -65,7 +65,8 @@ struct cast_setup {
     uint64_t noise_key;               /* rng_key(seed, RNG_RANGE) */
     double mirror_counts, pan_counts; /* encoder counts per turn; 2^32: ideal, positions take the true angle */
     enum line_layout layout;
-    double range_scale_m, xyz_scale_m;
+    double range_scale_m;
+    double xyz_scale[3]; /* units of the CRS per count, see georef_scale */
     uint32_t n_movers;
     struct cast_mover mover[CAST_MAX_MOVERS];
     /* A moving head: poses of the head (socs -> prcs) in order of time, pose_between them. They cover the firing times
@@ -80,6 +81,7 @@ struct cast_counters {
     uint64_t near_border; /* proposals near a border, looked at in double */
     uint64_t decided;     /* of these, not clearly inside the proposed triangle: all triangles around were asked */
     uint64_t went_on;     /* of these, nothing there after all: the ray went on behind */
+    uint64_t unfit;       /* echoes whose position did not fit into the wire's integers: sent as shots without echo */
     uint64_t undecided;   /* nearer to an edge than double precision can tell: counted as hit */
 };
 

@@ -24,7 +24,7 @@ static const char HELP[] =
     "  --empty-shots    keep shots without echo, with NaN coordinates\n"
     "  --stats FILE     write what was received as JSON; - is standard output\n"
     "  --set KEY=VALUE  any configuration key (CONFIG only); may be repeated\n"
-    "  --crs CRS        local, ecef or utm (CONFIG only)\n"
+    "  --crs CRS        local, ecef, utm or geodetic (CONFIG only)\n"
     "  --threads N      casters (CONFIG only)\n"
     "  --quiet          no progress\n\n"
     "Exit status 1 when the recording is not complete: the stream ended before the scan did, or frames or pulses were\n"

@@ -151,7 +151,8 @@ static void print_text(const struct report *r)
     print_length("95 %", s->p95_m);
     print_length("99.9 %", s->p999_m);
     print_length("max", s->max_m);
-    printf("%-10s point %zu at %.6f %.6f %.6f", "worst", s->worst + 1, p[0], p[1], p[2]);
+    int flat = r->cloud.epsg == 4979 ? 11 : 6; /* degrees, or metres */
+    printf("%-10s point %zu at %.*f %.*f %.6f", "worst", s->worst + 1, flat, p[0], flat, p[1], p[2]);
     if (surface != NULL) printf(" on %s | %s", surface->object, surface->material);
     printf("\n%-10s %zu farther than %g m\n", "beyond", s->beyond, r->tolerance_m);
     printf("%-10s %zu farther than %g m from everything\n", "far", s->far, r->max_m);

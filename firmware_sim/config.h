@@ -20,6 +20,7 @@
 
 enum { CONFIG_MAX_MESHES = 64, CONFIG_MAX_LINKS = 8, CONFIG_MAX_STATIONS = 64, CONFIG_PATH_LEN = 512 };
 
+enum config_heights { HEIGHTS_ELLIPSOID, HEIGHTS_GEOID, HEIGHTS_AUTO };
 enum config_pace { PACE_REALTIME, PACE_FAST, PACE_STEP };
 
 /* A head profile, config/heads/NAME.yaml: each figure is written `{ value: V, from: data sheet|assumed }`. */
@@ -110,7 +111,10 @@ struct config {
     enum georef_crs crs;
     int utm_zone;
     enum line_layout layout;
-    double scale_m; /* 0: the finest of 1e-6 x 10^n m that holds range_max_m in 31 bits */
+    enum config_heights heights;
+    enum georef_method georef; /* GEOREF_AUTO: as the plan says */
+    double tolerance_m;        /* what a georeferenced position may be off */
+    double scale_m;            /* 0: the finest of 1e-6 x 10^n m that holds range_max_m in 31 bits */
     /* links */
     struct link_spec link[CONFIG_MAX_LINKS];
     uint32_t n_links;

@@ -106,6 +106,9 @@ static int check_output(const struct cfg_reader *rd, const struct config *cfg)
 {
     if (cfg->utm_zone != 0 && cfg->crs != GEOREF_UTM)
         return cfg_fail_key(rd, "output.utm_zone", 0, "a zone, but output.crs is not utm; allowed only with crs: utm");
+    if (cfg->heights == HEIGHTS_GEOID && cfg->crs != GEOREF_UTM && cfg->crs != GEOREF_GEODETIC)
+        return cfg_fail_key(rd, "output.heights", 0,
+                            "geoid, but output.crs has no heights; allowed only with crs: utm, geodetic");
     if (cfg->scale_m == 0.0) return SH_OK;
     if (cfg->scale_m < 1e-6)
         return cfg_fail_key(rd, "output.scale_m", 0, "%.10g is out of range; allowed 0 (automatic) or 1e-6 to 1 m",

@@ -15,7 +15,13 @@
 #define WITHIN(low, high) .min = -9e12, .max = 9e12, .min_key = low, .max_key = high
 
 static const char *const up_names[] = {[SCENE_UP_Z] = "z", [SCENE_UP_Y] = "y", NULL};
-static const char *const crs_names[] = {[GEOREF_LOCAL] = "local", [GEOREF_ECEF] = "ecef", [GEOREF_UTM] = "utm", NULL};
+static const char *const crs_names[] = {
+    [GEOREF_LOCAL] = "local", [GEOREF_ECEF] = "ecef", [GEOREF_UTM] = "utm", [GEOREF_GEODETIC] = "geodetic", NULL};
+static const char *const georef_names[] = {
+    [GEOREF_AUTO] = "auto",     [GEOREF_EXACT] = "exact",   [GEOREF_ORDER1] = "order1",
+    [GEOREF_ORDER2] = "order2", [GEOREF_ORDER3] = "order3", NULL};
+static const char *const heights_names[] = {
+    [HEIGHTS_ELLIPSOID] = "ellipsoid", [HEIGHTS_GEOID] = "geoid", [HEIGHTS_AUTO] = "auto", NULL};
 static const char *const anchor_names[] = {[ANCHOR_NONE] = "none", [ANCHOR_EXPLICIT] = "explicit", [ANCHOR_IFC] = "ifc",
                                            [ANCHOR_UTM] = "utm",   [ANCHOR_ECEF] = "ecef",         NULL};
 static const char *const hemisphere_names[] = {"south", "north", NULL};
@@ -160,8 +166,14 @@ static const struct cfg_key config_keys[] = {
      .help = "UTM zone, only with crs: utm; 0: by position, UPS near the poles."},
     {"output.layout", CFG_ENUM, .def = "polar", .names = layout_names, IN_CONFIG(layout),
      .help = "polar: range and encoders, as a head measures; geo: coordinates from the anchor."},
+    {"output.heights", CFG_ENUM, .def = "ellipsoid", .names = heights_names, IN_CONFIG(heights),
+     .help = "Of utm and geodetic points; geoid needs GeographicLib's data, auto takes them where they are installed."},
+    {"output.tolerance_m", CFG_REAL, "m", "1e-6", 1e-7, 1, IN_CONFIG(tolerance_m),
+     .help = "What georeferencing may add to a point's error: the cheapest method that keeps it is used."},
+    {"output.georef", CFG_ENUM, .def = "auto", .names = georef_names, IN_CONFIG(georef),
+     .help = "Method of utm and geodetic points; auto: as `scanhead plan` says."},
     {"output.scale_m", CFG_REAL, "m", "0", 0, 1, IN_CONFIG(scale_m), .allowed = "0 (automatic) or 1e-6 to 1 m",
-     .help = "Metres per count of a coordinate; range_max_m of the profile must fit into 31 bits."},
+     .help = "Metres per count of a coordinate, at most, and of a range; range_max_m of the profile must fit into 31 bits."},
 
     {"links", CFG_LIST, .min = 0, .max = CONFIG_MAX_LINKS, LIST_OF(link, n_links),
      .help = "Where the head can be reached; none is needed to record off line."},

@@ -61,8 +61,10 @@ void device_fill_descriptor(const struct device *device, struct native_descripto
 
 void device_fill_anchor(const struct device *device, struct native_anchor *a)
 {
-    static const uint32_t crs[] = {
-        [GEOREF_LOCAL] = NATIVE_CRS_LOCAL, [GEOREF_ECEF] = NATIVE_CRS_ECEF, [GEOREF_UTM] = NATIVE_CRS_UTM};
+    static const uint32_t crs[] = {[GEOREF_LOCAL] = NATIVE_CRS_LOCAL,
+                                   [GEOREF_ECEF] = NATIVE_CRS_ECEF,
+                                   [GEOREF_UTM] = NATIVE_CRS_UTM,
+                                   [GEOREF_GEODETIC] = NATIVE_CRS_GEODETIC};
     const struct site_station *s = &device->site->station[device->station];
     memset(a, 0, sizeof *a);
     a->crs = crs[device->site->cfg->crs];
@@ -76,6 +78,8 @@ void device_fill_anchor(const struct device *device, struct native_anchor *a)
     memcpy(a->station_m, s->at.position_m, sizeof a->station_m);
     memcpy(a->rotation, s->at.rotation, sizeof a->rotation);
     a->moving = (uint32_t)device->site->moving;
+    memcpy(a->scale, s->scale, sizeof a->scale);
+    a->heights = georef_has_geoid(s->georef) ? NATIVE_HEIGHTS_GEOID : NATIVE_HEIGHTS_ELLIPSOID;
 }
 
 void device_fill_telemetry(const struct device *device, uint64_t tick, struct native_telemetry *t)

@@ -1,3 +1,4 @@
+#include "firmware_sim/site_georef.h"
 #include "firmware_sim/site_platform.h"
 
 #include <math.h>
@@ -158,7 +159,7 @@ static int add_station(struct site *site, const struct sh_report *report, struct
     const struct config *cfg = site->cfg;
     uint32_t i = site->n_stations;
     struct site_station *s = &site->station[i];
-    struct georef_spec spec = {.crs = cfg->crs, .utm_zone = site_utm_zone(site)};
+    struct georef_spec spec = {.crs = cfg->crs, .utm_zone = site_utm_zone(site), .geoid = site->geoid};
     s->station = &cfg->station[i];
     int rc = placement_georef(&s->at, &site->anchor, &spec, err);
     if (site->moving)
@@ -172,28 +173,7 @@ static int add_station(struct site *site, const struct sh_report *report, struct
     if (epsg != first)
         sh_warn(report, "%s: station %s is in EPSG %d, station %s in %d: their points do not fit together", cfg->file,
                 s->station->name, epsg, site->station[0].station->name, first);
-    return SH_OK;
-}
-
-/* The finest 1e-6 x 10^n m with which the head's whole range, from all of its path, fits into 31 bits, with 1 % left
- * for scale and noise. */
-static double choose_scale(const struct config *cfg, double path_reach_m)
-{
-    if (cfg->scale_m > 0.0) return cfg->scale_m;
-    double scale_m = 1e-6;
-    while ((cfg->profile.range_max_m + path_reach_m) * 1.01 / scale_m > 2147483647.0)
-        scale_m *= 10.0;
-    return scale_m;
-}
-
-static int check_path_fits(const struct site *site, struct sh_err *err)
-{
-    double most_m = site->cfg->profile.range_max_m + site->path_reach_m;
-    if (!site->moving || site->cfg->layout != LINE_GEO || most_m * 1.01 / site->scale_m < 0x1p31) return SH_OK;
-    return sh_fail(
-        err, SH_EINPUT,
-        "%s: output.scale_m: points up to %.0f m from the station do not fit into 31 bits; allowed above %.2g m",
-        site->cfg->file, most_m, most_m * 1.01 / 0x1p31);
+    return site_plan_georef(site, s, report, err);
 }
 
 int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err)
@@ -203,13 +183,13 @@ int site_load(const struct config *cfg, const struct sh_report *report, struct s
     if (site == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     site->cfg = cfg;
     site->moving = cfg->platform.kind != PLATFORM_STATIC;
-    int rc = load_scene(site, report, err);
+    int rc = site_open_geoid(site, err);
+    if (rc == SH_OK) rc = load_scene(site, report, err);
     if (rc == SH_OK) rc = place_stations(site, report, err);
     if (rc == SH_OK && site->moving) rc = site_load_platform(site, report, err);
-    site->scale_m = choose_scale(cfg, site->path_reach_m);
-    if (rc == SH_OK) rc = check_path_fits(site, err);
     for (uint32_t i = 0; i < cfg->n_stations && rc == SH_OK; i++)
         rc = add_station(site, report, err);
+    if (rc == SH_OK) rc = site_choose_scale(site, err);
     if (rc != SH_OK) {
         site_free(site);
         return rc;
@@ -232,6 +212,7 @@ void site_free(struct site *site)
         scene_free(site->mover[i].scene);
     }
     scene_free(site->scene);
+    georef_geoid_free(site->geoid);
     free(site);
 }
 
@@ -258,5 +239,6 @@ void site_cast_setup(const struct site *site, uint32_t station, struct cast_setu
     setup->mirror_counts = counts_or_ideal(profile->mirror_counts);
     setup->pan_counts = counts_or_ideal(profile->pan_counts);
     setup->layout = site->cfg->layout;
-    setup->range_scale_m = setup->xyz_scale_m = site->scale_m;
+    setup->range_scale_m = site->scale_m;
+    memcpy(setup->xyz_scale, s->scale, sizeof setup->xyz_scale);
 }

@@ -5,6 +5,7 @@
 
 #include "core/cast.h"
 #include "core/georef.h"
+#include "core/plan.h"
 #include "core/pose.h"
 #include "core/scene.h"
 #include "firmware_sim/config.h"
@@ -15,6 +16,8 @@ struct site_station {
     struct bvh *bvh; /* shared where stations are near each other */
     struct georef *georef;
     struct placement at;
+    double scale[3];      /* of geo points on the wire, units of the CRS per count */
+    struct plan_row plan; /* how the georef's method was chosen */
 };
 
 struct site_mover {
@@ -40,6 +43,7 @@ struct site {
     uint32_t n_bvh;
     struct site_station station[CONFIG_MAX_STATIONS];
     uint32_t n_stations;
+    struct georef_geoid *geoid; /* NULL: heights are ellipsoidal */
     /* A moving head; the stations then only say where on Earth the scene lies. */
     int moving;
     struct pose mount;            /* of the head on the platform */
@@ -54,6 +58,9 @@ struct site {
 
 /* Stations further than this from a BVH's origin get one of their own: a float there has steps of 0.06 mm. */
 #define SITE_BVH_REACH_M 1000.0
+
+/* Room left beyond the head's largest range, for noise. */
+#define SITE_MARGIN 1.01
 
 /* cfg must outlive the site. */
 int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err);

@@ -104,6 +104,7 @@ static void warn_if_coarse(const struct reading *g, const struct ply_element *e)
     for (size_t i = 0; i < g->cloud->n; i++)
         for (int k = 0; k < 3; k++)
             largest = fmax(largest, fabs(g->cloud->xyz_m[i][k]));
+    if (g->cloud->epsg == 4979) largest *= 111320.0; /* degrees */
     if (largest * 6e-8 > worth_a_word_m)
         sh_warn(g->report, "%s: stored in single precision, so good to %.2g m only", g->r.t.path, largest * 6e-8);
 }

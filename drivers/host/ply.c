@@ -74,9 +74,13 @@ static int check_info(struct ply *ply, const struct scanhead_info *info, struct 
 {
     struct ply_facts *facts = &ply->facts;
     int crs = info->geo ? info->crs : 0, epsg = info->geo ? info->epsg : 0;
+    int geoid = info->geo && info->geoid_heights;
     if (facts->have_crs && (facts->crs != crs || facts->epsg != epsg))
         return sh_fail(err, SH_EFORMAT, "%s: the stream went from EPSG %d to %d; a PLY file holds one CRS",
                        ply->file.path, facts->epsg, epsg);
+    if (facts->have_crs && facts->geoid_heights != geoid)
+        return sh_fail(err, SH_EFORMAT, "%s: the stream went to other heights (%s); a PLY file holds one kind",
+                       ply->file.path, geoid ? "geoid" : "ellipsoid");
     if (info->station > 0xffff)
         return sh_fail(err, SH_EFORMAT, "%s: station %u; a PLY file holds stations up to 65535", ply->file.path,
                        info->station);
@@ -87,6 +91,7 @@ static int check_info(struct ply *ply, const struct scanhead_info *info, struct 
     facts->have_crs = 1;
     facts->crs = crs;
     facts->epsg = epsg;
+    facts->geoid_heights = geoid;
     snprintf(facts->idn, sizeof facts->idn, "%s", info->idn);
     snprintf(facts->profile, sizeof facts->profile, "%s", info->profile);
     return 0;
@@ -110,8 +115,8 @@ static size_t put_binary(uint8_t *to, const struct scanhead_point *p, unsigned s
     return RECORD_LEN + FRAME_LEN;
 }
 
-/* Micrometres are the finest scale of the wire, 0.01 dB and nanoseconds its units: more digits would say
- * nothing. "nan" without a sign, as some readers know no other. */
+/* Micrometres (1e-11 degrees) are the finest scale of the wire, 0.01 dB and nanoseconds its units: more digits would
+ * say nothing. "nan" without a sign, as some readers know no other. */
 static size_t put_number(char *to, size_t room, int digits, double v)
 {
     int n = isnan(v) ? snprintf(to, room, "nan ") : snprintf(to, room, "%.*f ", digits, v);
@@ -119,12 +124,14 @@ static size_t put_number(char *to, size_t room, int digits, double v)
 }
 
 /* The length, or more than TEXT_LEN where numbers are absurdly long. */
-static size_t put_ascii(char *to, const struct scanhead_point *p, unsigned station, const double *frame)
+static size_t put_ascii(char *to, const struct scanhead_point *p, int degrees, unsigned station, const double *frame)
 {
+    const int flat = degrees ? 12 : 6;
     const struct {
         double v;
         int digits;
-    } number[] = {{p->x, 6}, {p->y, 6}, {p->z, 6}, {p->range_m, 6}, {p->reflectance_db, 2}, {(double)p->t_ns / 1e9, 9}};
+    } number[] = {{p->x, flat},    {p->y, flat},           {p->z, 6},
+                  {p->range_m, 6}, {p->reflectance_db, 2}, {(double)p->t_ns / 1e9, 9}};
     size_t n = 0;
     for (size_t i = 0; i < sizeof number / sizeof number[0] && n < TEXT_LEN; i++)
         n += put_number(to + n, TEXT_LEN - n, number[i].digits, number[i].v);
@@ -149,7 +156,7 @@ static int put_batch(struct ply *ply, const struct scanhead_info *info, int n, s
             continue;
         }
         const double *frame = info->moving ? &ply->frame[i] : NULL;
-        size_t len = ply->options.ascii ? put_ascii((char *)to + used, p, info->station, frame)
+        size_t len = ply->options.ascii ? put_ascii((char *)to + used, p, ply->facts.crs == 3, info->station, frame)
                                         : put_binary(to + used, p, info->station, frame);
         if (len > TEXT_LEN)
             return sh_fail(err, SH_EFORMAT, "%s: a coordinate beyond all measure: %g %g %g", ply->file.path, p->x, p->y,

@@ -89,7 +89,8 @@ int scanhead_next(struct scanhead *sh, struct scanhead_frame *frame, int timeout
 enum { SCANHEAD_NO_LABEL = 0xffff };
 
 struct scanhead_point {
-    double x, y, z;             /* in the stream's CRS (geo), or the head's frame SOCS (polar); NaN for an empty shot */
+    double x, y, z;             /* in the stream's CRS (geo; geodetic: degrees of latitude and of longitude
+                                 * within -180..180, metres), or the head's frame SOCS (polar); NaN for an empty shot */
     double range_m;             /* NaN for an empty shot */
     double mirror_rad, pan_rad; /* encoders; NaN in the geo layout */
     double reflectance_db;      /* NaN where not modelled */
@@ -100,17 +101,21 @@ struct scanhead_point {
 
 /* Points of the frame that scanhead_next returned last: at most max, from the index `first`. Returns how many, or
  * SCANHEAD_ESTATE before the descriptor and the anchor of the stream were seen. In the geo layout range_m is the
- * distance from the anchor, which is the station; NaN where the head moves. */
+ * distance from the anchor, which is the station: of utm in the grid, of geodetic straight through space on WGS 84; NaN
+ * where the head moves. */
 int scanhead_points(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                     struct scanhead_point *points, uint32_t max);
 
 /* What the stream has said of itself. Strings belong to the handle. 0, or SCANHEAD_ESTATE when not seen yet. */
 struct scanhead_info {
     const char *idn, *profile;
-    int geo;  /* 1: geo layout, 0: polar */
-    int crs;  /* 0 local (scene frame), 1 ECEF, 2 UTM/UPS */
-    int epsg; /* 0 for local */
-    double anchor[3], scale_m;
+    int geo;           /* 1: geo layout, 0: polar */
+    int crs;           /* 0 local (scene frame), 1 ECEF, 2 UTM/UPS, 3 geodetic */
+    int epsg;          /* 0 for local */
+    int geoid_heights; /* 1: heights of UTM and geodetic points are above the geoid; 0: ellipsoidal */
+    double anchor[3];  /* metres; geodetic: degrees, degrees, metres */
+    double scale_m;    /* a count on the wire is at most this on the ground */
+    double scale[3];   /* units of the CRS per count */
     double lat_deg, lon_deg, height_m, station_m[3];
     double rotation[9]; /* socs -> scene frame, row by row */
     double prr_hz, lines_hz, pan_deg_s, range_min_m, range_max_m;

@@ -161,6 +161,8 @@ int scanhead_get_info(const struct scanhead *sh, struct scanhead_info *info)
     info->crs = (int)a->crs;
     info->epsg = (int)a->epsg;
     info->scale_m = a->scale_m;
+    memcpy(info->scale, a->scale, sizeof info->scale);
+    info->geoid_heights = a->heights == NATIVE_HEIGHTS_GEOID;
     info->lat_deg = a->lat_deg;
     info->lon_deg = a->lon_deg;
     info->height_m = a->height_m;

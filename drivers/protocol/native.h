@@ -68,18 +68,22 @@ struct native_descriptor {
     uint64_t seed;
 };
 
-enum native_crs { NATIVE_CRS_LOCAL = 0, NATIVE_CRS_ECEF = 1, NATIVE_CRS_UTM = 2 };
+enum native_crs { NATIVE_CRS_LOCAL = 0, NATIVE_CRS_ECEF = 1, NATIVE_CRS_UTM = 2, NATIVE_CRS_GEODETIC = 3 };
+enum native_heights { NATIVE_HEIGHTS_ELLIPSOID = 0, NATIVE_HEIGHTS_GEOID = 1 };
 
 struct native_anchor {
     uint32_t crs;     /* enum native_crs */
     uint32_t epsg;    /* 0 for local */
     uint32_t station; /* number, from 1 */
     uint32_t moving;  /* bit 0: the head moves, see NATIVE_POSES; the other bits 0 */
-    double anchor[3]; /* of the station in the CRS, metres */
-    double scale_m;   /* geo: position = anchor + scale_m * (x, y, z) */
+    double anchor[3]; /* of the station in the CRS, metres; geodetic: degrees, degrees, metres */
+    double scale_m;   /* a count is at most this on the ground */
     double lat_deg, lon_deg, height_m;
     double station_m[3]; /* of the station in the scene frame */
     double rotation[9];  /* socs -> scene frame, row by row: p_prcs = station_m + rotation * p_socs */
+    double scale[3];     /* geo: position = anchor + scale[k] * count[k]; 0, or not there: scale_m */
+    uint32_t heights;    /* enum native_heights, of utm and geodetic */
+    uint32_t reserved2;
 };
 
 struct native_points { /* head of a points payload, 40 bytes, then n points of 20 */
