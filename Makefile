@@ -16,7 +16,7 @@ Q = $(Q_$(V))
 DEPS_BUILD = gcc g++ make pkg-config libc6-dev libembree-dev libassimp-dev libgeographiclib-dev libyaml-dev libpng-dev \
 	nettle-dev assimp-testmodels
 # and the tests, with the second compiler and its sanitizers:
-DEPS_TEST = $(DEPS_BUILD) libcmocka-dev clang libclang-rt-dev
+DEPS_TEST = $(DEPS_BUILD) libcmocka-dev clang libclang-rt-dev gpsd gpsd-clients
 
 PKGS = yaml-0.1 libpng nettle
 PKG_CFLAGS = $(eval PKG_CFLAGS := $$(shell pkg-config --cflags $(PKGS)))$(PKG_CFLAGS)

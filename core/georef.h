@@ -123,4 +123,8 @@ void georef_difference(const struct georef *georef, const double p_crs[3], doubl
  * smallest scale_m that would do, where they don't fit. */
 int georef_scale(const struct georef *georef, double scale_m, double reach_m, double scale[3], struct sh_err *err);
 
+/* A point east, north and up (metres) in the tangent frame at a place on WGS 84 -> its own latitude and longitude (deg,
+ * longitude -180..180) and ellipsoidal height (m). GeographicLib's LocalCartesian; for single points, not for speed. */
+void georef_geodetic(double lat_deg, double lon_deg, double height_m, const double d_enu[3], double geodetic[3]);
+
 #endif
