@@ -96,6 +96,10 @@ void georef_convergence(const struct georef *georef, double *convergence_rad, do
  * 0. */
 int georef_rotation(const struct georef *georef, double rotation[9]);
 
+/* Differences in prcs at the centre -> axes of the CRS (geodetic: east, north, up), row by row: the rotation that is
+ * left of the map there without its scale. The unit matrix at a pole in geodetic output. */
+void georef_axes(const struct georef *georef, double rotation[9]);
+
 /* What georef_forward is to use. SH_EINPUT: GEOREF_AUTO, or an order that has no polynomial here. Before other threads
  * see the georef. */
 int georef_set_method(struct georef *georef, enum georef_method method, struct sh_err *err);

@@ -79,6 +79,7 @@ void device_fill_anchor(const struct device *device, struct native_anchor *a)
     memcpy(a->rotation, s->at.rotation, sizeof a->rotation);
     a->moving = (uint32_t)device->site->moving;
     memcpy(a->scale, s->scale, sizeof a->scale);
+    georef_axes(s->georef, a->axes);
     a->heights = georef_has_geoid(s->georef) ? NATIVE_HEIGHTS_GEOID : NATIVE_HEIGHTS_ELLIPSOID;
 }
 

@@ -119,6 +119,7 @@ struct scanhead_info {
     double scale[3];   /* units of the CRS per count */
     double lat_deg, lon_deg, height_m, station_m[3];
     double rotation[9]; /* socs -> scene frame, row by row */
+    double axes[9];     /* scene frame at the anchor -> axes of the CRS (geodetic: east, north, up), row by row */
     double prr_hz, lines_hz, pan_deg_s, range_min_m, range_max_m;
     uint32_t station, n_surfaces, frames, scan;
     int moving; /* 1: the head moves; station_m and rotation do not say where it is, poses do */

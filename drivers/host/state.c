@@ -191,6 +191,7 @@ int scanhead_get_info(const struct scanhead *sh, struct scanhead_info *info)
     memcpy(info->anchor, a->anchor, sizeof info->anchor);
     memcpy(info->station_m, a->station_m, sizeof info->station_m);
     memcpy(info->rotation, a->rotation, sizeof info->rotation);
+    memcpy(info->axes, a->axes, sizeof info->axes);
     info->prr_hz = (double)d->prr_uhz / 1e6;
     info->lines_hz = (double)d->lines_uhz / 1e6;
     info->pan_deg_s = (double)d->pan_udeg_s / 1e6;

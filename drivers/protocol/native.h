@@ -84,6 +84,8 @@ struct native_anchor {
     double scale[3];     /* geo: position = anchor + scale[k] * count[k]; 0, or not there: scale_m */
     uint32_t heights;    /* enum native_heights, of utm and geodetic */
     uint32_t reserved2;
+    double axes[9]; /* differences in the scene frame at the anchor -> axes of the CRS, row by row, without its scale;
+                       geodetic: -> east, north, up. All 0, or not there: the unit matrix */
 };
 
 struct native_points { /* head of a points payload, 40 bytes, then n points of 20 */
