@@ -83,8 +83,8 @@ static void test_quaternion(void **state)
             q[i] /= sqrt(norm);
         double w = q[0], x = q[1], y = q[2], z = q[3];
         struct station_pose pose = {.rotation = {1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
-                                         2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-                                         2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}};
+                                                 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+                                                 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}};
         station_pose_quaternion(&pose, back);
         double dot = 0;
         for (int i = 0; i < 4; i++)
@@ -114,8 +114,8 @@ static void test_wkt(void **state)
     int n = 0;
     for (int epsg = 0; epsg < 40000; epsg++) {
         size_t len = crs_wkt(epsg, epsg % 2, text);
-        int depth = 0, want = epsg == 4978 || epsg == 4979 || epsg == 32661 || epsg == 32761 || (epsg > 32600 && epsg <= 32660) ||
-                              (epsg > 32700 && epsg <= 32760);
+        int depth = 0, want = epsg == 4978 || epsg == 4979 || epsg == 32661 || epsg == 32761 ||
+                              (epsg > 32600 && epsg <= 32660) || (epsg > 32700 && epsg <= 32760);
         assert_int_equal(len, strlen(text));
         assert_true(len < CRS_WKT_MAX);
         assert_int_equal(len > 0, want);
