@@ -65,7 +65,8 @@ struct cast_setup {
     uint64_t noise_key;               /* rng_key(seed, RNG_RANGE) */
     double mirror_counts, pan_counts; /* encoder counts per turn; 2^32: ideal, positions take the true angle */
     enum line_layout layout;
-    double range_scale_m, xyz_scale_m;
+    double range_scale_m;
+    double xyz_scale[3]; /* units of the CRS per count, see georef_scale */
     uint32_t n_movers;
     struct cast_mover mover[CAST_MAX_MOVERS];
     /* A moving head: poses of the head (socs -> prcs) in order of time, pose_between them. They cover the firing times
@@ -80,6 +81,7 @@ struct cast_counters {
     uint64_t near_border; /* proposals near a border, looked at in double */
     uint64_t decided;     /* of these, not clearly inside the proposed triangle: all triangles around were asked */
     uint64_t went_on;     /* of these, nothing there after all: the ray went on behind */
+    uint64_t unfit;       /* echoes whose position did not fit into the wire's integers: sent as shots without echo */
     uint64_t undecided;   /* nearer to an edge than double precision can tell: counted as hit */
 };
 
@@ -121,8 +123,20 @@ void caster_set_profile(struct caster *caster, struct cast_profile *profile);
 
 void caster_get_counters(const struct caster *caster, struct cast_counters *counters);
 
-/* socs -> prcs of a levelled head whose y axis points to heading_rad, clockwise from the scene's y axis. */
+/* socs -> levelled frame (x, y horizontal, z up) of a head turned by heading, then pitch, then roll, each about the
+ * axes as they are by then: rotation = Rz(-heading) Rx(pitch) Ry(roll), right-handed, column vectors, row by row: ch cr
+ * + sh sp sr   sh cp   ch sr - sh sp cr -sh cr + ch sp sr   ch cp  -sh sr - ch sp cr -cp sr              sp      cp cr
+ * heading: of the head's y axis, clockwise seen from above, from the frame's y axis; pitch: the y axis (forward) rises;
+ * roll: the x axis (right) sinks. */
+void cast_attitude(double heading_rad, double pitch_rad, double roll_rad, double rotation[9]);
+
+/* The same of a levelled head. */
 void cast_rotation(double heading_rad, double rotation[9]);
+
+/* The first surface of the scene from from_m along the unit vector down: its distance in *range_m, NaN when there is
+ * none. Exact as caster_hits. For setting up: looks at every triangle once. */
+int cast_floor(const struct scene *scene, const double from_m[3], const double down[3], double *range_m,
+               struct sh_err *err);
 
 /* Encoder reading of an angle: whole counts, modulo a turn. */
 uint32_t cast_encoder_count(double turn, double counts_per_turn);

@@ -1,13 +1,21 @@
 /* Scene frame -> coordinate reference system, through GeographicLib (georef/geographiclib_shim.cpp is the only C++).
  *
  * The scene frame is the local tangent frame of the station: x east, y north, z up along the ellipsoid's normal,
- * with the station's prcs position at (lat, lon, height). Coordinates leave as differences from the anchor, the
- * station in the CRS, so that nothing is lost to large numbers; the sum anchor + difference is the position.
- *   local  prcs as it is: metres in the mesh's frame
- *   ecef   WGS 84 geocentric X, Y, Z: a rotation and a shift, exact
- *   utm    easting, northing (with false origin), ellipsoidal height; zone automatic or forced. GeographicLib's
- *          UTMUPS, exact per point (about 0.9 us); UPS beyond 84 N and 80 S when the zone is automatic.
- * Thread: a georef is constant after creation. */
+ * with the station's prcs position at (lat, lon, height); or that of another place, turned against it (rotation); or a
+ * grid. Coordinates leave as differences from the anchor, which is the centre (the station, until it is moved) in the
+ * CRS, so that nothing is lost to large numbers; the sum anchor + difference is the position.
+ *   local     prcs as it is: metres in the mesh's frame
+ *   ecef      WGS 84 geocentric X, Y, Z: a rotation and a shift
+ *   utm       easting, northing (with false origin), height; zone automatic or forced. GeographicLib's UTMUPS; UPS
+ *             beyond 84 N and 80 S when the zone is automatic. Grid convergence and scale are in the map itself. From a
+ *             scene in the same grid (which utm_zone 0 then means): what they are.
+ *   geodetic  latitude and longitude in degrees, height; longitude differences the short way round, in -180..180
+ *
+ * Methods: exact calls GeographicLib for each point (about 0.2 us for geodetic, 0.9 us for utm); order 1, 2, 3 evaluate
+ * its Taylor polynomial about the centre in a few ns, within georef_bound_m. Only what is not linear has them: local,
+ * ecef from a metric frame, and a grid that the scene is in are exact whatever the method.
+ * Heights are ellipsoidal, or with a geoid above it (interpolated for each point: exact only).
+ * Thread: a georef is constant after creation and georef_set_method. */
 #ifndef CORE_GEOREF_H
 #define CORE_GEOREF_H
 
@@ -15,37 +23,112 @@
 
 #include "core/err.h"
 
-enum georef_crs { GEOREF_LOCAL, GEOREF_ECEF, GEOREF_UTM };
+enum georef_crs { GEOREF_LOCAL, GEOREF_ECEF, GEOREF_UTM, GEOREF_GEODETIC };
+enum georef_method { GEOREF_AUTO, GEOREF_EXACT, GEOREF_ORDER1, GEOREF_ORDER2, GEOREF_ORDER3 };
+
+struct georef_geoid;
 
 struct georef_spec {
     enum georef_crs crs;
     double station_m[3];     /* the head's origin in prcs */
     double lat_deg, lon_deg; /* geodetic, WGS 84, of the head's origin */
-    double height_m;         /* ellipsoidal */
+    double height_m;         /* ellipsoidal, whatever the output's heights are */
     int utm_zone;            /* 1..60, or 0: by position */
+    /* How prcs lies at the station, where it is not its tangent frame (see core/geoframe.h): */
+    double rotation[9]; /* differences in prcs -> east, north, up at the station, row by row; all 0: the same axes */
+    int prcs_is_grid;   /* 1: prcs is easting, northing, height of a grid, and station_m the station's */
+    int prcs_zone;      /* its zone: 1..60, or 0: UPS */
+    int prcs_north;     /* its hemisphere: 1 or 0 */
+    const struct georef_geoid
+        *geoid; /* heights above it (utm, geodetic); NULL: ellipsoidal. Has to outlive the georef. */
 };
+
+/* A place on WGS 84. */
+struct georef_place {
+    double lat_deg, lon_deg; /* -90..90, -180..180 */
+    double height_m;         /* ellipsoidal */
+};
+
+/* Where a position in another system lies. zone 1..60, or 0: UPS; north: hemisphere of the false origin; easting and
+ * northing with it; height ellipsoidal. SH_EINPUT: not finite, or outside of what UTMUPS takes. GeographicLib. */
+int georef_locate_utm(int zone, int north, double easting_m, double northing_m, double height_m,
+                      struct georef_place *out, struct sh_err *err);
+int georef_locate_ecef(const double p_ecef[3], struct georef_place *out, struct sh_err *err);
+
+/* And back. Not-a-number outside of -90..90 degrees of latitude. zone 0: by position, and *zone_used 0 where that is
+ * UPS; the three out-parameters may be NULL but grid (easting, northing, height). */
+void georef_geodetic_to_ecef(const struct georef_place *place, double p_ecef[3]);
+int georef_geodetic_to_utm(const struct georef_place *place, int zone, int *zone_used, int *north, double grid[3],
+                           struct sh_err *err);
+
+/* GeographicLib's geoid data (egm96-5 unless GEOGRAPHICLIB_GEOID_NAME says another), read into memory: 19 MB. SH_EINPUT
+ * when it is not installed. */
+int georef_geoid_open(struct georef_geoid **out, struct sh_err *err);
+void georef_geoid_free(struct georef_geoid *geoid);
 
 struct georef;
 
+/* The method is exact at first. Takes a millisecond where there are polynomials to fit. */
 int georef_create(const struct georef_spec *spec, struct georef **out, struct sh_err *err);
 void georef_free(struct georef *georef);
 
-/* The station in the CRS: what the differences are added to. */
+/* Another one about another centre, for a head that moves and for ranges that no longer fit: same scene frame, same
+ * CRS, zone and false origin, polynomials and anchor about centre_m (prcs). SH_EINPUT where the zone does not reach.
+ * Method as before; its bound may be another. */
+int georef_recentre(const struct georef *georef, const double centre_m[3], struct georef **out, struct sh_err *err);
+
+/* The centre in the CRS: what the differences are added to. */
 void georef_anchor(const struct georef *georef, double anchor[3]);
 
-/* EPSG code of the CRS: 4978 for ECEF, 326zz/327zz for UTM, 32661/32761 for UPS, 0 for local. */
+/* EPSG code of the CRS: 4978 for ECEF, 4979 for geodetic, 326zz/327zz for UTM, 32661/32761 for UPS, 0 for local. */
 int georef_epsg(const struct georef *georef);
 
-/* Where differences from the anchor are a rotation of those in prcs (local, ecef): 1 and its matrix, row by row. Else
+enum georef_crs georef_crs(const struct georef *georef);
+
+/* 1: heights are above the geoid; 0: above the ellipsoid. */
+int georef_has_geoid(const struct georef *georef);
+
+/* Of the output's grid at the centre: bearing of grid north, clockwise from true north, and metres of grid per metre on
+ * the ellipsoid. 0 and 1 where there is no grid, or it is the scene's own. */
+void georef_convergence(const struct georef *georef, double *convergence_rad, double *scale);
+
+/* Where differences from the anchor are a rotation of those in prcs: 1 and its matrix, row by row. Else
  * 0. */
 int georef_rotation(const struct georef *georef, double rotation[9]);
 
-/* n points, d_prcs relative to the station (metres) -> difference from the anchor. In place is allowed.
- * Not-a-number goes through. */
+/* Differences in prcs at the centre -> axes of the CRS (geodetic: east, north, up), row by row: the rotation that is
+ * left of the map there without its scale. The unit matrix at a pole in geodetic output. */
+void georef_axes(const struct georef *georef, double rotation[9]);
+
+/* What georef_forward is to use. SH_EINPUT: GEOREF_AUTO, or an order that has no polynomial here. Before other threads
+ * see the georef. */
+int georef_set_method(struct georef *georef, enum georef_method method, struct sh_err *err);
+enum georef_method georef_method(const struct georef *georef);
+
+/* No point within radius_m (horizontally) and height_m (up or down) of the centre is further from the true position
+ * than this with the method, metres on the ground; INFINITY where that is not known. polynomial.c says how it is known.
+ */
+double georef_bound_m(const struct georef *georef, enum georef_method method, double radius_m, double height_m);
+
+/* n points, d_prcs relative to the centre (metres) -> difference from the anchor, in units of the CRS (metres;
+ * geodetic: degrees, degrees, metres). In place is allowed. Not-a-number goes through. */
 void georef_forward(const struct georef *georef, size_t n, const double *dx, const double *dy, const double *dz,
                     double *out_x, double *out_y, double *out_z);
 
-/* One point back: difference from the anchor -> prcs (absolute). For checks and clients, not for speed. */
+/* One point back, exact: difference from the anchor -> prcs (absolute). For checks and clients, not for speed. */
 void georef_reverse(const struct georef *georef, const double d_crs[3], double p_prcs[3]);
+
+/* Position in the CRS minus anchor, the short way round in longitude. */
+void georef_difference(const struct georef *georef, const double p_crs[3], double d_crs[3]);
+
+/* Units of the CRS per count, so that a count is at most scale_m on the ground (utm, ecef, local: just scale_m, of the
+ * grid) for points within reach_m of the centre, and so that these fit into 31 bits and a sign. Degrees of longitude
+ * have a scale of their own: near a pole they are long in degrees and short on the ground. SH_EINPUT, naming the
+ * smallest scale_m that would do, where they don't fit. */
+int georef_scale(const struct georef *georef, double scale_m, double reach_m, double scale[3], struct sh_err *err);
+
+/* A point east, north and up (metres) in the tangent frame at a place on WGS 84 -> its own latitude and longitude (deg,
+ * longitude -180..180) and ellipsoidal height (m). GeographicLib's LocalCartesian; for single points, not for speed. */
+void georef_geodetic(double lat_deg, double lon_deg, double height_m, const double d_enu[3], double geodetic[3]);
 
 #endif

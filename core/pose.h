@@ -48,6 +48,7 @@ void pose_from_angles(double heading_rad, double pitch_rad, double roll_rad, dou
 void pose_to_angles(const double quat[4], double *heading_rad, double *pitch_rad, double *roll_rad);
 /* R, row by row. */
 void pose_matrix(const double quat[4], double rotation[9]);
+void pose_from_matrix(const double rotation[9], double quat[4]);
 void pose_multiply(const double a[4], const double b[4], double out[4]);
 void pose_rotate(const double quat[4], const double v[3], double out[3]);
 /* Angle between two attitudes, in [0, pi]. */
@@ -73,7 +74,7 @@ int trajectory_from_samples(const struct pose_sample *sample, size_t n, struct t
 
 /* A CSV file whose first line names the columns, in any order: t_s, x_m, y_m, z_m, and either heading_deg, pitch_deg,
  * roll_deg (heading alone will do) or qw, qx, qy, qz; frame where wanted (else the sample's number, from 0);
- * scan and flags, as `scanhead record --poses` writes them, are read over. Lines that
+ * scan and flags, as `scanhead record -o NAME.poses.csv` writes them, are read over. Lines that
  * begin with '#' and empty lines don't count. Everything else is an error with file and line. */
 int trajectory_read_csv(const char *path, struct trajectory **out, struct sh_err *err);
 

@@ -167,10 +167,11 @@ int bench_loop(const struct bench_case *c, const struct bench_result *one, uint3
                         .n_stations = 1,
                         .scale_m = BENCH_SCALE_M};
     struct site_station *station = &site.station[0];
-    memcpy(cfg->station[0].position_m, c->target->station_m, sizeof cfg->station[0].position_m);
+    memcpy(station->at.position_m, c->target->station_m, sizeof station->at.position_m);
     station->station = &cfg->station[0];
     station->bvh = c->bvh;
-    cast_rotation(0.0, station->rotation);
+    station->scale[0] = station->scale[1] = station->scale[2] = BENCH_SCALE_M;
+    cast_rotation(0.0, station->at.rotation);
     int rc = bench_georef(c->target, &station->georef, err);
     if (rc == SH_OK) rc = bench_embree_rays(c->embree, c->rays->fx, c->rays->fy, c->rays->fz, c->rays->n, err);
     if (rc == SH_OK) rc = bench_embree_prepare(c->embree, one->embree_width, one->embree_feed, err);

@@ -4,10 +4,13 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "firmware_sim/check_station.h"
 #include "firmware_sim/cmd.h"
+#include "firmware_sim/head_clock.h"
 
 static const char HELP[] =
-    "scanhead check CONFIG [--set KEY=VALUE ...]: validate configuration, scene and links; nothing runs\n\n"
+    "scanhead check CONFIG [--set KEY=VALUE ...]: validate configuration, scene and links; nothing runs.\n"
+    "Prints where the scene and each station stand, in every frame that is known.\n\n"
     "Configuration keys:\n\n";
 
 static const struct option OPTIONS[] = {
@@ -42,9 +45,10 @@ static void print_platform(const struct site *site)
            site->n_stretches);
 }
 
-static void print_summary(const struct config *cfg, const struct site *site)
+static int print_summary(const struct config *cfg, const struct site *site, struct sh_err *err)
 {
     const struct scene *scene = site->scene;
+    int rc = SH_OK;
     printf("%s: ok\n", cfg->file);
     printf("head      %s %s (%s), %g Hz pulses, %g lines/s, pan %g deg/s\n", cfg->profile.maker, cfg->profile.model,
            cfg->profile.name, (double)cfg->settings.prr_uhz * 1e-6, (double)cfg->settings.lines_uhz * 1e-6,
@@ -52,14 +56,28 @@ static void print_summary(const struct config *cfg, const struct site *site)
     printf("scene     %u triangles, %u surfaces, x %.3f..%.3f  y %.3f..%.3f  z %.3f..%.3f m\n", scene->n_triangles,
            scene->n_surfaces, scene->min_m[0], scene->max_m[0], scene->min_m[1], scene->max_m[1], scene->min_m[2],
            scene->max_m[2]);
-    for (uint32_t i = 0; i < site->n_stations; i++) {
-        double anchor[3];
-        georef_anchor(site->station[i].georef, anchor);
-        printf("station %u %s, EPSG %d, anchor %.6f %.6f %.6f\n", i + 1, site->station[i].station->name,
-               georef_epsg(site->station[i].georef), anchor[0], anchor[1], anchor[2]);
-    }
+    check_print_anchor(site, stdout);
+    for (uint32_t i = 0; i < site->n_stations && rc == SH_OK; i++)
+        rc = check_print_station(site, i, stdout, err);
     print_platform(site);
     printf("output    %s, %g m per count\n", cfg->layout == LINE_GEO ? "geo" : "polar", site->scale_m);
+    return rc;
+}
+
+static int print_time(const struct config *cfg, struct sh_err *err)
+{
+    struct head_clock clock;
+    struct utc_time utc;
+    char now[UTC_TEXT_LEN], end[UTC_TEXT_LEN];
+    int rc = head_clock_create(cfg, &clock, err);
+    if (rc != SH_OK || clock.source == HEAD_CLOCK_NONE) return rc;
+    utc_from_tai(&clock.table, clock.tai0_ns, &utc);
+    utc_format(&utc, 0, now);
+    utc_from_tai(&clock.table, utc_tai_from_posix(&clock.table, clock.table.expires_s * UTC_SECOND_NS), &utc);
+    utc_format(&utc, 0, end);
+    printf("time      %s at power-up; leap seconds are known up to %.10s\n", now, end);
+    if (clock.warning[0] != '\0') cmd_report_stderr.warn(cmd_report_stderr.ctx, clock.warning);
+    return SH_OK;
 }
 
 static int check(const struct cmd_sets *sets, const char *path)
@@ -71,7 +89,9 @@ static int check(const struct cmd_sets *sets, const char *path)
     if (cfg == NULL) return status;
     int rc = site_load(cfg, &cmd_report_stderr, &site, &err);
     if (rc == SH_OK) rc = check_links(cfg, &err);
-    if (rc == SH_OK) print_summary(cfg, site);
+    if (rc == SH_OK) rc = check_reach(site, &cmd_report_stderr, &err);
+    if (rc == SH_OK) rc = print_summary(cfg, site, &err);
+    if (rc == SH_OK) rc = print_time(cfg, &err);
     site_free(site);
     free(cfg);
     return rc == SH_OK ? CMD_OK : cmd_fail(&err);

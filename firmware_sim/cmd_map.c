@@ -5,8 +5,10 @@
 #include <string.h>
 
 #include "core/map.h"
+#include "core/mat3.h"
 #include "firmware_sim/cmd.h"
 #include "firmware_sim/recording.h"
+#include "firmware_sim/site.h"
 
 static const char HELP[] = "scanhead map CONFIG -o FILE.png [options]: scan map of the stations, from above\n\n"
                            "Scans one frame from each station off line and draws the points: dark where many heights "
@@ -32,6 +34,9 @@ struct map_run {
     double pixel_m;
     int quiet;
     struct map *map;
+    /* A scene in ECEF is seen from above station 1: east, north, up there. Else the scene's own axes. */
+    int turned;
+    double origin_m[3], to_enu[9];
     struct scanhead_point point[BATCH];
     double x[BATCH], y[BATCH], z[BATCH];
 };
@@ -63,6 +68,14 @@ static int parse(struct map_run *run, int argc, char **argv)
     return -1;
 }
 
+static void to_map(const struct map_run *run, const double p_prcs[3], double p[3])
+{
+    memcpy(p, p_prcs, 3 * sizeof *p);
+    if (!run->turned) return;
+    const double d[3] = {p_prcs[0] - run->origin_m[0], p_prcs[1] - run->origin_m[1], p_prcs[2] - run->origin_m[2]};
+    mat3_apply(run->to_enu, d, p);
+}
+
 static int add_frame(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
 {
     struct map_run *run = ctx;
@@ -71,9 +84,11 @@ static int add_frame(void *ctx, struct scanhead *sh, const struct scanhead_frame
         int n = scanhead_points(sh, frame, first, run->point, BATCH);
         if (n <= 0) return sh_fail(err, SH_ESTATE, "map: %s", scanhead_error(sh));
         for (int i = 0; i < n; i++) {
-            run->x[i] = run->point[i].x;
-            run->y[i] = run->point[i].y;
-            run->z[i] = run->point[i].z;
+            double p[3];
+            to_map(run, (const double[3]){run->point[i].x, run->point[i].y, run->point[i].z}, p);
+            run->x[i] = p[0];
+            run->y[i] = p[1];
+            run->z[i] = p[2];
         }
         map_add_points(run->map, (size_t)n, run->x, run->y, run->z);
         first += (uint32_t)n;
@@ -81,26 +96,50 @@ static int add_frame(void *ctx, struct scanhead *sh, const struct scanhead_frame
     return SH_OK;
 }
 
-static int create_map(struct map_run *run, const struct config *cfg, const struct scene *scene, struct sh_err *err)
+static void include(struct map_spec *spec, const double p[3])
 {
-    struct map_spec spec = {.pixel_m = run->pixel_m};
-    double span_m = 0.0;
     for (int i = 0; i < 2; i++) {
-        spec.min_m[i] = scene->min_m[i];
-        spec.max_m[i] = scene->max_m[i];
-        for (uint32_t s = 0; s < cfg->n_stations; s++) {
-            spec.min_m[i] = fmin(spec.min_m[i], cfg->station[s].position_m[i]);
-            spec.max_m[i] = fmax(spec.max_m[i], cfg->station[s].position_m[i]);
-        }
-        span_m = fmax(span_m, spec.max_m[i] - spec.min_m[i]);
+        spec->min_m[i] = fmin(spec->min_m[i], p[i]);
+        spec->max_m[i] = fmax(spec->max_m[i], p[i]);
     }
+}
+
+static int choose_view(struct map_run *run, const struct site *site, struct sh_err *err)
+{
+    const struct geoframe *frame = &site->anchor.frame;
+    run->turned = site->anchor.known && frame->kind == GEOFRAME_ECEF;
+    if (!run->turned) return SH_OK;
+    memcpy(run->origin_m, site->station[0].at.position_m, sizeof run->origin_m);
+    return geoframe_to_enu(frame, run->origin_m, run->to_enu, err);
+}
+
+static int create_map(struct map_run *run, const struct site *site, struct sh_err *err)
+{
+    const struct scene *scene = site->scene;
+    struct map_spec spec = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}, run->pixel_m};
+    double p[3], station[CONFIG_MAX_STATIONS][3];
+    int rc = choose_view(run, site, err);
+    if (rc != SH_OK) return rc;
+    for (uint32_t v = 0; v < scene->n_vertices && run->turned; v++) {
+        to_map(run, scene->vertex_m[v], p);
+        include(&spec, p);
+    }
+    if (!run->turned) {
+        include(&spec, scene->min_m);
+        include(&spec, scene->max_m);
+    }
+    for (uint32_t s = 0; s < site->n_stations; s++) {
+        to_map(run, site->station[s].at.position_m, station[s]);
+        include(&spec, station[s]);
+    }
+    double span_m = fmax(spec.max_m[0] - spec.min_m[0], spec.max_m[1] - spec.min_m[1]);
     for (int i = 0; i < 2; i++) { /* a margin, so that nothing sticks to the border */
         spec.min_m[i] -= 0.03 * span_m;
         spec.max_m[i] += 0.03 * span_m;
     }
-    int rc = map_create(&spec, &run->map, err);
-    for (uint32_t s = 0; s < cfg->n_stations && rc == SH_OK; s++)
-        rc = map_add_station(run->map, cfg->station[s].position_m[0], cfg->station[s].position_m[1], err);
+    rc = map_create(&spec, &run->map, err);
+    for (uint32_t s = 0; s < site->n_stations && rc == SH_OK; s++)
+        rc = map_add_station(run->map, station[s][0], station[s][1], err);
     return rc;
 }
 
@@ -122,7 +161,7 @@ static int draw(struct map_run *run, struct config *cfg, struct sh_err *err)
                                         .ctx = run,
                                         .interrupted = interrupted};
     int rc = offline_open(cfg, &cmd_report_stderr, &offline, err);
-    if (rc == SH_OK) rc = create_map(run, cfg, offline_scene(offline), err);
+    if (rc == SH_OK) rc = create_map(run, offline_site(offline), err);
     if (rc == SH_OK) rc = recording_run(offline_scanhead(offline), &options, &result, err);
     if (rc == SH_OK && cmd_interrupted) rc = sh_fail(err, SH_EIO, "interrupted; nothing written");
     if (rc == SH_OK) rc = map_write_png(run->map, run->output, err);

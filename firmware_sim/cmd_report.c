@@ -20,11 +20,9 @@ static const char help[] =
     "\n"
     "  CONFIG            the configuration of the recording: its scene, stations, output.crs and "
     "output.layout count\n"
-    "  CLOUD             a PLY file with x, y, z and, where it has them, station, echo and label (scanhead "
-    "record\n"
-    "                    -o FILE.ply). Points without a station are taken to be of the first one. Three "
-    "times nan is\n"
-    "                    a shot without echo\n"
+    "  CLOUD             a PLY file with x, y, z and, where it has them, station, echo and label, or a LAS file\n"
+    "                    (scanhead record -o FILE.ply or FILE.las). Points without a station are taken to be of the\n"
+    "                    first one. Three times nan is a shot without echo\n"
     "  --tolerance-m T   how far a point may be from the scene (default 0.001)\n"
     "  --max-m M         how far to look for the scene; what is farther counts as far, and fails (default "
     "10)\n"
@@ -151,7 +149,8 @@ static void print_text(const struct report *r)
     print_length("95 %", s->p95_m);
     print_length("99.9 %", s->p999_m);
     print_length("max", s->max_m);
-    printf("%-10s point %zu at %.6f %.6f %.6f", "worst", s->worst + 1, p[0], p[1], p[2]);
+    int flat = r->cloud.epsg == 4979 ? 11 : 6; /* degrees, or metres */
+    printf("%-10s point %zu at %.*f %.*f %.6f", "worst", s->worst + 1, flat, p[0], flat, p[1], p[2]);
     if (surface != NULL) printf(" on %s | %s", surface->object, surface->material);
     printf("\n%-10s %zu farther than %g m\n", "beyond", s->beyond, r->tolerance_m);
     printf("%-10s %zu farther than %g m from everything\n", "far", s->far, r->max_m);

@@ -20,6 +20,9 @@
 
 enum { CONFIG_MAX_MESHES = 64, CONFIG_MAX_LINKS = 8, CONFIG_MAX_STATIONS = 64, CONFIG_PATH_LEN = 512 };
 
+enum config_heights { HEIGHTS_ELLIPSOID, HEIGHTS_GEOID, HEIGHTS_AUTO };
+/* What the head speaks on a link (link_spec.protocol). */
+enum config_protocol { PROTOCOL_NATIVE, PROTOCOL_NMEA };
 enum config_pace { PACE_REALTIME, PACE_FAST, PACE_STEP };
 
 /* A head profile, config/heads/NAME.yaml: each figure is written `{ value: V, from: data sheet|assumed }`. */
@@ -46,11 +49,32 @@ struct config_mesh {
     double move_m_s[3], turn_deg_s, pivot_m[3], cycle_s;
 };
 
+/* How the scene lies on the Earth; core/geoframe.h. */
+enum config_anchor_source { ANCHOR_NONE, ANCHOR_EXPLICIT, ANCHOR_IFC, ANCHOR_UTM, ANCHOR_ECEF };
+struct config_anchor {
+    enum config_anchor_source source;
+    double origin_m[3], lat_deg, lon_deg, height_m, north_deg;
+    uint32_t utm_zone; /* 0: UPS */
+    int north;         /* hemisphere */
+    int height_given;  /* ifc: height_m stands in for RefElevation */
+};
+
+/* In which form a station's place on the Earth is given. */
+enum config_place { PLACE_NONE, PLACE_GEODETIC, PLACE_UTM, PLACE_ECEF };
+
 struct config_station {
     char name[32];
-    double position_m[3];              /* of the head's origin in the scene frame */
-    double heading_deg;                /* of the head's y axis, clockwise from the scene's y axis (north) */
-    double lat_deg, lon_deg, height_m; /* of the head's origin */
+    double position_m[3];                    /* of the head's origin in the scene frame */
+    int has_position;                        /* 0: it follows from the place on the Earth, through the anchor */
+    double heading_deg, pitch_deg, roll_deg; /* cast_attitude */
+    double instrument_height_m;              /* of the head's origin above the floor below position_m */
+    int has_instrument_height;
+    enum config_place place;
+    double lat_deg, lon_deg, height_m; /* of the head's origin; height_m also with PLACE_UTM */
+    uint32_t utm_zone;                 /* 0: UPS */
+    int north;                         /* hemisphere */
+    double easting_m, northing_m;
+    double ecef_m[3];
 };
 
 enum config_platform_kind { PLATFORM_STATIC, PLATFORM_TRAJECTORY, PLATFORM_LIVE };
@@ -68,6 +92,22 @@ struct config_platform {
     uint32_t port; /* live, in real time: UDP; 0: the system chooses */
 };
 
+/* Time of day (head_clock.h). */
+struct config_time {
+    char epoch[40]; /* of power-up: none, utc, tai, or a date as 2026-01-01T00:00:00Z */
+    double offset_s, drift_ppm, jump_s, jump_at_s;
+};
+
+/* The GNSS receiver (gnss.h). */
+struct config_gnss {
+    uint32_t rate_hz; /* 1, 2, 4, 5, 10, 20 */
+    enum config_talker { TALKER_GN, TALKER_GP } talker;
+    uint32_t quality; /* as in GGA: 0, 1, 2, 4, 5 */
+    uint32_t satellites;
+    double hdop, accuracy_m, geoid_separation_m;
+    double lever_arm_m[3]; /* of the antenna from the head's origin, in the head's frame */
+};
+
 struct config {
     char file[CONFIG_PATH_LEN];
     char profile_file[CONFIG_PATH_LEN];
@@ -80,6 +120,7 @@ struct config {
     uint32_t n_meshes;
     double scene_tolerance_m;
     int order_exactly; /* surfaces that overlap are ordered in double */
+    struct config_anchor anchor;
     /* stations */
     struct config_station station[CONFIG_MAX_STATIONS];
     uint32_t n_stations;
@@ -88,7 +129,10 @@ struct config {
     enum georef_crs crs;
     int utm_zone;
     enum line_layout layout;
-    double scale_m; /* 0: the finest of 1e-6 x 10^n m that holds range_max_m in 31 bits */
+    enum config_heights heights;
+    enum georef_method georef; /* GEOREF_AUTO: as the plan says */
+    double tolerance_m;        /* what a georeferenced position may be off */
+    double scale_m;            /* 0: the finest of 1e-6 x 10^n m that holds range_max_m in 31 bits */
     /* links */
     struct link_spec link[CONFIG_MAX_LINKS];
     uint32_t n_links;
@@ -100,7 +144,9 @@ struct config {
     double ahead_ms, queue_ms, late_ms;
     uint32_t threads; /* casters; 0: one per processor */
     enum config_pace pace;
-    double utc_epoch_s; /* UTC of power-up, s since 1970; 0: unknown */
+    /* time, gnss */
+    struct config_time time;
+    struct config_gnss gnss;
 };
 
 /* Reads path, its profile, then the `key=value` settings in order (as from --set, each checked the same way, named

@@ -10,15 +10,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-static int is_given(const struct cfg_reader *rd, const char *path, uint32_t item)
-{
-    return rd->line[cfg_row(rd, cfg_find(&rd->table, path))][item] != 0;
-}
+#include "firmware_sim/head_clock.h"
 
 /* Of two keys that contradict, the one to name: the first unless only the second was given. */
 static const char *given_of(const struct cfg_reader *rd, const char *first, const char *second)
 {
-    return !is_given(rd, first, 0) && is_given(rd, second, 0) ? second : first;
+    return !cfg_is_given(rd, first, 0) && cfg_is_given(rd, second, 0) ? second : first;
 }
 
 static double from_micro(int64_t micro)
@@ -94,18 +91,17 @@ static int check_mesh(const struct cfg_reader *rd, const struct config_mesh *mes
     return SH_OK;
 }
 
-static int check_stations(const struct cfg_reader *rd, struct config *cfg)
+int cfg_nmea_link(const struct config *cfg)
 {
-    static const char *const geodetic[] = {"stations[].lat_deg", "stations[].lon_deg", "stations[].height_m"};
+    for (uint32_t i = 0; i < cfg->n_links; i++)
+        if (cfg->link[i].protocol == PROTOCOL_NMEA) return (int)i;
+    return -1;
+}
+
+static int check_names(const struct cfg_reader *rd, struct config *cfg)
+{
     for (uint32_t i = 0; i < cfg->n_stations; i++) {
         struct config_station *station = &cfg->station[i];
-        for (int k = 0; k < 3 && cfg->crs != GEOREF_LOCAL; k++) {
-            if (is_given(rd, geodetic[k], i)) continue;
-            const struct cfg_key *key = cfg_find(&rd->table, geodetic[k]);
-            return cfg_fail_key(rd, geodetic[k], i,
-                                "missing, and output.crs is not local; required, allowed %.10g to %.10g %s", key->min,
-                                key->max, key->unit);
-        }
         if (station->name[0] == '\0') snprintf(station->name, sizeof station->name, "station-%u", i + 1);
         for (uint32_t k = 0; k < i; k++)
             if (strcmp(cfg->station[k].name, station->name) == 0)
@@ -119,6 +115,9 @@ static int check_output(const struct cfg_reader *rd, const struct config *cfg)
 {
     if (cfg->utm_zone != 0 && cfg->crs != GEOREF_UTM)
         return cfg_fail_key(rd, "output.utm_zone", 0, "a zone, but output.crs is not utm; allowed only with crs: utm");
+    if (cfg->heights == HEIGHTS_GEOID && cfg->crs != GEOREF_UTM && cfg->crs != GEOREF_GEODETIC)
+        return cfg_fail_key(rd, "output.heights", 0,
+                            "geoid, but output.crs has no heights; allowed only with crs: utm, geodetic");
     if (cfg->scale_m == 0.0) return SH_OK;
     if (cfg->scale_m < 1e-6)
         return cfg_fail_key(rd, "output.scale_m", 0, "%.10g is out of range; allowed 0 (automatic) or 1e-6 to 1 m",
@@ -143,14 +142,14 @@ static int check_link(const struct cfg_reader *rd, const struct config *cfg, uin
         {"links[].port", 1u << LINK_TCP},
         {"links[].max_sessions", 1u << LINK_TCP},
     };
-    static const char *const has[] = {[LINK_NULL] = "type",
-                                      [LINK_FILE] = "type, path",
-                                      [LINK_PTY] = "type, path",
-                                      [LINK_TCP] = "type, address, port, max_sessions"};
+    static const char *const has[] = {[LINK_NULL] = "type, protocol",
+                                      [LINK_FILE] = "type, path, protocol",
+                                      [LINK_PTY] = "type, path, protocol",
+                                      [LINK_TCP] = "type, address, port, max_sessions, protocol"};
     const struct link_spec *link = &cfg->link[i];
     const char *type = cfg_find(&rd->table, "links[].type")->names[link->type];
     for (size_t k = 0; k < sizeof keys / sizeof keys[0]; k++)
-        if (is_given(rd, keys[k].path, i) && !(keys[k].types & 1u << link->type))
+        if (cfg_is_given(rd, keys[k].path, i) && !(keys[k].types & 1u << link->type))
             return cfg_fail_key(rd, keys[k].path, i, "a %s link has no such key; allowed %s", type, has[link->type]);
     if (link->type == LINK_FILE && link->path[0] == '\0')
         return cfg_fail_key(rd, "links[].path", i, "missing; required for a file link is the file to write");
@@ -186,7 +185,7 @@ static int check_platform(const struct cfg_reader *rd, const struct config *cfg)
     };
     const struct config_platform *p = &cfg->platform;
     for (size_t k = 0; k < sizeof keys / sizeof keys[0]; k++)
-        if (is_given(rd, keys[k].path, 0) && !(keys[k].kinds & 1u << p->kind))
+        if (cfg_is_given(rd, keys[k].path, 0) && !(keys[k].kinds & 1u << p->kind))
             return cfg_fail_key(rd, keys[k].path, 0, "a %s platform has no such key; allowed %s",
                                 cfg_find(&rd->table, "platform.kind")->names[p->kind], has[p->kind]);
     if (p->kind == PLATFORM_LIVE && cfg->pace == PACE_FAST)
@@ -208,17 +207,44 @@ static int check_loop(const struct cfg_reader *rd, const struct config *cfg)
         cfg->tick_hz);
 }
 
+static int check_time(const struct cfg_reader *rd, const struct config *cfg)
+{
+    enum head_clock_source source;
+    struct sh_err why;
+    char shown[CFG_SHOW_MAX];
+    if (head_clock_parse(cfg->time.epoch, utc_table_builtin(), &source, NULL, &why) != SH_OK)
+        return cfg_fail_key(
+            rd, "time.epoch", 0,
+            "\"%s\": %.80s; allowed none, utc, tai, or a time after 1980-01-06 such as 2026-01-01T00:00:00Z",
+            cfg_show(cfg->time.epoch, shown), why.text);
+    int link = cfg_nmea_link(cfg);
+    if (source == HEAD_CLOCK_NONE && link >= 0)
+        return cfg_fail_key(rd, "links[].protocol", (uint32_t)link,
+                            "nmea, but the time is not known; required is time.epoch: utc, tai, or a time such as "
+                            "2026-01-01T00:00:00Z");
+    if (1000 % cfg->gnss.rate_hz != 0 || cfg->gnss.rate_hz == 8)
+        return cfg_fail_key(rd, "gnss.rate_hz", 0, "%u is not a rate it has; allowed 1, 2, 4, 5, 10 or 20 Hz",
+                            cfg->gnss.rate_hz);
+    if (cfg->gnss.quality == 3)
+        return cfg_fail_key(rd, "gnss.quality", 0,
+                            "3 is no fix of position; allowed 0 none, 1 autonomous, 2 differential, 4 RTK fixed, 5 RTK "
+                            "float");
+    return SH_OK;
+}
+
 int cfg_check(const struct cfg_reader *rd, struct config *cfg)
 {
     int code = check_limits(rd, cfg);
     if (code == SH_OK) code = check_head(rd, cfg);
     for (uint32_t i = 0; i < cfg->n_meshes && code == SH_OK; i++)
         code = check_mesh(rd, &cfg->mesh[i], i);
-    if (code == SH_OK) code = check_stations(rd, cfg);
+    if (code == SH_OK) code = cfg_check_places(rd, cfg);
+    if (code == SH_OK) code = check_names(rd, cfg);
     if (code == SH_OK) code = check_output(rd, cfg);
     if (code == SH_OK) code = check_platform(rd, cfg);
     for (uint32_t i = 0; i < cfg->n_links && code == SH_OK; i++)
         code = check_link(rd, cfg, i);
     if (code == SH_OK) code = check_loop(rd, cfg);
+    if (code == SH_OK) code = check_time(rd, cfg);
     return code;
 }

@@ -29,7 +29,7 @@ enum cfg_flags {
     CFG_ASCII = 2,  /* goes into *IDN?: printable ASCII without comma and quotes */
 };
 
-enum { CFG_MAX_ROWS = 96, CFG_MAX_ITEMS = 64, CFG_PATH_MAX = 96, CFG_FROM_SET = -1 };
+enum { CFG_MAX_ROWS = 128, CFG_MAX_ITEMS = 64, CFG_PATH_MAX = 96, CFG_FROM_SET = -1 };
 
 struct cfg_key {
     const char *path;
@@ -72,6 +72,7 @@ uint32_t *cfg_list_count(const struct cfg_reader *rd, const struct cfg_key *list
 void *cfg_address(const struct cfg_reader *rd, const struct cfg_key *key, uint32_t item);
 /* "stations[].name", 2 -> "stations[2].name". buf holds CFG_PATH_MAX. */
 const char *cfg_name(const char *path, uint32_t item, char *buf);
+int cfg_is_given(const struct cfg_reader *rd, const char *path, uint32_t item);
 /* The line of a key, or of the nearest section around it that was given. */
 int cfg_where(const struct cfg_reader *rd, const struct cfg_key *key, uint32_t item);
 /* "FILE:LINE: KEY: text", or "--set KEY: text" when line is CFG_FROM_SET. Returns SH_EINPUT. */
@@ -112,5 +113,9 @@ int cfg_fill_defaults(struct cfg_reader *rd, const struct config_profile *profil
 int cfg_load_profile(struct cfg_reader *rd, struct config *cfg);
 /* Everything that concerns more than one key. */
 int cfg_check(const struct cfg_reader *rd, struct config *cfg);
+/* config_place.c: the anchor, and the forms of a station's place. */
+int cfg_check_places(const struct cfg_reader *rd, struct config *cfg);
+/* The first link of the GNSS receiver; -1: none. */
+int cfg_nmea_link(const struct config *cfg);
 
 #endif

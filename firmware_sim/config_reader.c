@@ -73,6 +73,11 @@ static void cut_to_parent(char *path)
     *dot = '\0';
 }
 
+int cfg_is_given(const struct cfg_reader *rd, const char *path, uint32_t item)
+{
+    return rd->line[cfg_row(rd, cfg_find(&rd->table, path))][item] != 0;
+}
+
 int cfg_where(const struct cfg_reader *rd, const struct cfg_key *key, uint32_t item)
 {
     char path[CFG_PATH_MAX];

@@ -15,10 +15,21 @@
 #define WITHIN(low, high) .min = -9e12, .max = 9e12, .min_key = low, .max_key = high
 
 static const char *const up_names[] = {[SCENE_UP_Z] = "z", [SCENE_UP_Y] = "y", NULL};
-static const char *const crs_names[] = {[GEOREF_LOCAL] = "local", [GEOREF_ECEF] = "ecef", [GEOREF_UTM] = "utm", NULL};
+static const char *const crs_names[] = {
+    [GEOREF_LOCAL] = "local", [GEOREF_ECEF] = "ecef", [GEOREF_UTM] = "utm", [GEOREF_GEODETIC] = "geodetic", NULL};
+static const char *const georef_names[] = {
+    [GEOREF_AUTO] = "auto",     [GEOREF_EXACT] = "exact",   [GEOREF_ORDER1] = "order1",
+    [GEOREF_ORDER2] = "order2", [GEOREF_ORDER3] = "order3", NULL};
+static const char *const heights_names[] = {
+    [HEIGHTS_ELLIPSOID] = "ellipsoid", [HEIGHTS_GEOID] = "geoid", [HEIGHTS_AUTO] = "auto", NULL};
+static const char *const anchor_names[] = {[ANCHOR_NONE] = "none", [ANCHOR_EXPLICIT] = "explicit", [ANCHOR_IFC] = "ifc",
+                                           [ANCHOR_UTM] = "utm",   [ANCHOR_ECEF] = "ecef",         NULL};
+static const char *const hemisphere_names[] = {"south", "north", NULL};
 static const char *const layout_names[] = {[LINE_POLAR] = "polar", [LINE_GEO] = "geo", NULL};
 static const char *const link_names[] = {
     [LINK_NULL] = "null", [LINK_FILE] = "file", [LINK_PTY] = "pty", [LINK_TCP] = "tcp", NULL};
+static const char *const protocol_names[] = {[PROTOCOL_NATIVE] = "native", [PROTOCOL_NMEA] = "nmea", NULL};
+static const char *const talker_names[] = {[TALKER_GN] = "GN", [TALKER_GP] = "GP", NULL};
 static const char *const pace_names[] = {
     [PACE_REALTIME] = "realtime", [PACE_FAST] = "fast", [PACE_STEP] = "step", NULL};
 
@@ -74,20 +85,54 @@ static const struct cfg_key config_keys[] = {
     {"scene.meshes[].cycle_s", CFG_REAL, "s", "0", 0, 86400, IN_MESH(cycle_s),
      .help = "Motion goes forth and back within this time; 0: on and on."},
 
+    {"scene.anchor", CFG_MAP, .help = "How the scene lies on the Earth; all stations follow from it."},
+    {"scene.anchor.source", CFG_ENUM, .def = "none", .names = anchor_names, IN_CONFIG(anchor.source),
+     .help = "none: each station stands for itself; explicit: origin_m is at lat_deg, lon_deg, height_m; ifc: as the IFC "
+             "mesh's IFCSITE says; utm, ecef: the meshes' own coordinates are UTM (or UPS), ECEF."},
+    {"scene.anchor.origin_m", CFG_VEC3, "m", "[0, 0, 0]", -1e9, 1e9, IN_CONFIG(anchor.origin_m),
+     .help = "explicit: the scene's point that lies at lat_deg, lon_deg, height_m."},
+    {"scene.anchor.lat_deg", CFG_REAL, "deg", "", -90, 90, IN_CONFIG(anchor.lat_deg), .help = "explicit: its latitude, WGS 84."},
+    {"scene.anchor.lon_deg", CFG_REAL, "deg", "", -180, 180, IN_CONFIG(anchor.lon_deg), .help = "explicit: its longitude."},
+    {"scene.anchor.height_m", CFG_REAL, "m", "", -1000, 10000, IN_CONFIG(anchor.height_m),
+     .help = "explicit: its height above the ellipsoid; ifc: the same, in place of RefElevation, which counts from the sea."},
+    {"scene.anchor.north_deg", CFG_REAL, "deg", "0", -360, 360, IN_CONFIG(anchor.north_deg),
+     .help = "explicit: where true north lies, clockwise from the scene's y axis."},
+    {"scene.anchor.utm_zone", CFG_COUNT, NULL, "", 0, 60, IN_CONFIG(anchor.utm_zone),
+     .help = "utm: zone of the meshes' coordinates; 0: UPS. Required there."},
+    {"scene.anchor.hemisphere", CFG_ENUM, .def = "", .names = hemisphere_names, IN_CONFIG(anchor.north),
+     .help = "utm: where their northing counts from. Required there."},
+
     {"stations", CFG_LIST, .min = 1, .max = CONFIG_MAX_STATIONS, LIST_OF(station, n_stations),
      .help = "Places where the head can stand."},
     {"stations[]", CFG_MAP, .help = "A station."},
     {"stations[].name", CFG_TEXT, .def = "", IN_STATION(name), .help = "Name; station-N when not given."},
-    {"stations[].position_m", CFG_VEC3, "m", NULL, -1e9, 1e9, IN_STATION(position_m),
-     .help = "The head's origin in the scene frame."},
+    {"stations[].position_m", CFG_VEC3, "m", "", -1e9, 1e9, IN_STATION(position_m),
+     .help = "The head's origin in the scene frame; required, unless scene.anchor gives it from the place on the Earth."},
+    {"stations[].instrument_height_m", CFG_REAL, "m", "", 0, 1000, IN_STATION(instrument_height_m),
+     .help = "The head's origin stands this high above the first surface below its place; z (or the height) then is only "
+             "where the search downward begins, with 1 cm to spare."},
     {"stations[].heading_deg", CFG_REAL, "deg", "0", -360, 360, IN_STATION(heading_deg),
-     .help = "Of the head's y axis, clockwise from the scene's y axis (north)."},
-    {"stations[].lat_deg", CFG_REAL, "deg", "0", -90, 90, IN_STATION(lat_deg),
-     .help = "Geodetic latitude of the head's origin, WGS 84; required unless output.crs is local."},
-    {"stations[].lon_deg", CFG_REAL, "deg", "0", -180, 180, IN_STATION(lon_deg),
-     .help = "Longitude; required unless output.crs is local."},
-    {"stations[].height_m", CFG_REAL, "m", "0", -1000, 10000, IN_STATION(height_m),
-     .help = "Height above the ellipsoid; required unless output.crs is local."},
+     .help = "Of the head's y axis, clockwise from the scene's y axis: north without scene.anchor, grid north with utm, "
+             "true north with ecef."},
+    {"stations[].pitch_deg", CFG_REAL, "deg", "0", -90, 90, IN_STATION(pitch_deg),
+     .help = "After the heading, about the head's x axis: the y axis (forward) rises."},
+    {"stations[].roll_deg", CFG_REAL, "deg", "0", -180, 180, IN_STATION(roll_deg),
+     .help = "After the pitch, about the head's y axis: the x axis (right) sinks."},
+    {"stations[].lat_deg", CFG_REAL, "deg", "", -90, 90, IN_STATION(lat_deg),
+     .help = "Geodetic latitude of the head's origin, WGS 84. A place on the Earth, in one form, is required without "
+             "scene.anchor unless output.crs is local."},
+    {"stations[].lon_deg", CFG_REAL, "deg", "", -180, 180, IN_STATION(lon_deg), .help = "Longitude; with lat_deg."},
+    {"stations[].height_m", CFG_REAL, "m", "", -1000, 10000, IN_STATION(height_m),
+     .help = "Height above the ellipsoid; with lat_deg or easting_m."},
+    {"stations[].utm_zone", CFG_COUNT, NULL, "", 0, 60, IN_STATION(utm_zone),
+     .help = "UTM zone, 0: UPS; with easting_m. That of a scene.anchor of source utm when not given."},
+    {"stations[].hemisphere", CFG_ENUM, .def = "", .names = hemisphere_names, IN_STATION(north),
+     .help = "Of the zone; as utm_zone."},
+    {"stations[].easting_m", CFG_REAL, "m", "", -1e7, 1e7, IN_STATION(easting_m),
+     .help = "UTM or UPS easting of the head's origin, with false origin."},
+    {"stations[].northing_m", CFG_REAL, "m", "", -1e7, 2e7, IN_STATION(northing_m), .help = "Northing; with easting_m."},
+    {"stations[].ecef_m", CFG_VEC3, "m", "", -1e7, 1e7, IN_STATION(ecef_m),
+     .help = "The head's origin in ECEF, WGS 84: X, Y, Z."},
 
     {"platform", CFG_MAP, .help = "What the head stands on: a tripod, or something that moves."},
     {"platform.kind", CFG_ENUM, .def = "static", .names = platform_names, IN_CONFIG(platform.kind),
@@ -123,13 +168,21 @@ static const struct cfg_key config_keys[] = {
      .help = "UTM zone, only with crs: utm; 0: by position, UPS near the poles."},
     {"output.layout", CFG_ENUM, .def = "polar", .names = layout_names, IN_CONFIG(layout),
      .help = "polar: range and encoders, as a head measures; geo: coordinates from the anchor."},
+    {"output.heights", CFG_ENUM, .def = "ellipsoid", .names = heights_names, IN_CONFIG(heights),
+     .help = "Of utm and geodetic points; geoid needs GeographicLib's data, auto takes them where they are installed."},
+    {"output.tolerance_m", CFG_REAL, "m", "1e-6", 1e-7, 1, IN_CONFIG(tolerance_m),
+     .help = "What georeferencing may add to a point's error: the cheapest method that keeps it is used."},
+    {"output.georef", CFG_ENUM, .def = "auto", .names = georef_names, IN_CONFIG(georef),
+     .help = "Method of utm and geodetic points; auto: as `scanhead plan` says."},
     {"output.scale_m", CFG_REAL, "m", "0", 0, 1, IN_CONFIG(scale_m), .allowed = "0 (automatic) or 1e-6 to 1 m",
-     .help = "Metres per count of a coordinate; range_max_m of the profile must fit into 31 bits."},
+     .help = "Metres per count of a coordinate, at most, and of a range; range_max_m of the profile must fit into 31 bits."},
 
     {"links", CFG_LIST, .min = 0, .max = CONFIG_MAX_LINKS, LIST_OF(link, n_links),
      .help = "Where the head can be reached; none is needed to record off line."},
     {"links[]", CFG_MAP, .help = "A link."},
     {"links[].type", CFG_ENUM, .names = link_names, IN_LINK(type), .help = "Kind of link."},
+    {"links[].protocol", CFG_ENUM, .def = "native", .names = protocol_names, IN_LINK(protocol),
+     .help = "native: the head's stream and commands; nmea: the GNSS receiver, NMEA 0183 out, nothing in."},
     {"links[].path", CFG_PATH, .def = "", IN_LINK(path),
      .help = "pty: symbolic link to the terminal (optional); file: file to write (required)."},
     {"links[].address", CFG_TEXT, .def = "", IN_LINK(address), .help = "tcp: address to listen on; 127.0.0.1 when not given."},
@@ -153,8 +206,32 @@ static const struct cfg_key config_keys[] = {
     {"loop.threads", CFG_COUNT, NULL, "0", 0, 64, IN_CONFIG(threads), .help = "Casting threads; 0: one per processor."},
     {"loop.pace", CFG_ENUM, .def = "realtime", .names = pace_names, IN_CONFIG(pace),
      .help = "realtime: by the clock; fast: as fast as it computes; step: a client grants time."},
-    {"loop.utc_epoch_s", CFG_REAL, "s", "0", 0, 8589934592.0, IN_CONFIG(utc_epoch_s),
-     .help = "UTC of power-up, seconds since 1970; 0: unknown."},
+
+    {"time", CFG_MAP, .help = "Time of day: UTC and PPS; and errors of the head's clock, for tests of synchronisation."},
+    {"time.epoch", CFG_TEXT, .def = "none", IN_CONFIG(time.epoch),
+     .allowed = "none, utc, tai, or a time after 1980-01-06 such as 2026-01-01T00:00:00Z",
+     .help = "Time of power-up: UTC, or utc or tai for the system's clock at that moment; none: the head doesn't know."},
+    {"time.offset_s", CFG_REAL, "s", "0", -1e6, 1e6, IN_CONFIG(time.offset_s),
+     .help = "The head's clock is ahead of the true time. Concerns UTC, GPS time and PPS of the head, not the receiver."},
+    {"time.drift_ppm", CFG_REAL, "ppm", "0", -1000, 1000, IN_CONFIG(time.drift_ppm), .help = "And gains, from power-up."},
+    {"time.jump_s", CFG_REAL, "s", "0", -1e6, 1e6, IN_CONFIG(time.jump_s), .help = "And is set on by this, once,"},
+    {"time.jump_at_s", CFG_REAL, "s", "0", 0, 1e8, IN_CONFIG(time.jump_at_s), .help = "so long after power-up."},
+
+    {"gnss", CFG_MAP, .help = "The GNSS receiver, which speaks on links of protocol nmea; it needs the time."},
+    {"gnss.rate_hz", CFG_COUNT, "Hz", "1", 1, 20, IN_CONFIG(gnss.rate_hz), .allowed = "1, 2, 4, 5, 10 or 20 Hz",
+     .help = "Positions per second."},
+    {"gnss.talker", CFG_ENUM, .def = "GN", .names = talker_names, IN_CONFIG(gnss.talker),
+     .help = "First letters of its sentences."},
+    {"gnss.quality", CFG_COUNT, NULL, "1", 0, 5, IN_CONFIG(gnss.quality),
+     .allowed = "0 none, 1 autonomous, 2 differential, 4 RTK fixed, 5 RTK float", .help = "Quality of the fix, as in GGA."},
+    {"gnss.satellites", CFG_COUNT, NULL, "12", 0, 99, IN_CONFIG(gnss.satellites), .help = "Satellites used, as in GGA."},
+    {"gnss.hdop", CFG_REAL, NULL, "0.7", 0.1, 99.9, IN_CONFIG(gnss.hdop), .help = "Horizontal dilution of precision."},
+    {"gnss.accuracy_m", CFG_REAL, "m", "0", 0, 1000, IN_CONFIG(gnss.accuracy_m),
+     .help = "One sigma of the noise east, north and up, each position by itself; reproducible by noise.seed. 0: exact."},
+    {"gnss.lever_arm_m", CFG_VEC3, "m", "[0, 0, 0]", -100, 100, IN_CONFIG(gnss.lever_arm_m),
+     .help = "The antenna from the head's origin, in the head's frame: right, forward, up."},
+    {"gnss.geoid_separation_m", CFG_REAL, "m", "0", -120, 120, IN_CONFIG(gnss.geoid_separation_m),
+     .help = "Geoid above the ellipsoid: altitude in GGA is the ellipsoidal height less this."},
 };
 
 #define FIGURE .flags = CFG_FIGURE

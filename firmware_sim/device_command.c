@@ -54,6 +54,7 @@ void device_do_command(struct device *device, uint32_t session, const char *line
     struct command_device *cmd = &device->cmd;
     cmd->state = device_visible_state(device, released);
     cmd->t_ns = (int64_t)released * device->tick_ns;
+    device_set_time_texts(device);
     command_execute(cmd, session, line, out);
     if (out->took_control) device_push_event(device, NATIVE_EV_CONTROL, session, 0, 0, "taken");
     if (out->error != 0)
@@ -142,7 +143,7 @@ static int set_limits(struct device *device, struct sh_err *err)
     device->cmd.idn = device->idn;
     device->cmd.step_allowed = cfg->pace == PACE_STEP;
     device->cmd.pose_allowed = cfg->platform.kind == PLATFORM_LIVE;
-    memcpy(device->cmd.pose_centre_m, cfg->station[0].position_m, sizeof device->cmd.pose_centre_m);
+    memcpy(device->cmd.pose_centre_m, device->site->station[0].at.position_m, sizeof device->cmd.pose_centre_m);
     device->cmd.pose_reach_m = cfg->platform.reach_m;
     return SH_OK;
 }
@@ -173,6 +174,8 @@ int device_create(const struct site *site, const struct device_options *options,
         device->end_tick = (uint64_t)ceil(options->duration_s * (double)device->tick_hz);
     int rc = set_limits(device, err);
     if (rc == SH_OK) rc = check_live(device, err);
+    if (rc == SH_OK) rc = head_clock_create(site->cfg, &device->clock, err);
+    gnss_init(&device->gnss, site, &device->clock);
     if (rc == SH_OK) rc = open_journals(device, err);
     if (rc != SH_OK) {
         device_free(device);

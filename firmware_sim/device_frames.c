@@ -61,8 +61,10 @@ void device_fill_descriptor(const struct device *device, struct native_descripto
 
 void device_fill_anchor(const struct device *device, struct native_anchor *a)
 {
-    static const uint32_t crs[] = {
-        [GEOREF_LOCAL] = NATIVE_CRS_LOCAL, [GEOREF_ECEF] = NATIVE_CRS_ECEF, [GEOREF_UTM] = NATIVE_CRS_UTM};
+    static const uint32_t crs[] = {[GEOREF_LOCAL] = NATIVE_CRS_LOCAL,
+                                   [GEOREF_ECEF] = NATIVE_CRS_ECEF,
+                                   [GEOREF_UTM] = NATIVE_CRS_UTM,
+                                   [GEOREF_GEODETIC] = NATIVE_CRS_GEODETIC};
     const struct site_station *s = &device->site->station[device->station];
     memset(a, 0, sizeof *a);
     a->crs = crs[device->site->cfg->crs];
@@ -70,18 +72,20 @@ void device_fill_anchor(const struct device *device, struct native_anchor *a)
     a->station = device->station + 1;
     georef_anchor(s->georef, a->anchor);
     a->scale_m = device->site->scale_m;
-    a->lat_deg = s->station->lat_deg;
-    a->lon_deg = s->station->lon_deg;
-    a->height_m = s->station->height_m;
-    memcpy(a->station_m, s->station->position_m, sizeof a->station_m);
-    memcpy(a->rotation, s->rotation, sizeof a->rotation);
+    a->lat_deg = s->at.lat_deg;
+    a->lon_deg = s->at.lon_deg;
+    a->height_m = s->at.height_m;
+    memcpy(a->station_m, s->at.position_m, sizeof a->station_m);
+    memcpy(a->rotation, s->at.rotation, sizeof a->rotation);
     a->moving = (uint32_t)device->site->moving;
+    memcpy(a->scale, s->scale, sizeof a->scale);
+    georef_axes(s->georef, a->axes);
+    a->heights = georef_has_geoid(s->georef) ? NATIVE_HEIGHTS_GEOID : NATIVE_HEIGHTS_ELLIPSOID;
 }
 
 void device_fill_telemetry(const struct device *device, uint64_t tick, struct native_telemetry *t)
 {
     const struct device_counters *c = &device->counters;
-    double epoch_s = device->site->cfg->utc_epoch_s;
     memset(t, 0, sizeof *t);
     t->state = (uint32_t)device->state;
     t->scan = device->scan;
@@ -92,5 +96,7 @@ void device_fill_telemetry(const struct device *device, uint64_t tick, struct na
     t->late_blocks = atomic_load(&c->late_blocks);
     t->late_max_us = (uint32_t)(atomic_load(&c->late_max_ns) / 1000);
     t->errors_queued = device->cmd.queue.count;
-    t->utc_ns = epoch_s > 0.0 ? llround(epoch_s * 1e6) * 1000 + (int64_t)tick * device->tick_ns : 0;
+    if (device->clock.source != HEAD_CLOCK_NONE)
+        t->utc_ns =
+            utc_posix_from_tai(&device->clock.table, head_clock_ns(&device->clock, (int64_t)tick * device->tick_ns));
 }

@@ -7,6 +7,7 @@
 const struct cmd cmd_table[] = {
     {"run", "CONFIG [options]", "serve the head on its links until stopped", cmd_run},
     {"record", "SOURCE -o FILE [options]", "write the points of a scan to files", cmd_record},
+    {"plan", "CONFIG [options]", "which method each stage will use, its error bound and its cost", cmd_plan},
     {"map", "CONFIG -o FILE.png [options]", "scan map of the stations, from above", cmd_map},
     {"report", "CONFIG CLOUD [options]", "distance of a recording's points from the scene", cmd_report},
     {"check", "CONFIG [options]", "validate configuration, scene and links; nothing runs", cmd_check},

@@ -63,9 +63,9 @@ struct scanhead *offline_scanhead(struct offline *offline)
     return offline->sh;
 }
 
-const struct scene *offline_scene(const struct offline *offline)
+const struct site *offline_site(const struct offline *offline)
 {
-    return offline->site->scene;
+    return offline->site;
 }
 
 void offline_close(struct offline *offline)

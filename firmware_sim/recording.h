@@ -36,7 +36,7 @@ struct offline;
 /* Loads and runs the head of a configuration; its own links are left closed. cfg is changed (pace, links). */
 int offline_open(struct config *cfg, const struct sh_report *report, struct offline **out, struct sh_err *err);
 struct scanhead *offline_scanhead(struct offline *offline);
-const struct scene *offline_scene(const struct offline *offline);
+const struct site *offline_site(const struct offline *offline);
 void offline_close(struct offline *offline);
 
 #endif

@@ -1,9 +1,11 @@
+#include "firmware_sim/site_georef.h"
 #include "firmware_sim/site_platform.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/locate.h"
 #include "core/rng.h"
 
 static int is_moving(const struct config_mesh *mesh)
@@ -103,11 +105,11 @@ static double distance_m(const double a[3], const double b[3])
 }
 
 /* How far the stations that will share a BVH lie from its origin. */
-static double station_reach(const struct config *cfg, const double origin_m[3])
+static double station_reach(const struct site *site, const double origin_m[3])
 {
     double reach_m = 0.0;
-    for (uint32_t i = 0; i < cfg->n_stations; i++) {
-        double d = distance_m(cfg->station[i].position_m, origin_m);
+    for (uint32_t i = 0; i < site->cfg->n_stations; i++) {
+        double d = distance_m(site->station[i].at.position_m, origin_m);
         if (d <= SITE_BVH_REACH_M && d > reach_m) reach_m = d;
     }
     return reach_m;
@@ -124,55 +126,54 @@ static int find_bvh(struct site *site, const double station_m[3], const struct s
             return SH_OK;
         }
     }
-    int rc =
-        bvh_create(site->scene, station_m, station_reach(site->cfg, station_m), site->cfg->threads, report, out, err);
+    int rc = bvh_create(site->scene, station_m, station_reach(site, station_m), site->cfg->threads, report, out, err);
     if (rc != SH_OK) return rc;
     site->bvh[site->n_bvh++] = *out;
     return site->cfg->order_exactly ? bvh_order_exactly(*out, err) : SH_OK;
 }
 
-static int add_station(struct site *site, const struct config_station *station, const struct sh_report *report,
-                       struct sh_err *err)
+/* All places are known before the first BVH is built. */
+static int place_stations(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
-    const struct config *cfg = site->cfg;
-    struct site_station *s = &site->station[site->n_stations];
-    struct georef_spec spec = {.crs = cfg->crs,
-                               .utm_zone = cfg->utm_zone,
-                               .lat_deg = station->lat_deg,
-                               .lon_deg = station->lon_deg,
-                               .height_m = station->height_m};
-    memcpy(spec.station_m, station->position_m, sizeof spec.station_m);
-    s->station = station;
-    cast_rotation(station->heading_deg * M_PI / 180.0, s->rotation);
-    int rc = SH_OK;
-    if (site->moving)
-        s->bvh = site->bvh[0];
-    else
-        rc = find_bvh(site, station->position_m, report, &s->bvh, err);
-    if (rc == SH_OK) rc = georef_create(&spec, &s->georef, err);
-    if (rc == SH_OK) site->n_stations++;
+    int rc = placement_find_anchor(site->cfg, report, &site->anchor, err);
+    for (uint32_t i = 0; i < site->cfg->n_stations && rc == SH_OK; i++)
+        rc = placement_find(site->cfg, i, &site->anchor, site->scene, &site->station[i].at, err);
     return rc;
 }
 
-/* The finest 1e-6 x 10^n m with which the head's whole range, from all of its path, fits into 31 bits, with 1 % left
- * for scale and noise. */
-static double choose_scale(const struct config *cfg, double path_reach_m)
+int site_utm_zone(const struct site *site)
 {
-    if (cfg->scale_m > 0.0) return cfg->scale_m;
-    double scale_m = 1e-6;
-    while ((cfg->profile.range_max_m + path_reach_m) * 1.01 / scale_m > 2147483647.0)
-        scale_m *= 10.0;
-    return scale_m;
+    const struct geoframe *frame = &site->anchor.frame;
+    const struct placement *first = &site->station[0].at;
+    struct locate_grid utm;
+    if (site->cfg->utm_zone != 0 || !site->anchor.known || frame->kind == GEOFRAME_GRID) return site->cfg->utm_zone;
+    int tangent = frame->kind == GEOFRAME_TANGENT;
+    const struct georef_place at = {tangent ? frame->lat_deg : first->lat_deg,
+                                    tangent ? frame->lon_deg : first->lon_deg, 0.0};
+    int rc = locate_in_grid(&at, 0, &utm, NULL);
+    return rc == SH_OK ? utm.zone : 0;
 }
 
-static int check_path_fits(const struct site *site, struct sh_err *err)
+static int add_station(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
-    double most_m = site->cfg->profile.range_max_m + site->path_reach_m;
-    if (!site->moving || site->cfg->layout != LINE_GEO || most_m * 1.01 / site->scale_m < 0x1p31) return SH_OK;
-    return sh_fail(
-        err, SH_EINPUT,
-        "%s: output.scale_m: points up to %.0f m from the station do not fit into 31 bits; allowed above %.2g m",
-        site->cfg->file, most_m, most_m * 1.01 / 0x1p31);
+    const struct config *cfg = site->cfg;
+    uint32_t i = site->n_stations;
+    struct site_station *s = &site->station[i];
+    struct georef_spec spec = {.crs = cfg->crs, .utm_zone = site_utm_zone(site), .geoid = site->geoid};
+    s->station = &cfg->station[i];
+    int rc = placement_georef(&s->at, &site->anchor, &spec, err);
+    if (site->moving)
+        s->bvh = site->bvh[0];
+    else if (rc == SH_OK)
+        rc = find_bvh(site, s->at.position_m, report, &s->bvh, err);
+    if (rc == SH_OK) rc = georef_create(&spec, &s->georef, err);
+    if (rc != SH_OK) return rc;
+    site->n_stations++;
+    int epsg = georef_epsg(s->georef), first = georef_epsg(site->station[0].georef);
+    if (epsg != first)
+        sh_warn(report, "%s: station %s is in EPSG %d, station %s in %d: their points do not fit together", cfg->file,
+                s->station->name, epsg, site->station[0].station->name, first);
+    return site_plan_georef(site, s, report, err);
 }
 
 int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err)
@@ -182,12 +183,13 @@ int site_load(const struct config *cfg, const struct sh_report *report, struct s
     if (site == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     site->cfg = cfg;
     site->moving = cfg->platform.kind != PLATFORM_STATIC;
-    int rc = load_scene(site, report, err);
+    int rc = site_open_geoid(site, err);
+    if (rc == SH_OK) rc = load_scene(site, report, err);
+    if (rc == SH_OK) rc = place_stations(site, report, err);
     if (rc == SH_OK && site->moving) rc = site_load_platform(site, report, err);
-    site->scale_m = choose_scale(cfg, site->path_reach_m);
-    if (rc == SH_OK) rc = check_path_fits(site, err);
     for (uint32_t i = 0; i < cfg->n_stations && rc == SH_OK; i++)
-        rc = add_station(site, &cfg->station[i], report, err);
+        rc = add_station(site, report, err);
+    if (rc == SH_OK) rc = site_choose_scale(site, err);
     if (rc != SH_OK) {
         site_free(site);
         return rc;
@@ -210,6 +212,7 @@ void site_free(struct site *site)
         scene_free(site->mover[i].scene);
     }
     scene_free(site->scene);
+    georef_geoid_free(site->geoid);
     free(site);
 }
 
@@ -225,8 +228,8 @@ void site_cast_setup(const struct site *site, uint32_t station, struct cast_setu
     memset(setup, 0, sizeof *setup);
     setup->bvh = s->bvh;
     setup->georef = s->georef;
-    memcpy(setup->station_m, s->station->position_m, sizeof setup->station_m);
-    memcpy(setup->rotation, s->rotation, sizeof setup->rotation);
+    memcpy(setup->station_m, s->at.position_m, sizeof setup->station_m);
+    memcpy(setup->rotation, s->at.rotation, sizeof setup->rotation);
     setup->range_min_m = profile->range_min_m;
     setup->range_max_m = profile->range_max_m;
     setup->noise_on = site->cfg->noise_on;
@@ -236,5 +239,6 @@ void site_cast_setup(const struct site *site, uint32_t station, struct cast_setu
     setup->mirror_counts = counts_or_ideal(profile->mirror_counts);
     setup->pan_counts = counts_or_ideal(profile->pan_counts);
     setup->layout = site->cfg->layout;
-    setup->range_scale_m = setup->xyz_scale_m = site->scale_m;
+    setup->range_scale_m = site->scale_m;
+    memcpy(setup->xyz_scale, s->scale, sizeof setup->xyz_scale);
 }

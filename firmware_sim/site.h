@@ -5,15 +5,19 @@
 
 #include "core/cast.h"
 #include "core/georef.h"
+#include "core/plan.h"
 #include "core/pose.h"
 #include "core/scene.h"
 #include "firmware_sim/config.h"
+#include "firmware_sim/placement.h"
 
 struct site_station {
     const struct config_station *station;
     struct bvh *bvh; /* shared where stations are near each other */
     struct georef *georef;
-    double rotation[9]; /* socs -> prcs */
+    struct placement at;
+    double scale[3];      /* of geo points on the wire, units of the CRS per count */
+    struct plan_row plan; /* how the georef's method was chosen */
 };
 
 struct site_mover {
@@ -32,12 +36,14 @@ struct site_stretch {
 struct site {
     const struct config *cfg;
     struct scene *scene; /* what stands still */
+    struct placement_anchor anchor;
     struct site_mover mover[CAST_MAX_MOVERS];
     uint32_t n_movers, n_surfaces; /* surfaces of the scene, then of the movers */
     struct bvh *bvh[CONFIG_MAX_STATIONS];
     uint32_t n_bvh;
     struct site_station station[CONFIG_MAX_STATIONS];
     uint32_t n_stations;
+    struct georef_geoid *geoid; /* NULL: heights are ellipsoidal */
     /* A moving head; the stations then only say where on Earth the scene lies. */
     int moving;
     struct pose mount;            /* of the head on the platform */
@@ -53,9 +59,16 @@ struct site {
 /* Stations further than this from a BVH's origin get one of their own: a float there has steps of 0.06 mm. */
 #define SITE_BVH_REACH_M 1000.0
 
+/* Room left beyond the head's largest range, for noise. */
+#define SITE_MARGIN 1.01
+
 /* cfg must outlive the site. */
 int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err);
 void site_free(struct site *site);
+
+/* UTM zone for all stations of an anchored scene: that of the anchor, or of the first station; else, and where
+ * output.utm_zone or the scene's own grid says it, as the configuration has it (0: by position). */
+int site_utm_zone(const struct site *site);
 
 /* Names of a label below n_surfaces. */
 const struct scene_surface *site_surface(const struct site *site, uint32_t label);

@@ -101,7 +101,7 @@ static void measure_path(struct site *site)
     for (uint32_t s = 0; s < site->cfg->n_stations; s++)
         for (size_t i = 0; i < site->n_knots; i++)
             site->path_reach_m =
-                fmax(site->path_reach_m, distance_m(site->cfg->station[s].position_m, site->knot[i].pose.position_m));
+                fmax(site->path_reach_m, distance_m(site->station[s].at.position_m, site->knot[i].pose.position_m));
 }
 
 int site_load_platform(struct site *site, const struct sh_report *report, struct sh_err *err)
@@ -114,11 +114,11 @@ int site_load_platform(struct site *site, const struct sh_report *report, struct
     if (p->kind == PLATFORM_LIVE) {
         double reach_m = 0.0;
         for (uint32_t i = 1; i < cfg->n_stations; i++)
-            reach_m = fmax(reach_m, distance_m(cfg->station[0].position_m, cfg->station[i].position_m));
+            reach_m = fmax(reach_m, distance_m(site->station[0].at.position_m, site->station[i].at.position_m));
         const double *arm = p->mount_m;
         double head_m = p->reach_m + sqrt(arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2]);
         site->path_reach_m = head_m + reach_m;
-        return add_stretch(site, cfg->station[0].position_m, head_m, INT64_MAX, report, err);
+        return add_stretch(site, site->station[0].at.position_m, head_m, INT64_MAX, report, err);
     }
     int rc = load_knots(site, report, err);
     if (rc == SH_OK) measure_path(site);

@@ -79,11 +79,27 @@ void caster_get_counters(const struct caster *caster, struct cast_counters *coun
     *counters = caster->counters;
 }
 
+void cast_attitude(double heading_rad, double pitch_rad, double roll_rad, double rotation[9])
+{
+    double sh = sin(heading_rad), ch = cos(heading_rad), sp = sin(pitch_rad), cp = cos(pitch_rad);
+    double sr = sin(roll_rad), cr = cos(roll_rad);
+    const double r[9] = {ch * cr + sh * sp * sr,
+                         sh * cp,
+                         ch * sr - sh * sp * cr,
+                         -sh * cr + ch * sp * sr,
+                         ch * cp,
+                         -sh * sr - ch * sp * cr,
+                         -cp * sr,
+                         sp,
+                         cp * cr};
+    memcpy(rotation, r, sizeof r);
+}
+
 void cast_rotation(double heading_rad, double rotation[9])
 {
-    double s = sin(heading_rad), c = cos(heading_rad);
-    const double r[9] = {c, s, 0.0, -s, c, 0.0, 0.0, 0.0, 1.0};
-    memcpy(rotation, r, sizeof r);
+    cast_attitude(heading_rad, 0.0, 0.0, rotation);
+    for (int i = 0; i < 9; i++)
+        rotation[i] += 0.0; /* no negative zeros */
 }
 
 uint32_t cast_encoder_count(double turn, double counts_per_turn)
@@ -207,9 +223,28 @@ static int reading_rotation(const struct cast_setup *s, double to_crs[9])
     return linear;
 }
 
-/* Positions as a head computes them: from the range and from what its encoders read. */
-static void positions(struct caster *c, const struct cast_setup *s, int linear, struct line_block *block, uint32_t at,
-                      uint32_t n)
+/* What could not be said is no echo, and counted. */
+static uint32_t take_back(struct caster *c, struct line_block *block, uint32_t at, uint32_t n)
+{
+    uint32_t taken = 0;
+    for (uint32_t i = at; i < at + n; i++) {
+        if (block->echo[i] == 0) continue;
+        if (block->a[i] != (uint32_t)LINE_XYZ_NONE && block->b[i] != (uint32_t)LINE_XYZ_NONE &&
+            block->c[i] != (uint32_t)LINE_XYZ_NONE)
+            continue;
+        block->a[i] = block->b[i] = block->c[i] = (uint32_t)LINE_XYZ_NONE;
+        block->echo[i] = 0;
+        block->label[i] = LINE_LABEL_NONE;
+        taken++;
+    }
+    c->counters.unfit += taken;
+    return taken;
+}
+
+/* Positions as a head computes them: from the range and from what its encoders read. Returns how many echoes had to be
+ * taken back. */
+static uint32_t positions(struct caster *c, const struct cast_setup *s, int linear, struct line_block *block,
+                          uint32_t at, uint32_t n)
 {
     const struct moving_rays *m = &c->moving;
     if (s->n_knots != 0)
@@ -217,7 +252,8 @@ static void positions(struct caster *c, const struct cast_setup *s, int linear, 
     else
         kernel_scale(c->range_m, n, c->ex, c->ey, c->ez);
     if (!linear) georef_forward(s->georef, n, c->ex, c->ey, c->ez, c->ex, c->ey, c->ez);
-    kernel_geo(c->ex, c->ey, c->ez, s->xyz_scale_m, n, block->a + at, block->b + at, block->c + at);
+    uint32_t unfit = kernel_geo(c->ex, c->ey, c->ez, s->xyz_scale, n, block->a + at, block->b + at, block->c + at);
+    return unfit == 0 ? 0 : take_back(c, block, at, n);
 }
 
 /* How far the origins lie from the first of them. */
@@ -350,7 +386,7 @@ static uint32_t cast_chunk(struct caster *c, const struct cast_setup *s, const s
     if (s->noise_on) kernel_noise(s, run->pulse0 + at, n, c->range_m);
     ends(c, CAST_NOISE);
     if (s->layout == LINE_GEO)
-        positions(c, s, linear, block, at, n);
+        echoes -= positions(c, s, linear, block, at, n);
     else
         kernel_polar(s, c->range_m, c->mirror_turn, c->pan_turn, n, block->a + at, block->b + at, block->c + at);
     ends(c, CAST_POSITIONS);

@@ -253,22 +253,25 @@ void kernel_polar(const struct cast_setup *setup, const double *range_m, const d
 }
 
 VEC_CLONES
-static void counts_of(const double *restrict x, double per_m, uint32_t n, uint32_t *restrict out)
+static uint32_t counts_of(const double *restrict x, double per_unit, uint32_t n, uint32_t *restrict out)
 {
+    uint64_t unfit = 0;
     for (uint32_t i = 0; i < n; i++) {
         uint64_t bits;
-        vec_round(x[i] * per_m, &bits);
-        bits = x[i] == x[i] ? bits : (uint64_t)(uint32_t)LINE_XYZ_NONE;
+        double count = x[i] * per_unit;
+        vec_round(count, &bits);
+        uint64_t fits = fabs(count) < 2147483647.0; /* not-a-number does not */
+        unfit += (uint64_t)(x[i] == x[i]) & (fits ^ 1);
+        bits = fits ? bits : (uint64_t)(uint32_t)LINE_XYZ_NONE;
         out[i] = (uint32_t)bits;
     }
+    return (uint32_t)unfit;
 }
 
-void kernel_geo(const double *x, const double *y, const double *z, double scale_m, uint32_t n, uint32_t *a, uint32_t *b,
-                uint32_t *c)
+uint32_t kernel_geo(const double *x, const double *y, const double *z, const double scale[3], uint32_t n, uint32_t *a,
+                    uint32_t *b, uint32_t *c)
 {
-    counts_of(x, 1.0 / scale_m, n, a);
-    counts_of(y, 1.0 / scale_m, n, b);
-    counts_of(z, 1.0 / scale_m, n, c);
+    return counts_of(x, 1.0 / scale[0], n, a) + counts_of(y, 1.0 / scale[1], n, b) + counts_of(z, 1.0 / scale[2], n, c);
 }
 
 VEC_CLONES

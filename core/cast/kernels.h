@@ -71,9 +71,10 @@ void kernel_labels(const uint32_t *label, const uint8_t *echo, uint32_t n, uint1
 /* Wire numbers. a: range in counts, 0 for none; b, c: encoder counts modulo a turn. */
 void kernel_polar(const struct cast_setup *setup, const double *range_m, const double *mirror_turn,
                   const double *pan_turn, uint32_t n, uint32_t *a, uint32_t *b, uint32_t *c);
-/* Coordinates in counts of scale_m, LINE_XYZ_NONE for NaN. */
-void kernel_geo(const double *x, const double *y, const double *z, double scale_m, uint32_t n, uint32_t *a, uint32_t *b,
-                uint32_t *c);
+/* Coordinates in counts of scale[], LINE_XYZ_NONE for NaN and for what doesn't fit. Returns how many coordinates did
+ * not. */
+uint32_t kernel_geo(const double *x, const double *y, const double *z, const double scale[3], uint32_t n, uint32_t *a,
+                    uint32_t *b, uint32_t *c);
 void kernel_scale(const double *range_m, uint32_t n, double *x, double *y, double *z);
 
 /* Firing times after the run's first pulse: j * quot + floor((acc + j * rem) / den). */

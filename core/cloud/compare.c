@@ -49,11 +49,12 @@ static void to_scene(const struct work *w, size_t i, double p_prcs[3])
 {
     const double *p = w->cloud->xyz_m[i];
     const struct georef *georef = georef_of(w->cloud, w->site, i);
-    double anchor[3] = {0, 0, 0}, d_crs[3];
-    if (georef != NULL) georef_anchor(georef, anchor);
+    double d_crs[3];
     for (int k = 0; k < 3; k++)
-        d_crs[k] = p_prcs[k] = p[k] - anchor[k];
-    if (georef != NULL) georef_reverse(georef, d_crs, p_prcs);
+        p_prcs[k] = p[k];
+    if (georef == NULL) return;
+    georef_difference(georef, p, d_crs);
+    georef_reverse(georef, d_crs, p_prcs);
 }
 
 /* Whatever the reach, what is found within it is the nearest. */

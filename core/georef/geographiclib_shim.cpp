@@ -4,39 +4,45 @@
 #include <cstdio>
 #include <exception>
 #include <limits>
+#include <memory>
 #include <vector>
 
 #include <GeographicLib/Geocentric.hpp>
+#include <GeographicLib/Geoid.hpp>
 #include <GeographicLib/LocalCartesian.hpp>
+#include <GeographicLib/Math.hpp>
 #include <GeographicLib/PolarStereographic.hpp>
 #include <GeographicLib/TransverseMercator.hpp>
 #include <GeographicLib/UTMUPS.hpp>
 
 using GeographicLib::Geocentric;
+using GeographicLib::Geoid;
 using GeographicLib::LocalCartesian;
 using GeographicLib::PolarStereographic;
 using GeographicLib::TransverseMercator;
 using GeographicLib::UTMUPS;
 
-/* UTMUPS chooses and checks zone and hemisphere for the station, once. Points go through the projections that
- * it uses itself: UTMUPS would add 10,000 km to a point beyond the equator and throw beyond the edge of its
- * table. */
+struct shim_geoid {
+    Geoid geoid;
+};
+
+/* A UTM zone or UPS, without false origin. */
 struct shim_grid {
-    LocalCartesian local;
     int zone; /* 0: UPS */
     bool north;
-    double lon0_deg;
-    double anchor[3]; /* with false origin */
-    double x0, y0;    /* of the station, without */
-    double height_m;
+
+    void project(double lat, double lon, double &x, double &y, double &convergence, double &scale) const
+    {
+        if (zone == 0)
+            PolarStereographic::UPS().Forward(north, lat, lon, x, y, convergence, scale);
+        else
+            TransverseMercator::UTM().Forward(6.0 * zone - 183.0, lat, lon, x, y, convergence, scale);
+    }
 
     void project(double lat, double lon, double &x, double &y) const
     {
         double convergence, scale;
-        if (zone == 0)
-            PolarStereographic::UPS().Forward(north, lat, lon, x, y, convergence, scale);
-        else
-            TransverseMercator::UTM().Forward(lon0_deg, lat, lon, x, y, convergence, scale);
+        project(lat, lon, x, y, convergence, scale);
     }
 
     void unproject(double x, double y, double &lat, double &lon) const
@@ -45,11 +51,157 @@ struct shim_grid {
         if (zone == 0)
             PolarStereographic::UPS().Reverse(north, x, y, lat, lon, convergence, scale);
         else
-            TransverseMercator::UTM().Reverse(lon0_deg, x, y, lat, lon, convergence, scale);
+            TransverseMercator::UTM().Reverse(6.0 * zone - 183.0, x, y, lat, lon, convergence, scale);
+    }
+};
+
+/* UTMUPS chooses and checks zone and hemisphere for the station, once. Points go through the projections that
+ * it uses itself: UTMUPS would add 10,000 km to a point beyond the equator and throw beyond the edge of its
+ * table. */
+struct shim_map {
+    /* in: the scene frame */
+    bool from_grid;
+    LocalCartesian local; /* tangent */
+    double turn[9];       /* prcs -> its axes */
+    double centre_m[3];   /* from its origin, in its axes */
+    shim_grid in;         /* grid */
+    double in_x0, in_y0;  /* of the centre */
+    /* out */
+    shim_kind kind;
+    const shim_geoid *geoid;
+    shim_grid grid;
+    double place[3];  /* of the centre */
+    double anchor[3]; /* of the centre, with false origin */
+    double x0, y0;    /* of the centre, without */
+
+    double undulation(double lat, double lon) const
+    {
+        return geoid == nullptr ? 0.0 : geoid->geoid(lat, lon);
+    }
+
+    void set_frame(const shim_frame &frame)
+    {
+        from_grid = frame.is_grid != 0;
+        for (int i = 0; i < 9; i++)
+            turn[i] = frame.turn[i];
+        local.Reset(place[0], place[1], place[2]);
+        if (!from_grid) return;
+        double x, y;
+        bool north;
+        UTMUPS::Forward(place[0], place[1], in.zone, north, x, y, frame.zone == 0 ? int(UTMUPS::UPS) : frame.zone);
+        in.north = frame.zone == 0 ? north : frame.north != 0;
+        in.project(place[0], place[1], in_x0, in_y0);
+    }
+
+    /* Chooses zone and hemisphere; set_zone as for UTMUPS. Throws where the zone does not reach. */
+    void set_centre(int set_zone)
+    {
+        const double lat = place[0], lon = place[1];
+        anchor[2] = place[2] - undulation(lat, lon);
+        if (kind == SHIM_GEODETIC) {
+            anchor[0] = lat;
+            anchor[1] = lon;
+        } else if (kind == SHIM_ECEF) {
+            Geocentric::WGS84().Forward(lat, lon, place[2], anchor[0], anchor[1], anchor[2]);
+        } else {
+            UTMUPS::Forward(lat, lon, grid.zone, grid.north, anchor[0], anchor[1], set_zone);
+            grid.project(lat, lon, x0, y0);
+        }
+    }
+
+    /* d: from the centre, in prcs. */
+    void to_place(double dx, double dy, double dz, double &lat, double &lon, double &height) const
+    {
+        if (from_grid) {
+            in.unproject(in_x0 + dx, in_y0 + dy, lat, lon);
+            height = place[2] + dz;
+            return;
+        }
+        local.Reverse(centre_m[0] + (turn[0] * dx + turn[1] * dy + turn[2] * dz),
+                      centre_m[1] + (turn[3] * dx + turn[4] * dy + turn[5] * dz),
+                      centre_m[2] + (turn[6] * dx + turn[7] * dy + turn[8] * dz), lat, lon, height);
+    }
+
+    /* By d from the centre as it is, in prcs. */
+    void move_centre(const double d[3])
+    {
+        const bool was_north = grid.north;
+        const double false_x = anchor[0] - x0, false_y = anchor[1] - y0;
+        to_place(d[0], d[1], d[2], place[0], place[1], place[2]);
+        for (int i = 0; i < 3; i++)
+            centre_m[i] += turn[3 * i] * d[0] + turn[3 * i + 1] * d[1] + turn[3 * i + 2] * d[2];
+        in_x0 += d[0];
+        in_y0 += d[1];
+        set_centre(grid.zone);
+        if (kind != SHIM_GRID) return;
+        grid.north = was_north; /* no leap of 10,000 km on the equator */
+        grid.project(place[0], place[1], x0, y0);
+        anchor[0] = std::round(false_x) + x0;
+        anchor[1] = std::round(false_y) + y0;
+    }
+
+    void forward(double dx, double dy, double dz, double &x, double &y, double &z) const
+    {
+        double lat, lon, height;
+        to_place(dx, dy, dz, lat, lon, height);
+        if (kind == SHIM_ECEF) {
+            Geocentric::WGS84().Forward(lat, lon, height, x, y, z);
+            x -= anchor[0];
+            y -= anchor[1];
+            z -= anchor[2];
+            return;
+        }
+        z = (height - undulation(lat, lon)) - anchor[2];
+        if (kind == SHIM_GEODETIC) {
+            x = lat - place[0];
+            y = GeographicLib::Math::AngDiff(place[1], lon);
+            return;
+        }
+        grid.project(lat, lon, x, y);
+        x -= x0;
+        y -= y0;
+    }
+
+    void reverse(const double d[3], double out[3]) const
+    {
+        double lat = place[0] + d[0], lon = place[1] + d[1], height = d[2] + anchor[2], v[3];
+        if (kind == SHIM_GRID) grid.unproject(d[0] + x0, d[1] + y0, lat, lon);
+        if (kind == SHIM_ECEF)
+            Geocentric::WGS84().Reverse(anchor[0] + d[0], anchor[1] + d[1], anchor[2] + d[2], lat, lon, height);
+        else
+            height += undulation(lat, lon);
+        if (from_grid) {
+            in.project(lat, lon, out[0], out[1]);
+            out[0] -= in_x0;
+            out[1] -= in_y0;
+            out[2] = height - place[2];
+            return;
+        }
+        local.Forward(lat, lon, height, v[0], v[1], v[2]);
+        for (int i = 0; i < 3; i++)
+            v[i] -= centre_m[i];
+        for (int i = 0; i < 3; i++)
+            out[i] = turn[i] * v[0] + turn[3 + i] * v[1] + turn[6 + i] * v[2];
     }
 };
 
 static const double nan_m = std::numeric_limits<double>::quiet_NaN();
+
+/* Runs what may throw; the reason becomes a text. */
+template <typename F> static int attempt(char *why, size_t len, F f)
+{
+    try {
+        f();
+        return 0;
+    } catch (const std::exception &e) {
+        std::snprintf(why, len, "%s", e.what());
+    } catch (...) {
+        std::snprintf(why, len, "unknown failure in GeographicLib");
+    }
+    for (char *p = why; *p != 0; p++)
+        if (*p == '\n') *p = ' ';
+    return -1;
+}
 
 void shim_ecef(double lat_deg, double lon_deg, double height_m, double p_ecef[3], double rotation[9])
 {
@@ -66,62 +218,129 @@ void shim_ecef(double lat_deg, double lon_deg, double height_m, double p_ecef[3]
     }
 }
 
-struct shim_grid *shim_grid_create(double lat_deg, double lon_deg, double height_m, int zone, char *why, size_t len)
+void shim_geodetic(double lat_deg, double lon_deg, double height_m, const double d_local[3], double geodetic[3])
 {
-    struct shim_grid *grid = nullptr;
     try {
-        grid = new shim_grid;
-        grid->local.Reset(lat_deg, lon_deg, height_m);
-        UTMUPS::Forward(lat_deg, lon_deg, grid->zone, grid->north, grid->anchor[0], grid->anchor[1],
-                        zone == 0 ? int(UTMUPS::STANDARD) : zone);
-        grid->anchor[2] = height_m;
-        grid->height_m = height_m;
-        grid->lon0_deg = 6.0 * grid->zone - 183.0;
-        grid->project(lat_deg, lon_deg, grid->x0, grid->y0);
-        return grid;
-    } catch (const std::exception &e) {
-        std::snprintf(why, len, "%s", e.what());
+        LocalCartesian(lat_deg, lon_deg, height_m)
+            .Reverse(d_local[0], d_local[1], d_local[2], geodetic[0], geodetic[1], geodetic[2]);
     } catch (...) {
-        std::snprintf(why, len, "unknown failure in GeographicLib");
+        geodetic[0] = geodetic[1] = geodetic[2] = nan_m;
     }
-    delete grid;
-    return nullptr;
 }
 
-void shim_grid_free(struct shim_grid *grid)
+void shim_locate_ecef(const double p_ecef[3], double place[3])
 {
-    delete grid;
+    try {
+        Geocentric::WGS84().Reverse(p_ecef[0], p_ecef[1], p_ecef[2], place[0], place[1], place[2]);
+    } catch (...) {
+        place[0] = place[1] = place[2] = nan_m;
+    }
 }
 
-void shim_grid_anchor(const struct shim_grid *grid, double anchor[3])
+int shim_locate_utm(int zone, int north, const double grid[2], double lat_lon_deg[2], char *why, size_t len)
+{
+    return attempt(why, len,
+                   [&] { UTMUPS::Reverse(zone, north != 0, grid[0], grid[1], lat_lon_deg[0], lat_lon_deg[1]); });
+}
+
+int shim_to_utm(const double lat_lon_deg[2], int *zone, int *north, double grid[2], char *why, size_t len)
+{
+    return attempt(why, len, [&] {
+        bool n = false;
+        UTMUPS::Forward(lat_lon_deg[0], lat_lon_deg[1], *zone, n, grid[0], grid[1],
+                        *zone == 0 ? int(UTMUPS::STANDARD) : *zone);
+        *north = n;
+    });
+}
+
+struct shim_geoid *shim_geoid_open(char *why, size_t len)
+{
+    struct shim_geoid *geoid = nullptr;
+    attempt(why, len, [&] { geoid = new shim_geoid{Geoid(Geoid::DefaultGeoidName(), "", true, true)}; });
+    return geoid;
+}
+
+void shim_geoid_free(struct shim_geoid *geoid)
+{
+    delete geoid;
+}
+
+struct shim_map *shim_map_create(enum shim_kind kind, const double place[3], const struct shim_frame *frame, int zone,
+                                 const struct shim_geoid *geoid, char *why, size_t len)
+{
+    std::unique_ptr<shim_map> map;
+    int rc = attempt(why, len, [&] {
+        map.reset(new shim_map());
+        map->kind = kind;
+        map->geoid = geoid;
+        for (int i = 0; i < 3; i++)
+            map->place[i] = place[i];
+        map->place[1] = GeographicLib::Math::AngNormalize(place[1]);
+        map->set_frame(*frame);
+        map->set_centre(zone == 0 ? int(UTMUPS::STANDARD) : zone);
+    });
+    return rc == 0 ? map.release() : nullptr;
+}
+
+struct shim_map *shim_map_recentre(const struct shim_map *map, const double d_prcs[3], char *why, size_t len)
+{
+    std::unique_ptr<shim_map> moved;
+    int rc = attempt(why, len, [&] {
+        moved.reset(new shim_map(*map));
+        moved->move_centre(d_prcs);
+    });
+    return rc == 0 ? moved.release() : nullptr;
+}
+
+void shim_map_free(struct shim_map *map)
+{
+    delete map;
+}
+
+void shim_map_anchor(const struct shim_map *map, double anchor[3])
 {
     for (int i = 0; i < 3; i++)
-        anchor[i] = grid->anchor[i];
+        anchor[i] = map->anchor[i];
 }
 
-int shim_grid_epsg(const struct shim_grid *grid)
+void shim_map_place(const struct shim_map *map, double place[3])
 {
+    for (int i = 0; i < 3; i++)
+        place[i] = map->place[i];
+}
+
+int shim_map_epsg(const struct shim_map *map)
+{
+    if (map->kind == SHIM_GEODETIC) return 4979;
+    if (map->kind == SHIM_ECEF) return 4978;
     try {
-        return UTMUPS::EncodeEPSG(grid->zone, grid->north);
+        return UTMUPS::EncodeEPSG(map->grid.zone, map->grid.north);
     } catch (...) {
         return 0;
     }
 }
 
-void shim_grid_forward(const struct shim_grid *grid, size_t n, const double *dx, const double *dy, const double *dz,
-                       double *out_x, double *out_y, double *out_z)
+void shim_map_convergence(const struct shim_map *map, double *convergence_deg, double *scale)
+{
+    *convergence_deg = 0.0;
+    *scale = 1.0;
+    if (map->kind != SHIM_GRID) return;
+    char why[64];
+    attempt(why, sizeof why, [&] {
+        double x, y;
+        map->grid.project(map->place[0], map->place[1], x, y, *convergence_deg, *scale);
+    });
+}
+
+void shim_map_forward(const struct shim_map *map, size_t n, const double *dx, const double *dy, const double *dz,
+                      double *out_x, double *out_y, double *out_z)
 {
     for (size_t i = 0; i < n; i++) {
         double x = nan_m, y = nan_m, z = nan_m;
         /* Asked first: the projections turn some not-a-number into plain numbers. */
         if (std::isfinite(dx[i]) && std::isfinite(dy[i]) && std::isfinite(dz[i])) {
             try {
-                double lat, lon, height;
-                grid->local.Reverse(dx[i], dy[i], dz[i], lat, lon, height);
-                grid->project(lat, lon, x, y);
-                x -= grid->x0;
-                y -= grid->y0;
-                z = height - grid->height_m;
+                map->forward(dx[i], dy[i], dz[i], x, y, z);
             } catch (...) {
                 x = y = z = nan_m;
             }
@@ -132,16 +351,23 @@ void shim_grid_forward(const struct shim_grid *grid, size_t n, const double *dx,
     }
 }
 
-void shim_grid_reverse(const struct shim_grid *grid, const double d_grid[3], double d_local[3])
+void shim_map_reverse(const struct shim_map *map, const double d_map[3], double d_prcs[3])
 {
-    const double x = d_grid[0], y = d_grid[1], z = d_grid[2];
-    d_local[0] = d_local[1] = d_local[2] = nan_m;
-    if (!std::isfinite(x) || !std::isfinite(y) || !std::isfinite(z)) return;
+    d_prcs[0] = d_prcs[1] = d_prcs[2] = nan_m;
+    if (!std::isfinite(d_map[0]) || !std::isfinite(d_map[1]) || !std::isfinite(d_map[2])) return;
     try {
-        double lat, lon;
-        grid->unproject(x + grid->x0, y + grid->y0, lat, lon);
-        grid->local.Forward(lat, lon, z + grid->height_m, d_local[0], d_local[1], d_local[2]);
+        map->reverse(d_map, d_prcs);
     } catch (...) {
-        d_local[0] = d_local[1] = d_local[2] = nan_m;
+        d_prcs[0] = d_prcs[1] = d_prcs[2] = nan_m;
     }
+}
+
+int shim_utm_forward(double lat_deg, double lon_deg, int zone, struct shim_utm *out, char *why, size_t len)
+{
+    return attempt(why, len, [&] {
+        bool north = false;
+        UTMUPS::Forward(lat_deg, lon_deg, out->zone, north, out->easting_m, out->northing_m, out->convergence_deg,
+                        out->scale, zone == 0 ? int(UTMUPS::STANDARD) : zone);
+        out->north = north;
+    });
 }

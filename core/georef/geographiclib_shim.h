@@ -1,5 +1,5 @@
-/* C view of what we use of GeographicLib. Private to core/georef. No exception crosses: each becomes a text.
- */
+/* C view of what we use of GeographicLib. Private to core/georef. No exception crosses: each becomes a text, or
+ * not-a-number. */
 #ifndef CORE_GEOREF_GEOGRAPHICLIB_SHIM_H
 #define CORE_GEOREF_GEOGRAPHICLIB_SHIM_H
 
@@ -12,22 +12,59 @@ extern "C" {
 /* WGS 84 geocentric position, and the rotation (row by row) of east, north, up at it to X, Y, Z. */
 void shim_ecef(double lat_deg, double lon_deg, double height_m, double p_ecef[3], double rotation[9]);
 
-/* A local tangent frame and one grid zone. */
-struct shim_grid;
+/* east, north, up at a place -> latitude, longitude, height. */
+void shim_geodetic(double lat_deg, double lon_deg, double height_m, const double d_local[3], double geodetic[3]);
 
-/* zone: 1..60, or 0 for the standard zone, which beyond 84 N and 80 S is UPS. NULL on failure, with the
- * reason. */
-struct shim_grid *shim_grid_create(double lat_deg, double lon_deg, double height_m, int zone, char *why, size_t len);
-void shim_grid_free(struct shim_grid *grid);
+/* Geodetic place (degrees, degrees, metres) of a geocentric position; not-a-number on failure. */
+void shim_locate_ecef(const double p_ecef[3], double place[3]);
+/* UTM zone, or UPS for zone 0, to degrees and back: 0, or -1 with the reason. zone 0 on the way there: by
+ * position. */
+int shim_locate_utm(int zone, int north, const double grid[2], double lat_lon_deg[2], char *why, size_t len);
+int shim_to_utm(const double lat_lon_deg[2], int *zone, int *north, double grid[2], char *why, size_t len);
 
-/* Easting and northing with false origin, ellipsoidal height; EPSG code. */
-void shim_grid_anchor(const struct shim_grid *grid, double anchor[3]);
-int shim_grid_epsg(const struct shim_grid *grid);
+struct shim_geoid;
+/* The default geoid with cubic interpolation, wholly in memory. NULL on failure, with the reason. */
+struct shim_geoid *shim_geoid_open(char *why, size_t len);
+void shim_geoid_free(struct shim_geoid *geoid);
 
-/* east, north, up in metres <-> differences from the anchor. In place is allowed. */
-void shim_grid_forward(const struct shim_grid *grid, size_t n, const double *dx, const double *dy, const double *dz,
-                       double *out_x, double *out_y, double *out_z);
-void shim_grid_reverse(const struct shim_grid *grid, const double d_grid[3], double d_local[3]);
+/* A place in a grid (locate.c): 0, or -1 with the reason. */
+struct shim_utm {
+    int zone, north; /* zone 0: UPS */
+    double easting_m, northing_m, convergence_deg, scale;
+};
+/* zone: 1..60, or 0: by position */
+int shim_utm_forward(double lat_deg, double lon_deg, int zone, struct shim_utm *out, char *why, size_t len);
+
+/* From the scene frame about a centre to a grid zone, geodetic coordinates or ECEF. */
+struct shim_map;
+enum shim_kind { SHIM_GRID, SHIM_GEODETIC, SHIM_ECEF };
+
+/* How the scene frame (prcs) lies: turned against east, north, up at the place, or a grid. */
+struct shim_frame {
+    int is_grid;
+    double turn[9];  /* differences in prcs -> east, north, up, row by row */
+    int zone, north; /* grid; zone 0: UPS */
+};
+
+/* place: degrees, degrees, metres. zone: 1..60, or 0 for the standard zone, which beyond 84 N and 80 S is UPS. geoid
+ * may be NULL. NULL on failure, with the reason. */
+struct shim_map *shim_map_create(enum shim_kind kind, const double place[3], const struct shim_frame *frame, int zone,
+                                 const struct shim_geoid *geoid, char *why, size_t len);
+/* The same frame and zone about another centre, given as difference in prcs. */
+struct shim_map *shim_map_recentre(const struct shim_map *map, const double d_prcs[3], char *why, size_t len);
+void shim_map_free(struct shim_map *map);
+
+/* Of the centre: easting and northing with false origin, degrees, or X and Y; height as it leaves, or Z. EPSG code. */
+void shim_map_anchor(const struct shim_map *map, double anchor[3]);
+/* Of the centre: degrees, degrees, ellipsoidal height. */
+void shim_map_place(const struct shim_map *map, double place[3]);
+int shim_map_epsg(const struct shim_map *map);
+void shim_map_convergence(const struct shim_map *map, double *convergence_deg, double *scale);
+
+/* Differences in prcs from the centre <-> differences from the anchor. In place is allowed. */
+void shim_map_forward(const struct shim_map *map, size_t n, const double *dx, const double *dy, const double *dz,
+                      double *out_x, double *out_y, double *out_z);
+void shim_map_reverse(const struct shim_map *map, const double d_map[3], double d_prcs[3]);
 
 #ifdef __cplusplus
 }

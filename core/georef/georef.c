@@ -5,19 +5,19 @@
 #include <string.h>
 
 #include "core/georef/geographiclib_shim.h"
+#include "core/georef/private.h"
+#include "core/mat3.h"
+#include "core/vec3.h"
 
 /* Lowest land and sea bed to the edge of space: beyond, a unit or a sign is wrong. */
 #define HEIGHT_MIN_M (-12000.0)
 #define HEIGHT_MAX_M 100000.0
 
-struct georef {
-    enum georef_crs crs;
-    double station_m[3];
-    double anchor[3];
-    double rotation[9]; /* ecef: east, north, up -> X, Y, Z, row by row */
-    struct shim_grid *grid;
-    int epsg;
-};
+/* Polynomials are fitted within this; within 1/64 of the distance from the axis where longitude is one of the
+ * coordinates: its series converges within that distance. */
+#define FIT_MAX_M   20000.0
+#define FIT_OF_AXIS (1.0 / 64.0)
+#define FIT_LEAST_M 1.0
 
 static int check_range(const char *what, double value, double min, double max, const char *unit, struct sh_err *err)
 {
@@ -30,6 +30,9 @@ static int check_spec(const struct georef_spec *spec, struct sh_err *err)
     for (int i = 0; i < 3; i++)
         if (!isfinite(spec->station_m[i]))
             return sh_fail(err, SH_EINPUT, "georef: station position %c is not a finite number of metres", "xyz"[i]);
+    if ((int)spec->crs < GEOREF_LOCAL || spec->crs > GEOREF_GEODETIC)
+        return sh_fail(err, SH_EINPUT, "georef: coordinate reference system %d; allowed local, ecef, utm, geodetic",
+                       (int)spec->crs);
     if (spec->crs == GEOREF_LOCAL) return SH_OK;
     int rc = check_range("latitude", spec->lat_deg, -90, 90, "deg", err);
     if (rc == SH_OK) rc = check_range("longitude", spec->lon_deg, -180, 360, "deg", err);
@@ -39,17 +42,114 @@ static int check_spec(const struct georef_spec *spec, struct sh_err *err)
     return rc;
 }
 
-static int set_up_utm(struct georef *georef, const struct georef_spec *spec, struct sh_err *err)
+int georef_has_map(const struct georef *georef)
+{
+    return georef->map != NULL;
+}
+
+/* What differs from a unit matrix is wrong by more than rounding. */
+static int check_rotation(const double r[9], struct sh_err *err)
+{
+    for (int i = 0; i < 9; i++) {
+        int row = i / 3, other = i % 3;
+        double dot = vec3_dot(r + 3 * row, r + 3 * other);
+        if (!(fabs(dot - (row == other)) <= 1e-9))
+            return sh_fail(err, SH_EINPUT, "georef: the rotation of the scene frame is none");
+    }
+    return SH_OK;
+}
+
+static int set_up_frame(const struct georef_spec *spec, struct shim_frame *frame, struct sh_err *err)
+{
+    static const double none[9];
+    *frame = (struct shim_frame){.is_grid = spec->prcs_is_grid, .zone = spec->prcs_zone, .north = spec->prcs_north};
+    memcpy(frame->turn, mat3_unit, sizeof frame->turn);
+    if (spec->prcs_is_grid) {
+        if (spec->prcs_zone >= 0 && spec->prcs_zone <= 60) return SH_OK;
+        return sh_fail(err, SH_EINPUT, "georef: zone %d of the scene frame; allowed 1 to 60, or 0: UPS",
+                       spec->prcs_zone);
+    }
+    if (memcmp(spec->rotation, none, sizeof none) == 0) return SH_OK;
+    memcpy(frame->turn, spec->rotation, sizeof frame->turn);
+    return check_rotation(frame->turn, err);
+}
+
+/* Points in the grid that they are in already. */
+static int is_same_grid(const struct georef_spec *spec)
+{
+    return spec->crs == GEOREF_UTM && spec->prcs_is_grid &&
+           (spec->utm_zone == 0 || spec->utm_zone == spec->prcs_zone) && spec->geoid == NULL;
+}
+
+/* Metres per degree of latitude and of longitude at the centre, largest over height above it, and distance from the
+ * axis. The meridian's radius of curvature is largest at the poles: a^2/b. */
+void georef_degrees(const struct georef *georef, double height_m, double *lat_m, double *lon_m, double *axis_m)
+{
+    double place[3], p[3], rotation[9];
+    shim_map_place(georef->map, place);
+    shim_ecef(place[0], place[1], place[2], p, rotation);
+    *axis_m = hypot(p[0], p[1]);
+    *lat_m = (6399593.626 + fmax(place[2], 0.0) + height_m) * M_PI / 180.0;
+    *lon_m = *axis_m * M_PI / 180.0;
+}
+
+/* What all depends on that hangs on the centre. */
+static void set_up_centre(struct georef *georef)
+{
+    double half_m = FIT_MAX_M, lat_m, lon_m, axis_m;
+    shim_map_anchor(georef->map, georef->anchor);
+    if (georef->crs == GEOREF_GEODETIC) {
+        georef_degrees(georef, 0.0, &lat_m, &lon_m, &axis_m);
+        half_m = fmin(half_m, FIT_OF_AXIS * axis_m);
+    }
+    georef->polynomial.half_m = 0.0;
+    if (!georef->has_geoid && half_m >= FIT_LEAST_M) polynomial_fit(georef->map, half_m, &georef->polynomial);
+}
+
+static int fail_map(const struct georef_spec *spec, const char *why, struct sh_err *err)
+{
+    const char *open = why[0] != '\0' ? " (" : "", *close = why[0] != '\0' ? ")" : "";
+    if (spec->prcs_is_grid)
+        return sh_fail(err, SH_EINPUT,
+                       "georef: the scene's grid, or the output's, does not reach latitude %g, longitude %g%s%s%s",
+                       spec->lat_deg, spec->lon_deg, open, why, close);
+    if (spec->crs == GEOREF_UTM)
+        return sh_fail(err, SH_EINPUT,
+                       "georef: UTM zone %d does not reach latitude %g, longitude %g%s%s%s; 0: by position",
+                       spec->utm_zone, spec->lat_deg, spec->lon_deg, open, why, close);
+    return sh_fail(err, SH_EINPUT, "georef: %s", why);
+}
+
+static int set_up_map(struct georef *georef, const struct georef_spec *spec, const struct shim_frame *frame,
+                      struct sh_err *err)
 {
     char why[256] = "";
-    georef->grid = shim_grid_create(spec->lat_deg, spec->lon_deg, spec->height_m, spec->utm_zone, why, sizeof why);
-    if (georef->grid == NULL)
-        return sh_fail(err, SH_EINPUT,
-                       "georef: UTM zone %d does not reach latitude %g, longitude %g (%s); 0: by position",
-                       spec->utm_zone, spec->lat_deg, spec->lon_deg, why);
-    shim_grid_anchor(georef->grid, georef->anchor);
-    georef->epsg = shim_grid_epsg(georef->grid);
+    const double place[3] = {spec->lat_deg, spec->lon_deg, spec->height_m};
+    enum shim_kind kind = spec->crs == GEOREF_UTM ? SHIM_GRID : spec->crs == GEOREF_ECEF ? SHIM_ECEF : SHIM_GEODETIC;
+    georef->map = shim_map_create(kind, place, frame, spec->utm_zone,
+                                  spec->geoid != NULL ? georef_geoid_shim(spec->geoid) : NULL, why, sizeof why);
+    if (georef->map == NULL) return fail_map(spec, why, err);
+    georef->has_geoid = spec->geoid != NULL;
+    georef->epsg = shim_map_epsg(georef->map);
+    set_up_centre(georef);
     return SH_OK;
+}
+
+/* Local, ECEF from a metric frame, and a grid that the scene is in. */
+static void set_up_linear(struct georef *georef, const struct georef_spec *spec, const struct shim_frame *frame)
+{
+    memcpy(georef->anchor, spec->station_m, sizeof georef->anchor);
+    memcpy(georef->rotation, mat3_unit, sizeof georef->rotation);
+    if (spec->crs == GEOREF_UTM)
+        georef->epsg = spec->prcs_zone == 0 ? (spec->prcs_north ? 32661 : 32761)
+                                            : (spec->prcs_north ? 32600 : 32700) + spec->prcs_zone;
+    if (spec->crs == GEOREF_ECEF) {
+        double enu[9];
+        shim_ecef(spec->lat_deg, spec->lon_deg, spec->height_m, georef->anchor, enu);
+        mat3_multiply(enu, frame->turn, georef->rotation);
+        georef->epsg = 4978;
+    }
+    memcpy(georef->origin, georef->anchor, sizeof georef->origin);
 }
 
 int georef_create(const struct georef_spec *spec, struct georef **out, struct sh_err *err)
@@ -59,22 +159,16 @@ int georef_create(const struct georef_spec *spec, struct georef **out, struct sh
     struct georef *georef = calloc(1, sizeof *georef);
     if (georef == NULL) return sh_fail(err, SH_ENOMEM, "georef: no memory");
     georef->crs = spec->crs;
+    georef->method = GEOREF_EXACT;
     memcpy(georef->station_m, spec->station_m, sizeof georef->station_m);
-    switch (spec->crs) {
-    case GEOREF_LOCAL:
-        memcpy(georef->anchor, spec->station_m, sizeof georef->anchor);
-        break;
-    case GEOREF_ECEF:
-        shim_ecef(spec->lat_deg, spec->lon_deg, spec->height_m, georef->anchor, georef->rotation);
-        georef->epsg = 4978;
-        break;
-    case GEOREF_UTM:
-        rc = set_up_utm(georef, spec, err);
-        break;
-    default:
-        rc =
-            sh_fail(err, SH_EINPUT, "georef: coordinate reference system %d; allowed local, ecef, utm", (int)spec->crs);
-    }
+    memcpy(georef->centre_m, spec->station_m, sizeof georef->centre_m);
+    struct shim_frame frame;
+    rc = spec->crs == GEOREF_LOCAL ? SH_OK : set_up_frame(spec, &frame, err);
+    if (rc == SH_OK &&
+        (spec->crs == GEOREF_LOCAL || is_same_grid(spec) || (spec->crs == GEOREF_ECEF && !spec->prcs_is_grid)))
+        set_up_linear(georef, spec, &frame);
+    else if (rc == SH_OK)
+        rc = set_up_map(georef, spec, &frame, err);
     if (rc != SH_OK) {
         georef_free(georef);
         return rc;
@@ -86,8 +180,45 @@ int georef_create(const struct georef_spec *spec, struct georef **out, struct sh
 void georef_free(struct georef *georef)
 {
     if (georef == NULL) return;
-    shim_grid_free(georef->grid);
+    shim_map_free(georef->map);
     free(georef);
+}
+
+int georef_recentre(const struct georef *georef, const double centre_m[3], struct georef **out, struct sh_err *err)
+{
+    double d[3];
+    char why[256] = "";
+    for (int i = 0; i < 3; i++) {
+        d[i] = centre_m[i] - georef->centre_m[i];
+        if (!isfinite(d[i])) return sh_fail(err, SH_EINPUT, "georef: centre %c is not a finite number", "xyz"[i]);
+    }
+    struct georef *moved = malloc(sizeof *moved);
+    if (moved == NULL) return sh_fail(err, SH_ENOMEM, "georef: no memory");
+    *moved = *georef;
+    memcpy(moved->centre_m, centre_m, sizeof moved->centre_m);
+    if (georef_has_map(moved)) {
+        moved->map = shim_map_recentre(georef->map, d, why, sizeof why);
+        if (moved->map == NULL) {
+            free(moved);
+            return sh_fail(err, SH_EINPUT, "georef: the zone (EPSG %d) does not reach %.0f %.0f %.0f m (%s)",
+                           georef->epsg, centre_m[0], centre_m[1], centre_m[2], why);
+        }
+        set_up_centre(moved);
+    } else {
+        double turned[3];
+        for (int i = 0; i < 3; i++)
+            d[i] = centre_m[i] - georef->station_m[i];
+        mat3_apply(georef->rotation, d, turned);
+        for (int i = 0; i < 3; i++)
+            moved->anchor[i] = georef->origin[i] + turned[i];
+    }
+    if (moved->method != GEOREF_EXACT && moved->polynomial.half_m == 0.0 && georef_has_map(moved)) {
+        georef_free(moved);
+        return sh_fail(err, SH_EINPUT, "georef: no polynomial about %.0f %.0f %.0f m: too near a pole", centre_m[0],
+                       centre_m[1], centre_m[2]);
+    }
+    *out = moved;
+    return SH_OK;
 }
 
 void georef_anchor(const struct georef *georef, double anchor[3])
@@ -100,12 +231,66 @@ int georef_epsg(const struct georef *georef)
     return georef->epsg;
 }
 
+enum georef_crs georef_crs(const struct georef *georef)
+{
+    return georef->crs;
+}
+
+int georef_has_geoid(const struct georef *georef)
+{
+    return georef->has_geoid;
+}
+
+enum georef_method georef_method(const struct georef *georef)
+{
+    return georef->method;
+}
+
+void georef_convergence(const struct georef *georef, double *convergence_rad, double *scale)
+{
+    *convergence_rad = 0.0;
+    *scale = 1.0;
+    if (!georef_has_map(georef)) return;
+    shim_map_convergence(georef->map, convergence_rad, scale);
+    *convergence_rad *= M_PI / 180.0;
+}
+
 int georef_rotation(const struct georef *georef, double rotation[9])
 {
-    static const double same[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
-    if (georef->crs == GEOREF_UTM) return 0;
-    memcpy(rotation, georef->crs == GEOREF_ECEF ? georef->rotation : same, sizeof same);
+    if (georef_has_map(georef)) return 0;
+    memcpy(rotation, georef->rotation, sizeof georef->rotation);
     return 1;
+}
+
+int georef_set_method(struct georef *georef, enum georef_method method, struct sh_err *err)
+{
+    if (method < GEOREF_EXACT || method > GEOREF_ORDER3)
+        return sh_fail(err, SH_EINPUT, "georef: method %d; allowed exact, order1, order2, order3", (int)method);
+    if (method != GEOREF_EXACT && georef_has_map(georef) && georef->polynomial.half_m == 0.0)
+        return sh_fail(err, SH_EINPUT, "georef: there is no polynomial %s; allowed exact",
+                       georef->has_geoid ? "for heights above the geoid" : "about a place so near to the pole");
+    georef->method = method;
+    return SH_OK;
+}
+
+/* Rounding of positions of 6.4e6 to 1e7 m, and of GeographicLib, which states 5 nm for transverse Mercator. */
+#define EXACT_LINEAR_M 5e-9
+#define EXACT_MAP_M    2e-8
+
+double georef_bound_m(const struct georef *georef, enum georef_method method, double radius_m, double height_m)
+{
+    if (!(radius_m >= 0.0 && height_m >= 0.0)) return (double)INFINITY;
+    if (!georef_has_map(georef))
+        return georef->crs == GEOREF_ECEF ? EXACT_LINEAR_M + 4e-16 * (radius_m + height_m) : 0.0;
+    if (method == GEOREF_EXACT) return EXACT_MAP_M;
+    if (method == GEOREF_AUTO) return (double)INFINITY;
+    double weight[3] = {1.0, 1.0, 1.0}, axis_m;
+    if (georef->crs == GEOREF_GEODETIC) {
+        georef_degrees(georef, height_m, &weight[0], &weight[1], &axis_m);
+        weight[1] *= 1.0 + (radius_m + height_m) / axis_m;
+    }
+    int order = 1 + (int)method - (int)GEOREF_ORDER1;
+    return EXACT_MAP_M + polynomial_bound_m(&georef->polynomial, order, radius_m, height_m, weight);
 }
 
 static void rotate(const double r[9], size_t n, const double *dx, const double *dy, const double *dz, double *out_x,
@@ -122,31 +307,39 @@ static void rotate(const double r[9], size_t n, const double *dx, const double *
 void georef_forward(const struct georef *georef, size_t n, const double *dx, const double *dy, const double *dz,
                     double *out_x, double *out_y, double *out_z)
 {
-    switch (georef->crs) {
-    case GEOREF_LOCAL:
+    if (!georef_has_map(georef) && georef->crs != GEOREF_ECEF) {
         memmove(out_x, dx, n * sizeof *out_x);
         memmove(out_y, dy, n * sizeof *out_y);
         memmove(out_z, dz, n * sizeof *out_z);
-        break;
-    case GEOREF_ECEF:
+    } else if (!georef_has_map(georef)) {
         rotate(georef->rotation, n, dx, dy, dz, out_x, out_y, out_z);
-        break;
-    case GEOREF_UTM:
-        shim_grid_forward(georef->grid, n, dx, dy, dz, out_x, out_y, out_z);
-        break;
+    } else if (georef->method == GEOREF_EXACT) {
+        shim_map_forward(georef->map, n, dx, dy, dz, out_x, out_y, out_z);
+    } else {
+        int order = 1 + (int)georef->method - (int)GEOREF_ORDER1;
+        polynomial_apply(&georef->polynomial, order, n, dx, dy, dz, out_x, out_y, out_z);
     }
 }
 
 void georef_reverse(const struct georef *georef, const double d_crs[3], double p_prcs[3])
 {
-    double d[3] = {d_crs[0], d_crs[1], d_crs[2]};
-    if (georef->crs == GEOREF_UTM) {
-        shim_grid_reverse(georef->grid, d_crs, d);
-    } else if (georef->crs == GEOREF_ECEF) {
-        const double *r = georef->rotation;
-        for (int i = 0; i < 3; i++)
-            d[i] = r[i] * d_crs[0] + r[i + 3] * d_crs[1] + r[i + 6] * d_crs[2];
-    }
+    double d[3];
+    if (georef_has_map(georef))
+        shim_map_reverse(georef->map, d_crs, d);
+    else
+        mat3_apply_transposed(georef->rotation, d_crs, d);
     for (int i = 0; i < 3; i++)
-        p_prcs[i] = georef->station_m[i] + d[i];
+        p_prcs[i] = georef->centre_m[i] + d[i];
+}
+
+void georef_difference(const struct georef *georef, const double p_crs[3], double d_crs[3])
+{
+    for (int i = 0; i < 3; i++)
+        d_crs[i] = p_crs[i] - georef->anchor[i];
+    if (georef->crs == GEOREF_GEODETIC) d_crs[1] = remainder(d_crs[1], 360.0);
+}
+
+void georef_geodetic(double lat_deg, double lon_deg, double height_m, const double d_enu[3], double geodetic[3])
+{
+    shim_geodetic(lat_deg, lon_deg, height_m, d_enu, geodetic);
 }

@@ -39,16 +39,28 @@ void pose_matrix(const double quat[4], double r[9])
 }
 
 /* R's middle column is (sin h cos p, cos h cos p, sin p), its last row (-cos p sin r, sin p, cos p cos r). */
-void pose_to_angles(const double quat[4], double *heading_rad, double *pitch_rad, double *roll_rad)
+static void matrix_to_angles(const double r[9], double *heading_rad, double *pitch_rad, double *roll_rad)
 {
-    double r[9];
-    pose_matrix(quat, r);
     double flat = hypot(r[1], r[4]);
     *pitch_rad = atan2(r[7], flat);
     int pole = flat < 1e-9;
     *roll_rad = pole ? 0.0 : atan2(-r[6], r[8]);
     double heading = pole ? atan2(-r[3], r[0]) : atan2(r[1], r[4]);
     *heading_rad = heading < 0.0 ? heading + 2.0 * M_PI : heading;
+}
+
+void pose_to_angles(const double quat[4], double *heading_rad, double *pitch_rad, double *roll_rad)
+{
+    double r[9];
+    pose_matrix(quat, r);
+    matrix_to_angles(r, heading_rad, pitch_rad, roll_rad);
+}
+
+void pose_from_matrix(const double rotation[9], double quat[4])
+{
+    double heading_rad, pitch_rad, roll_rad;
+    matrix_to_angles(rotation, &heading_rad, &pitch_rad, &roll_rad);
+    pose_from_angles(heading_rad, pitch_rad, roll_rad, quat);
 }
 
 void pose_rotate(const double quat[4], const double v[3], double out[3])

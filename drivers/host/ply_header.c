@@ -55,8 +55,12 @@ void ply_names_free(struct ply_names *names)
 static const char *crs_text(const struct ply_facts *facts)
 {
     static const char *const text[] = {"scene frame, metres", "ECEF, metres",
-                                       "UTM or UPS with ellipsoidal height, metres"};
-    return facts->have_crs ? text[facts->crs] : "unknown, no points were recorded";
+                                       "UTM or UPS with ellipsoidal height, metres",
+                                       "latitude and longitude in degrees, ellipsoidal height in metres"};
+    static const char *const on_geoid[] = {"UTM or UPS with height above the geoid, metres",
+                                           "latitude and longitude in degrees, height above the geoid in metres"};
+    if (!facts->have_crs) return "unknown, no points were recorded";
+    return facts->geoid_heights && facts->crs >= 2 ? on_geoid[facts->crs - 2] : text[facts->crs];
 }
 
 static void put_comments(FILE *out, const struct ply_facts *facts, const struct ply_names *names)
@@ -71,7 +75,9 @@ static void put_comments(FILE *out, const struct ply_facts *facts, const struct 
     fprintf(out, "comment epsg %d\n", facts->epsg);
     fprintf(out, "comment idn %s\n", idn);
     fprintf(out, "comment profile %s\n", profile);
-    fputs("comment x y z range in metres, time in seconds since the scan's start\n", out);
+    fprintf(out, "comment %s, time in seconds since the scan's start\n",
+            facts->have_crs && facts->crs == 3 ? "x latitude, y longitude in degrees, z range in metres"
+                                               : "x y z range in metres");
     fputs("comment reflectance in dB, nan: not modelled\n", out);
     fputs("comment echo and echo_count 0: shot without echo; label 65535: none\n", out);
     if (facts->moving)

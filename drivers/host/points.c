@@ -42,14 +42,45 @@ static inline void common(const uint8_t *rec, int64_t t0_ns, struct scanhead_poi
     p->reflectance_db = refl == INT16_MIN ? NAN : refl / 100.0;
 }
 
+/* WGS 84, NIMA TR8350.2: geodetic to geocentric. */
+static void geocentric(double lat_deg, double lon_deg, double h, double p[3])
+{
+    const double a = 6378137.0, f = 1 / 298.257223563, e2 = f * (2 - f), rad = TWO_PI / 360;
+    double s = sin(lat_deg * rad), c = cos(lat_deg * rad), n = a / sqrt(1 - e2 * s * s);
+    p[0] = (n + h) * c * cos(lon_deg * rad);
+    p[1] = (n + h) * c * sin(lon_deg * rad);
+    p[2] = (n * (1 - e2) + h) * s;
+}
+
+static void points_geodetic(const struct scanhead *sh, const uint8_t *rec, int64_t t0_ns, struct scanhead_point *p,
+                            uint32_t n)
+{
+    const double *anchor = sh->anchor.anchor, *scale = sh->anchor.scale;
+    double from[3], to[3];
+    geocentric(anchor[0], anchor[1], anchor[2], from);
+    for (const uint8_t *end = rec + (size_t)n * NATIVE_POINT_LEN; rec < end; rec += NATIVE_POINT_LEN, p++) {
+        common(rec, t0_ns, p);
+        p->x = anchor[0] + scale[0] * (int32_t)le_get32(rec);
+        p->y = anchor[1] + scale[1] * (int32_t)le_get32(rec + 4);
+        p->z = anchor[2] + scale[2] * (int32_t)le_get32(rec + 8);
+        if (p->y > 180) p->y -= 360;
+        if (p->y < -180) p->y += 360;
+        geocentric(p->x, p->y, p->z, to);
+        double dx = to[0] - from[0], dy = to[1] - from[1], dz = to[2] - from[2];
+        p->range_m = sqrt(dx * dx + dy * dy + dz * dz);
+        p->mirror_rad = p->pan_rad = NAN;
+        if (p->echo_count == 0) p->x = p->y = p->z = p->range_m = NAN;
+    }
+}
+
 static void points_geo(const struct scanhead *sh, const uint8_t *rec, int64_t t0_ns, struct scanhead_point *p,
                        uint32_t n)
 {
-    const double *anchor = sh->anchor.anchor, scale = sh->anchor.scale_m;
+    const double *anchor = sh->anchor.anchor, *scale = sh->anchor.scale;
     for (const uint8_t *end = rec + (size_t)n * NATIVE_POINT_LEN; rec < end; rec += NATIVE_POINT_LEN, p++) {
         common(rec, t0_ns, p);
-        double dx = scale * (int32_t)le_get32(rec), dy = scale * (int32_t)le_get32(rec + 4),
-               dz = scale * (int32_t)le_get32(rec + 8);
+        double dx = scale[0] * (int32_t)le_get32(rec), dy = scale[1] * (int32_t)le_get32(rec + 4),
+               dz = scale[2] * (int32_t)le_get32(rec + 8);
         p->x = anchor[0] + dx;
         p->y = anchor[1] + dy;
         p->z = anchor[2] + dz;
@@ -103,7 +134,9 @@ int scanhead_points(struct scanhead *sh, const struct scanhead_frame *frame, uin
     uint32_t n = frame->n_points - first;
     if (n > max) n = max;
     const uint8_t *rec = frame->payload + NATIVE_POINTS_HEAD_LEN + (size_t)first * NATIVE_POINT_LEN;
-    if (sh->descriptor.layout == NATIVE_GEO)
+    if (sh->descriptor.layout == NATIVE_GEO && sh->anchor.crs == NATIVE_CRS_GEODETIC)
+        points_geodetic(sh, rec, frame->scan_t0_ns, points, n);
+    else if (sh->descriptor.layout == NATIVE_GEO)
         points_geo(sh, rec, frame->scan_t0_ns, points, n);
     else
         points_polar(sh, rec, frame->scan_t0_ns, points, n);

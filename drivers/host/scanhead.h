@@ -63,6 +63,7 @@ enum scanhead_event_code {
     SCANHEAD_EV_ERROR = 7,
     SCANHEAD_EV_SETTINGS = 8,
     SCANHEAD_EV_POSE_LATE = 9,
+    SCANHEAD_EV_PPS = 10, /* a full second: UTC (s since 1970), device time of the edge (ns), GPS time (s) */
 };
 
 struct scanhead_frame {
@@ -89,7 +90,8 @@ int scanhead_next(struct scanhead *sh, struct scanhead_frame *frame, int timeout
 enum { SCANHEAD_NO_LABEL = 0xffff };
 
 struct scanhead_point {
-    double x, y, z;             /* in the stream's CRS (geo), or the head's frame SOCS (polar); NaN for an empty shot */
+    double x, y, z;             /* in the stream's CRS (geo; geodetic: degrees of latitude and of longitude
+                                 * within -180..180, metres), or the head's frame SOCS (polar); NaN for an empty shot */
     double range_m;             /* NaN for an empty shot */
     double mirror_rad, pan_rad; /* encoders; NaN in the geo layout */
     double reflectance_db;      /* NaN where not modelled */
@@ -100,19 +102,24 @@ struct scanhead_point {
 
 /* Points of the frame that scanhead_next returned last: at most max, from the index `first`. Returns how many, or
  * SCANHEAD_ESTATE before the descriptor and the anchor of the stream were seen. In the geo layout range_m is the
- * distance from the anchor, which is the station; NaN where the head moves. */
+ * distance from the anchor, which is the station: of utm in the grid, of geodetic straight through space on WGS 84; NaN
+ * where the head moves. */
 int scanhead_points(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                     struct scanhead_point *points, uint32_t max);
 
 /* What the stream has said of itself. Strings belong to the handle. 0, or SCANHEAD_ESTATE when not seen yet. */
 struct scanhead_info {
     const char *idn, *profile;
-    int geo;  /* 1: geo layout, 0: polar */
-    int crs;  /* 0 local (scene frame), 1 ECEF, 2 UTM/UPS */
-    int epsg; /* 0 for local */
-    double anchor[3], scale_m;
+    int geo;           /* 1: geo layout, 0: polar */
+    int crs;           /* 0 local (scene frame), 1 ECEF, 2 UTM/UPS, 3 geodetic */
+    int epsg;          /* 0 for local */
+    int geoid_heights; /* 1: heights of UTM and geodetic points are above the geoid; 0: ellipsoidal */
+    double anchor[3];  /* metres; geodetic: degrees, degrees, metres */
+    double scale_m;    /* a count on the wire is at most this on the ground */
+    double scale[3];   /* units of the CRS per count */
     double lat_deg, lon_deg, height_m, station_m[3];
     double rotation[9]; /* socs -> scene frame, row by row */
+    double axes[9];     /* scene frame at the anchor -> axes of the CRS (geodetic: east, north, up), row by row */
     double prr_hz, lines_hz, pan_deg_s, range_min_m, range_max_m;
     uint32_t station, n_surfaces, frames, scan;
     int moving; /* 1: the head moves; station_m and rotation do not say where it is, poses do */
@@ -143,6 +150,14 @@ int scanhead_poses(struct scanhead *sh, const struct scanhead_frame *frame, uint
  * time where the head moves. frame (may be NULL): the frame scalar of each, 0 where it stands. Returns how many points
  * had no pose, because frames were lost: their coordinates are NaN. A negative error for another layout. */
 int scanhead_to_scene(struct scanhead *sh, struct scanhead_point *points, uint32_t n, double *frame);
+
+/* GPS time of t_ns since the scan's start (scanhead_point.t_ns) by the head's clock, in LAS's adjusted standard form:
+ * seconds since 1980-01-06T00:00:00Z without leap seconds, less 1e9. Add 1e9 and divide by 604800 for week and second
+ * of week. Good for frames up to the one that scanhead_next returned last: it goes by the last time the head told (at
+ * the scan's start and each second; scanhead_frame.event SCAN_START, PPS), exact to the ns where the head's clock has
+ * no drift; a double of that size has steps of 0.12 us. SCANHEAD_ESTATE where the head doesn't know the time, or before
+ * it and the scan's start were seen, which takes a second at most. */
+int scanhead_gps_time(const struct scanhead *sh, int64_t t_ns, double *adjusted_standard_gps_time_s);
 
 /* Name of a label: 1 and the two names (owned by the handle), or 0 when not seen yet. */
 int scanhead_surface(const struct scanhead *sh, uint32_t label, const char **object, const char **material);

@@ -1,7 +1,12 @@
+#include <string.h>
+
 #include "core/err.h"
 #include "drivers/protocol/bytes.h"
 #include "drivers/protocol/fields.h"
 #include "drivers/protocol/native.h"
+
+/* The first heads sent no scales by axis, no kind of height and no axes. */
+enum { ANCHOR_LEN_FIRST = 168, ANCHOR_LEN = 272 };
 
 int native_decode_descriptor(const uint8_t *payload, size_t len, struct native_descriptor *out)
 {
@@ -12,9 +17,21 @@ int native_decode_descriptor(const uint8_t *payload, size_t len, struct native_d
 
 int native_decode_anchor(const uint8_t *payload, size_t len, struct native_anchor *out)
 {
-    int rc = fields_decode(&fields_anchor, payload, len, out);
-    if (rc == 0 && out->crs > NATIVE_CRS_UTM) rc = SH_EFORMAT;
-    return rc;
+    uint8_t whole[ANCHOR_LEN] = {0};
+    if (len < ANCHOR_LEN_FIRST) return SH_EFORMAT;
+    memcpy(whole, payload, len < sizeof whole ? len : sizeof whole);
+    if (len < sizeof whole) memset(whole + ANCHOR_LEN_FIRST, 0, sizeof whole - ANCHOR_LEN_FIRST);
+    int rc = fields_decode(&fields_anchor, whole, sizeof whole, out);
+    if (rc != 0) return rc;
+    for (int i = 0; i < 3; i++)
+        if (out->scale[i] == 0) out->scale[i] = out->scale_m;
+    int turned = 0;
+    for (int i = 0; i < 9; i++)
+        turned |= out->axes[i] != 0;
+    for (int i = 0; i < 3 && !turned; i++)
+        out->axes[4 * i] = 1;
+    if (out->crs > NATIVE_CRS_GEODETIC || out->heights > NATIVE_HEIGHTS_GEOID) return SH_EFORMAT;
+    return 0;
 }
 
 int native_decode_points(const uint8_t *payload, size_t len, struct native_points *out)

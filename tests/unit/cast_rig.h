@@ -94,7 +94,7 @@ static inline struct cast_rig *cast_rig_open(struct scene *scene, const double s
                                      .pan_counts = 0x1p32,
                                      .layout = LINE_POLAR,
                                      .range_scale_m = 1e-5,
-                                     .xyz_scale_m = 1e-5};
+                                     .xyz_scale = {1e-5, 1e-5, 1e-5}};
     memcpy(rig->setup.station_m, station_m, sizeof rig->setup.station_m);
     cast_rotation(0.0, rig->setup.rotation);
     rig->spec = (struct schedule_spec){.prr_uhz = 300000 * HZ,

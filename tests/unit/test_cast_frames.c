@@ -169,11 +169,12 @@ static void check_geo_point(const struct cast_rig *rig, uint64_t k, uint32_t i, 
     const uint32_t *counts[] = {rig->block.a, rig->block.b, rig->block.c};
     double d_crs[3], p[3];
     for (int axis = 0; axis < 3; axis++)
-        d_crs[axis] = (int32_t)counts[axis][i] * rig->setup.xyz_scale_m;
+        d_crs[axis] = (int32_t)counts[axis][i] * rig->setup.xyz_scale[axis];
     georef_reverse(rig->georef, d_crs, p);
-    /* half a count on each axis, turned into the scene: sqrt(3)/2 counts; GeographicLib's own 5 nm both ways
-     */
-    long double rounding = 0.8660255L * (long double)rig->setup.xyz_scale_m + 2e-8L;
+    /* half a count on each axis, turned into the scene: sqrt(3)/2 counts, each at most scale_m, or as much larger as a
+     * grid is smaller than the ground: 0.04 %; GeographicLib's own 5 nm both ways and the method's bound */
+    long double rounding = 0.8664L * (long double)rig->setup.xyz_scale[2] +
+                           (long double)georef_bound_m(rig->georef, georef_method(rig->georef), 20.0, 20.0) + 2e-8L;
     long double off_read = 0.0L, off_true = 0.0L;
     for (int axis = 0; axis < 3; axis++) {
         off_read += powl((long double)p[axis] - HERE[axis] - range * read[axis], 2);
@@ -191,12 +192,18 @@ static void check_geo_point(const struct cast_rig *rig, uint64_t k, uint32_t i, 
 static void geo_counts_give_the_position_back(void **state)
 {
     (void)state;
-    static const enum georef_crs crs[] = {GEOREF_LOCAL, GEOREF_ECEF, GEOREF_UTM};
+    static const struct {
+        enum georef_crs crs;
+        enum georef_method method;
+    } ways[] = {{GEOREF_LOCAL, GEOREF_EXACT},    {GEOREF_ECEF, GEOREF_EXACT}, {GEOREF_UTM, GEOREF_EXACT},
+                {GEOREF_UTM, GEOREF_ORDER2},     {GEOREF_UTM, GEOREF_ORDER3}, {GEOREF_GEODETIC, GEOREF_EXACT},
+                {GEOREF_GEODETIC, GEOREF_ORDER2}};
+    enum { WAYS = sizeof ways / sizeof ways[0] };
     struct cast_rig *rig = room();
     struct schedule_line line;
     rig->setup.layout = LINE_GEO;
-    for (int c = 0; c < 6; c++) {
-        struct georef_spec spec = {.crs = crs[c / 2],
+    for (int c = 0; c < 2 * WAYS; c++) {
+        struct georef_spec spec = {.crs = ways[c / 2].crs,
                                    .station_m = {HERE[0], HERE[1], HERE[2]},
                                    .lat_deg = 52.5,
                                    .lon_deg = 13.4,
@@ -205,9 +212,10 @@ static void geo_counts_give_the_position_back(void **state)
         double heading = 0.7 * c - 1.0;
         georef_free(rig->georef);
         if (georef_create(&spec, &rig->georef, &err) != 0) fail_msg("%s", err.text);
+        assert_int_equal(georef_set_method(rig->georef, ways[c / 2].method, &err), 0);
         rig->setup.georef = rig->georef;
         rig->setup.mirror_counts = rig->setup.pan_counts = c % 2 ? 0x1p32 : 10000;
-        rig->setup.xyz_scale_m = c % 2 ? 1e-6 : 1e-4;
+        assert_int_equal(georef_scale(rig->georef, c % 2 ? 1e-6 : 1e-4, 100.0, rig->setup.xyz_scale, &err), 0);
         cast_rotation(heading, rig->setup.rotation);
         for (uint64_t n = 0; n < 2000; n += 331) {
             uint32_t shots = cast_line(rig, n, &line);

@@ -175,7 +175,7 @@ static void test_geo(void **state)
     struct cast_rig *rig = open_room(knot);
     struct schedule_line line;
     rig->setup.layout = LINE_GEO;
-    rig->setup.xyz_scale_m = 1e-6;
+    rig->setup.xyz_scale[0] = rig->setup.xyz_scale[1] = rig->setup.xyz_scale[2] = 1e-6;
     for (uint64_t n = 0; n < 6; n++) {
         cast_line(rig, n, &line);
         for (uint32_t j = 0; j < rig->block.n_points; j++) {

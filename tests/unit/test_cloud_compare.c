@@ -159,6 +159,7 @@ static void points_go_back_to_the_scene(void **state)
     check_crs(GEOREF_LOCAL, 0);
     check_crs(GEOREF_ECEF, 4978);
     check_crs(GEOREF_UTM, 32633);
+    check_crs(GEOREF_GEODETIC, 4979);
 }
 
 static void coverage_is_counted(void **state)

@@ -227,7 +227,7 @@ static void defaults_are_those_of_the_table(void **state)
     assert_true(cfg->tick_hz == 1000 && cfg->ahead_ms == 64 && cfg->queue_ms == 250 && cfg->late_ms == 100);
     assert_int_equal(cfg->threads, 0);
     assert_int_equal(cfg->pace, PACE_REALTIME);
-    assert_true(cfg->utc_epoch_s == 0.0);
+    assert_string_equal(cfg->time.epoch, "none");
 }
 
 static void odd_but_right_configurations_load(void **state)
@@ -252,6 +252,33 @@ static void odd_but_right_configurations_load(void **state)
     assert_loads(load_edited(LINES, "  pan_deg_s: 0\n  frames: 7\n"));
     assert_loads(load_edited("output:", "platform: {kind: live, port: 7000}\noutput:"));
     assert_int_equal(cfg->platform.kind, PLATFORM_LIVE);
+}
+
+static void places_are_taken_in_each_form(void **state)
+{
+    (void)state;
+    assert_loads(load_edited("heading_deg: 90", "lat_deg: 50\n    lon_deg: 180\n    height_m: 5"));
+    assert_int_equal(cfg->station[0].place, PLACE_GEODETIC);
+    assert_true(cfg->station[0].has_position && !cfg->station[0].has_instrument_height);
+    assert_loads(load_edited("heading_deg: 90", UTM_PLACE "    instrument_height_m: 0"));
+    assert_int_equal(cfg->station[0].place, PLACE_UTM);
+    assert_int_equal(cfg->station[0].utm_zone, 33);
+    assert_true(cfg->station[0].north && cfg->station[0].has_instrument_height);
+    /* An anchor in UTM gives zone and hemisphere; without position_m. */
+    static const char old[] = "stations:\n  - position_m: [1, 2, 3]\n    heading_deg: 90";
+    assert_loads(load_edited(old, "  anchor: {source: utm, utm_zone: 33, hemisphere: north}\nstations:\n"
+                                  "  - {easting_m: 5e5, northing_m: 5e6, height_m: 0}"));
+    assert_int_equal(cfg->station[0].utm_zone, 33);
+    assert_true(cfg->station[0].north && !cfg->station[0].has_position);
+    assert_loads(load_edited(old, "  anchor: {source: ecef}\nstations:\n  - {ecef_m: [6378137, 0, 0]}"));
+    assert_int_equal(cfg->station[0].place, PLACE_ECEF);
+    /* With an anchor, one of both. */
+    assert_int_equal(load_edited(old, "  anchor: {source: ecef}\nstations:\n"
+                                      "  - {position_m: [1, 2, 3], ecef_m: [6378137, 0, 0]}"),
+                     SH_EINPUT);
+    assert_says("stations[0].position_m: together with a place on the Earth");
+    assert_int_equal(load_edited(old, "  anchor: {source: ecef}\nstations:\n  - {heading_deg: 5}"), SH_EINPUT);
+    assert_says("stations[0].position_m: missing, and no place on the Earth is given either");
 }
 
 /* ---- --set */
@@ -653,6 +680,7 @@ int main(void)
         cmocka_unit_test(values_arrive),
         cmocka_unit_test(defaults_are_those_of_the_table),
         cmocka_unit_test(odd_but_right_configurations_load),
+        cmocka_unit_test(places_are_taken_in_each_form),
         cmocka_unit_test(set_changes_values),
         cmocka_unit_test(set_appends_elements),
         cmocka_unit_test(set_refuses),

@@ -23,7 +23,12 @@
 
 static struct georef *make(enum georef_crs crs, double lat_deg, double lon_deg, double height_m, int zone)
 {
-    struct georef_spec spec = {crs, {10, 20, 30}, lat_deg, lon_deg, height_m, zone};
+    struct georef_spec spec = {.crs = crs,
+                               .station_m = {10, 20, 30},
+                               .lat_deg = lat_deg,
+                               .lon_deg = lon_deg,
+                               .height_m = height_m,
+                               .utm_zone = zone};
     struct georef *georef = NULL;
     struct sh_err err = {0, ""};
     if (georef_create(&spec, &georef, &err) != SH_OK) fail_msg("%s", err.text);
@@ -213,10 +218,13 @@ static void test_round_trip(void **state)
         double lat_deg, lon_deg;
         int zone;
     } at[] = {
-        {GEOREF_LOCAL, 0, 0, 0},          {GEOREF_ECEF, 48.2, 16.4, 0},  {GEOREF_ECEF, -90, 0, 0},
-        {GEOREF_UTM, 48.2, 16.4, 0},      {GEOREF_UTM, 48.2, 12.5, 32},  {GEOREF_UTM, -33.9, 151.2, 0},
-        {GEOREF_UTM, 89.99, 77, 0},       {GEOREF_UTM, -90, 0, 0},       {GEOREF_UTM, 0, 9, 0},
-        {GEOREF_UTM, 1e-6, 5.9999999, 0}, {GEOREF_UTM, 10, 179.9999, 0},
+        {GEOREF_LOCAL, 0, 0, 0},       {GEOREF_ECEF, 48.2, 16.4, 0},
+        {GEOREF_ECEF, -90, 0, 0},      {GEOREF_UTM, 48.2, 16.4, 0},
+        {GEOREF_UTM, 48.2, 12.5, 32},  {GEOREF_UTM, -33.9, 151.2, 0},
+        {GEOREF_UTM, 89.99, 77, 0},    {GEOREF_UTM, -90, 0, 0},
+        {GEOREF_UTM, 0, 9, 0},         {GEOREF_UTM, 1e-6, 5.9999999, 0},
+        {GEOREF_UTM, 10, 179.9999, 0}, {GEOREF_GEODETIC, 48, 179.9999, 0},
+        {GEOREF_GEODETIC, 90, 10, 0},  {GEOREF_GEODETIC, -89.999, -180, 0},
     };
     for (size_t i = 0; i < sizeof at / sizeof at[0]; i++) {
         struct georef *georef = make(at[i].crs, at[i].lat_deg, at[i].lon_deg, 321, at[i].zone);
@@ -244,7 +252,8 @@ static void test_borders(void **state)
               {83.9999, 9, 0}, {84, 9, 0},   {-80, 9, 0},   {0, 17.0, 31}};
     for (size_t i = 0; i < sizeof at / sizeof at[0]; i++) {
         struct sh_err err = {0, ""};
-        struct georef_spec spec = {GEOREF_UTM, {0, 0, 0}, at[i].lat_deg, at[i].lon_deg, 0, at[i].zone};
+        struct georef_spec spec = {
+            .crs = GEOREF_UTM, .lat_deg = at[i].lat_deg, .lon_deg = at[i].lon_deg, .utm_zone = at[i].zone};
         struct georef *georef = NULL;
         if (at[i].zone != 0) { /* as far east of the central meridian as is allowed */
             double low = 3, high = 17;
@@ -271,27 +280,181 @@ static void test_borders(void **state)
     }
 }
 
+/* Blocks of any length, and values not in place, too. */
+static void check_nan(const struct georef *georef, int is_local)
+{
+    enum { N = 300 };
+    double in[3][N], out[3][N];
+    for (int i = 0; i < N; i++)
+        for (int c = 0; c < 3; c++)
+            in[c][i] = i % 4 == c + 1 ? (double)NAN : (double)(i + c);
+    georef_forward(georef, N, in[0], in[1], in[2], out[0], out[1], out[2]);
+    georef_forward(georef, N, in[0], in[1], in[2], in[0], in[1], in[2]);
+    for (int i = 0; i < N; i++) {
+        int nans = isnan(out[0][i]) + isnan(out[1][i]) + isnan(out[2][i]);
+        assert_int_equal(nans, i % 4 == 0 ? 0 : is_local ? 1 : 3);
+        for (int c = 0; c < 3; c++)
+            assert_true(in[c][i] == out[c][i] || (isnan(in[c][i]) && isnan(out[c][i])));
+    }
+    georef_forward(georef, 0, in[0], in[1], in[2], in[0], in[1], in[2]);
+}
+
 static void test_nan_and_in_place(void **state)
 {
     (void)state;
-    const enum georef_crs crs[] = {GEOREF_LOCAL, GEOREF_ECEF, GEOREF_UTM};
-    for (int c = 0; c < 3; c++) {
-        struct georef *georef = make(crs[c], 48.2, 16.4, 200, 0);
-        double x[5] = {1, NAN, 3, 4, 5}, y[5] = {1, 2, NAN, 4, 5}, z[5] = {1, 2, 3, NAN, 5};
-        double ox[5], oy[5], oz[5];
-        georef_forward(georef, 5, x, y, z, ox, oy, oz);
-        georef_forward(georef, 5, x, y, z, x, y, z);
-        for (int i = 0; i < 5; i++) {
-            assert_int_equal(isnan(x[i]) || isnan(y[i]) || isnan(z[i]), i > 0 && i < 4);
-            if (crs[c] != GEOREF_LOCAL) assert_int_equal(isnan(ox[i]) && isnan(oy[i]) && isnan(oz[i]), i > 0 && i < 4);
-            if (!isnan(ox[i])) assert_true(ox[i] == x[i]);
-            if (!isnan(oy[i])) assert_true(oy[i] == y[i]);
-            if (!isnan(oz[i])) assert_true(oz[i] == z[i]);
+    const enum georef_crs crs[] = {GEOREF_LOCAL, GEOREF_UTM, GEOREF_GEODETIC};
+    for (int c = 0; c < 3; c++)
+        for (enum georef_method m = GEOREF_EXACT; m <= GEOREF_ORDER3; m++) {
+            struct georef *georef = make(crs[c], 48.2, 16.4, 200, 0);
+            struct sh_err err;
+            assert_int_equal(georef_set_method(georef, m, &err), SH_OK);
+            check_nan(georef, crs[c] == GEOREF_LOCAL);
+            georef_free(georef);
         }
-        georef_forward(georef, 0, x, y, z, x, y, z);
+    struct georef *georef = make(GEOREF_ECEF, 48.2, 16.4, 200, 0);
+    double p[3] = {1, NAN, 3}, out[3];
+    forward_one(georef, p, out);
+    assert_true(isnan(out[0]) && isnan(out[1]));
+    georef_free(georef);
+    georef_free(NULL);
+}
+
+/* There and back between systems; and where the ends of the ellipsoid's axes and the
+ * false origins are. */
+static void test_places(void **state)
+{
+    (void)state;
+    struct georef_place place;
+    struct sh_err err;
+    double p[3], grid[3];
+    int zone, north;
+    assert_int_equal(georef_locate_ecef((const double[3]){0, 0, -B_M - 5}, &place, &err), SH_OK);
+    expect_near(place.lat_deg, -90, 1e-12);
+    expect_near(place.height_m, 5, TOL_M);
+    assert_int_equal(georef_locate_ecef((const double[3]){0, A_M + 7, 0}, &place, &err), SH_OK);
+    expect_point((const double[3]){place.lat_deg, place.lon_deg, place.height_m}, 0, 90, 7, TOL_M);
+    assert_int_equal(georef_locate_ecef((const double[3]){NAN, 0, 0}, &place, &err), SH_EINPUT);
+    assert_int_equal(georef_locate_utm(31, 1, 500000, 0, 12, &place, &err), SH_OK);
+    expect_point((const double[3]){place.lat_deg, place.lon_deg, place.height_m}, 0, 3, 12, 1e-13);
+    assert_int_equal(georef_locate_utm(0, 0, 2e6, 2e6, 0, &place, &err), SH_OK);
+    expect_near(place.lat_deg, -90, 1e-12);
+    assert_int_equal(georef_locate_utm(61, 1, 500000, 0, 0, &place, &err), SH_EINPUT);
+    assert_int_equal(georef_locate_utm(31, 1, 9e6, 0, 0, &place, &err), SH_EINPUT);
+    for (int i = 0; i < 50; i++) {
+        const struct georef_place at = {-88 + 3.5 * i, -179 + 7.1 * i, 100.0 * i};
+        georef_geodetic_to_ecef(&at, p);
+        assert_int_equal(georef_locate_ecef(p, &place, &err), SH_OK);
+        expect_point((const double[3]){place.lat_deg, remainder(place.lon_deg - at.lon_deg, 360), place.height_m},
+                     at.lat_deg, 0, at.height_m, TOL_M);
+        assert_int_equal(georef_geodetic_to_utm(&at, 0, &zone, &north, grid, &err), SH_OK);
+        assert_int_equal(zone == 0, at.lat_deg >= 84 || at.lat_deg < -80);
+        assert_int_equal(north, at.lat_deg >= 0);
+        assert_int_equal(georef_locate_utm(zone, north, grid[0], grid[1], grid[2], &place, &err), SH_OK);
+        expect_point((const double[3]){place.lat_deg, remainder(place.lon_deg - at.lon_deg, 360), place.height_m},
+                     at.lat_deg, 0, at.height_m, TOL_M);
+    }
+}
+
+/* Convergence east of the central meridian: atan(tan(dlon) sin(lat)) on the sphere, within e'^2 of it; scale
+ * 0.9996 (1 + x^2/2R^2). */
+static void test_convergence(void **state)
+{
+    (void)state;
+    double convergence_rad, scale;
+    struct georef *georef = make(GEOREF_UTM, 50, 11, 0, 32);
+    georef_convergence(georef, &convergence_rad, &scale);
+    double sphere = atan(tan(2 * PI / 180) * sin(50 * PI / 180));
+    expect_near(convergence_rad, sphere, 0.01 * sphere);
+    double x_m = 2 * PI / 180 * cos(50 * PI / 180) * 6.38e6;
+    expect_near(scale, 0.9996 * (1 + x_m * x_m / 2 / 6.38e6 / 6.38e6), 1e-6);
+    /* and it is that of the map: true north goes to the west of the grid's */
+    double d[3];
+    forward_one(georef, (const double[3]){0, 1, 0}, d);
+    expect_near(atan2(d[0], d[1]), -convergence_rad, 1e-8);
+    georef_free(georef);
+    georef = make(GEOREF_ECEF, 50, 11, 0, 0);
+    georef_convergence(georef, &convergence_rad, &scale);
+    assert_true(convergence_rad == 0 && scale == 1);
+    georef_free(georef);
+}
+
+/* Another centre: the same positions, also across the zone's border, the equator and the antimeridian. */
+static void test_recentre(void **state)
+{
+    (void)state;
+    const struct {
+        enum georef_crs crs;
+        double lat_deg, lon_deg;
+    } at[] = {{GEOREF_LOCAL, 0, 0},           {GEOREF_ECEF, 50, 11}, {GEOREF_UTM, 50, 11.99},
+              {GEOREF_UTM, -0.1, 9.5},        {GEOREF_UTM, 88, 100}, {GEOREF_GEODETIC, 50, 179.9},
+              {GEOREF_GEODETIC, -60, -179.9}, {GEOREF_UTM, 83.9, 8}};
+    for (size_t i = 0; i < sizeof at / sizeof at[0]; i++) {
+        struct georef *georef = make(at[i].crs, at[i].lat_deg, at[i].lon_deg, 500, 0), *moved;
+        struct sh_err err;
+        const double centre_m[3] = {20010, 30020, 430}, off_m[3] = {20000, 30000, 400};
+        double anchor[2][3], d[3], there[3], p[3];
+        assert_int_equal(georef_recentre(georef, centre_m, &moved, &err), SH_OK);
+        assert_int_equal(georef_epsg(moved), georef_epsg(georef));
+        georef_anchor(georef, anchor[0]);
+        georef_anchor(moved, anchor[1]);
+        for (int k = 0; k < 20; k++) {
+            const double local[3] = {50 * k, -30 * k, 10 * k};
+            double far[3];
+            for (int c = 0; c < 3; c++)
+                far[c] = local[c] + off_m[c];
+            forward_one(georef, far, d);
+            forward_one(moved, local, there);
+            for (int c = 0; c < 3; c++) {
+                double off = anchor[0][c] + d[c] - anchor[1][c] - there[c];
+                if (at[i].crs == GEOREF_GEODETIC && c == 1) off = remainder(off, 360);
+                expect_near(off, 0, TOL_M);
+            }
+            georef_reverse(moved, there, p);
+            expect_point(p, far[0] + 10, far[1] + 20, far[2] + 30, TOL_M);
+        }
+        georef_free(moved);
         georef_free(georef);
     }
-    georef_free(NULL);
+    struct georef *georef = make(GEOREF_UTM, 50, 11, 0, 32), *moved = NULL;
+    struct sh_err err;
+    assert_int_equal(georef_recentre(georef, (const double[3]){3e6, 0, 0}, &moved, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "does not reach"));
+    assert_null(moved);
+    georef_free(georef);
+}
+
+/* A count is at most scale_m long on the ground and the furthest points fit; where they can't, it is said. */
+static void test_scale(void **state)
+{
+    (void)state;
+    struct sh_err err;
+    for (int i = 0; i < 60; i++) {
+        double lat_deg = i < 3 ? 90 - 0.001 * i : -88 + 3 * i, reach_m = i % 2 ? 2000 : 100, scale_m = 1e-6, scale[3];
+        if (lat_deg > 90) break;
+        struct georef *georef = make(GEOREF_GEODETIC, lat_deg, 179.999, 50 * i, 0);
+        while (georef_scale(georef, scale_m, reach_m, scale, &err) != SH_OK)
+            scale_m *= 10;
+        for (int k = 0; k < 64; k++) {
+            double angle = k * PI / 32, d[3], p_ecef[3];
+            const double in[3] = {reach_m * cos(angle), reach_m * sin(angle), 0};
+            forward_one(georef, in, d);
+            struct georef_place at = {lat_deg + d[0], 179.999 + d[1], 50 * i};
+            georef_geodetic_to_ecef(&at, p_ecef);
+            for (int c = 0; c < 3; c++)
+                assert_true(fabs(d[c]) / scale[c] < 2147483647.0);
+            assert_true(scale[0] * PI / 180 * A_M <= scale_m);
+            assert_true(scale[1] * PI / 180 * hypot(p_ecef[0], p_ecef[1]) <= scale_m * 1.000001);
+        }
+        if (fabs(lat_deg) < 80) assert_true(scale_m == 1e-6 || (scale_m == 1e-5 && reach_m > 1000));
+        georef_free(georef);
+    }
+    struct georef *georef = make(GEOREF_UTM, 50, 11, 0, 32);
+    double scale[3];
+    assert_int_equal(georef_scale(georef, 1e-6, 100e3, scale, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "do not fit into 31 bits"));
+    assert_int_equal(georef_scale(georef, 1e-4, 100e3, scale, &err), SH_OK);
+    assert_true(scale[0] == 1e-4 && scale[1] == 1e-4 && scale[2] == 1e-4);
+    georef_free(georef);
 }
 
 static void test_refusals(void **state)
@@ -301,18 +464,18 @@ static void test_refusals(void **state)
         struct georef_spec spec;
         const char *part;
     } bad[] = {
-        {{GEOREF_ECEF, {0, 0, 0}, 90.001, 0, 0, 0}, "latitude 90.001 deg; allowed -90 to 90"},
-        {{GEOREF_ECEF, {0, 0, 0}, NAN, 0, 0, 0}, "latitude"},
-        {{GEOREF_UTM, {0, 0, 0}, 0, 361, 0, 0}, "longitude 361 deg; allowed -180 to 360"},
-        {{GEOREF_UTM, {0, 0, 0}, 0, -181, 0, 0}, "longitude"},
-        {{GEOREF_ECEF, {0, 0, 0}, 0, 0, 1e6, 0}, "height"},
-        {{GEOREF_ECEF, {0, 0, 0}, 0, 0, INFINITY, 0}, "height"},
-        {{GEOREF_UTM, {0, 0, 0}, 0, 0, 0, 61}, "zone 61; allowed 1 to 60"},
-        {{GEOREF_UTM, {0, 0, 0}, 0, 0, 0, -1}, "zone -1"},
-        {{GEOREF_UTM, {0, 0, 0}, 48, 16, 0, 10}, "zone 10 does not reach"},
-        {{GEOREF_UTM, {0, 0, 0}, 89, 16, 0, 33}, "zone 33 does not reach"},
-        {{GEOREF_LOCAL, {0, NAN, 0}, 0, 0, 0, 0}, "station position y"},
-        {{(enum georef_crs)7, {0, 0, 0}, 0, 0, 0, 0}, "allowed local, ecef, utm"},
+        {{.crs = GEOREF_ECEF, .lat_deg = 90.001}, "latitude 90.001 deg; allowed -90 to 90"},
+        {{.crs = GEOREF_ECEF, .lat_deg = NAN}, "latitude"},
+        {{.crs = GEOREF_UTM, .lon_deg = 361}, "longitude 361 deg; allowed -180 to 360"},
+        {{.crs = GEOREF_UTM, .lon_deg = -181}, "longitude"},
+        {{.crs = GEOREF_ECEF, .height_m = 1e6}, "height"},
+        {{.crs = GEOREF_ECEF, .height_m = INFINITY}, "height"},
+        {{.crs = GEOREF_UTM, .utm_zone = 61}, "zone 61; allowed 1 to 60"},
+        {{.crs = GEOREF_UTM, .utm_zone = -1}, "zone -1"},
+        {{.crs = GEOREF_UTM, .lat_deg = 48, .lon_deg = 16, .utm_zone = 10}, "zone 10 does not reach"},
+        {{.crs = GEOREF_UTM, .lat_deg = 89, .lon_deg = 16, .utm_zone = 33}, "zone 33 does not reach"},
+        {{.crs = GEOREF_LOCAL, .station_m = {0, NAN, 0}}, "station position y"},
+        {{.crs = (enum georef_crs)7}, "allowed local, ecef, utm, geodetic"},
     };
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         struct georef *georef = NULL;
@@ -336,6 +499,10 @@ int main(void)
         cmocka_unit_test(test_round_trip),
         cmocka_unit_test(test_borders),
         cmocka_unit_test(test_nan_and_in_place),
+        cmocka_unit_test(test_places),
+        cmocka_unit_test(test_convergence),
+        cmocka_unit_test(test_recentre),
+        cmocka_unit_test(test_scale),
         cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

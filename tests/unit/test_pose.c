@@ -45,6 +45,10 @@ static void test_convention(void **state)
         pose_to_angles(quat, &back[0], &back[1], &back[2]);
         /* pitch stays 0.07 rad from the pole: errors grow by 1 / cos, 14 times */
         assert_true(fabs(back[0] - heading) < 1e-13 && fabs(back[1] - pitch) < 1e-13 && fabs(back[2] - roll) < 1e-13);
+        pose_from_matrix(want, quat);
+        pose_matrix(quat, got);
+        for (int i = 0; i < 9; i++)
+            assert_true(fabs(got[i] - want[i]) < 1e-13);
     }
     /* In words: heading 90 looks east, pitch lifts the nose, roll lowers the right side. */
     double quat[4], out[3];

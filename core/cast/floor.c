@@ -1,0 +1,135 @@
+/* cast_floor: of all triangles only those around the vertical line become a scene, with a BVH where the ray begins. */
+#include "core/cast.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/vec3.h"
+
+struct column {
+    const struct scene *scene;
+    double from_m[3], u[3], v[3]; /* the line, and two directions across it */
+    uint32_t *prim;               /* triangles around it */
+    uint32_t *vertex;             /* their vertices in the scene, sorted, each once */
+    size_t n, n_vertices, capacity;
+};
+
+static void directions_across(const double down[3], double u[3], double v[3])
+{
+    int least = fabs(down[0]) < fabs(down[1]) ? 0 : 1;
+    if (fabs(down[2]) < fabs(down[least])) least = 2;
+    double axis[3] = {0.0, 0.0, 0.0};
+    axis[least] = 1.0;
+    vec3_cross(down, axis, u);
+    double length = sqrt(vec3_dot(u, u));
+    for (int i = 0; i < 3; i++)
+        u[i] /= length;
+    vec3_cross(down, u, v);
+}
+
+/* Does the line pass through the triangle's bounds across it? Rounding stays below a millionth of a coordinate. */
+static int is_around(const struct column *c, uint32_t prim)
+{
+    double min[2] = {INFINITY, INFINITY}, max[2] = {-INFINITY, -INFINITY}, far_m = 0.0;
+    for (int k = 0; k < 3; k++) {
+        const double *p = c->scene->vertex_m[c->scene->triangle[prim][k]];
+        double d[3] = {p[0] - c->from_m[0], p[1] - c->from_m[1], p[2] - c->from_m[2]};
+        double across[2] = {vec3_dot(d, c->u), vec3_dot(d, c->v)};
+        for (int i = 0; i < 2; i++) {
+            min[i] = fmin(min[i], across[i]);
+            max[i] = fmax(max[i], across[i]);
+        }
+        far_m = fmax(far_m, fabs(d[0]) + fabs(d[1]) + fabs(d[2]));
+    }
+    double slack_m = 1e-6 * far_m;
+    return min[0] <= slack_m && max[0] >= -slack_m && min[1] <= slack_m && max[1] >= -slack_m;
+}
+
+static int collect(struct column *c, struct sh_err *err)
+{
+    for (uint32_t i = 0; i < c->scene->n_triangles; i++) {
+        if (!is_around(c, i)) continue;
+        if (c->n == c->capacity) {
+            c->capacity = 2 * c->capacity + 64;
+            uint32_t *more = realloc(c->prim, c->capacity * sizeof *more);
+            if (more == NULL) return sh_fail(err, SH_ENOMEM, "cast: no memory to look for the floor");
+            c->prim = more;
+        }
+        c->prim[c->n++] = i;
+    }
+    return SH_OK;
+}
+
+static int compare(const void *a, const void *b)
+{
+    const uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* Neighbours keep their common vertices: the exact stage finds neighbours by them. */
+static int make_scene(struct column *c, struct scene **out, struct sh_err *err)
+{
+    const struct scene *all = c->scene;
+    c->vertex = malloc(3 * c->n * sizeof *c->vertex);
+    double(*vertex_m)[3] = malloc(3 * c->n * sizeof *vertex_m);
+    uint32_t(*triangle)[3] = malloc(c->n * sizeof *triangle);
+    int rc = SH_ENOMEM;
+    if (c->vertex == NULL || vertex_m == NULL || triangle == NULL) {
+        sh_fail(err, rc, "cast: no memory to look for the floor");
+        goto done;
+    }
+    for (size_t i = 0; i < c->n; i++)
+        memcpy(c->vertex + 3 * i, all->triangle[c->prim[i]], sizeof *triangle);
+    qsort(c->vertex, 3 * c->n, sizeof *c->vertex, compare);
+    for (size_t i = 0; i < 3 * c->n; i++)
+        if (i == 0 || c->vertex[i] != c->vertex[c->n_vertices - 1]) c->vertex[c->n_vertices++] = c->vertex[i];
+    for (size_t i = 0; i < c->n_vertices; i++)
+        memcpy(vertex_m[i], all->vertex_m[c->vertex[i]], sizeof *vertex_m);
+    for (size_t i = 0; i < c->n; i++)
+        for (int k = 0; k < 3; k++) {
+            const uint32_t *at = bsearch(&all->triangle[c->prim[i]][k], c->vertex, c->n_vertices, sizeof *at, compare);
+            triangle[i][k] = (uint32_t)(at - c->vertex);
+        }
+    rc = scene_from_arrays((const double(*)[3])vertex_m, (uint32_t)c->n_vertices, (const uint32_t(*)[3])triangle,
+                           (uint32_t)c->n, NULL, NULL, 0, out, err);
+done:
+    free(vertex_m);
+    free(triangle);
+    return rc;
+}
+
+static int cast_down(const struct column *c, const struct scene *scene, const double down[3], double *range_m,
+                     struct sh_err *err)
+{
+    struct bvh *bvh = NULL;
+    struct caster *caster = NULL;
+    uint32_t triangle;
+    double far_m = 1.0;
+    for (int i = 0; i < 3; i++)
+        far_m += fmax(fabs(scene->min_m[i] - c->from_m[i]), fabs(scene->max_m[i] - c->from_m[i]));
+    int rc = bvh_create(scene, c->from_m, 0.0, 1, NULL, &bvh, err);
+    if (rc == SH_OK) rc = bvh_order_exactly(bvh, err); /* few triangles: no need to ask whether that is wanted */
+    if (rc == SH_OK) rc = caster_create(&caster, err);
+    if (rc == SH_OK) caster_hits(caster, bvh, c->from_m, far_m, 1, &down[0], &down[1], &down[2], range_m, &triangle);
+    caster_free(caster);
+    bvh_free(bvh);
+    return rc;
+}
+
+int cast_floor(const struct scene *scene, const double from_m[3], const double down[3], double *range_m,
+               struct sh_err *err)
+{
+    struct column c = {.scene = scene};
+    struct scene *around = NULL;
+    memcpy(c.from_m, from_m, sizeof c.from_m);
+    directions_across(down, c.u, c.v);
+    *range_m = NAN;
+    int rc = collect(&c, err);
+    if (rc == SH_OK && c.n > 0) rc = make_scene(&c, &around, err);
+    if (rc == SH_OK && c.n > 0) rc = cast_down(&c, around, down, range_m, err);
+    scene_free(around);
+    free(c.vertex);
+    free(c.prim);
+    return rc;
+}

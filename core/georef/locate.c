@@ -1,0 +1,49 @@
+#include "core/locate.h"
+
+#include <math.h>
+#include <stddef.h>
+
+#include "core/georef/geographiclib_shim.h"
+
+/* As georef.c: lowest sea bed to the edge of space. */
+#define HEIGHT_MIN_M (-12000.0)
+#define HEIGHT_MAX_M 100000.0
+
+int locate_check(const struct georef_place *place, struct sh_err *err)
+{
+    /* each is false for not-a-number */
+    if (!(fabs(place->lat_deg) <= 90.0))
+        return sh_fail(err, SH_EINPUT, "latitude %.10g deg; allowed -90 to 90 deg", place->lat_deg);
+    if (!(place->lon_deg >= -180.0 && place->lon_deg <= 360.0))
+        return sh_fail(err, SH_EINPUT, "longitude %.10g deg; allowed -180 to 360 deg", place->lon_deg);
+    if (!(place->height_m >= HEIGHT_MIN_M && place->height_m <= HEIGHT_MAX_M))
+        return sh_fail(err, SH_EINPUT,
+                       "not near the Earth's surface: height %.10g m above the ellipsoid; allowed %g to %g m",
+                       place->height_m, HEIGHT_MIN_M, HEIGHT_MAX_M);
+    return SH_OK;
+}
+
+int locate_axes(const struct georef_place *place, double p_ecef[3], double rotation[9], struct sh_err *err)
+{
+    int rc = locate_check(place, err);
+    if (rc == SH_OK) shim_ecef(place->lat_deg, place->lon_deg, place->height_m, p_ecef, rotation);
+    return rc;
+}
+
+int locate_in_grid(const struct georef_place *place, int zone, struct locate_grid *out, struct sh_err *err)
+{
+    char why[256] = "";
+    struct shim_utm utm;
+    int rc = locate_check(place, err);
+    if (rc != SH_OK) return rc;
+    if (zone < 0 || zone > 60 || shim_utm_forward(place->lat_deg, place->lon_deg, zone, &utm, why, sizeof why) != 0)
+        return sh_fail(err, SH_EINPUT, "UTM zone %d does not reach latitude %.10g, longitude %.10g%s%s%s", zone,
+                       place->lat_deg, place->lon_deg, why[0] != '\0' ? " (" : "", why, why[0] != '\0' ? ")" : "");
+    *out = (struct locate_grid){.zone = utm.zone,
+                                .north = utm.north,
+                                .easting_m = utm.easting_m,
+                                .northing_m = utm.northing_m,
+                                .convergence_deg = utm.convergence_deg,
+                                .scale = utm.scale};
+    return SH_OK;
+}

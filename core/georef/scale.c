@@ -1,0 +1,55 @@
+/* Counts on the wire: how much of the CRS's unit one is. */
+#include <math.h>
+
+#include "core/georef/private.h"
+
+/* Half a count less than 2^31, for rounding; -2^31 says that there is no point. */
+static const double MOST_COUNTS = 2147483646.5;
+
+/* Largest difference of each coordinate from the anchor, in units of the CRS, and what a count of one metre would be.
+ */
+static void spans(const struct georef *georef, double reach_m, double span[3], double unit[3])
+{
+    for (int i = 0; i < 3; i++) {
+        span[i] = reach_m;
+        unit[i] = 1.0;
+    }
+    if (!georef_has_map(georef)) return;
+    if (georef->crs == GEOREF_ECEF) { /* from a grid, whose lengths differ by less than this */
+        for (int i = 0; i < 3; i++)
+            span[i] *= 1.1;
+        return;
+    }
+    /* Heights differ from those of the tangent plane by reach^2 / 2R, a geoid's by less than 1 % of the way. */
+    span[2] = reach_m * 1.01 + reach_m * reach_m / (2 * 6.3e6);
+    if (georef->crs == GEOREF_UTM) {
+        double convergence_rad, scale;
+        georef_convergence(georef, &convergence_rad, &scale);
+        /* A grid's scale changes by less than 1e-6 per metre, and by 1 / R per metre of depth. */
+        span[0] = span[1] = reach_m * scale * (1.002 + 1e-6 * reach_m);
+        return;
+    }
+    double lat_m, lon_m, axis_m;
+    georef_degrees(georef, reach_m, &lat_m, &lon_m, &axis_m);
+    unit[0] = 1.0 / lat_m;
+    unit[1] = 180.0 / M_PI / (axis_m + reach_m);
+    /* A degree of latitude is at least 110,574 m less 1/57 of the depth; 12 km deep are allowed. */
+    span[0] = reach_m / (110300.0 - reach_m * M_PI / 180.0);
+    span[1] = reach_m < axis_m ? asin(reach_m / axis_m) * 180.0 / M_PI * 1.0001 : 180.0;
+    if (reach_m > 1e6) span[0] = 180.0;
+}
+
+int georef_scale(const struct georef *georef, double scale_m, double reach_m, double scale[3], struct sh_err *err)
+{
+    double span[3], unit[3], least_m = 0.0;
+    spans(georef, reach_m, span, unit);
+    for (int i = 0; i < 3; i++) {
+        scale[i] = scale_m * unit[i];
+        least_m = fmax(least_m, span[i] / unit[i] / MOST_COUNTS);
+    }
+    if (least_m <= scale_m) return SH_OK; /* false for not-a-number */
+    return sh_fail(
+        err, SH_EINPUT,
+        "coordinates up to %g m from their anchor do not fit into 31 bits at %g m per count; at least %.3g m", reach_m,
+        scale_m, least_m);
+}

@@ -1,0 +1,24 @@
+/* What a single place on the Earth has besides its coordinates (core/georef.h): local axes, and convergence and scale
+ * in a grid. Degrees, metres; heights above the ellipsoid. Errors (SH_EINPUT) say what is allowed. Thread: any. */
+#ifndef CORE_LOCATE_H
+#define CORE_LOCATE_H
+
+#include "core/georef.h"
+
+/* Refuses what is no place: latitude or longitude out of range, or a height below the deepest sea or in space, where a
+ * unit or a sign is wrong. */
+int locate_check(const struct georef_place *place, struct sh_err *err);
+
+/* ECEF, and the rotation of east, north, up there to X, Y, Z, row by row. Checks the place. */
+int locate_axes(const struct georef_place *place, double p_ecef[3], double rotation[9], struct sh_err *err);
+
+struct locate_grid {
+    int zone, north; /* zone 0: UPS */
+    double easting_m, northing_m;
+    double convergence_deg; /* bearing of grid north, clockwise from true north */
+    double scale;           /* grid metres per metre on the ellipsoid */
+};
+/* zone: 1..60, or 0: by position, UPS beyond 84 N and 80 S. Checks the place. */
+int locate_in_grid(const struct georef_place *place, int zone, struct locate_grid *out, struct sh_err *err);
+
+#endif

@@ -1,0 +1,15 @@
+/* What `scanhead check` says about places: the anchor, and each station in every frame that is known. */
+#ifndef FIRMWARE_SIM_CHECK_STATION_H
+#define FIRMWARE_SIM_CHECK_STATION_H
+
+#include <stdio.h>
+
+#include "firmware_sim/site.h"
+
+void check_print_anchor(const struct site *site, FILE *out);
+int check_print_station(const struct site *site, uint32_t i, FILE *out, struct sh_err *err);
+
+/* Warns of stations that have nothing within the head's range, as the scene stands at the start. */
+int check_reach(const struct site *site, const struct sh_report *report, struct sh_err *err);
+
+#endif

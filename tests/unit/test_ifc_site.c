@@ -1,0 +1,237 @@
+/* The site of an IFC model: written files, and the house that Debian ships. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+#include "core/ifc_site.h"
+
+static char path[64];
+static struct ifc_site site;
+static struct sh_err err;
+
+/* Records in the order in which references come late: a reader may not count on one. */
+static const char base[] = "ISO-10303-21;\nHEADER;\nFILE_NAME('a;b''#1= IFCSITE(','x');\nENDSEC;\nDATA;\n"
+                           "#1= IFCPROJECT('p',$,$,$,$,$,$,(#5),#2);\n"
+                           "#2= IFCUNITASSIGNMENT((#4,#3));\n"
+                           "#3= IFCSIUNIT(*,.LENGTHUNIT.,.MILLI.,.METRE.);\n"
+                           "#4= IFCSIUNIT(*,.PLANEANGLEUNIT.,$,.RADIAN.);\n"
+                           "#5= IFCGEOMETRICREPRESENTATIONCONTEXT($,'Model',3,1.E-5,#6,#9);\n"
+                           "#6= IFCAXIS2PLACEMENT3D(#7,$,$);\n"
+                           "#7= IFCCARTESIANPOINT((0.,0.,0.));\n"
+                           "#8= IFCSITE('s',$,'x;',$,$,#10,$,$,.ELEMENT.,(52,31,30,500000),(13,24,0),34500.,$,$);\n"
+                           "#9= IFCDIRECTION((1.,1.));\n"
+                           "#10= IFCLOCALPLACEMENT($,#11);\n"
+                           "#11= IFCAXIS2PLACEMENT3D(#12,$,$);\n"
+                           "#12= IFCCARTESIANPOINT((1000.,-2000.,\n  500.));\n"
+                           "ENDSEC;\nEND-ISO-10303-21;\n";
+
+static int load_text(const char *text)
+{
+    FILE *f = fopen(path, "w");
+    assert_non_null(f);
+    fputs(text, f);
+    assert_int_equal(fclose(f), 0);
+    memset(&err, 0, sizeof err);
+    return ifc_site_read(path, &site, &err);
+}
+
+static int load_edited(const char *old, const char *with)
+{
+    char text[4096];
+    const char *at = strstr(base, old);
+    if (at == NULL) fail_msg("nothing to edit: %s", old);
+    snprintf(text, sizeof text, "%.*s%s%s", (int)(at - base), base, with, at + strlen(old));
+    return load_text(text);
+}
+
+static void assert_loads(int code)
+{
+    if (code != SH_OK) fail_msg("%s", err.text);
+}
+
+/* One rounding for each term of the sum. */
+static void assert_near(double got, double want)
+{
+    if (!(fabs(got - want) <= 1e-14 * (1.0 + fabs(want)))) fail_msg("%.17g instead of %.17g", got, want);
+}
+
+static void a_site_is_read(void **state)
+{
+    (void)state;
+    assert_loads(load_text(base));
+    assert_near(site.lat_deg, 52.0 + 31.0 / 60 + 30.5 / 3600);
+    assert_near(site.lon_deg, 13.4);
+    assert_near(site.elevation_m, 34.5); /* millimetres */
+    assert_near(site.origin_m[0], 1.0);
+    assert_near(site.origin_m[1], -2.0);
+    assert_near(site.origin_m[2], 0.5);
+    assert_near(site.north_deg, 45.0); /* between x and y, clockwise from y */
+    assert_true(site.has_north && !site.has_map);
+}
+
+static void what_is_not_given(void **state)
+{
+    (void)state;
+    assert_loads(load_edited("34500.", "$"));
+    assert_true(isnan(site.elevation_m));
+    assert_loads(load_edited("#6,#9)", "#6,$)"));
+    assert_true(site.north_deg == 0.0 && !site.has_north);
+    assert_loads(load_edited("$,$,#10,$", "$,$,$,$")); /* no placement: the origin */
+    assert_true(site.origin_m[0] == 0.0 && site.origin_m[1] == 0.0 && site.origin_m[2] == 0.0);
+    assert_loads(load_edited("ENDSEC;\nEND", "#20= IFCMAPCONVERSION(#5,#21,1.,2.,3.,$,$,$);\nENDSEC;\nEND"));
+    assert_true(site.has_map);
+    assert_loads(load_edited("#9= ", "/* #8= IFCSITE(; */ #9= "));
+    /* A plan's own context and a site without angles count for nothing. */
+    assert_loads(load_edited("#5= ", "#21= IFCGEOMETRICREPRESENTATIONCONTEXT($,'Plan',2,$,#22,$);\n"
+                                     "#23= IFCSITE('t',$,$,$,$,$,$,$,.PARTIAL.,$,$,$,$,$);\n#5= "));
+    assert_near(site.north_deg, 45.0);
+}
+
+static void angles(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *text;
+        double deg;
+    } good[] = {{"(-13,-24,0)", -13.4},
+                {"(0,-30,0)", -0.5},
+                {"(0,0,-36)", -0.01},
+                {"(0,0,0,-360000)", -0.0001},
+                {"(179,59,59,999999)", 180.0 - 1 / 3.6e9},
+                {"(-180,0,0)", -180.0},
+                {"( 13 , 24 , 0 )", 13.4}};
+    for (size_t i = 0; i < sizeof good / sizeof good[0]; i++) {
+        assert_loads(load_edited("(13,24,0)", good[i].text));
+        assert_near(site.lon_deg, good[i].deg);
+    }
+    assert_loads(load_edited("(52,31,30,500000)", "(-33,-52,-10)"));
+    assert_near(site.lat_deg, -(33.0 + 52.0 / 60 + 10.0 / 3600));
+}
+
+static void units(void **state)
+{
+    (void)state;
+    assert_loads(load_edited(".MILLI.", "$"));
+    assert_near(site.elevation_m, 34500.0);
+    assert_loads(load_edited("#3= IFCSIUNIT(*,.LENGTHUNIT.,.MILLI.,.METRE.);",
+                             "#3= IFCCONVERSIONBASEDUNIT(#30,.LENGTHUNIT.,'FOOT',#31);\n"
+                             "#31= IFCMEASUREWITHUNIT(IFCLENGTHMEASURE(0.3048),#32);\n"
+                             "#32= IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.);"));
+    assert_near(site.elevation_m, 34500.0 * 0.3048);
+    assert_near(site.origin_m[1], -2000.0 * 0.3048);
+}
+
+static void what_is_wrong_is_refused(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *old, *with, *part;
+    } bad[] = {
+        {"#8= IFCSITE", "#8= IFCBUILDING", "no IFCSITE with RefLatitude"},
+        {"(52,31,30,500000),(13,24,0)", "$,$", "no IFCSITE with RefLatitude"},
+        {"(13,24,0)", "$", "RefLongitude has 0 components"},
+        {"(13,24,0)", "(13,24)", "line 13: IFCSITE #8: RefLongitude has 2 components; allowed 3 or 4"},
+        {"(13,24,0)", "(13,24,0,0,0)", "RefLongitude has 5 components"},
+        {"(13,24,0)", "13.4", "RefLongitude has 0 components"},
+        {"(13,24,0)", "(-13,24,0)", "different sign"},
+        {"(13,24,0)", "(13,60,0)", "component 2 is not a whole number within 60"},
+        {"(13,24,0)", "(13,24,0.5)", "component 3 is not a whole number"},
+        {"(13,24,0)", "(13,24,0,1000000)", "component 4"},
+        {"(13,24,0)", "(180,0,1)", "allowed -180 to 180"},
+        {"(52,31,30,500000)", "(90,0,0,1)", "allowed -90 to 90"},
+        {"34500.", "'34500'", "RefElevation is not a number"},
+        {",$,$);\n#9", ",$);\n#9", "not the 14 attributes"},
+        {"#10= IFCLOCALPLACEMENT($", "#10= IFCLOCALPLACEMENT(#6", "relative to another"},
+        {"$,$,#10,$", "$,$,#99,$", "there is no record #99"},
+        {"$,$,#10,$", "$,$,#12,$", "no reference to IFCLOCALPLACEMENT"},
+        {"$,$,#10,$", "$,$,10,$", "no reference to IFCLOCALPLACEMENT"},
+        {"#7= IFCCARTESIANPOINT((0.,0.,0.));", "#7= IFCCARTESIANPOINT((0.,1.,0.));", "WorldCoordinateSystem"},
+        {"(1.,1.)", "(0.,0.)", "without a direction"},
+        {"(1.,1.)", "(1.,x)", "not a number"},
+        {".MILLI.", ".FURLONG.", "unknown prefix"},
+        {".LENGTHUNIT.", ".AREAUNIT.", "no unit of length"},
+        {"ENDSEC;\nEND", "#40= IFCSITE('s',$,$,$,$,$,$,$,.ELEMENT.,(1,2,3),(1,2,3),$,$,$);\nENDSEC;\nEND",
+         "a second site"},
+        {"ISO-10303-21;\nH", "ISO\nH", "doesn't begin with ISO-10303-21"},
+        {"END-ISO-10303-21;", "#13= IFCWALL(", "without its ';'"},
+        {"END-ISO-10303-21;", "'", "a text without an end"},
+        {"END-ISO-10303-21;", "/*", "a comment without an end"},
+        {"#9= IFCDIRECTION", "#9 IFCDIRECTION", "no record of the form"},
+    };
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        int code = load_edited(bad[i].old, bad[i].with);
+        if (code != SH_EINPUT || strstr(err.text, bad[i].part) == NULL)
+            fail_msg("case %zu: %d \"%s\" without \"%s\"", i, code, err.text, bad[i].part);
+        if (strncmp(err.text, path, strlen(path)) != 0) fail_msg("case %zu: no file in \"%s\"", i, err.text);
+        assert_null(strchr(err.text, '\n'));
+    }
+    assert_int_equal(ifc_site_read("/nonexistent.ifc", &site, &err), SH_EINPUT);
+}
+
+/* Any cut and any changed byte gives a site or one line. */
+static void damaged_files_never_crash(void **state)
+{
+    (void)state;
+    static const char spice[] = "#()',;=$*./ \n09-";
+    char text[sizeof base];
+    for (size_t i = 0; i < sizeof base - 1; i++) {
+        memcpy(text, base, sizeof base);
+        text[i] = '\0';
+        load_text(text);
+        memcpy(text, base, sizeof base);
+        text[i] = spice[i % (sizeof spice - 1)];
+        int code = load_text(text);
+        assert_true(code == SH_OK || code == SH_EINPUT);
+    }
+}
+
+/* As its record says: 52 deg 31 min N, 13 deg 24 min E, no elevation. */
+static void the_house(void **state)
+{
+    (void)state;
+    static const char house[] = "/usr/share/assimp/models/IFC/AC14-FZK-Haus.ifc";
+    if (access(house, R_OK) != 0) {
+        print_message("the house model is not installed (Debian: assimp-testmodels)\n");
+        skip();
+    }
+    assert_loads(ifc_site_read(house, &site, &err));
+    assert_near(site.lat_deg, 52.0 + 31.0 / 60);
+    assert_near(site.lon_deg, 13.4);
+    assert_true(isnan(site.elevation_m) && site.has_north && !site.has_map);
+    assert_near(site.north_deg, 0.0);
+}
+
+static int set_up(void **state)
+{
+    (void)state;
+    snprintf(path, sizeof path, "/tmp/test_ifc_site.XXXXXX");
+    int fd = mkstemp(path);
+    return fd < 0 ? -1 : close(fd);
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    return remove(path);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_site_is_read),
+        cmocka_unit_test(what_is_not_given),
+        cmocka_unit_test(angles),
+        cmocka_unit_test(units),
+        cmocka_unit_test(what_is_wrong_is_refused),
+        cmocka_unit_test(damaged_files_never_crash),
+        cmocka_unit_test(the_house),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

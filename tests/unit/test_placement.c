@@ -1,0 +1,369 @@
+/* From a configuration to where its stations stand. Run from the top of the source tree. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+#include "core/locate.h"
+#include "firmware_sim/check_station.h"
+
+static char dir[64], config_path[128];
+static struct config *cfg;
+static struct site *site;
+static struct sh_err err;
+static char warned[512];
+
+static void keep_warning(void *ctx, const char *text)
+{
+    (void)ctx;
+    snprintf(warned, sizeof warned, "%s", text);
+}
+static const struct sh_report report = {.warn = keep_warning};
+
+static void write_in(const char *name, const char *text)
+{
+    char path[256];
+    snprintf(path, sizeof path, "%s/%s", dir, name);
+    FILE *f = fopen(path, "w");
+    assert_non_null(f);
+    fputs(text, f);
+    assert_int_equal(fclose(f), 0);
+}
+
+/* A floor of 60 x 60 m about (x, y), at z. */
+static void write_floor(double x, double y, double z)
+{
+    char text[512];
+    snprintf(text, sizeof text, "v %.3f %.3f %.3f\nv %.3f %.3f %.3f\nv %.3f %.3f %.3f\nv %.3f %.3f %.3f\nf 1 2 3 4\n",
+             x - 30, y - 30, z, x + 30, y - 30, z, x + 30, y + 30, z, x - 30, y + 30, z);
+    write_in("floor.obj", text);
+}
+
+static int load(const char *anchor, const char *stations, const char *output)
+{
+    char text[2048];
+    snprintf(text, sizeof text,
+             "head: {profile: riegl-vz400i}\nscene:\n  tolerance_m: 1e-6\n"
+             "  meshes: [{file: floor.obj, up: z, scale: 1}]\n%s\nstations:\n%s\noutput: {crs: %s, layout: geo}\n",
+             anchor, stations, output);
+    write_in("test.yaml", text);
+    site_free(site);
+    site = NULL;
+    warned[0] = '\0';
+    memset(&err, 0, sizeof err);
+    int rc = config_load(config_path, NULL, 0, cfg, &err);
+    return rc == SH_OK ? site_load(cfg, &report, &site, &err) : rc;
+}
+
+static void ok(int code)
+{
+    if (code != SH_OK) fail_msg("%s", err.text);
+}
+
+static void assert_near(double got, double want, double tolerance)
+{
+    if (!(fabs(got - want) <= tolerance)) fail_msg("%.15g instead of %.15g, off by %.3g", got, want, got - want);
+}
+
+static void assert_position(uint32_t i, double x, double y, double z, double tolerance)
+{
+    const double *p = site->station[i].at.position_m;
+    assert_near(p[0], x, tolerance);
+    assert_near(p[1], y, tolerance);
+    assert_near(p[2], z, tolerance);
+}
+
+/* A corner of the scene in the CRS, from each station; they have to agree. */
+static void assert_corner_agrees(const double corner[3])
+{
+    double first[3];
+    for (uint32_t i = 0; i < site->n_stations; i++) {
+        double d[3], anchor[3];
+        for (int k = 0; k < 3; k++)
+            d[k] = corner[k] - site->station[i].at.position_m[k];
+        georef_anchor(site->station[i].georef, anchor);
+        georef_forward(site->station[i].georef, 1, &d[0], &d[1], &d[2], &d[0], &d[1], &d[2]);
+        for (int k = 0; k < 3; k++) {
+            d[k] += anchor[k];
+            if (i == 0) first[k] = d[k];
+            assert_near(d[k], first[k], 1e-7);
+        }
+        assert_int_equal(georef_epsg(site->station[i].georef), georef_epsg(site->station[0].georef));
+    }
+}
+
+/* Forms of one place give one place; the UTM and ECEF figures come from the place itself, and 4 decimals of metres in
+ * the text leave 5e-5. */
+static void each_form_leads_to_the_same_place(void **state)
+{
+    (void)state;
+    static const char anchor[] = "  anchor: {source: explicit, origin_m: [5, 6, 7], lat_deg: 52.5, lon_deg: 13.4, "
+                                 "height_m: 100, north_deg: 20}";
+    static const char *const crs[] = {"ecef", "utm"};
+    struct locate_grid utm;
+    double p[3];
+    char stations[512];
+    write_floor(0, 0, 0);
+    ok(load(anchor, "  - {position_m: [15, -20, 2]}", "local"));
+    const struct placement at = site->station[0].at;
+    const struct georef_place place = {at.lat_deg, at.lon_deg, at.height_m};
+    ok(locate_in_grid(&place, 0, &utm, &err));
+    georef_geodetic_to_ecef(&place, p);
+    snprintf(stations, sizeof stations,
+             "  - {position_m: [15, -20, 2]}\n  - {lat_deg: %.10f, lon_deg: %.10f, height_m: %.4f}\n"
+             "  - {utm_zone: %d, hemisphere: north, easting_m: %.4f, northing_m: %.4f, height_m: %.4f}\n"
+             "  - {ecef_m: [%.4f, %.4f, %.4f]}\n",
+             at.lat_deg, at.lon_deg, at.height_m, utm.zone, utm.easting_m, utm.northing_m, at.height_m, p[0], p[1],
+             p[2]);
+    for (int c = 0; c < 2; c++) {
+        ok(load(anchor, stations, crs[c]));
+        for (uint32_t i = 0; i < 4; i++)
+            assert_position(i, 15, -20, 2, 1e-4);
+        assert_corner_agrees((const double[3]){30, 30, 0});
+    }
+}
+
+/* Two stations across a zone's border (12 deg E, 1 m and 40 m away) share the anchor's zone. */
+static void a_zone_border_does_not_part_stations(void **state)
+{
+    (void)state;
+    write_floor(0, 0, 0);
+    ok(load("  anchor: {source: explicit, lat_deg: 50, lon_deg: 11.9999999, height_m: 0}",
+            "  - {position_m: [-20, 0, 2]}\n  - {position_m: [20, 0, 2]}", "utm"));
+    assert_corner_agrees((const double[3]){30, 30, 0});
+    assert_string_equal(warned, "");
+    /* Each for itself they don't, and it is said. */
+    ok(load("",
+            "  - {position_m: [-20, 0, 2], lat_deg: 50, lon_deg: 11.9997, height_m: 0}\n"
+            "  - {position_m: [20, 0, 2], lat_deg: 50, lon_deg: 12.0003, height_m: 0}",
+            "utm"));
+    assert_non_null(strstr(warned, "EPSG 32633, station station-1 in 32632"));
+}
+
+/* A mesh in UTM: stations by UTM are the scene's coordinates to the last bit, those by lat and lon come near. */
+static void a_mesh_in_utm(void **state)
+{
+    (void)state;
+    static const char anchor[] = "  anchor: {source: utm, utm_zone: 33, hemisphere: north}";
+    const double corner[3] = {391467, 5819741, 111};
+    double anchor_m[3];
+    write_floor(391437, 5819711, 111);
+    ok(load(anchor,
+            "  - {easting_m: 391437.1, northing_m: 5819711.2, height_m: 112.3, heading_deg: 30}\n"
+            "  - {lat_deg: 52.516686437, lon_deg: 13.400081019, height_m: 111.6, instrument_height_m: 1.5}\n",
+            "utm"));
+    const double exact[3] = {391437.1, 5819711.2, 112.3};
+    assert_memory_equal(site->station[0].at.position_m, exact, sizeof exact);
+    georef_anchor(site->station[0].georef, anchor_m);
+    assert_memory_equal(anchor_m, exact, sizeof exact);
+    assert_near(site->station[1].at.position_m[2], 112.5, 1e-9); /* floor at 111 */
+    assert_near(site->station[1].at.height_m, 112.5, 1e-9);
+    assert_corner_agrees(corner);
+    ok(load(anchor,
+            "  - {easting_m: 391437.1, northing_m: 5819711.2, height_m: 112.3}\n"
+            "  - {position_m: [391450, 5819700, 113]}",
+            "ecef"));
+    assert_corner_agrees(corner);
+}
+
+/* A scene in ECEF: the floor is down the plumb line, the head upright; at (a, 0, 0) down is -X. */
+static void a_mesh_in_ecef(void **state)
+{
+    (void)state;
+    write_in("floor.obj", "v 6378140 -9 -9\nv 6378140 9 -9\nv 6378140 9 9\nv 6378140 -9 9\nf 1 2 3 4\n");
+    ok(load("  anchor: {source: ecef}", "  - {ecef_m: [6378145, 0, 0], instrument_height_m: 2, heading_deg: 90}",
+            "utm"));
+    assert_position(0, 6378142, 0, 0, 2e-9);
+    const double *r = site->station[0].at.rotation;
+    /* forward (second column): heading 90 is east, Y; up is X; right is south, -Z */
+    const double want[9] = {0, 0, 1, 0, 1, 0, -1, 0, 0};
+    for (int i = 0; i < 9; i++)
+        assert_near(r[i], want[i], 1e-14);
+}
+
+static void an_instrument_height_counts_from_the_floor(void **state)
+{
+    (void)state;
+    write_floor(0, 0, -0.25);
+    ok(load("",
+            "  - {position_m: [3, 4, 1], instrument_height_m: 1.5}\n  - {position_m: [3, 4, 1]}\n"
+            "  - {position_m: [3, 4, -0.25], instrument_height_m: 1.5, roll_deg: 30}",
+            "local"));
+    assert_position(0, 3, 4, 1.25, 1e-14);
+    assert_position(1, 3, 4, 1, 0);
+    assert_position(2, 3, 4, 1.25, 1e-14); /* from the floor itself */
+    assert_int_equal(load("", "  - {name: gate, position_m: [3, 4, -1], instrument_height_m: 1.5}", "local"),
+                     SH_EINPUT);
+    assert_non_null(
+        strstr(err.text, "stations[0] (gate): instrument_height_m, but no surface of the scene lies below"));
+    assert_null(strchr(err.text, '\n'));
+    ok(load("", "  - {position_m: [3, 4, 1], instrument_height_m: 1.5, pitch_deg: 10}", "local"));
+    assert_position(0, 3, 4, 1.25, 1e-14);
+}
+
+static void what_has_no_place_is_refused(void **state)
+{
+    (void)state;
+    write_floor(0, 0, 0);
+    static const struct {
+        const char *anchor, *stations, *part;
+    } bad[] = {
+        {"  anchor: {source: utm, utm_zone: 33, hemisphere: north}", "  - {lat_deg: 52, lon_deg: 120, height_m: 0}",
+         "UTM zone 33 does not reach latitude 52, longitude 120"},
+        {"  anchor: {source: utm, utm_zone: 33, hemisphere: north}",
+         "  - {easting_m: 2e6, northing_m: 5e6, height_m: 0}", "is not in UTM zone 33N"},
+        {"  anchor: {source: ecef}", "  - {position_m: [1, 2, 3]}", "not near the Earth's surface"},
+        {"  anchor: {source: ifc}", "  - {position_m: [1, 2, 3]}", "no mesh is an .ifc file"},
+        {"", "  - {position_m: [0, 0, 1], ecef_m: [1, 2, 3]}", "not near the Earth's surface"},
+    };
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        int code = load(bad[i].anchor, bad[i].stations, "local");
+        if (code != SH_EINPUT || strstr(err.text, bad[i].part) == NULL)
+            fail_msg("case %zu: %d \"%s\" without \"%s\"", i, code, err.text, bad[i].part);
+    }
+}
+
+/* The y axis' azimuth as printed: from true north, from grid north. */
+static void read_azimuths(double *azimuth_deg, double *from_grid_deg)
+{
+    char *text = NULL;
+    size_t len = 0;
+    FILE *out = open_memstream(&text, &len);
+    ok(check_print_station(site, 0, out, &err));
+    fclose(out);
+    const char *at = strstr(text, "azimuth ");
+    assert_non_null(at);
+    assert_int_equal(sscanf(at, "azimuth %lf deg from true north, %lf", azimuth_deg, from_grid_deg), 2);
+    free(text);
+}
+
+/* Headings count from the scene's y axis; convergence parts true from grid north. On a sphere
+ * tan(convergence) = tan(dlon) sin(lat); the ellipsoid adds less than 1e-4 of it. */
+static void headings_and_convergence(void **state)
+{
+    (void)state;
+    double azimuth_deg, from_grid_deg, convergence_deg = atan(tan(3 * M_PI / 180) * sin(50 * M_PI / 180)) * 180 / M_PI;
+    write_floor(0, 0, 0);
+    ok(load("  anchor: {source: explicit, lat_deg: 50, lon_deg: 18, height_m: 0, north_deg: 20}",
+            "  - {position_m: [0, 0, 2], heading_deg: 50}", "local"));
+    read_azimuths(&azimuth_deg, &from_grid_deg); /* 18 E: the first of zone 34, whose meridian is 21 E, 3 deg away */
+    assert_near(azimuth_deg, 30, 1e-6);
+    assert_near(from_grid_deg, 30 + convergence_deg, 3e-4);
+    struct locate_grid utm;
+    char text[256];
+    ok(locate_in_grid(&(struct georef_place){50, 18, 0}, 33, &utm, &err)); /* the other side: 3 deg east of 15 E */
+    write_floor(utm.easting_m, utm.northing_m, 0);
+    snprintf(text, sizeof text, "  - {easting_m: %.4f, northing_m: %.4f, height_m: 2, heading_deg: 50}", utm.easting_m,
+             utm.northing_m);
+    ok(load("  anchor: {source: utm, utm_zone: 33, hemisphere: north}", text, "utm"));
+    read_azimuths(&azimuth_deg, &from_grid_deg);
+    assert_near(from_grid_deg, 50, 1e-6);
+    assert_near(azimuth_deg, 50 + convergence_deg, 3e-4);
+}
+
+static void a_station_out_of_reach_is_told(void **state)
+{
+    (void)state;
+    write_floor(0, 0, 0);
+    ok(load("", "  - {position_m: [0, 0, 790]}\n  - {position_m: [0, 0, 799]}", "local"));
+    warned[0] = '\0';
+    ok(check_reach(site, &report, &err)); /* 800 m; the corners are 42 m off, the face itself is within */
+    assert_string_equal(warned, "");
+    ok(load("", "  - {position_m: [0, 0, 1]}\n  - {position_m: [0, 0, 801]}", "local"));
+    ok(check_reach(site, &report, &err));
+    assert_non_null(strstr(warned, "station 2 station-2 at 0 0 801 m: nothing within range_max_m, 800 m"));
+    ok(load("", "  - {position_m: [600, 600, 1]}", "local")); /* 570 m off in x and in y: 806 m */
+    ok(check_reach(site, &report, &err));
+    assert_non_null(strstr(warned, "nothing within"));
+}
+
+static void the_house_has_its_site(void **state)
+{
+    (void)state;
+    static const char house[] = "/usr/share/assimp/models/IFC/AC14-FZK-Haus.ifc";
+    if (access(house, R_OK) != 0) {
+        print_message("the house model is not installed (Debian: assimp-testmodels)\n");
+        skip();
+    }
+    static const char text[] =
+        "head: {profile: riegl-vz400i}\n"
+        "scene:\n  meshes: [{file: /usr/share/assimp/models/IFC/AC14-FZK-Haus.ifc, up: %s, scale: %g, "
+        "offset_m: [100, 0, 0]}]\n  anchor: {source: ifc%s}\n"
+        "stations:\n  - {position_m: [100, 0, 0]}\n  - {position_m: [105.5, 2.2, 1], instrument_height_m: 1.6}\n"
+        "output: {crs: utm, layout: geo}\n";
+    static const struct {
+        const char *up;
+        double scale;
+        const char *height, *part;
+    } at[] = {{"y", 1, "", NULL},
+              {"y", 1, ", height_m: 110", NULL},
+              {"z", 1, "", "allowed up: y"},
+              {"y", 0.5, "", "scale: 1"}};
+    for (int i = 0; i < 4; i++) {
+        char edited[1024];
+        snprintf(edited, sizeof edited, text, at[i].up, at[i].scale, at[i].height);
+        write_in("test.yaml", edited);
+        site_free(site);
+        site = NULL;
+        warned[0] = '\0';
+        ok(config_load(config_path, NULL, 0, cfg, &err));
+        int code = site_load(cfg, &report, &site, &err);
+        if (at[i].part != NULL) {
+            assert_int_equal(code, SH_EINPUT);
+            assert_non_null(strstr(err.text, at[i].part));
+            continue;
+        }
+        ok(code);
+        assert_near(site->station[0].at.lat_deg, 52.0 + 31.0 / 60, 1e-12);
+        assert_near(site->station[0].at.lon_deg, 13.4, 1e-12);
+        assert_near(site->station[0].at.height_m, i == 0 ? 0 : 110, 1e-8);
+        assert_near(site->station[1].at.position_m[2], 1.6, 1e-6); /* the ground floor, in single precision */
+    }
+}
+
+static int set_up(void **state)
+{
+    (void)state;
+    char path[512];
+    snprintf(dir, sizeof dir, "/tmp/test_placement.XXXXXX");
+    if (mkdtemp(dir) == NULL || getcwd(path, sizeof path - 16) == NULL) return -1;
+    strcat(path, "/config/heads");
+    setenv("SCANHEAD_HEADS", path, 1);
+    snprintf(config_path, sizeof config_path, "%s/test.yaml", dir);
+    cfg = malloc(sizeof *cfg);
+    return cfg == NULL ? -1 : 0;
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    char path[128];
+    site_free(site);
+    free(cfg);
+    snprintf(path, sizeof path, "%s/floor.obj", dir);
+    remove(path);
+    remove(config_path);
+    return rmdir(dir);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(each_form_leads_to_the_same_place),
+        cmocka_unit_test(a_zone_border_does_not_part_stations),
+        cmocka_unit_test(a_mesh_in_utm),
+        cmocka_unit_test(a_mesh_in_ecef),
+        cmocka_unit_test(an_instrument_height_counts_from_the_floor),
+        cmocka_unit_test(what_has_no_place_is_refused),
+        cmocka_unit_test(headings_and_convergence),
+        cmocka_unit_test(a_station_out_of_reach_is_told),
+        cmocka_unit_test(the_house_has_its_site),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}
