@@ -215,8 +215,100 @@ static void test_gpsd(void **state)
     check_gpsd(*state, 1, 1);
 }
 
+/* ---- a head that moves: along a straight line at constant speed, so that half-way poses are a closed form */
+
+static const double VELOCITY_M_S[3] = {1.1, 0.7, 0.15}, DRIVE_S = 60.0;
+
+static void write_drive(const struct wire *wire)
+{
+    FILE *f = fopen(wire_path(wire, "drive.csv"), "w");
+    assert_non_null(f);
+    fprintf(f, "t_s,x_m,y_m,z_m,heading_deg\n");
+    for (double t = 0.0; t <= DRIVE_S; t += 0.5)
+        fprintf(f, "%.17g,%.17g,%.17g,%.17g,30\n", t, STATION[0] + VELOCITY_M_S[0] * t,
+                STATION[1] + VELOCITY_M_S[1] * t, STATION[2] + VELOCITY_M_S[2] * t);
+    assert_int_equal(fclose(f), 0);
+}
+
+/* WGS 84, NIMA TR8350.2. */
+static void to_ecef(double lat_deg, double lon_deg, double height_m, double p[3])
+{
+    const double a = 6378137, f = 1 / 298.257223563, e2 = f * (2 - f), deg = M_PI / 180;
+    double s = sin(lat_deg * deg), c = cos(lat_deg * deg), n = a / sqrt(1 - e2 * s * s);
+    p[0] = (n + height_m) * c * cos(lon_deg * deg);
+    p[1] = (n + height_m) * c * sin(lon_deg * deg);
+    p[2] = (n * (1 - e2) + height_m) * s;
+}
+
+/* East, north, up from the station. */
+static void from_station(const char *line, double d[3])
+{
+    double p[3], q[3], lat = LAT_DEG * M_PI / 180, lon = LON_DEG * M_PI / 180;
+    to_ecef(LAT_DEG, LON_DEG, HEIGHT_M, p);
+    to_ecef(number(line, "lat"), number(line, "lon"), number(line, "altHAE"), q);
+    double x = q[0] - p[0], y = q[1] - p[1], z = q[2] - p[2];
+    d[0] = -sin(lon) * x + cos(lon) * y;
+    d[1] = -sin(lat) * cos(lon) * x - sin(lat) * sin(lon) * y + cos(lat) * z;
+    d[2] = cos(lat) * cos(lon) * x + cos(lat) * sin(lon) * y + sin(lat) * z;
+}
+
+/* Where the trajectory is that long after the scan's start, to the sentences' rounding, as above; speed and course to
+ * theirs, 0.0005 knots and 0.01 degrees, and gpsd's three and four decimals. */
+static void check_drive(const char *line, double since_s)
+{
+    double d[3], t = since_s < 0.0 ? 0.0 : since_s;
+    from_station(line, d);
+    for (int i = 0; i < 3; i++)
+        if (fabs(d[i] - VELOCITY_M_S[i] * t) > 0.0005)
+            fail_msg("%g s after the start %g %g %g m from the station", since_s, d[0], d[1], d[2]);
+    if (since_s < 0.01) return; /* it stands, or starts */
+    double course_deg = atan2(VELOCITY_M_S[0], VELOCITY_M_S[1]) * 180 / M_PI;
+    assert_true(fabs(number(line, "speed") - hypot(VELOCITY_M_S[0], VELOCITY_M_S[1])) < 0.0005 * 0.5145 + 0.0005);
+    double off_deg = number(line, "track") - course_deg; /* the sentence rounds down */
+    assert_true(off_deg > -0.01 - 0.0001 && off_deg < 0.0001);
+}
+
+static void test_gpsd_moves(void **state)
+{
+    struct wire *wire = *state;
+    if (!in_path("gpsd") || !in_path("gpspipe")) {
+        print_message("# no gpsd, gpspipe (packages gpsd, gpsd-clients)\n");
+        skip();
+    }
+    char file[400];
+    snprintf(file, sizeof file, "platform.file=%s", wire_path(wire, "drive.csv"));
+    const char *const more[] = {
+        PLACE, "--set", "gnss.quality=4", "--set", "gnss.rate_hz=10", "--set", "platform.kind=trajectory", "--set",
+        file,  NULL};
+    write_drive(wire);
+    struct head head = head_start(wire, write_room(wire, NMEA_PTY), more);
+    struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
+    struct scanhead_frame frame;
+    struct gpsd gpsd;
+    gpsd_start(&gpsd, wire);
+    check_drive(gpsd_fix(&gpsd), -1.0); /* no scan yet */
+    client_tell(sh, "SCAN:STAR");
+    client_until(sh, SCANHEAD_EV_SCAN_START, &frame);
+    double start_s = 1e-9 * (double)frame.event_value[1], since_s;
+    int before = -1, n = 0;
+    scanhead_close(sh);
+    do {
+        const char *line = gpsd_fix(&gpsd);
+        int tenths = tpv_tenths(line);
+        since_s = 0.1 * tenths - start_s;
+        /* before the start was known to the receiver, it stood */
+        check_drive(line, since_s);
+        n += tenths != before;
+        before = tenths;
+    } while (since_s < 3.0);
+    assert_true(n >= 30);
+    gpsd_stop(&gpsd);
+    head_end(&head, SIGTERM);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test_setup_teardown(test_gpsd, wire_setup, wire_teardown)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test_setup_teardown(test_gpsd, wire_setup, wire_teardown),
+                                       cmocka_unit_test_setup_teardown(test_gpsd_moves, wire_setup, wire_teardown)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
