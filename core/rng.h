@@ -1,4 +1,5 @@
-/* The one random generator: counter-based, so that a number depends on (seed, pulse, purpose) and on nothing else.
+/* The one random generator: counter-based, so that a number depends on (seed, pulse, echo, purpose) and on nothing
+ * else.
  *
  * Two rounds of the SplitMix64 finaliser (Steele, Lea, Flood, OOPSLA 2014; constants by Stafford, "mix 13") over the
  * pulse number, each keyed. Pure; any thread. */
@@ -10,7 +11,16 @@
 
 #include "core/vecmath.h"
 
-enum rng_purpose { RNG_RANGE = 1, RNG_SCENE = 2, RNG_GNSS = 3 };
+enum rng_purpose {
+    RNG_RANGE = 1,
+    RNG_SCENE = 2,
+    RNG_GNSS = 3,
+    RNG_SIGNAL = 4, /* of the detector */
+    RNG_MIRROR = 5, /* where the beam goes, line angle */
+    RNG_PAN = 6,
+    RNG_BALL = 7, /* ball-shaped noise: direction */
+    RNG_BALL_RADIUS = 8,
+};
 
 VEC_INLINE uint64_t rng_mix(uint64_t x)
 {
@@ -28,6 +38,13 @@ VEC_INLINE uint64_t rng_key(uint64_t seed, enum rng_purpose purpose)
 VEC_INLINE uint64_t rng_u64(uint64_t key, uint64_t pulse)
 {
     return rng_mix(rng_mix(pulse * 0x9e3779b97f4a7c15ULL + key) ^ key);
+}
+
+/* What to ask with for an echo of a pulse: number counts from 0, so that a pulse's only echo is asked for by the pulse.
+ * Pulse numbers stay below 2^56. */
+VEC_INLINE uint64_t rng_echo(uint64_t pulse, uint32_t number)
+{
+    return pulse | (uint64_t)number << 56;
 }
 
 /* Standard normal, by Box and Muller: radius from the upper 32 bits, angle from the lower 32. The largest is 6.7.

@@ -37,6 +37,8 @@ struct scene_mesh_spec {
 struct scene_surface {
     char object[SCENE_NAME_LEN];
     char material[SCENE_NAME_LEN];
+    float colour[3]; /* diffuse, sRGB, 0..1: of STL, glTF, FBX, Collada and IFC with materials */
+    int has_colour;
 };
 
 /* What the import left out or changed; each kind that is not 0 is also reported as one warning per file. */

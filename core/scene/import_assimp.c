@@ -113,6 +113,19 @@ static int add_face(struct import *im, const struct aiFace *face, const struct a
     return build_polygon(b, im->corner, face->mNumIndices, label, err);
 }
 
+/* The first colour that comes with a material's name stays. */
+static void keep_colour(const struct import *im, const struct aiMesh *mesh, struct scene_surface *surface)
+{
+    struct aiColor4D c;
+    if (surface->has_colour || mesh->mMaterialIndex >= im->in->mNumMaterials) return;
+    if (aiGetMaterialColor(im->in->mMaterials[mesh->mMaterialIndex], AI_MATKEY_COLOR_DIFFUSE, &c) != AI_SUCCESS) return;
+    const float rgb[3] = {c.r, c.g, c.b};
+    for (int i = 0; i < 3; i++)
+        if (!(rgb[i] >= 0.0f && rgb[i] <= 1.0f)) return; /* no colour of a surface */
+    memcpy(surface->colour, rgb, sizeof rgb);
+    surface->has_colour = 1;
+}
+
 static int label_of(struct import *im, const struct aiNode *node, const struct aiMesh *mesh, uint16_t *label,
                     struct sh_err *err)
 {
@@ -120,8 +133,10 @@ static int label_of(struct import *im, const struct aiNode *node, const struct a
     struct aiString material = {0};
     if (mesh->mMaterialIndex < im->in->mNumMaterials)
         aiGetMaterialString(im->in->mMaterials[mesh->mMaterialIndex], AI_MATKEY_NAME, &material);
-    return build_label(im->b, object->data, strnlen(object->data, object->length), material.data,
-                       strnlen(material.data, material.length), label, err);
+    int rc = build_label(im->b, object->data, strnlen(object->data, object->length), material.data,
+                         strnlen(material.data, material.length), label, err);
+    if (rc == SH_OK) keep_colour(im, mesh, &im->b->scene->surface[*label]);
+    return rc;
 }
 
 static int add_mesh(struct import *im, const struct aiNode *node, const struct aiMesh *mesh, struct sh_err *err)

@@ -60,7 +60,7 @@ int scene_load(const struct scene_mesh_spec *specs, size_t n_specs, double toler
 
 static int copy_surfaces(struct scene_build *b, const struct scene_surface *surface, uint32_t n, struct sh_err *err)
 {
-    static const struct scene_surface only = {"object", "material"};
+    static const struct scene_surface only = {.object = "object", .material = "material"};
     if (surface == NULL) {
         surface = &only;
         n = 1;

@@ -295,6 +295,7 @@ int build_label(struct scene_build *b, const char *object, size_t object_len, co
 {
     struct scene *s = b->scene;
     struct scene_surface *fresh = &s->surface[s->n_surfaces]; /* room for one more than allowed */
+    fresh->has_colour = 0;
     unsigned cut = copy_name(fresh->object, object, object_len);
     cut += copy_name(fresh->material, material, material_len);
     struct scene_surface **found = tsearch(fresh, &b->surface_tree, compare_surfaces);

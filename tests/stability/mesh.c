@@ -195,7 +195,7 @@ void mesh_any_rotation(double r[9])
 
 struct scene *mesh_scene(const struct mesh *mesh)
 {
-    struct scene_surface surface[MESH_LABELS] = {{"", ""}};
+    struct scene_surface surface[MESH_LABELS] = {{.object = ""}};
     struct scene *scene;
     struct sh_err err;
     if (scene_from_arrays((const double(*)[3])mesh->vertex, mesh->n_vertices, (const uint32_t(*)[3])mesh->triangle,

@@ -36,7 +36,7 @@ static inline struct scene *box_scene(const double lo[3], const double hi[3])
     double vertex[8][3];
     uint32_t triangle[12][3];
     uint16_t label[12];
-    struct scene_surface surface[6];
+    struct scene_surface surface[6] = {{.object = ""}};
     struct scene *scene;
     struct sh_err err;
     for (int v = 0; v < 8; v++)

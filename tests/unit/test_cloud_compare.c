@@ -18,7 +18,9 @@ static struct scene *make_plate(void)
     static const double v[4][3] = {{0, 0, 0}, {8, 0, 0}, {8, 8, 0}, {0, 8, 0}};
     static const uint32_t t[2][3] = {{0, 1, 2}, {0, 2, 3}};
     static const uint16_t label[2] = {0, 2};
-    static const struct scene_surface surface[3] = {{"floor", "oak"}, {"roof", "tin"}, {"floor", "pine"}};
+    static const struct scene_surface surface[3] = {{.object = "floor", .material = "oak"},
+                                                    {.object = "roof", .material = "tin"},
+                                                    {.object = "floor", .material = "pine"}};
     struct scene *s;
     struct sh_err err;
     if (scene_from_arrays(v, 4, t, 2, label, surface, 3, &s, &err) != SH_OK) fail_msg("%s", err.text);

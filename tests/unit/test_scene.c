@@ -419,7 +419,7 @@ static void arrays_become_a_scene(void **state)
     double v[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {5, 5, 5}};
     uint32_t t[3][3] = {{0, 1, 2}, {0, 0, 1}, {2, 1, 0}};
     uint16_t label[3] = {1, 0, 0};
-    struct scene_surface surface[2] = {{"a", "b"}, {"c", "d"}};
+    struct scene_surface surface[2] = {{.object = "a", .material = "b"}, {.object = "c", .material = "d"}};
     struct scene *s;
     struct sh_err err;
     assert_int_equal(

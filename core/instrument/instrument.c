@@ -1,0 +1,89 @@
+#include "core/instrument.h"
+
+#include <math.h>
+
+#include "core/rng.h"
+#include "core/vecmath.h"
+
+static int reads_true(const struct instrument_encoder *e)
+{
+    return e->index_rad == 0.0 && e->scale == 0.0 && e->eccentricity_rad == 0.0;
+}
+
+int instrument_has_offset(const struct instrument *k)
+{
+    return k->transit_offset_m != 0.0 || k->mirror_offset_m != 0.0;
+}
+
+int instrument_is_ideal(const struct instrument *k)
+{
+    return k->collimation_rad == 0.0 && k->trunnion_rad == 0.0 && !instrument_has_offset(k) && reads_true(&k->mirror) &&
+           reads_true(&k->pan) && k->range_offset_m == 0.0 && k->range_scale == 0.0 && k->mirror_sigma_rad == 0.0 &&
+           k->pan_sigma_rad == 0.0;
+}
+
+VEC_CLONES
+static void directions(const struct instrument *k, uint64_t pulse0, uint32_t n, const double *restrict mirror_turn,
+                       const double *restrict pan_turn, double *restrict sx, double *restrict sy, double *restrict sz)
+{
+    const double st = sin(k->trunnion_rad), ct = cos(k->trunnion_rad), sc = sin(k->collimation_rad);
+    const double cc = cos(k->collimation_rad);
+    const double mirror_sigma = k->mirror_sigma_rad / VEC_TURN_RAD, pan_sigma = k->pan_sigma_rad / VEC_TURN_RAD;
+    const uint64_t mirror_key = k->mirror_key, pan_key = k->pan_key;
+    for (uint32_t i = 0; i < n; i++) {
+        double sm, cm, sp, cp;
+        vec_sincos_turn(mirror_turn[i] + mirror_sigma * rng_normal(mirror_key, pulse0 + i), &sm, &cm);
+        vec_sincos_turn(pan_turn[i] + pan_sigma * rng_normal(pan_key, pulse0 + i), &sp, &cp);
+        double x = sc * ct + cc * sm * st, y = cc * cm, z = cc * sm * ct - sc * st;
+        sx[i] = cp * x + sp * y;
+        sy[i] = cp * y - sp * x;
+        sz[i] = z;
+    }
+}
+
+VEC_CLONES
+static void origins(double right_m, double ahead_m, uint32_t n, const double *restrict pan_turn, double *restrict ox,
+                    double *restrict oy, double *restrict oz)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        double sp, cp;
+        vec_sincos_turn(pan_turn[i], &sp, &cp);
+        ox[i] = cp * right_m + sp * ahead_m;
+        oy[i] = cp * ahead_m - sp * right_m;
+        oz[i] = 0.0;
+    }
+}
+
+void instrument_aim(const struct instrument *k, uint64_t pulse0, uint32_t n, const double *mirror_turn,
+                    const double *pan_turn, const struct instrument_beams *beams)
+{
+    directions(k, pulse0, n, mirror_turn, pan_turn, beams->sx, beams->sy, beams->sz);
+    if (beams->ox != NULL)
+        origins(k->mirror_offset_m, k->transit_offset_m, n, pan_turn, beams->ox, beams->oy, beams->oz);
+}
+
+VEC_CLONES
+static void read_encoder(const struct instrument_encoder *e, uint32_t n, double *restrict turn)
+{
+    const double index = e->index_rad / VEC_TURN_RAD, scale = e->scale, phase = e->phase_rad / VEC_TURN_RAD;
+    const double eccentricity = e->eccentricity_rad / VEC_TURN_RAD;
+    for (uint32_t i = 0; i < n; i++) {
+        double s, c;
+        vec_sincos_turn(turn[i] - phase, &s, &c);
+        turn[i] += index + scale * turn[i] + eccentricity * s;
+    }
+}
+
+void instrument_read(const struct instrument *k, uint32_t n, double *mirror_turn, double *pan_turn)
+{
+    if (!reads_true(&k->mirror)) read_encoder(&k->mirror, n, mirror_turn);
+    if (!reads_true(&k->pan)) read_encoder(&k->pan, n, pan_turn);
+}
+
+VEC_CLONES
+void instrument_range(const struct instrument *k, uint32_t n, double *restrict range_m)
+{
+    const double offset_m = k->range_offset_m, scale = k->range_scale;
+    for (uint32_t i = 0; i < n; i++)
+        range_m[i] += offset_m + scale * range_m[i];
+}

@@ -1,0 +1,64 @@
+/* Surfaces: how much of a pulse comes back from what it met.
+ *
+ * Monostatic: source and detector look along the same line. What returns is given relative to a white Lambertian target
+ * that fills the beam and is met head on at the same range:
+ *
+ *     rho(i) = reflectance cos i + specular (m + 2)/2 cos^m(2i) cos i + retro
+ *
+ * - reflectance: Lambertian, radiance the same in all directions; cos i is the area the beam is spread over.
+ * - specular: a lobe of cos^m about the mirror direction, which lies 2i from the way back; normalised so that all of it
+ *   adds up to `specular` (E. P. Lafortune, Y. D. Willems, Using the modified Phong reflectance model, 1994); m is
+ * `gloss`.
+ * - retro: sent back into a narrow cone around where it came from, whatever the incidence: a foil has 100 to 1000.
+ *
+ * Glass passes a share of the power on, at each of its surfaces, in the same direction (panes are thin: no refraction).
+ * A mirror sends a share on by the law of reflection.
+ *
+ * Where the mesh has a colour, the reflectance is taken from it: the luminance of linear sRGB (ITU-R BT.709: 0.2126 R +
+ * 0.7152 G + 0.0722 B). That is an assumption: what is light to the eye need not be at the laser's wavelength. */
+#ifndef CORE_SURFACE_H
+#define CORE_SURFACE_H
+
+#include <stdint.h>
+
+#include "core/scene.h"
+
+struct surface {
+    double reflectance;     /* Lambertian, 0..1 */
+    double specular, gloss; /* 0..1; exponent of the lobe */
+    double retro;           /* >= 0 */
+    double glass, mirror;   /* shares of the power that are passed on, or reflected as by a mirror; 0..1 */
+};
+
+/* What a configuration says about surfaces whose names fit. The patterns are those of the shell (fnmatch); NaN: not
+ * said, and left as it is. */
+struct surface_rule {
+    char object[SCENE_NAME_LEN], material[SCENE_NAME_LEN];
+    struct surface surface;
+};
+
+/* Surfaces by label. Entry n stands for no surface at all: nothing comes back. */
+struct surface_table {
+    uint32_t n;
+    int has_lobes;  /* some surface is specular or retro-reflecting */
+    int has_optics; /* some surface is of glass or a mirror */
+    int has_mirror;
+    struct surface *surface; /* [n + 1] */
+};
+
+int surface_table_alloc(uint32_t n, struct surface_table *table, struct sh_err *err);
+void surface_table_free(struct surface_table *table);
+
+/* Fills entry `label` from the name and colour of a scene's surface and the first of n_rules rules that fits. unknown:
+ * the reflectance where neither says one. Returns the number of that rule, -1: none fits. */
+int surface_table_set(struct surface_table *table, uint32_t label, const struct scene_surface *named,
+                      const struct surface_rule *rule, uint32_t n_rules, double unknown);
+
+/* rho(i) of n hits; label beyond the table: 0. */
+void surface_return(const struct surface_table *table, uint32_t n, const uint32_t *label, const double *cos_incidence,
+                    double *rho);
+
+/* Reflectance of a colour (sRGB, 0..1). */
+double surface_luminance(const float rgb[3]);
+
+#endif

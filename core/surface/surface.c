@@ -1,0 +1,94 @@
+#include "core/surface.h"
+
+#include <fnmatch.h>
+#include <math.h>
+#include <stdlib.h>
+
+#include "core/vecmath.h"
+
+int surface_table_alloc(uint32_t n, struct surface_table *table, struct sh_err *err)
+{
+    *table = (struct surface_table){.n = n};
+    table->surface = calloc((size_t)n + 1, sizeof *table->surface);
+    return table->surface != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory for %u surfaces", n);
+}
+
+void surface_table_free(struct surface_table *table)
+{
+    free(table->surface);
+    table->surface = NULL;
+}
+
+static double linear(double srgb)
+{
+    return srgb <= 0.04045 ? srgb / 12.92 : pow((srgb + 0.055) / 1.055, 2.4);
+}
+
+double surface_luminance(const float rgb[3])
+{
+    return 0.2126 * linear((double)rgb[0]) + 0.7152 * linear((double)rgb[1]) + 0.0722 * linear((double)rgb[2]);
+}
+
+static void override(double *value, double said)
+{
+    if (!isnan(said)) *value = said;
+}
+
+int surface_table_set(struct surface_table *table, uint32_t label, const struct scene_surface *named,
+                      const struct surface_rule *rule, uint32_t n_rules, double unknown)
+{
+    struct surface *s = &table->surface[label];
+    int found = -1;
+    *s = (struct surface){.reflectance = named->has_colour ? surface_luminance(named->colour) : unknown};
+    for (uint32_t i = 0; i < n_rules && found < 0; i++)
+        if (fnmatch(rule[i].object, named->object, 0) == 0 && fnmatch(rule[i].material, named->material, 0) == 0)
+            found = (int)i;
+    if (found >= 0) {
+        const struct surface *said = &rule[found].surface;
+        override(&s->reflectance, said->reflectance);
+        override(&s->specular, said->specular);
+        override(&s->gloss, said->gloss);
+        override(&s->retro, said->retro);
+        override(&s->glass, said->glass);
+        override(&s->mirror, said->mirror);
+        /* What is passed on or mirrored is not scattered: a bare pane or mirror scatters at most the rest. */
+        if (isnan(said->reflectance)) s->reflectance *= 1.0 - fmin(s->glass + s->mirror, 1.0);
+    }
+    table->has_lobes |= s->specular > 0.0 || s->retro > 0.0;
+    table->has_mirror |= s->mirror > 0.0;
+    table->has_optics |= s->glass > 0.0 || s->mirror > 0.0;
+    return found;
+}
+
+enum { FIELDS = sizeof(struct surface) / sizeof(double) };
+_Static_assert(sizeof(struct surface) == 6 * sizeof(double), "gathered as doubles");
+
+VEC_CLONES
+static void lambert(const double *restrict field, uint32_t surfaces, uint32_t n, const uint32_t *restrict label,
+                    const double *restrict cosi, double *restrict rho)
+{
+    for (uint32_t i = 0; i < n; i++)
+        rho[i] = field[(int64_t)(label[i] < surfaces ? label[i] : surfaces) * FIELDS] * cosi[i];
+}
+
+VEC_CLONES
+static void lobes(const double *restrict field, uint32_t surfaces, uint32_t n, const uint32_t *restrict label,
+                  const double *restrict cosi, double *restrict rho)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        int64_t at = (int64_t)(label[i] < surfaces ? label[i] : surfaces) * FIELDS;
+        double specular = field[at + 1], gloss = field[at + 2], retro = field[at + 3];
+        double c2 = 2.0 * cosi[i] * cosi[i] - 1.0;
+        double lobe = vec_exp(gloss * vec_log(c2 > 1e-300 ? c2 : 1e-300));
+        lobe = c2 > 0.0 ? lobe : 0.0;
+        rho[i] += specular * 0.5 * (gloss + 2.0) * lobe * cosi[i] + retro;
+    }
+}
+
+void surface_return(const struct surface_table *table, uint32_t n, const uint32_t *label, const double *cos_incidence,
+                    double *rho)
+{
+    const double *field = &table->surface[0].reflectance;
+    lambert(field, table->n, n, label, cos_incidence, rho);
+    if (table->has_lobes) lobes(field, table->n, n, label, cos_incidence, rho);
+}
