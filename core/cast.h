@@ -10,8 +10,10 @@
 
 #include <stdint.h>
 
+#include "core/detect.h"
 #include "core/err.h"
 #include "core/georef.h"
+#include "core/instrument.h"
 #include "core/line.h"
 #include "core/pose.h"
 #include "core/scene.h"
@@ -53,6 +55,29 @@ struct cast_mover {
     double rotation[9], shift_m[3];
 };
 
+/* Glass and mirrors that a pulse may meet, one after the other, and still be followed. */
+enum { CAST_MAX_DEPTH = 4 };
+
+/* What happens between a hit and a point, as far as a configuration asks for it. Each part is left out where it is NULL
+ * or 0. Where all of it is, cast_setup.detect is NULL.
+ *
+ * Echoes of a pulse: of each pane that it passes, and of what lies behind. A mirror has none of its own unless its
+ * reflectance says so; what is seen in it is a ghost, at the length of the folded way along the beam, with a label of
+ * its own: ghost_label more than the surface's. Only pulses that meet such a surface are cast again; a way does not
+ * branch. More than max_echoes: the last are left out. Panes are of no thickness but their mesh's: not refracted. */
+struct cast_detect {
+    const struct instrument *instrument;
+    const struct surface_table *surfaces; /* for signal and depth; must outlive the scan */
+    const struct detect_signal *signal;   /* NULL: every hit is an echo */
+    int noise_by_signal;                  /* range noise from the amplitude, in place of cast_setup's sigma */
+    uint32_t depth;                       /* up to CAST_MAX_DEPTH; 0: no glass, no mirrors */
+    uint32_t ghost_label;
+    uint32_t max_echoes;
+    enum detect_ambiguity ambiguity;
+    uint32_t zones;
+    const struct detect_ball *ball;
+};
+
 /* What stays the same for all pulses of a scan (the movers' poses: of a run). */
 struct cast_setup {
     const struct bvh *bvh;
@@ -74,6 +99,7 @@ struct cast_setup {
      * relative to, and rotation is not used. n_knots 0: the head stands still at station_m. */
     uint32_t n_knots;
     const struct pose_knot *knot;
+    const struct cast_detect *detect; /* NULL: every hit within the limits is one echo, the head is ideal */
 };
 
 /* How often the exact stage had to look twice. */
@@ -82,7 +108,9 @@ struct cast_counters {
     uint64_t decided;     /* of these, not clearly inside the proposed triangle: all triangles around were asked */
     uint64_t went_on;     /* of these, nothing there after all: the ray went on behind */
     uint64_t unfit;       /* echoes whose position did not fit into the wire's integers: sent as shots without echo */
-    uint64_t undecided;   /* nearer to an edge than double precision can tell: counted as hit */
+    uint64_t faint;     /* hits below the detection threshold, or in a blind time: shots without echo, or echoes less */
+    uint64_t crowded;   /* echoes beyond max_echoes, left out */
+    uint64_t undecided; /* nearer to an edge than double precision can tell: counted as hit */
 };
 
 struct caster;
@@ -91,7 +119,8 @@ struct caster;
 int caster_create(struct caster **out, struct sh_err *err);
 void caster_free(struct caster *caster);
 
-/* Fills block (capacity >= run->n) from the run. Returns the number of echoes. Allocates nothing. */
+/* Fills block from the run; capacity >= run->n times the echoes that a pulse may have (1 + depth). Returns the number
+ * of echoes. Allocates nothing. */
 uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
                      struct line_block *block);
 

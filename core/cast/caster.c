@@ -4,48 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/cast/kernels.h"
-
-/* Pulses worked on at a time: the arrays stay in the second-level cache, the hits' planes are on their way. */
-enum { CHUNK = BVH_CHUNK };
-
-struct mover_rays {
-    double dx[CHUNK], dy[CHUNK], dz[CHUNK], range_m[CHUNK];
-    uint32_t hit[CHUNK];
-};
-
-/* Of a moving head only. */
-struct moving_rays {
-    double sx[CHUNK], sy[CHUNK], sz[CHUNK]; /* direction, socs */
-    double rx[CHUNK], ry[CHUNK], rz[CHUNK]; /* as the encoders read it, socs; geo layout */
-    double px[CHUNK], py[CHUNK], pz[CHUNK]; /* origin, prcs */
-    double ox[CHUNK], oy[CHUNK], oz[CHUNK]; /* origin, local frame of the BVH at hand */
-    float fx[CHUNK], fy[CHUNK], fz[CHUNK];  /* likewise, as Embree gets it */
-    double qx[CHUNK], qy[CHUNK], qz[CHUNK]; /* origin in a moving body's frame */
-};
-
-/* Where rays begin: all at one point (px NULL), or each at its own; prcs. */
-struct origins {
-    double at_m[3];
-    const double *px, *py, *pz;
-};
-
-struct caster {
-    struct bvh_packets packets;
-    double mirror_turn[CHUNK], pan_turn[CHUNK];
-    double dx[CHUNK], dy[CHUNK], dz[CHUNK]; /* direction of the beam, prcs */
-    double ex[CHUNK], ey[CHUNK], ez[CHUNK]; /* direction as the encoders read it, then the position; geo layout */
-    double range_m[CHUNK];
-    float fx[CHUNK], fy[CHUNK], fz[CHUNK]; /* the direction as Embree gets it */
-    uint32_t prim[CHUNK], hit[CHUNK];      /* as proposed; as decided */
-    float t[CHUNK], u[CHUNK], v[CHUNK];
-    uint32_t doubt[CHUNK];              /* the proposal has to be decided in double */
-    uint32_t seen[CHUNK], label[CHUNK]; /* labels of the last hits; of what counts in the end */
-    struct mover_rays mover;            /* touched only where something moves */
-    struct moving_rays moving;          /* touched only where the head moves */
-    struct cast_counters counters;
-    struct cast_profile *profile;
-};
+#include "core/cast/caster_private.h"
 
 /* What has passed since the stage before belongs to this one. */
 static inline void ends(struct caster *c, enum cast_stage stage)
@@ -54,6 +13,11 @@ static inline void ends(struct caster *c, enum cast_stage stage)
     uint64_t now = c->profile->now();
     c->profile->spent[stage] += now - c->profile->last;
     c->profile->last = now;
+}
+
+void caster_ends(struct caster *c, enum cast_stage stage)
+{
+    ends(c, stage);
 }
 
 void caster_set_profile(struct caster *caster, struct cast_profile *profile)
@@ -212,7 +176,7 @@ void caster_hits(struct caster *c, const struct bvh *bvh, const double station_m
 
 /* Socs to where positions go: straight to the CRS where that is a rotation, else to prcs. Returns 1 in the first case.
  */
-static int reading_rotation(const struct cast_setup *s, double to_crs[9])
+int caster_reading_rotation(const struct cast_setup *s, double to_crs[9])
 {
     double g[9];
     int linear = georef_rotation(s->georef, g);
@@ -235,6 +199,7 @@ static uint32_t take_back(struct caster *c, struct line_block *block, uint32_t a
         block->a[i] = block->b[i] = block->c[i] = (uint32_t)LINE_XYZ_NONE;
         block->echo[i] = 0;
         block->label[i] = LINE_LABEL_NONE;
+        block->refl_cdb[i] = LINE_REFL_NONE;
         taken++;
     }
     c->counters.unfit += taken;
@@ -243,14 +208,14 @@ static uint32_t take_back(struct caster *c, struct line_block *block, uint32_t a
 
 /* Positions as a head computes them: from the range and from what its encoders read. Returns how many echoes had to be
  * taken back. */
-static uint32_t positions(struct caster *c, const struct cast_setup *s, int linear, struct line_block *block,
-                          uint32_t at, uint32_t n)
+uint32_t caster_positions(struct caster *c, const struct cast_setup *s, int linear, const double *range_m,
+                          struct line_block *block, uint32_t at, uint32_t n)
 {
     const struct moving_rays *m = &c->moving;
     if (s->n_knots != 0)
-        kernel_scale_from(c->range_m, m->px, m->py, m->pz, s->station_m, n, c->ex, c->ey, c->ez);
+        kernel_scale_from(range_m, m->px, m->py, m->pz, s->station_m, n, c->ex, c->ey, c->ez);
     else
-        kernel_scale(c->range_m, n, c->ex, c->ey, c->ez);
+        kernel_scale(range_m, n, c->ex, c->ey, c->ez);
     if (!linear) georef_forward(s->georef, n, c->ex, c->ey, c->ez, c->ex, c->ey, c->ez);
     uint32_t unfit = kernel_geo(c->ex, c->ey, c->ez, s->xyz_scale, n, block->a + at, block->b + at, block->c + at);
     return unfit == 0 ? 0 : take_back(c, block, at, n);
@@ -268,9 +233,10 @@ static double spread_m(const struct origins *from, uint32_t n)
 }
 
 /* A moving body, cast in its own frame: what it hides gives way. */
-static void cast_mover(struct caster *c, const struct cast_setup *s, const struct cast_mover *m,
-                       const struct origins *from, uint32_t n)
+static void cast_mover(struct caster *c, const struct cast_setup *s, uint32_t which, const struct origins *from,
+                       const struct ray_set *set, uint32_t n)
 {
+    const struct cast_mover *m = &s->mover[which];
     double v[3], w[3];
     struct origins own = {.px = NULL};
     for (int i = 0; i < 3; i++) {
@@ -280,7 +246,7 @@ static void cast_mover(struct caster *c, const struct cast_setup *s, const struc
         w[i] = at - m->shift_m[i];
     }
     double radius_m = m->radius_m + (from->px != NULL ? spread_m(from, n) : 0.0);
-    if (!kernel_meets_sphere(c->dx, c->dy, c->dz, n, v, radius_m)) return;
+    if (!kernel_meets_sphere(set->dx, set->dy, set->dz, n, v, radius_m)) return;
     for (int i = 0; i < 3; i++)
         own.at_m[i] = m->rotation[i] * w[0] + m->rotation[3 + i] * w[1] + m->rotation[6 + i] * w[2];
     if (from->px != NULL) {
@@ -292,13 +258,30 @@ static void cast_mover(struct caster *c, const struct cast_setup *s, const struc
         own.pz = o->qz;
     }
     struct mover_rays *r = &c->mover;
-    kernel_turn_back(c->dx, c->dy, c->dz, m->rotation, n, r->dx, r->dy, r->dz);
+    kernel_turn_back(set->dx, set->dy, set->dz, m->rotation, n, r->dx, r->dy, r->dz);
     hits_from(c, m->bvh, &own, s->range_max_m, n, r->dx, r->dy, r->dz, r->range_m, r->hit);
     for (uint32_t i = 0; i < n; i++) {
-        if (!(r->range_m[i] < c->range_m[i]) && !(isnan(c->range_m[i]) && !isnan(r->range_m[i]))) continue;
-        c->range_m[i] = r->range_m[i];
-        c->label[i] = c->seen[i];
+        if (!(r->range_m[i] < set->range_m[i]) && !(isnan(set->range_m[i]) && !isnan(r->range_m[i]))) continue;
+        set->range_m[i] = r->range_m[i];
+        set->label[i] = c->seen[i];
+        set->hit[i] = r->hit[i];
+        if (set->body == NULL) continue;
+        set->body[i] = (uint8_t)(which + 1);
+        kernel_cosines(m->bvh, r->hit + i, r->dx + i, r->dy + i, r->dz + i, 1, set->cosine + i);
     }
+}
+
+void caster_nearest(struct caster *c, const struct cast_setup *s, const struct origins *from, const struct ray_set *set,
+                    uint32_t n)
+{
+    hits_from(c, s->bvh, from, s->range_max_m, n, set->dx, set->dy, set->dz, set->range_m, set->hit);
+    memcpy(set->label, c->seen, n * sizeof *set->label);
+    if (set->body != NULL) {
+        kernel_cosines(s->bvh, set->hit, set->dx, set->dy, set->dz, n, set->cosine);
+        memset(set->body, 0, n * sizeof *set->body);
+    }
+    for (uint32_t i = 0; i < s->n_movers; i++)
+        cast_mover(c, s, i, from, set, n);
 }
 
 /* The last pose at or before t_ns, or the first. */
@@ -317,7 +300,7 @@ static uint32_t find_knot(const struct cast_setup *s, int64_t t_ns)
 
 /* Directions and origins of pulses first .. first + n of a run, from what its socs directions are; stretch by stretch
  * between two poses. */
-static void move(struct caster *c, const struct cast_setup *s, int64_t t0_ns, const uint32_t *dt_ns, uint32_t n,
+void caster_move(struct caster *c, const struct cast_setup *s, int64_t t0_ns, const uint32_t *dt_ns, uint32_t n,
                  int geo)
 {
     struct moving_rays *m = &c->moving;
@@ -354,12 +337,12 @@ static int aim(struct caster *c, const struct cast_setup *s, const struct schedu
                                    m->rz);
         else
             kernel_directions(c->mirror_turn, c->pan_turn, none, n, m->sx, m->sy, m->sz);
-        move(c, s, run->t0_ns, dt_ns + at, n, geo);
+        caster_move(c, s, run->t0_ns, dt_ns + at, n, geo);
         from->px = m->px;
         from->py = m->py;
         from->pz = m->pz;
     } else if (geo) {
-        linear = reading_rotation(s, to_crs);
+        linear = caster_reading_rotation(s, to_crs);
         kernel_directions_read(s, c->mirror_turn, c->pan_turn, s->rotation, to_crs, n, c->dx, c->dy, c->dz, c->ex,
                                c->ey, c->ez);
     } else {
@@ -374,10 +357,9 @@ static uint32_t cast_chunk(struct caster *c, const struct cast_setup *s, const s
     struct origins from;
     if (c->profile != NULL) c->profile->last = c->profile->now();
     int linear = aim(c, s, run, block->dt_ns, at, n, &from);
-    hits_from(c, s->bvh, &from, s->range_max_m, n, c->dx, c->dy, c->dz, c->range_m, c->hit);
-    memcpy(c->label, c->seen, n * sizeof *c->label);
-    for (uint32_t i = 0; i < s->n_movers; i++)
-        cast_mover(c, s, &s->mover[i], &from, n);
+    const struct ray_set set = {
+        .dx = c->dx, .dy = c->dy, .dz = c->dz, .range_m = c->range_m, .label = c->label, .hit = c->hit};
+    caster_nearest(c, s, &from, &set, n);
     uint32_t echoes = kernel_detect(c->range_m, s->range_min_m, s->range_max_m, n, block->echo + at);
     kernel_labels(c->label, block->echo + at, n, block->label + at);
     for (uint32_t i = 0; i < n; i++)
@@ -386,7 +368,7 @@ static uint32_t cast_chunk(struct caster *c, const struct cast_setup *s, const s
     if (s->noise_on) kernel_noise(s, run->pulse0 + at, n, c->range_m);
     ends(c, CAST_NOISE);
     if (s->layout == LINE_GEO)
-        echoes -= positions(c, s, linear, block, at, n);
+        echoes -= caster_positions(c, s, linear, c->range_m, block, at, n);
     else
         kernel_polar(s, c->range_m, c->mirror_turn, c->pan_turn, n, block->a + at, block->b + at, block->c + at);
     ends(c, CAST_POSITIONS);
@@ -404,16 +386,24 @@ uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, cons
     block->t0_ns = run->t0_ns;
     block->line_t0_ns = run->line_t0_ns;
     block->layout = setup->layout;
-    block->n_points = run->n;
-    kernel_times(run, block->dt_ns);
+    /* Where a pulse may have several entries, times of pulses stand at the far end of the array: an entry never
+     * overtakes the pulses that are still to come. */
+    uint32_t *dt_ns = block->dt_ns + (setup->detect != NULL ? block->capacity - run->n : 0), out = 0;
+    kernel_times(run, dt_ns);
     /* The first packet of a run may begin within a packet of the line; later chunks begin at one. */
     uint32_t lead = run->in_line % SCHEDULE_PACKET;
     for (uint32_t at = 0; at < run->n;) {
         uint32_t n = lead != 0 ? SCHEDULE_PACKET - lead : CHUNK;
         if (n > run->n - at) n = run->n - at;
-        echoes += cast_chunk(caster, setup, run, block, at, n);
+        uint32_t entries = n;
+        if (setup->detect != NULL)
+            echoes += caster_detected(caster, setup, run, dt_ns + at, at, n, block, out, &entries);
+        else
+            echoes += cast_chunk(caster, setup, run, block, at, n);
         at += n;
+        out += entries;
         lead = 0;
     }
+    block->n_points = out;
     return echoes;
 }

@@ -159,6 +159,25 @@ uint32_t kernel_refine_from(const struct bvh *bvh, const struct kernel_hits *hit
 }
 
 VEC_CLONES
+static void cosines(const double *restrict tri, uint32_t n_triangles, const uint32_t *restrict hit,
+                    const double *restrict dx, const double *restrict dy, const double *restrict dz, uint32_t n,
+                    double *restrict cosine)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        int64_t at = (int64_t)(hit[i] < n_triangles ? hit[i] : n_triangles) * 4;
+        double nx = tri[at], ny = tri[at + 1], nz = tri[at + 2];
+        double c = fabs(nx * dx[i] + ny * dy[i] + nz * dz[i]) / sqrt(nx * nx + ny * ny + nz * nz);
+        cosine[i] = c > 1.0 ? 1.0 : c;
+    }
+}
+
+void kernel_cosines(const struct bvh *bvh, const uint32_t *hit, const double *dx, const double *dy, const double *dz,
+                    uint32_t n, double *cosine)
+{
+    cosines((const double *)bvh->triangle, bvh->scene->n_triangles, hit, dx, dy, dz, n, cosine);
+}
+
+VEC_CLONES
 int kernel_meets_sphere(const double *restrict dx, const double *restrict dy, const double *restrict dz, uint32_t n,
                         const double v[3], double radius_m)
 {

@@ -32,6 +32,10 @@ uint32_t kernel_refine(const struct bvh *bvh, const struct kernel_hits *hits, co
 uint32_t kernel_refine_from(const struct bvh *bvh, const struct kernel_hits *hits, const double *ox, const double *oy,
                             const double *oz, uint32_t n);
 
+/* Cosine of the incidence on the triangles that were hit, 0..1; NaN for none. */
+void kernel_cosines(const struct bvh *bvh, const uint32_t *hit, const double *dx, const double *dy, const double *dz,
+                    uint32_t n, double *cosine);
+
 /* ---- kernels_moving.c: pulses between two poses of a moving head */
 struct kernel_leg {
     double before_ns, span_ns;         /* from the first pose to the run's t0; to the second pose */

@@ -1,0 +1,127 @@
+/* Private to core/cast: the working memory of one thread, and what its parts share. */
+#ifndef CORE_CAST_CASTER_PRIVATE_H
+#define CORE_CAST_CASTER_PRIVATE_H
+
+#include "core/cast/kernels.h"
+
+/* Pulses worked on at a time: the arrays stay in the second-level cache, the hits' planes are on their way. */
+enum { CHUNK = BVH_CHUNK, CAST_LIST = CHUNK * (1 + CAST_MAX_DEPTH) };
+
+struct mover_rays {
+    double dx[CHUNK], dy[CHUNK], dz[CHUNK], range_m[CHUNK];
+    uint32_t hit[CHUNK];
+};
+
+/* Of a moving head, or one whose beams do not begin at its origin. */
+struct moving_rays {
+    double sx[CHUNK], sy[CHUNK], sz[CHUNK]; /* direction, socs */
+    double rx[CHUNK], ry[CHUNK], rz[CHUNK]; /* as the encoders read it, socs; geo layout */
+    double px[CHUNK], py[CHUNK], pz[CHUNK]; /* origin, prcs */
+    double ox[CHUNK], oy[CHUNK], oz[CHUNK]; /* origin, local frame of the BVH at hand */
+    float fx[CHUNK], fy[CHUNK], fz[CHUNK];  /* likewise, as Embree gets it */
+    double qx[CHUNK], qy[CHUNK], qz[CHUNK]; /* origin in a moving body's frame */
+};
+
+/* Where rays begin: all at one point (px NULL), or each at its own; prcs. */
+struct origins {
+    double at_m[3];
+    const double *px, *py, *pz;
+};
+
+/* Rays of a chunk, prcs, and what they meet first. */
+struct ray_set {
+    const double *dx, *dy, *dz;
+    double *range_m;
+    uint32_t *label;
+    uint32_t *hit; /* triangle of the body that was met */
+    /* only where detection asks for it, else NULL: */
+    double *cosine; /* of the incidence */
+    uint8_t *body;  /* 0: what stands still; k + 1: mover k */
+};
+
+/* Echoes of a chunk, in order of pulse, then of range; those of a pulse follow each other. */
+struct echo_list {
+    uint32_t n;
+    uint32_t pulse[CAST_LIST]; /* index in the chunk */
+    double range_m[CAST_LIST]; /* NaN: not detected */
+    double cosine[CAST_LIST];
+    double energy[CAST_LIST]; /* share of the pulse's energy that took this way */
+    uint32_t label[CAST_LIST];
+    uint8_t ghost[CAST_LIST];
+    /* of detection */
+    uint64_t key[CAST_LIST];
+    double rho[CAST_LIST], amplitude[CAST_LIST];
+    int16_t refl_cdb[CAST_LIST];
+    uint8_t echo[CAST_LIST];
+    double mirror_turn[CAST_LIST], pan_turn[CAST_LIST];
+    uint32_t dt_ns[CAST_LIST];
+};
+
+/* Rays behind glass or off a mirror: where they begin, where they go, what they met before. */
+struct path_rays {
+    uint32_t n;
+    uint32_t pulse[CHUNK];
+    double px[CHUNK], py[CHUNK], pz[CHUNK], dx[CHUNK], dy[CHUNK], dz[CHUNK];
+    double length_m[CHUNK]; /* of the way so far */
+    double energy[CHUNK];
+    uint8_t ghost[CHUNK];
+    double range_m[CHUNK], cosine[CHUNK];
+    uint32_t label[CHUNK], hit[CHUNK];
+    uint8_t body[CHUNK];
+    /* what was found on the ways, chained per pulse */
+    uint32_t first[CHUNK], last[CHUNK];
+    uint32_t n_found, next[CAST_LIST];
+    uint32_t found_label[CAST_LIST];
+    double found_m[CAST_LIST], found_cosine[CAST_LIST], found_energy[CAST_LIST];
+    uint8_t found_ghost[CAST_LIST];
+};
+
+struct caster {
+    struct bvh_packets packets;
+    double mirror_turn[CHUNK], pan_turn[CHUNK];
+    double dx[CHUNK], dy[CHUNK], dz[CHUNK]; /* direction of the beam, prcs */
+    double ex[CHUNK], ey[CHUNK], ez[CHUNK]; /* direction as the encoders read it, then the position; geo layout */
+    double range_m[CHUNK];
+    float fx[CHUNK], fy[CHUNK], fz[CHUNK]; /* the direction as Embree gets it */
+    uint32_t prim[CHUNK], hit[CHUNK];      /* as proposed; as decided */
+    float t[CHUNK], u[CHUNK], v[CHUNK];
+    uint32_t doubt[CHUNK];              /* the proposal has to be decided in double */
+    uint32_t seen[CHUNK], label[CHUNK]; /* labels of the last hits; of what counts in the end */
+    struct mover_rays mover;            /* touched only where something moves */
+    struct moving_rays moving;          /* touched only where the head moves, or is not ideal */
+    /* touched only where detection is modelled: */
+    double cosine[CHUNK];
+    uint8_t body[CHUNK];
+    struct echo_list list;
+    struct path_rays paths; /* touched only where there is glass or a mirror */
+    struct cast_counters counters;
+    struct cast_profile *profile;
+};
+
+/* ---- caster.c */
+void caster_ends(struct caster *c, enum cast_stage stage);
+/* What the rays of a chunk meet first, of all there is. */
+void caster_nearest(struct caster *c, const struct cast_setup *s, const struct origins *from, const struct ray_set *set,
+                    uint32_t n);
+/* Poses of a moving head: s (and, with geo, r) of c->moving -> d (and e), and the origins p. */
+void caster_move(struct caster *c, const struct cast_setup *s, int64_t t0_ns, const uint32_t *dt_ns, uint32_t n,
+                 int geo);
+/* Socs to where positions go: straight to the CRS where that is a rotation, else to prcs. Returns 1 in the first case.
+ */
+int caster_reading_rotation(const struct cast_setup *s, double to_crs[9]);
+/* Positions as a head computes them, from range_m and c->e: entries at .. at + n of the block. Returns how many echoes
+ * had to be taken back. */
+uint32_t caster_positions(struct caster *c, const struct cast_setup *s, int linear, const double *range_m,
+                          struct line_block *block, uint32_t at, uint32_t n);
+
+/* ---- optics.c: the hits of a chunk (c->range_m, label, hit, cosine, body; from, c->d) and what lies behind glass and
+ * off mirrors -> c->list. */
+void caster_follow(struct caster *c, const struct cast_setup *s, const struct origins *from, uint32_t n);
+
+/* ---- detected.c: a chunk with everything that cast_detect asks for. `at`: its first pulse in the run; entries from
+ * `out` on. dt_ns: times of the chunk's pulses. Returns the number of echoes; *entries: how many were written. */
+uint32_t caster_detected(struct caster *c, const struct cast_setup *s, const struct schedule_run *run,
+                         const uint32_t *dt_ns, uint32_t at, uint32_t n, struct line_block *block, uint32_t out,
+                         uint32_t *entries);
+
+#endif

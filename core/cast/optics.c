@@ -1,0 +1,183 @@
+/* Behind glass and off mirrors: only pulses that meet such a surface are cast again, together. */
+#include <math.h>
+#include <string.h>
+
+#include "core/cast/caster_private.h"
+#include "core/vec3.h"
+
+enum { NONE = 0xffffffff };
+
+static const struct surface *surface_of(const struct cast_setup *s, uint32_t label)
+{
+    const struct surface_table *t = s->detect->surfaces;
+    return &t->surface[label < t->n ? label : t->n];
+}
+
+static int goes_on(const struct cast_setup *s, uint32_t label)
+{
+    const struct surface *surface = surface_of(s, label);
+    return surface->glass > 0.0 || surface->mirror > 0.0;
+}
+
+/* Unit normal of a triangle, prcs. */
+static void normal_of(const struct cast_setup *s, uint8_t body, uint32_t hit, double n[3])
+{
+    const struct cast_mover *m = body != 0 ? &s->mover[body - 1] : NULL;
+    const double *at_rest = (m != NULL ? m->bvh : s->bvh)->triangle[hit].n;
+    double length = sqrt(vec3_dot(at_rest, at_rest));
+    for (int i = 0; i < 3; i++)
+        n[i] = (m == NULL ? at_rest[i] : vec3_dot(m->rotation + 3 * i, at_rest)) / length;
+}
+
+/* How far behind a surface a way goes on: a float's rounding of where that is (in the BVH's frame), across the surface,
+ * three times over; the surface itself is then not met again. */
+static double step_m(const struct cast_setup *s, const double at[3], double cosine)
+{
+    double most = 0.0;
+    for (int i = 0; i < 3; i++)
+        most = fmax(most, fabs(at[i] - s->bvh->origin_m[i]));
+    return fmax(1e-6, 3.0 * 0x1p-23 * most) / fmax(cosine, 1e-3);
+}
+
+/* Ray i of the paths sets out from what ray k of `from` has met. */
+static void set_out(const struct cast_setup *s, struct path_rays *p, uint32_t i, uint32_t k)
+{
+    const struct surface *surface = surface_of(s, p->label[k]);
+    double at[3], dir[3] = {p->dx[k], p->dy[k], p->dz[k]}, n[3];
+    at[0] = p->px[k] + p->range_m[k] * dir[0];
+    at[1] = p->py[k] + p->range_m[k] * dir[1];
+    at[2] = p->pz[k] + p->range_m[k] * dir[2];
+    double step = step_m(s, at, p->cosine[k]), share = surface->glass;
+    uint8_t ghost = p->ghost[k];
+    if (surface->mirror > 0.0) {
+        normal_of(s, p->body[k], p->hit[k], n);
+        double along = 2.0 * vec3_dot(n, dir);
+        for (int a = 0; a < 3; a++)
+            dir[a] -= along * n[a];
+        share = surface->mirror;
+        ghost = 1;
+    }
+    p->pulse[i] = p->pulse[k];
+    p->length_m[i] = p->length_m[k] + p->range_m[k] + step;
+    p->energy[i] = p->energy[k] * share * share; /* there and back */
+    p->ghost[i] = ghost;
+    p->px[i] = at[0] + step * dir[0];
+    p->py[i] = at[1] + step * dir[1];
+    p->pz[i] = at[2] + step * dir[2];
+    p->dx[i] = dir[0];
+    p->dy[i] = dir[1];
+    p->dz[i] = dir[2];
+}
+
+/* The pulses whose first hit lets them go on. */
+static void begin(const struct caster *c, const struct cast_setup *s, const struct origins *from, uint32_t n,
+                  struct path_rays *p)
+{
+    p->n = p->n_found = 0;
+    for (uint32_t i = 0; i < n; i++) {
+        p->first[i] = NONE;
+        if (isnan(c->range_m[i]) || !goes_on(s, c->label[i])) continue;
+        uint32_t k = p->n++;
+        p->pulse[k] = i;
+        p->px[k] = from->px != NULL ? from->px[i] : from->at_m[0];
+        p->py[k] = from->px != NULL ? from->py[i] : from->at_m[1];
+        p->pz[k] = from->px != NULL ? from->pz[i] : from->at_m[2];
+        p->dx[k] = c->dx[i];
+        p->dy[k] = c->dy[i];
+        p->dz[k] = c->dz[i];
+        p->length_m[k] = 0.0;
+        p->energy[k] = 1.0;
+        p->ghost[k] = 0;
+        p->range_m[k] = c->range_m[i];
+        p->cosine[k] = c->cosine[i];
+        p->label[k] = c->label[i];
+        p->hit[k] = c->hit[i];
+        p->body[k] = c->body[i];
+    }
+}
+
+/* What ray k met, at the end of its pulse's chain. */
+static void keep(struct path_rays *p, uint32_t k)
+{
+    uint32_t at = p->n_found++, pulse = p->pulse[k];
+    p->next[at] = NONE;
+    p->found_m[at] = p->length_m[k] + p->range_m[k];
+    p->found_cosine[at] = p->cosine[k];
+    p->found_energy[at] = p->energy[k];
+    p->found_label[at] = p->label[k];
+    p->found_ghost[at] = p->ghost[k];
+    if (p->first[pulse] == NONE)
+        p->first[pulse] = at;
+    else
+        p->next[p->last[pulse]] = at;
+    p->last[pulse] = at;
+}
+
+static void follow_paths(struct caster *c, const struct cast_setup *s)
+{
+    struct path_rays *p = &c->paths;
+    for (uint32_t depth = 0; depth < s->detect->depth && p->n > 0; depth++) {
+        uint32_t on = 0;
+        for (uint32_t k = 0; k < p->n; k++) /* in place: those that end here have been left out before */
+            set_out(s, p, k, k);
+        const struct origins from = {.px = p->px, .py = p->py, .pz = p->pz};
+        const struct ray_set set = {.dx = p->dx,
+                                    .dy = p->dy,
+                                    .dz = p->dz,
+                                    .range_m = p->range_m,
+                                    .label = p->label,
+                                    .hit = p->hit,
+                                    .cosine = p->cosine,
+                                    .body = p->body};
+        caster_nearest(c, s, &from, &set, p->n);
+        for (uint32_t k = 0; k < p->n; k++) {
+            if (isnan(p->range_m[k])) continue;
+            keep(p, k);
+            if (!goes_on(s, p->label[k])) continue;
+            uint32_t i = on++;
+            if (i == k) continue;
+            p->pulse[i] = p->pulse[k];
+            p->px[i] = p->px[k];
+            p->py[i] = p->py[k];
+            p->pz[i] = p->pz[k];
+            p->dx[i] = p->dx[k];
+            p->dy[i] = p->dy[k];
+            p->dz[i] = p->dz[k];
+            p->length_m[i] = p->length_m[k];
+            p->energy[i] = p->energy[k];
+            p->ghost[i] = p->ghost[k];
+            p->range_m[i] = p->range_m[k];
+            p->cosine[i] = p->cosine[k];
+            p->label[i] = p->label[k];
+            p->hit[i] = p->hit[k];
+            p->body[i] = p->body[k];
+        }
+        p->n = on;
+    }
+}
+
+static void append(struct echo_list *l, uint32_t pulse, double range_m, double cosine, double energy, uint32_t label,
+                   uint8_t ghost)
+{
+    uint32_t at = l->n++;
+    l->pulse[at] = pulse;
+    l->range_m[at] = range_m;
+    l->cosine[at] = cosine;
+    l->energy[at] = energy;
+    l->label[at] = label;
+    l->ghost[at] = ghost;
+}
+
+void caster_follow(struct caster *c, const struct cast_setup *s, const struct origins *from, uint32_t n)
+{
+    struct path_rays *p = &c->paths;
+    struct echo_list *l = &c->list;
+    begin(c, s, from, n, p);
+    follow_paths(c, s);
+    l->n = 0;
+    for (uint32_t i = 0; i < n; i++) {
+        append(l, i, c->range_m[i], c->cosine[i], 1.0, c->label[i], 0);
+        for (uint32_t k = p->first[i]; k != NONE; k = p->next[k])
+            append(l, i, p->found_m[k], p->found_cosine[k], p->found_energy[k], p->found_label[k], p->found_ghost[k]);
+    }
+}
