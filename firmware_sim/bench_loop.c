@@ -89,7 +89,7 @@ static void fill_config(struct config *cfg, const struct bench_case *c, uint32_t
     cfg->n_stations = 1;
     cfg->crs = GEOREF_ECEF;
     cfg->layout = LINE_GEO;
-    cfg->noise_on = 1;
+    cfg->noise_range = RANGE_NOISE_ON;
     cfg->seed = 1;
     cfg->link[0].type = LINK_NULL;
     cfg->n_links = 1;

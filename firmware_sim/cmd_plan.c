@@ -35,7 +35,7 @@ static void make_plan(const struct config *cfg, const struct site *site, struct 
                                    .order_exactly = cfg->order_exactly,
                                    .range_max_m = cfg->profile.range_max_m,
                                    .n_movers = site->n_movers,
-                                   .noise_on = cfg->noise_on,
+                                   .noise_on = cfg->noise_range != RANGE_NOISE_OFF,
                                    .range_sigma_m = cfg->profile.range_sigma_m,
                                    .range_sigma_ppm = cfg->profile.range_sigma_ppm};
     plan->n = plan_head(&head, plan->row);

@@ -11,14 +11,22 @@
 #include <stdint.h>
 #include <stdio.h>
 
+#include "core/detect.h"
 #include "core/err.h"
 #include "core/georef.h"
 #include "core/line.h"
 #include "core/scene.h"
+#include "core/surface.h"
 #include "drivers/link/link.h"
 #include "firmware_sim/head.h"
 
-enum { CONFIG_MAX_MESHES = 64, CONFIG_MAX_LINKS = 8, CONFIG_MAX_STATIONS = 64, CONFIG_PATH_LEN = 512 };
+enum {
+    CONFIG_MAX_MESHES = 64,
+    CONFIG_MAX_LINKS = 8,
+    CONFIG_MAX_STATIONS = 64,
+    CONFIG_MAX_SURFACES = 64,
+    CONFIG_PATH_LEN = 512
+};
 
 enum config_heights { HEIGHTS_ELLIPSOID, HEIGHTS_GEOID, HEIGHTS_AUTO };
 /* What the head speaks on a link (link_spec.protocol). */
@@ -35,7 +43,15 @@ struct config_profile {
     double optical_gain; /* beam degrees per mirror degree: 2 polygon, 1 45-degree mirror */
     double range_min_m, range_max_m;
     double range_sigma_m, range_sigma_ppm; /* one sigma of the range noise: fixed part, and part per distance */
-    double mirror_counts, pan_counts;      /* encoder counts per turn of the beam angle; 0: ideal (2^32 counts) */
+    double range_sigma_at_m, range_sigma_reflectance, range_sigma_floor_m; /* where the fixed part holds; its floor */
+    double mirror_sigma_deg, pan_sigma_deg;                                /* one sigma of the angle noise */
+    struct config_reach {
+        double reflectance, range_m;
+        enum config_from { FROM_DATA_SHEET, FROM_ASSUMED } from;
+    } reach[DETECT_MAX_REACHES];
+    uint32_t n_reaches; /* 0: range_max_m on 90 % */
+    double threshold_snr, overlap_m, wavelength_nm, visibility_m;
+    double mirror_counts, pan_counts; /* encoder counts per turn of the beam angle; 0: ideal (2^32 counts) */
     uint32_t max_echoes;
     double boot_s, spin_up_s, spin_down_s;
 };
@@ -108,6 +124,30 @@ struct config_gnss {
     double lever_arm_m[3]; /* of the antenna from the head's origin, in the head's frame */
 };
 
+enum config_range_noise { RANGE_NOISE_OFF, RANGE_NOISE_ON, RANGE_NOISE_SIGNAL, RANGE_NOISE_FALSE, RANGE_NOISE_TRUE };
+
+/* Ball-shaped noise; detect_ball. */
+struct config_ball {
+    double radius_m, factor[3], distance_1_m;
+    int local;
+    uint64_t seed; /* noise.seed where it is not given */
+};
+
+struct config_signal {
+    int on, sharp;
+    double reflectance; /* of surfaces of which nothing is said */
+    double visibility_m, extinction_1_km;
+    int has_extinction; /* else by visibility_m; 0 there: the data sheet's day */
+};
+
+/* Instrument errors; core/instrument.h. */
+struct config_instrument {
+    double collimation_deg, trunnion_deg, transit_offset_m, mirror_offset_m;
+    double mirror_index_deg, mirror_scale_ppm, mirror_eccentricity_deg, mirror_phase_deg;
+    double pan_index_deg, pan_scale_ppm, pan_eccentricity_deg, pan_phase_deg;
+    double range_offset_m, range_scale_ppm;
+};
+
 struct config {
     char file[CONFIG_PATH_LEN];
     char profile_file[CONFIG_PATH_LEN];
@@ -137,8 +177,18 @@ struct config {
     struct link_spec link[CONFIG_MAX_LINKS];
     uint32_t n_links;
     /* noise */
-    int noise_on; /* 0: exact ranges */
+    enum config_range_noise noise_range; /* off, on or signal once it is loaded */
+    int noise_angle;
     uint64_t seed;
+    struct config_ball ball;
+    /* signal, surfaces, head.ambiguity, instrument */
+    struct config_signal signal;
+    struct surface_rule surface[CONFIG_MAX_SURFACES];
+    uint32_t n_surfaces;
+    uint32_t optics_depth;
+    enum detect_ambiguity ambiguity;
+    uint32_t mta_zones;
+    struct config_instrument instrument;
     /* loop */
     double tick_hz; /* 100..10000, a divisor of 1e9 */
     double ahead_ms, queue_ms, late_ms;
@@ -152,6 +202,12 @@ struct config {
 /* Reads path, its profile, then the `key=value` settings in order (as from --set, each checked the same way, named
  * `--set KEY` in errors). On failure cfg is unspecified. cfg is large: allocate it. */
 int config_load(const char *path, const char *const *sets, int n_sets, struct config *cfg, struct sh_err *err);
+
+/* Entries that a pulse may need in a block: its echoes, as far as the configuration allows for more than one. */
+uint32_t config_points_per_pulse(const struct config *cfg);
+
+/* What a profile says about the signal; the rest of it (sharp, extinction, seed) is 0. */
+void config_signal_spec(const struct config_profile *profile, struct detect_signal_spec *spec);
 
 /* The reference: every key with type, unit, default, range and help. */
 void config_print_reference(FILE *out);

@@ -246,5 +246,6 @@ int cfg_check(const struct cfg_reader *rd, struct config *cfg)
         code = check_link(rd, cfg, i);
     if (code == SH_OK) code = check_loop(rd, cfg);
     if (code == SH_OK) code = check_time(rd, cfg);
+    if (code == SH_OK) code = cfg_check_signal(rd, cfg);
     return code;
 }

@@ -29,7 +29,7 @@ enum cfg_flags {
     CFG_ASCII = 2,  /* goes into *IDN?: printable ASCII without comma and quotes */
 };
 
-enum { CFG_MAX_ROWS = 128, CFG_MAX_ITEMS = 64, CFG_PATH_MAX = 96, CFG_FROM_SET = -1 };
+enum { CFG_MAX_ROWS = 192, CFG_MAX_ITEMS = 64, CFG_PATH_MAX = 96, CFG_FROM_SET = -1 };
 
 struct cfg_key {
     const char *path;
@@ -115,6 +115,9 @@ int cfg_load_profile(struct cfg_reader *rd, struct config *cfg);
 int cfg_check(const struct cfg_reader *rd, struct config *cfg);
 /* config_place.c: the anchor, and the forms of a station's place. */
 int cfg_check_places(const struct cfg_reader *rd, struct config *cfg);
+/* config_signal.c: noise, signal, surfaces, and what of a profile concerns them. */
+int cfg_check_signal(const struct cfg_reader *rd, struct config *cfg);
+int cfg_check_reaches(const struct cfg_reader *rd, const struct config_profile *profile);
 /* The first link of the GNSS receiver; -1: none. */
 int cfg_nmea_link(const struct config *cfg);
 

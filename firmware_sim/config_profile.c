@@ -112,7 +112,7 @@ static int check_profile(const struct cfg_reader *rd, const struct config_profil
                             "a field of view of %.10g deg does not fit into a sweep; allowed up to %.10g deg, "
                             "360 / facets * optical_gain",
                             fov_deg, sweep_deg);
-    return SH_OK;
+    return cfg_check_reaches(rd, p);
 }
 
 /* The file's name is the profile's: two names could differ. */

@@ -1,12 +1,16 @@
 /* The table of keys. Parsing, defaults, errors, --set and the reference come from here alone. */
 #include "firmware_sim/config_private.h"
 
+#include "core/cast.h"
+
 #define LEN(array)           (sizeof(array) / sizeof((array)[0]))
 #define MEMBER(type, member) .offset = offsetof(type, member), .size = sizeof(((type *)0)->member)
 #define IN_CONFIG(member)    MEMBER(struct config, member)
 #define IN_MESH(member)      MEMBER(struct config_mesh, member)
 #define IN_STATION(member)   MEMBER(struct config_station, member)
 #define IN_LINK(member)      MEMBER(struct link_spec, member)
+#define IN_SURFACE(member)   MEMBER(struct surface_rule, member)
+#define IN_REACH(member)     MEMBER(struct config_reach, member)
 #define IN_PROFILE(member)   MEMBER(struct config_profile, member)
 #define LIST_OF(array, count)                                                                 \
     .offset = offsetof(struct config, array), .size = sizeof(((struct config *)0)->array[0]), \
@@ -35,6 +39,15 @@ static const char *const pace_names[] = {
 
 static const char *const platform_names[] = {
     [PLATFORM_STATIC] = "static", [PLATFORM_TRAJECTORY] = "trajectory", [PLATFORM_LIVE] = "live", NULL};
+/* A switch that has got a third way; config_signal.c makes false and true off and on. */
+static const char *const range_noise_names[] = {
+    [RANGE_NOISE_OFF] = "off",     [RANGE_NOISE_ON] = "on",     [RANGE_NOISE_SIGNAL] = "signal",
+    [RANGE_NOISE_FALSE] = "false", [RANGE_NOISE_TRUE] = "true", NULL};
+static const char *const axes_names[] = {"scene", "beam", NULL};
+static const char *const detection_names[] = {"noisy", "sharp", NULL};
+static const char *const from_names[] = {[FROM_DATA_SHEET] = "data sheet", [FROM_ASSUMED] = "assumed", NULL};
+static const char *const ambiguity_names[] = {
+    [DETECT_AMBIGUITY_NONE] = "none", [DETECT_FOLDED] = "folded", [DETECT_RESOLVED] = "resolved", NULL};
 static const char *const at_end_names[] = {[PLATFORM_STOP] = "stop", [PLATFORM_HOLD] = "hold", NULL};
 
 /* clang-format off */
@@ -62,6 +75,12 @@ static const struct cfg_key config_keys[] = {
      .help = "Frames (pan sweeps) per scan; 0: until stopped."},
     {"head.station", CFG_COUNT, NULL, "1", 1, CONFIG_MAX_STATIONS, IN_CONFIG(settings.station),
      .help = "Station where the head stands, counted from 1."},
+
+    {"head.ambiguity", CFG_ENUM, .def = "none", .names = ambiguity_names, IN_CONFIG(ambiguity),
+     .help = "Echoes from beyond c / (2 prr_hz), behind the next pulse. none: told where they are; folded: less whole zones; "
+             "resolved: where they are, within mta_zones. Echoes in the blind range_min_m after a pulse are lost in the latter two."},
+    {"head.mta_zones", CFG_COUNT, NULL, "8", 1, 1000, IN_CONFIG(mta_zones),
+     .help = "Zones of c / (2 prr_hz) that ambiguity: resolved can tell apart; beyond, nothing is seen."},
 
     {"scene", CFG_MAP, .help = "What is scanned."},
     {"scene.tolerance_m", CFG_REAL, "m", "1e-6", 1e-9, 1, IN_CONFIG(scene_tolerance_m),
@@ -191,9 +210,80 @@ static const struct cfg_key config_keys[] = {
      .help = "tcp: clients at a time."},
 
     {"noise", CFG_MAP, .help = "Noise of the measurement."},
-    {"noise.range", CFG_BOOL, .def = "off", IN_CONFIG(noise_on),
-     .help = "Range noise after the profile's range_sigma; off: exact ranges."},
+    {"noise.range", CFG_ENUM, .def = "off", .names = range_noise_names, IN_CONFIG(noise_range), .allowed = "on or off, or signal",
+     .help = "Range noise. on: the profile's range_sigma_m and ppm, whatever the target; signal: that figure holds at "
+             "range_sigma_at_m, and noise grows as the signal fades (signal.model: on); off: exact ranges."},
+    {"noise.angle", CFG_BOOL, .def = "off", IN_CONFIG(noise_angle),
+     .help = "Angle noise after the profile's mirror_sigma_deg and pan_sigma_deg: the beam goes astray, the encoders don't know."},
     {"noise.seed", CFG_COUNT, NULL, "1", 0, 18446744073709551615.0, IN_CONFIG(seed), .help = "Seed of the random numbers."},
+    {"noise.ball", CFG_MAP, .help = "Ball-shaped noise: each point moves to anywhere in a ball around it."},
+    {"noise.ball.radius_m", CFG_REAL, "m", "0", 0, 100, IN_CONFIG(ball.radius_m), .help = "Radius of the ball; 0: none."},
+    {"noise.ball.distance_1_m", CFG_REAL, "1/m", "0", 0, 100, IN_CONFIG(ball.distance_1_m),
+     .help = "Distance factor: the radius grows by this share of itself per metre of range."},
+    {"noise.ball.factor", CFG_VEC3, NULL, "[1, 1, 1]", 0, 1000, IN_CONFIG(ball.factor), .help = "Stretches the ball along its axes."},
+    {"noise.ball.axes", CFG_ENUM, .def = "scene", .names = axes_names, IN_CONFIG(ball.local),
+     .help = "Its axes: x, y, z of the scene; or of the beam: along it, to the right, up."},
+    {"noise.ball.seed", CFG_COUNT, NULL, "", 0, 18446744073709551615.0, IN_CONFIG(ball.seed),
+     .help = "Seed of the ball's random numbers; noise.seed when not given."},
+
+    {"signal", CFG_MAP, .help = "What comes back: amplitude, reflectance, detection threshold."},
+    {"signal.model", CFG_BOOL, .def = "off", IN_CONFIG(signal.on),
+     .help = "on: range equation, reflectance in the points, targets vanish where the profile's reaches say; off: each hit "
+             "within range_max_m is an echo, without reflectance."},
+    {"signal.detection", CFG_ENUM, .def = "noisy", .names = detection_names, IN_CONFIG(signal.sharp),
+     .help = "noisy: by chance near the threshold, half of the pulses at the profile's reach; sharp: all up to there."},
+    {"signal.reflectance", CFG_REAL, NULL, "0.5", 0, 1, IN_CONFIG(signal.reflectance),
+     .help = "Of surfaces without a colour in the mesh and without a word in surfaces."},
+    {"signal.visibility_m", CFG_REAL, "m", "0", 0, 1e6, IN_CONFIG(signal.visibility_m),
+     .help = "Of the air, for its extinction at the profile's wavelength; 0: as for the profile's reaches."},
+    {"signal.extinction_1_km", CFG_REAL, "1/km", "", 0, 1000, IN_CONFIG(signal.extinction_1_km),
+     .help = "The extinction itself, absorption and scattering, in place of visibility_m."},
+
+    {"surfaces", CFG_LIST, .min = 0, .max = CONFIG_MAX_SURFACES, LIST_OF(surface, n_surfaces),
+     .help = "What surfaces are like, by name; the first entry that fits counts, what it doesn't say stays."},
+    {"surfaces[]", CFG_MAP, .help = "An entry."},
+    {"surfaces[].material", CFG_TEXT, .def = "*", IN_SURFACE(material), .help = "Material's name; * and ? stand for others, as in a shell."},
+    {"surfaces[].object", CFG_TEXT, .def = "*", IN_SURFACE(object), .help = "Object's name, likewise."},
+    {"surfaces[].reflectance", CFG_REAL, NULL, "", 0, 1, IN_SURFACE(surface.reflectance),
+     .help = "Lambertian; luminance of the mesh's colour when not given. 0 absorbs."},
+    {"surfaces[].specular", CFG_REAL, NULL, "", 0, 1, IN_SURFACE(surface.specular), .help = "Share that is reflected in a lobe."},
+    {"surfaces[].gloss", CFG_REAL, NULL, "", 0, 1e6, IN_SURFACE(surface.gloss),
+     .help = "Exponent of the lobe's cosine; 100 when not given."},
+    {"surfaces[].retro", CFG_REAL, NULL, "", 0, 1e6, IN_SURFACE(surface.retro),
+     .help = "Retro-reflector: signal of a white target times this, at any incidence; foils have 100 to 1000."},
+    {"surfaces[].glass", CFG_REAL, NULL, "", 0, 1, IN_SURFACE(surface.glass),
+     .help = "Share of the power that passes, at each surface: an echo of the pane, and of what lies behind."},
+    {"surfaces[].mirror", CFG_REAL, NULL, "", 0, 1, IN_SURFACE(surface.mirror),
+     .help = "Share of the power that is mirrored: ghost points, with surfaces of their own."},
+
+    {"optics", CFG_MAP, .help = "Pulses that meet glass or a mirror."},
+    {"optics.depth", CFG_COUNT, NULL, "4", 0, CAST_MAX_DEPTH, IN_CONFIG(optics_depth),
+     .help = "How many of them a pulse is followed through; 0: glass and mirrors are like other surfaces."},
+
+    {"instrument", CFG_MAP, .help = "Errors of the head's geometry (core/instrument.h): the beam goes where its mechanics point, "
+                                    "the points are computed as if there were none."},
+#define ANGLE(key, member, text) \
+    {"instrument." key, CFG_REAL, "deg", "0", -10, 10, IN_CONFIG(instrument.member), .help = text}
+    ANGLE("collimation_deg", collimation_deg, "The beam leaves the plane across the mirror's axis, to the right."),
+    ANGLE("trunnion_deg", trunnion_deg, "The mirror's axis is not level: its right end sinks."),
+    {"instrument.transit_offset_m", CFG_REAL, "m", "0", -1, 1, IN_CONFIG(instrument.transit_offset_m),
+     .help = "The mirror's axis passes this far ahead of the pan's axis."},
+    {"instrument.mirror_offset_m", CFG_REAL, "m", "0", -1, 1, IN_CONFIG(instrument.mirror_offset_m),
+     .help = "The beam leaves this far to the right of the pan's axis."},
+    ANGLE("mirror_index_deg", mirror_index_deg, "The line encoder reads too much by this."),
+    {"instrument.mirror_scale_ppm", CFG_REAL, "ppm", "0", -1e4, 1e4, IN_CONFIG(instrument.mirror_scale_ppm),
+     .help = "And by this share of the angle."},
+    ANGLE("mirror_eccentricity_deg", mirror_eccentricity_deg, "And by this times sin(angle - mirror_phase_deg)."),
+    {"instrument.mirror_phase_deg", CFG_REAL, "deg", "0", -360, 360, IN_CONFIG(instrument.mirror_phase_deg),
+     .help = "Phase of the eccentricity."},
+    ANGLE("pan_index_deg", pan_index_deg, "The pan encoder, likewise."),
+    {"instrument.pan_scale_ppm", CFG_REAL, "ppm", "0", -1e4, 1e4, IN_CONFIG(instrument.pan_scale_ppm), .help = "Likewise."},
+    ANGLE("pan_eccentricity_deg", pan_eccentricity_deg, "Likewise."),
+    {"instrument.pan_phase_deg", CFG_REAL, "deg", "0", -360, 360, IN_CONFIG(instrument.pan_phase_deg), .help = "Likewise."},
+    {"instrument.range_offset_m", CFG_REAL, "m", "0", -10, 10, IN_CONFIG(instrument.range_offset_m),
+     .help = "Ranges are told too long by this."},
+    {"instrument.range_scale_ppm", CFG_REAL, "ppm", "0", -1e4, 1e4, IN_CONFIG(instrument.range_scale_ppm),
+     .help = "And by this share: a clock that runs too fast."},
 
     {"loop", CFG_MAP, .help = "The fixed-rate loop."},
     {"loop.tick_hz", CFG_REAL, "Hz", "1000", 100, 10000, IN_CONFIG(tick_hz),
@@ -260,6 +350,29 @@ static const struct cfg_key profile_keys[] = {
      .help = "One sigma of the range noise, fixed part."},
     {"range_sigma_ppm", CFG_REAL, "ppm", NULL, 0, 1e4, IN_PROFILE(range_sigma_ppm), FIGURE,
      .help = "One sigma of the range noise, part per distance."},
+    {"range_sigma_at_m", CFG_REAL, "m", "100", 0.1, 1e5, IN_PROFILE(range_sigma_at_m), FIGURE,
+     .help = "Range where range_sigma_m holds; for noise.range: signal."},
+    {"range_sigma_reflectance", CFG_REAL, NULL, "0.9", 0.001, 1, IN_PROFILE(range_sigma_reflectance), FIGURE,
+     .help = "And the target's reflectance."},
+    {"range_sigma_floor_m", CFG_REAL, "m", "0", 0, 10, IN_PROFILE(range_sigma_floor_m), FIGURE,
+     .help = "What is left of it however strong the signal."},
+    {"mirror_sigma_deg", CFG_REAL, "deg", "0", 0, 1, IN_PROFILE(mirror_sigma_deg), FIGURE,
+     .help = "One sigma of the noise of the line angle."},
+    {"pan_sigma_deg", CFG_REAL, "deg", "0", 0, 1, IN_PROFILE(pan_sigma_deg), FIGURE, .help = "Of the pan angle."},
+    {"reaches", CFG_LIST, .min = 0, .max = DETECT_MAX_REACHES, .offset = offsetof(struct config_profile, reach),
+     .size = sizeof(struct config_reach), .count_offset = offsetof(struct config_profile, n_reaches),
+     .help = "Ranges up to which targets are seen, by reflectance; range_max_m on 0.9 when there are none."},
+    {"reaches[]", CFG_MAP, .help = "Written { reflectance: R, range_m: V, from: data sheet|assumed }."},
+    {"reaches[].reflectance", CFG_REAL, NULL, NULL, 0.001, 1, IN_REACH(reflectance), .help = "Of the target, Lambertian, head on."},
+    {"reaches[].range_m", CFG_REAL, "m", NULL, 0.1, 1e5, IN_REACH(range_m), .help = "Where half of the pulses still see it."},
+    {"reaches[].from", CFG_ENUM, .names = from_names, IN_REACH(from), .help = "Where the figures are from."},
+    {"threshold_snr", CFG_REAL, NULL, "8", 1, 1000, IN_PROFILE(threshold_snr), FIGURE,
+     .help = "Signal-to-noise ratio (amplitudes) at the detection threshold."},
+    {"overlap_m", CFG_REAL, "m", "0", 0, 1000, IN_PROFILE(overlap_m), FIGURE,
+     .help = "Range below which light misses the detector: 1 - exp(-(R / overlap_m)^2) of it is caught; 0: all."},
+    {"wavelength_nm", CFG_REAL, "nm", "1550", 400, 2000, IN_PROFILE(wavelength_nm), FIGURE, .help = "Of the laser."},
+    {"visibility_m", CFG_REAL, "m", "23000", 100, 1e6, IN_PROFILE(visibility_m), FIGURE,
+     .help = "Visibility that the reaches hold for."},
     {"mirror_counts", CFG_REAL, NULL, NULL, 0, 4294967296.0, IN_PROFILE(mirror_counts), FIGURE,
      .help = "Encoder counts per turn of the line angle; 0: ideal."},
     {"pan_counts", CFG_REAL, NULL, NULL, 0, 4294967296.0, IN_PROFILE(pan_counts), FIGURE,
@@ -273,7 +386,7 @@ static const struct cfg_key profile_keys[] = {
 
 _Static_assert(LEN(config_keys) <= CFG_MAX_ROWS && LEN(profile_keys) <= CFG_MAX_ROWS, "room for every row");
 _Static_assert((int)CONFIG_MAX_MESHES <= (int)CFG_MAX_ITEMS && (int)CONFIG_MAX_STATIONS <= (int)CFG_MAX_ITEMS &&
-                   (int)CONFIG_MAX_LINKS <= (int)CFG_MAX_ITEMS,
+                   (int)CONFIG_MAX_LINKS <= (int)CFG_MAX_ITEMS && (int)CONFIG_MAX_SURFACES <= (int)CFG_MAX_ITEMS,
                "room for every element");
 
 const struct cfg_table cfg_config_table = {config_keys, LEN(config_keys)};

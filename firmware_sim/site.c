@@ -1,3 +1,4 @@
+#include "firmware_sim/site_detect.h"
 #include "firmware_sim/site_georef.h"
 #include "firmware_sim/site_platform.h"
 
@@ -68,6 +69,8 @@ static int load_scene(struct site *site, const struct sh_report *report, struct 
 const struct scene_surface *site_surface(const struct site *site, uint32_t label)
 {
     const struct scene *scene = site->scene;
+    if (site->detect.ghost != NULL && label >= site->detect.n_real)
+        return &site->detect.ghost[label - site->detect.n_real];
     for (uint32_t i = 0; label >= scene->n_surfaces; i++) {
         label -= scene->n_surfaces;
         scene = site->mover[i].scene;
@@ -110,7 +113,7 @@ static double station_reach(const struct site *site, const double origin_m[3])
     double reach_m = 0.0;
     for (uint32_t i = 0; i < site->cfg->n_stations; i++) {
         double d = distance_m(site->station[i].at.position_m, origin_m);
-        if (d <= SITE_BVH_REACH_M && d > reach_m) reach_m = d;
+        if (d <= SITE_BVH_REACH_M) reach_m = fmax(reach_m, d + site_ray_reach_m(site, site->station[i].at.position_m));
     }
     return reach_m;
 }
@@ -185,6 +188,7 @@ int site_load(const struct config *cfg, const struct sh_report *report, struct s
     site->moving = cfg->platform.kind != PLATFORM_STATIC;
     int rc = site_open_geoid(site, err);
     if (rc == SH_OK) rc = load_scene(site, report, err);
+    if (rc == SH_OK) rc = site_set_up_detect(site, report, err);
     if (rc == SH_OK) rc = place_stations(site, report, err);
     if (rc == SH_OK && site->moving) rc = site_load_platform(site, report, err);
     for (uint32_t i = 0; i < cfg->n_stations && rc == SH_OK; i++)
@@ -213,6 +217,7 @@ void site_free(struct site *site)
     }
     scene_free(site->scene);
     georef_geoid_free(site->geoid);
+    site_free_detect(site);
     free(site);
 }
 
@@ -232,12 +237,13 @@ void site_cast_setup(const struct site *site, uint32_t station, struct cast_setu
     memcpy(setup->rotation, s->at.rotation, sizeof setup->rotation);
     setup->range_min_m = profile->range_min_m;
     setup->range_max_m = profile->range_max_m;
-    setup->noise_on = site->cfg->noise_on;
+    setup->noise_on = site->cfg->noise_range == RANGE_NOISE_ON;
     setup->range_sigma_m = profile->range_sigma_m;
     setup->range_sigma_ppm = profile->range_sigma_ppm;
     setup->noise_key = rng_key(site->cfg->seed, RNG_RANGE);
     setup->mirror_counts = counts_or_ideal(profile->mirror_counts);
     setup->pan_counts = counts_or_ideal(profile->pan_counts);
+    setup->detect = site->detect.on ? &site->detect.cast : NULL;
     setup->layout = site->cfg->layout;
     setup->range_scale_m = site->scale_m;
     memcpy(setup->xyz_scale, s->scale, sizeof setup->xyz_scale);

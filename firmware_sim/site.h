@@ -27,6 +27,18 @@ struct site_mover {
     double centre_m[3], radius_m;
 };
 
+/* What scans do between a hit and a point; site_detect.h. */
+struct site_detect {
+    int on; /* 0: nothing of it, and it costs nothing */
+    struct cast_detect cast;
+    struct surface_table surfaces;
+    struct detect_signal signal;
+    struct instrument instrument;
+    struct detect_ball ball;
+    uint32_t n_real;             /* labels of real surfaces; the others are ghosts', as many */
+    struct scene_surface *ghost; /* [n_real]; NULL: no mirrors */
+};
+
 /* A stretch of a moving head's path, with a BVH that reaches all of it. */
 struct site_stretch {
     int64_t until_ns; /* since the scan's start */
@@ -38,7 +50,8 @@ struct site {
     struct scene *scene; /* what stands still */
     struct placement_anchor anchor;
     struct site_mover mover[CAST_MAX_MOVERS];
-    uint32_t n_movers, n_surfaces; /* surfaces of the scene, then of the movers */
+    uint32_t n_movers, n_surfaces; /* surfaces of the scene, then of the movers, then their ghosts */
+    struct site_detect detect;
     struct bvh *bvh[CONFIG_MAX_STATIONS];
     uint32_t n_bvh;
     struct site_station station[CONFIG_MAX_STATIONS];

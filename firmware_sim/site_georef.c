@@ -1,6 +1,8 @@
 /* Georeferencing of a site: heights, method, counts. */
 #include "firmware_sim/site_georef.h"
 
+#include "firmware_sim/site_detect.h"
+
 #include <math.h>
 
 /* How far points can be from a station. */
@@ -13,15 +15,14 @@ static double reach_m(const struct site *site)
  * sigma, for noise. */
 static void extent_from(const struct site *site, const double station_m[3], struct plan_georef_need *need)
 {
-    const struct config_profile *p = &site->cfg->profile;
-    double reach = reach_m(site), far[3];
-    double noise_m = 10.0 * (p->range_sigma_m + 1e-6 * p->range_sigma_ppm * p->range_max_m);
+    double reach = reach_m(site), far[3], noise_m = site_noise_m(site);
     for (int i = 0; i < 3; i++) {
         double low = station_m[i] - site->scene->min_m[i], high = site->scene->max_m[i] - station_m[i];
         far[i] = fmax(low, high) * SITE_MARGIN + noise_m;
     }
     need->radius_m = need->height_m = reach;
-    if (site->n_movers > 0) return; /* they may go anywhere */
+    if (site->n_movers > 0) return;                                                 /* they may go anywhere */
+    if (site->detect.ghost != NULL || site->detect.cast.instrument != NULL) return; /* beside the scene */
     need->radius_m = fmin(reach, hypot(far[0], far[1]));
     need->height_m = fmin(reach, far[2]);
 }

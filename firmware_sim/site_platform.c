@@ -1,4 +1,5 @@
 /* The path of a moving head: its poses, and BVHs along it. */
+#include "firmware_sim/site_detect.h"
 #include "firmware_sim/site_platform.h"
 
 #include <math.h>
@@ -90,7 +91,8 @@ static int cover_path(struct site *site, const struct sh_report *report, struct 
         int64_t until_ns = end < site->n_knots ? site->knot[end - 1].t_ns : INT64_MAX;
         for (size_t k = end; k < site->n_knots && site->knot[k - 1].t_ns < until_ns + 100000000; k++)
             beyond_m = fmax(beyond_m, distance_m(site->knot[k].pose.position_m, site->knot[end - 1].pose.position_m));
-        rc = add_stretch(site, centre_m, radius_m + beyond_m + 1e-3, until_ns, report, err);
+        rc = add_stretch(site, centre_m, radius_m + beyond_m + 1e-3 + site_ray_reach_m(site, centre_m), until_ns,
+                         report, err);
         i = end == site->n_knots || end == i + 1 ? end : end - 1; /* they share a pose */
     }
     return rc;

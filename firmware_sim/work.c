@@ -30,7 +30,7 @@ int worker_create(const struct site *site, struct worker **out, struct sh_err *e
     worker->site = site;
     uint32_t n = device_tick_pulses(site->cfg);
     int rc = caster_create(&worker->caster, err);
-    if (rc == SH_OK) rc = line_block_alloc(&worker->block, n, err);
+    if (rc == SH_OK) rc = line_block_alloc(&worker->block, n * config_points_per_pulse(site->cfg), err);
     if (rc != SH_OK) {
         worker_free(worker);
         return rc;
@@ -51,7 +51,8 @@ uint32_t worker_slot_bytes(const struct config *cfg)
 {
     /* Each line part is a frame of its own. */
     uint32_t poses = cfg->platform.kind != PLATFORM_STATIC ? NATIVE_MAX_FRAME : 0;
-    return OVERHEAD_BYTES + poses + (uint32_t)native_points_bound(device_tick_pulses(cfg)) +
+    return OVERHEAD_BYTES + poses +
+           (uint32_t)native_points_bound(device_tick_pulses(cfg) * config_points_per_pulse(cfg)) +
            device_tick_lines(cfg) * (LINE_END_BYTES + NATIVE_HEADER_LEN + NATIVE_POINTS_HEAD_LEN);
 }
 
@@ -183,20 +184,22 @@ static void end_line(const struct worker *worker, const struct device_work *work
     uint64_t cast_here = cast_end > line->cast0 ? cast_end - line->cast0 : 0;
     uint64_t last =
         end > seg->k0 ? end - 1 : end; /* stopped at once after a change of settings: there is no nearer pulse */
+    double mirror_turn = schedule_mirror_turn(seg, last), pan_turn = schedule_pan_turn(seg, last);
+    if (setup->detect != NULL && setup->detect->instrument != NULL)
+        instrument_read(setup->detect->instrument, 1, &mirror_turn, &pan_turn);
     struct ring_mark *mark = &slot->mark[slot->n_marks++];
-    mark->end =
-        (struct line_end){.frame = line->frame,
-                          .line = (uint32_t)line->line,
-                          .pulse0 = line->begin,
-                          .n_fired = (uint32_t)(end - line->begin),
-                          .n_cast = (uint32_t)(line->cast_before + cast_here),
-                          .t0_ns = line->begin_ns,
-                          .t1_ns = schedule_time_ns(seg, end),
-                          .mirror_count = cast_encoder_count(schedule_mirror_turn(seg, last), setup->mirror_counts),
-                          .pan_count = cast_encoder_count(schedule_pan_turn(seg, last), setup->pan_counts),
-                          .status = partial               ? (uint32_t)LINE_PARTIAL
-                                    : line->last_of_frame ? (uint32_t)LINE_LAST_OF_FRAME
-                                                          : 0U};
+    mark->end = (struct line_end){.frame = line->frame,
+                                  .line = (uint32_t)line->line,
+                                  .pulse0 = line->begin,
+                                  .n_fired = (uint32_t)(end - line->begin),
+                                  .n_cast = (uint32_t)(line->cast_before + cast_here),
+                                  .t0_ns = line->begin_ns,
+                                  .t1_ns = schedule_time_ns(seg, end),
+                                  .mirror_count = cast_encoder_count(mirror_turn, setup->mirror_counts),
+                                  .pan_count = cast_encoder_count(pan_turn, setup->pan_counts),
+                                  .status = partial               ? (uint32_t)LINE_PARTIAL
+                                            : line->last_of_frame ? (uint32_t)LINE_LAST_OF_FRAME
+                                                                  : 0U};
     mark->frame_at = slot->len;
     mark->echoes_before = slot->echoes_tail;
     mark->scan_t0_ns = work->scan_t0_ns;

@@ -222,7 +222,7 @@ static void defaults_are_those_of_the_table(void **state)
     assert_int_equal(cfg->crs, GEOREF_LOCAL);
     assert_int_equal(cfg->layout, LINE_POLAR);
     assert_int_equal(cfg->link[0].max_sessions, 4);
-    assert_int_equal(cfg->noise_on, 0);
+    assert_int_equal(cfg->noise_range, RANGE_NOISE_OFF);
     assert_int_equal(cfg->seed, 1);
     assert_true(cfg->tick_hz == 1000 && cfg->ahead_ms == 64 && cfg->queue_ms == 250 && cfg->late_ms == 100);
     assert_int_equal(cfg->threads, 0);
@@ -245,7 +245,7 @@ static void odd_but_right_configurations_load(void **state)
     assert_loads(load_edited("type: tcp\n    port: 0", "type: null"));
     assert_int_equal(cfg->link[0].type, LINK_NULL);
     assert_loads(load_edited("output:", "noise: {range: true, seed: 18446744073709551615}\noutput:"));
-    assert_int_equal(cfg->noise_on, 1);
+    assert_int_equal(cfg->noise_range, RANGE_NOISE_ON);
     assert_true(cfg->seed == UINT64_MAX);
     /* A pan at rest, as SCPI has it, too: each line is a frame. */
     assert_loads(load_edited(LINES, "  pan_deg_s: 0\n  frames: 0\n"));

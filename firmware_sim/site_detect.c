@@ -1,0 +1,160 @@
+#include "firmware_sim/site_detect.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/rng.h"
+
+static const double DEG_RAD = M_PI / 180.0;
+static const char GHOST[] = "ghost of ";
+
+static int set_up_signal(struct site *site, struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    const struct config_profile *p = &cfg->profile;
+    struct detect_signal_spec spec;
+    struct sh_err why;
+    double wavelength_m = 1e-9 * p->wavelength_nm, day = detect_extinction_1_m(p->visibility_m, wavelength_m);
+    config_signal_spec(p, &spec);
+    spec.sharp = cfg->signal.sharp;
+    spec.seed = cfg->seed;
+    if (cfg->signal.has_extinction)
+        spec.extinction_1_m = 1e-3 * cfg->signal.extinction_1_km - day;
+    else if (cfg->signal.visibility_m > 0.0)
+        spec.extinction_1_m = detect_extinction_1_m(cfg->signal.visibility_m, wavelength_m) - day;
+    if (detect_signal_set_up(&spec, &site->detect.signal, &why) != SH_OK)
+        return sh_fail(err, SH_EINPUT, "%s: %.300s", cfg->profile_file, why.text);
+    return SH_OK;
+}
+
+static void set_up_encoder(struct instrument_encoder *e, double index_deg, double scale_ppm, double eccentricity_deg,
+                           double phase_deg)
+{
+    *e = (struct instrument_encoder){index_deg * DEG_RAD, 1e-6 * scale_ppm, eccentricity_deg * DEG_RAD,
+                                     phase_deg * DEG_RAD};
+}
+
+static void set_up_instrument(const struct config *cfg, struct instrument *out)
+{
+    const struct config_instrument *k = &cfg->instrument;
+    *out = (struct instrument){.collimation_rad = k->collimation_deg * DEG_RAD,
+                               .trunnion_rad = k->trunnion_deg * DEG_RAD,
+                               .transit_offset_m = k->transit_offset_m,
+                               .mirror_offset_m = k->mirror_offset_m,
+                               .range_offset_m = k->range_offset_m,
+                               .range_scale = 1e-6 * k->range_scale_ppm,
+                               .mirror_key = rng_key(cfg->seed, RNG_MIRROR),
+                               .pan_key = rng_key(cfg->seed, RNG_PAN)};
+    set_up_encoder(&out->mirror, k->mirror_index_deg, k->mirror_scale_ppm, k->mirror_eccentricity_deg,
+                   k->mirror_phase_deg);
+    set_up_encoder(&out->pan, k->pan_index_deg, k->pan_scale_ppm, k->pan_eccentricity_deg, k->pan_phase_deg);
+    if (!cfg->noise_angle) return;
+    out->mirror_sigma_rad = cfg->profile.mirror_sigma_deg * DEG_RAD;
+    out->pan_sigma_rad = cfg->profile.pan_sigma_deg * DEG_RAD;
+}
+
+static int set_up_surfaces(struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    uint32_t fits[CONFIG_MAX_SURFACES] = {0};
+    int rc = surface_table_alloc(site->n_surfaces, &site->detect.surfaces, err);
+    for (uint32_t i = 0; i < site->n_surfaces && rc == SH_OK; i++) {
+        int rule = surface_table_set(&site->detect.surfaces, i, site_surface(site, i), cfg->surface, cfg->n_surfaces,
+                                     cfg->signal.reflectance);
+        if (rule >= 0) fits[rule]++;
+    }
+    for (uint32_t i = 0; i < cfg->n_surfaces && rc == SH_OK; i++)
+        if (fits[i] == 0)
+            sh_warn(report, "%s: surfaces[%u]: no surface of material \"%s\", object \"%s\" is left for it", cfg->file,
+                    i, cfg->surface[i].material, cfg->surface[i].object);
+    return rc;
+}
+
+/* Ghosts get labels of their own, and names that say so. */
+static int name_ghosts(struct site *site, struct sh_err *err)
+{
+    struct site_detect *d = &site->detect;
+    uint32_t n = site->n_surfaces;
+    if (2 * n > SCENE_MAX_SURFACES)
+        return sh_fail(err, SH_EINPUT,
+                       "%s: surfaces: %u surfaces and a mirror: each needs a second label for its ghost; "
+                       "allowed up to %d",
+                       site->cfg->file, n, SCENE_MAX_SURFACES / 2);
+    d->ghost = calloc(n, sizeof *d->ghost);
+    if (d->ghost == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the names of ghosts");
+    for (uint32_t i = 0; i < n; i++) {
+        const struct scene_surface *of = site_surface(site, i);
+        int room = SCENE_NAME_LEN - (int)sizeof GHOST, len = (int)strlen(of->object);
+        if (len > room)
+            for (len = room; len > 0 && ((unsigned char)of->object[len] & 0xc0) == 0x80;)
+                len--; /* between two characters of UTF-8 */
+        d->ghost[i] = *of;
+        snprintf(d->ghost[i].object, SCENE_NAME_LEN, "%s%.*s", GHOST, len, of->object);
+    }
+    d->n_real = n;
+    site->n_surfaces = 2 * n;
+    return SH_OK;
+}
+
+int site_set_up_detect(struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    struct site_detect *d = &site->detect;
+    int rc = SH_OK;
+    d->cast = (struct cast_detect){
+        .max_echoes = cfg->profile.max_echoes, .ambiguity = cfg->ambiguity, .zones = cfg->mta_zones};
+    if (cfg->signal.on || cfg->n_surfaces > 0) rc = set_up_surfaces(site, report, err);
+    if (rc == SH_OK && cfg->signal.on) rc = set_up_signal(site, err);
+    if (rc != SH_OK) return rc;
+    d->cast.depth = d->surfaces.has_optics ? cfg->optics_depth : 0;
+    d->cast.surfaces = cfg->signal.on || d->cast.depth > 0 ? &d->surfaces : NULL;
+    d->cast.signal = cfg->signal.on ? &d->signal : NULL;
+    d->cast.noise_by_signal = cfg->noise_range == RANGE_NOISE_SIGNAL;
+    d->cast.ghost_label = site->n_surfaces;
+    if (d->cast.depth > 0 && d->surfaces.has_mirror) rc = name_ghosts(site, err);
+    set_up_instrument(cfg, &d->instrument);
+    if (!instrument_is_ideal(&d->instrument)) d->cast.instrument = &d->instrument;
+    if (cfg->ball.radius_m > 0.0) {
+        d->ball = (struct detect_ball){
+            .radius_m = cfg->ball.radius_m, .per_distance_1_m = cfg->ball.distance_1_m, .local = cfg->ball.local};
+        memcpy(d->ball.factor, cfg->ball.factor, sizeof d->ball.factor);
+        detect_ball_keys(&d->ball, cfg->ball.seed);
+        d->cast.ball = &d->ball;
+    }
+    d->on = d->cast.signal != NULL || d->cast.depth > 0 || d->cast.instrument != NULL || d->cast.ball != NULL ||
+            d->cast.ambiguity != DETECT_AMBIGUITY_NONE;
+    return rc;
+}
+
+void site_free_detect(struct site *site)
+{
+    surface_table_free(&site->detect.surfaces);
+    free(site->detect.ghost);
+}
+
+double site_ray_reach_m(const struct site *site, const double station_m[3])
+{
+    const struct config_instrument *k = &site->cfg->instrument;
+    double beside_m = hypot(k->transit_offset_m, k->mirror_offset_m), far2 = 0.0;
+    if (site->detect.cast.depth == 0) return beside_m;
+    for (int i = 0; i < 3; i++) {
+        double far = fmax(fabs(site->scene->min_m[i] - station_m[i]), fabs(site->scene->max_m[i] - station_m[i]));
+        far2 += far * far;
+    }
+    /* What moves may be anywhere. */
+    double behind_m = site->n_movers > 0 ? INFINITY : sqrt(far2) + 1e-3;
+    return beside_m + fmin(behind_m, site->cfg->profile.range_max_m);
+}
+
+double site_noise_m(const struct site *site)
+{
+    const struct config *cfg = site->cfg;
+    const struct config_profile *p = &cfg->profile;
+    double sigma_m = p->range_sigma_m + 1e-6 * p->range_sigma_ppm * p->range_max_m;
+    if (cfg->noise_range == RANGE_NOISE_SIGNAL) sigma_m += sqrt(site->detect.signal.jitter2); /* at the threshold */
+    const double *f = cfg->ball.factor;
+    double ball_m = cfg->ball.radius_m * (1.0 + cfg->ball.distance_1_m * p->range_max_m) * fmax(f[0], fmax(f[1], f[2]));
+    return 10.0 * sigma_m + ball_m;
+}

@@ -1,0 +1,18 @@
+/* What a site's scans do between a hit and a point, made from the configuration once. */
+#ifndef FIRMWARE_SIM_SITE_DETECT_H
+#define FIRMWARE_SIM_SITE_DETECT_H
+
+#include "firmware_sim/site.h"
+
+/* The scene, with its movers, has been loaded; site->n_surfaces grows by the labels of ghosts, where there are mirrors.
+ * Entries of `surfaces` that nothing fits are warned of. */
+int site_set_up_detect(struct site *site, const struct sh_report *report, struct sh_err *err);
+void site_free_detect(struct site *site);
+
+/* How far from the head's origin rays may begin, given where it stands: beams beside it, and ways behind glass. */
+double site_ray_reach_m(const struct site *site, const double station_m[3]);
+
+/* How far noise may take a point. */
+double site_noise_m(const struct site *site);
+
+#endif
