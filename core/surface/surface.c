@@ -51,8 +51,8 @@ int surface_table_set(struct surface_table *table, uint32_t label, const struct 
         override(&s->retro, said->retro);
         override(&s->glass, said->glass);
         override(&s->mirror, said->mirror);
-        /* What is passed on or mirrored is not scattered: a bare pane or mirror scatters at most the rest. */
-        if (isnan(said->reflectance)) s->reflectance *= 1.0 - fmin(s->glass + s->mirror, 1.0);
+        /* A pane scatters what it doesn't pass on, as far as its colour says; a mirror is clean. */
+        if (isnan(said->reflectance)) s->reflectance *= s->mirror > 0.0 ? 0.0 : 1.0 - s->glass;
     }
     table->has_lobes |= s->specular > 0.0 || s->retro > 0.0;
     table->has_mirror |= s->mirror > 0.0;

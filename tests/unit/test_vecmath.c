@@ -110,6 +110,26 @@ static double log_error(double x)
     return expected == 0.0L ? (double)error : (double)(error / fabsl(expected));
 }
 
+/* libm's expl is good to 64 bits. */
+static void exponential_of_a_million_numbers(void **state)
+{
+    (void)state;
+    uint64_t seed = 5;
+    double worst = 0.0, at = 0.0;
+    for (int i = 0; i < CASES; i++) {
+        double x = (i % 2 ? 1400.0 : 2.0) * (case_unit(&seed) - 0.5);
+        long double expected = expl((long double)x);
+        double error = (double)fabsl(((long double)vec_exp(x) - expected) / expected);
+        if (error > worst) {
+            worst = error;
+            at = x;
+        }
+    }
+    print_message("# exponential: worst relative error %.3g at %.17g\n", worst, at);
+    if (!(worst < LOG_ERROR)) fail_msg("relative error %.3g at %.17g", worst, at);
+    assert_true(vec_exp(0.0) == 1.0 && vec_exp(-1e6) == vec_exp(-700.0) && vec_exp(1e6) == vec_exp(700.0));
+}
+
 static void logarithm_of_a_million_numbers(void **state)
 {
     (void)state;
@@ -203,6 +223,7 @@ int main(void)
         cmocka_unit_test(whole_turns_change_nothing),
         cmocka_unit_test(they_lie_on_the_unit_circle),
         cmocka_unit_test(logarithm_of_a_million_numbers),
+        cmocka_unit_test(exponential_of_a_million_numbers),
         cmocka_unit_test(logarithm_at_its_edges),
         cmocka_unit_test(rounding_takes_ties_to_even),
         cmocka_unit_test(rounding_is_that_of_the_c_library),

@@ -1,0 +1,294 @@
+/* Surfaces, signal, zones and the ball, against closed forms. */
+#include "tests/unit/cases.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/detect.h"
+#include "core/line.h"
+#include "core/rng.h"
+#include "core/surface.h"
+
+static const double TURN = 6.283185307179586477;
+
+static struct detect_signal_spec spec_of(double extinction_1_m, double overlap_m)
+{
+    return (struct detect_signal_spec){.n_reaches = 1,
+                                       .reach = {{0.9, 900.0}},
+                                       .threshold_snr = 8.0,
+                                       .sharp = 1,
+                                       .overlap_m = overlap_m,
+                                       .extinction_1_m = extinction_1_m,
+                                       .sigma_m = 0.003,
+                                       .sigma_at_m = 100.0,
+                                       .sigma_reflectance = 0.9,
+                                       .seed = 1};
+}
+
+static void set_up(const struct detect_signal_spec *spec, struct detect_signal *signal)
+{
+    struct sh_err err;
+    if (detect_signal_set_up(spec, signal, &err) != SH_OK) fail_msg("%s", err.text);
+}
+
+/* What a head with such a signal says of one echo: 0.01 dB; LINE_REFL_NONE: not seen. */
+static int told(const struct detect_signal *signal, double range_m, double rho)
+{
+    uint64_t key = 7;
+    double amplitude;
+    int16_t refl_cdb;
+    const struct detect_echoes echoes = {
+        .n = 1, .key = &key, .range_m = &range_m, .rho = &rho, .amplitude = &amplitude, .refl_cdb = &refl_cdb};
+    detect_by_signal(signal, &echoes);
+    assert_true(isnan(range_m) == (refl_cdb == LINE_REFL_NONE));
+    return refl_cdb;
+}
+
+static void what_surfaces_send_back(void **state)
+{
+    (void)state;
+    struct surface_table table;
+    struct sh_err err;
+    assert_int_equal(surface_table_alloc(3, &table, &err), SH_OK);
+    table.surface[0] = (struct surface){.reflectance = 0.4};
+    table.surface[1] = (struct surface){.reflectance = 0.1, .specular = 0.5, .gloss = 30.0};
+    table.surface[2] = (struct surface){.retro = 250.0};
+    table.has_lobes = 1;
+    const uint32_t label[] = {0, 0, 1, 1, 1, 2, 3, 0xffff};
+    const double incidence_deg[] = {0, 60, 0, 15, 50, 70, 0, 0};
+    double cosine[8], rho[8];
+    for (int i = 0; i < 8; i++)
+        cosine[i] = cos(incidence_deg[i] * TURN / 360.0);
+    surface_return(&table, 8, label, cosine, rho);
+    /* 15 deg: the way back lies 30 deg off the mirror direction; 50 deg: 100 deg off it, behind the lobe. */
+    double c15 = cos(15.0 * TURN / 360.0), c30 = cos(30.0 * TURN / 360.0);
+    const double expected[] = {
+        0.4, 0.2, 0.1 + 0.5 * 16.0, 0.1 * c15 + 0.5 * 16.0 * pow(c30, 30.0) * c15, 0.1 * cosine[4], 250.0, 0.0, 0.0};
+    for (int i = 0; i < 8; i++)
+        if (!(fabs(rho[i] - expected[i]) <= 1e-12 * expected[i]))
+            fail_msg("case %d: %.15g, not %.15g", i, rho[i], expected[i]);
+    surface_table_free(&table);
+}
+
+/* Names choose the first rule that fits; what it doesn't say comes from the colour. sRGB 0.5 is 0.2140 of the light
+ * (IEC 61966-2-1). */
+static void names_and_colours_choose(void **state)
+{
+    (void)state;
+    const double unsaid = (double)NAN;
+    const struct surface_rule rule[] = {
+        {"*", "Glas*", {unsaid, unsaid, 100.0, unsaid, 0.9, unsaid}},
+        {"sign ?", "*", {0.3, unsaid, 100.0, 300.0, unsaid, unsaid}},
+        {"*", "paint", {0.05, unsaid, 100.0, unsaid, unsaid, unsaid}},
+        {"*", "silver", {unsaid, unsaid, 100.0, unsaid, unsaid, 0.8}},
+    };
+    const struct scene_surface named[] = {{"window", "Glas, klar", {0.5f, 0.5f, 0.5f}, 1},
+                                          {"sign 1", "paint", {1, 1, 1}, 1},
+                                          {"sign 12", "paint", {1, 1, 1}, 1},
+                                          {"wall", "brick", {1, 0, 0}, 1},
+                                          {"wall", "brick", {0, 0, 0}, 0},
+                                          {"m", "silver", {1, 1, 1}, 1}};
+    static const int chosen[] = {0, 1, 2, -1, -1, 3};
+    const double grey = 0.21404114, reflectance[] = {0.1 * grey, 0.3, 0.05, 0.2126, 0.6, 0.0};
+    struct surface_table table;
+    struct sh_err err;
+    assert_int_equal(surface_table_alloc(6, &table, &err), SH_OK);
+    for (uint32_t i = 0; i < 6; i++) {
+        assert_int_equal(surface_table_set(&table, i, &named[i], rule, 4, 0.6), chosen[i]);
+        assert_true(fabs(table.surface[i].reflectance - reflectance[i]) < 1e-8);
+    }
+    assert_true(table.surface[0].glass == 0.9 && table.surface[1].retro == 300.0 && table.surface[2].retro == 0.0 &&
+                table.surface[5].mirror == 0.8);
+    assert_true(table.has_optics && table.has_lobes && table.has_mirror);
+    surface_table_free(&table);
+}
+
+/* Reflectance is that of the target, whatever the range and the lens; fog takes 2 a R from it. */
+static void reflectance_is_the_targets(void **state)
+{
+    (void)state;
+    static const double range_m[] = {0.3, 1.0, 7.0, 50.0, 300.0};
+    struct detect_signal_spec clear = spec_of(0.0, 0.0), lens = spec_of(0.0, 5.0), fog = spec_of(0.003, 0.0);
+    struct detect_signal signal;
+    for (int i = 0; i < 5; i++) {
+        set_up(&clear, &signal);
+        assert_int_equal(told(&signal, range_m[i], 1.0), 0);
+        assert_int_equal(told(&signal, range_m[i], 0.2 * 0.5), -1000);
+        assert_int_equal(told(&signal, range_m[i], 300.0), 2477); /* 10 log10(300) = 24.77 dB */
+        set_up(&lens, &signal);
+        assert_int_equal(told(&signal, range_m[i], 0.5), -301);
+        set_up(&fog, &signal);
+        int lost_cdb = (int)lround(100.0 * 10.0 / log(10.0) * 2.0 * 0.003 * range_m[i]);
+        assert_int_equal(told(&signal, range_m[i], 1.0), -lost_cdb);
+    }
+}
+
+/* Amplitude from the range equation; at short range what the lens catches. */
+static void amplitude_follows_the_range_equation(void **state)
+{
+    (void)state;
+    struct detect_signal_spec spec = spec_of(0.001, 4.0);
+    struct detect_signal signal;
+    set_up(&spec, &signal);
+    for (double r = 0.01; r < 2000.0; r *= 1.7) {
+        double expected = 0.3 / 0.9 * pow(900.0 / r, 2.0) * exp(-0.002 * r) * -expm1(-r * r / 16.0);
+        double a = detect_amplitude(&signal, r, 0.3);
+        assert_true(fabs(a / expected - 1.0) < 1e-5); /* the series for small R / R_o */
+        assert_true(fabs(detect_least_reflectance(&signal, r) / (0.9 * r * r / 810000.0) - 1.0) < 1e-12);
+        /* A (1/R^2) seen: just so, and not */
+        assert_int_equal(told(&signal, r, 0.3 / expected * 1.0001) == LINE_REFL_NONE, 0);
+        assert_int_equal(told(&signal, r, 0.3 / expected * 0.9999) == LINE_REFL_NONE, 1);
+    }
+    assert_int_equal(told(&signal, 10.0, 0.0), LINE_REFL_NONE); /* absorbs */
+    assert_int_equal(told(&signal, (double)NAN, 1.0), LINE_REFL_NONE);
+}
+
+/* Kim's table: fog of 500 m visibility does not know colours, 3.912 / 500 m; haze of 4 km, q = 0.98; clear air of 23
+ * km, q = 1.3. */
+static void extinction_by_visibility(void **state)
+{
+    (void)state;
+    assert_true(fabs(detect_extinction_1_m(500.0, 1550e-9) - 3.912 / 500.0) < 1e-15);
+    assert_true(fabs(detect_extinction_1_m(4000.0, 1550e-9) - 3.912 / 4000.0 * pow(1550.0 / 550.0, -0.98)) < 1e-12);
+    assert_true(fabs(detect_extinction_1_m(23000.0, 905e-9) - 3.912 / 23000.0 * pow(905.0 / 550.0, -1.3)) < 1e-12);
+}
+
+static void reaches_that_contradict_are_refused(void **state)
+{
+    (void)state;
+    struct detect_signal_spec spec = spec_of(0.0, 0.0);
+    struct detect_signal signal;
+    struct sh_err err;
+    spec.n_reaches = 2;
+    spec.reach[1] = (struct detect_reach){0.2, 300.0}; /* 900 sqrt(0.2 / 0.9) = 424 m without any air */
+    assert_int_equal(detect_signal_set_up(&spec, &signal, &err), SH_EINPUT);
+    spec.reach[1] = (struct detect_reach){0.2, 900.0};
+    assert_int_equal(detect_signal_set_up(&spec, &signal, &err), SH_EINPUT);
+    spec.reach[1] = (struct detect_reach){0.2, 424.0};
+    assert_int_equal(detect_signal_set_up(&spec, &signal, &err), SH_OK);
+    spec.sigma_floor_m = 0.004;
+    assert_int_equal(detect_signal_set_up(&spec, &signal, &err), SH_EINPUT);
+}
+
+/* 1.2 MHz: zones of 124.9135 m. */
+static void zones_fold(void **state)
+{
+    (void)state;
+    const double zone_m = 299792458.0 / 2.0 / 1.2e6;
+    const double in[] = {1.0,         100.0,       zone_m + 50.0, 3.0 * zone_m + 2.0, 0.4, 2.0 * zone_m + 0.4,
+                         (double)NAN, 4.5 * zone_m};
+    const double folded[] = {1.0, 100.0, 50.0, 2.0, (double)NAN, (double)NAN, (double)NAN, 0.5 * zone_m};
+    double range_m[8];
+    for (int how = 0; how < 3; how++) {
+        memcpy(range_m, in, sizeof in);
+        detect_zones((enum detect_ambiguity)how, 1.0 / 1.2e6, 4, 0.5, 8, range_m);
+        for (int i = 0; i < 8; i++) {
+            int lost = isnan(folded[i]) || (how == DETECT_RESOLVED && i == 7); /* beyond its zones */
+            double expected = how == DETECT_AMBIGUITY_NONE ? in[i]
+                              : lost                       ? (double)NAN
+                              : how == DETECT_FOLDED       ? folded[i]
+                                                           : in[i];
+            assert_true(isnan(expected) ? isnan(range_m[i]) : fabs(range_m[i] - expected) < 1e-9);
+        }
+    }
+}
+
+static void point_at(double range_m, double mirror_turn, double pan_turn, double p[3])
+{
+    double m = TURN * mirror_turn, a = TURN * pan_turn;
+    p[0] = range_m * sin(a) * cos(m);
+    p[1] = range_m * cos(a) * cos(m);
+    p[2] = range_m * sin(m);
+}
+
+/* Points in the ball, and where in it: for a uniform ball of radius r the mean square along each axis is r^2 / 5, and
+ * (distance / r)^3 is uniform. Line angles on both sides of the zenith. Bounds: 4.75 standard errors; the variance of
+ * x^2 is r^4 (3/35 - 1/25). */
+static void the_ball_is_full(void **state)
+{
+    (void)state;
+    enum { N = 200000 };
+    static const double rotation[9] = {0, 1, 0, -1, 0, 0, 0, 0, 1}; /* a quarter turn about z */
+    static const double factor[3] = {1.0, 2.0, 0.5};
+    static uint64_t key[N];
+    static double range_m[N], mirror[N], pan[N];
+    for (int local = 0; local < 2; local++) {
+        struct detect_ball ball = {.radius_m = 0.01, .per_distance_1_m = 0.1, .local = local};
+        double sum[3] = {0}, sum2[3] = {0}, cubes = 0.0;
+        uint64_t seed = 11;
+        memcpy(ball.factor, factor, sizeof factor);
+        detect_ball_keys(&ball, 5);
+        for (uint32_t i = 0; i < N; i++) {
+            key[i] = rng_echo(i / 2, i % 2);
+            range_m[i] = 10.0 + 20.0 * case_unit(&seed);
+            mirror[i] = case_unit(&seed) - 0.25;
+            pan[i] = case_unit(&seed);
+            double before[3], after[3], moved[3], v[3], r = range_m[i], m = mirror[i], p = pan[i];
+            point_at(r, m, p, before);
+            detect_move_in_ball(&ball, rotation, 1, &key[i], &r, &m, &p);
+            point_at(r, m, p, after);
+            double cm = cos(TURN * mirror[i]), sm = sin(TURN * mirror[i]), cp = cos(TURN * pan[i]),
+                   sp = sin(TURN * pan[i]);
+            for (int k = 0; k < 3; k++)
+                v[k] = after[k] - before[k];
+            if (local) {
+                moved[0] = v[0] * sp * cm + v[1] * cp * cm + v[2] * sm; /* along */
+                moved[1] = v[0] * cp - v[1] * sp;                       /* right */
+                moved[2] = -v[0] * sp * sm - v[1] * cp * sm + v[2] * cm;
+            } else {
+                moved[0] = v[1]; /* prcs = rotation socs */
+                moved[1] = -v[0];
+                moved[2] = v[2];
+            }
+            double radius = 0.01 * (1.0 + 0.1 * range_m[i]), d2 = 0.0;
+            for (int k = 0; k < 3; k++) {
+                double u = moved[k] / (radius * factor[k]);
+                sum[k] += u;
+                sum2[k] += u * u;
+                d2 += u * u;
+            }
+            assert_true(d2 < 1.0 + 1e-9);
+            cubes += pow(d2, 1.5);
+            assert_true(fabs(m - mirror[i]) < 0.25 || cos(TURN * mirror[i]) * cos(TURN * m) > -0.01); /* same face */
+        }
+        for (int k = 0; k < 3; k++) {
+            assert_true(fabs(sum[k] / N) < 4.75 * sqrt(0.2 / N));
+            assert_true(fabs(sum2[k] / N - 0.2) < 4.75 * sqrt((3.0 / 35.0 - 1.0 / 25.0) / N));
+        }
+        assert_true(fabs(cubes / N - 0.5) < 4.75 * sqrt(1.0 / 12.0 / N));
+    }
+}
+
+/* The same key, the same place: from the same point, however often. No echo stays none. Other seeds, other places. */
+static void the_ball_does_not_accumulate(void **state)
+{
+    (void)state;
+    struct detect_ball ball = {.radius_m = 0.1, .factor = {1, 1, 1}, .local = 1};
+    const uint64_t key[3] = {1, 1, 2};
+    double range_m[3] = {5.0, 5.0, (double)NAN}, mirror[3] = {0.1, 0.1, 0.1}, pan[3] = {0.2, 0.2, 0.2};
+    detect_ball_keys(&ball, 1);
+    detect_move_in_ball(&ball, NULL, 3, key, range_m, mirror, pan);
+    assert_true(range_m[0] == range_m[1] && mirror[0] == mirror[1] && pan[0] == pan[1] && range_m[0] != 5.0);
+    assert_true(isnan(range_m[2]) && mirror[2] == 0.1 && pan[2] == 0.2);
+    double other_m = 5.0, other_mirror = 0.1, other_pan = 0.2;
+    detect_ball_keys(&ball, 2);
+    detect_move_in_ball(&ball, NULL, 1, key, &other_m, &other_mirror, &other_pan);
+    assert_true(other_m != range_m[0]);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_surfaces_send_back),
+        cmocka_unit_test(names_and_colours_choose),
+        cmocka_unit_test(reflectance_is_the_targets),
+        cmocka_unit_test(amplitude_follows_the_range_equation),
+        cmocka_unit_test(extinction_by_visibility),
+        cmocka_unit_test(reaches_that_contradict_are_refused),
+        cmocka_unit_test(zones_fold),
+        cmocka_unit_test(the_ball_is_full),
+        cmocka_unit_test(the_ball_does_not_accumulate),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
