@@ -118,7 +118,15 @@ uint32_t caster_positions(struct caster *c, const struct cast_setup *s, int line
  * off mirrors -> c->list. */
 void caster_follow(struct caster *c, const struct cast_setup *s, const struct origins *from, uint32_t n);
 
-/* ---- detected.c: a chunk with everything that cast_detect asks for. `at`: its first pulse in the run; entries from
+/* ---- detected.c: c->list (n, pulse, range_m, cosine, energy, label, ghost; each pulse of the chunk has at least one
+ * entry, with a range of NaN where it meets nothing) -> entries of the block from `out` on. pulse0: the chunk's first
+ * pulse, in the scan; c->mirror_turn and pan_turn: what the encoders said. Returns the number of echoes; *entries: how
+ * many were written. */
+uint32_t caster_report(struct caster *c, const struct cast_setup *s, const struct schedule_run *run,
+                       const uint32_t *dt_ns, uint64_t pulse0, struct line_block *block, uint32_t out,
+                       uint32_t *entries);
+
+/* A chunk with everything that cast_detect asks for. `at`: its first pulse in the run; entries from
  * `out` on. dt_ns: times of the chunk's pulses. Returns the number of echoes; *entries: how many were written. */
 uint32_t caster_detected(struct caster *c, const struct cast_setup *s, const struct schedule_run *run,
                          const uint32_t *dt_ns, uint32_t at, uint32_t n, struct line_block *block, uint32_t out,

@@ -238,29 +238,13 @@ static uint32_t number_again(const struct echo_list *l, struct line_block *block
     return to - out;
 }
 
-uint32_t caster_detected(struct caster *c, const struct cast_setup *s, const struct schedule_run *run,
-                         const uint32_t *dt_ns, uint32_t at, uint32_t n, struct line_block *block, uint32_t out,
-                         uint32_t *entries)
+uint32_t caster_report(struct caster *c, const struct cast_setup *s, const struct schedule_run *run,
+                       const uint32_t *dt_ns, uint64_t pulse0, struct line_block *block, uint32_t out,
+                       uint32_t *entries)
 {
     const struct cast_detect *d = s->detect;
     struct echo_list *l = &c->list;
-    struct origins from;
-    if (c->profile != NULL) c->profile->last = c->profile->now();
-    aim_beams(c, s, run, dt_ns, at, n, &from);
-    const struct ray_set set = {.dx = c->dx,
-                                .dy = c->dy,
-                                .dz = c->dz,
-                                .range_m = c->range_m,
-                                .label = c->label,
-                                .hit = c->hit,
-                                .cosine = c->cosine,
-                                .body = c->body};
-    caster_nearest(c, s, &from, &set, n);
-    if (d->depth > 0)
-        caster_follow(c, s, &from, n);
-    else
-        list_hits(c, n);
-    make_keys(l, run->pulse0 + at);
+    make_keys(l, pulse0);
     find_echoes(c, s, run);
     caster_ends(c, CAST_DETECT);
     add_noise(c, s);
@@ -279,4 +263,27 @@ uint32_t caster_detected(struct caster *c, const struct cast_setup *s, const str
     }
     caster_ends(c, CAST_POSITIONS);
     return echoes;
+}
+
+uint32_t caster_detected(struct caster *c, const struct cast_setup *s, const struct schedule_run *run,
+                         const uint32_t *dt_ns, uint32_t at, uint32_t n, struct line_block *block, uint32_t out,
+                         uint32_t *entries)
+{
+    struct origins from;
+    if (c->profile != NULL) c->profile->last = c->profile->now();
+    aim_beams(c, s, run, dt_ns, at, n, &from);
+    const struct ray_set set = {.dx = c->dx,
+                                .dy = c->dy,
+                                .dz = c->dz,
+                                .range_m = c->range_m,
+                                .label = c->label,
+                                .hit = c->hit,
+                                .cosine = c->cosine,
+                                .body = c->body};
+    caster_nearest(c, s, &from, &set, n);
+    if (s->detect->depth > 0)
+        caster_follow(c, s, &from, n);
+    else
+        list_hits(c, n);
+    return caster_report(c, s, run, dt_ns, run->pulse0 + at, block, out, entries);
 }

@@ -82,6 +82,7 @@ static const struct bad bad[] = {
     {"type: tcp", "type: usb", 14, "links[0].type", "allowed null, file, pty, tcp"},
     {"output:", "loop: {pace: slow}\noutput:", 16, "loop.pace", "allowed realtime, fast, step"},
     {"output:", "noise: {range: 1}\noutput:", 16, "noise.range", "allowed on or off"},
+    {"output:", "noise: {angle: 1}\noutput:", 16, "noise.angle", "allowed on or off"},
     {"[1, 2, 3]", "[1, 2]", 11, "stations[0].position_m", "2 numbers instead of 3"},
     {"[1, 2, 3]", "[1, 2, 3, 4]", 11, "stations[0].position_m", "4 numbers instead of 3"},
     {"[1, 2, 3]", "[1, 2, nan]", 11, "stations[0].position_m", "\"nan\" is not a number"},
@@ -189,6 +190,28 @@ static const struct bad bad[] = {
     {"type: tcp\n    port: 0", "type: file", 14, "links[0].path", "required for a file link"},
     {"type: tcp\n    port: 0", "type: file\n    path: a\n  - type: file\n    path: a", 17, "links[1].path", "same path"},
     {"heading_deg: 90", "name: a\n  - position_m: [0, 0, 0]\n    name: a", 14, "stations[1].name", "same name"},
+    /* noise, signal, surfaces, instrument */
+#define AT_16(text) "output:", text "\noutput:"
+    {AT_16("noise: {range: loud}"), 16, "noise.range", "allowed on or off, or signal"},
+    {AT_16("noise: {range: signal}"), 16, "noise.range", "allowed with signal.model: on"},
+    {AT_16("noise: {ball: {radius_m: -1}}"), 16, "noise.ball.radius_m", "allowed 0 to 100 m"},
+    {AT_16("noise: {ball: {axes: head}}"), 16, "noise.ball.axes", "allowed scene, beam"},
+    {AT_16("noise: {ball: {factor: [1, 1, -1]}}"), 16, "noise.ball.factor", "each 0 to 1000"},
+    {AT_16("noise: {ball: {radius_m: 1}}\nplatform: {kind: live}"), 16, "noise.ball.radius_m", "allowed axes: beam"},
+    {AT_16("signal: {model: dim}"), 16, "signal.model", "allowed on or off"},
+    {AT_16("signal: {detection: good}"), 16, "signal.detection", "allowed noisy, sharp"},
+    {AT_16("signal: {reflectance: 1.1}"), 16, "signal.reflectance", "allowed 0 to 1"},
+    {AT_16("signal: {visibility_m: 500, extinction_1_km: 3}"), 16, "signal.extinction_1_km", "allowed one of them"},
+    {AT_16("surfaces: {material: a}"), 16, "surfaces", "allowed a list of 0 to 64"},
+    {AT_16("surfaces: [{reflectance: 0.5}, {glass: 0.5, mirror: 0.5}]"), 16, "surfaces[1].mirror", "either glass or mirror"},
+    {AT_16("surfaces: [{reflectance: 0.5, glass: 0.6}]"), 16, "surfaces[0]", "add up to 1.1; allowed at most 1"},
+    {AT_16("surfaces: [{retro: -1}]"), 16, "surfaces[0].retro", "allowed 0 to 1000000"},
+    {AT_16("surfaces: [{reflektance: 1}]"), 16, "surfaces[0].reflektance", "did you mean surfaces[0].reflectance?"},
+    {AT_16("optics: {depth: 5}"), 16, "optics.depth", "0 to 4"},
+    {AT_16("instrument: {collimation_deg: 11}"), 16, "instrument.collimation_deg", "allowed -10 to 10 deg"},
+    {AT_16("instrument: {transit_offset_m: 2}"), 16, "instrument.transit_offset_m", "allowed -1 to 1 m"},
+    {FRAMES_AT_4("ambiguity: some"), 4, "head.ambiguity", "allowed none, folded, resolved"},
+    {FRAMES_AT_4("mta_zones: 0"), 4, "head.mta_zones", "1 to 1000"},
     /* places: the anchor, the forms of a station's place */
 #define ANCHOR(text) "scene:\n", "scene:\n  anchor: {" text "}\n"
 #define UTM_PLACE "utm_zone: 33\n    hemisphere: north\n    easting_m: 5e5\n    northing_m: 5e6\n    height_m: 0\n"
