@@ -8,6 +8,7 @@
 
 #include <stdint.h>
 
+#include "core/detect.h"
 #include "core/georef.h"
 
 struct plan_row {
@@ -36,8 +37,15 @@ struct plan_head {
     uint32_t n_movers;
     int noise_on;
     double range_sigma_m, range_sigma_ppm;
+    double range_sigma_at_m; /* noise by the signal: where that sigma holds; 0: whatever the signal */
+    double ball_radius_m;    /* 0: no ball-shaped noise */
+    uint32_t n_glass, depth; /* surfaces of glass, or mirrors; how many a pulse is followed through */
+    int signal, sharp;       /* there is a signal model; without noise of its own */
+    double reach_m;          /* where a white target vanishes */
+    enum detect_ambiguity ambiguity;
+    int instrument, angle_noise; /* errors of geometry; noise of the angles */
 };
-enum { PLAN_HEAD_ROWS = 6 };
+enum { PLAN_HEAD_ROWS = 11 };
 
 /* Everything but georeferencing. Stages that are left out have the method "none" and say why. Returns how many rows. */
 size_t plan_head(const struct plan_head *head, struct plan_row rows[PLAN_HEAD_ROWS]);

@@ -27,17 +27,45 @@ struct plan {
     size_t n;
 };
 
-static void make_plan(const struct config *cfg, const struct site *site, struct plan *plan)
+static int is_zero(const struct config_instrument *k)
 {
+    static const struct config_instrument zero;
+    return memcmp(k, &zero, sizeof zero) == 0;
+}
+
+static void ask_head(const struct config *cfg, const struct site *site, struct plan_head *head)
+{
+    const struct site_detect *d = &site->detect;
     struct bvh_info info;
     bvh_get_info(site->station[0].bvh, &info);
-    const struct plan_head head = {.packet = info.packet,
-                                   .order_exactly = cfg->order_exactly,
-                                   .range_max_m = cfg->profile.range_max_m,
-                                   .n_movers = site->n_movers,
-                                   .noise_on = cfg->noise_range != RANGE_NOISE_OFF,
-                                   .range_sigma_m = cfg->profile.range_sigma_m,
-                                   .range_sigma_ppm = cfg->profile.range_sigma_ppm};
+    *head = (struct plan_head){
+        .packet = info.packet,
+        .order_exactly = cfg->order_exactly,
+        .range_max_m = cfg->profile.range_max_m,
+        .n_movers = site->n_movers,
+        .noise_on = cfg->noise_range != RANGE_NOISE_OFF,
+        .range_sigma_m = cfg->profile.range_sigma_m,
+        .range_sigma_ppm = cfg->profile.range_sigma_ppm,
+        .range_sigma_at_m = cfg->noise_range == RANGE_NOISE_SIGNAL ? cfg->profile.range_sigma_at_m : 0.0,
+        .ball_radius_m = cfg->ball.radius_m,
+        .depth = d->cast.depth,
+        .signal = d->cast.signal != NULL,
+        .sharp = cfg->signal.sharp,
+        .ambiguity = cfg->ambiguity,
+        .instrument = !is_zero(&cfg->instrument),
+        .angle_noise = cfg->noise_angle,
+    };
+    for (uint32_t i = 0; i < d->surfaces.n; i++)
+        head->n_glass += d->surfaces.surface[i].glass > 0.0 || d->surfaces.surface[i].mirror > 0.0;
+    for (uint32_t i = 0; i < cfg->profile.n_reaches; i++)
+        head->reach_m = fmax(head->reach_m, cfg->profile.reach[i].range_m);
+    if (cfg->profile.n_reaches == 0) head->reach_m = cfg->profile.range_max_m;
+}
+
+static void make_plan(const struct config *cfg, const struct site *site, struct plan *plan)
+{
+    struct plan_head head;
+    ask_head(cfg, site, &head);
     plan->n = plan_head(&head, plan->row);
     if (cfg->layout == LINE_POLAR) {
         plan_georef_polar(&plan->row[plan->n++]);

@@ -26,11 +26,12 @@ static const char help[] =
     "  --tolerance-m T   how far a point may be from the scene (default 0.001)\n"
     "  --max-m M         how far to look for the scene; what is farther counts as far, and fails (default "
     "10)\n"
-    "  --json            the figures as JSON, in metres: points, empty, mean_m, rms_m, p50_m, p95_m, p999_m, "
+    "  --json            the figures as JSON, in metres: points, empty, ghosts, mean_m, rms_m, p50_m, p95_m, p999_m, "
     "max_m,\n"
     "                    beyond, far, tolerance_m, surfaces_hit, surfaces, triangles_hit, triangles, worst\n"
     "  --set KEY=VALUE   sets a key of the configuration\n"
     "\n"
+    "Points seen in mirrors lie where nothing is: with the mirrors in CONFIG (surfaces) they are left out.\n"
     "Mean, RMS, percentiles (nearest rank) and maximum are over all points that are not far. Percentiles are "
     "of the\n"
     "points' distances, which are never negative.\n"
@@ -46,6 +47,7 @@ struct report {
     struct site *site;
     struct distance *index;
     struct cloud cloud;
+    size_t ghosts;      /* points seen in mirrors: nothing is there, they are left out */
     double *distance_m; /* per point */
     uint32_t *triangle;
     struct cloud_stats stats;
@@ -76,6 +78,20 @@ static void warn(void *ctx, const char *text)
     sh_warn(&cmd_report_stderr, "%s", text);
 }
 
+/* Ghosts become shots without echo, but counted. */
+static void leave_out_ghosts(struct report *r)
+{
+    const struct site_detect *d = &r->site->detect;
+    struct cloud *c = &r->cloud;
+    for (size_t i = 0; d->ghost != NULL && c->label != NULL && i < c->n; i++) {
+        if (c->label[i] < d->n_real || c->label[i] >= 2 * d->n_real) continue;
+        c->label[i] = CLOUD_LABEL_NONE;
+        for (int k = 0; k < 3; k++)
+            c->xyz_m[i][k] = (double)NAN;
+        r->ghosts++;
+    }
+}
+
 static int load(struct report *r, struct sh_err *err)
 {
     const struct sh_report progress = {r, warn, tell_each_second};
@@ -83,6 +99,7 @@ static int load(struct report *r, struct sh_err *err)
     int rc = cloud_read(r->cloud_path, &progress, &r->cloud, err);
     if (rc == SH_OK) rc = site_load(r->cfg, &cmd_report_stderr, &r->site, err);
     if (rc == SH_OK) rc = distance_create(r->site->scene, &r->index, err);
+    if (rc == SH_OK) leave_out_ghosts(r);
     return rc;
 }
 
@@ -142,7 +159,8 @@ static void print_text(const struct report *r)
     const struct cloud_stats *s = &r->stats;
     const double *p = r->cloud.xyz_m[s->worst];
     const struct scene_surface *surface = worst_surface(r);
-    printf("%-10s %zu\n%-10s %zu shots without echo\n", "points", s->points, "empty", s->empty);
+    printf("%-10s %zu\n%-10s %zu shots without echo\n", "points", s->points, "empty", s->empty - r->ghosts);
+    if (r->ghosts != 0) printf("%-10s %zu points seen in mirrors, left out\n", "ghosts", r->ghosts);
     print_length("mean", s->mean_m);
     print_length("RMS", s->rms_m);
     print_length("50 %", s->p50_m);
@@ -180,7 +198,8 @@ static int print_json(const struct report *r, struct sh_err *err)
     json_begin(&json, stdout);
     json_open_object(&json, NULL);
     json_uint(&json, "points", s->points);
-    json_uint(&json, "empty", s->empty);
+    json_uint(&json, "empty", s->empty - r->ghosts);
+    json_uint(&json, "ghosts", r->ghosts);
     json_double(&json, "mean_m", s->mean_m);
     json_double(&json, "rms_m", s->rms_m);
     json_double(&json, "p50_m", s->p50_m);

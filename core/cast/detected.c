@@ -279,7 +279,7 @@ uint32_t caster_detected(struct caster *c, const struct cast_setup *s, const str
                                 .label = c->label,
                                 .hit = c->hit,
                                 .cosine = c->cosine,
-                                .body = c->body};
+                                .body = s->detect->surfaces != NULL ? c->body : NULL};
     caster_nearest(c, s, &from, &set, n);
     if (s->detect->depth > 0)
         caster_follow(c, s, &from, n);

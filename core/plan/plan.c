@@ -93,6 +93,47 @@ static const double FLOAT_ORDER = 5e-7;
 /* What the cast promises for incidence up to 89.9 degrees; tests/stability holds it to that. */
 static const double CAST_ERROR_M = 1e-6;
 
+static struct plan_row *plan_optics(struct plan_row *row, const struct plan_head *head)
+{
+    char why[192];
+    if (head->n_glass == 0)
+        return add(row, "optics", "none", 0.0, 0.0, "no surface is of glass or a mirror: no pulse is cast twice");
+    if (head->depth == 0) return add(row, "optics", "none", (double)NAN, 0.0, "optics.depth is 0");
+    snprintf(why, sizeof why,
+             "%u surfaces of glass or mirrors; only pulses that meet one are cast again, up to %u times", head->n_glass,
+             head->depth);
+    return add(row, "optics", "secondary rays", CAST_ERROR_M, (double)NAN, why);
+}
+
+static struct plan_row *plan_signal(struct plan_row *row, const struct plan_head *head)
+{
+    char why[192];
+    if (!head->signal)
+        return add(row, "signal", "none", 0.0, 0.0, "signal.model is off: each hit within range_max_m is an echo");
+    snprintf(why, sizeof why, "signal.model: targets vanish %s; the farthest of the profile's reaches is %.4g m",
+             head->sharp ? "sharply" : "by chance", head->reach_m);
+    return add(row, "signal", "range equation", 0.0, 30.0, why);
+}
+
+static struct plan_row *plan_noise(struct plan_row *row, const struct plan_head *head)
+{
+    char why[192];
+    if (head->noise_on && head->range_sigma_at_m > 0.0) {
+        snprintf(why, sizeof why, "noise.range: sigma %.3g m at %.4g m, by the signal elsewhere, and %.3g ppm",
+                 head->range_sigma_m, head->range_sigma_at_m, head->range_sigma_ppm);
+        row = add(row, "noise", "gauss, by signal", 0.0, 3.0, why);
+    } else if (head->noise_on) {
+        snprintf(why, sizeof why, "noise.range: sigma %.3g m and %.3g ppm, which are the head's, not an error",
+                 head->range_sigma_m, head->range_sigma_ppm);
+        row = add(row, "noise", "gauss", 0.0, 1.5, why);
+    } else {
+        row = add(row, "noise", "none", 0.0, 0.0, "noise.range is off");
+    }
+    if (!(head->ball_radius_m > 0.0)) return row;
+    snprintf(why, sizeof why, "noise.ball: points move by up to %.3g m, and more by its factors", head->ball_radius_m);
+    return add(row, "ball", "uniform in a ball", 0.0, 130.0, why);
+}
+
 size_t plan_head(const struct plan_head *head, struct plan_row rows[PLAN_HEAD_ROWS])
 {
     struct plan_row *row = rows;
@@ -113,12 +154,18 @@ size_t plan_head(const struct plan_head *head, struct plan_row rows[PLAN_HEAD_RO
     else
         row = add(row, "movers", "none", 0.0, 0.0, "no mesh moves");
     row = add(row, "beam", "none", 0.0, 0.0, "one ray per pulse: nothing asks for a footprint");
-    if (head->noise_on) {
-        snprintf(why, sizeof why, "noise.range: sigma %.3g m and %.3g ppm, which are the head's, not an error",
-                 head->range_sigma_m, head->range_sigma_ppm);
-        row = add(row, "noise", "gauss", 0.0, 1.5, why);
-    } else {
-        row = add(row, "noise", "none", 0.0, 0.0, "noise.range is off");
-    }
+    row = plan_optics(row, head);
+    row = plan_signal(row, head);
+    row = plan_noise(row, head);
+    if (head->ambiguity == DETECT_AMBIGUITY_NONE)
+        row = add(row, "zones", "none", 0.0, 0.0, "head.ambiguity is none: echoes are told where they are");
+    else
+        row = add(row, "zones", head->ambiguity == DETECT_FOLDED ? "folded" : "resolved", 0.0, 1.0,
+                  "head.ambiguity: echoes from behind the next pulse");
+    if (head->instrument || head->angle_noise)
+        row = add(row, "geometry", head->instrument ? "errors of geometry" : "angle noise", 0.0, 15.0,
+                  "instrument, noise.angle: each beam is aimed by the real mechanics, read by the encoders");
+    else
+        row = add(row, "geometry", "none", 0.0, 0.0, "instrument is all zero, noise.angle off: the head is ideal");
     return (size_t)(row - rows);
 }
