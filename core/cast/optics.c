@@ -1,4 +1,7 @@
-/* Behind glass and off mirrors: only pulses that meet such a surface are cast again, together. */
+/* Behind glass and off mirrors: only pulses that meet such a surface are cast again, together.
+ *
+ * Packets of such rays hang on the pulse number alone, as those of the pulses do: each SCHEDULE_PACKET pulses have
+ * packets of their own, filled up with copies of their last ray, whose pulse is NONE. */
 #include <math.h>
 #include <string.h>
 
@@ -39,8 +42,8 @@ static double step_m(const struct cast_setup *s, const double at[3], double cosi
     return fmax(1e-6, 3.0 * 0x1p-23 * most) / fmax(cosine, 1e-3);
 }
 
-/* Ray i of the paths sets out from what ray k of `from` has met. */
-static void set_out(const struct cast_setup *s, struct path_rays *p, uint32_t i, uint32_t k)
+/* Ray k sets out from what it has met. */
+static void set_out(const struct cast_setup *s, struct path_rays *p, uint32_t k)
 {
     const struct surface *surface = surface_of(s, p->label[k]);
     double at[3], dir[3] = {p->dx[k], p->dy[k], p->dz[k]}, n[3];
@@ -57,16 +60,45 @@ static void set_out(const struct cast_setup *s, struct path_rays *p, uint32_t i,
         share = surface->mirror;
         ghost = 1;
     }
-    p->pulse[i] = p->pulse[k];
-    p->length_m[i] = p->length_m[k] + p->range_m[k] + step;
-    p->energy[i] = p->energy[k] * share * share; /* there and back */
-    p->ghost[i] = ghost;
-    p->px[i] = at[0] + step * dir[0];
-    p->py[i] = at[1] + step * dir[1];
-    p->pz[i] = at[2] + step * dir[2];
-    p->dx[i] = dir[0];
-    p->dy[i] = dir[1];
-    p->dz[i] = dir[2];
+    p->length_m[k] += p->range_m[k] + step;
+    p->energy[k] *= share * share; /* there and back */
+    p->ghost[k] = ghost;
+    p->px[k] = at[0] + step * dir[0];
+    p->py[k] = at[1] + step * dir[1];
+    p->pz[k] = at[2] + step * dir[2];
+    p->dx[k] = dir[0];
+    p->dy[k] = dir[1];
+    p->dz[k] = dir[2];
+}
+
+static void copy_ray(struct path_rays *p, uint32_t to, uint32_t from)
+{
+    p->pulse[to] = p->pulse[from];
+    p->px[to] = p->px[from];
+    p->py[to] = p->py[from];
+    p->pz[to] = p->pz[from];
+    p->dx[to] = p->dx[from];
+    p->dy[to] = p->dy[from];
+    p->dz[to] = p->dz[from];
+    p->length_m[to] = p->length_m[from];
+    p->energy[to] = p->energy[from];
+    p->ghost[to] = p->ghost[from];
+    p->range_m[to] = p->range_m[from];
+    p->cosine[to] = p->cosine[from];
+    p->label[to] = p->label[from];
+    p->hit[to] = p->hit[from];
+    p->body[to] = p->body[from];
+}
+
+/* Fills the last packet up. */
+static uint32_t fill_up(struct path_rays *p, uint32_t n)
+{
+    uint32_t end = (n + SCHEDULE_PACKET - 1) / SCHEDULE_PACKET * SCHEDULE_PACKET;
+    for (uint32_t k = n; k < end; k++) {
+        copy_ray(p, k, n - 1);
+        p->pulse[k] = NONE;
+    }
+    return end;
 }
 
 /* The pulses whose first hit lets them go on. */
@@ -75,6 +107,7 @@ static void begin(const struct caster *c, const struct cast_setup *s, const stru
 {
     p->n = p->n_found = 0;
     for (uint32_t i = 0; i < n; i++) {
+        if (i % SCHEDULE_PACKET == 0) p->n = fill_up(p, p->n);
         p->first[i] = NONE;
         if (isnan(c->range_m[i]) || !goes_on(s, c->label[i])) continue;
         uint32_t k = p->n++;
@@ -94,6 +127,7 @@ static void begin(const struct caster *c, const struct cast_setup *s, const stru
         p->hit[k] = c->hit[i];
         p->body[k] = c->body[i];
     }
+    p->n = fill_up(p, p->n);
 }
 
 /* What ray k met, at the end of its pulse's chain. */
@@ -118,8 +152,8 @@ static void follow_paths(struct caster *c, const struct cast_setup *s)
     struct path_rays *p = &c->paths;
     for (uint32_t depth = 0; depth < s->detect->depth && p->n > 0; depth++) {
         uint32_t on = 0;
-        for (uint32_t k = 0; k < p->n; k++) /* in place: those that end here have been left out before */
-            set_out(s, p, k, k);
+        for (uint32_t k = 0; k < p->n; k++)
+            set_out(s, p, k);
         const struct origins from = {.px = p->px, .py = p->py, .pz = p->pz};
         const struct ray_set set = {.dx = p->dx,
                                     .dy = p->dy,
@@ -131,27 +165,12 @@ static void follow_paths(struct caster *c, const struct cast_setup *s)
                                     .body = p->body};
         caster_nearest(c, s, &from, &set, p->n);
         for (uint32_t k = 0; k < p->n; k++) {
-            if (isnan(p->range_m[k])) continue;
+            if (k % SCHEDULE_PACKET == 0) on = fill_up(p, on);
+            if (p->pulse[k] == NONE || isnan(p->range_m[k])) continue;
             keep(p, k);
-            if (!goes_on(s, p->label[k])) continue;
-            uint32_t i = on++;
-            if (i == k) continue;
-            p->pulse[i] = p->pulse[k];
-            p->px[i] = p->px[k];
-            p->py[i] = p->py[k];
-            p->pz[i] = p->pz[k];
-            p->dx[i] = p->dx[k];
-            p->dy[i] = p->dy[k];
-            p->dz[i] = p->dz[k];
-            p->length_m[i] = p->length_m[k];
-            p->energy[i] = p->energy[k];
-            p->ghost[i] = p->ghost[k];
-            p->range_m[i] = p->range_m[k];
-            p->cosine[i] = p->cosine[k];
-            p->label[i] = p->label[k];
-            p->hit[i] = p->hit[k];
-            p->body[i] = p->body[k];
+            if (goes_on(s, p->label[k])) copy_ray(p, on++, k);
         }
+        on = fill_up(p, on);
         p->n = on;
     }
 }
