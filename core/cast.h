@@ -73,6 +73,7 @@ struct cast_detect {
     uint32_t depth;                       /* up to CAST_MAX_DEPTH; 0: no glass, no mirrors */
     uint32_t ghost_label;
     uint32_t max_echoes;
+    double separation_m; /* returns of glass and mirrors so near behind each other make one echo; 0: each its own */
     enum detect_ambiguity ambiguity;
     uint32_t zones;
     const struct detect_ball *ball;

@@ -50,7 +50,7 @@ struct config_profile {
         enum config_from { FROM_DATA_SHEET, FROM_ASSUMED } from;
     } reach[DETECT_MAX_REACHES];
     uint32_t n_reaches; /* 0: range_max_m on 90 % */
-    double threshold_snr, overlap_m, wavelength_nm, visibility_m;
+    double threshold_snr, overlap_m, wavelength_nm, visibility_m, pulse_width_ns;
     double mirror_counts, pan_counts; /* encoder counts per turn of the beam angle; 0: ideal (2^32 counts) */
     uint32_t max_echoes;
     double boot_s, spin_up_s, spin_down_s;

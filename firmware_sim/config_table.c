@@ -370,6 +370,8 @@ static const struct cfg_key profile_keys[] = {
      .help = "Signal-to-noise ratio (amplitudes) at the detection threshold."},
     {"overlap_m", CFG_REAL, "m", "0", 0, 1000, IN_PROFILE(overlap_m), FIGURE,
      .help = "Range below which light misses the detector: 1 - exp(-(R / overlap_m)^2) of it is caught; 0: all."},
+    {"pulse_width_ns", CFG_REAL, "ns", "0", 0, 1000, IN_PROFILE(pulse_width_ns), FIGURE,
+     .help = "Width of the pulse, at half maximum: returns within c / 2 times that are one echo."},
     {"wavelength_nm", CFG_REAL, "nm", "1550", 400, 2000, IN_PROFILE(wavelength_nm), FIGURE, .help = "Of the laser."},
     {"visibility_m", CFG_REAL, "m", "23000", 100, 1e6, IN_PROFILE(visibility_m), FIGURE,
      .help = "Visibility that the reaches hold for."},

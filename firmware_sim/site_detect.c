@@ -103,8 +103,10 @@ int site_set_up_detect(struct site *site, const struct sh_report *report, struct
     const struct config *cfg = site->cfg;
     struct site_detect *d = &site->detect;
     int rc = SH_OK;
-    d->cast = (struct cast_detect){
-        .max_echoes = cfg->profile.max_echoes, .ambiguity = cfg->ambiguity, .zones = cfg->mta_zones};
+    d->cast = (struct cast_detect){.max_echoes = cfg->profile.max_echoes,
+                                   .separation_m = 0.5 * DETECT_LIGHT_M_S * 1e-9 * cfg->profile.pulse_width_ns,
+                                   .ambiguity = cfg->ambiguity,
+                                   .zones = cfg->mta_zones};
     if (cfg->signal.on || cfg->n_surfaces > 0) rc = set_up_surfaces(site, report, err);
     if (rc == SH_OK && cfg->signal.on) rc = set_up_signal(site, err);
     if (rc != SH_OK) return rc;

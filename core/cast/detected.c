@@ -93,6 +93,50 @@ static void leave_out_bare(const struct surface_table *table, struct echo_list *
     }
 }
 
+/* What comes back within the range resolution after the return before is one echo with it: at the mean of the ranges,
+ * weighted by what came back, with the surface that sent most. The others of its returns are left out of the list. */
+static void merge_returns(struct echo_list *l, double separation_m)
+{
+    uint32_t to = 0;
+    double last_m = 0.0, most = 0.0; /* of the echo at hand: its last return, its strongest */
+    for (uint32_t i = 0; i < l->n; i++) {
+        uint32_t e = to - 1;
+        int same = to > 0 && l->pulse[e] == l->pulse[i] && l->rho[e] > 0.0 && l->rho[i] > 0.0 &&
+                   l->range_m[i] - last_m <= separation_m; /* not-a-number: no */
+        last_m = l->range_m[i];
+        if (same) {
+            double sum = l->rho[e] + l->rho[i];
+            l->range_m[e] += (l->range_m[i] - l->range_m[e]) * l->rho[i] / sum;
+            if (l->rho[i] > most) {
+                l->label[e] = l->label[i];
+                l->ghost[e] = l->ghost[i];
+            }
+            most = fmax(most, l->rho[i]);
+            l->rho[e] = sum;
+            continue;
+        }
+        most = l->rho[i];
+        l->pulse[to] = l->pulse[i];
+        l->range_m[to] = l->range_m[i];
+        l->label[to] = l->label[i];
+        l->ghost[to] = l->ghost[i];
+        l->rho[to] = l->rho[i];
+        to++;
+    }
+    l->n = to;
+}
+
+/* How much comes back of each, and what of it can't be told apart. */
+static void weigh_returns(const struct cast_detect *d, struct echo_list *l)
+{
+    surface_return(d->surfaces, l->n, l->label, l->cosine, l->rho);
+    for (uint32_t i = 0; i < l->n; i++)
+        l->rho[i] *= l->energy[i];
+    if (d->depth == 0) return;
+    leave_out_bare(d->surfaces, l);
+    if (d->separation_m > 0.0) merge_returns(l, d->separation_m);
+}
+
 /* Ranges of what is not detected become NaN. */
 static void find_echoes(struct caster *c, const struct cast_setup *s, const struct schedule_run *run)
 {
@@ -104,13 +148,6 @@ static void find_echoes(struct caster *c, const struct cast_setup *s, const stru
                                          .rho = l->rho,
                                          .amplitude = l->amplitude,
                                          .refl_cdb = l->refl_cdb};
-    kernel_detect(l->range_m, s->range_min_m, s->range_max_m, l->n, l->echo);
-    if (d->surfaces != NULL) {
-        surface_return(d->surfaces, l->n, l->label, l->cosine, l->rho);
-        for (uint32_t i = 0; i < l->n; i++)
-            l->rho[i] *= l->energy[i];
-        if (d->depth > 0) leave_out_bare(d->surfaces, l);
-    }
     uint32_t before = count_echoes(l);
     if (d->signal != NULL)
         detect_by_signal(d->signal, &echoes);
@@ -244,6 +281,8 @@ uint32_t caster_report(struct caster *c, const struct cast_setup *s, const struc
 {
     const struct cast_detect *d = s->detect;
     struct echo_list *l = &c->list;
+    kernel_detect(l->range_m, s->range_min_m, s->range_max_m, l->n, l->echo);
+    if (d->surfaces != NULL) weigh_returns(d, l);
     make_keys(l, pulse0);
     find_echoes(c, s, run);
     caster_ends(c, CAST_DETECT);

@@ -187,6 +187,39 @@ static void a_pane_and_what_is_behind_it(void **state)
     close_optics(&o);
 }
 
+/* With a range resolution of 10 cm both sides of the pane are one echo, between them by what each sends back, and their
+ * sum; the wall stays apart. Without the pane's far side in reach of the resolution (1 mm), three. */
+static void what_is_too_near_is_one_echo(void **state)
+{
+    (void)state;
+    struct optics o;
+    struct schedule_line line;
+    struct detect_signal signal;
+    struct sh_err err;
+    const struct detect_signal_spec spec = {.n_reaches = 1, .reach = {{0.9, 900.0}}, .threshold_snr = 8.0, .sharp = 1};
+    assert_int_equal(detect_signal_set_up(&spec, &signal, &err), SH_OK);
+    open_optics(&o, window());
+    o.table.surface[0] = (struct surface){.reflectance = 0.05, .glass = 0.9};
+    o.table.surface[1] = (struct surface){.reflectance = 0.6};
+    o.table.has_optics = 1;
+    o.detect.signal = &signal;
+    schedule_get_line(&o.rig->segment, 0, &line);
+    o.detect.separation_m = 0.001;
+    assert_int_equal(cast_some(o.rig, &line, line.cast0 + 10, 1000), 3000);
+    o.detect.separation_m = 0.1;
+    assert_int_equal(cast_some(o.rig, &line, line.cast0 + 10, 1000), 2000);
+    for (uint32_t i = 0; i < 2000; i++) {
+        long double d[3];
+        direction(o.rig, &line, 10 + i / 2, d);
+        double pane = 0.05 + 0.05 * 0.81, y = i % 2 ? 5.0 : 2.0 + 0.004 * 0.05 * 0.81 / pane;
+        near_range(o.rig, i, ((long double)y - (long double)STATION[1]) / d[1]);
+        assert_int_equal(o.rig->block.label[i], i % 2);
+        double cdb = 1000.0 * log10((i % 2 ? 0.6 * 0.6561 : pane) * (double)d[1]);
+        assert_true(fabs(o.rig->block.refl_cdb[i] - cdb) < 0.51);
+    }
+    close_optics(&o);
+}
+
 /* The same light from the same pulses, however a line is cut, with noise on everything, in both layouts. */
 static void cuts_leave_no_trace(void **state)
 {
@@ -320,9 +353,13 @@ static void a_mirror_that_moves(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_mirror_shows_the_room_behind_it), cmocka_unit_test(facing_mirrors_end_at_the_depth),
-        cmocka_unit_test(a_pane_and_what_is_behind_it),      cmocka_unit_test(cuts_leave_no_trace),
-        cmocka_unit_test(nothing_asked_for_changes_nothing), cmocka_unit_test(a_mirror_that_moves),
+        cmocka_unit_test(a_mirror_shows_the_room_behind_it),
+        cmocka_unit_test(facing_mirrors_end_at_the_depth),
+        cmocka_unit_test(a_pane_and_what_is_behind_it),
+        cmocka_unit_test(what_is_too_near_is_one_echo),
+        cmocka_unit_test(cuts_leave_no_trace),
+        cmocka_unit_test(nothing_asked_for_changes_nothing),
+        cmocka_unit_test(a_mirror_that_moves),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
