@@ -69,6 +69,25 @@ static void tilts_follow_spherical_trigonometry(void **state)
     }
 }
 
+/* Both at once: the beam on its cone about the mirror's axis (x), then all of it turned about y, lengths kept. */
+static void tilts_add_up(void **state)
+{
+    (void)state;
+    const double c = 0.1, t = -0.2;
+    for (double m = -0.5; m <= 0.5; m += 0.03) {
+        struct shot shot = shoot(&(struct instrument){.collimation_rad = c, .trunnion_rad = t}, m, 0.0, 0);
+        const double axis[3] = {cos(t), 0.0, -sin(t)}, up[3] = {sin(t), 0.0, cos(t)};
+        double along = 0.0, lift = 0.0, length2 = 0.0;
+        for (int i = 0; i < 3; i++) {
+            along += axis[i] * shot.s[i];
+            lift += up[i] * shot.s[i];
+            length2 += shot.s[i] * shot.s[i];
+        }
+        assert_true(fabs(along - sin(c)) < 1e-15 && fabs(lift - cos(c) * sin(TURN * m)) < 1e-15);
+        assert_true(fabs(length2 - 1.0) < 1e-15 && fabs(shot.s[1] - cos(c) * cos(TURN * m)) < 1e-15);
+    }
+}
+
 /* A point at R along the beam, seen from the head's origin. Plane triangles: transit offset e ahead: distance^2 = R^2 +
  * e^2 + 2 R e cos m, in pan nothing; mirror offset e to the right: pan by atan(e / (R cos m)). */
 static void offsets_make_plane_triangles(void **state)
@@ -250,9 +269,13 @@ static void the_caster_sends_beams_where_they_go(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(an_ideal_instrument_is_one),           cmocka_unit_test(tilts_follow_spherical_trigonometry),
-        cmocka_unit_test(offsets_make_plane_triangles),         cmocka_unit_test(encoders_read_by_their_errors),
-        cmocka_unit_test(two_faces_show_what_they_should),      cmocka_unit_test(angle_noise_is_the_beams),
+        cmocka_unit_test(an_ideal_instrument_is_one),
+        cmocka_unit_test(tilts_follow_spherical_trigonometry),
+        cmocka_unit_test(tilts_add_up),
+        cmocka_unit_test(offsets_make_plane_triangles),
+        cmocka_unit_test(encoders_read_by_their_errors),
+        cmocka_unit_test(two_faces_show_what_they_should),
+        cmocka_unit_test(angle_noise_is_the_beams),
         cmocka_unit_test(the_caster_sends_beams_where_they_go),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
