@@ -120,7 +120,8 @@ int site_load_platform(struct site *site, const struct sh_report *report, struct
         const double *arm = p->mount_m;
         double head_m = p->reach_m + sqrt(arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2]);
         site->path_reach_m = head_m + reach_m;
-        return add_stretch(site, site->station[0].at.position_m, head_m, INT64_MAX, report, err);
+        return add_stretch(site, site->station[0].at.position_m,
+                           head_m + site_ray_reach_m(site, site->station[0].at.position_m), INT64_MAX, report, err);
     }
     int rc = load_knots(site, report, err);
     if (rc == SH_OK) measure_path(site);

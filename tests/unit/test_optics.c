@@ -306,6 +306,43 @@ static void nothing_asked_for_changes_nothing(void **state)
     close_optics(&o);
 }
 
+/* A room whose ceiling and more is out of range: those shots keep their scheduled angles and a range of 0 to the bit,
+ * whatever noise there is; the others don't. */
+static void noise_never_touches_empty_shots(void **state)
+{
+    (void)state;
+    static uint32_t plain[3][RIG_LINE];
+    struct optics o;
+    struct schedule_line line;
+    open_optics(&o, box_scene(LO, HI));
+    const struct instrument k = {.mirror_sigma_rad = 1e-3, .pan_sigma_rad = 1e-3, .mirror_key = 5, .pan_key = 6};
+    struct detect_ball ball = {.radius_m = 0.05, .factor = {1, 1, 1}};
+    detect_ball_keys(&ball, 3);
+    o.rig->setup.range_max_m = 4.0;
+    o.rig->setup.noise_on = 1;
+    o.rig->setup.range_sigma_m = 0.01;
+    o.rig->setup.noise_key = rng_key(1, RNG_RANGE);
+    o.rig->setup.detect = NULL;
+    uint32_t n = shoot_line(&o, 40, &line), empty = 0, moved = 0;
+    memcpy(plain[0], o.rig->block.a, n * sizeof(uint32_t));
+    memcpy(plain[1], o.rig->block.b, n * sizeof(uint32_t));
+    memcpy(plain[2], o.rig->block.c, n * sizeof(uint32_t));
+    o.rig->setup.detect = &o.detect;
+    o.detect.instrument = &k;
+    o.detect.ball = &ball;
+    shoot_line(&o, 40, &line);
+    for (uint32_t i = 0; i < n; i++) {
+        int same =
+            o.rig->block.a[i] == plain[0][i] && o.rig->block.b[i] == plain[1][i] && o.rig->block.c[i] == plain[2][i];
+        if (o.rig->block.echo[i] == 0) /* the beam may stray to where there is nothing: the angles are the schedule's */
+            assert_true(o.rig->block.a[i] == 0 && o.rig->block.b[i] == plain[1][i] && o.rig->block.c[i] == plain[2][i]);
+        empty += o.rig->block.echo[i] == 0;
+        moved += o.rig->block.echo[i] != 0 && !same;
+    }
+    assert_true(empty > 500 && moved > 500 && empty + moved == n);
+    close_optics(&o);
+}
+
 /* A mirror on a body that moves: turned by 45 degrees about z through (0, 2, 0), then 1 m ahead. Beams that meet it go
  * on to the wall at x = 6: the way there plus what is left, at right angles. */
 static void a_mirror_that_moves(void **state)
@@ -359,6 +396,7 @@ int main(void)
         cmocka_unit_test(what_is_too_near_is_one_echo),
         cmocka_unit_test(cuts_leave_no_trace),
         cmocka_unit_test(nothing_asked_for_changes_nothing),
+        cmocka_unit_test(noise_never_touches_empty_shots),
         cmocka_unit_test(a_mirror_that_moves),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
