@@ -37,7 +37,7 @@ struct scene_mesh_spec {
 struct scene_surface {
     char object[SCENE_NAME_LEN];
     char material[SCENE_NAME_LEN];
-    float colour[3]; /* diffuse, sRGB, 0..1: of STL, glTF, FBX, Collada and IFC with materials */
+    float colour[3]; /* diffuse, sRGB, 0..1: of glTF, FBX, Collada and IFC, and of OBJ with an mtllib (Kd) */
     int has_colour;
 };
 

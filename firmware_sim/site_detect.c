@@ -58,13 +58,20 @@ static void set_up_instrument(const struct config *cfg, struct instrument *out)
 static int set_up_surfaces(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
-    uint32_t fits[CONFIG_MAX_SURFACES] = {0};
+    uint32_t fits[CONFIG_MAX_SURFACES] = {0}, unknown = 0;
     int rc = surface_table_alloc(site->n_surfaces, &site->detect.surfaces, err);
     for (uint32_t i = 0; i < site->n_surfaces && rc == SH_OK; i++) {
         int rule = surface_table_set(&site->detect.surfaces, i, site_surface(site, i), cfg->surface, cfg->n_surfaces,
                                      cfg->signal.reflectance);
         if (rule >= 0) fits[rule]++;
+        int said = rule >= 0 && !isnan(cfg->surface[rule].surface.reflectance);
+        unknown += !said && !site_surface(site, i)->has_colour;
     }
+    if (rc == SH_OK && cfg->signal.on && unknown > 0)
+        sh_warn(report,
+                "%s: of %u of %u surfaces neither the mesh's colour nor surfaces tells the reflectance: %g is taken "
+                "(signal.reflectance)",
+                cfg->file, unknown, site->n_surfaces, cfg->signal.reflectance);
     for (uint32_t i = 0; i < cfg->n_surfaces && rc == SH_OK; i++)
         if (fits[i] == 0)
             sh_warn(report, "%s: surfaces[%u]: no surface of material \"%s\", object \"%s\" is left for it", cfg->file,

@@ -1,4 +1,4 @@
-/* Wavefront OBJ in double: v, f, o, g, usemtl. Points and lines are counted; what has no shape is passed
+/* Wavefront OBJ in double: v, f, o, g, usemtl, mtllib. Points and lines are counted; what has no shape is passed
  * over. */
 #include <stdlib.h>
 #include <string.h>
@@ -16,7 +16,7 @@ struct obj {
     struct text t;
     uint32_t *corner; /* of one face */
     size_t cap_corners;
-    struct span object, material;
+    struct span object, material, library; /* library: the last one named */
     uint16_t label;
     bool label_known;
     uint64_t n_unknown, unknown_line;
@@ -155,8 +155,8 @@ static int read_other(struct obj *o, const char *word, size_t len)
 {
     static const char *const numbers[] = {"vt",  "vn",  "vp",  "s",    "parm", "trim",   "hole", "scrv", "sp",
                                           "end", "con", "deg", "bmat", "step", "cstype", "mg",   NULL};
-    static const char *const texts[] = {"mtllib", "usemap", "maplib",     "lod",       "bevel", "c_interp", "d_interp",
-                                        "ctech",  "stech",  "shadow_obj", "trace_obj", "call",  "csh",      NULL};
+    static const char *const texts[] = {"usemap", "maplib",     "lod",       "bevel", "c_interp", "d_interp", "ctech",
+                                        "stech",  "shadow_obj", "trace_obj", "call",  "csh",      NULL};
     static const char *const free_form[] = {"l", "curv", "curv2", "surf", NULL};
     if (is_word(word, len, free_form)) return count_left_out(o, false);
     if (is_word(word, len, numbers)) {
@@ -192,6 +192,12 @@ static int read_statement(struct obj *o, struct sh_err *err)
         }
     }
     if (len == 6 && memcmp(word, "usemtl", 6) == 0) return read_name(o, &o->material);
+    if (len == 6 && memcmp(word, "mtllib", 6) == 0) {
+        o->t.continued = false; /* a backslash there may be a path's */
+        o->library.len = text_rest(&o->t, &o->library.text);
+        o->t.continued = true;
+        return SH_OK;
+    }
     return read_other(o, word, len);
 }
 
@@ -218,6 +224,7 @@ static void tick(void *build)
 int read_obj(struct scene_build *b, struct sh_err *err)
 {
     struct obj o = {.b = b, .material = {"", 0}};
+    uint32_t first_surface = b->scene->n_surfaces;
     build_base_name(b, &o.object.text, &o.object.len);
     int rc = text_open(&o.t, b->spec->file, tick, b, err);
     o.t.continued = true;
@@ -225,6 +232,7 @@ int read_obj(struct scene_build *b, struct sh_err *err)
     if (rc == SH_OK && o.n_unknown > 0)
         sh_warn(b->report, "%s: %llu unknown statements passed over; the first is '%s' in line %llu", b->name,
                 (unsigned long long)o.n_unknown, o.unknown, (unsigned long long)o.unknown_line);
+    if (rc == SH_OK && o.library.len > 0) read_mtl(b, o.library.text, o.library.len, first_surface);
     b->scene->n_meshes++;
     free(o.corner);
     text_close(&o.t);

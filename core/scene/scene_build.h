@@ -65,6 +65,9 @@ void build_base_name(const struct scene_build *b, const char **name, size_t *len
 
 /* The readers. Each has the spec, and the file's name, from the builder. */
 int read_obj(struct scene_build *b, struct sh_err *err);
+/* Colours of the surfaces from first_surface on, from the library that the OBJ names. Meshes often come
+ * without it: then they have none, and whoever needs colours says so. */
+void read_mtl(struct scene_build *b, const char *name, size_t len, uint32_t first_surface);
 int read_ply(struct scene_build *b, struct sh_err *err);
 int import_assimp(struct scene_build *b, struct sh_err *err);
 

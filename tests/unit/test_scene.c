@@ -46,6 +46,26 @@ static void obj_is_read(void **state)
     scene_free(s);
 }
 
+/* Colours by material, from the library beside the mesh; the first that is given, of what is a colour. */
+static void obj_takes_colours_from_its_library(void **state)
+{
+    (void)state;
+    static const char library[] = "# made by hand\nnewmtl brick wall\r\nKa 1 1 1\nKd 0.5 0.25 1\nKd 0 0 0\n"
+                                  "newmtl tin\nKd spectral tin.rfl\nnewmtl unused\nKd 1 1 1\nnewmtl gold\nKd 1 2 0\n";
+    static const char mesh[] = "mtllib my colours.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n"
+                               "usemtl brick wall\nf 1 2 3\no b\nf 1 2 3\nusemtl tin\nf 1 2 3\nusemtl gold\nf 1 2 3\n";
+    write_file("my colours.mtl", library, sizeof library - 1);
+    struct scene *s = load_text("coloured.obj", mesh);
+    assert_int_equal(s->n_surfaces, 4);
+    for (int i = 0; i < 4; i++)
+        assert_int_equal(s->surface[i].has_colour, i < 2);
+    for (int i = 0; i < 2; i++)
+        assert_true(s->surface[i].colour[0] == 0.5f && s->surface[i].colour[1] == 0.25f &&
+                    s->surface[i].colour[2] == 1.0f);
+    scene_free(s);
+    unlink(strcat(strcpy(path, folder), "/my colours.mtl"));
+}
+
 static void obj_without_names(void **state)
 {
     (void)state;
@@ -456,6 +476,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(obj_is_read),
+        cmocka_unit_test(obj_takes_colours_from_its_library),
         cmocka_unit_test(obj_without_names),
         cmocka_unit_test(obj_numbers_are_exact),
         cmocka_unit_test(obj_random_numbers_are_exact),
