@@ -113,16 +113,33 @@ static int add_face(struct import *im, const struct aiFace *face, const struct a
     return build_polygon(b, im->corner, face->mNumIndices, label, err);
 }
 
-/* The first colour that comes with a material's name stays. */
+/* Linear light as sRGB has it, IEC 61966-2-1. */
+static float to_srgb(float linear)
+{
+    double c = (double)linear;
+    return (float)(c <= 0.0031308 ? 12.92 * c : 1.055 * pow(c, 1.0 / 2.4) - 0.055);
+}
+
+/* Materials that Assimp makes up where a file has none. */
+static bool is_made_up(const char *material)
+{
+    return material[0] == '\0' || strcmp(material, AI_DEFAULT_MATERIAL_NAME) == 0 ||
+           strcmp(material, "<IFCDefault>") == 0;
+}
+
+/* The first colour that comes with a material's name stays. glTF has linear colours. */
 static void keep_colour(const struct import *im, const struct aiMesh *mesh, struct scene_surface *surface)
 {
     struct aiColor4D c;
-    if (surface->has_colour || mesh->mMaterialIndex >= im->in->mNumMaterials) return;
+    const char *dot = strrchr(im->b->spec->file, '.');
+    if (surface->has_colour || mesh->mMaterialIndex >= im->in->mNumMaterials || is_made_up(surface->material)) return;
     if (aiGetMaterialColor(im->in->mMaterials[mesh->mMaterialIndex], AI_MATKEY_COLOR_DIFFUSE, &c) != AI_SUCCESS) return;
     const float rgb[3] = {c.r, c.g, c.b};
-    for (int i = 0; i < 3; i++)
+    bool linear = dot != NULL && (strcasecmp(dot, ".gltf") == 0 || strcasecmp(dot, ".glb") == 0);
+    for (int i = 0; i < 3; i++) {
         if (!(rgb[i] >= 0.0f && rgb[i] <= 1.0f)) return; /* no colour of a surface */
-    memcpy(surface->colour, rgb, sizeof rgb);
+        surface->colour[i] = linear ? to_srgb(rgb[i]) : rgb[i];
+    }
     surface->has_colour = 1;
 }
 

@@ -91,6 +91,29 @@ static void single_precision_within_the_tree(void **state)
     scene_free(s);
 }
 
+/* glTF's colours are linear: 0.2140 of the light is 0.5 in sRGB. What Assimp makes up for STL is none. */
+static void colours_come_with_materials(void **state)
+{
+    (void)state;
+    static const char text[] =
+        "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0}],"
+        "\"materials\":[{\"name\":\"paint\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[0.21404114,1,0,1]}}],"
+        "\"meshes\":[{\"name\":\"m\",\"primitives\":[{\"attributes\":{\"POSITION\":0},\"material\":0}]}],"
+        "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}],"
+        "\"bufferViews\":[{\"buffer\":0,\"byteLength\":36}],"
+        "\"buffers\":[{\"byteLength\":36,\"uri\":\"data:application/octet-stream;base64,"
+        "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA\"}]}";
+    struct scene *s = load_text("paint.gltf", text);
+    assert_string_equal(s->surface[0].material, "paint");
+    assert_int_equal(s->surface[0].has_colour, 1);
+    assert_true(fabs((double)s->surface[0].colour[0] - 0.5) < 1e-6 &&
+                fabs((double)s->surface[0].colour[1] - 1.0) < 1e-6 && s->surface[0].colour[2] == 0.0f);
+    scene_free(s);
+    s = load_text("a.stl", stl_text(0, 0, "0"));
+    assert_int_equal(s->surface[0].has_colour, 0);
+    scene_free(s);
+}
+
 static void broken_files_are_refused(void **state)
 {
     (void)state;
@@ -274,6 +297,7 @@ int main(void)
         cmocka_unit_test(stl_is_read),
         cmocka_unit_test(single_precision_is_refused),
         cmocka_unit_test(single_precision_within_the_tree),
+        cmocka_unit_test(colours_come_with_materials),
         cmocka_unit_test(broken_files_are_refused),
         cmocka_unit_test(boxes),
         cmocka_unit_test(units),
