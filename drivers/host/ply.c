@@ -127,6 +127,7 @@ static int ply_scan(void *rec, struct sh_err *err)
     facts->epsg = track_epsg(&ply->track);
     facts->geoid_heights = track_is_geoid(&ply->track);
     facts->moving = info->moving;
+    facts->stops = info->stop;
     snprintf(facts->idn, sizeof facts->idn, "%s", info->idn);
     snprintf(facts->profile, sizeof facts->profile, "%s", info->profile);
     return ply->begun ? 0 : begin(ply, ply->track.sh, info->n_surfaces, err);
@@ -141,7 +142,7 @@ static int ply_points(void *rec, int n, struct sh_err *err)
     size_t used = 0;
     for (int i = 0; i < n; i++) {
         struct scanhead_point p = t->point[i];
-        const double *frame = t->info.moving ? &t->frame[i] : NULL;
+        const double *frame = t->info.moving ? &t->frame[i] : t->info.stop ? &t->info.frame : NULL;
         if (p.echo_count == 0 && !ply->options.empty_shots) continue;
         if (!t->info.geo) {
             double xyz[3] = {p.x, p.y, p.z};

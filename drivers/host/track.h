@@ -33,7 +33,7 @@ struct track {
     double frame[TRACK_BATCH]; /* of each point of a moving head: frame scalar of the trajectory */
     /* inner state */
     int begun, new_scan, have_next_line;
-    int crs, epsg, geoid, moving;
+    int crs, epsg, geoid, moving, stops;
     uint32_t next_line, last_station;
     uint64_t next_line_pulse0, last_pulse0;
 };
