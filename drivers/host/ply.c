@@ -110,7 +110,9 @@ static size_t put_ascii(char *to, const struct scanhead_point *p, int degrees, u
         n += put_number(to + n, TEXT_LEN - n, number[i].digits, number[i].v);
     if (n >= TEXT_LEN) return TEXT_LEN + 1;
     n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u %u %u %u", p->echo, p->echo_count, p->label, station);
-    if (frame != NULL && n < TEXT_LEN) n += (size_t)snprintf(to + n, TEXT_LEN - n, " %.9g", *frame);
+    if (frame != NULL && n < TEXT_LEN)
+        n += (size_t)(isnan(*frame) ? snprintf(to + n, TEXT_LEN - n, " nan")
+                                    : snprintf(to + n, TEXT_LEN - n, " %.9g", *frame));
     if (n >= TEXT_LEN) return TEXT_LEN + 1;
     to[n++] = '\n';
     return n;
@@ -227,6 +229,7 @@ static int ply_close(void *rec, int keep, struct sh_err *err)
 {
     struct ply *ply = rec;
     int rc = keep ? finish(ply, err) : 0;
+    if (keep && rc == 0) track_tell(&ply->track, ply->options.report);
     int closed = outfile_close(&ply->file, keep && rc == 0, err);
     ply_names_free(&ply->names);
     free(ply);

@@ -81,10 +81,11 @@ static void put_comments(FILE *out, const struct ply_facts *facts, const struct 
     fputs("comment reflectance in dB, nan: not modelled\n", out);
     fputs("comment echo and echo_count 0: shot without echo; label 65535: none\n", out);
     if (facts->moving)
-        fprintf(out,
-                "comment the head moved, each point has its own pose; frame: frame scalar of the trajectory\n"
-                "comment points_without_pose %" PRIu64 "\n",
-                facts->n_without_pose);
+        fprintf(
+            out,
+            "comment the head moved, each point has its own pose; frame: frame scalar of the trajectory, nan: lost\n"
+            "comment points_without_pose %" PRIu64 "\n",
+            facts->n_without_pose);
     if (facts->stops) fputs("comment the stations are stops on a trajectory; frame: its frame scalar there\n", out);
     fprintf(out, "comment empty_shots %s\n", facts->empty_shots ? "kept" : "left out");
     fprintf(out,

@@ -93,12 +93,12 @@ static uint64_t number_rows(struct track *t, uint64_t row, int n)
     return row;
 }
 
-/* Positions of the geo layout need no pose, the frame scalar does. */
+/* Positions of the geo layout need no pose, the frame scalar does: not-a-number where it was lost. */
 static void set_geo_frames(struct track *t, struct scanhead *sh, int n)
 {
     struct scanhead_pose pose;
     for (int i = 0; i < n; i++)
-        t->frame[i] = scanhead_pose(sh, t->point[i].t_ns, &pose) == SCANHEAD_OK ? pose.frame : 0.0;
+        t->frame[i] = scanhead_pose(sh, t->point[i].t_ns, &pose) == SCANHEAD_OK ? pose.frame : NAN;
 }
 
 /* How many are left, or a negative error. */

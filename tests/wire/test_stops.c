@@ -2,7 +2,8 @@
 #include "tests/wire/room.h"
 
 /* Five stops at 1, 1.25, ... 2 s of a path whose frames count by 10 a second, from 100 on. */
-#define RIDE "t_s,x_m,y_m,z_m,roll_deg,pitch_deg,heading_deg,frame\n" \
+#define RIDE                                                 \
+    "t_s,x_m,y_m,z_m,roll_deg,pitch_deg,heading_deg,frame\n" \
     "50,0,0,0,0,0,0,100\n51,1.5,-2.25,0.5,0,0,30,110\n52,-2.25,1.75,0.75,0,0,90,120\n53,0,0,0,0,0,0,130\n"
 #define STOPS "platform: {kind: stops, file: ride.csv, start_s: 1, end_s: 2, step_s: 0.25}\n"
 enum { N_STOPS = 5 };
@@ -223,7 +224,8 @@ static void test_wrong_parts(void **state)
     const char *const args[] = {"check", path, NULL};
     assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
     char *text = wire_read(wire_path(wire, "out"), NULL);
-    assert_non_null(strstr(text, "stops     5, from 1 s on, each 0.25 s\n  stop-1    1 s, frame 110, scene 1.5000 -2.25"));
+    assert_non_null(
+        strstr(text, "stops     5, from 1 s on, each 0.25 s\n  stop-1    1 s, frame 110, scene 1.5000 -2.25"));
     assert_non_null(strstr(text, "\n  stop-5    2 s, frame 120, scene -2.2500 1.7500 0.7500 m; heading 90,"));
     free(text);
 }
