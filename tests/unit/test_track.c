@@ -83,7 +83,8 @@ static void test_ply(void **state)
     for (int n = 0; n < 18; n++) {
         double p[3], t_s, frame;
         int used;
-        assert_int_equal(sscanf(at, "%lf %lf %lf %*f nan %lf 1 1 3 1 %lf\n%n", &p[0], &p[1], &p[2], &t_s, &frame, &used), 5);
+        assert_int_equal(
+            sscanf(at, "%lf %lf %lf %*f nan %lf 1 1 3 1 %lf\n%n", &p[0], &p[1], &p[2], &t_s, &frame, &used), 5);
         expect(n, p, &t_s, &frame, 0.5e-6);
         at += used;
     }
@@ -159,9 +160,11 @@ static void test_e57(void **state)
             hi[k] = fmax(hi[k], p[k]);
         }
     }
-    static const char *const tag[3][2] = {{"<xMinimum", "<xMaximum"}, {"<yMinimum", "<yMaximum"}, {"<zMinimum", "<zMaximum"}};
+    static const char *const tag[3][2] = {
+        {"<xMinimum", "<xMaximum"}, {"<yMinimum", "<yMaximum"}, {"<zMinimum", "<zMaximum"}};
     for (int k = 0; k < 3; k++)
-        assert_true(fabs(number_of(xml, tag[k][0]) - lo[k]) <= 0.5e-3 && fabs(number_of(xml, tag[k][1]) - hi[k]) <= 0.5e-3);
+        assert_true(fabs(number_of(xml, tag[k][0]) - lo[k]) <= 0.5e-3 &&
+                    fabs(number_of(xml, tag[k][1]) - hi[k]) <= 0.5e-3);
     assert_true(number_of(xml, "<w") == 1); /* the points are where they were hit */
     free(e57);
 }
