@@ -288,6 +288,8 @@ static int record_config(struct record *r, struct sh_err *err)
     if (rc == SH_OK && frames == 0 && !arrives && !(r->recording.duration_s > 0.0))
         rc =
             sh_fail(err, SH_EINPUT, "%s: head.frames is 0, a scan without end; give --frames or --duration", cfg->file);
+    if (rc == SH_OK && cfg->layout == LINE_GEO && cfg->crs == GEOREF_GEODETIC)
+        rc = record_files_check_degrees(&r->files, err);
     if (rc == SH_OK) rc = offline_open(cfg, &cmd_report_stderr, &offline, err);
     if (rc == SH_OK && r->all_stations) {
         r->recording.first_station = 1;

@@ -277,4 +277,4 @@ static int e57_close(void *rec, int keep, struct sh_err *err)
     return rc != 0 ? rc : closed;
 }
 
-const struct recorder_ops recorder_e57 = {".e57", e57_open, e57_frame, e57_close};
+const struct recorder_ops recorder_e57 = {".e57", e57_open, e57_frame, e57_close, 1};

@@ -237,4 +237,4 @@ static int las_close(void *rec, int keep, struct sh_err *err)
     return rc != 0 ? rc : closed;
 }
 
-const struct recorder_ops recorder_las = {".las", las_open, las_frame, las_close};
+const struct recorder_ops recorder_las = {".las", las_open, las_frame, las_close, 0};

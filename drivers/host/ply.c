@@ -236,4 +236,4 @@ static int ply_close(void *rec, int keep, struct sh_err *err)
     return rc != 0 ? rc : closed;
 }
 
-const struct recorder_ops recorder_ply = {".ply", ply_open, ply_frame, ply_close};
+const struct recorder_ops recorder_ply = {".ply", ply_open, ply_frame, ply_close, 0};

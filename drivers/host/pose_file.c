@@ -123,4 +123,4 @@ static int pose_file_close(void *rec, int keep, struct sh_err *err)
     return rc != SH_OK ? rc : closed;
 }
 
-const struct recorder_ops recorder_poses = {".poses.csv", pose_file_open, pose_file_frame, pose_file_close};
+const struct recorder_ops recorder_poses = {".poses.csv", pose_file_open, pose_file_frame, pose_file_close, 0};

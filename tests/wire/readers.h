@@ -95,8 +95,9 @@ static inline size_t compare(char *text, size_t first, const double tolerance_m[
 /* ---- how a scan's points as read lie to what they should be */
 
 struct misfit {
-    double bounds_m, shift_m, turn_rad; /* of the bounding box; the rigid motion that fits best, which the pose is off */
-    double radius_m;                    /* of the scan about its middle */
+    double bounds_m, shift_m,
+        turn_rad;    /* of the bounding box; the rigid motion that fits best, which the pose is off */
+    double radius_m; /* of the scan about its middle */
 };
 
 /* Solves the symmetric 3 x 3 system by Cramer's rule. */
@@ -149,8 +150,8 @@ static inline struct misfit misfit(size_t first, size_t end)
     return out;
 }
 
-/* A row of the table. Single points were off by tolerance_m per axis at most: so is the box, and by far the pose, but for
- * a shift that all have in common. */
+/* A row of the table. Single points were off by tolerance_m per axis at most: so is the box, and by far the pose, but
+ * for a shift that all have in common. */
 static inline void tell(const char *format, const char *reader, const double tolerance_m[N_STATIONS])
 {
     struct misfit worst = {0};

@@ -200,14 +200,18 @@ static void test_degrees(void **state)
     }
 }
 
-/* Heights above EGM96: PROJ does by our text what it does by EPSG's own codes, with or without its grid of the geoid. */
+/* Heights above EGM96: PROJ does by our text what it does by EPSG's own codes, with or without its grid of the geoid.
+ */
 static void test_geoid_text(void **state)
 {
     static const struct {
         int epsg;
         const char *code;
-    } crs[] = {{4979, "EPSG:4326+5773"}, {32633, "EPSG:32633+5773"}, {32720, "EPSG:32720+5773"},
-               {32661, "EPSG:5041+5773"}, {32761, "EPSG:5042+5773"}};
+    } crs[] = {{4979, "EPSG:4326+5773"},
+               {32633, "EPSG:32633+5773"},
+               {32720, "EPSG:32720+5773"},
+               {32661, "EPSG:5041+5773"},
+               {32761, "EPSG:5042+5773"}};
     wire = *state;
     for (size_t i = 0; i < sizeof crs / sizeof crs[0]; i++) {
         char wkt[CRS_WKT_MAX];
