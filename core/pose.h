@@ -88,11 +88,13 @@ void trajectory_free(struct trajectory *trajectory);
 void trajectory_span(const struct trajectory *trajectory, double *first_s, double *last_s);
 void trajectory_at(const struct trajectory *trajectory, double t_s, struct pose *pose, double *frame);
 
-/* The knots of a head that is mounted on the platform, from start_s (time 0 of the knots) to the trajectory's end: at
+/* The knots of a head that is mounted on the platform, from start_s (time 0 of the knots) to end_s or the trajectory's
+ * end, whichever comes first: at
  * the samples, and as many between two as keep what pose_between makes of them within tolerance_m of the curve (closed
  * bound: acceleration and lever arm times interval^2 / 8; the attitude is the same), at most longest_ns apart.
  * Allocates *out. error_m: the bound that holds, more than tolerance_m only where POSE_MIN_STEP_US is the limit. */
-int trajectory_knots(const struct trajectory *trajectory, double start_s, const struct pose *mount, double tolerance_m,
-                     int64_t longest_ns, struct pose_knot **out, size_t *n, double *error_m, struct sh_err *err);
+int trajectory_knots(const struct trajectory *trajectory, double start_s, double end_s, const struct pose *mount,
+                     double tolerance_m, int64_t longest_ns, struct pose_knot **out, size_t *n, double *error_m,
+                     struct sh_err *err);
 
 #endif

@@ -57,7 +57,8 @@ static int print_summary(const struct config *cfg, const struct site *site, stru
            scene->n_surfaces, scene->min_m[0], scene->max_m[0], scene->min_m[1], scene->max_m[1], scene->min_m[2],
            scene->max_m[2]);
     check_print_anchor(site, stdout);
-    for (uint32_t i = 0; i < site->n_stations && rc == SH_OK; i++)
+    if (site->stop != NULL) check_print_stops(site, stdout);
+    for (uint32_t i = 0; i < site->n_stations && rc == SH_OK && site->stop == NULL; i++)
         rc = check_print_station(site, i, stdout, err);
     print_platform(site);
     printf("output    %s, %g m per count\n", cfg->layout == LINE_GEO ? "geo" : "polar", site->scale_m);

@@ -23,7 +23,7 @@ static const struct option OPTIONS[] = {{"set", required_argument, NULL, 's'},
                                         {NULL, 0, NULL, 0}};
 
 struct plan {
-    struct plan_row row[PLAN_HEAD_ROWS + CONFIG_MAX_STATIONS];
+    struct plan_row *row; /* of the head, then of each station */
     size_t n;
 };
 
@@ -88,14 +88,17 @@ static int plan_config(const struct cmd_sets *sets, const char *path, int as_jso
     int status = CMD_OK;
     struct sh_err err = {0};
     struct site *site = NULL;
-    struct plan plan;
+    struct plan plan = {0};
     struct config *cfg = cmd_load_config(path, sets, &status);
     if (cfg == NULL) return status;
     int rc = site_load(cfg, &cmd_report_stderr, &site, &err);
+    if (rc == SH_OK) plan.row = calloc(PLAN_HEAD_ROWS + site->n_stations, sizeof *plan.row);
+    if (rc == SH_OK && plan.row == NULL) rc = sh_fail(&err, SH_ENOMEM, "no memory");
     if (rc == SH_OK) {
         make_plan(cfg, site, &plan);
         rc = as_json ? print_json(&plan, &err) : print_text(&plan);
     }
+    free(plan.row);
     site_free(site);
     free(cfg);
     return rc == SH_OK ? CMD_OK : cmd_fail(&err);

@@ -84,7 +84,7 @@ static int parse_station(struct record *r, const char *text)
         r->all_stations = 1;
         return CMD_OK;
     }
-    return cmd_parse_long("record", "--station", text, 1, CONFIG_MAX_STATIONS, &r->station);
+    return cmd_parse_long("record", "--station", text, 1, CONFIG_MAX_STOPS, &r->station);
 }
 
 static int add_file(struct record *r, const char *path)
@@ -278,10 +278,6 @@ static int record_config(struct record *r, struct sh_err *err)
     struct config *cfg = cmd_load_config(r->source, &r->sets, &status);
     if (cfg == NULL) return status;
     struct offline *offline = NULL;
-    if (r->all_stations) {
-        r->recording.first_station = 1;
-        r->recording.last_station = cfg->n_stations;
-    }
     uint32_t frames = r->recording.frames >= 0 ? (uint32_t)r->recording.frames : cfg->settings.frames;
     int rc = SH_OK;
     int arrives = cfg->platform.kind == PLATFORM_TRAJECTORY && cfg->platform.at_end == PLATFORM_STOP;
@@ -292,7 +288,13 @@ static int record_config(struct record *r, struct sh_err *err)
     if (rc == SH_OK && frames == 0 && !arrives && !(r->recording.duration_s > 0.0))
         rc =
             sh_fail(err, SH_EINPUT, "%s: head.frames is 0, a scan without end; give --frames or --duration", cfg->file);
+    if (rc == SH_OK && cfg->layout == LINE_GEO && cfg->crs == GEOREF_GEODETIC)
+        rc = record_files_check_degrees(&r->files, err);
     if (rc == SH_OK) rc = offline_open(cfg, &cmd_report_stderr, &offline, err);
+    if (rc == SH_OK && r->all_stations) {
+        r->recording.first_station = 1;
+        r->recording.last_station = offline_site(offline)->n_stations;
+    }
     if (rc == SH_OK) rc = record(r, offline_scanhead(offline), err);
     offline_close(offline);
     free(cfg);

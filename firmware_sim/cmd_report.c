@@ -44,6 +44,7 @@ struct report {
     struct cmd_sets sets;
     struct config *cfg;
     struct site *site;
+    const struct georef **georef; /* of each station */
     struct distance *index;
     struct cloud cloud;
     double *distance_m; /* per point */
@@ -96,11 +97,12 @@ static unsigned thread_count(const struct config *cfg)
 static int compare(struct report *r, struct sh_err *err)
 {
     const struct site *site = r->site;
-    const struct georef *georef[CONFIG_MAX_STATIONS];
+    r->georef = calloc(site->n_stations, sizeof *r->georef);
+    if (r->georef == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %u stations", site->n_stations);
     for (uint32_t i = 0; i < site->n_stations; i++)
-        georef[i] = site->station[i].georef;
+        r->georef[i] = site->station[i].georef;
     const struct cloud_site setup = {.index = r->index,
-                                     .georef = r->cfg->layout == LINE_GEO ? georef : NULL,
+                                     .georef = r->cfg->layout == LINE_GEO ? r->georef : NULL,
                                      .n_stations = site->n_stations,
                                      .max_m = r->max_m,
                                      .threads = thread_count(r->cfg)};
@@ -253,6 +255,7 @@ static int parse_options(struct report *r, int argc, char **argv)
 
 static void release(struct report *r)
 {
+    free(r->georef);
     free(r->distance_m);
     free(r->triangle);
     cloud_free(&r->cloud);

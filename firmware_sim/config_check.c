@@ -64,7 +64,7 @@ static int check_head(const struct cfg_reader *rd, const struct config *cfg)
                             "the pan goes from %.15g to %.15g deg; allowed pan_start_deg at most pan_stop_deg, 360 deg "
                             "apart at most",
                             from_micro(s->pan_start_udeg), from_micro(s->pan_stop_udeg));
-    if (s->station > cfg->n_stations)
+    if (s->station > cfg->n_stations && cfg->platform.kind != PLATFORM_STOPS)
         return cfg_fail_key(rd, "head.station", 0, "there is no station %u; allowed 1 to %u", s->station,
                             cfg->n_stations);
     return SH_OK;
@@ -159,15 +159,38 @@ static int check_link(const struct cfg_reader *rd, const struct config *cfg, uin
     return SH_OK;
 }
 
-static int check_platform(const struct cfg_reader *rd, const struct config *cfg)
+/* Which part of the trajectory, and where on it to stop. How long it is, its file says (site_platform.c). */
+static int check_part(const struct cfg_reader *rd, struct config *cfg)
+{
+    struct config_platform *p = &cfg->platform;
+    int stops = p->kind == PLATFORM_STOPS;
+    p->has_end = cfg_is_given(rd, "platform.end_s", 0);
+    if (p->has_end && (stops ? p->end_s < p->start_s : p->end_s <= p->start_s))
+        return cfg_fail_key(rd, "platform.end_s", 0, "%.9g s, and platform.start_s is %.9g; allowed %s", p->end_s,
+                            p->start_s, stops ? "start_s or more" : "more than start_s");
+    if (!stops) return SH_OK;
+    if (!(p->step_s > 0.0))
+        return cfg_fail_key(rd, cfg_is_given(rd, "platform.step_s", 0) ? "platform.step_s" : "platform.kind", 0,
+                            "stops need the time from each to the next, platform.step_s; allowed above 0 to 1e9 s");
+    if (cfg->n_stations > 1)
+        return cfg_fail_key(rd, "stations", 0,
+                            "%u of them, but platform.kind is stops, which are the stations; allowed one, which says "
+                            "where on the Earth the scene lies",
+                            cfg->n_stations);
+    return SH_OK;
+}
+
+static int check_platform(const struct cfg_reader *rd, struct config *cfg)
 {
     static const struct {
         const char *path;
         unsigned kinds; /* bit per kind of platform that has the key */
     } keys[] = {
-        {"platform.file", 1u << PLATFORM_TRAJECTORY},
-        {"platform.waypoints", 1u << PLATFORM_TRAJECTORY},
-        {"platform.start_s", 1u << PLATFORM_TRAJECTORY},
+        {"platform.file", 1u << PLATFORM_TRAJECTORY | 1u << PLATFORM_STOPS},
+        {"platform.waypoints", 1u << PLATFORM_TRAJECTORY | 1u << PLATFORM_STOPS},
+        {"platform.start_s", 1u << PLATFORM_TRAJECTORY | 1u << PLATFORM_STOPS},
+        {"platform.end_s", 1u << PLATFORM_TRAJECTORY | 1u << PLATFORM_STOPS},
+        {"platform.step_s", 1u << PLATFORM_STOPS},
         {"platform.at_end", 1u << PLATFORM_TRAJECTORY},
         {"platform.reach_m", 1u << PLATFORM_LIVE},
         {"platform.extrapolate_ms", 1u << PLATFORM_LIVE},
@@ -180,8 +203,9 @@ static int check_platform(const struct cfg_reader *rd, const struct config *cfg)
     };
     static const char *const has[] = {
         [PLATFORM_STATIC] = "kind alone; the station says where the head stands",
-        [PLATFORM_TRAJECTORY] = "file or waypoints, start_s, at_end, mount_...",
+        [PLATFORM_TRAJECTORY] = "file or waypoints, start_s, end_s, at_end, mount_...",
         [PLATFORM_LIVE] = "reach_m, extrapolate_ms, address, port, mount_...",
+        [PLATFORM_STOPS] = "file or waypoints, start_s, end_s, step_s, mount_...",
     };
     const struct config_platform *p = &cfg->platform;
     for (size_t k = 0; k < sizeof keys / sizeof keys[0]; k++)
@@ -191,11 +215,11 @@ static int check_platform(const struct cfg_reader *rd, const struct config *cfg)
     if (p->kind == PLATFORM_LIVE && cfg->pace == PACE_FAST)
         return cfg_fail_key(rd, "loop.pace", 0,
                             "nobody can say in time where a live platform is; allowed realtime, step");
-    if (p->kind != PLATFORM_TRAJECTORY) return SH_OK;
+    if (p->kind != PLATFORM_TRAJECTORY && p->kind != PLATFORM_STOPS) return SH_OK;
     if ((p->file[0] != '\0') == (p->waypoints[0] != '\0'))
         return cfg_fail_key(rd, p->file[0] != '\0' ? "platform.waypoints" : "platform.kind", 0,
                             "a trajectory comes from one file; allowed either platform.file or platform.waypoints");
-    return SH_OK;
+    return check_part(rd, cfg);
 }
 
 static int check_loop(const struct cfg_reader *rd, const struct config *cfg)

@@ -33,8 +33,11 @@ static const char *const talker_names[] = {[TALKER_GN] = "GN", [TALKER_GP] = "GP
 static const char *const pace_names[] = {
     [PACE_REALTIME] = "realtime", [PACE_FAST] = "fast", [PACE_STEP] = "step", NULL};
 
-static const char *const platform_names[] = {
-    [PLATFORM_STATIC] = "static", [PLATFORM_TRAJECTORY] = "trajectory", [PLATFORM_LIVE] = "live", NULL};
+static const char *const platform_names[] = {[PLATFORM_STATIC] = "static",
+                                             [PLATFORM_TRAJECTORY] = "trajectory",
+                                             [PLATFORM_LIVE] = "live",
+                                             [PLATFORM_STOPS] = "stops",
+                                             NULL};
 static const char *const at_end_names[] = {[PLATFORM_STOP] = "stop", [PLATFORM_HOLD] = "hold", NULL};
 
 /* clang-format off */
@@ -60,7 +63,7 @@ static const struct cfg_key config_keys[] = {
      IN_CONFIG(settings.pan_stop_udeg), .help = "Pan angle where a frame ends; at most a turn after pan_start_deg."},
     {"head.frames", CFG_COUNT, NULL, "1", 0, 1000000, IN_CONFIG(settings.frames),
      .help = "Frames (pan sweeps) per scan; 0: until stopped."},
-    {"head.station", CFG_COUNT, NULL, "1", 1, CONFIG_MAX_STATIONS, IN_CONFIG(settings.station),
+    {"head.station", CFG_COUNT, NULL, "1", 1, CONFIG_MAX_STOPS, IN_CONFIG(settings.station),
      .help = "Station where the head stands, counted from 1."},
 
     {"scene", CFG_MAP, .help = "What is scanned."},
@@ -78,7 +81,7 @@ static const struct cfg_key config_keys[] = {
     {"scene.meshes[].offset_m", CFG_VEC3, "m", "[0, 0, 0]", -1e9, 1e9, IN_MESH(offset_m),
      .help = "Added after axes and scale."},
     {"scene.meshes[].move_m_s", CFG_VEC3, "m/s", "[0, 0, 0]", -1000, 1000, IN_MESH(move_m_s),
-     .help = "The mesh moves: velocity, from the scan's start."},
+     .help = "The mesh moves: velocity, from the scan's start. At a stop (platform.kind) it stands as at the stop's time."},
     {"scene.meshes[].turn_deg_s", CFG_REAL, "deg/s", "0", -36000, 36000, IN_MESH(turn_deg_s),
      .help = "The mesh turns about the vertical through pivot_m, clockwise seen from above."},
     {"scene.meshes[].pivot_m", CFG_VEC3, "m", "[0, 0, 0]", -1e9, 1e9, IN_MESH(pivot_m), .help = "Where it turns."},
@@ -136,13 +139,17 @@ static const struct cfg_key config_keys[] = {
 
     {"platform", CFG_MAP, .help = "What the head stands on: a tripod, or something that moves."},
     {"platform.kind", CFG_ENUM, .def = "static", .names = platform_names, IN_CONFIG(platform.kind),
-     .help = "static: at the station; trajectory: along a file; live: as a peer says, by UDP or (pace step) with TIME:STEP."},
+     .help = "static: at the station; trajectory: along a file; stops: standing at some of its poses, the scan's stations; live: as a peer says, by UDP or (pace step) with TIME:STEP."},
     {"platform.file", CFG_PATH, .def = "", IN_CONFIG(platform.file),
-     .help = "trajectory: CSV with t_s,x_m,y_m,z_m,roll_deg,pitch_deg,heading_deg (or qw,qx,qy,qz), scene frame."},
+     .help = "trajectory, stops: CSV with t_s,x_m,y_m,z_m,roll_deg,pitch_deg,heading_deg (or qw,qx,qy,qz), scene frame."},
     {"platform.waypoints", CFG_PATH, .def = "", IN_CONFIG(platform.waypoints),
-     .help = "trajectory: CSV with x_m,y_m,z_m,speed_m_s[,pause_s] instead; heading along the path."},
+     .help = "trajectory, stops: CSV with x_m,y_m,z_m,speed_m_s[,pause_s] instead; heading along the path."},
     {"platform.start_s", CFG_REAL, "s", "0", 0, 1e9, IN_CONFIG(platform.start_s),
-     .help = "trajectory: where a scan starts on it, after its first sample."},
+     .help = "trajectory, stops: where a scan starts on it, or the first stop; after its first sample."},
+    {"platform.end_s", CFG_REAL, "s", "0", 0, 1e9, IN_CONFIG(platform.end_s),
+     .help = "trajectory, stops: where it ends, likewise; without the key, with its last sample."},
+    {"platform.step_s", CFG_REAL, "s", "0", 0, 1e9, IN_CONFIG(platform.step_s),
+     .help = "stops: from each to the next, at start_s, start_s + step_s, ... up to end_s; required there."},
     {"platform.at_end", CFG_ENUM, .def = "stop", .names = at_end_names, IN_CONFIG(platform.at_end),
      .help = "trajectory: at its end the scan stops, or the platform holds its last pose."},
     {"platform.mount_m", CFG_VEC3, "m", "[0, 0, 0]", -1000, 1000, IN_CONFIG(platform.mount_m),

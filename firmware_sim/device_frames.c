@@ -77,7 +77,8 @@ void device_fill_anchor(const struct device *device, struct native_anchor *a)
     a->height_m = s->at.height_m;
     memcpy(a->station_m, s->at.position_m, sizeof a->station_m);
     memcpy(a->rotation, s->at.rotation, sizeof a->rotation);
-    a->moving = (uint32_t)device->site->moving;
+    a->moving = device->site->moving ? NATIVE_MOVING : device->site->stop != NULL ? NATIVE_STOP : 0;
+    a->frame = s->frame;
     memcpy(a->scale, s->scale, sizeof a->scale);
     georef_axes(s->georef, a->axes);
     a->heights = georef_has_geoid(s->georef) ? NATIVE_HEIGHTS_GEOID : NATIVE_HEIGHTS_ELLIPSOID;

@@ -1,5 +1,6 @@
 #include "firmware_sim/site_georef.h"
 #include "firmware_sim/site_platform.h"
+#include "firmware_sim/site_stops.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -99,6 +100,11 @@ void site_move(const struct site *site, double t_s, struct cast_setup *setup)
     }
 }
 
+double site_mover_time(const struct site *site, uint32_t station, double scan_s)
+{
+    return site->stop != NULL ? site->station[station].t_s : scan_s;
+}
+
 static double distance_m(const double a[3], const double b[3])
 {
     return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
@@ -108,7 +114,7 @@ static double distance_m(const double a[3], const double b[3])
 static double station_reach(const struct site *site, const double origin_m[3])
 {
     double reach_m = 0.0;
-    for (uint32_t i = 0; i < site->cfg->n_stations; i++) {
+    for (uint32_t i = 0; i < site->n_stations; i++) {
         double d = distance_m(site->station[i].at.position_m, origin_m);
         if (d <= SITE_BVH_REACH_M && d > reach_m) reach_m = d;
     }
@@ -126,6 +132,9 @@ static int find_bvh(struct site *site, const double station_m[3], const struct s
             return SH_OK;
         }
     }
+    if (site->n_bvh == CONFIG_MAX_STATIONS)
+        return sh_fail(err, SH_EINPUT, "%s: the stations are too far apart; allowed %d groups of %.0f m across",
+                       site->cfg->file, CONFIG_MAX_STATIONS, 2.0 * SITE_BVH_REACH_M);
     int rc = bvh_create(site->scene, station_m, station_reach(site, station_m), site->cfg->threads, report, out, err);
     if (rc != SH_OK) return rc;
     site->bvh[site->n_bvh++] = *out;
@@ -135,10 +144,18 @@ static int find_bvh(struct site *site, const double station_m[3], const struct s
 /* All places are known before the first BVH is built. */
 static int place_stations(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
-    int rc = placement_find_anchor(site->cfg, report, &site->anchor, err);
-    for (uint32_t i = 0; i < site->cfg->n_stations && rc == SH_OK; i++)
-        rc = placement_find(site->cfg, i, &site->anchor, site->scene, &site->station[i].at, err);
-    return rc;
+    const struct config *cfg = site->cfg;
+    int rc = placement_find_anchor(cfg, report, &site->anchor, err);
+    site->station = calloc(cfg->n_stations, sizeof *site->station);
+    if (rc == SH_OK && site->station == NULL)
+        rc = sh_fail(err, SH_ENOMEM, "no memory for %u stations", cfg->n_stations);
+    if (rc != SH_OK) return rc;
+    site->n_stations = cfg->n_stations;
+    for (uint32_t i = 0; i < cfg->n_stations && rc == SH_OK; i++) {
+        site->station[i].station = &cfg->station[i];
+        rc = placement_find(cfg, i, &site->anchor, site->scene, &site->station[i].at, err);
+    }
+    return rc == SH_OK && cfg->platform.kind == PLATFORM_STOPS ? site_load_stops(site, err) : rc;
 }
 
 int site_utm_zone(const struct site *site)
@@ -154,13 +171,11 @@ int site_utm_zone(const struct site *site)
     return rc == SH_OK ? utm.zone : 0;
 }
 
-static int add_station(struct site *site, const struct sh_report *report, struct sh_err *err)
+static int add_station(struct site *site, uint32_t i, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
-    uint32_t i = site->n_stations;
     struct site_station *s = &site->station[i];
     struct georef_spec spec = {.crs = cfg->crs, .utm_zone = site_utm_zone(site), .geoid = site->geoid};
-    s->station = &cfg->station[i];
     int rc = placement_georef(&s->at, &site->anchor, &spec, err);
     if (site->moving)
         s->bvh = site->bvh[0];
@@ -168,7 +183,6 @@ static int add_station(struct site *site, const struct sh_report *report, struct
         rc = find_bvh(site, s->at.position_m, report, &s->bvh, err);
     if (rc == SH_OK) rc = georef_create(&spec, &s->georef, err);
     if (rc != SH_OK) return rc;
-    site->n_stations++;
     int epsg = georef_epsg(s->georef), first = georef_epsg(site->station[0].georef);
     if (epsg != first)
         sh_warn(report, "%s: station %s is in EPSG %d, station %s in %d: their points do not fit together", cfg->file,
@@ -182,13 +196,13 @@ int site_load(const struct config *cfg, const struct sh_report *report, struct s
     struct site *site = calloc(1, sizeof *site);
     if (site == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     site->cfg = cfg;
-    site->moving = cfg->platform.kind != PLATFORM_STATIC;
+    site->moving = config_head_moves(&cfg->platform);
     int rc = site_open_geoid(site, err);
     if (rc == SH_OK) rc = load_scene(site, report, err);
     if (rc == SH_OK) rc = place_stations(site, report, err);
     if (rc == SH_OK && site->moving) rc = site_load_platform(site, report, err);
-    for (uint32_t i = 0; i < cfg->n_stations && rc == SH_OK; i++)
-        rc = add_station(site, report, err);
+    for (uint32_t i = 0; i < site->n_stations && rc == SH_OK; i++)
+        rc = add_station(site, i, report, err);
     if (rc == SH_OK) rc = site_choose_scale(site, err);
     if (rc != SH_OK) {
         site_free(site);
@@ -205,6 +219,8 @@ void site_free(struct site *site)
     free(site->stretch);
     for (uint32_t i = 0; i < site->n_stations; i++)
         georef_free(site->station[i].georef);
+    free(site->station);
+    free(site->stop);
     for (uint32_t i = 0; i < site->n_bvh; i++)
         bvh_free(site->bvh[i]);
     for (uint32_t i = 0; i < site->n_movers; i++) {

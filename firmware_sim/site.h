@@ -12,12 +12,13 @@
 #include "firmware_sim/placement.h"
 
 struct site_station {
-    const struct config_station *station;
-    struct bvh *bvh; /* shared where stations are near each other */
+    const struct config_station *station; /* of the configuration, or of stops */
+    struct bvh *bvh;                      /* shared where stations are near each other */
     struct georef *georef;
     struct placement at;
     double scale[3];      /* of geo points on the wire, units of the CRS per count */
     struct plan_row plan; /* how the georef's method was chosen */
+    double t_s, frame;    /* a stop: when it is, after the trajectory's first sample; frame scalar of the trajectory */
 };
 
 struct site_mover {
@@ -41,9 +42,10 @@ struct site {
     uint32_t n_movers, n_surfaces; /* surfaces of the scene, then of the movers */
     struct bvh *bvh[CONFIG_MAX_STATIONS];
     uint32_t n_bvh;
-    struct site_station station[CONFIG_MAX_STATIONS];
+    struct site_station *station;
     uint32_t n_stations;
-    struct georef_geoid *geoid; /* NULL: heights are ellipsoidal */
+    struct config_station *stop; /* the stations where the platform stops; NULL: the configuration's are */
+    struct georef_geoid *geoid;  /* NULL: heights are ellipsoidal */
     /* A moving head; the stations then only say where on Earth the scene lies. */
     int moving;
     struct pose mount;            /* of the head on the platform */
@@ -76,8 +78,9 @@ const struct scene_surface *site_surface(const struct site *site, uint32_t label
 /* The BVH for a moving head at a time of the scan. */
 struct bvh *site_bvh_at(const struct site *site, int64_t t_ns);
 
-/* Poses of all movers at a time of the scan. */
+/* Poses of all movers at a time of the scan; at a stop they stand as at the stop's own (site_mover_time). */
 void site_move(const struct site *site, double t_s, struct cast_setup *setup);
+double site_mover_time(const struct site *site, uint32_t station, double scan_s);
 
 /* What the casters need to scan from a station (0..n_stations-1). */
 void site_cast_setup(const struct site *site, uint32_t station, struct cast_setup *setup);

@@ -9,22 +9,32 @@
 static const double TOLERANCE_M = 1e-4;
 static const int64_t LONGEST_NS = 10000000;
 
-static int load_knots(struct site *site, const struct sh_report *report, struct sh_err *err)
+int site_open_trajectory(const struct site *site, struct site_part *part, struct sh_err *err)
 {
     const struct config_platform *p = &site->cfg->platform;
-    struct trajectory *trajectory;
     double first_s, last_s;
-    int rc = p->file[0] != '\0' ? trajectory_read_csv(p->file, &trajectory, err)
-                                : trajectory_read_waypoints(p->waypoints, &trajectory, err);
+    int rc = p->file[0] != '\0' ? trajectory_read_csv(p->file, &part->trajectory, err)
+                                : trajectory_read_waypoints(p->waypoints, &part->trajectory, err);
     if (rc != SH_OK) return rc;
-    trajectory_span(trajectory, &first_s, &last_s);
-    if (p->start_s > last_s - first_s)
-        rc = sh_fail(err, SH_EINPUT, "%s: platform.start_s: %.9g s is behind the trajectory's end; allowed 0 to %.9g",
-                     site->cfg->file, p->start_s, last_s - first_s);
-    if (rc == SH_OK)
-        rc = trajectory_knots(trajectory, first_s + p->start_s, &site->mount, TOLERANCE_M, LONGEST_NS, &site->knot,
-                              &site->n_knots, &site->knot_error_m, err);
-    trajectory_free(trajectory);
+    trajectory_span(part->trajectory, &first_s, &last_s);
+    part->start_s = first_s + p->start_s;
+    part->end_s = p->has_end ? first_s + p->end_s : last_s;
+    int wrong_end = p->has_end && part->end_s > last_s;
+    if (!wrong_end && part->start_s <= last_s) return SH_OK;
+    trajectory_free(part->trajectory);
+    return sh_fail(err, SH_EINPUT, "%s: platform.%s: %.9g s is behind the trajectory's end; allowed %.9g to %.9g",
+                   site->cfg->file, wrong_end ? "end_s" : "start_s", wrong_end ? p->end_s : p->start_s,
+                   wrong_end ? p->start_s : 0.0, last_s - first_s);
+}
+
+static int load_knots(struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    struct site_part part;
+    int rc = site_open_trajectory(site, &part, err);
+    if (rc != SH_OK) return rc;
+    rc = trajectory_knots(part.trajectory, part.start_s, part.end_s, &site->mount, TOLERANCE_M, LONGEST_NS, &site->knot,
+                          &site->n_knots, &site->knot_error_m, err);
+    trajectory_free(part.trajectory);
     if (rc == SH_OK && site->knot_error_m > TOLERANCE_M * 1.001)
         sh_warn(report,
                 "the trajectory bends more than poses %g ms apart can follow: the head is off it by up to %.2g m",
@@ -104,13 +114,18 @@ static void measure_path(struct site *site)
                 fmax(site->path_reach_m, distance_m(site->station[s].at.position_m, site->knot[i].pose.position_m));
 }
 
+void site_get_mount(const struct config_platform *p, struct pose *mount)
+{
+    const double deg = M_PI / 180.0;
+    memcpy(mount->position_m, p->mount_m, sizeof p->mount_m);
+    pose_from_angles(p->mount_heading_deg * deg, p->mount_pitch_deg * deg, p->mount_roll_deg * deg, mount->quat);
+}
+
 int site_load_platform(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
     const struct config_platform *p = &cfg->platform;
-    const double deg = M_PI / 180.0;
-    memcpy(site->mount.position_m, p->mount_m, sizeof p->mount_m);
-    pose_from_angles(p->mount_heading_deg * deg, p->mount_pitch_deg * deg, p->mount_roll_deg * deg, site->mount.quat);
+    site_get_mount(p, &site->mount);
     if (p->kind == PLATFORM_LIVE) {
         double reach_m = 0.0;
         for (uint32_t i = 1; i < cfg->n_stations; i++)

@@ -50,7 +50,7 @@ void worker_free(struct worker *worker)
 uint32_t worker_slot_bytes(const struct config *cfg)
 {
     /* Each line part is a frame of its own. */
-    uint32_t poses = cfg->platform.kind != PLATFORM_STATIC ? NATIVE_MAX_FRAME : 0;
+    uint32_t poses = config_head_moves(&cfg->platform) ? NATIVE_MAX_FRAME : 0;
     return OVERHEAD_BYTES + poses + (uint32_t)native_points_bound(device_tick_pulses(cfg)) +
            device_tick_lines(cfg) * (LINE_END_BYTES + NATIVE_HEADER_LEN + NATIVE_POINTS_HEAD_LEN);
 }
@@ -212,7 +212,9 @@ static void fill_pulses(struct worker *worker, const struct device_work *work, s
         worker->setup_station = work->station + 1;
     }
     if (worker->site->n_movers != 0)
-        site_move(worker->site, 1e-9 * (double)(work->t_ns - work->scan_t0_ns), &worker->setup);
+        site_move(worker->site,
+                  site_mover_time(worker->site, work->station, 1e-9 * (double)(work->t_ns - work->scan_t0_ns)),
+                  &worker->setup);
     take_poses(worker, work, slot, cap);
     for (uint64_t k = work->pulse0; k < work->pulse_end;) {
         struct schedule_line line;

@@ -164,15 +164,16 @@ static void set_knot(const struct trajectory *tr, double start_s, int64_t t_ns, 
     pose_mount(&body, mount, &knot->pose);
 }
 
-int trajectory_knots(const struct trajectory *tr, double start_s, const struct pose *mount, double tolerance_m,
-                     int64_t longest_ns, struct pose_knot **out, size_t *n, double *error_m, struct sh_err *err)
+int trajectory_knots(const struct trajectory *tr, double start_s, double end_s, const struct pose *mount,
+                     double tolerance_m, int64_t longest_ns, struct pose_knot **out, size_t *n, double *error_m,
+                     struct sh_err *err)
 {
     const double *arm = mount->position_m;
-    double arm_m = sqrt(arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2]), end_s = tr->sample[tr->n - 1].t_s;
+    double arm_m = sqrt(arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2]);
     size_t room = 1;
     *error_m = 0.0;
     for (size_t i = 0; i + 1 < tr->n; i++)
-        if (tr->sample[i + 1].t_s > start_s) {
+        if (tr->sample[i + 1].t_s > start_s && tr->sample[i].t_s < end_s) {
             double ignored = 0.0;
             room += parts_of(tr, i, arm_m, tolerance_m, 1e-9 * (double)longest_ns, &ignored) + 1;
         }
@@ -180,13 +181,13 @@ int trajectory_knots(const struct trajectory *tr, double start_s, const struct p
     if (knot == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %zu poses of a trajectory", room);
     size_t k = 0;
     set_knot(tr, start_s, 0, mount, &knot[k++]);
-    for (size_t i = 0; i + 1 < tr->n && start_s < end_s; i++) {
+    for (size_t i = 0; i + 1 < tr->n && tr->sample[i].t_s < end_s; i++) {
         double a_s = tr->sample[i].t_s, b_s = tr->sample[i + 1].t_s;
         if (b_s <= start_s) continue;
         size_t parts = parts_of(tr, i, arm_m, tolerance_m, 1e-9 * (double)longest_ns, error_m);
         for (size_t j = 1; j <= parts; j++) {
             double t_s = j == parts ? b_s : a_s + (b_s - a_s) * ((double)j / (double)parts);
-            int64_t t_ns = llround(1e9 * (t_s - start_s));
+            int64_t t_ns = llround(1e9 * (fmin(t_s, end_s) - start_s));
             if (t_ns > knot[k - 1].t_ns) set_knot(tr, start_s, t_ns, mount, &knot[k++]);
         }
     }

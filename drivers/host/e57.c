@@ -33,7 +33,8 @@ struct e57 {
     struct track track;
     struct e57_facts facts;
     struct e57_scan *scan; /* the one at hand */
-    unsigned n;            /* records in the streams */
+    const struct sh_report *report;
+    unsigned n; /* records in the streams */
     uint8_t stream[N_STREAMS][PACKET_RECORDS * 8];
     uint8_t packet[PACKET_MAX];
 };
@@ -49,6 +50,7 @@ static int e57_open(const char *path, const struct recorder_options *options, vo
         return rc;
     }
     e->facts.empty_shots = options->empty_shots;
+    e->report = options->report;
     e->track.path = e->file.path;
     e->pages.file = &e->file;
     *rec = e;
@@ -268,10 +270,11 @@ static int e57_close(void *rec, int keep, struct sh_err *err)
 {
     struct e57 *e = rec;
     int rc = keep ? finish(e, err) : 0;
+    if (keep && rc == 0) track_tell(&e->track, e->report);
     int closed = outfile_close(&e->file, keep && rc == 0, err);
     free(e->facts.scan);
     free(e);
     return rc != 0 ? rc : closed;
 }
 
-const struct recorder_ops recorder_e57 = {".e57", e57_open, e57_frame, e57_close};
+const struct recorder_ops recorder_e57 = {".e57", e57_open, e57_frame, e57_close, 1};

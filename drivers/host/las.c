@@ -3,7 +3,8 @@
  *
  * Coordinates are counts of the stream's own scale from the first scan's station, so those of the first scan are the
  * stream's very numbers, and those of further stations are rounded once, by half a count at most. Nothing is clipped:
- * what is too far for 32 bits is an error. */
+ * what is too far for 32 bits is an error. Longitudes go on beyond 180 or -180 degrees where a scan crosses the
+ * antimeridian: all lie within 180 degrees of the first station. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -128,7 +129,9 @@ static int put_xyz(struct las *las, uint8_t *to, const double p[3], struct sh_er
     struct las_facts *f = &las->facts;
     int32_t n[3];
     for (int i = 0; i < 3; i++) {
-        double counts = rint((p[i] - f->offset[i]) / f->scale[i]);
+        double from_offset = p[i] - f->offset[i];
+        if (i == 0 && is_swapped(las)) from_offset = remainder(from_offset, 360);
+        double counts = rint(from_offset / f->scale[i]);
         if (!(fabs(counts) <= INT32_MAX)) return too_far(las, p, err);
         n[i] = (int32_t)counts;
     }
@@ -234,4 +237,4 @@ static int las_close(void *rec, int keep, struct sh_err *err)
     return rc != 0 ? rc : closed;
 }
 
-const struct recorder_ops recorder_las = {".las", las_open, las_frame, las_close};
+const struct recorder_ops recorder_las = {".las", las_open, las_frame, las_close, 0};

@@ -81,10 +81,12 @@ static void put_comments(FILE *out, const struct ply_facts *facts, const struct 
     fputs("comment reflectance in dB, nan: not modelled\n", out);
     fputs("comment echo and echo_count 0: shot without echo; label 65535: none\n", out);
     if (facts->moving)
-        fprintf(out,
-                "comment the head moved, each point has its own pose; frame: frame scalar of the trajectory\n"
-                "comment points_without_pose %" PRIu64 "\n",
-                facts->n_without_pose);
+        fprintf(
+            out,
+            "comment the head moved, each point has its own pose; frame: frame scalar of the trajectory, nan: lost\n"
+            "comment points_without_pose %" PRIu64 "\n",
+            facts->n_without_pose);
+    if (facts->stops) fputs("comment the stations are stops on a trajectory; frame: its frame scalar there\n", out);
     fprintf(out, "comment empty_shots %s\n", facts->empty_shots ? "kept" : "left out");
     fprintf(out,
             "comment frames_lost %" PRIu64 " reader_lost %" PRIu64 " dropped %" PRIu64 " bad_payload %" PRIu64 "\n",
@@ -115,7 +117,7 @@ static void put_header(FILE *out, const struct ply_facts *facts, const struct pl
           "property float reflectance\nproperty double time\nproperty uchar echo\nproperty uchar echo_count\n"
           "property ushort label\nproperty ushort station\n",
           out);
-    fputs(facts->moving ? "property double frame\nend_header\n" : "end_header\n", out);
+    fputs(facts->moving || facts->stops ? "property double frame\nend_header\n" : "end_header\n", out);
 }
 
 int ply_header_make(const struct ply_facts *facts, const struct ply_names *names, size_t size, char **text, size_t *len,

@@ -122,7 +122,9 @@ struct scanhead_info {
     double axes[9];     /* scene frame at the anchor -> axes of the CRS (geodetic: east, north, up), row by row */
     double prr_hz, lines_hz, pan_deg_s, range_min_m, range_max_m;
     uint32_t station, n_surfaces, frames, scan;
-    int moving; /* 1: the head moves; station_m and rotation do not say where it is, poses do */
+    int moving;   /* 1: the head moves; station_m and rotation do not say where it is, poses do */
+    int stop;     /* 1: the station is a stop on a trajectory */
+    double frame; /* of a stop: frame scalar of the trajectory; else 0 */
 };
 int scanhead_get_info(const struct scanhead *sh, struct scanhead_info *info);
 
@@ -147,8 +149,9 @@ int scanhead_pose(struct scanhead *sh, int64_t t_ns, struct scanhead_pose *pose)
 int scanhead_poses(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first, struct scanhead_pose *poses,
                    uint32_t max);
 /* Points of the polar layout from the head's frame to the scene frame: x, y, z in place, each with the pose of its own
- * time where the head moves. frame (may be NULL): the frame scalar of each, 0 where it stands. Returns how many points
- * had no pose, because frames were lost: their coordinates are NaN. A negative error for another layout. */
+ * time where the head moves. frame (may be NULL): the frame scalar of each, that of the stop where it
+ * stands. Returns how many points had no pose, because frames were lost: their coordinates are NaN. A negative error
+ * for another layout. */
 int scanhead_to_scene(struct scanhead *sh, struct scanhead_point *points, uint32_t n, double *frame);
 
 /* GPS time of t_ns since the scan's start (scanhead_point.t_ns) by the head's clock, in LAS's adjusted standard form:

@@ -201,7 +201,9 @@ int scanhead_get_info(const struct scanhead *sh, struct scanhead_info *info)
     info->n_surfaces = d->n_surfaces;
     info->frames = d->frames;
     info->scan = d->scan;
-    info->moving = a->moving & 1;
+    info->moving = (a->moving & NATIVE_MOVING) != 0;
+    info->stop = (a->moving & NATIVE_STOP) != 0;
+    info->frame = a->frame;
     return SCANHEAD_OK;
 }
 

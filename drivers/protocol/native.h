@@ -71,11 +71,16 @@ struct native_descriptor {
 enum native_crs { NATIVE_CRS_LOCAL = 0, NATIVE_CRS_ECEF = 1, NATIVE_CRS_UTM = 2, NATIVE_CRS_GEODETIC = 3 };
 enum native_heights { NATIVE_HEIGHTS_ELLIPSOID = 0, NATIVE_HEIGHTS_GEOID = 1 };
 
+enum native_moving {
+    NATIVE_MOVING = 1, /* the head moves, see NATIVE_POSES */
+    NATIVE_STOP = 2,   /* it stands at a stop of a trajectory; `frame` is the stop's */
+};
+
 struct native_anchor {
     uint32_t crs;     /* enum native_crs */
     uint32_t epsg;    /* 0 for local */
     uint32_t station; /* number, from 1 */
-    uint32_t moving;  /* bit 0: the head moves, see NATIVE_POSES; the other bits 0 */
+    uint32_t moving;  /* enum native_moving */
     double anchor[3]; /* of the station in the CRS, metres; geodetic: degrees, degrees, metres */
     double scale_m;   /* a count is at most this on the ground */
     double lat_deg, lon_deg, height_m;
@@ -86,6 +91,7 @@ struct native_anchor {
     uint32_t reserved2;
     double axes[9]; /* differences in the scene frame at the anchor -> axes of the CRS, row by row, without its scale;
                        geodetic: -> east, north, up. All 0, or not there: the unit matrix */
+    double frame;   /* at a stop: frame scalar of the trajectory */
 };
 
 struct native_points { /* head of a points payload, 40 bytes, then n points of 20 */

@@ -191,7 +191,7 @@ static void test_knots(void **state)
     double error_m, frame, worst = 0, turned = 0;
     struct sh_err err;
     pose_from_angles(30 * DEG, -10 * DEG, 0, mount.quat);
-    assert_int_equal(trajectory_knots(tr, 0.25, &mount, 1e-4, 10000000, &knot, &n, &error_m, &err), SH_OK);
+    assert_int_equal(trajectory_knots(tr, 0.25, 1e9, &mount, 1e-4, 10000000, &knot, &n, &error_m, &err), SH_OK);
     assert_true(error_m <= 1e-4 && knot[0].t_ns == 0 && knot[n - 1].t_ns == 9650000000);
     for (size_t i = 0; i + 1 < n; i++) {
         int64_t gap = knot[i + 1].t_ns - knot[i].t_ns;
@@ -210,6 +210,31 @@ static void test_knots(void **state)
     assert_true(worst <= error_m * 1.0001 && worst > 0.2 * error_m);
     assert_true(turned < 1e-9); /* a knot's time is rounded to a nanosecond */
     free(knot);
+    trajectory_free(tr);
+}
+
+/* Cut at end_s: the same poses up to there, and the one of that time as the last. */
+static void test_knots_to_an_end(void **state)
+{
+    (void)state;
+    struct trajectory *tr = circle();
+    const struct pose mount = {.quat = {1, 0, 0, 0}};
+    struct pose_knot *whole, *part;
+    struct pose last;
+    size_t n, m;
+    double error_m, frame;
+    struct sh_err err;
+    assert_int_equal(trajectory_knots(tr, 0.25, 1e9, &mount, 1e-4, 10000000, &whole, &n, &error_m, &err), SH_OK);
+    assert_int_equal(trajectory_knots(tr, 0.25, 1.2345, &mount, 1e-4, 10000000, &part, &m, &error_m, &err), SH_OK);
+    assert_true(m > 2 && m < n && part[m - 1].t_ns == 984500000 && part[m - 2].t_ns < 984500000);
+    assert_memory_equal(whole, part, (m - 1) * sizeof *part);
+    trajectory_at(tr, 1.2345, &last, &frame);
+    assert_true(distance(last.position_m, part[m - 1].pose.position_m) < 1e-12 && frame == part[m - 1].frame);
+    free(part);
+    assert_int_equal(trajectory_knots(tr, 0.25, 0.25, &mount, 1e-4, 10000000, &part, &m, &error_m, &err), SH_OK);
+    assert_true(m == 1 && part[0].t_ns == 0);
+    free(whole);
+    free(part);
     trajectory_free(tr);
 }
 
@@ -362,9 +387,9 @@ static void test_waypoints(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_convention),    cmocka_unit_test(test_between),   cmocka_unit_test(test_straight_line),
-        cmocka_unit_test(test_constant_turn), cmocka_unit_test(test_knots),     cmocka_unit_test(test_csv),
-        cmocka_unit_test(test_csv_errors),    cmocka_unit_test(test_waypoints),
+        cmocka_unit_test(test_convention),    cmocka_unit_test(test_between),    cmocka_unit_test(test_straight_line),
+        cmocka_unit_test(test_constant_turn), cmocka_unit_test(test_knots),      cmocka_unit_test(test_knots_to_an_end),
+        cmocka_unit_test(test_csv),           cmocka_unit_test(test_csv_errors), cmocka_unit_test(test_waypoints),
     };
     return cmocka_run_group_tests(tests, make_file, remove_file);
 }

@@ -1,5 +1,6 @@
 /* SIGTERM and SIGINT end the program in good order wherever it is: status 0, statistics written, symlink
  * gone, files whole. */
+#include <inttypes.h>
 #include "tests/wire/room.h"
 
 static const struct room_config ENDLESS = {.profile = "riegl-vz400i",
@@ -183,22 +184,36 @@ static void expect_whole_e57(const struct wire *wire, const char *name)
     free(e57);
 }
 
+/* A PTX grid has columns times rows lines behind its head of ten. */
+static void expect_whole_ptx(const struct wire *wire, const char *name)
+{
+    char *ptx = wire_read(wire_path(wire, name), NULL);
+    uint64_t columns, rows, lines = 0;
+    assert_int_equal(sscanf(ptx, "%" SCNu64 " %" SCNu64, &columns, &rows), 2);
+    for (const char *at = ptx; (at = strchr(at, '\n')) != NULL; at++)
+        lines++;
+    assert_int_equal(lines, 10 + columns * rows);
+    free(ptx);
+}
+
 static void test_record_off_line(void **state)
 {
     struct wire *wire = *state;
-    char config[352], ply[352], las[352], e57[352];
+    char config[352], ply[352], las[352], e57[352], ptx[352];
     room_write(wire);
     snprintf(config, sizeof config, "%s", room_config_write(wire, &ENDLESS));
     snprintf(ply, sizeof ply, "%s", wire_path(wire, "x.ply"));
     snprintf(las, sizeof las, "%s", wire_path(wire, "x.las"));
     snprintf(e57, sizeof e57, "%s", wire_path(wire, "x.e57"));
+    snprintf(ptx, sizeof ptx, "%s", wire_path(wire, "x.ptx"));
     interrupt_record(wire,
-                     (const char *const[]){"record", config, "-o", ply, "-o", las, "-o", e57, "--duration", "1e6",
-                                           "--stats", wire_path(wire, "stats.json"), NULL},
+                     (const char *const[]){"record", config, "-o", ply, "-o", las, "-o", e57, "-o", ptx, "--duration",
+                                           "1e6", "--stats", wire_path(wire, "stats.json"), NULL},
                      SIGINT);
     assert_int_equal(ply_points(wire, "x.ply"), stats_uint(wire, "points"));
     assert_int_equal(las_points(wire, "x.las"), stats_uint(wire, "points"));
     expect_whole_e57(wire, "x.e57");
+    expect_whole_ptx(wire, "x.ptx");
     assert_true(stats_uint(wire, "points") > 1000);
 }
 
