@@ -69,8 +69,8 @@ static int scale_stations(struct site *site, double scale_m, struct sh_err *err)
     return rc;
 }
 
-/* The finest 1e-6 x 10^n m with which the head's whole range, from all of its path, fits into 31 bits, with a hundredth left for noise, unless
- * the configuration names a scale. */
+/* The finest 1e-6 x 10^n m with which the head's whole range, from all of its path, fits into 31 bits, with a hundredth
+ * left for noise, unless the configuration names a scale. */
 int site_choose_scale(struct site *site, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
