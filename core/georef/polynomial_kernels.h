@@ -101,41 +101,41 @@ VEC_INLINE double twice_atan_deg(double t)
         for (size_t i = 0; i < n; i++)                                                                             \
             out[i] = plane##order(k, x[i], y[i]);                                                                  \
     }
-#define POLYNOMIAL_MERIDIAN_KERNEL(ATTRIBUTE, name, order)                                                        \
-    ATTRIBUTE static void name##_meridian##order(                                                                 \
-        const struct polynomial *p, size_t n, const double *restrict x, const double *restrict y,                 \
-        const double *restrict z, double *restrict out_x, double *restrict out_y, double *restrict out_z)         \
-    {                                                                                                             \
-        double lat[POLYNOMIAL_PLANE], up[POLYNOMIAL_PLANE], t[9];                                                 \
-        const double axis = p->meridian.axis_m, sine = p->meridian.sin_lat, cosine = p->meridian.cos_lat;                                    \
-        memcpy(lat, p->plane[0], sizeof lat);                                                                     \
-        memcpy(up, p->plane[1], sizeof up);                                                                       \
-        memcpy(t, p->meridian.turn, sizeof t);                                                                             \
-        for (size_t i = 0; i < n; i++) {                                                                          \
-            double e = t[0] * x[i] + t[1] * y[i] + t[2] * z[i], north = t[3] * x[i] + t[4] * y[i] + t[5] * z[i];  \
-            double u = t[6] * x[i] + t[7] * y[i] + t[8] * z[i], a = axis + (cosine * u - sine * north);           \
-            double half = e / (sqrt(a * a + e * e) + a), out = e * half; /* tangent of half the angle; s - a */    \
-            north -= sine * out;                                                                                  \
-            u += cosine * out;                                                                                    \
-            out_x[i] = plane##order(lat, north, u);                                                               \
-            out_y[i] = twice_atan_deg(half);                                                                      \
-            out_z[i] = plane##order(up, north, u);                                                                \
-        }                                                                                                         \
+#define POLYNOMIAL_MERIDIAN_KERNEL(ATTRIBUTE, name, order)                                                       \
+    ATTRIBUTE static void name##_meridian##order(                                                                \
+        const struct polynomial *p, size_t n, const double *restrict x, const double *restrict y,                \
+        const double *restrict z, double *restrict out_x, double *restrict out_y, double *restrict out_z)        \
+    {                                                                                                            \
+        double lat[POLYNOMIAL_PLANE], up[POLYNOMIAL_PLANE], t[9];                                                \
+        const double axis = p->meridian.axis_m, sine = p->meridian.sin_lat, cosine = p->meridian.cos_lat;        \
+        memcpy(lat, p->plane[0], sizeof lat);                                                                    \
+        memcpy(up, p->plane[1], sizeof up);                                                                      \
+        memcpy(t, p->meridian.turn, sizeof t);                                                                   \
+        for (size_t i = 0; i < n; i++) {                                                                         \
+            double e = t[0] * x[i] + t[1] * y[i] + t[2] * z[i], north = t[3] * x[i] + t[4] * y[i] + t[5] * z[i]; \
+            double u = t[6] * x[i] + t[7] * y[i] + t[8] * z[i], a = axis + (cosine * u - sine * north);          \
+            double half = e / (sqrt(a * a + e * e) + a), out = e * half; /* tangent of half the angle; s - a */  \
+            north -= sine * out;                                                                                 \
+            u += cosine * out;                                                                                   \
+            out_x[i] = plane##order(lat, north, u);                                                              \
+            out_y[i] = twice_atan_deg(half);                                                                     \
+            out_z[i] = plane##order(up, north, u);                                                               \
+        }                                                                                                        \
     }
-#define POLYNOMIAL_KERNELS(ATTRIBUTE, name)                                                      \
-    POLYNOMIAL_SPACE_KERNEL(ATTRIBUTE, name, 1)                                                  \
-    POLYNOMIAL_SPACE_KERNEL(ATTRIBUTE, name, 2)                                                  \
-    POLYNOMIAL_SPACE_KERNEL(ATTRIBUTE, name, 3)                                                  \
-    POLYNOMIAL_FLAT_KERNEL(ATTRIBUTE, name, 1)                                                   \
-    POLYNOMIAL_FLAT_KERNEL(ATTRIBUTE, name, 2)                                                   \
-    POLYNOMIAL_FLAT_KERNEL(ATTRIBUTE, name, 3)                                                   \
-    POLYNOMIAL_FLAT_KERNEL(ATTRIBUTE, name, 5)                                                   \
-    POLYNOMIAL_MERIDIAN_KERNEL(ATTRIBUTE, name, 1)                                               \
-    POLYNOMIAL_MERIDIAN_KERNEL(ATTRIBUTE, name, 2)                                               \
-    POLYNOMIAL_MERIDIAN_KERNEL(ATTRIBUTE, name, 3)                                               \
-    static const struct polynomial_kernels name = {                                              \
-        .space = {NULL, name##_space1, name##_space2, name##_space3, NULL, NULL},                \
-        .flat = {NULL, name##_flat1, name##_flat2, name##_flat3, NULL, name##_flat5},            \
+#define POLYNOMIAL_KERNELS(ATTRIBUTE, name)                                           \
+    POLYNOMIAL_SPACE_KERNEL(ATTRIBUTE, name, 1)                                       \
+    POLYNOMIAL_SPACE_KERNEL(ATTRIBUTE, name, 2)                                       \
+    POLYNOMIAL_SPACE_KERNEL(ATTRIBUTE, name, 3)                                       \
+    POLYNOMIAL_FLAT_KERNEL(ATTRIBUTE, name, 1)                                        \
+    POLYNOMIAL_FLAT_KERNEL(ATTRIBUTE, name, 2)                                        \
+    POLYNOMIAL_FLAT_KERNEL(ATTRIBUTE, name, 3)                                        \
+    POLYNOMIAL_FLAT_KERNEL(ATTRIBUTE, name, 5)                                        \
+    POLYNOMIAL_MERIDIAN_KERNEL(ATTRIBUTE, name, 1)                                    \
+    POLYNOMIAL_MERIDIAN_KERNEL(ATTRIBUTE, name, 2)                                    \
+    POLYNOMIAL_MERIDIAN_KERNEL(ATTRIBUTE, name, 3)                                    \
+    static const struct polynomial_kernels name = {                                   \
+        .space = {NULL, name##_space1, name##_space2, name##_space3, NULL, NULL},     \
+        .flat = {NULL, name##_flat1, name##_flat2, name##_flat3, NULL, name##_flat5}, \
         .meridian = {NULL, name##_meridian1, name##_meridian2, name##_meridian3, NULL, NULL}};
 
 #endif
