@@ -143,8 +143,7 @@ static void point(const struct row *row, uint64_t i, double d[3])
 /* The default for the row's extent. */
 static struct georef *plan(const struct row *row, struct plan_row *planned)
 {
-    const struct plan_georef_need need = {
-        .radius_m = RADIUS_M, .height_m = row->height_m, .tolerance_m = TOLERANCE_M};
+    const struct plan_georef_need need = {.radius_m = RADIUS_M, .height_m = row->height_m, .tolerance_m = TOLERANCE_M};
     struct georef *georef;
     enum georef_method method;
     struct sh_err err;
@@ -184,8 +183,14 @@ static void show(const struct row *row, double bound_m)
 }
 
 #define AT(lat, lon, height) .lat_deg = (lat), .lon_deg = (lon), .height_m = (height)
-#define UTM(...)             {.crs = GEOREF_UTM, __VA_ARGS__}
-#define GEODETIC(...)        {.crs = GEOREF_GEODETIC, __VA_ARGS__}
+#define UTM(...)                       \
+    {                                  \
+        .crs = GEOREF_UTM, __VA_ARGS__ \
+    }
+#define GEODETIC(...)                       \
+    {                                       \
+        .crs = GEOREF_GEODETIC, __VA_ARGS__ \
+    }
 
 static const struct row POLES[] = {
     {"UPS, 1 km from the north pole", "metres added", UTM(AT(89.991, 77.0, 5.0)), 500.0, add_metres, 32661},
@@ -206,8 +211,8 @@ static void test_poles(void **state)
     for (size_t i = 0; i < sizeof POLES / sizeof POLES[0]; i++)
         show(&POLES[i], TOLERANCE_M);
     /* At the pole itself there is no polynomial, and exact is what it does: 20 nm. */
-    const struct row pole = {"geodetic, at the pole", "degrees per metre", GEODETIC(AT(90.0, 0.0, 3.0)), 500.0,
-                             degrees_per_metre, 4979};
+    const struct row pole = {
+        "geodetic, at the pole", "degrees per metre", GEODETIC(AT(90.0, 0.0, 3.0)), 500.0, degrees_per_metre, 4979};
     struct plan_row planned;
     georef_free(plan(&pole, &planned));
     assert_string_equal(planned.method, "exact");
@@ -221,15 +226,15 @@ static const struct row ZONES[] = {
     {"antimeridian, from the west", "longitudes subtracted", GEODETIC(AT(65.0, -179.999, 10.0)), 300.0,
      subtract_longitude, 4979},
     {"antimeridian, UTM 60", "zone by each point", UTM(AT(-16.8, 179.995, 10.0)), 300.0, zone_by_point, 32760},
-    {"equator, UTM 17", "each hemisphere its own northing", UTM(AT(0.004, -78.45, 2500.0)), 300.0, zone_by_point, 32617},
+    {"equator, UTM 17", "each hemisphere its own northing", UTM(AT(0.004, -78.45, 2500.0)), 300.0, zone_by_point,
+     32617},
     {"border of UTM 32 and 33", "zone by each point", UTM(AT(52.0, 11.995, 100.0)), 300.0, zone_by_point, 32632},
     {"border of UTM and UPS, 84 N", "zone by each point", UTM(AT(83.995, 3.0, 0.0)), 300.0, zone_by_point, 32631},
     {"Norway, Bergen", "zone by longitude", UTM(AT(60.39, 5.32, 40.0)), 300.0, zone_by_longitude, 32632},
     {"Svalbard, Longyearbyen", "zone by longitude", UTM(AT(78.22, 11.65, 20.0)), 300.0, zone_by_longitude, 32633},
     {"Svalbard, 33 and 35's border", "zone by each point", UTM(AT(78.5, 20.98, 20.0)), 300.0, zone_by_point, 32633},
     {"neighbouring zone forced", "metres added", UTM(AT(52.0, 13.3, 100.0), .utm_zone = 32), 300.0, add_metres, 32632},
-    {"the same, on the equator", "order 1 everywhere", UTM(AT(0.5, 13.3, 100.0), .utm_zone = 32), 300.0, order1,
-     32632},
+    {"the same, on the equator", "order 1 everywhere", UTM(AT(0.5, 13.3, 100.0), .utm_zone = 32), 300.0, order1, 32632},
 };
 
 static void test_zones(void **state)
