@@ -15,8 +15,9 @@ Q = $(Q_$(V))
 # What a fresh Debian 12 needs. Building and the demo:
 DEPS_BUILD = gcc g++ make pkg-config libc6-dev libembree-dev libassimp-dev libgeographiclib-dev libyaml-dev libpng-dev \
 	nettle-dev assimp-testmodels
-# and the tests, with the second compiler and its sanitizers:
-DEPS_TEST = $(DEPS_BUILD) libcmocka-dev clang libclang-rt-dev
+# and the tests, with the second compiler and its sanitizers, clients and readers of recordings that are not ours:
+DEPS_TEST = $(DEPS_BUILD) libcmocka-dev clang libclang-rt-dev gpsd gpsd-clients cloudcompare proj-bin python3-minimal \
+	$(if $(shell command -v npm),,nodejs npm)
 
 PKGS = yaml-0.1 libpng nettle
 PKG_CFLAGS = $(eval PKG_CFLAGS := $$(shell pkg-config --cflags $(PKGS)))$(PKG_CFLAGS)
@@ -94,7 +95,15 @@ define install_missing
 		$$sudo apt-get update -qq && $$sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $$missing >/dev/null; \
 	fi
 endef
-deps:
+# The readers for LAS and E57 are npm's, in the versions of the lock file. Without npm's registry their tests are skipped.
+READERS = $(BUILD)/readers
+deps: deps-test $(READERS)/installed
+$(READERS)/installed: $(wildcard tests/readers/*) | deps-test
+	@mkdir -p $(@D)
+	@cp tests/readers/* $(@D)
+	@if (cd $(@D) && npm ci --no-audit --no-fund --loglevel=error --fetch-retries=0 --fetch-timeout=30000) >$(@D)/npm.log 2>&1; then touch $@; \
+	else echo "npm could not install the readers for LAS and E57 ($(@D)/npm.log): their tests will be skipped"; fi
+deps-test:
 	$(call install_missing,$(DEPS_TEST))
 deps-build:
 	$(call install_missing,$(DEPS_BUILD))
@@ -111,10 +120,10 @@ test: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test test-programs
 	@$(MAKE) --no-print-directory -j2 $(CLANG) objects
 	@$(MAKE) --no-print-directory -j2 $(ASAN) all test-unit-programs
-	@SCANHEAD=$(BUILD)/test/scanhead sh tests/run_all.sh $(BUILD)
+	@SCANHEAD=$(BUILD)/test/scanhead READERS=$(READERS) sh tests/run_all.sh $(BUILD)
 test-unit test-wire test-accuracy test-stability: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test test-programs
-	@SCANHEAD=$(BUILD)/test/scanhead sh tests/run_all.sh $(BUILD) $(@:test-%=%)
+	@SCANHEAD=$(BUILD)/test/scanhead READERS=$(READERS) sh tests/run_all.sh $(BUILD) $(@:test-%=%)
 
 # ---- figures: speed and leaks; speed against accuracy, each method
 DEPS_CHART = gnuplot-nox
@@ -154,6 +163,6 @@ format:
 	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')
 clean:
 	rm -rf $(BUILD)
-.PHONY: all deps deps-build demo test test-unit test-wire test-accuracy test-stability objects test-unit-programs test-programs bench chart install format clean
+.PHONY: all deps deps-test deps-build demo test test-unit test-wire test-accuracy test-stability objects test-unit-programs test-programs bench chart install format clean
 .SECONDARY:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)

@@ -2,8 +2,10 @@
  *
  * A cloud is read from a PLY file (ASCII, or binary of either byte order, any number types). Element vertex
  * has the properties x, y, z and, where they are there, station (from 1), echo and label, as our recorder
- * writes them; all else is passed over. Ownership: cloud_read allocates, cloud_free releases. A cloud that is
- * read is constant and may be used from any thread. */
+ * writes them; all else is passed over. Or from a LAS file (1.2 to 1.4, not compressed): the point source ID is the
+ * station, the return number the echo, the extra bytes "label" the label.
+ * Ownership: cloud_read allocates, cloud_free releases. A cloud that is read is constant and may be used from any
+ * thread. */
 #ifndef CORE_CLOUD_H
 #define CORE_CLOUD_H
 
@@ -29,7 +31,7 @@ struct cloud {
     int64_t epsg;       /* of the header's comment "epsg N", 0: scene frame; CLOUD_EPSG_UNKNOWN: it has none */
 };
 
-/* Errors (SH_EINPUT, naming file and line, or byte): missing or unreadable, not a PLY file, x, y or z
+/* Errors (SH_EINPUT, naming file and line, or byte): missing or unreadable, not a PLY or LAS file, x, y or z
  * missing, a count the file can't hold, truncated, infinite coordinates or only some of the three not a
  * number, a station, echo or label that is not a whole number in its range. Warns of other elements and of
  * bytes after the last one. */

@@ -97,6 +97,10 @@ void georef_convergence(const struct georef *georef, double *convergence_rad, do
  * 0. */
 int georef_rotation(const struct georef *georef, double rotation[9]);
 
+/* Differences in prcs at the centre -> axes of the CRS (geodetic: east, north, up), row by row: the rotation that is
+ * left of the map there without its scale. The unit matrix at a pole in geodetic output. */
+void georef_axes(const struct georef *georef, double rotation[9]);
+
 /* What georef_forward is to use. SH_EINPUT: GEOREF_AUTO, or an order that has no polynomial here. Before other threads
  * see the georef. */
 int georef_set_method(struct georef *georef, enum georef_method method, struct sh_err *err);
@@ -123,5 +127,9 @@ void georef_difference(const struct georef *georef, const double p_crs[3], doubl
  * have a scale of their own: near a pole they are long in degrees and short on the ground. SH_EINPUT, naming the
  * smallest scale_m that would do, where they don't fit. */
 int georef_scale(const struct georef *georef, double scale_m, double reach_m, double scale[3], struct sh_err *err);
+
+/* A point east, north and up (metres) in the tangent frame at a place on WGS 84 -> its own latitude and longitude (deg,
+ * longitude -180..180) and ellipsoidal height (m). GeographicLib's LocalCartesian; for single points, not for speed. */
+void georef_geodetic(double lat_deg, double lon_deg, double height_m, const double d_enu[3], double geodetic[3]);
 
 #endif

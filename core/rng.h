@@ -10,7 +10,7 @@
 
 #include "core/vecmath.h"
 
-enum rng_purpose { RNG_RANGE = 1, RNG_SCENE = 2 };
+enum rng_purpose { RNG_RANGE = 1, RNG_SCENE = 2, RNG_GNSS = 3 };
 
 VEC_INLINE uint64_t rng_mix(uint64_t x)
 {

@@ -6,6 +6,7 @@
 
 #include "firmware_sim/check_station.h"
 #include "firmware_sim/cmd.h"
+#include "firmware_sim/head_clock.h"
 
 static const char HELP[] =
     "scanhead check CONFIG [--set KEY=VALUE ...]: validate configuration, scene and links; nothing runs.\n"
@@ -63,6 +64,22 @@ static int print_summary(const struct config *cfg, const struct site *site, stru
     return rc;
 }
 
+static int print_time(const struct config *cfg, struct sh_err *err)
+{
+    struct head_clock clock;
+    struct utc_time utc;
+    char now[UTC_TEXT_LEN], end[UTC_TEXT_LEN];
+    int rc = head_clock_create(cfg, &clock, err);
+    if (rc != SH_OK || clock.source == HEAD_CLOCK_NONE) return rc;
+    utc_from_tai(&clock.table, clock.tai0_ns, &utc);
+    utc_format(&utc, 0, now);
+    utc_from_tai(&clock.table, utc_tai_from_posix(&clock.table, clock.table.expires_s * UTC_SECOND_NS), &utc);
+    utc_format(&utc, 0, end);
+    printf("time      %s at power-up; leap seconds are known up to %.10s\n", now, end);
+    if (clock.warning[0] != '\0') cmd_report_stderr.warn(cmd_report_stderr.ctx, clock.warning);
+    return SH_OK;
+}
+
 static int check(const struct cmd_sets *sets, const char *path)
 {
     int status = CMD_OK;
@@ -74,6 +91,7 @@ static int check(const struct cmd_sets *sets, const char *path)
     if (rc == SH_OK) rc = check_links(cfg, &err);
     if (rc == SH_OK) rc = check_reach(site, &cmd_report_stderr, &err);
     if (rc == SH_OK) rc = print_summary(cfg, site, &err);
+    if (rc == SH_OK) rc = print_time(cfg, &err);
     site_free(site);
     free(cfg);
     return rc == SH_OK ? CMD_OK : cmd_fail(&err);

@@ -3,25 +3,33 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "drivers/host/pose_file.h"
-#include "drivers/host/recorder.h"
 #include "firmware_sim/clock.h"
 #include "firmware_sim/cmd.h"
 #include "firmware_sim/json.h"
+#include "firmware_sim/record_files.h"
 #include "firmware_sim/recording.h"
 
 static const char HELP[] =
     "scanhead record SOURCE -o FILE [-o FILE ...] [options]: write the points of a scan to files\n\n"
     "SOURCE is tty:/dev/..., tcp:host:port, FILE.shs (a raw stream), or a CONFIG: then the head runs off line in this\n"
-    "process, as fast as it computes. FILE is .ply (points) or .shs (raw stream).\n\n"
+    "process, as fast as it computes. FILE says by its ending what is written:\n\n"
+    "  .ply        points, binary or text, with double coordinates, label and station\n"
+    "  .las        LAS 1.4, point format 6: points with CRS, time, returns, label; station as point source ID\n"
+    "  .ptx        a grid per scan, with the scan's pose; shots without echo are in it\n"
+    "  .e57        E57: points of each scan, with its pose\n"
+    "  .poses.csv  true position and orientation of each scan, or a moving head's trajectory\n"
+    "  .shs        the raw stream\n"
+    "  .pcapng     the stream's frames as packets, for capinfos and tshark\n\n"
+    "Several scans go into one file, in one coordinate system: that of the stream (geo layout), or the scene's (polar\n"
+    "layout).\n\n"
     "  -o FILE          where to write; may be repeated\n"
     "  --station N|all  scan from station N, or from all one after the other into the same files\n"
     "  --frames N       frames per scan\n"
     "  --duration S     stop each scan after S seconds of device time\n"
+    "  --split          each scan to files of its own: NAME-1.las, NAME-2.las, ..., in the order of scans\n"
     "  --listen         send no command: record what comes until the stream ends or Ctrl-C\n"
-    "  --poses FILE     write the poses of a moving head as CSV; a trajectory file of its own\n"
     "  --ascii          PLY as text\n"
-    "  --empty-shots    keep shots without echo, with NaN coordinates\n"
+    "  --empty-shots    keep shots without echo: .ply with NaN coordinates, .e57 with its invalid state\n"
     "  --stats FILE     write what was received as JSON; - is standard output\n"
     "  --set KEY=VALUE  any configuration key (CONFIG only); may be repeated\n"
     "  --crs CRS        local, ecef, utm or geodetic (CONFIG only)\n"
@@ -30,15 +38,14 @@ static const char HELP[] =
     "Exit status 1 when the recording is not complete: the stream ended before the scan did, or frames or pulses were\n"
     "lost on the way. What came is kept in FILE all the same.\n";
 
-enum { MAX_FILES = 8 };
 enum {
     OPT_STATION = 256,
     OPT_FRAMES,
     OPT_DURATION,
     OPT_LISTEN,
-    OPT_POSES,
     OPT_ASCII,
     OPT_EMPTY,
+    OPT_SPLIT,
     OPT_STATS,
     OPT_SET,
     OPT_CRS,
@@ -50,9 +57,9 @@ static const struct option OPTIONS[] = {{"station", required_argument, NULL, OPT
                                         {"frames", required_argument, NULL, OPT_FRAMES},
                                         {"duration", required_argument, NULL, OPT_DURATION},
                                         {"listen", no_argument, NULL, OPT_LISTEN},
-                                        {"poses", required_argument, NULL, OPT_POSES},
                                         {"ascii", no_argument, NULL, OPT_ASCII},
                                         {"empty-shots", no_argument, NULL, OPT_EMPTY},
+                                        {"split", no_argument, NULL, OPT_SPLIT},
                                         {"stats", required_argument, NULL, OPT_STATS},
                                         {"set", required_argument, NULL, OPT_SET},
                                         {"crs", required_argument, NULL, OPT_CRS},
@@ -62,21 +69,12 @@ static const struct option OPTIONS[] = {{"station", required_argument, NULL, OPT
                                         {"help", no_argument, NULL, 'h'},
                                         {NULL, 0, NULL, 0}};
 
-struct file {
-    const char *path;
-    const struct recorder_ops *ops;
-    void *rec;
-};
-
 struct record {
-    const char *source, *stats, *poses_path;
-    struct pose_file *poses;
-    struct file file[MAX_FILES];
-    int n_files;
+    const char *source, *stats;
+    struct record_files files;
     int all_stations;
     long station;
     struct cmd_sets sets;
-    struct recorder_options recorder;
     struct recording_options recording;
 };
 
@@ -92,14 +90,7 @@ static int parse_station(struct record *r, const char *text)
 static int add_file(struct record *r, const char *path)
 {
     struct sh_err err = {0};
-    if (r->n_files == MAX_FILES) return cmd_usage("record", "at most %d files", MAX_FILES);
-    for (int i = 0; i < r->n_files; i++)
-        if (strcmp(r->file[i].path, path) == 0) return cmd_usage("record", "-o %s: given twice", path);
-    r->file[r->n_files].path = path;
-    r->file[r->n_files].ops = recorder_find(path, &err);
-    if (r->file[r->n_files].ops == NULL) return cmd_fail(&err);
-    r->n_files++;
-    return CMD_OK;
+    return record_files_add(&r->files, path, &err) == SH_OK ? CMD_OK : cmd_fail(&err);
 }
 
 static int parse_option(struct record *r, int opt, char **argv)
@@ -116,14 +107,14 @@ static int parse_option(struct record *r, int opt, char **argv)
     case OPT_LISTEN:
         r->recording.listen = 1;
         return CMD_OK;
-    case OPT_POSES:
-        r->poses_path = optarg;
-        return CMD_OK;
     case OPT_ASCII:
-        r->recorder.ascii = 1;
+        r->files.recorder.ascii = 1;
         return CMD_OK;
     case OPT_EMPTY:
-        r->recorder.empty_shots = 1;
+        r->files.recorder.empty_shots = 1;
+        return CMD_OK;
+    case OPT_SPLIT:
+        r->files.split = 1;
         return CMD_OK;
     case OPT_STATS:
         r->stats = optarg;
@@ -155,49 +146,15 @@ static int parse(struct record *r, int argc, char **argv)
         if (status != CMD_OK) return status;
     }
     if (optind != argc - 1) return cmd_usage("record", "one SOURCE is needed");
-    if (r->n_files == 0 && r->stats == NULL && r->poses_path == NULL) return cmd_usage("record", "-o FILE is needed");
+    if (r->files.n == 0 && r->stats == NULL) return cmd_usage("record", "-o FILE is needed");
     r->source = argv[optind];
     return -1;
-}
-
-static int open_files(struct record *r, struct sh_err *err)
-{
-    int rc = SH_OK;
-    for (int i = 0; i < r->n_files && rc == SH_OK; i++)
-        rc = r->file[i].ops->open(r->file[i].path, &r->recorder, &r->file[i].rec, err);
-    if (rc == SH_OK && r->poses_path != NULL) rc = pose_file_open(r->poses_path, &r->poses, err);
-    return rc;
-}
-
-static int close_files(struct record *r, int keep, struct sh_err *err)
-{
-    int rc = SH_OK;
-    for (int i = 0; i < r->n_files; i++) {
-        struct sh_err why = {0};
-        if (r->file[i].rec == NULL) continue;
-        int e = r->file[i].ops->close(r->file[i].rec, keep, &why);
-        r->file[i].rec = NULL;
-        if (e != SH_OK && rc == SH_OK) rc = sh_fail(err, e, "%s", why.text);
-    }
-    struct sh_err why = {0};
-    int e = pose_file_close(r->poses, keep, &why);
-    r->poses = NULL;
-    if (e != SH_OK && rc == SH_OK) rc = sh_fail(err, e, "%s", why.text);
-    return rc;
 }
 
 static int write_frame(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
 {
     struct record *r = ctx;
-    if (frame->type == SCANHEAD_POSES && r->poses != NULL) {
-        int rc = pose_file_frame(r->poses, sh, frame, err);
-        if (rc != SH_OK) return rc;
-    }
-    for (int i = 0; i < r->n_files; i++) {
-        int rc = r->file[i].ops->frame(r->file[i].rec, sh, frame, err);
-        if (rc != SH_OK) return rc;
-    }
-    return SH_OK;
+    return record_files_frame(&r->files, sh, frame, err);
 }
 
 static int write_stats(const struct record *r, struct scanhead *sh, const struct recording_result *result,
@@ -261,6 +218,14 @@ static void say_result(const struct record *r, const struct recording_result *re
                 (unsigned long long)result->scans);
 }
 
+static void print_note(void *ctx, const char *text)
+{
+    (void)ctx;
+    fprintf(stderr, "scanhead: %s\n", text);
+}
+
+static const struct sh_report NOTES = {NULL, print_note, NULL};
+
 static int interrupted(void)
 {
     return cmd_interrupted;
@@ -270,9 +235,9 @@ static int record(struct record *r, struct scanhead *sh, struct sh_err *err)
 {
     struct recording_result result = {0};
     if (r->stats != NULL) scanhead_hash_start(sh);
-    int rc = open_files(r, err);
+    int rc = record_files_open(&r->files, err);
     if (rc != SH_OK) {
-        close_files(r, 0, NULL);
+        record_files_close(&r->files, 0, NULL);
         return rc;
     }
     r->recording.frame = write_frame;
@@ -283,7 +248,7 @@ static int record(struct record *r, struct scanhead *sh, struct sh_err *err)
     rc = recording_run(sh, &r->recording, &result, err);
     double wall_s = 1e-9 * (double)(clock_now_ns() - start_ns);
     struct sh_err why = {0};
-    int closed = close_files(r, result.points != 0 || rc == SH_OK, &why);
+    int closed = record_files_close(&r->files, result.points != 0 || rc == SH_OK, &why);
     if (rc == SH_OK && closed != SH_OK) rc = sh_fail(err, closed, "%s", why.text);
     if (rc == SH_OK && r->stats != NULL) rc = write_stats(r, sh, &result, wall_s, err);
     if (rc == SH_OK || result.points != 0) say_result(r, &result);
@@ -364,6 +329,7 @@ int cmd_record(int argc, char **argv)
     memset(&r, 0, sizeof r);
     r.recording.frames = -1;
     r.recording.progress = 1;
+    r.files.recorder.report = &NOTES;
     int status = parse(&r, argc, argv);
     if (status >= 0) return status;
     r.recording.first_station = r.recording.last_station = (uint32_t)r.station;

@@ -2,7 +2,8 @@
  *
  *   *IDN?  *RST  *CLS  *OPC?  *STB?  SYSTem:ERRor[:NEXT]?  SYSTem:ERRor:COUNt?  SYSTem:VERSion?  SYSTem:CONTrol:RELease
  *   SYSTem:CONTrol?  HEAD:PRR  HEAD:LINes  HEAD:PAN  HEAD:STATe?  HEAD:STATION  SCAN:LINE:STARt  SCAN:LINE:STOP
- *   SCAN:PAN:STARt  SCAN:PAN:STOP  SCAN:FRAMes  SCAN:STARt  SCAN:STOP  SCAN:COUNt?  HELP?  TIME?  TIME:STEP
+ *   SCAN:PAN:STARt  SCAN:PAN:STOP  SCAN:FRAMes  SCAN:STARt  SCAN:STOP  SCAN:COUNt?  HELP?  TIME?  TIME:UTC?
+ *   TIME:GPS?  TIME:STEP
  * Short and long forms, any case (HEAD:STATION has no short one: STAT is STATe); a query ends in '?'. MIN, MAX and DEF
  * are taken as a number; a setting's query takes MIN, MAX and DEF too ("HEAD:PRR? MAX"). MIN and MAX are the limits as
  * the profile and the other settings leave them now, so they are never refused. A setting may carry its unit as a
@@ -74,6 +75,7 @@ struct command_device {
     uint32_t control;                      /* session that may change things; 0: nobody, the next who does takes it */
     uint64_t frames_done;                  /* of the scan at hand or the last one */
     int64_t t_ns;                          /* device time */
+    char utc[40], gps[40];                 /* the same as time of day, by the head's clock; empty: unknown */
     int step_allowed;                      /* 1 when the pace is `step` */
     int pose_allowed;                      /* 1 when the platform is live: a step may carry its pose ... */
     double pose_centre_m[3], pose_reach_m; /* ... so far from there at most */

@@ -94,6 +94,25 @@ static void query_time(struct command_call *call)
     command_reply(call, "%lld", (long long)call->dev->t_ns);
 }
 
+/* An empty text: the head doesn't know the time. */
+static void reply_time_of_day(struct command_call *call, const char *text)
+{
+    if (text[0] == '\0')
+        command_fail(call, CMD_E_SETTINGS, "%s? needs time.epoch in the configuration", call->row->header);
+    else
+        command_reply(call, "%s", text);
+}
+
+static void query_utc(struct command_call *call)
+{
+    reply_time_of_day(call, call->dev->utc);
+}
+
+static void query_gps(struct command_call *call)
+{
+    reply_time_of_day(call, call->dev->gps);
+}
+
 static void query_help(struct command_call *call)
 {
     size_t n, len = 0;
@@ -194,6 +213,8 @@ static const struct command_row rows[] = {
     QUERY("SCAN:COUNt", query_count),
     QUERY("HELP", query_help),
     QUERY("TIME", query_time),
+    QUERY("TIME:UTC", query_utc),
+    QUERY("TIME:GPS", query_gps),
     {"TIME:STEP", NULL, act_step, &unit_ns, NULL, 0, 1},
 };
 /* clang-format on */

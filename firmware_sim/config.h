@@ -21,6 +21,8 @@
 enum { CONFIG_MAX_MESHES = 64, CONFIG_MAX_LINKS = 8, CONFIG_MAX_STATIONS = 64, CONFIG_PATH_LEN = 512 };
 
 enum config_heights { HEIGHTS_ELLIPSOID, HEIGHTS_GEOID, HEIGHTS_AUTO };
+/* What the head speaks on a link (link_spec.protocol). */
+enum config_protocol { PROTOCOL_NATIVE, PROTOCOL_NMEA };
 enum config_pace { PACE_REALTIME, PACE_FAST, PACE_STEP };
 
 /* A head profile, config/heads/NAME.yaml: each figure is written `{ value: V, from: data sheet|assumed }`. */
@@ -90,6 +92,22 @@ struct config_platform {
     uint32_t port; /* live, in real time: UDP; 0: the system chooses */
 };
 
+/* Time of day (head_clock.h). */
+struct config_time {
+    char epoch[40]; /* of power-up: none, utc, tai, or a date as 2026-01-01T00:00:00Z */
+    double offset_s, drift_ppm, jump_s, jump_at_s;
+};
+
+/* The GNSS receiver (gnss.h). */
+struct config_gnss {
+    uint32_t rate_hz; /* 1, 2, 4, 5, 10, 20 */
+    enum config_talker { TALKER_GN, TALKER_GP } talker;
+    uint32_t quality; /* as in GGA: 0, 1, 2, 4, 5 */
+    uint32_t satellites;
+    double hdop, accuracy_m, geoid_separation_m;
+    double lever_arm_m[3]; /* of the antenna from the head's origin, in the head's frame */
+};
+
 struct config {
     char file[CONFIG_PATH_LEN];
     char profile_file[CONFIG_PATH_LEN];
@@ -126,7 +144,9 @@ struct config {
     double ahead_ms, queue_ms, late_ms;
     uint32_t threads; /* casters; 0: one per processor */
     enum config_pace pace;
-    double utc_epoch_s; /* UTC of power-up, s since 1970; 0: unknown */
+    /* time, gnss */
+    struct config_time time;
+    struct config_gnss gnss;
 };
 
 /* Reads path, its profile, then the `key=value` settings in order (as from --set, each checked the same way, named

@@ -10,6 +10,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "firmware_sim/head_clock.h"
+
 /* Of two keys that contradict, the one to name: the first unless only the second was given. */
 static const char *given_of(const struct cfg_reader *rd, const char *first, const char *second)
 {
@@ -89,6 +91,13 @@ static int check_mesh(const struct cfg_reader *rd, const struct config_mesh *mes
     return SH_OK;
 }
 
+int cfg_nmea_link(const struct config *cfg)
+{
+    for (uint32_t i = 0; i < cfg->n_links; i++)
+        if (cfg->link[i].protocol == PROTOCOL_NMEA) return (int)i;
+    return -1;
+}
+
 static int check_names(const struct cfg_reader *rd, struct config *cfg)
 {
     for (uint32_t i = 0; i < cfg->n_stations; i++) {
@@ -133,10 +142,10 @@ static int check_link(const struct cfg_reader *rd, const struct config *cfg, uin
         {"links[].port", 1u << LINK_TCP},
         {"links[].max_sessions", 1u << LINK_TCP},
     };
-    static const char *const has[] = {[LINK_NULL] = "type",
-                                      [LINK_FILE] = "type, path",
-                                      [LINK_PTY] = "type, path",
-                                      [LINK_TCP] = "type, address, port, max_sessions"};
+    static const char *const has[] = {[LINK_NULL] = "type, protocol",
+                                      [LINK_FILE] = "type, path, protocol",
+                                      [LINK_PTY] = "type, path, protocol",
+                                      [LINK_TCP] = "type, address, port, max_sessions, protocol"};
     const struct link_spec *link = &cfg->link[i];
     const char *type = cfg_find(&rd->table, "links[].type")->names[link->type];
     for (size_t k = 0; k < sizeof keys / sizeof keys[0]; k++)
@@ -198,6 +207,31 @@ static int check_loop(const struct cfg_reader *rd, const struct config *cfg)
         cfg->tick_hz);
 }
 
+static int check_time(const struct cfg_reader *rd, const struct config *cfg)
+{
+    enum head_clock_source source;
+    struct sh_err why;
+    char shown[CFG_SHOW_MAX];
+    if (head_clock_parse(cfg->time.epoch, utc_table_builtin(), &source, NULL, &why) != SH_OK)
+        return cfg_fail_key(
+            rd, "time.epoch", 0,
+            "\"%s\": %.80s; allowed none, utc, tai, or a time after 1980-01-06 such as 2026-01-01T00:00:00Z",
+            cfg_show(cfg->time.epoch, shown), why.text);
+    int link = cfg_nmea_link(cfg);
+    if (source == HEAD_CLOCK_NONE && link >= 0)
+        return cfg_fail_key(rd, "links[].protocol", (uint32_t)link,
+                            "nmea, but the time is not known; required is time.epoch: utc, tai, or a time such as "
+                            "2026-01-01T00:00:00Z");
+    if (1000 % cfg->gnss.rate_hz != 0 || cfg->gnss.rate_hz == 8)
+        return cfg_fail_key(rd, "gnss.rate_hz", 0, "%u is not a rate it has; allowed 1, 2, 4, 5, 10 or 20 Hz",
+                            cfg->gnss.rate_hz);
+    if (cfg->gnss.quality == 3)
+        return cfg_fail_key(rd, "gnss.quality", 0,
+                            "3 is no fix of position; allowed 0 none, 1 autonomous, 2 differential, 4 RTK fixed, 5 RTK "
+                            "float");
+    return SH_OK;
+}
+
 int cfg_check(const struct cfg_reader *rd, struct config *cfg)
 {
     int code = check_limits(rd, cfg);
@@ -211,5 +245,6 @@ int cfg_check(const struct cfg_reader *rd, struct config *cfg)
     for (uint32_t i = 0; i < cfg->n_links && code == SH_OK; i++)
         code = check_link(rd, cfg, i);
     if (code == SH_OK) code = check_loop(rd, cfg);
+    if (code == SH_OK) code = check_time(rd, cfg);
     return code;
 }

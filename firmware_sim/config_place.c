@@ -127,6 +127,8 @@ static int check_station(const struct cfg_reader *rd, const struct config *cfg, 
             "of them");
     if (!anchored && nowhere && cfg->crs != GEOREF_LOCAL)
         return fail_required(rd, "stations[].lat_deg", i, "output.crs is not local and there is no scene.anchor");
+    if (!anchored && nowhere && cfg_nmea_link(cfg) >= 0)
+        return fail_required(rd, "stations[].lat_deg", i, "a link has the protocol nmea and there is no scene.anchor");
     return SH_OK;
 }
 

@@ -115,5 +115,7 @@ int cfg_load_profile(struct cfg_reader *rd, struct config *cfg);
 int cfg_check(const struct cfg_reader *rd, struct config *cfg);
 /* config_place.c: the anchor, and the forms of a station's place. */
 int cfg_check_places(const struct cfg_reader *rd, struct config *cfg);
+/* The first link of the GNSS receiver; -1: none. */
+int cfg_nmea_link(const struct config *cfg);
 
 #endif

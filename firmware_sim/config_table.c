@@ -32,6 +32,8 @@ static const char *const hemisphere_names[] = {"south", "north", NULL};
 static const char *const layout_names[] = {[LINE_POLAR] = "polar", [LINE_GEO] = "geo", NULL};
 static const char *const link_names[] = {
     [LINK_NULL] = "null", [LINK_FILE] = "file", [LINK_PTY] = "pty", [LINK_TCP] = "tcp", NULL};
+static const char *const protocol_names[] = {[PROTOCOL_NATIVE] = "native", [PROTOCOL_NMEA] = "nmea", NULL};
+static const char *const talker_names[] = {[TALKER_GN] = "GN", [TALKER_GP] = "GP", NULL};
 static const char *const pace_names[] = {
     [PACE_REALTIME] = "realtime", [PACE_FAST] = "fast", [PACE_STEP] = "step", NULL};
 
@@ -183,6 +185,8 @@ static const struct cfg_key config_keys[] = {
      .help = "Where the head can be reached; none is needed to record off line."},
     {"links[]", CFG_MAP, .help = "A link."},
     {"links[].type", CFG_ENUM, .names = link_names, IN_LINK(type), .help = "Kind of link."},
+    {"links[].protocol", CFG_ENUM, .def = "native", .names = protocol_names, IN_LINK(protocol),
+     .help = "native: the head's stream and commands; nmea: the GNSS receiver, NMEA 0183 out, nothing in."},
     {"links[].path", CFG_PATH, .def = "", IN_LINK(path),
      .help = "pty: symbolic link to the terminal (optional); file: file to write (required)."},
     {"links[].address", CFG_TEXT, .def = "", IN_LINK(address), .help = "tcp: address to listen on; 127.0.0.1 when not given."},
@@ -206,8 +210,32 @@ static const struct cfg_key config_keys[] = {
     {"loop.threads", CFG_COUNT, NULL, "0", 0, 64, IN_CONFIG(threads), .help = "Casting threads; 0: one per processor."},
     {"loop.pace", CFG_ENUM, .def = "realtime", .names = pace_names, IN_CONFIG(pace),
      .help = "realtime: by the clock; fast: as fast as it computes; step: a client grants time."},
-    {"loop.utc_epoch_s", CFG_REAL, "s", "0", 0, 8589934592.0, IN_CONFIG(utc_epoch_s),
-     .help = "UTC of power-up, seconds since 1970; 0: unknown."},
+
+    {"time", CFG_MAP, .help = "Time of day: UTC and PPS; and errors of the head's clock, for tests of synchronisation."},
+    {"time.epoch", CFG_TEXT, .def = "none", IN_CONFIG(time.epoch),
+     .allowed = "none, utc, tai, or a time after 1980-01-06 such as 2026-01-01T00:00:00Z",
+     .help = "Time of power-up: UTC, or utc or tai for the system's clock at that moment; none: the head doesn't know."},
+    {"time.offset_s", CFG_REAL, "s", "0", -1e6, 1e6, IN_CONFIG(time.offset_s),
+     .help = "The head's clock is ahead of the true time. Concerns UTC, GPS time and PPS of the head, not the receiver."},
+    {"time.drift_ppm", CFG_REAL, "ppm", "0", -1000, 1000, IN_CONFIG(time.drift_ppm), .help = "And gains, from power-up."},
+    {"time.jump_s", CFG_REAL, "s", "0", -1e6, 1e6, IN_CONFIG(time.jump_s), .help = "And is set on by this, once,"},
+    {"time.jump_at_s", CFG_REAL, "s", "0", 0, 1e8, IN_CONFIG(time.jump_at_s), .help = "so long after power-up."},
+
+    {"gnss", CFG_MAP, .help = "The GNSS receiver, which speaks on links of protocol nmea; it needs the time."},
+    {"gnss.rate_hz", CFG_COUNT, "Hz", "1", 1, 20, IN_CONFIG(gnss.rate_hz), .allowed = "1, 2, 4, 5, 10 or 20 Hz",
+     .help = "Positions per second."},
+    {"gnss.talker", CFG_ENUM, .def = "GN", .names = talker_names, IN_CONFIG(gnss.talker),
+     .help = "First letters of its sentences."},
+    {"gnss.quality", CFG_COUNT, NULL, "1", 0, 5, IN_CONFIG(gnss.quality),
+     .allowed = "0 none, 1 autonomous, 2 differential, 4 RTK fixed, 5 RTK float", .help = "Quality of the fix, as in GGA."},
+    {"gnss.satellites", CFG_COUNT, NULL, "12", 0, 99, IN_CONFIG(gnss.satellites), .help = "Satellites used, as in GGA."},
+    {"gnss.hdop", CFG_REAL, NULL, "0.7", 0.1, 99.9, IN_CONFIG(gnss.hdop), .help = "Horizontal dilution of precision."},
+    {"gnss.accuracy_m", CFG_REAL, "m", "0", 0, 1000, IN_CONFIG(gnss.accuracy_m),
+     .help = "One sigma of the noise east, north and up, each position by itself; reproducible by noise.seed. 0: exact."},
+    {"gnss.lever_arm_m", CFG_VEC3, "m", "[0, 0, 0]", -100, 100, IN_CONFIG(gnss.lever_arm_m),
+     .help = "The antenna from the head's origin, in the head's frame: right, forward, up."},
+    {"gnss.geoid_separation_m", CFG_REAL, "m", "0", -120, 120, IN_CONFIG(gnss.geoid_separation_m),
+     .help = "Geoid above the ellipsoid: altitude in GGA is the ellipsoidal height less this."},
 };
 
 #define FIGURE .flags = CFG_FIGURE

@@ -82,7 +82,8 @@ static void begin_scan(struct device *device, uint64_t tick)
     device->describe = 1;
     device->cmd.frames_done = 0;
     device->live.next = 0;
-    device_push_event(device, NATIVE_EV_SCAN_START, device->scan, tick * (uint64_t)device->tick_ns, 0, "");
+    device_push_event(device, NATIVE_EV_SCAN_START, device->scan, tick * (uint64_t)device->tick_ns,
+                      (uint64_t)device_gps_ns(device, (int64_t)tick * device->tick_ns), "");
     if (device->options.start && device->options.duration_s > 0.0 && device->scan == 1)
         device->end_tick = tick + ticks_of(device, device->options.duration_s);
 }
@@ -250,13 +251,14 @@ int device_claim(struct device *device, uint64_t released, struct device_work *w
     }
     uint64_t tick = device->next_tick;
     memset(work, 0, offsetof(struct device_work, event));
-    work->describe = work->scanning = work->telemetry = work->cut_short = 0;
+    work->describe = work->scanning = work->telemetry = work->cut_short = work->wake = 0;
     work->surfaces_n = work->n_poses = 0;
     work->tick = tick;
     work->t_ns = (int64_t)tick * device->tick_ns;
     run_replay(device, tick);
     run_timers(device, tick);
     say_overrun(device, tick);
+    device_say_pps(device, tick);
     take_events(device, work);
     work->n_events_before = work->n_events;
     if (device->scanning) {
@@ -270,6 +272,7 @@ int device_claim(struct device *device, uint64_t released, struct device_work *w
         work->telemetry = 1;
         device_fill_telemetry(device, tick, &work->telemetry_frame);
     }
+    work->wake = gnss_count(&device->gnss, work->t_ns) != gnss_count(&device->gnss, work->t_ns + device->tick_ns);
     if (device->ending || tick >= device->end_tick) device->over = 1;
     device->next_tick = tick + 1;
     pthread_mutex_unlock(&device->lock);

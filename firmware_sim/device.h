@@ -50,6 +50,7 @@ struct device_work {
     struct pose_knot pose[DEVICE_MAX_POSES];
     int telemetry;
     struct native_telemetry telemetry_frame;
+    int wake; /* readers have something to do, be there frames or not: the receiver has a position */
 };
 
 struct device;
@@ -98,6 +99,17 @@ int device_pose_numbers(struct device *device, int64_t t_ns, const double v[6]);
 
 /* Something for the error queue (enum command_error), and an event on the wire. */
 void device_report(struct device *device, int number, const char *text);
+
+/* Device time begins now, at this time of clock_now_ns(): takes the time of day from the system where it is to come
+ * from there. Before the first tick is claimed. *warning: something the user should know, or NULL; belongs to the
+ * device. */
+int device_power_up(struct device *device, int64_t now_ns, const char **warning, struct sh_err *err);
+
+/* The GNSS receiver: positions until a device time, the device time of a position (from 0), and its sentences at the
+ * station where the head stands. Returns the length, 0 when cap is too small. */
+uint64_t device_gnss_count(const struct device *device, int64_t t_ns);
+int64_t device_gnss_time_ns(const struct device *device, uint64_t index);
+size_t device_gnss_sentences(struct device *device, uint64_t index, char *dst, size_t cap);
 
 /* Scans begun so far. */
 uint64_t device_scans(struct device *device);

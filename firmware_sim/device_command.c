@@ -54,6 +54,7 @@ void device_do_command(struct device *device, uint32_t session, const char *line
     struct command_device *cmd = &device->cmd;
     cmd->state = device_visible_state(device, released);
     cmd->t_ns = (int64_t)released * device->tick_ns;
+    device_set_time_texts(device);
     command_execute(cmd, session, line, out);
     if (out->took_control) device_push_event(device, NATIVE_EV_CONTROL, session, 0, 0, "taken");
     if (out->error != 0)
@@ -173,6 +174,8 @@ int device_create(const struct site *site, const struct device_options *options,
         device->end_tick = (uint64_t)ceil(options->duration_s * (double)device->tick_hz);
     int rc = set_limits(device, err);
     if (rc == SH_OK) rc = check_live(device, err);
+    if (rc == SH_OK) rc = head_clock_create(site->cfg, &device->clock, err);
+    gnss_init(&device->gnss, site, &device->clock);
     if (rc == SH_OK) rc = open_journals(device, err);
     if (rc != SH_OK) {
         device_free(device);

@@ -79,13 +79,13 @@ void device_fill_anchor(const struct device *device, struct native_anchor *a)
     memcpy(a->rotation, s->at.rotation, sizeof a->rotation);
     a->moving = (uint32_t)device->site->moving;
     memcpy(a->scale, s->scale, sizeof a->scale);
+    georef_axes(s->georef, a->axes);
     a->heights = georef_has_geoid(s->georef) ? NATIVE_HEIGHTS_GEOID : NATIVE_HEIGHTS_ELLIPSOID;
 }
 
 void device_fill_telemetry(const struct device *device, uint64_t tick, struct native_telemetry *t)
 {
     const struct device_counters *c = &device->counters;
-    double epoch_s = device->site->cfg->utc_epoch_s;
     memset(t, 0, sizeof *t);
     t->state = (uint32_t)device->state;
     t->scan = device->scan;
@@ -96,5 +96,7 @@ void device_fill_telemetry(const struct device *device, uint64_t tick, struct na
     t->late_blocks = atomic_load(&c->late_blocks);
     t->late_max_us = (uint32_t)(atomic_load(&c->late_max_ns) / 1000);
     t->errors_queued = device->cmd.queue.count;
-    t->utc_ns = epoch_s > 0.0 ? llround(epoch_s * 1e6) * 1000 + (int64_t)tick * device->tick_ns : 0;
+    if (device->clock.source != HEAD_CLOCK_NONE)
+        t->utc_ns =
+            utc_posix_from_tai(&device->clock.table, head_clock_ns(&device->clock, (int64_t)tick * device->tick_ns));
 }

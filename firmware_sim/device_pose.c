@@ -89,6 +89,41 @@ static uint32_t platform_at(const struct device *device, int64_t t_ns, struct po
     return 0;
 }
 
+/* On the trajectory; it stands before its begin and behind its end. */
+static void on_path(const struct site *site, int64_t t_ns, struct pose *out)
+{
+    const struct pose_knot *knot = site->knot;
+    size_t low = 0, high = site->n_knots; /* knot[low] is at or before t, knot[high] behind */
+    *out = knot[0].pose;
+    if (t_ns <= knot[0].t_ns) return;
+    while (high - low > 1) {
+        size_t middle = low + (high - low) / 2;
+        if (knot[middle].t_ns <= t_ns)
+            low = middle;
+        else
+            high = middle;
+    }
+    *out = knot[low].pose;
+    if (high < site->n_knots)
+        pose_between(&knot[low].pose, &knot[high].pose,
+                     (double)(t_ns - knot[low].t_ns) / (double)(knot[high].t_ns - knot[low].t_ns), out);
+}
+
+int device_head_pose(struct device *device, int64_t t_ns, struct pose *head)
+{
+    const struct site *site = device->site;
+    struct pose body;
+    if (!site->moving || (site->n_knots == 0 && device->live.n == 0)) return 0;
+    if (site->n_knots != 0) {
+        int64_t start_ns = (int64_t)device->scan_tick0 * device->tick_ns;
+        on_path(site, device->scan == 0 ? 0 : t_ns - start_ns, head);
+        return 1;
+    }
+    platform_at(device, t_ns, &body);
+    pose_mount(&body, &site->mount, head);
+    return 1;
+}
+
 static void make_knot(struct device *device, int64_t t_ns, struct pose_knot *knot)
 {
     const struct site *site = device->site;

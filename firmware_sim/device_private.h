@@ -5,6 +5,8 @@
 #include <pthread.h>
 
 #include "firmware_sim/device.h"
+#include "firmware_sim/gnss.h"
+#include "firmware_sim/head_clock.h"
 
 /* Poses of a live platform. Each tick begins with one of the head, made once, from those that had come. */
 struct device_live {
@@ -26,6 +28,8 @@ struct device {
     struct device_options options;
     struct device_counters counters;
     struct command_device cmd;
+    struct head_clock clock;
+    struct gnss gnss;
     char idn[96];
     uint64_t tick_hz;
     int64_t tick_ns;
@@ -73,8 +77,18 @@ void device_do_command(struct device *device, uint32_t session, const char *line
 
 /* device_pose.c: with the lock held. The end of the head's path, since the scan's start; INT64_MAX: there is none. */
 int64_t device_path_end_ns(const struct device *device);
+/* Where the head is at a device time; 0: it stands at its station. A trajectory runs from the start of the last scan.
+ */
+int device_head_pose(struct device *device, int64_t t_ns, struct pose *head);
 /* Poses of a live head for the pulses that the work holds. */
 void device_take_poses(struct device *device, struct device_work *work);
+/* device_time.c: the head's clock and the receiver. */
+/* GPS time, ns, of a device time by the head's clock; 0: unknown. */
+int64_t device_gps_ns(const struct device *device, int64_t t_ns);
+/* An event for the full second that begins in the tick, if one does. */
+void device_say_pps(struct device *device, uint64_t tick);
+/* What TIME:UTC? and TIME:GPS? answer at cmd.t_ns. */
+void device_set_time_texts(struct device *device);
 
 /* device_frames.c: what the frames say. */
 void device_fill_descriptor(const struct device *device, struct native_descriptor *d);

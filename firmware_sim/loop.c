@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "drivers/protocol/native.h"
+#include "firmware_sim/clock.h"
 #include "firmware_sim/loop_private.h"
 
 enum { PACER_PRIORITY = 80 };
@@ -33,7 +34,7 @@ static int check_capacity(const struct loop *loop, const struct pump *pump, stru
 {
     double capacity = pump_capacity(pump), rate = stream_rate(loop);
     char endpoint[300];
-    if (capacity <= 0.0 || capacity >= rate) return SH_OK;
+    if (capacity <= 0.0 || capacity >= rate || pump_is_nmea(pump)) return SH_OK;
     pump_endpoint(pump, endpoint, sizeof endpoint);
     return sh_fail(err, SH_EINPUT, "link %s: the stream has %.2f MB/s, the link carries %.2f MB/s; lower head.prr_hz",
                    endpoint, 1e-6 * rate, 1e-6 * capacity);
@@ -122,7 +123,8 @@ void loop_print_endpoints(const struct loop *loop, FILE *out)
     for (uint32_t i = 0; i < loop->n_pumps; i++) {
         char text[512];
         pump_endpoint(loop->pump[i], text, sizeof text);
-        fprintf(out, "%s{\"type\":\"%s\",\"endpoint\":\"%s\"}", i == 0 ? "" : ",", pump_type(loop->pump[i]), text);
+        fprintf(out, "%s{\"type\":\"%s\",\"endpoint\":\"%s\"%s}", i == 0 ? "" : ",", pump_type(loop->pump[i]), text,
+                pump_is_nmea(loop->pump[i]) ? ",\"protocol\":\"nmea\"" : "");
     }
     if (loop->feed != NULL) {
         char text[512];
@@ -130,6 +132,16 @@ void loop_print_endpoints(const struct loop *loop, FILE *out)
         fprintf(out, "%s{\"type\":\"pose\",\"endpoint\":\"%s\"}", loop->n_pumps == 0 ? "" : ",", text);
     }
     fprintf(out, "]}\n");
+}
+
+/* The moment that is device time 0. */
+static int power_up(struct loop *loop, struct sh_err *err)
+{
+    const char *warning;
+    loop->epoch_ns = clock_now_ns();
+    int rc = device_power_up(loop->device, loop->epoch_ns, &warning, err);
+    if (rc == SH_OK && warning != NULL) sh_warn(loop->options.report, "%s", warning);
+    return rc;
 }
 
 /* Real-time priority and locked memory where permitted; a warning where not. */
@@ -147,7 +159,12 @@ static int start_pacer(struct loop *loop, struct sh_err *err)
             sh_warn(loop->options.report, "memory not locked (%s): paging may delay the loop; raise RLIMIT_MEMLOCK",
                     strerror(errno));
     }
-    int rc = pthread_create(&loop->pacer_thread, &attr, loop_pacer_main, loop);
+    int rc = power_up(loop, err);
+    if (rc != SH_OK) {
+        pthread_attr_destroy(&attr);
+        return rc;
+    }
+    rc = pthread_create(&loop->pacer_thread, &attr, loop_pacer_main, loop);
     if (rc == EPERM && rt) {
         sh_warn(loop->options.report, "no SCHED_FIFO for the pacing thread (%s): raise RLIMIT_RTPRIO to %d",
                 strerror(rc), PACER_PRIORITY);

@@ -55,6 +55,7 @@ struct loop {
 
     pthread_t pacer_thread;
     int pacer_running;
+    int64_t epoch_ns;            /* clock_now_ns() of device time 0 */
     _Atomic uint64_t granted;    /* step: ticks that may pass */
     _Atomic uint64_t granted_ns; /* step: the sum of all grants */
     _Atomic uint64_t final_tick; /* first tick that will never be; UINT64_MAX while unknown */
@@ -87,7 +88,7 @@ void *loop_caster_main(void *arg);
 /* Something happened that casters or the pacing thread may wait for: a command, a grant, the end. */
 void loop_poke(struct loop *loop);
 
-/* A link with its thread (pump.c). */
+/* A link with its thread (pump.c, pump_nmea.c). */
 int pump_open(struct loop *loop, uint32_t index, const struct link_spec *spec, struct pump **out, struct sh_err *err);
 int pump_start(struct pump *pump, struct sh_err *err);
 void pump_wake(struct pump *pump); /* real-time safe */
@@ -96,6 +97,7 @@ void pump_close(struct pump *pump);
 void pump_endpoint(const struct pump *pump, char *buf, size_t len);
 double pump_capacity(const struct pump *pump); /* bytes per second; 0: no fixed limit */
 const char *pump_type(const struct pump *pump);
+int pump_is_nmea(const struct pump *pump);
 
 /* The hash of the stream, a reader of its own (hash.c). */
 int hasher_start(struct loop *loop, struct hasher **out, struct sh_err *err);

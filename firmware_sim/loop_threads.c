@@ -153,7 +153,7 @@ static void release(struct loop *loop, struct ring_slot *slot, uint64_t tick, in
         at += (uint32_t)native_seal(slot->bytes + at, loop->seq++);
     count(loop, slot, now_ns);
     /* Where the pacing thread waits for readers, they must see empty ticks pass, too. */
-    int wake = slot->len != 0 || loop_waits(loop);
+    int wake = slot->len != 0 || slot->wake || loop_waits(loop);
     ring_release(&loop->ring, tick);
     if (wake) wake_all(loop);
     sem_post(&loop->work);
@@ -170,7 +170,7 @@ static void note_late(struct loop *loop, int64_t late_ns)
 static void pace_realtime(struct loop *loop)
 {
     const int64_t late_ns = (int64_t)(loop->cfg->late_ms * 1e6);
-    int64_t epoch_ns = clock_now_ns(), credit_ns = 0;
+    int64_t epoch_ns = loop->epoch_ns, credit_ns = 0;
     for (uint64_t tick = 0; !atomic_load(&loop->stopping) && tick != atomic_load(&loop->final_tick);) {
         int64_t due_ns = epoch_ns + (int64_t)(tick + 1) * loop->tick_ns;
         int64_t now_ns = clock_now_ns();

@@ -12,49 +12,7 @@
 
 #include "drivers/protocol/native_encode.h"
 #include "firmware_sim/clock.h"
-#include "firmware_sim/loop_private.h"
-
-enum {
-    REPLY_ROOM = 8192,
-    BATCH_BYTES = 131072, /* small ticks are written together up to this */
-    READ_BYTES = 65536,
-    DRAIN_NS = 2000000000, /* at the end a reader may take this long between two bytes */
-};
-
-struct session {
-    int open, lagging;
-    uint32_t id; /* from 1, over all links */
-    int reader;
-    uint64_t cursor;
-    int have_seq;
-    uint32_t next_seq;
-    uint64_t lost_frames;
-    struct command_lines lines;
-    unsigned char in[READ_BYTES]; /* read, and from in_pos on not looked at yet */
-    uint32_t in_len, in_pos;
-    uint8_t *out;
-    uint32_t out_len, out_pos;
-    char reply[REPLY_ROOM];
-    uint32_t reply_len;
-    int replies_dropped;
-    int stepping; /* the reply to TIME:STEP waits until all before this tick has gone out */
-    uint64_t step_tick;
-    char step_reply[COMMAND_MAX_REPLY];
-    char peer[64];
-    int64_t moved_ns; /* when a byte last went out */
-};
-
-struct pump {
-    struct loop *loop;
-    const struct link_ops *ops;
-    void *link;
-    int wake_fd;
-    uint32_t out_cap;
-    struct session session[LINK_MAX_SESSIONS];
-    pthread_t thread;
-    int running;
-    int failed; /* a write failed; why is still to be told */
-};
+#include "firmware_sim/pump_private.h"
 
 int pump_open(struct loop *loop, uint32_t index, const struct link_spec *spec, struct pump **out, struct sh_err *err)
 {
@@ -63,6 +21,7 @@ int pump_open(struct loop *loop, uint32_t index, const struct link_spec *spec, s
     if (pump == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     pump->loop = loop;
     pump->ops = link_ops_get(spec->type);
+    pump->nmea = spec->protocol == PROTOCOL_NMEA;
     pump->out_cap = loop->slot_bytes + BATCH_BYTES + REPLY_ROOM;
     pump->wake_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     int rc = pump->wake_fd < 0 ? sh_fail(err, SH_EIO, "eventfd: %s", strerror(errno)) : SH_OK;
@@ -105,6 +64,11 @@ const char *pump_type(const struct pump *pump)
     return pump->ops->name;
 }
 
+int pump_is_nmea(const struct pump *pump)
+{
+    return pump->nmea;
+}
+
 void pump_wake(struct pump *pump)
 {
     uint64_t one = 1;
@@ -143,6 +107,7 @@ static void close_session(struct pump *pump, struct session *s)
     if (!s->open) return;
     s->open = 0;
     set_active(pump, s, 0);
+    if (pump->nmea) return; /* it had nothing to say */
     device_session_closed(pump->loop->device, s->id, s->peer, s->lines.len != 0 || s->lines.overrun);
     loop_poke(pump->loop);
 }
@@ -218,23 +183,29 @@ static void read_commands(struct pump *pump, struct session *s, int index)
     }
 }
 
-/* Tells the reader, in a frame of its own, and the error queue once per episode. */
-static void say_lost(struct pump *pump, struct session *s, uint32_t frames)
+void pump_count_lost(struct pump *pump, struct session *s, uint32_t n)
 {
     struct loop *loop = pump->loop;
-    s->lost_frames += frames;
-    atomic_fetch_add(&loop->counters->reader_lost_frames, frames);
-    struct native_event event = {.code = NATIVE_EV_READER_LOST, .a = frames, .c = s->lost_frames};
-    snprintf(event.text, sizeof event.text, "%u frames lost: the reader is too slow", frames);
-    int64_t t_ns = (int64_t)atomic_load(&loop->ring.released) * loop->tick_ns;
-    s->out_len +=
-        (uint32_t)native_encode_event(s->out + s->out_len, pump->out_cap - s->out_len, &event, t_ns, NATIVE_LOCAL);
+    s->lost_frames += n;
+    atomic_fetch_add(&loop->counters->reader_lost_frames, n);
     if (!s->lagging) {
         char text[96];
         snprintf(text, sizeof text, "session %u, %.50s", s->id, s->peer);
         device_report(loop->device, CMD_E_READER, text);
     }
     s->lagging = 1;
+}
+
+/* Tells the reader in a frame of its own. */
+static void say_lost(struct pump *pump, struct session *s, uint32_t frames)
+{
+    struct loop *loop = pump->loop;
+    pump_count_lost(pump, s, frames);
+    struct native_event event = {.code = NATIVE_EV_READER_LOST, .a = frames, .c = s->lost_frames};
+    snprintf(event.text, sizeof event.text, "%u frames lost: the reader is too slow", frames);
+    int64_t t_ns = (int64_t)atomic_load(&loop->ring.released) * loop->tick_ns;
+    s->out_len +=
+        (uint32_t)native_encode_event(s->out + s->out_len, pump->out_cap - s->out_len, &event, t_ns, NATIVE_LOCAL);
 }
 
 /* One tick into the buffer. Returns 0 when there is none or no room. */
@@ -278,7 +249,8 @@ static void fill(struct pump *pump, struct session *s)
 {
     s->out_len = s->out_pos = 0;
     take_replies(pump, s);
-    while (s->out_len < BATCH_BYTES && take_tick(pump, s))
+    if (pump->nmea) pump_take_nmea(pump, s);
+    while (!pump->nmea && s->out_len < BATCH_BYTES && take_tick(pump, s))
         continue;
     /* The frames of a step go out before its reply: who has that has them all. */
     while (s->stepping && (s->cursor >= s->step_tick || atomic_load(&pump->loop->pacer_done))) {
@@ -335,7 +307,10 @@ static void handle(struct pump *pump, const struct link_event *event)
         close_session(pump, s);
         break;
     case LINK_READABLE:
-        if (s->open) read_commands(pump, s, event->session);
+        if (s->open && pump->nmea)
+            pump_skip_nmea(pump, event->session);
+        else if (s->open)
+            read_commands(pump, s, event->session);
         break;
     case LINK_REFUSED:
         device_report(pump->loop->device, CMD_E_REFUSED, event->peer);
@@ -364,7 +339,8 @@ static void leave_session(struct pump *pump, struct session *s)
 {
     struct loop *loop = pump->loop;
     uint32_t missing = s->have_seq ? loop->seq - s->next_seq : 0; /* the pacing thread is done with seq */
-    if (s->out_pos < s->out_len) missing++;                       /* at least the frame it was in the middle of */
+    if (pump->nmea) missing = pump_nmea_backlog(pump, s);
+    if (s->out_pos < s->out_len) missing++; /* at least the frame it was in the middle of */
     if (atomic_load(&loop->pacer_done) && missing != 0) atomic_fetch_add(&loop->counters->reader_lost_frames, missing);
     set_active(pump, s, 0);
 }

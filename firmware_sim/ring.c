@@ -60,6 +60,7 @@ struct ring_slot *ring_claim(struct ring *ring, uint64_t tick)
         return NULL; /* only the pacing thread can have changed it: lost */
     atomic_store(&slot->busy, 1);
     slot->len = slot->n_frames = slot->first_seq = slot->echoes_tail = slot->n_marks = 0;
+    slot->wake = 0;
     slot->n_fired = slot->n_cast = slot->n_echoes = slot->n_lines = 0;
     return slot;
 }

@@ -37,6 +37,7 @@ struct ring_slot {
     uint8_t *bytes;
     uint32_t len, n_frames;
     uint32_t first_seq; /* set at release */
+    int wake;           /* readers are woken at release though it be empty */
     uint64_t n_fired, n_cast, n_echoes, n_lines;
     uint32_t echoes_tail; /* echoes after the last mark */
     uint32_t n_marks;

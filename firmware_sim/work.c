@@ -234,6 +234,7 @@ static void fill_pulses(struct worker *worker, const struct device_work *work, s
 
 void worker_fill(struct worker *worker, const struct device_work *work, struct ring_slot *slot, uint32_t slot_bytes)
 {
+    slot->wake = work->wake;
     fill_heads(worker, work, slot, slot_bytes);
     if (work->scanning) fill_pulses(worker, work, slot, slot_bytes);
     for (uint32_t i = work->n_events_before; i < work->n_events; i++)

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/cloud/las.h"
 #include "core/scene/ply_rows.h"
 
 struct reading {
@@ -144,9 +145,8 @@ static int read_body(struct reading *g, struct sh_err *err)
     return SH_OK;
 }
 
-int cloud_read(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err)
+static int read_ply(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err)
 {
-    *out = (struct cloud){.epsg = CLOUD_EPSG_UNKNOWN};
     struct reading *g = calloc(1, sizeof *g);
     if (g == NULL) return sh_fail(err, SH_ENOMEM, "no memory to read %s", path);
     g->cloud = out;
@@ -155,6 +155,13 @@ int cloud_read(const char *path, const struct sh_report *report, struct cloud *o
     if (rc == SH_OK) rc = read_body(g, err);
     ply_rows_close(&g->r);
     free(g);
+    return rc;
+}
+
+int cloud_read(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err)
+{
+    *out = (struct cloud){.epsg = CLOUD_EPSG_UNKNOWN};
+    int rc = cloud_is_las(path) ? cloud_read_las(path, report, out, err) : read_ply(path, report, out, err);
     if (rc != SH_OK) cloud_free(out);
     return rc;
 }

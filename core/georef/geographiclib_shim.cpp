@@ -218,6 +218,16 @@ void shim_ecef(double lat_deg, double lon_deg, double height_m, double p_ecef[3]
     }
 }
 
+void shim_geodetic(double lat_deg, double lon_deg, double height_m, const double d_local[3], double geodetic[3])
+{
+    try {
+        LocalCartesian(lat_deg, lon_deg, height_m)
+            .Reverse(d_local[0], d_local[1], d_local[2], geodetic[0], geodetic[1], geodetic[2]);
+    } catch (...) {
+        geodetic[0] = geodetic[1] = geodetic[2] = nan_m;
+    }
+}
+
 void shim_locate_ecef(const double p_ecef[3], double place[3])
 {
     try {

@@ -12,6 +12,9 @@ extern "C" {
 /* WGS 84 geocentric position, and the rotation (row by row) of east, north, up at it to X, Y, Z. */
 void shim_ecef(double lat_deg, double lon_deg, double height_m, double p_ecef[3], double rotation[9]);
 
+/* east, north, up at a place -> latitude, longitude, height. */
+void shim_geodetic(double lat_deg, double lon_deg, double height_m, const double d_local[3], double geodetic[3]);
+
 /* Geodetic place (degrees, degrees, metres) of a geocentric position; not-a-number on failure. */
 void shim_locate_ecef(const double p_ecef[3], double place[3]);
 /* UTM zone, or UPS for zone 0, to degrees and back: 0, or -1 with the reason. zone 0 on the way there: by

@@ -13,7 +13,7 @@ _Static_assert(SCANHEAD_EINPUT == (int)SH_EINPUT && SCANHEAD_EIO == (int)SH_EIO 
                    SCANHEAD_ESTATE == (int)SH_ESTATE,
                "the library's errors are those of core/err.h");
 _Static_assert(SCANHEAD_POINTS == (int)NATIVE_POINTS && SCANHEAD_POSES == (int)NATIVE_POSES &&
-                   SCANHEAD_EV_POSE_LATE == (int)NATIVE_EV_POSE_LATE && SCANHEAD_POSE_NONE == (int)NATIVE_POSE_NONE &&
+                   SCANHEAD_EV_PPS == (int)NATIVE_EV_PPS && SCANHEAD_POSE_NONE == (int)NATIVE_POSE_NONE &&
                    SCANHEAD_LOCAL == (int)NATIVE_LOCAL,
                "types, events and flags are those on the wire");
 

@@ -42,6 +42,9 @@ struct scanhead {
     struct native_anchor anchor;
     uint64_t last_pulse0;
     struct host_poses *poses; /* NULL: none came yet */
+    int have_scan_t0, have_gps;
+    int64_t scan_t0_ns;        /* device time of the scan's start */
+    int64_t gps_at_ns, gps_ns; /* a device time, and the GPS time the head's clock had then */
     struct host_surface *surface;
     uint32_t n_surfaces;
 

@@ -129,16 +129,10 @@ static int publish(struct outfile *file, struct sh_err *err)
     return 0;
 }
 
-int outfile_close(struct outfile *file, int keep, int salvage, struct sh_err *err)
+int outfile_close(struct outfile *file, int keep, struct sh_err *err)
 {
     int rc = keep ? publish(file, err) : 0;
-    if (rc != 0 && salvage) {
-        char why[sizeof err->text];
-        snprintf(why, sizeof why, "%s", err != NULL ? err->text : "");
-        sh_fail(err, rc, "%s; what was written is in %s", why, file->part);
-    } else if (rc != 0 || !keep) {
-        unlink(file->part);
-    }
+    if (rc != 0 || !keep) unlink(file->part);
     release(file);
     return rc;
 }

@@ -16,20 +16,20 @@
 #include "drivers/host/outfile.h"
 #include "drivers/host/ply_header.h"
 #include "drivers/host/recorder_list.h"
+#include "drivers/host/track.h"
 #include "drivers/protocol/bytes.h"
 #include "drivers/protocol/native.h"
 
-enum { RECORD_LEN = 4 * 8 + 4 + 8 + 1 + 1 + 2 + 2, FRAME_LEN = 8, BATCH = 256, TEXT_LEN = 512 };
+enum { RECORD_LEN = 4 * 8 + 4 + 8 + 1 + 1 + 2 + 2, FRAME_LEN = 8, TEXT_LEN = 512 };
 
 struct ply {
     struct outfile file;
+    struct track track;
     struct recorder_options options;
     struct ply_facts facts;
     struct ply_names names;
     int begun;         /* room for the header is made */
     size_t header_len; /* bytes of that room */
-    struct scanhead_point batch[BATCH];
-    double frame[BATCH]; /* of a moving head: frame scalar */
 };
 
 static int ply_open(const char *path, const struct recorder_options *options, void **rec, struct sh_err *err)
@@ -44,6 +44,7 @@ static int ply_open(const char *path, const struct recorder_options *options, vo
         free(ply);
         return rc;
     }
+    ply->track.path = ply->file.path;
     *rec = ply;
     return 0;
 }
@@ -67,34 +68,6 @@ static int begin(struct ply *ply, const struct scanhead *sh, uint32_t n_surfaces
         left -= n;
     }
     return rc;
-}
-
-/* One file holds points of one CRS. */
-static int check_info(struct ply *ply, const struct scanhead_info *info, struct sh_err *err)
-{
-    struct ply_facts *facts = &ply->facts;
-    int crs = info->geo ? info->crs : 0, epsg = info->geo ? info->epsg : 0;
-    int geoid = info->geo && info->geoid_heights;
-    if (facts->have_crs && (facts->crs != crs || facts->epsg != epsg))
-        return sh_fail(err, SH_EFORMAT, "%s: the stream went from EPSG %d to %d; a PLY file holds one CRS",
-                       ply->file.path, facts->epsg, epsg);
-    if (facts->have_crs && facts->geoid_heights != geoid)
-        return sh_fail(err, SH_EFORMAT, "%s: the stream went to other heights (%s); a PLY file holds one kind",
-                       ply->file.path, geoid ? "geoid" : "ellipsoid");
-    if (info->station > 0xffff)
-        return sh_fail(err, SH_EFORMAT, "%s: station %u; a PLY file holds stations up to 65535", ply->file.path,
-                       info->station);
-    if (facts->have_crs && facts->moving != info->moving)
-        return sh_fail(err, SH_EFORMAT, "%s: the stream went on with a head that %s; a PLY file holds either",
-                       ply->file.path, info->moving ? "moves" : "stands still");
-    facts->moving = info->moving;
-    facts->have_crs = 1;
-    facts->crs = crs;
-    facts->epsg = epsg;
-    facts->geoid_heights = geoid;
-    snprintf(facts->idn, sizeof facts->idn, "%s", info->idn);
-    snprintf(facts->profile, sizeof facts->profile, "%s", info->profile);
-    return 0;
 }
 
 /* frame: NULL where there is no such property. */
@@ -143,58 +116,50 @@ static size_t put_ascii(char *to, const struct scanhead_point *p, int degrees, u
     return n;
 }
 
-static int put_batch(struct ply *ply, const struct scanhead_info *info, int n, struct sh_err *err)
+/* Room for the header is made when the head has told how many surfaces there are. */
+static int ply_scan(void *rec, struct sh_err *err)
 {
-    uint8_t *to = outfile_room(&ply->file, BATCH * TEXT_LEN, err);
+    struct ply *ply = rec;
+    const struct scanhead_info *info = &ply->track.info;
+    struct ply_facts *facts = &ply->facts;
+    facts->have_crs = 1;
+    facts->crs = track_crs(&ply->track);
+    facts->epsg = track_epsg(&ply->track);
+    facts->geoid_heights = track_is_geoid(&ply->track);
+    facts->moving = info->moving;
+    snprintf(facts->idn, sizeof facts->idn, "%s", info->idn);
+    snprintf(facts->profile, sizeof facts->profile, "%s", info->profile);
+    return ply->begun ? 0 : begin(ply, ply->track.sh, info->n_surfaces, err);
+}
+
+static int ply_points(void *rec, int n, struct sh_err *err)
+{
+    struct ply *ply = rec;
+    const struct track *t = &ply->track;
+    uint8_t *to = outfile_room(&ply->file, TRACK_BATCH * TEXT_LEN, err);
     if (to == NULL) return SH_EIO;
     size_t used = 0;
     for (int i = 0; i < n; i++) {
-        struct scanhead_point *p = &ply->batch[i];
-        if (p->echo_count == 0 && !ply->options.empty_shots) continue;
-        if (p->echo_count != 0 && isnan(p->x)) { /* no pose: counted, not guessed */
-            ply->facts.n_without_pose++;
-            continue;
+        struct scanhead_point p = t->point[i];
+        const double *frame = t->info.moving ? &t->frame[i] : NULL;
+        if (p.echo_count == 0 && !ply->options.empty_shots) continue;
+        if (!t->info.geo) {
+            double xyz[3] = {p.x, p.y, p.z};
+            station_pose_forward(&t->pose, xyz);
+            p.x = xyz[0];
+            p.y = xyz[1];
+            p.z = xyz[2];
         }
-        const double *frame = info->moving ? &ply->frame[i] : NULL;
-        size_t len = ply->options.ascii ? put_ascii((char *)to + used, p, ply->facts.crs == 3, info->station, frame)
-                                        : put_binary(to + used, p, info->station, frame);
+        size_t len = ply->options.ascii ? put_ascii((char *)to + used, &p, ply->facts.crs == 3, t->info.station, frame)
+                                        : put_binary(to + used, &p, t->info.station, frame);
         if (len > TEXT_LEN)
-            return sh_fail(err, SH_EFORMAT, "%s: a coordinate beyond all measure: %g %g %g", ply->file.path, p->x, p->y,
-                           p->z);
+            return sh_fail(err, SH_EFORMAT, "%s: a coordinate beyond all measure: %g %g %g", ply->file.path, p.x, p.y,
+                           p.z);
         used += len;
         ply->facts.n_vertices++;
     }
     outfile_used(&ply->file, used);
     return 0;
-}
-
-/* Positions of the geo layout need no pose, the frame scalar does. */
-static void set_geo_frames(struct ply *ply, struct scanhead *sh, const struct scanhead_info *info, int n)
-{
-    struct scanhead_pose pose;
-    for (int i = 0; i < n && info->geo && info->moving; i++)
-        ply->frame[i] = scanhead_pose(sh, ply->batch[i].t_ns, &pose) == SCANHEAD_OK ? pose.frame : 0.0;
-}
-
-static int put_points(struct ply *ply, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
-{
-    struct scanhead_info info;
-    if (scanhead_get_info(sh, &info) != 0) {
-        ply->facts.n_unplaced += frame->n_points;
-        return 0;
-    }
-    int rc = check_info(ply, &info, err);
-    if (rc == 0 && !ply->begun) rc = begin(ply, sh, info.n_surfaces, err);
-    for (uint32_t first = 0; rc == 0 && first < frame->n_points;) {
-        int n = scanhead_points(sh, frame, first, ply->batch, BATCH);
-        if (n < 0) return sh_fail(err, n, "%s: %s", ply->file.path, scanhead_error(sh));
-        if (!info.geo && scanhead_to_scene(sh, ply->batch, (uint32_t)n, ply->frame) < 0)
-            return sh_fail(err, SH_EFORMAT, "%s: %s", ply->file.path, scanhead_error(sh));
-        set_geo_frames(ply, sh, &info, n);
-        rc = put_batch(ply, &info, n, err);
-        first += (uint32_t)n;
-    }
-    return rc;
 }
 
 struct naming {
@@ -211,10 +176,10 @@ static void take_name(void *ctx, uint32_t label, const char *object, const char 
 
 static int ply_frame(void *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
 {
+    static const struct track_ops ops = {ply_scan, ply_points};
     struct ply *ply = rec;
     scanhead_get_stats(sh, &ply->facts.stats);
-    if (frame->type == SCANHEAD_POINTS) return put_points(ply, sh, frame, err);
-    if (frame->type != SCANHEAD_SURFACES) return 0;
+    if (frame->type != SCANHEAD_SURFACES) return track_frame(&ply->track, sh, frame, &ops, ply, err);
     struct naming naming = {ply, err, 0};
     native_decode_surfaces(frame->payload, frame->payload_len, take_name, &naming);
     return naming.rc;
@@ -245,6 +210,8 @@ static int move_points(struct ply *ply, size_t header_len, struct sh_err *err)
 static int finish(struct ply *ply, struct sh_err *err)
 {
     int rc = outfile_flush(&ply->file, err);
+    ply->facts.n_unplaced = ply->track.n_unplaced;
+    ply->facts.n_without_pose = ply->track.n_without_pose;
     char *header;
     size_t len;
     if (rc == 0) rc = ply_header_make(&ply->facts, &ply->names, ply->header_len, &header, &len, err);
@@ -259,7 +226,7 @@ static int ply_close(void *rec, int keep, struct sh_err *err)
 {
     struct ply *ply = rec;
     int rc = keep ? finish(ply, err) : 0;
-    int closed = outfile_close(&ply->file, keep && rc == 0, 0, err);
+    int closed = outfile_close(&ply->file, keep && rc == 0, err);
     ply_names_free(&ply->names);
     free(ply);
     return rc != 0 ? rc : closed;

@@ -1,33 +1,69 @@
-#include "drivers/host/pose_file.h"
-
+/* .poses.csv: where the head truly was, what a registration or a trajectory has to find.
+ *
+ * Of a head that stands, one row per scan: the pose takes points from the head's frame to the frame of the recordings
+ * beside it (station_pose.h), whose coordinates are not-a-number where they are geodetic, and the axes then east,
+ * north, up. Of a head that moves, one row per pose, each time once, in the scene frame, times since the scan's start:
+ * a trajectory file of its own (core/pose.h). Gaps, where frames were lost, are lines of comment. */
+#include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "drivers/host/outfile.h"
+#include "drivers/host/recorder_list.h"
+#include "drivers/host/track.h"
+#include "drivers/protocol/native.h"
 
 enum { BATCH = 64, LINE = 512 };
 
 struct pose_file {
     struct outfile out;
-    int begun;
+    struct track track;
+    int titled, begun;
     uint32_t scan;
     int64_t last_ns; /* written last */
 };
 
-static const char title[] = "scan,t_s,x_m,y_m,z_m,qw,qx,qy,qz,frame,flags\n";
-
-int pose_file_open(const char *path, struct pose_file **out, struct sh_err *err)
+static int pose_file_open(const char *path, const struct recorder_options *options, void **rec, struct sh_err *err)
 {
-    *out = calloc(1, sizeof **out);
-    if (*out == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);
-    int rc = outfile_open(&(*out)->out, path, err);
+    (void)options;
+    struct pose_file *file = calloc(1, sizeof *file);
+    if (file == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);
+    int rc = outfile_open(&file->out, path, err);
     if (rc != SH_OK) {
-        free(*out);
-        *out = NULL;
+        free(file);
         return rc;
     }
-    return outfile_write(&(*out)->out, title, sizeof title - 1, err);
+    file->track.path = file->out.path;
+    *rec = file;
+    return SH_OK;
+}
+
+static int put_title(struct pose_file *file, int moving, struct sh_err *err)
+{
+    static const char *const title[] = {"scan,station,epsg,x_m,y_m,z_m,qw,qx,qy,qz,lat_deg,lon_deg,height_m\n",
+                                        "scan,t_s,x_m,y_m,z_m,qw,qx,qy,qz,frame,flags\n"};
+    if (file->titled) return SH_OK;
+    file->titled = 1;
+    return outfile_write(&file->out, title[moving], strlen(title[moving]), err);
+}
+
+static int put_station(void *rec, struct sh_err *err)
+{
+    struct pose_file *file = rec;
+    const struct track *t = &file->track;
+    double q[4], p[3];
+    char row[LINE];
+    if (t->info.moving) return SH_OK;
+    memcpy(p, t->pose.shift_m, sizeof p);
+    if (track_crs(t) == NATIVE_CRS_GEODETIC) p[0] = p[1] = p[2] = NAN;
+    station_pose_quaternion(&t->pose, q);
+    int n = snprintf(row, sizeof row, "%u,%u,%d,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g\n",
+                     t->n_scans, t->info.station, track_epsg(t), p[0], p[1], p[2], q[0], q[1], q[2], q[3],
+                     t->info.lat_deg, t->info.lon_deg, t->info.height_m);
+    int rc = put_title(file, 0, err);
+    return rc != SH_OK ? rc : outfile_write(&file->out, row, (size_t)n, err);
 }
 
 static int put(struct pose_file *file, const struct scanhead_pose *p, struct sh_err *err)
@@ -39,11 +75,12 @@ static int put(struct pose_file *file, const struct scanhead_pose *p, struct sh_
     return outfile_write(&file->out, line, (size_t)n, err);
 }
 
-int pose_file_frame(struct pose_file *file, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
+static int put_poses(struct pose_file *file, struct scanhead *sh, const struct scanhead_frame *frame,
+                     struct sh_err *err)
 {
     struct scanhead_pose pose[BATCH];
     struct scanhead_info info;
-    int n, rc = SH_OK;
+    int n, rc = put_title(file, 1, err);
     if (scanhead_get_info(sh, &info) != SCANHEAD_OK) return SH_OK; /* whose scan it is isn't known yet */
     if (!file->begun || info.scan != file->scan) file->last_ns = INT64_MIN;
     file->begun = 1;
@@ -62,10 +99,20 @@ int pose_file_frame(struct pose_file *file, struct scanhead *sh, const struct sc
     return rc;
 }
 
-int pose_file_close(struct pose_file *file, int keep, struct sh_err *err)
+static int pose_file_frame(void *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
 {
-    if (file == NULL) return SH_OK;
-    int rc = outfile_close(&file->out, keep, 0, err);
-    free(file);
-    return rc;
+    static const struct track_ops ops = {put_station, NULL};
+    struct pose_file *file = rec;
+    if (frame->type == SCANHEAD_POSES) return put_poses(file, sh, frame, err);
+    return track_frame(&file->track, sh, frame, &ops, file, err);
 }
+
+static int pose_file_close(void *rec, int keep, struct sh_err *err)
+{
+    struct pose_file *file = rec;
+    int rc = keep ? put_title(file, 0, err) : SH_OK, closed = outfile_close(&file->out, keep && rc == SH_OK, err);
+    free(file);
+    return rc != SH_OK ? rc : closed;
+}
+
+const struct recorder_ops recorder_poses = {".poses.csv", pose_file_open, pose_file_frame, pose_file_close};

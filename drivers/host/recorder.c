@@ -6,7 +6,8 @@
 
 #include "drivers/host/recorder_list.h"
 
-static const struct recorder_ops *const recorders[] = {&recorder_ply, &recorder_shs};
+static const struct recorder_ops *const recorders[] = {&recorder_ply,   &recorder_las,    &recorder_ptx, &recorder_e57,
+                                                       &recorder_poses, &recorder_pcapng, &recorder_shs};
 
 enum { N_RECORDERS = sizeof recorders / sizeof recorders[0] };
 

@@ -8,6 +8,8 @@
 struct recorder_options {
     int ascii;       /* PLY as text */
     int empty_shots; /* keep shots without echo, where the format can */
+    /* Told at the end what the format had no room for. May be NULL; must live until close. */
+    const struct sh_report *report;
 };
 
 struct recorder_ops {

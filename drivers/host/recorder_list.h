@@ -4,6 +4,7 @@
 
 #include "drivers/host/recorder.h"
 
-extern const struct recorder_ops recorder_ply, recorder_shs;
+extern const struct recorder_ops recorder_ply, recorder_las, recorder_ptx, recorder_e57, recorder_poses,
+    recorder_pcapng, recorder_shs;
 
 #endif

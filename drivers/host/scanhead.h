@@ -63,6 +63,7 @@ enum scanhead_event_code {
     SCANHEAD_EV_ERROR = 7,
     SCANHEAD_EV_SETTINGS = 8,
     SCANHEAD_EV_POSE_LATE = 9,
+    SCANHEAD_EV_PPS = 10, /* a full second: UTC (s since 1970), device time of the edge (ns), GPS time (s) */
 };
 
 struct scanhead_frame {
@@ -118,6 +119,7 @@ struct scanhead_info {
     double scale[3];   /* units of the CRS per count */
     double lat_deg, lon_deg, height_m, station_m[3];
     double rotation[9]; /* socs -> scene frame, row by row */
+    double axes[9];     /* scene frame at the anchor -> axes of the CRS (geodetic: east, north, up), row by row */
     double prr_hz, lines_hz, pan_deg_s, range_min_m, range_max_m;
     uint32_t station, n_surfaces, frames, scan;
     int moving; /* 1: the head moves; station_m and rotation do not say where it is, poses do */
@@ -148,6 +150,14 @@ int scanhead_poses(struct scanhead *sh, const struct scanhead_frame *frame, uint
  * time where the head moves. frame (may be NULL): the frame scalar of each, 0 where it stands. Returns how many points
  * had no pose, because frames were lost: their coordinates are NaN. A negative error for another layout. */
 int scanhead_to_scene(struct scanhead *sh, struct scanhead_point *points, uint32_t n, double *frame);
+
+/* GPS time of t_ns since the scan's start (scanhead_point.t_ns) by the head's clock, in LAS's adjusted standard form:
+ * seconds since 1980-01-06T00:00:00Z without leap seconds, less 1e9. Add 1e9 and divide by 604800 for week and second
+ * of week. Good for frames up to the one that scanhead_next returned last: it goes by the last time the head told (at
+ * the scan's start and each second; scanhead_frame.event SCAN_START, PPS), exact to the ns where the head's clock has
+ * no drift; a double of that size has steps of 0.12 us. SCANHEAD_ESTATE where the head doesn't know the time, or before
+ * it and the scan's start were seen, which takes a second at most. */
+int scanhead_gps_time(const struct scanhead *sh, int64_t t_ns, double *adjusted_standard_gps_time_s);
 
 /* Name of a label: 1 and the two names (owned by the handle), or 0 when not seen yet. */
 int scanhead_surface(const struct scanhead *sh, uint32_t label, const char **object, const char **material);

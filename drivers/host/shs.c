@@ -25,10 +25,9 @@ static int shs_frame(void *rec, struct scanhead *sh, const struct scanhead_frame
     return outfile_write(rec, frame->raw, frame->raw_len, err);
 }
 
-/* Any part of a stream is a stream, so what was written before a failure is worth keeping. */
 static int shs_close(void *rec, int keep, struct sh_err *err)
 {
-    int rc = outfile_close(rec, keep, 1, err);
+    int rc = outfile_close(rec, keep, err);
     free(rec);
     return rc;
 }

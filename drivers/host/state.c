@@ -51,9 +51,30 @@ static int absorb_points(struct scanhead *sh, const struct native_header *header
     struct native_points points;
     if (native_decode_points(payload, header->length, &points) != 0) return bad(sh, "wrong points");
     if (sh->have_pulse && points.pulse0 < sh->last_pulse0) forget(sh);
+    sh->scan_t0_ns = (int64_t)((uint64_t)header->t_ns - (uint64_t)points.t0_ns);
+    sh->have_scan_t0 = 1;
     sh->have_pulse = 1;
     sh->last_pulse0 = points.pulse0;
     return 0;
+}
+
+/* The head's clock at a device time. GPS time fits: it is below 2^63 ns until 2272. */
+static void set_gps(struct scanhead *sh, uint64_t at_ns, uint64_t gps_ns)
+{
+    sh->gps_at_ns = (int64_t)at_ns;
+    sh->gps_ns = (int64_t)gps_ns;
+    sh->have_gps = 1;
+}
+
+static void absorb_time(struct scanhead *sh, const struct native_event *event)
+{
+    if (event->code == NATIVE_EV_SCAN_START) {
+        sh->scan_t0_ns = (int64_t)event->b;
+        sh->have_scan_t0 = 1;
+        set_gps(sh, event->b, event->c);
+        sh->have_gps = event->c != 0;
+    }
+    if (event->code == NATIVE_EV_PPS) set_gps(sh, event->b, event->c * 1000000000u);
 }
 
 static int absorb_event(struct scanhead *sh, const struct native_header *header, const uint8_t *payload)
@@ -63,6 +84,7 @@ static int absorb_event(struct scanhead *sh, const struct native_header *header,
     if (event.code == NATIVE_EV_READER_LOST) sh->reader_lost = event.c;
     if (event.code == NATIVE_EV_OVERRUN) sh->pulses_lost += event.b;
     if (event.code == NATIVE_EV_SCAN_START && sh->have_descriptor && event.a != sh->descriptor.scan) forget(sh);
+    absorb_time(sh, &event);
     return 0;
 }
 
@@ -169,6 +191,7 @@ int scanhead_get_info(const struct scanhead *sh, struct scanhead_info *info)
     memcpy(info->anchor, a->anchor, sizeof info->anchor);
     memcpy(info->station_m, a->station_m, sizeof info->station_m);
     memcpy(info->rotation, a->rotation, sizeof info->rotation);
+    memcpy(info->axes, a->axes, sizeof info->axes);
     info->prr_hz = (double)d->prr_uhz / 1e6;
     info->lines_hz = (double)d->lines_uhz / 1e6;
     info->pan_deg_s = (double)d->pan_udeg_s / 1e6;
@@ -179,6 +202,17 @@ int scanhead_get_info(const struct scanhead *sh, struct scanhead_info *info)
     info->frames = d->frames;
     info->scan = d->scan;
     info->moving = a->moving & 1;
+    return SCANHEAD_OK;
+}
+
+int scanhead_gps_time(const struct scanhead *sh, int64_t t_ns, double *adjusted_standard_gps_time_s)
+{
+    if (!sh->have_gps || !sh->have_scan_t0) return SCANHEAD_ESTATE;
+    /* Modulo 2^64, so that a wrong stream can't overflow; seconds and the rest apart, so that only the sum is rounded.
+     */
+    uint64_t gps_ns = (uint64_t)sh->gps_ns + ((uint64_t)sh->scan_t0_ns + (uint64_t)t_ns - (uint64_t)sh->gps_at_ns);
+    int64_t s = (int64_t)gps_ns / 1000000000, ns = (int64_t)gps_ns % 1000000000;
+    *adjusted_standard_gps_time_s = (double)(s - 1000000000) + (double)ns / 1e9;
     return SCANHEAD_OK;
 }
 

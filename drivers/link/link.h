@@ -21,6 +21,7 @@ struct link_spec {
     char address[64]; /* tcp: numeric or name; empty: 127.0.0.1 */
     int port;         /* tcp: 0 lets the system choose */
     int max_sessions; /* tcp: 1..LINK_MAX_SESSIONS */
+    int protocol;     /* what its owner speaks on it; 0: the usual. Links don't look at it */
     int fd;           /* fd: a connected stream descriptor (socket pair), taken over */
 };
 

@@ -84,6 +84,8 @@ struct native_anchor {
     double scale[3];     /* geo: position = anchor + scale[k] * count[k]; 0, or not there: scale_m */
     uint32_t heights;    /* enum native_heights, of utm and geodetic */
     uint32_t reserved2;
+    double axes[9]; /* differences in the scene frame at the anchor -> axes of the CRS, row by row, without its scale;
+                       geodetic: -> east, north, up. All 0, or not there: the unit matrix */
 };
 
 struct native_points { /* head of a points payload, 40 bytes, then n points of 20 */
@@ -134,7 +136,7 @@ struct native_telemetry {
 
 enum native_event_code {
     NATIVE_EV_STATE = 1,       /* a: new state, b: state before */
-    NATIVE_EV_SCAN_START = 2,  /* a: scan number, b: device time of pulse 0, ns */
+    NATIVE_EV_SCAN_START = 2,  /* a: scan number, b: device time of pulse 0, ns, c: its GPS time, ns; 0: unknown */
     NATIVE_EV_SCAN_END = 3,    /* a: scan number, b: pulses fired, c: pulses lost */
     NATIVE_EV_OVERRUN = 4,     /* the head could not keep up; a: first lost pulse, b: pulses lost, c: ticks lost */
     NATIVE_EV_READER_LOST = 5, /* this reader could not follow; a: frames lost now, b: 0, c: frames lost in all */
@@ -142,6 +144,8 @@ enum native_event_code {
     NATIVE_EV_ERROR = 7,       /* a: SCPI error number (two's complement) */
     NATIVE_EV_SETTINGS = 8,    /* a: first pulse with the new settings */
     NATIVE_EV_POSE_LATE = 9,   /* no pose in time; a: poses made up so far, c: ns since the last one that came */
+    NATIVE_EV_PPS = 10, /* a full second of the head's clock; a: UTC, s since 1970, b: device time of the edge, ns,
+                          c: GPS time, s; the text is the UTC */
 };
 struct native_event {
     uint32_t code, reserved;

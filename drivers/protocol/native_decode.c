@@ -5,8 +5,8 @@
 #include "drivers/protocol/fields.h"
 #include "drivers/protocol/native.h"
 
-/* Heads before the geodetic CRS sent no scales by axis and no kind of height. */
-enum { ANCHOR_LEN_FIRST = 168, ANCHOR_LEN = 200 };
+/* The first heads sent no scales by axis, no kind of height and no axes. */
+enum { ANCHOR_LEN_FIRST = 168, ANCHOR_LEN = 272 };
 
 int native_decode_descriptor(const uint8_t *payload, size_t len, struct native_descriptor *out)
 {
@@ -25,6 +25,11 @@ int native_decode_anchor(const uint8_t *payload, size_t len, struct native_ancho
     if (rc != 0) return rc;
     for (int i = 0; i < 3; i++)
         if (out->scale[i] == 0) out->scale[i] = out->scale_m;
+    int turned = 0;
+    for (int i = 0; i < 9; i++)
+        turned |= out->axes[i] != 0;
+    for (int i = 0; i < 3 && !turned; i++)
+        out->axes[4 * i] = 1;
     if (out->crs > NATIVE_CRS_GEODETIC || out->heights > NATIVE_HEIGHTS_GEOID) return SH_EFORMAT;
     return 0;
 }

@@ -32,6 +32,8 @@ static inline struct command_device command_test_device(void)
         .state = HEAD_IDLE,
         .frames_done = 7,
         .t_ns = INT64_C(1234567890123),
+        .utc = "2026-01-01T00:20:34.567890123Z",
+        .gps = "2399,346852.567890123",
     };
     dev.defaults = dev.settings;
     return dev;

@@ -78,6 +78,8 @@ static const struct {
     {"SCAN:COUNT", "SCAN:COUN", 1, 0, ""},
     {"HELP", "HELP", 1, 0, ""},
     {"TIME", "TIME", 1, 0, ""},
+    {"TIME:UTC", "TIME:UTC", 1, 0, ""},
+    {"TIME:GPS", "TIME:GPS", 1, 0, ""},
     {"TIME:STEP", "TIME:STEP", 0, 1, " 5"},
 };
 
@@ -185,6 +187,8 @@ static void replies_of_queries(void **ctx)
     expect(&dev, "SCAN:LINE:STAR?", "-30");
     expect(&dev, "SCAN:COUN?", "7");
     expect(&dev, "TIME?", "1234567890123");
+    expect(&dev, "TIME:UTC?", "2026-01-01T00:20:34.567890123Z");
+    expect(&dev, "TIME:GPS?", "2399,346852.567890123");
     dev.settings.line_start_udeg = -1;
     expect(&dev, "SCAN:LINE:STAR?", "-0.000001");
     dev.settings.line_start_udeg = -1500000;
@@ -306,6 +310,15 @@ static void a_line_too_long_is_dropped_whole(void **ctx)
     expect_error(&dev, 1, line, CMD_E_OVERRUN);
 }
 
+static void a_head_without_the_time_says_so(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = command_test_device();
+    dev.utc[0] = dev.gps[0] = '\0';
+    expect_error(&dev, 1, "TIME:UTC?", CMD_E_SETTINGS);
+    expect_error(&dev, 1, "TIME:GPS?", CMD_E_SETTINGS);
+}
+
 static void help_lists_every_header_in_one_line(void **ctx)
 {
     (void)ctx;
@@ -335,6 +348,7 @@ int main(void)
         cmocka_unit_test(state_names_and_control),
         cmocka_unit_test(wrong_lines_give_one_error),
         cmocka_unit_test(a_line_too_long_is_dropped_whole),
+        cmocka_unit_test(a_head_without_the_time_says_so),
         cmocka_unit_test(help_lists_every_header_in_one_line),
     };
     return cmocka_run_group_tests_name("command", tests, NULL, NULL);

@@ -227,7 +227,7 @@ static void defaults_are_those_of_the_table(void **state)
     assert_true(cfg->tick_hz == 1000 && cfg->ahead_ms == 64 && cfg->queue_ms == 250 && cfg->late_ms == 100);
     assert_int_equal(cfg->threads, 0);
     assert_int_equal(cfg->pace, PACE_REALTIME);
-    assert_true(cfg->utc_epoch_s == 0.0);
+    assert_string_equal(cfg->time.epoch, "none");
 }
 
 static void odd_but_right_configurations_load(void **state)

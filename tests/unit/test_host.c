@@ -771,6 +771,42 @@ static void test_tcp6(void **state)
     check_tcp(AF_INET6, "[::1]");
 }
 
+/* 2011-09-14T01:46:25Z is GPS 1e9 s (published by LIGO's tconvert), so its adjusted standard time is 0. */
+static void test_gps_time(void **state)
+{
+    (void)state;
+    struct scanhead_frame f;
+    double t_s = -1.0;
+    int head;
+    struct scanhead *sh = open_pair(&head);
+    assert_int_equal(scanhead_gps_time(sh, 0, &t_s), SCANHEAD_ESTATE);
+    put_event(head, NATIVE_EV_SCAN_START, 1, 5000000000, 1000000000000000000, 0);
+    expect_frame(sh, SCANHEAD_EVENT, &f);
+    assert_int_equal(scanhead_gps_time(sh, 0, &t_s), 0);
+    assert_true(t_s == 0.0);
+    assert_int_equal(scanhead_gps_time(sh, 1234567890, &t_s), 0);
+    assert_true(fabs(t_s - 1.23456789) < 1e-15); /* seconds and fraction are rounded apart */
+    assert_int_equal(scanhead_gps_time(sh, -2500000000, &t_s), 0);
+    assert_true(t_s == -2.5);
+    /* The head's clock was set 3.75 s on between: the second of GPS 1e9 + 5 began 1.25 s after the scan. */
+    put_event(head, NATIVE_EV_PPS, 1315964790, 6250000000, 1000000005, 0);
+    expect_frame(sh, SCANHEAD_EVENT, &f);
+    assert_int_equal(f.event, SCANHEAD_EV_PPS);
+    assert_int_equal(scanhead_gps_time(sh, 1250000001, &t_s), 0);
+    assert_true(fabs(t_s - 5.000000001) < 1e-15);
+    /* A scan of which the start was not seen: its points tell when that was, here 500 ns after power-up. */
+    put_points(head, 3, 0);
+    expect_frame(sh, SCANHEAD_POINTS, &f);
+    assert_int_equal(scanhead_gps_time(sh, 7000000000 - 500, &t_s), 0);
+    assert_true(t_s == 5.75);
+    /* A head that doesn't know the time. */
+    put_event(head, NATIVE_EV_SCAN_START, 2, 9000000000, 0, 0);
+    expect_frame(sh, SCANHEAD_EVENT, &f);
+    assert_int_equal(scanhead_gps_time(sh, 0, &t_s), SCANHEAD_ESTATE);
+    close(head);
+    scanhead_close(sh);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -791,6 +827,7 @@ int main(void)
         cmocka_unit_test(test_pty),
         cmocka_unit_test(test_tcp),
         cmocka_unit_test(test_tcp6),
+        cmocka_unit_test(test_gps_time),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -162,15 +162,15 @@ static void test_end_of_the_path(void **state)
     for (int i = 0; i < 3; i++) {
         char stats[352], poses[352];
         snprintf(stats, sizeof stats, "%s", wire_path(wire, "stats.json"));
-        snprintf(poses, sizeof poses, "%s", wire_path(wire, "poses.csv"));
-        const char *const args[] = {"record",  config,  "--stats",   stats,   "--poses",    poses,
+        snprintf(poses, sizeof poses, "%s", wire_path(wire, "ride.poses.csv"));
+        const char *const args[] = {"record",  config,  "--stats",   stats,   "-o",         poses,
                                     "--quiet", "--set", runs[i].set, "--set", runs[i].more, NULL};
         assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "head.out", "head.err", -1)), 0);
         double pulses = (double)stats_uint(wire, "pulses");
         /* all of the sweep is cast; a frame ends with its last line, of 1/97.7 s */
         assert_true(fabs(pulses - runs[i].s * RIDE.prr_hz) < (runs[i].frames != 0 ? 2 * 1264 * 2 : 1.01));
         size_t len;
-        char *text = wire_read(wire_path(wire, "poses.csv"), &len), *last = text + len - 2;
+        char *text = wire_read(wire_path(wire, "ride.poses.csv"), &len), *last = text + len - 2;
         while (last[-1] != '\n')
             last--;
         unsigned scan;

@@ -153,18 +153,52 @@ static void interrupt_record(struct wire *wire, const char *const *args, int sig
     assert_int_equal(status, 0);
 }
 
+static uint64_t le64(const char *p)
+{
+    uint64_t v = 0;
+    for (int i = 7; i >= 0; i--)
+        v = v << 8 | (uint8_t)p[i];
+    return v;
+}
+
+/* The points of a LAS file by its header, whose records are of 32 bytes; and it must be as long as that says. */
+static uint64_t las_points(const struct wire *wire, const char *name)
+{
+    size_t len;
+    char *las = wire_read(wire_path(wire, name), &len);
+    uint64_t n = le64(las + 247), first = le64(las + 96) & UINT32_MAX;
+    assert_int_equal(strncmp(las, "LASF", 4), 0);
+    assert_int_equal(first + 32 * n, len);
+    free(las);
+    return n;
+}
+
+/* An E57 file is finished when its header tells its length. */
+static void expect_whole_e57(const struct wire *wire, const char *name)
+{
+    size_t len;
+    char *e57 = wire_read(wire_path(wire, name), &len);
+    assert_int_equal(strncmp(e57, "ASTM-E57", 8), 0);
+    assert_int_equal(le64(e57 + 16), len);
+    free(e57);
+}
+
 static void test_record_off_line(void **state)
 {
     struct wire *wire = *state;
-    char config[352], ply[352];
+    char config[352], ply[352], las[352], e57[352];
     room_write(wire);
     snprintf(config, sizeof config, "%s", room_config_write(wire, &ENDLESS));
     snprintf(ply, sizeof ply, "%s", wire_path(wire, "x.ply"));
+    snprintf(las, sizeof las, "%s", wire_path(wire, "x.las"));
+    snprintf(e57, sizeof e57, "%s", wire_path(wire, "x.e57"));
     interrupt_record(wire,
-                     (const char *const[]){"record", config, "-o", ply, "--duration", "1e6", "--stats",
-                                           wire_path(wire, "stats.json"), NULL},
+                     (const char *const[]){"record", config, "-o", ply, "-o", las, "-o", e57, "--duration", "1e6",
+                                           "--stats", wire_path(wire, "stats.json"), NULL},
                      SIGINT);
     assert_int_equal(ply_points(wire, "x.ply"), stats_uint(wire, "points"));
+    assert_int_equal(las_points(wire, "x.las"), stats_uint(wire, "points"));
+    expect_whole_e57(wire, "x.e57");
     assert_true(stats_uint(wire, "points") > 1000);
 }
 

@@ -1,0 +1,64 @@
+/* The rotation in the map at its centre. */
+#include <math.h>
+#include <string.h>
+
+#include "core/georef/private.h"
+#include "core/mat3.h"
+
+/* Far enough for nanometres of rounding to be 1e-10 rad, near enough for a quadratic map to be linear by symmetry. */
+static const double STEP_M = 100.0;
+
+/* Column k is what a metre along axis k becomes. */
+static void jacobian(const struct georef *georef, double j[9])
+{
+    double lat_m, lon_m, axis_m, out[2][3];
+    for (int k = 0; k < 3; k++) {
+        for (int side = 0; side < 2; side++) {
+            double d[3] = {0.0, 0.0, 0.0};
+            d[k] = side == 0 ? -STEP_M : STEP_M;
+            shim_map_forward(georef->map, 1, &d[0], &d[1], &d[2], &out[side][0], &out[side][1], &out[side][2]);
+        }
+        for (int i = 0; i < 3; i++)
+            j[3 * i + k] = (out[1][i] - out[0][i]) / (2.0 * STEP_M);
+    }
+    if (georef->crs != GEOREF_GEODETIC) return;
+    georef_degrees(georef, 0.0, &lat_m, &lon_m, &axis_m);
+    for (int k = 0; k < 3; k++) { /* latitude, longitude -> east, north */
+        double north = j[k] * lat_m;
+        j[k] = j[3 + k] * lon_m;
+        j[3 + k] = north;
+    }
+}
+
+/* Inverse transposed: the matrix of cofactors over the determinant. */
+static int invert(const double m[9], double out[9])
+{
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) {
+            int a = (i + 1) % 3, b = (i + 2) % 3, c = (k + 1) % 3, d = (k + 2) % 3;
+            out[3 * i + k] = m[3 * a + c] * m[3 * b + d] - m[3 * a + d] * m[3 * b + c];
+        }
+    double det = m[0] * out[0] + m[1] * out[1] + m[2] * out[2];
+    for (int i = 0; i < 9; i++)
+        out[i] /= det;
+    return det > 0.1; /* false for not-a-number */
+}
+
+/* The map is a rotation, and stretching along its own axes before or after: the rotation is the polar factor, by
+ * Newton's iteration (Higham 1986), which converges quadratically from near. */
+void georef_axes(const struct georef *georef, double rotation[9])
+{
+    double m[9], other[9];
+    if (!georef_has_map(georef)) {
+        memcpy(rotation, georef->rotation, sizeof m);
+        return;
+    }
+    memcpy(rotation, mat3_unit, sizeof m);
+    jacobian(georef, m);
+    for (int n = 0; n < 8; n++) {
+        if (!invert(m, other)) return;
+        for (int i = 0; i < 9; i++)
+            m[i] = 0.5 * (m[i] + other[i]);
+    }
+    memcpy(rotation, m, sizeof m);
+}

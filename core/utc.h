@@ -1,0 +1,67 @@
+/* UTC, TAI and GPS time.
+ *
+ * One continuous scale inside: TAI in nanoseconds since 1970-01-01T00:00:00 TAI, which is what CLOCK_TAI counts; dates
+ * are taken from 1972 to 2199, well within int64. UTC is TAI less a whole number of seconds that a table gives; during
+ * a leap second the time of day reads 23:59:60. GPS time is TAI less 19 s, counted from 1980-01-06T00:00:00Z in weeks
+ * of 604,800 s (IS-GPS-200, 3.3.4 and 6.2.4); a table is not needed for it. POSIX time has no leap seconds: 23:59:60
+ * has the number of the second after it (POSIX.1, 4.16).
+ *
+ * The table is IERS Bulletin C's. It has an end: leap seconds after expires_s are not known yet.
+ * Pure; any thread. */
+#ifndef CORE_UTC_H
+#define CORE_UTC_H
+
+#include <stdint.h>
+
+#include "core/err.h"
+
+enum { UTC_MAX_LEAPS = 64, UTC_TEXT_LEN = 32 };
+
+#define UTC_SECOND_NS ((int64_t)1000000000)
+
+struct utc_leap {
+    int64_t posix_s;       /* from this second on, the one after the leap second, */
+    int32_t tai_minus_utc; /* TAI is ahead by so many seconds */
+};
+
+struct utc_table {
+    uint32_t n; /* at least 1, ascending */
+    struct utc_leap leap[UTC_MAX_LEAPS];
+    int64_t expires_s; /* POSIX second up to which the table is complete */
+};
+
+struct utc_time {
+    int year, month, day, hour, minute; /* month and day from 1 */
+    int second;                         /* 60 in a leap second */
+    int32_t ns;
+};
+
+struct utc_gps {
+    int64_t week; /* since 1980-01-06, not cut to 10 or 13 bits */
+    int64_t ns;   /* of the week */
+};
+
+/* What was known when this was written. */
+const struct utc_table *utc_table_builtin(void);
+/* The text of a leap-seconds.list (IERS, NIST, tzdata): NTP seconds and TAI-UTC, `#@` the expiry. On failure out is
+ * unspecified; the error names the line. */
+int utc_table_parse(const char *text, struct utc_table *out, struct sh_err *err);
+
+void utc_from_tai(const struct utc_table *table, int64_t tai_ns, struct utc_time *out);
+/* SH_EINPUT for a date outside 1972..2199, a date or time of day that does not exist, or a second 60 where the table
+ * has none. */
+int utc_to_tai(const struct utc_table *table, const struct utc_time *utc, int64_t *tai_ns, struct sh_err *err);
+
+int64_t utc_posix_from_tai(const struct utc_table *table, int64_t tai_ns); /* ns since 1970 */
+int64_t utc_tai_from_posix(const struct utc_table *table, int64_t posix_ns);
+
+/* GPS time in nanoseconds since its epoch, and as week and time of week. */
+int64_t utc_gps_ns(int64_t tai_ns);
+struct utc_gps utc_gps_week(int64_t tai_ns);
+
+/* ISO 8601: "2016-12-31T23:59:60Z", with up to 9 decimals of the second. Nothing else is taken. */
+int utc_parse(const char *text, struct utc_time *out, struct sh_err *err);
+/* The same; n decimals (0 to 9) of the second, cut, not rounded: a second begins when it begins. */
+void utc_format(const struct utc_time *utc, int decimals, char buf[UTC_TEXT_LEN]);
+
+#endif

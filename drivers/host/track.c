@@ -1,0 +1,184 @@
+#include "drivers/host/track.h"
+
+#include <math.h>
+
+#include "drivers/protocol/native.h"
+
+int track_crs(const struct track *track)
+{
+    return track->crs;
+}
+
+int track_epsg(const struct track *track)
+{
+    return track->epsg;
+}
+
+int track_is_geoid(const struct track *track)
+{
+    return track->geoid;
+}
+
+int track_check_metres(const struct track *t, struct sh_err *err)
+{
+    if (t->crs != NATIVE_CRS_GEODETIC) return 0;
+    return sh_fail(err, SH_EFORMAT,
+                   "%s: this format holds metres, and output.crs is geodetic; allowed local, ecef, utm, or .las, .ply",
+                   t->path);
+}
+
+/* In steps of this the recording of a moving head holds 200 km in 32 bits. */
+static const double MOVING_SCALE_M = 1e-4;
+
+static int check_info(struct track *t, struct sh_err *err)
+{
+    const struct scanhead_info *info = &t->info;
+    int crs = info->geo ? info->crs : NATIVE_CRS_LOCAL, epsg = info->geo ? info->epsg : 0;
+    int geoid = info->geo && info->geoid_heights;
+    if (t->begun && (t->crs != crs || t->epsg != epsg))
+        return sh_fail(err, SH_EFORMAT, "%s: the stream went from EPSG %d to %d; a file holds one CRS", t->path,
+                       t->epsg, epsg);
+    if (t->begun && t->geoid != geoid)
+        return sh_fail(err, SH_EFORMAT, "%s: the stream went to other heights (%s); a file holds one kind", t->path,
+                       geoid ? "geoid" : "ellipsoid");
+    if (t->begun && t->moving != info->moving)
+        return sh_fail(err, SH_EFORMAT, "%s: the stream went on with a head that %s; a file holds either", t->path,
+                       info->moving ? "moves" : "stands still");
+    if (info->station > UINT16_MAX)
+        return sh_fail(err, SH_EFORMAT, "%s: station %u; a file holds stations up to 65535", t->path, info->station);
+    t->crs = crs;
+    t->epsg = epsg;
+    t->geoid = geoid;
+    t->moving = info->moving;
+    t->scale_m = info->moving && info->scale_m > 0 && info->scale_m < MOVING_SCALE_M ? MOVING_SCALE_M : info->scale_m;
+    t->begun = 1;
+    return 0;
+}
+
+static void set_pose(struct track *t)
+{
+    static const struct station_pose same = {{0, 0, 0}, {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    if (t->info.moving && !t->info.geo)
+        t->pose = same;
+    else
+        station_pose_of(&t->info, &t->pose);
+}
+
+/* A descriptor that is no repetition, pulses that go back, another station: whichever of them reached us. */
+static int begins_scan(const struct track *t, const struct scanhead_frame *frame)
+{
+    return t->n_scans == 0 || t->new_scan || frame->pulse0 < t->last_pulse0 || t->info.station != t->last_station;
+}
+
+/* The end of a line tells where the next one begins. Where it was lost, the times in the frame do, as long as the pulse
+ * rate is that of the descriptor. */
+static uint64_t first_row(const struct track *t, const struct scanhead_frame *frame)
+{
+    if (t->have_next_line && t->next_line == frame->scan_line && t->next_line_pulse0 <= frame->pulse0)
+        return frame->pulse0 - t->next_line_pulse0;
+    double since_s = 1e-9 * (double)(frame->scan_t0_ns - frame->line_t0_ns);
+    return since_s > 0 ? (uint64_t)llround(since_s * t->info.prr_hz) : 0;
+}
+
+/* Echoes of one pulse follow each other: a new pulse begins wherever the number is 0 or 1. */
+static uint64_t number_rows(struct track *t, uint64_t row, int n)
+{
+    for (int i = 0; i < n; i++) {
+        if (t->point[i].echo <= 1) row++;
+        t->row[i] = (uint32_t)(row - 1);
+    }
+    return row;
+}
+
+/* Positions of the geo layout need no pose, the frame scalar does. */
+static void set_geo_frames(struct track *t, struct scanhead *sh, int n)
+{
+    struct scanhead_pose pose;
+    for (int i = 0; i < n; i++)
+        t->frame[i] = scanhead_pose(sh, t->point[i].t_ns, &pose) == SCANHEAD_OK ? pose.frame : 0.0;
+}
+
+/* How many are left, or a negative error. */
+static int place_moving(struct track *t, struct scanhead *sh, int n, struct sh_err *err)
+{
+    int kept = 0;
+    if (t->info.geo) {
+        set_geo_frames(t, sh, n);
+        return n;
+    }
+    int lost = scanhead_to_scene(sh, t->point, (uint32_t)n, t->frame);
+    if (lost < 0) return sh_fail(err, lost, "%s: %s", t->path, scanhead_error(sh));
+    for (int i = 0; i < n; i++) {
+        if (t->point[i].echo_count != 0 && isnan(t->point[i].x)) {
+            t->n_without_pose++;
+            continue;
+        }
+        t->point[kept] = t->point[i];
+        t->row[kept] = t->row[i];
+        t->frame[kept++] = t->frame[i];
+    }
+    return kept;
+}
+
+static int take_points(struct track *t, struct scanhead *sh, const struct scanhead_frame *frame,
+                       const struct track_ops *ops, void *rec, struct sh_err *err)
+{
+    if (scanhead_get_info(sh, &t->info) != 0) {
+        t->n_unplaced += frame->n_points;
+        return 0;
+    }
+    int begins = begins_scan(t, frame), rc = check_info(t, err);
+    t->sh = sh;
+    t->line = frame->scan_line;
+    t->t0_ns = frame->scan_t0_ns;
+    if (rc == 0 && begins) {
+        set_pose(t);
+        t->n_scans++;
+        t->new_scan = 0;
+        if (ops->scan != NULL) rc = ops->scan(rec, err);
+    }
+    t->last_pulse0 = frame->pulse0;
+    t->last_station = t->info.station;
+    uint64_t row = first_row(t, frame);
+    if (rc == 0 && row + frame->n_points > UINT32_MAX)
+        rc = sh_fail(err, SH_EFORMAT, "%s: line %u has more than 2^32 pulses", t->path, t->line);
+    for (uint32_t first = 0; rc == 0 && ops->points != NULL && first < frame->n_points;) {
+        int n = scanhead_points(sh, frame, first, t->point, TRACK_BATCH);
+        if (n < 0) return sh_fail(err, n, "%s: %s", t->path, scanhead_error(sh));
+        row = number_rows(t, row, n);
+        int kept = t->info.moving ? place_moving(t, sh, n, err) : n;
+        rc = kept < 0 ? kept : ops->points(rec, kept, err);
+        first += (uint32_t)n;
+    }
+    return rc;
+}
+
+static void take_line_end(struct track *t, const struct scanhead_frame *frame)
+{
+    struct native_line_end end;
+    t->have_next_line = native_decode_line_end(frame->payload, frame->payload_len, &end) == 0;
+    if (!t->have_next_line) return;
+    t->next_line = end.line + 1;
+    t->next_line_pulse0 = end.pulse0 + end.n_fired;
+}
+
+int track_frame(struct track *t, struct scanhead *sh, const struct scanhead_frame *frame, const struct track_ops *ops,
+                void *rec, struct sh_err *err)
+{
+    if (frame->type == SCANHEAD_POINTS) return take_points(t, sh, frame, ops, rec, err);
+    if (frame->type == SCANHEAD_LINE_END) take_line_end(t, frame);
+    if (frame->type == SCANHEAD_DESCRIPTOR && (frame->flags & SCANHEAD_REPEAT) == 0) {
+        t->new_scan = 1;
+        t->have_next_line = 0;
+    }
+    return 0;
+}
+
+void track_tell(const struct track *t, const struct sh_report *report)
+{
+    if (t->n_unplaced > 0)
+        sh_warn(report, "%s: %llu points left out that came before the descriptor and the anchor of their scan",
+                t->path, (unsigned long long)t->n_unplaced);
+    if (t->n_without_pose > 0)
+        sh_warn(report, "%s: %llu points left out whose pose was lost", t->path, (unsigned long long)t->n_without_pose);
+}

@@ -1,0 +1,42 @@
+/* A GNSS fix -> NMEA 0183 sentences. Pure; writes only into dst; allocates nothing; real-time safe.
+ *
+ * Sentences as NMEA 0183 has them from 2.3 to 4.0: "$" talker and type, fields with commas between, "*" and the XOR of
+ * all characters between the two as two upper-case hex digits, CR LF. Two things go beyond the standard, as they do
+ * with survey receivers: minutes have 7 decimals (a step is 0.19 mm) and heights 4, so that a GGA may be longer than 82
+ * characters. A field that isn't known is empty; without a fix (quality 0) all of the position is.
+ * Each function returns the length of the sentence with its end (and a NUL behind), or 0 when cap is too small. */
+#ifndef DRIVERS_PROTOCOL_NMEA_H
+#define DRIVERS_PROTOCOL_NMEA_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+enum { NMEA_MAX_SENTENCE = 160, NMEA_ALL_SENTENCES = 5, NMEA_MAX_ALL = NMEA_ALL_SENTENCES * NMEA_MAX_SENTENCE };
+
+struct nmea_fix {
+    char talker[2];       /* "GN", "GP" */
+    int year, month, day; /* UTC */
+    int hour, minute;
+    int second, hundredth;     /* second 60 in a leap second */
+    double lat_deg, lon_deg;   /* WGS 84; north and east positive; -90..90, -180..180 */
+    double altitude_m;         /* above the geoid */
+    double geoid_separation_m; /* geoid above the ellipsoid; ellipsoidal height = altitude + separation */
+    int quality;               /* of GGA: 0 none, 1 autonomous, 2 differential, 4 RTK fixed, 5 RTK float */
+    int satellites;
+    double hdop;
+    double speed_m_s, course_deg; /* over ground; course NaN: at rest */
+    double sigma_m[3];            /* of latitude, longitude, altitude */
+};
+
+size_t nmea_encode_gga(char *dst, size_t cap, const struct nmea_fix *fix);
+size_t nmea_encode_rmc(char *dst, size_t cap, const struct nmea_fix *fix);
+size_t nmea_encode_gsa(char *dst, size_t cap, const struct nmea_fix *fix);
+size_t nmea_encode_gst(char *dst, size_t cap, const struct nmea_fix *fix);
+size_t nmea_encode_zda(char *dst, size_t cap, const struct nmea_fix *fix);
+/* All of them: RMC GGA GSA GST ZDA. */
+size_t nmea_encode_all(char *dst, size_t cap, const struct nmea_fix *fix);
+
+/* XOR of len characters. */
+uint8_t nmea_checksum(const char *text, size_t len);
+
+#endif

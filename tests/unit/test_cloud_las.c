@@ -1,0 +1,95 @@
+/* LAS files as clouds: what the recorder wrote, which other people's readers check elsewhere, and broken ones. */
+#include "core/cloud.h"
+#include "tests/unit/recorder_rig.h"
+
+static const struct rig_point points[] = {
+    {3000, -4000, 12000, -1234, 7, 1, 2}, {3001, -4001, 12001, INT16_MIN, 8, 2, 2}, {0, 0, 0, INT16_MIN, 0xffff, 0, 0}};
+
+static void write_las(uint32_t crs, uint32_t epsg, int geo)
+{
+    struct sh_err err = {0};
+    struct native_anchor a = rig_anchor_of(crs, epsg, 1), b = rig_anchor_of(crs, epsg, 2);
+    rig_begin();
+    rig_descriptor(geo, 1);
+    rig_anchor(&a);
+    rig_points(0, 0, 0, points, 3);
+    rig_descriptor(geo, 2);
+    rig_anchor(&b);
+    rig_points(0, 0, 0, points, 1);
+    if (rig_record(rig_path("a.las"), (struct recorder_options){0}, 1, &err) != 0) fail_msg("%s", err.text);
+}
+
+static void test_read(void **state)
+{
+    (void)state;
+    static const int codes[][3] = {{NATIVE_CRS_UTM, 32632, 32632},
+                                   {NATIVE_CRS_UTM, 32761, 32761},
+                                   {NATIVE_CRS_UTM, 32661, 32661},
+                                   {NATIVE_CRS_ECEF, 4978, 4978},
+                                   {NATIVE_CRS_LOCAL, 0, CLOUD_EPSG_UNKNOWN}};
+    for (size_t i = 0; i < sizeof codes / sizeof codes[0]; i++) {
+        struct cloud cloud;
+        struct sh_err err = {0};
+        write_las((uint32_t)codes[i][0], (uint32_t)codes[i][1], 1);
+        if (cloud_read(rig_path("a.las"), NULL, &cloud, &err) != 0) fail_msg("%s", err.text);
+        assert_int_equal(cloud.epsg, codes[i][2]);
+        assert_int_equal(cloud.n, 3);
+        static const unsigned want[3][3] = {{1, 1, 7}, {1, 2, 8}, {2, 1, 7}};
+        for (int k = 0; k < 3; k++) {
+            assert_int_equal(cloud.station[k], want[k][0]);
+            assert_int_equal(cloud.echo[k], want[k][1]);
+            assert_int_equal(cloud.label[k], want[k][2]);
+        }
+        assert_true(fabs(cloud.xyz_m[1][0] - 500003.251) < 1e-9 && fabs(cloud.xyz_m[1][1] - 4999995.999) < 2e-9);
+        assert_true(fabs(cloud.xyz_m[1][2] - 412.126) < 1e-12);
+        cloud_free(&cloud);
+        unlink(rig_path("a.las"));
+    }
+}
+
+/* One byte changed, or the end cut off: what is wrong is told, with the file's name. */
+static void test_broken(void **state)
+{
+    (void)state;
+    static const struct {
+        int at, value; /* at -1: cut to `value` bytes, counted from the end if negative */
+        const char *says;
+    } broken[] = {{-1, 100, "shorter than a LAS header"},
+                  {-1, -1, "cut off"},
+                  {25, 1, "version 1.2 to 1.4"},
+                  {104, 6 | 0x80, "compressed"},
+                  {104, 11, "format"},
+                  {105, 29, "shorter than their format"},
+                  {250, 1, "cut off"},
+                  {254, 255, "cut off"},
+                  {99, 1, "cut off"},
+                  {102, 1, "variable length records"},
+                  {375 + 21, 255, "variable length records"},
+                  {138, 0xff, "no position"}};
+    for (size_t i = 0; i < sizeof broken / sizeof broken[0]; i++) {
+        size_t len;
+        struct cloud cloud;
+        struct sh_err err = {0};
+        write_las(NATIVE_CRS_UTM, 32632, 1);
+        uint8_t *las = rig_read(rig_path("a.las"), &len);
+        if (broken[i].at >= 0)
+            las[broken[i].at] = (uint8_t)broken[i].value;
+        else
+            len = broken[i].value < 0 ? len - 1 : (size_t)broken[i].value;
+        if (broken[i].at == 138) las[137] = 0xf0; /* the scale is NaN or infinite */
+        FILE *f = fopen(rig_path("a.las"), "wb");
+        assert_int_equal(fwrite(las, 1, len, f), len);
+        fclose(f);
+        free(las);
+        assert_int_equal(cloud_read(rig_path("a.las"), NULL, &cloud, &err), SH_EINPUT);
+        if (strstr(err.text, broken[i].says) == NULL) fail_msg("case %zu: %s", i, err.text);
+        assert_non_null(strstr(err.text, "a.las"));
+        unlink(rig_path("a.las"));
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_read), cmocka_unit_test(test_broken)};
+    return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
+}

@@ -1,0 +1,244 @@
+/* The head's clock: full seconds to the nanosecond, its errors, and what of the device goes by it. */
+#include "tests/unit/device_rig.h"
+
+#include <math.h>
+#include <sys/timex.h>
+#include <time.h>
+
+#include "firmware_sim/head_clock.h"
+
+__extension__ typedef __int128 i128;
+
+static struct head_clock make_clock(double offset_s, double drift_ppm, double jump_s, double jump_at_s)
+{
+    static struct config cfg;
+    struct head_clock clock;
+    struct sh_err err;
+    memset(&cfg, 0, sizeof cfg);
+    strcpy(cfg.time.epoch, "2026-01-01T00:00:00.3Z");
+    cfg.time.offset_s = offset_s;
+    cfg.time.drift_ppm = drift_ppm;
+    cfg.time.jump_s = jump_s;
+    cfg.time.jump_at_s = jump_at_s;
+    need(head_clock_create(&cfg, &clock, &err), &err);
+    return clock;
+}
+
+/* 2026-01-01T00:00:00Z is 1767225600 s after 1970 (date -u -d 2026-01-01 +%s), and TAI 37 s more. */
+#define TAI0_S INT64_C(1767225637)
+
+struct edges {
+    int n;
+    int64_t at_ns[64], tai_s[64];
+};
+
+/* All edges up to a time, in ticks of a size that does not divide anything. */
+static struct edges find_edges(const struct head_clock *clock, int64_t tick_ns, int64_t until_ns)
+{
+    struct edges e = {0};
+    for (int64_t t = 0; t < until_ns && e.n < 64; t += tick_ns)
+        e.n += head_clock_edge(clock, t, t + tick_ns, &e.at_ns[e.n], &e.tai_s[e.n]);
+    return e;
+}
+
+static void exact_seconds(void **state)
+{
+    (void)state;
+    struct head_clock clock = make_clock(0, 0, 0, 0);
+    static const int64_t ticks_ns[] = {100000, 1000000, 10000000, 9999991};
+    for (int k = 0; k < 4; k++) {
+        struct edges e = find_edges(&clock, ticks_ns[k], INT64_C(20000000000));
+        assert_int_equal(e.n, 20);
+        for (int i = 0; i < e.n; i++)
+            assert_true(e.at_ns[i] == 700000000 + i * UTC_SECOND_NS && e.tai_s[i] == TAI0_S + 1 + i);
+    }
+    assert_true(head_clock_ns(&clock, 0) == TAI0_S * UTC_SECOND_NS + 300000000);
+    assert_true(head_clock_true_ns(&clock, 5) == head_clock_ns(&clock, 5));
+}
+
+/* An edge at power-up is one. */
+static void the_first_nanosecond(void **state)
+{
+    (void)state;
+    struct head_clock clock = make_clock(-0.3, 0, 0, 0);
+    struct edges e = find_edges(&clock, 1000000, 1500000000);
+    assert_true(e.n == 2 && e.at_ns[0] == 0 && e.tai_s[0] == TAI0_S && e.at_ns[1] == UTC_SECOND_NS);
+}
+
+/* The clock gains d for each second: it shows second s at the smallest t with t + floor(t d) >= s - tai0, that is at
+ * ceil((s - tai0) / (1 + d)) up to one for the two roundings. Looked for by hand around it. */
+static void drift(void **state)
+{
+    (void)state;
+    static const double ppm[] = {1000, 12.345678, 0.000001, -0.000001, -7, -1000};
+    for (int k = 0; k < 6; k++) {
+        struct head_clock clock = make_clock(0, ppm[k], 0, 0);
+        struct edges e = find_edges(&clock, 1000000, INT64_C(30000000000));
+        assert_true(e.n == 30 || e.n == 29);
+        for (int i = 0; i < e.n; i++) {
+            int64_t wanted_ns = 700000000 + i * UTC_SECOND_NS, ppt = llround(ppm[k] * 1e6);
+            int64_t about_ns = (int64_t)((long double)wanted_ns / (1 + (long double)ppt / 1e12L));
+            int64_t t_ns = about_ns - 3;
+            for (;;
+                 t_ns++) { /* floor(t d): the product fits 128 bits, its floor by adding whole thousands of seconds */
+                i128 product = (i128)t_ns * ppt + (i128)1000000000000 * 1000000000000;
+                if (t_ns + (int64_t)(product / 1000000000000 - 1000000000000) >= wanted_ns) break;
+            }
+            assert_true(e.at_ns[i] == t_ns && e.tai_s[i] == TAI0_S + 1 + i);
+            assert_true(head_clock_ns(&clock, t_ns) >= e.tai_s[i] * UTC_SECOND_NS);
+            assert_true(head_clock_ns(&clock, t_ns - 1) < e.tai_s[i] * UTC_SECOND_NS);
+        }
+    }
+}
+
+/* At 5.25 s the clock, which then shows x.55, is set on by 2.2 s or back: seconds are left out or come again, and the
+ * jump itself is none. */
+static void jumps(void **state)
+{
+    (void)state;
+    struct head_clock on = make_clock(0, 0, 2.2, 5.25), back = make_clock(0, 0, -2.2, 5.25);
+    struct edges e = find_edges(&on, 1000000, INT64_C(9000000000));
+    assert_int_equal(e.n, 9);
+    assert_true(e.at_ns[4] == 4700000000 && e.tai_s[4] == TAI0_S + 5);
+    assert_true(e.at_ns[5] == 5500000000 && e.tai_s[5] == TAI0_S + 8); /* 5.55 + 2.2 s at 5.25 s: 7.75, so in 0.25 s */
+    e = find_edges(&back, 1000000, INT64_C(9000000000));
+    assert_true(e.at_ns[4] == 4700000000 && e.tai_s[4] == TAI0_S + 5);
+    assert_true(e.at_ns[5] == 5900000000 && e.tai_s[5] == TAI0_S + 4); /* 3.35 s at 5.25 s */
+    /* Onto a full second within a tick: that is when it begins. */
+    struct head_clock onto = make_clock(0, 0, 0.45, 5.25);
+    e = find_edges(&onto, 10000000, INT64_C(6500000000));
+    assert_true(e.at_ns[5] == 5250000000 && e.tai_s[5] == TAI0_S + 6);
+}
+
+static void epochs(void **state)
+{
+    (void)state;
+    enum head_clock_source source;
+    struct sh_err err;
+    int64_t tai_ns;
+    const struct utc_table *table = utc_table_builtin();
+    assert_true(head_clock_parse("none", table, &source, NULL, &err) == SH_OK && source == HEAD_CLOCK_NONE);
+    assert_true(head_clock_parse("utc", table, &source, NULL, &err) == SH_OK && source == HEAD_CLOCK_UTC);
+    assert_true(head_clock_parse("tai", table, &source, NULL, &err) == SH_OK && source == HEAD_CLOCK_TAI);
+    assert_int_equal(head_clock_parse("2016-12-31T23:59:60.5Z", table, &source, &tai_ns, &err), SH_OK);
+    assert_true(source == HEAD_CLOCK_EPOCH &&
+                tai_ns == INT64_C(1483228836500000000)); /* 2017-01-01 less 0.5 s, and 37 */
+    assert_int_equal(head_clock_parse("now", table, &source, NULL, &err), SH_EINPUT);
+    assert_true(head_clock_parse("", table, &source, NULL, &err) == SH_OK && source == HEAD_CLOCK_NONE);
+}
+
+/* The system's clock is between what it was before and after. */
+static void the_systems_clock(void **state)
+{
+    (void)state;
+    static struct config cfg;
+    struct head_clock clock;
+    struct sh_err err;
+    struct timespec before, after;
+    strcpy(cfg.time.epoch, "utc");
+    clock_gettime(CLOCK_REALTIME, &before);
+    need(head_clock_create(&cfg, &clock, &err), &err);
+    clock_gettime(CLOCK_REALTIME, &after);
+    int64_t utc_ns = utc_posix_from_tai(&clock.table, head_clock_ns(&clock, 0));
+    assert_true(utc_ns >= before.tv_sec * UTC_SECOND_NS + before.tv_nsec - 1000000);
+    assert_true(utc_ns <=
+                after.tv_sec * UTC_SECOND_NS + after.tv_nsec + 1000000); /* slewing, never so much in a moment */
+}
+
+/* CLOCK_TAI is taken where the system has set its offset, and refused where it is a UTC. */
+static void the_systems_tai(void **state)
+{
+    (void)state;
+    static struct config cfg;
+    struct head_clock clock;
+    struct sh_err err;
+    struct timespec before;
+    struct timex timex = {.modes = 0};
+    strcpy(cfg.time.epoch, "tai");
+    adjtimex(&timex);
+    clock_gettime(CLOCK_TAI, &before);
+    int rc = head_clock_create(&cfg, &clock, &err);
+    if (timex.tai == 0) {
+        assert_int_equal(rc, SH_ESTATE);
+        assert_non_null(strstr(err.text, "time.epoch: tai"));
+        return;
+    }
+    need(rc, &err);
+    int64_t late_ns = head_clock_ns(&clock, 0) - (before.tv_sec * UTC_SECOND_NS + before.tv_nsec);
+    assert_true(late_ns >= -1000000); /* as above */
+}
+
+/* A device from 23:59:57.75 on, over the leap second, its clock 0.25 s ahead and 100 ppm fast. */
+static void the_device_goes_by_it(void **state)
+{
+    (void)state;
+    static const struct device_options options = {.start = 1};
+    static const char *const sets[] = {"time.epoch=2016-12-31T23:59:57.75Z", "time.offset_s=0.25",
+                                       "time.drift_ppm=100"};
+    static const char *const utc[] = {"2016-12-31T23:59:58Z", "2016-12-31T23:59:59Z", "2016-12-31T23:59:60Z",
+                                      "2017-01-01T00:00:00Z"};
+    static const uint64_t posix[] = {1483228798, 1483228799, 1483228800, 1483228800};
+    struct rig *rig = rig_open(&options, sets, 3);
+    int n = 0;
+    while (rig->next < 3500) {
+        assert_true(rig_claim(rig));
+        const struct native_event *pps = rig_event(rig, NATIVE_EV_PPS), *start = rig_event(rig, NATIVE_EV_SCAN_START);
+        if (pps != NULL) {
+            assert_string_equal(pps->text, utc[n]);
+            assert_true(pps->a == posix[n] && pps->c == (uint64_t)(1167264015 + n)); /* 23:59:60 is GPS 1167264017 */
+            int64_t about_ns = (int64_t)(n * 1e9 / 1.0001);
+            assert_true(llabs((int64_t)pps->b - about_ns) <= 1);
+            assert_true(rig->work.tick == pps->b / 1000000);
+            n++;
+        }
+        if (start != NULL) {
+            int64_t t_ns = (int64_t)start->b; /* 1e-4 of it: exact, it is in ms */
+            assert_true((int64_t)start->c == INT64_C(1167264015000000000) + t_ns + t_ns / 10000);
+        }
+    }
+    assert_int_equal(n, 4);
+    assert_string_equal(rig_tell(rig, "TIME?", 3000), "3000000000");
+    assert_string_equal(rig_tell(rig, "TIME:UTC?", 3000), "2017-01-01T00:00:00.000300000Z");
+    assert_string_equal(rig_tell(rig, "TIME:GPS?", 3000), "1930,18.000300000");
+    assert_string_equal(rig_tell(rig, "TIME:UTC?", 2500), "2016-12-31T23:59:60.500250000Z");
+    rig_close(rig);
+}
+
+/* Without a time: no event, no GPS time, telemetry without UTC. */
+static void a_device_that_does_not_know(void **state)
+{
+    (void)state;
+    static const struct device_options options = {.start = 1};
+    struct rig *rig = rig_open(&options, NULL, 0);
+    int telemetry = 0;
+    while (rig->next < 2500) {
+        assert_true(rig_claim(rig));
+        assert_null(rig_event(rig, NATIVE_EV_PPS));
+        const struct native_event *start = rig_event(rig, NATIVE_EV_SCAN_START);
+        assert_true(start == NULL || start->c == 0);
+        assert_true(!rig->work.telemetry || rig->work.telemetry_frame.utc_ns == 0);
+        telemetry += rig->work.telemetry;
+        assert_int_equal(rig->work.wake, 0);
+    }
+    assert_int_equal(telemetry, 3);
+    struct command_result result;
+    device_command(rig->device, 1, "TIME:UTC?", 0, &result);
+    assert_int_equal(result.error, CMD_E_SETTINGS);
+    rig_close(rig);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(exact_seconds),
+        cmocka_unit_test(the_first_nanosecond),
+        cmocka_unit_test(drift),
+        cmocka_unit_test(jumps),
+        cmocka_unit_test(epochs),
+        cmocka_unit_test(the_systems_clock),
+        cmocka_unit_test(the_systems_tai),
+        cmocka_unit_test(the_device_goes_by_it),
+        cmocka_unit_test(a_device_that_does_not_know),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}

@@ -1,0 +1,242 @@
+/* LAS files, field by field at the offsets of the ASPRS specification (LAS 1.4 R15). */
+#include "tests/unit/recorder_rig.h"
+
+enum { HEADER = 375, VLR = 54, POINT = 32 };
+
+static const struct rig_point points[] = {
+    {3000, -4000, 12000, -1234, 7, 1, 2},
+    {3001, -4001, 12001, INT16_MIN, 8, 2, 2},
+    {0, 0, 0, INT16_MIN, 0xffff, 0, 0},
+    {0, 0, -5000, 32767, 9, 1, 1},
+    {5, 0, 0, 0, 1, 1, 1},
+};
+enum { N = sizeof points / sizeof points[0] };
+
+static uint8_t *las;
+static size_t las_len;
+
+static void record_las(void)
+{
+    struct sh_err err = {0};
+    const char *path = rig_path("a.las");
+    int rc = rig_record(path, (struct recorder_options){0}, 1, &err);
+    if (rc != 0) fail_msg("%s", err.text);
+    free(las);
+    las = rig_read(path, &las_len);
+    unlink(path);
+}
+
+static void put_scan(int geo, uint32_t scan, const struct native_anchor *anchor)
+{
+    rig_descriptor(geo, scan);
+    rig_anchor(anchor);
+    rig_points(0, 0, 0, points, N);
+}
+
+static const uint8_t *find_vlr(const char *user, unsigned record)
+{
+    size_t at = rig_uint(las + 94, 2);
+    for (uint64_t i = 0; i < rig_uint(las + 100, 4); i++) {
+        assert_int_equal(rig_uint(las + at, 2), 0);
+        if (strcmp((char *)las + at + 2, user) == 0 && rig_uint(las + at + 18, 2) == record) return las + at;
+        at += VLR + rig_uint(las + at + 20, 2);
+    }
+    return NULL;
+}
+
+static void check_header(const char *profile)
+{
+    static const uint8_t zeros[24];
+    assert_memory_equal(las, "LASF", 4);
+    assert_int_equal(rig_uint(las + 4, 2), 0);
+    assert_int_equal(rig_uint(las + 6, 2), 1 << 4); /* WKT; not adjusted standard GPS time */
+    assert_int_equal(las[24], 1);
+    assert_int_equal(las[25], 4);
+    assert_string_equal((char *)las + 26, profile);
+    assert_string_equal((char *)las + 58, "scanhead");
+    assert_int_equal(rig_uint(las + 94, 2), HEADER);
+    assert_int_equal(las[104], 6);
+    assert_int_equal(rig_uint(las + 105, 2), POINT);
+    assert_memory_equal(las + 107, zeros, 24); /* the old counts must be 0 for format 6 */
+    assert_memory_equal(las + 227, zeros, 20); /* no waveforms, no extended records */
+    assert_int_equal(rig_uint(las + 96, 4) + POINT * rig_uint(las + 247, 8), las_len);
+}
+
+static void test_header(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 2);
+    rig_begin();
+    put_scan(1, 1, &a);
+    record_las();
+    check_header("model");
+    assert_int_equal(rig_uint(las + 247, 8), 4);
+    static const int by_return[15] = {3, 1};
+    for (int i = 0; i < 15; i++)
+        assert_int_equal(rig_uint(las + 255 + 8 * i, 8), by_return[i]);
+    for (int i = 0; i < 3; i++) {
+        assert_true(rig_double(las + 131 + 8 * i) == 1e-3);
+        assert_true(rig_double(las + 155 + 8 * i) == a.anchor[i]);
+    }
+    static const double max_min[3][2] = {{3.001, 0}, {0, -4.001}, {12.001, -5}};
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 2; k++)
+            assert_true(fabs(rig_double(las + 179 + 16 * i + 8 * k) - (a.anchor[i] + max_min[i][k])) < 1e-9);
+    assert_non_null(strstr(rig_notes, "1 shots without echo left out"));
+}
+
+static void test_records(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 65535);
+    rig_begin();
+    put_scan(1, 1, &a);
+    record_las();
+    const uint8_t *wkt = find_vlr("LASF_Projection", 2112), *extra = find_vlr("LASF_Spec", 4),
+                  *p = las + rig_uint(las + 96, 4);
+    assert_non_null(wkt);
+    assert_non_null(strstr((char *)wkt + VLR, "AUTHORITY[\"EPSG\",\"32632\"]"));
+    assert_int_equal(strlen((char *)wkt + VLR) + 1, rig_uint(wkt + 20, 2));
+    assert_non_null(extra);
+    assert_int_equal(rig_uint(extra + 20, 2), 192);
+    assert_int_equal(extra[VLR + 2], 3); /* unsigned short */
+    assert_string_equal((char *)extra + VLR + 4, "label");
+    for (int i = 0; i < N; i++) {
+        const struct rig_point *want = &points[i];
+        if (want->count == 0) continue;
+        assert_int_equal(rig_int32(p), want->a); /* the stream's own counts */
+        assert_int_equal(rig_int32(p + 4), want->b);
+        assert_int_equal(rig_int32(p + 8), want->c);
+        assert_int_equal(rig_uint(p + 12, 2), want->refl_cdb + 32768);
+        assert_int_equal(p[14], want->count << 4 | want->echo);
+        assert_int_equal(p[15], 0);
+        assert_int_equal(p[16], 0);
+        assert_int_equal(p[17], 0);
+        assert_int_equal(rig_uint(p + 20, 2), 65535);
+        assert_true(rig_double(p + 22) == (i < 2 ? 0 : i == 3 ? 2e-3 : 3e-3));
+        assert_int_equal(rig_uint(p + 30, 2), want->label);
+        p += POINT;
+    }
+    /* steps of 0.006 degrees from straight down: 12 m up at 5 m aside, again 1 mm on; down; level */
+    p = las + rig_uint(las + 96, 4);
+    assert_int_equal(rig_uint(p + 18, 2), lrint((90 + atan2(12, 5) * 180 / M_PI) / 0.006));
+    assert_int_equal(rig_uint(p + 2 * POINT + 18, 2), 0);
+    assert_int_equal(rig_uint(p + 3 * POINT + 18, 2), 15000);
+}
+
+/* A second station is counted from the first one's anchor; one beyond what 32 bits reach is refused. */
+static void test_stations(void **state)
+{
+    (void)state;
+    struct sh_err err = {0};
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1), b = rig_anchor_of(NATIVE_CRS_UTM, 32632, 2);
+    b.anchor[0] += 1000.0004;
+    rig_begin();
+    put_scan(1, 1, &a);
+    put_scan(1, 2, &b);
+    record_las();
+    check_header("model");
+    const uint8_t *p = las + rig_uint(las + 96, 4) + 4 * POINT;
+    assert_int_equal(rig_uint(las + 247, 8), 8);
+    assert_int_equal(rig_int32(p), 1003000); /* 1003.0004 m, half a step at most away */
+    assert_int_equal(rig_uint(p - POINT + 20, 2), 1);
+    assert_int_equal(rig_uint(p + 20, 2), 2);
+    b.anchor[0] = a.anchor[0] - 2147484;
+    rig_begin();
+    put_scan(1, 1, &a);
+    put_scan(1, 2, &b);
+    assert_int_equal(rig_record(rig_path("a.las"), (struct recorder_options){0}, 1, &err), SH_EFORMAT);
+    assert_non_null(strstr(err.text, "station 2"));
+    assert_non_null(strstr(err.text, "output.scale_m"));
+    /* kept all the same, the file holds what came before: of the second station two points, 3 m nearer */
+    assert_int_equal(rig_record(rig_path("a.las"), (struct recorder_options){0}, RIG_KEEP_ALWAYS, &err), SH_EFORMAT);
+    free(las);
+    las = rig_read(rig_path("a.las"), &las_len);
+    unlink(rig_path("a.las"));
+    check_header("model");
+    assert_int_equal(rig_uint(las + 247, 8), 6);
+    assert_true(fabs(rig_double(las + 187) - (a.anchor[0] - 2147481)) < 1e-9);
+}
+
+/* In the polar layout points are placed in the scene by the pose, and there is no CRS. */
+static void test_polar(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
+    static const struct rig_point forward = {5000, 0, 0, 0, 1, 1, 1}, right = {5000, 0, 900, 0, 1, 1, 1},
+                                  up = {5000, 900, 0, 0, 1, 1, 1};
+    rig_begin();
+    rig_descriptor(0, 1);
+    rig_anchor(&a);
+    rig_points(0, 0, 0, (struct rig_point[]){forward, right, up}, 3);
+    record_las();
+    check_header("model");
+    static const int32_t want[3][3] = {{5000, 0, 0}, {0, -5000, 0}, {0, 0, 5000}};
+    const uint8_t *p = las + rig_uint(las + 96, 4);
+    assert_null(find_vlr("LASF_Projection", 2112));
+    for (int i = 0; i < 3; i++) {
+        assert_true(rig_double(las + 155 + 8 * i) == a.station_m[i]);
+        for (int k = 0; k < 3; k++)
+            assert_int_equal(rig_int32(p + POINT * i + 4 * k), want[i][k]);
+    }
+    assert_int_equal(rig_uint(p + 18, 2), 15000);
+    assert_int_equal(rig_uint(p + 2 * POINT + 18, 2), 30000);
+}
+
+static void test_no_points(void **state)
+{
+    (void)state;
+    rig_begin();
+    rig_descriptor(1, 1);
+    rig_points(0, 0, 0, points, N); /* without an anchor they have no place */
+    record_las();
+    check_header("OTHER");
+    assert_int_equal(rig_uint(las + 247, 8), 0);
+    assert_non_null(strstr(rig_notes, "5 points left out"));
+}
+
+static void test_disk_full(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
+    rig_begin();
+    for (uint32_t i = 0; i < 20; i++)
+        put_scan(1, i + 1, &a);
+    rig_check_disk_full(rig_path("full.las"), 2000);
+}
+
+/* More points than the buffer holds, so that the header is written over in the file. */
+static void test_long(void **state)
+{
+    (void)state;
+    static struct rig_point many[3000];
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_ECEF, 4978, 1);
+    for (int i = 0; i < 3000; i++)
+        many[i] = (struct rig_point){i, -i, 2 * i, 0, 1, 1, 1};
+    rig_begin();
+    rig_descriptor(1, 1);
+    rig_anchor(&a);
+    for (uint32_t i = 0; i < 20; i++)
+        rig_points(i, 3000 * i, 3000 * i, many, 3000);
+    record_las();
+    check_header("model");
+    assert_int_equal(rig_uint(las + 247, 8), 60000);
+    assert_int_equal(rig_int32(las + las_len - POINT), 2999);
+    assert_non_null(strstr((char *)find_vlr("LASF_Projection", 2112) + VLR, "GEOCCS["));
+}
+
+static int tear_down(void **state)
+{
+    free(las);
+    return rig_tear_down(state);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_header), cmocka_unit_test(test_records),   cmocka_unit_test(test_stations),
+        cmocka_unit_test(test_polar),  cmocka_unit_test(test_no_points), cmocka_unit_test(test_disk_full),
+        cmocka_unit_test(test_long),
+    };
+    return cmocka_run_group_tests(tests, rig_set_up, tear_down);
+}

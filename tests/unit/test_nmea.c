@@ -1,0 +1,238 @@
+/* NMEA sentences against published examples and a reader that shares nothing with the encoder. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "drivers/protocol/nmea.h"
+#include "tests/unit/nmea_reader.h"
+
+static struct nmea_fix munich(void)
+{
+    return (struct nmea_fix){.talker = {'G', 'P'},
+                             .year = 1994,
+                             .month = 3,
+                             .day = 23,
+                             .hour = 12,
+                             .minute = 35,
+                             .second = 19,
+                             .lat_deg = 48 + 7.038 / 60,
+                             .lon_deg = 11 + 31.0 / 60,
+                             .altitude_m = 545.4,
+                             .geoid_separation_m = 46.9,
+                             .quality = 1,
+                             .satellites = 8,
+                             .hdop = 0.9,
+                             .speed_m_s = 22.4 * 1852.0 / 3600.0,
+                             .course_deg = 84.4,
+                             .sigma_m = {0.01, 0.02, 0.03}};
+}
+
+/* As they stand in manuals and tutorials everywhere (the first two are the "Munich" ones). */
+static void published_checksums(void **state)
+{
+    (void)state;
+    static const char *const lines[] = {
+        "$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47",
+        "$GPRMC,123519,A,4807.038,N,01131.000,E,022.4,084.4,230394,003.1,W*6A",
+        "$GPGSA,A,3,04,05,,09,12,,,24,,,,,2.5,1.3,2.1*39",
+        "$GPZDA,201530.00,04,07,2002,00,00*60",
+        "$GPGST,024603.00,3.2,6.6,4.7,47.3,5.8,5.6,22.0*58",
+    };
+    for (size_t i = 0; i < sizeof lines / sizeof *lines; i++) {
+        const char *star = strchr(lines[i], '*');
+        assert_int_equal(nmea_checksum(lines[i] + 1, (size_t)(star - lines[i] - 1)), strtol(star + 1, NULL, 16));
+    }
+}
+
+static void the_example_comes_out(void **state)
+{
+    (void)state;
+    struct nmea_fix fix = munich();
+    struct nmea_line line;
+    char text[NMEA_MAX_ALL];
+    read_line(text, nmea_encode_gga(text, sizeof text, &fix), "GPGGA", 15, &line);
+    static const char *const gga[] = {"123519.00", "4807.0380000", "N", "01131.0000000", "E", "1", "08",
+                                      "0.9",       "545.4000",     "M", "46.9000",       "M", "",  ""};
+    for (int i = 0; i < 14; i++)
+        assert_string_equal(line.field[i + 1], gga[i]);
+    read_line(text, nmea_encode_rmc(text, sizeof text, &fix), "GPRMC", 13, &line);
+    static const char *const rmc[] = {
+        "123519.00", "A", "4807.0380000", "N", "01131.0000000", "E", "22.400", "84.40", "230394", "", "", "A"};
+    for (int i = 0; i < 12; i++)
+        assert_string_equal(line.field[i + 1], rmc[i]);
+    read_line(text, nmea_encode_zda(text, sizeof text, &fix), "GPZDA", 7, &line);
+    assert_string_equal(line.field[2], "23");
+    assert_string_equal(line.field[3], "03");
+    assert_string_equal(line.field[4], "1994");
+    read_line(text, nmea_encode_gsa(text, sizeof text, &fix), "GPGSA", 18, &line);
+    assert_string_equal(line.field[2], "3");
+    assert_string_equal(line.field[10], "08"); /* eight satellites, then none */
+    assert_string_equal(line.field[11], "");
+    assert_string_equal(line.field[16], "0.9");
+    read_line(text, nmea_encode_gst(text, sizeof text, &fix), "GPGST", 9, &line);
+    assert_string_equal(line.field[6], "0.0100");
+    assert_string_equal(line.field[7], "0.0200");
+    assert_string_equal(line.field[8], "0.0300");
+}
+
+/* Half a step of the last digit: 0.5e-7 of a minute, and what a double of 180 degrees loses. */
+#define HALF_STEP_DEG (0.5e-7 / 60 + 1e-13)
+
+static void check_place(double lat_deg, double lon_deg)
+{
+    struct nmea_fix fix = munich();
+    struct nmea_line line;
+    char text[NMEA_MAX_SENTENCE];
+    fix.lat_deg = lat_deg;
+    fix.lon_deg = lon_deg;
+    read_line(text, nmea_encode_gga(text, sizeof text, &fix), "GPGGA", 15, &line);
+    double lat = read_angle(line.field[2], line.field[3], 2, "NS"),
+           lon = read_angle(line.field[4], line.field[5], 3, "EW");
+    if (fabs(lat - lat_deg) > HALF_STEP_DEG || fabs(lon - lon_deg) > HALF_STEP_DEG)
+        fail_msg("%.12f %.12f came back as %.12f %.12f", lat_deg, lon_deg, lat, lon);
+}
+
+static void places_come_back(void **state)
+{
+    (void)state;
+    static const double lats[] = {0,       -0.0, 90, -90, 89.99999999999, -1e-12, 1e-9, 48.0000000001, 47.99999999999,
+                                  -33.8568},
+                        lons[] = {0,      180,           -180, 179.99999999999, -179.99999999999,
+                                  -1e-12, 8.99999999999, -0.5, 151.2153};
+    for (size_t i = 0; i < sizeof lats / sizeof *lats; i++)
+        for (size_t k = 0; k < sizeof lons / sizeof *lons; k++)
+            check_place(lats[i], lons[k]);
+    for (int i = 0; i < 20000; i++) /* the fraction of the golden ratio spreads evenly */
+        check_place(180 * fmod(i * 0.6180339887498949, 1) - 90, 360 * fmod(i * 0.3819660112501051 + 0.1, 1) - 180);
+}
+
+/* 47 deg 59.99999999 min is 48 deg, not 47 deg 60 min. */
+static void minutes_round_up_to_degrees(void **state)
+{
+    (void)state;
+    struct nmea_fix fix = munich();
+    struct nmea_line line;
+    char text[NMEA_MAX_SENTENCE];
+    fix.lat_deg = 48 - 0.4e-7 / 60;
+    fix.lon_deg = -(10 - 0.4e-7 / 60);
+    read_line(text, nmea_encode_gga(text, sizeof text, &fix), "GPGGA", 15, &line);
+    assert_string_equal(line.field[2], "4800.0000000");
+    assert_string_equal(line.field[4], "01000.0000000");
+    assert_string_equal(line.field[5], "W");
+    fix.lat_deg = 48 - 0.6e-7 / 60;
+    read_line(text, nmea_encode_gga(text, sizeof text, &fix), "GPGGA", 15, &line);
+    assert_string_equal(line.field[2], "4759.9999999");
+    fix.lat_deg = -1e-12; /* no minus zero */
+    read_line(text, nmea_encode_gga(text, sizeof text, &fix), "GPGGA", 15, &line);
+    assert_string_equal(line.field[2], "0000.0000000");
+    assert_string_equal(line.field[3], "N");
+}
+
+static void leap_second_and_hundredths(void **state)
+{
+    (void)state;
+    struct nmea_fix fix = munich();
+    struct nmea_line line;
+    char text[NMEA_MAX_SENTENCE];
+    fix.hour = 23;
+    fix.minute = 59;
+    fix.second = 60;
+    fix.hundredth = 95;
+    read_line(text, nmea_encode_zda(text, sizeof text, &fix), "GPZDA", 7, &line);
+    assert_string_equal(line.field[1], "235960.95");
+}
+
+static void speed_and_course(void **state)
+{
+    (void)state;
+    struct nmea_fix fix = munich();
+    struct nmea_line line;
+    char text[NMEA_MAX_SENTENCE];
+    fix.speed_m_s = 1852.0 / 3600.0;
+    fix.course_deg = 359.999;
+    read_line(text, nmea_encode_rmc(text, sizeof text, &fix), "GPRMC", 13, &line);
+    assert_string_equal(line.field[7], "1.000");
+    assert_string_equal(line.field[8], "359.99"); /* never 360.00 */
+    fix.speed_m_s = 0;
+    fix.course_deg = NAN;
+    read_line(text, nmea_encode_rmc(text, sizeof text, &fix), "GPRMC", 13, &line);
+    assert_string_equal(line.field[7], "0.000");
+    assert_string_equal(line.field[8], "");
+}
+
+/* Mode letters of RMC as NMEA 0183 has them, beside the quality of GGA. */
+static void qualities(void **state)
+{
+    (void)state;
+    static const struct {
+        int quality;
+        const char *mode;
+    } of[] = {{0, "N"}, {1, "A"}, {2, "D"}, {4, "R"}, {5, "F"}};
+    for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
+        struct nmea_fix fix = munich();
+        struct nmea_line line;
+        char text[NMEA_MAX_SENTENCE], digit[2] = {(char)('0' + of[i].quality)};
+        fix.quality = of[i].quality;
+        read_line(text, nmea_encode_gga(text, sizeof text, &fix), "GPGGA", 15, &line);
+        assert_string_equal(line.field[6], digit);
+        for (int k = 2; k < 6 && fix.quality == 0; k++)
+            assert_string_equal(line.field[k], "");
+        read_line(text, nmea_encode_rmc(text, sizeof text, &fix), "GPRMC", 13, &line);
+        assert_string_equal(line.field[12], of[i].mode);
+        assert_string_equal(line.field[2], fix.quality == 0 ? "V" : "A");
+        read_line(text, nmea_encode_gsa(text, sizeof text, &fix), "GPGSA", 18, &line);
+        assert_string_equal(line.field[2], fix.quality == 0 ? "1" : "3");
+        read_line(text, nmea_encode_gst(text, sizeof text, &fix), "GPGST", 9, &line);
+    }
+}
+
+/* The longest there can be fits; into one byte less nothing goes, and nothing is written behind the end. */
+static void room_is_kept(void **state)
+{
+    (void)state;
+    struct nmea_fix fix = munich();
+    char text[NMEA_MAX_ALL + 1], small[NMEA_MAX_ALL + 1];
+    fix.satellites = 99;
+    fix.hdop = 99.9;
+    fix.altitude_m = -12345.6789;
+    fix.geoid_separation_m = -119.9999;
+    fix.lon_deg = -180;
+    fix.speed_m_s = 123456;
+    for (int i = 0; i < 3; i++)
+        fix.sigma_m[i] = 1000;
+    size_t len = nmea_encode_all(text, sizeof text, &fix);
+    assert_true(len > 0 && len <= NMEA_MAX_ALL);
+    int sentences = 0;
+    for (size_t i = 0; i < len; i++)
+        sentences += text[i] == '\n';
+    assert_int_equal(sentences, NMEA_ALL_SENTENCES);
+    for (size_t cap = 0; cap <= len; cap++) {
+        memset(small, 0x55, sizeof small);
+        assert_int_equal(nmea_encode_all(small, cap, &fix), 0);
+        for (size_t i = cap; i < sizeof small; i++)
+            assert_int_equal(small[i], 0x55);
+    }
+    assert_int_equal(nmea_encode_all(small, len + 1, &fix), len);
+    assert_memory_equal(small, text, len);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(published_checksums),
+        cmocka_unit_test(the_example_comes_out),
+        cmocka_unit_test(places_come_back),
+        cmocka_unit_test(minutes_round_up_to_degrees),
+        cmocka_unit_test(leap_second_and_hundredths),
+        cmocka_unit_test(speed_and_course),
+        cmocka_unit_test(qualities),
+        cmocka_unit_test(room_is_kept),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

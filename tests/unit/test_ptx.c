@@ -1,0 +1,185 @@
+/* PTX grids, line by line, and the files of true poses. */
+#include "tests/unit/recorder_rig.h"
+
+static char *text, *at;
+
+static void record_text(const char *name)
+{
+    struct sh_err err = {0};
+    size_t len;
+    const char *path = rig_path(name);
+    int rc = rig_record(path, (struct recorder_options){0}, 1, &err);
+    if (rc != 0) fail_msg("%s", err.text);
+    free(text);
+    text = at = (char *)rig_read(path, &len);
+    unlink(path);
+}
+
+static void expect_line(const char *want)
+{
+    size_t len = strcspn(at, "\n");
+    char line[256];
+    snprintf(line, sizeof line, "%.*s", (int)len, at);
+    assert_string_equal(line, want);
+    at += len + 1;
+}
+
+/* The head of a grid: size, pose twice; a quarter turn clockwise, vectors being rows. */
+static void expect_head(int columns, int rows, const char *shift)
+{
+    char line[256];
+    static const char *const axis[3] = {"0.000000000000000 -1.000000000000000 0.000000000000000",
+                                        "1.000000000000000 0.000000000000000 0.000000000000000",
+                                        "0.000000000000000 0.000000000000000 1.000000000000000"};
+    snprintf(line, sizeof line, "%d", columns);
+    expect_line(line);
+    snprintf(line, sizeof line, "%d", rows);
+    expect_line(line);
+    expect_line(shift);
+    for (int i = 0; i < 3; i++)
+        expect_line(axis[i]);
+    for (int i = 0; i < 3; i++) {
+        snprintf(line, sizeof line, "%s 0", axis[i]);
+        expect_line(line);
+    }
+    snprintf(line, sizeof line, "%s 1", shift);
+    expect_line(line);
+}
+
+static const struct rig_point none = {0, 0, 0, INT16_MIN, 0xffff, 0, 0};
+
+/* Lines of three, two and four shots, and one that was lost: a grid of four columns and four rows. */
+static void test_grid(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
+    memcpy(a.anchor, a.station_m, sizeof a.anchor);
+    const struct rig_point wall = {1000, -2000, 3000, INT16_MIN, 0, 1, 1}, dark = {1, 0, 0, -1000, 0, 1, 1},
+                           bright = {0, 1, 0, 500, 0, 1, 1}, near = {0, 0, 1000, 0, 0, 1, 2},
+                           far = {0, 0, 2000, 0, 0, 2, 2};
+    rig_begin();
+    rig_descriptor(1, 1);
+    rig_anchor(&a);
+    rig_points(5, 0, 4, (struct rig_point[]){wall, none, dark}, 3);
+    rig_points(6, 10, 15, (struct rig_point[]){bright, none}, 2);
+    rig_points(8, 30, 33, (struct rig_point[]){none, near, far, none, wall}, 5);
+    record_text("a.ptx");
+    expect_head(4, 4, "10.000000000 20.000000000 30.000000000");
+    static const char *const want[16] = {
+        "0 0 0 0.5",
+        "2.000000 1.000000 3.000000 0.500000", /* not modelled */
+        "0 0 0 0.5",
+        "0.000000 0.001000 0.000000 0.100000", /* -10 dB */
+        "0 0 0 0.5",
+        "0 0 0 0.5",
+        "-0.001000 0.000000 0.000000 1.000000", /* 5 dB */
+        "0 0 0 0.5",
+        "0 0 0 0.5", /* the line that was lost */
+        "0 0 0 0.5",
+        "0 0 0 0.5",
+        "0 0 0 0.5",
+        "0 0 0 0.5",
+        "0.000000 0.000000 1.000000 1.000000", /* the first of two */
+        "0 0 0 0.5",
+        "2.000000 1.000000 3.000000 0.500000",
+    };
+    for (int i = 0; i < 16; i++)
+        expect_line(want[i]);
+    assert_int_equal(*at, 0);
+    assert_non_null(strstr(rig_notes, "1 echoes left out"));
+    assert_non_null(strstr(rig_notes, "1 echoes brighter"));
+    assert_non_null(strstr(rig_notes, "7 places of the grid without a shot")); /* 16 places, 9 shots */
+}
+
+static void test_scans(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1), b = rig_anchor_of(NATIVE_CRS_UTM, 32632, 2);
+    const struct rig_point wall = {1000, -2000, 3000, INT16_MIN, 0, 1, 1};
+    b.anchor[0] += 0.125;
+    rig_begin();
+    rig_descriptor(1, 1);
+    rig_anchor(&a);
+    rig_points(0, 0, 4, (struct rig_point[]){wall, none}, 2);
+    rig_descriptor(1, 2);
+    rig_anchor(&b);
+    rig_points(0, 0, 4, &wall, 1);
+    record_text("a.ptx");
+    expect_head(1, 2, "500000.250000000 5000000.000000000 400.125000000");
+    expect_line("2.000000 1.000000 3.000000 0.500000");
+    expect_line("0 0 0 0.5");
+    expect_head(1, 1, "500000.375000000 5000000.000000000 400.125000000");
+    expect_line("2.000000 1.000000 3.000000 0.500000");
+    assert_int_equal(*at, 0);
+    assert_string_equal(rig_notes, "");
+}
+
+/* What the head measured stands as it is; the pose is that in the scene. */
+static void test_polar(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
+    const struct rig_point up = {5000, 900, 0, INT16_MIN, 0, 1, 1}, right = {5000, 0, 900, INT16_MIN, 0, 1, 1};
+    rig_begin();
+    rig_descriptor(0, 1);
+    rig_anchor(&a);
+    rig_points(0, 0, 0, (struct rig_point[]){right, up}, 2);
+    record_text("a.ptx");
+    expect_head(1, 2, "10.000000000 20.000000000 30.000000000");
+    expect_line("5.000000 0.000000 0.000000 0.500000");
+    expect_line("0.000000 0.000000 5.000000 0.500000");
+}
+
+static void test_poses(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 7), b = rig_anchor_of(NATIVE_CRS_UTM, 32632, 3);
+    rig_begin();
+    rig_descriptor(1, 1);
+    rig_anchor(&a);
+    rig_points(0, 0, 0, &none, 1);
+    rig_descriptor(1, 2);
+    rig_anchor(&b);
+    rig_points(0, 0, 0, &none, 1);
+    record_text("a.poses.csv");
+    expect_line("scan,station,epsg,x_m,y_m,z_m,qw,qx,qy,qz,lat_deg,lon_deg,height_m");
+    static const double want[10] = {500000.25, 5e6, 400.125, M_SQRT1_2, 0, 0, -M_SQRT1_2, 45, 9, 400.125};
+    for (int i = 0; i < 2; i++) {
+        char *end;
+        assert_int_equal(strtol(at, &end, 10), i + 1);
+        assert_int_equal(strtol(end + 1, &end, 10), i == 0 ? 7 : 3);
+        assert_int_equal(strtol(end + 1, &end, 10), 32632);
+        for (int k = 0; k < 10; k++)
+            assert_true(fabs(strtod(end + 1, &end) - want[k]) < 1e-15);
+        assert_int_equal(*end, '\n');
+        at = end + 1;
+    }
+    assert_int_equal(*at, 0);
+}
+
+static void test_disk_full(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
+    rig_begin();
+    rig_descriptor(1, 1);
+    rig_anchor(&a);
+    for (uint32_t i = 0; i < 300; i++)
+        rig_points(i, 10 * i, 10 * i, &(struct rig_point){1000, -2000, 3000, INT16_MIN, 0, 1, 1}, 1);
+    rig_check_disk_full(rig_path("full.ptx"), 4000);
+}
+
+static int tear_down(void **state)
+{
+    free(text);
+    return rig_tear_down(state);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_grid),  cmocka_unit_test(test_scans),     cmocka_unit_test(test_polar),
+        cmocka_unit_test(test_poses), cmocka_unit_test(test_disk_full),
+    };
+    return cmocka_run_group_tests(tests, rig_set_up, tear_down);
+}
