@@ -18,7 +18,7 @@ const char *plan_method_name(enum georef_method method)
 static double cost_ns(const struct georef *georef, enum georef_method method)
 {
     if (method != GEOREF_EXACT) return methods[method].cost_ns;
-    return georef_crs(georef) == GEOREF_UTM ? 900.0 : 250.0;
+    return georef_crs(georef) == GEOREF_UTM ? 600.0 : 250.0;
 }
 
 /* Local and ecef: the head's rotation and the CRS's are one matrix. */
