@@ -1,6 +1,6 @@
-/* What the polynomials of georeferencing cost on each width of vectors that this CPU has: rows of the chart's table, which
- * it does not draw. The loops are those of the program (core/georef/polynomial_kernels.h), compiled once more for each
- * instruction set; errors are against the exact method. README.md tells how to read it. */
+/* What the polynomials of georeferencing cost on each width of vectors that this CPU has: rows of the chart's table,
+ * which it does not draw. The loops are those of the program (core/georef/polynomial_kernels.h), compiled once more for
+ * each instruction set; errors are against the exact method. README.md tells how to read it. */
 #include <math.h>
 #include <sched.h>
 #include <stdio.h>
@@ -46,24 +46,15 @@ static const struct {
     const char *name;
     struct georef_spec spec;
     int order;
-} MAP[MAPS] = {{"to UTM: order 3", {.crs = GEOREF_UTM, .lat_deg = 52.5, .lon_deg = 13.4}, 3},
-               {"to geodetic: order 3", {.crs = GEOREF_GEODETIC, .lat_deg = 52.5, .lon_deg = 13.4}, 3},
-               {"UTM to geodetic: order 5",
-                {.crs = GEOREF_GEODETIC,
-                 .lat_deg = 52.5,
-                 .lon_deg = 13.4,
-                 .prcs_is_grid = 1,
-                 .prcs_zone = 33,
-                 .prcs_north = 1},
-                5},
-               {"UTM to ECEF: order 3",
-                {.crs = GEOREF_ECEF,
-                 .lat_deg = 52.5,
-                 .lon_deg = 13.4,
-                 .prcs_is_grid = 1,
-                 .prcs_zone = 33,
-                 .prcs_north = 1},
-                3}};
+} MAP[MAPS] = {
+    {"to UTM: order 3", {.crs = GEOREF_UTM, .lat_deg = 52.5, .lon_deg = 13.4}, 3},
+    {"to geodetic: order 3", {.crs = GEOREF_GEODETIC, .lat_deg = 52.5, .lon_deg = 13.4}, 3},
+    {"UTM to geodetic: order 5",
+     {.crs = GEOREF_GEODETIC, .lat_deg = 52.5, .lon_deg = 13.4, .prcs_is_grid = 1, .prcs_zone = 33, .prcs_north = 1},
+     5},
+    {"UTM to ECEF: order 3",
+     {.crs = GEOREF_ECEF, .lat_deg = 52.5, .lon_deg = 13.4, .prcs_is_grid = 1, .prcs_zone = 33, .prcs_north = 1},
+     3}};
 
 static double in[3][POINTS], out[3][POINTS], exact[3][POINTS], error_m[POINTS];
 
