@@ -7,7 +7,8 @@
 static const struct georef_place PLACE = {52.5, 13.4, 80.0};
 static const double NORTH_DEG = 30.0, WAY_M = 30000.0, STRETCH_M = 2000.0;
 
-/* Along a wall, 12 m away on the left; the pan turns, so that it is met up to the head's range of 1000 m ahead and behind. */
+/* Along a wall, 12 m away on the left; the pan turns, so that it is met up to the head's range of 1000 m ahead and
+ * behind. */
 static void write_drive(struct wire *wire, char config[352])
 {
     wire_write_text(wire, "wall.obj",
@@ -130,7 +131,8 @@ static void test_anchor_moves(void **state)
     static const struct {
         const char *set;
         enum georef_crs crs;
-    } runs[] = {{"output.crs=utm", GEOREF_UTM}, {"output.crs=geodetic", GEOREF_GEODETIC}, {"output.crs=ecef", GEOREF_ECEF}};
+    } runs[] = {
+        {"output.crs=utm", GEOREF_UTM}, {"output.crs=geodetic", GEOREF_GEODETIC}, {"output.crs=ecef", GEOREF_ECEF}};
     struct wire *wire = *state;
     char config[352];
     write_drive(wire, config);
@@ -155,10 +157,89 @@ static void test_anchor_moves(void **state)
     free(scene);
 }
 
+/* ---- an anchor that did not come */
+
+enum { HEADER = 28, TYPE_ANCHOR = 2, FLAG_REPEAT = 1 };
+
+/* Takes the nth anchor frame that is no repetition out of a recorded stream. */
+static size_t drop_anchor(uint8_t *bytes, size_t len, int nth)
+{
+    for (size_t at = 0; at + HEADER <= len;) {
+        size_t frame = HEADER + ((size_t)bytes[at + 4] | (size_t)bytes[at + 5] << 8 | (size_t)bytes[at + 6] << 16);
+        if (bytes[at] != 0xd5) fail_msg("no frame at byte %zu", at);
+        if (bytes[at + 1] == TYPE_ANCHOR && (bytes[at + 3] & FLAG_REPEAT) == 0 && nth-- == 0) {
+            memmove(bytes + at, bytes + at + frame, len - at - frame);
+            return len - frame;
+        }
+        at += frame;
+    }
+    fail_msg("no such anchor");
+    return 0;
+}
+
+struct replay {
+    uint32_t n, unplaced;
+    double x[MOST]; /* infinity: not placed */
+};
+
+static struct replay *replay(const char *path)
+{
+    struct scanhead_frame frame;
+    struct scanhead_point point[256];
+    struct replay *out = calloc(1, sizeof *out);
+    assert_non_null(out);
+    struct scanhead *sh = client_open(path);
+    while (scanhead_next(sh, &frame, 0) == SCANHEAD_OK)
+        for (uint32_t first = 0; frame.type == SCANHEAD_POINTS && first < frame.n_points;) {
+            int n = scanhead_points(sh, &frame, first, point, 256), placed = n > 0;
+            if (!placed) {
+                assert_int_equal(n, SCANHEAD_ESTATE);
+                n = (int)(frame.n_points - first);
+                out->unplaced += (uint32_t)n;
+            }
+            assert_true(out->n + (uint32_t)n <= MOST);
+            for (int i = 0; i < n; i++)
+                out->x[out->n++] = placed ? point[i].x : (double)INFINITY;
+            first += (uint32_t)n;
+        }
+    scanhead_close(sh);
+    return out;
+}
+
+/* Points behind it are placed again from the next repetition on, within a second of 60, and none is placed by the
+ * anchor before, 2 km away. */
+static void test_lost_anchor(void **state)
+{
+    struct wire *wire = *state;
+    char config[352], path[352];
+    size_t len;
+    write_drive(wire, config);
+    snprintf(path, sizeof path, "%s", wire_path(wire, "drive.shs"));
+    const char *const args[] = {
+        "record", config, "-o", path, "--quiet", "--set", "output.crs=utm", "--set", "output.layout=geo", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "head.out", "head.err", -1)), 0);
+    struct replay *whole = replay(path), *holed;
+    assert_int_equal(whole->unplaced, 0);
+    char *bytes = wire_read(path, &len);
+    len = drop_anchor((uint8_t *)bytes, len, 7);
+    snprintf(path, sizeof path, "%s", wire_write(wire, "holed.shs", bytes, len));
+    free(bytes);
+    holed = replay(path);
+    print_message("# an anchor lost: %u of %u points not placed\n", holed->unplaced, whole->n);
+    assert_int_equal(holed->n, whole->n);
+    assert_true(holed->unplaced > 0 && holed->unplaced <= whole->n / 60 + 100);
+    for (uint32_t i = 0; i < whole->n; i++)
+        if (holed->x[i] != whole->x[i] && !isinf(holed->x[i]) && !isnan(whole->x[i]))
+            fail_msg("point %u at %.3f, not %.3f", i, holed->x[i], whole->x[i]);
+    free(whole);
+    free(holed);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_anchor_moves, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_lost_anchor, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
