@@ -135,7 +135,8 @@ bench: deps-build
 CHART = $(BUILD)/chart/speed_accuracy
 $(BUILD)/tests/bench/chart: tests/bench/chart.c tests/bench/reference.c $(BUILD)/modules.a
 $(BUILD)/tests/bench/chart_georef: tests/bench/chart_georef.c $(BUILD)/modules.a
-CHARTS = $(BUILD)/tests/bench/chart $(BUILD)/tests/bench/chart_georef
+$(BUILD)/tests/bench/chart_widths: tests/bench/chart_widths.c $(BUILD)/modules.a
+CHARTS = $(BUILD)/tests/bench/chart $(BUILD)/tests/bench/chart_georef $(BUILD)/tests/bench/chart_widths
 $(CHARTS):
 	@mkdir -p $(@D)
 	@echo "  CHART $@"
@@ -146,6 +147,7 @@ chart: deps-build
 	@mkdir -p $(BUILD)/chart
 	$(BUILD)/tests/bench/chart > $(CHART).csv
 	$(BUILD)/tests/bench/chart_georef >> $(CHART).csv
+	$(BUILD)/tests/bench/chart_widths >> $(CHART).csv
 	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)'" tests/bench/chart.gp
 objects: $(EVERYTHING)
 test-unit-programs: $(UNIT)

@@ -12,10 +12,11 @@
  *   geodetic  latitude and longitude in degrees, height; longitude differences the short way round, in -180..180
  *
  * Methods: exact calls GeographicLib for each point (about 0.2 us for geodetic, 0.9 us for utm); order 1, 2, 3 evaluate
- * its Taylor polynomial about the centre in a few ns, within georef_bound_m. Only what is not linear has them: local,
- * ecef from a metric frame, and a grid that the scene is in are exact whatever the method.
- * Heights are ellipsoidal, or with a geoid above it (interpolated for each point: exact only).
- * Thread: a georef is constant after creation and georef_set_method. */
+ * its Taylor polynomial about the centre in a few ns, within georef_bound_m; order 5 too, where heights stay what they
+ * are (a grid to another one or to geodetic). In geodetic output longitude is no polynomial but closed, which holds to
+ * some radii of the scene from a pole (polynomial.h). Only what is not linear has them: local, ecef from a metric
+ * frame, and a grid that the scene is in are exact whatever the method. Heights are ellipsoidal, or with a geoid above
+ * it (interpolated for each point: exact only). Thread: a georef is constant after creation and georef_set_method. */
 #ifndef CORE_GEOREF_H
 #define CORE_GEOREF_H
 
@@ -24,7 +25,7 @@
 #include "core/err.h"
 
 enum georef_crs { GEOREF_LOCAL, GEOREF_ECEF, GEOREF_UTM, GEOREF_GEODETIC };
-enum georef_method { GEOREF_AUTO, GEOREF_EXACT, GEOREF_ORDER1, GEOREF_ORDER2, GEOREF_ORDER3 };
+enum georef_method { GEOREF_AUTO, GEOREF_EXACT, GEOREF_ORDER1, GEOREF_ORDER2, GEOREF_ORDER3, GEOREF_ORDER5 };
 
 struct georef_geoid;
 

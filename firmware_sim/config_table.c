@@ -17,9 +17,13 @@
 static const char *const up_names[] = {[SCENE_UP_Z] = "z", [SCENE_UP_Y] = "y", NULL};
 static const char *const crs_names[] = {
     [GEOREF_LOCAL] = "local", [GEOREF_ECEF] = "ecef", [GEOREF_UTM] = "utm", [GEOREF_GEODETIC] = "geodetic", NULL};
-static const char *const georef_names[] = {
-    [GEOREF_AUTO] = "auto",     [GEOREF_EXACT] = "exact",   [GEOREF_ORDER1] = "order1",
-    [GEOREF_ORDER2] = "order2", [GEOREF_ORDER3] = "order3", NULL};
+static const char *const georef_names[] = {[GEOREF_AUTO] = "auto",
+                                           [GEOREF_EXACT] = "exact",
+                                           [GEOREF_ORDER1] = "order1",
+                                           [GEOREF_ORDER2] = "order2",
+                                           [GEOREF_ORDER3] = "order3",
+                                           [GEOREF_ORDER5] = "order5",
+                                           NULL};
 static const char *const heights_names[] = {
     [HEIGHTS_ELLIPSOID] = "ellipsoid", [HEIGHTS_GEOID] = "geoid", [HEIGHTS_AUTO] = "auto", NULL};
 static const char *const anchor_names[] = {[ANCHOR_NONE] = "none", [ANCHOR_EXPLICIT] = "explicit", [ANCHOR_IFC] = "ifc",

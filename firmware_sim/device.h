@@ -46,6 +46,7 @@ struct device_work {
     uint64_t pulse0, pulse_end; /* pulses of this tick */
     int cut_short;              /* the scan stops at pulse_end, within a line */
     uint32_t station;
+    size_t stretch;   /* of a trajectory: the one that the last anchor was for */
     uint32_t n_poses; /* live: the head's poses of this tick; 0: a head that stands still, or goes along a trajectory */
     struct pose_knot pose[DEVICE_MAX_POSES];
     int telemetry;
@@ -115,6 +116,9 @@ size_t device_gnss_sentences(struct device *device, uint64_t index, char *dst, s
 uint64_t device_scans(struct device *device);
 
 double device_tick_ns(const struct device *device);
+
+/* The anchor of a station's points; the stretch counts only along a trajectory (site_georef). */
+void device_fill_anchor(const struct site *site, uint32_t station, size_t stretch, struct native_anchor *a);
 
 /* The most pulses that one tick consists of, and lines that end in it, whatever the settings: a slot has to hold them.
  */

@@ -48,7 +48,9 @@ struct device {
     uint64_t scan_tick0, pulse_next, scan_lost0;
     struct schedule_segment segment;
     uint32_t station; /* of the scan at hand, from 0 */
+    size_t stretch;   /* of a trajectory: the one of the last pulse that is claimed */
     int describe;     /* descriptor and anchor are due, as news */
+    int anchor_lost;  /* they are due as a repetition: a new anchor was in a tick that was lost */
     int stop_requested;
 
     struct native_event pending[DEVICE_MAX_PENDING];
@@ -92,7 +94,6 @@ void device_set_time_texts(struct device *device);
 
 /* device_frames.c: what the frames say. */
 void device_fill_descriptor(const struct device *device, struct native_descriptor *d);
-void device_fill_anchor(const struct device *device, struct native_anchor *a);
 void device_fill_telemetry(const struct device *device, uint64_t tick, struct native_telemetry *t);
 void device_fill_spec(const struct device *device, struct schedule_spec *spec);
 

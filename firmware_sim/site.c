@@ -216,11 +216,15 @@ void site_free(struct site *site)
 {
     if (site == NULL) return;
     free(site->knot);
-    free(site->stretch);
-    for (uint32_t i = 0; i < site->n_stations; i++)
-        georef_free(site->station[i].georef);
-    free(site->station);
     free(site->stop);
+    for (uint32_t i = 0; i < site->n_stations; i++) {
+        struct site_station *s = &site->station[i];
+        for (size_t k = 0; s->leg != NULL && k < site->n_stretches; k++)
+            georef_free(s->leg[k].georef);
+        free(s->leg);
+        georef_free(s->georef);
+    }
+    free(site->station);
     for (uint32_t i = 0; i < site->n_bvh; i++)
         bvh_free(site->bvh[i]);
     for (uint32_t i = 0; i < site->n_movers; i++) {
@@ -229,7 +233,18 @@ void site_free(struct site *site)
     }
     scene_free(site->scene);
     georef_geoid_free(site->geoid);
+    free(site->stretch);
     free(site);
+}
+
+const struct georef *site_georef(const struct site *site, uint32_t station, size_t stretch, const double **centre_m,
+                                 const double **scale)
+{
+    const struct site_station *s = &site->station[station];
+    const struct site_leg *leg = s->leg != NULL ? &s->leg[stretch] : NULL;
+    *centre_m = leg != NULL ? site->stretch[stretch].centre_m : s->at.position_m;
+    *scale = leg != NULL ? leg->scale : s->scale;
+    return leg != NULL ? leg->georef : s->georef;
 }
 
 static double counts_or_ideal(double counts)

@@ -11,13 +11,20 @@
 #include "firmware_sim/config.h"
 #include "firmware_sim/placement.h"
 
+/* Points of the geo layout along one stretch of a head's path: about its centre. */
+struct site_leg {
+    struct georef *georef;
+    double scale[3]; /* as below */
+};
+
 struct site_station {
     const struct config_station *station; /* of the configuration, or of stops */
     struct bvh *bvh;                      /* shared where stations are near each other */
     struct georef *georef;
     struct placement at;
     double scale[3];      /* of geo points on the wire, units of the CRS per count */
-    struct plan_row plan; /* how the georef's method was chosen */
+    struct site_leg *leg; /* one for each stretch of a trajectory, in the geo layout; else NULL */
+    struct plan_row plan; /* how the georef's method was chosen; of the worst leg */
     double t_s, frame;    /* a stop: when it is, after the trajectory's first sample; frame scalar of the trajectory */
 };
 
@@ -30,8 +37,9 @@ struct site_mover {
 
 /* A stretch of a moving head's path, with a BVH that reaches all of it. */
 struct site_stretch {
-    int64_t until_ns; /* since the scan's start */
+    int64_t until_ns; /* since the scan's start: whole milliseconds; INT64_MAX: the last one */
     struct bvh *bvh;
+    double centre_m[3], reach_m; /* all of it lies so near to that */
 };
 
 struct site {
@@ -54,7 +62,7 @@ struct site {
     double knot_error_m;          /* what the head's path differs from the trajectory by, at most */
     struct site_stretch *stretch; /* in order of time */
     size_t n_stretches;
-    double path_reach_m; /* from any station */
+    double live_reach_m; /* of a live head from any station */
     double scale_m;      /* of positions and ranges on the wire, metres per count */
 };
 
@@ -75,8 +83,15 @@ int site_utm_zone(const struct site *site);
 /* Names of a label below n_surfaces. */
 const struct scene_surface *site_surface(const struct site *site, uint32_t label);
 
-/* The BVH for a moving head at a time of the scan. */
-struct bvh *site_bvh_at(const struct site *site, int64_t t_ns);
+/* On which stretch a moving head is at a time of the scan; and what the casters need there, in a setup for the station.
+ */
+size_t site_stretch_at(const struct site *site, int64_t t_ns);
+void site_enter(const struct site *site, uint32_t station, size_t stretch, struct cast_setup *setup);
+
+/* The georeference of a station's points on a stretch, what the anchor is in the scene, and its scale. The stretch
+ * counts only along a trajectory. */
+const struct georef *site_georef(const struct site *site, uint32_t station, size_t stretch, const double **centre_m,
+                                 const double **scale);
 
 /* Poses of all movers at a time of the scan; at a stop they stand as at the stop's own (site_mover_time). */
 void site_move(const struct site *site, double t_s, struct cast_setup *setup);

@@ -85,11 +85,13 @@ static int add_stretch(struct site *site, const double centre_m[3], double reach
     int rc = bvh_create(site->scene, centre_m, reach_m, site->cfg->threads, report, bvh, err);
     if (rc != SH_OK) return rc;
     site->n_bvh++;
-    site->stretch[site->n_stretches++] = (struct site_stretch){until_ns, *bvh};
+    struct site_stretch *stretch = &site->stretch[site->n_stretches++];
+    *stretch = (struct site_stretch){.until_ns = until_ns, .bvh = *bvh, .reach_m = reach_m};
+    memcpy(stretch->centre_m, centre_m, sizeof stretch->centre_m);
     return site->cfg->order_exactly ? bvh_order_exactly(*bvh, err) : SH_OK;
 }
 
-/* A stretch ends between two poses; pulses of the block at hand may lie some blocks' way behind. */
+/* A stretch ends between two poses, and the head goes on for up to a millisecond, which 100 ms cover. */
 static int cover_path(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     int rc = SH_OK;
@@ -100,18 +102,11 @@ static int cover_path(struct site *site, const struct sh_report *report, struct 
         int64_t until_ns = end < site->n_knots ? site->knot[end - 1].t_ns : INT64_MAX;
         for (size_t k = end; k < site->n_knots && site->knot[k - 1].t_ns < until_ns + 100000000; k++)
             beyond_m = fmax(beyond_m, distance_m(site->knot[k].pose.position_m, site->knot[end - 1].pose.position_m));
+        if (until_ns != INT64_MAX) until_ns = (until_ns + 999999) / 1000000 * 1000000; /* as an anchor says it */
         rc = add_stretch(site, centre_m, radius_m + beyond_m + 1e-3, until_ns, report, err);
         i = end == site->n_knots || end == i + 1 ? end : end - 1; /* they share a pose */
     }
     return rc;
-}
-
-static void measure_path(struct site *site)
-{
-    for (uint32_t s = 0; s < site->cfg->n_stations; s++)
-        for (size_t i = 0; i < site->n_knots; i++)
-            site->path_reach_m =
-                fmax(site->path_reach_m, distance_m(site->station[s].at.position_m, site->knot[i].pose.position_m));
 }
 
 void site_get_mount(const struct config_platform *p, struct pose *mount)
@@ -132,18 +127,26 @@ int site_load_platform(struct site *site, const struct sh_report *report, struct
             reach_m = fmax(reach_m, distance_m(site->station[0].at.position_m, site->station[i].at.position_m));
         const double *arm = p->mount_m;
         double head_m = p->reach_m + sqrt(arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2]);
-        site->path_reach_m = head_m + reach_m;
+        site->live_reach_m = head_m + reach_m;
         return add_stretch(site, site->station[0].at.position_m, head_m, INT64_MAX, report, err);
     }
     int rc = load_knots(site, report, err);
-    if (rc == SH_OK) measure_path(site);
     return rc == SH_OK ? cover_path(site, report, err) : rc;
 }
 
-struct bvh *site_bvh_at(const struct site *site, int64_t t_ns)
+size_t site_stretch_at(const struct site *site, int64_t t_ns)
 {
     size_t i = 0;
     while (i + 1 < site->n_stretches && t_ns >= site->stretch[i].until_ns)
         i++;
-    return site->stretch[i].bvh;
+    return i;
+}
+
+void site_enter(const struct site *site, uint32_t station, size_t stretch, struct cast_setup *setup)
+{
+    const double *centre_m, *scale;
+    setup->bvh = site->stretch[stretch].bvh;
+    setup->georef = site_georef(site, station, stretch, &centre_m, &scale);
+    memcpy(setup->station_m, centre_m, sizeof setup->station_m);
+    memcpy(setup->xyz_scale, scale, sizeof setup->xyz_scale);
 }

@@ -309,6 +309,44 @@ void shim_map_place(const struct shim_map *map, double place[3])
         place[i] = map->place[i];
 }
 
+/* prcs to the tangent frame's origin, to ECEF, to the centre's axes. */
+static void meridian_of_metric(const struct shim_map *map, struct shim_meridian *out)
+{
+    double p[3], from[9], to[9];
+    const LocalCartesian &local = map->local;
+    shim_ecef(local.LatitudeOrigin(), local.LongitudeOrigin(), local.HeightOrigin(), p, from);
+    shim_ecef(map->place[0], map->place[1], map->place[2], p, to);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            double sum = 0.0;
+            for (int k = 0; k < 3; k++)
+                for (int m = 0; m < 3; m++)
+                    sum += to[3 * k + i] * from[3 * k + m] * map->turn[3 * m + j];
+            out->turn[3 * i + j] = sum;
+        }
+    out->axis_m = std::hypot(p[0], p[1]);
+    out->sin_lat = to[8];
+    out->cos_lat = to[7];
+}
+
+int shim_map_meridian(const struct shim_map *map, struct shim_meridian *out)
+{
+    *out = {};
+    if (!map->from_grid) {
+        meridian_of_metric(map, out);
+        return 1;
+    }
+    if (map->in.zone != 0) return 0;
+    /* x = rho sin lon, y = -rho cos lon about the north pole, rho cos lon about the south pole */
+    out->axis_m = std::hypot(map->in_x0, map->in_y0);
+    out->sin_lat = map->in.north ? 1.0 : -1.0;
+    double x = map->in_x0 / out->axis_m, y = map->in_y0 / out->axis_m;
+    const double turn[9] = {-y, x, 0.0, -x, -y, 0.0, 0.0, 0.0, 1.0};
+    for (int i = 0; i < 9; i++)
+        out->turn[i] = i < 6 ? out->sin_lat * turn[i] : turn[i];
+    return 1;
+}
+
 int shim_map_epsg(const struct shim_map *map)
 {
     if (map->kind == SHIM_GEODETIC) return 4979;

@@ -58,6 +58,14 @@ void shim_map_free(struct shim_map *map);
 void shim_map_anchor(const struct shim_map *map, double anchor[3]);
 /* Of the centre: degrees, degrees, ellipsoidal height. */
 void shim_map_place(const struct shim_map *map, double place[3]);
+/* What longitude depends on: how differences in prcs lie to the centre's meridian. */
+struct shim_meridian {
+    double turn[9];          /* differences in prcs -> east, north, up at the centre, row by row */
+    double axis_m;           /* from the Earth's axis, or from the pole in a UPS grid */
+    double sin_lat, cos_lat; /* how up and north point along the axis; in a UPS grid as at the pole */
+};
+/* 0 where there is none: from a UTM grid. */
+int shim_map_meridian(const struct shim_map *map, struct shim_meridian *out);
 int shim_map_epsg(const struct shim_map *map);
 void shim_map_convergence(const struct shim_map *map, double *convergence_deg, double *scale);
 

@@ -114,7 +114,7 @@ struct scanhead_info {
     int crs;           /* 0 local (scene frame), 1 ECEF, 2 UTM/UPS, 3 geodetic */
     int epsg;          /* 0 for local */
     int geoid_heights; /* 1: heights of UTM and geodetic points are above the geoid; 0: ellipsoidal */
-    double anchor[3];  /* metres; geodetic: degrees, degrees, metres */
+    double anchor[3];  /* metres; geodetic: degrees, degrees, metres. Moves along with a head on a trajectory */
     double scale_m;    /* a count on the wire is at most this on the ground */
     double scale[3];   /* units of the CRS per count */
     double lat_deg, lon_deg, height_m, station_m[3];

@@ -53,7 +53,7 @@ static const struct field anchor[] = {
     ANCHOR(moving, FIELD_32),      ANCHOR(anchor, FIELD_REAL),   ANCHOR(scale_m, FIELD_REAL),
     ANCHOR(lat_deg, FIELD_REAL),   ANCHOR(lon_deg, FIELD_REAL),  ANCHOR(height_m, FIELD_REAL),
     ANCHOR(station_m, FIELD_REAL), ANCHOR(rotation, FIELD_REAL), ANCHOR(scale, FIELD_REAL),
-    ANCHOR(heights, FIELD_32),     ANCHOR(reserved2, FIELD_32),  ANCHOR(axes, FIELD_REAL),
+    ANCHOR(heights, FIELD_32),     ANCHOR(until_ms, FIELD_32),   ANCHOR(axes, FIELD_REAL),
     ANCHOR(frame, FIELD_REAL),
 };
 

@@ -88,7 +88,7 @@ struct native_anchor {
     double rotation[9];  /* socs -> scene frame, row by row: p_prcs = station_m + rotation * p_socs */
     double scale[3];     /* geo: position = anchor + scale[k] * count[k]; 0, or not there: scale_m */
     uint32_t heights;    /* enum native_heights, of utm and geodetic */
-    uint32_t reserved2;
+    uint32_t until_ms;   /* of the scan: for points before that; 0: for all that follow */
     double axes[9]; /* differences in the scene frame at the anchor -> axes of the CRS, row by row, without its scale;
                        geodetic: -> east, north, up. All 0, or not there: the unit matrix */
     double frame;   /* at a stop: frame scalar of the trajectory */
