@@ -29,12 +29,16 @@ enum georef_method { GEOREF_AUTO, GEOREF_EXACT, GEOREF_ORDER1, GEOREF_ORDER2, GE
 
 struct georef_geoid;
 
+/* As a zone where 0 means by position. */
+enum { GEOREF_UPS = -1 };
+
 struct georef_spec {
     enum georef_crs crs;
     double station_m[3];     /* the head's origin in prcs */
     double lat_deg, lon_deg; /* geodetic, WGS 84, of the head's origin */
     double height_m;         /* ellipsoidal, whatever the output's heights are */
-    int utm_zone;            /* 1..60, or 0: by position */
+    int utm_zone;            /* 1..60, GEOREF_UPS, or 0: by position */
+    int side;                /* utm: hemisphere of the false northing; 1: north, -1: south, 0: by position */
     /* How prcs lies at the station, where it is not its tangent frame (see core/geoframe.h): */
     double rotation[9]; /* differences in prcs -> east, north, up at the station, row by row; all 0: the same axes */
     int prcs_is_grid;   /* 1: prcs is easting, northing, height of a grid, and station_m the station's */

@@ -97,9 +97,14 @@ static int print_on_earth(const struct site *site, uint32_t i, FILE *out, struct
     double p_ecef[3], forward[3], up[3];
     struct locate_grid utm;
     int grid = site->anchor.known && frame->kind == GEOFRAME_GRID;
-    int zone = site->cfg->utm_zone != 0 ? site->cfg->utm_zone : grid ? frame->zone : site_utm_zone(site);
+    int zone, side;
+    site_grid(site, &zone, &side);
     const struct georef_place place = {at->lat_deg, at->lon_deg, at->height_m};
     int rc = locate_in_grid(&place, zone, &utm, err);
+    if (rc == SH_OK && side != 0 && utm.zone != 0 && utm.north != (side > 0)) {
+        utm.north = side > 0;
+        utm.northing_m += utm.north ? -1e7 : 1e7;
+    }
     if (rc == SH_OK) rc = axis_enu(site, i, 1, forward, err);
     if (rc == SH_OK) rc = axis_enu(site, i, 2, up, err);
     if (rc != SH_OK) return rc;

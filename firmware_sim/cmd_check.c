@@ -45,6 +45,16 @@ static void print_platform(const struct site *site)
            site->n_stretches);
 }
 
+static void print_output(const struct config *cfg, const struct site *site)
+{
+    int heights = cfg->crs == GEOREF_UTM || cfg->crs == GEOREF_GEODETIC;
+    printf("output    %s, %g m per count%s\n", cfg->layout == LINE_GEO ? "geo" : "polar", site->scale_m,
+           !heights                       ? ""
+           : site->geoid != NULL          ? ", heights above the geoid"
+           : cfg->heights == HEIGHTS_AUTO ? ", heights above the ellipsoid (no geoid data is installed)"
+                                          : ", heights above the ellipsoid");
+}
+
 static int print_summary(const struct config *cfg, const struct site *site, struct sh_err *err)
 {
     const struct scene *scene = site->scene;
@@ -61,7 +71,7 @@ static int print_summary(const struct config *cfg, const struct site *site, stru
     for (uint32_t i = 0; i < site->n_stations && rc == SH_OK && site->stop == NULL; i++)
         rc = check_print_station(site, i, stdout, err);
     print_platform(site);
-    printf("output    %s, %g m per count\n", cfg->layout == LINE_GEO ? "geo" : "polar", site->scale_m);
+    print_output(cfg, site);
     return rc;
 }
 

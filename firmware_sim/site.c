@@ -158,24 +158,34 @@ static int place_stations(struct site *site, const struct sh_report *report, str
     return rc == SH_OK && cfg->platform.kind == PLATFORM_STOPS ? site_load_stops(site, err) : rc;
 }
 
-int site_utm_zone(const struct site *site)
+void site_grid(const struct site *site, int *zone, int *side)
 {
     const struct geoframe *frame = &site->anchor.frame;
-    const struct placement *first = &site->station[0].at;
+    const struct site_station *first = &site->station[0];
     struct locate_grid utm;
-    if (site->cfg->utm_zone != 0 || !site->anchor.known || frame->kind == GEOFRAME_GRID) return site->cfg->utm_zone;
+    *zone = site->cfg->utm_zone;
+    *side = 0;
+    if (first->station->place == PLACE_UTM) *side = first->station->north ? 1 : -1;
+    if (!site->anchor.known) return;
     int tangent = frame->kind == GEOFRAME_TANGENT;
-    const struct georef_place at = {tangent ? frame->lat_deg : first->lat_deg,
-                                    tangent ? frame->lon_deg : first->lon_deg, 0.0};
-    int rc = locate_in_grid(&at, 0, &utm, NULL);
-    return rc == SH_OK ? utm.zone : 0;
+    if (frame->kind == GEOFRAME_GRID) {
+        if (*zone == 0) *zone = frame->zone == 0 ? GEOREF_UPS : frame->zone;
+        *side = frame->north ? 1 : -1;
+        return;
+    }
+    const struct georef_place at = {tangent ? frame->lat_deg : first->at.lat_deg,
+                                    tangent ? frame->lon_deg : first->at.lon_deg, 0.0};
+    if (locate_in_grid(&at, *zone, &utm, NULL) != SH_OK) return;
+    *zone = utm.zone == 0 ? GEOREF_UPS : utm.zone;
+    if (*side == 0) *side = utm.north ? 1 : -1;
 }
 
 static int add_station(struct site *site, uint32_t i, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
     struct site_station *s = &site->station[i];
-    struct georef_spec spec = {.crs = cfg->crs, .utm_zone = site_utm_zone(site), .geoid = site->geoid};
+    struct georef_spec spec = {.crs = cfg->crs, .geoid = site->geoid};
+    site_grid(site, &spec.utm_zone, &spec.side);
     int rc = placement_georef(&s->at, &site->anchor, &spec, err);
     if (site->moving)
         s->bvh = site->bvh[0];

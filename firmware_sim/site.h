@@ -76,9 +76,10 @@ struct site {
 int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err);
 void site_free(struct site *site);
 
-/* UTM zone for all stations of an anchored scene: that of the anchor, or of the first station; else, and where
- * output.utm_zone or the scene's own grid says it, as the configuration has it (0: by position). */
-int site_utm_zone(const struct site *site);
+/* The grid of output.crs utm, as georef_spec has it: one for all stations of an anchored scene, that of the anchor or
+ * of the first station, unless output.utm_zone or the scene's own grid says it; else by position. The hemisphere of the
+ * false northing is that in which the first station is given, if it is given in UTM. */
+void site_grid(const struct site *site, int *zone, int *side);
 
 /* Names of a label below n_surfaces. */
 const struct scene_surface *site_surface(const struct site *site, uint32_t label);

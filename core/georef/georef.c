@@ -39,7 +39,7 @@ static int check_spec(const struct georef_spec *spec, struct sh_err *err)
     int rc = check_range("latitude", spec->lat_deg, -90, 90, "deg", err);
     if (rc == SH_OK) rc = check_range("longitude", spec->lon_deg, -180, 360, "deg", err);
     if (rc == SH_OK) rc = check_range("height", spec->height_m, HEIGHT_MIN_M, HEIGHT_MAX_M, "m", err);
-    if (rc == SH_OK && spec->crs == GEOREF_UTM && (spec->utm_zone < 0 || spec->utm_zone > 60))
+    if (rc == SH_OK && spec->crs == GEOREF_UTM && (spec->utm_zone < GEOREF_UPS || spec->utm_zone > 60))
         rc = sh_fail(err, SH_EINPUT, "georef: UTM zone %d; allowed 1 to 60, or 0: by position", spec->utm_zone);
     return rc;
 }
@@ -80,7 +80,8 @@ static int set_up_frame(const struct georef_spec *spec, struct shim_frame *frame
 static int is_same_grid(const struct georef_spec *spec)
 {
     return spec->crs == GEOREF_UTM && spec->prcs_is_grid &&
-           (spec->utm_zone == 0 || spec->utm_zone == spec->prcs_zone) && spec->geoid == NULL;
+           (spec->utm_zone == 0 || spec->utm_zone == (spec->prcs_zone == 0 ? GEOREF_UPS : spec->prcs_zone)) &&
+           (spec->side == 0 || (spec->side > 0) == spec->prcs_north) && spec->geoid == NULL;
 }
 
 /* Metres per degree of latitude and of longitude at the centre, largest over height above it, and distance from the
@@ -131,7 +132,8 @@ static int set_up_map(struct georef *georef, const struct georef_spec *spec, con
     char why[256] = "";
     const double place[3] = {spec->lat_deg, spec->lon_deg, spec->height_m};
     enum shim_kind kind = spec->crs == GEOREF_UTM ? SHIM_GRID : spec->crs == GEOREF_ECEF ? SHIM_ECEF : SHIM_GEODETIC;
-    georef->map = shim_map_create(kind, place, frame, spec->utm_zone,
+    const struct shim_zone zone = {spec->utm_zone, spec->side};
+    georef->map = shim_map_create(kind, place, frame, &zone,
                                   spec->geoid != NULL ? georef_geoid_shim(spec->geoid) : NULL, why, sizeof why);
     if (georef->map == NULL) return fail_map(spec, why, err);
     georef->has_geoid = spec->geoid != NULL;

@@ -471,7 +471,7 @@ static void test_refusals(void **state)
         {{.crs = GEOREF_ECEF, .height_m = 1e6}, "height"},
         {{.crs = GEOREF_ECEF, .height_m = INFINITY}, "height"},
         {{.crs = GEOREF_UTM, .utm_zone = 61}, "zone 61; allowed 1 to 60"},
-        {{.crs = GEOREF_UTM, .utm_zone = -1}, "zone -1"},
+        {{.crs = GEOREF_UTM, .utm_zone = -2}, "zone -2"},
         {{.crs = GEOREF_UTM, .lat_deg = 48, .lon_deg = 16, .utm_zone = 10}, "zone 10 does not reach"},
         {{.crs = GEOREF_UTM, .lat_deg = 89, .lon_deg = 16, .utm_zone = 33}, "zone 33 does not reach"},
         {{.crs = GEOREF_LOCAL, .station_m = {0, NAN, 0}}, "station position y"},
