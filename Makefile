@@ -17,6 +17,8 @@ DEPS_BUILD = gcc g++ make pkg-config libc6-dev libembree-dev libassimp-dev libge
 	nettle-dev assimp-testmodels
 # and the tests, with the second compiler and its sanitizers:
 DEPS_TEST = $(DEPS_BUILD) libcmocka-dev clang libclang-rt-dev
+# The guest tests; they are skipped where these can't be had. The kernel (linux-image-amd64) is fetched, not installed.
+DEPS_GUEST = qemu-system-x86 busybox-static cpio kmod xz-utils usbutils usbip
 
 PKGS = yaml-0.1 libpng nettle
 PKG_CFLAGS = $(eval PKG_CFLAGS := $$(shell pkg-config --cflags $(PKGS)))$(PKG_CFLAGS)
@@ -47,7 +49,7 @@ OBJ = $(SRC:%=$(BUILD)/%.o)
 LIBOBJ = $(patsubst %,$(BUILD)/%.o,core/err.c $(PROTO) $(HOST))
 PROGRAMS = $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/$(1)/test_*.c))
 UNIT = $(call PROGRAMS,unit)
-TESTS = $(UNIT) $(call PROGRAMS,wire) $(call PROGRAMS,accuracy) $(call PROGRAMS,stability)
+TESTS = $(UNIT) $(call PROGRAMS,wire) $(call PROGRAMS,accuracy) $(call PROGRAMS,stability) $(call PROGRAMS,guest)
 EVERYTHING = $(OBJ) $(BUILD)/firmware_sim/main.c.o
 
 all: $(BUILD)/scanhead $(BUILD)/libscanhead.a $(BUILD)/libscanhead.so
@@ -96,6 +98,9 @@ define install_missing
 endef
 deps:
 	$(call install_missing,$(DEPS_TEST))
+	@$(MAKE) --no-print-directory deps-guest || echo "the guest tests will be skipped"
+deps-guest:
+	$(call install_missing,$(DEPS_GUEST))
 deps-build:
 	$(call install_missing,$(DEPS_BUILD))
 
@@ -112,7 +117,7 @@ test: deps
 	@$(MAKE) --no-print-directory -j2 $(CLANG) objects
 	@$(MAKE) --no-print-directory -j2 $(ASAN) all test-unit-programs
 	@SCANHEAD=$(BUILD)/test/scanhead sh tests/run_all.sh $(BUILD)
-test-unit test-wire test-accuracy test-stability: deps
+test-unit test-wire test-accuracy test-stability test-guest: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test test-programs
 	@SCANHEAD=$(BUILD)/test/scanhead sh tests/run_all.sh $(BUILD) $(@:test-%=%)
 
@@ -150,6 +155,6 @@ format:
 	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')
 clean:
 	rm -rf $(BUILD)
-.PHONY: all deps deps-build demo test test-unit test-wire test-accuracy test-stability objects test-unit-programs test-programs bench chart install format clean
+.PHONY: all deps deps-build deps-guest demo test test-unit test-wire test-accuracy test-stability test-guest objects test-unit-programs test-programs bench chart install format clean
 .SECONDARY:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)
