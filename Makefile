@@ -14,13 +14,13 @@ Q = $(Q_$(V))
 
 # What a fresh Debian 12 needs. Building and the demo:
 DEPS_BUILD = gcc g++ make pkg-config libc6-dev libembree-dev libassimp-dev libgeographiclib-dev libyaml-dev libpng-dev \
-	nettle-dev assimp-testmodels
+	nettle-dev libusb-1.0-0-dev assimp-testmodels
 # and the tests, with the second compiler and its sanitizers:
 DEPS_TEST = $(DEPS_BUILD) libcmocka-dev clang libclang-rt-dev
 # The guest tests; they are skipped where these can't be had. The kernel (linux-image-amd64) is fetched, not installed.
 DEPS_GUEST = qemu-system-x86 busybox-static cpio kmod xz-utils usbutils usbip
 
-PKGS = yaml-0.1 libpng nettle
+PKGS = yaml-0.1 libpng nettle libusb-1.0
 PKG_CFLAGS = $(eval PKG_CFLAGS := $$(shell pkg-config --cflags $(PKGS)))$(PKG_CFLAGS)
 PKG_LIBS = $(eval PKG_LIBS := $$(shell pkg-config --libs $(PKGS)))$(PKG_LIBS)
 OPT ?= -O3 $(VEC_WIDTH)
@@ -34,6 +34,7 @@ SAN ?=
 # No contraction to FMA: the same numbers on every instruction set. errno and traps of libm are not used.
 FP = -ffp-contract=off -fno-math-errno -fno-trapping-math
 HEADS_DIR = $(PREFIX)/share/scanhead/heads
+UDEV_DIR = $(PREFIX)/lib/udev/rules.d
 ALL_CPPFLAGS = -I. -D_GNU_SOURCE -MMD -MP $(CPPFLAGS)
 ALL_CFLAGS = -std=c11 $(OPT) -g $(FP) $(CWARN) $(WERROR) -fPIC -pthread $(SAN) $(PKG_CFLAGS) $(CFLAGS)
 ALL_CXXFLAGS = -std=c++17 $(OPT) -g $(FP) $(WARN) $(WERROR) -fPIC -pthread $(SAN) $(CXXFLAGS)
@@ -74,7 +75,7 @@ $(BUILD)/libscanhead.a: $(LIBOBJ)
 $(BUILD)/libscanhead.so: $(LIBOBJ) drivers/host/libscanhead.map
 	@echo "  LD    $@"
 	$(Q)$(CC) -shared $(SAN) -Wl,--version-script=drivers/host/libscanhead.map -Wl,-soname,libscanhead.so.1 \
-		-o $@ $(LIBOBJ) -lnettle -lm
+		-o $@ $(LIBOBJ) -lnettle -lusb-1.0 -lm
 $(BUILD)/scanhead: $(BUILD)/firmware_sim/main.c.o $(BUILD)/modules.a
 	@echo "  LD    $@"
 	$(Q)$(CC) $(SAN) -o $@ $^ $(LDLIBS)
@@ -144,13 +145,15 @@ test-unit-programs: $(UNIT)
 test-programs: all $(TESTS)
 
 install: all
-	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib $(DESTDIR)$(PREFIX)/include $(DESTDIR)$(HEADS_DIR)
+	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib $(DESTDIR)$(PREFIX)/include $(DESTDIR)$(HEADS_DIR) \
+		$(DESTDIR)$(UDEV_DIR)
 	install $(BUILD)/scanhead $(DESTDIR)$(PREFIX)/bin/
 	install -m 644 $(BUILD)/libscanhead.a $(DESTDIR)$(PREFIX)/lib/
 	install $(BUILD)/libscanhead.so $(DESTDIR)$(PREFIX)/lib/libscanhead.so.1
 	ln -sf libscanhead.so.1 $(DESTDIR)$(PREFIX)/lib/libscanhead.so
 	install -m 644 drivers/host/scanhead.h $(DESTDIR)$(PREFIX)/include/
 	install -m 644 config/heads/*.yaml $(DESTDIR)$(HEADS_DIR)/
+	install -m 644 drivers/host/70-scanhead.rules $(DESTDIR)$(UDEV_DIR)/
 format:
 	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')
 clean:
