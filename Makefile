@@ -45,7 +45,7 @@ CORE = $(wildcard core/*.c core/*/*.c) core/georef/geographiclib_shim.cpp
 PROTO = $(wildcard drivers/protocol/*.c)
 HOST = $(wildcard drivers/host/*.c)
 FIRM = $(filter-out firmware_sim/main.c,$(wildcard firmware_sim/*.c))
-SRC = $(CORE) $(PROTO) $(HOST) $(wildcard drivers/link/*.c) $(FIRM)
+SRC = $(CORE) $(PROTO) $(HOST) $(wildcard drivers/link/*.c) $(wildcard drivers/usb/*.c) $(FIRM)
 OBJ = $(SRC:%=$(BUILD)/%.o)
 LIBOBJ = $(patsubst %,$(BUILD)/%.o,core/err.c $(PROTO) $(HOST))
 PROGRAMS = $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/$(1)/test_*.c))
