@@ -1,10 +1,15 @@
 # Inside the guest: results for the host, as TAP on descriptor 3. Sourced by init before the test's script.
 tests=0
 
-module_options() {
-    case $1 in
-    dummy_hcd.ko) echo "is_super_speed=1" ;;
-    esac
+# load MODULE [OPTION...]: with what it needs.
+load() {
+    module=$1
+    shift
+    while read -r part; do
+        [ ! -e "/sys/module/$(echo "$part" | tr - _)" ] || continue
+        if [ "$part" = "$module" ]; then insmod "/modules/$part.ko" "$@"; else insmod "/modules/$part.ko"; fi ||
+            note "cannot load $part"
+    done <"/modules/$module.order"
 }
 
 note() {
@@ -57,22 +62,25 @@ ask_host() {
     echo "$answer"
 }
 
-# programs of cmocka: their results under our numbers.
+# tap PREFIX PROGRAM...: a program of cmocka; its results under our numbers, what it skips left out.
 tap() {
-    "$@" >/tmp/tap.out 2>/tmp/tap.err
+    prefix=$1
+    shift
+    CMOCKA_MESSAGE_OUTPUT=TAP "$@" >/tmp/tap.out 2>/tmp/tap.err
     status=$?
     planned=$(sed -n 's/^1\.\.\([0-9]*\).*/\1/p' /tmp/tap.out)
     seen=0 failed=0
     while read -r line; do
         case $line in
-        "ok "*) pass "${line#ok * - }" ;;
-        "not ok "*) failed=1; fail "${line#not ok * - }" ;;
-        "#"*) echo "$line" >&3; continue ;;
-        *) continue ;;
+        "ok "*) pass "$prefix: ${line#ok * - }" ;;
+        "not ok "*"# SKIP"*) ;;
+        "not ok "*) failed=1; fail "$prefix: ${line#not ok * - }" ;;
+        "1.."* | "# ok - "* | "# not ok - "*) continue ;;
+        *) note "${line#\# }"; continue ;;
         esac
         seen=$((seen + 1))
     done </tmp/tap.out
     [ "$seen" = "$planned" ] && [ $((status != 0)) = $failed ] && return
-    fail "$1" "planned ${planned:-none}, seen $seen, exit status $status"
+    fail "$prefix: $1" "planned ${planned:-none}, seen $seen, exit status $status"
     cat /tmp/tap.out /tmp/tap.err | tail -n 20 | sed 's/^/#   /' >&3
 }

@@ -2,7 +2,7 @@
 
 # head_start YAML [OPTION...]: a head with these links, and TCP on 5025 beside them. head_stop ends it.
 head_start() {
-    sed "\$alinks: [{type: tcp, port: 5025}, $1]" /head.yaml >/tmp/config.yaml
+    sed "\$alinks: [{type: tcp, port: 5025}${1:+, $1}]" /head.yaml >/tmp/config.yaml
     shift
     cp /room.obj /tmp/
     rm -f /tmp/ready
@@ -33,23 +33,51 @@ tty_is_there() {
     test -c /dev/ttyACM0
 }
 
-# What lsusb shows of the head is what PROTOCOL.md and the class specifications want. $1: the speed's packet size.
+# What lsusb shows of the head is what the class specifications want. check_enumeration PREFIX BYTES: of a bulk packet.
 check_enumeration() {
-    check "$2: enumerated" wait_for 20 is_plugged
-    wait_for 10 tty_is_there
+    check "$1: enumerated" wait_for 20 is_plugged
+    check "$1: the stock driver makes a tty of it" wait_for 10 tty_is_there
     lsusb -v -d 1209:0001 >/tmp/lsusb.txt 2>/tmp/lsusb.err
-    check "$2: serial number, maker and product are strings" test "$(grep -c 'iManufacturer  *[1-9][0-9]* [A-Za-z]\|iProduct  *[1-9][0-9]* [A-Za-z]\|iSerial  *[1-9][0-9]* [A-Za-z0-9]' /tmp/lsusb.txt)" = 3
-    check "$2: CDC-ACM by an interface association" grep -A 8 'Interface Association' /tmp/lsusb.txt
-    check "$2: abstract control model" grep -q 'bInterfaceSubClass *2 ' /tmp/lsusb.txt
-    check "$2: vendor interface FF/53/48" grep -A 2 'bInterfaceClass *255 ' /tmp/lsusb.txt
-    check "$2: bulk endpoints of $1 bytes" test "$(grep -A 4 'Transfer Type *Bulk' /tmp/lsusb.txt | grep -c "wMaxPacketSize.* 1x $1 bytes")" = 4
-    check "$2: the stock driver has made a tty of it" tty_is_there
+    check "$1: maker, product and serial number are strings" \
+        test "$(grep -c 'i\(Manufacturer\|Product\|Serial\)  *[1-9][0-9]* [A-Za-z0-9]' /tmp/lsusb.txt)" = 3
+    check "$1: interface association" grep 'Interface Association' /tmp/lsusb.txt
+    check "$1: CDC-ACM" grep 'CDC ACM:' /tmp/lsusb.txt
+    grep -A 2 'bInterfaceClass  *255' /tmp/lsusb.txt | sed 's/.* \([0-9][0-9]*\) *$/\1/' | tr '\n' ' ' >/tmp/vendor.txt
+    check "$1: vendor interface FF/53/48" grep '255 83 72' /tmp/vendor.txt
+    check "$1: four bulk endpoints of $2 bytes" \
+        test "$(grep -A 4 'Transfer Type *Bulk' /tmp/lsusb.txt | grep -c "wMaxPacketSize.* 1x $2 bytes")" = 4
+    check "$1: Microsoft OS 2.0 platform capability" grep -i 'd8dd60df-4589-4cc7-9cd2-659d9e648a9f' /tmp/lsusb.txt
 }
 
-# The recorder: over USB, and through the plain tty.
+sha256_of() {
+    sed -n 's/.*"stream_sha256": "\([0-9a-f]*\)".*/\1/p' "$1"
+}
+
+# The same two scans over TCP: what every other wire must give. Into tcp1 and tcp2.
+record_reference() {
+    check "the scans over TCP" scanhead record tcp:127.0.0.1:5025 --stats tcp1.json --quiet
+    scanhead record tcp:127.0.0.1:5025 --stats tcp2.json --quiet
+    tcp1=$(sha256_of tcp1.json) tcp2=$(sha256_of tcp2.json)
+}
+
+# The recorder: a head's first scan over USB, its second through the plain tty.
 check_record() {
+    rm -f usb.json tty.json
     check "$1: scanhead list shows it" sh -c "scanhead list | grep '^usb:1209:0001:'"
     check "$1: scanhead record usb" scanhead record usb --wait 10 -o usb.ply --stats usb.json --quiet
+    check "$1: the stream is the same as over TCP" test "$(sha256_of usb.json)" = "$tcp1" -a -n "$tcp1"
     check "$1: scanhead record tty" scanhead record tty:/dev/ttyACM0 --wait 10 -o tty.ply --stats tty.json --quiet
-    check "$1: the same stream" test "$(grep sha256 usb.json)" = "$(grep sha256 tty.json)"
+    check "$1: the stream of the tty is the same as over TCP" test "$(sha256_of tty.json)" = "$tcp2" -a -n "$tcp2"
+    check "$1: as many points in the file as pulses" grep "element vertex $(sed -n 's/.*"points": \([0-9]*\).*/\1/p' usb.json)\$" usb.ply
+}
+
+# A client that is killed leaves the head to the next one.
+check_killed_client() {
+    scanhead record usb --frames 100 -o killed.shs --quiet 2>/dev/null &
+    client=$!
+    wait_for 20 test -s killed.shs.part
+    kill -9 $client
+    wait $client 2>/dev/null
+    rm -f killed.shs.part
+    check "$1: after a client was killed" sh -c "scanhead record usb --wait 5 --duration 0.1 --frames 1 --stats after.json --quiet || scanhead record usb --stats after.json --quiet"
 }

@@ -19,8 +19,8 @@ guest_name=$(basename "$0" .sh)
 guest_work=$guest_cache/run/$guest_name
 guest_pid=
 
-# Of each module also what it needs is taken. vhci and the gadgets are modules in Debian's kernel.
-GUEST_MODULES="xhci-pci vhci-hcd usbip-core dummy_hcd libcomposite usb_f_fs usb_f_acm cdc-acm configfs"
+# Modules that the scripts may load; what these need is taken as well.
+GUEST_MODULES="xhci-pci vhci-hcd dummy_hcd usb_f_fs usb_f_acm cdc-acm"
 GUEST_TOOLS="busybox qemu-system-x86_64 cpio depmod lsusb usbip xz dpkg-deb"
 
 guest_skip() {
@@ -45,7 +45,7 @@ guest_kernel_name() {
     if [ -n "$name" ]; then
         echo "$name=$(apt-cache show --no-all-versions "$name" | sed -n 's/^Version: //p')"
     else
-        ls -t "$guest_cache" 2>/dev/null | grep '^linux-image-.*=' | head -n 1
+        ls -t "$guest_cache" 2>/dev/null | sed -n 's/^\(linux-image-.*=.*\)-[0-9]*$/\1/p' | head -n 1
     fi
 }
 
@@ -63,16 +63,18 @@ guest_unpack_kernel() {
     done
     [ "$(head -c 4 "$2/vmlinux" | tail -c 3)" = ELF ] || return 1
     PATH=$PATH:/sbin:/usr/sbin depmod -b "$2/tree" "$release"
-    guest_module_order "$2/tree/lib/modules/$release" >"$2/order" || return 1
     mkdir -p "$2/root/modules"
-    while read -r file; do cp "$2/tree/lib/modules/$release/$file" "$2/root/modules/" || return 1; done <"$2/order"
-    sed 's|.*/||' "$2/order" >"$2/root/modules/order"
-    rm -rf "$2/tree"
+    for module in $GUEST_MODULES; do
+        guest_module_order "$2/tree/lib/modules/$release" "$module" >"$2/order" || return 1
+        while read -r file; do cp "$2/tree/lib/modules/$release/$file" "$2/root/modules/" || return 1; done <"$2/order"
+        sed 's|.*/||; s|\.ko$||' "$2/order" >"$2/root/modules/$module.order"
+    done
+    rm -rf "$2/tree" "$2/order"
 }
 
-# The files of the modules wanted, each after those it needs.
+# guest_module_order FOLDER MODULE: the files of the module and of those it needs, each after what it needs itself.
 guest_module_order() {
-    awk -v wanted="$GUEST_MODULES" '
+    awk -v wanted="$2" '
         { file = $1; sub(/:$/, "", file); name = file; sub(/.*\//, "", name); sub(/\.ko.*/, "", name); gsub(/-/, "_", name)
           path[name] = file; needs[file] = ""; for (i = 2; i <= NF; i++) needs[file] = needs[file] " " $i }
         function put(file,   list, n, i) {
@@ -82,10 +84,9 @@ guest_module_order() {
             for (i = n; i > 0; i--) put(list[i])
             print file
         }
-        END { n = split(wanted, list, " ")
-              for (i = 1; i <= n; i++) { gsub(/-/, "_", list[i])
-                  if (list[i] in path) put(path[list[i]]); else { print "no module " list[i] > "/dev/stderr"; bad = 1 } }
-              exit bad }' "$1/modules.dep"
+        END { gsub(/-/, "_", wanted)
+              if (!(wanted in path)) exit 1
+              put(path[wanted]) }' "$1/modules.dep"
 }
 
 guest_pack() {
@@ -106,7 +107,7 @@ guest_copy() {
 guest_prepare_kernel() {
     kernel=$(guest_kernel_name)
     [ -n "$kernel" ] || guest_skip "no package linux-image-amd64: apt-get update, or no network"
-    guest_kernel=$guest_cache/$kernel
+    guest_kernel=$guest_cache/$kernel-$(echo "$GUEST_MODULES" | cksum | cut -d" " -f1)
     if [ ! -e "$guest_kernel/vmlinux" ]; then
         rm -rf "$guest_kernel.new"
         mkdir -p "$guest_kernel.new"

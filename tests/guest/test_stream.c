@@ -1,6 +1,6 @@
 /* The client's side of a head on a real bus: console, a scan with every frame looked at, and unplugging in its middle.
  *
- * From the environment: SOURCE (default usb), CONSOLE (a tty), TCP (the same head over TCP), PLUG and UNPLUG (shell
+ * From the environment: SOURCE (default usb), CONSOLE (a tty), PLUG and UNPLUG (shell
  * commands that do it), REPLUGS (how often). What isn't given is skipped. */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -61,11 +61,11 @@ static void wait_idle(struct scanhead *sh)
 {
     char reply[512] = "";
     struct scanhead_frame frame;
-    for (int i = 0; i < 400 && strcmp(reply, "idle") != 0; i++) {
-        tell(sh, "HEAD:STAT?", reply);
+    for (time_t end_s = time(NULL) + WAIT_MS / 1000; strcmp(reply, "idle") != 0 && time(NULL) < end_s;) {
         scanhead_next(sh, &frame, 50);
+        tell(sh, "HEAD:STAT?", reply);
     }
-    assert_string_equal(reply, "idle");
+    if (strcmp(reply, "idle") != 0) fail_msg("the head stays %s", reply);
 }
 
 /* ---- every frame looked at: what is missing must show in the sequence numbers */
@@ -104,13 +104,12 @@ static int next(struct watch *w, struct scanhead *sh)
     return rc;
 }
 
-static void scan(const char *name, char hash[65], struct watch *w)
+static void scan(const char *name, struct watch *w)
 {
     struct scanhead_stats s;
     struct scanhead *sh = open_head(name);
     memset(w, 0, sizeof *w);
     wait_idle(sh);
-    scanhead_hash_start(sh);
     do_command(sh, "SCAN:STAR");
     while (!w->over)
         if (next(w, sh) != 0) fail_msg("%s", scanhead_error(sh));
@@ -119,27 +118,22 @@ static void scan(const char *name, char hash[65], struct watch *w)
     assert_true(w->pulses > 0);
     assert_int_equal(w->next_pulse, w->scan_pulses);
     assert_int_equal(w->pulses, w->scan_pulses);
-    scanhead_hash_hex(sh, hash);
     scanhead_close(sh);
 }
 
-/* stream_sha256 is of what the head saw, whatever the wire. */
-static void test_same_scan(void **state)
+static void test_scan(void **state)
 {
-    char usb[65], tcp[65];
     struct watch w;
     (void)state;
-    scan(env("TCP"), tcp, &w);
-    scan(source(), usb, &w);
-    print_message("%llu pulses, sha256 %s\n", (unsigned long long)w.pulses, usb);
-    assert_string_equal(usb, tcp);
+    for (int i = 0; i < 2; i++)
+        scan(source(), &w);
 }
 
 /* ---- the console */
 
 static void test_console(void **state)
 {
-    char command[600], reply[512];
+    char command[300], reply[512];
     const char *tty = env("CONSOLE");
     (void)state;
     snprintf(command, sizeof command, "tty:%s", tty);
@@ -153,10 +147,11 @@ static void test_console(void **state)
         assert_int_equal(atoi(reply), 1 + i % 7);
     }
     do_command(sh, "SCAN:FRAM 1");
-    memset(command, ' ', 500); /* longer than packets of any speed but super */
-    strcpy(command + 500, "*IDN?");
+    memset(command, ' ', 250); /* the longest that is allowed: several packets at full speed */
+    strcpy(command + 250, "*IDN?");
     tell(sh, command, reply);
     assert_int_equal(strncmp(reply, "scanhead,", 9), 0);
+    do_command(sh, "*CLS");
     tell(sh, "NO:SUCH:COMMAND", reply);
     assert_int_equal(strncmp(reply, "ERR -113,", 9), 0);
     tell(sh, "SYST:ERR?", reply);
@@ -166,11 +161,11 @@ static void test_console(void **state)
 
 static void test_scan_on_console(void **state)
 {
-    char name[256], hash[65];
+    char name[256];
     struct watch w;
     (void)state;
     snprintf(name, sizeof name, "tty:%s", env("CONSOLE"));
-    scan(name, hash, &w);
+    scan(name, &w);
 }
 
 /* ---- sessions */
@@ -238,8 +233,7 @@ static void test_replug(void **state)
     do_command(sh, "SCAN:FRAM 1000");
     for (int i = 0; i < atoi(times); i++)
         unplug_in_the_middle(sh, &w);
-    char reply[512];
-    tell(sh, "SCAN:STOP", reply);
+    do_command(sh, "SCAN:STOP");
     wait_idle(sh);
     do_command(sh, "SCAN:FRAM 1");
     scanhead_get_stats(sh, &s);
@@ -251,7 +245,7 @@ static void test_replug(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_sessions),        cmocka_unit_test(test_console), cmocka_unit_test(test_same_scan),
+        cmocka_unit_test(test_sessions),        cmocka_unit_test(test_console), cmocka_unit_test(test_scan),
         cmocka_unit_test(test_scan_on_console), cmocka_unit_test(test_replug),
     };
     return cmocka_run_group_tests_name("stream", tests, NULL, NULL);
