@@ -106,6 +106,6 @@ int cmd_list(int argc, char **argv)
     if (argc != 1) return cmd_usage("list", "it takes no arguments");
     struct sh_err err = {0};
     if (config_list_profiles(NULL, stdout, &err) < 0) return cmd_fail(&err);
-    puts("links: pty (virtual serial port), tcp, usb (usbip), file, null");
+    puts("links: pty (virtual serial port), tcp, usb (usbip, usbredir), file, null");
     return CMD_OK;
 }
