@@ -145,7 +145,7 @@ static void put_interface(struct sink *to, const struct usb_interface_row *row, 
     put8(to, row->subclass);
     put8(to, row->protocol);
     put8(to, row->string);
-    put(to, row->extra, row->extra_len);
+    if (row->extra_len > 0) put(to, row->extra, row->extra_len);
     for (unsigned i = 0; i < row->n_endpoints; i++)
         put_endpoint(to, &row->endpoint[i], rate);
 }

@@ -262,7 +262,7 @@ static void run_submit(struct usbip_conn *conn, struct usbip_urb *urb)
 static void take_submit(struct usbip_conn *conn)
 {
     const uint32_t direction = get_be32(conn->head + 12), length = get_be32(conn->head + 24),
-                   packets = get_be32(conn->head + 36);
+                   packets = get_be32(conn->head + 32);
     struct usbip_urb *urb = NULL;
     if (direction <= DIR_IN && length <= MAX_URB_BYTES && (packets == 0 || packets == UINT32_MAX) &&
         get_be32(conn->head + 16) <= 15)

@@ -284,7 +284,7 @@ static void test_broken(void **state)
     static const struct {
         int at;
         uint32_t value;
-    } edits[] = {{0, 0}, {0, 3}, {8, 0x10003}, {12, 2}, {16, 16}, {24, 0x7fffffff}, {36, 1}};
+    } edits[] = {{0, 0}, {0, 3}, {8, 0x10003}, {12, 2}, {16, 16}, {24, 0x7fffffff}, {32, 1}};
     for (size_t i = 0; i < sizeof edits / sizeof edits[0]; i++) {
         memset(urb, 0, sizeof urb);
         put_be32(urb, 1);

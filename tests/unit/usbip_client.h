@@ -94,7 +94,8 @@ static inline uint32_t client_submit(struct client *c, int in, uint32_t ep, cons
     put_be32(h + 12, (uint32_t)in);
     put_be32(h + 16, ep);
     put_be32(h + 24, len);
-    put_be32(h + 36, 0xffffffff);
+    put_be32(h + 32, 0xffffffff); /* packets: none, it is not isochronous */
+    put_be32(h + 36, 64);         /* interval: for interrupts */
     if (setup != NULL) memcpy(h + 40, setup, 8);
     client_write(c, h, sizeof h);
     if (!in && len > 0) client_write(c, out, len);
