@@ -14,13 +14,15 @@ Q = $(Q_$(V))
 
 # What a fresh Debian 12 needs. Building and the demo:
 DEPS_BUILD = gcc g++ make pkg-config libc6-dev libembree-dev libassimp-dev libgeographiclib-dev libyaml-dev libpng-dev \
-	nettle-dev libusb-1.0-0-dev assimp-testmodels
+	nettle-dev libusb-1.0-0-dev libusbredirparser-dev assimp-testmodels
 # and the tests, with the second compiler and its sanitizers:
 DEPS_TEST = $(DEPS_BUILD) libcmocka-dev clang libclang-rt-dev
 # The guest tests; they are skipped where these can't be had. The kernel (linux-image-amd64) is fetched, not installed.
 DEPS_GUEST = qemu-system-x86 busybox-static cpio kmod xz-utils usbutils usbip
 
-PKGS = yaml-0.1 libpng nettle libusb-1.0
+# Without libusbredirparser everything builds but the back end that needs it.
+USBREDIR = $(eval USBREDIR := $$(shell pkg-config --exists libusbredirparser-0.5 && echo libusbredirparser-0.5))$(USBREDIR)
+PKGS = yaml-0.1 libpng nettle libusb-1.0 $(USBREDIR)
 PKG_CFLAGS = $(eval PKG_CFLAGS := $$(shell pkg-config --cflags $(PKGS)))$(PKG_CFLAGS)
 PKG_LIBS = $(eval PKG_LIBS := $$(shell pkg-config --libs $(PKGS)))$(PKG_LIBS)
 OPT ?= -O3 $(VEC_WIDTH)
@@ -35,7 +37,7 @@ SAN ?=
 FP = -ffp-contract=off -fno-math-errno -fno-trapping-math
 HEADS_DIR = $(PREFIX)/share/scanhead/heads
 UDEV_DIR = $(PREFIX)/lib/udev/rules.d
-ALL_CPPFLAGS = -I. -D_GNU_SOURCE -MMD -MP $(CPPFLAGS)
+ALL_CPPFLAGS = -I. -D_GNU_SOURCE $(if $(USBREDIR),-DHAVE_USBREDIR) -MMD -MP $(CPPFLAGS)
 ALL_CFLAGS = -std=c11 $(OPT) -g $(FP) $(CWARN) $(WERROR) -fPIC -pthread $(SAN) $(PKG_CFLAGS) $(CFLAGS)
 ALL_CXXFLAGS = -std=c++17 $(OPT) -g $(FP) $(WARN) $(WERROR) -fPIC -pthread $(SAN) $(CXXFLAGS)
 EMBREE = $(if $(wildcard /usr/include/embree4/rtcore.h),-lembree4,-lembree3)

@@ -41,6 +41,6 @@ int cmd_list(int argc, char **argv)
     if (argc != 1) return cmd_usage("list", "it takes no arguments");
     struct sh_err err = {0};
     if (config_list_profiles(NULL, stdout, &err) < 0) return cmd_fail(&err);
-    puts("links: pty (virtual serial port), tcp, usb (usbip), file, null");
+    puts("links: pty (virtual serial port), tcp, usb (usbip, usbredir, functionfs), file, null");
     return list_usb();
 }

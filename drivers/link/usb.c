@@ -24,10 +24,10 @@ static int usb_open(const struct link_spec *spec, void **link, struct sh_err *er
 {
     struct usb_link *self = calloc(1, sizeof *self);
     if (self == NULL) return sh_fail(err, SH_ENOMEM, "link usb: no memory");
-    struct usb_identity id = {.vid = (uint16_t)spec->vid, .pid = (uint16_t)spec->pid,
-                              .highest = (enum usb_rate)spec->speed};
-    struct usb_backend_spec backend = {.type = (enum usb_backend_type)spec->backend, .port = spec->port,
-                                       .attach = spec->attach};
+    struct usb_identity id = {
+        .vid = (uint16_t)spec->vid, .pid = (uint16_t)spec->pid, .highest = (enum usb_rate)spec->speed};
+    struct usb_backend_spec backend = {
+        .type = (enum usb_backend_type)spec->backend, .port = spec->port, .attach = spec->attach};
     snprintf(id.serial, sizeof id.serial, "%s", spec->serial);
     snprintf(backend.address, sizeof backend.address, "%s", spec->address);
     snprintf(backend.path, sizeof backend.path, "%s", spec->path);

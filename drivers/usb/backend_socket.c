@@ -17,9 +17,9 @@ enum { BACKLOG = 16 };
 
 static int error_code(int error)
 {
-    return error == EACCES || error == EPERM ? SH_EPERM
+    return error == EACCES || error == EPERM                                                           ? SH_EPERM
            : error == EADDRINUSE || error == EADDRNOTAVAIL || error == ENOENT || error == ECONNREFUSED ? SH_EINPUT
-                                                                                                      : SH_EIO;
+                                                                                                       : SH_EIO;
 }
 
 static int start(int fd, const struct sockaddr *at, socklen_t len, int connecting)
@@ -105,12 +105,21 @@ static int tcp_socket(const struct usb_backend_spec *spec, const char *what, int
     return SH_OK;
 }
 
-int usb_backend_socket(const struct usb_backend_spec *spec, const char *what, int *fd, char *name,
-                       size_t len, struct sh_err *err)
+int usb_backend_socket(const struct usb_backend_spec *spec, const char *what, int *fd, char *name, size_t len,
+                       struct sh_err *err)
 {
     if (spec->path[0] != '\0') {
         snprintf(name, len, "%s", spec->path);
         return unix_socket(spec, what, fd, err);
     }
     return tcp_socket(spec, what, fd, name, len, err);
+}
+
+void usb_backend_hang_up(int fd, int timeout_ms)
+{
+    char waste[4096];
+    struct pollfd slot = {.fd = fd, .events = POLLIN};
+    if (shutdown(fd, SHUT_WR) != 0) return;
+    while (poll(&slot, 1, timeout_ms) > 0 && recv(fd, waste, sizeof waste, MSG_DONTWAIT) > 0)
+        continue;
 }

@@ -230,7 +230,7 @@ static int class_or_vendor(struct usb_device *device, const struct usb_ctrlreque
     const struct setup low = {.index = s->index & 0xff};
     if ((s->type & USB_RECIP_MASK) == USB_RECIP_INTERFACE && !names_interface(device, &low)) return USB_STALL;
     if ((s->type & USB_RECIP_MASK) == USB_RECIP_ENDPOINT && named_pipe(device, s) == NULL) return USB_STALL;
-    if (device->hooks.request == NULL) return USB_STALL;
+    if (device->hooks.request == NULL || (s->type & USB_RECIP_MASK) > USB_RECIP_OTHER) return USB_STALL;
     int n = device->hooks.request(device->ctx, raw, data);
     return n > s->length ? s->length : n;
 }

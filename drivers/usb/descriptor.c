@@ -5,16 +5,16 @@
 #include "drivers/usb/usb.h"
 
 enum {
-    BCD_USB_2 = 0x0210,     /* the least that may have a BOS */
-    BCD_USB_3 = 0x0320,     /* at super speed */
-    PACKET_0 = 64,          /* bMaxPacketSize0, full and high speed */
-    PACKET_0_SUPER = 9,     /* the same at super speed: 2^9 */
-    SELF_POWERED = 0x40,    /* bmAttributes, with bit 7, which is always set */
+    BCD_USB_2 = 0x0210,  /* the least that may have a BOS */
+    BCD_USB_3 = 0x0320,  /* at super speed */
+    PACKET_0 = 64,       /* bMaxPacketSize0, full and high speed */
+    PACKET_0_SUPER = 9,  /* the same at super speed: 2^9 */
+    SELF_POWERED = 0x40, /* bmAttributes, with bit 7, which is always set */
     CAP_USB_2_EXTENSION = 2,
     CAP_SUPER_SPEED = 3,
     CAP_PLATFORM = 5,
-    LPM = 2,                /* super-speed devices must know link power management at high speed */
-    WORKS_FROM_FULL = 1,    /* bFunctionalitySupport: complete at full speed already */
+    LPM = 2,             /* super-speed devices must know link power management at high speed */
+    WORKS_FROM_FULL = 1, /* bFunctionalitySupport: complete at full speed already */
     U1_EXIT_US = 10,
     U2_EXIT_US = 2047,
 };
@@ -54,7 +54,8 @@ static void put32(struct sink *to, uint32_t v)
 /* A field that was put before its value was known. */
 static void patch16(struct sink *to, size_t at, unsigned v)
 {
-    if (at + 2 <= to->room) le_put16(to->out + at, (uint16_t)v);
+    if (at < to->room) to->out[at] = (uint8_t)v;
+    if (at + 1 < to->room) to->out[at + 1] = (uint8_t)(v >> 8);
 }
 
 const struct usb_interface_row *usb_find_row(const struct usb_model *model, unsigned interface, unsigned alt)
@@ -144,7 +145,7 @@ static void put_interface(struct sink *to, const struct usb_interface_row *row, 
     put8(to, row->subclass);
     put8(to, row->protocol);
     put8(to, row->string);
-    put(to, row->extra, row->extra_len);
+    if (row->extra_len > 0) put(to, row->extra, row->extra_len);
     for (unsigned i = 0; i < row->n_endpoints; i++)
         put_endpoint(to, &row->endpoint[i], rate);
 }

@@ -11,14 +11,30 @@ static const char *const strings[] = {"scanhead", "Laser scanner head", "Scanner
 enum { STRING_MAKER = 1, STRING_PRODUCT, STRING_CONSOLE, STRING_STREAM };
 
 /* Header 1.20; no call management; line coding, line state and break; union of both interfaces. */
-static const uint8_t console_extra[] = {
-    5, USB_DT_CS_INTERFACE, USB_CDC_HEADER_TYPE,          0x20, 0x01,
-    5, USB_DT_CS_INTERFACE, USB_CDC_CALL_MANAGEMENT_TYPE, 0,    CONSOLE_DATA_INTERFACE,
-    4, USB_DT_CS_INTERFACE, USB_CDC_ACM_TYPE,             USB_CDC_CAP_LINE | USB_CDC_CAP_BRK,
-    5, USB_DT_CS_INTERFACE, USB_CDC_UNION_TYPE,           CONSOLE_INTERFACE, CONSOLE_DATA_INTERFACE};
+static const uint8_t console_extra[] = {5,
+                                        USB_DT_CS_INTERFACE,
+                                        USB_CDC_HEADER_TYPE,
+                                        0x20,
+                                        0x01,
+                                        5,
+                                        USB_DT_CS_INTERFACE,
+                                        USB_CDC_CALL_MANAGEMENT_TYPE,
+                                        0,
+                                        CONSOLE_DATA_INTERFACE,
+                                        4,
+                                        USB_DT_CS_INTERFACE,
+                                        USB_CDC_ACM_TYPE,
+                                        USB_CDC_CAP_LINE | USB_CDC_CAP_BRK,
+                                        5,
+                                        USB_DT_CS_INTERFACE,
+                                        USB_CDC_UNION_TYPE,
+                                        CONSOLE_INTERFACE,
+                                        CONSOLE_DATA_INTERFACE};
 
-#define BULK(number, bursts) \
-    {.address = (number), .type = USB_ENDPOINT_XFER_BULK, .packet = {64, 512, 1024}, .burst = (bursts)}
+#define BULK(number, bursts)                                                                              \
+    {                                                                                                     \
+        .address = (number), .type = USB_ENDPOINT_XFER_BULK, .packet = {64, 512, 1024}, .burst = (bursts) \
+    }
 
 /* An interrupt every 16 ms: in frames at full speed, as 2^(n-1) microframes above. */
 static const struct usb_endpoint_row notify_endpoints[] = {
@@ -158,8 +174,16 @@ int scanhead_usb_create(const struct usb_identity *id, struct scanhead_usb *head
 
 void scanhead_usb_update(struct scanhead_usb *head)
 {
-    static const uint8_t notice[] = {USB_DIR_IN | USB_TYPE_CLASS | USB_RECIP_INTERFACE, USB_CDC_NOTIFY_SERIAL_STATE,
-                                     0, 0, CONSOLE_INTERFACE, 0, 2, 0, SERIAL_STATE_READY, 0};
+    static const uint8_t notice[] = {USB_DIR_IN | USB_TYPE_CLASS | USB_RECIP_INTERFACE,
+                                     USB_CDC_NOTIFY_SERIAL_STATE,
+                                     0,
+                                     0,
+                                     CONSOLE_INTERFACE,
+                                     0,
+                                     2,
+                                     0,
+                                     SERIAL_STATE_READY,
+                                     0};
     uint32_t epoch = 0;
     if (head->state_due && usb_device_write(head->device, CONSOLE_NOTIFY, notice, sizeof notice) == sizeof notice)
         head->state_due = 0;

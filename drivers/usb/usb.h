@@ -76,9 +76,9 @@ struct usb_function_row {
 struct usb_model {
     uint8_t class, subclass, protocol; /* of the device */
     uint16_t bcd_device;
-    uint16_t max_power_ma;             /* 0: self-powered */
-    const char *const *string;         /* by index from 1, UTF-8; NULL ends the list */
-    uint8_t manufacturer, product;     /* indices; the serial number's is the one after the list */
+    uint16_t max_power_ma;         /* 0: self-powered */
+    const char *const *string;     /* by index from 1, UTF-8; NULL ends the list */
+    uint8_t manufacturer, product; /* indices; the serial number's is the one after the list */
     const struct usb_function_row *function;
     const struct usb_interface_row *interface; /* rows */
     uint8_t n_functions, n_interfaces, n_rows;

@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "drivers/protocol/bytes.h"
+#include "drivers/usb/backend.h"
 #include "drivers/usb/usbip.h"
 #include "drivers/usb/usbip_conn.h"
 
@@ -140,8 +141,8 @@ static void on_complete(void *ctx, struct usb_transfer *transfer)
 
 static void describe_device(const struct usbip_conn *conn, uint8_t *out)
 {
-    static const uint8_t speed[] = {[USB_RATE_FULL] = USB_SPEED_FULL, [USB_RATE_HIGH] = USB_SPEED_HIGH,
-                                    [USB_RATE_SUPER] = USB_SPEED_SUPER};
+    static const uint8_t speed[] = {
+        [USB_RATE_FULL] = USB_SPEED_FULL, [USB_RATE_HIGH] = USB_SPEED_HIGH, [USB_RATE_SUPER] = USB_SPEED_SUPER};
     const struct usb_model *model = usb_device_model(conn->device);
     const struct usb_identity *id = usb_device_identity(conn->device);
     memset(out, 0, OP_DEVICE);
@@ -387,15 +388,11 @@ void usbip_conn_start(struct usbip_conn *conn, int fd, struct usb_device *device
 
 void usbip_conn_drain(struct usbip_conn *conn, int timeout_ms)
 {
-    uint8_t waste[4096];
     struct pollfd slot = {.fd = conn->fd, .events = POLLOUT};
     usbip_conn_write(conn);
     while (!conn->broken && conn->out_first != NULL && poll(&slot, 1, timeout_ms) > 0)
         usbip_conn_write(conn);
-    if (conn->broken || shutdown(conn->fd, SHUT_WR) != 0) return;
-    slot.events = POLLIN;
-    while (poll(&slot, 1, timeout_ms) > 0 && recv(conn->fd, waste, sizeof waste, MSG_DONTWAIT) > 0)
-        continue;
+    if (!conn->broken) usb_backend_hang_up(conn->fd, timeout_ms);
 }
 
 void usbip_conn_end(struct usbip_conn *conn)

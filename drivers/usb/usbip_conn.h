@@ -30,8 +30,8 @@ void usbip_conn_import(struct usbip_conn *conn);
 /* Reads and acts until nothing is left or go_on says 0. */
 void usbip_conn_read(struct usbip_conn *conn, int (*go_on)(void *ctx), void *ctx);
 void usbip_conn_write(struct usbip_conn *conn);
-/* Sends what is queued and waits until the peer has taken it and hung up, timeout_ms at most for each step: closing with
- * requests of the peer unread would throw away replies on their way. */
+/* Sends what is queued and waits until the peer has taken it and hung up, timeout_ms at most for each step: closing
+ * with requests of the peer unread would throw away replies on their way. */
 void usbip_conn_drain(struct usbip_conn *conn, int timeout_ms);
 /* Detaches the device if it was imported here, and frees everything. */
 void usbip_conn_end(struct usbip_conn *conn);

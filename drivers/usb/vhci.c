@@ -41,8 +41,8 @@ static int find_port(const char *dir, enum usb_rate rate, unsigned *port, struct
 
 int vhci_attach(const char *dir, int fd, uint32_t devid, enum usb_rate rate, unsigned *port, struct sh_err *err)
 {
-    static const int speed[] = {[USB_RATE_FULL] = USB_SPEED_FULL, [USB_RATE_HIGH] = USB_SPEED_HIGH,
-                                [USB_RATE_SUPER] = USB_SPEED_SUPER};
+    static const int speed[] = {
+        [USB_RATE_FULL] = USB_SPEED_FULL, [USB_RATE_HIGH] = USB_SPEED_HIGH, [USB_RATE_SUPER] = USB_SPEED_SUPER};
     char path[320], text[64];
     if (dir == NULL) dir = DIR_DEFAULT;
     int rc = find_port(dir, rate, port, err);
