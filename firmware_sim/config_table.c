@@ -20,7 +20,8 @@ static const char *const crs_names[] = {[GEOREF_LOCAL] = "local", [GEOREF_ECEF] 
 static const char *const layout_names[] = {[LINE_POLAR] = "polar", [LINE_GEO] = "geo", NULL};
 static const char *const link_names[] = {
     [LINK_NULL] = "null", [LINK_FILE] = "file", [LINK_PTY] = "pty", [LINK_TCP] = "tcp", [LINK_USB] = "usb", NULL};
-static const char *const backend_names[] = {[USB_BACKEND_USBIP] = "usbip", [USB_BACKEND_USBREDIR] = "usbredir", NULL};
+static const char *const backend_names[] = {
+    [USB_BACKEND_USBIP] = "usbip", [USB_BACKEND_USBREDIR] = "usbredir", [USB_BACKEND_FUNCTIONFS] = "functionfs", NULL};
 static const char *const speed_names[] = {
     [USB_RATE_FULL] = "full", [USB_RATE_HIGH] = "high", [USB_RATE_SUPER] = "super", NULL};
 static const char *const pace_names[] = {

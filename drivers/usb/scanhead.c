@@ -101,7 +101,9 @@ static void set_open(struct scanhead_usb *head, int index, int open)
     struct scanhead_usb_session *session = &head->session[index];
     if (session->open == open) return;
     session->open = open;
-    if (!open) usb_device_next_epoch(head->device, session->out);
+    if (open) return;
+    usb_device_next_epoch(head->device, session->out);
+    usb_device_next_epoch(head->device, session->in);
 }
 
 static int set_line_coding(struct scanhead_usb *head, const uint8_t *data)

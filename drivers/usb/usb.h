@@ -192,7 +192,8 @@ size_t usb_device_read(struct usb_device *device, uint8_t endpoint, void *data, 
 size_t usb_device_can_read(const struct usb_device *device, uint8_t endpoint, uint32_t *epoch);
 /* What waits on an OUT endpoint and came in an epoch before `epoch` is taken and dropped; returns bytes. */
 size_t usb_device_drop(struct usb_device *device, uint8_t endpoint, uint32_t epoch);
-/* A count the function may raise at borders between its sessions; OUT transfers are stamped with it. */
+/* A count the function may raise at borders between its sessions. OUT transfers are stamped with it; a back end that
+ * holds IN data on its way takes it back when it has changed. */
 uint32_t usb_device_epoch(const struct usb_device *device, uint8_t endpoint);
 void usb_device_next_epoch(struct usb_device *device, uint8_t endpoint);
 /* Halts an endpoint, as a function does that wants to be asked; the host clears it. */
