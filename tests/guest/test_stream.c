@@ -206,7 +206,7 @@ static void unplug_in_the_middle(struct scanhead *sh, struct watch *w)
         do_command(sh, "SCAN:STAR");
     }
     uint64_t pulses = w->pulses;
-    while (w->pulses < pulses + 2000 && !w->over)
+    while (w->pulses < pulses + 500 && !w->over)
         if (next(w, sh) != 0) fail_msg("%s", scanhead_error(sh));
     run(env("UNPLUG"));
     int rc;
@@ -234,7 +234,9 @@ static void test_replug(void **state)
     do_command(sh, "SCAN:FRAM 1000");
     for (int i = 0; i < atoi(times); i++)
         unplug_in_the_middle(sh, &w);
-    do_command(sh, "SCAN:STOP");
+    char reply[512];
+    tell(sh, "HEAD:STAT?", reply); /* a head that was started anew may have ended its scan */
+    if (strcmp(reply, "idle") != 0) do_command(sh, "SCAN:STOP");
     wait_idle(sh);
     do_command(sh, "SCAN:FRAM 1");
     scanhead_get_stats(sh, &s);
