@@ -130,6 +130,11 @@ test-unit test-wire test-accuracy test-stability test-guest: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test test-programs
 	@SCANHEAD=$(BUILD)/test/scanhead sh tests/run_all.sh $(BUILD) $(@:test-%=%)
 
+# The other end of a usbredir channel goes, comes back and resets 1,000 times (`make test`: 20).
+soak-usb: deps
+	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test all $(BUILD)/test/tests/wire/test_usb_soak
+	@USB_SOAK_EVENTS=1000 SCANHEAD=$(BUILD)/test/scanhead $(BUILD)/test/tests/wire/test_usb_soak
+
 # ---- figures: speed and leaks; speed against accuracy, each method
 DEPS_CHART = gnuplot-nox
 bench: deps-build
@@ -166,6 +171,6 @@ format:
 	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')
 clean:
 	rm -rf $(BUILD)
-.PHONY: all deps deps-build deps-guest demo test test-unit test-wire test-accuracy test-stability test-guest objects test-unit-programs test-programs bench chart install format clean
+.PHONY: all deps deps-build deps-guest demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb objects test-unit-programs test-programs bench chart install format clean
 .SECONDARY:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)
