@@ -22,7 +22,7 @@ note "chapter 9 at $(uptime_s) s"
 head_stop
 check "socket pair: gone with the head" wait_for 10 is_unplugged
 
-head_start "{type: usb}"
+head_start "{type: usb}" --set head.prr_hz=10000
 check "usbip list shows it" sh -c "usbip list -r 127.0.0.1 2>/dev/null | grep 1209:0001"
 check "usbip attach" usbip attach -r 127.0.0.1 -b 1-1
 check_enumeration "TCP" 512

@@ -68,10 +68,11 @@ static void wait_idle(struct scanhead *sh)
     if (strcmp(reply, "idle") != 0) fail_msg("the head stays %s", reply);
 }
 
-/* ---- every frame looked at: what is missing must show in the sequence numbers */
+/* ---- every frame looked at: pulses that are missing must have been announced before, as a gap in the sequence numbers
+ * or as ones that the head could not compute */
 
 struct watch {
-    uint64_t frames, pulses, next_pulse, gaps, scan_pulses;
+    uint64_t frames, pulses, next_pulse, announced, scan_pulses;
     int over, have_pulse;
 };
 
@@ -79,16 +80,16 @@ static void look(struct watch *w, struct scanhead *sh, const struct scanhead_fra
 {
     struct scanhead_stats s;
     scanhead_get_stats(sh, &s);
-    uint64_t gaps = s.seq_gaps;
+    uint64_t announced = s.seq_gaps + s.pulses_lost;
     w->frames++;
     if (frame->type == SCANHEAD_POINTS) {
-        if (w->have_pulse && frame->pulse0 != w->next_pulse && gaps == w->gaps)
-            fail_msg("pulse %llu follows %llu, and no sequence number is missing", (unsigned long long)frame->pulse0,
+        if (w->have_pulse && frame->pulse0 != w->next_pulse && announced == w->announced)
+            fail_msg("pulse %llu follows %llu, and nothing was said to be lost", (unsigned long long)frame->pulse0,
                      (unsigned long long)w->next_pulse);
         w->have_pulse = 1;
         w->pulses += frame->n_pulses;
         w->next_pulse = frame->pulse0 + frame->n_pulses;
-        w->gaps = gaps;
+        w->announced = announced;
     }
     if (frame->type == SCANHEAD_EVENT && frame->event == SCANHEAD_EV_SCAN_END) {
         w->scan_pulses = frame->event_value[1];
@@ -205,7 +206,7 @@ static void unplug_in_the_middle(struct scanhead *sh, struct watch *w)
         do_command(sh, "SCAN:STAR");
     }
     uint64_t pulses = w->pulses;
-    while (w->pulses < pulses + 2000 && !w->over)
+    while (w->pulses < pulses + 500 && !w->over)
         if (next(w, sh) != 0) fail_msg("%s", scanhead_error(sh));
     run(env("UNPLUG"));
     int rc;
@@ -233,12 +234,15 @@ static void test_replug(void **state)
     do_command(sh, "SCAN:FRAM 1000");
     for (int i = 0; i < atoi(times); i++)
         unplug_in_the_middle(sh, &w);
-    do_command(sh, "SCAN:STOP");
+    char reply[512];
+    tell(sh, "HEAD:STAT?", reply); /* a head that was started anew may have ended its scan */
+    if (strcmp(reply, "idle") != 0) do_command(sh, "SCAN:STOP");
     wait_idle(sh);
     do_command(sh, "SCAN:FRAM 1");
     scanhead_get_stats(sh, &s);
-    print_message("%s times: %llu frames, %llu lost meanwhile, in %llu gaps\n", times, (unsigned long long)s.frames,
-                  (unsigned long long)s.seq_lost, (unsigned long long)s.seq_gaps);
+    print_message("%s times: %llu frames, %llu lost meanwhile, in %llu gaps; %llu pulses too late\n", times,
+                  (unsigned long long)s.frames, (unsigned long long)s.seq_lost, (unsigned long long)s.seq_gaps,
+                  (unsigned long long)s.pulses_lost);
     scanhead_close(sh);
 }
 
