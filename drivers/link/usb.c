@@ -100,6 +100,7 @@ static void tell(struct usb_link *self, int i, uint32_t want_write, struct link_
     const struct scanhead_usb_session *session = &self->head.session[i];
     if (self->told[i] && !session->open && !is_readable(self, i))
         self->told[i] = !link_events_push(events, LINK_CLOSED, i, session_names[i]);
+    if (!self->told[i]) scanhead_usb_ended(&self->head, i);
     if (!self->told[i] && session->open) self->told[i] = link_events_push(events, LINK_OPENED, i, session_names[i]);
     if (is_readable(self, i)) link_events_push(events, LINK_READABLE, i, NULL);
     if ((want_write >> i & 1u) != 0 && is_writable(self, i)) link_events_push(events, LINK_WRITABLE, i, NULL);

@@ -101,11 +101,12 @@ static void disable(struct functionfs *self)
 /* The host has configured the device. */
 static void enable(struct functionfs *self)
 {
-    const struct usb_ctrlrequest setup = {.bRequest = USB_REQ_SET_CONFIGURATION,
+    const struct usb_ctrlrequest setup = {
+        .bRequest = USB_REQ_SET_CONFIGURATION,
 #if __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__
-                                          .wValue = USB_CONFIGURATION << 8
+        .wValue = USB_CONFIGURATION << 8
 #else
-                                          .wValue = USB_CONFIGURATION
+        .wValue = USB_CONFIGURATION
 #endif
     };
     disable(self); /* the kernel leaves out the event before when it was not read in time */
@@ -137,8 +138,9 @@ static void answer(struct functionfs *self, struct usb_ctrlrequest setup)
     } else if (length == 0) {
         n = usb_device_control(self->device, &setup, self->data, 0);
         if (n >= 0 && read(self->ep0, self->data, 0) == 0) return;
-    } else if (length <= sizeof self->data && read(self->ep0, self->data, length) == (ssize_t)length) {
-        usb_device_control(self->device, &setup, self->data, length); /* the data are acknowledged: too late to stall */
+    } else if (length <= sizeof self->data && usb_device_control(self->device, &setup, NULL, length) == 0 &&
+               read(self->ep0, self->data, length) == (ssize_t)length) {
+        usb_device_control(self->device, &setup, self->data, length); /* the data are taken: too late to stall */
         return;
     }
     if (n == USB_STALL) stall(self, in);

@@ -4,6 +4,7 @@
 #include <linux/usb/cdc.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <sys/timerfd.h>
 #include <termios.h>
 #include <unistd.h>
@@ -12,7 +13,7 @@
 #include "drivers/usb/functionfs_private.h"
 #include "drivers/usb/scanhead.h"
 
-enum { IDLE_S = 1 };
+static const struct itimerspec every_second = {{1, 0}, {1, 0}}, never = {{0, 0}, {0, 0}};
 
 static void tty_path(const struct ffs_console *console, char *path, size_t len)
 {
@@ -46,12 +47,6 @@ static void set_session(struct ffs_console *console, int open)
     if (usb_device_control(console->device, &setup, NULL, 0) == 0) console->session = open;
 }
 
-static void arm(const struct ffs_console *console, int on)
-{
-    const struct itimerspec at = {.it_value.tv_sec = on ? IDLE_S : 0};
-    timerfd_settime(console->timer, 0, &at, NULL);
-}
-
 static void offer_tx(struct ffs_console *console)
 {
     if (console->tx_at_core) return;
@@ -61,20 +56,32 @@ static void offer_tx(struct ffs_console *console)
     usb_device_submit(console->device, &console->tx);
 }
 
+/* The tty hands its bytes on in up to 16 requests, one per write, before its buffer begins to fill and shows that
+ * nobody takes them. So little is written in many pieces. */
 static void write_tx(struct ffs_console *console)
 {
-    ssize_t n = write(console->fd, console->tx_bytes + console->tx_pos, console->tx_len - console->tx_pos);
-    if (n > 0) console->tx_pos += (uint32_t)n;
-    const int over = console->tx_pos == console->tx_len;
-    if (n > 0 || over) arm(console, !over);
-    if (over) offer_tx(console);
+    enum { REQUESTS = 16, MUCH = 1024 };
+    const uint32_t piece = console->tx_len < MUCH ? console->tx_len / (REQUESTS + 4) + 1 : console->tx_len;
+    while (console->tx_pos < console->tx_len) {
+        const uint32_t left = console->tx_len - console->tx_pos;
+        ssize_t n = write(console->fd, console->tx_bytes + console->tx_pos, left < piece ? left : piece);
+        if (n <= 0) return;
+        console->tx_pos += (uint32_t)n;
+        console->written += (uint64_t)n;
+    }
+    offer_tx(console);
 }
 
-/* The host takes nothing: its port is closed. What is left for it is void. */
-static void give_up_tx(struct ffs_console *console)
+/* Every second: has the host taken anything of what there is? If not, its port is closed, and what is left is void. */
+static void look_at_host(struct ffs_console *console)
 {
     uint64_t count;
-    if (read(console->timer, &count, sizeof count) < 0 || console->tx_pos == console->tx_len) return;
+    int waiting = 0;
+    if (read(console->timer, &count, sizeof count) < 0 || ioctl(console->fd, TIOCOUTQ, &waiting) != 0) return;
+    const uint64_t taken = console->written - (uint64_t)waiting;
+    const int stuck = taken == console->taken && (waiting > 0 || console->tx_pos < console->tx_len);
+    console->taken = taken;
+    if (!stuck || !console->session) return;
     console->tx_pos = console->tx_len;
     set_session(console, 0);
     offer_tx(console);
@@ -93,6 +100,7 @@ void ffs_console_start(struct ffs_console *console)
         tcsetattr(console->fd, TCSANOW, &raw);
     }
     console->tx_len = console->tx_pos = 0;
+    timerfd_settime(console->timer, 0, &every_second, NULL);
     offer_tx(console);
 }
 
@@ -102,7 +110,7 @@ void ffs_console_stop(struct ffs_console *console)
     if (console->fd >= 0) close(console->fd);
     console->fd = -1;
     console->session = 0;
-    if (console->timer >= 0) arm(console, 0);
+    if (console->timer >= 0) timerfd_settime(console->timer, 0, &never, NULL);
 }
 
 short ffs_console_events(const struct ffs_console *console)
@@ -116,8 +124,8 @@ static void read_rx(struct ffs_console *console)
     if (n <= 0) return;
     if (!console->session) set_session(console, 1);
     console->rx_busy = 1;
-    console->rx = (struct usb_transfer){
-        .id = 2, .endpoint = CONSOLE_OUT, .length = (uint32_t)n, .data = console->rx_bytes};
+    console->rx =
+        (struct usb_transfer){.id = 2, .endpoint = CONSOLE_OUT, .length = (uint32_t)n, .data = console->rx_bytes};
     usb_device_submit(console->device, &console->rx);
 }
 
@@ -126,7 +134,7 @@ void ffs_console_handle(struct ffs_console *console, short revents, int timed_ou
     if (console->fd < 0) return;
     if ((revents & POLLIN) != 0 && !console->rx_busy) read_rx(console);
     if ((revents & POLLOUT) != 0) write_tx(console);
-    if (timed_out) give_up_tx(console);
+    if (timed_out) look_at_host(console);
 }
 
 int ffs_console_complete(struct ffs_console *console, struct usb_transfer *transfer)
@@ -140,7 +148,6 @@ int ffs_console_complete(struct ffs_console *console, struct usb_transfer *trans
     if (transfer->status != USB_OK || console->fd < 0) return 1;
     console->tx_len = transfer->actual;
     console->tx_pos = 0;
-    arm(console, 1);
     write_tx(console);
     return 1;
 }

@@ -1,5 +1,5 @@
-/* Endpoints of FunctionFS. write(2) on them blocks until the host has taken the data, so they are driven by the kernel's
- * asynchronous I/O, whose completions an eventfd counts. */
+/* Endpoints of FunctionFS. write(2) on them blocks until the host has taken the data, so they are driven by the
+ * kernel's asynchronous I/O, whose completions an eventfd counts. */
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
@@ -82,10 +82,8 @@ static int submit(struct ffs_pipes *pipes, struct ffs_pipe *pipe, struct ffs_slo
 static void to_core(struct ffs_pipes *pipes, struct ffs_pipe *pipe, struct ffs_slot *slot, uint32_t length)
 {
     slot->state = FFS_AT_CORE;
-    slot->transfer = (struct usb_transfer){.id = (uint64_t)(uintptr_t)slot,
-                                           .endpoint = pipe->address,
-                                           .length = length,
-                                           .data = slot->buffer};
+    slot->transfer = (struct usb_transfer){
+        .id = (uint64_t)(uintptr_t)slot, .endpoint = pipe->address, .length = length, .data = slot->buffer};
     usb_device_submit(pipes->device, &slot->transfer);
 }
 
@@ -153,7 +151,8 @@ int ffs_pipes_take(struct ffs_pipes *pipes)
     if (!is_in(pipe) && event.res >= 0 && pipes->running)
         to_core(pipes, pipe, slot, (uint32_t)event.res);
     else
-        set_going(pipes, pipe, slot); /* an endpoint that is down takes nothing, and the slot rests till the next start */
+        set_going(pipes, pipe,
+                  slot); /* an endpoint that is down takes nothing, and the slot rests till the next start */
     return 1;
 }
 

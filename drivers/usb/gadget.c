@@ -204,14 +204,14 @@ static int make_named_dir(struct gadget *gadget, struct sh_err *err)
     }
     int error = errno;
     gadget->dir[0] = '\0';
-    return sh_fail(err, error == EPERM || error == EACCES ? SH_EPERM : SH_EIO, "functionfs: no gadget in %s: %s", GADGETS,
-                   strerror(error));
+    return sh_fail(err, error == EPERM || error == EACCES ? SH_EPERM : SH_EIO, "functionfs: no gadget in %s: %s",
+                   GADGETS, strerror(error));
 }
 
 static int write_identity(const struct gadget *gadget, const struct usb_model *model, const struct usb_identity *id)
 {
-    static const char *const speed[] = {[USB_RATE_FULL] = "full-speed", [USB_RATE_HIGH] = "high-speed",
-                                        [USB_RATE_SUPER] = "super-speed"};
+    static const char *const speed[] = {
+        [USB_RATE_FULL] = "full-speed", [USB_RATE_HIGH] = "high-speed", [USB_RATE_SUPER] = "super-speed"};
     const char *dir = gadget->dir;
     if (write_text(dir, "max_speed", "%s", speed[id->highest]) != 0 && errno != ENOENT) return -1; /* since 5.12 */
     return write_text(dir, "idVendor", "0x%04x", id->vid) | write_text(dir, "idProduct", "0x%04x", id->pid) |
@@ -229,8 +229,8 @@ static int write_configuration(const struct gadget *gadget, const struct usb_mod
     const char *dir = gadget->dir;
     return make_dir(dir, "configs/c.1") |
            write_text(dir, "configs/c.1/bmAttributes", "0x%02x", model->max_power_ma == 0 ? 0xc0 : 0x80) |
-           write_text(dir, "configs/c.1/MaxPower", "%u", model->max_power_ma) |
-           write_text(dir, "os_desc/use", "1") | write_text(dir, "os_desc/b_vendor_code", "0x%02x", model->ms_vendor_code) |
+           write_text(dir, "configs/c.1/MaxPower", "%u", model->max_power_ma) | write_text(dir, "os_desc/use", "1") |
+           write_text(dir, "os_desc/b_vendor_code", "0x%02x", model->ms_vendor_code) |
            write_text(dir, "os_desc/qw_sign", "MSFT100") | make_link(dir, "configs/c.1", "os_desc/c.1");
 }
 
@@ -241,9 +241,10 @@ static int make_function(struct gadget *gadget, const char *kind, struct sh_err 
     snprintf(function, sizeof function, "functions/%s.%s", kind, gadget->name);
     snprintf(link, sizeof link, "configs/c.1/%s.%s", kind, gadget->name);
     if (make_dir(gadget->dir, function) != 0)
-        return errno == ENOENT ? sh_fail(err, SH_EINPUT, "functionfs: the kernel has no such function: modprobe usb_f_%s",
-                                         strcmp(kind, "ffs") == 0 ? "fs" : kind)
-                               : sh_fail(err, SH_EIO, "functionfs: %s/%s: %s", gadget->dir, function, strerror(errno));
+        return errno == ENOENT
+                   ? sh_fail(err, SH_EINPUT, "functionfs: the kernel has no such function: modprobe usb_f_%s",
+                             strcmp(kind, "ffs") == 0 ? "fs" : kind)
+                   : sh_fail(err, SH_EIO, "functionfs: %s/%s: %s", gadget->dir, function, strerror(errno));
     if (make_link(gadget->dir, function, link) != 0)
         return sh_fail(err, SH_EIO, "functionfs: %s/%s: %s", gadget->dir, link, strerror(errno));
     return SH_OK;
@@ -439,7 +440,9 @@ enum usb_rate gadget_rate(const struct gadget *gadget)
     char dir[320], text[32] = "";
     snprintf(dir, sizeof dir, "%s/%s", CONTROLLERS, gadget->udc);
     read_text(dir, "current_speed", text, sizeof text);
-    return strncmp(text, "super", 5) == 0 ? USB_RATE_SUPER : strncmp(text, "high", 4) == 0 ? USB_RATE_HIGH : USB_RATE_FULL;
+    return strncmp(text, "super", 5) == 0  ? USB_RATE_SUPER
+           : strncmp(text, "high", 4) == 0 ? USB_RATE_HIGH
+                                           : USB_RATE_FULL;
 }
 
 void gadget_unbind(struct gadget *gadget)

@@ -99,8 +99,9 @@ const struct usb_model scanhead_usb_model = {
 static void set_open(struct scanhead_usb *head, int index, int open)
 {
     struct scanhead_usb_session *session = &head->session[index];
-    if (session->open == open) return;
+    if (session->open == open && !session->again) return;
     session->open = open;
+    session->again = 0;
     if (open) return;
     usb_device_next_epoch(head->device, session->out);
     usb_device_next_epoch(head->device, session->in);
@@ -108,6 +109,7 @@ static void set_open(struct scanhead_usb *head, int index, int open)
 
 static int set_line_coding(struct scanhead_usb *head, const uint8_t *data)
 {
+    if (data == NULL) return 0;
     const unsigned stop_bits = data[4], parity = data[5], bits = data[6];
     if (stop_bits > 2 || parity > 4 || !((bits >= 5 && bits <= 8) || bits == 16)) return USB_STALL;
     memcpy(head->line_coding, data, sizeof head->line_coding);
@@ -145,10 +147,17 @@ static int on_request(void *ctx, const struct usb_ctrlrequest *setup, uint8_t *d
     }
     if (setup->bRequestType == (USB_DIR_OUT | USB_TYPE_VENDOR | USB_RECIP_INTERFACE) && index == STREAM_INTERFACE &&
         setup->bRequest == SCANHEAD_USB_STREAM && value <= 1 && length == 0) {
-        set_open(head, STREAM_SESSION, value == 1);
+        const int again = value == 1 && head->session[STREAM_SESSION].open;
+        set_open(head, STREAM_SESSION, value == 1 && !again);
+        head->session[STREAM_SESSION].again = again;
         return 0;
     }
     return USB_STALL;
+}
+
+void scanhead_usb_ended(struct scanhead_usb *head, int session)
+{
+    if (head->session[session].again) set_open(head, session, 1);
 }
 
 /* 115200 8N1, as a serial port that nobody has set. */

@@ -3,7 +3,7 @@
  *
  * A console session begins when the host raises DTR (SET_CONTROL_LINE_STATE) and ends when it drops it. A stream
  * session begins with the vendor request SCANHEAD_USB_STREAM, wValue 1, or with the first data on the OUT endpoint, and
- * ends with wValue 0. Both end when the interface goes away. */
+ * ends with wValue 0; wValue 1 while one is open ends it and begins another. Both end when the interface goes away. */
 #ifndef DRIVERS_USB_SCANHEAD_H
 #define DRIVERS_USB_SCANHEAD_H
 
@@ -27,6 +27,7 @@ enum { CONSOLE_SESSION, STREAM_SESSION, SCANHEAD_USB_SESSIONS };
 /* A session as the host sees it. */
 struct scanhead_usb_session {
     int open;
+    int again;       /* opened anew while open: open once more when its end is told */
     uint8_t in, out; /* endpoints */
 };
 
@@ -42,5 +43,7 @@ int scanhead_usb_create(const struct usb_identity *id, struct scanhead_usb *head
 /* What follows from the host's transfers rather than its requests: a stream that opens with data, the console's
  * notification. To be called after each of them. */
 void scanhead_usb_update(struct scanhead_usb *head);
+/* The end of a session has been told to who serves it. */
+void scanhead_usb_ended(struct scanhead_usb *head, int session);
 
 #endif

@@ -136,7 +136,8 @@ struct usb_transfer {
 /* What the function gets to know. All may be NULL. Called within the calls of the back end. */
 struct usb_hooks {
     /* A class or vendor request. OUT: data holds wLength bytes; return 0. IN: fill at most wLength bytes, return how
-     * many. USB_STALL refuses it. The interface or endpoint it names exists in the present configuration. */
+     * many. USB_STALL refuses it. OUT with wLength above 0 and data NULL: asked before the data come; answer as if, and
+     * do nothing. The interface or endpoint it names exists in the present configuration. */
     int (*request)(void *ctx, const struct usb_ctrlrequest *setup, uint8_t *data);
     /* An interface came to life or ended: configuration, alternate setting, reset, unplugging. */
     void (*interface)(void *ctx, unsigned interface, int active);
