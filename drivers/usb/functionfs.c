@@ -183,10 +183,14 @@ static int functionfs_handle(void *backend, const struct pollfd *fds, int n, int
     struct functionfs *self = backend;
     if (n != N_FDS) return SH_OK;
     int going = go_on(ctx);
-    while (going && take_event(self))
-        going = go_on(ctx);
-    while (going && ffs_pipes_take(&self->pipes))
-        going = go_on(ctx);
+    /* What came on the endpoints came before the event on ep0: a session is not closed before its last data are in. */
+    int any = 1;
+    while (going && any) {
+        while (going && ffs_pipes_take(&self->pipes))
+            going = go_on(ctx);
+        any = going && take_event(self);
+        going = going && go_on(ctx);
+    }
     if (going && (fds[AT_TTY].fd == self->console.fd || fds[AT_TIMER].revents != 0))
         ffs_console_handle(&self->console, fds[AT_TTY].fd >= 0 ? fds[AT_TTY].revents : 0, fds[AT_TIMER].revents != 0);
     self->backlog = !going;

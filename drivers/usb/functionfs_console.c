@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "drivers/protocol/bytes.h"
+#include "drivers/protocol/native_encode.h"
 #include "drivers/usb/functionfs_private.h"
 #include "drivers/usb/scanhead.h"
 
@@ -60,6 +61,12 @@ static void offer_tx(struct ffs_console *console)
  * nobody takes them. So little is written in many pieces. */
 static void write_tx(struct ffs_console *console)
 {
+    if (console->lead_pos < console->lead_len) {
+        ssize_t n = write(console->fd, console->lead + console->lead_pos, console->lead_len - console->lead_pos);
+        if (n > 0) console->lead_pos += (uint32_t)n;
+        if (n > 0) console->written += (uint64_t)n;
+        if (console->lead_pos < console->lead_len) return;
+    }
     enum { REQUESTS = 16, MUCH = 1024 };
     const uint32_t piece = console->tx_len < MUCH ? console->tx_len / (REQUESTS + 4) + 1 : console->tx_len;
     while (console->tx_pos < console->tx_len) {
@@ -83,8 +90,20 @@ static void look_at_host(struct ffs_console *console)
     console->taken = taken;
     if (!stuck || !console->session) return;
     console->tx_pos = console->tx_len;
+    console->lead_len = console->lead_pos = 0;
+    console->cut = 1;
     set_session(console, 0);
     offer_tx(console);
+}
+
+/* A reader takes text only in step, behind a whole frame (PROTOCOL.md, Resynchronisation). */
+static void lead_in(struct ffs_console *console)
+{
+    const struct native_event event = {.code = NATIVE_EV_READER_LOST, .text = "the end of an earlier session"};
+    console->cut = 0;
+    console->lead_pos = 0;
+    console->lead_len = (uint32_t)native_encode_event(console->lead, sizeof console->lead, &event, 0, NATIVE_LOCAL);
+    write_tx(console);
 }
 
 void ffs_console_start(struct ffs_console *console)
@@ -99,7 +118,9 @@ void ffs_console_start(struct ffs_console *console)
         cfmakeraw(&raw);
         tcsetattr(console->fd, TCSANOW, &raw);
     }
-    console->tx_len = console->tx_pos = 0;
+    console->tx_len = console->tx_pos = console->lead_len = console->lead_pos = 0;
+    console->written = console->taken = 0;
+    console->cut = 0;
     timerfd_settime(console->timer, 0, &every_second, NULL);
     offer_tx(console);
 }
@@ -115,14 +136,18 @@ void ffs_console_stop(struct ffs_console *console)
 
 short ffs_console_events(const struct ffs_console *console)
 {
-    return (short)((console->rx_busy ? 0 : POLLIN) | (console->tx_pos < console->tx_len ? POLLOUT : 0));
+    return (short)((console->rx_busy ? 0 : POLLIN) |
+                   (console->tx_pos < console->tx_len || console->lead_pos < console->lead_len ? POLLOUT : 0));
 }
 
 static void read_rx(struct ffs_console *console)
 {
     ssize_t n = read(console->fd, console->rx_bytes, sizeof console->rx_bytes);
     if (n <= 0) return;
-    if (!console->session) set_session(console, 1);
+    if (!console->session) {
+        set_session(console, 1);
+        if (console->cut) lead_in(console);
+    }
     console->rx_busy = 1;
     console->rx =
         (struct usb_transfer){.id = 2, .endpoint = CONSOLE_OUT, .length = (uint32_t)n, .data = console->rx_bytes};

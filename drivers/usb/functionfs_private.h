@@ -54,7 +54,9 @@ void ffs_pipes_drain(struct ffs_pipes *pipes, int timeout_ms);
 void ffs_pipes_close(struct ffs_pipes *pipes);
 
 /* The console. The kernel's f_acm keeps DTR to itself, so a session begins with the first bytes of the host, and ends
- * when the host has taken nothing for a second or two of what there is for it. */
+ * when the host has taken nothing for a second or two of what there is for it. What the tty holds by then can't be
+ * taken back: the next reader gets it first, a frame cut at its end, and then a frame of its own that brings it into
+ * step. */
 struct ffs_console {
     struct usb_device *device;
     int fd;    /* of the tty; -1: not plugged in, or no console */
@@ -62,6 +64,9 @@ struct ffs_console {
     int number;
     int rx_busy, tx_at_core, session;
     uint32_t tx_len, tx_pos;
+    int cut; /* a session was given up: the tty holds the rest of it */
+    uint32_t lead_len, lead_pos;
+    uint8_t lead[256];       /* goes before everything else */
     uint64_t written, taken; /* bytes to the tty; of these, gone from its buffer when last looked at */
     struct usb_transfer rx, tx;
     uint8_t rx_bytes[4096], tx_bytes[4096];

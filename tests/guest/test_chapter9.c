@@ -381,7 +381,8 @@ static void test_halt(void **state)
         assert_int_equal(libusb_clear_halt(t.dev, endpoint[i]), 0); /* not halted: allowed */
     }
     ask();
-    assert_int_equal(control(EP_OUT, LIBUSB_REQUEST_SET_FEATURE, 9, endpoint[0], NULL, 0), STALL);
+    if (!t.has_kernel) /* dummy_hcd takes any feature of an endpoint for a halt */
+        assert_int_equal(control(EP_OUT, LIBUSB_REQUEST_SET_FEATURE, 9, endpoint[0], NULL, 0), STALL);
     session(0);
 }
 
