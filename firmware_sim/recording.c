@@ -88,6 +88,7 @@ static int replug(struct recording *r, struct sh_err *err)
     } while (rc != SCANHEAD_OK && clock_now_ns() < end_ns && !(r->o->interrupted != NULL && r->o->interrupted()));
     if (rc != SCANHEAD_OK) return sh_fail(err, SH_ELOST, "the head did not come back: %s", scanhead_error(r->sh));
     scanning = strncmp(reply, "s", 1) == 0; /* spin-up, scanning, spin-down */
+    sh_warn(r->o->report, "the head is back");
     r->result->replugs++;
     r->result->broken_scans += (uint64_t)(r->within_scan && !r->broken);
     r->broken = r->within_scan && scanning;

@@ -78,13 +78,37 @@ check_record() {
     check "$1: as many points in the file as pulses" grep "element vertex $(sed -n 's/.*"points": \([0-9]*\).*/\1/p' usb.json)\$" usb.ply
 }
 
-# A client that is killed leaves the head to the next one.
-check_killed_client() {
-    scanhead record usb --frames 100 -o killed.shs --quiet 2>/dev/null &
+# The recorder that follows a scan says about once a second how far it has come.
+has_points() {
+    grep -q 'recording: 0\.[0-9]*[1-9]' "$1"
+}
+
+# A recorder when its head goes in the middle of a scan: killed itself, left alone, and told to wait for the head. Needs a
+# head in real time, plug.sh and unplug.sh.
+check_cut_records() {
+    scanhead record usb --wait 10 --frames 100 -o cut.ply 2>killed.err &
+    wait_for 20 has_points killed.err
+    kill -9 $!
+    wait $! 2>/dev/null
+    scanhead record usb --wait 10 --listen -o cut.ply 2>cut.err &
     client=$!
-    wait_for 20 test -s killed.shs.part
-    kill -9 $client
-    wait $client 2>/dev/null
-    rm -f killed.shs.part
-    check "$1: after a client was killed" sh -c "scanhead record usb --wait 5 --duration 0.1 --frames 1 --stats after.json --quiet || scanhead record usb --stats after.json --quiet"
+    check "$1: another recorder after one was killed" wait_for 20 has_points cut.err
+    sh unplug.sh
+    wait $client
+    check "$1: exit status 1 when unplugged" test $? = 1
+    check "$1: and it says so" grep 'unplugged' cut.err
+    check "$1: and what had come is in the file" grep -a 'element vertex [1-9]' cut.ply
+    sh plug.sh
+    scanhead record usb --wait 10 --listen --replug 20 -o again.ply --stats again.json 2>again.err &
+    client=$!
+    wait_for 20 has_points again.err
+    sh unplug.sh
+    wait_for 5 is_unplugged
+    sh plug.sh
+    check "$1: --replug goes on" wait_for 20 grep 'is back' again.err
+    kill -INT $client
+    wait $client
+    check "$1: exit status 1 when the head was away" test $? = 1
+    check "$1: and it says so, once" grep 'away within 1 scans' again.err
+    check "$1: with the count" grep '"replugs": 1,' again.json
 }

@@ -30,6 +30,8 @@ check_enumeration "TCP" 512
 echo "echo 0 >$vhci/detach" >unplug.sh
 echo "usbip attach -r 127.0.0.1 -b 1-1" >plug.sh
 note "plugged at $(uptime_s) s"
+check_cut_records "TCP"
+note "cut at $(uptime_s) s"
 REPLUGS=20 UNPLUG="sh unplug.sh" PLUG="sh plug.sh" tap "TCP" test_stream
 note "replugged at $(uptime_s) s"
 head_stop
