@@ -135,6 +135,12 @@ soak-usb: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test all $(BUILD)/test/tests/wire/test_usb_soak
 	@USB_SOAK_EVENTS=1000 SCANHEAD=$(BUILD)/test/scanhead $(BUILD)/test/tests/wire/test_usb_soak
 
+# A million pulses over each kind of USB, each with the hash that TCP gives: some minutes in an emulated machine.
+test-usb-million: deps
+	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test test-programs
+	@SCANHEAD=$(BUILD)/test/scanhead BUILD=$(BUILD) GUEST_PAN_DEG_S=0.4 GUEST_LIMIT_S=900 \
+		bash tests/run_tap.sh -t 1800 tests/guest/guest.sh
+
 # ---- figures: speed and leaks; speed against accuracy, each method
 DEPS_CHART = gnuplot-nox
 bench: deps-build
@@ -171,6 +177,6 @@ format:
 	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')
 clean:
 	rm -rf $(BUILD)
-.PHONY: all deps deps-build deps-guest demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb objects test-unit-programs test-programs bench chart install format clean
+.PHONY: all deps deps-build deps-guest demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb test-usb-million objects test-unit-programs test-programs bench chart install format clean
 .SECONDARY:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)

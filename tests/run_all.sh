@@ -14,7 +14,7 @@ for folder in unit accuracy stability wire; do
 done
 if [ -z "$part" ] || [ "$part" = guest ]; then
     export BUILD="$build"
-    set -- "$@" tests/guest/test_*.sh # they take the programs of tests/guest with them
+    set -- "$@" tests/guest/guest.sh # it takes the programs of tests/guest with it
 fi
 if [ -z "$part" ]; then
     for source in tests/unit/test_*.c; do

@@ -50,6 +50,11 @@ check_enumeration() {
         check "$1: Microsoft OS 2.0 platform capability" grep -i 'd8dd60df-4589-4cc7-9cd2-659d9e648a9f' /tmp/lsusb.txt
 }
 
+# A run for long scans does no more than record them.
+records_only() {
+    test -e /records_only
+}
+
 sha256_of() {
     sed -n 's/.*"stream_sha256": "\([0-9a-f]*\)".*/\1/p' "$1"
 }
@@ -69,6 +74,7 @@ check_record() {
     check "$1: the stream is the same as over TCP" test "$(sha256_of usb.json)" = "$tcp1" -a -n "$tcp1"
     check "$1: scanhead record tty" scanhead record tty:/dev/ttyACM0 --wait 10 -o tty.ply --stats tty.json --quiet
     check "$1: the stream of the tty is the same as over TCP" test "$(sha256_of tty.json)" = "$tcp2" -a -n "$tcp2"
+    note "$1: $(sed -n 's/.*\("pulses": [0-9]*\),.*/\1/p' usb.json), $(sed -n 's/.*\("wall_s": [0-9.]*\),.*/\1/p' usb.json)"
     check "$1: as many points in the file as pulses" grep "element vertex $(sed -n 's/.*"points": \([0-9]*\).*/\1/p' usb.json)\$" usb.ply
 }
 

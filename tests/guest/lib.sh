@@ -162,6 +162,15 @@ guest_add() {
     cp "$1" "$guest_work/root/${2:-}"
 }
 
+# The head of the tests, and what the scripts in the guest know of it. GUEST_PAN_DEG_S makes its scan longer (0.4: a
+# million pulses); then only records are made of it.
+guest_add_head() {
+    guest_add tests/guest/in_usb.sh
+    guest_add tests/guest/room.obj
+    sed "s/pan_deg_s: .*/pan_deg_s: ${GUEST_PAN_DEG_S:-60}/" tests/guest/head.yaml >"$guest_work/root/head.yaml"
+    [ -z "${GUEST_PAN_DEG_S:-}" ] || : >"$guest_work/root/records_only"
+}
+
 host_request() {
     echo "nothing to be had here: $*"
 }
@@ -188,7 +197,7 @@ guest_follow() {
 
 guest_boot() {
     cp "$1" "$guest_work/root/script.sh"
-    limit_s=$2
+    limit_s=${GUEST_LIMIT_S:-$2}
     shift 2
     { cat "$guest_base"; guest_pack "$guest_kernel/root"; guest_pack "$guest_work/root"; } >"$guest_work/initrd"
     mkfifo "$guest_work/results.in" "$guest_work/results.out"

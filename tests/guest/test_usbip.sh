@@ -2,7 +2,5 @@
 # The head as a USB/IP server: by socket pair to the kernel's virtual host controller, and by TCP with the stock tool.
 . tests/guest/lib.sh
 guest_prepare
-guest_add tests/guest/head.yaml
-guest_add tests/guest/room.obj
-guest_add tests/guest/in_usb.sh
+guest_add_head
 guest_boot tests/guest/in_usbip.sh 100

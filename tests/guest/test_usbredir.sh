@@ -3,7 +3,7 @@
 # process is to be killed and started again.
 . tests/guest/lib.sh
 guest_prepare
-guest_add tests/guest/in_usb.sh
+guest_add_head
 
 head_pid=
 tcp_port=
@@ -11,7 +11,7 @@ tcp_port=
 # head_start [OPTION...]: the head on the host; its TCP port into tcp_port.
 head_start() {
     rm -f "$guest_work/ready"
-    sed "\$alinks: [{type: tcp, port: 0}, {type: usb, backend: usbredir, path: usb}]" tests/guest/head.yaml \
+    sed "\$alinks: [{type: tcp, port: 0}, {type: usb, backend: usbredir, path: usb}]" "$guest_work/root/head.yaml" \
         >"$guest_work/config.yaml"
     cp tests/guest/room.obj "$guest_work/"
     "$guest_scanhead" run "$guest_work/config.yaml" --ready-fd 9 "$@" 9>"$guest_work/ready" 2>>"$guest_work/head.err" \
