@@ -111,8 +111,9 @@ static void scan(const char *name, struct watch *w)
     struct scanhead *sh = open_head(name);
     memset(w, 0, sizeof *w);
     wait_idle(sh);
-    scanhead_get_stats(sh, &before); /* a gadget's tty may still hold the end of an earlier session */
     do_command(sh, "SCAN:STAR");
+    if (next(w, sh) != 0) fail_msg("%s", scanhead_error(sh));
+    scanhead_get_stats(sh, &before); /* a gadget's tty first brings what it holds of an earlier session */
     while (!w->over)
         if (next(w, sh) != 0) fail_msg("%s", scanhead_error(sh));
     scanhead_get_stats(sh, &s);
