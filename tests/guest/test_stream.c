@@ -105,15 +105,26 @@ static int next(struct watch *w, struct scanhead *sh)
     return rc;
 }
 
+/* Starts a scan and waits for its beginning: a gadget's tty first brings what it holds of an earlier session. */
+static void start_scan(struct scanhead *sh)
+{
+    char reply[512];
+    struct scanhead_frame frame = {0};
+    tell(sh, "TIME?", reply);
+    do_command(sh, "SCAN:STAR");
+    while (frame.type != SCANHEAD_EVENT || frame.event != SCANHEAD_EV_SCAN_START ||
+           frame.event_value[1] < strtoull(reply, NULL, 10))
+        if (scanhead_next(sh, &frame, WAIT_MS) != 0) fail_msg("%s", scanhead_error(sh));
+}
+
 static void scan(const char *name, struct watch *w)
 {
     struct scanhead_stats s, before;
     struct scanhead *sh = open_head(name);
     memset(w, 0, sizeof *w);
     wait_idle(sh);
-    do_command(sh, "SCAN:STAR");
-    if (next(w, sh) != 0) fail_msg("%s", scanhead_error(sh));
-    scanhead_get_stats(sh, &before); /* a gadget's tty first brings what it holds of an earlier session */
+    start_scan(sh);
+    scanhead_get_stats(sh, &before);
     while (!w->over)
         if (next(w, sh) != 0) fail_msg("%s", scanhead_error(sh));
     scanhead_get_stats(sh, &s);
