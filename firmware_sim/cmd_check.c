@@ -1,4 +1,4 @@
-/* scanhead check and scanhead list: nothing runs. */
+/* scanhead check: nothing runs. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -125,18 +125,4 @@ int cmd_check(int argc, char **argv)
     }
     if (optind != argc - 1) return cmd_usage("check", "one CONFIG is needed");
     return check(&sets, argv[optind]);
-}
-
-int cmd_list(int argc, char **argv)
-{
-    if (argc == 2 && (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0)) {
-        puts("scanhead list: head profiles ($SCANHEAD_HEADS, else the installed ones, else config/heads) and kinds of "
-             "links");
-        return CMD_OK;
-    }
-    if (argc != 1) return cmd_usage("list", "it takes no arguments");
-    struct sh_err err = {0};
-    if (config_list_profiles(NULL, stdout, &err) < 0) return cmd_fail(&err);
-    puts("links: pty (virtual serial port), tcp, file, null");
-    return CMD_OK;
 }

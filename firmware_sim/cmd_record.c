@@ -11,8 +11,10 @@
 
 static const char HELP[] =
     "scanhead record SOURCE -o FILE [-o FILE ...] [options]: write the points of a scan to files\n\n"
-    "SOURCE is tty:/dev/..., tcp:host:port, FILE.shs (a raw stream), or a CONFIG: then the head runs off line in this\n"
-    "process, as fast as it computes. FILE says by its ending what is written:\n\n"
+    "SOURCE is usb, usb:vid:pid, usb:vid:pid:serial (scanhead list shows them), tty:/dev/..., tcp:host:port, FILE.shs\n"
+    "(a raw stream), or a CONFIG: then the head runs off line in this process, as fast as it computes. FILE says by "
+    "its\n"
+    "ending what is written:\n\n"
     "  .ply        points, binary or text, with double coordinates, label and station\n"
     "  .las        LAS 1.4, point format 6: points with CRS, time, returns, label; station as point source ID\n"
     "  .ptx        a grid per scan, with the scan's pose; shots without echo are in it\n"
@@ -28,6 +30,8 @@ static const char HELP[] =
     "  --duration S     stop each scan after S seconds of device time\n"
     "  --split          each scan to files of its own: NAME-1.las, NAME-2.las, ..., in the order of scans\n"
     "  --listen         send no command: record what comes until the stream ends or Ctrl-C\n"
+    "  --wait S         wait up to S seconds for SOURCE to be there\n"
+    "  --replug S       when the head is unplugged, wait up to S seconds for it and go on in the same files\n"
     "  --ascii          PLY as text\n"
     "  --empty-shots    keep shots without echo: .ply with NaN coordinates, .e57 with its invalid state\n"
     "  --stats FILE     write what was received as JSON; - is standard output\n"
@@ -35,14 +39,16 @@ static const char HELP[] =
     "  --crs CRS        local, ecef, utm or geodetic (CONFIG only)\n"
     "  --threads N      casters (CONFIG only)\n"
     "  --quiet          no progress\n\n"
-    "Exit status 1 when the recording is not complete: the stream ended before the scan did, or frames or pulses were\n"
-    "lost on the way. What came is kept in FILE all the same.\n";
+    "Exit status 1 when the recording is not complete: the stream ended before the scan did, frames or pulses were\n"
+    "lost on the way, or the head was away within a scan. What came is kept in FILE all the same.\n";
 
 enum {
     OPT_STATION = 256,
     OPT_FRAMES,
     OPT_DURATION,
     OPT_LISTEN,
+    OPT_WAIT,
+    OPT_REPLUG,
     OPT_ASCII,
     OPT_EMPTY,
     OPT_SPLIT,
@@ -57,6 +63,8 @@ static const struct option OPTIONS[] = {{"station", required_argument, NULL, OPT
                                         {"frames", required_argument, NULL, OPT_FRAMES},
                                         {"duration", required_argument, NULL, OPT_DURATION},
                                         {"listen", no_argument, NULL, OPT_LISTEN},
+                                        {"wait", required_argument, NULL, OPT_WAIT},
+                                        {"replug", required_argument, NULL, OPT_REPLUG},
                                         {"ascii", no_argument, NULL, OPT_ASCII},
                                         {"empty-shots", no_argument, NULL, OPT_EMPTY},
                                         {"split", no_argument, NULL, OPT_SPLIT},
@@ -74,6 +82,7 @@ struct record {
     struct record_files files;
     int all_stations;
     long station;
+    double wait_s;
     struct cmd_sets sets;
     struct recording_options recording;
 };
@@ -107,6 +116,10 @@ static int parse_option(struct record *r, int opt, char **argv)
     case OPT_LISTEN:
         r->recording.listen = 1;
         return CMD_OK;
+    case OPT_WAIT:
+        return cmd_parse_double("record", "--wait", optarg, 0, 1e8, &r->wait_s);
+    case OPT_REPLUG:
+        return cmd_parse_double("record", "--replug", optarg, 0, 1e8, &r->recording.replug_s);
     case OPT_ASCII:
         r->files.recorder.ascii = 1;
         return CMD_OK;
@@ -181,6 +194,7 @@ static int write_stats(const struct record *r, struct scanhead *sh, const struct
     json_uint(&json, "dropped", s.dropped);
     json_uint(&json, "reader_lost_frames", s.reader_lost);
     json_uint(&json, "lost_pulses", result->lost_pulses);
+    json_uint(&json, "replugs", result->replugs);
     json_double(&json, "wall_s", wall_s);
     json_double(&json, "cpu_s", clock_cpu_s());
     json_double(&json, "pulses_per_s", wall_s > 0.0 ? (double)result->pulses / wall_s : 0.0);
@@ -204,6 +218,11 @@ static int check_complete(struct scanhead *sh, const struct recording_result *re
     struct scanhead_stats s;
     scanhead_get_stats(sh, &s);
     uint64_t pulses = s.pulses_lost > result->lost_pulses ? s.pulses_lost : result->lost_pulses;
+    if (result->broken_scans != 0)
+        return sh_fail(
+            err, SH_ELOST,
+            "the recording is not complete: the head was away within %llu scans; %llu frames known to be lost",
+            (unsigned long long)result->broken_scans, (unsigned long long)count_lost(sh));
     if (count_lost(sh) == 0 && pulses == 0) return SH_OK;
     return sh_fail(err, SH_EIO,
                    "the recording is not complete: %llu frames lost to this reader, %llu pulses by the head",
@@ -250,7 +269,9 @@ static int record(struct record *r, struct scanhead *sh, struct sh_err *err)
     struct sh_err why = {0};
     int closed = record_files_close(&r->files, result.points != 0 || rc == SH_OK, &why);
     if (rc == SH_OK && closed != SH_OK) rc = sh_fail(err, closed, "%s", why.text);
-    if (rc == SH_OK && r->stats != NULL) rc = write_stats(r, sh, &result, wall_s, err);
+    int counts = rc == SH_OK || rc == SH_ELOST; /* also of a recording that an unplugged device has cut */
+    if (counts && r->stats != NULL && (closed = write_stats(r, sh, &result, wall_s, &why)) != SH_OK && rc == SH_OK)
+        rc = sh_fail(err, closed, "%s", why.text);
     if (rc == SH_OK || result.points != 0) say_result(r, &result);
     return rc == SH_OK ? check_complete(sh, &result, err) : rc;
 }
@@ -268,8 +289,8 @@ static int is_config(const char *source)
 
 static int is_stream(const char *source)
 {
-    return strncmp(source, "tty:", 4) == 0 || strncmp(source, "tcp:", 4) == 0 || strncmp(source, "fd:", 3) == 0 ||
-           ends_in(source, ".shs");
+    return strcmp(source, "usb") == 0 || strncmp(source, "usb:", 4) == 0 || strncmp(source, "tty:", 4) == 0 ||
+           strncmp(source, "tcp:", 4) == 0 || strncmp(source, "fd:", 3) == 0 || ends_in(source, ".shs");
 }
 
 static int record_config(struct record *r, struct sh_err *err)
@@ -301,12 +322,24 @@ static int record_config(struct record *r, struct sh_err *err)
     return rc == SH_OK ? CMD_OK : cmd_fail(err);
 }
 
+/* Tries again until the time is over: a device that is plugged in now may get its permissions a moment later. */
+static int open_stream(const struct record *r, struct scanhead **sh, char *why, size_t len)
+{
+    const int64_t end_ns = clock_now_ns() + (int64_t)(1e9 * r->wait_s);
+    for (;;) {
+        int rc = scanhead_open(r->source, sh, why, len);
+        int may_come = rc != SCANHEAD_OK && (rc != SCANHEAD_EINPUT || strncmp(r->source, "tty:", 4) == 0);
+        if (!may_come || clock_now_ns() >= end_ns || cmd_interrupted) return rc;
+        clock_sleep_until_ns(clock_now_ns() + 100000000);
+    }
+}
+
 static int record_stream(struct record *r, struct sh_err *err)
 {
     struct scanhead *sh = NULL;
     char why[256];
     if (r->sets.n != 0) return cmd_usage("record", "--set, --crs and --threads need a CONFIG as SOURCE");
-    int rc = scanhead_open(r->source, &sh, why, sizeof why);
+    int rc = open_stream(r, &sh, why, sizeof why);
     if (rc != SCANHEAD_OK) {
         sh_fail(err, rc, "%s", why);
         return cmd_fail(err);
@@ -338,6 +371,8 @@ int cmd_record(int argc, char **argv)
     cmd_catch_signals();
     struct sh_err err = {0};
     if (!is_config(r.source) && !is_stream(r.source))
-        return cmd_usage("record", "SOURCE %s: allowed tty:PATH, tcp:HOST:PORT, FILE.shs, CONFIG.yaml", r.source);
+        return cmd_usage("record",
+                         "SOURCE %s: allowed usb, usb:VID:PID:SERIAL, tty:PATH, tcp:HOST:PORT, FILE.shs, CONFIG.yaml",
+                         r.source);
     return is_config(r.source) ? record_config(&r, &err) : record_stream(&r, &err);
 }

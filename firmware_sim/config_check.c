@@ -10,6 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "drivers/usb/backend.h"
 #include "firmware_sim/head_clock.h"
 
 /* Of two keys that contradict, the one to name: the first unless only the second was given. */
@@ -131,22 +132,64 @@ static int check_output(const struct cfg_reader *rd, const struct config *cfg)
     return SH_OK;
 }
 
-static int check_link(const struct cfg_reader *rd, const struct config *cfg, uint32_t i)
+enum { OF_USBIP = 1u << USB_BACKEND_USBIP, OF_USBREDIR = 1u << USB_BACKEND_USBREDIR };
+enum { OF_FUNCTIONFS = 1u << USB_BACKEND_FUNCTIONFS };
+
+static int check_usb_link(const struct cfg_reader *rd, const struct config *cfg, struct link_spec *link, uint32_t i)
+{
+    static const struct {
+        const char *path;
+        unsigned backends; /* bit per back end that has the key */
+    } keys[] = {
+        {"links[].path", OF_USBREDIR},
+        {"links[].address", OF_USBIP | OF_USBREDIR},
+        {"links[].port", OF_USBIP | OF_USBREDIR},
+        {"links[].attach", OF_USBIP | OF_USBREDIR},
+        {"links[].udc", OF_FUNCTIONFS},
+    };
+    const char *name = cfg_find(&rd->table, "links[].backend")->names[link->backend];
+    for (size_t k = 0; k < sizeof keys / sizeof keys[0]; k++)
+        if (cfg_is_given(rd, keys[k].path, i) && !(keys[k].backends & 1u << link->backend))
+            return cfg_fail_key(rd, keys[k].path, i, "the back end %s has no such key; allowed without it", name);
+    const int has_port = cfg_is_given(rd, "links[].port", i), has_address = cfg_is_given(rd, "links[].address", i);
+    if (link->path[0] != '\0' && (has_port || has_address))
+        return cfg_fail_key(rd, "links[].path", i, "both a path and a port or address; allowed one of them");
+    if (link->backend == USB_BACKEND_USBIP && link->attach && (has_port || has_address))
+        return cfg_fail_key(rd, "links[].attach", i,
+                            "a device that is attached here listens nowhere; allowed without port and address");
+    if (link->backend == USB_BACKEND_USBREDIR && link->path[0] == '\0' && !has_port)
+        return cfg_fail_key(rd, "links[].backend", i, "usbredir needs a path or a port; allowed with one of them");
+    if (link->backend == USB_BACKEND_USBIP && !has_port) link->port = USB_BACKEND_USBIP_PORT;
+    if (link->serial[0] == '\0') snprintf(link->serial, sizeof link->serial, "%s", cfg->serial);
+    return SH_OK;
+}
+
+static int check_link(const struct cfg_reader *rd, struct config *cfg, uint32_t i)
 {
     static const struct {
         const char *path;
         unsigned types; /* bit per link type that has the key */
     } keys[] = {
-        {"links[].path", 1u << LINK_FILE | 1u << LINK_PTY},
-        {"links[].address", 1u << LINK_TCP},
-        {"links[].port", 1u << LINK_TCP},
+        {"links[].path", 1u << LINK_FILE | 1u << LINK_PTY | 1u << LINK_USB},
+        {"links[].address", 1u << LINK_TCP | 1u << LINK_USB},
+        {"links[].port", 1u << LINK_TCP | 1u << LINK_USB},
         {"links[].max_sessions", 1u << LINK_TCP},
+        {"links[].protocol", 1u << LINK_NULL | 1u << LINK_FILE | 1u << LINK_PTY | 1u << LINK_TCP},
+        {"links[].backend", 1u << LINK_USB},
+        {"links[].attach", 1u << LINK_USB},
+        {"links[].udc", 1u << LINK_USB},
+        {"links[].speed", 1u << LINK_USB},
+        {"links[].vid", 1u << LINK_USB},
+        {"links[].pid", 1u << LINK_USB},
+        {"links[].serial", 1u << LINK_USB},
     };
     static const char *const has[] = {[LINK_NULL] = "type, protocol",
                                       [LINK_FILE] = "type, path, protocol",
                                       [LINK_PTY] = "type, path, protocol",
-                                      [LINK_TCP] = "type, address, port, max_sessions, protocol"};
-    const struct link_spec *link = &cfg->link[i];
+                                      [LINK_TCP] = "type, address, port, max_sessions, protocol",
+                                      [LINK_USB] =
+                                          "type, backend, address, port, path, attach, udc, speed, vid, pid, serial"};
+    struct link_spec *link = &cfg->link[i];
     const char *type = cfg_find(&rd->table, "links[].type")->names[link->type];
     for (size_t k = 0; k < sizeof keys / sizeof keys[0]; k++)
         if (cfg_is_given(rd, keys[k].path, i) && !(keys[k].types & 1u << link->type))
@@ -156,7 +199,7 @@ static int check_link(const struct cfg_reader *rd, const struct config *cfg, uin
     for (uint32_t k = 0; k < i && link->path[0] != '\0'; k++)
         if (strcmp(cfg->link[k].path, link->path) == 0)
             return cfg_fail_key(rd, "links[].path", i, "links[%u] has the same path; allowed a path of its own", k);
-    return SH_OK;
+    return link->type == LINK_USB ? check_usb_link(rd, cfg, link, i) : SH_OK;
 }
 
 /* Which part of the trajectory, and where on it to stop. How long it is, its file says (site_platform.c). */

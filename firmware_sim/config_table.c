@@ -1,4 +1,5 @@
 /* The table of keys. Parsing, defaults, errors, --set and the reference come from here alone. */
+#include "drivers/usb/backend.h"
 #include "firmware_sim/config_private.h"
 
 #define LEN(array)           (sizeof(array) / sizeof((array)[0]))
@@ -31,9 +32,13 @@ static const char *const anchor_names[] = {[ANCHOR_NONE] = "none", [ANCHOR_EXPLI
 static const char *const hemisphere_names[] = {"south", "north", NULL};
 static const char *const layout_names[] = {[LINE_POLAR] = "polar", [LINE_GEO] = "geo", NULL};
 static const char *const link_names[] = {
-    [LINK_NULL] = "null", [LINK_FILE] = "file", [LINK_PTY] = "pty", [LINK_TCP] = "tcp", NULL};
+    [LINK_NULL] = "null", [LINK_FILE] = "file", [LINK_PTY] = "pty", [LINK_TCP] = "tcp", [LINK_USB] = "usb", NULL};
 static const char *const protocol_names[] = {[PROTOCOL_NATIVE] = "native", [PROTOCOL_NMEA] = "nmea", NULL};
 static const char *const talker_names[] = {[TALKER_GN] = "GN", [TALKER_GP] = "GP", NULL};
+static const char *const backend_names[] = {
+    [USB_BACKEND_USBIP] = "usbip", [USB_BACKEND_USBREDIR] = "usbredir", [USB_BACKEND_FUNCTIONFS] = "functionfs", NULL};
+static const char *const speed_names[] = {
+    [USB_RATE_FULL] = "full", [USB_RATE_HIGH] = "high", [USB_RATE_SUPER] = "super", NULL};
 static const char *const pace_names[] = {
     [PACE_REALTIME] = "realtime", [PACE_FAST] = "fast", [PACE_STEP] = "step", NULL};
 
@@ -195,11 +200,24 @@ static const struct cfg_key config_keys[] = {
     {"links[].protocol", CFG_ENUM, .def = "native", .names = protocol_names, IN_LINK(protocol),
      .help = "native: the head's stream and commands; nmea: the GNSS receiver, NMEA 0183 out, nothing in."},
     {"links[].path", CFG_PATH, .def = "", IN_LINK(path),
-     .help = "pty: symbolic link to the terminal (optional); file: file to write (required)."},
-    {"links[].address", CFG_TEXT, .def = "", IN_LINK(address), .help = "tcp: address to listen on; 127.0.0.1 when not given."},
-    {"links[].port", CFG_COUNT, NULL, "0", 0, 65535, IN_LINK(port), .help = "tcp: port; 0: the system chooses."},
+     .help = "pty: symbolic link to the terminal (optional); file: file to write (required); usbredir: Unix socket, instead of a port."},
+    {"links[].address", CFG_TEXT, .def = "", IN_LINK(address), .help = "tcp, usb: address to listen on; 127.0.0.1 when not given."},
+    {"links[].port", CFG_COUNT, NULL, "0", 0, 65535, IN_LINK(port),
+     .help = "tcp, usb: port; 0: the system chooses; usbip, when not given: 3240."},
     {"links[].max_sessions", CFG_COUNT, NULL, "4", 1, LINK_MAX_SESSIONS, IN_LINK(max_sessions),
      .help = "tcp: clients at a time."},
+    {"links[].backend", CFG_ENUM, .def = "usbip", .names = backend_names, IN_LINK(backend),
+     .help = "usb: how the device reaches a host."},
+    {"links[].attach", CFG_BOOL, .def = "off", IN_LINK(attach),
+     .help = "usbip: plug into this machine's vhci_hcd; usbredir: connect to the guest's socket instead of listening."},
+    {"links[].udc", CFG_TEXT, .def = "", IN_LINK(udc), .help = "functionfs: USB device controller; when not given, the first free one."},
+    {"links[].speed", CFG_ENUM, .def = "high", .names = speed_names, IN_LINK(speed),
+     .help = "usb: full (12 Mbit/s), high (480) or super (5000); the fastest the device can do."},
+    {"links[].vid", CFG_COUNT, NULL, "0x1209", 1, 65535, IN_LINK(vid), .flags = CFG_HEX, .allowed = "0x0001 to 0xffff",
+     .help = "usb: vendor id; the default pair is set aside for private tests."},
+    {"links[].pid", CFG_COUNT, NULL, "0x0001", 0, 65535, IN_LINK(pid), .flags = CFG_HEX, .allowed = "0x0000 to 0xffff",
+     .help = "usb: product id."},
+    {"links[].serial", CFG_TEXT, .def = "", IN_LINK(serial), .help = "usb: serial number; head.serial when not given."},
 
     {"noise", CFG_MAP, .help = "Noise of the measurement."},
     {"noise.range", CFG_BOOL, .def = "off", IN_CONFIG(noise_on),

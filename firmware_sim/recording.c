@@ -15,7 +15,7 @@ struct recording {
     struct recording_result *result;
     int64_t next_report_ns, scan_t0_ns; /* monotonic; device time of the scan's start, -1 before it */
     int stopping;
-    int scan_over, idle, within_scan;
+    int scan_over, idle, within_scan, broken;
 };
 
 static int command(struct recording *r, const char *line, char *reply, size_t len, struct sh_err *err)
@@ -56,7 +56,7 @@ static void look_at(struct recording *r, const struct scanhead_frame *frame)
     if (frame->event == SCANHEAD_EV_SCAN_START) r->scan_t0_ns = (int64_t)frame->event_value[1];
     if (frame->event == SCANHEAD_EV_SCAN_END) {
         r->scan_over = 1;
-        r->within_scan = 0;
+        r->within_scan = r->broken = 0;
         r->result->scans++;
         r->result->lost_pulses += frame->event_value[2];
     }
@@ -74,6 +74,29 @@ static void report(struct recording *r)
     sh_progress(r->o->report, text, -1.0);
 }
 
+/* The head was unplugged: waits for it. A scan that is over when it is back has ended meanwhile; of one that is not,
+ * the rest will come. */
+static int replug(struct recording *r, struct sh_err *err)
+{
+    const int64_t end_ns = clock_now_ns() + (int64_t)(1e9 * r->o->replug_s);
+    char reply[512];
+    int rc, scanning = 0;
+    sh_warn(r->o->report, "%s; waiting for it", scanhead_error(r->sh));
+    do {
+        rc = scanhead_reattach(r->sh, NEXT_MS);
+        if (rc == SCANHEAD_OK) rc = scanhead_command(r->sh, "HEAD:STAT?", reply, sizeof reply, REPLY_MS);
+    } while (rc != SCANHEAD_OK && clock_now_ns() < end_ns && !(r->o->interrupted != NULL && r->o->interrupted()));
+    if (rc != SCANHEAD_OK) return sh_fail(err, SH_ELOST, "the head did not come back: %s", scanhead_error(r->sh));
+    scanning = strncmp(reply, "s", 1) == 0; /* spin-up, scanning, spin-down */
+    sh_warn(r->o->report, "the head is back");
+    r->result->replugs++;
+    r->result->broken_scans += (uint64_t)(r->within_scan && !r->broken);
+    r->broken = r->within_scan && scanning;
+    if (r->within_scan && !scanning) r->scan_over = 1;
+    r->within_scan = r->broken;
+    return 0;
+}
+
 /* One frame. 1: got one; 0: none in time; negative: over. */
 static int step(struct recording *r, int timeout_ms, struct sh_err *err)
 {
@@ -81,6 +104,7 @@ static int step(struct recording *r, int timeout_ms, struct sh_err *err)
     int rc = scanhead_next(r->sh, &frame, timeout_ms);
     report(r);
     if (rc == SCANHEAD_ETIMEOUT) return 0;
+    if ((rc == SCANHEAD_ELOST || rc == SCANHEAD_ECLOSED) && r->o->replug_s > 0.0) return replug(r, err);
     if (rc != SCANHEAD_OK) return sh_fail(err, rc, "%s", scanhead_error(r->sh));
     look_at(r, &frame);
     if (frame.type == SCANHEAD_POINTS) count_points(r, &frame);
@@ -160,6 +184,6 @@ int recording_run(struct scanhead *sh, const struct recording_options *options, 
     if (rc == SH_ECLOSED && options->listen && result->frames == 0)
         return sh_fail(err, SH_EFORMAT, "the stream ended without a single frame");
     if (rc == SH_ECLOSED && options->listen && !r.within_scan) return SH_OK;
-    result->ended_early = rc == SH_ECLOSED;
+    result->ended_early = rc == SH_ECLOSED || rc == SH_ELOST;
     return rc == SH_ECLOSED && r.within_scan ? sh_fail(err, rc, "the stream ended in the middle of a scan") : rc;
 }

@@ -26,15 +26,35 @@ enum scanhead_error {
     SCANHEAD_ECLOSED = -6,  /* the head is gone, or the file is at its end */
     SCANHEAD_EFORMAT = -7,  /* not this protocol */
     SCANHEAD_ESTATE = -8,   /* not possible now, e.g. points before descriptor and anchor were seen */
+    SCANHEAD_ELOST = -9,    /* the USB head was unplugged, or isn't there */
 };
 
 struct scanhead;
 
-/* source: "tty:/dev/ttyACM0", "tcp:host:port", "fd:N" (taken over), or the path of a raw stream (.shs).
- * On failure *out is NULL and err (may be NULL) gets the reason. */
+/* source: "usb", "usb:vid:pid", "usb:vid:pid:serial" (the head's own interface, ids in hexadecimal),
+ * "tty:/dev/ttyACM0", "tcp:host:port", "fd:N" (taken over), or the path of a raw stream (.shs). On failure *out is NULL
+ * and err (may be NULL) gets the reason. */
 int scanhead_open(const char *source, struct scanhead **out, char *err, size_t err_len);
 void scanhead_close(struct scanhead *sh);
 const char *scanhead_error(const struct scanhead *sh);
+
+/* After SCANHEAD_ELOST or SCANHEAD_ECLOSED, once all frames that had come were taken: waits until the same head is
+ * there again and goes on with it. Counters, hash and what the stream has said go on too: a jump in the sequence tells
+ * what was lost meanwhile. A USB head is the one with the same ids and serial number. SCANHEAD_ESTATE for a file or
+ * "fd:N"; any other error: it did not come back in time; call again, or close. */
+int scanhead_reattach(struct scanhead *sh, int timeout_ms);
+
+/* Heads on USB now. */
+struct scanhead_usb_head {
+    char source[192]; /* for scanhead_open: usb:vid:pid:serial */
+    uint16_t vid, pid;
+    char serial[128], maker[128], product[128];
+    int bus, device;
+    double speed_bit_s; /* 0: unknown */
+    char problem[128];  /* why it can't be opened, e.g. no permission; empty: nothing */
+};
+/* How many there are, of which at most max are described; or SCANHEAD_EIO with the reason in err (may be NULL). */
+int scanhead_list_usb(struct scanhead_usb_head *heads, int max, char *err, size_t err_len);
 
 /* Sends one command line and waits for its reply line (without its end). Frames that arrive meanwhile are kept and come
  * from scanhead_next() later; at most 64 MiB of them, then the oldest are dropped and counted (stats.dropped).

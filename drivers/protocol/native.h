@@ -210,6 +210,9 @@ enum native_item native_parser_next(struct native_parser *parser);
 /* Nothing more will be added: what waits for more bytes is searched as garbage, so that whole frames behind a cut one
  * come out at the end of a recording too. */
 void native_parser_finish(struct native_parser *parser);
+/* After native_parser_finish() and all its items: bytes of another connection to the same head follow. Counters and
+ * sequence go on. */
+void native_parser_resume(struct native_parser *parser);
 
 /* 1 if a frame with this header belongs to stream_sha256: the hash runs over u8 type, u32 length (LE) and the payload
  * of each descriptor, anchor, points, line-end and poses frame that has neither NATIVE_REPEAT nor NATIVE_LOCAL. */
