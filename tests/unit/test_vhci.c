@@ -60,7 +60,8 @@ static void test_attach(void **state)
         enum usb_rate rate;
         unsigned port;
         const char *text; /* port, descriptor, device, speed: USB_SPEED_FULL 2, HIGH 3, SUPER 5 */
-    } cases[] = {{USB_RATE_FULL, 1, "1 7 65538 2"}, {USB_RATE_HIGH, 1, "1 7 65538 3"}, {USB_RATE_SUPER, 9, "9 7 65538 5"}};
+    } cases[] = {
+        {USB_RATE_FULL, 1, "1 7 65538 2"}, {USB_RATE_HIGH, 1, "1 7 65538 3"}, {USB_RATE_SUPER, 9, "9 7 65538 5"}};
     for (int i = 0; i < 3; i++) {
         char text[64] = "";
         unsigned port = 99;
