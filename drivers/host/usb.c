@@ -14,7 +14,7 @@
 #include <time.h>
 
 /* A read is a multiple of every packet size (64, 512, 1024 bytes): so none can be sent more than it has room for. */
-enum { IN_TRANSFERS = 16, IN_BYTES = 64 << 10, OUT_BYTES = 2048, MAX_FAILURES = 5, CANCEL_MS = 1000 };
+enum { IN_TRANSFERS = 16, IN_BYTES = 64 << 10, OUT_BYTES = 2048, CANCEL_MS = 1000, FAILING_MS = 3000 };
 
 struct in_transfer {
     struct libusb_transfer *transfer;
@@ -27,7 +27,9 @@ struct host_usb {
     libusb_device_handle *handle;
     struct usb_interface interface;
     struct in_transfer in[IN_TRANSFERS];
-    int n_in, head, failures; /* how many; the one to read from next; failures since data came */
+    int n_in, head;     /* how many; the one to read from next */
+    int failures;       /* since data came */
+    int64_t give_up_ns; /* the first of them, and FAILING_MS */
     struct libusb_transfer *out;
     int out_flying, out_error; /* errno of the write before */
     uint8_t *in_data, out_data[OUT_BYTES];
@@ -100,12 +102,13 @@ static int submit(struct in_transfer *in)
 }
 
 /* An endpoint that stalled or a bus that garbled: everything is taken back and the endpoint started anew. A device that
- * is just being unplugged often shows itself first in this way, so each try waits longer than the one before. */
+ * is just being unplugged shows itself first in this way, until the hub has noticed: so the second try and later ones
+ * give it a moment. */
 static void recover(struct host_usb *usb)
 {
     cancel_reads(usb);
     if (usb->failures > 1) {
-        struct timespec pause = {.tv_nsec = 5000000L << usb->failures};
+        struct timespec pause = {.tv_nsec = 20000000};
         nanosleep(&pause, NULL);
     }
     libusb_clear_halt(usb->handle, usb->interface.in);
@@ -117,7 +120,8 @@ static int turn(struct host_usb *usb)
     struct in_transfer *in = &usb->in[usb->head];
     int error = errno_of_status(in->transfer->status);
     if (in->transfer->actual_length > 0) usb->failures = 0;
-    if (error == EPROTO && ++usb->failures > MAX_FAILURES) error = EIO;
+    if (error == EPROTO && usb->failures++ == 0) usb->give_up_ns = host_deadline_ns(FAILING_MS);
+    if (error == EPROTO && host_deadline_ns(0) > usb->give_up_ns) error = EIO;
     if (error == EPROTO) recover(usb);
     if (error == ENODEV || error == EIO) {
         in->error = error;

@@ -3,4 +3,4 @@
 . tests/guest/lib.sh
 guest_prepare
 guest_add_head
-guest_boot tests/guest/in_functionfs.sh 150
+guest_boot tests/guest/in_functionfs.sh 240

@@ -3,4 +3,4 @@
 . tests/guest/lib.sh
 guest_prepare
 guest_add_head
-guest_boot tests/guest/in_usbip.sh 100
+guest_boot tests/guest/in_usbip.sh 240

@@ -54,5 +54,5 @@ head_start --pace fast
     echo "tcp2=$(hash_over_tcp)"
 } >"$guest_work/root/hashes.sh"
 head_end -TERM
-guest_boot tests/guest/in_usbredir.sh 100 -device qemu-xhci,id=x -chardev "socket,id=usb,path=$guest_work/usb,reconnect=1" \
+guest_boot tests/guest/in_usbredir.sh 240 -device qemu-xhci,id=x -chardev "socket,id=usb,path=$guest_work/usb,reconnect=1" \
     -device usb-redir,chardev=usb,bus=x.0
