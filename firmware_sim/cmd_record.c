@@ -36,7 +36,8 @@ static const char HELP[] =
     "  --threads N      casters (CONFIG only)\n"
     "  --quiet          no progress\n\n"
     "Exit status 1 when the recording is not complete: the stream ended before the scan did, Ctrl-C came before scans\n"
-    "with an end had theirs (not with --listen), or frames or pulses were lost on the way. What came is kept in FILE all\n"
+    "with an end had theirs (not with --listen), or frames or pulses were lost on the way. What came is kept in FILE "
+    "all\n"
     "the same.\n";
 
 enum {
@@ -280,10 +281,11 @@ static int set_layout(const struct record *r, struct config *cfg, struct sh_err 
 {
     if (!r->crs_given || cfg->layout == LINE_GEO) return SH_OK;
     if (cfg->layout_given)
-        return sh_fail(err, SH_EINPUT,
-                       "%s: output.layout is polar, whose recordings are in the scene frame; with --crs allowed geo, as "
-                       "by --set output.layout=geo",
-                       cfg->file);
+        return sh_fail(
+            err, SH_EINPUT,
+            "%s: output.layout is polar, whose recordings are in the scene frame; with --crs allowed geo, as "
+            "by --set output.layout=geo",
+            cfg->file);
     cfg->layout = LINE_GEO;
     return SH_OK;
 }

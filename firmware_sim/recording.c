@@ -15,9 +15,9 @@ struct recording {
     const struct recording_options *o;
     struct recording_result *result;
     int64_t next_report_ns, scan_t0_ns; /* monotonic; device time of the scan's start, -1 before it */
-    int interrupted;  /* asked to end the whole recording */
-    int stopping;     /* the scan at hand is to end */
-    int scan_started; /* SCAN_START or points were seen since SCAN:STAR */
+    int interrupted;                    /* asked to end the whole recording */
+    int stopping;                       /* the scan at hand is to end */
+    int scan_started;                   /* SCAN_START or points were seen since SCAN:STAR */
     int scan_over, cut_short, within_scan;
 };
 
@@ -132,7 +132,8 @@ static int stop_scan(struct recording *r, struct sh_err *err)
     char reply[512];
     int rc = scanhead_command(r->sh, "SCAN:STOP", reply, sizeof reply, REPLY_MS);
     if (rc != SCANHEAD_OK) return sh_fail(err, rc, "SCAN:STOP: %s", scanhead_error(r->sh));
-    r->cut_short = r->interrupted && strncmp(reply, "ERR", 3) != 0; /* a refusal says that the scan has just ended by itself */
+    r->cut_short =
+        r->interrupted && strncmp(reply, "ERR", 3) != 0; /* a refusal says that the scan has just ended by itself */
     return SH_OK;
 }
 
