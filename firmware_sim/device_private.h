@@ -89,6 +89,7 @@ void device_take_poses(struct device *device, struct device_work *work);
 int64_t device_gps_ns(const struct device *device, int64_t t_ns);
 /* An event for the full second that begins in the tick, if one does. */
 void device_say_pps(struct device *device, uint64_t tick);
+void device_say_time(struct device *device, uint64_t tick);
 /* What TIME:UTC? and TIME:GPS? answer at cmd.t_ns. */
 void device_set_time_texts(struct device *device);
 

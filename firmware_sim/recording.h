@@ -27,6 +27,7 @@ struct recording_result {
     uint64_t points, empty, frames, scans, pulses;
     uint64_t lost_pulses; /* as the head says: cast pulses it could not compute */
     int ended_early;      /* the stream ended before the scan did */
+    char missing[128];    /* what was asked for but left out because of `interrupted`; empty: nothing */
 };
 
 int recording_run(struct scanhead *sh, const struct recording_options *options, struct recording_result *result,

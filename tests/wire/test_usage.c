@@ -206,6 +206,10 @@ static const struct {
     {"empty glTF", "bad.gltf", "{}", {"bad.gltf"}},
     {"glTF that is none", "bad.glb", "glTFxxxx", {"bad.glb"}},
     {"IFC that is none", "bad.ifc", "ISO-10303-21;", {"bad.ifc"}},
+    {"IFC with a record missing",
+     "bad.ifc",
+     "ISO-10303-21;\nDATA;\n#2= IFCSITE('a#9',$);\n#1= IFCRELAGGREGATES('b',$,$,$,#2,(#3));\nEND-ISO-10303-21;\n",
+     {"bad.ifc, line 4", "#1 refers to #3"}},
 };
 
 static void test_meshes(void **state)
