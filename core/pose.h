@@ -74,8 +74,9 @@ int trajectory_from_samples(const struct pose_sample *sample, size_t n, struct t
 
 /* A CSV file whose first line names the columns, in any order: t_s, x_m, y_m, z_m, and either heading_deg, pitch_deg,
  * roll_deg (heading alone will do) or qw, qx, qy, qz; frame where wanted (else the sample's number, from 0);
- * scan and flags, as `scanhead record -o NAME.poses.csv` writes them, are read over. Lines that
- * begin with '#' and empty lines don't count. Everything else is an error with file and line. */
+ * scan and flags, as `scanhead record -o NAME.poses.csv` writes them, are read over, as is a byte
+ * order mark of UTF-8. Lines that begin with '#' and empty lines don't count. Times are within 4e9 s of 0, so that
+ * nanoseconds between any two fit into 64 bits. Everything else is an error with file and line. */
 int trajectory_read_csv(const char *path, struct trajectory **out, struct sh_err *err);
 
 /* Way-points, a CSV file likewise: x_m, y_m, z_m, speed_m_s, and pause_s where wanted. The platform goes through them

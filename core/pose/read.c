@@ -8,7 +8,9 @@
 
 static const double DEG = M_PI / 180.0;
 static const double STEP_S = 0.02; /* of the samples that way-points are turned into */
+static const double STEP_M = 0.01; /* likewise, where that is longer */
 static const double SLOWEST_M_S = 1e-3;
+static const double LATEST_S = 4e9; /* differences fit into 63 bits of nanoseconds, and the year 2096 since 1970 */
 
 struct samples {
     struct pose_sample *at;
@@ -74,6 +76,9 @@ static int take_sample(const struct csv *csv, const struct pose_sample *before, 
         if (fabs(v[k]) > 1e9)
             return text_fail(&csv->text, csv->line, SH_EINPUT, err, "%s %.6g; allowed -1e9 to 1e9", sample_columns[k],
                              v[k]);
+    if (!(fabs(s->t_s) <= LATEST_S))
+        return text_fail(&csv->text, csv->line, SH_EINPUT, err, "t_s %.9g; allowed %g to %g", s->t_s, -LATEST_S,
+                         LATEST_S);
     if (before != NULL && !(s->t_s - before->t_s > 0.999e-6 * POSE_MIN_STEP_US))
         return text_fail(&csv->text, csv->line, SH_EINPUT, err,
                          "t_s %.9g after %.9g; allowed rising times, at least %g s apart", s->t_s, before->t_s,

@@ -270,7 +270,7 @@ static void test_csv(void **state)
     struct trajectory *angles, *quats;
     struct pose a, b;
     double frame, first, last;
-    write_file("# a comment\n\nt_s, x_m,y_m,z_m,roll_deg,pitch_deg,heading_deg\r\n"
+    write_file("\xef\xbb\xbf# a comment behind a byte order mark\n\nt_s, x_m,y_m,z_m,roll_deg,pitch_deg,heading_deg\r\n"
                "0,1,2,3,5,-6,370\r\n# another\n2.5,3,2,3,0,0,90\n");
     if (trajectory_read_csv(path, &angles, &err) != SH_OK) fail_msg("%s", err.text);
     trajectory_span(angles, &first, &last);
@@ -313,6 +313,9 @@ static void test_csv_errors(void **state)
         {NAMES "0,1 m,2,3,4\n", "line 2", "x_m"},
         {NAMES "0,1,2,3,4\n# c\n0,1,2,3,4\n", "line 4", "rising times"},
         {NAMES "0,1,2,3,4\n0.00005,1,2,3,4\n", "line 3", "at least 0.0001 s"},
+        {NAMES "0,1,2,3,4\n1e300,1,2,3,4\n", "line 3", "t_s 1e+300; allowed -4e+09 to 4e+09"},
+        {NAMES "-1e18,1,2,3,4\n0,1,2,3,4\n", "line 2", "t_s -1e+18; allowed"},
+        {"\xef\xbb" NAMES, "line 1", "is unknown"}, /* no whole byte order mark */
         {"t_s,x_m,y_m,z_m,qw,qx,qy,qz\n0,0,0,0,1,1,0,0\n", "line 2", "quaternion"},
         {"t_s,x_m,y_m,z_m,heading_deg,pitch_deg\n0,0,0,0,0,91\n", "line 2", "pitch_deg"},
     };
