@@ -167,9 +167,9 @@ static const struct cfg_key config_keys[] = {
     {"platform.reach_m", CFG_REAL, "m", "100", 1, 1000, IN_CONFIG(platform.reach_m),
      .help = "live: how far from the station the head may come."},
     {"platform.extrapolate_ms", CFG_REAL, "ms", "100", 0, 10000, IN_CONFIG(platform.extrapolate_ms),
-     .help = "live: how long the last two poses are taken to go on; later the platform stands, and is late."},
+     .help = "live: how long the last two poses are taken to go on; later the platform stands, and is late. Between two poses it goes on evenly."},
     {"platform.address", CFG_TEXT, .def = "127.0.0.1", IN_CONFIG(platform.address),
-     .help = "live, in real time: address where poses come in by UDP, lines of t_s x y z roll pitch heading."},
+     .help = "live, in real time: address where poses come in by UDP, lines of t_s x y z roll pitch heading, up to 3600 s ahead of device time."},
     {"platform.port", CFG_COUNT, NULL, "0", 0, 65535, IN_CONFIG(platform.port), .help = "live: its port; 0: the system chooses."},
 
     {"output", CFG_MAP, .help = "Form of the points."},
