@@ -147,7 +147,7 @@ static const struct cfg_key config_keys[] = {
     {"platform.file", CFG_PATH, .def = "", IN_CONFIG(platform.file),
      .help = "trajectory, stops: CSV with t_s,x_m,y_m,z_m,roll_deg,pitch_deg,heading_deg (or qw,qx,qy,qz), scene frame."},
     {"platform.waypoints", CFG_PATH, .def = "", IN_CONFIG(platform.waypoints),
-     .help = "trajectory, stops: CSV with x_m,y_m,z_m,speed_m_s[,pause_s] instead; heading along the path."},
+     .help = "trajectory, stops: CSV with x_m,y_m,z_m,speed_m_s[,pause_s] instead; heading along the path, level as a station there."},
     {"platform.start_s", CFG_REAL, "s", "0", 0, 1e9, IN_CONFIG(platform.start_s),
      .help = "trajectory, stops: where a scan starts on it, or the first stop; after its first sample."},
     {"platform.end_s", CFG_REAL, "s", "0", 0, 1e9, IN_CONFIG(platform.end_s),
