@@ -243,6 +243,7 @@ static void end_scan(struct device *device, uint64_t tick)
     uint64_t lost = atomic_load(&device->counters.lost_pulses) - device->scan_lost0;
     int stopped = device->stop_requested;
     device->scanning = 0;
+    device->scan_end_tick = tick;
     device->stop_requested = 0;
     device_push_event(device, NATIVE_EV_SCAN_END, device->scan, device->pulse_next, lost, "");
     device_transition(device, stopped ? HEAD_EV_STOP : HEAD_EV_DONE, tick);

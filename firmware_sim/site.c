@@ -213,7 +213,7 @@ int site_load(const struct config *cfg, const struct sh_report *report, struct s
     if (rc == SH_OK && site->moving) rc = site_load_platform(site, report, err);
     for (uint32_t i = 0; i < site->n_stations && rc == SH_OK; i++)
         rc = add_station(site, i, report, err);
-    if (rc == SH_OK) rc = site_choose_scale(site, err);
+    if (rc == SH_OK) rc = site_choose_scale(site, report, err);
     if (rc != SH_OK) {
         site_free(site);
         return rc;

@@ -344,6 +344,14 @@ static void test_links(void **state)
     expect_link(wire, "file that is a folder", "{type: file, path: .}", 2, "irectory");
     expect_link(wire, "no such address", "{type: tcp, address: 300.1.1.1}", 2, "300.1.1.1");
 
+    /* A live platform's socket is asked by `check`, too. */
+    char config[352];
+    write_config(wire, "{type: \"null\"}", "{type: \"null\"}");
+    snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
+    expect(wire, "no such address of a platform",
+           (const char *const[]){"check", config, "--set", "platform.kind=live", "--set", "platform.address=x y", NULL},
+           2, (const char *const[]){"platform.address x y: no such address", NULL});
+
     struct sockaddr_in at = {.sin_family = AF_INET};
     socklen_t len = sizeof at;
     int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
