@@ -128,9 +128,13 @@ void georef_difference(const struct georef *georef, const double p_crs[3], doubl
 
 /* Units of the CRS per count, so that a count is at most scale_m on the ground (utm, ecef, local: just scale_m, of the
  * grid) for points within reach_m of the centre, and so that these fit into 31 bits and a sign. Degrees of longitude
- * have a scale of their own: near a pole they are long in degrees and short on the ground. SH_EINPUT, naming the
- * smallest scale_m that would do, where they don't fit. */
+ * have a scale of their own: near a pole they are long in degrees and short on the ground, and where up to 360 of them
+ * don't fit otherwise, that scale alone is coarser, up to 2 pi reach_m / 2^31 on the ground. SH_EINPUT, naming the
+ * smallest scale_m that would do, where the others don't fit. */
 int georef_scale(const struct georef *georef, double scale_m, double reach_m, double scale[3], struct sh_err *err);
+/* The longest that a count of these is within reach_m, metres (on the ground, or of the grid): scale_m, or what
+ * longitude has. */
+double georef_count_m(const struct georef *georef, double reach_m, const double scale[3]);
 
 /* A point east, north and up (metres) in the tangent frame at a place on WGS 84 -> its own latitude and longitude (deg,
  * longitude -180..180) and ellipsoidal height (m). GeographicLib's LocalCartesian; for single points, not for speed. */

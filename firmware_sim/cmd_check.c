@@ -7,6 +7,7 @@
 #include "firmware_sim/check_station.h"
 #include "firmware_sim/cmd.h"
 #include "firmware_sim/head_clock.h"
+#include "firmware_sim/pose_feed.h"
 
 static const char HELP[] =
     "scanhead check CONFIG [--set KEY=VALUE ...]: validate configuration, scene and links; nothing runs.\n"
@@ -16,7 +17,7 @@ static const char HELP[] =
 static const struct option OPTIONS[] = {
     {"set", required_argument, NULL, 's'}, {"help", no_argument, NULL, 'h'}, {NULL, 0, NULL, 0}};
 
-/* Opens and closes each link, so that a taken port or a wrong path shows now. */
+/* Opens and closes each link, and the socket of a live platform, so that a taken port or a wrong path shows now. */
 static int check_links(const struct config *cfg, struct sh_err *err)
 {
     for (uint32_t i = 0; i < cfg->n_links; i++) {
@@ -27,7 +28,11 @@ static int check_links(const struct config *cfg, struct sh_err *err)
         if (rc != SH_OK) return rc;
         ops->close(link);
     }
-    return SH_OK;
+    struct pose_feed *feed = NULL;
+    if (cfg->platform.kind != PLATFORM_LIVE || cfg->pace == PACE_STEP) return SH_OK;
+    int rc = pose_feed_open(NULL, cfg, &feed, err);
+    pose_feed_close(feed);
+    return rc;
 }
 
 static void print_platform(const struct site *site)

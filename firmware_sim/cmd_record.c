@@ -36,11 +36,12 @@ static const char HELP[] =
     "  --empty-shots    keep shots without echo: .ply with NaN coordinates, .e57 with its invalid state\n"
     "  --stats FILE     write what was received as JSON; - is standard output\n"
     "  --set KEY=VALUE  any configuration key (CONFIG only); may be repeated\n"
-    "  --crs CRS        local, ecef, utm or geodetic (CONFIG only)\n"
+    "  --crs CRS        local, ecef, utm or geodetic (CONFIG only): points in it, that is output.layout=geo, too\n"
     "  --threads N      casters (CONFIG only)\n"
     "  --quiet          no progress\n\n"
-    "Exit status 1 when the recording is not complete: the stream ended before the scan did, frames or pulses were\n"
-    "lost on the way, or the head was away within a scan. What came is kept in FILE all the same.\n";
+    "Exit status 1 when the recording is not complete: the stream ended before the scan did, Ctrl-C came before scans\n"
+    "with an end had theirs (not with --listen), frames or pulses were lost on the way, or the head was away within a\n"
+    "scan. What came is kept in FILE all the same.\n";
 
 enum {
     OPT_STATION = 256,
@@ -80,7 +81,7 @@ static const struct option OPTIONS[] = {{"station", required_argument, NULL, OPT
 struct record {
     const char *source, *stats;
     struct record_files files;
-    int all_stations;
+    int all_stations, crs_given;
     long station;
     double wait_s;
     struct cmd_sets sets;
@@ -135,6 +136,7 @@ static int parse_option(struct record *r, int opt, char **argv)
     case OPT_SET:
         return cmd_add_set(&r->sets, optarg);
     case OPT_CRS:
+        r->crs_given = 1;
         return cmd_add_key(&r->sets, "output.crs", optarg);
     case OPT_THREADS:
         return cmd_add_key(&r->sets, "loop.threads", optarg);
@@ -217,6 +219,7 @@ static int check_complete(struct scanhead *sh, const struct recording_result *re
 {
     struct scanhead_stats s;
     scanhead_get_stats(sh, &s);
+    if (result->missing[0] != '\0') return sh_fail(err, SH_ESTATE, "interrupted; missing: %s", result->missing);
     uint64_t pulses = s.pulses_lost > result->lost_pulses ? s.pulses_lost : result->lost_pulses;
     if (result->broken_scans != 0)
         return sh_fail(
@@ -267,7 +270,7 @@ static int record(struct record *r, struct scanhead *sh, struct sh_err *err)
     rc = recording_run(sh, &r->recording, &result, err);
     double wall_s = 1e-9 * (double)(clock_now_ns() - start_ns);
     struct sh_err why = {0};
-    int closed = record_files_close(&r->files, result.points != 0 || rc == SH_OK, &why);
+    int closed = record_files_close(&r->files, result.points != 0 || (rc == SH_OK && result.missing[0] == '\0'), &why);
     if (rc == SH_OK && closed != SH_OK) rc = sh_fail(err, closed, "%s", why.text);
     int counts = rc == SH_OK || rc == SH_ELOST; /* also of a recording that an unplugged device has cut */
     if (counts && r->stats != NULL && (closed = write_stats(r, sh, &result, wall_s, &why)) != SH_OK && rc == SH_OK)
@@ -293,6 +296,20 @@ static int is_stream(const char *source)
            strncmp(source, "tcp:", 4) == 0 || strncmp(source, "fd:", 3) == 0 || ends_in(source, ".shs");
 }
 
+/* Polar points are in no CRS. */
+static int set_layout(const struct record *r, struct config *cfg, struct sh_err *err)
+{
+    if (!r->crs_given || cfg->layout == LINE_GEO) return SH_OK;
+    if (cfg->layout_given)
+        return sh_fail(
+            err, SH_EINPUT,
+            "%s: output.layout is polar, whose recordings are in the scene frame; with --crs allowed geo, as "
+            "by --set output.layout=geo",
+            cfg->file);
+    cfg->layout = LINE_GEO;
+    return SH_OK;
+}
+
 static int record_config(struct record *r, struct sh_err *err)
 {
     int status = CMD_OK;
@@ -309,6 +326,7 @@ static int record_config(struct record *r, struct sh_err *err)
     if (rc == SH_OK && frames == 0 && !arrives && !(r->recording.duration_s > 0.0))
         rc =
             sh_fail(err, SH_EINPUT, "%s: head.frames is 0, a scan without end; give --frames or --duration", cfg->file);
+    if (rc == SH_OK) rc = set_layout(r, cfg, err);
     if (rc == SH_OK && cfg->layout == LINE_GEO && cfg->crs == GEOREF_GEODETIC)
         rc = record_files_check_degrees(&r->files, err);
     if (rc == SH_OK) rc = offline_open(cfg, &cmd_report_stderr, &offline, err);

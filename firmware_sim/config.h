@@ -143,6 +143,7 @@ struct config {
     enum georef_crs crs;
     int utm_zone;
     enum line_layout layout;
+    int layout_given; /* 0: the default */
     enum config_heights heights;
     enum georef_method georef; /* GEOREF_AUTO: as the plan says */
     double tolerance_m;        /* what a georeferenced position may be off */

@@ -112,8 +112,9 @@ static int check_names(const struct cfg_reader *rd, struct config *cfg)
     return SH_OK;
 }
 
-static int check_output(const struct cfg_reader *rd, const struct config *cfg)
+static int check_output(const struct cfg_reader *rd, struct config *cfg)
 {
+    cfg->layout_given = cfg_is_given(rd, "output.layout", 0);
     if (cfg->utm_zone != 0 && cfg->crs != GEOREF_UTM)
         return cfg_fail_key(rd, "output.utm_zone", 0, "a zone, but output.crs is not utm; allowed only with crs: utm");
     if (cfg->heights == HEIGHTS_GEOID && cfg->crs != GEOREF_UTM && cfg->crs != GEOREF_GEODETIC)

@@ -194,11 +194,16 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
     return done || stop || arrives;
 }
 
+static int is_repeated(const struct device *device, uint64_t tick)
+{
+    uint64_t since = tick - device->scan_tick0;
+    return device->scanning && ((since != 0 && since % device->tick_hz == 0) || device->anchor_lost);
+}
+
 static void describe(struct device *device, uint64_t tick, struct device_work *work)
 {
     uint64_t since = tick - device->scan_tick0;
-    int repeat = (since != 0 && since % device->tick_hz == 0) || device->anchor_lost;
-    if (device->describe || repeat) {
+    if (device->describe || is_repeated(device, tick)) {
         work->describe = 1;
         work->describe_flags = device->describe ? 0 : NATIVE_REPEAT;
         device_fill_descriptor(device, &work->descriptor);
@@ -238,6 +243,7 @@ static void end_scan(struct device *device, uint64_t tick)
     uint64_t lost = atomic_load(&device->counters.lost_pulses) - device->scan_lost0;
     int stopped = device->stop_requested;
     device->scanning = 0;
+    device->scan_end_tick = tick;
     device->stop_requested = 0;
     device_push_event(device, NATIVE_EV_SCAN_END, device->scan, device->pulse_next, lost, "");
     device_transition(device, stopped ? HEAD_EV_STOP : HEAD_EV_DONE, tick);
@@ -263,6 +269,7 @@ int device_claim(struct device *device, uint64_t released, struct device_work *w
     run_timers(device, tick);
     say_overrun(device, tick);
     device_say_pps(device, tick);
+    if (is_repeated(device, tick)) device_say_time(device, tick); /* who joins now knows it before the first point */
     take_events(device, work);
     work->n_events_before = work->n_events;
     if (device->scanning) {

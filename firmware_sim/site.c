@@ -142,14 +142,12 @@ static int find_bvh(struct site *site, const double station_m[3], const struct s
 }
 
 /* All places are known before the first BVH is built. */
-static int place_stations(struct site *site, const struct sh_report *report, struct sh_err *err)
+static int place_stations(struct site *site, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
-    int rc = placement_find_anchor(cfg, report, &site->anchor, err);
+    int rc = SH_OK;
     site->station = calloc(cfg->n_stations, sizeof *site->station);
-    if (rc == SH_OK && site->station == NULL)
-        rc = sh_fail(err, SH_ENOMEM, "no memory for %u stations", cfg->n_stations);
-    if (rc != SH_OK) return rc;
+    if (site->station == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %u stations", cfg->n_stations);
     site->n_stations = cfg->n_stations;
     for (uint32_t i = 0; i < cfg->n_stations && rc == SH_OK; i++) {
         site->station[i].station = &cfg->station[i];
@@ -208,12 +206,14 @@ int site_load(const struct config *cfg, const struct sh_report *report, struct s
     site->cfg = cfg;
     site->moving = config_head_moves(&cfg->platform);
     int rc = site_open_geoid(site, err);
+    /* before the scene: what is wrong with an IFC file's site is told rather than what follows from it */
+    if (rc == SH_OK) rc = placement_find_anchor(cfg, report, &site->anchor, err);
     if (rc == SH_OK) rc = load_scene(site, report, err);
-    if (rc == SH_OK) rc = place_stations(site, report, err);
+    if (rc == SH_OK) rc = place_stations(site, err);
     if (rc == SH_OK && site->moving) rc = site_load_platform(site, report, err);
     for (uint32_t i = 0; i < site->n_stations && rc == SH_OK; i++)
         rc = add_station(site, i, report, err);
-    if (rc == SH_OK) rc = site_choose_scale(site, err);
+    if (rc == SH_OK) rc = site_choose_scale(site, report, err);
     if (rc != SH_OK) {
         site_free(site);
         return rc;

@@ -117,7 +117,7 @@ static int scale_stations(struct site *site, double scale_m, struct sh_err *err)
 
 /* The finest 1e-6 x 10^n m with which the head's whole range fits into 31 bits, in the geo layout from anywhere on its
  * leg, with a hundredth left for noise, unless the configuration names a scale. */
-int site_choose_scale(struct site *site, struct sh_err *err)
+static int choose_scale(struct site *site, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
     if (cfg->scale_m > 0.0) return scale_stations(site, cfg->scale_m, err);
@@ -127,5 +127,29 @@ int site_choose_scale(struct site *site, struct sh_err *err)
     int rc = scale_stations(site, scale_m, err);
     while (rc != SH_OK && scale_m < 1.0)
         rc = scale_stations(site, scale_m *= 10.0, err);
+    return rc;
+}
+
+static double count_m(const struct site *site, const struct site_station *s)
+{
+    double most_m = 0.0;
+    if (s->leg == NULL) return georef_count_m(s->georef, reach_m(site, NULL), s->scale);
+    for (size_t i = 0; i < site->n_stretches; i++)
+        most_m = fmax(most_m, georef_count_m(s->leg[i].georef, reach_m(site, &site->stretch[i]), s->leg[i].scale));
+    return most_m;
+}
+
+int site_choose_scale(struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    int rc = choose_scale(site, err);
+    for (uint32_t i = 0; i < site->n_stations && rc == SH_OK && site->cfg->layout == LINE_GEO; i++) {
+        double most_m = count_m(site, &site->station[i]);
+        if (most_m > site->scale_m * (1.0 + 1e-9))
+            sh_warn(
+                report,
+                "station %s: a count of longitude is up to %.2g m, all others at most %g m: near a pole 360 degrees "
+                "have to fit into 31 bits",
+                site->station[i].station->name, most_m, site->scale_m);
+    }
     return rc;
 }

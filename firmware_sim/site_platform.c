@@ -5,16 +5,19 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What the head's own path may differ from the trajectory by, and how far apart its poses are at most. */
-static const double TOLERANCE_M = 1e-4;
+/* What the head's own path may differ from the trajectory by, and how far apart its poses are at most: the steps that a
+ * path is cut in for BVHs, and those of a recorded trajectory. */
+static const double TOLERANCE_M = 1e-4, LONGEST_M = 0.01;
 static const int64_t LONGEST_NS = 10000000;
 
 int site_open_trajectory(const struct site *site, struct site_part *part, struct sh_err *err)
 {
     const struct config_platform *p = &site->cfg->platform;
     double first_s, last_s;
-    int rc = p->file[0] != '\0' ? trajectory_read_csv(p->file, &part->trajectory, err)
-                                : trajectory_read_waypoints(p->waypoints, &part->trajectory, err);
+    int rc = p->file[0] != '\0'
+                 ? trajectory_read_csv(p->file, &part->trajectory, err)
+                 : trajectory_read_waypoints(p->waypoints, site->anchor.known ? &site->anchor.frame : NULL,
+                                             &part->trajectory, err);
     if (rc != SH_OK) return rc;
     trajectory_span(part->trajectory, &first_s, &last_s);
     part->start_s = first_s + p->start_s;
@@ -29,12 +32,17 @@ int site_open_trajectory(const struct site *site, struct site_part *part, struct
 
 static int load_knots(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
+    const struct config_platform *p = &site->cfg->platform;
     struct site_part part;
+    struct sh_err why;
     int rc = site_open_trajectory(site, &part, err);
     if (rc != SH_OK) return rc;
-    rc = trajectory_knots(part.trajectory, part.start_s, part.end_s, &site->mount, TOLERANCE_M, LONGEST_NS, &site->knot,
-                          &site->n_knots, &site->knot_error_m, err);
+    rc = trajectory_knots(part.trajectory, part.start_s, part.end_s, &site->mount, TOLERANCE_M, LONGEST_NS, LONGEST_M,
+                          &site->knot, &site->n_knots, &site->knot_error_m, &why);
     trajectory_free(part.trajectory);
+    if (rc != SH_OK)
+        return sh_fail(err, rc, "%s: platform.%s: %.300s", site->cfg->file, p->file[0] != '\0' ? "file" : "waypoints",
+                       why.text);
     if (rc == SH_OK && site->knot_error_m > TOLERANCE_M * 1.001)
         sh_warn(report,
                 "the trajectory bends more than poses %g ms apart can follow: the head is off it by up to %.2g m",

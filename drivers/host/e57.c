@@ -102,6 +102,12 @@ static int end_scan(struct e57 *e, struct sh_err *err)
     return rc;
 }
 
+static void set_start(struct e57 *e)
+{
+    e->scan->have_start = scanhead_gps_time(e->track.sh, 0, &e->scan->start_gps_s) == 0;
+    e->scan->start_gps_s += 1e9; /* adjusted time is that much less */
+}
+
 static int begin_scan(void *rec, struct sh_err *err)
 {
     static const uint8_t blank[SECTION_HEADER_LEN];
@@ -126,8 +132,7 @@ static int begin_scan(void *rec, struct sh_err *err)
     e->scan->scale_m = e->track.scale_m;
     snprintf(e->scan->idn, sizeof e->scan->idn, "%s", info->idn);
     snprintf(e->scan->profile, sizeof e->scan->profile, "%s", info->profile);
-    e->scan->have_start = scanhead_gps_time(e->track.sh, 0, &e->scan->start_gps_s) == 0;
-    e->scan->start_gps_s += 1e9; /* adjusted time is that much less */
+    set_start(e);
     e->facts.epsg = track_epsg(&e->track);
     e->facts.geoid_heights = track_is_geoid(&e->track);
     return e57_put(&e->pages, blank, sizeof blank, err);
@@ -210,6 +215,7 @@ static void put_index(struct e57 *e, const struct scanhead_point *p, uint32_t ro
 static int e57_points(void *rec, int n, struct sh_err *err)
 {
     struct e57 *e = rec;
+    if (!e->scan->have_start) set_start(e); /* the time may come late */
     for (int i = 0; i < n; i++) {
         const struct scanhead_point *p = &e->track.point[i];
         if (p->echo_count == 0 && !e->facts.empty_shots) continue;

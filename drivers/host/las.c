@@ -25,7 +25,7 @@ struct las {
     struct track track;
     struct las_facts facts;
     const struct sh_report *report;
-    int begun;
+    int begun, time_came_late;
     size_t front_len;
     uint64_t n_empty;
 };
@@ -193,6 +193,9 @@ static int las_points(void *rec, int n, struct sh_err *err)
     uint8_t *to = outfile_room(&las->file, TRACK_BATCH * LAS_POINT_LEN, err), *at = to;
     if (to == NULL) return SH_EIO;
     int rc = 0;
+    double s;
+    if (!las->facts.gps_time && !las->time_came_late)
+        las->time_came_late = scanhead_gps_time(las->track.sh, 0, &s) == 0;
     for (int i = 0; i < n; i++) {
         const struct scanhead_point *p = &las->track.point[i];
         if (p->echo_count == 0) {
@@ -231,6 +234,11 @@ static int las_close(void *rec, int keep, struct sh_err *err)
     if (keep && rc == 0 && las->n_empty > 0)
         sh_warn(las->report, "%s: %llu shots without echo left out, for which LAS has no place", las->file.path,
                 (unsigned long long)las->n_empty);
+    if (keep && rc == 0 && las->time_came_late)
+        sh_warn(las->report,
+                "%s: times count from the scan's start: what the head said of its clock was lost before the first "
+                "points",
+                las->file.path);
     if (keep && rc == 0) track_tell(&las->track, las->report);
     int closed = outfile_close(&las->file, keep && rc == 0, err);
     free(las);

@@ -118,6 +118,15 @@ static size_t put_ascii(char *to, const struct scanhead_point *p, int degrees, u
     return n;
 }
 
+/* The time may come late. */
+static void set_gps(struct ply *ply)
+{
+    struct ply_facts *facts = &ply->facts;
+    if (facts->have_gps || ply->track.n_scans != 1) return;
+    facts->have_gps = scanhead_gps_time(ply->track.sh, 0, &facts->gps_s) == 0;
+    facts->gps_s += 1e9; /* adjusted time is that much less */
+}
+
 /* Room for the header is made when the head has told how many surfaces there are. */
 static int ply_scan(void *rec, struct sh_err *err)
 {
@@ -142,6 +151,7 @@ static int ply_points(void *rec, int n, struct sh_err *err)
     uint8_t *to = outfile_room(&ply->file, TRACK_BATCH * TEXT_LEN, err);
     if (to == NULL) return SH_EIO;
     size_t used = 0;
+    set_gps(ply);
     for (int i = 0; i < n; i++) {
         struct scanhead_point p = t->point[i];
         const double *frame = t->info.moving ? &t->frame[i] : t->info.stop ? &t->info.frame : NULL;

@@ -13,6 +13,8 @@ struct ply_facts {
     uint64_t n_vertices, n_unplaced; /* points before their descriptor and anchor were seen */
     uint64_t n_without_pose;         /* points of a moving head whose pose was lost */
     int have_crs, crs, epsg, moving, stops, geoid_heights;
+    int have_gps;
+    double gps_s; /* GPS time of the first scan's start */
     char idn[96], profile[32];
     struct scanhead_stats stats;
 };

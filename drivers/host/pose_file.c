@@ -4,7 +4,7 @@
  * beside it (station_pose.h; at stops with the frame scalar, too), whose coordinates are not-a-number where they are
  * geodetic, and the axes then east, north, up. Of a head that moves, one row per pose, each time once, in the scene
  * frame, times since the scan's start: a trajectory file of its own (core/pose.h). Gaps, where frames were lost, are
- * lines of comment. */
+ * lines of comment, and so is what links the scene frame to the CRS of the geo layout. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -82,6 +82,26 @@ static int put(struct pose_file *file, const struct scanhead_pose *p, struct sh_
     return outfile_write(&file->out, line, (size_t)n, err);
 }
 
+/* Poses are in the scene frame; where the points are in a CRS: what links the two, as comments. */
+static int put_link(struct pose_file *file, const struct scanhead_info *info, struct sh_err *err)
+{
+    char text[4 * LINE];
+    const double *p = info->station_m, *r = info->axes;
+    static const char *const to[] = {[NATIVE_CRS_ECEF] = "ECEF X Y Z",
+                                     [NATIVE_CRS_UTM] = "easting, northing, height",
+                                     [NATIVE_CRS_GEODETIC] = "east, north, up"};
+    if (!info->geo || info->crs == NATIVE_CRS_LOCAL) return SH_OK;
+    int n = snprintf(text, sizeof text,
+                     "# poses are in the scene frame, points recorded beside them in EPSG %d\n"
+                     "# scene point x_m,y_m,z_m is at lat_deg,lon_deg,ellipsoidal height_m: %.15g,%.15g,%.15g: "
+                     "%.15g,%.15g,%.15g\n"
+                     "# scene axes to %s, row by row, where the path begins: "
+                     "%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g\n",
+                     info->epsg, p[0], p[1], p[2], info->lat_deg, info->lon_deg, info->height_m, to[info->crs], r[0],
+                     r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8]);
+    return outfile_write(&file->out, text, (size_t)n, err);
+}
+
 static int put_poses(struct pose_file *file, struct scanhead *sh, const struct scanhead_frame *frame,
                      struct sh_err *err)
 {
@@ -90,6 +110,7 @@ static int put_poses(struct pose_file *file, struct scanhead *sh, const struct s
     int n, rc = put_title(file, MOVING, err);
     if (scanhead_get_info(sh, &info) != SCANHEAD_OK) return SH_OK; /* whose scan it is isn't known yet */
     if (!file->begun || info.scan != file->scan) file->last_ns = INT64_MIN;
+    if (rc == SH_OK && !file->begun) rc = put_link(file, &info, err);
     file->begun = 1;
     file->scan = info.scan;
     for (uint32_t first = 0; (n = scanhead_poses(sh, frame, first, pose, BATCH)) > 0 && rc == SH_OK;

@@ -83,7 +83,8 @@ enum scanhead_event_code {
     SCANHEAD_EV_ERROR = 7,
     SCANHEAD_EV_SETTINGS = 8,
     SCANHEAD_EV_POSE_LATE = 9,
-    SCANHEAD_EV_PPS = 10, /* a full second: UTC (s since 1970), device time of the edge (ns), GPS time (s) */
+    SCANHEAD_EV_PPS = 10,  /* a full second: UTC (s since 1970), device time of the edge (ns), GPS time (s) */
+    SCANHEAD_EV_TIME = 11, /* before each repeated descriptor: 0, device time (ns), its GPS time (ns) */
 };
 
 struct scanhead_frame {
@@ -177,9 +178,10 @@ int scanhead_to_scene(struct scanhead *sh, struct scanhead_point *points, uint32
 /* GPS time of t_ns since the scan's start (scanhead_point.t_ns) by the head's clock, in LAS's adjusted standard form:
  * seconds since 1980-01-06T00:00:00Z without leap seconds, less 1e9. Add 1e9 and divide by 604800 for week and second
  * of week. Good for frames up to the one that scanhead_next returned last: it goes by the last time the head told (at
- * the scan's start and each second; scanhead_frame.event SCAN_START, PPS), exact to the ns where the head's clock has
- * no drift; a double of that size has steps of 0.12 us. SCANHEAD_ESTATE where the head doesn't know the time, or before
- * it and the scan's start were seen, which takes a second at most. */
+ * the scan's start and each second; scanhead_frame.event SCAN_START, PPS, TIME), exact to the ns where the head's clock
+ * has no drift; a double of that size has steps of 0.12 us. SCANHEAD_ESTATE where the head doesn't know the time, or
+ * before it and the scan's start were seen; where the head knows it, it is there with the first points that can be
+ * placed. */
 int scanhead_gps_time(const struct scanhead *sh, int64_t t_ns, double *adjusted_standard_gps_time_s);
 
 /* Name of a label: 1 and the two names (owned by the handle), or 0 when not seen yet. */

@@ -76,6 +76,7 @@ static void absorb_time(struct scanhead *sh, const struct native_event *event)
         set_gps(sh, event->b, event->c);
         sh->have_gps = event->c != 0;
     }
+    if (event->code == NATIVE_EV_TIME) set_gps(sh, event->b, event->c);
     if (event->code == NATIVE_EV_PPS) set_gps(sh, event->b, event->c * 1000000000u);
 }
 

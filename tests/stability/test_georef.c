@@ -205,6 +205,43 @@ static const struct row POLES[] = {
     {"geodetic, 1.5 km from the pole", "order 1", GEODETIC(AT(89.9865, -100.0, 0.0)), 500.0, order1, 4979},
 };
 
+/* What rounding to counts costs in latitude and height, on the ground. */
+static double rounding_m(const struct georef *georef, const double scale[3], double reach_m)
+{
+    const double unit_m[3] = {111694.0, 0.0, 1.0}; /* of a degree of latitude, where it is longest */
+    double most_m = 0.0;
+    for (uint64_t i = 0; i < 1000; i++) {
+        double angle = 2.0 * M_PI * spread(i, 0), out[3];
+        const double d[3] = {reach_m * spread(i, 2) * cos(angle), reach_m * spread(i, 2) * sin(angle), spread(i, 1)};
+        exactly(georef, d, out);
+        for (int k = 0; k < 3; k++) {
+            assert_true(fabs(out[k] / scale[k]) < 2147483647.0);
+            most_m = fmax(most_m, unit_m[k] * fabs(round(out[k] / scale[k]) * scale[k] - out[k]));
+        }
+    }
+    return most_m;
+}
+
+/* Only degrees of longitude need longer counts where all of them are near: half a micrometre elsewhere. */
+static void test_counts_at_the_pole(void **state)
+{
+    (void)state;
+    const struct georef_spec spec = {.crs = GEOREF_GEODETIC, AT(90.0, 0.0, 3.0)};
+    const double reach_m = 2020.0;
+    struct georef *georef;
+    struct sh_err err;
+    double scale[3], shared[3];
+    assert_int_equal(georef_create(&spec, &georef, &err), SH_OK);
+    if (georef_scale(georef, 1e-6, reach_m, scale, &err) != SH_OK) fail_msg("%s", err.text);
+    assert_int_equal(georef_scale(georef, 1e-5, reach_m, shared, &err), SH_OK); /* the next that holds them as it is */
+    /* 2 pi 2020 m / 2^31 are 5.9 um */
+    assert_true(georef_count_m(georef, reach_m, scale) < 6e-6 && shared[1] > scale[1]);
+    table_row("geodetic, at the pole: counts, 2 km", "one scale for all axes", rounding_m(georef, shared, reach_m),
+              rounding_m(georef, scale, reach_m), 0.5001e-6, "m");
+    georef_free(georef);
+    table_check();
+}
+
 static void test_poles(void **state)
 {
     (void)state;
@@ -335,10 +372,8 @@ int main(void)
 {
     table_head("stability: georeferencing; the default within 2 km, by the method it takes");
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_poles),
-        cmocka_unit_test(test_zones),
-        cmocka_unit_test(test_heights),
-        cmocka_unit_test(test_far_from_anchor),
+        cmocka_unit_test(test_poles),   cmocka_unit_test(test_counts_at_the_pole), cmocka_unit_test(test_zones),
+        cmocka_unit_test(test_heights), cmocka_unit_test(test_far_from_anchor),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -104,12 +104,54 @@ static void test_degrees(void **state)
     }
 }
 
+/* --crs says that points are to be in it: no recording in the scene frame instead. */
+static void test_crs(void **state)
+{
+    struct wire *wire = *state;
+    char config[352], path[352];
+    begin(wire, config);
+    snprintf(path, sizeof path, "%s", wire_path(wire, "a.ply"));
+    const char *args[] = {"record",  config,
+                          "-o",      path,
+                          "--crs",   "utm",
+                          "--set",   "stations[0].lat_deg=50",
+                          "--set",   "stations[0].lon_deg=8",
+                          "--set",   "stations[0].height_m=100",
+                          "--quiet", NULL,
+                          NULL,      NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+    char *ply = wire_read(path, NULL);
+    assert_non_null(strstr(ply, "\ncomment epsg 32632\n")); /* 6 to 12 degrees east is zone 32 */
+    free(ply);
+    remove(path);
+    args[13] = "--set";
+    args[14] = "output.layout=polar";
+    expect_refusal(wire, args, "output.layout is polar");
+}
+
+/* --duration ends each scan, not the row of stations. */
+static void test_duration_of_each(void **state)
+{
+    struct wire *wire = *state;
+    char config[352], path[352], stats[352];
+    begin(wire, config);
+    snprintf(path, sizeof path, "%s", wire_path(wire, "a.ply"));
+    snprintf(stats, sizeof stats, "%s", wire_path(wire, "stats.json"));
+    const char *const args[] = {"record",  config,       "-o",      path,    "--station",
+                                "all",     "--duration", "0.05",    "--set", "stations.1.position_m=[1, 0, 0]",
+                                "--stats", stats,        "--quiet", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+    assert_int_equal(stats_uint(wire, "scans"), 2);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_same_file, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_no_file, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_degrees, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_crs, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_duration_of_each, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests_name("record files", tests, NULL, NULL);
 }

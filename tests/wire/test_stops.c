@@ -219,6 +219,7 @@ static void test_files(void **state)
         unsigned station;
         double scalar;
         end = strchr(row, '\n');
+        *end = 0; /* sscanf measures all of its text first */
         assert_int_equal(sscanf(row, "%*f %*f %*f %*f %*s %*f %*u %*u %*u %u %lf%n", &station, &scalar, &used), 2);
         assert_true(row + used == end && scalar == 110 + 2.5 * (station - 1));
     }

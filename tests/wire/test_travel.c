@@ -3,6 +3,7 @@
 #include "tests/wire/room.h"
 
 #include "core/geoframe.h"
+#include "core/pose.h"
 
 static const struct georef_place PLACE = {52.5, 13.4, 80.0};
 static const double NORTH_DEG = 30.0, WAY_M = 30000.0, STRETCH_M = 2000.0;
@@ -235,11 +236,67 @@ static void test_lost_anchor(void **state)
     free(holed);
 }
 
+/* The poses of a recording in ECEF, which are in the scene frame: by what the file says of it, each comes to where
+ * GeographicLib has it; and the file is a trajectory still. ECEF is rigid: only roundings of 7e6 m remain. */
+static void test_poses_beside_a_crs(void **state)
+{
+    struct wire *wire = *state;
+    char config[352], path[352];
+    double at[3], place[3], r[9], base[3], anchor[3];
+    static const double origin[3] = {0, 0, 0};
+    write_drive(wire, config);
+    snprintf(path, sizeof path, "%s", wire_path(wire, "a.poses.csv"));
+    const char *const args[] = {"record",           config,       "-o", path,      "--crs", "ecef", "--set",
+                                "head.prr_hz=1000", "--duration", "1",  "--quiet", NULL};
+    if (wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)) != 0) wire_show(wire, "err");
+    char *text = wire_read(path, NULL), *line = strstr(text, "EPSG 4978\n# scene point");
+    assert_non_null(line);
+    line = strstr(line, "height_m: ");
+    assert_int_equal(
+        sscanf(line, "height_m: %lf,%lf,%lf: %lf,%lf,%lf", &at[0], &at[1], &at[2], &place[0], &place[1], &place[2]), 6);
+    line = strstr(line, "begins: ");
+    assert_int_equal(sscanf(line, "begins: %lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf", &r[0], &r[1], &r[2], &r[3], &r[4],
+                            &r[5], &r[6], &r[7], &r[8]),
+                     9);
+    struct geoframe frame;
+    struct georef_spec spec = {.crs = GEOREF_ECEF},
+                       there = {.crs = GEOREF_ECEF, .lat_deg = place[0], .lon_deg = place[1], .height_m = place[2]};
+    struct georef *truth, *point;
+    struct sh_err err;
+    assert_int_equal(geoframe_set_tangent(&frame, origin, &PLACE, NORTH_DEG, &err), SH_OK);
+    assert_int_equal(geoframe_fill(&frame, origin, &spec, &err), SH_OK);
+    assert_int_equal(georef_create(&spec, &truth, &err), SH_OK);
+    assert_int_equal(georef_create(&there, &point, &err), SH_OK);
+    georef_anchor(point, base);
+    georef_anchor(truth, anchor);
+    int n = 0;
+    for (char *row = strchr(line, '\n') + 1; *row != 0; row = strchr(row, '\n') + 1, n++) {
+        double p[3], want[3];
+        assert_int_equal(sscanf(row, "%*u,%*f,%lf,%lf,%lf", &p[0], &p[1], &p[2]), 3);
+        georef_forward(truth, 1, &p[0], &p[1], &p[2], &want[0], &want[1], &want[2]);
+        for (int k = 0; k < 3; k++) {
+            double got = base[k] - anchor[k];
+            for (int j = 0; j < 3; j++)
+                got += r[3 * k + j] * (p[j] - at[j]);
+            assert_true(fabs(got - want[k]) < 1e-7);
+        }
+    }
+    assert_true(n > 10);
+    struct trajectory *trajectory;
+    int rc = trajectory_read_csv(path, &trajectory, &err);
+    if (rc != SH_OK) fail_msg("%s", err.text);
+    trajectory_free(trajectory);
+    georef_free(truth);
+    georef_free(point);
+    free(text);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_anchor_moves, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_lost_anchor, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_poses_beside_a_crs, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
