@@ -14,12 +14,16 @@ Q = $(Q_$(V))
 
 # What a fresh Debian 12 needs. Building and the demo:
 DEPS_BUILD = gcc g++ make pkg-config libc6-dev libembree-dev libassimp-dev libgeographiclib-dev libyaml-dev libpng-dev \
-	nettle-dev assimp-testmodels
+	nettle-dev libusb-1.0-0-dev libusbredirparser-dev assimp-testmodels
 # and the tests, with the second compiler and its sanitizers, clients and readers of recordings that are not ours:
 DEPS_TEST = $(DEPS_BUILD) libcmocka-dev clang libclang-rt-dev gpsd gpsd-clients cloudcompare proj-bin python3-minimal \
 	$(if $(shell command -v npm),,nodejs npm)
+# The guest tests; they are skipped where these can't be had. The kernel (linux-image-amd64) is fetched, not installed.
+DEPS_GUEST = qemu-system-x86 busybox-static cpio kmod xz-utils usbutils usbip
 
-PKGS = yaml-0.1 libpng nettle
+# Without libusbredirparser everything builds but the back end that needs it.
+USBREDIR = $(eval USBREDIR := $$(shell pkg-config --exists libusbredirparser-0.5 && echo libusbredirparser-0.5))$(USBREDIR)
+PKGS = yaml-0.1 libpng nettle libusb-1.0 $(USBREDIR)
 PKG_CFLAGS = $(eval PKG_CFLAGS := $$(shell pkg-config --cflags $(PKGS)))$(PKG_CFLAGS)
 PKG_LIBS = $(eval PKG_LIBS := $$(shell pkg-config --libs $(PKGS)))$(PKG_LIBS)
 OPT ?= -O3 $(VEC_WIDTH)
@@ -33,7 +37,8 @@ SAN ?=
 # No contraction to FMA: the same numbers on every instruction set. errno and traps of libm are not used.
 FP = -ffp-contract=off -fno-math-errno -fno-trapping-math
 HEADS_DIR = $(PREFIX)/share/scanhead/heads
-ALL_CPPFLAGS = -I. -D_GNU_SOURCE -MMD -MP $(CPPFLAGS)
+UDEV_DIR = $(PREFIX)/lib/udev/rules.d
+ALL_CPPFLAGS = -I. -D_GNU_SOURCE $(if $(USBREDIR),-DHAVE_USBREDIR) -MMD -MP $(CPPFLAGS)
 ALL_CFLAGS = -std=c11 $(OPT) -g $(FP) $(CWARN) $(WERROR) -fPIC -pthread $(SAN) $(PKG_CFLAGS) $(CFLAGS)
 ALL_CXXFLAGS = -std=c++17 $(OPT) -g $(FP) $(WARN) $(WERROR) -fPIC -pthread $(SAN) $(CXXFLAGS)
 EMBREE = $(if $(wildcard /usr/include/embree4/rtcore.h),-lembree4,-lembree3)
@@ -43,12 +48,12 @@ CORE = $(wildcard core/*.c core/*/*.c) core/georef/geographiclib_shim.cpp
 PROTO = $(wildcard drivers/protocol/*.c)
 HOST = $(wildcard drivers/host/*.c)
 FIRM = $(filter-out firmware_sim/main.c,$(wildcard firmware_sim/*.c))
-SRC = $(CORE) $(PROTO) $(HOST) $(wildcard drivers/link/*.c) $(FIRM)
+SRC = $(CORE) $(PROTO) $(HOST) $(wildcard drivers/link/*.c) $(wildcard drivers/usb/*.c) $(FIRM)
 OBJ = $(SRC:%=$(BUILD)/%.o)
 LIBOBJ = $(patsubst %,$(BUILD)/%.o,core/err.c $(PROTO) $(HOST))
 PROGRAMS = $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/$(1)/test_*.c))
 UNIT = $(call PROGRAMS,unit)
-TESTS = $(UNIT) $(call PROGRAMS,wire) $(call PROGRAMS,accuracy) $(call PROGRAMS,stability)
+TESTS = $(UNIT) $(call PROGRAMS,wire) $(call PROGRAMS,accuracy) $(call PROGRAMS,stability) $(call PROGRAMS,guest)
 EVERYTHING = $(OBJ) $(BUILD)/firmware_sim/main.c.o
 
 all: $(BUILD)/scanhead $(BUILD)/libscanhead.a $(BUILD)/libscanhead.so
@@ -73,7 +78,7 @@ $(BUILD)/libscanhead.a: $(LIBOBJ)
 $(BUILD)/libscanhead.so: $(LIBOBJ) drivers/host/libscanhead.map
 	@echo "  LD    $@"
 	$(Q)$(CC) -shared $(SAN) -Wl,--version-script=drivers/host/libscanhead.map -Wl,-soname,libscanhead.so.1 \
-		-o $@ $(LIBOBJ) -lnettle -lm
+		-o $@ $(LIBOBJ) -lnettle -lusb-1.0 -lm
 $(BUILD)/scanhead: $(BUILD)/firmware_sim/main.c.o $(BUILD)/modules.a
 	@echo "  LD    $@"
 	$(Q)$(CC) $(SAN) -o $@ $^ $(LDLIBS)
@@ -84,6 +89,12 @@ $(BUILD)/tests/%: tests/%.c $(BUILD)/modules.a $$(call BESIDE,$$(*D))
 	@mkdir -p $(@D)
 	@echo "  TEST  $@"
 	$(Q)$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -MF $@.d -o $@ $< $(call BESIDE,$(*D)) $(BUILD)/modules.a -lcmocka $(LDLIBS)
+
+# What runs in the guest has the client library alone: it starts faster there.
+$(BUILD)/tests/guest/%: tests/guest/%.c $(BUILD)/libscanhead.a
+	@mkdir -p $(@D)
+	@echo "  TEST  $@"
+	$(Q)$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -MF $@.d -o $@ $< $(BUILD)/libscanhead.a -lcmocka -lnettle -lusb-1.0 -lm -pthread
 
 # ---- what is missing, and only that
 define install_missing
@@ -105,6 +116,9 @@ $(READERS)/installed: $(wildcard tests/readers/*) | deps-test
 	else echo "npm could not install the readers for LAS and E57 ($(@D)/npm.log): their tests will be skipped"; fi
 deps-test:
 	$(call install_missing,$(DEPS_TEST))
+	@$(MAKE) --no-print-directory deps-guest || echo "the guest tests will be skipped"
+deps-guest:
+	$(call install_missing,$(DEPS_GUEST))
 deps-build:
 	$(call install_missing,$(DEPS_BUILD))
 
@@ -121,9 +135,20 @@ test: deps
 	@$(MAKE) --no-print-directory -j2 $(CLANG) objects
 	@$(MAKE) --no-print-directory -j2 $(ASAN) all test-unit-programs
 	@SCANHEAD=$(BUILD)/test/scanhead READERS=$(READERS) sh tests/run_all.sh $(BUILD)
-test-unit test-wire test-accuracy test-stability: deps
+test-unit test-wire test-accuracy test-stability test-guest: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test test-programs
 	@SCANHEAD=$(BUILD)/test/scanhead READERS=$(READERS) sh tests/run_all.sh $(BUILD) $(@:test-%=%)
+
+# The other end of a usbredir channel goes, comes back and resets 1,000 times (`make test`: 20).
+soak-usb: deps
+	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test all $(BUILD)/test/tests/wire/test_usb_soak
+	@USB_SOAK_EVENTS=1000 SCANHEAD=$(BUILD)/test/scanhead $(BUILD)/test/tests/wire/test_usb_soak
+
+# A million pulses over each kind of USB, each with the hash that TCP gives: some minutes in an emulated machine.
+test-usb-million: deps
+	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test test-programs
+	@SCANHEAD=$(BUILD)/test/scanhead BUILD=$(BUILD) GUEST_PAN_DEG_S=0.4 GUEST_LIMIT_S=900 \
+		bash tests/run_tap.sh -t 1800 tests/guest/guest.sh
 
 # ---- figures: speed and leaks; speed against accuracy, each method
 DEPS_CHART = gnuplot-nox
@@ -135,7 +160,8 @@ bench: deps-build
 CHART = $(BUILD)/chart/speed_accuracy
 $(BUILD)/tests/bench/chart: tests/bench/chart.c tests/bench/reference.c $(BUILD)/modules.a
 $(BUILD)/tests/bench/chart_georef: tests/bench/chart_georef.c $(BUILD)/modules.a
-CHARTS = $(BUILD)/tests/bench/chart $(BUILD)/tests/bench/chart_georef
+$(BUILD)/tests/bench/chart_widths: tests/bench/chart_widths.c $(BUILD)/modules.a
+CHARTS = $(BUILD)/tests/bench/chart $(BUILD)/tests/bench/chart_georef $(BUILD)/tests/bench/chart_widths
 $(CHARTS):
 	@mkdir -p $(@D)
 	@echo "  CHART $@"
@@ -146,23 +172,27 @@ chart: deps-build
 	@mkdir -p $(BUILD)/chart
 	$(BUILD)/tests/bench/chart > $(CHART).csv
 	$(BUILD)/tests/bench/chart_georef >> $(CHART).csv
+	$(BUILD)/tests/bench/chart_widths >> $(CHART).csv
 	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)'" tests/bench/chart.gp
 objects: $(EVERYTHING)
 test-unit-programs: $(UNIT)
 test-programs: all $(TESTS)
 
 install: all
-	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib $(DESTDIR)$(PREFIX)/include $(DESTDIR)$(HEADS_DIR)
+	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib $(DESTDIR)$(PREFIX)/include $(DESTDIR)$(HEADS_DIR) \
+		$(DESTDIR)$(UDEV_DIR)
 	install $(BUILD)/scanhead $(DESTDIR)$(PREFIX)/bin/
 	install -m 644 $(BUILD)/libscanhead.a $(DESTDIR)$(PREFIX)/lib/
 	install $(BUILD)/libscanhead.so $(DESTDIR)$(PREFIX)/lib/libscanhead.so.1
 	ln -sf libscanhead.so.1 $(DESTDIR)$(PREFIX)/lib/libscanhead.so
 	install -m 644 drivers/host/scanhead.h $(DESTDIR)$(PREFIX)/include/
 	install -m 644 config/heads/*.yaml $(DESTDIR)$(HEADS_DIR)/
+	install -m 644 drivers/host/70-scanhead.rules $(DESTDIR)$(UDEV_DIR)/
 format:
 	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')
 clean:
 	rm -rf $(BUILD)
-.PHONY: all deps deps-test deps-build demo test test-unit test-wire test-accuracy test-stability objects test-unit-programs test-programs bench chart install format clean
+.PHONY: all deps deps-test deps-build deps-guest demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb \
+	test-usb-million objects test-unit-programs test-programs bench chart install format clean
 .SECONDARY:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)

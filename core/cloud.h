@@ -44,13 +44,17 @@ struct cloud_site {
     const struct georef *const
         *georef; /* [n_stations], by station - 1; NULL: the cloud is in the scene frame already */
     uint32_t n_stations;
-    double max_m;     /* how far to look */
+    double max_m; /* how far to look */
+    /* Bodies that do not stand in the scene; NULL: there are none. Takes a point of such a body's label from the scene
+     * to the body's own frame and gives the body's index; NULL: the point is of the scene. From any thread. */
+    const struct distance *(*body)(void *ctx, unsigned station, uint16_t label, double p_prcs[3]);
+    void *body_ctx;
     unsigned threads; /* at least 1; the result does not depend on it */
 };
 
 /* Per point: its distance from the nearest triangle (not-a-number: shot without echo; INFINITY: nothing
- * within max_m) and that triangle's number, or CLOUD_TRIANGLE_NONE. Points without a station are of the first
- * one. SH_EINPUT: a point's station is not among n_stations. */
+ * within max_m) and that triangle's number, or CLOUD_TRIANGLE_NONE, also for a body's. Points without a station are of
+ * the first one. SH_EINPUT: a point's station is not among n_stations. */
 int cloud_compare(const struct cloud *cloud, const struct cloud_site *site, const struct sh_report *report,
                   double *distance_m, uint32_t *triangle, struct sh_err *err);
 
@@ -62,9 +66,9 @@ struct cloud_coverage {
  * there is no such triangle. */
 uint16_t cloud_surface(const struct cloud *cloud, const struct scene *scene, const uint32_t *triangle, size_t i);
 
-/* How many of the scene's surfaces and triangles have points (far ones have no triangle).
- * SH_EINPUT: a label the scene doesn't have. */
-int cloud_cover(const struct cloud *cloud, const struct scene *scene, const uint32_t *triangle,
+/* How many of the n_surfaces, the scene's and then those of bodies, and of the scene's triangles have points (far ones
+ * have no triangle). SH_EINPUT: a label of n_surfaces or more. */
+int cloud_cover(const struct cloud *cloud, const struct scene *scene, uint32_t n_surfaces, const uint32_t *triangle,
                 struct cloud_coverage *out, struct sh_err *err);
 
 /* A percentile is the nearest rank: the smallest value that at least so many of all do not exceed. Mean, RMS,

@@ -16,6 +16,7 @@ enum sh_code {
     SH_ECLOSED = -6,  /* the other end is gone */
     SH_EFORMAT = -7,  /* bytes that are not what the protocol says */
     SH_ESTATE = -8,   /* not possible in the present state */
+    SH_ELOST = -9,    /* a device is not there, or not any more */
 };
 
 struct sh_err {

@@ -12,10 +12,11 @@
  *   geodetic  latitude and longitude in degrees, height; longitude differences the short way round, in -180..180
  *
  * Methods: exact calls GeographicLib for each point (about 0.2 us for geodetic, 0.9 us for utm); order 1, 2, 3 evaluate
- * its Taylor polynomial about the centre in a few ns, within georef_bound_m. Only what is not linear has them: local,
- * ecef from a metric frame, and a grid that the scene is in are exact whatever the method.
- * Heights are ellipsoidal, or with a geoid above it (interpolated for each point: exact only).
- * Thread: a georef is constant after creation and georef_set_method. */
+ * its Taylor polynomial about the centre in a few ns, within georef_bound_m; order 5 too, where heights stay what they
+ * are (a grid to another one or to geodetic). In geodetic output longitude is no polynomial but closed, which holds to
+ * some radii of the scene from a pole (polynomial.h). Only what is not linear has them: local, ecef from a metric
+ * frame, and a grid that the scene is in are exact whatever the method. Heights are ellipsoidal, or with a geoid above
+ * it (interpolated for each point: exact only). Thread: a georef is constant after creation and georef_set_method. */
 #ifndef CORE_GEOREF_H
 #define CORE_GEOREF_H
 
@@ -24,16 +25,20 @@
 #include "core/err.h"
 
 enum georef_crs { GEOREF_LOCAL, GEOREF_ECEF, GEOREF_UTM, GEOREF_GEODETIC };
-enum georef_method { GEOREF_AUTO, GEOREF_EXACT, GEOREF_ORDER1, GEOREF_ORDER2, GEOREF_ORDER3 };
+enum georef_method { GEOREF_AUTO, GEOREF_EXACT, GEOREF_ORDER1, GEOREF_ORDER2, GEOREF_ORDER3, GEOREF_ORDER5 };
 
 struct georef_geoid;
+
+/* As a zone where 0 means by position. */
+enum { GEOREF_UPS = -1 };
 
 struct georef_spec {
     enum georef_crs crs;
     double station_m[3];     /* the head's origin in prcs */
     double lat_deg, lon_deg; /* geodetic, WGS 84, of the head's origin */
     double height_m;         /* ellipsoidal, whatever the output's heights are */
-    int utm_zone;            /* 1..60, or 0: by position */
+    int utm_zone;            /* 1..60, GEOREF_UPS, or 0: by position */
+    int side;                /* utm: hemisphere of the false northing; 1: north, -1: south, 0: by position */
     /* How prcs lies at the station, where it is not its tangent frame (see core/geoframe.h): */
     double rotation[9]; /* differences in prcs -> east, north, up at the station, row by row; all 0: the same axes */
     int prcs_is_grid;   /* 1: prcs is easting, northing, height of a grid, and station_m the station's */
@@ -123,9 +128,13 @@ void georef_difference(const struct georef *georef, const double p_crs[3], doubl
 
 /* Units of the CRS per count, so that a count is at most scale_m on the ground (utm, ecef, local: just scale_m, of the
  * grid) for points within reach_m of the centre, and so that these fit into 31 bits and a sign. Degrees of longitude
- * have a scale of their own: near a pole they are long in degrees and short on the ground. SH_EINPUT, naming the
- * smallest scale_m that would do, where they don't fit. */
+ * have a scale of their own: near a pole they are long in degrees and short on the ground, and where up to 360 of them
+ * don't fit otherwise, that scale alone is coarser, up to 2 pi reach_m / 2^31 on the ground. SH_EINPUT, naming the
+ * smallest scale_m that would do, where the others don't fit. */
 int georef_scale(const struct georef *georef, double scale_m, double reach_m, double scale[3], struct sh_err *err);
+/* The longest that a count of these is within reach_m, metres (on the ground, or of the grid): scale_m, or what
+ * longitude has. */
+double georef_count_m(const struct georef *georef, double reach_m, const double scale[3]);
 
 /* A point east, north and up (metres) in the tangent frame at a place on WGS 84 -> its own latitude and longitude (deg,
  * longitude -180..180) and ellipsoidal height (m). GeographicLib's LocalCartesian; for single points, not for speed. */

@@ -18,7 +18,7 @@ struct locate_grid {
     double convergence_deg; /* bearing of grid north, clockwise from true north */
     double scale;           /* grid metres per metre on the ellipsoid */
 };
-/* zone: 1..60, or 0: by position, UPS beyond 84 N and 80 S. Checks the place. */
+/* zone: 1..60, GEOREF_UPS, or 0: by position, UPS beyond 84 N and 80 S. Checks the place. */
 int locate_in_grid(const struct georef_place *place, int zone, struct locate_grid *out, struct sh_err *err);
 
 #endif

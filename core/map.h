@@ -23,7 +23,7 @@ enum {
     MAP_DEFAULT_PX = 1200,     /* longer side of the map where the pixel size is not given */
     MAP_MAX_SIDE_PX = 16384,   /* longest side of the map */
     MAP_MAX_PIXELS = 16777216, /* of the map: 16 bytes each while it is made, 256 MiB */
-    MAP_MAX_STATIONS = 64,
+    MAP_MAX_STATIONS = 4096,
     MAP_MIN_WIDTH_PX = 512, /* of the image; a narrower map is centred */
 };
 

@@ -23,6 +23,7 @@
 #include <stdint.h>
 
 #include "core/err.h"
+#include "core/geoframe.h"
 
 struct pose {
     double position_m[3]; /* of the body's origin, prcs */
@@ -67,32 +68,43 @@ struct pose_sample {
     double frame;
 };
 
-enum { POSE_MIN_STEP_US = 100 }; /* samples are at least this far apart */
+enum {
+    POSE_MIN_STEP_US = 100,   /* samples are at least this far apart */
+    POSE_MAX_KNOTS = 10000000 /* of a trajectory: 800 MB of memory, 28 hours every 10 ms */
+};
 
 /* n >= 1 samples, times rising by POSE_MIN_STEP_US at least; copied. SH_EINPUT says which sample is wrong. */
 int trajectory_from_samples(const struct pose_sample *sample, size_t n, struct trajectory **out, struct sh_err *err);
 
 /* A CSV file whose first line names the columns, in any order: t_s, x_m, y_m, z_m, and either heading_deg, pitch_deg,
  * roll_deg (heading alone will do) or qw, qx, qy, qz; frame where wanted (else the sample's number, from 0);
- * scan and flags, as `scanhead record -o NAME.poses.csv` writes them, are read over. Lines that
- * begin with '#' and empty lines don't count. Everything else is an error with file and line. */
+ * scan and flags, as `scanhead record -o NAME.poses.csv` writes them, are read over, as is a byte
+ * order mark of UTF-8. Lines that begin with '#' and empty lines don't count. Times are within 4e9 s of 0, so that
+ * nanoseconds between any two fit into 64 bits. Everything else is an error with file and line. */
 int trajectory_read_csv(const char *path, struct trajectory **out, struct sh_err *err);
 
 /* Way-points, a CSV file likewise: x_m, y_m, z_m, speed_m_s, and pause_s where wanted. The platform goes through them
  * on the cubic Hermite curve described above, the way to the next point taking chord / speed_m_s (the last one's speed
  * does not matter, but must be there), and stands at a point for pause_s, where it comes to rest and starts smoothly.
- * Heading along the path, pitch and roll 0. */
-int trajectory_read_waypoints(const char *path, struct trajectory **out, struct sh_err *err);
+ * Heading along the path, pitch and roll 0, about the axes that a station has there: geoframe_level of frame, or the
+ * scene's own without one (NULL). SH_EINPUT, too, where the way is longer than POSE_MAX_KNOTS samples: every 0.02 s, or
+ * every 0.01 m where that is longer. */
+int trajectory_read_waypoints(const char *path, const struct geoframe *frame, struct trajectory **out,
+                              struct sh_err *err);
 
 void trajectory_free(struct trajectory *trajectory);
 void trajectory_span(const struct trajectory *trajectory, double *first_s, double *last_s);
 void trajectory_at(const struct trajectory *trajectory, double t_s, struct pose *pose, double *frame);
 
-/* The knots of a head that is mounted on the platform, from start_s (time 0 of the knots) to the trajectory's end: at
+/* The knots of a head that is mounted on the platform, from start_s (time 0 of the knots) to end_s or the trajectory's
+ * end, whichever comes first: at
  * the samples, and as many between two as keep what pose_between makes of them within tolerance_m of the curve (closed
- * bound: acceleration and lever arm times interval^2 / 8; the attitude is the same), at most longest_ns apart.
- * Allocates *out. error_m: the bound that holds, more than tolerance_m only where POSE_MIN_STEP_US is the limit. */
-int trajectory_knots(const struct trajectory *trajectory, double start_s, const struct pose *mount, double tolerance_m,
-                     int64_t longest_ns, struct pose_knot **out, size_t *n, double *error_m, struct sh_err *err);
+ * bound: acceleration and lever arm times interval^2 / 8; the attitude is the same). They are at most longest_ns apart
+ * while the head goes on by longest_m, or turns by 0.01 rad, within that: where it hardly moves there are no more than
+ * needed. Allocates *out. SH_EINPUT for more than POSE_MAX_KNOTS. error_m: the bound that holds, more than tolerance_m
+ * only where POSE_MIN_STEP_US is the limit. */
+int trajectory_knots(const struct trajectory *trajectory, double start_s, double end_s, const struct pose *mount,
+                     double tolerance_m, int64_t longest_ns, double longest_m, struct pose_knot **out, size_t *n,
+                     double *error_m, struct sh_err *err);
 
 #endif

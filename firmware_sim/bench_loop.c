@@ -159,16 +159,16 @@ int bench_loop(const struct bench_case *c, const struct bench_result *one, uint3
     if (cfg == NULL) return sh_fail(err, SH_ENOMEM, "bench: no memory");
     fill_config(cfg, c, out->threads, frames);
     /* A site of what is there already; nothing of it is released here but the georeference. */
+    struct site_station only = {.station = &cfg->station[0]}, *station = &only;
     struct site site = {.cfg = cfg,
                         .scene = c->target->scene,
                         .n_surfaces = c->target->scene->n_surfaces,
                         .bvh = {c->bvh},
                         .n_bvh = 1,
+                        .station = station,
                         .n_stations = 1,
                         .scale_m = BENCH_SCALE_M};
-    struct site_station *station = &site.station[0];
     memcpy(station->at.position_m, c->target->station_m, sizeof station->at.position_m);
-    station->station = &cfg->station[0];
     station->bvh = c->bvh;
     station->scale[0] = station->scale[1] = station->scale[2] = BENCH_SCALE_M;
     cast_rotation(0.0, station->at.rotation);

@@ -23,6 +23,13 @@ void check_print_anchor(const struct site *site, FILE *out)
     const struct geoframe *f = &site->anchor.frame;
     static const char *const source[] = {
         [ANCHOR_EXPLICIT] = "explicit", [ANCHOR_IFC] = "ifc", [ANCHOR_UTM] = "utm", [ANCHOR_ECEF] = "ecef"};
+    if (site->anchor.known && cfg->anchor.source == ANCHOR_NONE) {
+        fprintf(out,
+                "anchor    station 1 of the configuration: scene point %.4f %.4f %.4f at lat %.9f lon %.9f deg, height "
+                "%.4f m; true north along y\n",
+                f->origin_m[0], f->origin_m[1], f->origin_m[2], f->lat_deg, f->lon_deg, f->height_m);
+        return;
+    }
     if (!site->anchor.known) {
         fputs("anchor    none: each station stands for itself, the scene's y axis is its true north\n", out);
         return;
@@ -90,9 +97,14 @@ static int print_on_earth(const struct site *site, uint32_t i, FILE *out, struct
     double p_ecef[3], forward[3], up[3];
     struct locate_grid utm;
     int grid = site->anchor.known && frame->kind == GEOFRAME_GRID;
-    int zone = site->cfg->utm_zone != 0 ? site->cfg->utm_zone : grid ? frame->zone : site_utm_zone(site);
+    int zone, side;
+    site_grid(site, &zone, &side);
     const struct georef_place place = {at->lat_deg, at->lon_deg, at->height_m};
     int rc = locate_in_grid(&place, zone, &utm, err);
+    if (rc == SH_OK && side != 0 && utm.zone != 0 && utm.north != (side > 0)) {
+        utm.north = side > 0;
+        utm.northing_m += utm.north ? -1e7 : 1e7;
+    }
     if (rc == SH_OK) rc = axis_enu(site, i, 1, forward, err);
     if (rc == SH_OK) rc = axis_enu(site, i, 2, up, err);
     if (rc != SH_OK) return rc;
@@ -121,6 +133,22 @@ int check_print_station(const struct site *site, uint32_t i, FILE *out, struct s
     if (!isnan(s->at.floor_m)) fprintf(out, "; %g m above the floor", s->at.floor_m);
     fputc('\n', out);
     return s->at.on_earth ? print_on_earth(site, i, out, err) : SH_OK;
+}
+
+void check_print_stops(const struct site *site, FILE *out)
+{
+    const struct config_platform *p = &site->cfg->platform;
+    fprintf(out, "stops     %u, from %.9g s on, each %.9g s\n", site->n_stations, p->start_s, p->step_s);
+    for (uint32_t i = 0; i < site->n_stations; i++) {
+        const struct site_station *s = &site->station[i];
+        const struct config_station *c = s->station;
+        fprintf(out, "  %-9s %.9g s, frame %.9g, scene %.4f %.4f %.4f m; heading %g, pitch %g, roll %g deg", c->name,
+                s->t_s, s->frame, s->at.position_m[0], s->at.position_m[1], s->at.position_m[2],
+                turn_deg(c->heading_deg), c->pitch_deg + 0.0, c->roll_deg + 0.0);
+        if (s->at.on_earth)
+            fprintf(out, "; lat %.9f lon %.9f deg, height %.4f m", s->at.lat_deg, s->at.lon_deg, s->at.height_m);
+        fputc('\n', out);
+    }
 }
 
 /* A vertex within reach settles most cases without an index. */

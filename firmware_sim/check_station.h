@@ -9,6 +9,9 @@
 void check_print_anchor(const struct site *site, FILE *out);
 int check_print_station(const struct site *site, uint32_t i, FILE *out, struct sh_err *err);
 
+/* A line for each stop. */
+void check_print_stops(const struct site *site, FILE *out);
+
 /* Warns of stations that have nothing within the head's range, as the scene stands at the start. */
 int check_reach(const struct site *site, const struct sh_report *report, struct sh_err *err);
 

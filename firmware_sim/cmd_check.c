@@ -1,4 +1,4 @@
-/* scanhead check and scanhead list: nothing runs. */
+/* scanhead check: nothing runs. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -7,6 +7,7 @@
 #include "firmware_sim/check_station.h"
 #include "firmware_sim/cmd.h"
 #include "firmware_sim/head_clock.h"
+#include "firmware_sim/pose_feed.h"
 
 static const char HELP[] =
     "scanhead check CONFIG [--set KEY=VALUE ...]: validate configuration, scene and links; nothing runs.\n"
@@ -16,7 +17,7 @@ static const char HELP[] =
 static const struct option OPTIONS[] = {
     {"set", required_argument, NULL, 's'}, {"help", no_argument, NULL, 'h'}, {NULL, 0, NULL, 0}};
 
-/* Opens and closes each link, so that a taken port or a wrong path shows now. */
+/* Opens and closes each link, and the socket of a live platform, so that a taken port or a wrong path shows now. */
 static int check_links(const struct config *cfg, struct sh_err *err)
 {
     for (uint32_t i = 0; i < cfg->n_links; i++) {
@@ -27,7 +28,11 @@ static int check_links(const struct config *cfg, struct sh_err *err)
         if (rc != SH_OK) return rc;
         ops->close(link);
     }
-    return SH_OK;
+    struct pose_feed *feed = NULL;
+    if (cfg->platform.kind != PLATFORM_LIVE || cfg->pace == PACE_STEP) return SH_OK;
+    int rc = pose_feed_open(NULL, cfg, &feed, err);
+    pose_feed_close(feed);
+    return rc;
 }
 
 static void print_platform(const struct site *site)
@@ -45,6 +50,16 @@ static void print_platform(const struct site *site)
            site->n_stretches);
 }
 
+static void print_output(const struct config *cfg, const struct site *site)
+{
+    int heights = cfg->crs == GEOREF_UTM || cfg->crs == GEOREF_GEODETIC;
+    printf("output    %s, %g m per count%s\n", cfg->layout == LINE_GEO ? "geo" : "polar", site->scale_m,
+           !heights                       ? ""
+           : site->geoid != NULL          ? ", heights above the geoid"
+           : cfg->heights == HEIGHTS_AUTO ? ", heights above the ellipsoid (no geoid data is installed)"
+                                          : ", heights above the ellipsoid");
+}
+
 static int print_summary(const struct config *cfg, const struct site *site, struct sh_err *err)
 {
     const struct scene *scene = site->scene;
@@ -57,10 +72,11 @@ static int print_summary(const struct config *cfg, const struct site *site, stru
            scene->n_surfaces, scene->min_m[0], scene->max_m[0], scene->min_m[1], scene->max_m[1], scene->min_m[2],
            scene->max_m[2]);
     check_print_anchor(site, stdout);
-    for (uint32_t i = 0; i < site->n_stations && rc == SH_OK; i++)
+    if (site->stop != NULL) check_print_stops(site, stdout);
+    for (uint32_t i = 0; i < site->n_stations && rc == SH_OK && site->stop == NULL; i++)
         rc = check_print_station(site, i, stdout, err);
     print_platform(site);
-    printf("output    %s, %g m per count\n", cfg->layout == LINE_GEO ? "geo" : "polar", site->scale_m);
+    print_output(cfg, site);
     return rc;
 }
 
@@ -114,18 +130,4 @@ int cmd_check(int argc, char **argv)
     }
     if (optind != argc - 1) return cmd_usage("check", "one CONFIG is needed");
     return check(&sets, argv[optind]);
-}
-
-int cmd_list(int argc, char **argv)
-{
-    if (argc == 2 && (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0)) {
-        puts("scanhead list: head profiles ($SCANHEAD_HEADS, else the installed ones, else config/heads) and kinds of "
-             "links");
-        return CMD_OK;
-    }
-    if (argc != 1) return cmd_usage("list", "it takes no arguments");
-    struct sh_err err = {0};
-    if (config_list_profiles(NULL, stdout, &err) < 0) return cmd_fail(&err);
-    puts("links: pty (virtual serial port), tcp, file, null");
-    return CMD_OK;
 }

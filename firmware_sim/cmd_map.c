@@ -117,7 +117,7 @@ static int create_map(struct map_run *run, const struct site *site, struct sh_er
 {
     const struct scene *scene = site->scene;
     struct map_spec spec = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}, run->pixel_m};
-    double p[3], station[CONFIG_MAX_STATIONS][3];
+    double p[3], mark[3];
     int rc = choose_view(run, site, err);
     if (rc != SH_OK) return rc;
     for (uint32_t v = 0; v < scene->n_vertices && run->turned; v++) {
@@ -129,8 +129,8 @@ static int create_map(struct map_run *run, const struct site *site, struct sh_er
         include(&spec, scene->max_m);
     }
     for (uint32_t s = 0; s < site->n_stations; s++) {
-        to_map(run, site->station[s].at.position_m, station[s]);
-        include(&spec, station[s]);
+        to_map(run, site->station[s].at.position_m, mark);
+        include(&spec, mark);
     }
     double span_m = fmax(spec.max_m[0] - spec.min_m[0], spec.max_m[1] - spec.min_m[1]);
     for (int i = 0; i < 2; i++) { /* a margin, so that nothing sticks to the border */
@@ -138,8 +138,10 @@ static int create_map(struct map_run *run, const struct site *site, struct sh_er
         spec.max_m[i] += 0.03 * span_m;
     }
     rc = map_create(&spec, &run->map, err);
-    for (uint32_t s = 0; s < site->n_stations && rc == SH_OK; s++)
-        rc = map_add_station(run->map, station[s][0], station[s][1], err);
+    for (uint32_t s = 0; s < site->n_stations && rc == SH_OK; s++) {
+        to_map(run, site->station[s].at.position_m, mark);
+        rc = map_add_station(run->map, mark[0], mark[1], err);
+    }
     return rc;
 }
 
@@ -153,7 +155,6 @@ static int draw(struct map_run *run, struct config *cfg, struct sh_err *err)
     struct offline *offline = NULL;
     struct recording_result result;
     struct recording_options options = {.first_station = 1,
-                                        .last_station = cfg->n_stations,
                                         .frames = 1,
                                         .progress = !run->quiet,
                                         .report = &cmd_report_stderr,
@@ -161,6 +162,7 @@ static int draw(struct map_run *run, struct config *cfg, struct sh_err *err)
                                         .ctx = run,
                                         .interrupted = interrupted};
     int rc = offline_open(cfg, &cmd_report_stderr, &offline, err);
+    if (rc == SH_OK) options.last_station = offline_site(offline)->n_stations;
     if (rc == SH_OK) rc = create_map(run, offline_site(offline), err);
     if (rc == SH_OK) rc = recording_run(offline_scanhead(offline), &options, &result, err);
     if (rc == SH_OK && cmd_interrupted) rc = sh_fail(err, SH_EIO, "interrupted; nothing written");

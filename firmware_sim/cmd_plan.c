@@ -14,7 +14,10 @@ static const char HELP[] =
     "  --json           an array of {stage, method, error_m, cost_ns, why}; null: hangs on the scene\n"
     "  --set KEY=VALUE  another value of a configuration key\n\n"
     "georef is planned for each station, from output.crs, output.tolerance_m, output.georef, the scene's extent and\n"
-    "the head's range_max_m. A stage with the method none is left out: nothing in the configuration asks for it.\n";
+    "the head's range_max_m; one row for all where they get the same method, else one each. A stage with the method\n"
+    "none is left out: nothing in the configuration asks for it. Costs are rounded figures of `make chart` on one "
+    "core\n"
+    "with AVX2, to compare methods by; what hangs on the scene is measured by `make bench`.\n";
 
 enum { OPT_JSON = 256 };
 static const struct option OPTIONS[] = {{"set", required_argument, NULL, 's'},
@@ -23,9 +26,39 @@ static const struct option OPTIONS[] = {{"set", required_argument, NULL, 's'},
                                         {NULL, 0, NULL, 0}};
 
 struct plan {
-    struct plan_row row[PLAN_HEAD_ROWS + CONFIG_MAX_STATIONS];
+    struct plan_row *row; /* of the head, then of each station */
     size_t n;
 };
+
+static void name_row(struct plan_row *row, const char *whose)
+{
+    char why[sizeof row->why];
+    snprintf(why, sizeof why, "%.60s: %.125s", whose, row->why);
+    memcpy(row->why, why, sizeof row->why);
+}
+
+/* A row for each station; one for all, with the largest bound, where they have the same method. */
+static void add_georef(const struct site *site, struct plan *plan)
+{
+    const struct site_station *s = site->station;
+    uint32_t same = 1, worst = 0;
+    for (uint32_t i = 1; i < site->n_stations; i++) {
+        same += strcmp(s[i].plan.method, s[0].plan.method) == 0;
+        if (s[i].plan.error_m > s[worst].plan.error_m) worst = i;
+    }
+    if (same == site->n_stations) {
+        struct plan_row *row = &plan->row[plan->n++];
+        *row = s[worst].plan;
+        if (site->n_stations > 1) name_row(row, "all stations");
+        return;
+    }
+    for (uint32_t i = 0; i < site->n_stations; i++) {
+        char whose[64];
+        snprintf(whose, sizeof whose, "station %u %.40s", i + 1, s[i].station->name);
+        plan->row[plan->n] = s[i].plan;
+        name_row(&plan->row[plan->n++], whose);
+    }
+}
 
 static int is_zero(const struct config_instrument *k)
 {
@@ -71,13 +104,7 @@ static void make_plan(const struct config *cfg, const struct site *site, struct 
         plan_georef_polar(&plan->row[plan->n++]);
         return;
     }
-    for (uint32_t i = 0; i < site->n_stations; i++) {
-        struct plan_row *row = &plan->row[plan->n++];
-        *row = site->station[i].plan;
-        char why[sizeof row->why];
-        snprintf(why, sizeof why, "station %u %s: %.120s", i + 1, site->station[i].station->name, row->why);
-        memcpy(row->why, why, sizeof row->why);
-    }
+    add_georef(site, plan);
 }
 
 static int print_json(const struct plan *plan, struct sh_err *err)
@@ -116,14 +143,17 @@ static int plan_config(const struct cmd_sets *sets, const char *path, int as_jso
     int status = CMD_OK;
     struct sh_err err = {0};
     struct site *site = NULL;
-    struct plan plan;
+    struct plan plan = {0};
     struct config *cfg = cmd_load_config(path, sets, &status);
     if (cfg == NULL) return status;
     int rc = site_load(cfg, &cmd_report_stderr, &site, &err);
+    if (rc == SH_OK) plan.row = calloc(PLAN_HEAD_ROWS + site->n_stations, sizeof *plan.row);
+    if (rc == SH_OK && plan.row == NULL) rc = sh_fail(&err, SH_ENOMEM, "no memory");
     if (rc == SH_OK) {
         make_plan(cfg, site, &plan);
         rc = as_json ? print_json(&plan, &err) : print_text(&plan);
     }
+    free(plan.row);
     site_free(site);
     free(cfg);
     return rc == SH_OK ? CMD_OK : cmd_fail(&err);

@@ -11,8 +11,10 @@
 
 static const char HELP[] =
     "scanhead record SOURCE -o FILE [-o FILE ...] [options]: write the points of a scan to files\n\n"
-    "SOURCE is tty:/dev/..., tcp:host:port, FILE.shs (a raw stream), or a CONFIG: then the head runs off line in this\n"
-    "process, as fast as it computes. FILE says by its ending what is written:\n\n"
+    "SOURCE is usb, usb:vid:pid, usb:vid:pid:serial (scanhead list shows them), tty:/dev/..., tcp:host:port, FILE.shs\n"
+    "(a raw stream), or a CONFIG: then the head runs off line in this process, as fast as it computes. FILE says by "
+    "its\n"
+    "ending what is written:\n\n"
     "  .ply        points, binary or text, with double coordinates, label and station\n"
     "  .las        LAS 1.4, point format 6: points with CRS, time, returns, label; station as point source ID\n"
     "  .ptx        a grid per scan, with the scan's pose; shots without echo are in it\n"
@@ -28,21 +30,26 @@ static const char HELP[] =
     "  --duration S     stop each scan after S seconds of device time\n"
     "  --split          each scan to files of its own: NAME-1.las, NAME-2.las, ..., in the order of scans\n"
     "  --listen         send no command: record what comes until the stream ends or Ctrl-C\n"
+    "  --wait S         wait up to S seconds for SOURCE to be there\n"
+    "  --replug S       when the head is unplugged, wait up to S seconds for it and go on in the same files\n"
     "  --ascii          PLY as text\n"
     "  --empty-shots    keep shots without echo: .ply with NaN coordinates, .e57 with its invalid state\n"
     "  --stats FILE     write what was received as JSON; - is standard output\n"
     "  --set KEY=VALUE  any configuration key (CONFIG only); may be repeated\n"
-    "  --crs CRS        local, ecef, utm or geodetic (CONFIG only)\n"
+    "  --crs CRS        local, ecef, utm or geodetic (CONFIG only): points in it, that is output.layout=geo, too\n"
     "  --threads N      casters (CONFIG only)\n"
     "  --quiet          no progress\n\n"
-    "Exit status 1 when the recording is not complete: the stream ended before the scan did, or frames or pulses were\n"
-    "lost on the way. What came is kept in FILE all the same.\n";
+    "Exit status 1 when the recording is not complete: the stream ended before the scan did, Ctrl-C came before scans\n"
+    "with an end had theirs (not with --listen), frames or pulses were lost on the way, or the head was away within a\n"
+    "scan. What came is kept in FILE all the same.\n";
 
 enum {
     OPT_STATION = 256,
     OPT_FRAMES,
     OPT_DURATION,
     OPT_LISTEN,
+    OPT_WAIT,
+    OPT_REPLUG,
     OPT_ASCII,
     OPT_EMPTY,
     OPT_SPLIT,
@@ -57,6 +64,8 @@ static const struct option OPTIONS[] = {{"station", required_argument, NULL, OPT
                                         {"frames", required_argument, NULL, OPT_FRAMES},
                                         {"duration", required_argument, NULL, OPT_DURATION},
                                         {"listen", no_argument, NULL, OPT_LISTEN},
+                                        {"wait", required_argument, NULL, OPT_WAIT},
+                                        {"replug", required_argument, NULL, OPT_REPLUG},
                                         {"ascii", no_argument, NULL, OPT_ASCII},
                                         {"empty-shots", no_argument, NULL, OPT_EMPTY},
                                         {"split", no_argument, NULL, OPT_SPLIT},
@@ -72,8 +81,9 @@ static const struct option OPTIONS[] = {{"station", required_argument, NULL, OPT
 struct record {
     const char *source, *stats;
     struct record_files files;
-    int all_stations;
+    int all_stations, crs_given;
     long station;
+    double wait_s;
     struct cmd_sets sets;
     struct recording_options recording;
 };
@@ -84,7 +94,7 @@ static int parse_station(struct record *r, const char *text)
         r->all_stations = 1;
         return CMD_OK;
     }
-    return cmd_parse_long("record", "--station", text, 1, CONFIG_MAX_STATIONS, &r->station);
+    return cmd_parse_long("record", "--station", text, 1, CONFIG_MAX_STOPS, &r->station);
 }
 
 static int add_file(struct record *r, const char *path)
@@ -107,6 +117,10 @@ static int parse_option(struct record *r, int opt, char **argv)
     case OPT_LISTEN:
         r->recording.listen = 1;
         return CMD_OK;
+    case OPT_WAIT:
+        return cmd_parse_double("record", "--wait", optarg, 0, 1e8, &r->wait_s);
+    case OPT_REPLUG:
+        return cmd_parse_double("record", "--replug", optarg, 0, 1e8, &r->recording.replug_s);
     case OPT_ASCII:
         r->files.recorder.ascii = 1;
         return CMD_OK;
@@ -122,6 +136,7 @@ static int parse_option(struct record *r, int opt, char **argv)
     case OPT_SET:
         return cmd_add_set(&r->sets, optarg);
     case OPT_CRS:
+        r->crs_given = 1;
         return cmd_add_key(&r->sets, "output.crs", optarg);
     case OPT_THREADS:
         return cmd_add_key(&r->sets, "loop.threads", optarg);
@@ -181,6 +196,7 @@ static int write_stats(const struct record *r, struct scanhead *sh, const struct
     json_uint(&json, "dropped", s.dropped);
     json_uint(&json, "reader_lost_frames", s.reader_lost);
     json_uint(&json, "lost_pulses", result->lost_pulses);
+    json_uint(&json, "replugs", result->replugs);
     json_double(&json, "wall_s", wall_s);
     json_double(&json, "cpu_s", clock_cpu_s());
     json_double(&json, "pulses_per_s", wall_s > 0.0 ? (double)result->pulses / wall_s : 0.0);
@@ -203,7 +219,13 @@ static int check_complete(struct scanhead *sh, const struct recording_result *re
 {
     struct scanhead_stats s;
     scanhead_get_stats(sh, &s);
+    if (result->missing[0] != '\0') return sh_fail(err, SH_ESTATE, "interrupted; missing: %s", result->missing);
     uint64_t pulses = s.pulses_lost > result->lost_pulses ? s.pulses_lost : result->lost_pulses;
+    if (result->broken_scans != 0)
+        return sh_fail(
+            err, SH_ELOST,
+            "the recording is not complete: the head was away within %llu scans; %llu frames known to be lost",
+            (unsigned long long)result->broken_scans, (unsigned long long)count_lost(sh));
     if (count_lost(sh) == 0 && pulses == 0) return SH_OK;
     return sh_fail(err, SH_EIO,
                    "the recording is not complete: %llu frames lost to this reader, %llu pulses by the head",
@@ -248,9 +270,11 @@ static int record(struct record *r, struct scanhead *sh, struct sh_err *err)
     rc = recording_run(sh, &r->recording, &result, err);
     double wall_s = 1e-9 * (double)(clock_now_ns() - start_ns);
     struct sh_err why = {0};
-    int closed = record_files_close(&r->files, result.points != 0 || rc == SH_OK, &why);
+    int closed = record_files_close(&r->files, result.points != 0 || (rc == SH_OK && result.missing[0] == '\0'), &why);
     if (rc == SH_OK && closed != SH_OK) rc = sh_fail(err, closed, "%s", why.text);
-    if (rc == SH_OK && r->stats != NULL) rc = write_stats(r, sh, &result, wall_s, err);
+    int counts = rc == SH_OK || rc == SH_ELOST; /* also of a recording that an unplugged device has cut */
+    if (counts && r->stats != NULL && (closed = write_stats(r, sh, &result, wall_s, &why)) != SH_OK && rc == SH_OK)
+        rc = sh_fail(err, closed, "%s", why.text);
     if (rc == SH_OK || result.points != 0) say_result(r, &result);
     return rc == SH_OK ? check_complete(sh, &result, err) : rc;
 }
@@ -268,8 +292,22 @@ static int is_config(const char *source)
 
 static int is_stream(const char *source)
 {
-    return strncmp(source, "tty:", 4) == 0 || strncmp(source, "tcp:", 4) == 0 || strncmp(source, "fd:", 3) == 0 ||
-           ends_in(source, ".shs");
+    return strcmp(source, "usb") == 0 || strncmp(source, "usb:", 4) == 0 || strncmp(source, "tty:", 4) == 0 ||
+           strncmp(source, "tcp:", 4) == 0 || strncmp(source, "fd:", 3) == 0 || ends_in(source, ".shs");
+}
+
+/* Polar points are in no CRS. */
+static int set_layout(const struct record *r, struct config *cfg, struct sh_err *err)
+{
+    if (!r->crs_given || cfg->layout == LINE_GEO) return SH_OK;
+    if (cfg->layout_given)
+        return sh_fail(
+            err, SH_EINPUT,
+            "%s: output.layout is polar, whose recordings are in the scene frame; with --crs allowed geo, as "
+            "by --set output.layout=geo",
+            cfg->file);
+    cfg->layout = LINE_GEO;
+    return SH_OK;
 }
 
 static int record_config(struct record *r, struct sh_err *err)
@@ -278,10 +316,6 @@ static int record_config(struct record *r, struct sh_err *err)
     struct config *cfg = cmd_load_config(r->source, &r->sets, &status);
     if (cfg == NULL) return status;
     struct offline *offline = NULL;
-    if (r->all_stations) {
-        r->recording.first_station = 1;
-        r->recording.last_station = cfg->n_stations;
-    }
     uint32_t frames = r->recording.frames >= 0 ? (uint32_t)r->recording.frames : cfg->settings.frames;
     int rc = SH_OK;
     int arrives = cfg->platform.kind == PLATFORM_TRAJECTORY && cfg->platform.at_end == PLATFORM_STOP;
@@ -292,11 +326,30 @@ static int record_config(struct record *r, struct sh_err *err)
     if (rc == SH_OK && frames == 0 && !arrives && !(r->recording.duration_s > 0.0))
         rc =
             sh_fail(err, SH_EINPUT, "%s: head.frames is 0, a scan without end; give --frames or --duration", cfg->file);
+    if (rc == SH_OK) rc = set_layout(r, cfg, err);
+    if (rc == SH_OK && cfg->layout == LINE_GEO && cfg->crs == GEOREF_GEODETIC)
+        rc = record_files_check_degrees(&r->files, err);
     if (rc == SH_OK) rc = offline_open(cfg, &cmd_report_stderr, &offline, err);
+    if (rc == SH_OK && r->all_stations) {
+        r->recording.first_station = 1;
+        r->recording.last_station = offline_site(offline)->n_stations;
+    }
     if (rc == SH_OK) rc = record(r, offline_scanhead(offline), err);
     offline_close(offline);
     free(cfg);
     return rc == SH_OK ? CMD_OK : cmd_fail(err);
+}
+
+/* Tries again until the time is over: a device that is plugged in now may get its permissions a moment later. */
+static int open_stream(const struct record *r, struct scanhead **sh, char *why, size_t len)
+{
+    const int64_t end_ns = clock_now_ns() + (int64_t)(1e9 * r->wait_s);
+    for (;;) {
+        int rc = scanhead_open(r->source, sh, why, len);
+        int may_come = rc != SCANHEAD_OK && (rc != SCANHEAD_EINPUT || strncmp(r->source, "tty:", 4) == 0);
+        if (!may_come || clock_now_ns() >= end_ns || cmd_interrupted) return rc;
+        clock_sleep_until_ns(clock_now_ns() + 100000000);
+    }
 }
 
 static int record_stream(struct record *r, struct sh_err *err)
@@ -304,7 +357,7 @@ static int record_stream(struct record *r, struct sh_err *err)
     struct scanhead *sh = NULL;
     char why[256];
     if (r->sets.n != 0) return cmd_usage("record", "--set, --crs and --threads need a CONFIG as SOURCE");
-    int rc = scanhead_open(r->source, &sh, why, sizeof why);
+    int rc = open_stream(r, &sh, why, sizeof why);
     if (rc != SCANHEAD_OK) {
         sh_fail(err, rc, "%s", why);
         return cmd_fail(err);
@@ -336,6 +389,8 @@ int cmd_record(int argc, char **argv)
     cmd_catch_signals();
     struct sh_err err = {0};
     if (!is_config(r.source) && !is_stream(r.source))
-        return cmd_usage("record", "SOURCE %s: allowed tty:PATH, tcp:HOST:PORT, FILE.shs, CONFIG.yaml", r.source);
+        return cmd_usage("record",
+                         "SOURCE %s: allowed usb, usb:VID:PID:SERIAL, tty:PATH, tcp:HOST:PORT, FILE.shs, CONFIG.yaml",
+                         r.source);
     return is_config(r.source) ? record_config(&r, &err) : record_stream(&r, &err);
 }

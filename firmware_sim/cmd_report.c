@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "core/cloud.h"
+#include "core/mat3.h"
 #include "firmware_sim/cmd.h"
 #include "firmware_sim/json.h"
 #include "firmware_sim/site.h"
@@ -34,7 +35,8 @@ static const char help[] =
     "Points seen in mirrors lie where nothing is: with the mirrors in CONFIG (surfaces) they are left out.\n"
     "Mean, RMS, percentiles (nearest rank) and maximum are over all points that are not far. Percentiles are "
     "of the\n"
-    "points' distances, which are never negative.\n"
+    "points' distances, which are never negative. Bodies that move stand where they stood at the station's stop\n"
+    "(platform.kind: stops); points on what moved during a scan are refused.\n"
     "Exit status: 0 all points are within the tolerance, 1 some are not, 2 wrong usage or input.\n";
 
 struct report {
@@ -45,7 +47,9 @@ struct report {
     struct cmd_sets sets;
     struct config *cfg;
     struct site *site;
+    const struct georef **georef; /* of each station */
     struct distance *index;
+    struct distance *mover_index[CAST_MAX_MOVERS]; /* of each body that moves, in its own frame */
     struct cloud cloud;
     size_t ghosts;      /* points seen in mirrors: nothing is there, they are left out */
     double *distance_m; /* per point */
@@ -100,6 +104,8 @@ static int load(struct report *r, struct sh_err *err)
     if (rc == SH_OK) rc = site_load(r->cfg, &cmd_report_stderr, &r->site, err);
     if (rc == SH_OK) rc = distance_create(r->site->scene, &r->index, err);
     if (rc == SH_OK) leave_out_ghosts(r);
+    for (uint32_t k = 0; rc == SH_OK && k < r->site->n_movers; k++)
+        rc = distance_create(r->site->mover[k].scene, &r->mover_index[k], err);
     return rc;
 }
 
@@ -110,17 +116,51 @@ static unsigned thread_count(const struct config *cfg)
     return processors > 0 ? (unsigned)processors : 1;
 }
 
+/* Where a moving body was hit, in the body's own frame: at a stop it stands all scan long. */
+static const struct distance *body_of(void *ctx, unsigned station, uint16_t label, double p_prcs[3])
+{
+    const struct report *r = ctx;
+    const struct site *site = r->site;
+    uint32_t k = 0, first = site->scene->n_surfaces;
+    if (label < first || label >= site->n_surfaces) return NULL;
+    for (; label >= first + site->mover[k].scene->n_surfaces; k++)
+        first += site->mover[k].scene->n_surfaces;
+    struct cast_setup setup;
+    site_move(site, site_mover_time(site, station - 1, 0.0), &setup);
+    const struct cast_mover *at = &setup.mover[k];
+    const double d[3] = {p_prcs[0] - at->shift_m[0], p_prcs[1] - at->shift_m[1], p_prcs[2] - at->shift_m[2]};
+    mat3_apply_transposed(at->rotation, d, p_prcs);
+    return r->mover_index[k];
+}
+
+/* Elsewhere a body's place hangs on the time of each point, which not every file has. */
+static int check_bodies(const struct report *r, struct sh_err *err)
+{
+    const struct site *site = r->site;
+    if (site->stop != NULL || site->n_movers == 0 || r->cloud.label == NULL) return SH_OK;
+    for (size_t i = 0; i < r->cloud.n; i++)
+        if (r->cloud.label[i] >= site->scene->n_surfaces && r->cloud.label[i] < site->n_surfaces)
+            return sh_fail(err, SH_EINPUT,
+                           "%s: point %zu is on %s, which moved during the scan; allowed are points of what stands "
+                           "still, and scans with platform.kind: stops",
+                           r->cloud_path, i + 1, site_surface(site, r->cloud.label[i])->object);
+    return SH_OK;
+}
+
 static int compare(struct report *r, struct sh_err *err)
 {
     const struct site *site = r->site;
-    const struct georef *georef[CONFIG_MAX_STATIONS];
+    r->georef = calloc(site->n_stations, sizeof *r->georef);
+    if (r->georef == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %u stations", site->n_stations);
     for (uint32_t i = 0; i < site->n_stations; i++)
-        georef[i] = site->station[i].georef;
+        r->georef[i] = site->station[i].georef;
     const struct cloud_site setup = {.index = r->index,
-                                     .georef = r->cfg->layout == LINE_GEO ? georef : NULL,
+                                     .georef = r->cfg->layout == LINE_GEO ? r->georef : NULL,
                                      .n_stations = site->n_stations,
                                      .max_m = r->max_m,
-                                     .threads = thread_count(r->cfg)};
+                                     .threads = thread_count(r->cfg),
+                                     .body = site->n_movers > 0 ? body_of : NULL,
+                                     .body_ctx = r};
     const struct sh_report progress = {r, warn, tell_each_second};
     struct sh_err why = {0};
     r->told_s = now_s();
@@ -128,8 +168,10 @@ static int compare(struct report *r, struct sh_err *err)
     r->triangle = malloc((r->cloud.n + 1) * sizeof *r->triangle);
     if (r->distance_m == NULL || r->triangle == NULL)
         return sh_fail(err, SH_ENOMEM, "no memory for %zu distances", r->cloud.n);
-    int rc = cloud_compare(&r->cloud, &setup, &progress, r->distance_m, r->triangle, &why);
-    if (rc == SH_OK) rc = cloud_cover(&r->cloud, site->scene, r->triangle, &r->coverage, &why);
+    int rc = check_bodies(r, err);
+    if (rc != SH_OK) return rc;
+    rc = cloud_compare(&r->cloud, &setup, &progress, r->distance_m, r->triangle, &why);
+    if (rc == SH_OK) rc = cloud_cover(&r->cloud, site->scene, site->n_surfaces, r->triangle, &r->coverage, &why);
     if (rc != SH_OK) return sh_fail(err, rc, "%s: %.300s", r->cloud_path, why.text);
     cloud_stats(r->distance_m, r->cloud.n, r->tolerance_m, &r->stats);
     if (r->stats.points == 0)
@@ -141,7 +183,7 @@ static int compare(struct report *r, struct sh_err *err)
 static const struct scene_surface *worst_surface(const struct report *r)
 {
     uint16_t label = cloud_surface(&r->cloud, r->site->scene, r->triangle, r->stats.worst);
-    return label != CLOUD_LABEL_NONE ? &r->site->scene->surface[label] : NULL;
+    return label != CLOUD_LABEL_NONE ? site_surface(r->site, label) : NULL;
 }
 
 static void print_length(const char *what, double m)
@@ -173,8 +215,7 @@ static void print_text(const struct report *r)
     printf("\n%-10s %zu farther than %g m\n", "beyond", s->beyond, r->tolerance_m);
     printf("%-10s %zu farther than %g m from everything\n", "far", s->far, r->max_m);
     printf("%-10s %" PRIu32 " of %" PRIu32 " surfaces, %" PRIu32 " of %" PRIu32 " triangles\n", "coverage",
-           r->coverage.surfaces_hit, r->site->scene->n_surfaces, r->coverage.triangles_hit,
-           r->site->scene->n_triangles);
+           r->coverage.surfaces_hit, r->site->n_surfaces, r->coverage.triangles_hit, r->site->scene->n_triangles);
 }
 
 static void put_worst(struct json *json, const struct report *r)
@@ -210,7 +251,7 @@ static int print_json(const struct report *r, struct sh_err *err)
     json_uint(&json, "far", s->far);
     json_double(&json, "tolerance_m", r->tolerance_m);
     json_uint(&json, "surfaces_hit", r->coverage.surfaces_hit);
-    json_uint(&json, "surfaces", r->site->scene->n_surfaces);
+    json_uint(&json, "surfaces", r->site->n_surfaces);
     json_uint(&json, "triangles_hit", r->coverage.triangles_hit);
     json_uint(&json, "triangles", r->site->scene->n_triangles);
     put_worst(&json, r);
@@ -272,10 +313,13 @@ static int parse_options(struct report *r, int argc, char **argv)
 
 static void release(struct report *r)
 {
+    free(r->georef);
     free(r->distance_m);
     free(r->triangle);
     cloud_free(&r->cloud);
     distance_free(r->index);
+    for (uint32_t k = 0; k < CAST_MAX_MOVERS; k++)
+        distance_free(r->mover_index[k]);
     site_free(r->site);
     free(r->cfg);
     free(r);

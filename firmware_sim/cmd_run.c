@@ -202,9 +202,10 @@ int cmd_run(int argc, char **argv)
     if (cfg == NULL) return status;
     cmd_catch_signals();
     struct sh_err err = {0};
-    int rc = cfg->n_links == 0 ? sh_fail(&err, SH_EINPUT,
-                                         "%s: links: none; run needs at least one of pty, tcp, file, null", cfg->file)
-                               : run_with(&o, cfg, &err);
+    int rc = cfg->n_links == 0
+                 ? sh_fail(&err, SH_EINPUT, "%s: links: none; run needs at least one of pty, tcp, usb, file, null",
+                           cfg->file)
+                 : run_with(&o, cfg, &err);
     free(cfg);
     return rc == SH_OK ? CMD_OK : cmd_fail(&err);
 }

@@ -25,6 +25,7 @@ enum {
     CONFIG_MAX_LINKS = 8,
     CONFIG_MAX_STATIONS = 64,
     CONFIG_MAX_SURFACES = 64,
+    CONFIG_MAX_STOPS = 4096,
     CONFIG_PATH_LEN = 512
 };
 
@@ -93,20 +94,28 @@ struct config_station {
     double ecef_m[3];
 };
 
-enum config_platform_kind { PLATFORM_STATIC, PLATFORM_TRAJECTORY, PLATFORM_LIVE };
+enum config_platform_kind { PLATFORM_STATIC, PLATFORM_TRAJECTORY, PLATFORM_LIVE, PLATFORM_STOPS };
 enum config_at_end { PLATFORM_STOP, PLATFORM_HOLD };
 
 /* What the head stands on. Attitudes as core/pose.h has them. */
 struct config_platform {
     enum config_platform_kind kind;
-    char file[CONFIG_PATH_LEN], waypoints[CONFIG_PATH_LEN]; /* trajectory: one of them */
-    double start_s;                                         /* of the trajectory, after its first sample */
+    char file[CONFIG_PATH_LEN], waypoints[CONFIG_PATH_LEN]; /* trajectory, stops: one of them */
+    double start_s, end_s;                                  /* part of the trajectory, after its first sample */
+    int has_end;                                            /* 0: to its last sample */
+    double step_s;                                          /* stops: from each to the next */
     enum config_at_end at_end;
     double mount_m[3], mount_heading_deg, mount_pitch_deg, mount_roll_deg; /* of the head on the platform */
     double reach_m, extrapolate_ms;                                        /* live */
     char address[64];
     uint32_t port; /* live, in real time: UDP; 0: the system chooses */
 };
+
+/* The head moves while it scans. */
+static inline int config_head_moves(const struct config_platform *platform)
+{
+    return platform->kind == PLATFORM_TRAJECTORY || platform->kind == PLATFORM_LIVE;
+}
 
 /* Time of day (head_clock.h). */
 struct config_time {
@@ -169,6 +178,7 @@ struct config {
     enum georef_crs crs;
     int utm_zone;
     enum line_layout layout;
+    int layout_given; /* 0: the default */
     enum config_heights heights;
     enum georef_method georef; /* GEOREF_AUTO: as the plan says */
     double tolerance_m;        /* what a georeferenced position may be off */

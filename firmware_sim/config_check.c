@@ -10,6 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "drivers/usb/backend.h"
 #include "firmware_sim/head_clock.h"
 
 /* Of two keys that contradict, the one to name: the first unless only the second was given. */
@@ -64,7 +65,7 @@ static int check_head(const struct cfg_reader *rd, const struct config *cfg)
                             "the pan goes from %.15g to %.15g deg; allowed pan_start_deg at most pan_stop_deg, 360 deg "
                             "apart at most",
                             from_micro(s->pan_start_udeg), from_micro(s->pan_stop_udeg));
-    if (s->station > cfg->n_stations)
+    if (s->station > cfg->n_stations && cfg->platform.kind != PLATFORM_STOPS)
         return cfg_fail_key(rd, "head.station", 0, "there is no station %u; allowed 1 to %u", s->station,
                             cfg->n_stations);
     return SH_OK;
@@ -111,8 +112,9 @@ static int check_names(const struct cfg_reader *rd, struct config *cfg)
     return SH_OK;
 }
 
-static int check_output(const struct cfg_reader *rd, const struct config *cfg)
+static int check_output(const struct cfg_reader *rd, struct config *cfg)
 {
+    cfg->layout_given = cfg_is_given(rd, "output.layout", 0);
     if (cfg->utm_zone != 0 && cfg->crs != GEOREF_UTM)
         return cfg_fail_key(rd, "output.utm_zone", 0, "a zone, but output.crs is not utm; allowed only with crs: utm");
     if (cfg->heights == HEIGHTS_GEOID && cfg->crs != GEOREF_UTM && cfg->crs != GEOREF_GEODETIC)
@@ -131,22 +133,64 @@ static int check_output(const struct cfg_reader *rd, const struct config *cfg)
     return SH_OK;
 }
 
-static int check_link(const struct cfg_reader *rd, const struct config *cfg, uint32_t i)
+enum { OF_USBIP = 1u << USB_BACKEND_USBIP, OF_USBREDIR = 1u << USB_BACKEND_USBREDIR };
+enum { OF_FUNCTIONFS = 1u << USB_BACKEND_FUNCTIONFS };
+
+static int check_usb_link(const struct cfg_reader *rd, const struct config *cfg, struct link_spec *link, uint32_t i)
+{
+    static const struct {
+        const char *path;
+        unsigned backends; /* bit per back end that has the key */
+    } keys[] = {
+        {"links[].path", OF_USBREDIR},
+        {"links[].address", OF_USBIP | OF_USBREDIR},
+        {"links[].port", OF_USBIP | OF_USBREDIR},
+        {"links[].attach", OF_USBIP | OF_USBREDIR},
+        {"links[].udc", OF_FUNCTIONFS},
+    };
+    const char *name = cfg_find(&rd->table, "links[].backend")->names[link->backend];
+    for (size_t k = 0; k < sizeof keys / sizeof keys[0]; k++)
+        if (cfg_is_given(rd, keys[k].path, i) && !(keys[k].backends & 1u << link->backend))
+            return cfg_fail_key(rd, keys[k].path, i, "the back end %s has no such key; allowed without it", name);
+    const int has_port = cfg_is_given(rd, "links[].port", i), has_address = cfg_is_given(rd, "links[].address", i);
+    if (link->path[0] != '\0' && (has_port || has_address))
+        return cfg_fail_key(rd, "links[].path", i, "both a path and a port or address; allowed one of them");
+    if (link->backend == USB_BACKEND_USBIP && link->attach && (has_port || has_address))
+        return cfg_fail_key(rd, "links[].attach", i,
+                            "a device that is attached here listens nowhere; allowed without port and address");
+    if (link->backend == USB_BACKEND_USBREDIR && link->path[0] == '\0' && !has_port)
+        return cfg_fail_key(rd, "links[].backend", i, "usbredir needs a path or a port; allowed with one of them");
+    if (link->backend == USB_BACKEND_USBIP && !has_port) link->port = USB_BACKEND_USBIP_PORT;
+    if (link->serial[0] == '\0') snprintf(link->serial, sizeof link->serial, "%s", cfg->serial);
+    return SH_OK;
+}
+
+static int check_link(const struct cfg_reader *rd, struct config *cfg, uint32_t i)
 {
     static const struct {
         const char *path;
         unsigned types; /* bit per link type that has the key */
     } keys[] = {
-        {"links[].path", 1u << LINK_FILE | 1u << LINK_PTY},
-        {"links[].address", 1u << LINK_TCP},
-        {"links[].port", 1u << LINK_TCP},
+        {"links[].path", 1u << LINK_FILE | 1u << LINK_PTY | 1u << LINK_USB},
+        {"links[].address", 1u << LINK_TCP | 1u << LINK_USB},
+        {"links[].port", 1u << LINK_TCP | 1u << LINK_USB},
         {"links[].max_sessions", 1u << LINK_TCP},
+        {"links[].protocol", 1u << LINK_NULL | 1u << LINK_FILE | 1u << LINK_PTY | 1u << LINK_TCP},
+        {"links[].backend", 1u << LINK_USB},
+        {"links[].attach", 1u << LINK_USB},
+        {"links[].udc", 1u << LINK_USB},
+        {"links[].speed", 1u << LINK_USB},
+        {"links[].vid", 1u << LINK_USB},
+        {"links[].pid", 1u << LINK_USB},
+        {"links[].serial", 1u << LINK_USB},
     };
     static const char *const has[] = {[LINK_NULL] = "type, protocol",
                                       [LINK_FILE] = "type, path, protocol",
                                       [LINK_PTY] = "type, path, protocol",
-                                      [LINK_TCP] = "type, address, port, max_sessions, protocol"};
-    const struct link_spec *link = &cfg->link[i];
+                                      [LINK_TCP] = "type, address, port, max_sessions, protocol",
+                                      [LINK_USB] =
+                                          "type, backend, address, port, path, attach, udc, speed, vid, pid, serial"};
+    struct link_spec *link = &cfg->link[i];
     const char *type = cfg_find(&rd->table, "links[].type")->names[link->type];
     for (size_t k = 0; k < sizeof keys / sizeof keys[0]; k++)
         if (cfg_is_given(rd, keys[k].path, i) && !(keys[k].types & 1u << link->type))
@@ -156,18 +200,41 @@ static int check_link(const struct cfg_reader *rd, const struct config *cfg, uin
     for (uint32_t k = 0; k < i && link->path[0] != '\0'; k++)
         if (strcmp(cfg->link[k].path, link->path) == 0)
             return cfg_fail_key(rd, "links[].path", i, "links[%u] has the same path; allowed a path of its own", k);
+    return link->type == LINK_USB ? check_usb_link(rd, cfg, link, i) : SH_OK;
+}
+
+/* Which part of the trajectory, and where on it to stop. How long it is, its file says (site_platform.c). */
+static int check_part(const struct cfg_reader *rd, struct config *cfg)
+{
+    struct config_platform *p = &cfg->platform;
+    int stops = p->kind == PLATFORM_STOPS;
+    p->has_end = cfg_is_given(rd, "platform.end_s", 0);
+    if (p->has_end && (stops ? p->end_s < p->start_s : p->end_s <= p->start_s))
+        return cfg_fail_key(rd, "platform.end_s", 0, "%.9g s, and platform.start_s is %.9g; allowed %s", p->end_s,
+                            p->start_s, stops ? "start_s or more" : "more than start_s");
+    if (!stops) return SH_OK;
+    if (!(p->step_s > 0.0))
+        return cfg_fail_key(rd, cfg_is_given(rd, "platform.step_s", 0) ? "platform.step_s" : "platform.kind", 0,
+                            "stops need the time from each to the next, platform.step_s; allowed above 0 to 1e9 s");
+    if (cfg->n_stations > 1)
+        return cfg_fail_key(rd, "stations", 0,
+                            "%u of them, but platform.kind is stops, which are the stations; allowed one, which says "
+                            "where on the Earth the scene lies",
+                            cfg->n_stations);
     return SH_OK;
 }
 
-static int check_platform(const struct cfg_reader *rd, const struct config *cfg)
+static int check_platform(const struct cfg_reader *rd, struct config *cfg)
 {
     static const struct {
         const char *path;
         unsigned kinds; /* bit per kind of platform that has the key */
     } keys[] = {
-        {"platform.file", 1u << PLATFORM_TRAJECTORY},
-        {"platform.waypoints", 1u << PLATFORM_TRAJECTORY},
-        {"platform.start_s", 1u << PLATFORM_TRAJECTORY},
+        {"platform.file", 1u << PLATFORM_TRAJECTORY | 1u << PLATFORM_STOPS},
+        {"platform.waypoints", 1u << PLATFORM_TRAJECTORY | 1u << PLATFORM_STOPS},
+        {"platform.start_s", 1u << PLATFORM_TRAJECTORY | 1u << PLATFORM_STOPS},
+        {"platform.end_s", 1u << PLATFORM_TRAJECTORY | 1u << PLATFORM_STOPS},
+        {"platform.step_s", 1u << PLATFORM_STOPS},
         {"platform.at_end", 1u << PLATFORM_TRAJECTORY},
         {"platform.reach_m", 1u << PLATFORM_LIVE},
         {"platform.extrapolate_ms", 1u << PLATFORM_LIVE},
@@ -180,8 +247,9 @@ static int check_platform(const struct cfg_reader *rd, const struct config *cfg)
     };
     static const char *const has[] = {
         [PLATFORM_STATIC] = "kind alone; the station says where the head stands",
-        [PLATFORM_TRAJECTORY] = "file or waypoints, start_s, at_end, mount_...",
+        [PLATFORM_TRAJECTORY] = "file or waypoints, start_s, end_s, at_end, mount_...",
         [PLATFORM_LIVE] = "reach_m, extrapolate_ms, address, port, mount_...",
+        [PLATFORM_STOPS] = "file or waypoints, start_s, end_s, step_s, mount_...",
     };
     const struct config_platform *p = &cfg->platform;
     for (size_t k = 0; k < sizeof keys / sizeof keys[0]; k++)
@@ -191,11 +259,11 @@ static int check_platform(const struct cfg_reader *rd, const struct config *cfg)
     if (p->kind == PLATFORM_LIVE && cfg->pace == PACE_FAST)
         return cfg_fail_key(rd, "loop.pace", 0,
                             "nobody can say in time where a live platform is; allowed realtime, step");
-    if (p->kind != PLATFORM_TRAJECTORY) return SH_OK;
+    if (p->kind != PLATFORM_TRAJECTORY && p->kind != PLATFORM_STOPS) return SH_OK;
     if ((p->file[0] != '\0') == (p->waypoints[0] != '\0'))
         return cfg_fail_key(rd, p->file[0] != '\0' ? "platform.waypoints" : "platform.kind", 0,
                             "a trajectory comes from one file; allowed either platform.file or platform.waypoints");
-    return SH_OK;
+    return check_part(rd, cfg);
 }
 
 static int check_loop(const struct cfg_reader *rd, const struct config *cfg)

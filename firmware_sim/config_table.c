@@ -1,4 +1,5 @@
 /* The table of keys. Parsing, defaults, errors, --set and the reference come from here alone. */
+#include "drivers/usb/backend.h"
 #include "firmware_sim/config_private.h"
 
 #include "core/cast.h"
@@ -21,9 +22,13 @@
 static const char *const up_names[] = {[SCENE_UP_Z] = "z", [SCENE_UP_Y] = "y", NULL};
 static const char *const crs_names[] = {
     [GEOREF_LOCAL] = "local", [GEOREF_ECEF] = "ecef", [GEOREF_UTM] = "utm", [GEOREF_GEODETIC] = "geodetic", NULL};
-static const char *const georef_names[] = {
-    [GEOREF_AUTO] = "auto",     [GEOREF_EXACT] = "exact",   [GEOREF_ORDER1] = "order1",
-    [GEOREF_ORDER2] = "order2", [GEOREF_ORDER3] = "order3", NULL};
+static const char *const georef_names[] = {[GEOREF_AUTO] = "auto",
+                                           [GEOREF_EXACT] = "exact",
+                                           [GEOREF_ORDER1] = "order1",
+                                           [GEOREF_ORDER2] = "order2",
+                                           [GEOREF_ORDER3] = "order3",
+                                           [GEOREF_ORDER5] = "order5",
+                                           NULL};
 static const char *const heights_names[] = {
     [HEIGHTS_ELLIPSOID] = "ellipsoid", [HEIGHTS_GEOID] = "geoid", [HEIGHTS_AUTO] = "auto", NULL};
 static const char *const anchor_names[] = {[ANCHOR_NONE] = "none", [ANCHOR_EXPLICIT] = "explicit", [ANCHOR_IFC] = "ifc",
@@ -31,14 +36,21 @@ static const char *const anchor_names[] = {[ANCHOR_NONE] = "none", [ANCHOR_EXPLI
 static const char *const hemisphere_names[] = {"south", "north", NULL};
 static const char *const layout_names[] = {[LINE_POLAR] = "polar", [LINE_GEO] = "geo", NULL};
 static const char *const link_names[] = {
-    [LINK_NULL] = "null", [LINK_FILE] = "file", [LINK_PTY] = "pty", [LINK_TCP] = "tcp", NULL};
+    [LINK_NULL] = "null", [LINK_FILE] = "file", [LINK_PTY] = "pty", [LINK_TCP] = "tcp", [LINK_USB] = "usb", NULL};
 static const char *const protocol_names[] = {[PROTOCOL_NATIVE] = "native", [PROTOCOL_NMEA] = "nmea", NULL};
 static const char *const talker_names[] = {[TALKER_GN] = "GN", [TALKER_GP] = "GP", NULL};
+static const char *const backend_names[] = {
+    [USB_BACKEND_USBIP] = "usbip", [USB_BACKEND_USBREDIR] = "usbredir", [USB_BACKEND_FUNCTIONFS] = "functionfs", NULL};
+static const char *const speed_names[] = {
+    [USB_RATE_FULL] = "full", [USB_RATE_HIGH] = "high", [USB_RATE_SUPER] = "super", NULL};
 static const char *const pace_names[] = {
     [PACE_REALTIME] = "realtime", [PACE_FAST] = "fast", [PACE_STEP] = "step", NULL};
 
-static const char *const platform_names[] = {
-    [PLATFORM_STATIC] = "static", [PLATFORM_TRAJECTORY] = "trajectory", [PLATFORM_LIVE] = "live", NULL};
+static const char *const platform_names[] = {[PLATFORM_STATIC] = "static",
+                                             [PLATFORM_TRAJECTORY] = "trajectory",
+                                             [PLATFORM_LIVE] = "live",
+                                             [PLATFORM_STOPS] = "stops",
+                                             NULL};
 /* A switch that has got a third way; config_signal.c makes false and true off and on. */
 static const char *const range_noise_names[] = {
     [RANGE_NOISE_OFF] = "off",     [RANGE_NOISE_ON] = "on",     [RANGE_NOISE_SIGNAL] = "signal",
@@ -73,7 +85,7 @@ static const struct cfg_key config_keys[] = {
      IN_CONFIG(settings.pan_stop_udeg), .help = "Pan angle where a frame ends; at most a turn after pan_start_deg."},
     {"head.frames", CFG_COUNT, NULL, "1", 0, 1000000, IN_CONFIG(settings.frames),
      .help = "Frames (pan sweeps) per scan; 0: until stopped."},
-    {"head.station", CFG_COUNT, NULL, "1", 1, CONFIG_MAX_STATIONS, IN_CONFIG(settings.station),
+    {"head.station", CFG_COUNT, NULL, "1", 1, CONFIG_MAX_STOPS, IN_CONFIG(settings.station),
      .help = "Station where the head stands, counted from 1."},
 
     {"head.ambiguity", CFG_ENUM, .def = "none", .names = ambiguity_names, IN_CONFIG(ambiguity),
@@ -97,7 +109,7 @@ static const struct cfg_key config_keys[] = {
     {"scene.meshes[].offset_m", CFG_VEC3, "m", "[0, 0, 0]", -1e9, 1e9, IN_MESH(offset_m),
      .help = "Added after axes and scale."},
     {"scene.meshes[].move_m_s", CFG_VEC3, "m/s", "[0, 0, 0]", -1000, 1000, IN_MESH(move_m_s),
-     .help = "The mesh moves: velocity, from the scan's start."},
+     .help = "The mesh moves: velocity, from the scan's start. At a stop (platform.kind) it stands as at the stop's time."},
     {"scene.meshes[].turn_deg_s", CFG_REAL, "deg/s", "0", -36000, 36000, IN_MESH(turn_deg_s),
      .help = "The mesh turns about the vertical through pivot_m, clockwise seen from above."},
     {"scene.meshes[].pivot_m", CFG_VEC3, "m", "[0, 0, 0]", -1e9, 1e9, IN_MESH(pivot_m), .help = "Where it turns."},
@@ -155,13 +167,17 @@ static const struct cfg_key config_keys[] = {
 
     {"platform", CFG_MAP, .help = "What the head stands on: a tripod, or something that moves."},
     {"platform.kind", CFG_ENUM, .def = "static", .names = platform_names, IN_CONFIG(platform.kind),
-     .help = "static: at the station; trajectory: along a file; live: as a peer says, by UDP or (pace step) with TIME:STEP."},
+     .help = "static: at the station; trajectory: along a file; stops: standing at some of its poses, the scan's stations; live: as a peer says, by UDP or (pace step) with TIME:STEP."},
     {"platform.file", CFG_PATH, .def = "", IN_CONFIG(platform.file),
-     .help = "trajectory: CSV with t_s,x_m,y_m,z_m,roll_deg,pitch_deg,heading_deg (or qw,qx,qy,qz), scene frame."},
+     .help = "trajectory, stops: CSV with t_s,x_m,y_m,z_m,roll_deg,pitch_deg,heading_deg (or qw,qx,qy,qz), scene frame."},
     {"platform.waypoints", CFG_PATH, .def = "", IN_CONFIG(platform.waypoints),
-     .help = "trajectory: CSV with x_m,y_m,z_m,speed_m_s[,pause_s] instead; heading along the path."},
+     .help = "trajectory, stops: CSV with x_m,y_m,z_m,speed_m_s[,pause_s] instead; heading along the path, level as a station there."},
     {"platform.start_s", CFG_REAL, "s", "0", 0, 1e9, IN_CONFIG(platform.start_s),
-     .help = "trajectory: where a scan starts on it, after its first sample."},
+     .help = "trajectory, stops: where a scan starts on it, or the first stop; after its first sample."},
+    {"platform.end_s", CFG_REAL, "s", "0", 0, 1e9, IN_CONFIG(platform.end_s),
+     .help = "trajectory, stops: where it ends, likewise; without the key, with its last sample."},
+    {"platform.step_s", CFG_REAL, "s", "0", 0, 1e9, IN_CONFIG(platform.step_s),
+     .help = "stops: from each to the next, at start_s, start_s + step_s, ... up to end_s; required there."},
     {"platform.at_end", CFG_ENUM, .def = "stop", .names = at_end_names, IN_CONFIG(platform.at_end),
      .help = "trajectory: at its end the scan stops, or the platform holds its last pose."},
     {"platform.mount_m", CFG_VEC3, "m", "[0, 0, 0]", -1000, 1000, IN_CONFIG(platform.mount_m),
@@ -175,9 +191,9 @@ static const struct cfg_key config_keys[] = {
     {"platform.reach_m", CFG_REAL, "m", "100", 1, 1000, IN_CONFIG(platform.reach_m),
      .help = "live: how far from the station the head may come."},
     {"platform.extrapolate_ms", CFG_REAL, "ms", "100", 0, 10000, IN_CONFIG(platform.extrapolate_ms),
-     .help = "live: how long the last two poses are taken to go on; later the platform stands, and is late."},
+     .help = "live: how long the last two poses are taken to go on; later the platform stands, and is late. Between two poses it goes on evenly."},
     {"platform.address", CFG_TEXT, .def = "127.0.0.1", IN_CONFIG(platform.address),
-     .help = "live, in real time: address where poses come in by UDP, lines of t_s x y z roll pitch heading."},
+     .help = "live, in real time: address where poses come in by UDP, lines of t_s x y z roll pitch heading, up to 3600 s ahead of device time."},
     {"platform.port", CFG_COUNT, NULL, "0", 0, 65535, IN_CONFIG(platform.port), .help = "live: its port; 0: the system chooses."},
 
     {"output", CFG_MAP, .help = "Form of the points."},
@@ -203,11 +219,24 @@ static const struct cfg_key config_keys[] = {
     {"links[].protocol", CFG_ENUM, .def = "native", .names = protocol_names, IN_LINK(protocol),
      .help = "native: the head's stream and commands; nmea: the GNSS receiver, NMEA 0183 out, nothing in."},
     {"links[].path", CFG_PATH, .def = "", IN_LINK(path),
-     .help = "pty: symbolic link to the terminal (optional); file: file to write (required)."},
-    {"links[].address", CFG_TEXT, .def = "", IN_LINK(address), .help = "tcp: address to listen on; 127.0.0.1 when not given."},
-    {"links[].port", CFG_COUNT, NULL, "0", 0, 65535, IN_LINK(port), .help = "tcp: port; 0: the system chooses."},
+     .help = "pty: symbolic link to the terminal (optional); file: file to write (required); usbredir: Unix socket, instead of a port."},
+    {"links[].address", CFG_TEXT, .def = "", IN_LINK(address), .help = "tcp, usb: address to listen on; 127.0.0.1 when not given."},
+    {"links[].port", CFG_COUNT, NULL, "0", 0, 65535, IN_LINK(port),
+     .help = "tcp, usb: port; 0: the system chooses; usbip, when not given: 3240."},
     {"links[].max_sessions", CFG_COUNT, NULL, "4", 1, LINK_MAX_SESSIONS, IN_LINK(max_sessions),
      .help = "tcp: clients at a time."},
+    {"links[].backend", CFG_ENUM, .def = "usbip", .names = backend_names, IN_LINK(backend),
+     .help = "usb: how the device reaches a host."},
+    {"links[].attach", CFG_BOOL, .def = "off", IN_LINK(attach),
+     .help = "usbip: plug into this machine's vhci_hcd; usbredir: connect to the guest's socket instead of listening."},
+    {"links[].udc", CFG_TEXT, .def = "", IN_LINK(udc), .help = "functionfs: USB device controller; when not given, the first free one."},
+    {"links[].speed", CFG_ENUM, .def = "high", .names = speed_names, IN_LINK(speed),
+     .help = "usb: full (12 Mbit/s), high (480) or super (5000); the fastest the device can do."},
+    {"links[].vid", CFG_COUNT, NULL, "0x1209", 1, 65535, IN_LINK(vid), .flags = CFG_HEX, .allowed = "0x0001 to 0xffff",
+     .help = "usb: vendor id; the default pair is set aside for private tests."},
+    {"links[].pid", CFG_COUNT, NULL, "0x0001", 0, 65535, IN_LINK(pid), .flags = CFG_HEX, .allowed = "0x0000 to 0xffff",
+     .help = "usb: product id."},
+    {"links[].serial", CFG_TEXT, .def = "", IN_LINK(serial), .help = "usb: serial number; head.serial when not given."},
 
     {"noise", CFG_MAP, .help = "Noise of the measurement."},
     {"noise.range", CFG_ENUM, .def = "off", .names = range_noise_names, IN_CONFIG(noise_range), .allowed = "on or off, or signal",

@@ -143,12 +143,22 @@ static int refuse(const struct place *at, const char *text, const char *what)
                     cfg_show(text, shown), what, cfg_allowed(at->key, allowed));
 }
 
+static enum cfg_number parse_hex(const char *digits, __int128 *out)
+{
+    size_t n = strspn(digits, "0123456789abcdefABCDEF");
+    if (n == 0 || digits[n] != '\0') return CFG_NOT_A_NUMBER;
+    if (n > 15) return CFG_TOO_LARGE;
+    *out = (__int128)strtoull(digits, NULL, 16);
+    return CFG_NUMBER_OK;
+}
+
 static int store_whole(const struct place *at, void *dst, const char *text)
 {
     const struct cfg_key *key = at->key;
     int decimals = key->type == CFG_MICRO ? 6 : 0;
     __int128 value, unit = key->type == CFG_MICRO ? 1000000 : 1;
-    switch (cfg_parse_decimal(text, decimals, &value)) {
+    switch (key->flags & CFG_HEX && text[0] == '0' && text[1] == 'x' ? parse_hex(text + 2, &value)
+                                                                     : cfg_parse_decimal(text, decimals, &value)) {
     case CFG_NOT_A_NUMBER:
         return refuse(at, text, "not a number");
     case CFG_TOO_FINE:

@@ -79,7 +79,9 @@ static void begin_scan(struct device *device, uint64_t tick)
     device->pulse_next = 0;
     device->scan_lost0 = atomic_load(&device->counters.lost_pulses);
     device->station = device->cmd.settings.station - 1;
+    device->stretch = site_stretch_at(device->site, 0);
     device->describe = 1;
+    device->anchor_lost = 0;
     device->cmd.frames_done = 0;
     device->live.next = 0;
     device_push_event(device, NATIVE_EV_SCAN_START, device->scan, tick * (uint64_t)device->tick_ns,
@@ -167,6 +169,7 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
     work->scan_t0_ns = (int64_t)device->scan_tick0 * device->tick_ns;
     work->segment = *seg;
     work->station = device->station;
+    work->stretch = device->stretch;
     work->pulse0 = device->pulse_next;
     /* A stop keeps what was fired before this tick began; else the cut leaves whole packets for the next tick. */
     int64_t path_end_ns = device_path_end_ns(device), until_ns = stop ? since : since + device->tick_ns;
@@ -182,6 +185,7 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
     if (done || end > seg->end_pulse) end = seg->end_pulse;
     if (end < work->pulse0) end = work->pulse0;
     work->pulse_end = device->pulse_next = end;
+    if (end > work->pulse0) device->stretch = site_stretch_at(device->site, schedule_time_ns(seg, end - 1));
     work->cut_short = (stop || arrives) && end < seg->end_pulse;
     device_take_poses(device, work);
     struct schedule_line line;
@@ -190,16 +194,21 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
     return done || stop || arrives;
 }
 
+static int is_repeated(const struct device *device, uint64_t tick)
+{
+    uint64_t since = tick - device->scan_tick0;
+    return device->scanning && ((since != 0 && since % device->tick_hz == 0) || device->anchor_lost);
+}
+
 static void describe(struct device *device, uint64_t tick, struct device_work *work)
 {
     uint64_t since = tick - device->scan_tick0;
-    int repeat = since != 0 && since % device->tick_hz == 0;
-    if (device->describe || repeat) {
+    if (device->describe || is_repeated(device, tick)) {
         work->describe = 1;
         work->describe_flags = device->describe ? 0 : NATIVE_REPEAT;
         device_fill_descriptor(device, &work->descriptor);
-        device_fill_anchor(device, &work->anchor);
-        device->describe = 0;
+        device_fill_anchor(device->site, device->station, device->stretch, &work->anchor);
+        device->describe = device->anchor_lost = 0;
     }
     /* All names at the scan's start, then round and round for those who join late. */
     uint32_t n = device->site->n_surfaces;
@@ -234,6 +243,7 @@ static void end_scan(struct device *device, uint64_t tick)
     uint64_t lost = atomic_load(&device->counters.lost_pulses) - device->scan_lost0;
     int stopped = device->stop_requested;
     device->scanning = 0;
+    device->scan_end_tick = tick;
     device->stop_requested = 0;
     device_push_event(device, NATIVE_EV_SCAN_END, device->scan, device->pulse_next, lost, "");
     device_transition(device, stopped ? HEAD_EV_STOP : HEAD_EV_DONE, tick);
@@ -259,6 +269,7 @@ int device_claim(struct device *device, uint64_t released, struct device_work *w
     run_timers(device, tick);
     say_overrun(device, tick);
     device_say_pps(device, tick);
+    if (is_repeated(device, tick)) device_say_time(device, tick); /* who joins now knows it before the first point */
     take_events(device, work);
     work->n_events_before = work->n_events;
     if (device->scanning) {
@@ -311,6 +322,7 @@ void device_lost(struct device *device, const struct device_work *work, uint64_t
     if (first_cast < device->lost_first) device->lost_first = first_cast;
     take_back(device, work);
     if (work->describe && work->describe_flags == 0 && device->scanning) device->describe = 1;
+    if (work->scanning && work->stretch != device->stretch) device->anchor_lost = 1; /* maybe not in this tick */
     pthread_mutex_unlock(&device->lock);
 }
 

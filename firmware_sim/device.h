@@ -18,7 +18,7 @@
 #include "firmware_sim/journal.h"
 #include "firmware_sim/site.h"
 
-enum { DEVICE_MAX_EVENTS = 24, DEVICE_MAX_POSES = 256 };
+enum { DEVICE_MAX_EVENTS = 24, DEVICE_MAX_POSES = 256, DEVICE_POSE_AHEAD_S = 3600 };
 
 /* Counters that casters, pacing thread and readers share. */
 struct device_counters {
@@ -46,6 +46,7 @@ struct device_work {
     uint64_t pulse0, pulse_end; /* pulses of this tick */
     int cut_short;              /* the scan stops at pulse_end, within a line */
     uint32_t station;
+    size_t stretch;   /* of a trajectory: the one that the last anchor was for */
     uint32_t n_poses; /* live: the head's poses of this tick; 0: a head that stands still, or goes along a trajectory */
     struct pose_knot pose[DEVICE_MAX_POSES];
     int telemetry;
@@ -92,7 +93,9 @@ void device_overlong(struct device *device, uint32_t session, struct command_res
 /* A session has gone; partial: in the middle of a command. Gives control back. */
 void device_session_closed(struct device *device, uint32_t session, const char *who, int partial);
 /* Where a live platform is at a device time (of its own, before the mount): from TIME:STEP or the socket. Returns 0, or
- * 1 where it can't be used (not later than the one before, or out of reach): then it is counted. */
+ * 1 where it can't be used (not later than the one before, out of reach, or, but for the pace step, more than
+ * DEVICE_POSE_AHEAD_S ahead of device time): then it is counted. However far apart they are, the platform moves evenly
+ * from one pose to the next. */
 int device_pose(struct device *device, int64_t t_ns, const struct pose *pose);
 /* The same from x, y, z (m), roll, pitch, heading (degrees). */
 int device_pose_numbers(struct device *device, int64_t t_ns, const double v[6]);
@@ -115,6 +118,9 @@ size_t device_gnss_sentences(struct device *device, uint64_t index, char *dst, s
 uint64_t device_scans(struct device *device);
 
 double device_tick_ns(const struct device *device);
+
+/* The anchor of a station's points; the stretch counts only along a trajectory (site_georef). */
+void device_fill_anchor(const struct site *site, uint32_t station, size_t stretch, struct native_anchor *a);
 
 /* The most pulses that one tick consists of, and lines that end in it, whatever the settings: a slot has to hold them.
  */

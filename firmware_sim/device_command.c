@@ -131,7 +131,7 @@ static int set_limits(struct device *device, struct sh_err *err)
                                               .fov_max_udeg = p->fov_max_udeg,
                                               .pan_min_udeg = p->pan_min_udeg,
                                               .pan_max_udeg = p->pan_max_udeg,
-                                              .n_stations = cfg->n_stations};
+                                              .n_stations = device->site->n_stations};
     device->cmd.settings = device->cmd.defaults = cfg->settings;
     char idn[256];
     snprintf(idn, sizeof idn, "%s,%s,%s,scanhead native %d", p->maker, p->model, cfg->serial, NATIVE_VERSION);

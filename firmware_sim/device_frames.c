@@ -59,28 +59,33 @@ void device_fill_descriptor(const struct device *device, struct native_descripto
     d->seed = cfg->seed;
 }
 
-void device_fill_anchor(const struct device *device, struct native_anchor *a)
+void device_fill_anchor(const struct site *site, uint32_t station, size_t stretch, struct native_anchor *a)
 {
     static const uint32_t crs[] = {[GEOREF_LOCAL] = NATIVE_CRS_LOCAL,
                                    [GEOREF_ECEF] = NATIVE_CRS_ECEF,
                                    [GEOREF_UTM] = NATIVE_CRS_UTM,
                                    [GEOREF_GEODETIC] = NATIVE_CRS_GEODETIC};
-    const struct site_station *s = &device->site->station[device->station];
+    const struct site_station *s = &site->station[station];
+    const double *centre_m, *scale;
+    const struct georef *georef = site_georef(site, station, stretch, &centre_m, &scale);
     memset(a, 0, sizeof *a);
-    a->crs = crs[device->site->cfg->crs];
-    a->epsg = (uint32_t)georef_epsg(s->georef);
-    a->station = device->station + 1;
-    georef_anchor(s->georef, a->anchor);
-    a->scale_m = device->site->scale_m;
+    a->crs = crs[site->cfg->crs];
+    a->epsg = (uint32_t)georef_epsg(georef);
+    a->station = station + 1;
+    georef_anchor(georef, a->anchor);
+    a->scale_m = site->scale_m;
     a->lat_deg = s->at.lat_deg;
     a->lon_deg = s->at.lon_deg;
     a->height_m = s->at.height_m;
     memcpy(a->station_m, s->at.position_m, sizeof a->station_m);
     memcpy(a->rotation, s->at.rotation, sizeof a->rotation);
-    a->moving = (uint32_t)device->site->moving;
-    memcpy(a->scale, s->scale, sizeof a->scale);
-    georef_axes(s->georef, a->axes);
-    a->heights = georef_has_geoid(s->georef) ? NATIVE_HEIGHTS_GEOID : NATIVE_HEIGHTS_ELLIPSOID;
+    a->moving = site->moving ? NATIVE_MOVING : site->stop != NULL ? NATIVE_STOP : 0;
+    a->frame = s->frame;
+    memcpy(a->scale, scale, sizeof a->scale);
+    georef_axes(georef, a->axes);
+    if (s->leg != NULL && site->stretch[stretch].until_ns != INT64_MAX)
+        a->until_ms = (uint32_t)(site->stretch[stretch].until_ns / 1000000);
+    a->heights = georef_has_geoid(georef) ? NATIVE_HEIGHTS_GEOID : NATIVE_HEIGHTS_ELLIPSOID;
 }
 
 void device_fill_telemetry(const struct device *device, uint64_t tick, struct native_telemetry *t)

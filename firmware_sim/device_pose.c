@@ -33,11 +33,18 @@ static int is_near(const struct device *device, const struct pose *pose)
     return d2 <= device->site->cfg->platform.reach_m * device->site->cfg->platform.reach_m;
 }
 
+/* So far ahead that the time must be wrong: taken, it would keep all right ones out. A step's end is granted time. */
+static int is_early(const struct device *device, int64_t t_ns)
+{
+    int64_t now_ns = (int64_t)device->next_tick * device->tick_ns;
+    return device->site->cfg->pace != PACE_STEP && t_ns > now_ns + DEVICE_POSE_AHEAD_S * INT64_C(1000000000);
+}
+
 int device_pose(struct device *device, int64_t t_ns, const struct pose *pose)
 {
     struct device_live *live = &device->live;
     pthread_mutex_lock(&device->lock);
-    int bad = (live->n != 0 && t_ns <= sample_t(live, live->n - 1)) || !is_near(device, pose);
+    int bad = (live->n != 0 && t_ns <= sample_t(live, live->n - 1)) || !is_near(device, pose) || is_early(device, t_ns);
     if (!bad) {
         live->sample[live->n % LEN(live->sample)].t_ns = t_ns;
         live->sample[live->n++ % LEN(live->sample)].pose = *pose;
@@ -116,7 +123,8 @@ int device_head_pose(struct device *device, int64_t t_ns, struct pose *head)
     if (!site->moving || (site->n_knots == 0 && device->live.n == 0)) return 0;
     if (site->n_knots != 0) {
         int64_t start_ns = (int64_t)device->scan_tick0 * device->tick_ns;
-        on_path(site, device->scan == 0 ? 0 : t_ns - start_ns, head);
+        int64_t end_ns = device->scanning ? t_ns : (int64_t)device->scan_end_tick * device->tick_ns;
+        on_path(site, device->scan == 0 ? 0 : (t_ns < end_ns ? t_ns : end_ns) - start_ns, head);
         return 1;
     }
     platform_at(device, t_ns, &body);

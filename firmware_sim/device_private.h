@@ -46,9 +46,12 @@ struct device {
     int scanning;
     uint32_t scan; /* number, from 1 */
     uint64_t scan_tick0, pulse_next, scan_lost0;
+    uint64_t scan_end_tick; /* of the last scan, when none is on */
     struct schedule_segment segment;
     uint32_t station; /* of the scan at hand, from 0 */
+    size_t stretch;   /* of a trajectory: the one of the last pulse that is claimed */
     int describe;     /* descriptor and anchor are due, as news */
+    int anchor_lost;  /* they are due as a repetition: a new anchor was in a tick that was lost */
     int stop_requested;
 
     struct native_event pending[DEVICE_MAX_PENDING];
@@ -77,8 +80,8 @@ void device_do_command(struct device *device, uint32_t session, const char *line
 
 /* device_pose.c: with the lock held. The end of the head's path, since the scan's start; INT64_MAX: there is none. */
 int64_t device_path_end_ns(const struct device *device);
-/* Where the head is at a device time; 0: it stands at its station. A trajectory runs from the start of the last scan.
- */
+/* Where the head is at a device time; 0: it stands at its station. A trajectory runs from the start of the last scan to
+ * its end, and the platform stands there until the next one begins. */
 int device_head_pose(struct device *device, int64_t t_ns, struct pose *head);
 /* Poses of a live head for the pulses that the work holds. */
 void device_take_poses(struct device *device, struct device_work *work);
@@ -87,12 +90,12 @@ void device_take_poses(struct device *device, struct device_work *work);
 int64_t device_gps_ns(const struct device *device, int64_t t_ns);
 /* An event for the full second that begins in the tick, if one does. */
 void device_say_pps(struct device *device, uint64_t tick);
+void device_say_time(struct device *device, uint64_t tick);
 /* What TIME:UTC? and TIME:GPS? answer at cmd.t_ns. */
 void device_set_time_texts(struct device *device);
 
 /* device_frames.c: what the frames say. */
 void device_fill_descriptor(const struct device *device, struct native_descriptor *d);
-void device_fill_anchor(const struct device *device, struct native_anchor *a);
 void device_fill_telemetry(const struct device *device, uint64_t tick, struct native_telemetry *t);
 void device_fill_spec(const struct device *device, struct schedule_spec *spec);
 

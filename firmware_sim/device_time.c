@@ -32,6 +32,13 @@ void device_say_pps(struct device *device, uint64_t tick)
                       (uint64_t)edge_ns, (uint64_t)(utc_gps_ns(tai_ns) / UTC_SECOND_NS), text);
 }
 
+void device_say_time(struct device *device, uint64_t tick)
+{
+    int64_t t_ns = (int64_t)tick * device->tick_ns;
+    if (device->clock.source == HEAD_CLOCK_NONE) return;
+    device_push_event(device, NATIVE_EV_TIME, 0, (uint64_t)t_ns, (uint64_t)device_gps_ns(device, t_ns), "");
+}
+
 void device_set_time_texts(struct device *device)
 {
     struct command_device *cmd = &device->cmd;

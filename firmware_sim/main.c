@@ -12,7 +12,7 @@ const struct cmd cmd_table[] = {
     {"report", "CONFIG CLOUD [options]", "distance of a recording's points from the scene", cmd_report},
     {"check", "CONFIG [options]", "validate configuration, scene and links; nothing runs", cmd_check},
     {"bench", "[options]", "speed figures as JSON on standard output", cmd_bench},
-    {"list", "", "head profiles and kinds of links", cmd_list},
+    {"list", "", "head profiles, kinds of links, heads on USB", cmd_list},
     {NULL, NULL, NULL, NULL},
 };
 

@@ -148,6 +148,7 @@ static int find(const struct config_station *s, const struct placement_anchor *a
     if (rc == SH_OK && anchor->known) rc = geoframe_level(&anchor->frame, out->position_m, level, err);
     if (rc == SH_OK && s->has_instrument_height) rc = stand_on_floor(s, level, scene, out, err);
     if (rc == SH_OK && anchor->known) rc = geoframe_locate(&anchor->frame, out->position_m, &at, err);
+    if (!anchor->known) at.height_m += out->position_m[2] - s->position_m[2]; /* both are where the search began */
     if (rc != SH_OK) return rc;
     out->on_earth = anchor->known || s->place != PLACE_NONE;
     out->lat_deg = at.lat_deg;

@@ -62,7 +62,7 @@ static void take_line(struct pose_feed *feed, const char *line)
         atomic_fetch_add(&device_counters(feed->device)->bad_poses, 1);
         tell_bad(feed, "a pose that is not t_s x y z roll pitch heading");
     } else if (device_pose_numbers(feed->device, t_ns, pose) != 0) {
-        tell_bad(feed, "a pose out of platform.reach_m, or not later than the one before");
+        tell_bad(feed, "a pose out of platform.reach_m, not after the last one, or over 1 h ahead");
     }
 }
 

@@ -3,8 +3,9 @@
  *   t_s x y z roll pitch heading
  *
  * device time in seconds (TIME? asks for it), metres in the scene frame, degrees as core/pose.h has them; blanks or
- * commas between. A thread of its own takes them in. Lines that are wrong, out of reach or not later than the one
- * before are counted (bad_poses), and told once per second at most. */
+ * commas between. A thread of its own takes them in. Lines that are wrong, out of reach, not later than the one
+ * before or more than DEVICE_POSE_AHEAD_S ahead of device time are counted (bad_poses), and told once per second at
+ * most. */
 #ifndef FIRMWARE_SIM_POSE_FEED_H
 #define FIRMWARE_SIM_POSE_FEED_H
 
@@ -14,7 +15,8 @@
 
 struct pose_feed;
 
-/* Listens where platform.address and platform.port of the device's configuration say. */
+/* Listens where platform.address and platform.port of the device's configuration say. device NULL: to see whether it
+ * can, not to be started. */
 int pose_feed_open(struct device *device, const struct config *cfg, struct pose_feed **out, struct sh_err *err);
 int pose_feed_start(struct pose_feed *feed, struct sh_err *err);
 /* "udp:127.0.0.1:4711" */

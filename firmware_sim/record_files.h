@@ -22,6 +22,8 @@ struct record_files {
 
 /* SH_EINPUT: too many, twice the same, an ending without a recorder. path must live on. */
 int record_files_add(struct record_files *files, const char *path, struct sh_err *err);
+/* SH_EINPUT where one holds metres alone, for a stream of geodetic coordinates. */
+int record_files_check_degrees(const struct record_files *files, struct sh_err *err);
 int record_files_open(struct record_files *files, struct sh_err *err);
 int record_files_frame(struct record_files *files, struct scanhead *sh, const struct scanhead_frame *frame,
                        struct sh_err *err);

@@ -14,6 +14,7 @@ struct recording_options {
     uint32_t first_station, last_station; /* scanned one after the other, from 1; 0: as the head is set */
     long frames;                          /* per scan; -1: as the head is set */
     double duration_s;                    /* > 0: stop each scan after this time of scanning */
+    double replug_s;                      /* > 0: how long to wait for a head that was unplugged, to go on then */
     int progress;                         /* to the report, about once a second */
     const struct sh_report *report;
     /* Each frame, in order. A negative SH_E ends the recording with it. */
@@ -25,8 +26,10 @@ struct recording_options {
 
 struct recording_result {
     uint64_t points, empty, frames, scans, pulses;
-    uint64_t lost_pulses; /* as the head says: cast pulses it could not compute */
-    int ended_early;      /* the stream ended before the scan did */
+    uint64_t lost_pulses;           /* as the head says: cast pulses it could not compute */
+    int ended_early;                /* the stream ended before the scan did */
+    char missing[128];              /* what was asked for but left out because of `interrupted`; empty: nothing */
+    uint64_t replugs, broken_scans; /* how often the head was away and came back; scans in which it was */
 };
 
 int recording_run(struct scanhead *sh, const struct recording_options *options, struct recording_result *result,

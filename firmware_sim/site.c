@@ -1,6 +1,7 @@
 #include "firmware_sim/site_detect.h"
 #include "firmware_sim/site_georef.h"
 #include "firmware_sim/site_platform.h"
+#include "firmware_sim/site_stops.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -102,6 +103,11 @@ void site_move(const struct site *site, double t_s, struct cast_setup *setup)
     }
 }
 
+double site_mover_time(const struct site *site, uint32_t station, double scan_s)
+{
+    return site->stop != NULL ? site->station[station].t_s : scan_s;
+}
+
 static double distance_m(const double a[3], const double b[3])
 {
     return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
@@ -111,7 +117,7 @@ static double distance_m(const double a[3], const double b[3])
 static double station_reach(const struct site *site, const double origin_m[3])
 {
     double reach_m = 0.0;
-    for (uint32_t i = 0; i < site->cfg->n_stations; i++) {
+    for (uint32_t i = 0; i < site->n_stations; i++) {
         double d = distance_m(site->station[i].at.position_m, origin_m);
         if (d <= SITE_BVH_REACH_M) reach_m = fmax(reach_m, d + site_ray_reach_m(site, site->station[i].at.position_m));
     }
@@ -129,6 +135,9 @@ static int find_bvh(struct site *site, const double station_m[3], const struct s
             return SH_OK;
         }
     }
+    if (site->n_bvh == CONFIG_MAX_STATIONS)
+        return sh_fail(err, SH_EINPUT, "%s: the stations are too far apart; allowed %d groups of %.0f m across",
+                       site->cfg->file, CONFIG_MAX_STATIONS, 2.0 * SITE_BVH_REACH_M);
     int rc = bvh_create(site->scene, station_m, station_reach(site, station_m), site->cfg->threads, report, out, err);
     if (rc != SH_OK) return rc;
     site->bvh[site->n_bvh++] = *out;
@@ -136,34 +145,48 @@ static int find_bvh(struct site *site, const double station_m[3], const struct s
 }
 
 /* All places are known before the first BVH is built. */
-static int place_stations(struct site *site, const struct sh_report *report, struct sh_err *err)
-{
-    int rc = placement_find_anchor(site->cfg, report, &site->anchor, err);
-    for (uint32_t i = 0; i < site->cfg->n_stations && rc == SH_OK; i++)
-        rc = placement_find(site->cfg, i, &site->anchor, site->scene, &site->station[i].at, err);
-    return rc;
-}
-
-int site_utm_zone(const struct site *site)
-{
-    const struct geoframe *frame = &site->anchor.frame;
-    const struct placement *first = &site->station[0].at;
-    struct locate_grid utm;
-    if (site->cfg->utm_zone != 0 || !site->anchor.known || frame->kind == GEOFRAME_GRID) return site->cfg->utm_zone;
-    int tangent = frame->kind == GEOFRAME_TANGENT;
-    const struct georef_place at = {tangent ? frame->lat_deg : first->lat_deg,
-                                    tangent ? frame->lon_deg : first->lon_deg, 0.0};
-    int rc = locate_in_grid(&at, 0, &utm, NULL);
-    return rc == SH_OK ? utm.zone : 0;
-}
-
-static int add_station(struct site *site, const struct sh_report *report, struct sh_err *err)
+static int place_stations(struct site *site, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
-    uint32_t i = site->n_stations;
+    int rc = SH_OK;
+    site->station = calloc(cfg->n_stations, sizeof *site->station);
+    if (site->station == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %u stations", cfg->n_stations);
+    site->n_stations = cfg->n_stations;
+    for (uint32_t i = 0; i < cfg->n_stations && rc == SH_OK; i++) {
+        site->station[i].station = &cfg->station[i];
+        rc = placement_find(cfg, i, &site->anchor, site->scene, &site->station[i].at, err);
+    }
+    return rc == SH_OK && cfg->platform.kind == PLATFORM_STOPS ? site_load_stops(site, err) : rc;
+}
+
+void site_grid(const struct site *site, int *zone, int *side)
+{
+    const struct geoframe *frame = &site->anchor.frame;
+    const struct site_station *first = &site->station[0];
+    struct locate_grid utm;
+    *zone = site->cfg->utm_zone;
+    *side = 0;
+    if (first->station->place == PLACE_UTM) *side = first->station->north ? 1 : -1;
+    if (!site->anchor.known) return;
+    int tangent = frame->kind == GEOFRAME_TANGENT;
+    if (frame->kind == GEOFRAME_GRID) {
+        if (*zone == 0) *zone = frame->zone == 0 ? GEOREF_UPS : frame->zone;
+        *side = frame->north ? 1 : -1;
+        return;
+    }
+    const struct georef_place at = {tangent ? frame->lat_deg : first->at.lat_deg,
+                                    tangent ? frame->lon_deg : first->at.lon_deg, 0.0};
+    if (locate_in_grid(&at, *zone, &utm, NULL) != SH_OK) return;
+    *zone = utm.zone == 0 ? GEOREF_UPS : utm.zone;
+    if (*side == 0) *side = utm.north ? 1 : -1;
+}
+
+static int add_station(struct site *site, uint32_t i, const struct sh_report *report, struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
     struct site_station *s = &site->station[i];
-    struct georef_spec spec = {.crs = cfg->crs, .utm_zone = site_utm_zone(site), .geoid = site->geoid};
-    s->station = &cfg->station[i];
+    struct georef_spec spec = {.crs = cfg->crs, .geoid = site->geoid};
+    site_grid(site, &spec.utm_zone, &spec.side);
     int rc = placement_georef(&s->at, &site->anchor, &spec, err);
     if (site->moving)
         s->bvh = site->bvh[0];
@@ -171,7 +194,6 @@ static int add_station(struct site *site, const struct sh_report *report, struct
         rc = find_bvh(site, s->at.position_m, report, &s->bvh, err);
     if (rc == SH_OK) rc = georef_create(&spec, &s->georef, err);
     if (rc != SH_OK) return rc;
-    site->n_stations++;
     int epsg = georef_epsg(s->georef), first = georef_epsg(site->station[0].georef);
     if (epsg != first)
         sh_warn(report, "%s: station %s is in EPSG %d, station %s in %d: their points do not fit together", cfg->file,
@@ -185,15 +207,17 @@ int site_load(const struct config *cfg, const struct sh_report *report, struct s
     struct site *site = calloc(1, sizeof *site);
     if (site == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     site->cfg = cfg;
-    site->moving = cfg->platform.kind != PLATFORM_STATIC;
+    site->moving = config_head_moves(&cfg->platform);
     int rc = site_open_geoid(site, err);
+    /* before the scene: what is wrong with an IFC file's site is told rather than what follows from it */
+    if (rc == SH_OK) rc = placement_find_anchor(cfg, report, &site->anchor, err);
     if (rc == SH_OK) rc = load_scene(site, report, err);
     if (rc == SH_OK) rc = site_set_up_detect(site, report, err);
-    if (rc == SH_OK) rc = place_stations(site, report, err);
+    if (rc == SH_OK) rc = place_stations(site, err);
     if (rc == SH_OK && site->moving) rc = site_load_platform(site, report, err);
-    for (uint32_t i = 0; i < cfg->n_stations && rc == SH_OK; i++)
-        rc = add_station(site, report, err);
-    if (rc == SH_OK) rc = site_choose_scale(site, err);
+    for (uint32_t i = 0; i < site->n_stations && rc == SH_OK; i++)
+        rc = add_station(site, i, report, err);
+    if (rc == SH_OK) rc = site_choose_scale(site, report, err);
     if (rc != SH_OK) {
         site_free(site);
         return rc;
@@ -206,9 +230,15 @@ void site_free(struct site *site)
 {
     if (site == NULL) return;
     free(site->knot);
-    free(site->stretch);
-    for (uint32_t i = 0; i < site->n_stations; i++)
-        georef_free(site->station[i].georef);
+    free(site->stop);
+    for (uint32_t i = 0; i < site->n_stations; i++) {
+        struct site_station *s = &site->station[i];
+        for (size_t k = 0; s->leg != NULL && k < site->n_stretches; k++)
+            georef_free(s->leg[k].georef);
+        free(s->leg);
+        georef_free(s->georef);
+    }
+    free(site->station);
     for (uint32_t i = 0; i < site->n_bvh; i++)
         bvh_free(site->bvh[i]);
     for (uint32_t i = 0; i < site->n_movers; i++) {
@@ -217,8 +247,19 @@ void site_free(struct site *site)
     }
     scene_free(site->scene);
     georef_geoid_free(site->geoid);
+    free(site->stretch);
     site_free_detect(site);
     free(site);
+}
+
+const struct georef *site_georef(const struct site *site, uint32_t station, size_t stretch, const double **centre_m,
+                                 const double **scale)
+{
+    const struct site_station *s = &site->station[station];
+    const struct site_leg *leg = s->leg != NULL ? &s->leg[stretch] : NULL;
+    *centre_m = leg != NULL ? site->stretch[stretch].centre_m : s->at.position_m;
+    *scale = leg != NULL ? leg->scale : s->scale;
+    return leg != NULL ? leg->georef : s->georef;
 }
 
 static double counts_or_ideal(double counts)

@@ -11,13 +11,21 @@
 #include "firmware_sim/config.h"
 #include "firmware_sim/placement.h"
 
+/* Points of the geo layout along one stretch of a head's path: about its centre. */
+struct site_leg {
+    struct georef *georef;
+    double scale[3]; /* as below */
+};
+
 struct site_station {
-    const struct config_station *station;
-    struct bvh *bvh; /* shared where stations are near each other */
+    const struct config_station *station; /* of the configuration, or of stops */
+    struct bvh *bvh;                      /* shared where stations are near each other */
     struct georef *georef;
     struct placement at;
     double scale[3];      /* of geo points on the wire, units of the CRS per count */
-    struct plan_row plan; /* how the georef's method was chosen */
+    struct site_leg *leg; /* one for each stretch of a trajectory, in the geo layout; else NULL */
+    struct plan_row plan; /* how the georef's method was chosen; of the worst leg */
+    double t_s, frame;    /* a stop: when it is, after the trajectory's first sample; frame scalar of the trajectory */
 };
 
 struct site_mover {
@@ -41,8 +49,9 @@ struct site_detect {
 
 /* A stretch of a moving head's path, with a BVH that reaches all of it. */
 struct site_stretch {
-    int64_t until_ns; /* since the scan's start */
+    int64_t until_ns; /* since the scan's start: whole milliseconds; INT64_MAX: the last one */
     struct bvh *bvh;
+    double centre_m[3], reach_m; /* all of it lies so near to that */
 };
 
 struct site {
@@ -54,9 +63,10 @@ struct site {
     struct site_detect detect;
     struct bvh *bvh[CONFIG_MAX_STATIONS];
     uint32_t n_bvh;
-    struct site_station station[CONFIG_MAX_STATIONS];
+    struct site_station *station;
     uint32_t n_stations;
-    struct georef_geoid *geoid; /* NULL: heights are ellipsoidal */
+    struct config_station *stop; /* the stations where the platform stops; NULL: the configuration's are */
+    struct georef_geoid *geoid;  /* NULL: heights are ellipsoidal */
     /* A moving head; the stations then only say where on Earth the scene lies. */
     int moving;
     struct pose mount;            /* of the head on the platform */
@@ -65,7 +75,7 @@ struct site {
     double knot_error_m;          /* what the head's path differs from the trajectory by, at most */
     struct site_stretch *stretch; /* in order of time */
     size_t n_stretches;
-    double path_reach_m; /* from any station */
+    double live_reach_m; /* of a live head from any station */
     double scale_m;      /* of positions and ranges on the wire, metres per count */
 };
 
@@ -79,18 +89,27 @@ struct site {
 int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err);
 void site_free(struct site *site);
 
-/* UTM zone for all stations of an anchored scene: that of the anchor, or of the first station; else, and where
- * output.utm_zone or the scene's own grid says it, as the configuration has it (0: by position). */
-int site_utm_zone(const struct site *site);
+/* The grid of output.crs utm, as georef_spec has it: one for all stations of an anchored scene, that of the anchor or
+ * of the first station, unless output.utm_zone or the scene's own grid says it; else by position. The hemisphere of the
+ * false northing is that in which the first station is given, if it is given in UTM. */
+void site_grid(const struct site *site, int *zone, int *side);
 
 /* Names of a label below n_surfaces. */
 const struct scene_surface *site_surface(const struct site *site, uint32_t label);
 
-/* The BVH for a moving head at a time of the scan. */
-struct bvh *site_bvh_at(const struct site *site, int64_t t_ns);
+/* On which stretch a moving head is at a time of the scan; and what the casters need there, in a setup for the station.
+ */
+size_t site_stretch_at(const struct site *site, int64_t t_ns);
+void site_enter(const struct site *site, uint32_t station, size_t stretch, struct cast_setup *setup);
 
-/* Poses of all movers at a time of the scan. */
+/* The georeference of a station's points on a stretch, what the anchor is in the scene, and its scale. The stretch
+ * counts only along a trajectory. */
+const struct georef *site_georef(const struct site *site, uint32_t station, size_t stretch, const double **centre_m,
+                                 const double **scale);
+
+/* Poses of all movers at a time of the scan; at a stop they stand as at the stop's own (site_mover_time). */
 void site_move(const struct site *site, double t_s, struct cast_setup *setup);
+double site_mover_time(const struct site *site, uint32_t station, double scan_s);
 
 /* What the casters need to scan from a station (0..n_stations-1). */
 void site_cast_setup(const struct site *site, uint32_t station, struct cast_setup *setup);

@@ -12,6 +12,6 @@ int site_plan_georef(const struct site *site, struct site_station *s, const stru
                      struct sh_err *err);
 
 /* Metres per count, and the CRS's units per count for each station. */
-int site_choose_scale(struct site *site, struct sh_err *err);
+int site_choose_scale(struct site *site, const struct sh_report *report, struct sh_err *err);
 
 #endif

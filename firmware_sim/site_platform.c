@@ -6,26 +6,44 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What the head's own path may differ from the trajectory by, and how far apart its poses are at most. */
-static const double TOLERANCE_M = 1e-4;
+/* What the head's own path may differ from the trajectory by, and how far apart its poses are at most: the steps that a
+ * path is cut in for BVHs, and those of a recorded trajectory. */
+static const double TOLERANCE_M = 1e-4, LONGEST_M = 0.01;
 static const int64_t LONGEST_NS = 10000000;
+
+int site_open_trajectory(const struct site *site, struct site_part *part, struct sh_err *err)
+{
+    const struct config_platform *p = &site->cfg->platform;
+    double first_s, last_s;
+    int rc = p->file[0] != '\0'
+                 ? trajectory_read_csv(p->file, &part->trajectory, err)
+                 : trajectory_read_waypoints(p->waypoints, site->anchor.known ? &site->anchor.frame : NULL,
+                                             &part->trajectory, err);
+    if (rc != SH_OK) return rc;
+    trajectory_span(part->trajectory, &first_s, &last_s);
+    part->start_s = first_s + p->start_s;
+    part->end_s = p->has_end ? first_s + p->end_s : last_s;
+    int wrong_end = p->has_end && part->end_s > last_s;
+    if (!wrong_end && part->start_s <= last_s) return SH_OK;
+    trajectory_free(part->trajectory);
+    return sh_fail(err, SH_EINPUT, "%s: platform.%s: %.9g s is behind the trajectory's end; allowed %.9g to %.9g",
+                   site->cfg->file, wrong_end ? "end_s" : "start_s", wrong_end ? p->end_s : p->start_s,
+                   wrong_end ? p->start_s : 0.0, last_s - first_s);
+}
 
 static int load_knots(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const struct config_platform *p = &site->cfg->platform;
-    struct trajectory *trajectory;
-    double first_s, last_s;
-    int rc = p->file[0] != '\0' ? trajectory_read_csv(p->file, &trajectory, err)
-                                : trajectory_read_waypoints(p->waypoints, &trajectory, err);
+    struct site_part part;
+    struct sh_err why;
+    int rc = site_open_trajectory(site, &part, err);
     if (rc != SH_OK) return rc;
-    trajectory_span(trajectory, &first_s, &last_s);
-    if (p->start_s > last_s - first_s)
-        rc = sh_fail(err, SH_EINPUT, "%s: platform.start_s: %.9g s is behind the trajectory's end; allowed 0 to %.9g",
-                     site->cfg->file, p->start_s, last_s - first_s);
-    if (rc == SH_OK)
-        rc = trajectory_knots(trajectory, first_s + p->start_s, &site->mount, TOLERANCE_M, LONGEST_NS, &site->knot,
-                              &site->n_knots, &site->knot_error_m, err);
-    trajectory_free(trajectory);
+    rc = trajectory_knots(part.trajectory, part.start_s, part.end_s, &site->mount, TOLERANCE_M, LONGEST_NS, LONGEST_M,
+                          &site->knot, &site->n_knots, &site->knot_error_m, &why);
+    trajectory_free(part.trajectory);
+    if (rc != SH_OK)
+        return sh_fail(err, rc, "%s: platform.%s: %.300s", site->cfg->file, p->file[0] != '\0' ? "file" : "waypoints",
+                       why.text);
     if (rc == SH_OK && site->knot_error_m > TOLERANCE_M * 1.001)
         sh_warn(report,
                 "the trajectory bends more than poses %g ms apart can follow: the head is off it by up to %.2g m",
@@ -76,11 +94,13 @@ static int add_stretch(struct site *site, const double centre_m[3], double reach
     int rc = bvh_create(site->scene, centre_m, reach_m, site->cfg->threads, report, bvh, err);
     if (rc != SH_OK) return rc;
     site->n_bvh++;
-    site->stretch[site->n_stretches++] = (struct site_stretch){until_ns, *bvh};
+    struct site_stretch *stretch = &site->stretch[site->n_stretches++];
+    *stretch = (struct site_stretch){.until_ns = until_ns, .bvh = *bvh, .reach_m = reach_m};
+    memcpy(stretch->centre_m, centre_m, sizeof stretch->centre_m);
     return site->cfg->order_exactly ? bvh_order_exactly(*bvh, err) : SH_OK;
 }
 
-/* A stretch ends between two poses; pulses of the block at hand may lie some blocks' way behind. */
+/* A stretch ends between two poses, and the head goes on for up to a millisecond, which 100 ms cover. */
 static int cover_path(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     int rc = SH_OK;
@@ -91,6 +111,7 @@ static int cover_path(struct site *site, const struct sh_report *report, struct 
         int64_t until_ns = end < site->n_knots ? site->knot[end - 1].t_ns : INT64_MAX;
         for (size_t k = end; k < site->n_knots && site->knot[k - 1].t_ns < until_ns + 100000000; k++)
             beyond_m = fmax(beyond_m, distance_m(site->knot[k].pose.position_m, site->knot[end - 1].pose.position_m));
+        if (until_ns != INT64_MAX) until_ns = (until_ns + 999999) / 1000000 * 1000000; /* as an anchor says it */
         rc = add_stretch(site, centre_m, radius_m + beyond_m + 1e-3 + site_ray_reach_m(site, centre_m), until_ns,
                          report, err);
         i = end == site->n_knots || end == i + 1 ? end : end - 1; /* they share a pose */
@@ -98,40 +119,45 @@ static int cover_path(struct site *site, const struct sh_report *report, struct 
     return rc;
 }
 
-static void measure_path(struct site *site)
+void site_get_mount(const struct config_platform *p, struct pose *mount)
 {
-    for (uint32_t s = 0; s < site->cfg->n_stations; s++)
-        for (size_t i = 0; i < site->n_knots; i++)
-            site->path_reach_m =
-                fmax(site->path_reach_m, distance_m(site->station[s].at.position_m, site->knot[i].pose.position_m));
+    const double deg = M_PI / 180.0;
+    memcpy(mount->position_m, p->mount_m, sizeof p->mount_m);
+    pose_from_angles(p->mount_heading_deg * deg, p->mount_pitch_deg * deg, p->mount_roll_deg * deg, mount->quat);
 }
 
 int site_load_platform(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
     const struct config_platform *p = &cfg->platform;
-    const double deg = M_PI / 180.0;
-    memcpy(site->mount.position_m, p->mount_m, sizeof p->mount_m);
-    pose_from_angles(p->mount_heading_deg * deg, p->mount_pitch_deg * deg, p->mount_roll_deg * deg, site->mount.quat);
+    site_get_mount(p, &site->mount);
     if (p->kind == PLATFORM_LIVE) {
         double reach_m = 0.0;
         for (uint32_t i = 1; i < cfg->n_stations; i++)
             reach_m = fmax(reach_m, distance_m(site->station[0].at.position_m, site->station[i].at.position_m));
         const double *arm = p->mount_m;
         double head_m = p->reach_m + sqrt(arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2]);
-        site->path_reach_m = head_m + reach_m;
+        site->live_reach_m = head_m + reach_m;
         return add_stretch(site, site->station[0].at.position_m,
                            head_m + site_ray_reach_m(site, site->station[0].at.position_m), INT64_MAX, report, err);
     }
     int rc = load_knots(site, report, err);
-    if (rc == SH_OK) measure_path(site);
     return rc == SH_OK ? cover_path(site, report, err) : rc;
 }
 
-struct bvh *site_bvh_at(const struct site *site, int64_t t_ns)
+size_t site_stretch_at(const struct site *site, int64_t t_ns)
 {
     size_t i = 0;
     while (i + 1 < site->n_stretches && t_ns >= site->stretch[i].until_ns)
         i++;
-    return site->stretch[i].bvh;
+    return i;
+}
+
+void site_enter(const struct site *site, uint32_t station, size_t stretch, struct cast_setup *setup)
+{
+    const double *centre_m, *scale;
+    setup->bvh = site->stretch[stretch].bvh;
+    setup->georef = site_georef(site, station, stretch, &centre_m, &scale);
+    memcpy(setup->station_m, centre_m, sizeof setup->station_m);
+    memcpy(setup->xyz_scale, scale, sizeof setup->xyz_scale);
 }

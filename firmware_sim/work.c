@@ -11,6 +11,8 @@ struct worker {
     struct line_block block;
     struct cast_setup setup;
     uint32_t setup_station; /* 1 + the station that setup is for; 0: none yet */
+    size_t stretch;         /* of a moving head's path, that setup is for */
+    size_t anchored;        /* the one whose anchor went out last */
     /* a moving head: its poses for the pulses at hand, and as they go out */
     struct pose_knot knot[NATIVE_MAX_POSES];
     struct native_pose pose[NATIVE_MAX_POSES];
@@ -50,7 +52,7 @@ void worker_free(struct worker *worker)
 uint32_t worker_slot_bytes(const struct config *cfg)
 {
     /* Each line part is a frame of its own. */
-    uint32_t poses = cfg->platform.kind != PLATFORM_STATIC ? NATIVE_MAX_FRAME : 0;
+    uint32_t poses = config_head_moves(&cfg->platform) ? NATIVE_MAX_FRAME : 0;
     return OVERHEAD_BYTES + poses +
            (uint32_t)native_points_bound(device_tick_pulses(cfg) * config_points_per_pulse(cfg)) +
            device_tick_lines(cfg) * (LINE_END_BYTES + NATIVE_HEADER_LEN + NATIVE_POINTS_HEAD_LEN);
@@ -152,6 +154,34 @@ static void take_poses(struct worker *worker, const struct device_work *work, st
           1);
 }
 
+/* Points behind it are about another place (site_georef). */
+static void move_anchor(struct worker *worker, const struct device_work *work, size_t stretch, struct ring_slot *slot,
+                        uint32_t cap)
+{
+    struct native_anchor anchor;
+    if (stretch == worker->anchored) return;
+    worker->anchored = stretch;
+    if (worker->site->station[work->station].leg == NULL) return;
+    device_fill_anchor(worker->site, work->station, stretch, &anchor);
+    added(slot, native_encode_anchor(slot->bytes + slot->len, cap - slot->len, &anchor, work->t_ns, 0), 1);
+}
+
+/* Where the path of a moving head enters another stretch: what is needed for pulse k and those that follow on it,
+ * before the one that is returned. */
+static uint64_t enter_stretch(struct worker *worker, const struct device_work *work, uint64_t k, uint64_t end,
+                              struct ring_slot *slot, uint32_t cap)
+{
+    const struct site *site = worker->site;
+    if (!site->moving) return end;
+    size_t stretch = site_stretch_at(site, schedule_time_ns(&work->segment, k));
+    if (stretch != worker->stretch) site_enter(site, work->station, stretch, &worker->setup);
+    worker->stretch = stretch;
+    move_anchor(worker, work, stretch, slot, cap);
+    if (site->stretch[stretch].until_ns == INT64_MAX) return end;
+    uint64_t next = schedule_pulse_at(&work->segment, site->stretch[stretch].until_ns);
+    return next < end ? next : end;
+}
+
 static void cast_run(struct worker *worker, const struct device_work *work, const struct schedule_line *line,
                      uint64_t k, uint64_t end, struct ring_slot *slot, uint32_t cap)
 {
@@ -159,9 +189,9 @@ static void cast_run(struct worker *worker, const struct device_work *work, cons
     if (longest == 0) longest = 1;
     while (k < end) {
         struct schedule_run run;
-        uint64_t n = end - k < longest ? end - k : longest;
+        uint64_t stop = enter_stretch(worker, work, k, end, slot, cap);
+        uint64_t n = stop - k < longest ? stop - k : longest;
         schedule_get_run(&work->segment, line, k, (uint32_t)n, &run);
-        if (worker->site->moving) worker->setup.bvh = site_bvh_at(worker->site, run.t0_ns);
         uint32_t echoes = caster_cast(worker->caster, &worker->setup, &run, &worker->block);
         uint8_t *at = slot->bytes + slot->len;
         size_t len = native_encode_points(at, cap - slot->len, &worker->block, work->scan_t0_ns);
@@ -213,9 +243,13 @@ static void fill_pulses(struct worker *worker, const struct device_work *work, s
     if (worker->setup_station != work->station + 1) {
         site_cast_setup(worker->site, work->station, &worker->setup);
         worker->setup_station = work->station + 1;
+        worker->stretch = SIZE_MAX;
     }
+    worker->anchored = work->stretch;
     if (worker->site->n_movers != 0)
-        site_move(worker->site, 1e-9 * (double)(work->t_ns - work->scan_t0_ns), &worker->setup);
+        site_move(worker->site,
+                  site_mover_time(worker->site, work->station, 1e-9 * (double)(work->t_ns - work->scan_t0_ns)),
+                  &worker->setup);
     take_poses(worker, work, slot, cap);
     for (uint64_t k = work->pulse0; k < work->pulse_end;) {
         struct schedule_line line;
@@ -228,6 +262,9 @@ static void fill_pulses(struct worker *worker, const struct device_work *work, s
         if (end == line.pulse_end) end_line(worker, work, &line, end, slot, cap);
         k = end;
     }
+    if (worker->site->moving && work->pulse_end > work->pulse0) /* in the blind part of a line, too */
+        move_anchor(worker, work, site_stretch_at(worker->site, schedule_time_ns(&work->segment, work->pulse_end - 1)),
+                    slot, cap);
     if (!work->cut_short) return;
     /* The line that was stopped in, be some of its pulses in this tick or all in earlier ones. */
     struct schedule_line line;

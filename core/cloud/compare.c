@@ -58,11 +58,11 @@ static void to_scene(const struct work *w, size_t i, double p_prcs[3])
 }
 
 /* Whatever the reach, what is found within it is the nearest. */
-static int find_nearest(const struct cloud_site *site, const double p_prcs[3], struct distance_hit *hit)
+static int find_nearest(const struct distance *index, double max_m, const double p_prcs[3], struct distance_hit *hit)
 {
-    for (double reach_m = FIRST_REACH_M; reach_m < site->max_m; reach_m *= 10)
-        if (distance_query(site->index, p_prcs, reach_m, hit)) return 1;
-    return distance_query(site->index, p_prcs, site->max_m, hit);
+    for (double reach_m = FIRST_REACH_M; reach_m < max_m; reach_m *= 10)
+        if (distance_query(index, p_prcs, reach_m, hit)) return 1;
+    return distance_query(index, p_prcs, max_m, hit);
 }
 
 static void compare_point(const struct work *w, size_t i)
@@ -74,9 +74,12 @@ static void compare_point(const struct work *w, size_t i)
     if (isnan(w->cloud->xyz_m[i][0])) return;
     w->distance_m[i] = INFINITY;
     to_scene(w, i, p_prcs);
-    if (!find_nearest(w->site, p_prcs, &hit)) return;
+    const struct distance *body = NULL;
+    if (w->site->body != NULL && w->cloud->label != NULL)
+        body = w->site->body(w->site->body_ctx, station_of(w->cloud, i), w->cloud->label[i], p_prcs);
+    if (!find_nearest(body != NULL ? body : w->site->index, w->site->max_m, p_prcs, &hit)) return;
     w->distance_m[i] = hit.distance_m;
-    w->triangle[i] = hit.triangle;
+    if (body == NULL) w->triangle[i] = hit.triangle;
 }
 
 static void work_on(struct work *w, const struct sh_report *report)

@@ -72,13 +72,14 @@ static int read_header(struct las *las, struct sh_err *err)
     return SH_OK;
 }
 
-/* The code of the projected CRS, or of ECEF. What stream of ours calls UPS (32661, 32761) is written as the same
- * projection with the easting first. */
+/* The code of the projected CRS, of ECEF, or of geodetic WGS 84, which has no code for x as longitude. What stream of
+ * ours calls UPS (32661, 32761) is written as the same projection with the easting first. */
 static int64_t epsg_of(const char *wkt)
 {
     static const char mark[] = "AUTHORITY[\"EPSG\",\"";
     if (strncmp(wkt, "GEOCCS[", 7) == 0) return 4978;
     const char *at = strstr(wkt, "PROJCS["), *last = NULL;
+    if (at == NULL && strstr(wkt, "GEOGCS[\"WGS 84\"") != NULL) return 4979;
     int depth = 0;
     for (; at != NULL && *at != 0; at++) {
         if (depth == 1 && strncmp(at, mark, sizeof mark - 1) == 0) last = at + sizeof mark - 1;
@@ -151,6 +152,11 @@ static int read_points(struct las *las, struct sh_err *err)
             double scale = get_double(las->data + 131 + 8 * k), offset = get_double(las->data + 155 + 8 * k);
             c->xyz_m[i][k] = (int32_t)(uint32_t)get(p + 4 * k, 4) * scale + offset;
             if (!isfinite(c->xyz_m[i][k])) return fail(las, err, "scales and offsets that give no position");
+        }
+        if (c->epsg == 4979) { /* x is longitude in a LAS file, latitude here */
+            double lon_deg = c->xyz_m[i][0];
+            c->xyz_m[i][0] = c->xyz_m[i][1];
+            c->xyz_m[i][1] = remainder(lon_deg, 360);
         }
         c->echo[i] = p[14] & (is_new ? 15 : 7);
         c->station[i] = (uint16_t)get(p + (is_new ? 20 : 18), 2);

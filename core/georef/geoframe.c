@@ -72,7 +72,7 @@ static int find_in_grid(const struct geoframe *frame, const struct georef_place 
                         struct sh_err *err)
 {
     struct locate_grid utm;
-    int rc = locate_in_grid(at, frame->zone, &utm, err);
+    int rc = locate_in_grid(at, frame->zone == 0 ? GEOREF_UPS : frame->zone, &utm, err);
     if (rc != SH_OK) return rc;
     if (utm.zone != frame->zone || (utm.zone == 0 && utm.north != frame->north))
         return sh_fail(err, SH_EINPUT, "latitude %.10g, longitude %.10g is not in the scene's grid, UPS %s",
@@ -114,7 +114,7 @@ static int grid_to_enu(const struct geoframe *frame, const struct georef_place *
                        struct sh_err *err)
 {
     struct locate_grid utm;
-    int rc = locate_in_grid(at, frame->zone, &utm, err);
+    int rc = locate_in_grid(at, frame->zone == 0 ? GEOREF_UPS : frame->zone, &utm, err);
     if (rc != SH_OK) return rc;
     /* grid north bears convergence: it is (s, c) in east and north */
     double s = sin(utm.convergence_deg * M_PI / 180.0), c = cos(utm.convergence_deg * M_PI / 180.0);

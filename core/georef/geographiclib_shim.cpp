@@ -55,6 +55,12 @@ struct shim_grid {
     }
 };
 
+/* Of zones as core/georef.h has them. */
+static int utmups_zone(int zone)
+{
+    return zone == 0 ? int(UTMUPS::STANDARD) : zone < 0 ? int(UTMUPS::UPS) : zone;
+}
+
 /* UTMUPS chooses and checks zone and hemisphere for the station, once. Points go through the projections that
  * it uses itself: UTMUPS would add 10,000 km to a point beyond the equator and throw beyond the edge of its
  * table. */
@@ -88,9 +94,18 @@ struct shim_map {
         if (!from_grid) return;
         double x, y;
         bool north;
-        UTMUPS::Forward(place[0], place[1], in.zone, north, x, y, frame.zone == 0 ? int(UTMUPS::UPS) : frame.zone);
+        UTMUPS::Forward(place[0], place[1], in.zone, north, x, y, frame.zone);
         in.north = frame.zone == 0 ? north : frame.north != 0;
         in.project(place[0], place[1], in_x0, in_y0);
+    }
+
+    /* Another hemisphere's false northing; UPS has a projection for each. */
+    void force_side(int side)
+    {
+        if (kind != SHIM_GRID || side == 0 || grid.north == (side > 0)) return;
+        if (grid.zone == 0) throw GeographicLib::GeographicErr("UPS of the other hemisphere");
+        grid.north = side > 0;
+        anchor[1] += grid.north ? -1e7 : 1e7;
     }
 
     /* Chooses zone and hemisphere; set_zone as for UTMUPS. Throws where the zone does not reach. */
@@ -247,8 +262,7 @@ int shim_to_utm(const double lat_lon_deg[2], int *zone, int *north, double grid[
 {
     return attempt(why, len, [&] {
         bool n = false;
-        UTMUPS::Forward(lat_lon_deg[0], lat_lon_deg[1], *zone, n, grid[0], grid[1],
-                        *zone == 0 ? int(UTMUPS::STANDARD) : *zone);
+        UTMUPS::Forward(lat_lon_deg[0], lat_lon_deg[1], *zone, n, grid[0], grid[1], utmups_zone(*zone));
         *north = n;
     });
 }
@@ -265,8 +279,8 @@ void shim_geoid_free(struct shim_geoid *geoid)
     delete geoid;
 }
 
-struct shim_map *shim_map_create(enum shim_kind kind, const double place[3], const struct shim_frame *frame, int zone,
-                                 const struct shim_geoid *geoid, char *why, size_t len)
+struct shim_map *shim_map_create(enum shim_kind kind, const double place[3], const struct shim_frame *frame,
+                                 const struct shim_zone *zone, const struct shim_geoid *geoid, char *why, size_t len)
 {
     std::unique_ptr<shim_map> map;
     int rc = attempt(why, len, [&] {
@@ -277,7 +291,8 @@ struct shim_map *shim_map_create(enum shim_kind kind, const double place[3], con
             map->place[i] = place[i];
         map->place[1] = GeographicLib::Math::AngNormalize(place[1]);
         map->set_frame(*frame);
-        map->set_centre(zone == 0 ? int(UTMUPS::STANDARD) : zone);
+        map->set_centre(utmups_zone(zone->zone));
+        map->force_side(zone->side);
     });
     return rc == 0 ? map.release() : nullptr;
 }
@@ -307,6 +322,44 @@ void shim_map_place(const struct shim_map *map, double place[3])
 {
     for (int i = 0; i < 3; i++)
         place[i] = map->place[i];
+}
+
+/* prcs to the tangent frame's origin, to ECEF, to the centre's axes. */
+static void meridian_of_metric(const struct shim_map *map, struct shim_meridian *out)
+{
+    double p[3], from[9], to[9];
+    const LocalCartesian &local = map->local;
+    shim_ecef(local.LatitudeOrigin(), local.LongitudeOrigin(), local.HeightOrigin(), p, from);
+    shim_ecef(map->place[0], map->place[1], map->place[2], p, to);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            double sum = 0.0;
+            for (int k = 0; k < 3; k++)
+                for (int m = 0; m < 3; m++)
+                    sum += to[3 * k + i] * from[3 * k + m] * map->turn[3 * m + j];
+            out->turn[3 * i + j] = sum;
+        }
+    out->axis_m = std::hypot(p[0], p[1]);
+    out->sin_lat = to[8];
+    out->cos_lat = to[7];
+}
+
+int shim_map_meridian(const struct shim_map *map, struct shim_meridian *out)
+{
+    *out = {};
+    if (!map->from_grid) {
+        meridian_of_metric(map, out);
+        return 1;
+    }
+    if (map->in.zone != 0) return 0;
+    /* x = rho sin lon, y = -rho cos lon about the north pole, rho cos lon about the south pole */
+    out->axis_m = std::hypot(map->in_x0, map->in_y0);
+    out->sin_lat = map->in.north ? 1.0 : -1.0;
+    double x = map->in_x0 / out->axis_m, y = map->in_y0 / out->axis_m;
+    const double turn[9] = {-y, x, 0.0, -x, -y, 0.0, 0.0, 0.0, 1.0};
+    for (int i = 0; i < 9; i++)
+        out->turn[i] = i < 6 ? out->sin_lat * turn[i] : turn[i];
+    return 1;
 }
 
 int shim_map_epsg(const struct shim_map *map)
@@ -367,7 +420,7 @@ int shim_utm_forward(double lat_deg, double lon_deg, int zone, struct shim_utm *
     return attempt(why, len, [&] {
         bool north = false;
         UTMUPS::Forward(lat_deg, lon_deg, out->zone, north, out->easting_m, out->northing_m, out->convergence_deg,
-                        out->scale, zone == 0 ? int(UTMUPS::STANDARD) : zone);
+                        out->scale, utmups_zone(zone));
         out->north = north;
     });
 }

@@ -17,8 +17,8 @@ void shim_geodetic(double lat_deg, double lon_deg, double height_m, const double
 
 /* Geodetic place (degrees, degrees, metres) of a geocentric position; not-a-number on failure. */
 void shim_locate_ecef(const double p_ecef[3], double place[3]);
-/* UTM zone, or UPS for zone 0, to degrees and back: 0, or -1 with the reason. zone 0 on the way there: by
- * position. */
+/* UTM zone, or UPS for zone 0, to degrees and back: 0, or -1 with the reason. zone on the way there: 0 by
+ * position, -1 UPS. */
 int shim_locate_utm(int zone, int north, const double grid[2], double lat_lon_deg[2], char *why, size_t len);
 int shim_to_utm(const double lat_lon_deg[2], int *zone, int *north, double grid[2], char *why, size_t len);
 
@@ -32,7 +32,7 @@ struct shim_utm {
     int zone, north; /* zone 0: UPS */
     double easting_m, northing_m, convergence_deg, scale;
 };
-/* zone: 1..60, or 0: by position */
+/* zone: 1..60, 0: by position, or -1: UPS */
 int shim_utm_forward(double lat_deg, double lon_deg, int zone, struct shim_utm *out, char *why, size_t len);
 
 /* From the scene frame about a centre to a grid zone, geodetic coordinates or ECEF. */
@@ -46,10 +46,15 @@ struct shim_frame {
     int zone, north; /* grid; zone 0: UPS */
 };
 
-/* place: degrees, degrees, metres. zone: 1..60, or 0 for the standard zone, which beyond 84 N and 80 S is UPS. geoid
- * may be NULL. NULL on failure, with the reason. */
-struct shim_map *shim_map_create(enum shim_kind kind, const double place[3], const struct shim_frame *frame, int zone,
-                                 const struct shim_geoid *geoid, char *why, size_t len);
+/* The output's grid. zone: 1..60, 0 for the standard zone, which beyond 84 N and 80 S is UPS, or -1: UPS. side: 0: the
+ * place's hemisphere, 1: north, -1: south. */
+struct shim_zone {
+    int zone, side;
+};
+
+/* place: degrees, degrees, metres. geoid may be NULL. NULL on failure, with the reason. */
+struct shim_map *shim_map_create(enum shim_kind kind, const double place[3], const struct shim_frame *frame,
+                                 const struct shim_zone *zone, const struct shim_geoid *geoid, char *why, size_t len);
 /* The same frame and zone about another centre, given as difference in prcs. */
 struct shim_map *shim_map_recentre(const struct shim_map *map, const double d_prcs[3], char *why, size_t len);
 void shim_map_free(struct shim_map *map);
@@ -58,6 +63,14 @@ void shim_map_free(struct shim_map *map);
 void shim_map_anchor(const struct shim_map *map, double anchor[3]);
 /* Of the centre: degrees, degrees, ellipsoidal height. */
 void shim_map_place(const struct shim_map *map, double place[3]);
+/* What longitude depends on: how differences in prcs lie to the centre's meridian. */
+struct shim_meridian {
+    double turn[9];          /* differences in prcs -> east, north, up at the centre, row by row */
+    double axis_m;           /* from the Earth's axis, or from the pole in a UPS grid */
+    double sin_lat, cos_lat; /* how up and north point along the axis; in a UPS grid as at the pole */
+};
+/* 0 where there is none: from a UTM grid. */
+int shim_map_meridian(const struct shim_map *map, struct shim_meridian *out);
 int shim_map_epsg(const struct shim_map *map);
 void shim_map_convergence(const struct shim_map *map, double *convergence_deg, double *scale);
 

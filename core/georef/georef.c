@@ -13,11 +13,13 @@
 #define HEIGHT_MIN_M (-12000.0)
 #define HEIGHT_MAX_M 100000.0
 
-/* Polynomials are fitted within this; within 1/64 of the distance from the axis where longitude is one of the
- * coordinates: its series converges within that distance. */
+/* Polynomials are fitted within this; within 1/64 of the distance from the axis where longitude is one of their
+ * outputs: its series converges within that distance. */
 #define FIT_MAX_M   20000.0
 #define FIT_OF_AXIS (1.0 / 64.0)
 #define FIT_LEAST_M 1.0
+/* Nearer to a pole there is no longitude to begin with. */
+#define AXIS_LEAST_M 1.0
 
 static int check_range(const char *what, double value, double min, double max, const char *unit, struct sh_err *err)
 {
@@ -37,7 +39,7 @@ static int check_spec(const struct georef_spec *spec, struct sh_err *err)
     int rc = check_range("latitude", spec->lat_deg, -90, 90, "deg", err);
     if (rc == SH_OK) rc = check_range("longitude", spec->lon_deg, -180, 360, "deg", err);
     if (rc == SH_OK) rc = check_range("height", spec->height_m, HEIGHT_MIN_M, HEIGHT_MAX_M, "m", err);
-    if (rc == SH_OK && spec->crs == GEOREF_UTM && (spec->utm_zone < 0 || spec->utm_zone > 60))
+    if (rc == SH_OK && spec->crs == GEOREF_UTM && (spec->utm_zone < GEOREF_UPS || spec->utm_zone > 60))
         rc = sh_fail(err, SH_EINPUT, "georef: UTM zone %d; allowed 1 to 60, or 0: by position", spec->utm_zone);
     return rc;
 }
@@ -78,7 +80,8 @@ static int set_up_frame(const struct georef_spec *spec, struct shim_frame *frame
 static int is_same_grid(const struct georef_spec *spec)
 {
     return spec->crs == GEOREF_UTM && spec->prcs_is_grid &&
-           (spec->utm_zone == 0 || spec->utm_zone == spec->prcs_zone) && spec->geoid == NULL;
+           (spec->utm_zone == 0 || spec->utm_zone == (spec->prcs_zone == 0 ? GEOREF_UPS : spec->prcs_zone)) &&
+           (spec->side == 0 || (spec->side > 0) == spec->prcs_north) && spec->geoid == NULL;
 }
 
 /* Metres per degree of latitude and of longitude at the centre, largest over height above it, and distance from the
@@ -96,14 +99,17 @@ void georef_degrees(const struct georef *georef, double height_m, double *lat_m,
 /* What all depends on that hangs on the centre. */
 static void set_up_centre(struct georef *georef)
 {
+    struct shim_meridian meridian;
+    enum polynomial_form form = georef->from_grid && georef->crs != GEOREF_ECEF ? POLYNOMIAL_FLAT : POLYNOMIAL_SPACE;
     double half_m = FIT_MAX_M, lat_m, lon_m, axis_m;
     shim_map_anchor(georef->map, georef->anchor);
     if (georef->crs == GEOREF_GEODETIC) {
         georef_degrees(georef, 0.0, &lat_m, &lon_m, &axis_m);
-        half_m = fmin(half_m, FIT_OF_AXIS * axis_m);
+        if (shim_map_meridian(georef->map, &meridian)) form = POLYNOMIAL_MERIDIAN;
+        if (form == POLYNOMIAL_FLAT || axis_m < AXIS_LEAST_M) half_m = fmin(half_m, FIT_OF_AXIS * axis_m);
     }
     georef->polynomial.half_m = 0.0;
-    if (!georef->has_geoid && half_m >= FIT_LEAST_M) polynomial_fit(georef->map, half_m, &georef->polynomial);
+    if (!georef->has_geoid && half_m >= FIT_LEAST_M) polynomial_fit(georef->map, form, half_m, &georef->polynomial);
 }
 
 static int fail_map(const struct georef_spec *spec, const char *why, struct sh_err *err)
@@ -126,10 +132,12 @@ static int set_up_map(struct georef *georef, const struct georef_spec *spec, con
     char why[256] = "";
     const double place[3] = {spec->lat_deg, spec->lon_deg, spec->height_m};
     enum shim_kind kind = spec->crs == GEOREF_UTM ? SHIM_GRID : spec->crs == GEOREF_ECEF ? SHIM_ECEF : SHIM_GEODETIC;
-    georef->map = shim_map_create(kind, place, frame, spec->utm_zone,
+    const struct shim_zone zone = {spec->utm_zone, spec->side};
+    georef->map = shim_map_create(kind, place, frame, &zone,
                                   spec->geoid != NULL ? georef_geoid_shim(spec->geoid) : NULL, why, sizeof why);
     if (georef->map == NULL) return fail_map(spec, why, err);
     georef->has_geoid = spec->geoid != NULL;
+    georef->from_grid = spec->prcs_is_grid;
     georef->epsg = shim_map_epsg(georef->map);
     set_up_centre(georef);
     return SH_OK;
@@ -262,13 +270,22 @@ int georef_rotation(const struct georef *georef, double rotation[9])
     return 1;
 }
 
+static int order_of(enum georef_method method)
+{
+    return method == GEOREF_ORDER5 ? 5 : 1 + (int)method - (int)GEOREF_ORDER1;
+}
+
 int georef_set_method(struct georef *georef, enum georef_method method, struct sh_err *err)
 {
-    if (method < GEOREF_EXACT || method > GEOREF_ORDER3)
-        return sh_fail(err, SH_EINPUT, "georef: method %d; allowed exact, order1, order2, order3", (int)method);
+    if (method < GEOREF_EXACT || method > GEOREF_ORDER5)
+        return sh_fail(err, SH_EINPUT, "georef: method %d; allowed exact, order1, order2, order3, order5", (int)method);
     if (method != GEOREF_EXACT && georef_has_map(georef) && georef->polynomial.half_m == 0.0)
         return sh_fail(err, SH_EINPUT, "georef: there is no polynomial %s; allowed exact",
                        georef->has_geoid ? "for heights above the geoid" : "about a place so near to the pole");
+    if (method != GEOREF_EXACT && georef_has_map(georef) &&
+        !polynomial_has_order(&georef->polynomial, order_of(method)))
+        return sh_fail(err, SH_EINPUT, "georef: no polynomial of order %d here; allowed exact, order1, order2, order3",
+                       order_of(method));
     georef->method = method;
     return SH_OK;
 }
@@ -289,8 +306,7 @@ double georef_bound_m(const struct georef *georef, enum georef_method method, do
         georef_degrees(georef, height_m, &weight[0], &weight[1], &axis_m);
         weight[1] *= 1.0 + (radius_m + height_m) / axis_m;
     }
-    int order = 1 + (int)method - (int)GEOREF_ORDER1;
-    return EXACT_MAP_M + polynomial_bound_m(&georef->polynomial, order, radius_m, height_m, weight);
+    return EXACT_MAP_M + polynomial_bound_m(&georef->polynomial, order_of(method), radius_m, height_m, weight);
 }
 
 static void rotate(const double r[9], size_t n, const double *dx, const double *dy, const double *dz, double *out_x,
@@ -316,8 +332,7 @@ void georef_forward(const struct georef *georef, size_t n, const double *dx, con
     } else if (georef->method == GEOREF_EXACT) {
         shim_map_forward(georef->map, n, dx, dy, dz, out_x, out_y, out_z);
     } else {
-        int order = 1 + (int)georef->method - (int)GEOREF_ORDER1;
-        polynomial_apply(&georef->polynomial, order, n, dx, dy, dz, out_x, out_y, out_z);
+        polynomial_apply(&georef->polynomial, order_of(georef->method), n, dx, dy, dz, out_x, out_y, out_z);
     }
 }
 

@@ -2,6 +2,7 @@
 
 #include <math.h>
 #include <stddef.h>
+#include <stdio.h>
 
 #include "core/georef/geographiclib_shim.h"
 
@@ -36,9 +37,12 @@ int locate_in_grid(const struct georef_place *place, int zone, struct locate_gri
     struct shim_utm utm;
     int rc = locate_check(place, err);
     if (rc != SH_OK) return rc;
-    if (zone < 0 || zone > 60 || shim_utm_forward(place->lat_deg, place->lon_deg, zone, &utm, why, sizeof why) != 0)
-        return sh_fail(err, SH_EINPUT, "UTM zone %d does not reach latitude %.10g, longitude %.10g%s%s%s", zone,
-                       place->lat_deg, place->lon_deg, why[0] != '\0' ? " (" : "", why, why[0] != '\0' ? ")" : "");
+    char name[32];
+    snprintf(name, sizeof name, zone == GEOREF_UPS ? "UPS" : "UTM zone %d", zone);
+    if (zone < GEOREF_UPS || zone > 60 ||
+        shim_utm_forward(place->lat_deg, place->lon_deg, zone, &utm, why, sizeof why) != 0)
+        return sh_fail(err, SH_EINPUT, "%s does not reach latitude %.10g, longitude %.10g%s%s%s", name, place->lat_deg,
+                       place->lon_deg, why[0] != '\0' ? " (" : "", why, why[0] != '\0' ? ")" : "");
     *out = (struct locate_grid){.zone = utm.zone,
                                 .north = utm.north,
                                 .easting_m = utm.easting_m,

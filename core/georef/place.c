@@ -14,8 +14,8 @@ int georef_locate_utm(int zone, int north, double easting_m, double northing_m, 
     if (!isfinite(easting_m) || !isfinite(northing_m) || !isfinite(height_m))
         return sh_fail(err, SH_EINPUT, "%s coordinates are not finite numbers of metres", zone == 0 ? "UPS" : "UTM");
     if (shim_locate_utm(zone, north, grid, at, why, sizeof why) != 0)
-        return sh_fail(err, SH_EINPUT, "%.3f E %.3f N is not in UTM zone %d%c (%s)", easting_m, northing_m, zone,
-                       north ? 'N' : 'S', why);
+        return sh_fail(err, SH_EINPUT, "%.3f E %.3f N is not in %s %d%c (%s)", easting_m, northing_m,
+                       zone == 0 ? "UPS" : "UTM zone", zone, north ? 'N' : 'S', why);
     *out = (struct georef_place){at[0], at[1], height_m};
     return SH_OK;
 }

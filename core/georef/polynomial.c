@@ -1,10 +1,10 @@
-/* The map as a polynomial: fit, bound, evaluation.
+/* The map as a polynomial: fit and bound.
  *
  * Fit. The map is taken by GeographicLib at 7 x 7 x 7 Chebyshev nodes of a cube about the centre and interpolated
  * (products of Lagrange polynomials, whose coefficients are made in long double). The nodes are kilometres apart, so
  * that the nanometres of rounding in GeographicLib's figures are divided by (20 km)^k in a coefficient of degree k and
  * come back multiplied by (scene / 20 km)^k; derivatives by small differences would do the opposite. Terms up to
- * degree 6 are kept, up to 3 are used.
+ * degree 6 are kept, up to 3 or 5 are used. In the meridian the nodes lie in its plane.
  *
  * Bound. What an order leaves out is, for every point of the cylinder, at most the sum of the absolute values of the
  * terms left out up to degree 6, each at its own worst place; plus the rest of the series, which is taken as geometric
@@ -16,9 +16,10 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/vecmath.h"
+#include "core/georef/polynomial_kernels.h"
+#include "core/mat3.h"
 
-enum { NODES = POLYNOMIAL_DEGREE + 1, CUBE = NODES * NODES * NODES, BLOCK = 128 };
+enum { NODES = POLYNOMIAL_DEGREE + 1, CUBE = NODES * NODES * NODES };
 
 /* GeographicLib's 5 nm for transverse Mercator, 1 nm for geocentric coordinates, and as much again. */
 static const double FLOOR_M = 1e-8;
@@ -73,7 +74,37 @@ static void next_power(int power[3])
     }
 }
 
-void polynomial_fit(const struct shim_map *map, double half_m, struct polynomial *out)
+/* Nodes in the meridian's plane, given as 0, n, u, and the map there. Behind the pole latitude goes on beyond 90
+ * degrees. */
+static void sample_meridian(const struct shim_map *map, const struct polynomial *p, double value[3][CUBE])
+{
+    double place[3], pole;
+    shim_map_place(map, place);
+    pole = place[0] < 0.0 ? -90.0 : 90.0;
+    for (int i = 0; i < CUBE; i++) {
+        double d[3], enu[3] = {0.0, value[1][i], value[2][i]};
+        mat3_apply_transposed(p->meridian.turn, enu, d);
+        shim_map_forward(map, 1, &d[0], &d[1], &d[2], &value[0][i], &value[1][i], &value[2][i]);
+        if (fabs(value[1][i]) > 90.0) value[0][i] = 2.0 * (pole - place[0]) - value[0][i];
+        value[1][i] = 0.0;
+    }
+}
+
+/* Of those of degree d, x^a y^b is the one (d-a)(d-a+1)/2 behind the first, y^b z^c the one d(d+1)/2 + c. */
+static void set_up_plane(struct polynomial *p)
+{
+    int first = 0, at = 0, meridian = p->form == POLYNOMIAL_MERIDIAN;
+    for (int d = 1; d <= 5; d++) {
+        for (int j = 0; j <= d; j++, at++) {
+            int term = first + (meridian ? d * (d + 1) / 2 + j : j * (j + 1) / 2);
+            p->plane[0][at] = p->c[0][term];
+            p->plane[1][at] = p->c[meridian ? 2 : 1][term];
+        }
+        first += (d + 1) * (d + 2) / 2;
+    }
+}
+
+void polynomial_fit(const struct shim_map *map, enum polynomial_form form, double half_m, struct polynomial *out)
 {
     double node[NODES], lagrange[NODES][NODES], value[3][CUBE];
     make_lagrange(node, lagrange);
@@ -82,7 +113,14 @@ void polynomial_fit(const struct shim_map *map, double half_m, struct polynomial
         value[1][i] = half_m * node[i / NODES % NODES];
         value[2][i] = half_m * node[i % NODES];
     }
-    shim_map_forward(map, CUBE, value[0], value[1], value[2], value[0], value[1], value[2]);
+    out->form = form;
+    out->half_m = half_m;
+    if (form == POLYNOMIAL_MERIDIAN) {
+        shim_map_meridian(map, &out->meridian);
+        sample_meridian(map, out, value);
+    } else {
+        shim_map_forward(map, CUBE, value[0], value[1], value[2], value[0], value[1], value[2]);
+    }
     int power[3] = {0, 0, 0};
     for (int t = 0; t < POLYNOMIAL_TERMS; t++) {
         next_power(power);
@@ -90,7 +128,12 @@ void polynomial_fit(const struct shim_map *map, double half_m, struct polynomial
         for (int k = 0; k < 3; k++)
             out->c[k][t] = coefficient(lagrange, value[k], power) / size;
     }
-    out->half_m = half_m;
+    set_up_plane(out);
+}
+
+int polynomial_has_order(const struct polynomial *p, int order)
+{
+    return p->half_m > 0.0 && ((order >= 1 && order <= 3) || (order == 5 && p->form == POLYNOMIAL_FLAT));
 }
 
 /* Largest x^a y^b z^c within the cylinder. */
@@ -119,13 +162,13 @@ static void degrees(const struct polynomial *p, double radius_m, double height_m
         part_m[d] = sqrt(sum[d][0] * sum[d][0] + sum[d][1] * sum[d][1] + sum[d][2] * sum[d][2]);
 }
 
-double polynomial_bound_m(const struct polynomial *p, int order, double radius_m, double height_m,
-                          const double weight[3])
+static double series_bound_m(const struct polynomial *p, int order, double radius_m, double height_m,
+                             const double weight[3])
 {
     double whole_m[POLYNOMIAL_DEGREE + 1], part_m[POLYNOMIAL_DEGREE + 1], bound_m = FLOOR_M;
-    double reach_m = fmax(radius_m, height_m);
-    if (!(reach_m <= p->half_m) || p->half_m == 0.0) return (double)INFINITY;
-    degrees(p, p->half_m, p->half_m, weight, whole_m);
+    double reach_m = fmax(radius_m, height_m), whole_height_m = p->form == POLYNOMIAL_FLAT ? 0.0 : p->half_m;
+    if (!(reach_m <= p->half_m)) return (double)INFINITY;
+    degrees(p, p->half_m, whole_height_m, weight, whole_m);
     degrees(p, radius_m, height_m, weight, part_m);
     double ratio = whole_m[5] / whole_m[4], here = ratio * reach_m / p->half_m;
     if (!(here < 0.5)) return (double)INFINITY;
@@ -135,53 +178,23 @@ double polynomial_bound_m(const struct polynomial *p, int order, double radius_m
     return bound_m + 10.0 * whole_m[POLYNOMIAL_DEGREE] * ratio * reach_m / p->half_m;
 }
 
-VEC_INLINE double order1(const double *c, double x, double y, double z)
+/* Points of a frame that is turned may be as far up as they are away. Turning into the meridian moves a point by s - a,
+ * at most radius^2 / 2a. */
+static double meridian_bound_m(const struct polynomial *p, int order, double radius_m, double height_m,
+                               const double weight[3])
 {
-    return x * c[0] + y * c[1] + z * c[2];
+    if (fabs(p->meridian.turn[8]) < 1.0 - 1e-12) radius_m = height_m = hypot(radius_m, height_m);
+    double least_m = p->meridian.axis_m - radius_m * fabs(p->meridian.sin_lat) - height_m * p->meridian.cos_lat;
+    if (!(least_m > 0.0)) return (double)INFINITY;
+    double half = 0.5 * radius_m / least_m, moved_m = radius_m * half;
+    double left_m = POLYNOMIAL_ATAN_LEFT * pow(half, 9) * (p->meridian.axis_m + radius_m + height_m);
+    return left_m + series_bound_m(p, order, radius_m + moved_m, height_m + moved_m, weight);
 }
 
-VEC_INLINE double order2(const double *c, double x, double y, double z)
+double polynomial_bound_m(const struct polynomial *p, int order, double radius_m, double height_m,
+                          const double weight[3])
 {
-    return x * (c[0] + x * c[3] + y * c[4] + z * c[5]) + y * (c[1] + y * c[6] + z * c[7]) + z * (c[2] + z * c[8]);
-}
-
-VEC_INLINE double order3(const double *c, double x, double y, double z)
-{
-    double in_x = c[0] + x * (c[3] + x * c[9] + y * c[10] + z * c[11]) + y * (c[4] + y * c[12] + z * c[13]) +
-                  z * (c[5] + z * c[14]);
-    double in_y = c[1] + y * (c[6] + y * c[15] + z * c[16]) + z * (c[7] + z * c[17]);
-    return x * in_x + y * in_y + z * (c[2] + z * (c[8] + z * c[18]));
-}
-
-/* One output at a time: its coefficients stay in registers. */
-#define APPLY(order)                                                                                    \
-    VEC_CLONES                                                                                          \
-    static void apply_##order(const double c[POLYNOMIAL_USED], size_t n, const double *restrict x,      \
-                              const double *restrict y, const double *restrict z, double *restrict out) \
-    {                                                                                                   \
-        double k[POLYNOMIAL_USED];                                                                      \
-        memcpy(k, c, sizeof k);                                                                         \
-        for (size_t i = 0; i < n; i++)                                                                  \
-            out[i] = order(k, x[i], y[i], z[i]);                                                        \
-    }
-APPLY(order1)
-APPLY(order2)
-APPLY(order3)
-
-void polynomial_apply(const struct polynomial *p, int order, size_t n, const double *x, const double *y,
-                      const double *z, double *out_x, double *out_y, double *out_z)
-{
-    double result[3][BLOCK];
-    void (*apply)(const double *, size_t, const double *restrict, const double *restrict, const double *restrict,
-                  double *restrict) = order == 1   ? apply_order1
-                                      : order == 2 ? apply_order2
-                                                   : apply_order3;
-    for (size_t at = 0; at < n; at += BLOCK) {
-        size_t m = n - at < BLOCK ? n - at : BLOCK;
-        for (int k = 0; k < 3; k++)
-            apply(p->c[k], m, x + at, y + at, z + at, result[k]);
-        memcpy(out_x + at, result[0], m * sizeof *out_x);
-        memcpy(out_y + at, result[1], m * sizeof *out_y);
-        memcpy(out_z + at, result[2], m * sizeof *out_z);
-    }
+    if (!polynomial_has_order(p, order)) return (double)INFINITY;
+    if (p->form == POLYNOMIAL_MERIDIAN) return meridian_bound_m(p, order, radius_m, height_m, weight);
+    return series_bound_m(p, order, radius_m, p->form == POLYNOMIAL_FLAT ? 0.0 : height_m, weight);
 }

@@ -1,4 +1,11 @@
-/* The map's Taylor polynomial about its centre. Private to core/georef. */
+/* The map's Taylor polynomial about its centre, in the form that settles fastest. Private to core/georef.
+ *   space     three polynomials of x, y, z: a metric frame to a grid, a grid to ECEF
+ *   flat      two of x, y; heights stay what they are: a grid to another grid, a UTM grid to geodetic
+ *   meridian  geodetic from a metric frame or a UPS grid. With e, n, u the point's east, north, up from the centre, its
+ * distance from the Earth's axis is s = hypot(a, e), a = s0 + u cos lat - n sin lat, and its longitude is off by 2
+ * atan(e / (s + a)). Turned back into the centre's meridian, which moves it by s - a away from the axis, latitude and
+ * height are polynomials of n and u alone, which know nothing of the pole: longitude as a polynomial is off by (scene /
+ * s0)^4 s0. A UPS grid has the pole in its plane: the same with a = s0 -+ n. */
 #ifndef CORE_GEOREF_POLYNOMIAL_H
 #define CORE_GEOREF_POLYNOMIAL_H
 
@@ -7,17 +14,27 @@
 #include "core/georef/geographiclib_shim.h"
 
 /* Terms x^a y^b z^c of degree 1 to 6 in order of degree, then of falling a, then of falling b: 3, 6, 10, 15, 21, 28. */
-enum { POLYNOMIAL_DEGREE = 6, POLYNOMIAL_TERMS = 83, POLYNOMIAL_USED = 19 };
+enum { POLYNOMIAL_DEGREE = 6, POLYNOMIAL_TERMS = 83, POLYNOMIAL_USED = 19, POLYNOMIAL_PLANE = 20 };
+
+enum polynomial_form { POLYNOMIAL_SPACE, POLYNOMIAL_FLAT, POLYNOMIAL_MERIDIAN };
 
 struct polynomial {
-    double c[3][POLYNOMIAL_TERMS]; /* per output; units of the CRS per metre^degree */
+    enum polynomial_form form;
+    double c[3][POLYNOMIAL_TERMS]; /* per output; units of the CRS per metre^degree; meridian: of 0, n, u */
     double half_m;                 /* fitted within +-half_m on each axis; 0: there is none */
+    /* Terms of degree 1 to 5 in two variables, p^d, p^(d-1) q, ..., q^d: flat, of x and y for both outputs; meridian,
+     * of n and u for latitude and height. */
+    double plane[2][POLYNOMIAL_PLANE];
+    struct shim_meridian meridian;
 };
 
 /* Fits within +-half_m about the map's centre. */
-void polynomial_fit(const struct shim_map *map, double half_m, struct polynomial *out);
+void polynomial_fit(const struct shim_map *map, enum polynomial_form form, double half_m, struct polynomial *out);
 
-/* What is left out above `order` (1 to 3), within radius_m and height_m of the centre; weight: metres on the ground per
+/* Whether there is this order: 1 to 3, and 5 where it is flat. */
+int polynomial_has_order(const struct polynomial *p, int order);
+
+/* What is left out above `order`, within radius_m and height_m of the centre; weight: metres on the ground per
  * unit of each output. INFINITY beyond half_m, and where the series does not settle. */
 double polynomial_bound_m(const struct polynomial *p, int order, double radius_m, double height_m,
                           const double weight[3]);

@@ -14,7 +14,7 @@ struct georef {
     double anchor[3];
     double rotation[9];   /* where there is no map: prcs -> CRS, row by row */
     struct shim_map *map; /* NULL: linear */
-    int has_geoid, epsg;
+    int has_geoid, from_grid, epsg;
     struct polynomial polynomial; /* of the map; half_m 0: none */
 };
 

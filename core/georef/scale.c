@@ -42,14 +42,27 @@ static void spans(const struct georef *georef, double reach_m, double span[3], d
 int georef_scale(const struct georef *georef, double scale_m, double reach_m, double scale[3], struct sh_err *err)
 {
     double span[3], unit[3], least_m = 0.0;
+    int degrees = georef_has_map(georef) && georef->crs == GEOREF_GEODETIC;
     spans(georef, reach_m, span, unit);
     for (int i = 0; i < 3; i++) {
         scale[i] = scale_m * unit[i];
-        least_m = fmax(least_m, span[i] / unit[i] / MOST_COUNTS);
+        if (degrees && i == 1) /* a full turn has to fit, however short that is on the ground */
+            scale[i] = fmax(scale[i], span[i] / MOST_COUNTS);
+        else
+            least_m = fmax(least_m, span[i] / unit[i] / MOST_COUNTS);
     }
     if (least_m <= scale_m) return SH_OK; /* false for not-a-number */
     return sh_fail(
         err, SH_EINPUT,
         "coordinates up to %g m from their anchor do not fit into 31 bits at %g m per count; at least %.3g m", reach_m,
         scale_m, least_m);
+}
+
+double georef_count_m(const struct georef *georef, double reach_m, const double scale[3])
+{
+    double span[3], unit[3], most_m = 0.0;
+    spans(georef, reach_m, span, unit);
+    for (int i = 0; i < 3; i++)
+        most_m = fmax(most_m, scale[i] / unit[i]);
+    return most_m;
 }

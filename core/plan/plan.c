@@ -6,11 +6,9 @@
 static const struct {
     const char *name;
     double cost_ns;
-} methods[] = {[GEOREF_AUTO] = {"auto", 0.0},
-               [GEOREF_EXACT] = {"exact", 0.0}, /* by CRS */
-               [GEOREF_ORDER1] = {"order1", 1.0},
-               [GEOREF_ORDER2] = {"order2", 2.0},
-               [GEOREF_ORDER3] = {"order3", 4.0}};
+} methods[] = {[GEOREF_AUTO] = {"auto", 0.0},     [GEOREF_EXACT] = {"exact", 0.0}, /* by CRS */
+               [GEOREF_ORDER1] = {"order1", 1.0}, [GEOREF_ORDER2] = {"order2", 2.0},
+               [GEOREF_ORDER3] = {"order3", 4.0}, [GEOREF_ORDER5] = {"order5", 4.0}};
 
 const char *plan_method_name(enum georef_method method)
 {
@@ -20,7 +18,7 @@ const char *plan_method_name(enum georef_method method)
 static double cost_ns(const struct georef *georef, enum georef_method method)
 {
     if (method != GEOREF_EXACT) return methods[method].cost_ns;
-    return georef_crs(georef) == GEOREF_UTM ? 900.0 : 250.0;
+    return georef_crs(georef) == GEOREF_UTM ? 600.0 : 250.0;
 }
 
 /* Local and ecef: the head's rotation and the CRS's are one matrix. */
@@ -44,7 +42,7 @@ int plan_georef(const struct georef *georef, const struct plan_georef_need *need
         say_linear(georef, row, bound_m);
         return SH_OK;
     }
-    enum georef_method first = GEOREF_ORDER1, last = GEOREF_ORDER3;
+    enum georef_method first = GEOREF_ORDER1, last = GEOREF_ORDER5;
     if (need->forced != GEOREF_AUTO) first = last = need->forced;
     for (enum georef_method m = first; m <= last; m++) {
         double b = georef_bound_m(georef, m, need->radius_m, need->height_m);

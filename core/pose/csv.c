@@ -69,6 +69,8 @@ int csv_open(struct csv *csv, const char *path, const char *const *known, struct
     memset(csv, 0, sizeof *csv);
     csv->known = known;
     int rc = text_open(&csv->text, path, NULL, NULL, err);
+    if (rc == SH_OK && csv->text.size >= 3 && memcmp(csv->text.p, "\xef\xbb\xbf", 3) == 0)
+        csv->text.p += 3; /* a byte order mark, as spreadsheets write it */
     return rc == SH_OK ? read_names(csv, err) : rc;
 }
 

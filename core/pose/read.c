@@ -3,12 +3,16 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/mat3.h"
 #include "core/pose/csv.h"
 #include "core/pose/trajectory.h"
 
 static const double DEG = M_PI / 180.0;
-static const double STEP_S = 0.02; /* of the samples that way-points are turned into */
+static const double STEP_S = 0.02;  /* of the samples that way-points are turned into */
+static const double STEP_M = 0.01;  /* likewise, where that is longer */
+static const double LEG_PARTS = 64; /* of a leg, however short: the curve between two points is a cubic */
 static const double SLOWEST_M_S = 1e-3;
+static const double LATEST_S = 4e9; /* differences fit into 63 bits of nanoseconds, and the year 2096 since 1970 */
 
 struct samples {
     struct pose_sample *at;
@@ -74,6 +78,9 @@ static int take_sample(const struct csv *csv, const struct pose_sample *before, 
         if (fabs(v[k]) > 1e9)
             return text_fail(&csv->text, csv->line, SH_EINPUT, err, "%s %.6g; allowed -1e9 to 1e9", sample_columns[k],
                              v[k]);
+    if (!(fabs(s->t_s) <= LATEST_S))
+        return text_fail(&csv->text, csv->line, SH_EINPUT, err, "t_s %.9g; allowed %g to %g", s->t_s, -LATEST_S,
+                         LATEST_S);
     if (before != NULL && !(s->t_s - before->t_s > 0.999e-6 * POSE_MIN_STEP_US))
         return text_fail(&csv->text, csv->line, SH_EINPUT, err,
                          "t_s %.9g after %.9g; allowed rising times, at least %g s apart", s->t_s, before->t_s,
@@ -117,7 +124,7 @@ static const char *const waypoint_columns[] = {"x_m", "y_m", "z_m", "speed_m_s",
 /* The points as samples, their times without the pauses; and these. */
 struct way {
     struct samples points;
-    double *pause_s;
+    double *pause_s, pauses_s; /* of each; their sum */
 };
 
 static int check_waypoint(const struct csv *csv, struct sh_err *err)
@@ -145,6 +152,7 @@ static int add_waypoint(const struct csv *csv, double speed_m_s, struct way *way
     if (pauses != NULL) way->pause_s = pauses;
     if (s == NULL || pauses == NULL) return text_fail(&csv->text, 0, SH_ENOMEM, err, "no memory for its way-points");
     pauses[way->points.n - 1] = v[PAUSE];
+    way->pauses_s += v[PAUSE];
     memcpy(s->pose.position_m, v + WX, sizeof s->pose.position_m);
     s->pose.quat[0] = 1.0;
     s->frame = (double)(way->points.n - 1);
@@ -160,7 +168,9 @@ static int add_waypoint(const struct csv *csv, double speed_m_s, struct way *way
                          "%.6g m from the way-point before, %.6g s at its speed; allowed %g to 1e6 s", sqrt(chord2),
                          way_s, 1e-6 * POSE_MIN_STEP_US);
     s->t_s = s[-1].t_s + way_s;
-    return SH_OK;
+    if (s->t_s + way->pauses_s <= LATEST_S) return SH_OK;
+    return text_fail(&csv->text, csv->line, SH_EINPUT, err, "%.9g s from the first way-point on; allowed %g",
+                     s->t_s + way->pauses_s, LATEST_S);
 }
 
 static int read_waypoints(struct csv *csv, struct way *way, struct sh_err *err)
@@ -180,16 +190,19 @@ static int read_waypoints(struct csv *csv, struct way *way, struct sh_err *err)
     }
 }
 
-/* Heading of the way around t_s; left as it is where that goes straight up. */
-static void heading_at(const struct trajectory *curve, double t_s, double *heading_rad)
+/* Heading of the way from d before t_s to d behind it, in the axes of level; left as it is where that goes straight up.
+ */
+static void heading_at(const struct trajectory *curve, double t_s, double d, const double level[9], double *heading_rad)
 {
-    const double d = 1e-4;
     struct pose a, b;
     double frame;
     trajectory_at(curve, t_s - d, &a, &frame);
     trajectory_at(curve, t_s + d, &b, &frame);
-    double dx = b.position_m[0] - a.position_m[0], dy = b.position_m[1] - a.position_m[1];
-    if (hypot(dx, dy) > d * SLOWEST_M_S) *heading_rad = atan2(dx, dy);
+    double step_m[3], on_m[3];
+    for (int k = 0; k < 3; k++)
+        step_m[k] = b.position_m[k] - a.position_m[k];
+    mat3_apply_transposed(level, step_m, on_m);
+    if (hypot(on_m[0], on_m[1]) > d * SLOWEST_M_S) *heading_rad = atan2(on_m[0], on_m[1]);
 }
 
 /* How far along an interval the platform is after its share f of the time: f, but from or to a standstill smoothly. */
@@ -199,50 +212,80 @@ static double along(double f, int from_rest, int to_rest)
     return f + f * g * (f * to_rest - g * from_rest);
 }
 
-static int put_sample(const struct trajectory *curve, double curve_s, double t_s, double *heading_rad,
-                      struct samples *out)
+/* Parts of the way behind point i: STEP_S each, or STEP_M where that is longer. */
+static size_t leg_parts(const struct trajectory *curve, size_t i)
+{
+    if (i + 1 >= curve->n) return 1;
+    const double *a = curve->sample[i].pose.position_m, *b = curve->sample[i + 1].pose.position_m;
+    double chord_m =
+        sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]) + (b[2] - a[2]) * (b[2] - a[2]));
+    double by_time = ceil((curve->sample[i + 1].t_s - curve->sample[i].t_s) / STEP_S);
+    return (size_t)fmax(1.0, fmin(by_time, fmax(LEG_PARTS, ceil(chord_m / STEP_M))));
+}
+
+static int put_sample(const struct trajectory *curve, double curve_s, double t_s, double d,
+                      const struct geoframe *frame, double *heading_rad, struct samples *out, struct sh_err *err)
 {
     struct pose_sample *s = add_sample(out);
-    if (s == NULL) return SH_ENOMEM;
+    double level[9], level_quat[4], turn[4];
+    if (s == NULL) return sh_fail(err, SH_ENOMEM, "no memory for its samples");
     s->t_s = t_s;
     trajectory_at(curve, curve_s, &s->pose, &s->frame);
-    heading_at(curve, curve_s, heading_rad);
-    pose_from_angles(*heading_rad, 0.0, 0.0, s->pose.quat);
+    int rc = frame != NULL ? geoframe_level(frame, s->pose.position_m, level, err) : SH_OK;
+    if (rc != SH_OK) return rc;
+    heading_at(curve, curve_s, d, frame != NULL ? level : mat3_unit, heading_rad);
+    pose_from_angles(*heading_rad, 0.0, 0.0, frame != NULL ? turn : s->pose.quat);
+    if (frame == NULL) return SH_OK;
+    pose_from_matrix(level, level_quat);
+    pose_multiply(level_quat, turn, s->pose.quat);
     return SH_OK;
 }
 
 /* The curve as samples that are near each other, heading along it, with the pauses. */
-static int follow(const struct trajectory *curve, const double *pause_s, struct samples *out)
+static int follow(const struct trajectory *curve, const double *pause_s, const struct geoframe *frame,
+                  struct samples *out, struct sh_err *err)
 {
-    double heading_rad = 0.0, t_s = 0.0;
+    const double near = 0.005; /* of a step, to either side: the heading there */
+    double heading_rad = 0.0, t_s = 0.0, before_s = STEP_S;
+    size_t n = 0;
     int rc = SH_OK;
+    for (size_t i = 0; i < curve->n; i++)
+        n += leg_parts(curve, i) + 1;
+    if (n > POSE_MAX_KNOTS)
+        return sh_fail(err, SH_EINPUT, "too long a way: %zu samples every %g s or %g m; allowed %d", n, STEP_S, STEP_M,
+                       POSE_MAX_KNOTS);
     for (size_t i = 0; i < curve->n && rc == SH_OK; i++) {
         double at_s = curve->sample[i].t_s, h = i + 1 < curve->n ? curve->sample[i + 1].t_s - at_s : 0.0;
-        size_t parts = h > STEP_S ? (size_t)ceil(h / STEP_S) : 1;
-        if (pause_s[i] > 0.0) rc = put_sample(curve, at_s, t_s, &heading_rad, out);
+        size_t parts = leg_parts(curve, i);
+        double step_s = fmax(STEP_S, h / (double)parts), d = near * fmin(before_s, step_s);
+        if (pause_s[i] > 0.0) rc = put_sample(curve, at_s, t_s, d, frame, &heading_rad, out, err);
         t_s += pause_s[i];
         for (size_t j = 0; j < parts && rc == SH_OK; j++) {
             double f = (double)j / (double)parts;
             double on = along(f, pause_s[i] > 0.0, i + 1 < curve->n && pause_s[i + 1] > 0.0);
-            rc = put_sample(curve, at_s + h * on, t_s + h * f, &heading_rad, out);
+            rc = put_sample(curve, at_s + h * on, t_s + h * f, d, frame, &heading_rad, out, err);
+            d = near * step_s;
         }
+        before_s = step_s;
         t_s += h;
     }
     return rc;
 }
 
-int trajectory_read_waypoints(const char *path, struct trajectory **out, struct sh_err *err)
+int trajectory_read_waypoints(const char *path, const struct geoframe *frame, struct trajectory **out,
+                              struct sh_err *err)
 {
     struct csv csv;
-    struct way way = {{0}, NULL};
+    struct way way = {0};
+    struct sh_err why;
     struct samples samples = {0};
     struct trajectory *curve = NULL;
     *out = NULL;
     int rc = csv_open(&csv, path, waypoint_columns, err);
     if (rc == SH_OK) rc = read_waypoints(&csv, &way, err);
     if (rc == SH_OK) rc = trajectory_from_samples(way.points.at, way.points.n, &curve, err);
-    if (rc == SH_OK && follow(curve, way.pause_s, &samples) != SH_OK)
-        rc = text_fail(&csv.text, 0, SH_ENOMEM, err, "no memory for its samples");
+    if (rc == SH_OK && (rc = follow(curve, way.pause_s, frame, &samples, &why)) != SH_OK)
+        text_fail(&csv.text, 0, rc, err, "%.300s", why.text);
     if (rc == SH_OK) rc = trajectory_from_samples(samples.at, samples.n, out, err);
     trajectory_free(curve);
     csv_close(&csv);

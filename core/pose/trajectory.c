@@ -5,6 +5,8 @@
 
 #include "core/pose/trajectory.h"
 
+static const double LONGEST_RAD = 0.01; /* see trajectory_knots */
+
 static double chord_rate(const struct trajectory *tr, size_t i, int axis)
 {
     return (tr->sample[i + 1].pose.position_m[axis] - tr->sample[i].pose.position_m[axis]) /
@@ -140,19 +142,26 @@ static double acceleration(const struct trajectory *tr, size_t i)
     return sqrt(fmax(at_a, at_b));
 }
 
+/* What knots have to keep. */
+struct limits {
+    double arm_m, tolerance_m, longest_s, longest_m;
+};
+
 /* Parts that interval i is cut in, and what stays of the deviation. */
-static size_t parts_of(const struct trajectory *tr, size_t i, double arm_m, double tolerance_m, double longest_s,
-                       double *error_m)
+static double parts_of(const struct trajectory *tr, size_t i, const struct limits *limits, double *error_m)
 {
-    double h = tr->sample[i + 1].t_s - tr->sample[i].t_s;
-    double rate = pose_angle_between(tr->sample[i].pose.quat, tr->sample[i + 1].pose.quat) / h;
-    double sag = (acceleration(tr, i) + rate * rate * arm_m) * h * h / 8.0; /* of the interval in one part */
-    double parts = fmax(ceil(sqrt(sag / tolerance_m)), ceil(h / longest_s * (1.0 - 1e-9)));
+    const struct pose *a = &tr->sample[i].pose, *b = &tr->sample[i + 1].pose;
+    double h = tr->sample[i + 1].t_s - tr->sample[i].t_s, turn = pose_angle_between(a->quat, b->quat), chord2 = 0.0;
+    for (int k = 0; k < 3; k++)
+        chord2 += (b->position_m[k] - a->position_m[k]) * (b->position_m[k] - a->position_m[k]);
+    double moves = fmax((sqrt(chord2) + turn * limits->arm_m) / limits->longest_m, turn / LONGEST_RAD);
+    double sag = (acceleration(tr, i) + turn / h * turn / h * limits->arm_m) * h * h / 8.0; /* in one part */
+    double parts =
+        fmax(ceil(sqrt(sag / limits->tolerance_m)), fmin(ceil(h / limits->longest_s * (1.0 - 1e-9)), ceil(moves)));
     double most = floor(h / (1e-6 * POSE_MIN_STEP_US));
-    if (parts > most) parts = most;
-    if (parts < 1.0) parts = 1.0;
+    parts = fmax(1.0, fmin(parts, most));
     *error_m = fmax(*error_m, sag / (parts * parts));
-    return (size_t)parts;
+    return parts;
 }
 
 static void set_knot(const struct trajectory *tr, double start_s, int64_t t_ns, const struct pose *mount,
@@ -164,29 +173,35 @@ static void set_knot(const struct trajectory *tr, double start_s, int64_t t_ns, 
     pose_mount(&body, mount, &knot->pose);
 }
 
-int trajectory_knots(const struct trajectory *tr, double start_s, const struct pose *mount, double tolerance_m,
-                     int64_t longest_ns, struct pose_knot **out, size_t *n, double *error_m, struct sh_err *err)
+int trajectory_knots(const struct trajectory *tr, double start_s, double end_s, const struct pose *mount,
+                     double tolerance_m, int64_t longest_ns, double longest_m, struct pose_knot **out, size_t *n,
+                     double *error_m, struct sh_err *err)
 {
     const double *arm = mount->position_m;
-    double arm_m = sqrt(arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2]), end_s = tr->sample[tr->n - 1].t_s;
-    size_t room = 1;
+    const struct limits limits = {sqrt(arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2]), tolerance_m,
+                                  1e-9 * (double)longest_ns, longest_m};
+    double most = 1.0;
     *error_m = 0.0;
     for (size_t i = 0; i + 1 < tr->n; i++)
-        if (tr->sample[i + 1].t_s > start_s) {
+        if (tr->sample[i + 1].t_s > start_s && tr->sample[i].t_s < end_s) {
             double ignored = 0.0;
-            room += parts_of(tr, i, arm_m, tolerance_m, 1e-9 * (double)longest_ns, &ignored) + 1;
+            most += parts_of(tr, i, &limits, &ignored) + 1;
         }
+    if (!(most <= POSE_MAX_KNOTS))
+        return sh_fail(err, SH_EINPUT, "the trajectory needs up to %.0f poses from %.9g s on; allowed %d", most,
+                       start_s, POSE_MAX_KNOTS);
+    size_t room = (size_t)most;
     struct pose_knot *knot = malloc(room * sizeof *knot);
     if (knot == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %zu poses of a trajectory", room);
     size_t k = 0;
     set_knot(tr, start_s, 0, mount, &knot[k++]);
-    for (size_t i = 0; i + 1 < tr->n && start_s < end_s; i++) {
+    for (size_t i = 0; i + 1 < tr->n && tr->sample[i].t_s < end_s; i++) {
         double a_s = tr->sample[i].t_s, b_s = tr->sample[i + 1].t_s;
         if (b_s <= start_s) continue;
-        size_t parts = parts_of(tr, i, arm_m, tolerance_m, 1e-9 * (double)longest_ns, error_m);
+        size_t parts = (size_t)parts_of(tr, i, &limits, error_m);
         for (size_t j = 1; j <= parts; j++) {
             double t_s = j == parts ? b_s : a_s + (b_s - a_s) * ((double)j / (double)parts);
-            int64_t t_ns = llround(1e9 * (t_s - start_s));
+            int64_t t_ns = llround(1e9 * (fmin(t_s, end_s) - start_s));
             if (t_ns > knot[k - 1].t_ns) set_knot(tr, start_s, t_ns, mount, &knot[k++]);
         }
     }

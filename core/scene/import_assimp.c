@@ -15,6 +15,7 @@
 #include <assimp/config.h>
 #include <assimp/scene.h>
 
+#include "core/scene/ifc_check.h"
 #include "core/scene/scene_build.h"
 
 enum { MAX_DEPTH = 256 };
@@ -206,8 +207,9 @@ static int check_precision(const struct import *im, struct sh_err *err)
                       im->largest, off_m, im->b->tolerance_m);
 }
 
-/* An IFC file that was cut off reads without an error, with less in it. */
-static int check_ifc_end(struct scene_build *b, struct sh_err *err)
+/* An IFC file that was cut off reads without an error, with less in it; one in which records are missing crashes
+ * Assimp. */
+static int check_ifc(struct scene_build *b, struct sh_err *err)
 {
     static const char last[] = "END-ISO-10303-21;";
     char tail[1024] = "";
@@ -218,7 +220,7 @@ static int check_ifc_end(struct scene_build *b, struct sh_err *err)
     if (fseek(f, -(long)(sizeof tail), SEEK_END) != 0) rewind(f);
     size_t got = fread(tail, 1, sizeof tail, f);
     fclose(f);
-    if (memmem(tail, got, last, sizeof last - 1) != NULL) return SH_OK;
+    if (memmem(tail, got, last, sizeof last - 1) != NULL) return ifc_check_references(b->spec->file, err);
     return build_fail(b, SH_EINPUT, err, "cut off: it doesn't end with %s", last);
 }
 
@@ -250,7 +252,7 @@ int import_assimp(struct scene_build *b, struct sh_err *err)
     struct import im = {.b = b};
     struct import_log log = {0};
     struct stat st;
-    int rc = check_ifc_end(b, err);
+    int rc = check_ifc(b, err);
     if (rc != SH_OK) return rc;
     /* Assimp's C interface has no progress: say once that a large file will take a while. */
     if (stat(b->spec->file, &st) == 0 && st.st_size > 8 << 20) build_announce(b);

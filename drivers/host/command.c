@@ -2,8 +2,6 @@
 #include <errno.h>
 #include <poll.h>
 #include <string.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include "drivers/host/host.h"
 
@@ -37,16 +35,6 @@ static int discard_stale(struct scanhead *sh)
     return 0;
 }
 
-static ssize_t put(struct scanhead *sh, const char *data, size_t len)
-{
-    return sh->source.is_socket ? send(sh->source.fd, data, len, MSG_NOSIGNAL) : write(sh->source.fd, data, len);
-}
-
-static int gone(struct scanhead *sh)
-{
-    return sh_fail(&sh->err, SCANHEAD_ECLOSED, "%s: the head is gone", sh->source.name);
-}
-
 /* Reads on while it waits to write: a head that is itself waiting to write must not lock up both. */
 static int wait_writable(struct scanhead *sh, int64_t deadline_ns)
 {
@@ -56,21 +44,29 @@ static int wait_writable(struct scanhead *sh, int64_t deadline_ns)
     rc = host_fill(sh, deadline_ns);
     while (rc == 0 && (rc = take_items(sh)) == 1)
         rc = 0;
-    return rc == 0 && sh->ended ? gone(sh) : rc;
+    return rc == 0 && sh->ended ? host_gone(sh) : rc;
+}
+
+static int unplugged(struct scanhead *sh)
+{
+    sh->lost = sh->source.usb != NULL;
+    return host_gone(sh);
 }
 
 static int send_all(struct scanhead *sh, const char *data, size_t len, int64_t deadline_ns)
 {
     size_t done = 0;
     while (done < len) {
-        ssize_t n = put(sh, data + done, len - done);
+        ssize_t n = sh->source.ops->write(&sh->source, data + done, len - done);
         int rc = 0;
         if (n > 0)
             done += (size_t)n;
         else if (n < 0 && errno == EAGAIN)
             rc = wait_writable(sh, deadline_ns);
+        else if (n < 0 && errno == ENODEV)
+            rc = unplugged(sh);
         else if (n < 0 && (errno == EPIPE || errno == ECONNRESET || errno == EIO))
-            rc = gone(sh);
+            rc = host_gone(sh);
         else if (n < 0 && errno != EINTR)
             rc = sh_fail(&sh->err, SH_EIO, "%s: cannot write: %s", sh->source.name, strerror(errno));
         if (rc != 0) {
@@ -119,12 +115,12 @@ int scanhead_command(struct scanhead *sh, const char *command, char *reply, size
     line[len] = '\n';
     int64_t deadline_ns = host_deadline_ns(timeout_ms);
     rc = discard_stale(sh);
-    if (rc == 0) rc = sh->ended ? gone(sh) : send_all(sh, line, len + 1, deadline_ns);
+    if (rc == 0) rc = sh->ended ? host_gone(sh) : send_all(sh, line, len + 1, deadline_ns);
     while (rc == 0) {
         rc = take_items(sh);
         if (rc == 1) return copy_reply(sh, reply, reply_len);
         if (rc != 0) break;
-        if (sh->ended) return gone(sh);
+        if (sh->ended) return host_gone(sh);
         rc = deadline_ns < host_deadline_ns(0) ? SH_ETIMEOUT : host_fill(sh, deadline_ns);
     }
     if (rc == SH_ETIMEOUT)

@@ -33,7 +33,8 @@ struct e57 {
     struct track track;
     struct e57_facts facts;
     struct e57_scan *scan; /* the one at hand */
-    unsigned n;            /* records in the streams */
+    const struct sh_report *report;
+    unsigned n; /* records in the streams */
     uint8_t stream[N_STREAMS][PACKET_RECORDS * 8];
     uint8_t packet[PACKET_MAX];
 };
@@ -49,6 +50,7 @@ static int e57_open(const char *path, const struct recorder_options *options, vo
         return rc;
     }
     e->facts.empty_shots = options->empty_shots;
+    e->report = options->report;
     e->track.path = e->file.path;
     e->pages.file = &e->file;
     *rec = e;
@@ -100,6 +102,12 @@ static int end_scan(struct e57 *e, struct sh_err *err)
     return rc;
 }
 
+static void set_start(struct e57 *e)
+{
+    e->scan->have_start = scanhead_gps_time(e->track.sh, 0, &e->scan->start_gps_s) == 0;
+    e->scan->start_gps_s += 1e9; /* adjusted time is that much less */
+}
+
 static int begin_scan(void *rec, struct sh_err *err)
 {
     static const uint8_t blank[SECTION_HEADER_LEN];
@@ -124,8 +132,7 @@ static int begin_scan(void *rec, struct sh_err *err)
     e->scan->scale_m = e->track.scale_m;
     snprintf(e->scan->idn, sizeof e->scan->idn, "%s", info->idn);
     snprintf(e->scan->profile, sizeof e->scan->profile, "%s", info->profile);
-    e->scan->have_start = scanhead_gps_time(e->track.sh, 0, &e->scan->start_gps_s) == 0;
-    e->scan->start_gps_s += 1e9; /* adjusted time is that much less */
+    set_start(e);
     e->facts.epsg = track_epsg(&e->track);
     e->facts.geoid_heights = track_is_geoid(&e->track);
     return e57_put(&e->pages, blank, sizeof blank, err);
@@ -208,6 +215,7 @@ static void put_index(struct e57 *e, const struct scanhead_point *p, uint32_t ro
 static int e57_points(void *rec, int n, struct sh_err *err)
 {
     struct e57 *e = rec;
+    if (!e->scan->have_start) set_start(e); /* the time may come late */
     for (int i = 0; i < n; i++) {
         const struct scanhead_point *p = &e->track.point[i];
         if (p->echo_count == 0 && !e->facts.empty_shots) continue;
@@ -268,10 +276,11 @@ static int e57_close(void *rec, int keep, struct sh_err *err)
 {
     struct e57 *e = rec;
     int rc = keep ? finish(e, err) : 0;
+    if (keep && rc == 0) track_tell(&e->track, e->report);
     int closed = outfile_close(&e->file, keep && rc == 0, err);
     free(e->facts.scan);
     free(e);
     return rc != 0 ? rc : closed;
 }
 
-const struct recorder_ops recorder_e57 = {".e57", e57_open, e57_frame, e57_close};
+const struct recorder_ops recorder_e57 = {".e57", e57_open, e57_frame, e57_close, 1};

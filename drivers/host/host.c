@@ -3,14 +3,14 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
+#include <time.h>
 
 #include "drivers/protocol/bytes.h"
 
 _Static_assert(SCANHEAD_EINPUT == (int)SH_EINPUT && SCANHEAD_EIO == (int)SH_EIO && SCANHEAD_ENOMEM == (int)SH_ENOMEM &&
                    SCANHEAD_EPERM == (int)SH_EPERM && SCANHEAD_ETIMEOUT == (int)SH_ETIMEOUT &&
                    SCANHEAD_ECLOSED == (int)SH_ECLOSED && SCANHEAD_EFORMAT == (int)SH_EFORMAT &&
-                   SCANHEAD_ESTATE == (int)SH_ESTATE,
+                   SCANHEAD_ESTATE == (int)SH_ESTATE && SCANHEAD_ELOST == (int)SH_ELOST,
                "the library's errors are those of core/err.h");
 _Static_assert(SCANHEAD_POINTS == (int)NATIVE_POINTS && SCANHEAD_POSES == (int)NATIVE_POSES &&
                    SCANHEAD_EV_PPS == (int)NATIVE_EV_PPS && SCANHEAD_POSE_NONE == (int)NATIVE_POSE_NONE &&
@@ -36,6 +36,33 @@ int scanhead_open(const char *source, struct scanhead **out, char *err, size_t e
     return rc;
 }
 
+/* A source tried again and again while it isn't there; a wrong name is not tried again. */
+static int open_in_time(const char *source, int64_t deadline_ns, struct host_source *out, struct sh_err *err)
+{
+    const struct timespec pause = {.tv_nsec = 50000000};
+    for (;;) {
+        int rc = host_source_open(source, out, err);
+        if (rc == SH_OK || rc == SH_ENOMEM || host_deadline_ns(0) >= deadline_ns) return rc;
+        nanosleep(&pause, NULL);
+    }
+}
+
+int scanhead_reattach(struct scanhead *sh, int timeout_ms)
+{
+    char name[sizeof sh->source.name];
+    if (sh->source.is_file || strncmp(sh->source.name, "fd:", 3) == 0)
+        return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: nothing that could come back", sh->source.name);
+    if (sh->source.ops != NULL) sh->source.ops->close(&sh->source);
+    sh->source.ops = NULL;
+    sh->ended = 1;
+    snprintf(name, sizeof name, "%s", sh->source.name);
+    int rc = open_in_time(name, host_deadline_ns(timeout_ms), &sh->source, &sh->err);
+    if (rc != SH_OK) return rc;
+    sh->ended = sh->lost = sh->stuck = 0;
+    native_parser_resume(&sh->parser);
+    return SCANHEAD_OK;
+}
+
 static void free_nodes(struct host_node *node)
 {
     while (node != NULL) {
@@ -48,7 +75,7 @@ static void free_nodes(struct host_node *node)
 void scanhead_close(struct scanhead *sh)
 {
     if (sh == NULL) return;
-    close(sh->source.fd);
+    if (sh->source.ops != NULL) sh->source.ops->close(&sh->source);
     free_nodes(sh->first);
     free(sh->current);
     for (uint32_t i = 0; i < sh->n_surfaces; i++) {
@@ -165,14 +192,20 @@ static int hand_out(struct scanhead *sh, const uint8_t *raw, struct scanhead_fra
     return SCANHEAD_OK;
 }
 
+int host_gone(struct scanhead *sh)
+{
+    if (sh->lost) return sh_fail(&sh->err, SCANHEAD_ELOST, "%s: the head was unplugged", sh->source.name);
+    return sh_fail(&sh->err, SCANHEAD_ECLOSED, sh->source.is_file ? "%s: end of the recording" : "%s: the head is gone",
+                   sh->source.name);
+}
+
 static int closed(struct scanhead *sh)
 {
     const struct native_stats *s = &sh->parser.stats;
     if (s->bytes > 0 && s->frames == 0 && s->texts == 0)
         return sh_fail(&sh->err, SCANHEAD_EFORMAT, "%s: not one frame in %llu bytes: not a scan head's stream",
                        sh->source.name, (unsigned long long)s->bytes);
-    return sh_fail(&sh->err, SCANHEAD_ECLOSED, sh->source.is_file ? "%s: end of the recording" : "%s: the head is gone",
-                   sh->source.name);
+    return host_gone(sh);
 }
 
 int scanhead_next(struct scanhead *sh, struct scanhead_frame *frame, int timeout_ms)

@@ -3,6 +3,7 @@
 #define DRIVERS_HOST_HOST_H
 
 #include <nettle/sha2.h>
+#include <sys/types.h>
 
 #include "core/err.h"
 #include "drivers/host/scanhead.h"
@@ -21,15 +22,29 @@ struct host_surface {
     char *object, *material; /* NULL: not seen */
 };
 
+/* How bytes come and go, without blocking; one table for descriptors, one for USB. */
+struct host_source;
+struct host_source_ops {
+    /* Bytes moved; 0 from read: the end; -1 with errno: EAGAIN when none can be now. */
+    ssize_t (*read)(struct host_source *source, void *to, size_t len);
+    ssize_t (*write)(struct host_source *source, const void *data, size_t len);
+    /* poll() for POLLIN and POLLOUT until the deadline (host_deadline_ns): 1, 0 when it is over, -1 with errno. */
+    int (*wait)(struct host_source *source, short events, int64_t deadline_ns, short *revents);
+    void (*close)(struct host_source *source);
+};
+
 struct host_source {
+    const struct host_source_ops *ops;
     int fd;
+    struct host_usb *usb;
     int is_file, is_socket;
-    char name[256]; /* for messages */
+    char name[256]; /* for messages, and to open it again */
 };
 
 struct scanhead {
     struct host_source source;
     int ended; /* no more bytes will come */
+    int lost;  /* because the device was unplugged */
     int stuck; /* half a command went out: nothing sensible can follow */
     struct native_parser parser;
     struct host_node *first, *last, *current; /* kept frames; the one that was handed out */
@@ -57,6 +72,12 @@ struct scanhead {
 
 /* Opens what `source` names, non-blocking. */
 int host_source_open(const char *source, struct host_source *out, struct sh_err *err);
+/* usb.c: the same for "usb..."; out is zero but for its name. */
+int host_usb_open(const char *source, struct host_source *out, struct sh_err *err);
+extern const struct host_source_ops host_fd_ops;
+
+/* What to say where nothing more will come. */
+int host_gone(struct scanhead *sh);
 
 /* Takes a frame into the state: descriptor, anchor, names, counters, hash. Called once per frame, in stream
  * order. */

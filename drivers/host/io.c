@@ -1,7 +1,8 @@
-/* Bytes in: waiting and reading, with deadlines on the monotonic clock. */
+/* Bytes in: waiting and reading, with deadlines on the monotonic clock; and the sources that are descriptors. */
 #include <errno.h>
 #include <poll.h>
 #include <string.h>
+#include <sys/socket.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -15,31 +16,55 @@ int64_t host_deadline_ns(int timeout_ms)
     return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec + (int64_t)timeout_ms * 1000000;
 }
 
+static ssize_t fd_read(struct host_source *source, void *to, size_t len)
+{
+    return read(source->fd, to, len);
+}
+
+static ssize_t fd_write(struct host_source *source, const void *data, size_t len)
+{
+    return source->is_socket ? send(source->fd, data, len, MSG_NOSIGNAL) : write(source->fd, data, len);
+}
+
+static int fd_wait(struct host_source *source, short events, int64_t deadline_ns, short *revents)
+{
+    struct timespec left = {0}, *wait = NULL;
+    if (deadline_ns != INT64_MAX) {
+        int64_t left_ns = deadline_ns - host_deadline_ns(0);
+        if (left_ns < 0) left_ns = 0;
+        left.tv_sec = left_ns / 1000000000;
+        left.tv_nsec = left_ns % 1000000000;
+        wait = &left;
+    }
+    struct pollfd p = {.fd = source->fd, .events = events};
+    int n = ppoll(&p, 1, wait, NULL);
+    *revents = p.revents;
+    return n;
+}
+
+static void fd_close(struct host_source *source)
+{
+    close(source->fd);
+}
+
+const struct host_source_ops host_fd_ops = {fd_read, fd_write, fd_wait, fd_close};
+
 int host_wait(struct scanhead *sh, short events, int64_t deadline_ns, short *revents)
 {
     for (;;) {
-        struct timespec left = {0}, *wait = NULL;
-        if (deadline_ns != INT64_MAX) {
-            int64_t left_ns = deadline_ns - host_deadline_ns(0);
-            if (left_ns < 0) left_ns = 0;
-            left.tv_sec = left_ns / 1000000000;
-            left.tv_nsec = left_ns % 1000000000;
-            wait = &left;
-        }
-        struct pollfd p = {.fd = sh->source.fd, .events = events};
-        int n = ppoll(&p, 1, wait, NULL);
-        *revents = p.revents;
+        int n = sh->source.ops->wait(&sh->source, events, deadline_ns, revents);
         if (n > 0) return 0;
         if (n == 0) return sh_fail(&sh->err, SH_ETIMEOUT, "%s: nothing came in time", sh->source.name);
         if (errno != EINTR) return sh_fail(&sh->err, SH_EIO, "%s: %s", sh->source.name, strerror(errno));
         /* without a deadline a signal is the only way for the program to get a word in */
-        if (wait == NULL) return sh_fail(&sh->err, SH_ETIMEOUT, "%s: a signal came", sh->source.name);
+        if (deadline_ns == INT64_MAX) return sh_fail(&sh->err, SH_ETIMEOUT, "%s: a signal came", sh->source.name);
     }
 }
 
 /* A pty whose master is closed says EIO; a reset connection is as gone as a closed one. */
 static int is_hang_up(const struct scanhead *sh, int error)
 {
+    if (sh->source.usb != NULL) return error == ENODEV;
     return !sh->source.is_file && (error == EIO || error == ECONNRESET || error == EPIPE || error == ENODEV ||
                                    error == ENXIO || error == ETIMEDOUT);
 }
@@ -49,7 +74,7 @@ int host_fill(struct scanhead *sh, int64_t deadline_ns)
     size_t room;
     uint8_t *to = native_parser_room(&sh->parser, &room);
     for (;;) {
-        ssize_t n = read(sh->source.fd, to, room);
+        ssize_t n = sh->source.ops->read(&sh->source, to, room);
         if (n > 0) {
             native_parser_added(&sh->parser, (size_t)n);
             return 0;
@@ -57,6 +82,7 @@ int host_fill(struct scanhead *sh, int64_t deadline_ns)
         if (n == 0 || is_hang_up(sh, errno)) {
             native_parser_finish(&sh->parser);
             sh->ended = 1;
+            sh->lost = sh->source.usb != NULL;
             return 0;
         }
         if (errno == EINTR) continue;

@@ -3,7 +3,8 @@
  *
  * Coordinates are counts of the stream's own scale from the first scan's station, so those of the first scan are the
  * stream's very numbers, and those of further stations are rounded once, by half a count at most. Nothing is clipped:
- * what is too far for 32 bits is an error. */
+ * what is too far for 32 bits is an error. Longitudes go on beyond 180 or -180 degrees where a scan crosses the
+ * antimeridian: all lie within 180 degrees of the first station. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -24,7 +25,7 @@ struct las {
     struct track track;
     struct las_facts facts;
     const struct sh_report *report;
-    int begun;
+    int begun, time_came_late;
     size_t front_len;
     uint64_t n_empty;
 };
@@ -128,7 +129,9 @@ static int put_xyz(struct las *las, uint8_t *to, const double p[3], struct sh_er
     struct las_facts *f = &las->facts;
     int32_t n[3];
     for (int i = 0; i < 3; i++) {
-        double counts = rint((p[i] - f->offset[i]) / f->scale[i]);
+        double from_offset = p[i] - f->offset[i];
+        if (i == 0 && is_swapped(las)) from_offset = remainder(from_offset, 360);
+        double counts = rint(from_offset / f->scale[i]);
         if (!(fabs(counts) <= INT32_MAX)) return too_far(las, p, err);
         n[i] = (int32_t)counts;
     }
@@ -190,6 +193,9 @@ static int las_points(void *rec, int n, struct sh_err *err)
     uint8_t *to = outfile_room(&las->file, TRACK_BATCH * LAS_POINT_LEN, err), *at = to;
     if (to == NULL) return SH_EIO;
     int rc = 0;
+    double s;
+    if (!las->facts.gps_time && !las->time_came_late)
+        las->time_came_late = scanhead_gps_time(las->track.sh, 0, &s) == 0;
     for (int i = 0; i < n; i++) {
         const struct scanhead_point *p = &las->track.point[i];
         if (p->echo_count == 0) {
@@ -228,10 +234,15 @@ static int las_close(void *rec, int keep, struct sh_err *err)
     if (keep && rc == 0 && las->n_empty > 0)
         sh_warn(las->report, "%s: %llu shots without echo left out, for which LAS has no place", las->file.path,
                 (unsigned long long)las->n_empty);
+    if (keep && rc == 0 && las->time_came_late)
+        sh_warn(las->report,
+                "%s: times count from the scan's start: what the head said of its clock was lost before the first "
+                "points",
+                las->file.path);
     if (keep && rc == 0) track_tell(&las->track, las->report);
     int closed = outfile_close(&las->file, keep && rc == 0, err);
     free(las);
     return rc != 0 ? rc : closed;
 }
 
-const struct recorder_ops recorder_las = {".las", las_open, las_frame, las_close};
+const struct recorder_ops recorder_las = {".las", las_open, las_frame, las_close, 0};

@@ -6,6 +6,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 static void release(struct outfile *file)
@@ -16,6 +18,21 @@ static void release(struct outfile *file)
     free(file->buf);
     memset(file, 0, sizeof *file);
     file->fd = -1;
+}
+
+/* The part file, empty and ours alone: two recordings into one file, by whatever names, would end in neither. */
+static int create_part(struct outfile *file, struct sh_err *err)
+{
+    struct stat st;
+    if (stat(file->path, &st) == 0 && S_ISDIR(st.st_mode))
+        return sh_fail(err, SH_EINPUT, "%s: is a directory; allowed is the name of a file", file->path);
+    file->fd = open(file->part, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+    if (file->fd >= 0 && flock(file->fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+        return sh_fail(err, SH_EINPUT, "%s: is being written by another recording; allowed is a file of its own",
+                       file->part);
+    if (file->fd >= 0 && ftruncate(file->fd, 0) == 0) return 0;
+    int code = errno == EACCES || errno == EPERM || errno == EROFS ? SH_EPERM : errno == ENOENT ? SH_EINPUT : SH_EIO;
+    return sh_fail(err, code, "%s: cannot create: %s", file->part, strerror(errno));
 }
 
 int outfile_open(struct outfile *file, const char *path, struct sh_err *err)
@@ -29,11 +46,8 @@ int outfile_open(struct outfile *file, const char *path, struct sh_err *err)
         release(file);
         return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);
     }
-    file->fd = open(file->part, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-    if (file->fd >= 0) return 0;
-    int code = errno == EACCES || errno == EPERM || errno == EROFS ? SH_EPERM : errno == ENOENT ? SH_EINPUT : SH_EIO;
-    sh_fail(err, code, "%s: cannot create: %s", file->part, strerror(errno));
-    release(file);
+    int code = create_part(file, err);
+    if (code != 0) release(file);
     return code;
 }
 

@@ -114,4 +114,4 @@ static int pcapng_close(void *rec, int keep, struct sh_err *err)
     return rc;
 }
 
-const struct recorder_ops recorder_pcapng = {".pcapng", pcapng_open, pcapng_frame, pcapng_close};
+const struct recorder_ops recorder_pcapng = {".pcapng", pcapng_open, pcapng_frame, pcapng_close, 0};

@@ -110,10 +110,21 @@ static size_t put_ascii(char *to, const struct scanhead_point *p, int degrees, u
         n += put_number(to + n, TEXT_LEN - n, number[i].digits, number[i].v);
     if (n >= TEXT_LEN) return TEXT_LEN + 1;
     n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u %u %u %u", p->echo, p->echo_count, p->label, station);
-    if (frame != NULL && n < TEXT_LEN) n += (size_t)snprintf(to + n, TEXT_LEN - n, " %.9g", *frame);
+    if (frame != NULL && n < TEXT_LEN)
+        n += (size_t)(isnan(*frame) ? snprintf(to + n, TEXT_LEN - n, " nan")
+                                    : snprintf(to + n, TEXT_LEN - n, " %.9g", *frame));
     if (n >= TEXT_LEN) return TEXT_LEN + 1;
     to[n++] = '\n';
     return n;
+}
+
+/* The time may come late. */
+static void set_gps(struct ply *ply)
+{
+    struct ply_facts *facts = &ply->facts;
+    if (facts->have_gps || ply->track.n_scans != 1) return;
+    facts->have_gps = scanhead_gps_time(ply->track.sh, 0, &facts->gps_s) == 0;
+    facts->gps_s += 1e9; /* adjusted time is that much less */
 }
 
 /* Room for the header is made when the head has told how many surfaces there are. */
@@ -127,6 +138,7 @@ static int ply_scan(void *rec, struct sh_err *err)
     facts->epsg = track_epsg(&ply->track);
     facts->geoid_heights = track_is_geoid(&ply->track);
     facts->moving = info->moving;
+    facts->stops = info->stop;
     snprintf(facts->idn, sizeof facts->idn, "%s", info->idn);
     snprintf(facts->profile, sizeof facts->profile, "%s", info->profile);
     return ply->begun ? 0 : begin(ply, ply->track.sh, info->n_surfaces, err);
@@ -139,9 +151,10 @@ static int ply_points(void *rec, int n, struct sh_err *err)
     uint8_t *to = outfile_room(&ply->file, TRACK_BATCH * TEXT_LEN, err);
     if (to == NULL) return SH_EIO;
     size_t used = 0;
+    set_gps(ply);
     for (int i = 0; i < n; i++) {
         struct scanhead_point p = t->point[i];
-        const double *frame = t->info.moving ? &t->frame[i] : NULL;
+        const double *frame = t->info.moving ? &t->frame[i] : t->info.stop ? &t->info.frame : NULL;
         if (p.echo_count == 0 && !ply->options.empty_shots) continue;
         if (!t->info.geo) {
             double xyz[3] = {p.x, p.y, p.z};
@@ -226,10 +239,11 @@ static int ply_close(void *rec, int keep, struct sh_err *err)
 {
     struct ply *ply = rec;
     int rc = keep ? finish(ply, err) : 0;
+    if (keep && rc == 0) track_tell(&ply->track, ply->options.report);
     int closed = outfile_close(&ply->file, keep && rc == 0, err);
     ply_names_free(&ply->names);
     free(ply);
     return rc != 0 ? rc : closed;
 }
 
-const struct recorder_ops recorder_ply = {".ply", ply_open, ply_frame, ply_close};
+const struct recorder_ops recorder_ply = {".ply", ply_open, ply_frame, ply_close, 0};

@@ -1,6 +1,7 @@
 #include "drivers/host/ply_header.h"
 
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,6 +11,8 @@ enum {
     PAD_MIN = 8,         /* "comment\n" */
     NAME_ROOM = 160,     /* a label line of two names of 63 bytes, the longest a head sends */
     COUNT_ROOM = 8 * 20, /* figures that may still grow to 20 digits */
+    TIME_ROOM = 80,      /* the line of the GPS time, where it comes late */
+    WEEK_S = 604800,
 };
 
 /* A name must not end its line. */
@@ -78,13 +81,20 @@ static void put_comments(FILE *out, const struct ply_facts *facts, const struct 
     fprintf(out, "comment %s, time in seconds since the scan's start\n",
             facts->have_crs && facts->crs == 3 ? "x latitude, y longitude in degrees, z range in metres"
                                                : "x y z range in metres");
+    if (facts->have_gps) {
+        double week = floor(facts->gps_s / WEEK_S);
+        fprintf(out, "comment the first scan starts at GPS week %.0f second %.6f\n", week,
+                facts->gps_s - week * WEEK_S);
+    }
     fputs("comment reflectance in dB, nan: not modelled\n", out);
     fputs("comment echo and echo_count 0: shot without echo; label 65535: none\n", out);
     if (facts->moving)
-        fprintf(out,
-                "comment the head moved, each point has its own pose; frame: frame scalar of the trajectory\n"
-                "comment points_without_pose %" PRIu64 "\n",
-                facts->n_without_pose);
+        fprintf(
+            out,
+            "comment the head moved, each point has its own pose; frame: frame scalar of the trajectory, nan: lost\n"
+            "comment points_without_pose %" PRIu64 "\n",
+            facts->n_without_pose);
+    if (facts->stops) fputs("comment the stations are stops on a trajectory; frame: its frame scalar there\n", out);
     fprintf(out, "comment empty_shots %s\n", facts->empty_shots ? "kept" : "left out");
     fprintf(out,
             "comment frames_lost %" PRIu64 " reader_lost %" PRIu64 " dropped %" PRIu64 " bad_payload %" PRIu64 "\n",
@@ -115,7 +125,7 @@ static void put_header(FILE *out, const struct ply_facts *facts, const struct pl
           "property float reflectance\nproperty double time\nproperty uchar echo\nproperty uchar echo_count\n"
           "property ushort label\nproperty ushort station\n",
           out);
-    fputs(facts->moving ? "property double frame\nend_header\n" : "end_header\n", out);
+    fputs(facts->moving || facts->stops ? "property double frame\nend_header\n" : "end_header\n", out);
 }
 
 int ply_header_make(const struct ply_facts *facts, const struct ply_names *names, size_t size, char **text, size_t *len,
@@ -144,5 +154,5 @@ size_t ply_header_reserve(const struct ply_facts *facts, const struct ply_names 
     size_t len;
     if (ply_header_make(facts, names, 0, &text, &len, NULL) != 0) return 0;
     free(text);
-    return len + COUNT_ROOM + PAD_MIN + (size_t)(names->n - names->n_named) * NAME_ROOM;
+    return len + COUNT_ROOM + TIME_ROOM + PAD_MIN + (size_t)(names->n - names->n_named) * NAME_ROOM;
 }

@@ -84,7 +84,7 @@ static void points_geo(const struct scanhead *sh, const uint8_t *rec, int64_t t0
         p->x = anchor[0] + dx;
         p->y = anchor[1] + dy;
         p->z = anchor[2] + dz;
-        p->range_m = sh->anchor.moving & 1 ? NAN : sqrt(dx * dx + dy * dy + dz * dz);
+        p->range_m = sh->anchor.moving & NATIVE_MOVING ? NAN : sqrt(dx * dx + dy * dy + dz * dz);
         p->mirror_rad = p->pan_rad = NAN;
         if (p->echo_count == 0) p->x = p->y = p->z = p->range_m = NAN;
     }

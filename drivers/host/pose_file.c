@@ -1,9 +1,10 @@
 /* .poses.csv: where the head truly was, what a registration or a trajectory has to find.
  *
  * Of a head that stands, one row per scan: the pose takes points from the head's frame to the frame of the recordings
- * beside it (station_pose.h), whose coordinates are not-a-number where they are geodetic, and the axes then east,
- * north, up. Of a head that moves, one row per pose, each time once, in the scene frame, times since the scan's start:
- * a trajectory file of its own (core/pose.h). Gaps, where frames were lost, are lines of comment. */
+ * beside it (station_pose.h; at stops with the frame scalar, too), whose coordinates are not-a-number where they are
+ * geodetic, and the axes then east, north, up. Of a head that moves, one row per pose, each time once, in the scene
+ * frame, times since the scan's start: a trajectory file of its own (core/pose.h). Gaps, where frames were lost, are
+ * lines of comment, and so is what links the scene frame to the CRS of the geo layout. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -40,13 +41,17 @@ static int pose_file_open(const char *path, const struct recorder_options *optio
     return SH_OK;
 }
 
-static int put_title(struct pose_file *file, int moving, struct sh_err *err)
+enum title { STATIONS, STOPS, MOVING };
+
+static int put_title(struct pose_file *file, enum title which, struct sh_err *err)
 {
-    static const char *const title[] = {"scan,station,epsg,x_m,y_m,z_m,qw,qx,qy,qz,lat_deg,lon_deg,height_m\n",
-                                        "scan,t_s,x_m,y_m,z_m,qw,qx,qy,qz,frame,flags\n"};
+    static const char *const title[] = {
+        [STATIONS] = "scan,station,epsg,x_m,y_m,z_m,qw,qx,qy,qz,lat_deg,lon_deg,height_m\n",
+        [STOPS] = "scan,station,epsg,x_m,y_m,z_m,qw,qx,qy,qz,lat_deg,lon_deg,height_m,frame\n",
+        [MOVING] = "scan,t_s,x_m,y_m,z_m,qw,qx,qy,qz,frame,flags\n"};
     if (file->titled) return SH_OK;
     file->titled = 1;
-    return outfile_write(&file->out, title[moving], strlen(title[moving]), err);
+    return outfile_write(&file->out, title[which], strlen(title[which]), err);
 }
 
 static int put_station(void *rec, struct sh_err *err)
@@ -59,10 +64,12 @@ static int put_station(void *rec, struct sh_err *err)
     memcpy(p, t->pose.shift_m, sizeof p);
     if (track_crs(t) == NATIVE_CRS_GEODETIC) p[0] = p[1] = p[2] = NAN;
     station_pose_quaternion(&t->pose, q);
-    int n = snprintf(row, sizeof row, "%u,%u,%d,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g\n",
+    int n = snprintf(row, sizeof row, "%u,%u,%d,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g",
                      t->n_scans, t->info.station, track_epsg(t), p[0], p[1], p[2], q[0], q[1], q[2], q[3],
                      t->info.lat_deg, t->info.lon_deg, t->info.height_m);
-    int rc = put_title(file, 0, err);
+    if (t->info.stop) n += snprintf(row + n, sizeof row - (size_t)n, ",%.9g", t->info.frame);
+    row[n++] = '\n';
+    int rc = put_title(file, t->info.stop ? STOPS : STATIONS, err);
     return rc != SH_OK ? rc : outfile_write(&file->out, row, (size_t)n, err);
 }
 
@@ -75,14 +82,35 @@ static int put(struct pose_file *file, const struct scanhead_pose *p, struct sh_
     return outfile_write(&file->out, line, (size_t)n, err);
 }
 
+/* Poses are in the scene frame; where the points are in a CRS: what links the two, as comments. */
+static int put_link(struct pose_file *file, const struct scanhead_info *info, struct sh_err *err)
+{
+    char text[4 * LINE];
+    const double *p = info->station_m, *r = info->axes;
+    static const char *const to[] = {[NATIVE_CRS_ECEF] = "ECEF X Y Z",
+                                     [NATIVE_CRS_UTM] = "easting, northing, height",
+                                     [NATIVE_CRS_GEODETIC] = "east, north, up"};
+    if (!info->geo || info->crs == NATIVE_CRS_LOCAL) return SH_OK;
+    int n = snprintf(text, sizeof text,
+                     "# poses are in the scene frame, points recorded beside them in EPSG %d\n"
+                     "# scene point x_m,y_m,z_m is at lat_deg,lon_deg,ellipsoidal height_m: %.15g,%.15g,%.15g: "
+                     "%.15g,%.15g,%.15g\n"
+                     "# scene axes to %s, row by row, where the path begins: "
+                     "%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g\n",
+                     info->epsg, p[0], p[1], p[2], info->lat_deg, info->lon_deg, info->height_m, to[info->crs], r[0],
+                     r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8]);
+    return outfile_write(&file->out, text, (size_t)n, err);
+}
+
 static int put_poses(struct pose_file *file, struct scanhead *sh, const struct scanhead_frame *frame,
                      struct sh_err *err)
 {
     struct scanhead_pose pose[BATCH];
     struct scanhead_info info;
-    int n, rc = put_title(file, 1, err);
+    int n, rc = put_title(file, MOVING, err);
     if (scanhead_get_info(sh, &info) != SCANHEAD_OK) return SH_OK; /* whose scan it is isn't known yet */
     if (!file->begun || info.scan != file->scan) file->last_ns = INT64_MIN;
+    if (rc == SH_OK && !file->begun) rc = put_link(file, &info, err);
     file->begun = 1;
     file->scan = info.scan;
     for (uint32_t first = 0; (n = scanhead_poses(sh, frame, first, pose, BATCH)) > 0 && rc == SH_OK;
@@ -110,9 +138,10 @@ static int pose_file_frame(void *rec, struct scanhead *sh, const struct scanhead
 static int pose_file_close(void *rec, int keep, struct sh_err *err)
 {
     struct pose_file *file = rec;
-    int rc = keep ? put_title(file, 0, err) : SH_OK, closed = outfile_close(&file->out, keep && rc == SH_OK, err);
+    int rc = keep ? put_title(file, STATIONS, err) : SH_OK,
+        closed = outfile_close(&file->out, keep && rc == SH_OK, err);
     free(file);
     return rc != SH_OK ? rc : closed;
 }
 
-const struct recorder_ops recorder_poses = {".poses.csv", pose_file_open, pose_file_frame, pose_file_close};
+const struct recorder_ops recorder_poses = {".poses.csv", pose_file_open, pose_file_frame, pose_file_close, 0};

@@ -179,10 +179,10 @@ int scanhead_to_scene(struct scanhead *sh, struct scanhead_point *points, uint32
     if (!sh->have_descriptor || !sh->have_anchor || sh->descriptor.layout != NATIVE_POLAR)
         return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: only points of the polar layout can be taken to the scene frame",
                        sh->source.name);
-    if (sh->anchor.moving & 1) return to_scene_moving(sh, points, n, frame);
+    if (sh->anchor.moving & NATIVE_MOVING) return to_scene_moving(sh, points, n, frame);
     for (uint32_t i = 0; i < n; i++) {
         place(sh->anchor.rotation, sh->anchor.station_m, &points[i]);
-        if (frame != NULL) frame[i] = 0;
+        if (frame != NULL) frame[i] = sh->anchor.frame;
     }
     return 0;
 }

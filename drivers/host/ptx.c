@@ -161,4 +161,4 @@ static int ptx_close(void *rec, int keep, struct sh_err *err)
     return rc != 0 ? rc : closed;
 }
 
-const struct recorder_ops recorder_ptx = {".ptx", ptx_open, ptx_frame, ptx_close};
+const struct recorder_ops recorder_ptx = {".ptx", ptx_open, ptx_frame, ptx_close, 1};

@@ -22,6 +22,7 @@ struct recorder_ops {
     /* Finishes the file (counts in the header), syncs and renames. rec is void afterwards, also on failure.
      * keep = 0: throws the file away. */
     int (*close)(void *rec, int keep, struct sh_err *err);
+    int metres; /* 1: its coordinates are metres, a geodetic stream is refused with its first points */
 };
 
 /* By the path's ending; NULL and the list of known endings in err when there is none. */

@@ -26,15 +26,35 @@ enum scanhead_error {
     SCANHEAD_ECLOSED = -6,  /* the head is gone, or the file is at its end */
     SCANHEAD_EFORMAT = -7,  /* not this protocol */
     SCANHEAD_ESTATE = -8,   /* not possible now, e.g. points before descriptor and anchor were seen */
+    SCANHEAD_ELOST = -9,    /* the USB head was unplugged, or isn't there */
 };
 
 struct scanhead;
 
-/* source: "tty:/dev/ttyACM0", "tcp:host:port", "fd:N" (taken over), or the path of a raw stream (.shs).
- * On failure *out is NULL and err (may be NULL) gets the reason. */
+/* source: "usb", "usb:vid:pid", "usb:vid:pid:serial" (the head's own interface, ids in hexadecimal),
+ * "tty:/dev/ttyACM0", "tcp:host:port", "fd:N" (taken over), or the path of a raw stream (.shs). On failure *out is NULL
+ * and err (may be NULL) gets the reason. */
 int scanhead_open(const char *source, struct scanhead **out, char *err, size_t err_len);
 void scanhead_close(struct scanhead *sh);
 const char *scanhead_error(const struct scanhead *sh);
+
+/* After SCANHEAD_ELOST or SCANHEAD_ECLOSED, once all frames that had come were taken: waits until the same head is
+ * there again and goes on with it. Counters, hash and what the stream has said go on too: a jump in the sequence tells
+ * what was lost meanwhile. A USB head is the one with the same ids and serial number. SCANHEAD_ESTATE for a file or
+ * "fd:N"; any other error: it did not come back in time; call again, or close. */
+int scanhead_reattach(struct scanhead *sh, int timeout_ms);
+
+/* Heads on USB now. */
+struct scanhead_usb_head {
+    char source[192]; /* for scanhead_open: usb:vid:pid:serial */
+    uint16_t vid, pid;
+    char serial[128], maker[128], product[128];
+    int bus, device;
+    double speed_bit_s; /* 0: unknown */
+    char problem[128];  /* why it can't be opened, e.g. no permission; empty: nothing */
+};
+/* How many there are, of which at most max are described; or SCANHEAD_EIO with the reason in err (may be NULL). */
+int scanhead_list_usb(struct scanhead_usb_head *heads, int max, char *err, size_t err_len);
 
 /* Sends one command line and waits for its reply line (without its end). Frames that arrive meanwhile are kept and come
  * from scanhead_next() later; at most 64 MiB of them, then the oldest are dropped and counted (stats.dropped).
@@ -63,7 +83,8 @@ enum scanhead_event_code {
     SCANHEAD_EV_ERROR = 7,
     SCANHEAD_EV_SETTINGS = 8,
     SCANHEAD_EV_POSE_LATE = 9,
-    SCANHEAD_EV_PPS = 10, /* a full second: UTC (s since 1970), device time of the edge (ns), GPS time (s) */
+    SCANHEAD_EV_PPS = 10,  /* a full second: UTC (s since 1970), device time of the edge (ns), GPS time (s) */
+    SCANHEAD_EV_TIME = 11, /* before each repeated descriptor: 0, device time (ns), its GPS time (ns) */
 };
 
 struct scanhead_frame {
@@ -114,7 +135,7 @@ struct scanhead_info {
     int crs;           /* 0 local (scene frame), 1 ECEF, 2 UTM/UPS, 3 geodetic */
     int epsg;          /* 0 for local */
     int geoid_heights; /* 1: heights of UTM and geodetic points are above the geoid; 0: ellipsoidal */
-    double anchor[3];  /* metres; geodetic: degrees, degrees, metres */
+    double anchor[3];  /* metres; geodetic: degrees, degrees, metres. Moves along with a head on a trajectory */
     double scale_m;    /* a count on the wire is at most this on the ground */
     double scale[3];   /* units of the CRS per count */
     double lat_deg, lon_deg, height_m, station_m[3];
@@ -122,7 +143,9 @@ struct scanhead_info {
     double axes[9];     /* scene frame at the anchor -> axes of the CRS (geodetic: east, north, up), row by row */
     double prr_hz, lines_hz, pan_deg_s, range_min_m, range_max_m;
     uint32_t station, n_surfaces, frames, scan;
-    int moving; /* 1: the head moves; station_m and rotation do not say where it is, poses do */
+    int moving;   /* 1: the head moves; station_m and rotation do not say where it is, poses do */
+    int stop;     /* 1: the station is a stop on a trajectory */
+    double frame; /* of a stop: frame scalar of the trajectory; else 0 */
 };
 int scanhead_get_info(const struct scanhead *sh, struct scanhead_info *info);
 
@@ -147,16 +170,18 @@ int scanhead_pose(struct scanhead *sh, int64_t t_ns, struct scanhead_pose *pose)
 int scanhead_poses(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first, struct scanhead_pose *poses,
                    uint32_t max);
 /* Points of the polar layout from the head's frame to the scene frame: x, y, z in place, each with the pose of its own
- * time where the head moves. frame (may be NULL): the frame scalar of each, 0 where it stands. Returns how many points
- * had no pose, because frames were lost: their coordinates are NaN. A negative error for another layout. */
+ * time where the head moves. frame (may be NULL): the frame scalar of each, that of the stop where it
+ * stands. Returns how many points had no pose, because frames were lost: their coordinates are NaN. A negative error
+ * for another layout. */
 int scanhead_to_scene(struct scanhead *sh, struct scanhead_point *points, uint32_t n, double *frame);
 
 /* GPS time of t_ns since the scan's start (scanhead_point.t_ns) by the head's clock, in LAS's adjusted standard form:
  * seconds since 1980-01-06T00:00:00Z without leap seconds, less 1e9. Add 1e9 and divide by 604800 for week and second
  * of week. Good for frames up to the one that scanhead_next returned last: it goes by the last time the head told (at
- * the scan's start and each second; scanhead_frame.event SCAN_START, PPS), exact to the ns where the head's clock has
- * no drift; a double of that size has steps of 0.12 us. SCANHEAD_ESTATE where the head doesn't know the time, or before
- * it and the scan's start were seen, which takes a second at most. */
+ * the scan's start and each second; scanhead_frame.event SCAN_START, PPS, TIME), exact to the ns where the head's clock
+ * has no drift; a double of that size has steps of 0.12 us. SCANHEAD_ESTATE where the head doesn't know the time, or
+ * before it and the scan's start were seen; where the head knows it, it is there with the first points that can be
+ * placed. */
 int scanhead_gps_time(const struct scanhead *sh, int64_t t_ns, double *adjusted_standard_gps_time_s);
 
 /* Name of a label: 1 and the two names (owned by the handle), or 0 when not seen yet. */

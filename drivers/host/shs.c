@@ -32,4 +32,4 @@ static int shs_close(void *rec, int keep, struct sh_err *err)
     return rc;
 }
 
-const struct recorder_ops recorder_shs = {".shs", shs_open, shs_frame, shs_close};
+const struct recorder_ops recorder_shs = {".shs", shs_open, shs_frame, shs_close, 0};

@@ -1,4 +1,4 @@
-/* Sources by name: tty:PATH, tcp:HOST:PORT, fd:N, or the path of a recorded stream. */
+/* Sources by name: usb..., tty:PATH, tcp:HOST:PORT, fd:N, or the path of a recorded stream. */
 #include <errno.h>
 #include <fcntl.h>
 #include <netdb.h>
@@ -21,8 +21,8 @@ static int fail_open(struct sh_err *err, const char *name)
 {
     int code = errno == EACCES || errno == EPERM ? SH_EPERM : errno == ENOENT ? SH_EINPUT : SH_EIO;
     return sh_fail(err, code,
-                   "%s: cannot open: %s (a source is tty:PATH, tcp:HOST:PORT, fd:N or the path of a .shs file)", name,
-                   strerror(errno));
+                   "%s: cannot open: %s (a source is usb, tty:PATH, tcp:HOST:PORT, fd:N or the path of a .shs file)",
+                   name, strerror(errno));
 }
 
 static int open_tty(const char *path, struct host_source *out, struct sh_err *err)
@@ -161,6 +161,8 @@ int host_source_open(const char *source, struct host_source *out, struct sh_err 
     out->fd = -1;
     snprintf(out->name, sizeof out->name, "%s", source);
     int rc;
+    if (strcmp(source, "usb") == 0 || strncmp(source, "usb:", 4) == 0) return host_usb_open(source, out, err);
+    out->ops = &host_fd_ops;
     if (strncmp(source, "tty:", 4) == 0)
         rc = open_tty(source + 4, out, err);
     else if (strncmp(source, "tcp:", 4) == 0)
@@ -173,5 +175,6 @@ int host_source_open(const char *source, struct host_source *out, struct sh_err 
         close(out->fd);
         out->fd = -1;
     }
+    if (rc != 0) out->ops = NULL;
     return rc;
 }

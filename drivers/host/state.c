@@ -53,6 +53,8 @@ static int absorb_points(struct scanhead *sh, const struct native_header *header
     if (sh->have_pulse && points.pulse0 < sh->last_pulse0) forget(sh);
     sh->scan_t0_ns = (int64_t)((uint64_t)header->t_ns - (uint64_t)points.t0_ns);
     sh->have_scan_t0 = 1;
+    int64_t until_ns = 1000000 * (int64_t)sh->anchor.until_ms; /* behind it those of an anchor that did not reach us */
+    if (sh->have_anchor && until_ns != 0 && points.t0_ns >= until_ns) sh->have_anchor = 0;
     sh->have_pulse = 1;
     sh->last_pulse0 = points.pulse0;
     return 0;
@@ -74,6 +76,7 @@ static void absorb_time(struct scanhead *sh, const struct native_event *event)
         set_gps(sh, event->b, event->c);
         sh->have_gps = event->c != 0;
     }
+    if (event->code == NATIVE_EV_TIME) set_gps(sh, event->b, event->c);
     if (event->code == NATIVE_EV_PPS) set_gps(sh, event->b, event->c * 1000000000u);
 }
 
@@ -201,7 +204,9 @@ int scanhead_get_info(const struct scanhead *sh, struct scanhead_info *info)
     info->n_surfaces = d->n_surfaces;
     info->frames = d->frames;
     info->scan = d->scan;
-    info->moving = a->moving & 1;
+    info->moving = (a->moving & NATIVE_MOVING) != 0;
+    info->stop = (a->moving & NATIVE_STOP) != 0;
+    info->frame = a->frame;
     return SCANHEAD_OK;
 }
 

@@ -41,15 +41,18 @@ static int check_info(struct track *t, struct sh_err *err)
     if (t->begun && t->geoid != geoid)
         return sh_fail(err, SH_EFORMAT, "%s: the stream went to other heights (%s); a file holds one kind", t->path,
                        geoid ? "geoid" : "ellipsoid");
-    if (t->begun && t->moving != info->moving)
-        return sh_fail(err, SH_EFORMAT, "%s: the stream went on with a head that %s; a file holds either", t->path,
-                       info->moving ? "moves" : "stands still");
+    if (t->begun && (t->moving != info->moving || t->stops != info->stop))
+        return sh_fail(err, SH_EFORMAT, "%s: the stream went on with a head that %s; a file holds one kind", t->path,
+                       info->moving ? "moves"
+                       : info->stop ? "stops on a trajectory"
+                                    : "stands still");
     if (info->station > UINT16_MAX)
         return sh_fail(err, SH_EFORMAT, "%s: station %u; a file holds stations up to 65535", t->path, info->station);
     t->crs = crs;
     t->epsg = epsg;
     t->geoid = geoid;
     t->moving = info->moving;
+    t->stops = info->stop;
     t->scale_m = info->moving && info->scale_m > 0 && info->scale_m < MOVING_SCALE_M ? MOVING_SCALE_M : info->scale_m;
     t->begun = 1;
     return 0;
@@ -90,12 +93,12 @@ static uint64_t number_rows(struct track *t, uint64_t row, int n)
     return row;
 }
 
-/* Positions of the geo layout need no pose, the frame scalar does. */
+/* Positions of the geo layout need no pose, the frame scalar does: not-a-number where it was lost. */
 static void set_geo_frames(struct track *t, struct scanhead *sh, int n)
 {
     struct scanhead_pose pose;
     for (int i = 0; i < n; i++)
-        t->frame[i] = scanhead_pose(sh, t->point[i].t_ns, &pose) == SCANHEAD_OK ? pose.frame : 0.0;
+        t->frame[i] = scanhead_pose(sh, t->point[i].t_ns, &pose) == SCANHEAD_OK ? pose.frame : NAN;
 }
 
 /* How many are left, or a negative error. */

@@ -3,7 +3,8 @@
  *
  * Points of a moving head come out where they were hit, each by the pose of its own time: in the polar layout in the
  * scene frame, with a pose of the scan that changes nothing; in the geo layout in the CRS, as of a standing head, and
- * the pose is the first anchor's. Those whose pose was lost are left out and counted.
+ * the pose is the first anchor's. Those of the polar layout whose pose was lost are left out and counted; those of the
+ * geo layout need none.
  *
  * A recorder passes each frame to track_frame and gets its points back in batches. One thread per track. */
 #ifndef DRIVERS_HOST_TRACK_H
@@ -30,10 +31,10 @@ struct track {
     double scale_m;          /* of coordinates in the recording: the stream's; coarser where the head moves far */
     struct scanhead_point point[TRACK_BATCH];
     uint32_t row[TRACK_BATCH]; /* of each point: pulses since the line's first, the blind ones included */
-    double frame[TRACK_BATCH]; /* of each point of a moving head: frame scalar of the trajectory */
+    double frame[TRACK_BATCH]; /* of each point of a moving head: frame scalar of the trajectory; NaN: lost */
     /* inner state */
     int begun, new_scan, have_next_line;
-    int crs, epsg, geoid, moving;
+    int crs, epsg, geoid, moving, stops;
     uint32_t next_line, last_station;
     uint64_t next_line_pulse0, last_pulse0;
 };

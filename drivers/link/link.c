@@ -4,7 +4,7 @@
 
 static const struct link_ops *const links[] = {
     [LINK_NULL] = &link_null, [LINK_FILE] = &link_file, [LINK_PTY] = &link_pty,
-    [LINK_TCP] = &link_tcp,   [LINK_FD] = &link_fd,
+    [LINK_TCP] = &link_tcp,   [LINK_USB] = &link_usb,   [LINK_FD] = &link_fd,
 };
 enum { N_LINKS = sizeof links / sizeof links[0] };
 

@@ -1,7 +1,8 @@
 /* Links: bytes <-> world. One ops struct, one file each; a link knows nothing of frames.
  *
- * A link has sessions: readers and commanders that come and go (a pty or a file has one, TCP several). One thread
- * owns a link and makes all calls on it; nothing but poll() waits, and write() of `file` and `null`, which may. */
+ * A link has sessions: readers and commanders that come and go (a pty or a file has one, TCP several, USB two: console
+ * and stream). One thread owns a link and makes all calls on it; nothing but poll() waits, and write() of `file` and
+ * `null`, which may. */
 #ifndef DRIVERS_LINK_LINK_H
 #define DRIVERS_LINK_LINK_H
 
@@ -13,16 +14,22 @@
 
 enum { LINK_MAX_SESSIONS = 8, LINK_MAX_EVENTS = 2 * LINK_MAX_SESSIONS + 2 };
 
-enum link_type { LINK_NULL, LINK_FILE, LINK_PTY, LINK_TCP, LINK_FD };
+enum link_type { LINK_NULL, LINK_FILE, LINK_PTY, LINK_TCP, LINK_USB, LINK_FD };
 
 struct link_spec {
     enum link_type type;
-    char path[256];   /* file: where to write; pty: symlink to the slave, may be empty */
+    char path[256];   /* file: where to write; pty: symlink to the slave, may be empty; usb: see below */
     char address[64]; /* tcp: numeric or name; empty: 127.0.0.1 */
     int port;         /* tcp: 0 lets the system choose */
     int max_sessions; /* tcp: 1..LINK_MAX_SESSIONS */
     int protocol;     /* what its owner speaks on it; 0: the usual. Links don't look at it */
     int fd;           /* fd: a connected stream descriptor (socket pair), taken over */
+    /* usb; address, port and path as struct usb_backend_spec has them, which explains these as well */
+    int backend; /* enum usb_backend_type */
+    int speed;   /* enum usb_rate: the fastest the device can do */
+    int attach, vid, pid;
+    char udc[64];
+    char serial[64]; /* empty: no serial number string */
 };
 
 enum link_event_kind {

@@ -7,7 +7,7 @@
 
 #include "drivers/link/link.h"
 
-extern const struct link_ops link_null, link_file, link_pty, link_tcp, link_fd;
+extern const struct link_ops link_null, link_file, link_pty, link_tcp, link_usb, link_fd;
 
 /* Events of one poll() call. push answers 0 when there is no room; the caller then leaves its state as it is,
  * so that the event comes with the next call. */

@@ -53,7 +53,8 @@ static const struct field anchor[] = {
     ANCHOR(moving, FIELD_32),      ANCHOR(anchor, FIELD_REAL),   ANCHOR(scale_m, FIELD_REAL),
     ANCHOR(lat_deg, FIELD_REAL),   ANCHOR(lon_deg, FIELD_REAL),  ANCHOR(height_m, FIELD_REAL),
     ANCHOR(station_m, FIELD_REAL), ANCHOR(rotation, FIELD_REAL), ANCHOR(scale, FIELD_REAL),
-    ANCHOR(heights, FIELD_32),     ANCHOR(reserved2, FIELD_32),  ANCHOR(axes, FIELD_REAL),
+    ANCHOR(heights, FIELD_32),     ANCHOR(until_ms, FIELD_32),   ANCHOR(axes, FIELD_REAL),
+    ANCHOR(frame, FIELD_REAL),
 };
 
 #define POINTS(member, kind) ROW(native_points, member, kind)
@@ -92,7 +93,7 @@ static const struct field pose[] = {
 };
 
 const struct field_table fields_descriptor = TABLE(descriptor, native_descriptor, 272);
-const struct field_table fields_anchor = TABLE(anchor, native_anchor, 272);
+const struct field_table fields_anchor = TABLE(anchor, native_anchor, 280);
 const struct field_table fields_points = TABLE(points, native_points, NATIVE_POINTS_HEAD_LEN);
 const struct field_table fields_line_end = TABLE(line_end, native_line_end, 56);
 const struct field_table fields_telemetry = TABLE(telemetry, native_telemetry, 72);

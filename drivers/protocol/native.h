@@ -71,11 +71,16 @@ struct native_descriptor {
 enum native_crs { NATIVE_CRS_LOCAL = 0, NATIVE_CRS_ECEF = 1, NATIVE_CRS_UTM = 2, NATIVE_CRS_GEODETIC = 3 };
 enum native_heights { NATIVE_HEIGHTS_ELLIPSOID = 0, NATIVE_HEIGHTS_GEOID = 1 };
 
+enum native_moving {
+    NATIVE_MOVING = 1, /* the head moves, see NATIVE_POSES */
+    NATIVE_STOP = 2,   /* it stands at a stop of a trajectory; `frame` is the stop's */
+};
+
 struct native_anchor {
     uint32_t crs;     /* enum native_crs */
     uint32_t epsg;    /* 0 for local */
     uint32_t station; /* number, from 1 */
-    uint32_t moving;  /* bit 0: the head moves, see NATIVE_POSES; the other bits 0 */
+    uint32_t moving;  /* enum native_moving */
     double anchor[3]; /* of the station in the CRS, metres; geodetic: degrees, degrees, metres */
     double scale_m;   /* a count is at most this on the ground */
     double lat_deg, lon_deg, height_m;
@@ -83,9 +88,10 @@ struct native_anchor {
     double rotation[9];  /* socs -> scene frame, row by row: p_prcs = station_m + rotation * p_socs */
     double scale[3];     /* geo: position = anchor + scale[k] * count[k]; 0, or not there: scale_m */
     uint32_t heights;    /* enum native_heights, of utm and geodetic */
-    uint32_t reserved2;
+    uint32_t until_ms;   /* of the scan: for points before that; 0: for all that follow */
     double axes[9]; /* differences in the scene frame at the anchor -> axes of the CRS, row by row, without its scale;
                        geodetic: -> east, north, up. All 0, or not there: the unit matrix */
+    double frame;   /* at a stop: frame scalar of the trajectory */
 };
 
 struct native_points { /* head of a points payload, 40 bytes, then n points of 20 */
@@ -144,8 +150,10 @@ enum native_event_code {
     NATIVE_EV_ERROR = 7,       /* a: SCPI error number (two's complement) */
     NATIVE_EV_SETTINGS = 8,    /* a: first pulse with the new settings */
     NATIVE_EV_POSE_LATE = 9,   /* no pose in time; a: poses made up so far, c: ns since the last one that came */
-    NATIVE_EV_PPS = 10, /* a full second of the head's clock; a: UTC, s since 1970, b: device time of the edge, ns,
-                          c: GPS time, s; the text is the UTC */
+    NATIVE_EV_PPS = 10,  /* a full second of the head's clock; a: UTC, s since 1970, b: device time of the edge, ns,
+                           c: GPS time, s; the text is the UTC */
+    NATIVE_EV_TIME = 11, /* the head's clock, before each repeated descriptor; a: 0, b: device time, ns, c: its GPS
+                            time, ns */
 };
 struct native_event {
     uint32_t code, reserved;
@@ -204,6 +212,9 @@ enum native_item native_parser_next(struct native_parser *parser);
 /* Nothing more will be added: what waits for more bytes is searched as garbage, so that whole frames behind a cut one
  * come out at the end of a recording too. */
 void native_parser_finish(struct native_parser *parser);
+/* After native_parser_finish() and all its items: bytes of another connection to the same head follow. Counters and
+ * sequence go on. */
+void native_parser_resume(struct native_parser *parser);
 
 /* 1 if a frame with this header belongs to stream_sha256: the hash runs over u8 type, u32 length (LE) and the payload
  * of each descriptor, anchor, points, line-end and poses frame that has neither NATIVE_REPEAT nor NATIVE_LOCAL. */

@@ -5,8 +5,8 @@
 #include "drivers/protocol/fields.h"
 #include "drivers/protocol/native.h"
 
-/* The first heads sent no scales by axis, no kind of height and no axes. */
-enum { ANCHOR_LEN_FIRST = 168, ANCHOR_LEN = 272 };
+/* The first heads sent no scales by axis, no kind of height and no axes; later ones no frame scalar. */
+enum { ANCHOR_LEN_FIRST = 168, ANCHOR_LEN_AXES = 272, ANCHOR_LEN = 280 };
 
 int native_decode_descriptor(const uint8_t *payload, size_t len, struct native_descriptor *out)
 {
@@ -19,8 +19,8 @@ int native_decode_anchor(const uint8_t *payload, size_t len, struct native_ancho
 {
     uint8_t whole[ANCHOR_LEN] = {0};
     if (len < ANCHOR_LEN_FIRST) return SH_EFORMAT;
-    memcpy(whole, payload, len < sizeof whole ? len : sizeof whole);
-    if (len < sizeof whole) memset(whole + ANCHOR_LEN_FIRST, 0, sizeof whole - ANCHOR_LEN_FIRST);
+    size_t known = len < ANCHOR_LEN_AXES ? ANCHOR_LEN_FIRST : len < ANCHOR_LEN ? ANCHOR_LEN_AXES : ANCHOR_LEN;
+    memcpy(whole, payload, known);
     int rc = fields_decode(&fields_anchor, whole, sizeof whole, out);
     if (rc != 0) return rc;
     for (int i = 0; i < 3; i++)

@@ -37,6 +37,14 @@ void native_parser_finish(struct native_parser *parser)
     parser->finished = 1;
 }
 
+void native_parser_resume(struct native_parser *parser)
+{
+    parser->stats.bad_bytes += parser->end - parser->start;
+    parser->start = parser->end = 0;
+    parser->finished = 0;
+    parser->in_step = 1;
+}
+
 static void read_header(const uint8_t *frame, struct native_header *header)
 {
     header->type = frame[1];

@@ -10,7 +10,7 @@ family = "f = $2; sub(/ [^ ]*$/, \"\", f); "
 panel_of(i) = word(plots, 2 * i - 1)
 scene_of(i) = word(plots, 2 * i)
 here(i) = "$1 == \"" . panel_of(i) . "\" && $3 == \"" . scene_of(i) . "\""
-plots = rows("$1 != \"georef\"", "if (!seen[$1, $3]++) print \"\\042\" $1 \"\\042\", \"\\042\" $3 \"\\042\"")
+plots = rows("$1 !~ /^georef/", "if (!seen[$1, $3]++) print \"\\042\" $1 \"\\042\", \"\\042\" $3 \"\\042\"")
 families(i) = rows(here(i), family . "if (!seen[f]++) print \"\\042\" f \"\\042\"")
 # "< awk" makes a table of one family: ns, p99.9, max, what is varied
 part(i, f) = "< awk -F, 'NR > 1 && " . here(i) . " { " . family . "n = split($2, w, \" \"); if (f ~ /^" . f . \
@@ -20,9 +20,10 @@ marked(i, column) = "< awk -F, 'NR > 1 && " . here(i) . " && $" . column . " == 
 
 n_plots = words(plots) / 2
 # georef: the same few methods in every scene, so that a scene is what has a symbol, and the method stands beside it
-radii = rows("$1 == \"georef\"", "if (!seen[$3]++) print \"\042\" $3 \"\042\"")
+radii = rows("$1 == \"georef\"", "if (!seen[$3]++) print \"\\042\" $3 \"\\042\"")
 within(r) = "< awk -F, 'NR > 1 && $1 == \"georef\" && $3 == \"" . r . "\" { print $4 \",\" ($5 > 0 ? $5 : 1e-17) \",\" " . \
     "($6 > 0 ? $6 : 1e-17) \",\" $2 \",\" $7 \",\" $8 }' '" . csv . "' | sort -t, -g"
+method(r, is) = within(r) . " | awk -F, '$4 " . is . " \"flat earth\"' | sed 's/order //'"
 only(r, column) = within(r) . " | awk -F, '$" . column . " == 1'"
 n_rows = (n_plots + (words(radii) > 0) + 1) / 2
 
@@ -79,14 +80,14 @@ do for [out in "svg png"] {
     }
     if (words(radii) > 0) {
         n = words(radii)
-        set title "georef: scene to UTM, points within ..." font ",14" offset 0, -0.4
+        set title "georef: scene to UTM by order 1, 2, 3, within 10 m to 5 km" font ",14" offset 0, -0.4
         set ylabel "error of the position in m"
         set xrange [*:*]
         set yrange [*:*]
         stats "< awk -F, '$1 == \"georef\"' '" . csv . "'" using 4:5 nooutput name "low"
         stats "< awk -F, '$1 == \"georef\"' '" . csv . "'" using 4:6 nooutput name "high"
-        set xrange [low_min_x * 0.7 : low_max_x * 1.6]
-        set yrange [low_min_y / 5 : high_max_y * 5]
+        set xrange [low_min_x * 0.6 : low_max_x * 1.7]
+        set yrange [low_min_y / 5 : high_max_y * 6]
         plot 1e-6 with lines lc rgb "#d55e00" lw 1 dt 3 title "tolerance", \
             for [k = 1:n] only(word(radii, k), 5) using 1:2 with lines lc rgb colour[k] lw 1 dt 2 notitle, \
             NaN with lines lc rgb "#000000" lw 1.5 dt 2 title "front", \
@@ -95,7 +96,8 @@ do for [out in "svg png"] {
             for [k = 1:n] within(word(radii, k)) using 1:2:2:3 with yerrorbars pt symbol[k] ps 1.2 lw 1 lc rgb colour[k] \
             notitle, \
             for [k = 1:n] NaN with points pt symbol[k] ps 1.4 lc rgb colour[k] title word(radii, k), \
-            within(word(radii, n)) using 1:(low_min_y / 2.5):4 with labels font ",10" tc rgb "#000000" notitle
+            method(word(radii, n), "!=") using 1:(low_min_y / 2.5):4 with labels font ",10" tc rgb "#000000" notitle, \
+            method(word(radii, n), "==") using 1:(high_max_y * 2.5):4 with labels font ",10" tc rgb "#000000" notitle
         set ylabel "error of the range in m" offset 1, 0
     }
     unset multiplot

@@ -11,7 +11,7 @@
 #include "firmware_sim/bench.h"
 #include "tests/geodesy.h"
 
-enum { PLACES = 6, POINTS = 2048, METHODS = 4, ROUNDS = 15, SCENES = 4 };
+enum { PLACES = 6, POINTS = 2048, METHODS = 5, ROUNDS = 15, SCENES = 5 };
 
 /* An ordinary place, a zone's edge on the equator, the neighbouring zone forced there, 83.9 N, UPS, and high up. */
 static const struct georef_spec PLACE[PLACES] = {
@@ -22,10 +22,16 @@ static const struct georef_spec PLACE[PLACES] = {
 static const struct {
     const char *name;
     double radius_m, height_m;
-} SCENE[SCENES] = {{"10 m", 10.0, 5.0}, {"100 m", 100.0, 40.0}, {"1 km", 1000.0, 400.0}, {"5 km", 5000.0, 1000.0}};
+} SCENE[SCENES] = {{"10 m", 10.0, 5.0},
+                   {"100 m", 100.0, 40.0},
+                   {"1 km", 1000.0, 400.0},
+                   {"2 km", 2000.0, 700.0},
+                   {"5 km", 5000.0, 1000.0}};
 
-static const char *const NAME[METHODS] = {"order 1", "order 2", "order 3", "exact"};
-static const enum georef_method METHOD[METHODS] = {GEOREF_ORDER1, GEOREF_ORDER2, GEOREF_ORDER3, GEOREF_EXACT};
+/* Flat: metres turned by the grid's convergence and stretched by its scale at the station. Not of the program. */
+#define FLAT GEOREF_AUTO
+static const char *const NAME[METHODS] = {"flat earth", "order 1", "order 2", "order 3", "exact"};
+static const enum georef_method METHOD[METHODS] = {FLAT, GEOREF_ORDER1, GEOREF_ORDER2, GEOREF_ORDER3, GEOREF_EXACT};
 
 struct result {
     double ns[ROUNDS], ns_median, err_p999_m, err_max_m;
@@ -51,6 +57,26 @@ static void scatter(int scene)
     }
 }
 
+static void go_flat(const struct georef *georef)
+{
+    double angle, scale;
+    georef_convergence(georef, &angle, &scale);
+    const double c = scale * cos(angle), s = scale * sin(angle);
+    for (int i = 0; i < POINTS; i++) {
+        out[0][i] = c * in[0][i] - s * in[1][i];
+        out[1][i] = s * in[0][i] + c * in[1][i];
+        out[2][i] = in[2][i];
+    }
+}
+
+static void go(struct georef *georef, int m)
+{
+    if (METHOD[m] == FLAT)
+        go_flat(georef);
+    else
+        georef_forward(georef, POINTS, in[0], in[1], in[2], out[0], out[1], out[2]);
+}
+
 static void measure_errors(struct georef *georef, int place)
 {
     double anchor[3];
@@ -64,8 +90,8 @@ static void measure_errors(struct georef *georef, int place)
             truth[i][k] = p[k] - (long double)anchor[k];
     }
     for (int m = 0; m < METHODS; m++) {
-        georef_set_method(georef, METHOD[m], NULL);
-        georef_forward(georef, POINTS, in[0], in[1], in[2], out[0], out[1], out[2]);
+        if (METHOD[m] != FLAT) georef_set_method(georef, METHOD[m], NULL);
+        go(georef, m);
         for (int i = 0; i < POINTS; i++) {
             long double sum = 0;
             for (int k = 0; k < 3; k++)
@@ -80,10 +106,10 @@ static void measure_speed(struct georef *georef, struct result *result)
     for (int round = 0; round < ROUNDS; round++)
         for (int m = 0; m < METHODS; m++) {
             int times = METHOD[m] == GEOREF_EXACT ? 2 : 500;
-            georef_set_method(georef, METHOD[m], NULL);
+            if (METHOD[m] != FLAT) georef_set_method(georef, METHOD[m], NULL);
             double start_s = bench_thread_s();
             for (int k = 0; k < times; k++)
-                georef_forward(georef, POINTS, in[0], in[1], in[2], out[0], out[1], out[2]);
+                go(georef, m);
             result[m].ns[round] = 1e9 * (bench_thread_s() - start_s) / times / POINTS;
         }
 }
@@ -117,10 +143,14 @@ static void finish(struct result *result, int the_default)
         result[m].is_default = m == the_default;
     }
     for (int m = 0; m < METHODS; m++) {
+        const struct result *a = &result[m];
         result[m].front = 1;
         for (int k = 0; k < METHODS; k++) {
-            int no_worse = result[k].ns_median <= result[m].ns_median && result[k].err_p999_m <= result[m].err_p999_m;
-            if (k != m && no_worse) result[m].front = 0;
+            const struct result *b = &result[k];
+            int no_worse =
+                b->ns_median <= a->ns_median && b->err_p999_m <= a->err_p999_m && b->err_max_m <= a->err_max_m;
+            int better = b->ns_median < a->ns_median || b->err_p999_m < a->err_p999_m || b->err_max_m < a->err_max_m;
+            if (no_worse && better) result[m].front = 0;
         }
     }
 }

@@ -173,17 +173,17 @@ static void coverage_is_counted(void **state)
     struct cloud c = {.n = 4, .label = label};
     struct cloud_coverage cover;
     struct sh_err err;
-    assert_int_equal(cloud_cover(&c, s, triangle, &cover, &err), SH_OK);
+    assert_int_equal(cloud_cover(&c, s, s->n_surfaces, triangle, &cover, &err), SH_OK);
     assert_int_equal(cover.surfaces_hit, 2);
     assert_int_equal(cover.triangles_hit, 1);
     c.label = NULL;
     assert_int_equal(cloud_surface(&c, s, triangle, 0), 2);
     assert_int_equal(cloud_surface(&c, s, triangle, 1), CLOUD_LABEL_NONE);
-    assert_int_equal(cloud_cover(&c, s, triangle, &cover, &err), SH_OK);
+    assert_int_equal(cloud_cover(&c, s, s->n_surfaces, triangle, &cover, &err), SH_OK);
     assert_int_equal(cover.surfaces_hit, 1);
     c.label = label;
     label[2] = 3;
-    assert_int_equal(cloud_cover(&c, s, triangle, &cover, &err), SH_EINPUT);
+    assert_int_equal(cloud_cover(&c, s, s->n_surfaces, triangle, &cover, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, "point 3 has label 3; the scene has 3 surfaces"));
     scene_free(s);
 }

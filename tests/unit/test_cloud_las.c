@@ -47,6 +47,34 @@ static void test_read(void **state)
     }
 }
 
+/* In degrees: the file's x is longitude, the cloud's first is latitude, as in a stream; and within -180..180. */
+static void test_degrees(void **state)
+{
+    (void)state;
+    static const double lon_deg[] = {9, 179.998, -179.998};
+    for (int i = 0; i < 3; i++) {
+        struct native_anchor a = rig_anchor_of(NATIVE_CRS_GEODETIC, 4979, 1);
+        struct cloud cloud;
+        struct sh_err err = {0};
+        a.anchor[0] = 45;
+        a.anchor[1] = lon_deg[i];
+        a.scale[0] = a.scale[1] = 1e-6;
+        a.scale[2] = 1e-3;
+        rig_begin();
+        rig_descriptor(1, 1);
+        rig_anchor(&a);
+        rig_points(0, 0, 0, (struct rig_point[]){{3000, 4000, 12000, 0, 7, 1, 1}, {0, -4000, 0, 0, 7, 1, 1}}, 2);
+        if (rig_record(rig_path("a.las"), (struct recorder_options){0}, 1, &err) != 0) fail_msg("%s", err.text);
+        if (cloud_read(rig_path("a.las"), NULL, &cloud, &err) != 0) fail_msg("%s", err.text);
+        const double want[2] = {remainder(lon_deg[i] + 0.004, 360), remainder(lon_deg[i] - 0.004, 360)};
+        assert_int_equal(cloud.epsg, 4979);
+        assert_true(fabs(cloud.xyz_m[0][0] - 45.003) < 1e-13 && fabs(cloud.xyz_m[0][2] - 412.125) < 1e-12);
+        assert_true(fabs(cloud.xyz_m[0][1] - want[0]) < 1e-12 && fabs(cloud.xyz_m[1][1] - want[1]) < 1e-12);
+        cloud_free(&cloud);
+        unlink(rig_path("a.las"));
+    }
+}
+
 /* One byte changed, or the end cut off: what is wrong is told, with the file's name. */
 static void test_broken(void **state)
 {
@@ -90,6 +118,7 @@ static void test_broken(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_read), cmocka_unit_test(test_broken)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_read), cmocka_unit_test(test_degrees),
+                                       cmocka_unit_test(test_broken)};
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
 }

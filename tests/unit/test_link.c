@@ -22,7 +22,8 @@ static void test_table(void **state)
         assert_true(link_ops_get(types[i])->capacity(NULL) == 0);
     }
     assert_int_equal(link_type_parse("udp"), -1);
-    assert_null(link_ops_get((enum link_type)5));
+    assert_null(link_ops_get((enum link_type)6));
+    assert_int_equal(link_type_parse("usb"), LINK_USB);
     assert_null(link_ops_get((enum link_type) - 1));
 }
 

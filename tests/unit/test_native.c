@@ -157,6 +157,8 @@ static struct native_anchor make_anchor(void)
     a.heights = NATIVE_HEIGHTS_GEOID;
     for (int i = 0; i < 9; i++)
         a.axes[i] = 0.5 * i - 1.75;
+    a.moving = NATIVE_STOP;
+    a.frame = 1207.25;
     return a;
 }
 
@@ -165,12 +167,12 @@ static void test_anchor(void **state)
     (void)state;
     struct native_anchor a = make_anchor(), back;
     size_t len = native_encode_anchor(out, sizeof out, &a, 5, NATIVE_LOCAL);
-    check_frame(out, len, 2, 2, 272, 5);
+    check_frame(out, len, 2, 2, 280, 5);
     const uint8_t *p = out + 28;
     assert_int_equal(wire(p, 0, 4), 2);
     assert_int_equal(wire(p, 4, 4), 32632);
     assert_int_equal(wire(p, 8, 4), UINT32_MAX);
-    assert_int_equal(wire(p, 12, 4), 0);
+    assert_int_equal(wire(p, 12, 4), 2);
     assert_true(wire_double(p, 16) == 500000.125 && wire_double(p, 24) == 6e6 && wire_double(p, 32) == -11000.5);
     assert_true(wire_double(p, 40) == 1e-5);
     assert_true(wire_double(p, 48) == -90 && wire_double(p, 56) == 180 && wire_double(p, 64) == 8848.86);
@@ -181,22 +183,27 @@ static void test_anchor(void **state)
     assert_true(wire(p, 192, 4) == 1 && wire(p, 196, 4) == 0);
     for (size_t i = 0; i < 9; i++)
         assert_true(wire_double(p, 200 + 8 * i) == 0.5 * (double)i - 1.75);
-    assert_int_equal(native_decode_anchor(p, 272, &back), 0);
+    assert_true(wire_double(p, 272) == 1207.25);
+    assert_int_equal(native_decode_anchor(p, 280, &back), 0);
     assert_memory_equal(&a, &back, sizeof a);
-    assert_int_equal(native_decode_anchor(p, 168, &back), 0); /* of an older head */
+    for (size_t n = 272; n < 280; n++) { /* of an older head */
+        assert_int_equal(native_decode_anchor(p, n, &back), 0);
+        assert_true(back.frame == 0 && back.axes[8] == 2.25 && back.scale[2] == 0.75);
+    }
+    assert_int_equal(native_decode_anchor(p, 168, &back), 0); /* of the first ones */
     assert_true(back.scale[0] == 1e-5 && back.scale[1] == 1e-5 && back.scale[2] == 1e-5 && back.heights == 0);
     assert_true(back.rotation[8] == 3.75);
     for (int i = 0; i < 9; i++)
         assert_true(back.axes[i] == (i % 4 == 0));
     assert_int_equal(native_decode_anchor(p, 167, &back), SH_EFORMAT);
     out[28] = 3;
-    assert_int_equal(native_decode_anchor(p, 272, &back), 0);
+    assert_int_equal(native_decode_anchor(p, 280, &back), 0);
     assert_int_equal(back.crs, NATIVE_CRS_GEODETIC);
     out[28] = 4;
-    assert_int_equal(native_decode_anchor(p, 272, &back), SH_EFORMAT);
+    assert_int_equal(native_decode_anchor(p, 280, &back), SH_EFORMAT);
     out[28] = 2;
     out[28 + 192] = 2;
-    assert_int_equal(native_decode_anchor(p, 272, &back), SH_EFORMAT);
+    assert_int_equal(native_decode_anchor(p, 280, &back), SH_EFORMAT);
 }
 
 static void test_line_end(void **state)

@@ -129,6 +129,43 @@ static void each_form_leads_to_the_same_place(void **state)
     }
 }
 
+/* One grid for a scene, UPS and the hemisphere's false northing included. */
+static void the_equator_and_the_edge_of_ups_do_not_part_stations(void **state)
+{
+    (void)state;
+    static const char both[] = "  - {position_m: [0, 20, 2]}\n  - {position_m: [0, -20, 2]}";
+    write_floor(0, 0, 0);
+    ok(load("  anchor: {source: explicit, lat_deg: 0, lon_deg: 15, height_m: 0}", both, "utm"));
+    assert_corner_agrees((const double[3]){30, 30, 0});
+    ok(load("  anchor: {source: explicit, lat_deg: -0.0000001, lon_deg: 15, height_m: 0}", both, "utm"));
+    assert_corner_agrees((const double[3]){30, 30, 0});
+    assert_int_equal(georef_epsg(site->station[0].georef), 32733);
+    ok(load("  anchor: {source: explicit, lat_deg: 84.00005, lon_deg: 15, height_m: 0}", both, "utm"));
+    assert_corner_agrees((const double[3]){30, 30, 0});
+    assert_int_equal(georef_epsg(site->station[1].georef), 32661);
+    assert_string_equal(warned, "");
+    /* a station given in the southern grid, on the equator */
+    double anchor[3];
+    ok(load("",
+            "  - {position_m: [0, 0, 2], utm_zone: 33, hemisphere: south, easting_m: 500000, northing_m: 10000000, "
+            "height_m: 0}",
+            "utm"));
+    assert_int_equal(georef_epsg(site->station[0].georef), 32733);
+    georef_anchor(site->station[0].georef, anchor);
+    assert_near(anchor[1], 1e7, 1e-6);
+}
+
+/* Without an anchor the place on the Earth is that of position_m as given: both rise with the instrument. */
+static void instrument_height_moves_the_height_on_the_earth(void **state)
+{
+    (void)state;
+    write_floor(0, 0, 0);
+    ok(load("", "  - {position_m: [0, 0, 1.5], instrument_height_m: 2, lat_deg: 50, lon_deg: 10, height_m: 80}",
+            "utm"));
+    assert_position(0, 0, 0, 2, 1e-9);
+    assert_near(site->station[0].at.height_m, 80.5, 1e-9);
+}
+
 /* Two stations across a zone's border (12 deg E, 1 m and 40 m away) share the anchor's zone. */
 static void a_zone_border_does_not_part_stations(void **state)
 {
@@ -356,6 +393,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(each_form_leads_to_the_same_place),
+        cmocka_unit_test(the_equator_and_the_edge_of_ups_do_not_part_stations),
+        cmocka_unit_test(instrument_height_moves_the_height_on_the_earth),
         cmocka_unit_test(a_zone_border_does_not_part_stations),
         cmocka_unit_test(a_mesh_in_utm),
         cmocka_unit_test(a_mesh_in_ecef),

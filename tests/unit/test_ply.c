@@ -469,7 +469,7 @@ static void test_whole_or_not_at_all(void **state)
     char blocked[80];
     snprintf(blocked, sizeof blocked, "%s/d.ply", dir);
     assert_int_equal(mkdir(blocked, 0777), 0);
-    assert_int_equal(record(blocked, (struct recorder_options){0}, 1, &err), SH_EIO);
+    assert_int_equal(record(blocked, (struct recorder_options){0}, 1, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, blocked));
     rmdir(blocked);
 }

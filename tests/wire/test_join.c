@@ -72,6 +72,21 @@ struct recording {
     size_t at[MAX_FRAMES + 1]; /* of each frame; the last entry is the end */
 };
 
+/* Where each frame of the file link's recording begins. */
+static void read_frames(const struct wire *wire, struct recording *r)
+{
+    r->bytes = (uint8_t *)wire_read(wire_path(wire, "stream.shs"), &r->len);
+    for (size_t at = 0; at < r->len; r->n_frames++) { /* as PROTOCOL.md has it: the length is at 4 */
+        assert_true(r->n_frames < MAX_FRAMES);
+        assert_int_equal(r->bytes[at], NATIVE_SYNC);
+        r->at[r->n_frames] = at;
+        at += NATIVE_HEADER_LEN + (r->bytes[at + 4] | (size_t)r->bytes[at + 5] << 8 | (size_t)r->bytes[at + 6] << 16);
+    }
+    r->at[r->n_frames] = r->len;
+    assert_true(r->n_frames > 0);
+    assert_int_equal(r->bytes[8] | r->bytes[9] | r->bytes[10] | r->bytes[11], 0); /* from the very first frame on */
+}
+
 static void record(struct wire *wire, struct recording *r)
 {
     struct room_config config = {.profile = "riegl-vz400i",
@@ -85,16 +100,7 @@ static void record(struct wire *wire, struct recording *r)
     const char *const more[] = {"--start", "--frames", "1", "--pace", "fast", NULL};
     struct head head = head_start(wire, room_config_write(wire, &config), more);
     head_end(&head, 0);
-    r->bytes = (uint8_t *)wire_read(wire_path(wire, "stream.shs"), &r->len);
-    for (size_t at = 0; at < r->len; r->n_frames++) { /* as PROTOCOL.md has it: the length is at 4 */
-        assert_true(r->n_frames < MAX_FRAMES);
-        assert_int_equal(r->bytes[at], NATIVE_SYNC);
-        r->at[r->n_frames] = at;
-        at += NATIVE_HEADER_LEN + (r->bytes[at + 4] | (size_t)r->bytes[at + 5] << 8 | (size_t)r->bytes[at + 6] << 16);
-    }
-    r->at[r->n_frames] = r->len;
-    assert_true(r->n_frames > 0);
-    assert_int_equal(r->bytes[8] | r->bytes[9] | r->bytes[10] | r->bytes[11], 0); /* from the very first frame on */
+    read_frames(wire, r);
 }
 
 /* Parses the frames first .. last - 1 without the byte at `lost`; every frame but the one it was in must
@@ -173,11 +179,83 @@ static void test_recording_is_whole(void **state)
     free(r.bytes);
 }
 
+/* ---- the time of day, for a reader that joins in the middle of a scan */
+
+/* The stream from frame `first` on: with the first points that can be placed the time is known, too. Returns how many
+ * points frames came. */
+static int check_time(const struct wire *wire, const struct recording *r, int first, int64_t gps_of_t0_ns)
+{
+    size_t at = r->at[first];
+    struct scanhead *sh = client_open(wire_write(wire, "late.shs", r->bytes + at, r->len - at));
+    struct scanhead_frame frame;
+    struct scanhead_info info;
+    int n = 0;
+    while (scanhead_next(sh, &frame, 0) == SCANHEAD_OK) {
+        double adjusted_s;
+        if (frame.type != SCANHEAD_POINTS || scanhead_get_info(sh, &info) != SCANHEAD_OK) continue;
+        n++;
+        if (scanhead_gps_time(sh, 0, &adjusted_s) != SCANHEAD_OK)
+            fail_msg("from frame %d on: points at %.3f s, and no time yet", first, 1e-9 * (double)frame.scan_t0_ns);
+        /* a double of 5e8 has steps of 2^-24 s */
+        assert_true(fabs(adjusted_s - ((double)(gps_of_t0_ns / 1000000000 - 1000000000) +
+                                       1e-9 * (double)(gps_of_t0_ns % 1000000000))) < 2e-7);
+    }
+    scanhead_close(sh);
+    return n;
+}
+
+static void expect_time_in_files(struct wire *wire, int64_t gps_of_t0_ns)
+{
+    char shs[352], las[352], ply[352], line[96];
+    snprintf(shs, sizeof shs, "%s", wire_path(wire, "late.shs"));
+    snprintf(las, sizeof las, "%s", wire_path(wire, "late.las"));
+    snprintf(ply, sizeof ply, "%s", wire_path(wire, "late.ply"));
+    const char *const args[] = {"record", shs, "-o", las, "-o", ply, "--quiet", NULL};
+    wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)); /* 1 if frames at the cut are taken as lost */
+    char *text = wire_read(las, NULL);
+    assert_int_equal(text[6] & 1, 1); /* adjusted standard GPS time, LAS 1.4 R15 table 4 */
+    free(text);
+    const int64_t week_ns = INT64_C(604800) * 1000000000;
+    int64_t of_week_us = gps_of_t0_ns % week_ns / 1000;
+    snprintf(line, sizeof line, "\ncomment the first scan starts at GPS week %lld second %lld.%06lld\n",
+             (long long)(gps_of_t0_ns / week_ns), (long long)(of_week_us / 1000000), (long long)(of_week_us % 1000000));
+    text = wire_read(ply, NULL);
+    if (strstr(text, line) == NULL) fail_msg("no '%s' in: %.600s", line, text);
+    free(text);
+}
+
+static void test_time_of_late_reader(void **state)
+{
+    struct wire *wire = *state;
+    struct recording r = {0};
+    struct room_config config = ENDLESS;
+    struct scanhead_frame frame;
+    config.prr_hz = 20000;
+    config.lines_hz = 50;
+    config.links = "links: [{type: file, path: stream.shs}]\n";
+    config.more = "time: {epoch: \"2026-01-01T00:00:00Z\"}\n";
+    room_write(wire);
+    const char *const more[] = {"--start", "--duration", "3.5", "--pace", "fast", NULL};
+    struct head head = head_start(wire, room_config_write(wire, &config), more);
+    head_end(&head, 0);
+    read_frames(wire, &r);
+    struct scanhead *sh = client_open(wire_path(wire, "stream.shs"));
+    client_until(sh, SCANHEAD_EV_SCAN_START, &frame);
+    int64_t gps_of_t0_ns = (int64_t)frame.event_value[2];
+    scanhead_close(sh);
+    for (int first = 0; first < r.n_frames; first += r.n_frames / 60)
+        check_time(wire, &r, first, gps_of_t0_ns);
+    assert_true(check_time(wire, &r, r.n_frames / 3, gps_of_t0_ns) > 100);
+    expect_time_in_files(wire, gps_of_t0_ns);
+    free(r.bytes);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_late_reader, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_lost_byte, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_time_of_late_reader, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_recording_is_whole, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -2,9 +2,7 @@
  * back by other people's software, point by point against the raw stream. A reader that is not installed is skipped. */
 #include "core/georef.h"
 #include "drivers/host/crs_wkt.h"
-#include "tests/wire/room.h"
-
-enum { N_STATIONS = 2, MAX_POINTS = 200000 };
+#include "tests/wire/readers.h"
 
 /* Two stations on the ground of a yard with three walls and no roof: shots without echo, and lines of unequal length
  * (47 lines of 10,000 pulses). The second one's degrees are those of its position in metres, near enough. */
@@ -23,9 +21,6 @@ static const char YARD[] = "v -20 -15 -1.5\nv 25 -15 -1.5\nv 25 18 -1.5\nv -20 1
                            "o floor\nf 1 2 3 4\no south\nf 1 2 6 5\no east\nf 2 3 7 6\no north\nf 3 4 8 7\n";
 static const double LAT_LON_H[N_STATIONS][3] = {{52.5167, 13.4, 110.2}, {52.51674987, 13.39987326, 111.1}};
 
-static struct wire *wire;
-static double (*truth)[3];      /* the stream's points, in UTM */
-static size_t n_truth, n_first; /* n_first of the first station */
 static size_t n_frames;
 static double scale_m, anchor[N_STATIONS][3];
 
@@ -63,9 +58,7 @@ static void keep_points(struct scanhead *sh, const struct scanhead_frame *frame)
     for (int i = 0; i < n; i++) {
         assert_true(point[i].echo_count <= 1);
         if (point[i].echo_count == 0) continue;
-        assert_true(n_truth < MAX_POINTS);
-        memcpy(truth[n_truth++], &point[i].x, sizeof truth[0]);
-        if (info.station == 1) n_first = n_truth;
+        keep_truth(&point[i], info.station);
     }
 }
 
@@ -90,7 +83,6 @@ static int set_up(void **state)
     struct scanhead_frame frame;
     if (wire_setup(state) != 0) return -1;
     wire = *state;
-    truth = malloc(MAX_POINTS * sizeof *truth);
     record_all();
     struct scanhead *sh = client_open(wire_path(wire, "f.shs"));
     while (scanhead_next(sh, &frame, -1) == 0)
@@ -98,85 +90,6 @@ static int set_up(void **state)
     scanhead_close(sh);
     assert_true(n_first > 10000 && n_truth - n_first > 10000);
     return 0;
-}
-
-static int tear_down(void **state)
-{
-    free(truth);
-    return wire_teardown(state);
-}
-
-/* ---- other people's programs */
-
-/* Runs argv (ends with NULL) in the test's folder; its exit status, 127 where there is no such program. */
-static int run(const char *const *argv)
-{
-    char out[352], err[352];
-    snprintf(out, sizeof out, "%s", wire_path(wire, "tool.out"));
-    snprintf(err, sizeof err, "%s", wire_path(wire, "tool.err"));
-    pid_t pid = wire_fork(wire);
-    if (pid == 0) {
-        int o = open(out, O_WRONLY | O_CREAT | O_TRUNC, 0600), e = open(err, O_WRONLY | O_CREAT | O_TRUNC, 0600);
-        dup2(o, 1);
-        dup2(e, 2);
-        setenv("QT_QPA_PLATFORM", "offscreen", 1);
-        if (chdir(wire->dir) == 0) execvp(argv[0], (char **)(uintptr_t)argv);
-        _exit(127);
-    }
-    return wire_wait(wire, pid);
-}
-
-static void run_well(const char *const *argv)
-{
-    int status = run(argv);
-    if (status == 127) {
-        print_message("# %s is not installed\n", argv[0]);
-        skip();
-    }
-    if (status != 0) {
-        wire_show(wire, "tool.out");
-        wire_show(wire, "tool.err");
-    }
-    assert_int_equal(status, 0);
-}
-
-/* One of tests/readers/, where make has put it beside what npm installed. */
-static void run_reader(const char *script, const char *in, const char *out)
-{
-    const char *folder = getenv("READERS");
-    char path[PATH_MAX];
-    char full[PATH_MAX + 64];
-    if (realpath(folder != NULL ? folder : "build/readers", path) == NULL) path[0] = 0;
-    snprintf(full, sizeof full, "%s/installed", path);
-    if (path[0] == 0 || access(full, F_OK) != 0) {
-        print_message("# npm's readers are not installed: make deps says why\n");
-        skip();
-    }
-    snprintf(full, sizeof full, "%s/%s", path, script);
-    const char *const argv[] = {"node", "--experimental-wasm-modules", full, in, out, NULL};
-    run_well(argv);
-}
-
-/* The first three numbers of each line, against the stream's points from `first` on. tolerance_m is per axis, for a
- * point's station. */
-static size_t compare(char *text, size_t first, const double tolerance_m[N_STATIONS])
-{
-    size_t n = first;
-    for (char *at = text, *end; *at != 0; at = end + 1, n++) {
-        end = at + strcspn(at, "\n");
-        assert_true(n < n_truth);
-        for (int i = 0; i < 3; i++) {
-            char *next;
-            double v = strtod(at, &next);
-            assert_true(next > at && next <= end);
-            if (!(fabs(v - truth[n][i]) <= tolerance_m[n >= n_first]))
-                fail_msg("point %zu, axis %d: %.9f, not %.9f", n, i, v, truth[n][i]);
-            at = next;
-        }
-        end = at + strcspn(at, "\n");
-        if (*end == 0) break;
-    }
-    return n - first;
 }
 
 /* Steps of a double at 5.8e6 m are 9e-10 m; a few operations of reader and writer are within three. */
@@ -203,6 +116,7 @@ static void test_las(void **state)
         }
         assert_true(fabs(bound[2 * i] - lo) <= tolerance_m[1] && fabs(bound[2 * i + 1] - hi) <= tolerance_m[1]);
     }
+    tell("LAS", "@loaders.gl/las", tolerance_m);
     free(text);
 }
 
@@ -214,6 +128,7 @@ static void test_e57(void **state)
     double m = 0.5 * sqrt(3) * scale_m + DOUBLE_M, tolerance_m[N_STATIONS] = {m, m};
     char *text = wire_read(wire_path(wire, "e57.xyz"), NULL);
     assert_int_equal(compare(text, 0, tolerance_m), n_truth);
+    tell("E57", "web-e57", tolerance_m);
     free(text);
 }
 
@@ -229,6 +144,7 @@ static void test_ptx(void **state)
     char *first = wire_read(wire_path(wire, "f_0.asc"), NULL), *second = wire_read(wire_path(wire, "f_1.asc"), NULL);
     assert_int_equal(compare(first, 0, tolerance_m), n_first);
     assert_int_equal(compare(second, n_first, tolerance_m), n_truth - n_first);
+    tell("PTX", "CloudCompare", tolerance_m);
     free(first);
     free(second);
 }
@@ -243,6 +159,7 @@ static void test_ply(void **state)
     run_well(argv);
     char *text = wire_read(wire_path(wire, "ply.xyz"), NULL);
     assert_int_equal(compare(text, 0, tolerance_m), n_truth);
+    tell("PLY", "Python's struct", tolerance_m);
     free(text);
 }
 
@@ -355,5 +272,5 @@ int main(void)
         cmocka_unit_test(test_ply), cmocka_unit_test(test_ply_pcl), cmocka_unit_test(test_pcapng),
         cmocka_unit_test(test_crs), cmocka_unit_test(test_all_crs),
     };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
+    return cmocka_run_group_tests(tests, set_up, wire_teardown);
 }

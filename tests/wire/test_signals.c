@@ -1,5 +1,6 @@
 /* SIGTERM and SIGINT end the program in good order wherever it is: status 0, statistics written, symlink
  * gone, files whole. */
+#include <inttypes.h>
 #include "tests/wire/room.h"
 
 static const struct room_config ENDLESS = {.profile = "riegl-vz400i",
@@ -132,7 +133,7 @@ static uint64_t ply_points(const struct wire *wire, const char *name)
 
 /* Starts `record SOURCE -o FILE` and interrupts it once the file grows: waits by watching what is being
  * written. */
-static void interrupt_record(struct wire *wire, const char *const *args, int signal_number)
+static void interrupt_record(struct wire *wire, const char *const *args, int signal_number, int expected)
 {
     pid_t pid = wire_spawn(wire, args, "out", "err", -1);
     int64_t end_ms = wire_now_ms() + DEADLINE_MS;
@@ -149,8 +150,15 @@ static void interrupt_record(struct wire *wire, const char *const *args, int sig
     }
     assert_int_equal(kill(pid, signal_number), 0);
     int status = wire_wait(wire, pid);
-    if (status != 0) wire_show(wire, "err");
-    assert_int_equal(status, 0);
+    if (status != expected) wire_show(wire, "err");
+    assert_int_equal(status, expected);
+}
+
+static void expect_error(const struct wire *wire, const char *line)
+{
+    char *err = wire_read(wire_path(wire, "err"), NULL);
+    if (strstr(err, line) == NULL) fail_msg("no '%s' in: %s", line, err);
+    free(err);
 }
 
 static uint64_t le64(const char *p)
@@ -183,22 +191,37 @@ static void expect_whole_e57(const struct wire *wire, const char *name)
     free(e57);
 }
 
+/* A PTX grid has columns times rows lines behind its head of ten. */
+static void expect_whole_ptx(const struct wire *wire, const char *name)
+{
+    char *ptx = wire_read(wire_path(wire, name), NULL);
+    uint64_t columns, rows, lines = 0;
+    assert_int_equal(sscanf(ptx, "%" SCNu64 " %" SCNu64, &columns, &rows), 2);
+    for (const char *at = ptx; (at = strchr(at, '\n')) != NULL; at++)
+        lines++;
+    assert_int_equal(lines, 10 + columns * rows);
+    free(ptx);
+}
+
 static void test_record_off_line(void **state)
 {
     struct wire *wire = *state;
-    char config[352], ply[352], las[352], e57[352];
+    char config[352], ply[352], las[352], e57[352], ptx[352];
     room_write(wire);
     snprintf(config, sizeof config, "%s", room_config_write(wire, &ENDLESS));
     snprintf(ply, sizeof ply, "%s", wire_path(wire, "x.ply"));
     snprintf(las, sizeof las, "%s", wire_path(wire, "x.las"));
     snprintf(e57, sizeof e57, "%s", wire_path(wire, "x.e57"));
+    snprintf(ptx, sizeof ptx, "%s", wire_path(wire, "x.ptx"));
     interrupt_record(wire,
-                     (const char *const[]){"record", config, "-o", ply, "-o", las, "-o", e57, "--duration", "1e6",
-                                           "--stats", wire_path(wire, "stats.json"), NULL},
-                     SIGINT);
+                     (const char *const[]){"record", config, "-o", ply, "-o", las, "-o", e57, "-o", ptx, "--duration",
+                                           "1e6", "--stats", wire_path(wire, "stats.json"), NULL},
+                     SIGINT, 1);
+    expect_error(wire, "interrupted; missing: the end of the scan\n");
     assert_int_equal(ply_points(wire, "x.ply"), stats_uint(wire, "points"));
     assert_int_equal(las_points(wire, "x.las"), stats_uint(wire, "points"));
     expect_whole_e57(wire, "x.e57");
+    expect_whole_ptx(wire, "x.ptx");
     assert_true(stats_uint(wire, "points") > 1000);
 }
 
@@ -211,13 +234,81 @@ static void test_record_from_a_head(void **state)
     snprintf(source, sizeof source, "%s", head_endpoint(&head, "pty"));
     snprintf(ply, sizeof ply, "%s", wire_path(wire, "x.ply"));
     snprintf(stats, sizeof stats, "%s", wire_path(wire, "record.json"));
-    interrupt_record(wire, (const char *const[]){"record", source, "-o", ply, "--stats", stats, NULL}, SIGTERM);
+    interrupt_record(wire, (const char *const[]){"record", source, "-o", ply, "--stats", stats, NULL}, SIGTERM,
+                     0); /* a scan without end is complete when it is stopped */
     struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
     client_wait_state(sh, "idle"); /* it has stopped the scan it began */
     scanhead_close(sh);
     head_end(&head, SIGTERM);
     assert_true(ply_points(wire, "x.ply") > 1000);
     assert_int_equal(ply_points(wire, "x.ply"), stats_uint(wire, "echoes")); /* to the last one */
+}
+
+/* full-sweep, but for one figure, in seconds. */
+static void profile_write(const struct wire *wire, const char *key, const char *value)
+{
+    char *text = wire_read("config/heads/full-sweep.yaml", NULL), line[32];
+    snprintf(line, sizeof line, "\n%s: { value: ", key);
+    char *at = strstr(text, line), path[352];
+    assert_non_null(at);
+    at += strlen(line);
+    char *rest = at + strcspn(at, ",");
+    snprintf(path, sizeof path, "%s", wire_path(wire, "slow.yaml"));
+    FILE *f = fopen(path, "w");
+    assert_non_null(f);
+    fprintf(f, "%.*s%s%s", (int)(at - text), text, value, rest);
+    assert_int_equal(fclose(f), 0);
+    free(text);
+}
+
+/* A head that takes long for the step named, and a recorder that waits for it: as soon as `state` is seen, it is
+ * interrupted. */
+static void stop_early(struct wire *wire, const char *key, const char *state, int signal_number, const char *says)
+{
+    struct room_config config = ENDLESS;
+    char source[352], ply[352];
+    config.profile = "slow.yaml";
+    room_write(wire);
+    profile_write(wire, key, "10");
+    struct head head = head_start(wire, room_config_write(wire, &config), NULL);
+    snprintf(source, sizeof source, "%s", head_endpoint(&head, "tcp"));
+    snprintf(ply, sizeof ply, "%s", wire_path(wire, "x.ply"));
+    struct scanhead *sh = client_open(source);
+    int64_t end_ms = wire_now_ms() + DEADLINE_MS;
+    pid_t pid = wire_spawn(wire, (const char *const[]){"record", source, "-o", ply, NULL}, "out", "err", -1);
+    while (access(wire_path(wire, "x.ply.part"), F_OK) != 0 || strcmp(client_ask(sh, "HEAD:STAT?"), state) != 0)
+        if (wire_now_ms() > end_ms) fail_msg("the head does not come to %s", state);
+    assert_int_equal(kill(pid, signal_number), 0);
+    assert_int_equal(wire_wait(wire, pid), 1);
+    expect_error(wire, says);
+    assert_int_not_equal(access(ply, F_OK), 0);
+    scanhead_close(sh);
+    head_end(&head, SIGTERM);
+}
+
+static void test_record_before_the_scan(void **state)
+{
+    stop_early(*state, "boot_s", "boot", SIGINT, "interrupted; missing: the scan\n");
+    stop_early(*state, "spin_up_s", "spin-up", SIGTERM, "interrupted; missing: the scan\n");
+}
+
+/* Which stations an interruption left out; the first one's scan goes on for hours. */
+static void test_record_of_stations(void **state)
+{
+    struct wire *wire = *state;
+    struct room_config config = ENDLESS;
+    char path[352], ply[352];
+    config.frames = 100000;
+    room_write(wire);
+    snprintf(path, sizeof path, "%s", room_config_write(wire, &config));
+    snprintf(ply, sizeof ply, "%s", wire_path(wire, "x.ply"));
+    interrupt_record(wire,
+                     (const char *const[]){"record", path, "--station", "all", "-o", ply, "--set",
+                                           "stations.1.position_m=[0, 0, 0]", "--set",
+                                           "stations.2.position_m=[1, 0, 0]", NULL},
+                     SIGINT, 1);
+    expect_error(wire, "interrupted; missing: the end of the scan from station 1 and the scans from stations 2 to 3\n");
+    assert_true(ply_points(wire, "x.ply") > 1000);
 }
 
 int main(void)
@@ -229,6 +320,8 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_at_pace_step, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_record_off_line, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_record_from_a_head, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_record_before_the_scan, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_record_of_stations, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

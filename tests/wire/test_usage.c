@@ -206,6 +206,10 @@ static const struct {
     {"empty glTF", "bad.gltf", "{}", {"bad.gltf"}},
     {"glTF that is none", "bad.glb", "glTFxxxx", {"bad.glb"}},
     {"IFC that is none", "bad.ifc", "ISO-10303-21;", {"bad.ifc"}},
+    {"IFC with a record missing",
+     "bad.ifc",
+     "ISO-10303-21;\nDATA;\n#2= IFCSITE('a#9',$);\n#1= IFCRELAGGREGATES('b',$,$,$,#2,(#3));\nEND-ISO-10303-21;\n",
+     {"bad.ifc, line 4", "#1 refers to #3"}},
 };
 
 static void test_meshes(void **state)
@@ -339,6 +343,14 @@ static void test_links(void **state)
     expect_link(wire, "file in no folder", "{type: file, path: none/x}", 2, "none/x");
     expect_link(wire, "file that is a folder", "{type: file, path: .}", 2, "irectory");
     expect_link(wire, "no such address", "{type: tcp, address: 300.1.1.1}", 2, "300.1.1.1");
+
+    /* A live platform's socket is asked by `check`, too. */
+    char config[352];
+    write_config(wire, "{type: \"null\"}", "{type: \"null\"}");
+    snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
+    expect(wire, "no such address of a platform",
+           (const char *const[]){"check", config, "--set", "platform.kind=live", "--set", "platform.address=x y", NULL},
+           2, (const char *const[]){"platform.address x y: no such address", NULL});
 
     struct sockaddr_in at = {.sin_family = AF_INET};
     socklen_t len = sizeof at;

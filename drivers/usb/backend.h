@@ -1,0 +1,60 @@
+/* Back ends: who carries what a host does to the device core, and what the core answers back. One ops struct, one file
+ * each. A back end is driven by its owner's poll(2): no threads, nothing blocks. */
+#ifndef DRIVERS_USB_BACKEND_H
+#define DRIVERS_USB_BACKEND_H
+
+#include <poll.h>
+
+#include "drivers/usb/usb.h"
+
+enum usb_backend_type { USB_BACKEND_USBIP, USB_BACKEND_USBREDIR, USB_BACKEND_FUNCTIONFS };
+
+enum { USB_BACKEND_MAX_FDS = 8, USB_BACKEND_NAME_MAX = 300, USB_BACKEND_USBIP_PORT = 3240 };
+
+struct usb_backend_spec {
+    enum usb_backend_type type;
+    char address[64]; /* usbip, usbredir: numeric or name; empty: 127.0.0.1 */
+    int port;         /* usbip, usbredir: 0 lets the system choose */
+    char path[256];   /* usbredir: Unix socket, instead of address and port */
+    char udc[64];     /* functionfs: name of the controller; empty: the first free one */
+    int attach;       /* usbip: plug into this machine's vhci_hcd; usbredir: connect instead of listening */
+};
+
+struct usb_backend_ops {
+    const char *name;
+
+    /* Opens as spec says; nothing is left behind when it fails. The device is the caller's and outlives the back end,
+     * which attaches and detaches it. */
+    int (*open)(const struct usb_backend_spec *spec, struct usb_device *device, void **backend, struct sh_err *err);
+
+    /* "usbip:127.0.0.1:3240" */
+    void (*endpoint)(const void *backend, char *buf, size_t len);
+
+    /* Fills descriptors to wait for (room for USB_BACKEND_MAX_FDS) and returns how many. */
+    int (*prepare)(void *backend, struct pollfd *fds);
+
+    /* After poll(2) on exactly these. Works through what came until go_on(ctx) says 0, which it asks after each of the
+     * host's acts; the rest waits for the next call, and then also without a descriptor that is ready: `more` says so.
+     * SH_EIO ends the back end for good. */
+    int (*handle)(void *backend, const struct pollfd *fds, int n, int (*go_on)(void *ctx), void *ctx);
+    int (*more)(const void *backend);
+
+    /* Sends what the core has completed, as far as the wire takes it. After usb_device_write and usb_device_read. */
+    void (*flush)(void *backend);
+
+    /* Unplugs. */
+    void (*close)(void *backend);
+};
+
+/* NULL for an unknown type. */
+const struct usb_backend_ops *usb_backend_ops_get(enum usb_backend_type type);
+
+/* A listening or (connect) connected socket, not blocking. On a Unix socket left behind by a process that is gone, the
+ * path is taken over. `what` names it in errors; name gets "127.0.0.1:3240" or the path. backend_socket.c */
+int usb_backend_socket(const struct usb_backend_spec *spec, const char *what, int *fd, char *name, size_t len,
+                       struct sh_err *err);
+/* Before closing: nothing more from us, and wait until the peer has read it and hung up, or timeout_ms pass without a
+ * byte. To close with requests of the peer unread would throw away replies on their way. backend_socket.c */
+void usb_backend_hang_up(int fd, int timeout_ms);
+
+#endif

@@ -1,0 +1,223 @@
+/* The functionfs back end: the device on a real device controller of this machine (a board with a UDC), as a gadget of
+ * the Linux kernel. The kernel answers the standard requests from the descriptors it was given; what concerns our own
+ * interfaces comes as events on ep0. The core hears of a configuration as if it had answered the requests itself. */
+#include <errno.h>
+#include <fcntl.h>
+#include <linux/usb/functionfs.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "drivers/protocol/bytes.h"
+#include "drivers/usb/backend.h"
+#include "drivers/usb/functionfs_private.h"
+
+enum { MAX_DATA_STAGE = 4096, CLOSE_WAIT_MS = 500 };
+
+struct functionfs {
+    struct usb_device *device;
+    struct gadget gadget;
+    int ep0;
+    int backlog; /* stopped before everything was looked at */
+    struct ffs_pipes pipes;
+    struct ffs_console console;
+    uint8_t data[MAX_DATA_STAGE];
+};
+
+static void on_complete(void *ctx, struct usb_transfer *transfer)
+{
+    struct functionfs *self = ctx;
+    if (!ffs_console_complete(&self->console, transfer)) ffs_pipes_complete(&self->pipes, transfer);
+}
+
+static int open_ep0(struct functionfs *self, struct sh_err *err)
+{
+    char path[96];
+    snprintf(path, sizeof path, "%s/ep0", self->gadget.mount);
+    self->ep0 = open(path, O_RDWR | O_NONBLOCK | O_CLOEXEC);
+    if (self->ep0 < 0) return sh_fail(err, SH_EIO, "functionfs: %s: %s", path, strerror(errno));
+    return gadget_describe(&self->gadget, self->ep0, usb_device_identity(self->device), err);
+}
+
+static void take_apart(struct functionfs *self)
+{
+    gadget_unbind(&self->gadget);
+    ffs_pipes_stop(&self->pipes);
+    usb_device_detach(self->device);
+    ffs_pipes_close(&self->pipes);
+    ffs_console_close(&self->console);
+    if (self->ep0 >= 0) close(self->ep0);
+    gadget_remove(&self->gadget);
+    free(self);
+}
+
+static int functionfs_open(const struct usb_backend_spec *spec, struct usb_device *device, void **backend,
+                           struct sh_err *err)
+{
+    struct functionfs *self = calloc(1, sizeof *self);
+    if (self == NULL) return sh_fail(err, SH_ENOMEM, "functionfs: no memory");
+    self->device = device;
+    self->ep0 = self->pipes.event_fd = self->console.fd = self->console.timer = -1;
+    int rc = gadget_create(&self->gadget, usb_device_model(device), usb_device_identity(device), err);
+    if (rc == SH_OK) rc = open_ep0(self, err);
+    if (rc == SH_OK) rc = ffs_pipes_open(&self->pipes, device, &self->gadget, err);
+    if (rc == SH_OK) rc = ffs_console_open(&self->console, device, self->gadget.tty_number, err);
+    if (rc == SH_OK) rc = gadget_bind(&self->gadget, spec->udc, err);
+    if (rc != SH_OK) {
+        take_apart(self);
+        return rc;
+    }
+    *backend = self;
+    return SH_OK;
+}
+
+static void functionfs_endpoint(const void *backend, char *buf, size_t len)
+{
+    const struct functionfs *self = backend;
+    snprintf(buf, len, "functionfs:%s", self->gadget.udc);
+}
+
+enum { AT_EP0, AT_AIO, AT_TTY, AT_TIMER, N_FDS };
+
+static int functionfs_prepare(void *backend, struct pollfd *fds)
+{
+    struct functionfs *self = backend;
+    const short tty = ffs_console_events(&self->console);
+    fds[AT_EP0] = (struct pollfd){.fd = self->ep0, .events = POLLIN};
+    fds[AT_AIO] = (struct pollfd){.fd = self->pipes.event_fd, .events = POLLIN};
+    fds[AT_TTY] = (struct pollfd){.fd = tty != 0 ? self->console.fd : -1, .events = tty};
+    fds[AT_TIMER] = (struct pollfd){.fd = self->console.timer, .events = POLLIN};
+    return N_FDS;
+}
+
+static void disable(struct functionfs *self)
+{
+    ffs_pipes_stop(&self->pipes);
+    usb_device_detach(self->device);
+    ffs_console_stop(&self->console);
+}
+
+/* The host has configured the device. */
+static void enable(struct functionfs *self)
+{
+    const struct usb_ctrlrequest setup = {
+        .bRequest = USB_REQ_SET_CONFIGURATION,
+#if __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__
+        .wValue = USB_CONFIGURATION << 8
+#else
+        .wValue = USB_CONFIGURATION
+#endif
+    };
+    disable(self); /* the kernel leaves out the event before when it was not read in time */
+    usb_device_attach(self->device, gadget_rate(&self->gadget), on_complete, self);
+    usb_device_assume_address(self->device);
+    usb_device_control(self->device, &setup, NULL, 0);
+    ffs_pipes_start(&self->pipes);
+    ffs_console_start(&self->console);
+}
+
+/* A transfer in the wrong direction is FunctionFS's way to stall. */
+static void stall(struct functionfs *self, int in)
+{
+    ssize_t n = in ? read(self->ep0, self->data, 0) : write(self->ep0, self->data, 0);
+    (void)n; /* fails, as it must */
+}
+
+/* FunctionFS counts interfaces from 0, the model from where the part begins. */
+static void answer(struct functionfs *self, struct usb_ctrlrequest setup)
+{
+    const int in = (setup.bRequestType & USB_DIR_IN) != 0;
+    const unsigned length = le_get16(&setup.wLength), index = le_get16(&setup.wIndex);
+    if ((setup.bRequestType & USB_RECIP_MASK) == USB_RECIP_INTERFACE && (index & 0xff) < self->gadget.part.n_interfaces)
+        le_put16(&setup.wIndex, (uint16_t)((index & 0xff00u) | self->gadget.interface[index & 0xff]));
+    int n = USB_STALL;
+    if (in) {
+        if (length <= sizeof self->data) n = usb_device_control(self->device, &setup, self->data, length);
+        if (n >= 0 && write(self->ep0, self->data, (size_t)n) == n) return;
+    } else if (length == 0) {
+        n = usb_device_control(self->device, &setup, self->data, 0);
+        if (n >= 0 && read(self->ep0, self->data, 0) == 0) return;
+    } else if (length <= sizeof self->data && usb_device_control(self->device, &setup, NULL, length) == 0 &&
+               read(self->ep0, self->data, length) == (ssize_t)length) {
+        usb_device_control(self->device, &setup, self->data, length); /* the data are taken: too late to stall */
+        return;
+    }
+    if (n == USB_STALL) stall(self, in);
+}
+
+/* One event of ep0; 0: there is none. */
+static int take_event(struct functionfs *self)
+{
+    struct usb_functionfs_event event;
+    if (read(self->ep0, &event, sizeof event) != sizeof event) return 0;
+    switch (event.type) {
+    case FUNCTIONFS_ENABLE:
+        enable(self);
+        break;
+    case FUNCTIONFS_DISABLE:
+    case FUNCTIONFS_UNBIND:
+        disable(self);
+        break;
+    case FUNCTIONFS_SETUP:
+        answer(self, event.u.setup);
+        break;
+    case FUNCTIONFS_SUSPEND:
+    case FUNCTIONFS_RESUME:
+        usb_device_suspend(self->device, event.type == FUNCTIONFS_SUSPEND);
+        break;
+    default: /* BIND: nothing to do */
+        break;
+    }
+    return 1;
+}
+
+static void functionfs_flush(void *backend)
+{
+    struct functionfs *self = backend;
+    ffs_pipes_withdraw(&self->pipes);
+}
+
+static int functionfs_handle(void *backend, const struct pollfd *fds, int n, int (*go_on)(void *ctx), void *ctx)
+{
+    struct functionfs *self = backend;
+    if (n != N_FDS) return SH_OK;
+    int going = go_on(ctx);
+    /* What came on the endpoints came before the event on ep0: a session is not closed before its last data are in. */
+    int any = 1;
+    while (going && any) {
+        while (going && ffs_pipes_take(&self->pipes))
+            going = go_on(ctx);
+        any = going && take_event(self);
+        going = going && go_on(ctx);
+    }
+    if (going && (fds[AT_TTY].fd == self->console.fd || fds[AT_TIMER].revents != 0))
+        ffs_console_handle(&self->console, fds[AT_TTY].fd >= 0 ? fds[AT_TTY].revents : 0, fds[AT_TIMER].revents != 0);
+    self->backlog = !going;
+    functionfs_flush(self);
+    return SH_OK;
+}
+
+static int functionfs_more(const void *backend)
+{
+    const struct functionfs *self = backend;
+    return self->backlog;
+}
+
+static void functionfs_close(void *backend)
+{
+    struct functionfs *self = backend;
+    ffs_pipes_drain(&self->pipes, CLOSE_WAIT_MS);
+    take_apart(self);
+}
+
+const struct usb_backend_ops usb_backend_functionfs = {
+    .name = "functionfs",
+    .open = functionfs_open,
+    .endpoint = functionfs_endpoint,
+    .prepare = functionfs_prepare,
+    .handle = functionfs_handle,
+    .more = functionfs_more,
+    .flush = functionfs_flush,
+    .close = functionfs_close,
+};

@@ -1,0 +1,185 @@
+/* The console of a gadget: the kernel's f_acm, whose other end is /dev/ttyGSn. */
+#include <errno.h>
+#include <fcntl.h>
+#include <linux/usb/cdc.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <sys/timerfd.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include "drivers/protocol/bytes.h"
+#include "drivers/protocol/native_encode.h"
+#include "drivers/usb/functionfs_private.h"
+#include "drivers/usb/scanhead.h"
+
+static const struct itimerspec every_second = {{1, 0}, {1, 0}}, never = {{0, 0}, {0, 0}};
+
+static void tty_path(const struct ffs_console *console, char *path, size_t len)
+{
+    snprintf(path, len, "/dev/ttyGS%d", console->number);
+}
+
+int ffs_console_open(struct ffs_console *console, struct usb_device *device, int number, struct sh_err *err)
+{
+    char path[32];
+    memset(console, 0, sizeof *console);
+    console->device = device;
+    console->number = number;
+    console->fd = console->timer = -1;
+    if (number < 0) return SH_OK;
+    tty_path(console, path, sizeof path);
+    if (access(path, R_OK | W_OK) != 0)
+        return sh_fail(err, errno == EACCES ? SH_EPERM : SH_EIO, "functionfs: console %s: %s%s", path, strerror(errno),
+                       errno == ENOENT ? "; is devtmpfs mounted on /dev?" : "");
+    console->timer = timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC);
+    if (console->timer < 0) return sh_fail(err, SH_EIO, "functionfs: timerfd: %s", strerror(errno));
+    return SH_OK;
+}
+
+/* As the host's driver would: what the kernel's function does not tell. */
+static void set_session(struct ffs_console *console, int open)
+{
+    struct usb_ctrlrequest setup = {.bRequestType = USB_DIR_OUT | USB_TYPE_CLASS | USB_RECIP_INTERFACE,
+                                    .bRequest = USB_CDC_REQ_SET_CONTROL_LINE_STATE};
+    le_put16(&setup.wValue, (uint16_t)open);
+    le_put16(&setup.wIndex, CONSOLE_INTERFACE);
+    if (usb_device_control(console->device, &setup, NULL, 0) == 0) console->session = open;
+}
+
+static void offer_tx(struct ffs_console *console)
+{
+    if (console->tx_at_core) return;
+    console->tx_at_core = 1;
+    console->tx = (struct usb_transfer){
+        .id = 1, .endpoint = CONSOLE_IN, .length = sizeof console->tx_bytes, .data = console->tx_bytes};
+    usb_device_submit(console->device, &console->tx);
+}
+
+/* The tty hands its bytes on in up to 16 requests, one per write, before its buffer begins to fill and shows that
+ * nobody takes them. So little is written in many pieces. */
+static void write_tx(struct ffs_console *console)
+{
+    if (console->lead_pos < console->lead_len) {
+        ssize_t n = write(console->fd, console->lead + console->lead_pos, console->lead_len - console->lead_pos);
+        if (n > 0) console->lead_pos += (uint32_t)n;
+        if (n > 0) console->written += (uint64_t)n;
+        if (console->lead_pos < console->lead_len) return;
+    }
+    enum { REQUESTS = 16, MUCH = 1024 };
+    const uint32_t piece = console->tx_len < MUCH ? console->tx_len / (REQUESTS + 4) + 1 : console->tx_len;
+    while (console->tx_pos < console->tx_len) {
+        const uint32_t left = console->tx_len - console->tx_pos;
+        ssize_t n = write(console->fd, console->tx_bytes + console->tx_pos, left < piece ? left : piece);
+        if (n <= 0) return;
+        console->tx_pos += (uint32_t)n;
+        console->written += (uint64_t)n;
+    }
+    offer_tx(console);
+}
+
+/* Every second: has the host taken anything of what there is? If not, its port is closed, and what is left is void. */
+static void look_at_host(struct ffs_console *console)
+{
+    uint64_t count;
+    int waiting = 0;
+    if (read(console->timer, &count, sizeof count) < 0 || ioctl(console->fd, TIOCOUTQ, &waiting) != 0) return;
+    const uint64_t taken = console->written - (uint64_t)waiting;
+    const int stuck = taken == console->taken && (waiting > 0 || console->tx_pos < console->tx_len);
+    console->taken = taken;
+    if (!stuck || !console->session) return;
+    console->tx_pos = console->tx_len;
+    console->lead_len = console->lead_pos = 0;
+    console->cut = 1;
+    set_session(console, 0);
+    offer_tx(console);
+}
+
+/* A reader takes text only in step, behind a whole frame (PROTOCOL.md, Resynchronisation). */
+static void lead_in(struct ffs_console *console)
+{
+    const struct native_event event = {.code = NATIVE_EV_READER_LOST, .text = "the end of an earlier session"};
+    console->cut = 0;
+    console->lead_pos = 0;
+    console->lead_len = (uint32_t)native_encode_event(console->lead, sizeof console->lead, &event, 0, NATIVE_LOCAL);
+    write_tx(console);
+}
+
+void ffs_console_start(struct ffs_console *console)
+{
+    char path[32];
+    struct termios raw;
+    if (console->number < 0) return;
+    tty_path(console, path, sizeof path);
+    if (console->fd < 0) console->fd = open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+    if (console->fd < 0) return; /* looked at when the link was opened */
+    if (tcgetattr(console->fd, &raw) == 0) {
+        cfmakeraw(&raw);
+        tcsetattr(console->fd, TCSANOW, &raw);
+    }
+    console->tx_len = console->tx_pos = console->lead_len = console->lead_pos = 0;
+    console->written = console->taken = 0;
+    console->cut = 0;
+    timerfd_settime(console->timer, 0, &every_second, NULL);
+    offer_tx(console);
+}
+
+/* Unplugged, so that close does not wait for the host to read. */
+void ffs_console_stop(struct ffs_console *console)
+{
+    if (console->fd >= 0) close(console->fd);
+    console->fd = -1;
+    console->session = 0;
+    if (console->timer >= 0) timerfd_settime(console->timer, 0, &never, NULL);
+}
+
+short ffs_console_events(const struct ffs_console *console)
+{
+    return (short)((console->rx_busy ? 0 : POLLIN) |
+                   (console->tx_pos < console->tx_len || console->lead_pos < console->lead_len ? POLLOUT : 0));
+}
+
+static void read_rx(struct ffs_console *console)
+{
+    ssize_t n = read(console->fd, console->rx_bytes, sizeof console->rx_bytes);
+    if (n <= 0) return;
+    if (!console->session) {
+        set_session(console, 1);
+        if (console->cut) lead_in(console);
+    }
+    console->rx_busy = 1;
+    console->rx =
+        (struct usb_transfer){.id = 2, .endpoint = CONSOLE_OUT, .length = (uint32_t)n, .data = console->rx_bytes};
+    usb_device_submit(console->device, &console->rx);
+}
+
+void ffs_console_handle(struct ffs_console *console, short revents, int timed_out)
+{
+    if (console->fd < 0) return;
+    if ((revents & POLLIN) != 0 && !console->rx_busy) read_rx(console);
+    if ((revents & POLLOUT) != 0) write_tx(console);
+    if (timed_out) look_at_host(console);
+}
+
+int ffs_console_complete(struct ffs_console *console, struct usb_transfer *transfer)
+{
+    if (transfer == &console->rx) {
+        console->rx_busy = 0;
+        return 1;
+    }
+    if (transfer != &console->tx) return 0;
+    console->tx_at_core = 0;
+    if (transfer->status != USB_OK || console->fd < 0) return 1;
+    console->tx_len = transfer->actual;
+    console->tx_pos = 0;
+    write_tx(console);
+    return 1;
+}
+
+void ffs_console_close(struct ffs_console *console)
+{
+    ffs_console_stop(console);
+    if (console->timer >= 0) close(console->timer);
+    console->timer = -1;
+}

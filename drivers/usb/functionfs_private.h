@@ -1,0 +1,84 @@
+/* Inside of the functionfs back end: endpoints with asynchronous I/O, and the console over the kernel's tty. */
+#ifndef DRIVERS_USB_FUNCTIONFS_PRIVATE_H
+#define DRIVERS_USB_FUNCTIONFS_PRIVATE_H
+
+#include <linux/aio_abi.h>
+#include <poll.h>
+
+#include "drivers/usb/gadget.h"
+#include "drivers/usb/usb.h"
+
+enum { FFS_SLOTS = 8, FFS_SLOT_BYTES = 32768, FFS_MAX_PIPES = 8 };
+
+/* A slot is a buffer that goes round: IN, it waits at the core as if a host had asked for that much, is filled, and is
+ * written to the kernel; OUT, it is read from the kernel and waits at the core until the function has read it. */
+enum ffs_slot_state { FFS_IDLE, FFS_AT_CORE, FFS_AT_KERNEL };
+
+struct ffs_slot {
+    struct usb_transfer transfer;
+    enum ffs_slot_state state;
+    struct iocb io, zero; /* zero: the packet of no bytes behind it */
+    int n_io;             /* of these, at the kernel */
+    uint8_t *buffer;
+};
+
+struct ffs_pipe {
+    int fd;
+    uint8_t address; /* of the model */
+    uint32_t epoch;  /* of what is at the kernel */
+    struct ffs_slot slot[FFS_SLOTS];
+};
+
+struct ffs_pipes {
+    struct usb_device *device;
+    aio_context_t aio;
+    int event_fd; /* counts completions */
+    int running;
+    int n;
+    struct ffs_pipe pipe[FFS_MAX_PIPES];
+};
+
+/* Opens the endpoints of the part, in the order of its descriptors. */
+int ffs_pipes_open(struct ffs_pipes *pipes, struct usb_device *device, const struct gadget *gadget, struct sh_err *err);
+/* The configuration has come up: everything goes round. */
+void ffs_pipes_start(struct ffs_pipes *pipes);
+void ffs_pipes_stop(struct ffs_pipes *pipes);
+/* Takes one completion; 0: there is none. */
+int ffs_pipes_take(struct ffs_pipes *pipes);
+/* What was handed to the kernel in a session that is over is taken back: it is not for the next one. */
+void ffs_pipes_withdraw(struct ffs_pipes *pipes);
+/* The core gives a transfer back; 0: it is none of these. */
+int ffs_pipes_complete(struct ffs_pipes *pipes, struct usb_transfer *transfer);
+/* Waits until the host has taken what is at the kernel, as long as it takes something within timeout_ms. */
+void ffs_pipes_drain(struct ffs_pipes *pipes, int timeout_ms);
+void ffs_pipes_close(struct ffs_pipes *pipes);
+
+/* The console. The kernel's f_acm keeps DTR to itself, so a session begins with the first bytes of the host, and ends
+ * when the host has taken nothing for a second or two of what there is for it. What the tty holds by then can't be
+ * taken back: the next reader gets it first, a frame cut at its end, and then a frame of its own that brings it into
+ * step. */
+struct ffs_console {
+    struct usb_device *device;
+    int fd;    /* of the tty; -1: not plugged in, or no console */
+    int timer; /* timerfd; -1: no console */
+    int number;
+    int rx_busy, tx_at_core, session;
+    uint32_t tx_len, tx_pos;
+    int cut; /* a session was given up: the tty holds the rest of it */
+    uint32_t lead_len, lead_pos;
+    uint8_t lead[256];       /* goes before everything else */
+    uint64_t written, taken; /* bytes to the tty; of these, gone from its buffer when last looked at */
+    struct usb_transfer rx, tx;
+    uint8_t rx_bytes[4096], tx_bytes[4096];
+};
+
+/* number: of the tty, -1 for none. Fails where the tty can't be used. */
+int ffs_console_open(struct ffs_console *console, struct usb_device *device, int number, struct sh_err *err);
+void ffs_console_start(struct ffs_console *console);
+void ffs_console_stop(struct ffs_console *console);
+short ffs_console_events(const struct ffs_console *console);
+void ffs_console_handle(struct ffs_console *console, short revents, int timed_out);
+int ffs_console_complete(struct ffs_console *console, struct usb_transfer *transfer);
+void ffs_console_close(struct ffs_console *console);
+
+#endif

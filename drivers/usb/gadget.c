@@ -1,0 +1,460 @@
+#include "drivers/usb/gadget.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <linux/usb/functionfs.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mount.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "drivers/protocol/bytes.h"
+
+static const char GADGETS[] = "/sys/kernel/config/usb_gadget", CONTROLLERS[] = "/sys/class/udc";
+static const char PREFIX[] = "scanhead-";
+
+/* ---- configfs */
+
+static int write_text(const char *dir, const char *file, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
+
+/* 0 or -1 with errno. */
+static int write_text(const char *dir, const char *file, const char *fmt, ...)
+{
+    char path[512], text[128];
+    va_list ap;
+    va_start(ap, fmt);
+    int len = vsnprintf(text, sizeof text, fmt, ap);
+    va_end(ap);
+    snprintf(path, sizeof path, "%s/%s", dir, file);
+    int fd = open(path, O_WRONLY | O_CLOEXEC);
+    if (fd < 0) return -1;
+    ssize_t n = write(fd, text, (size_t)len);
+    int error = errno;
+    close(fd);
+    errno = error;
+    return n == len ? 0 : -1;
+}
+
+static int read_text(const char *dir, const char *file, char *text, size_t len)
+{
+    char path[512];
+    snprintf(path, sizeof path, "%s/%s", dir, file);
+    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    if (fd < 0) return -1;
+    ssize_t n = read(fd, text, len - 1);
+    close(fd);
+    text[n > 0 ? n : 0] = '\0';
+    text[strcspn(text, "\n")] = '\0';
+    return n < 0 ? -1 : 0;
+}
+
+static int make_dir(const char *dir, const char *name)
+{
+    char path[512];
+    snprintf(path, sizeof path, "%s/%s", dir, name);
+    return mkdir(path, 0755);
+}
+
+static void remove_dir(const char *dir, const char *name)
+{
+    char path[512];
+    snprintf(path, sizeof path, "%s/%s", dir, name);
+    rmdir(path);
+}
+
+static int make_link(const char *dir, const char *target, const char *name)
+{
+    char from[512], to[512];
+    snprintf(from, sizeof from, "%s/%s", dir, target);
+    snprintf(to, sizeof to, "%s/%s", dir, name);
+    return symlink(from, to);
+}
+
+static void remove_link(const char *dir, const char *name)
+{
+    char path[512];
+    snprintf(path, sizeof path, "%s/%s", dir, name);
+    unlink(path);
+}
+
+/* ---- what is left behind */
+
+static void unmount(const char *name)
+{
+    char source[128], dir[256], type[64];
+    FILE *mounts = fopen("/proc/self/mounts", "r");
+    if (mounts == NULL) return;
+    while (fscanf(mounts, "%127s %255s %63s%*[^\n]", source, dir, type) == 3)
+        if (strcmp(type, "functionfs") == 0 && strcmp(source, name) == 0 && umount2(dir, MNT_DETACH) == 0) rmdir(dir);
+    fclose(mounts);
+}
+
+/* Everything of that name, in the order in which configfs lets go of it. What is not there does no harm. */
+static void remove_all(const char *name)
+{
+    char dir[128], function[64], link[80];
+    snprintf(dir, sizeof dir, "%s/%s", GADGETS, name);
+    if (access(dir, F_OK) == 0) (void)write_text(dir, "UDC", "\n");
+    unmount(name);
+    static const char *const kinds[] = {"acm", "ffs"};
+    for (int i = 0; i < 2; i++) {
+        snprintf(link, sizeof link, "configs/c.1/%s.%s", kinds[i], name);
+        remove_link(dir, link);
+    }
+    remove_link(dir, "os_desc/c.1");
+    remove_dir(dir, "configs/c.1/strings/0x409");
+    remove_dir(dir, "configs/c.1");
+    for (int i = 0; i < 2; i++) {
+        snprintf(function, sizeof function, "functions/%s.%s", kinds[i], name);
+        remove_dir(dir, function);
+    }
+    remove_dir(dir, "strings/0x409");
+    rmdir(dir);
+}
+
+static void remove_left_behind(void)
+{
+    DIR *dir = opendir(GADGETS);
+    if (dir == NULL) return;
+    for (struct dirent *entry; (entry = readdir(dir)) != NULL;) {
+        if (strncmp(entry->d_name, PREFIX, sizeof PREFIX - 1) != 0) continue;
+        long pid = strtol(entry->d_name + sizeof PREFIX - 1, NULL, 10);
+        if (pid > 0 && kill((pid_t)pid, 0) != 0 && errno == ESRCH) remove_all(entry->d_name);
+    }
+    closedir(dir);
+}
+
+/* ---- making it */
+
+static int is_console(const struct usb_function_row *function)
+{
+    return function->class == USB_CLASS_COMM && function->subclass == 2;
+}
+
+static uint8_t take_string(struct gadget *gadget, const struct usb_model *model, uint8_t index)
+{
+    unsigned n = 0;
+    if (index == 0) return 0;
+    while (gadget->string[n] != NULL)
+        n++;
+    gadget->string[n] = model->string[index - 1];
+    return (uint8_t)(n + 1);
+}
+
+/* The model without its console, if it has one, numbered from 0. */
+static int take_part(struct gadget *gadget, const struct usb_model *model, struct sh_err *err)
+{
+    struct usb_model *part = &gadget->part;
+    *part = *model;
+    part->function = gadget->function;
+    part->interface = gadget->row;
+    part->string = gadget->string;
+    part->n_functions = part->n_interfaces = part->n_rows = 0;
+    gadget->tty_number = -1;
+    for (unsigned f = 0; f < model->n_functions; f++) {
+        const struct usb_function_row *from = &model->function[f];
+        if (is_console(from)) {
+            if (gadget->tty_number != -1 || f != 0)
+                return sh_fail(err, SH_EINPUT, "functionfs: a device has one console at most, and it comes first");
+            gadget->tty_number = 0;
+            continue;
+        }
+        struct usb_function_row *to = &gadget->function[part->n_functions++];
+        *to = *from;
+        to->first = part->n_interfaces;
+        to->string = take_string(gadget, model, from->string);
+        for (unsigned i = from->first; i < (unsigned)from->first + from->count; i++) {
+            gadget->interface[part->n_interfaces] = (uint8_t)i;
+            if (usb_find_row(model, i, 1) != NULL)
+                return sh_fail(err, SH_EINPUT, "functionfs: the kernel's FunctionFS knows no alternate settings");
+            struct usb_interface_row *row = &gadget->row[part->n_rows++];
+            *row = *usb_find_row(model, i, 0);
+            row->number = part->n_interfaces++;
+            row->string = take_string(gadget, model, row->string);
+        }
+    }
+    return SH_OK;
+}
+
+static int look_for_configfs(struct sh_err *err)
+{
+    if (access(GADGETS, F_OK) != 0) (void)mount("configfs", "/sys/kernel/config", "configfs", 0, NULL);
+    if (access(GADGETS, F_OK) != 0)
+        return sh_fail(err, SH_EINPUT,
+                       "functionfs: %s is not there: modprobe libcomposite, and mount -t configfs none "
+                       "/sys/kernel/config (as root)",
+                       GADGETS);
+    if (access(GADGETS, W_OK) != 0)
+        return sh_fail(err, SH_EPERM, "functionfs: %s: %s; gadgets are made by root", GADGETS, strerror(errno));
+    return SH_OK;
+}
+
+static int make_named_dir(struct gadget *gadget, struct sh_err *err)
+{
+    for (int i = 0; i < 100; i++) {
+        snprintf(gadget->name, sizeof gadget->name, "%s%ld-%d", PREFIX, (long)getpid(), i);
+        snprintf(gadget->dir, sizeof gadget->dir, "%s/%s", GADGETS, gadget->name);
+        if (mkdir(gadget->dir, 0755) == 0) return SH_OK;
+        if (errno != EEXIST) break;
+    }
+    int error = errno;
+    gadget->dir[0] = '\0';
+    return sh_fail(err, error == EPERM || error == EACCES ? SH_EPERM : SH_EIO, "functionfs: no gadget in %s: %s",
+                   GADGETS, strerror(error));
+}
+
+static int write_identity(const struct gadget *gadget, const struct usb_model *model, const struct usb_identity *id)
+{
+    static const char *const speed[] = {
+        [USB_RATE_FULL] = "full-speed", [USB_RATE_HIGH] = "high-speed", [USB_RATE_SUPER] = "super-speed"};
+    const char *dir = gadget->dir;
+    if (write_text(dir, "max_speed", "%s", speed[id->highest]) != 0 && errno != ENOENT) return -1; /* since 5.12 */
+    return write_text(dir, "idVendor", "0x%04x", id->vid) | write_text(dir, "idProduct", "0x%04x", id->pid) |
+           write_text(dir, "bcdUSB", "0x0210") | write_text(dir, "bcdDevice", "0x%04x", model->bcd_device) |
+           write_text(dir, "bDeviceClass", "0x%02x", model->class) |
+           write_text(dir, "bDeviceSubClass", "0x%02x", model->subclass) |
+           write_text(dir, "bDeviceProtocol", "0x%02x", model->protocol) | make_dir(dir, "strings/0x409") |
+           write_text(dir, "strings/0x409/manufacturer", "%s", model->string[model->manufacturer - 1]) |
+           write_text(dir, "strings/0x409/product", "%s", model->string[model->product - 1]) |
+           (id->serial[0] != '\0' ? write_text(dir, "strings/0x409/serialnumber", "%s", id->serial) : 0);
+}
+
+static int write_configuration(const struct gadget *gadget, const struct usb_model *model)
+{
+    const char *dir = gadget->dir;
+    return make_dir(dir, "configs/c.1") |
+           write_text(dir, "configs/c.1/bmAttributes", "0x%02x", model->max_power_ma == 0 ? 0xc0 : 0x80) |
+           write_text(dir, "configs/c.1/MaxPower", "%u", model->max_power_ma) | write_text(dir, "os_desc/use", "1") |
+           write_text(dir, "os_desc/b_vendor_code", "0x%02x", model->ms_vendor_code) |
+           write_text(dir, "os_desc/qw_sign", "MSFT100") | make_link(dir, "configs/c.1", "os_desc/c.1");
+}
+
+/* The console first: it has the first interfaces. */
+static int make_function(struct gadget *gadget, const char *kind, struct sh_err *err)
+{
+    char function[80], link[96];
+    snprintf(function, sizeof function, "functions/%s.%s", kind, gadget->name);
+    snprintf(link, sizeof link, "configs/c.1/%s.%s", kind, gadget->name);
+    if (make_dir(gadget->dir, function) != 0)
+        return errno == ENOENT
+                   ? sh_fail(err, SH_EINPUT, "functionfs: the kernel has no such function: modprobe usb_f_%s",
+                             strcmp(kind, "ffs") == 0 ? "fs" : kind)
+                   : sh_fail(err, SH_EIO, "functionfs: %s/%s: %s", gadget->dir, function, strerror(errno));
+    if (make_link(gadget->dir, function, link) != 0)
+        return sh_fail(err, SH_EIO, "functionfs: %s/%s: %s", gadget->dir, link, strerror(errno));
+    return SH_OK;
+}
+
+static int find_tty(struct gadget *gadget, struct sh_err *err)
+{
+    char file[96], text[16];
+    snprintf(file, sizeof file, "functions/acm.%s/port_num", gadget->name);
+    if (read_text(gadget->dir, file, text, sizeof text) != 0)
+        return sh_fail(err, SH_EIO, "functionfs: %s/%s: %s", gadget->dir, file, strerror(errno));
+    gadget->tty_number = atoi(text);
+    return SH_OK;
+}
+
+static int mount_instance(struct gadget *gadget, struct sh_err *err)
+{
+    char dir[] = "/tmp/scanhead-ffs-XXXXXX";
+    if (mkdtemp(dir) == NULL) return sh_fail(err, SH_EIO, "functionfs: %s: %s", dir, strerror(errno));
+    if (mount(gadget->name, dir, "functionfs", 0, NULL) != 0) {
+        int error = errno;
+        rmdir(dir);
+        return sh_fail(err, error == EPERM ? SH_EPERM : SH_EIO, "functionfs: cannot be mounted: %s%s", strerror(error),
+                       error == ENODEV ? "; modprobe usb_f_fs" : "");
+    }
+    snprintf(gadget->mount, sizeof gadget->mount, "%s", dir);
+    return SH_OK;
+}
+
+int gadget_create(struct gadget *gadget, const struct usb_model *model, const struct usb_identity *id,
+                  struct sh_err *err)
+{
+    memset(gadget, 0, sizeof *gadget);
+    int rc = take_part(gadget, model, err);
+    if (rc == SH_OK) rc = look_for_configfs(err);
+    if (rc != SH_OK) return rc;
+    remove_left_behind();
+    rc = make_named_dir(gadget, err);
+    if (rc == SH_OK && (write_identity(gadget, model, id) != 0 || write_configuration(gadget, model) != 0))
+        rc = sh_fail(err, SH_EIO, "functionfs: %s cannot be filled in: %s", gadget->dir, strerror(errno));
+    if (rc == SH_OK && gadget->tty_number >= 0) rc = make_function(gadget, "acm", err);
+    if (rc == SH_OK && gadget->tty_number >= 0) rc = find_tty(gadget, err);
+    if (rc == SH_OK) rc = make_function(gadget, "ffs", err);
+    if (rc == SH_OK) rc = mount_instance(gadget, err);
+    if (rc != SH_OK) gadget_remove(gadget);
+    return rc;
+}
+
+/* ---- descriptors for FunctionFS: <linux/usb/functionfs.h> has the format */
+
+static uint32_t count_descriptors(const uint8_t *bytes, size_t len)
+{
+    uint32_t n = 0;
+    for (size_t at = 0; at < len; at += bytes[at])
+        n++;
+    return n;
+}
+
+/* WinUSB the older way, by Microsoft OS 1.0, which is what the kernel's gadgets speak. One compatible id, one property
+ * per function. Returns the new end. */
+static size_t put_os_descriptors(const struct usb_function_row *function, uint8_t *out, size_t at, uint32_t *count)
+{
+    static const char name[] = "DeviceInterfaceGUID";
+    if (function->compatible_id == NULL) return at;
+    const uint32_t data_len = function->guid != NULL ? (uint32_t)strlen(function->guid) + 1 : 0;
+    const uint32_t property = 14 + (uint32_t)sizeof name + data_len;
+    memset(out + at, 0, 11 + 24 + 11 + property);
+    out[at] = function->first;
+    le_put32(out + at + 1, 11 + 24);
+    le_put16(out + at + 5, 1); /* version */
+    le_put16(out + at + 7, 4); /* compatible ids */
+    out[at + 9] = 1;
+    out[at + 11] = function->first;
+    out[at + 12] = 1;
+    memcpy(out + at + 13, function->compatible_id, strnlen(function->compatible_id, 8));
+    at += 11 + 24;
+    ++*count;
+    if (function->guid == NULL) return at;
+    out[at] = function->first;
+    le_put32(out + at + 1, 11 + property);
+    le_put16(out + at + 5, 1);
+    le_put16(out + at + 7, 5); /* properties */
+    le_put16(out + at + 9, 1);
+    at += 11;
+    le_put32(out + at, property);
+    le_put32(out + at + 4, 1); /* REG_SZ */
+    le_put16(out + at + 8, (uint16_t)sizeof name);
+    memcpy(out + at + 10, name, sizeof name);
+    le_put32(out + at + 10 + sizeof name, data_len);
+    memcpy(out + at + 14 + sizeof name, function->guid, data_len);
+    ++*count;
+    return at + property;
+}
+
+static int write_all(int fd, const void *bytes, size_t len)
+{
+    return write(fd, bytes, len) == (ssize_t)len ? 0 : -1;
+}
+
+static int write_descriptors(const struct gadget *gadget, int ep0, const struct usb_identity *id)
+{
+    uint8_t out[4 * USB_MAX_CONFIG + 256];
+    const unsigned n_rates = (unsigned)id->highest + 1;
+    uint32_t os_count = 0, flags = FUNCTIONFS_HAS_MS_OS_DESC;
+    size_t at = 12 + 4 * n_rates + 4; /* behind the counts */
+    for (unsigned rate = 0; rate < n_rates; rate++) {
+        uint8_t config[USB_MAX_CONFIG];
+        size_t len = usb_describe_config(&gadget->part, id, (enum usb_rate)rate, USB_DT_CONFIG, config, sizeof config);
+        if (len > sizeof config) return -1;
+        len -= USB_DT_CONFIG_SIZE;
+        memcpy(out + at, config + USB_DT_CONFIG_SIZE, len);
+        le_put32(out + 12 + 4 * rate, count_descriptors(out + at, len));
+        flags |= 1u << rate; /* FUNCTIONFS_HAS_FS_DESC, _HS_, _SS_ */
+        at += len;
+    }
+    for (unsigned i = 0; i < gadget->part.n_functions && i < 2; i++)
+        at = put_os_descriptors(&gadget->function[i], out, at, &os_count);
+    le_put32(out, FUNCTIONFS_DESCRIPTORS_MAGIC_V2);
+    le_put32(out + 4, (uint32_t)at);
+    le_put32(out + 8, flags);
+    le_put32(out + 12 + 4 * n_rates, os_count);
+    return write_all(ep0, out, at);
+}
+
+static int write_strings(const struct gadget *gadget, int ep0)
+{
+    uint8_t out[1024];
+    uint32_t n = 0;
+    size_t at = 18;
+    for (; gadget->string[n] != NULL; n++) {
+        const size_t len = strlen(gadget->string[n]) + 1;
+        if (at + len > sizeof out) return -1;
+        memcpy(out + at, gadget->string[n], len);
+        at += len;
+    }
+    if (n == 0) at = 16;
+    le_put32(out, FUNCTIONFS_STRINGS_MAGIC);
+    le_put32(out + 4, (uint32_t)at);
+    le_put32(out + 8, n);
+    le_put32(out + 12, n != 0);
+    le_put16(out + 16, USB_LANGID);
+    return write_all(ep0, out, at);
+}
+
+int gadget_describe(const struct gadget *gadget, int ep0, const struct usb_identity *id, struct sh_err *err)
+{
+    if (write_descriptors(gadget, ep0, id) != 0)
+        return sh_fail(err, SH_EIO, "functionfs: the kernel takes no such descriptors: %s", strerror(errno));
+    if (write_strings(gadget, ep0) != 0)
+        return sh_fail(err, SH_EIO, "functionfs: the kernel takes no such strings: %s", strerror(errno));
+    return SH_OK;
+}
+
+/* ---- plugging in and out */
+
+static int bind_to(struct gadget *gadget, const char *udc)
+{
+    if (write_text(gadget->dir, "UDC", "%s\n", udc) != 0) return -1;
+    snprintf(gadget->udc, sizeof gadget->udc, "%s", udc);
+    return 0;
+}
+
+static int bind_first_free(struct gadget *gadget, struct sh_err *err)
+{
+    DIR *dir = opendir(CONTROLLERS);
+    int n = 0, error = 0;
+    for (struct dirent *entry; dir != NULL && gadget->udc[0] == '\0' && (entry = readdir(dir)) != NULL;) {
+        if (entry->d_name[0] == '.') continue;
+        n++;
+        if (bind_to(gadget, entry->d_name) != 0) error = errno;
+    }
+    if (dir != NULL) closedir(dir);
+    if (gadget->udc[0] != '\0') return SH_OK;
+    if (n == 0)
+        return sh_fail(err, SH_EINPUT,
+                       "functionfs: no USB device controller in %s: the machine has none, or its driver is not loaded "
+                       "(dwc2 on a Raspberry Pi; dummy_hcd to try without one)",
+                       CONTROLLERS);
+    return sh_fail(err, SH_EIO, "functionfs: none of %d device controllers takes the gadget: %s", n, strerror(error));
+}
+
+int gadget_bind(struct gadget *gadget, const char *udc, struct sh_err *err)
+{
+    if (udc[0] == '\0') return bind_first_free(gadget, err);
+    if (bind_to(gadget, udc) == 0) return SH_OK;
+    if (errno == ENODEV || errno == ENOENT)
+        return sh_fail(err, SH_EINPUT, "functionfs: no device controller %s; %s lists what there is", udc, CONTROLLERS);
+    return sh_fail(err, SH_EIO, "functionfs: device controller %s: %s", udc, strerror(errno));
+}
+
+enum usb_rate gadget_rate(const struct gadget *gadget)
+{
+    char dir[320], text[32] = "";
+    snprintf(dir, sizeof dir, "%s/%s", CONTROLLERS, gadget->udc);
+    read_text(dir, "current_speed", text, sizeof text);
+    return strncmp(text, "super", 5) == 0  ? USB_RATE_SUPER
+           : strncmp(text, "high", 4) == 0 ? USB_RATE_HIGH
+                                           : USB_RATE_FULL;
+}
+
+void gadget_unbind(struct gadget *gadget)
+{
+    if (gadget->udc[0] != '\0') (void)write_text(gadget->dir, "UDC", "\n");
+    gadget->udc[0] = '\0';
+}
+
+void gadget_remove(struct gadget *gadget)
+{
+    gadget_unbind(gadget);
+    if (gadget->mount[0] != '\0' && umount2(gadget->mount, MNT_DETACH) == 0) rmdir(gadget->mount);
+    if (gadget->dir[0] != '\0') remove_all(gadget->name);
+    gadget->dir[0] = gadget->mount[0] = '\0';
+}

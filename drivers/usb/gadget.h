@@ -1,0 +1,38 @@
+/* A USB gadget of the Linux kernel, made through configfs: identity, strings, one configuration, FunctionFS for what
+ * this program does itself and f_acm for a CDC-ACM console. Private to the functionfs back end.
+ *
+ * Why f_acm: FunctionFS takes no class-specific interface descriptors (type 24h), without which no host knows a CDC
+ * console. The kernel's has them; what it lacks is told in functionfs.c. */
+#ifndef DRIVERS_USB_GADGET_H
+#define DRIVERS_USB_GADGET_H
+
+#include "drivers/usb/usb.h"
+
+struct gadget {
+    char name[48];  /* scanhead-PID-N, in configfs, of both functions and of the mounted instance */
+    char dir[128];  /* in configfs; empty: not made */
+    char mount[64]; /* where FunctionFS is mounted; empty: nowhere */
+    char udc[256];  /* empty: not bound */
+    int tty_number; /* /dev/ttyGSn; -1: no console */
+    /* What FunctionFS carries, numbered from 0 as it wants it: the model without the console. */
+    struct usb_model part;
+    struct usb_interface_row row[USB_MAX_INTERFACES];
+    struct usb_function_row function[USB_MAX_INTERFACES];
+    const char *string[2 * USB_MAX_INTERFACES + 1];
+    uint8_t interface[USB_MAX_INTERFACES]; /* of the model, by number in the part */
+};
+
+/* Removes what dead processes left, then makes everything but the binding: ep0 in gadget->mount is ready to be opened.
+ */
+int gadget_create(struct gadget *gadget, const struct usb_model *model, const struct usb_identity *id,
+                  struct sh_err *err);
+/* Writes the descriptors and strings to ep0. */
+int gadget_describe(const struct gadget *gadget, int ep0, const struct usb_identity *id, struct sh_err *err);
+/* Plugs in: udc, or the first free controller where that is empty. */
+int gadget_bind(struct gadget *gadget, const char *udc, struct sh_err *err);
+enum usb_rate gadget_rate(const struct gadget *gadget);
+void gadget_unbind(struct gadget *gadget);
+/* After ep0 and the endpoints are closed. */
+void gadget_remove(struct gadget *gadget);
+
+#endif

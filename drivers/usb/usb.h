@@ -1,0 +1,203 @@
+/* The USB device core: descriptors, control requests, endpoints and cancellation, with no transport in it.
+ *
+ * A device is data: a struct usb_model and what it points to. The core answers all of chapter 9 from it. Above the
+ * core stands the function (a link, or a test), which reads and writes endpoints and answers class and vendor requests
+ * by hooks; below it stands a back end (usbip, usbredir, functionfs), which carries what the host does:
+ *
+ *   usb_device_attach/detach/reset/suspend   the bus
+ *   usb_device_control                       a control transfer, answered at once
+ *   usb_device_submit, usb_device_cancel     a bulk or interrupt transfer of the host, and its withdrawal
+ *
+ * A transfer is one request of the host's driver (a URB). IN waits until the function writes, OUT until the function
+ * has read all of it: that is what NAK does on a real bus, so a function that does not read holds the host back. It
+ * belongs to the core from submit until the host's complete() is called with it, which happens exactly once, maybe
+ * within submit.
+ *
+ * IN packets: a transfer ends when it is full, or with a short packet. So what one usb_device_write() leaves ends with
+ * a short packet, or with one of zero length where it is a whole number of packets; where that filled the transfer to
+ * the last byte, the zero-length packet ends the next one, unless more is written first. A transfer whose rest is
+ * smaller than the packet that comes next fails with USB_OVERFLOW, as it does on a real bus, and that packet stays
+ * with the function: nothing is lost.
+ *
+ * Wire formats: Universal Serial Bus 2.0, chapter 9; USB 3.2, chapter 9 (super speed, BOS); CDC 1.2 and PSTN 1.2;
+ * Microsoft OS 2.0 Descriptors Specification. Numbers in structs are in host order unless said.
+ * Thread: a device belongs to one thread. Nothing blocks. */
+#ifndef DRIVERS_USB_USB_H
+#define DRIVERS_USB_USB_H
+
+#include <linux/usb/ch9.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <sys/types.h>
+
+#include "core/err.h"
+
+enum {
+    USB_MAX_INTERFACES = 8,
+    USB_MAX_ENDPOINTS = 30,  /* beside endpoint 0: 15 IN, 15 OUT */
+    USB_MAX_CONFIG = 512,    /* bytes of a configuration with all its descriptors */
+    USB_CONTROL_MAX = 65535, /* wLength */
+    USB_STALL = -1000,       /* of a control request; apart from the SH_E codes */
+    USB_CONFIGURATION = 1,   /* bConfigurationValue of the one configuration */
+    USB_LANGID = 0x0409,     /* English, United States */
+};
+
+/* ---- a device as data */
+
+enum usb_rate { USB_RATE_FULL, USB_RATE_HIGH, USB_RATE_SUPER, USB_N_RATES };
+
+struct usb_endpoint_row {
+    uint8_t address;              /* number, and USB_DIR_IN */
+    uint8_t type;                 /* USB_ENDPOINT_XFER_BULK, USB_ENDPOINT_XFER_INT */
+    uint16_t packet[USB_N_RATES]; /* wMaxPacketSize by rate */
+    uint8_t interval[USB_N_RATES];
+    uint8_t burst; /* super speed: bMaxBurst */
+};
+
+/* One alternate setting of an interface; rows of one interface follow each other, alt 0 first. */
+struct usb_interface_row {
+    uint8_t number, alt, class, subclass, protocol;
+    uint8_t string;       /* index into the model's strings, 0 none */
+    const uint8_t *extra; /* class descriptors, as they go out between interface and endpoints */
+    uint8_t extra_len;
+    const struct usb_endpoint_row *endpoint;
+    uint8_t n_endpoints;
+};
+
+/* What belongs together: one driver of the host. */
+struct usb_function_row {
+    uint8_t first, count; /* interfaces; count above 1 gives an interface association descriptor */
+    uint8_t class, subclass, protocol;
+    uint8_t string;
+    const char *compatible_id; /* Microsoft OS 2.0, "WINUSB" for instance; NULL: none */
+    const char *guid;          /* "{...}", DeviceInterfaceGUIDs; NULL: none */
+};
+
+struct usb_model {
+    uint8_t class, subclass, protocol; /* of the device */
+    uint16_t bcd_device;
+    uint16_t max_power_ma;         /* 0: self-powered */
+    const char *const *string;     /* by index from 1, UTF-8; NULL ends the list */
+    uint8_t manufacturer, product; /* indices; the serial number's is the one after the list */
+    const struct usb_function_row *function;
+    const struct usb_interface_row *interface; /* rows */
+    uint8_t n_functions, n_interfaces, n_rows;
+    uint8_t ms_vendor_code; /* bRequest for the Microsoft OS 2.0 set; unused without compatible ids */
+};
+
+/* What differs from one device of a model to the next. */
+struct usb_identity {
+    uint16_t vid, pid;
+    char serial[64];       /* UTF-8; empty: no serial number string */
+    enum usb_rate highest; /* fastest rate it can do */
+};
+
+/* ---- descriptors, for the core and for back ends that hand them to a kernel. Each writes at most `room` bytes and
+ * returns the length of the whole, or 0 where the device has no such descriptor at this rate. */
+
+size_t usb_describe_device(const struct usb_model *model, const struct usb_identity *id, enum usb_rate rate,
+                           uint8_t *out, size_t room);
+size_t usb_describe_qualifier(const struct usb_model *model, const struct usb_identity *id, enum usb_rate rate,
+                              uint8_t *out, size_t room);
+/* type: USB_DT_CONFIG, or USB_DT_OTHER_SPEED_CONFIG for the other one of full and high. */
+size_t usb_describe_config(const struct usb_model *model, const struct usb_identity *id, enum usb_rate rate,
+                           uint8_t type, uint8_t *out, size_t room);
+size_t usb_describe_bos(const struct usb_model *model, const struct usb_identity *id, uint8_t *out, size_t room);
+size_t usb_describe_string(const struct usb_model *model, const struct usb_identity *id, uint8_t index, uint8_t *out,
+                           size_t room);
+/* The Microsoft OS 2.0 descriptor set; 0 without compatible ids. */
+size_t usb_describe_ms_os(const struct usb_model *model, uint8_t *out, size_t room);
+/* The row of an interface's alternate setting, NULL when there is none. */
+const struct usb_interface_row *usb_find_row(const struct usb_model *model, unsigned interface, unsigned alt);
+
+/* ---- transfers */
+
+enum usb_status {
+    USB_OK,
+    USB_CANCELLED, /* by usb_device_cancel */
+    USB_STALLED,   /* the endpoint is halted */
+    USB_GONE,      /* no such endpoint now: reset, unplugged, other configuration or alternate setting */
+    USB_OVERFLOW,  /* IN: the rest of the transfer is smaller than the packet that comes */
+};
+
+struct usb_transfer {
+    uint64_t id;      /* the back end's; no two pending ones are equal */
+    uint8_t endpoint; /* with USB_DIR_IN */
+    uint32_t length;  /* bytes asked for, or sent */
+    uint8_t *data;    /* of `length` bytes */
+    /* set by the core */
+    uint32_t actual;
+    enum usb_status status;
+    int zero_packet; /* IN: actual is a whole number of packets and below length: a zero-length packet ends it */
+    uint32_t epoch;  /* OUT: usb_device_epoch of its interface when it came */
+    struct usb_transfer *next;
+};
+
+/* What the function gets to know. All may be NULL. Called within the calls of the back end. */
+struct usb_hooks {
+    /* A class or vendor request. OUT: data holds wLength bytes; return 0. IN: fill at most wLength bytes, return how
+     * many. USB_STALL refuses it. OUT with wLength above 0 and data NULL: asked before the data come; answer as if, and
+     * do nothing. The interface or endpoint it names exists in the present configuration. */
+    int (*request)(void *ctx, const struct usb_ctrlrequest *setup, uint8_t *data);
+    /* An interface came to life or ended: configuration, alternate setting, reset, unplugging. */
+    void (*interface)(void *ctx, unsigned interface, int active);
+};
+
+struct usb_device;
+
+/* model, identity's content and hooks as above; complete(host_ctx, transfer) is the back end's and set with
+ * usb_device_attach. SH_EINPUT when the model contradicts itself. */
+int usb_device_create(const struct usb_model *model, const struct usb_identity *id, const struct usb_hooks *hooks,
+                      void *ctx, struct usb_device **out, struct sh_err *err);
+/* Detaches first. */
+void usb_device_free(struct usb_device *device);
+
+/* ---- for back ends */
+
+typedef void (*usb_complete)(void *ctx, struct usb_transfer *transfer);
+
+/* Plugged in, state default. */
+void usb_device_attach(struct usb_device *device, enum usb_rate rate, usb_complete complete, void *ctx);
+/* Unplugged: what is pending completes with USB_GONE. */
+void usb_device_detach(struct usb_device *device);
+/* Back to the state default, at that rate. */
+void usb_device_reset(struct usb_device *device, enum usb_rate rate);
+void usb_device_suspend(struct usb_device *device, int suspended);
+/* For back ends whose host gives no addresses: state default -> addressed. */
+void usb_device_assume_address(struct usb_device *device);
+/* A control transfer. data: OUT, the len bytes that came with it; IN, room for wLength bytes. Returns bytes (IN), 0
+ * (OUT) or USB_STALL. */
+int usb_device_control(struct usb_device *device, const struct usb_ctrlrequest *setup, uint8_t *data, uint32_t len);
+void usb_device_submit(struct usb_device *device, struct usb_transfer *transfer);
+/* 1: it was pending and completed with USB_CANCELLED within the call; 0: it is not pending (any more). */
+int usb_device_cancel(struct usb_device *device, uint64_t id);
+
+/* ---- for both */
+
+const struct usb_model *usb_device_model(const struct usb_device *device);
+const struct usb_identity *usb_device_identity(const struct usb_device *device);
+enum usb_rate usb_device_rate(const struct usb_device *device);
+/* 0: not configured. */
+int usb_device_configuration(const struct usb_device *device);
+/* The present alternate setting's row; NULL when not configured. */
+const struct usb_interface_row *usb_device_row(const struct usb_device *device, unsigned interface);
+
+/* ---- for functions. An endpoint that is not there, is halted or suspended has no room and nothing to read. */
+
+/* Bytes taken by waiting IN transfers, maybe 0. */
+size_t usb_device_write(struct usb_device *device, uint8_t endpoint, const void *data, size_t len);
+int usb_device_can_write(const struct usb_device *device, uint8_t endpoint);
+/* Of one epoch at a time. */
+size_t usb_device_read(struct usb_device *device, uint8_t endpoint, void *data, size_t len);
+/* Bytes that wait; *epoch (may be NULL) is that of the oldest. */
+size_t usb_device_can_read(const struct usb_device *device, uint8_t endpoint, uint32_t *epoch);
+/* What waits on an OUT endpoint and came in an epoch before `epoch` is taken and dropped; returns bytes. */
+size_t usb_device_drop(struct usb_device *device, uint8_t endpoint, uint32_t epoch);
+/* A count the function may raise at borders between its sessions. OUT transfers are stamped with it; a back end that
+ * holds IN data on its way takes it back when it has changed. */
+uint32_t usb_device_epoch(const struct usb_device *device, uint8_t endpoint);
+void usb_device_next_epoch(struct usb_device *device, uint8_t endpoint);
+/* Halts an endpoint, as a function does that wants to be asked; the host clears it. */
+void usb_device_halt(struct usb_device *device, uint8_t endpoint);
+
+#endif

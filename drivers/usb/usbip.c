@@ -1,0 +1,162 @@
+/* The usbip back end: a USB/IP server of its own, TCP 3240 on loopback by default, or one connection by socket pair to
+ * this machine's vhci_hcd. One host at a time has the device; others may list it. */
+#include <errno.h>
+#include <fcntl.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "drivers/usb/backend.h"
+#include "drivers/usb/usbip.h"
+#include "drivers/usb/usbip_conn.h"
+#include "drivers/usb/vhci.h"
+
+enum { MAX_CONNS = 4, SEND_BUFFER_BYTES = 1 << 20, CLOSE_WAIT_MS = 500 };
+
+struct usbip {
+    struct usb_device *device;
+    int listener; /* -1: attached here, nobody else may come */
+    int taken;
+    struct usbip_conn conn[MAX_CONNS];
+    char name[USB_BACKEND_NAME_MAX];
+};
+
+static int attach_here(struct usbip *self, struct sh_err *err)
+{
+    int pair[2];
+    unsigned port = 0;
+    const int size = SEND_BUFFER_BYTES;
+    if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair) != 0)
+        return sh_fail(err, SH_EIO, "usbip: no socket pair: %s", strerror(errno));
+    setsockopt(pair[0], SOL_SOCKET, SO_SNDBUF, &size, sizeof size);
+    int rc = vhci_attach(NULL, pair[1], USBIP_DEVID, usb_device_identity(self->device)->highest, &port, err);
+    close(pair[1]);
+    if (rc == SH_OK && fcntl(pair[0], F_SETFL, O_NONBLOCK) != 0)
+        rc = sh_fail(err, SH_EIO, "usbip: socket pair: %s", strerror(errno));
+    if (rc != SH_OK) {
+        close(pair[0]);
+        return rc;
+    }
+    usbip_conn_start(&self->conn[0], pair[0], self->device, &self->taken);
+    usbip_conn_import(&self->conn[0]);
+    snprintf(self->name, sizeof self->name, "usbip:vhci_hcd.0:%u", port);
+    return SH_OK;
+}
+
+static int listen_here(struct usbip *self, const struct usb_backend_spec *spec, struct sh_err *err)
+{
+    char at[USB_BACKEND_NAME_MAX - 8] = "";
+    int rc = usb_backend_socket(spec, "usbip", &self->listener, at, sizeof at, err);
+    if (rc == SH_OK) snprintf(self->name, sizeof self->name, "usbip:%s", at);
+    return rc;
+}
+
+static int usbip_open(const struct usb_backend_spec *spec, struct usb_device *device, void **backend,
+                      struct sh_err *err)
+{
+    struct usbip *self = calloc(1, sizeof *self);
+    if (self == NULL) return sh_fail(err, SH_ENOMEM, "usbip: no memory");
+    self->device = device;
+    self->listener = -1;
+    for (int i = 0; i < MAX_CONNS; i++)
+        self->conn[i].fd = -1;
+    struct usb_backend_spec served = *spec;
+    served.attach = 0;
+    int rc = spec->attach ? attach_here(self, err) : listen_here(self, &served, err);
+    if (rc != SH_OK) {
+        free(self);
+        return rc;
+    }
+    *backend = self;
+    return SH_OK;
+}
+
+static void usbip_endpoint(const void *backend, char *buf, size_t len)
+{
+    const struct usbip *self = backend;
+    snprintf(buf, len, "%s", self->name);
+}
+
+static int usbip_prepare(void *backend, struct pollfd *fds)
+{
+    struct usbip *self = backend;
+    int all_taken = 1;
+    for (int i = 0; i < MAX_CONNS; i++) {
+        const struct usbip_conn *conn = &self->conn[i];
+        fds[i] = (struct pollfd){.fd = conn->fd, .events = POLLIN};
+        if (conn->out_first != NULL) fds[i].events |= POLLOUT;
+        if (conn->fd < 0) all_taken = 0;
+    }
+    fds[MAX_CONNS] = (struct pollfd){.fd = all_taken ? -1 : self->listener, .events = POLLIN};
+    return MAX_CONNS + 1;
+}
+
+static void welcome(struct usbip *self)
+{
+    const int one = 1, size = SEND_BUFFER_BYTES;
+    for (int i = 0; i < MAX_CONNS; i++) {
+        if (self->conn[i].fd >= 0) continue;
+        int fd = accept4(self->listener, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
+        if (fd < 0) return;
+        setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &one, sizeof one);
+        setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &size, sizeof size);
+        usbip_conn_start(&self->conn[i], fd, self->device, &self->taken);
+    }
+}
+
+static void sweep(struct usbip *self)
+{
+    for (int i = 0; i < MAX_CONNS; i++)
+        if (self->conn[i].fd >= 0 && self->conn[i].broken) usbip_conn_end(&self->conn[i]);
+}
+
+static void usbip_flush(void *backend)
+{
+    struct usbip *self = backend;
+    for (int i = 0; i < MAX_CONNS; i++)
+        if (self->conn[i].fd >= 0) usbip_conn_write(&self->conn[i]);
+}
+
+static int usbip_handle(void *backend, const struct pollfd *fds, int n, int (*go_on)(void *ctx), void *ctx)
+{
+    struct usbip *self = backend;
+    for (int i = 0; i < MAX_CONNS && i < n; i++)
+        if (self->conn[i].fd >= 0 && (fds[i].revents & ~POLLOUT) != 0) usbip_conn_read(&self->conn[i], go_on, ctx);
+    if (n > MAX_CONNS && fds[MAX_CONNS].fd >= 0 && fds[MAX_CONNS].revents != 0) welcome(self);
+    usbip_flush(self);
+    sweep(self);
+    return SH_OK;
+}
+
+/* The sockets keep what was not read, and poll says so. */
+static int usbip_more(const void *backend)
+{
+    (void)backend;
+    return 0;
+}
+
+static void usbip_close(void *backend)
+{
+    struct usbip *self = backend;
+    for (int i = 0; i < MAX_CONNS; i++) {
+        if (self->conn[i].fd >= 0) usbip_conn_drain(&self->conn[i], CLOSE_WAIT_MS);
+        usbip_conn_end(&self->conn[i]);
+    }
+    if (self->listener >= 0) close(self->listener);
+    free(self);
+}
+
+const struct usb_backend_ops usb_backend_usbip = {
+    .name = "usbip",
+    .open = usbip_open,
+    .endpoint = usbip_endpoint,
+    .prepare = usbip_prepare,
+    .handle = usbip_handle,
+    .more = usbip_more,
+    .flush = usbip_flush,
+    .close = usbip_close,
+};

@@ -1,0 +1,39 @@
+/* One connection of the usbip back end: operations first, then URBs once the device is imported. Private. */
+#ifndef DRIVERS_USB_USBIP_CONN_H
+#define DRIVERS_USB_USBIP_CONN_H
+
+#include "drivers/usb/usb.h"
+#include "drivers/usb/usbip.h"
+
+struct usbip_urb; /* a transfer with its header and bytes */
+
+struct usbip_conn {
+    int fd; /* -1: free */
+    int imported;
+    int broken; /* to be closed: the peer is gone, or says what it must not */
+    struct usb_device *device;
+    int *taken; /* shared: the device is imported by some connection */
+    uint8_t head[URB_HEADER];
+    uint32_t head_len;
+    struct usbip_urb *incoming; /* an OUT whose bytes are coming in */
+    uint32_t incoming_len;
+    struct usbip_urb *out_first, *out_last; /* replies to send */
+    uint32_t out_pos;
+    uint32_t n_urbs; /* all that exist for this connection */
+    uint64_t n_bytes;
+};
+
+/* fd is connected and not blocking, and taken over. */
+void usbip_conn_start(struct usbip_conn *conn, int fd, struct usb_device *device, int *taken);
+/* As if the device had been imported: for a host that begins with URBs. */
+void usbip_conn_import(struct usbip_conn *conn);
+/* Reads and acts until nothing is left or go_on says 0. */
+void usbip_conn_read(struct usbip_conn *conn, int (*go_on)(void *ctx), void *ctx);
+void usbip_conn_write(struct usbip_conn *conn);
+/* Sends what is queued and waits until the peer has taken it and hung up, timeout_ms at most for each step: closing
+ * with requests of the peer unread would throw away replies on their way. */
+void usbip_conn_drain(struct usbip_conn *conn, int timeout_ms);
+/* Detaches the device if it was imported here, and frees everything. */
+void usbip_conn_end(struct usbip_conn *conn);
+
+#endif

@@ -1,0 +1,57 @@
+#include "drivers/usb/vhci.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+static const char DIR_DEFAULT[] = "/sys/devices/platform/vhci_hcd.0";
+enum { PORT_FREE = 4 }; /* VDEV_ST_NULL */
+
+static int fail(const char *dir, const char *file, struct sh_err *err)
+{
+    if (errno == ENOENT)
+        return sh_fail(err, SH_EINPUT, "usbip: %s/%s is not there: load the module, modprobe vhci-hcd (as root)", dir,
+                       file);
+    if (errno == EACCES || errno == EPERM)
+        return sh_fail(err, SH_EPERM,
+                       "usbip: %s/%s: %s; run as root, or serve on a port and let root attach (usbip attach -r "
+                       "127.0.0.1 -b 1-1)",
+                       dir, file, strerror(errno));
+    return sh_fail(err, SH_EIO, "usbip: %s/%s: %s", dir, file, strerror(errno));
+}
+
+/* Lines "hs  0000 004 000 00000000 000000 0-0": hub, port, state, ... */
+static int find_port(const char *dir, enum usb_rate rate, unsigned *port, struct sh_err *err)
+{
+    char path[320], line[256], hub[8];
+    unsigned number, state;
+    int found = 0;
+    snprintf(path, sizeof path, "%s/status", dir);
+    FILE *in = fopen(path, "r");
+    if (in == NULL) return fail(dir, "status", err);
+    while (!found && fgets(line, sizeof line, in) != NULL)
+        found = sscanf(line, "%7s %u %u", hub, &number, &state) == 3 && state == PORT_FREE &&
+                strcmp(hub, rate == USB_RATE_SUPER ? "ss" : "hs") == 0;
+    fclose(in);
+    *port = number;
+    return found ? SH_OK : sh_fail(err, SH_EIO, "usbip: no free port on vhci_hcd.0; detach one (usbip detach -p N)");
+}
+
+int vhci_attach(const char *dir, int fd, uint32_t devid, enum usb_rate rate, unsigned *port, struct sh_err *err)
+{
+    static const int speed[] = {
+        [USB_RATE_FULL] = USB_SPEED_FULL, [USB_RATE_HIGH] = USB_SPEED_HIGH, [USB_RATE_SUPER] = USB_SPEED_SUPER};
+    char path[320], text[64];
+    if (dir == NULL) dir = DIR_DEFAULT;
+    int rc = find_port(dir, rate, port, err);
+    if (rc != SH_OK) return rc;
+    snprintf(path, sizeof path, "%s/attach", dir);
+    int file = open(path, O_WRONLY | O_CLOEXEC);
+    if (file < 0) return fail(dir, "attach", err);
+    int len = snprintf(text, sizeof text, "%u %d %u %d", *port, fd, devid, speed[rate]);
+    if (write(file, text, (size_t)len) != len) rc = fail(dir, "attach", err);
+    close(file);
+    return rc;
+}

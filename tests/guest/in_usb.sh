@@ -1,0 +1,114 @@
+# Inside the guest: a head on the bus, and what is asked of it. Sourced by the scripts of the tests.
+
+# head_start YAML [OPTION...]: a head with these links, and TCP on 5025 beside them. head_stop ends it.
+head_start() {
+    sed "\$alinks: [{type: tcp, port: 5025}${1:+, $1}]" /head.yaml >/tmp/config.yaml
+    shift
+    cp /room.obj /tmp/
+    rm -f /tmp/ready
+    scanhead run /tmp/config.yaml --ready-fd 9 "$@" 9>/tmp/ready 2>/tmp/head.err &
+    head_pid=$!
+    wait_for 20 test -s /tmp/ready || note "the head is not ready: $(tail -n 3 /tmp/head.err | tr '\n' ' ')"
+}
+
+head_stop() {
+    kill "$head_pid"
+    wait "$head_pid"
+}
+
+head_kill() {
+    kill -9 "$head_pid"
+    wait "$head_pid" 2>/dev/null
+}
+
+is_plugged() {
+    lsusb -d 1209:0001
+}
+
+is_unplugged() {
+    ! lsusb -d 1209:0001
+}
+
+tty_is_there() {
+    test -c /dev/ttyACM0
+}
+
+# What lsusb shows of the head is what the class specifications want. check_enumeration PREFIX BYTES: of a bulk packet.
+check_enumeration() {
+    check "$1: enumerated" wait_for 20 is_plugged
+    check "$1: the stock driver makes a tty of it" wait_for 10 tty_is_there
+    lsusb -v -d 1209:0001 >/tmp/lsusb.txt 2>/tmp/lsusb.err
+    check "$1: maker, product and serial number are strings" \
+        test "$(grep -c 'i\(Manufacturer\|Product\|Serial\)  *[1-9][0-9]* [A-Za-z0-9]' /tmp/lsusb.txt)" = 3
+    check "$1: interface association" grep 'Interface Association' /tmp/lsusb.txt
+    check "$1: CDC-ACM" grep 'CDC ACM:' /tmp/lsusb.txt
+    grep -A 2 'bInterfaceClass  *255' /tmp/lsusb.txt | sed 's/.* \([0-9][0-9]*\) *$/\1/' | tr '\n' ' ' >/tmp/vendor.txt
+    check "$1: vendor interface FF/53/48" grep '255 83 72' /tmp/vendor.txt
+    check "$1: four bulk endpoints of $2 bytes" \
+        test "$(grep -A 4 'Transfer Type *Bulk' /tmp/lsusb.txt | grep -c "wMaxPacketSize.* 1x $2 bytes")" = 4
+    [ -n "${is_gadget:-}" ] ||
+        check "$1: Microsoft OS 2.0 platform capability" grep -i 'd8dd60df-4589-4cc7-9cd2-659d9e648a9f' /tmp/lsusb.txt
+}
+
+# A run for long scans does no more than record them.
+records_only() {
+    test -e /records_only
+}
+
+sha256_of() {
+    sed -n 's/.*"stream_sha256": "\([0-9a-f]*\)".*/\1/p' "$1"
+}
+
+# The same two scans over TCP: what every other wire must give. Into tcp1 and tcp2.
+record_reference() {
+    check "the scans over TCP" scanhead record tcp:127.0.0.1:5025 --stats tcp1.json --quiet
+    scanhead record tcp:127.0.0.1:5025 --stats tcp2.json --quiet
+    tcp1=$(sha256_of tcp1.json) tcp2=$(sha256_of tcp2.json)
+}
+
+# The recorder: a head's first scan over USB, its second through the plain tty.
+check_record() {
+    rm -f usb.json tty.json
+    check "$1: scanhead list shows it" sh -c "scanhead list | grep '^usb:1209:0001:'"
+    check "$1: scanhead record usb" scanhead record usb --wait 10 -o usb.ply --stats usb.json --quiet
+    check "$1: the stream is the same as over TCP" test "$(sha256_of usb.json)" = "$tcp1" -a -n "$tcp1"
+    check "$1: scanhead record tty" scanhead record tty:/dev/ttyACM0 --wait 10 -o tty.ply --stats tty.json --quiet
+    check "$1: the stream of the tty is the same as over TCP" test "$(sha256_of tty.json)" = "$tcp2" -a -n "$tcp2"
+    note "$1: $(sed -n 's/.*\("pulses": [0-9]*\),.*/\1/p' usb.json), $(sed -n 's/.*\("wall_s": [0-9.]*\),.*/\1/p' usb.json)"
+    check "$1: as many points in the file as pulses" grep "element vertex $(sed -n 's/.*"points": \([0-9]*\).*/\1/p' usb.json)\$" usb.ply
+}
+
+# The recorder that follows a scan says about once a second how far it has come.
+has_points() {
+    grep -q 'recording: 0\.[0-9]*[1-9]' "$1"
+}
+
+# A recorder when its head goes in the middle of a scan: killed itself, left alone, and told to wait for the head. Needs a
+# head in real time, plug.sh and unplug.sh.
+check_cut_records() {
+    scanhead record usb --wait 10 --frames 100 -o cut.ply 2>killed.err &
+    wait_for 20 has_points killed.err
+    kill -9 $!
+    wait $! 2>/dev/null
+    scanhead record usb --wait 10 --listen -o cut.ply 2>cut.err &
+    client=$!
+    check "$1: another recorder after one was killed" wait_for 20 has_points cut.err
+    sh unplug.sh
+    wait $client
+    check "$1: exit status 1 when unplugged" test $? = 1
+    check "$1: and it says so" grep 'unplugged' cut.err
+    check "$1: and what had come is in the file" grep -a 'element vertex [1-9]' cut.ply
+    sh plug.sh
+    scanhead record usb --wait 10 --listen --replug 20 -o again.ply --stats again.json 2>again.err &
+    client=$!
+    wait_for 20 has_points again.err
+    sh unplug.sh
+    wait_for 5 is_unplugged
+    sh plug.sh
+    check "$1: --replug goes on" wait_for 20 grep 'is back' again.err
+    kill -INT $client
+    wait $client
+    check "$1: exit status 1 when the head was away" test $? = 1
+    check "$1: and it says so, once" grep 'away within 1 scans' again.err
+    check "$1: with the count" grep '"replugs": 1,' again.json
+}

@@ -1,0 +1,220 @@
+# The host's side of the guest tests: a real kernel in QEMU, and what it says as TAP. Sourced by tests/guest/test_*.sh.
+#
+#   guest_prepare                  kernel, modules and libraries into $BUILD/guest; skips the test where that can't be
+#   guest_add FILE [TARGET]        a file of this test into the guest (default: the root folder)
+#   guest_boot SCRIPT LIMIT_S [QEMU_OPTION...]
+#                                  boots, runs SCRIPT in the guest and prints its results as TAP
+#
+# The kernel is Debian's stock one out of its package, not installed. All that takes time is kept in $BUILD/guest, by the
+# package's version and by what the libraries are. The guest has two serial lines: the console, of which the log is kept,
+# and one for results (init, in_*.sh), on which it may also ask the host for something: `HOST word...` calls the function
+# host_request, and the guest waits for the line that this prints.
+set -eu
+
+guest_build=${BUILD:-build}
+guest_cache=$guest_build/guest
+guest_scanhead=${SCANHEAD:-$guest_build/test/scanhead}
+guest_programs=$guest_build/test/tests/guest
+guest_name=$(basename "$0" .sh)
+guest_work=$guest_cache/run/$guest_name
+guest_pid=
+
+# Modules that the scripts may load; what these need is taken as well.
+GUEST_MODULES="xhci-pci vhci-hcd dummy_hcd usb_f_fs usb_f_acm cdc-acm"
+GUEST_TOOLS="busybox qemu-system-x86_64 cpio depmod lsusb usbip xz dpkg-deb"
+
+guest_skip() {
+    echo "1..0 # SKIP $*"
+    exit 0
+}
+
+guest_quit() {
+    echo "Bail out! $*"
+    exit 1
+}
+
+guest_end() {
+    [ -z "$guest_pid" ] || kill "$guest_pid" 2>/dev/null || :
+}
+trap guest_end EXIT
+trap 'exit 130' INT TERM
+
+# Name and version of the kernel that the stock package stands for; without lists, of the one that is here already.
+guest_kernel_name() {
+    name=$(apt-cache depends linux-image-amd64 2>/dev/null | sed -n 's/.*Depends: \(linux-image-[0-9].*-amd64\)$/\1/p' | head -n 1)
+    if [ -n "$name" ]; then
+        echo "$name=$(apt-cache show --no-all-versions "$name" | sed -n 's/^Version: //p')"
+    else
+        ls -t "$guest_cache" 2>/dev/null | sed -n 's/^\(linux-image-.*=.*\)-[0-9]*$/\1/p' | head -n 1
+    fi
+}
+
+# vmlinux and the modules of the package $1 into the new folder $2.
+guest_unpack_kernel() {
+    mkdir -p "$2/deb" "$2/tree"
+    (cd "$2/deb" && apt-get download -q "$1" >../download.log 2>&1) || return 1
+    dpkg-deb --fsys-tarfile "$2"/deb/*.deb | tar -x -C "$2/tree" ./boot ./lib/modules || return 1
+    rm -rf "$2/deb"
+    release=$(ls "$2/tree/lib/modules")
+    # An xz stream lies inside the image and has other things after it; the uncompressed kernel boots 3 s faster.
+    for at in $(LC_ALL=C grep -obUaP '\xfd7zXZ\x00' "$2/tree/boot/vmlinuz-$release" | cut -d: -f1); do
+        tail -c +$((at + 1)) "$2/tree/boot/vmlinuz-$release" | xz -dc --single-stream >"$2/vmlinux" 2>/dev/null || :
+        [ "$(head -c 4 "$2/vmlinux" | tail -c 3)" != ELF ] || break
+    done
+    [ "$(head -c 4 "$2/vmlinux" | tail -c 3)" = ELF ] || return 1
+    PATH=$PATH:/sbin:/usr/sbin depmod -b "$2/tree" "$release"
+    mkdir -p "$2/root/modules"
+    for module in $GUEST_MODULES; do
+        guest_module_order "$2/tree/lib/modules/$release" "$module" >"$2/order" || return 1
+        while read -r file; do cp "$2/tree/lib/modules/$release/$file" "$2/root/modules/" || return 1; done <"$2/order"
+        sed 's|.*/||; s|\.ko$||' "$2/order" >"$2/root/modules/$module.order"
+    done
+    rm -rf "$2/tree" "$2/order"
+}
+
+# guest_module_order FOLDER MODULE: the files of the module and of those it needs, each after what it needs itself.
+guest_module_order() {
+    awk -v wanted="$2" '
+        { file = $1; sub(/:$/, "", file); name = file; sub(/.*\//, "", name); sub(/\.ko.*/, "", name); gsub(/-/, "_", name)
+          path[name] = file; needs[file] = ""; for (i = 2; i <= NF; i++) needs[file] = needs[file] " " $i }
+        function put(file,   list, n, i) {
+            if (done[file]) return
+            done[file] = 1
+            n = split(needs[file], list, " ")
+            for (i = n; i > 0; i--) put(list[i])
+            print file
+        }
+        END { gsub(/-/, "_", wanted)
+              if (!(wanted in path)) exit 1
+              put(path[wanted]) }' "$1/modules.dep"
+}
+
+guest_pack() {
+    (cd "$1" && find . | LC_ALL=C sort | cpio -o -H newc -R 0:0 --quiet)
+}
+
+# Shared libraries of some programs, and their loader, at the places where the programs look for them.
+guest_libraries() {
+    for program; do ldd "$program"; done | sed -n 's/.*=> \(\/[^ ]*\).*/\1/p; s/^[[:space:]]*\(\/[^ ]*ld-linux[^ ]*\).*/\1/p' |
+        LC_ALL=C sort -u
+}
+
+guest_copy() {
+    mkdir -p "$2$(dirname "$1")"
+    cp -L "$1" "$2$1"
+}
+
+guest_prepare_kernel() {
+    kernel=$(guest_kernel_name)
+    [ -n "$kernel" ] || guest_skip "no package linux-image-amd64: apt-get update, or no network"
+    guest_kernel=$guest_cache/$kernel-$(echo "$GUEST_MODULES" | cksum | cut -d" " -f1)
+    if [ ! -e "$guest_kernel/vmlinux" ]; then
+        rm -rf "$guest_kernel.new"
+        mkdir -p "$guest_kernel.new"
+        guest_unpack_kernel "$kernel" "$guest_kernel.new" || guest_skip "the kernel package $kernel can't be had or unpacked"
+        rm -rf "$guest_kernel"
+        mv "$guest_kernel.new" "$guest_kernel"
+    fi
+}
+
+# The test programs for the guest that make has built: tests/guest/test_*.c.
+guest_test_programs() {
+    for source in tests/guest/test_*.c; do
+        name=$(basename "$source" .c)
+        [ ! -x "$guest_programs/$name" ] || echo "$guest_programs/$name"
+    done
+}
+
+guest_prepare_libraries() {
+    libraries=$(guest_libraries "$guest_scanhead" "$(command -v lsusb)" "$(command -v usbip)" $(guest_test_programs))
+    key=$( (ls -lL $libraries "$(command -v lsusb)" "$(command -v busybox)" "$(command -v usbip)") | cksum | tr ' ' '-')
+    guest_base=$guest_cache/base-$key.cpio
+    [ ! -e "$guest_base" ] || return 0
+    rm -rf "$guest_cache/base" "$guest_cache"/base-*.cpio
+    mkdir -p "$guest_cache/base/bin"
+    for file in $libraries; do guest_copy "$file" "$guest_cache/base"; done
+    cp -L "$(command -v lsusb)" "$(command -v busybox)" "$(command -v usbip)" "$guest_cache/base/bin/"
+    [ ! -e /usr/share/hwdata/usb.ids ] || guest_copy /usr/share/hwdata/usb.ids "$guest_cache/base"
+    guest_pack "$guest_cache/base" >"$guest_base.new"
+    mv "$guest_base.new" "$guest_base"
+    rm -rf "$guest_cache/base"
+}
+
+guest_prepare() {
+    for tool in $GUEST_TOOLS; do
+        PATH=$PATH:/sbin:/usr/sbin command -v "$tool" >/dev/null || guest_skip "no $tool: make deps"
+    done
+    [ "$(uname -m)" = x86_64 ] || guest_skip "the guest is x86-64, this machine is $(uname -m)"
+    mkdir -p "$guest_cache"
+    guest_prepare_kernel
+    guest_prepare_libraries
+    rm -rf "$guest_work"
+    mkdir -p "$guest_work/root/bin"
+    cp tests/guest/init tests/guest/in_lib.sh "$guest_work/root/"
+    cp "$guest_scanhead" $(guest_test_programs) "$guest_work/root/bin/"
+    strip --strip-debug "$guest_work"/root/bin/*
+    cp -r config "$guest_work/root/config"
+    chmod +x "$guest_work/root/init"
+}
+
+guest_add() {
+    mkdir -p "$guest_work/root/$(dirname "${2:-.}")"
+    cp "$1" "$guest_work/root/${2:-}"
+}
+
+# The head of the tests, and what the scripts in the guest know of it. GUEST_PAN_DEG_S makes its scan longer (0.4: a
+# million pulses); then only records are made of it.
+guest_add_head() {
+    guest_add tests/guest/in_usb.sh
+    guest_add tests/guest/room.obj
+    sed "s/pan_deg_s: .*/pan_deg_s: ${GUEST_PAN_DEG_S:-60}/" tests/guest/head.yaml >"$guest_work/root/head.yaml"
+    [ -z "${GUEST_PAN_DEG_S:-}" ] || : >"$guest_work/root/records_only"
+}
+
+host_request() {
+    echo "nothing to be had here: $*"
+}
+
+# The guest's lines, until it is done or gone.
+guest_follow() {
+    done=
+    while [ -z "$done" ] && read -r line <&3; do
+        line=$(printf '%s' "$line" | tr -d '\r')
+        case $line in
+        "ok "* | "not ok "* | "#"*) echo "$line" ;;
+        "HOST "*) host_request ${line#HOST } >&4 ;;
+        "DONE "*) done=${line#DONE } ;;
+        "ENDED "*) break ;;
+        esac
+    done
+    if [ -n "$done" ]; then
+        echo "1..$done"
+        return 0
+    fi
+    sed 's/^/# /' "$guest_work/console.log" | tail -n 30
+    guest_quit "the guest did not get to its end within its time, or fell over (${line:-}); console: $guest_work/console.log"
+}
+
+guest_boot() {
+    cp "$1" "$guest_work/root/script.sh"
+    limit_s=${GUEST_LIMIT_S:-$2}
+    shift 2
+    { cat "$guest_base"; guest_pack "$guest_kernel/root"; guest_pack "$guest_work/root"; } >"$guest_work/initrd"
+    mkfifo "$guest_work/results.in" "$guest_work/results.out"
+    exec 3<>"$guest_work/results.out" 4<>"$guest_work/results.in"
+    # No KVM, and one CPU: a second one makes small transfers ten times slower on two host cores.
+    (
+        exec 3<&- 4<&-
+        status=0
+        timeout -k 5 "$limit_s" qemu-system-x86_64 -accel tcg -cpu max -smp 1 -m 768 -M q35 -nodefaults -no-user-config \
+            -display none -no-reboot -monitor none -kernel "$guest_kernel/vmlinux" -initrd "$guest_work/initrd" \
+            -append "console=ttyS0 quiet panic=-1 mitigations=off nokaslr" -chardev "file,id=console,path=$guest_work/console.log" \
+            -serial chardev:console -chardev "pipe,id=results,path=$guest_work/results" -serial chardev:results "$@" \
+            >"$guest_work/qemu.log" 2>&1 || status=$?
+        echo "ENDED $status" >"$guest_work/results.out"
+    ) &
+    guest_pid=$!
+    guest_follow
+    wait "$guest_pid" || :
+    guest_pid=
+}

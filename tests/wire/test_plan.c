@@ -1,0 +1,139 @@
+/* scanhead plan, through the program: rows and keys, the method by tolerance and extent, stations that differ, and what
+ * can't be had. */
+#include "tests/wire/room.h"
+
+static char *plan(struct wire *wire, const char *const *args, int status)
+{
+    int got = wire_wait(wire, wire_spawn(wire, args, "out", "err", -1));
+    if (got != status) wire_show(wire, "err");
+    assert_int_equal(got, status);
+    return wire_read(wire_path(wire, status == 0 ? "out" : "err"), NULL);
+}
+
+/* Ground of 600 by 600 m, a station in its middle and one in its corner: points up to 430 m and 860 m away, which is
+ * within the head's 1000 m. */
+static const char *set_up(struct wire *wire)
+{
+    wire_write_text(wire, "room.obj",
+                    "v -300 -300 -1.7\nv 300 -300 -1.7\nv 300 300 -1.7\nv -300 300 -1.7\n"
+                    "o ground\nusemtl grass\nf 1 2 3 4\n");
+    static char path[256];
+    const char *config =
+        wire_write_text(wire, "config.yaml",
+                        "head: {profile: full-sweep, prr_hz: 100000, lines_hz: 50, pan_deg_s: 100, frames: 1}\n"
+                        "scene:\n  meshes:\n    - {file: room.obj, up: z, scale: 1}\n"
+                        "  anchor: {source: explicit, lat_deg: 52.5, lon_deg: 13.4, height_m: 100}\n"
+                        "stations:\n  - {name: middle, position_m: [0, 0, 0]}\n"
+                        "  - {name: corner, position_m: [299, 299, 0]}\n"
+                        "links: [{type: \"null\"}]\noutput: {crs: utm, layout: geo}\n");
+    snprintf(path, sizeof path, "%s", config); /* those of wire_path are used again */
+    return path;
+}
+
+/* The nth object with that stage, up to its end. */
+static char *row(const char *json, const char *stage, int n)
+{
+    char key[64];
+    snprintf(key, sizeof key, "\"stage\": \"%s\"", stage);
+    const char *at = json;
+    for (; n >= 0; n--, at++)
+        if ((at = strstr(at, key)) == NULL) return NULL;
+    return strndup(at - 1, strcspn(at - 1, "}"));
+}
+
+static double number_of(const char *text, const char *key)
+{
+    const char *at = strstr(text, key);
+    if (at == NULL) fail_msg("no %s in %s", key, text);
+    return strtod(at + strlen(key), NULL);
+}
+
+static void expect_row(const char *json, const char *stage, int n, const char *method, double most_m, const char *why)
+{
+    char want[64], *text = row(json, stage, n);
+    if (text == NULL) fail_msg("no row %d of %s in %s", n, stage, json);
+    snprintf(want, sizeof want, "\"method\": \"%s", method);
+    if (strstr(text, want) == NULL || strstr(text, why) == NULL || !(number_of(text, "\"error_m\": ") <= most_m))
+        fail_msg("%s, row %d: %s", stage, n, text);
+    assert_non_null(strstr(text, "\"cost_ns\": "));
+    free(text);
+}
+
+/* What order n leaves out is a fraction of range^(n+1) / R^n with R = 6400 km: of order 1 at 430 m some of 0.03 m, of
+ * order 2 some of 2 um, at 860 m of 16 um, of order 3 some of 2 nm. */
+static void test_method_by_tolerance(void **state)
+{
+    struct wire *wire = *state;
+    const char *config = set_up(wire);
+    static const struct {
+        const char *set, *method, *why;
+        double most_m;
+    } cases[] = {{"output.tolerance_m=1e-7", "order3", "all stations: the cheapest that meets the tolerance", 1e-7},
+                 {"output.tolerance_m=0.001", "order2", "all stations: the cheapest that meets the tolerance", 1e-3},
+                 {"output.tolerance_m=1", "order1", "all stations: the cheapest that meets the tolerance", 1.0},
+                 {"output.georef=exact", "exact", "asked for by output.georef", 1e-7},
+                 {"output.georef=order3", "order3", "asked for by output.georef", 1e-7},
+                 {"output.crs=ecef", "rotation", "ECEF is a rotation", 1e-8},
+                 {"output.crs=local", "none", "points stay in the scene frame", 0.0},
+                 {"output.layout=polar", "none", "output.layout is polar", 0.0}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const char *const args[] = {"plan", config, "--json", "--set", cases[i].set, NULL};
+        char *json = plan(wire, args, 0);
+        assert_int_equal(json[0], '[');
+        expect_row(json, "cast", 0, "packets of ", 1e-6, "float can't tell");
+        expect_row(json, "georef", 0, cases[i].method, cases[i].most_m, cases[i].why);
+        char *second = row(json, "georef", 1);
+        if (second != NULL) fail_msg("%s: %s", cases[i].set, second);
+        free(json);
+    }
+}
+
+static void test_stations_that_differ(void **state)
+{
+    struct wire *wire = *state;
+    const char *config = set_up(wire);
+    const char *const args[] = {"plan", config, "--json", "--set", "output.tolerance_m=4e-6", NULL};
+    char *json = plan(wire, args, 0);
+    expect_row(json, "georef", 0, "order2", 4e-6, "station 1 middle");
+    expect_row(json, "georef", 1, "order3", 4e-6, "station 2 corner");
+    free(json);
+}
+
+/* The table for people has the same rows. */
+static void test_text(void **state)
+{
+    struct wire *wire = *state;
+    const char *config = set_up(wire);
+    const char *const args[] = {"plan", config, NULL}, *const help[] = {"plan", "--help", NULL};
+    static const char *const words[] = {"stage", "cast", "order", "movers", "beam", "noise", "\ngeoref   order3"};
+    char *text = plan(wire, args, 0);
+    for (size_t i = 0; i < sizeof words / sizeof words[0]; i++)
+        if (strstr(text, words[i]) == NULL) fail_msg("no %s in %s", words[i], text);
+    free(text);
+    text = plan(wire, help, 0);
+    assert_non_null(strstr(text, "make chart"));
+    free(text);
+}
+
+static void test_what_cannot_be(void **state)
+{
+    struct wire *wire = *state;
+    const char *config = set_up(wire);
+    const char *const args[] = {"plan", config, "--set", "output.georef=order5", NULL};
+    char *text = plan(wire, args, 2);
+    assert_non_null(strstr(text, "output.georef"));
+    assert_non_null(strstr(text, "allowed exact"));
+    assert_ptr_equal(strchr(text, '\n'), text + strlen(text) - 1);
+    free(text);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_method_by_tolerance, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_stations_that_differ, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_text, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_what_cannot_be, wire_setup, wire_teardown),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

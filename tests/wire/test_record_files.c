@@ -1,0 +1,157 @@
+/* `scanhead record` and the files it is to write: what can't be is refused before anything is scanned. */
+#include <dirent.h>
+
+#include "tests/wire/room.h"
+
+static const struct room_config SCAN = {.prr_hz = 20000,
+                                        .lines_hz = 50,
+                                        .pan_deg_s = 150,
+                                        .pan_stop_deg = 60,
+                                        .frames = 1,
+                                        .links = "links: [{type: \"null\"}]\n"};
+
+static int count_files(const struct wire *wire)
+{
+    int n = 0;
+    DIR *dir = opendir(wire->dir);
+    assert_non_null(dir);
+    while (readdir(dir) != NULL)
+        n++;
+    closedir(dir);
+    return n;
+}
+
+/* One line that says so, status 2, and no file more than before. */
+static void expect_refusal(struct wire *wire, const char *const *args, const char *says)
+{
+    wire_write_text(wire, "out", "");
+    wire_write_text(wire, "err", "");
+    int before = count_files(wire), status = wire_wait(wire, wire_spawn(wire, args, "out", "err", -1));
+    char *text = wire_read(wire_path(wire, "err"), NULL), *end = strchr(text, '\n');
+    if (status != 2 || strstr(text, says) == NULL || end == NULL || end[1] != 0)
+        fail_msg("status %d, no '%s' in: %s", status, says, text);
+    assert_int_equal(count_files(wire), before);
+    free(text);
+}
+
+static void begin(struct wire *wire, char config[352])
+{
+    room_write(wire);
+    snprintf(config, 352, "%s", room_config_write(wire, &SCAN));
+}
+
+/* Two names of one file would make a mess of it, and so would two recordings. */
+static void test_same_file(void **state)
+{
+    struct wire *wire = *state;
+    char config[352], a[352], b[352], part[352];
+    begin(wire, config);
+    snprintf(a, sizeof a, "%s", wire_path(wire, "a.las"));
+    snprintf(b, sizeof b, "%s", wire_path(wire, "./a.las"));
+    expect_refusal(wire, (const char *const[]){"record", config, "-o", a, "-o", a, NULL}, "given twice");
+    expect_refusal(wire, (const char *const[]){"record", config, "-o", a, "-o", b, NULL},
+                   "is being written by another recording");
+    /* what a recording that was killed has left is no hindrance */
+    snprintf(part, sizeof part, "%s", wire_write_text(wire, "a.las.part", "left behind, longer than nothing"));
+    const char *const args[] = {"record", config, "-o", a, "--quiet", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+    assert_int_equal(access(part, F_OK), -1);
+    char *las = wire_read(a, NULL);
+    assert_int_equal(strncmp(las, "LASF", 4), 0);
+    free(las);
+}
+
+static void test_no_file(void **state)
+{
+    struct wire *wire = *state;
+    static const char *const ending[] = {"las", "ptx", "e57", "ply", "poses.csv", "pcapng", "shs"};
+    char config[352], name[64], path[352];
+    begin(wire, config);
+    for (int i = 0; i < 7; i++) {
+        snprintf(name, sizeof name, "folder.%s", ending[i]);
+        snprintf(path, sizeof path, "%s", wire_path(wire, name));
+        assert_int_equal(mkdir(path, 0700), 0);
+        expect_refusal(wire, (const char *const[]){"record", config, "-o", path, NULL}, "is a directory");
+        assert_int_equal(rmdir(path), 0);
+        snprintf(name, sizeof name, "none/a.%s", ending[i]);
+        snprintf(path, sizeof path, "%s", wire_path(wire, name));
+        expect_refusal(wire, (const char *const[]){"record", config, "-o", path, NULL}, "No such file or directory");
+    }
+    snprintf(path, sizeof path, "%s", wire_path(wire, "a.xyz"));
+    expect_refusal(wire, (const char *const[]){"record", config, "-o", path, NULL},
+                   "known are .ply .las .ptx .e57 .poses.csv .pcapng .shs");
+}
+
+/* Formats with rigid poses take no degrees, and say so before the scan. */
+static void test_degrees(void **state)
+{
+    struct wire *wire = *state;
+    static const char *const ending[] = {"ptx", "e57"};
+    char config[352], name[64], path[352];
+    begin(wire, config);
+    for (int i = 0; i < 2; i++) {
+        snprintf(name, sizeof name, "a.%s", ending[i]);
+        snprintf(path, sizeof path, "%s", wire_path(wire, name));
+        const char *const args[] = {"record",  config,
+                                    "-o",      path,
+                                    "--crs",   "geodetic",
+                                    "--set",   "output.layout=geo",
+                                    "--set",   "stations[0].lat_deg=50",
+                                    "--set",   "stations[0].lon_deg=8",
+                                    "--set",   "stations[0].height_m=100",
+                                    "--quiet", NULL};
+        expect_refusal(wire, args, "this format holds metres, and output.crs is geodetic; allowed local, ecef, utm");
+    }
+}
+
+/* --crs says that points are to be in it: no recording in the scene frame instead. */
+static void test_crs(void **state)
+{
+    struct wire *wire = *state;
+    char config[352], path[352];
+    begin(wire, config);
+    snprintf(path, sizeof path, "%s", wire_path(wire, "a.ply"));
+    const char *args[] = {"record",  config,
+                          "-o",      path,
+                          "--crs",   "utm",
+                          "--set",   "stations[0].lat_deg=50",
+                          "--set",   "stations[0].lon_deg=8",
+                          "--set",   "stations[0].height_m=100",
+                          "--quiet", NULL,
+                          NULL,      NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+    char *ply = wire_read(path, NULL);
+    assert_non_null(strstr(ply, "\ncomment epsg 32632\n")); /* 6 to 12 degrees east is zone 32 */
+    free(ply);
+    remove(path);
+    args[13] = "--set";
+    args[14] = "output.layout=polar";
+    expect_refusal(wire, args, "output.layout is polar");
+}
+
+/* --duration ends each scan, not the row of stations. */
+static void test_duration_of_each(void **state)
+{
+    struct wire *wire = *state;
+    char config[352], path[352], stats[352];
+    begin(wire, config);
+    snprintf(path, sizeof path, "%s", wire_path(wire, "a.ply"));
+    snprintf(stats, sizeof stats, "%s", wire_path(wire, "stats.json"));
+    const char *const args[] = {"record",  config,       "-o",      path,    "--station",
+                                "all",     "--duration", "0.05",    "--set", "stations.1.position_m=[1, 0, 0]",
+                                "--stats", stats,        "--quiet", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+    assert_int_equal(stats_uint(wire, "scans"), 2);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_same_file, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_no_file, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_degrees, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_crs, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_duration_of_each, wire_setup, wire_teardown),
+    };
+    return cmocka_run_group_tests_name("record files", tests, NULL, NULL);
+}
