@@ -62,8 +62,9 @@ sha256_of() {
 # The same two scans over TCP: what every other wire must give. Into tcp1 and tcp2.
 record_reference() {
     check "the scans over TCP" scanhead record tcp:127.0.0.1:5025 --stats tcp1.json --quiet
-    scanhead record tcp:127.0.0.1:5025 --stats tcp2.json --quiet
-    tcp1=$(sha256_of tcp1.json) tcp2=$(sha256_of tcp2.json)
+    records_only || scanhead record tcp:127.0.0.1:5025 --stats tcp2.json --quiet
+    tcp1=$(sha256_of tcp1.json) tcp2=
+    records_only || tcp2=$(sha256_of tcp2.json)
 }
 
 # The recorder: a head's first scan over USB, its second through the plain tty.
@@ -72,8 +73,12 @@ check_record() {
     check "$1: scanhead list shows it" sh -c "scanhead list | grep '^usb:1209:0001:'"
     check "$1: scanhead record usb" scanhead record usb --wait 10 -o usb.ply --stats usb.json --quiet
     check "$1: the stream is the same as over TCP" test "$(sha256_of usb.json)" = "$tcp1" -a -n "$tcp1"
-    check "$1: scanhead record tty" scanhead record tty:/dev/ttyACM0 --wait 10 -o tty.ply --stats tty.json --quiet
-    check "$1: the stream of the tty is the same as over TCP" test "$(sha256_of tty.json)" = "$tcp2" -a -n "$tcp2"
+    # A tty has no flow control: where an emulated processor is too slow for a head as fast as it computes, the kernel's
+    # tty buffers (640 KiB) run over, and bytes are gone. Seen with a million pulses, never with a few thousand.
+    if ! records_only; then
+        check "$1: scanhead record tty" scanhead record tty:/dev/ttyACM0 --wait 10 -o tty.ply --stats tty.json --quiet
+        check "$1: the stream of the tty is the same as over TCP" test "$(sha256_of tty.json)" = "$tcp2" -a -n "$tcp2"
+    fi
     note "$1: $(sed -n 's/.*\("pulses": [0-9]*\),.*/\1/p' usb.json), $(sed -n 's/.*\("wall_s": [0-9.]*\),.*/\1/p' usb.json)"
     check "$1: as many points in the file as pulses" grep "element vertex $(sed -n 's/.*"points": \([0-9]*\).*/\1/p' usb.json)\$" usb.ply
 }
