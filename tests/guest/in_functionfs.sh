@@ -23,7 +23,7 @@ for speed in high super; do
     check "$speed: nothing left" test -z "$(ls $gadgets)"
     note "recorded at $(uptime_s) s"
     records_only && continue
-    head_start "{type: usb, backend: functionfs, speed: $speed}" --set head.prr_hz=10000
+    head_start "{type: usb, backend: functionfs, speed: $speed}" --set head.prr_hz=4000
     wait_for 10 is_plugged
     REPLUGS=10 UNPLUG="sh unplug.sh" PLUG="sh plug.sh" tap "$speed" test_stream
     note "streamed at $(uptime_s) s"

@@ -33,7 +33,7 @@ note "recorded at $(uptime_s) s"
 head_stop
 check "TCP: gone with the recorded head" wait_for 10 is_unplugged
 records_only && return
-head_start "{type: usb}" --set head.prr_hz=10000
+head_start "{type: usb}" --set head.prr_hz=4000
 echo "echo 0 >$vhci/detach" >unplug.sh
 echo "usbip attach -r 127.0.0.1 -b 1-1" >plug.sh
 sh plug.sh
