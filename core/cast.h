@@ -10,6 +10,7 @@
 
 #include <stdint.h>
 
+#include "core/beam.h"
 #include "core/err.h"
 #include "core/georef.h"
 #include "core/line.h"
@@ -53,6 +54,15 @@ struct cast_mover {
     double rotation[9], shift_m[3];
 };
 
+/* A beam with a footprint (core/beam.h). Constant; any thread. */
+struct cast_beam {
+    struct beam beam;
+    enum beam_mode mode; /* BEAM_RINGS, or BEAM_ADAPTIVE with outlines: then the head and the scene stand still */
+    uint32_t max_echoes; /* of a pulse; up to LINE_MAX_ECHOES */
+    struct beam_pattern pattern, fine; /* sub-rays; the finest */
+    const struct beam_outlines *outlines;
+};
+
 /* What stays the same for all pulses of a scan (the movers' poses: of a run). */
 struct cast_setup {
     const struct bvh *bvh;
@@ -67,6 +77,10 @@ struct cast_setup {
     enum line_layout layout;
     double range_scale_m;
     double xyz_scale[3]; /* units of the CRS per count, see georef_scale */
+    /* NULL: pulses are single rays. Else the BVH's station_reach_m covers the exit radius, and blocks have room for
+     * beam->max_echoes entries a pulse. */
+    const struct cast_beam *beam;
+    enum beam_select echoes; /* which of a pulse's */
     uint32_t n_movers;
     struct cast_mover mover[CAST_MAX_MOVERS];
     /* A moving head: poses of the head (socs -> prcs) in order of time, pose_between them. They cover the firing times
@@ -83,6 +97,11 @@ struct cast_counters {
     uint64_t went_on;     /* of these, nothing there after all: the ray went on behind */
     uint64_t unfit;       /* echoes whose position did not fit into the wire's integers: sent as shots without echo */
     uint64_t undecided;   /* nearer to an edge than double precision can tell: counted as hit */
+    /* with a beam */
+    uint64_t outlined;  /* adaptive: pulses whose footprint an outline cuts */
+    uint64_t sub_rays;  /* cast beyond the central ones */
+    uint64_t ragged;    /* adaptive: pulses with more outlines than can be told apart, cast as rings */
+    uint64_t left_out;  /* echoes beyond max_echoes */
 };
 
 struct caster;

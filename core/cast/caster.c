@@ -4,57 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/cast/kernels.h"
-
-/* Pulses worked on at a time: the arrays stay in the second-level cache, the hits' planes are on their way. */
-enum { CHUNK = BVH_CHUNK };
-
-struct mover_rays {
-    double dx[CHUNK], dy[CHUNK], dz[CHUNK], range_m[CHUNK];
-    uint32_t hit[CHUNK];
-};
-
-/* Of a moving head only. */
-struct moving_rays {
-    double sx[CHUNK], sy[CHUNK], sz[CHUNK]; /* direction, socs */
-    double rx[CHUNK], ry[CHUNK], rz[CHUNK]; /* as the encoders read it, socs; geo layout */
-    double px[CHUNK], py[CHUNK], pz[CHUNK]; /* origin, prcs */
-    double ox[CHUNK], oy[CHUNK], oz[CHUNK]; /* origin, local frame of the BVH at hand */
-    float fx[CHUNK], fy[CHUNK], fz[CHUNK];  /* likewise, as Embree gets it */
-    double qx[CHUNK], qy[CHUNK], qz[CHUNK]; /* origin in a moving body's frame */
-};
-
-/* Where rays begin: all at one point (px NULL), or each at its own; prcs. */
-struct origins {
-    double at_m[3];
-    const double *px, *py, *pz;
-};
-
-struct caster {
-    struct bvh_packets packets;
-    double mirror_turn[CHUNK], pan_turn[CHUNK];
-    double dx[CHUNK], dy[CHUNK], dz[CHUNK]; /* direction of the beam, prcs */
-    double ex[CHUNK], ey[CHUNK], ez[CHUNK]; /* direction as the encoders read it, then the position; geo layout */
-    double range_m[CHUNK];
-    float fx[CHUNK], fy[CHUNK], fz[CHUNK]; /* the direction as Embree gets it */
-    uint32_t prim[CHUNK], hit[CHUNK];      /* as proposed; as decided */
-    float t[CHUNK], u[CHUNK], v[CHUNK];
-    uint32_t doubt[CHUNK];              /* the proposal has to be decided in double */
-    uint32_t seen[CHUNK], label[CHUNK]; /* labels of the last hits; of what counts in the end */
-    struct mover_rays mover;            /* touched only where something moves */
-    struct moving_rays moving;          /* touched only where the head moves */
-    struct cast_counters counters;
-    struct cast_profile *profile;
-};
-
-/* What has passed since the stage before belongs to this one. */
-static inline void ends(struct caster *c, enum cast_stage stage)
-{
-    if (c->profile == NULL) return;
-    uint64_t now = c->profile->now();
-    c->profile->spent[stage] += now - c->profile->last;
-    c->profile->last = now;
-}
+#include "core/cast/caster.h"
 
 void caster_set_profile(struct caster *caster, struct cast_profile *profile)
 {
@@ -66,11 +16,15 @@ int caster_create(struct caster **out, struct sh_err *err)
     *out = aligned_alloc(64, (sizeof **out + 63) / 64 * 64);
     if (*out == NULL) return sh_fail(err, SH_ENOMEM, "cast: no memory for a caster");
     memset(*out, 0, sizeof **out);
-    return SH_OK;
+    int rc = beam_work_create(&(*out)->beam, err);
+    if (rc != SH_OK) free(*out);
+    return rc;
 }
 
 void caster_free(struct caster *caster)
 {
+    if (caster == NULL) return;
+    beam_work_free(caster->beam);
     free(caster);
 }
 
@@ -166,17 +120,16 @@ static void cast_rays(struct caster *c, struct decide_ray *ray, struct bvh_rays 
         rays->oy = m->fy;
         rays->oz = m->fz;
     }
-    ends(c, CAST_DIRECTIONS);
+    caster_ends(c, CAST_DIRECTIONS);
     bvh_intersect(bvh, &c->packets, rays, n);
-    ends(c, CAST_EMBREE);
+    caster_ends(c, CAST_EMBREE);
     uint32_t doubts = from->px != NULL ? kernel_refine_from(bvh, hits, m->ox, m->oy, m->oz, n)
                                        : kernel_refine(bvh, hits, ray->o_local, n);
-    ends(c, CAST_REFINE);
+    caster_ends(c, CAST_REFINE);
     if (doubts != 0) decide(c, ray, from, hits, c->prim, n);
 }
 
-/* n rays from one point, or (n <= CHUNK) each from its own. */
-static void hits_from(struct caster *c, const struct bvh *bvh, const struct origins *from, double range_max_m,
+void caster_hits_from(struct caster *c, const struct bvh *bvh, const struct origins *from, double range_max_m,
                       uint32_t n, const double *dx, const double *dy, const double *dz, double *range_m,
                       uint32_t *triangle)
 {
@@ -199,7 +152,7 @@ static void hits_from(struct caster *c, const struct bvh *bvh, const struct orig
                                    .doubt = c->doubt};
         cast_rays(c, &ray, &rays, from, &hits, m);
         memcpy(triangle + at, c->prim, m * sizeof *triangle);
-        ends(c, CAST_DECIDE);
+        caster_ends(c, CAST_DECIDE);
     }
 }
 
@@ -207,7 +160,7 @@ void caster_hits(struct caster *c, const struct bvh *bvh, const double station_m
                  const double *dx, const double *dy, const double *dz, double *range_m, uint32_t *triangle)
 {
     const struct origins from = {.at_m = {station_m[0], station_m[1], station_m[2]}};
-    hits_from(c, bvh, &from, range_max_m, n, dx, dy, dz, range_m, triangle);
+    caster_hits_from(c, bvh, &from, range_max_m, n, dx, dy, dz, range_m, triangle);
 }
 
 /* Socs to where positions go: straight to the CRS where that is a rotation, else to prcs. Returns 1 in the first case.
@@ -241,19 +194,21 @@ static uint32_t take_back(struct caster *c, struct line_block *block, uint32_t a
     return taken;
 }
 
-/* Positions as a head computes them: from the range and from what its encoders read. Returns how many echoes had to be
- * taken back. */
-static uint32_t positions(struct caster *c, const struct cast_setup *s, int linear, struct line_block *block,
-                          uint32_t at, uint32_t n)
+/* Positions as a head computes them: from the range and from what its encoders read. */
+uint32_t caster_wire(struct caster *c, const struct cast_setup *s, int linear, struct line_block *block, uint32_t at,
+                     uint32_t n)
 {
     const struct moving_rays *m = &c->moving;
+    if (s->layout != LINE_GEO) {
+        kernel_polar(s, c->range_m, c->mirror_turn, c->pan_turn, n, block->a + at, block->b + at, block->c + at);
+        return 0;
+    }
     if (s->n_knots != 0)
         kernel_scale_from(c->range_m, m->px, m->py, m->pz, s->station_m, n, c->ex, c->ey, c->ez);
     else
         kernel_scale(c->range_m, n, c->ex, c->ey, c->ez);
     if (!linear) georef_forward(s->georef, n, c->ex, c->ey, c->ez, c->ex, c->ey, c->ez);
-    uint32_t unfit = kernel_geo(c->ex, c->ey, c->ez, s->xyz_scale, n, block->a + at, block->b + at, block->c + at);
-    return unfit == 0 ? 0 : take_back(c, block, at, n);
+    return kernel_geo(c->ex, c->ey, c->ez, s->xyz_scale, n, block->a + at, block->b + at, block->c + at);
 }
 
 /* How far the origins lie from the first of them. */
@@ -269,7 +224,7 @@ static double spread_m(const struct origins *from, uint32_t n)
 
 /* A moving body, cast in its own frame: what it hides gives way. */
 static void cast_mover(struct caster *c, const struct cast_setup *s, const struct cast_mover *m,
-                       const struct origins *from, uint32_t n)
+                       const struct origins *from, const struct caster_rays *rays, uint32_t n)
 {
     double v[3], w[3];
     struct origins own = {.px = NULL};
@@ -280,7 +235,7 @@ static void cast_mover(struct caster *c, const struct cast_setup *s, const struc
         w[i] = at - m->shift_m[i];
     }
     double radius_m = m->radius_m + (from->px != NULL ? spread_m(from, n) : 0.0);
-    if (!kernel_meets_sphere(c->dx, c->dy, c->dz, n, v, radius_m)) return;
+    if (!kernel_meets_sphere(rays->dx, rays->dy, rays->dz, n, v, radius_m)) return;
     for (int i = 0; i < 3; i++)
         own.at_m[i] = m->rotation[i] * w[0] + m->rotation[3 + i] * w[1] + m->rotation[6 + i] * w[2];
     if (from->px != NULL) {
@@ -292,13 +247,23 @@ static void cast_mover(struct caster *c, const struct cast_setup *s, const struc
         own.pz = o->qz;
     }
     struct mover_rays *r = &c->mover;
-    kernel_turn_back(c->dx, c->dy, c->dz, m->rotation, n, r->dx, r->dy, r->dz);
-    hits_from(c, m->bvh, &own, s->range_max_m, n, r->dx, r->dy, r->dz, r->range_m, r->hit);
+    kernel_turn_back(rays->dx, rays->dy, rays->dz, m->rotation, n, r->dx, r->dy, r->dz);
+    caster_hits_from(c, m->bvh, &own, s->range_max_m, n, r->dx, r->dy, r->dz, r->range_m, r->hit);
+    if (rays->cosine != NULL) kernel_incidence(m->bvh, r->hit, r->dx, r->dy, r->dz, n, r->cosine);
     for (uint32_t i = 0; i < n; i++) {
-        if (!(r->range_m[i] < c->range_m[i]) && !(isnan(c->range_m[i]) && !isnan(r->range_m[i]))) continue;
-        c->range_m[i] = r->range_m[i];
-        c->label[i] = c->seen[i];
+        if (!(r->range_m[i] < rays->range_m[i]) && !(isnan(rays->range_m[i]) && !isnan(r->range_m[i]))) continue;
+        rays->range_m[i] = r->range_m[i];
+        rays->label[i] = c->seen[i];
+        if (rays->cosine != NULL) rays->cosine[i] = r->cosine[i];
+        if (rays->triangle != NULL) rays->triangle[i] = CAST_NO_TRIANGLE;
     }
+}
+
+void caster_movers(struct caster *c, const struct cast_setup *s, const struct origins *from,
+                   const struct caster_rays *rays, uint32_t n)
+{
+    for (uint32_t i = 0; i < s->n_movers; i++)
+        cast_mover(c, s, &s->mover[i], from, rays, n);
 }
 
 /* The last pose at or before t_ns, or the first. */
@@ -368,35 +333,44 @@ static int aim(struct caster *c, const struct cast_setup *s, const struct schedu
     return linear;
 }
 
-static uint32_t cast_chunk(struct caster *c, const struct cast_setup *s, const struct schedule_run *run,
-                           struct line_block *block, uint32_t at, uint32_t n)
+/* Each pulse is one ray: its echo, if there is one. */
+static uint32_t single_chunk(struct caster *c, const struct cast_setup *s, int linear, uint64_t pulse0, uint32_t n,
+                             struct line_block *block, uint32_t at)
 {
-    struct origins from;
-    if (c->profile != NULL) c->profile->last = c->profile->now();
-    int linear = aim(c, s, run, block->dt_ns, at, n, &from);
-    hits_from(c, s->bvh, &from, s->range_max_m, n, c->dx, c->dy, c->dz, c->range_m, c->hit);
-    memcpy(c->label, c->seen, n * sizeof *c->label);
-    for (uint32_t i = 0; i < s->n_movers; i++)
-        cast_mover(c, s, &s->mover[i], &from, n);
     uint32_t echoes = kernel_detect(c->range_m, s->range_min_m, s->range_max_m, n, block->echo + at);
     kernel_labels(c->label, block->echo + at, n, block->label + at);
     for (uint32_t i = 0; i < n; i++)
         block->refl_cdb[at + i] = LINE_REFL_NONE;
-    ends(c, CAST_DETECT);
-    if (s->noise_on) kernel_noise(s, run->pulse0 + at, n, c->range_m);
-    ends(c, CAST_NOISE);
-    if (s->layout == LINE_GEO)
-        echoes -= positions(c, s, linear, block, at, n);
-    else
-        kernel_polar(s, c->range_m, c->mirror_turn, c->pan_turn, n, block->a + at, block->b + at, block->c + at);
-    ends(c, CAST_POSITIONS);
+    caster_ends(c, CAST_DETECT);
+    if (s->noise_on) kernel_noise(s, pulse0, n, c->range_m);
+    caster_ends(c, CAST_NOISE);
+    if (caster_wire(c, s, linear, block, at, n) != 0) echoes -= take_back(c, block, at, n);
+    caster_ends(c, CAST_POSITIONS);
+    return echoes;
+}
+
+/* dt_ns: of the run's pulses. */
+static uint32_t cast_chunk(struct caster *c, const struct cast_setup *s, const struct schedule_run *run,
+                           const uint32_t *dt_ns, uint32_t first, uint32_t n, struct line_block *block, uint32_t *at)
+{
+    struct origins from;
+    if (c->profile != NULL) c->profile->last = c->profile->now();
+    int linear = aim(c, s, run, dt_ns, first, n, &from);
+    caster_hits_from(c, s->bvh, &from, s->range_max_m, n, c->dx, c->dy, c->dz, c->range_m, c->hit);
+    memcpy(c->label, c->seen, n * sizeof *c->label);
+    if (s->beam != NULL) return beam_chunk(c, s, &from, linear, run->pulse0 + first, dt_ns + first, n, block, at);
+    const struct caster_rays rays = {
+        .dx = c->dx, .dy = c->dy, .dz = c->dz, .range_m = c->range_m, .label = c->label};
+    caster_movers(c, s, &from, &rays, n);
+    uint32_t echoes = single_chunk(c, s, linear, run->pulse0 + first, n, block, *at);
+    *at += n;
     return echoes;
 }
 
 uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
                      struct line_block *block)
 {
-    uint32_t echoes = 0;
+    uint32_t echoes = 0, at = 0;
     block->frame = run->frame;
     block->line = run->line;
     block->pulse0 = run->pulse0;
@@ -404,16 +378,18 @@ uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, cons
     block->t0_ns = run->t0_ns;
     block->line_t0_ns = run->line_t0_ns;
     block->layout = setup->layout;
-    block->n_points = run->n;
-    kernel_times(run, block->dt_ns);
+    /* With several points a pulse, the pulses' times wait at the end of the array until the points reach them. */
+    uint32_t *dt_ns = setup->beam == NULL ? block->dt_ns : block->dt_ns + block->capacity - run->n;
+    kernel_times(run, dt_ns);
     /* The first packet of a run may begin within a packet of the line; later chunks begin at one. */
     uint32_t lead = run->in_line % SCHEDULE_PACKET;
-    for (uint32_t at = 0; at < run->n;) {
+    for (uint32_t first = 0; first < run->n;) {
         uint32_t n = lead != 0 ? SCHEDULE_PACKET - lead : CHUNK;
-        if (n > run->n - at) n = run->n - at;
-        echoes += cast_chunk(caster, setup, run, block, at, n);
-        at += n;
+        if (n > run->n - first) n = run->n - first;
+        echoes += cast_chunk(caster, setup, run, dt_ns, first, n, block, &at);
+        first += n;
         lead = 0;
     }
+    block->n_points = at;
     return echoes;
 }

@@ -77,6 +77,14 @@ uint32_t kernel_geo(const double *x, const double *y, const double *z, const dou
                     uint32_t *b, uint32_t *c);
 void kernel_scale(const double *range_m, uint32_t n, double *x, double *y, double *z);
 
+/* ---- kernels_beam.c */
+/* Cosine of the incidence, 0 .. 1, on the triangles that rays meet; 1 for none. */
+void kernel_incidence(const struct bvh *bvh, const uint32_t *prim, const double *dx, const double *dy,
+                      const double *dz, uint32_t n, double *cosine);
+/* Up to where outlines may cut a footprint whose centre meets a surface at that range and incidence: beyond it by the
+ * slope of the surface, doubled, for it may bend away, and by some footprints. */
+void kernel_limits(const struct beam *beam, const double *range_m, const double *cosine, uint32_t n, double *limit_m);
+
 /* Firing times after the run's first pulse: j * quot + floor((acc + j * rem) / den). */
 void kernel_times(const struct schedule_run *run, uint32_t *dt_ns);
 

@@ -1,0 +1,194 @@
+/* Outlines by direction: every cell that a footprint can reach an edge from knows it. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/beam/outlines.h"
+#include "core/vec3.h"
+
+enum { N_CELLS = 6 * OUTLINE_CELLS * OUTLINE_CELLS };
+#define NEAREST_M 0.02 /* nearer than this, all directions are near each other */
+#define PIECE     0.1  /* the longest piece of an edge, by its distance */
+
+struct draw {
+    struct beam_outlines *o;
+    const struct beam *beam;
+    int fill; /* 0: count into first[c + 1]; 1: write at first[c]++ */
+    uint32_t edge;
+    uint64_t n;
+};
+
+static void put(struct draw *d, uint32_t cell, float range_m)
+{
+    struct beam_outlines *o = d->o;
+    d->n++;
+    if (!d->fill) {
+        o->first[cell + 1]++;
+        return;
+    }
+    o->entry[o->first[cell]++] = (struct outline_entry){range_m, d->edge};
+    if (range_m < o->nearest_m[cell]) o->nearest_m[cell] = range_m;
+}
+
+static void put_row(struct draw *d, uint32_t face, int32_t row, double from, double to, float range_m)
+{
+    int32_t i0 = (int32_t)floor(fmax(from, 0.0)), i1 = (int32_t)floor(fmin(to, OUTLINE_CELLS - 1));
+    for (int32_t i = i0; i <= i1; i++)
+        put(d, (face * OUTLINE_CELLS + (uint32_t)row) * OUTLINE_CELLS + (uint32_t)i, range_m);
+}
+
+/* A piece from p to q (in cells) and all that is within `wide` cells of it, row by row. */
+static void draw_on_face(struct draw *d, uint32_t face, const double p[2], const double q[2], double wide,
+                         float range_m)
+{
+    double low = fmin(p[1], q[1]), high = fmax(p[1], q[1]);
+    if (high + wide < 0.0 || low - wide >= OUTLINE_CELLS) return;
+    int32_t j0 = (int32_t)floor(fmax(low - wide, 0.0)), j1 = (int32_t)floor(fmin(high + wide, OUTLINE_CELLS - 1));
+    for (int32_t j = j0; j <= j1; j++) {
+        /* the part of the piece that this row can be near to */
+        double t0 = 0.0, t1 = 1.0, rise = q[1] - p[1];
+        if (fabs(rise) > 1e-9) {
+            double ta = (j - wide - p[1]) / rise, tb = (j + 1 + wide - p[1]) / rise;
+            t0 = fmax(0.0, fmin(ta, tb));
+            t1 = fmin(1.0, fmax(ta, tb));
+        }
+        if (t0 > t1) continue;
+        double x0 = p[0] + t0 * (q[0] - p[0]), x1 = p[0] + t1 * (q[0] - p[0]);
+        put_row(d, face, j, fmin(x0, x1) - wide, fmax(x0, x1) + wide, range_m);
+    }
+}
+
+/* A short piece: on each face that it or a footprint at it may reach. */
+static void draw_piece(struct draw *d, const double p[3], const double q[3], double range_m)
+{
+    const double half = 0.5 * OUTLINE_CELLS;
+    double angle = 1.02 * beam_radius(d->beam, range_m) / range_m + 1e-6;
+    for (uint32_t face = 0; face < 6; face++) {
+        int axis = (int)face / 2, ua = (axis + 1) % 3, va = (axis + 2) % 3;
+        double sign = face % 2 == 0 ? 1.0 : -1.0, zp = sign * p[axis], zq = sign * q[axis];
+        double least = 0.35 * range_m; /* a face's corner is at 0.577; a piece is short */
+        if (zp < least || zq < least) continue;
+        double a[2] = {p[ua] / zp, p[va] / zp}, b[2] = {q[ua] / zq, q[va] / zq};
+        /* on the face an angle appears larger by 1 / cos^2 from its middle */
+        double more = fmax(1.0 + a[0] * a[0] + a[1] * a[1], 1.0 + b[0] * b[0] + b[1] * b[1]);
+        double wide = 1.1 * angle * more * half + 0.01;
+        for (int i = 0; i < 2; i++) {
+            a[i] = (a[i] + 1.0) * half;
+            b[i] = (b[i] + 1.0) * half;
+        }
+        draw_on_face(d, face, a, b, wide, (float)(0.999999 * range_m));
+    }
+}
+
+static double nearest_on(const double p[3], const double q[3])
+{
+    double e[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]}, ee = vec3_dot(e, e);
+    double t = ee > 0.0 ? fmin(1.0, fmax(0.0, -vec3_dot(p, e) / ee)) : 0.0;
+    double x[3] = {p[0] + t * e[0], p[1] + t * e[1], p[2] + t * e[2]};
+    return sqrt(vec3_dot(x, x));
+}
+
+static void draw_edge(struct draw *d, const double p[3], const double q[3], double range_max_m)
+{
+    double e[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]};
+    double range_m = nearest_on(p, q), length = sqrt(vec3_dot(e, e));
+    if (range_m > range_max_m) return;
+    if (length > PIECE * fmax(range_m, NEAREST_M)) {
+        double middle[3] = {p[0] + 0.5 * e[0], p[1] + 0.5 * e[1], p[2] + 0.5 * e[2]};
+        draw_edge(d, p, middle, range_max_m);
+        draw_edge(d, middle, q, range_max_m);
+        return;
+    }
+    if (range_m > NEAREST_M) draw_piece(d, p, q, range_m);
+}
+
+static int by_range(const void *a, const void *b)
+{
+    const struct outline_entry *x = a, *y = b;
+    if (x->range_m != y->range_m) return (x->range_m > y->range_m) - (x->range_m < y->range_m);
+    return (x->edge > y->edge) - (x->edge < y->edge);
+}
+
+static uint64_t draw_all(struct beam_outlines *o, const struct beam *beam, double range_max_m, int fill)
+{
+    struct draw d = {.o = o, .beam = beam, .fill = fill};
+    for (d.edge = 0; d.edge < o->n_edges; d.edge++) {
+        double p[3], q[3];
+        for (int i = 0; i < 3; i++) {
+            p[i] = o->edge[d.edge].a[i];
+            q[i] = o->edge[d.edge].b[i];
+        }
+        draw_edge(&d, p, q, range_max_m);
+    }
+    return d.n;
+}
+
+static int fill_cells(struct beam_outlines *o, const struct beam *beam, double range_max_m, struct sh_err *err)
+{
+    uint64_t n = draw_all(o, beam, range_max_m, 0);
+    if (n >= UINT32_MAX) return sh_fail(err, SH_EINPUT, "beam: too many outlines; beam.mode: rings does without them");
+    for (uint32_t c = 0; c < N_CELLS; c++) {
+        o->first[c + 1] += o->first[c];
+        o->nearest_m[c] = INFINITY;
+    }
+    o->entry = malloc((size_t)(n + 1) * sizeof *o->entry);
+    if (o->entry == NULL) return sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");
+    draw_all(o, beam, range_max_m, 1);
+    memmove(o->first + 1, o->first, N_CELLS * sizeof *o->first); /* each stands at its end now */
+    o->first[0] = 0;
+    for (uint32_t c = 0; c < N_CELLS; c++)
+        if (o->first[c + 1] - o->first[c] > 1)
+            qsort(o->entry + o->first[c], o->first[c + 1] - o->first[c], sizeof *o->entry, by_range);
+    o->info.entries = n;
+    o->info.bytes = n * sizeof *o->entry + N_CELLS * (sizeof *o->first + sizeof *o->nearest_m) +
+                    o->n_edges * sizeof *o->edge;
+    return SH_OK;
+}
+
+int beam_outlines_create(const struct scene *scene, const double station_m[3], const struct beam *beam,
+                         double range_max_m, struct beam_outlines **out, struct sh_err *err)
+{
+    struct beam_outlines *o = calloc(1, sizeof *o);
+    *out = NULL;
+    if (o == NULL) return sh_fail(err, SH_ENOMEM, "beam: no memory");
+    o->first = calloc(N_CELLS + 1, sizeof *o->first);
+    o->nearest_m = malloc(N_CELLS * sizeof *o->nearest_m);
+    int rc = o->first == NULL || o->nearest_m == NULL ? sh_fail(err, SH_ENOMEM, "beam: no memory") : SH_OK;
+    if (rc == SH_OK) rc = outline_find(scene, station_m, &o->edge, &o->n_edges, &o->info.edges, err);
+    if (rc == SH_OK) rc = fill_cells(o, beam, range_max_m * 1.01, err);
+    if (rc != SH_OK) {
+        beam_outlines_free(o);
+        return rc;
+    }
+    o->info.outlines = o->n_edges;
+    *out = o;
+    return SH_OK;
+}
+
+void beam_outlines_free(struct beam_outlines *o)
+{
+    if (o == NULL) return;
+    free(o->edge);
+    free(o->first);
+    free(o->nearest_m);
+    free(o->entry);
+    free(o);
+}
+
+void beam_outlines_get_info(const struct beam_outlines *o, struct beam_outlines_info *info)
+{
+    *info = o->info;
+}
+
+/* The nearest edge of a cell against the range, and what a footprint adds to it at most: decided later. */
+uint32_t beam_near_outlines(const struct beam_outlines *o, const double *dx, const double *dy, const double *dz,
+                            const double *range_m, uint32_t n, uint32_t *pulse)
+{
+    uint32_t found = 0;
+    for (uint32_t i = 0; i < n; i++) {
+        float nearest_m = o->nearest_m[outline_cell(dx[i], dy[i], dz[i])];
+        pulse[found] = i;
+        found += (uint32_t)(nearest_m < (float)INFINITY) & (uint32_t)!((double)nearest_m > range_m[i]);
+    }
+    return found;
+}
