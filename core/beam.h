@@ -40,7 +40,9 @@ enum beam_select { BEAM_ALL, BEAM_FIRST, BEAM_LAST, BEAM_STRONGEST };
 
 enum {
     BEAM_MAX_RINGS = 18,
+    BEAM_FINE_RINGS = 12, /* for beam_cut: 469 places */
     BEAM_MAX_SUBRAYS = 1 + 3 * BEAM_MAX_RINGS * (BEAM_MAX_RINGS + 1),
+    BEAM_SUBRAY_ROOM = (BEAM_MAX_SUBRAYS + 63) / 64 * 64,
     BEAM_HALF_STEPS = 1024,
 };
 #define BEAM_LEAST_ENERGY 0.01 /* of the footprint's, for an echo */
@@ -50,7 +52,8 @@ struct beam {
     double exit_radius_m; /* D / 2 */
     double slope;         /* theta / 2 */
     double resolution_m;
-    double half[BEAM_HALF_STEPS + 2]; /* energy beyond a line, by its distance from the centre, -1 .. 1 */
+    /* beyond a line, by its distance from the centre, -1 .. 1: energy, and its first moment */
+    double half[BEAM_HALF_STEPS + 2], moment[BEAM_HALF_STEPS + 2];
 };
 
 /* Lengths and angles as above; the pulse width in seconds. */
@@ -68,7 +71,7 @@ void beam_half(const struct beam *beam, double h, double *energy, double *moment
 /* Places of sub-rays in the unit disc, each with 1/n of the energy. */
 struct beam_pattern {
     uint32_t n;
-    double x[BEAM_MAX_SUBRAYS], y[BEAM_MAX_SUBRAYS];
+    double x[BEAM_SUBRAY_ROOM], y[BEAM_SUBRAY_ROOM]; /* whole words of bits; behind n: nothing */
 };
 /* rings: 0 (the centre alone) to BEAM_MAX_RINGS. */
 void beam_rings(uint32_t rings, struct beam_pattern *pattern);
@@ -121,10 +124,9 @@ struct beam_outlines_info {
 };
 void beam_outlines_get_info(const struct beam_outlines *outlines, struct beam_outlines_info *info);
 
-/* Pulses whose footprint may reach an outline before range_m (plus what the footprint's size adds; NaN: at any range):
- * their indices. Returns how many. */
-uint32_t beam_near_outlines(const struct beam_outlines *outlines, const double *dx, const double *dy, const double *dz,
-                            const double *range_m, uint32_t n, uint32_t *pulse);
+/* Pulses whose footprint may reach an outline up to limit_m: their indices. Returns how many. */
+uint32_t beam_near_outlines(const struct beam_outlines *outlines, const float *dx, const float *dy, const float *dz,
+                            const float *limit_m, uint32_t n, uint32_t *pulse);
 
 enum { BEAM_MAX_LINES = 12, BEAM_MAX_PARTS = 64 };
 
@@ -133,7 +135,8 @@ struct beam_line {
     double n[2], h;
 };
 /* The outlines that cross the footprint of a pulse nearer than limit_m. Returns their number, up to BEAM_MAX_LINES, or
- * BEAM_MAX_LINES + 1: more than that. *reached_m: the nearest that was left out for its range (INFINITY: none). */
+ * BEAM_MAX_LINES + 1: more than that. *next_m: from which range on there may be more (INFINITY: none, or nothing crosses
+ * it up to limit_m). */
 uint32_t beam_find_lines(const struct beam_outlines *outlines, const struct beam *beam, const double dir[3],
                          double limit_m, struct beam_line *line, double *next_m);
 

@@ -37,6 +37,13 @@ static double between(double from, double to)
     return sum * step / 3.0;
 }
 
+/* By Gauss's theorem: x exp(-2 r^2) is minus a quarter of the derivative of exp(-2 r^2) by x. */
+static double moment_beyond(double h)
+{
+    const double scale = 2.0 / (M_PI * (1.0 - exp(-2.0)));
+    return 0.25 * (across(h) - scale * exp(-2.0) * 2.0 * sqrt(fmax(0.0, 1.0 - h * h)));
+}
+
 void beam_init(struct beam *beam, double exit_m, double divergence_rad, double pulse_width_s)
 {
     memset(beam, 0, sizeof *beam);
@@ -47,6 +54,8 @@ void beam_init(struct beam *beam, double exit_m, double divergence_rad, double p
         double h = 2.0 * i / BEAM_HALF_STEPS - 1.0;
         beam->half[i] = beam->half[i + 1] + between(h, h + 2.0 / BEAM_HALF_STEPS);
     }
+    for (int i = 0; i <= BEAM_HALF_STEPS; i++)
+        beam->moment[i] = moment_beyond(2.0 * i / BEAM_HALF_STEPS - 1.0);
     for (int i = 0; i <= BEAM_HALF_STEPS; i++)
         beam->half[i] /= beam->half[0] > 0.0 && i > 0 ? beam->half[0] : 1.0;
     beam->half[0] = 1.0;
@@ -75,22 +84,20 @@ double beam_plane_sigma(const struct beam *beam, double range_m, double cosine)
     return beam_radius(beam, range_m) * sqrt(1.0 - fmin(1.0, c * c)) / c * sqrt(0.5 * mean_t());
 }
 
-/* The moment by Gauss's theorem: x exp(-2 r^2) is minus a quarter of the derivative of exp(-2 r^2) by x. */
 void beam_half(const struct beam *beam, double h, double *energy, double *moment)
 {
-    double at = (h + 1.0) * (0.5 * BEAM_HALF_STEPS), y2 = fmax(0.0, 1.0 - h * h);
+    double at = (h + 1.0) * (0.5 * BEAM_HALF_STEPS);
     uint32_t i = at <= 0.0 ? 0 : at >= BEAM_HALF_STEPS ? BEAM_HALF_STEPS - 1 : (uint32_t)at;
     double part = at - i;
     *energy = beam->half[i] + (beam->half[i + 1] - beam->half[i]) * part;
-    const double scale = 2.0 / (M_PI * (1.0 - exp(-2.0)));
-    *moment = 0.25 * (across(h) - scale * exp(-2.0) * 2.0 * sqrt(y2));
+    *moment = beam->moment[i] + (beam->moment[i + 1] - beam->moment[i]) * part;
 }
 
 void beam_rings(uint32_t rings, struct beam_pattern *pattern)
 {
     const double all = 1.0 - exp(-2.0);
+    memset(pattern, 0, sizeof *pattern);
     pattern->n = 1 + 3 * rings * (rings + 1);
-    pattern->x[0] = pattern->y[0] = 0.0;
     for (uint32_t k = 1, at = 1; k <= rings; k++) {
         /* energy inside of the middle of this ring's annulus */
         double inside = (1.0 + 3.0 * k * (k - 1) + 3.0 * k) / pattern->n;

@@ -4,6 +4,7 @@
 
 #include "core/beam/outlines.h"
 #include "core/vec3.h"
+#include "core/vecmath.h"
 
 enum { WORDS = (BEAM_MAX_SUBRAYS + 63) / 64 };
 #define LEAST_PART 0.0005
@@ -89,27 +90,39 @@ static int is_known(const struct beam_line *line, uint32_t n, const struct beam_
     return 0;
 }
 
+/* The beam passes clear of the plane through the station and the edge: most do. The footprint is widest, as an angle,
+ * where the edge is nearest. */
+static int is_clear(const struct beam *beam, const struct outline_edge *edge, const float d[3], float range_m)
+{
+    const float exit = 1.01f * (float)beam->exit_radius_m, slope = 1.01f * (float)beam->slope;
+    float off = edge->normal[0] * d[0] + edge->normal[1] * d[1] + edge->normal[2] * d[2], away = off * range_m;
+    return away * away > exit * exit + slope * slope * range_m * range_m;
+}
+
 uint32_t beam_find_lines(const struct beam_outlines *o, const struct beam *beam, const double dir[3], double limit_m,
                          struct beam_line *line, double *next_m)
 {
-    uint32_t cell = outline_cell(dir[0], dir[1], dir[2]), n = 0;
+    uint32_t cell = outline_cell((float)dir[0], (float)dir[1], (float)dir[2]), n = 0;
+    const float d[3] = {(float)dir[0], (float)dir[1], (float)dir[2]};
     double e1[3], e2[3];
-    beam_axes(dir, e1, e2);
+    int axes = 0;
     *next_m = INFINITY;
     for (uint32_t k = o->first[cell]; k < o->first[cell + 1]; k++) {
         const struct outline_entry *entry = &o->entry[k];
         const struct outline_edge *edge = &o->edge[entry->edge];
         struct local_edge e;
         struct beam_line one;
-        if ((double)entry->range_m >= *next_m) break;
+        if ((double)entry->range_m > limit_m) {
+            *next_m = n > 0 ? (double)entry->range_m : (double)INFINITY;
+            break;
+        }
+        if (is_clear(beam, edge, d, entry->range_m)) continue;
+        if (!axes) beam_axes(dir, e1, e2);
+        axes = 1;
         turn_in(edge->a, e1, e2, dir, e.a);
         turn_in(edge->b, e1, e2, dir, e.b);
         if (!clip_to_beam(beam, &e)) continue;
-        double range_m = fmin(e.a[2], e.b[2]);
-        if (range_m > limit_m) {
-            *next_m = fmin(*next_m, range_m);
-            continue;
-        }
+        if (fmin(e.a[2], e.b[2]) > limit_m) continue; /* it is nearer elsewhere */
         if (!make_line(beam, &e, &one) || is_known(line, n, &one)) continue;
         if (n == BEAM_MAX_LINES) return n + 1;
         line[n++] = one;
@@ -167,15 +180,21 @@ static int cut_caps(const struct beam *beam, const struct beam_line *line, uint3
     return 1;
 }
 
-/* Sub-rays of the fine pattern as sets of bits. */
-static void half_bits(const struct beam_pattern *fine, const struct beam_line *line, uint64_t *bits)
+/* Sub-rays of the fine pattern as sets of bits: eight truth values of a byte each make eight bits by a product that
+ * brings each to its place. Beyond the pattern's end: whatever, the sets are cut to it. */
+VEC_CLONES
+static void half_bits(const double *restrict x, const double *restrict y, double nx, double ny, double h,
+                      uint32_t words, uint64_t *restrict bits)
 {
-    for (uint32_t w = 0; w < WORDS; w++) {
-        uint32_t end = fine->n - 64 * w < 64 ? fine->n - 64 * w : 64;
+    for (uint32_t w = 0; w < words; w++) {
+        uint8_t beyond[64];
+        for (uint32_t i = 0; i < 64; i++)
+            beyond[i] = x[64 * w + i] * nx + y[64 * w + i] * ny > h;
         uint64_t word = 0;
-        for (uint32_t i = 0; i < end && 64 * w < fine->n; i++) {
-            double off = fine->x[64 * w + i] * line->n[0] + fine->y[64 * w + i] * line->n[1];
-            word |= (uint64_t)(off > line->h) << i;
+        for (uint32_t i = 0; i < 8; i++) {
+            uint64_t eight;
+            memcpy(&eight, beyond + 8 * i, sizeof eight);
+            word |= (eight * 0x0102040810204080ULL) >> 56 << (8 * i);
         }
         bits[w] = word;
     }
@@ -185,7 +204,7 @@ static void sum_part(const struct beam_pattern *fine, const uint64_t *bits, stru
 {
     double mx = 0.0, my = 0.0, each = 1.0 / fine->n;
     uint32_t n = 0;
-    for (uint32_t w = 0; w < WORDS; w++)
+    for (uint32_t w = 0; 64 * w < fine->n; w++)
         for (uint64_t left = bits[w]; left != 0; left &= left - 1, n++) {
             uint32_t i = 64 * w + (uint32_t)__builtin_ctzll(left);
             mx += fine->x[i];
@@ -197,22 +216,22 @@ static void sum_part(const struct beam_pattern *fine, const uint64_t *bits, stru
 static int cut_bits(const struct beam_pattern *fine, const struct beam_line *line, uint32_t n, struct beam_parts *parts)
 {
     uint64_t part[BEAM_MAX_PARTS][WORDS], half[WORDS];
-    uint32_t n_parts = 1;
-    for (uint32_t w = 0; w < WORDS; w++)
+    uint32_t n_parts = 1, words = (fine->n + 63) / 64;
+    for (uint32_t w = 0; w < words; w++)
         part[0][w] = 64 * (w + 1) <= fine->n  ? ~(uint64_t)0
                      : 64 * w < fine->n ? ((uint64_t)1 << (fine->n % 64)) - 1
                                         : 0;
     for (uint32_t i = 0; i < n; i++) {
-        half_bits(fine, &line[i], half);
+        half_bits(fine->x, fine->y, line[i].n[0], line[i].n[1], line[i].h, words, half);
         for (uint32_t p = 0, end = n_parts; p < end; p++) {
             uint64_t beyond = 0, before = 0;
-            for (uint32_t w = 0; w < WORDS; w++) {
+            for (uint32_t w = 0; w < words; w++) {
                 beyond |= part[p][w] & half[w];
                 before |= part[p][w] & ~half[w];
             }
             if (beyond == 0 || before == 0) continue;
             if (n_parts == BEAM_MAX_PARTS) return 1;
-            for (uint32_t w = 0; w < WORDS; w++) {
+            for (uint32_t w = 0; w < words; w++) {
                 part[n_parts][w] = part[p][w] & half[w];
                 part[p][w] &= ~half[w];
             }

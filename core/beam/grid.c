@@ -5,8 +5,9 @@
 
 #include "core/beam/outlines.h"
 #include "core/vec3.h"
+#include "core/vecmath.h"
 
-enum { N_CELLS = 6 * OUTLINE_CELLS * OUTLINE_CELLS };
+enum { N_CELLS = 6 * OUTLINE_CELLS * OUTLINE_CELLS, BLOCK = 256 };
 #define NEAREST_M 0.02 /* nearer than this, all directions are near each other */
 #define PIECE     0.1  /* the longest piece of an edge, by its distance */
 
@@ -27,14 +28,14 @@ static void put(struct draw *d, uint32_t cell, float range_m)
         return;
     }
     o->entry[o->first[cell]++] = (struct outline_entry){range_m, d->edge};
-    if (range_m < o->nearest_m[cell]) o->nearest_m[cell] = range_m;
+    if (!(range_m >= o->nearest_m[cell])) o->nearest_m[cell] = range_m;
 }
 
 static void put_row(struct draw *d, uint32_t face, int32_t row, double from, double to, float range_m)
 {
     int32_t i0 = (int32_t)floor(fmax(from, 0.0)), i1 = (int32_t)floor(fmin(to, OUTLINE_CELLS - 1));
     for (int32_t i = i0; i <= i1; i++)
-        put(d, (face * OUTLINE_CELLS + (uint32_t)row) * OUTLINE_CELLS + (uint32_t)i, range_m);
+        put(d, outline_place(face, (uint32_t)i, (uint32_t)row), range_m);
 }
 
 /* A piece from p to q (in cells) and all that is within `wide` cells of it, row by row. */
@@ -129,7 +130,7 @@ static int fill_cells(struct beam_outlines *o, const struct beam *beam, double r
     if (n >= UINT32_MAX) return sh_fail(err, SH_EINPUT, "beam: too many outlines; beam.mode: rings does without them");
     for (uint32_t c = 0; c < N_CELLS; c++) {
         o->first[c + 1] += o->first[c];
-        o->nearest_m[c] = INFINITY;
+        o->nearest_m[c] = NAN; /* nearer than nothing */
     }
     o->entry = malloc((size_t)(n + 1) * sizeof *o->entry);
     if (o->entry == NULL) return sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");
@@ -180,15 +181,55 @@ void beam_outlines_get_info(const struct beam_outlines *o, struct beam_outlines_
     *info = o->info;
 }
 
-/* The nearest edge of a cell against the range, and what a footprint adds to it at most: decided later. */
-uint32_t beam_near_outlines(const struct beam_outlines *o, const double *dx, const double *dy, const double *dz,
-                            const double *range_m, uint32_t n, uint32_t *pulse)
+VEC_CLONES
+static void cells_of(const float *restrict dx, const float *restrict dy, const float *restrict dz, uint32_t n,
+                     uint32_t *restrict cell)
+{
+    for (uint32_t i = 0; i < n; i++)
+        cell[i] = outline_cell(dx[i], dy[i], dz[i]);
+}
+
+VEC_CLONES
+static uint32_t near_of(const float *restrict nearest_m, const uint32_t *restrict cell, const float *restrict limit_m,
+                        uint32_t n, uint8_t *restrict near)
 {
     uint32_t found = 0;
     for (uint32_t i = 0; i < n; i++) {
-        float nearest_m = o->nearest_m[outline_cell(dx[i], dy[i], dz[i])];
-        pulse[found] = i;
-        found += (uint32_t)(nearest_m < (float)INFINITY) & (uint32_t)!((double)nearest_m > range_m[i]);
+        uint32_t is = nearest_m[cell[i]] <= limit_m[i];
+        near[i] = (uint8_t)is;
+        found += is;
+    }
+    return found;
+}
+
+/* What looking for lines is going to read, step by step for all pulses at once. */
+static void prefetch(const struct beam_outlines *o, const uint32_t *cell, uint32_t n)
+{
+    for (uint32_t k = 0; k < n; k++)
+        __builtin_prefetch(&o->first[cell[k]], 0, 3);
+    for (uint32_t k = 0; k < n; k++)
+        __builtin_prefetch(&o->entry[o->first[cell[k]]], 0, 3);
+    for (uint32_t k = 0; k < n; k++)
+        for (uint32_t i = o->first[cell[k]], end = o->first[cell[k] + 1]; i < end && i < o->first[cell[k]] + 2; i++)
+            __builtin_prefetch(&o->edge[o->entry[i].edge], 0, 3);
+}
+
+/* The nearest edge of a cell against the range, and what a footprint adds to it at most: decided later. */
+uint32_t beam_near_outlines(const struct beam_outlines *o, const float *dx, const float *dy, const float *dz,
+                            const float *limit_m, uint32_t n, uint32_t *pulse)
+{
+    uint32_t cell[BLOCK], near_cell[BLOCK + 1], found = 0;
+    uint8_t near[BLOCK];
+    for (uint32_t at = 0; at < n; at += BLOCK) {
+        uint32_t part = n - at < BLOCK ? n - at : BLOCK, before = found;
+        cells_of(dx + at, dy + at, dz + at, part, cell);
+        if (near_of(o->nearest_m, cell, limit_m + at, part, near) == 0) continue;
+        for (uint32_t i = 0; i < part; i++) {
+            pulse[found] = at + i;
+            near_cell[found - before] = cell[i];
+            found += near[i];
+        }
+        prefetch(o, near_cell, found - before);
     }
     return found;
 }

@@ -7,11 +7,11 @@
 
 #include "core/beam.h"
 
-enum { OUTLINE_CELLS = 768 }; /* along a face: 2.6 mrad in its middle, half of that in its corners */
+enum { OUTLINE_CELLS = 512 }; /* along a face: 2.6 mrad in its middle, half of that in its corners */
 
-/* An edge's ends, from the station. */
+/* An edge's ends, from the station, and the unit normal of the plane through all three. */
 struct outline_edge {
-    float a[3], b[3];
+    float a[3], b[3], normal[3];
 };
 
 struct outline_entry {
@@ -23,7 +23,7 @@ struct beam_outlines {
     uint32_t n_edges;
     struct outline_edge *edge;
     uint32_t *first;     /* entries of cell c: first[c] .. first[c + 1] */
-    float *nearest_m;    /* of each cell; INFINITY: it leads to none */
+    float *nearest_m;    /* of each cell; NaN: it leads to none */
     struct outline_entry *entry; /* by range */
     struct beam_outlines_info info;
 };
@@ -32,33 +32,27 @@ struct beam_outlines {
 int outline_find(const struct scene *scene, const double station_m[3], struct outline_edge **edge, uint32_t *n,
                  uint64_t *n_edges, struct sh_err *err);
 
-static inline uint32_t outline_cell(double dx, double dy, double dz)
+/* Cells lie in tiles of 4 x 4: nearest_m of a tile is one cache line. */
+static inline uint32_t outline_place(uint32_t face, uint32_t i, uint32_t j)
 {
-    const double ax = __builtin_fabs(dx), ay = __builtin_fabs(dy), az = __builtin_fabs(dz);
-    const double half = 0.5 * OUTLINE_CELLS;
-    double main, u, v;
-    uint32_t face;
-    if (ax >= ay && ax >= az) {
-        main = ax;
-        u = dy;
-        v = dz;
-        face = dx < 0.0;
-    } else if (ay >= az) {
-        main = ay;
-        u = dz;
-        v = dx;
-        face = 2 + (dy < 0.0);
-    } else {
-        main = az;
-        u = dx;
-        v = dy;
-        face = 4 + (dz < 0.0);
-    }
-    double scale = half / main;
-    uint32_t i = (uint32_t)(u * scale + half), j = (uint32_t)(v * scale + half);
+    const uint32_t tiles = OUTLINE_CELLS / 4;
+    return ((face * tiles + j / 4) * tiles + i / 4) * 16 + j % 4 * 4 + i % 4;
+}
+
+/* In float: the cells know what is a hundredth of a cell beside them, too. */
+static inline __attribute__((always_inline)) uint32_t outline_cell(float dx, float dy, float dz)
+{
+    const float ax = __builtin_fabsf(dx), ay = __builtin_fabsf(dy), az = __builtin_fabsf(dz);
+    const float half = 0.5f * OUTLINE_CELLS;
+    uint32_t is_x = (ax >= ay) & (ax >= az), is_y = (ay >= az) & !is_x;
+    float along = is_x ? dx : is_y ? dy : dz;
+    float u = is_x ? dy : is_y ? dz : dx, v = is_x ? dz : is_y ? dx : dy;
+    uint32_t face = (is_x ? 0U : is_y ? 2U : 4U) + (along < 0.0f);
+    float scale = half / __builtin_fabsf(along);
+    int32_t i = (int32_t)(u * scale + half), j = (int32_t)(v * scale + half);
     i = i < OUTLINE_CELLS ? i : OUTLINE_CELLS - 1;
     j = j < OUTLINE_CELLS ? j : OUTLINE_CELLS - 1;
-    return (face * OUTLINE_CELLS + j) * OUTLINE_CELLS + i;
+    return outline_place(face, (uint32_t)i, (uint32_t)j);
 }
 
 #endif

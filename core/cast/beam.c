@@ -13,6 +13,7 @@ enum {
     POOL = 8 * CHUNK, /* sub-rays worked on at a time */
     MAX_JOBS = 256,   /* pulses with sub-rays, likewise */
     MAX_PASSES = 4,
+    ECHO_SHIFT = 56, /* pulse numbers stay below */
 };
 
 /* Sub-rays; those of a job lie together. */
@@ -26,22 +27,25 @@ struct pool {
 /* A pulse that one ray does not do for. */
 struct job {
     uint32_t pulse, first, n; /* its sub-rays */
-    int again;                /* more outlines have come into play */
-    double next_m;            /* the nearest outline that was left out */
+    uint32_t lines;           /* outlines that cut it */
+    double next_m;            /* from where on outlines were left out */
     struct beam_return centre; /* known without a ray; energy 0: none */
     double e1[3], e2[3]; /* across the beam */
 };
 
 struct beam_work {
-    double cosine[CHUNK], limit_m[CHUNK];
-    uint32_t near[CHUNK];
+    float steep[CHUNK], limit_m[CHUNK];
+    uint32_t near[CHUNK]; /* pulses with sub-rays */
     struct job job[MAX_JOBS];
     uint32_t n_jobs;
     struct pool pool;
     struct beam_return returns[BEAM_MAX_SUBRAYS + 1];
-    struct beam_echoes some, echoes; /* of pulses with sub-rays; of all */
+    struct beam_echoes some; /* of pulses with sub-rays */
     /* per pulse, while c holds what is per point */
-    double mirror_turn[CHUNK], pan_turn[CHUNK], ex[CHUNK], ey[CHUNK], ez[CHUNK], px[CHUNK], py[CHUNK], pz[CHUNK];
+    double range_m[CHUNK], mirror_turn[CHUNK], pan_turn[CHUNK];
+    double ex[CHUNK], ey[CHUNK], ez[CHUNK], px[CHUNK], py[CHUNK], pz[CHUNK];
+    uint32_t label[CHUNK];
+    uint64_t counter[CHUNK]; /* of the points' random numbers */
 };
 
 int beam_work_create(struct beam_work **out, struct sh_err *err)
@@ -49,9 +53,7 @@ int beam_work_create(struct beam_work **out, struct sh_err *err)
     struct beam_work *w = *out = aligned_alloc(64, (sizeof *w + 63) / 64 * 64); /* not touched until there is a beam */
     if (w == NULL) return sh_fail(err, SH_ENOMEM, "cast: no memory for a caster");
     memset(&w->some, 0, sizeof w->some);
-    memset(&w->echoes, 0, sizeof w->echoes);
     int rc = beam_echoes_alloc(&w->some, CHUNK * (LINE_MAX_ECHOES + 1), err);
-    if (rc == SH_OK) rc = beam_echoes_alloc(&w->echoes, CHUNK * (LINE_MAX_ECHOES + 1), err);
     if (rc != SH_OK) {
         beam_work_free(w);
         *out = NULL;
@@ -63,7 +65,6 @@ void beam_work_free(struct beam_work *w)
 {
     if (w == NULL) return;
     beam_echoes_free(&w->some);
-    beam_echoes_free(&w->echoes);
     free(w);
 }
 
@@ -121,7 +122,7 @@ static int known_centre(const struct caster *c, const struct cast_setup *s, cons
     uint32_t p = job->pulse;
     struct beam_return *r = &job->centre;
     if (isnan(c->range_m[p])) return 1; /* nothing there */
-    if (c->beam->cosine[p] < 0.02 || c->hit[p] == CAST_NO_TRIANGLE) return 0;
+    if (c->beam->steep[p] > 2500.0f) return 0;
     const struct bvh_triangle *tri = &s->bvh->triangle[c->hit[p]];
     const double dir[3] = {c->dx[p], c->dy[p], c->dz[p]};
     double origin[3], out[3];
@@ -131,25 +132,27 @@ static int known_centre(const struct caster *c, const struct cast_setup *s, cons
         origin[i] -= s->bvh->origin_m[i];
     r->range_m = (tri->d - vec3_dot(tri->n, origin)) / vec3_dot(tri->n, out);
     r->energy = energy;
-    r->cosine = (float)c->beam->cosine[p];
+    r->cosine = 1.0f / sqrtf(c->beam->steep[p]);
     r->triangle = c->hit[p];
     r->label = c->label[p];
     return 1;
 }
 
-/* The rays that a pulse needs, given the outlines up to limit_m. Returns 0 where the central one will do. */
+/* The rays that a pulse needs, given the outlines up to limit_m. Returns 0 where those of `known` outlines will do, or
+ * (0) the central one. */
 static int plan_job(struct caster *c, const struct cast_setup *s, const struct origins *from, struct job *job,
-                    double limit_m)
+                    double limit_m, uint32_t known)
 {
     const struct cast_beam *b = s->beam;
     const double dir[3] = {c->dx[job->pulse], c->dy[job->pulse], c->dz[job->pulse]};
     struct beam_line line[BEAM_MAX_LINES];
     struct beam_parts parts;
+    uint32_t lines = beam_find_lines(b->outlines, &b->beam, dir, limit_m, line, &job->next_m);
+    if (lines == known) return 0;
+    job->lines = lines;
     job->first = c->beam->pool.n;
     job->n = 0;
     job->centre.energy = 0.0;
-    uint32_t lines = beam_find_lines(b->outlines, &b->beam, dir, limit_m, line, &job->next_m);
-    if (lines == 0) return 0;
     beam_axes(dir, job->e1, job->e2);
     if (lines > BEAM_MAX_LINES || beam_cut(&b->beam, &b->fine, line, lines, &parts) != 0) {
         add_pattern(c, b, from, job);
@@ -197,7 +200,7 @@ static void look_behind(struct caster *c, const struct cast_setup *s, const stru
         for (uint32_t i = job->first; i < job->first + job->n; i++)
             far_m = isnan(w->pool.range_m[i]) ? (double)INFINITY : fmax(far_m, w->pool.range_m[i]);
         double limit_m = far_m + 4.0 * beam_radius(&s->beam->beam, far_m);
-        if (job->next_m < limit_m) plan_job(c, s, from, job, limit_m);
+        if (job->next_m < limit_m) plan_job(c, s, from, job, limit_m, job->lines);
     }
     if (w->pool.n != first) cast_pool(c, s, first);
 }
@@ -239,7 +242,10 @@ static uint32_t sub_rays(struct caster *c, const struct cast_setup *s, const str
     int adaptive = b->mode == BEAM_ADAPTIVE;
     uint32_t reserve = !adaptive || b->pattern.n > BEAM_MAX_PARTS ? b->pattern.n : BEAM_MAX_PARTS, cut = 0;
     uint32_t candidates = n;
-    if (adaptive) candidates = beam_near_outlines(b->outlines, c->dx, c->dy, c->dz, w->limit_m, n, w->near);
+    if (adaptive) {
+        kernel_limits(&b->beam, c->range_m, w->steep, n, w->limit_m);
+        candidates = beam_near_outlines(b->outlines, c->fx, c->fy, c->fz, w->limit_m, n, w->near);
+    }
     w->n_jobs = w->pool.n = w->some.n = 0;
     for (uint32_t k = 0; k < candidates; k++) {
         struct job *job = &w->job[w->n_jobs];
@@ -252,7 +258,7 @@ static uint32_t sub_rays(struct caster *c, const struct cast_setup *s, const str
             job->centre.energy = 0.0;
             beam_axes(dir, job->e1, job->e2);
             add_pattern(c, b, from, job);
-        } else if (!plan_job(c, s, from, job, w->limit_m[job->pulse])) {
+        } else if (!plan_job(c, s, from, job, (double)w->limit_m[job->pulse], 0)) {
             continue;
         }
         w->near[cut++] = job->pulse;
@@ -264,59 +270,26 @@ static uint32_t sub_rays(struct caster *c, const struct cast_setup *s, const str
     return cut;
 }
 
-/* One ray for all of a footprint on one plane. */
-static void add_single(const struct caster *c, const struct cast_setup *s, uint32_t i, struct beam_echoes *e)
+static void copy_echo(struct beam_echoes *e, uint32_t to, uint32_t from)
 {
-    if (isnan(c->range_m[i])) return;
-    uint32_t at = e->n++;
-    double cosine = c->beam->cosine[i];
-    const struct beam *beam = &s->beam->beam;
-    double sigma_m = 2.3548 * beam_plane_sigma(beam, c->range_m[i], cosine);
-    e->pulse[at] = i;
-    e->range_m[at] = c->range_m[i] + beam_plane_excess(beam, c->range_m[i], cosine);
-    e->energy[at] = 1.0f;
-    e->cosine[at] = (float)cosine;
-    e->width_m[at] = (float)sqrt(beam->resolution_m * beam->resolution_m + sigma_m * sigma_m);
-    e->triangle[at] = c->hit[i];
-    e->label[at] = c->label[i];
+    e->pulse[to] = e->pulse[from];
+    e->range_m[to] = e->range_m[from];
+    e->energy[to] = e->energy[from];
+    e->cosine[to] = e->cosine[from];
+    e->width_m[to] = e->width_m[from];
+    e->triangle[to] = e->triangle[from];
+    e->label[to] = e->label[from];
 }
 
-static void copy_echo(struct beam_echoes *to, uint32_t at, const struct beam_echoes *from, uint32_t i)
-{
-    to->pulse[at] = from->pulse[i];
-    to->range_m[at] = from->range_m[i];
-    to->energy[at] = from->energy[i];
-    to->cosine[at] = from->cosine[i];
-    to->width_m[at] = from->width_m[i];
-    to->triangle[at] = from->triangle[i];
-    to->label[at] = from->label[i];
-}
-
-/* Pulses with sub-rays and the others, in order. */
-static void gather_echoes(struct caster *c, const struct cast_setup *s, uint32_t n, uint32_t cut)
-{
-    struct beam_work *w = c->beam;
-    uint32_t k = 0, i = 0;
-    w->echoes.n = 0;
-    for (uint32_t p = 0; p < n; p++) {
-        if (k == cut || w->near[k] != p) {
-            add_single(c, s, p, &w->echoes);
-            continue;
-        }
-        k++;
-        while (i < w->some.n && w->some.pulse[i] == p)
-            copy_echo(&w->echoes, w->echoes.n++, &w->some, i++);
-    }
-}
-
-/* ---- THE PLACE FOR DETECTION: amplitude, threshold and reflectance of the list's echoes go here; what is below the
- * threshold is dropped by leaving it out, as echoes out of the head's range are. */
+/* ---- THE PLACE FOR DETECTION: of pulses with sub-rays here, by their echoes' range, cosine, energy and label; of the
+ * others in write_piece, from the ranges in c. What is not detected is left out, as echoes out of the head's range are.
+ */
 static void detect_echoes(const struct cast_setup *s, struct beam_echoes *e)
 {
     uint32_t kept = 0;
     for (uint32_t i = 0; i < e->n; i++)
         if (e->range_m[i] >= s->range_min_m && e->range_m[i] <= s->range_max_m) {
-            if (kept != i) copy_echo(e, kept, e, i);
+            if (kept != i) copy_echo(e, kept, i);
             kept++;
         }
     e->n = kept;
@@ -333,34 +306,12 @@ static uint32_t choose(const struct beam_echoes *e, enum beam_select select, uin
     return best;
 }
 
-/* Points of up to CHUNK entries: number byte, label, pulse; ranges in c. */
-struct points {
-    uint32_t n, pulse[CHUNK];
-};
-
-static void restore(struct caster *c, const struct cast_setup *s, const struct points *points)
-{
-    const struct beam_work *w = c->beam;
-    for (uint32_t i = 0; i < points->n; i++) {
-        c->mirror_turn[i] = w->mirror_turn[points->pulse[i]];
-        c->pan_turn[i] = w->pan_turn[points->pulse[i]];
-    }
-    for (uint32_t i = 0; i < points->n && s->layout == LINE_GEO; i++) {
-        c->ex[i] = w->ex[points->pulse[i]];
-        c->ey[i] = w->ey[points->pulse[i]];
-        c->ez[i] = w->ez[points->pulse[i]];
-    }
-    for (uint32_t i = 0; i < points->n && s->n_knots != 0; i++) {
-        c->moving.px[i] = w->px[points->pulse[i]];
-        c->moving.py[i] = w->py[points->pulse[i]];
-        c->moving.pz[i] = w->pz[points->pulse[i]];
-    }
-}
-
 static void keep(struct caster *c, const struct cast_setup *s, uint32_t n)
 {
     struct beam_work *w = c->beam;
     const size_t bytes = n * sizeof(double);
+    memcpy(w->range_m, c->range_m, bytes);
+    memcpy(w->label, c->label, n * sizeof *w->label);
     memcpy(w->mirror_turn, c->mirror_turn, bytes);
     memcpy(w->pan_turn, c->pan_turn, bytes);
     if (s->layout == LINE_GEO) {
@@ -372,6 +323,25 @@ static void keep(struct caster *c, const struct cast_setup *s, uint32_t n)
         memcpy(w->px, c->moving.px, bytes);
         memcpy(w->py, c->moving.py, bytes);
         memcpy(w->pz, c->moving.pz, bytes);
+    }
+}
+
+/* What pulses p .. p + n - 1 have in common with their points at k .. */
+static void restore(struct caster *c, const struct cast_setup *s, uint32_t p, uint32_t n, uint32_t k)
+{
+    const struct beam_work *w = c->beam;
+    const size_t bytes = n * sizeof(double);
+    memcpy(c->mirror_turn + k, w->mirror_turn + p, bytes);
+    memcpy(c->pan_turn + k, w->pan_turn + p, bytes);
+    if (s->layout == LINE_GEO) {
+        memcpy(c->ex + k, w->ex + p, bytes);
+        memcpy(c->ey + k, w->ey + p, bytes);
+        memcpy(c->ez + k, w->ez + p, bytes);
+    }
+    if (s->n_knots != 0) {
+        memcpy(c->moving.px + k, w->px + p, bytes);
+        memcpy(c->moving.py + k, w->py + p, bytes);
+        memcpy(c->moving.pz + k, w->pz + p, bytes);
     }
 }
 
@@ -406,6 +376,7 @@ static uint32_t drop_unfit(struct caster *c, struct line_block *b, uint32_t at, 
     return to - at;
 }
 
+/* Points on their way into the block, CHUNK at most at a time. */
 struct writer {
     struct caster *c;
     const struct cast_setup *s;
@@ -413,87 +384,120 @@ struct writer {
     const uint32_t *dt_ns;
     uint64_t pulse0;
     int linear;
-    uint32_t *at, echoes;
-    struct points points;
+    uint32_t at; /* the piece's first entry */
+    uint32_t n, n_numbers, echoes;
+    uint16_t numbered[CHUNK]; /* points of pulses with several */
+    uint8_t number[CHUNK];
 };
 
-static void flush(struct writer *w)
-{
-    struct points *p = &w->points;
-    uint32_t at = *w->at, n = p->n, echoes = 0;
-    if (n == 0) return;
-    restore(w->c, w->s, p);
-    for (uint32_t i = 0; i < n; i++) {
-        w->block->refl_cdb[at + i] = LINE_REFL_NONE;
-        echoes += w->block->echo[at + i] != 0;
-    }
-    if (caster_wire(w->c, w->s, w->linear, w->block, at, n) != 0) {
-        echoes = 0;
-        n = drop_unfit(w->c, w->block, at, n, &echoes);
-    }
-    w->echoes += echoes;
-    *w->at += n;
-    p->n = 0;
-}
-
-/* One entry; the noise is keyed by pulse and echo, the first echo's as that of a single ray. */
-static void write_point(struct writer *w, uint32_t pulse, const struct beam_echoes *e, uint32_t i, uint8_t number)
+/* Keyed by pulse and echo; the first echo's is that of a single ray. */
+static void write_noise(struct writer *w, uint32_t n)
 {
     const struct cast_setup *s = w->s;
-    uint32_t k = w->points.n++, at = *w->at + k;
-    double range_m = number != 0 ? e->range_m[i] : (double)NAN;
-    if (number != 0 && s->noise_on) {
-        uint64_t counter = w->pulse0 + pulse + ((uint64_t)((number & 15) - 1) << 56);
-        range_m += (s->range_sigma_m + 1e-6 * s->range_sigma_ppm * range_m) * rng_normal(s->noise_key, counter);
-    }
-    w->points.pulse[k] = pulse;
-    w->c->range_m[k] = range_m;
-    w->block->dt_ns[at] = w->dt_ns[pulse];
-    w->block->echo[at] = number;
-    w->block->label[at] = number != 0 ? (uint16_t)e->label[i] : (uint16_t)LINE_LABEL_NONE;
+    double *range_m = w->c->range_m;
+    for (uint32_t i = 0; i < n; i++)
+        range_m[i] += (s->range_sigma_m + 1e-6 * s->range_sigma_ppm * range_m[i]) *
+                      rng_normal(s->noise_key, w->c->beam->counter[i]);
 }
 
-/* Echoes of the chunk, pulse by pulse. All of a pulse go into one piece. */
-static void write_points(struct writer *w, const struct beam_echoes *e, uint32_t n)
+static void write_piece(struct writer *w)
 {
-    for (uint32_t p = 0, i = 0, end; p < n; p++, i = end) {
+    struct caster *c = w->c;
+    struct line_block *b = w->block;
+    uint32_t n = w->n;
+    if (n == 0) return;
+    uint32_t echoes = kernel_detect(c->range_m, w->s->range_min_m, w->s->range_max_m, n, b->echo + w->at);
+    kernel_labels(c->label, b->echo + w->at, n, b->label + w->at);
+    for (uint32_t i = 0; i < n; i++)
+        b->refl_cdb[w->at + i] = LINE_REFL_NONE;
+    for (uint32_t i = 0; i < w->n_numbers; i++)
+        b->echo[w->at + w->numbered[i]] = w->number[i];
+    if (w->s->noise_on) write_noise(w, n);
+    if (caster_wire(c, w->s, w->linear, b, w->at, n) != 0) {
+        echoes = 0;
+        n = drop_unfit(c, b, w->at, n, &echoes);
+    }
+    w->echoes += echoes;
+    w->at += n;
+    w->n = w->n_numbers = 0;
+}
+
+/* Pulses p .. end - 1, of one point each, whose ranges and labels are kept. */
+static void write_plain(struct writer *w, uint32_t p, uint32_t end)
+{
+    const struct beam_work *kept = w->c->beam;
+    while (p < end) {
+        if (w->n == CHUNK) write_piece(w);
+        uint32_t n = end - p < CHUNK - w->n ? end - p : CHUNK - w->n, k = w->n;
+        restore(w->c, w->s, p, n, k);
+        memcpy(w->c->range_m + k, kept->range_m + p, n * sizeof(double));
+        memcpy(w->c->label + k, kept->label + p, n * sizeof(uint32_t));
+        memmove(w->block->dt_ns + w->at + k, w->dt_ns + p, n * sizeof(uint32_t));
+        if (w->s->noise_on)
+            for (uint32_t i = 0; i < n; i++)
+                w->c->beam->counter[k + i] = w->pulse0 + p + i;
+        w->n += n;
+        p += n;
+    }
+}
+
+/* A pulse of several. */
+static void write_several(struct writer *w, uint32_t p, const struct beam_echoes *e, uint32_t first, uint32_t count)
+{
+    if (w->n + count > CHUNK) write_piece(w);
+    for (uint32_t i = 0; i < count; i++) {
+        uint32_t k = w->n++;
+        restore(w->c, w->s, p, 1, k);
+        w->c->range_m[k] = e->range_m[first + i];
+        w->c->label[k] = e->label[first + i];
+        w->block->dt_ns[w->at + k] = w->dt_ns[p];
+        w->c->beam->counter[k] = w->pulse0 + p + ((uint64_t)i << ECHO_SHIFT);
+        w->numbered[w->n_numbers] = (uint16_t)k;
+        w->number[w->n_numbers++] = (uint8_t)((i + 1) | count << 4);
+    }
+}
+
+/* All pulses of a chunk; those with sub-rays are near[0 .. cut - 1], their echoes in e. */
+static void write_points(struct writer *w, const struct beam_echoes *e, uint32_t n, uint32_t cut)
+{
+    struct beam_work *kept = w->c->beam;
+    uint32_t from = 0;
+    for (uint32_t k = 0, i = 0, end; k < cut; k++, i = end) {
+        uint32_t p = kept->near[k];
         for (end = i; end < e->n && e->pulse[end] == p;)
             end++;
-        if (w->points.n + LINE_MAX_ECHOES > CHUNK) flush(w);
-        uint32_t count = end - i;
-        if (count == 0)
-            write_point(w, p, e, i, 0);
-        else if (count == 1 || w->s->echoes != BEAM_ALL)
-            write_point(w, p, e, choose(e, w->s->echoes, i, end), 0x11);
-        else
-            for (uint32_t k = 0; k < count; k++)
-                write_point(w, p, e, i + k, (uint8_t)((k + 1) | count << 4));
+        if (end - i > 1 && w->s->echoes == BEAM_ALL) {
+            write_plain(w, from, p);
+            write_several(w, p, e, i, end - i);
+            from = p + 1;
+            continue;
+        }
+        uint32_t one = end == i ? 0 : choose(e, w->s->echoes, i, end);
+        kept->range_m[p] = end == i ? (double)NAN : e->range_m[one];
+        if (end != i) kept->label[p] = e->label[one];
     }
-    flush(w);
+    write_plain(w, from, n);
+    write_piece(w);
 }
 
 uint32_t beam_chunk(struct caster *c, const struct cast_setup *s, const struct origins *from, int linear,
                     uint64_t pulse0, const uint32_t *dt_ns, uint32_t n, struct line_block *block, uint32_t *at)
 {
     struct beam_work *w = c->beam;
-    struct writer writer = {
-        .c = c, .s = s, .block = block, .dt_ns = dt_ns, .pulse0 = pulse0, .linear = linear, .at = at};
-    const struct caster_rays rays = {.dx = c->dx,
-                                     .dy = c->dy,
-                                     .dz = c->dz,
-                                     .range_m = c->range_m,
-                                     .cosine = w->cosine,
-                                     .label = c->label,
-                                     .triangle = c->hit};
-    kernel_incidence(s->bvh, c->hit, c->dx, c->dy, c->dz, n, w->cosine);
-    caster_movers(c, s, from, &rays, n);
-    kernel_limits(&s->beam->beam, c->range_m, w->cosine, n, w->limit_m);
+    struct writer writer = {.c = c, .s = s, .block = block, .dt_ns = dt_ns, .pulse0 = pulse0, .linear = linear};
+    writer.at = *at;
     uint32_t cut = sub_rays(c, s, from, n);
-    gather_echoes(c, s, n, cut);
-    detect_echoes(s, &w->echoes);
+    if (s->beam->mode == BEAM_ADAPTIVE) kernel_excess(&s->beam->beam, w->steep, n, c->range_m);
+    detect_echoes(s, &w->some);
     caster_ends(c, CAST_DETECT);
     keep(c, s, n);
-    write_points(&writer, &w->echoes, n);
+    write_points(&writer, &w->some, n, cut);
     caster_ends(c, CAST_POSITIONS);
+    *at = writer.at;
     return writer.echoes;
+}
+
+float *beam_steep(struct caster *c)
+{
+    return c->beam->steep;
 }

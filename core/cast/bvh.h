@@ -92,7 +92,6 @@ struct bvh_packets {
     } at __attribute__((aligned(64)));
     float org[3], t_min; /* as set */
     uint32_t width;      /* 0: not yet */
-    int placed;          /* the origins are the rays' own, not org */
 };
 
 /* Rays of one chunk in arrays, padded to whole packets; prim is RTC_INVALID_GEOMETRY_ID for a miss. t, u, v are

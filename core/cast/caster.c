@@ -85,6 +85,7 @@ static void decide_one(struct caster *c, struct decide_ray *ray, const struct or
     hits->label[i] =
         hit.prim == RTC_INVALID_GEOMETRY_ID ? (uint32_t)LINE_LABEL_NONE : bvh_label(&ray->bvh->triangle[hit.prim]);
     hits->range_m[i] = hit.prim == RTC_INVALID_GEOMETRY_ID ? (double)NAN : hit.range_m;
+    if (hits->steep != NULL) kernel_steep(ray->bvh, hit.prim, ray->dir, &hits->steep[i]);
 }
 
 /* Doubts are few: whole packets without any are passed at once. Each costs a chain of cache misses, so they are looked
@@ -121,7 +122,7 @@ static void cast_rays(struct caster *c, struct decide_ray *ray, struct bvh_rays 
         rays->oz = m->fz;
     }
     caster_ends(c, CAST_DIRECTIONS);
-    bvh_intersect(bvh, &c->packets, rays, n);
+    bvh_intersect(bvh, from->px != NULL ? &c->placed : &c->packets, rays, n);
     caster_ends(c, CAST_EMBREE);
     uint32_t doubts = from->px != NULL ? kernel_refine_from(bvh, hits, m->ox, m->oy, m->oz, n)
                                        : kernel_refine(bvh, hits, ray->o_local, n);
@@ -149,6 +150,7 @@ void caster_hits_from(struct caster *c, const struct bvh *bvh, const struct orig
                                    .v = c->v,
                                    .range_m = range_m + at,
                                    .label = c->seen,
+                                   .steep = c->steep,
                                    .doubt = c->doubt};
         cast_rays(c, &ray, &rays, from, &hits, m);
         memcpy(triangle + at, c->prim, m * sizeof *triangle);
@@ -356,7 +358,11 @@ static uint32_t cast_chunk(struct caster *c, const struct cast_setup *s, const s
     struct origins from;
     if (c->profile != NULL) c->profile->last = c->profile->now();
     int linear = aim(c, s, run, dt_ns, first, n, &from);
+    if (s->beam != NULL && s->beam->mode == BEAM_RINGS)
+        return beam_chunk(c, s, &from, linear, run->pulse0 + first, dt_ns + first, n, block, at);
+    c->steep = s->beam != NULL ? beam_steep(c) : NULL;
     caster_hits_from(c, s->bvh, &from, s->range_max_m, n, c->dx, c->dy, c->dz, c->range_m, c->hit);
+    c->steep = NULL;
     memcpy(c->label, c->seen, n * sizeof *c->label);
     if (s->beam != NULL) return beam_chunk(c, s, &from, linear, run->pulse0 + first, dt_ns + first, n, block, at);
     const struct caster_rays rays = {

@@ -31,7 +31,7 @@ struct origins {
 struct beam_work;
 
 struct caster {
-    struct bvh_packets packets;
+    struct bvh_packets packets, placed; /* of rays from one point; each from its own */
     double mirror_turn[CHUNK], pan_turn[CHUNK];
     double dx[CHUNK], dy[CHUNK], dz[CHUNK]; /* direction of the beam, prcs */
     double ex[CHUNK], ey[CHUNK], ez[CHUNK]; /* direction as the encoders read it, then the position; geo layout */
@@ -43,6 +43,7 @@ struct caster {
     uint32_t seen[CHUNK], label[CHUNK]; /* labels of the last hits; of what counts in the end */
     struct mover_rays mover;            /* touched only where something moves */
     struct moving_rays moving;          /* touched only where the head moves */
+    float *steep;                       /* where 1 / cos^2 of the incidence goes; NULL: not asked for */
     struct beam_work *beam;             /* touched only where pulses have a footprint */
     struct cast_counters counters;
     struct cast_profile *profile;
@@ -82,7 +83,9 @@ uint32_t caster_wire(struct caster *c, const struct cast_setup *s, int linear, s
 /* ---- beam.c */
 int beam_work_create(struct beam_work **out, struct sh_err *err);
 void beam_work_free(struct beam_work *work);
-/* The central rays of n pulses have been cast: finds their echoes and writes them into the block from entry *at on.
+/* Where the incidences of central rays are to go. */
+float *beam_steep(struct caster *c);
+/* n pulses are aimed, and (adaptive) their central rays have been cast: finds their echoes and writes them into the block from entry *at on.
  * dt_ns: of these pulses. Returns the number of echoes. */
 uint32_t beam_chunk(struct caster *c, const struct cast_setup *s, const struct origins *from, int linear,
                     uint64_t pulse0, const uint32_t *dt_ns, uint32_t n, struct line_block *block, uint32_t *at);

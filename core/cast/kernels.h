@@ -23,6 +23,7 @@ struct kernel_hits {
     const float *u, *v;
     double *range_m; /* out: (d - n.o) / (n.dir) of the proposed triangle's plane; NaN for none */
     uint32_t *label; /* out: of the proposed triangle; LINE_LABEL_NONE for none */
+    float *steep;    /* out: 1 / cos^2 of the incidence, for rays from one point; NULL: not asked for */
     uint32_t *doubt; /* out: 1 where the hit is so near to the border, across the ray, that the proposal is in doubt */
 };
 /* Returns how many are in doubt. */
@@ -81,9 +82,13 @@ void kernel_scale(const double *range_m, uint32_t n, double *x, double *y, doubl
 /* Cosine of the incidence, 0 .. 1, on the triangles that rays meet; 1 for none. */
 void kernel_incidence(const struct bvh *bvh, const uint32_t *prim, const double *dx, const double *dy,
                       const double *dz, uint32_t n, double *cosine);
-/* Up to where outlines may cut a footprint whose centre meets a surface at that range and incidence: beyond it by the
- * slope of the surface, doubled, for it may bend away, and by some footprints. */
-void kernel_limits(const struct beam *beam, const double *range_m, const double *cosine, uint32_t n, double *limit_m);
+/* 1 / cos^2 for one; RTC_INVALID_GEOMETRY_ID: NaN. */
+void kernel_steep(const struct bvh *bvh, uint32_t prim, const double dir[3], float *steep);
+/* Up to where outlines may cut a footprint whose centre meets a surface at that range, and 1 / cos^2 of its incidence:
+ * beyond it by the slope of the surface, doubled and more, for it may bend away, and by some footprints. */
+void kernel_limits(const struct beam *beam, const double *range_m, const float *steep, uint32_t n, float *limit_m);
+/* Ranges of centres -> means over footprints on planes; the first term of beam_plane_excess, which has them all. */
+void kernel_excess(const struct beam *beam, const float *steep, uint32_t n, double *range_m);
 
 /* Firing times after the run's first pulse: j * quot + floor((acc + j * rem) / den). */
 void kernel_times(const struct schedule_run *run, uint32_t *dt_ns);

@@ -24,19 +24,40 @@ void kernel_incidence(const struct bvh *bvh, const uint32_t *prim, const double 
     incidence((const double *)bvh->triangle, bvh->scene->n_triangles, prim, dx, dy, dz, n, cosine);
 }
 
+void kernel_steep(const struct bvh *bvh, uint32_t prim, const double dir[3], float *steep)
+{
+    double cosine;
+    kernel_incidence(bvh, &prim, &dir[0], &dir[1], &dir[2], 1, &cosine);
+    *steep = prim < bvh->scene->n_triangles ? (float)(1.0 / (cosine * cosine)) : NAN;
+}
+
 VEC_CLONES
-static void limits(double exit2, double slope2, const double *restrict range_m, const double *restrict cosine,
-                   uint32_t n, double *restrict limit_m)
+static void limits(float exit2, float slope2, const double *restrict range_m, const float *restrict steep, uint32_t n,
+                   float *restrict limit_m)
 {
     for (uint32_t i = 0; i < n; i++) {
-        double c = cosine[i] > 1e-3 ? cosine[i] : 1e-3;
-        double radius_m = sqrt(exit2 + slope2 * range_m[i] * range_m[i]);
-        double limit = range_m[i] + radius_m * (4.0 + 3.0 * sqrt(1.0 - c * c) / c);
-        limit_m[i] = limit == limit ? limit : (double)INFINITY;
+        float range = (float)range_m[i], s = steep[i] < 1e6f ? steep[i] : 1e6f;
+        float limit = range + sqrtf(exit2 + slope2 * range * range) * (4.0f + 3.0f * sqrtf(s));
+        limit_m[i] = limit == limit ? limit : (float)INFINITY;
     }
 }
 
-void kernel_limits(const struct beam *beam, const double *range_m, const double *cosine, uint32_t n, double *limit_m)
+void kernel_limits(const struct beam *beam, const double *range_m, const float *steep, uint32_t n, float *limit_m)
 {
-    limits(beam->exit_radius_m * beam->exit_radius_m, beam->slope * beam->slope, range_m, cosine, n, limit_m);
+    limits((float)(beam->exit_radius_m * beam->exit_radius_m), (float)(beam->slope * beam->slope), range_m, steep, n,
+           limit_m);
+}
+
+VEC_CLONES
+static void excess(double scale, float most, const float *restrict steep, uint32_t n, double *restrict range_m)
+{
+    for (uint32_t i = 0; i < n; i++)
+        range_m[i] += range_m[i] * (scale * (double)(steep[i] < most ? steep[i] : most));
+}
+
+void kernel_excess(const struct beam *beam, const float *steep, uint32_t n, double *range_m)
+{
+    double s2 = beam->slope * beam->slope;
+    if (s2 == 0.0) return;
+    excess(beam_plane_excess(beam, 1.0, 1.0), (float)(0.25 / s2), steep, n, range_m);
 }

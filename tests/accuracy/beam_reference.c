@@ -122,7 +122,7 @@ int beam_rig_open(struct beam_rig *rig, struct scene *scene, const double statio
         .pan_stop_udeg = llround(view->pan_stop_deg * 1e6)};
     schedule_start(&rig->segment, &spec);
     beam_init(&rig->beam.beam, 0.007, 0.35e-3, 4e-9);
-    beam_rings(BEAM_MAX_RINGS, &rig->beam.fine);
+    beam_rings(BEAM_FINE_RINGS, &rig->beam.fine);
     rig->beam.max_echoes = LINE_MAX_ECHOES;
     struct georef_spec local = {.crs = GEOREF_LOCAL};
     memcpy(local.station_m, station_m, sizeof local.station_m);
