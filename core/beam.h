@@ -17,9 +17,9 @@
  * Returns of a pulse, one for each sub-ray that meets something, become echoes: sorted by range, a gap larger than the
  * range resolution (c tau / 2 of the pulse width tau) begins a new one. An echo's range is the energy-weighted mean of
  * its returns - with two surfaces closer than the resolution, the mixed pixel's -, its surface that of its strongest
- * return, its energy the sum. Less than 1 % of the footprint's energy is no echo. Of more echoes than the head can tell,
- * the weakest are left out, and counted. The width of an echo is that of the pulse, resolution_m, and 2.355 sigma of
- * its ranges, added as squares (full widths at half maximum of Gaussians).
+ * return, its energy the sum. Less than 1 % of the footprint's energy is no echo. Of more echoes than the head can
+ * tell, the weakest are left out, and counted. The width of an echo is that of the pulse, resolution_m, and 2.355 sigma
+ * of its ranges, added as squares (full widths at half maximum of Gaussians).
  *
  * One ray for all of the footprint. Where it lies on one plane at incidence i, the mean over it is not the range of its
  * centre: a sub-ray at (rho, phi) meets the plane at (R - rho D/2 tan i cos phi) / (1 - rho s tan i sin phi), s = theta
@@ -82,9 +82,9 @@ void beam_axes(const double dir[3], double e1[3], double e2[3]);
 /* What one sub-ray, or one part of a footprint, brings back. */
 struct beam_return {
     double range_m;
-    double energy;           /* of the footprint's */
-    float cosine;            /* of the incidence */
-    float sigma_m;           /* of the ranges within it */
+    double energy; /* of the footprint's */
+    float cosine;  /* of the incidence */
+    float sigma_m; /* of the ranges within it */
     uint32_t triangle, label;
 };
 
@@ -135,8 +135,8 @@ struct beam_line {
     double n[2], h;
 };
 /* The outlines that cross the footprint of a pulse nearer than limit_m. Returns their number, up to BEAM_MAX_LINES, or
- * BEAM_MAX_LINES + 1: more than that. *next_m: from which range on there may be more (INFINITY: none, or nothing crosses
- * it up to limit_m). */
+ * BEAM_MAX_LINES + 1: more than that. *next_m: from which range on there may be more (INFINITY: none, or nothing
+ * crosses it up to limit_m). */
 uint32_t beam_find_lines(const struct beam_outlines *outlines, const struct beam *beam, const double dir[3],
                          double limit_m, struct beam_line *line, double *next_m);
 

@@ -98,10 +98,10 @@ struct cast_counters {
     uint64_t unfit;       /* echoes whose position did not fit into the wire's integers: sent as shots without echo */
     uint64_t undecided;   /* nearer to an edge than double precision can tell: counted as hit */
     /* with a beam */
-    uint64_t outlined;  /* adaptive: pulses whose footprint an outline cuts */
-    uint64_t sub_rays;  /* cast beyond the central ones */
-    uint64_t ragged;    /* adaptive: pulses with more outlines than can be told apart, cast as rings */
-    uint64_t left_out;  /* echoes beyond max_echoes */
+    uint64_t outlined; /* adaptive: pulses whose footprint an outline cuts */
+    uint64_t sub_rays; /* cast beyond the central ones */
+    uint64_t ragged;   /* adaptive: pulses with more outlines than can be told apart, cast as rings */
+    uint64_t left_out; /* echoes beyond max_echoes */
 };
 
 struct caster;

@@ -29,12 +29,15 @@ struct plan {
 
 static void make_plan(const struct config *cfg, const struct site *site, struct plan *plan)
 {
+    const struct cast_beam *beam = site->station[0].beam;
     struct bvh_info info;
     bvh_get_info(site->station[0].bvh, &info);
     const struct plan_head head = {.packet = info.packet,
                                    .order_exactly = cfg->order_exactly,
                                    .range_max_m = cfg->profile.range_max_m,
                                    .n_movers = site->n_movers,
+                                   .beam_adaptive = beam != NULL && beam->mode == BEAM_ADAPTIVE,
+                                   .beam_rays = beam != NULL ? beam->pattern.n : 0,
                                    .noise_on = cfg->noise_on,
                                    .range_sigma_m = cfg->profile.range_sigma_m,
                                    .range_sigma_ppm = cfg->profile.range_sigma_ppm};

@@ -18,7 +18,10 @@ static const struct command_unit unit_deg_s = {"deg/s", 6, "DEG/S", {{"DEG/S", 0
 static const struct command_unit unit_ns = {"ns", 0, "NS, US, MS or S", {{"NS", 0}, {"US", 3}, {"MS", 6}, {"S", 9}}};
 static const struct command_unit unit_count = {"", 0, "no unit", {{NULL, 0}}};
 
-enum { PRR, LINES, PAN, STATION, LINE_START, LINE_STOP, PAN_START, PAN_STOP, FRAMES };
+enum { PRR, LINES, PAN, STATION, LINE_START, LINE_STOP, PAN_START, PAN_STOP, FRAMES, ECHOES };
+
+/* In the order of enum beam_select. */
+static const char *const echo_words[] = {"ALL", "FIRSt", "LAST", "STRongest", NULL};
 
 /* A pulse rate below the line rate would leave lines without a pulse; a line or a pan sweep of no width has nothing to
  * scan, and one beyond a turn would scan things twice. */
@@ -39,6 +42,7 @@ static const struct command_setting settings[] = {
     [PAN_STOP] = {SETTING(pan_stop_udeg), 0, 0, PROFILE(pan_min_udeg), PROFILE(pan_max_udeg),
                   "SCAN:PAN:STARt", SETTING(pan_start_udeg), 1, TURN_UDEG},
     [FRAMES] = {SETTING(frames), 1, 0, CONSTANT(0), CONSTANT(UINT32_MAX), NO_OTHER},
+    [ECHOES] = {SETTING(echoes), 1, 0, CONSTANT(0), CONSTANT(3), NO_OTHER, echo_words},
 };
 /* clang-format on */
 
@@ -208,6 +212,7 @@ static const struct command_row rows[] = {
     VALUE("SCAN:PAN:STARt", unit_deg, PAN_START),
     VALUE("SCAN:PAN:STOP", unit_deg, PAN_STOP),
     VALUE("SCAN:FRAMes", unit_count, FRAMES),
+    VALUE("SCAN:ECHoes", unit_count, ECHOES),
     ACTION("SCAN:STARt", act_start, 0),
     ACTION("SCAN:STOP", act_stop, 0),
     QUERY("SCAN:COUNt", query_count),

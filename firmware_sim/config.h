@@ -11,6 +11,7 @@
 #include <stdint.h>
 #include <stdio.h>
 
+#include "core/beam.h"
 #include "core/err.h"
 #include "core/georef.h"
 #include "core/line.h"
@@ -36,6 +37,7 @@ struct config_profile {
     double range_min_m, range_max_m;
     double range_sigma_m, range_sigma_ppm; /* one sigma of the range noise: fixed part, and part per distance */
     double mirror_counts, pan_counts;      /* encoder counts per turn of the beam angle; 0: ideal (2^32 counts) */
+    double beam_exit_m, beam_divergence_rad, pulse_width_ns; /* core/beam.h */
     uint32_t max_echoes;
     double boot_s, spin_up_s, spin_down_s;
 };
@@ -136,6 +138,9 @@ struct config {
     /* links */
     struct link_spec link[CONFIG_MAX_LINKS];
     uint32_t n_links;
+    /* beam */
+    enum beam_mode beam_mode;
+    uint32_t beam_rings;
     /* noise */
     int noise_on; /* 0: exact ranges */
     uint64_t seed;
@@ -152,6 +157,12 @@ struct config {
 /* Reads path, its profile, then the `key=value` settings in order (as from --set, each checked the same way, named
  * `--set KEY` in errors). On failure cfg is unspecified. cfg is large: allocate it. */
 int config_load(const char *path, const char *const *sets, int n_sets, struct config *cfg, struct sh_err *err);
+
+/* Whether anything in the scene, or the head, moves. */
+int config_moves(const struct config *cfg);
+
+/* Points that a pulse can bring at most. */
+uint32_t config_points_a_pulse(const struct config *cfg);
 
 /* The reference: every key with type, unit, default, range and help. */
 void config_print_reference(FILE *out);

@@ -35,6 +35,10 @@ static const char *const pace_names[] = {
 
 static const char *const platform_names[] = {
     [PLATFORM_STATIC] = "static", [PLATFORM_TRAJECTORY] = "trajectory", [PLATFORM_LIVE] = "live", NULL};
+static const char *const beam_names[] = {
+    [BEAM_SINGLE] = "single", [BEAM_RINGS] = "rings", [BEAM_ADAPTIVE] = "adaptive", [BEAM_AUTO] = "auto", NULL};
+static const char *const echoes_names[] = {
+    [BEAM_ALL] = "all", [BEAM_FIRST] = "first", [BEAM_LAST] = "last", [BEAM_STRONGEST] = "strongest", NULL};
 static const char *const at_end_names[] = {[PLATFORM_STOP] = "stop", [PLATFORM_HOLD] = "hold", NULL};
 
 /* clang-format off */
@@ -190,6 +194,16 @@ static const struct cfg_key config_keys[] = {
     {"links[].max_sessions", CFG_COUNT, NULL, "4", 1, LINK_MAX_SESSIONS, IN_LINK(max_sessions),
      .help = "tcp: clients at a time."},
 
+    {"beam", CFG_MAP, .help = "The footprint of the pulses."},
+    {"beam.mode", CFG_ENUM, .def = "single", .names = beam_names, IN_CONFIG(beam_mode),
+     .help = "single: one ray per pulse; rings: sub-rays over the footprint; adaptive: where it reaches over an edge; "
+             "auto: adaptive where head and scene stand still, else rings."},
+    {"beam.rings", CFG_COUNT, NULL, "4", 0, BEAM_MAX_RINGS, IN_CONFIG(beam_rings),
+     .help = "Rings of sub-rays, 1 + 3 n (n + 1) in all; adaptive: where a footprint holds more edges than it can tell "
+             "apart."},
+    {"beam.echoes", CFG_ENUM, .def = "all", .names = echoes_names, IN_CONFIG(settings.echoes),
+     .help = "Which echoes of a pulse are sent: all, first, last, strongest."},
+
     {"noise", CFG_MAP, .help = "Noise of the measurement."},
     {"noise.range", CFG_BOOL, .def = "off", IN_CONFIG(noise_on),
      .help = "Range noise after the profile's range_sigma; off: exact ranges."},
@@ -264,6 +278,12 @@ static const struct cfg_key profile_keys[] = {
      .help = "Encoder counts per turn of the line angle; 0: ideal."},
     {"pan_counts", CFG_REAL, NULL, NULL, 0, 4294967296.0, IN_PROFILE(pan_counts), FIGURE,
      .help = "Encoder counts per turn of the pan; 0: ideal."},
+    {"beam_exit_m", CFG_REAL, "m", NULL, 0, 1, IN_PROFILE(beam_exit_m), FIGURE,
+     .help = "Diameter of the beam at the exit, at 1/e2 of its irradiance."},
+    {"beam_divergence_rad", CFG_REAL, "rad", NULL, 0, 0.01, IN_PROFILE(beam_divergence_rad), FIGURE,
+     .help = "Full divergence at 1/e2: 1.41 times one at 1/e, 1.70 times one at half maximum."},
+    {"pulse_width_ns", CFG_REAL, "ns", NULL, 0, 1000, IN_PROFILE(pulse_width_ns), FIGURE,
+     .help = "Width of the pulse: echoes nearer to each other than c / 2 of it are one."},
     {"max_echoes", CFG_COUNT, NULL, NULL, 1, LINE_MAX_ECHOES, IN_PROFILE(max_echoes), FIGURE, .help = "Echoes per pulse."},
     {"boot_s", CFG_REAL, "s", NULL, 0, 600, IN_PROFILE(boot_s), FIGURE, .help = "Power-on to ready."},
     {"spin_up_s", CFG_REAL, "s", NULL, 0, 600, IN_PROFILE(spin_up_s), FIGURE, .help = "Start command to mirror at speed."},

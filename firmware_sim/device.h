@@ -46,6 +46,7 @@ struct device_work {
     uint64_t pulse0, pulse_end; /* pulses of this tick */
     int cut_short;              /* the scan stops at pulse_end, within a line */
     uint32_t station;
+    uint32_t echoes;  /* enum beam_select */
     uint32_t n_poses; /* live: the head's poses of this tick; 0: a head that stands still, or goes along a trajectory */
     struct pose_knot pose[DEVICE_MAX_POSES];
     int telemetry;

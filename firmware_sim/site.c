@@ -107,10 +107,10 @@ static double distance_m(const double a[3], const double b[3])
 /* How far the stations that will share a BVH lie from its origin. */
 static double station_reach(const struct site *site, const double origin_m[3])
 {
-    double reach_m = 0.0;
+    double beam_m = site->cfg->beam_mode == BEAM_SINGLE ? 0.0 : 0.5 * site->cfg->profile.beam_exit_m, reach_m = beam_m;
     for (uint32_t i = 0; i < site->cfg->n_stations; i++) {
         double d = distance_m(site->station[i].at.position_m, origin_m);
-        if (d <= SITE_BVH_REACH_M && d > reach_m) reach_m = d;
+        if (d <= SITE_BVH_REACH_M && d + beam_m > reach_m) reach_m = d + beam_m;
     }
     return reach_m;
 }
@@ -154,6 +154,26 @@ int site_utm_zone(const struct site *site)
     return rc == SH_OK ? utm.zone : 0;
 }
 
+/* The beam as it is from a station. */
+static int make_beam(struct site *site, struct site_station *s, const struct sh_report *report, struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    const struct config_profile *p = &cfg->profile;
+    if (cfg->beam_mode == BEAM_SINGLE) return SH_OK;
+    struct cast_beam *beam = s->beam = calloc(1, sizeof *beam);
+    if (beam == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
+    beam->mode = cfg->beam_mode != BEAM_AUTO ? cfg->beam_mode : config_moves(cfg) ? BEAM_RINGS : BEAM_ADAPTIVE;
+    beam->max_echoes = p->max_echoes;
+    beam_init(&beam->beam, p->beam_exit_m, p->beam_divergence_rad, 1e-9 * p->pulse_width_ns);
+    beam_rings(cfg->beam_rings, &beam->pattern);
+    beam_rings(BEAM_FINE_RINGS, &beam->fine);
+    if (beam->mode != BEAM_ADAPTIVE) return SH_OK;
+    if (site->scene->n_triangles > 1000000) sh_progress(report, "looking for outlines", -1.0);
+    int rc = beam_outlines_create(site->scene, s->at.position_m, &beam->beam, p->range_max_m, &s->outlines, err);
+    beam->outlines = s->outlines;
+    return rc;
+}
+
 static int add_station(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
@@ -166,6 +186,7 @@ static int add_station(struct site *site, const struct sh_report *report, struct
         s->bvh = site->bvh[0];
     else if (rc == SH_OK)
         rc = find_bvh(site, s->at.position_m, report, &s->bvh, err);
+    if (rc == SH_OK) rc = make_beam(site, s, report, err);
     if (rc == SH_OK) rc = georef_create(&spec, &s->georef, err);
     if (rc != SH_OK) return rc;
     site->n_stations++;
@@ -205,6 +226,10 @@ void site_free(struct site *site)
     free(site->stretch);
     for (uint32_t i = 0; i < site->n_stations; i++)
         georef_free(site->station[i].georef);
+    for (uint32_t i = 0; i < site->cfg->n_stations; i++) {
+        free(site->station[i].beam);
+        beam_outlines_free(site->station[i].outlines);
+    }
     for (uint32_t i = 0; i < site->n_bvh; i++)
         bvh_free(site->bvh[i]);
     for (uint32_t i = 0; i < site->n_movers; i++) {
@@ -239,6 +264,8 @@ void site_cast_setup(const struct site *site, uint32_t station, struct cast_setu
     setup->mirror_counts = counts_or_ideal(profile->mirror_counts);
     setup->pan_counts = counts_or_ideal(profile->pan_counts);
     setup->layout = site->cfg->layout;
+    setup->beam = s->beam;
+    setup->echoes = (enum beam_select)site->cfg->settings.echoes;
     setup->range_scale_m = site->scale_m;
     memcpy(setup->xyz_scale, s->scale, sizeof setup->xyz_scale);
 }

@@ -16,8 +16,10 @@ struct site_station {
     struct bvh *bvh; /* shared where stations are near each other */
     struct georef *georef;
     struct placement at;
-    double scale[3];      /* of geo points on the wire, units of the CRS per count */
-    struct plan_row plan; /* how the georef's method was chosen */
+    struct cast_beam *beam;         /* NULL: one ray per pulse */
+    struct beam_outlines *outlines; /* beam.mode adaptive */
+    double scale[3];                /* of geo points on the wire, units of the CRS per count */
+    struct plan_row plan;           /* how the georef's method was chosen */
 };
 
 struct site_mover {

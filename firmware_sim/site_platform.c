@@ -72,6 +72,7 @@ static int add_stretch(struct site *site, const double centre_m[3], double reach
     if (more == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the path");
     site->stretch = more;
     struct bvh **bvh = &site->bvh[site->n_bvh];
+    if (site->cfg->beam_mode != BEAM_SINGLE) reach_m += 0.5 * site->cfg->profile.beam_exit_m;
     int rc = bvh_create(site->scene, centre_m, reach_m, site->cfg->threads, report, bvh, err);
     if (rc != SH_OK) return rc;
     site->n_bvh++;

@@ -28,7 +28,7 @@ int worker_create(const struct site *site, struct worker **out, struct sh_err *e
     struct worker *worker = calloc(1, sizeof *worker);
     if (worker == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     worker->site = site;
-    uint32_t n = device_tick_pulses(site->cfg);
+    uint32_t n = device_tick_pulses(site->cfg) * config_points_a_pulse(site->cfg);
     int rc = caster_create(&worker->caster, err);
     if (rc == SH_OK) rc = line_block_alloc(&worker->block, n, err);
     if (rc != SH_OK) {
@@ -51,7 +51,8 @@ uint32_t worker_slot_bytes(const struct config *cfg)
 {
     /* Each line part is a frame of its own. */
     uint32_t poses = cfg->platform.kind != PLATFORM_STATIC ? NATIVE_MAX_FRAME : 0;
-    return OVERHEAD_BYTES + poses + (uint32_t)native_points_bound(device_tick_pulses(cfg)) +
+    return OVERHEAD_BYTES + poses +
+           (uint32_t)native_points_bound(device_tick_pulses(cfg) * config_points_a_pulse(cfg)) +
            device_tick_lines(cfg) * (LINE_END_BYTES + NATIVE_HEADER_LEN + NATIVE_POINTS_HEAD_LEN);
 }
 
@@ -211,6 +212,7 @@ static void fill_pulses(struct worker *worker, const struct device_work *work, s
         site_cast_setup(worker->site, work->station, &worker->setup);
         worker->setup_station = work->station + 1;
     }
+    worker->setup.echoes = (enum beam_select)work->echoes;
     if (worker->site->n_movers != 0)
         site_move(worker->site, 1e-9 * (double)(work->t_ns - work->scan_t0_ns), &worker->setup);
     take_poses(worker, work, slot, cap);

@@ -34,8 +34,8 @@ static int clip_to_beam(const struct beam *beam, struct local_edge *e)
     if (e->b[2] < 0.0) t1 = -e->a[2] / d[2];
     double aa = d[0] * d[0] + d[1] * d[1] - s2 * d[2] * d[2];
     double bb = e->a[0] * d[0] + e->a[1] * d[1] - s2 * e->a[2] * d[2];
-    double cc = e->a[0] * e->a[0] + e->a[1] * e->a[1] - s2 * e->a[2] * e->a[2] -
-                beam->exit_radius_m * beam->exit_radius_m;
+    double cc =
+        e->a[0] * e->a[0] + e->a[1] * e->a[1] - s2 * e->a[2] * e->a[2] - beam->exit_radius_m * beam->exit_radius_m;
     if (aa > 0.0) {
         double root = bb * bb - aa * cc;
         if (root <= 0.0) return 0;
@@ -218,9 +218,9 @@ static int cut_bits(const struct beam_pattern *fine, const struct beam_line *lin
     uint64_t part[BEAM_MAX_PARTS][WORDS], half[WORDS];
     uint32_t n_parts = 1, words = (fine->n + 63) / 64;
     for (uint32_t w = 0; w < words; w++)
-        part[0][w] = 64 * (w + 1) <= fine->n  ? ~(uint64_t)0
-                     : 64 * w < fine->n ? ((uint64_t)1 << (fine->n % 64)) - 1
-                                        : 0;
+        part[0][w] = 64 * (w + 1) <= fine->n ? ~(uint64_t)0
+                     : 64 * w < fine->n      ? ((uint64_t)1 << (fine->n % 64)) - 1
+                                             : 0;
     for (uint32_t i = 0; i < n; i++) {
         half_bits(fine->x, fine->y, line[i].n[0], line[i].n[1], line[i].h, words, half);
         for (uint32_t p = 0, end = n_parts; p < end; p++) {

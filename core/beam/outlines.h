@@ -22,8 +22,8 @@ struct outline_entry {
 struct beam_outlines {
     uint32_t n_edges;
     struct outline_edge *edge;
-    uint32_t *first;     /* entries of cell c: first[c] .. first[c + 1] */
-    float *nearest_m;    /* of each cell; NaN: it leads to none */
+    uint32_t *first;             /* entries of cell c: first[c] .. first[c + 1] */
+    float *nearest_m;            /* of each cell; NaN: it leads to none */
     struct outline_entry *entry; /* by range */
     struct beam_outlines_info info;
 };

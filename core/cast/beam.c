@@ -26,11 +26,11 @@ struct pool {
 
 /* A pulse that one ray does not do for. */
 struct job {
-    uint32_t pulse, first, n; /* its sub-rays */
-    uint32_t lines;           /* outlines that cut it */
-    double next_m;            /* from where on outlines were left out */
+    uint32_t pulse, first, n;  /* its sub-rays */
+    uint32_t lines;            /* outlines that cut it */
+    double next_m;             /* from where on outlines were left out */
     struct beam_return centre; /* known without a ray; energy 0: none */
-    double e1[3], e2[3]; /* across the beam */
+    double e1[3], e2[3];       /* across the beam */
 };
 
 struct beam_work {

@@ -365,8 +365,7 @@ static uint32_t cast_chunk(struct caster *c, const struct cast_setup *s, const s
     c->steep = NULL;
     memcpy(c->label, c->seen, n * sizeof *c->label);
     if (s->beam != NULL) return beam_chunk(c, s, &from, linear, run->pulse0 + first, dt_ns + first, n, block, at);
-    const struct caster_rays rays = {
-        .dx = c->dx, .dy = c->dy, .dz = c->dz, .range_m = c->range_m, .label = c->label};
+    const struct caster_rays rays = {.dx = c->dx, .dy = c->dy, .dz = c->dz, .range_m = c->range_m, .label = c->label};
     caster_movers(c, s, &from, &rays, n);
     uint32_t echoes = single_chunk(c, s, linear, run->pulse0 + first, n, block, *at);
     *at += n;

@@ -77,16 +77,16 @@ void caster_movers(struct caster *c, const struct cast_setup *s, const struct or
 
 /* Wire numbers of n points whose ranges and directions stand in c, from the block's entry `at` on. Returns how many
  * coordinates did not fit; they are LINE_XYZ_NONE. */
-uint32_t caster_wire(struct caster *c, const struct cast_setup *s, int linear, struct line_block *block,
-                          uint32_t at, uint32_t n);
+uint32_t caster_wire(struct caster *c, const struct cast_setup *s, int linear, struct line_block *block, uint32_t at,
+                     uint32_t n);
 
 /* ---- beam.c */
 int beam_work_create(struct beam_work **out, struct sh_err *err);
 void beam_work_free(struct beam_work *work);
 /* Where the incidences of central rays are to go. */
 float *beam_steep(struct caster *c);
-/* n pulses are aimed, and (adaptive) their central rays have been cast: finds their echoes and writes them into the block from entry *at on.
- * dt_ns: of these pulses. Returns the number of echoes. */
+/* n pulses are aimed, and (adaptive) their central rays have been cast: finds their echoes and writes them into the
+ * block from entry *at on. dt_ns: of these pulses. Returns the number of echoes. */
 uint32_t beam_chunk(struct caster *c, const struct cast_setup *s, const struct origins *from, int linear,
                     uint64_t pulse0, const uint32_t *dt_ns, uint32_t n, struct line_block *block, uint32_t *at);
 

@@ -80,8 +80,8 @@ void kernel_scale(const double *range_m, uint32_t n, double *x, double *y, doubl
 
 /* ---- kernels_beam.c */
 /* Cosine of the incidence, 0 .. 1, on the triangles that rays meet; 1 for none. */
-void kernel_incidence(const struct bvh *bvh, const uint32_t *prim, const double *dx, const double *dy,
-                      const double *dz, uint32_t n, double *cosine);
+void kernel_incidence(const struct bvh *bvh, const uint32_t *prim, const double *dx, const double *dy, const double *dz,
+                      uint32_t n, double *cosine);
 /* 1 / cos^2 for one; RTC_INVALID_GEOMETRY_ID: NaN. */
 void kernel_steep(const struct bvh *bvh, uint32_t prim, const double dir[3], float *steep);
 /* Up to where outlines may cut a footprint whose centre meets a surface at that range, and 1 / cos^2 of its incidence:

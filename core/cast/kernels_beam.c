@@ -18,8 +18,8 @@ static void incidence(const double *restrict tri, uint32_t n_triangles, const ui
     }
 }
 
-void kernel_incidence(const struct bvh *bvh, const uint32_t *prim, const double *dx, const double *dy,
-                      const double *dz, uint32_t n, double *cosine)
+void kernel_incidence(const struct bvh *bvh, const uint32_t *prim, const double *dx, const double *dy, const double *dz,
+                      uint32_t n, double *cosine)
 {
     incidence((const double *)bvh->triangle, bvh->scene->n_triangles, prim, dx, dy, dz, n, cosine);
 }

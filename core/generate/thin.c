@@ -111,8 +111,8 @@ int generate_bars(const struct generate_bar *bar, uint32_t n_bars, double half_m
 {
     struct builder b;
     uint32_t n_surfaces = 1;
-    int rc = reserve(&b, BOX_VERTICES + (size_t)n_bars * 2 * SIDES,
-                     BOX_TRIANGLES + (size_t)n_bars * (4 * SIDES - 4), err);
+    int rc =
+        reserve(&b, BOX_VERTICES + (size_t)n_bars * 2 * SIDES, BOX_TRIANGLES + (size_t)n_bars * (4 * SIDES - 4), err);
     if (rc == SH_OK) add_box(&b, half_m);
     for (uint32_t i = 0; i < n_bars && rc == SH_OK; i++) {
         add_bar(&b, &bar[i]);

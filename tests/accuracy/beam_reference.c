@@ -98,9 +98,8 @@ void beam_ref_pulse(struct caster *c, const struct bvh *bvh, const struct beam *
             continue;
         }
         if (out->n == BEAM_REF_ECHOES) continue;
-        out->echo[out->n++] = (struct beam_ref_echo){.range_m = sum / (end - i),
-                                                     .energy = (double)(end - i) / N,
-                                                     .label = strongest_label(met + i, end - i)};
+        out->echo[out->n++] = (struct beam_ref_echo){
+            .range_m = sum / (end - i), .energy = (double)(end - i) / N, .label = strongest_label(met + i, end - i)};
     }
 }
 
@@ -110,16 +109,16 @@ int beam_rig_open(struct beam_rig *rig, struct scene *scene, const double statio
     const int64_t hz = 1000000, lines_hz = 100;
     memset(rig, 0, sizeof *rig);
     rig->scene = scene;
-    struct schedule_spec spec = {
-        .lines_uhz = lines_hz * hz,
-        .prr_uhz = lines_hz * hz * view->pulses,
-        .pan_udeg_s = llround((view->pan_stop_deg - view->pan_start_deg) * 1e6) * lines_hz / view->lines,
-        .fov_min_udeg = llround(view->line_start_deg * 1e6),
-        .sweep_udeg = llround((view->line_stop_deg - view->line_start_deg) * 1e6),
-        .line_start_udeg = llround(view->line_start_deg * 1e6),
-        .line_stop_udeg = llround(view->line_stop_deg * 1e6),
-        .pan_start_udeg = llround(view->pan_start_deg * 1e6),
-        .pan_stop_udeg = llround(view->pan_stop_deg * 1e6)};
+    struct schedule_spec spec = {.lines_uhz = lines_hz * hz,
+                                 .prr_uhz = lines_hz * hz * view->pulses,
+                                 .pan_udeg_s =
+                                     llround((view->pan_stop_deg - view->pan_start_deg) * 1e6) * lines_hz / view->lines,
+                                 .fov_min_udeg = llround(view->line_start_deg * 1e6),
+                                 .sweep_udeg = llround((view->line_stop_deg - view->line_start_deg) * 1e6),
+                                 .line_start_udeg = llround(view->line_start_deg * 1e6),
+                                 .line_stop_udeg = llround(view->line_stop_deg * 1e6),
+                                 .pan_start_udeg = llround(view->pan_start_deg * 1e6),
+                                 .pan_stop_udeg = llround(view->pan_stop_deg * 1e6)};
     schedule_start(&rig->segment, &spec);
     beam_init(&rig->beam.beam, 0.007, 0.35e-3, 4e-9);
     beam_rings(BEAM_FINE_RINGS, &rig->beam.fine);

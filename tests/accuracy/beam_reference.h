@@ -10,14 +10,13 @@ enum { BEAM_REF_RAYS = 1000, BEAM_REF_ECHOES = 32 };
 struct beam_ref_echo {
     double range_m, energy;
     uint32_t label; /* of its strongest surface */
-
 };
 
 struct beam_ref {
     uint32_t n; /* echoes */
     struct beam_ref_echo echo[BEAM_REF_ECHOES];
-    int partial;       /* some sub-rays met nothing, or an echo was too weak */
-    double spread_m;   /* of all ranges */
+    int partial;     /* some sub-rays met nothing, or an echo was too weak */
+    double spread_m; /* of all ranges */
 };
 
 void beam_ref_pulse(struct caster *caster, const struct bvh *bvh, const struct beam *beam, const double station_m[3],
