@@ -46,6 +46,7 @@ enum {
     BEAM_HALF_STEPS = 1024,
 };
 #define BEAM_LEAST_ENERGY 0.01 /* of the footprint's, for an echo */
+#define BEAM_LEAST_STEP_M 5e-4 /* what lies nearer to each other at an outline makes none */
 
 /* A beam's figures. Constant after beam_init; any thread. */
 struct beam {
@@ -114,13 +115,23 @@ uint32_t beam_merge(const struct beam *beam, struct beam_return *returns, uint32
  * may reach, and the nearest of them. Constant after it is made; any thread. */
 struct beam_outlines;
 
-/* station_m: where all pulses come from; at most exit_radius_m off. The scene must outlive the outlines. Takes about
- * 1 us per triangle. */
+/* Casts rays from the station: unit directions -> ranges, NaN for none. */
+struct beam_probe {
+    void (*cast)(void *ctx, uint32_t n, const double *dx, const double *dy, const double *dz, double *range_m);
+    void *ctx;
+};
+/* station_m: where all pulses come from; at most exit_radius_m off.
+ * probe, NULL: all outlines count. Else rays are cast close along both sides of each, a footprint's radius apart: a
+ * stretch of it is left out where it is hidden, or where the ranges on both sides agree to BEAM_LEAST_STEP_M (a wall that
+ * stands on a floor; parts of a wall). Such a stretch can't make another echo; ignored as any fold between triangles is,
+ * it may move a range by a sixth of the footprint's radius times the change of slope. What is hidden from the station
+ * may be seen from the edge of the exit: a strip of at most its radius. */
 int beam_outlines_create(const struct scene *scene, const double station_m[3], const struct beam *beam,
-                         double range_max_m, struct beam_outlines **out, struct sh_err *err);
+                         double range_max_m, const struct beam_probe *probe, struct beam_outlines **out,
+                         struct sh_err *err);
 void beam_outlines_free(struct beam_outlines *outlines);
 struct beam_outlines_info {
-    uint64_t edges, outlines, entries, bytes;
+    uint64_t edges, outlines, stretches, entries, bytes;
 };
 void beam_outlines_get_info(const struct beam_outlines *outlines, struct beam_outlines_info *info);
 

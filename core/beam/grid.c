@@ -19,6 +19,12 @@ struct draw {
     uint64_t n;
 };
 
+/* Stretches of edges that count. */
+struct stretches {
+    struct outline_stretch *at;
+    size_t n, room;
+};
+
 static void put(struct draw *d, uint32_t cell, float range_m)
 {
     struct beam_outlines *o = d->o;
@@ -89,18 +95,64 @@ static double nearest_on(const double p[3], const double q[3])
     return sqrt(vec3_dot(x, x));
 }
 
-static void draw_edge(struct draw *d, const double p[3], const double q[3], double range_max_m)
+static int add_stretch(struct stretches *s, const double p[3], const double q[3], uint32_t edge)
 {
-    double e[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]};
-    double range_m = nearest_on(p, q), length = sqrt(vec3_dot(e, e));
-    if (range_m > range_max_m) return;
-    if (length > PIECE * fmax(range_m, NEAREST_M)) {
-        double middle[3] = {p[0] + 0.5 * e[0], p[1] + 0.5 * e[1], p[2] + 0.5 * e[2]};
-        draw_edge(d, p, middle, range_max_m);
-        draw_edge(d, middle, q, range_max_m);
-        return;
+    if (s->n == s->room) {
+        size_t room = s->room == 0 ? 4096 : 2 * s->room;
+        struct outline_stretch *more = realloc(s->at, room * sizeof *more);
+        if (more == NULL) return SH_ENOMEM;
+        s->at = more;
+        s->room = room;
     }
-    if (range_m > NEAREST_M) draw_piece(d, p, q, range_m);
+    struct outline_stretch *one = &s->at[s->n++];
+    memcpy(one->p, p, sizeof one->p);
+    memcpy(one->q, q, sizeof one->q);
+    one->edge = edge;
+    return SH_OK;
+}
+
+/* Pieces of an edge, each short as seen from the station; of these, what counts. */
+static int cut_edge(struct stretches *s, struct outline_prober *prober, const double p[3], const double q[3],
+                    uint32_t edge, double range_max_m)
+{
+    double e[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]}, middle[3];
+    double range_m = nearest_on(p, q), length = sqrt(vec3_dot(e, e));
+    if (range_m > range_max_m) return SH_OK;
+    if (length > PIECE * fmax(range_m, NEAREST_M)) {
+        for (int i = 0; i < 3; i++)
+            middle[i] = p[i] + 0.5 * e[i];
+        int rc = cut_edge(s, prober, p, middle, edge, range_max_m);
+        return rc == SH_OK ? cut_edge(s, prober, middle, q, edge, range_max_m) : rc;
+    }
+    if (range_m <= NEAREST_M) return SH_OK;
+    if (prober->probe == NULL) return add_stretch(s, p, q, edge);
+    uint32_t n = outline_probe(prober, p, q, range_m);
+    for (uint32_t i = 0, end; i < n; i = end) {
+        double a[3], b[3];
+        for (end = i + 1; end < n && prober->counts[end] == prober->counts[i];)
+            end++;
+        if (!prober->counts[i]) continue;
+        for (int k = 0; k < 3; k++) {
+            a[k] = p[k] + e[k] * i / n;
+            b[k] = p[k] + e[k] * end / n;
+        }
+        if (add_stretch(s, a, b, edge) != SH_OK) return SH_ENOMEM;
+    }
+    return SH_OK;
+}
+
+static int find_stretches(const struct beam_outlines *o, struct outline_prober *prober, double range_max_m,
+                          struct stretches *s)
+{
+    for (uint32_t k = 0; k < o->n_edges; k++) {
+        double p[3], q[3];
+        for (int i = 0; i < 3; i++) {
+            p[i] = o->edge[k].a[i];
+            q[i] = o->edge[k].b[i];
+        }
+        if (cut_edge(s, prober, p, q, k, range_max_m) != SH_OK) return SH_ENOMEM;
+    }
+    return SH_OK;
 }
 
 static int by_range(const void *a, const void *b)
@@ -110,23 +162,19 @@ static int by_range(const void *a, const void *b)
     return (x->edge > y->edge) - (x->edge < y->edge);
 }
 
-static uint64_t draw_all(struct beam_outlines *o, const struct beam *beam, double range_max_m, int fill)
+static uint64_t draw_all(struct beam_outlines *o, const struct beam *beam, const struct stretches *s, int fill)
 {
     struct draw d = {.o = o, .beam = beam, .fill = fill};
-    for (d.edge = 0; d.edge < o->n_edges; d.edge++) {
-        double p[3], q[3];
-        for (int i = 0; i < 3; i++) {
-            p[i] = o->edge[d.edge].a[i];
-            q[i] = o->edge[d.edge].b[i];
-        }
-        draw_edge(&d, p, q, range_max_m);
+    for (size_t i = 0; i < s->n; i++) {
+        d.edge = s->at[i].edge;
+        draw_piece(&d, s->at[i].p, s->at[i].q, nearest_on(s->at[i].p, s->at[i].q));
     }
     return d.n;
 }
 
-static int fill_cells(struct beam_outlines *o, const struct beam *beam, double range_max_m, struct sh_err *err)
+static int fill_cells(struct beam_outlines *o, const struct beam *beam, const struct stretches *s, struct sh_err *err)
 {
-    uint64_t n = draw_all(o, beam, range_max_m, 0);
+    uint64_t n = draw_all(o, beam, s, 0);
     if (n >= UINT32_MAX) return sh_fail(err, SH_EINPUT, "beam: too many outlines; beam.mode: rings does without them");
     for (uint32_t c = 0; c < N_CELLS; c++) {
         o->first[c + 1] += o->first[c];
@@ -134,7 +182,7 @@ static int fill_cells(struct beam_outlines *o, const struct beam *beam, double r
     }
     o->entry = malloc((size_t)(n + 1) * sizeof *o->entry);
     if (o->entry == NULL) return sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");
-    draw_all(o, beam, range_max_m, 1);
+    draw_all(o, beam, s, 1);
     memmove(o->first + 1, o->first, N_CELLS * sizeof *o->first); /* each stands at its end now */
     o->first[0] = 0;
     for (uint32_t c = 0; c < N_CELLS; c++)
@@ -147,16 +195,30 @@ static int fill_cells(struct beam_outlines *o, const struct beam *beam, double r
 }
 
 int beam_outlines_create(const struct scene *scene, const double station_m[3], const struct beam *beam,
-                         double range_max_m, struct beam_outlines **out, struct sh_err *err)
+                         double range_max_m, const struct beam_probe *probe, struct beam_outlines **out,
+                         struct sh_err *err)
 {
+    struct stretches stretches = {.at = NULL};
+    struct outline_prober *prober = calloc(1, sizeof *prober);
     struct beam_outlines *o = calloc(1, sizeof *o);
     *out = NULL;
-    if (o == NULL) return sh_fail(err, SH_ENOMEM, "beam: no memory");
+    if (o == NULL || prober == NULL) {
+        free(o);
+        free(prober);
+        return sh_fail(err, SH_ENOMEM, "beam: no memory");
+    }
+    prober->probe = probe;
+    prober->beam = beam;
     o->first = calloc(N_CELLS + 1, sizeof *o->first);
     o->nearest_m = malloc(N_CELLS * sizeof *o->nearest_m);
     int rc = o->first == NULL || o->nearest_m == NULL ? sh_fail(err, SH_ENOMEM, "beam: no memory") : SH_OK;
     if (rc == SH_OK) rc = outline_find(scene, station_m, &o->edge, &o->n_edges, &o->info.edges, err);
-    if (rc == SH_OK) rc = fill_cells(o, beam, range_max_m * 1.01, err);
+    if (rc == SH_OK && find_stretches(o, prober, range_max_m * 1.01, &stretches) != SH_OK)
+        rc = sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");
+    if (rc == SH_OK) rc = fill_cells(o, beam, &stretches, err);
+    o->info.stretches = stretches.n;
+    free(stretches.at);
+    free(prober);
     if (rc != SH_OK) {
         beam_outlines_free(o);
         return rc;
