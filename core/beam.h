@@ -72,7 +72,7 @@ void beam_half(const struct beam *beam, double h, double *energy, double *moment
 /* Places of sub-rays in the unit disc, each with 1/n of the energy. */
 struct beam_pattern {
     uint32_t n;
-    double x[BEAM_SUBRAY_ROOM], y[BEAM_SUBRAY_ROOM]; /* whole words of bits; behind n: nothing */
+    float x[BEAM_SUBRAY_ROOM], y[BEAM_SUBRAY_ROOM]; /* whole words of bits; behind n: nothing */
 };
 /* rings: 0 (the centre alone) to BEAM_MAX_RINGS. */
 void beam_rings(uint32_t rings, struct beam_pattern *pattern);
@@ -122,10 +122,10 @@ struct beam_probe {
 };
 /* station_m: where all pulses come from; at most exit_radius_m off.
  * probe, NULL: all outlines count. Else rays are cast close along both sides of each, a footprint's radius apart: a
- * stretch of it is left out where it is hidden, or where the ranges on both sides agree to BEAM_LEAST_STEP_M (a wall that
- * stands on a floor; parts of a wall). Such a stretch can't make another echo; ignored as any fold between triangles is,
- * it may move a range by a sixth of the footprint's radius times the change of slope. What is hidden from the station
- * may be seen from the edge of the exit: a strip of at most its radius. */
+ * stretch of it is left out where it is hidden, or where the ranges on both sides agree to BEAM_LEAST_STEP_M (a wall
+ * that stands on a floor; parts of a wall). Such a stretch can't make another echo; ignored as any fold between
+ * triangles is, it may move a range by a sixth of the footprint's radius times the change of slope. What is hidden from
+ * the station may be seen from the edge of the exit: a strip of at most its radius. */
 int beam_outlines_create(const struct scene *scene, const double station_m[3], const struct beam *beam,
                          double range_max_m, const struct beam_probe *probe, struct beam_outlines **out,
                          struct sh_err *err);

@@ -104,8 +104,8 @@ void beam_rings(uint32_t rings, struct beam_pattern *pattern)
         double radius = sqrt(-0.5 * log(1.0 - inside * all));
         for (uint32_t i = 0; i < 6 * k; i++, at++) {
             double phi = 2.0 * M_PI * (i + 0.5 * (k % 2)) / (6 * k);
-            pattern->x[at] = radius * cos(phi);
-            pattern->y[at] = radius * sin(phi);
+            pattern->x[at] = (float)(radius * cos(phi));
+            pattern->y[at] = (float)(radius * sin(phi));
         }
     }
 }

@@ -183,8 +183,8 @@ static int cut_caps(const struct beam *beam, const struct beam_line *line, uint3
 /* Sub-rays of the fine pattern as sets of bits: eight truth values of a byte each make eight bits by a product that
  * brings each to its place. Beyond the pattern's end: whatever, the sets are cut to it. */
 VEC_CLONES
-static void half_bits(const double *restrict x, const double *restrict y, double nx, double ny, double h,
-                      uint32_t words, uint64_t *restrict bits)
+static void half_bits(const float *restrict x, const float *restrict y, float nx, float ny, float h, uint32_t words,
+                      uint64_t *restrict bits)
 {
     for (uint32_t w = 0; w < words; w++) {
         uint8_t beyond[64];
@@ -207,8 +207,8 @@ static void sum_part(const struct beam_pattern *fine, const uint64_t *bits, stru
     for (uint32_t w = 0; 64 * w < fine->n; w++)
         for (uint64_t left = bits[w]; left != 0; left &= left - 1, n++) {
             uint32_t i = 64 * w + (uint32_t)__builtin_ctzll(left);
-            mx += fine->x[i];
-            my += fine->y[i];
+            mx += (double)fine->x[i];
+            my += (double)fine->y[i];
         }
     add_part(parts, n * each, mx * each, my * each, (int)(bits[0] & 1));
 }
@@ -222,7 +222,7 @@ static int cut_bits(const struct beam_pattern *fine, const struct beam_line *lin
                      : 64 * w < fine->n      ? ((uint64_t)1 << (fine->n % 64)) - 1
                                              : 0;
     for (uint32_t i = 0; i < n; i++) {
-        half_bits(fine->x, fine->y, line[i].n[0], line[i].n[1], line[i].h, words, half);
+        half_bits(fine->x, fine->y, (float)line[i].n[0], (float)line[i].n[1], (float)line[i].h, words, half);
         for (uint32_t p = 0, end = n_parts; p < end; p++) {
             uint64_t beyond = 0, before = 0;
             for (uint32_t w = 0; w < words; w++) {

@@ -42,7 +42,8 @@ struct outline_prober {
     double dx[2 * PROBE_MOST], dy[2 * PROBE_MOST], dz[2 * PROBE_MOST], range_m[2 * PROBE_MOST];
     uint8_t counts[PROBE_MOST];
 };
-/* The piece from p to q in equal parts, each about a footprint's radius: how many, and in counts whether each counts. */
+/* The piece from p to q in equal parts, each about a footprint's radius: how many, and in counts whether each counts.
+ */
 uint32_t outline_probe(struct outline_prober *prober, const double p[3], const double q[3], double range_m);
 
 /* weld.c: the outlines among the edges of a scene. Gives *edge (malloc) and *n, and how many edges there are. */

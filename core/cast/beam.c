@@ -111,7 +111,7 @@ static void add_ray(const struct caster *c, const struct beam *beam, const struc
 static void add_pattern(const struct caster *c, const struct cast_beam *b, const struct origins *from, struct job *job)
 {
     for (uint32_t i = 0; i < b->pattern.n; i++)
-        add_ray(c, &b->beam, from, job, b->pattern.x[i], b->pattern.y[i], 1.0 / b->pattern.n);
+        add_ray(c, &b->beam, from, job, (double)b->pattern.x[i], (double)b->pattern.y[i], 1.0 / b->pattern.n);
 }
 
 /* The part with the centre lies on the surface that is met there: its range at (x, y) needs no ray. Returns 0 where it
@@ -171,6 +171,7 @@ static void cast_pool(struct caster *c, const struct cast_setup *s, uint32_t fir
 {
     struct pool *p = &c->beam->pool;
     c->counters.sub_rays += p->n - first;
+    c->scattered = s->beam->mode == BEAM_ADAPTIVE;
     for (uint32_t at = first, n; at < p->n; at += n) {
         n = p->n - at < CHUNK ? p->n - at : CHUNK;
         const struct origins from = {.px = p->px + at, .py = p->py + at, .pz = p->pz + at};
@@ -186,6 +187,7 @@ static void cast_pool(struct caster *c, const struct cast_setup *s, uint32_t fir
         kernel_incidence(s->bvh, rays.triangle, rays.dx, rays.dy, rays.dz, n, rays.cosine);
         caster_movers(c, s, &from, &rays, n);
     }
+    c->scattered = 0;
 }
 
 /* Outlines behind what the centre meets count too, where another part of the footprint looks past it. */

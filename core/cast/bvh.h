@@ -99,6 +99,7 @@ struct bvh_packets {
 struct bvh_rays {
     float org[3], t_min, t_max;
     const float *ox, *oy, *oz; /* origins of their own instead of org; NULL: none */
+    int scattered;             /* neighbours have nothing in common: one by one */
     const float *dx, *dy, *dz;
     uint32_t *prim;
     float *t, *u, *v;

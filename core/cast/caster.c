@@ -135,8 +135,15 @@ void caster_hits_from(struct caster *c, const struct bvh *bvh, const struct orig
                       uint32_t *triangle)
 {
     struct decide_ray ray = {.bvh = bvh, .t_max = (float)(range_max_m * 1.001)};
-    struct bvh_rays rays = {
-        .t_max = ray.t_max, .dx = c->fx, .dy = c->fy, .dz = c->fz, .t = c->t, .u = c->u, .v = c->v, .prim = c->prim};
+    struct bvh_rays rays = {.t_max = ray.t_max,
+                            .scattered = c->scattered,
+                            .dx = c->fx,
+                            .dy = c->fy,
+                            .dz = c->fz,
+                            .t = c->t,
+                            .u = c->u,
+                            .v = c->v,
+                            .prim = c->prim};
     set_origin(&ray, from->at_m[0], from->at_m[1], from->at_m[2]);
     for (int i = 0; i < 3; i++)
         rays.org[i] = (float)ray.o_local[i];

@@ -158,7 +158,7 @@ void bvh_intersect(const struct bvh *bvh, struct bvh_packets *packets, const str
 {
     const uint32_t width = bvh->info.packet;
     if (n == 0) return;
-    if (width == 1) {
+    if (width == 1 || rays->scattered) {
         intersect_1(bvh, rays, n);
         return;
     }

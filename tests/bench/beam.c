@@ -107,9 +107,9 @@ static void measure(const char *name, struct scene *scene, const double station_
         exit(1);
     }
     beam_outlines_get_info(rig.outlines, &info);
-    printf("%s: %u triangles, %llu edges, %llu outlines, %llu stretches, %llu entries, %.1f MB\n", name, scene->n_triangles,
-           (unsigned long long)info.edges, (unsigned long long)info.outlines, (unsigned long long)info.stretches, (unsigned long long)info.entries,
-           1e-6 * (double)info.bytes);
+    printf("%s: %u triangles, %llu edges, %llu outlines, %llu stretches, %llu entries, %.1f MB\n", name,
+           scene->n_triangles, (unsigned long long)info.edges, (unsigned long long)info.outlines,
+           (unsigned long long)info.stretches, (unsigned long long)info.entries, 1e-6 * (double)info.bytes);
     uint32_t n = view->lines * view->pulses;
     for (int r = 0; r < ROUNDS; r++)
         for (uint32_t m = 0; m < N_METHODS; m++) {
