@@ -33,6 +33,11 @@ struct job {
     double e1[3], e2[3];       /* across the beam */
 };
 
+/* A pulse of several points: its echoes in the list. */
+struct several {
+    uint32_t pulse, first, n;
+};
+
 struct beam_work {
     float steep[CHUNK], limit_m[CHUNK];
     uint32_t near[CHUNK]; /* pulses with sub-rays */
@@ -45,6 +50,7 @@ struct beam_work {
     double range_m[CHUNK], mirror_turn[CHUNK], pan_turn[CHUNK];
     double ex[CHUNK], ey[CHUNK], ez[CHUNK], px[CHUNK], py[CHUNK], pz[CHUNK];
     uint32_t label[CHUNK];
+    struct several several[CHUNK];
     uint64_t counter[CHUNK]; /* of the points' random numbers */
 };
 
@@ -459,24 +465,51 @@ static void write_several(struct writer *w, uint32_t p, const struct beam_echoes
     }
 }
 
-/* All pulses of a chunk; those with sub-rays are near[0 .. cut - 1], their echoes in e. */
-static void write_points(struct writer *w, const struct beam_echoes *e, uint32_t n, uint32_t cut)
+/* Pulses of a chunk with sub-rays are near[0 .. cut - 1], their echoes in e. Those that send one point become as the
+ * plain ones, in c. Returns how many send several. */
+static uint32_t make_plain(struct caster *c, const struct cast_setup *s, const struct beam_echoes *e, uint32_t cut,
+                           struct several *several)
 {
-    struct beam_work *kept = w->c->beam;
-    uint32_t from = 0;
+    struct beam_work *w = c->beam;
+    uint32_t left = 0;
     for (uint32_t k = 0, i = 0, end; k < cut; k++, i = end) {
-        uint32_t p = kept->near[k];
+        uint32_t p = w->near[k];
         for (end = i; end < e->n && e->pulse[end] == p;)
             end++;
-        if (end - i > 1 && w->s->echoes == BEAM_ALL) {
-            write_plain(w, from, p);
-            write_several(w, p, e, i, end - i);
-            from = p + 1;
+        if (end - i > 1 && s->echoes == BEAM_ALL) {
+            several[left++] = (struct several){p, i, end - i};
             continue;
         }
-        uint32_t one = end == i ? 0 : choose(e, w->s->echoes, i, end);
-        kept->range_m[p] = end == i ? (double)NAN : e->range_m[one];
-        if (end != i) kept->label[p] = e->label[one];
+        uint32_t one = end == i ? 0 : choose(e, s->echoes, i, end);
+        c->range_m[p] = end == i ? (double)NAN : e->range_m[one];
+        if (end != i) c->label[p] = e->label[one];
+    }
+    return left;
+}
+
+/* All pulses have one point each: they stand in c as they are. */
+static void write_all_plain(struct writer *w, uint32_t n)
+{
+    if (w->dt_ns != w->block->dt_ns + w->at) memmove(w->block->dt_ns + w->at, w->dt_ns, n * sizeof *w->dt_ns);
+    for (uint32_t i = 0; i < n && w->s->noise_on; i++)
+        w->c->beam->counter[i] = w->pulse0 + i;
+    w->n = n;
+    write_piece(w);
+}
+
+static void write_points(struct writer *w, const struct beam_echoes *e, uint32_t n, uint32_t cut)
+{
+    struct several *several = w->c->beam->several;
+    uint32_t left = make_plain(w->c, w->s, e, cut, several), from = 0;
+    if (left == 0) {
+        write_all_plain(w, n);
+        return;
+    }
+    keep(w->c, w->s, n);
+    for (uint32_t k = 0; k < left; k++) {
+        write_plain(w, from, several[k].pulse);
+        write_several(w, several[k].pulse, e, several[k].first, several[k].n);
+        from = several[k].pulse + 1;
     }
     write_plain(w, from, n);
     write_piece(w);
@@ -492,7 +525,6 @@ uint32_t beam_chunk(struct caster *c, const struct cast_setup *s, const struct o
     if (s->beam->mode == BEAM_ADAPTIVE) kernel_excess(&s->beam->beam, w->steep, n, c->range_m);
     detect_echoes(s, &w->some);
     caster_ends(c, CAST_DETECT);
-    keep(c, s, n);
     write_points(&writer, &w->some, n, cut);
     caster_ends(c, CAST_POSITIONS);
     *at = writer.at;

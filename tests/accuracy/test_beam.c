@@ -229,8 +229,7 @@ static void test_house(void **state)
     struct scene *scene;
     struct beam_rig rig;
     struct sh_err err;
-    if (scene_load(&spec, 1, 1e-4, NULL, &scene, &err) != 0 ||
-        beam_rig_open(&rig, scene, station_m, &view, &err) != 0)
+    if (scene_load(&spec, 1, 1e-4, NULL, &scene, &err) != 0 || beam_rig_open(&rig, scene, station_m, &view, &err) != 0)
         fail_msg("%s", err.text);
     against_reference(&rig, &view, 5 * SHARE, &adaptive, &rings);
     print_tally("house, adaptive", &adaptive);
@@ -269,8 +268,8 @@ static uint32_t make_wires(struct generate_bar *bar)
  * view is that of the bar. */
 static int may_reach(const struct beam *beam, const struct generate_bar *bar, const double dir[3])
 {
-    double axis[3], n[3], length = 0.0, off = 0.0, range_m = 1.02 * sqrt(bar->a[1] * bar->a[1] + bar->b[0] * bar->b[0] +
-                                                                        bar->b[2] * bar->b[2]);
+    double axis[3], n[3], length = 0.0, off = 0.0,
+                          range_m = 1.02 * sqrt(bar->a[1] * bar->a[1] + bar->b[0] * bar->b[0] + bar->b[2] * bar->b[2]);
     for (int i = 0; i < 3; i++)
         axis[i] = bar->b[i] - bar->a[i];
     for (int i = 0; i < 3; i++)
@@ -368,7 +367,8 @@ static void test_wires_against_rings(void **state)
 static void test_foliage(void **state)
 {
     (void)state;
-    const struct generate_crown crown[2] = {{{-4.0, 14.0, 1.0}, 3.0, 0.06, 20000}, {{3.0, 18.0, 0.0}, 4.0, 0.06, 20000}};
+    const struct generate_crown crown[2] = {{{-4.0, 14.0, 1.0}, 3.0, 0.06, 20000},
+                                            {{3.0, 18.0, 0.0}, 4.0, 0.06, 20000}};
     const struct beam_view view = {-12.0, 16.0, -30.0, 25.0, 10, 1000};
     struct tally adaptive = {0}, rings = {0};
     struct cast_counters before, after;
@@ -415,8 +415,8 @@ static struct scene *door(double step_m)
 }
 
 /* With steps from less than a millimetre to more than the resolution: one echo at the energy-weighted mean of both
- * surfaces up to it, two beyond, for each of the pulses across the edge. Half a millimetre is what the outlines take for
- * none; the mean there is off by at most half of the step. */
+ * surfaces up to it, two beyond, for each of the pulses across the edge. Half a millimetre is what the outlines take
+ * for none; the mean there is off by at most half of the step. */
 static void test_door_edge(void **state)
 {
     (void)state;
