@@ -136,10 +136,15 @@ CHART = $(BUILD)/chart/speed_accuracy
 $(BUILD)/tests/bench/chart: tests/bench/chart.c tests/bench/reference.c $(BUILD)/modules.a
 $(BUILD)/tests/bench/chart_georef: tests/bench/chart_georef.c $(BUILD)/modules.a
 CHARTS = $(BUILD)/tests/bench/chart $(BUILD)/tests/bench/chart_georef
-$(CHARTS):
+$(CHARTS) $(BUILD)/tests/bench/beam:
 	@mkdir -p $(@D)
 	@echo "  CHART $@"
 	$(Q)$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -o $@ $^ $(LDLIBS)
+# Footprints: cost, and error against 1,000 sub-rays; a few minutes.
+$(BUILD)/tests/bench/beam: tests/bench/beam.c tests/accuracy/beam_reference.c $(BUILD)/modules.a
+bench-beam: deps-build
+	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/beam
+	@$(BUILD)/tests/bench/beam house wires foliage leaves
 chart: deps-build
 	$(call install_missing,$(DEPS_CHART))
 	@$(MAKE) --no-print-directory -j2 $(CHARTS)
@@ -163,6 +168,6 @@ format:
 	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')
 clean:
 	rm -rf $(BUILD)
-.PHONY: all deps deps-test deps-build demo test test-unit test-wire test-accuracy test-stability objects test-unit-programs test-programs bench chart install format clean
+.PHONY: all deps deps-test deps-build demo test test-unit test-wire test-accuracy test-stability objects test-unit-programs test-programs bench bench-beam chart install format clean
 .SECONDARY:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)

@@ -64,9 +64,10 @@ static void wires(const char *regime, double range_m, double diameter_m)
     struct sh_err err;
     for (int k = 0; k < 8; k++) {
         double z = range_m * (0.01 * k - 0.035), half = 0.2 * range_m;
-        bar[k] = (struct generate_bar){
-            .a = {-half, range_m, z - 0.002 * half}, .b = {half, range_m, z + 0.003 * half}, .diameter_m = diameter_m,
-            .label = 1};
+        bar[k] = (struct generate_bar){.a = {-half, range_m, z - 0.002 * half},
+                                       .b = {half, range_m, z + 0.003 * half},
+                                       .diameter_m = diameter_m,
+                                       .label = 1};
     }
     const struct beam_view view = {-2.1, 2.1, -6.0, 6.0, LINES, 600};
     if (generate_bars(bar, 8, 150.0, &scene, &err) != 0) fail_msg("%s", err.text);
@@ -138,8 +139,7 @@ static void test_door_edge(void **state)
                     struct beam_ref ref;
                     beam_ref_pulse(rig.caster, rig.bvh, &rig.beam.beam, STATION_M, dir, rig.setup.range_max_m, &ref);
                     assert_int_equal(ref.n, 1);
-                    worst[method] =
-                        fmax(worst[method], fabs(1e-6 * rig.block.a[i] - ref.echo[0].range_m) / step_m[k]);
+                    worst[method] = fmax(worst[method], fabs(1e-6 * rig.block.a[i] - ref.echo[0].range_m) / step_m[k]);
                 }
             }
         }
