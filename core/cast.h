@@ -114,7 +114,8 @@ struct cast_setup {
      * relative to, and rotation is not used. n_knots 0: the head stands still at station_m. */
     uint32_t n_knots;
     const struct pose_knot *knot;
-    const struct cast_detect *detect; /* NULL: every hit within the limits is one echo, the head is ideal */
+    /* NULL: every hit within the limits is one echo, the head is ideal. Else beam is NULL: they are not joined. */
+    const struct cast_detect *detect;
 };
 
 /* How often the exact stage had to look twice. */
@@ -139,8 +140,8 @@ struct caster;
 int caster_create(struct caster **out, struct sh_err *err);
 void caster_free(struct caster *caster);
 
-/* Fills block from the run; capacity >= run->n times the echoes that a pulse may have (1 + depth). Returns the number
- * of echoes. Allocates nothing. */
+/* Fills block from the run; capacity >= run->n times the echoes that a pulse may have (1 + depth, beam->max_echoes).
+ * Returns the number of echoes. Allocates nothing. */
 uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
                      struct line_block *block);
 

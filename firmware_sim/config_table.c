@@ -245,7 +245,8 @@ static const struct cfg_key config_keys[] = {
     {"beam", CFG_MAP, .help = "The footprint of the pulses."},
     {"beam.mode", CFG_ENUM, .def = "single", .names = beam_names, IN_CONFIG(beam_mode),
      .help = "single: one ray per pulse; rings: sub-rays over the footprint; adaptive: where it reaches over an edge; "
-             "auto: adaptive where head and scene stand still, else rings."},
+             "auto: adaptive where head and scene stand still, else rings. Only single with signal.model, glass, mirrors, "
+             "noise.ball, noise.angle, head.ambiguity, instrument."},
     {"beam.rings", CFG_COUNT, NULL, "4", 0, BEAM_MAX_RINGS, IN_CONFIG(beam_rings),
      .help = "Rings of sub-rays, 1 + 3 n (n + 1) in all; adaptive: where a footprint holds more edges than it can tell "
              "apart."},
