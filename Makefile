@@ -162,10 +162,15 @@ $(BUILD)/tests/bench/chart: tests/bench/chart.c tests/bench/reference.c $(BUILD)
 $(BUILD)/tests/bench/chart_georef: tests/bench/chart_georef.c $(BUILD)/modules.a
 $(BUILD)/tests/bench/chart_widths: tests/bench/chart_widths.c $(BUILD)/modules.a
 CHARTS = $(BUILD)/tests/bench/chart $(BUILD)/tests/bench/chart_georef $(BUILD)/tests/bench/chart_widths
-$(CHARTS):
+$(CHARTS) $(BUILD)/tests/bench/beam:
 	@mkdir -p $(@D)
 	@echo "  CHART $@"
 	$(Q)$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -o $@ $^ $(LDLIBS)
+# Footprints: cost, and error against 1,000 sub-rays; a few minutes.
+$(BUILD)/tests/bench/beam: tests/bench/beam.c tests/accuracy/beam_reference.c $(BUILD)/modules.a
+bench-beam: deps-build
+	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/beam
+	@$(BUILD)/tests/bench/beam house wires foliage leaves
 chart: deps-build
 	$(call install_missing,$(DEPS_CHART))
 	@$(MAKE) --no-print-directory -j2 $(CHARTS)
@@ -193,6 +198,6 @@ format:
 clean:
 	rm -rf $(BUILD)
 .PHONY: all deps deps-test deps-build deps-guest demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb \
-	test-usb-million objects test-unit-programs test-programs bench chart install format clean
+	test-usb-million objects test-unit-programs test-programs bench bench-beam chart install format clean
 .SECONDARY:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)

@@ -10,6 +10,7 @@
 
 #include <stdint.h>
 
+#include "core/beam.h"
 #include "core/detect.h"
 #include "core/err.h"
 #include "core/georef.h"
@@ -79,6 +80,15 @@ struct cast_detect {
     const struct detect_ball *ball;
 };
 
+/* A beam with a footprint (core/beam.h). Constant; any thread. */
+struct cast_beam {
+    struct beam beam;
+    enum beam_mode mode; /* BEAM_RINGS, or BEAM_ADAPTIVE with outlines: then the head and the scene stand still */
+    uint32_t max_echoes; /* of a pulse; up to LINE_MAX_ECHOES */
+    struct beam_pattern pattern, fine; /* sub-rays; the finest */
+    const struct beam_outlines *outlines;
+};
+
 /* What stays the same for all pulses of a scan (the movers' poses: of a run). */
 struct cast_setup {
     const struct bvh *bvh;
@@ -93,6 +103,10 @@ struct cast_setup {
     enum line_layout layout;
     double range_scale_m;
     double xyz_scale[3]; /* units of the CRS per count, see georef_scale */
+    /* NULL: pulses are single rays. Else the BVH's station_reach_m covers the exit radius, and blocks have room for
+     * beam->max_echoes entries a pulse. */
+    const struct cast_beam *beam;
+    enum beam_select echoes; /* which of a pulse's */
     uint32_t n_movers;
     struct cast_mover mover[CAST_MAX_MOVERS];
     /* A moving head: poses of the head (socs -> prcs) in order of time, pose_between them. They cover the firing times
@@ -100,7 +114,8 @@ struct cast_setup {
      * relative to, and rotation is not used. n_knots 0: the head stands still at station_m. */
     uint32_t n_knots;
     const struct pose_knot *knot;
-    const struct cast_detect *detect; /* NULL: every hit within the limits is one echo, the head is ideal */
+    /* NULL: every hit within the limits is one echo, the head is ideal. Else beam is NULL: they are not joined. */
+    const struct cast_detect *detect;
 };
 
 /* How often the exact stage had to look twice. */
@@ -112,6 +127,11 @@ struct cast_counters {
     uint64_t faint;     /* hits below the detection threshold, or in a blind time: shots without echo, or echoes less */
     uint64_t crowded;   /* echoes beyond max_echoes, left out */
     uint64_t undecided; /* nearer to an edge than double precision can tell: counted as hit */
+    /* with a beam */
+    uint64_t outlined; /* adaptive: pulses whose footprint an outline cuts */
+    uint64_t sub_rays; /* cast beyond the central ones */
+    uint64_t ragged;   /* adaptive: pulses with more outlines than can be told apart, cast as rings */
+    uint64_t left_out; /* echoes beyond max_echoes */
 };
 
 struct caster;
@@ -120,8 +140,8 @@ struct caster;
 int caster_create(struct caster **out, struct sh_err *err);
 void caster_free(struct caster *caster);
 
-/* Fills block from the run; capacity >= run->n times the echoes that a pulse may have (1 + depth). Returns the number
- * of echoes. Allocates nothing. */
+/* Fills block from the run; capacity >= run->n times the echoes that a pulse may have (1 + depth, beam->max_echoes).
+ * Returns the number of echoes. Allocates nothing. */
 uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
                      struct line_block *block);
 
@@ -132,6 +152,11 @@ enum { CAST_NO_TRIANGLE = 0xffffffff };
  * range_max_m may or may not be told. Range error: see tests/accuracy. Allocates nothing. */
 void caster_hits(struct caster *caster, const struct bvh *bvh, const double station_m[3], double range_max_m,
                  uint32_t n, const double *dx, const double *dy, const double *dz, double *range_m, uint32_t *triangle);
+
+/* The outlines of a scene that are steps as seen from the station, which lies within the BVH's station_reach_m
+ * (beam_outlines_create). For setting up. */
+int cast_outlines(const struct scene *scene, const struct bvh *bvh, const double station_m[3], const struct beam *beam,
+                  double range_max_m, struct beam_outlines **out, struct sh_err *err);
 
 /* Cost by stage, for measuring: `now` counts in any unit and is read between the stages of each chunk. */
 enum cast_stage {

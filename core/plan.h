@@ -35,6 +35,8 @@ struct plan_head {
     int order_exactly; /* surfaces that overlap are ordered in double */
     double range_max_m;
     uint32_t n_movers;
+    int beam_adaptive;  /* adaptive beam */
+    uint32_t beam_rays; /* sub-rays of rings; 0: single rays */
     int noise_on;
     double range_sigma_m, range_sigma_ppm;
     double range_sigma_at_m; /* noise by the signal: where that sigma holds; 0: whatever the signal */

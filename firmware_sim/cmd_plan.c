@@ -69,6 +69,7 @@ static int is_zero(const struct config_instrument *k)
 static void ask_head(const struct config *cfg, const struct site *site, struct plan_head *head)
 {
     const struct site_detect *d = &site->detect;
+    const struct cast_beam *beam = site->station[0].beam;
     struct bvh_info info;
     bvh_get_info(site->station[0].bvh, &info);
     *head = (struct plan_head){
@@ -76,6 +77,8 @@ static void ask_head(const struct config *cfg, const struct site *site, struct p
         .order_exactly = cfg->order_exactly,
         .range_max_m = cfg->profile.range_max_m,
         .n_movers = site->n_movers,
+        .beam_adaptive = beam != NULL && beam->mode == BEAM_ADAPTIVE,
+        .beam_rays = beam != NULL ? beam->pattern.n : 0,
         .noise_on = cfg->noise_range != RANGE_NOISE_OFF,
         .range_sigma_m = cfg->profile.range_sigma_m,
         .range_sigma_ppm = cfg->profile.range_sigma_ppm,

@@ -66,6 +66,26 @@ static int is_letter(char c)
     return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z');
 }
 
+/* One of a setting's words, or DEF; returns -1 when it failed. */
+static int parse_word(struct command_call *call)
+{
+    const char *const *words = call->row->setting->words;
+    char list[96] = "", clip[COMMAND_CLIP_LEN];
+    size_t len = 0;
+    if (command_word_matches("DEFault", call->param)) {
+        call->value.kind = COMMAND_VALUE_DEF;
+        return 0;
+    }
+    call->value.kind = COMMAND_VALUE_WORD;
+    for (call->value.word = 0; words[call->value.word] != NULL; call->value.word++) {
+        if (command_word_matches(words[call->value.word], call->param)) return 0;
+        len += (size_t)snprintf(list + len, sizeof list - len, "%s, ", words[call->value.word]);
+    }
+    command_clip(clip, call->param, strlen(call->param));
+    command_fail(call, CMD_E_DATA_TYPE, "%s takes %sDEF, not '%s'", call->row->header, list, clip);
+    return -1;
+}
+
 /* The one parameter of a setting or a step; returns -1 when it failed. */
 static int parse_value(struct command_call *call)
 {
@@ -81,6 +101,7 @@ static int parse_value(struct command_call *call)
         command_fail(call, CMD_E_NOT_ALLOWED, "%s takes one value", row->header);
         return -1;
     }
+    if (row->setting != NULL && row->setting->words != NULL) return parse_word(call);
     if (row->setting != NULL && parse_special(call->param, &call->value.kind)) return 0;
     call->value.kind = COMMAND_VALUE_NUMBER;
     command_clip(clip, call->param, strlen(call->param));
@@ -125,7 +146,8 @@ static void do_act(struct command_call *call)
         return;
     }
     if (row->unit != NULL && call->param[0] == '\0') {
-        command_fail(call, CMD_E_MISSING, "%s takes a number", row->header);
+        command_fail(call, CMD_E_MISSING, "%s takes a %s", row->header,
+                     row->setting != NULL && row->setting->words != NULL ? "word" : "number");
         return;
     }
     if (row->unit != NULL && parse_value(call) != 0) return;

@@ -2,8 +2,9 @@
  *
  *   *IDN?  *RST  *CLS  *OPC?  *STB?  SYSTem:ERRor[:NEXT]?  SYSTem:ERRor:COUNt?  SYSTem:VERSion?  SYSTem:CONTrol:RELease
  *   SYSTem:CONTrol?  HEAD:PRR  HEAD:LINes  HEAD:PAN  HEAD:STATe?  HEAD:STATION  SCAN:LINE:STARt  SCAN:LINE:STOP
- *   SCAN:PAN:STARt  SCAN:PAN:STOP  SCAN:FRAMes  SCAN:STARt  SCAN:STOP  SCAN:COUNt?  HELP?  TIME?  TIME:UTC?
+ *   SCAN:PAN:STARt  SCAN:PAN:STOP  SCAN:FRAMes  SCAN:ECHoes  SCAN:STARt  SCAN:STOP  SCAN:COUNt?  HELP?  TIME? TIME:UTC?
  *   TIME:GPS?  TIME:STEP
+ * SCAN:ECHoes takes ALL, FIRSt, LAST, STRongest or DEF: which echoes of a pulse are sent.
  * Short and long forms, any case (HEAD:STATION has no short one: STAT is STATe); a query ends in '?'. MIN, MAX and DEF
  * are taken as a number; a setting's query takes MIN, MAX and DEF too ("HEAD:PRR? MAX"). MIN and MAX are the limits as
  * the profile and the other settings leave them now, so they are never refused. A setting may carry its unit as a

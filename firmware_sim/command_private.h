@@ -83,16 +83,24 @@ struct command_setting {
     struct command_bound min, max;
     const char *other; /* header of the other setting; NULL: none */
     size_t other_offset;
-    int64_t least, most; /* COMMAND_UNBOUND: no such bound */
+    int64_t least, most;      /* COMMAND_UNBOUND: no such bound */
+    const char *const *words; /* values are these, by their place; NULL: numbers */
 };
 #define COMMAND_UNBOUND INT64_MIN
 
-enum command_value_kind { COMMAND_VALUE_NUMBER, COMMAND_VALUE_MIN, COMMAND_VALUE_MAX, COMMAND_VALUE_DEF };
+enum command_value_kind {
+    COMMAND_VALUE_NUMBER,
+    COMMAND_VALUE_WORD,
+    COMMAND_VALUE_MIN,
+    COMMAND_VALUE_MAX,
+    COMMAND_VALUE_DEF
+};
 
 struct command_value {
     enum command_value_kind kind;
     struct command_decimal decimal;
     int shift; /* of the suffix */
+    uint32_t word;
 };
 
 struct command_call {

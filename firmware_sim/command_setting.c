@@ -65,6 +65,10 @@ void command_setting_query(struct command_call *call)
                               ? read_field(&call->dev->settings, setting->offset, setting->is_u32)
                               : special_value(call);
     char number[NUMBER_LEN];
+    if (setting->words != NULL) {
+        command_reply(call, "%s", setting->words[value]);
+        return;
+    }
     command_format_fixed(number, sizeof number, value, call->row->unit->decimals);
     command_reply(call, "%s", number);
 }
@@ -137,7 +141,9 @@ void command_setting_change(struct command_call *call)
 {
     const struct command_setting *setting = call->row->setting;
     int64_t value;
-    if (call->value.kind != COMMAND_VALUE_NUMBER)
+    if (call->value.kind == COMMAND_VALUE_WORD)
+        value = call->value.word;
+    else if (call->value.kind != COMMAND_VALUE_NUMBER)
         value = special_value(call);
     else if (command_value_in_range(call, read_bound(call, &setting->min), read_bound(call, &setting->max), &value) !=
              0)

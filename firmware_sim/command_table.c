@@ -18,27 +18,31 @@ static const struct command_unit unit_deg_s = {"deg/s", 6, "DEG/S", {{"DEG/S", 0
 static const struct command_unit unit_ns = {"ns", 0, "NS, US, MS or S", {{"NS", 0}, {"US", 3}, {"MS", 6}, {"S", 9}}};
 static const struct command_unit unit_count = {"", 0, "no unit", {{NULL, 0}}};
 
-enum { PRR, LINES, PAN, STATION, LINE_START, LINE_STOP, PAN_START, PAN_STOP, FRAMES };
+enum { PRR, LINES, PAN, STATION, LINE_START, LINE_STOP, PAN_START, PAN_STOP, FRAMES, ECHOES };
+
+/* In the order of enum beam_select. */
+static const char *const echo_words[] = {"ALL", "FIRSt", "LAST", "STRongest", NULL};
 
 /* A pulse rate below the line rate would leave lines without a pulse; a line or a pan sweep of no width has nothing to
  * scan, and one beyond a turn would scan things twice. */
 static const struct command_setting settings[] = {
-    /* field, is_u32, not_in_scan, min, max, other, its field, least, most */
+    /* field, is_u32, not_in_scan, min, max, other, its field, least, most, words */
     [PRR] = {SETTING(prr_uhz), 0, 0, PROFILE(prr_min_uhz), PROFILE(prr_max_uhz),
-             "HEAD:LINes", SETTING(lines_uhz), 0, COMMAND_UNBOUND},
+             "HEAD:LINes", SETTING(lines_uhz), 0, COMMAND_UNBOUND, NULL},
     [LINES] = {SETTING(lines_uhz), 0, 0, PROFILE(lines_min_uhz), PROFILE(lines_max_uhz),
-               "HEAD:PRR", SETTING(prr_uhz), COMMAND_UNBOUND, 0},
-    [PAN] = {SETTING(pan_udeg_s), 0, 0, CONSTANT(0), PROFILE(pan_max_udeg_s), NO_OTHER},
-    [STATION] = {SETTING(station), 1, 1, CONSTANT(1), PROFILE(n_stations), NO_OTHER},
+               "HEAD:PRR", SETTING(prr_uhz), COMMAND_UNBOUND, 0, NULL},
+    [PAN] = {SETTING(pan_udeg_s), 0, 0, CONSTANT(0), PROFILE(pan_max_udeg_s), NO_OTHER, NULL},
+    [STATION] = {SETTING(station), 1, 1, CONSTANT(1), PROFILE(n_stations), NO_OTHER, NULL},
     [LINE_START] = {SETTING(line_start_udeg), 0, 0, PROFILE(fov_min_udeg), PROFILE(fov_max_udeg),
-                    "SCAN:LINE:STOP", SETTING(line_stop_udeg), COMMAND_UNBOUND, -1},
+                    "SCAN:LINE:STOP", SETTING(line_stop_udeg), COMMAND_UNBOUND, -1, NULL},
     [LINE_STOP] = {SETTING(line_stop_udeg), 0, 0, PROFILE(fov_min_udeg), PROFILE(fov_max_udeg),
-                   "SCAN:LINE:STARt", SETTING(line_start_udeg), 1, COMMAND_UNBOUND},
+                   "SCAN:LINE:STARt", SETTING(line_start_udeg), 1, COMMAND_UNBOUND, NULL},
     [PAN_START] = {SETTING(pan_start_udeg), 0, 0, PROFILE(pan_min_udeg), PROFILE(pan_max_udeg),
-                   "SCAN:PAN:STOP", SETTING(pan_stop_udeg), -TURN_UDEG, -1},
+                   "SCAN:PAN:STOP", SETTING(pan_stop_udeg), -TURN_UDEG, -1, NULL},
     [PAN_STOP] = {SETTING(pan_stop_udeg), 0, 0, PROFILE(pan_min_udeg), PROFILE(pan_max_udeg),
-                  "SCAN:PAN:STARt", SETTING(pan_start_udeg), 1, TURN_UDEG},
-    [FRAMES] = {SETTING(frames), 1, 0, CONSTANT(0), CONSTANT(UINT32_MAX), NO_OTHER},
+                  "SCAN:PAN:STARt", SETTING(pan_start_udeg), 1, TURN_UDEG, NULL},
+    [FRAMES] = {SETTING(frames), 1, 0, CONSTANT(0), CONSTANT(UINT32_MAX), NO_OTHER, NULL},
+    [ECHOES] = {SETTING(echoes), 1, 0, CONSTANT(0), CONSTANT(3), NO_OTHER, echo_words},
 };
 /* clang-format on */
 
@@ -208,6 +212,7 @@ static const struct command_row rows[] = {
     VALUE("SCAN:PAN:STARt", unit_deg, PAN_START),
     VALUE("SCAN:PAN:STOP", unit_deg, PAN_STOP),
     VALUE("SCAN:FRAMes", unit_count, FRAMES),
+    VALUE("SCAN:ECHoes", unit_count, ECHOES),
     ACTION("SCAN:STARt", act_start, 0),
     ACTION("SCAN:STOP", act_stop, 0),
     QUERY("SCAN:COUNt", query_count),

@@ -11,6 +11,7 @@
 #include <stdint.h>
 #include <stdio.h>
 
+#include "core/beam.h"
 #include "core/detect.h"
 #include "core/err.h"
 #include "core/georef.h"
@@ -52,7 +53,8 @@ struct config_profile {
     } reach[DETECT_MAX_REACHES];
     uint32_t n_reaches; /* 0: range_max_m on 90 % */
     double threshold_snr, overlap_m, wavelength_nm, visibility_m, pulse_width_ns;
-    double mirror_counts, pan_counts; /* encoder counts per turn of the beam angle; 0: ideal (2^32 counts) */
+    double mirror_counts, pan_counts;        /* encoder counts per turn of the beam angle; 0: ideal (2^32 counts) */
+    double beam_exit_m, beam_divergence_rad; /* core/beam.h */
     uint32_t max_echoes;
     double boot_s, spin_up_s, spin_down_s;
 };
@@ -186,6 +188,9 @@ struct config {
     /* links */
     struct link_spec link[CONFIG_MAX_LINKS];
     uint32_t n_links;
+    /* beam */
+    enum beam_mode beam_mode;
+    uint32_t beam_rings;
     /* noise */
     enum config_range_noise noise_range; /* off, on or signal once it is loaded */
     int noise_angle;
@@ -213,11 +218,17 @@ struct config {
  * `--set KEY` in errors). On failure cfg is unspecified. cfg is large: allocate it. */
 int config_load(const char *path, const char *const *sets, int n_sets, struct config *cfg, struct sh_err *err);
 
+/* Whether pulses are followed through glass or off mirrors. */
+int config_has_optics(const struct config *cfg);
+
 /* Entries that a pulse may need in a block: its echoes, as far as the configuration allows for more than one. */
 uint32_t config_points_per_pulse(const struct config *cfg);
 
 /* What a profile says about the signal; the rest of it (sharp, extinction, seed) is 0. */
 void config_signal_spec(const struct config_profile *profile, struct detect_signal_spec *spec);
+
+/* Whether anything in the scene, or the head, moves. */
+int config_moves(const struct config *cfg);
 
 /* The reference: every key with type, unit, default, range and help. */
 void config_print_reference(FILE *out);

@@ -266,6 +266,42 @@ static int check_platform(const struct cfg_reader *rd, struct config *cfg)
     return check_part(rd, cfg);
 }
 
+int config_moves(const struct config *cfg)
+{
+    int moves = cfg->platform.kind != PLATFORM_STATIC;
+    for (uint32_t i = 0; i < cfg->n_meshes; i++) {
+        const struct config_mesh *m = &cfg->mesh[i];
+        moves |= m->turn_deg_s != 0.0 || m->move_m_s[0] != 0.0 || m->move_m_s[1] != 0.0 || m->move_m_s[2] != 0.0;
+    }
+    return moves;
+}
+
+/* What a pulse with a footprint is not joined with yet: the key that asks for it, or NULL. */
+static const char *asks_for_detection(const struct config *cfg)
+{
+    static const struct config_instrument ideal;
+    if (cfg->signal.on) return "signal.model";
+    if (config_has_optics(cfg)) return "surfaces with glass or a mirror";
+    if (cfg->ambiguity != DETECT_AMBIGUITY_NONE) return "head.ambiguity";
+    if (cfg->ball.radius_m > 0.0) return "noise.ball";
+    if (cfg->noise_angle) return "noise.angle";
+    return memcmp(&cfg->instrument, &ideal, sizeof ideal) != 0 ? "instrument" : NULL;
+}
+
+/* Outlines are those that a head that stands still sees of a scene that does. */
+static int check_beam(const struct cfg_reader *rd, const struct config *cfg)
+{
+    if (cfg->beam_mode != BEAM_SINGLE && cfg->profile.beam_exit_m == 0.0 && cfg->profile.beam_divergence_rad == 0.0)
+        return cfg_fail_key(rd, "beam.mode", 0, "head profile %s has no footprint; allowed single", cfg->profile.name);
+    if (cfg->beam_mode == BEAM_ADAPTIVE && config_moves(cfg))
+        return cfg_fail_key(rd, "beam.mode", 0, "adaptive, but the head or a mesh moves; allowed single, rings, auto");
+    const char *asks = cfg->beam_mode == BEAM_SINGLE ? NULL : asks_for_detection(cfg);
+    if (asks != NULL)
+        return cfg_fail_key(rd, "beam.mode", 0, "%s, and %s: not possible together; allowed single, or without that",
+                            cfg_find(&rd->table, "beam.mode")->names[cfg->beam_mode], asks);
+    return SH_OK;
+}
+
 static int check_loop(const struct cfg_reader *rd, const struct config *cfg)
 {
     if (fmod(1e9, cfg->tick_hz) == 0.0 && floor(cfg->tick_hz) == cfg->tick_hz) return SH_OK;
@@ -312,6 +348,7 @@ int cfg_check(const struct cfg_reader *rd, struct config *cfg)
     if (code == SH_OK) code = check_platform(rd, cfg);
     for (uint32_t i = 0; i < cfg->n_links && code == SH_OK; i++)
         code = check_link(rd, cfg, i);
+    if (code == SH_OK) code = check_beam(rd, cfg);
     if (code == SH_OK) code = check_loop(rd, cfg);
     if (code == SH_OK) code = check_time(rd, cfg);
     if (code == SH_OK) code = cfg_check_signal(rd, cfg);

@@ -39,12 +39,18 @@ int cfg_check_reaches(const struct cfg_reader *rd, const struct config_profile *
     return SH_OK;
 }
 
-uint32_t config_points_per_pulse(const struct config *cfg)
+int config_has_optics(const struct config *cfg)
 {
     int optics = 0;
     for (uint32_t i = 0; i < cfg->n_surfaces; i++)
         optics |= cfg->surface[i].surface.glass > 0.0 || cfg->surface[i].surface.mirror > 0.0;
-    uint32_t most = optics ? 1 + cfg->optics_depth : 1;
+    return optics && cfg->optics_depth > 0;
+}
+
+uint32_t config_points_per_pulse(const struct config *cfg)
+{
+    if (cfg->beam_mode != BEAM_SINGLE) return cfg->profile.max_echoes;
+    uint32_t most = config_has_optics(cfg) ? 1 + cfg->optics_depth : 1;
     return most < cfg->profile.max_echoes ? most : cfg->profile.max_echoes;
 }
 

@@ -60,6 +60,10 @@ static const char *const detection_names[] = {"noisy", "sharp", NULL};
 static const char *const from_names[] = {[FROM_DATA_SHEET] = "data sheet", [FROM_ASSUMED] = "assumed", NULL};
 static const char *const ambiguity_names[] = {
     [DETECT_AMBIGUITY_NONE] = "none", [DETECT_FOLDED] = "folded", [DETECT_RESOLVED] = "resolved", NULL};
+static const char *const beam_names[] = {
+    [BEAM_SINGLE] = "single", [BEAM_RINGS] = "rings", [BEAM_ADAPTIVE] = "adaptive", [BEAM_AUTO] = "auto", NULL};
+static const char *const echoes_names[] = {
+    [BEAM_ALL] = "all", [BEAM_FIRST] = "first", [BEAM_LAST] = "last", [BEAM_STRONGEST] = "strongest", NULL};
 static const char *const at_end_names[] = {[PLATFORM_STOP] = "stop", [PLATFORM_HOLD] = "hold", NULL};
 
 /* clang-format off */
@@ -238,6 +242,17 @@ static const struct cfg_key config_keys[] = {
      .help = "usb: product id."},
     {"links[].serial", CFG_TEXT, .def = "", IN_LINK(serial), .help = "usb: serial number; head.serial when not given."},
 
+    {"beam", CFG_MAP, .help = "The footprint of the pulses."},
+    {"beam.mode", CFG_ENUM, .def = "single", .names = beam_names, IN_CONFIG(beam_mode),
+     .help = "single: one ray per pulse; rings: sub-rays over the footprint; adaptive: where it reaches over an edge; "
+             "auto: adaptive where head and scene stand still, else rings. Only single with signal.model, glass, mirrors, "
+             "noise.ball, noise.angle, head.ambiguity, instrument."},
+    {"beam.rings", CFG_COUNT, NULL, "4", 0, BEAM_MAX_RINGS, IN_CONFIG(beam_rings),
+     .help = "Rings of sub-rays, 1 + 3 n (n + 1) in all; adaptive: where a footprint holds more edges than it can tell "
+             "apart."},
+    {"beam.echoes", CFG_ENUM, .def = "all", .names = echoes_names, IN_CONFIG(settings.echoes),
+     .help = "Which echoes of a pulse are sent: all, first, last, strongest."},
+
     {"noise", CFG_MAP, .help = "Noise of the measurement."},
     {"noise.range", CFG_ENUM, .def = "off", .names = range_noise_names, IN_CONFIG(noise_range), .allowed = "on or off, or signal",
      .help = "Range noise. on: the profile's range_sigma_m and ppm, whatever the target; signal: that figure holds at "
@@ -399,8 +414,6 @@ static const struct cfg_key profile_keys[] = {
      .help = "Signal-to-noise ratio (amplitudes) at the detection threshold."},
     {"overlap_m", CFG_REAL, "m", "0", 0, 1000, IN_PROFILE(overlap_m), FIGURE,
      .help = "Range below which light misses the detector: 1 - exp(-(R / overlap_m)^2) of it is caught; 0: all."},
-    {"pulse_width_ns", CFG_REAL, "ns", "0", 0, 1000, IN_PROFILE(pulse_width_ns), FIGURE,
-     .help = "Width of the pulse, at half maximum: returns within c / 2 times that are one echo."},
     {"wavelength_nm", CFG_REAL, "nm", "1550", 400, 2000, IN_PROFILE(wavelength_nm), FIGURE, .help = "Of the laser."},
     {"visibility_m", CFG_REAL, "m", "23000", 100, 1e6, IN_PROFILE(visibility_m), FIGURE,
      .help = "Visibility that the reaches hold for."},
@@ -408,6 +421,12 @@ static const struct cfg_key profile_keys[] = {
      .help = "Encoder counts per turn of the line angle; 0: ideal."},
     {"pan_counts", CFG_REAL, NULL, NULL, 0, 4294967296.0, IN_PROFILE(pan_counts), FIGURE,
      .help = "Encoder counts per turn of the pan; 0: ideal."},
+    {"beam_exit_m", CFG_REAL, "m", NULL, 0, 1, IN_PROFILE(beam_exit_m), FIGURE,
+     .help = "Diameter of the beam at the exit, at 1/e2 of its irradiance."},
+    {"beam_divergence_rad", CFG_REAL, "rad", NULL, 0, 0.01, IN_PROFILE(beam_divergence_rad), FIGURE,
+     .help = "Full divergence at 1/e2: 1.41 times one at 1/e, 1.70 times one at half maximum."},
+    {"pulse_width_ns", CFG_REAL, "ns", NULL, 0, 1000, IN_PROFILE(pulse_width_ns), FIGURE,
+     .help = "Width of the pulse: echoes nearer to each other than c / 2 of it are one."},
     {"max_echoes", CFG_COUNT, NULL, NULL, 1, LINE_MAX_ECHOES, IN_PROFILE(max_echoes), FIGURE, .help = "Echoes per pulse."},
     {"boot_s", CFG_REAL, "s", NULL, 0, 600, IN_PROFILE(boot_s), FIGURE, .help = "Power-on to ready."},
     {"spin_up_s", CFG_REAL, "s", NULL, 0, 600, IN_PROFILE(spin_up_s), FIGURE, .help = "Start command to mirror at speed."},

@@ -170,6 +170,7 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
     work->segment = *seg;
     work->station = device->station;
     work->stretch = device->stretch;
+    work->echoes = device->cmd.settings.echoes;
     work->pulse0 = device->pulse_next;
     /* A stop keeps what was fired before this tick began; else the cut leaves whole packets for the next tick. */
     int64_t path_end_ns = device_path_end_ns(device), until_ns = stop ? since : since + device->tick_ns;

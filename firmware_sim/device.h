@@ -47,6 +47,7 @@ struct device_work {
     int cut_short;              /* the scan stops at pulse_end, within a line */
     uint32_t station;
     size_t stretch;   /* of a trajectory: the one that the last anchor was for */
+    uint32_t echoes;  /* enum beam_select */
     uint32_t n_poses; /* live: the head's poses of this tick; 0: a head that stands still, or goes along a trajectory */
     struct pose_knot pose[DEVICE_MAX_POSES];
     int telemetry;

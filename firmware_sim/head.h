@@ -45,6 +45,7 @@ struct head_settings {
     int64_t pan_start_udeg, pan_stop_udeg;   /* start <= stop, at most a turn apart */
     uint32_t frames;                         /* frames per scan; 0: until stopped */
     uint32_t station;                        /* from 1 */
+    uint32_t echoes;                         /* enum beam_select: which of a pulse's are sent */
 };
 
 /* What the head can do: from its profile. */

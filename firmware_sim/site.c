@@ -181,6 +181,26 @@ void site_grid(const struct site *site, int *zone, int *side)
     if (*side == 0) *side = utm.north ? 1 : -1;
 }
 
+/* The beam as it is from a station. */
+static int make_beam(struct site *site, struct site_station *s, const struct sh_report *report, struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    const struct config_profile *p = &cfg->profile;
+    if (cfg->beam_mode == BEAM_SINGLE) return SH_OK;
+    struct cast_beam *beam = s->beam = calloc(1, sizeof *beam);
+    if (beam == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
+    beam->mode = cfg->beam_mode != BEAM_AUTO ? cfg->beam_mode : config_moves(cfg) ? BEAM_RINGS : BEAM_ADAPTIVE;
+    beam->max_echoes = p->max_echoes;
+    beam_init(&beam->beam, p->beam_exit_m, p->beam_divergence_rad, 1e-9 * p->pulse_width_ns);
+    beam_rings(cfg->beam_rings, &beam->pattern);
+    beam_rings(BEAM_FINE_RINGS, &beam->fine);
+    if (beam->mode != BEAM_ADAPTIVE) return SH_OK;
+    if (site->scene->n_triangles > 1000000) sh_progress(report, "looking for outlines", -1.0);
+    int rc = cast_outlines(site->scene, s->bvh, s->at.position_m, &beam->beam, p->range_max_m, &s->outlines, err);
+    beam->outlines = s->outlines;
+    return rc;
+}
+
 static int add_station(struct site *site, uint32_t i, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
@@ -192,6 +212,7 @@ static int add_station(struct site *site, uint32_t i, const struct sh_report *re
         s->bvh = site->bvh[0];
     else if (rc == SH_OK)
         rc = find_bvh(site, s->at.position_m, report, &s->bvh, err);
+    if (rc == SH_OK) rc = make_beam(site, s, report, err);
     if (rc == SH_OK) rc = georef_create(&spec, &s->georef, err);
     if (rc != SH_OK) return rc;
     int epsg = georef_epsg(s->georef), first = georef_epsg(site->station[0].georef);
@@ -237,6 +258,8 @@ void site_free(struct site *site)
             georef_free(s->leg[k].georef);
         free(s->leg);
         georef_free(s->georef);
+        free(s->beam);
+        beam_outlines_free(s->outlines);
     }
     free(site->station);
     for (uint32_t i = 0; i < site->n_bvh; i++)
@@ -286,6 +309,8 @@ void site_cast_setup(const struct site *site, uint32_t station, struct cast_setu
     setup->pan_counts = counts_or_ideal(profile->pan_counts);
     setup->detect = site->detect.on ? &site->detect.cast : NULL;
     setup->layout = site->cfg->layout;
+    setup->beam = s->beam;
+    setup->echoes = (enum beam_select)site->cfg->settings.echoes;
     setup->range_scale_m = site->scale_m;
     memcpy(setup->xyz_scale, s->scale, sizeof setup->xyz_scale);
 }

@@ -22,10 +22,12 @@ struct site_station {
     struct bvh *bvh;                      /* shared where stations are near each other */
     struct georef *georef;
     struct placement at;
-    double scale[3];      /* of geo points on the wire, units of the CRS per count */
-    struct site_leg *leg; /* one for each stretch of a trajectory, in the geo layout; else NULL */
-    struct plan_row plan; /* how the georef's method was chosen; of the worst leg */
-    double t_s, frame;    /* a stop: when it is, after the trajectory's first sample; frame scalar of the trajectory */
+    struct cast_beam *beam;         /* NULL: one ray per pulse */
+    struct beam_outlines *outlines; /* beam.mode adaptive */
+    double scale[3];                /* of geo points on the wire, units of the CRS per count */
+    struct site_leg *leg;           /* one for each stretch of a trajectory, in the geo layout; else NULL */
+    struct plan_row plan;           /* how the georef's method was chosen; of the worst leg */
+    double t_s, frame; /* a stop: when it is, after the trajectory's first sample; frame scalar of the trajectory */
 };
 
 struct site_mover {

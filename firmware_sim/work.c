@@ -246,6 +246,7 @@ static void fill_pulses(struct worker *worker, const struct device_work *work, s
         worker->stretch = SIZE_MAX;
     }
     worker->anchored = work->stretch;
+    worker->setup.echoes = (enum beam_select)work->echoes;
     if (worker->site->n_movers != 0)
         site_move(worker->site,
                   site_mover_time(worker->site, work->station, 1e-9 * (double)(work->t_ns - work->scan_t0_ns)),

@@ -92,7 +92,6 @@ struct bvh_packets {
     } at __attribute__((aligned(64)));
     float org[3], t_min; /* as set */
     uint32_t width;      /* 0: not yet */
-    int placed;          /* the origins are the rays' own, not org */
 };
 
 /* Rays of one chunk in arrays, padded to whole packets; prim is RTC_INVALID_GEOMETRY_ID for a miss. t, u, v are
@@ -100,6 +99,7 @@ struct bvh_packets {
 struct bvh_rays {
     float org[3], t_min, t_max;
     const float *ox, *oy, *oz; /* origins of their own instead of org; NULL: none */
+    int scattered;             /* neighbours have nothing in common: one by one */
     const float *dx, *dy, *dz;
     uint32_t *prim;
     float *t, *u, *v;

@@ -6,20 +6,6 @@
 
 #include "core/cast/caster_private.h"
 
-/* What has passed since the stage before belongs to this one. */
-static inline void ends(struct caster *c, enum cast_stage stage)
-{
-    if (c->profile == NULL) return;
-    uint64_t now = c->profile->now();
-    c->profile->spent[stage] += now - c->profile->last;
-    c->profile->last = now;
-}
-
-void caster_ends(struct caster *c, enum cast_stage stage)
-{
-    ends(c, stage);
-}
-
 void caster_set_profile(struct caster *caster, struct cast_profile *profile)
 {
     caster->profile = profile;
@@ -30,11 +16,15 @@ int caster_create(struct caster **out, struct sh_err *err)
     *out = aligned_alloc(64, (sizeof **out + 63) / 64 * 64);
     if (*out == NULL) return sh_fail(err, SH_ENOMEM, "cast: no memory for a caster");
     memset(*out, 0, sizeof **out);
-    return SH_OK;
+    int rc = beam_work_create(&(*out)->beam, err);
+    if (rc != SH_OK) free(*out);
+    return rc;
 }
 
 void caster_free(struct caster *caster)
 {
+    if (caster == NULL) return;
+    beam_work_free(caster->beam);
     free(caster);
 }
 
@@ -95,6 +85,7 @@ static void decide_one(struct caster *c, struct decide_ray *ray, const struct or
     hits->label[i] =
         hit.prim == RTC_INVALID_GEOMETRY_ID ? (uint32_t)LINE_LABEL_NONE : bvh_label(&ray->bvh->triangle[hit.prim]);
     hits->range_m[i] = hit.prim == RTC_INVALID_GEOMETRY_ID ? (double)NAN : hit.range_m;
+    if (hits->steep != NULL) kernel_steep(ray->bvh, hit.prim, ray->dir, &hits->steep[i]);
 }
 
 /* Doubts are few: whole packets without any are passed at once. Each costs a chain of cache misses, so they are looked
@@ -130,23 +121,29 @@ static void cast_rays(struct caster *c, struct decide_ray *ray, struct bvh_rays 
         rays->oy = m->fy;
         rays->oz = m->fz;
     }
-    ends(c, CAST_DIRECTIONS);
-    bvh_intersect(bvh, &c->packets, rays, n);
-    ends(c, CAST_EMBREE);
+    caster_ends(c, CAST_DIRECTIONS);
+    bvh_intersect(bvh, from->px != NULL ? &c->placed : &c->packets, rays, n);
+    caster_ends(c, CAST_EMBREE);
     uint32_t doubts = from->px != NULL ? kernel_refine_from(bvh, hits, m->ox, m->oy, m->oz, n)
                                        : kernel_refine(bvh, hits, ray->o_local, n);
-    ends(c, CAST_REFINE);
+    caster_ends(c, CAST_REFINE);
     if (doubts != 0) decide(c, ray, from, hits, c->prim, n);
 }
 
-/* n rays from one point, or (n <= CHUNK) each from its own. */
-static void hits_from(struct caster *c, const struct bvh *bvh, const struct origins *from, double range_max_m,
+void caster_hits_from(struct caster *c, const struct bvh *bvh, const struct origins *from, double range_max_m,
                       uint32_t n, const double *dx, const double *dy, const double *dz, double *range_m,
                       uint32_t *triangle)
 {
     struct decide_ray ray = {.bvh = bvh, .t_max = (float)(range_max_m * 1.001)};
-    struct bvh_rays rays = {
-        .t_max = ray.t_max, .dx = c->fx, .dy = c->fy, .dz = c->fz, .t = c->t, .u = c->u, .v = c->v, .prim = c->prim};
+    struct bvh_rays rays = {.t_max = ray.t_max,
+                            .scattered = c->scattered,
+                            .dx = c->fx,
+                            .dy = c->fy,
+                            .dz = c->fz,
+                            .t = c->t,
+                            .u = c->u,
+                            .v = c->v,
+                            .prim = c->prim};
     set_origin(&ray, from->at_m[0], from->at_m[1], from->at_m[2]);
     for (int i = 0; i < 3; i++)
         rays.org[i] = (float)ray.o_local[i];
@@ -160,10 +157,11 @@ static void hits_from(struct caster *c, const struct bvh *bvh, const struct orig
                                    .v = c->v,
                                    .range_m = range_m + at,
                                    .label = c->seen,
+                                   .steep = c->steep,
                                    .doubt = c->doubt};
         cast_rays(c, &ray, &rays, from, &hits, m);
         memcpy(triangle + at, c->prim, m * sizeof *triangle);
-        ends(c, CAST_DECIDE);
+        caster_ends(c, CAST_DECIDE);
     }
 }
 
@@ -171,7 +169,7 @@ void caster_hits(struct caster *c, const struct bvh *bvh, const double station_m
                  const double *dx, const double *dy, const double *dz, double *range_m, uint32_t *triangle)
 {
     const struct origins from = {.at_m = {station_m[0], station_m[1], station_m[2]}};
-    hits_from(c, bvh, &from, range_max_m, n, dx, dy, dz, range_m, triangle);
+    caster_hits_from(c, bvh, &from, range_max_m, n, dx, dy, dz, range_m, triangle);
 }
 
 /* Socs to where positions go: straight to the CRS where that is a rotation, else to prcs. Returns 1 in the first case.
@@ -206,19 +204,26 @@ static uint32_t take_back(struct caster *c, struct line_block *block, uint32_t a
     return taken;
 }
 
-/* Positions as a head computes them: from the range and from what its encoders read. Returns how many echoes had to be
- * taken back. */
-uint32_t caster_positions(struct caster *c, const struct cast_setup *s, int linear, const double *range_m,
-                          struct line_block *block, uint32_t at, uint32_t n)
+uint32_t caster_wire(struct caster *c, const struct cast_setup *s, int linear, const double *range_m,
+                     struct line_block *block, uint32_t at, uint32_t n)
 {
     const struct moving_rays *m = &c->moving;
+    if (s->layout != LINE_GEO) {
+        kernel_polar(s, range_m, c->mirror_turn, c->pan_turn, n, block->a + at, block->b + at, block->c + at);
+        return 0;
+    }
     if (s->n_knots != 0)
         kernel_scale_from(range_m, m->px, m->py, m->pz, s->station_m, n, c->ex, c->ey, c->ez);
     else
         kernel_scale(range_m, n, c->ex, c->ey, c->ez);
     if (!linear) georef_forward(s->georef, n, c->ex, c->ey, c->ez, c->ex, c->ey, c->ez);
-    uint32_t unfit = kernel_geo(c->ex, c->ey, c->ez, s->xyz_scale, n, block->a + at, block->b + at, block->c + at);
-    return unfit == 0 ? 0 : take_back(c, block, at, n);
+    return kernel_geo(c->ex, c->ey, c->ez, s->xyz_scale, n, block->a + at, block->b + at, block->c + at);
+}
+
+uint32_t caster_positions(struct caster *c, const struct cast_setup *s, int linear, const double *range_m,
+                          struct line_block *block, uint32_t at, uint32_t n)
+{
+    return caster_wire(c, s, linear, range_m, block, at, n) == 0 ? 0 : take_back(c, block, at, n);
 }
 
 /* How far the origins lie from the first of them. */
@@ -259,7 +264,7 @@ static void cast_mover(struct caster *c, const struct cast_setup *s, uint32_t wh
     }
     struct mover_rays *r = &c->mover;
     kernel_turn_back(set->dx, set->dy, set->dz, m->rotation, n, r->dx, r->dy, r->dz);
-    hits_from(c, m->bvh, &own, s->range_max_m, n, r->dx, r->dy, r->dz, r->range_m, r->hit);
+    caster_hits_from(c, m->bvh, &own, s->range_max_m, n, r->dx, r->dy, r->dz, r->range_m, r->hit);
     for (uint32_t i = 0; i < n; i++) {
         if (!(r->range_m[i] < set->range_m[i]) && !(isnan(set->range_m[i]) && !isnan(r->range_m[i]))) continue;
         set->range_m[i] = r->range_m[i];
@@ -274,7 +279,7 @@ static void cast_mover(struct caster *c, const struct cast_setup *s, uint32_t wh
 void caster_nearest(struct caster *c, const struct cast_setup *s, const struct origins *from, const struct ray_set *set,
                     uint32_t n)
 {
-    hits_from(c, s->bvh, from, s->range_max_m, n, set->dx, set->dy, set->dz, set->range_m, set->hit);
+    caster_hits_from(c, s->bvh, from, s->range_max_m, n, set->dx, set->dy, set->dz, set->range_m, set->hit);
     memcpy(set->label, c->seen, n * sizeof *set->label);
     if (set->body != NULL) {
         kernel_cosines(s->bvh, set->hit, set->dx, set->dy, set->dz, n, set->cosine);
@@ -351,34 +356,54 @@ static int aim(struct caster *c, const struct cast_setup *s, const struct schedu
     return linear;
 }
 
-static uint32_t cast_chunk(struct caster *c, const struct cast_setup *s, const struct schedule_run *run,
-                           struct line_block *block, uint32_t at, uint32_t n)
+/* Each pulse is one ray: its echo, if there is one. */
+static uint32_t single_chunk(struct caster *c, const struct cast_setup *s, int linear, uint64_t pulse0, uint32_t n,
+                             struct line_block *block, uint32_t at)
 {
-    struct origins from;
-    if (c->profile != NULL) c->profile->last = c->profile->now();
-    int linear = aim(c, s, run, block->dt_ns, at, n, &from);
-    const struct ray_set set = {
-        .dx = c->dx, .dy = c->dy, .dz = c->dz, .range_m = c->range_m, .label = c->label, .hit = c->hit};
-    caster_nearest(c, s, &from, &set, n);
     uint32_t echoes = kernel_detect(c->range_m, s->range_min_m, s->range_max_m, n, block->echo + at);
     kernel_labels(c->label, block->echo + at, n, block->label + at);
     for (uint32_t i = 0; i < n; i++)
         block->refl_cdb[at + i] = LINE_REFL_NONE;
-    ends(c, CAST_DETECT);
-    if (s->noise_on) kernel_noise(s, run->pulse0 + at, n, c->range_m);
-    ends(c, CAST_NOISE);
-    if (s->layout == LINE_GEO)
-        echoes -= caster_positions(c, s, linear, c->range_m, block, at, n);
-    else
-        kernel_polar(s, c->range_m, c->mirror_turn, c->pan_turn, n, block->a + at, block->b + at, block->c + at);
-    ends(c, CAST_POSITIONS);
+    caster_ends(c, CAST_DETECT);
+    if (s->noise_on) kernel_noise(s, pulse0, n, c->range_m);
+    caster_ends(c, CAST_NOISE);
+    echoes -= caster_positions(c, s, linear, c->range_m, block, at, n);
+    caster_ends(c, CAST_POSITIONS);
+    return echoes;
+}
+
+/* The central rays of an adaptive beam, with their incidences; nothing moves. */
+static void cast_central(struct caster *c, const struct cast_setup *s, const struct origins *from, uint32_t n)
+{
+    c->steep = beam_steep(c);
+    caster_hits_from(c, s->bvh, from, s->range_max_m, n, c->dx, c->dy, c->dz, c->range_m, c->hit);
+    c->steep = NULL;
+    memcpy(c->label, c->seen, n * sizeof *c->label);
+}
+
+/* dt_ns: of the run's pulses. */
+static uint32_t cast_chunk(struct caster *c, const struct cast_setup *s, const struct schedule_run *run,
+                           const uint32_t *dt_ns, uint32_t first, uint32_t n, struct line_block *block, uint32_t *at)
+{
+    struct origins from;
+    if (c->profile != NULL) c->profile->last = c->profile->now();
+    int linear = aim(c, s, run, dt_ns, first, n, &from);
+    if (s->beam != NULL) {
+        if (s->beam->mode == BEAM_ADAPTIVE) cast_central(c, s, &from, n);
+        return beam_chunk(c, s, &from, linear, run->pulse0 + first, dt_ns + first, n, block, at);
+    }
+    const struct ray_set set = {
+        .dx = c->dx, .dy = c->dy, .dz = c->dz, .range_m = c->range_m, .label = c->label, .hit = c->hit};
+    caster_nearest(c, s, &from, &set, n);
+    uint32_t echoes = single_chunk(c, s, linear, run->pulse0 + first, n, block, *at);
+    *at += n;
     return echoes;
 }
 
 uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
                      struct line_block *block)
 {
-    uint32_t echoes = 0;
+    uint32_t echoes = 0, at = 0;
     block->frame = run->frame;
     block->line = run->line;
     block->pulse0 = run->pulse0;
@@ -386,24 +411,23 @@ uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, cons
     block->t0_ns = run->t0_ns;
     block->line_t0_ns = run->line_t0_ns;
     block->layout = setup->layout;
-    /* Where a pulse may have several entries, times of pulses stand at the far end of the array: an entry never
-     * overtakes the pulses that are still to come. */
-    uint32_t *dt_ns = block->dt_ns + (setup->detect != NULL ? block->capacity - run->n : 0), out = 0;
+    /* With several entries a pulse, the pulses' times wait at the end of the array: no entry overtakes the pulses that
+     * are still to come. */
+    int several = setup->beam != NULL || setup->detect != NULL;
+    uint32_t *dt_ns = several ? block->dt_ns + block->capacity - run->n : block->dt_ns;
     kernel_times(run, dt_ns);
     /* The first packet of a run may begin within a packet of the line; later chunks begin at one. */
     uint32_t lead = run->in_line % SCHEDULE_PACKET;
-    for (uint32_t at = 0; at < run->n;) {
+    for (uint32_t first = 0; first < run->n;) {
         uint32_t n = lead != 0 ? SCHEDULE_PACKET - lead : CHUNK;
-        if (n > run->n - at) n = run->n - at;
-        uint32_t entries = n;
+        if (n > run->n - first) n = run->n - first;
         if (setup->detect != NULL)
-            echoes += caster_detected(caster, setup, run, dt_ns + at, at, n, block, out, &entries);
+            echoes += caster_detected(caster, setup, run, dt_ns + first, first, n, block, &at);
         else
-            echoes += cast_chunk(caster, setup, run, block, at, n);
-        at += n;
-        out += entries;
+            echoes += cast_chunk(caster, setup, run, dt_ns, first, n, block, &at);
+        first += n;
         lead = 0;
     }
-    block->n_points = out;
+    block->n_points = at;
     return echoes;
 }

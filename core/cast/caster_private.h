@@ -76,8 +76,10 @@ struct path_rays {
     uint8_t found_ghost[CAST_LIST];
 };
 
+struct beam_work;
+
 struct caster {
-    struct bvh_packets packets;
+    struct bvh_packets packets, placed; /* of rays from one point; each from its own */
     double mirror_turn[CHUNK], pan_turn[CHUNK];
     double dx[CHUNK], dy[CHUNK], dz[CHUNK]; /* direction of the beam, prcs */
     double ex[CHUNK], ey[CHUNK], ez[CHUNK]; /* direction as the encoders read it, then the position; geo layout */
@@ -89,6 +91,9 @@ struct caster {
     uint32_t seen[CHUNK], label[CHUNK]; /* labels of the last hits; of what counts in the end */
     struct mover_rays mover;            /* touched only where something moves */
     struct moving_rays moving;          /* touched only where the head moves, or is not ideal */
+    float *steep;                       /* where 1 / cos^2 of the incidence goes; NULL: not asked for */
+    int scattered;                      /* of the rays at hand, neighbours have nothing in common */
+    struct beam_work *beam;             /* touched only where pulses have a footprint */
     /* touched only where detection is modelled: */
     double cosine[CHUNK];
     uint8_t body[CHUNK];
@@ -98,8 +103,20 @@ struct caster {
     struct cast_profile *profile;
 };
 
+/* What has passed since the stage before belongs to this one. */
+static inline void caster_ends(struct caster *c, enum cast_stage stage)
+{
+    if (c->profile == NULL) return;
+    uint64_t now = c->profile->now();
+    c->profile->spent[stage] += now - c->profile->last;
+    c->profile->last = now;
+}
+
 /* ---- caster.c */
-void caster_ends(struct caster *c, enum cast_stage stage);
+/* Exact hits of n rays from one point, or (n <= CHUNK) each from its own; labels of the last chunk in c->seen. */
+void caster_hits_from(struct caster *c, const struct bvh *bvh, const struct origins *from, double range_max_m,
+                      uint32_t n, const double *dx, const double *dy, const double *dz, double *range_m,
+                      uint32_t *triangle);
 /* What the rays of a chunk meet first, of all there is. */
 void caster_nearest(struct caster *c, const struct cast_setup *s, const struct origins *from, const struct ray_set *set,
                     uint32_t n);
@@ -109,8 +126,11 @@ void caster_move(struct caster *c, const struct cast_setup *s, int64_t t0_ns, co
 /* Socs to where positions go: straight to the CRS where that is a rotation, else to prcs. Returns 1 in the first case.
  */
 int caster_reading_rotation(const struct cast_setup *s, double to_crs[9]);
-/* Positions as a head computes them, from range_m and c->e: entries at .. at + n of the block. Returns how many echoes
- * had to be taken back. */
+/* Positions as a head computes them, from range_m and what its encoders read (c->e, or the turns): entries at .. at + n
+ * of the block. Returns how many coordinates did not fit; they are LINE_XYZ_NONE. */
+uint32_t caster_wire(struct caster *c, const struct cast_setup *s, int linear, const double *range_m,
+                     struct line_block *block, uint32_t at, uint32_t n);
+/* Likewise; echoes that did not fit are taken back. Returns how many. */
 uint32_t caster_positions(struct caster *c, const struct cast_setup *s, int linear, const double *range_m,
                           struct line_block *block, uint32_t at, uint32_t n);
 
@@ -126,10 +146,19 @@ uint32_t caster_report(struct caster *c, const struct cast_setup *s, const struc
                        const uint32_t *dt_ns, uint64_t pulse0, struct line_block *block, uint32_t out,
                        uint32_t *entries);
 
-/* A chunk with everything that cast_detect asks for. `at`: its first pulse in the run; entries from
- * `out` on. dt_ns: times of the chunk's pulses. Returns the number of echoes; *entries: how many were written. */
+/* A chunk with everything that cast_detect asks for. first: its first pulse in the run; entries from *at on. dt_ns:
+ * times of the chunk's pulses. Returns the number of echoes. */
 uint32_t caster_detected(struct caster *c, const struct cast_setup *s, const struct schedule_run *run,
-                         const uint32_t *dt_ns, uint32_t at, uint32_t n, struct line_block *block, uint32_t out,
-                         uint32_t *entries);
+                         const uint32_t *dt_ns, uint32_t first, uint32_t n, struct line_block *block, uint32_t *at);
+
+/* ---- beam.c */
+int beam_work_create(struct beam_work **out, struct sh_err *err);
+void beam_work_free(struct beam_work *work);
+/* Where the incidences of central rays are to go. */
+float *beam_steep(struct caster *c);
+/* n pulses are aimed, and (adaptive) their central rays have been cast: finds their echoes and writes them into the
+ * block from entry *at on. dt_ns: of these pulses. Returns the number of echoes. */
+uint32_t beam_chunk(struct caster *c, const struct cast_setup *s, const struct origins *from, int linear,
+                    uint64_t pulse0, const uint32_t *dt_ns, uint32_t n, struct line_block *block, uint32_t *at);
 
 #endif

@@ -305,12 +305,12 @@ uint32_t caster_report(struct caster *c, const struct cast_setup *s, const struc
 }
 
 uint32_t caster_detected(struct caster *c, const struct cast_setup *s, const struct schedule_run *run,
-                         const uint32_t *dt_ns, uint32_t at, uint32_t n, struct line_block *block, uint32_t out,
-                         uint32_t *entries)
+                         const uint32_t *dt_ns, uint32_t first, uint32_t n, struct line_block *block, uint32_t *at)
 {
     struct origins from;
+    uint32_t entries;
     if (c->profile != NULL) c->profile->last = c->profile->now();
-    aim_beams(c, s, run, dt_ns, at, n, &from);
+    aim_beams(c, s, run, dt_ns, first, n, &from);
     const struct ray_set set = {.dx = c->dx,
                                 .dy = c->dy,
                                 .dz = c->dz,
@@ -324,5 +324,7 @@ uint32_t caster_detected(struct caster *c, const struct cast_setup *s, const str
         caster_follow(c, s, &from, n);
     else
         list_hits(c, n);
-    return caster_report(c, s, run, dt_ns, run->pulse0 + at, block, out, entries);
+    uint32_t echoes = caster_report(c, s, run, dt_ns, run->pulse0 + first, block, *at, &entries);
+    *at += entries;
+    return echoes;
 }

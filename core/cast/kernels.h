@@ -23,6 +23,7 @@ struct kernel_hits {
     const float *u, *v;
     double *range_m; /* out: (d - n.o) / (n.dir) of the proposed triangle's plane; NaN for none */
     uint32_t *label; /* out: of the proposed triangle; LINE_LABEL_NONE for none */
+    float *steep;    /* out: 1 / cos^2 of the incidence, for rays from one point; NULL: not asked for */
     uint32_t *doubt; /* out: 1 where the hit is so near to the border, across the ray, that the proposal is in doubt */
 };
 /* Returns how many are in doubt. */
@@ -80,6 +81,15 @@ void kernel_polar(const struct cast_setup *setup, const double *range_m, const d
 uint32_t kernel_geo(const double *x, const double *y, const double *z, const double scale[3], uint32_t n, uint32_t *a,
                     uint32_t *b, uint32_t *c);
 void kernel_scale(const double *range_m, uint32_t n, double *x, double *y, double *z);
+
+/* ---- kernels_beam.c */
+/* 1 / cos^2 for one; RTC_INVALID_GEOMETRY_ID: NaN. */
+void kernel_steep(const struct bvh *bvh, uint32_t prim, const double dir[3], float *steep);
+/* Up to where outlines may cut a footprint whose centre meets a surface at that range, and 1 / cos^2 of its incidence:
+ * beyond it by the slope of the surface, doubled and more, for it may bend away, and by some footprints. */
+void kernel_limits(const struct beam *beam, const double *range_m, const float *steep, uint32_t n, float *limit_m);
+/* Ranges of centres -> means over footprints on planes; the first term of beam_plane_excess, which has them all. */
+void kernel_excess(const struct beam *beam, const float *steep, uint32_t n, double *range_m);
 
 /* Firing times after the run's first pulse: j * quot + floor((acc + j * rem) / den). */
 void kernel_times(const struct schedule_run *run, uint32_t *dt_ns);

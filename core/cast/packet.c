@@ -141,7 +141,8 @@ static void set_up(struct bvh_packets *packets, const struct bvh_rays *rays, uin
     packets->width = width;
 }
 
-/* Origins of their own: the next chunk with a common one has to be set up again. */
+/* Origins of their own. Such packets are kept apart from those with a common one (caster.h), which would have to be set
+ * up again. */
 static void place(struct bvh_packets *packets, const struct bvh_rays *rays, uint32_t n)
 {
     const uint32_t width = packets->width;
@@ -151,14 +152,13 @@ static void place(struct bvh_packets *packets, const struct bvh_rays *rays, uint
         place_8(packets->at.by8, rays, n);
     else
         place_4(packets->at.by4, rays, n);
-    packets->placed = 1;
 }
 
 void bvh_intersect(const struct bvh *bvh, struct bvh_packets *packets, const struct bvh_rays *rays, uint32_t n)
 {
     const uint32_t width = bvh->info.packet;
     if (n == 0) return;
-    if (width == 1) {
+    if (width == 1 || rays->scattered) {
         intersect_1(bvh, rays, n);
         return;
     }

@@ -151,7 +151,15 @@ size_t plan_head(const struct plan_head *head, struct plan_row rows[PLAN_HEAD_RO
         row = add(row, "movers", "cast on their own", CAST_ERROR_M, (double)NAN, "meshes that move");
     else
         row = add(row, "movers", "none", 0.0, 0.0, "no mesh moves");
-    row = add(row, "beam", "none", 0.0, 0.0, "one ray per pulse: nothing asks for a footprint");
+    if (head->beam_adaptive) {
+        row = add(row, "beam", "adaptive", (double)NAN, (double)NAN,
+                  "one ray, and one for each part that outlines cut a footprint into; nothing moves");
+    } else if (head->beam_rays > 0) {
+        snprintf(method, sizeof method, "rings of %u", head->beam_rays);
+        row = add(row, "beam", method, (double)NAN, (double)NAN, "so many rays for each pulse");
+    } else {
+        row = add(row, "beam", "none", 0.0, 0.0, "beam.mode is single: one ray per pulse");
+    }
     row = plan_optics(row, head);
     row = plan_signal(row, head);
     row = plan_noise(row, head);

@@ -46,12 +46,13 @@ static inline int write_profile(void)
     static const struct {
         const char *key;
         double value;
-    } figure[] = {{"prr_min_hz", 1000},    {"prr_max_hz", 2000000}, {"lines_min_hz", 1},    {"lines_max_hz", 2000},
-                  {"pan_max_deg_s", 360},  {"fov_min_deg", -40},    {"fov_max_deg", 60},    {"pan_min_deg", 0},
-                  {"pan_max_deg", 360},    {"facets", 3},           {"optical_gain", 2},    {"range_min_m", 0.5},
-                  {"range_max_m", 100},    {"range_sigma_m", 0},    {"range_sigma_ppm", 0}, {"mirror_counts", 1048576},
-                  {"pan_counts", 1048576}, {"max_echoes", 1},       {"boot_s", 0.2},        {"spin_up_s", 0.03},
-                  {"spin_down_s", 0.05}};
+    } figure[] = {
+        {"prr_min_hz", 1000},    {"prr_max_hz", 2000000}, {"lines_min_hz", 1},    {"lines_max_hz", 2000},
+        {"pan_max_deg_s", 360},  {"fov_min_deg", -40},    {"fov_max_deg", 60},    {"pan_min_deg", 0},
+        {"pan_max_deg", 360},    {"facets", 3},           {"optical_gain", 2},    {"range_min_m", 0.5},
+        {"range_max_m", 100},    {"range_sigma_m", 0},    {"range_sigma_ppm", 0}, {"mirror_counts", 1048576},
+        {"pan_counts", 1048576}, {"max_echoes", 1},       {"beam_exit_m", 0.007}, {"beam_divergence_rad", 3.5e-4},
+        {"pulse_width_ns", 4},   {"boot_s", 0.2},         {"spin_up_s", 0.03},    {"spin_down_s", 0.05}};
     fprintf(f, "maker: Maker\nmodel: Model\n");
     for (size_t i = 0; i < sizeof figure / sizeof *figure; i++)
         fprintf(f, "%s: { value: %.10g, from: assumed }\n", figure[i].key, figure[i].value);

@@ -73,6 +73,7 @@ static const struct {
     {"SCAN:PAN:START", "SCAN:PAN:STAR", 1, 1, " 10"},
     {"SCAN:PAN:STOP", "SCAN:PAN:STOP", 1, 1, " 90"},
     {"SCAN:FRAMES", "SCAN:FRAM", 1, 1, " 4"},
+    {"SCAN:ECHOES", "SCAN:ECH", 1, 1, " LAST"},
     {"SCAN:START", "SCAN:STAR", 0, 1, ""},
     {"SCAN:STOP", "SCAN:STOP", 0, 1, ""},
     {"SCAN:COUNT", "SCAN:COUN", 1, 0, ""},

@@ -287,6 +287,27 @@ static void steps_of_time(void **ctx)
     expect_error(&dev, 1, "TIME:STEP -9300000000000000000", CMD_E_RANGE, "STEP -9300000000000000000, allowed 1 to");
 }
 
+/* A setting of words: each in short and long, DEF, and what it is not. */
+static void words(void **state)
+{
+    (void)state;
+    struct command_device dev = command_test_device();
+    static const char *const set[] = {"FIRS", "first", "LAST", "STR", "strongest", "ALL"};
+    static const char *const get[] = {"FIRSt", "FIRSt", "LAST", "STRongest", "STRongest", "ALL"};
+    for (int i = 0; i < 6; i++) {
+        char line[40];
+        snprintf(line, sizeof line, "SCAN:ECH %s", set[i]);
+        expect(&dev, line, "OK");
+        expect(&dev, "SCAN:ECHOES?", get[i]);
+    }
+    expect(&dev, "SCAN:ECHOES LAST", "OK");
+    expect(&dev, "SCAN:ECHOES DEF", "OK");
+    expect(&dev, "SCAN:ECHOES?", "ALL");
+    expect_error(&dev, 1, "SCAN:ECHOES 2", CMD_E_DATA_TYPE, "takes ALL, FIRSt, LAST, STRongest, DEF, not '2'");
+    expect_error(&dev, 1, "SCAN:ECHOES MAX", CMD_E_DATA_TYPE, "not 'MAX'");
+    expect_error(&dev, 1, "SCAN:ECHOES", CMD_E_MISSING, "takes a word");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -300,6 +321,7 @@ int main(void)
         cmocka_unit_test(effects_follow_the_state_machine),
         cmocka_unit_test(a_station_stays_during_a_scan),
         cmocka_unit_test(steps_of_time),
+        cmocka_unit_test(words),
     };
     return cmocka_run_group_tests_name("command values", tests, NULL, NULL);
 }

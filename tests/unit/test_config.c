@@ -473,6 +473,8 @@ static void malformed_profiles_are_refused(void **state)
         {"facets: { value: 1,", "facets: { value: 2,", "fov_max_deg", "allowed up to 180 deg"},
         {"facets: { value: 1,", "facets: { value: 0,", "facets", "1 to 360"},
         {"optical_gain: { value: 1,", "optical_gain: { value: 2,", "optical_gain", "allowed up to 360"},
+        {"beam_divergence_rad: { value: 0.0005,", "beam_divergence_rad: { value: 0.5,", "beam_divergence_rad",
+         "0 to 0.01"},
         {"max_echoes: { value: 1,", "max_echoes: { value: 16,", "max_echoes", "1 to 15"},
         {"lines_min_hz: { value: 5,", "lines_min_hz: { value: 0.2,", "lines_min_hz", "allowed 0.25 to"},
         {"lines_min_hz: { value: 5,", "lines_min_hz: { value: 201,", "lines_min_hz", "at most lines_max_hz"},

@@ -1,0 +1,123 @@
+/* Figures of a beam, and patterns of sub-rays. */
+#include "core/beam.h"
+
+#include <math.h>
+#include <string.h>
+
+static const double LIGHT_M_S = 299792458.0;
+
+/* t = rho^2 over the footprint: density proportional to exp(-2 t) on 0 .. 1. Means of t and t^2, by parts. */
+static double mean_t(void)
+{
+    return 0.5 - exp(-2.0) / (1.0 - exp(-2.0));
+}
+
+static double mean_t2(void)
+{
+    return mean_t() - exp(-2.0) / (1.0 - exp(-2.0));
+}
+
+/* Energy per distance of a line from the centre: the Gaussian, cut off at the disc's edge. */
+static double across(double x)
+{
+    const double scale = 2.0 / (M_PI * (1.0 - exp(-2.0)));
+    double y2 = 1.0 - x * x;
+    return y2 <= 0.0 ? 0.0 : scale * exp(-2.0 * x * x) * sqrt(0.5 * M_PI) * erf(sqrt(2.0 * y2));
+}
+
+/* With x = -cos a the integrand is smooth at the disc's edge as well. */
+static double between(double from, double to)
+{
+    enum { STEPS = 8 };
+    double a = acos(-fmax(-1.0, from)), b = acos(-fmin(1.0, to)), step = (b - a) / STEPS, sum = 0.0;
+    for (int i = 0; i <= STEPS; i++) {
+        double at = a + i * step, weight = i == 0 || i == STEPS ? 1.0 : i % 2 == 1 ? 4.0 : 2.0;
+        sum += weight * across(-cos(at)) * sin(at);
+    }
+    return sum * step / 3.0;
+}
+
+/* By Gauss's theorem: x exp(-2 r^2) is minus a quarter of the derivative of exp(-2 r^2) by x. */
+static double moment_beyond(double h)
+{
+    const double scale = 2.0 / (M_PI * (1.0 - exp(-2.0)));
+    return 0.25 * (across(h) - scale * exp(-2.0) * 2.0 * sqrt(fmax(0.0, 1.0 - h * h)));
+}
+
+void beam_init(struct beam *beam, double exit_m, double divergence_rad, double pulse_width_s)
+{
+    memset(beam, 0, sizeof *beam);
+    beam->exit_radius_m = 0.5 * exit_m;
+    beam->slope = 0.5 * divergence_rad;
+    beam->resolution_m = 0.5 * LIGHT_M_S * pulse_width_s;
+    for (int i = BEAM_HALF_STEPS - 1; i >= 0; i--) {
+        double h = 2.0 * i / BEAM_HALF_STEPS - 1.0;
+        beam->half[i] = beam->half[i + 1] + between(h, h + 2.0 / BEAM_HALF_STEPS);
+    }
+    for (int i = 0; i <= BEAM_HALF_STEPS; i++)
+        beam->moment[i] = moment_beyond(2.0 * i / BEAM_HALF_STEPS - 1.0);
+    for (int i = 0; i <= BEAM_HALF_STEPS; i++)
+        beam->half[i] /= beam->half[0] > 0.0 && i > 0 ? beam->half[0] : 1.0;
+    beam->half[0] = 1.0;
+}
+
+double beam_radius(const struct beam *beam, double range_m)
+{
+    double spread = beam->slope * range_m;
+    return sqrt(beam->exit_radius_m * beam->exit_radius_m + spread * spread);
+}
+
+/* The series of sqrt((1 + t s^2) / (1 - t b^2)), b = s tan i, to second order in t; beyond b = 1/2, where the plane is
+ * within a footprint's angle of the beam, it is kept. */
+double beam_plane_excess(const struct beam *beam, double range_m, double cosine)
+{
+    double s2 = beam->slope * beam->slope, c2 = fmax(cosine * cosine, 4.0 * s2 / (1.0 + 4.0 * s2));
+    if (s2 == 0.0) return 0.0;
+    double b2 = s2 * (1.0 / c2 - 1.0);
+    double first = 0.5 * (s2 + b2), second = 0.375 * b2 * b2 + 0.25 * s2 * b2 - 0.125 * s2 * s2;
+    return range_m * (first * mean_t() + second * mean_t2());
+}
+
+double beam_plane_sigma(const struct beam *beam, double range_m, double cosine)
+{
+    double c = fmax(fabs(cosine), 1e-6);
+    return beam_radius(beam, range_m) * sqrt(1.0 - fmin(1.0, c * c)) / c * sqrt(0.5 * mean_t());
+}
+
+void beam_half(const struct beam *beam, double h, double *energy, double *moment)
+{
+    double at = (h + 1.0) * (0.5 * BEAM_HALF_STEPS);
+    uint32_t i = at <= 0.0 ? 0 : at >= BEAM_HALF_STEPS ? BEAM_HALF_STEPS - 1 : (uint32_t)at;
+    double part = at - i;
+    *energy = beam->half[i] + (beam->half[i + 1] - beam->half[i]) * part;
+    *moment = beam->moment[i] + (beam->moment[i + 1] - beam->moment[i]) * part;
+}
+
+void beam_rings(uint32_t rings, struct beam_pattern *pattern)
+{
+    const double all = 1.0 - exp(-2.0);
+    memset(pattern, 0, sizeof *pattern);
+    pattern->n = 1 + 3 * rings * (rings + 1);
+    for (uint32_t k = 1, at = 1; k <= rings; k++) {
+        /* energy inside of the middle of this ring's annulus */
+        double inside = (1.0 + 3.0 * k * (k - 1) + 3.0 * k) / pattern->n;
+        double radius = sqrt(-0.5 * log(1.0 - inside * all));
+        for (uint32_t i = 0; i < 6 * k; i++, at++) {
+            double phi = 2.0 * M_PI * (i + 0.5 * (k % 2)) / (6 * k);
+            pattern->x[at] = (float)(radius * cos(phi));
+            pattern->y[at] = (float)(radius * sin(phi));
+        }
+    }
+}
+
+/* T. Duff and others, Building an Orthonormal Basis, Revisited, JCGT 6(1), 2017. */
+void beam_axes(const double d[3], double e1[3], double e2[3])
+{
+    double sign = copysign(1.0, d[2]), a = -1.0 / (sign + d[2]), b = d[0] * d[1] * a;
+    e1[0] = 1.0 + sign * d[0] * d[0] * a;
+    e1[1] = sign * b;
+    e1[2] = -sign * d[0];
+    e2[0] = b;
+    e2[1] = sign + d[1] * d[1] * a;
+    e2[2] = -d[1];
+}

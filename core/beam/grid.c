@@ -1,0 +1,297 @@
+/* Outlines by direction: every cell that a footprint can reach an edge from knows it. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/beam/outlines.h"
+#include "core/vec3.h"
+#include "core/vecmath.h"
+
+enum { N_CELLS = 6 * OUTLINE_CELLS * OUTLINE_CELLS, BLOCK = 256 };
+#define NEAREST_M 0.02 /* nearer than this, all directions are near each other */
+#define PIECE     0.1  /* the longest piece of an edge, by its distance */
+
+struct draw {
+    struct beam_outlines *o;
+    const struct beam *beam;
+    int fill; /* 0: count into first[c + 1]; 1: write at first[c]++ */
+    uint32_t edge;
+    uint64_t n;
+};
+
+/* Stretches of edges that count. */
+struct stretches {
+    struct outline_stretch *at;
+    size_t n, room;
+};
+
+static void put(struct draw *d, uint32_t cell, float range_m)
+{
+    struct beam_outlines *o = d->o;
+    d->n++;
+    if (!d->fill) {
+        o->first[cell + 1]++;
+        return;
+    }
+    o->entry[o->first[cell]++] = (struct outline_entry){range_m, d->edge};
+    if (!(range_m >= o->nearest_m[cell])) o->nearest_m[cell] = range_m;
+}
+
+static void put_row(struct draw *d, uint32_t face, int32_t row, double from, double to, float range_m)
+{
+    int32_t i0 = (int32_t)floor(fmax(from, 0.0)), i1 = (int32_t)floor(fmin(to, OUTLINE_CELLS - 1));
+    for (int32_t i = i0; i <= i1; i++)
+        put(d, outline_place(face, (uint32_t)i, (uint32_t)row), range_m);
+}
+
+/* A piece from p to q (in cells) and all that is within `wide` cells of it, row by row. */
+static void draw_on_face(struct draw *d, uint32_t face, const double p[2], const double q[2], double wide,
+                         float range_m)
+{
+    double low = fmin(p[1], q[1]), high = fmax(p[1], q[1]);
+    if (high + wide < 0.0 || low - wide >= OUTLINE_CELLS) return;
+    int32_t j0 = (int32_t)floor(fmax(low - wide, 0.0)), j1 = (int32_t)floor(fmin(high + wide, OUTLINE_CELLS - 1));
+    for (int32_t j = j0; j <= j1; j++) {
+        /* the part of the piece that this row can be near to */
+        double t0 = 0.0, t1 = 1.0, rise = q[1] - p[1];
+        if (fabs(rise) > 1e-9) {
+            double ta = (j - wide - p[1]) / rise, tb = (j + 1 + wide - p[1]) / rise;
+            t0 = fmax(0.0, fmin(ta, tb));
+            t1 = fmin(1.0, fmax(ta, tb));
+        }
+        if (t0 > t1) continue;
+        double x0 = p[0] + t0 * (q[0] - p[0]), x1 = p[0] + t1 * (q[0] - p[0]);
+        put_row(d, face, j, fmin(x0, x1) - wide, fmax(x0, x1) + wide, range_m);
+    }
+}
+
+/* A short piece: on each face that it or a footprint at it may reach. */
+static void draw_piece(struct draw *d, const double p[3], const double q[3], double range_m)
+{
+    const double half = 0.5 * OUTLINE_CELLS;
+    double angle = 1.02 * beam_radius(d->beam, range_m) / range_m + 1e-6;
+    for (uint32_t face = 0; face < 6; face++) {
+        int axis = (int)face / 2, ua = (axis + 1) % 3, va = (axis + 2) % 3;
+        double sign = face % 2 == 0 ? 1.0 : -1.0, zp = sign * p[axis], zq = sign * q[axis];
+        double least = 0.35 * range_m; /* a face's corner is at 0.577; a piece is short */
+        if (zp < least || zq < least) continue;
+        double a[2] = {p[ua] / zp, p[va] / zp}, b[2] = {q[ua] / zq, q[va] / zq};
+        /* on the face an angle appears larger by 1 / cos^2 from its middle */
+        double more = fmax(1.0 + a[0] * a[0] + a[1] * a[1], 1.0 + b[0] * b[0] + b[1] * b[1]);
+        double wide = 1.1 * angle * more * half + 0.01;
+        for (int i = 0; i < 2; i++) {
+            a[i] = (a[i] + 1.0) * half;
+            b[i] = (b[i] + 1.0) * half;
+        }
+        draw_on_face(d, face, a, b, wide, (float)(0.999999 * range_m));
+    }
+}
+
+static double nearest_on(const double p[3], const double q[3])
+{
+    double e[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]}, ee = vec3_dot(e, e);
+    double t = ee > 0.0 ? fmin(1.0, fmax(0.0, -vec3_dot(p, e) / ee)) : 0.0;
+    double x[3] = {p[0] + t * e[0], p[1] + t * e[1], p[2] + t * e[2]};
+    return sqrt(vec3_dot(x, x));
+}
+
+static int add_stretch(struct stretches *s, const double p[3], const double q[3], uint32_t edge)
+{
+    if (s->n == s->room) {
+        size_t room = s->room == 0 ? 4096 : 2 * s->room;
+        struct outline_stretch *more = realloc(s->at, room * sizeof *more);
+        if (more == NULL) return SH_ENOMEM;
+        s->at = more;
+        s->room = room;
+    }
+    struct outline_stretch *one = &s->at[s->n++];
+    memcpy(one->p, p, sizeof one->p);
+    memcpy(one->q, q, sizeof one->q);
+    one->edge = edge;
+    return SH_OK;
+}
+
+/* Pieces of an edge, each short as seen from the station; of these, what counts. */
+static int cut_edge(struct stretches *s, struct outline_prober *prober, const double p[3], const double q[3],
+                    uint32_t edge, double range_max_m)
+{
+    double e[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]}, middle[3];
+    double range_m = nearest_on(p, q), length = sqrt(vec3_dot(e, e));
+    if (range_m > range_max_m) return SH_OK;
+    if (length > PIECE * fmax(range_m, NEAREST_M)) {
+        for (int i = 0; i < 3; i++)
+            middle[i] = p[i] + 0.5 * e[i];
+        int rc = cut_edge(s, prober, p, middle, edge, range_max_m);
+        return rc == SH_OK ? cut_edge(s, prober, middle, q, edge, range_max_m) : rc;
+    }
+    if (range_m <= NEAREST_M) return SH_OK;
+    if (prober->probe == NULL) return add_stretch(s, p, q, edge);
+    uint32_t n = outline_probe(prober, p, q, range_m);
+    for (uint32_t i = 0, end; i < n; i = end) {
+        double a[3], b[3];
+        for (end = i + 1; end < n && prober->counts[end] == prober->counts[i];)
+            end++;
+        if (!prober->counts[i]) continue;
+        for (int k = 0; k < 3; k++) {
+            a[k] = p[k] + e[k] * i / n;
+            b[k] = p[k] + e[k] * end / n;
+        }
+        if (add_stretch(s, a, b, edge) != SH_OK) return SH_ENOMEM;
+    }
+    return SH_OK;
+}
+
+static int find_stretches(const struct beam_outlines *o, struct outline_prober *prober, double range_max_m,
+                          struct stretches *s)
+{
+    for (uint32_t k = 0; k < o->n_edges; k++) {
+        double p[3], q[3];
+        for (int i = 0; i < 3; i++) {
+            p[i] = o->edge[k].a[i];
+            q[i] = o->edge[k].b[i];
+        }
+        if (cut_edge(s, prober, p, q, k, range_max_m) != SH_OK) return SH_ENOMEM;
+    }
+    return SH_OK;
+}
+
+static int by_range(const void *a, const void *b)
+{
+    const struct outline_entry *x = a, *y = b;
+    if (x->range_m != y->range_m) return (x->range_m > y->range_m) - (x->range_m < y->range_m);
+    return (x->edge > y->edge) - (x->edge < y->edge);
+}
+
+static uint64_t draw_all(struct beam_outlines *o, const struct beam *beam, const struct stretches *s, int fill)
+{
+    struct draw d = {.o = o, .beam = beam, .fill = fill};
+    for (size_t i = 0; i < s->n; i++) {
+        d.edge = s->at[i].edge;
+        draw_piece(&d, s->at[i].p, s->at[i].q, nearest_on(s->at[i].p, s->at[i].q));
+    }
+    return d.n;
+}
+
+static int fill_cells(struct beam_outlines *o, const struct beam *beam, const struct stretches *s, struct sh_err *err)
+{
+    uint64_t n = draw_all(o, beam, s, 0);
+    if (n >= UINT32_MAX) return sh_fail(err, SH_EINPUT, "beam: too many outlines; beam.mode: rings does without them");
+    for (uint32_t c = 0; c < N_CELLS; c++) {
+        o->first[c + 1] += o->first[c];
+        o->nearest_m[c] = NAN; /* nearer than nothing */
+    }
+    o->entry = malloc((size_t)(n + 1) * sizeof *o->entry);
+    if (o->entry == NULL) return sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");
+    draw_all(o, beam, s, 1);
+    memmove(o->first + 1, o->first, N_CELLS * sizeof *o->first); /* each stands at its end now */
+    o->first[0] = 0;
+    for (uint32_t c = 0; c < N_CELLS; c++)
+        if (o->first[c + 1] - o->first[c] > 1)
+            qsort(o->entry + o->first[c], o->first[c + 1] - o->first[c], sizeof *o->entry, by_range);
+    o->info.entries = n;
+    o->info.bytes =
+        n * sizeof *o->entry + N_CELLS * (sizeof *o->first + sizeof *o->nearest_m) + o->n_edges * sizeof *o->edge;
+    return SH_OK;
+}
+
+int beam_outlines_create(const struct scene *scene, const double station_m[3], const struct beam *beam,
+                         double range_max_m, const struct beam_probe *probe, struct beam_outlines **out,
+                         struct sh_err *err)
+{
+    struct stretches stretches = {.at = NULL};
+    struct outline_prober *prober = calloc(1, sizeof *prober);
+    struct beam_outlines *o = calloc(1, sizeof *o);
+    *out = NULL;
+    if (o == NULL || prober == NULL) {
+        free(o);
+        free(prober);
+        return sh_fail(err, SH_ENOMEM, "beam: no memory");
+    }
+    prober->probe = probe;
+    prober->beam = beam;
+    o->first = calloc(N_CELLS + 1, sizeof *o->first);
+    o->nearest_m = malloc(N_CELLS * sizeof *o->nearest_m);
+    int rc = o->first == NULL || o->nearest_m == NULL ? sh_fail(err, SH_ENOMEM, "beam: no memory") : SH_OK;
+    if (rc == SH_OK) rc = outline_find(scene, station_m, &o->edge, &o->n_edges, &o->info.edges, err);
+    if (rc == SH_OK && find_stretches(o, prober, range_max_m * 1.01, &stretches) != SH_OK)
+        rc = sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");
+    if (rc == SH_OK) rc = fill_cells(o, beam, &stretches, err);
+    o->info.stretches = stretches.n;
+    free(stretches.at);
+    free(prober);
+    if (rc != SH_OK) {
+        beam_outlines_free(o);
+        return rc;
+    }
+    o->info.outlines = o->n_edges;
+    *out = o;
+    return SH_OK;
+}
+
+void beam_outlines_free(struct beam_outlines *o)
+{
+    if (o == NULL) return;
+    free(o->edge);
+    free(o->first);
+    free(o->nearest_m);
+    free(o->entry);
+    free(o);
+}
+
+void beam_outlines_get_info(const struct beam_outlines *o, struct beam_outlines_info *info)
+{
+    *info = o->info;
+}
+
+VEC_CLONES
+static void cells_of(const float *restrict dx, const float *restrict dy, const float *restrict dz, uint32_t n,
+                     uint32_t *restrict cell)
+{
+    for (uint32_t i = 0; i < n; i++)
+        cell[i] = outline_cell(dx[i], dy[i], dz[i]);
+}
+
+VEC_CLONES
+static uint32_t near_of(const float *restrict nearest_m, const uint32_t *restrict cell, const float *restrict limit_m,
+                        uint32_t n, uint8_t *restrict near)
+{
+    uint32_t found = 0;
+    for (uint32_t i = 0; i < n; i++) {
+        uint32_t is = nearest_m[cell[i]] <= limit_m[i];
+        near[i] = (uint8_t)is;
+        found += is;
+    }
+    return found;
+}
+
+/* What looking for lines is going to read, step by step for all pulses at once. */
+static void prefetch(const struct beam_outlines *o, const uint32_t *cell, uint32_t n)
+{
+    for (uint32_t k = 0; k < n; k++)
+        __builtin_prefetch(&o->first[cell[k]], 0, 3);
+    for (uint32_t k = 0; k < n; k++)
+        __builtin_prefetch(&o->entry[o->first[cell[k]]], 0, 3);
+    for (uint32_t k = 0; k < n; k++)
+        for (uint32_t i = o->first[cell[k]], end = o->first[cell[k] + 1]; i < end && i < o->first[cell[k]] + 2; i++)
+            __builtin_prefetch(&o->edge[o->entry[i].edge], 0, 3);
+}
+
+/* The nearest edge of a cell against the range, and what a footprint adds to it at most: decided later. */
+uint32_t beam_near_outlines(const struct beam_outlines *o, const float *dx, const float *dy, const float *dz,
+                            const float *limit_m, uint32_t n, uint32_t *pulse)
+{
+    uint32_t cell[BLOCK], near_cell[BLOCK + 1], found = 0;
+    uint8_t near[BLOCK];
+    for (uint32_t at = 0; at < n; at += BLOCK) {
+        uint32_t part = n - at < BLOCK ? n - at : BLOCK, before = found;
+        cells_of(dx + at, dy + at, dz + at, part, cell);
+        if (near_of(o->nearest_m, cell, limit_m + at, part, near) == 0) continue;
+        for (uint32_t i = 0; i < part; i++) {
+            pulse[found] = at + i;
+            near_cell[found - before] = cell[i];
+            found += near[i];
+        }
+        prefetch(o, near_cell, found - before);
+    }
+    return found;
+}

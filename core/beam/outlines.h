@@ -1,0 +1,76 @@
+/* Private to core/beam: outlines of a scene from a station, and the cells of direction that lead to them.
+ *
+ * Directions are cells of a cube's faces, n x n each: x / |z| and y / |z| of the axis with the largest component, from
+ * -1 to 1. */
+#ifndef CORE_BEAM_OUTLINES_H
+#define CORE_BEAM_OUTLINES_H
+
+#include "core/beam.h"
+
+enum { OUTLINE_CELLS = 512 }; /* along a face: 2.6 mrad in its middle, half of that in its corners */
+
+/* An edge's ends, from the station, and the unit normal of the plane through all three. */
+struct outline_edge {
+    float a[3], b[3], normal[3];
+};
+
+struct outline_entry {
+    float range_m; /* of the nearest point of the edge, in or near the cell */
+    uint32_t edge;
+};
+
+struct beam_outlines {
+    uint32_t n_edges;
+    struct outline_edge *edge;
+    uint32_t *first;             /* entries of cell c: first[c] .. first[c + 1] */
+    float *nearest_m;            /* of each cell; NaN: it leads to none */
+    struct outline_entry *entry; /* by range */
+    struct beam_outlines_info info;
+};
+
+/* Part of an edge that counts, from the station. */
+struct outline_stretch {
+    double p[3], q[3];
+    uint32_t edge;
+};
+
+/* probe.c: looks along both sides of a piece of an edge. */
+enum { PROBE_MOST = 512 };
+struct outline_prober {
+    const struct beam_probe *probe; /* NULL: all counts */
+    const struct beam *beam;
+    double dx[2 * PROBE_MOST], dy[2 * PROBE_MOST], dz[2 * PROBE_MOST], range_m[2 * PROBE_MOST];
+    uint8_t counts[PROBE_MOST];
+};
+/* The piece from p to q in equal parts, each about a footprint's radius: how many, and in counts whether each counts.
+ */
+uint32_t outline_probe(struct outline_prober *prober, const double p[3], const double q[3], double range_m);
+
+/* weld.c: the outlines among the edges of a scene. Gives *edge (malloc) and *n, and how many edges there are. */
+int outline_find(const struct scene *scene, const double station_m[3], struct outline_edge **edge, uint32_t *n,
+                 uint64_t *n_edges, struct sh_err *err);
+
+/* Cells lie in tiles of 4 x 4: nearest_m of a tile is one cache line. */
+static inline uint32_t outline_place(uint32_t face, uint32_t i, uint32_t j)
+{
+    const uint32_t tiles = OUTLINE_CELLS / 4;
+    return ((face * tiles + j / 4) * tiles + i / 4) * 16 + j % 4 * 4 + i % 4;
+}
+
+/* In float: the cells know what is a hundredth of a cell beside them, too. */
+static inline __attribute__((always_inline)) uint32_t outline_cell(float dx, float dy, float dz)
+{
+    const float ax = __builtin_fabsf(dx), ay = __builtin_fabsf(dy), az = __builtin_fabsf(dz);
+    const float half = 0.5f * OUTLINE_CELLS;
+    uint32_t is_x = (ax >= ay) & (ax >= az), is_y = (ay >= az) & !is_x;
+    float along = is_x ? dx : is_y ? dy : dz;
+    float u = is_x ? dy : is_y ? dz : dx, v = is_x ? dz : is_y ? dx : dy;
+    uint32_t face = (is_x ? 0U : is_y ? 2U : 4U) + (along < 0.0f);
+    float scale = half / __builtin_fabsf(along);
+    int32_t i = (int32_t)(u * scale + half), j = (int32_t)(v * scale + half);
+    i = i < OUTLINE_CELLS ? i : OUTLINE_CELLS - 1;
+    j = j < OUTLINE_CELLS ? j : OUTLINE_CELLS - 1;
+    return outline_place(face, (uint32_t)i, (uint32_t)j);
+}
+
+#endif
