@@ -35,6 +35,7 @@ struct usbredir {
     int listener, fd; /* -1: none */
     struct usbredirparser *parser;
     int broken;
+    int greeted; /* its hello has come */
     int (*go_on)(void *ctx);
     void *go_on_ctx;
     uint32_t n_pending;
@@ -50,7 +51,7 @@ struct redir_transfer {
     struct usbredir *owner;
     struct usb_redir_bulk_packet_header bulk;
     uint8_t *packet; /* the parser's: what an OUT carries */
-    uint32_t room;
+    uint32_t held;   /* counted in n_bytes */
     uint8_t bytes[];
 };
 
@@ -66,23 +67,24 @@ static int status_of(enum usb_status status)
 
 /* ---- transfers */
 
-static struct redir_transfer *new_transfer(struct usbredir *self, uint32_t room)
+/* room: for what goes to the host; bytes: what it holds in all, also of what came. */
+static struct redir_transfer *new_transfer(struct usbredir *self, uint32_t room, uint32_t bytes)
 {
-    if (self->n_pending >= MAX_PENDING || self->n_bytes + room > MAX_PENDING_BYTES) return NULL;
+    if (self->n_pending >= MAX_PENDING || self->n_bytes + bytes > MAX_PENDING_BYTES) return NULL;
     struct redir_transfer *transfer = malloc(sizeof *transfer + room);
     if (transfer == NULL) return NULL;
     memset(transfer, 0, sizeof *transfer);
     transfer->owner = self;
-    transfer->room = room;
+    transfer->held = bytes;
     self->n_pending++;
-    self->n_bytes += room;
+    self->n_bytes += bytes;
     return transfer;
 }
 
 static void free_transfer(struct usbredir *self, struct redir_transfer *transfer)
 {
     self->n_pending--;
-    self->n_bytes -= transfer->room;
+    self->n_bytes -= transfer->held;
     if (transfer->packet != NULL) usbredirparser_free_packet_data(self->parser, transfer->packet);
     free(transfer);
 }
@@ -173,6 +175,7 @@ static void on_hello(void *priv, struct usb_redir_hello_header *hello)
     const struct usb_model *model = usb_device_model(self->device);
     const struct usb_identity *id = usb_device_identity(self->device);
     (void)hello;
+    self->greeted = 1;
     attach(self);
     send_interfaces(self);
     struct usb_redir_device_connect_header connect = {.speed = speed[id->highest],
@@ -183,6 +186,13 @@ static void on_hello(void *priv, struct usb_redir_hello_header *hello)
                                                       .product_id = id->pid,
                                                       .device_version_bcd = model->bcd_device};
     usbredirparser_send_device_connect(self->parser, &connect);
+}
+
+/* The library passes on packets from before the hello, too. */
+static int is_early(struct usbredir *self)
+{
+    if (!self->greeted) self->broken = 1;
+    return !self->greeted;
 }
 
 /* ---- requests */
@@ -200,6 +210,7 @@ static int request(struct usbredir *self, unsigned type, unsigned code, unsigned
 static void on_reset(void *priv)
 {
     struct usbredir *self = priv;
+    if (is_early(self)) return;
     usb_device_reset(self->device, usb_device_rate(self->device));
     usb_device_assume_address(self->device);
 }
@@ -207,6 +218,7 @@ static void on_reset(void *priv)
 static void on_set_configuration(void *priv, uint64_t id, struct usb_redir_set_configuration_header *set)
 {
     struct usbredir *self = priv;
+    if (is_early(self)) return;
     int rc = request(self, USB_DIR_OUT, USB_REQ_SET_CONFIGURATION, set->configuration, 0, NULL, 0);
     if (rc == 0) send_interfaces(self);
     struct usb_redir_configuration_status_header status = {.status = rc == 0 ? usb_redir_success : usb_redir_stall,
@@ -220,6 +232,7 @@ static void on_get_configuration(void *priv, uint64_t id)
     struct usbredir *self = priv;
     struct usb_redir_configuration_status_header status = {
         .status = usb_redir_success, .configuration = (uint8_t)usb_device_configuration(self->device)};
+    if (is_early(self)) return;
     usbredirparser_send_configuration_status(self->parser, id, &status);
 }
 
@@ -236,6 +249,7 @@ static void send_alt(struct usbredir *self, uint64_t id, unsigned interface, int
 static void on_set_alt(void *priv, uint64_t id, struct usb_redir_set_alt_setting_header *set)
 {
     struct usbredir *self = priv;
+    if (is_early(self)) return;
     int rc = request(self, USB_DIR_OUT | USB_RECIP_INTERFACE, USB_REQ_SET_INTERFACE, set->alt, set->interface, NULL, 0);
     if (rc == 0) send_interfaces(self);
     send_alt(self, id, set->interface, rc == 0);
@@ -249,6 +263,10 @@ static void on_get_alt(void *priv, uint64_t id, struct usb_redir_get_alt_setting
 static void on_control(void *priv, uint64_t id, struct usb_redir_control_packet_header *header, uint8_t *data, int len)
 {
     struct usbredir *self = priv;
+    if (is_early(self)) {
+        usbredirparser_free_packet_data(self->parser, data);
+        return;
+    }
     const int in = (header->requesttype & USB_DIR_IN) != 0;
     uint8_t *room = in ? malloc((size_t)header->length + 1) : NULL;
     int n = USB_STALL;
@@ -270,8 +288,9 @@ static void on_bulk(void *priv, uint64_t id, struct usb_redir_bulk_packet_header
     struct usbredir *self = priv;
     const uint32_t length = (uint32_t)header->length_high << 16 | header->length;
     const int in = (header->endpoint & USB_DIR_IN) != 0;
-    struct redir_transfer *transfer =
-        (!in && (uint32_t)len != length) || length > MAX_PENDING_BYTES ? NULL : new_transfer(self, in ? length : 0);
+    struct redir_transfer *transfer = !self->greeted || (!in && (uint32_t)len != length) || length > MAX_PENDING_BYTES
+                                          ? NULL
+                                          : new_transfer(self, in ? length : 0, length);
     if (transfer == NULL) {
         usbredirparser_free_packet_data(self->parser, data);
         self->broken = 1;
@@ -313,7 +332,8 @@ static void on_start_interrupt(void *priv, uint64_t id, struct usb_redir_start_i
                                                                  .endpoint = start->endpoint};
     struct redir_transfer *transfer = NULL;
     const int allowed = (start->endpoint & USB_DIR_IN) != 0 && has_interrupt(self, start->endpoint);
-    if (allowed && self->receiving[number] == NULL) transfer = new_transfer(self, MAX_INTERRUPT);
+    if (is_early(self)) return;
+    if (allowed && self->receiving[number] == NULL) transfer = new_transfer(self, MAX_INTERRUPT, MAX_INTERRUPT);
     if (!allowed || (transfer == NULL && self->receiving[number] == NULL)) status.status = usb_redir_inval;
     usbredirparser_send_interrupt_receiving_status(self->parser, id, &status);
     if (transfer == NULL) return;
@@ -328,6 +348,7 @@ static void on_stop_interrupt(void *priv, uint64_t id, struct usb_redir_stop_int
     struct usbredir *self = priv;
     struct usb_redir_interrupt_receiving_status_header status = {.status = usb_redir_success,
                                                                  .endpoint = stop->endpoint};
+    if (is_early(self)) return;
     usb_device_cancel(self->device, OWN_ID | (stop->endpoint & USB_ENDPOINT_NUMBER_MASK));
     usbredirparser_send_interrupt_receiving_status(self->parser, id, &status);
 }
@@ -364,6 +385,21 @@ static void ignore_iso(void *priv, uint64_t id, struct usb_redir_iso_packet_head
 }
 
 /* ---- the socket */
+
+/* No endpoint has streams. */
+static void refuse_streams(void *priv, uint64_t id, struct usb_redir_alloc_bulk_streams_header *alloc)
+{
+    struct usbredir *self = priv;
+    struct usb_redir_bulk_streams_status_header status = {.endpoints = alloc->endpoints, .status = usb_redir_inval};
+    usbredirparser_send_bulk_streams_status(self->parser, id, &status);
+}
+
+static void refuse_no_streams(void *priv, uint64_t id, struct usb_redir_free_bulk_streams_header *none)
+{
+    struct usbredir *self = priv;
+    struct usb_redir_bulk_streams_status_header status = {.endpoints = none->endpoints, .status = usb_redir_inval};
+    usbredirparser_send_bulk_streams_status(self->parser, id, &status);
+}
 
 static int on_read(void *priv, uint8_t *data, int count)
 {
@@ -417,6 +453,8 @@ static int start(struct usbredir *self, int fd)
     parser->stop_iso_stream_func = ignore_stop_iso;
     parser->start_interrupt_receiving_func = on_start_interrupt;
     parser->stop_interrupt_receiving_func = on_stop_interrupt;
+    parser->alloc_bulk_streams_func = refuse_streams;
+    parser->free_bulk_streams_func = refuse_no_streams;
     parser->cancel_data_packet_func = on_cancel;
     parser->control_packet_func = on_control;
     parser->bulk_packet_func = on_bulk;
@@ -428,7 +466,7 @@ static int start(struct usbredir *self, int fd)
     usbredirparser_caps_set_cap(caps, usb_redir_cap_32bits_bulk_length);
     self->fd = fd;
     self->parser = parser;
-    self->broken = 0;
+    self->broken = self->greeted = 0;
     usbredirparser_init(parser, version, caps, USB_REDIR_CAPS_SIZE, usbredirparser_fl_usb_host);
     return SH_OK;
 }

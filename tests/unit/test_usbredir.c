@@ -569,13 +569,60 @@ static void test_garbage(void **state)
     bench_close(&bench);
 }
 
+/* Packets before the hello, and of streams, which no endpoint has: the peer is cut off or told, and the next one
+ * served. Headers as in usbredirproto.h: type, length and id, of 32 bits before the hello and 64 after it. */
+static void test_early_and_streams(void **state)
+{
+    (void)state;
+    static const uint8_t early[][24] = {
+        {101, 0, 0, 0, 8, 0, 0, 0, 1, 0, 0, 0, 0x83, 0, 0, 2},                     /* bulk IN of 512 */
+        {100, 0, 0, 0, 10, 0, 0, 0, 1, 0, 0, 0, 0x80, 6, 0x80, 0, 0, 1, 0, 0, 18}, /* GET_DESCRIPTOR */
+        {15, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0x81},                               /* receive interrupts */
+        {18, 0, 0, 0, 8, 0, 0, 0, 1, 0, 0, 0, 8, 0, 0, 0, 1},                      /* streams */
+        {19, 0, 0, 0, 4, 0, 0, 0, 1, 0, 0, 0, 8},
+    };
+    static const uint8_t late[][24] = {{18, 0, 0, 0, 8, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 8, 0, 0, 0, 1},
+                                       {19, 0, 0, 0, 4, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 8}};
+    struct bench bench = redir_bench(USB_RATE_HIGH);
+    for (size_t i = 0; i < sizeof early / sizeof early[0]; i++) {
+        int fd = guest_socket();
+        assert_int_equal(send(fd, early[i], 12u + early[i][4], MSG_NOSIGNAL), 12 + early[i][4]);
+        for (int k = 0; k < 4; k++) {
+            bench.n_queue = 0;
+            bench_poll(&bench, 0, 0);
+        }
+        close(fd);
+        bench.n_queue = 0;
+        bench_poll(&bench, 0, 0);
+    }
+    struct guest *g = guest_new(&bench);
+    guest_configure(g);
+    for (size_t i = 0; i < sizeof late / sizeof late[0]; i++) {
+        assert_int_equal(send(g->fd, late[i], 16u + late[i][4], MSG_NOSIGNAL), 16 + late[i][4]);
+        bench.n_queue = 0;
+        bench_poll(&bench, 0, 0);
+    }
+    guest_free(g);
+    bench.n_queue = 0;
+    bench_poll(&bench, 0, 0);
+    g = guest_new(&bench);
+    guest_configure(g);
+    guest_free(g);
+    bench_close(&bench);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_connect),   cmocka_unit_test(test_requests),
-        cmocka_unit_test(test_stream),    cmocka_unit_test(test_cancel_and_halt),
-        cmocka_unit_test(test_interrupt), cmocka_unit_test(test_close),
-        cmocka_unit_test(test_path),      cmocka_unit_test(test_garbage),
+        cmocka_unit_test(test_connect),
+        cmocka_unit_test(test_requests),
+        cmocka_unit_test(test_stream),
+        cmocka_unit_test(test_cancel_and_halt),
+        cmocka_unit_test(test_interrupt),
+        cmocka_unit_test(test_close),
+        cmocka_unit_test(test_path),
+        cmocka_unit_test(test_garbage),
+        cmocka_unit_test(test_early_and_streams),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }
