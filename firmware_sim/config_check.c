@@ -95,7 +95,7 @@ static int check_mesh(const struct cfg_reader *rd, const struct config_mesh *mes
 int cfg_nmea_link(const struct config *cfg)
 {
     for (uint32_t i = 0; i < cfg->n_links; i++)
-        if (cfg->link[i].protocol == PROTOCOL_NMEA) return (int)i;
+        if (cfg->link[i].protocol == PROTOCOL_NMEA && cfg->link[i].type != LINK_USB) return (int)i; /* check_link */
     return -1;
 }
 

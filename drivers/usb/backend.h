@@ -54,7 +54,8 @@ const struct usb_backend_ops *usb_backend_ops_get(enum usb_backend_type type);
 int usb_backend_socket(const struct usb_backend_spec *spec, const char *what, int *fd, char *name, size_t len,
                        struct sh_err *err);
 /* Before closing: nothing more from us, and wait until the peer has read it and hung up, or timeout_ms pass without a
- * byte. To close with requests of the peer unread would throw away replies on their way. backend_socket.c */
+ * byte, eight times that at most. To close with requests of the peer unread would throw away replies on their way.
+ * backend_socket.c */
 void usb_backend_hang_up(int fd, int timeout_ms);
 
 #endif

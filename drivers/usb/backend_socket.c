@@ -117,9 +117,10 @@ int usb_backend_socket(const struct usb_backend_spec *spec, const char *what, in
 
 void usb_backend_hang_up(int fd, int timeout_ms)
 {
-    char waste[4096];
+    enum { READS = 8 }; /* a peer that goes on sending is waited for no longer */
+    char waste[65536];
     struct pollfd slot = {.fd = fd, .events = POLLIN};
     if (shutdown(fd, SHUT_WR) != 0) return;
-    while (poll(&slot, 1, timeout_ms) > 0 && recv(fd, waste, sizeof waste, MSG_DONTWAIT) > 0)
-        continue;
+    for (int i = 0; i < READS; i++)
+        if (poll(&slot, 1, timeout_ms) <= 0 || recv(fd, waste, sizeof waste, MSG_DONTWAIT) <= 0) return;
 }
