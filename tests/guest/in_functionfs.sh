@@ -23,7 +23,7 @@ check "$speed: gone with the head" wait_for 10 is_unplugged
 check "$speed: nothing left" test -z "$(ls $gadgets)"
 note "recorded at $(uptime_s) s"
 records_only && return
-head_start "{type: usb, backend: functionfs, speed: $speed}" --set head.prr_hz=4000
+head_start "{type: usb, backend: functionfs, speed: $speed}" --set head.prr_hz=4000 --set loop.tick_hz=100
 wait_for 10 is_plugged
 REPLUGS=20 UNPLUG="sh unplug.sh" PLUG="sh plug.sh" tap "$speed" test_stream
 note "streamed at $(uptime_s) s"

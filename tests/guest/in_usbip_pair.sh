@@ -19,7 +19,7 @@ note "super at $(uptime_s) s"
 cat >plug.sh <<'END'
 . /in_lib.sh
 . /in_usb.sh
-head_start "{type: usb, attach: on}" --set head.prr_hz=4000
+head_start "{type: usb, attach: on}" --set head.prr_hz=4000 --set loop.tick_hz=100
 END
 echo 'kill -9 $(cat /tmp/head.pid)' >unplug.sh
 sh plug.sh

@@ -8,7 +8,7 @@ note "recorded at $(uptime_s) s"
 head_stop
 check "TCP: gone with the head" wait_for 10 is_unplugged
 records_only && return
-head_start "{type: usb}" --set head.prr_hz=4000
+head_start "{type: usb}" --set head.prr_hz=4000 --set loop.tick_hz=100
 echo "echo 0 >$vhci/detach" >unplug.sh
 echo "usbip attach -r 127.0.0.1 -b 1-1" >plug.sh
 sh plug.sh

@@ -222,7 +222,7 @@ static void unplug_in_the_middle(struct scanhead *sh, struct watch *w)
         do_command(sh, "SCAN:STAR");
     }
     uint64_t pulses = w->pulses;
-    while (w->pulses < pulses + 500 && !w->over)
+    while (w->pulses < pulses + 200 && !w->over)
         if (next(w, sh) != 0) fail_msg("%s", scanhead_error(sh));
     run(env("UNPLUG"));
     int rc;
