@@ -18,6 +18,7 @@ struct usb_backend_spec {
     char path[256];   /* usbredir: Unix socket, instead of address and port */
     char udc[64];     /* functionfs: name of the controller; empty: the first free one */
     int attach;       /* usbip: plug into this machine's vhci_hcd; usbredir: connect instead of listening */
+    int retry_ms;     /* with attach: time between attempts to come back after the host has let go; 0: 1000 */
 };
 
 struct usb_backend_ops {
@@ -38,6 +39,9 @@ struct usb_backend_ops {
      * SH_EIO ends the back end for good. */
     int (*handle)(void *backend, const struct pollfd *fds, int n, int (*go_on)(void *ctx), void *ctx);
     int (*more)(const void *backend);
+
+    /* What who runs the head should know, one line, and each only once; NULL: nothing. Valid until the next call. */
+    const char *(*news)(void *backend);
 
     /* Sends what the core has completed, as far as the wire takes it. After usb_device_write and usb_device_read. */
     void (*flush)(void *backend);

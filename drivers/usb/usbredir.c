@@ -560,6 +560,12 @@ static int usbredir_more(const void *backend)
     return 0;
 }
 
+static const char *usbredir_news(void *backend)
+{
+    (void)backend;
+    return NULL;
+}
+
 static void usbredir_close(void *backend)
 {
     struct usbredir *self = backend;
@@ -585,6 +591,7 @@ const struct usb_backend_ops usb_backend_usbredir = {
     .prepare = usbredir_prepare,
     .handle = usbredir_handle,
     .more = usbredir_more,
+    .news = usbredir_news,
     .flush = usbredir_flush,
     .close = usbredir_close,
 };

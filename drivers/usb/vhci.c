@@ -26,7 +26,7 @@ static int fail(const char *dir, const char *file, struct sh_err *err)
 static int find_port(const char *dir, enum usb_rate rate, unsigned *port, struct sh_err *err)
 {
     char path[320], line[256], hub[8];
-    unsigned number, state;
+    unsigned number = 0, state;
     int found = 0;
     snprintf(path, sizeof path, "%s/status", dir);
     FILE *in = fopen(path, "r");
