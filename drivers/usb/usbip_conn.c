@@ -10,7 +10,10 @@
 #include "drivers/usb/backend.h"
 #include "drivers/usb/usbip_private.h"
 
-enum { MAX_URB_BYTES = 16 << 20 /* usbfs's own limit by default, of all */ };
+enum {
+    MAX_URB_BYTES = 16 << 20, /* usbfs's own limit by default, of all */
+    MAX_READS = 256,          /* at a time: who sends without end does not have the thread to himself */
+};
 
 /* Where the host's driver forbids short packets, a host controller makes an error of them. */
 static void return_urb(struct usbip_conn *conn, struct usbip_urb *urb, int status, uint32_t actual)
@@ -177,7 +180,7 @@ static uint32_t read_head(struct usbip_conn *conn)
 
 void usbip_conn_read(struct usbip_conn *conn, int (*go_on)(void *ctx), void *ctx)
 {
-    while (!conn->broken && go_on(ctx)) {
+    for (int reads = 0; !conn->broken && go_on(ctx); reads++) {
         if (usbip_conn_is_full(conn)) usbip_conn_write(conn); /* a host may send many requests before it reads */
         if (usbip_conn_is_full(conn)) return;
         if ((conn->incoming != NULL ? read_incoming(conn) : read_head(conn)) == 0) return;

@@ -28,7 +28,7 @@ struct usbip_conn {
 void usbip_conn_start(struct usbip_conn *conn, int fd, struct usb_device *device, int *taken);
 /* As if the device had been imported: for a host that begins with URBs. */
 void usbip_conn_import(struct usbip_conn *conn);
-/* Reads and acts until nothing is left, go_on says 0 or the connection is full. */
+/* Reads and acts until nothing is left, go_on says 0 or the connection is full; no longer than some hundred times. */
 void usbip_conn_read(struct usbip_conn *conn, int (*go_on)(void *ctx), void *ctx);
 /* Too many replies wait for the host to read them: nothing more is read before. */
 int usbip_conn_is_full(const struct usbip_conn *conn);

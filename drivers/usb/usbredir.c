@@ -17,8 +17,9 @@
 #include "drivers/link/socket.h"
 #include "drivers/usb/usbredir_private.h"
 
-/* MAX_UNSENT: packets that wait for the guest to read them; above that nothing more is read from it. */
-enum { CLOSE_WAIT_MS = 500, SEND_BUFFER_BYTES = 1 << 20, MAX_UNSENT = 64 };
+/* MAX_UNSENT: packets that wait for the guest to read them; above that nothing more is read from it. MAX_READS: at a
+ * time, so that who sends without end does not have the thread to himself. */
+enum { CLOSE_WAIT_MS = 500, SEND_BUFFER_BYTES = 1 << 20, MAX_UNSENT = 64, MAX_READS = 256 };
 
 static int is_full(const struct usbredir *self)
 {
@@ -37,7 +38,7 @@ static void usbredir_flush(void *backend)
 static int on_read(void *priv, uint8_t *data, int count)
 {
     struct usbredir *self = priv;
-    if (self->broken || !self->go_on(self->go_on_ctx)) return 0;
+    if (self->broken || self->n_reads++ >= MAX_READS || !self->go_on(self->go_on_ctx)) return 0;
     if (is_full(self)) usbredir_flush(self); /* a guest may send many packets before it reads */
     if (self->broken || is_full(self)) return 0;
     ssize_t n = recv(self->fd, data, (size_t)count, MSG_DONTWAIT);
@@ -195,6 +196,7 @@ static int usbredir_handle(void *backend, const struct pollfd *fds, int n, int (
     if (n != N_FDS) return SH_OK;
     self->go_on = go_on;
     self->go_on_ctx = ctx;
+    self->n_reads = 0;
     if (self->fd >= 0 && self->parser == NULL && fds[AT_GUEST].revents != 0)
         rc = end_connect(self, usb_backend_connect_error(self->fd));
     else if (self->parser != NULL && (fds[AT_GUEST].revents & ~POLLOUT) != 0 &&

@@ -170,7 +170,11 @@ static void on_start_interrupt(void *priv, uint64_t id, struct usb_redir_start_i
     usbredirparser_send_interrupt_receiving_status(self->parser, id, &status);
     if (transfer == NULL) return;
     transfer->transfer = (struct usb_transfer){
-        .id = OWN_ID | number, .endpoint = start->endpoint, .length = MAX_INTERRUPT, .data = transfer->bytes};
+        .id = OWN_ID | number,
+        .endpoint = start->endpoint,
+        .length =
+            row->packet[usb_device_rate(self->device)], /* one packet at a time, as the guest's controller takes them */
+        .data = transfer->bytes};
     self->receiving[number] = transfer;
     usb_device_submit(self->device, &transfer->transfer);
 }

@@ -17,6 +17,7 @@ struct usbredir {
     int greeted; /* its hello has come */
     int (*go_on)(void *ctx);
     void *go_on_ctx;
+    int n_reads; /* within one call of handle */
     uint32_t n_pending;
     uint64_t n_bytes;
     struct redir_transfer *receiving[16]; /* by number of the interrupt IN endpoint */

@@ -107,6 +107,35 @@ static void test_pipelining(void **state)
     bench_close(&bench);
 }
 
+/* One turn of the link's thread is over in bounded time, however much the host has sent. */
+static void test_turns(void **state)
+{
+    (void)state;
+    enum { REQUESTS = 3000 };
+    static const uint8_t get_status[8] = {0x80, GET_STATUS, 0, 0, 0, 0, 2, 0};
+    static uint8_t back[REQUESTS * (HEADER + 2)];
+    struct bench bench = usbip_bench("N");
+    struct client c;
+    client_import(&c, &bench);
+    for (uint32_t i = 0; i < REQUESTS; i++) {
+        uint8_t head[HEADER];
+        put_submit(head, i + 1, 1, 0, 2, get_status);
+        assert_int_equal(send(c.fd, head, sizeof head, MSG_DONTWAIT), sizeof head); /* all of it fits: 144 KB */
+    }
+    size_t got = 0;
+    for (const int64_t end_ms = now_ms() + DEADLINE_MS; got < sizeof back;) {
+        assert_true(now_ms() < end_ms);
+        bench_poll(&bench, 0, 1);
+        ssize_t n = recv(c.fd, back + got, sizeof back - got, MSG_DONTWAIT);
+        assert_true(n <= (ssize_t)sizeof back / 2);
+        if (n > 0) got += (size_t)n;
+    }
+    for (uint32_t i = 0; i < REQUESTS; i++)
+        assert_int_equal(get_be32(back + i * (HEADER + 2) + 4), i + 1);
+    close(c.fd);
+    bench_close(&bench);
+}
+
 /* Everything a host says in one session, and what it gets: the same however the bytes are cut. */
 static size_t session(size_t piece, uint8_t *got, size_t room)
 {
@@ -192,10 +221,8 @@ static void test_short_not_ok(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_silent),
-        cmocka_unit_test(test_pipelining),
-        cmocka_unit_test(test_segments),
-        cmocka_unit_test(test_short_not_ok),
+        cmocka_unit_test(test_silent),   cmocka_unit_test(test_pipelining),   cmocka_unit_test(test_turns),
+        cmocka_unit_test(test_segments), cmocka_unit_test(test_short_not_ok),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

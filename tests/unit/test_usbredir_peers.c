@@ -103,6 +103,32 @@ static void test_flood(void **state)
     bench_close(&bench);
 }
 
+/* One turn of the link's thread is over in bounded time, however much the guest has sent and reads. */
+static void test_turns(void **state)
+{
+    (void)state;
+    enum { REQUESTS = 250 }; /* their pieces fit into a Unix socket's buffer of 208 KiB by default */
+    struct bench bench = redir_bench(USB_RATE_HIGH);
+    struct guest *g = guest_new(&bench);
+    static uint8_t reply[REQUESTS * 1024];
+    for (uint32_t i = 1; i <= REQUESTS; i++) {
+        uint8_t head[CONTROL_HEAD];
+        put_get_config(head, i);
+        assert_int_equal(send(g->fd, head, sizeof head, MSG_DONTWAIT), sizeof head);
+    }
+    bench_poll(&bench, 0, 0);
+    size_t first = 0;
+    for (ssize_t n; (n = recv(g->fd, reply + first, sizeof reply - first, MSG_DONTWAIT)) > 0;)
+        first += (size_t)n;
+    const size_t each = 16 + le_get32(reply + 4);
+    assert_in_range(first, each, REQUESTS * each - 1); /* some, and not all */
+    read_raw(g, reply + first, REQUESTS * each - first);
+    for (uint32_t i = 1; i <= REQUESTS; i++)
+        assert_int_equal(le_get32(reply + (i - 1) * each + 8), i);
+    guest_free(g);
+    bench_close(&bench);
+}
+
 static struct seen *control_on(struct guest *g, uint64_t id, uint8_t endpoint, unsigned request, unsigned value)
 {
     struct usb_redir_control_packet_header h = {
@@ -244,8 +270,8 @@ static void test_busy_path(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_silent),    cmocka_unit_test(test_flood),     cmocka_unit_test(test_wrong_endpoint),
-        cmocka_unit_test(test_reconnect), cmocka_unit_test(test_busy_path),
+        cmocka_unit_test(test_silent),         cmocka_unit_test(test_flood),     cmocka_unit_test(test_turns),
+        cmocka_unit_test(test_wrong_endpoint), cmocka_unit_test(test_reconnect), cmocka_unit_test(test_busy_path),
     };
     return cmocka_run_group_tests(tests, guest_setup, guest_teardown);
 }
