@@ -180,7 +180,7 @@ static uint32_t read_head(struct usbip_conn *conn)
 
 void usbip_conn_read(struct usbip_conn *conn, int (*go_on)(void *ctx), void *ctx)
 {
-    for (int reads = 0; !conn->broken && go_on(ctx); reads++) {
+    for (int reads = 0; reads < MAX_READS && !conn->broken && go_on(ctx); reads++) {
         if (usbip_conn_is_full(conn)) usbip_conn_write(conn); /* a host may send many requests before it reads */
         if (usbip_conn_is_full(conn)) return;
         if ((conn->incoming != NULL ? read_incoming(conn) : read_head(conn)) == 0) return;
