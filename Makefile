@@ -66,6 +66,12 @@ $(BUILD)/%.cpp.o: %.cpp
 	@mkdir -p $(@D)
 	@echo "  CXX   $<"
 	$(Q)$(CXX) $(ALL_CPPFLAGS) $(ALL_CXXFLAGS) -c $< -o $@
+# Objects that ask for libusbredirparser are built again once it has come or gone.
+$(BUILD)/usbredir: ALWAYS
+	@mkdir -p $(@D)
+	@echo '$(USBREDIR)' | cmp -s - $@ || echo '$(USBREDIR)' >$@
+$(filter $(BUILD)/drivers/usb/usbredir%,$(OBJ)): $(BUILD)/usbredir
+ALWAYS:
 # All modules for the program and the tests, and the client library alone.
 $(BUILD)/modules.a: $(OBJ)
 	@rm -f $@
@@ -197,7 +203,7 @@ format:
 	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')
 clean:
 	rm -rf $(BUILD)
-.PHONY: all deps deps-test deps-build deps-guest demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb \
+.PHONY: ALWAYS all deps deps-test deps-build deps-guest demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb \
 	test-usb-million objects test-unit-programs test-programs bench bench-beam chart install format clean
 .SECONDARY:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)

@@ -232,7 +232,8 @@ static const struct cfg_key config_keys[] = {
     {"links[].backend", CFG_ENUM, .def = "usbip", .names = backend_names, IN_LINK(backend),
      .help = "usb: how the device reaches a host."},
     {"links[].attach", CFG_BOOL, .def = "off", IN_LINK(attach),
-     .help = "usbip: plug into this machine's vhci_hcd; usbredir: connect to the guest's socket instead of listening."},
+     .help = "usbip: plug into this machine's vhci_hcd; usbredir: connect to the guest's socket instead of listening; and "
+             "once more whenever the host lets go."},
     {"links[].udc", CFG_TEXT, .def = "", IN_LINK(udc), .help = "functionfs: USB device controller; when not given, the first free one."},
     {"links[].speed", CFG_ENUM, .def = "high", .names = speed_names, IN_LINK(speed),
      .help = "usb: full (12 Mbit/s), high (480) or super (5000); the fastest the device can do."},
