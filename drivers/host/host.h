@@ -38,6 +38,8 @@ struct host_source {
     int fd;
     struct host_usb *usb;
     int is_file, is_socket;
+    int unsettled;  /* a terminal: the head may have been sent an echo, or half a line, before it was ours */
+    int asked;      /* questions that went out to settle that, and have no answer yet */
     char name[256]; /* for messages, and to open it again */
 };
 

@@ -58,7 +58,9 @@ int scanhead_list_usb(struct scanhead_usb_head *heads, int max, char *err, size_
 
 /* Sends one command line and waits for its reply line (without its end). Frames that arrive meanwhile are kept and come
  * from scanhead_next() later; at most 64 MiB of them, then the oldest are dropped and counted (stats.dropped).
- * A reply "ERR n,..." is returned as it is, with SCANHEAD_OK: the command was answered. */
+ * A reply "ERR n,..." is returned as it is, with SCANHEAD_OK: the command was answered.
+ * The first command on a "tty:" is preceded by an empty line and *IDN?, and all reply lines up to the answer to it are
+ * passed over: a terminal may have echoed to the head what it sent before the terminal was in raw mode. */
 int scanhead_command(struct scanhead *sh, const char *command, char *reply, size_t reply_len, int timeout_ms);
 
 enum scanhead_frame_type { /* as on the wire */

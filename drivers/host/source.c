@@ -32,12 +32,16 @@ static int open_tty(const char *path, struct host_source *out, struct sh_err *er
     struct termios tio;
     if (tcgetattr(out->fd, &tio) != 0)
         return sh_fail(err, SH_EINPUT, "%s: not a terminal device: %s", out->name, strerror(errno));
+    const int cooked = (tio.c_lflag & (ICANON | ECHO)) != 0;
     cfmakeraw(&tio);
     tio.c_cflag |= CLOCAL | CREAD;
     tio.c_cc[VMIN] = 1; /* else a read without data looks like the end */
     tio.c_cc[VTIME] = 0;
     if (tcsetattr(out->fd, TCSANOW, &tio) != 0)
         return sh_fail(err, SH_EIO, "%s: cannot set raw mode: %s", out->name, strerror(errno));
+    /* What came meanwhile has been changed, and echoed to the head; what is not there yet need not arrive. */
+    if (cooked) tcflush(out->fd, TCIOFLUSH);
+    out->unsettled = 1;
     return 0;
 }
 
