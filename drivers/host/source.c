@@ -159,13 +159,18 @@ static int open_file(const char *path, struct host_source *out, struct sh_err *e
     return 0;
 }
 
+int host_source_is_usb(const char *source)
+{
+    return strcmp(source, "usb") == 0 || strncmp(source, "usb:", 4) == 0;
+}
+
 int host_source_open(const char *source, struct host_source *out, struct sh_err *err)
 {
     memset(out, 0, sizeof *out);
     out->fd = -1;
     snprintf(out->name, sizeof out->name, "%s", source);
     int rc;
-    if (strcmp(source, "usb") == 0 || strncmp(source, "usb:", 4) == 0) return host_usb_open(source, out, err);
+    if (host_source_is_usb(source)) return host_usb_open(source, out, err);
     out->ops = &host_fd_ops;
     if (strncmp(source, "tty:", 4) == 0)
         rc = open_tty(source + 4, out, err);
