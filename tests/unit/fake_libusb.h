@@ -55,7 +55,7 @@ static struct fake_bus {
     int clear_halt_rc, submit_rc;  /* what these give while not 0 */
     int submit_fails;              /* for so many times; < 0: always */
     int submit_room;               /* how many reads may be under way; 0: any number */
-    int will_not_cancel;
+    int will_not_cancel, hold_writes;
     int contexts, handles, transfers, claimed, sessions, lists, configs; /* to be 0 at the end */
     int n_lists, n_clear_halts, n_waits, last_wait_ms;
     char written[4096]; /* what has come of commands */
@@ -206,6 +206,7 @@ int libusb_open(libusb_device *device, libusb_device_handle **handle)
 void libusb_close(libusb_device_handle *handle)
 {
     bus.handles--;
+    if (!bus.will_not_cancel) assert_int_equal(bus.n_flying, 0);
     bus.n_flying = bus.claimed = 0; /* the kernel takes them back */
     free(handle);
 }
@@ -334,7 +335,7 @@ static inline int fake_happen(void)
         fake_complete(i, step->status, step->data, step->len);
         return 1;
     }
-    for (int i = 0; i < bus.n_flying; i++) {
+    for (int i = 0; i < bus.n_flying && !bus.hold_writes; i++) {
         if (bus.flying[i]->endpoint != FAKE_OUT) continue;
         fake_complete(i, LIBUSB_TRANSFER_COMPLETED, NULL, 0);
         return 1;

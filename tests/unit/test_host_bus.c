@@ -346,6 +346,18 @@ static void test_unplug_while_writing(void **state)
     close_head(sh);
 }
 
+/* The head takes no command: closing takes the write back before anything is freed. */
+static void test_close_while_writing(void **state)
+{
+    char reply[64];
+    (void)state;
+    struct scanhead *sh = open_head("usb");
+    bus.hold_writes = 1;
+    assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, 20), SCANHEAD_ETIMEOUT);
+    assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, 20), SCANHEAD_ETIMEOUT); /* behind it */
+    close_head(sh);
+}
+
 /* A transfer that does not end when it is taken back is forgotten with the device. */
 static void test_close_with_a_stuck_transfer(void **state)
 {
@@ -444,6 +456,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_write_fails, begin, end),
         cmocka_unit_test_setup_teardown(test_unplug_seen_by_writing, begin, end),
         cmocka_unit_test_setup_teardown(test_unplug_while_writing, begin, end),
+        cmocka_unit_test_setup_teardown(test_close_while_writing, begin, end),
         cmocka_unit_test_setup_teardown(test_close_with_a_stuck_transfer, begin, end),
         cmocka_unit_test_setup_teardown(test_wait, begin, end),
         cmocka_unit_test_setup_teardown(test_wait_for_permission, begin, end),
