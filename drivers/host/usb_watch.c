@@ -1,11 +1,11 @@
 /* Waiting for a head to be plugged in: the system's hot-plug events, where it has them. */
-#include <time.h>
-
 #include <stdlib.h>
+#include <time.h>
+#include <unistd.h>
 
 #include "drivers/host/usb.h"
 
-/* No event tells of a permission that udev gives, of a configuration that the kernel sets, of another program that lets
+/* No event tells of a permission that comes late, of a configuration that the kernel sets, of another program that lets
  * go: what has just come is looked at often for a while, and everything at times. */
 enum { PAUSE_MS = 50, HURRY_MS = 2000, LOOK_MS = 1000 };
 
@@ -22,13 +22,18 @@ static int LIBUSB_CALL on_arrival(libusb_context *ctx, libusb_device *device, li
     return 0;
 }
 
+/* libusb hears of devices from udev, once its rules are through; where no udev runs (a container, a small guest) it
+ * hears nothing, and does not know that. */
+static int has_events(void)
+{
+    return libusb_has_capability(LIBUSB_CAP_HAS_HOTPLUG) && access("/run/udev/control", F_OK) == 0;
+}
+
 struct host_usb_watch *host_usb_watch_open(const char *source)
 {
     struct usb_wanted wanted;
     struct sh_err err;
-    if (!host_source_is_usb(source) || !libusb_has_capability(LIBUSB_CAP_HAS_HOTPLUG) ||
-        host_usb_parse(source, &wanted, &err) != SH_OK)
-        return NULL;
+    if (!host_source_is_usb(source) || !has_events() || host_usb_parse(source, &wanted, &err) != SH_OK) return NULL;
     struct host_usb_watch *watch = calloc(1, sizeof *watch);
     if (watch == NULL || libusb_init(&watch->ctx) != 0) {
         free(watch);

@@ -15,6 +15,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #define FAKE_NUL '\xff' /* for a NUL in a device's string; libusb gives ASCII alone */
 
@@ -51,10 +52,10 @@ static struct fake_bus {
     struct fake_step step[FAKE_STEPS];
     int n_steps, done;
     void (*idle)(void);
-    int no_hotplug, gone, init_rc; /* gone: every device that is open has been unplugged */
-    int clear_halt_rc, submit_rc;  /* what these give while not 0 */
-    int submit_fails;              /* for so many times; < 0: always */
-    int submit_room;               /* how many reads may be under way; 0: any number */
+    int no_hotplug, no_udev, gone, init_rc; /* gone: every device that is open has been unplugged */
+    int clear_halt_rc, submit_rc;           /* what these give while not 0 */
+    int submit_fails;                       /* for so many times; < 0: always */
+    int submit_room;                        /* how many reads may be under way; 0: any number */
     int will_not_cancel, hold_writes;
     int contexts, handles, transfers, claimed, sessions, lists, configs; /* to be 0 at the end */
     int n_lists, n_clear_halts, n_waits, last_wait_ms;
@@ -115,6 +116,14 @@ int libusb_hotplug_register_callback(libusb_context *ctx, int events, int flags,
     ctx->arrival = callback;
     ctx->arrival_data = data;
     return 0;
+}
+
+/* Whether udev runs: without it libusb has no events, and does not know. */
+int access(const char *path, int mode)
+{
+    assert_string_equal(path, "/run/udev/control");
+    assert_int_equal(mode, F_OK);
+    return bus.no_udev ? -1 : 0;
 }
 
 const char *libusb_strerror(int error)
