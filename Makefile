@@ -38,6 +38,7 @@ SAN ?=
 FP = -ffp-contract=off -fno-math-errno -fno-trapping-math
 HEADS_DIR = $(PREFIX)/share/scanhead/heads
 UDEV_DIR = $(PREFIX)/lib/udev/rules.d
+PC_DIR = $(PREFIX)/lib/pkgconfig
 ALL_CPPFLAGS = -I. -D_GNU_SOURCE $(if $(USBREDIR),-DHAVE_USBREDIR) -MMD -MP $(CPPFLAGS)
 ALL_CFLAGS = -std=c11 $(OPT) -g $(FP) $(CWARN) $(WERROR) -fPIC -pthread $(SAN) $(PKG_CFLAGS) $(CFLAGS)
 ALL_CXXFLAGS = -std=c++17 $(OPT) -g $(FP) $(WARN) $(WERROR) -fPIC -pthread $(SAN) $(CXXFLAGS)
@@ -185,7 +186,7 @@ test-programs: all $(TESTS)
 
 install: all
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib $(DESTDIR)$(PREFIX)/include $(DESTDIR)$(HEADS_DIR) \
-		$(DESTDIR)$(UDEV_DIR)
+		$(DESTDIR)$(UDEV_DIR) $(DESTDIR)$(PC_DIR)
 	install $(BUILD)/scanhead $(DESTDIR)$(PREFIX)/bin/
 	install -m 644 $(BUILD)/libscanhead.a $(DESTDIR)$(PREFIX)/lib/
 	install $(BUILD)/libscanhead.so $(DESTDIR)$(PREFIX)/lib/libscanhead.so.1
@@ -193,6 +194,7 @@ install: all
 	install -m 644 drivers/host/scanhead.h $(DESTDIR)$(PREFIX)/include/
 	install -m 644 config/heads/*.yaml $(DESTDIR)$(HEADS_DIR)/
 	install -m 644 drivers/host/70-scanhead.rules $(DESTDIR)$(UDEV_DIR)/
+	sed 's|@PREFIX@|$(PREFIX)|' drivers/host/libscanhead.pc.in > $(DESTDIR)$(PC_DIR)/libscanhead.pc
 format:
 	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')
 clean:

@@ -8,6 +8,7 @@ set --
 for folder in unit accuracy stability wire; do
     [ -z "$part" ] || [ "$part" = $folder ] || continue
     [ $folder != unit ] || set -- "$@" tests/check_includes.sh
+    [ $folder != wire ] || set -- "$@" tests/check_install.sh
     for source in tests/$folder/test_*.c; do
         [ ! -e "$source" ] || set -- "$@" "$build/test/${source%.c}"
     done
