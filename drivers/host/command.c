@@ -47,7 +47,8 @@ static int wait_writable(struct scanhead *sh, int64_t deadline_ns)
     return rc == 0 && sh->ended ? host_gone(sh) : rc;
 }
 
-static int unplugged(struct scanhead *sh)
+/* What had come can still be read. */
+static int gone_while_writing(struct scanhead *sh)
 {
     sh->lost = sh->source.usb != NULL;
     return host_gone(sh);
@@ -63,10 +64,8 @@ static int send_all(struct scanhead *sh, const char *data, size_t len, int64_t d
             done += (size_t)n;
         else if (n < 0 && errno == EAGAIN)
             rc = wait_writable(sh, deadline_ns);
-        else if (n < 0 && errno == ENODEV)
-            rc = unplugged(sh);
-        else if (n < 0 && (errno == EPIPE || errno == ECONNRESET || errno == EIO))
-            rc = host_gone(sh);
+        else if (n < 0 && host_is_hang_up(sh, errno))
+            rc = gone_while_writing(sh);
         else if (n < 0 && errno != EINTR)
             rc = sh_fail(&sh->err, SH_EIO, "%s: cannot write: %s", sh->source.name, strerror(errno));
         if (rc != 0) {

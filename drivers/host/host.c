@@ -204,7 +204,8 @@ static int hand_out(struct scanhead *sh, const uint8_t *raw, struct scanhead_fra
 
 int host_gone(struct scanhead *sh)
 {
-    if (sh->lost) return sh_fail(&sh->err, SCANHEAD_ELOST, "%s: the head was unplugged", sh->source.name);
+    if (sh->lost)
+        return sh_fail(&sh->err, SCANHEAD_ELOST, "%s: the head was unplugged, or answers no more", sh->source.name);
     return sh_fail(&sh->err, SCANHEAD_ECLOSED, sh->source.is_file ? "%s: end of the recording" : "%s: the head is gone",
                    sh->source.name);
 }

@@ -86,6 +86,8 @@ void host_usb_watch_close(struct host_usb_watch *watch);
 /* rc: why the last try failed. 0: try again, or the deadline is over; -1: a signal came. */
 int host_usb_watch_wait(struct host_usb_watch *watch, int rc, int64_t deadline_ns);
 
+/* io.c: whether an errno of the source's read or write means that the other side is gone. */
+int host_is_hang_up(const struct scanhead *sh, int error);
 /* What to say where nothing more will come. */
 int host_gone(struct scanhead *sh);
 
