@@ -95,6 +95,14 @@ struct search {
     char refused[64];
 };
 
+/* For the message that there are several; where there is no room for all, it shows that. */
+static void name_another(struct search *s, const char *name)
+{
+    const size_t used = strlen(s->others), room = sizeof s->others - used;
+    if ((size_t)snprintf(s->others + used, room, "%s%s", used > 0 ? ", " : "", name) >= room)
+        memcpy(s->others + sizeof s->others - sizeof "...", "...", sizeof "...");
+}
+
 static void try_device(struct search *s, libusb_device *device)
 {
     struct libusb_device_descriptor d;
@@ -117,8 +125,7 @@ static void try_device(struct search *s, libusb_device *device)
         return;
     }
     snprintf(name, sizeof name, "usb:%04x:%04x%s%s", d.idVendor, d.idProduct, serial[0] != 0 ? ":" : "", serial);
-    size_t used = strlen(s->others);
-    snprintf(s->others + used, sizeof s->others - used, "%s%s", used > 0 ? ", " : "", name);
+    name_another(s, name);
     if (s->n++ > 0) {
         libusb_close(handle);
         return;

@@ -138,6 +138,26 @@ static void test_no_permission(void **state)
     close_head(open_head("usb"));
 }
 
+static void test_several(void **state)
+{
+    static const char hundred[] =
+        "0123456789012345678901234567890123456789012345678901234567890123456789012345678901234567"
+        "890123456789";
+    struct scanhead *sh;
+    char err[512];
+    (void)state;
+    bus.device[1] = (struct libusb_device){.present = 1};
+    assert_int_equal(scanhead_open("usb", &sh, err, sizeof err), SCANHEAD_EINPUT);
+    assert_non_null(strstr(err, "2 heads"));
+    assert_non_null(strstr(err, ": usb:1209:0001:SH-1, usb:1209:0002"));
+    close_head(open_head("usb:1209:2"));
+    for (int i = 0; i < 3; i++)
+        bus.device[i] = (struct libusb_device){.present = 1, .serial = hundred};
+    assert_int_equal(scanhead_open("usb", &sh, err, sizeof err), SCANHEAD_EINPUT);
+    assert_non_null(strstr(err, "3 heads"));
+    assert_string_equal(err + strlen(err) - 3, "...");
+}
+
 static void test_cannot_open(void **state)
 {
     struct scanhead *sh;
@@ -448,6 +468,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_strings, begin, end),
         cmocka_unit_test_setup_teardown(test_no_permission, begin, end),
+        cmocka_unit_test_setup_teardown(test_several, begin, end),
         cmocka_unit_test_setup_teardown(test_cannot_open, begin, end),
         cmocka_unit_test_setup_teardown(test_failures_pass, begin, end),
         cmocka_unit_test_setup_teardown(test_data_with_a_failure, begin, end),
