@@ -202,4 +202,4 @@ clean:
 .PHONY: all deps deps-test deps-build deps-guest demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb \
 	test-usb-million objects test-unit-programs test-programs bench bench-beam chart install format clean
 .SECONDARY:
--include $(shell find $(BUILD) -name '*.d' 2>/dev/null)
+-include $(shell find $(BUILD) -type f -name '*.d' 2>/dev/null)

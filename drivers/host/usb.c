@@ -16,7 +16,7 @@
 /* A read is a multiple of every packet size (64, 512, 1024 bytes): so none can be sent more than it has room for. */
 enum { IN_TRANSFERS = 16, IN_BYTES = 64 << 10, OUT_BYTES = 2048, CANCEL_MS = 1000 };
 /* How long a bus may fail with the device still on it, as it does until the hub has noticed an unplugged one. */
-enum { FAILING_MS = 1000, FAILING_PAUSE_MS = 20 };
+enum { FAILING_MS = 1000, FAILING_PAUSE_MS = 20, RELAPSE_MS = 10000 };
 
 struct in_transfer {
     struct libusb_transfer *transfer;
@@ -26,8 +26,9 @@ struct in_transfer {
 };
 
 struct failing {
-    int n;              /* failures since something got through */
+    int n;              /* failures since something got through, or since RELAPSE_MS without one */
     int64_t give_up_ns; /* the first of them, and FAILING_MS */
+    int64_t relapse_ns; /* the last of them, and RELAPSE_MS */
 };
 
 struct host_usb {
@@ -129,13 +130,17 @@ static int submit(struct in_transfer *in)
 static int recover(struct host_usb *usb, struct failing *failing, uint8_t endpoint)
 {
     const struct timespec pause = {.tv_nsec = FAILING_PAUSE_MS * 1000000};
+    const int64_t now_ns = host_deadline_ns(0);
+    if (failing->n > 0 && now_ns > failing->relapse_ns) failing->n = 0;
     if (failing->n++ == 0)
         failing->give_up_ns = host_deadline_ns(FAILING_MS);
-    else if (host_deadline_ns(0) > failing->give_up_ns)
+    else if (now_ns > failing->give_up_ns)
         return ENODEV;
     else
         nanosleep(&pause, NULL);
-    return libusb_clear_halt(usb->handle, endpoint) == LIBUSB_ERROR_NO_DEVICE ? ENODEV : 0;
+    const int rc = libusb_clear_halt(usb->handle, endpoint);
+    failing->relapse_ns = host_deadline_ns(RELAPSE_MS);
+    return rc == LIBUSB_ERROR_NO_DEVICE ? ENODEV : 0;
 }
 
 /* The same for the reads: all are taken back first, and those that failed along with this one need no more. */
