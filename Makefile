@@ -38,6 +38,7 @@ SAN ?=
 FP = -ffp-contract=off -fno-math-errno -fno-trapping-math
 HEADS_DIR = $(PREFIX)/share/scanhead/heads
 UDEV_DIR = $(PREFIX)/lib/udev/rules.d
+PC_DIR = $(PREFIX)/lib/pkgconfig
 ALL_CPPFLAGS = -I. -D_GNU_SOURCE $(if $(USBREDIR),-DHAVE_USBREDIR) -MMD -MP $(CPPFLAGS)
 ALL_CFLAGS = -std=c11 $(OPT) -g $(FP) $(CWARN) $(WERROR) -fPIC -pthread $(SAN) $(PKG_CFLAGS) $(CFLAGS)
 ALL_CXXFLAGS = -std=c++17 $(OPT) -g $(FP) $(WARN) $(WERROR) -fPIC -pthread $(SAN) $(CXXFLAGS)
@@ -191,7 +192,7 @@ test-programs: all $(TESTS)
 
 install: all
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib $(DESTDIR)$(PREFIX)/include $(DESTDIR)$(HEADS_DIR) \
-		$(DESTDIR)$(UDEV_DIR)
+		$(DESTDIR)$(UDEV_DIR) $(DESTDIR)$(PC_DIR)
 	install $(BUILD)/scanhead $(DESTDIR)$(PREFIX)/bin/
 	install -m 644 $(BUILD)/libscanhead.a $(DESTDIR)$(PREFIX)/lib/
 	install $(BUILD)/libscanhead.so $(DESTDIR)$(PREFIX)/lib/libscanhead.so.1
@@ -199,6 +200,7 @@ install: all
 	install -m 644 drivers/host/scanhead.h $(DESTDIR)$(PREFIX)/include/
 	install -m 644 config/heads/*.yaml $(DESTDIR)$(HEADS_DIR)/
 	install -m 644 drivers/host/70-scanhead.rules $(DESTDIR)$(UDEV_DIR)/
+	sed 's|@PREFIX@|$(PREFIX)|' drivers/host/libscanhead.pc.in > $(DESTDIR)$(PC_DIR)/libscanhead.pc
 format:
 	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')
 clean:
@@ -206,4 +208,4 @@ clean:
 .PHONY: ALWAYS all deps deps-test deps-build deps-guest demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb \
 	test-usb-million objects test-unit-programs test-programs bench bench-beam chart install format clean
 .SECONDARY:
--include $(shell find $(BUILD) -name '*.d' 2>/dev/null)
+-include $(shell find $(BUILD) -type f -name '*.d' 2>/dev/null)

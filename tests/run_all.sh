@@ -17,7 +17,7 @@ programs() {
 set -- $(programs accuracy) $(programs stability)
 if [ -z "$part" ] || [ "$part" = unit ]; then set -- "$@" tests/check_includes.sh $(programs unit); fi
 if [ -z "$part" ]; then set -- "$@" $(programs unit "$build/asan"); fi
-if [ -z "$part" ] || [ "$part" = wire ]; then set -- "$@" -- $(programs wire); fi
+if [ -z "$part" ] || [ "$part" = wire ]; then set -- "$@" -- tests/check_install.sh $(programs wire); fi
 if [ -z "$part" ] || [ "$part" = guest ]; then
     export BUILD="$build"
     set -- "$@" tests/guest/guest.sh # it takes the programs of tests/guest with it
