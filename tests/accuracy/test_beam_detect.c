@@ -1,0 +1,172 @@
+/* Footprints and detection together: each echo of a pulse by itself, against what can be written down. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "core/generate.h"
+#include "core/rng.h"
+#include "core/surface.h"
+#include "tests/accuracy/beam_reference.h"
+
+static const double STATION[3] = {0.0, 0.0, 0.0};
+
+static void open_rig(struct beam_rig *rig, struct scene *scene, const struct beam_view *view)
+{
+    struct sh_err err;
+    if (beam_rig_open(rig, scene, STATION, view, &err) != 0) fail_msg("%s", err.text);
+}
+
+/* ---- nothing asked for */
+
+struct copy {
+    uint32_t n, *a, *b, *c, *dt_ns;
+    uint16_t *label;
+    int16_t *refl_cdb;
+    uint8_t *echo;
+};
+
+static void *twin(const void *from, size_t bytes)
+{
+    void *to = malloc(bytes);
+    assert_non_null(to);
+    return memcpy(to, from, bytes);
+}
+
+static void copy_block(const struct line_block *b, struct copy *to)
+{
+    uint32_t n = to->n = b->n_points;
+    to->a = twin(b->a, n * sizeof *b->a);
+    to->b = twin(b->b, n * sizeof *b->b);
+    to->c = twin(b->c, n * sizeof *b->c);
+    to->dt_ns = twin(b->dt_ns, n * sizeof *b->dt_ns);
+    to->label = twin(b->label, n * sizeof *b->label);
+    to->refl_cdb = twin(b->refl_cdb, n * sizeof *b->refl_cdb);
+    to->echo = twin(b->echo, n);
+}
+
+static void free_copy(struct copy *c)
+{
+    free(c->a);
+    free(c->b);
+    free(c->c);
+    free(c->dt_ns);
+    free(c->label);
+    free(c->refl_cdb);
+    free(c->echo);
+}
+
+static void same_block(const struct line_block *b, const struct copy *c)
+{
+    assert_int_equal(b->n_points, c->n);
+    assert_memory_equal(b->echo, c->echo, c->n);
+    assert_memory_equal(b->label, c->label, c->n * sizeof *c->label);
+    assert_memory_equal(b->dt_ns, c->dt_ns, c->n * sizeof *c->dt_ns);
+    assert_memory_equal(b->refl_cdb, c->refl_cdb, c->n * sizeof *c->refl_cdb);
+    assert_memory_equal(b->b, c->b, c->n * sizeof *c->b);
+    assert_memory_equal(b->c, c->c, c->n * sizeof *c->c);
+    assert_memory_equal(b->a, c->a, c->n * sizeof *c->a);
+}
+
+/* A railing, wires and leaves before a wall that is out of range in part: pulses of none, one and several echoes. */
+static struct scene *railing(void)
+{
+    struct generate_bar bar[48];
+    struct scene *scene;
+    struct sh_err err;
+    uint32_t n = 0;
+    for (uint16_t k = 0; k < 48; k++) {
+        double x = -4.7 + 0.2 * k, y = 6.0 + 0.3 * (k % 12);
+        bar[n++] = (struct generate_bar){
+            .a = {x, y, -2.0}, .b = {x + 0.3, y + 1.0, 2.0}, .diameter_m = k % 3 == 0 ? 0.003 : 0.02, .label = 1};
+    }
+    if (generate_bars(bar, n, 20.0, &scene, &err) != 0) fail_msg("%s", err.text);
+    return scene;
+}
+
+/* Where detection asks for nothing, the beam's blocks are its own, entry by entry: noise, numbers, order. */
+static void nothing_asked_for_changes_nothing(void **state)
+{
+    (void)state;
+    const struct beam_view view = {-20.0, 20.0, -45.0, 45.0, 12, 3000};
+    const struct cast_detect nothing = {.max_echoes = LINE_MAX_ECHOES};
+    static const enum beam_mode modes[] = {BEAM_ADAPTIVE, BEAM_RINGS};
+    uint64_t several = 0, none = 0;
+    struct beam_rig rig;
+    open_rig(&rig, railing(), &view);
+    rig.setup.range_max_m = 22.0;
+    rig.setup.noise_on = 1;
+    rig.setup.range_sigma_m = 0.003;
+    rig.setup.range_sigma_ppm = 10.0;
+    rig.setup.noise_key = rng_key(7, RNG_RANGE);
+    for (int m = 0; m < 2; m++)
+        for (int geo = 0; geo < 2; geo++)
+            for (int select = BEAM_ALL; select <= BEAM_STRONGEST; select++) {
+                beam_rig_mode(&rig, modes[m], 3);
+                rig.setup.layout = geo ? LINE_GEO : LINE_POLAR;
+                rig.setup.echoes = (enum beam_select)select;
+                for (uint32_t l = 0; l < view.lines; l += 3) {
+                    struct copy own;
+                    rig.setup.detect = NULL;
+                    uint32_t echoes = beam_rig_line(&rig, l);
+                    copy_block(&rig.block, &own);
+                    rig.setup.detect = &nothing;
+                    assert_int_equal(beam_rig_line(&rig, l), echoes);
+                    same_block(&rig.block, &own);
+                    for (uint32_t i = 0; i < own.n; i++) {
+                        several += own.echo[i] >> 4 > 1;
+                        none += own.echo[i] == 0;
+                    }
+                    free_copy(&own);
+                }
+            }
+    assert_true(several > 1000 && none > 1000);
+    beam_rig_close(&rig);
+}
+
+/* The noise of an echo is its own, whichever of the pulse's are sent: first, last and strongest are entries of all. */
+static void selection_keeps_the_noise(void **state)
+{
+    (void)state;
+    const struct beam_view view = {-20.0, 20.0, -45.0, 45.0, 4, 3000};
+    uint64_t several = 0;
+    struct beam_rig rig;
+    open_rig(&rig, railing(), &view);
+    rig.setup.noise_on = 1;
+    rig.setup.range_sigma_m = 0.003;
+    rig.setup.noise_key = rng_key(7, RNG_RANGE);
+    beam_rig_mode(&rig, BEAM_ADAPTIVE, 3);
+    for (uint32_t l = 0; l < view.lines; l++) {
+        struct copy all;
+        rig.setup.echoes = BEAM_ALL;
+        beam_rig_line(&rig, l);
+        copy_block(&rig.block, &all);
+        for (int select = BEAM_FIRST; select <= BEAM_LAST; select++) {
+            rig.setup.echoes = (enum beam_select)select;
+            beam_rig_line(&rig, l);
+            assert_int_equal(rig.block.n_points, view.pulses);
+            for (uint32_t p = 0, i = 0; p < view.pulses; p++) {
+                uint32_t n = all.echo[i] == 0 ? 1 : all.echo[i] >> 4;
+                assert_int_equal(rig.block.a[p], all.a[select == BEAM_FIRST ? i : i + n - 1]);
+                several += n > 1;
+                i += n;
+            }
+        }
+        free_copy(&all);
+    }
+    assert_true(several > 100);
+    beam_rig_close(&rig);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(nothing_asked_for_changes_nothing),
+        cmocka_unit_test(selection_keeps_the_noise),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
