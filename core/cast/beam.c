@@ -174,7 +174,7 @@ static void cast_pool(struct caster *c, const struct cast_setup *s, uint32_t fir
     int through = s->detect != NULL && s->detect->depth > 0;
     if (first == 0) c->beam->behind.n = 0;
     c->counters.sub_rays += p->n - first;
-    c->scattered = s->beam->mode == BEAM_ADAPTIVE;
+    c->scattered = c->beam->scattered;
     for (uint32_t at = first, n; at < p->n; at += n) {
         n = p->n - at < CHUNK ? p->n - at : CHUNK;
         const struct origins from = {.px = p->px + at, .py = p->py + at, .pz = p->pz + at};
@@ -303,16 +303,11 @@ static int sees_glass(const struct caster *c, const struct cast_setup *s, uint32
     return s->detect != NULL && s->detect->depth > 0 && !isnan(c->range_m[pulse]) && caster_goes_on(s, c->label[pulse]);
 }
 
-/* Pulses that one ray may not do for. */
+/* Pulses of an adaptive beam that one ray may not do for. */
 static uint32_t find_candidates(struct caster *c, const struct cast_setup *s, uint32_t n)
 {
     struct beam_work *w = c->beam;
     uint32_t found = 0, all = 0;
-    if (s->beam->mode != BEAM_ADAPTIVE) {
-        for (uint32_t p = 0; p < n; p++)
-            w->candidate[p] = p;
-        return n;
-    }
     kernel_limits(&s->beam->beam, c->range_m, w->steep, n, w->limit_m);
     if (s->detect == NULL || s->detect->depth == 0)
         return beam_near_outlines(s->beam->outlines, c->fx, c->fy, c->fz, w->limit_m, n, w->candidate);
@@ -325,43 +320,58 @@ static uint32_t find_candidates(struct caster *c, const struct cast_setup *s, ui
     return all;
 }
 
-/* Rays for a candidate; returns 0 where the central one will do. */
-static int plan_pulse(struct caster *c, const struct cast_setup *s, const struct origins *from, struct job *job)
+/* Sub-rays all over the footprints of these pulses. */
+static void cast_whole(struct caster *c, const struct cast_setup *s, const struct origins *from, const uint32_t *pulse,
+                       uint32_t n)
 {
-    if (s->beam->mode != BEAM_ADAPTIVE || sees_glass(c, s, job->pulse)) {
+    struct beam_work *w = c->beam;
+    const uint32_t reserve = s->beam->pattern.n;
+    w->scattered = 0;
+    for (uint32_t k = 0; k < n; k++) {
+        struct job *job = &w->job[w->n_jobs++];
+        job->pulse = pulse[k];
         plan_whole(c, s->beam, from, job);
-        return 1;
+        if (w->n_jobs == MAX_JOBS || w->pool.n + reserve > POOL) run_jobs(c, s, from, reserve);
     }
-    return plan_job(c, s, from, job, (double)c->beam->limit_m[job->pulse], 0);
+    if (w->n_jobs > 0) run_jobs(c, s, from, reserve);
+}
+
+/* Candidates of an adaptive beam: rays for the parts of their footprints. */
+static void cast_parts(struct caster *c, const struct cast_setup *s, const struct origins *from, uint32_t candidates)
+{
+    struct beam_work *w = c->beam;
+    const uint32_t pattern = s->beam->pattern.n, reserve = pattern > BEAM_MAX_PARTS ? pattern : BEAM_MAX_PARTS;
+    w->scattered = 1;
+    for (uint32_t k = 0; k < candidates; k++) {
+        struct job *job = &w->job[w->n_jobs];
+        uint32_t pulse = job->pulse = w->candidate[k];
+        job->next_m = INFINITY;
+        if (sees_glass(c, s, pulse)) {
+            w->near[w->n_near++] = w->again[w->n_again++] = pulse;
+            continue;
+        }
+        if (!plan_job(c, s, from, job, (double)w->limit_m[pulse], 0)) continue;
+        w->near[w->n_near++] = pulse;
+        w->n_jobs++;
+        if (w->n_jobs == MAX_JOBS || w->pool.n + reserve > POOL) run_jobs(c, s, from, reserve);
+    }
+    if (w->n_jobs > 0) run_jobs(c, s, from, reserve);
 }
 
 /* Fills w->some with the echoes of pulses that one ray does not do for; gives those pulses in w->near. */
 static void sub_rays(struct caster *c, const struct cast_setup *s, const struct origins *from, uint32_t n)
 {
     struct beam_work *w = c->beam;
-    const uint32_t pattern = s->beam->pattern.n;
-    int adaptive = s->beam->mode == BEAM_ADAPTIVE;
-    uint32_t reserve = !adaptive || pattern > BEAM_MAX_PARTS ? pattern : BEAM_MAX_PARTS;
-    uint32_t candidates = find_candidates(c, s, n);
     w->n_jobs = w->pool.n = w->some.n = w->n_near = w->n_again = 0;
-    for (uint32_t k = 0; k < candidates; k++) {
-        struct job *job = &w->job[w->n_jobs];
-        job->pulse = w->candidate[k];
-        job->next_m = INFINITY;
-        if (!plan_pulse(c, s, from, job)) continue;
-        w->near[w->n_near++] = job->pulse;
-        w->n_jobs++;
-        if (w->n_jobs == MAX_JOBS || w->pool.n + reserve > POOL) run_jobs(c, s, from, reserve);
+    if (s->beam->mode != BEAM_ADAPTIVE) {
+        for (; w->n_near < n; w->n_near++)
+            w->near[w->n_near] = w->n_near;
+        cast_whole(c, s, from, w->near, n);
+        return;
     }
-    run_jobs(c, s, from, reserve);
-    for (uint32_t k = 0; k < w->n_again; k++) {
-        struct job *job = &w->job[w->n_jobs++];
-        job->pulse = w->again[k];
-        plan_whole(c, s->beam, from, job);
-        if (w->n_jobs == MAX_JOBS || w->pool.n + reserve > POOL) run_jobs(c, s, from, reserve);
-    }
-    if (w->n_again > 0) run_jobs(c, s, from, reserve);
-    if (adaptive) c->counters.outlined += w->n_near;
+    cast_parts(c, s, from, find_candidates(c, s, n));
+    cast_whole(c, s, from, w->again, w->n_again);
+    c->counters.outlined += w->n_near;
 }
 
 /* The central rays of an adaptive beam, with their incidences; nothing moves. */

@@ -51,6 +51,7 @@ struct beam_work {
     uint32_t again[CHUNK], n_again;                 /* glass or a mirror was met beside the centre */
     struct job job[MAX_JOBS];
     uint32_t n_jobs;
+    int scattered; /* the pool's rays have nothing in common */
     struct pool pool;
     struct beam_return returns[(BEAM_MAX_SUBRAYS + 1) * (1 + CAST_MAX_DEPTH)];
     uint32_t n_returns;
