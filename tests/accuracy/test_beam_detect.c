@@ -618,11 +618,17 @@ static void a_footprint_on_the_border_of_a_mirror(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(nothing_asked_for_changes_nothing),  cmocka_unit_test(selection_keeps_the_noise),
-        cmocka_unit_test(each_echo_has_its_own_reflectance),  cmocka_unit_test(a_mixed_pixel_leans_to_what_is_bright),
-        cmocka_unit_test(an_echo_drops_out_by_itself),        cmocka_unit_test(angle_noise_moves_the_footprint),
-        cmocka_unit_test(ball_noise_moves_each_echo),         cmocka_unit_test(each_echo_is_folded_by_itself),
-        cmocka_unit_test(a_footprint_on_the_border_of_glass), cmocka_unit_test(a_footprint_on_the_border_of_a_mirror),
+        cmocka_unit_test(nothing_asked_for_changes_nothing),
+        cmocka_unit_test(selection_keeps_the_noise),
+        cmocka_unit_test(each_echo_has_its_own_reflectance),
+        cmocka_unit_test(a_mixed_pixel_leans_to_what_is_bright),
+        cmocka_unit_test(an_echo_drops_out_by_itself),
+        cmocka_unit_test(angle_noise_moves_the_footprint),
+        cmocka_unit_test(ball_noise_moves_each_echo),
+        cmocka_unit_test(each_echo_is_folded_by_itself),
+        cmocka_unit_test(a_footprint_on_the_border_of_glass),
+        cmocka_unit_test(no_light_is_lost),
+        cmocka_unit_test(a_footprint_on_the_border_of_a_mirror),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
