@@ -154,9 +154,9 @@ void caster_hits(struct caster *caster, const struct bvh *bvh, const double stat
                  uint32_t n, const double *dx, const double *dy, const double *dz, double *range_m, uint32_t *triangle);
 
 /* The outlines of a scene that are steps as seen from the station, which lies within the BVH's station_reach_m
- * (beam_outlines_create). For setting up. */
+ * (beam_outlines_create; kind: as there, of surface_kinds where detection models surfaces). For setting up. */
 int cast_outlines(const struct scene *scene, const struct bvh *bvh, const double station_m[3], const struct beam *beam,
-                  double range_max_m, struct beam_outlines **out, struct sh_err *err);
+                  double range_max_m, const uint16_t *kind, struct beam_outlines **out, struct sh_err *err);
 
 /* Cost by stage, for measuring: `now` counts in any unit and is read between the stages of each chunk. */
 enum cast_stage {

@@ -75,7 +75,8 @@ void kernel_directions_read(const struct cast_setup *setup, const double *mirror
 }
 
 /* Embree tells a packet's directions apart by their signs, but takes what is smaller than 1e-18 for positive when it
- * divides by it: with a component of -1e-22, all rays of that packet with its signs would be lost. So there are none. */
+ * divides by it: with a component of -1e-22, all rays of that packet with its signs would be lost. So there are none.
+ */
 VEC_INLINE float direction_component(double d)
 {
     float f = (float)d;
