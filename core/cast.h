@@ -81,10 +81,13 @@ struct cast_detect {
     const struct detect_ball *ball;
 };
 
-/* A beam with a footprint (core/beam.h). Constant; any thread. */
+/* A beam with a footprint (core/beam.h). Constant; any thread. With cast_detect, echoes weigh by what comes back of
+ * them, each by itself is detected or not, and has noise of its own. Where a footprint of an adaptive beam lies on
+ * glass or a mirror, in part or as a whole, it is cast as rings: what is seen there has outlines that nobody knows. */
 struct cast_beam {
     struct beam beam;
-    enum beam_mode mode; /* BEAM_RINGS, or BEAM_ADAPTIVE with outlines: then the head and the scene stand still */
+    enum beam_mode mode; /* BEAM_RINGS, or BEAM_ADAPTIVE with outlines: then the head and the scene stand still,
+                          * and beams begin at station_m (instrument_has_offset) */
     uint32_t max_echoes; /* of a pulse; up to LINE_MAX_ECHOES */
     struct beam_pattern pattern, fine; /* sub-rays; the finest */
     const struct beam_outlines *outlines;

@@ -94,7 +94,11 @@ static void nothing_asked_for_changes_nothing(void **state)
     (void)state;
     const struct beam_view view = {-20.0, 20.0, -45.0, 45.0, 12, 3000};
     const struct cast_detect nothing = {.max_echoes = LINE_MAX_ECHOES};
-    static const enum beam_mode modes[] = {BEAM_ADAPTIVE, BEAM_RINGS};
+    static const enum beam_mode modes[] = {BEAM_ADAPTIVE, BEAM_RINGS, BEAM_RINGS};
+    struct pose_knot knots[2] = {{.t_ns = 0, .pose = {.quat = {1.0, 0.0, 0.0, 0.0}}},
+                                 {.t_ns = 120000000,
+                                  .pose = {.position_m = {0.003, 0.004, 0.002},
+                                           .quat = {cos(0.1), 0.0, 0.0, sin(0.1)}}}}; /* the last mode's head moves */
     uint64_t several = 0, none = 0;
     struct beam_rig rig;
     open_rig(&rig, railing(), &view);
@@ -103,10 +107,12 @@ static void nothing_asked_for_changes_nothing(void **state)
     rig.setup.range_sigma_m = 0.003;
     rig.setup.range_sigma_ppm = 10.0;
     rig.setup.noise_key = rng_key(7, RNG_RANGE);
-    for (int m = 0; m < 2; m++)
+    rig.setup.knot = knots;
+    for (int m = 0; m < 3; m++)
         for (int geo = 0; geo < 2; geo++)
             for (int select = BEAM_ALL; select <= BEAM_STRONGEST; select++) {
                 beam_rig_mode(&rig, modes[m], 3);
+                rig.setup.n_knots = m == 2 ? 2 : 0;
                 rig.setup.layout = geo ? LINE_GEO : LINE_POLAR;
                 rig.setup.echoes = (enum beam_select)select;
                 for (uint32_t l = 0; l < view.lines; l += 3) {
