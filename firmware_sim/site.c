@@ -189,14 +189,15 @@ static int make_beam(struct site *site, struct site_station *s, const struct sh_
     if (cfg->beam_mode == BEAM_SINGLE) return SH_OK;
     struct cast_beam *beam = s->beam = calloc(1, sizeof *beam);
     if (beam == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
-    beam->mode = cfg->beam_mode != BEAM_AUTO ? cfg->beam_mode : config_moves(cfg) ? BEAM_RINGS : BEAM_ADAPTIVE;
+    beam->mode = cfg->beam_mode != BEAM_AUTO ? cfg->beam_mode : config_beam_fixed(cfg) ? BEAM_ADAPTIVE : BEAM_RINGS;
     beam->max_echoes = p->max_echoes;
     beam_init(&beam->beam, p->beam_exit_m, p->beam_divergence_rad, 1e-9 * p->pulse_width_ns);
     beam_rings(cfg->beam_rings, &beam->pattern);
     beam_rings(BEAM_FINE_RINGS, &beam->fine);
     if (beam->mode != BEAM_ADAPTIVE) return SH_OK;
     if (site->scene->n_triangles > 1000000) sh_progress(report, "looking for outlines", -1.0);
-    int rc = cast_outlines(site->scene, s->bvh, s->at.position_m, &beam->beam, p->range_max_m, &s->outlines, err);
+    int rc = cast_outlines(site->scene, s->bvh, s->at.position_m, &beam->beam, p->range_max_m, site->detect.kind,
+                           &s->outlines, err);
     beam->outlines = s->outlines;
     return rc;
 }
