@@ -135,9 +135,9 @@ struct beam_outlines_info {
 };
 void beam_outlines_get_info(const struct beam_outlines *outlines, struct beam_outlines_info *info);
 
-/* Pulses whose footprint may reach an outline up to limit_m: their indices. Returns how many. */
+/* Pulses whose footprint may reach an outline, at whatever range: their indices. Returns how many. */
 uint32_t beam_near_outlines(const struct beam_outlines *outlines, const float *dx, const float *dy, const float *dz,
-                            const float *limit_m, uint32_t n, uint32_t *pulse);
+                            uint32_t n, uint32_t *pulse);
 
 enum { BEAM_MAX_LINES = 12, BEAM_MAX_PARTS = 64 };
 
@@ -157,7 +157,8 @@ struct beam_parts {
     uint32_t n, centre; /* the part with the centre of the disc */
     double energy[BEAM_MAX_PARTS], x[BEAM_MAX_PARTS], y[BEAM_MAX_PARTS];
 };
-/* Returns 0, or 1 where there are more than BEAM_MAX_PARTS. Parts of less than 0.05 % of the energy are left out. */
+/* fine: of BEAM_FINE_RINGS. Returns 0, or 1 where there are more than BEAM_MAX_PARTS. Parts of less than 0.05 % of the energy
+ * are left out. */
 int beam_cut(const struct beam *beam, const struct beam_pattern *fine, const struct beam_line *line, uint32_t n,
              struct beam_parts *parts);
 

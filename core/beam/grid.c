@@ -34,7 +34,7 @@ static void put(struct draw *d, uint32_t cell, float range_m)
         return;
     }
     o->entry[o->first[cell]++] = (struct outline_entry){range_m, d->edge};
-    if (!(range_m >= o->nearest_m[cell])) o->nearest_m[cell] = range_m;
+    o->any[cell / 32] |= 1U << cell % 32;
 }
 
 static void put_row(struct draw *d, uint32_t face, int32_t row, double from, double to, float range_m)
@@ -176,10 +176,8 @@ static int fill_cells(struct beam_outlines *o, const struct beam *beam, const st
 {
     uint64_t n = draw_all(o, beam, s, 0);
     if (n >= UINT32_MAX) return sh_fail(err, SH_EINPUT, "beam: too many outlines; beam.mode: rings does without them");
-    for (uint32_t c = 0; c < N_CELLS; c++) {
+    for (uint32_t c = 0; c < N_CELLS; c++)
         o->first[c + 1] += o->first[c];
-        o->nearest_m[c] = NAN; /* nearer than nothing */
-    }
     o->entry = malloc((size_t)(n + 1) * sizeof *o->entry);
     if (o->entry == NULL) return sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");
     draw_all(o, beam, s, 1);
@@ -190,7 +188,7 @@ static int fill_cells(struct beam_outlines *o, const struct beam *beam, const st
             qsort(o->entry + o->first[c], o->first[c + 1] - o->first[c], sizeof *o->entry, by_range);
     o->info.entries = n;
     o->info.bytes =
-        n * sizeof *o->entry + N_CELLS * (sizeof *o->first + sizeof *o->nearest_m) + o->n_edges * sizeof *o->edge;
+        n * sizeof *o->entry + N_CELLS * sizeof *o->first + N_CELLS / 8 + o->n_edges * sizeof *o->edge;
     return SH_OK;
 }
 
@@ -210,8 +208,8 @@ int beam_outlines_create(const struct scene *scene, const double station_m[3], c
     prober->probe = probe;
     prober->beam = beam;
     o->first = calloc(N_CELLS + 1, sizeof *o->first);
-    o->nearest_m = malloc(N_CELLS * sizeof *o->nearest_m);
-    int rc = o->first == NULL || o->nearest_m == NULL ? sh_fail(err, SH_ENOMEM, "beam: no memory") : SH_OK;
+    o->any = calloc(N_CELLS / 32, sizeof *o->any);
+    int rc = o->first == NULL || o->any == NULL ? sh_fail(err, SH_ENOMEM, "beam: no memory") : SH_OK;
     if (rc == SH_OK) rc = outline_find(scene, station_m, &o->edge, &o->n_edges, &o->info.edges, err);
     if (rc == SH_OK && find_stretches(o, prober, range_max_m * 1.01, &stretches) != SH_OK)
         rc = sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");
@@ -233,7 +231,7 @@ void beam_outlines_free(struct beam_outlines *o)
     if (o == NULL) return;
     free(o->edge);
     free(o->first);
-    free(o->nearest_m);
+    free(o->any);
     free(o->entry);
     free(o);
 }
@@ -243,25 +241,15 @@ void beam_outlines_get_info(const struct beam_outlines *o, struct beam_outlines_
     *info = o->info;
 }
 
+/* Which of the directions lead to outlines: near[i] 1, else 0. */
 VEC_CLONES
-static void cells_of(const float *restrict dx, const float *restrict dy, const float *restrict dz, uint32_t n,
-                     uint32_t *restrict cell)
+static void look_up(const uint32_t *restrict any, const float *restrict dx, const float *restrict dy,
+                    const float *restrict dz, uint32_t n, uint32_t *restrict cell, uint8_t *restrict near)
 {
     for (uint32_t i = 0; i < n; i++)
         cell[i] = outline_cell(dx[i], dy[i], dz[i]);
-}
-
-VEC_CLONES
-static uint32_t near_of(const float *restrict nearest_m, const uint32_t *restrict cell, const float *restrict limit_m,
-                        uint32_t n, uint8_t *restrict near)
-{
-    uint32_t found = 0;
-    for (uint32_t i = 0; i < n; i++) {
-        uint32_t is = nearest_m[cell[i]] <= limit_m[i];
-        near[i] = (uint8_t)is;
-        found += is;
-    }
-    return found;
+    for (uint32_t i = 0; i < n; i++)
+        near[i] = (uint8_t)(any[cell[i] / 32] >> cell[i] % 32 & 1);
 }
 
 /* What looking for lines is going to read, step by step for all pulses at once. */
@@ -276,20 +264,24 @@ static void prefetch(const struct beam_outlines *o, const uint32_t *cell, uint32
             __builtin_prefetch(&o->edge[o->entry[i].edge], 0, 3);
 }
 
-/* The nearest edge of a cell against the range, and what a footprint adds to it at most: decided later. */
+/* Most cells lead to none; ranges are looked at later. */
 uint32_t beam_near_outlines(const struct beam_outlines *o, const float *dx, const float *dy, const float *dz,
-                            const float *limit_m, uint32_t n, uint32_t *pulse)
+                            uint32_t n, uint32_t *pulse)
 {
     uint32_t cell[BLOCK], near_cell[BLOCK + 1], found = 0;
     uint8_t near[BLOCK];
     for (uint32_t at = 0; at < n; at += BLOCK) {
         uint32_t part = n - at < BLOCK ? n - at : BLOCK, before = found;
-        cells_of(dx + at, dy + at, dz + at, part, cell);
-        if (near_of(o->nearest_m, cell, limit_m + at, part, near) == 0) continue;
-        for (uint32_t i = 0; i < part; i++) {
-            pulse[found] = at + i;
-            near_cell[found - before] = cell[i];
-            found += near[i];
+        memset(near, 0, sizeof near);
+        look_up(o->any, dx + at, dy + at, dz + at, part, cell, near);
+        for (uint32_t i = 0; i < part; i += 8) {
+            uint64_t eight;
+            memcpy(&eight, near + i, sizeof eight);
+            for (; eight != 0; eight &= eight - 1) {
+                uint32_t k = i + (uint32_t)__builtin_ctzll(eight) / 8;
+                pulse[found] = at + k;
+                near_cell[found++ - before] = cell[k];
+            }
         }
         prefetch(o, near_cell, found - before);
     }

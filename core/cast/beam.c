@@ -206,8 +206,7 @@ static uint32_t sub_rays(struct caster *c, const struct cast_setup *s, const str
     uint32_t reserve = !adaptive || b->pattern.n > BEAM_MAX_PARTS ? b->pattern.n : BEAM_MAX_PARTS, cut = 0;
     uint32_t candidates = n;
     if (adaptive) {
-        kernel_limits(&b->beam, c->range_m, w->steep, n, w->limit_m);
-        candidates = beam_near_outlines(b->outlines, c->fx, c->fy, c->fz, w->limit_m, n, w->near);
+        candidates = beam_near_outlines(b->outlines, c->fx, c->fy, c->fz, n, w->near);
     }
     w->n_jobs = w->pool.n = w->some.n = 0;
     for (uint32_t k = 0; k < candidates; k++) {
@@ -221,7 +220,7 @@ static uint32_t sub_rays(struct caster *c, const struct cast_setup *s, const str
             job->centre.energy = 0.0;
             beam_axes(dir, job->e1, job->e2);
             add_pattern(c, b, from, job);
-        } else if (!plan_job(c, s, from, job, (double)w->limit_m[job->pulse], 0)) {
+        } else if (!plan_job(c, s, from, job, kernel_limit(&b->beam, c->range_m[job->pulse], w->steep[job->pulse]), 0)) {
             continue;
         }
         w->near[cut++] = job->pulse;

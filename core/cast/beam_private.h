@@ -33,7 +33,7 @@ struct several {
 };
 
 struct beam_work {
-    float steep[CHUNK], limit_m[CHUNK];
+    float steep[CHUNK];
     uint32_t near[CHUNK]; /* pulses with sub-rays */
     struct job job[MAX_JOBS];
     uint32_t n_jobs;
