@@ -135,9 +135,9 @@ struct beam_outlines_info {
 };
 void beam_outlines_get_info(const struct beam_outlines *outlines, struct beam_outlines_info *info);
 
-/* Pulses whose footprint may reach an outline, at whatever range: their indices. Returns how many. */
+/* Cells of n unit directions; and the pulses whose footprint may reach an outline, at whatever range: their indices . Returns how many. */
 uint32_t beam_near_outlines(const struct beam_outlines *outlines, const float *dx, const float *dy, const float *dz,
-                            uint32_t n, uint32_t *pulse);
+                            uint32_t n, uint32_t *cell, uint32_t *pulse);
 
 enum { BEAM_MAX_LINES = 12, BEAM_MAX_PARTS = 64 };
 
@@ -145,11 +145,11 @@ enum { BEAM_MAX_LINES = 12, BEAM_MAX_PARTS = 64 };
 struct beam_line {
     double n[2], h;
 };
-/* The outlines that cross the footprint of a pulse nearer than limit_m. Returns their number, up to BEAM_MAX_LINES, or
+/* The outlines that cross the footprint of a pulse nearer than limit_m; cell: its direction's. Returns their number, up to BEAM_MAX_LINES, or
  * BEAM_MAX_LINES + 1: more than that. *next_m: from which range on there may be more (INFINITY: none, or nothing
  * crosses it up to limit_m). */
-uint32_t beam_find_lines(const struct beam_outlines *outlines, const struct beam *beam, const double dir[3],
-                         double limit_m, struct beam_line *line, double *next_m);
+uint32_t beam_find_lines(const struct beam_outlines *outlines, const struct beam *beam, uint32_t cell,
+                         const double dir[3], double limit_m, struct beam_line *line, double *next_m);
 
 /* The parts that lines cut the footprint into. Each lies on one surface; convex, so that its centre of energy is in
  * it. */

@@ -7,7 +7,7 @@
 #include "core/vec3.h"
 #include "core/vecmath.h"
 
-enum { N_CELLS = 6 * OUTLINE_CELLS * OUTLINE_CELLS, BLOCK = 256 };
+enum { N_CELLS = 6 * OUTLINE_CELLS * OUTLINE_CELLS };
 #define NEAREST_M 0.02 /* nearer than this, all directions are near each other */
 #define PIECE     0.1  /* the longest piece of an edge, by its distance */
 
@@ -241,49 +241,37 @@ void beam_outlines_get_info(const struct beam_outlines *o, struct beam_outlines_
     *info = o->info;
 }
 
-/* Which of the directions lead to outlines: near[i] 1, else 0. */
 VEC_CLONES
-static void look_up(const uint32_t *restrict any, const float *restrict dx, const float *restrict dy,
-                    const float *restrict dz, uint32_t n, uint32_t *restrict cell, uint8_t *restrict near)
+static void cells_of(const float *restrict dx, const float *restrict dy, const float *restrict dz, uint32_t n,
+                     uint32_t *restrict cell)
 {
     for (uint32_t i = 0; i < n; i++)
         cell[i] = outline_cell(dx[i], dy[i], dz[i]);
-    for (uint32_t i = 0; i < n; i++)
-        near[i] = (uint8_t)(any[cell[i] / 32] >> cell[i] % 32 & 1);
 }
 
 /* What looking for lines is going to read, step by step for all pulses at once. */
-static void prefetch(const struct beam_outlines *o, const uint32_t *cell, uint32_t n)
+static void prefetch(const struct beam_outlines *o, const uint32_t *cell, const uint32_t *pulse, uint32_t n)
 {
+    const uint32_t *first = o->first;
     for (uint32_t k = 0; k < n; k++)
-        __builtin_prefetch(&o->first[cell[k]], 0, 3);
+        __builtin_prefetch(&first[cell[pulse[k]]], 0, 3);
     for (uint32_t k = 0; k < n; k++)
-        __builtin_prefetch(&o->entry[o->first[cell[k]]], 0, 3);
+        __builtin_prefetch(&o->entry[first[cell[pulse[k]]]], 0, 3);
     for (uint32_t k = 0; k < n; k++)
-        for (uint32_t i = o->first[cell[k]], end = o->first[cell[k] + 1]; i < end && i < o->first[cell[k]] + 2; i++)
+        for (uint32_t c = cell[pulse[k]], i = first[c], end = first[c + 1]; i < end && i < first[c] + 2; i++)
             __builtin_prefetch(&o->edge[o->entry[i].edge], 0, 3);
 }
 
 /* Most cells lead to none; ranges are looked at later. */
 uint32_t beam_near_outlines(const struct beam_outlines *o, const float *dx, const float *dy, const float *dz,
-                            uint32_t n, uint32_t *pulse)
+                            uint32_t n, uint32_t *cell, uint32_t *pulse)
 {
-    uint32_t cell[BLOCK], near_cell[BLOCK + 1], found = 0;
-    uint8_t near[BLOCK];
-    for (uint32_t at = 0; at < n; at += BLOCK) {
-        uint32_t part = n - at < BLOCK ? n - at : BLOCK, before = found;
-        memset(near, 0, sizeof near);
-        look_up(o->any, dx + at, dy + at, dz + at, part, cell, near);
-        for (uint32_t i = 0; i < part; i += 8) {
-            uint64_t eight;
-            memcpy(&eight, near + i, sizeof eight);
-            for (; eight != 0; eight &= eight - 1) {
-                uint32_t k = i + (uint32_t)__builtin_ctzll(eight) / 8;
-                pulse[found] = at + k;
-                near_cell[found++ - before] = cell[k];
-            }
-        }
-        prefetch(o, near_cell, found - before);
+    uint32_t found = 0;
+    cells_of(dx, dy, dz, n, cell);
+    for (uint32_t i = 0; i < n; i++) {
+        pulse[found] = i;
+        found += o->any[cell[i] / 32] >> cell[i] % 32 & 1;
     }
+    prefetch(o, cell, pulse, found);
     return found;
 }

@@ -36,8 +36,9 @@ static int clip_to_beam(const struct beam *beam, struct local_edge *e)
         double root = bb * bb - aa * cc;
         if (root <= 0.0) return 0;
         root = sqrt(root);
-        t0 = fmax(t0, (-bb - root) / aa);
-        t1 = fmin(t1, (-bb + root) / aa);
+        double over = 1.0 / aa, in = (-bb - root) * over, out = (-bb + root) * over;
+        t0 = in > t0 ? in : t0;
+        t1 = out < t1 ? out : t1;
     } else if (cc > 0.0 && aa + 2.0 * bb + cc > 0.0) {
         return 0; /* steeper than the beam's own edge, and outside at both ends */
     }
@@ -53,9 +54,9 @@ static int clip_to_beam(const struct beam *beam, struct local_edge *e)
 /* The sub-ray through a point is (x, y) of the unit disc: (l1 + i l2) / (w0 + i s z) as complex numbers. */
 static void to_disc(const struct beam *beam, const double p[3], double u[2])
 {
-    double re = beam->exit_radius_m, im = beam->slope * p[2], w2 = re * re + im * im;
-    u[0] = (p[0] * re + p[1] * im) / w2;
-    u[1] = (p[1] * re - p[0] * im) / w2;
+    double re = beam->exit_radius_m, im = beam->slope * p[2], over = 1.0 / (re * re + im * im);
+    u[0] = (p[0] * re + p[1] * im) * over;
+    u[1] = (p[1] * re - p[0] * im) * over;
 }
 
 static int make_line(const struct beam *beam, const struct local_edge *e, struct beam_line *line)
@@ -63,10 +64,11 @@ static int make_line(const struct beam *beam, const struct local_edge *e, struct
     double p[2], q[2];
     to_disc(beam, e->a, p);
     to_disc(beam, e->b, q);
-    double ex = q[0] - p[0], ey = q[1] - p[1], length = sqrt(ex * ex + ey * ey);
-    if (!(length > 1e-9)) return 0;
-    line->n[0] = -ey / length;
-    line->n[1] = ex / length;
+    double ex = q[0] - p[0], ey = q[1] - p[1], length2 = ex * ex + ey * ey;
+    if (!(length2 > 1e-18)) return 0;
+    double over = 1.0 / sqrt(length2);
+    line->n[0] = -ey * over;
+    line->n[1] = ex * over;
     line->h = line->n[0] * p[0] + line->n[1] * p[1];
     if (line->h < 0.0) {
         line->h = -line->h;
@@ -95,10 +97,10 @@ static int is_clear(const struct beam *beam, const struct outline_edge *edge, co
     return away * away > exit * exit + slope * slope * range_m * range_m;
 }
 
-uint32_t beam_find_lines(const struct beam_outlines *o, const struct beam *beam, const double dir[3], double limit_m,
-                         struct beam_line *line, double *next_m)
+uint32_t beam_find_lines(const struct beam_outlines *o, const struct beam *beam, uint32_t cell, const double dir[3],
+                         double limit_m, struct beam_line *line, double *next_m)
 {
-    uint32_t cell = outline_cell((float)dir[0], (float)dir[1], (float)dir[2]), n = 0;
+    uint32_t n = 0;
     const float d[3] = {(float)dir[0], (float)dir[1], (float)dir[2]};
     double e1[3], e2[3];
     int axes = 0;
@@ -118,7 +120,7 @@ uint32_t beam_find_lines(const struct beam_outlines *o, const struct beam *beam,
         turn_in(edge->a, e1, e2, dir, e.a);
         turn_in(edge->b, e1, e2, dir, e.b);
         if (!clip_to_beam(beam, &e)) continue;
-        if (fmin(e.a[2], e.b[2]) > limit_m) continue; /* it is nearer elsewhere */
+        if (e.a[2] > limit_m && e.b[2] > limit_m) continue; /* it is nearer elsewhere */
         if (!make_line(beam, &e, &one) || is_known(line, n, &one)) continue;
         if (n == BEAM_MAX_LINES) return n + 1;
         line[n++] = one;

@@ -39,8 +39,9 @@ static void sub_ray(const struct beam *beam, const double dir[3], const struct j
         out[i] = dir[i] + beam->slope * (x * job->e2[i] - y * job->e1[i]);
         length2 += out[i] * out[i];
     }
+    double over = 1.0 / sqrt(length2);
     for (int i = 0; i < 3; i++)
-        out[i] /= sqrt(length2);
+        out[i] *= over;
 }
 
 static void pulse_origin(const struct origins *from, uint32_t i, double origin[3])
@@ -108,7 +109,7 @@ static int plan_job(struct caster *c, const struct cast_setup *s, const struct o
     const double dir[3] = {c->dx[job->pulse], c->dy[job->pulse], c->dz[job->pulse]};
     struct beam_line line[BEAM_MAX_LINES];
     struct beam_parts parts;
-    uint32_t lines = beam_find_lines(b->outlines, &b->beam, dir, limit_m, line, &job->next_m);
+    uint32_t lines = beam_find_lines(b->outlines, &b->beam, c->beam->cell[job->pulse], dir, limit_m, line, &job->next_m);
     if (lines == known) return 0;
     job->lines = lines;
     job->first = c->beam->pool.n;
@@ -132,7 +133,7 @@ static void cast_pool(struct caster *c, const struct cast_setup *s, uint32_t fir
 {
     struct pool *p = &c->beam->pool;
     c->counters.sub_rays += p->n - first;
-    c->scattered = s->beam->mode == BEAM_ADAPTIVE;
+    c->scattered = 0;
     for (uint32_t at = first, n; at < p->n; at += n) {
         n = p->n - at < CHUNK ? p->n - at : CHUNK;
         const struct origins from = {.px = p->px + at, .py = p->py + at, .pz = p->pz + at};
@@ -206,7 +207,7 @@ static uint32_t sub_rays(struct caster *c, const struct cast_setup *s, const str
     uint32_t reserve = !adaptive || b->pattern.n > BEAM_MAX_PARTS ? b->pattern.n : BEAM_MAX_PARTS, cut = 0;
     uint32_t candidates = n;
     if (adaptive) {
-        candidates = beam_near_outlines(b->outlines, c->fx, c->fy, c->fz, n, w->near);
+        candidates = beam_near_outlines(b->outlines, c->fx, c->fy, c->fz, n, w->cell, w->near);
     }
     w->n_jobs = w->pool.n = w->some.n = 0;
     for (uint32_t k = 0; k < candidates; k++) {

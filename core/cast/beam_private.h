@@ -34,6 +34,7 @@ struct several {
 
 struct beam_work {
     float steep[CHUNK];
+    uint32_t cell[CHUNK]; /* of outlines */
     uint32_t near[CHUNK]; /* pulses with sub-rays */
     struct job job[MAX_JOBS];
     uint32_t n_jobs;
