@@ -55,8 +55,8 @@ static int cut_caps(const struct beam *beam, const struct beam_line *line, uint3
     return 1;
 }
 
-/* Places of the fine pattern as sets of bits: place 16 r + i is bit r of lane i, so that one comparison of vectors makes
- * a bit of all lanes. */
+/* Places of the fine pattern as sets of bits: place 16 r + i is bit r of lane i, so that one comparison of vectors
+ * makes a bit of all lanes. */
 enum { LANES = 16, MAX_ROWS = 32 };
 _Static_assert(1 + 3 * BEAM_FINE_RINGS * (BEAM_FINE_RINGS + 1) <= LANES * MAX_ROWS, "a bit for each place");
 typedef float lanes_f __attribute__((vector_size(4 * LANES)));
@@ -110,9 +110,9 @@ static uint32_t cut_places(const struct beam_pattern *fine, const struct beam_li
     const int rows = (int)(fine->n + LANES - 1) / LANES;
     uint32_t n_parts = 1;
     for (uint32_t i = 0; i < LANES; i++) /* all places */
-        part[0][i] = (int32_t)((fine->n + LANES - 1 - i) / LANES == MAX_ROWS
-                                   ? ~0U
-                                   : (1U << (fine->n + LANES - 1 - i) / LANES) - 1);
+        part[0][i] =
+            (int32_t)((fine->n + LANES - 1 - i) / LANES == MAX_ROWS ? ~0U
+                                                                    : (1U << (fine->n + LANES - 1 - i) / LANES) - 1);
     for (uint32_t i = 0; i < n; i++) {
         lanes_i beyond;
         beyond_line(fine, rows, &line[i], &beyond);

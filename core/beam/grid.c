@@ -187,8 +187,7 @@ static int fill_cells(struct beam_outlines *o, const struct beam *beam, const st
         if (o->first[c + 1] - o->first[c] > 1)
             qsort(o->entry + o->first[c], o->first[c + 1] - o->first[c], sizeof *o->entry, by_range);
     o->info.entries = n;
-    o->info.bytes =
-        n * sizeof *o->entry + N_CELLS * sizeof *o->first + N_CELLS / 8 + o->n_edges * sizeof *o->edge;
+    o->info.bytes = n * sizeof *o->entry + N_CELLS * sizeof *o->first + N_CELLS / 8 + o->n_edges * sizeof *o->edge;
     return SH_OK;
 }
 

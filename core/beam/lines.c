@@ -4,7 +4,7 @@
 #include "core/beam/outlines.h"
 #include "core/vec3.h"
 
-#define SAME_LINE  1e-3 /* of the footprint's radius, and of a radian */
+#define SAME_LINE 1e-3 /* of the footprint's radius, and of a radian */
 
 /* An edge in the beam's frame: across, and along. */
 struct local_edge {
