@@ -19,8 +19,16 @@
 #define PACKET_ONE(scene, ctx, ray)             rtcIntersect1(scene, ctx, ray)
 #endif
 
-/* Whole packets are copied by an instruction or two. */
-#define COPY_BYTES(W, bytes) ((bytes) == 4 * (W) ? 4 * (W) : (bytes))
+/* n numbers of 4 bytes, of whole packets by an instruction or two. */
+static inline __attribute__((always_inline)) void copy(void *to, const void *from, uint32_t n, uint32_t width)
+{
+    if (n == width)
+        memcpy(to, from, 4 * width);
+    else
+        for (uint32_t i = 0; i < n; i++)
+            memcpy((char *)to + 4 * i, (const char *)from + 4 * i, 4);
+}
+
 /* Packet p takes rays first[p] .. first[p + 1] - 1.
  * The planes of what a packet has hit are asked for when the next one has been cast: to read them at once would mean to
  * wait for what Embree has only just written. */
@@ -44,10 +52,10 @@
                           uint32_t packets)                                                                        \
     {                                                                                                              \
         for (uint32_t p = 0; p < packets; p++) {                                                                   \
-            const size_t bytes = (first[p + 1] - first[p]) * sizeof(float);                                        \
-            memcpy(packet[p].ray.org_x, rays->ox + first[p], COPY_BYTES(W, bytes));                                \
-            memcpy(packet[p].ray.org_y, rays->oy + first[p], COPY_BYTES(W, bytes));                                \
-            memcpy(packet[p].ray.org_z, rays->oz + first[p], COPY_BYTES(W, bytes));                                \
+            const uint32_t n = first[p + 1] - first[p];                                                            \
+            copy(packet[p].ray.org_x, rays->ox + first[p], n, W);                                                  \
+            copy(packet[p].ray.org_y, rays->oy + first[p], n, W);                                                  \
+            copy(packet[p].ray.org_z, rays->oz + first[p], n, W);                                                  \
         }                                                                                                          \
     }                                                                                                              \
     static void prefetch_##W(const struct bvh *bvh, const struct RTCRayHit##W *packet)                             \
@@ -62,10 +70,10 @@
         PACKET_CONTEXT(context);                                                                                   \
         int valid[W] __attribute__((aligned(64)));                                                                 \
         for (uint32_t p = 0; p < packets; p++) {                                                                   \
-            const size_t bytes = (first[p + 1] - first[p]) * sizeof(float);                                        \
-            memcpy(packet[p].ray.dir_x, rays->dx + first[p], COPY_BYTES(W, bytes));                                \
-            memcpy(packet[p].ray.dir_y, rays->dy + first[p], COPY_BYTES(W, bytes));                                \
-            memcpy(packet[p].ray.dir_z, rays->dz + first[p], COPY_BYTES(W, bytes));                                \
+            const uint32_t n = first[p + 1] - first[p];                                                            \
+            copy(packet[p].ray.dir_x, rays->dx + first[p], n, W);                                                  \
+            copy(packet[p].ray.dir_y, rays->dy + first[p], n, W);                                                  \
+            copy(packet[p].ray.dir_z, rays->dz + first[p], n, W);                                                  \
             for (uint32_t i = 0; i < W; i++)                                                                       \
                 packet[p].ray.tfar[i] = rays->t_max;                                                               \
             memset(packet[p].hit.geomID, 0xff, sizeof packet->hit.geomID);                                         \
@@ -84,11 +92,11 @@
         }                                                                                                          \
         prefetch_##W(bvh, &packet[packets - 1]);                                                                   \
         for (uint32_t p = 0; p < packets; p++) {                                                                   \
-            const size_t bytes = (first[p + 1] - first[p]) * sizeof(float);                                        \
-            memcpy(rays->prim + first[p], packet[p].hit.primID, COPY_BYTES(W, bytes));                             \
-            memcpy(rays->t + first[p], packet[p].ray.tfar, COPY_BYTES(W, bytes));                                  \
-            memcpy(rays->u + first[p], packet[p].hit.u, COPY_BYTES(W, bytes));                                     \
-            memcpy(rays->v + first[p], packet[p].hit.v, COPY_BYTES(W, bytes));                                     \
+            const uint32_t n = first[p + 1] - first[p];                                                            \
+            copy(rays->prim + first[p], packet[p].hit.primID, n, W);                                               \
+            copy(rays->t + first[p], packet[p].ray.tfar, n, W);                                                    \
+            copy(rays->u + first[p], packet[p].hit.u, n, W);                                                       \
+            copy(rays->v + first[p], packet[p].hit.v, n, W);                                                       \
         }                                                                                                          \
     }
 
