@@ -19,6 +19,9 @@
 #define PACKET_ONE(scene, ctx, ray)             rtcIntersect1(scene, ctx, ray)
 #endif
 
+/* Of packets that were cut, those that are left with as many as this are not worth it. */
+enum { FEW = 4 };
+
 /* n numbers of 4 bytes, of whole packets by an instruction or two. */
 static inline __attribute__((always_inline)) void copy(void *to, const void *from, uint32_t n, uint32_t width)
 {
@@ -64,6 +67,19 @@ static inline __attribute__((always_inline)) void copy(void *to, const void *fro
         for (uint32_t i = 0; i < W; i++)                                                                           \
             __builtin_prefetch(&bvh->triangle[packet->hit.primID[i] < last ? packet->hit.primID[i] : last], 0, 2); \
     }                                                                                                              \
+    static void one_by_one_##W(const struct bvh *bvh, struct RTCRayHit##W *packet, uint32_t n)                     \
+    {                                                                                                              \
+        for (uint32_t i = 0; i < n; i++) {                                                                         \
+            const float org[3] = {packet->ray.org_x[i], packet->ray.org_y[i], packet->ray.org_z[i]};               \
+            const float dir[3] = {packet->ray.dir_x[i], packet->ray.dir_y[i], packet->ray.dir_z[i]};               \
+            struct bvh_one one = {.t_min = packet->ray.tnear[i], .t_max = packet->ray.tfar[i]};                    \
+            bvh_intersect_one(bvh, org, dir, &one);                                                                \
+            packet->hit.primID[i] = one.prim;                                                                      \
+            packet->ray.tfar[i] = one.t;                                                                           \
+            packet->hit.u[i] = one.u;                                                                              \
+            packet->hit.v[i] = one.v;                                                                              \
+        }                                                                                                          \
+    }                                                                                                              \
     static void intersect_##W(const struct bvh *bvh, struct RTCRayHit##W *packet, const struct bvh_rays *rays,     \
                               const uint32_t *first, uint32_t packets)                                             \
     {                                                                                                              \
@@ -87,7 +103,10 @@ static inline __attribute__((always_inline)) void copy(void *to, const void *fro
                 for (uint32_t i = 0; i < W; i++)                                                                   \
                     valid[i] = i < n ? -1 : 0;                                                                     \
             was = n;                                                                                               \
-            PACKET_CALL(W, valid, bvh->rtc, &context, &packet[p]);                                                 \
+            if (n <= FEW && rays->begins != NULL)                                                                  \
+                one_by_one_##W(bvh, &packet[p], n);                                                                \
+            else                                                                                                   \
+                PACKET_CALL(W, valid, bvh->rtc, &context, &packet[p]);                                             \
             if (p > 0) prefetch_##W(bvh, &packet[p - 1]);                                                          \
         }                                                                                                          \
         prefetch_##W(bvh, &packet[packets - 1]);                                                                   \
