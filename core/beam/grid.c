@@ -16,6 +16,7 @@ struct draw {
     const struct beam *beam;
     int fill; /* 0: count into first[c + 1]; 1: write at first[c]++ */
     uint32_t edge;
+    float normal[3]; /* of the edge's plane */
     uint64_t n;
 };
 
@@ -33,7 +34,7 @@ static void put(struct draw *d, uint32_t cell, float range_m)
         o->first[cell + 1]++;
         return;
     }
-    o->entry[o->first[cell]++] = (struct outline_entry){range_m, d->edge};
+    o->entry[o->first[cell]++] = (struct outline_entry){range_m, {d->normal[0], d->normal[1], d->normal[2]}, d->edge};
     o->any[cell / 32] |= 1U << cell % 32;
 }
 
@@ -162,11 +163,25 @@ static int by_range(const void *a, const void *b)
     return (x->edge > y->edge) - (x->edge < y->edge);
 }
 
+static void edge_normal(const struct outline_edge *edge, float normal[3])
+{
+    double a[3], b[3], n[3];
+    for (int i = 0; i < 3; i++) {
+        a[i] = (double)edge->a[i];
+        b[i] = (double)edge->b[i];
+    }
+    vec3_cross(a, b, n);
+    double length = sqrt(vec3_dot(n, n));
+    for (int i = 0; i < 3; i++)
+        normal[i] = length > 0.0 ? (float)(n[i] / length) : 0.0f;
+}
+
 static uint64_t draw_all(struct beam_outlines *o, const struct beam *beam, const struct stretches *s, int fill)
 {
     struct draw d = {.o = o, .beam = beam, .fill = fill};
     for (size_t i = 0; i < s->n; i++) {
         d.edge = s->at[i].edge;
+        if (fill) edge_normal(&o->edge[d.edge], d.normal);
         draw_piece(&d, s->at[i].p, s->at[i].q, nearest_on(s->at[i].p, s->at[i].q));
     }
     return d.n;
@@ -248,29 +263,35 @@ static void cells_of(const float *restrict dx, const float *restrict dy, const f
         cell[i] = outline_cell(dx[i], dy[i], dz[i]);
 }
 
-/* What looking for lines is going to read, step by step for all pulses at once. */
+/* Brings what looking for lines is going to read, step by step for all pulses at once. */
 static void prefetch(const struct beam_outlines *o, const uint32_t *cell, const uint32_t *pulse, uint32_t n)
 {
-    const uint32_t *first = o->first;
     for (uint32_t k = 0; k < n; k++)
-        __builtin_prefetch(&first[cell[pulse[k]]], 0, 3);
+        __builtin_prefetch(&o->first[cell[pulse[k]]], 0, 3);
     for (uint32_t k = 0; k < n; k++)
-        __builtin_prefetch(&o->entry[first[cell[pulse[k]]]], 0, 3);
-    for (uint32_t k = 0; k < n; k++)
-        for (uint32_t c = cell[pulse[k]], i = first[c], end = first[c + 1]; i < end && i < first[c] + 2; i++)
-            __builtin_prefetch(&o->edge[o->entry[i].edge], 0, 3);
+        __builtin_prefetch(&o->entry[o->first[cell[pulse[k]]]], 0, 3);
 }
 
-/* Most cells lead to none; ranges are looked at later. */
-uint32_t beam_near_outlines(const struct beam_outlines *o, const float *dx, const float *dy, const float *dz,
-                            uint32_t n, uint32_t *cell, uint32_t *pulse)
+/* Most cells lead to none, and most of those that lead to some are wider than the footprint; ranges are looked at
+ * later. */
+uint32_t beam_near_outlines(const struct beam_outlines *o, const struct beam *beam, const float *dx, const float *dy,
+                            const float *dz, uint32_t n, uint32_t *cell, uint32_t *pulse)
 {
-    uint32_t found = 0;
+    uint32_t found = 0, left = 0;
     cells_of(dx, dy, dz, n, cell);
     for (uint32_t i = 0; i < n; i++) {
         pulse[found] = i;
         found += o->any[cell[i] / 32] >> cell[i] % 32 & 1;
     }
     prefetch(o, cell, pulse, found);
-    return found;
+    for (uint32_t k = 0; k < found; k++) {
+        uint32_t i = pulse[k], at = o->first[cell[i]], end = o->first[cell[i] + 1];
+        const float d[3] = {dx[i], dy[i], dz[i]};
+        while (at < end && outline_is_clear(beam, &o->entry[at], d))
+            at++;
+        if (at == end) continue;
+        __builtin_prefetch(&o->edge[o->entry[at].edge], 0, 3);
+        pulse[left++] = i;
+    }
+    return left;
 }

@@ -88,15 +88,6 @@ static int is_known(const struct beam_line *line, uint32_t n, const struct beam_
     return 0;
 }
 
-/* The beam passes clear of the plane through the station and the edge: most do. The footprint is widest, as an angle,
- * where the edge is nearest. */
-static int is_clear(const struct beam *beam, const struct outline_edge *edge, const float d[3], float range_m)
-{
-    const float exit = 1.01f * (float)beam->exit_radius_m, slope = 1.01f * (float)beam->slope;
-    float off = edge->normal[0] * d[0] + edge->normal[1] * d[1] + edge->normal[2] * d[2], away = off * range_m;
-    return away * away > exit * exit + slope * slope * range_m * range_m;
-}
-
 uint32_t beam_find_lines(const struct beam_outlines *o, const struct beam *beam, uint32_t cell, const double dir[3],
                          double limit_m, struct beam_line *line, double *next_m)
 {
@@ -114,7 +105,7 @@ uint32_t beam_find_lines(const struct beam_outlines *o, const struct beam *beam,
             *next_m = n > 0 ? (double)entry->range_m : (double)INFINITY;
             break;
         }
-        if (is_clear(beam, edge, d, entry->range_m)) continue;
+        if (outline_is_clear(beam, entry, d)) continue;
         if (!axes) beam_axes(dir, e1, e2);
         axes = 1;
         turn_in(edge->a, e1, e2, dir, e.a);

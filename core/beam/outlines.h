@@ -9,13 +9,14 @@
 
 enum { OUTLINE_CELLS = 512 }; /* along a face: 2.6 mrad in its middle, half of that in its corners */
 
-/* An edge's ends, from the station, and the unit normal of the plane through all three. */
+/* An edge's ends, from the station. */
 struct outline_edge {
-    float a[3], b[3], normal[3];
+    float a[3], b[3];
 };
 
 struct outline_entry {
-    float range_m; /* of the nearest point of the edge, in or near the cell */
+    float range_m;   /* of the nearest point of the edge, in or near the cell */
+    float normal[3]; /* of unit length, of the plane through the station and the edge */
     uint32_t edge;
 };
 
@@ -71,6 +72,15 @@ static inline __attribute__((always_inline)) uint32_t outline_cell(float dx, flo
     i = i < OUTLINE_CELLS ? i : OUTLINE_CELLS - 1;
     j = j < OUTLINE_CELLS ? j : OUTLINE_CELLS - 1;
     return outline_place(face, (uint32_t)i, (uint32_t)j);
+}
+
+/* The beam passes clear of the plane through the station and the edge: most do. The footprint is widest, as an angle,
+ * where the edge is nearest. */
+static inline int outline_is_clear(const struct beam *beam, const struct outline_entry *entry, const float d[3])
+{
+    const float exit = 1.01f * (float)beam->exit_radius_m, slope = 1.01f * (float)beam->slope, range = entry->range_m;
+    float away = (entry->normal[0] * d[0] + entry->normal[1] * d[1] + entry->normal[2] * d[2]) * range;
+    return away * away > exit * exit + slope * slope * range * range;
 }
 
 #endif

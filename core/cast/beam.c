@@ -354,8 +354,8 @@ static uint32_t find_candidates(struct caster *c, const struct cast_setup *s, ui
     struct beam_work *w = c->beam;
     uint32_t found = 0, all = 0;
     if (s->detect == NULL || s->detect->depth == 0)
-        return beam_near_outlines(s->beam->outlines, c->fx, c->fy, c->fz, n, w->cell, w->candidate);
-    found = beam_near_outlines(s->beam->outlines, c->fx, c->fy, c->fz, n, w->cell, w->near);
+        return beam_near_outlines(s->beam->outlines, &s->beam->beam, c->fx, c->fy, c->fz, n, w->cell, w->candidate);
+    found = beam_near_outlines(s->beam->outlines, &s->beam->beam, c->fx, c->fy, c->fz, n, w->cell, w->near);
     for (uint32_t p = 0, k = 0; p < n; p++) {
         int near = k < found && w->near[k] == p;
         k += (uint32_t)near;

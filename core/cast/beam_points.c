@@ -40,23 +40,42 @@ static uint32_t choose(const struct beam_echoes *e, enum beam_select select, uin
     return best;
 }
 
-/* What pulses p .. p + n - 1 have in common with their points at k .. of the piece. */
-static void gather(struct caster *c, const struct cast_setup *s, uint32_t p, uint32_t n, uint32_t k)
+static void keep(struct caster *c, const struct cast_setup *s, uint32_t n)
 {
     struct beam_work *w = c->beam;
     const size_t bytes = n * sizeof(double);
-    if (s->layout != LINE_GEO) {
-        memcpy(w->mirror_turn + k, c->mirror_turn + p, bytes);
-        memcpy(w->pan_turn + k, c->pan_turn + p, bytes);
-        return;
+    memcpy(w->range_m, c->range_m, bytes);
+    memcpy(w->label, c->label, n * sizeof *w->label);
+    memcpy(w->mirror_turn, c->mirror_turn, bytes);
+    memcpy(w->pan_turn, c->pan_turn, bytes);
+    if (s->layout == LINE_GEO) {
+        memcpy(w->ex, c->ex, bytes);
+        memcpy(w->ey, c->ey, bytes);
+        memcpy(w->ez, c->ez, bytes);
     }
-    memcpy(w->ex + k, c->ex + p, bytes);
-    memcpy(w->ey + k, c->ey + p, bytes);
-    memcpy(w->ez + k, c->ez + p, bytes);
     if (s->n_knots != 0) {
-        memcpy(w->px + k, c->moving.px + p, bytes);
-        memcpy(w->py + k, c->moving.py + p, bytes);
-        memcpy(w->pz + k, c->moving.pz + p, bytes);
+        memcpy(w->px, c->moving.px, bytes);
+        memcpy(w->py, c->moving.py, bytes);
+        memcpy(w->pz, c->moving.pz, bytes);
+    }
+}
+
+/* What pulses p .. p + n - 1 have in common with their points at k .. */
+static void restore(struct caster *c, const struct cast_setup *s, uint32_t p, uint32_t n, uint32_t k)
+{
+    const struct beam_work *w = c->beam;
+    const size_t bytes = n * sizeof(double);
+    memcpy(c->mirror_turn + k, w->mirror_turn + p, bytes);
+    memcpy(c->pan_turn + k, w->pan_turn + p, bytes);
+    if (s->layout == LINE_GEO) {
+        memcpy(c->ex + k, w->ex + p, bytes);
+        memcpy(c->ey + k, w->ey + p, bytes);
+        memcpy(c->ez + k, w->ez + p, bytes);
+    }
+    if (s->n_knots != 0) {
+        memcpy(c->moving.px + k, w->px + p, bytes);
+        memcpy(c->moving.py + k, w->py + p, bytes);
+        memcpy(c->moving.pz + k, w->pz + p, bytes);
     }
 }
 
@@ -99,9 +118,6 @@ struct writer {
     const uint32_t *dt_ns;
     uint64_t pulse0;
     int linear;
-    double *range_m; /* of the piece's points */
-    uint32_t *label;
-    struct wire_from from;
     uint32_t at; /* the piece's first entry */
     uint32_t n, n_numbers, echoes;
     uint16_t numbered[CHUNK]; /* points of pulses with several */
@@ -112,7 +128,7 @@ struct writer {
 static void write_noise(struct writer *w, uint32_t n)
 {
     const struct cast_setup *s = w->s;
-    double *range_m = w->range_m;
+    double *range_m = w->c->range_m;
     for (uint32_t i = 0; i < n; i++)
         range_m[i] += (s->range_sigma_m + 1e-6 * s->range_sigma_ppm * range_m[i]) *
                       rng_normal(s->noise_key, w->c->beam->counter[i]);
@@ -124,14 +140,14 @@ static void write_piece(struct writer *w)
     struct line_block *b = w->block;
     uint32_t n = w->n;
     if (n == 0) return;
-    uint32_t echoes = kernel_detect(w->range_m, w->s->range_min_m, w->s->range_max_m, n, b->echo + w->at);
-    kernel_labels(w->label, b->echo + w->at, n, b->label + w->at);
+    uint32_t echoes = kernel_detect(c->range_m, w->s->range_min_m, w->s->range_max_m, n, b->echo + w->at);
+    kernel_labels(c->label, b->echo + w->at, n, b->label + w->at);
     for (uint32_t i = 0; i < n; i++)
         b->refl_cdb[w->at + i] = LINE_REFL_NONE;
     for (uint32_t i = 0; i < w->n_numbers; i++)
         b->echo[w->at + w->numbered[i]] = w->number[i];
     if (w->s->noise_on) write_noise(w, n);
-    if (caster_wire(w->s, w->linear, &w->from, w->range_m, b, w->at, n) != 0) {
+    if (caster_wire(c, w->s, w->linear, c->range_m, b, w->at, n) != 0) {
         echoes = 0;
         n = drop_unfit(c, b, w->at, n, &echoes);
     }
@@ -140,19 +156,20 @@ static void write_piece(struct writer *w)
     w->n = w->n_numbers = 0;
 }
 
-/* Pulses p .. end - 1, of one point each. */
+/* Pulses p .. end - 1, of one point each, whose ranges and labels are kept. */
 static void write_plain(struct writer *w, uint32_t p, uint32_t end)
 {
+    const struct beam_work *kept = w->c->beam;
     while (p < end) {
         if (w->n == CHUNK) write_piece(w);
         uint32_t n = end - p < CHUNK - w->n ? end - p : CHUNK - w->n, k = w->n;
-        gather(w->c, w->s, p, n, k);
-        memcpy(w->range_m + k, w->c->range_m + p, n * sizeof(double));
-        memcpy(w->label + k, w->c->label + p, n * sizeof(uint32_t));
+        restore(w->c, w->s, p, n, k);
+        memcpy(w->c->range_m + k, kept->range_m + p, n * sizeof(double));
+        memcpy(w->c->label + k, kept->label + p, n * sizeof(uint32_t));
         memmove(w->block->dt_ns + w->at + k, w->dt_ns + p, n * sizeof(uint32_t));
         if (w->s->noise_on)
             for (uint32_t i = 0; i < n; i++)
-                w->c->beam->counter[k + i] = rng_echo(w->pulse0 + p + i, w->c->beam->number[p + i]);
+                w->c->beam->counter[k + i] = rng_echo(w->pulse0 + p + i, kept->number[p + i]);
         w->n += n;
         p += n;
     }
@@ -164,9 +181,9 @@ static void write_several(struct writer *w, uint32_t p, const struct beam_echoes
     if (w->n + count > CHUNK) write_piece(w);
     for (uint32_t i = 0; i < count; i++) {
         uint32_t k = w->n++;
-        gather(w->c, w->s, p, 1, k);
-        w->range_m[k] = e->range_m[first + i];
-        w->label[k] = e->label[first + i];
+        restore(w->c, w->s, p, 1, k);
+        w->c->range_m[k] = e->range_m[first + i];
+        w->c->label[k] = e->label[first + i];
         w->block->dt_ns[w->at + k] = w->dt_ns[p];
         w->c->beam->counter[k] = rng_echo(w->pulse0 + p, e->number[first + i]);
         w->numbered[w->n_numbers] = (uint16_t)k;
@@ -204,9 +221,6 @@ static void write_all_plain(struct writer *w, uint32_t n)
     if (w->dt_ns != w->block->dt_ns + w->at) memmove(w->block->dt_ns + w->at, w->dt_ns, n * sizeof *w->dt_ns);
     for (uint32_t i = 0; i < n && w->s->noise_on; i++)
         w->c->beam->counter[i] = rng_echo(w->pulse0 + i, w->c->beam->number[i]);
-    w->range_m = w->c->range_m;
-    w->label = w->c->label;
-    w->from = caster_wire_from(w->c);
     w->n = n;
     write_piece(w);
 }
@@ -220,17 +234,7 @@ static void write_points(struct writer *w, const struct beam_echoes *e, uint32_t
         write_all_plain(w, n);
         return;
     }
-    struct beam_work *work = w->c->beam;
-    w->range_m = work->range_m;
-    w->label = work->label;
-    w->from = (struct wire_from){.mirror_turn = work->mirror_turn,
-                                 .pan_turn = work->pan_turn,
-                                 .ex = work->ex,
-                                 .ey = work->ey,
-                                 .ez = work->ez,
-                                 .px = work->px,
-                                 .py = work->py,
-                                 .pz = work->pz};
+    keep(w->c, w->s, n);
     for (uint32_t k = 0; k < left; k++) {
         write_plain(w, from, several[k].pulse);
         write_several(w, several[k].pulse, e, several[k].first, several[k].n);

@@ -59,7 +59,7 @@ struct beam_work {
     struct beam_return returns[(BEAM_MAX_SUBRAYS + 1) * (1 + CAST_MAX_DEPTH)];
     uint32_t n_returns;
     struct beam_echoes some; /* of pulses with sub-rays */
-    /* per point, where pulses have several, while c holds what is per pulse */
+    /* per pulse, while c holds what is per point */
     double range_m[CHUNK], mirror_turn[CHUNK], pan_turn[CHUNK];
     double ex[CHUNK], ey[CHUNK], ez[CHUNK], px[CHUNK], py[CHUNK], pz[CHUNK];
     uint32_t label[CHUNK];

@@ -193,39 +193,26 @@ static uint32_t take_back(struct caster *c, struct line_block *block, uint32_t a
     return taken;
 }
 
-uint32_t caster_wire(const struct cast_setup *s, int linear, const struct wire_from *from, const double *range_m,
+uint32_t caster_wire(struct caster *c, const struct cast_setup *s, int linear, const double *range_m,
                      struct line_block *block, uint32_t at, uint32_t n)
 {
-    double *ex = from->ex, *ey = from->ey, *ez = from->ez;
+    const struct moving_rays *m = &c->moving;
     if (s->layout != LINE_GEO) {
-        kernel_polar(s, range_m, from->mirror_turn, from->pan_turn, n, block->a + at, block->b + at, block->c + at);
+        kernel_polar(s, range_m, c->mirror_turn, c->pan_turn, n, block->a + at, block->b + at, block->c + at);
         return 0;
     }
     if (s->n_knots != 0)
-        kernel_scale_from(range_m, from->px, from->py, from->pz, s->station_m, n, ex, ey, ez);
+        kernel_scale_from(range_m, m->px, m->py, m->pz, s->station_m, n, c->ex, c->ey, c->ez);
     else
-        kernel_scale(range_m, n, ex, ey, ez);
-    if (!linear) georef_forward(s->georef, n, ex, ey, ez, ex, ey, ez);
-    return kernel_geo(ex, ey, ez, s->xyz_scale, n, block->a + at, block->b + at, block->c + at);
-}
-
-struct wire_from caster_wire_from(struct caster *c)
-{
-    return (struct wire_from){.mirror_turn = c->mirror_turn,
-                              .pan_turn = c->pan_turn,
-                              .ex = c->ex,
-                              .ey = c->ey,
-                              .ez = c->ez,
-                              .px = c->moving.px,
-                              .py = c->moving.py,
-                              .pz = c->moving.pz};
+        kernel_scale(range_m, n, c->ex, c->ey, c->ez);
+    if (!linear) georef_forward(s->georef, n, c->ex, c->ey, c->ez, c->ex, c->ey, c->ez);
+    return kernel_geo(c->ex, c->ey, c->ez, s->xyz_scale, n, block->a + at, block->b + at, block->c + at);
 }
 
 uint32_t caster_positions(struct caster *c, const struct cast_setup *s, int linear, const double *range_m,
                           struct line_block *block, uint32_t at, uint32_t n)
 {
-    const struct wire_from from = caster_wire_from(c);
-    return caster_wire(s, linear, &from, range_m, block, at, n) == 0 ? 0 : take_back(c, block, at, n);
+    return caster_wire(c, s, linear, range_m, block, at, n) == 0 ? 0 : take_back(c, block, at, n);
 }
 
 /* How far the origins lie from the first of them. */

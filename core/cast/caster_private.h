@@ -124,18 +124,11 @@ void caster_hits_from(struct caster *c, const struct bvh *bvh, const struct orig
 /* What the rays of a chunk meet first, of all there is. */
 void caster_nearest(struct caster *c, const struct cast_setup *s, const struct origins *from, const struct ray_set *set,
                     uint32_t n);
-/* What the encoders read, by entry. */
-struct wire_from {
-    const double *mirror_turn, *pan_turn;
-    double *ex, *ey, *ez; /* geo layout: the direction in, the position out */
-    const double *px, *py, *pz;
-};
-struct wire_from caster_wire_from(struct caster *c);
-/* Positions as a head computes them, from range_m and what its encoders read: entries at .. at + n of the block.
- * Returns how many coordinates did not fit; they are LINE_XYZ_NONE. */
-uint32_t caster_wire(const struct cast_setup *s, int linear, const struct wire_from *from, const double *range_m,
+/* Positions as a head computes them, from range_m and what its encoders read (c->e, or the turns): entries at .. at + n
+ * of the block. Returns how many coordinates did not fit; they are LINE_XYZ_NONE. */
+uint32_t caster_wire(struct caster *c, const struct cast_setup *s, int linear, const double *range_m,
                      struct line_block *block, uint32_t at, uint32_t n);
-/* Likewise, from what stands in c; echoes that did not fit are taken back. Returns how many. */
+/* Likewise; echoes that did not fit are taken back. Returns how many. */
 uint32_t caster_positions(struct caster *c, const struct cast_setup *s, int linear, const double *range_m,
                           struct line_block *block, uint32_t at, uint32_t n);
 

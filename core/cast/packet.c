@@ -22,10 +22,12 @@
 /* Of packets that were cut, those that are left with as many as this are not worth it. */
 enum { FEW = 4 };
 
-/* n numbers of 4 bytes, of whole packets by an instruction or two. */
-static inline __attribute__((always_inline)) void copy(void *to, const void *from, uint32_t n, uint32_t width)
+/* Numbers of 4 bytes of rays at .. at + n, whole packets of them wherever the arrays go on: what is beyond n belongs to
+ * packets that come later, or to none. */
+static inline __attribute__((always_inline)) void copy(void *to, const void *from, uint32_t at, uint32_t n,
+                                                       uint32_t width)
 {
-    if (n == width)
+    if (at + width <= BVH_CHUNK)
         memcpy(to, from, 4 * width);
     else
         for (uint32_t i = 0; i < n; i++)
@@ -56,9 +58,9 @@ static inline __attribute__((always_inline)) void copy(void *to, const void *fro
     {                                                                                                              \
         for (uint32_t p = 0; p < packets; p++) {                                                                   \
             const uint32_t n = first[p + 1] - first[p];                                                            \
-            copy(packet[p].ray.org_x, rays->ox + first[p], n, W);                                                  \
-            copy(packet[p].ray.org_y, rays->oy + first[p], n, W);                                                  \
-            copy(packet[p].ray.org_z, rays->oz + first[p], n, W);                                                  \
+            copy(packet[p].ray.org_x, rays->ox + first[p], first[p], n, W);                                        \
+            copy(packet[p].ray.org_y, rays->oy + first[p], first[p], n, W);                                        \
+            copy(packet[p].ray.org_z, rays->oz + first[p], first[p], n, W);                                        \
         }                                                                                                          \
     }                                                                                                              \
     static void prefetch_##W(const struct bvh *bvh, const struct RTCRayHit##W *packet)                             \
@@ -87,9 +89,9 @@ static inline __attribute__((always_inline)) void copy(void *to, const void *fro
         int valid[W] __attribute__((aligned(64)));                                                                 \
         for (uint32_t p = 0; p < packets; p++) {                                                                   \
             const uint32_t n = first[p + 1] - first[p];                                                            \
-            copy(packet[p].ray.dir_x, rays->dx + first[p], n, W);                                                  \
-            copy(packet[p].ray.dir_y, rays->dy + first[p], n, W);                                                  \
-            copy(packet[p].ray.dir_z, rays->dz + first[p], n, W);                                                  \
+            copy(packet[p].ray.dir_x, rays->dx + first[p], first[p], n, W);                                        \
+            copy(packet[p].ray.dir_y, rays->dy + first[p], first[p], n, W);                                        \
+            copy(packet[p].ray.dir_z, rays->dz + first[p], first[p], n, W);                                        \
             for (uint32_t i = 0; i < W; i++)                                                                       \
                 packet[p].ray.tfar[i] = rays->t_max;                                                               \
             memset(packet[p].hit.geomID, 0xff, sizeof packet->hit.geomID);                                         \
@@ -112,10 +114,10 @@ static inline __attribute__((always_inline)) void copy(void *to, const void *fro
         prefetch_##W(bvh, &packet[packets - 1]);                                                                   \
         for (uint32_t p = 0; p < packets; p++) {                                                                   \
             const uint32_t n = first[p + 1] - first[p];                                                            \
-            copy(rays->prim + first[p], packet[p].hit.primID, n, W);                                               \
-            copy(rays->t + first[p], packet[p].ray.tfar, n, W);                                                    \
-            copy(rays->u + first[p], packet[p].hit.u, n, W);                                                       \
-            copy(rays->v + first[p], packet[p].hit.v, n, W);                                                       \
+            copy(rays->prim + first[p], packet[p].hit.primID, first[p], n, W);                                     \
+            copy(rays->t + first[p], packet[p].ray.tfar, first[p], n, W);                                          \
+            copy(rays->u + first[p], packet[p].hit.u, first[p], n, W);                                             \
+            copy(rays->v + first[p], packet[p].hit.v, first[p], n, W);                                             \
         }                                                                                                          \
     }
 
