@@ -141,9 +141,10 @@ struct beam_outlines_info {
 };
 void beam_outlines_get_info(const struct beam_outlines *outlines, struct beam_outlines_info *info);
 
-/* Pulses whose footprint may reach an outline up to limit_m: their indices. Returns how many. */
-uint32_t beam_near_outlines(const struct beam_outlines *outlines, const float *dx, const float *dy, const float *dz,
-                            const float *limit_m, uint32_t n, uint32_t *pulse);
+/* Cells of n unit directions; and the pulses whose footprint may reach an outline, at whatever range: their indices.
+ * Returns how many. */
+uint32_t beam_near_outlines(const struct beam_outlines *outlines, const struct beam *beam, const float *dx,
+                            const float *dy, const float *dz, uint32_t n, uint32_t *cell, uint32_t *pulse);
 
 enum { BEAM_MAX_LINES = 12, BEAM_MAX_PARTS = 64 };
 
@@ -151,11 +152,11 @@ enum { BEAM_MAX_LINES = 12, BEAM_MAX_PARTS = 64 };
 struct beam_line {
     double n[2], h;
 };
-/* The outlines that cross the footprint of a pulse nearer than limit_m. Returns their number, up to BEAM_MAX_LINES, or
- * BEAM_MAX_LINES + 1: more than that. *next_m: from which range on there may be more (INFINITY: none, or nothing
- * crosses it up to limit_m). */
-uint32_t beam_find_lines(const struct beam_outlines *outlines, const struct beam *beam, const double dir[3],
-                         double limit_m, struct beam_line *line, double *next_m);
+/* The outlines that cross the footprint of a pulse nearer than limit_m; cell: its direction's. Returns their number, up
+ * to BEAM_MAX_LINES, or BEAM_MAX_LINES + 1: more than that. *next_m: from which range on there may be more (INFINITY:
+ * none, or nothing crosses it up to limit_m). */
+uint32_t beam_find_lines(const struct beam_outlines *outlines, const struct beam *beam, uint32_t cell,
+                         const double dir[3], double limit_m, struct beam_line *line, double *next_m);
 
 /* The parts that lines cut the footprint into. Each lies on one surface; convex, so that its centre of energy is in
  * it. */
@@ -163,7 +164,8 @@ struct beam_parts {
     uint32_t n, centre; /* the part with the centre of the disc */
     double energy[BEAM_MAX_PARTS], x[BEAM_MAX_PARTS], y[BEAM_MAX_PARTS];
 };
-/* Returns 0, or 1 where there are more than BEAM_MAX_PARTS. Parts of less than 0.05 % of the energy are left out. */
+/* fine: of BEAM_FINE_RINGS. Returns 0, or 1 where there are more than BEAM_MAX_PARTS. Parts of less than 0.05 % of the
+ * energy are left out. */
 int beam_cut(const struct beam *beam, const struct beam_pattern *fine, const struct beam_line *line, uint32_t n,
              struct beam_parts *parts);
 

@@ -160,6 +160,7 @@ void caster_hits_from(struct caster *c, const struct bvh *bvh, const struct orig
                                    .label = c->seen,
                                    .steep = c->steep,
                                    .doubt = c->doubt};
+        rays.begins = c->begins != NULL ? c->begins + at : NULL;
         cast_rays(c, &ray, &rays, from, &hits, m);
         memcpy(triangle + at, c->prim, m * sizeof *triangle);
         caster_ends(c, CAST_DECIDE);
