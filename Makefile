@@ -163,7 +163,8 @@ $(BUILD)/tests/bench/chart_georef: tests/bench/chart_georef.c $(BUILD)/modules.a
 $(BUILD)/tests/bench/chart_widths: tests/bench/chart_widths.c $(BUILD)/modules.a
 $(BUILD)/tests/bench/beam: tests/bench/beam.c tests/accuracy/beam_reference.c $(BUILD)/modules.a
 CHARTS = $(BUILD)/tests/bench/chart $(BUILD)/tests/bench/chart_georef $(BUILD)/tests/bench/chart_widths $(BUILD)/tests/bench/beam
-$(CHARTS):
+$(BUILD)/tests/bench/plain: tests/bench/plain.c $(BUILD)/modules.a
+$(CHARTS) $(BUILD)/tests/bench/plain:
 	@mkdir -p $(@D)
 	@echo "  CHART $@"
 	$(Q)$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -o $@ $^ $(LDLIBS)
@@ -171,6 +172,10 @@ $(CHARTS):
 bench-beam: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/beam
 	@$(BUILD)/tests/bench/beam house wires foliage leaves
+# Effects that are named and not needed: by the plain cast, within 5 %.
+bench-plain: deps-build
+	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/plain
+	@$(BUILD)/tests/bench/plain
 chart: deps-build
 	$(call install_missing,$(DEPS_CHART))
 	@$(MAKE) --no-print-directory -j2 $(CHARTS)
@@ -199,6 +204,6 @@ format:
 clean:
 	rm -rf $(BUILD)
 .PHONY: all deps deps-test deps-build deps-guest demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb \
-	test-usb-million objects test-unit-programs test-programs bench bench-beam chart install format clean
+	test-usb-million objects test-unit-programs test-programs bench bench-beam bench-plain chart install format clean
 .SECONDARY:
 -include $(shell find $(BUILD) -name '*.d' 2>/dev/null)
