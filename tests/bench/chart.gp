@@ -15,6 +15,9 @@ families(i) = rows(here(i), family . "if (!seen[f]++) print \"\\042\" f \"\\042\
 # "< awk" makes a table of one family: ns, p99.9, max, what is varied
 part(i, f) = "< awk -F, 'NR > 1 && " . here(i) . " { " . family . "n = split($2, w, \" \"); if (f ~ /^" . f . \
     "$/) print $4 \",\" ($5 > 0 ? $5 : 1e-17) \",\" ($6 > 0 ? $6 : 1e-17) \",\" (n > 1 ? w[n] : \"\") }' '" . csv . "'"
+# Labels of a family that would stand in each other become one.
+labels(i, f) = part(i, f) . " | sort -t, -g | awk -F, 'NR > 1 && $1 < 1.06 * x { text = text \" \" $4; x = $1; next } " . \
+    "NR > 1 { print first \",\" text } { first = x = $1; text = $4 } END { print first \",\" text }'"
 marked(i, column) = "< awk -F, 'NR > 1 && " . here(i) . " && $" . column . " == 1 { print $4 \",\" ($5 > 0 ? $5 : 1e-17) }' '" . \
     csv . "' | sort -t, -g"
 
@@ -26,16 +29,16 @@ within(r) = "< awk -F, 'NR > 1 && $1 == \"georef\" && $3 == \"" . r . "\" { prin
 method(r, is) = within(r) . " | awk -F, '$4 " . is . " \"flat earth\"' | sed 's/order //'"
 only(r, column) = within(r) . " | awk -F, '$" . column . " == 1'"
 # beam: likewise, once the ranges (column 9), once the counts (10); what is 0 there is left out. The last field tells
-# whether the label stands above the symbol: rings of the first two scenes lie close to each other.
+# whether the label stands below (0), above (1) or beside (2) the symbol: rings of different scenes lie close to each other.
 scenes = rows("$1 == \"beam\"", "if (!seen[$3]++) print \"\\042\" $3 \"\\042\"")
 of(k, y) = "< awk -F, 'NR > 1 && $1 == \"beam\" && $3 == \"" . word(scenes, k) . "\" && $" . y . " > 0 { m = $2; ring = sub(/rings /, \"\", m); " . \
-    "print $4 \",\" $" . y . " \",\" m \",\" $8 \",\" (" . k . " > 2 ? m != \"adaptive\" : ring && " . y . " == 10 ? " . k . " == 2 : " . k . \
+    "print $4 \",\" $" . y . " \",\" m \",\" $8 \",\" (" . k . " > 2 ? (m == \"adaptive\" ? 0 : ring && " . y . " == 10 ? 2 : 1) : ring && " . y . " == 10 ? " . k . " == 2 : " . k . \
     " == 1) }' '" . csv . "' | sort -t, -g"
 those(k, y, what) = of(k, y) . " | awk -F, '" . what . "'"
 best = "NR == 1 || $2 < least { least = $2; print }"
 array beam_title[2] = ["beam: range of echoes, by sub-rays a pulse", "beam: number of echoes, by sub-rays a pulse"]
 array beam_y[2] = ["RMS error in m, where the number of echoes is right", "wrong numbers, as a part of the mixed pulses"]
-n_rows = (n_plots + (words(radii) > 0) + 2 * (words(scenes) > 0) + 1) / 2
+n_rows = (n_plots + (words(radii) > 0) + 1) / 2 + (words(scenes) > 0)
 
 array colour[8] = ["#d55e00", "#e69f00", "#0072b2", "#56b4e9", "#009e73", "#cc79a7", "#666666", "#000000"]
 array symbol[8] = [8, 9, 6, 7, 5, 11, 13, 3]
@@ -92,7 +95,7 @@ do for [out in "svg png"] {
             for [k = 1:n] part(i, word(names, k)) using 1:2:2:3 with yerrorbars pt symbol[k] ps 1.2 lw 1 lc rgb colour[k] \
             notitle, \
             for [k = 1:n] NaN with points pt symbol[k] ps 1.4 lc rgb colour[k] title word(names, k), \
-            for [k = 1:n] part(i, word(names, k)) using 1:(10 ** lowest[k]):4 with labels offset 0, lane_offset(k) font ",9" tc rgb colour[k] notitle
+            for [k = 1:n] labels(i, word(names, k)) using 1:(10 ** lowest[k]):2 with labels offset 0, lane_offset(k) font ",9" tc rgb colour[k] notitle
     }
     if (words(radii) > 0) {
         n = words(radii)
@@ -118,6 +121,7 @@ do for [out in "svg png"] {
         set ylabel "error of the range in m" offset 1, 0
     }
     n = words(scenes)
+    if ((n_plots + (words(radii) > 0)) % 2 == 1 && n > 0) { set multiplot next }
     set xtics (20, 50, 100, 200, 500, 1000, 2000, 5000, 10000, 20000)
     do for [p = 1:(n > 0 ? 2 : 0)] {
         y = 8 + p
@@ -135,6 +139,7 @@ do for [out in "svg png"] {
             for [k = 1:n] of(k, y) using 1:2 with points pt symbol[k] ps 1.2 lc rgb colour[k] notitle, \
             for [k = 1:n] NaN with points pt symbol[k] ps 1.4 lc rgb colour[k] title word(scenes, k), \
             for [k = 1:n] those(k, y, "$5 == 1") using 1:2:3 with labels offset 0, 1.0 font ",9" tc rgb colour[k] notitle, \
+            for [k = 1:n] those(k, y, "$5 == 2") using 1:2:3 with labels left offset 0.7, 0 font ",9" tc rgb colour[k] notitle, \
             for [k = 1:n] those(k, y, "$5 == 0") using 1:2:3 with labels offset 0, -1.0 font ",9" tc rgb colour[k] notitle
     }
     set ylabel "error of the range in m" offset 1, 0
