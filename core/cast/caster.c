@@ -287,6 +287,8 @@ void caster_nearest(struct caster *c, const struct cast_setup *s, const struct o
     }
     for (uint32_t i = 0; i < s->n_movers; i++)
         cast_mover(c, s, i, from, set, n);
+    if (set->body != NULL && s->detect != NULL && s->detect->surfaces != NULL && s->detect->surfaces->texture != NULL)
+        caster_texels(s, from, set, n);
 }
 
 /* The last pose at or before t_ns, or the first. */

@@ -134,6 +134,10 @@ uint32_t caster_wire(struct caster *c, const struct cast_setup *s, int linear, c
 uint32_t caster_positions(struct caster *c, const struct cast_setup *s, int linear, const double *range_m,
                           struct line_block *block, uint32_t at, uint32_t n);
 
+/* ---- texels.c: labels of what has been met get the reflectance there, as surface_texel has it. Only where the
+ * surfaces have textures. */
+void caster_texels(const struct cast_setup *s, const struct origins *from, const struct ray_set *set, uint32_t n);
+
 /* ---- optics.c: the hits of a chunk (c->range_m, label, hit, cosine, body; from, c->d) and what lies behind glass and
  * off mirrors -> c->list. */
 void caster_follow(struct caster *c, const struct cast_setup *s, const struct origins *from, uint32_t n);

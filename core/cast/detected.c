@@ -4,6 +4,7 @@
 
 #include "core/cast/caster_private.h"
 #include "core/rng.h"
+#include "core/surface.h"
 
 static const double AS_IT_IS[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
 
@@ -88,7 +89,8 @@ static uint32_t count_echoes(const struct echo_list *l)
 static void leave_out_bare(const struct surface_table *table, struct echo_list *l)
 {
     for (uint32_t i = 0; i < l->n; i++) {
-        const struct surface *surface = &table->surface[l->label[i] < table->n ? l->label[i] : table->n];
+        uint32_t label = surface_of_label(l->label[i]);
+        const struct surface *surface = &table->surface[label < table->n ? label : table->n];
         if (l->rho[i] == 0.0 && surface->glass + surface->mirror > 0.0) l->range_m[i] = (double)NAN;
     }
 }
