@@ -13,7 +13,7 @@ struct surface_texture {
     uint16_t texel[];
 };
 
-enum { MOST_SIDE = 32768, CHANNELS = 3 };
+enum { MOST_SIDE = 16384, CHANNELS = 3 };
 
 void surface_textures_free(struct surface_table *table)
 {
