@@ -282,6 +282,7 @@ uint32_t beam_near_outlines(const struct beam_outlines *o, const float *dx, cons
 {
     uint32_t cell[BLOCK], near_cell[BLOCK + 1], found = 0;
     uint8_t near[BLOCK];
+    if (o->info.entries == 0) return 0;
     for (uint32_t at = 0; at < n; at += BLOCK) {
         uint32_t part = n - at < BLOCK ? n - at : BLOCK, before = found;
         cells_of(dx + at, dy + at, dz + at, part, cell);
