@@ -18,7 +18,9 @@
  * range resolution (c tau / 2 of the pulse width tau) begins a new one. An echo's range is the energy-weighted mean of
  * its returns - with two surfaces closer than the resolution, the mixed pixel's -, its surface that of its strongest
  * return, its energy the sum. Less than 1 % of the footprint's energy is no echo. Of more echoes than the head can
- * tell, the weakest are left out, and counted. The width of an echo is that of the pulse, resolution_m, and 2.355 sigma
+ * tell, the weakest are left out, and counted. Where surfaces are modelled (core/surface.h), what weighs is what comes
+ * back: energy times the surface's return, times the share that glass and mirrors before it let through; the 1 % is
+ * still of the footprint. The width of an echo is that of the pulse, resolution_m, and 2.355 sigma
  * of its ranges, added as squares (full widths at half maximum of Gaussians).
  *
  * One ray for all of the footprint. Where it lies on one plane at incidence i, the mean over it is not the range of its
@@ -87,6 +89,7 @@ void beam_axes(const double dir[3], double e1[3], double e2[3]);
 struct beam_return {
     double range_m;
     double energy; /* of the footprint's */
+    double back;   /* what comes back of that, where surfaces are modelled; else the energy again */
     float cosine;  /* of the incidence */
     float sigma_m; /* of the ranges within it */
     uint32_t triangle, label;
@@ -97,15 +100,15 @@ struct beam_echoes {
     uint32_t n, capacity;
     uint32_t *pulse; /* index in the chunk */
     double *range_m;
-    float *energy, *cosine, *width_m;
+    float *energy, *back, *cosine, *width_m;
     uint32_t *triangle, *label;
-    uint8_t *number; /* as in struct line_block: number and count; 0: a shot without echo, whose range is NaN */
+    uint8_t *number; /* among the pulse's, from 0, those counted that were left out: for random numbers */
 };
 int beam_echoes_alloc(struct beam_echoes *echoes, uint32_t capacity, struct sh_err *err);
 void beam_echoes_free(struct beam_echoes *echoes);
 
-/* Returns of one pulse -> its echoes, at the end of the list, not yet numbered. Sorts the returns. Those of the
- * list's echoes that exceed most are left out, the weakest first; gives how many. */
+/* Returns of one pulse -> its echoes, at the end of the list. Sorts the returns. Those of the pulse's echoes that
+ * exceed most are left out, those first of which least comes back; gives how many. */
 uint32_t beam_merge(const struct beam *beam, struct beam_return *returns, uint32_t n, uint32_t pulse, uint32_t most,
                     struct beam_echoes *echoes);
 
@@ -138,9 +141,10 @@ struct beam_outlines_info {
 };
 void beam_outlines_get_info(const struct beam_outlines *outlines, struct beam_outlines_info *info);
 
-/* Pulses whose footprint may reach an outline up to limit_m: their indices. Returns how many. */
+/* Cells of n unit directions; and the pulses whose footprint may reach an outline, at whatever range: their indices .
+ * Returns how many. */
 uint32_t beam_near_outlines(const struct beam_outlines *outlines, const float *dx, const float *dy, const float *dz,
-                            const float *limit_m, uint32_t n, uint32_t *pulse);
+                            uint32_t n, uint32_t *cell, uint32_t *pulse);
 
 enum { BEAM_MAX_LINES = 12, BEAM_MAX_PARTS = 64 };
 
@@ -148,11 +152,11 @@ enum { BEAM_MAX_LINES = 12, BEAM_MAX_PARTS = 64 };
 struct beam_line {
     double n[2], h;
 };
-/* The outlines that cross the footprint of a pulse nearer than limit_m. Returns their number, up to BEAM_MAX_LINES, or
- * BEAM_MAX_LINES + 1: more than that. *next_m: from which range on there may be more (INFINITY: none, or nothing
- * crosses it up to limit_m). */
-uint32_t beam_find_lines(const struct beam_outlines *outlines, const struct beam *beam, const double dir[3],
-                         double limit_m, struct beam_line *line, double *next_m);
+/* The outlines that cross the footprint of a pulse nearer than limit_m; cell: its direction's. Returns their number, up
+ * to BEAM_MAX_LINES, or BEAM_MAX_LINES + 1: more than that. *next_m: from which range on there may be more (INFINITY:
+ * none, or nothing crosses it up to limit_m). */
+uint32_t beam_find_lines(const struct beam_outlines *outlines, const struct beam *beam, uint32_t cell,
+                         const double dir[3], double limit_m, struct beam_line *line, double *next_m);
 
 /* The parts that lines cut the footprint into. Each lies on one surface; convex, so that its centre of energy is in
  * it. */
@@ -160,7 +164,8 @@ struct beam_parts {
     uint32_t n, centre; /* the part with the centre of the disc */
     double energy[BEAM_MAX_PARTS], x[BEAM_MAX_PARTS], y[BEAM_MAX_PARTS];
 };
-/* Returns 0, or 1 where there are more than BEAM_MAX_PARTS. Parts of less than 0.05 % of the energy are left out. */
+/* fine: of BEAM_FINE_RINGS. Returns 0, or 1 where there are more than BEAM_MAX_PARTS. Parts of less than 0.05 % of the
+ * energy are left out. */
 int beam_cut(const struct beam *beam, const struct beam_pattern *fine, const struct beam_line *line, uint32_t n,
              struct beam_parts *parts);
 

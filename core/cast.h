@@ -65,7 +65,8 @@ enum { CAST_MAX_DEPTH = 4 };
  * Echoes of a pulse: of each pane that it passes, and of what lies behind. A mirror has none of its own unless its
  * reflectance says so; what is seen in it is a ghost, at the length of the folded way along the beam, with a label of
  * its own: ghost_label more than the surface's. Only pulses that meet such a surface are cast again; a way does not
- * branch. More than max_echoes: the last are left out. Panes are of no thickness but their mesh's: not refracted. */
+ * branch.
+ * Panes are of no thickness but their mesh's: not refracted. */
 struct cast_detect {
     const struct instrument *instrument;
     const struct surface_table *surfaces; /* for signal and depth; must outlive the scan */
@@ -114,7 +115,7 @@ struct cast_setup {
      * relative to, and rotation is not used. n_knots 0: the head stands still at station_m. */
     uint32_t n_knots;
     const struct pose_knot *knot;
-    /* NULL: every hit within the limits is one echo, the head is ideal. Else beam is NULL: they are not joined. */
+    /* NULL: every hit within the limits is one echo, the head is ideal. Its max_echoes is also the beam's. */
     const struct cast_detect *detect;
 };
 
@@ -125,13 +126,12 @@ struct cast_counters {
     uint64_t went_on;     /* of these, nothing there after all: the ray went on behind */
     uint64_t unfit;       /* echoes whose position did not fit into the wire's integers: sent as shots without echo */
     uint64_t faint;     /* hits below the detection threshold, or in a blind time: shots without echo, or echoes less */
-    uint64_t crowded;   /* echoes beyond max_echoes, left out */
+    uint64_t crowded;   /* echoes beyond max_echoes: the weakest, left out */
     uint64_t undecided; /* nearer to an edge than double precision can tell: counted as hit */
     /* with a beam */
     uint64_t outlined; /* adaptive: pulses whose footprint an outline cuts */
     uint64_t sub_rays; /* cast beyond the central ones */
     uint64_t ragged;   /* adaptive: pulses with more outlines than can be told apart, cast as rings */
-    uint64_t left_out; /* echoes beyond max_echoes */
 };
 
 struct caster;

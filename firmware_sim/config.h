@@ -229,6 +229,8 @@ void config_signal_spec(const struct config_profile *profile, struct detect_sign
 
 /* Whether anything in the scene, or the head, moves. */
 int config_moves(const struct config *cfg);
+/* True when all beams begin at one place of a scene that stands still: what an adaptive beam needs. */
+int config_beam_fixed(const struct config *cfg);
 
 /* The reference: every key with type, unit, default, range and help. */
 void config_print_reference(FILE *out);

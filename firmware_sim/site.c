@@ -190,7 +190,7 @@ static int make_beam(struct site *site, struct site_station *s, const struct sh_
     if (cfg->beam_mode == BEAM_SINGLE) return SH_OK;
     struct cast_beam *beam = s->beam = calloc(1, sizeof *beam);
     if (beam == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
-    beam->mode = cfg->beam_mode != BEAM_AUTO ? cfg->beam_mode : config_moves(cfg) ? BEAM_RINGS : BEAM_ADAPTIVE;
+    beam->mode = cfg->beam_mode != BEAM_AUTO ? cfg->beam_mode : config_beam_fixed(cfg) ? BEAM_ADAPTIVE : BEAM_RINGS;
     beam->max_echoes = p->max_echoes;
     beam_init(&beam->beam, p->beam_exit_m, p->beam_divergence_rad, 1e-9 * p->pulse_width_ns);
     beam_rings(cfg->beam_rings, &beam->pattern);

@@ -7,7 +7,7 @@
 #include "core/vec3.h"
 #include "core/vecmath.h"
 
-enum { N_CELLS = 6 * OUTLINE_CELLS * OUTLINE_CELLS, BLOCK = 256 };
+enum { N_CELLS = 6 * OUTLINE_CELLS * OUTLINE_CELLS };
 #define NEAREST_M 0.02 /* nearer than this, all directions are near each other */
 #define PIECE     0.1  /* the longest piece of an edge, by its distance */
 
@@ -34,7 +34,7 @@ static void put(struct draw *d, uint32_t cell, float range_m)
         return;
     }
     o->entry[o->first[cell]++] = (struct outline_entry){range_m, d->edge};
-    if (!(range_m >= o->nearest_m[cell])) o->nearest_m[cell] = range_m;
+    o->any[cell / 32] |= 1U << cell % 32;
 }
 
 static void put_row(struct draw *d, uint32_t face, int32_t row, double from, double to, float range_m)
@@ -176,10 +176,8 @@ static int fill_cells(struct beam_outlines *o, const struct beam *beam, const st
 {
     uint64_t n = draw_all(o, beam, s, 0);
     if (n >= UINT32_MAX) return sh_fail(err, SH_EINPUT, "beam: too many outlines; beam.mode: rings does without them");
-    for (uint32_t c = 0; c < N_CELLS; c++) {
+    for (uint32_t c = 0; c < N_CELLS; c++)
         o->first[c + 1] += o->first[c];
-        o->nearest_m[c] = NAN; /* nearer than nothing */
-    }
     o->entry = malloc((size_t)(n + 1) * sizeof *o->entry);
     if (o->entry == NULL) return sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");
     draw_all(o, beam, s, 1);
@@ -189,8 +187,7 @@ static int fill_cells(struct beam_outlines *o, const struct beam *beam, const st
         if (o->first[c + 1] - o->first[c] > 1)
             qsort(o->entry + o->first[c], o->first[c + 1] - o->first[c], sizeof *o->entry, by_range);
     o->info.entries = n;
-    o->info.bytes =
-        n * sizeof *o->entry + N_CELLS * (sizeof *o->first + sizeof *o->nearest_m) + o->n_edges * sizeof *o->edge;
+    o->info.bytes = n * sizeof *o->entry + N_CELLS * sizeof *o->first + N_CELLS / 8 + o->n_edges * sizeof *o->edge;
     return SH_OK;
 }
 
@@ -210,8 +207,8 @@ int beam_outlines_create(const struct scene *scene, const double station_m[3], c
     prober->probe = probe;
     prober->beam = beam;
     o->first = calloc(N_CELLS + 1, sizeof *o->first);
-    o->nearest_m = malloc(N_CELLS * sizeof *o->nearest_m);
-    int rc = o->first == NULL || o->nearest_m == NULL ? sh_fail(err, SH_ENOMEM, "beam: no memory") : SH_OK;
+    o->any = calloc(N_CELLS / 32, sizeof *o->any);
+    int rc = o->first == NULL || o->any == NULL ? sh_fail(err, SH_ENOMEM, "beam: no memory") : SH_OK;
     if (rc == SH_OK) rc = outline_find(scene, station_m, &o->edge, &o->n_edges, &o->info.edges, err);
     if (rc == SH_OK && find_stretches(o, prober, range_max_m * 1.01, &stretches) != SH_OK)
         rc = sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");
@@ -233,7 +230,7 @@ void beam_outlines_free(struct beam_outlines *o)
     if (o == NULL) return;
     free(o->edge);
     free(o->first);
-    free(o->nearest_m);
+    free(o->any);
     free(o->entry);
     free(o);
 }
@@ -251,48 +248,29 @@ static void cells_of(const float *restrict dx, const float *restrict dy, const f
         cell[i] = outline_cell(dx[i], dy[i], dz[i]);
 }
 
-VEC_CLONES
-static uint32_t near_of(const float *restrict nearest_m, const uint32_t *restrict cell, const float *restrict limit_m,
-                        uint32_t n, uint8_t *restrict near)
-{
-    uint32_t found = 0;
-    for (uint32_t i = 0; i < n; i++) {
-        uint32_t is = nearest_m[cell[i]] <= limit_m[i];
-        near[i] = (uint8_t)is;
-        found += is;
-    }
-    return found;
-}
-
 /* What looking for lines is going to read, step by step for all pulses at once. */
-static void prefetch(const struct beam_outlines *o, const uint32_t *cell, uint32_t n)
+static void prefetch(const struct beam_outlines *o, const uint32_t *cell, const uint32_t *pulse, uint32_t n)
 {
+    const uint32_t *first = o->first;
     for (uint32_t k = 0; k < n; k++)
-        __builtin_prefetch(&o->first[cell[k]], 0, 3);
+        __builtin_prefetch(&first[cell[pulse[k]]], 0, 3);
     for (uint32_t k = 0; k < n; k++)
-        __builtin_prefetch(&o->entry[o->first[cell[k]]], 0, 3);
+        __builtin_prefetch(&o->entry[first[cell[pulse[k]]]], 0, 3);
     for (uint32_t k = 0; k < n; k++)
-        for (uint32_t i = o->first[cell[k]], end = o->first[cell[k] + 1]; i < end && i < o->first[cell[k]] + 2; i++)
+        for (uint32_t c = cell[pulse[k]], i = first[c], end = first[c + 1]; i < end && i < first[c] + 2; i++)
             __builtin_prefetch(&o->edge[o->entry[i].edge], 0, 3);
 }
 
-/* The nearest edge of a cell against the range, and what a footprint adds to it at most: decided later. */
+/* Most cells lead to none; ranges are looked at later. */
 uint32_t beam_near_outlines(const struct beam_outlines *o, const float *dx, const float *dy, const float *dz,
-                            const float *limit_m, uint32_t n, uint32_t *pulse)
+                            uint32_t n, uint32_t *cell, uint32_t *pulse)
 {
-    uint32_t cell[BLOCK], near_cell[BLOCK + 1], found = 0;
-    uint8_t near[BLOCK];
-    if (o->info.entries == 0) return 0;
-    for (uint32_t at = 0; at < n; at += BLOCK) {
-        uint32_t part = n - at < BLOCK ? n - at : BLOCK, before = found;
-        cells_of(dx + at, dy + at, dz + at, part, cell);
-        if (near_of(o->nearest_m, cell, limit_m + at, part, near) == 0) continue;
-        for (uint32_t i = 0; i < part; i++) {
-            pulse[found] = at + i;
-            near_cell[found - before] = cell[i];
-            found += near[i];
-        }
-        prefetch(o, near_cell, found - before);
+    uint32_t found = 0;
+    cells_of(dx, dy, dz, n, cell);
+    for (uint32_t i = 0; i < n; i++) {
+        pulse[found] = i;
+        found += o->any[cell[i] / 32] >> cell[i] % 32 & 1;
     }
+    prefetch(o, cell, pulse, found);
     return found;
 }

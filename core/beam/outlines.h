@@ -23,7 +23,7 @@ struct beam_outlines {
     uint32_t n_edges;
     struct outline_edge *edge;
     uint32_t *first;             /* entries of cell c: first[c] .. first[c + 1] */
-    float *nearest_m;            /* of each cell; NaN: it leads to none */
+    uint32_t *any;               /* a bit for each cell: it leads to some */
     struct outline_entry *entry; /* by range */
     struct beam_outlines_info info;
 };
@@ -50,7 +50,7 @@ uint32_t outline_probe(struct outline_prober *prober, const double p[3], const d
 int outline_find(const struct scene *scene, const double station_m[3], struct outline_edge **edge, uint32_t *n,
                  uint64_t *n_edges, struct sh_err *err);
 
-/* Cells lie in tiles of 4 x 4: nearest_m of a tile is one cache line. */
+/* Cells lie in tiles of 4 x 4: `first` of a tile is one cache line. */
 static inline uint32_t outline_place(uint32_t face, uint32_t i, uint32_t j)
 {
     const uint32_t tiles = OUTLINE_CELLS / 4;

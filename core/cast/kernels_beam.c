@@ -11,21 +11,10 @@ void kernel_steep(const struct bvh *bvh, uint32_t prim, const double dir[3], flo
     *steep = prim < bvh->scene->n_triangles ? (float)(1.0 / (cosine * cosine)) : NAN;
 }
 
-VEC_CLONES
-static void limits(float exit2, float slope2, const double *restrict range_m, const float *restrict steep, uint32_t n,
-                   float *restrict limit_m)
+double kernel_limit(const struct beam *beam, double range_m, float steep)
 {
-    for (uint32_t i = 0; i < n; i++) {
-        float range = (float)range_m[i], s = steep[i] < 1e6f ? steep[i] : 1e6f;
-        float limit = range + sqrtf(exit2 + slope2 * range * range) * (4.0f + 3.0f * sqrtf(s));
-        limit_m[i] = limit == limit ? limit : (float)INFINITY;
-    }
-}
-
-void kernel_limits(const struct beam *beam, const double *range_m, const float *steep, uint32_t n, float *limit_m)
-{
-    limits((float)(beam->exit_radius_m * beam->exit_radius_m), (float)(beam->slope * beam->slope), range_m, steep, n,
-           limit_m);
+    double s = steep < 1e6f ? (double)steep : 1e6;
+    return isnan(range_m) ? (double)INFINITY : range_m + beam_radius(beam, range_m) * (4.0 + 3.0 * sqrt(s));
 }
 
 VEC_CLONES

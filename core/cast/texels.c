@@ -25,10 +25,11 @@ static void weights(const double *a, const double *b, const double *c, const dou
 
 void caster_texels(const struct cast_setup *s, const struct origins *from, const struct ray_set *set, uint32_t n)
 {
-    const struct surface_table *table = s->detect->surfaces;
+    const struct surface_table *table = s->detect != NULL ? s->detect->surfaces : NULL;
+    if (table == NULL || table->texture == NULL) return;
     for (uint32_t i = 0; i < n; i++) {
         if (isnan(set->range_m[i]) || set->label[i] >= table->n || table->texture[set->label[i]] == NULL) continue;
-        const struct cast_mover *m = set->body[i] != 0 ? &s->mover[set->body[i] - 1] : NULL;
+        const struct cast_mover *m = set->body != NULL && set->body[i] != 0 ? &s->mover[set->body[i] - 1] : NULL;
         const struct scene *scene = (m != NULL ? m->bvh : s->bvh)->scene;
         if (scene->uv == NULL) continue;
         const double d[3] = {set->dx[i], set->dy[i], set->dz[i]};

@@ -178,7 +178,7 @@ static const struct bad bad[] = {
     {"stations:", "platform: {kind: stops, file: a, step_s: 1}\nstations:\n  - {name: b, position_m: [1, 2, 3]}", 11, "stations", "2 of them"},
     {"output:", "beam:\n  mode: cone\noutput:", 17, "beam.mode", "single, rings, adaptive, auto"},
     {"output:", "beam:\n  rings: 19\noutput:", 17, "beam.rings", "0 to 18"},
-    {"output:", "beam:\n  mode: rings\nsignal: {model: on}\noutput:", 17, "beam.mode", "rings, and signal.model: not possible together; allowed single"},
+    {"output:", "beam:\n  mode: adaptive\ninstrument: {mirror_offset_m: 0.001}\noutput:", 17, "beam.mode", "mirror_offset_m moves the beam; allowed single, rings, auto"},
     {"output:", "platform: {kind: live}\nbeam:\n  mode: adaptive\noutput:", 18, "beam.mode", "allowed single, rings, auto"},
     {"output:", "platform:\n  kind: boat\noutput:", 17, "platform.kind", "static"},
     {"output:", "loop:\n  tick_hz: 300\noutput:", 17, "loop.tick_hz", "a divisor of 1e9"},

@@ -99,10 +99,10 @@ struct seen {
 /* Half of 0.01 dB, and of a texel's 65534th of a reflectance of 0.02 or more. */
 static const double TOLD_DB = 0.005 + 4.343 * 0.5 / 65534.0 / 0.02;
 
-/* Casts over the board and compares the reflectance of each pulse with its square's. Pulses within a thousandth of a
- * square of its edge are left out. */
+/* Casts over the board and compares the reflectance of each pulse with its square's. Pulses within `near` squares of
+ * its edge are left out. */
 static struct seen compare(const struct scene *scene, const struct surface_table *table, double dark, double light,
-                           const struct cast_mover *mover, double shift_m)
+                           const struct cast_mover *mover, double shift_m, struct cast_beam *beam, double near)
 {
     static const double at[3] = {0.0, 0.0, 0.0};
     const struct schedule_spec spec = {.prr_uhz = 24000000000,
@@ -124,7 +124,7 @@ static struct seen compare(const struct scene *scene, const struct surface_table
     const struct detect_signal_spec sheet = {
         .n_reaches = 1, .reach = {{0.9, 900.0}}, .threshold_snr = 8.0, .sharp = 1, .seed = 1};
     schedule_start(&segment, &spec);
-    if (bvh_create(scene, at, 0.0, 1, NULL, &bvh, &err) != SH_OK || caster_create(&caster, &err) != SH_OK ||
+    if (bvh_create(scene, at, 0.01, 1, NULL, &bvh, &err) != SH_OK || caster_create(&caster, &err) != SH_OK ||
         line_block_alloc(&block, 1000, &err) != SH_OK || detect_signal_set_up(&sheet, &signal, &err) != SH_OK)
         fail_msg("%s", err.text);
     const struct cast_detect detect = {.surfaces = table, .signal = &signal, .max_echoes = 1};
@@ -139,6 +139,12 @@ static struct seen compare(const struct scene *scene, const struct surface_table
         setup.n_movers = 1;
         setup.mover[0] = *mover;
     }
+    struct beam_outlines *outlines = NULL;
+    setup.beam = beam;
+    if (beam != NULL && beam->mode == BEAM_ADAPTIVE) {
+        if (cast_outlines(scene, bvh, at, &beam->beam, 2000.0, &outlines, &err) != SH_OK) fail_msg("%s", err.text);
+        beam->outlines = outlines;
+    }
     for (uint64_t l = 0; l < 20; l++) {
         struct schedule_line line;
         struct schedule_run run;
@@ -151,7 +157,7 @@ static struct seen compare(const struct scene *scene, const struct surface_table
             double d[3] = {sin(p) * cos(m), cos(p) * cos(m), sin(m)}, range_m = AWAY_M / d[1];
             double u = (d[0] * range_m - shift_m + 0.5 * SIDE_M) * 2.0 / SIDE_M * SQUARES;
             double v = (d[2] * range_m + 0.5 * SIDE_M) * 2.0 / SIDE_M * SQUARES;
-            if (block.echo[i] == 0 || fabs(u - round(u)) < 1e-3 || fabs(v - round(v)) < 1e-3) continue;
+            if (block.echo[i] == 0 || fabs(u - round(u)) < near || fabs(v - round(v)) < near) continue;
             if (u < 0.0 || v < 0.0 || u > 2.0 * SQUARES || v > 2.0 * SQUARES) continue;
             int is = is_light((int)u, (int)v);
             double want_db = 10.0 * log10((is ? light : dark) * d[1]);
@@ -163,6 +169,7 @@ static struct seen compare(const struct scene *scene, const struct surface_table
             seen.dark += (uint32_t)!is;
         }
     }
+    beam_outlines_free(outlines);
     line_block_free(&block);
     caster_free(caster);
     bvh_free(bvh);
@@ -195,7 +202,7 @@ static void squares_are_where_the_image_has_them(void **state)
     assert_int_equal(scene->n_textures, 1);
     assert_string_equal(scene->texture[0].file, path_of("board.png"));
     fill_table(&table, scene, &scene->surface[0], 1, 0);
-    struct seen seen = compare(scene, &table, reflectance(DARK), reflectance(LIGHT), NULL, 0.0);
+    struct seen seen = compare(scene, &table, reflectance(DARK), reflectance(LIGHT), NULL, 0.0, NULL, 1e-3);
     assert_true(seen.light > 200 && seen.dark > 200);
     surface_table_free(&table);
     scene_free(scene);
@@ -222,12 +229,34 @@ static void squares_move_with_the_mesh(void **state)
                                      .radius_m = 3.0,
                                      .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1},
                                      .shift_m = {0.35, 0.0, 0.0}};
-    struct seen seen = compare(still, &table, reflectance(DARK), reflectance(LIGHT), &mover, 0.35);
+    struct seen seen = compare(still, &table, reflectance(DARK), reflectance(LIGHT), &mover, 0.35, NULL, 1e-3);
     assert_true(seen.light > 200 && seen.dark > 200);
     surface_table_free(&table);
     bvh_free(bvh);
     scene_free(board);
     scene_free(still);
+}
+
+/* With a footprint of 8 mm: where it lies within a square; adaptively, one ray tells the square in its centre. */
+static void squares_under_a_footprint(void **state)
+{
+    (void)state;
+    static struct cast_beam beam;
+    struct scene *scene = load("board.obj", 1);
+    struct surface_table table;
+    fill_table(&table, scene, &scene->surface[0], 1, 0);
+    beam_init(&beam.beam, 0.007, 0.35e-3, 4e-9);
+    beam_rings(2, &beam.pattern);
+    beam_rings(BEAM_FINE_RINGS, &beam.fine);
+    beam.max_echoes = 1;
+    for (int adaptive = 0; adaptive < 2; adaptive++) {
+        beam.mode = adaptive ? BEAM_ADAPTIVE : BEAM_RINGS;
+        struct seen seen =
+            compare(scene, &table, reflectance(DARK), reflectance(LIGHT), NULL, 0.0, &beam, adaptive ? 1e-3 : 0.02);
+        assert_true(seen.light > 200 && seen.dark > 200);
+    }
+    surface_table_free(&table);
+    scene_free(scene);
 }
 
 /* glTF counts v from the top, and Assimp turns that round. */
@@ -262,7 +291,7 @@ static void squares_of_gltf(void **state)
     if (scene_load(&spec, 1, 1e-4, NULL, &scene, &err) != SH_OK) fail_msg("%s", err.text);
     assert_int_equal(scene->n_textures, 1);
     fill_table(&table, scene, &scene->surface[0], 1, 0);
-    struct seen seen = compare(scene, &table, light_of(DARK / 255.0), light_of(LIGHT / 255.0), NULL, 0.0);
+    struct seen seen = compare(scene, &table, light_of(DARK / 255.0), light_of(LIGHT / 255.0), NULL, 0.0, NULL, 1e-3);
     assert_true(seen.light > 200 && seen.dark > 200);
     surface_table_free(&table);
     scene_free(scene);
@@ -302,7 +331,9 @@ static void what_is_no_png_is_said(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(squares_are_where_the_image_has_them),
-                                       cmocka_unit_test(squares_move_with_the_mesh), cmocka_unit_test(squares_of_gltf),
+                                       cmocka_unit_test(squares_move_with_the_mesh),
+                                       cmocka_unit_test(squares_under_a_footprint),
+                                       cmocka_unit_test(squares_of_gltf),
                                        cmocka_unit_test(nothing_is_kept_unasked),
                                        cmocka_unit_test(what_is_no_png_is_said)};
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
