@@ -141,8 +141,8 @@ struct beam_outlines_info {
 };
 void beam_outlines_get_info(const struct beam_outlines *outlines, struct beam_outlines_info *info);
 
-/* Cells of n unit directions; and the pulses whose footprint may reach an outline, at whatever range: their indices .
- * Returns how many. */
+/* Cells of n unit directions (left alone where there are no outlines at all); and the pulses whose footprint may reach
+ * one, at whatever range: their indices. Returns how many. */
 uint32_t beam_near_outlines(const struct beam_outlines *outlines, const float *dx, const float *dy, const float *dz,
                             uint32_t n, uint32_t *cell, uint32_t *pulse);
 
