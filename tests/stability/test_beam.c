@@ -11,7 +11,7 @@
 #ifdef SH_SANITIZE
 enum { LINES = 2 };
 #else
-enum { LINES = 4 };
+enum { LINES = 3 };
 #endif
 
 static const double STATION_M[3] = {0.0, 0.0, 0.0};
