@@ -168,16 +168,21 @@ CHART = $(BUILD)/chart/speed_accuracy
 $(BUILD)/tests/bench/chart: tests/bench/chart.c tests/bench/reference.c $(BUILD)/modules.a
 $(BUILD)/tests/bench/chart_georef: tests/bench/chart_georef.c $(BUILD)/modules.a
 $(BUILD)/tests/bench/chart_widths: tests/bench/chart_widths.c $(BUILD)/modules.a
-CHARTS = $(BUILD)/tests/bench/chart $(BUILD)/tests/bench/chart_georef $(BUILD)/tests/bench/chart_widths
-$(CHARTS) $(BUILD)/tests/bench/beam:
+$(BUILD)/tests/bench/beam: tests/bench/beam.c tests/accuracy/beam_reference.c $(BUILD)/modules.a
+CHARTS = $(BUILD)/tests/bench/chart $(BUILD)/tests/bench/chart_georef $(BUILD)/tests/bench/chart_widths $(BUILD)/tests/bench/beam
+$(BUILD)/tests/bench/plain: tests/bench/plain.c $(BUILD)/modules.a
+$(CHARTS) $(BUILD)/tests/bench/plain:
 	@mkdir -p $(@D)
 	@echo "  CHART $@"
 	$(Q)$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -o $@ $^ $(LDLIBS)
 # Footprints: cost, and error against 1,000 sub-rays; a few minutes.
-$(BUILD)/tests/bench/beam: tests/bench/beam.c tests/accuracy/beam_reference.c $(BUILD)/modules.a
 bench-beam: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/beam
 	@$(BUILD)/tests/bench/beam house wires foliage leaves
+# Effects that are named and not needed: by the plain cast, within 5 %.
+bench-plain: deps-build
+	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/plain
+	@$(BUILD)/tests/bench/plain
 chart: deps-build
 	$(call install_missing,$(DEPS_CHART))
 	@$(MAKE) --no-print-directory -j2 $(CHARTS)
@@ -185,6 +190,7 @@ chart: deps-build
 	$(BUILD)/tests/bench/chart > $(CHART).csv
 	$(BUILD)/tests/bench/chart_georef >> $(CHART).csv
 	$(BUILD)/tests/bench/chart_widths >> $(CHART).csv
+	$(BUILD)/tests/bench/beam --chart house wires foliage >> $(CHART).csv
 	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)'" tests/bench/chart.gp
 objects: $(EVERYTHING)
 test-unit-programs: $(UNIT)
@@ -206,6 +212,6 @@ format:
 clean:
 	rm -rf $(BUILD)
 .PHONY: ALWAYS all deps deps-test deps-build deps-guest demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb \
-	test-usb-million objects test-unit-programs test-programs bench bench-beam chart install format clean
+	test-usb-million objects test-unit-programs test-programs bench bench-beam bench-plain chart install format clean
 .SECONDARY:
 -include $(shell find $(BUILD) -type f -name '*.d' 2>/dev/null)

@@ -278,6 +278,7 @@ uint32_t beam_near_outlines(const struct beam_outlines *o, const struct beam *be
                             const float *dz, uint32_t n, uint32_t *cell, uint32_t *pulse)
 {
     uint32_t found = 0, left = 0;
+    if (o->info.entries == 0) return 0;
     cells_of(dx, dy, dz, n, cell);
     for (uint32_t i = 0; i < n; i++) {
         pulse[found] = i;

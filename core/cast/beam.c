@@ -426,6 +426,9 @@ static void cast_central(struct caster *c, const struct cast_setup *s, const str
     caster_hits_from(c, s->bvh, from, s->range_max_m, n, c->dx, c->dy, c->dz, c->range_m, c->hit);
     c->steep = NULL;
     memcpy(c->label, c->seen, n * sizeof *c->label);
+    const struct ray_set set = {
+        .dx = c->dx, .dy = c->dy, .dz = c->dz, .range_m = c->range_m, .label = c->label, .hit = c->hit};
+    caster_texels(s, from, &set, n);
 }
 
 void beam_cast(struct caster *c, const struct cast_setup *s, const struct origins *from, uint32_t n)

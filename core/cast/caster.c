@@ -276,6 +276,7 @@ void caster_nearest(struct caster *c, const struct cast_setup *s, const struct o
     }
     for (uint32_t i = 0; i < s->n_movers; i++)
         cast_mover(c, s, i, from, set, n);
+    if (set->body != NULL) caster_texels(s, from, set, n);
 }
 
 /* Each pulse is one ray: its echo, if there is one. */

@@ -132,6 +132,10 @@ uint32_t caster_wire(struct caster *c, const struct cast_setup *s, int linear, c
 uint32_t caster_positions(struct caster *c, const struct cast_setup *s, int linear, const double *range_m,
                           struct line_block *block, uint32_t at, uint32_t n);
 
+/* ---- texels.c: labels of what has been met get the reflectance there, as surface_texel has it. Nothing where the
+ * surfaces have no textures. */
+void caster_texels(const struct cast_setup *s, const struct origins *from, const struct ray_set *set, uint32_t n);
+
 /* ---- aim.c */
 /* Poses of a moving head: s (and, with geo, r) of c->moving -> d (and e), and the origins p. */
 void caster_move(struct caster *c, const struct cast_setup *s, int64_t t0_ns, const uint32_t *dt_ns, uint32_t n,

@@ -18,15 +18,19 @@ double kernel_limit(const struct beam *beam, double range_m, float steep)
 }
 
 VEC_CLONES
-static void excess(double scale, float most, const float *restrict steep, uint32_t n, double *restrict range_m)
+static void excess(const double *restrict term, float most, const float *restrict steep, uint32_t n,
+                   double *restrict range_m)
 {
-    for (uint32_t i = 0; i < n; i++)
-        range_m[i] += range_m[i] * (scale * (double)(steep[i] < most ? steep[i] : most));
+    for (uint32_t i = 0; i < n; i++) {
+        double x = (double)(steep[i] < most ? steep[i] : most);
+        range_m[i] += range_m[i] * x * (term[0] + x * (term[1] + x * term[2]));
+    }
 }
 
 void kernel_excess(const struct beam *beam, const float *steep, uint32_t n, double *range_m)
 {
-    double s2 = beam->slope * beam->slope;
+    double term[3], s2 = beam->slope * beam->slope;
     if (s2 == 0.0) return;
-    excess(beam_plane_excess(beam, 1.0, 1.0), (float)(0.25 / s2), steep, n, range_m);
+    beam_plane_series(beam, term);
+    excess(term, (float)(0.25 / s2), steep, n, range_m);
 }
