@@ -8,7 +8,6 @@ head_start() {
     rm -f /tmp/ready
     scanhead run /tmp/config.yaml --ready-fd 9 "$@" 9>/tmp/ready 2>/tmp/head.err &
     head_pid=$!
-    echo $head_pid >/tmp/head.pid
     wait_for 20 test -s /tmp/ready || note "the head is not ready: $(tail -n 3 /tmp/head.err | tr '\n' ' ')"
 }
 
