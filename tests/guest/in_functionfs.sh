@@ -13,6 +13,10 @@ head_stop
 # Unbound from its controller the gadget is off the bus. (soft_connect won't do: dummy_hcd of 6.1 answers nothing after it.)
 echo "echo >\$(echo $gadgets/*/UDC)" >unplug.sh
 echo "echo dummy_udc.0 >\$(echo $gadgets/*/UDC)" >plug.sh
+ends_soon() {
+    kill $head_pid
+    wait_for 5 sh -c "! kill -0 $head_pid"
+}
 packet=512
 [ $speed = high ] || packet=1024
 head_start "{type: usb, backend: functionfs, speed: $speed}" --pace fast
@@ -27,8 +31,31 @@ head_start "{type: usb, backend: functionfs, speed: $speed}" --set head.prr_hz=4
 wait_for 10 is_plugged
 REPLUGS=20 UNPLUG="sh unplug.sh" PLUG="sh plug.sh" tap "$speed" test_stream
 note "streamed at $(uptime_s) s"
+# Without a configuration a head has nothing to do on its bus: it rests, and is there again with the next one.
+cpu_ticks() {
+    awk '{print $14 + $15}' /proc/$head_pid/stat
+}
+rests() {
+    before=$(cpu_ticks)
+    sleep 1
+    used=$(($(cpu_ticks) - before))
+    test $used -lt 50 # of 100: a loop takes all, the head's ticks without a scan below 10
+}
+device=$(dirname "$(grep -l 1209 /sys/bus/usb/devices/*/idVendor)")
+for file in bConfigurationValue authorized; do
+    echo 0 >$device/$file
+    check "$speed: $file 0: the head rests" rests
+    echo 1 >$device/$file
+    check "$speed: $file 1: records again" scanhead record usb --wait 10 --quiet --stats again.json
+done
+note "rested at $(uptime_s) s"
 tap "$speed" test_chapter9
 note "chapter 9 at $(uptime_s) s"
+device=$(dirname "$(grep -l 1209 /sys/bus/usb/devices/*/idVendor)")
+echo 0 >$device/bConfigurationValue
+check "$speed: ends without a configuration" ends_soon
+head_start "{type: usb, backend: functionfs, speed: $speed}" --pace fast
+wait_for 10 is_plugged
 head_kill
 check "$speed: a killed head leaves its gadget" test "$(ls $gadgets | wc -l)" = 1
 head_start "{type: usb, backend: functionfs, speed: $speed}" --pace fast

@@ -20,6 +20,7 @@ wait_for 10 is_plugged
 echo "echo 0 >$vhci/detach" >unplug.sh
 # Plugs itself in again.
 REPLUGS=20 UNPLUG="sh unplug.sh" PLUG=: tap "socket pair" test_stream
+check "socket pair: says that it is back" grep 'plugged in again' /tmp/head.err
 note "replugged at $(uptime_s) s"
 head_kill
 check "socket pair: gone with the killed head" wait_for 10 is_unplugged

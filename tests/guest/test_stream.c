@@ -269,7 +269,7 @@ static int settle(void **state)
     (void)state;
     struct scanhead *sh = open_head(source());
     tell(sh, "HEAD:STAT?", reply);
-    if (strcmp(reply, "idle") != 0) do_command(sh, "SCAN:STOP");
+    if (strcmp(reply, "scanning") == 0) do_command(sh, "SCAN:STOP");
     wait_idle(sh);
     do_command(sh, "SCAN:FRAM 1");
     scanhead_close(sh);
