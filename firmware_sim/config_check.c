@@ -115,6 +115,10 @@ static int check_names(const struct cfg_reader *rd, struct config *cfg)
 static int check_output(const struct cfg_reader *rd, struct config *cfg)
 {
     cfg->layout_given = cfg_is_given(rd, "output.layout", 0);
+    if (!cfg_is_given(rd, "output.tolerance_m", 0)) cfg->tolerance_m = fmax(1e-7, 1e-3 * cfg->plan_tolerance_m);
+    cfg->optics_depth_given = cfg_is_given(rd, "optics.depth", 0);
+    if (cfg->order_exactly == ORDER_FALSE) cfg->order_exactly = ORDER_OFF;
+    if (cfg->order_exactly == ORDER_TRUE) cfg->order_exactly = ORDER_ON;
     if (cfg->utm_zone != 0 && cfg->crs != GEOREF_UTM)
         return cfg_fail_key(rd, "output.utm_zone", 0, "a zone, but output.crs is not utm; allowed only with crs: utm");
     if (cfg->heights == HEIGHTS_GEOID && cfg->crs != GEOREF_UTM && cfg->crs != GEOREF_GEODETIC)
@@ -276,8 +280,7 @@ int config_moves(const struct config *cfg)
     return moves;
 }
 
-/* What a pulse with a footprint is not joined with yet: the key that asks for it, or NULL. */
-static const char *asks_for_detection(const struct config *cfg)
+const char *config_asks_for_detection(const struct config *cfg)
 {
     static const struct config_instrument ideal;
     if (cfg->signal.on) return "signal.model";
@@ -291,11 +294,12 @@ static const char *asks_for_detection(const struct config *cfg)
 /* Outlines are those that a head that stands still sees of a scene that does. */
 static int check_beam(const struct cfg_reader *rd, const struct config *cfg)
 {
-    if (cfg->beam_mode != BEAM_SINGLE && cfg->profile.beam_exit_m == 0.0 && cfg->profile.beam_divergence_rad == 0.0)
+    if (cfg->beam_mode == BEAM_SINGLE || cfg->beam_mode == BEAM_AUTO) return SH_OK;
+    if (cfg->profile.beam_exit_m == 0.0 && cfg->profile.beam_divergence_rad == 0.0)
         return cfg_fail_key(rd, "beam.mode", 0, "head profile %s has no footprint; allowed single", cfg->profile.name);
     if (cfg->beam_mode == BEAM_ADAPTIVE && config_moves(cfg))
         return cfg_fail_key(rd, "beam.mode", 0, "adaptive, but the head or a mesh moves; allowed single, rings, auto");
-    const char *asks = cfg->beam_mode == BEAM_SINGLE ? NULL : asks_for_detection(cfg);
+    const char *asks = config_asks_for_detection(cfg);
     if (asks != NULL)
         return cfg_fail_key(rd, "beam.mode", 0, "%s, and %s: not possible together; allowed single, or without that",
                             cfg_find(&rd->table, "beam.mode")->names[cfg->beam_mode], asks);
