@@ -39,7 +39,7 @@ struct plan_row {
     struct plan_option left[PLAN_MAX_OPTIONS]; /* what was left out; why_not says why */
 };
 
-/* Chooses, of n options in order of cost, and fills row (stage, method, figures, forced, left, why). forced: the option
+/* Chooses, of n options, and fills row (stage, method, figures, forced, left, why). forced: the option
  * that the configuration names, by `key`; -1: none. Returns the number of the option. */
 uint32_t plan_choose(struct plan_row *row, const char *stage, const struct plan_option *option, uint32_t n, int forced,
                      const char *key, const struct plan_tolerance *tolerance);
@@ -78,23 +78,15 @@ struct plan_place {
 
 struct plan_sample;
 
-/* Draws pulses of all places alike. With outlines, those that no outline cuts are many and alike, so that only some of
- * them are cast with the reference; then the sample is larger. The places must outlive it. */
+/* Draws pulses of all places alike. Those that meet one smooth surface are many and alike, so that only some of them are
+ * cast with the reference: which they are, 61 sub-rays tell. The places must outlive it. */
 int plan_sample_create(struct plan_place *place, uint32_t n_places, struct plan_sample **out, struct sh_err *err);
 void plan_sample_free(struct plan_sample *sample);
 
-struct plan_sample_info {
-    uint64_t drawn;   /* pulses */
-    uint64_t looked;  /* of these, cast with the reference */
-    double cut_share; /* adaptive: of the pulses, those that an outline cuts */
-    double sub_rays;  /* adaptive: per pulse */
-};
-void plan_sample_get_info(const struct plan_sample *sample, struct plan_sample_info *info);
-
-/* What a beam is off against BEAM_MAX_RINGS rings (1,027 sub-rays): error_m and echo_share of option. BEAM_SINGLE: one
- * ray. Both are upper limits: two standard errors above the mean square, and the limit of 95 % of Poisson's
- * distribution for what an outline cuts; what no outline cuts counts as it is found, because the outlines promise that
- * it is nothing. The first call casts the reference. progress: see plan_sample_create. */
+/* What a beam is off against BEAM_MAX_RINGS rings (1,027 sub-rays): error_m and echo_share of option; for
+ * BEAM_ADAPTIVE, whose place has outlines, its cost_ns, too. BEAM_SINGLE: one ray. Both are upper limits: two standard
+ * errors above the mean square, and the limit of 95 % of Poisson's distribution of what is found among the pulses that
+ * do not meet one smooth surface; the others count as they are found. The first call casts the reference. */
 void plan_sample_beam(struct plan_sample *sample, enum beam_mode mode, uint32_t rings, struct plan_option *option);
 
 /* What following pulses through only `depth` surfaces of glass or mirrors is off against CAST_MAX_DEPTH. A pulse that
@@ -111,9 +103,8 @@ struct plan_methods {
     uint32_t depth;      /* of glass and mirrors */
 };
 
-/* Costs and names of beams. */
-void plan_beam_option(enum beam_mode mode, uint32_t rings, const struct plan_sample_info *info,
-                      struct plan_option *option);
+/* A beam's name, and its cost where that does not hang on the scene; nothing is known yet of what it is off. */
+void plan_beam_option(enum beam_mode mode, uint32_t rings, struct plan_option *option);
 /* Fills options, in order of cost, for surfaces in a scene that lies within far_m of the head. */
 void plan_order_options(double far_m, struct plan_option option[2]);
 

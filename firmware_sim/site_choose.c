@@ -109,18 +109,26 @@ static void fill_place(const struct site *site, struct at *at, struct plan_place
     site_cast_setup(site, at->station, &place->setup);
 }
 
-/* Some of the stations, evenly. footprint: with beams, adaptive where they can be. */
+/* Some of the stations, evenly. */
 static int open_look(struct look *look, struct site *site, int footprint, const struct sh_report *report,
                      struct sh_err *err)
 {
-    int rc = SH_OK, adaptive = !config_moves(site->cfg);
+    int rc = SH_OK;
     *look = (struct look){.site = site, .n = site->n_stations < MAX_PLACES ? site->n_stations : MAX_PLACES};
     for (uint32_t i = 0; i < look->n && rc == SH_OK; i++) {
         look->at[i] = (struct at){site, i * site->n_stations / look->n};
-        if (footprint) rc = make_beam(site, &site->station[look->at[i].station], adaptive, report, err);
+        if (footprint) rc = make_beam(site, &site->station[look->at[i].station], 0, report, err);
         fill_place(site, &look->at[i], &look->place[i]);
     }
     return rc == SH_OK ? plan_sample_create(look->place, look->n, &look->sample, err) : rc;
+}
+
+static int add_outlines(const struct look *look, const struct sh_report *report, struct sh_err *err)
+{
+    int rc = SH_OK;
+    for (uint32_t i = 0; i < look->n && rc == SH_OK; i++)
+        rc = make_beam(look->site, &look->site->station[look->at[i].station], 1, report, err);
+    return rc;
 }
 
 /* ---- the choice of a beam */
@@ -130,59 +138,70 @@ struct beam_choice {
     uint32_t rings;
 };
 
-/* What there is, in order of cost. */
-static void list_beams(const struct site *site, const struct plan_sample *sample, struct beam_choice *choice,
-                       struct plan_option *option)
+/* What there is: those of known costs in their order. */
+static void list_beams(const struct site *site, struct beam_choice *choice, struct plan_option *option)
 {
     static const uint32_t rings[FOOTPRINT_OPTIONS - 2] = {1, 2, 3, 4, 6, 8, 12};
     const char *none = no_footprint(site);
-    struct plan_sample_info info = {0};
-    if (sample != NULL) plan_sample_get_info(sample, &info);
     for (uint32_t i = 0; i < FOOTPRINT_OPTIONS; i++) {
         choice[i] = (struct beam_choice){i == 0 ? BEAM_SINGLE : i == 1 ? BEAM_ADAPTIVE : BEAM_RINGS,
                                          i < 2 ? site->cfg->beam_rings : rings[i - 2]};
-        plan_beam_option(choice[i].mode, choice[i].rings, &info, &option[i]);
+        plan_beam_option(choice[i].mode, choice[i].rings, &option[i]);
         if (i > 0 && none != NULL)
             snprintf(option[i].why_not, sizeof option[i].why_not, "%s%s",
                      none == config_asks_for_detection(site->cfg) ? "not together with " : "", none);
         else if (i == 1 && config_moves(site->cfg))
             snprintf(option[i].why_not, sizeof option[i].why_not, "the head or a mesh moves");
     }
-    for (uint32_t i = 2; i < FOOTPRINT_OPTIONS && option[i - 1].cost_ns > option[i].cost_ns; i++) {
-        struct plan_option o = option[i];
-        struct beam_choice c = choice[i];
-        option[i] = option[i - 1];
-        choice[i] = choice[i - 1];
-        option[i - 1] = o;
-        choice[i - 1] = c;
-    }
 }
 
-/* Measures in order of cost, up to the first that holds. */
+/* Measures what can be had, up to what costs more than one that holds. Outlines take time to find, and only the
+ * adaptive beam needs them. Returns whether one holds. */
+static int measure_beams(struct look *look, const struct beam_choice *choice, struct plan_option *option,
+                         const struct sh_report *report, struct sh_err *err, int *holds)
+{
+    const struct plan_tolerance tolerance = tolerance_of(look->site);
+    double cost_ns = (double)INFINITY;
+    int rc = SH_OK;
+    for (uint32_t i = 0; i < FOOTPRINT_OPTIONS && rc == SH_OK; i++) {
+        if (option[i].why_not[0] != '\0' || option[i].cost_ns > cost_ns) continue;
+        if (choice[i].mode == BEAM_ADAPTIVE) {
+            if (*holds) continue; /* single rays do */
+            rc = add_outlines(look, report, err);
+            if (rc != SH_OK) return rc;
+        }
+        plan_sample_beam(look->sample, choice[i].mode, choice[i].rings, &option[i]);
+        if (!plan_holds(&option[i], &tolerance)) continue;
+        *holds = 1;
+        cost_ns = option[i].cost_ns;
+    }
+    return rc;
+}
+
+static int try_beams(struct site *site, const struct beam_choice *choice, struct plan_option *option,
+                     const struct sh_report *report, struct sh_err *err)
+{
+    struct look look = {0};
+    int holds = 0, rc = open_look(&look, site, 1, report, err);
+    if (rc == SH_OK) rc = measure_beams(&look, choice, option, report, err, &holds);
+    if (rc == SH_OK && !holds)
+        sh_warn(report, "%s: beam.mode: auto: no beam holds plan.tolerance_m and plan.echo_tolerance here",
+                site->cfg->file);
+    plan_sample_free(look.sample);
+    return rc;
+}
+
 static int choose_beam(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const struct plan_tolerance tolerance = tolerance_of(site);
     struct plan_option option[FOOTPRINT_OPTIONS];
     struct beam_choice choice[FOOTPRINT_OPTIONS];
-    struct look look = {0};
-    int rc = SH_OK, can = no_footprint(site) == NULL;
-    if (can) rc = open_look(&look, site, 1, report, err);
+    list_beams(site, choice, option);
+    int rc = no_footprint(site) == NULL ? try_beams(site, choice, option, report, err) : SH_OK;
     if (rc != SH_OK) return rc;
-    struct plan_option one;
-    if (can) plan_sample_beam(look.sample, BEAM_SINGLE, 0, &one); /* which says how many pulses an outline cuts */
-    list_beams(site, look.sample, choice, option);
-    for (uint32_t i = 0; i < FOOTPRINT_OPTIONS && can; i++) {
-        if (option[i].why_not[0] != '\0') continue;
-        plan_sample_beam(look.sample, choice[i].mode, choice[i].rings, &option[i]);
-        if (plan_holds(&option[i], &tolerance)) break;
-    }
     uint32_t chosen = plan_choose(&site->plan.beam, "beam", option, FOOTPRINT_OPTIONS, -1, "", &tolerance);
     site->plan.methods.beam = choice[chosen].mode;
     site->plan.methods.rings = choice[chosen].rings;
-    if (can && !plan_holds(&option[chosen], &tolerance))
-        sh_warn(report, "%s: no beam holds plan.tolerance_m and plan.echo_tolerance here; %s is the least off",
-                site->cfg->file, option[chosen].method);
-    plan_sample_free(look.sample);
     return SH_OK;
 }
 
@@ -191,22 +210,16 @@ static int force_beam(struct site *site, int measure, const struct sh_report *re
 {
     const struct config *cfg = site->cfg;
     const struct plan_tolerance tolerance = tolerance_of(site);
-    struct plan_sample_info info = {.cut_share = (double)NAN};
-    struct plan_option option, measured;
+    struct plan_option option;
     struct look look = {0};
-    measure = measure && cfg->beam_mode != BEAM_SINGLE;
-    if (measure) {
+    plan_beam_option(cfg->beam_mode, cfg->beam_rings, &option);
+    if (measure && cfg->beam_mode != BEAM_SINGLE) {
         int rc = open_look(&look, site, 1, report, err);
+        if (rc == SH_OK && cfg->beam_mode == BEAM_ADAPTIVE) rc = add_outlines(&look, report, err);
+        if (rc == SH_OK) plan_sample_beam(look.sample, cfg->beam_mode, cfg->beam_rings, &option);
+        plan_sample_free(look.sample);
         if (rc != SH_OK) return rc;
-        plan_sample_beam(look.sample, cfg->beam_mode, cfg->beam_rings, &measured);
-        plan_sample_get_info(look.sample, &info);
     }
-    plan_beam_option(cfg->beam_mode, cfg->beam_rings, &info, &option);
-    if (measure) {
-        option.error_m = measured.error_m;
-        option.echo_share = measured.echo_share;
-    }
-    plan_sample_free(look.sample);
     site->plan.methods.beam = cfg->beam_mode;
     site->plan.methods.rings = cfg->beam_rings;
     plan_choose(&site->plan.beam, "beam", &option, 1, 0, "beam.mode", &tolerance);

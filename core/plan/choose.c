@@ -57,9 +57,9 @@ uint32_t plan_choose(struct plan_row *row, const char *stage, const struct plan_
 {
     uint32_t chosen = 0, can = 0;
     int holds = 0;
-    for (uint32_t i = n; i-- > 0;) {
+    for (uint32_t i = 0; i < n; i++) {
         can += option[i].why_not[0] == '\0';
-        if (!plan_holds(&option[i], tolerance)) continue;
+        if (!plan_holds(&option[i], tolerance) || (holds && !(option[i].cost_ns < option[chosen].cost_ns))) continue;
         chosen = i;
         holds = 1;
     }

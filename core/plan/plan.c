@@ -33,8 +33,7 @@ void plan_order_options(double far_m, struct plan_option option[2])
     option[1] = (struct plan_option){.method = "double", .cost_ns = (double)NAN};
 }
 
-void plan_beam_option(enum beam_mode mode, uint32_t rings, const struct plan_sample_info *info,
-                      struct plan_option *option)
+void plan_beam_option(enum beam_mode mode, uint32_t rings, struct plan_option *option)
 {
     uint32_t n = 1 + 3 * rings * (rings + 1);
     *option = (struct plan_option){.method = "single", .error_m = (double)NAN, .echo_share = (double)NAN};
@@ -43,7 +42,7 @@ void plan_beam_option(enum beam_mode mode, uint32_t rings, const struct plan_sam
         option->cost_ns = n * PLAN_COST_SUB_RAY;
     } else if (mode == BEAM_ADAPTIVE) {
         snprintf(option->method, sizeof option->method, "adaptive");
-        option->cost_ns = PLAN_COST_OUTLINES + info->cut_share * PLAN_COST_CUT + info->sub_rays * PLAN_COST_SUB_RAY;
+        option->cost_ns = (double)NAN;
     }
 }
 
