@@ -79,7 +79,7 @@ struct plan_place {
 struct plan_sample;
 
 /* Draws pulses of all places alike. Those that meet one smooth surface are many and alike, so that only some of them are
- * cast with the reference: which they are, 61 sub-rays tell. The places must outlive it. */
+ * cast with the reference: which they are, 127 sub-rays tell. The places must outlive it. */
 int plan_sample_create(struct plan_place *place, uint32_t n_places, struct plan_sample **out, struct sh_err *err);
 void plan_sample_free(struct plan_sample *sample);
 

@@ -76,6 +76,22 @@ static void print_line(const char *stage, const char *method, const double figur
     printf("%-8s %-22s %8s %8s %6s  %s\n", stage, method, shown[0], shown[1], shown[2], why);
 }
 
+/* Not measured, for the same reason: told once. */
+static int is_like(const struct plan_option *a, const struct plan_option *b)
+{
+    return isnan(a->error_m) && isnan(b->error_m) && strcmp(a->why_not, b->why_not) == 0;
+}
+
+static void print_left(const struct plan_option *left, uint32_t more)
+{
+    const double figure[3] = {left->error_m, left->echo_share, left->cost_ns};
+    char method[40], why[sizeof left->why_not + 32];
+    snprintf(method, sizeof method, "  not %s", left->method);
+    snprintf(why, sizeof why, "%s", left->why_not);
+    if (more != 0) snprintf(why, sizeof why, "%s; likewise the %u after it", left->why_not, more);
+    print_line("", method, figure, why);
+}
+
 static int print_text(const struct site_plan *plan)
 {
     printf("%-8s %-22s %8s %8s %6s  %s\n", "stage", "method", "error m", "echoes", "ns", "why");
@@ -83,12 +99,10 @@ static int print_text(const struct site_plan *plan)
         const struct plan_row *row = &plan->row[i];
         const double figure[3] = {row->error_m, row->echo_share, row->cost_ns};
         print_line(row->stage, row->method, figure, row->why);
-        for (uint32_t k = 0; k < row->n_left; k++) {
-            const struct plan_option *left = &row->left[k];
-            const double of_left[3] = {left->error_m, left->echo_share, left->cost_ns};
-            char method[40];
-            snprintf(method, sizeof method, "  not %s", left->method);
-            print_line("", method, of_left, left->why_not);
+        for (uint32_t k = 0, end; k < row->n_left; k = end) {
+            for (end = k + 1; end < row->n_left && is_like(&row->left[k], &row->left[end]);)
+                end++;
+            print_left(&row->left[k], end - k - 1);
         }
     }
     return SH_OK;

@@ -1,7 +1,7 @@
 /* The command set: SCPI-style lines in, one reply line each, and the error queue of SCPI-99 (21.8).
  *
  *   *IDN?  *RST  *CLS  *OPC?  *STB?  SYSTem:ERRor[:NEXT]?  SYSTem:ERRor:COUNt?  SYSTem:VERSion?  SYSTem:CONTrol:RELease
- *   SYSTem:CONTrol?  HEAD:PRR  HEAD:LINes  HEAD:PAN  HEAD:STATe?  HEAD:STATION  SCAN:LINE:STARt  SCAN:LINE:STOP
+ *   SYSTem:CONTrol?  SYSTem:PLAN?  HEAD:PRR  HEAD:LINes  HEAD:PAN  HEAD:STATe?  HEAD:STATION  SCAN:LINE:STARt  SCAN:LINE:STOP
  *   SCAN:PAN:STARt  SCAN:PAN:STOP  SCAN:FRAMes  SCAN:ECHoes  SCAN:STARt  SCAN:STOP  SCAN:COUNt?  HELP?  TIME? TIME:UTC?
  *   TIME:GPS?  TIME:STEP
  * SCAN:ECHoes takes ALL, FIRSt, LAST, STRongest or DEF: which echoes of a pulse are sent.
@@ -68,6 +68,7 @@ const char *command_error_text(int number);
 /* What the device tells the command set; the loop keeps it up to date. */
 struct command_device {
     const char *idn;
+    const char *plan; /* the methods in use, in a line; NULL: not known */
     struct head_limits limits;
     struct head_settings settings; /* as they are now; command_execute changes them only when all is well */
     struct head_settings defaults; /* what *RST restores */

@@ -12,13 +12,13 @@
 static const double SMOOTH_M = 5e-5;
 
 enum {
-    MAX_DRAWN = 32768, /* pulses */
+    MAX_DRAWN = 16384,  /* pulses */
     MIXED_LOOKS = 1024, /* of these, cast with the reference: those that meet more than one smooth surface, */
-    PLAIN_LOOKS = 512,  /* and of the others */
-    PLAIN_EVERY = 64,   /* one of so many */
-    PROBE_RINGS = 4,
+    PLAIN_LOOKS = 1024, /* and of the others */
+    PLAIN_EVERY = 8,    /* one of so many */
+    PROBE_RINGS = 6,
     OPTICS_DRAWN = 8192,
-    TRIES = 64, /* for each pulse: the others are not cast, where the field of view is narrow */
+    TRIES = 1 << 20, /* for each pulse: few of them are cast where the field of view is narrow */
     ROOM = 64,  /* in the block; more than LINE_MAX_ECHOES */
 };
 
