@@ -78,15 +78,16 @@ struct plan_place {
 
 struct plan_sample;
 
-/* Draws pulses of all places alike. Those that meet one smooth surface are many and alike, so that only some of them are
- * cast with the reference: which they are, 127 sub-rays tell. The places must outlive it. */
+/* Draws pulses of all places alike. Those that meet one smooth surface are many and alike, so that only some of them
+ * are cast with the reference: which they are, 61 sub-rays tell. The places must outlive it. */
 int plan_sample_create(struct plan_place *place, uint32_t n_places, struct plan_sample **out, struct sh_err *err);
 void plan_sample_free(struct plan_sample *sample);
 
 /* What a beam is off against BEAM_MAX_RINGS rings (1,027 sub-rays): error_m and echo_share of option; for
- * BEAM_ADAPTIVE, whose place has outlines, its cost_ns, too. BEAM_SINGLE: one ray. Both are upper limits: two standard
- * errors above the mean square, and the limit of 95 % of Poisson's distribution of what is found among the pulses that
- * do not meet one smooth surface; the others count as they are found. The first call casts the reference. */
+ * BEAM_ADAPTIVE, whose place has outlines, its cost_ns, too. BEAM_SINGLE: one ray. Both are upper limits: three
+ * standard errors above the mean square, and the limit of 95 % of Poisson's distribution of what is found among the
+ * pulses that do not meet one smooth surface; the others count as they are found. The first call casts the reference.
+ */
 void plan_sample_beam(struct plan_sample *sample, enum beam_mode mode, uint32_t rings, struct plan_option *option);
 
 /* What following pulses through only `depth` surfaces of glass or mirrors is off against CAST_MAX_DEPTH. A pulse that

@@ -10,18 +10,25 @@
 #include "firmware_sim/site_plan.h"
 
 static const char HELP[] =
-    "scanhead plan CONFIG [options]: the method each stage will use, its error bound, its cost, why, and what was left out\n\n"
+    "scanhead plan CONFIG [options]: the method each stage will use, its error bound, its cost, why, and what was left "
+    "out\n\n"
     "  --json           an array of {stage, method, error_m, echo_share, cost_ns, forced, why, left_out}, left_out an\n"
     "                   array of {method, error_m, echo_share, cost_ns, why}; null: not known, or hangs on the scene\n"
     "  --set KEY=VALUE  another value of a configuration key\n\n"
-    "Of each stage the cheapest method is used whose bounds hold plan.tolerance_m (root mean square of the ranges) and\n"
+    "Of each stage the cheapest method is used whose bounds hold plan.tolerance_m (root mean square of the ranges) "
+    "and\n"
     "plan.echo_tolerance (share of the pulses with another number of echoes), unless beam.mode, optics.depth,\n"
-    "scene.order_exactly or output.georef force one. Beam and optics are tried on some thousands of the head's own pulses\n"
-    "in the scene, always the same ones, against 1,027 sub-rays, or the deepest way; bounds are upper limits of what was\n"
-    "found. georef is planned for each station, from output.crs, output.tolerance_m, the scene's extent and the head's\n"
+    "scene.order_exactly or output.georef force one. Beam and optics are tried on some thousands of the head's own "
+    "pulses\n"
+    "in the scene, always the same ones, against 1,027 sub-rays, or the deepest way; bounds are upper limits of what "
+    "was\n"
+    "found. georef is planned for each station, from output.crs, output.tolerance_m, the scene's extent and the "
+    "head's\n"
     "range_max_m; one row for all where they get the same method, else one each. A stage with the method none is left\n"
-    "out: nothing in the configuration asks for it. Costs count beyond a single ray: rounded figures of `make chart` and\n"
-    "`make bench-beam` on one core with AVX2, to compare methods by; what hangs on the scene is measured by `make bench`.\n";
+    "out: nothing in the configuration asks for it. Costs count beyond a single ray: rounded figures of `make chart` "
+    "and\n"
+    "`make bench-beam` on one core with AVX2, to compare methods by; what hangs on the scene is measured by `make "
+    "bench`.\n";
 
 enum { OPT_JSON = 256 };
 static const struct option OPTIONS[] = {{"set", required_argument, NULL, 's'},

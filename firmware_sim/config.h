@@ -173,7 +173,8 @@ struct config {
     struct config_mesh mesh[CONFIG_MAX_MESHES];
     uint32_t n_meshes;
     double scene_tolerance_m;
-    enum config_order order_exactly; /* surfaces that overlap are ordered in double; auto, off or on once it is loaded */
+    enum config_order
+        order_exactly; /* surfaces that overlap are ordered in double; auto, off or on once it is loaded */
     struct config_anchor anchor;
     /* stations */
     struct config_station station[CONFIG_MAX_STATIONS];

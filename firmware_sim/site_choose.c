@@ -144,7 +144,9 @@ static void list_beams(const struct site *site, struct beam_choice *choice, stru
     static const uint32_t rings[FOOTPRINT_OPTIONS - 2] = {1, 2, 3, 4, 6, 8, 12};
     const char *none = no_footprint(site);
     for (uint32_t i = 0; i < FOOTPRINT_OPTIONS; i++) {
-        choice[i] = (struct beam_choice){i == 0 ? BEAM_SINGLE : i == 1 ? BEAM_ADAPTIVE : BEAM_RINGS,
+        choice[i] = (struct beam_choice){i == 0   ? BEAM_SINGLE
+                                         : i == 1 ? BEAM_ADAPTIVE
+                                                  : BEAM_RINGS,
                                          i < 2 ? site->cfg->beam_rings : rings[i - 2]};
         plan_beam_option(choice[i].mode, choice[i].rings, &option[i]);
         if (i > 0 && none != NULL)
@@ -245,10 +247,8 @@ static int choose_optics(struct site *site, int measure, const struct sh_report 
         if (rc != SH_OK) return rc;
     }
     for (uint32_t d = 0; d <= CAST_MAX_DEPTH; d++) {
-        option[d] = (struct plan_option){.method = "none",
-                                         .error_m = (double)NAN,
-                                         .echo_share = (double)NAN,
-                                         .cost_ns = d == 0 ? 0.0 : (double)NAN};
+        option[d] = (struct plan_option){
+            .method = "none", .error_m = (double)NAN, .echo_share = (double)NAN, .cost_ns = d == 0 ? 0.0 : (double)NAN};
         if (d > 0) snprintf(option[d].method, sizeof option[d].method, "depth %u", d);
         if (look.sample == NULL || holds) continue;
         plan_sample_optics(look.sample, d, &option[d]);

@@ -44,7 +44,9 @@ static void say_why(struct plan_row *row, const struct plan_option *it, uint32_t
         snprintf(first, sizeof first, "forced by %s", key);
     else
         snprintf(first, sizeof first, "%s",
-                 can == 1 ? "the only one that can be had" : holds ? "the cheapest" : "the one that is least off");
+                 can == 1 ? "the only one that can be had"
+                 : holds  ? "the cheapest"
+                          : "the one that is least off");
     if (known)
         snprintf(row->why, sizeof row->why, "%s; %s %.3g m, and %.3g %% of the pulses with another echo count", first,
                  verdict, tolerance->range_m, 100.0 * tolerance->echo_share);

@@ -43,10 +43,10 @@ static void leave_out(const struct georef *georef, const struct plan_georef_need
                                      .cost_ns = cost_ns(georef, m)};
         snprintf(left->method, sizeof left->method, "%s", methods[m].name);
         snprintf(left->why_not, sizeof left->why_not, "%s",
-                 !isfinite(left->error_m)              ? "it has no bound here"
-                 : left->error_m > need->tolerance_m   ? "off by more than the tolerance"
-                 : need->forced != GEOREF_AUTO         ? "not asked for"
-                                                       : "dearer, or no better");
+                 !isfinite(left->error_m)            ? "it has no bound here"
+                 : left->error_m > need->tolerance_m ? "off by more than the tolerance"
+                 : need->forced != GEOREF_AUTO       ? "not asked for"
+                                                     : "dearer, or no better");
     }
 }
 
@@ -95,4 +95,3 @@ void plan_georef_polar(struct plan_row *row)
     snprintf(row->why, sizeof row->why,
              "output.layout is polar: points leave as range and angles, the anchor says where");
 }
-

@@ -7,19 +7,19 @@
 #include "core/plan/cost.h"
 #include "core/rng.h"
 
-/* Two rays' ranges further apart than that are not those of one smooth surface: at 80 deg, 100 m and 0.35 mrad, the mean
- * over a footprint is 2 um off its centre. */
+/* Two rays' ranges further apart than that are not those of one smooth surface: at 80 deg, 100 m and 0.35 mrad, the
+ * mean over a footprint is 2 um off its centre. */
 static const double SMOOTH_M = 5e-5;
 
 enum {
-    MAX_DRAWN = 16384,  /* pulses */
+    MAX_DRAWN = 32768,  /* pulses */
     MIXED_LOOKS = 1024, /* of these, cast with the reference: those that meet more than one smooth surface, */
     PLAIN_LOOKS = 1024, /* and of the others */
     PLAIN_EVERY = 8,    /* one of so many */
-    PROBE_RINGS = 6,
+    PROBE_RINGS = 4,
     OPTICS_DRAWN = 8192,
     TRIES = 1 << 20, /* for each pulse: few of them are cast where the field of view is narrow */
-    ROOM = 64,  /* in the block; more than LINE_MAX_ECHOES */
+    ROOM = 64,       /* in the block; more than LINE_MAX_ECHOES */
 };
 
 struct echoes {
@@ -172,7 +172,8 @@ static void prepare_beam(struct plan_sample *s)
 
 /* What was found: of mixed pulses each stands for itself, of the others each for many. */
 struct tally {
-    double echoes, further, sum2, sum4; /* further than the first of a pulse; of what ranges are off, squared; and squared again */
+    double echoes, further, sum2,
+        sum4; /* further than the first of a pulse; of what ranges are off, squared; and squared again */
     double wrong_mixed, wrong_plain;
 };
 
@@ -201,7 +202,7 @@ static void conclude(const struct tally *t, double pulses, struct plan_option *o
     option->error_m = option->echo_share = (double)NAN;
     if (!(pulses > 0.0)) return;
     option->echo_share = fmin(1.0, (poisson_limit(t->wrong_mixed) + t->wrong_plain) / pulses);
-    option->error_m = t->echoes > 0.0 ? sqrt((t->sum2 + 2.0 * sqrt(t->sum4)) / t->echoes) : 0.0;
+    option->error_m = t->echoes > 0.0 ? sqrt((t->sum2 + 3.0 * sqrt(t->sum4)) / t->echoes) : 0.0;
 }
 
 void plan_sample_beam(struct plan_sample *s, enum beam_mode mode, uint32_t rings, struct plan_option *option)
@@ -227,8 +228,7 @@ void plan_sample_beam(struct plan_sample *s, enum beam_mode mode, uint32_t rings
     double pulses = (double)s->drawn;
     conclude(&tally, pulses, option);
     if (mode != BEAM_ADAPTIVE || !(pulses > 0.0)) return;
-    option->cost_ns =
-        PLAN_COST_OUTLINES + outlined / pulses * PLAN_COST_CUT + sub_rays / pulses * PLAN_COST_SUB_RAY;
+    option->cost_ns = PLAN_COST_OUTLINES + outlined / pulses * PLAN_COST_CUT + sub_rays / pulses * PLAN_COST_SUB_RAY;
 }
 
 /* ---- glass and mirrors */
