@@ -22,7 +22,8 @@ static const char HELP[] =
     "pulses\n"
     "in the scene, always the same ones, against 1,027 sub-rays, or the deepest way; bounds are upper limits of what "
     "was\n"
-    "found. georef is planned for each station, from output.crs, output.tolerance_m, the scene's extent and the "
+    "found, from up to four of the stations, for the settings at power-up. georef is planned for each station, from "
+    "output.crs, output.tolerance_m, the scene's extent and the "
     "head's\n"
     "range_max_m; one row for all where they get the same method, else one each. A stage with the method none is left\n"
     "out: nothing in the configuration asks for it. Costs count beyond a single ray: rounded figures of `make chart` "
@@ -95,7 +96,7 @@ static void print_left(const struct plan_option *left, uint32_t more)
     char method[40], why[sizeof left->why_not + 32];
     snprintf(method, sizeof method, "  not %s", left->method);
     snprintf(why, sizeof why, "%s", left->why_not);
-    if (more != 0) snprintf(why, sizeof why, "%s; likewise the %u after it", left->why_not, more);
+    if (more != 0) snprintf(why, sizeof why, "%s; likewise %u more", left->why_not, more);
     print_line("", method, figure, why);
 }
 

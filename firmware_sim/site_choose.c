@@ -114,6 +114,7 @@ static int open_look(struct look *look, struct site *site, int footprint, const 
                      struct sh_err *err)
 {
     int rc = SH_OK;
+    if (site->scene->n_triangles > 1000000) sh_progress(report, "trying methods on the scene", -1.0);
     *look = (struct look){.site = site, .n = site->n_stations < MAX_PLACES ? site->n_stations : MAX_PLACES};
     for (uint32_t i = 0; i < look->n && rc == SH_OK; i++) {
         look->at[i] = (struct at){site, i * site->n_stations / look->n};
@@ -257,6 +258,11 @@ static int choose_optics(struct site *site, int measure, const struct sh_report 
     plan_sample_free(look.sample);
     site->plan.methods.depth =
         plan_choose(&site->plan.optics, "optics", option, CAST_MAX_DEPTH + 1, forced, "optics.depth", &tolerance);
+    if (forced < 0 && site->plan.methods.depth == 0)
+        sh_warn(report,
+                "%s: plan.tolerance_m and plan.echo_tolerance allow to take glass and mirrors as other surfaces; "
+                "optics.depth has them followed",
+                cfg->file);
     if (forced < 0 && !holds)
         sh_warn(report, "%s: ways through glass and off mirrors are longer than the %u that are followed", cfg->file,
                 site->plan.methods.depth);

@@ -7,5 +7,8 @@
 #define PLAN_COST_SUB_RAY  70.0   /* a ray of a ring, or behind glass */
 #define PLAN_COST_OUTLINES 8.0    /* adaptive: asking whether an outline is near, for each pulse */
 #define PLAN_COST_CUT      1000.0 /* adaptive: a pulse that one cuts */
+/* What would be saved without; `make bench`, stages "refine" and "decide". */
+#define PLAN_COST_REFINE 6.0 /* ranges from the triangles' planes, in double */
+#define PLAN_COST_DECIDE 0.5 /* triangles in double where float can't tell */
 
 #endif

@@ -292,9 +292,10 @@ static void test_figures(void **state)
     plan_sample_beam(sample, BEAM_ADAPTIVE, 4, &adaptive);
     plan_sample_beam(sample, BEAM_RINGS, 2, &rings);
     double sigma = sqrt(share / 32768.0);
-    printf("# a step: two echoes in %.3f %% of the pulses; single rays are wrong in %.3f %%, 19 sub-rays in %.3f %%, the "
-           "adaptive beam in %.3f %%\n",
-           100.0 * share, 100.0 * single.echo_share, 100.0 * rings.echo_share, 100.0 * adaptive.echo_share);
+    printf(
+        "# a step: two echoes in %.3f %% of the pulses; single rays are wrong in %.3f %%, 19 sub-rays in %.3f %%, the "
+        "adaptive beam in %.3f %%\n",
+        100.0 * share, 100.0 * single.echo_share, 100.0 * rings.echo_share, 100.0 * adaptive.echo_share);
     assert_true(single.echo_share > share - 1.4 * sigma && single.echo_share < share + 4.7 * sigma);
     assert_true(single.error_m < 1e-4); /* away from the strip it is right, but for less than 1 % of a metre's step */
     assert_true(rings.echo_share < single.echo_share && adaptive.echo_share < rings.echo_share);
