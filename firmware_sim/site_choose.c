@@ -25,6 +25,12 @@ static const char *no_footprint(const struct site *site)
     return config_asks_for_detection(site->cfg);
 }
 
+/* Why an adaptive one can't be had, where footprints can; NULL: it can. */
+static const char *no_outlines(const struct site *site)
+{
+    return config_moves(site->cfg) ? "the head or a mesh moves" : NULL;
+}
+
 static int make_beam(const struct site *site, struct site_station *s, int adaptive, const struct sh_report *report,
                      struct sh_err *err)
 {
@@ -153,8 +159,8 @@ static void list_beams(const struct site *site, struct beam_choice *choice, stru
         if (i > 0 && none != NULL)
             snprintf(option[i].why_not, sizeof option[i].why_not, "%s%s",
                      none == config_asks_for_detection(site->cfg) ? "not together with " : "", none);
-        else if (i == 1 && config_moves(site->cfg))
-            snprintf(option[i].why_not, sizeof option[i].why_not, "the head or a mesh moves");
+        else if (i == 1 && no_outlines(site) != NULL)
+            snprintf(option[i].why_not, sizeof option[i].why_not, "%s", no_outlines(site));
     }
 }
 

@@ -108,25 +108,40 @@ static void cast_look(struct plan_sample *s, struct cast_setup *setup, const str
     out->last_label = out->n != 0 ? b->label[out->n - 1] : LINE_LABEL_NONE;
 }
 
-/* The run's setup, but exact: ranges in their finest counts, without noise. */
-static void set_up(const struct plan_place *p, struct cast_setup *setup)
+/* The run's setup, but exact: ranges in their finest counts, without noise, thresholds sharp. */
+struct exact {
+    struct cast_setup setup;
+    struct cast_detect detect;
+    struct detect_signal signal;
+};
+
+static void set_up(const struct plan_place *p, struct exact *e)
 {
+    struct cast_setup *setup = &e->setup;
     *setup = p->setup;
     setup->layout = LINE_POLAR;
     setup->range_scale_m = fmax(1e-6, setup->range_max_m * 1.1 / 0x1p31);
     setup->noise_on = 0;
     setup->echoes = BEAM_ALL;
+    if (setup->detect == NULL) return;
+    e->detect = *setup->detect;
+    setup->detect = &e->detect;
+    e->detect.noise_by_signal = 0;
+    e->detect.ball = NULL;
+    if (e->detect.signal == NULL) return;
+    e->signal = *e->detect.signal;
+    e->signal.per_snr = 0.0;
+    e->detect.signal = &e->signal;
 }
 
 static void cast_beam(struct plan_sample *s, const struct look *look, enum beam_mode mode, struct echoes *out)
 {
     const struct plan_place *p = &s->place[look->place];
-    struct cast_setup setup;
-    set_up(p, &setup);
-    setup.detect = NULL;
-    setup.beam = mode == BEAM_SINGLE ? NULL : p->beam;
-    if (setup.beam != NULL) p->beam->mode = mode;
-    cast_look(s, &setup, look, out);
+    struct exact e;
+    set_up(p, &e);
+    e.setup.beam = mode == BEAM_SINGLE ? NULL : p->beam;
+    if (e.setup.beam != NULL) p->beam->mode = mode;
+    cast_look(s, &e.setup, look, out);
 }
 
 static void set_rings(const struct plan_sample *s, uint32_t rings)
@@ -236,21 +251,16 @@ void plan_sample_beam(struct plan_sample *s, enum beam_mode mode, uint32_t rings
 /* apart: every surface on the way is an echo. */
 static void cast_way(struct plan_sample *s, const struct look *look, uint32_t depth, int apart, struct echoes *out)
 {
-    const struct plan_place *p = &s->place[look->place];
-    struct cast_setup setup;
-    set_up(p, &setup);
-    struct cast_detect detect = *p->setup.detect;
-    detect.depth = depth;
-    detect.noise_by_signal = 0;
-    detect.ball = NULL;
+    struct exact e;
+    set_up(&s->place[look->place], &e);
+    e.setup.beam = NULL;
+    e.detect.depth = depth;
     if (apart) {
-        detect.signal = NULL;
-        detect.separation_m = 0.0;
-        detect.max_echoes = LINE_MAX_ECHOES;
+        e.detect.signal = NULL;
+        e.detect.separation_m = 0.0;
+        e.detect.max_echoes = LINE_MAX_ECHOES;
     }
-    setup.detect = &detect;
-    setup.beam = NULL;
-    cast_look(s, &setup, look, out);
+    cast_look(s, &e.setup, look, out);
 }
 
 static int leads_on(const struct plan_sample *s, const struct echoes *e)

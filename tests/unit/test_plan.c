@@ -12,10 +12,8 @@
 static const struct plan_tolerance TOLERANCE = {1e-3, 1e-2};
 
 enum { N = 4 };
-static const struct plan_option options[N] = {{"a", 2e-3, 0.0, 1.0, ""},
-                                              {"b", 1e-3, 2e-2, 2.0, ""},
-                                              {"c", 1e-4, 1e-3, 9.0, ""},
-                                              {"d", 1e-4, 1e-2, 5.0, ""}};
+static const struct plan_option options[N] = {
+    {"a", 2e-3, 0.0, 1.0, ""}, {"b", 1e-3, 2e-2, 2.0, ""}, {"c", 1e-4, 1e-3, 9.0, ""}, {"d", 1e-4, 1e-2, 5.0, ""}};
 
 static void expect(const struct plan_row *row, const char *method, int forced, const char *why)
 {
@@ -95,9 +93,8 @@ static void test_order(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_cheapest_that_holds), cmocka_unit_test(test_forced),
-        cmocka_unit_test(test_least_off),           cmocka_unit_test(test_what_cannot_be_had),
-        cmocka_unit_test(test_order),
+        cmocka_unit_test(test_cheapest_that_holds), cmocka_unit_test(test_forced), cmocka_unit_test(test_least_off),
+        cmocka_unit_test(test_what_cannot_be_had),  cmocka_unit_test(test_order),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
