@@ -18,7 +18,9 @@
  * range resolution (c tau / 2 of the pulse width tau) begins a new one. An echo's range is the energy-weighted mean of
  * its returns - with two surfaces closer than the resolution, the mixed pixel's -, its surface that of its strongest
  * return, its energy the sum. Less than 1 % of the footprint's energy is no echo. Of more echoes than the head can
- * tell, the weakest are left out, and counted. The width of an echo is that of the pulse, resolution_m, and 2.355 sigma
+ * tell, the weakest are left out, and counted. Where surfaces are modelled (core/surface.h), what weighs is what comes
+ * back: energy times the surface's return, times the share that glass and mirrors before it let through; the 1 % is
+ * still of the footprint. The width of an echo is that of the pulse, resolution_m, and 2.355 sigma
  * of its ranges, added as squares (full widths at half maximum of Gaussians).
  *
  * One ray for all of the footprint. Where it lies on one plane at incidence i, the mean over it is not the range of its
@@ -84,6 +86,7 @@ void beam_axes(const double dir[3], double e1[3], double e2[3]);
 struct beam_return {
     double range_m;
     double energy; /* of the footprint's */
+    double back;   /* what comes back of that, where surfaces are modelled; else the energy again */
     float cosine;  /* of the incidence */
     float sigma_m; /* of the ranges within it */
     uint32_t triangle, label;
@@ -94,15 +97,15 @@ struct beam_echoes {
     uint32_t n, capacity;
     uint32_t *pulse; /* index in the chunk */
     double *range_m;
-    float *energy, *cosine, *width_m;
+    float *energy, *back, *cosine, *width_m;
     uint32_t *triangle, *label;
-    uint8_t *number; /* as in struct line_block: number and count; 0: a shot without echo, whose range is NaN */
+    uint8_t *number; /* among the pulse's, from 0, those counted that were left out: for random numbers */
 };
 int beam_echoes_alloc(struct beam_echoes *echoes, uint32_t capacity, struct sh_err *err);
 void beam_echoes_free(struct beam_echoes *echoes);
 
-/* Returns of one pulse -> its echoes, at the end of the list, not yet numbered. Sorts the returns. Those of the
- * list's echoes that exceed most are left out, the weakest first; gives how many. */
+/* Returns of one pulse -> its echoes, at the end of the list. Sorts the returns. Those of the pulse's echoes that
+ * exceed most are left out, those first of which least comes back; gives how many. */
 uint32_t beam_merge(const struct beam *beam, struct beam_return *returns, uint32_t n, uint32_t pulse, uint32_t most,
                     struct beam_echoes *echoes);
 
@@ -115,11 +118,14 @@ uint32_t beam_merge(const struct beam *beam, struct beam_return *returns, uint32
  * may reach, and the nearest of them. Constant after it is made; any thread. */
 struct beam_outlines;
 
-/* Casts rays from the station: unit directions -> ranges, NaN for none. */
+/* Casts rays from the station: unit directions -> ranges, NaN for none, and the kinds of surfaces that they meet. */
 struct beam_probe {
-    void (*cast)(void *ctx, uint32_t n, const double *dx, const double *dy, const double *dz, double *range_m);
+    void (*cast)(void *ctx, uint32_t n, const double *dx, const double *dy, const double *dz, double *range_m,
+                 uint16_t *kind);
     void *ctx;
 };
+/* kind, by label: surfaces of one kind send back the same. NULL: all do, or nobody asks. Else edges where one kind ends
+ * are outlines, too, with or without a step. */
 /* station_m: where all pulses come from; at most exit_radius_m off.
  * probe, NULL: all outlines count. Else rays are cast close along both sides of each, a footprint's radius apart: a
  * stretch of it is left out where it is hidden, or where the ranges on both sides agree to BEAM_LEAST_STEP_M (a wall
@@ -127,8 +133,8 @@ struct beam_probe {
  * triangles is, it may move a range by a sixth of the footprint's radius times the change of slope. What is hidden from
  * the station may be seen from the edge of the exit: a strip of at most its radius. */
 int beam_outlines_create(const struct scene *scene, const double station_m[3], const struct beam *beam,
-                         double range_max_m, const struct beam_probe *probe, struct beam_outlines **out,
-                         struct sh_err *err);
+                         double range_max_m, const uint16_t *kind, const struct beam_probe *probe,
+                         struct beam_outlines **out, struct sh_err *err);
 void beam_outlines_free(struct beam_outlines *outlines);
 struct beam_outlines_info {
     uint64_t edges, outlines, stretches, entries, bytes;

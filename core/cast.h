@@ -65,7 +65,8 @@ enum { CAST_MAX_DEPTH = 4 };
  * Echoes of a pulse: of each pane that it passes, and of what lies behind. A mirror has none of its own unless its
  * reflectance says so; what is seen in it is a ghost, at the length of the folded way along the beam, with a label of
  * its own: ghost_label more than the surface's. Only pulses that meet such a surface are cast again; a way does not
- * branch. More than max_echoes: the last are left out. Panes are of no thickness but their mesh's: not refracted. */
+ * branch.
+ * Panes are of no thickness but their mesh's: not refracted. */
 struct cast_detect {
     const struct instrument *instrument;
     const struct surface_table *surfaces; /* for signal and depth; must outlive the scan */
@@ -80,10 +81,13 @@ struct cast_detect {
     const struct detect_ball *ball;
 };
 
-/* A beam with a footprint (core/beam.h). Constant; any thread. */
+/* A beam with a footprint (core/beam.h). Constant; any thread. With cast_detect, echoes weigh by what comes back of
+ * them, each by itself is detected or not, and has noise of its own. Where a footprint of an adaptive beam lies on
+ * glass or a mirror, in part or as a whole, it is cast as rings: what is seen there has outlines that nobody knows. */
 struct cast_beam {
     struct beam beam;
-    enum beam_mode mode; /* BEAM_RINGS, or BEAM_ADAPTIVE with outlines: then the head and the scene stand still */
+    enum beam_mode mode; /* BEAM_RINGS, or BEAM_ADAPTIVE with outlines: then the head and the scene stand still,
+                          * and beams begin at station_m (instrument_has_offset) */
     uint32_t max_echoes; /* of a pulse; up to LINE_MAX_ECHOES */
     struct beam_pattern pattern, fine; /* sub-rays; the finest */
     const struct beam_outlines *outlines;
@@ -114,7 +118,7 @@ struct cast_setup {
      * relative to, and rotation is not used. n_knots 0: the head stands still at station_m. */
     uint32_t n_knots;
     const struct pose_knot *knot;
-    /* NULL: every hit within the limits is one echo, the head is ideal. Else beam is NULL: they are not joined. */
+    /* NULL: every hit within the limits is one echo, the head is ideal. Its max_echoes is also the beam's. */
     const struct cast_detect *detect;
 };
 
@@ -125,13 +129,12 @@ struct cast_counters {
     uint64_t went_on;     /* of these, nothing there after all: the ray went on behind */
     uint64_t unfit;       /* echoes whose position did not fit into the wire's integers: sent as shots without echo */
     uint64_t faint;     /* hits below the detection threshold, or in a blind time: shots without echo, or echoes less */
-    uint64_t crowded;   /* echoes beyond max_echoes, left out */
+    uint64_t crowded;   /* echoes beyond max_echoes: the weakest, left out */
     uint64_t undecided; /* nearer to an edge than double precision can tell: counted as hit */
     /* with a beam */
     uint64_t outlined; /* adaptive: pulses whose footprint an outline cuts */
     uint64_t sub_rays; /* cast beyond the central ones */
     uint64_t ragged;   /* adaptive: pulses with more outlines than can be told apart, cast as rings */
-    uint64_t left_out; /* echoes beyond max_echoes */
 };
 
 struct caster;
@@ -154,9 +157,9 @@ void caster_hits(struct caster *caster, const struct bvh *bvh, const double stat
                  uint32_t n, const double *dx, const double *dy, const double *dz, double *range_m, uint32_t *triangle);
 
 /* The outlines of a scene that are steps as seen from the station, which lies within the BVH's station_reach_m
- * (beam_outlines_create). For setting up. */
+ * (beam_outlines_create; kind: as there, of surface_kinds where detection models surfaces). For setting up. */
 int cast_outlines(const struct scene *scene, const struct bvh *bvh, const double station_m[3], const struct beam *beam,
-                  double range_max_m, struct beam_outlines **out, struct sh_err *err);
+                  double range_max_m, const uint16_t *kind, struct beam_outlines **out, struct sh_err *err);
 
 /* Cost by stage, for measuring: `now` counts in any unit and is read between the stages of each chunk. */
 enum cast_stage {

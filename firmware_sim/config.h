@@ -231,15 +231,14 @@ int config_has_optics(const struct config *cfg);
 /* What a profile says about the signal; the rest of it (sharp, extinction, seed) is 0. */
 void config_signal_spec(const struct config_profile *profile, struct detect_signal_spec *spec);
 
-/* What a pulse with a footprint is not joined with yet: the key that asks for it, or NULL. */
-const char *config_asks_for_detection(const struct config *cfg);
-
 /* The schedule of a head with some settings. */
 void config_fill_spec(const struct config_profile *profile, const struct head_settings *settings,
                       struct schedule_spec *spec);
 
 /* Whether anything in the scene, or the head, moves. */
 int config_moves(const struct config *cfg);
+/* True when all beams begin at one place of a scene that stands still: what an adaptive beam needs. */
+int config_beam_fixed(const struct config *cfg);
 
 /* The reference: every key with type, unit, default, range and help. */
 void config_print_reference(FILE *out);

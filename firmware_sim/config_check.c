@@ -280,29 +280,21 @@ int config_moves(const struct config *cfg)
     return moves;
 }
 
-const char *config_asks_for_detection(const struct config *cfg)
+int config_beam_fixed(const struct config *cfg)
 {
-    static const struct config_instrument ideal;
-    if (cfg->signal.on) return "signal.model";
-    if (config_has_optics(cfg)) return "surfaces with glass or a mirror";
-    if (cfg->ambiguity != DETECT_AMBIGUITY_NONE) return "head.ambiguity";
-    if (cfg->ball.radius_m > 0.0) return "noise.ball";
-    if (cfg->noise_angle) return "noise.angle";
-    return memcmp(&cfg->instrument, &ideal, sizeof ideal) != 0 ? "instrument" : NULL;
+    return !config_moves(cfg) && cfg->instrument.transit_offset_m == 0.0 && cfg->instrument.mirror_offset_m == 0.0;
 }
 
-/* Outlines are those that a head that stands still sees of a scene that does. */
+/* Outlines are those that are seen from one place. */
 static int check_beam(const struct cfg_reader *rd, const struct config *cfg)
 {
     if (cfg->beam_mode == BEAM_SINGLE || cfg->beam_mode == BEAM_AUTO) return SH_OK;
     if (cfg->profile.beam_exit_m == 0.0 && cfg->profile.beam_divergence_rad == 0.0)
         return cfg_fail_key(rd, "beam.mode", 0, "head profile %s has no footprint; allowed single", cfg->profile.name);
-    if (cfg->beam_mode == BEAM_ADAPTIVE && config_moves(cfg))
-        return cfg_fail_key(rd, "beam.mode", 0, "adaptive, but the head or a mesh moves; allowed single, rings, auto");
-    const char *asks = config_asks_for_detection(cfg);
-    if (asks != NULL)
-        return cfg_fail_key(rd, "beam.mode", 0, "%s, and %s: not possible together; allowed single, or without that",
-                            cfg_find(&rd->table, "beam.mode")->names[cfg->beam_mode], asks);
+    if (cfg->beam_mode == BEAM_ADAPTIVE && !config_beam_fixed(cfg))
+        return cfg_fail_key(rd, "beam.mode", 0, "adaptive, but %s; allowed single, rings, auto",
+                            config_moves(cfg) ? "the head or a mesh moves"
+                                              : "instrument.transit_offset_m or mirror_offset_m moves the beam");
     return SH_OK;
 }
 

@@ -249,14 +249,13 @@ static const struct cfg_key config_keys[] = {
 
     {"beam", CFG_MAP, .help = "The footprint of the pulses."},
     {"beam.mode", CFG_ENUM, .def = "single", .names = beam_names, IN_CONFIG(beam_mode),
-     .help = "single: one ray per pulse; rings: sub-rays over the footprint; adaptive: where it reaches over an edge; "
-             "auto: as `scanhead plan` says. Only single, which auto then takes, with signal.model, glass, mirrors, "
-             "noise.ball, noise.angle, head.ambiguity, instrument."},
+     .help = "single: one ray per pulse; rings: sub-rays over the footprint; adaptive: where it reaches over an edge, "
+             "or onto glass or a mirror; auto: as `scanhead plan` says."},
     {"beam.rings", CFG_COUNT, NULL, "4", 0, BEAM_MAX_RINGS, IN_CONFIG(beam_rings),
      .help = "Rings of sub-rays, 1 + 3 n (n + 1) in all; adaptive: where a footprint holds more edges than it can tell "
              "apart."},
     {"beam.echoes", CFG_ENUM, .def = "all", .names = echoes_names, IN_CONFIG(settings.echoes),
-     .help = "Which echoes of a pulse are sent: all, first, last, strongest."},
+     .help = "Which echoes of a pulse are sent, also of glass and what is behind: all, first, last, strongest."},
 
     {"plan", CFG_MAP, .help = "What the methods of all stages may be off; each stage takes the cheapest that holds it "
                               "(`scanhead plan`)."},

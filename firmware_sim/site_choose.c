@@ -22,13 +22,14 @@ static const char *no_footprint(const struct site *site)
 {
     const struct config_profile *p = &site->cfg->profile;
     if (p->beam_exit_m == 0.0 && p->beam_divergence_rad == 0.0) return "the head profile has no footprint";
-    return config_asks_for_detection(site->cfg);
+    return NULL;
 }
 
 /* Why an adaptive one can't be had, where footprints can; NULL: it can. */
 static const char *no_outlines(const struct site *site)
 {
-    return config_moves(site->cfg) ? "the head or a mesh moves" : NULL;
+    if (config_beam_fixed(site->cfg)) return NULL;
+    return config_moves(site->cfg) ? "the head or a mesh moves" : "an offset of the instrument moves the beam";
 }
 
 static int make_beam(const struct site *site, struct site_station *s, int adaptive, const struct sh_report *report,
@@ -43,7 +44,8 @@ static int make_beam(const struct site *site, struct site_station *s, int adapti
     beam_rings(BEAM_FINE_RINGS, &beam->fine);
     if (!adaptive || s->outlines != NULL) return SH_OK;
     if (site->scene->n_triangles > 1000000) sh_progress(report, "looking for outlines", -1.0);
-    int rc = cast_outlines(site->scene, s->bvh, s->at.position_m, &beam->beam, p->range_max_m, &s->outlines, err);
+    int rc = cast_outlines(site->scene, s->bvh, s->at.position_m, &beam->beam, p->range_max_m, site->detect.kind,
+                           &s->outlines, err);
     beam->outlines = s->outlines;
     return rc;
 }
@@ -157,8 +159,7 @@ static void list_beams(const struct site *site, struct beam_choice *choice, stru
                                          i < 2 ? site->cfg->beam_rings : rings[i - 2]};
         plan_beam_option(choice[i].mode, choice[i].rings, &option[i]);
         if (i > 0 && none != NULL)
-            snprintf(option[i].why_not, sizeof option[i].why_not, "%s%s",
-                     none == config_asks_for_detection(site->cfg) ? "not together with " : "", none);
+            snprintf(option[i].why_not, sizeof option[i].why_not, "%s", none);
         else if (i == 1 && no_outlines(site) != NULL)
             snprintf(option[i].why_not, sizeof option[i].why_not, "%s", no_outlines(site));
     }

@@ -12,13 +12,14 @@ int beam_echoes_alloc(struct beam_echoes *e, uint32_t capacity, struct sh_err *e
     e->pulse = malloc(capacity * sizeof *e->pulse);
     e->range_m = malloc(capacity * sizeof *e->range_m);
     e->energy = malloc(capacity * sizeof *e->energy);
+    e->back = malloc(capacity * sizeof *e->back);
     e->cosine = malloc(capacity * sizeof *e->cosine);
     e->width_m = malloc(capacity * sizeof *e->width_m);
     e->triangle = malloc(capacity * sizeof *e->triangle);
     e->label = malloc(capacity * sizeof *e->label);
     e->number = malloc(capacity);
-    if (e->pulse != NULL && e->range_m != NULL && e->energy != NULL && e->cosine != NULL && e->width_m != NULL &&
-        e->triangle != NULL && e->label != NULL && e->number != NULL)
+    if (e->pulse != NULL && e->range_m != NULL && e->energy != NULL && e->back != NULL && e->cosine != NULL &&
+        e->width_m != NULL && e->triangle != NULL && e->label != NULL && e->number != NULL)
         return SH_OK;
     beam_echoes_free(e);
     return sh_fail(err, SH_ENOMEM, "beam: no memory for %u echoes", capacity);
@@ -29,6 +30,7 @@ void beam_echoes_free(struct beam_echoes *e)
     free(e->pulse);
     free(e->range_m);
     free(e->energy);
+    free(e->back);
     free(e->cosine);
     free(e->width_m);
     free(e->triangle);
@@ -51,29 +53,35 @@ static void sort(struct beam_return *r, uint32_t n)
         }
 }
 
-/* One echo from returns that hang together. */
-static void append(const struct beam *beam, const struct beam_return *r, uint32_t n, uint32_t pulse,
-                   struct beam_echoes *e)
+/* One echo from returns that hang together. Returns 0 where they are too weak for one. */
+static int append(const struct beam *beam, const struct beam_return *r, uint32_t n, uint32_t pulse,
+                  struct beam_echoes *e)
 {
-    double energy = 0.0, first = 0.0, second = 0.0;
+    double energy = 0.0, back = 0.0, first = 0.0, second = 0.0;
     uint32_t strongest = 0;
     for (uint32_t i = 0; i < n; i++) {
-        double d = r[i].range_m - r[0].range_m;
         energy += r[i].energy;
-        first += r[i].energy * d;
-        second += r[i].energy * (d * d + (double)r[i].sigma_m * (double)r[i].sigma_m);
-        if (r[i].energy > r[strongest].energy) strongest = i;
+        back += r[i].back;
     }
-    if (energy < BEAM_LEAST_ENERGY) return;
-    double mean = first / energy, variance = fmax(0.0, second / energy - mean * mean);
+    if (energy < BEAM_LEAST_ENERGY) return 0;
+    for (uint32_t i = 0; i < n; i++) {
+        double d = r[i].range_m - r[0].range_m, weight = back > 0.0 ? r[i].back : r[i].energy;
+        first += weight * d;
+        second += weight * (d * d + (double)r[i].sigma_m * (double)r[i].sigma_m);
+        if (back > 0.0 ? r[i].back > r[strongest].back : r[i].energy > r[strongest].energy) strongest = i;
+    }
+    double all = back > 0.0 ? back : energy;
+    double mean = first / all, variance = fmax(0.0, second / all - mean * mean);
     uint32_t at = e->n++;
     e->pulse[at] = pulse;
     e->range_m[at] = r[0].range_m + mean;
     e->energy[at] = (float)energy;
+    e->back[at] = (float)back;
     e->cosine[at] = r[strongest].cosine;
     e->width_m[at] = (float)sqrt(beam->resolution_m * beam->resolution_m + 8.0 * log(2.0) * variance);
     e->triangle[at] = r[strongest].triangle;
     e->label[at] = r[strongest].label;
+    return 1;
 }
 
 static void move_echo(struct beam_echoes *e, uint32_t to, uint32_t from)
@@ -81,17 +89,19 @@ static void move_echo(struct beam_echoes *e, uint32_t to, uint32_t from)
     e->pulse[to] = e->pulse[from];
     e->range_m[to] = e->range_m[from];
     e->energy[to] = e->energy[from];
+    e->back[to] = e->back[from];
     e->cosine[to] = e->cosine[from];
     e->width_m[to] = e->width_m[from];
     e->triangle[to] = e->triangle[from];
     e->label[to] = e->label[from];
+    e->number[to] = e->number[from];
 }
 
 static void drop_weakest(struct beam_echoes *e, uint32_t first)
 {
     uint32_t weakest = first;
     for (uint32_t i = first; i < e->n; i++)
-        if (e->energy[i] < e->energy[weakest]) weakest = i;
+        if (e->back[i] < e->back[weakest]) weakest = i;
     for (uint32_t i = weakest; i + 1 < e->n; i++)
         move_echo(e, i, i + 1);
     e->n--;
@@ -101,11 +111,13 @@ uint32_t beam_merge(const struct beam *beam, struct beam_return *r, uint32_t n, 
                     struct beam_echoes *e)
 {
     uint32_t first = e->n, left_out = 0;
+    uint8_t number = 0;
     sort(r, n);
     for (uint32_t i = 0, end; i < n; i = end) {
         for (end = i + 1; end < n && r[end].range_m - r[end - 1].range_m <= beam->resolution_m;)
             end++;
-        append(beam, r + i, end - i, pulse, e);
+        if (!append(beam, r + i, end - i, pulse, e)) continue;
+        e->number[e->n - 1] = number++;
         if (e->n - first <= most) continue;
         drop_weakest(e, first);
         left_out++;

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/surface.h"
 #include "core/vec3.h"
 
 enum { MAX_PASSES = 4 };
@@ -69,8 +70,16 @@ static void add_ray(const struct caster *c, const struct beam *beam, const struc
     job->n++;
 }
 
-static void add_pattern(const struct caster *c, const struct cast_beam *b, const struct origins *from, struct job *job)
+/* A job of sub-rays all over the footprint. */
+static void plan_whole(struct caster *c, const struct cast_beam *b, const struct origins *from, struct job *job)
 {
+    const double dir[3] = {c->dx[job->pulse], c->dy[job->pulse], c->dz[job->pulse]};
+    job->first = c->beam->pool.n;
+    job->n = 0;
+    job->centre.energy = 0.0;
+    job->next_m = INFINITY;
+    job->whole = 1;
+    beam_axes(dir, job->e1, job->e2);
     for (uint32_t i = 0; i < b->pattern.n; i++)
         add_ray(c, &b->beam, from, job, (double)b->pattern.x[i], (double)b->pattern.y[i], 1.0 / b->pattern.n);
 }
@@ -114,10 +123,10 @@ static int plan_job(struct caster *c, const struct cast_setup *s, const struct o
     job->first = c->beam->pool.n;
     job->n = 0;
     job->centre.energy = 0.0;
+    job->whole = 0;
     beam_axes(dir, job->e1, job->e2);
     if (lines > BEAM_MAX_LINES || beam_cut(&b->beam, &b->fine, line, lines, &parts) != 0) {
-        add_pattern(c, b, from, job);
-        job->next_m = INFINITY;
+        plan_whole(c, b, from, job);
         c->counters.ragged++;
         return 1;
     }
@@ -127,12 +136,45 @@ static int plan_job(struct caster *c, const struct cast_setup *s, const struct o
     return 1;
 }
 
+/* How much the surfaces send back that rays from `first` on have met. */
+static void weigh_pool(struct caster *c, const struct cast_setup *s, uint32_t first)
+{
+    struct pool *p = &c->beam->pool;
+    struct behind *b = &c->beam->behind;
+    if (s->detect == NULL || s->detect->surfaces == NULL) return;
+    surface_return(s->detect->surfaces, p->n - first, p->label + first, p->cosine + first, p->rho + first);
+    if (s->detect->depth > 0) surface_return(s->detect->surfaces, b->n, b->label, b->cosine, b->rho);
+}
+
+/* What rays at .. at + n of the pool, which begin at `from`, come to behind what they have met. */
+static void look_through(struct caster *c, const struct cast_setup *s, const struct origins *from,
+                         const struct ray_set *met, uint32_t at, uint32_t n)
+{
+    const struct path_rays *p = &c->paths;
+    struct behind *b = &c->beam->behind;
+    caster_follow_rays(c, s, from, met, n);
+    for (uint32_t i = 0; i < n; i++) {
+        b->first[at + i] = b->n;
+        for (uint32_t k = p->first[i]; k != CAST_NO_PATH; k = p->next[k]) {
+            uint32_t to = b->n++;
+            b->range_m[to] = p->found_m[k];
+            b->cosine[to] = p->found_cosine[k];
+            b->share[to] = p->found_energy[k];
+            b->label[to] = p->found_label[k];
+            b->ghost[to] = p->found_ghost[k];
+        }
+        b->count[at + i] = b->n - b->first[at + i];
+    }
+}
+
 /* Casts what is in the pool from ray `first` on. */
 static void cast_pool(struct caster *c, const struct cast_setup *s, uint32_t first)
 {
     struct pool *p = &c->beam->pool;
+    int through = s->detect != NULL && s->detect->depth > 0;
+    if (first == 0) c->beam->behind.n = 0;
     c->counters.sub_rays += p->n - first;
-    c->scattered = s->beam->mode == BEAM_ADAPTIVE;
+    c->scattered = c->beam->scattered;
     for (uint32_t at = first, n; at < p->n; at += n) {
         n = p->n - at < CHUNK ? p->n - at : CHUNK;
         const struct origins from = {.px = p->px + at, .py = p->py + at, .pz = p->pz + at};
@@ -145,10 +187,12 @@ static void cast_pool(struct caster *c, const struct cast_setup *s, uint32_t fir
                                     .cosine = p->cosine + at,
                                     .body = p->body + at};
         caster_nearest(c, s, &from, &set, n);
+        if (through) look_through(c, s, &from, &set, at, n);
         for (uint32_t i = at; i < at + n && s->n_movers != 0; i++)
             if (p->body[i] != 0) p->triangle[i] = CAST_NO_TRIANGLE; /* not of the scene */
     }
     c->scattered = 0;
+    weigh_pool(c, s, first);
 }
 
 /* Outlines behind what the centre meets count too, where another part of the footprint looks past it. */
@@ -168,22 +212,78 @@ static void look_behind(struct caster *c, const struct cast_setup *s, const stru
     if (w->pool.n != first) cast_pool(c, s, first);
 }
 
+/* A return, with rho of its surface. */
+static void add_return(struct caster *c, const struct cast_setup *s, const struct beam_return *r, double share,
+                       double rho, int ghost)
+{
+    struct beam_return *to = &c->beam->returns[c->beam->n_returns];
+    *to = *r;
+    to->back = r->energy;
+    if (s->detect != NULL && s->detect->surfaces != NULL) {
+        if (caster_is_bare(s, r->label, rho)) return;
+        to->back = r->energy * share * rho;
+        to->label += ghost ? s->detect->ghost_label : 0;
+    }
+    c->beam->n_returns++;
+}
+
+static void add_centre(struct caster *c, const struct cast_setup *s, const struct beam_return *centre)
+{
+    double cosine = (double)centre->cosine, rho = 0.0;
+    if (s->detect != NULL && s->detect->surfaces != NULL)
+        surface_return(s->detect->surfaces, 1, &centre->label, &cosine, &rho);
+    add_return(c, s, centre, 1.0, rho, 0);
+}
+
+/* What sub-ray i came to. */
+static void add_met(struct caster *c, const struct cast_setup *s, uint32_t i)
+{
+    const struct pool *p = &c->beam->pool;
+    const struct behind *b = &c->beam->behind;
+    struct beam_return r = {.range_m = p->range_m[i],
+                            .energy = p->energy[i],
+                            .cosine = (float)p->cosine[i],
+                            .triangle = p->triangle[i],
+                            .label = p->label[i]};
+    if (isnan(p->range_m[i])) return;
+    add_return(c, s, &r, 1.0, p->rho[i], 0);
+    if (s->detect == NULL || s->detect->depth == 0) return;
+    for (uint32_t k = b->first[i]; k < b->first[i] + b->count[i]; k++) {
+        r.range_m = b->range_m[k];
+        r.cosine = (float)b->cosine[k];
+        r.triangle = CAST_NO_TRIANGLE;
+        r.label = b->label[k];
+        add_return(c, s, &r, b->share[k], b->rho[k], b->ghost[k]);
+    }
+}
+
+/* Adaptive, and a part of the footprint lies on glass or a mirror: what can be seen there has outlines of its own. */
+static int sees_through(const struct caster *c, const struct cast_setup *s, const struct job *job)
+{
+    if (job->whole || s->detect == NULL || s->detect->depth == 0) return 0;
+    for (uint32_t i = job->first; i < job->first + job->n; i++)
+        if (!isnan(c->beam->pool.range_m[i]) && caster_goes_on(s, c->beam->pool.label[i])) return 1;
+    return 0;
+}
+
 /* The returns of a job as echoes. */
 static void finish_job(struct caster *c, const struct cast_setup *s, const struct job *job)
 {
     struct beam_work *w = c->beam;
-    const struct pool *p = &w->pool;
-    uint32_t n = 0;
-    if (job->centre.energy > 0.0) w->returns[n++] = job->centre;
-    for (uint32_t i = job->first; i < job->first + job->n; i++) {
-        if (isnan(p->range_m[i])) continue;
-        w->returns[n++] = (struct beam_return){.range_m = p->range_m[i],
-                                               .energy = p->energy[i],
-                                               .cosine = (float)p->cosine[i],
-                                               .triangle = p->triangle[i],
-                                               .label = p->label[i]};
+    struct several *at = &w->several[job->pulse];
+    /* Detection decides which of many are left out. */
+    uint32_t most = s->detect != NULL ? LINE_MAX_ECHOES : s->beam->max_echoes;
+    if (sees_through(c, s, job)) {
+        w->again[w->n_again++] = job->pulse;
+        return;
     }
-    c->counters.left_out += beam_merge(&s->beam->beam, w->returns, n, job->pulse, s->beam->max_echoes, &w->some);
+    w->n_returns = 0;
+    if (job->centre.energy > 0.0) add_centre(c, s, &job->centre);
+    for (uint32_t i = job->first; i < job->first + job->n; i++)
+        add_met(c, s, i);
+    at->first = w->some.n;
+    c->counters.crowded += beam_merge(&s->beam->beam, w->returns, w->n_returns, job->pulse, most, &w->some);
+    at->n = w->some.n - at->first;
 }
 
 static void run_jobs(struct caster *c, const struct cast_setup *s, const struct origins *from, uint32_t reserve)
@@ -197,53 +297,96 @@ static void run_jobs(struct caster *c, const struct cast_setup *s, const struct 
     w->n_jobs = w->pool.n = 0;
 }
 
-/* Fills w->some with the echoes of pulses that one ray does not do for; gives those pulses in w->near. */
-static uint32_t sub_rays(struct caster *c, const struct cast_setup *s, const struct origins *from, uint32_t n)
+/* The centre of an adaptive beam meets glass or a mirror. */
+static int sees_glass(const struct caster *c, const struct cast_setup *s, uint32_t pulse)
+{
+    return s->detect != NULL && s->detect->depth > 0 && !isnan(c->range_m[pulse]) && caster_goes_on(s, c->label[pulse]);
+}
+
+/* Pulses of an adaptive beam that one ray may not do for. */
+static uint32_t find_candidates(struct caster *c, const struct cast_setup *s, uint32_t n)
 {
     struct beam_work *w = c->beam;
-    const struct cast_beam *b = s->beam;
-    int adaptive = b->mode == BEAM_ADAPTIVE;
-    uint32_t reserve = !adaptive || b->pattern.n > BEAM_MAX_PARTS ? b->pattern.n : BEAM_MAX_PARTS, cut = 0;
-    uint32_t candidates = n;
-    if (adaptive) {
-        kernel_limits(&b->beam, c->range_m, w->steep, n, w->limit_m);
-        candidates = beam_near_outlines(b->outlines, c->fx, c->fy, c->fz, w->limit_m, n, w->near);
+    uint32_t found = 0, all = 0;
+    kernel_limits(&s->beam->beam, c->range_m, w->steep, n, w->limit_m);
+    if (s->detect == NULL || s->detect->depth == 0)
+        return beam_near_outlines(s->beam->outlines, c->fx, c->fy, c->fz, w->limit_m, n, w->candidate);
+    found = beam_near_outlines(s->beam->outlines, c->fx, c->fy, c->fz, w->limit_m, n, w->near);
+    for (uint32_t p = 0, k = 0; p < n; p++) {
+        int near = k < found && w->near[k] == p;
+        k += (uint32_t)near;
+        if (near || sees_glass(c, s, p)) w->candidate[all++] = p;
     }
-    w->n_jobs = w->pool.n = w->some.n = 0;
+    return all;
+}
+
+/* Sub-rays all over the footprints of these pulses. */
+static void cast_whole(struct caster *c, const struct cast_setup *s, const struct origins *from, const uint32_t *pulse,
+                       uint32_t n)
+{
+    struct beam_work *w = c->beam;
+    const uint32_t reserve = s->beam->pattern.n;
+    w->scattered = 0;
+    for (uint32_t k = 0; k < n; k++) {
+        struct job *job = &w->job[w->n_jobs++];
+        job->pulse = pulse[k];
+        plan_whole(c, s->beam, from, job);
+        if (w->n_jobs == MAX_JOBS || w->pool.n + reserve > POOL) run_jobs(c, s, from, reserve);
+    }
+    if (w->n_jobs > 0) run_jobs(c, s, from, reserve);
+}
+
+/* Candidates of an adaptive beam: rays for the parts of their footprints. */
+static void cast_parts(struct caster *c, const struct cast_setup *s, const struct origins *from, uint32_t candidates)
+{
+    struct beam_work *w = c->beam;
+    const uint32_t pattern = s->beam->pattern.n, reserve = pattern > BEAM_MAX_PARTS ? pattern : BEAM_MAX_PARTS;
+    w->scattered = 1;
     for (uint32_t k = 0; k < candidates; k++) {
         struct job *job = &w->job[w->n_jobs];
-        job->pulse = adaptive ? w->near[k] : k;
+        uint32_t pulse = job->pulse = w->candidate[k];
         job->next_m = INFINITY;
-        if (!adaptive) {
-            const double dir[3] = {c->dx[k], c->dy[k], c->dz[k]};
-            job->first = w->pool.n;
-            job->n = 0;
-            job->centre.energy = 0.0;
-            beam_axes(dir, job->e1, job->e2);
-            add_pattern(c, b, from, job);
-        } else if (!plan_job(c, s, from, job, (double)w->limit_m[job->pulse], 0)) {
+        if (sees_glass(c, s, pulse)) {
+            w->near[w->n_near++] = w->again[w->n_again++] = pulse;
             continue;
         }
-        w->near[cut++] = job->pulse;
+        if (!plan_job(c, s, from, job, (double)w->limit_m[pulse], 0)) continue;
+        w->near[w->n_near++] = pulse;
         w->n_jobs++;
         if (w->n_jobs == MAX_JOBS || w->pool.n + reserve > POOL) run_jobs(c, s, from, reserve);
     }
-    run_jobs(c, s, from, reserve);
-    if (adaptive) c->counters.outlined += cut;
-    return cut;
+    if (w->n_jobs > 0) run_jobs(c, s, from, reserve);
 }
 
-uint32_t beam_chunk(struct caster *c, const struct cast_setup *s, const struct origins *from, int linear,
-                    uint64_t pulse0, const uint32_t *dt_ns, uint32_t n, struct line_block *block, uint32_t *at)
+/* Fills w->some with the echoes of pulses that one ray does not do for; gives those pulses in w->near. */
+static void sub_rays(struct caster *c, const struct cast_setup *s, const struct origins *from, uint32_t n)
 {
-    uint32_t cut = sub_rays(c, s, from, n);
-    if (s->beam->mode == BEAM_ADAPTIVE) kernel_excess(&s->beam->beam, c->beam->steep, n, c->range_m);
-    uint32_t echoes = beam_write_points(c, s, linear, pulse0, dt_ns, n, cut, block, at);
-    caster_ends(c, CAST_POSITIONS);
-    return echoes;
+    struct beam_work *w = c->beam;
+    w->n_jobs = w->pool.n = w->some.n = w->n_near = w->n_again = 0;
+    if (s->beam->mode != BEAM_ADAPTIVE) {
+        for (; w->n_near < n; w->n_near++)
+            w->near[w->n_near] = w->n_near;
+        cast_whole(c, s, from, w->near, n);
+        return;
+    }
+    cast_parts(c, s, from, find_candidates(c, s, n));
+    cast_whole(c, s, from, w->again, w->n_again);
+    c->counters.outlined += w->n_near;
 }
 
-float *beam_steep(struct caster *c)
+/* The central rays of an adaptive beam, with their incidences; nothing moves. */
+static void cast_central(struct caster *c, const struct cast_setup *s, const struct origins *from, uint32_t n)
 {
-    return c->beam->steep;
+    c->steep = c->beam->steep;
+    caster_hits_from(c, s->bvh, from, s->range_max_m, n, c->dx, c->dy, c->dz, c->range_m, c->hit);
+    c->steep = NULL;
+    memcpy(c->label, c->seen, n * sizeof *c->label);
+}
+
+void beam_cast(struct caster *c, const struct cast_setup *s, const struct origins *from, uint32_t n)
+{
+    int adaptive = s->beam->mode == BEAM_ADAPTIVE;
+    if (adaptive) cast_central(c, s, from, n);
+    sub_rays(c, s, from, n);
+    if (adaptive) kernel_excess(&s->beam->beam, c->beam->steep, n, c->range_m);
 }

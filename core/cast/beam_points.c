@@ -5,8 +5,6 @@
 #include "core/cast/beam_private.h"
 #include "core/rng.h"
 
-enum { ECHO_SHIFT = 56 }; /* of the noise's counter; pulse numbers stay below */
-
 static void copy_echo(struct beam_echoes *e, uint32_t to, uint32_t from)
 {
     e->pulse[to] = e->pulse[from];
@@ -16,11 +14,10 @@ static void copy_echo(struct beam_echoes *e, uint32_t to, uint32_t from)
     e->width_m[to] = e->width_m[from];
     e->triangle[to] = e->triangle[from];
     e->label[to] = e->label[from];
+    e->number[to] = e->number[from];
 }
 
-/* ---- THE PLACE FOR DETECTION: of pulses with sub-rays here, by their echoes' range, cosine, energy and label; of the
- * others in write_piece, from the ranges in c. What is not detected is left out, as echoes out of the head's range are.
- */
+/* Echoes out of the head's range are left out. */
 static void detect_echoes(const struct cast_setup *s, struct beam_echoes *e)
 {
     uint32_t kept = 0;
@@ -127,7 +124,7 @@ struct writer {
     uint8_t number[CHUNK];
 };
 
-/* Keyed by pulse and echo; the first echo's is that of a single ray. */
+/* Keyed by pulse and echo, whether others are sent or not; the first echo's is that of a single ray. */
 static void write_noise(struct writer *w, uint32_t n)
 {
     const struct cast_setup *s = w->s;
@@ -172,7 +169,7 @@ static void write_plain(struct writer *w, uint32_t p, uint32_t end)
         memmove(w->block->dt_ns + w->at + k, w->dt_ns + p, n * sizeof(uint32_t));
         if (w->s->noise_on)
             for (uint32_t i = 0; i < n; i++)
-                w->c->beam->counter[k + i] = w->pulse0 + p + i;
+                w->c->beam->counter[k + i] = rng_echo(w->pulse0 + p + i, kept->number[p + i]);
         w->n += n;
         p += n;
     }
@@ -188,7 +185,7 @@ static void write_several(struct writer *w, uint32_t p, const struct beam_echoes
         w->c->range_m[k] = e->range_m[first + i];
         w->c->label[k] = e->label[first + i];
         w->block->dt_ns[w->at + k] = w->dt_ns[p];
-        w->c->beam->counter[k] = w->pulse0 + p + ((uint64_t)i << ECHO_SHIFT);
+        w->c->beam->counter[k] = rng_echo(w->pulse0 + p, e->number[first + i]);
         w->numbered[w->n_numbers] = (uint16_t)k;
         w->number[w->n_numbers++] = (uint8_t)((i + 1) | count << 4);
     }
@@ -211,7 +208,9 @@ static uint32_t make_plain(struct caster *c, const struct cast_setup *s, const s
         }
         uint32_t one = end == i ? 0 : choose(e, s->echoes, i, end);
         c->range_m[p] = end == i ? (double)NAN : e->range_m[one];
-        if (end != i) c->label[p] = e->label[one];
+        if (end == i) continue;
+        c->label[p] = e->label[one];
+        w->number[p] = e->number[one];
     }
     return left;
 }
@@ -221,7 +220,7 @@ static void write_all_plain(struct writer *w, uint32_t n)
 {
     if (w->dt_ns != w->block->dt_ns + w->at) memmove(w->block->dt_ns + w->at, w->dt_ns, n * sizeof *w->dt_ns);
     for (uint32_t i = 0; i < n && w->s->noise_on; i++)
-        w->c->beam->counter[i] = w->pulse0 + i;
+        w->c->beam->counter[i] = rng_echo(w->pulse0 + i, w->c->beam->number[i]);
     w->n = n;
     write_piece(w);
 }
@@ -229,6 +228,7 @@ static void write_all_plain(struct writer *w, uint32_t n)
 static void write_points(struct writer *w, const struct beam_echoes *e, uint32_t n, uint32_t cut)
 {
     struct several *several = w->c->beam->several;
+    if (w->s->noise_on) memset(w->c->beam->number, 0, n);
     uint32_t left = make_plain(w->c, w->s, e, cut, several), from = 0;
     if (left == 0) {
         write_all_plain(w, n);
@@ -245,13 +245,14 @@ static void write_points(struct writer *w, const struct beam_echoes *e, uint32_t
 }
 
 uint32_t beam_write_points(struct caster *c, const struct cast_setup *s, int linear, uint64_t pulse0,
-                           const uint32_t *dt_ns, uint32_t n, uint32_t cut, struct line_block *block, uint32_t *at)
+                           const uint32_t *dt_ns, uint32_t n, struct line_block *block, uint32_t *at)
 {
     struct writer writer = {.c = c, .s = s, .block = block, .dt_ns = dt_ns, .pulse0 = pulse0, .linear = linear};
     writer.at = *at;
     detect_echoes(s, &c->beam->some);
     caster_ends(c, CAST_DETECT);
-    write_points(&writer, &c->beam->some, n, cut);
+    write_points(&writer, &c->beam->some, n, c->beam->n_near);
+    caster_ends(c, CAST_POSITIONS);
     *at = writer.at;
     return writer.echoes;
 }

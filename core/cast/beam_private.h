@@ -1,4 +1,4 @@
-/* Private to core/cast/beam.c and beam_points.c: working memory for pulses with a footprint. */
+/* Private to core/cast/beam*.c: working memory for pulses with a footprint. */
 #ifndef CORE_CAST_BEAM_PRIVATE_H
 #define CORE_CAST_BEAM_PRIVATE_H
 
@@ -13,9 +13,21 @@ enum {
 struct pool {
     double px[POOL], py[POOL], pz[POOL], dx[POOL], dy[POOL], dz[POOL];
     double range_m[POOL], cosine[POOL], energy[POOL];
+    double rho[POOL]; /* of the surface; touched only where surfaces are modelled */
     uint32_t triangle[POOL], label[POOL];
     uint8_t body[POOL];
     uint32_t n;
+};
+
+/* What sub-rays come to behind glass and off mirrors; touched only where there is such. */
+struct behind {
+    uint32_t first[POOL], count[POOL]; /* of a sub-ray */
+    uint32_t n;
+    double range_m[POOL * CAST_MAX_DEPTH], cosine[POOL * CAST_MAX_DEPTH];
+    double share[POOL * CAST_MAX_DEPTH]; /* of the sub-ray's energy */
+    double rho[POOL * CAST_MAX_DEPTH];
+    uint32_t label[POOL * CAST_MAX_DEPTH];
+    uint8_t ghost[POOL * CAST_MAX_DEPTH];
 };
 
 /* A pulse that one ray does not do for. */
@@ -25,32 +37,33 @@ struct job {
     double next_m;             /* from where on outlines were left out */
     struct beam_return centre; /* known without a ray; energy 0: none */
     double e1[3], e2[3];       /* across the beam */
+    int whole;                 /* sub-rays all over the footprint, whatever its outlines */
 };
 
-/* A pulse of several points: its echoes in the list. */
+/* Echoes of a pulse in the list. */
 struct several {
     uint32_t pulse, first, n;
 };
 
 struct beam_work {
     float steep[CHUNK], limit_m[CHUNK];
-    uint32_t near[CHUNK]; /* pulses with sub-rays */
+    uint32_t candidate[CHUNK], near[CHUNK], n_near; /* pulses to look at; those with sub-rays */
+    uint32_t again[CHUNK], n_again;                 /* glass or a mirror was met beside the centre */
     struct job job[MAX_JOBS];
     uint32_t n_jobs;
+    int scattered; /* the pool's rays have nothing in common */
     struct pool pool;
-    struct beam_return returns[BEAM_MAX_SUBRAYS + 1];
+    struct beam_return returns[(BEAM_MAX_SUBRAYS + 1) * (1 + CAST_MAX_DEPTH)];
+    uint32_t n_returns;
     struct beam_echoes some; /* of pulses with sub-rays */
     /* per pulse, while c holds what is per point */
     double range_m[CHUNK], mirror_turn[CHUNK], pan_turn[CHUNK];
     double ex[CHUNK], ey[CHUNK], ez[CHUNK], px[CHUNK], py[CHUNK], pz[CHUNK];
     uint32_t label[CHUNK];
-    struct several several[CHUNK];
-    uint64_t counter[CHUNK]; /* of the points' random numbers */
+    struct several several[CHUNK]; /* by pulse; for beam_points.c, in order of pulse, those of several points */
+    uint64_t counter[CHUNK];       /* of the points' random numbers */
+    uint8_t number[CHUNK];         /* of the echo that a pulse of one point sends */
+    struct behind behind;
 };
-
-/* A chunk whose pulses with sub-rays are work->near[0 .. cut - 1], their echoes in work->some, its other pulses' ranges
- * and labels in c: into the block from entry *at on. Returns the number of echoes. */
-uint32_t beam_write_points(struct caster *c, const struct cast_setup *s, int linear, uint64_t pulse0,
-                           const uint32_t *dt_ns, uint32_t n, uint32_t cut, struct line_block *block, uint32_t *at);
 
 #endif

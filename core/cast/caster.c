@@ -1,6 +1,7 @@
 #include "core/cast.h"
 
 #include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -15,7 +16,7 @@ int caster_create(struct caster **out, struct sh_err *err)
 {
     *out = aligned_alloc(64, (sizeof **out + 63) / 64 * 64);
     if (*out == NULL) return sh_fail(err, SH_ENOMEM, "cast: no memory for a caster");
-    memset(*out, 0, sizeof **out);
+    memset(*out, 0, offsetof(struct caster, list)); /* what is behind is not touched until it is needed */
     int rc = beam_work_create(&(*out)->beam, err);
     if (rc != SH_OK) free(*out);
     return rc;
@@ -172,19 +173,6 @@ void caster_hits(struct caster *c, const struct bvh *bvh, const double station_m
     caster_hits_from(c, bvh, &from, range_max_m, n, dx, dy, dz, range_m, triangle);
 }
 
-/* Socs to where positions go: straight to the CRS where that is a rotation, else to prcs. Returns 1 in the first case.
- */
-int caster_reading_rotation(const struct cast_setup *s, double to_crs[9])
-{
-    double g[9];
-    int linear = georef_rotation(s->georef, g);
-    memcpy(to_crs, s->rotation, 9 * sizeof *to_crs);
-    for (int i = 0; i < 9 && linear; i++)
-        to_crs[i] = g[i / 3 * 3] * s->rotation[i % 3] + g[i / 3 * 3 + 1] * s->rotation[3 + i % 3] +
-                    g[i / 3 * 3 + 2] * s->rotation[6 + i % 3];
-    return linear;
-}
-
 /* What could not be said is no echo, and counted. */
 static uint32_t take_back(struct caster *c, struct line_block *block, uint32_t at, uint32_t n)
 {
@@ -289,73 +277,6 @@ void caster_nearest(struct caster *c, const struct cast_setup *s, const struct o
         cast_mover(c, s, i, from, set, n);
 }
 
-/* The last pose at or before t_ns, or the first. */
-static uint32_t find_knot(const struct cast_setup *s, int64_t t_ns)
-{
-    uint32_t lo = 0, hi = s->n_knots;
-    while (hi - lo > 1) {
-        uint32_t mid = lo + (hi - lo) / 2;
-        if (s->knot[mid].t_ns <= t_ns)
-            lo = mid;
-        else
-            hi = mid;
-    }
-    return lo;
-}
-
-/* Directions and origins of pulses first .. first + n of a run, from what its socs directions are; stretch by stretch
- * between two poses. */
-void caster_move(struct caster *c, const struct cast_setup *s, int64_t t0_ns, const uint32_t *dt_ns, uint32_t n,
-                 int geo)
-{
-    struct moving_rays *m = &c->moving;
-    for (uint32_t i = 0, k = find_knot(s, t0_ns + dt_ns[0]); i < n; k++) {
-        int last = k + 1 >= s->n_knots, before = s->knot[k].t_ns > t0_ns + (int64_t)dt_ns[i];
-        uint32_t end = i;
-        while (end < n && (last || t0_ns + (int64_t)dt_ns[end] < s->knot[before ? k : k + 1].t_ns))
-            end++;
-        struct kernel_leg leg;
-        kernel_leg(&s->knot[k], &s->knot[last || before ? k : k + 1], t0_ns, &leg);
-        uint32_t part = end - i;
-        const uint32_t *dt = dt_ns + i;
-        kernel_turn_leg(&leg, dt, part, m->sx + i, m->sy + i, m->sz + i, c->dx + i, c->dy + i, c->dz + i);
-        if (geo) kernel_turn_leg(&leg, dt, part, m->rx + i, m->ry + i, m->rz + i, c->ex + i, c->ey + i, c->ez + i);
-        kernel_place_leg(&leg, dt, part, m->px + i, m->py + i, m->pz + i);
-        if (before) k--;
-        i = end;
-    }
-}
-
-/* Where the beams go and begin. Returns whether e is in the CRS already. */
-static int aim(struct caster *c, const struct cast_setup *s, const struct schedule_run *run, const uint32_t *dt_ns,
-               uint32_t at, uint32_t n, struct origins *from)
-{
-    static const double none[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
-    struct moving_rays *m = &c->moving;
-    int geo = s->layout == LINE_GEO, linear = 0;
-    double to_crs[9];
-    kernel_angles(run, at, n, c->mirror_turn, c->pan_turn);
-    *from = (struct origins){.at_m = {s->station_m[0], s->station_m[1], s->station_m[2]}};
-    if (s->n_knots != 0) {
-        if (geo)
-            kernel_directions_read(s, c->mirror_turn, c->pan_turn, none, none, n, m->sx, m->sy, m->sz, m->rx, m->ry,
-                                   m->rz);
-        else
-            kernel_directions(c->mirror_turn, c->pan_turn, none, n, m->sx, m->sy, m->sz);
-        caster_move(c, s, run->t0_ns, dt_ns + at, n, geo);
-        from->px = m->px;
-        from->py = m->py;
-        from->pz = m->pz;
-    } else if (geo) {
-        linear = caster_reading_rotation(s, to_crs);
-        kernel_directions_read(s, c->mirror_turn, c->pan_turn, s->rotation, to_crs, n, c->dx, c->dy, c->dz, c->ex,
-                               c->ey, c->ez);
-    } else {
-        kernel_directions(c->mirror_turn, c->pan_turn, s->rotation, n, c->dx, c->dy, c->dz);
-    }
-    return linear;
-}
-
 /* Each pulse is one ray: its echo, if there is one. */
 static uint32_t single_chunk(struct caster *c, const struct cast_setup *s, int linear, uint64_t pulse0, uint32_t n,
                              struct line_block *block, uint32_t at)
@@ -372,25 +293,16 @@ static uint32_t single_chunk(struct caster *c, const struct cast_setup *s, int l
     return echoes;
 }
 
-/* The central rays of an adaptive beam, with their incidences; nothing moves. */
-static void cast_central(struct caster *c, const struct cast_setup *s, const struct origins *from, uint32_t n)
-{
-    c->steep = beam_steep(c);
-    caster_hits_from(c, s->bvh, from, s->range_max_m, n, c->dx, c->dy, c->dz, c->range_m, c->hit);
-    c->steep = NULL;
-    memcpy(c->label, c->seen, n * sizeof *c->label);
-}
-
 /* dt_ns: of the run's pulses. */
 static uint32_t cast_chunk(struct caster *c, const struct cast_setup *s, const struct schedule_run *run,
                            const uint32_t *dt_ns, uint32_t first, uint32_t n, struct line_block *block, uint32_t *at)
 {
     struct origins from;
     if (c->profile != NULL) c->profile->last = c->profile->now();
-    int linear = aim(c, s, run, dt_ns, first, n, &from);
+    int linear = caster_aim(c, s, run, dt_ns, first, n, &from);
     if (s->beam != NULL) {
-        if (s->beam->mode == BEAM_ADAPTIVE) cast_central(c, s, &from, n);
-        return beam_chunk(c, s, &from, linear, run->pulse0 + first, dt_ns + first, n, block, at);
+        beam_cast(c, s, &from, n);
+        return beam_write_points(c, s, linear, run->pulse0 + first, dt_ns + first, n, block, at);
     }
     const struct ray_set set = {
         .dx = c->dx, .dy = c->dy, .dz = c->dz, .range_m = c->range_m, .label = c->label, .hit = c->hit};

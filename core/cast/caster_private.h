@@ -5,7 +5,8 @@
 #include "core/cast/kernels.h"
 
 /* Pulses worked on at a time: the arrays stay in the second-level cache, the hits' planes are on their way. */
-enum { CHUNK = BVH_CHUNK, CAST_LIST = CHUNK * (1 + CAST_MAX_DEPTH) };
+enum { CHUNK = BVH_CHUNK, CAST_LIST = CHUNK * LINE_MAX_ECHOES, CAST_FOUND = CHUNK * CAST_MAX_DEPTH };
+enum { CAST_NO_PATH = 0xffffffff };
 
 struct mover_rays {
     double dx[CHUNK], dy[CHUNK], dz[CHUNK], range_m[CHUNK];
@@ -43,14 +44,16 @@ struct ray_set {
 struct echo_list {
     uint32_t n;
     uint32_t pulse[CAST_LIST]; /* index in the chunk */
+    uint8_t number[CAST_LIST]; /* among the pulse's, from 0: for random numbers */
     double range_m[CAST_LIST]; /* NaN: not detected */
     double cosine[CAST_LIST];
     double energy[CAST_LIST]; /* share of the pulse's energy that took this way */
+    double rho[CAST_LIST];    /* what comes back of it; the energy itself where surfaces are not modelled */
     uint32_t label[CAST_LIST];
     uint8_t ghost[CAST_LIST];
     /* of detection */
     uint64_t key[CAST_LIST];
-    double rho[CAST_LIST], amplitude[CAST_LIST];
+    double amplitude[CAST_LIST];
     int16_t refl_cdb[CAST_LIST];
     uint8_t echo[CAST_LIST];
     double mirror_turn[CAST_LIST], pan_turn[CAST_LIST];
@@ -60,7 +63,7 @@ struct echo_list {
 /* Rays behind glass or off a mirror: where they begin, where they go, what they met before. */
 struct path_rays {
     uint32_t n;
-    uint32_t pulse[CHUNK];
+    uint32_t ray[CHUNK]; /* of those that they go on from */
     double px[CHUNK], py[CHUNK], pz[CHUNK], dx[CHUNK], dy[CHUNK], dz[CHUNK];
     double length_m[CHUNK]; /* of the way so far */
     double energy[CHUNK];
@@ -68,12 +71,12 @@ struct path_rays {
     double range_m[CHUNK], cosine[CHUNK];
     uint32_t label[CHUNK], hit[CHUNK];
     uint8_t body[CHUNK];
-    /* what was found on the ways, chained per pulse */
+    /* what was found on the ways, chained per ray: first[i], next[..] up to CAST_NO_PATH */
     uint32_t first[CHUNK], last[CHUNK];
-    uint32_t n_found, next[CAST_LIST];
-    uint32_t found_label[CAST_LIST];
-    double found_m[CAST_LIST], found_cosine[CAST_LIST], found_energy[CAST_LIST];
-    uint8_t found_ghost[CAST_LIST];
+    uint32_t n_found, next[CAST_FOUND];
+    uint32_t found_label[CAST_FOUND];
+    double found_m[CAST_FOUND], found_cosine[CAST_FOUND], found_energy[CAST_FOUND];
+    uint8_t found_ghost[CAST_FOUND];
 };
 
 struct beam_work;
@@ -94,13 +97,13 @@ struct caster {
     float *steep;                       /* where 1 / cos^2 of the incidence goes; NULL: not asked for */
     int scattered;                      /* of the rays at hand, neighbours have nothing in common */
     struct beam_work *beam;             /* touched only where pulses have a footprint */
-    /* touched only where detection is modelled: */
-    double cosine[CHUNK];
-    uint8_t body[CHUNK];
-    struct echo_list list;
-    struct path_rays paths; /* touched only where there is glass or a mirror */
     struct cast_counters counters;
     struct cast_profile *profile;
+    /* touched only where detection is modelled: */
+    struct echo_list list;
+    double cosine[CHUNK];
+    uint8_t body[CHUNK];
+    struct path_rays paths; /* touched only where there is glass or a mirror */
 };
 
 /* What has passed since the stage before belongs to this one. */
@@ -120,12 +123,6 @@ void caster_hits_from(struct caster *c, const struct bvh *bvh, const struct orig
 /* What the rays of a chunk meet first, of all there is. */
 void caster_nearest(struct caster *c, const struct cast_setup *s, const struct origins *from, const struct ray_set *set,
                     uint32_t n);
-/* Poses of a moving head: s (and, with geo, r) of c->moving -> d (and e), and the origins p. */
-void caster_move(struct caster *c, const struct cast_setup *s, int64_t t0_ns, const uint32_t *dt_ns, uint32_t n,
-                 int geo);
-/* Socs to where positions go: straight to the CRS where that is a rotation, else to prcs. Returns 1 in the first case.
- */
-int caster_reading_rotation(const struct cast_setup *s, double to_crs[9]);
 /* Positions as a head computes them, from range_m and what its encoders read (c->e, or the turns): entries at .. at + n
  * of the block. Returns how many coordinates did not fit; they are LINE_XYZ_NONE. */
 uint32_t caster_wire(struct caster *c, const struct cast_setup *s, int linear, const double *range_m,
@@ -134,31 +131,54 @@ uint32_t caster_wire(struct caster *c, const struct cast_setup *s, int linear, c
 uint32_t caster_positions(struct caster *c, const struct cast_setup *s, int linear, const double *range_m,
                           struct line_block *block, uint32_t at, uint32_t n);
 
-/* ---- optics.c: the hits of a chunk (c->range_m, label, hit, cosine, body; from, c->d) and what lies behind glass and
- * off mirrors -> c->list. */
-void caster_follow(struct caster *c, const struct cast_setup *s, const struct origins *from, uint32_t n);
+/* ---- aim.c */
+/* Poses of a moving head: s (and, with geo, r) of c->moving -> d (and e), and the origins p. */
+void caster_move(struct caster *c, const struct cast_setup *s, int64_t t0_ns, const uint32_t *dt_ns, uint32_t n,
+                 int geo);
+/* Socs to where positions go: straight to the CRS where that is a rotation, else to prcs. Returns 1 in the first case.
+ */
+int caster_reading_rotation(const struct cast_setup *s, double to_crs[9]);
+/* Where the beams of an ideal head go and begin: pulses at .. at + n of a run. dt_ns: of the run's pulses. Returns
+ * whether c->e, for geo layout, is in the CRS already. */
+int caster_aim(struct caster *c, const struct cast_setup *s, const struct schedule_run *run, const uint32_t *dt_ns,
+               uint32_t at, uint32_t n, struct origins *from);
+/* The same, as the mechanics are; c->mirror_turn and pan_turn become what the encoders say. dt_ns: of these pulses. */
+void caster_aim_bent(struct caster *c, const struct cast_setup *s, const struct schedule_run *run,
+                     const uint32_t *dt_ns, uint32_t at, uint32_t n, struct origins *from);
 
-/* ---- detected.c: c->list (n, pulse, range_m, cosine, energy, label, ghost; each pulse of the chunk has at least one
- * entry, with a range of NaN where it meets nothing) -> entries of the block from `out` on. pulse0: the chunk's first
- * pulse, in the scan; c->mirror_turn and pan_turn: what the encoders said. Returns the number of echoes; *entries: how
- * many were written. */
-uint32_t caster_report(struct caster *c, const struct cast_setup *s, const struct schedule_run *run,
-                       const uint32_t *dt_ns, uint64_t pulse0, struct line_block *block, uint32_t out,
-                       uint32_t *entries);
+/* ---- optics.c */
+/* True for glass and mirrors, where detection has a depth. */
+int caster_goes_on(const struct cast_setup *s, uint32_t label);
+/* What n <= CHUNK rays, which have met `met` with body and cosine, come to behind glass and off mirrors -> chains of
+ * c->paths. */
+void caster_follow_rays(struct caster *c, const struct cast_setup *s, const struct origins *from,
+                        const struct ray_set *met, uint32_t n);
+/* The rays are pulses: their hits and chains -> c->list, without rho. */
+void caster_list_paths(struct caster *c, const struct ray_set *met, uint32_t n);
 
-/* A chunk with everything that cast_detect asks for. first: its first pulse in the run; entries from *at on. dt_ns:
- * times of the chunk's pulses. Returns the number of echoes. */
+/* ---- detected.c: a chunk with everything that cast_detect asks for. first: its first pulse in the run; entries from
+ * *at on. dt_ns: times of the chunk's pulses. Returns the number of echoes. */
 uint32_t caster_detected(struct caster *c, const struct cast_setup *s, const struct schedule_run *run,
                          const uint32_t *dt_ns, uint32_t first, uint32_t n, struct line_block *block, uint32_t *at);
+/* A bare pane or mirror sends nothing back: no echo, whether there is a signal model or not. */
+int caster_is_bare(const struct cast_setup *s, uint32_t label, double rho);
+
+/* ---- report.c: what was detected (c->list; each pulse of the chunk has at least one entry, with a range of NaN where
+ * it is no echo) -> entries of the block from `out` on. c->mirror_turn and pan_turn: what the encoders said. Returns
+ * the number of echoes; *entries: how many were written. */
+uint32_t caster_report(struct caster *c, const struct cast_setup *s, const struct schedule_run *run,
+                       const uint32_t *dt_ns, struct line_block *block, uint32_t out, uint32_t *entries);
 
 /* ---- beam.c */
 int beam_work_create(struct beam_work **out, struct sh_err *err);
 void beam_work_free(struct beam_work *work);
-/* Where the incidences of central rays are to go. */
-float *beam_steep(struct caster *c);
-/* n pulses are aimed, and (adaptive) their central rays have been cast: finds their echoes and writes them into the
- * block from entry *at on. dt_ns: of these pulses. Returns the number of echoes. */
-uint32_t beam_chunk(struct caster *c, const struct cast_setup *s, const struct origins *from, int linear,
-                    uint64_t pulse0, const uint32_t *dt_ns, uint32_t n, struct line_block *block, uint32_t *at);
+/* n pulses are aimed: casts them, with sub-rays where they are needed. */
+void beam_cast(struct caster *c, const struct cast_setup *s, const struct origins *from, uint32_t n);
+/* ---- what was cast, beam_points.c: into the block from entry *at on, where there is no cast_detect. dt_ns: of these
+ * pulses. Returns the number of echoes. */
+uint32_t beam_write_points(struct caster *c, const struct cast_setup *s, int linear, uint64_t pulse0,
+                           const uint32_t *dt_ns, uint32_t n, struct line_block *block, uint32_t *at);
+/* ---- beam_list.c: -> c->list, with rho. */
+void beam_list(struct caster *c, const struct cast_setup *s, uint32_t n);
 
 #endif

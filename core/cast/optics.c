@@ -1,14 +1,13 @@
-/* Behind glass and off mirrors: only pulses that meet such a surface are cast again, together.
+/* Behind glass and off mirrors: only rays that meet such a surface are cast again, together.
  *
- * Packets of such rays hang on the pulse number alone, as those of the pulses do: each SCHEDULE_PACKET pulses have
- * packets of their own, filled up with copies of their last ray, whose pulse is NONE. */
+ * Packets of such rays hang on the packets of those that they go on from, and so on the pulse number: each
+ * SCHEDULE_PACKET rays have packets of their own, filled up with copies of their last ray, whose number is
+ * CAST_NO_PATH. */
 #include <math.h>
 #include <string.h>
 
 #include "core/cast/caster_private.h"
 #include "core/vec3.h"
-
-enum { NONE = 0xffffffff };
 
 static const struct surface *surface_of(const struct cast_setup *s, uint32_t label)
 {
@@ -16,7 +15,7 @@ static const struct surface *surface_of(const struct cast_setup *s, uint32_t lab
     return &t->surface[label < t->n ? label : t->n];
 }
 
-static int goes_on(const struct cast_setup *s, uint32_t label)
+int caster_goes_on(const struct cast_setup *s, uint32_t label)
 {
     const struct surface *surface = surface_of(s, label);
     return surface->glass > 0.0 || surface->mirror > 0.0;
@@ -73,7 +72,7 @@ static void set_out(const struct cast_setup *s, struct path_rays *p, uint32_t k)
 
 static void copy_ray(struct path_rays *p, uint32_t to, uint32_t from)
 {
-    p->pulse[to] = p->pulse[from];
+    p->ray[to] = p->ray[from];
     p->px[to] = p->px[from];
     p->py[to] = p->py[from];
     p->pz[to] = p->pz[from];
@@ -96,60 +95,62 @@ static uint32_t fill_up(struct path_rays *p, uint32_t n)
     uint32_t end = (n + SCHEDULE_PACKET - 1) / SCHEDULE_PACKET * SCHEDULE_PACKET;
     for (uint32_t k = n; k < end; k++) {
         copy_ray(p, k, n - 1);
-        p->pulse[k] = NONE;
+        p->ray[k] = CAST_NO_PATH;
     }
     return end;
 }
 
-/* The pulses whose first hit lets them go on. */
-static void begin(const struct caster *c, const struct cast_setup *s, const struct origins *from, uint32_t n,
+/* The rays whose first hit lets them go on. */
+static void begin(const struct cast_setup *s, const struct origins *from, const struct ray_set *set, uint32_t n,
                   struct path_rays *p)
 {
     p->n = p->n_found = 0;
     for (uint32_t i = 0; i < n; i++) {
         if (i % SCHEDULE_PACKET == 0) p->n = fill_up(p, p->n);
-        p->first[i] = NONE;
-        if (isnan(c->range_m[i]) || !goes_on(s, c->label[i])) continue;
+        p->first[i] = CAST_NO_PATH;
+        if (isnan(set->range_m[i]) || !caster_goes_on(s, set->label[i])) continue;
         uint32_t k = p->n++;
-        p->pulse[k] = i;
+        p->ray[k] = i;
         p->px[k] = from->px != NULL ? from->px[i] : from->at_m[0];
         p->py[k] = from->px != NULL ? from->py[i] : from->at_m[1];
         p->pz[k] = from->px != NULL ? from->pz[i] : from->at_m[2];
-        p->dx[k] = c->dx[i];
-        p->dy[k] = c->dy[i];
-        p->dz[k] = c->dz[i];
+        p->dx[k] = set->dx[i];
+        p->dy[k] = set->dy[i];
+        p->dz[k] = set->dz[i];
         p->length_m[k] = 0.0;
         p->energy[k] = 1.0;
         p->ghost[k] = 0;
-        p->range_m[k] = c->range_m[i];
-        p->cosine[k] = c->cosine[i];
-        p->label[k] = c->label[i];
-        p->hit[k] = c->hit[i];
-        p->body[k] = c->body[i];
+        p->range_m[k] = set->range_m[i];
+        p->cosine[k] = set->cosine[i];
+        p->label[k] = set->label[i];
+        p->hit[k] = set->hit[i];
+        p->body[k] = set->body[i];
     }
     p->n = fill_up(p, p->n);
 }
 
-/* What ray k met, at the end of its pulse's chain. */
+/* What ray k met, at the end of the first ray's chain. */
 static void keep(struct path_rays *p, uint32_t k)
 {
-    uint32_t at = p->n_found++, pulse = p->pulse[k];
-    p->next[at] = NONE;
+    uint32_t at = p->n_found++, ray = p->ray[k];
+    p->next[at] = CAST_NO_PATH;
     p->found_m[at] = p->length_m[k] + p->range_m[k];
     p->found_cosine[at] = p->cosine[k];
     p->found_energy[at] = p->energy[k];
     p->found_label[at] = p->label[k];
     p->found_ghost[at] = p->ghost[k];
-    if (p->first[pulse] == NONE)
-        p->first[pulse] = at;
+    if (p->first[ray] == CAST_NO_PATH)
+        p->first[ray] = at;
     else
-        p->next[p->last[pulse]] = at;
-    p->last[pulse] = at;
+        p->next[p->last[ray]] = at;
+    p->last[ray] = at;
 }
 
-static void follow_paths(struct caster *c, const struct cast_setup *s)
+void caster_follow_rays(struct caster *c, const struct cast_setup *s, const struct origins *first,
+                        const struct ray_set *met, uint32_t n)
 {
     struct path_rays *p = &c->paths;
+    begin(s, first, met, n, p);
     for (uint32_t depth = 0; depth < s->detect->depth && p->n > 0; depth++) {
         uint32_t on = 0;
         for (uint32_t k = 0; k < p->n; k++)
@@ -166,9 +167,9 @@ static void follow_paths(struct caster *c, const struct cast_setup *s)
         caster_nearest(c, s, &from, &set, p->n);
         for (uint32_t k = 0; k < p->n; k++) {
             if (k % SCHEDULE_PACKET == 0) on = fill_up(p, on);
-            if (p->pulse[k] == NONE || isnan(p->range_m[k])) continue;
+            if (p->ray[k] == CAST_NO_PATH || isnan(p->range_m[k])) continue;
             keep(p, k);
-            if (goes_on(s, p->label[k])) copy_ray(p, on++, k);
+            if (caster_goes_on(s, p->label[k])) copy_ray(p, on++, k);
         }
         on = fill_up(p, on);
         p->n = on;
@@ -179,6 +180,7 @@ static void append(struct echo_list *l, uint32_t pulse, double range_m, double c
                    uint8_t ghost)
 {
     uint32_t at = l->n++;
+    l->number[at] = at > 0 && l->pulse[at - 1] == pulse ? (uint8_t)(l->number[at - 1] + 1) : 0;
     l->pulse[at] = pulse;
     l->range_m[at] = range_m;
     l->cosine[at] = cosine;
@@ -187,16 +189,14 @@ static void append(struct echo_list *l, uint32_t pulse, double range_m, double c
     l->ghost[at] = ghost;
 }
 
-void caster_follow(struct caster *c, const struct cast_setup *s, const struct origins *from, uint32_t n)
+void caster_list_paths(struct caster *c, const struct ray_set *met, uint32_t n)
 {
-    struct path_rays *p = &c->paths;
+    const struct path_rays *p = &c->paths;
     struct echo_list *l = &c->list;
-    begin(c, s, from, n, p);
-    follow_paths(c, s);
     l->n = 0;
     for (uint32_t i = 0; i < n; i++) {
-        append(l, i, c->range_m[i], c->cosine[i], 1.0, c->label[i], 0);
-        for (uint32_t k = p->first[i]; k != NONE; k = p->next[k])
+        append(l, i, met->range_m[i], met->cosine[i], 1.0, met->label[i], 0);
+        for (uint32_t k = p->first[i]; k != CAST_NO_PATH; k = p->next[k])
             append(l, i, p->found_m[k], p->found_cosine[k], p->found_energy[k], p->found_label[k], p->found_ghost[k]);
     }
 }

@@ -146,7 +146,8 @@ static struct scene *window(void)
     return scene;
 }
 
-/* Three echoes: both sides of the pane, and the wall, whose light passes four of them. Only the middle of the line. */
+/* Three echoes: both sides of the pane, and the wall, whose light passes four of them. Only the middle of the line. Of
+ * more than are asked for, the weakest is left out: the pane's far side, then its near one. */
 static void a_pane_and_what_is_behind_it(void **state)
 {
     (void)state;
@@ -172,10 +173,11 @@ static void a_pane_and_what_is_behind_it(void **state)
             assert_int_equal(o.rig->block.n_pulses, 1000);
             for (uint32_t i = 0; i < 1000 * most; i++) {
                 static const double y[] = {2.0, 2.004, 5.0}, rho[] = {0.05, 0.05 * 0.81, 0.6 * 0.6561};
-                uint32_t pulse = i / most, number = i % most;
+                static const uint32_t sent[3][3] = {{2}, {0, 2}, {0, 1, 2}};
+                uint32_t pulse = i / most, number = sent[most - 1][i % most];
                 long double d[3];
                 direction(o.rig, &line, 10 + pulse, d);
-                assert_int_equal(o.rig->block.echo[i], (number + 1) | most << 4);
+                assert_int_equal(o.rig->block.echo[i], (i % most + 1) | most << 4);
                 assert_int_equal(o.rig->block.label[i], number == 2);
                 near_range(o.rig, i, ((long double)y[number] - (long double)STATION[1]) / d[1]);
                 assert_true(o.rig->block.t0_ns + o.rig->block.dt_ns[i] == schedule_time_ns(&o.rig->segment, k + pulse));
