@@ -74,6 +74,8 @@ static const struct line_block *cast(struct side *side, uint32_t station, const 
     struct cast_setup setup;
     struct cast_detect detect;
     site_cast_setup(side->site, station, &setup);
+    const struct plan_methods *methods = &side->site->plan.methods;
+    assert_true(methods->beam == BEAM_SINGLE ? setup.beam == NULL : setup.beam->mode == methods->beam);
     setup.layout = layout;
     setup.noise_on = 0;
     if (layout == LINE_POLAR) setup.range_scale_m = 1e-6;
