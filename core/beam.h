@@ -26,7 +26,7 @@
  * One ray for all of the footprint. Where it lies on one plane at incidence i, the mean over it is not the range of its
  * centre: a sub-ray at (rho, phi) meets the plane at (R - rho D/2 tan i cos phi) / (1 - rho s tan i sin phi), s = theta
  * / 2, times sqrt(1 + rho^2 s^2) along itself. The mean over phi is R sqrt((1 + rho^2 s^2) / (1 - rho^2 s^2 tan^2 i)).
- * Over the footprint, with t = rho^2 distributed as exp(-2 t) on 0 .. 1, mean t = 0.343 and mean t^2 = 0.187:
+ * Over the footprint, with t = rho^2 distributed as exp(-2 t) on 0 .. 1, mean t = 0.343, mean t^2 = 0.187:
  * R (1 + 0.343 s^2 / (2 cos^2 i) + ...), 0.14 mm at 800 m, 80 deg and 0.35 mrad. */
 #ifndef CORE_BEAM_H
 #define CORE_BEAM_H
@@ -62,8 +62,11 @@ struct beam {
 /* Lengths and angles as above; the pulse width in seconds. */
 void beam_init(struct beam *beam, double exit_m, double divergence_rad, double pulse_width_s);
 double beam_radius(const struct beam *beam, double range_m);
-/* Mean over a footprint on one plane, less the range of its centre. cosine: of the incidence, > 0. */
+/* Mean over a footprint on one plane, less the range of its centre. cosine: of the incidence, > 0. Beyond s / cos i =
+ * 1/2, where the plane is within a footprint's angle of the beam, that of 1/2. */
 double beam_plane_excess(const struct beam *beam, double range_m, double cosine);
+/* The same as a polynomial: range (term[0] x + term[1] x^2 + term[2] x^3), x = 1 / cos^2 of the incidence. */
+void beam_plane_series(const struct beam *beam, double term[3]);
 /* Standard deviation of the ranges there. */
 double beam_plane_sigma(const struct beam *beam, double range_m, double cosine);
 
@@ -141,9 +144,10 @@ struct beam_outlines_info {
 };
 void beam_outlines_get_info(const struct beam_outlines *outlines, struct beam_outlines_info *info);
 
-/* Pulses whose footprint may reach an outline up to limit_m: their indices. Returns how many. */
-uint32_t beam_near_outlines(const struct beam_outlines *outlines, const float *dx, const float *dy, const float *dz,
-                            const float *limit_m, uint32_t n, uint32_t *pulse);
+/* Cells of n unit directions (left alone where there are no outlines at all); and the pulses whose footprint may reach
+ * one, at whatever range: their indices. Returns how many. */
+uint32_t beam_near_outlines(const struct beam_outlines *outlines, const struct beam *beam, const float *dx,
+                            const float *dy, const float *dz, uint32_t n, uint32_t *cell, uint32_t *pulse);
 
 enum { BEAM_MAX_LINES = 12, BEAM_MAX_PARTS = 64 };
 
@@ -151,11 +155,11 @@ enum { BEAM_MAX_LINES = 12, BEAM_MAX_PARTS = 64 };
 struct beam_line {
     double n[2], h;
 };
-/* The outlines that cross the footprint of a pulse nearer than limit_m. Returns their number, up to BEAM_MAX_LINES, or
- * BEAM_MAX_LINES + 1: more than that. *next_m: from which range on there may be more (INFINITY: none, or nothing
- * crosses it up to limit_m). */
-uint32_t beam_find_lines(const struct beam_outlines *outlines, const struct beam *beam, const double dir[3],
-                         double limit_m, struct beam_line *line, double *next_m);
+/* The outlines that cross the footprint of a pulse nearer than limit_m; cell: its direction's. Returns their number, up
+ * to BEAM_MAX_LINES, or BEAM_MAX_LINES + 1: more than that. *next_m: from which range on there may be more (INFINITY:
+ * none, or nothing crosses it up to limit_m). */
+uint32_t beam_find_lines(const struct beam_outlines *outlines, const struct beam *beam, uint32_t cell,
+                         const double dir[3], double limit_m, struct beam_line *line, double *next_m);
 
 /* The parts that lines cut the footprint into. Each lies on one surface; convex, so that its centre of energy is in
  * it. */
@@ -163,7 +167,8 @@ struct beam_parts {
     uint32_t n, centre; /* the part with the centre of the disc */
     double energy[BEAM_MAX_PARTS], x[BEAM_MAX_PARTS], y[BEAM_MAX_PARTS];
 };
-/* Returns 0, or 1 where there are more than BEAM_MAX_PARTS. Parts of less than 0.05 % of the energy are left out. */
+/* fine: of BEAM_FINE_RINGS. Returns 0, or 1 where there are more than BEAM_MAX_PARTS. Parts of less than 0.05 % of the
+ * energy are left out. */
 int beam_cut(const struct beam *beam, const struct beam_pattern *fine, const struct beam_line *line, uint32_t n,
              struct beam_parts *parts);
 

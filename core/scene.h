@@ -29,6 +29,7 @@ struct scene_mesh_spec {
     enum scene_up up;
     double scale;       /* metres per unit of the file, > 0 */
     double offset_m[3]; /* added after axes and scale */
+    int textures;       /* keep texture coordinates, and the names of textures: of .obj, and of what Assimp reads */
 };
 
 /* One surface label: an object of the file with one material.
@@ -39,6 +40,14 @@ struct scene_surface {
     char material[SCENE_NAME_LEN];
     float colour[3]; /* diffuse, sRGB, 0..1: of glTF, FBX, Collada and IFC, and of OBJ with an mtllib (Kd) */
     int has_colour;
+    uint16_t texture; /* 1 + its number in the scene's textures; 0: none */
+};
+
+/* An image that tells the diffuse colour all over a surface; not looked into here. */
+struct scene_texture {
+    char *file;     /* as found beside the mesh's file */
+    uint8_t *bytes; /* of one that lies within it, as it would be in a file; else NULL */
+    size_t n_bytes;
 };
 
 /* What the import left out or changed; each kind that is not 0 is also reported as one warning per file. */
@@ -55,7 +64,11 @@ struct scene {
     uint32_t (*triangle)[3];       /* [n_triangles] indices into vertex_m */
     uint16_t *label;               /* [n_triangles] index into surface */
     struct scene_surface *surface; /* [n_surfaces] */
-    double min_m[3], max_m[3];     /* bounds of the used vertices, prcs */
+    /* Only where a spec asks for textures and there are some; else NULL, 0. */
+    float (*uv)[3][2];             /* [n_triangles] of the corners; the image's lower left corner is 0, 0; NaN: none */
+    struct scene_texture *texture; /* [n_textures] */
+    uint32_t n_textures;
+    double min_m[3], max_m[3]; /* bounds of the used vertices, prcs */
     struct scene_counts counts;
 };
 

@@ -15,7 +15,8 @@
  * A mirror sends a share on by the law of reflection.
  *
  * Where the mesh has a colour, the reflectance is taken from it: the luminance of linear sRGB (ITU-R BT.709: 0.2126 R +
- * 0.7152 G + 0.0722 B). That is an assumption: what is light to the eye need not be at the laser's wavelength. */
+ * 0.7152 G + 0.0722 B). That is an assumption: what is light to the eye need not be at the laser's wavelength. Where it
+ * has a diffuse texture, likewise from the texel at the hit, times the colour, channel by channel. */
 #ifndef CORE_SURFACE_H
 #define CORE_SURFACE_H
 
@@ -38,12 +39,14 @@ struct surface_rule {
 };
 
 /* Surfaces by label. Entry n stands for no surface at all: nothing comes back. */
+struct surface_texture;
 struct surface_table {
     uint32_t n;
     int has_lobes;  /* some surface is specular or retro-reflecting */
     int has_optics; /* some surface is of glass or a mirror */
     int has_mirror;
-    struct surface *surface; /* [n + 1] */
+    struct surface *surface;          /* [n + 1] */
+    struct surface_texture **texture; /* [n + 1], NULL where there is none; NULL: none has */
 };
 
 int surface_table_alloc(uint32_t n, struct surface_table *table, struct sh_err *err);
@@ -56,6 +59,19 @@ int surface_table_set(struct surface_table *table, uint32_t label, const struct 
 
 /* Labels of equal surfaces get the same number: kind[n], of the caller. */
 int surface_kinds(const struct surface_table *table, uint16_t *kind, struct sh_err *err);
+
+/* Entry `label` gets its reflectance from a texture: a PNG, repeated in both directions, its gamma taken for that of
+ * sRGB. SH_EINPUT, naming the file: can't be read. Then, and of glass and mirrors, the entry stays as it is. */
+int surface_table_texture(struct surface_table *table, uint32_t label, const struct scene_surface *named,
+                          const struct scene_texture *texture, struct sh_err *err);
+
+/* Labels of hits hold the surface in their low 16 bits. The high ones, where a texture tells the reflectance there, are
+ * 1 + 65534 times that, else 0. uv: of the hit, finite. Only for surfaces with a texture. */
+uint32_t surface_texel(const struct surface_table *table, uint32_t label, const double uv[2]);
+static inline uint32_t surface_of_label(uint32_t label)
+{
+    return label & 0xffff;
+}
 
 /* rho(i) of n hits; label beyond the table: 0. */
 void surface_return(const struct surface_table *table, uint32_t n, const uint32_t *label, const double *cos_incidence,

@@ -43,6 +43,8 @@ static const char HELP[] =
     "with an end had theirs (not with --listen), frames or pulses were lost on the way, or the head was away within a\n"
     "scan. What came is kept in FILE all the same.\n";
 
+enum { WAIT_MS = 1000 };
+
 enum {
     OPT_STATION = 256,
     OPT_FRAMES,
@@ -340,22 +342,27 @@ static int record_config(struct record *r, struct sh_err *err)
     return rc == SH_OK ? CMD_OK : cmd_fail(err);
 }
 
-/* Tries again until the time is over: a device that is plugged in now may get its permissions a moment later. */
+/* Waits for the source in parts: a signal just before one of them is seen after it. */
 static int open_stream(const struct record *r, struct scanhead **sh, char *why, size_t len)
 {
     const int64_t end_ns = clock_now_ns() + (int64_t)(1e9 * r->wait_s);
     for (;;) {
-        int rc = scanhead_open(r->source, sh, why, len);
-        int may_come = rc != SCANHEAD_OK && (rc != SCANHEAD_EINPUT || strncmp(r->source, "tty:", 4) == 0);
+        const int64_t left_ms = (end_ns - clock_now_ns()) / 1000000;
+        int rc = scanhead_open_within(r->source,
+                                      left_ms < 0         ? 0
+                                      : left_ms < WAIT_MS ? (int)left_ms
+                                                          : WAIT_MS,
+                                      sh, why, len);
+        int may_come =
+            rc != SCANHEAD_OK && rc != SCANHEAD_ENOMEM && (rc != SCANHEAD_EINPUT || strncmp(r->source, "tty:", 4) == 0);
         if (!may_come || clock_now_ns() >= end_ns || cmd_interrupted) return rc;
-        clock_sleep_until_ns(clock_now_ns() + 100000000);
     }
 }
 
 static int record_stream(struct record *r, struct sh_err *err)
 {
     struct scanhead *sh = NULL;
-    char why[256];
+    char why[512];
     if (r->sets.n != 0) return cmd_usage("record", "--set, --crs and --threads need a CONFIG as SOURCE");
     int rc = open_stream(r, &sh, why, sizeof why);
     if (rc != SCANHEAD_OK) {

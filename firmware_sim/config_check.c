@@ -164,6 +164,8 @@ static int check_usb_link(const struct cfg_reader *rd, const struct config *cfg,
                             "a device that is attached here listens nowhere; allowed without port and address");
     if (link->backend == USB_BACKEND_USBREDIR && link->path[0] == '\0' && !has_port)
         return cfg_fail_key(rd, "links[].backend", i, "usbredir needs a path or a port; allowed with one of them");
+    if (link->backend == USB_BACKEND_USBREDIR && link->attach && link->path[0] == '\0' && link->port == 0)
+        return cfg_fail_key(rd, "links[].port", i, "0, and the head is to connect to it; allowed 1 to 65535");
     if (link->backend == USB_BACKEND_USBIP && !has_port) link->port = USB_BACKEND_USBIP_PORT;
     if (link->serial[0] == '\0') snprintf(link->serial, sizeof link->serial, "%s", cfg->serial);
     return SH_OK;

@@ -295,6 +295,13 @@ static void fail_link(struct pump *pump, const char *why)
         sh_fail(&pump->loop->link_error, SH_EIO, "link %s: %s; it is cut short", endpoint, why);
 }
 
+static void tell_notice(struct pump *pump, const char *text)
+{
+    char endpoint[300];
+    pump->ops->endpoint(pump->link, endpoint, sizeof endpoint);
+    sh_warn(pump->loop->options.report, "link %s: %s", endpoint, text);
+}
+
 static void handle(struct pump *pump, const struct link_event *event)
 {
     struct session *s = &pump->session[event->session];
@@ -315,6 +322,9 @@ static void handle(struct pump *pump, const struct link_event *event)
     case LINK_REFUSED:
         device_report(pump->loop->device, CMD_E_REFUSED, event->peer);
         loop_poke(pump->loop);
+        break;
+    case LINK_NOTICE:
+        tell_notice(pump, event->peer);
         break;
     case LINK_WRITABLE:
     case LINK_WOKEN:

@@ -8,7 +8,7 @@
 #include "firmware_sim/clock.h"
 #include "firmware_sim/head.h"
 
-enum { REPLY_MS = 5000, NEXT_MS = 250, END_MS = 5000, BOOT_MS = 30000 };
+enum { REPLY_MS = 5000, NEXT_MS = 250, END_MS = 5000, BOOT_MS = 30000, REPLUG_MS = 1000 };
 
 struct recording {
     struct scanhead *sh;
@@ -96,7 +96,7 @@ static int replug(struct recording *r, struct sh_err *err)
     int rc, scanning = 0;
     sh_warn(r->o->report, "%s; waiting for it", scanhead_error(r->sh));
     do {
-        rc = scanhead_reattach(r->sh, NEXT_MS);
+        rc = scanhead_reattach(r->sh, REPLUG_MS);
         if (rc == SCANHEAD_OK) rc = scanhead_command(r->sh, "HEAD:STAT?", reply, sizeof reply, REPLY_MS);
     } while (rc != SCANHEAD_OK && clock_now_ns() < end_ns && !(r->o->interrupted != NULL && r->o->interrupted()));
     if (rc != SCANHEAD_OK) return sh_fail(err, SH_ELOST, "the head did not come back: %s", scanhead_error(r->sh));

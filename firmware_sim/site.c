@@ -17,9 +17,10 @@ static int is_moving(const struct config_mesh *mesh)
     return mesh->turn_deg_s != 0.0 || mesh->move_m_s[0] != 0.0 || mesh->move_m_s[1] != 0.0 || mesh->move_m_s[2] != 0.0;
 }
 
-static struct scene_mesh_spec mesh_spec(const struct config_mesh *mesh)
+static struct scene_mesh_spec mesh_spec(const struct config *cfg, const struct config_mesh *mesh)
 {
-    struct scene_mesh_spec spec = {.file = mesh->file, .up = mesh->up, .scale = mesh->scale};
+    struct scene_mesh_spec spec = {
+        .file = mesh->file, .up = mesh->up, .scale = mesh->scale, .textures = cfg->signal.on};
     memcpy(spec.offset_m, mesh->offset_m, sizeof spec.offset_m);
     return spec;
 }
@@ -32,7 +33,7 @@ static int add_mover(struct site *site, const struct config_mesh *mesh, const st
     if (site->n_movers == CAST_MAX_MOVERS)
         return sh_fail(err, SH_EINPUT, "%s: scene.meshes: too many that move; at most %d", cfg->file, CAST_MAX_MOVERS);
     struct site_mover *m = &site->mover[site->n_movers++];
-    struct scene_mesh_spec spec = mesh_spec(mesh);
+    struct scene_mesh_spec spec = mesh_spec(cfg, mesh);
     double half2 = 0.0;
     m->mesh = mesh;
     int rc = scene_load(&spec, 1, cfg->scene_tolerance_m, report, &m->scene, err);
@@ -57,7 +58,7 @@ static int load_scene(struct site *site, const struct sh_report *report, struct 
     struct scene_mesh_spec spec[CONFIG_MAX_MESHES];
     size_t n = 0;
     for (uint32_t i = 0; i < cfg->n_meshes; i++)
-        if (!is_moving(&cfg->mesh[i])) spec[n++] = mesh_spec(&cfg->mesh[i]);
+        if (!is_moving(&cfg->mesh[i])) spec[n++] = mesh_spec(cfg, &cfg->mesh[i]);
     if (n == 0)
         return sh_fail(err, SH_EINPUT, "%s: scene.meshes: all of them move; at least one has to stand still",
                        cfg->file);

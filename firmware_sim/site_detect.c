@@ -55,18 +55,58 @@ static void set_up_instrument(const struct config *cfg, struct instrument *out)
     out->pan_sigma_rad = cfg->profile.pan_sigma_deg * DEG_RAD;
 }
 
+/* NULL: none. */
+static const struct scene_texture *texture_of(const struct site *site, uint32_t label)
+{
+    const struct scene *scene = site->scene;
+    for (uint32_t i = 0; label >= scene->n_surfaces; i++) {
+        label -= scene->n_surfaces;
+        scene = site->mover[i].scene;
+    }
+    uint32_t number = scene->surface[label].texture;
+    return number != 0 ? &scene->texture[number - 1] : NULL;
+}
+
+/* Those whose reflectance no rule says. What can't be read is told. */
+static int set_up_textures(struct site *site, const uint8_t *said, const struct sh_report *report, struct sh_err *err)
+{
+    struct sh_err why, first = {0};
+    uint32_t failed = 0;
+    int rc = SH_OK;
+    for (uint32_t i = 0; i < site->n_surfaces && rc == SH_OK; i++) {
+        const struct scene_texture *texture = said[i] ? NULL : texture_of(site, i);
+        if (texture == NULL) continue;
+        rc = surface_table_texture(&site->detect.surfaces, i, site_surface(site, i), texture, &why);
+        if (rc != SH_EINPUT) continue;
+        if (failed++ == 0) first = why;
+        rc = SH_OK;
+    }
+    if (rc != SH_OK) return sh_fail(err, rc, "%s", why.text);
+    if (failed > 0)
+        sh_warn(report,
+                "%s: %u surfaces have a texture that is not used: their colour counts, or signal.reflectance; the "
+                "first: %s",
+                site->cfg->file, failed, first.text);
+    return rc;
+}
+
 static int set_up_surfaces(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
     uint32_t fits[CONFIG_MAX_SURFACES] = {0}, unknown = 0;
+    uint8_t *is_said = calloc(site->n_surfaces, 1);
     int rc = surface_table_alloc(site->n_surfaces, &site->detect.surfaces, err);
+    if (rc == SH_OK && is_said == NULL) rc = sh_fail(err, SH_ENOMEM, "no memory for %u surfaces", site->n_surfaces);
     for (uint32_t i = 0; i < site->n_surfaces && rc == SH_OK; i++) {
         int rule = surface_table_set(&site->detect.surfaces, i, site_surface(site, i), cfg->surface, cfg->n_surfaces,
                                      cfg->signal.reflectance);
         if (rule >= 0) fits[rule]++;
         int said = rule >= 0 && !isnan(cfg->surface[rule].surface.reflectance);
-        unknown += !said && !site_surface(site, i)->has_colour;
+        is_said[i] = (uint8_t)said;
+        unknown += !said && !site_surface(site, i)->has_colour && site_surface(site, i)->texture == 0;
     }
+    if (rc == SH_OK && cfg->signal.on) rc = set_up_textures(site, is_said, report, err);
+    free(is_said);
     if (rc == SH_OK && cfg->signal.on && unknown > 0)
         sh_warn(report,
                 "%s: of %u of %u surfaces neither the mesh's colour nor surfaces tells the reflectance: %g is taken "

@@ -142,6 +142,6 @@ void site_plan_text(const struct site *site, char *text, size_t room)
 {
     const struct site_plan *plan = &site->plan;
     int polar = site->cfg->layout == LINE_POLAR;
-    snprintf(text, room, "order %s, beam %s, optics %s, georef %s", plan->order.method, plan->beam.method,
+    snprintf(text, room, "order %s; beam %s; optics %s; georef %s", plan->order.method, plan->beam.method,
              plan->optics.method, polar ? "none" : site->station[0].plan.method);
 }

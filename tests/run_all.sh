@@ -1,24 +1,26 @@
 #!/bin/sh
 # Runs the tests that make has built: sh tests/run_all.sh BUILD [unit|wire|accuracy|stability|guest]. Without a part all of them,
 # and the unit tests once more with the sanitizers in. Ends with one line of counts.
+# What computes runs as many at a time as there are processors; what works in real time has the machine to itself.
 set -eu
 build=$1
 part=${2:-}
-set --
-for folder in unit accuracy stability wire; do
-    [ -z "$part" ] || [ "$part" = $folder ] || continue
-    [ $folder != unit ] || set -- "$@" tests/check_includes.sh
-    for source in tests/$folder/test_*.c; do
-        [ ! -e "$source" ] || set -- "$@" "$build/test/${source%.c}"
+
+# programs FOLDER [BUILD]: the test programs of a folder, if its part is wanted.
+programs() {
+    [ -z "$part" ] || [ "$part" = "$1" ] || return 0
+    for source in tests/"$1"/test_*.c; do
+        [ ! -e "$source" ] || echo "${2:-$build/test}/${source%.c}"
     done
-done
+}
+
+set -- $(programs accuracy) $(programs stability)
+if [ -z "$part" ] || [ "$part" = unit ]; then set -- "$@" tests/check_includes.sh $(programs unit); fi
+if [ -z "$part" ]; then set -- "$@" $(programs unit "$build/asan"); fi
+if [ -z "$part" ] || [ "$part" = wire ]; then set -- "$@" -- tests/check_install.sh $(programs wire); fi
 if [ -z "$part" ] || [ "$part" = guest ]; then
     export BUILD="$build"
     set -- "$@" tests/guest/guest.sh # it takes the programs of tests/guest with it
 fi
-if [ -z "$part" ]; then
-    for source in tests/unit/test_*.c; do
-        set -- "$@" "$build/asan/${source%.c}"
-    done
-fi
-exec bash tests/run_tap.sh "$@"
+if [ "$1" = -- ]; then shift; fi
+exec bash tests/run_tap.sh -j "$([ "$part" = wire ] && echo 1 || getconf _NPROCESSORS_ONLN)" "$@"

@@ -1,32 +1,35 @@
 #!/bin/bash
-# Runs test programs that print TAP (cmocka programs, scripts) one after the other and adds up.
+# Runs test programs that print TAP (cmocka programs, scripts) and adds up.
 #
-#   run_tap.sh [-t SECONDS] PROGRAM...        SECONDS per program; default $TAP_LIMIT_S, or 300
+#   run_tap.sh [-t SECONDS] [-j N] PROGRAM... [-- PROGRAM...]
 #
-# One line per program, and the tables of the stability and accuracy programs; of one that fails all it printed but its passed
-# tests. The reasons of skips follow, and
+# SECONDS per program; default $TAP_LIMIT_S, or 300. N programs at a time, default 1; those after `--` have the machine to themselves,
+# one after the other.
+# One line per program, in the order given, and the tables of the stability and accuracy programs; of one that fails all it printed
+# but its passed tests. The reasons of skips follow, and
 # the last line is `N passed, N failed, N skipped`. Exit status 1 when anything failed, 2 for wrong usage.
 # What counts as a failure beside `not ok`: fewer results than planned; a status other than 0, a signal or no end
 # within the limit, where no failure says so already; and a program without any result.
 set -u
 
-limit_s=${TAP_LIMIT_S:-300}
-while getopts t: option; do
+limit_s=${TAP_LIMIT_S:-300} at_a_time=1
+while getopts t:j: option; do
     case $option in
     t) limit_s=$OPTARG ;;
+    j) at_a_time=$OPTARG ;;
     *) exit 2 ;;
     esac
 done
 shift $((OPTIND - 1))
-if [ $# -eq 0 ] || ! [[ $limit_s =~ ^[1-9][0-9]*$ ]]; then
-    echo "usage: $0 [-t SECONDS] PROGRAM..." >&2
+if [ $# -eq 0 ] || ! [[ $limit_s =~ ^[1-9][0-9]*$ && $at_a_time =~ ^[1-9][0-9]*$ ]]; then
+    echo "usage: $0 [-t SECONDS] [-j N] PROGRAM... [-- PROGRAM...]" >&2
     exit 2
 fi
 
 work=$(mktemp -d) || exit 1
-running=
+declare -A running=() # process: number of its program
 # timeout has made a process group of the program and passes the signal on to all of it.
-trap '[ -n "$running" ] && kill "$running" 2>/dev/null; rm -rf "$work"' EXIT
+trap '[ ${#running[@]} -gt 0 ] && kill "${!running[@]}" 2>/dev/null; rm -rf "$work"' EXIT
 trap 'exit 130' INT TERM
 
 # Reads the TAP on standard input; prints `planned passed failed skipped`, and the skips to the file `skips`.
@@ -54,25 +57,46 @@ count='
 total_passed=0 total_failed=0 total_skipped=0
 : >"$work/reasons"
 
-run_one() {
-    local program=$1 name status start_ms end_ms planned passed failed skipped results missing why=""
-    name=$(basename "$program")
-    start_ms=$(date +%s%3N)
-    # The streams apart: a line of one must not fall into a line of the other.
+programs=() started_ms=() ended_ms=() statuses=() reported=0
+
+# start PROGRAM: in the background, so that an interrupt needs no wait for the program; its streams apart, as a line of one must not
+# fall into a line of the other.
+start() {
+    local number=${#programs[@]} program=$1
+    programs+=("$program")
+    started_ms+=("$(date +%s%3N)")
     case $program in
     */*) ;;
     *) program=./$program ;;
     esac
-    CMOCKA_MESSAGE_OUTPUT=TAP timeout -k 5 "$limit_s" "$program" >"$work/out" 2>"$work/err" </dev/null &
-    running=$!
-    wait "$running" 2>/dev/null # in the background, so that an interrupt needs no wait for the program
+    CMOCKA_MESSAGE_OUTPUT=TAP timeout -k 5 "$limit_s" "$program" >"$work/$number.out" 2>"$work/$number.err" </dev/null &
+    running[$!]=$number
+}
+
+# Waits until one has ended, and reports those of which all before have been reported.
+wait_one() {
+    local process status number
+    wait -n -p process "${!running[@]}" 2>/dev/null
     status=$?
-    running=
-    end_ms=$(date +%s%3N)
+    number=${running[$process]}
+    unset "running[$process]"
+    ended_ms[number]=$(date +%s%3N)
     # Who ignores SIGTERM is killed, which timeout tells as 137 and not as 124.
-    [ $status -eq 137 ] && [ $((end_ms - start_ms)) -ge $((limit_s * 1000)) ] && status=124
+    [ $status -eq 137 ] && [ $((ended_ms[number] - started_ms[number])) -ge $((limit_s * 1000)) ] && status=124
+    statuses[number]=$status
+    while [ -n "${statuses[reported]:-}" ]; do
+        report $reported
+        reported=$((reported + 1))
+    done
+}
+
+# report NUMBER: of a program that has ended.
+report() {
+    local number=$1 program=${programs[$1]} status=${statuses[$1]} name planned passed failed skipped results missing why=""
+    local took_ms=$((ended_ms[number] - started_ms[number])) out=$work/$1.out
+    name=$(basename "$program")
     : >"$work/skips"
-    read -r planned passed failed skipped < <(LC_ALL=C awk -v skips="$work/skips" "$count" "$work/out")
+    read -r planned passed failed skipped < <(LC_ALL=C awk -v skips="$work/skips" "$count" "$out")
     results=$((passed + failed + skipped))
     missing=$((planned - results))
     [ $status -ge 124 ] && why="; $(ending $status)"
@@ -92,15 +116,16 @@ run_one() {
     total_failed=$((total_failed + failed))
     total_skipped=$((total_skipped + skipped))
     printf '%-4s %-32s %4d ok %4d not ok %4d skip  %d.%03d s%s\n' "$([ "$failed" -eq 0 ] && echo ok || echo FAIL)" \
-        "$name" "$passed" "$failed" "$skipped" $(((end_ms - start_ms) / 1000)) $(((end_ms - start_ms) % 1000)) "$why"
+        "$name" "$passed" "$failed" "$skipped" $((took_ms / 1000)) $((took_ms % 1000)) "$why"
     if [ "$failed" -eq 0 ]; then
         case $program in # their tables are what they are for
-        */stability/* | */accuracy/*) grep -a '^# ' "$work/out" | grep -a -v -E '^# (not )?ok' | sed 's/^# /    /' ;;
+        */stability/* | */accuracy/*) grep -a '^# ' "$out" | grep -a -v -E '^# (not )?ok' | sed 's/^# /    /' ;;
         esac
-        return
+    else
+        grep -a -v -i -E '^ok([[:space:]]|$)|^not ok .*# *skip|^1\.\.[0-9]' "$out" | sed 's/^/    /'
+        sed 's/^/    /' "$work/$number.err"
     fi
-    grep -a -v -i -E '^ok([[:space:]]|$)|^not ok .*# *skip|^1\.\.[0-9]' "$work/out" | sed 's/^/    /'
-    sed 's/^/    /' "$work/err"
+    rm -f "$out" "$work/$number.err"
 }
 
 ending() {
@@ -112,7 +137,20 @@ ending() {
     esac
 }
 
-for program; do run_one "$program"; done
+wait_all() {
+    while [ ${#running[@]} -gt 0 ]; do wait_one; done
+}
+
+for program; do
+    if [ "$program" = -- ]; then
+        wait_all
+        at_a_time=1
+        continue
+    fi
+    [ ${#running[@]} -lt "$at_a_time" ] || wait_one
+    start "$program"
+done
+wait_all
 if [ -s "$work/reasons" ]; then
     echo "skipped:"
     sed 's/^/    /' "$work/reasons"

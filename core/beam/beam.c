@@ -67,15 +67,27 @@ double beam_radius(const struct beam *beam, double range_m)
     return sqrt(beam->exit_radius_m * beam->exit_radius_m + spread * spread);
 }
 
-/* The series of sqrt((1 + t s^2) / (1 - t b^2)), b = s tan i, to second order in t; beyond b = 1/2, where the plane is
- * within a footprint's angle of the beam, it is kept. */
+static double mean_t3(void)
+{
+    return 1.5 * mean_t2() - exp(-2.0) / (1.0 - exp(-2.0));
+}
+
+/* The series of sqrt((1 + t s^2) / (1 - t b^2)) - 1, b = s tan i, to third order in t, by x = 1 / cos^2 i: s^2 + b^2 =
+ * s^2 x, and what is left out is s^2 of these terms. */
+void beam_plane_series(const struct beam *beam, double term[3])
+{
+    double s2 = beam->slope * beam->slope;
+    term[0] = 0.5 * s2 * mean_t();
+    term[1] = 0.375 * s2 * s2 * mean_t2();
+    term[2] = 0.3125 * s2 * s2 * s2 * mean_t3();
+}
+
 double beam_plane_excess(const struct beam *beam, double range_m, double cosine)
 {
-    double s2 = beam->slope * beam->slope, c2 = fmax(cosine * cosine, 4.0 * s2 / (1.0 + 4.0 * s2));
+    double s2 = beam->slope * beam->slope, x = 1.0 / fmax(cosine * cosine, 4.0 * s2), term[3];
     if (s2 == 0.0) return 0.0;
-    double b2 = s2 * (1.0 / c2 - 1.0);
-    double first = 0.5 * (s2 + b2), second = 0.375 * b2 * b2 + 0.25 * s2 * b2 - 0.125 * s2 * s2;
-    return range_m * (first * mean_t() + second * mean_t2());
+    beam_plane_series(beam, term);
+    return range_m * x * (term[0] + x * (term[1] + x * term[2]));
 }
 
 double beam_plane_sigma(const struct beam *beam, double range_m, double cosine)

@@ -43,7 +43,8 @@ void beam_echoes_free(struct beam_echoes *e)
 static void sort(struct beam_return *r, uint32_t n)
 {
     static const uint32_t steps[] = {301, 132, 57, 23, 10, 4, 1};
-    for (size_t s = 0; s < sizeof steps / sizeof steps[0]; s++)
+    size_t s = n < 10 ? 5 : 0;
+    for (; s < sizeof steps / sizeof steps[0]; s++)
         for (uint32_t i = steps[s]; i < n; i++) {
             struct beam_return one = r[i];
             uint32_t j = i;

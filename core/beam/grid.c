@@ -7,7 +7,7 @@
 #include "core/vec3.h"
 #include "core/vecmath.h"
 
-enum { N_CELLS = 6 * OUTLINE_CELLS * OUTLINE_CELLS, BLOCK = 256 };
+enum { N_CELLS = 6 * OUTLINE_CELLS * OUTLINE_CELLS };
 #define NEAREST_M 0.02 /* nearer than this, all directions are near each other */
 #define PIECE     0.1  /* the longest piece of an edge, by its distance */
 
@@ -16,6 +16,7 @@ struct draw {
     const struct beam *beam;
     int fill; /* 0: count into first[c + 1]; 1: write at first[c]++ */
     uint32_t edge;
+    float normal[3]; /* of the edge's plane */
     uint64_t n;
 };
 
@@ -33,8 +34,8 @@ static void put(struct draw *d, uint32_t cell, float range_m)
         o->first[cell + 1]++;
         return;
     }
-    o->entry[o->first[cell]++] = (struct outline_entry){range_m, d->edge};
-    if (!(range_m >= o->nearest_m[cell])) o->nearest_m[cell] = range_m;
+    o->entry[o->first[cell]++] = (struct outline_entry){range_m, {d->normal[0], d->normal[1], d->normal[2]}, d->edge};
+    o->any[cell / 32] |= 1U << cell % 32;
 }
 
 static void put_row(struct draw *d, uint32_t face, int32_t row, double from, double to, float range_m)
@@ -162,11 +163,25 @@ static int by_range(const void *a, const void *b)
     return (x->edge > y->edge) - (x->edge < y->edge);
 }
 
+static void edge_normal(const struct outline_edge *edge, float normal[3])
+{
+    double a[3], b[3], n[3];
+    for (int i = 0; i < 3; i++) {
+        a[i] = (double)edge->a[i];
+        b[i] = (double)edge->b[i];
+    }
+    vec3_cross(a, b, n);
+    double length = sqrt(vec3_dot(n, n));
+    for (int i = 0; i < 3; i++)
+        normal[i] = length > 0.0 ? (float)(n[i] / length) : 0.0f;
+}
+
 static uint64_t draw_all(struct beam_outlines *o, const struct beam *beam, const struct stretches *s, int fill)
 {
     struct draw d = {.o = o, .beam = beam, .fill = fill};
     for (size_t i = 0; i < s->n; i++) {
         d.edge = s->at[i].edge;
+        if (fill) edge_normal(&o->edge[d.edge], d.normal);
         draw_piece(&d, s->at[i].p, s->at[i].q, nearest_on(s->at[i].p, s->at[i].q));
     }
     return d.n;
@@ -176,10 +191,8 @@ static int fill_cells(struct beam_outlines *o, const struct beam *beam, const st
 {
     uint64_t n = draw_all(o, beam, s, 0);
     if (n >= UINT32_MAX) return sh_fail(err, SH_EINPUT, "beam: too many outlines; beam.mode: rings does without them");
-    for (uint32_t c = 0; c < N_CELLS; c++) {
+    for (uint32_t c = 0; c < N_CELLS; c++)
         o->first[c + 1] += o->first[c];
-        o->nearest_m[c] = NAN; /* nearer than nothing */
-    }
     o->entry = malloc((size_t)(n + 1) * sizeof *o->entry);
     if (o->entry == NULL) return sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");
     draw_all(o, beam, s, 1);
@@ -189,8 +202,7 @@ static int fill_cells(struct beam_outlines *o, const struct beam *beam, const st
         if (o->first[c + 1] - o->first[c] > 1)
             qsort(o->entry + o->first[c], o->first[c + 1] - o->first[c], sizeof *o->entry, by_range);
     o->info.entries = n;
-    o->info.bytes =
-        n * sizeof *o->entry + N_CELLS * (sizeof *o->first + sizeof *o->nearest_m) + o->n_edges * sizeof *o->edge;
+    o->info.bytes = n * sizeof *o->entry + N_CELLS * sizeof *o->first + N_CELLS / 8 + o->n_edges * sizeof *o->edge;
     return SH_OK;
 }
 
@@ -210,8 +222,8 @@ int beam_outlines_create(const struct scene *scene, const double station_m[3], c
     prober->probe = probe;
     prober->beam = beam;
     o->first = calloc(N_CELLS + 1, sizeof *o->first);
-    o->nearest_m = malloc(N_CELLS * sizeof *o->nearest_m);
-    int rc = o->first == NULL || o->nearest_m == NULL ? sh_fail(err, SH_ENOMEM, "beam: no memory") : SH_OK;
+    o->any = calloc(N_CELLS / 32, sizeof *o->any);
+    int rc = o->first == NULL || o->any == NULL ? sh_fail(err, SH_ENOMEM, "beam: no memory") : SH_OK;
     if (rc == SH_OK) rc = outline_find(scene, station_m, kind, &o->edge, &o->n_edges, &o->info.edges, err);
     if (rc == SH_OK && find_stretches(o, prober, range_max_m * 1.01, &stretches) != SH_OK)
         rc = sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");
@@ -233,7 +245,7 @@ void beam_outlines_free(struct beam_outlines *o)
     if (o == NULL) return;
     free(o->edge);
     free(o->first);
-    free(o->nearest_m);
+    free(o->any);
     free(o->entry);
     free(o);
 }
@@ -251,47 +263,36 @@ static void cells_of(const float *restrict dx, const float *restrict dy, const f
         cell[i] = outline_cell(dx[i], dy[i], dz[i]);
 }
 
-VEC_CLONES
-static uint32_t near_of(const float *restrict nearest_m, const uint32_t *restrict cell, const float *restrict limit_m,
-                        uint32_t n, uint8_t *restrict near)
+/* Brings what looking for lines is going to read, step by step for all pulses at once. */
+static void prefetch(const struct beam_outlines *o, const uint32_t *cell, const uint32_t *pulse, uint32_t n)
 {
-    uint32_t found = 0;
+    for (uint32_t k = 0; k < n; k++)
+        __builtin_prefetch(&o->first[cell[pulse[k]]], 0, 3);
+    for (uint32_t k = 0; k < n; k++)
+        __builtin_prefetch(&o->entry[o->first[cell[pulse[k]]]], 0, 3);
+}
+
+/* Most cells lead to none, and most of those that lead to some are wider than the footprint; ranges are looked at
+ * later. */
+uint32_t beam_near_outlines(const struct beam_outlines *o, const struct beam *beam, const float *dx, const float *dy,
+                            const float *dz, uint32_t n, uint32_t *cell, uint32_t *pulse)
+{
+    uint32_t found = 0, left = 0;
+    if (o->info.entries == 0) return 0;
+    cells_of(dx, dy, dz, n, cell);
     for (uint32_t i = 0; i < n; i++) {
-        uint32_t is = nearest_m[cell[i]] <= limit_m[i];
-        near[i] = (uint8_t)is;
-        found += is;
+        pulse[found] = i;
+        found += o->any[cell[i] / 32] >> cell[i] % 32 & 1;
     }
-    return found;
-}
-
-/* What looking for lines is going to read, step by step for all pulses at once. */
-static void prefetch(const struct beam_outlines *o, const uint32_t *cell, uint32_t n)
-{
-    for (uint32_t k = 0; k < n; k++)
-        __builtin_prefetch(&o->first[cell[k]], 0, 3);
-    for (uint32_t k = 0; k < n; k++)
-        __builtin_prefetch(&o->entry[o->first[cell[k]]], 0, 3);
-    for (uint32_t k = 0; k < n; k++)
-        for (uint32_t i = o->first[cell[k]], end = o->first[cell[k] + 1]; i < end && i < o->first[cell[k]] + 2; i++)
-            __builtin_prefetch(&o->edge[o->entry[i].edge], 0, 3);
-}
-
-/* The nearest edge of a cell against the range, and what a footprint adds to it at most: decided later. */
-uint32_t beam_near_outlines(const struct beam_outlines *o, const float *dx, const float *dy, const float *dz,
-                            const float *limit_m, uint32_t n, uint32_t *pulse)
-{
-    uint32_t cell[BLOCK], near_cell[BLOCK + 1], found = 0;
-    uint8_t near[BLOCK];
-    for (uint32_t at = 0; at < n; at += BLOCK) {
-        uint32_t part = n - at < BLOCK ? n - at : BLOCK, before = found;
-        cells_of(dx + at, dy + at, dz + at, part, cell);
-        if (near_of(o->nearest_m, cell, limit_m + at, part, near) == 0) continue;
-        for (uint32_t i = 0; i < part; i++) {
-            pulse[found] = at + i;
-            near_cell[found - before] = cell[i];
-            found += near[i];
-        }
-        prefetch(o, near_cell, found - before);
+    prefetch(o, cell, pulse, found);
+    for (uint32_t k = 0; k < found; k++) {
+        uint32_t i = pulse[k], at = o->first[cell[i]], end = o->first[cell[i] + 1];
+        const float d[3] = {dx[i], dy[i], dz[i]};
+        while (at < end && outline_is_clear(beam, &o->entry[at], d))
+            at++;
+        if (at == end) continue;
+        __builtin_prefetch(&o->edge[o->entry[at].edge], 0, 3);
+        pulse[left++] = i;
     }
-    return found;
+    return left;
 }

@@ -9,13 +9,14 @@
 
 enum { OUTLINE_CELLS = 512 }; /* along a face: 2.6 mrad in its middle, half of that in its corners */
 
-/* An edge's ends, from the station, and the unit normal of the plane through all three. */
+/* An edge's ends, from the station. */
 struct outline_edge {
-    float a[3], b[3], normal[3];
+    float a[3], b[3];
 };
 
 struct outline_entry {
-    float range_m; /* of the nearest point of the edge, in or near the cell */
+    float range_m;   /* of the nearest point of the edge, in or near the cell */
+    float normal[3]; /* of unit length, of the plane through the station and the edge */
     uint32_t edge;
 };
 
@@ -23,7 +24,7 @@ struct beam_outlines {
     uint32_t n_edges;
     struct outline_edge *edge;
     uint32_t *first;             /* entries of cell c: first[c] .. first[c + 1] */
-    float *nearest_m;            /* of each cell; NaN: it leads to none */
+    uint32_t *any;               /* a bit for each cell: it leads to some */
     struct outline_entry *entry; /* by range */
     struct beam_outlines_info info;
 };
@@ -52,7 +53,7 @@ uint32_t outline_probe(struct outline_prober *prober, const double p[3], const d
 int outline_find(const struct scene *scene, const double station_m[3], const uint16_t *kind, struct outline_edge **edge,
                  uint32_t *n, uint64_t *n_edges, struct sh_err *err);
 
-/* Cells lie in tiles of 4 x 4: nearest_m of a tile is one cache line. */
+/* Cells lie in tiles of 4 x 4: `first` of a tile is one cache line. */
 static inline uint32_t outline_place(uint32_t face, uint32_t i, uint32_t j)
 {
     const uint32_t tiles = OUTLINE_CELLS / 4;
@@ -73,6 +74,15 @@ static inline __attribute__((always_inline)) uint32_t outline_cell(float dx, flo
     i = i < OUTLINE_CELLS ? i : OUTLINE_CELLS - 1;
     j = j < OUTLINE_CELLS ? j : OUTLINE_CELLS - 1;
     return outline_place(face, (uint32_t)i, (uint32_t)j);
+}
+
+/* The beam passes clear of the plane through the station and the edge: most do. The footprint is widest, as an angle,
+ * where the edge is nearest. */
+static inline int outline_is_clear(const struct beam *beam, const struct outline_entry *entry, const float d[3])
+{
+    const float exit = 1.01f * (float)beam->exit_radius_m, slope = 1.01f * (float)beam->slope, range = entry->range_m;
+    float away = (entry->normal[0] * d[0] + entry->normal[1] * d[1] + entry->normal[2] * d[2]) * range;
+    return away * away > exit * exit + slope * slope * range * range;
 }
 
 #endif

@@ -138,13 +138,9 @@ static int collect(const struct weld *w, struct outline_edge **edge, uint32_t *n
         double a[3], b[3];
         from_station(w, w->slot[i].low, a);
         from_station(w, w->slot[i].high, b);
-        double normal[3], length;
-        vec3_cross(a, b, normal);
-        length = sqrt(vec3_dot(normal, normal));
         for (int j = 0; j < 3; j++) {
             (*edge)[*n].a[j] = (float)a[j];
             (*edge)[*n].b[j] = (float)b[j];
-            (*edge)[*n].normal[j] = length > 0.0 ? (float)(normal[j] / length) : 0.0f;
         }
         (*n)++;
     }

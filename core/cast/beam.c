@@ -8,7 +8,11 @@
 #include "core/surface.h"
 #include "core/vec3.h"
 
-enum { MAX_PASSES = 4 };
+/* What one outline cuts off beyond this, in footprint radii, is 0.3 % of the energy: no echo, and on the mean of ranges
+ * that become one echo less than 0.003 of the resolution. */
+#define RIM 0.945
+/* Pulses with fewer sub-rays than this share packets with their neighbours. */
+enum { ALONE = 64 };
 
 int beam_work_create(struct beam_work **out, struct sh_err *err)
 {
@@ -40,8 +44,9 @@ static void sub_ray(const struct beam *beam, const double dir[3], const struct j
         out[i] = dir[i] + beam->slope * (x * job->e2[i] - y * job->e1[i]);
         length2 += out[i] * out[i];
     }
+    double over = 1.0 / sqrt(length2);
     for (int i = 0; i < 3; i++)
-        out[i] /= sqrt(length2);
+        out[i] *= over;
 }
 
 static void pulse_origin(const struct origins *from, uint32_t i, double origin[3])
@@ -117,15 +122,17 @@ static int plan_job(struct caster *c, const struct cast_setup *s, const struct o
     const double dir[3] = {c->dx[job->pulse], c->dy[job->pulse], c->dz[job->pulse]};
     struct beam_line line[BEAM_MAX_LINES];
     struct beam_parts parts;
-    uint32_t lines = beam_find_lines(b->outlines, &b->beam, dir, limit_m, line, &job->next_m);
-    if (lines == known) return 0;
+    uint32_t lines =
+        beam_find_lines(b->outlines, &b->beam, c->beam->cell[job->pulse], dir, limit_m, line, &job->next_m);
+    if (lines == known || (lines == 1 && line[0].h > RIM)) return 0;
     job->lines = lines;
     job->first = c->beam->pool.n;
     job->n = 0;
     job->centre.energy = 0.0;
     job->whole = 0;
     beam_axes(dir, job->e1, job->e2);
-    if (lines > BEAM_MAX_LINES || beam_cut(&b->beam, &b->fine, line, lines, &parts) != 0) {
+    if (lines > BEAM_MAX_LINES || ++job->passes > MAX_PASSES ||
+        beam_cut(&b->beam, &b->fine, line, lines, &parts) != 0) {
         plan_whole(c, b, from, job);
         c->counters.ragged++;
         return 1;
@@ -167,16 +174,41 @@ static void look_through(struct caster *c, const struct cast_setup *s, const str
     }
 }
 
+/* Whether these two pulses of a chunk may share a packet. */
+static int together(uint32_t a, uint32_t b)
+{
+    return a / SCHEDULE_PACKET == b / SCHEDULE_PACKET;
+}
+
+/* Which rays share a packet hangs on the pulse number alone, as it does for those of the pulses: SCHEDULE_PACKET pulses
+ * have packets of their own. */
+static void mark_packets(struct beam_work *w, uint32_t first)
+{
+    const struct job *last = NULL;
+    uint32_t n = 0; /* of rays in the packet */
+    memset(w->pool.begins + first, 0, w->pool.n - first);
+    for (uint32_t j = 0; j < w->n_jobs; j++) {
+        const struct job *job = &w->job[j];
+        if (job->first < first || job->n == 0) continue;
+        if (last == NULL || !together(last->pulse, job->pulse) || last->n >= ALONE || job->n >= ALONE) n = 0;
+        for (uint32_t i = job->first; i < job->first + job->n; i++, n++)
+            w->pool.begins[i] = n % SCHEDULE_PACKET == 0;
+        last = job;
+    }
+}
+
 /* Casts what is in the pool from ray `first` on. */
 static void cast_pool(struct caster *c, const struct cast_setup *s, uint32_t first)
 {
     struct pool *p = &c->beam->pool;
+    mark_packets(c->beam, first);
     int through = s->detect != NULL && s->detect->depth > 0;
     if (first == 0) c->beam->behind.n = 0;
     c->counters.sub_rays += p->n - first;
-    c->scattered = c->beam->scattered;
     for (uint32_t at = first, n; at < p->n; at += n) {
         n = p->n - at < CHUNK ? p->n - at : CHUNK;
+        while (at + n < p->n && !p->begins[at + n])
+            n--;
         const struct origins from = {.px = p->px + at, .py = p->py + at, .pz = p->pz + at};
         const struct ray_set set = {.dx = p->dx + at,
                                     .dy = p->dy + at,
@@ -186,24 +218,27 @@ static void cast_pool(struct caster *c, const struct cast_setup *s, uint32_t fir
                                     .hit = p->triangle + at,
                                     .cosine = p->cosine + at,
                                     .body = p->body + at};
+        c->begins = p->begins + at;
         caster_nearest(c, s, &from, &set, n);
+        c->begins = NULL;
+        c->scattered = c->beam->scattered;
         if (through) look_through(c, s, &from, &set, at, n);
+        c->scattered = 0;
         for (uint32_t i = at; i < at + n && s->n_movers != 0; i++)
             if (p->body[i] != 0) p->triangle[i] = CAST_NO_TRIANGLE; /* not of the scene */
     }
-    c->scattered = 0;
     weigh_pool(c, s, first);
 }
 
 /* Outlines behind what the centre meets count too, where another part of the footprint looks past it. */
-static void look_behind(struct caster *c, const struct cast_setup *s, const struct origins *from, uint32_t reserve)
+static void look_behind(struct caster *c, const struct cast_setup *s, const struct origins *from)
 {
     struct beam_work *w = c->beam;
     uint32_t first = w->pool.n;
     for (uint32_t j = 0; j < w->n_jobs; j++) {
         struct job *job = &w->job[j];
         double far_m = job->centre.energy > 0.0 ? job->centre.range_m : 0.0;
-        if (!(job->next_m < INFINITY) || w->pool.n + reserve > POOL) continue;
+        if (!(job->next_m < INFINITY)) continue;
         for (uint32_t i = job->first; i < job->first + job->n; i++)
             far_m = isnan(w->pool.range_m[i]) ? (double)INFINITY : fmax(far_m, w->pool.range_m[i]);
         double limit_m = far_m + 4.0 * beam_radius(&s->beam->beam, far_m);
@@ -286,15 +321,25 @@ static void finish_job(struct caster *c, const struct cast_setup *s, const struc
     at->n = w->some.n - at->first;
 }
 
-static void run_jobs(struct caster *c, const struct cast_setup *s, const struct origins *from, uint32_t reserve)
+static void run_jobs(struct caster *c, const struct cast_setup *s, const struct origins *from)
 {
     struct beam_work *w = c->beam;
     cast_pool(c, s, 0);
     for (int pass = 0; pass < MAX_PASSES && s->beam->mode == BEAM_ADAPTIVE; pass++)
-        look_behind(c, s, from, reserve);
+        look_behind(c, s, from);
     for (uint32_t j = 0; j < w->n_jobs; j++)
         finish_job(c, s, &w->job[j]);
     w->n_jobs = w->pool.n = 0;
+}
+
+/* Whether there may be no room left for the pulses that share packets with this one, of `most` sub-rays each; asked
+ * for each pulse, so that those before it that share its packets are all in. */
+static int is_full(const struct beam_work *w, uint32_t pulse, uint32_t most)
+{
+    _Static_assert(SCHEDULE_PACKET * (MAX_PASSES * BEAM_MAX_PARTS + BEAM_MAX_SUBRAYS) <= POOL, "room for a packet");
+    uint32_t jobs = w->n_jobs + SCHEDULE_PACKET;
+    if (w->n_jobs == 0 || together(w->job[w->n_jobs - 1].pulse, pulse)) return 0;
+    return jobs > MAX_JOBS || jobs * most > POOL;
 }
 
 /* The centre of an adaptive beam meets glass or a mirror. */
@@ -308,10 +353,9 @@ static uint32_t find_candidates(struct caster *c, const struct cast_setup *s, ui
 {
     struct beam_work *w = c->beam;
     uint32_t found = 0, all = 0;
-    kernel_limits(&s->beam->beam, c->range_m, w->steep, n, w->limit_m);
     if (s->detect == NULL || s->detect->depth == 0)
-        return beam_near_outlines(s->beam->outlines, c->fx, c->fy, c->fz, w->limit_m, n, w->candidate);
-    found = beam_near_outlines(s->beam->outlines, c->fx, c->fy, c->fz, w->limit_m, n, w->near);
+        return beam_near_outlines(s->beam->outlines, &s->beam->beam, c->fx, c->fy, c->fz, n, w->cell, w->candidate);
+    found = beam_near_outlines(s->beam->outlines, &s->beam->beam, c->fx, c->fy, c->fz, n, w->cell, w->near);
     for (uint32_t p = 0, k = 0; p < n; p++) {
         int near = k < found && w->near[k] == p;
         k += (uint32_t)near;
@@ -325,37 +369,38 @@ static void cast_whole(struct caster *c, const struct cast_setup *s, const struc
                        uint32_t n)
 {
     struct beam_work *w = c->beam;
-    const uint32_t reserve = s->beam->pattern.n;
     w->scattered = 0;
     for (uint32_t k = 0; k < n; k++) {
+        if (is_full(w, pulse[k], s->beam->pattern.n)) run_jobs(c, s, from);
         struct job *job = &w->job[w->n_jobs++];
         job->pulse = pulse[k];
         plan_whole(c, s->beam, from, job);
-        if (w->n_jobs == MAX_JOBS || w->pool.n + reserve > POOL) run_jobs(c, s, from, reserve);
     }
-    if (w->n_jobs > 0) run_jobs(c, s, from, reserve);
+    if (w->n_jobs > 0) run_jobs(c, s, from);
 }
 
 /* Candidates of an adaptive beam: rays for the parts of their footprints. */
 static void cast_parts(struct caster *c, const struct cast_setup *s, const struct origins *from, uint32_t candidates)
 {
     struct beam_work *w = c->beam;
-    const uint32_t pattern = s->beam->pattern.n, reserve = pattern > BEAM_MAX_PARTS ? pattern : BEAM_MAX_PARTS;
+    const uint32_t most = MAX_PASSES * BEAM_MAX_PARTS + s->beam->pattern.n;
     w->scattered = 1;
     for (uint32_t k = 0; k < candidates; k++) {
+        if (is_full(w, w->candidate[k], most)) run_jobs(c, s, from);
         struct job *job = &w->job[w->n_jobs];
         uint32_t pulse = job->pulse = w->candidate[k];
         job->next_m = INFINITY;
+        job->passes = 0;
         if (sees_glass(c, s, pulse)) {
             w->near[w->n_near++] = w->again[w->n_again++] = pulse;
             continue;
         }
-        if (!plan_job(c, s, from, job, (double)w->limit_m[pulse], 0)) continue;
+        double limit_m = kernel_limit(&s->beam->beam, c->range_m[pulse], w->steep[pulse]);
+        if (!plan_job(c, s, from, job, limit_m, 0)) continue;
         w->near[w->n_near++] = pulse;
         w->n_jobs++;
-        if (w->n_jobs == MAX_JOBS || w->pool.n + reserve > POOL) run_jobs(c, s, from, reserve);
     }
-    if (w->n_jobs > 0) run_jobs(c, s, from, reserve);
+    if (w->n_jobs > 0) run_jobs(c, s, from);
 }
 
 /* Fills w->some with the echoes of pulses that one ray does not do for; gives those pulses in w->near. */
@@ -381,6 +426,9 @@ static void cast_central(struct caster *c, const struct cast_setup *s, const str
     caster_hits_from(c, s->bvh, from, s->range_max_m, n, c->dx, c->dy, c->dz, c->range_m, c->hit);
     c->steep = NULL;
     memcpy(c->label, c->seen, n * sizeof *c->label);
+    const struct ray_set set = {
+        .dx = c->dx, .dy = c->dy, .dz = c->dz, .range_m = c->range_m, .label = c->label, .hit = c->hit};
+    caster_texels(s, from, &set, n);
 }
 
 void beam_cast(struct caster *c, const struct cast_setup *s, const struct origins *from, uint32_t n)

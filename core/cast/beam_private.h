@@ -5,8 +5,9 @@
 #include "core/cast/caster_private.h"
 
 enum {
-    POOL = 8 * CHUNK, /* sub-rays worked on at a time */
-    MAX_JOBS = 256,   /* pulses with sub-rays, likewise */
+    POOL = 24 * CHUNK, /* sub-rays worked on at a time */
+    MAX_JOBS = 256,    /* pulses with sub-rays, likewise */
+    MAX_PASSES = 4,    /* over their outlines */
 };
 
 /* Sub-rays; those of a job lie together. */
@@ -16,6 +17,7 @@ struct pool {
     double rho[POOL]; /* of the surface; touched only where surfaces are modelled */
     uint32_t triangle[POOL], label[POOL];
     uint8_t body[POOL];
+    uint8_t begins[POOL]; /* a packet */
     uint32_t n;
 };
 
@@ -33,7 +35,7 @@ struct behind {
 /* A pulse that one ray does not do for. */
 struct job {
     uint32_t pulse, first, n;  /* its sub-rays */
-    uint32_t lines;            /* outlines that cut it */
+    uint32_t lines, passes;    /* outlines that cut it; how often they were looked at */
     double next_m;             /* from where on outlines were left out */
     struct beam_return centre; /* known without a ray; energy 0: none */
     double e1[3], e2[3];       /* across the beam */
@@ -46,7 +48,8 @@ struct several {
 };
 
 struct beam_work {
-    float steep[CHUNK], limit_m[CHUNK];
+    float steep[CHUNK];
+    uint32_t cell[CHUNK];                           /* of outlines */
     uint32_t candidate[CHUNK], near[CHUNK], n_near; /* pulses to look at; those with sub-rays */
     uint32_t again[CHUNK], n_again;                 /* glass or a mirror was met beside the centre */
     struct job job[MAX_JOBS];

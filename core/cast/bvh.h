@@ -100,6 +100,7 @@ struct bvh_rays {
     float org[3], t_min, t_max;
     const float *ox, *oy, *oz; /* origins of their own instead of org; NULL: none */
     int scattered;             /* neighbours have nothing in common: one by one */
+    const uint8_t *begins; /* 1: a packet begins with this ray, whether the last one is full or not; NULL: none does */
     const float *dx, *dy, *dz;
     uint32_t *prim;
     float *t, *u, *v;

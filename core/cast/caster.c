@@ -160,6 +160,7 @@ void caster_hits_from(struct caster *c, const struct bvh *bvh, const struct orig
                                    .label = c->seen,
                                    .steep = c->steep,
                                    .doubt = c->doubt};
+        rays.begins = c->begins != NULL ? c->begins + at : NULL;
         cast_rays(c, &ray, &rays, from, &hits, m);
         memcpy(triangle + at, c->prim, m * sizeof *triangle);
         caster_ends(c, CAST_DECIDE);
@@ -275,6 +276,7 @@ void caster_nearest(struct caster *c, const struct cast_setup *s, const struct o
     }
     for (uint32_t i = 0; i < s->n_movers; i++)
         cast_mover(c, s, i, from, set, n);
+    if (set->body != NULL) caster_texels(s, from, set, n);
 }
 
 /* Each pulse is one ray: its echo, if there is one. */

@@ -95,6 +95,7 @@ struct caster {
     struct mover_rays mover;            /* touched only where something moves */
     struct moving_rays moving;          /* touched only where the head moves, or is not ideal */
     float *steep;                       /* where 1 / cos^2 of the incidence goes; NULL: not asked for */
+    const uint8_t *begins;              /* of the rays at hand, where packets begin (bvh.h) */
     int scattered;                      /* of the rays at hand, neighbours have nothing in common */
     struct beam_work *beam;             /* touched only where pulses have a footprint */
     struct cast_counters counters;
@@ -130,6 +131,10 @@ uint32_t caster_wire(struct caster *c, const struct cast_setup *s, int linear, c
 /* Likewise; echoes that did not fit are taken back. Returns how many. */
 uint32_t caster_positions(struct caster *c, const struct cast_setup *s, int linear, const double *range_m,
                           struct line_block *block, uint32_t at, uint32_t n);
+
+/* ---- texels.c: labels of what has been met get the reflectance there, as surface_texel has it. Nothing where the
+ * surfaces have no textures. */
+void caster_texels(const struct cast_setup *s, const struct origins *from, const struct ray_set *set, uint32_t n);
 
 /* ---- aim.c */
 /* Poses of a moving head: s (and, with geo, r) of c->moving -> d (and e), and the origins p. */

@@ -87,7 +87,7 @@ void kernel_scale(const double *range_m, uint32_t n, double *x, double *y, doubl
 void kernel_steep(const struct bvh *bvh, uint32_t prim, const double dir[3], float *steep);
 /* Up to where outlines may cut a footprint whose centre meets a surface at that range, and 1 / cos^2 of its incidence:
  * beyond it by the slope of the surface, doubled and more, for it may bend away, and by some footprints. */
-void kernel_limits(const struct beam *beam, const double *range_m, const float *steep, uint32_t n, float *limit_m);
+double kernel_limit(const struct beam *beam, double range_m, float steep);
 /* Ranges of centres -> means over footprints on planes; the first term of beam_plane_excess, which has them all. */
 void kernel_excess(const struct beam *beam, const float *steep, uint32_t n, double *range_m);
 

@@ -7,11 +7,13 @@
 #include <string.h>
 
 #include "core/cast/caster_private.h"
+#include "core/surface.h"
 #include "core/vec3.h"
 
 static const struct surface *surface_of(const struct cast_setup *s, uint32_t label)
 {
     const struct surface_table *t = s->detect->surfaces;
+    label = surface_of_label(label);
     return &t->surface[label < t->n ? label : t->n];
 }
 

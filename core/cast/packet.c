@@ -19,7 +19,23 @@
 #define PACKET_ONE(scene, ctx, ray)             rtcIntersect1(scene, ctx, ray)
 #endif
 
-/* The planes of what a packet has hit are asked for when the next one has been cast: to read them at once would mean to
+/* Of packets that were cut, those that are left with as many as this are not worth it. */
+enum { FEW = 4 };
+
+/* Numbers of 4 bytes of rays at .. at + n, whole packets of them wherever the arrays go on: what is beyond n belongs to
+ * packets that come later, or to none. */
+static inline __attribute__((always_inline)) void copy(void *to, const void *from, uint32_t at, uint32_t n,
+                                                       uint32_t width)
+{
+    if (at + width <= BVH_CHUNK)
+        memcpy(to, from, 4 * width);
+    else
+        for (uint32_t i = 0; i < n; i++)
+            memcpy((char *)to + 4 * i, (const char *)from + 4 * i, 4);
+}
+
+/* Packet p takes rays first[p] .. first[p + 1] - 1.
+ * The planes of what a packet has hit are asked for when the next one has been cast: to read them at once would mean to
  * wait for what Embree has only just written. */
 #define PACKET_FUNCTION(W)                                                                                         \
     static void set_up_##W(struct RTCRayHit##W *packet, const struct bvh_rays *rays)                               \
@@ -37,12 +53,14 @@
                 packet[p].hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;                                              \
             }                                                                                                      \
     }                                                                                                              \
-    static void place_##W(struct RTCRayHit##W *packet, const struct bvh_rays *rays, uint32_t n)                    \
+    static void place_##W(struct RTCRayHit##W *packet, const struct bvh_rays *rays, const uint32_t *first,         \
+                          uint32_t packets)                                                                        \
     {                                                                                                              \
-        for (uint32_t p = 0; p < (n + W - 1) / W; p++) {                                                           \
-            memcpy(packet[p].ray.org_x, rays->ox + p * W, sizeof packet->ray.org_x);                               \
-            memcpy(packet[p].ray.org_y, rays->oy + p * W, sizeof packet->ray.org_y);                               \
-            memcpy(packet[p].ray.org_z, rays->oz + p * W, sizeof packet->ray.org_z);                               \
+        for (uint32_t p = 0; p < packets; p++) {                                                                   \
+            const uint32_t n = first[p + 1] - first[p];                                                            \
+            copy(packet[p].ray.org_x, rays->ox + first[p], first[p], n, W);                                        \
+            copy(packet[p].ray.org_y, rays->oy + first[p], first[p], n, W);                                        \
+            copy(packet[p].ray.org_z, rays->oz + first[p], first[p], n, W);                                        \
         }                                                                                                          \
     }                                                                                                              \
     static void prefetch_##W(const struct bvh *bvh, const struct RTCRayHit##W *packet)                             \
@@ -51,16 +69,29 @@
         for (uint32_t i = 0; i < W; i++)                                                                           \
             __builtin_prefetch(&bvh->triangle[packet->hit.primID[i] < last ? packet->hit.primID[i] : last], 0, 2); \
     }                                                                                                              \
+    static void one_by_one_##W(const struct bvh *bvh, struct RTCRayHit##W *packet, uint32_t n)                     \
+    {                                                                                                              \
+        for (uint32_t i = 0; i < n; i++) {                                                                         \
+            const float org[3] = {packet->ray.org_x[i], packet->ray.org_y[i], packet->ray.org_z[i]};               \
+            const float dir[3] = {packet->ray.dir_x[i], packet->ray.dir_y[i], packet->ray.dir_z[i]};               \
+            struct bvh_one one = {.t_min = packet->ray.tnear[i], .t_max = packet->ray.tfar[i]};                    \
+            bvh_intersect_one(bvh, org, dir, &one);                                                                \
+            packet->hit.primID[i] = one.prim;                                                                      \
+            packet->ray.tfar[i] = one.t;                                                                           \
+            packet->hit.u[i] = one.u;                                                                              \
+            packet->hit.v[i] = one.v;                                                                              \
+        }                                                                                                          \
+    }                                                                                                              \
     static void intersect_##W(const struct bvh *bvh, struct RTCRayHit##W *packet, const struct bvh_rays *rays,     \
-                              uint32_t n)                                                                          \
+                              const uint32_t *first, uint32_t packets)                                             \
     {                                                                                                              \
         PACKET_CONTEXT(context);                                                                                   \
         int valid[W] __attribute__((aligned(64)));                                                                 \
-        const uint32_t packets = (n + W - 1) / W;                                                                  \
         for (uint32_t p = 0; p < packets; p++) {                                                                   \
-            memcpy(packet[p].ray.dir_x, rays->dx + p * W, sizeof packet->ray.dir_x);                               \
-            memcpy(packet[p].ray.dir_y, rays->dy + p * W, sizeof packet->ray.dir_y);                               \
-            memcpy(packet[p].ray.dir_z, rays->dz + p * W, sizeof packet->ray.dir_z);                               \
+            const uint32_t n = first[p + 1] - first[p];                                                            \
+            copy(packet[p].ray.dir_x, rays->dx + first[p], first[p], n, W);                                        \
+            copy(packet[p].ray.dir_y, rays->dy + first[p], first[p], n, W);                                        \
+            copy(packet[p].ray.dir_z, rays->dz + first[p], first[p], n, W);                                        \
             for (uint32_t i = 0; i < W; i++)                                                                       \
                 packet[p].ray.tfar[i] = rays->t_max;                                                               \
             memset(packet[p].hit.geomID, 0xff, sizeof packet->hit.geomID);                                         \
@@ -68,19 +99,25 @@
         }                                                                                                          \
         for (uint32_t i = 0; i < W; i++)                                                                           \
             valid[i] = -1;                                                                                         \
-        for (uint32_t p = 0; p < packets; p++) {                                                                   \
-            if (n - p * W < W)                                                                                     \
+        for (uint32_t p = 0, was = W; p < packets; p++) {                                                          \
+            const uint32_t n = first[p + 1] - first[p];                                                            \
+            if (n != was)                                                                                          \
                 for (uint32_t i = 0; i < W; i++)                                                                   \
-                    valid[i] = i < n - p * W ? -1 : 0;                                                             \
-            PACKET_CALL(W, valid, bvh->rtc, &context, &packet[p]);                                                 \
+                    valid[i] = i < n ? -1 : 0;                                                                     \
+            was = n;                                                                                               \
+            if (n <= FEW && rays->begins != NULL)                                                                  \
+                one_by_one_##W(bvh, &packet[p], n);                                                                \
+            else                                                                                                   \
+                PACKET_CALL(W, valid, bvh->rtc, &context, &packet[p]);                                             \
             if (p > 0) prefetch_##W(bvh, &packet[p - 1]);                                                          \
         }                                                                                                          \
         prefetch_##W(bvh, &packet[packets - 1]);                                                                   \
         for (uint32_t p = 0; p < packets; p++) {                                                                   \
-            memcpy(rays->prim + p * W, packet[p].hit.primID, sizeof packet->hit.primID);                           \
-            memcpy(rays->t + p * W, packet[p].ray.tfar, sizeof packet->ray.tfar);                                  \
-            memcpy(rays->u + p * W, packet[p].hit.u, sizeof packet->hit.u);                                        \
-            memcpy(rays->v + p * W, packet[p].hit.v, sizeof packet->hit.v);                                        \
+            const uint32_t n = first[p + 1] - first[p];                                                            \
+            copy(rays->prim + first[p], packet[p].hit.primID, first[p], n, W);                                     \
+            copy(rays->t + first[p], packet[p].ray.tfar, first[p], n, W);                                          \
+            copy(rays->u + first[p], packet[p].hit.u, first[p], n, W);                                             \
+            copy(rays->v + first[p], packet[p].hit.v, first[p], n, W);                                             \
         }                                                                                                          \
     }
 
@@ -141,33 +178,44 @@ static void set_up(struct bvh_packets *packets, const struct bvh_rays *rays, uin
     packets->width = width;
 }
 
-/* Origins of their own. Such packets are kept apart from those with a common one (caster.h), which would have to be set
- * up again. */
-static void place(struct bvh_packets *packets, const struct bvh_rays *rays, uint32_t n)
+/* Cuts rays at .. n into packets, `most` at most; gives how many, and where they begin and the last one ends. */
+static uint32_t cut(const struct bvh_rays *rays, uint32_t width, uint32_t at, uint32_t n, uint32_t most,
+                    uint32_t *first)
 {
-    const uint32_t width = packets->width;
-    if (width == 16)
-        place_16(packets->at.by16, rays, n);
-    else if (width == 8)
-        place_8(packets->at.by8, rays, n);
-    else
-        place_4(packets->at.by4, rays, n);
+    uint32_t packets = 0;
+    first[0] = at;
+    while (at < n && packets < most) {
+        uint32_t end = n - at < width ? n : at + width;
+        for (uint32_t i = at + 1; rays->begins != NULL && i < end; i++)
+            if (rays->begins[i]) end = i;
+        first[++packets] = at = end;
+    }
+    return packets;
 }
 
+/* Packets with origins of their own are kept apart from those with a common one (caster.h), which would have to be set
+ * up again. */
 void bvh_intersect(const struct bvh *bvh, struct bvh_packets *packets, const struct bvh_rays *rays, uint32_t n)
 {
     const uint32_t width = bvh->info.packet;
+    uint32_t first[BVH_CHUNK / 4 + 1];
     if (n == 0) return;
     if (width == 1 || rays->scattered) {
         intersect_1(bvh, rays, n);
         return;
     }
     set_up(packets, rays, width);
-    if (rays->ox != NULL) place(packets, rays, n);
-    if (width == 16)
-        intersect_16(bvh, packets->at.by16, rays, n);
-    else if (width == 8)
-        intersect_8(bvh, packets->at.by8, rays, n);
-    else
-        intersect_4(bvh, packets->at.by4, rays, n);
+    for (uint32_t at = 0, k; at < n; at = first[k]) {
+        k = cut(rays, width, at, n, BVH_CHUNK / width, first);
+        if (width == 16) {
+            if (rays->ox != NULL) place_16(packets->at.by16, rays, first, k);
+            intersect_16(bvh, packets->at.by16, rays, first, k);
+        } else if (width == 8) {
+            if (rays->ox != NULL) place_8(packets->at.by8, rays, first, k);
+            intersect_8(bvh, packets->at.by8, rays, first, k);
+        } else {
+            if (rays->ox != NULL) place_4(packets->at.by4, rays, first, k);
+            intersect_4(bvh, packets->at.by4, rays, first, k);
+        }
+    }
 }

@@ -35,6 +35,7 @@ struct import {
     int n_levels;
     double largest;   /* |coordinate| at any level, file units */
     uint32_t *corner; /* of one face */
+    float (*corner_uv)[2];
     size_t cap_corners;
     uint64_t n_faces, n_done; /* for the progress */
 };
@@ -103,13 +104,21 @@ static int add_face(struct import *im, const struct aiFace *face, const struct a
         void *corner = realloc(im->corner, cap * sizeof *im->corner);
         if (corner == NULL) return build_fail(b, SH_ENOMEM, err, "no memory for a face");
         im->corner = corner;
+        void *uv = b->spec->textures ? realloc(im->corner_uv, cap * sizeof *im->corner_uv) : NULL;
+        if (b->spec->textures && uv == NULL) return build_fail(b, SH_ENOMEM, err, "no memory for a face");
+        im->corner_uv = uv;
         im->cap_corners = cap;
     }
+    const struct aiVector3D *uv = b->spec->textures ? mesh->mTextureCoords[0] : NULL;
+    b->corner_uv = uv != NULL ? (const float(*)[2])im->corner_uv : NULL;
     for (unsigned i = 0; i < face->mNumIndices; i++) {
         if (face->mIndices[i] >= mesh->mNumVertices)
             return build_fail(b, SH_EINPUT, err, "index %u out of range; there are %u vertices", face->mIndices[i],
                               mesh->mNumVertices);
         im->corner[i] = b->mesh_vertex0 + face->mIndices[i];
+        if (uv == NULL) continue;
+        im->corner_uv[i][0] = uv[face->mIndices[i]].x;
+        im->corner_uv[i][1] = uv[face->mIndices[i]].y;
     }
     return build_polygon(b, im->corner, face->mNumIndices, label, err);
 }
@@ -144,6 +153,32 @@ static void keep_colour(const struct import *im, const struct aiMesh *mesh, stru
     surface->has_colour = 1;
 }
 
+/* The diffuse texture, a file or ("*3") one within this. What lies there unpacked is none that is read. */
+static int keep_texture(const struct import *im, const struct aiMesh *mesh, struct scene_surface *surface,
+                        struct sh_err *err)
+{
+    struct aiString path;
+    char name[sizeof path.data + 256];
+    const char *base = strrchr(im->b->spec->file, '/');
+    const struct aiTexture *within = NULL;
+    if (!im->b->spec->textures || surface->texture != 0 || mesh->mMaterialIndex >= im->in->mNumMaterials) return SH_OK;
+    if (aiGetMaterialTexture(im->in->mMaterials[mesh->mMaterialIndex], aiTextureType_DIFFUSE, 0, &path, NULL, NULL,
+                             NULL, NULL, NULL, NULL) != AI_SUCCESS)
+        return SH_OK;
+    if (path.data[0] == '*') {
+        unsigned long i = strtoul(path.data + 1, NULL, 10);
+        if (i >= im->in->mNumTextures || im->in->mTextures[i]->mHeight != 0) return SH_OK;
+        within = im->in->mTextures[i];
+    }
+    int len = snprintf(name, sizeof name, "%.255s%.*s",
+                       within == NULL ? ""
+                       : base != NULL ? base + 1
+                                      : im->b->spec->file,
+                       (int)path.length, path.data);
+    return build_texture(im->b, name, (size_t)len, within != NULL ? within->pcData : NULL,
+                         within != NULL ? within->mWidth : 0, &surface->texture, err);
+}
+
 static int label_of(struct import *im, const struct aiNode *node, const struct aiMesh *mesh, uint16_t *label,
                     struct sh_err *err)
 {
@@ -153,8 +188,9 @@ static int label_of(struct import *im, const struct aiNode *node, const struct a
         aiGetMaterialString(im->in->mMaterials[mesh->mMaterialIndex], AI_MATKEY_NAME, &material);
     int rc = build_label(im->b, object->data, strnlen(object->data, object->length), material.data,
                          strnlen(material.data, material.length), label, err);
-    if (rc == SH_OK) keep_colour(im, mesh, &im->b->scene->surface[*label]);
-    return rc;
+    if (rc != SH_OK) return rc;
+    keep_colour(im, mesh, &im->b->scene->surface[*label]);
+    return keep_texture(im, mesh, &im->b->scene->surface[*label], err);
 }
 
 static int add_mesh(struct import *im, const struct aiNode *node, const struct aiMesh *mesh, struct sh_err *err)
@@ -264,6 +300,7 @@ int import_assimp(struct scene_build *b, struct sh_err *err)
     if (rc == SH_OK && log.n > 0)
         sh_warn(b->report, "%s: %u warnings while read, the first: %s", b->name, log.n, log.first);
     free(im.corner);
+    free(im.corner_uv);
     aiReleaseImport(im.in);
     return rc;
 }

@@ -1,5 +1,6 @@
 /* Wavefront OBJ in double: v, f, o, g, usemtl, mtllib. Points and lines are counted; what has no shape is passed
  * over. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -14,8 +15,11 @@ struct span {
 struct obj {
     struct scene_build *b;
     struct text t;
-    uint32_t *corner; /* of one face */
+    uint32_t *corner;      /* of one face */
+    float (*corner_uv)[2]; /* likewise; only where textures are asked for */
     size_t cap_corners;
+    float (*uv)[2]; /* all vt so far */
+    size_t n_uv, cap_uv;
     struct span object, material, library; /* library: the last one named */
     uint16_t label;
     bool label_known;
@@ -59,16 +63,51 @@ static int read_vertex(struct obj *o, struct sh_err *err)
     return build_vertex(o->b, v, err);
 }
 
-/* One v, v/vt, v//vn or v/vt/vn; only v counts. */
-static int read_corner(struct obj *o, uint32_t *corner, struct sh_err *err)
+/* vt u [v [w]] */
+static int read_uv(struct obj *o, struct sh_err *err)
+{
+    double number[3] = {0.0, 0.0, 0.0};
+    int n = 0;
+    while (!at_statement_end(o)) {
+        if (n == 3 || !text_number(&o->t, &number[n])) return fail_at(o, err, "vt takes 1 to 3 numbers");
+        n++;
+    }
+    if (n == 0) return fail_at(o, err, "vt takes 1 to 3 numbers");
+    if (o->n_uv == o->cap_uv) {
+        size_t cap = o->cap_uv * 2 + 1024;
+        void *uv = realloc(o->uv, cap * sizeof *o->uv);
+        if (uv == NULL) return build_fail(o->b, SH_ENOMEM, err, "no memory for texture coordinates");
+        o->uv = uv;
+        o->cap_uv = cap;
+    }
+    o->uv[o->n_uv][0] = (float)number[0];
+    o->uv[o->n_uv++][1] = (float)number[1];
+    return SH_OK;
+}
+
+/* 0: the corner has none. */
+static int set_corner_uv(struct obj *o, int64_t index, float uv[2], struct sh_err *err)
+{
+    int64_t number = index < 0 ? (int64_t)o->n_uv + index : index - 1;
+    if (index != 0 && (number < 0 || number >= (int64_t)o->n_uv)) {
+        o->b->line = o->t.line;
+        return build_fail(o->b, SH_EINPUT, err, "vt index %lld out of range; %zu so far", (long long)index, o->n_uv);
+    }
+    for (int k = 0; k < 2; k++)
+        uv[k] = index != 0 ? o->uv[number][k] : (float)NAN;
+    return SH_OK;
+}
+
+/* One v, v/vt, v//vn or v/vt/vn; vn doesn't count, and vt where no textures are asked for. */
+static int read_corner(struct obj *o, uint32_t *corner, float uv[2], struct sh_err *err)
 {
     struct text at = o->t;
-    int64_t index, other;
+    int64_t index, other, texture = 0;
     bool ok = text_integer(&o->t, &index);
     for (int slash = 0; ok && slash < 2 && *o->t.p == '/'; slash++) {
         o->t.p++;
         if (slash == 0 && *o->t.p == '/') continue;
-        ok = text_integer(&o->t, &other);
+        ok = text_integer(&o->t, slash == 0 ? &texture : &other);
     }
     if (!ok || !text_at_word_end(&o->t)) {
         o->t = at;
@@ -82,7 +121,7 @@ static int read_corner(struct obj *o, uint32_t *corner, struct sh_err *err)
                           (long long)n);
     }
     *corner = o->b->vertex0 + (uint32_t)number;
-    return SH_OK;
+    return uv != NULL ? set_corner_uv(o, texture, uv, err) : SH_OK;
 }
 
 static int use_label(struct obj *o, struct sh_err *err)
@@ -102,9 +141,13 @@ static int read_face(struct obj *o, struct sh_err *err)
             void *corner = realloc(o->corner, cap * sizeof *o->corner);
             if (corner == NULL) return build_fail(o->b, SH_ENOMEM, err, "no memory for a face");
             o->corner = corner;
+            void *uv = o->b->spec->textures ? realloc(o->corner_uv, cap * sizeof *o->corner_uv) : NULL;
+            if (o->b->spec->textures && uv == NULL) return build_fail(o->b, SH_ENOMEM, err, "no memory for a face");
+            o->corner_uv = uv;
             o->cap_corners = cap;
         }
-        rc = read_corner(o, &o->corner[n++], err);
+        rc = read_corner(o, &o->corner[n], o->corner_uv != NULL ? o->corner_uv[n] : NULL, err);
+        n++;
     }
     if (rc != SH_OK) return rc;
     if (n == 0) return fail_at(o, err, "f takes three corners or more");
@@ -114,6 +157,7 @@ static int read_face(struct obj *o, struct sh_err *err)
         return SH_OK;
     }
     rc = use_label(o, err);
+    o->b->corner_uv = o->n_uv > 0 ? (const float(*)[2])o->corner_uv : NULL;
     return rc == SH_OK ? build_polygon(o->b, o->corner, n, o->label, err) : rc;
 }
 
@@ -191,6 +235,7 @@ static int read_statement(struct obj *o, struct sh_err *err)
             break;
         }
     }
+    if (len == 2 && memcmp(word, "vt", 2) == 0 && o->b->spec->textures) return read_uv(o, err);
     if (len == 6 && memcmp(word, "usemtl", 6) == 0) return read_name(o, &o->material);
     if (len == 6 && memcmp(word, "mtllib", 6) == 0) {
         o->t.continued = false; /* a backslash there may be a path's */
@@ -232,9 +277,11 @@ int read_obj(struct scene_build *b, struct sh_err *err)
     if (rc == SH_OK && o.n_unknown > 0)
         sh_warn(b->report, "%s: %llu unknown statements passed over; the first is '%s' in line %llu", b->name,
                 (unsigned long long)o.n_unknown, o.unknown, (unsigned long long)o.unknown_line);
-    if (rc == SH_OK && o.library.len > 0) read_mtl(b, o.library.text, o.library.len, first_surface);
+    if (rc == SH_OK && o.library.len > 0) rc = read_mtl(b, o.library.text, o.library.len, first_surface, err);
     b->scene->n_meshes++;
     free(o.corner);
+    free(o.corner_uv);
+    free(o.uv);
     text_close(&o.t);
     return rc;
 }

@@ -72,6 +72,8 @@ static int copy_surfaces(struct scene_build *b, const struct scene_surface *surf
         if (memchr(surface[i].object, '\0', SCENE_NAME_LEN) == NULL ||
             memchr(surface[i].material, '\0', SCENE_NAME_LEN) == NULL)
             return build_fail(b, SH_EINPUT, err, "surface %u: a name has no end", i);
+    for (uint32_t i = 0; i < n; i++)
+        b->scene->surface[i].texture = 0;
     b->scene->n_surfaces = n;
     return SH_OK;
 }
@@ -125,5 +127,11 @@ void scene_free(struct scene *scene)
     free(scene->triangle);
     free(scene->label);
     free(scene->surface);
+    free(scene->uv);
+    for (uint32_t i = 0; i < scene->n_textures; i++) {
+        free(scene->texture[i].file);
+        free(scene->texture[i].bytes);
+    }
+    free(scene->texture);
     free(scene);
 }

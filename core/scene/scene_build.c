@@ -57,6 +57,7 @@ void build_begin_file(struct scene_build *b, const struct scene_mesh_spec *spec)
     b->vertex0 = b->mesh_vertex0 = b->scene->n_vertices;
     b->triangle0 = b->scene->n_triangles;
     b->counts = (struct scene_counts){0};
+    b->corner_uv = NULL;
     b->not_simple = 0;
     b->file_ns = now_ns();
 }
@@ -114,6 +115,11 @@ int build_finish(struct scene_build *b, struct scene **out, struct sh_err *err)
     settle((void **)&s->vertex_m, s->n_vertices, sizeof *s->vertex_m);
     settle((void **)&s->triangle, s->n_triangles, sizeof *s->triangle);
     settle((void **)&s->label, s->n_triangles, sizeof *s->label);
+    if (s->n_textures == 0) {
+        free(s->uv);
+        s->uv = NULL;
+    }
+    if (s->uv != NULL) settle((void **)&s->uv, s->n_triangles, sizeof *s->uv);
     for (int k = 0; k < 3; k++) {
         s->min_m[k] = INFINITY;
         s->max_m[k] = -INFINITY;
@@ -178,8 +184,11 @@ static int grow_triangles(struct scene_build *b, uint64_t need, struct sh_err *e
     void *t = realloc(b->scene->triangle, cap * sizeof *b->scene->triangle);
     if (t != NULL) b->scene->triangle = t;
     void *l = t != NULL ? realloc(b->scene->label, cap * sizeof *b->scene->label) : NULL;
-    if (l == NULL) return build_fail(b, SH_ENOMEM, err, "no memory for %u triangles", cap);
-    b->scene->label = l;
+    if (l != NULL) b->scene->label = l;
+    void *uv = l != NULL && b->scene->uv != NULL ? realloc(b->scene->uv, cap * sizeof *b->scene->uv) : NULL;
+    if (uv != NULL) b->scene->uv = uv;
+    if (l == NULL || (b->scene->uv != NULL && uv == NULL))
+        return build_fail(b, SH_ENOMEM, err, "no memory for %u triangles", cap);
     b->cap_triangles = cap;
     return SH_OK;
 }
@@ -233,7 +242,26 @@ static bool has_area(const double *a, const double *b, const double *c)
     return sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]) > 1e-12 * longest2;
 }
 
-int build_triangle(struct scene_build *b, const uint32_t corner[3], uint16_t label, struct sh_err *err)
+static const float no_uv[3][2] = {{NAN, NAN}, {NAN, NAN}, {NAN, NAN}};
+
+/* The first triangle that has some makes room for those of all. */
+static int keep_uv(struct scene_build *b, const float uv[3][2], struct sh_err *err)
+{
+    struct scene *s = b->scene;
+    if (s->uv == NULL) {
+        if (uv == no_uv) return SH_OK;
+        s->uv = malloc(b->cap_triangles * sizeof *s->uv);
+        if (s->uv == NULL) return build_fail(b, SH_ENOMEM, err, "no memory for texture coordinates");
+        for (uint32_t i = 0; i < s->n_triangles; i++)
+            memcpy(s->uv[i], no_uv, sizeof no_uv);
+    }
+    memcpy(s->uv[s->n_triangles], uv, sizeof no_uv);
+    return SH_OK;
+}
+
+/* uv: of the corners, or no_uv. */
+static int add_triangle(struct scene_build *b, const uint32_t corner[3], const float uv[3][2], uint16_t label,
+                        struct sh_err *err)
 {
     struct scene *s = b->scene;
     if (!has_area(s->vertex_m[corner[0]], s->vertex_m[corner[1]], s->vertex_m[corner[2]])) {
@@ -244,9 +272,15 @@ int build_triangle(struct scene_build *b, const uint32_t corner[3], uint16_t lab
         int rc = grow_triangles(b, s->n_triangles + 1ull, err);
         if (rc != SH_OK) return rc;
     }
+    int rc = keep_uv(b, uv, err);
     memcpy(s->triangle[s->n_triangles], corner, sizeof *s->triangle);
     s->label[s->n_triangles++] = label;
-    return SH_OK;
+    return rc;
+}
+
+int build_triangle(struct scene_build *b, const uint32_t corner[3], uint16_t label, struct sh_err *err)
+{
+    return add_triangle(b, corner, b->corner_uv != NULL ? b->corner_uv : no_uv, label, err);
 }
 
 int build_polygon(struct scene_build *b, const uint32_t *corner, size_t n, uint16_t label, struct sh_err *err)
@@ -264,7 +298,11 @@ int build_polygon(struct scene_build *b, const uint32_t *corner, size_t n, uint1
     int rc = SH_OK;
     for (size_t i = 0; i + 2 < n && rc == SH_OK; i++) {
         const uint32_t *c = t->triangle[i];
-        rc = build_triangle(b, (uint32_t[3]){corner[c[0]], corner[c[1]], corner[c[2]]}, label, err);
+        float uv[3][2];
+        for (int k = 0; b->corner_uv != NULL && k < 3; k++)
+            memcpy(uv[k], b->corner_uv[c[k]], sizeof uv[k]);
+        rc = add_triangle(b, (uint32_t[3]){corner[c[0]], corner[c[1]], corner[c[2]]},
+                          b->corner_uv != NULL ? (const float(*)[2])uv : no_uv, label, err);
     }
     return rc;
 }
@@ -296,6 +334,7 @@ int build_label(struct scene_build *b, const char *object, size_t object_len, co
     struct scene *s = b->scene;
     struct scene_surface *fresh = &s->surface[s->n_surfaces]; /* room for one more than allowed */
     fresh->has_colour = 0;
+    fresh->texture = 0;
     unsigned cut = copy_name(fresh->object, object, object_len);
     cut += copy_name(fresh->material, material, material_len);
     struct scene_surface **found = tsearch(fresh, &b->surface_tree, compare_surfaces);
@@ -310,6 +349,44 @@ int build_label(struct scene_build *b, const char *object, size_t object_len, co
         b->counts.names_cut += cut;
     }
     *label = (uint16_t)(*found - s->surface);
+    return SH_OK;
+}
+
+/* A name in a mesh's file is that of a file in the same folder; other systems write \. */
+static char *beside(const struct scene_build *b, const char *name, size_t len)
+{
+    const char *slash = strrchr(b->spec->file, '/');
+    size_t folder = name[0] != '/' && slash != NULL ? (size_t)(slash - b->spec->file) + 1 : 0;
+    char *path = malloc(folder + len + 1);
+    if (path == NULL) return NULL;
+    memcpy(path, b->spec->file, folder);
+    for (size_t i = 0; i < len; i++)
+        path[folder + i] = name[i] == '\\' ? '/' : name[i];
+    path[folder + len] = '\0';
+    return path;
+}
+
+int build_texture(struct scene_build *b, const char *name, size_t len, const void *bytes, size_t n_bytes,
+                  uint16_t *number, struct sh_err *err)
+{
+    struct scene *s = b->scene;
+    char *file = beside(b, name, len);
+    for (uint32_t i = 0; file != NULL && i < s->n_textures; i++)
+        if (strcmp(s->texture[i].file, file) == 0) {
+            free(file);
+            *number = (uint16_t)(i + 1);
+            return SH_OK;
+        }
+    struct scene_texture *more = file != NULL ? realloc(s->texture, (s->n_textures + 1) * sizeof *s->texture) : NULL;
+    if (more != NULL) s->texture = more;
+    uint8_t *copy = more != NULL && bytes != NULL ? malloc(n_bytes) : NULL;
+    if (more == NULL || (bytes != NULL && copy == NULL)) {
+        free(file);
+        return build_fail(b, SH_ENOMEM, err, "no memory for a texture");
+    }
+    if (copy != NULL) memcpy(copy, bytes, n_bytes);
+    s->texture[s->n_textures++] = (struct scene_texture){file, copy, copy != NULL ? n_bytes : 0};
+    *number = (uint16_t)s->n_textures; /* one a surface at most */
     return SH_OK;
 }
 

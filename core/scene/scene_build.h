@@ -21,6 +21,7 @@ struct scene_build {
     uint32_t mesh_vertex0;       /* the scene's size before this mesh; messages count from here */
     struct scene_counts counts;
     uint64_t not_simple;
+    const float (*corner_uv)[2]; /* of the next polygon's corners; NULL: none */
     /* the builder's own */
     uint32_t cap_vertices, cap_triangles;
     void *surface_tree;
@@ -54,6 +55,11 @@ int build_polygon(struct scene_build *b, const uint32_t *corner, size_t n, uint1
 int build_label(struct scene_build *b, const char *object, size_t object_len, const char *material, size_t material_len,
                 uint16_t *label, struct sh_err *err);
 
+/* The number, from 1, of the texture in that file, named in the mesh's own file or library (beside which it lies), or
+ * (bytes not NULL) within it. *number stays where there is no memory. */
+int build_texture(struct scene_build *b, const char *name, size_t len, const void *bytes, size_t n_bytes,
+                  uint16_t *number, struct sh_err *err);
+
 /* Reports "reading FILE" about four times a second, once the load takes longer than a second. */
 void build_progress(struct scene_build *b, double fraction);
 
@@ -65,9 +71,9 @@ void build_base_name(const struct scene_build *b, const char **name, size_t *len
 
 /* The readers. Each has the spec, and the file's name, from the builder. */
 int read_obj(struct scene_build *b, struct sh_err *err);
-/* Colours of the surfaces from first_surface on, from the library that the OBJ names. Meshes often come
+/* Colours and textures of the surfaces from first_surface on, from the library that the OBJ names. Meshes often come
  * without it: then they have none, and whoever needs colours says so. */
-void read_mtl(struct scene_build *b, const char *name, size_t len, uint32_t first_surface);
+int read_mtl(struct scene_build *b, const char *name, size_t len, uint32_t first_surface, struct sh_err *err);
 int read_ply(struct scene_build *b, struct sh_err *err);
 int import_assimp(struct scene_build *b, struct sh_err *err);
 

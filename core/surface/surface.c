@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/surface/texture.h"
 #include "core/vecmath.h"
 
 int surface_table_alloc(uint32_t n, struct surface_table *table, struct sh_err *err)
@@ -16,18 +17,20 @@ int surface_table_alloc(uint32_t n, struct surface_table *table, struct sh_err *
 
 void surface_table_free(struct surface_table *table)
 {
+    surface_textures_free(table);
     free(table->surface);
     table->surface = NULL;
 }
 
-static double linear(double srgb)
+double surface_linear(double srgb)
 {
     return srgb <= 0.04045 ? srgb / 12.92 : pow((srgb + 0.055) / 1.055, 2.4);
 }
 
 double surface_luminance(const float rgb[3])
 {
-    return 0.2126 * linear((double)rgb[0]) + 0.7152 * linear((double)rgb[1]) + 0.0722 * linear((double)rgb[2]);
+    return 0.2126 * surface_linear((double)rgb[0]) + 0.7152 * surface_linear((double)rgb[1]) +
+           0.0722 * surface_linear((double)rgb[2]);
 }
 
 static void override(double *value, double said)
@@ -98,12 +101,23 @@ static void lambert(const double *restrict field, uint32_t surfaces, uint32_t n,
         rho[i] = field[(int64_t)(label[i] < surfaces ? label[i] : surfaces) * FIELDS] * cosi[i];
 }
 
+static void lambert_texels(const struct surface_table *table, uint32_t n, const uint32_t *label, const double *cosi,
+                           double *rho)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        uint32_t own = surface_of_label(label[i]), texel = own < table->n ? label[i] >> 16 : 0;
+        rho[i] = cosi[i] *
+                 (texel != 0 ? (texel - 1) / 65534.0 : table->surface[own < table->n ? own : table->n].reflectance);
+    }
+}
+
 VEC_CLONES
 static void lobes(const double *restrict field, uint32_t surfaces, uint32_t n, const uint32_t *restrict label,
                   const double *restrict cosi, double *restrict rho)
 {
     for (uint32_t i = 0; i < n; i++) {
-        int64_t at = (int64_t)(label[i] < surfaces ? label[i] : surfaces) * FIELDS;
+        uint32_t own = label[i] & 0xffff;
+        int64_t at = (int64_t)(own < surfaces ? own : surfaces) * FIELDS;
         double specular = field[at + 1], gloss = field[at + 2], retro = field[at + 3];
         double c2 = 2.0 * cosi[i] * cosi[i] - 1.0;
         double lobe = vec_exp(gloss * vec_log(c2 > 1e-300 ? c2 : 1e-300));
@@ -116,6 +130,9 @@ void surface_return(const struct surface_table *table, uint32_t n, const uint32_
                     double *rho)
 {
     const double *field = &table->surface[0].reflectance;
-    lambert(field, table->n, n, label, cos_incidence, rho);
+    if (table->texture != NULL)
+        lambert_texels(table, n, label, cos_incidence, rho);
+    else
+        lambert(field, table->n, n, label, cos_incidence, rho);
     if (table->has_lobes) lobes(field, table->n, n, label, cos_incidence, rho);
 }

@@ -5,7 +5,7 @@
 
 #include "drivers/host/host.h"
 
-enum { COMMAND_MAX = 1024, STALE_READS = 32 };
+enum { COMMAND_MAX = 1024, STALE_READS = 32, ANSWERS_MS = 200 };
 
 /* Keeps the frames that are in the parser. 1: the parser is at a text. */
 static int take_items(struct scanhead *sh)
@@ -47,7 +47,8 @@ static int wait_writable(struct scanhead *sh, int64_t deadline_ns)
     return rc == 0 && sh->ended ? host_gone(sh) : rc;
 }
 
-static int unplugged(struct scanhead *sh)
+/* What had come can still be read. */
+static int gone_while_writing(struct scanhead *sh)
 {
     sh->lost = sh->source.usb != NULL;
     return host_gone(sh);
@@ -63,10 +64,8 @@ static int send_all(struct scanhead *sh, const char *data, size_t len, int64_t d
             done += (size_t)n;
         else if (n < 0 && errno == EAGAIN)
             rc = wait_writable(sh, deadline_ns);
-        else if (n < 0 && errno == ENODEV)
-            rc = unplugged(sh);
-        else if (n < 0 && (errno == EPIPE || errno == ECONNRESET || errno == EIO))
-            rc = host_gone(sh);
+        else if (n < 0 && host_is_hang_up(sh, errno))
+            rc = gone_while_writing(sh);
         else if (n < 0 && errno != EINTR)
             rc = sh_fail(&sh->err, SH_EIO, "%s: cannot write: %s", sh->source.name, strerror(errno));
         if (rc != 0) {
@@ -104,6 +103,50 @@ static int copy_reply(struct scanhead *sh, char *reply, size_t reply_len)
     return SCANHEAD_OK;
 }
 
+/* What every head answers to *IDN?, and to nothing else: four fields (IEEE 488.2); an error's text is in quotes. */
+static int is_identity(const char *text)
+{
+    int commas = 0;
+    for (const char *p = text; *p != 0; p++)
+        commas += *p == ',';
+    return commas == 3 && strchr(text, '"') == NULL;
+}
+
+/* Passes lines over until every question has its answer. One that was given up may be lost: so once there is an answer,
+ * those to the others have ANSWERS_MS. */
+static int pass_over(struct scanhead *sh, int64_t deadline_ns)
+{
+    int answered = 0;
+    while (sh->source.asked > 0) {
+        int rc = take_items(sh);
+        if (rc == 1 && is_identity(sh->parser.text)) {
+            sh->source.asked--;
+            if (!answered++) deadline_ns = host_deadline_ns(ANSWERS_MS);
+        }
+        if (rc == 1) continue;
+        if (rc == 0 && sh->ended) return host_gone(sh);
+        if (rc == 0) rc = deadline_ns < host_deadline_ns(0) ? SH_ETIMEOUT : host_fill(sh, deadline_ns);
+        if (rc == SH_ETIMEOUT && answered)
+            sh->source.asked = 0;
+        else if (rc != 0)
+            return rc;
+    }
+    sh->source.unsettled = 0;
+    return 0;
+}
+
+/* The first exchange on a terminal. Between open() and raw mode the terminal echoes what the head sends, and the head
+ * takes it for commands; another program may have left half a line. So that line is ended, and the answers to all that
+ * are passed over up to the one to a question of our own. */
+static int settle(struct scanhead *sh, int64_t deadline_ns)
+{
+    static const char question[] = "\n*IDN?\n";
+    int rc = send_all(sh, question, sizeof question - 1, deadline_ns);
+    if (rc != 0) return rc;
+    sh->source.asked++;
+    return pass_over(sh, deadline_ns);
+}
+
 int scanhead_command(struct scanhead *sh, const char *command, char *reply, size_t reply_len, int timeout_ms)
 {
     char line[COMMAND_MAX + 1];
@@ -115,6 +158,7 @@ int scanhead_command(struct scanhead *sh, const char *command, char *reply, size
     line[len] = '\n';
     int64_t deadline_ns = host_deadline_ns(timeout_ms);
     rc = discard_stale(sh);
+    if (rc == 0 && sh->source.unsettled && !sh->ended) rc = settle(sh, deadline_ns);
     if (rc == 0) rc = sh->ended ? host_gone(sh) : send_all(sh, line, len + 1, deadline_ns);
     while (rc == 0) {
         rc = take_items(sh);

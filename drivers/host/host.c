@@ -3,7 +3,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #include "drivers/protocol/bytes.h"
 
@@ -17,7 +16,24 @@ _Static_assert(SCANHEAD_POINTS == (int)NATIVE_POINTS && SCANHEAD_POSES == (int)N
                    SCANHEAD_LOCAL == (int)NATIVE_LOCAL,
                "types, events and flags are those on the wire");
 
-int scanhead_open(const char *source, struct scanhead **out, char *err, size_t err_len)
+/* A source tried again and again while it isn't there. wrong_too: also when its name is wrong, for it was right once.
+ */
+static int open_in_time(const char *source, int wrong_too, int64_t deadline_ns, struct host_source *out,
+                        struct sh_err *err)
+{
+    struct host_usb_watch *watch = deadline_ns > host_deadline_ns(0) ? host_usb_watch_open(source) : NULL;
+    wrong_too |= strncmp(source, "tty:", 4) == 0; /* the node of one that is not plugged in isn't there */
+    for (;;) {
+        int rc = host_source_open(source, out, err);
+        if (rc == SH_OK || rc == SH_ENOMEM || (rc == SH_EINPUT && !wrong_too) || host_deadline_ns(0) >= deadline_ns ||
+            host_usb_watch_wait(watch, rc, deadline_ns) != 0) {
+            host_usb_watch_close(watch);
+            return rc;
+        }
+    }
+}
+
+int scanhead_open_within(const char *source, int timeout_ms, struct scanhead **out, char *err, size_t err_len)
 {
     struct sh_err why = {0};
     int rc;
@@ -25,26 +41,20 @@ int scanhead_open(const char *source, struct scanhead **out, char *err, size_t e
     *out = NULL;
     if (sh == NULL) {
         rc = sh_fail(&why, SH_ENOMEM, "no memory for a scan head handle");
-    } else if ((rc = host_source_open(source, &sh->source, &why)) != 0) {
+    } else if ((rc = open_in_time(source, 0, host_deadline_ns(timeout_ms), &sh->source, &why)) != 0) {
         free(sh);
     } else {
         native_parser_init(&sh->parser);
         host_turn_table(sh);
         *out = sh;
     }
-    if (err != NULL && err_len > 0) snprintf(err, err_len, "%s", why.text);
+    if (err != NULL && err_len > 0) snprintf(err, err_len, "%s", rc == SH_OK ? "" : why.text);
     return rc;
 }
 
-/* A source tried again and again while it isn't there; a wrong name is not tried again. */
-static int open_in_time(const char *source, int64_t deadline_ns, struct host_source *out, struct sh_err *err)
+int scanhead_open(const char *source, struct scanhead **out, char *err, size_t err_len)
 {
-    const struct timespec pause = {.tv_nsec = 50000000};
-    for (;;) {
-        int rc = host_source_open(source, out, err);
-        if (rc == SH_OK || rc == SH_ENOMEM || host_deadline_ns(0) >= deadline_ns) return rc;
-        nanosleep(&pause, NULL);
-    }
+    return scanhead_open_within(source, 0, out, err, err_len);
 }
 
 int scanhead_reattach(struct scanhead *sh, int timeout_ms)
@@ -56,7 +66,7 @@ int scanhead_reattach(struct scanhead *sh, int timeout_ms)
     sh->source.ops = NULL;
     sh->ended = 1;
     snprintf(name, sizeof name, "%s", sh->source.name);
-    int rc = open_in_time(name, host_deadline_ns(timeout_ms), &sh->source, &sh->err);
+    int rc = open_in_time(name, 1, host_deadline_ns(timeout_ms), &sh->source, &sh->err);
     if (rc != SH_OK) return rc;
     sh->ended = sh->lost = sh->stuck = 0;
     native_parser_resume(&sh->parser);
@@ -194,7 +204,8 @@ static int hand_out(struct scanhead *sh, const uint8_t *raw, struct scanhead_fra
 
 int host_gone(struct scanhead *sh)
 {
-    if (sh->lost) return sh_fail(&sh->err, SCANHEAD_ELOST, "%s: the head was unplugged", sh->source.name);
+    if (sh->lost)
+        return sh_fail(&sh->err, SCANHEAD_ELOST, "%s: the head was unplugged, or answers no more", sh->source.name);
     return sh_fail(&sh->err, SCANHEAD_ECLOSED, sh->source.is_file ? "%s: end of the recording" : "%s: the head is gone",
                    sh->source.name);
 }

@@ -38,6 +38,8 @@ struct host_source {
     int fd;
     struct host_usb *usb;
     int is_file, is_socket;
+    int unsettled;  /* a terminal: the head may have been sent an echo, or half a line, before it was ours */
+    int asked;      /* questions that went out to settle that, and have no answer yet */
     char name[256]; /* for messages, and to open it again */
 };
 
@@ -72,10 +74,20 @@ struct scanhead {
 
 /* Opens what `source` names, non-blocking. */
 int host_source_open(const char *source, struct host_source *out, struct sh_err *err);
+int host_source_is_usb(const char *source);
 /* usb.c: the same for "usb..."; out is zero but for its name. */
 int host_usb_open(const char *source, struct host_source *out, struct sh_err *err);
 extern const struct host_source_ops host_fd_ops;
 
+/* usb_watch.c: waits between two tries to open a source. NULL where a source is not on USB, or the system tells nothing
+ * of devices that come: then the waits are short. Devices that come after this are not missed. */
+struct host_usb_watch *host_usb_watch_open(const char *source);
+void host_usb_watch_close(struct host_usb_watch *watch);
+/* rc: why the last try failed. 0: try again, or the deadline is over; -1: a signal came. */
+int host_usb_watch_wait(struct host_usb_watch *watch, int rc, int64_t deadline_ns);
+
+/* io.c: whether an errno of the source's read or write means that the other side is gone. */
+int host_is_hang_up(const struct scanhead *sh, int error);
 /* What to say where nothing more will come. */
 int host_gone(struct scanhead *sh);
 

@@ -62,7 +62,7 @@ int host_wait(struct scanhead *sh, short events, int64_t deadline_ns, short *rev
 }
 
 /* A pty whose master is closed says EIO; a reset connection is as gone as a closed one. */
-static int is_hang_up(const struct scanhead *sh, int error)
+int host_is_hang_up(const struct scanhead *sh, int error)
 {
     if (sh->source.usb != NULL) return error == ENODEV;
     return !sh->source.is_file && (error == EIO || error == ECONNRESET || error == EPIPE || error == ENODEV ||
@@ -79,7 +79,7 @@ int host_fill(struct scanhead *sh, int64_t deadline_ns)
             native_parser_added(&sh->parser, (size_t)n);
             return 0;
         }
-        if (n == 0 || is_hang_up(sh, errno)) {
+        if (n == 0 || host_is_hang_up(sh, errno)) {
             native_parser_finish(&sh->parser);
             sh->ended = 1;
             sh->lost = sh->source.usb != NULL;

@@ -35,30 +35,36 @@ struct scanhead;
  * "tty:/dev/ttyACM0", "tcp:host:port", "fd:N" (taken over), or the path of a raw stream (.shs). On failure *out is NULL
  * and err (may be NULL) gets the reason. */
 int scanhead_open(const char *source, struct scanhead **out, char *err, size_t err_len);
+/* The same, and while the source isn't there (a head that is not plugged in, a device node without permissions yet)
+ * again and again for up to timeout_ms; < 0: for ever. On USB the system's hot-plug events wake it. A wrong source ends
+ * it at once, a signal early; it gives the reason of the last try. */
+int scanhead_open_within(const char *source, int timeout_ms, struct scanhead **out, char *err, size_t err_len);
 void scanhead_close(struct scanhead *sh);
 const char *scanhead_error(const struct scanhead *sh);
 
 /* After SCANHEAD_ELOST or SCANHEAD_ECLOSED, once all frames that had come were taken: waits until the same head is
  * there again and goes on with it. Counters, hash and what the stream has said go on too: a jump in the sequence tells
  * what was lost meanwhile. A USB head is the one with the same ids and serial number. SCANHEAD_ESTATE for a file or
- * "fd:N"; any other error: it did not come back in time; call again, or close. */
+ * "fd:N"; any other error: it did not come back in time, or a signal came; call again, or close. */
 int scanhead_reattach(struct scanhead *sh, int timeout_ms);
 
 /* Heads on USB now. */
 struct scanhead_usb_head {
     char source[192]; /* for scanhead_open: usb:vid:pid:serial */
     uint16_t vid, pid;
-    char serial[128], maker[128], product[128];
+    char serial[128], maker[128], product[128]; /* printable; other characters, and backslashes, as \xNN */
     int bus, device;
     double speed_bit_s; /* 0: unknown */
-    char problem[128];  /* why it can't be opened, e.g. no permission; empty: nothing */
+    char problem[320];  /* why it can't be opened, e.g. no permission; empty: nothing */
 };
 /* How many there are, of which at most max are described; or SCANHEAD_EIO with the reason in err (may be NULL). */
 int scanhead_list_usb(struct scanhead_usb_head *heads, int max, char *err, size_t err_len);
 
 /* Sends one command line and waits for its reply line (without its end). Frames that arrive meanwhile are kept and come
  * from scanhead_next() later; at most 64 MiB of them, then the oldest are dropped and counted (stats.dropped).
- * A reply "ERR n,..." is returned as it is, with SCANHEAD_OK: the command was answered. */
+ * A reply "ERR n,..." is returned as it is, with SCANHEAD_OK: the command was answered.
+ * The first command on a "tty:" is preceded by an empty line and *IDN?, and all reply lines up to the answer to it are
+ * passed over: a terminal may have echoed to the head what it sent before the terminal was in raw mode. */
 int scanhead_command(struct scanhead *sh, const char *command, char *reply, size_t reply_len, int timeout_ms);
 
 enum scanhead_frame_type { /* as on the wire */

@@ -32,12 +32,16 @@ static int open_tty(const char *path, struct host_source *out, struct sh_err *er
     struct termios tio;
     if (tcgetattr(out->fd, &tio) != 0)
         return sh_fail(err, SH_EINPUT, "%s: not a terminal device: %s", out->name, strerror(errno));
+    const int cooked = (tio.c_lflag & (ICANON | ECHO)) != 0;
     cfmakeraw(&tio);
     tio.c_cflag |= CLOCAL | CREAD;
     tio.c_cc[VMIN] = 1; /* else a read without data looks like the end */
     tio.c_cc[VTIME] = 0;
     if (tcsetattr(out->fd, TCSANOW, &tio) != 0)
         return sh_fail(err, SH_EIO, "%s: cannot set raw mode: %s", out->name, strerror(errno));
+    /* What came meanwhile has been changed, and echoed to the head; what is not there yet need not arrive. */
+    if (cooked) tcflush(out->fd, TCIOFLUSH);
+    out->unsettled = 1;
     return 0;
 }
 
@@ -155,13 +159,18 @@ static int open_file(const char *path, struct host_source *out, struct sh_err *e
     return 0;
 }
 
+int host_source_is_usb(const char *source)
+{
+    return strcmp(source, "usb") == 0 || strncmp(source, "usb:", 4) == 0;
+}
+
 int host_source_open(const char *source, struct host_source *out, struct sh_err *err)
 {
     memset(out, 0, sizeof *out);
     out->fd = -1;
     snprintf(out->name, sizeof out->name, "%s", source);
     int rc;
-    if (strcmp(source, "usb") == 0 || strncmp(source, "usb:", 4) == 0) return host_usb_open(source, out, err);
+    if (host_source_is_usb(source)) return host_usb_open(source, out, err);
     out->ops = &host_fd_ops;
     if (strncmp(source, "tty:", 4) == 0)
         rc = open_tty(source + 4, out, err);

@@ -14,12 +14,21 @@
 #include <time.h>
 
 /* A read is a multiple of every packet size (64, 512, 1024 bytes): so none can be sent more than it has room for. */
-enum { IN_TRANSFERS = 16, IN_BYTES = 64 << 10, OUT_BYTES = 2048, CANCEL_MS = 1000, FAILING_MS = 3000 };
+enum { IN_TRANSFERS = 16, IN_BYTES = 64 << 10, OUT_BYTES = 2048, CANCEL_MS = 1000 };
+/* How long a bus may fail with the device still on it, as it does until the hub has noticed an unplugged one. */
+enum { FAILING_MS = 1000, FAILING_PAUSE_MS = 20, RELAPSE_MS = 10000 };
 
 struct in_transfer {
     struct libusb_transfer *transfer;
-    int flying, error; /* under way; errno of why it could not be sent off any more */
-    size_t used;       /* bytes that were read out of it */
+    int flying;
+    int error;   /* errno of why it could not be sent off */
+    size_t used; /* bytes that were read out of it */
+};
+
+struct failing {
+    int n;              /* failures since something got through, or since RELAPSE_MS without one */
+    int64_t give_up_ns; /* the first of them, and FAILING_MS */
+    int64_t relapse_ns; /* the last of them, and RELAPSE_MS */
 };
 
 struct host_usb {
@@ -27,9 +36,8 @@ struct host_usb {
     libusb_device_handle *handle;
     struct usb_interface interface;
     struct in_transfer in[IN_TRANSFERS];
-    int n_in, head;     /* how many; the one to read from next */
-    int failures;       /* since data came */
-    int64_t give_up_ns; /* the first of them, and FAILING_MS */
+    int n_in, head; /* how many; the one to read from next */
+    struct failing in_failing, out_failing;
     struct libusb_transfer *out;
     int out_flying, out_error; /* errno of the write before */
     uint8_t *in_data, out_data[OUT_BYTES];
@@ -61,6 +69,13 @@ static void LIBUSB_CALL out_done(struct libusb_transfer *transfer)
     struct host_usb *usb = transfer->user_data;
     usb->out_flying = 0;
     usb->out_error = errno_of_status(transfer->status);
+    if (usb->out_error == 0) usb->out_failing.n = 0;
+}
+
+/* What the bus or the system says to a request: EPROTO may be over in a moment. */
+static int errno_of_rc(int rc)
+{
+    return rc == 0 ? 0 : rc == LIBUSB_ERROR_NO_DEVICE ? ENODEV : EPROTO;
 }
 
 /* Takes in what has happened, waiting for at most timeout. */
@@ -91,39 +106,64 @@ static void cancel_reads(struct host_usb *usb)
         handle_events(usb, 10000000);
 }
 
+static void cancel_write(struct host_usb *usb)
+{
+    if (usb->out_flying) libusb_cancel_transfer(usb->out);
+    int64_t deadline_ns = host_deadline_ns(CANCEL_MS);
+    while (usb->out_flying && host_deadline_ns(0) < deadline_ns)
+        handle_events(usb, 10000000);
+}
+
 static int submit(struct in_transfer *in)
 {
     in->used = 0;
     in->transfer->actual_length = 0;
     int rc = libusb_submit_transfer(in->transfer);
     in->flying = rc == 0;
-    in->error = rc == 0 ? 0 : rc == LIBUSB_ERROR_NO_DEVICE ? ENODEV : EIO;
+    in->error = errno_of_rc(rc);
     return rc;
 }
 
-/* An endpoint that stalled or a bus that garbled: everything is taken back and the endpoint started anew. A device that
- * is just being unplugged shows itself first in this way, until the hub has noticed: so the second try and later ones
- * give it a moment. */
-static void recover(struct host_usb *usb)
+/* An endpoint that stalled or a bus that garbled is started anew. A device that is just being unplugged shows itself
+ * first in this way, until the hub has noticed: so the second try and later ones give it a moment. 0: worth another
+ * try; ENODEV: the device is gone, or has not let anything through for too long. */
+static int recover(struct host_usb *usb, struct failing *failing, uint8_t endpoint)
+{
+    const struct timespec pause = {.tv_nsec = FAILING_PAUSE_MS * 1000000};
+    const int64_t now_ns = host_deadline_ns(0);
+    if (failing->n > 0 && now_ns > failing->relapse_ns) failing->n = 0;
+    if (failing->n++ == 0)
+        failing->give_up_ns = host_deadline_ns(FAILING_MS);
+    else if (now_ns > failing->give_up_ns)
+        return ENODEV;
+    else
+        nanosleep(&pause, NULL);
+    const int rc = libusb_clear_halt(usb->handle, endpoint);
+    failing->relapse_ns = host_deadline_ns(RELAPSE_MS);
+    return rc == LIBUSB_ERROR_NO_DEVICE ? ENODEV : 0;
+}
+
+/* The same for the reads: all are taken back first, and those that failed along with this one need no more. */
+static int recover_reads(struct host_usb *usb)
 {
     cancel_reads(usb);
-    if (usb->failures > 1) {
-        struct timespec pause = {.tv_nsec = 20000000};
-        nanosleep(&pause, NULL);
+    for (int i = 0; i < usb->n_in; i++) {
+        struct in_transfer *in = &usb->in[i];
+        if (!in->flying && errno_of_status(in->transfer->status) == EPROTO)
+            in->transfer->status = LIBUSB_TRANSFER_CANCELLED;
+        if (in->error == EPROTO) in->error = ECANCELED;
     }
-    libusb_clear_halt(usb->handle, usb->interface.in);
+    return recover(usb, &usb->in_failing, usb->interface.in);
 }
 
 /* The transfer at hand is used up: sends it off again, and goes on to the next. */
 static int turn(struct host_usb *usb)
 {
     struct in_transfer *in = &usb->in[usb->head];
-    int error = errno_of_status(in->transfer->status);
-    if (in->transfer->actual_length > 0) usb->failures = 0;
-    if (error == EPROTO && usb->failures++ == 0) usb->give_up_ns = host_deadline_ns(FAILING_MS);
-    if (error == EPROTO && host_deadline_ns(0) > usb->give_up_ns) error = EIO;
-    if (error == EPROTO) recover(usb);
-    if (error == ENODEV || error == EIO) {
+    int error = in->error != 0 ? in->error : errno_of_status(in->transfer->status);
+    if (in->transfer->actual_length > 0) usb->in_failing.n = 0;
+    if (error == EPROTO) error = recover_reads(usb);
+    if (error == ENODEV) {
         in->error = error;
         return error;
     }
@@ -145,12 +185,12 @@ static ssize_t usb_read(struct host_source *source, void *to, size_t len)
             in->used += n;
             return (ssize_t)n;
         }
-        int error = in->error;
-        if (error == 0 && !in->flying)
+        int error = 0;
+        if (!in->flying)
             error = turn(usb);
-        else if (error == 0 && looked++)
+        else if (looked++)
             error = EAGAIN;
-        else if (error == 0 && handle_events(usb, 0) != 0)
+        else if (handle_events(usb, 0) != 0)
             error = errno;
         if (error != 0) {
             errno = error;
@@ -159,20 +199,25 @@ static ssize_t usb_read(struct host_source *source, void *to, size_t len)
     }
 }
 
+/* A write that failed is not sent again: the head may have it. Its command gets no reply in time, the next one goes out
+ * when the endpoint has been started anew. */
 static ssize_t usb_write(struct host_source *source, const void *data, size_t len)
 {
     struct host_usb *usb = source->usb;
     if (usb->out_flying && handle_events(usb, 0) != 0) return -1;
-    errno = usb->out_flying ? EAGAIN : usb->out_error;
-    usb->out_error = 0;
-    if (errno != 0) return -1;
+    int error = usb->out_flying ? EAGAIN : usb->out_error;
+    if (error == EPROTO) error = recover(usb, &usb->out_failing, usb->interface.out);
+    if (error != 0) {
+        errno = error;
+        return -1;
+    }
     size_t n = len < OUT_BYTES ? len : OUT_BYTES;
     memcpy(usb->out_data, data, n);
     usb->out->length = (int)n;
-    int rc = libusb_submit_transfer(usb->out);
-    usb->out_flying = rc == 0;
-    if (rc == 0) return (ssize_t)n;
-    errno = rc == LIBUSB_ERROR_NO_DEVICE ? ENODEV : EIO;
+    usb->out_error = errno_of_rc(libusb_submit_transfer(usb->out));
+    usb->out_flying = usb->out_error == 0;
+    if (usb->out_flying) return (ssize_t)n;
+    errno = usb->out_error == ENODEV ? ENODEV : EAGAIN;
     return -1;
 }
 
@@ -213,8 +258,8 @@ static void usb_close(struct host_source *source)
 {
     struct host_usb *usb = source->usb;
     session(usb, 0);
+    cancel_write(usb);
     cancel_reads(usb);
-    if (usb->out_flying && libusb_cancel_transfer(usb->out) == 0) handle_events(usb, 100000000);
     libusb_release_interface(usb->handle, usb->interface.number);
     usb_free(usb);
 }

@@ -6,7 +6,9 @@
 
 #include "drivers/host/usb.h"
 
-#define RULE "install 70-scanhead.rules (make install), then plug the head in again, or be root"
+#define RULE                                                                                                 \
+    "no permission; the udev rule gives it: `sudo make install`, or copy drivers/host/70-scanhead.rules to " \
+    "/etc/udev/rules.d; then `sudo udevadm control --reload`, and plug the head in again"
 
 /* "1209:" or "1209" -> number; NULL when it isn't one to four hexadecimal digits. */
 static const char *parse_id(const char *text, int *id)
@@ -67,11 +69,19 @@ static int is_wanted_id(const struct usb_wanted *wanted, const struct libusb_dev
     return (wanted->vid < 0 || wanted->vid == d->idVendor) && (wanted->pid < 0 || wanted->pid == d->idProduct);
 }
 
+/* A device may call itself anything; what goes to terminals and logs is printable, and still tells two devices apart:
+ * other characters, and backslashes, as \xNN. What does not fit is left out. */
 static void read_string(libusb_device_handle *handle, uint8_t index, char *text, size_t len)
 {
     unsigned char ascii[128];
-    int n = index != 0 ? libusb_get_string_descriptor_ascii(handle, index, ascii, sizeof ascii - 1) : 0;
-    snprintf(text, len, "%.*s", n > 0 ? n : 0, (const char *)ascii);
+    int n = index != 0 ? libusb_get_string_descriptor_ascii(handle, index, ascii, sizeof ascii) : 0;
+    size_t used = 0;
+    for (int i = 0; i < n; i++) {
+        const int plain = ascii[i] >= 0x20 && ascii[i] < 0x7f && ascii[i] != '\\';
+        if (used + (plain ? 1 : 4) >= len) break;
+        used += (size_t)snprintf(text + used, len - used, plain ? "%c" : "\\x%02x", ascii[i]);
+    }
+    text[used] = '\0';
 }
 
 struct search {
@@ -84,6 +94,14 @@ struct search {
     char others[256];
     char refused[64];
 };
+
+/* For the message that there are several; where there is no room for all, it shows that. */
+static void name_another(struct search *s, const char *name)
+{
+    const size_t used = strlen(s->others), room = sizeof s->others - used;
+    if ((size_t)snprintf(s->others + used, room, "%s%s", used > 0 ? ", " : "", name) >= room)
+        memcpy(s->others + sizeof s->others - sizeof "...", "...", sizeof "...");
+}
 
 static void try_device(struct search *s, libusb_device *device)
 {
@@ -107,8 +125,7 @@ static void try_device(struct search *s, libusb_device *device)
         return;
     }
     snprintf(name, sizeof name, "usb:%04x:%04x%s%s", d.idVendor, d.idProduct, serial[0] != 0 ? ":" : "", serial);
-    size_t used = strlen(s->others);
-    snprintf(s->others + used, sizeof s->others - used, "%s%s", used > 0 ? ", " : "", name);
+    name_another(s, name);
     if (s->n++ > 0) {
         libusb_close(handle);
         return;
@@ -137,8 +154,7 @@ int host_usb_find(libusb_context *ctx, const struct usb_wanted *wanted, libusb_d
     if (s.handle != NULL) libusb_close(s.handle);
     if (s.n > 1)
         return sh_fail(err, SH_EINPUT, "%s: %d heads are plugged in; name one of them: %s", asked, s.n, s.others);
-    if (s.error == LIBUSB_ERROR_ACCESS)
-        return sh_fail(err, SH_EPERM, "%s: no permission for the head %s: " RULE, asked, s.refused);
+    if (s.error == LIBUSB_ERROR_ACCESS) return sh_fail(err, SH_EPERM, "%s: the head %s: " RULE, asked, s.refused);
     if (s.error != 0)
         return sh_fail(err, SH_EIO, "%s: cannot open the head %s: %s", asked, s.refused, libusb_strerror(s.error));
     return sh_fail(err, SH_ELOST, "%s: no such head on USB; scanhead list shows those there are", asked);
@@ -156,8 +172,7 @@ static void describe(libusb_device *device, const struct libusb_device_descripto
     if (speed > 0 && (size_t)speed < sizeof rates / sizeof rates[0]) head->speed_bit_s = rates[speed];
     int rc = libusb_open(device, &handle);
     if (rc != 0) {
-        snprintf(head->problem, sizeof head->problem, "%s",
-                 rc == LIBUSB_ERROR_ACCESS ? "no permission: " RULE : libusb_strerror(rc));
+        snprintf(head->problem, sizeof head->problem, "%s", rc == LIBUSB_ERROR_ACCESS ? RULE : libusb_strerror(rc));
     } else {
         read_string(handle, d->iSerialNumber, head->serial, sizeof head->serial);
         read_string(handle, d->iManufacturer, head->maker, sizeof head->maker);

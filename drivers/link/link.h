@@ -27,7 +27,7 @@ struct link_spec {
     /* usb; address, port and path as struct usb_backend_spec has them, which explains these as well */
     int backend; /* enum usb_backend_type */
     int speed;   /* enum usb_rate: the fastest the device can do */
-    int attach, vid, pid;
+    int attach, retry_ms, vid, pid;
     char udc[64];
     char serial[64]; /* empty: no serial number string */
 };
@@ -39,12 +39,13 @@ enum link_event_kind {
     LINK_WRITABLE, /* write() will take something (only for sessions in want_write) */
     LINK_WOKEN,    /* wake_fd was signalled; poll has drained it (eventfd) */
     LINK_REFUSED,  /* somebody was turned away: all sessions taken */
+    LINK_NOTICE,   /* who runs the head should know: the text is in peer */
 };
 
 struct link_event {
     enum link_event_kind kind;
-    int session;   /* 0..max_sessions-1 */
-    char peer[64]; /* for LINK_OPENED, LINK_CLOSED, LINK_REFUSED: who, for the log */
+    int session;    /* 0..max_sessions-1 */
+    char peer[200]; /* for LINK_OPENED, LINK_CLOSED, LINK_REFUSED: who, for the log */
 };
 
 struct link_ops {

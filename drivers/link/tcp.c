@@ -7,7 +7,6 @@
 #include <fcntl.h>
 #include <netdb.h>
 #include <netinet/in.h>
-#include <netinet/tcp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,6 +14,7 @@
 #include <unistd.h>
 
 #include "drivers/link/link_util.h"
+#include "drivers/link/socket.h"
 
 enum { SEND_BUFFER_BYTES = 1 << 20, BACKLOG = 128 };
 
@@ -111,16 +111,6 @@ static double tcp_capacity(const void *link)
     return 0;
 }
 
-static void tcp_tune(int fd)
-{
-    const int one = 1, idle_s = 10, interval_s = 5, probes = 3;
-    setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &one, sizeof one);
-    setsockopt(fd, SOL_SOCKET, SO_KEEPALIVE, &one, sizeof one);
-    setsockopt(fd, IPPROTO_TCP, TCP_KEEPIDLE, &idle_s, sizeof idle_s);
-    setsockopt(fd, IPPROTO_TCP, TCP_KEEPINTVL, &interval_s, sizeof interval_s);
-    setsockopt(fd, IPPROTO_TCP, TCP_KEEPCNT, &probes, sizeof probes);
-}
-
 /* Without a free descriptor accept fails and the listener stays readable: poll would spin. */
 static int tcp_accept(struct tcp_link *tcp, struct sockaddr_storage *from, socklen_t *len, int *starved)
 {
@@ -152,7 +142,7 @@ static void tcp_welcome(struct tcp_link *tcp, struct link_events *events)
             link_events_push(events, LINK_REFUSED, 0, peer);
             continue;
         }
-        tcp_tune(fd);
+        socket_tune(fd);
         struct tcp_session *session = &tcp->session[slot];
         session->state = TCP_OPEN;
         session->fd = fd;

@@ -16,6 +16,7 @@ struct usb_link {
     const struct usb_backend_ops *ops;
     void *backend;
     int told[SCANHEAD_USB_SESSIONS]; /* the caller takes it to be open */
+    const char *news;                /* the back end's, until told */
 };
 
 static const char *const session_names[] = {[CONSOLE_SESSION] = "usb console", [STREAM_SESSION] = "usb stream"};
@@ -26,8 +27,10 @@ static int usb_open(const struct link_spec *spec, void **link, struct sh_err *er
     if (self == NULL) return sh_fail(err, SH_ENOMEM, "link usb: no memory");
     struct usb_identity id = {
         .vid = (uint16_t)spec->vid, .pid = (uint16_t)spec->pid, .highest = (enum usb_rate)spec->speed};
-    struct usb_backend_spec backend = {
-        .type = (enum usb_backend_type)spec->backend, .port = spec->port, .attach = spec->attach};
+    struct usb_backend_spec backend = {.type = (enum usb_backend_type)spec->backend,
+                                       .port = spec->port,
+                                       .attach = spec->attach,
+                                       .retry_ms = spec->retry_ms};
     snprintf(id.serial, sizeof id.serial, "%s", spec->serial);
     snprintf(backend.address, sizeof backend.address, "%s", spec->address);
     snprintf(backend.path, sizeof backend.path, "%s", spec->path);
@@ -108,7 +111,7 @@ static void tell(struct usb_link *self, int i, uint32_t want_write, struct link_
 
 static int has_news(const struct usb_link *self, uint32_t want_write)
 {
-    int news = self->ops->more(self->backend);
+    int news = self->ops->more(self->backend) || self->news != NULL;
     for (int i = 0; i < SCANHEAD_USB_SESSIONS; i++)
         news |= has_to_tell(self, i) || is_readable(self, i) || ((want_write >> i & 1u) != 0 && is_writable(self, i));
     return news;
@@ -129,6 +132,8 @@ static int usb_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     self->ops->flush(self->backend);
     for (int i = 0; i < SCANHEAD_USB_SESSIONS; i++)
         tell(self, i, want_write, &events);
+    if (self->news == NULL) self->news = self->ops->news(self->backend);
+    if (self->news != NULL && link_events_push(&events, LINK_NOTICE, 0, self->news)) self->news = NULL;
     return events.n;
 }
 

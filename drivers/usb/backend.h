@@ -4,6 +4,7 @@
 #define DRIVERS_USB_BACKEND_H
 
 #include <poll.h>
+#include <sys/socket.h>
 
 #include "drivers/usb/usb.h"
 
@@ -18,6 +19,7 @@ struct usb_backend_spec {
     char path[256];   /* usbredir: Unix socket, instead of address and port */
     char udc[64];     /* functionfs: name of the controller; empty: the first free one */
     int attach;       /* usbip: plug into this machine's vhci_hcd; usbredir: connect instead of listening */
+    int retry_ms;     /* with attach: time between attempts to come back after the host has let go; 0: 1000 */
 };
 
 struct usb_backend_ops {
@@ -39,6 +41,9 @@ struct usb_backend_ops {
     int (*handle)(void *backend, const struct pollfd *fds, int n, int (*go_on)(void *ctx), void *ctx);
     int (*more)(const void *backend);
 
+    /* What who runs the head should know, one line, and each only once; NULL: nothing. Valid until the next call. */
+    const char *(*news)(void *backend);
+
     /* Sends what the core has completed, as far as the wire takes it. After usb_device_write and usb_device_read. */
     void (*flush)(void *backend);
 
@@ -53,6 +58,16 @@ const struct usb_backend_ops *usb_backend_ops_get(enum usb_backend_type type);
  * path is taken over. `what` names it in errors; name gets "127.0.0.1:3240" or the path. backend_socket.c */
 int usb_backend_socket(const struct usb_backend_spec *spec, const char *what, int *fd, char *name, size_t len,
                        struct sh_err *err);
+/* Where a socket that was connected by usb_backend_socket leads, and the way there once more: without waiting and
+ * without asking for names. 0: *fd is connected; EINPROGRESS: it is when poll(2) finds it writable, and SO_ERROR says
+ * how it went; else an errno, and *fd is -1. backend_socket.c */
+struct usb_backend_address {
+    struct sockaddr_storage at;
+    socklen_t len;
+};
+void usb_backend_peer(const struct usb_backend_spec *spec, int fd, struct usb_backend_address *out);
+int usb_backend_connect(const struct usb_backend_address *to, int *fd);
+int usb_backend_connect_error(int fd);
 /* Before closing: nothing more from us, and wait until the peer has read it and hung up, or timeout_ms pass without a
  * byte, eight times that at most. To close with requests of the peer unread would throw away replies on their way.
  * backend_socket.c */

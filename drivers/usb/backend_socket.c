@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <netdb.h>
 #include <netinet/in.h>
-#include <netinet/tcp.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/socket.h>
@@ -27,7 +26,6 @@ static int start(int fd, const struct sockaddr *at, socklen_t len, int connectin
     const int one = 1;
     if (connecting) return connect(fd, at, len);
     setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
-    if (at->sa_family != AF_UNIX) setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &one, sizeof one); /* inherited */
     return bind(fd, at, len) == 0 ? listen(fd, BACKLOG) : -1;
 }
 
@@ -43,25 +41,76 @@ static int open_socket(const struct sockaddr *at, socklen_t len, int connecting)
     return -1;
 }
 
-/* Nobody answers on it: its owner is gone without removing it. */
-static int is_left_behind(const struct sockaddr_un *at)
+int usb_backend_connect(const struct usb_backend_address *to, int *fd)
+{
+    *fd = socket(to->at.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+    if (*fd < 0) return errno;
+    if (connect(*fd, (const struct sockaddr *)&to->at, to->len) == 0) return 0;
+    const int error = errno;
+    if (error == EINPROGRESS) return error;
+    close(*fd);
+    *fd = -1;
+    return error;
+}
+
+/* Where nobody listens on a port of this machine, TCP may connect a socket to itself, from that very port. */
+static int is_own(int fd)
+{
+    struct sockaddr_storage here = {0}, there = {0};
+    socklen_t len = sizeof here;
+    if (getsockname(fd, (struct sockaddr *)&here, &len) != 0 || here.ss_family == AF_UNIX) return 0;
+    len = sizeof there;
+    return getpeername(fd, (struct sockaddr *)&there, &len) == 0 && memcmp(&here, &there, sizeof here) == 0;
+}
+
+int usb_backend_connect_error(int fd)
+{
+    int error = 0;
+    socklen_t len = sizeof error;
+    if (getsockopt(fd, SOL_SOCKET, SO_ERROR, &error, &len) != 0) return errno;
+    return error == 0 && is_own(fd) ? ECONNREFUSED : error;
+}
+
+static int unix_address(const char *path, struct usb_backend_address *out)
+{
+    struct sockaddr_un at = {.sun_family = AF_UNIX};
+    if (strlen(path) >= sizeof at.sun_path) return 0;
+    strcpy(at.sun_path, path);
+    memcpy(&out->at, &at, sizeof at);
+    out->len = sizeof at;
+    return 1;
+}
+
+void usb_backend_peer(const struct usb_backend_spec *spec, int fd, struct usb_backend_address *out)
+{
+    if (spec->path[0] != '\0') {
+        unix_address(spec->path, out); /* it has fitted before */
+        return;
+    }
+    out->len = sizeof out->at;
+    if (getpeername(fd, (struct sockaddr *)&out->at, &out->len) != 0) out->len = 0;
+}
+
+/* Nobody answers on it: its owner is gone without removing it. One whose queue is full lives; that is not waited for.
+ */
+static int is_left_behind(const char *path, const struct usb_backend_address *at)
 {
     struct stat st;
-    if (lstat(at->sun_path, &st) != 0 || !S_ISSOCK(st.st_mode)) return 0;
-    int fd = open_socket((const struct sockaddr *)at, sizeof *at, 1);
+    int fd;
+    if (lstat(path, &st) != 0 || !S_ISSOCK(st.st_mode)) return 0;
+    const int error = usb_backend_connect(at, &fd);
     if (fd >= 0) close(fd);
-    return fd < 0 && errno == ECONNREFUSED;
+    return error == ECONNREFUSED;
 }
 
 static int unix_socket(const struct usb_backend_spec *spec, const char *what, int *fd, struct sh_err *err)
 {
-    struct sockaddr_un at = {.sun_family = AF_UNIX};
-    if (strlen(spec->path) >= sizeof at.sun_path)
+    struct usb_backend_address at;
+    if (!unix_address(spec->path, &at))
         return sh_fail(err, SH_EINPUT, "%s:%s: the path is too long for a socket; allowed %zu bytes", what, spec->path,
-                       sizeof at.sun_path - 1);
-    strcpy(at.sun_path, spec->path);
-    if (!spec->attach && is_left_behind(&at)) unlink(at.sun_path);
-    *fd = open_socket((struct sockaddr *)&at, sizeof at, spec->attach);
+                       sizeof((struct sockaddr_un *)0)->sun_path - 1);
+    if (!spec->attach && is_left_behind(spec->path, &at)) unlink(spec->path);
+    *fd = open_socket((struct sockaddr *)&at.at, at.len, spec->attach);
     if (*fd >= 0) return SH_OK;
     return sh_fail(err, error_code(errno), "%s:%s: cannot %s: %s%s", what, spec->path,
                    spec->attach ? "connect" : "listen", strerror(errno),

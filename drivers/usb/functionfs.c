@@ -13,17 +13,9 @@
 #include "drivers/usb/backend.h"
 #include "drivers/usb/functionfs_private.h"
 
-enum { MAX_DATA_STAGE = 4096, CLOSE_WAIT_MS = 500 };
-
-struct functionfs {
-    struct usb_device *device;
-    struct gadget gadget;
-    int ep0;
-    int backlog; /* stopped before everything was looked at */
-    struct ffs_pipes pipes;
-    struct ffs_console console;
-    uint8_t data[MAX_DATA_STAGE];
-};
+/* MAX_TAKEN: completions before ep0 is looked at again, and MAX_EVENTS: events of ep0 within one call. Whatever the
+ * kernel's answers are, both get their turn, and so does the owner. */
+enum { CLOSE_WAIT_MS = 500, MAX_TAKEN = 2 * FFS_SLOTS * FFS_MAX_PIPES, MAX_EVENTS = 64 };
 
 static void on_complete(void *ctx, struct usb_transfer *transfer)
 {
@@ -101,14 +93,8 @@ static void disable(struct functionfs *self)
 /* The host has configured the device. */
 static void enable(struct functionfs *self)
 {
-    const struct usb_ctrlrequest setup = {
-        .bRequest = USB_REQ_SET_CONFIGURATION,
-#if __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__
-        .wValue = USB_CONFIGURATION << 8
-#else
-        .wValue = USB_CONFIGURATION
-#endif
-    };
+    struct usb_ctrlrequest setup = {.bRequest = USB_REQ_SET_CONFIGURATION};
+    le_put16(&setup.wValue, USB_CONFIGURATION);
     disable(self); /* the kernel leaves out the event before when it was not read in time */
     usb_device_attach(self->device, gadget_rate(&self->gadget), on_complete, self);
     usb_device_assume_address(self->device);
@@ -124,13 +110,21 @@ static void stall(struct functionfs *self, int in)
     (void)n; /* fails, as it must */
 }
 
-/* FunctionFS counts interfaces from 0, the model from where the part begins. */
+/* The kernel has put its own numbers in wIndex: interfaces count from 0, endpoints from 1 in the order of our
+ * descriptors. To the model's. An endpoint that nobody described becomes endpoint 0, and no function answers for it. */
+static void translate_index(const struct functionfs *self, struct usb_ctrlrequest *setup)
+{
+    const unsigned index = le_get16(&setup->wIndex), recipient = setup->bRequestType & USB_RECIP_MASK;
+    if (recipient == USB_RECIP_INTERFACE && (index & 0xff) < self->gadget.part.n_interfaces)
+        le_put16(&setup->wIndex, (uint16_t)((index & 0xff00u) | self->gadget.interface[index & 0xff]));
+    if (recipient == USB_RECIP_ENDPOINT) le_put16(&setup->wIndex, ffs_pipes_address(&self->pipes, index));
+}
+
 static void answer(struct functionfs *self, struct usb_ctrlrequest setup)
 {
     const int in = (setup.bRequestType & USB_DIR_IN) != 0;
-    const unsigned length = le_get16(&setup.wLength), index = le_get16(&setup.wIndex);
-    if ((setup.bRequestType & USB_RECIP_MASK) == USB_RECIP_INTERFACE && (index & 0xff) < self->gadget.part.n_interfaces)
-        le_put16(&setup.wIndex, (uint16_t)((index & 0xff00u) | self->gadget.interface[index & 0xff]));
+    const unsigned length = le_get16(&setup.wLength);
+    translate_index(self, &setup);
     int n = USB_STALL;
     if (in) {
         if (length <= sizeof self->data) n = usb_device_control(self->device, &setup, self->data, length);
@@ -182,18 +176,18 @@ static int functionfs_handle(void *backend, const struct pollfd *fds, int n, int
 {
     struct functionfs *self = backend;
     if (n != N_FDS) return SH_OK;
-    int going = go_on(ctx);
+    int going = go_on(ctx), any = 1;
     /* What came on the endpoints came before the event on ep0: a session is not closed before its last data are in. */
-    int any = 1;
-    while (going && any) {
-        while (going && ffs_pipes_take(&self->pipes))
+    for (int events = 0; going && any && events < MAX_EVENTS; events++) {
+        int taken = 0;
+        for (; going && taken < MAX_TAKEN && ffs_pipes_take(&self->pipes); taken++)
             going = go_on(ctx);
-        any = going && take_event(self);
+        any = going && (take_event(self) || taken == MAX_TAKEN);
         going = going && go_on(ctx);
     }
     if (going && (fds[AT_TTY].fd == self->console.fd || fds[AT_TIMER].revents != 0))
         ffs_console_handle(&self->console, fds[AT_TTY].fd >= 0 ? fds[AT_TTY].revents : 0, fds[AT_TIMER].revents != 0);
-    self->backlog = !going;
+    self->backlog = !going || any;
     functionfs_flush(self);
     return SH_OK;
 }
@@ -202,6 +196,12 @@ static int functionfs_more(const void *backend)
 {
     const struct functionfs *self = backend;
     return self->backlog;
+}
+
+static const char *functionfs_news(void *backend)
+{
+    (void)backend;
+    return NULL;
 }
 
 static void functionfs_close(void *backend)
@@ -218,6 +218,7 @@ const struct usb_backend_ops usb_backend_functionfs = {
     .prepare = functionfs_prepare,
     .handle = functionfs_handle,
     .more = functionfs_more,
+    .news = functionfs_news,
     .flush = functionfs_flush,
     .close = functionfs_close,
 };

@@ -91,6 +91,7 @@ static void to_kernel(struct ffs_pipes *pipes, struct ffs_pipe *pipe, struct ffs
 {
     const int in = is_in(pipe);
     slot->state = FFS_AT_KERNEL;
+    slot->start = pipes->start;
     submit(pipes, pipe, slot, &slot->io, in ? slot->transfer.actual : FFS_SLOT_BYTES);
     if (in && slot->n_io != 0 && slot->transfer.zero_packet) submit(pipes, pipe, slot, &slot->zero, 0);
     if (slot->n_io == 0) slot->state = FFS_IDLE;
@@ -109,10 +110,14 @@ static void set_going(struct ffs_pipes *pipes, struct ffs_pipe *pipe, struct ffs
 void ffs_pipes_start(struct ffs_pipes *pipes)
 {
     pipes->running = 1;
+    pipes->start++;
     for (int i = 0; i < pipes->n; i++) {
-        pipes->pipe[i].epoch = usb_device_epoch(pipes->device, pipes->pipe[i].address);
-        for (int k = 0; k < FFS_SLOTS; k++)
-            if (pipes->pipe[i].slot[k].state == FFS_IDLE) set_going(pipes, &pipes->pipe[i], &pipes->pipe[i].slot[k]);
+        struct ffs_pipe *pipe = &pipes->pipe[i];
+        pipe->epoch = usb_device_epoch(pipes->device, pipe->address);
+        for (int k = 0; k < FFS_SLOTS; k++) {
+            pipe->slot[k].failures = 0;
+            if (pipe->slot[k].state == FFS_IDLE) set_going(pipes, pipe, &pipe->slot[k]);
+        }
     }
 }
 
@@ -138,6 +143,15 @@ int ffs_pipes_complete(struct ffs_pipes *pipes, struct usb_transfer *transfer)
     return 1;
 }
 
+/* A slot the kernel has given back unused. An endpoint that is down does so at once, and would again; what is left over
+ * from before the present start says nothing about it. Other failures pass, or become many in a row. */
+static int has_to_rest(const struct ffs_pipes *pipes, struct ffs_slot *slot, int64_t result)
+{
+    const int is_down = result == -EAGAIN || result == -ESHUTDOWN || result == -ENODEV;
+    if (slot->start != pipes->start) return 0;
+    return is_down || ++slot->failures >= FFS_MAX_FAILURES;
+}
+
 int ffs_pipes_take(struct ffs_pipes *pipes)
 {
     struct io_event event;
@@ -148,11 +162,13 @@ int ffs_pipes_take(struct ffs_pipes *pipes)
     struct ffs_slot *slot = (struct ffs_slot *)(uintptr_t)event.data;
     struct ffs_pipe *pipe = pipe_of(pipes, slot);
     if (--slot->n_io > 0) return 1; /* its zero-length packet is still on the way */
-    if (!is_in(pipe) && event.res >= 0 && pipes->running)
+    if (event.res >= 0) slot->failures = 0;
+    if (event.res < 0 && has_to_rest(pipes, slot, event.res))
+        slot->state = FFS_IDLE;
+    else if (!is_in(pipe) && event.res >= 0 && pipes->running)
         to_core(pipes, pipe, slot, (uint32_t)event.res);
     else
-        set_going(pipes, pipe,
-                  slot); /* an endpoint that is down takes nothing, and the slot rests till the next start */
+        set_going(pipes, pipe, slot);
     return 1;
 }
 
@@ -188,6 +204,11 @@ void ffs_pipes_drain(struct ffs_pipes *pipes, int timeout_ms)
     while (is_under_way(pipes) && poll(&slot, 1, timeout_ms) > 0)
         while (ffs_pipes_take(pipes))
             continue;
+}
+
+uint8_t ffs_pipes_address(const struct ffs_pipes *pipes, unsigned number)
+{
+    return number >= 1 && number <= (unsigned)pipes->n ? pipes->pipe[number - 1].address : 0;
 }
 
 void ffs_pipes_close(struct ffs_pipes *pipes)

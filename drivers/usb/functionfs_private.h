@@ -8,10 +8,11 @@
 #include "drivers/usb/gadget.h"
 #include "drivers/usb/usb.h"
 
-enum { FFS_SLOTS = 8, FFS_SLOT_BYTES = 32768, FFS_MAX_PIPES = 8 };
+enum { FFS_SLOTS = 8, FFS_SLOT_BYTES = 32768, FFS_MAX_PIPES = 8, FFS_MAX_FAILURES = 16 };
 
 /* A slot is a buffer that goes round: IN, it waits at the core as if a host had asked for that much, is filled, and is
- * written to the kernel; OUT, it is read from the kernel and waits at the core until the function has read it. */
+ * written to the kernel; OUT, it is read from the kernel and waits at the core until the function has read it. On an
+ * endpoint that is down the kernel gives it back at once: then it is idle until the next configuration comes up. */
 enum ffs_slot_state { FFS_IDLE, FFS_AT_CORE, FFS_AT_KERNEL };
 
 struct ffs_slot {
@@ -19,6 +20,8 @@ struct ffs_slot {
     enum ffs_slot_state state;
     struct iocb io, zero; /* zero: the packet of no bytes behind it */
     int n_io;             /* of these, at the kernel */
+    uint32_t start;       /* which start they are from */
+    int failures;         /* in a row */
     uint8_t *buffer;
 };
 
@@ -34,6 +37,7 @@ struct ffs_pipes {
     aio_context_t aio;
     int event_fd; /* counts completions */
     int running;
+    uint32_t start; /* counts ffs_pipes_start */
     int n;
     struct ffs_pipe pipe[FFS_MAX_PIPES];
 };
@@ -52,6 +56,8 @@ int ffs_pipes_complete(struct ffs_pipes *pipes, struct usb_transfer *transfer);
 /* Waits until the host has taken what is at the kernel, as long as it takes something within timeout_ms. */
 void ffs_pipes_drain(struct ffs_pipes *pipes, int timeout_ms);
 void ffs_pipes_close(struct ffs_pipes *pipes);
+/* The model's address of an endpoint by its number in FunctionFS, counted from 1; 0 where there is none. */
+uint8_t ffs_pipes_address(const struct ffs_pipes *pipes, unsigned number);
 
 /* The console. The kernel's f_acm keeps DTR to itself, so a session begins with the first bytes of the host, and ends
  * when the host has taken nothing for a second or two of what there is for it. What the tty holds by then can't be
@@ -80,5 +86,19 @@ short ffs_console_events(const struct ffs_console *console);
 void ffs_console_handle(struct ffs_console *console, short revents, int timed_out);
 int ffs_console_complete(struct ffs_console *console, struct usb_transfer *transfer);
 void ffs_console_close(struct ffs_console *console);
+
+/* ---- the back end */
+
+enum { FFS_MAX_DATA_STAGE = 4096 };
+
+struct functionfs {
+    struct usb_device *device;
+    struct gadget gadget;
+    int ep0;
+    int backlog; /* stopped before everything was looked at */
+    struct ffs_pipes pipes;
+    struct ffs_console console;
+    uint8_t data[FFS_MAX_DATA_STAGE];
+};
 
 #endif

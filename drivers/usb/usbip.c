@@ -1,16 +1,19 @@
 /* The usbip back end: a USB/IP server of its own, TCP 3240 on loopback by default, or one connection by socket pair to
- * this machine's vhci_hcd. One host at a time has the device; others may list it. */
+ * this machine's vhci_hcd. One host at a time has the device; others may list it.
+ *
+ * A connection that has not imported the device keeps its place until a new one needs it: silent ones lock nobody out.
+ * A device that is attached here comes back when the host detaches it, as one that is plugged in again. */
 #include <errno.h>
 #include <fcntl.h>
-#include <netinet/in.h>
-#include <netinet/tcp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "drivers/link/socket.h"
 #include "drivers/usb/backend.h"
+#include "drivers/usb/retry.h"
 #include "drivers/usb/usbip.h"
 #include "drivers/usb/usbip_conn.h"
 #include "drivers/usb/vhci.h"
@@ -19,8 +22,10 @@ enum { MAX_CONNS = 4, SEND_BUFFER_BYTES = 1 << 20, CLOSE_WAIT_MS = 500 };
 
 struct usbip {
     struct usb_device *device;
-    int listener; /* -1: attached here, nobody else may come */
+    int listener;           /* -1: attached here, nobody else may come */
+    struct usb_retry retry; /* of what is attached here */
     int taken;
+    uint64_t n_welcomed;
     struct usbip_conn conn[MAX_CONNS];
     char name[USB_BACKEND_NAME_MAX];
 };
@@ -47,6 +52,12 @@ static int attach_here(struct usbip *self, struct sh_err *err)
     return SH_OK;
 }
 
+static int start_here(struct usbip *self, const struct usb_backend_spec *spec, struct sh_err *err)
+{
+    int rc = usb_retry_open(&self->retry, "usbip", spec->retry_ms, err);
+    return rc == SH_OK ? attach_here(self, err) : rc;
+}
+
 static int listen_here(struct usbip *self, const struct usb_backend_spec *spec, struct sh_err *err)
 {
     char at[USB_BACKEND_NAME_MAX - 8] = "";
@@ -61,13 +72,14 @@ static int usbip_open(const struct usb_backend_spec *spec, struct usb_device *de
     struct usbip *self = calloc(1, sizeof *self);
     if (self == NULL) return sh_fail(err, SH_ENOMEM, "usbip: no memory");
     self->device = device;
-    self->listener = -1;
+    self->listener = self->retry.timer = -1;
     for (int i = 0; i < MAX_CONNS; i++)
         self->conn[i].fd = -1;
     struct usb_backend_spec served = *spec;
     served.attach = 0;
-    int rc = spec->attach ? attach_here(self, err) : listen_here(self, &served, err);
+    int rc = spec->attach ? start_here(self, spec, err) : listen_here(self, &served, err);
     if (rc != SH_OK) {
+        usb_retry_close(&self->retry);
         free(self);
         return rc;
     }
@@ -81,37 +93,66 @@ static void usbip_endpoint(const void *backend, char *buf, size_t len)
     snprintf(buf, len, "%s", self->name);
 }
 
+enum { AT_LISTENER = MAX_CONNS, AT_RETRY, N_FDS };
+
 static int usbip_prepare(void *backend, struct pollfd *fds)
 {
     struct usbip *self = backend;
-    int all_taken = 1;
     for (int i = 0; i < MAX_CONNS; i++) {
         const struct usbip_conn *conn = &self->conn[i];
-        fds[i] = (struct pollfd){.fd = conn->fd, .events = POLLIN};
+        fds[i] = (struct pollfd){.fd = conn->fd};
+        if (!usbip_conn_is_full(conn)) fds[i].events |= POLLIN;
         if (conn->out_first != NULL) fds[i].events |= POLLOUT;
-        if (conn->fd < 0) all_taken = 0;
     }
-    fds[MAX_CONNS] = (struct pollfd){.fd = all_taken ? -1 : self->listener, .events = POLLIN};
-    return MAX_CONNS + 1;
+    fds[AT_LISTENER] = (struct pollfd){.fd = self->listener, .events = POLLIN};
+    fds[AT_RETRY] = (struct pollfd){.fd = self->retry.timer, .events = POLLIN};
+    return N_FDS;
+}
+
+/* A free place, or that of the one which has been here longest without importing: one host at most has imported. */
+static struct usbip_conn *make_room(struct usbip *self)
+{
+    struct usbip_conn *oldest = NULL;
+    for (int i = 0; i < MAX_CONNS; i++) {
+        struct usbip_conn *conn = &self->conn[i];
+        if (conn->fd < 0) return conn;
+        if (!conn->imported && (oldest == NULL || conn->number < oldest->number)) oldest = conn;
+    }
+    usbip_conn_end(oldest);
+    return oldest;
 }
 
 static void welcome(struct usbip *self)
 {
-    const int one = 1, size = SEND_BUFFER_BYTES;
+    const int size = SEND_BUFFER_BYTES;
     for (int i = 0; i < MAX_CONNS; i++) {
-        if (self->conn[i].fd >= 0) continue;
         int fd = accept4(self->listener, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
         if (fd < 0) return;
-        setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &one, sizeof one);
+        socket_tune(fd);
         setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &size, sizeof size);
-        usbip_conn_start(&self->conn[i], fd, self->device, &self->taken);
+        struct usbip_conn *conn = make_room(self);
+        usbip_conn_start(conn, fd, self->device, &self->taken);
+        conn->number = ++self->n_welcomed;
     }
 }
 
-static void sweep(struct usbip *self)
+static int sweep(struct usbip *self)
 {
-    for (int i = 0; i < MAX_CONNS; i++)
-        if (self->conn[i].fd >= 0 && self->conn[i].broken) usbip_conn_end(&self->conn[i]);
+    int rc = SH_OK;
+    for (int i = 0; i < MAX_CONNS; i++) {
+        if (self->conn[i].fd < 0 || !self->conn[i].broken) continue;
+        usbip_conn_end(&self->conn[i]);
+        if (self->listener < 0) rc = usb_retry_start(&self->retry);
+    }
+    return rc;
+}
+
+static int attach_again(struct usbip *self)
+{
+    struct sh_err err = {0, ""};
+    if (attach_here(self, &err) == SH_OK) return usb_retry_done(&self->retry);
+    usb_retry_failed(&self->retry, err.text);
+    return SH_OK;
 }
 
 static void usbip_flush(void *backend)
@@ -124,12 +165,14 @@ static void usbip_flush(void *backend)
 static int usbip_handle(void *backend, const struct pollfd *fds, int n, int (*go_on)(void *ctx), void *ctx)
 {
     struct usbip *self = backend;
-    for (int i = 0; i < MAX_CONNS && i < n; i++)
+    if (n != N_FDS) return SH_OK;
+    for (int i = 0; i < MAX_CONNS; i++)
         if (self->conn[i].fd >= 0 && (fds[i].revents & ~POLLOUT) != 0) usbip_conn_read(&self->conn[i], go_on, ctx);
-    if (n > MAX_CONNS && fds[MAX_CONNS].fd >= 0 && fds[MAX_CONNS].revents != 0) welcome(self);
+    if (fds[AT_LISTENER].fd >= 0 && fds[AT_LISTENER].revents != 0) welcome(self);
+    int rc = SH_OK;
+    if (fds[AT_RETRY].fd >= 0 && usb_retry_is_due(&self->retry, fds[AT_RETRY].revents)) rc = attach_again(self);
     usbip_flush(self);
-    sweep(self);
-    return SH_OK;
+    return rc == SH_OK ? sweep(self) : rc;
 }
 
 /* The sockets keep what was not read, and poll says so. */
@@ -137,6 +180,12 @@ static int usbip_more(const void *backend)
 {
     (void)backend;
     return 0;
+}
+
+static const char *usbip_news(void *backend)
+{
+    struct usbip *self = backend;
+    return usb_retry_news(&self->retry);
 }
 
 static void usbip_close(void *backend)
@@ -147,6 +196,7 @@ static void usbip_close(void *backend)
         usbip_conn_end(&self->conn[i]);
     }
     if (self->listener >= 0) close(self->listener);
+    usb_retry_close(&self->retry);
     free(self);
 }
 
@@ -157,6 +207,7 @@ const struct usb_backend_ops usb_backend_usbip = {
     .prepare = usbip_prepare,
     .handle = usbip_handle,
     .more = usbip_more,
+    .news = usbip_news,
     .flush = usbip_flush,
     .close = usbip_close,
 };

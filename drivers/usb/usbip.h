@@ -22,10 +22,11 @@ enum {
     OP_IMPORT = OP_HEADER + BUSID_LEN,
     /* URBs: u32 command, seqnum, devid, direction, ep, then 28 bytes by command */
     URB_HEADER = 48,
-    CMD_SUBMIT = 1, /* u32 flags, length, start frame, packets, interval, u8[8] setup */
-    CMD_UNLINK = 2, /* u32 seqnum */
-    RET_SUBMIT = 3, /* i32 status, u32 actual length, start frame, packets, errors */
-    RET_UNLINK = 4, /* i32 status */
+    CMD_SUBMIT = 1,       /* u32 flags, length, start frame, packets, interval, u8[8] setup */
+    CMD_UNLINK = 2,       /* u32 seqnum */
+    RET_SUBMIT = 3,       /* i32 status, u32 actual length, start frame, packets, errors */
+    RET_UNLINK = 4,       /* i32 status */
+    URB_SHORT_NOT_OK = 1, /* of the flags */
     DIR_OUT = 0,
     DIR_IN = 1,
 };

@@ -1,117 +1,31 @@
 /* A connection of a USB/IP client: DEVLIST and IMPORT, then SUBMIT and UNLINK.
  *
  * The peer is not trusted: what breaks the protocol, or asks for more memory than a host needs, ends the connection. */
-#include <arpa/inet.h>
 #include <errno.h>
 #include <poll.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/socket.h>
-#include <sys/uio.h>
 #include <unistd.h>
 
 #include "drivers/protocol/bytes.h"
 #include "drivers/usb/backend.h"
-#include "drivers/usb/usbip.h"
-#include "drivers/usb/usbip_conn.h"
+#include "drivers/usb/usbip_private.h"
 
 enum {
-    MAX_URB_BYTES = 16 << 20,     /* of one; usbfs's own limit by default is 16 MiB in all */
-    MAX_PENDING_BYTES = 64 << 20, /* of all */
-    MAX_PENDING = 4096,
-    MAX_REPLY_PARTS = 64,
+    MAX_URB_BYTES = 16 << 20, /* usbfs's own limit by default, of all */
+    MAX_READS = 256,          /* at a time: who sends without end does not have the thread to himself */
 };
 
-/* The header of the reply stands before the bytes, so that both leave in one piece. */
-struct usbip_urb {
-    struct usb_transfer transfer;
-    struct usbip_conn *conn;
-    struct usbip_urb *next;
-    uint32_t seqnum;
-    int in;
-    uint32_t send_len; /* of wire, once it is a reply */
-    uint32_t room;
-    uint8_t wire[]; /* URB_HEADER, then room bytes */
-};
-
-static void put_be16(uint8_t *at, unsigned v)
-{
-    const uint16_t be = htons((uint16_t)v);
-    memcpy(at, &be, sizeof be);
-}
-
-static void put_be32(uint8_t *at, uint32_t v)
-{
-    const uint32_t be = htonl(v);
-    memcpy(at, &be, sizeof be);
-}
-
-static uint32_t get_be32(const uint8_t *at)
-{
-    uint32_t be;
-    memcpy(&be, at, sizeof be);
-    return ntohl(be);
-}
-
-static unsigned get_be16(const uint8_t *at)
-{
-    return (unsigned)at[0] << 8 | at[1];
-}
-
-/* ---- replies */
-
-static struct usbip_urb *new_urb(struct usbip_conn *conn, uint32_t room)
-{
-    if (conn->n_urbs >= MAX_PENDING || conn->n_bytes + room > MAX_PENDING_BYTES) return NULL;
-    struct usbip_urb *urb = malloc(sizeof *urb + URB_HEADER + room);
-    if (urb == NULL) return NULL;
-    memset(urb, 0, sizeof *urb + URB_HEADER); /* the bytes are written before they are sent */
-    urb->conn = conn;
-    urb->room = room;
-    conn->n_urbs++;
-    conn->n_bytes += room;
-    return urb;
-}
-
-static void free_urb(struct usbip_conn *conn, struct usbip_urb *urb)
-{
-    conn->n_urbs--;
-    conn->n_bytes -= urb->room;
-    free(urb);
-}
-
-static void queue(struct usbip_conn *conn, struct usbip_urb *urb, uint32_t len)
-{
-    urb->send_len = len;
-    urb->next = NULL;
-    if (conn->out_last != NULL)
-        conn->out_last->next = urb;
-    else
-        conn->out_first = urb;
-    conn->out_last = urb;
-}
-
+/* Where the host's driver forbids short packets, a host controller makes an error of them. */
 static void return_urb(struct usbip_conn *conn, struct usbip_urb *urb, int status, uint32_t actual)
 {
+    enum { WIRE_EREMOTEIO = 121 };
+    if (status == 0 && urb->in && urb->short_is_error && actual < urb->room) status = -WIRE_EREMOTEIO;
     memset(urb->wire, 0, URB_HEADER);
     put_be32(urb->wire, RET_SUBMIT);
     put_be32(urb->wire + 4, urb->seqnum);
     put_be32(urb->wire + 20, (uint32_t)status);
     put_be32(urb->wire + 24, actual);
-    queue(conn, urb, URB_HEADER + (urb->in ? actual : 0));
-}
-
-/* A reply that is nothing but its own bytes. */
-static uint8_t *plain_reply(struct usbip_conn *conn, uint32_t len)
-{
-    struct usbip_urb *reply = new_urb(conn, len > URB_HEADER ? len - URB_HEADER : 0);
-    if (reply == NULL) {
-        conn->broken = 1;
-        return NULL;
-    }
-    queue(conn, reply, len);
-    return reply->wire;
+    usbip_queue(conn, urb, URB_HEADER + (urb->in ? actual : 0));
 }
 
 /* Linux's numbers, whatever this system's are: they are the protocol's. */
@@ -132,59 +46,9 @@ static void on_complete(void *ctx, struct usb_transfer *transfer)
     struct usbip_conn *conn = ctx;
     struct usbip_urb *urb = (struct usbip_urb *)transfer;
     if (transfer->status == USB_CANCELLED)
-        free_urb(conn, urb);
+        usbip_urb_free(conn, urb);
     else
         return_urb(conn, urb, errno_of(transfer->status), transfer->actual);
-}
-
-/* ---- operations */
-
-static void describe_device(const struct usbip_conn *conn, uint8_t *out)
-{
-    static const uint8_t speed[] = {
-        [USB_RATE_FULL] = USB_SPEED_FULL, [USB_RATE_HIGH] = USB_SPEED_HIGH, [USB_RATE_SUPER] = USB_SPEED_SUPER};
-    const struct usb_model *model = usb_device_model(conn->device);
-    const struct usb_identity *id = usb_device_identity(conn->device);
-    memset(out, 0, OP_DEVICE);
-    strcpy((char *)out, "/sys/devices/scanhead/" USBIP_BUSID);
-    strcpy((char *)out + 256, USBIP_BUSID);
-    put_be32(out + 288, USBIP_BUS);
-    put_be32(out + 292, USBIP_DEVICE);
-    put_be32(out + 296, speed[id->highest]);
-    put_be16(out + 300, id->vid);
-    put_be16(out + 302, id->pid);
-    put_be16(out + 304, model->bcd_device);
-    out[306] = model->class;
-    out[307] = model->subclass;
-    out[308] = model->protocol;
-    out[309] = (uint8_t)usb_device_configuration(conn->device);
-    out[310] = 1;
-    out[311] = model->n_interfaces;
-}
-
-static void put_op(uint8_t *out, unsigned code, uint32_t status)
-{
-    put_be16(out, USBIP_VERSION);
-    put_be16(out + 2, code);
-    put_be32(out + 4, status);
-}
-
-static void list_devices(struct usbip_conn *conn)
-{
-    const struct usb_model *model = usb_device_model(conn->device);
-    uint8_t *out = plain_reply(conn, OP_HEADER + 4 + OP_DEVICE + (uint32_t)model->n_interfaces * OP_INTERFACE);
-    if (out == NULL) return;
-    put_op(out, OP_REP_DEVLIST, OP_OK);
-    put_be32(out + 8, 1);
-    describe_device(conn, out + 12);
-    for (unsigned i = 0; i < model->n_interfaces; i++) {
-        const struct usb_interface_row *row = usb_find_row(model, i, 0);
-        uint8_t *at = out + 12 + OP_DEVICE + i * OP_INTERFACE;
-        at[0] = row->class;
-        at[1] = row->subclass;
-        at[2] = row->protocol;
-        at[3] = 0;
-    }
 }
 
 void usbip_conn_import(struct usbip_conn *conn)
@@ -192,38 +56,6 @@ void usbip_conn_import(struct usbip_conn *conn)
     conn->imported = *conn->taken = 1;
     usb_device_attach(conn->device, usb_device_identity(conn->device)->highest, on_complete, conn);
     usb_device_assume_address(conn->device); /* the client's kernel gives out addresses, and keeps them */
-}
-
-static void import_device(struct usbip_conn *conn, const uint8_t *busid)
-{
-    const int known = strncmp((const char *)busid, USBIP_BUSID, BUSID_LEN) == 0;
-    const uint32_t status = !known ? OP_FAILED : *conn->taken ? OP_BUSY : OP_OK;
-    uint8_t *out = plain_reply(conn, OP_HEADER + (status == OP_OK ? OP_DEVICE : 0));
-    if (out == NULL) return;
-    put_op(out, OP_REP_IMPORT, status);
-    if (status != OP_OK) return;
-    describe_device(conn, out + OP_HEADER);
-    usbip_conn_import(conn);
-}
-
-/* How many bytes the head needs, as far as it has come. */
-static uint32_t head_need(const struct usbip_conn *conn)
-{
-    if (conn->imported) return URB_HEADER;
-    if (conn->head_len < OP_HEADER) return OP_HEADER;
-    return get_be16(conn->head + 2) == OP_REQ_IMPORT ? OP_IMPORT : OP_HEADER;
-}
-
-static void take_op(struct usbip_conn *conn)
-{
-    const unsigned code = get_be16(conn->head + 2);
-    conn->head_len = 0;
-    if (get_be16(conn->head) != USBIP_VERSION || (code != OP_REQ_DEVLIST && code != OP_REQ_IMPORT))
-        conn->broken = 1;
-    else if (code == OP_REQ_DEVLIST)
-        list_devices(conn);
-    else
-        import_device(conn, conn->head + OP_HEADER);
 }
 
 /* ---- URBs */
@@ -266,13 +98,14 @@ static void take_submit(struct usbip_conn *conn)
     struct usbip_urb *urb = NULL;
     if (direction <= DIR_IN && length <= MAX_URB_BYTES && (packets == 0 || packets == UINT32_MAX) &&
         get_be32(conn->head + 16) <= 15)
-        urb = new_urb(conn, length);
+        urb = usbip_urb_new(conn, length);
     if (urb == NULL) {
         conn->broken = 1;
         return;
     }
     urb->seqnum = get_be32(conn->head + 4);
     urb->in = direction == DIR_IN;
+    urb->short_is_error = (get_be32(conn->head + 20) & URB_SHORT_NOT_OK) != 0;
     if (urb->in || length == 0) {
         run_submit(conn, urb);
         return;
@@ -285,7 +118,7 @@ static void take_unlink(struct usbip_conn *conn)
 {
     const uint32_t seqnum = get_be32(conn->head + 4);
     const int was_pending = usb_device_cancel(conn->device, get_be32(conn->head + 20));
-    uint8_t *out = plain_reply(conn, URB_HEADER);
+    uint8_t *out = usbip_queue_plain(conn, URB_HEADER);
     if (out == NULL) return;
     put_be32(out, RET_UNLINK);
     put_be32(out + 4, seqnum);
@@ -328,56 +161,29 @@ static uint32_t read_incoming(struct usbip_conn *conn)
     return n;
 }
 
+static uint32_t head_need(const struct usbip_conn *conn)
+{
+    return conn->imported ? URB_HEADER : usbip_op_need(conn);
+}
+
 static uint32_t read_head(struct usbip_conn *conn)
 {
-    uint32_t n = receive(conn, conn->head + conn->head_len, head_need(conn) - conn->head_len);
+    const uint32_t n = receive(conn, conn->head + conn->head_len, head_need(conn) - conn->head_len);
     conn->head_len += n;
     if (n == 0 || conn->head_len < head_need(conn)) return n;
     if (conn->imported)
         take_urb(conn);
     else
-        take_op(conn);
+        usbip_op_take(conn);
     return n;
 }
 
 void usbip_conn_read(struct usbip_conn *conn, int (*go_on)(void *ctx), void *ctx)
 {
-    while (!conn->broken && go_on(ctx))
-        if ((conn->incoming != NULL ? read_incoming(conn) : read_head(conn)) == 0) break;
-}
-
-static void drop_sent(struct usbip_conn *conn, uint32_t n)
-{
-    while (conn->out_first != NULL) {
-        struct usbip_urb *first = conn->out_first;
-        if (n < first->send_len - conn->out_pos) {
-            conn->out_pos += n;
-            return;
-        }
-        n -= first->send_len - conn->out_pos;
-        conn->out_pos = 0;
-        conn->out_first = first->next;
-        if (conn->out_first == NULL) conn->out_last = NULL;
-        free_urb(conn, first);
-    }
-}
-
-void usbip_conn_write(struct usbip_conn *conn)
-{
-    while (conn->out_first != NULL && !conn->broken) {
-        struct iovec part[MAX_REPLY_PARTS];
-        size_t n = 0;
-        for (struct usbip_urb *urb = conn->out_first; urb != NULL && n < MAX_REPLY_PARTS; urb = urb->next) {
-            const uint32_t skip = n == 0 ? conn->out_pos : 0;
-            part[n++] = (struct iovec){urb->wire + skip, urb->send_len - skip};
-        }
-        const struct msghdr message = {.msg_iov = part, .msg_iovlen = n};
-        ssize_t sent = sendmsg(conn->fd, &message, MSG_DONTWAIT | MSG_NOSIGNAL);
-        if (sent < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR || errno == ENOBUFS)) return;
-        if (sent < 0)
-            conn->broken = 1;
-        else
-            drop_sent(conn, (uint32_t)sent);
+    for (int reads = 0; reads < MAX_READS && !conn->broken && go_on(ctx); reads++) {
+        if (usbip_conn_is_full(conn)) usbip_conn_write(conn); /* a host may send many requests before it reads */
+        if (usbip_conn_is_full(conn)) return;
+        if ((conn->incoming != NULL ? read_incoming(conn) : read_head(conn)) == 0) return;
     }
 }
 
@@ -402,12 +208,8 @@ void usbip_conn_end(struct usbip_conn *conn)
         usb_device_detach(conn->device); /* what is pending comes back as replies, to be freed below */
         *conn->taken = 0;
     }
-    if (conn->incoming != NULL) free_urb(conn, conn->incoming);
-    while (conn->out_first != NULL) {
-        struct usbip_urb *first = conn->out_first;
-        conn->out_first = first->next;
-        free_urb(conn, first);
-    }
+    if (conn->incoming != NULL) usbip_urb_free(conn, conn->incoming);
+    usbip_queue_clear(conn);
     close(conn->fd);
     *conn = (struct usbip_conn){.fd = -1};
 }

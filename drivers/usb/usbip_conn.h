@@ -8,7 +8,8 @@
 struct usbip_urb; /* a transfer with its header and bytes */
 
 struct usbip_conn {
-    int fd; /* -1: free */
+    int fd;          /* -1: free */
+    uint64_t number; /* of arrival */
     int imported;
     int broken; /* to be closed: the peer is gone, or says what it must not */
     struct usb_device *device;
@@ -19,16 +20,18 @@ struct usbip_conn {
     uint32_t incoming_len;
     struct usbip_urb *out_first, *out_last; /* replies to send */
     uint32_t out_pos;
-    uint32_t n_urbs; /* all that exist for this connection */
-    uint64_t n_bytes;
+    uint32_t n_pending, n_unsent; /* URBs: of the first kind the device has not answered yet */
+    uint64_t pending_bytes, unsent_bytes;
 };
 
 /* fd is connected and not blocking, and taken over. */
 void usbip_conn_start(struct usbip_conn *conn, int fd, struct usb_device *device, int *taken);
 /* As if the device had been imported: for a host that begins with URBs. */
 void usbip_conn_import(struct usbip_conn *conn);
-/* Reads and acts until nothing is left or go_on says 0. */
+/* Reads and acts until nothing is left, go_on says 0 or the connection is full; no longer than some hundred times. */
 void usbip_conn_read(struct usbip_conn *conn, int (*go_on)(void *ctx), void *ctx);
+/* Too many replies wait for the host to read them: nothing more is read before. */
+int usbip_conn_is_full(const struct usbip_conn *conn);
 void usbip_conn_write(struct usbip_conn *conn);
 /* Sends what is queued and waits until the peer has taken it and hung up, timeout_ms at most for each step: closing
  * with requests of the peer unread would throw away replies on their way. */

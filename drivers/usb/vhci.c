@@ -26,7 +26,7 @@ static int fail(const char *dir, const char *file, struct sh_err *err)
 static int find_port(const char *dir, enum usb_rate rate, unsigned *port, struct sh_err *err)
 {
     char path[320], line[256], hub[8];
-    unsigned number, state;
+    unsigned number = 0, state;
     int found = 0;
     snprintf(path, sizeof path, "%s/status", dir);
     FILE *in = fopen(path, "r");
@@ -39,19 +39,34 @@ static int find_port(const char *dir, enum usb_rate rate, unsigned *port, struct
     return found ? SH_OK : sh_fail(err, SH_EIO, "usbip: no free port on vhci_hcd.0; detach one (usbip detach -p N)");
 }
 
+static int write_attach(const char *dir, const char *text, struct sh_err *err)
+{
+    char path[320];
+    snprintf(path, sizeof path, "%s/attach", dir);
+    int file = open(path, O_WRONLY | O_CLOEXEC);
+    if (file < 0) return fail(dir, "attach", err);
+    const ssize_t len = (ssize_t)strlen(text);
+    int rc = write(file, text, (size_t)len) == len ? SH_OK : fail(dir, "attach", err);
+    const int error = errno;
+    close(file);
+    errno = error;
+    return rc;
+}
+
 int vhci_attach(const char *dir, int fd, uint32_t devid, enum usb_rate rate, unsigned *port, struct sh_err *err)
 {
     static const int speed[] = {
         [USB_RATE_FULL] = USB_SPEED_FULL, [USB_RATE_HIGH] = USB_SPEED_HIGH, [USB_RATE_SUPER] = USB_SPEED_SUPER};
-    char path[320], text[64];
+    enum { TRIES = 8 }; /* somebody else may have taken the port meanwhile */
+    char text[64];
+    int rc = SH_OK;
     if (dir == NULL) dir = DIR_DEFAULT;
-    int rc = find_port(dir, rate, port, err);
-    if (rc != SH_OK) return rc;
-    snprintf(path, sizeof path, "%s/attach", dir);
-    int file = open(path, O_WRONLY | O_CLOEXEC);
-    if (file < 0) return fail(dir, "attach", err);
-    int len = snprintf(text, sizeof text, "%u %d %u %d", *port, fd, devid, speed[rate]);
-    if (write(file, text, (size_t)len) != len) rc = fail(dir, "attach", err);
-    close(file);
+    for (int i = 0; i < TRIES; i++) {
+        rc = find_port(dir, rate, port, err);
+        if (rc != SH_OK) return rc;
+        snprintf(text, sizeof text, "%u %d %u %d", *port, fd, devid, speed[rate]);
+        rc = write_attach(dir, text, err);
+        if (rc == SH_OK || errno != EBUSY) return rc;
+    }
     return rc;
 }

@@ -103,6 +103,32 @@ void beam_ref_pulse(struct caster *c, const struct bvh *bvh, const struct beam *
     }
 }
 
+double beam_ref_plane_mean(const struct beam *beam, const double dir[3], const double n[3], double d)
+{
+    enum { STEPS = 40, TURN = 64 };
+    long double sum = 0.0L, all = 0.0L;
+    double e1[3], e2[3];
+    beam_axes(dir, e1, e2);
+    for (int i = 0; i <= STEPS; i++) {
+        long double t = (long double)i / STEPS, rho = sqrtl(t);
+        long double weight = expl(-2.0L * t) * (i == 0 || i == STEPS ? 1.0L : i % 2 == 1 ? 4.0L : 2.0L);
+        for (int k = 0; k < TURN; k++) {
+            long double x = rho * cosl(2.0L * (long double)M_PI * k / TURN);
+            long double y = rho * sinl(2.0L * (long double)M_PI * k / TURN), top = d, along = 0.0L, length2 = 0.0L;
+            for (int j = 0; j < 3; j++) {
+                long double o = beam->exit_radius_m * (x * e1[j] + y * e2[j]);
+                long double v = dir[j] + beam->slope * (x * e2[j] - y * e1[j]);
+                top -= n[j] * o;
+                along += n[j] * v;
+                length2 += v * v;
+            }
+            sum += weight * top / along * sqrtl(length2);
+            all += weight;
+        }
+    }
+    return (double)(sum / all);
+}
+
 int beam_rig_open(struct beam_rig *rig, struct scene *scene, const double station_m[3], const struct beam_view *view,
                   struct sh_err *err)
 {

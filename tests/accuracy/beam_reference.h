@@ -22,6 +22,10 @@ struct beam_ref {
 void beam_ref_pulse(struct caster *caster, const struct bvh *bvh, const struct beam *beam, const double station_m[3],
                     const double dir[3], double range_max_m, struct beam_ref *out);
 
+/* Mean range over the footprint on the plane n . p = d, seen from the origin, by the definition: sub-rays as straight
+ * lines of the hyperboloid, weights as their Gaussian. Simpson's rule over t = rho^2, equal steps over phi. */
+double beam_ref_plane_mean(const struct beam *beam, const double dir[3], const double n[3], double d);
+
 /* A scan cast with a beam, and the directions of its pulses. */
 struct beam_rig {
     struct scene *scene;

@@ -80,34 +80,6 @@ static void test_rings(void **state)
     assert_true(fabs(inside - (1.0 - exp(-0.5)) / (1.0 - exp(-2.0))) < 0.03);
 }
 
-/* Mean range over the footprint by the definition: sub-rays as straight lines of the hyperboloid, weights as their
- * Gaussian; plane n . p = d. Simpson's rule over t = rho^2, equal steps over phi. */
-static double mean_range(const struct beam *beam, const double dir[3], const double n[3], double d)
-{
-    enum { STEPS = 40, TURN = 64 };
-    long double sum = 0.0L, all = 0.0L;
-    double e1[3], e2[3];
-    beam_axes(dir, e1, e2);
-    for (int i = 0; i <= STEPS; i++) {
-        long double t = (long double)i / STEPS, rho = sqrtl(t);
-        long double weight = expl(-2.0L * t) * (i == 0 || i == STEPS ? 1.0L : i % 2 == 1 ? 4.0L : 2.0L);
-        for (int k = 0; k < TURN; k++) {
-            long double x = rho * cosl(2.0L * (long double)M_PI * k / TURN);
-            long double y = rho * sinl(2.0L * (long double)M_PI * k / TURN), top = d, along = 0.0L, length2 = 0.0L;
-            for (int j = 0; j < 3; j++) {
-                long double o = beam->exit_radius_m * (x * e1[j] + y * e2[j]);
-                long double v = dir[j] + beam->slope * (x * e2[j] - y * e1[j]);
-                top -= n[j] * o;
-                along += n[j] * v;
-                length2 += v * v;
-            }
-            sum += weight * top / along * sqrtl(length2);
-            all += weight;
-        }
-    }
-    return (double)(sum / all);
-}
-
 /* A wall at range_m straight ahead, its normal turned away by the incidence. */
 static struct scene *wall(double range_m, double incidence_rad)
 {
@@ -147,7 +119,7 @@ static void test_wall(void **state)
                 assert_int_equal(beam_rig_line(&rig, l), view.pulses);
                 for (uint32_t p = 0; p < view.pulses; p++) {
                     const double dir[3] = {d[0][p], d[1][p], d[2][p]};
-                    double at = -cos(i) * range_m[r], want = mean_range(&rig.beam.beam, dir, n, at);
+                    double at = -cos(i) * range_m[r], want = beam_ref_plane_mean(&rig.beam.beam, dir, n, at);
                     double centre = at / (n[0] * dir[0] + n[1] * dir[1]);
                     worst = fmax(worst, fabs(1e-6 * rig.block.a[p] - want));
                     plain = fmax(plain, fabs(centre - want));

@@ -1,42 +1,53 @@
 /* Pulses as single rays, as rings of sub-rays, and adaptive: cost, and error against 1,000 sub-rays.
  *
- *   build/tests/bench/beam [house|wires|foliage|terrain ...]
+ *   build/tests/bench/beam [--chart] [house|wires|foliage|leaves ...]
  *
  * ns: per pulse, the whole cast; median of interleaved rounds, processor time of the thread. ratio: by the single-ray
  * cast of the same rounds. count: pulses with another number of echoes than the reference, of all pulses, and of those
- * of several echoes or a partial hit. rms, energy: of the echoes of pulses whose number agrees. */
+ * of several echoes or a partial hit. rms, p99.9, max: ranges of the echoes of pulses whose number agrees. --chart:
+ * rows of the chart's table. */
 #include <math.h>
+#include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #include "core/generate.h"
 #include "core/rng.h"
+#include "firmware_sim/bench.h"
+#include "firmware_sim/config_private.h"
 #include "tests/accuracy/beam_reference.h"
 
-enum { ROUNDS = 9, MAX_METHODS = 8 };
+enum { ROUNDS = 9, FEW_ROUNDS = 3, MAX_METHODS = 8 };
+
+static int as_chart;
 
 struct method {
     const char *name;
     enum beam_mode mode;
     uint32_t rings;
 };
-static const struct method methods[] = {
-    {"single", BEAM_SINGLE, 0}, {"adaptive", BEAM_ADAPTIVE, 4}, {"rings 0", BEAM_RINGS, 0}, {"rings 1", BEAM_RINGS, 1},
-    {"rings 2", BEAM_RINGS, 2}, {"rings 3", BEAM_RINGS, 3},     {"rings 4", BEAM_RINGS, 4}, {"rings 6", BEAM_RINGS, 6}};
+static const struct method methods[] = {{"single", BEAM_SINGLE, 0},  {"adaptive", BEAM_ADAPTIVE, 4},
+                                        {"rings 1", BEAM_RINGS, 0},  {"rings 7", BEAM_RINGS, 1},
+                                        {"rings 19", BEAM_RINGS, 2}, {"rings 37", BEAM_RINGS, 3},
+                                        {"rings 61", BEAM_RINGS, 4}, {"rings 127", BEAM_RINGS, 6}};
 enum { N_METHODS = sizeof methods / sizeof methods[0] };
+_Static_assert((int)N_METHODS <= (int)MAX_METHODS, "room");
 
-struct tally {
-    uint64_t pulses, mixed, wrong, wrong_mixed, echoes;
-    double range2, energy2;
+struct result {
+    double ns[ROUNDS], ratio[ROUNDS];
+    uint64_t pulses, mixed, wrong, wrong_mixed, echoes, capacity;
+    double range2, *off_m; /* [echoes] */
+    /* in the end: */
+    double ns_median, ratio_median, rms_m, p999_m, max_m, wrong_part;
+    int front;
 };
 
-static double thread_s(void)
+static void *must(void *memory)
 {
-    struct timespec t;
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+    if (memory != NULL) return memory;
+    fprintf(stderr, "beam: no memory\n");
+    exit(1);
 }
 
 static int by_value(const void *a, const void *b)
@@ -45,13 +56,7 @@ static int by_value(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static double median(double *v, int n)
-{
-    qsort(v, (size_t)n, sizeof *v, by_value);
-    return v[n / 2];
-}
-
-static void compare(struct tally *t, const struct line_block *b, uint32_t *at, const struct beam_ref *ref)
+static void compare(struct result *t, const struct line_block *b, uint32_t *at, const struct beam_ref *ref)
 {
     uint32_t first = *at, n = b->echo[first] >> 4;
     *at += n == 0 ? 1 : n;
@@ -65,16 +70,20 @@ static void compare(struct tally *t, const struct line_block *b, uint32_t *at, c
     }
     for (uint32_t k = 0; k < n; k++) {
         double d = 1e-6 * b->a[first + k] - ref->echo[k].range_m;
+        if (t->echoes == t->capacity) {
+            t->capacity = 2 * t->capacity + 1024;
+            t->off_m = must(realloc(t->off_m, t->capacity * sizeof *t->off_m));
+        }
+        t->off_m[t->echoes++] = fabs(d);
         t->range2 += d * d;
-        t->echoes++;
     }
 }
 
-static void accuracy(struct beam_rig *rig, const struct beam_view *view, uint32_t sample, uint32_t n_methods,
-                     struct tally *tally)
+/* Every sample-th line. */
+static void accuracy(struct beam_rig *rig, const struct beam_view *view, uint32_t sample, struct result *result)
 {
-    double *d = malloc(3 * view->pulses * sizeof *d);
-    struct beam_ref *ref = malloc(view->pulses * sizeof *ref);
+    double *d = must(malloc(3 * view->pulses * sizeof *d));
+    struct beam_ref *ref = must(malloc(view->pulses * sizeof *ref));
     for (uint32_t l = 0; l < view->lines; l += sample) {
         beam_rig_directions(rig, l, d, d + view->pulses, d + 2 * view->pulses);
         for (uint32_t i = 0; i < view->pulses; i++) {
@@ -82,73 +91,132 @@ static void accuracy(struct beam_rig *rig, const struct beam_view *view, uint32_
             beam_ref_pulse(rig->caster, rig->bvh, &rig->beam.beam, rig->setup.station_m, dir, rig->setup.range_max_m,
                            &ref[i]);
         }
-        for (uint32_t m = 0; m < n_methods; m++) {
+        for (uint32_t m = 0; m < N_METHODS; m++) {
             uint32_t at = 0;
             beam_rig_mode(rig, methods[m].mode, methods[m].rings);
             beam_rig_line(rig, l);
             for (uint32_t i = 0; i < view->pulses; i++)
-                compare(&tally[m], &rig->block, &at, &ref[i]);
+                compare(&result[m], &rig->block, &at, &ref[i]);
         }
     }
     free(d);
     free(ref);
 }
 
+static double pass_ns(struct beam_rig *rig, const struct beam_view *view, uint32_t step)
+{
+    uint32_t lines = 0;
+    double start_s = bench_thread_s();
+    for (uint32_t l = 0; l < view->lines; l += step, lines++)
+        beam_rig_line(rig, l);
+    return 1e9 * (bench_thread_s() - start_s) / ((double)lines * view->pulses);
+}
+
+/* Each method in turn; of many sub-rays, fewer rounds and each fourth line. */
+static void speed(struct beam_rig *rig, const struct beam_view *view, struct result *result)
+{
+    for (int r = 0; r < ROUNDS; r++)
+        for (uint32_t m = 0; m < N_METHODS; m++) {
+            int slow = methods[m].mode == BEAM_RINGS && methods[m].rings >= 2;
+            beam_rig_mode(rig, methods[m].mode, methods[m].rings);
+            result[m].ns[r] = slow && r >= FEW_ROUNDS ? result[m].ns[r - FEW_ROUNDS] : pass_ns(rig, view, slow ? 4 : 1);
+            result[m].ratio[r] = result[m].ns[r] / result[0].ns[r];
+        }
+}
+
+static void sum_up(struct result *r)
+{
+    qsort(r->off_m, r->echoes, sizeof *r->off_m, by_value);
+    r->ns_median = bench_median(r->ns, ROUNDS);
+    r->ratio_median = bench_median(r->ratio, ROUNDS);
+    r->rms_m = sqrt(r->range2 / (double)r->echoes);
+    r->p999_m = r->off_m[(uint64_t)ceil(0.999 * (double)r->echoes) - 1];
+    r->max_m = r->off_m[r->echoes - 1];
+    r->wrong_part = (double)r->wrong / (double)r->mixed;
+}
+
+/* On the front: no other one is at least as fast and, in both figures, at least as exact, and better in one. */
+static void mark_front(struct result *result)
+{
+    for (uint32_t i = 0; i < N_METHODS; i++) {
+        struct result *a = &result[i];
+        a->front = 1;
+        for (uint32_t k = 0; k < N_METHODS; k++) {
+            const struct result *b = &result[k];
+            int no_worse = b->ns_median <= a->ns_median && b->rms_m <= a->rms_m && b->wrong_part <= a->wrong_part;
+            int better = b->ns_median < a->ns_median || b->rms_m < a->rms_m || b->wrong_part < a->wrong_part;
+            if (no_worse && better) a->front = 0;
+        }
+    }
+}
+
+static void print_rows(const char *scene, const struct result *result)
+{
+    const char *by_default = cfg_find(&cfg_config_table, "beam.mode")->def;
+    if (strcmp(by_default, "auto") == 0) by_default = "adaptive"; /* of a head that stands still */
+    for (uint32_t m = 0; m < N_METHODS; m++) {
+        const struct result *r = &result[m];
+        if (methods[m].mode == BEAM_RINGS && methods[m].rings == 0) continue;
+        printf("beam,%s,%s,%.3f,%.3g,%.3g,%d,%d,%.3g,%.3g\n", methods[m].name, scene, r->ns_median, r->p999_m, r->max_m,
+               r->front, strcmp(methods[m].name, by_default) == 0, r->rms_m, r->wrong_part);
+    }
+}
+
+static void print_table(const struct result *result)
+{
+    for (uint32_t m = 0; m < N_METHODS; m++) {
+        const struct result *r = &result[m];
+        printf("  %-9s %8.1f ns  ratio %6.2f  count %.4f %% of all, %.2f %% of mixed  rms %.3f mm, p99.9 %.3f mm\n",
+               methods[m].name, r->ns_median, r->ratio_median, 100.0 * (double)r->wrong / (double)r->pulses,
+               100.0 * (double)r->wrong_mixed / (double)r->mixed, 1e3 * r->rms_m, 1e3 * r->p999_m);
+    }
+    printf("  (%llu pulses, %.3f %% mixed)\n", (unsigned long long)result[0].pulses,
+           100.0 * (double)result[0].mixed / (double)result[0].pulses);
+}
+
+static void print_scene(const char *name, struct beam_rig *rig, const struct beam_view *view)
+{
+    struct cast_counters before, after;
+    struct beam_outlines_info info;
+    uint32_t n = view->lines * view->pulses;
+    beam_outlines_get_info(rig->outlines, &info);
+    printf("%s: %u triangles, %llu edges, %llu outlines, %llu stretches, %llu entries, %.1f MB\n", name,
+           rig->scene->n_triangles, (unsigned long long)info.edges, (unsigned long long)info.outlines,
+           (unsigned long long)info.stretches, (unsigned long long)info.entries, 1e-6 * (double)info.bytes);
+    beam_rig_mode(rig, BEAM_ADAPTIVE, 4);
+    caster_get_counters(rig->caster, &before);
+    for (uint32_t l = 0; l < view->lines; l++)
+        beam_rig_line(rig, l);
+    caster_get_counters(rig->caster, &after);
+    printf("  adaptive: %.4f %% cut, %.4f sub-rays a pulse, %.4f %% ragged\n",
+           100.0 * (double)(after.outlined - before.outlined) / n, (double)(after.sub_rays - before.sub_rays) / n,
+           100.0 * (double)(after.ragged - before.ragged) / n);
+}
+
 static void measure(const char *name, struct scene *scene, const double station_m[3], const struct beam_view *view,
                     uint32_t sample)
 {
+    static struct result result[MAX_METHODS];
     struct beam_rig rig;
     struct sh_err err;
-    struct beam_outlines_info info;
-    static double ns[MAX_METHODS][ROUNDS];
-    struct tally tally[MAX_METHODS] = {{0}};
+    memset(result, 0, sizeof result);
+    if (as_chart) fprintf(stderr, "chart: beam, %s\n", name);
     if (beam_rig_open(&rig, scene, station_m, view, &err) != 0) {
         fprintf(stderr, "%s\n", err.text);
         exit(1);
     }
-    beam_outlines_get_info(rig.outlines, &info);
-    printf("%s: %u triangles, %llu edges, %llu outlines, %llu stretches, %llu entries, %.1f MB\n", name,
-           scene->n_triangles, (unsigned long long)info.edges, (unsigned long long)info.outlines,
-           (unsigned long long)info.stretches, (unsigned long long)info.entries, 1e-6 * (double)info.bytes);
-    uint32_t n = view->lines * view->pulses;
-    for (int r = 0; r < ROUNDS; r++)
-        for (uint32_t m = 0; m < N_METHODS; m++) {
-            if (r >= 3 && methods[m].rings >= 2 && methods[m].mode == BEAM_RINGS) {
-                ns[m][r] = ns[m][r - 3];
-                continue;
-            }
-            beam_rig_mode(&rig, methods[m].mode, methods[m].rings);
-            double start = thread_s();
-            for (uint32_t l = 0; l < view->lines; l++)
-                beam_rig_line(&rig, l);
-            ns[m][r] = 1e9 * (thread_s() - start) / n;
-        }
-    struct cast_counters before, after;
-    beam_rig_mode(&rig, BEAM_ADAPTIVE, 4);
-    caster_get_counters(rig.caster, &before);
-    for (uint32_t l = 0; l < view->lines; l++)
-        beam_rig_line(&rig, l);
-    caster_get_counters(rig.caster, &after);
-    printf("  adaptive: %.4f %% cut, %.4f sub-rays a pulse, %.4f %% ragged\n",
-           100.0 * (double)(after.outlined - before.outlined) / n, (double)(after.sub_rays - before.sub_rays) / n,
-           100.0 * (double)(after.ragged - before.ragged) / n);
-    if (sample > 0) accuracy(&rig, view, sample, N_METHODS, tally);
-    for (uint32_t m = 0; m < N_METHODS; m++) {
-        double ratio[ROUNDS];
-        for (int r = 0; r < ROUNDS; r++)
-            ratio[r] = ns[m][r] / ns[0][r];
-        double by = median(ratio, ROUNDS);
-        const struct tally *t = &tally[m];
-        printf("  %-9s %8.1f ns  ratio %6.2f", methods[m].name, median(ns[m], ROUNDS), by);
-        if (sample > 0)
-            printf("  count %.4f %% of all, %.2f %% of mixed  rms %.3f mm",
-                   100.0 * (double)t->wrong / (double)t->pulses, 100.0 * (double)t->wrong_mixed / (double)t->mixed,
-                   1e3 * sqrt(t->range2 / (double)t->echoes));
-        printf("\n");
-    }
-    if (sample > 0)
-        printf("  (%llu pulses, %.3f %% mixed)\n", (unsigned long long)tally[0].pulses,
-               100.0 * (double)tally[0].mixed / (double)tally[0].pulses);
+    if (!as_chart) print_scene(name, &rig, view);
+    speed(&rig, view, result);
+    accuracy(&rig, view, sample, result);
+    for (uint32_t m = 0; m < N_METHODS; m++)
+        sum_up(&result[m]);
+    mark_front(result);
+    if (as_chart)
+        print_rows(name, result);
+    else
+        print_table(result);
+    for (uint32_t m = 0; m < N_METHODS; m++)
+        free(result[m].off_m);
     beam_rig_close(&rig);
 }
 
@@ -203,13 +271,24 @@ static void foliage(uint32_t n_leaves)
     measure("foliage", scene, station_m, &view, 10);
 }
 
+static void pin(void)
+{
+    cpu_set_t one;
+    int cpu = sched_getcpu();
+    CPU_ZERO(&one);
+    CPU_SET(cpu < 0 ? 0U : (unsigned)cpu, &one);
+    sched_setaffinity(0, sizeof one, &one);
+}
+
 int main(int argc, char **argv)
 {
+    pin();
     for (int i = 1; i < argc; i++) {
+        as_chart |= strcmp(argv[i], "--chart") == 0;
         if (strcmp(argv[i], "house") == 0) house();
         if (strcmp(argv[i], "wires") == 0) wires();
         if (strcmp(argv[i], "foliage") == 0) foliage(60000);
         if (strcmp(argv[i], "leaves") == 0) foliage(3000000);
     }
-    return 0;
+    return fflush(stdout) == 0 ? 0 : 1;
 }

@@ -266,7 +266,7 @@ static void print_rows(const struct method *method, const char *scene)
     static const char *const kind[] = {"float", "refined", "decided"};
     for (int i = 0; i < METHODS; i++) {
         const struct method *m = &method[i];
-        printf("cast,%s%s %u,%s,%.3f,%.3g,%.3g,%d,%d\n",
+        printf("cast,%s%s %u,%s,%.3f,%.3g,%.3g,%d,%d,,\n",
                m->kind == DECIDED ? ""
                : m->robust        ? "robust "
                                   : "plain ",
@@ -325,7 +325,7 @@ int main(void)
     struct sh_err err;
     static struct method all[METHODS];
     pin();
-    printf("panel,method,scene,ns_per_pulse,err_p999_m,err_max_m,front,default\n");
+    printf("panel,method,scene,ns_per_pulse,err_p999_m,err_max_m,front,default,err_rms_m,wrong_counts\n");
     for (size_t i = 0; i < sizeof SCENES / sizeof SCENES[0]; i++)
         if (draw_scene(&SCENES[i], all, &err) != SH_OK) {
             fprintf(stderr, "chart: %s\n", err.text);

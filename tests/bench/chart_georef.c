@@ -176,7 +176,7 @@ static int draw_scene(int scene)
     }
     finish(result, the_default);
     for (int m = 0; m < METHODS; m++)
-        printf("georef,%s,%s,%.3f,%.3g,%.3g,%d,%d\n", NAME[m], SCENE[scene].name, result[m].ns_median,
+        printf("georef,%s,%s,%.3f,%.3g,%.3g,%d,%d,,\n", NAME[m], SCENE[scene].name, result[m].ns_median,
                result[m].err_p999_m, result[m].err_max_m, result[m].front, result[m].is_default);
     return 0;
 }

@@ -108,7 +108,7 @@ static int measure(int map, const struct width *width, int n_widths)
                               out[0], out[1], out[2]);
         compare_points(georef);
         double median = bench_median(ns[w], ROUNDS);
-        printf("georef width,%s,%s,%.3f,%.3g,%.3g,0,0\n", MAP[map].name, width[w].name, median,
+        printf("georef width,%s,%s,%.3f,%.3g,%.3g,0,0,,\n", MAP[map].name, width[w].name, median,
                error_m[(int)(0.999 * POINTS)], error_m[POINTS - 1]);
         fprintf(stderr, "chart: %-26s %-20s %6.2f ns per point, error at most %.2g m\n", MAP[map].name, width[w].name,
                 median, error_m[POINTS - 1]);

@@ -9,16 +9,19 @@ check_enumeration "usbredir" 512
 check_record "usbredir"
 note "recorded at $(uptime_s) s"
 records_only && return
-tap "usbredir" test_stream
-note "streamed at $(uptime_s) s"
 tap "usbredir" test_chapter9
 note "chapter 9 at $(uptime_s) s"
 ask_host stop >/dev/null
 check "usbredir: gone with the head" wait_for 10 is_unplugged
+ask_host start_super --pace fast >/dev/null
+check_enumeration "usbredir, super" 1024
+record_again "usbredir, super"
+ask_host stop >/dev/null
+note "super at $(uptime_s) s"
 # Each time the process is killed with the stream in full flow, and another one takes its place.
-ask_host start >/dev/null
+ask_host start --set head.prr_hz=4000 --set loop.tick_hz=100 >/dev/null
 check "usbredir: plugged in again" wait_for 10 is_plugged
 echo ". /in_lib.sh; ask_host kill >/dev/null" >unplug.sh
-echo ". /in_lib.sh; ask_host start >/dev/null" >plug.sh
-REPLUGS=3 UNPLUG="sh unplug.sh" PLUG="sh plug.sh" tap "usbredir killed" test_stream
+echo ". /in_lib.sh; ask_host start --set head.prr_hz=4000 --set loop.tick_hz=100 >/dev/null" >plug.sh
+REPLUGS=20 UNPLUG="sh unplug.sh" PLUG="sh plug.sh" tap "usbredir killed" test_stream
 note "killed at $(uptime_s) s"

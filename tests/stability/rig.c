@@ -85,6 +85,19 @@ void rig_aim(struct rig *rig, const double p[3])
     rig_direct(rig, p[0] - rig->station_m[0], p[1] - rig->station_m[1], p[2] - rig->station_m[2]);
 }
 
+void rig_line_ahead(struct schedule_segment *segment, struct schedule_line *line, struct schedule_run *run)
+{
+    const struct schedule_spec spec = {.prr_uhz = 288000000000,
+                                       .lines_uhz = 3000000,
+                                       .fov_min_udeg = -40000000,
+                                       .sweep_udeg = 240000000,
+                                       .line_start_udeg = -500000,
+                                       .line_stop_udeg = 500000};
+    schedule_start(segment, &spec);
+    schedule_get_line(segment, 0, line);
+    schedule_get_run(segment, line, line->cast0, RIG_LINE_PULSES, run);
+}
+
 double rig_unit(uint64_t seed, uint64_t i)
 {
     return (double)(int64_t)(rng_u64(rng_mix(seed), i) >> 11) * 0x1p-53;

@@ -65,6 +65,10 @@ void rig_row_of_ranges(struct rig *rig, const char *regime, const double naive_o
  * float range. */
 void rig_row_of_rays(struct rig *rig, const char *regime, const double naive_origin_m[3]);
 
+/* A line of pulses straight ahead (y), half a degree up and down. */
+enum { RIG_LINE_PULSES = 400 };
+void rig_line_ahead(struct schedule_segment *segment, struct schedule_line *line, struct schedule_run *run);
+
 /* Uniform in 0..1, from a counter. */
 double rig_unit(uint64_t seed, uint64_t i);
 

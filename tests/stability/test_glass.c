@@ -7,7 +7,7 @@
 #include "core/surface.h"
 #include "tests/stability/rig.h"
 
-enum { PULSES = 400 };
+enum { PULSES = RIG_LINE_PULSES };
 static const double PANE_M = 0.004, WALL_M = 3.0;
 
 /* Both sides of a pane that the beam ahead meets at `away_m` under the incidence i, and a wall behind, all parallel;
@@ -32,20 +32,6 @@ static struct scene *make_window(double away_m, double incidence_rad, const doub
     if (scene_from_arrays((const double(*)[3])vertex, 12, triangle, 6, label, surface, 2, &scene, &err) != SH_OK)
         fail_msg("%s", err.text);
     return scene;
-}
-
-/* A line of pulses, half a degree up and down. */
-static void schedule_line_ahead(struct schedule_run *run, struct schedule_segment *segment, struct schedule_line *line)
-{
-    const struct schedule_spec spec = {.prr_uhz = 288000000000,
-                                       .lines_uhz = 3000000,
-                                       .fov_min_udeg = -40000000,
-                                       .sweep_udeg = 240000000,
-                                       .line_start_udeg = -500000,
-                                       .line_stop_udeg = 500000};
-    schedule_start(segment, &spec);
-    schedule_get_line(segment, 0, line);
-    schedule_get_run(segment, line, line->cast0, PULSES, run);
 }
 
 /* True ranges of the three surfaces along pulse i. */
@@ -74,7 +60,7 @@ static uint32_t wrong_of_ours(const struct scene *scene, double away_m, double i
     struct surface_table table;
     struct sh_err err;
     uint32_t wrong = 0;
-    schedule_line_ahead(&run, &segment, &line);
+    rig_line_ahead(&segment, &line, &run);
     if (bvh_create(scene, at, 2000.0, 1, NULL, &bvh, &err) != SH_OK || caster_create(&caster, &err) != SH_OK ||
         line_block_alloc(&block, PULSES * (1 + CAST_MAX_DEPTH), &err) != SH_OK ||
         surface_table_alloc(2, &table, &err) != SH_OK)
@@ -118,7 +104,7 @@ static uint32_t wrong_of_naive(const struct scene *scene, double away_m, double 
     uint32_t wrong = 0;
     struct naive *naive = naive_create(scene, at, 1, 1);
     assert_non_null(naive);
-    schedule_line_ahead(&run, &segment, &line);
+    rig_line_ahead(&segment, &line, &run);
     for (uint32_t i = 0; i < PULSES; i++) {
         double range_m[3], dir[3], length_m = 0.0;
         uint32_t off = 0;

@@ -216,6 +216,7 @@ static const struct bad bad[] = {
     {"type: tcp", "type: usb\n    path: /tmp/x", 15, "links[0].path", "the back end usbip has no such key"},
     {"type: tcp\n    port: 0", "type: usb\n    backend: usbredir", 15, "links[0].backend", "with one of them"},
     {"type: tcp", "type: usb\n    backend: usbredir\n    path: /tmp/x", 16, "links[0].path", "allowed one of them"},
+    {"type: tcp", "type: usb\n    backend: usbredir\n    attach: on", 17, "links[0].port", "allowed 1 to 65535"},
     {"type: tcp", "type: usb\n    backend: functionfs", 16, "links[0].port", "the back end functionfs has no such key"},
     {"type: tcp", "type: usb\n    udc: dummy_udc.0", 15, "links[0].udc", "the back end usbip has no such key"},
     {"type: tcp\n    port: 0", "type: file", 14, "links[0].path", "required for a file link"},

@@ -13,6 +13,8 @@
 
 enum { PENDING = 8, BULK = 16384, STREAM_IN = 0x83, STREAM_INTERFACE = 2, SESSION_REQUEST = 0x22, SEED = 20 };
 
+enum { UNPLUG, RESET, REOPEN, CANCEL, UNPLUG_IN_A_PACKET, N_KINDS };
+
 /* What one event may leave behind before it shows: with 1000 events a single transfer of 16 KiB each would be 16 MB.
  * The rest is what an allocator keeps for itself. */
 enum { RSS_SLACK_KIB = 4096 };
@@ -26,6 +28,7 @@ struct soak {
     uint64_t next_id, first_id; /* of bulk packets; of those that were asked for since the last event */
     uint64_t bytes, frames, pulses, next_pulse, announced, head_lost, unannounced;
     int have_pulse;
+    int struck[N_KINDS];
 };
 
 /* ---- the stream */
@@ -296,10 +299,9 @@ static int count_fds(const struct soak *s)
 
 /* ---- the events */
 
-enum { UNPLUG, RESET, REOPEN, CANCEL, UNPLUG_IN_A_PACKET, N_KINDS };
-
 static void strike(struct soak *s, unsigned kind)
 {
+    s->struck[kind]++;
     static const uint8_t half[] = {101, 0, 0, 0, 200}; /* a bulk packet's header that breaks off */
     switch (kind) {
     case UNPLUG_IN_A_PACKET:
@@ -360,11 +362,16 @@ static void test_soak(void **state)
         strike(s, draw((uint64_t)i, 1, N_KINDS));
     }
     stream(s, 200000); /* still alive */
-    print_message("%d events, %llu frames in %llu bytes, %llu lost meanwhile in %llu gaps; %d times too early\n",
-                  events, (unsigned long long)s->frames, (unsigned long long)(s->bytes - bytes),
+    print_message("%d events: %d unplugged, %d of them within a packet; %d resets, %d sessions begun anew, %d with "
+                  "transfers taken back\n",
+                  events, s->struck[UNPLUG] + s->struck[UNPLUG_IN_A_PACKET], s->struck[UNPLUG_IN_A_PACKET],
+                  s->struck[RESET], s->struck[REOPEN] + s->struck[CANCEL], s->struck[CANCEL]);
+    print_message("%llu frames in %llu bytes; %llu lost in %llu gaps, which the sequence tells; %llu unaccounted for\n",
+                  (unsigned long long)s->frames, (unsigned long long)(s->bytes - bytes),
                   (unsigned long long)s->parser.stats.seq_lost, (unsigned long long)s->parser.stats.seq_gaps,
-                  s->refused);
-    print_message("resident %lu KiB, was %lu; descriptors %d, were %d\n", rss_kib(s), rss, count_fds(s), fds);
+                  (unsigned long long)s->unannounced);
+    print_message("resident %lu KiB, was %lu; descriptors %d, were %d; %d times plugged in too early\n", rss_kib(s),
+                  rss, count_fds(s), fds, s->refused);
     assert_int_equal(s->unannounced, 0);
     assert_int_equal(s->parser.stats.bad_payload, 0);
     assert_int_equal(count_fds(s), fds);

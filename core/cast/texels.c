@@ -1,0 +1,52 @@
+/* Where on a texture rays have met it. */
+#include <math.h>
+
+#include "core/cast/caster_private.h"
+#include "core/surface.h"
+
+/* Barycentric coordinates of p, on the triangle's plane, by the areas seen along the largest axis of its normal. */
+static void weights(const double *a, const double *b, const double *c, const double p[3], double w[3])
+{
+    double u[3], v[3], n[3];
+    for (int i = 0; i < 3; i++) {
+        u[i] = b[i] - a[i];
+        v[i] = c[i] - a[i];
+    }
+    for (int i = 0; i < 3; i++)
+        n[i] = u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3];
+    int along = fabs(n[0]) > fabs(n[1]) ? 0 : 1;
+    if (fabs(n[2]) > fabs(n[along])) along = 2;
+    int x = (along + 1) % 3, y = (along + 2) % 3;
+    double qx = p[x] - a[x], qy = p[y] - a[y];
+    w[1] = (qx * v[y] - qy * v[x]) / n[along];
+    w[2] = (u[x] * qy - u[y] * qx) / n[along];
+    w[0] = 1.0 - w[1] - w[2];
+}
+
+void caster_texels(const struct cast_setup *s, const struct origins *from, const struct ray_set *set, uint32_t n)
+{
+    const struct surface_table *table = s->detect != NULL ? s->detect->surfaces : NULL;
+    if (table == NULL || table->texture == NULL) return;
+    for (uint32_t i = 0; i < n; i++) {
+        if (isnan(set->range_m[i]) || set->label[i] >= table->n || table->texture[set->label[i]] == NULL) continue;
+        const struct cast_mover *m = set->body != NULL && set->body[i] != 0 ? &s->mover[set->body[i] - 1] : NULL;
+        const struct scene *scene = (m != NULL ? m->bvh : s->bvh)->scene;
+        if (scene->uv == NULL) continue;
+        const double d[3] = {set->dx[i], set->dy[i], set->dz[i]};
+        double at[3], p[3], w[3], uv[2] = {0.0, 0.0};
+        for (int k = 0; k < 3; k++) {
+            at[k] = from->px != NULL ? (k == 0 ? from->px : k == 1 ? from->py : from->pz)[i] : from->at_m[k];
+            at[k] += set->range_m[i] * d[k];
+        }
+        for (int k = 0; k < 3; k++) /* where that was at rest */
+            p[k] = m == NULL ? at[k]
+                             : m->rotation[k] * (at[0] - m->shift_m[0]) + m->rotation[3 + k] * (at[1] - m->shift_m[1]) +
+                                   m->rotation[6 + k] * (at[2] - m->shift_m[2]);
+        const uint32_t *corner = scene->triangle[set->hit[i]];
+        weights(scene->vertex_m[corner[0]], scene->vertex_m[corner[1]], scene->vertex_m[corner[2]], p, w);
+        for (int c = 0; c < 3; c++)
+            for (int k = 0; k < 2; k++)
+                uv[k] += w[c] * (double)scene->uv[set->hit[i]][c][k];
+        if (isfinite(uv[0]) && isfinite(uv[1])) set->label[i] = surface_texel(table, set->label[i], uv);
+    }
+}

@@ -1,0 +1,80 @@
+/* What a USB/IP client asks before it has the device: which there are (DEVLIST), and one of them (IMPORT). */
+#include "drivers/usb/usbip_private.h"
+
+static void describe_device(const struct usbip_conn *conn, uint8_t *out)
+{
+    static const uint8_t speed[] = {
+        [USB_RATE_FULL] = USB_SPEED_FULL, [USB_RATE_HIGH] = USB_SPEED_HIGH, [USB_RATE_SUPER] = USB_SPEED_SUPER};
+    const struct usb_model *model = usb_device_model(conn->device);
+    const struct usb_identity *id = usb_device_identity(conn->device);
+    memset(out, 0, OP_DEVICE);
+    strcpy((char *)out, "/sys/devices/scanhead/" USBIP_BUSID);
+    strcpy((char *)out + 256, USBIP_BUSID);
+    put_be32(out + 288, USBIP_BUS);
+    put_be32(out + 292, USBIP_DEVICE);
+    put_be32(out + 296, speed[id->highest]);
+    put_be16(out + 300, id->vid);
+    put_be16(out + 302, id->pid);
+    put_be16(out + 304, model->bcd_device);
+    out[306] = model->class;
+    out[307] = model->subclass;
+    out[308] = model->protocol;
+    out[309] = (uint8_t)usb_device_configuration(conn->device);
+    out[310] = 1;
+    out[311] = model->n_interfaces;
+}
+
+static void put_op(uint8_t *out, unsigned code, uint32_t status)
+{
+    put_be16(out, USBIP_VERSION);
+    put_be16(out + 2, code);
+    put_be32(out + 4, status);
+}
+
+static void list_devices(struct usbip_conn *conn)
+{
+    const struct usb_model *model = usb_device_model(conn->device);
+    uint8_t *out = usbip_queue_plain(conn, OP_HEADER + 4 + OP_DEVICE + (uint32_t)model->n_interfaces * OP_INTERFACE);
+    if (out == NULL) return;
+    put_op(out, OP_REP_DEVLIST, OP_OK);
+    put_be32(out + 8, 1);
+    describe_device(conn, out + 12);
+    for (unsigned i = 0; i < model->n_interfaces; i++) {
+        const struct usb_interface_row *row = usb_find_row(model, i, 0);
+        uint8_t *at = out + 12 + OP_DEVICE + i * OP_INTERFACE;
+        at[0] = row->class;
+        at[1] = row->subclass;
+        at[2] = row->protocol;
+        at[3] = 0;
+    }
+}
+
+static void import_device(struct usbip_conn *conn, const uint8_t *busid)
+{
+    const int known = strncmp((const char *)busid, USBIP_BUSID, BUSID_LEN) == 0;
+    const uint32_t status = !known ? OP_FAILED : *conn->taken ? OP_BUSY : OP_OK;
+    uint8_t *out = usbip_queue_plain(conn, OP_HEADER + (status == OP_OK ? OP_DEVICE : 0));
+    if (out == NULL) return;
+    put_op(out, OP_REP_IMPORT, status);
+    if (status != OP_OK) return;
+    describe_device(conn, out + OP_HEADER);
+    usbip_conn_import(conn);
+}
+
+uint32_t usbip_op_need(const struct usbip_conn *conn)
+{
+    if (conn->head_len < OP_HEADER) return OP_HEADER;
+    return get_be16(conn->head + 2) == OP_REQ_IMPORT ? OP_IMPORT : OP_HEADER;
+}
+
+void usbip_op_take(struct usbip_conn *conn)
+{
+    const unsigned code = get_be16(conn->head + 2);
+    conn->head_len = 0;
+    if (get_be16(conn->head) != USBIP_VERSION || (code != OP_REQ_DEVLIST && code != OP_REQ_IMPORT))
+        conn->broken = 1;
+    else if (code == OP_REQ_DEVLIST)
+        list_devices(conn);
+    else
+        import_device(conn, conn->head + OP_HEADER);
+}

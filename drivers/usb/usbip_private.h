@@ -1,0 +1,71 @@
+/* Inside of a connection: URBs and their memory, replies and their order, operations. */
+#ifndef DRIVERS_USB_USBIP_PRIVATE_H
+#define DRIVERS_USB_USBIP_PRIVATE_H
+
+#include <arpa/inet.h>
+#include <string.h>
+
+#include "drivers/usb/usbip_conn.h"
+
+/* Of what the host has asked for and the device has not answered; who asks for more is cut off. */
+enum { MAX_PENDING = 4096, MAX_PENDING_BYTES = 64 << 20 };
+/* Of answers that are not sent yet: above these nothing more is read until the host has taken some. */
+enum { MAX_UNSENT = 256, MAX_UNSENT_BYTES = 1 << 20 };
+
+/* The header of the reply stands before the bytes, so that both leave in one piece. */
+struct usbip_urb {
+    struct usb_transfer transfer;
+    struct usbip_conn *conn;
+    struct usbip_urb *next;
+    uint32_t seqnum;
+    int in;
+    int short_is_error;
+    uint32_t send_len; /* of wire, once it is a reply */
+    uint32_t room;
+    uint8_t wire[]; /* URB_HEADER, then room bytes */
+};
+
+static inline void put_be16(uint8_t *at, unsigned v)
+{
+    const uint16_t be = htons((uint16_t)v);
+    memcpy(at, &be, sizeof be);
+}
+
+static inline void put_be32(uint8_t *at, uint32_t v)
+{
+    const uint32_t be = htonl(v);
+    memcpy(at, &be, sizeof be);
+}
+
+static inline uint32_t get_be32(const uint8_t *at)
+{
+    uint32_t be;
+    memcpy(&be, at, sizeof be);
+    return ntohl(be);
+}
+
+static inline unsigned get_be16(const uint8_t *at)
+{
+    return (unsigned)at[0] << 8 | at[1];
+}
+
+/* ---- usbip_queue.c */
+
+/* NULL: too much is pending, or no memory. It counts as pending until it is queued or freed. */
+struct usbip_urb *usbip_urb_new(struct usbip_conn *conn, uint32_t room);
+/* One that was not queued. */
+void usbip_urb_free(struct usbip_conn *conn, struct usbip_urb *urb);
+/* As a reply, of len bytes of wire. It is freed once it is sent. */
+void usbip_queue(struct usbip_conn *conn, struct usbip_urb *urb, uint32_t len);
+/* A reply that is nothing but its own bytes, which are 0; NULL breaks the connection. */
+uint8_t *usbip_queue_plain(struct usbip_conn *conn, uint32_t len);
+void usbip_queue_clear(struct usbip_conn *conn);
+
+/* ---- usbip_ops.c */
+
+/* How many bytes an operation needs, as far as it has come. */
+uint32_t usbip_op_need(const struct usbip_conn *conn);
+/* All bytes of it are in conn->head. */
+void usbip_op_take(struct usbip_conn *conn);
+
+#endif

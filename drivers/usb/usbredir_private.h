@@ -1,0 +1,41 @@
+/* Inside of the usbredir back end, which is split by what the guest asks for: requests, data, and the socket. */
+#ifndef DRIVERS_USB_USBREDIR_PRIVATE_H
+#define DRIVERS_USB_USBREDIR_PRIVATE_H
+
+#include <usbredirparser.h>
+
+#include "drivers/usb/backend.h"
+#include "drivers/usb/retry.h"
+
+struct redir_transfer;
+
+struct usbredir {
+    struct usb_device *device;
+    int listener, fd;              /* -1: none */
+    struct usbredirparser *parser; /* NULL: no connection (yet) */
+    int broken;
+    int greeted; /* its hello has come */
+    int (*go_on)(void *ctx);
+    void *go_on_ctx;
+    int n_reads; /* within one call of handle */
+    uint32_t n_pending;
+    uint64_t n_bytes;
+    struct redir_transfer *receiving[16]; /* by number of the interrupt IN endpoint */
+    uint64_t next_id;                     /* of interrupt packets */
+    struct usb_retry retry;               /* of a connection we make */
+    struct usb_backend_address peer;      /* where to */
+    char path[256];                       /* to be removed; empty: none */
+    char name[USB_BACKEND_NAME_MAX];
+};
+
+/* usbredir_requests.c */
+void usbredir_take_requests(struct usbredirparser *parser);
+/* The library passes on packets from before the hello, too: 1, and the connection is broken. */
+int usbredir_is_early(struct usbredir *self);
+
+/* usbredir_data.c */
+void usbredir_take_data(struct usbredirparser *parser);
+/* usb_complete of all transfers. */
+void usbredir_on_complete(void *ctx, struct usb_transfer *transfer);
+
+#endif

@@ -1,0 +1,183 @@
+/* The usbredir back end: what the device is, and requests to it. */
+#include "drivers/usb/backend.h"
+
+#ifdef HAVE_USBREDIR
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "drivers/protocol/bytes.h"
+#include "drivers/usb/usbredir_private.h"
+
+/* ---- what the device is */
+
+static void send_interfaces(struct usbredir *self)
+{
+    const struct usb_model *model = usb_device_model(self->device);
+    struct usb_redir_interface_info_header info = {.interface_count = model->n_interfaces};
+    struct usb_redir_ep_info_header eps = {0};
+    memset(eps.type, usb_redir_type_invalid, sizeof eps.type);
+    eps.type[0] = eps.type[16] = usb_redir_type_control;
+    for (unsigned i = 0; i < model->n_interfaces; i++) {
+        const struct usb_interface_row *row = usb_device_row(self->device, i);
+        if (row == NULL) row = usb_find_row(model, i, 0);
+        info.interface[i] = row->number;
+        info.interface_class[i] = row->class;
+        info.interface_subclass[i] = row->subclass;
+        info.interface_protocol[i] = row->protocol;
+        for (unsigned k = 0; k < row->n_endpoints; k++) {
+            const struct usb_endpoint_row *ep = &row->endpoint[k];
+            const unsigned at = (ep->address & USB_ENDPOINT_NUMBER_MASK) + (ep->address & USB_DIR_IN ? 16u : 0u);
+            eps.type[at] = ep->type;
+            eps.interval[at] = ep->interval[usb_device_rate(self->device)];
+            eps.interface[at] = row->number;
+            eps.max_packet_size[at] = ep->packet[usb_device_rate(self->device)];
+        }
+    }
+    usbredirparser_send_interface_info(self->parser, &info);
+    usbredirparser_send_ep_info(self->parser, &eps);
+}
+
+static void attach(struct usbredir *self)
+{
+    usb_device_attach(self->device, usb_device_identity(self->device)->highest, usbredir_on_complete, self);
+    usb_device_assume_address(self->device); /* the guest's controller gives out addresses, and keeps them */
+}
+
+static void on_hello(void *priv, struct usb_redir_hello_header *hello)
+{
+    static const uint8_t speed[] = {[USB_RATE_FULL] = usb_redir_speed_full,
+                                    [USB_RATE_HIGH] = usb_redir_speed_high,
+                                    [USB_RATE_SUPER] = usb_redir_speed_super};
+    struct usbredir *self = priv;
+    const struct usb_model *model = usb_device_model(self->device);
+    const struct usb_identity *id = usb_device_identity(self->device);
+    (void)hello;
+    self->greeted = 1;
+    attach(self);
+    send_interfaces(self);
+    struct usb_redir_device_connect_header connect = {.speed = speed[id->highest],
+                                                      .device_class = model->class,
+                                                      .device_subclass = model->subclass,
+                                                      .device_protocol = model->protocol,
+                                                      .vendor_id = id->vid,
+                                                      .product_id = id->pid,
+                                                      .device_version_bcd = model->bcd_device};
+    usbredirparser_send_device_connect(self->parser, &connect);
+}
+
+int usbredir_is_early(struct usbredir *self)
+{
+    if (!self->greeted) self->broken = 1;
+    return !self->greeted;
+}
+
+/* ---- requests */
+
+static int request(struct usbredir *self, unsigned type, unsigned code, unsigned value, unsigned index, uint8_t *data,
+                   unsigned length)
+{
+    struct usb_ctrlrequest setup = {.bRequestType = (uint8_t)type, .bRequest = (uint8_t)code};
+    le_put16(&setup.wValue, (uint16_t)value);
+    le_put16(&setup.wIndex, (uint16_t)index);
+    le_put16(&setup.wLength, (uint16_t)length);
+    return usb_device_control(self->device, &setup, data, length);
+}
+
+static void on_reset(void *priv)
+{
+    struct usbredir *self = priv;
+    if (usbredir_is_early(self)) return;
+    usb_device_reset(self->device, usb_device_rate(self->device));
+    usb_device_assume_address(self->device);
+}
+
+static void on_set_configuration(void *priv, uint64_t id, struct usb_redir_set_configuration_header *set)
+{
+    struct usbredir *self = priv;
+    if (usbredir_is_early(self)) return;
+    int rc = request(self, USB_DIR_OUT, USB_REQ_SET_CONFIGURATION, set->configuration, 0, NULL, 0);
+    if (rc == 0) send_interfaces(self);
+    struct usb_redir_configuration_status_header status = {.status = rc == 0 ? usb_redir_success : usb_redir_stall,
+                                                           .configuration =
+                                                               (uint8_t)usb_device_configuration(self->device)};
+    usbredirparser_send_configuration_status(self->parser, id, &status);
+}
+
+static void on_get_configuration(void *priv, uint64_t id)
+{
+    struct usbredir *self = priv;
+    struct usb_redir_configuration_status_header status = {
+        .status = usb_redir_success, .configuration = (uint8_t)usb_device_configuration(self->device)};
+    if (usbredir_is_early(self)) return;
+    usbredirparser_send_configuration_status(self->parser, id, &status);
+}
+
+static void send_alt(struct usbredir *self, uint64_t id, unsigned interface, int ok)
+{
+    const struct usb_interface_row *row = usb_device_row(self->device, interface);
+    struct usb_redir_alt_setting_status_header status = {.status =
+                                                             ok && row != NULL ? usb_redir_success : usb_redir_stall,
+                                                         .interface = (uint8_t)interface,
+                                                         .alt = row != NULL ? row->alt : 0};
+    usbredirparser_send_alt_setting_status(self->parser, id, &status);
+}
+
+static void on_set_alt(void *priv, uint64_t id, struct usb_redir_set_alt_setting_header *set)
+{
+    struct usbredir *self = priv;
+    if (usbredir_is_early(self)) return;
+    int rc = request(self, USB_DIR_OUT | USB_RECIP_INTERFACE, USB_REQ_SET_INTERFACE, set->alt, set->interface, NULL, 0);
+    if (rc == 0) send_interfaces(self);
+    send_alt(self, id, set->interface, rc == 0);
+}
+
+static void on_get_alt(void *priv, uint64_t id, struct usb_redir_get_alt_setting_header *get)
+{
+    struct usbredir *self = priv;
+    if (usbredir_is_early(self)) return;
+    send_alt(self, id, get->interface, 1);
+}
+
+static void answer_control(struct usbredir *self, uint64_t id, struct usb_redir_control_packet_header *header,
+                           const uint8_t *out, int len)
+{
+    const int in = (header->requesttype & USB_DIR_IN) != 0;
+    uint8_t *room = malloc((size_t)header->length + 1);
+    int n = USB_STALL;
+    if (room != NULL && !in && len == header->length && len > 0) memcpy(room, out, (size_t)len);
+    if (room != NULL && len == (in ? 0 : header->length))
+        n = request(self, header->requesttype, header->request, header->value, header->index, room, header->length);
+    header->status = n >= 0 ? usb_redir_success : usb_redir_stall;
+    header->length = n < 0 ? 0 : in ? (uint16_t)n : header->length;
+    /* As with bulk: no data pointer in the answer to an OUT. */
+    usbredirparser_send_control_packet(self->parser, id, header, in && n > 0 ? room : NULL, in && n > 0 ? n : 0);
+    free(room);
+}
+
+/* There is one control endpoint. */
+static void on_control(void *priv, uint64_t id, struct usb_redir_control_packet_header *header, uint8_t *data, int len)
+{
+    struct usbredir *self = priv;
+    if (!usbredir_is_early(self) && (header->endpoint & ~USB_DIR_IN) == 0) {
+        answer_control(self, id, header, data, len);
+    } else if (self->greeted) {
+        header->status = usb_redir_inval;
+        header->length = 0;
+        usbredirparser_send_control_packet(self->parser, id, header, NULL, 0);
+    }
+    usbredirparser_free_packet_data(self->parser, data);
+}
+
+void usbredir_take_requests(struct usbredirparser *parser)
+{
+    parser->hello_func = on_hello;
+    parser->reset_func = on_reset;
+    parser->set_configuration_func = on_set_configuration;
+    parser->get_configuration_func = on_get_configuration;
+    parser->set_alt_setting_func = on_set_alt;
+    parser->get_alt_setting_func = on_get_alt;
+    parser->control_packet_func = on_control;
+}
+
+#endif

@@ -1,0 +1,60 @@
+#!/bin/sh
+# What `make install` installs is enough for a client: the README's example, compiled with the installed files alone, reads
+# a scan. Prints TAP. $SCANHEAD: the program of the build that is installed.
+set -u
+program=${SCANHEAD:-build/scanhead}
+work=$(mktemp -d) || exit 1
+head=
+trap '[ -z "$head" ] || kill "$head"; rm -rf "$work"' EXIT
+prefix=/opt/scanhead
+tests=0
+
+# check NAME COMMAND...: passes when the command does; else what it wrote is shown.
+check() {
+    tests=$((tests + 1))
+    name=$1
+    shift
+    if "$@" >"$work/out" 2>&1; then
+        echo "ok $tests - $name"
+    else
+        echo "not ok $tests - $name"
+        tail -n 20 "$work/out" | sed 's/^/# /'
+    fi
+}
+
+# Without what the make above this one told it.
+install_it() {
+    env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -s install BUILD="$(dirname "$program")" WERROR=-Werror DESTDIR="$work/root" \
+        PREFIX=$prefix
+}
+
+config() {
+    PKG_CONFIG_PATH=$work/root$prefix/lib/pkgconfig pkg-config --define-variable=prefix="$work/root$prefix" "$@" libscanhead
+}
+
+compile() {
+    out=$1
+    shift
+    (cd "$work" && ${CC:-cc} -Wall -Werror client.c $(config --cflags) "$@" -o "$out")
+}
+
+# The scan of the guest tests' head, read by the client as points in lines of three numbers.
+reads_a_scan() {
+    sed "\$alinks: [{type: pty, path: port}]" tests/guest/head.yaml >"$work/config.yaml"
+    cp tests/guest/room.obj "$work/"
+    mkfifo "$work/ready"
+    "$work/root$prefix/bin/scanhead" run "$work/config.yaml" --pace fast --ready-fd 9 9>"$work/ready" 2>"$work/head.err" &
+    head=$!
+    read -r ready <"$work/ready" || { cat "$work/head.err"; return 1; }
+    LD_LIBRARY_PATH=$work/root$prefix/lib timeout 60 "$work/client" >"$work/points" || { cat "$work/points"; return 1; }
+    test "$(grep -c '^-\{0,1\}[0-9.]* -\{0,1\}[0-9.]* -\{0,1\}[0-9.]*$' "$work/points")" -gt 1000
+}
+
+# The only example in C; at the terminal of this test.
+sed -n '/^```c$/,/^```$/p' README.md | sed "/^\`\`\`/d; s|tty:[^\"]*|tty:$work/port|" >"$work/client.c"
+check "make install" install_it
+check "the udev rule is where udev looks below a prefix" test -s "$work/root$prefix/lib/udev/rules.d/70-scanhead.rules"
+check "the README's client, with the archive" compile client-static "$work/root$prefix/lib/libscanhead.a" -lnettle -lusb-1.0 -lm
+check "the README's client, with the shared library" compile client $(config --libs)
+check "and it reads a scan" reads_a_scan
+echo "1..$tests"

@@ -1,0 +1,238 @@
+/* The functionfs back end with a test's files in place of the kernel's: FIFOs for endpoints, which the same
+ * asynchronous I/O reads and writes, and a socket pair for ep0. An empty FIFO answers a read as an endpoint does that
+ * is not enabled: at once, with -EAGAIN. What a kernel answers itself is left to the guest tests. */
+#include "tests/unit/usb_host.h"
+#include "tests/unit/usb_models.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <linux/usb/functionfs.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "drivers/usb/backend.h"
+#include "drivers/usb/functionfs_private.h"
+
+enum { EP_IN = 0x81, EP_OUT = 0x02, ENOUGH = 1000000 };
+
+struct rig {
+    struct host *host;
+    struct functionfs *ffs;
+    const struct usb_backend_ops *ops;
+    int kernel; /* the other end of ep0 */
+    int acts;   /* since the last call of handle */
+    char dir[40], path[60];
+};
+
+static char *file(struct rig *rig, const char *name)
+{
+    snprintf(rig->path, sizeof rig->path, "%s/%s", rig->dir, name);
+    return rig->path;
+}
+
+/* out: what stands for the OUT endpoint; NULL: a FIFO. */
+static struct rig rig_open(const char *out)
+{
+    struct rig rig = {.ops = usb_backend_ops_get(USB_BACKEND_FUNCTIONFS), .dir = "/tmp/test_functionfs.XXXXXX"};
+    struct sh_err err = {0, ""};
+    int pair[2];
+    assert_non_null(mkdtemp(rig.dir));
+    assert_int_equal(mkfifo(file(&rig, "ep1"), 0600), 0);
+    if (out != NULL)
+        assert_int_equal(symlink(out, file(&rig, "ep2")), 0);
+    else
+        assert_int_equal(mkfifo(file(&rig, "ep2"), 0600), 0);
+    rig.host = host_new(&pair_model, USB_RATE_HIGH, USB_RATE_HIGH);
+    rig.ffs = calloc(1, sizeof *rig.ffs);
+    assert_non_null(rig.ffs);
+    rig.ffs->device = rig.host->device;
+    snprintf(rig.ffs->gadget.mount, sizeof rig.ffs->gadget.mount, "%s", rig.dir);
+    rig.ffs->gadget.tty_number = -1;
+    rig.ffs->gadget.part = pair_model;
+    rig.ffs->gadget.row[0] = pair_interfaces[0];
+    assert_int_equal(socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK, 0, pair), 0);
+    rig.ffs->ep0 = pair[0];
+    rig.kernel = pair[1];
+    if (ffs_pipes_open(&rig.ffs->pipes, rig.ffs->device, &rig.ffs->gadget, &err) != SH_OK) fail_msg("%s", err.text);
+    assert_int_equal(ffs_console_open(&rig.ffs->console, rig.ffs->device, -1, &err), SH_OK);
+    return rig;
+}
+
+static void rig_close(struct rig *rig)
+{
+    rig->ops->close(rig->ffs);
+    host_free(rig->host);
+    close(rig->kernel);
+    unlink(file(rig, "ep1"));
+    unlink(file(rig, "ep2"));
+    assert_int_equal(rmdir(rig->dir), 0);
+}
+
+static int count_act(void *ctx)
+{
+    struct rig *rig = ctx;
+    if (++rig->acts > ENOUGH) fail_msg("handle() goes on and on");
+    return 1;
+}
+
+static void handle(struct rig *rig)
+{
+    struct pollfd fds[USB_BACKEND_MAX_FDS];
+    int n = rig->ops->prepare(rig->ffs, fds);
+    assert_true(poll(fds, (nfds_t)n, 0) >= 0);
+    rig->acts = 0;
+    assert_int_equal(rig->ops->handle(rig->ffs, fds, n, count_act, rig), SH_OK);
+}
+
+/* Until it has nothing to do: then poll(2) waits, and the processor rests. */
+static void settle(struct rig *rig)
+{
+    for (int calls = 0; calls < 1000; calls++) {
+        struct pollfd fds[USB_BACKEND_MAX_FDS];
+        int n = rig->ops->prepare(rig->ffs, fds);
+        if (!rig->ops->more(rig->ffs) && poll(fds, (nfds_t)n, 0) == 0) return;
+        handle(rig);
+    }
+    fail_msg("poll(2) never waits");
+}
+
+static void event(struct rig *rig, enum usb_functionfs_event_type type)
+{
+    const struct usb_functionfs_event e = {.type = (uint8_t)type};
+    assert_int_equal(send(rig->kernel, &e, sizeof e, 0), sizeof e);
+}
+
+static void host_sends(struct rig *rig, const char *text)
+{
+    int fd = open(file(rig, "ep2"), O_WRONLY | O_NONBLOCK);
+    assert_true(fd >= 0);
+    assert_int_equal(write(fd, text, strlen(text)), strlen(text));
+    close(fd);
+}
+
+/* The host takes the configuration away: every read comes back at once, again and again. */
+static void test_deconfigured(void **state)
+{
+    (void)state;
+    struct rig rig = rig_open(NULL);
+    char text[8];
+    event(&rig, FUNCTIONFS_ENABLE);
+    settle(&rig); /* would go round for ever if what came back went out again */
+    assert_int_equal(usb_device_configuration(rig.host->device), 1);
+    event(&rig, FUNCTIONFS_DISABLE);
+    settle(&rig);
+    assert_int_equal(usb_device_configuration(rig.host->device), 0);
+    /* and brings it back: what rested goes round again, both ways */
+    host_sends(&rig, "abc");
+    event(&rig, FUNCTIONFS_ENABLE);
+    settle(&rig);
+    assert_int_equal(usb_device_read(rig.host->device, EP_OUT, text, sizeof text), 3);
+    assert_memory_equal(text, "abc", 3);
+    assert_int_equal(usb_device_write(rig.host->device, EP_IN, "defg", 4), 4);
+    settle(&rig);
+    int fd = open(file(&rig, "ep1"), O_RDONLY | O_NONBLOCK);
+    assert_int_equal(read(fd, text, sizeof text), 4);
+    assert_memory_equal(text, "defg", 4);
+    close(fd);
+    rig_close(&rig);
+}
+
+/* What fails from before the present configuration says nothing about this one. */
+static void test_left_over(void **state)
+{
+    (void)state;
+    struct rig rig = rig_open(NULL);
+    struct ffs_pipes *pipes = &rig.ffs->pipes;
+    char text[8];
+    event(&rig, FUNCTIONFS_ENABLE);
+    settle(&rig);
+    ffs_pipes_start(pipes); /* all OUT slots fail, and their completions wait */
+    host_sends(&rig, "x");
+    ffs_pipes_start(pipes); /* the endpoint is up again before they are read */
+    settle(&rig);
+    assert_int_equal(usb_device_read(rig.host->device, EP_OUT, text, sizeof text), 1);
+    rig_close(&rig);
+}
+
+/* /dev/null completes each read with no bytes: a host that sends empty packets without end. ep0 gets its turn. */
+static void test_busy_endpoint(void **state)
+{
+    (void)state;
+    struct rig rig = rig_open("/dev/null");
+    event(&rig, FUNCTIONFS_ENABLE);
+    handle(&rig);
+    assert_int_equal(usb_device_configuration(rig.host->device), 1);
+    assert_true(rig.ops->more(rig.ffs)); /* completions wait, which no descriptor tells any more */
+    event(&rig, FUNCTIONFS_DISABLE);
+    handle(&rig);
+    assert_int_equal(usb_device_configuration(rig.host->device), 0);
+    settle(&rig);
+    rig_close(&rig);
+}
+
+/* An error that does not pass: here the kernel can't write to the buffers. */
+static void test_failing_endpoint(void **state)
+{
+    (void)state;
+    struct rig rig = rig_open(NULL);
+    struct ffs_pipe *pipe = &rig.ffs->pipes.pipe[1];
+    uint8_t *buffer[FFS_SLOTS];
+    for (int i = 0; i < FFS_SLOTS; i++) {
+        buffer[i] = pipe->slot[i].buffer;
+        pipe->slot[i].buffer = (uint8_t *)16;
+    }
+    host_sends(&rig, "x");
+    event(&rig, FUNCTIONFS_ENABLE);
+    settle(&rig);
+    for (int i = 0; i < FFS_SLOTS; i++) {
+        assert_int_equal(pipe->slot[i].failures, FFS_MAX_FAILURES);
+        pipe->slot[i].buffer = buffer[i];
+    }
+    event(&rig, FUNCTIONFS_ENABLE); /* the next configuration gives it another chance */
+    settle(&rig);
+    assert_int_equal(usb_device_can_read(rig.host->device, EP_OUT, NULL), 1);
+    rig_close(&rig);
+}
+
+static ssize_t endpoint_request(struct rig *rig, unsigned index, void *answer, size_t room)
+{
+    struct usb_functionfs_event e = {.type = FUNCTIONFS_SETUP};
+    e.u.setup.bRequestType = USB_DIR_IN | USB_TYPE_VENDOR | USB_RECIP_ENDPOINT;
+    e.u.setup.bRequest = 0x55;
+    le_put16(&e.u.setup.wIndex, (uint16_t)index);
+    le_put16(&e.u.setup.wLength, 4);
+    assert_int_equal(send(rig->kernel, &e, sizeof e, 0), sizeof e);
+    settle(rig);
+    return recv(rig->kernel, answer, room, MSG_DONTWAIT);
+}
+
+/* The kernel (f_fs.c, ffs_func_revmap_ep) names an endpoint in wIndex by its place in our descriptors, from 1. */
+static void test_endpoint_request(void **state)
+{
+    (void)state;
+    static const unsigned address[] = {EP_IN, EP_OUT};
+    struct rig rig = rig_open(NULL);
+    uint8_t answer[8];
+    event(&rig, FUNCTIONFS_ENABLE);
+    settle(&rig);
+    for (unsigned i = 0; i < 2; i++) {
+        assert_int_equal(endpoint_request(&rig, i + 1, answer, sizeof answer), 4);
+        assert_int_equal(answer[0], 0xc0); /* host_request() */
+        assert_int_equal(le_get16(&rig.host->last.wIndex), address[i]);
+    }
+    const int before = rig.host->n_requests;
+    assert_int_equal(endpoint_request(&rig, 3, answer, sizeof answer), -1);
+    assert_int_equal(rig.host->n_requests, before);
+    rig_close(&rig);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_deconfigured),     cmocka_unit_test(test_left_over),
+        cmocka_unit_test(test_busy_endpoint),    cmocka_unit_test(test_failing_endpoint),
+        cmocka_unit_test(test_endpoint_request),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,222 @@
+/* libscanhead on a bus that is played: transfers that fail, unplugging at each moment, closing with some under way.
+ * What a real bus does is for tests/guest. */
+#include "tests/unit/bus_rig.h"
+
+/* ---- the stream */
+
+/* Empty packets, errors of the bus, a stalled endpoint, in between good ones: what came is there, in order. */
+static void test_failures_pass(void **state)
+{
+    static const enum libusb_transfer_status failures[] = {LIBUSB_TRANSFER_ERROR, LIBUSB_TRANSFER_STALL,
+                                                           LIBUSB_TRANSFER_OVERFLOW};
+    (void)state;
+    uint32_t seq = 0;
+    struct scanhead *sh = open_head("usb");
+    for (int round = 0; round < 9; round++) {
+        script_events(seq, seq + 5);
+        fake_script(FAKE_IN, LIBUSB_TRANSFER_COMPLETED, NULL, 0);
+        script_events(seq + 5, seq + 7);
+        fake_script(FAKE_IN, failures[round % 3], NULL, 0);
+        if (round % 2) fake_script(FAKE_IN, failures[round % 3], NULL, 0);
+        script_events(seq + 7, seq + 9);
+        seq += 9;
+    }
+    expect_events(sh, 0, seq);
+    assert_true(bus.n_clear_halts > 0);
+    assert_int_equal(bus.done, bus.n_steps);
+    close_head(sh);
+}
+
+/* A frame whose first half comes with the failure, as some controllers give it. */
+static void test_data_with_a_failure(void **state)
+{
+    uint8_t raw[512];
+    (void)state;
+    const size_t len = make_event(raw, sizeof raw, 1);
+    struct scanhead *sh = open_head("usb");
+    script_events(0, 1);
+    fake_script(FAKE_IN, LIBUSB_TRANSFER_ERROR, raw, len / 2);
+    fake_script(FAKE_IN, LIBUSB_TRANSFER_COMPLETED, raw + len / 2, len - len / 2);
+    script_events(2, 5);
+    expect_events(sh, 0, 5);
+    close_head(sh);
+}
+
+/* usbfs has no memory for a moment: the read is sent off again later, behind the others. */
+static void test_submit_fails_for_a_while(void **state)
+{
+    (void)state;
+    struct scanhead *sh = open_head("usb");
+    script_events(0, 100);
+    expect_events(sh, 0, 1);
+    bus.submit_rc = LIBUSB_ERROR_NO_MEM;
+    bus.submit_fails = 3;
+    expect_events(sh, 1, 100);
+    assert_int_equal(bus.submit_fails, 0);
+    close_head(sh);
+}
+
+/* ---- unplugging */
+
+static void expect_lost(struct scanhead *sh)
+{
+    struct scanhead_frame frame;
+    char reply[64];
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(scanhead_next(sh, &frame, TIMEOUT_MS), SCANHEAD_ELOST);
+        assert_non_null(strstr(scanhead_error(sh), "unplugged"));
+        assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, TIMEOUT_MS), SCANHEAD_ELOST);
+    }
+    close_head(sh);
+}
+
+static void test_unplug_at_once(void **state)
+{
+    (void)state;
+    struct scanhead *sh = open_head("usb");
+    script_events(0, 8);
+    expect_events(sh, 0, 1); /* the others are in, too */
+    unplug();
+    expect_events(sh, 1, 8);
+    expect_lost(sh);
+}
+
+/* The bus shows a device that goes as errors first. */
+static void test_unplug_with_errors(void **state)
+{
+    (void)state;
+    struct scanhead *sh = open_head("usb");
+    script_events(0, 4);
+    for (int i = 0; i < 20; i++)
+        fake_script(FAKE_IN, LIBUSB_TRANSFER_ERROR, NULL, 0);
+    bus.clear_halt_rc = LIBUSB_ERROR_IO;
+    bus.idle = unplug;
+    expect_events(sh, 0, 4);
+    expect_lost(sh);
+}
+
+/* Never a word from the hub: after a while the head is lost all the same. */
+static void test_errors_without_end(void **state)
+{
+    (void)state;
+    struct scanhead *sh = open_head("usb");
+    bus.submit_rc = bus.clear_halt_rc = LIBUSB_ERROR_IO;
+    bus.submit_fails = -1;
+    for (int i = 0; i < 16; i++)
+        fake_script(FAKE_IN, LIBUSB_TRANSFER_ERROR, NULL, 0);
+    expect_lost(sh);
+}
+
+/* ---- writing */
+
+static void ask(struct scanhead *sh)
+{
+    char reply[64];
+    memset(bus.written, 0, sizeof bus.written);
+    bus.answer = "12\r\n";
+    if (scanhead_command(sh, "TIME?", reply, sizeof reply, TIMEOUT_MS) != 0) fail_msg("%s", scanhead_error(sh));
+    assert_string_equal(reply, "12");
+    assert_string_equal(bus.written, "TIME?\n"); /* it alone, and once */
+}
+
+/* The write fails after it was sent off: that command gets no reply, and the next one goes out. */
+static void test_write_fails(void **state)
+{
+    static const enum libusb_transfer_status failures[] = {LIBUSB_TRANSFER_ERROR, LIBUSB_TRANSFER_STALL};
+    char reply[64];
+    (void)state;
+    struct scanhead *sh = open_head("usb");
+    ask(sh);
+    for (int i = 0; i < 2; i++) {
+        const int cleared = bus.n_clear_halts;
+        fake_script(FAKE_OUT, failures[i], NULL, 0);
+        assert_int_equal(scanhead_command(sh, "SCAN:STOP", reply, sizeof reply, 20), SCANHEAD_ETIMEOUT);
+        ask(sh);
+        assert_int_equal(bus.n_clear_halts, cleared + 1);
+    }
+    bus.submit_rc = LIBUSB_ERROR_NO_MEM;
+    bus.submit_fails = 3;
+    ask(sh);
+    assert_int_equal(bus.submit_fails, 0);
+    close_head(sh);
+}
+
+/* The bus still says that the device is there, and takes nothing for it: the read that is under way tells nothing. */
+static void test_unplug_seen_by_writing(void **state)
+{
+    char reply[64];
+    (void)state;
+    struct scanhead *sh = open_head("usb");
+    fake_script(FAKE_OUT, LIBUSB_TRANSFER_ERROR, NULL, 0);
+    assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, 20), SCANHEAD_ETIMEOUT);
+    bus.submit_rc = bus.clear_halt_rc = LIBUSB_ERROR_IO;
+    bus.submit_fails = -1;
+    assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, TIMEOUT_MS), SCANHEAD_ELOST);
+    assert_non_null(strstr(scanhead_error(sh), "unplugged"));
+    close_head(sh);
+}
+
+static void test_unplug_while_writing(void **state)
+{
+    char reply[64];
+    (void)state;
+    /* in between: the write fails, then the device is gone when the endpoint is to be started anew */
+    struct scanhead *sh = open_head("usb");
+    fake_script(FAKE_OUT, LIBUSB_TRANSFER_ERROR, NULL, 0);
+    assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, 20), SCANHEAD_ETIMEOUT);
+    bus.clear_halt_rc = LIBUSB_ERROR_NO_DEVICE;
+    assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, TIMEOUT_MS), SCANHEAD_ELOST);
+    close_head(sh);
+    /* when it is sent off */
+    bus.clear_halt_rc = 0;
+    sh = open_head("usb");
+    bus.submit_rc = LIBUSB_ERROR_NO_DEVICE;
+    bus.submit_fails = 1;
+    assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, TIMEOUT_MS), SCANHEAD_ELOST);
+    close_head(sh);
+    /* while its reply is awaited */
+    bus.submit_rc = 0;
+    sh = open_head("usb");
+    bus.idle = unplug;
+    assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, TIMEOUT_MS), SCANHEAD_ELOST);
+    close_head(sh);
+}
+
+/* The head takes no command: closing takes the write back before anything is freed. */
+static void test_close_while_writing(void **state)
+{
+    char reply[64];
+    (void)state;
+    struct scanhead *sh = open_head("usb");
+    bus.hold_writes = 1;
+    assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, 20), SCANHEAD_ETIMEOUT);
+    assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, 20), SCANHEAD_ETIMEOUT); /* behind it */
+    close_head(sh);
+}
+
+/* A transfer that does not end when it is taken back is forgotten with the device. */
+static void test_close_with_a_stuck_transfer(void **state)
+{
+    (void)state;
+    struct scanhead *sh = open_head("usb");
+    bus.will_not_cancel = 1;
+    close_head(sh);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_failures_pass, rig_begin, rig_end),
+        cmocka_unit_test_setup_teardown(test_data_with_a_failure, rig_begin, rig_end),
+        cmocka_unit_test_setup_teardown(test_submit_fails_for_a_while, rig_begin, rig_end),
+        cmocka_unit_test_setup_teardown(test_unplug_at_once, rig_begin, rig_end),
+        cmocka_unit_test_setup_teardown(test_unplug_with_errors, rig_begin, rig_end),
+        cmocka_unit_test_setup_teardown(test_errors_without_end, rig_begin, rig_end),
+        cmocka_unit_test_setup_teardown(test_write_fails, rig_begin, rig_end),
+        cmocka_unit_test_setup_teardown(test_unplug_seen_by_writing, rig_begin, rig_end),
+        cmocka_unit_test_setup_teardown(test_unplug_while_writing, rig_begin, rig_end),
+        cmocka_unit_test_setup_teardown(test_close_while_writing, rig_begin, rig_end),
+        cmocka_unit_test_setup_teardown(test_close_with_a_stuck_transfer, rig_begin, rig_end),
+    };
+    return cmocka_run_group_tests_name("host_transfers", tests, NULL, NULL);
+}

@@ -1,0 +1,209 @@
+/* libscanhead on a terminal that was in its usual mode, with echo, while the head was sending: what the head took for
+ * commands is answered with errors, and the first command gets its own reply all the same. */
+#include <fcntl.h>
+#include <poll.h>
+#include <pthread.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <termios.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+#include "drivers/host/scanhead.h"
+#include "drivers/protocol/native_encode.h"
+
+enum { FRAMES = 40, TIMEOUT_MS = 20000 };
+
+#define ERROR_REPLY "ERR -113,\"Undefined header\"\r\n"
+
+/* The far end: a head that answers line by line until the terminal is closed. */
+struct head {
+    int master;
+    pthread_t thread;
+    char line[512]; /* what it has of a command */
+    size_t len;
+    const char *late; /* comes before the answer to the first line; NULL: nothing */
+    int identities, errors;
+};
+
+static void put(struct head *head, const char *text)
+{
+    assert_int_equal(write(head->master, text, strlen(text)), strlen(text));
+}
+
+static void put_events(int fd, int n)
+{
+    uint8_t raw[512];
+    for (int i = 0; i < n; i++) {
+        struct native_event e = {.code = NATIVE_EV_ERROR, .text = "a line\r\nSCAN:STOP\r\n*RST\n"};
+        size_t len = native_encode_event(raw, sizeof raw, &e, 1, 0);
+        native_seal(raw, (uint32_t)i);
+        assert_int_equal(write(fd, raw, len), len);
+    }
+}
+
+static void answer(struct head *head)
+{
+    head->line[head->len] = 0;
+    const size_t len = head->len;
+    head->len = 0;
+    if (len == 0) return;
+    if (head->late != NULL) {
+        put_events(head->master, 1);
+        put(head, head->late);
+        head->late = NULL;
+    }
+    if (strcmp(head->line, "*IDN?") == 0) {
+        head->identities++;
+        put(head, "Maker,Model,SN1,1.0\r\n");
+    } else if (strcmp(head->line, "TIME?") == 0) {
+        put(head, "12\r\n");
+    } else if (strcmp(head->line, "SYST:ERR?") == 0) {
+        put(head, "-222,\"Data out of range; 1,2,3\"\r\n");
+    } else {
+        head->errors++;
+        put(head, ERROR_REPLY);
+    }
+}
+
+static void *play(void *arg)
+{
+    struct head *head = arg;
+    char c;
+    while (read(head->master, &c, 1) == 1) {
+        if (c == '\n' || c == '\r')
+            answer(head);
+        else if (head->len < sizeof head->line - 1)
+            head->line[head->len++] = c;
+    }
+    return NULL;
+}
+
+/* A terminal in its usual mode; *slave holds it open, as the kernel's own side of a serial line does. */
+static int make_terminal(char *source, size_t len, int *slave)
+{
+    int master = posix_openpt(O_RDWR | O_NOCTTY);
+    if (master < 0 || grantpt(master) != 0 || unlockpt(master) != 0) skip();
+    snprintf(source, len, "tty:%s", ptsname(master));
+    *slave = open(ptsname(master), O_RDWR | O_NOCTTY);
+    assert_true(*slave >= 0);
+    struct termios tio;
+    assert_int_equal(tcgetattr(*slave, &tio), 0);
+    assert_true((tio.c_lflag & ECHO) != 0 && (tio.c_lflag & ICANON) != 0);
+    return master;
+}
+
+static struct scanhead *open_head(const char *source)
+{
+    struct scanhead *sh;
+    char err[256];
+    if (scanhead_open(source, &sh, err, sizeof err) != 0) fail_msg("%s", err);
+    return sh;
+}
+
+static void expect_reply(struct scanhead *sh, const char *command, const char *wanted)
+{
+    char reply[128];
+    if (scanhead_command(sh, command, reply, sizeof reply, TIMEOUT_MS) != 0) fail_msg("%s", scanhead_error(sh));
+    assert_string_equal(reply, wanted);
+}
+
+static void end(struct head *head, struct scanhead *sh, int slave)
+{
+    scanhead_close(sh);
+    close(slave); /* the last one: the head's read ends */
+    pthread_join(head->thread, NULL);
+    close(head->master);
+}
+
+/* The head had an echo of its own frames, half a line of somebody's, and errors on their way. */
+static void test_replies_in_order(void **state)
+{
+    char source[64];
+    int slave;
+    struct head head = {.line = "HEAD:PR\xd5garbage", .late = ERROR_REPLY "12345\r\nOK\r\n0,\"a,b,c\"\r\n"};
+    (void)state;
+    head.len = strlen(head.line);
+    head.master = make_terminal(source, sizeof source, &slave);
+    put_events(head.master, FRAMES); /* echoed */
+    struct scanhead *sh = open_head(source);
+    assert_int_equal(pthread_create(&head.thread, NULL, play, &head), 0);
+    expect_reply(sh, "TIME?", "12");
+    expect_reply(sh, "SYST:ERR?", "-222,\"Data out of range; 1,2,3\"");
+    expect_reply(sh, "NOSUCH", "ERR -113,\"Undefined header\"");
+    end(&head, sh, slave);
+    assert_int_equal(head.identities, 1);
+    assert_true(head.errors >= 2); /* the half line, and NOSUCH */
+}
+
+/* What came before raw mode was changed on its way, CR to LF and so on: none of it comes out as frames, and what comes
+ * after does, whole. */
+static void test_frames_after(void **state)
+{
+    char source[64];
+    int slave;
+    struct head head = {0};
+    struct scanhead_frame frame;
+    struct scanhead_stats stats;
+    (void)state;
+    head.master = make_terminal(source, sizeof source, &slave);
+    put_events(head.master, 3);
+    struct scanhead *sh = open_head(source);
+    put_events(head.master, FRAMES);
+    for (uint32_t i = 0; i < FRAMES; i++) {
+        assert_int_equal(scanhead_next(sh, &frame, TIMEOUT_MS), 0);
+        assert_int_equal(frame.seq, i);
+    }
+    scanhead_get_stats(sh, &stats);
+    assert_int_equal(stats.bad_bytes, 0);
+    assert_int_equal(pthread_create(&head.thread, NULL, play, &head), 0);
+    end(&head, sh, slave);
+}
+
+/* Nobody answers: the time-out is the command's, and the next command asks again. What was asked before may be lost, or
+ * be answered now. */
+static void check_late_head(int lost)
+{
+    char source[64], reply[64];
+    int slave;
+    struct head head = {0};
+    head.master = make_terminal(source, sizeof source, &slave);
+    struct scanhead *sh = open_head(source);
+    for (int i = 0; i < 3; i++) {
+        assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, 20), SCANHEAD_ETIMEOUT);
+        assert_non_null(strstr(scanhead_error(sh), "TIME?"));
+    }
+    if (lost) {
+        char questions[64];
+        assert_int_equal(read(head.master, questions, sizeof questions), 3 * strlen("\n*IDN?\n"));
+    }
+    assert_int_equal(pthread_create(&head.thread, NULL, play, &head), 0);
+    expect_reply(sh, "TIME?", "12");
+    expect_reply(sh, "*IDN?", "Maker,Model,SN1,1.0");
+    expect_reply(sh, "TIME?", "12");
+    end(&head, sh, slave);
+    assert_int_equal(head.identities, lost ? 2 : 5);
+    assert_int_equal(head.errors, 0);
+}
+
+static void test_late_head(void **state)
+{
+    (void)state;
+    check_late_head(0);
+    check_late_head(1);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_replies_in_order),
+        cmocka_unit_test(test_frames_after),
+        cmocka_unit_test(test_late_head),
+    };
+    return cmocka_run_group_tests_name("host_tty", tests, NULL, NULL);
+}

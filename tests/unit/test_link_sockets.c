@@ -1,0 +1,100 @@
+/* What every TCP socket of a head has, whoever accepted it: a peer that vanishes without a word is noticed. The test
+ * finds the link's end of a connection among this process's own descriptors. */
+#include "tests/unit/link_test.h"
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+
+#include "drivers/usb/backend.h"
+
+enum { MAX_FD = 1024, NOTICED_S = 60 };
+
+static int connect_to(const struct bench *bench)
+{
+    char name[300];
+    bench->ops->endpoint(bench->link, name, sizeof name);
+    struct sockaddr_in at = {.sin_family = AF_INET,
+                             .sin_addr.s_addr = htonl(INADDR_LOOPBACK),
+                             .sin_port = htons((uint16_t)atoi(strrchr(name, ':') + 1))};
+    int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    assert_int_equal(connect(fd, (struct sockaddr *)&at, sizeof at), 0);
+    return fd;
+}
+
+/* -1: not accepted yet */
+static int other_end(int fd)
+{
+    struct sockaddr_in mine, peer;
+    socklen_t len = sizeof mine;
+    assert_int_equal(getsockname(fd, (struct sockaddr *)&mine, &len), 0);
+    for (int i = 3; i < MAX_FD; i++) {
+        len = sizeof peer;
+        if (i != fd && getpeername(i, (struct sockaddr *)&peer, &len) == 0 && peer.sin_family == AF_INET &&
+            peer.sin_port == mine.sin_port)
+            return i;
+    }
+    return -1;
+}
+
+static int option(int fd, int level, int name)
+{
+    int value = 0;
+    socklen_t len = sizeof value;
+    assert_int_equal(getsockopt(fd, level, name, &value, &len), 0);
+    return value;
+}
+
+static void check(const struct link_spec *spec)
+{
+    struct bench bench = bench_open(spec);
+    int fd = connect_to(&bench), end = -1;
+    for (const int64_t end_ms = now_ms() + DEADLINE_MS; end < 0; end = other_end(fd)) {
+        assert_true(now_ms() < end_ms);
+        bench.n_queue = 0;
+        bench_poll(&bench, 0, 1);
+    }
+    assert_int_equal(option(end, SOL_SOCKET, SO_KEEPALIVE), 1);
+    assert_int_equal(option(end, IPPROTO_TCP, TCP_NODELAY), 1);
+    const int idle_s = option(end, IPPROTO_TCP, TCP_KEEPIDLE), interval_s = option(end, IPPROTO_TCP, TCP_KEEPINTVL),
+              probes = option(end, IPPROTO_TCP, TCP_KEEPCNT);
+    assert_in_range(idle_s + interval_s * probes, 1, NOTICED_S);
+    close(fd);
+    bench.n_queue = 0;
+    bench_poll(&bench, 0, 0);
+    bench_close(&bench);
+}
+
+static void test_tcp(void **state)
+{
+    (void)state;
+    check(&(struct link_spec){.type = LINK_TCP, .max_sessions = 1});
+}
+
+static void test_usbip(void **state)
+{
+    (void)state;
+    check(&(struct link_spec){.type = LINK_USB, .backend = USB_BACKEND_USBIP, .vid = 1});
+}
+
+static void test_usbredir(void **state)
+{
+    (void)state;
+#ifdef HAVE_USBREDIR
+    check(&(struct link_spec){.type = LINK_USB, .backend = USB_BACKEND_USBREDIR, .vid = 1});
+#else
+    print_message("# needs libusbredirparser-dev\n");
+    skip();
+#endif
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_tcp),
+        cmocka_unit_test(test_usbip),
+        cmocka_unit_test(test_usbredir),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

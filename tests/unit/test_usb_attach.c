@@ -1,0 +1,124 @@
+/* A device that plugs itself in (`attach: on`) and whose host lets go of it: it comes back by itself, and says so. */
+#include "tests/unit/usbip_client.h"
+
+#include <poll.h>
+
+#include "drivers/usb/vhci.h"
+
+/* In place of the kernel's virtual host controller, and of the module that talks to it: takes the other end of the
+ * socket pair, as the kernel does. */
+static struct {
+    int fd, attempts, refuses;
+} vhci = {.fd = -1};
+
+int vhci_attach(const char *dir, int fd, uint32_t devid, enum usb_rate rate, unsigned *port, struct sh_err *err)
+{
+    assert_null(dir);
+    assert_int_equal(devid, DEVID);
+    assert_int_equal(rate, USB_RATE_HIGH);
+    *port = (unsigned)vhci.attempts++;
+    if (vhci.refuses > 0) {
+        vhci.refuses--;
+        return sh_fail(err, SH_EINPUT, "no such module %d", vhci.refuses);
+    }
+    assert_int_equal(vhci.fd, -1);
+    vhci.fd = dup(fd);
+    return SH_OK;
+}
+
+static struct reply r;
+
+static struct client host_of(struct bench *bench)
+{
+    struct client c = {.bench = bench, .fd = vhci.fd};
+    vhci.fd = -1;
+    assert_true(c.fd >= 0);
+    assert_int_equal(client_control(&c, &r, 0x80, 6, 0x0100, 0, 18, NULL), 0);
+    assert_int_equal(client_control(&c, &r, 0x00, 9, 1, 0, 0, NULL), 0);
+    assert_int_equal(client_control(&c, &r, 0x41, 0x22, 1, 2, 0, NULL), 0);
+    assert_int_equal(bench_expect(bench, LINK_OPENED, 0).session, 1);
+    return c;
+}
+
+static void expect_notice(struct bench *bench, const char *part)
+{
+    const struct link_event event = bench_expect(bench, LINK_NOTICE, 0);
+    if (strstr(event.peer, part) == NULL) fail_msg("\"%s\" has no \"%s\"", event.peer, part);
+}
+
+static void test_usbip(void **state)
+{
+    (void)state;
+    struct link_spec spec = {.type = LINK_USB,
+                             .backend = USB_BACKEND_USBIP,
+                             .speed = USB_RATE_HIGH,
+                             .vid = 0x1209,
+                             .pid = 1,
+                             .attach = 1,
+                             .retry_ms = 1};
+    struct bench bench = bench_open(&spec);
+    for (int round = 0; round < 3; round++) {
+        char name[300], want[40];
+        struct client c = host_of(&bench);
+        bench.ops->endpoint(bench.link, name, sizeof name);
+        snprintf(want, sizeof want, "usbip:vhci_hcd.0:%d", vhci.attempts - 1);
+        assert_string_equal(name, want);
+        client_submit(&c, 1, 3, NULL, NULL, 512); /* in flight */
+        vhci.refuses = 2 * round;
+        close(c.fd); /* as `usbip detach` does */
+        assert_int_equal(bench_expect(&bench, LINK_CLOSED, 0).session, 1);
+        expect_notice(&bench, "let go");
+        if (round > 0) expect_notice(&bench, "no such module"); /* once, however often it is tried */
+        expect_notice(&bench, "plugged in again");
+        assert_int_equal(vhci.refuses, 0);
+    }
+    close(vhci.fd);
+    vhci.fd = -1;
+    bench_close(&bench);
+}
+
+/* One that can't be plugged in at all is an error at once, and nothing is tried again. */
+static void test_usbip_refused(void **state)
+{
+    (void)state;
+    struct link_spec spec = {
+        .type = LINK_USB, .backend = USB_BACKEND_USBIP, .speed = USB_RATE_HIGH, .vid = 1, .attach = 1};
+    struct sh_err err = {0, ""};
+    void *link;
+    vhci.refuses = 1;
+    assert_int_equal(link_ops_get(LINK_USB)->open(&spec, &link, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "no such module"));
+}
+
+/* Between attempts nothing goes round: who runs the head may stop it, and the processor rests. */
+static void test_pace(void **state)
+{
+    (void)state;
+    struct link_spec spec = {.type = LINK_USB,
+                             .backend = USB_BACKEND_USBIP,
+                             .speed = USB_RATE_HIGH,
+                             .vid = 0x1209,
+                             .pid = 1,
+                             .attach = 1,
+                             .retry_ms = 3600000};
+    struct bench bench = bench_open(&spec);
+    const int attempts = vhci.attempts;
+    struct client c = host_of(&bench);
+    close(c.fd);
+    assert_int_equal(bench_expect(&bench, LINK_CLOSED, 0).session, 1);
+    expect_notice(&bench, "let go");
+    for (int i = 0; i < 3; i++)
+        assert_int_equal(bench_poll(&bench, 3, 1), 0);
+    assert_int_equal(vhci.attempts, attempts);
+    bench_close(&bench);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_usbip),
+        cmocka_unit_test(test_usbip_refused),
+        cmocka_unit_test(test_pace),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

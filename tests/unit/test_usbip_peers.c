@@ -1,0 +1,229 @@
+/* Clients of the usbip back end that are silent, pipeline, or cut their bytes anywhere. */
+#include "tests/unit/usbip_client.h"
+
+#include <poll.h>
+
+/* MANY requests have 48 MB, replies not counted: more than the sockets' buffers and the back end together. */
+enum { EREMOTEIO_WIRE = -121, GET_STATUS = 0, MANY = 1000000 };
+
+static struct reply r;
+
+static void list_devices(struct client *c)
+{
+    static const uint8_t request[8] = {0x01, 0x11, 0x80, 0x05};
+    uint8_t back[12 + 312 + 12];
+    client_write(c, request, sizeof request);
+    assert_true(client_read(c, back, sizeof back));
+    assert_int_equal(back[3], 5);
+}
+
+static int connect_silent(struct bench *bench)
+{
+    int fd = client_connect(bench);
+    bench_poll(bench, 0, 0);
+    return fd;
+}
+
+/* More of them than the back end has places for. */
+static void test_silent(void **state)
+{
+    (void)state;
+    enum { SILENT = 20 };
+    struct bench bench = usbip_bench("N");
+    struct client host, other = {.bench = &bench};
+    int silent[2 * SILENT];
+    for (int i = 0; i < SILENT; i++)
+        silent[i] = connect_silent(&bench);
+    client_import(&host, &bench);
+    for (int i = SILENT; i < 2 * SILENT; i++)
+        silent[i] = connect_silent(&bench);
+    other.fd = client_connect(&bench);
+    list_devices(&other);
+    assert_int_equal(client_control(&host, &r, 0x80, GET_STATUS, 0, 0, 2, NULL), 0); /* who has the device keeps it */
+    list_devices(&other);
+    for (int i = 0; i < 2 * SILENT; i++)
+        close(silent[i]);
+    close(other.fd);
+    close(host.fd);
+    bench_close(&bench);
+}
+
+static void put_submit(uint8_t *at, uint32_t seqnum, int in, uint32_t ep, uint32_t len, const uint8_t *setup)
+{
+    memset(at, 0, HEADER);
+    put_be32(at, 1);
+    put_be32(at + 4, seqnum);
+    put_be32(at + 8, DEVID);
+    put_be32(at + 12, (uint32_t)in);
+    put_be32(at + 16, ep);
+    put_be32(at + 24, len);
+    put_be32(at + 32, 0xffffffff);
+    if (setup != NULL) memcpy(at + 40, setup, 8);
+}
+
+/* Sends as long as the way takes it and the link moves; returns the requests begun. */
+static uint32_t send_requests(struct client *c)
+{
+    static const uint8_t get_status[8] = {0x80, GET_STATUS, 0, 0, 0, 0, 2, 0};
+    uint8_t head[HEADER];
+    uint32_t n = 0;
+    for (size_t pos = HEADER, stuck = 0; stuck < 3;) {
+        if (pos == HEADER) {
+            assert_true(n < MANY); /* nobody holds so much */
+            put_submit(head, ++n, 1, 0, 2, get_status);
+            pos = 0;
+        }
+        ssize_t sent = send(c->fd, head + pos, HEADER - pos, MSG_DONTWAIT | MSG_NOSIGNAL);
+        if (sent > 0) {
+            pos += (size_t)sent;
+            stuck = 0;
+            continue;
+        }
+        assert_int_equal(errno, EAGAIN); /* and not cut off */
+        /* A link that can't go on waits; one whose host can't read yet moves what the kernel takes. */
+        const int64_t start_ms = now_ms();
+        bench_poll(c->bench, 0, 50);
+        if (now_ms() - start_ms >= 49) stuck++;
+    }
+    return n;
+}
+
+/* A host that sends and sends before it reads: it is held back, not cut off, and gets every reply in its order. */
+static void test_pipelining(void **state)
+{
+    (void)state;
+    struct bench bench = usbip_bench("N");
+    struct client c;
+    client_import(&c, &bench);
+    const uint32_t n = send_requests(&c);
+    assert_true(n > 5000); /* more than the back end holds of any kind (4096) */
+    for (uint32_t i = 1; i < n; i++) {
+        assert_true(client_reply(&c, &r, 1));
+        assert_int_equal(r.seqnum, i);
+        assert_int_equal(r.status, 0);
+        assert_int_equal(r.actual, 2);
+    }
+    close(c.fd);
+    bench_close(&bench);
+}
+
+/* One turn of the link's thread is over in bounded time, however much the host has sent. */
+static void test_turns(void **state)
+{
+    (void)state;
+    enum { REQUESTS = 3000 };
+    static const uint8_t get_status[8] = {0x80, GET_STATUS, 0, 0, 0, 0, 2, 0};
+    static uint8_t back[REQUESTS * (HEADER + 2)];
+    struct bench bench = usbip_bench("N");
+    struct client c;
+    client_import(&c, &bench);
+    for (uint32_t i = 0; i < REQUESTS; i++) {
+        uint8_t head[HEADER];
+        put_submit(head, i + 1, 1, 0, 2, get_status);
+        assert_int_equal(send(c.fd, head, sizeof head, MSG_DONTWAIT), sizeof head); /* all of it fits: 144 KB */
+    }
+    size_t got = 0;
+    int turns = 0;
+    for (const int64_t end_ms = now_ms() + DEADLINE_MS; got < sizeof back; turns++) {
+        assert_true(now_ms() < end_ms);
+        bench_poll(&bench, 0, 1);
+        ssize_t n = recv(c.fd, back + got, sizeof back - got, MSG_DONTWAIT);
+        if (n > 0) got += (size_t)n;
+    }
+    assert_true(turns >= REQUESTS / 500); /* all of it is there from the first turn on */
+    for (uint32_t i = 0; i < REQUESTS; i++)
+        assert_int_equal(get_be32(back + i * (HEADER + 2) + 4), i + 1);
+    close(c.fd);
+    bench_close(&bench);
+}
+
+/* Everything a host says in one session, and what it gets: the same however the bytes are cut. */
+static size_t session(size_t piece, uint8_t *got, size_t room)
+{
+    static const uint8_t import[40] = {0x01, 0x11, 0x80, 0x03, 0, 0, 0, 0, '1', '-', '1'};
+    static const uint8_t describe[8] = {0x80, 6, 0, 1, 0, 0, 18, 0}, configure[8] = {0, 9, 1},
+                         coding[8] = {0x21, 0x20, 0, 0, 0, 0, 7, 0}, rate[7] = {0x80, 0x25, 0, 0, 0, 0, 8};
+    uint8_t said[40 + 6 * HEADER + 7 + 5], *at = said;
+    memcpy(at, import, sizeof import);
+    at += sizeof import;
+    put_submit(at, 1, 1, 0, 18, describe);
+    put_submit(at += HEADER, 2, 0, 0, 0, configure);
+    put_submit(at += HEADER, 3, 0, 0, 7, coding);
+    memcpy(at += HEADER, rate, 7);
+    put_submit(at += 7, 4, 1, 3, 512, NULL); /* waits */
+    put_submit(at += HEADER, 5, 0, 1, 5, NULL);
+    memcpy(at += HEADER, "*RST\n", 5); /* waits: there is no session */
+    at += 5;
+    put_submit(at, 6, 0, 0, 0, NULL);
+    put_be32(at, 2); /* unlink */
+    put_be32(at + 20, 4);
+    at += HEADER;
+    assert_int_equal(at - said, sizeof said);
+
+    struct bench bench = usbip_bench("N");
+    struct client c = {.bench = &bench, .fd = client_connect(&bench)};
+    for (size_t i = 0; i < sizeof said; i += piece) {
+        client_write(&c, said + i, piece < sizeof said - i ? piece : sizeof said - i);
+        bench_poll(&bench, 0, 0);
+    }
+    const size_t want = 8 + 312 + HEADER + 18 + 2 * HEADER + HEADER;
+    assert_true(want <= room);
+    assert_true(client_read(&c, got, want));
+    close(c.fd);
+    bench_close(&bench);
+    return want;
+}
+
+static void test_segments(void **state)
+{
+    (void)state;
+    static const size_t pieces[] = {1, 7, 47, 48, 49, 100};
+    uint8_t whole[1024], cut[1024];
+    const size_t n = session(1 << 20, whole, sizeof whole);
+    assert_int_equal(get_be32(whole + n - HEADER), 4); /* the last is the unlink's */
+    assert_int_equal((int)get_be32(whole + n - HEADER + 20), -104);
+    for (size_t i = 0; i < sizeof pieces / sizeof pieces[0]; i++) {
+        assert_int_equal(session(pieces[i], cut, sizeof cut), n);
+        assert_memory_equal(cut, whole, n);
+    }
+}
+
+/* URB_SHORT_NOT_OK is the server's to judge, as it is a host controller's (include/linux/usb.h). */
+static void test_short_not_ok(void **state)
+{
+    (void)state;
+    struct bench bench = usbip_bench("N");
+    struct client c;
+    client_import(&c, &bench);
+    assert_int_equal(client_control(&c, &r, 0x00, 9, 1, 0, 0, NULL), 0);
+    assert_int_equal(client_control(&c, &r, 0x41, 0x22, 1, 2, 0, NULL), 0);
+    bench_expect(&bench, LINK_OPENED, 0);
+    for (int strict = 0; strict < 2; strict++) {
+        static const char data[512] = "abc";
+        for (uint32_t len = 3; len <= 512; len += 509) {
+            uint8_t head[HEADER];
+            put_submit(head, ++c.seqnum, 1, 3, 512, NULL);
+            put_be32(head + 20, (uint32_t)strict);
+            client_write(&c, head, sizeof head);
+            bench_expect(&bench, LINK_WRITABLE, 2);
+            bench_write_all(&bench, 1, data, len);
+            assert_true(client_reply(&c, &r, 1));
+            assert_int_equal(r.actual, len);
+            assert_int_equal(r.status, strict && len < 512 ? EREMOTEIO_WIRE : 0);
+        }
+        client_submit(&c, 1, 3, NULL, NULL, 512); /* for the empty packet behind the whole one */
+        assert_true(client_reply(&c, &r, 1));
+        assert_int_equal(r.actual, 0);
+    }
+    close(c.fd);
+    bench_close(&bench);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_silent),   cmocka_unit_test(test_pipelining),   cmocka_unit_test(test_turns),
+        cmocka_unit_test(test_segments), cmocka_unit_test(test_short_not_ok),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,67 @@
+/* A head whose stream a USB of its speed can't carry says so at start, with both figures; one that it can carry runs.
+ *
+ * The figures are worked out by hand. A point has 20 bytes (PROTOCOL.md), and full-sweep's mirror (36 facets, gain 10)
+ * fires over its whole sweep of 100 deg. USB 2.0 fits 19 bulk packets of 64 bytes into a frame of 1 ms at full speed
+ * (table 5-9): 1.216 MB/s. At high speed host controllers reach 10 packets of 512 in a microframe of 125 us: 40.96
+ * MB/s. Super speed, some 400 MB/s, carries more than any profile may fire (10 MHz, 200 MB/s). */
+#include "tests/wire/room.h"
+
+static void write_config(const struct wire *wire, const char *speed, int prr_hz)
+{
+    char text[512];
+    snprintf(text, sizeof text,
+             "head: {profile: full-sweep, prr_hz: %d, lines_hz: 50, pan_deg_s: 100, frames: 1}\n"
+             "scene:\n  meshes:\n    - {file: room.obj, up: z, scale: 1}\n"
+             "stations:\n  - {position_m: [0, 0, 0]}\n"
+             "links: [{type: usb, port: 0, speed: %s}]\n",
+             prr_hz, speed);
+    wire_write_text(wire, "config.yaml", text);
+}
+
+static int run(struct wire *wire, char **err)
+{
+    char config[352];
+    snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
+    const char *const args[] = {"run", config, "--duration", "0.01", "--pace", "fast", "--quiet", NULL};
+    int status = wire_wait(wire, wire_spawn(wire, args, "out", "err", -1));
+    *err = wire_read(wire_path(wire, "err"), NULL);
+    return status;
+}
+
+static void test_capacity(void **state)
+{
+    static const struct {
+        const char *speed;
+        int prr_hz;
+        const char *stream, *link; /* NULL: it fits */
+    } cases[] = {
+        {"full", 60000, NULL, NULL},
+        {"full", 61000, "1.22 MB/s", "1.22 MB/s"},
+        {"full", 500000, "10.00 MB/s", "1.22 MB/s"},
+        {"high", 2000000, NULL, NULL},
+        {"high", 2200000, "44.00 MB/s", "40.96 MB/s"},
+        {"super", 2200000, NULL, NULL},
+    };
+    struct wire *wire = *state;
+    room_write(wire);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        char *err, want[128];
+        write_config(wire, cases[i].speed, cases[i].prr_hz);
+        const int status = run(wire, &err);
+        snprintf(want, sizeof want, "the stream has %s, the link carries %s; lower head.prr_hz\n", cases[i].stream,
+                 cases[i].link);
+        if (status != (cases[i].stream != NULL ? 2 : 0)) fail_msg("%s: status %d: %s", cases[i].speed, status, err);
+        if (cases[i].stream != NULL) {
+            if (strstr(err, want) == NULL) fail_msg("%s", err);
+            assert_non_null(strstr(err, "usbip:127.0.0.1:"));
+            assert_ptr_equal(strchr(err, '\n'), err + strlen(err) - 1); /* one line */
+        }
+        free(err);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test_setup_teardown(test_capacity, wire_setup, wire_teardown)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
