@@ -1,6 +1,6 @@
 /* What methods cost, in rounded ns of one core: to compare them by. `make bench-beam` measures single rays, sub-rays
  * and the adaptive beam (house, wires, foliage), `make bench` stages, `make chart` ways to cast and to georeference.
- * Sub-rays cost 65 ns in a house and 105 ns among leaves, a pulse that outlines cut 0.6 to 3.6 us. */
+ * Sub-rays cost 65 ns in a house and 105 ns among leaves, a pulse that outlines cut 0.2 to 2.2 us. */
 #ifndef CORE_PLAN_COST_H
 #define CORE_PLAN_COST_H
 
