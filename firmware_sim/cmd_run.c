@@ -8,6 +8,7 @@
 
 #include "firmware_sim/clock.h"
 #include "firmware_sim/cmd.h"
+#include "firmware_sim/site_plan.h"
 
 static const char HELP[] =
     "scanhead run CONFIG [options]: serve the head on its links until stopped\n\n"
@@ -122,6 +123,8 @@ static void say_what_runs(const struct config *cfg, const struct site *site, con
             cfg->profile.maker, cfg->profile.model, cfg->profile.name, site->scene->n_triangles,
             site->scene->n_surfaces, info.build_s, (double)info.bytes / site->scene->n_triangles, info.packet);
     char endpoint[512];
+    site_plan_text(site, endpoint, sizeof endpoint);
+    fprintf(stderr, "scanhead: plan: %s\n", endpoint);
     for (uint32_t i = 0; loop_endpoint(loop, i, endpoint, sizeof endpoint); i++)
         fprintf(stderr, "scanhead: link %s\n", endpoint);
 }

@@ -1,15 +1,14 @@
 /* The command set: SCPI-style lines in, one reply line each, and the error queue of SCPI-99 (21.8).
  *
  *   *IDN?  *RST  *CLS  *OPC?  *STB?  SYSTem:ERRor[:NEXT]?  SYSTem:ERRor:COUNt?  SYSTem:VERSion?  SYSTem:CONTrol:RELease
- *   SYSTem:CONTrol?  HEAD:PRR  HEAD:LINes  HEAD:PAN  HEAD:STATe?  HEAD:STATION  SCAN:LINE:STARt  SCAN:LINE:STOP
- *   SCAN:PAN:STARt  SCAN:PAN:STOP  SCAN:FRAMes  SCAN:ECHoes  SCAN:STARt  SCAN:STOP  SCAN:COUNt?  HELP?  TIME? TIME:UTC?
- *   TIME:GPS?  TIME:STEP
- * SCAN:ECHoes takes ALL, FIRSt, LAST, STRongest or DEF: which echoes of a pulse are sent.
- * Short and long forms, any case (HEAD:STATION has no short one: STAT is STATe); a query ends in '?'. MIN, MAX and DEF
- * are taken as a number; a setting's query takes MIN, MAX and DEF too ("HEAD:PRR? MAX"). MIN and MAX are the limits as
- * the profile and the other settings leave them now, so they are never refused. A setting may carry its unit as a
- * suffix: HZ, KHZ, MHZ (mega, as SCPI has it); DEG; DEG/S; a step is in nanoseconds or NS, US, MS, S. Numbers are taken
- * exactly or refused, never rounded. With a live platform a step may carry its pose at the step's end:
+ *   SYSTem:CONTrol?  SYSTem:PLAN?  HEAD:PRR  HEAD:LINes  HEAD:PAN  HEAD:STATe?  HEAD:STATION  SCAN:LINE:STARt
+ * SCAN:LINE:STOP SCAN:PAN:STARt  SCAN:PAN:STOP  SCAN:FRAMes  SCAN:ECHoes  SCAN:STARt  SCAN:STOP  SCAN:COUNt?  HELP?
+ * TIME? TIME:UTC? TIME:GPS?  TIME:STEP SCAN:ECHoes takes ALL, FIRSt, LAST, STRongest or DEF: which echoes of a pulse
+ * are sent. Short and long forms, any case (HEAD:STATION has no short one: STAT is STATe); a query ends in '?'. MIN,
+ * MAX and DEF are taken as a number; a setting's query takes MIN, MAX and DEF too ("HEAD:PRR? MAX"). MIN and MAX are
+ * the limits as the profile and the other settings leave them now, so they are never refused. A setting may carry its
+ * unit as a suffix: HZ, KHZ, MHZ (mega, as SCPI has it); DEG; DEG/S; a step is in nanoseconds or NS, US, MS, S. Numbers
+ * are taken exactly or refused, never rounded. With a live platform a step may carry its pose at the step's end:
  * `TIME:STEP 10 MS, x, y, z, roll, pitch, heading`, metres in the scene frame and degrees (core/pose.h). *STB?: 4
  * errors are queued, 128 scanning. Outside the profile is -222; against another setting or the state -221. *CLS, like
  * SYSTem:ERRor?, needs no control. Reply: the value, or "OK", or `ERR -222,"Data out of range; HEAD:PRR 5000000 Hz,
@@ -68,6 +67,7 @@ const char *command_error_text(int number);
 /* What the device tells the command set; the loop keeps it up to date. */
 struct command_device {
     const char *idn;
+    const char *plan; /* the methods in use, in a line; NULL: not known */
     struct head_limits limits;
     struct head_settings settings; /* as they are now; command_execute changes them only when all is well */
     struct head_settings defaults; /* what *RST restores */

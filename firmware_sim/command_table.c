@@ -73,6 +73,11 @@ static void query_error_count(struct command_call *call)
     command_reply(call, "%u", call->dev->queue.count);
 }
 
+static void query_plan(struct command_call *call)
+{
+    command_reply(call, "%s", call->dev->plan != NULL ? call->dev->plan : "not known");
+}
+
 static void query_version(struct command_call *call)
 {
     command_reply(call, "1999.0");
@@ -201,6 +206,7 @@ static const struct command_row rows[] = {
     QUERY("SYSTem:ERRor:COUNt", query_error_count),
     QUERY("SYSTem:VERSion", query_version),
     QUERY("SYSTem:CONTrol", query_control),
+    QUERY("SYSTem:PLAN", query_plan),
     ACTION("SYSTem:CONTrol:RELease", act_release, 0),
     VALUE("HEAD:PRR", unit_hz, PRR),
     VALUE("HEAD:LINes", unit_hz, LINES),

@@ -17,6 +17,7 @@
 #include "core/georef.h"
 #include "core/line.h"
 #include "core/scene.h"
+#include "core/schedule.h"
 #include "core/surface.h"
 #include "drivers/link/link.h"
 #include "firmware_sim/head.h"
@@ -159,6 +160,8 @@ struct config_instrument {
     double range_offset_m, range_scale_ppm;
 };
 
+enum config_order { ORDER_AUTO, ORDER_OFF, ORDER_ON, ORDER_FALSE, ORDER_TRUE };
+
 struct config {
     char file[CONFIG_PATH_LEN];
     char profile_file[CONFIG_PATH_LEN];
@@ -170,7 +173,8 @@ struct config {
     struct config_mesh mesh[CONFIG_MAX_MESHES];
     uint32_t n_meshes;
     double scene_tolerance_m;
-    int order_exactly; /* surfaces that overlap are ordered in double */
+    enum config_order
+        order_exactly; /* surfaces that overlap are ordered in double; auto, off or on once it is loaded */
     struct config_anchor anchor;
     /* stations */
     struct config_station station[CONFIG_MAX_STATIONS];
@@ -191,6 +195,8 @@ struct config {
     /* beam */
     enum beam_mode beam_mode;
     uint32_t beam_rings;
+    /* plan */
+    double plan_tolerance_m, echo_tolerance;
     /* noise */
     enum config_range_noise noise_range; /* off, on or signal once it is loaded */
     int noise_angle;
@@ -201,6 +207,7 @@ struct config {
     struct surface_rule surface[CONFIG_MAX_SURFACES];
     uint32_t n_surfaces;
     uint32_t optics_depth;
+    int optics_depth_given; /* 0: as the plan says, up to optics_depth */
     enum detect_ambiguity ambiguity;
     uint32_t mta_zones;
     struct config_instrument instrument;
@@ -221,11 +228,12 @@ int config_load(const char *path, const char *const *sets, int n_sets, struct co
 /* Whether pulses are followed through glass or off mirrors. */
 int config_has_optics(const struct config *cfg);
 
-/* Entries that a pulse may need in a block: its echoes, as far as the configuration allows for more than one. */
-uint32_t config_points_per_pulse(const struct config *cfg);
-
 /* What a profile says about the signal; the rest of it (sharp, extinction, seed) is 0. */
 void config_signal_spec(const struct config_profile *profile, struct detect_signal_spec *spec);
+
+/* The schedule of a head with some settings. */
+void config_fill_spec(const struct config_profile *profile, const struct head_settings *settings,
+                      struct schedule_spec *spec);
 
 /* Whether anything in the scene, or the head, moves. */
 int config_moves(const struct config *cfg);

@@ -115,6 +115,10 @@ static int check_names(const struct cfg_reader *rd, struct config *cfg)
 static int check_output(const struct cfg_reader *rd, struct config *cfg)
 {
     cfg->layout_given = cfg_is_given(rd, "output.layout", 0);
+    if (!cfg_is_given(rd, "output.tolerance_m", 0)) cfg->tolerance_m = fmax(1e-7, 1e-3 * cfg->plan_tolerance_m);
+    cfg->optics_depth_given = cfg_is_given(rd, "optics.depth", 0);
+    if (cfg->order_exactly == ORDER_FALSE) cfg->order_exactly = ORDER_OFF;
+    if (cfg->order_exactly == ORDER_TRUE) cfg->order_exactly = ORDER_ON;
     if (cfg->utm_zone != 0 && cfg->crs != GEOREF_UTM)
         return cfg_fail_key(rd, "output.utm_zone", 0, "a zone, but output.crs is not utm; allowed only with crs: utm");
     if (cfg->heights == HEIGHTS_GEOID && cfg->crs != GEOREF_UTM && cfg->crs != GEOREF_GEODETIC)
@@ -286,7 +290,8 @@ int config_beam_fixed(const struct config *cfg)
 /* Outlines are those that are seen from one place. */
 static int check_beam(const struct cfg_reader *rd, const struct config *cfg)
 {
-    if (cfg->beam_mode != BEAM_SINGLE && cfg->profile.beam_exit_m == 0.0 && cfg->profile.beam_divergence_rad == 0.0)
+    if (cfg->beam_mode == BEAM_SINGLE || cfg->beam_mode == BEAM_AUTO) return SH_OK;
+    if (cfg->profile.beam_exit_m == 0.0 && cfg->profile.beam_divergence_rad == 0.0)
         return cfg_fail_key(rd, "beam.mode", 0, "head profile %s has no footprint; allowed single", cfg->profile.name);
     if (cfg->beam_mode == BEAM_ADAPTIVE && !config_beam_fixed(cfg))
         return cfg_fail_key(rd, "beam.mode", 0, "adaptive, but %s; allowed single, rings, auto",

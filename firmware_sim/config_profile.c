@@ -2,6 +2,7 @@
 #include "firmware_sim/config_private.h"
 
 #include <dirent.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -232,4 +233,18 @@ int config_list_profiles(const char *dir, FILE *out, struct sh_err *err)
     }
     free(entries);
     return code == SH_OK ? n : code;
+}
+
+void config_fill_spec(const struct config_profile *profile, const struct head_settings *s, struct schedule_spec *spec)
+{
+    *spec = (struct schedule_spec){.prr_uhz = s->prr_uhz,
+                                   .lines_uhz = s->lines_uhz,
+                                   .pan_udeg_s = s->pan_udeg_s,
+                                   .fov_min_udeg = profile->fov_min_udeg,
+                                   .sweep_udeg = llround(360e6 * profile->optical_gain / profile->facets),
+                                   .line_start_udeg = s->line_start_udeg,
+                                   .line_stop_udeg = s->line_stop_udeg,
+                                   .pan_start_udeg = s->pan_start_udeg,
+                                   .pan_stop_udeg = s->pan_stop_udeg,
+                                   .frames = s->frames};
 }

@@ -47,13 +47,6 @@ int config_has_optics(const struct config *cfg)
     return optics && cfg->optics_depth > 0;
 }
 
-uint32_t config_points_per_pulse(const struct config *cfg)
-{
-    if (cfg->beam_mode != BEAM_SINGLE) return cfg->profile.max_echoes;
-    uint32_t most = config_has_optics(cfg) ? 1 + cfg->optics_depth : 1;
-    return most < cfg->profile.max_echoes ? most : cfg->profile.max_echoes;
-}
-
 /* What is not given is not said. */
 static void mark_unsaid(const struct cfg_reader *rd, uint32_t i, struct surface *s)
 {

@@ -55,6 +55,8 @@ static const char *const platform_names[] = {[PLATFORM_STATIC] = "static",
 static const char *const range_noise_names[] = {
     [RANGE_NOISE_OFF] = "off",     [RANGE_NOISE_ON] = "on",     [RANGE_NOISE_SIGNAL] = "signal",
     [RANGE_NOISE_FALSE] = "false", [RANGE_NOISE_TRUE] = "true", NULL};
+static const char *const order_names[] = {[ORDER_AUTO] = "auto",   [ORDER_OFF] = "off",   [ORDER_ON] = "on",
+                                          [ORDER_FALSE] = "false", [ORDER_TRUE] = "true", NULL};
 static const char *const axes_names[] = {"scene", "beam", NULL};
 static const char *const detection_names[] = {"noisy", "sharp", NULL};
 static const char *const from_names[] = {[FROM_DATA_SHEET] = "data sheet", [FROM_ASSUMED] = "assumed", NULL};
@@ -101,8 +103,10 @@ static const struct cfg_key config_keys[] = {
     {"scene", CFG_MAP, .help = "What is scanned."},
     {"scene.tolerance_m", CFG_REAL, "m", "1e-6", 1e-9, 1, IN_CONFIG(scene_tolerance_m),
      .help = "What a vertex may be off: a mesh format of single precision with larger coordinates is refused."},
-    {"scene.order_exactly", CFG_BOOL, .def = "off", IN_CONFIG(order_exactly),
-     .help = "Order surfaces that overlap or cross in double; costs loading time, and speed where they do."},
+    {"scene.order_exactly", CFG_ENUM, .def = "auto", .names = order_names, IN_CONFIG(order_exactly),
+     .allowed = "auto, on or off",
+     .help = "Order surfaces that overlap or cross in double; costs loading time, and speed where they do. auto: where "
+             "float's resolution in the scene is coarser than plan.tolerance_m."},
     {"scene.meshes", CFG_LIST, .min = 1, .max = CONFIG_MAX_MESHES, LIST_OF(mesh, n_meshes),
      .help = "Mesh files; together they are the scene."},
     {"scene.meshes[]", CFG_MAP, .help = "A mesh file."},
@@ -209,8 +213,9 @@ static const struct cfg_key config_keys[] = {
      .help = "polar: range and encoders, as a head measures; geo: coordinates from the anchor."},
     {"output.heights", CFG_ENUM, .def = "ellipsoid", .names = heights_names, IN_CONFIG(heights),
      .help = "Of utm and geodetic points; geoid needs GeographicLib's data, auto takes them where they are installed."},
-    {"output.tolerance_m", CFG_REAL, "m", "1e-6", 1e-7, 1, IN_CONFIG(tolerance_m),
-     .help = "What georeferencing may add to a point's error: the cheapest method that keeps it is used."},
+    {"output.tolerance_m", CFG_REAL, "m", "", 1e-7, 1, IN_CONFIG(tolerance_m),
+     .help = "What georeferencing may add to a point's error: the cheapest method that keeps it is used. A thousandth of "
+             "plan.tolerance_m, 1e-7 m at least, when not given."},
     {"output.georef", CFG_ENUM, .def = "auto", .names = georef_names, IN_CONFIG(georef),
      .help = "Method of utm and geodetic points; auto: as `scanhead plan` says."},
     {"output.scale_m", CFG_REAL, "m", "0", 0, 1, IN_CONFIG(scale_m), .allowed = "0 (automatic) or 1e-6 to 1 m",
@@ -246,13 +251,20 @@ static const struct cfg_key config_keys[] = {
     {"beam", CFG_MAP, .help = "The footprint of the pulses."},
     {"beam.mode", CFG_ENUM, .def = "single", .names = beam_names, IN_CONFIG(beam_mode),
      .help = "single: one ray per pulse; rings: sub-rays over the footprint; adaptive: where it reaches over an edge, "
-             "or onto glass or a mirror; auto: adaptive where head and scene stand still and instrument has no offsets, else "
-             "rings."},
+             "or onto glass or a mirror; auto: as `scanhead plan` says."},
     {"beam.rings", CFG_COUNT, NULL, "4", 0, BEAM_MAX_RINGS, IN_CONFIG(beam_rings),
      .help = "Rings of sub-rays, 1 + 3 n (n + 1) in all; adaptive: where a footprint holds more edges than it can tell "
              "apart."},
     {"beam.echoes", CFG_ENUM, .def = "all", .names = echoes_names, IN_CONFIG(settings.echoes),
      .help = "Which echoes of a pulse are sent, also of glass and what is behind: all, first, last, strongest."},
+
+    {"plan", CFG_MAP, .help = "What the methods of all stages may be off; each stage takes the cheapest that holds it "
+                              "(`scanhead plan`)."},
+    {"plan.tolerance_m", CFG_REAL, "m", "1e-3", 1e-6, 1, IN_CONFIG(plan_tolerance_m),
+     .help = "Echo ranges against a footprint of 1,000 sub-rays, root mean square."},
+    {"plan.echo_tolerance", CFG_REAL, NULL, "1e-3", 1e-4, 1, IN_CONFIG(echo_tolerance),
+     .help = "Share of the pulses that may have another number of echoes than with 1,000 sub-rays; 1e-3 is what the "
+             "plan's sample can tell."},
 
     {"noise", CFG_MAP, .help = "Noise of the measurement."},
     {"noise.range", CFG_ENUM, .def = "off", .names = range_noise_names, IN_CONFIG(noise_range), .allowed = "on or off, or signal",
@@ -303,7 +315,8 @@ static const struct cfg_key config_keys[] = {
 
     {"optics", CFG_MAP, .help = "Pulses that meet glass or a mirror."},
     {"optics.depth", CFG_COUNT, NULL, "4", 0, CAST_MAX_DEPTH, IN_CONFIG(optics_depth),
-     .help = "How many of them a pulse is followed through; 0: glass and mirrors are like other surfaces."},
+     .help = "How many of them a pulse is followed through, at most; 0: glass and mirrors are like other surfaces. When not "
+             "given, as many as count here, as `scanhead plan` says."},
 
     {"instrument", CFG_MAP, .help = "Errors of the head's geometry (core/instrument.h): the beam goes where its mechanics point, "
                                     "the points are computed as if there were none."},

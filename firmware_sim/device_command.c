@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "firmware_sim/device_private.h"
+#include "firmware_sim/site_plan.h"
 
 static void change_settings(struct device *device)
 {
@@ -141,6 +142,8 @@ static int set_limits(struct device *device, struct sh_err *err)
                        sizeof device->idn - 1 - strlen(",,,scanhead native 1"));
     strcpy(device->idn, idn);
     device->cmd.idn = device->idn;
+    site_plan_text(device->site, device->plan, sizeof device->plan);
+    device->cmd.plan = device->plan;
     device->cmd.step_allowed = cfg->pace == PACE_STEP;
     device->cmd.pose_allowed = cfg->platform.kind == PLATFORM_LIVE;
     memcpy(device->cmd.pose_centre_m, device->site->station[0].at.position_m, sizeof device->cmd.pose_centre_m);
@@ -155,7 +158,11 @@ static int open_journals(struct device *device, struct sh_err *err)
         rc = journal_read(device->options.replay, &device->replay, &device->n_replay, err);
     if (rc != SH_OK || device->options.journal == NULL) return rc;
     device->journal = journal_open(device->options.journal, err);
-    return device->journal != NULL ? SH_OK : err->code;
+    if (device->journal == NULL) return err->code;
+    char note[16 + sizeof device->plan];
+    snprintf(note, sizeof note, "plan: %s", device->plan);
+    journal_note(device->journal, note); /* what went wrong, journal_close says */
+    return SH_OK;
 }
 
 int device_create(const struct site *site, const struct device_options *options, struct device **out,

@@ -4,25 +4,9 @@
 
 #include "firmware_sim/device_private.h"
 
-static int64_t sweep_udeg(const struct config_profile *profile)
-{
-    return llround(360e6 * profile->optical_gain / profile->facets);
-}
-
 void device_fill_spec(const struct device *device, struct schedule_spec *spec)
 {
-    const struct head_settings *s = &device->cmd.settings;
-    const struct config_profile *profile = &device->site->cfg->profile;
-    *spec = (struct schedule_spec){.prr_uhz = s->prr_uhz,
-                                   .lines_uhz = s->lines_uhz,
-                                   .pan_udeg_s = s->pan_udeg_s,
-                                   .fov_min_udeg = profile->fov_min_udeg,
-                                   .sweep_udeg = sweep_udeg(profile),
-                                   .line_start_udeg = s->line_start_udeg,
-                                   .line_stop_udeg = s->line_stop_udeg,
-                                   .pan_start_udeg = s->pan_start_udeg,
-                                   .pan_stop_udeg = s->pan_stop_udeg,
-                                   .frames = s->frames};
+    config_fill_spec(&device->site->cfg->profile, &device->cmd.settings, spec);
 }
 
 void device_fill_descriptor(const struct device *device, struct native_descriptor *d)

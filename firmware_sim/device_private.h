@@ -30,6 +30,7 @@ struct device {
     struct command_device cmd;
     struct head_clock clock;
     struct gnss gnss;
+    char plan[160]; /* site_plan_text */
     char idn[96];
     uint64_t tick_hz;
     int64_t tick_ns;

@@ -55,6 +55,14 @@ int journal_write(struct journal *journal, uint64_t tick, int64_t t_ns, uint32_t
     return journal->error == 0 ? SH_OK : SH_EIO;
 }
 
+int journal_note(struct journal *journal, const char *text)
+{
+    if (journal->error != 0) return SH_EIO;
+    if (!is_command_line(text)) return SH_EINPUT;
+    if (fprintf(journal->file, "# %s\n", text) < 0 || fflush(journal->file) != 0) journal->error = errno;
+    return journal->error == 0 ? SH_OK : SH_EIO;
+}
+
 int journal_close(struct journal *journal, struct sh_err *err)
 {
     if (journal == NULL) return SH_OK;

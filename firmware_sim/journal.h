@@ -23,6 +23,9 @@ struct journal *journal_open(const char *path, struct sh_err *err);
  * reason. */
 int journal_write(struct journal *journal, uint64_t tick, int64_t t_ns, uint32_t session, const char *line);
 
+/* A note, which replaying passes over: one printable line. Failures as in journal_write. */
+int journal_note(struct journal *journal, const char *text);
+
 /* Closes and releases. The first thing that went wrong in writing, with its text, or 0. NULL is nothing to
  * close. */
 int journal_close(struct journal *journal, struct sh_err *err);

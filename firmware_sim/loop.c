@@ -68,7 +68,7 @@ int loop_create(const struct site *site, struct device *device, const struct loo
     loop->counters = device_counters(device);
     loop->tick_ns = (int64_t)device_tick_ns(device);
     loop->ahead_ticks = (uint64_t)(cfg->ahead_ms * 1e6 / (double)loop->tick_ns) + 1;
-    loop->slot_bytes = worker_slot_bytes(cfg);
+    loop->slot_bytes = worker_slot_bytes(site);
     loop->n_threads = choose_threads(cfg);
     atomic_store(&loop->final_tick, UINT64_MAX);
     pthread_mutex_init(&loop->claim_lock, NULL);

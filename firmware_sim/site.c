@@ -1,5 +1,7 @@
+#include "firmware_sim/site_choose.h"
 #include "firmware_sim/site_detect.h"
 #include "firmware_sim/site_georef.h"
+#include "firmware_sim/site_plan.h"
 #include "firmware_sim/site_platform.h"
 #include "firmware_sim/site_stops.h"
 
@@ -47,8 +49,7 @@ static int add_mover(struct site *site, const struct config_mesh *mesh, const st
         half2 += half * half;
     }
     m->radius_m = sqrt(half2) * (1.0 + 1e-9) + 1e-6;
-    rc = bvh_create(m->scene, m->centre_m, cfg->profile.range_max_m, cfg->threads, report, &m->bvh, err);
-    return rc == SH_OK && cfg->order_exactly ? bvh_order_exactly(m->bvh, err) : rc;
+    return bvh_create(m->scene, m->centre_m, cfg->profile.range_max_m, cfg->threads, report, &m->bvh, err);
 }
 
 static int load_scene(struct site *site, const struct sh_report *report, struct sh_err *err)
@@ -66,6 +67,13 @@ static int load_scene(struct site *site, const struct sh_report *report, struct 
     for (uint32_t i = 0; i < cfg->n_meshes && rc == SH_OK; i++)
         if (is_moving(&cfg->mesh[i])) rc = add_mover(site, &cfg->mesh[i], report, err);
     return rc;
+}
+
+uint32_t site_points_per_pulse(const struct site *site)
+{
+    const struct plan_methods *methods = &site->plan.methods;
+    uint32_t most = methods->beam != BEAM_SINGLE ? LINE_MAX_ECHOES : 1 + methods->depth;
+    return most < site->cfg->profile.max_echoes ? most : site->cfg->profile.max_echoes;
 }
 
 const struct scene_surface *site_surface(const struct site *site, uint32_t label)
@@ -142,7 +150,7 @@ static int find_bvh(struct site *site, const double station_m[3], const struct s
     int rc = bvh_create(site->scene, station_m, station_reach(site, station_m), site->cfg->threads, report, out, err);
     if (rc != SH_OK) return rc;
     site->bvh[site->n_bvh++] = *out;
-    return site->cfg->order_exactly ? bvh_order_exactly(*out, err) : SH_OK;
+    return site->plan.methods.order_exactly ? bvh_order_exactly(*out, err) : SH_OK;
 }
 
 /* All places are known before the first BVH is built. */
@@ -182,27 +190,6 @@ void site_grid(const struct site *site, int *zone, int *side)
     if (*side == 0) *side = utm.north ? 1 : -1;
 }
 
-/* The beam as it is from a station. */
-static int make_beam(struct site *site, struct site_station *s, const struct sh_report *report, struct sh_err *err)
-{
-    const struct config *cfg = site->cfg;
-    const struct config_profile *p = &cfg->profile;
-    if (cfg->beam_mode == BEAM_SINGLE) return SH_OK;
-    struct cast_beam *beam = s->beam = calloc(1, sizeof *beam);
-    if (beam == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
-    beam->mode = cfg->beam_mode != BEAM_AUTO ? cfg->beam_mode : config_beam_fixed(cfg) ? BEAM_ADAPTIVE : BEAM_RINGS;
-    beam->max_echoes = p->max_echoes;
-    beam_init(&beam->beam, p->beam_exit_m, p->beam_divergence_rad, 1e-9 * p->pulse_width_ns);
-    beam_rings(cfg->beam_rings, &beam->pattern);
-    beam_rings(BEAM_FINE_RINGS, &beam->fine);
-    if (beam->mode != BEAM_ADAPTIVE) return SH_OK;
-    if (site->scene->n_triangles > 1000000) sh_progress(report, "looking for outlines", -1.0);
-    int rc = cast_outlines(site->scene, s->bvh, s->at.position_m, &beam->beam, p->range_max_m, site->detect.kind,
-                           &s->outlines, err);
-    beam->outlines = s->outlines;
-    return rc;
-}
-
 static int add_station(struct site *site, uint32_t i, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
@@ -214,7 +201,6 @@ static int add_station(struct site *site, uint32_t i, const struct sh_report *re
         s->bvh = site->bvh[0];
     else if (rc == SH_OK)
         rc = find_bvh(site, s->at.position_m, report, &s->bvh, err);
-    if (rc == SH_OK) rc = make_beam(site, s, report, err);
     if (rc == SH_OK) rc = georef_create(&spec, &s->georef, err);
     if (rc != SH_OK) return rc;
     int epsg = georef_epsg(s->georef), first = georef_epsg(site->station[0].georef);
@@ -237,10 +223,12 @@ int site_load(const struct config *cfg, const struct sh_report *report, struct s
     if (rc == SH_OK) rc = load_scene(site, report, err);
     if (rc == SH_OK) rc = site_set_up_detect(site, report, err);
     if (rc == SH_OK) rc = place_stations(site, err);
+    if (rc == SH_OK) rc = site_plan_order(site, err);
     if (rc == SH_OK && site->moving) rc = site_load_platform(site, report, err);
     for (uint32_t i = 0; i < site->n_stations && rc == SH_OK; i++)
         rc = add_station(site, i, report, err);
     if (rc == SH_OK) rc = site_choose_scale(site, report, err);
+    if (rc == SH_OK) rc = site_choose_methods(site, report, err);
     if (rc != SH_OK) {
         site_free(site);
         return rc;
@@ -263,6 +251,7 @@ void site_free(struct site *site)
         free(s->beam);
         beam_outlines_free(s->outlines);
     }
+    free(site->plan.row);
     free(site->station);
     for (uint32_t i = 0; i < site->n_bvh; i++)
         bvh_free(site->bvh[i]);

@@ -23,7 +23,7 @@ struct site_station {
     struct georef *georef;
     struct placement at;
     struct cast_beam *beam;         /* NULL: one ray per pulse */
-    struct beam_outlines *outlines; /* beam.mode adaptive */
+    struct beam_outlines *outlines; /* an adaptive one's */
     double scale[3];                /* of geo points on the wire, units of the CRS per count */
     struct site_leg *leg;           /* one for each stretch of a trajectory, in the geo layout; else NULL */
     struct plan_row plan;           /* how the georef's method was chosen; of the worst leg */
@@ -50,6 +50,14 @@ struct site_detect {
     uint16_t *kind;              /* [n_real] of surfaces, for outlines; NULL: not modelled */
 };
 
+/* What was planned, once; scans take their methods from here alone. */
+struct site_plan {
+    struct plan_methods methods;
+    struct plan_row order, beam, optics;
+    struct plan_row *row; /* all of it, in the order of the stages */
+    size_t n;
+};
+
 /* A stretch of a moving head's path, with a BVH that reaches all of it. */
 struct site_stretch {
     int64_t until_ns; /* since the scan's start: whole milliseconds; INT64_MAX: the last one */
@@ -64,6 +72,7 @@ struct site {
     struct site_mover mover[CAST_MAX_MOVERS];
     uint32_t n_movers, n_surfaces; /* surfaces of the scene, then of the movers, then their ghosts */
     struct site_detect detect;
+    struct site_plan plan;
     struct bvh *bvh[CONFIG_MAX_STATIONS];
     uint32_t n_bvh;
     struct site_station *station;
@@ -96,6 +105,9 @@ void site_free(struct site *site);
  * of the first station, unless output.utm_zone or the scene's own grid says it; else by position. The hemisphere of the
  * false northing is that in which the first station is given, if it is given in UTM. */
 void site_grid(const struct site *site, int *zone, int *side);
+
+/* Entries that a pulse may need in a block: its echoes, as far as the plan allows for more than one. */
+uint32_t site_points_per_pulse(const struct site *site);
 
 /* Names of a label below n_surfaces. */
 const struct scene_surface *site_surface(const struct site *site, uint32_t label);

@@ -177,9 +177,16 @@ int site_set_up_detect(struct site *site, const struct sh_report *report, struct
         detect_ball_keys(&d->ball, cfg->ball.seed);
         d->cast.ball = &d->ball;
     }
+    site_set_depth(site, d->cast.depth);
+    return rc;
+}
+
+void site_set_depth(struct site *site, uint32_t depth)
+{
+    struct site_detect *d = &site->detect;
+    d->cast.depth = depth;
     d->on = d->cast.signal != NULL || d->cast.depth > 0 || d->cast.instrument != NULL || d->cast.ball != NULL ||
             d->cast.ambiguity != DETECT_AMBIGUITY_NONE;
-    return rc;
 }
 
 void site_free_detect(struct site *site)

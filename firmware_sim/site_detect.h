@@ -9,6 +9,9 @@
 int site_set_up_detect(struct site *site, const struct sh_report *report, struct sh_err *err);
 void site_free_detect(struct site *site);
 
+/* How many surfaces of glass or mirrors pulses are followed through, once that is known. */
+void site_set_depth(struct site *site, uint32_t depth);
+
 /* How far from the head's origin rays may begin, given where it stands: beams beside it, and ways behind glass. */
 double site_ray_reach_m(const struct site *site, const double station_m[3]);
 

@@ -97,7 +97,7 @@ static int add_stretch(struct site *site, const double centre_m[3], double reach
     struct site_stretch *stretch = &site->stretch[site->n_stretches++];
     *stretch = (struct site_stretch){.until_ns = until_ns, .bvh = *bvh, .reach_m = reach_m};
     memcpy(stretch->centre_m, centre_m, sizeof stretch->centre_m);
-    return site->cfg->order_exactly ? bvh_order_exactly(*bvh, err) : SH_OK;
+    return site->plan.methods.order_exactly ? bvh_order_exactly(*bvh, err) : SH_OK;
 }
 
 /* A stretch ends between two poses, and the head goes on for up to a millisecond, which 100 ms cover. */

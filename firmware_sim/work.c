@@ -32,7 +32,7 @@ int worker_create(const struct site *site, struct worker **out, struct sh_err *e
     worker->site = site;
     uint32_t n = device_tick_pulses(site->cfg);
     int rc = caster_create(&worker->caster, err);
-    if (rc == SH_OK) rc = line_block_alloc(&worker->block, n * config_points_per_pulse(site->cfg), err);
+    if (rc == SH_OK) rc = line_block_alloc(&worker->block, n * site_points_per_pulse(site), err);
     if (rc != SH_OK) {
         worker_free(worker);
         return rc;
@@ -49,12 +49,13 @@ void worker_free(struct worker *worker)
     free(worker);
 }
 
-uint32_t worker_slot_bytes(const struct config *cfg)
+uint32_t worker_slot_bytes(const struct site *site)
 {
+    const struct config *cfg = site->cfg;
     /* Each line part is a frame of its own. */
     uint32_t poses = config_head_moves(&cfg->platform) ? NATIVE_MAX_FRAME : 0;
     return OVERHEAD_BYTES + poses +
-           (uint32_t)native_points_bound(device_tick_pulses(cfg) * config_points_per_pulse(cfg)) +
+           (uint32_t)native_points_bound(device_tick_pulses(cfg) * site_points_per_pulse(site)) +
            device_tick_lines(cfg) * (LINE_END_BYTES + NATIVE_HEADER_LEN + NATIVE_POINTS_HEAD_LEN);
 }
 

@@ -12,7 +12,7 @@ int worker_create(const struct site *site, struct worker **out, struct sh_err *e
 void worker_free(struct worker *worker);
 
 /* Bytes that a slot needs for the busiest tick that the profile allows. */
-uint32_t worker_slot_bytes(const struct config *cfg);
+uint32_t worker_slot_bytes(const struct site *site);
 
 /* Fills the slot. Allocates nothing. */
 void worker_fill(struct worker *worker, const struct device_work *work, struct ring_slot *slot, uint32_t slot_bytes);

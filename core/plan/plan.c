@@ -1,88 +1,24 @@
+/* Rows of the stages about which there is little to choose. */
 #include "core/plan.h"
 
 #include <math.h>
 #include <stdio.h>
 
-static const struct {
-    const char *name;
-    double cost_ns;
-} methods[] = {[GEOREF_AUTO] = {"auto", 0.0},     [GEOREF_EXACT] = {"exact", 0.0}, /* by CRS */
-               [GEOREF_ORDER1] = {"order1", 1.0}, [GEOREF_ORDER2] = {"order2", 2.0},
-               [GEOREF_ORDER3] = {"order3", 4.0}, [GEOREF_ORDER5] = {"order5", 4.0}};
+#include "core/plan/cost.h"
 
-const char *plan_method_name(enum georef_method method)
-{
-    return methods[method].name;
-}
-
-static double cost_ns(const struct georef *georef, enum georef_method method)
-{
-    if (method != GEOREF_EXACT) return methods[method].cost_ns;
-    return georef_crs(georef) == GEOREF_UTM ? 600.0 : 250.0;
-}
-
-/* Local and ecef: the head's rotation and the CRS's are one matrix. */
-static void say_linear(const struct georef *georef, struct plan_row *row, double error_m)
-{
-    int local = georef_crs(georef) == GEOREF_LOCAL;
-    snprintf(row->method, sizeof row->method, "%s", local ? "none" : "rotation");
-    row->error_m = error_m;
-    row->cost_ns = 0.0;
-    snprintf(row->why, sizeof row->why, "%s",
-             local ? "points stay in the scene frame" : "ECEF is a rotation, which the head's rotation takes in");
-}
-
-int plan_georef(const struct georef *georef, const struct plan_georef_need *need, enum georef_method *method,
-                struct plan_row *row, struct sh_err *err)
-{
-    double bound_m = georef_bound_m(georef, GEOREF_EXACT, need->radius_m, need->height_m), rotation[9];
-    *row = (struct plan_row){.stage = "georef"};
-    *method = GEOREF_EXACT;
-    if (georef_rotation(georef, rotation)) {
-        say_linear(georef, row, bound_m);
-        return SH_OK;
-    }
-    enum georef_method first = GEOREF_ORDER1, last = GEOREF_ORDER5;
-    if (need->forced != GEOREF_AUTO) first = last = need->forced;
-    for (enum georef_method m = first; m <= last; m++) {
-        double b = georef_bound_m(georef, m, need->radius_m, need->height_m);
-        int meets = b <= need->tolerance_m;
-        if (need->forced != GEOREF_AUTO && !isfinite(b))
-            return sh_fail(err, SH_EINPUT,
-                           "georeferencing by %s has no bound for points up to %.4g m away; allowed exact",
-                           methods[m].name, need->radius_m);
-        if (!meets && need->forced == GEOREF_AUTO) continue;
-        *method = m;
-        bound_m = b;
-        break;
-    }
-    snprintf(row->method, sizeof row->method, "%s", methods[*method].name);
-    row->error_m = bound_m;
-    row->cost_ns = cost_ns(georef, *method);
-    const char *why = need->forced != GEOREF_AUTO       ? "asked for by output.georef"
-                      : !(bound_m <= need->tolerance_m) ? "nothing meets the tolerance"
-                      : *method != GEOREF_EXACT         ? "the cheapest that meets the tolerance"
-                      : georef_has_geoid(georef)        ? "the geoid is interpolated for each point"
-                                                        : "no polynomial meets the tolerance";
-    snprintf(row->why, sizeof row->why, "%s: %.3g m within %.5g m, %.5g m up or down", why, need->tolerance_m,
-             need->radius_m, need->height_m);
-    return SH_OK;
-}
-
-void plan_georef_polar(struct plan_row *row)
-{
-    *row = (struct plan_row){.stage = "georef", .method = "none"};
-    snprintf(row->why, sizeof row->why,
-             "output.layout is polar: points leave as range and angles, the anchor says where");
-}
-
-static struct plan_row *add(struct plan_row *row, const char *stage, const char *method, double error_m, double cost_ns,
-                            const char *why)
+void plan_say(struct plan_row *row, const char *stage, const char *method, double error_m, double cost_ns,
+              const char *why)
 {
     *row = (struct plan_row){.error_m = error_m, .cost_ns = cost_ns};
     snprintf(row->stage, sizeof row->stage, "%s", stage);
     snprintf(row->method, sizeof row->method, "%s", method);
     snprintf(row->why, sizeof row->why, "%s", why);
+}
+
+static struct plan_row *add(struct plan_row *row, const char *stage, const char *method, double error_m, double cost_ns,
+                            const char *why)
+{
+    plan_say(row, stage, method, error_m, cost_ns, why);
     return row + 1;
 }
 
@@ -91,16 +27,23 @@ static const double FLOAT_ORDER = 5e-7;
 /* What the cast promises for incidence up to 89.9 degrees; tests/stability holds it to that. */
 static const double CAST_ERROR_M = 1e-6;
 
-static struct plan_row *plan_optics(struct plan_row *row, const struct plan_head *head)
+void plan_order_options(double far_m, struct plan_option option[2])
 {
-    char why[192];
-    if (head->n_glass == 0)
-        return add(row, "optics", "none", 0.0, 0.0, "no surface is of glass or a mirror: no pulse is cast twice");
-    if (head->depth == 0) return add(row, "optics", "none", (double)NAN, 0.0, "optics.depth is 0");
-    snprintf(why, sizeof why,
-             "%u surfaces of glass or mirrors; only pulses that meet one are cast again, up to %u times", head->n_glass,
-             head->depth);
-    return add(row, "optics", "secondary rays", CAST_ERROR_M, (double)NAN, why);
+    option[0] = (struct plan_option){.method = "none", .error_m = FLOAT_ORDER * far_m};
+    option[1] = (struct plan_option){.method = "double", .cost_ns = (double)NAN};
+}
+
+void plan_beam_option(enum beam_mode mode, uint32_t rings, struct plan_option *option)
+{
+    uint32_t n = 1 + 3 * rings * (rings + 1);
+    *option = (struct plan_option){.method = "single", .error_m = (double)NAN, .echo_share = (double)NAN};
+    if (mode == BEAM_RINGS) {
+        snprintf(option->method, sizeof option->method, "rings %u (%u rays)", rings, n);
+        option->cost_ns = n * PLAN_COST_SUB_RAY;
+    } else if (mode == BEAM_ADAPTIVE) {
+        snprintf(option->method, sizeof option->method, "adaptive");
+        option->cost_ns = (double)NAN;
+    }
 }
 
 static struct plan_row *plan_signal(struct plan_row *row, const struct plan_head *head)
@@ -132,35 +75,28 @@ static struct plan_row *plan_noise(struct plan_row *row, const struct plan_head 
     return add(row, "ball", "uniform in a ball", 0.0, 130.0, why);
 }
 
+/* A way to cast that has no bound. */
+static void leave_out(struct plan_row *row, const char *method, double cost_ns, const char *why)
+{
+    struct plan_option *left = &row->left[row->n_left++];
+    *left = (struct plan_option){.error_m = (double)NAN, .echo_share = (double)NAN, .cost_ns = cost_ns};
+    snprintf(left->method, sizeof left->method, "%s", method);
+    snprintf(left->why_not, sizeof left->why_not, "no bound: %s (make chart)", why);
+}
+
 size_t plan_head(const struct plan_head *head, struct plan_row rows[PLAN_HEAD_ROWS])
 {
     struct plan_row *row = rows;
-    char method[32], why[192];
+    char method[32];
     snprintf(method, sizeof method, "packets of %u, decided", head->packet);
     row = add(row, "cast", method, CAST_ERROR_M, (double)NAN,
               "the widest packets of this CPU; triangle and range in double where float can't tell; cost: make bench");
-    if (head->order_exactly)
-        row = add(row, "order", "double", 0.0, (double)NAN, "scene.order_exactly: surfaces that overlap are ordered");
-    else {
-        snprintf(why, sizeof why,
-                 "scene.order_exactly is off: of surfaces within %.2g m of each other at %.4g m any one",
-                 FLOAT_ORDER * head->range_max_m, head->range_max_m);
-        row = add(row, "order", "none", FLOAT_ORDER * head->range_max_m, 0.0, why);
-    }
+    leave_out(row - 1, "float", -(PLAN_COST_REFINE + PLAN_COST_DECIDE), "at an edge it tells another surface, or none");
+    leave_out(row - 1, "refined", -PLAN_COST_DECIDE, "at an edge it tells another surface, or none");
     if (head->n_movers > 0)
         row = add(row, "movers", "cast on their own", CAST_ERROR_M, (double)NAN, "meshes that move");
     else
         row = add(row, "movers", "none", 0.0, 0.0, "no mesh moves");
-    if (head->beam_adaptive) {
-        row = add(row, "beam", "adaptive", (double)NAN, (double)NAN,
-                  "one ray, and one for each part that outlines cut a footprint into; nothing moves");
-    } else if (head->beam_rays > 0) {
-        snprintf(method, sizeof method, "rings of %u", head->beam_rays);
-        row = add(row, "beam", method, (double)NAN, (double)NAN, "so many rays for each pulse");
-    } else {
-        row = add(row, "beam", "none", 0.0, 0.0, "beam.mode is single: one ray per pulse");
-    }
-    row = plan_optics(row, head);
     row = plan_signal(row, head);
     row = plan_noise(row, head);
     if (head->ambiguity == DETECT_AMBIGUITY_NONE)

@@ -126,7 +126,7 @@ static inline struct rig *rig_open(const struct device_options *options, const c
     need(site_load(rig->cfg, NULL, &rig->site, &err), &err);
     need(device_create(rig->site, options != NULL ? options : &none, &rig->device, &err), &err);
     need(worker_create(rig->site, &rig->worker, &err), &err);
-    rig->slot_bytes = worker_slot_bytes(rig->cfg);
+    rig->slot_bytes = worker_slot_bytes(rig->site);
     need(ring_create(&rig->ring, 1, 1, rig->slot_bytes, &err), &err);
     return rig;
 }

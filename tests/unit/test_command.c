@@ -62,6 +62,7 @@ static const struct {
     {"SYSTEM:ERROR:COUNT", "SYST:ERR:COUN", 1, 0, ""},
     {"SYSTEM:VERSION", "SYST:VERS", 1, 0, ""},
     {"SYSTEM:CONTROL", "SYST:CONT", 1, 0, ""},
+    {"SYSTEM:PLAN", "SYST:PLAN", 1, 0, ""},
     {"SYSTEM:CONTROL:RELEASE", "SYST:CONT:REL", 0, 1, ""},
     {"HEAD:PRR", "HEAD:PRR", 1, 1, " 200000"},
     {"HEAD:LINES", "HEAD:LIN", 1, 1, " 50"},

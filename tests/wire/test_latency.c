@@ -46,8 +46,8 @@ static int64_t command(struct session *s, const char *line)
     int64_t before_ns = atoll(client_ask(s->sh, "TIME?"));
     client_tell(s->sh, line);
     int64_t after_ns = atoll(client_ask(s->sh, "TIME?"));
-    char *text = wire_read(s->journal, NULL), *at = strchr(text, '\n') + 1;
-    for (int i = 0; i < s->commands; i++)
+    char *text = wire_read(s->journal, NULL), *at = text;
+    for (int i = 0; at[0] == '#' || i++ < s->commands;) /* notes, and the commands before */
         at = strchr(at, '\n') + 1;
     s->commands++;
     uint64_t tick;

@@ -127,12 +127,116 @@ static void test_what_cannot_be(void **state)
     free(text);
 }
 
+/* Methods by stage, and a word of the reason; forced ones as such. */
+struct want {
+    const char *stage, *method, *left_out, *why_left_out;
+};
+
+static void expect_plan(struct wire *wire, const char *config, const struct want *want, size_t n)
+{
+    const char *const args[] = {"plan", config, "--json", NULL};
+    char *json = plan(wire, args, 0), *again = plan(wire, args, 0);
+    assert_string_equal(json, again); /* the same configuration, the same plan */
+    for (size_t i = 0; i < n; i++) {
+        char method[64], *text = row(json, want[i].stage, 0);
+        if (text == NULL) fail_msg("%s: no row of %s in %s", config, want[i].stage, json);
+        snprintf(method, sizeof method, "\"method\": \"%s\"", want[i].method);
+        if (strstr(text, method) == NULL || strstr(text, "\"forced\": false") == NULL) fail_msg("%s: %s", config, text);
+        free(text);
+        if (want[i].left_out == NULL) continue;
+        snprintf(method, sizeof method, "\"method\": \"%s\"", want[i].left_out);
+        const char *stage = strstr(json, want[i].stage), *left = strstr(stage, method);
+        if (left == NULL || strstr(left, want[i].why_left_out) == NULL ||
+            strstr(left, want[i].why_left_out) > strchr(left, '}'))
+            fail_msg("%s: %s is left out, but not because %s", config, want[i].left_out, want[i].why_left_out);
+    }
+    free(json);
+    free(again);
+}
+
+/* Few edges and a tolerance of a centimetre: single rays. Leaves: they don't do. Glass: followed as far as it counts.
+ */
+static void test_three_plans(void **state)
+{
+    struct wire *wire = *state;
+    static const struct want demo[] = {{"beam", "single", "adaptive", "dearer"},
+                                       {"optics", "none", NULL, NULL},
+                                       {"signal", "none", NULL, NULL},
+                                       {"order", "none", "double", "dearer"},
+                                       {"georef", "order2", "order1", "off by more than the tolerance"}};
+    static const struct want foliage[] = {{"beam", "adaptive", "single", "its ranges are off by more than 0.005 m"},
+                                          {"beam", "adaptive", "rings 12 (469 rays)", "dearer"},
+                                          {"optics", "none", NULL, NULL},
+                                          {"georef", "none", NULL, NULL}};
+    static const struct want glass[] = {{"beam", "single", "adaptive", "dearer"},
+                                        {"optics", "depth 3", "depth 1", "its ranges are off"},
+                                        {"optics", "depth 3", "depth 2", "get another echo count"},
+                                        {"optics", "depth 3", "depth 4", "dearer"},
+                                        {"signal", "range equation", NULL, NULL},
+                                        {"noise", "gauss, by signal", NULL, NULL},
+                                        {"georef", "rotation", NULL, NULL}};
+    expect_plan(wire, "config/foliage.yaml", foliage, sizeof foliage / sizeof foliage[0]);
+    expect_plan(wire, "config/glass.yaml", glass, sizeof glass / sizeof glass[0]);
+    if (access("/usr/share/assimp/models/IFC/AC14-FZK-Haus.ifc", R_OK) != 0) {
+        printf("# no house (package assimp-testmodels): the demo's plan is not looked at\n");
+        skip();
+    }
+    expect_plan(wire, "config/demo.yaml", demo, sizeof demo / sizeof demo[0]);
+}
+
+/* What a run applies, by its own account, is what is planned; a tighter tolerance changes both. */
+static void test_run_follows_plan(void **state)
+{
+    struct wire *wire = *state;
+    static const struct {
+        const char *set, *line;
+    } cases[] = {{"optics.depth=1", "# plan: order none; beam single; optics depth 1; georef rotation\n"},
+                 {"plan.echo_tolerance=0.01", "# plan: order none; beam single; optics depth 2; georef rotation\n"},
+                 {"plan.tolerance_m=1e-6", "# plan: order double; beam single; optics depth 3; georef rotation\n"}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        char journal[256];
+        snprintf(journal, sizeof journal, "%s", wire_path(wire, "journal"));
+        const char *const args[] = {"run",   "config/glass.yaml", "--start",   "--duration", "0.05",  "--pace",
+                                    "fast",  "--quiet",           "--journal", journal,      "--set", cases[i].set,
+                                    "--set", "beam.mode=single",  NULL};
+        assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+        char *text = wire_read(journal, NULL);
+        if (strstr(text, cases[i].line) == NULL) fail_msg("%s: %s", cases[i].set, text);
+        free(text);
+    }
+}
+
+/* Forced methods have bounds, too, and say whether they hold. */
+static void test_forced(void **state)
+{
+    struct wire *wire = *state;
+    static const struct {
+        const char *set, *stage, *method, *why;
+    } cases[] = {{"beam.mode=rings", "beam", "rings 4 (61 rays)", "forced by beam.mode; does not hold"},
+                 {"beam.mode=adaptive", "beam", "adaptive", "forced by beam.mode; holds"},
+                 {"beam.mode=single", "beam", "single", "forced by beam.mode"},
+                 {"scene.order_exactly=on", "order", "double", "forced by scene.order_exactly"}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const char *const args[] = {"plan", "config/foliage.yaml", "--json", "--set", cases[i].set, NULL};
+        char *json = plan(wire, args, 0), *text = row(json, cases[i].stage, 0), method[64];
+        snprintf(method, sizeof method, "\"method\": \"%s\"", cases[i].method);
+        if (strstr(text, method) == NULL || strstr(text, cases[i].why) == NULL ||
+            strstr(text, "\"forced\": true") == NULL)
+            fail_msg("%s: %s", cases[i].set, text);
+        free(text);
+        free(json);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_method_by_tolerance, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_stations_that_differ, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_text, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_three_plans, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_run_follows_plan, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_forced, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_what_cannot_be, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,0 +1,79 @@
+/* Which of several options. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "core/plan.h"
+
+int plan_holds(const struct plan_option *option, const struct plan_tolerance *tolerance)
+{
+    return option->why_not[0] == '\0' && option->error_m <= tolerance->range_m &&
+           option->echo_share <= tolerance->echo_share;
+}
+
+/* How far an option misses the tolerance; nothing known is worst. */
+static double excess(const struct plan_option *option, const struct plan_tolerance *tolerance)
+{
+    if (option->why_not[0] != '\0') return (double)INFINITY;
+    double range = option->error_m / tolerance->range_m, echoes = option->echo_share / tolerance->echo_share;
+    return isnan(range) || isnan(echoes) ? 1e300 : fmax(range, echoes);
+}
+
+static void leave_out(struct plan_row *row, const struct plan_option *option, const struct plan_tolerance *tolerance,
+                      double chosen_ns)
+{
+    struct plan_option *left = &row->left[row->n_left++];
+    *left = *option;
+    if (option->why_not[0] != '\0') return;
+    if (option->error_m > tolerance->range_m)
+        snprintf(left->why_not, sizeof left->why_not, "its ranges are off by more than %.3g m", tolerance->range_m);
+    else if (option->echo_share > tolerance->echo_share)
+        snprintf(left->why_not, sizeof left->why_not, "more than %.3g %% of the pulses get another echo count",
+                 100.0 * tolerance->echo_share);
+    else
+        snprintf(left->why_not, sizeof left->why_not, "%s", option->cost_ns <= chosen_ns ? "not asked for" : "dearer");
+}
+
+static void say_why(struct plan_row *row, const struct plan_option *it, uint32_t can, const char *key,
+                    const struct plan_tolerance *tolerance)
+{
+    char first[96];
+    int holds = plan_holds(it, tolerance), known = !isnan(it->error_m) && !isnan(it->echo_share);
+    const char *verdict = holds ? "holds" : "does not hold";
+    if (row->forced)
+        snprintf(first, sizeof first, "forced by %s", key);
+    else
+        snprintf(first, sizeof first, "%s",
+                 can == 1 ? "the only one that can be had"
+                 : holds  ? "the cheapest"
+                          : "the one that is least off");
+    if (known)
+        snprintf(row->why, sizeof row->why, "%s; %s %.3g m, and %.3g %% of the pulses with another echo count", first,
+                 verdict, tolerance->range_m, 100.0 * tolerance->echo_share);
+    else
+        snprintf(row->why, sizeof row->why, "%s; what it is off is not known", first);
+}
+
+uint32_t plan_choose(struct plan_row *row, const char *stage, const struct plan_option *option, uint32_t n, int forced,
+                     const char *key, const struct plan_tolerance *tolerance)
+{
+    uint32_t chosen = 0, can = 0;
+    int holds = 0;
+    for (uint32_t i = 0; i < n; i++) {
+        can += option[i].why_not[0] == '\0';
+        if (!plan_holds(&option[i], tolerance) || (holds && !(option[i].cost_ns < option[chosen].cost_ns))) continue;
+        chosen = i;
+        holds = 1;
+    }
+    for (uint32_t i = 0; i < n && !holds; i++)
+        if (excess(&option[i], tolerance) < excess(&option[chosen], tolerance)) chosen = i;
+    if (forced >= 0) chosen = (uint32_t)forced;
+    const struct plan_option *it = &option[chosen];
+    plan_say(row, stage, it->method, it->error_m, it->cost_ns, "");
+    row->echo_share = it->echo_share;
+    row->forced = forced >= 0;
+    say_why(row, it, can, key, tolerance);
+    for (uint32_t i = 0; i < n; i++)
+        if (i != chosen) leave_out(row, &option[i], tolerance, it->cost_ns);
+    return chosen;
+}

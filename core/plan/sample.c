@@ -1,0 +1,294 @@
+/* Pulses of the head, drawn by chance, cast with a method and with the reference. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/plan.h"
+#include "core/plan/cost.h"
+#include "core/rng.h"
+
+/* Two rays' ranges further apart than that are not those of one smooth surface: at 80 deg, 100 m and 0.35 mrad, the
+ * mean over a footprint is 2 um off its centre. */
+static const double SMOOTH_M = 5e-5;
+
+enum {
+    MAX_DRAWN = 32768,  /* pulses */
+    MIXED_LOOKS = 1024, /* of these, cast with the reference: those that meet more than one smooth surface, */
+    PLAIN_LOOKS = 1024, /* and of the others */
+    PLAIN_EVERY = 8,    /* one of so many */
+    PROBE_RINGS = 4,
+    OPTICS_DRAWN = 8192,
+    TRIES = 1 << 20, /* for each pulse: few of them are cast where the field of view is narrow */
+    ROOM = 64,       /* in the block; more than LINE_MAX_ECHOES */
+};
+
+struct echoes {
+    uint32_t n;
+    double range_m[LINE_MAX_ECHOES];
+    uint32_t last_label;
+};
+
+struct look {
+    uint32_t place;
+    int mixed; /* meets more than one smooth surface; optics: the way is longer than what is followed */
+    uint64_t pulse;
+    struct echoes reference;
+};
+
+struct plan_sample {
+    struct plan_place *place;
+    uint32_t n_places;
+    struct caster *caster;
+    struct line_block block;
+    uint64_t key, tries;
+    struct look *look; /* of the beam */
+    uint32_t n_looks;
+    uint64_t drawn, plain, mixed_looks, plain_looks;
+    /* of the optics: with CAST_MAX_DEPTH */
+    struct look *way;
+    uint32_t n_ways;
+};
+
+int plan_sample_create(struct plan_place *place, uint32_t n_places, struct plan_sample **out, struct sh_err *err)
+{
+    struct plan_sample *s = *out = calloc(1, sizeof *s);
+    if (s == NULL) return sh_fail(err, SH_ENOMEM, "plan: no memory");
+    *s = (struct plan_sample){.place = place, .n_places = n_places, .key = rng_key(1, RNG_PLAN)};
+    s->look = calloc(MIXED_LOOKS + PLAIN_LOOKS, sizeof *s->look);
+    s->way = calloc(OPTICS_DRAWN, sizeof *s->way);
+    int rc = s->look != NULL && s->way != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "plan: no memory");
+    if (rc == SH_OK) rc = caster_create(&s->caster, err);
+    if (rc == SH_OK) rc = line_block_alloc(&s->block, ROOM, err);
+    if (rc != SH_OK) {
+        plan_sample_free(s);
+        *out = NULL;
+    }
+    return rc;
+}
+
+void plan_sample_free(struct plan_sample *s)
+{
+    if (s == NULL) return;
+    caster_free(s->caster);
+    line_block_free(&s->block);
+    free(s->look);
+    free(s->way);
+    free(s);
+}
+
+/* The next pulse by chance that is cast. Returns 0 where none is found. */
+static int draw(struct plan_sample *s, struct look *look)
+{
+    for (int i = 0; i < TRIES; i++) {
+        uint64_t number = s->tries++;
+        look->place = (uint32_t)(number % s->n_places);
+        const struct plan_place *p = &s->place[look->place];
+        struct schedule_line line;
+        look->pulse = p->segment.k0 + rng_u64(s->key, number) % p->pulses;
+        schedule_get_line(&p->segment, schedule_line_of(&p->segment, look->pulse), &line);
+        if (line.cast0 <= look->pulse && look->pulse < line.cast_end) return 1;
+    }
+    return 0;
+}
+
+/* One pulse by itself, as it is set up. */
+static void cast_look(struct plan_sample *s, struct cast_setup *setup, const struct look *look, struct echoes *out)
+{
+    const struct plan_place *p = &s->place[look->place];
+    const struct line_block *b = &s->block;
+    struct schedule_line line;
+    struct schedule_run run;
+    schedule_get_line(&p->segment, schedule_line_of(&p->segment, look->pulse), &line);
+    schedule_get_run(&p->segment, &line, look->pulse, 1, &run);
+    if (p->enter != NULL) p->enter(p->ctx, run.t0_ns, setup);
+    caster_cast(s->caster, setup, &run, &s->block);
+    out->n = b->echo[0] >> 4;
+    for (uint32_t i = 0; i < out->n; i++)
+        out->range_m[i] = setup->range_scale_m * b->a[i];
+    out->last_label = out->n != 0 ? b->label[out->n - 1] : LINE_LABEL_NONE;
+}
+
+/* The run's setup, but exact: ranges in their finest counts, without noise, thresholds sharp. */
+struct exact {
+    struct cast_setup setup;
+    struct cast_detect detect;
+    struct detect_signal signal;
+};
+
+static void set_up(const struct plan_place *p, struct exact *e)
+{
+    struct cast_setup *setup = &e->setup;
+    *setup = p->setup;
+    setup->layout = LINE_POLAR;
+    setup->range_scale_m = fmax(1e-6, setup->range_max_m * 1.1 / 0x1p31);
+    setup->noise_on = 0;
+    setup->echoes = BEAM_ALL;
+    if (setup->detect == NULL) return;
+    e->detect = *setup->detect;
+    setup->detect = &e->detect;
+    e->detect.noise_by_signal = 0;
+    e->detect.ball = NULL;
+    if (e->detect.signal == NULL) return;
+    e->signal = *e->detect.signal;
+    e->signal.per_snr = 0.0;
+    e->detect.signal = &e->signal;
+}
+
+static void cast_beam(struct plan_sample *s, const struct look *look, enum beam_mode mode, struct echoes *out)
+{
+    const struct plan_place *p = &s->place[look->place];
+    struct exact e;
+    set_up(p, &e);
+    e.setup.beam = mode == BEAM_SINGLE ? NULL : p->beam;
+    if (e.setup.beam != NULL) p->beam->mode = mode;
+    cast_look(s, &e.setup, look, out);
+}
+
+static void set_rings(const struct plan_sample *s, uint32_t rings)
+{
+    for (uint32_t i = 0; i < s->n_places; i++)
+        beam_rings(rings, &s->place[i].beam->pattern);
+}
+
+static int is_mixed(struct plan_sample *s, const struct look *look)
+{
+    struct echoes centre, all;
+    cast_beam(s, look, BEAM_SINGLE, &centre);
+    cast_beam(s, look, BEAM_RINGS, &all);
+    if (centre.n != all.n) return 1;
+    return all.n > 1 || (all.n == 1 && !(fabs(all.range_m[0] - centre.range_m[0]) < SMOOTH_M));
+}
+
+static void draw_looks(struct plan_sample *s)
+{
+    struct look look;
+    while (s->mixed_looks < MIXED_LOOKS && s->drawn < MAX_DRAWN && draw(s, &look)) {
+        s->drawn++;
+        look.mixed = is_mixed(s, &look);
+        if (look.mixed) {
+            s->mixed_looks++;
+        } else {
+            if (s->plain++ % PLAIN_EVERY != 0 || s->plain_looks == PLAIN_LOOKS) continue;
+            s->plain_looks++;
+        }
+        s->look[s->n_looks++] = look;
+    }
+}
+
+static void prepare_beam(struct plan_sample *s)
+{
+    if (s->n_looks != 0) return;
+    set_rings(s, PROBE_RINGS);
+    draw_looks(s);
+    set_rings(s, BEAM_MAX_RINGS);
+    for (uint32_t i = 0; i < s->n_looks; i++)
+        cast_beam(s, &s->look[i], BEAM_RINGS, &s->look[i].reference);
+}
+
+/* What was found: of mixed pulses each stands for itself, of the others each for many. */
+struct tally {
+    double echoes, further, sum2,
+        sum4; /* further than the first of a pulse; of what ranges are off, squared; and squared again */
+    double wrong_mixed, wrong_plain;
+};
+
+static void compare(struct tally *t, const struct echoes *got, const struct echoes *want, double weight, int mixed)
+{
+    t->further += got->n > 1 ? weight * (got->n - 1) : 0.0;
+    if (got->n != want->n) *(mixed ? &t->wrong_mixed : &t->wrong_plain) += weight;
+    for (uint32_t i = 0; got->n == want->n && i < got->n; i++) {
+        double off = got->range_m[i] - want->range_m[i], off2 = off * off;
+        t->echoes += weight;
+        t->sum2 += weight * off2;
+        t->sum4 += weight * weight * off2 * off2;
+    }
+}
+
+/* Upper limit, at 95 %, of a Poisson mean of which `found` were found: half the quantile of chi-squared with 2 found +
+ * 2 degrees of freedom, after Wilson and Hilferty (1931). */
+static double poisson_limit(double found)
+{
+    double k = found + 1.0, root = 1.0 - 1.0 / (9.0 * k) + 1.645 / (3.0 * sqrt(k));
+    return k * root * root * root;
+}
+
+static void conclude(const struct tally *t, double pulses, struct plan_option *option)
+{
+    option->error_m = option->echo_share = (double)NAN;
+    if (!(pulses > 0.0)) return;
+    option->echo_share = fmin(1.0, (poisson_limit(t->wrong_mixed) + t->wrong_plain) / pulses);
+    option->error_m = t->echoes > 0.0 ? sqrt((t->sum2 + 3.0 * sqrt(t->sum4)) / t->echoes) : 0.0;
+}
+
+void plan_sample_beam(struct plan_sample *s, enum beam_mode mode, uint32_t rings, struct plan_option *option)
+{
+    struct cast_counters before, after;
+    struct tally tally = {0};
+    struct echoes got;
+    double outlined = 0.0, sub_rays = 0.0;
+    prepare_beam(s);
+    set_rings(s, rings);
+    double plain_weight = s->plain_looks != 0 ? (double)s->plain / (double)s->plain_looks : 0.0;
+    caster_get_counters(s->caster, &before);
+    for (uint32_t i = 0; i < s->n_looks; i++) {
+        const struct look *look = &s->look[i];
+        double weight = look->mixed ? 1.0 : plain_weight;
+        cast_beam(s, look, mode, &got);
+        compare(&tally, &got, &look->reference, weight, look->mixed);
+        caster_get_counters(s->caster, &after);
+        outlined += weight * (double)(after.outlined - before.outlined);
+        sub_rays += weight * (double)(after.sub_rays - before.sub_rays);
+        before = after;
+    }
+    double pulses = (double)s->drawn;
+    conclude(&tally, pulses, option);
+    if (mode != BEAM_ADAPTIVE || !(pulses > 0.0)) return;
+    option->cost_ns = PLAN_COST_OUTLINES + outlined / pulses * PLAN_COST_CUT + sub_rays / pulses * PLAN_COST_SUB_RAY;
+}
+
+/* ---- glass and mirrors */
+
+/* apart: every surface on the way is an echo. */
+static void cast_way(struct plan_sample *s, const struct look *look, uint32_t depth, int apart, struct echoes *out)
+{
+    struct exact e;
+    set_up(&s->place[look->place], &e);
+    e.setup.beam = NULL;
+    e.detect.depth = depth;
+    if (apart) {
+        e.detect.signal = NULL;
+        e.detect.separation_m = 0.0;
+        e.detect.max_echoes = LINE_MAX_ECHOES;
+    }
+    cast_look(s, &e.setup, look, out);
+}
+
+static int leads_on(const struct plan_sample *s, const struct echoes *e)
+{
+    const struct cast_detect *d = s->place[0].setup.detect;
+    const struct surface_table *t = d->surfaces;
+    uint32_t label = e->last_label;
+    if (label == LINE_LABEL_NONE) return 0;
+    if (label >= t->n && d->ghost_label != 0) label -= d->ghost_label;
+    return label < t->n && (t->surface[label].glass > 0.0 || t->surface[label].mirror > 0.0);
+}
+
+void plan_sample_optics(struct plan_sample *s, uint32_t depth, struct plan_option *option)
+{
+    struct tally tally = {0};
+    struct echoes got;
+    while (s->n_ways < OPTICS_DRAWN && draw(s, &s->way[s->n_ways])) {
+        struct look *way = &s->way[s->n_ways++];
+        cast_way(s, way, CAST_MAX_DEPTH, 1, &way->reference);
+        way->mixed = way->reference.n > CAST_MAX_DEPTH && leads_on(s, &way->reference);
+        cast_way(s, way, CAST_MAX_DEPTH, 0, &way->reference);
+    }
+    for (uint32_t i = 0; i < s->n_ways; i++) {
+        const struct look *way = &s->way[i];
+        cast_way(s, way, depth, 0, &got);
+        compare(&tally, &got, &way->reference, 1.0, 1);
+        if (got.n == way->reference.n && way->mixed) tally.wrong_mixed += 1.0;
+    }
+    conclude(&tally, s->n_ways, option);
+    option->cost_ns = depth == 0 ? 0.0 : PLAN_COST_SUB_RAY * tally.further / s->n_ways;
+}

@@ -1,0 +1,100 @@
+/* Which of several options, and what the plan says about it. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "core/plan.h"
+
+static const struct plan_tolerance TOLERANCE = {1e-3, 1e-2};
+
+enum { N = 4 };
+static const struct plan_option options[N] = {
+    {"a", 2e-3, 0.0, 1.0, ""}, {"b", 1e-3, 2e-2, 2.0, ""}, {"c", 1e-4, 1e-3, 9.0, ""}, {"d", 1e-4, 1e-2, 5.0, ""}};
+
+static void expect(const struct plan_row *row, const char *method, int forced, const char *why)
+{
+    assert_string_equal(row->method, method);
+    assert_int_equal(row->forced, forced);
+    if (strstr(row->why, why) == NULL) fail_msg("%s", row->why);
+}
+
+static void expect_left(const struct plan_row *row, uint32_t i, const char *method, const char *why)
+{
+    assert_true(i < row->n_left);
+    assert_string_equal(row->left[i].method, method);
+    if (strstr(row->left[i].why_not, why) == NULL) fail_msg("%s: %s", method, row->left[i].why_not);
+}
+
+/* Of those whose bounds hold the cheapest, wherever it stands; equal to the tolerance holds. */
+static void test_cheapest_that_holds(void **state)
+{
+    (void)state;
+    struct plan_row row;
+    assert_int_equal(plan_choose(&row, "beam", options, N, -1, "", &TOLERANCE), 3);
+    expect(&row, "d", 0, "the cheapest; holds 0.001 m, and 1 % of the pulses");
+    assert_string_equal(row.stage, "beam");
+    assert_true(row.error_m == 1e-4 && row.echo_share == 1e-2 && row.cost_ns == 5.0);
+    assert_int_equal(row.n_left, 3);
+    expect_left(&row, 0, "a", "its ranges are off by more than 0.001 m");
+    expect_left(&row, 1, "b", "more than 1 % of the pulses get another echo count");
+    expect_left(&row, 2, "c", "dearer");
+}
+
+static void test_forced(void **state)
+{
+    (void)state;
+    struct plan_row row;
+    assert_int_equal(plan_choose(&row, "beam", options, N, 1, "beam.mode", &TOLERANCE), 1);
+    expect(&row, "b", 1, "forced by beam.mode; does not hold");
+    assert_int_equal(plan_choose(&row, "beam", options, N, 2, "beam.mode", &TOLERANCE), 2);
+    expect(&row, "c", 1, "forced by beam.mode; holds");
+    expect_left(&row, 2, "d", "not asked for");
+}
+
+/* By how often the tolerance it is off: a by 2, b by 3, and so a, however close b's ranges come. */
+static void test_least_off(void **state)
+{
+    (void)state;
+    struct plan_row row;
+    struct plan_option some[3] = {options[1], options[0], {"e", (double)NAN, (double)NAN, 0.1, ""}};
+    some[0].echo_share = 3e-2;
+    assert_int_equal(plan_choose(&row, "beam", some, 3, -1, "", &TOLERANCE), 1);
+    expect(&row, "a", 0, "the one that is least off; does not hold");
+}
+
+/* What can't be had is not taken, whatever its figures; what is left may be unknown. */
+static void test_what_cannot_be_had(void **state)
+{
+    (void)state;
+    struct plan_row row;
+    struct plan_option some[2] = {{"e", (double)NAN, (double)NAN, 0.0, ""}, {"f", 0.0, 0.0, 0.0, "the head moves"}};
+    assert_int_equal(plan_choose(&row, "beam", some, 2, -1, "", &TOLERANCE), 0);
+    expect(&row, "e", 0, "the only one that can be had; what it is off is not known");
+    expect_left(&row, 0, "f", "the head moves");
+    assert_false(plan_holds(&some[0], &TOLERANCE) || plan_holds(&some[1], &TOLERANCE));
+}
+
+/* Float tells surfaces apart to 5e-7 of their distance: at 1 mm, up to 2 km. */
+static void test_order(void **state)
+{
+    (void)state;
+    struct plan_row row;
+    struct plan_option option[2];
+    plan_order_options(1900.0, option);
+    assert_int_equal(plan_choose(&row, "order", option, 2, -1, "", &TOLERANCE), 0);
+    plan_order_options(2100.0, option);
+    assert_int_equal(plan_choose(&row, "order", option, 2, -1, "", &TOLERANCE), 1);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_cheapest_that_holds), cmocka_unit_test(test_forced), cmocka_unit_test(test_least_off),
+        cmocka_unit_test(test_what_cannot_be_had),  cmocka_unit_test(test_order),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
