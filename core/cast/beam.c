@@ -8,9 +8,9 @@
 #include "core/surface.h"
 #include "core/vec3.h"
 
-/* What one outline cuts off beyond this, in footprint radii, is 0.3 % of the energy: no echo, and on the mean of ranges
- * that become one echo less than 0.003 of the resolution. */
-#define RIM 0.945
+/* What one outline cuts off beyond this, in footprint radii, is 0.16 % of the energy: no echo, and on the mean of
+ * ranges that become one echo less than 0.002 of the resolution. */
+#define RIM 0.96
 /* Pulses with fewer sub-rays than this share packets with their neighbours. */
 enum { ALONE = 64 };
 
