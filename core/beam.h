@@ -118,11 +118,14 @@ uint32_t beam_merge(const struct beam *beam, struct beam_return *returns, uint32
  * may reach, and the nearest of them. Constant after it is made; any thread. */
 struct beam_outlines;
 
-/* Casts rays from the station: unit directions -> ranges, NaN for none. */
+/* Casts rays from the station: unit directions -> ranges, NaN for none, and the kinds of surfaces that they meet. */
 struct beam_probe {
-    void (*cast)(void *ctx, uint32_t n, const double *dx, const double *dy, const double *dz, double *range_m);
+    void (*cast)(void *ctx, uint32_t n, const double *dx, const double *dy, const double *dz, double *range_m,
+                 uint16_t *kind);
     void *ctx;
 };
+/* kind, by label: surfaces of one kind send back the same. NULL: all do, or nobody asks. Else edges where one kind ends
+ * are outlines, too, with or without a step. */
 /* station_m: where all pulses come from; at most exit_radius_m off.
  * probe, NULL: all outlines count. Else rays are cast close along both sides of each, a footprint's radius apart: a
  * stretch of it is left out where it is hidden, or where the ranges on both sides agree to BEAM_LEAST_STEP_M (a wall
@@ -130,8 +133,8 @@ struct beam_probe {
  * triangles is, it may move a range by a sixth of the footprint's radius times the change of slope. What is hidden from
  * the station may be seen from the edge of the exit: a strip of at most its radius. */
 int beam_outlines_create(const struct scene *scene, const double station_m[3], const struct beam *beam,
-                         double range_max_m, const struct beam_probe *probe, struct beam_outlines **out,
-                         struct sh_err *err);
+                         double range_max_m, const uint16_t *kind, const struct beam_probe *probe,
+                         struct beam_outlines **out, struct sh_err *err);
 void beam_outlines_free(struct beam_outlines *outlines);
 struct beam_outlines_info {
     uint64_t edges, outlines, stretches, entries, bytes;

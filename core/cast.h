@@ -81,10 +81,13 @@ struct cast_detect {
     const struct detect_ball *ball;
 };
 
-/* A beam with a footprint (core/beam.h). Constant; any thread. */
+/* A beam with a footprint (core/beam.h). Constant; any thread. With cast_detect, echoes weigh by what comes back of
+ * them, each by itself is detected or not, and has noise of its own. Where a footprint of an adaptive beam lies on
+ * glass or a mirror, in part or as a whole, it is cast as rings: what is seen there has outlines that nobody knows. */
 struct cast_beam {
     struct beam beam;
-    enum beam_mode mode; /* BEAM_RINGS, or BEAM_ADAPTIVE with outlines: then the head and the scene stand still */
+    enum beam_mode mode; /* BEAM_RINGS, or BEAM_ADAPTIVE with outlines: then the head and the scene stand still,
+                          * and beams begin at station_m (instrument_has_offset) */
     uint32_t max_echoes; /* of a pulse; up to LINE_MAX_ECHOES */
     struct beam_pattern pattern, fine; /* sub-rays; the finest */
     const struct beam_outlines *outlines;
@@ -154,9 +157,9 @@ void caster_hits(struct caster *caster, const struct bvh *bvh, const double stat
                  uint32_t n, const double *dx, const double *dy, const double *dz, double *range_m, uint32_t *triangle);
 
 /* The outlines of a scene that are steps as seen from the station, which lies within the BVH's station_reach_m
- * (beam_outlines_create). For setting up. */
+ * (beam_outlines_create; kind: as there, of surface_kinds where detection models surfaces). For setting up. */
 int cast_outlines(const struct scene *scene, const struct bvh *bvh, const double station_m[3], const struct beam *beam,
-                  double range_max_m, struct beam_outlines **out, struct sh_err *err);
+                  double range_max_m, const uint16_t *kind, struct beam_outlines **out, struct sh_err *err);
 
 /* Cost by stage, for measuring: `now` counts in any unit and is read between the stages of each chunk. */
 enum cast_stage {

@@ -54,6 +54,9 @@ void surface_table_free(struct surface_table *table);
 int surface_table_set(struct surface_table *table, uint32_t label, const struct scene_surface *named,
                       const struct surface_rule *rule, uint32_t n_rules, double unknown);
 
+/* Labels of equal surfaces get the same number: kind[n], of the caller. */
+int surface_kinds(const struct surface_table *table, uint16_t *kind, struct sh_err *err);
+
 /* rho(i) of n hits; label beyond the table: 0. */
 void surface_return(const struct surface_table *table, uint32_t n, const uint32_t *label, const double *cos_incidence,
                     double *rho);

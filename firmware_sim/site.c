@@ -196,7 +196,8 @@ static int make_beam(struct site *site, struct site_station *s, const struct sh_
     beam_rings(BEAM_FINE_RINGS, &beam->fine);
     if (beam->mode != BEAM_ADAPTIVE) return SH_OK;
     if (site->scene->n_triangles > 1000000) sh_progress(report, "looking for outlines", -1.0);
-    int rc = cast_outlines(site->scene, s->bvh, s->at.position_m, &beam->beam, p->range_max_m, &s->outlines, err);
+    int rc = cast_outlines(site->scene, s->bvh, s->at.position_m, &beam->beam, p->range_max_m, site->detect.kind,
+                           &s->outlines, err);
     beam->outlines = s->outlines;
     return rc;
 }

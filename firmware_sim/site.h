@@ -47,6 +47,7 @@ struct site_detect {
     struct detect_ball ball;
     uint32_t n_real;             /* labels of real surfaces; the others are ghosts', as many */
     struct scene_surface *ghost; /* [n_real]; NULL: no mirrors */
+    uint16_t *kind;              /* [n_real] of surfaces, for outlines; NULL: not modelled */
 };
 
 /* A stretch of a moving head's path, with a BVH that reaches all of it. */

@@ -122,7 +122,12 @@ int site_set_up_detect(struct site *site, const struct sh_report *report, struct
     d->cast.signal = cfg->signal.on ? &d->signal : NULL;
     d->cast.noise_by_signal = cfg->noise_range == RANGE_NOISE_SIGNAL;
     d->cast.ghost_label = site->n_surfaces;
-    if (d->cast.depth > 0 && d->surfaces.has_mirror) rc = name_ghosts(site, err);
+    if (d->cast.surfaces != NULL && cfg->beam_mode != BEAM_SINGLE) {
+        d->kind = calloc(d->surfaces.n + 1, sizeof *d->kind);
+        rc = d->kind == NULL ? sh_fail(err, SH_ENOMEM, "no memory for kinds of surfaces")
+                             : surface_kinds(&d->surfaces, d->kind, err);
+    }
+    if (rc == SH_OK && d->cast.depth > 0 && d->surfaces.has_mirror) rc = name_ghosts(site, err);
     set_up_instrument(cfg, &d->instrument);
     if (!instrument_is_ideal(&d->instrument)) d->cast.instrument = &d->instrument;
     if (cfg->ball.radius_m > 0.0) {
@@ -141,6 +146,7 @@ void site_free_detect(struct site *site)
 {
     surface_table_free(&site->detect.surfaces);
     free(site->detect.ghost);
+    free(site->detect.kind);
 }
 
 double site_ray_reach_m(const struct site *site, const double station_m[3])

@@ -207,8 +207,8 @@ static int fill_cells(struct beam_outlines *o, const struct beam *beam, const st
 }
 
 int beam_outlines_create(const struct scene *scene, const double station_m[3], const struct beam *beam,
-                         double range_max_m, const struct beam_probe *probe, struct beam_outlines **out,
-                         struct sh_err *err)
+                         double range_max_m, const uint16_t *kind, const struct beam_probe *probe,
+                         struct beam_outlines **out, struct sh_err *err)
 {
     struct stretches stretches = {.at = NULL};
     struct outline_prober *prober = calloc(1, sizeof *prober);
@@ -224,7 +224,7 @@ int beam_outlines_create(const struct scene *scene, const double station_m[3], c
     o->first = calloc(N_CELLS + 1, sizeof *o->first);
     o->any = calloc(N_CELLS / 32, sizeof *o->any);
     int rc = o->first == NULL || o->any == NULL ? sh_fail(err, SH_ENOMEM, "beam: no memory") : SH_OK;
-    if (rc == SH_OK) rc = outline_find(scene, station_m, &o->edge, &o->n_edges, &o->info.edges, err);
+    if (rc == SH_OK) rc = outline_find(scene, station_m, kind, &o->edge, &o->n_edges, &o->info.edges, err);
     if (rc == SH_OK && find_stretches(o, prober, range_max_m * 1.01, &stretches) != SH_OK)
         rc = sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");
     if (rc == SH_OK) rc = fill_cells(o, beam, &stretches, err);

@@ -41,15 +41,17 @@ struct outline_prober {
     const struct beam_probe *probe; /* NULL: all counts */
     const struct beam *beam;
     double dx[2 * PROBE_MOST], dy[2 * PROBE_MOST], dz[2 * PROBE_MOST], range_m[2 * PROBE_MOST];
+    uint16_t kind[2 * PROBE_MOST];
     uint8_t counts[PROBE_MOST];
 };
 /* The piece from p to q in equal parts, each about a footprint's radius: how many, and in counts whether each counts.
  */
 uint32_t outline_probe(struct outline_prober *prober, const double p[3], const double q[3], double range_m);
 
-/* weld.c: the outlines among the edges of a scene. Gives *edge (malloc) and *n, and how many edges there are. */
-int outline_find(const struct scene *scene, const double station_m[3], struct outline_edge **edge, uint32_t *n,
-                 uint64_t *n_edges, struct sh_err *err);
+/* weld.c: the outlines among the edges of a scene; kind: as for beam_outlines_create. Gives *edge (malloc) and *n, and
+ * how many edges there are. */
+int outline_find(const struct scene *scene, const double station_m[3], const uint16_t *kind, struct outline_edge **edge,
+                 uint32_t *n, uint64_t *n_edges, struct sh_err *err);
 
 /* Cells lie in tiles of 4 x 4: `first` of a tile is one cache line. */
 static inline uint32_t outline_place(uint32_t face, uint32_t i, uint32_t j)

@@ -1,4 +1,4 @@
-/* Which stretches of an outline are steps that can be seen. */
+/* Which stretches of an outline are steps that can be seen, or the end of a kind of surface. */
 #include <math.h>
 #include <string.h>
 
@@ -25,12 +25,12 @@ static void put_pair(struct outline_prober *prober, uint32_t i, const double at[
     }
 }
 
-static uint8_t is_step(double a, double b, double edge_m, double beside_m)
+static uint8_t is_step(double a, double b, int same_kind, double edge_m, double beside_m)
 {
     double slack_m = BEAM_LEAST_STEP_M + 2.0 * SLOPE * beside_m;
     if (isnan(a) && isnan(b)) return 0;
     if (a < edge_m - slack_m && b < edge_m - slack_m) return 0; /* hidden */
-    return isnan(a) || isnan(b) || fabs(a - b) > slack_m;
+    return !same_kind || isnan(a) || isnan(b) || fabs(a - b) > slack_m;
 }
 
 uint32_t outline_probe(struct outline_prober *prober, const double p[3], const double q[3], double range_m)
@@ -52,11 +52,12 @@ uint32_t outline_probe(struct outline_prober *prober, const double p[3], const d
             at[k] = p[k] + e[k] * (i + 0.5) / n;
         put_pair(prober, i, at, normal, beside_m);
     }
-    prober->probe->cast(prober->probe->ctx, 2 * n, prober->dx, prober->dy, prober->dz, prober->range_m);
+    prober->probe->cast(prober->probe->ctx, 2 * n, prober->dx, prober->dy, prober->dz, prober->range_m, prober->kind);
     for (uint32_t i = 0; i < n; i++) {
         for (int k = 0; k < 3; k++)
             at[k] = p[k] + e[k] * (i + 0.5) / n;
-        seen[i] = is_step(prober->range_m[2 * i], prober->range_m[2 * i + 1], sqrt(vec3_dot(at, at)), beside_m);
+        int same = prober->kind[2 * i] == prober->kind[2 * i + 1];
+        seen[i] = is_step(prober->range_m[2 * i], prober->range_m[2 * i + 1], same, sqrt(vec3_dot(at, at)), beside_m);
     }
     for (uint32_t i = 0; i < n; i++) /* and a part on either side */
         prober->counts[i] = (uint8_t)(seen[i] | (i > 0 ? seen[i - 1] : 0) | (i + 1 < n ? seen[i + 1] : 0));

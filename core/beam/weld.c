@@ -1,8 +1,9 @@
 /* Which edges of a mesh are outlines, seen from a station.
  *
  * An edge and the station span a plane. With triangles on both sides of it, the surface goes on beyond the edge,
- * without a step in range; with triangles on one side only, it ends there. That needs neither normals nor an order of
- * corners. Corners at the same place, bit by bit, are one. */
+ * without a step in range; with triangles on one side only, it ends there, and where those on both sides are of
+ * different kinds, one kind does. That needs neither normals nor an order of corners. Corners at the same place, bit by
+ * bit, are one. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,7 +12,7 @@
 #include "core/rng.h"
 #include "core/vec3.h"
 
-enum { NONE = 0xffffffff };
+enum { NONE = 0xffffffff, TWO_KINDS = 4 };
 
 struct slot {
     uint32_t low, high; /* corners; low NONE: free */
@@ -22,7 +23,9 @@ struct weld {
     const double *station_m;
     uint32_t *same; /* [n_vertices] the first vertex at the same place */
     struct slot *slot;
-    uint8_t *sides; /* of a slot: 1 and 2 */
+    uint8_t *sides; /* of a slot: 1 and 2; 4: of two kinds */
+    const uint16_t *kind;
+    uint16_t *of; /* of a slot: kind of its first triangle; NULL: nobody asks */
     uint64_t mask;
 };
 
@@ -108,7 +111,12 @@ static void add_triangles(struct weld *w)
         for (int i = 0; i < 3; i++) {
             uint32_t a = v[i], b = v[(i + 1) % 3], low = a < b ? a : b, high = a < b ? b : a;
             uint64_t at = find_edge(w, low, high);
-            w->sides[at] |= side_of(w, low, high, v[(i + 2) % 3]);
+            uint8_t before = w->sides[at], side = side_of(w, low, high, v[(i + 2) % 3]);
+            w->sides[at] = before | side;
+            if (w->of == NULL || side == 0) continue;
+            uint16_t kind = w->kind[w->scene->label[t]];
+            if (before == 0) w->of[at] = kind;
+            if (w->of[at] != kind) w->sides[at] |= TWO_KINDS;
         }
     }
 }
@@ -139,15 +147,16 @@ static int collect(const struct weld *w, struct outline_edge **edge, uint32_t *n
     return SH_OK;
 }
 
-int outline_find(const struct scene *scene, const double station_m[3], struct outline_edge **edge, uint32_t *n,
-                 uint64_t *n_edges, struct sh_err *err)
+int outline_find(const struct scene *scene, const double station_m[3], const uint16_t *kind, struct outline_edge **edge,
+                 uint32_t *n, uint64_t *n_edges, struct sh_err *err)
 {
-    struct weld w = {.scene = scene, .station_m = station_m};
+    struct weld w = {.scene = scene, .station_m = station_m, .kind = kind};
     uint64_t size = power_of_two(4 * (uint64_t)scene->n_triangles);
     w.mask = size - 1;
     w.slot = malloc(size * sizeof *w.slot);
     w.sides = calloc(size, 1);
-    int rc = w.slot == NULL || w.sides == NULL
+    w.of = kind != NULL ? malloc(size * sizeof *w.of) : NULL;
+    int rc = w.slot == NULL || w.sides == NULL || (kind != NULL && w.of == NULL)
                  ? sh_fail(err, SH_ENOMEM, "beam: no memory for the edges of %u triangles", scene->n_triangles)
                  : same_vertices(&w, err);
     if (rc == SH_OK) {
@@ -158,5 +167,6 @@ int outline_find(const struct scene *scene, const double station_m[3], struct ou
     free(w.same);
     free(w.slot);
     free(w.sides);
+    free(w.of);
     return rc;
 }

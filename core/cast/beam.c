@@ -8,9 +8,6 @@
 #include "core/surface.h"
 #include "core/vec3.h"
 
-/* What one outline cuts off beyond this, in footprint radii, is 0.16 % of the energy: no echo, and on the mean of
- * ranges that become one echo less than 0.002 of the resolution. */
-#define RIM 0.96
 /* Pulses with fewer sub-rays than this share packets with their neighbours. */
 enum { ALONE = 64 };
 
@@ -124,7 +121,7 @@ static int plan_job(struct caster *c, const struct cast_setup *s, const struct o
     struct beam_parts parts;
     uint32_t lines =
         beam_find_lines(b->outlines, &b->beam, c->beam->cell[job->pulse], dir, limit_m, line, &job->next_m);
-    if (lines == known || (lines == 1 && line[0].h > RIM)) return 0;
+    if (lines == known) return 0;
     job->lines = lines;
     job->first = c->beam->pool.n;
     job->n = 0;

@@ -74,14 +74,23 @@ void kernel_directions_read(const struct cast_setup *setup, const double *mirror
                     n, dx, dy, dz, ex, ey, ez);
 }
 
+/* Embree tells a packet's directions apart by their signs, but takes what is smaller than 1e-18 for positive when it
+ * divides by it: with a component of -1e-22, all rays of that packet with its signs would be lost. So there are none.
+ */
+VEC_INLINE float direction_component(double d)
+{
+    float f = (float)d;
+    return f < 0.0f && f > -1e-15f ? 0.0f : f;
+}
+
 VEC_CLONES
 void kernel_to_float(const double *restrict dx, const double *restrict dy, const double *restrict dz, uint32_t n,
                      float *restrict fx, float *restrict fy, float *restrict fz)
 {
     for (uint32_t i = 0; i < n; i++) {
-        fx[i] = (float)dx[i];
-        fy[i] = (float)dy[i];
-        fz[i] = (float)dz[i];
+        fx[i] = direction_component(dx[i]);
+        fy[i] = direction_component(dy[i]);
+        fz[i] = direction_component(dz[i]);
     }
 }
 

@@ -3,6 +3,7 @@
 #include <fnmatch.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "core/vecmath.h"
 
@@ -58,6 +59,32 @@ int surface_table_set(struct surface_table *table, uint32_t label, const struct 
     table->has_mirror |= s->mirror > 0.0;
     table->has_optics |= s->glass > 0.0 || s->mirror > 0.0;
     return found;
+}
+
+struct named_surface {
+    struct surface surface; /* first: compared */
+    uint32_t label;
+};
+
+static int by_surface(const void *a, const void *b)
+{
+    return memcmp(a, b, sizeof(struct surface));
+}
+
+int surface_kinds(const struct surface_table *table, uint16_t *kind, struct sh_err *err)
+{
+    struct named_surface *all = calloc(table->n + 1, sizeof *all);
+    uint16_t kinds = 0;
+    if (all == NULL) return sh_fail(err, SH_ENOMEM, "surfaces: no memory for %u of them", table->n);
+    for (uint32_t i = 0; i < table->n; i++)
+        all[i] = (struct named_surface){table->surface[i], i};
+    qsort(all, table->n, sizeof *all, by_surface);
+    for (uint32_t i = 0; i < table->n; i++) {
+        kinds = (uint16_t)(kinds + (i > 0 && by_surface(&all[i - 1], &all[i]) != 0));
+        kind[all[i].label] = kinds;
+    }
+    free(all);
+    return SH_OK;
 }
 
 enum { FIELDS = sizeof(struct surface) / sizeof(double) };

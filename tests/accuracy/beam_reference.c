@@ -203,7 +203,8 @@ int beam_rig_open(struct beam_rig *rig, struct scene *scene, const double statio
     if (rc == SH_OK) rc = caster_create(&rig->caster, err);
     if (rc == SH_OK) rc = line_block_alloc(&rig->block, view->pulses * LINE_MAX_ECHOES, err);
     if (rc == SH_OK)
-        rc = cast_outlines(scene, rig->bvh, station_m, &rig->beam.beam, rig->setup.range_max_m, &rig->outlines, err);
+        rc = cast_outlines(scene, rig->bvh, station_m, &rig->beam.beam, rig->setup.range_max_m, NULL, &rig->outlines,
+                           err);
     rig->setup.bvh = rig->bvh;
     rig->setup.georef = rig->georef;
     rig->beam.outlines = rig->outlines;
