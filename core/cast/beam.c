@@ -334,9 +334,10 @@ static void run_jobs(struct caster *c, const struct cast_setup *s, const struct 
 static int is_full(const struct beam_work *w, uint32_t pulse, uint32_t most)
 {
     _Static_assert(SCHEDULE_PACKET * (MAX_PASSES * BEAM_MAX_PARTS + BEAM_MAX_SUBRAYS) <= POOL, "room for a packet");
-    uint32_t jobs = w->n_jobs + SCHEDULE_PACKET;
+    const uint32_t near = 8 * CHUNK; /* what stays in a cache, where that is enough */
+    uint32_t jobs = w->n_jobs + SCHEDULE_PACKET, room = 2 * SCHEDULE_PACKET * most > near ? POOL : near;
     if (w->n_jobs == 0 || together(w->job[w->n_jobs - 1].pulse, pulse)) return 0;
-    return jobs > MAX_JOBS || jobs * most > POOL;
+    return jobs > MAX_JOBS || jobs * most > room;
 }
 
 /* The centre of an adaptive beam meets glass or a mirror. */
