@@ -8,9 +8,6 @@
 #include "core/surface.h"
 #include "core/vec3.h"
 
-/* What one outline cuts off beyond this, in footprint radii, is 0.3 % of the energy: no echo, and on the mean of ranges
- * that become one echo less than 0.003 of the resolution. */
-#define RIM 0.945
 /* Pulses with fewer sub-rays than this share packets with their neighbours. */
 enum { ALONE = 64 };
 
@@ -124,7 +121,7 @@ static int plan_job(struct caster *c, const struct cast_setup *s, const struct o
     struct beam_parts parts;
     uint32_t lines =
         beam_find_lines(b->outlines, &b->beam, c->beam->cell[job->pulse], dir, limit_m, line, &job->next_m);
-    if (lines == known || (lines == 1 && line[0].h > RIM)) return 0;
+    if (lines == known) return 0;
     job->lines = lines;
     job->first = c->beam->pool.n;
     job->n = 0;
@@ -337,9 +334,10 @@ static void run_jobs(struct caster *c, const struct cast_setup *s, const struct 
 static int is_full(const struct beam_work *w, uint32_t pulse, uint32_t most)
 {
     _Static_assert(SCHEDULE_PACKET * (MAX_PASSES * BEAM_MAX_PARTS + BEAM_MAX_SUBRAYS) <= POOL, "room for a packet");
-    uint32_t jobs = w->n_jobs + SCHEDULE_PACKET;
+    const uint32_t near = 8 * CHUNK; /* what stays in a cache, where that is enough */
+    uint32_t jobs = w->n_jobs + SCHEDULE_PACKET, room = 2 * SCHEDULE_PACKET * most > near ? POOL : near;
     if (w->n_jobs == 0 || together(w->job[w->n_jobs - 1].pulse, pulse)) return 0;
-    return jobs > MAX_JOBS || jobs * most > POOL;
+    return jobs > MAX_JOBS || jobs * most > room;
 }
 
 /* The centre of an adaptive beam meets glass or a mirror. */

@@ -18,10 +18,10 @@ static int by_range(const void *a, const void *b)
 }
 
 /* Equal energies: the i-th of n lies where (i + 1/2) / n of the energy is inside of it. */
-static void spiral(double (*place)[2])
+static void spiral(double (*place)[2], int n)
 {
-    for (int i = 0; i < BEAM_REF_RAYS; i++) {
-        double inside = (i + 0.5) / BEAM_REF_RAYS * (1.0 - exp(-2.0));
+    for (int i = 0; i < n; i++) {
+        double inside = (i + 0.5) / n * (1.0 - exp(-2.0));
         double r = sqrt(-0.5 * log(1.0 - inside)), phi = i * M_PI * (3.0 - sqrt(5.0));
         place[i][0] = r * cos(phi);
         place[i][1] = r * sin(phi);
@@ -59,39 +59,59 @@ static uint32_t strongest_label(const struct met *m, uint32_t n)
     return best;
 }
 
+/* A pulse's sub-rays: from where, and to where. */
+struct rays {
+    double p[3][BEAM_REF_RAYS], d[3][BEAM_REF_RAYS], range_m[BEAM_REF_RAYS];
+    uint32_t triangle[BEAM_REF_RAYS];
+};
+
+static void cast_places(struct caster *c, const struct bvh *bvh, const struct beam *beam, const double station_m[3],
+                        const double dir[3], double range_max_m, uint32_t n, double (*place)[2], struct rays *rays)
+{
+    double e1[3], e2[3];
+    across(dir, e1, e2);
+    for (uint32_t i = 0; i < n; i++) {
+        double length = 0.0, x = place[i][0], y = place[i][1];
+        for (int k = 0; k < 3; k++) {
+            rays->p[k][i] = station_m[k] + beam->exit_radius_m * (x * e1[k] + y * e2[k]);
+            rays->d[k][i] = dir[k] + beam->slope * (x * e2[k] - y * e1[k]);
+            length += rays->d[k][i] * rays->d[k][i];
+        }
+        for (int k = 0; k < 3; k++)
+            rays->d[k][i] /= sqrt(length);
+    }
+    const struct origins from = {.px = rays->p[0], .py = rays->p[1], .pz = rays->p[2]};
+    caster_hits_from(c, bvh, &from, range_max_m, n, rays->d[0], rays->d[1], rays->d[2], rays->range_m, rays->triangle);
+}
+
 void beam_ref_pulse(struct caster *c, const struct bvh *bvh, const struct beam *beam, const double station_m[3],
                     const double dir[3], double range_max_m, struct beam_ref *out)
 {
     enum { N = BEAM_REF_RAYS };
     static double place[N][2];
+    static struct rays rays;
     static int known;
-    double p[3][N], d[3][N], range_m[N], e1[3], e2[3];
-    uint32_t triangle[N], n = 0;
+    uint32_t n = 0;
     struct met met[N];
-    if (!known) spiral(place);
+    if (!known) spiral(place, N);
     known = 1;
-    across(dir, e1, e2);
-    for (int i = 0; i < N; i++) {
-        double length = 0.0, x = place[i][0], y = place[i][1];
-        for (int k = 0; k < 3; k++) {
-            p[k][i] = station_m[k] + beam->exit_radius_m * (x * e1[k] + y * e2[k]);
-            d[k][i] = dir[k] + beam->slope * (x * e2[k] - y * e1[k]);
-            length += d[k][i] * d[k][i];
-        }
-        for (int k = 0; k < 3; k++)
-            d[k][i] /= sqrt(length);
-    }
-    const struct origins from = {.px = p[0], .py = p[1], .pz = p[2]};
-    caster_hits_from(c, bvh, &from, range_max_m, N, d[0], d[1], d[2], range_m, triangle);
+    cast_places(c, bvh, beam, station_m, dir, range_max_m, N, place, &rays);
     for (int i = 0; i < N; i++)
-        if (!isnan(range_m[i])) met[n++] = (struct met){range_m[i], bvh->scene->label[triangle[i]]};
-    qsort(met, n, sizeof *met, by_range);
+        if (!isnan(rays.range_m[i])) met[n++] = (struct met){rays.range_m[i], bvh->scene->label[rays.triangle[i]]};
+    double least = INFINITY, most = -INFINITY;
+    for (uint32_t i = 0; i < n; i++) {
+        least = fmin(least, met[i].range_m);
+        most = fmax(most, met[i].range_m);
+    }
+    int together = most - least <= beam->resolution_m; /* one echo, in whatever order */
+    if (!together) qsort(met, n, sizeof *met, by_range);
     memset(out, 0, sizeof *out);
     out->partial = n < N;
-    out->spread_m = n > 0 ? met[n - 1].range_m - met[0].range_m : 0.0;
+    out->spread_m = n > 0 ? most - least : 0.0;
     for (uint32_t i = 0, end; i < n; i = end) {
         double sum = 0.0;
-        for (end = i; end < n && (end == i || met[end].range_m - met[end - 1].range_m <= beam->resolution_m); end++)
+        for (end = i;
+             end < n && (together || end == i || met[end].range_m - met[end - 1].range_m <= beam->resolution_m); end++)
             sum += met[end].range_m;
         if ((end - i) < BEAM_LEAST_ENERGY * N) {
             out->partial = 1;
@@ -127,6 +147,51 @@ double beam_ref_plane_mean(const struct beam *beam, const double dir[3], const d
         }
     }
     return (double)(sum / all);
+}
+
+int beam_ref_plain(const struct beam_rig *rig, const double dir[3], struct beam_ref *out)
+{
+    enum { INSIDE = 80, RIM = 48, N = INSIDE + RIM };
+    static double place[N][2];
+    static struct rays rays;
+    static int known;
+    double least = INFINITY, most = -INFINITY, sum = 0.0;
+    if (!known) spiral(place, INSIDE);
+    for (int i = INSIDE; i < N && !known; i++) {
+        place[i][0] = 0.93 * cos(2.0 * M_PI * i / RIM);
+        place[i][1] = 0.93 * sin(2.0 * M_PI * i / RIM);
+    }
+    known = 1;
+    cast_places(rig->caster, rig->bvh, &rig->beam.beam, rig->setup.station_m, dir, rig->setup.range_max_m, N, place,
+                &rays);
+    for (int i = 0; i < N; i++) {
+        if (isnan(rays.range_m[i])) return 0;
+        least = fmin(least, rays.range_m[i]);
+        most = fmax(most, rays.range_m[i]);
+        sum += i < INSIDE ? rays.range_m[i] : 0.0;
+    }
+    if (most - least > 0.005) return 0;
+    *out = (struct beam_ref){.n = 1, .echo = {{sum / INSIDE, 1.0, rig->scene->label[rays.triangle[0]]}}};
+    out->spread_m = most - least;
+    return 1;
+}
+
+void beam_compare(struct beam_tally *t, const struct line_block *b, uint32_t *at, const struct beam_ref *ref)
+{
+    uint32_t first = *at, n = b->echo[first] >> 4;
+    int mixed = ref->n > 1 || ref->partial;
+    *at += n == 0 ? 1 : n;
+    t->pulses++;
+    t->mixed += (uint64_t)mixed;
+    t->wrong += n != ref->n;
+    t->wrong_mixed += n != ref->n && mixed;
+    for (uint32_t k = 0; k < n && n == ref->n; k++) {
+        double d = 1e-6 * b->a[first + k] - ref->echo[k].range_m;
+        t->range2 += d * d;
+        t->near2 += fabs(d) < 0.6 ? d * d : 0.0;
+        t->off += fabs(d) >= 0.6;
+        t->echoes++;
+    }
 }
 
 int beam_rig_open(struct beam_rig *rig, struct scene *scene, const double station_m[3], const struct beam_view *view,
