@@ -98,7 +98,7 @@ static void open_session(struct pump *pump, struct session *s, const char *peer)
     s->out_len = s->out_pos = s->reply_len = s->in_len = s->in_pos = 0;
     s->moved_ns = clock_now_ns();
     memset(&s->lines, 0, sizeof s->lines);
-    snprintf(s->peer, sizeof s->peer, "%s", peer);
+    snprintf(s->peer, sizeof s->peer, "%.63s", peer); /* an address: shorter */
     set_active(pump, s, 1);
 }
 
