@@ -10,11 +10,6 @@ fi
 head_stop
 check "socket pair: gone with the head" wait_for 10 is_unplugged
 records_only && return
-head_start "{type: usb, attach: on, speed: super}" --pace fast
-check_enumeration "socket pair, super" 1024
-record_again "socket pair, super"
-head_stop
-note "super at $(uptime_s) s"
 head_start "{type: usb, attach: on}" --set head.prr_hz=4000 --set loop.tick_hz=100
 wait_for 10 is_plugged
 echo "echo 0 >$vhci/detach" >unplug.sh

@@ -24,3 +24,9 @@ check_enumeration "TCP, full" 64
 record_again "TCP, full"
 head_stop
 note "full at $(uptime_s) s"
+check "TCP, full: gone with the head" wait_for 10 is_unplugged
+head_start "{type: usb, attach: on, speed: super}" --pace fast
+check_enumeration "socket pair, super" 1024
+record_again "socket pair, super"
+head_stop
+note "super at $(uptime_s) s"
