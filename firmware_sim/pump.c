@@ -224,12 +224,13 @@ static int take_tick(struct pump *pump, struct session *s)
         return 1;
     }
     s->cursor++;
-    if (got != RING_READ || n_frames == 0) return 1;
+    if (got != RING_READ) return 1;
+    /* An empty tick tells, too: what is lost may have been the last frames for long. */
     if (s->have_seq && first_seq != s->next_seq)
         say_lost(pump, s, first_seq - s->next_seq);
     else if (released - s->cursor < loop->ring.queue_ticks / 8)
         s->lagging = 0;
-    s->have_seq = 1;
+    s->have_seq |= n_frames != 0;
     s->next_seq = first_seq + n_frames;
     memmove(s->out + s->out_len, s->out + at, len);
     s->out_len += len;

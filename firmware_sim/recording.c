@@ -8,9 +8,10 @@
 #include "firmware_sim/clock.h"
 #include "firmware_sim/head.h"
 
-enum { REPLY_MS = 5000, NEXT_MS = 250, END_MS = 5000, BOOT_MS = 30000, REPLUG_MS = 1000 };
+enum { REPLY_MS = 5000, NEXT_MS = 250, END_MS = 5000, BOOT_MS = 30000, REPLUG_MS = 1000, SILENT_MS = 2000 };
 
 struct recording {
+    int64_t heard_ns; /* when pulses came last, or the head was asked why none do */
     struct scanhead *sh;
     const struct recording_options *o;
     struct recording_result *result;
@@ -120,7 +121,10 @@ static int step(struct recording *r, int timeout_ms, struct sh_err *err)
     if ((rc == SCANHEAD_ELOST || rc == SCANHEAD_ECLOSED) && r->o->replug_s > 0.0) return replug(r, err);
     if (rc != SCANHEAD_OK) return sh_fail(err, rc, "%s", scanhead_error(r->sh));
     look_at(r, &frame);
-    if (frame.type == SCANHEAD_POINTS) count_points(r, &frame);
+    if (frame.type == SCANHEAD_POINTS) {
+        r->heard_ns = clock_now_ns();
+        count_points(r, &frame);
+    }
     int64_t into_ns = frame.t_ns - r->scan_t0_ns;
     if (r->o->duration_s > 0.0 && r->scan_t0_ns >= 0 && (double)into_ns >= 1e9 * r->o->duration_s) r->stopping = 1;
     rc = r->o->frame(r->o->ctx, r->sh, &frame, err);
@@ -161,10 +165,25 @@ static int stop_scan(struct recording *r, struct sh_err *err)
     return SH_OK;
 }
 
+/* No pulses have come for a while: frames that a slow reader lost may have held the scan's end. */
+static int look_for_end(struct recording *r, struct sh_err *err)
+{
+    struct scanhead_stats stats;
+    char reply[512];
+    scanhead_get_stats(r->sh, &stats);
+    if (stats.seq_lost + stats.reader_lost == 0) return SH_OK;
+    int rc = command(r, "HEAD:STAT?", reply, sizeof reply, err);
+    if (rc != SH_OK || strcmp(reply, "idle") != 0) return rc;
+    sh_warn(r->o->report, "the scan's end was lost; the head is idle");
+    r->scan_started = r->scan_over = 1;
+    return SH_OK;
+}
+
 static int follow(struct recording *r, struct sh_err *err)
 {
     int64_t end_ns = INT64_MAX;
     int asked = 0;
+    r->heard_ns = clock_now_ns();
     while (!r->scan_over) {
         if (is_interrupted(r)) r->stopping = 1;
         if (r->stopping && r->o->listen) return SH_OK;
@@ -178,6 +197,10 @@ static int follow(struct recording *r, struct sh_err *err)
             return sh_fail(err, SH_ETIMEOUT, "the head did not end the scan within %d s", END_MS / 1000);
         int rc = step(r, NEXT_MS, err);
         if (rc < 0) return rc;
+        if (clock_now_ns() - r->heard_ns < (int64_t)SILENT_MS * 1000000) continue;
+        rc = look_for_end(r, err);
+        if (rc != SH_OK) return rc;
+        r->heard_ns = clock_now_ns();
     }
     return r->scan_started || r->stopping || r->o->listen
                ? SH_OK

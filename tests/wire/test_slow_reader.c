@@ -174,11 +174,41 @@ static void test_fast(void **state)
     assert_int_equal(stats_uint(wire, "reader_lost_frames"), 0);
 }
 
+/* A recorder that stands still until the scan is over has lost its end, after which a head says nothing by itself: it
+ * is told the loss, asks, and ends. */
+static void test_end_lost(void **state)
+{
+    struct wire *wire = *state;
+    struct room_config config = RATE;
+    struct scanhead_frame frame;
+    config.frames = 1;
+    config.pan_stop_deg = 270; /* 3 s, 60 MB: more than the buffers between */
+    config.more = "loop: {queue_ms: 50, late_ms: 10000}\n";
+    room_write(wire);
+    struct head head = head_start(wire, room_config_write(wire, &config), NULL);
+    struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
+    const char *const args[] = {"record", head_endpoint(&head, "tcp"), "--quiet", "--stats", "/dev/null", NULL};
+    pid_t pid = wire_spawn(wire, args, "record.out", "record.err", -1);
+    client_until(sh, SCANHEAD_EV_SCAN_START, &frame);
+    assert_int_equal(kill(pid, SIGSTOP), 0);
+    client_until(sh, SCANHEAD_EV_SCAN_END, &frame);
+    client_wait_state(sh, "idle");
+    assert_int_equal(kill(pid, SIGCONT), 0);
+    assert_int_equal(wire_wait(wire, pid), 1);
+    char *said = wire_read(wire_path(wire, "record.err"), NULL);
+    assert_non_null(strstr(said, "the scan's end was lost"));
+    assert_non_null(strstr(said, "frames lost to this reader"));
+    free(said);
+    scanhead_close(sh);
+    head_end(&head, SIGTERM);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_realtime, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_fast, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_end_lost, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
