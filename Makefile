@@ -194,7 +194,7 @@ chart: deps-build
 	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)'" tests/bench/chart.gp
 objects: $(EVERYTHING)
 test-unit-programs: $(UNIT)
-test-programs: all $(TESTS)
+test-programs: all $(TESTS) $(CHARTS) $(BUILD)/tests/bench/plain
 
 install: all
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib $(DESTDIR)$(PREFIX)/include $(DESTDIR)$(HEADS_DIR) \

@@ -97,7 +97,7 @@ static int open_run(struct run *r, const struct plain_case *c, const char *hall,
     int rc = config_load("config/demo.yaml", set, n, r->cfg, err);
     if (rc == SH_OK) rc = site_load(r->cfg, NULL, &r->site, err);
     if (rc == SH_OK) rc = caster_create(&r->caster, err);
-    if (rc == SH_OK) rc = line_block_alloc(&r->block, BENCH_LINE_PULSES * config_points_per_pulse(r->cfg), err);
+    if (rc == SH_OK) rc = line_block_alloc(&r->block, BENCH_LINE_PULSES * site_points_per_pulse(r->site), err);
     if (rc == SH_OK) rc = bench_rays_create(LINES, &r->rays, err);
     if (rc != SH_OK) return rc;
     site_cast_setup(r->site, STATION, &r->setup);
