@@ -287,6 +287,21 @@ int config_beam_fixed(const struct config *cfg)
     return !config_moves(cfg) && cfg->instrument.transit_offset_m == 0.0 && cfg->instrument.mirror_offset_m == 0.0;
 }
 
+static const double LEAST_PULSE_NS = 0.1; /* 15 mm of range */
+
+/* Sub-rays that meet one oblique surface have ranges apart: with hardly a range resolution each would be an echo, or,
+ * too weak for one, lost. */
+static int check_pulse_width(const struct cfg_reader *rd, const struct config *cfg)
+{
+    const struct config_profile *p = &cfg->profile;
+    const int footprint = p->beam_exit_m != 0.0 || p->beam_divergence_rad != 0.0;
+    if (cfg->beam_mode == BEAM_SINGLE || !footprint || p->pulse_width_ns >= LEAST_PULSE_NS) return SH_OK;
+    return cfg_fail_key(rd, "beam.mode", 0,
+                        "pulse_width_ns of head profile %s is %.10g: too short to tell the echoes of a footprint; "
+                        "allowed single, or a pulse_width_ns of at least %.10g",
+                        p->name, p->pulse_width_ns, LEAST_PULSE_NS);
+}
+
 /* Outlines are those that are seen from one place. */
 static int check_beam(const struct cfg_reader *rd, const struct config *cfg)
 {
@@ -347,6 +362,7 @@ int cfg_check(const struct cfg_reader *rd, struct config *cfg)
     for (uint32_t i = 0; i < cfg->n_links && code == SH_OK; i++)
         code = check_link(rd, cfg, i);
     if (code == SH_OK) code = check_beam(rd, cfg);
+    if (code == SH_OK) code = check_pulse_width(rd, cfg);
     if (code == SH_OK) code = check_loop(rd, cfg);
     if (code == SH_OK) code = check_time(rd, cfg);
     if (code == SH_OK) code = cfg_check_signal(rd, cfg);

@@ -129,17 +129,18 @@ static int name_ghosts(struct site *site, struct sh_err *err)
                        "%s: surfaces: %u surfaces and a mirror: each needs a second label for its ghost; "
                        "allowed up to %d",
                        site->cfg->file, n, SCENE_MAX_SURFACES / 2);
-    d->ghost = calloc(n, sizeof *d->ghost);
-    if (d->ghost == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the names of ghosts");
+    struct scene_surface *ghost = calloc(n, sizeof *ghost);
+    if (ghost == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the names of ghosts");
     for (uint32_t i = 0; i < n; i++) {
         const struct scene_surface *of = site_surface(site, i);
         int room = SCENE_NAME_LEN - (int)sizeof GHOST, len = (int)strlen(of->object);
         if (len > room)
             for (len = room; len > 0 && ((unsigned char)of->object[len] & 0xc0) == 0x80;)
                 len--; /* between two characters of UTF-8 */
-        d->ghost[i] = *of;
-        snprintf(d->ghost[i].object, SCENE_NAME_LEN, "%s%.*s", GHOST, len, of->object);
+        ghost[i] = *of;
+        snprintf(ghost[i].object, SCENE_NAME_LEN, "%s%.*s", GHOST, len, of->object);
     }
+    d->ghost = ghost; /* from here on site_surface tells them from the others */
     d->n_real = n;
     site->n_surfaces = 2 * n;
     return SH_OK;
