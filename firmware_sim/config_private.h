@@ -26,7 +26,7 @@ enum cfg_type {
 
 enum cfg_flags {
     CFG_FIGURE = 1, /* written { value: V, from: data sheet|assumed } */
-    CFG_HEX = 4,    /* may be written 0x1209 */
+    CFG_HEX = 4,    /* written 0x1209, and only so: 1209 is read both ways */
     CFG_ASCII = 2,  /* goes into *IDN?: printable ASCII without comma and quotes */
 };
 

@@ -157,8 +157,9 @@ static int store_whole(const struct place *at, void *dst, const char *text)
     const struct cfg_key *key = at->key;
     int decimals = key->type == CFG_MICRO ? 6 : 0;
     __int128 value, unit = key->type == CFG_MICRO ? 1000000 : 1;
-    switch (key->flags & CFG_HEX && text[0] == '0' && text[1] == 'x' ? parse_hex(text + 2, &value)
-                                                                     : cfg_parse_decimal(text, decimals, &value)) {
+    const int is_hex = (key->flags & CFG_HEX) != 0;
+    if (is_hex && strncmp(text, "0x", 2) != 0) return refuse(at, text, "without 0x");
+    switch (is_hex ? parse_hex(text + 2, &value) : cfg_parse_decimal(text, decimals, &value)) {
     case CFG_NOT_A_NUMBER:
         return refuse(at, text, "not a number");
     case CFG_TOO_FINE:

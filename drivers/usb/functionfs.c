@@ -56,6 +56,7 @@ static int functionfs_open(const struct usb_backend_spec *spec, struct usb_devic
     if (rc == SH_OK) rc = ffs_pipes_open(&self->pipes, device, &self->gadget, err);
     if (rc == SH_OK) rc = ffs_console_open(&self->console, device, self->gadget.tty_number, err);
     if (rc == SH_OK) rc = gadget_bind(&self->gadget, spec->udc, err);
+    if (rc == SH_OK) rc = gadget_check_rate(&self->gadget, usb_device_identity(device)->highest, err);
     if (rc != SH_OK) {
         take_apart(self);
         return rc;

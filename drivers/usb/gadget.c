@@ -14,6 +14,8 @@
 
 static const char GADGETS[] = "/sys/kernel/config/usb_gadget", CONTROLLERS[] = "/sys/class/udc";
 static const char PREFIX[] = "scanhead-";
+static const char *const rate_names[] = {
+    [USB_RATE_FULL] = "full", [USB_RATE_HIGH] = "high", [USB_RATE_SUPER] = "super"};
 
 /* ---- configfs */
 
@@ -207,10 +209,9 @@ static int make_named_dir(struct gadget *gadget, struct sh_err *err)
 
 static int write_identity(const struct gadget *gadget, const struct usb_model *model, const struct usb_identity *id)
 {
-    static const char *const speed[] = {
-        [USB_RATE_FULL] = "full-speed", [USB_RATE_HIGH] = "high-speed", [USB_RATE_SUPER] = "super-speed"};
     const char *dir = gadget->dir;
-    if (write_text(dir, "max_speed", "%s", speed[id->highest]) != 0 && errno != ENOENT) return -1; /* since 5.12 */
+    if (write_text(dir, "max_speed", "%s-speed", rate_names[id->highest]) != 0 && errno != ENOENT)
+        return -1; /* since 5.12 */
     return write_text(dir, "idVendor", "0x%04x", id->vid) | write_text(dir, "idProduct", "0x%04x", id->pid) |
            write_text(dir, "bcdUSB", "0x0210") | write_text(dir, "bcdDevice", "0x%04x", model->bcd_device) |
            write_text(dir, "bDeviceClass", "0x%02x", model->class) |
@@ -327,14 +328,27 @@ int gadget_bind(struct gadget *gadget, const char *udc, struct sh_err *err)
     return sh_fail(err, SH_EIO, "functionfs: device controller %s: %s", udc, strerror(errno));
 }
 
-enum usb_rate gadget_rate(const struct gadget *gadget)
+static enum usb_rate read_rate(const struct gadget *gadget, const char *file)
 {
     char dir[320], text[32] = "";
     snprintf(dir, sizeof dir, "%s/%s", CONTROLLERS, gadget->udc);
-    read_text(dir, "current_speed", text, sizeof text);
+    read_text(dir, file, text, sizeof text);
     return strncmp(text, "super", 5) == 0  ? USB_RATE_SUPER
            : strncmp(text, "high", 4) == 0 ? USB_RATE_HIGH
                                            : USB_RATE_FULL;
+}
+
+enum usb_rate gadget_rate(const struct gadget *gadget)
+{
+    return read_rate(gadget, "current_speed");
+}
+
+int gadget_check_rate(const struct gadget *gadget, enum usb_rate wanted, struct sh_err *err)
+{
+    const enum usb_rate fastest = read_rate(gadget, "maximum_speed");
+    if (fastest >= wanted) return SH_OK;
+    return sh_fail(err, SH_EINPUT, "functionfs: device controller %s does not reach %s speed; allowed %s%s",
+                   gadget->udc, rate_names[wanted], fastest == USB_RATE_FULL ? "" : "full, ", rate_names[fastest]);
 }
 
 void gadget_unbind(struct gadget *gadget)

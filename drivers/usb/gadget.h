@@ -30,7 +30,10 @@ int gadget_create(struct gadget *gadget, const struct usb_model *model, const st
 int gadget_describe(const struct gadget *gadget, int ep0, const struct usb_identity *id, struct sh_err *err);
 /* Plugs in: udc, or the first free controller where that is empty. */
 int gadget_bind(struct gadget *gadget, const char *udc, struct sh_err *err);
+/* Of the bus it is on. */
 enum usb_rate gadget_rate(const struct gadget *gadget);
+/* SH_EINPUT: the controller it is bound to is not as fast. */
+int gadget_check_rate(const struct gadget *gadget, enum usb_rate wanted, struct sh_err *err);
 void gadget_unbind(struct gadget *gadget);
 /* After ep0 and the endpoints are closed. */
 void gadget_remove(struct gadget *gadget);

@@ -129,6 +129,7 @@ static void welcome(struct usbip *self)
         int fd = accept4(self->listener, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
         if (fd < 0) return;
         socket_tune(fd);
+        socket_tune_impatient(fd); /* a kernel; and as long as it seems to be there, no other host gets the device */
         setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &size, sizeof size);
         struct usbip_conn *conn = make_room(self);
         usbip_conn_start(conn, fd, self->device, &self->taken);

@@ -212,6 +212,7 @@ static const struct bad bad[] = {
     {"type: tcp", "type: usb\n    vid: 0x0", 15, "links[0].vid", "0x0001 to 0xffff"},
     {"type: tcp", "type: usb\n    vid: 0x10000", 15, "links[0].vid", "0x0001 to 0xffff"},
     {"type: tcp", "type: usb\n    pid: 0xg", 15, "links[0].pid", "not a number"},
+    {"type: tcp", "type: usb\n    vid: 1209", 15, "links[0].vid", "\"1209\" is without 0x; allowed 0x0001 to 0xffff"},
     {"type: tcp", "type: usb\n    attach: on", 15, "links[0].attach", "allowed without port and address"},
     {"type: tcp", "type: usb\n    path: /tmp/x", 15, "links[0].path", "the back end usbip has no such key"},
     {"type: tcp\n    port: 0", "type: usb\n    backend: usbredir", 15, "links[0].backend", "with one of them"},
