@@ -83,7 +83,7 @@ static int known_centre(const struct caster *c, const struct cast_setup *s, cons
 }
 
 int beam_plan_job(struct caster *c, const struct cast_setup *s, const struct origins *from, struct job *job,
-                    double limit_m, uint32_t known)
+                  double limit_m, uint32_t known)
 {
     const struct cast_beam *b = s->beam;
     const double dir[3] = {c->dx[job->pulse], c->dy[job->pulse], c->dz[job->pulse]};
