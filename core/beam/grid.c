@@ -7,14 +7,20 @@
 #include "core/vec3.h"
 #include "core/vecmath.h"
 
-enum { N_CELLS = 6 * OUTLINE_CELLS * OUTLINE_CELLS };
+enum {
+    N_CELLS = 6 * OUTLINE_CELLS * OUTLINE_CELLS,
+    TOGETHER = 8, /* pulses on either side of one for which it is asked */
+};
 #define NEAREST_M 0.02 /* nearer than this, all directions are near each other */
 #define PIECE     0.1  /* the longest piece of an edge, by its distance */
+
+/* Count into first[c + 1]; write at first[c]++; mark in around. */
+enum draw_what { COUNT, FILL, AROUND };
 
 struct draw {
     struct beam_outlines *o;
     const struct beam *beam;
-    int fill; /* 0: count into first[c + 1]; 1: write at first[c]++ */
+    enum draw_what what;
     uint32_t edge;
     float normal[3]; /* of the edge's plane */
     uint64_t n;
@@ -29,8 +35,12 @@ struct stretches {
 static void put(struct draw *d, uint32_t cell, float range_m)
 {
     struct beam_outlines *o = d->o;
+    if (d->what == AROUND) {
+        o->around[cell / 32] |= 1U << cell % 32;
+        return;
+    }
     d->n++;
-    if (!d->fill) {
+    if (d->what == COUNT) {
         o->first[cell + 1]++;
         return;
     }
@@ -71,6 +81,7 @@ static void draw_piece(struct draw *d, const double p[3], const double q[3], dou
 {
     const double half = 0.5 * OUTLINE_CELLS;
     double angle = 1.02 * beam_radius(d->beam, range_m) / range_m + 1e-6;
+    if (d->what == AROUND) angle += 1.02 * OUTLINE_AROUND_RAD;
     for (uint32_t face = 0; face < 6; face++) {
         int axis = (int)face / 2, ua = (axis + 1) % 3, va = (axis + 2) % 3;
         double sign = face % 2 == 0 ? 1.0 : -1.0, zp = sign * p[axis], zq = sign * q[axis];
@@ -176,12 +187,13 @@ static void edge_normal(const struct outline_edge *edge, float normal[3])
         normal[i] = length > 0.0 ? (float)(n[i] / length) : 0.0f;
 }
 
-static uint64_t draw_all(struct beam_outlines *o, const struct beam *beam, const struct stretches *s, int fill)
+static uint64_t draw_all(struct beam_outlines *o, const struct beam *beam, const struct stretches *s,
+                         enum draw_what what)
 {
-    struct draw d = {.o = o, .beam = beam, .fill = fill};
+    struct draw d = {.o = o, .beam = beam, .what = what};
     for (size_t i = 0; i < s->n; i++) {
         d.edge = s->at[i].edge;
-        if (fill) edge_normal(&o->edge[d.edge], d.normal);
+        if (d.what == FILL) edge_normal(&o->edge[d.edge], d.normal);
         draw_piece(&d, s->at[i].p, s->at[i].q, nearest_on(s->at[i].p, s->at[i].q));
     }
     return d.n;
@@ -189,20 +201,21 @@ static uint64_t draw_all(struct beam_outlines *o, const struct beam *beam, const
 
 static int fill_cells(struct beam_outlines *o, const struct beam *beam, const struct stretches *s, struct sh_err *err)
 {
-    uint64_t n = draw_all(o, beam, s, 0);
+    uint64_t n = draw_all(o, beam, s, COUNT);
     if (n >= UINT32_MAX) return sh_fail(err, SH_EINPUT, "beam: too many outlines; beam.mode: rings does without them");
     for (uint32_t c = 0; c < N_CELLS; c++)
         o->first[c + 1] += o->first[c];
     o->entry = malloc((size_t)(n + 1) * sizeof *o->entry);
     if (o->entry == NULL) return sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");
-    draw_all(o, beam, s, 1);
+    draw_all(o, beam, s, FILL);
+    draw_all(o, beam, s, AROUND);
     memmove(o->first + 1, o->first, N_CELLS * sizeof *o->first); /* each stands at its end now */
     o->first[0] = 0;
     for (uint32_t c = 0; c < N_CELLS; c++)
         if (o->first[c + 1] - o->first[c] > 1)
             qsort(o->entry + o->first[c], o->first[c + 1] - o->first[c], sizeof *o->entry, by_range);
     o->info.entries = n;
-    o->info.bytes = n * sizeof *o->entry + N_CELLS * sizeof *o->first + N_CELLS / 8 + o->n_edges * sizeof *o->edge;
+    o->info.bytes = n * sizeof *o->entry + N_CELLS * sizeof *o->first + N_CELLS / 4 + o->n_edges * sizeof *o->edge;
     return SH_OK;
 }
 
@@ -223,7 +236,9 @@ int beam_outlines_create(const struct scene *scene, const double station_m[3], c
     prober->beam = beam;
     o->first = calloc(N_CELLS + 1, sizeof *o->first);
     o->any = calloc(N_CELLS / 32, sizeof *o->any);
-    int rc = o->first == NULL || o->any == NULL ? sh_fail(err, SH_ENOMEM, "beam: no memory") : SH_OK;
+    o->around = calloc(N_CELLS / 32, sizeof *o->around);
+    int rc =
+        o->first == NULL || o->any == NULL || o->around == NULL ? sh_fail(err, SH_ENOMEM, "beam: no memory") : SH_OK;
     if (rc == SH_OK) rc = outline_find(scene, station_m, kind, &o->edge, &o->n_edges, &o->info.edges, err);
     if (rc == SH_OK && find_stretches(o, prober, range_max_m * 1.01, &stretches) != SH_OK)
         rc = sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");
@@ -246,6 +261,7 @@ void beam_outlines_free(struct beam_outlines *o)
     free(o->edge);
     free(o->first);
     free(o->any);
+    free(o->around);
     free(o->entry);
     free(o);
 }
@@ -255,12 +271,82 @@ void beam_outlines_get_info(const struct beam_outlines *o, struct beam_outlines_
     *info = o->info;
 }
 
+/* Square of the longest way from one direction to the next. */
+VEC_CLONES
+static float longest_step2(const float *restrict dx, const float *restrict dy, const float *restrict dz, uint32_t n)
+{
+    uint32_t most = 0;
+    for (uint32_t i = 0; i + 1 < n; i++) {
+        float x = dx[i + 1] - dx[i], y = dy[i + 1] - dy[i], z = dz[i + 1] - dz[i], step2 = x * x + y * y + z * z;
+        uint32_t bits; /* in the order of the numbers, which are not negative */
+        memcpy(&bits, &step2, sizeof bits);
+        most = bits > most ? bits : most;
+    }
+    float longest;
+    memcpy(&longest, &most, sizeof longest);
+    return longest;
+}
+
 VEC_CLONES
 static void cells_of(const float *restrict dx, const float *restrict dy, const float *restrict dz, uint32_t n,
                      uint32_t *restrict cell)
 {
     for (uint32_t i = 0; i < n; i++)
         cell[i] = outline_cell(dx[i], dy[i], dz[i]);
+}
+
+/* Directions looked up together. */
+struct few {
+    float dx[BEAM_NEAR_MOST], dy[BEAM_NEAR_MOST], dz[BEAM_NEAR_MOST];
+    uint32_t cell[BEAM_NEAR_MOST];
+};
+
+static int is_set(const uint32_t *bits, uint32_t cell)
+{
+    return bits[cell / 32] >> cell % 32 & 1;
+}
+
+/* Pulses some way around which there are outlines: of so many at a time, that is asked of the middle one. */
+static uint32_t list_around(const struct beam_outlines *o, const float *dx, const float *dy, const float *dz,
+                            uint32_t n, struct few *few, uint32_t *pulse)
+{
+    const float reach = (float)OUTLINE_AROUND_RAD, step = sqrtf(longest_step2(dx, dy, dz, n)) + 1e-6f;
+    const uint32_t half = step * TOGETHER > reach ? (uint32_t)(reach / step) : TOGETHER, group = 2 * half + 1;
+    uint32_t found = 0, groups = 0;
+    for (uint32_t base = 0; base < n; base += group, groups++) {
+        uint32_t middle = base + half < n ? base + half : n - 1;
+        few->dx[groups] = dx[middle];
+        few->dy[groups] = dy[middle];
+        few->dz[groups] = dz[middle];
+    }
+    cells_of(few->dx, few->dy, few->dz, groups, few->cell);
+    for (uint32_t k = 0; k < groups; k++) {
+        uint32_t end = (k + 1) * group < n ? (k + 1) * group : n;
+        for (uint32_t i = k * group; i < end && is_set(o->around, few->cell[k]); i++)
+            pulse[found++] = i;
+    }
+    return found;
+}
+
+/* Pulses in cells that lead to some. */
+static uint32_t in_cells(const struct beam_outlines *o, const float *dx, const float *dy, const float *dz, uint32_t n,
+                         uint32_t *cell, uint32_t *pulse)
+{
+    struct few few;
+    uint32_t around = list_around(o, dx, dy, dz, n, &few, pulse), found = 0;
+    for (uint32_t k = 0; k < around; k++) {
+        few.dx[k] = dx[pulse[k]];
+        few.dy[k] = dy[pulse[k]];
+        few.dz[k] = dz[pulse[k]];
+    }
+    cells_of(few.dx, few.dy, few.dz, around, few.cell);
+    for (uint32_t k = 0; k < around; k++) {
+        uint32_t i = pulse[k];
+        cell[i] = few.cell[k];
+        pulse[found] = i;
+        found += (uint32_t)is_set(o->any, few.cell[k]);
+    }
+    return found;
 }
 
 /* Brings what looking for lines is going to read, step by step for all pulses at once. */
@@ -277,13 +363,9 @@ static void prefetch(const struct beam_outlines *o, const uint32_t *cell, const 
 uint32_t beam_near_outlines(const struct beam_outlines *o, const struct beam *beam, const float *dx, const float *dy,
                             const float *dz, uint32_t n, uint32_t *cell, uint32_t *pulse)
 {
-    uint32_t found = 0, left = 0;
+    uint32_t left = 0;
     if (o->info.entries == 0) return 0;
-    cells_of(dx, dy, dz, n, cell);
-    for (uint32_t i = 0; i < n; i++) {
-        pulse[found] = i;
-        found += o->any[cell[i] / 32] >> cell[i] % 32 & 1;
-    }
+    uint32_t found = in_cells(o, dx, dy, dz, n, cell, pulse);
     prefetch(o, cell, pulse, found);
     for (uint32_t k = 0; k < found; k++) {
         uint32_t i = pulse[k], at = o->first[cell[i]], end = o->first[cell[i] + 1];

@@ -9,6 +9,9 @@
 
 enum { OUTLINE_CELLS = 512 }; /* along a face: 2.6 mrad in its middle, half of that in its corners */
 
+/* Neighbours among pulses are looked up together where they are as near as this to one of them. */
+#define OUTLINE_AROUND_RAD 4e-3
+
 /* An edge's ends, from the station. */
 struct outline_edge {
     float a[3], b[3];
@@ -25,6 +28,7 @@ struct beam_outlines {
     struct outline_edge *edge;
     uint32_t *first;             /* entries of cell c: first[c] .. first[c + 1] */
     uint32_t *any;               /* a bit for each cell: it leads to some */
+    uint32_t *around;            /* likewise: some cell within OUTLINE_AROUND_RAD of a direction in it does */
     struct outline_entry *entry; /* by range */
     struct beam_outlines_info info;
 };

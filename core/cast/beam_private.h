@@ -5,31 +5,32 @@
 #include "core/cast/caster_private.h"
 
 enum {
-    POOL = 24 * CHUNK, /* sub-rays worked on at a time */
-    MAX_JOBS = 256,    /* pulses with sub-rays, likewise */
-    MAX_PASSES = 4,    /* over their outlines */
+    POOL = 24 * CHUNK,     /* sub-rays worked on at a time */
+    POOL_ROOM = POOL + 16, /* arrays of a power of two would get into each other's way in a cache */
+    MAX_JOBS = 256,        /* pulses with sub-rays, likewise */
+    MAX_PASSES = 4,        /* over their outlines */
 };
 
 /* Sub-rays; those of a job lie together. */
 struct pool {
-    double px[POOL], py[POOL], pz[POOL], dx[POOL], dy[POOL], dz[POOL];
-    double range_m[POOL], cosine[POOL], energy[POOL];
-    double rho[POOL]; /* of the surface; touched only where surfaces are modelled */
-    uint32_t triangle[POOL], label[POOL];
-    uint8_t body[POOL];
-    uint8_t begins[POOL]; /* a packet */
+    double px[POOL_ROOM], py[POOL_ROOM], pz[POOL_ROOM], dx[POOL_ROOM], dy[POOL_ROOM], dz[POOL_ROOM];
+    double range_m[POOL_ROOM], cosine[POOL_ROOM], energy[POOL_ROOM];
+    double rho[POOL_ROOM]; /* of the surface; touched only where surfaces are modelled */
+    uint32_t triangle[POOL_ROOM], label[POOL_ROOM];
+    uint8_t body[POOL_ROOM];
+    uint8_t begins[POOL_ROOM]; /* a packet */
     uint32_t n;
 };
 
 /* What sub-rays come to behind glass and off mirrors; touched only where there is such. */
 struct behind {
-    uint32_t first[POOL], count[POOL]; /* of a sub-ray */
+    uint32_t first[POOL_ROOM], count[POOL_ROOM]; /* of a sub-ray */
     uint32_t n;
-    double range_m[POOL * CAST_MAX_DEPTH], cosine[POOL * CAST_MAX_DEPTH];
-    double share[POOL * CAST_MAX_DEPTH]; /* of the sub-ray's energy */
-    double rho[POOL * CAST_MAX_DEPTH];
-    uint32_t label[POOL * CAST_MAX_DEPTH];
-    uint8_t ghost[POOL * CAST_MAX_DEPTH];
+    double range_m[POOL_ROOM * CAST_MAX_DEPTH], cosine[POOL_ROOM * CAST_MAX_DEPTH];
+    double share[POOL_ROOM * CAST_MAX_DEPTH]; /* of the sub-ray's energy */
+    double rho[POOL_ROOM * CAST_MAX_DEPTH];
+    uint32_t label[POOL_ROOM * CAST_MAX_DEPTH];
+    uint8_t ghost[POOL_ROOM * CAST_MAX_DEPTH];
 };
 
 /* A pulse that one ray does not do for. */
@@ -68,5 +69,13 @@ struct beam_work {
     uint8_t number[CHUNK];         /* of the echo that a pulse of one point sends */
     struct behind behind;
 };
+
+/* ---- beam_plan.c: jobs, their sub-rays at the end of the pool. */
+/* Sub-rays all over the footprint. */
+void beam_plan_whole(struct caster *c, const struct cast_beam *b, const struct origins *from, struct job *job);
+/* The rays that a pulse needs, given the outlines up to limit_m. Returns 0 where those of `known` outlines will do, or
+ * (0) the central one. */
+int beam_plan_job(struct caster *c, const struct cast_setup *s, const struct origins *from, struct job *job,
+                  double limit_m, uint32_t known);
 
 #endif

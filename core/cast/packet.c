@@ -148,6 +148,7 @@ void bvh_intersect_one(const struct bvh *bvh, const float org[3], const float di
 
 static void intersect_1(const struct bvh *bvh, const struct bvh_rays *rays, uint32_t n)
 {
+    const uint32_t last = bvh->scene->n_triangles;
     for (uint32_t i = 0; i < n; i++) {
         const float dir[3] = {rays->dx[i], rays->dy[i], rays->dz[i]};
         struct bvh_one one = {.t_min = rays->t_min, .t_max = rays->t_max};
@@ -155,6 +156,7 @@ static void intersect_1(const struct bvh *bvh, const struct bvh_rays *rays, uint
                               rays->ox != NULL ? rays->oy[i] : rays->org[1],
                               rays->ox != NULL ? rays->oz[i] : rays->org[2]};
         bvh_intersect_one(bvh, own, dir, &one);
+        __builtin_prefetch(&bvh->triangle[one.prim < last ? one.prim : last], 0, 2);
         rays->prim[i] = one.prim;
         rays->t[i] = one.t;
         rays->u[i] = one.u;

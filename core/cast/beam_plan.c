@@ -1,0 +1,111 @@
+/* Which sub-rays a pulse gets, and where in its footprint. */
+#include <math.h>
+
+#include "core/cast/beam_private.h"
+#include "core/vec3.h"
+
+/* The sub-ray at (x, y) of a pulse's disc. */
+static void sub_ray(const struct beam *beam, const double dir[3], const struct job *job, double x, double y,
+                    double origin[3], double out[3])
+{
+    for (int i = 0; i < 3; i++) {
+        origin[i] += beam->exit_radius_m * (x * job->e1[i] + y * job->e2[i]);
+        out[i] = dir[i] + beam->slope * (x * job->e2[i] - y * job->e1[i]);
+    }
+    /* 1 / sqrt(1 + t): without a root and a quotient to wait for; what is left out is below t^4, with t < 2.5e-5. */
+    double t = beam->slope * beam->slope * (x * x + y * y);
+    double over = 1.0 - t * (0.5 - t * (0.375 - 0.3125 * t));
+    for (int i = 0; i < 3; i++)
+        out[i] *= over;
+}
+
+static void pulse_origin(const struct origins *from, uint32_t i, double origin[3])
+{
+    origin[0] = from->px != NULL ? from->px[i] : from->at_m[0];
+    origin[1] = from->px != NULL ? from->py[i] : from->at_m[1];
+    origin[2] = from->px != NULL ? from->pz[i] : from->at_m[2];
+}
+
+static void add_ray(const struct caster *c, const struct beam *beam, const struct origins *from, struct job *job,
+                    double x, double y, double energy)
+{
+    struct pool *pool = &c->beam->pool;
+    uint32_t i = pool->n++;
+    const double dir[3] = {c->dx[job->pulse], c->dy[job->pulse], c->dz[job->pulse]};
+    double origin[3], out[3];
+    pulse_origin(from, job->pulse, origin);
+    sub_ray(beam, dir, job, x, y, origin, out);
+    pool->px[i] = origin[0];
+    pool->py[i] = origin[1];
+    pool->pz[i] = origin[2];
+    pool->dx[i] = out[0];
+    pool->dy[i] = out[1];
+    pool->dz[i] = out[2];
+    pool->energy[i] = energy;
+    job->n++;
+}
+
+void beam_plan_whole(struct caster *c, const struct cast_beam *b, const struct origins *from, struct job *job)
+{
+    const double dir[3] = {c->dx[job->pulse], c->dy[job->pulse], c->dz[job->pulse]};
+    job->first = c->beam->pool.n;
+    job->n = 0;
+    job->centre.energy = 0.0;
+    job->next_m = INFINITY;
+    job->whole = 1;
+    beam_axes(dir, job->e1, job->e2);
+    for (uint32_t i = 0; i < b->pattern.n; i++)
+        add_ray(c, &b->beam, from, job, (double)b->pattern.x[i], (double)b->pattern.y[i], 1.0 / b->pattern.n);
+}
+
+/* The part with the centre lies on the surface that is met there: its range at (x, y) needs no ray. Returns 0 where it
+ * does: seen at a small angle that plane runs away. */
+static int known_centre(const struct caster *c, const struct cast_setup *s, const struct origins *from, struct job *job,
+                        double energy, double x, double y)
+{
+    uint32_t p = job->pulse;
+    struct beam_return *r = &job->centre;
+    if (isnan(c->range_m[p])) return 1; /* nothing there */
+    if (c->beam->steep[p] > 2500.0f) return 0;
+    const struct bvh_triangle *tri = &s->bvh->triangle[c->hit[p]];
+    const double dir[3] = {c->dx[p], c->dy[p], c->dz[p]};
+    double origin[3], out[3];
+    pulse_origin(from, p, origin);
+    sub_ray(&s->beam->beam, dir, job, x, y, origin, out);
+    for (int i = 0; i < 3; i++)
+        origin[i] -= s->bvh->origin_m[i];
+    r->range_m = (tri->d - vec3_dot(tri->n, origin)) / vec3_dot(tri->n, out);
+    r->energy = energy;
+    r->cosine = 1.0f / sqrtf(c->beam->steep[p]);
+    r->triangle = c->hit[p];
+    r->label = c->label[p];
+    return 1;
+}
+
+int beam_plan_job(struct caster *c, const struct cast_setup *s, const struct origins *from, struct job *job,
+                  double limit_m, uint32_t known)
+{
+    const struct cast_beam *b = s->beam;
+    const double dir[3] = {c->dx[job->pulse], c->dy[job->pulse], c->dz[job->pulse]};
+    struct beam_line line[BEAM_MAX_LINES];
+    struct beam_parts parts;
+    uint32_t lines =
+        beam_find_lines(b->outlines, &b->beam, c->beam->cell[job->pulse], dir, limit_m, line, &job->next_m);
+    if (lines == known) return 0;
+    job->lines = lines;
+    job->first = c->beam->pool.n;
+    job->n = 0;
+    job->centre.energy = 0.0;
+    job->whole = 0;
+    beam_axes(dir, job->e1, job->e2);
+    if (lines > BEAM_MAX_LINES || ++job->passes > MAX_PASSES ||
+        beam_cut(&b->beam, &b->fine, line, lines, &parts) != 0) {
+        beam_plan_whole(c, b, from, job);
+        c->counters.ragged++;
+        return 1;
+    }
+    for (uint32_t i = 0; i < parts.n; i++)
+        if (i != parts.centre || !known_centre(c, s, from, job, parts.energy[i], parts.x[i], parts.y[i]))
+            add_ray(c, &b->beam, from, job, parts.x[i], parts.y[i], parts.energy[i]);
+    return 1;
+}

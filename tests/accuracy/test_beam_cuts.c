@@ -1,0 +1,134 @@
+/* Points do not depend on how a line is cut into runs: a tick or a thread may take any part of it. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "core/generate.h"
+#include "core/rng.h"
+#include "core/surface.h"
+#include "tests/accuracy/beam_reference.h"
+
+static const double STATION[3] = {0.0, 0.0, 0.0};
+static const struct beam_view VIEW = {-20.0, 20.0, -45.0, 45.0, 6, 3000};
+enum { GLASS = 1, ROOM = 3000 * LINE_MAX_ECHOES };
+
+/* Bars at all depths; every third one is of glass. */
+static void open_rig(struct beam_rig *rig)
+{
+    struct generate_bar bar[48];
+    struct scene *scene;
+    struct sh_err err;
+    for (uint16_t k = 0; k < 48; k++) {
+        double x = -4.7 + 0.2 * k, y = 6.0 + 0.3 * (k % 12);
+        bar[k] = (struct generate_bar){.a = {x, y, -2.0},
+                                       .b = {x + 0.3, y + 1.0, 2.0},
+                                       .diameter_m = k % 3 == 0 ? 0.2 : 0.02,
+                                       .label = (uint16_t)(k % 3 == 0 ? GLASS : GLASS + 1)};
+    }
+    if (generate_bars(bar, 48, 20.0, &scene, &err) != 0) fail_msg("%s", err.text);
+    if (beam_rig_open(rig, scene, STATION, &VIEW, &err) != 0) fail_msg("%s", err.text);
+}
+
+struct points {
+    uint32_t n, echoes;
+    uint32_t a[ROOM], b[ROOM], c[ROOM];
+    uint16_t label[ROOM];
+    int16_t refl_cdb[ROOM];
+    uint8_t echo[ROOM];
+};
+
+/* Line l in runs of `most` pulses, the first one of them `lead`; 0: as a whole. */
+static void cast_cut(struct beam_rig *rig, uint32_t l, uint32_t lead, uint32_t most, struct points *to)
+{
+    struct schedule_line line;
+    struct schedule_run run;
+    const struct line_block *b = &rig->block;
+    schedule_get_line(&rig->segment, l, &line);
+    to->n = to->echoes = 0;
+    for (uint64_t p = line.cast0, n; p < line.cast_end; p += n) {
+        n = most == 0 ? line.cast_end - p : p == line.cast0 ? lead : most;
+        if (n > line.cast_end - p) n = line.cast_end - p;
+        schedule_get_run(&rig->segment, &line, p, (uint32_t)n, &run);
+        to->echoes += caster_cast(rig->caster, &rig->setup, &run, &rig->block);
+        memcpy(to->a + to->n, b->a, b->n_points * sizeof *b->a);
+        memcpy(to->b + to->n, b->b, b->n_points * sizeof *b->b);
+        memcpy(to->c + to->n, b->c, b->n_points * sizeof *b->c);
+        memcpy(to->label + to->n, b->label, b->n_points * sizeof *b->label);
+        memcpy(to->refl_cdb + to->n, b->refl_cdb, b->n_points * sizeof *b->refl_cdb);
+        memcpy(to->echo + to->n, b->echo, b->n_points);
+        to->n += b->n_points;
+    }
+}
+
+static void all_cuts_alike(struct beam_rig *rig)
+{
+    static const uint32_t cuts[][2] = {{1, 1000}, {7, 16}, {1023, 1}, {16, 37}, {333, 1025}};
+    static struct points whole, cut;
+    uint64_t several = 0;
+    for (uint32_t l = 0; l < VIEW.lines; l++) {
+        cast_cut(rig, l, 0, 0, &whole);
+        for (uint32_t i = 0; i < whole.n; i++)
+            several += whole.echo[i] >> 4 > 1;
+        for (size_t k = 0; k < sizeof cuts / sizeof cuts[0]; k++) {
+            cast_cut(rig, l, cuts[k][0], cuts[k][1], &cut);
+            assert_int_equal(cut.n, whole.n);
+            assert_int_equal(cut.echoes, whole.echoes);
+            assert_memory_equal(cut.a, whole.a, whole.n * sizeof *whole.a);
+            assert_memory_equal(cut.b, whole.b, whole.n * sizeof *whole.b);
+            assert_memory_equal(cut.c, whole.c, whole.n * sizeof *whole.c);
+            assert_memory_equal(cut.label, whole.label, whole.n * sizeof *whole.label);
+            assert_memory_equal(cut.refl_cdb, whole.refl_cdb, whole.n * sizeof *whole.refl_cdb);
+            assert_memory_equal(cut.echo, whole.echo, whole.n);
+        }
+    }
+    assert_true(several > 100); /* the scene has what is in question */
+}
+
+static void modes_alike(const struct cast_detect *detect)
+{
+    struct beam_rig rig;
+    open_rig(&rig);
+    rig.setup.noise_on = 1;
+    rig.setup.range_sigma_m = 0.003;
+    rig.setup.noise_key = rng_key(7, RNG_RANGE);
+    rig.setup.detect = detect;
+    for (int rings = 0; rings < 2; rings++) {
+        beam_rig_mode(&rig, rings ? BEAM_RINGS : BEAM_ADAPTIVE, 2);
+        all_cuts_alike(&rig);
+    }
+    beam_rig_close(&rig);
+}
+
+static void a_beam_alone(void **state)
+{
+    (void)state;
+    modes_alike(NULL);
+}
+
+static void with_glass(void **state)
+{
+    (void)state;
+    struct surface_table table;
+    struct sh_err err;
+    assert_int_equal(surface_table_alloc(3, &table, &err), 0);
+    for (uint32_t i = 0; i <= table.n; i++)
+        table.surface[i] = (struct surface){.reflectance = 0.5};
+    table.surface[GLASS] = (struct surface){.reflectance = 0.05, .glass = 0.9};
+    const struct cast_detect detect = {.surfaces = &table, .depth = 3, .max_echoes = LINE_MAX_ECHOES};
+    modes_alike(&detect);
+    surface_table_free(&table);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_beam_alone),
+        cmocka_unit_test(with_glass),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
