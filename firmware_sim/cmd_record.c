@@ -198,6 +198,9 @@ static int write_stats(const struct record *r, struct scanhead *sh, const struct
     json_uint(&json, "dropped", s.dropped);
     json_uint(&json, "reader_lost_frames", s.reader_lost);
     json_uint(&json, "lost_pulses", result->lost_pulses);
+    json_uint(&json, "crowded_echoes", result->crowded);
+    json_uint(&json, "faint_hits", result->faint);
+    json_uint(&json, "unfit_echoes", result->unfit);
     json_uint(&json, "replugs", result->replugs);
     json_double(&json, "wall_s", wall_s);
     json_double(&json, "cpu_s", clock_cpu_s());
@@ -278,6 +281,7 @@ static int record(struct record *r, struct scanhead *sh, struct sh_err *err)
     if (counts && r->stats != NULL && (closed = write_stats(r, sh, &result, wall_s, &why)) != SH_OK && rc == SH_OK)
         rc = sh_fail(err, closed, "%s", why.text);
     if (rc == SH_OK || result.points != 0) say_result(r, &result);
+    cmd_warn_left_out(result.crowded, result.unfit);
     return rc == SH_OK ? check_complete(sh, &result, err) : rc;
 }
 
