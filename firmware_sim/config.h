@@ -1,4 +1,4 @@
-/* The configuration: YAML through libyaml's document API and one table (config_table.c) of key, type, unit, default,
+/* The configuration: YAML through libyaml's document API and one table (config_table*.c) of key, type, unit, default,
  * range and help, which alone gives parsing, defaults, errors, `--help` text and the reference.
  *
  * Units: as the key's name says (hz, deg, m). Everything is checked; an error is one line:

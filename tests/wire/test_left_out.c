@@ -141,8 +141,8 @@ static void test_echoes_left_out(void **state)
     assert_true(sums.crowded > 10000);
 }
 
-/* The range equation: a wall of the reflectance that is just seen at REACH_M is seen where cos i / R^2 >= 1 / REACH_M^2.
- * A part in 1e9 of that may go either way; and each hit is an echo or faint. */
+/* The range equation: a wall of the reflectance that is just seen at REACH_M is seen where cos i / R^2 >= 1 /
+ * REACH_M^2. A part in 1e9 of that may go either way; and each hit is an echo or faint. */
 static void as_the_range_equation_says(const struct native_line_end *end, const struct oracle *oracle)
 {
     uint32_t faint = 0, unsure = 0;
