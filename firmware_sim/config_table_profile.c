@@ -1,8 +1,8 @@
 /* The table of a head profile's keys. */
 #include "firmware_sim/config_private.h"
 
-#define IN_PROFILE(member)   CFG_MEMBER(struct config_profile, member)
-#define IN_REACH(member)     CFG_MEMBER(struct config_reach, member)
+#define IN_PROFILE(member) CFG_MEMBER(struct config_profile, member)
+#define IN_REACH(member)   CFG_MEMBER(struct config_reach, member)
 
 static const char *const from_names[] = {[FROM_DATA_SHEET] = "data sheet", [FROM_ASSUMED] = "assumed", NULL};
 
