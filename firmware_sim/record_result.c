@@ -6,8 +6,8 @@
 #include "firmware_sim/clock.h"
 #include "firmware_sim/json.h"
 
-int record_write_stats(const char *path, struct scanhead *sh, const struct recording_result *result,
-                       double wall_s, struct sh_err *err)
+int record_write_stats(const char *path, struct scanhead *sh, const struct recording_result *result, double wall_s,
+                       struct sh_err *err)
 {
     struct scanhead_stats s;
     char hex[65];
