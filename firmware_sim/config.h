@@ -194,6 +194,7 @@ struct config {
     uint32_t n_links;
     /* beam */
     enum beam_mode beam_mode;
+    int measures; /* no key: `plan` casts footprints to measure what a forced beam is off, be it single rays */
     uint32_t beam_rings;
     /* plan */
     double plan_tolerance_m, echo_tolerance;
