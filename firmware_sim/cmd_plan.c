@@ -96,7 +96,7 @@ static void print_left(const struct plan_option *left, uint32_t more)
     char method[40], why[sizeof left->why_not + 32];
     snprintf(method, sizeof method, "  not %s", left->method);
     snprintf(why, sizeof why, "%s", left->why_not);
-    if (more != 0) snprintf(why, sizeof why, "%s; so %s %u more", left->why_not, more == 1 ? "is" : "are", more);
+    if (more != 0) snprintf(why, sizeof why, "%s; the same goes for %u more", left->why_not, more);
     print_line("", method, figure, why);
 }
 
