@@ -12,16 +12,18 @@
  * from its own point of the exit plane, at (x, y) = rho (cos phi, sin phi) of the unit disc; equal areas of energy in
  * the disc are equal areas of energy in every footprint. Its range counts along itself from the exit plane.
  * Rings: one sub-ray in the centre and 6 k on ring k = 1 .. N, 1 + 3 N (N + 1) in all, each with the same energy: ring
- * k lies where half of the energy of its annulus is inside.
+ * k lies where half of the energy of its annulus is inside. (Energy within rho, from the irradiance: (1 - exp(-2
+ * rho^2)) / (1 - exp(-2)).)
  *
  * Returns of a pulse, one for each sub-ray that meets something, become echoes: sorted by range, a gap larger than the
  * range resolution (c tau / 2 of the pulse width tau) begins a new one. An echo's range is the energy-weighted mean of
  * its returns - with two surfaces closer than the resolution, the mixed pixel's -, its surface that of its strongest
- * return, its energy the sum. Less than 1 % of the footprint's energy is no echo. Of more echoes than the head can
- * tell, the weakest are left out, and counted. Where surfaces are modelled (core/surface.h), what weighs is what comes
- * back: energy times the surface's return, times the share that glass and mirrors before it let through; the 1 % is
- * still of the footprint. The width of an echo is that of the pulse, resolution_m, and 2.355 sigma
- * of its ranges, added as squares (full widths at half maximum of Gaussians).
+ * return, its energy the sum: the centroid of equal pulses that overlap, whatever their shape. Less than 1 % of the
+ * footprint's energy is no echo. Of more echoes than the head can tell, the weakest are left out, and counted. Where
+ * surfaces are modelled (core/surface.h), what weighs is what comes back: energy times the surface's return, times the
+ * share that glass and mirrors before it let through; the 1 % is still of the footprint (and where nothing comes back
+ * of any of them, energy weighs). The width of an echo is that of the pulse, resolution_m, and 2.355 sigma of its
+ * ranges, added as squares (full widths at half maximum of Gaussians).
  *
  * One ray for all of the footprint. Where it lies on one plane at incidence i, the mean over it is not the range of its
  * centre: a sub-ray at (rho, phi) meets the plane at (R - rho D/2 tan i cos phi) / (1 - rho s tan i sin phi), s = theta

@@ -52,6 +52,8 @@ struct line_end {
     int64_t t0_ns, t1_ns;             /* first pulse of this line, first pulse of the next, since the scan's start */
     uint32_t mirror_count, pan_count; /* encoder readings at the last pulse of this line */
     uint32_t status;                  /* LINE_LAST_OF_FRAME, LINE_PARTIAL */
+    /* what was hit and is no echo of the line, see struct cast_counters; 0 also where blocks of the line were lost */
+    uint32_t n_crowded, n_faint, n_unfit;
 };
 enum {
     LINE_LAST_OF_FRAME = 1u << 0,

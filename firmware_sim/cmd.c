@@ -154,6 +154,9 @@ static void put_stats(struct json *json, const struct cmd_stats *stats)
     json_double(json, "pulses_per_s", s->wall_s > 0.0 ? (double)s->pulses / s->wall_s : 0.0);
     json_uint(json, "lost_pulses", s->lost_pulses);
     json_uint(json, "lost_ticks", s->lost_ticks);
+    json_uint(json, "crowded_echoes", s->crowded);
+    json_uint(json, "faint_hits", s->faint);
+    json_uint(json, "unfit_echoes", s->unfit);
     json_uint(json, "reader_lost_frames", s->reader_lost_frames);
     json_uint(json, "late_blocks", s->late_blocks);
     json_uint(json, "late_poses", s->late_poses);
@@ -164,6 +167,16 @@ static void put_stats(struct json *json, const struct cmd_stats *stats)
     json_int(json, "rss_peak_kib", usage.ru_maxrss);
     json_string(json, "stream_sha256", s->have_hash ? s->sha256 : NULL);
     json_close_object(json);
+}
+
+void cmd_warn_left_out(uint64_t crowded, uint64_t unfit)
+{
+    if (crowded != 0)
+        fprintf(stderr, "scanhead: warning: %llu echoes left out, the weakest: the head tells max_echoes of a pulse\n",
+                (unsigned long long)crowded);
+    if (unfit != 0)
+        fprintf(stderr, "scanhead: warning: %llu echoes left out, too far from the anchor for the stream's integers\n",
+                (unsigned long long)unfit);
 }
 
 int cmd_write_stats(const char *path, const struct cmd_stats *stats, struct sh_err *err)

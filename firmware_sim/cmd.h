@@ -69,6 +69,8 @@ struct cmd_stats {
     struct loop_stats loop;
     double cpu_s;
 };
+/* One line on standard error for each kind of echoes that are not in the points. */
+void cmd_warn_left_out(uint64_t crowded, uint64_t unfit);
 int cmd_write_stats(const char *path, const struct cmd_stats *stats, struct sh_err *err);
 
 #endif

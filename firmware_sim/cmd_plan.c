@@ -96,7 +96,7 @@ static void print_left(const struct plan_option *left, uint32_t more)
     char method[40], why[sizeof left->why_not + 32];
     snprintf(method, sizeof method, "  not %s", left->method);
     snprintf(why, sizeof why, "%s", left->why_not);
-    if (more != 0) snprintf(why, sizeof why, "%s; likewise %u more", left->why_not, more);
+    if (more != 0) snprintf(why, sizeof why, "%s; the same goes for %u more", left->why_not, more);
     print_line("", method, figure, why);
 }
 
@@ -123,6 +123,7 @@ static int plan_config(const struct cmd_sets *sets, const char *path, int as_jso
     struct site *site = NULL;
     struct config *cfg = cmd_load_config(path, sets, &status);
     if (cfg == NULL) return status;
+    cfg->measures = 1;
     int rc = site_load(cfg, &cmd_report_stderr, &site, &err);
     if (rc == SH_OK) rc = site_plan_rows(site, &cmd_report_stderr, &err);
     if (rc == SH_OK) rc = as_json ? print_json(&site->plan, &err) : print_text(&site->plan);

@@ -5,8 +5,8 @@
 
 #include "firmware_sim/clock.h"
 #include "firmware_sim/cmd.h"
-#include "firmware_sim/json.h"
 #include "firmware_sim/record_files.h"
+#include "firmware_sim/record_result.h"
 #include "firmware_sim/recording.h"
 
 static const char HELP[] =
@@ -174,66 +174,6 @@ static int write_frame(void *ctx, struct scanhead *sh, const struct scanhead_fra
     return record_files_frame(&r->files, sh, frame, err);
 }
 
-static int write_stats(const struct record *r, struct scanhead *sh, const struct recording_result *result,
-                       double wall_s, struct sh_err *err)
-{
-    struct scanhead_stats s;
-    char hex[65];
-    scanhead_get_stats(sh, &s);
-    scanhead_hash_hex(sh, hex);
-    FILE *out = strcmp(r->stats, "-") == 0 ? stdout : fopen(r->stats, "w");
-    if (out == NULL) return sh_fail(err, SH_EIO, "%s: can't be written", r->stats);
-    struct json json;
-    json_begin(&json, out);
-    json_open_object(&json, NULL);
-    json_uint(&json, "points", result->points);
-    json_uint(&json, "empty_shots", result->empty);
-    json_uint(&json, "pulses", result->pulses);
-    json_uint(&json, "scans", result->scans);
-    json_uint(&json, "frames", s.frames);
-    json_uint(&json, "bytes", s.bytes);
-    json_uint(&json, "bad_payload", s.bad_payload);
-    json_uint(&json, "bad_bytes", s.bad_bytes);
-    json_uint(&json, "seq_lost", s.seq_lost);
-    json_uint(&json, "dropped", s.dropped);
-    json_uint(&json, "reader_lost_frames", s.reader_lost);
-    json_uint(&json, "lost_pulses", result->lost_pulses);
-    json_uint(&json, "replugs", result->replugs);
-    json_double(&json, "wall_s", wall_s);
-    json_double(&json, "cpu_s", clock_cpu_s());
-    json_double(&json, "pulses_per_s", wall_s > 0.0 ? (double)result->pulses / wall_s : 0.0);
-    json_string(&json, "stream_sha256", hex);
-    json_close_object(&json);
-    int rc = json_end(&json, err);
-    if (out != stdout && fclose(out) != 0 && rc == SH_OK) rc = sh_fail(err, SH_EIO, "%s: can't be written", r->stats);
-    return rc;
-}
-
-/* Frames that never came: gaps in the sequence; those with a wrong checksum are among them but at the very end. */
-static uint64_t count_lost(struct scanhead *sh)
-{
-    struct scanhead_stats s;
-    scanhead_get_stats(sh, &s);
-    return (s.seq_lost > s.bad_payload ? s.seq_lost : s.bad_payload) + s.dropped;
-}
-
-static int check_complete(struct scanhead *sh, const struct recording_result *result, struct sh_err *err)
-{
-    struct scanhead_stats s;
-    scanhead_get_stats(sh, &s);
-    if (result->missing[0] != '\0') return sh_fail(err, SH_ESTATE, "interrupted; missing: %s", result->missing);
-    uint64_t pulses = s.pulses_lost > result->lost_pulses ? s.pulses_lost : result->lost_pulses;
-    if (result->broken_scans != 0)
-        return sh_fail(
-            err, SH_ELOST,
-            "the recording is not complete: the head was away within %llu scans; %llu frames known to be lost",
-            (unsigned long long)result->broken_scans, (unsigned long long)count_lost(sh));
-    if (count_lost(sh) == 0 && pulses == 0) return SH_OK;
-    return sh_fail(err, SH_EIO,
-                   "the recording is not complete: %llu frames lost to this reader, %llu pulses by the head",
-                   (unsigned long long)count_lost(sh), (unsigned long long)pulses);
-}
-
 static void say_result(const struct record *r, const struct recording_result *result)
 {
     if (r->recording.progress)
@@ -275,10 +215,12 @@ static int record(struct record *r, struct scanhead *sh, struct sh_err *err)
     int closed = record_files_close(&r->files, result.points != 0 || (rc == SH_OK && result.missing[0] == '\0'), &why);
     if (rc == SH_OK && closed != SH_OK) rc = sh_fail(err, closed, "%s", why.text);
     int counts = rc == SH_OK || rc == SH_ELOST; /* also of a recording that an unplugged device has cut */
-    if (counts && r->stats != NULL && (closed = write_stats(r, sh, &result, wall_s, &why)) != SH_OK && rc == SH_OK)
+    if (counts && r->stats != NULL && (closed = record_write_stats(r->stats, sh, &result, wall_s, &why)) != SH_OK &&
+        rc == SH_OK)
         rc = sh_fail(err, closed, "%s", why.text);
     if (rc == SH_OK || result.points != 0) say_result(r, &result);
-    return rc == SH_OK ? check_complete(sh, &result, err) : rc;
+    cmd_warn_left_out(result.crowded, result.unfit);
+    return rc == SH_OK ? record_check_complete(sh, &result, err) : rc;
 }
 
 static int ends_in(const char *text, const char *ending)

@@ -169,6 +169,7 @@ static int serve(const struct run_options *o, struct loop *loop, struct device *
     if (stats.loop.lost_pulses != 0)
         fprintf(stderr, "scanhead: warning: %llu pulses could not be computed in time\n",
                 (unsigned long long)stats.loop.lost_pulses);
+    cmd_warn_left_out(stats.loop.crowded, stats.loop.unfit);
     if (stats.loop.reader_lost_frames != 0)
         fprintf(stderr, "scanhead: warning: readers lost %llu frames\n",
                 (unsigned long long)stats.loop.reader_lost_frames);

@@ -1,4 +1,4 @@
-/* The configuration: YAML through libyaml's document API and one table (config_table.c) of key, type, unit, default,
+/* The configuration: YAML through libyaml's document API and one table (config_table*.c) of key, type, unit, default,
  * range and help, which alone gives parsing, defaults, errors, `--help` text and the reference.
  *
  * Units: as the key's name says (hz, deg, m). Everything is checked; an error is one line:
@@ -194,6 +194,7 @@ struct config {
     uint32_t n_links;
     /* beam */
     enum beam_mode beam_mode;
+    int measures; /* no key: `plan` casts footprints to measure what a forced beam is off, be it single rays */
     uint32_t beam_rings;
     /* plan */
     double plan_tolerance_m, echo_tolerance;

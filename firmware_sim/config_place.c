@@ -4,8 +4,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#define LEN(array) (sizeof(array) / sizeof((array)[0]))
-
 /* "required, allowed ..." of a key that is missing, after why. */
 static int fail_required(const struct cfg_reader *rd, const char *path, uint32_t item, const char *why)
 {
@@ -36,7 +34,7 @@ static int check_anchor(const struct cfg_reader *rd, struct config *cfg)
                                       [ANCHOR_ECEF] = "source alone"};
     const char *source = cfg_find(&rd->table, "scene.anchor.source")->names[cfg->anchor.source];
     char why[64];
-    for (size_t k = 0; k < LEN(keys); k++) {
+    for (size_t k = 0; k < CFG_LEN(keys); k++) {
         int given = cfg_is_given(rd, keys[k].path, 0);
         if (given && !(keys[k].taken & 1u << cfg->anchor.source))
             return cfg_fail_key(rd, keys[k].path, 0, "an anchor of source %s has no such key; allowed %s", source,
@@ -64,7 +62,7 @@ static int find_form(const struct cfg_reader *rd, struct config_station *station
 {
     const char *first = NULL;
     station->place = PLACE_NONE;
-    for (size_t k = 0; k < LEN(form_keys); k++) {
+    for (size_t k = 0; k < CFG_LEN(form_keys); k++) {
         if (!cfg_is_given(rd, form_keys[k].path, i)) continue;
         if (first != NULL && station->place != form_keys[k].place)
             return cfg_fail_key(
@@ -89,7 +87,7 @@ static int complete_form(const struct cfg_reader *rd, const struct config *cfg, 
                                       [PLACE_UTM] = "utm_zone, hemisphere, easting_m, northing_m, height_m go together",
                                       [PLACE_ECEF] = ""};
     int from_anchor = cfg->anchor.source == ANCHOR_UTM;
-    for (size_t k = 0; k < LEN(form_keys); k++) {
+    for (size_t k = 0; k < CFG_LEN(form_keys); k++) {
         const char *path = form_keys[k].path;
         if (form_keys[k].place != station->place || cfg_is_given(rd, path, i)) continue;
         if (from_anchor && strcmp(path, "stations[].utm_zone") == 0)

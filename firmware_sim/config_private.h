@@ -50,7 +50,10 @@ struct cfg_table {
     const struct cfg_key *keys;
     size_t n;
 };
+/* config_table.c, config_table_profile.c */
 extern const struct cfg_table cfg_config_table, cfg_profile_table;
+#define CFG_LEN(array)           (sizeof(array) / sizeof((array)[0]))
+#define CFG_MEMBER(type, member) .offset = offsetof(type, member), .size = sizeof(((type *)0)->member)
 
 struct cfg_reader {
     const char *file;

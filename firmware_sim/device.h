@@ -24,6 +24,7 @@ enum { DEVICE_MAX_EVENTS = 24, DEVICE_MAX_POSES = 256, DEVICE_POSE_AHEAD_S = 360
 struct device_counters {
     _Atomic uint64_t pulses, fired, echoes, lines; /* released; pulses: cast ones */
     _Atomic uint64_t lost_pulses, lost_ticks;      /* cast pulses and ticks that could not be computed in time */
+    _Atomic uint64_t crowded, faint, unfit;        /* released lines' hits that are no echoes: struct cast_counters */
     _Atomic uint64_t late_blocks, late_max_ns;
     _Atomic uint64_t reader_lost_frames;
     _Atomic uint64_t late_poses, bad_poses; /* live: made up for want of one in time; that came and could not be used */

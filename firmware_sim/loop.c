@@ -236,6 +236,9 @@ static void fill_stats(struct loop *loop, struct loop_stats *stats)
     stats->fired_pulses = atomic_load(&c->fired);
     stats->echoes = atomic_load(&c->echoes);
     stats->lines = atomic_load(&c->lines);
+    stats->crowded = atomic_load(&c->crowded);
+    stats->faint = atomic_load(&c->faint);
+    stats->unfit = atomic_load(&c->unfit);
     stats->lost_pulses = atomic_load(&c->lost_pulses);
     stats->lost_ticks = atomic_load(&c->lost_ticks);
     stats->late_blocks = atomic_load(&c->late_blocks);

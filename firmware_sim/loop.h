@@ -27,6 +27,7 @@ struct loop_options {
 
 struct loop_stats {
     uint64_t pulses, fired_pulses, echoes, lines, scans;
+    uint64_t crowded, faint, unfit; /* hits that are no echoes: struct cast_counters */
     uint64_t lost_pulses, lost_ticks, late_blocks, reader_lost_frames;
     uint64_t late_poses, bad_poses; /* of a live platform */
     double wall_s;                  /* from the release of the first pulse to that of the last */

@@ -63,7 +63,8 @@ struct loop {
     _Atomic int stopping;        /* give up waiting for anything */
     _Atomic int pacer_done;
     _Atomic uint32_t pumps_busy; /* pumps that still have something to bring out */
-    uint32_t seq, line_echoes;   /* of the pacing thread */
+    uint32_t seq;                /* of the pacing thread */
+    struct ring_hits line;       /* of the line so far; likewise */
     int line_broken;             /* likewise: a tick was lost since the last line end */
     _Atomic uint64_t late[LATE_BUCKETS];
     _Atomic int64_t first_pulse_ns, last_pulse_ns; /* when released; 0: not yet */

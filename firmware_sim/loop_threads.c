@@ -119,18 +119,23 @@ static void wake_all(struct loop *loop)
     if (loop->hasher != NULL) hasher_wake(loop->hasher);
 }
 
-/* Line ends get their number of echoes; 0 says that blocks of the line are missing. */
+/* Line ends get their counts of echoes; 0 says that blocks of the line are missing. */
 static void finish_lines(struct loop *loop, struct ring_slot *slot)
 {
     for (uint32_t i = 0; i < slot->n_marks; i++) {
         struct ring_mark *mark = &slot->mark[i];
-        mark->end.n_echoes = loop->line_broken ? 0 : loop->line_echoes + mark->echoes_before;
+        ring_hits_add(&loop->line, &mark->before);
+        if (loop->line_broken) loop->line = (struct ring_hits){0};
+        mark->end.n_echoes = loop->line.echoes;
+        mark->end.n_crowded = loop->line.crowded;
+        mark->end.n_faint = loop->line.faint;
+        mark->end.n_unfit = loop->line.unfit;
         native_encode_line_end(slot->bytes + mark->frame_at, loop->slot_bytes - mark->frame_at, &mark->end,
                                mark->scan_t0_ns);
-        loop->line_echoes = 0;
+        loop->line = (struct ring_hits){0};
         loop->line_broken = 0;
     }
-    loop->line_echoes += slot->echoes_tail;
+    ring_hits_add(&loop->line, &slot->tail);
 }
 
 static void count(struct loop *loop, const struct ring_slot *slot, int64_t now_ns)
@@ -139,6 +144,11 @@ static void count(struct loop *loop, const struct ring_slot *slot, int64_t now_n
     atomic_fetch_add(&c->pulses, slot->n_cast);
     atomic_fetch_add(&c->fired, slot->n_fired);
     atomic_fetch_add(&c->echoes, slot->n_echoes);
+    if ((slot->n_crowded | slot->n_faint | slot->n_unfit) != 0) {
+        atomic_fetch_add(&c->crowded, slot->n_crowded);
+        atomic_fetch_add(&c->faint, slot->n_faint);
+        atomic_fetch_add(&c->unfit, slot->n_unfit);
+    }
     atomic_fetch_add(&c->lines, slot->n_lines);
     if (slot->n_fired == 0) return;
     if (atomic_load(&loop->first_pulse_ns) == 0) atomic_store(&loop->first_pulse_ns, now_ns);

@@ -50,6 +50,15 @@ struct pump {
 /* Counts what a session lost; the error queue hears of it once per episode. */
 void pump_count_lost(struct pump *pump, struct session *s, uint32_t n);
 
+/* pump_commands.c */
+/* A reply line, behind those that wait already. */
+void pump_add_reply(struct session *s, const char *text);
+/* What was read. Lines wait while a step goes on, and until earlier replies are on their way: each is carried out, and
+ * answered, after the one before. Only who sends on and on without reading loses replies. */
+void pump_take_lines(struct pump *pump, struct session *s);
+/* Reads what the client sent, and takes its lines. */
+void pump_read_commands(struct pump *pump, struct session *s, int index);
+
 /* pump_nmea.c: a session of the GNSS receiver. Its cursor is the tick up to which it has everything. */
 /* Sentences of what was released into the buffer; where the reader is too far behind, those of half a queue are lost.
  */

@@ -55,6 +55,15 @@ static int gives_up(const struct scanhead_frame *frame)
            frame->event_value[0] != HEAD_SCANNING;
 }
 
+static void count_line(struct recording *r, const struct scanhead_frame *frame)
+{
+    struct native_line_end end;
+    if (native_decode_line_end(frame->payload, frame->payload_len, &end) != 0) return;
+    r->result->crowded += end.n_crowded;
+    r->result->faint += end.n_faint;
+    r->result->unfit += end.n_unfit;
+}
+
 static void look_at(struct recording *r, const struct scanhead_frame *frame)
 {
     r->result->frames++;
@@ -63,6 +72,7 @@ static void look_at(struct recording *r, const struct scanhead_frame *frame)
         r->result->pulses += frame->n_pulses;
         if (r->scan_t0_ns < 0) r->scan_t0_ns = frame->t_ns - frame->scan_t0_ns;
     }
+    if (frame->type == SCANHEAD_LINE_END) count_line(r, frame);
     if (frame->type != SCANHEAD_EVENT) return;
     if (frame->event == SCANHEAD_EV_SCAN_START) {
         r->scan_t0_ns = (int64_t)frame->event_value[1];

@@ -27,6 +27,7 @@ struct recording_options {
 struct recording_result {
     uint64_t points, empty, frames, scans, pulses;
     uint64_t lost_pulses;           /* as the head says: cast pulses it could not compute */
+    uint64_t crowded, faint, unfit; /* hits that are no echoes, as its line ends say */
     int ended_early;                /* the stream ended before the scan did */
     char missing[128];              /* what was asked for but left out because of `interrupted`; empty: nothing */
     uint64_t replugs, broken_scans; /* how often the head was away and came back; scans in which it was */

@@ -16,6 +16,14 @@ static struct ring_slot *slot_of(struct ring *ring, uint64_t tick)
     return &ring->slot[tick % ring->n_slots];
 }
 
+void ring_hits_add(struct ring_hits *sum, const struct ring_hits *more)
+{
+    sum->echoes += more->echoes;
+    sum->crowded += more->crowded;
+    sum->faint += more->faint;
+    sum->unfit += more->unfit;
+}
+
 int ring_create(struct ring *ring, uint64_t ahead_ticks, uint64_t queue_ticks, uint32_t slot_bytes, struct sh_err *err)
 {
     memset(ring, 0, sizeof *ring);
@@ -59,9 +67,11 @@ struct ring_slot *ring_claim(struct ring *ring, uint64_t tick)
     if (seen == state_of(tick, LOST) || !atomic_compare_exchange_strong(&slot->state, &seen, state_of(tick, COMPUTING)))
         return NULL; /* only the pacing thread can have changed it: lost */
     atomic_store(&slot->busy, 1);
-    slot->len = slot->n_frames = slot->first_seq = slot->echoes_tail = slot->n_marks = 0;
+    slot->len = slot->n_frames = slot->first_seq = slot->n_marks = 0;
+    slot->tail = (struct ring_hits){0};
     slot->wake = 0;
     slot->n_fired = slot->n_cast = slot->n_echoes = slot->n_lines = 0;
+    slot->n_crowded = slot->n_faint = slot->n_unfit = 0;
     return slot;
 }
 

@@ -22,11 +22,17 @@
 /* Marks: 10,000 lines a second in ticks of 10 ms, and device_tick_lines' two more, fit. */
 enum { RING_MAX_READERS = 72, RING_MAX_MARKS = 104 };
 
-/* A line-end frame that lacks its number of echoes until the tick is released: blocks before it may come from
+/* What pulses hit: echoes, and what is none (struct cast_counters). */
+struct ring_hits {
+    uint32_t echoes, crowded, faint, unfit;
+};
+void ring_hits_add(struct ring_hits *sum, const struct ring_hits *more);
+
+/* A line-end frame that lacks its counts of echoes until the tick is released: blocks before it may come from
  * elsewhere. */
 struct ring_mark {
-    uint32_t frame_at;      /* offset of the frame in bytes */
-    uint32_t echoes_before; /* echoes of this slot since the mark before */
+    uint32_t frame_at;       /* offset of the frame in bytes */
+    struct ring_hits before; /* of this slot since the mark before */
     int64_t scan_t0_ns;
     struct line_end end;
 };
@@ -38,8 +44,8 @@ struct ring_slot {
     uint32_t len, n_frames;
     uint32_t first_seq; /* set at release */
     int wake;           /* readers are woken at release though it be empty */
-    uint64_t n_fired, n_cast, n_echoes, n_lines;
-    uint32_t echoes_tail; /* echoes after the last mark */
+    uint64_t n_fired, n_cast, n_echoes, n_lines, n_crowded, n_faint, n_unfit;
+    struct ring_hits tail; /* after the last mark */
     uint32_t n_marks;
     struct ring_mark mark[RING_MAX_MARKS];
 };

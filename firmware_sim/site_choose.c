@@ -215,7 +215,7 @@ static int choose_beam(struct site *site, const struct sh_report *report, struct
     return SH_OK;
 }
 
-/* measure: the bound, too. Not around single rays: a scan's BVH then has no room for a footprint. */
+/* measure: the bound, too. */
 static int force_beam(struct site *site, int measure, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
@@ -223,7 +223,7 @@ static int force_beam(struct site *site, int measure, const struct sh_report *re
     struct plan_option option;
     struct look look = {0};
     plan_beam_option(cfg->beam_mode, cfg->beam_rings, &option);
-    if (measure && cfg->beam_mode != BEAM_SINGLE) {
+    if (measure && no_footprint(site) == NULL) {
         int rc = open_look(&look, site, 1, report, err);
         if (rc == SH_OK && cfg->beam_mode == BEAM_ADAPTIVE) rc = add_outlines(&look, report, err);
         if (rc == SH_OK) plan_sample_beam(look.sample, cfg->beam_mode, cfg->beam_rings, &option);

@@ -163,7 +163,7 @@ int site_set_up_detect(struct site *site, const struct sh_report *report, struct
     d->cast.signal = cfg->signal.on ? &d->signal : NULL;
     d->cast.noise_by_signal = cfg->noise_range == RANGE_NOISE_SIGNAL;
     d->cast.ghost_label = site->n_surfaces;
-    if (d->cast.surfaces != NULL && cfg->beam_mode != BEAM_SINGLE) {
+    if (d->cast.surfaces != NULL && site_casts_footprints(cfg)) {
         d->kind = calloc(d->surfaces.n + 1, sizeof *d->kind);
         rc = d->kind == NULL ? sh_fail(err, SH_ENOMEM, "no memory for kinds of surfaces")
                              : surface_kinds(&d->surfaces, d->kind, err);
@@ -180,6 +180,11 @@ int site_set_up_detect(struct site *site, const struct sh_report *report, struct
     }
     site_set_depth(site, d->cast.depth);
     return rc;
+}
+
+int site_casts_footprints(const struct config *cfg)
+{
+    return cfg->beam_mode != BEAM_SINGLE || cfg->measures;
 }
 
 void site_set_depth(struct site *site, uint32_t depth)
@@ -201,7 +206,7 @@ double site_ray_reach_m(const struct site *site, const double station_m[3])
 {
     const struct config_instrument *k = &site->cfg->instrument;
     double beside_m = hypot(k->transit_offset_m, k->mirror_offset_m), far2 = 0.0;
-    if (site->cfg->beam_mode != BEAM_SINGLE) beside_m += 0.5 * site->cfg->profile.beam_exit_m;
+    if (site_casts_footprints(site->cfg)) beside_m += 0.5 * site->cfg->profile.beam_exit_m;
     if (site->detect.cast.depth == 0) return beside_m;
     for (int i = 0; i < 3; i++) {
         double far = fmax(fabs(site->scene->min_m[i] - station_m[i]), fabs(site->scene->max_m[i] - station_m[i]));

@@ -43,7 +43,8 @@ int site_plan_order(struct site *site, struct sh_err *err)
         (int)plan_choose(row, "order", option, 2, forced, "scene.order_exactly", &tolerance);
     size_t used = strlen(row->why);
     if (!site->plan.methods.order_exactly)
-        snprintf(row->why + used, sizeof row->why - used, "; of surfaces nearer to each other than that any one");
+        snprintf(row->why + used, sizeof row->why - used,
+                 "; surfaces nearer to each other than the error may be taken for one another");
     for (uint32_t i = 0; i < site->n_movers && site->plan.methods.order_exactly; i++) {
         int rc = bvh_order_exactly(site->mover[i].bvh, err);
         if (rc != SH_OK) return rc;

@@ -8,6 +8,7 @@
 struct worker {
     const struct site *site;
     struct caster *caster;
+    struct cast_counters counted; /* of the caster, as far as slots have them */
     struct line_block block;
     struct cast_setup setup;
     uint32_t setup_station; /* 1 + the station that setup is for; 0: none yet */
@@ -183,6 +184,23 @@ static uint64_t enter_stretch(struct worker *worker, const struct device_work *w
     return next < end ? next : end;
 }
 
+/* What a cast has added to the caster's counters. */
+static void count_hits(struct worker *worker, uint32_t echoes, struct ring_slot *slot)
+{
+    struct cast_counters now, *was = &worker->counted;
+    caster_get_counters(worker->caster, &now);
+    const struct ring_hits hits = {.echoes = echoes,
+                                   .crowded = (uint32_t)(now.crowded - was->crowded),
+                                   .faint = (uint32_t)(now.faint - was->faint),
+                                   .unfit = (uint32_t)(now.unfit - was->unfit)};
+    *was = now;
+    slot->n_echoes += hits.echoes;
+    slot->n_crowded += hits.crowded;
+    slot->n_faint += hits.faint;
+    slot->n_unfit += hits.unfit;
+    ring_hits_add(&slot->tail, &hits);
+}
+
 static void cast_run(struct worker *worker, const struct device_work *work, const struct schedule_line *line,
                      uint64_t k, uint64_t end, struct ring_slot *slot, uint32_t cap)
 {
@@ -194,12 +212,11 @@ static void cast_run(struct worker *worker, const struct device_work *work, cons
         uint64_t n = stop - k < longest ? stop - k : longest;
         schedule_get_run(&work->segment, line, k, (uint32_t)n, &run);
         uint32_t echoes = caster_cast(worker->caster, &worker->setup, &run, &worker->block);
+        count_hits(worker, echoes, slot);
         uint8_t *at = slot->bytes + slot->len;
         size_t len = native_encode_points(at, cap - slot->len, &worker->block, work->scan_t0_ns);
         added(slot, len, frames_in(at, len));
         slot->n_cast += n;
-        slot->n_echoes += echoes;
-        slot->echoes_tail += echoes;
         k += n;
     }
 }
@@ -232,9 +249,9 @@ static void end_line(const struct worker *worker, const struct device_work *work
                                             : line->last_of_frame ? (uint32_t)LINE_LAST_OF_FRAME
                                                                   : 0U};
     mark->frame_at = slot->len;
-    mark->echoes_before = slot->echoes_tail;
+    mark->before = slot->tail;
     mark->scan_t0_ns = work->scan_t0_ns;
-    slot->echoes_tail = 0;
+    slot->tail = (struct ring_hits){0};
     slot->n_lines++;
     added(slot, native_encode_line_end(slot->bytes + slot->len, cap - slot->len, &mark->end, work->scan_t0_ns), 1);
 }

@@ -67,7 +67,8 @@ static const struct field points[] = {
 static const struct field line_end[] = {
     END(frame, FIELD_32),        END(line, FIELD_32),      END(pulse0, FIELD_64), END(t0_ns, FIELD_64),
     END(t1_ns, FIELD_64),        END(n_fired, FIELD_32),   END(n_cast, FIELD_32), END(n_echoes, FIELD_32),
-    END(mirror_count, FIELD_32), END(pan_count, FIELD_32), END(status, FIELD_32),
+    END(mirror_count, FIELD_32), END(pan_count, FIELD_32), END(status, FIELD_32), END(n_crowded, FIELD_32),
+    END(n_faint, FIELD_32),      END(n_unfit, FIELD_32),
 };
 
 #define TELE(member, kind) ROW(native_telemetry, member, kind)
@@ -95,7 +96,7 @@ static const struct field pose[] = {
 const struct field_table fields_descriptor = TABLE(descriptor, native_descriptor, 272);
 const struct field_table fields_anchor = TABLE(anchor, native_anchor, 280);
 const struct field_table fields_points = TABLE(points, native_points, NATIVE_POINTS_HEAD_LEN);
-const struct field_table fields_line_end = TABLE(line_end, native_line_end, 56);
+const struct field_table fields_line_end = TABLE(line_end, native_line_end, 68);
 const struct field_table fields_telemetry = TABLE(telemetry, native_telemetry, 72);
 const struct field_table fields_pose = TABLE(pose, native_pose, NATIVE_POSE_LEN);
 const struct field_table fields_event = TABLE(event, native_event, 128);

@@ -116,6 +116,8 @@ struct native_line_end {
     uint64_t pulse0;
     int64_t t0_ns, t1_ns;
     uint32_t n_fired, n_cast, n_echoes, mirror_count, pan_count, status;
+    uint32_t n_crowded, n_faint,
+        n_unfit; /* echoes left out, hits not detected, echoes that did not fit; 0: or unknown */
 };
 
 enum native_pose_flags { /* the values of core/pose.h */

@@ -7,6 +7,8 @@
 
 /* The first heads sent no scales by axis, no kind of height and no axes; later ones no frame scalar. */
 enum { ANCHOR_LEN_FIRST = 168, ANCHOR_LEN_AXES = 272, ANCHOR_LEN = 280 };
+/* Nor did they count what is no echo. */
+enum { LINE_END_LEN_FIRST = 56, LINE_END_LEN = 68 };
 
 int native_decode_descriptor(const uint8_t *payload, size_t len, struct native_descriptor *out)
 {
@@ -57,7 +59,10 @@ void native_decode_point(const uint8_t *payload, uint32_t i, struct native_point
 
 int native_decode_line_end(const uint8_t *payload, size_t len, struct native_line_end *out)
 {
-    return fields_decode(&fields_line_end, payload, len, out);
+    uint8_t whole[LINE_END_LEN] = {0};
+    if (len < LINE_END_LEN_FIRST) return SH_EFORMAT;
+    memcpy(whole, payload, len < LINE_END_LEN ? LINE_END_LEN_FIRST : LINE_END_LEN);
+    return fields_decode(&fields_line_end, whole, sizeof whole, out);
 }
 
 int native_decode_telemetry(const uint8_t *payload, size_t len, struct native_telemetry *out)

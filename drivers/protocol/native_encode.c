@@ -68,6 +68,9 @@ size_t native_encode_line_end(uint8_t *dst, size_t cap, const struct line_end *e
         .mirror_count = end->mirror_count,
         .pan_count = end->pan_count,
         .status = end->status,
+        .n_crowded = end->n_crowded,
+        .n_faint = end->n_faint,
+        .n_unfit = end->n_unfit,
     };
     return encode_fixed(dst, cap, NATIVE_LINE_END, &fields_line_end, &wire, scan_t0_ns + end->t1_ns, 0);
 }

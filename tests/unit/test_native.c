@@ -209,13 +209,25 @@ static void test_anchor(void **state)
 static void test_line_end(void **state)
 {
     (void)state;
-    struct line_end e = {1, UINT32_MAX, UINT64_MAX - 1, 3, 4, 5, -6, 7000, UINT32_MAX - 2, 9, LINE_PARTIAL};
+    struct line_end e = {1,  UINT32_MAX, UINT64_MAX - 1, 3, 4, 5, -6, 7000, UINT32_MAX - 2, 9, LINE_PARTIAL,
+                         10, 11,         UINT32_MAX - 3};
     size_t len = native_encode_line_end(out, sizeof out, &e, 1000);
-    check_frame(out, len, 4, 0, 56, 1000 + e.t1_ns);
+    check_frame(out, len, 4, 0, 68, 1000 + e.t1_ns);
     const uint8_t *p = out + 28;
     struct native_line_end back;
-    assert_int_equal(native_decode_line_end(p, 56, &back), 0);
+    /* the first heads' line ends had no counts; what is between them and these is none either */
     assert_int_equal(native_decode_line_end(p, 55, &back), SH_EFORMAT);
+    for (size_t n = 56; n < 68; n++) {
+        assert_int_equal(native_decode_line_end(p, n, &back), 0);
+        assert_int_equal(back.status, e.status);
+        assert_int_equal(back.n_crowded | back.n_faint | back.n_unfit, 0);
+    }
+    assert_int_equal(native_decode_line_end(p, 68, &back), 0);
+    assert_int_equal(wire(p, 56, 4), e.n_crowded);
+    assert_int_equal(wire(p, 60, 4), e.n_faint);
+    assert_int_equal(wire(p, 64, 4), e.n_unfit);
+    assert_int_equal(back.n_crowded, e.n_crowded);
+    assert_int_equal(back.n_unfit, e.n_unfit);
     assert_int_equal(wire(p, 0, 4), e.frame);
     assert_int_equal(wire(p, 4, 4), e.line);
     assert_int_equal(wire(p, 8, 8), e.pulse0);

@@ -170,12 +170,14 @@ static void a_claimed_slot_is_empty(void **state)
     for (uint64_t tick = 0; tick < 3 * ring.n_slots; tick++) {
         struct ring_slot *slot = ring_claim(&ring, tick);
         assert_non_null(slot);
-        assert_true(slot->len == 0 && slot->n_frames == 0 && slot->n_marks == 0 && slot->echoes_tail == 0 &&
+        assert_true(slot->len == 0 && slot->n_frames == 0 && slot->n_marks == 0 && slot->tail.echoes == 0 &&
                     slot->first_seq == 0);
         assert_true(slot->n_fired == 0 && slot->n_cast == 0 && slot->n_echoes == 0 && slot->n_lines == 0);
+        assert_true(slot->n_crowded == 0 && slot->n_faint == 0 && slot->n_unfit == 0 && slot->tail.crowded == 0);
         memset(slot->bytes, 0xff, SLOT_BYTES);
-        slot->len = slot->n_frames = slot->n_marks = slot->echoes_tail = 1;
+        slot->len = slot->n_frames = slot->n_marks = slot->tail.echoes = 1;
         slot->n_fired = slot->n_cast = slot->n_echoes = slot->n_lines = 1;
+        slot->n_crowded = slot->n_faint = slot->n_unfit = slot->tail.crowded = 1;
         assert_true(ring_ready(&ring, slot, tick));
         ring_release(&ring, tick);
     }
