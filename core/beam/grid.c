@@ -312,13 +312,15 @@ static uint32_t list_around(const struct beam_outlines *o, const float *dx, cons
 {
     const float reach = (float)OUTLINE_AROUND_RAD, step = sqrtf(longest_step2(dx, dy, dz, n)) + 1e-6f;
     const uint32_t half = step * TOGETHER > reach ? (uint32_t)(reach / step) : TOGETHER, group = 2 * half + 1;
-    uint32_t found = 0, groups = 0;
-    for (uint32_t base = 0; base < n; base += group, groups++) {
+    uint32_t found = 0, groups = 0, base = 0;
+    if (n == 0) return 0;
+    do {
         uint32_t middle = base + half < n ? base + half : n - 1;
         few->dx[groups] = dx[middle];
         few->dy[groups] = dy[middle];
-        few->dz[groups] = dz[middle];
-    }
+        few->dz[groups++] = dz[middle];
+        base += group;
+    } while (base < n);
     cells_of(few->dx, few->dy, few->dz, groups, few->cell);
     for (uint32_t k = 0; k < groups; k++) {
         uint32_t end = (k + 1) * group < n ? (k + 1) * group : n;
