@@ -40,42 +40,42 @@ static uint32_t choose(const struct beam_echoes *e, enum beam_select select, uin
     return best;
 }
 
-static void keep(struct caster *c, const struct cast_setup *s, uint32_t n)
+/* What pulses of several points have in common with them, before the others' positions overwrite it. */
+static void keep(struct caster *c, const struct cast_setup *s, uint32_t left)
 {
     struct beam_work *w = c->beam;
-    const size_t bytes = n * sizeof(double);
-    memcpy(w->range_m, c->range_m, bytes);
-    memcpy(w->label, c->label, n * sizeof *w->label);
-    memcpy(w->mirror_turn, c->mirror_turn, bytes);
-    memcpy(w->pan_turn, c->pan_turn, bytes);
-    if (s->layout == LINE_GEO) {
-        memcpy(w->ex, c->ex, bytes);
-        memcpy(w->ey, c->ey, bytes);
-        memcpy(w->ez, c->ez, bytes);
-    }
-    if (s->n_knots != 0) {
-        memcpy(w->px, c->moving.px, bytes);
-        memcpy(w->py, c->moving.py, bytes);
-        memcpy(w->pz, c->moving.pz, bytes);
+    for (uint32_t k = 0; k < left; k++) {
+        const uint32_t p = w->several[k].pulse;
+        w->mirror_turn[k] = c->mirror_turn[p];
+        w->pan_turn[k] = c->pan_turn[p];
+        if (s->layout == LINE_GEO) {
+            w->ex[k] = c->ex[p];
+            w->ey[k] = c->ey[p];
+            w->ez[k] = c->ez[p];
+        }
+        if (s->n_knots != 0) {
+            w->px[k] = c->moving.px[p];
+            w->py[k] = c->moving.py[p];
+            w->pz[k] = c->moving.pz[p];
+        }
     }
 }
 
-/* What pulses p .. p + n - 1 have in common with their points at k .. */
-static void restore(struct caster *c, const struct cast_setup *s, uint32_t p, uint32_t n, uint32_t k)
+/* Point i gets what was kept of pulse k. */
+static void restore(struct caster *c, const struct cast_setup *s, uint32_t k, uint32_t i)
 {
     const struct beam_work *w = c->beam;
-    const size_t bytes = n * sizeof(double);
-    memcpy(c->mirror_turn + k, w->mirror_turn + p, bytes);
-    memcpy(c->pan_turn + k, w->pan_turn + p, bytes);
+    c->mirror_turn[i] = w->mirror_turn[k];
+    c->pan_turn[i] = w->pan_turn[k];
     if (s->layout == LINE_GEO) {
-        memcpy(c->ex + k, w->ex + p, bytes);
-        memcpy(c->ey + k, w->ey + p, bytes);
-        memcpy(c->ez + k, w->ez + p, bytes);
+        c->ex[i] = w->ex[k];
+        c->ey[i] = w->ey[k];
+        c->ez[i] = w->ez[k];
     }
     if (s->n_knots != 0) {
-        memcpy(c->moving.px + k, w->px + p, bytes);
-        memcpy(c->moving.py + k, w->py + p, bytes);
-        memcpy(c->moving.pz + k, w->pz + p, bytes);
+        c->moving.px[i] = w->px[k];
+        c->moving.py[i] = w->py[k];
+        c->moving.pz[i] = w->pz[k];
     }
 }
 
@@ -110,18 +110,16 @@ static uint32_t drop_unfit(struct caster *c, struct line_block *b, uint32_t at, 
     return to - at;
 }
 
-/* Points on their way into the block, CHUNK at most at a time. */
+/* A chunk on its way into the block. */
 struct writer {
     struct caster *c;
     const struct cast_setup *s;
     struct line_block *block;
-    const uint32_t *dt_ns;
+    const uint32_t *dt_ns; /* of the pulses */
     uint64_t pulse0;
     int linear;
-    uint32_t at; /* the piece's first entry */
-    uint32_t n, n_numbers, echoes;
-    uint16_t numbered[CHUNK]; /* points of pulses with several */
-    uint8_t number[CHUNK];
+    uint32_t at, n, left; /* the chunk's first entry; pulses; those of several points */
+    uint32_t echoes, unfit;
 };
 
 /* Keyed by pulse and echo, whether others are sent or not; the first echo's is that of a single ray. */
@@ -134,65 +132,98 @@ static void write_noise(struct writer *w, uint32_t n)
                       rng_normal(s->noise_key, w->c->beam->counter[i]);
 }
 
-static void write_piece(struct writer *w)
+/* Each pulse's only or first point, which stand in c as they are; no times yet. */
+static void write_firsts(struct writer *w)
 {
     struct caster *c = w->c;
     struct line_block *b = w->block;
-    uint32_t n = w->n;
-    if (n == 0) return;
-    uint32_t echoes = kernel_detect(c->range_m, w->s->range_min_m, w->s->range_max_m, n, b->echo + w->at);
-    kernel_labels(c->label, b->echo + w->at, n, b->label + w->at);
-    for (uint32_t i = 0; i < n; i++)
-        b->refl_cdb[w->at + i] = LINE_REFL_NONE;
-    for (uint32_t i = 0; i < w->n_numbers; i++)
-        b->echo[w->at + w->numbered[i]] = w->number[i];
+    const uint32_t n = w->n, at = w->at;
+    w->echoes = kernel_detect(c->range_m, w->s->range_min_m, w->s->range_max_m, n, b->echo + at);
+    kernel_labels(c->label, b->echo + at, n, b->label + at);
+    for (uint32_t i = 0; i < n && w->s->noise_on; i++)
+        c->beam->counter[i] = rng_echo(w->pulse0 + i, c->beam->number[i]);
     if (w->s->noise_on) write_noise(w, n);
-    if (caster_wire(c, w->s, w->linear, c->range_m, b, w->at, n) != 0) {
-        echoes = 0;
-        n = drop_unfit(c, b, w->at, n, &echoes);
-    }
-    w->echoes += echoes;
-    w->at += n;
-    w->n = w->n_numbers = 0;
+    w->unfit = caster_wire(c, w->s, w->linear, c->range_m, b, at, n);
 }
 
-/* Pulses p .. end - 1, of one point each, whose ranges and labels are kept. */
-static void write_plain(struct writer *w, uint32_t p, uint32_t end)
+/* The further points, CHUNK at most at a time: positions into `more`. Returns how many. */
+static uint32_t write_further(struct writer *w, const struct beam_echoes *e, struct line_block *more)
 {
-    const struct beam_work *kept = w->c->beam;
-    while (p < end) {
-        if (w->n == CHUNK) write_piece(w);
-        uint32_t n = end - p < CHUNK - w->n ? end - p : CHUNK - w->n, k = w->n;
-        restore(w->c, w->s, p, n, k);
-        memcpy(w->c->range_m + k, kept->range_m + p, n * sizeof(double));
-        memcpy(w->c->label + k, kept->label + p, n * sizeof(uint32_t));
-        memmove(w->block->dt_ns + w->at + k, w->dt_ns + p, n * sizeof(uint32_t));
-        if (w->s->noise_on)
-            for (uint32_t i = 0; i < n; i++)
-                w->c->beam->counter[k + i] = rng_echo(w->pulse0 + p + i, kept->number[p + i]);
-        w->n += n;
-        p += n;
+    struct caster *c = w->c;
+    uint32_t done = 0, n = 0;
+    for (uint32_t k = 0; k < w->left; k++) {
+        const struct several *of = &c->beam->several[k];
+        for (uint32_t i = of->first + 1; i < of->first + of->n; i++, n++) {
+            if (n == CHUNK) {
+                if (w->s->noise_on) write_noise(w, n);
+                w->unfit += caster_wire(c, w->s, w->linear, c->range_m, more, done, n);
+                done += n;
+                n = 0;
+            }
+            restore(c, w->s, k, n);
+            c->range_m[n] = e->range_m[i];
+            c->beam->counter[n] = rng_echo(w->pulse0 + of->pulse, e->number[i]);
+        }
     }
+    if (w->s->noise_on) write_noise(w, n);
+    w->unfit += caster_wire(c, w->s, w->linear, c->range_m, more, done, n);
+    return done + n;
 }
 
-/* A pulse of several. */
-static void write_several(struct writer *w, uint32_t p, const struct beam_echoes *e, uint32_t first, uint32_t count)
+/* n entries of the block, but for their times. */
+static void move_entries(struct line_block *b, uint32_t to, uint32_t from, uint32_t n)
 {
-    if (w->n + count > CHUNK) write_piece(w);
-    for (uint32_t i = 0; i < count; i++) {
-        uint32_t k = w->n++;
-        restore(w->c, w->s, p, 1, k);
-        w->c->range_m[k] = e->range_m[first + i];
-        w->c->label[k] = e->label[first + i];
-        w->block->dt_ns[w->at + k] = w->dt_ns[p];
-        w->c->beam->counter[k] = rng_echo(w->pulse0 + p, e->number[first + i]);
-        w->numbered[w->n_numbers] = (uint16_t)k;
-        w->number[w->n_numbers++] = (uint8_t)((i + 1) | count << 4);
+    memmove(b->a + to, b->a + from, n * sizeof *b->a);
+    memmove(b->b + to, b->b + from, n * sizeof *b->b);
+    memmove(b->c + to, b->c + from, n * sizeof *b->c);
+    memmove(b->label + to, b->label + from, n * sizeof *b->label);
+    memmove(b->echo + to, b->echo + from, n * sizeof *b->echo);
+}
+
+/* The further points go behind the first ones of their pulses: from the last one on, which moves furthest. */
+static void insert_further(struct writer *w, const struct beam_echoes *e, const struct line_block *more, uint32_t n)
+{
+    struct line_block *b = w->block;
+    uint32_t to = w->at + w->n + n, end = w->n;
+    for (uint32_t k = w->left; k-- > 0;) {
+        const struct several *of = &w->c->beam->several[k];
+        uint32_t behind = end - of->pulse - 1;
+        to -= behind;
+        move_entries(b, to, w->at + of->pulse + 1, behind);
+        for (uint32_t i = of->n; i-- > 1;) {
+            to--;
+            n--;
+            b->a[to] = more->a[n];
+            b->b[to] = more->b[n];
+            b->c[to] = more->c[n];
+            b->label[to] = (uint16_t)e->label[of->first + i];
+            b->echo[to] = (uint8_t)((i + 1) | of->n << 4);
+        }
+        to--;
+        end = of->pulse;
+        move_entries(b, to, w->at + end, 1);
+        b->echo[to] = (uint8_t)(1 | of->n << 4);
     }
 }
 
-/* Pulses of a chunk with sub-rays are near[0 .. cut - 1], their echoes in e. Those that send one point become as the
- * plain ones, in c. Returns how many send several. */
+/* Times of all entries. They may wait in the same array, further on: from the first one on. */
+static void write_times(struct writer *w)
+{
+    uint32_t *to = w->block->dt_ns + w->at, from = 0;
+    for (uint32_t k = 0; k < w->left; k++) {
+        const struct several *of = &w->c->beam->several[k];
+        uint32_t dt_ns = w->dt_ns[of->pulse];
+        memmove(to, w->dt_ns + from, (of->pulse - from) * sizeof *to);
+        to += of->pulse - from;
+        for (uint32_t i = 0; i < of->n; i++)
+            *to++ = dt_ns;
+        from = of->pulse + 1;
+    }
+    if (to != w->dt_ns + from) memmove(to, w->dt_ns + from, (w->n - from) * sizeof *to);
+}
+
+/* Pulses of a chunk with sub-rays are near[0 .. cut - 1], their echoes in e. What they send, or of several the
+ * first, becomes as with the plain ones, in c. Returns how many send several. */
 static uint32_t make_plain(struct caster *c, const struct cast_setup *s, const struct beam_echoes *e, uint32_t cut,
                            struct several *several)
 {
@@ -202,11 +233,9 @@ static uint32_t make_plain(struct caster *c, const struct cast_setup *s, const s
         uint32_t p = w->near[k];
         for (end = i; end < e->n && e->pulse[end] == p;)
             end++;
-        if (end - i > 1 && s->echoes == BEAM_ALL) {
-            several[left++] = (struct several){p, i, end - i};
-            continue;
-        }
-        uint32_t one = end == i ? 0 : choose(e, s->echoes, i, end);
+        int all = end - i > 1 && s->echoes == BEAM_ALL;
+        if (all) several[left++] = (struct several){p, i, end - i};
+        uint32_t one = end == i ? 0 : all ? i : choose(e, s->echoes, i, end);
         c->range_m[p] = end == i ? (double)NAN : e->range_m[one];
         if (end == i) continue;
         c->label[p] = e->label[one];
@@ -215,43 +244,41 @@ static uint32_t make_plain(struct caster *c, const struct cast_setup *s, const s
     return left;
 }
 
-/* All pulses have one point each: they stand in c as they are. */
-static void write_all_plain(struct writer *w, uint32_t n)
+static void write_points(struct writer *w, const struct beam_echoes *e, uint32_t cut)
 {
-    if (w->dt_ns != w->block->dt_ns + w->at) memmove(w->block->dt_ns + w->at, w->dt_ns, n * sizeof *w->dt_ns);
-    for (uint32_t i = 0; i < n && w->s->noise_on; i++)
-        w->c->beam->counter[i] = rng_echo(w->pulse0 + i, w->c->beam->number[i]);
-    w->n = n;
-    write_piece(w);
-}
-
-static void write_points(struct writer *w, const struct beam_echoes *e, uint32_t n, uint32_t cut)
-{
-    struct several *several = w->c->beam->several;
-    if (w->s->noise_on) memset(w->c->beam->number, 0, n);
-    uint32_t left = make_plain(w->c, w->s, e, cut, several), from = 0;
-    if (left == 0) {
-        write_all_plain(w, n);
-        return;
+    struct caster *c = w->c;
+    struct beam_work *work = c->beam;
+    struct line_block more = {.a = work->a, .b = work->b, .c = work->c};
+    uint32_t n = w->n;
+    if (w->s->noise_on) memset(work->number, 0, n);
+    w->left = make_plain(c, w->s, e, cut, work->several);
+    keep(c, w->s, w->left);
+    write_firsts(w);
+    if (w->left != 0) {
+        uint32_t further = write_further(w, e, &more);
+        insert_further(w, e, &more, further);
+        w->echoes += further;
+        n += further;
     }
-    keep(w->c, w->s, n);
-    for (uint32_t k = 0; k < left; k++) {
-        write_plain(w, from, several[k].pulse);
-        write_several(w, several[k].pulse, e, several[k].first, several[k].n);
-        from = several[k].pulse + 1;
+    write_times(w);
+    int16_t *refl_cdb = w->block->refl_cdb + w->at;
+    for (uint32_t i = 0; i < n; i++)
+        refl_cdb[i] = LINE_REFL_NONE;
+    if (w->unfit != 0) {
+        w->echoes = 0;
+        n = drop_unfit(c, w->block, w->at, n, &w->echoes);
     }
-    write_plain(w, from, n);
-    write_piece(w);
+    w->at += n;
 }
 
 uint32_t beam_write_points(struct caster *c, const struct cast_setup *s, int linear, uint64_t pulse0,
                            const uint32_t *dt_ns, uint32_t n, struct line_block *block, uint32_t *at)
 {
-    struct writer writer = {.c = c, .s = s, .block = block, .dt_ns = dt_ns, .pulse0 = pulse0, .linear = linear};
+    struct writer writer = {.c = c, .s = s, .block = block, .dt_ns = dt_ns, .pulse0 = pulse0, .linear = linear, .n = n};
     writer.at = *at;
     detect_echoes(s, &c->beam->some);
     caster_ends(c, CAST_DETECT);
-    write_points(&writer, &c->beam->some, n, c->beam->n_near);
+    write_points(&writer, &c->beam->some, c->beam->n_near);
     caster_ends(c, CAST_POSITIONS);
     *at = writer.at;
     return writer.echoes;

@@ -60,13 +60,13 @@ struct beam_work {
     struct beam_return returns[(BEAM_MAX_SUBRAYS + 1) * (1 + CAST_MAX_DEPTH)];
     uint32_t n_returns;
     struct beam_echoes some; /* of pulses with sub-rays */
-    /* per pulse, while c holds what is per point */
-    double range_m[CHUNK], mirror_turn[CHUNK], pan_turn[CHUNK];
+    /* of pulses of several points, as c has it: */
+    double mirror_turn[CHUNK], pan_turn[CHUNK];
     double ex[CHUNK], ey[CHUNK], ez[CHUNK], px[CHUNK], py[CHUNK], pz[CHUNK];
-    uint32_t label[CHUNK];
+    uint32_t a[CAST_LIST], b[CAST_LIST], c[CAST_LIST]; /* of their points but the first, as in a block */
     struct several several[CHUNK]; /* by pulse; for beam_points.c, in order of pulse, those of several points */
     uint64_t counter[CHUNK];       /* of the points' random numbers */
-    uint8_t number[CHUNK];         /* of the echo that a pulse of one point sends */
+    uint8_t number[CHUNK];         /* of a pulse's only or first echo */
     struct behind behind;
 };
 
