@@ -261,9 +261,7 @@ static void write_points(struct writer *w, const struct beam_echoes *e, uint32_t
         n += further;
     }
     write_times(w);
-    int16_t *refl_cdb = w->block->refl_cdb + w->at;
-    for (uint32_t i = 0; i < n; i++)
-        refl_cdb[i] = LINE_REFL_NONE;
+    caster_no_reflectance(w->block, w->at, n);
     if (w->unfit != 0) {
         w->echoes = 0;
         n = drop_unfit(c, w->block, w->at, n, &w->echoes);

@@ -285,8 +285,7 @@ static uint32_t single_chunk(struct caster *c, const struct cast_setup *s, int l
 {
     uint32_t echoes = kernel_detect(c->range_m, s->range_min_m, s->range_max_m, n, block->echo + at);
     kernel_labels(c->label, block->echo + at, n, block->label + at);
-    for (uint32_t i = 0; i < n; i++)
-        block->refl_cdb[at + i] = LINE_REFL_NONE;
+    caster_no_reflectance(block, at, n);
     caster_ends(c, CAST_DETECT);
     if (s->noise_on) kernel_noise(s, pulse0, n, c->range_m);
     caster_ends(c, CAST_NOISE);

@@ -124,6 +124,15 @@ void caster_hits_from(struct caster *c, const struct bvh *bvh, const struct orig
 /* What the rays of a chunk meet first, of all there is. */
 void caster_nearest(struct caster *c, const struct cast_setup *s, const struct origins *from, const struct ray_set *set,
                     uint32_t n);
+/* n entries from `at` on without a reflectance: nothing is known of it. (By a pointer of its own the loop is vectors.)
+ */
+static inline void caster_no_reflectance(const struct line_block *block, uint32_t at, uint32_t n)
+{
+    int16_t *refl_cdb = block->refl_cdb + at;
+    for (uint32_t i = 0; i < n; i++)
+        refl_cdb[i] = LINE_REFL_NONE;
+}
+
 /* Positions as a head computes them, from range_m and what its encoders read (c->e, or the turns): entries at .. at + n
  * of the block. Returns how many coordinates did not fit; they are LINE_XYZ_NONE. */
 uint32_t caster_wire(struct caster *c, const struct cast_setup *s, int linear, const double *range_m,

@@ -46,17 +46,22 @@ static void expect_notice(struct bench *bench, const char *part)
     if (strstr(event.peer, part) == NULL) fail_msg("\"%s\" has no \"%s\"", event.peer, part);
 }
 
-static void test_usbip(void **state)
+static struct bench open_attached(int retry_ms)
 {
-    (void)state;
     struct link_spec spec = {.type = LINK_USB,
                              .backend = USB_BACKEND_USBIP,
                              .speed = USB_RATE_HIGH,
                              .vid = 0x1209,
                              .pid = 1,
                              .attach = 1,
-                             .retry_ms = 1};
-    struct bench bench = bench_open(&spec);
+                             .retry_ms = retry_ms};
+    return bench_open(&spec);
+}
+
+static void test_usbip(void **state)
+{
+    (void)state;
+    struct bench bench = open_attached(1);
     for (int round = 0; round < 3; round++) {
         char name[300], want[40];
         struct client c = host_of(&bench);
@@ -94,14 +99,7 @@ static void test_usbip_refused(void **state)
 static void test_pace(void **state)
 {
     (void)state;
-    struct link_spec spec = {.type = LINK_USB,
-                             .backend = USB_BACKEND_USBIP,
-                             .speed = USB_RATE_HIGH,
-                             .vid = 0x1209,
-                             .pid = 1,
-                             .attach = 1,
-                             .retry_ms = 3600000};
-    struct bench bench = bench_open(&spec);
+    struct bench bench = open_attached(3600000);
     const int attempts = vhci.attempts;
     struct client c = host_of(&bench);
     close(c.fd);
