@@ -147,10 +147,13 @@ struct beam_outlines_info {
 void beam_outlines_get_info(const struct beam_outlines *outlines, struct beam_outlines_info *info);
 
 enum { BEAM_NEAR_MOST = 1024 };
-/* The pulses, of n <= BEAM_NEAR_MOST unit directions, whose footprint may reach one, at whatever range: their indices,
- * and cell[i] for each pulse i of these. Returns how many. */
+/* A pulse whose footprint may reach outlines first .. end. */
+struct beam_near {
+    uint32_t pulse, first, end;
+};
+/* Those, at whatever range, of n <= BEAM_NEAR_MOST unit directions. Returns how many. */
 uint32_t beam_near_outlines(const struct beam_outlines *outlines, const struct beam *beam, const float *dx,
-                            const float *dy, const float *dz, uint32_t n, uint32_t *cell, uint32_t *pulse);
+                            const float *dy, const float *dz, uint32_t n, struct beam_near *near);
 
 enum { BEAM_MAX_LINES = 12, BEAM_MAX_PARTS = 64 };
 
@@ -158,11 +161,12 @@ enum { BEAM_MAX_LINES = 12, BEAM_MAX_PARTS = 64 };
 struct beam_line {
     double n[2], h;
 };
-/* The outlines that cross the footprint of a pulse nearer than limit_m; cell: its direction's.
- * Returns their number, up to BEAM_MAX_LINES, or BEAM_MAX_LINES + 1: more than that. *next_m: from which range on there
- * may be more (INFINITY: none, or nothing crosses it up to limit_m). */
-uint32_t beam_find_lines(const struct beam_outlines *outlines, const struct beam *beam, uint32_t cell,
-                         const double dir[3], double limit_m, struct beam_line *line, double *next_m);
+/* The outlines that cross the footprint of a pulse nearer than limit_m. e1, e2: its beam_axes, which the lines refer
+ * to. Returns their number, up to BEAM_MAX_LINES, or BEAM_MAX_LINES + 1: more than that. *next_m: from which range on
+ * there may be more (INFINITY: none, or nothing crosses it up to limit_m). */
+uint32_t beam_find_lines(const struct beam_outlines *outlines, const struct beam *beam, const struct beam_near *near,
+                         const double dir[3], const double e1[3], const double e2[3], double limit_m,
+                         struct beam_line *line, double *next_m);
 
 /* The parts that lines cut the footprint into. Each lies on one surface; convex, so that its centre of energy is in
  * it. */

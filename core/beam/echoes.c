@@ -54,32 +54,44 @@ static void sort(struct beam_return *r, uint32_t n)
         }
 }
 
+/* Mean (less the first one's) and variance of ranges, weighted by what comes back or else by energy, `all` together.
+ * Gives the index of the strongest. */
+static uint32_t average(const struct beam_return *r, uint32_t n, double all, int by_back, double *mean,
+                        double *variance)
+{
+    double first = 0.0, second = 0.0;
+    uint32_t strongest = 0;
+    for (uint32_t i = 0; i < n; i++) {
+        double d = r[i].range_m - r[0].range_m, weight = by_back ? r[i].back : r[i].energy;
+        first += weight * d;
+        second += weight * (d * d + (double)r[i].sigma_m * (double)r[i].sigma_m);
+        if (by_back ? r[i].back > r[strongest].back : r[i].energy > r[strongest].energy) strongest = i;
+    }
+    *mean = first / all;
+    *variance = fmax(0.0, second / all - *mean * *mean);
+    return strongest;
+}
+
 /* One echo from returns that hang together. Returns 0 where they are too weak for one. */
 static int append(const struct beam *beam, const struct beam_return *r, uint32_t n, uint32_t pulse,
                   struct beam_echoes *e)
 {
-    double energy = 0.0, back = 0.0, first = 0.0, second = 0.0;
+    double energy = 0.0, back = 0.0, mean = 0.0, variance = (double)r[0].sigma_m * (double)r[0].sigma_m;
     uint32_t strongest = 0;
     for (uint32_t i = 0; i < n; i++) {
         energy += r[i].energy;
         back += r[i].back;
     }
     if (energy < BEAM_LEAST_ENERGY) return 0;
-    for (uint32_t i = 0; i < n; i++) {
-        double d = r[i].range_m - r[0].range_m, weight = back > 0.0 ? r[i].back : r[i].energy;
-        first += weight * d;
-        second += weight * (d * d + (double)r[i].sigma_m * (double)r[i].sigma_m);
-        if (back > 0.0 ? r[i].back > r[strongest].back : r[i].energy > r[strongest].energy) strongest = i;
-    }
-    double all = back > 0.0 ? back : energy;
-    double mean = first / all, variance = fmax(0.0, second / all - mean * mean);
+    if (n > 1) strongest = average(r, n, back > 0.0 ? back : energy, back > 0.0, &mean, &variance);
     uint32_t at = e->n++;
     e->pulse[at] = pulse;
     e->range_m[at] = r[0].range_m + mean;
     e->energy[at] = (float)energy;
     e->back[at] = (float)back;
     e->cosine[at] = r[strongest].cosine;
-    e->width_m[at] = (float)sqrt(beam->resolution_m * beam->resolution_m + 8.0 * log(2.0) * variance);
+    e->width_m[at] = variance == 0.0 ? (float)beam->resolution_m
+                                     : (float)sqrt(beam->resolution_m * beam->resolution_m + 8.0 * log(2.0) * variance);
     e->triangle[at] = r[strongest].triangle;
     e->label[at] = r[strongest].label;
     return 1;

@@ -330,12 +330,12 @@ static uint32_t list_around(const struct beam_outlines *o, const float *dx, cons
     return found;
 }
 
-/* Pulses in cells that lead to some. */
+/* Pulses in cells that lead to some; near->first: the cell. */
 static uint32_t in_cells(const struct beam_outlines *o, const float *dx, const float *dy, const float *dz, uint32_t n,
-                         uint32_t *cell, uint32_t *pulse)
+                         struct beam_near *near)
 {
     struct few few;
-    uint32_t around = list_around(o, dx, dy, dz, n, &few, pulse), found = 0;
+    uint32_t pulse[BEAM_NEAR_MOST], around = list_around(o, dx, dy, dz, n, &few, pulse), found = 0;
     for (uint32_t k = 0; k < around; k++) {
         few.dx[k] = dx[pulse[k]];
         few.dy[k] = dy[pulse[k]];
@@ -343,40 +343,43 @@ static uint32_t in_cells(const struct beam_outlines *o, const float *dx, const f
     }
     cells_of(few.dx, few.dy, few.dz, around, few.cell);
     for (uint32_t k = 0; k < around; k++) {
-        uint32_t i = pulse[k];
-        cell[i] = few.cell[k];
-        pulse[found] = i;
+        near[found].pulse = pulse[k];
+        near[found].first = few.cell[k];
         found += (uint32_t)is_set(o->any, few.cell[k]);
     }
     return found;
 }
 
 /* Brings what looking for lines is going to read, step by step for all pulses at once. */
-static void prefetch(const struct beam_outlines *o, const uint32_t *cell, const uint32_t *pulse, uint32_t n)
+static void look_up(const struct beam_outlines *o, struct beam_near *near, uint32_t n)
 {
     for (uint32_t k = 0; k < n; k++)
-        __builtin_prefetch(&o->first[cell[pulse[k]]], 0, 3);
-    for (uint32_t k = 0; k < n; k++)
-        __builtin_prefetch(&o->entry[o->first[cell[pulse[k]]]], 0, 3);
+        __builtin_prefetch(&o->first[near[k].first], 0, 3);
+    for (uint32_t k = 0; k < n; k++) {
+        const uint32_t *first = &o->first[near[k].first];
+        near[k].first = first[0];
+        near[k].end = first[1];
+        __builtin_prefetch(&o->entry[first[0]], 0, 3);
+    }
 }
 
 /* Most cells lead to none, and most of those that lead to some are wider than the footprint; ranges are looked at
  * later. */
 uint32_t beam_near_outlines(const struct beam_outlines *o, const struct beam *beam, const float *dx, const float *dy,
-                            const float *dz, uint32_t n, uint32_t *cell, uint32_t *pulse)
+                            const float *dz, uint32_t n, struct beam_near *near)
 {
     uint32_t left = 0;
     if (o->info.entries == 0) return 0;
-    uint32_t found = in_cells(o, dx, dy, dz, n, cell, pulse);
-    prefetch(o, cell, pulse, found);
+    uint32_t found = in_cells(o, dx, dy, dz, n, near);
+    look_up(o, near, found);
     for (uint32_t k = 0; k < found; k++) {
-        uint32_t i = pulse[k], at = o->first[cell[i]], end = o->first[cell[i] + 1];
-        const float d[3] = {dx[i], dy[i], dz[i]};
-        while (at < end && outline_is_clear(beam, &o->entry[at], d))
-            at++;
-        if (at == end) continue;
-        __builtin_prefetch(&o->edge[o->entry[at].edge], 0, 3);
-        pulse[left++] = i;
+        struct beam_near one = near[k];
+        const float d[3] = {dx[one.pulse], dy[one.pulse], dz[one.pulse]};
+        while (one.first < one.end && outline_is_clear(beam, &o->entry[one.first], d))
+            one.first++;
+        if (one.first == one.end) continue;
+        __builtin_prefetch(&o->edge[o->entry[one.first].edge], 0, 3);
+        near[left++] = one;
     }
     return left;
 }

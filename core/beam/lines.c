@@ -88,15 +88,14 @@ static int is_known(const struct beam_line *line, uint32_t n, const struct beam_
     return 0;
 }
 
-uint32_t beam_find_lines(const struct beam_outlines *o, const struct beam *beam, uint32_t cell, const double dir[3],
-                         double limit_m, struct beam_line *line, double *next_m)
+uint32_t beam_find_lines(const struct beam_outlines *o, const struct beam *beam, const struct beam_near *near,
+                         const double dir[3], const double e1[3], const double e2[3], double limit_m,
+                         struct beam_line *line, double *next_m)
 {
     uint32_t n = 0;
     const float d[3] = {(float)dir[0], (float)dir[1], (float)dir[2]};
-    double e1[3], e2[3];
-    int axes = 0;
     *next_m = INFINITY;
-    for (uint32_t k = o->first[cell]; k < o->first[cell + 1]; k++) {
+    for (uint32_t k = near->first; k < near->end; k++) {
         const struct outline_entry *entry = &o->entry[k];
         const struct outline_edge *edge = &o->edge[entry->edge];
         struct local_edge e;
@@ -106,8 +105,6 @@ uint32_t beam_find_lines(const struct beam_outlines *o, const struct beam *beam,
             break;
         }
         if (outline_is_clear(beam, entry, d)) continue;
-        if (!axes) beam_axes(dir, e1, e2);
-        axes = 1;
         turn_in(edge->a, e1, e2, dir, e.a);
         turn_in(edge->b, e1, e2, dir, e.b);
         if (!clip_to_beam(beam, &e)) continue;

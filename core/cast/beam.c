@@ -89,7 +89,7 @@ static void cast_pool(struct caster *c, const struct cast_setup *s, uint32_t fir
 {
     struct pool *p = &c->beam->pool;
     mark_packets(c->beam, first);
-    int through = s->detect != NULL && s->detect->depth > 0;
+    int plain = s->detect == NULL && s->n_movers == 0, through = s->detect != NULL && s->detect->depth > 0;
     if (first == 0) c->beam->behind.n = 0;
     c->counters.sub_rays += p->n - first;
     for (uint32_t at = first, n; at < p->n; at += n) {
@@ -103,8 +103,8 @@ static void cast_pool(struct caster *c, const struct cast_setup *s, uint32_t fir
                                     .range_m = p->range_m + at,
                                     .label = p->label + at,
                                     .hit = p->triangle + at,
-                                    .cosine = p->cosine + at,
-                                    .body = p->body + at};
+                                    .cosine = plain ? NULL : p->cosine + at,
+                                    .body = plain ? NULL : p->body + at};
         c->begins = p->begins + at;
         caster_nearest(c, s, &from, &set, n);
         c->begins = NULL;
@@ -164,7 +164,7 @@ static void add_met(struct caster *c, const struct cast_setup *s, uint32_t i)
     const struct behind *b = &c->beam->behind;
     struct beam_return r = {.range_m = p->range_m[i],
                             .energy = p->energy[i],
-                            .cosine = (float)p->cosine[i],
+                            .cosine = s->detect != NULL ? (float)p->cosine[i] : 0.0f,
                             .triangle = p->triangle[i],
                             .label = p->label[i]};
     if (isnan(p->range_m[i])) return;
@@ -243,12 +243,12 @@ static uint32_t find_candidates(struct caster *c, const struct cast_setup *s, ui
     uint32_t found = 0, all = 0;
     _Static_assert((int)CHUNK <= (int)BEAM_NEAR_MOST, "all at once");
     if (s->detect == NULL || s->detect->depth == 0)
-        return beam_near_outlines(s->beam->outlines, &s->beam->beam, c->fx, c->fy, c->fz, n, w->cell, w->candidate);
-    found = beam_near_outlines(s->beam->outlines, &s->beam->beam, c->fx, c->fy, c->fz, n, w->cell, w->near);
+        return beam_near_outlines(s->beam->outlines, &s->beam->beam, c->fx, c->fy, c->fz, n, w->candidate);
+    found = beam_near_outlines(s->beam->outlines, &s->beam->beam, c->fx, c->fy, c->fz, n, w->reach);
     for (uint32_t p = 0, k = 0; p < n; p++) {
-        int near = k < found && w->near[k] == p;
+        int near = k < found && w->reach[k].pulse == p;
+        if (near || sees_glass(c, s, p)) w->candidate[all++] = near ? w->reach[k] : (struct beam_near){.pulse = p};
         k += (uint32_t)near;
-        if (near || sees_glass(c, s, p)) w->candidate[all++] = p;
     }
     return all;
 }
@@ -274,10 +274,13 @@ static void cast_parts(struct caster *c, const struct cast_setup *s, const struc
     struct beam_work *w = c->beam;
     const uint32_t most = MAX_PASSES * BEAM_MAX_PARTS + s->beam->pattern.n;
     w->scattered = 1;
+    for (uint32_t k = 0; k < candidates; k++)
+        __builtin_prefetch(&s->bvh->triangle[c->hit[w->candidate[k].pulse]], 0, 3);
     for (uint32_t k = 0; k < candidates; k++) {
-        if (is_full(w, w->candidate[k], most)) run_jobs(c, s, from);
+        if (is_full(w, w->candidate[k].pulse, most)) run_jobs(c, s, from);
         struct job *job = &w->job[w->n_jobs];
-        uint32_t pulse = job->pulse = w->candidate[k];
+        uint32_t pulse = job->pulse = w->candidate[k].pulse;
+        job->near = &w->candidate[k];
         job->next_m = INFINITY;
         job->passes = 0;
         if (sees_glass(c, s, pulse)) {

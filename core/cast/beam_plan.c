@@ -3,10 +3,11 @@
 
 #include "core/cast/beam_private.h"
 #include "core/vec3.h"
+#include "core/vecmath.h"
 
 /* The sub-ray at (x, y) of a pulse's disc. */
-static void sub_ray(const struct beam *beam, const double dir[3], const struct job *job, double x, double y,
-                    double origin[3], double out[3])
+VEC_INLINE void sub_ray(const struct beam *beam, const double dir[restrict 3], const struct job *restrict job, double x,
+                        double y, double origin[restrict 3], double out[restrict 3])
 {
     for (int i = 0; i < 3; i++) {
         origin[i] += beam->exit_radius_m * (x * job->e1[i] + y * job->e2[i]);
@@ -76,7 +77,7 @@ static int known_centre(const struct caster *c, const struct cast_setup *s, cons
         origin[i] -= s->bvh->origin_m[i];
     r->range_m = (tri->d - vec3_dot(tri->n, origin)) / vec3_dot(tri->n, out);
     r->energy = energy;
-    r->cosine = 1.0f / sqrtf(c->beam->steep[p]);
+    r->cosine = s->detect != NULL ? 1.0f / sqrtf(c->beam->steep[p]) : 0.0f;
     r->triangle = c->hit[p];
     r->label = c->label[p];
     return 1;
@@ -89,15 +90,15 @@ int beam_plan_job(struct caster *c, const struct cast_setup *s, const struct ori
     const double dir[3] = {c->dx[job->pulse], c->dy[job->pulse], c->dz[job->pulse]};
     struct beam_line line[BEAM_MAX_LINES];
     struct beam_parts parts;
+    beam_axes(dir, job->e1, job->e2);
     uint32_t lines =
-        beam_find_lines(b->outlines, &b->beam, c->beam->cell[job->pulse], dir, limit_m, line, &job->next_m);
+        beam_find_lines(b->outlines, &b->beam, job->near, dir, job->e1, job->e2, limit_m, line, &job->next_m);
     if (lines == known) return 0;
     job->lines = lines;
     job->first = c->beam->pool.n;
     job->n = 0;
     job->centre.energy = 0.0;
     job->whole = 0;
-    beam_axes(dir, job->e1, job->e2);
     if (lines > BEAM_MAX_LINES || ++job->passes > MAX_PASSES ||
         beam_cut(&b->beam, &b->fine, line, lines, &parts) != 0) {
         beam_plan_whole(c, b, from, job);

@@ -35,12 +35,13 @@ struct behind {
 
 /* A pulse that one ray does not do for. */
 struct job {
-    uint32_t pulse, first, n;  /* its sub-rays */
-    uint32_t lines, passes;    /* outlines that cut it; how often they were looked at */
-    double next_m;             /* from where on outlines were left out */
-    struct beam_return centre; /* known without a ray; energy 0: none */
-    double e1[3], e2[3];       /* across the beam */
-    int whole;                 /* sub-rays all over the footprint, whatever its outlines */
+    uint32_t pulse, first, n;     /* its sub-rays */
+    uint32_t lines, passes;       /* outlines that cut it; how often they were looked at */
+    const struct beam_near *near; /* the outlines */
+    double next_m;                /* from where on outlines were left out */
+    struct beam_return centre;    /* known without a ray; energy 0: none */
+    double e1[3], e2[3];          /* across the beam */
+    int whole;                    /* sub-rays all over the footprint, whatever its outlines */
 };
 
 /* Echoes of a pulse in the list. */
@@ -50,9 +51,10 @@ struct several {
 
 struct beam_work {
     float steep[CHUNK];
-    uint32_t cell[CHUNK];                           /* of outlines */
-    uint32_t candidate[CHUNK], near[CHUNK], n_near; /* pulses to look at; those with sub-rays */
-    uint32_t again[CHUNK], n_again;                 /* glass or a mirror was met beside the centre */
+    struct beam_near candidate[CHUNK]; /* pulses to look at */
+    struct beam_near reach[CHUNK];     /* with glass or mirrors: those near outlines */
+    uint32_t near[CHUNK], n_near;      /* those with sub-rays */
+    uint32_t again[CHUNK], n_again;    /* glass or a mirror was met beside the centre */
     struct job job[MAX_JOBS];
     uint32_t n_jobs;
     int scattered; /* the pool's rays have nothing in common */
