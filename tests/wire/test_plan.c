@@ -135,8 +135,7 @@ struct want {
 static void expect_plan(struct wire *wire, const char *config, const struct want *want, size_t n)
 {
     const char *const args[] = {"plan", config, "--json", NULL};
-    char *json = plan(wire, args, 0), *again = plan(wire, args, 0);
-    assert_string_equal(json, again); /* the same configuration, the same plan */
+    char *json = plan(wire, args, 0);
     for (size_t i = 0; i < n; i++) {
         char method[64], *text = row(json, want[i].stage, 0);
         if (text == NULL) fail_msg("%s: no row of %s in %s", config, want[i].stage, json);
@@ -151,7 +150,6 @@ static void expect_plan(struct wire *wire, const char *config, const struct want
             fail_msg("%s: %s is left out, but not because %s", config, want[i].left_out, want[i].why_left_out);
     }
     free(json);
-    free(again);
 }
 
 /* Few edges and a tolerance of a centimetre: single rays. Leaves: they don't do. Glass: followed as far as it counts.
@@ -206,18 +204,40 @@ static void test_run_follows_plan(void **state)
     }
 }
 
+/* The example with one in eight of its leaves, and few sub-rays: planned in a fraction of the time. */
+static const char *few_leaves(struct wire *wire)
+{
+    char *whole = wire_read("config/foliage.yaml", NULL), *text = calloc(1, 1 << 16), *rest = whole, here[1024], *line;
+    static char path[256];
+    assert_non_null(getcwd(here, sizeof here));
+    for (unsigned leaves = 0; (line = strsep(&rest, "\n")) != NULL;) {
+        char *file = strstr(line, "scenes/"), *end = text + strlen(text);
+        if (strstr(line, "leaves.obj") != NULL && leaves++ % 8 != 0) continue;
+        if (file == NULL)
+            sprintf(end, "%s\n%s", line, strcmp(line, "beam:") == 0 ? "  rings: 1\n" : "");
+        else
+            sprintf(end, "%.*s%s/config/%s\n", (int)(file - line), line, here, file);
+    }
+    snprintf(path, sizeof path, "%s", wire_write_text(wire, "few.yaml", text));
+    free(text);
+    free(whole);
+    return path;
+}
+
 /* Forced methods have bounds, too, and say whether they hold. */
 static void test_forced(void **state)
 {
     struct wire *wire = *state;
+    const char *config = few_leaves(wire);
     static const struct {
         const char *set, *stage, *method, *why;
-    } cases[] = {{"beam.mode=rings", "beam", "rings 4 (61 rays)", "forced by beam.mode; does not hold"},
+    } cases[] = {{"beam.mode=rings", "beam", "rings 1 (7 rays)", "forced by beam.mode; does not hold"},
                  {"beam.mode=adaptive", "beam", "adaptive", "forced by beam.mode; holds"},
                  {"beam.mode=single", "beam", "single", "forced by beam.mode; does not hold"},
                  {"scene.order_exactly=on", "order", "double", "forced by scene.order_exactly"}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        const char *const args[] = {"plan", "config/foliage.yaml", "--json", "--set", cases[i].set, NULL};
+        const char *const args[] = {
+            "plan", config, "--json", "--set", cases[i].set, "--set", "plan.echo_tolerance=0.002", NULL};
         char *json = plan(wire, args, 0), *text = row(json, cases[i].stage, 0), method[64];
         snprintf(method, sizeof method, "\"method\": \"%s\"", cases[i].method);
         if (strstr(text, method) == NULL || strstr(text, cases[i].why) == NULL ||
@@ -246,6 +266,11 @@ static void test_forced_as_chosen(void **state)
         free(text);
         free(json);
     }
+    const char *const args[] = {"plan", "config/glass.yaml", "--json", NULL};
+    char *json = plan(wire, args, 0), *again = plan(wire, args, 0);
+    assert_string_equal(json, again); /* the same configuration, the same plan */
+    free(json);
+    free(again);
     assert_true(figure[0][0] > 0.0 && figure[0][1] > 0.0);
     assert_true(figure[0][0] == figure[1][0] && figure[0][1] == figure[1][1]);
 }
