@@ -56,7 +56,7 @@ for file in bConfigurationValue authorized; do
     check "$speed: $file 1: records again" scanhead record usb --wait 10 --quiet --stats again.json
 done
 note "rested at $(uptime_s) s"
-tap "$speed" test_chapter9
+check_chapter9 "$speed"
 note "chapter 9 at $(uptime_s) s"
 device=$(dirname "$(grep -l 1209 /sys/bus/usb/devices/*/idVendor)")
 echo 0 >$device/bConfigurationValue
