@@ -66,6 +66,7 @@ head_start "{type: usb, backend: functionfs, speed: $speed}" --pace fast
 wait_for 10 is_plugged
 head_kill
 check "$speed: a killed head leaves its gadget" test "$(ls $gadgets | wc -l)" = 1
+mkdir $gadgets/scanhead-1-123456789-0 # of one whose number, 1, is that of another process now
 head_start "{type: usb, backend: functionfs, speed: $speed}" --pace fast
 check "$speed: the next one takes it away" test "$(ls $gadgets | wc -l)" = 1
 check "$speed: and is there" wait_for 10 is_plugged
