@@ -225,7 +225,8 @@ static const struct cfg_key config_keys[] = {
      .help = "native: the head's stream and commands; nmea: the GNSS receiver, NMEA 0183 out, nothing in."},
     {"links[].path", CFG_PATH, .def = "", IN_LINK(path),
      .help = "pty: symbolic link to the terminal (optional); file: file to write (required); usbredir: Unix socket, instead of a port."},
-    {"links[].address", CFG_TEXT, .def = "", IN_LINK(address), .help = "tcp, usb: address to listen on; 127.0.0.1 when not given."},
+    {"links[].address", CFG_TEXT, .def = "", IN_LINK(address),
+     .help = "tcp, usb: address to listen on, or with attach to connect to; 127.0.0.1 when not given."},
     {"links[].port", CFG_COUNT, NULL, "0", 0, 65535, IN_LINK(port),
      .help = "tcp, usb: port; 0: the system chooses; usbip, when not given: 3240."},
     {"links[].max_sessions", CFG_COUNT, NULL, "4", 1, LINK_MAX_SESSIONS, IN_LINK(max_sessions),
@@ -341,7 +342,9 @@ static const struct cfg_key config_keys[] = {
 
     {"loop", CFG_MAP, .help = "The fixed-rate loop."},
     {"loop.tick_hz", CFG_REAL, "Hz", "1000", 100, 10000, IN_CONFIG(tick_hz),
-     .allowed = "a divisor of 1e9 from 100 to 10000 Hz, such as 500, 1000, 2000", .help = "Rate of the loop."},
+     .allowed = "a divisor of 1e9 from 100 to 10000 Hz, such as 500, 1000, 2000",
+     .help = "Rate of the loop. Its ticks cut the stream into frames: another rate is another hash of the stream, though the "
+             "points are the same (but of a live platform, whose poses are one for each tick)."},
     {"loop.ahead_ms", CFG_REAL, "ms", "64", 2, 90, IN_CONFIG(ahead_ms),
      .help = "How far casting runs ahead of the beam; a command takes that long to reach the beam."},
     {"loop.queue_ms", CFG_REAL, "ms", "250", 10, 10000, IN_CONFIG(queue_ms), .help = "What each link can hold back."},

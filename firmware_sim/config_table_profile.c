@@ -65,7 +65,8 @@ static const struct cfg_key profile_keys[] = {
     {"beam_divergence_rad", CFG_REAL, "rad", NULL, 0, 0.01, IN_PROFILE(beam_divergence_rad), FIGURE,
      .help = "Full divergence at 1/e2: 1.41 times one at 1/e, 1.70 times one at half maximum."},
     {"pulse_width_ns", CFG_REAL, "ns", NULL, 0, 1000, IN_PROFILE(pulse_width_ns), FIGURE,
-     .help = "Width of the pulse: echoes nearer to each other than c / 2 of it are one."},
+     .help = "Width of the pulse: echoes nearer to each other than c / 2 of it are one. A beam that has a width needs at "
+             "least 0.1 ns in any beam.mode but single."},
     {"max_echoes", CFG_COUNT, NULL, NULL, 1, LINE_MAX_ECHOES, IN_PROFILE(max_echoes), FIGURE, .help = "Echoes per pulse."},
     {"boot_s", CFG_REAL, "s", NULL, 0, 600, IN_PROFILE(boot_s), FIGURE, .help = "Power-on to ready."},
     {"spin_up_s", CFG_REAL, "s", NULL, 0, 600, IN_PROFILE(spin_up_s), FIGURE, .help = "Start command to mirror at speed."},

@@ -186,6 +186,7 @@ static int look_for_end(struct recording *r, struct sh_err *err)
     if (rc != SH_OK || strcmp(reply, "idle") != 0) return rc;
     sh_warn(r->o->report, "the scan's end was lost; the head is idle");
     r->scan_started = r->scan_over = 1;
+    r->within_scan = r->broken = 0;
     return SH_OK;
 }
 

@@ -3,7 +3,6 @@
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
-#include <signal.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -116,15 +115,36 @@ static void remove_all(const char *name)
     rmdir(dir);
 }
 
+/* When a process was started, in clock ticks from the machine's start: proc(5), stat, field 22. 0 or -1 with errno. */
+static int started_at(long pid, unsigned long long *ticks)
+{
+    char dir[32], text[1024];
+    snprintf(dir, sizeof dir, "/proc/%ld", pid);
+    if (read_text(dir, "stat", text, sizeof text) != 0) return -1;
+    const char *at = strrchr(text, ')'); /* field 2, the name, may hold anything */
+    for (int field = 2; at != NULL && field < 22; field++)
+        at = strchr(at + 1, ' ');
+    if (at != NULL && sscanf(at, "%llu", ticks) == 1) return 0;
+    errno = EPROTO;
+    return -1;
+}
+
+/* Its maker is gone: there is no such process, or it is another one that got the number since. */
+static int is_left_behind(const char *name)
+{
+    long pid;
+    unsigned long long start, now;
+    if (strncmp(name, PREFIX, sizeof PREFIX - 1) != 0) return 0;
+    if (sscanf(name + sizeof PREFIX - 1, "%ld-%llu-", &pid, &start) != 2 || pid <= 0) return 0;
+    return started_at(pid, &now) == 0 ? now != start : errno == ENOENT || errno == ESRCH;
+}
+
 static void remove_left_behind(void)
 {
     DIR *dir = opendir(GADGETS);
     if (dir == NULL) return;
-    for (struct dirent *entry; (entry = readdir(dir)) != NULL;) {
-        if (strncmp(entry->d_name, PREFIX, sizeof PREFIX - 1) != 0) continue;
-        long pid = strtol(entry->d_name + sizeof PREFIX - 1, NULL, 10);
-        if (pid > 0 && kill((pid_t)pid, 0) != 0 && errno == ESRCH) remove_all(entry->d_name);
-    }
+    for (struct dirent *entry; (entry = readdir(dir)) != NULL;)
+        if (is_left_behind(entry->d_name)) remove_all(entry->d_name);
     closedir(dir);
 }
 
@@ -195,8 +215,12 @@ static int look_for_configfs(struct sh_err *err)
 
 static int make_named_dir(struct gadget *gadget, struct sh_err *err)
 {
+    const long pid = (long)getpid();
+    unsigned long long start;
+    if (started_at(pid, &start) != 0)
+        return sh_fail(err, SH_EIO, "functionfs: /proc/%ld/stat: %s", pid, strerror(errno));
     for (int i = 0; i < 100; i++) {
-        snprintf(gadget->name, sizeof gadget->name, "%s%ld-%d", PREFIX, (long)getpid(), i);
+        snprintf(gadget->name, sizeof gadget->name, "%s%ld-%llu-%d", PREFIX, pid, start, i);
         snprintf(gadget->dir, sizeof gadget->dir, "%s/%s", GADGETS, gadget->name);
         if (mkdir(gadget->dir, 0755) == 0) return SH_OK;
         if (errno != EEXIST) break;

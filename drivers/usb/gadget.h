@@ -9,7 +9,7 @@
 #include "drivers/usb/usb.h"
 
 struct gadget {
-    char name[48];  /* scanhead-PID-N, in configfs, of both functions and of the mounted instance */
+    char name[48];  /* scanhead-PID-START-N, in configfs, of both functions and of the mounted instance */
     char dir[128];  /* in configfs; empty: not made */
     char mount[64]; /* where FunctionFS is mounted; empty: nowhere */
     char udc[256];  /* empty: not bound */

@@ -12,6 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "drivers/link/socket.h"
@@ -134,6 +135,24 @@ static void welcome(struct usbredir *self)
 
 /* ---- the back end */
 
+static void note_path(struct usbredir *self, const char *path)
+{
+    struct stat st;
+    if (path[0] == '\0' || lstat(path, &st) != 0) return;
+    snprintf(self->path, sizeof self->path, "%s", path);
+    self->path_device = st.st_dev;
+    self->path_inode = st.st_ino;
+}
+
+/* Unless it was removed meanwhile, and another program listens there. Before the listener is closed: until then nobody
+ * takes the path for left behind, and the inode's number is not given to another. */
+static void remove_path(const struct usbredir *self)
+{
+    struct stat st;
+    if (self->path[0] == '\0' || lstat(self->path, &st) != 0) return;
+    if (st.st_dev == self->path_device && st.st_ino == self->path_inode) unlink(self->path);
+}
+
 static int open_socket(struct usbredir *self, const struct usb_backend_spec *spec, struct sh_err *err)
 {
     int fd;
@@ -143,7 +162,7 @@ static int open_socket(struct usbredir *self, const struct usb_backend_spec *spe
     snprintf(self->name, sizeof self->name, "usbredir:%s", at);
     if (!spec->attach) {
         self->listener = fd;
-        snprintf(self->path, sizeof self->path, "%s", spec->path);
+        note_path(self, spec->path);
         return SH_OK;
     }
     usb_backend_peer(spec, fd, &self->peer);
@@ -237,9 +256,9 @@ static void usbredir_close(void *backend)
         if (!self->broken) usb_backend_hang_up(self->fd, CLOSE_WAIT_MS);
     }
     stop(self);
+    remove_path(self);
     if (self->listener >= 0) close(self->listener);
     usb_retry_close(&self->retry);
-    if (self->path[0] != '\0') unlink(self->path);
     free(self);
 }
 

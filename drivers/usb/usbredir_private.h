@@ -2,6 +2,7 @@
 #ifndef DRIVERS_USB_USBREDIR_PRIVATE_H
 #define DRIVERS_USB_USBREDIR_PRIVATE_H
 
+#include <sys/types.h>
 #include <usbredirparser.h>
 
 #include "drivers/usb/backend.h"
@@ -25,6 +26,8 @@ struct usbredir {
     struct usb_retry retry;               /* of a connection we make */
     struct usb_backend_address peer;      /* where to */
     char path[256];                       /* to be removed; empty: none */
+    dev_t path_device;                    /* what we made there, which it need not be any more */
+    ino_t path_inode;
     char name[USB_BACKEND_NAME_MAX];
 };
 

@@ -127,3 +127,9 @@ check_cut_records() {
     check "$1: and it says so, once" grep 'away within 1 scans' again.err
     check "$1: with the count" grep '"replugs": 1,' again.json
 }
+
+# What the USB specification wants of a device. check_chapter9 PREFIX
+check_chapter9() {
+    tap "$1" test_chapter9
+    tap "$1" test_chapter9_transfers
+}

@@ -4,7 +4,7 @@ check_enumeration "socket pair" 512
 check_record "socket pair"
 note "recorded at $(uptime_s) s"
 if ! records_only; then
-    tap "socket pair" test_chapter9
+    check_chapter9 "socket pair"
     note "chapter 9 at $(uptime_s) s"
 fi
 head_stop

@@ -9,7 +9,7 @@ check_enumeration "usbredir" 512
 check_record "usbredir"
 note "recorded at $(uptime_s) s"
 records_only && return
-tap "usbredir" test_chapter9
+check_chapter9 "usbredir"
 note "chapter 9 at $(uptime_s) s"
 ask_host stop >/dev/null
 check "usbredir: gone with the head" wait_for 10 is_unplugged

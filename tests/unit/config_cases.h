@@ -1,27 +1,10 @@
-/* Cases of test_config.c: a configuration that loads, and edits of it that must not. */
+/* Cases of test_config.c: edits of a configuration that loads, which must not. */
 #ifndef TESTS_UNIT_CONFIG_CASES_H
 #define TESTS_UNIT_CONFIG_CASES_H
 
-#include <stddef.h>
+#include "tests/unit/config_rig.h"
 
 /* clang-format off */
-static const char base[] = "head:\n"                        /* 1 */
-                           "  profile: riegl-vz400i\n"      /* 2 */
-                           "  prr_hz: 500000\n"             /* 3 */
-                           "  lines_hz: 100\n"              /* 4 */
-                           "scene:\n"                       /* 5 */
-                           "  meshes:\n"                    /* 6 */
-                           "    - file: cube.obj\n"         /* 7 */
-                           "      up: z\n"                  /* 8 */
-                           "      scale: 1\n"               /* 9 */
-                           "stations:\n"                    /* 10 */
-                           "  - position_m: [1, 2, 3]\n"    /* 11 */
-                           "    heading_deg: 90\n"          /* 12 */
-                           "links:\n"                       /* 13 */
-                           "  - type: tcp\n"                /* 14 */
-                           "    port: 0\n"                  /* 15 */
-                           "output:\n"                      /* 16 */
-                           "  crs: local\n";                /* 17 */
 
 struct bad {
     const char *old, *with; /* edit of base; old NULL: with is the whole file */
@@ -30,8 +13,6 @@ struct bad {
     const char *fragment;
 };
 
-#define PRR "  prr_hz: 500000\n"
-#define LINES "  lines_hz: 100\n"
 #define FRAMES_AT_4(text) LINES, "  " text "\n" LINES
 static const struct bad bad[] = {
     /* numbers */

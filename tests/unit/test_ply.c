@@ -1,133 +1,9 @@
-/* The recorders: what they write is read back by a reader of its own. */
-#include <errno.h>
-#include <fcntl.h>
+/* The PLY recorder: what it writes is read back by a reader of its own. */
 #include <math.h>
-#include <setjmp.h>
-#include <signal.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <sys/resource.h>
-#include <sys/stat.h>
-#include <unistd.h>
-#include <cmocka.h>
 
-#include "drivers/host/recorder.h"
-#include "drivers/protocol/native_encode.h"
+#include "tests/unit/ply_rig.h"
 
-enum { N = 5, RECORD = 50 };
-
-static char dir[] = "/tmp/test_ply_XXXXXX";
-static char shs_path[64], out_path[64], part_path[64];
-static uint8_t out[1 << 18];
-static FILE *shs;
-
-/* ---- a stream to record */
-
-static const int32_t xyz[N][3] = {
-    {300000, -400000, 1200000}, {-1, 1, 0}, {INT32_MAX, -INT32_MAX, 7}, {0, 0, 0}, {123456789, 5, -987654321}};
-static uint32_t a[N], b[N], c[N], dt[N] = {0, 1000, 2000, 3000, 0xffffff};
-static int16_t refl[N] = {-1234, INT16_MIN, 0, 5, 32767};
-static uint16_t label[N] = {0, 1, 2, 0xffff, 1};
-static uint8_t echo[N] = {0x11, 0x21, 0x22, 0x00, 0xff};
-
-static void put(size_t len)
-{
-    assert_true(len > 0);
-    assert_int_equal(fwrite(out, 1, len, shs), len);
-}
-
-static void put_descriptor(int geo, uint32_t scan, uint32_t n_surfaces)
-{
-    struct native_descriptor d = {.idn = "Maker,Model,SN1,1.0",
-                                  .profile = "model",
-                                  .scan = scan,
-                                  .n_surfaces = n_surfaces,
-                                  .layout = geo ? NATIVE_GEO : NATIVE_POLAR,
-                                  .mirror_counts_per_turn = 3600,
-                                  .pan_counts_per_turn = 3600,
-                                  .range_scale_m = 1e-3};
-    put(native_encode_descriptor(out, sizeof out, &d, 0, 0));
-}
-
-static void put_anchor(uint32_t crs, uint32_t epsg, uint32_t station)
-{
-    /* heading 90 degrees: the head's y axis (forward) is the scene's x axis */
-    struct native_anchor anchor = {.crs = crs,
-                                   .epsg = epsg,
-                                   .station = station,
-                                   .anchor = {500000.25, 5e6, 400.125},
-                                   .scale_m = 1e-5,
-                                   .station_m = {10, 20, 30},
-                                   .rotation = {0, 1, 0, -1, 0, 0, 0, 0, 1}};
-    put(native_encode_anchor(out, sizeof out, &anchor, 0, 0));
-}
-
-static void put_points(uint64_t pulse0)
-{
-    struct line_block block = {.pulse0 = pulse0,
-                               .n_pulses = N - 1,
-                               .t0_ns = 5000000001,
-                               .n_points = N,
-                               .dt_ns = dt,
-                               .a = a,
-                               .b = b,
-                               .c = c,
-                               .refl_cdb = refl,
-                               .echo = echo,
-                               .label = label};
-    put(native_encode_points(out, sizeof out, &block, 0));
-}
-
-static void name_of(void *ctx, uint32_t i, const char **object, const char **material)
-{
-    static const char *const names[3] = {"wall\nof brick", "door", "roof"};
-    *object = ctx != NULL ? ctx : names[i];
-    *material = "mat";
-}
-
-static void put_surfaces(uint32_t first, uint32_t n, char *name)
-{
-    uint32_t done;
-    put(native_encode_surfaces(out, sizeof out, first, n, 65536, name_of, name, 0, 0, &done));
-    assert_int_equal(done, n);
-}
-
-static void begin_stream(void)
-{
-    for (int i = 0; i < N; i++) {
-        a[i] = (uint32_t)xyz[i][0];
-        b[i] = (uint32_t)xyz[i][1];
-        c[i] = (uint32_t)xyz[i][2];
-    }
-    shs = fopen(shs_path, "wb");
-    assert_non_null(shs);
-}
-
-/* Records the stream at shs_path; the code of the call that failed, or of close. */
-static int record(const char *path, struct recorder_options options, int keep, struct sh_err *err)
-{
-    struct scanhead *sh;
-    struct scanhead_frame frame;
-    void *rec;
-    if (shs != NULL) fclose(shs);
-    shs = NULL;
-    const struct recorder_ops *ops = recorder_find(path, err);
-    assert_non_null(ops);
-    assert_int_equal(scanhead_open(shs_path, &sh, NULL, 0), 0);
-    int rc = ops->open(path, &options, &rec, err);
-    if (rc == 0) {
-        while (rc == 0 && scanhead_next(sh, &frame, -1) == 0)
-            rc = ops->frame(rec, sh, &frame, err);
-        int closed = ops->close(rec, rc == 0 && keep, err);
-        if (rc == 0) rc = closed;
-    }
-    scanhead_close(sh);
-    return rc;
-}
+enum { RECORD = 50 };
 
 /* ---- a reader of its own */
 
@@ -137,8 +13,7 @@ struct vertex {
     unsigned echo, echo_count, label, station;
 };
 
-static char *text;
-static size_t text_len, body;
+static size_t body;
 static struct vertex vertex[64];
 static int n_vertices;
 
@@ -156,16 +31,6 @@ static double real(const char *p)
     double d;
     memcpy(&d, &v, 8);
     return d;
-}
-
-static void slurp(const char *path)
-{
-    FILE *in = fopen(path, "rb");
-    assert_non_null(in);
-    free(text);
-    text = calloc(1, 1 << 22);
-    text_len = fread(text, 1, (1 << 22) - 1, in);
-    fclose(in);
 }
 
 static void read_binary(void)
@@ -449,123 +314,6 @@ static void test_crs_change_refused(void **state)
     assert_non_null(strstr(err.text, "65536"));
 }
 
-static void test_whole_or_not_at_all(void **state)
-{
-    (void)state;
-    struct sh_err err;
-    FILE *old = fopen(out_path, "wb");
-    fputs("old", old);
-    fclose(old);
-    begin_stream();
-    put_descriptor(1, 1, 3);
-    put_anchor(NATIVE_CRS_UTM, 32632, 2);
-    put_points(0);
-    assert_int_equal(record(out_path, (struct recorder_options){0}, 0, &err), 0);
-    slurp(out_path);
-    assert_string_equal(text, "old");
-    assert_int_equal(access(part_path, F_OK), -1);
-    assert_int_equal(record("/nonexistent/x.ply", (struct recorder_options){0}, 1, &err), SH_EINPUT);
-    assert_non_null(strstr(err.text, "/nonexistent/x.ply"));
-    char blocked[80];
-    snprintf(blocked, sizeof blocked, "%s/d.ply", dir);
-    assert_int_equal(mkdir(blocked, 0777), 0);
-    assert_int_equal(record(blocked, (struct recorder_options){0}, 1, &err), SH_EINPUT);
-    assert_non_null(strstr(err.text, blocked));
-    rmdir(blocked);
-}
-
-/* A limit on the file's size stands for the full disk: the same write fails. */
-static void test_disk_full(void **state)
-{
-    (void)state;
-    struct sh_err err;
-    struct rlimit old, small = {3000, 0};
-    void (*was)(int) = signal(SIGXFSZ, SIG_IGN);
-    char path[80], part[96];
-    begin_stream();
-    put_descriptor(1, 1, 3);
-    put_anchor(NATIVE_CRS_UTM, 32632, 2);
-    for (int i = 0; i < 20; i++)
-        put_points((uint64_t)i * 4);
-    fclose(shs);
-    shs = NULL;
-    unlink(out_path);
-    getrlimit(RLIMIT_FSIZE, &old);
-    small.rlim_max = old.rlim_max;
-    assert_int_equal(setrlimit(RLIMIT_FSIZE, &small), 0);
-    int ply = record(out_path, (struct recorder_options){0}, 1, &err);
-    char ply_text[512];
-    snprintf(ply_text, sizeof ply_text, "%s", err.text);
-    snprintf(path, sizeof path, "%s/full.shs", dir);
-    snprintf(part, sizeof part, "%s.part", path);
-    int raw = record(path, (struct recorder_options){0}, 1, &err);
-    setrlimit(RLIMIT_FSIZE, &old);
-    signal(SIGXFSZ, was);
-    assert_int_equal(ply, SH_EIO);
-    assert_non_null(strstr(ply_text, part_path));
-    assert_int_equal(access(out_path, F_OK), -1);
-    assert_int_equal(access(part_path, F_OK), -1);
-    assert_int_equal(raw, SH_EIO);
-    assert_non_null(strstr(err.text, part));
-    assert_int_equal(access(path, F_OK), -1);
-    assert_int_equal(access(part, F_OK), -1);
-}
-
-static void test_shs(void **state)
-{
-    (void)state;
-    struct sh_err err;
-    char path[80], *copy;
-    begin_stream();
-    put_surfaces(0, 3, NULL);
-    put_descriptor(1, 1, 3);
-    put_anchor(NATIVE_CRS_UTM, 32632, 2);
-    for (int i = 0; i < 10000; i++) /* beyond the buffer */
-        put_points((uint64_t)i * 4);
-    snprintf(path, sizeof path, "%s/copy.SHS", dir);
-    assert_int_equal(record(path, (struct recorder_options){0}, 1, &err), 0);
-    slurp(shs_path);
-    copy = text;
-    text = NULL;
-    size_t copy_len = text_len;
-    slurp(path);
-    assert_int_equal(text_len, copy_len);
-    assert_memory_equal(text, copy, copy_len);
-    free(copy);
-    unlink(path);
-}
-
-static void test_find(void **state)
-{
-    (void)state;
-    struct sh_err err;
-    assert_string_equal(recorder_find("x.PLY", &err)->ending, ".ply");
-    assert_string_equal(recorder_find("a/b.shs", &err)->ending, ".shs");
-    assert_null(recorder_find("x.txt", &err));
-    assert_int_equal(err.code, SH_EINPUT);
-    assert_non_null(strstr(err.text, ".ply"));
-    assert_null(recorder_find(".ply", &err));
-}
-
-static int set_up(void **state)
-{
-    (void)state;
-    if (mkdtemp(dir) == NULL) return -1;
-    snprintf(shs_path, sizeof shs_path, "%s/in.shs", dir);
-    snprintf(out_path, sizeof out_path, "%s/out.ply", dir);
-    snprintf(part_path, sizeof part_path, "%s/out.ply.part", dir);
-    return 0;
-}
-
-static int tear_down(void **state)
-{
-    (void)state;
-    free(text);
-    unlink(shs_path);
-    unlink(out_path);
-    return rmdir(dir);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -577,10 +325,6 @@ int main(void)
         cmocka_unit_test(test_points_before_descriptor),
         cmocka_unit_test(test_losses_are_told),
         cmocka_unit_test(test_crs_change_refused),
-        cmocka_unit_test(test_whole_or_not_at_all),
-        cmocka_unit_test(test_disk_full),
-        cmocka_unit_test(test_shs),
-        cmocka_unit_test(test_find),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -267,11 +267,27 @@ static void test_busy_path(void **state)
     unlink(guest_path);
 }
 
+/* A path that somebody removed and another head listens on by now stays that one's. */
+static void test_path_of_another(void **state)
+{
+    (void)state;
+    struct bench first = redir_bench(USB_RATE_HIGH);
+    assert_int_equal(unlink(guest_path), 0);
+    struct bench second = redir_bench(USB_RATE_HIGH);
+    bench_close(&first);
+    struct guest *g = guest_new(&second);
+    guest_configure(g);
+    guest_free(g);
+    bench_close(&second);
+    assert_int_equal(access(guest_path, F_OK), -1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_silent),         cmocka_unit_test(test_flood),     cmocka_unit_test(test_turns),
-        cmocka_unit_test(test_wrong_endpoint), cmocka_unit_test(test_reconnect), cmocka_unit_test(test_busy_path),
+        cmocka_unit_test(test_path_of_another), cmocka_unit_test(test_silent),         cmocka_unit_test(test_flood),
+        cmocka_unit_test(test_turns),           cmocka_unit_test(test_wrong_endpoint), cmocka_unit_test(test_reconnect),
+        cmocka_unit_test(test_busy_path),
     };
     return cmocka_run_group_tests(tests, guest_setup, guest_teardown);
 }

@@ -43,6 +43,7 @@ struct room_config {
     double line_start_deg, line_stop_deg; /* both 0: the profile's */
     unsigned frames;
     const char *links; /* YAML of the list */
+    const char *noise; /* noise besides range, ", KEY: VALUE"; NULL: none */
     const char *more;  /* further YAML; NULL: none */
 };
 
@@ -65,7 +66,8 @@ static inline const char *room_config_write(const struct wire *wire, const struc
     fprintf(f, "  frames: %u\nscene:\n  meshes:\n    - {file: room.obj, up: z, scale: 1}\n", c->frames);
     fprintf(f, "stations:\n  - {position_m: [%.17g, %.17g, %.17g], heading_deg: %.17g}\n", STATION[0], STATION[1],
             STATION[2], HEADING_DEG);
-    fprintf(f, "noise: {range: off}\n%s%s", c->links, c->more != NULL ? c->more : "");
+    fprintf(f, "noise: {range: off%s}\n%s%s", c->noise != NULL ? c->noise : "", c->links,
+            c->more != NULL ? c->more : "");
     assert_int_equal(fclose(f), 0);
     return path;
 }

@@ -97,10 +97,11 @@ static void expect_stats(const struct wire *wire, const struct sums *sums)
 }
 
 /* A scan by a head with several threads, whose blocks end within lines; then the same as `record` takes it. */
-static void scan(struct wire *wire, const char *more, check_fn *check, struct sums *sums)
+static void scan(struct wire *wire, const char *noise, const char *more, check_fn *check, struct sums *sums)
 {
     struct room_config config = SCAN;
     char path[352], stats[352];
+    config.noise = noise;
     config.more = more;
     wire_write_text(wire, "two-echoes.yaml", PROFILE);
     snprintf(path, sizeof path, "%s", room_config_write(wire, &config));
@@ -135,7 +136,7 @@ static void test_echoes_left_out(void **state)
 {
     struct sums sums;
     panes_write(*state);
-    scan(*state,
+    scan(*state, NULL,
          "beam: {mode: single}\noptics: {depth: 2}\nsurfaces: [{material: glass, glass: 0.9, reflectance: 0.1}]\n",
          three_for_two, &sums);
     assert_true(sums.crowded > 10000);
@@ -165,7 +166,7 @@ static void test_hits_too_faint(void **state)
 {
     struct sums sums;
     room_write(*state);
-    scan(*state, "signal: {model: on, detection: sharp, reflectance: 0.5}\nbeam: {mode: single}\n",
+    scan(*state, NULL, "signal: {model: on, detection: sharp, reflectance: 0.5}\nbeam: {mode: single}\n",
          as_the_range_equation_says, &sums);
     assert_true(sums.faint > 1000 && sums.echoes > 1000);
 }
@@ -182,7 +183,55 @@ static void test_a_plain_scan(void **state)
 {
     struct sums sums;
     room_write(*state);
-    scan(*state, "beam: {mode: single}\n", nothing_else, &sums);
+    scan(*state, NULL, "beam: {mode: single}\n", nothing_else, &sums);
+}
+
+/* A ball that is flattened to a rod along the scene's x axis, so big that points leave the reach of the stream's
+ * integers,
+ * +-(2^31 - 1) counts of the automatic 1e-6 m from the station. */
+static const double BALL_M = 100.0, GROWTH_1_M = 5.0, FARTHEST_M = 2147.483647;
+
+/* Of a place in a ball of radius 1, uniform over its volume: that its x is beyond q. The disc at x has the share
+ * 3/4 (1 - x^2) of the volume; that from q to 1. */
+static double beyond(double q)
+{
+    return q >= 1.0 ? 0.0 : 0.5 - 0.75 * q + 0.25 * q * q * q;
+}
+
+/* How many a scan should have lost, and the variance of that. */
+static double unfit_mean, unfit_variance;
+
+static void as_the_ball_says(const struct native_line_end *end, const struct oracle *oracle)
+{
+    for (uint64_t k = end->pulse0; k < end->pulse0 + end->n_fired; k++) {
+        struct room_ray ray;
+        if (!oracle_is_cast(oracle, k)) continue;
+        double mirror = oracle_mirror_deg(oracle, k) * M_PI / 180.0, pan = oracle_pan_deg(oracle, k) * M_PI / 180.0;
+        room_cast(mirror, pan, &ray);
+        double x = ray.range_m * cos(mirror) * sin(pan + HEADING_DEG * M_PI / 180.0);
+        double radius_m = BALL_M * (1.0 + GROWTH_1_M * ray.range_m);
+        double share = beyond((FARTHEST_M - x) / radius_m) + beyond((FARTHEST_M + x) / radius_m);
+        unfit_mean += share;
+        unfit_variance += share * (1.0 - share);
+    }
+    assert_int_equal(end->n_echoes + end->n_unfit, end->n_cast); /* none is anything else */
+    assert_int_equal(end->n_crowded + end->n_faint, 0);
+}
+
+static void test_positions_beyond_the_integers(void **state)
+{
+    struct sums sums;
+    room_write(*state);
+    unfit_mean = unfit_variance = 0.0;
+    scan(*state, ", ball: {radius_m: 100, distance_1_m: 5, factor: [1, 0, 0]}",
+         "beam: {mode: single}\noutput: {layout: geo}\n", as_the_ball_says, &sums);
+    assert_true(unfit_mean > 1000.0);
+    /* five sigma: by chance once in 1.7 million seeds */
+    assert_true(fabs((double)sums.unfit - unfit_mean) < 5.0 * sqrt(unfit_variance));
+    char *said = wire_read(wire_path(*state, "head.err"), NULL), want[96];
+    snprintf(want, sizeof want, "%" PRIu64 " echoes left out, too far from the anchor", sums.unfit);
+    assert_non_null(strstr(said, want));
+    free(said);
 }
 
 int main(void)
@@ -190,6 +239,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_echoes_left_out, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_hits_too_faint, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_positions_beyond_the_integers, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_a_plain_scan, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

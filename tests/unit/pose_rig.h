@@ -1,0 +1,20 @@
+/* For tests of poses. */
+#ifndef TESTS_UNIT_POSE_RIG_H
+#define TESTS_UNIT_POSE_RIG_H
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/pose.h"
+#include "tests/unit/cases.h"
+
+static const double DEG = M_PI / 180.0;
+
+static inline double distance(const double a[3], const double b[3])
+{
+    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
+}
+
+#endif

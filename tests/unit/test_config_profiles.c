@@ -1,0 +1,187 @@
+/* Head profiles: those that come with the program, and what is refused of one. */
+#include "tests/unit/config_rig.h"
+
+static void shipped_files_load(void **state)
+{
+    (void)state;
+    static const char *const heads[] = {"riegl-vz400i", "riegl-vz600i", "leica-rtc360", "full-sweep"};
+    for (size_t i = 0; i < 4; i++) {
+        char set[64];
+        snprintf(set, sizeof set, "head.profile=%s", heads[i]);
+        assert_loads(load_set(set));
+        assert_string_equal(cfg->profile.name, heads[i]);
+        assert_true(cfg->profile.spin_up_s + cfg->ahead_ms * 1e-3 < 0.1); /* command to beam */
+    }
+    /* The whole sweep is the field of view, without rounding. */
+    assert_true(360.0 / cfg->profile.facets * cfg->profile.optical_gain == 100.0);
+    assert_int_equal(cfg->profile.fov_max_udeg - cfg->profile.fov_min_udeg, 100000000);
+    static const char *const ready[] = {"config/demo.yaml", "config/vz600i_house.yaml"};
+    if (access("/usr/share/assimp/models/IFC/AC14-FZK-Haus.ifc", R_OK) != 0) {
+        print_message("the house model is not installed: ready configurations not loaded\n");
+        return;
+    }
+    for (size_t i = 0; i < 2; i++)
+        assert_loads(config_load(ready[i], NULL, 0, cfg, &err));
+}
+
+static void profiles_give_their_figures(void **state)
+{
+    (void)state;
+    assert_loads(load_set("head.profile=leica-rtc360"));
+    /* Leica RTC360 data sheet: 0.5 to 130 m, 1.0 mm + 10 ppm, 300 deg */
+    const struct config_profile *p = &cfg->profile;
+    assert_true(p->range_min_m == 0.5 && p->range_max_m == 130 && p->range_sigma_m == 0.001 &&
+                p->range_sigma_ppm == 10);
+    assert_int_equal(p->fov_max_udeg - p->fov_min_udeg, 300000000);
+    assert_string_equal(p->maker, "Leica");
+}
+
+/* Reads a shipped profile, replaces `old` by `with` and loads it as heads/mine.yaml beside the configuration.
+ */
+static int load_profile(const char *old, const char *with)
+{
+    char text[8192];
+    FILE *file = fopen("config/heads/leica-rtc360.yaml", "rb");
+    assert_non_null(file);
+    size_t len = fread(text, 1, sizeof text - 1, file);
+    fclose(file);
+    text[len] = '\0';
+    char *at = strstr(text, old), changed[8448];
+    assert_non_null(at);
+    snprintf(changed, sizeof changed, "%.*s%s%s", (int)(at - text), text, with, at + strlen(old));
+    write_in("heads/mine.yaml", changed);
+    return load_edited("riegl-vz400i\n  prr_hz: 500000\n  lines_hz: 100", "mine");
+}
+
+static void malformed_profiles_are_refused(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *old, *with, *key, *fragment;
+    } wrong[] = {
+        {"{ value: 130, from: data sheet }", "130", "range_max_m", "allowed { value: V, from: data sheet }"},
+        {"{ value: 130, from: data sheet }", "{ value: 130 }", "range_max_m", "\"from\" is missing"},
+        {"{ value: 130, from: data sheet }", "{ from: assumed }", "range_max_m", "\"value\" is missing"},
+        {"{ value: 130, from: data sheet }", "{ value: 130, from: hearsay }", "range_max_m",
+         "allowed data sheet, assumed"},
+        {"{ value: 130, from: data sheet }", "{ value: 130, from: [] }", "range_max_m", "allowed data sheet, assumed"},
+        {"{ value: 130, from: data sheet }", "{ value: 130 m, from: assumed }", "range_max_m", "not a number"},
+        {"{ value: 130, from: data sheet }", "{ value: 1, value: 2, from: assumed }", "range_max_m", "given twice"},
+        {"{ value: 130, from: data sheet }", "{ value: 1, note: 2, from: assumed }", "range_max_m", "unknown"},
+        {"{ value: 130, from: data sheet }", "{ value: 0.4, from: assumed }", "range_min_m", "below range_max_m"},
+        {"{ value: 0.00088, from: assumed }", "{ value: 0.002, from: assumed }", "range_sigma_floor_m",
+         "above range_sigma_m"},
+        {"range_m: 130, from: assumed", "range_m: 130", "reaches[0].from", "missing"},
+        {"range_m: 130, from: assumed", "range_m: 130, from: memory", "reaches[0].from", "allowed data sheet, assumed"},
+        {"range_m: 130, from: assumed }",
+         "range_m: 130, from: assumed }\n  - { reflectance: 0.2, range_m: 140, from: assumed }", "reaches",
+         "falls at least with the square of the range"},
+        {"range_max_m:", "range_mx_m:", "range_mx_m", "did you mean range_max_m?"},
+        {"range_max_m: { value: 130, from: data sheet }\n", "", "range_max_m", "missing"},
+        {"facets: { value: 1,", "facets: { value: 2,", "fov_max_deg", "allowed up to 180 deg"},
+        {"facets: { value: 1,", "facets: { value: 0,", "facets", "1 to 360"},
+        {"optical_gain: { value: 1,", "optical_gain: { value: 2,", "optical_gain", "allowed up to 360"},
+        {"beam_divergence_rad: { value: 0.0005,", "beam_divergence_rad: { value: 0.5,", "beam_divergence_rad",
+         "0 to 0.01"},
+        {"max_echoes: { value: 1,", "max_echoes: { value: 16,", "max_echoes", "1 to 15"},
+        {"lines_min_hz: { value: 5,", "lines_min_hz: { value: 0.2,", "lines_min_hz", "allowed 0.25 to"},
+        {"lines_min_hz: { value: 5,", "lines_min_hz: { value: 201,", "lines_min_hz", "at most lines_max_hz"},
+        {"prr_min_hz: { value: 100000,", "prr_min_hz: { value: 2000001,", "prr_min_hz", "at most prr_max_hz"},
+        {"pan_max_deg: { value: 180,", "pan_max_deg: { value: 0,", "pan_max_deg", "above pan_min_deg"},
+        {"fov_min_deg: { value: -60,", "fov_min_deg: { value: 240,", "fov_min_deg", "below fov_max_deg"},
+        {"model: RTC360", "model: a,b", "model", "without comma"},
+        {"model: RTC360", "model: { value: RTC360, from: data sheet }", "model", "here stands a section"},
+    };
+    assert_loads(load_profile("RTC360", "RTC360"));
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        char start[128], key[64];
+        if (load_profile(wrong[i].old, wrong[i].with) != SH_EINPUT) fail_msg("%s was taken", wrong[i].with);
+        snprintf(start, sizeof start, "%s/heads/mine.yaml:", dir);
+        snprintf(key, sizeof key, ": %s: ", wrong[i].key);
+        if (strncmp(err.text, start, strlen(start)) != 0) fail_msg("%s: %s", wrong[i].with, err.text);
+        assert_says(key);
+        assert_says(wrong[i].fragment);
+    }
+}
+
+static void a_range_beyond_31_bits_is_refused(void **state)
+{
+    (void)state;
+    /* 2^31 * 1e-6 m = 2147.48 m: 2147 m fit, 2148 m do not. */
+    char *text = edited("riegl-vz400i\n  prr_hz: 500000\n  lines_hz: 100", "mine");
+    for (int far_m = 2147; far_m <= 2148; far_m++) {
+        char value[64];
+        snprintf(value, sizeof value, "range_max_m: { value: %d,", far_m);
+        assert_loads(load_profile("range_max_m: { value: 130,", value));
+        const char *const sets[] = {"output.scale_m=1e-6"};
+        write_file(config_path, text, strlen(text));
+        int code = load_sets(sets, 1);
+        assert_int_equal(code, far_m == 2147 ? SH_OK : SH_EINPUT);
+    }
+    assert_says("--set output.scale_m: 1e-06 is too fine");
+    free(text);
+}
+
+static void a_slow_pulse_rate_needs_slow_lines(void **state)
+{
+    (void)state;
+    assert_loads(load_profile("prr_min_hz: { value: 100000,", "prr_min_hz: { value: 10,"));
+    char *text =
+        edited("riegl-vz400i\n  prr_hz: 500000\n  lines_hz: 100", "mine\n  prr_hz: 100\n  lines_hz: 100.000001");
+    assert_int_equal(load_text(text), SH_EINPUT);
+    assert_says(":3: head.prr_hz: less than a pulse per line");
+    free(text);
+}
+
+static void profiles_are_looked_up_in_order(void **state)
+{
+    (void)state;
+    char env[256], path[128];
+    assert_loads(load_profile("model: RTC360", "model: mine"));
+    assert_string_equal(cfg->profile.model, "mine"); /* heads/ beside the configuration */
+    snprintf(path, sizeof path, "%s/heads/mine.yaml", dir);
+    assert_string_equal(cfg->profile_file, path);
+    assert_loads(load_edited("riegl-vz400i\n  prr_hz: 500000", "heads/mine.yaml")); /* relative to the file */
+    assert_string_equal(cfg->profile.name, "mine");
+    snprintf(env, sizeof env, "%s", getenv("SCANHEAD_HEADS"));
+    snprintf(path, sizeof path, "%s/first", dir);
+    mkdir(path, 0700);
+    write_in("first/mine.yaml", "maker: first\n");
+    setenv("SCANHEAD_HEADS", path, 1);
+    assert_int_equal(load_edited("riegl-vz400i", "mine"), SH_EINPUT);
+    assert_says("first/mine.yaml:1: model: missing"); /* the variable goes before heads/ */
+    setenv("SCANHEAD_HEADS", env, 1);
+}
+
+static void profiles_are_listed(void **state)
+{
+    (void)state;
+    char *text = NULL;
+    size_t len = 0;
+    FILE *out = open_memstream(&text, &len);
+    assert_int_equal(config_list_profiles("config/heads", out, &err), 4);
+    fclose(out);
+    assert_non_null(strstr(text, "leica-rtc360"));
+    assert_non_null(strstr(text, "Leica RTC360; data sheet: range_min_m, range_max_m, range_sigma_m, range_sigma_ppm"));
+    int lines = 0;
+    for (const char *p = text; *p != '\0'; p++)
+        lines += *p == '\n';
+    assert_int_equal(lines, 4);
+    free(text);
+    assert_int_equal(config_list_profiles("/nonexistent", stdout, &err), SH_EINPUT);
+    assert_says("/nonexistent");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(shipped_files_load),
+        cmocka_unit_test(profiles_give_their_figures),
+        cmocka_unit_test(malformed_profiles_are_refused),
+        cmocka_unit_test(a_range_beyond_31_bits_is_refused),
+        cmocka_unit_test(a_slow_pulse_rate_needs_slow_lines),
+        cmocka_unit_test(profiles_are_looked_up_in_order),
+        cmocka_unit_test(profiles_are_listed),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

@@ -1,0 +1,114 @@
+/* --set: values changed and elements added on the command line. */
+#include "tests/unit/config_rig.h"
+
+static void set_changes_values(void **state)
+{
+    (void)state;
+    assert_loads(load_set("head.prr_hz=2e5"));
+    assert_int_equal(cfg->settings.prr_uhz, 200000000000);
+    assert_loads(load_set("stations[0].heading_deg=45.5"));
+    assert_true(cfg->station[0].heading_deg == 45.5);
+    assert_loads(load_set("stations.0.heading_deg=-1"));
+    assert_true(cfg->station[0].heading_deg == -1);
+    assert_loads(load_set("stations[0].position_m=[4, 5.5, -6]"));
+    assert_true(cfg->station[0].position_m[1] == 5.5 && cfg->station[0].position_m[2] == -6);
+    assert_loads(load_set("stations[0].position_m=7,8,9"));
+    assert_true(cfg->station[0].position_m[2] == 9);
+    assert_loads(load_set("head.serial=A=B"));
+    assert_string_equal(cfg->serial, "A=B");
+    assert_loads(load_set("head.profile=riegl-vz600i"));
+    assert_string_equal(cfg->profile.name, "riegl-vz600i");
+    assert_int_equal(cfg->settings.line_stop_udeg, 65000000); /* defaults follow the profile */
+}
+
+static void set_appends_elements(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"links[1].path=out.bin", "links[1].type=file", "stations.1.position_m=0,0,2",
+                                       "head.station=2",        "head.station=1",     "head.station=2"};
+    write_file(config_path, base, sizeof base - 1);
+    assert_loads(load_sets(sets, 6));
+    assert_int_equal(cfg->n_links, 2);
+    assert_int_equal(cfg->link[1].type, LINK_FILE);
+    assert_string_equal(cfg->link[1].path, "out.bin"); /* of the working directory, not of the file */
+    assert_int_equal(cfg->n_stations, 2);
+    assert_int_equal(cfg->settings.station, 2);
+    assert_string_equal(cfg->station[1].name, "station-2");
+}
+
+static void set_refuses(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *set, *key, *fragment;
+    } wrong[] = {
+        {"head.prr_hz", "head.prr_hz", "no '='"},
+        {"=5", "=5", "no key"},
+        {"", "", "no '='"},
+        {"head.prr=5", "head.prr", "did you mean head.prr_hz?"},
+        {"prr_hz=5", "prr_hz", "did you mean head.prr_hz?"},
+        {"head.prr_hz=30 kHz", "head.prr_hz", "not a number"},
+        {"head.prr_hz=", "head.prr_hz", "not a number"},
+        {"head.prr_hz=5e6", "head.prr_hz", "allowed 100000 to 1200000 Hz"},
+        {"head=5", "head", "is a section"},
+        {"links=[]", "links", "is a list"},
+        {"links[0]=tcp", "links[0]", "is a section"},
+        {"stations[2].heading_deg=0", "stations[2].heading_deg", "allowed indices 0 to 1, the last appends one"},
+        {"links[99999999999999999999].type=tcp", "links[99999999999999999999].type", "allowed indices 0 to 1"},
+        {"links[-1].type=tcp", "links[-1].type", "unknown key"},
+        {"links[].type=tcp", "links[].type", "no index"},
+        {"links[0.type=tcp", "links[0.type", "unknown key"},
+        {"links[0]type=tcp", "links[0]type", "unknown key"},
+        {"links.type=tcp", "links.type", "unknown key"},
+        {"links[0].typ=tcp", "links[0].typ", "did you mean links[0].type?"},
+        {"links[1].port=5", "links[1].type", "missing"},
+        {"stations[0].position_m=1,2", "stations[0].position_m", "[x, y, z]"},
+        {"stations[0].position_m=[1,2,3", "stations[0].position_m", "[x, y, z]"},
+        {"stations[0].position_m=1,2,3,4", "stations[0].position_m", "not a number"},
+        {"stations[0].name=\xff", "stations[0].name", "not UTF-8"},
+        {"stations[0].name=a\nb", "stations[0].name", "control characters"},
+        {"output.crs=utm", "stations[0].lat_deg", "missing"},
+        {"head.profile=nosuch", "head.profile", "no profile \"nosuch\""},
+        {"output.scale_m=1e-7", "output.scale_m", "1e-6 to 1 m"},
+        {"loop.tick_hz=999", "loop.tick_hz", "a divisor of 1e9"},
+        {"links[0].type=pty", "links[0].port", "a pty link has no such key"},
+    };
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        char start[128], in_file[192];
+        snprintf(start, sizeof start, "--set %s: ", wrong[i].key);
+        snprintf(in_file, sizeof in_file, "%s:", config_path); /* where the file is at fault together with --set */
+        if (load_set(wrong[i].set) != SH_EINPUT) fail_msg("%s was taken", wrong[i].set);
+        int elsewhere = strcmp(wrong[i].set, "output.crs=utm") == 0 || strcmp(wrong[i].set, "links[0].type=pty") == 0;
+        const char *expected = elsewhere ? in_file : start;
+        if (strncmp(err.text, expected, strlen(expected)) != 0) fail_msg("%s: %s", wrong[i].set, err.text);
+        assert_says(wrong[i].fragment);
+        assert_says(wrong[i].key);
+    }
+}
+
+static void a_full_list_takes_no_more(void **state)
+{
+    (void)state;
+    char text[8][32];
+    const char *sets[8];
+    for (int i = 0; i < 8; i++) {
+        snprintf(text[i], sizeof text[i], "links[%d].type=null", i + 1);
+        sets[i] = text[i];
+    }
+    write_file(config_path, base, sizeof base - 1);
+    assert_loads(load_sets(sets, 7));
+    assert_int_equal(cfg->n_links, 8);
+    assert_int_equal(load_sets(sets, 8), SH_EINPUT);
+    assert_says("--set links[8].type: links has 8 elements; allowed indices 0 to 7");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(set_changes_values),
+        cmocka_unit_test(set_appends_elements),
+        cmocka_unit_test(set_refuses),
+        cmocka_unit_test(a_full_list_takes_no_more),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

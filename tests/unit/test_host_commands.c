@@ -1,0 +1,223 @@
+/* libscanhead: commands over a socket pair, a pty and TCP. */
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <pthread.h>
+
+#include "tests/unit/host_rig.h"
+
+/* ---- commands: a thread plays the head, by script */
+
+struct script {
+    int fd;
+    const char *expect; /* line the client must send */
+    int frames_before, frames_after, big;
+    const char *reply; /* NULL: hang up */
+    int ok;
+    const char *identity; /* not NULL: the client asks for it first, after an empty line */
+};
+
+static int came(int fd, const char *expect)
+{
+    char line[600];
+    size_t n = 0;
+    while (n < sizeof line - 1 && read(fd, line + n, 1) == 1 && line[n] != '\n')
+        n++;
+    line[n] = 0;
+    return strcmp(line, expect) == 0;
+}
+
+static void *play(void *arg)
+{
+    struct script *s = arg;
+    s->ok = 1;
+    if (s->identity != NULL)
+        s->ok = came(s->fd, "") && came(s->fd, "*IDN?") && write(s->fd, s->identity, strlen(s->identity)) > 0;
+    s->ok = came(s->fd, s->expect) && s->ok;
+    static uint8_t frame[NATIVE_MAX_FRAME];
+    for (int i = 0; i < s->frames_before + s->frames_after; i++) {
+        if (i == s->frames_before) s->ok &= write(s->fd, s->reply, strlen(s->reply)) > 0;
+        struct line_block block = make_block(s->big ? MAX_POINTS : 1, (uint64_t)i);
+        size_t len = native_encode_points(frame, sizeof frame, &block, 0), at = 0;
+        while (at < len) {
+            ssize_t w = write(s->fd, frame + at, len - at);
+            if (w <= 0) return NULL;
+            at += (size_t)w;
+        }
+    }
+    if (s->frames_after == 0 && s->reply != NULL) s->ok &= write(s->fd, s->reply, strlen(s->reply)) > 0;
+    if (s->reply == NULL) shutdown(s->fd, SHUT_RDWR);
+    return NULL;
+}
+
+static int run_command(struct scanhead *sh, struct script *s, char *reply, size_t reply_len)
+{
+    pthread_t thread;
+    assert_int_equal(pthread_create(&thread, NULL, play, s), 0);
+    int rc = scanhead_command(sh, s->expect, reply, reply_len, 20000);
+    pthread_join(thread, NULL);
+    assert_true(s->ok);
+    return rc;
+}
+
+static void test_command(void **state)
+{
+    (void)state;
+    int head;
+    struct scanhead *sh = open_pair(&head);
+    struct scanhead_frame f;
+    char reply[512];
+    memset(echo, 0x11, sizeof echo);
+    memset(dt, 0, sizeof dt);
+    put_points(head, 1, 1000);
+    put_all(head, "LATE\r\n", 6); /* the reply to a command given up: never taken for a new one's */
+    struct script s = {
+        .fd = head, .expect = "*IDN?", .frames_before = 5, .frames_after = 3, .reply = "Maker,Model,SN1,1.0\r\n"};
+    assert_int_equal(run_command(sh, &s, reply, sizeof reply), 0);
+    assert_string_equal(reply, "Maker,Model,SN1,1.0");
+    struct script e = {
+        .fd = head, .expect = "HEAD:PRR 5000000", .frames_before = 1, .reply = "ERR -222,\"Data out of range\"\r\n"};
+    assert_int_equal(run_command(sh, &e, reply, sizeof reply), 0);
+    assert_string_equal(reply, "ERR -222,\"Data out of range\"");
+    static const uint64_t pulses[] = {1000, 0, 1, 2, 3, 4, 5, 6, 7, 0};
+    for (size_t i = 0; i < sizeof pulses / sizeof pulses[0]; i++) {
+        expect_frame(sh, SCANHEAD_POINTS, &f);
+        assert_int_equal(f.pulse0, pulses[i]);
+    }
+    assert_int_equal(scanhead_next(sh, &f, 0), SCANHEAD_ETIMEOUT);
+    struct script h = {.fd = head, .expect = "SCAN:STOP", .frames_before = 1, .reply = NULL};
+    assert_int_equal(run_command(sh, &h, reply, sizeof reply), SCANHEAD_ECLOSED);
+    expect_frame(sh, SCANHEAD_POINTS, &f); /* what came before the end is not lost */
+    assert_int_equal(scanhead_next(sh, &f, 0), SCANHEAD_ECLOSED);
+    assert_int_equal(scanhead_command(sh, "*IDN?", reply, sizeof reply, 10), SCANHEAD_ECLOSED);
+    close(head);
+    scanhead_close(sh);
+}
+
+static void test_command_refused(void **state)
+{
+    (void)state;
+    int head;
+    struct scanhead *sh = open_pair(&head);
+    char reply[512], back[32];
+    assert_int_equal(scanhead_command(sh, "", reply, sizeof reply, 10), SCANHEAD_EINPUT);
+    assert_int_equal(scanhead_command(sh, "  ", reply, sizeof reply, 10), SCANHEAD_EINPUT);
+    assert_int_equal(scanhead_command(sh, "A\nB", reply, sizeof reply, 10), SCANHEAD_EINPUT);
+    assert_int_equal(scanhead_command(sh, "\xc3\xa4", reply, sizeof reply, 10), SCANHEAD_EINPUT);
+    assert_int_equal(recv(head, back, sizeof back, MSG_DONTWAIT), -1);
+    assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, 1), SCANHEAD_ETIMEOUT);
+    assert_non_null(strstr(scanhead_error(sh), "TIME?"));
+    assert_int_equal(recv(head, back, sizeof back, 0), 6);
+    struct script s = {.fd = head, .expect = "*IDN?", .reply = "12345678\r\n"};
+    assert_int_equal(run_command(sh, &s, reply, 8), SCANHEAD_EINPUT); /* not cut */
+    close(head);
+    scanhead_close(sh);
+}
+
+/* More than 64 MiB before the reply: the oldest go, counted, and what they said is not forgotten. */
+static void test_command_queue_bound(void **state)
+{
+    (void)state;
+    int head;
+    struct scanhead *sh = open_pair(&head);
+    struct scanhead_frame f;
+    struct scanhead_info info;
+    struct scanhead_stats stats;
+    char reply[32];
+    memset(echo, 0x11, sizeof echo);
+    put_descriptor(head, 1, 1, 0);
+    put_anchor(head, 0);
+    struct script s = {.fd = head, .expect = "TIME?", .frames_before = 1100, .big = 1, .reply = "0\r\n"};
+    assert_int_equal(run_command(sh, &s, reply, sizeof reply), 0);
+    scanhead_get_stats(sh, &stats);
+    assert_int_equal(stats.frames, 1102);
+    /* a full frame is 65548 bytes and its entry a few more, so 64 MiB hold 1023 of them */
+    assert_int_equal(stats.dropped, 1102 - 1023);
+    assert_int_equal(scanhead_get_info(sh, &info), 0);
+    expect_frame(sh, SCANHEAD_POINTS, &f);
+    assert_int_equal(f.pulse0, 1100 - 1023);
+    close(head);
+    scanhead_close(sh);
+}
+
+static void test_pty(void **state)
+{
+    (void)state;
+    int master = posix_openpt(O_RDWR | O_NOCTTY);
+    char source[64], err[256], reply[32];
+    if (master < 0 || grantpt(master) != 0 || unlockpt(master) != 0) skip();
+    snprintf(source, sizeof source, "tty:%s", ptsname(master));
+    struct scanhead *sh;
+    struct scanhead_frame f;
+    assert_int_equal(scanhead_open(source, &sh, err, sizeof err), 0);
+    /* bytes a terminal in its usual mode would change: ^C ^D CR ^S ^V DEL */
+    struct native_event e = {.code = 1, .text = "\x03\x04\r\n\x11\x13\x16\x7f"};
+    put_all(master, out, native_encode_event(out, sizeof out, &e, 1, 0));
+    expect_frame(sh, SCANHEAD_EVENT, &f);
+    assert_string_equal(f.event_text, e.text);
+    struct script s = {.fd = master, .expect = "TIME?", .reply = "12\r\n", .identity = "Maker,Model,SN1,1.0\r\n"};
+    assert_int_equal(run_command(sh, &s, reply, sizeof reply), 0);
+    assert_string_equal(reply, "12");
+    close(master);
+    assert_int_equal(scanhead_next(sh, &f, -1), SCANHEAD_ECLOSED);
+    scanhead_close(sh);
+}
+
+static void check_tcp(int family, const char *host)
+{
+    struct sockaddr_storage address = {.ss_family = (sa_family_t)family};
+    struct sockaddr_in6 *v6 = (struct sockaddr_in6 *)&address;
+    struct sockaddr_in *v4 = (struct sockaddr_in *)&address;
+    if (family == AF_INET)
+        v4->sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    else
+        v6->sin6_addr = in6addr_loopback;
+    socklen_t len = family == AF_INET ? sizeof *v4 : sizeof *v6;
+    int fd = socket(family, SOCK_STREAM, 0);
+    if (fd < 0 || bind(fd, (struct sockaddr *)&address, len) != 0) skip();
+    assert_int_equal(listen(fd, 1), 0);
+    getsockname(fd, (struct sockaddr *)&address, &len);
+    char source[64], err[256], reply[32];
+    snprintf(source, sizeof source, "tcp:%s:%d", host, ntohs(family == AF_INET ? v4->sin_port : v6->sin6_port));
+    struct scanhead *sh;
+    struct scanhead_frame f;
+    assert_int_equal(scanhead_open(source, &sh, err, sizeof err), 0);
+    int head = accept(fd, NULL, NULL);
+    put_points(head, 2, 3);
+    expect_frame(sh, SCANHEAD_POINTS, &f);
+    struct script s = {.fd = head, .expect = "TIME?", .frames_before = 2, .reply = "12\r\n"};
+    assert_int_equal(run_command(sh, &s, reply, sizeof reply), 0);
+    close(head);
+    close(fd);
+    expect_frame(sh, SCANHEAD_POINTS, &f);
+    expect_frame(sh, SCANHEAD_POINTS, &f);
+    assert_int_equal(scanhead_next(sh, &f, -1), SCANHEAD_ECLOSED);
+    scanhead_close(sh);
+    /* nobody listens there any more */
+    assert_int_equal(scanhead_open(source, &sh, err, sizeof err), SCANHEAD_EIO);
+    assert_non_null(strstr(err, source));
+}
+
+static void test_tcp(void **state)
+{
+    (void)state;
+    check_tcp(AF_INET, "127.0.0.1");
+}
+
+static void test_tcp6(void **state)
+{
+    (void)state;
+    check_tcp(AF_INET6, "[::1]");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_command),
+        cmocka_unit_test(test_command_refused),
+        cmocka_unit_test(test_command_queue_bound),
+        cmocka_unit_test(test_pty),
+        cmocka_unit_test(test_tcp),
+        cmocka_unit_test(test_tcp6),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,119 @@
+/* libscanhead: what it counts, hashes and refuses of a stream. */
+#include <nettle/sha2.h>
+
+#include "tests/unit/host_rig.h"
+
+static void test_stats(void **state)
+{
+    (void)state;
+    int head;
+    struct scanhead *sh = open_pair(&head);
+    struct scanhead_frame f;
+    struct scanhead_stats s;
+    put_event(head, NATIVE_EV_READER_LOST, 5, 500, 5, NATIVE_LOCAL);
+    put_event(head, NATIVE_EV_READER_LOST, 3, 300, 8, NATIVE_LOCAL);
+    put_event(head, NATIVE_EV_OVERRUN, 1000, 20, 1, 0);
+    struct native_event e = {.code = NATIVE_EV_OVERRUN, .b = 22};
+    size_t len = native_encode_event(out, sizeof out, &e, 1, 0);
+    native_seal(out, 4); /* after 0: three are missing */
+    put_all(head, out, len);
+    out[30] ^= 1;
+    put_all(head, out, len);
+    close(head);
+    for (int i = 0; i < 4; i++)
+        expect_frame(sh, SCANHEAD_EVENT, &f);
+    assert_int_equal(scanhead_next(sh, &f, -1), SCANHEAD_ECLOSED);
+    scanhead_get_stats(sh, &s);
+    assert_int_equal(s.bytes, 5 * 156);
+    assert_int_equal(s.frames, 4);
+    assert_int_equal(s.bad_payload, 1);
+    assert_int_equal(s.bad_bytes, 156);
+    assert_int_equal(s.seq_gaps, 1);
+    assert_int_equal(s.seq_lost, 3);
+    assert_int_equal(s.reader_lost, 8);
+    assert_int_equal(s.pulses_lost, 42);
+    scanhead_close(sh);
+}
+
+static void test_version_and_types(void **state)
+{
+    (void)state;
+    int head;
+    struct scanhead *sh = open_pair(&head);
+    struct scanhead_frame f;
+    struct native_event e = {.code = 1};
+    size_t len = native_encode_event(out, sizeof out, &e, 1, 0);
+    out[2] = 2;
+    native_seal(out, 0);
+    put_all(head, out, len);
+    out[2] = 1;
+    out[1] = 99; /* a type of later times is handed out as it is */
+    native_seal(out, 1);
+    put_all(head, out, len);
+    assert_int_equal(scanhead_next(sh, &f, 5000), SCANHEAD_EFORMAT);
+    assert_non_null(strstr(scanhead_error(sh), "version 2"));
+    expect_frame(sh, 99, &f);
+    close(head);
+    scanhead_close(sh);
+}
+
+static void hash_frame(struct sha256_ctx *ctx, const uint8_t *frame, size_t len)
+{
+    sha256_update(ctx, 1, frame + 1);
+    sha256_update(ctx, 4, frame + 4);
+    sha256_update(ctx, len - 28, frame + 28);
+}
+
+static void test_hash(void **state)
+{
+    (void)state;
+    int head;
+    struct scanhead *sh = open_pair(&head);
+    struct scanhead_frame f;
+    char hex[65], want[65];
+    struct sha256_ctx ctx;
+    sha256_init(&ctx);
+    scanhead_hash_start(sh);
+    scanhead_hash_hex(sh, hex);
+    /* FIPS 180: the digest of nothing */
+    assert_string_equal(hex, "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+    struct native_descriptor d = make_descriptor(1, 1);
+    struct native_anchor anchor = make_anchor();
+    struct line_end end = {.line = 3};
+    struct line_block block = make_block(9, 0);
+    size_t len;
+    for (int part = 0; part < 4; part++) {
+        if (part == 0) len = native_encode_descriptor(out, sizeof out, &d, 5, 0);
+        if (part == 1) len = native_encode_anchor(out, sizeof out, &anchor, 5, 0);
+        if (part == 2) len = native_encode_points(out, sizeof out, &block, 5);
+        if (part == 3) len = native_encode_line_end(out, sizeof out, &end, 5);
+        hash_frame(&ctx, out, len);
+        put_all(head, out, len);
+        put_event(head, 1, 2, 3, 4, 0);            /* outside */
+        put_descriptor(head, 1, 1, NATIVE_REPEAT); /* outside */
+    }
+    close(head);
+    int n = 0;
+    while (scanhead_next(sh, &f, 5000) == 0)
+        n++;
+    assert_int_equal(n, 12);
+    uint8_t digest[32];
+    sha256_digest(&ctx, sizeof digest, digest);
+    for (int i = 0; i < 32; i++)
+        snprintf(want + 2 * i, 3, "%02x", digest[i]);
+    for (int i = 0; i < 2; i++) { /* asking does not end it */
+        scanhead_hash_hex(sh, hex);
+        assert_string_equal(hex, want);
+    }
+    scanhead_close(sh);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_stats),
+        cmocka_unit_test(test_version_and_types),
+        cmocka_unit_test(test_hash),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,161 @@
+/* The parser: bytes in pieces of any size, its limits, and garbage. */
+#include "tests/unit/native_stream.h"
+
+static uint8_t out[1 << 20];
+
+static void test_parser_whole(void **state)
+{
+    (void)state;
+    make_stream();
+    for (size_t chunk = 1; chunk <= stream_len; chunk = chunk < 80 ? chunk + 1 : chunk * 2 + 1) {
+        begin();
+        feed(stream, stream_len, chunk);
+        check_got(0, 0);
+        assert_int_equal(n_texts, 5);
+        assert_int_equal(parser.stats.frames, 13);
+        assert_int_equal(parser.stats.texts, 5);
+        assert_int_equal(parser.stats.bytes, stream_len);
+        assert_int_equal(parser.stats.bad_bytes, 0);
+        assert_int_equal(parser.stats.bad_payload, 0);
+        assert_int_equal(parser.stats.seq_gaps, 0);
+        assert_int_equal(parser.stats.seq_lost, 0);
+    }
+}
+
+static void test_parser_random_chunks(void **state)
+{
+    (void)state;
+    make_stream();
+    uint32_t x = 1;
+    for (int run = 0; run < 300; run++) {
+        size_t at = 0;
+        begin();
+        while (at < stream_len) {
+            x = x * 1664525u + 1013904223u;
+            size_t n = 1 + (x >> 8) % (1u + (uint32_t)run * 4);
+            if (n > stream_len - at) n = stream_len - at;
+            feed(stream + at, n, n);
+            at += n;
+        }
+        check_got(0, 0);
+        assert_int_equal(n_texts, 5);
+    }
+}
+
+static void test_parser_length_refused(void **state)
+{
+    (void)state;
+    make_stream();
+    begin();
+    uint8_t bad[28] = {NATIVE_SYNC, NATIVE_POINTS, 1, 0, 1, 0, 1, 0}; /* 65537 bytes */
+    native_seal(bad, 0);
+    feed(bad, 28, 28);
+    assert_int_equal(parser.stats.bad_bytes, 28); /* at once, without waiting for a payload */
+    feed(stream, stream_len, 100);
+    check_got(0, 0);
+    assert_int_equal(n_texts, 4); /* out of step until the first frame */
+}
+
+static void test_parser_biggest_frame(void **state)
+{
+    (void)state;
+    struct line_block block = make_block(NATIVE_MAX_POINTS);
+    memset(block_echo, 0, sizeof block_echo);
+    memset(block_dt, 0, sizeof block_dt);
+    size_t len = native_encode_points(out, sizeof out, &block, 0);
+    assert_int_equal(len, 28 + 40 + 20 * 3274);
+    static const size_t chunks[] = {1000, 4096, 65535, 200000};
+    for (size_t c = 0; c < 4; c++) {
+        native_parser_init(&parser);
+        int n = 0;
+        for (int repeat = 0; repeat < 20; repeat++) {
+            size_t at = 0;
+            while (at < len) {
+                size_t room;
+                uint8_t *to = native_parser_room(&parser, &room);
+                size_t part = len - at < chunks[c] ? len - at : chunks[c];
+                if (part > room) part = room;
+                assert_true(part > 0);
+                memcpy(to, out + at, part);
+                native_parser_added(&parser, part);
+                at += part;
+                while (native_parser_next(&parser) == NATIVE_FRAME) {
+                    assert_memory_equal(parser.frame, out, len);
+                    n++;
+                }
+            }
+        }
+        assert_int_equal(n, 20);
+        assert_int_equal(parser.stats.bad_bytes, 0);
+    }
+}
+
+static void test_parser_text_limits(void **state)
+{
+    (void)state;
+    char line[600];
+    memset(line, 'x', sizeof line);
+    memcpy(line + 510, "\r\n", 2);
+    begin();
+    feed((const uint8_t *)line, 512, 100);
+    assert_int_equal(n_texts, 1);
+    assert_int_equal(strlen(parser.text), 510);
+    memset(line, 'x', sizeof line);
+    memcpy(line + 511, "\r\n", 2);
+    begin();
+    feed((const uint8_t *)line, 513, 100);
+    assert_int_equal(n_texts, 0);
+    assert_int_equal(parser.stats.bad_bytes, 513);
+    /* out of step: a line is not taken for a reply */
+    feed((const uint8_t *)"OK\r\n", 4, 4);
+    assert_int_equal(n_texts, 0);
+}
+
+static void test_seq_jumps_back(void **state)
+{
+    (void)state;
+    struct native_telemetry t = {0};
+    size_t len = native_encode_telemetry(out, sizeof out, &t, 0, 0);
+    static const uint32_t seq[] = {10, 11, 15, 0, 1, 1};
+    begin();
+    for (size_t i = 0; i < 6; i++) {
+        assert_int_equal(native_seal(out, seq[i]), len);
+        feed(out, len, len);
+    }
+    /* 15 after 11: three lost; 0 after 15 and 1 after 1: jumps back, nobody knows */
+    assert_int_equal(parser.stats.seq_gaps, 3);
+    assert_int_equal(parser.stats.seq_lost, 3);
+}
+
+/* Garbage made to be slow: sync bytes only, and headers without payload whose length hides what follows. The
+ * work is counted in CRC checks: the parser reads a good header at most once per frame start, so the number
+ * is bounded. */
+static void test_parser_resync_cost(void **state)
+{
+    (void)state;
+    native_parser_init(&parser);
+    memset(out, NATIVE_SYNC, sizeof out);
+    size_t at = 0;
+    while (at < sizeof out) {
+        size_t room;
+        uint8_t *to = native_parser_room(&parser, &room);
+        size_t n = sizeof out - at < room ? sizeof out - at : room;
+        memcpy(to, out + at, n);
+        native_parser_added(&parser, n);
+        at += n;
+        assert_int_equal(native_parser_next(&parser), NATIVE_MORE);
+        assert_true(parser.end - parser.start < NATIVE_HEADER_LEN);
+    }
+    assert_true(parser.stats.bad_bytes > sizeof out - NATIVE_HEADER_LEN);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_parser_whole),          cmocka_unit_test(test_parser_random_chunks),
+        cmocka_unit_test(test_parser_length_refused), cmocka_unit_test(test_parser_biggest_frame),
+        cmocka_unit_test(test_parser_text_limits),    cmocka_unit_test(test_seq_jumps_back),
+        cmocka_unit_test(test_parser_resync_cost),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,236 @@
+/* core/pose: trajectories from files of samples and of waypoints. */
+#include <unistd.h>
+
+#include "core/geoframe.h"
+#include "tests/unit/pose_rig.h"
+
+static char path[] = "/tmp/scanhead-pose-XXXXXX";
+
+static int make_file(void **state)
+{
+    (void)state;
+    int fd = mkstemp(path);
+    return fd < 0 ? -1 : close(fd);
+}
+
+static int remove_file(void **state)
+{
+    (void)state;
+    return unlink(path);
+}
+
+static void write_file(const char *text)
+{
+    FILE *f = fopen(path, "w");
+    assert_non_null(f);
+    fputs(text, f);
+    assert_int_equal(fclose(f), 0);
+}
+
+static void test_csv(void **state)
+{
+    (void)state;
+    struct sh_err err;
+    struct trajectory *angles, *quats;
+    struct pose a, b;
+    double frame, first, last;
+    write_file("\xef\xbb\xbf# a comment behind a byte order mark\n\nt_s, x_m,y_m,z_m,roll_deg,pitch_deg,heading_deg\r\n"
+               "0,1,2,3,5,-6,370\r\n# another\n2.5,3,2,3,0,0,90\n");
+    if (trajectory_read_csv(path, &angles, &err) != SH_OK) fail_msg("%s", err.text);
+    trajectory_span(angles, &first, &last);
+    assert_true(first == 0.0 && last == 2.5);
+    trajectory_at(angles, 0.0, &a, &frame);
+    pose_from_angles(10 * DEG, -6 * DEG, 5 * DEG, b.quat);
+    assert_true(pose_angle_between(a.quat, b.quat) < 1e-14 && a.position_m[1] == 2.0);
+    char text[300]; /* the same by quaternions, columns in another order, with frames */
+    snprintf(text, sizeof text,
+             "frame,qw,qx,qy,qz,z_m,y_m,x_m,t_s\n7,%.17g,%.17g,%.17g,%.17g,3,2,1,0\n8,1,0,0,0,3,2,3,2\n", b.quat[0],
+             b.quat[1], b.quat[2], b.quat[3]);
+    write_file(text);
+    if (trajectory_read_csv(path, &quats, &err) != SH_OK) fail_msg("%s", err.text);
+    trajectory_at(quats, 0.0, &b, &frame);
+    assert_true(pose_angle_between(a.quat, b.quat) < 1e-14 && frame == 7.0 && b.position_m[0] == 1.0);
+    trajectory_free(angles);
+    trajectory_free(quats);
+}
+
+#define NAMES "t_s,x_m,y_m,z_m,heading_deg\n"
+
+static void test_csv_errors(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *text, *where, *what;
+    } wrong[] = {
+        {"", ":", "empty"},
+        {"t_s,x_m,y_m\n0,1,2\n", "line 1", "columns have to be"},
+        {"t_s,x_m,y_m,z_m,heading_deg,qw\n", "line 1", "columns have to be"},
+        {"t_s,x_m,y_m,z_m,heading\n", "line 1", "\"heading\" is unknown; allowed t_s"},
+        {"t_s,t_s\n", "line 1", "twice"},
+        {NAMES, ":", "no samples"},
+        {NAMES "0,1,2,3\n", "line 2", "4 values"},
+        {NAMES "0,1,2,3,4,5\n", "line 2", "more than the 5"},
+        {NAMES "0,1,2,3,4\n1,1,2,,4\n", "line 3", "z_m is not a finite decimal number: \"\""},
+        {NAMES "0,1,nan,3,4\n", "line 2", "y_m"},
+        {NAMES "0,0x10,2,3,4\n", "line 2", "x_m"},
+        {NAMES "0,1e999,2,3,4\n", "line 2", "x_m"},
+        {NAMES "0,1 m,2,3,4\n", "line 2", "x_m"},
+        {NAMES "0,1,2,3,4\n# c\n0,1,2,3,4\n", "line 4", "rising times"},
+        {NAMES "0,1,2,3,4\n0.00005,1,2,3,4\n", "line 3", "at least 0.0001 s"},
+        {NAMES "0,1,2,3,4\n1e300,1,2,3,4\n", "line 3", "t_s 1e+300; allowed -4e+09 to 4e+09"},
+        {NAMES "-1e18,1,2,3,4\n0,1,2,3,4\n", "line 2", "t_s -1e+18; allowed"},
+        {"\xef\xbb" NAMES, "line 1", "is unknown"}, /* no whole byte order mark */
+        {"t_s,x_m,y_m,z_m,qw,qx,qy,qz\n0,0,0,0,1,1,0,0\n", "line 2", "quaternion"},
+        {"t_s,x_m,y_m,z_m,heading_deg,pitch_deg\n0,0,0,0,0,91\n", "line 2", "pitch_deg"},
+    };
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        struct trajectory *tr;
+        struct sh_err err = {0};
+        write_file(wrong[i].text);
+        assert_int_equal(trajectory_read_csv(path, &tr, &err), SH_EINPUT);
+        assert_null(tr);
+        if (strstr(err.text, path) == NULL || strstr(err.text, wrong[i].where) == NULL ||
+            strstr(err.text, wrong[i].what) == NULL)
+            fail_msg("%zu: %s", i, err.text);
+    }
+    struct trajectory *tr;
+    struct sh_err err;
+    assert_int_equal(trajectory_read_csv("/nonexistent/x.csv", &tr, &err), SH_EINPUT);
+}
+
+static void test_waypoints(void **state)
+{
+    (void)state;
+    struct sh_err err;
+    struct trajectory *tr;
+    struct pose p;
+    double frame, h, pitch, roll, first, last;
+    /* North at 5 m/s for 20 m, stand for 2 s, on for 10 m at 2 m/s. */
+    write_file("x_m,y_m,z_m,speed_m_s,pause_s\n0,0,1,5,0\n0,10,1,5,0\n0,20,1,2,2\n0,30,1,2,0\n");
+    if (trajectory_read_waypoints(path, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
+    trajectory_span(tr, &first, &last);
+    assert_true(first == 0.0 && fabs(last - 11.0) < 1e-12);
+    trajectory_at(tr, 1.0, &p, &frame);
+    pose_to_angles(p.quat, &h, &pitch, &roll);
+    assert_true(fabs(p.position_m[1] - 5) < 1e-3 && fabs(frame - 0.5) < 1e-3 && fabs(h) < 1e-12 &&
+                p.position_m[2] == 1);
+    for (double t = 4.0; t <= 6.0; t += 0.1) { /* it stands, exactly */
+        trajectory_at(tr, t, &p, &frame);
+        assert_true(fabs(p.position_m[1] - 20) < 1e-12 && fabs(frame - 2) < 1e-12);
+    }
+    trajectory_free(tr);
+    /* A pause in a bend: the car stands as it came and leaves as it stands, without a jerk of its nose. */
+    write_file("x_m,y_m,z_m,speed_m_s,pause_s\n0,0,0,5,0\n0,20,0,5,1\n20,20,0,5,0\n");
+    if (trajectory_read_waypoints(path, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
+    struct pose before;
+    trajectory_at(tr, 0.0, &before, &frame);
+    for (double t = 0.01; t <= 9.0; t += 0.01) {
+        trajectory_at(tr, t, &p, &frame);
+        assert_true(pose_angle_between(before.quat, p.quat) < 0.01);   /* 45 degrees in 4 s, at most 1 rad/s anywhere */
+        assert_true(distance(before.position_m, p.position_m) < 0.15); /* at most three times the mean speed */
+        before = p;
+    }
+    trajectory_free(tr);
+    /* A corner: heading turns from north to east, in the end along the last leg. */
+    write_file("x_m,y_m,z_m,speed_m_s\n0,0,0,10\n0,50,0,10\n50,50,0,10\n100,50,0,10\n");
+    if (trajectory_read_waypoints(path, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
+    trajectory_at(tr, 5.0, &p, &frame);
+    pose_to_angles(p.quat, &h, &pitch, &roll);
+    assert_true(fabs(h - 45 * DEG) < 1e-3); /* equal times before and behind: the parabola halves the angle */
+    trajectory_at(tr, 15.0, &p, &frame);
+    pose_to_angles(p.quat, &h, &pitch, &roll);
+    assert_true(fabs(h - 90 * DEG) < 1e-3);
+    trajectory_free(tr);
+    static const char *const wrong[] = {
+        "x_m,y_m,z_m\n0,0,0\n", "x_m,y_m,z_m,speed_m_s\n0,0,0,1\n", "x_m,y_m,z_m,speed_m_s\n0,0,0,0\n1,0,0,1\n",
+        "x_m,y_m,z_m,speed_m_s\n0,0,0,1\n0,0,0,1\n", "x_m,y_m,z_m,speed_m_s,pause_s\n0,0,0,1,-1\n1,0,0,1,0\n"};
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        write_file(wrong[i]);
+        assert_int_equal(trajectory_read_waypoints(path, NULL, &tr, &err), SH_EINPUT);
+        assert_non_null(strstr(err.text, path));
+    }
+}
+
+/* 10 m at 1 mm/s are as many samples as they are long; more than there is room for, and a time that is no count of
+ * nanoseconds, are errors. */
+static void test_slow_waypoints(void **state)
+{
+    (void)state;
+    struct sh_err err;
+    struct trajectory *tr;
+    struct pose p;
+    double frame, h, pitch, roll;
+    write_file("x_m,y_m,z_m,speed_m_s\n0,0,0,0.001\n0,5,0,0.001\n5,5,0,0.001\n");
+    if (trajectory_read_waypoints(path, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
+    const struct pose mount = {.quat = {1, 0, 0, 0}};
+    struct pose_knot *knot;
+    size_t n;
+    double error_m;
+    assert_int_equal(trajectory_knots(tr, 0, 1e9, &mount, 1e-4, 10000000, 0.01, &knot, &n, &error_m, &err), SH_OK);
+    assert_true(n < 3100 && error_m <= 1e-4); /* legs of 5.0 to 5.5 m, each step of theirs in up to three */
+    free(knot);
+    trajectory_at(tr, 5000.0, &p, &frame);
+    pose_to_angles(p.quat, &h, &pitch, &roll);
+    assert_true(fabs(h - 45 * DEG) < 1e-3 && fabs(frame - 1) < 1e-9);
+    trajectory_free(tr);
+    char text[4096] = "x_m,y_m,z_m,speed_m_s\n";
+    for (int i = 0; i < 120; i++) /* each 999 m at 1 mm/s: 99,900 samples */
+        snprintf(text + strlen(text), sizeof text - strlen(text), "%d,0,0,0.001\n", 999 * i);
+    write_file(text);
+    assert_int_equal(trajectory_read_waypoints(path, NULL, &tr, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, path));
+    assert_non_null(strstr(err.text, "allowed 10000000"));
+    FILE *f = fopen(path, "w");
+    assert_non_null(f);
+    fputs("x_m,y_m,z_m,speed_m_s,pause_s\n", f);
+    for (int i = 0; i < 50000; i++) /* a day each: 4e9 s are over with the 46,297th */
+        fprintf(f, "0,%d,0,1000,86400\n", i);
+    assert_int_equal(fclose(f), 0);
+    assert_int_equal(trajectory_read_waypoints(path, NULL, &tr, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "line 46298: "));
+    assert_non_null(strstr(err.text, "allowed 4e+09"));
+}
+
+/* East in a scene in ECEF: up is the ellipsoid's normal, forward is east, wherever on the Earth. */
+static void test_level_waypoints(void **state)
+{
+    (void)state;
+    const double a_m = 6378137.0, e2 = 0.0066943799901413165, places[][2] = {{50, 8}, {-33, 151}, {0, -90}, {89, 30}};
+    struct geoframe ecef;
+    geoframe_set_ecef(&ecef);
+    for (size_t i = 0; i < sizeof places / sizeof places[0]; i++) {
+        double lat = places[i][0] * DEG, lon = places[i][1] * DEG, n_m = a_m / sqrt(1 - e2 * sin(lat) * sin(lat));
+        const double up[3] = {cos(lat) * cos(lon), cos(lat) * sin(lon), sin(lat)}, east[3] = {-sin(lon), cos(lon), 0};
+        const double at_m[3] = {n_m * up[0], n_m * up[1], n_m * (1 - e2) * up[2]};
+        struct trajectory *tr;
+        struct sh_err err;
+        struct pose p;
+        double frame, r[9];
+        char text[512] = "x_m,y_m,z_m,speed_m_s\n";
+        for (int k = -1; k <= 1; k++)
+            snprintf(text + strlen(text), sizeof text - strlen(text), "%.9f,%.9f,%.9f,%g\n", at_m[0] + 10 * k * east[0],
+                     at_m[1] + 10 * k * east[1], at_m[2] + 10 * k * east[2], i == 1 ? 0.001 : 5.0);
+        write_file(text);
+        if (trajectory_read_waypoints(path, &ecef, &tr, &err) != SH_OK) fail_msg("%s", err.text);
+        trajectory_at(tr, i == 1 ? 1e4 : 2.0, &p, &frame);
+        pose_matrix(p.quat, r);
+        for (int k = 0; k < 3; k++) {
+            assert_true(fabs(r[3 * k + 2] - up[k]) < 1e-9);
+            /* differences of coordinates that are right to 1e-9 m, over 1 mm, or 0.1 mm when it is slow */
+            assert_true(fabs(r[3 * k + 1] - east[k]) < 3e-5);
+        }
+        trajectory_free(tr);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_csv),
+        cmocka_unit_test(test_csv_errors),
+        cmocka_unit_test(test_waypoints),
+        cmocka_unit_test(test_slow_waypoints),
+        cmocka_unit_test(test_level_waypoints),
+    };
+    return cmocka_run_group_tests(tests, make_file, remove_file);
+}

@@ -1,0 +1,186 @@
+/* Taking a scan: a head by script, over TCP, loses frames to the recorder and is unplugged; which scans count as
+ * broken. */
+#include <arpa/inet.h>
+#include <pthread.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdatomic.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+#include "drivers/protocol/native_encode.h"
+#include "firmware_sim/recording.h"
+
+/* What the head does, one after the other. */
+enum deed {
+    END,
+    PULSES,   /* some of a scan */
+    LOSES,    /* frames do not reach the recorder, the scan's end among them */
+    IDLE,     /* is asked its state, and says so */
+    SCANNING, /* likewise */
+    UNPLUGGED /* and plugged in again */
+};
+
+struct head {
+    int listener;
+    const enum deed *script;
+    const char *wrong;
+    int fd;
+    uint32_t seq;
+    _Atomic int over;
+};
+
+static struct head head;
+
+static void send_frame(uint8_t *frame, size_t len)
+{
+    native_seal(frame, head.seq++);
+    if (send(head.fd, frame, len, MSG_NOSIGNAL) != (ssize_t)len) head.wrong = "a frame was not taken";
+}
+
+static void send_telemetry(void)
+{
+    uint8_t frame[256];
+    struct native_telemetry t = {.state = 4};
+    send_frame(frame, native_encode_telemetry(frame, sizeof frame, &t, 0, 0));
+}
+
+static void send_pulse(void)
+{
+    uint8_t frame[256], echo = 0x11;
+    uint32_t zero = 0;
+    int16_t refl = 0;
+    uint16_t label = 0;
+    struct line_block block = {.n_pulses = 1,
+                               .n_points = 1,
+                               .dt_ns = &zero,
+                               .a = &zero,
+                               .b = &zero,
+                               .c = &zero,
+                               .refl_cdb = &refl,
+                               .echo = &echo,
+                               .label = &label};
+    send_frame(frame, native_encode_points(frame, sizeof frame, &block, 0));
+}
+
+static void answer(const char *state)
+{
+    char line[64];
+    size_t n = 0;
+    while (n < sizeof line - 1 && read(head.fd, line + n, 1) == 1 && line[n] != '\n')
+        n++;
+    line[n] = '\0';
+    if (strcmp(line, "HEAD:STAT?") != 0) head.wrong = "asked something else";
+    if (send(head.fd, state, strlen(state), MSG_NOSIGNAL) <= 0) head.wrong = "an answer was not taken";
+}
+
+static void *play(void *arg)
+{
+    (void)arg;
+    head.fd = accept(head.listener, NULL, NULL);
+    for (const enum deed *deed = head.script; *deed != END && head.wrong == NULL; deed++) {
+        if (*deed == PULSES) send_pulse();
+        if (*deed == IDLE) answer("idle\r\n");
+        if (*deed == SCANNING) answer("scanning\r\n");
+        if (*deed == LOSES) {
+            head.seq += 5;
+            send_telemetry();
+        }
+        if (*deed == UNPLUGGED) {
+            close(head.fd);
+            head.fd = accept(head.listener, NULL, NULL);
+        }
+    }
+    atomic_store(&head.over, 1);
+    send_telemetry(); /* so that the recorder need not wait to see that it is over */
+    return NULL;
+}
+
+static int is_over(void)
+{
+    return atomic_load(&head.over);
+}
+
+static int take_frame(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
+{
+    (void)ctx;
+    (void)sh;
+    (void)frame;
+    (void)err;
+    return SH_OK;
+}
+
+static void record(const enum deed *script, struct recording_result *result)
+{
+    struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+    socklen_t len = sizeof at;
+    head = (struct head){.script = script, .listener = socket(AF_INET, SOCK_STREAM, 0)};
+    assert_int_equal(bind(head.listener, (struct sockaddr *)&at, sizeof at), 0);
+    assert_int_equal(listen(head.listener, 1), 0);
+    assert_int_equal(getsockname(head.listener, (struct sockaddr *)&at, &len), 0);
+    char source[64], why[256];
+    struct scanhead *sh;
+    snprintf(source, sizeof source, "tcp:127.0.0.1:%d", ntohs(at.sin_port));
+    if (scanhead_open(source, &sh, why, sizeof why) != SCANHEAD_OK) fail_msg("%s", why);
+    pthread_t thread;
+    assert_int_equal(pthread_create(&thread, NULL, play, NULL), 0);
+    const struct recording_options options = {
+        .listen = 1, .frames = -1, .replug_s = 20, .frame = take_frame, .interrupted = is_over};
+    struct sh_err err = {0, ""};
+    int rc = recording_run(sh, &options, result, &err);
+    scanhead_close(sh);
+    shutdown(head.listener, SHUT_RDWR); /* whatever the head waits for */
+    pthread_join(thread, NULL);
+    close(head.fd);
+    close(head.listener);
+    if (head.wrong != NULL) fail_msg("the head: %s", head.wrong);
+    if (rc != SH_OK) fail_msg("%s", err.text);
+}
+
+static void test_unplugged_within_a_scan(void **state)
+{
+    (void)state;
+    static const enum deed once[] = {PULSES, UNPLUGGED, SCANNING, PULSES, UNPLUGGED, SCANNING, END};
+    struct recording_result result;
+    record(once, &result);
+    assert_int_equal(result.replugs, 2);
+    assert_int_equal(result.broken_scans, 1); /* one scan, however often */
+    assert_int_equal(result.pulses, 2);
+}
+
+/* The scan was over, though its end was lost: nothing was left to break. */
+static void test_unplugged_after_a_lost_end(void **state)
+{
+    (void)state;
+    static const enum deed after[] = {PULSES, LOSES, IDLE, UNPLUGGED, IDLE, END};
+    struct recording_result result;
+    record(after, &result);
+    assert_int_equal(result.replugs, 1);
+    assert_int_equal(result.broken_scans, 0);
+}
+
+/* Nor does the next scan take a break of this one for its own. */
+static void test_broken_once_more_after_a_lost_end(void **state)
+{
+    (void)state;
+    static const enum deed twice[] = {PULSES, UNPLUGGED, SCANNING, LOSES, IDLE, PULSES, UNPLUGGED, SCANNING, END};
+    struct recording_result result;
+    record(twice, &result);
+    assert_int_equal(result.replugs, 2);
+    assert_int_equal(result.broken_scans, 2);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_unplugged_within_a_scan),
+        cmocka_unit_test(test_unplugged_after_a_lost_end),
+        cmocka_unit_test(test_broken_once_more_after_a_lost_end),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
