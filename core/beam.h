@@ -109,8 +109,8 @@ struct beam_echoes {
 int beam_echoes_alloc(struct beam_echoes *echoes, uint32_t capacity, struct sh_err *err);
 void beam_echoes_free(struct beam_echoes *echoes);
 
-/* Returns of one pulse -> its echoes, at the end of the list. Sorts the returns. Those of the pulse's echoes that
- * exceed most are left out, those first of which least comes back; gives how many. */
+/* Returns of one pulse -> its echoes, at the end of the list. The returns change places. Those of the pulse's echoes
+ * that exceed most are left out, those first of which least comes back; gives how many. */
 uint32_t beam_merge(const struct beam *beam, struct beam_return *returns, uint32_t n, uint32_t pulse, uint32_t most,
                     struct beam_echoes *echoes);
 

@@ -120,12 +120,32 @@ static void drop_weakest(struct beam_echoes *e, uint32_t first)
     e->n--;
 }
 
+/* From so many returns on it is faster to look first. */
+enum { MANY = 7 };
+
+/* Most footprints lie on one surface: their returns hang together whatever their order. The nearest one goes to the
+ * front, as sorting would have it. */
+static int hang_together(const struct beam *beam, struct beam_return *r, uint32_t n)
+{
+    uint32_t nearest = 0;
+    double farthest_m = r[0].range_m;
+    for (uint32_t i = 1; i < n; i++) {
+        if (r[i].range_m < r[nearest].range_m) nearest = i;
+        farthest_m = r[i].range_m > farthest_m ? r[i].range_m : farthest_m;
+    }
+    if (farthest_m - r[nearest].range_m > beam->resolution_m) return 0;
+    struct beam_return one = r[0];
+    r[0] = r[nearest];
+    r[nearest] = one;
+    return 1;
+}
+
 uint32_t beam_merge(const struct beam *beam, struct beam_return *r, uint32_t n, uint32_t pulse, uint32_t most,
                     struct beam_echoes *e)
 {
     uint32_t first = e->n, left_out = 0;
     uint8_t number = 0;
-    sort(r, n);
+    if (n < MANY || !hang_together(beam, r, n)) sort(r, n);
     for (uint32_t i = 0, end; i < n; i = end) {
         for (end = i + 1; end < n && r[end].range_m - r[end - 1].range_m <= beam->resolution_m;)
             end++;
