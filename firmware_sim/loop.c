@@ -26,7 +26,8 @@ static double stream_rate(const struct loop *loop)
     const struct head_settings *h = &cfg->settings;
     double sweep_udeg = 360e6 * cfg->profile.optical_gain / cfg->profile.facets;
     double used = (double)(h->line_stop_udeg - h->line_start_udeg) / sweep_udeg;
-    return (double)h->prr_uhz * 1e-6 * (used < 1.0 ? used : 1.0) * NATIVE_POINT_LEN;
+    double point_len = NATIVE_POINT_LEN + (cfg->attributes ? NATIVE_ATTRIBUTE_LEN : 0);
+    return (double)h->prr_uhz * 1e-6 * (used < 1.0 ? used : 1.0) * point_len;
 }
 
 /* A link that can't carry the stream is refused before it loses any of it. */

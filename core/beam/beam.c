@@ -90,10 +90,22 @@ double beam_plane_excess(const struct beam *beam, double range_m, double cosine)
     return range_m * x * (term[0] + x * (term[1] + x * term[2]));
 }
 
+void beam_plane_variance(const struct beam *beam, double term[2])
+{
+    term[0] = 0.5 * mean_t() * beam->exit_radius_m * beam->exit_radius_m;
+    term[1] = 0.5 * mean_t() * beam->slope * beam->slope;
+}
+
 double beam_plane_sigma(const struct beam *beam, double range_m, double cosine)
 {
-    double c = fmax(fabs(cosine), 1e-6);
-    return beam_radius(beam, range_m) * sqrt(1.0 - fmin(1.0, c * c)) / c * sqrt(0.5 * mean_t());
+    double term[2], x = 1.0 / fmax(cosine * cosine, 1e-12);
+    beam_plane_variance(beam, term);
+    return sqrt((term[0] + term[1] * range_m * range_m) * fmax(0.0, x - 1.0));
+}
+
+double beam_echo_width(double pulse_m, double variance_m2)
+{
+    return variance_m2 == 0.0 ? pulse_m : sqrt(pulse_m * pulse_m + 8.0 * M_LN2 * variance_m2);
 }
 
 void beam_half(const struct beam *beam, double h, double *energy, double *moment)

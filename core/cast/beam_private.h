@@ -70,6 +70,7 @@ struct beam_work {
     uint64_t counter[CHUNK];       /* of the points' random numbers */
     uint8_t number[CHUNK];         /* of a pulse's only or first echo */
     struct behind behind;
+    float width_m[CHUNK]; /* of a pulse's only or first echo; touched only where attributes are asked for */
 };
 
 /* ---- beam_plan.c: jobs, their sub-rays at the end of the pool. */
