@@ -59,6 +59,8 @@ struct beam {
     double resolution_m;
     /* beyond a line, by its distance from the centre, -1 .. 1: energy, and its first moment */
     double half[BEAM_HALF_STEPS + 2], moment[BEAM_HALF_STEPS + 2];
+    /* its second moments, about the footprint's centre: along the distance, and along the line */
+    double along[BEAM_HALF_STEPS + 2], across[BEAM_HALF_STEPS + 2];
 };
 
 /* Lengths and angles as above; the pulse width in seconds. */
@@ -80,11 +82,14 @@ double beam_echo_width(double pulse_m, double variance_m2);
 /* The part of the unit disc beyond the line n . u = h, n a unit vector, |h| <= 1: its energy, and the energy times the
  * distance of its centre of energy along n. */
 void beam_half(const struct beam *beam, double h, double *energy, double *moment);
+/* Its second moments, along n and along the line. */
+void beam_half_squares(const struct beam *beam, double h, double *along, double *across);
 
 /* Places of sub-rays in the unit disc, each with 1/n of the energy. */
 struct beam_pattern {
     uint32_t n;
     float x[BEAM_SUBRAY_ROOM], y[BEAM_SUBRAY_ROOM]; /* whole words of bits; behind n: nothing */
+    double rest; /* variance of the footprint's x, and of its y, less that of the places: what lies around each */
 };
 /* rings: 0 (the centre alone) to BEAM_MAX_RINGS. */
 void beam_rings(uint32_t rings, struct beam_pattern *pattern);
@@ -183,5 +188,13 @@ struct beam_parts {
  * energy are left out. */
 int beam_cut(const struct beam *beam, const struct beam_pattern *fine, const struct beam_line *line, uint32_t n,
              struct beam_parts *parts);
+
+/* How each part spreads about its centre of energy: variances and covariance of x and y. */
+struct beam_spread {
+    double xx[BEAM_MAX_PARTS], xy[BEAM_MAX_PARTS], yy[BEAM_MAX_PARTS];
+};
+/* beam_cut, with the parts' spreads. */
+int beam_cut_spread(const struct beam *beam, const struct beam_pattern *fine, const struct beam_line *line, uint32_t n,
+                    struct beam_parts *parts, struct beam_spread *spread);
 
 #endif

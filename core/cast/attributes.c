@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "core/cast/beam_private.h"
+#include "core/vec3.h"
 #include "core/vecmath.h"
 
 /* There and back, in units of 0.01 ns. */
@@ -68,11 +69,28 @@ void caster_plane_widths(const struct beam *beam, const float *steep, const doub
     plane_widths(beam->resolution_m * beam->resolution_m, full * term[0], full * term[1], steep, range_m, n, width_m);
 }
 
+/* The sub-ray at (x, y) begins at exit_radius (x e1 + y e2), with slope (x e2 - y e1): how the range changes with x and
+ * y, to first order. */
+float beam_part_sigma(const struct beam *beam, const double dir[3], const struct job *job, const double n[3],
+                      double range_m, double xx, double xy, double yy)
+{
+    double along = vec3_dot(n, dir), a1 = vec3_dot(n, job->e1) / along, a2 = vec3_dot(n, job->e2) / along;
+    double by_x = -beam->exit_radius_m * a1 - range_m * beam->slope * a2;
+    double by_y = -beam->exit_radius_m * a2 + range_m * beam->slope * a1;
+    double variance = by_x * by_x * xx + 2.0 * by_x * by_y * xy + by_y * by_y * yy;
+    return (float)sqrt(variance > 0.0 ? variance : 0.0);
+}
+
+float beam_round_sigma(const struct beam *beam, double range_m, double cosine, double variance)
+{
+    double tan2 = 1.0 / fmax(cosine * cosine, 1e-12) - 1.0;
+    return (float)(beam_radius(beam, range_m) * sqrt(fmax(0.0, variance * tan2)));
+}
+
 void caster_list_attributes(const struct echo_list *l, const struct line_block *block, uint32_t out)
 {
     for (uint32_t i = 0; i < l->n; i++) {
-        block->amplitude_cdb[out + i] =
-            l->echo[i] != 0 ? l->amplitude_cdb[l->from[i]] : (int16_t)LINE_AMPLITUDE_NONE;
+        block->amplitude_cdb[out + i] = l->echo[i] != 0 ? l->amplitude_cdb[l->from[i]] : (int16_t)LINE_AMPLITUDE_NONE;
         block->width_cns[out + i] = l->echo[i] != 0 ? caster_width(l->width_m[l->from[i]]) : (uint16_t)LINE_WIDTH_NONE;
     }
 }
