@@ -69,7 +69,7 @@ struct native_descriptor {
     double range_min_m, range_max_m;
     uint32_t max_echoes, n_surfaces, frames, scan; /* frames per scan (0: endless); scan number from 1 */
     uint64_t seed;
-    uint32_t content; /* enum native_content; 0 is not sent */
+    uint32_t content, reserved; /* enum native_content; where it is 0, neither is sent */
 };
 
 enum native_content { NATIVE_HAS_ATTRIBUTES = 1 }; /* a frame of attributes follows each one of points */

@@ -8,7 +8,7 @@
 /* The first heads sent no scales by axis, no kind of height and no axes; later ones no frame scalar. */
 enum { ANCHOR_LEN_FIRST = 168, ANCHOR_LEN_AXES = 272, ANCHOR_LEN = 280 };
 /* A descriptor that says nothing of content ends before it. */
-enum { DESCRIPTOR_LEN_CONTENT = 276, DESCRIPTOR_CONTENT_AT = 272 };
+enum { DESCRIPTOR_LEN_CONTENT = 280, DESCRIPTOR_CONTENT_AT = 272 };
 /* Nor did they count what is no echo. */
 enum { LINE_END_LEN_FIRST = 56, LINE_END_LEN = 68 };
 

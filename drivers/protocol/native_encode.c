@@ -38,10 +38,10 @@ size_t native_encode_descriptor(uint8_t *dst, size_t cap, const struct native_de
 {
     size_t len = fields_descriptor.wire_len;
     if (d->content == 0) return encode_fixed(dst, cap, NATIVE_DESCRIPTOR, &fields_descriptor, d, t_ns, flags);
-    if (cap < NATIVE_HEADER_LEN + len + 4) return 0;
+    if (cap < NATIVE_HEADER_LEN + len + 8) return 0;
     fields_encode(&fields_descriptor, d, dst + NATIVE_HEADER_LEN);
-    le_put32(dst + NATIVE_HEADER_LEN + len, d->content);
-    return put_header(dst, NATIVE_DESCRIPTOR, flags, len + 4, t_ns);
+    le_put64(dst + NATIVE_HEADER_LEN + len, d->content);
+    return put_header(dst, NATIVE_DESCRIPTOR, flags, len + 8, t_ns);
 }
 
 size_t native_encode_anchor(uint8_t *dst, size_t cap, const struct native_anchor *a, int64_t t_ns, int flags)
