@@ -176,10 +176,13 @@ static int write_frame(void *ctx, struct scanhead *sh, const struct scanhead_fra
 
 static void say_result(const struct record *r, const struct recording_result *result)
 {
-    if (r->recording.progress)
-        fprintf(stderr, "scanhead: %llu points, %llu shots without echo, %llu scans\n",
-                (unsigned long long)result->points, (unsigned long long)result->empty,
-                (unsigned long long)result->scans);
+    char faint[64] = "";
+    if (!r->recording.progress) return;
+    if (result->faint != 0)
+        snprintf(faint, sizeof faint, ", %llu hits not detected", (unsigned long long)result->faint);
+    fprintf(stderr, "scanhead: %llu points, %llu shots without echo%s, %llu scans\n",
+            (unsigned long long)result->points, (unsigned long long)result->empty, faint,
+            (unsigned long long)result->scans);
 }
 
 static void print_note(void *ctx, const char *text)

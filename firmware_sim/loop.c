@@ -37,8 +37,9 @@ static int check_capacity(const struct loop *loop, const struct pump *pump, stru
     char endpoint[300];
     if (capacity <= 0.0 || capacity >= rate || pump_is_nmea(pump)) return SH_OK;
     pump_endpoint(pump, endpoint, sizeof endpoint);
-    return sh_fail(err, SH_EINPUT, "link %s: the stream has %.2f MB/s, the link carries %.2f MB/s; lower head.prr_hz",
-                   endpoint, 1e-6 * rate, 1e-6 * capacity);
+    return sh_fail(err, SH_EINPUT, "link %s: the stream has %.2f MB/s, the link carries %.2f MB/s; lower head.prr_hz%s",
+                   endpoint, 1e-6 * rate, 1e-6 * capacity,
+                   loop->cfg->attributes ? ", or leave out output.attributes" : "");
 }
 
 static int open_links(struct loop *loop, struct sh_err *err)
