@@ -3,7 +3,6 @@
 #include "drivers/protocol/native.h"
 #include "tests/wire/room.h"
 
-/* Outside of the room's middle, at its pillar, so that there are several echoes; and a dark material for faint ones. */
 static const struct room_config SCAN = {
     .profile = "riegl-vz400i",
     .prr_hz = 100000,
@@ -25,9 +24,9 @@ static const char *begin(struct wire *wire)
 {
     static char config[352];
     room_write(wire);
-    FILE *f = fopen(wire_path(wire, "room.obj"), "a"); /* a pillar whose edges cut footprints */
+    FILE *f = fopen(wire_path(wire, "room.obj"), "a"); /* a board 0.3 m before the wall, whose edges cut footprints */
     assert_non_null(f);
-    fputs("v 1.5 2 -1.5\nv 1.9 2.3 -1.5\nv 1.9 2.3 2.5\nv 1.5 2 2.5\no pillar\nusemtl paint-pillar\nf 9 10 11 12\n", f);
+    fputs("v 3 3.6 -1.5\nv 3.5 3.65 -1.5\nv 3.5 3.65 2.5\nv 3 3.6 2.5\no board\nusemtl paint-board\nf 9 10 11 12\n", f);
     assert_int_equal(fclose(f), 0);
     snprintf(config, sizeof config, "%s", room_config_write(wire, &SCAN));
     return config;
@@ -240,7 +239,7 @@ static void test_files(void **state)
         least = fmin(least, told[i].width_ns);
         most = fmax(most, told[i].width_ns);
     }
-    assert_true(least == 4.0 && most > 4.2); /* the profile's pulse; edges of the pillar nearer than that to the wall */
+    assert_true(least == 4.0 && most > 4.2); /* the profile's pulse; board and wall in one echo */
     check_ply(wire, "a.ply", 0, 0);
     check_las(wire, "a.las");
     /* out of the stream the same */
@@ -378,8 +377,8 @@ static void test_capacity(void **state)
                     "links: [{type: usb, port: 0, speed: full}]\n");
     snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
     for (int i = 0; i < 3; i++) {
-        const char *const args[] = {"run",  config,  "--duration", "0.01",       "--pace", "fast",
-                                    "--set", cases[i].set, "--set", cases[i].prr, "--quiet", NULL};
+        const char *const args[] = {"run",   config,       "--duration", "0.01",       "--pace",  "fast",
+                                    "--set", cases[i].set, "--set",      cases[i].prr, "--quiet", NULL};
         assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), cases[i].status);
         if (cases[i].status == 0) continue;
         char *err = wire_read(wire_path(wire, "err"), NULL);
