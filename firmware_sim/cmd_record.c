@@ -17,6 +17,7 @@ static const char HELP[] =
     "ending what is written:\n\n"
     "  .ply        points, binary or text, with double coordinates, label and station\n"
     "  .las        LAS 1.4, point format 6: points with CRS, time, returns, label; station as point source ID\n"
+    "              (both with amplitude and width of the echoes, where the head sends them: output.attributes)\n"
     "  .ptx        a grid per scan, with the scan's pose; shots without echo are in it\n"
     "  .e57        E57: points of each scan, with its pose\n"
     "  .poses.csv  true position and orientation of each scan, or a moving head's trajectory\n"
