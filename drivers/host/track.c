@@ -149,16 +149,15 @@ static int begin_waiting(struct track *t, struct sh_err *err)
 }
 
 /* The batch at hand. */
-static int wait_for_attributes(struct track *t, int n)
+static void wait_for_attributes(struct track *t, int n)
 {
     struct track_waiting *w = t->waiting;
-    for (int i = 0; i < n && w->n < NATIVE_MAX_POINTS; i++) {
+    for (int i = 0; i < n && w->n < NATIVE_MAX_POINTS; i++) { /* no frame holds more */
         struct waiting_point *p = &w->point[w->n++];
         *p = (struct waiting_point){.point = t->point[i], .row = t->row[i], .index = t->index[i]};
         if (t->info.moving) p->frame = t->frame[i];
         if (scanhead_gps_time(t->sh, p->point.t_ns, &p->gps_s) != 0) p->gps_s = (double)NAN;
     }
-    return 0;
 }
 
 /* attribute: of all points of their frame; NULL: lost. */
@@ -237,7 +236,12 @@ static int take_points(struct track *t, struct scanhead *sh, const struct scanhe
         for (int i = 0; i < n && t->has_attributes; i++)
             t->index[i] = first + (uint32_t)i;
         int kept = t->info.moving ? place_moving(t, sh, n, err) : n;
-        rc = kept < 0 ? kept : t->has_attributes ? wait_for_attributes(t, kept) : ops->points(rec, kept, err);
+        if (kept < 0)
+            rc = kept;
+        else if (t->has_attributes)
+            wait_for_attributes(t, kept);
+        else
+            rc = ops->points(rec, kept, err);
         first += (uint32_t)n;
     }
     return rc;

@@ -472,6 +472,64 @@ static void glass_and_what_is_behind(void **state)
         }
 }
 
+/* Behind a pane, and on a body that moves, only the incidence of a sub-ray is known: a slanted wall there is as wide.
+ */
+static void slanted_behind_glass_and_in_motion(void **state)
+{
+    (void)state;
+    const double range_m = 100.0, slant = 75.0 * M_PI / 180.0;
+    for (int moving = 0; moving < 2; moving++) {
+        struct lit l = {.near_m = 20.0, .far_m = 20.0, .rho = {0.2, 0.5}};
+        struct face face;
+        struct sh_err err;
+        struct bvh *body = NULL;
+        double d[3][4], mean, variance;
+        struct scene *wall =
+            slanted(range_m, slant, 0.7, (const double[]){-9.0, 9.0}, (const double[]){-9.0, 9.0}, &face);
+        double vertex[8][3];
+        static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
+        static const uint16_t label[4] = {BACK, BACK, FRONT, FRONT};
+        static const struct scene_surface surface[2] = {{.object = "pane"}, {.object = "wall"}};
+        struct scene *both;
+        for (int v = 0; v < 8; v++) { /* the pane beside the beam, or in it */
+            double side = v % 4 == 1 || v % 4 == 2 ? 1.0 : -1.0, up = v % 4 >= 2 ? 1.0 : -1.0;
+            const double pane[3] = {side + (moving ? 8.0 : 0.0), 20.0, up};
+            memcpy(vertex[v], v < 4 ? wall->vertex_m[v] : pane, sizeof vertex[v]);
+        }
+        if (scene_from_arrays((const double(*)[3])vertex + (moving ? 4 : 0), moving ? 4 : 8, triangle, moving ? 2 : 4,
+                              moving ? label + 2 : label, surface, 2, &both, &err) != 0)
+            fail_msg("%s", err.text);
+        open_lit(&l, both, &AHEAD, 1e-9);
+        beam_init(&l.rig.beam.beam, 0.007, 0.35e-3, 0.4e-9);
+        if (line_block_alloc_attributes(&l.rig.block, &err) != 0) fail_msg("%s", err.text);
+        l.table.surface[FRONT].glass = 0.7;
+        l.table.has_optics = 1;
+        l.detect.depth = moving ? 0 : 1;
+        l.rig.setup.pulse_m = l.detect.separation_m = l.rig.beam.beam.resolution_m;
+        if (moving) {
+            const double origin_m[3] = {0.0, 0.0, 0.0};
+            struct cast_mover *m = &l.rig.setup.mover[0];
+            if (bvh_create(wall, origin_m, 3000.0, 1, NULL, &body, &err) != 0) fail_msg("%s", err.text);
+            *m = (struct cast_mover){.bvh = body, .centre_m = {0.0, range_m, 0.0}, .radius_m = 20.0};
+            cast_rotation(0.0, m->rotation);
+            l.rig.setup.n_movers = 1;
+        }
+        beam_rig_mode(&l.rig, moving ? BEAM_RINGS : BEAM_ADAPTIVE, 4);
+        beam_rig_line(&l.rig, 1);
+        beam_rig_directions(&l.rig, 1, d[0], d[1], d[2]);
+        const double dir[3] = {d[0][0], d[1][0], d[2][0]};
+        spread(&l.rig.beam.beam, dir, &face, &mean, &variance);
+        double want = width_of(l.rig.setup.pulse_m, variance);
+        assert_int_equal(l.rig.block.echo[0], moving ? 0x11 : 0x21);
+        assert_true(want > 1.4 * width_of(l.rig.setup.pulse_m, 0.0));
+        /* with 61 sub-rays that lie the same all around */
+        check_width(l.rig.block.width_cns[moving ? 0 : 1], want, 0.0, 1e-3);
+        close_lit(&l);
+        bvh_free(body);
+        scene_free(wall);
+    }
+}
+
 /* A block without room for them is filled as ever, with the same points. */
 static void points_are_the_same_without(void **state)
 {
@@ -503,6 +561,7 @@ int main(void)
         cmocka_unit_test(amplitude_and_reflectance_agree),
         cmocka_unit_test(attributes_stay_with_their_echo),
         cmocka_unit_test(glass_and_what_is_behind),
+        cmocka_unit_test(slanted_behind_glass_and_in_motion),
         cmocka_unit_test(points_are_the_same_without),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

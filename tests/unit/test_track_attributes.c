@@ -56,8 +56,8 @@ static void put_poses(int64_t from_ms)
     put(native_encode_poses(out, sizeof out, pose, 2, 0, 0), -1);
 }
 
-/* Shots a millisecond apart; the fourth one is empty. Shot i at pulse0 + i has pulse0 + i as amplitude (0.01 dB) and 400
- * more as width. local: a frame of this reader's own comes between. */
+/* Shots a millisecond apart; the fourth one is empty. Shot i at pulse0 + i has pulse0 + i as amplitude (0.01 dB) and
+ * 400 more as width. local: a frame of this reader's own comes between. */
 static void put_points(uint32_t line, uint64_t pulse0, int with, int lost, int local)
 {
     uint32_t a[SHOTS], zero[SHOTS] = {0}, dt[SHOTS];
@@ -120,8 +120,7 @@ static char *expect(char *at, int number)
 {
     char amplitude[32], width[32], want[32];
     int used;
-    assert_int_equal(
-        sscanf(at, "%*f %*f %*f %*f %*f %*f 1 1 0 1 %*s %31s %31s\n%n", amplitude, width, &used), 2);
+    assert_int_equal(sscanf(at, "%*f %*f %*f %*f %*f %*f 1 1 0 1 %*s %31s %31s\n%n", amplitude, width, &used), 2);
     snprintf(want, sizeof want, "%.2f", 0.01 * number);
     assert_string_equal(amplitude, number < 0 ? "nan" : want);
     snprintf(want, sizeof want, "%.2f", 4.0 + 0.01 * number);
@@ -143,8 +142,8 @@ static void test_moving(void **state)
     put_points(0, 0, 1, -1, 0);
     put_points(1, 95, 1, -1, 1);
     put_poses(200);
-    put_points(2, 200, 1, 1, 0);  /* attributes lost */
-    put_points(3, 220, 1, 0, 0);  /* points lost */
+    put_points(2, 200, 1, 1, 0); /* attributes lost */
+    put_points(3, 220, 1, 0, 0); /* points lost */
     put_points(4, 240, 1, -1, 0);
     put_points(5, 260, 1, 1, 0); /* lost, at the end */
     char *text = (char *)record("a.ply", (struct recorder_options){.ascii = 1}, &len);
@@ -179,7 +178,8 @@ static void test_binary(void **state)
         float v[2];
         memcpy(v, at + 50, sizeof v);
         if (i == 3) assert_true(isnan(v[0]) && isnan(v[1]));
-        if (i != 3) assert_true(fabsf(v[0] - 0.01f * (float)i) < 1e-6f && fabsf(v[1] - 4.0f - 0.01f * (float)i) < 1e-6f);
+        if (i != 3)
+            assert_true(fabsf(v[0] - 0.01f * (float)i) < 1e-6f && fabsf(v[1] - 4.0f - 0.01f * (float)i) < 1e-6f);
     }
     free(file);
 }
@@ -229,7 +229,8 @@ static void test_kinds(void **state)
         put_points(0, 0, 0, -1, 0);
         int rc = rig_record(path, (struct recorder_options){0}, 1, &err);
         assert_int_equal(rc, which < 2 ? SH_EFORMAT : 0);
-        if (which < 2) assert_non_null(strstr(err.text, "the stream went on without attributes; a file holds one kind"));
+        if (which < 2)
+            assert_non_null(strstr(err.text, "the stream went on without attributes; a file holds one kind"));
         unlink(path);
     }
 }
