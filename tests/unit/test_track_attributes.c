@@ -142,10 +142,11 @@ static void test_moving(void **state)
     put_points(0, 0, 1, -1, 0);
     put_points(1, 95, 1, -1, 1);
     put_poses(200);
-    put_points(2, 200, 1, 1, 0); /* attributes lost */
-    put_points(3, 220, 1, 0, 0); /* points lost */
-    put_points(4, 240, 1, -1, 0);
-    put_points(5, 260, 1, 1, 0); /* lost, at the end */
+    put_points(2, 195, 1, -1, 0); /* the last five */
+    put_points(3, 210, 1, 1, 0);  /* attributes lost */
+    put_points(4, 220, 1, 0, 0);  /* points lost */
+    put_points(5, 240, 1, -1, 0);
+    put_points(6, 260, 1, 1, 0); /* lost, at the end */
     char *text = (char *)record("a.ply", (struct recorder_options){.ascii = 1}, &len);
     assert_non_null(strstr(text, "comment points_without_attributes 18\n"));
     assert_non_null(strstr(rig_notes, "18 points without amplitude and width, which were lost"));
@@ -153,10 +154,10 @@ static void test_moving(void **state)
     assert_non_null(at);
     at = strstr(at, "end_header\n") + 11;
     static const struct {
-        int pulse0, n, known;
-    } lines[] = {{0, 10, 1}, {95, 6, 1}, {200, 10, 0}, {240, 10, 1}, {260, 10, 0}};
-    for (int l = 0; l < 5; l++)
-        for (int i = 0; i < lines[l].n; i++)
+        int pulse0, first, end, known;
+    } lines[] = {{0, 0, 10, 1}, {95, 0, 6, 1}, {195, 5, 10, 1}, {210, 0, 10, 0}, {240, 0, 10, 1}, {260, 0, 10, 0}};
+    for (int l = 0; l < 6; l++)
+        for (int i = lines[l].first; i < lines[l].end; i++)
             if (i != 3) at = expect(at, lines[l].known ? lines[l].pulse0 + i : -1);
     assert_int_equal(*at, 0);
     free(text);
