@@ -1,6 +1,5 @@
 /* Amplitudes and widths of echoes, where a block has room for them. */
 #include <math.h>
-#include <string.h>
 
 #include "core/cast/beam_private.h"
 #include "core/vec3.h"
