@@ -203,6 +203,27 @@ static int take_attributes(struct track *t, struct scanhead *sh, const struct sc
     return hand_out(t, attribute, ops, rec, err);
 }
 
+static void count_unheld(struct track *t, int n)
+{
+    if (t->wants_attributes || scanhead_has_attributes(t->sh) != 1) return;
+    for (int i = 0; i < n; i++)
+        t->n_attributes_unheld += t->point[i].echo_count != 0;
+}
+
+/* n points of the frame that are at hand, from `first` on. */
+static int take_batch(struct track *t, struct scanhead *sh, uint32_t first, int n, const struct track_ops *ops,
+                      void *rec, struct sh_err *err)
+{
+    for (int i = 0; i < n && t->has_attributes; i++)
+        t->index[i] = first + (uint32_t)i;
+    int kept = t->info.moving ? place_moving(t, sh, n, err) : n;
+    if (kept < 0) return kept;
+    count_unheld(t, kept);
+    if (!t->has_attributes) return ops->points(rec, kept, err);
+    wait_for_attributes(t, kept);
+    return 0;
+}
+
 static int take_points(struct track *t, struct scanhead *sh, const struct scanhead_frame *frame,
                        const struct track_ops *ops, void *rec, struct sh_err *err)
 {
@@ -233,15 +254,7 @@ static int take_points(struct track *t, struct scanhead *sh, const struct scanhe
         int n = scanhead_points(sh, frame, first, t->point, TRACK_BATCH);
         if (n < 0) return sh_fail(err, n, "%s: %s", t->path, scanhead_error(sh));
         row = number_rows(t, row, n);
-        for (int i = 0; i < n && t->has_attributes; i++)
-            t->index[i] = first + (uint32_t)i;
-        int kept = t->info.moving ? place_moving(t, sh, n, err) : n;
-        if (kept < 0)
-            rc = kept;
-        else if (t->has_attributes)
-            wait_for_attributes(t, kept);
-        else
-            rc = ops->points(rec, kept, err);
+        rc = take_batch(t, sh, first, n, ops, rec, err);
         first += (uint32_t)n;
     }
     return rc;
@@ -276,6 +289,9 @@ void track_tell(const struct track *t, const struct sh_report *report)
                 t->path, (unsigned long long)t->n_unplaced);
     if (t->n_without_pose > 0)
         sh_warn(report, "%s: %llu points left out whose pose was lost", t->path, (unsigned long long)t->n_without_pose);
+    if (t->n_attributes_unheld > 0)
+        sh_warn(report, "%s: amplitude and width of %llu points left out, for which this format has no place", t->path,
+                (unsigned long long)t->n_attributes_unheld);
     if (t->n_without_attributes > 0)
         sh_warn(report, "%s: %llu points without amplitude and width, which were lost", t->path,
                 (unsigned long long)t->n_without_attributes);

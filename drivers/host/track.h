@@ -36,6 +36,7 @@ struct track {
     uint64_t n_unplaced;           /* points before their descriptor and anchor were seen */
     uint64_t n_without_pose;       /* points of a moving head whose pose was lost */
     uint64_t n_without_attributes; /* echoes whose attributes were lost */
+    uint64_t n_attributes_unheld;  /* echoes with attributes that the recorder has no place for */
     double scale_m;                /* of coordinates in the recording: the stream's; coarser where the head moves far */
     struct scanhead_point point[TRACK_BATCH];
     uint32_t row[TRACK_BATCH]; /* of each point: pulses since the line's first, the blind ones included */

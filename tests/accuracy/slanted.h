@@ -20,7 +20,8 @@ struct face {
 };
 
 /* Mean and variance of the ranges of sub-rays on a Vogel spiral, equal energy each, that meet the face; their share. */
-static inline double spread(const struct beam *beam, const double dir[3], const struct face *f, double *mean, double *variance)
+static inline double spread(const struct beam *beam, const double dir[3], const struct face *f, double *mean,
+                            double *variance)
 {
     enum { RAYS = 40000 };
     double e1[3], e2[3], sum = 0.0, sum2 = 0.0, first = NAN;
@@ -61,7 +62,7 @@ static inline double width_of(double pulse_m, double variance)
 /* A quad on the plane through (0, range, 0) that is slanted by i, about an axis that is turned by `about` from
  * vertical; its corners u, v of the plane's axes, the second one along the slant. */
 static inline struct scene *slanted(double range_m, double i, double about, const double u[2], const double v[2],
-                             struct face *face)
+                                    struct face *face)
 {
     const double across[3] = {sin(about), 0.0, cos(about)}; /* in the plane, across the beam */
     const double up[3] = {cos(about) * cos(i), sin(i), -sin(about) * cos(i)};
@@ -82,7 +83,8 @@ static inline struct scene *slanted(double range_m, double i, double about, cons
     return scene;
 }
 
-static inline void open_attributes(struct beam_rig *rig, struct scene *scene, const struct beam_view *view, double pulse_s)
+static inline void open_attributes(struct beam_rig *rig, struct scene *scene, const struct beam_view *view,
+                                   double pulse_s)
 {
     struct sh_err err;
     open_rig(rig, scene, view);
