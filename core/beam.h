@@ -23,7 +23,10 @@
  * surfaces are modelled (core/surface.h), what weighs is what comes back: energy times the surface's return, times the
  * share that glass and mirrors before it let through; the 1 % is still of the footprint (and where nothing comes back
  * of any of them, energy weighs). The width of an echo is that of the pulse, resolution_m, and 2.355 sigma of its
- * ranges, added as squares (full widths at half maximum of Gaussians).
+ * ranges, added as squares (full widths at half maximum of Gaussians). Of a return that stands for a part of the
+ * footprint, or for what lies around a sub-ray, the ranges within it count as well, to first order on its plane: short
+ * by half of (s tan i)^2 of the standard deviation, s = theta / 2; where lines cross in the footprint, by a few percent
+ * more, as its parts are then known by places.
  *
  * One ray for all of the footprint. Where it lies on one plane at incidence i, the mean over it is not the range of its
  * centre: a sub-ray at (rho, phi) meets the plane at (R - rho D/2 tan i cos phi) / (1 - rho s tan i sin phi), s = theta
@@ -59,6 +62,8 @@ struct beam {
     double resolution_m;
     /* beyond a line, by its distance from the centre, -1 .. 1: energy, and its first moment */
     double half[BEAM_HALF_STEPS + 2], moment[BEAM_HALF_STEPS + 2];
+    /* its second moments, about the footprint's centre: along the distance, and along the line */
+    double along[BEAM_HALF_STEPS + 2], across[BEAM_HALF_STEPS + 2];
 };
 
 /* Lengths and angles as above; the pulse width in seconds. */
@@ -69,17 +74,25 @@ double beam_radius(const struct beam *beam, double range_m);
 double beam_plane_excess(const struct beam *beam, double range_m, double cosine);
 /* The same as a polynomial: range (term[0] x + term[1] x^2 + term[2] x^3), x = 1 / cos^2 of the incidence. */
 void beam_plane_series(const struct beam *beam, double term[3]);
-/* Standard deviation of the ranges there. */
+/* Standard deviation of the ranges there, to first order in s tan i: w(R) tan i times the standard deviation of rho cos
+ * phi, the root of half the mean t. */
 double beam_plane_sigma(const struct beam *beam, double range_m, double cosine);
+/* Its square as (term[0] + term[1] range^2) (x - 1), x as above. */
+void beam_plane_variance(const struct beam *beam, double term[2]);
+/* Width of an echo whose ranges vary so: pulse_m is the pulse's own, c tau / 2. */
+double beam_echo_width(double pulse_m, double variance_m2);
 
 /* The part of the unit disc beyond the line n . u = h, n a unit vector, |h| <= 1: its energy, and the energy times the
  * distance of its centre of energy along n. */
 void beam_half(const struct beam *beam, double h, double *energy, double *moment);
+/* Its second moments, along n and along the line. */
+void beam_half_squares(const struct beam *beam, double h, double *along, double *across);
 
 /* Places of sub-rays in the unit disc, each with 1/n of the energy. */
 struct beam_pattern {
     uint32_t n;
     float x[BEAM_SUBRAY_ROOM], y[BEAM_SUBRAY_ROOM]; /* whole words of bits; behind n: nothing */
+    double rest; /* variance of the footprint's x, and of its y, less that of the places: what lies around each */
 };
 /* rings: 0 (the centre alone) to BEAM_MAX_RINGS. */
 void beam_rings(uint32_t rings, struct beam_pattern *pattern);
@@ -178,5 +191,13 @@ struct beam_parts {
  * energy are left out. */
 int beam_cut(const struct beam *beam, const struct beam_pattern *fine, const struct beam_line *line, uint32_t n,
              struct beam_parts *parts);
+
+/* How each part spreads about its centre of energy: variances and covariance of x and y. */
+struct beam_spread {
+    double xx[BEAM_MAX_PARTS], xy[BEAM_MAX_PARTS], yy[BEAM_MAX_PARTS];
+};
+/* beam_cut, with the parts' spreads. */
+int beam_cut_spread(const struct beam *beam, const struct beam_pattern *fine, const struct beam_line *line, uint32_t n,
+                    struct beam_parts *parts, struct beam_spread *spread);
 
 #endif

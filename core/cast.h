@@ -111,6 +111,8 @@ struct cast_setup {
      * beam->max_echoes entries a pulse. */
     const struct cast_beam *beam;
     enum beam_select echoes; /* which of a pulse's */
+    double
+        pulse_m; /* c tau / 2 of the pulse, a beam's resolution_m; for the widths of echoes, where a block has room */
     uint32_t n_movers;
     struct cast_mover mover[CAST_MAX_MOVERS];
     /* A moving head: poses of the head (socs -> prcs) in order of time, pose_between them. They cover the firing times
@@ -143,8 +145,10 @@ struct caster;
 int caster_create(struct caster **out, struct sh_err *err);
 void caster_free(struct caster *caster);
 
-/* Fills block from the run; capacity >= run->n times the echoes that a pulse may have (1 + depth, beam->max_echoes).
- * Returns the number of echoes. Allocates nothing. */
+/* Fills block from the run, with attributes where it has room for them: the width of a single ray's echo is the
+ * pulse's, of a footprint's as core/beam.h has it, of what glass and mirrors bring together likewise; an amplitude
+ * needs a signal model. Noise of ranges moves echoes, and doesn't widen them. The block has capacity >= run->n times
+ * the echoes that a pulse may have (1 + depth, beam->max_echoes). Returns the number of echoes. Allocates nothing. */
 uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
                      struct line_block *block);
 

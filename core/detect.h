@@ -18,7 +18,8 @@
  * Detection. The signal carries Gaussian noise of sigma 1/k in units of the threshold, k the signal-to-noise ratio at
  * the threshold; it is detected where A + n/k >= 1, with probability Phi(k (A - 1)). So half of the pulses see a target
  * at the data sheet's range. Reflectance, relative to a white Lambertian target at that range, met head on, in the data
- * sheet's air: (A + n/k) rho_min(R) / o(R). Amplitude in dB above the threshold is 10 log10 A.
+ * sheet's air: (A + n/k) rho_min(R) / o(R). Amplitude in dB above the threshold, as a head measures it, is
+ * 10 log10 (A + n/k): 0 dB or more of what is detected.
  *
  * Range noise. The time of an echo has a jitter of rise time over signal-to-noise ratio (M. Skolnik, Introduction to
  * radar systems, 1980), beside one that no signal helps against (clock, digits):
@@ -92,6 +93,9 @@ struct detect_echoes {
 
 /* Fills amplitude and refl_cdb; range_m becomes NaN where nothing is detected. */
 void detect_by_signal(const struct detect_signal *signal, const struct detect_echoes *echoes);
+/* After that: amplitudes in 0.01 dB above the threshold; LINE_AMPLITUDE_NONE where there is no echo, and of all without
+ * a signal (NULL). */
+void detect_amplitudes(const struct detect_signal *signal, const struct detect_echoes *echoes, int16_t *amplitude_cdb);
 /* Range noise by the amplitude. */
 void detect_range_noise(const struct detect_signal *signal, const struct detect_echoes *echoes);
 /* Range noise of sigma0 + sigma1 * range, whatever the signal. */

@@ -4,8 +4,8 @@
  * run of consecutive cast pulses of one line, with one entry per echo, and one entry for a shot without echo.
  * Entries are in order of pulse, then of range. Times and pulse numbers count from the scan's start.
  *
- * Ownership: line_block_alloc makes the arrays for `capacity` entries, line_block_free releases them; a block
- * belongs to one thread. Nothing else allocates. */
+ * Ownership: line_block_alloc makes the arrays for `capacity` entries, line_block_alloc_attributes those that are
+ * optional, line_block_free releases them all; a block belongs to one thread. Nothing else allocates. */
 #ifndef CORE_LINE_H
 #define CORE_LINE_H
 
@@ -14,10 +14,13 @@
 #include "core/err.h"
 
 enum {
-    LINE_REFL_NONE = INT16_MIN, /* reflectance is not modelled */
-    LINE_XYZ_NONE = INT32_MIN,  /* coordinate of a shot without echo */
-    LINE_LABEL_NONE = 0xffff,   /* label of a shot without echo */
-    LINE_MAX_ECHOES = 15,       /* echo number and count are four bits each on the wire */
+    LINE_REFL_NONE = INT16_MIN,      /* reflectance is not modelled */
+    LINE_XYZ_NONE = INT32_MIN,       /* coordinate of a shot without echo */
+    LINE_LABEL_NONE = 0xffff,        /* label of a shot without echo */
+    LINE_MAX_ECHOES = 15,            /* echo number and count are four bits each on the wire */
+    LINE_AMPLITUDE_NONE = INT16_MIN, /* amplitude is not modelled, or there is no echo */
+    LINE_WIDTH_NONE = 0,             /* width of a shot without echo */
+    LINE_WIDTH_MOST = UINT16_MAX,    /* that much or more */
 };
 
 /* What the three numbers of a point are; chosen per stream. */
@@ -40,6 +43,9 @@ struct line_block {
     int16_t *refl_cdb;   /* 0.01 dB relative to a white Lambertian target; LINE_REFL_NONE */
     uint8_t *echo;       /* number (1..15) in the low nibble, count in the high one; 0: shot without echo */
     uint16_t *label;     /* surface label; LINE_LABEL_NONE */
+    /* Attributes: both, or both NULL: not asked for, and nobody works them out. */
+    int16_t *amplitude_cdb; /* 0.01 dB above the detection threshold, with the detector's noise; LINE_AMPLITUDE_NONE */
+    uint16_t *width_cns;    /* width of the echo, full at half maximum, 0.01 ns; LINE_WIDTH_NONE, LINE_WIDTH_MOST */
 };
 
 /* One line is over. */
@@ -61,6 +67,8 @@ enum {
 };
 
 int line_block_alloc(struct line_block *block, uint32_t capacity, struct sh_err *err);
+/* For a block that has its other arrays. On failure the block is as it was. */
+int line_block_alloc_attributes(struct line_block *block, struct sh_err *err);
 void line_block_free(struct line_block *block);
 
 #endif

@@ -17,6 +17,7 @@ static const char HELP[] =
     "ending what is written:\n\n"
     "  .ply        points, binary or text, with double coordinates, label and station\n"
     "  .las        LAS 1.4, point format 6: points with CRS, time, returns, label; station as point source ID\n"
+    "              (both with amplitude and width of the echoes, where the head sends them: output.attributes)\n"
     "  .ptx        a grid per scan, with the scan's pose; shots without echo are in it\n"
     "  .e57        E57: points of each scan, with its pose\n"
     "  .poses.csv  true position and orientation of each scan, or a moving head's trajectory\n"
@@ -176,10 +177,13 @@ static int write_frame(void *ctx, struct scanhead *sh, const struct scanhead_fra
 
 static void say_result(const struct record *r, const struct recording_result *result)
 {
-    if (r->recording.progress)
-        fprintf(stderr, "scanhead: %llu points, %llu shots without echo, %llu scans\n",
-                (unsigned long long)result->points, (unsigned long long)result->empty,
-                (unsigned long long)result->scans);
+    char faint[64] = "";
+    if (!r->recording.progress) return;
+    if (result->faint != 0)
+        snprintf(faint, sizeof faint, ", %llu hits not detected", (unsigned long long)result->faint);
+    fprintf(stderr, "scanhead: %llu points, %llu shots without echo%s, %llu scans\n",
+            (unsigned long long)result->points, (unsigned long long)result->empty, faint,
+            (unsigned long long)result->scans);
 }
 
 static void print_note(void *ctx, const char *text)

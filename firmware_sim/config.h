@@ -188,6 +188,7 @@ struct config {
     enum config_heights heights;
     enum georef_method georef; /* GEOREF_AUTO: as the plan says */
     double tolerance_m;        /* what a georeferenced position may be off */
+    int attributes;            /* amplitude and width of each echo go out behind the points */
     double scale_m;            /* 0: the finest of 1e-6 x 10^n m that holds range_max_m in 31 bits */
     /* links */
     struct link_spec link[CONFIG_MAX_LINKS];

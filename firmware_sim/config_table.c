@@ -214,6 +214,9 @@ static const struct cfg_key config_keys[] = {
              "plan.tolerance_m, 1e-7 m at least, when not given."},
     {"output.georef", CFG_ENUM, .def = "auto", .names = georef_names, IN_CONFIG(georef),
      .help = "Method of utm and geodetic points; auto: as `scanhead plan` says."},
+    {"output.attributes", CFG_BOOL, .def = "off", IN_CONFIG(attributes),
+     .help = "on: each points frame is followed by one with amplitude (needs signal.model: on) and width of its echoes, 4 bytes "
+             "a point; .ply and .las recordings have them."},
     {"output.scale_m", CFG_REAL, "m", "0", 0, 1, IN_CONFIG(scale_m), .allowed = "0 (automatic) or 1e-6 to 1 m",
      .help = "Metres per count of a coordinate, at most, and of a range; range_max_m of the profile must fit into 31 bits."},
 

@@ -41,6 +41,7 @@ void device_fill_descriptor(const struct device *device, struct native_descripto
     d->frames = spec->frames;
     d->scan = device->scan;
     d->seed = cfg->seed;
+    d->content = cfg->attributes ? (uint32_t)NATIVE_HAS_ATTRIBUTES : 0;
 }
 
 void device_fill_anchor(const struct site *site, uint32_t station, size_t stretch, struct native_anchor *a)

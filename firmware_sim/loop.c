@@ -26,7 +26,8 @@ static double stream_rate(const struct loop *loop)
     const struct head_settings *h = &cfg->settings;
     double sweep_udeg = 360e6 * cfg->profile.optical_gain / cfg->profile.facets;
     double used = (double)(h->line_stop_udeg - h->line_start_udeg) / sweep_udeg;
-    return (double)h->prr_uhz * 1e-6 * (used < 1.0 ? used : 1.0) * NATIVE_POINT_LEN;
+    double point_len = NATIVE_POINT_LEN + (cfg->attributes ? NATIVE_ATTRIBUTE_LEN : 0);
+    return (double)h->prr_uhz * 1e-6 * (used < 1.0 ? used : 1.0) * point_len;
 }
 
 /* A link that can't carry the stream is refused before it loses any of it. */
@@ -36,8 +37,9 @@ static int check_capacity(const struct loop *loop, const struct pump *pump, stru
     char endpoint[300];
     if (capacity <= 0.0 || capacity >= rate || pump_is_nmea(pump)) return SH_OK;
     pump_endpoint(pump, endpoint, sizeof endpoint);
-    return sh_fail(err, SH_EINPUT, "link %s: the stream has %.2f MB/s, the link carries %.2f MB/s; lower head.prr_hz",
-                   endpoint, 1e-6 * rate, 1e-6 * capacity);
+    return sh_fail(err, SH_EINPUT, "link %s: the stream has %.2f MB/s, the link carries %.2f MB/s; lower head.prr_hz%s",
+                   endpoint, 1e-6 * rate, 1e-6 * capacity,
+                   loop->cfg->attributes ? ", or leave out output.attributes" : "");
 }
 
 static int open_links(struct loop *loop, struct sh_err *err)

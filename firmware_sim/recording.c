@@ -57,8 +57,8 @@ static int gives_up(const struct scanhead_frame *frame)
 
 static void count_line(struct recording *r, const struct scanhead_frame *frame)
 {
-    struct native_line_end end;
-    if (native_decode_line_end(frame->payload, frame->payload_len, &end) != 0) return;
+    struct scanhead_line_end end;
+    if (scanhead_line_end(r->sh, frame, &end) != SCANHEAD_OK) return;
     r->result->crowded += end.n_crowded;
     r->result->faint += end.n_faint;
     r->result->unfit += end.n_unfit;

@@ -302,6 +302,7 @@ void site_cast_setup(const struct site *site, uint32_t station, struct cast_setu
     setup->layout = site->cfg->layout;
     setup->beam = s->beam;
     setup->echoes = (enum beam_select)site->cfg->settings.echoes;
+    setup->pulse_m = 0.5 * DETECT_LIGHT_M_S * 1e-9 * profile->pulse_width_ns;
     setup->range_scale_m = site->scale_m;
     memcpy(setup->xyz_scale, s->scale, sizeof setup->xyz_scale);
 }

@@ -34,6 +34,7 @@ int worker_create(const struct site *site, struct worker **out, struct sh_err *e
     uint32_t n = device_tick_pulses(site->cfg);
     int rc = caster_create(&worker->caster, err);
     if (rc == SH_OK) rc = line_block_alloc(&worker->block, n * site_points_per_pulse(site), err);
+    if (rc == SH_OK && site->cfg->attributes) rc = line_block_alloc_attributes(&worker->block, err);
     if (rc != SH_OK) {
         worker_free(worker);
         return rc;
@@ -55,9 +56,13 @@ uint32_t worker_slot_bytes(const struct site *site)
     const struct config *cfg = site->cfg;
     /* Each line part is a frame of its own. */
     uint32_t poses = config_head_moves(&cfg->platform) ? NATIVE_MAX_FRAME : 0;
-    return OVERHEAD_BYTES + poses +
-           (uint32_t)native_points_bound(device_tick_pulses(cfg) * site_points_per_pulse(site)) +
-           device_tick_lines(cfg) * (LINE_END_BYTES + NATIVE_HEADER_LEN + NATIVE_POINTS_HEAD_LEN);
+    uint32_t n_points = device_tick_pulses(cfg) * site_points_per_pulse(site), lines = device_tick_lines(cfg);
+    uint32_t attributes = 0;
+    if (cfg->attributes)
+        attributes = (uint32_t)native_attributes_bound(n_points) +
+                     lines * (uint32_t)(NATIVE_HEADER_LEN + NATIVE_ATTRIBUTES_HEAD_LEN);
+    return OVERHEAD_BYTES + poses + attributes + (uint32_t)native_points_bound(n_points) +
+           lines * (LINE_END_BYTES + NATIVE_HEADER_LEN + NATIVE_POINTS_HEAD_LEN);
 }
 
 static void added(struct ring_slot *slot, size_t len, uint32_t frames)

@@ -17,31 +17,41 @@ static double mean_t2(void)
     return mean_t() - exp(-2.0) / (1.0 - exp(-2.0));
 }
 
-/* Energy per distance of a line from the centre: the Gaussian, cut off at the disc's edge. */
-static double across(double x)
+/* Per distance of a line from the centre: the Gaussian, cut off at the disc's edge. */
+struct across {
+    double energy, along, across; /* energy; its second moments, by the distance and along the line */
+};
+
+static struct across across(double x)
 {
     const double scale = 2.0 / (M_PI * (1.0 - exp(-2.0)));
-    double y2 = 1.0 - x * x;
-    return y2 <= 0.0 ? 0.0 : scale * exp(-2.0 * x * x) * sqrt(0.5 * M_PI) * erf(sqrt(2.0 * y2));
+    double y2 = 1.0 - x * x, g = scale * exp(-2.0 * x * x), whole;
+    if (y2 <= 0.0) return (struct across){0.0, 0.0, 0.0};
+    whole = g * sqrt(0.5 * M_PI) * erf(sqrt(2.0 * y2));
+    return (struct across){whole, whole * x * x, 0.25 * whole - 0.5 * g * sqrt(y2) * exp(-2.0 * y2)};
 }
 
-/* With x = -cos a the integrand is smooth at the disc's edge as well. */
-static double between(double from, double to)
+/* Simpson's rule. With x = -cos a the integrand is smooth at the disc's edge as well. */
+static struct across between(double from, double to)
 {
     enum { STEPS = 8 };
-    double a = acos(-fmax(-1.0, from)), b = acos(-fmin(1.0, to)), step = (b - a) / STEPS, sum = 0.0;
+    double a = acos(-fmax(-1.0, from)), b = acos(-fmin(1.0, to)), step = (b - a) / STEPS;
+    struct across sum = {0.0, 0.0, 0.0};
     for (int i = 0; i <= STEPS; i++) {
         double at = a + i * step, weight = i == 0 || i == STEPS ? 1.0 : i % 2 == 1 ? 4.0 : 2.0;
-        sum += weight * across(-cos(at)) * sin(at);
+        struct across here = across(-cos(at));
+        sum.energy += weight * here.energy * sin(at);
+        sum.along += weight * here.along * sin(at);
+        sum.across += weight * here.across * sin(at);
     }
-    return sum * step / 3.0;
+    return (struct across){sum.energy * step / 3.0, sum.along * step / 3.0, sum.across * step / 3.0};
 }
 
 /* By Gauss's theorem: x exp(-2 r^2) is minus a quarter of the derivative of exp(-2 r^2) by x. */
 static double moment_beyond(double h)
 {
     const double scale = 2.0 / (M_PI * (1.0 - exp(-2.0)));
-    return 0.25 * (across(h) - scale * exp(-2.0) * 2.0 * sqrt(fmax(0.0, 1.0 - h * h)));
+    return 0.25 * (across(h).energy - scale * exp(-2.0) * 2.0 * sqrt(fmax(0.0, 1.0 - h * h)));
 }
 
 void beam_init(struct beam *beam, double exit_m, double divergence_rad, double pulse_width_s)
@@ -52,7 +62,10 @@ void beam_init(struct beam *beam, double exit_m, double divergence_rad, double p
     beam->resolution_m = 0.5 * LIGHT_M_S * pulse_width_s;
     for (int i = BEAM_HALF_STEPS - 1; i >= 0; i--) {
         double h = 2.0 * i / BEAM_HALF_STEPS - 1.0;
-        beam->half[i] = beam->half[i + 1] + between(h, h + 2.0 / BEAM_HALF_STEPS);
+        struct across strip = between(h, h + 2.0 / BEAM_HALF_STEPS);
+        beam->half[i] = beam->half[i + 1] + strip.energy;
+        beam->along[i] = beam->along[i + 1] + strip.along;
+        beam->across[i] = beam->across[i + 1] + strip.across;
     }
     for (int i = 0; i <= BEAM_HALF_STEPS; i++)
         beam->moment[i] = moment_beyond(2.0 * i / BEAM_HALF_STEPS - 1.0);
@@ -90,19 +103,47 @@ double beam_plane_excess(const struct beam *beam, double range_m, double cosine)
     return range_m * x * (term[0] + x * (term[1] + x * term[2]));
 }
 
+void beam_plane_variance(const struct beam *beam, double term[2])
+{
+    term[0] = 0.5 * mean_t() * beam->exit_radius_m * beam->exit_radius_m;
+    term[1] = 0.5 * mean_t() * beam->slope * beam->slope;
+}
+
 double beam_plane_sigma(const struct beam *beam, double range_m, double cosine)
 {
-    double c = fmax(fabs(cosine), 1e-6);
-    return beam_radius(beam, range_m) * sqrt(1.0 - fmin(1.0, c * c)) / c * sqrt(0.5 * mean_t());
+    double term[2], x = 1.0 / fmax(cosine * cosine, 1e-12);
+    beam_plane_variance(beam, term);
+    return sqrt((term[0] + term[1] * range_m * range_m) * fmax(0.0, x - 1.0));
+}
+
+double beam_echo_width(double pulse_m, double variance_m2)
+{
+    return variance_m2 == 0.0 ? pulse_m : sqrt(pulse_m * pulse_m + 8.0 * M_LN2 * variance_m2);
+}
+
+/* Where h lies in the tables. */
+static uint32_t look_up(double h, double *part)
+{
+    double at = (h + 1.0) * (0.5 * BEAM_HALF_STEPS);
+    uint32_t i = at <= 0.0 ? 0 : at >= BEAM_HALF_STEPS ? BEAM_HALF_STEPS - 1 : (uint32_t)at;
+    *part = at - i;
+    return i;
 }
 
 void beam_half(const struct beam *beam, double h, double *energy, double *moment)
 {
-    double at = (h + 1.0) * (0.5 * BEAM_HALF_STEPS);
-    uint32_t i = at <= 0.0 ? 0 : at >= BEAM_HALF_STEPS ? BEAM_HALF_STEPS - 1 : (uint32_t)at;
-    double part = at - i;
+    double part;
+    uint32_t i = look_up(h, &part);
     *energy = beam->half[i] + (beam->half[i + 1] - beam->half[i]) * part;
     *moment = beam->moment[i] + (beam->moment[i + 1] - beam->moment[i]) * part;
+}
+
+void beam_half_squares(const struct beam *beam, double h, double *along, double *across)
+{
+    double part;
+    uint32_t i = look_up(h, &part);
+    *along = beam->along[i] + (beam->along[i + 1] - beam->along[i]) * part;
+    *across = beam->across[i] + (beam->across[i + 1] - beam->across[i]) * part;
 }
 
 void beam_rings(uint32_t rings, struct beam_pattern *pattern)
@@ -110,10 +151,12 @@ void beam_rings(uint32_t rings, struct beam_pattern *pattern)
     const double all = 1.0 - exp(-2.0);
     memset(pattern, 0, sizeof *pattern);
     pattern->n = 1 + 3 * rings * (rings + 1);
+    pattern->rest = 0.5 * mean_t();
     for (uint32_t k = 1, at = 1; k <= rings; k++) {
         /* energy inside of the middle of this ring's annulus */
         double inside = (1.0 + 3.0 * k * (k - 1) + 3.0 * k) / pattern->n;
         double radius = sqrt(-0.5 * log(1.0 - inside * all));
+        pattern->rest -= 3.0 * k * radius * radius / pattern->n; /* half of it each way */
         for (uint32_t i = 0; i < 6 * k; i++, at++) {
             double phi = 2.0 * M_PI * (i + 0.5 * (k % 2)) / (6 * k);
             pattern->x[at] = (float)(radius * cos(phi));

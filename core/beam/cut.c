@@ -7,21 +7,58 @@
 
 #define LEAST_PART 0.0005
 
-static void add_part(struct beam_parts *parts, double energy, double mx, double my, int centre)
+/* A part's energy, and its moments about the footprint's centre. */
+struct portion {
+    double energy, x, y, xx, xy, yy;
+};
+
+static void take_from(struct portion *a, const struct portion *b)
 {
-    if (energy < LEAST_PART) return;
+    a->energy -= b->energy;
+    a->x -= b->x;
+    a->y -= b->y;
+    a->xx -= b->xx;
+    a->xy -= b->xy;
+    a->yy -= b->yy;
+}
+
+static void add_part(struct beam_parts *parts, struct beam_spread *spread, const struct portion *p, int centre)
+{
+    if (p->energy < LEAST_PART) return;
     uint32_t i = parts->n++;
-    parts->energy[i] = energy;
-    parts->x[i] = mx / energy;
-    parts->y[i] = my / energy;
+    double x = p->x / p->energy, y = p->y / p->energy;
+    parts->energy[i] = p->energy;
+    parts->x[i] = x;
+    parts->y[i] = y;
     if (centre) parts->centre = i;
+    if (spread == NULL) return;
+    spread->xx[i] = p->xx / p->energy - x * x;
+    spread->xy[i] = p->xy / p->energy - x * y;
+    spread->yy[i] = p->yy / p->energy - y * y;
+}
+
+/* Beyond a line; second moments only where they are asked for. */
+static struct portion cap_of(const struct beam *beam, const struct beam_line *line, int squares)
+{
+    struct portion p = {.xx = 0.0};
+    double moment, along, across, nx = line->n[0], ny = line->n[1];
+    beam_half(beam, line->h, &p.energy, &moment);
+    p.x = moment * nx;
+    p.y = moment * ny;
+    if (!squares) return p;
+    beam_half_squares(beam, line->h, &along, &across);
+    p.xx = along * nx * nx + across * ny * ny;
+    p.xy = (along - across) * nx * ny;
+    p.yy = along * ny * ny + across * nx * nx;
+    return p;
 }
 
 /* What one or two lines cut off, in closed form. All h >= 0: the caps lie beyond. Returns 0 where the lines meet in the
  * disc. */
-static int cut_caps(const struct beam *beam, const struct beam_line *line, uint32_t n, struct beam_parts *parts)
+static int cut_caps(const struct beam *beam, const struct beam_line *line, uint32_t n, struct beam_parts *parts,
+                    struct beam_spread *spread)
 {
-    double energy[2], moment[2], rest = 1.0, mx = 0.0, my = 0.0;
+    struct portion cap[2], rest = {.energy = 1.0};
     int nested = -1; /* the line whose cap contains the other's */
     if (n == 2) {
         double cross = line[0].n[0] * line[1].n[1] - line[0].n[1] * line[1].n[0];
@@ -36,22 +73,15 @@ static int cut_caps(const struct beam *beam, const struct beam_line *line, uint3
             if (middle > out->h) nested = outer;
         }
     }
+    if (spread != NULL) rest.xx = rest.yy = beam->along[0];
     for (uint32_t i = 0; i < n; i++)
-        beam_half(beam, line[i].h, &energy[i], &moment[i]);
+        cap[i] = cap_of(beam, &line[i], spread != NULL);
+    if (nested >= 0) take_from(&cap[nested], &cap[1 - nested]);
     for (uint32_t i = 0; i < n; i++) {
-        double e = energy[i], cx = moment[i] * line[i].n[0], cy = moment[i] * line[i].n[1];
-        if (nested == (int)i) {
-            uint32_t in = 1 - i;
-            e -= energy[in];
-            cx -= moment[in] * line[in].n[0];
-            cy -= moment[in] * line[in].n[1];
-        }
-        rest -= e;
-        mx -= cx;
-        my -= cy;
-        add_part(parts, e, cx, cy, 0);
+        take_from(&rest, &cap[i]);
+        add_part(parts, spread, &cap[i], 0);
     }
-    add_part(parts, rest, mx, my, 1);
+    add_part(parts, spread, &rest, 1);
     return 1;
 }
 
@@ -129,14 +159,27 @@ static uint32_t cut_places(const struct beam_pattern *fine, const struct beam_li
     return n_parts;
 }
 
+/* Sums of squares over the places of a set and around each, place by place: asked for only with spreads. */
+static void sum_squares(const struct beam_pattern *fine, const lanes_i *set, struct portion *p)
+{
+    for (uint32_t k = 0; k < fine->n; k++) {
+        if (((uint32_t)(*set)[k % LANES] >> k / LANES & 1) == 0) continue;
+        double x = (double)fine->x[k], y = (double)fine->y[k];
+        p->xx += x * x + fine->rest;
+        p->xy += x * y;
+        p->yy += y * y + fine->rest;
+    }
+}
+
 static int add_places(const struct beam_pattern *fine, const struct beam_line *line, uint32_t n,
-                      struct beam_parts *parts)
+                      struct beam_parts *parts, struct beam_spread *spread)
 {
     lanes_i part[BEAM_MAX_PARTS];
     struct sums sums[BEAM_MAX_PARTS];
     const double each = 1.0 / fine->n;
     uint32_t n_parts = cut_places(fine, line, n, part, sums);
     for (uint32_t p = 0; p < n_parts; p++) {
+        struct portion portion = {.energy = 0.0};
         uint32_t places = 0;
         double mx = 0.0, my = 0.0;
         for (int i = 0; i < LANES; i++) {
@@ -144,17 +187,30 @@ static int add_places(const struct beam_pattern *fine, const struct beam_line *l
             mx += (double)sums[p].x[i];
             my += (double)sums[p].y[i];
         }
-        add_part(parts, places * each, mx * each, my * each, part[p][0] & 1);
+        if (spread != NULL) sum_squares(fine, &part[p], &portion);
+        portion = (struct portion){.energy = places * each,
+                                   .x = mx * each,
+                                   .y = my * each,
+                                   .xx = portion.xx * each,
+                                   .xy = portion.xy * each,
+                                   .yy = portion.yy * each};
+        add_part(parts, spread, &portion, part[p][0] & 1);
     }
     return n_parts == 0;
+}
+
+int beam_cut_spread(const struct beam *beam, const struct beam_pattern *fine, const struct beam_line *line, uint32_t n,
+                    struct beam_parts *parts, struct beam_spread *spread)
+{
+    parts->n = 0;
+    parts->centre = BEAM_MAX_PARTS;
+    if (n <= 2 && cut_caps(beam, line, n, parts, spread)) return 0;
+    parts->n = 0;
+    return add_places(fine, line, n, parts, spread);
 }
 
 int beam_cut(const struct beam *beam, const struct beam_pattern *fine, const struct beam_line *line, uint32_t n,
              struct beam_parts *parts)
 {
-    parts->n = 0;
-    parts->centre = BEAM_MAX_PARTS;
-    if (n <= 2 && cut_caps(beam, line, n, parts)) return 0;
-    parts->n = 0;
-    return add_places(fine, line, n, parts);
+    return beam_cut_spread(beam, fine, line, n, parts, NULL);
 }

@@ -90,8 +90,7 @@ static int append(const struct beam *beam, const struct beam_return *r, uint32_t
     e->energy[at] = (float)energy;
     e->back[at] = (float)back;
     e->cosine[at] = r[strongest].cosine;
-    e->width_m[at] = variance == 0.0 ? (float)beam->resolution_m
-                                     : (float)sqrt(beam->resolution_m * beam->resolution_m + 8.0 * log(2.0) * variance);
+    e->width_m[at] = (float)beam_echo_width(beam->resolution_m, variance);
     e->triangle[at] = r[strongest].triangle;
     e->label[at] = r[strongest].label;
     return 1;

@@ -157,8 +157,20 @@ static void add_centre(struct caster *c, const struct cast_setup *s, const struc
     add_return(c, s, centre, 1.0, rho, 0);
 }
 
-/* What sub-ray i came to. */
-static void add_met(struct caster *c, const struct cast_setup *s, uint32_t i)
+/* Of the ranges within what sub-ray i of a job stands for. */
+static float met_sigma(const struct caster *c, const struct cast_setup *s, const struct job *job, uint32_t i)
+{
+    const struct pool *p = &c->beam->pool;
+    const struct beam *beam = &s->beam->beam;
+    const double dir[3] = {c->dx[job->pulse], c->dy[job->pulse], c->dz[job->pulse]};
+    if (p->triangle[i] == CAST_NO_TRIANGLE) /* of a body that moves, whole footprints, with an incidence */
+        return beam_round_sigma(beam, p->range_m[i], p->cosine[i], (double)p->xx[i]);
+    return beam_part_sigma(beam, dir, job, s->bvh->triangle[p->triangle[i]].n, p->range_m[i], (double)p->xx[i],
+                           (double)p->xy[i], (double)p->yy[i]);
+}
+
+/* What sub-ray i of a job came to. */
+static void add_met(struct caster *c, const struct cast_setup *s, const struct job *job, uint32_t i)
 {
     const struct pool *p = &c->beam->pool;
     const struct behind *b = &c->beam->behind;
@@ -168,6 +180,7 @@ static void add_met(struct caster *c, const struct cast_setup *s, uint32_t i)
                             .triangle = p->triangle[i],
                             .label = p->label[i]};
     if (isnan(p->range_m[i])) return;
+    if (c->attributes) r.sigma_m = met_sigma(c, s, job, i);
     add_return(c, s, &r, 1.0, p->rho[i], 0);
     if (s->detect == NULL || s->detect->depth == 0) return;
     for (uint32_t k = b->first[i]; k < b->first[i] + b->count[i]; k++) {
@@ -175,6 +188,7 @@ static void add_met(struct caster *c, const struct cast_setup *s, uint32_t i)
         r.cosine = (float)b->cosine[k];
         r.triangle = CAST_NO_TRIANGLE;
         r.label = b->label[k];
+        if (c->attributes) r.sigma_m = beam_round_sigma(&s->beam->beam, r.range_m, b->cosine[k], (double)p->xx[i]);
         add_return(c, s, &r, b->share[k], b->rho[k], b->ghost[k]);
     }
 }
@@ -202,7 +216,7 @@ static void finish_job(struct caster *c, const struct cast_setup *s, const struc
     w->n_returns = 0;
     if (job->centre.energy > 0.0) add_centre(c, s, &job->centre);
     for (uint32_t i = job->first; i < job->first + job->n; i++)
-        add_met(c, s, i);
+        add_met(c, s, job, i);
     at->first = w->some.n;
     c->counters.crowded += beam_merge(&s->beam->beam, w->returns, w->n_returns, job->pulse, most, &w->some);
     at->n = w->some.n - at->first;

@@ -6,7 +6,7 @@
 #include "core/surface.h"
 
 /* Pulses p .. end - 1 whose central ray does for all of the footprint. */
-static void list_central(struct caster *c, uint32_t p, uint32_t end)
+static void list_central(struct caster *c, const struct cast_setup *s, uint32_t p, uint32_t end)
 {
     struct echo_list *l = &c->list;
     const uint32_t at = l->n, n = end - p;
@@ -18,6 +18,7 @@ static void list_central(struct caster *c, uint32_t p, uint32_t end)
         l->cosine[at + i] = 1.0 / sqrt((double)c->beam->steep[p + i]);
         l->energy[at + i] = 1.0;
     }
+    if (c->attributes) caster_plane_widths(&s->beam->beam, c->beam->steep + p, c->range_m + p, n, l->width_m + at);
     l->n += n;
 }
 
@@ -36,6 +37,8 @@ static void list_echoes(struct caster *c, uint32_t p)
         l->energy[at] = (double)e->energy[i];
         l->label[at] = e->label[i];
     }
+    for (uint32_t i = 0; i < of->n && c->attributes; i++)
+        l->width_m[l->n + i] = e->width_m[of->first + i];
     if (of->n == 0) {
         l->pulse[at] = p;
         l->number[at] = 0;
@@ -67,11 +70,11 @@ void beam_list(struct caster *c, const struct cast_setup *s, uint32_t n)
     uint32_t p = 0;
     l->n = 0;
     for (uint32_t k = 0; k < w->n_near; k++) {
-        list_central(c, p, w->near[k]);
+        list_central(c, s, p, w->near[k]);
         list_echoes(c, w->near[k]);
         p = w->near[k] + 1;
     }
-    list_central(c, p, n);
+    list_central(c, s, p, n);
     memset(l->ghost, 0, l->n);
     if (s->detect->surfaces != NULL)
         surface_return(s->detect->surfaces, l->n, l->label, l->cosine, l->rho);

@@ -57,14 +57,18 @@ void beam_plan_whole(struct caster *c, const struct cast_beam *b, const struct o
     beam_axes(dir, job->e1, job->e2);
     for (uint32_t i = 0; i < b->pattern.n; i++)
         add_ray(c, &b->beam, from, job, (double)b->pattern.x[i], (double)b->pattern.y[i], 1.0 / b->pattern.n);
+    for (uint32_t i = job->first; i < job->first + job->n && c->attributes; i++) {
+        c->beam->pool.xx[i] = c->beam->pool.yy[i] = (float)b->pattern.rest;
+        c->beam->pool.xy[i] = 0.0f;
+    }
 }
 
 /* The part with the centre lies on the surface that is met there: its range at (x, y) needs no ray. Returns 0 where it
  * does: seen at a small angle that plane runs away. */
 static int known_centre(const struct caster *c, const struct cast_setup *s, const struct origins *from, struct job *job,
-                        double energy, double x, double y)
+                        const struct beam_parts *parts, const struct beam_spread *spread)
 {
-    uint32_t p = job->pulse;
+    const uint32_t p = job->pulse, part = parts->centre;
     struct beam_return *r = &job->centre;
     if (isnan(c->range_m[p])) return 1; /* nothing there */
     if (c->beam->steep[p] > 2500.0f) return 0;
@@ -72,15 +76,32 @@ static int known_centre(const struct caster *c, const struct cast_setup *s, cons
     const double dir[3] = {c->dx[p], c->dy[p], c->dz[p]};
     double origin[3], out[3];
     pulse_origin(from, p, origin);
-    sub_ray(&s->beam->beam, dir, job, x, y, origin, out);
+    sub_ray(&s->beam->beam, dir, job, parts->x[part], parts->y[part], origin, out);
     for (int i = 0; i < 3; i++)
         origin[i] -= s->bvh->origin_m[i];
     r->range_m = (tri->d - vec3_dot(tri->n, origin)) / vec3_dot(tri->n, out);
-    r->energy = energy;
+    r->energy = parts->energy[part];
+    r->sigma_m = 0.0f;
+    if (c->attributes)
+        r->sigma_m = beam_part_sigma(&s->beam->beam, dir, job, tri->n, r->range_m, spread->xx[part], spread->xy[part],
+                                     spread->yy[part]);
     r->cosine = s->detect != NULL ? 1.0f / sqrtf(c->beam->steep[p]) : 0.0f;
     r->triangle = c->hit[p];
     r->label = c->label[p];
     return 1;
+}
+
+/* A ray for part i. */
+static void add_part(const struct caster *c, const struct beam *beam, const struct origins *from, struct job *job,
+                     const struct beam_parts *parts, const struct beam_spread *spread, uint32_t i)
+{
+    struct pool *pool = &c->beam->pool;
+    uint32_t at = pool->n;
+    add_ray(c, beam, from, job, parts->x[i], parts->y[i], parts->energy[i]);
+    if (!c->attributes) return;
+    pool->xx[at] = (float)spread->xx[i];
+    pool->xy[at] = (float)spread->xy[i];
+    pool->yy[at] = (float)spread->yy[i];
 }
 
 int beam_plan_job(struct caster *c, const struct cast_setup *s, const struct origins *from, struct job *job,
@@ -90,6 +111,7 @@ int beam_plan_job(struct caster *c, const struct cast_setup *s, const struct ori
     const double dir[3] = {c->dx[job->pulse], c->dy[job->pulse], c->dz[job->pulse]};
     struct beam_line line[BEAM_MAX_LINES];
     struct beam_parts parts;
+    struct beam_spread spread; /* filled only where attributes are asked for */
     beam_axes(dir, job->e1, job->e2);
     uint32_t lines =
         beam_find_lines(b->outlines, &b->beam, job->near, dir, job->e1, job->e2, limit_m, line, &job->next_m);
@@ -100,13 +122,13 @@ int beam_plan_job(struct caster *c, const struct cast_setup *s, const struct ori
     job->centre.energy = 0.0;
     job->whole = 0;
     if (lines > BEAM_MAX_LINES || ++job->passes > MAX_PASSES ||
-        beam_cut(&b->beam, &b->fine, line, lines, &parts) != 0) {
+        beam_cut_spread(&b->beam, &b->fine, line, lines, &parts, c->attributes ? &spread : NULL) != 0) {
         beam_plan_whole(c, b, from, job);
         c->counters.ragged++;
         return 1;
     }
     for (uint32_t i = 0; i < parts.n; i++)
-        if (i != parts.centre || !known_centre(c, s, from, job, parts.energy[i], parts.x[i], parts.y[i]))
-            add_ray(c, &b->beam, from, job, parts.x[i], parts.y[i], parts.energy[i]);
+        if (i != parts.centre || !known_centre(c, s, from, job, &parts, &spread))
+            add_part(c, &b->beam, from, job, &parts, &spread, i);
     return 1;
 }

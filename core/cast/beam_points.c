@@ -99,6 +99,7 @@ static uint32_t drop_unfit(struct caster *c, struct line_block *b, uint32_t at, 
             b->dt_ns[to] = b->dt_ns[k];
             b->refl_cdb[to] = b->refl_cdb[k];
             b->label[to] = fits ? b->label[k] : (uint16_t)LINE_LABEL_NONE;
+            if (c->attributes) b->width_cns[to] = fits ? b->width_cns[k] : (uint16_t)LINE_WIDTH_NONE;
             count += (uint32_t)fits;
             to++;
         }
@@ -140,6 +141,7 @@ static void write_firsts(struct writer *w)
     const uint32_t n = w->n, at = w->at;
     w->echoes = kernel_detect(c->range_m, w->s->range_min_m, w->s->range_max_m, n, b->echo + at);
     kernel_labels(c->label, b->echo + at, n, b->label + at);
+    if (c->attributes) caster_widths(b, at, c->beam->width_m, n);
     for (uint32_t i = 0; i < n && w->s->noise_on; i++)
         c->beam->counter[i] = rng_echo(w->pulse0 + i, c->beam->number[i]);
     if (w->s->noise_on) write_noise(w, n);
@@ -178,6 +180,7 @@ static void move_entries(struct line_block *b, uint32_t to, uint32_t from, uint3
     memmove(b->c + to, b->c + from, n * sizeof *b->c);
     memmove(b->label + to, b->label + from, n * sizeof *b->label);
     memmove(b->echo + to, b->echo + from, n * sizeof *b->echo);
+    if (b->width_cns != NULL) memmove(b->width_cns + to, b->width_cns + from, n * sizeof *b->width_cns);
 }
 
 /* The further points go behind the first ones of their pulses: from the last one on, which moves furthest. */
@@ -197,6 +200,7 @@ static void insert_further(struct writer *w, const struct beam_echoes *e, const 
             b->b[to] = more->b[n];
             b->c[to] = more->c[n];
             b->label[to] = (uint16_t)e->label[of->first + i];
+            if (b->width_cns != NULL) b->width_cns[to] = caster_width(e->width_m[of->first + i]);
             b->echo[to] = (uint8_t)((i + 1) | of->n << 4);
         }
         to--;
@@ -240,6 +244,7 @@ static uint32_t make_plain(struct caster *c, const struct cast_setup *s, const s
         if (end == i) continue;
         c->label[p] = e->label[one];
         w->number[p] = e->number[one];
+        if (c->attributes) w->width_m[p] = e->width_m[one];
     }
     return left;
 }
@@ -251,6 +256,8 @@ static void write_points(struct writer *w, const struct beam_echoes *e, uint32_t
     struct line_block more = {.a = work->a, .b = work->b, .c = work->c};
     uint32_t n = w->n;
     if (w->s->noise_on) memset(work->number, 0, n);
+    if (c->attributes && w->s->beam->mode == BEAM_ADAPTIVE)
+        caster_plane_widths(&w->s->beam->beam, work->steep, c->range_m, n, work->width_m);
     w->left = make_plain(c, w->s, e, cut, work->several);
     keep(c, w->s, w->left);
     write_firsts(w);
@@ -262,6 +269,7 @@ static void write_points(struct writer *w, const struct beam_echoes *e, uint32_t
     }
     write_times(w);
     caster_no_reflectance(w->block, w->at, n);
+    if (c->attributes) caster_no_amplitudes(w->block, w->at, n);
     if (w->unfit != 0) {
         w->echoes = 0;
         n = drop_unfit(c, w->block, w->at, n, &w->echoes);

@@ -20,6 +20,9 @@ struct pool {
     uint8_t body[POOL_ROOM];
     uint8_t begins[POOL_ROOM]; /* a packet */
     uint32_t n;
+    /* of the part that a sub-ray stands for: variances and covariance of x and y; touched only where attributes are
+     * asked for */
+    float xx[POOL_ROOM], xy[POOL_ROOM], yy[POOL_ROOM];
 };
 
 /* What sub-rays come to behind glass and off mirrors; touched only where there is such. */
@@ -70,7 +73,15 @@ struct beam_work {
     uint64_t counter[CHUNK];       /* of the points' random numbers */
     uint8_t number[CHUNK];         /* of a pulse's only or first echo */
     struct behind behind;
+    float width_m[CHUNK]; /* of a pulse's only or first echo; touched only where attributes are asked for */
 };
+
+/* ---- attributes.c: standard deviation of the ranges within a part of a job's footprint that spreads so about its
+ * middle and lies on the plane with normal n, which is range_m away there. */
+float beam_part_sigma(const struct beam *beam, const double dir[3], const struct job *job, const double n[3],
+                      double range_m, double xx, double xy, double yy);
+/* Likewise of a part that spreads the same all around, where only the incidence is known. */
+float beam_round_sigma(const struct beam *beam, double range_m, double cosine, double variance);
 
 /* ---- beam_plan.c: jobs, their sub-rays at the end of the pool. */
 /* Sub-rays all over the footprint. */

@@ -187,6 +187,10 @@ static uint32_t take_back(struct caster *c, struct line_block *block, uint32_t a
         block->echo[i] = 0;
         block->label[i] = LINE_LABEL_NONE;
         block->refl_cdb[i] = LINE_REFL_NONE;
+        if (c->attributes) {
+            block->amplitude_cdb[i] = LINE_AMPLITUDE_NONE;
+            block->width_cns[i] = LINE_WIDTH_NONE;
+        }
         taken++;
     }
     c->counters.unfit += taken;
@@ -290,6 +294,7 @@ static uint32_t single_chunk(struct caster *c, const struct cast_setup *s, int l
     if (s->noise_on) kernel_noise(s, pulse0, n, c->range_m);
     caster_ends(c, CAST_NOISE);
     echoes -= caster_positions(c, s, linear, c->range_m, block, at, n);
+    if (c->attributes) caster_pulse_attributes(s, block, at, n);
     caster_ends(c, CAST_POSITIONS);
     return echoes;
 }
@@ -317,6 +322,7 @@ uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, cons
                      struct line_block *block)
 {
     uint32_t echoes = 0, at = 0;
+    caster->attributes = block->width_cns != NULL;
     block->frame = run->frame;
     block->line = run->line;
     block->pulse0 = run->pulse0;

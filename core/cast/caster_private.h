@@ -58,6 +58,10 @@ struct echo_list {
     uint8_t echo[CAST_LIST];
     double mirror_turn[CAST_LIST], pan_turn[CAST_LIST];
     uint32_t dt_ns[CAST_LIST];
+    /* touched only where the block has room for attributes: */
+    float width_m[CAST_LIST];
+    int16_t amplitude_cdb[CAST_LIST];
+    uint32_t from[CAST_LIST]; /* once the list is what is sent: where an entry's width and amplitude are */
 };
 
 /* Rays behind glass or off a mirror: where they begin, where they go, what they met before. */
@@ -100,6 +104,7 @@ struct caster {
     struct beam_work *beam;             /* touched only where pulses have a footprint */
     struct cast_counters counters;
     struct cast_profile *profile;
+    int attributes; /* the block at hand has room for them */
     /* touched only where detection is modelled: */
     struct echo_list list;
     double cosine[CHUNK];
@@ -140,6 +145,20 @@ uint32_t caster_wire(struct caster *c, const struct cast_setup *s, int linear, c
 /* Likewise; echoes that did not fit are taken back. Returns how many. */
 uint32_t caster_positions(struct caster *c, const struct cast_setup *s, int linear, const double *range_m,
                           struct line_block *block, uint32_t at, uint32_t n);
+
+/* ---- attributes.c: only for a block that has room for them. */
+/* A width as it is told. */
+uint16_t caster_width(float width_m);
+/* Of entries at .. at + n, whose echo numbers are set. */
+void caster_widths(const struct line_block *block, uint32_t at, const float *width_m, uint32_t n);
+void caster_no_amplitudes(const struct line_block *block, uint32_t at, uint32_t n);
+/* Likewise, of single rays where detection is not modelled. */
+void caster_pulse_attributes(const struct cast_setup *s, const struct line_block *block, uint32_t at, uint32_t n);
+/* Widths of echoes of footprints that one ray stands for. steep: 1 / cos^2 of the incidences. */
+void caster_plane_widths(const struct beam *beam, const float *steep, const double *range_m, uint32_t n,
+                         float *width_m);
+/* Of the list, whose entries go to `out`. */
+void caster_list_attributes(const struct echo_list *list, const struct line_block *block, uint32_t out);
 
 /* ---- texels.c: labels of what has been met get the reflectance there, as surface_texel has it. Nothing where the
  * surfaces have no textures. */

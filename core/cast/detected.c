@@ -41,18 +41,25 @@ int caster_is_bare(const struct cast_setup *s, uint32_t label, double rho)
 }
 
 /* What comes back within the range resolution after the return before is one echo with it: at the mean of the ranges,
- * weighted by what came back, with the surface that sent most. The others of its returns are left out of the list. */
-static void merge_returns(struct echo_list *l, double separation_m)
+ * weighted by what came back, with the surface that sent most, and as wide as the ranges lie apart. The others of its
+ * returns are left out of the list. */
+static void merge_returns(struct echo_list *l, const struct cast_setup *s, int attributes)
 {
+    const double separation_m = s->detect->separation_m;
     uint32_t to = 0;
-    double last_m = 0.0, most = 0.0; /* of the echo at hand: its last return, its strongest */
+    double last_m = 0.0, most = 0.0,
+           spread = 0.0; /* of the echo at hand: its last return, its strongest, sum rho d^2 */
     for (uint32_t i = 0; i < l->n; i++) {
         uint32_t e = to - 1;
         int same = to > 0 && l->pulse[e] == l->pulse[i] && l->rho[e] > 0.0 && l->rho[i] > 0.0 &&
                    l->range_m[i] - last_m <= separation_m; /* not-a-number: no */
         last_m = l->range_m[i];
         if (same) {
-            double sum = l->rho[e] + l->rho[i];
+            double sum = l->rho[e] + l->rho[i], apart_m = l->range_m[i] - l->range_m[e];
+            if (attributes) {
+                spread += l->rho[e] * l->rho[i] / sum * apart_m * apart_m;
+                l->width_m[e] = (float)beam_echo_width(s->pulse_m, spread / sum);
+            }
             l->range_m[e] += (l->range_m[i] - l->range_m[e]) * l->rho[i] / sum;
             if (l->rho[i] > most) {
                 l->label[e] = l->label[i];
@@ -63,6 +70,7 @@ static void merge_returns(struct echo_list *l, double separation_m)
             continue;
         }
         most = l->rho[i];
+        spread = 0.0;
         l->pulse[to] = l->pulse[i];
         l->number[to] = to > 0 && l->pulse[to - 1] == l->pulse[i] ? (uint8_t)(l->number[to - 1] + 1) : 0;
         l->range_m[to] = l->range_m[i];
@@ -75,9 +83,11 @@ static void merge_returns(struct echo_list *l, double separation_m)
 }
 
 /* How much comes back of each, and what of it can't be told apart. */
-static void weigh_returns(const struct cast_setup *s, struct echo_list *l)
+static void weigh_returns(const struct cast_setup *s, struct echo_list *l, int attributes)
 {
     const struct cast_detect *d = s->detect;
+    for (uint32_t i = 0; i < l->n && attributes; i++)
+        l->width_m[i] = (float)s->pulse_m;
     if (d->surfaces == NULL) {
         memcpy(l->rho, l->energy, l->n * sizeof *l->rho);
         return;
@@ -88,7 +98,7 @@ static void weigh_returns(const struct cast_setup *s, struct echo_list *l)
     if (d->depth == 0) return;
     for (uint32_t i = 0; i < l->n; i++)
         if (caster_is_bare(s, l->label[i], l->rho[i])) l->range_m[i] = (double)NAN;
-    if (d->separation_m > 0.0) merge_returns(l, d->separation_m);
+    if (d->separation_m > 0.0) merge_returns(l, s, attributes);
 }
 
 /* Ranges of what is not detected become NaN. */
@@ -108,6 +118,7 @@ static void find_echoes(struct caster *c, const struct cast_setup *s, const stru
     else
         for (uint32_t i = 0; i < l->n; i++)
             l->refl_cdb[i] = LINE_REFL_NONE;
+    if (c->attributes) detect_amplitudes(d->signal, &echoes, l->amplitude_cdb);
     if (d->ambiguity != DETECT_AMBIGUITY_NONE)
         detect_zones(d->ambiguity, 1e-9 * ((double)run->ns_quot + (double)run->ns_rem / (double)run->ns_den), d->zones,
                      s->range_min_m, l->n, l->range_m);
@@ -166,7 +177,7 @@ uint32_t caster_detected(struct caster *c, const struct cast_setup *s, const str
     } else {
         list_single(c, s, &from, n);
         limit_ranges(c, s);
-        weigh_returns(s, &c->list);
+        weigh_returns(s, &c->list, c->attributes);
     }
     make_keys(&c->list, run->pulse0 + first);
     find_echoes(c, s, run);

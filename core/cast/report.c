@@ -12,15 +12,17 @@ struct heard {
     uint64_t key;
     uint32_t label;
     int16_t refl_cdb;
+    uint8_t entry; /* of the pulse's in the list */
 };
 
-static struct heard hear(const struct cast_detect *d, const struct echo_list *l, uint32_t i)
+static struct heard hear(const struct cast_detect *d, const struct echo_list *l, uint32_t first, uint32_t i)
 {
     return (struct heard){.range_m = l->range_m[i],
                           .strength = d->signal != NULL ? l->amplitude[i] : l->rho[i],
                           .key = l->key[i],
                           .label = l->label[i] + (l->ghost[i] ? d->ghost_label : 0),
-                          .refl_cdb = l->refl_cdb[i]};
+                          .refl_cdb = l->refl_cdb[i],
+                          .entry = (uint8_t)(i - first)};
 }
 
 /* By range, as it is told: folding may have changed the order. */
@@ -61,7 +63,7 @@ static uint32_t hear_pulse(struct caster *c, const struct cast_setup *s, uint32_
     const struct echo_list *l = &c->list;
     uint32_t n = 0;
     for (uint32_t i = first; i < end; i++)
-        if (!isnan(l->range_m[i])) h[n++] = hear(d, l, i);
+        if (!isnan(l->range_m[i])) h[n++] = hear(d, l, first, i);
     if (n < 2) return n;
     for (; n > d->max_echoes; c->counters.crowded++)
         n = drop_weakest(h, n);
@@ -89,6 +91,7 @@ static uint32_t number_echoes(struct caster *c, const struct cast_setup *s)
             l->refl_cdb[out] = h[k].refl_cdb;
             l->key[out] = h[k].key;
             l->echo[out] = (uint8_t)(n > 0 ? (k + 1) | n << 4 : 0);
+            if (c->attributes) l->from[out] = i + h[k].entry;
         }
         total += n;
     }
@@ -111,6 +114,7 @@ static void write_entries(struct caster *c, const uint32_t *dt_ns, struct line_b
     memcpy(block->dt_ns + out, l->dt_ns, l->n * sizeof *l->dt_ns);
     memcpy(block->refl_cdb + out, l->refl_cdb, l->n * sizeof *l->refl_cdb);
     memcpy(block->echo + out, l->echo, l->n * sizeof *l->echo);
+    if (c->attributes) caster_list_attributes(l, block, out);
 }
 
 /* Positions of entries, from what the encoders said. Returns how many echoes did not fit. */
@@ -154,6 +158,10 @@ static uint32_t number_again(const struct echo_list *l, struct line_block *block
             block->label[to] = block->label[out + end];
             block->refl_cdb[to] = block->refl_cdb[out + end];
             block->dt_ns[to] = block->dt_ns[out + end];
+            if (block->width_cns != NULL) {
+                block->amplitude_cdb[to] = block->amplitude_cdb[out + end];
+                block->width_cns[to] = block->width_cns[out + end];
+            }
             to++;
         }
         for (uint32_t k = first; k < to; k++)

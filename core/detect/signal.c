@@ -145,3 +145,30 @@ void detect_by_signal(const struct detect_signal *signal, const struct detect_ec
     sum_pieces(signal, e->n, e->range_m, e->amplitude);
     detect(signal, e->n, e->key, e->rho, e->range_m, e->amplitude, e->refl_cdb);
 }
+
+VEC_CLONES
+static void amplitudes(const struct detect_signal *s, uint32_t n, const uint64_t *restrict key,
+                       const double *restrict amplitude, const double *restrict range_m, int16_t *restrict out)
+{
+    const double per_snr = s->per_snr;
+    const uint64_t signal_key = s->signal_key;
+    for (uint32_t i = 0; i < n; i++) {
+        double seen = amplitude[i] + per_snr * rng_normal(signal_key, key[i]); /* as above */
+        int detected = range_m[i] == range_m[i];
+        double cdb = 1000.0 / 2.302585092994045684 * vec_log(detected && seen > 1.0 ? seen : 1.0);
+        uint64_t bits;
+        cdb = cdb > 32767.0 ? 32767.0 : cdb; /* likewise */
+        vec_round(cdb, &bits);
+        out[i] = (int16_t)(detected ? bits : (uint64_t)(uint16_t)LINE_AMPLITUDE_NONE);
+    }
+}
+
+void detect_amplitudes(const struct detect_signal *signal, const struct detect_echoes *e, int16_t *amplitude_cdb)
+{
+    if (signal != NULL) {
+        amplitudes(signal, e->n, e->key, e->amplitude, e->range_m, amplitude_cdb);
+        return;
+    }
+    for (uint32_t i = 0; i < e->n; i++)
+        amplitude_cdb[i] = LINE_AMPLITUDE_NONE;
+}

@@ -12,8 +12,8 @@ _Static_assert(SCANHEAD_EINPUT == (int)SH_EINPUT && SCANHEAD_EIO == (int)SH_EIO 
                    SCANHEAD_ESTATE == (int)SH_ESTATE && SCANHEAD_ELOST == (int)SH_ELOST,
                "the library's errors are those of core/err.h");
 _Static_assert(SCANHEAD_POINTS == (int)NATIVE_POINTS && SCANHEAD_POSES == (int)NATIVE_POSES &&
-                   SCANHEAD_EV_PPS == (int)NATIVE_EV_PPS && SCANHEAD_POSE_NONE == (int)NATIVE_POSE_NONE &&
-                   SCANHEAD_LOCAL == (int)NATIVE_LOCAL,
+                   SCANHEAD_ATTRIBUTES == (int)NATIVE_ATTRIBUTES && SCANHEAD_EV_PPS == (int)NATIVE_EV_PPS &&
+                   SCANHEAD_POSE_NONE == (int)NATIVE_POSE_NONE && SCANHEAD_LOCAL == (int)NATIVE_LOCAL,
                "types, events and flags are those on the wire");
 
 /* A source tried again and again while it isn't there. wrong_too: also when its name is wrong, for it was right once.
@@ -156,7 +156,7 @@ int host_keep(struct scanhead *sh)
     return rc;
 }
 
-static void fill_points(struct scanhead_frame *frame)
+static void fill_points(struct scanhead *sh, struct scanhead_frame *frame)
 {
     struct native_points points;
     if (native_decode_points(frame->payload, frame->payload_len, &points) != 0) return;
@@ -167,6 +167,19 @@ static void fill_points(struct scanhead_frame *frame)
     frame->pulse0 = points.pulse0;
     frame->scan_t0_ns = points.t0_ns;
     frame->line_t0_ns = points.line_t0_ns;
+    sh->have_points = 1;
+    sh->points_seq = frame->seq;
+    sh->of_points =
+        (struct native_attributes){.pulse0 = points.pulse0, .line = points.line, .n_points = points.n_points};
+}
+
+static void fill_attributes(struct scanhead_frame *frame)
+{
+    struct native_attributes attributes;
+    if (native_decode_attributes(frame->payload, frame->payload_len, &attributes) != 0) return;
+    frame->scan_line = attributes.line;
+    frame->n_points = attributes.n_points;
+    frame->pulse0 = attributes.pulse0;
 }
 
 static void fill_event(struct scanhead_frame *frame)
@@ -196,7 +209,8 @@ static int hand_out(struct scanhead *sh, const uint8_t *raw, struct scanhead_fra
         .raw = raw,
         .raw_len = NATIVE_HEADER_LEN + (size_t)header.length,
     };
-    if (header.type == NATIVE_POINTS) fill_points(frame);
+    if (header.type == NATIVE_POINTS) fill_points(sh, frame);
+    if (header.type == NATIVE_ATTRIBUTES) fill_attributes(frame);
     if (header.type == NATIVE_EVENT) fill_event(frame);
     sh->payload = frame->payload;
     return SCANHEAD_OK;

@@ -52,6 +52,9 @@ struct scanhead {
     struct host_node *first, *last, *current; /* kept frames; the one that was handed out */
     size_t queued_bytes;
     const uint8_t *payload; /* of the frame that scanhead_next returned last */
+    int have_points;        /* a points frame has been handed out: */
+    uint32_t points_seq;
+    struct native_attributes of_points; /* as its attributes will begin */
 
     /* what the stream has said, as of the frame handed out last */
     int have_descriptor, have_anchor, have_pulse;

@@ -41,6 +41,7 @@ static int las_open(const char *path, const struct recorder_options *options, vo
     }
     las->report = options->report;
     las->track.path = las->file.path;
+    las->track.wants_attributes = 1;
     for (int i = 0; i < 3; i++)
         las->facts.scale[i] = 1;
     strcpy(las->facts.profile, "OTHER"); /* until points have come */
@@ -92,6 +93,7 @@ static int las_scan(void *rec, struct sh_err *err)
     f->epsg = track_epsg(t);
     f->geoid_heights = track_is_geoid(t);
     f->moving = t->info.moving;
+    f->attributes = t->has_attributes;
     set_counts(las);
     snprintf(f->profile, sizeof f->profile, "%s", t->info.profile);
     f->gps_time = scanhead_gps_time(t->sh, t->t0_ns, &f->created_gps_s) == 0;
@@ -143,10 +145,17 @@ static int put_xyz(struct las *las, uint8_t *to, const double p[3], struct sh_er
     return 0;
 }
 
-static int put_time(const struct las *las, uint8_t *to, int64_t t_ns, struct sh_err *err)
+/* Of point i of the batch. One that has waited was told the time before that. */
+static int is_told_time(const struct track *t, int i, double *gps_s)
 {
-    double s = (double)t_ns / 1e9;
-    if (las->facts.gps_time && scanhead_gps_time(las->track.sh, t_ns, &s) != 0)
+    *gps_s = t->gps_s[i];
+    return t->has_attributes ? !isnan(*gps_s) : scanhead_gps_time(t->sh, t->point[i].t_ns, gps_s) == 0;
+}
+
+static int put_time(const struct las *las, uint8_t *to, int i, struct sh_err *err)
+{
+    double s = (double)las->track.point[i].t_ns / 1e9;
+    if (las->facts.gps_time && !is_told_time(&las->track, i, &s))
         return sh_fail(err, SH_EFORMAT, "%s: the head tells no time any more; a LAS file holds one kind of time",
                        las->file.path);
     le_put_double(to, s);
@@ -165,16 +174,27 @@ static void set_socs(const struct track *t, double p[3])
     station_pose_reverse(&t->pose, p);
 }
 
-static int put_point(struct las *las, uint8_t *to, const struct scanhead_point *point, struct sh_err *err)
+/* 0.01 dB and 0.01 ns, as on the wire. */
+static void put_attribute(uint8_t *to, const struct scanhead_attribute *a)
+{
+    int amplitude = isnan(a->amplitude_db) ? NATIVE_AMPLITUDE_NONE : (int)lrint(100 * a->amplitude_db);
+    int width = isnan(a->width_ns) ? NATIVE_WIDTH_NONE : (int)lrint(100 * a->width_ns);
+    le_put16(to, (uint16_t)amplitude);
+    le_put16(to + 2, (uint16_t)width);
+}
+
+/* Point i of the batch. */
+static int put_point(struct las *las, uint8_t *to, int i, struct sh_err *err)
 {
     struct track *t = &las->track;
+    const struct scanhead_point *point = &t->point[i];
     double p_crs[3] = {point->x, point->y, point->z}, p_socs[3] = {point->x, point->y, point->z};
     if (!t->info.geo)
         station_pose_forward(&t->pose, p_crs);
     else
         set_socs(t, p_socs);
     if (is_swapped(las)) swap(p_crs);
-    int rc = put_time(las, to + 22, point->t_ns, err);
+    int rc = put_time(las, to + 22, i, err);
     if (rc == 0) rc = put_xyz(las, to, p_crs, err);
     le_put16(to + 12, intensity(point->reflectance_db));
     to[14] = (uint8_t)(point->echo | point->echo_count << 4);
@@ -184,13 +204,14 @@ static int put_point(struct las *las, uint8_t *to, const struct scanhead_point *
     le_put16(to + 18, t->info.moving ? 0 : scan_angle(p_socs));
     le_put16(to + 20, (uint16_t)t->info.station);
     le_put16(to + 30, point->label);
+    if (t->has_attributes) put_attribute(to + LAS_POINT_LEN, &t->attribute[i]);
     return rc;
 }
 
 static int las_points(void *rec, int n, struct sh_err *err)
 {
     struct las *las = rec;
-    uint8_t *to = outfile_room(&las->file, TRACK_BATCH * LAS_POINT_LEN, err), *at = to;
+    uint8_t *to = outfile_room(&las->file, TRACK_BATCH * LAS_POINT_LEN_MAX, err), *at = to;
     if (to == NULL) return SH_EIO;
     int rc = 0;
     double s;
@@ -202,9 +223,9 @@ static int las_points(void *rec, int n, struct sh_err *err)
             las->n_empty++;
             continue;
         }
-        rc = put_point(las, at, p, err);
+        rc = put_point(las, at, i, err);
         if (rc != 0) break;
-        at += LAS_POINT_LEN;
+        at += las->facts.attributes ? LAS_POINT_LEN_MAX : LAS_POINT_LEN;
         las->facts.n_points++;
         if (p->echo >= 1) las->facts.n_by_return[p->echo - 1]++;
     }
@@ -212,9 +233,10 @@ static int las_points(void *rec, int n, struct sh_err *err)
     return rc;
 }
 
+static const struct track_ops ops = {las_scan, las_points};
+
 static int las_frame(void *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
 {
-    static const struct track_ops ops = {las_scan, las_points};
     struct las *las = rec;
     return track_frame(&las->track, sh, frame, &ops, las, err);
 }
@@ -222,7 +244,8 @@ static int las_frame(void *rec, struct scanhead *sh, const struct scanhead_frame
 static int finish(struct las *las, struct sh_err *err)
 {
     uint8_t front[LAS_FRONT_MAX];
-    int rc = las->begun ? 0 : put_front(las, err);
+    int rc = track_flush(&las->track, &ops, las, err);
+    if (rc == 0 && !las->begun) rc = put_front(las, err);
     if (rc == 0) rc = outfile_flush(&las->file, err);
     return rc != 0 ? rc : outfile_patch(&las->file, 0, front, las_front(&las->facts, front), err);
 }
@@ -241,6 +264,7 @@ static int las_close(void *rec, int keep, struct sh_err *err)
                 las->file.path);
     if (keep && rc == 0) track_tell(&las->track, las->report);
     int closed = outfile_close(&las->file, keep && rc == 0, err);
+    track_free(&las->track);
     free(las);
     return rc != 0 ? rc : closed;
 }

@@ -12,7 +12,9 @@ enum {
     GPS_EPOCH_UNIX_S = 315964800, /* 1980-01-06 */
     ADJUSTED_S = 1000000000,
     EXTRA_UINT16 = 3,
-    EXTRA_HAS_NO_DATA = 1,
+    EXTRA_INT16 = 4,
+    EXTRA_HAS_NO_DATA = 1 << 0,
+    EXTRA_HAS_SCALE = 1 << 3,
 };
 
 static void put_text(uint8_t *to, size_t room, const char *text)
@@ -32,16 +34,26 @@ static uint8_t *put_vlr_head(uint8_t *to, const char *user, uint16_t record, siz
     return to + LAS_VLR_HEAD_LEN;
 }
 
-static uint8_t *put_label_vlr(uint8_t *to)
+/* One of the extra bytes behind a point, 2 bytes. scale 0: none; no_data as its type has it. */
+static uint8_t *put_extra(uint8_t *to, uint8_t type, const char *name, int64_t no_data, double scale, const char *text)
 {
-    to = put_vlr_head(to, "LASF_Spec", 4, LAS_EXTRA_LEN, "extra bytes of a point");
     memset(to, 0, LAS_EXTRA_LEN);
-    to[2] = EXTRA_UINT16;
-    to[3] = EXTRA_HAS_NO_DATA;
-    put_text(to + 4, 32, "label");
-    le_put64(to + 40, 0xffff);
-    put_text(to + 160, 32, "surface hit; 65535: none");
+    to[2] = type;
+    to[3] = (uint8_t)(EXTRA_HAS_NO_DATA | (scale != 0.0 ? EXTRA_HAS_SCALE : 0));
+    put_text(to + 4, 32, name);
+    le_put64(to + 40, (uint64_t)no_data);
+    if (scale != 0.0) le_put_double(to + 112, scale);
+    put_text(to + 160, 32, text);
     return to + LAS_EXTRA_LEN;
+}
+
+static uint8_t *put_extra_vlr(uint8_t *to, int attributes)
+{
+    to = put_vlr_head(to, "LASF_Spec", 4, (attributes ? 3 : 1) * LAS_EXTRA_LEN, "extra bytes of a point");
+    to = put_extra(to, EXTRA_UINT16, "label", 0xffff, 0.0, "surface hit; 65535: none");
+    if (!attributes) return to;
+    to = put_extra(to, EXTRA_INT16, "amplitude", -32768, 0.01, "dB above detection threshold");
+    return put_extra(to, EXTRA_UINT16, "width", 0, 0.01, "ns, full at half maximum");
 }
 
 static uint8_t *put_note_vlr(uint8_t *to, int gps_time, int moving)
@@ -95,7 +107,7 @@ static void put_header(uint8_t *to, const struct las_facts *f, size_t front_len,
     le_put32(to + 96, (uint32_t)front_len);
     le_put32(to + 100, n_vlrs);
     to[104] = 6;
-    le_put16(to + 105, LAS_POINT_LEN);
+    le_put16(to + 105, f->attributes ? LAS_POINT_LEN_MAX : LAS_POINT_LEN);
     /* the counts of 32 bits stay 0, as format 6 wants it */
     for (int i = 0; i < 3; i++) {
         le_put_double(to + 131 + 8 * i, f->scale[i]);
@@ -111,7 +123,7 @@ static void put_header(uint8_t *to, const struct las_facts *f, size_t front_len,
 
 size_t las_front(const struct las_facts *f, uint8_t to[LAS_FRONT_MAX])
 {
-    uint8_t *end = put_label_vlr(to + LAS_HEADER_LEN);
+    uint8_t *end = put_extra_vlr(to + LAS_HEADER_LEN, f->attributes);
     end = put_note_vlr(end, f->gps_time, f->moving);
     uint8_t *crs = end;
     end = put_crs_vlr(end, f->epsg, f->geoid_heights);

@@ -12,16 +12,18 @@ enum {
     LAS_HEADER_LEN = 375,
     LAS_VLR_HEAD_LEN = 54,
     LAS_EXTRA_LEN = 192,
-    LAS_POINT_LEN = 30 + 2, /* format 6, and the label */
+    LAS_POINT_LEN = 30 + 2,                    /* format 6, and the label */
+    LAS_POINT_LEN_MAX = LAS_POINT_LEN + 2 + 2, /* and amplitude and width */
     LAS_RETURNS = 15,
     LAS_NOTE_MAX = 512,
-    LAS_FRONT_MAX = LAS_HEADER_LEN + 3 * LAS_VLR_HEAD_LEN + LAS_EXTRA_LEN + CRS_WKT_MAX + LAS_NOTE_MAX,
+    LAS_FRONT_MAX = LAS_HEADER_LEN + 3 * LAS_VLR_HEAD_LEN + 3 * LAS_EXTRA_LEN + CRS_WKT_MAX + LAS_NOTE_MAX,
 };
 
 struct las_facts {
     int epsg;
     int moving;
-    int gps_time; /* times are adjusted standard GPS time */
+    int attributes; /* amplitude and width behind the label */
+    int gps_time;   /* times are adjusted standard GPS time */
     char profile[32];
     double scale[3], offset[3]; /* of x, y, z; x and y are longitude and latitude in geodetic coordinates */
     int geoid_heights;
@@ -30,8 +32,8 @@ struct las_facts {
     int32_t min[3], max[3]; /* counts; only with points */
 };
 
-/* Everything before the points. Returns its length, which depends on the CRS and the time's kind alone, so that it can
- * be written again when the counts are known. */
+/* Everything before the points. Returns its length, which depends on the CRS, the time's kind and attributes alone, so
+ * that it can be written again when the counts are known. */
 size_t las_front(const struct las_facts *facts, uint8_t to[LAS_FRONT_MAX]);
 
 #endif

@@ -20,7 +20,7 @@
 #include "drivers/protocol/bytes.h"
 #include "drivers/protocol/native.h"
 
-enum { RECORD_LEN = 4 * 8 + 4 + 8 + 1 + 1 + 2 + 2, FRAME_LEN = 8, TEXT_LEN = 512 };
+enum { RECORD_LEN = 4 * 8 + 4 + 8 + 1 + 1 + 2 + 2, FRAME_LEN = 8, ATTRIBUTES_LEN = 8, TEXT_LEN = 512 };
 
 struct ply {
     struct outfile file;
@@ -45,6 +45,7 @@ static int ply_open(const char *path, const struct recorder_options *options, vo
         return rc;
     }
     ply->track.path = ply->file.path;
+    ply->track.wants_attributes = 1;
     *rec = ply;
     return 0;
 }
@@ -70,9 +71,19 @@ static int begin(struct ply *ply, const struct scanhead *sh, uint32_t n_surfaces
     return rc;
 }
 
-/* frame: NULL where there is no such property. */
-static size_t put_binary(uint8_t *to, const struct scanhead_point *p, unsigned station, const double *frame)
+/* A vertex as far as the file has its properties. */
+struct vertex {
+    struct scanhead_point point;
+    unsigned station;
+    const double *frame;                        /* NULL where there is no such property */
+    const struct scanhead_attribute *attribute; /* likewise */
+};
+
+static size_t put_binary(uint8_t *to, const struct vertex *v)
 {
+    const struct scanhead_point *p = &v->point;
+    size_t len = RECORD_LEN;
+
     le_put_double(to, p->x);
     le_put_double(to + 8, p->y);
     le_put_double(to + 16, p->z);
@@ -82,10 +93,15 @@ static size_t put_binary(uint8_t *to, const struct scanhead_point *p, unsigned s
     to[44] = p->echo;
     to[45] = p->echo_count;
     le_put16(to + 46, p->label);
-    le_put16(to + 48, (uint16_t)station);
-    if (frame == NULL) return RECORD_LEN;
-    le_put_double(to + RECORD_LEN, *frame);
-    return RECORD_LEN + FRAME_LEN;
+    le_put16(to + 48, (uint16_t)v->station);
+    if (v->frame != NULL) {
+        le_put_double(to + len, *v->frame);
+        len += FRAME_LEN;
+    }
+    if (v->attribute == NULL) return len;
+    le_put_float(to + len, (float)v->attribute->amplitude_db);
+    le_put_float(to + len + 4, (float)v->attribute->width_ns);
+    return len + ATTRIBUTES_LEN;
 }
 
 /* Micrometres (1e-11 degrees) are the finest scale of the wire, 0.01 dB and nanoseconds its units: more digits would
@@ -97,8 +113,9 @@ static size_t put_number(char *to, size_t room, int digits, double v)
 }
 
 /* The length, or more than TEXT_LEN where numbers are absurdly long. */
-static size_t put_ascii(char *to, const struct scanhead_point *p, int degrees, unsigned station, const double *frame)
+static size_t put_ascii(char *to, const struct vertex *v, int degrees)
 {
+    const struct scanhead_point *p = &v->point;
     const int flat = degrees ? 12 : 6;
     const struct {
         double v;
@@ -109,12 +126,14 @@ static size_t put_ascii(char *to, const struct scanhead_point *p, int degrees, u
     for (size_t i = 0; i < sizeof number / sizeof number[0] && n < TEXT_LEN; i++)
         n += put_number(to + n, TEXT_LEN - n, number[i].digits, number[i].v);
     if (n >= TEXT_LEN) return TEXT_LEN + 1;
-    n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u %u %u %u", p->echo, p->echo_count, p->label, station);
-    if (frame != NULL && n < TEXT_LEN)
-        n += (size_t)(isnan(*frame) ? snprintf(to + n, TEXT_LEN - n, " nan")
-                                    : snprintf(to + n, TEXT_LEN - n, " %.9g", *frame));
+    n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u %u %u %u ", p->echo, p->echo_count, p->label, v->station);
+    if (v->frame != NULL && n < TEXT_LEN)
+        n += (size_t)(isnan(*v->frame) ? snprintf(to + n, TEXT_LEN - n, "nan ")
+                                       : snprintf(to + n, TEXT_LEN - n, "%.9g ", *v->frame));
+    if (v->attribute != NULL && n < TEXT_LEN) n += put_number(to + n, TEXT_LEN - n, 2, v->attribute->amplitude_db);
+    if (v->attribute != NULL && n < TEXT_LEN) n += put_number(to + n, TEXT_LEN - n, 2, v->attribute->width_ns);
     if (n >= TEXT_LEN) return TEXT_LEN + 1;
-    to[n++] = '\n';
+    to[n - 1] = '\n'; /* the blank behind the last number */
     return n;
 }
 
@@ -139,6 +158,7 @@ static int ply_scan(void *rec, struct sh_err *err)
     facts->geoid_heights = track_is_geoid(&ply->track);
     facts->moving = info->moving;
     facts->stops = info->stop;
+    facts->attributes = ply->track.has_attributes;
     snprintf(facts->idn, sizeof facts->idn, "%s", info->idn);
     snprintf(facts->profile, sizeof facts->profile, "%s", info->profile);
     return ply->begun ? 0 : begin(ply, ply->track.sh, info->n_surfaces, err);
@@ -153,21 +173,23 @@ static int ply_points(void *rec, int n, struct sh_err *err)
     size_t used = 0;
     set_gps(ply);
     for (int i = 0; i < n; i++) {
-        struct scanhead_point p = t->point[i];
-        const double *frame = t->info.moving ? &t->frame[i] : t->info.stop ? &t->info.frame : NULL;
-        if (p.echo_count == 0 && !ply->options.empty_shots) continue;
+        struct vertex v = {.point = t->point[i], .station = t->info.station};
+        struct scanhead_point *p = &v.point;
+        if (p->echo_count == 0 && !ply->options.empty_shots) continue;
+        if (t->info.moving || t->info.stop) v.frame = t->info.moving ? &t->frame[i] : &t->info.frame;
+        if (t->has_attributes) v.attribute = &t->attribute[i];
         if (!t->info.geo) {
-            double xyz[3] = {p.x, p.y, p.z};
+            double xyz[3] = {p->x, p->y, p->z};
             station_pose_forward(&t->pose, xyz);
-            p.x = xyz[0];
-            p.y = xyz[1];
-            p.z = xyz[2];
+            p->x = xyz[0];
+            p->y = xyz[1];
+            p->z = xyz[2];
         }
-        size_t len = ply->options.ascii ? put_ascii((char *)to + used, &p, ply->facts.crs == 3, t->info.station, frame)
-                                        : put_binary(to + used, &p, t->info.station, frame);
+        size_t len =
+            ply->options.ascii ? put_ascii((char *)to + used, &v, ply->facts.crs == 3) : put_binary(to + used, &v);
         if (len > TEXT_LEN)
-            return sh_fail(err, SH_EFORMAT, "%s: a coordinate beyond all measure: %g %g %g", ply->file.path, p.x, p.y,
-                           p.z);
+            return sh_fail(err, SH_EFORMAT, "%s: a coordinate beyond all measure: %g %g %g", ply->file.path, p->x, p->y,
+                           p->z);
         used += len;
         ply->facts.n_vertices++;
     }
@@ -187,9 +209,10 @@ static void take_name(void *ctx, uint32_t label, const char *object, const char 
     if (naming->rc == 0) naming->rc = ply_names_set(&naming->ply->names, label, object, material, naming->err);
 }
 
+static const struct track_ops ops = {ply_scan, ply_points};
+
 static int ply_frame(void *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
 {
-    static const struct track_ops ops = {ply_scan, ply_points};
     struct ply *ply = rec;
     scanhead_get_stats(sh, &ply->facts.stats);
     if (frame->type != SCANHEAD_SURFACES) return track_frame(&ply->track, sh, frame, &ops, ply, err);
@@ -222,7 +245,9 @@ static int move_points(struct ply *ply, size_t header_len, struct sh_err *err)
 
 static int finish(struct ply *ply, struct sh_err *err)
 {
-    int rc = outfile_flush(&ply->file, err);
+    int rc = track_flush(&ply->track, &ops, ply, err);
+    if (rc == 0) rc = outfile_flush(&ply->file, err);
+    ply->facts.n_without_attributes = ply->track.n_without_attributes;
     ply->facts.n_unplaced = ply->track.n_unplaced;
     ply->facts.n_without_pose = ply->track.n_without_pose;
     char *header;
@@ -242,6 +267,7 @@ static int ply_close(void *rec, int keep, struct sh_err *err)
     if (keep && rc == 0) track_tell(&ply->track, ply->options.report);
     int closed = outfile_close(&ply->file, keep && rc == 0, err);
     ply_names_free(&ply->names);
+    track_free(&ply->track);
     free(ply);
     return rc != 0 ? rc : closed;
 }

@@ -87,6 +87,11 @@ static void put_comments(FILE *out, const struct ply_facts *facts, const struct 
                 facts->gps_s - week * WEEK_S);
     }
     fputs("comment reflectance in dB, nan: not modelled\n", out);
+    if (facts->attributes)
+        fprintf(out,
+                "comment amplitude in dB above the detection threshold, width of the echo in ns at half maximum\n"
+                "comment points_without_attributes %" PRIu64 "\n",
+                facts->n_without_attributes);
     fputs("comment echo and echo_count 0: shot without echo; label 65535: none\n", out);
     if (facts->moving)
         fprintf(
@@ -125,7 +130,9 @@ static void put_header(FILE *out, const struct ply_facts *facts, const struct pl
           "property float reflectance\nproperty double time\nproperty uchar echo\nproperty uchar echo_count\n"
           "property ushort label\nproperty ushort station\n",
           out);
-    fputs(facts->moving || facts->stops ? "property double frame\nend_header\n" : "end_header\n", out);
+    if (facts->moving || facts->stops) fputs("property double frame\n", out);
+    if (facts->attributes) fputs("property float amplitude\nproperty float width\n", out);
+    fputs("end_header\n", out);
 }
 
 int ply_header_make(const struct ply_facts *facts, const struct ply_names *names, size_t size, char **text, size_t *len,
@@ -154,5 +161,6 @@ size_t ply_header_reserve(const struct ply_facts *facts, const struct ply_names 
     size_t len;
     if (ply_header_make(facts, names, 0, &text, &len, NULL) != 0) return 0;
     free(text);
+    if (facts->attributes) len += 20;
     return len + COUNT_ROOM + TIME_ROOM + PAD_MIN + (size_t)(names->n - names->n_named) * NAME_ROOM;
 }

@@ -12,7 +12,8 @@ struct ply_facts {
     int ascii, empty_shots;
     uint64_t n_vertices, n_unplaced; /* points before their descriptor and anchor were seen */
     uint64_t n_without_pose;         /* points of a moving head whose pose was lost */
-    int have_crs, crs, epsg, moving, stops, geoid_heights;
+    uint64_t n_without_attributes;   /* echoes */
+    int have_crs, crs, epsg, moving, stops, geoid_heights, attributes;
     int have_gps;
     double gps_s; /* GPS time of the first scan's start */
     char idn[96], profile[32];

@@ -76,6 +76,7 @@ enum scanhead_frame_type { /* as on the wire */
                            SCANHEAD_EVENT = 6,
                            SCANHEAD_SURFACES = 7,
                            SCANHEAD_POSES = 8,
+                           SCANHEAD_ATTRIBUTES = 9,
 };
 enum scanhead_frame_flags { SCANHEAD_REPEAT = 1, SCANHEAD_LOCAL = 2 };
 
@@ -101,7 +102,7 @@ struct scanhead_frame {
     size_t payload_len;
     const uint8_t *raw; /* the frame as on the wire, header and payload; valid as payload is */
     size_t raw_len;
-    /* SCANHEAD_POINTS */
+    /* SCANHEAD_POINTS; SCANHEAD_ATTRIBUTES, likewise: scan_line, n_points, pulse0 */
     uint32_t scan_frame, scan_line, n_points, n_pulses;
     uint64_t pulse0;
     int64_t scan_t0_ns, line_t0_ns; /* since the scan's start: of pulse0, of the line's first pulse */
@@ -133,6 +134,34 @@ struct scanhead_point {
  * where the head moves. */
 int scanhead_points(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                     struct scanhead_point *points, uint32_t max);
+
+struct scanhead_attribute {
+    double amplitude_db; /* above the head's detection threshold; NaN: not modelled, or an empty shot */
+    double width_ns;     /* of the echo, full at half maximum; 655.35: that or more; NaN: an empty shot */
+};
+
+/* Attributes of the points of the last frame of SCANHEAD_POINTS: of that frame's point `first` and those behind it, at
+ * most max, out of the frame of SCANHEAD_ATTRIBUTES that scanhead_next returned last. Returns how many, or
+ * SCANHEAD_ESTATE where these are not the last points' (their own frame, or frames between, were lost). */
+int scanhead_attributes(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
+                        struct scanhead_attribute *attributes, uint32_t max);
+/* 1: the head sends attributes, in a frame of their own directly behind each one of points; 0: it does not;
+ * SCANHEAD_ESTATE before the descriptor was seen. */
+int scanhead_has_attributes(const struct scanhead *sh);
+
+struct scanhead_line_end {
+    uint32_t scan_frame, scan_line;
+    uint64_t pulse0;                          /* the line's first pulse in the scan */
+    int64_t t0_ns, t1_ns;                     /* since the scan's start: this line's first pulse, the next one's */
+    uint32_t n_fired, n_cast;                 /* pulses of the whole sweep; of these, not in its blind part */
+    uint32_t n_echoes;                        /* sent; this and the last three are 0 also where parts were lost */
+    uint32_t mirror_count, pan_count, status; /* encoders at its last pulse; 1: last of the frame, 2: stopped within */
+    uint32_t n_crowded;                       /* echoes left out, the weakest: beyond what the head tells of a pulse */
+    uint32_t n_faint;                         /* hits that the head did not detect */
+    uint32_t n_unfit;                         /* echoes too far for the stream's integers: sent as empty shots */
+};
+/* A frame of SCANHEAD_LINE_END, decoded. SCANHEAD_EINPUT for another one, SCANHEAD_EFORMAT for a wrong one. */
+int scanhead_line_end(struct scanhead *sh, const struct scanhead_frame *frame, struct scanhead_line_end *end);
 
 /* What the stream has said of itself. Strings belong to the handle. 0, or SCANHEAD_ESTATE when not seen yet. */
 struct scanhead_info {

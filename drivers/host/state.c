@@ -60,6 +60,12 @@ static int absorb_points(struct scanhead *sh, const struct native_header *header
     return 0;
 }
 
+static int absorb_attributes(struct scanhead *sh, const struct native_header *header, const uint8_t *payload)
+{
+    struct native_attributes attributes;
+    return native_decode_attributes(payload, header->length, &attributes) != 0 ? bad(sh, "wrong attributes") : 0;
+}
+
 /* The head's clock at a device time. GPS time fits: it is below 2^63 ns until 2272. */
 static void set_gps(struct scanhead *sh, uint64_t at_ns, uint64_t gps_ns)
 {
@@ -162,6 +168,8 @@ int host_absorb(struct scanhead *sh, const struct native_header *header, const u
         return absorb_anchor(sh, header, payload);
     case NATIVE_POINTS:
         return absorb_points(sh, header, payload);
+    case NATIVE_ATTRIBUTES:
+        return absorb_attributes(sh, header, payload);
     case NATIVE_POSES:
         if (host_absorb_poses(sh, payload, header->length) == SH_EFORMAT) return bad(sh, "wrong poses");
         return sh->poses != NULL ? 0 : sh_fail(&sh->err, SH_ENOMEM, "no memory for poses");

@@ -6,7 +6,11 @@
  * the pose is the first anchor's. Those of the polar layout whose pose was lost are left out and counted; those of the
  * geo layout need none.
  *
- * A recorder passes each frame to track_frame and gets its points back in batches. One thread per track. */
+ * Where a recorder wants attributes and the head sends them, points wait for the frame behind theirs. Without it (it
+ * was lost) they come out with the next points, or at the end, with attributes that are not-a-number, and are counted.
+ *
+ * A recorder passes each frame to track_frame, what waits to track_flush at the end, and gets its points back in
+ * batches. One thread per track. */
 #ifndef DRIVERS_HOST_TRACK_H
 #define DRIVERS_HOST_TRACK_H
 
@@ -16,8 +20,11 @@
 
 enum { TRACK_BATCH = 256 };
 
+struct track_waiting;
+
 struct track {
-    const char *path; /* for messages; the recorder's */
+    const char *path;     /* for messages; the recorder's */
+    int wants_attributes; /* the recorder's */
     /* of the frame that the points at hand are in */
     const struct scanhead *sh;
     struct scanhead_info info;
@@ -25,15 +32,22 @@ struct track {
     uint32_t line; /* in the scan, from 0 */
     int64_t t0_ns; /* of the first point, since the scan's start */
     /* of the stream so far */
-    uint32_t n_scans;        /* with points */
-    uint64_t n_unplaced;     /* points before their descriptor and anchor were seen */
-    uint64_t n_without_pose; /* points of a moving head whose pose was lost */
-    double scale_m;          /* of coordinates in the recording: the stream's; coarser where the head moves far */
+    uint32_t n_scans;              /* with points */
+    uint64_t n_unplaced;           /* points before their descriptor and anchor were seen */
+    uint64_t n_without_pose;       /* points of a moving head whose pose was lost */
+    uint64_t n_without_attributes; /* echoes whose attributes were lost */
+    uint64_t n_attributes_unheld;  /* echoes with attributes that the recorder has no place for */
+    double scale_m;                /* of coordinates in the recording: the stream's; coarser where the head moves far */
     struct scanhead_point point[TRACK_BATCH];
     uint32_t row[TRACK_BATCH]; /* of each point: pulses since the line's first, the blind ones included */
     double frame[TRACK_BATCH]; /* of each point of a moving head: frame scalar of the trajectory; NaN: lost */
+    int has_attributes;        /* wanted, and sent: */
+    struct scanhead_attribute attribute[TRACK_BATCH];
+    double gps_s[TRACK_BATCH]; /* scanhead_gps_time of each, as of its own frame; NaN: not known */
     /* inner state */
     int begun, new_scan, have_next_line;
+    uint32_t index[TRACK_BATCH]; /* of each point in its frame, where it may wait */
+    struct track_waiting *waiting;
     int crs, epsg, geoid, moving, stops;
     uint32_t next_line, last_station;
     uint64_t next_line_pulse0, last_pulse0;
@@ -47,12 +61,16 @@ struct track_ops {
     int (*points)(void *rec, int n, struct sh_err *err);
 };
 
-/* SH_EFORMAT when the stream goes to another CRS or kind of heights, or to a head that moves or stands, which no
- * recorder's file can hold, or to a station beyond 65535. */
+/* SH_EFORMAT when the stream goes to another CRS or kind of heights, to a head that moves or stands, or that sends
+ * attributes or does not (where they are wanted), which no recorder's file can hold, or to a station beyond 65535. */
 int track_frame(struct track *track, struct scanhead *sh, const struct scanhead_frame *frame,
                 const struct track_ops *ops, void *rec, struct sh_err *err);
 
-/* At the end: what could not be placed. */
+/* At the end: points that still wait for their attributes. */
+int track_flush(struct track *track, const struct track_ops *ops, void *rec, struct sh_err *err);
+void track_free(struct track *track);
+
+/* At the end: what could not be placed, or had no attributes. */
 void track_tell(const struct track *track, const struct sh_report *report);
 
 /* The CRS of the recording's points: the stream's in the geo layout, the scene frame in the polar one. */

@@ -63,6 +63,13 @@ static const struct field points[] = {
     POINTS(line_t0_ns, FIELD_64), POINTS(n_pulses, FIELD_32), POINTS(n_points, FIELD_32),
 };
 
+#define ATTRIBUTES(member, kind) ROW(native_attributes, member, kind)
+static const struct field attributes[] = {
+    ATTRIBUTES(pulse0, FIELD_64),
+    ATTRIBUTES(line, FIELD_32),
+    ATTRIBUTES(n_points, FIELD_32),
+};
+
 #define END(member, kind) ROW(native_line_end, member, kind)
 static const struct field line_end[] = {
     END(frame, FIELD_32),        END(line, FIELD_32),      END(pulse0, FIELD_64), END(t0_ns, FIELD_64),
@@ -96,6 +103,7 @@ static const struct field pose[] = {
 const struct field_table fields_descriptor = TABLE(descriptor, native_descriptor, 272);
 const struct field_table fields_anchor = TABLE(anchor, native_anchor, 280);
 const struct field_table fields_points = TABLE(points, native_points, NATIVE_POINTS_HEAD_LEN);
+const struct field_table fields_attributes = TABLE(attributes, native_attributes, NATIVE_ATTRIBUTES_HEAD_LEN);
 const struct field_table fields_line_end = TABLE(line_end, native_line_end, 68);
 const struct field_table fields_telemetry = TABLE(telemetry, native_telemetry, 72);
 const struct field_table fields_pose = TABLE(pose, native_pose, NATIVE_POSE_LEN);

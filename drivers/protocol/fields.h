@@ -24,8 +24,8 @@ struct field_table {
     size_t n_fields, wire_len, struct_len;
 };
 
-extern const struct field_table fields_descriptor, fields_anchor, fields_points, fields_line_end, fields_telemetry,
-    fields_event, fields_pose;
+extern const struct field_table fields_descriptor, fields_anchor, fields_points, fields_attributes, fields_line_end,
+    fields_telemetry, fields_event, fields_pose;
 
 /* Writes exactly table->wire_len bytes. */
 void fields_encode(const struct field_table *table, const void *from, uint8_t *wire);

@@ -20,6 +20,8 @@ enum {
     NATIVE_POSES_HEAD_LEN = 8,
     NATIVE_POSE_LEN = 80,
     NATIVE_MAX_POSES = (NATIVE_MAX_PAYLOAD - NATIVE_POSES_HEAD_LEN) / NATIVE_POSE_LEN,
+    NATIVE_ATTRIBUTES_HEAD_LEN = 16,
+    NATIVE_ATTRIBUTE_LEN = 4,
     NATIVE_MAX_TEXT = 512, /* longest reply line, with its CR LF */
 };
 
@@ -30,8 +32,9 @@ enum native_type {
     NATIVE_LINE_END = 4,
     NATIVE_TELEMETRY = 5,
     NATIVE_EVENT = 6,
-    NATIVE_SURFACES = 7, /* names of some labels */
-    NATIVE_POSES = 8,    /* where a moving head is while it measures what follows */
+    NATIVE_SURFACES = 7,   /* names of some labels */
+    NATIVE_POSES = 8,      /* where a moving head is while it measures what follows */
+    NATIVE_ATTRIBUTES = 9, /* amplitude and width of the points in the frame before */
 };
 
 enum native_flags {
@@ -66,7 +69,10 @@ struct native_descriptor {
     double range_min_m, range_max_m;
     uint32_t max_echoes, n_surfaces, frames, scan; /* frames per scan (0: endless); scan number from 1 */
     uint64_t seed;
+    uint32_t content, reserved; /* enum native_content; where it is 0, neither is sent */
 };
+
+enum native_content { NATIVE_HAS_ATTRIBUTES = 1 }; /* a frame of attributes follows each one of points */
 
 enum native_crs { NATIVE_CRS_LOCAL = 0, NATIVE_CRS_ECEF = 1, NATIVE_CRS_UTM = 2, NATIVE_CRS_GEODETIC = 3 };
 enum native_heights { NATIVE_HEIGHTS_ELLIPSOID = 0, NATIVE_HEIGHTS_GEOID = 1 };
@@ -109,6 +115,18 @@ struct native_point {
     uint16_t label;
     uint32_t dt_ns;
     uint8_t echo, echo_count; /* both 0: shot without echo */
+};
+
+struct native_attributes { /* head of an attributes payload, 16 bytes, then n attributes of 4 */
+    uint64_t pulse0;
+    uint32_t line, n_points; /* all three as in the points frame before */
+};
+
+enum { NATIVE_AMPLITUDE_NONE = INT16_MIN, NATIVE_WIDTH_NONE = 0, NATIVE_WIDTH_MOST = UINT16_MAX };
+/* 4 bytes: 0 i16 amplitude, 2 u16 width */
+struct native_attribute {
+    int16_t amplitude_cdb; /* 0.01 dB above the detection threshold */
+    uint16_t width_cns;    /* 0.01 ns, full at half maximum */
 };
 
 struct native_line_end {
@@ -168,6 +186,8 @@ int native_decode_descriptor(const uint8_t *payload, size_t len, struct native_d
 int native_decode_anchor(const uint8_t *payload, size_t len, struct native_anchor *out);
 int native_decode_points(const uint8_t *payload, size_t len, struct native_points *out);
 void native_decode_point(const uint8_t *payload, uint32_t i, struct native_point *out); /* i < n_points */
+int native_decode_attributes(const uint8_t *payload, size_t len, struct native_attributes *out);
+void native_decode_attribute(const uint8_t *payload, uint32_t i, struct native_attribute *out); /* i < n_points */
 int native_decode_line_end(const uint8_t *payload, size_t len, struct native_line_end *out);
 int native_decode_telemetry(const uint8_t *payload, size_t len, struct native_telemetry *out);
 int native_decode_event(const uint8_t *payload, size_t len, struct native_event *out);
@@ -219,7 +239,8 @@ void native_parser_finish(struct native_parser *parser);
 void native_parser_resume(struct native_parser *parser);
 
 /* 1 if a frame with this header belongs to stream_sha256: the hash runs over u8 type, u32 length (LE) and the payload
- * of each descriptor, anchor, points, line-end and poses frame that has neither NATIVE_REPEAT nor NATIVE_LOCAL. */
+ * of each descriptor, anchor, points, line-end, poses and attributes frame that has neither NATIVE_REPEAT nor
+ * NATIVE_LOCAL. */
 int native_is_hashed(const struct native_header *header);
 
 #endif

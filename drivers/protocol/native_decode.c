@@ -7,6 +7,8 @@
 
 /* The first heads sent no scales by axis, no kind of height and no axes; later ones no frame scalar. */
 enum { ANCHOR_LEN_FIRST = 168, ANCHOR_LEN_AXES = 272, ANCHOR_LEN = 280 };
+/* A descriptor that says nothing of content ends before it. */
+enum { DESCRIPTOR_LEN_CONTENT = 280, DESCRIPTOR_CONTENT_AT = 272 };
 /* Nor did they count what is no echo. */
 enum { LINE_END_LEN_FIRST = 56, LINE_END_LEN = 68 };
 
@@ -14,6 +16,7 @@ int native_decode_descriptor(const uint8_t *payload, size_t len, struct native_d
 {
     int rc = fields_decode(&fields_descriptor, payload, len, out);
     if (rc == 0 && out->layout != NATIVE_POLAR && out->layout != NATIVE_GEO) rc = SH_EFORMAT;
+    if (rc == 0 && len >= DESCRIPTOR_LEN_CONTENT) out->content = le_get32(payload + DESCRIPTOR_CONTENT_AT);
     return rc;
 }
 
@@ -55,6 +58,20 @@ void native_decode_point(const uint8_t *payload, uint32_t i, struct native_point
     out->dt_ns = tail & 0xffffffu;
     out->echo = (uint8_t)(tail >> 24 & 15u);
     out->echo_count = (uint8_t)(tail >> 28);
+}
+
+int native_decode_attributes(const uint8_t *payload, size_t len, struct native_attributes *out)
+{
+    int rc = fields_decode(&fields_attributes, payload, len, out);
+    if (rc == 0 && out->n_points > (len - NATIVE_ATTRIBUTES_HEAD_LEN) / NATIVE_ATTRIBUTE_LEN) rc = SH_EFORMAT;
+    return rc;
+}
+
+void native_decode_attribute(const uint8_t *payload, uint32_t i, struct native_attribute *out)
+{
+    const uint8_t *p = payload + NATIVE_ATTRIBUTES_HEAD_LEN + (size_t)i * NATIVE_ATTRIBUTE_LEN;
+    out->amplitude_cdb = (int16_t)le_get16(p);
+    out->width_cns = le_get16(p + 2);
 }
 
 int native_decode_line_end(const uint8_t *payload, size_t len, struct native_line_end *out)
@@ -134,5 +151,5 @@ int native_is_hashed(const struct native_header *header)
 {
     if ((header->flags & (NATIVE_REPEAT | NATIVE_LOCAL)) != 0) return 0;
     return header->type == NATIVE_DESCRIPTOR || header->type == NATIVE_ANCHOR || header->type == NATIVE_POINTS ||
-           header->type == NATIVE_LINE_END || header->type == NATIVE_POSES;
+           header->type == NATIVE_LINE_END || header->type == NATIVE_POSES || header->type == NATIVE_ATTRIBUTES;
 }

@@ -36,7 +36,12 @@ static size_t encode_fixed(uint8_t *dst, size_t cap, enum native_type type, cons
 
 size_t native_encode_descriptor(uint8_t *dst, size_t cap, const struct native_descriptor *d, int64_t t_ns, int flags)
 {
-    return encode_fixed(dst, cap, NATIVE_DESCRIPTOR, &fields_descriptor, d, t_ns, flags);
+    size_t len = fields_descriptor.wire_len;
+    if (d->content == 0) return encode_fixed(dst, cap, NATIVE_DESCRIPTOR, &fields_descriptor, d, t_ns, flags);
+    if (cap < NATIVE_HEADER_LEN + len + 8) return 0;
+    fields_encode(&fields_descriptor, d, dst + NATIVE_HEADER_LEN);
+    le_put64(dst + NATIVE_HEADER_LEN + len, d->content);
+    return put_header(dst, NATIVE_DESCRIPTOR, flags, len + 8, t_ns);
 }
 
 size_t native_encode_anchor(uint8_t *dst, size_t cap, const struct native_anchor *a, int64_t t_ns, int flags)
@@ -88,12 +93,22 @@ size_t native_encode_poses(uint8_t *dst, size_t cap, const struct native_pose *p
     return put_header(dst, NATIVE_POSES, flags, len, t_ns);
 }
 
-size_t native_points_bound(uint32_t n_points)
+static size_t frames_bound(uint32_t n_points)
 {
     /* a cut goes back to the start of a pulse: at most LINE_MAX_ECHOES - 1 points */
     const size_t least = NATIVE_MAX_POINTS - (LINE_MAX_ECHOES - 1);
-    size_t frames = n_points == 0 ? 1 : (n_points + least - 1) / least;
-    return frames * (NATIVE_HEADER_LEN + NATIVE_POINTS_HEAD_LEN) + (size_t)n_points * NATIVE_POINT_LEN;
+    return n_points == 0 ? 1 : (n_points + least - 1) / least;
+}
+
+size_t native_points_bound(uint32_t n_points)
+{
+    return frames_bound(n_points) * (NATIVE_HEADER_LEN + NATIVE_POINTS_HEAD_LEN) + (size_t)n_points * NATIVE_POINT_LEN;
+}
+
+size_t native_attributes_bound(uint32_t n_points)
+{
+    return frames_bound(n_points) * (NATIVE_HEADER_LEN + NATIVE_ATTRIBUTES_HEAD_LEN) +
+           (size_t)n_points * NATIVE_ATTRIBUTE_LEN;
 }
 
 /* Every pulse has an entry whose echo number is 0 or 1, and it is its first. */
@@ -143,6 +158,22 @@ static uint32_t count_pulses(const uint8_t *echo, uint32_t n)
     return pulses;
 }
 
+/* Attributes of the block's entries first .. first + n, which the frame with this head has gone out with. 0: no room.
+ */
+static size_t put_attributes(uint8_t *dst, size_t cap, const struct line_block *block, uint32_t first,
+                             const struct native_points *points, int64_t t_ns)
+{
+    const struct native_attributes head = {
+        .pulse0 = points->pulse0, .line = points->line, .n_points = points->n_points};
+    size_t payload_len = NATIVE_ATTRIBUTES_HEAD_LEN + (size_t)head.n_points * NATIVE_ATTRIBUTE_LEN;
+    uint8_t *at = dst + NATIVE_HEADER_LEN + NATIVE_ATTRIBUTES_HEAD_LEN;
+    if (cap < NATIVE_HEADER_LEN + payload_len) return 0;
+    fields_encode(&fields_attributes, &head, dst + NATIVE_HEADER_LEN);
+    for (uint32_t i = first; i < first + head.n_points; i++, at += NATIVE_ATTRIBUTE_LEN)
+        le_put32(at, (uint16_t)block->amplitude_cdb[i] | (uint32_t)block->width_cns[i] << 16);
+    return put_header(dst, NATIVE_ATTRIBUTES, 0, payload_len, t_ns);
+}
+
 size_t native_encode_points(uint8_t *dst, size_t cap, const struct line_block *block, int64_t scan_t0_ns)
 {
     size_t done = 0;
@@ -166,6 +197,11 @@ size_t native_encode_points(uint8_t *dst, size_t cap, const struct line_block *b
         fields_encode(&fields_points, &head, payload);
         if (put_points(payload + NATIVE_POINTS_HEAD_LEN, block, first, n, dt0_ns) != 0) return 0;
         done += put_header(dst + done, NATIVE_POINTS, 0, payload_len, scan_t0_ns + head.t0_ns);
+        if (block->width_cns != NULL) {
+            size_t len = put_attributes(dst + done, cap - done, block, first, &head, scan_t0_ns + head.t0_ns);
+            if (len == 0) return 0;
+            done += len;
+        }
         pulses += head.n_pulses;
         first += n;
     } while (first < block->n_points);

@@ -15,7 +15,8 @@ size_t native_encode_telemetry(uint8_t *dst, size_t cap, const struct native_tel
 size_t native_encode_event(uint8_t *dst, size_t cap, const struct native_event *e, int64_t t_ns, int flags);
 
 /* Block -> one or more points frames (NATIVE_MAX_POINTS each; cut between pulses, so that a pulse's echoes stay in one
- * frame). scan_t0_ns: device time of the scan's start. */
+ * frame), and behind each the frame of its attributes, where the block has some. scan_t0_ns: device time of the scan's
+ * start. */
 size_t native_encode_points(uint8_t *dst, size_t cap, const struct line_block *block, int64_t scan_t0_ns);
 size_t native_encode_line_end(uint8_t *dst, size_t cap, const struct line_end *end, int64_t scan_t0_ns);
 
@@ -32,7 +33,8 @@ size_t native_encode_surfaces(uint8_t *dst, size_t cap, uint32_t first, uint32_t
 /* Sets the sequence number of the whole frame at frame and renews the header CRC. Returns the frame's length. */
 size_t native_seal(uint8_t *frame, uint32_t seq);
 
-/* Bytes that native_encode_points can need for n_points. */
+/* Bytes that native_encode_points can need for n_points; and further ones for their attributes. */
 size_t native_points_bound(uint32_t n_points);
+size_t native_attributes_bound(uint32_t n_points);
 
 #endif

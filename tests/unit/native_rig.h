@@ -77,6 +77,7 @@ static inline struct native_descriptor make_descriptor(void)
     d.frames = UINT32_MAX;
     d.scan = 7;
     d.seed = 0x0123456789abcdefu;
+    d.content = d.reserved = 0; /* not sent then; test_native_attributes */
     return d;
 }
 

@@ -80,13 +80,12 @@ static void check_lost_nothing(const struct tally *t)
     assert_int_equal(t->last_seq - t->first_seq + 1, t->frames);
 }
 
-static void test_realtime(void **state)
+static void overtake(struct wire *wire, const char *more_yaml)
 {
-    struct wire *wire = *state;
     struct room_config config = RATE;
     /* The fast one has the same queue of 50 ms, but a receive buffer of megabytes and a thread that does
      * nothing else. */
-    config.more = "loop: {queue_ms: 50, late_ms: 10000}\n";
+    config.more = more_yaml;
     room_write(wire);
     struct head head = head_start(wire, room_config_write(wire, &config), NULL);
     struct tally fast = {.sh = client_open(head_endpoint(&head, "tcp"))}, slow = {.hold_fd = -1};
@@ -140,6 +139,17 @@ static void test_realtime(void **state)
     assert_true(stats_uint(wire, "reader_lost_frames") >= slow.told_lost + fast.told_lost);
     if (fast.told_events == 0) assert_int_equal(stats_uint(wire, "pulses"), fast.pulses);
     assert_int_equal(stats_uint(wire, "lost_pulses"), 0);
+}
+
+static void test_realtime(void **state)
+{
+    overtake(*state, "loop: {queue_ms: 50, late_ms: 10000}\n");
+}
+
+/* Half of the frames are of attributes, and count like any other. */
+static void test_attributes(void **state)
+{
+    overtake(*state, "loop: {queue_ms: 50, late_ms: 10000}\noutput: {attributes: on}\n");
 }
 
 static void test_fast(void **state)
@@ -207,6 +217,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_realtime, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_attributes, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_fast, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_end_lost, wire_setup, wire_teardown),
     };

@@ -1,0 +1,60 @@
+/* What stands beside the points: attributes of each, sums of each line. */
+#include <math.h>
+
+#include "drivers/host/host.h"
+
+int scanhead_has_attributes(const struct scanhead *sh)
+{
+    if (!sh->have_descriptor) return SCANHEAD_ESTATE;
+    return (sh->descriptor.content & NATIVE_HAS_ATTRIBUTES) != 0;
+}
+
+/* The frame right behind the last points, and about the same. */
+static int is_of_points(const struct scanhead *sh, const struct scanhead_frame *frame)
+{
+    return sh->have_points && frame->seq == sh->points_seq + 1 && frame->pulse0 == sh->of_points.pulse0 &&
+           frame->scan_line == sh->of_points.line && frame->n_points == sh->of_points.n_points;
+}
+
+int scanhead_attributes(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
+                        struct scanhead_attribute *attributes, uint32_t max)
+{
+    if (frame->type != SCANHEAD_ATTRIBUTES || frame->payload == NULL || frame->payload != sh->payload)
+        return sh_fail(&sh->err, SCANHEAD_EINPUT, "not the attributes frame that scanhead_next returned last");
+    if (!is_of_points(sh, frame))
+        return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: attributes of points that were lost", sh->source.name);
+    if (first >= frame->n_points) return 0;
+    uint32_t n = frame->n_points - first;
+    if (n > max) n = max;
+    for (uint32_t i = 0; i < n; i++) {
+        struct native_attribute a;
+        native_decode_attribute(frame->payload, first + i, &a);
+        attributes[i].amplitude_db = a.amplitude_cdb == NATIVE_AMPLITUDE_NONE ? (double)NAN : a.amplitude_cdb / 100.0;
+        attributes[i].width_ns = a.width_cns == NATIVE_WIDTH_NONE ? (double)NAN : a.width_cns / 100.0;
+    }
+    return (int)n;
+}
+
+int scanhead_line_end(struct scanhead *sh, const struct scanhead_frame *frame, struct scanhead_line_end *end)
+{
+    struct native_line_end wire;
+    if (frame->type != SCANHEAD_LINE_END || frame->payload == NULL)
+        return sh_fail(&sh->err, SCANHEAD_EINPUT, "not a frame of a line's end");
+    if (native_decode_line_end(frame->payload, frame->payload_len, &wire) != 0)
+        return sh_fail(&sh->err, SCANHEAD_EFORMAT, "%s: a line's end that is too short", sh->source.name);
+    *end = (struct scanhead_line_end){.scan_frame = wire.frame,
+                                      .scan_line = wire.line,
+                                      .pulse0 = wire.pulse0,
+                                      .t0_ns = wire.t0_ns,
+                                      .t1_ns = wire.t1_ns,
+                                      .n_fired = wire.n_fired,
+                                      .n_cast = wire.n_cast,
+                                      .n_echoes = wire.n_echoes,
+                                      .mirror_count = wire.mirror_count,
+                                      .pan_count = wire.pan_count,
+                                      .status = wire.status,
+                                      .n_crowded = wire.n_crowded,
+                                      .n_faint = wire.n_faint,
+                                      .n_unfit = wire.n_unfit};
+    return SCANHEAD_OK;
+}
