@@ -171,7 +171,8 @@ $(BUILD)/tests/bench/chart_widths: tests/bench/chart_widths.c $(BUILD)/modules.a
 $(BUILD)/tests/bench/beam: tests/bench/beam.c tests/accuracy/beam_reference.c $(BUILD)/modules.a
 CHARTS = $(BUILD)/tests/bench/chart $(BUILD)/tests/bench/chart_georef $(BUILD)/tests/bench/chart_widths $(BUILD)/tests/bench/beam
 $(BUILD)/tests/bench/plain: tests/bench/plain.c $(BUILD)/modules.a
-$(CHARTS) $(BUILD)/tests/bench/plain:
+$(BUILD)/tests/bench/refine: tests/bench/refine.c $(BUILD)/modules.a
+$(CHARTS) $(BUILD)/tests/bench/plain $(BUILD)/tests/bench/refine:
 	@mkdir -p $(@D)
 	@echo "  CHART $@"
 	$(Q)$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -o $@ $^ $(LDLIBS)

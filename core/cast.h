@@ -96,6 +96,7 @@ struct cast_beam {
 /* What stays the same for all pulses of a scan (the movers' poses: of a run). */
 struct cast_setup {
     const struct bvh *bvh;
+    int unrefined;               /* single rays: as Embree has them; without beam and detect (cast_float_error) */
     const struct georef *georef; /* geo layout */
     double station_m[3];         /* the head's origin, prcs */
     double rotation[9];          /* socs -> prcs, row by row */

@@ -103,7 +103,7 @@ struct bvh_rays {
     const uint8_t *begins; /* 1: a packet begins with this ray, whether the last one is full or not; NULL: none does */
     const float *dx, *dy, *dz;
     uint32_t *prim;
-    float *t, *u, *v;
+    float *t, *u, *v; /* u NULL: neither it nor v, nor the planes, are going to be looked at */
 };
 
 /* Casts n <= BVH_CHUNK rays, in packets of the native width, ragged ends masked. */
