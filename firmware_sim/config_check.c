@@ -112,13 +112,20 @@ static int check_names(const struct cfg_reader *rd, struct config *cfg)
     return SH_OK;
 }
 
+static void tidy_choice(enum config_choice *choice)
+{
+    if (*choice == CHOICE_FALSE) *choice = CHOICE_OFF;
+    if (*choice == CHOICE_TRUE) *choice = CHOICE_ON;
+}
+
 static int check_output(const struct cfg_reader *rd, struct config *cfg)
 {
     cfg->layout_given = cfg_is_given(rd, "output.layout", 0);
     if (!cfg_is_given(rd, "output.tolerance_m", 0)) cfg->tolerance_m = fmax(1e-7, 1e-3 * cfg->plan_tolerance_m);
     cfg->optics_depth_given = cfg_is_given(rd, "optics.depth", 0);
-    if (cfg->order_exactly == ORDER_FALSE) cfg->order_exactly = ORDER_OFF;
-    if (cfg->order_exactly == ORDER_TRUE) cfg->order_exactly = ORDER_ON;
+    cfg->plan_tolerance_given = cfg_is_given(rd, "plan.tolerance_m", 0);
+    tidy_choice(&cfg->order_exactly);
+    tidy_choice(&cfg->refine);
     if (cfg->utm_zone != 0 && cfg->crs != GEOREF_UTM)
         return cfg_fail_key(rd, "output.utm_zone", 0, "a zone, but output.crs is not utm; allowed only with crs: utm");
     if (cfg->heights == HEIGHTS_GEOID && cfg->crs != GEOREF_UTM && cfg->crs != GEOREF_GEODETIC)
