@@ -322,6 +322,18 @@ static int check_beam(const struct cfg_reader *rd, const struct config *cfg)
     return SH_OK;
 }
 
+/* Embree's own hits have no planes to go on with. */
+static int check_cast(const struct cfg_reader *rd, const struct config *cfg)
+{
+    if (cfg->refine != CHOICE_OFF) return SH_OK;
+    if (cfg->beam_mode != BEAM_SINGLE)
+        return cfg_fail_key(rd, "cast.refine", 0,
+                            "off, but footprints need exact planes; allowed with beam.mode: single");
+    if (cfg->order_exactly == CHOICE_ON)
+        return cfg_fail_key(rd, "cast.refine", 0, "off, but scene.order_exactly is on; allowed one of them");
+    return SH_OK;
+}
+
 static int check_loop(const struct cfg_reader *rd, const struct config *cfg)
 {
     if (fmod(1e9, cfg->tick_hz) == 0.0 && floor(cfg->tick_hz) == cfg->tick_hz) return SH_OK;
@@ -369,6 +381,7 @@ int cfg_check(const struct cfg_reader *rd, struct config *cfg)
     for (uint32_t i = 0; i < cfg->n_links && code == SH_OK; i++)
         code = check_link(rd, cfg, i);
     if (code == SH_OK) code = check_beam(rd, cfg);
+    if (code == SH_OK) code = check_cast(rd, cfg);
     if (code == SH_OK) code = check_pulse_width(rd, cfg);
     if (code == SH_OK) code = check_loop(rd, cfg);
     if (code == SH_OK) code = check_time(rd, cfg);

@@ -25,7 +25,6 @@ static void fill_place(const struct site *site, struct site_look_at *at, struct 
         place->pulses = schedule_pulse_at(&place->segment, site->knot[site->n_knots - 1].t_ns - site->knot[0].t_ns) + 1;
     if (site->n_movers > 0 || site->n_knots != 0) place->enter = enter;
     site_cast_setup(site, at->station, &place->setup);
-    place->setup.unrefined = 0; /* whatever is planned by now: the reference is exact */
 }
 
 uint32_t site_look_count(const struct site *site)

@@ -38,6 +38,7 @@ int site_plan_order(struct site *site, struct sh_err *err)
     struct plan_option option[2];
     struct plan_row *row = &site->plan.order;
     plan_order_options(farthest_m(site), option);
+    if (site->cfg->refine == CHOICE_OFF) snprintf(option[1].why_not, sizeof option[1].why_not, "cast.refine is off");
     int forced = asked == CHOICE_AUTO ? -1 : asked == CHOICE_ON;
     site->plan.methods.order_exactly =
         (int)plan_choose(row, "order", option, 2, forced, "scene.order_exactly", &tolerance);
@@ -142,7 +143,6 @@ void site_plan_text(const struct site *site, char *text, size_t room)
 {
     const struct site_plan *plan = &site->plan;
     int polar = site->cfg->layout == LINE_POLAR;
-    snprintf(text, room, "cast %s; order %s; beam %s; optics %s; georef %s",
-             plan->methods.unrefined ? "float" : "refined", plan->order.method, plan->beam.method, plan->optics.method,
-             polar ? "none" : site->station[0].plan.method);
+    snprintf(text, room, "cast %s; order %s; beam %s; optics %s; georef %s", plan->methods.plain ? "float" : "refined",
+             plan->order.method, plan->beam.method, plan->optics.method, polar ? "none" : site->station[0].plan.method);
 }

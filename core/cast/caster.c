@@ -125,8 +125,8 @@ static void cast_rays(struct caster *c, struct decide_ray *ray, struct bvh_rays 
     caster_ends(c, CAST_DIRECTIONS);
     bvh_intersect(bvh, from->px != NULL ? &c->placed : &c->packets, rays, n);
     caster_ends(c, CAST_EMBREE);
-    if (c->unrefined) {
-        kernel_unrefined(bvh, c->prim, c->t, n, hits->range_m, hits->label);
+    if (bvh->plain) {
+        kernel_plain(bvh, c->prim, c->t, n, hits->range_m, hits->label);
         caster_ends(c, CAST_REFINE);
         return;
     }
@@ -147,7 +147,7 @@ void caster_hits_from(struct caster *c, const struct bvh *bvh, const struct orig
                             .dy = c->fy,
                             .dz = c->fz,
                             .t = c->t,
-                            .u = c->unrefined ? NULL : c->u,
+                            .u = bvh->plain ? NULL : c->u,
                             .v = c->v,
                             .prim = c->prim};
     set_origin(&ray, from->at_m[0], from->at_m[1], from->at_m[2]);
@@ -312,9 +312,7 @@ static uint32_t cast_chunk(struct caster *c, const struct cast_setup *s, const s
     }
     const struct ray_set set = {
         .dx = c->dx, .dy = c->dy, .dz = c->dz, .range_m = c->range_m, .label = c->label, .hit = c->hit};
-    c->unrefined = s->unrefined;
     caster_nearest(c, s, &from, &set, n);
-    c->unrefined = 0;
     uint32_t echoes = single_chunk(c, s, linear, run->pulse0 + first, n, block, *at);
     *at += n;
     return echoes;

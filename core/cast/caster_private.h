@@ -96,7 +96,6 @@ struct caster {
     struct moving_rays moving;          /* touched only where the head moves, or is not ideal */
     float *steep;                       /* where 1 / cos^2 of the incidence goes; NULL: not asked for */
     const uint8_t *begins;              /* of the rays at hand, where packets begin (bvh.h) */
-    int unrefined;                      /* hits are taken as Embree has them */
     int scattered;                      /* of the rays at hand, neighbours have nothing in common */
     struct beam_work *beam;             /* touched only where pulses have a footprint */
     struct cast_counters counters;

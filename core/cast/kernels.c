@@ -193,8 +193,8 @@ uint32_t kernel_refine_from(const struct bvh *bvh, const struct kernel_hits *hit
 }
 
 VEC_CLONES
-static void unrefined(const uint16_t *restrict label_of, uint32_t n_triangles, const uint32_t *restrict prim,
-                      const float *restrict t, uint32_t n, double *restrict range_m, uint32_t *restrict label)
+static void plain(const uint16_t *restrict label_of, uint32_t n_triangles, const uint32_t *restrict prim,
+                  const float *restrict t, uint32_t n, double *restrict range_m, uint32_t *restrict label)
 {
     for (uint32_t i = 0; i < n; i++)
         range_m[i] = prim[i] < n_triangles ? (double)t[i] : (double)NAN;
@@ -202,10 +202,10 @@ static void unrefined(const uint16_t *restrict label_of, uint32_t n_triangles, c
         label[i] = prim[i] < n_triangles ? label_of[prim[i]] : (uint32_t)LINE_LABEL_NONE;
 }
 
-void kernel_unrefined(const struct bvh *bvh, const uint32_t *prim, const float *t, uint32_t n, double *range_m,
-                      uint32_t *label)
+void kernel_plain(const struct bvh *bvh, const uint32_t *prim, const float *t, uint32_t n, double *range_m,
+                  uint32_t *label)
 {
-    unrefined(bvh->scene->label, bvh->scene->n_triangles, prim, t, n, range_m, label);
+    plain(bvh->scene->label, bvh->scene->n_triangles, prim, t, n, range_m, label);
 }
 
 VEC_CLONES

@@ -30,7 +30,7 @@ static void list_options(const struct plan_cast_need *need, const struct plan_op
 static void judge(const struct plan_cast_need *need, struct plan_option *it)
 {
     const struct plan_tolerance *t = &need->tolerance;
-    const char *why = need->not_float != NULL ? need->not_float : need->forced < 0 ? need->not_by_itself : NULL;
+    const char *why = need->not_plain != NULL ? need->not_plain : need->forced < 0 ? need->not_by_itself : NULL;
     if (why != NULL)
         snprintf(it->why_not, sizeof it->why_not, "%s", why);
     else if (need->forced < 0 && !(it->error_m <= PLAN_CAST_SHARE * t->range_m))
@@ -47,14 +47,13 @@ int plan_cast(const struct plan_cast_need *need, const struct plan_option *as_is
     int forced = need->forced < 0 ? -1 : need->forced ? REFINED : AS_IS;
     list_options(need, as_is, option);
     judge(need, &option[AS_IS]);
-    int unrefined =
-        plan_choose(row, "cast", option, OPTIONS, forced, "cast.refine", &need->tolerance) == (uint32_t)AS_IS;
+    int plain = plan_choose(row, "cast", option, OPTIONS, forced, "cast.refine", &need->tolerance) == (uint32_t)AS_IS;
     size_t used = strlen(row->why);
-    if (!unrefined && !row->forced)
+    if (!plain && !row->forced)
         snprintf(row->why, sizeof row->why, "triangle and range in double where float can't tell; costs about %.2g ns",
                  PLAN_COST_REFINE + PLAN_COST_DECIDE);
     else
         snprintf(row->why + used, sizeof row->why - used, "; %s",
-                 unrefined ? "Embree's own hits" : "in double where float can't tell");
-    return unrefined;
+                 plain ? "Embree's own hits" : "in double where float can't tell");
+    return plain;
 }
