@@ -180,6 +180,10 @@ $(CHARTS) $(BUILD)/tests/bench/plain $(BUILD)/tests/bench/refine:
 bench-beam: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/beam
 	@$(BUILD)/tests/bench/beam house wires foliage leaves
+# Exact planes and the decision of doubtful hits, by rays without.
+bench-refine: deps-build
+	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/refine
+	@$(BUILD)/tests/bench/refine house 100k 1M
 # Effects that are named and not needed: by the plain cast, within 5 %.
 bench-plain: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/plain
@@ -195,7 +199,7 @@ chart: deps-build
 	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)'" tests/bench/chart.gp
 objects: $(EVERYTHING)
 test-unit-programs: $(UNIT)
-test-programs: all $(TESTS) $(CHARTS) $(BUILD)/tests/bench/plain
+test-programs: all $(TESTS) $(CHARTS) $(BUILD)/tests/bench/plain $(BUILD)/tests/bench/refine
 
 install: all
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib $(DESTDIR)$(PREFIX)/include $(DESTDIR)$(HEADS_DIR) \
@@ -213,6 +217,6 @@ format:
 clean:
 	rm -rf $(BUILD)
 .PHONY: ALWAYS all deps deps-test deps-build deps-guest demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb \
-	test-usb-million objects test-unit-programs test-programs bench bench-beam bench-plain chart install format clean
+	test-usb-million objects test-unit-programs test-programs bench bench-beam bench-plain bench-refine chart install format clean
 .SECONDARY:
 -include $(shell find $(BUILD) -type f -name '*.d' 2>/dev/null)

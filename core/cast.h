@@ -1,6 +1,7 @@
 /* Casting: a run of pulses -> echoes. Embree proposes a triangle from float rays in packets of the machine's native
  * width; the range comes from the triangle's plane in double, kept beside the BVH, and where the ray passes so near to
- * a triangle's border that float can't be trusted, the triangle is chosen again in double.
+ * a triangle's border that float can't be trusted, the triangle is chosen again in double. On a plain BVH Embree's hits
+ * stand as they are.
  *
  * Frames: the BVH is built in a local frame (prcs minus origin_m), where float is safe; the station is a point of it.
  * Ray packets are SCHEDULE_PACKET pulses, cut by pulse number. On a moving platform each pulse has its own origin and

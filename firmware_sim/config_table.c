@@ -256,11 +256,11 @@ static const struct cfg_key config_keys[] = {
 
     {"cast", CFG_MAP, .help = "How a ray finds what it meets."},
     {"cast.refine", CFG_ENUM, .def = "auto", .names = choice_names, IN_CONFIG(refine), .allowed = "auto, on or off",
-     .help = "on: range and triangle in double where float can't tell, within a micrometre. off: as Embree has them, which is "
-             "faster; ranges are off by some 1e-7 of themselves over the cosine of the incidence, another surface may be told "
-             "within 1e-6 of the range beside an edge, and the stream may differ from one CPU's packets of rays to another's; "
-             "only for single rays without signal, glass, mirrors, ambiguity, instrument errors, angle or ball noise. auto: off "
-             "where plan.tolerance_m is given and `scanhead plan` finds it met ten times over."},
+     .help = "on: range and triangle in double where float can't tell, within a micrometre. off: as Embree has them, faster: "
+             "ranges off by some 1e-7 of themselves over the cosine of the incidence, now and then another surface beside an "
+             "edge, a stream that may differ between CPUs with other packets of rays; for single rays without signal, optics, "
+             "ambiguity, instrument errors, angle or ball noise. auto: off where plan.tolerance_m is given and a tenth of it "
+             "is enough, as `scanhead plan` says."},
 
     {"plan", CFG_MAP, .help = "What the methods of all stages may be off; each stage takes the cheapest that holds it "
                               "(`scanhead plan`)."},

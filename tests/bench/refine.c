@@ -94,7 +94,7 @@ static void pin(void)
 
 int main(int argc, char **argv)
 {
-    int polar = 0;
+    int polar = 1;
     pin();
     printf("%-8s %9s %9s %9s %7s\n", "scene", "refined", "plain", "saved ns", "ratio");
     for (int i = 1; i < argc; i++) {
