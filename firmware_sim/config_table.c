@@ -265,7 +265,8 @@ static const struct cfg_key config_keys[] = {
     {"plan", CFG_MAP, .help = "What the methods of all stages may be off; each stage takes the cheapest that holds it "
                               "(`scanhead plan`)."},
     {"plan.tolerance_m", CFG_REAL, "m", "1e-3", 1e-6, 1, IN_CONFIG(plan_tolerance_m),
-     .help = "Echo ranges against a footprint of 1,000 sub-rays, root mean square."},
+     .help = "Echo ranges against a footprint of 1,000 sub-rays, root mean square. Where it is given, a tenth of it may be "
+             "what rays that are not refined are off (cast.refine)."},
     {"plan.echo_tolerance", CFG_REAL, NULL, "1e-3", 1e-4, 1, IN_CONFIG(echo_tolerance),
      .help = "Share of the pulses that may have another number of echoes than with 1,000 sub-rays; 1e-3 is what the "
              "plan's sample can tell."},

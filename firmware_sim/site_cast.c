@@ -66,23 +66,24 @@ static void drop(const struct site *site, struct bvh *bvh[])
         bvh_free(bvh[i]);
 }
 
-/* Exact BVHs are there; makes plain ones and compares. */
+/* Exact BVHs are there; makes plain ones and compares, from all stations. */
 static int compare(struct site *site, struct bvh *plain[], struct plan_option *as_is, const struct sh_report *report,
                    struct sh_err *err)
 {
     struct site_look look = {0};
-    struct plan_place other[SITE_LOOK_PLACES];
-    int rc = SH_OK;
+    struct plan_place *other = calloc(site->n_stations, sizeof *other);
+    int rc = other != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory");
     for (uint32_t i = 0; i < site->n_bvh && rc == SH_OK; i++)
         rc = bvh_create_other(site->bvh[i], site->cfg->threads, report, &plain[i], err);
-    if (rc == SH_OK) rc = site_look_open(&look, site, report, err);
+    if (rc == SH_OK) rc = site_look_open(&look, site, site->n_stations, report, err);
     for (uint32_t i = 0; i < look.n && rc == SH_OK; i++) {
         other[i] = look.place[i];
         for (uint32_t k = 0; k < site->n_bvh; k++)
             if (other[i].setup.bvh == site->bvh[k]) other[i].setup.bvh = plain[k];
     }
     if (rc == SH_OK) plan_sample_cast(look.sample, other, PLAN_CAST_SHARE * site->cfg->plan_tolerance_m, as_is);
-    plan_sample_free(look.sample);
+    site_look_close(&look);
+    free(other);
     return rc;
 }
 

@@ -9,7 +9,7 @@
 #include "firmware_sim/site_detect.h"
 #include "firmware_sim/site_look.h"
 
-enum { FOOTPRINT_OPTIONS = 9 };
+enum { MAX_PLACES = 4, FOOTPRINT_OPTIONS = 9 };
 
 static struct plan_tolerance tolerance_of(const struct site *site)
 {
@@ -84,9 +84,9 @@ static int apply_beam(struct site *site, const struct sh_report *report, struct 
 static int open_look(struct site_look *look, struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     int rc = SH_OK;
-    for (uint32_t i = 0; i < site_look_count(site) && rc == SH_OK; i++)
-        rc = make_beam(site, &site->station[site_look_station(site, i)], 0, report, err);
-    return rc == SH_OK ? site_look_open(look, site, report, err) : rc;
+    for (uint32_t i = 0; i < site_look_count(site, MAX_PLACES) && rc == SH_OK; i++)
+        rc = make_beam(site, &site->station[site_look_station(site, MAX_PLACES, i)], 0, report, err);
+    return rc == SH_OK ? site_look_open(look, site, MAX_PLACES, report, err) : rc;
 }
 
 static int add_outlines(const struct site_look *look, const struct sh_report *report, struct sh_err *err)
@@ -152,7 +152,7 @@ static int try_beams(struct site *site, const struct beam_choice *choice, struct
     if (rc == SH_OK && !holds)
         sh_warn(report, "%s: beam.mode: auto: no beam holds plan.tolerance_m and plan.echo_tolerance here",
                 site->cfg->file);
-    plan_sample_free(look.sample);
+    site_look_close(&look);
     return rc;
 }
 
@@ -182,7 +182,7 @@ static int force_beam(struct site *site, int measure, const struct sh_report *re
         int rc = open_look(&look, site, report, err);
         if (rc == SH_OK && cfg->beam_mode == BEAM_ADAPTIVE) rc = add_outlines(&look, report, err);
         if (rc == SH_OK) plan_sample_beam(look.sample, cfg->beam_mode, cfg->beam_rings, &option);
-        plan_sample_free(look.sample);
+        site_look_close(&look);
         if (rc != SH_OK) return rc;
     }
     site->plan.methods.beam = cfg->beam_mode;
@@ -206,8 +206,11 @@ static int choose_optics(struct site *site, int measure, const struct sh_report 
         return SH_OK;
     }
     if (forced < 0 || measure) {
-        int rc = site_look_open(&look, site, report, err);
-        if (rc != SH_OK) return rc;
+        int rc = site_look_open(&look, site, MAX_PLACES, report, err);
+        if (rc != SH_OK) {
+            site_look_close(&look);
+            return rc;
+        }
     }
     for (uint32_t d = 0; d <= CAST_MAX_DEPTH; d++) {
         option[d] = (struct plan_option){
@@ -217,7 +220,7 @@ static int choose_optics(struct site *site, int measure, const struct sh_report 
         plan_sample_optics(look.sample, d, &option[d]);
         holds = forced < 0 && plan_holds(&option[d], &tolerance);
     }
-    plan_sample_free(look.sample);
+    site_look_close(&look);
     site->plan.methods.depth =
         plan_choose(&site->plan.optics, "optics", option, CAST_MAX_DEPTH + 1, forced, "optics.depth", &tolerance);
     if (forced < 0 && site->plan.methods.depth == 0)

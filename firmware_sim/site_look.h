@@ -4,23 +4,24 @@
 
 #include "firmware_sim/site.h"
 
-enum { SITE_LOOK_PLACES = 4 };
-
 struct site_look {
     struct site *site;
-    struct plan_place place[SITE_LOOK_PLACES];
+    struct plan_place *place; /* [n] */
     struct site_look_at {
         const struct site *site;
         uint32_t station;
-    } at[SITE_LOOK_PLACES];
+    } * at; /* [n] */
     uint32_t n;
-    struct plan_sample *sample; /* the caller's to free, also after an error */
+    struct plan_sample *sample;
 };
 
-/* Some of the stations, evenly; with the beams that they have by then. The look stays where it is. */
-int site_look_open(struct site_look *look, struct site *site, const struct sh_report *report, struct sh_err *err);
-/* Before that: the stations it is going to take, 0 .. site_look_count - 1. */
-uint32_t site_look_count(const struct site *site);
-uint32_t site_look_station(const struct site *site, uint32_t i);
+/* Of `most` of the stations, or all there are: how many that makes, and which. */
+uint32_t site_look_count(const struct site *site, uint32_t most);
+uint32_t site_look_station(const struct site *site, uint32_t most, uint32_t i);
+/* Looks from these, with the beams that they have by then. To be closed, after an error, too; a look of zeros may be.
+ */
+int site_look_open(struct site_look *look, struct site *site, uint32_t most, const struct sh_report *report,
+                   struct sh_err *err);
+void site_look_close(struct site_look *look);
 
 #endif
