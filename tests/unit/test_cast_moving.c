@@ -130,13 +130,9 @@ static uint64_t sum_block(const struct line_block *b, uint32_t from, uint32_t n,
     return sum;
 }
 
-/* The pose hangs on the pulse's time alone: not on how runs are cut, on ray packets, or on what the caster did before.
- */
-static void test_same_bytes(void **state)
+/* near_m: of the straight way up. */
+static void expect_same_bytes(struct cast_rig *rig, int whatever_width, double near_m)
 {
-    (void)state;
-    struct pose_knot knot[KNOTS];
-    struct cast_rig *rig = open_room(knot);
     static const uint32_t widths[] = {0, 16, 8, 4, 1}; /* 0: the native one */
     static const uint32_t cuts[] = {RIG_LINE, 16, 2048, 48};
     struct bvh_info info;
@@ -145,6 +141,7 @@ static void test_same_bytes(void **state)
     for (int w = 0; w < 5; w++) {
         if (widths[w] > info.packet) continue;
         if (widths[w] != 0) bvh_set_packet(rig->bvh, widths[w]);
+        if (!whatever_width) want = 0;
         for (int c = 0; c < 4; c++) {
             uint64_t sum = 1;
             struct schedule_line line;
@@ -161,9 +158,25 @@ static void test_same_bytes(void **state)
             double d[3] = {0, 0, 1}, range;
             uint32_t hit;
             caster_hits(rig->caster, rig->bvh, CENTRE, 100.0, 1, &d[0], &d[1], &d[2], &range, &hit);
-            assert_true(fabs(range - HI[2]) < 1e-12);
+            assert_true(fabs(range - HI[2]) < near_m);
         }
     }
+}
+
+/* The pose hangs on the pulse's time alone: not on how runs are cut, on ray packets, or on what the caster did before.
+ * Without refinement packets of another width may find something else at an edge. */
+static void test_same_bytes(void **state)
+{
+    (void)state;
+    struct pose_knot knot[KNOTS];
+    struct cast_rig *rig = open_room(knot);
+    struct bvh *plain;
+    struct sh_err err;
+    expect_same_bytes(rig, 1, 1e-12);
+    if (bvh_create_other(rig->bvh, 1, NULL, &plain, &err) != 0) fail_msg("%s", err.text);
+    bvh_free(rig->bvh);
+    rig->setup.bvh = rig->bvh = plain;
+    expect_same_bytes(rig, 0, 1e-6);
     cast_rig_close(rig);
 }
 
