@@ -239,6 +239,8 @@ static void test_cast(void **state)
                  {{"plan.tolerance_m=0.001", "cast.refine=off"}, 1, 1, "forced by cast.refine; holds 0.001 m"},
                  {{"plan.tolerance_m=0.001", "signal.model=on"}, 0, 0, "signal, optics"},
                  {{"plan.tolerance_m=0.001", "beam.mode=rings"}, 0, 0, "sub-rays"},
+                 /* float's steps at 20 m are 2 um */
+                 {{"plan.tolerance_m=1e-6", "cast.refine=off"}, 1, 1, "forced by cast.refine; does not hold 1e-06 m"},
                  {{"plan.tolerance_m=1e-6", "cast.refine=auto"}, 0, 0, "surfaces are ordered in double"}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         const char *const args[] = {"plan",  config,          "--json", "--set",         "head.line_stop_deg=-20",
