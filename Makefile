@@ -172,7 +172,8 @@ $(BUILD)/tests/bench/chart_widths: tests/bench/chart_widths.c $(BUILD)/modules.a
 $(BUILD)/tests/bench/beam: tests/bench/beam.c tests/accuracy/beam_reference.c $(BUILD)/modules.a
 CHARTS = $(BUILD)/tests/bench/chart $(BUILD)/tests/bench/chart_georef $(BUILD)/tests/bench/chart_widths $(BUILD)/tests/bench/beam
 $(BUILD)/tests/bench/plain: tests/bench/plain.c $(BUILD)/modules.a
-$(CHARTS) $(BUILD)/tests/bench/plain:
+$(BUILD)/tests/bench/refine: tests/bench/refine.c $(BUILD)/modules.a
+$(CHARTS) $(BUILD)/tests/bench/plain $(BUILD)/tests/bench/refine:
 	@mkdir -p $(@D)
 	@echo "  CHART $@"
 	$(Q)$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -o $@ $^ $(LDLIBS)
@@ -180,6 +181,10 @@ $(CHARTS) $(BUILD)/tests/bench/plain:
 bench-beam: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/beam
 	@$(BUILD)/tests/bench/beam house wires foliage leaves
+# Exact planes and the decision of doubtful hits, by rays without.
+bench-refine: deps-build
+	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/refine
+	@$(BUILD)/tests/bench/refine house 100k 1M
 # Effects that are named and not needed: by the plain cast, within 5 %.
 bench-plain: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/plain
@@ -195,7 +200,7 @@ chart: deps-build
 	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)'" tests/bench/chart.gp
 objects: $(EVERYTHING)
 test-unit-programs: $(UNIT)
-test-programs: all $(TESTS) $(CHARTS) $(BUILD)/tests/bench/plain
+test-programs: all $(TESTS) $(CHARTS) $(BUILD)/tests/bench/plain $(BUILD)/tests/bench/refine
 
 install: all
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib $(DESTDIR)$(PREFIX)/include $(DESTDIR)$(HEADS_DIR) \
@@ -213,6 +218,6 @@ format:
 clean:
 	rm -rf $(BUILD)
 .PHONY: ALWAYS all deps deps-test deps-build deps-guest demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb \
-	test-usb-million objects test-unit-programs test-programs bench bench-beam bench-plain chart install format clean
+	test-usb-million objects test-unit-programs test-programs bench bench-beam bench-plain bench-refine chart install format clean
 .SECONDARY:
 -include $(shell find $(BUILD) -type f -name '*.d' 2>/dev/null)

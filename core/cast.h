@@ -1,6 +1,7 @@
 /* Casting: a run of pulses -> echoes. Embree proposes a triangle from float rays in packets of the machine's native
  * width; the range comes from the triangle's plane in double, kept beside the BVH, and where the ray passes so near to
- * a triangle's border that float can't be trusted, the triangle is chosen again in double.
+ * a triangle's border that float can't be trusted, the triangle is chosen again in double. On a plain BVH Embree's hits
+ * stand as they are.
  *
  * Frames: the BVH is built in a local frame (prcs minus origin_m), where float is safe; the station is a point of it.
  * Ray packets are SCHEDULE_PACKET pulses, cut by pulse number. On a moving platform each pulse has its own origin and
@@ -32,6 +33,15 @@ struct bvh_info {
  * decided again. Built with `threads` threads (0: all). */
 int bvh_create(const struct scene *scene, const double origin_m[3], double station_reach_m, unsigned threads,
                const struct sh_report *report, struct bvh **out, struct sh_err *err);
+/* A BVH of float alone, for speed: what Embree finds stands as it is, and nothing is decided again. Less memory, too.
+ * For single rays, bodies that move included; not for beam, cast_detect, cast_outlines or bvh_order_exactly, which need
+ * the planes. How far off it is: core/cast/bvh.h. Hits may differ from one width of packets to another.
+ */
+int bvh_create_plain(const struct scene *scene, const double origin_m[3], double station_reach_m, unsigned threads,
+                     const struct sh_report *report, struct bvh **out, struct sh_err *err);
+/* Of the same scene, with the same origin and reach: the other kind, plain of one that is not. */
+int bvh_create_other(const struct bvh *bvh, unsigned threads, const struct sh_report *report, struct bvh **out,
+                     struct sh_err *err);
 void bvh_free(struct bvh *bvh);
 
 /* Orders surfaces in double where they overlap, cross, or lie behind each other within float's resolution: their labels
@@ -154,9 +164,10 @@ uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, cons
 
 enum { CAST_NO_TRIANGLE = 0xffffffff };
 
-/* Exact hits of n rays from the station: unit directions in prcs -> range along the ray (NaN where it meets nothing)
- * and triangle of the scene (CAST_NO_TRIANGLE). The station lies within the BVH's station_reach_m; hits beyond
- * range_max_m may or may not be told. Range error: see tests/accuracy. Allocates nothing. */
+/* Exact hits (a plain BVH: Embree's) of n rays from the station: unit directions in prcs -> range along the ray (NaN
+ * where it meets nothing) and triangle of the scene (CAST_NO_TRIANGLE). The station lies within the BVH's
+ * station_reach_m; hits beyond range_max_m may or may not be told. Range error: see tests/accuracy. Allocates nothing.
+ */
 void caster_hits(struct caster *caster, const struct bvh *bvh, const double station_m[3], double range_max_m,
                  uint32_t n, const double *dx, const double *dy, const double *dz, double *range_m, uint32_t *triangle);
 

@@ -17,19 +17,22 @@ static const char HELP[] =
     "  --set KEY=VALUE  another value of a configuration key\n\n"
     "Of each stage the cheapest method is used whose bounds hold plan.tolerance_m (root mean square of the ranges) "
     "and\n"
-    "plan.echo_tolerance (share of the pulses with another number of echoes), unless beam.mode, optics.depth,\n"
+    "plan.echo_tolerance (share of the pulses with another number of echoes), unless cast.refine, beam.mode, "
+    "optics.depth,\n"
     "scene.order_exactly or output.georef force one. Beam and optics are tried on some thousands of the head's own "
     "pulses\n"
     "in the scene, always the same ones, against 1,027 sub-rays, or the deepest way; bounds are upper limits of what "
     "was\n"
-    "found, from up to four of the stations, for the settings at power-up. georef is planned for each station, from "
-    "output.crs, output.tolerance_m, the scene's extent and the "
-    "head's\n"
-    "range_max_m; one row for all where they get the same method, else one each. A stage with the method none is left\n"
-    "out: nothing in the configuration asks for it. Costs count beyond a single ray: rounded figures of `make chart` "
-    "and\n"
-    "`make bench-beam` on one core with AVX2, to compare methods by; what hangs on the scene is measured by `make "
-    "bench`.\n";
+    "found, from up to four of the stations, for the settings at power-up. Single rays are not refined where\n"
+    "plan.tolerance_m is given and 32,768 pulses need no more than a tenth of both tolerances. georef is planned for "
+    "each\n"
+    "station, from output.crs, output.tolerance_m, the scene's extent and the head's range_max_m; one row for all "
+    "where\n"
+    "they get the same method, else one each. A stage with the method none is left out: nothing in the configuration "
+    "asks\n"
+    "for it. Costs count beyond a single ray: rounded figures of `make chart`, `make bench-refine` and `make "
+    "bench-beam` on\n"
+    "one core with AVX2, to compare methods by; what hangs on the scene is measured by `make bench`.\n";
 
 enum { OPT_JSON = 256 };
 static const struct option OPTIONS[] = {{"set", required_argument, NULL, 's'},

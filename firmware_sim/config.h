@@ -160,7 +160,7 @@ struct config_instrument {
     double range_offset_m, range_scale_ppm;
 };
 
-enum config_order { ORDER_AUTO, ORDER_OFF, ORDER_ON, ORDER_FALSE, ORDER_TRUE };
+enum config_choice { CHOICE_AUTO, CHOICE_OFF, CHOICE_ON, CHOICE_FALSE, CHOICE_TRUE };
 
 struct config {
     char file[CONFIG_PATH_LEN];
@@ -173,7 +173,7 @@ struct config {
     struct config_mesh mesh[CONFIG_MAX_MESHES];
     uint32_t n_meshes;
     double scene_tolerance_m;
-    enum config_order
+    enum config_choice
         order_exactly; /* surfaces that overlap are ordered in double; auto, off or on once it is loaded */
     struct config_anchor anchor;
     /* stations */
@@ -197,8 +197,11 @@ struct config {
     enum beam_mode beam_mode;
     int measures; /* no key: `plan` casts footprints to measure what a forced beam is off, be it single rays */
     uint32_t beam_rings;
+    /* cast */
+    enum config_choice refine; /* auto, off or on once it is loaded */
     /* plan */
     double plan_tolerance_m, echo_tolerance;
+    int plan_tolerance_given; /* 0: the default */
     /* noise */
     enum config_range_noise noise_range; /* off, on or signal once it is loaded */
     int noise_angle;

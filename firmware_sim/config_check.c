@@ -112,13 +112,20 @@ static int check_names(const struct cfg_reader *rd, struct config *cfg)
     return SH_OK;
 }
 
+static void tidy_choice(enum config_choice *choice)
+{
+    if (*choice == CHOICE_FALSE) *choice = CHOICE_OFF;
+    if (*choice == CHOICE_TRUE) *choice = CHOICE_ON;
+}
+
 static int check_output(const struct cfg_reader *rd, struct config *cfg)
 {
     cfg->layout_given = cfg_is_given(rd, "output.layout", 0);
     if (!cfg_is_given(rd, "output.tolerance_m", 0)) cfg->tolerance_m = fmax(1e-7, 1e-3 * cfg->plan_tolerance_m);
     cfg->optics_depth_given = cfg_is_given(rd, "optics.depth", 0);
-    if (cfg->order_exactly == ORDER_FALSE) cfg->order_exactly = ORDER_OFF;
-    if (cfg->order_exactly == ORDER_TRUE) cfg->order_exactly = ORDER_ON;
+    cfg->plan_tolerance_given = cfg_is_given(rd, "plan.tolerance_m", 0);
+    tidy_choice(&cfg->order_exactly);
+    tidy_choice(&cfg->refine);
     if (cfg->utm_zone != 0 && cfg->crs != GEOREF_UTM)
         return cfg_fail_key(rd, "output.utm_zone", 0, "a zone, but output.crs is not utm; allowed only with crs: utm");
     if (cfg->heights == HEIGHTS_GEOID && cfg->crs != GEOREF_UTM && cfg->crs != GEOREF_GEODETIC)
@@ -315,6 +322,18 @@ static int check_beam(const struct cfg_reader *rd, const struct config *cfg)
     return SH_OK;
 }
 
+/* Embree's own hits have no planes to go on with. */
+static int check_cast(const struct cfg_reader *rd, const struct config *cfg)
+{
+    if (cfg->refine != CHOICE_OFF) return SH_OK;
+    if (cfg->beam_mode != BEAM_SINGLE)
+        return cfg_fail_key(rd, "cast.refine", 0,
+                            "off, but footprints need exact planes; allowed with beam.mode: single");
+    if (cfg->order_exactly == CHOICE_ON)
+        return cfg_fail_key(rd, "cast.refine", 0, "off, but scene.order_exactly is on; allowed one of them");
+    return SH_OK;
+}
+
 static int check_loop(const struct cfg_reader *rd, const struct config *cfg)
 {
     if (fmod(1e9, cfg->tick_hz) == 0.0 && floor(cfg->tick_hz) == cfg->tick_hz) return SH_OK;
@@ -362,6 +381,7 @@ int cfg_check(const struct cfg_reader *rd, struct config *cfg)
     for (uint32_t i = 0; i < cfg->n_links && code == SH_OK; i++)
         code = check_link(rd, cfg, i);
     if (code == SH_OK) code = check_beam(rd, cfg);
+    if (code == SH_OK) code = check_cast(rd, cfg);
     if (code == SH_OK) code = check_pulse_width(rd, cfg);
     if (code == SH_OK) code = check_loop(rd, cfg);
     if (code == SH_OK) code = check_time(rd, cfg);

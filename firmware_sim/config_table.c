@@ -52,8 +52,8 @@ static const char *const platform_names[] = {[PLATFORM_STATIC] = "static",
 static const char *const range_noise_names[] = {
     [RANGE_NOISE_OFF] = "off",     [RANGE_NOISE_ON] = "on",     [RANGE_NOISE_SIGNAL] = "signal",
     [RANGE_NOISE_FALSE] = "false", [RANGE_NOISE_TRUE] = "true", NULL};
-static const char *const order_names[] = {[ORDER_AUTO] = "auto",   [ORDER_OFF] = "off",   [ORDER_ON] = "on",
-                                          [ORDER_FALSE] = "false", [ORDER_TRUE] = "true", NULL};
+static const char *const choice_names[] = {[CHOICE_AUTO] = "auto",   [CHOICE_OFF] = "off",   [CHOICE_ON] = "on",
+                                           [CHOICE_FALSE] = "false", [CHOICE_TRUE] = "true", NULL};
 static const char *const axes_names[] = {"scene", "beam", NULL};
 static const char *const detection_names[] = {"noisy", "sharp", NULL};
 static const char *const ambiguity_names[] = {
@@ -99,7 +99,7 @@ static const struct cfg_key config_keys[] = {
     {"scene", CFG_MAP, .help = "What is scanned."},
     {"scene.tolerance_m", CFG_REAL, "m", "1e-6", 1e-9, 1, IN_CONFIG(scene_tolerance_m),
      .help = "What a vertex may be off: a mesh format of single precision with larger coordinates is refused."},
-    {"scene.order_exactly", CFG_ENUM, .def = "auto", .names = order_names, IN_CONFIG(order_exactly),
+    {"scene.order_exactly", CFG_ENUM, .def = "auto", .names = choice_names, IN_CONFIG(order_exactly),
      .allowed = "auto, on or off",
      .help = "Order surfaces that overlap or cross in double; costs loading time, and speed where they do. auto: where "
              "float's resolution in the scene is coarser than plan.tolerance_m."},
@@ -258,10 +258,19 @@ static const struct cfg_key config_keys[] = {
     {"beam.echoes", CFG_ENUM, .def = "all", .names = echoes_names, IN_CONFIG(settings.echoes),
      .help = "Which echoes of a pulse are sent, also of glass and what is behind: all, first, last, strongest."},
 
+    {"cast", CFG_MAP, .help = "How a ray finds what it meets."},
+    {"cast.refine", CFG_ENUM, .def = "auto", .names = choice_names, IN_CONFIG(refine), .allowed = "auto, on or off",
+     .help = "on: range and triangle in double where float can't tell, within a micrometre. off: as Embree has them, faster: "
+             "ranges off by some 1e-7 of themselves over the cosine of the incidence, now and then another surface beside an "
+             "edge, a stream that may differ between CPUs with other packets of rays; for single rays without signal, optics, "
+             "ambiguity, instrument errors, angle or ball noise. auto: off where plan.tolerance_m is given and a tenth of it "
+             "is enough, as `scanhead plan` says."},
+
     {"plan", CFG_MAP, .help = "What the methods of all stages may be off; each stage takes the cheapest that holds it "
                               "(`scanhead plan`)."},
     {"plan.tolerance_m", CFG_REAL, "m", "1e-3", 1e-6, 1, IN_CONFIG(plan_tolerance_m),
-     .help = "Echo ranges against a footprint of 1,000 sub-rays, root mean square."},
+     .help = "Echo ranges against a footprint of 1,000 sub-rays, root mean square. Where it is given, a tenth of it may be "
+             "what rays that are not refined are off (cast.refine)."},
     {"plan.echo_tolerance", CFG_REAL, NULL, "1e-3", 1e-4, 1, IN_CONFIG(echo_tolerance),
      .help = "Share of the pulses that may have another number of echoes than with 1,000 sub-rays; 1e-3 is what the "
              "plan's sample can tell."},

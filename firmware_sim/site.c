@@ -49,7 +49,7 @@ static int add_mover(struct site *site, const struct config_mesh *mesh, const st
         half2 += half * half;
     }
     m->radius_m = sqrt(half2) * (1.0 + 1e-9) + 1e-6;
-    return bvh_create(m->scene, m->centre_m, cfg->profile.range_max_m, cfg->threads, report, &m->bvh, err);
+    return site_build_bvh(site, m->scene, m->centre_m, cfg->profile.range_max_m, report, &m->bvh, err);
 }
 
 static int load_scene(struct site *site, const struct sh_report *report, struct sh_err *err)
@@ -147,10 +147,10 @@ static int find_bvh(struct site *site, const double station_m[3], const struct s
     if (site->n_bvh == CONFIG_MAX_STATIONS)
         return sh_fail(err, SH_EINPUT, "%s: the stations are too far apart; allowed %d groups of %.0f m across",
                        site->cfg->file, CONFIG_MAX_STATIONS, 2.0 * SITE_BVH_REACH_M);
-    int rc = bvh_create(site->scene, station_m, station_reach(site, station_m), site->cfg->threads, report, out, err);
-    if (rc != SH_OK) return rc;
-    site->bvh[site->n_bvh++] = *out;
-    return site->plan.methods.order_exactly ? bvh_order_exactly(*out, err) : SH_OK;
+    *out = NULL;
+    int rc = site_build_bvh(site, site->scene, station_m, station_reach(site, station_m), report, out, err);
+    if (*out != NULL) site->bvh[site->n_bvh++] = *out;
+    return rc;
 }
 
 /* All places are known before the first BVH is built. */
@@ -222,6 +222,7 @@ int site_load(const struct config *cfg, const struct sh_report *report, struct s
     if (rc == SH_OK) rc = placement_find_anchor(cfg, report, &site->anchor, err);
     if (rc == SH_OK) rc = load_scene(site, report, err);
     if (rc == SH_OK) rc = site_set_up_detect(site, report, err);
+    if (rc == SH_OK) rc = site_check_cast(site, err);
     if (rc == SH_OK) rc = place_stations(site, err);
     if (rc == SH_OK) rc = site_plan_order(site, err);
     if (rc == SH_OK && site->moving) rc = site_load_platform(site, report, err);

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "firmware_sim/site_detect.h"
+#include "firmware_sim/site_look.h"
 
 enum { MAX_PLACES = 4, FOOTPRINT_OPTIONS = 9 };
 
@@ -77,70 +78,24 @@ static int apply_beam(struct site *site, const struct sh_report *report, struct 
     return rc;
 }
 
-/* ---- looking at the scene */
+/* ---- the choice of a beam */
 
-struct look {
-    struct site *site;
-    struct plan_place place[MAX_PLACES];
-    struct at {
-        const struct site *site;
-        uint32_t station;
-    } at[MAX_PLACES];
-    uint32_t n;
-    struct plan_sample *sample;
-};
-
-static void enter(void *ctx, int64_t t_ns, struct cast_setup *setup)
-{
-    const struct at *at = ctx;
-    const struct site *site = at->site;
-    site_move(site, site_mover_time(site, at->station, 1e-9 * (double)t_ns), setup);
-    if (site->n_knots == 0) return;
-    site_enter(site, at->station, site_stretch_at(site, t_ns), setup);
-    setup->knot = site->knot;
-    setup->n_knots = (uint32_t)site->n_knots;
-}
-
-/* One frame; along a trajectory all of it. */
-static void fill_place(const struct site *site, struct at *at, struct plan_place *place)
-{
-    struct head_settings settings = site->cfg->settings;
-    struct schedule_spec spec;
-    if (settings.frames != 1) settings.frames = site->n_knots != 0 ? 0 : 1;
-    config_fill_spec(&site->cfg->profile, &settings, &spec);
-    *place = (struct plan_place){.beam = site->station[at->station].beam, .ctx = at};
-    schedule_start(&place->segment, &spec);
-    place->pulses = place->segment.end_pulse;
-    if (site->n_knots != 0)
-        place->pulses = schedule_pulse_at(&place->segment, site->knot[site->n_knots - 1].t_ns - site->knot[0].t_ns) + 1;
-    if (site->n_movers > 0 || site->n_knots != 0) place->enter = enter;
-    site_cast_setup(site, at->station, &place->setup);
-}
-
-/* Some of the stations, evenly. */
-static int open_look(struct look *look, struct site *site, int footprint, const struct sh_report *report,
-                     struct sh_err *err)
+/* Footprints for the stations that are looked at. */
+static int open_look(struct site_look *look, struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     int rc = SH_OK;
-    if (site->scene->n_triangles > 1000000) sh_progress(report, "trying methods on the scene", -1.0);
-    *look = (struct look){.site = site, .n = site->n_stations < MAX_PLACES ? site->n_stations : MAX_PLACES};
-    for (uint32_t i = 0; i < look->n && rc == SH_OK; i++) {
-        look->at[i] = (struct at){site, i * site->n_stations / look->n};
-        if (footprint) rc = make_beam(site, &site->station[look->at[i].station], 0, report, err);
-        fill_place(site, &look->at[i], &look->place[i]);
-    }
-    return rc == SH_OK ? plan_sample_create(look->place, look->n, &look->sample, err) : rc;
+    for (uint32_t i = 0; i < site_look_count(site, MAX_PLACES) && rc == SH_OK; i++)
+        rc = make_beam(site, &site->station[site_look_station(site, MAX_PLACES, i)], 0, report, err);
+    return rc == SH_OK ? site_look_open(look, site, MAX_PLACES, report, err) : rc;
 }
 
-static int add_outlines(const struct look *look, const struct sh_report *report, struct sh_err *err)
+static int add_outlines(const struct site_look *look, const struct sh_report *report, struct sh_err *err)
 {
     int rc = SH_OK;
     for (uint32_t i = 0; i < look->n && rc == SH_OK; i++)
         rc = make_beam(look->site, &look->site->station[look->at[i].station], 1, report, err);
     return rc;
 }
-
-/* ---- the choice of a beam */
 
 struct beam_choice {
     enum beam_mode mode;
@@ -167,7 +122,7 @@ static void list_beams(const struct site *site, struct beam_choice *choice, stru
 
 /* Measures what can be had, up to what costs more than one that holds. Outlines take time to find, and only the
  * adaptive beam needs them. Returns whether one holds. */
-static int measure_beams(struct look *look, const struct beam_choice *choice, struct plan_option *option,
+static int measure_beams(struct site_look *look, const struct beam_choice *choice, struct plan_option *option,
                          const struct sh_report *report, struct sh_err *err, int *holds)
 {
     const struct plan_tolerance tolerance = tolerance_of(look->site);
@@ -191,13 +146,13 @@ static int measure_beams(struct look *look, const struct beam_choice *choice, st
 static int try_beams(struct site *site, const struct beam_choice *choice, struct plan_option *option,
                      const struct sh_report *report, struct sh_err *err)
 {
-    struct look look = {0};
-    int holds = 0, rc = open_look(&look, site, 1, report, err);
+    struct site_look look = {0};
+    int holds = 0, rc = open_look(&look, site, report, err);
     if (rc == SH_OK) rc = measure_beams(&look, choice, option, report, err, &holds);
     if (rc == SH_OK && !holds)
         sh_warn(report, "%s: beam.mode: auto: no beam holds plan.tolerance_m and plan.echo_tolerance here",
                 site->cfg->file);
-    plan_sample_free(look.sample);
+    site_look_close(&look);
     return rc;
 }
 
@@ -221,13 +176,13 @@ static int force_beam(struct site *site, int measure, const struct sh_report *re
     const struct config *cfg = site->cfg;
     const struct plan_tolerance tolerance = tolerance_of(site);
     struct plan_option option;
-    struct look look = {0};
+    struct site_look look = {0};
     plan_beam_option(cfg->beam_mode, cfg->beam_rings, &option);
     if (measure && no_footprint(site) == NULL) {
-        int rc = open_look(&look, site, 1, report, err);
+        int rc = open_look(&look, site, report, err);
         if (rc == SH_OK && cfg->beam_mode == BEAM_ADAPTIVE) rc = add_outlines(&look, report, err);
         if (rc == SH_OK) plan_sample_beam(look.sample, cfg->beam_mode, cfg->beam_rings, &option);
-        plan_sample_free(look.sample);
+        site_look_close(&look);
         if (rc != SH_OK) return rc;
     }
     site->plan.methods.beam = cfg->beam_mode;
@@ -243,7 +198,7 @@ static int choose_optics(struct site *site, int measure, const struct sh_report 
     const struct config *cfg = site->cfg;
     const struct plan_tolerance tolerance = tolerance_of(site);
     struct plan_option option[CAST_MAX_DEPTH + 1];
-    struct look look = {0};
+    struct site_look look = {0};
     int forced = cfg->optics_depth_given ? (int)cfg->optics_depth : -1, holds = 0;
     if (!site->detect.surfaces.has_optics) {
         plan_say(&site->plan.optics, "optics", "none", 0.0, 0.0,
@@ -251,8 +206,11 @@ static int choose_optics(struct site *site, int measure, const struct sh_report 
         return SH_OK;
     }
     if (forced < 0 || measure) {
-        int rc = open_look(&look, site, 0, report, err);
-        if (rc != SH_OK) return rc;
+        int rc = site_look_open(&look, site, MAX_PLACES, report, err);
+        if (rc != SH_OK) {
+            site_look_close(&look);
+            return rc;
+        }
     }
     for (uint32_t d = 0; d <= CAST_MAX_DEPTH; d++) {
         option[d] = (struct plan_option){
@@ -262,7 +220,7 @@ static int choose_optics(struct site *site, int measure, const struct sh_report 
         plan_sample_optics(look.sample, d, &option[d]);
         holds = forced < 0 && plan_holds(&option[d], &tolerance);
     }
-    plan_sample_free(look.sample);
+    site_look_close(&look);
     site->plan.methods.depth =
         plan_choose(&site->plan.optics, "optics", option, CAST_MAX_DEPTH + 1, forced, "optics.depth", &tolerance);
     if (forced < 0 && site->plan.methods.depth == 0)
@@ -283,7 +241,7 @@ int site_choose_methods(struct site *site, const struct sh_report *report, struc
         rc = site->cfg->beam_mode == BEAM_AUTO ? choose_beam(site, report, err) : force_beam(site, 0, report, err);
     if (rc == SH_OK) rc = apply_beam(site, report, err);
     if (rc == SH_OK) site_set_depth(site, site->plan.methods.depth);
-    return rc;
+    return rc == SH_OK ? site_choose_cast(site, 0, report, err) : rc;
 }
 
 int site_measure_forced(struct site *site, const struct sh_report *report, struct sh_err *err)
@@ -291,5 +249,6 @@ int site_measure_forced(struct site *site, const struct sh_report *report, struc
     int rc = SH_OK;
     if (site->plan.optics.forced) rc = choose_optics(site, 1, report, err);
     if (rc == SH_OK && site->plan.beam.forced) rc = force_beam(site, 1, report, err);
-    return rc == SH_OK ? apply_beam(site, report, err) : rc;
+    if (rc == SH_OK) rc = apply_beam(site, report, err);
+    return rc == SH_OK ? site_choose_cast(site, 1, report, err) : rc;
 }

@@ -34,11 +34,12 @@ static double farthest_m(const struct site *site)
 int site_plan_order(struct site *site, struct sh_err *err)
 {
     const struct plan_tolerance tolerance = tolerance_of(site);
-    const enum config_order asked = site->cfg->order_exactly;
+    const enum config_choice asked = site->cfg->order_exactly;
     struct plan_option option[2];
     struct plan_row *row = &site->plan.order;
     plan_order_options(farthest_m(site), option);
-    int forced = asked == ORDER_AUTO ? -1 : asked == ORDER_ON;
+    if (site->cfg->refine == CHOICE_OFF) snprintf(option[1].why_not, sizeof option[1].why_not, "cast.refine is off");
+    int forced = asked == CHOICE_AUTO ? -1 : asked == CHOICE_ON;
     site->plan.methods.order_exactly =
         (int)plan_choose(row, "order", option, 2, forced, "scene.order_exactly", &tolerance);
     size_t used = strlen(row->why);
@@ -91,10 +92,8 @@ static int is_zero(const struct config_instrument *k)
 static void ask_head(const struct site *site, struct plan_head *head)
 {
     const struct config *cfg = site->cfg;
-    struct bvh_info info;
-    bvh_get_info(site->station[0].bvh, &info);
     *head = (struct plan_head){
-        .packet = info.packet,
+        .cast_error_m = site->plan.cast.error_m,
         .n_movers = site->n_movers,
         .noise_on = cfg->noise_range != RANGE_NOISE_OFF,
         .range_sigma_m = cfg->profile.range_sigma_m,
@@ -122,13 +121,14 @@ int site_plan_rows(struct site *site, const struct sh_report *report, struct sh_
     ask_head(site, &head);
     size_t n = plan_head(&head, of_head);
     free(plan->row);
-    plan->row = calloc(n + 4 + site->n_stations, sizeof *plan->row);
+    plan->row = calloc(n + 5 + site->n_stations, sizeof *plan->row);
     if (plan->row == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     plan->n = 0;
+    plan->row[plan->n++] = plan->cast;
+    plan->row[plan->n++] = plan->order;
     for (size_t i = 0; i < n; i++) {
         plan->row[plan->n++] = of_head[i];
-        if (i == 0) plan->row[plan->n++] = plan->order; /* behind the cast */
-        if (i != 1) continue;                           /* behind what moves */
+        if (i != 0) continue; /* behind what moves */
         plan->row[plan->n++] = plan->beam;
         plan->row[plan->n++] = plan->optics;
     }
@@ -143,6 +143,6 @@ void site_plan_text(const struct site *site, char *text, size_t room)
 {
     const struct site_plan *plan = &site->plan;
     int polar = site->cfg->layout == LINE_POLAR;
-    snprintf(text, room, "order %s; beam %s; optics %s; georef %s", plan->order.method, plan->beam.method,
-             plan->optics.method, polar ? "none" : site->station[0].plan.method);
+    snprintf(text, room, "cast %s; order %s; beam %s; optics %s; georef %s", plan->methods.plain ? "float" : "refined",
+             plan->order.method, plan->beam.method, plan->optics.method, polar ? "none" : site->station[0].plan.method);
 }

@@ -1,5 +1,6 @@
 /* The path of a moving head: its poses, and BVHs along it. */
 #include "firmware_sim/site_detect.h"
+#include "firmware_sim/site_choose.h"
 #include "firmware_sim/site_platform.h"
 
 #include <math.h>
@@ -91,13 +92,13 @@ static int add_stretch(struct site *site, const double centre_m[3], double reach
     if (more == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the path");
     site->stretch = more;
     struct bvh **bvh = &site->bvh[site->n_bvh];
-    int rc = bvh_create(site->scene, centre_m, reach_m, site->cfg->threads, report, bvh, err);
+    int rc = site_build_bvh(site, site->scene, centre_m, reach_m, report, bvh, err);
+    if (*bvh != NULL) site->n_bvh++;
     if (rc != SH_OK) return rc;
-    site->n_bvh++;
     struct site_stretch *stretch = &site->stretch[site->n_stretches++];
     *stretch = (struct site_stretch){.until_ns = until_ns, .bvh = *bvh, .reach_m = reach_m};
     memcpy(stretch->centre_m, centre_m, sizeof stretch->centre_m);
-    return site->plan.methods.order_exactly ? bvh_order_exactly(*bvh, err) : SH_OK;
+    return SH_OK;
 }
 
 /* A stretch ends between two poses, and the head goes on for up to a millisecond, which 100 ms cover. */

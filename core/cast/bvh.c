@@ -47,8 +47,8 @@ static double seconds(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-int bvh_create(const struct scene *scene, const double origin_m[3], double station_reach_m, unsigned threads,
-               const struct sh_report *report, struct bvh **out, struct sh_err *err)
+static int create(const struct scene *scene, const double origin_m[3], double station_reach_m, unsigned threads,
+                  int plain, const struct sh_report *report, struct bvh **out, struct sh_err *err)
 {
     *out = NULL;
     struct bvh *bvh = calloc(1, sizeof *bvh);
@@ -56,6 +56,7 @@ int bvh_create(const struct scene *scene, const double origin_m[3], double stati
     char config[32] = "";
     if (threads != 0) snprintf(config, sizeof config, "threads=%u", threads);
     bvh->scene = scene;
+    bvh->plain = plain;
     bvh->station_reach_m = station_reach_m;
     for (int i = 0; i < 3; i++)
         bvh->origin_m[i] = origin_m[i];
@@ -74,9 +75,28 @@ int bvh_create(const struct scene *scene, const double origin_m[3], double stati
     }
     bvh->info.packet = native_packet(bvh->device);
     bvh->info.build_s = seconds() - start;
-    bvh->info.bytes = (uint64_t)bvh->bytes + (uint64_t)scene->n_triangles * sizeof *bvh->triangle;
+    bvh->info.bytes = (uint64_t)bvh->bytes;
+    if (!plain) bvh->info.bytes += (uint64_t)scene->n_triangles * sizeof *bvh->triangle;
     *out = bvh;
     return SH_OK;
+}
+
+int bvh_create(const struct scene *scene, const double origin_m[3], double station_reach_m, unsigned threads,
+               const struct sh_report *report, struct bvh **out, struct sh_err *err)
+{
+    return create(scene, origin_m, station_reach_m, threads, 0, report, out, err);
+}
+
+int bvh_create_plain(const struct scene *scene, const double origin_m[3], double station_reach_m, unsigned threads,
+                     const struct sh_report *report, struct bvh **out, struct sh_err *err)
+{
+    return create(scene, origin_m, station_reach_m, threads, 1, report, out, err);
+}
+
+int bvh_create_other(const struct bvh *bvh, unsigned threads, const struct sh_report *report, struct bvh **out,
+                     struct sh_err *err)
+{
+    return create(bvh->scene, bvh->origin_m, bvh->station_reach_m, threads, !bvh->plain, report, out, err);
 }
 
 void bvh_free(struct bvh *bvh)

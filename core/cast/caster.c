@@ -125,6 +125,11 @@ static void cast_rays(struct caster *c, struct decide_ray *ray, struct bvh_rays 
     caster_ends(c, CAST_DIRECTIONS);
     bvh_intersect(bvh, from->px != NULL ? &c->placed : &c->packets, rays, n);
     caster_ends(c, CAST_EMBREE);
+    if (bvh->plain) {
+        kernel_plain(bvh, c->prim, c->t, n, hits->range_m, hits->label);
+        caster_ends(c, CAST_REFINE);
+        return;
+    }
     uint32_t doubts = from->px != NULL ? kernel_refine_from(bvh, hits, m->ox, m->oy, m->oz, n)
                                        : kernel_refine(bvh, hits, ray->o_local, n);
     caster_ends(c, CAST_REFINE);
@@ -142,7 +147,7 @@ void caster_hits_from(struct caster *c, const struct bvh *bvh, const struct orig
                             .dy = c->fy,
                             .dz = c->fz,
                             .t = c->t,
-                            .u = c->u,
+                            .u = bvh->plain ? NULL : c->u,
                             .v = c->v,
                             .prim = c->prim};
     set_origin(&ray, from->at_m[0], from->at_m[1], from->at_m[2]);

@@ -193,6 +193,22 @@ uint32_t kernel_refine_from(const struct bvh *bvh, const struct kernel_hits *hit
 }
 
 VEC_CLONES
+static void plain(const uint16_t *restrict label_of, uint32_t n_triangles, const uint32_t *restrict prim,
+                  const float *restrict t, uint32_t n, double *restrict range_m, uint32_t *restrict label)
+{
+    for (uint32_t i = 0; i < n; i++)
+        range_m[i] = prim[i] < n_triangles ? (double)t[i] : (double)NAN;
+    for (uint32_t i = 0; i < n; i++)
+        label[i] = prim[i] < n_triangles ? label_of[prim[i]] : (uint32_t)LINE_LABEL_NONE;
+}
+
+void kernel_plain(const struct bvh *bvh, const uint32_t *prim, const float *t, uint32_t n, double *range_m,
+                  uint32_t *label)
+{
+    plain(bvh->scene->label, bvh->scene->n_triangles, prim, t, n, range_m, label);
+}
+
+VEC_CLONES
 static void cosines(const double *restrict tri, uint32_t n_triangles, const uint32_t *restrict hit,
                     const double *restrict dx, const double *restrict dy, const double *restrict dz, uint32_t n,
                     double *restrict cosine)

@@ -33,6 +33,10 @@ uint32_t kernel_refine(const struct bvh *bvh, const struct kernel_hits *hits, co
 uint32_t kernel_refine_from(const struct bvh *bvh, const struct kernel_hits *hits, const double *ox, const double *oy,
                             const double *oz, uint32_t n);
 
+/* What Embree proposed as it is: range NaN and label LINE_LABEL_NONE for a miss. */
+void kernel_plain(const struct bvh *bvh, const uint32_t *prim, const float *t, uint32_t n, double *range_m,
+                  uint32_t *label);
+
 /* Cosine of the incidence on the triangles that were hit, 0..1; NaN for none. */
 void kernel_cosines(const struct bvh *bvh, const uint32_t *hit, const double *dx, const double *dy, const double *dz,
                     uint32_t n, double *cosine);

@@ -109,13 +109,14 @@ static inline __attribute__((always_inline)) void copy(void *to, const void *fro
                 one_by_one_##W(bvh, &packet[p], n);                                                                \
             else                                                                                                   \
                 PACKET_CALL(W, valid, bvh->rtc, &context, &packet[p]);                                             \
-            if (p > 0) prefetch_##W(bvh, &packet[p - 1]);                                                          \
+            if (p > 0 && rays->u != NULL) prefetch_##W(bvh, &packet[p - 1]);                                       \
         }                                                                                                          \
-        prefetch_##W(bvh, &packet[packets - 1]);                                                                   \
+        if (rays->u != NULL) prefetch_##W(bvh, &packet[packets - 1]);                                              \
         for (uint32_t p = 0; p < packets; p++) {                                                                   \
             const uint32_t n = first[p + 1] - first[p];                                                            \
             copy(rays->prim + first[p], packet[p].hit.primID, first[p], n, W);                                     \
             copy(rays->t + first[p], packet[p].ray.tfar, first[p], n, W);                                          \
+            if (rays->u == NULL) continue;                                                                         \
             copy(rays->u + first[p], packet[p].hit.u, first[p], n, W);                                             \
             copy(rays->v + first[p], packet[p].hit.v, first[p], n, W);                                             \
         }                                                                                                          \
@@ -156,9 +157,10 @@ static void intersect_1(const struct bvh *bvh, const struct bvh_rays *rays, uint
                               rays->ox != NULL ? rays->oy[i] : rays->org[1],
                               rays->ox != NULL ? rays->oz[i] : rays->org[2]};
         bvh_intersect_one(bvh, own, dir, &one);
-        __builtin_prefetch(&bvh->triangle[one.prim < last ? one.prim : last], 0, 2);
         rays->prim[i] = one.prim;
         rays->t[i] = one.t;
+        if (rays->u == NULL) continue;
+        __builtin_prefetch(&bvh->triangle[one.prim < last ? one.prim : last], 0, 2);
         rays->u[i] = one.u;
         rays->v[i] = one.v;
     }

@@ -24,8 +24,6 @@ static struct plan_row *add(struct plan_row *row, const char *stage, const char 
 
 /* Within how much of the range float can't tell two surfaces apart. */
 static const double FLOAT_ORDER = 5e-7;
-/* What the cast promises for incidence up to 89.9 degrees; tests/stability holds it to that. */
-static const double CAST_ERROR_M = 1e-6;
 
 void plan_order_options(double far_m, struct plan_option option[2])
 {
@@ -75,26 +73,11 @@ static struct plan_row *plan_noise(struct plan_row *row, const struct plan_head 
     return add(row, "ball", "uniform in a ball", 0.0, 130.0, why);
 }
 
-/* A way to cast that has no bound. */
-static void leave_out(struct plan_row *row, const char *method, double cost_ns, const char *why)
-{
-    struct plan_option *left = &row->left[row->n_left++];
-    *left = (struct plan_option){.error_m = (double)NAN, .echo_share = (double)NAN, .cost_ns = cost_ns};
-    snprintf(left->method, sizeof left->method, "%s", method);
-    snprintf(left->why_not, sizeof left->why_not, "no bound: %s (make chart)", why);
-}
-
 size_t plan_head(const struct plan_head *head, struct plan_row rows[PLAN_HEAD_ROWS])
 {
     struct plan_row *row = rows;
-    char method[32];
-    snprintf(method, sizeof method, "packets of %u, decided", head->packet);
-    row = add(row, "cast", method, CAST_ERROR_M, (double)NAN,
-              "the widest packets of this CPU; triangle and range in double where float can't tell; cost: make bench");
-    leave_out(row - 1, "float", -(PLAN_COST_REFINE + PLAN_COST_DECIDE), "at an edge it tells another surface, or none");
-    leave_out(row - 1, "refined", -PLAN_COST_DECIDE, "at an edge it tells another surface, or none");
     if (head->n_movers > 0)
-        row = add(row, "movers", "cast on their own", CAST_ERROR_M, (double)NAN, "meshes that move");
+        row = add(row, "movers", "cast on their own", head->cast_error_m, (double)NAN, "meshes that move");
     else
         row = add(row, "movers", "none", 0.0, 0.0, "no mesh moves");
     row = plan_signal(row, head);
