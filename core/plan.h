@@ -95,10 +95,10 @@ void plan_sample_beam(struct plan_sample *sample, enum beam_mode mode, uint32_t 
 void plan_sample_optics(struct plan_sample *sample, uint32_t depth, struct plan_option *option);
 
 /* What single rays on plain BVHs (bvh_create_plain) are off against those that are refined: `plain` are the sample's
- * places, but for that; nothing moves there, and there is no cast_detect. A pulse that something else answers, or
- * nothing, at a range more than most_m off, counts as one with another number of echoes: echo_share is the limit of 95
- * % of Poisson's distribution of what is found. error_m is of the others: three standard errors above the mean square,
- * and room for as many of most_m as may have been missed. */
+ * places, but for that; nothing moves there, and there is no cast_detect. A pulse that gets a range more than most_m
+ * off, or an echo more or less, counts as one with another number of echoes: echo_share is the limit of 95 percent of
+ * Poisson's distribution of what is found. error_m is of the others: three standard errors above the mean square, and
+ * room for as many of most_m as may have been missed. */
 void plan_sample_cast(struct plan_sample *sample, const struct plan_place *plain, double most_m,
                       struct plan_option *option);
 

@@ -6,7 +6,7 @@
 
 #include "firmware_sim/site_look.h"
 
-enum { MOST_TRIANGLES = 2000000 }; /* for two BVHs of each group of stations */
+enum { MOST_TRIANGLES = 1000000 }; /* a second BVH of so many takes a few seconds */
 
 /* Why plain BVHs can't be had; NULL: they can. With config_check's, the one place that says what they go with. */
 static const char *not_plain(const struct site *site)

@@ -22,14 +22,14 @@
  *
  * A plain BVH (bvh_create_plain) leaves all of that out; its triangles are wider by an eighth of the budget, so that
  * hardly a ray slips through a closed mesh. Away from borders it names the same triangle, and its range is off by at
- * most 2^-24 (16 F + L + 2.2 S) / cos,  S = a b max(a, b) / (2 A), in the units above: F the farthest corner from the
+ * most 2^-24 (17 F + L + 2.2 S) / cos,  S = a b max(a, b) / (2 A), in the units above: F the farthest corner from the
  * BVH's origin plus the ray's origin from there; L the longest edge, a and b the others, A the area; cos of the
  * incidence. What lies along the normal: a vertex is off by 1, C by 1.2, the ray's origin by 1 and its direction by 1,
- * T = N . C by 3 and den = N . D by 3, times F each; the stored edges by 1 times their length; and the plane is tilted
- * by what N = e1 x e2 is off by, 2.2 a b, against |N| = 2 A, at most max(a, b) from v0: little but for caps, whose
- * height is a small part of their length. Along the ray: the reciprocal and the products, 5, and the length of the
- * rounded direction, 1. At a silhouette a ray meets what it passes by less than an eighth of the width, and float's
- * error there.
+ * T = N . C by 3 and den = N . D by 3, times F each, 10.2 together; the stored edges by 1 times their length; and the
+ * plane is tilted by what N = e1 x e2 is off by, 2.2 a b, against |N| = 2 A, at most max(a, b) from v0: little but for
+ * caps, whose height is a small part of their length. Along the ray, times F again: the reciprocal and the products, 5,
+ * and the length of the rounded direction, 1. At a silhouette a ray meets what it passes by less than an eighth of the
+ * width, and float's error there.
  *
  * What float still decides is the order of two surfaces that lie within its resolution behind each other, about 5e-7 of
  * the range over the cosine of the incidence; unless bvh_order_exactly was called: then such rivals are known from the

@@ -53,7 +53,7 @@ static double bound_m(const struct bvh *bvh, uint32_t prim, const double station
     double area2 = sqrt(vec3_dot(n, n)), longest = fmax(length[0], fmax(length[1], length[2]));
     double between = fmax(fmin(length[0], length[1]), fmin(fmax(length[0], length[1]), length[2]));
     double shape = length[0] * length[1] * length[2] / longest * between / area2;
-    return 0x1p-24 * (16.0 * (far_m + sqrt(off2)) + longest + 2.2 * shape) * area2 / fabs(vec3_dot(n, dir));
+    return 0x1p-24 * (17.0 * (far_m + sqrt(off2)) + longest + 2.2 * shape) * area2 / fabs(vec3_dot(n, dir));
 }
 
 static void judge(const struct reference *reference, const struct bvh *exact, const double station_m[3],
