@@ -74,10 +74,8 @@ double beam_radius(const struct beam *beam, double range_m);
 double beam_plane_excess(const struct beam *beam, double range_m, double cosine);
 /* The same as a polynomial: range (term[0] x + term[1] x^2 + term[2] x^3), x = 1 / cos^2 of the incidence. */
 void beam_plane_series(const struct beam *beam, double term[3]);
-/* Standard deviation of the ranges there, to first order in s tan i: w(R) tan i times the standard deviation of rho cos
- * phi, the root of half the mean t. */
-double beam_plane_sigma(const struct beam *beam, double range_m, double cosine);
-/* Its square as (term[0] + term[1] range^2) (x - 1), x as above. */
+/* Variance of the ranges there, to first order in s tan i: that of rho cos phi, half the mean t, times w(R)^2 tan^2 i;
+ * as (term[0] + term[1] range^2) (x - 1), x as above. */
 void beam_plane_variance(const struct beam *beam, double term[2]);
 /* Width of an echo whose ranges vary so: pulse_m is the pulse's own, c tau / 2. */
 double beam_echo_width(double pulse_m, double variance_m2);

@@ -109,13 +109,6 @@ void beam_plane_variance(const struct beam *beam, double term[2])
     term[1] = 0.5 * mean_t() * beam->slope * beam->slope;
 }
 
-double beam_plane_sigma(const struct beam *beam, double range_m, double cosine)
-{
-    double term[2], x = 1.0 / fmax(cosine * cosine, 1e-12);
-    beam_plane_variance(beam, term);
-    return sqrt((term[0] + term[1] * range_m * range_m) * fmax(0.0, x - 1.0));
-}
-
 double beam_echo_width(double pulse_m, double variance_m2)
 {
     return variance_m2 == 0.0 ? pulse_m : sqrt(pulse_m * pulse_m + 8.0 * M_LN2 * variance_m2);

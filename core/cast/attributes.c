@@ -5,15 +5,15 @@
 #include "core/vec3.h"
 #include "core/vecmath.h"
 
-/* There and back, in units of 0.01 ns. */
-static const double CNS_PER_M = 2e11 / 299792458.0;
+/* There and back, in units of 0.01 ns. Floats hold all that is told: 16 bits. */
+static const float CNS_PER_M = (float)(2e11 / 299792458.0);
 
 VEC_CLONES
 static void widths(const float *restrict width_m, const uint8_t *restrict echo, uint32_t n, uint16_t *restrict out)
 {
     for (uint32_t i = 0; i < n; i++) {
-        double cns = (double)width_m[i] * CNS_PER_M + 0.5;
-        int32_t count = cns < (double)LINE_WIDTH_MOST ? (int32_t)cns : LINE_WIDTH_MOST;
+        float cns = width_m[i] * CNS_PER_M + 0.5f;
+        int32_t count = (int32_t)(cns < (float)LINE_WIDTH_MOST ? cns : (float)LINE_WIDTH_MOST); /* not-a-number: most */
         out[i] = (uint16_t)(echo[i] != 0 ? count : LINE_WIDTH_NONE);
     }
 }
@@ -50,14 +50,14 @@ void caster_pulse_attributes(const struct cast_setup *s, const struct line_block
 
 /* Beyond most the plane is along the beam. */
 VEC_CLONES
-static void plane_widths(double pulse2, double fixed, double per_range2, const float *restrict steep,
+static void plane_widths(float pulse2, float fixed, float per_range2, const float *restrict steep,
                          const double *restrict range_m, uint32_t n, float *restrict width_m)
 {
     const float most = 1e12f;
     for (uint32_t i = 0; i < n; i++) {
-        double x = (double)(steep[i] < most ? steep[i] : most) - 1.0;
-        x = x > 0.0 ? x : 0.0;
-        width_m[i] = (float)sqrt(pulse2 + (fixed + per_range2 * range_m[i] * range_m[i]) * x);
+        float x = (steep[i] < most ? steep[i] : most) - 1.0f, r = (float)range_m[i];
+        x = x > 0.0f ? x : 0.0f;
+        width_m[i] = sqrtf(pulse2 + (fixed + per_range2 * r * r) * x);
     }
 }
 
@@ -65,7 +65,8 @@ void caster_plane_widths(const struct beam *beam, const float *steep, const doub
 {
     double term[2], full = 8.0 * M_LN2;
     beam_plane_variance(beam, term);
-    plane_widths(beam->resolution_m * beam->resolution_m, full * term[0], full * term[1], steep, range_m, n, width_m);
+    plane_widths((float)(beam->resolution_m * beam->resolution_m), (float)(full * term[0]), (float)(full * term[1]),
+                 steep, range_m, n, width_m);
 }
 
 /* The sub-ray at (x, y) begins at exit_radius (x e1 + y e2), with slope (x e2 - y e1): how the range changes with x and
