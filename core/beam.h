@@ -17,16 +17,16 @@
  *
  * Returns of a pulse, one for each sub-ray that meets something, become echoes: sorted by range, a gap larger than the
  * range resolution (c tau / 2 of the pulse width tau) begins a new one. An echo's range is the energy-weighted mean of
- * its returns - with two surfaces closer than the resolution, the mixed pixel's -, its surface that of its strongest
- * return, its energy the sum: the centroid of equal pulses that overlap, whatever their shape. Less than 1 % of the
- * footprint's energy is no echo. Of more echoes than the head can tell, the weakest are left out, and counted. Where
- * surfaces are modelled (core/surface.h), what weighs is what comes back: energy times the surface's return, times the
- * share that glass and mirrors before it let through; the 1 % is still of the footprint (and where nothing comes back
- * of any of them, energy weighs). The width of an echo is that of the pulse, resolution_m, and 2.355 sigma of its
- * ranges, added as squares (full widths at half maximum of Gaussians). Of a return that stands for a part of the
- * footprint, or for what lies around a sub-ray, the ranges within it count as well, to first order on its plane: short
- * by half of (s tan i)^2 of the standard deviation, s = theta / 2; where lines cross in the footprint, by a few percent
- * more, as its parts are then known by places.
+ * its returns - with two surfaces closer than the resolution, the mixed pixel's -, its surface the one that most
+ * of it comes back from, its energy the sum: the centroid of equal pulses that overlap, whatever their shape. Less than
+ * 1 % of the footprint's energy is no echo. Of more echoes than the head can tell, the weakest are left out, and
+ * counted. Where surfaces are modelled (core/surface.h), what weighs is what comes back: energy times the surface's
+ * return, times the share that glass and mirrors before it let through; the 1 % is still of the footprint (and where
+ * nothing comes back of any of them, energy weighs). The width of an echo is that of the pulse, resolution_m, and 2.355
+ * sigma of its ranges, added as squares (full widths at half maximum of Gaussians). Of a return that stands for a part
+ * of the footprint, or for what lies around a sub-ray, the ranges within it count as well, to first order on its plane:
+ * short by half of (s tan i)^2 of the standard deviation, s = theta / 2; where lines cross in the footprint, by a few
+ * percent more, as its parts are then known by places.
  *
  * One ray for all of the footprint. Where it lies on one plane at incidence i, the mean over it is not the range of its
  * centre: a sub-ray at (rho, phi) meets the plane at (R - rho D/2 tan i cos phi) / (1 - rho s tan i sin phi), s = theta

@@ -19,7 +19,8 @@ static uint32_t choose_threads(const struct config *cfg)
     return n < 1 ? 1 : n > LOOP_MAX_THREADS ? LOOP_MAX_THREADS : (uint32_t)n;
 }
 
-/* Bytes per second of the points at the rates that are set; a head can be told to go faster later. */
+/* Bytes per second of the points at the rates that are set, of one echo a pulse: the least that there will be. A head
+ * can be told to go faster later, and further echoes and the frames' heads come on top; what a link loses is told. */
 static double stream_rate(const struct loop *loop)
 {
     const struct config *cfg = loop->cfg;

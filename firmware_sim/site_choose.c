@@ -223,7 +223,7 @@ static int choose_optics(struct site *site, int measure, const struct sh_report 
     site_look_close(&look);
     site->plan.methods.depth =
         plan_choose(&site->plan.optics, "optics", option, CAST_MAX_DEPTH + 1, forced, "optics.depth", &tolerance);
-    if (forced < 0 && site->plan.methods.depth == 0)
+    if (forced < 0 && holds && site->plan.methods.depth == 0)
         sh_warn(report,
                 "%s: plan.tolerance_m and plan.echo_tolerance allow to take glass and mirrors as other surfaces; "
                 "optics.depth has them followed",

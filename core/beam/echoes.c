@@ -54,19 +54,46 @@ static void sort(struct beam_return *r, uint32_t n)
         }
 }
 
+/* Of the surface that most comes back from, its strongest return: many weak returns may be of one surface. */
+static uint32_t of_strongest_surface(const struct beam_return *r, uint32_t n, int by_back)
+{
+    uint32_t best = 0;
+    double most = -1.0;
+    for (uint32_t i = 0; i < n; i++) {
+        uint32_t first = 0, strongest = i;
+        double sum = 0.0;
+        while (r[first].label != r[i].label)
+            first++;
+        if (first != i) continue;
+        for (uint32_t k = i; k < n; k++) {
+            if (r[k].label != r[i].label) continue;
+            sum += by_back ? r[k].back : r[k].energy;
+            if (by_back ? r[k].back > r[strongest].back : r[k].energy > r[strongest].energy) strongest = k;
+        }
+        if (sum > most) {
+            most = sum;
+            best = strongest;
+        }
+    }
+    return best;
+}
+
 /* Mean (less the first one's) and variance of ranges, weighted by what comes back or else by energy, `all` together.
- * Gives the index of the strongest. */
+ * Gives the index of the strongest, of the strongest surface. */
 static uint32_t average(const struct beam_return *r, uint32_t n, double all, int by_back, double *mean,
                         double *variance)
 {
     double first = 0.0, second = 0.0;
     uint32_t strongest = 0;
+    int alike = 1;
     for (uint32_t i = 0; i < n; i++) {
         double d = r[i].range_m - r[0].range_m, weight = by_back ? r[i].back : r[i].energy;
         first += weight * d;
         second += weight * (d * d + (double)r[i].sigma_m * (double)r[i].sigma_m);
         if (by_back ? r[i].back > r[strongest].back : r[i].energy > r[strongest].energy) strongest = i;
+        alike &= r[i].label == r[0].label;
     }
+    if (!alike) strongest = of_strongest_surface(r, n, by_back);
     *mean = first / all;
     *variance = fmax(0.0, second / all - *mean * *mean);
     return strongest;

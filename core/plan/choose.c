@@ -65,8 +65,11 @@ uint32_t plan_choose(struct plan_row *row, const char *stage, const struct plan_
         chosen = i;
         holds = 1;
     }
-    for (uint32_t i = 0; i < n && !holds; i++)
-        if (excess(&option[i], tolerance) < excess(&option[chosen], tolerance)) chosen = i;
+    /* Of those that miss it by as much, the last: options go from rough to exact. */
+    for (uint32_t i = 0; i < n && !holds; i++) {
+        double off = excess(&option[i], tolerance), least = excess(&option[chosen], tolerance);
+        if (off < least || (off == least && off < 1e300)) chosen = i;
+    }
     if (forced >= 0) chosen = (uint32_t)forced;
     const struct plan_option *it = &option[chosen];
     plan_say(row, stage, it->method, it->error_m, it->cost_ns, "");

@@ -64,6 +64,12 @@ static void test_least_off(void **state)
     some[0].echo_share = 3e-2;
     assert_int_equal(plan_choose(&row, "beam", some, 3, -1, "", &TOLERANCE), 1);
     expect(&row, "a", 0, "the one that is least off; does not hold");
+    /* options go from rough to exact: where all miss by as much, the last that can be had */
+    struct plan_option same[4] = {{"none", 0.0, 1.0, 0.0, ""},
+                                  {"1", 0.0, 1.0, 1.0, ""},
+                                  {"2", 0.0, 1.0, 2.0, ""},
+                                  {"3", 0.0, 1.0, 3.0, "not here"}};
+    assert_int_equal(plan_choose(&row, "optics", same, 4, -1, "", &TOLERANCE), 2);
 }
 
 /* What can't be had is not taken, whatever its figures; what is left may be unknown. */

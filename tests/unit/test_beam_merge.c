@@ -1,0 +1,85 @@
+/* Returns of a pulse -> echoes: by the definitions of core/beam.h, in numbers that can be done by hand. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <cmocka.h>
+
+#include "core/beam.h"
+
+enum { MOST = 16 };
+
+static struct beam beam;
+static struct beam_echoes echoes;
+
+static int set_up(void **state)
+{
+    (void)state;
+    struct sh_err err;
+    beam_init(&beam, 0.007, 0.35e-3, 4e-9); /* resolution: 0.5996 m */
+    return beam_echoes_alloc(&echoes, MOST, &err);
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    beam_echoes_free(&echoes);
+    return 0;
+}
+
+static void merge(struct beam_return *r, uint32_t n)
+{
+    echoes.n = 0;
+    for (uint32_t i = 0; i < n; i++)
+        r[i].back = r[i].energy;
+    assert_int_equal(beam_merge(&beam, r, n, 5, MOST, &echoes), 0);
+}
+
+/* Ten equal returns within the resolution: two of the nearer surface, eight of the other. One echo, at the mean, of the
+ * surface that most comes back from, though none of its returns is stronger. Whatever the order. */
+static void test_surface_of_many_returns(void **state)
+{
+    (void)state;
+    for (uint32_t turn = 0; turn < 10; turn++) {
+        struct beam_return r[10] = {{0}};
+        for (uint32_t i = 0; i < 10; i++) {
+            uint32_t k = (i + turn) % 10, near = k < 2;
+            r[i] = (struct beam_return){.range_m = near ? 20.0 : 20.3, .energy = 0.1, .triangle = k, .label = near ? 7 : 9};
+        }
+        merge(r, 10);
+        assert_int_equal(echoes.n, 1);
+        assert_int_equal(echoes.pulse[0], 5);
+        assert_int_equal(echoes.label[0], 9);
+        assert_true(echoes.triangle[0] >= 2);
+        assert_true(fabs(echoes.range_m[0] - 20.24) < 1e-12);
+        assert_true(fabs((double)echoes.energy[0] - 1.0) < 1e-6);
+    }
+}
+
+/* A gap above the resolution begins a new echo; less than 1 % is none; returns each within the resolution of the next
+ * hang together, however far the first is from the last. */
+static void test_gaps(void **state)
+{
+    (void)state;
+    struct beam_return apart[8] = {{.range_m = 30.61, .energy = 0.2}, {.range_m = 30.0, .energy = 0.3},
+                                   {.range_m = 28.0, .energy = 0.009}, {.range_m = 40.0, .energy = 0.1},
+                                   {.range_m = 41.5, .energy = 0.1},  {.range_m = 40.5, .energy = 0.1},
+                                   {.range_m = 41.0, .energy = 0.1},  {.range_m = 50.0, .energy = 0.091}};
+    merge(apart, 8);
+    assert_int_equal(echoes.n, 4);
+    static const double want_m[4] = {30.0, 30.61, 40.75, 50.0}, want_energy[4] = {0.3, 0.2, 0.4, 0.091};
+    for (uint32_t i = 0; i < 4; i++) {
+        assert_true(fabs(echoes.range_m[i] - want_m[i]) < 1e-12);
+        assert_true(fabs((double)echoes.energy[i] - want_energy[i]) < 1e-6);
+        assert_int_equal(echoes.number[i], i);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_surface_of_many_returns),
+        cmocka_unit_test(test_gaps),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}
