@@ -53,7 +53,7 @@ static uint8_t *put_extra_vlr(uint8_t *to, int attributes)
     to = put_extra(to, EXTRA_UINT16, "label", 0xffff, 0.0, "surface hit; 65535: none");
     if (!attributes) return to;
     to = put_extra(to, EXTRA_INT16, "amplitude", -32768, 0.01, "dB above detection threshold");
-    return put_extra(to, EXTRA_UINT16, "width", 0, 0.01, "ns, full at half maximum");
+    return put_extra(to, EXTRA_UINT16, "width", 0, 0.01, "ns FWHM; 655.35: that or more");
 }
 
 static uint8_t *put_note_vlr(uint8_t *to, int gps_time, int moving)

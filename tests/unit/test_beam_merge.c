@@ -44,7 +44,8 @@ static void test_surface_of_many_returns(void **state)
         struct beam_return r[10] = {{0}};
         for (uint32_t i = 0; i < 10; i++) {
             uint32_t k = (i + turn) % 10, near = k < 2;
-            r[i] = (struct beam_return){.range_m = near ? 20.0 : 20.3, .energy = 0.1, .triangle = k, .label = near ? 7 : 9};
+            r[i] = (struct beam_return){
+                .range_m = near ? 20.0 : 20.3, .energy = 0.1, .triangle = k, .label = near ? 7 : 9};
         }
         merge(r, 10);
         assert_int_equal(echoes.n, 1);
@@ -61,10 +62,10 @@ static void test_surface_of_many_returns(void **state)
 static void test_gaps(void **state)
 {
     (void)state;
-    struct beam_return apart[8] = {{.range_m = 30.61, .energy = 0.2}, {.range_m = 30.0, .energy = 0.3},
+    struct beam_return apart[8] = {{.range_m = 30.61, .energy = 0.2},  {.range_m = 30.0, .energy = 0.3},
                                    {.range_m = 28.0, .energy = 0.009}, {.range_m = 40.0, .energy = 0.1},
-                                   {.range_m = 41.5, .energy = 0.1},  {.range_m = 40.5, .energy = 0.1},
-                                   {.range_m = 41.0, .energy = 0.1},  {.range_m = 50.0, .energy = 0.091}};
+                                   {.range_m = 41.5, .energy = 0.1},   {.range_m = 40.5, .energy = 0.1},
+                                   {.range_m = 41.0, .energy = 0.1},   {.range_m = 50.0, .energy = 0.091}};
     merge(apart, 8);
     assert_int_equal(echoes.n, 4);
     static const double want_m[4] = {30.0, 30.61, 40.75, 50.0}, want_energy[4] = {0.3, 0.2, 0.4, 0.091};
