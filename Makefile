@@ -136,7 +136,7 @@ demo: deps-build
 
 # ---- tests. Everything is built with warnings as errors, by both compilers, and again with sanitizers.
 STRICT = WERROR=-Werror
-ASAN = $(STRICT) BUILD=$(BUILD)/asan OPT=-O1 CPPFLAGS=-DSH_SANITIZE SAN="-fsanitize=address,undefined -fno-sanitize-recover=all"
+ASAN = $(STRICT) BUILD=$(BUILD)/asan OPT=-O1 CPPFLAGS=-DSH_SANITIZE SAN="-g1 -fsanitize=address,undefined -fno-sanitize-recover=all"
 CLANG = $(STRICT) BUILD=$(BUILD)/clang CC=clang CXX=clang++ OPT=-O0
 test: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test test-programs
