@@ -54,6 +54,12 @@ static void sort(struct beam_return *r, uint32_t n)
         }
 }
 
+/* What counts of a return: what comes back, or its energy where nothing does of any. */
+static double weight_of(const struct beam_return *r, int by_back)
+{
+    return by_back ? r->back : r->energy;
+}
+
 /* Of the surface that most comes back from, its strongest return: many weak returns may be of one surface. */
 static uint32_t of_strongest_surface(const struct beam_return *r, uint32_t n, int by_back)
 {
@@ -67,8 +73,8 @@ static uint32_t of_strongest_surface(const struct beam_return *r, uint32_t n, in
         if (first != i) continue;
         for (uint32_t k = i; k < n; k++) {
             if (r[k].label != r[i].label) continue;
-            sum += by_back ? r[k].back : r[k].energy;
-            if (by_back ? r[k].back > r[strongest].back : r[k].energy > r[strongest].energy) strongest = k;
+            sum += weight_of(&r[k], by_back);
+            if (weight_of(&r[k], by_back) > weight_of(&r[strongest], by_back)) strongest = k;
         }
         if (sum > most) {
             most = sum;
@@ -87,10 +93,10 @@ static uint32_t average(const struct beam_return *r, uint32_t n, double all, int
     uint32_t strongest = 0;
     int alike = 1;
     for (uint32_t i = 0; i < n; i++) {
-        double d = r[i].range_m - r[0].range_m, weight = by_back ? r[i].back : r[i].energy;
+        double d = r[i].range_m - r[0].range_m, weight = weight_of(&r[i], by_back);
         first += weight * d;
         second += weight * (d * d + (double)r[i].sigma_m * (double)r[i].sigma_m);
-        if (by_back ? r[i].back > r[strongest].back : r[i].energy > r[strongest].energy) strongest = i;
+        if (weight > weight_of(&r[strongest], by_back)) strongest = i;
         alike &= r[i].label == r[0].label;
     }
     if (!alike) strongest = of_strongest_surface(r, n, by_back);

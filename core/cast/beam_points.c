@@ -79,38 +79,6 @@ static void restore(struct caster *c, const struct cast_setup *s, uint32_t k, ui
     }
 }
 
-/* What could not be said is no echo, and counted; the pulse's other echoes are numbered anew. Returns how many entries
- * are left of n. */
-static uint32_t drop_unfit(struct caster *c, struct line_block *b, uint32_t at, uint32_t n, uint32_t *echoes)
-{
-    uint32_t to = at;
-    for (uint32_t i = at, end; i < at + n; i = end) {
-        uint32_t first = to, count = 0;
-        for (end = i + 1; end < at + n && (b->echo[end] & 15) > 1;)
-            end++;
-        for (uint32_t k = i; k < end; k++) {
-            int fits = b->a[k] != (uint32_t)LINE_XYZ_NONE && b->b[k] != (uint32_t)LINE_XYZ_NONE &&
-                       b->c[k] != (uint32_t)LINE_XYZ_NONE;
-            if (!fits && b->echo[k] != 0) c->counters.unfit++;
-            if (!fits && (k + 1 < end || to > first)) continue; /* but one entry stays */
-            b->a[to] = b->a[k];
-            b->b[to] = b->b[k];
-            b->c[to] = b->c[k];
-            b->dt_ns[to] = b->dt_ns[k];
-            b->refl_cdb[to] = b->refl_cdb[k];
-            b->label[to] = fits ? b->label[k] : (uint16_t)LINE_LABEL_NONE;
-            if (c->attributes) b->width_cns[to] = fits ? b->width_cns[k] : (uint16_t)LINE_WIDTH_NONE;
-            count += (uint32_t)fits;
-            to++;
-        }
-        *echoes += count;
-        for (uint32_t k = first; k < to; k++)
-            b->echo[k] = (uint8_t)(count == 0 ? 0 : (k - first + 1) | count << 4);
-        if (count == 0) b->a[first] = b->b[first] = b->c[first] = (uint32_t)LINE_XYZ_NONE;
-    }
-    return to - at;
-}
-
 /* A chunk on its way into the block. */
 struct writer {
     struct caster *c;
@@ -271,8 +239,7 @@ static void write_points(struct writer *w, const struct beam_echoes *e, uint32_t
     caster_no_reflectance(w->block, w->at, n);
     if (c->attributes) caster_no_amplitudes(w->block, w->at, n);
     if (w->unfit != 0) {
-        w->echoes = 0;
-        n = drop_unfit(c, w->block, w->at, n, &w->echoes);
+        n = caster_drop_unfit(c, w->block, w->at, n, &w->echoes);
     }
     w->at += n;
 }

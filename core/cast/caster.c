@@ -179,27 +179,42 @@ void caster_hits(struct caster *c, const struct bvh *bvh, const double station_m
     caster_hits_from(c, bvh, &from, range_max_m, n, dx, dy, dz, range_m, triangle);
 }
 
-/* What could not be said is no echo, and counted. */
-static uint32_t take_back(struct caster *c, struct line_block *block, uint32_t at, uint32_t n)
+/* Moves entry `from`, which has no echo where it does not fit. */
+static void keep_entry(struct line_block *b, uint32_t to, uint32_t from, int fits)
 {
-    uint32_t taken = 0;
-    for (uint32_t i = at; i < at + n; i++) {
-        if (block->echo[i] == 0) continue;
-        if (block->a[i] != (uint32_t)LINE_XYZ_NONE && block->b[i] != (uint32_t)LINE_XYZ_NONE &&
-            block->c[i] != (uint32_t)LINE_XYZ_NONE)
-            continue;
-        block->a[i] = block->b[i] = block->c[i] = (uint32_t)LINE_XYZ_NONE;
-        block->echo[i] = 0;
-        block->label[i] = LINE_LABEL_NONE;
-        block->refl_cdb[i] = LINE_REFL_NONE;
-        if (c->attributes) {
-            block->amplitude_cdb[i] = LINE_AMPLITUDE_NONE;
-            block->width_cns[i] = LINE_WIDTH_NONE;
+    b->a[to] = b->a[from];
+    b->b[to] = b->b[from];
+    b->c[to] = b->c[from];
+    b->dt_ns[to] = b->dt_ns[from];
+    b->refl_cdb[to] = fits ? b->refl_cdb[from] : (int16_t)LINE_REFL_NONE;
+    b->label[to] = fits ? b->label[from] : (uint16_t)LINE_LABEL_NONE;
+    if (b->width_cns == NULL) return;
+    b->amplitude_cdb[to] = fits ? b->amplitude_cdb[from] : (int16_t)LINE_AMPLITUDE_NONE;
+    b->width_cns[to] = fits ? b->width_cns[from] : (uint16_t)LINE_WIDTH_NONE;
+}
+
+uint32_t caster_drop_unfit(struct caster *c, struct line_block *b, uint32_t at, uint32_t n, uint32_t *echoes)
+{
+    uint32_t to = at;
+    *echoes = 0;
+    for (uint32_t i = at, end; i < at + n; i = end) {
+        uint32_t first = to, count = 0;
+        for (end = i + 1; end < at + n && (b->echo[end] & 15) > 1;)
+            end++;
+        for (uint32_t k = i; k < end; k++) {
+            int fits = b->a[k] != (uint32_t)LINE_XYZ_NONE && b->b[k] != (uint32_t)LINE_XYZ_NONE &&
+                       b->c[k] != (uint32_t)LINE_XYZ_NONE;
+            if (!fits && b->echo[k] != 0) c->counters.unfit++;
+            if (!fits && (k + 1 < end || to > first)) continue; /* but one entry stays */
+            keep_entry(b, to++, k, fits);
+            count += (uint32_t)fits;
         }
-        taken++;
+        *echoes += count;
+        for (uint32_t k = first; k < to; k++)
+            b->echo[k] = (uint8_t)(count == 0 ? 0 : (k - first + 1) | count << 4);
+        if (count == 0) b->a[first] = b->b[first] = b->c[first] = (uint32_t)LINE_XYZ_NONE;
     }
-    c->counters.unfit += taken;
-    return taken;
+    return to - at;
 }
 
 uint32_t caster_wire(struct caster *c, const struct cast_setup *s, int linear, const double *range_m,
@@ -216,12 +231,6 @@ uint32_t caster_wire(struct caster *c, const struct cast_setup *s, int linear, c
         kernel_scale(range_m, n, c->ex, c->ey, c->ez);
     if (!linear) georef_forward(s->georef, n, c->ex, c->ey, c->ez, c->ex, c->ey, c->ez);
     return kernel_geo(c->ex, c->ey, c->ez, s->xyz_scale, n, block->a + at, block->b + at, block->c + at);
-}
-
-uint32_t caster_positions(struct caster *c, const struct cast_setup *s, int linear, const double *range_m,
-                          struct line_block *block, uint32_t at, uint32_t n)
-{
-    return caster_wire(c, s, linear, range_m, block, at, n) == 0 ? 0 : take_back(c, block, at, n);
 }
 
 /* How far the origins lie from the first of them. */
@@ -298,7 +307,7 @@ static uint32_t single_chunk(struct caster *c, const struct cast_setup *s, int l
     caster_ends(c, CAST_DETECT);
     if (s->noise_on) kernel_noise(s, pulse0, n, c->range_m);
     caster_ends(c, CAST_NOISE);
-    echoes -= caster_positions(c, s, linear, c->range_m, block, at, n);
+    if (caster_wire(c, s, linear, c->range_m, block, at, n) != 0) caster_drop_unfit(c, block, at, n, &echoes);
     if (c->attributes) caster_pulse_attributes(s, block, at, n);
     caster_ends(c, CAST_POSITIONS);
     return echoes;

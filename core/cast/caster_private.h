@@ -142,9 +142,9 @@ static inline void caster_no_reflectance(const struct line_block *block, uint32_
  * of the block. Returns how many coordinates did not fit; they are LINE_XYZ_NONE. */
 uint32_t caster_wire(struct caster *c, const struct cast_setup *s, int linear, const double *range_m,
                      struct line_block *block, uint32_t at, uint32_t n);
-/* Likewise; echoes that did not fit are taken back. Returns how many. */
-uint32_t caster_positions(struct caster *c, const struct cast_setup *s, int linear, const double *range_m,
-                          struct line_block *block, uint32_t at, uint32_t n);
+/* Where some did not: these are no echoes, and counted; the pulse's other echoes are numbered anew, but one entry of a
+ * pulse stays. Returns how many entries are left of n; *echoes: how many echoes are among them. */
+uint32_t caster_drop_unfit(struct caster *c, struct line_block *block, uint32_t at, uint32_t n, uint32_t *echoes);
 
 /* ---- attributes.c: only for a block that has room for them. */
 /* A width as it is told. */

@@ -136,38 +136,9 @@ static uint32_t write_positions(struct caster *c, const struct cast_setup *s, co
             kernel_directions_read(s, l->mirror_turn + at, l->pan_turn + at, s->rotation, to_crs, n, c->dx, c->dy,
                                    c->dz, c->ex, c->ey, c->ez);
         }
-        unfit += caster_positions(c, s, linear, l->range_m + at, block, out + at, n);
+        unfit += caster_wire(c, s, linear, l->range_m + at, block, out + at, n);
     }
     return unfit;
-}
-
-/* Some echoes have been taken back: the others of their pulses are numbered again. Returns how many entries are left.
- */
-static uint32_t number_again(const struct echo_list *l, struct line_block *block, uint32_t out)
-{
-    uint32_t to = out;
-    for (uint32_t i = 0, end; i < l->n; i = end) {
-        uint32_t kept = 0, first = to;
-        for (end = i; end < l->n && l->pulse[end] == l->pulse[i]; end++) {
-            int last = end + 1 == l->n || l->pulse[end + 1] != l->pulse[i];
-            if (block->echo[out + end] == 0 && !(last && kept == 0)) continue;
-            kept += block->echo[out + end] != 0;
-            block->a[to] = block->a[out + end];
-            block->b[to] = block->b[out + end];
-            block->c[to] = block->c[out + end];
-            block->label[to] = block->label[out + end];
-            block->refl_cdb[to] = block->refl_cdb[out + end];
-            block->dt_ns[to] = block->dt_ns[out + end];
-            if (block->width_cns != NULL) {
-                block->amplitude_cdb[to] = block->amplitude_cdb[out + end];
-                block->width_cns[to] = block->width_cns[out + end];
-            }
-            to++;
-        }
-        for (uint32_t k = first; k < to; k++)
-            block->echo[k] = (uint8_t)(kept > 0 ? (k - first + 1) | kept << 4 : 0);
-    }
-    return to - out;
 }
 
 uint32_t caster_report(struct caster *c, const struct cast_setup *s, const struct schedule_run *run,
@@ -184,8 +155,7 @@ uint32_t caster_report(struct caster *c, const struct cast_setup *s, const struc
         kernel_polar(s, l->range_m, l->mirror_turn, l->pan_turn, l->n, block->a + out, block->b + out, block->c + out);
     } else {
         uint32_t unfit = write_positions(c, s, run, block, out);
-        echoes -= unfit;
-        if (unfit != 0) *entries = number_again(l, block, out);
+        if (unfit != 0) *entries = caster_drop_unfit(c, block, out, l->n, &echoes);
     }
     caster_ends(c, CAST_POSITIONS);
     return echoes;

@@ -8,7 +8,6 @@
  * many of them are off by more than the resolution (a different leaf, say: a few decide the rms of a tree), and the rms
  * without those. --chart: rows of the chart's table. */
 #include <math.h>
-#include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,6 +17,7 @@
 #include "firmware_sim/bench.h"
 #include "firmware_sim/config_private.h"
 #include "tests/accuracy/beam_reference.h"
+#include "tests/bench/pin.h"
 
 enum { ROUNDS = 15, FEW_ROUNDS = 3, MAX_METHODS = 8 };
 
@@ -265,15 +265,6 @@ static void foliage(uint32_t n_leaves)
     if (generate_foliage(crown, 3, 60.0, 1, &scene, &err) != 0) exit(1);
     struct beam_view view = {-12.0, 16.0, -30.0, 30.0, 100, 1000};
     measure("foliage", scene, station_m, &view, 10);
-}
-
-static void pin(void)
-{
-    cpu_set_t one;
-    int cpu = sched_getcpu();
-    CPU_ZERO(&one);
-    CPU_SET(cpu < 0 ? 0U : (unsigned)cpu, &one);
-    sched_setaffinity(0, sizeof one, &one);
 }
 
 int main(int argc, char **argv)

@@ -3,7 +3,6 @@
  *
  * A method's name is its family and, as the last word, what is varied in it: "robust decided 16". */
 #include <math.h>
-#include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,6 +13,7 @@
 #include "core/vecmath.h"
 #include "firmware_sim/bench.h"
 #include "tests/bench/reference.h"
+#include "tests/bench/pin.h"
 
 enum { LINES = 200, ROUNDS = 9, CHUNK = 256, SAMPLE_STEP = 1, WIDTHS = 4, METHODS = 24 };
 enum kind { FLOAT, REFINED, DECIDED, UNREFINED }; /* the last two with the program's own BVHs */
@@ -312,15 +312,6 @@ static int draw_scene(const struct chart_scene *spec, struct method *all, struct
     tear_down(c);
     free(c);
     return rc;
-}
-
-static void pin(void)
-{
-    cpu_set_t one;
-    int cpu = sched_getcpu();
-    CPU_ZERO(&one);
-    CPU_SET(cpu < 0 ? 0U : (unsigned)cpu, &one);
-    sched_setaffinity(0, sizeof one, &one);
 }
 
 int main(void)

@@ -2,7 +2,6 @@
  * to read it. Scene frame to UTM and UPS; errors are against tests/geodesy.h, which shares nothing with GeographicLib.
  */
 #include <math.h>
-#include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -10,6 +9,7 @@
 #include "core/rng.h"
 #include "firmware_sim/bench.h"
 #include "tests/geodesy.h"
+#include "tests/bench/pin.h"
 
 enum { PLACES = 6, POINTS = 2048, METHODS = 5, ROUNDS = 15, SCENES = 5 };
 
@@ -183,11 +183,7 @@ static int draw_scene(int scene)
 
 int main(void)
 {
-    cpu_set_t one;
-    int cpu = sched_getcpu();
-    CPU_ZERO(&one);
-    CPU_SET(cpu < 0 ? 0U : (unsigned)cpu, &one);
-    sched_setaffinity(0, sizeof one, &one);
+    pin();
     fprintf(stderr, "chart: georef\n");
     for (int i = 0; i < SCENES; i++)
         if (draw_scene(i) != 0) return 1;

@@ -2,7 +2,6 @@
  * which it does not draw. The loops are those of the program (core/georef/polynomial_kernels.h), compiled once more for
  * each instruction set; errors are against the exact method. README.md tells how to read it. */
 #include <math.h>
-#include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -10,6 +9,7 @@
 #include "core/georef/private.h"
 #include "core/rng.h"
 #include "firmware_sim/bench.h"
+#include "tests/bench/pin.h"
 
 enum { POINTS = 2048, ROUNDS = 25, TIMES = 100, MAPS = 4, MAX_WIDTHS = 4 };
 
@@ -120,11 +120,8 @@ static int measure(int map, const struct width *width, int n_widths)
 int main(void)
 {
     struct width width[MAX_WIDTHS];
-    cpu_set_t one;
-    int cpu = sched_getcpu(), n = find_widths(width);
-    CPU_ZERO(&one);
-    CPU_SET(cpu < 0 ? 0U : (unsigned)cpu, &one);
-    sched_setaffinity(0, sizeof one, &one);
+    int n = find_widths(width);
+    pin();
     scatter();
     for (int i = 0; i < MAPS; i++)
         if (measure(i, width, n) != 0) return 1;

@@ -4,7 +4,6 @@
  *
  *   build/tests/bench/plain */
 #include <math.h>
-#include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,6 +12,7 @@
 #include "firmware_sim/bench.h"
 #include "firmware_sim/config.h"
 #include "firmware_sim/site.h"
+#include "tests/bench/pin.h"
 
 enum { LINES = 100, ROUNDS = 41, MAX_SETS = 24, STATION = 2 };
 static const double ALLOWED = 0.05;
@@ -146,15 +146,6 @@ static double measure(struct run *r, double *plain_ns, double *ns)
     *plain_ns = bench_median(plain, ROUNDS);
     *ns = bench_median(asked, ROUNDS);
     return bench_median(ratio, ROUNDS);
-}
-
-static void pin(void)
-{
-    cpu_set_t one;
-    int cpu = sched_getcpu();
-    CPU_ZERO(&one);
-    CPU_SET(cpu < 0 ? 0U : (unsigned)cpu, &one);
-    sched_setaffinity(0, sizeof one, &one);
 }
 
 int main(void)

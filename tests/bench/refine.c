@@ -2,12 +2,12 @@
  * (bvh_create_plain), the whole cast of the same lines in turns. Processor time of the thread; medians of rounds.
  *
  *   build/tests/bench/refine [polar|ecef] [house|10k|1M|...] ... */
-#include <sched.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "core/cast.h"
 #include "firmware_sim/bench.h"
+#include "tests/bench/pin.h"
 
 enum { LINES = 400, ROUNDS = 21 };
 
@@ -81,15 +81,6 @@ static void measure(struct run *r, const char *scene)
     double refined = bench_median(ns[0], ROUNDS), plain = bench_median(ns[1], ROUNDS);
     printf("%-8s %9.2f %9.2f %9.2f %7.3f\n", scene, refined, plain, refined - plain, bench_median(ratio, ROUNDS));
     fflush(stdout);
-}
-
-static void pin(void)
-{
-    cpu_set_t one;
-    int cpu = sched_getcpu();
-    CPU_ZERO(&one);
-    CPU_SET(cpu < 0 ? 0U : (unsigned)cpu, &one);
-    sched_setaffinity(0, sizeof one, &one);
 }
 
 int main(int argc, char **argv)
