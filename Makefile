@@ -48,8 +48,7 @@ LDLIBS = $(EMBREE) -lassimp -lGeographicLib $(PKG_LIBS) -lstdc++ -lm -pthread
 CORE = $(wildcard core/*.c core/*/*.c) core/georef/geographiclib_shim.cpp
 PROTO = $(wildcard drivers/protocol/*.c)
 HOST = $(wildcard drivers/host/*.c)
-FIRM = $(filter-out firmware_sim/main.c,$(wildcard firmware_sim/*.c))
-SRC = $(CORE) $(PROTO) $(HOST) $(wildcard drivers/link/*.c) $(wildcard drivers/usb/*.c) $(FIRM)
+SRC = $(CORE) $(PROTO) $(HOST) $(wildcard drivers/link/*.c drivers/usb/*.c drivers/record/*.c firmware_sim/*/*.c)
 OBJ = $(SRC:%=$(BUILD)/%.o)
 LIBOBJ = $(patsubst %,$(BUILD)/%.o,core/err.c $(PROTO) $(HOST))
 PROGRAMS = $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/$(1)/test_*.c))
@@ -89,14 +88,24 @@ $(BUILD)/libscanhead.so: $(LIBOBJ) drivers/host/libscanhead.map
 $(BUILD)/scanhead: $(BUILD)/firmware_sim/main.c.o $(BUILD)/modules.a
 	@echo "  LD    $@"
 	$(Q)$(CC) $(SAN) -o $@ $^ $(LDLIBS)
+# What several programs of tests/ share: scenes, rays, plain Embree.
+BENCH_MAINS = $(patsubst %,tests/bench/%.c,bench chart chart_georef chart_widths beam plain refine)
+SHARED = $(filter-out $(BENCH_MAINS),$(wildcard tests/common/*.c tests/bench/*.c))
+$(BUILD)/shared.a: $(SHARED:%=$(BUILD)/%.o)
+	@rm -f $@
+	@echo "  AR    $@"
+	$(Q)$(AR) rcs $@ $^
+$(BUILD)/bench: $(BUILD)/tests/bench/bench.c.o $(BUILD)/shared.a $(BUILD)/modules.a
+	@echo "  LD    $@"
+	$(Q)$(CC) $(SAN) -o $@ $^ $(LDLIBS)
 # A test program, with what its folder has besides test programs. What computes little itself is built in half the time.
 QUICK = $(if $(filter unit wire guest,$(1)),-O1)
 BESIDE = $(patsubst %,$(BUILD)/%.o,$(filter-out $(wildcard tests/$(1)/test_*.c),$(wildcard tests/$(1)/*.c)))
 .SECONDEXPANSION:
-$(BUILD)/tests/%: tests/%.c $(BUILD)/modules.a $$(call BESIDE,$$(*D))
+$(BUILD)/tests/%: tests/%.c $(BUILD)/shared.a $(BUILD)/modules.a $$(call BESIDE,$$(*D))
 	@mkdir -p $(@D)
 	@echo "  TEST  $@"
-	$(Q)$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) $(call QUICK,$(*D)) -MF $@.d -o $@ $< $(call BESIDE,$(*D)) $(BUILD)/modules.a -lcmocka $(LDLIBS)
+	$(Q)$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) $(call QUICK,$(*D)) -MF $@.d -o $@ $< $(call BESIDE,$(*D)) $(BUILD)/shared.a $(BUILD)/modules.a -lcmocka $(LDLIBS)
 
 # What runs in the guest has the client library alone: it starts faster there.
 $(BUILD)/tests/guest/%: tests/guest/%.c $(BUILD)/libscanhead.a
@@ -161,22 +170,17 @@ test-usb-million: deps
 # ---- figures: speed and leaks; speed against accuracy, each method
 DEPS_CHART = gnuplot-nox
 bench: deps-build
-	@$(MAKE) --no-print-directory -j2 $(BUILD)/scanhead
-	@mkdir -p $(BUILD)/bench
-	@$(BUILD)/scanhead bench --scenes 10k,100k,1M,10M,house --leaks 1e8 -o $(BUILD)/bench/bench.json
+	@$(MAKE) --no-print-directory -j2 $(BUILD)/bench
+	@$(BUILD)/bench --scenes 10k,100k,1M,10M,house --leaks 1e8 -o $(BUILD)/bench.json
 # Each program of the chart writes its panel's rows; the first one the head of the table.
 CHART = $(BUILD)/chart/speed_accuracy
-$(BUILD)/tests/bench/chart: tests/bench/chart.c tests/bench/reference.c $(BUILD)/modules.a
-$(BUILD)/tests/bench/chart_georef: tests/bench/chart_georef.c $(BUILD)/modules.a
-$(BUILD)/tests/bench/chart_widths: tests/bench/chart_widths.c $(BUILD)/modules.a
-$(BUILD)/tests/bench/beam: tests/bench/beam.c tests/accuracy/beam_reference.c $(BUILD)/modules.a
-CHARTS = $(BUILD)/tests/bench/chart $(BUILD)/tests/bench/chart_georef $(BUILD)/tests/bench/chart_widths $(BUILD)/tests/bench/beam
-$(BUILD)/tests/bench/plain: tests/bench/plain.c $(BUILD)/modules.a
-$(BUILD)/tests/bench/refine: tests/bench/refine.c $(BUILD)/modules.a
-$(CHARTS) $(BUILD)/tests/bench/plain $(BUILD)/tests/bench/refine:
+CHARTS = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_georef chart_widths beam)
+FIGURES = $(CHARTS) $(BUILD)/tests/bench/plain $(BUILD)/tests/bench/refine
+$(BUILD)/tests/bench/beam: tests/accuracy/beam_reference.c
+$(FIGURES): $(BUILD)/tests/bench/%: tests/bench/%.c $(BUILD)/shared.a $(BUILD)/modules.a
 	@mkdir -p $(@D)
 	@echo "  CHART $@"
-	$(Q)$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -o $@ $^ $(LDLIBS)
+	$(Q)$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -MF $@.d -o $@ $(filter %.c,$^) $(filter %.a,$^) $(LDLIBS)
 # Footprints: cost, and error against 1,000 sub-rays; a few minutes.
 bench-beam: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/beam
@@ -200,7 +204,7 @@ chart: deps-build
 	gnuplot -e "csv='$(CHART).csv'; base='$(CHART)'" tests/bench/chart.gp
 objects: $(EVERYTHING)
 test-unit-programs: $(UNIT)
-test-programs: all $(TESTS) $(CHARTS) $(BUILD)/tests/bench/plain $(BUILD)/tests/bench/refine
+test-programs: all $(BUILD)/bench $(TESTS) $(FIGURES)
 
 install: all
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib $(DESTDIR)$(PREFIX)/include $(DESTDIR)$(HEADS_DIR) \

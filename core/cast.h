@@ -11,7 +11,7 @@
 
 #include <stdint.h>
 
-#include "core/beam.h"
+#include "core/footprint.h"
 #include "core/detect.h"
 #include "core/err.h"
 #include "core/georef.h"
@@ -35,7 +35,7 @@ int bvh_create(const struct scene *scene, const double origin_m[3], double stati
                const struct sh_report *report, struct bvh **out, struct sh_err *err);
 /* A BVH of float alone, for speed: what Embree finds stands as it is, and nothing is decided again. Less memory, too.
  * For single rays, bodies that move included; not for beam, cast_detect, cast_outlines or bvh_order_exactly, which need
- * the planes. How far off it is: core/cast/bvh.h. Hits may differ from one width of packets to another.
+ * the planes. How far off it is: core/bvh/bvh_inside.h. Hits may differ from one width of packets to another.
  */
 int bvh_create_plain(const struct scene *scene, const double origin_m[3], double station_reach_m, unsigned threads,
                      const struct sh_report *report, struct bvh **out, struct sh_err *err);
@@ -91,7 +91,7 @@ struct cast_detect {
     const struct detect_ball *ball;
 };
 
-/* A beam with a footprint (core/beam.h). Constant; any thread. With cast_detect, echoes weigh by what comes back of
+/* A beam with a footprint (core/footprint.h). Constant; any thread. With cast_detect, echoes weigh by what comes back of
  * them, each by itself is detected or not, and has noise of its own. Where a footprint of an adaptive beam lies on
  * glass or a mirror, in part or as a whole, it is cast as rings: what is seen there has outlines that nobody knows. */
 struct cast_beam {
@@ -156,7 +156,7 @@ int caster_create(struct caster **out, struct sh_err *err);
 void caster_free(struct caster *caster);
 
 /* Fills block from the run, with attributes where it has room for them: the width of a single ray's echo is the
- * pulse's, of a footprint's as core/beam.h has it, of what glass and mirrors bring together likewise; an amplitude
+ * pulse's, of a footprint's as core/footprint.h has it, of what glass and mirrors bring together likewise; an amplitude
  * needs a signal model. Noise of ranges moves echoes, and doesn't widen them. The block has capacity >= run->n times
  * the echoes that a pulse may have (1 + depth, beam->max_echoes). Returns the number of echoes. Allocates nothing. */
 uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,

@@ -26,6 +26,8 @@ rules='
     function allowed(from, to) {
         if (from ~ /^core\//) return to ~ /^core\//
         if (from ~ /^drivers\/host\//) return to ~ /^drivers\/(protocol|host)\// || to == "core/err.h"
+        if (from ~ /^drivers\/record\//)
+            return to ~ /^drivers\/(protocol|record)\// || to == "core/err.h" || to == "drivers/host/scanhead.h"
         if (from ~ /^drivers\/protocol\//) return to ~ /^drivers\/protocol\// || to == "core/line.h" || to == "core/err.h"
         if (from ~ /^drivers\/link\//) return to ~ /^drivers\/(link|usb)\// || to == "core/line.h" || to == "core/err.h"
         if (from ~ /^drivers\//)
@@ -73,9 +75,9 @@ clean_tree() {
     plant core/georef/geographiclib_shim.cpp '#include "core/georef/shim.h"' '#include <GeographicLib/UTMUPS.hpp>'
     plant drivers/protocol/native.c '#include "drivers/protocol/native.h"' '#include "core/line.h"' '#include "core/err.h"'
     plant drivers/link/tcp.c '#include "drivers/link/link.h"' '#include "core/err.h"' '#include <sys/socket.h>'
-    plant drivers/usb/device.c '#include "drivers/usb/device.h"' '#include "drivers/protocol/native.h"'
+    plant drivers/usb/usb_core.c '#include "drivers/usb/device.h"' '#include "drivers/protocol/native.h"'
     plant drivers/host/open.c '#include "drivers/host/scanhead.h"' '#include "drivers/protocol/native.h"' '#include "core/err.h"'
-    plant firmware_sim/loop.c '#include "core/scene.h"' '#include "drivers/link/link.h"' '#include "drivers/host/scanhead.h"' \
+    plant firmware_sim/loop/loop.c '#include "core/scene.h"' '#include "drivers/link/link.h"' '#include "drivers/host/scanhead.h"' \
         '/* #include "tests/nothing.h" */' '// #include "../core/err.h"'
     plant build-asan/generated.cpp 'int built;'
 }
@@ -96,7 +98,7 @@ found=$(violations "$work/tree")
 report $? "a clean tree passes" "$found"
 
 expect_violation core/bad.c '#include "drivers/link/link.h"'
-expect_violation core/bad.h '#include "firmware_sim/head.h"'
+expect_violation core/bad.h '#include "firmware_sim/command/head.h"'
 expect_violation core/deep/bad.c '  #  include   "drivers/protocol/native.h" /* why */'
 expect_violation core/bad.c '#include <drivers/link/link.h>'
 expect_violation core/bad.c '#include "../drivers/link/link.h"'
@@ -106,20 +108,20 @@ expect_violation core/bad.c '#include HEADER'
 expect_violation core/georef/other.cpp 'int other;'
 expect_violation drivers/bad.h '#include "core/scene.h"'
 expect_violation drivers/usb/bad.c '#include "core/georef.h"'
-expect_violation drivers/usb/bad.c '#include "firmware_sim/head.h"'
+expect_violation drivers/usb/bad.c '#include "firmware_sim/command/head.h"'
 expect_violation drivers/usb/bad.c '#include "drivers/host/scanhead.h"'
 expect_violation drivers/link/bad.c '#include "core/scene.h"'
 expect_violation drivers/link/bad.c '#include "drivers/protocol/native.h"'
 expect_violation drivers/link/bad.c '#include "drivers/host/scanhead.h"'
-expect_violation drivers/link/bad.c '#include "firmware_sim/config.h"'
+expect_violation drivers/link/bad.c '#include "firmware_sim/config/config.h"'
 expect_violation drivers/protocol/bad.c '#include "core/scene.h"'
 expect_violation drivers/protocol/bad.c '#include "drivers/link/link.h"'
 expect_violation drivers/protocol/bad.c '#include "drivers/host/scanhead.h"'
-expect_violation drivers/protocol/bad.c '#include "firmware_sim/head.h"'
+expect_violation drivers/protocol/bad.c '#include "firmware_sim/command/head.h"'
 expect_violation drivers/host/bad.c '#include "core/line.h"'
 expect_violation drivers/host/bad.c '#include "core/scene.h"'
 expect_violation drivers/host/bad.c '#include "drivers/link/link.h"'
-expect_violation drivers/host/bad.c '#include "firmware_sim/head.h"'
+expect_violation drivers/host/bad.c '#include "firmware_sim/command/head.h"'
 expect_violation firmware_sim/bad.c '#include "tests/unit/command_device.h"'
 expect_violation firmware_sim/bad.cpp 'int bad;'
 expect_violation tests/accuracy/bad.cc 'int bad;'

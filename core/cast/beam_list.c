@@ -2,7 +2,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/cast/beam_private.h"
+#include "core/cast/beam_work.h"
 #include "core/surface.h"
 
 /* Pulses p .. end - 1 whose central ray does for all of the footprint. */

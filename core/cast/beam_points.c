@@ -2,7 +2,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/cast/beam_private.h"
+#include "core/cast/beam_work.h"
 #include "core/rng.h"
 
 static void copy_echo(struct beam_echoes *e, uint32_t to, uint32_t from)

@@ -2,7 +2,7 @@
 #ifndef CORE_CAST_KERNELS_H
 #define CORE_CAST_KERNELS_H
 
-#include "core/cast/bvh.h"
+#include "core/bvh/bvh_inside.h"
 
 /* Mirror and pan angle of n pulses of a run, from its pulse `first` on. */
 void kernel_angles(const struct schedule_run *run, uint32_t first, uint32_t n, double *mirror_turn, double *pan_turn);

@@ -1,5 +1,5 @@
 /* The rows of a PLY file, in file order: numbers of any type, text or binary of either byte order. What they
- * mean is the reader's affair (read_ply.c: a mesh; core/cloud/cloud.c: points). */
+ * mean is the reader's affair (read_ply.c: a mesh; core/analysis/cloud.c: points). */
 #ifndef CORE_SCENE_PLY_ROWS_H
 #define CORE_SCENE_PLY_ROWS_H
 

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "drivers/host/usb.h"
+#include "drivers/host/usb_inside.h"
 
 #define RULE                                                                                                 \
     "no permission; the udev rule gives it: `sudo make install`, or copy drivers/host/70-scanhead.rules to " \

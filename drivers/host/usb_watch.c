@@ -3,7 +3,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "drivers/host/usb.h"
+#include "drivers/host/usb_inside.h"
 
 /* No event tells of a permission that comes late, of a configuration that the kernel sets, of another program that lets
  * go: what has just come is looked at often for a while, and everything at times. */

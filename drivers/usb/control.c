@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "drivers/protocol/bytes.h"
-#include "drivers/usb/device_private.h"
+#include "drivers/usb/usb_core.h"
 
 struct setup {
     uint8_t type, request;

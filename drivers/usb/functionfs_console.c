@@ -12,7 +12,7 @@
 #include "drivers/protocol/bytes.h"
 #include "drivers/protocol/native_encode.h"
 #include "drivers/usb/functionfs_private.h"
-#include "drivers/usb/scanhead.h"
+#include "drivers/usb/head_device.h"
 
 static const struct itimerspec every_second = {{1, 0}, {1, 0}}, never = {{0, 0}, {0, 0}};
 

@@ -1,6 +1,6 @@
 /* Places all over the Earth, points about them, and how far two methods are apart. */
-#ifndef TESTS_STATIONS_H
-#define TESTS_STATIONS_H
+#ifndef TESTS_ACCURACY_STATIONS_H
+#define TESTS_ACCURACY_STATIONS_H
 
 #include <stdint.h>
 

@@ -1,4 +1,4 @@
-/* The beam against its definitions (core/beam.h). */
+/* The beam against its definitions (core/footprint.h). */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

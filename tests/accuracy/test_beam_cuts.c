@@ -8,7 +8,7 @@
 #include <string.h>
 #include <cmocka.h>
 
-#include "core/generate.h"
+#include "tests/common/generate.h"
 #include "core/rng.h"
 #include "core/surface.h"
 #include "tests/accuracy/beam_reference.h"

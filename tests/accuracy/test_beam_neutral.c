@@ -1,5 +1,5 @@
 /* Footprints with a detection that asks for nothing, and which of the echoes are sent: neither changes an echo. */
-#include "core/generate.h"
+#include "tests/common/generate.h"
 #include "core/rng.h"
 #include "tests/accuracy/block_copy.h"
 #include "tests/accuracy/lit_plates.h"

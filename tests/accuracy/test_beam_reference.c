@@ -8,7 +8,7 @@
 #include <unistd.h>
 #include <cmocka.h>
 
-#include "core/generate.h"
+#include "tests/common/generate.h"
 #include "tests/accuracy/beam_reference.h"
 
 /* SH_SANITIZE: sanitizers are for the code, not for the count. */

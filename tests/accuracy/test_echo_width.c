@@ -1,4 +1,4 @@
-/* Widths of echoes against the spread of many sub-rays, worked out from the definition in core/beam.h. */
+/* Widths of echoes against the spread of many sub-rays, worked out from the definition in core/footprint.h. */
 #include "tests/accuracy/slanted.h"
 
 /* One ray stands for the footprint; with rings the sub-rays have spreads of their own, so that few do. */

@@ -1,5 +1,5 @@
 /* Rays that are not refined, against the long double reference: away from borders the true triangle, at a range within
- * the bound that core/cast/bvh.h derives; near them, another one that the ray passes within what float may be off by.
+ * the bound that core/bvh/bvh_inside.h derives; near them, another one that the ray passes within what float may be off by.
  * Where that fails first: grazing incidence, far away, far from the BVH's origin, on UTM coordinates, on flat caps. */
 #include <math.h>
 #include <setjmp.h>
@@ -10,8 +10,8 @@
 #include <string.h>
 #include <cmocka.h>
 
-#include "core/cast/bvh.h"
-#include "core/generate.h"
+#include "core/bvh/bvh_inside.h"
+#include "tests/common/generate.h"
 #include "core/rng.h"
 #include "core/vec3.h"
 #include "tests/accuracy/reference.h"

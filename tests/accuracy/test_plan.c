@@ -13,7 +13,7 @@
 #include <cmocka.h>
 
 #include "core/cast/caster_private.h"
-#include "firmware_sim/site_plan.h"
+#include "firmware_sim/site/plan_rows.h"
 #include "tests/accuracy/beam_reference.h"
 
 /* SH_SANITIZE: sanitizers are for the code, not for the count. */
@@ -42,7 +42,7 @@ static void open_side(struct side *side, const char *file, const char *const *se
         site_load(side->cfg, NULL, &side->site, &err) != SH_OK || caster_create(&side->caster, &err) != SH_OK ||
         line_block_alloc(&side->block, ROOM, &err) != SH_OK)
         fail_msg("%s", err.text);
-    settings = side->cfg->settings;
+    settings = side->cfg->head.settings;
     settings.frames = 1;
     config_fill_spec(&side->cfg->profile, &settings, &spec);
     schedule_start(&side->segment, &spec);
@@ -113,8 +113,8 @@ static void expect_within(const char *what, const struct tally *t, const struct 
     assert_true(t->pulses >= RUNS);
     assert_true(wrong <= row->echo_share + 3.0 * sqrt(row->echo_share / n));
     assert_true(t->sum2 - 2.0 * sqrt(t->sum4) <= row->error_m * row->error_m * t->echoes + 1e-12 * t->echoes);
-    assert_true(wrong <= cfg->echo_tolerance + 3.0 * sqrt(cfg->echo_tolerance / n));
-    assert_true(rms <= cfg->plan_tolerance_m);
+    assert_true(wrong <= cfg->plan.echo_tolerance + 3.0 * sqrt(cfg->plan.echo_tolerance / n));
+    assert_true(rms <= cfg->plan.tolerance_m);
 }
 
 static void compare_beam(struct side *side, uint32_t station, const struct schedule_run *run, const struct beam *beam,
@@ -192,7 +192,7 @@ static void check_cast(const char *file, struct side *side, struct side *referen
 {
     struct tally t = {0};
     struct schedule_run run;
-    const double most_m = PLAN_CAST_SHARE * side->cfg->plan_tolerance_m;
+    const double most_m = PLAN_CAST_SHARE * side->cfg->plan.tolerance_m;
     assert_true(!reference->site->plan.methods.plain);
     for (uint32_t j = 0; j < RUNS * 6; j++) {
         if (!get_run(side, j, &run)) continue;
@@ -239,8 +239,8 @@ static void check_positions(struct side *side, struct side *reference)
     printf("# %s: %llu points, georef %s promises %.2g m, found %.2g m, counts of %.2g m\n", side->cfg->file,
            (unsigned long long)points, row->method, bound, most, side->site->scale_m);
     assert_true(points > RUNS);
-    assert_true(bound <= side->cfg->tolerance_m);
-    if (side->site->plan.methods.plain) bound += PLAN_CAST_SHARE * side->cfg->plan_tolerance_m;
+    assert_true(bound <= side->cfg->output.tolerance_m);
+    if (side->site->plan.methods.plain) bound += PLAN_CAST_SHARE * side->cfg->plan.tolerance_m;
     assert_true(most <= bound + 1.001 * side->site->scale_m);
 }
 

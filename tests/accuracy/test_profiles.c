@@ -8,7 +8,7 @@
 #include "tests/unit/cases.h"
 
 #include "core/rng.h"
-#include "firmware_sim/site.h"
+#include "firmware_sim/site/site.h"
 
 enum { PULSES = 1666, LINES = 600 };
 

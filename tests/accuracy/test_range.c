@@ -12,7 +12,7 @@
 #include <cmocka.h>
 
 #include "core/cast.h"
-#include "core/generate.h"
+#include "tests/common/generate.h"
 #include "core/rng.h"
 #include "tests/accuracy/reference.h"
 

@@ -12,10 +12,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/generate.h"
+#include "tests/common/generate.h"
 #include "core/rng.h"
-#include "firmware_sim/bench.h"
-#include "firmware_sim/config_private.h"
+#include "tests/bench/bench.h"
+#include "firmware_sim/config/table.h"
 #include "tests/accuracy/beam_reference.h"
 #include "tests/bench/pin.h"
 

@@ -8,10 +8,10 @@
 #include <string.h>
 
 #include "core/cast.h"
-#include "core/generate.h"
+#include "tests/common/generate.h"
 #include "core/rng.h"
 #include "core/vecmath.h"
-#include "firmware_sim/bench.h"
+#include "tests/bench/bench.h"
 #include "tests/bench/reference.h"
 #include "tests/bench/pin.h"
 

@@ -7,7 +7,7 @@
 
 #include "core/plan.h"
 #include "core/rng.h"
-#include "firmware_sim/bench.h"
+#include "tests/bench/bench.h"
 #include "tests/geodesy.h"
 #include "tests/bench/pin.h"
 

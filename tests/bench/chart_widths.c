@@ -8,7 +8,7 @@
 #include "core/georef/polynomial_kernels.h"
 #include "core/georef/private.h"
 #include "core/rng.h"
-#include "firmware_sim/bench.h"
+#include "tests/bench/bench.h"
 #include "tests/bench/pin.h"
 
 enum { POINTS = 2048, ROUNDS = 25, TIMES = 100, MAPS = 4, MAX_WIDTHS = 4 };

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "core/cast.h"
-#include "firmware_sim/bench.h"
+#include "tests/bench/bench.h"
 #include "tests/bench/pin.h"
 
 enum { LINES = 400, ROUNDS = 21 };

@@ -21,7 +21,7 @@
 #include <unistd.h>
 #include <cmocka.h>
 
-#include "drivers/host/usb.h"
+#include "drivers/host/usb_inside.h"
 
 enum { MS = 1000, EP0_IN = 0x80, IF_IN = 0x81, EP_IN = 0x82, DEV_OUT = 0x00, IF_OUT = 0x01, EP_OUT = 0x02 };
 enum { VENDOR_IF_OUT = 0x41, HALT = 0, STALL = LIBUSB_ERROR_PIPE, BUFFER = 64 << 10 };

@@ -1,6 +1,6 @@
 /* Meshes for the casting tests, put together from parts. */
-#ifndef TESTS_MESH_H
-#define TESTS_MESH_H
+#ifndef TESTS_STABILITY_MESH_H
+#define TESTS_STABILITY_MESH_H
 
 #include <stdint.h>
 

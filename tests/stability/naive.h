@@ -1,7 +1,7 @@
 /* The plain way to cast with Embree, which the stability table shows beside ours: one float mesh with shared
  * vertices, float rays, the range as Embree tells it. */
-#ifndef TESTS_NAIVE_H
-#define TESTS_NAIVE_H
+#ifndef TESTS_STABILITY_NAIVE_H
+#define TESTS_STABILITY_NAIVE_H
 
 #include <stdint.h>
 

@@ -1,6 +1,6 @@
 /* One scene seen from one station by ours and by the reference, and what rays of it come to. */
-#ifndef TESTS_RIG_H
-#define TESTS_RIG_H
+#ifndef TESTS_STABILITY_RIG_H
+#define TESTS_STABILITY_RIG_H
 
 #include <stdint.h>
 

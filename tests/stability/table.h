@@ -2,8 +2,8 @@
  *
  * A row fails where ours breaks the bound, and where the naive method keeps it: then the row proves nothing.
  */
-#ifndef TESTS_TABLE_H
-#define TESTS_TABLE_H
+#ifndef TESTS_STABILITY_TABLE_H
+#define TESTS_STABILITY_TABLE_H
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/generate.h"
+#include "tests/common/generate.h"
 #include "tests/accuracy/beam_reference.h"
 #include "tests/stability/table.h"
 

@@ -5,7 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "core/generate.h"
+#include "tests/common/generate.h"
 #include "tests/stability/rig.h"
 
 static const double NOWHERE[3] = {0.0, 0.0, 0.0};

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/generate.h"
+#include "tests/common/generate.h"
 #include "core/rng.h"
 #include "tests/stability/rig.h"
 

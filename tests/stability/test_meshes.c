@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/cast/bvh.h" /* the label that a triangle counts with */
+#include "core/bvh/bvh_inside.h" /* the label that a triangle counts with */
 #include "tests/stability/rig.h"
 
 #ifdef SH_SANITIZE

@@ -2,7 +2,7 @@
 #ifndef TESTS_UNIT_COMMAND_DEVICE_H
 #define TESTS_UNIT_COMMAND_DEVICE_H
 
-#include "firmware_sim/command.h"
+#include "firmware_sim/command/command.h"
 
 #define MICRO INT64_C(1000000)
 

@@ -14,7 +14,7 @@
 #include <unistd.h>
 #include <cmocka.h>
 
-#include "firmware_sim/config_private.h"
+#include "firmware_sim/config/table.h"
 
 /* clang-format off */
 static const char base[] = "head:\n"                        /* 1 */

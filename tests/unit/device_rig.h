@@ -14,9 +14,9 @@
 #include <cmocka.h>
 
 #include "drivers/protocol/native.h"
-#include "firmware_sim/device.h"
-#include "firmware_sim/ring.h"
-#include "firmware_sim/work.h"
+#include "firmware_sim/device/device.h"
+#include "firmware_sim/loop/ring.h"
+#include "firmware_sim/loop/work.h"
 
 static char folder[64];
 static char journal_path[96];

@@ -12,7 +12,7 @@
 #include <unistd.h>
 #include <cmocka.h>
 
-#include "drivers/host/recorder.h"
+#include "drivers/record/recorder.h"
 #include "drivers/protocol/native_encode.h"
 
 enum { N = 5 };

@@ -15,7 +15,7 @@
 #include <unistd.h>
 #include <cmocka.h>
 
-#include "drivers/host/recorder.h"
+#include "drivers/record/recorder.h"
 #include "drivers/protocol/native_encode.h"
 
 enum { RIG_MAX_POINTS = 4096 };

@@ -1,6 +1,6 @@
 /* For tests of the scene: files in a folder of their own, a load that collects warnings. */
-#ifndef TESTS_SCENE_FILES_H
-#define TESTS_SCENE_FILES_H
+#ifndef TESTS_UNIT_SCENE_FILES_H
+#define TESTS_UNIT_SCENE_FILES_H
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,11 +1,11 @@
-/* Returns of a pulse -> echoes: by the definitions of core/beam.h, in numbers that can be done by hand. */
+/* Returns of a pulse -> echoes: by the definitions of core/footprint.h, in numbers that can be done by hand. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <cmocka.h>
 
-#include "core/beam.h"
+#include "core/footprint.h"
 
 enum { MOST = 16 };
 

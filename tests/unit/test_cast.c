@@ -49,7 +49,7 @@ static void ranges_in_a_room_are_exact_to_the_planes_tilt(void **state)
             int wall = -1;
             const long double d[3] = {dx[i], dy[i], dz[i]};
             long double error = fabsl((long double)range[i] - box_range(lo, hi, station, d, &wall));
-            /* A stored normal is tilted by up to 2^-40 (core/cast/bvh.h) about the triangle's middle, at most 4.3 km
+            /* A stored normal is tilted by up to 2^-40 (core/bvh/bvh_inside.h) about the triangle's middle, at most 4.3 km
              * from here; the incidence's cosine is at least 0.05: 4300 * 2^-40 / 0.05 = 8e-8 m. */
             if (!(error < 8e-8L)) fail_msg("room %d, ray %d: range %.12g, %.3Lg m off", r, i, range[i], error);
             assert_int_equal(rig->scene->label[triangle[i]], wall);
@@ -110,7 +110,7 @@ static void ranges_to_a_tilted_plane_are_exact_to_the_planes_tilt(void **state)
                 nd += n[i] * d[i];
             }
             long double error = fabsl((long double)range - no / nd);
-            /* A stored normal is tilted by up to 2^-40 (core/cast/bvh.h) about the triangle's middle, at most 4.3 km
+            /* A stored normal is tilted by up to 2^-40 (core/bvh/bvh_inside.h) about the triangle's middle, at most 4.3 km
              * from here; the incidence's cosine is at least 0.05: 4300 * 2^-40 / 0.05 = 8e-8 m. */
             if (!(error < 8e-8L)) fail_msg("plane %d, ray %d: range %.12g, %.3Lg m off", p, ray, range, error);
             if (error > worst) worst = error;

@@ -251,7 +251,7 @@ static void test_moving_body(void **state)
 }
 
 /* Rays that are not refined, from a head that moves past a body that moves: what refined ones meet. 14 m away at most,
- * float is off by 17 x 2^-24 x 14 m (core/cast/bvh.h) over the cosine of the incidence, which at the far end of the
+ * float is off by 17 x 2^-24 x 14 m (core/bvh/bvh_inside.h) over the cosine of the incidence, which at the far end of the
  * long wall is a fifteenth; and each reading by half a count of 10 um. Where a ray passes an edge within that the wall
  * may be either. */
 static void test_plain(void **state)

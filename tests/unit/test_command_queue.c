@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "firmware_sim/command.h"
+#include "firmware_sim/command/command.h"
 
 static void expect_pop(struct command_queue *queue, const char *text)
 {

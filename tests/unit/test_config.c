@@ -110,14 +110,14 @@ static void values_arrive(void **state)
     char file[128];
     assert_loads(load_edited(LINES, "  lines_hz: 99.999999\n  pan_stop_deg: 0.1\n  serial: K-7\n  frames: 1e3\n"));
     snprintf(file, sizeof file, "%s/cube.obj", dir);
-    assert_int_equal(cfg->settings.prr_uhz, 500000000000);
-    assert_int_equal(cfg->settings.lines_uhz, 99999999);
-    assert_int_equal(cfg->settings.pan_stop_udeg, 100000);
-    assert_int_equal(cfg->settings.frames, 1000);
-    assert_string_equal(cfg->serial, "K-7");
-    assert_int_equal(cfg->n_meshes, 1);
-    assert_string_equal(cfg->mesh[0].file, file); /* beside the configuration */
-    assert_int_equal(cfg->mesh[0].up, SCENE_UP_Z);
+    assert_int_equal(cfg->head.settings.prr_uhz, 500000000000);
+    assert_int_equal(cfg->head.settings.lines_uhz, 99999999);
+    assert_int_equal(cfg->head.settings.pan_stop_udeg, 100000);
+    assert_int_equal(cfg->head.settings.frames, 1000);
+    assert_string_equal(cfg->head.serial, "K-7");
+    assert_int_equal(cfg->scene.n_meshes, 1);
+    assert_string_equal(cfg->scene.mesh[0].file, file); /* beside the configuration */
+    assert_int_equal(cfg->scene.mesh[0].up, SCENE_UP_Z);
     assert_int_equal(cfg->n_stations, 1);
     assert_true(cfg->station[0].position_m[0] == 1 && cfg->station[0].position_m[1] == 2 &&
                 cfg->station[0].position_m[2] == 3 && cfg->station[0].heading_deg == 90);
@@ -131,7 +131,7 @@ static void defaults_are_those_of_the_table(void **state)
     (void)state;
     assert_loads(load_edited(PRR LINES, ""));
     /* the profile's: see config/heads/riegl-vz400i.yaml */
-    const struct head_settings *s = &cfg->settings;
+    const struct head_settings *s = &cfg->head.settings;
     assert_int_equal(s->prr_uhz, 1200000000000);
     assert_int_equal(s->lines_uhz, 240000000);
     assert_int_equal(s->pan_udeg_s, 150000000);
@@ -142,16 +142,16 @@ static void defaults_are_those_of_the_table(void **state)
     assert_int_equal(s->frames, 1);
     assert_int_equal(s->station, 1);
     assert_string_equal(cfg->station[0].name, "station-1");
-    assert_true(cfg->scene_tolerance_m == 1e-6 && cfg->scale_m == 0.0);
-    assert_true(cfg->mesh[0].offset_m[0] == 0.0 && cfg->mesh[0].offset_m[2] == 0.0);
-    assert_int_equal(cfg->crs, GEOREF_LOCAL);
-    assert_int_equal(cfg->layout, LINE_POLAR);
+    assert_true(cfg->scene.tolerance_m == 1e-6 && cfg->output.scale_m == 0.0);
+    assert_true(cfg->scene.mesh[0].offset_m[0] == 0.0 && cfg->scene.mesh[0].offset_m[2] == 0.0);
+    assert_int_equal(cfg->output.crs, GEOREF_LOCAL);
+    assert_int_equal(cfg->output.layout, LINE_POLAR);
     assert_int_equal(cfg->link[0].max_sessions, 4);
-    assert_int_equal(cfg->noise_range, RANGE_NOISE_OFF);
-    assert_int_equal(cfg->seed, 1);
-    assert_true(cfg->tick_hz == 1000 && cfg->ahead_ms == 64 && cfg->queue_ms == 250 && cfg->late_ms == 100);
-    assert_int_equal(cfg->threads, 0);
-    assert_int_equal(cfg->pace, PACE_REALTIME);
+    assert_int_equal(cfg->noise.range, RANGE_NOISE_OFF);
+    assert_int_equal(cfg->noise.seed, 1);
+    assert_true(cfg->loop.tick_hz == 1000 && cfg->loop.ahead_ms == 64 && cfg->loop.queue_ms == 250 && cfg->loop.late_ms == 100);
+    assert_int_equal(cfg->loop.threads, 0);
+    assert_int_equal(cfg->loop.pace, PACE_REALTIME);
     assert_string_equal(cfg->time.epoch, "none");
 }
 
@@ -170,8 +170,8 @@ static void odd_but_right_configurations_load(void **state)
     assert_loads(load_edited("type: tcp\n    port: 0", "type: null"));
     assert_int_equal(cfg->link[0].type, LINK_NULL);
     assert_loads(load_edited("output:", "noise: {range: true, seed: 18446744073709551615}\noutput:"));
-    assert_int_equal(cfg->noise_range, RANGE_NOISE_ON);
-    assert_true(cfg->seed == UINT64_MAX);
+    assert_int_equal(cfg->noise.range, RANGE_NOISE_ON);
+    assert_true(cfg->noise.seed == UINT64_MAX);
     /* A pan at rest, as SCPI has it, too: each line is a frame. */
     assert_loads(load_edited(LINES, "  pan_deg_s: 0\n  frames: 0\n"));
     assert_loads(load_edited(LINES, "  pan_deg_s: 0\n  frames: 7\n"));

@@ -10,7 +10,7 @@ static void shipped_files_load(void **state)
         snprintf(set, sizeof set, "head.profile=%s", heads[i]);
         assert_loads(load_set(set));
         assert_string_equal(cfg->profile.name, heads[i]);
-        assert_true(cfg->profile.spin_up_s + cfg->ahead_ms * 1e-3 < 0.1); /* command to beam */
+        assert_true(cfg->profile.spin_up_s + cfg->loop.ahead_ms * 1e-3 < 0.1); /* command to beam */
     }
     /* The whole sweep is the field of view, without rounding. */
     assert_true(360.0 / cfg->profile.facets * cfg->profile.optical_gain == 100.0);

@@ -5,7 +5,7 @@ static void set_changes_values(void **state)
 {
     (void)state;
     assert_loads(load_set("head.prr_hz=2e5"));
-    assert_int_equal(cfg->settings.prr_uhz, 200000000000);
+    assert_int_equal(cfg->head.settings.prr_uhz, 200000000000);
     assert_loads(load_set("stations[0].heading_deg=45.5"));
     assert_true(cfg->station[0].heading_deg == 45.5);
     assert_loads(load_set("stations.0.heading_deg=-1"));
@@ -15,10 +15,10 @@ static void set_changes_values(void **state)
     assert_loads(load_set("stations[0].position_m=7,8,9"));
     assert_true(cfg->station[0].position_m[2] == 9);
     assert_loads(load_set("head.serial=A=B"));
-    assert_string_equal(cfg->serial, "A=B");
+    assert_string_equal(cfg->head.serial, "A=B");
     assert_loads(load_set("head.profile=riegl-vz600i"));
     assert_string_equal(cfg->profile.name, "riegl-vz600i");
-    assert_int_equal(cfg->settings.line_stop_udeg, 65000000); /* defaults follow the profile */
+    assert_int_equal(cfg->head.settings.line_stop_udeg, 65000000); /* defaults follow the profile */
 }
 
 static void set_appends_elements(void **state)
@@ -32,7 +32,7 @@ static void set_appends_elements(void **state)
     assert_int_equal(cfg->link[1].type, LINK_FILE);
     assert_string_equal(cfg->link[1].path, "out.bin"); /* of the working directory, not of the file */
     assert_int_equal(cfg->n_stations, 2);
-    assert_int_equal(cfg->settings.station, 2);
+    assert_int_equal(cfg->head.settings.station, 2);
     assert_string_equal(cfg->station[1].name, "station-2");
 }
 

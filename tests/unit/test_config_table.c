@@ -8,7 +8,7 @@
 #include <string.h>
 #include <cmocka.h>
 
-#include "firmware_sim/config_private.h"
+#include "firmware_sim/config/table.h"
 
 static void the_reference_names_every_key(void **state)
 {

@@ -4,8 +4,8 @@
 
 #include <math.h>
 
-#include "firmware_sim/device_private.h"
-#include "firmware_sim/journal.h"
+#include "firmware_sim/device/device_state.h"
+#include "firmware_sim/device/journal.h"
 
 #define HZ INT64_C(1000000)
 
@@ -55,7 +55,7 @@ static void a_command_reaches_the_beam_within_100_ms(void **state)
 {
     (void)state;
     struct rig *rig = rig_open(NULL, NULL, 0);
-    assert_true(rig->cfg->ahead_ms == 64.0 && rig->cfg->tick_hz == 1000.0);
+    assert_true(rig->cfg->loop.ahead_ms == 64.0 && rig->cfg->loop.tick_hz == 1000.0);
     for (uint64_t scan = 1; scan <= 20; scan++) {
         uint64_t released = rig->next < 300 ? 300 : rig->next;
         rig_go_to(rig, released + 65);

@@ -4,8 +4,8 @@
 #include <math.h>
 
 #include "drivers/protocol/nmea.h"
-#include "firmware_sim/gnss.h"
-#include "firmware_sim/head_clock.h"
+#include "firmware_sim/device/gnss.h"
+#include "firmware_sim/device/head_clock.h"
 #include "tests/unit/nmea_reader.h"
 
 struct receiver {

@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "firmware_sim/head.h"
+#include "firmware_sim/command/head.h"
 
 /* All pairs, by name, as a person would write them on paper; "-" is refused. */
 static const char *const event_order[HEAD_N_EVENTS] = {"power-on", "power-off", "booted",    "start", "spun-up",

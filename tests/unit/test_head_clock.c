@@ -5,7 +5,7 @@
 #include <sys/timex.h>
 #include <time.h>
 
-#include "firmware_sim/head_clock.h"
+#include "firmware_sim/device/head_clock.h"
 
 __extension__ typedef __int128 i128;
 

@@ -12,7 +12,7 @@
 #include <unistd.h>
 #include <cmocka.h>
 
-#include "drivers/host/usb.h"
+#include "drivers/host/usb_inside.h"
 #include "drivers/protocol/native_encode.h"
 
 static void test_names(void **state)

@@ -11,7 +11,7 @@
 
 #include <cmocka.h>
 
-#include "firmware_sim/journal.h"
+#include "firmware_sim/device/journal.h"
 
 static char dir[] = "/tmp/scanhead-journal-XXXXXX";
 static char path[64];

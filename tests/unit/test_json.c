@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "firmware_sim/json.h"
+#include "firmware_sim/base/json.h"
 
 /* Collects one text in memory. */
 struct sink {

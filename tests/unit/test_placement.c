@@ -11,7 +11,7 @@
 #include <cmocka.h>
 
 #include "core/locate.h"
-#include "firmware_sim/check_station.h"
+#include "firmware_sim/app/check_places.h"
 
 static char dir[64], config_path[128];
 static struct config *cfg;

@@ -6,7 +6,7 @@
 #include <stdatomic.h>
 #include <string.h>
 
-#include "firmware_sim/ring.h"
+#include "firmware_sim/loop/ring.h"
 
 enum { AHEAD = 6, QUEUE = 4, SLOT_BYTES = 1000 };
 

@@ -3,7 +3,7 @@
 
 #include <unistd.h>
 
-#include "firmware_sim/site.h"
+#include "firmware_sim/site/site.h"
 
 static char folder[] = "/tmp/scanhead-move-XXXXXX";
 

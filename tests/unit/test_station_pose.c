@@ -1,9 +1,9 @@
 /* The head's pose in a recording's frame, against GeographicLib; the CRS texts; the place of a shot in its line. */
-#include "drivers/host/station_pose.h"
+#include "drivers/record/station_pose.h"
 
 #include "core/georef.h"
-#include "drivers/host/crs_wkt.h"
-#include "drivers/host/track.h"
+#include "drivers/record/crs_wkt.h"
+#include "drivers/record/track.h"
 #include "drivers/protocol/native.h"
 #include "tests/unit/cases.h"
 #include "tests/unit/recorder_rig.h"

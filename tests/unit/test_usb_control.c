@@ -2,7 +2,7 @@
 #include "tests/unit/usb_host.h"
 #include "tests/unit/usb_models.h"
 
-#include "drivers/usb/scanhead.h"
+#include "drivers/usb/head_device.h"
 
 enum { DEF = 1, ADR = 2, CFG = 4, ALL = 7 };      /* states in which a case succeeds */
 enum { FS = 1, HS = 2, SS = 4, ANY = 7, NO = 0 }; /* and rates */

@@ -3,7 +3,7 @@
 #include "tests/unit/usb_host.h"
 #include "tests/unit/usb_models.h"
 
-#include "drivers/usb/scanhead.h"
+#include "drivers/usb/head_device.h"
 
 static const enum usb_rate rates[] = {USB_RATE_FULL, USB_RATE_HIGH, USB_RATE_SUPER};
 

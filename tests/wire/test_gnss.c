@@ -1,6 +1,6 @@
 /* The GNSS receiver on its links: whole sentences in their order, all of them or what is lost counted; and the PPS of
  * the native stream beside them. */
-#include "tests/wire/gnss.h"
+#include "tests/wire/gnss_rig.h"
 
 #include "tests/unit/nmea_reader.h"
 

@@ -1,5 +1,5 @@
 /* The GNSS receiver read by gpsd, the client that everybody has, and gpspipe. */
-#include "tests/wire/gnss.h"
+#include "tests/wire/gnss_rig.h"
 
 static int in_path(const char *program)
 {

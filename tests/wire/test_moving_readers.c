@@ -1,5 +1,5 @@
 /* Recordings of a moving head, and in degrees, read by other people's software: the same points in all formats. */
-#include "drivers/host/crs_wkt.h"
+#include "drivers/record/crs_wkt.h"
 #include "tests/wire/readers.h"
 
 /* A yard with three walls and no roof, and a head that drives and turns in it for a second. */

@@ -1,7 +1,7 @@
 /* Recordings as readers see them that are not ours: a scan of two stations in UTM, written in each format at once, read
  * back by other people's software, point by point against the raw stream. A reader that is not installed is skipped. */
 #include "core/georef.h"
-#include "drivers/host/crs_wkt.h"
+#include "drivers/record/crs_wkt.h"
 #include "tests/wire/readers.h"
 
 /* Two stations on the ground of a yard with three walls and no roof: shots without echo, and lines of unequal length

@@ -1,0 +1,87 @@
+#include <errno.h>
+#include <png.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/analysis/map_private.h"
+
+/* libpng reports by a callback that must not return; the reason is kept for the error text. */
+struct png_reason {
+    char text[128];
+};
+
+static void on_error(png_structp png, png_const_charp text)
+{
+    struct png_reason *reason = png_get_error_ptr(png);
+    snprintf(reason->text, sizeof reason->text, "%s", text);
+    png_longjmp(png, 1);
+}
+
+static void on_warning(png_structp png, png_const_charp text)
+{
+    (void)png;
+    (void)text; /* libpng's warnings concern chunks that we do not write */
+}
+
+/* Nothing here is changed between setjmp and longjmp but through pointers. */
+static int encode(const struct map_image *image, FILE *file, png_structp png, png_infop info)
+{
+    if (setjmp(png_jmpbuf(png)) != 0) return -1;
+    png_init_io(png, file);
+    png_set_IHDR(png, info, image->width, image->height, 8, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
+                 PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+    png_set_sRGB(png, info, PNG_sRGB_INTENT_RELATIVE);
+    png_write_info(png, info);
+    for (uint32_t row = 0; row < image->height; row++)
+        png_write_row(png, image->rgb + (size_t)row * image->width * 3);
+    png_write_end(png, info);
+    return 0;
+}
+
+static int encode_file(const struct map_image *image, FILE *file, struct png_reason *reason)
+{
+    int rc = -1;
+    png_infop info = NULL;
+    png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, reason, on_error, on_warning);
+    if (png != NULL) info = png_create_info_struct(png);
+    if (info != NULL)
+        rc = encode(image, file, png, info);
+    else
+        snprintf(reason->text, sizeof reason->text, "no memory");
+    png_destroy_write_struct(&png, &info);
+    if (rc == 0 && fflush(file) != 0) {
+        snprintf(reason->text, sizeof reason->text, "%s", strerror(errno));
+        rc = -1;
+    }
+    return rc;
+}
+
+int map_png_write(const struct map_image *image, const char *path, struct sh_err *err)
+{
+    struct png_reason reason = {""};
+    const size_t len = strlen(path) + sizeof ".part";
+    char *part = malloc(len);
+    if (part == NULL) return sh_fail(err, SH_ENOMEM, "map %s: no memory", path);
+    snprintf(part, len, "%s.part", path);
+    int rc = SH_OK;
+    FILE *file = fopen(part, "wbe");
+    if (file == NULL) {
+        rc = sh_fail(err,
+                     errno == EACCES                       ? SH_EPERM
+                     : errno == ENOENT || errno == ENOTDIR ? SH_EINPUT
+                                                           : SH_EIO,
+                     "map %s: cannot be written: %s", path, strerror(errno));
+        goto out;
+    }
+    if (encode_file(image, file, &reason) != 0)
+        rc = sh_fail(err, SH_EIO, "map %s: cannot be written: %s", path, reason.text);
+    if (fclose(file) != 0 && rc == SH_OK)
+        rc = sh_fail(err, SH_EIO, "map %s: cannot be written: %s", path, strerror(errno));
+    if (rc == SH_OK && rename(part, path) != 0)
+        rc = sh_fail(err, errno == EISDIR ? SH_EINPUT : SH_EIO, "map %s: cannot be written: %s", path, strerror(errno));
+    if (rc != SH_OK) remove(part);
+out:
+    free(part);
+    return rc;
+}

@@ -1,0 +1,127 @@
+#include "core/bvh/bvh_inside.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+
+static bool count_bytes(void *user, ssize_t bytes, bool post)
+{
+    (void)post;
+    struct bvh *bvh = user;
+    __atomic_add_fetch(&bvh->bytes, (int64_t)bytes, __ATOMIC_RELAXED);
+    return true;
+}
+
+static int build(struct bvh *bvh, struct sh_err *err)
+{
+    RTCGeometry geometry = rtcNewGeometry(bvh->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    int rc = bvh_fill(bvh, geometry, err);
+    if (rc == SH_OK) {
+        rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_HIGH);
+        rtcCommitGeometry(geometry);
+        bvh->rtc = rtcNewScene(bvh->device);
+        rtcSetSceneFlags(bvh->rtc, RTC_SCENE_FLAG_NONE);
+        rtcSetSceneBuildQuality(bvh->rtc, RTC_BUILD_QUALITY_HIGH);
+        rtcAttachGeometry(bvh->rtc, geometry);
+        rtcCommitScene(bvh->rtc);
+        int code = (int)rtcGetDeviceError(bvh->device);
+        if (code != RTC_ERROR_NONE)
+            rc = sh_fail(err, SH_ENOMEM, "cast: Embree failed to build the BVH (error %d)", code);
+    }
+    rtcReleaseGeometry(geometry);
+    return rc;
+}
+
+static uint32_t native_packet(RTCDevice device)
+{
+    if (rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED)) return 16;
+    if (rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED)) return 8;
+    return 4;
+}
+
+static double seconds(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static int create(const struct scene *scene, const double origin_m[3], double station_reach_m, unsigned threads,
+                  int plain, const struct sh_report *report, struct bvh **out, struct sh_err *err)
+{
+    *out = NULL;
+    struct bvh *bvh = calloc(1, sizeof *bvh);
+    if (bvh == NULL) return sh_fail(err, SH_ENOMEM, "cast: no memory");
+    char config[32] = "";
+    if (threads != 0) snprintf(config, sizeof config, "threads=%u", threads);
+    bvh->scene = scene;
+    bvh->plain = plain;
+    bvh->station_reach_m = station_reach_m;
+    for (int i = 0; i < 3; i++)
+        bvh->origin_m[i] = origin_m[i];
+    bvh->device = rtcNewDevice(config);
+    if (bvh->device == NULL) {
+        free(bvh);
+        return sh_fail(err, SH_EIO, "cast: Embree can't start on this processor");
+    }
+    rtcSetDeviceMemoryMonitorFunction(bvh->device, count_bytes, bvh);
+    if (scene->n_triangles > 1000000) sh_progress(report, "building the BVH", -1.0);
+    double start = seconds();
+    int rc = build(bvh, err);
+    if (rc != SH_OK) {
+        bvh_free(bvh);
+        return rc;
+    }
+    bvh->info.packet = native_packet(bvh->device);
+    bvh->info.build_s = seconds() - start;
+    bvh->info.bytes = (uint64_t)bvh->bytes;
+    if (!plain) bvh->info.bytes += (uint64_t)scene->n_triangles * sizeof *bvh->triangle;
+    *out = bvh;
+    return SH_OK;
+}
+
+int bvh_create(const struct scene *scene, const double origin_m[3], double station_reach_m, unsigned threads,
+               const struct sh_report *report, struct bvh **out, struct sh_err *err)
+{
+    return create(scene, origin_m, station_reach_m, threads, 0, report, out, err);
+}
+
+int bvh_create_plain(const struct scene *scene, const double origin_m[3], double station_reach_m, unsigned threads,
+                     const struct sh_report *report, struct bvh **out, struct sh_err *err)
+{
+    return create(scene, origin_m, station_reach_m, threads, 1, report, out, err);
+}
+
+int bvh_create_other(const struct bvh *bvh, unsigned threads, const struct sh_report *report, struct bvh **out,
+                     struct sh_err *err)
+{
+    return create(bvh->scene, bvh->origin_m, bvh->station_reach_m, threads, !bvh->plain, report, out, err);
+}
+
+void bvh_free(struct bvh *bvh)
+{
+    if (bvh == NULL) return;
+    if (bvh->rtc != NULL) rtcReleaseScene(bvh->rtc);
+    rtcReleaseDevice(bvh->device);
+    free(bvh->triangle);
+    free(bvh->rival_first);
+    free(bvh->rival);
+    free(bvh);
+}
+
+void bvh_get_info(const struct bvh *bvh, struct bvh_info *info)
+{
+    *info = bvh->info;
+}
+
+void bvh_set_packet(struct bvh *bvh, uint32_t rays)
+{
+    bvh->info.packet = rays;
+}
+
+void bvh_origin(const struct bvh *bvh, double origin_m[3])
+{
+    for (int i = 0; i < 3; i++)
+        origin_m[i] = bvh->origin_m[i];
+}

@@ -1,0 +1,291 @@
+/* Near a border: which triangle does the ray really meet? In double. */
+#include <math.h>
+#include <stdbool.h>
+
+#include "core/bvh/bvh_inside.h"
+#include "core/vec3.h"
+
+enum { DECIDE_MAX_ROUNDS = 32 };
+
+struct search {
+    const struct decide_ray *ray;
+    double point_m[3], radius_m; /* of the query, local frame */
+    uint32_t proposed;
+    uint32_t prim;            /* best so far */
+    double range_m, border_m; /* its range, and how far the ray passes from its nearest edge */
+    uint32_t near_prim;       /* the one that the ray misses by least; gap 1: double precision can't tell */
+    double near_gap, near_range_m;
+};
+
+static int before(const double a[3], const double b[3])
+{
+    for (int i = 0; i < 3; i++)
+        if (a[i] != b[i]) return a[i] < b[i];
+    return 0;
+}
+
+/* On which side of the edge a-b the ray passes, as the distance across the ray times the edge's length; corners
+ * relative to the ray's origin. Taken in one order of the corners whatever triangle asks, so that two triangles of an
+ * edge get the same number with opposite signs. */
+static double edge_side(const double a[3], const double b[3], const double dir[3])
+{
+    int swap = before(b, a);
+    const double *p = swap ? b : a, *q = swap ? a : b;
+    double e[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]};
+    double side = dir[0] * (p[1] * e[2] - p[2] * e[1]) + dir[1] * (p[2] * e[0] - p[0] * e[2]) +
+                  dir[2] * (p[0] * e[1] - p[1] * e[0]);
+    return swap ? -side : side;
+}
+
+static double edge_length(const double a[3], const double b[3])
+{
+    double e[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+    return sqrt(vec3_dot(e, e));
+}
+
+static double plane_range(const struct decide_ray *ray, uint32_t prim)
+{
+    const struct bvh_triangle *tri = &ray->bvh->triangle[prim];
+    return (tri->d - vec3_dot(tri->n, ray->o_local)) / vec3_dot(tri->n, ray->dir);
+}
+
+/* Range along the ray of the point where it comes nearest to the segment. */
+static double edge_range(const double a[3], const double b[3], const double dir[3])
+{
+    double e[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+    double ee = vec3_dot(e, e), ed = vec3_dot(e, dir), ae = vec3_dot(a, e), ad = vec3_dot(a, dir),
+           dd = vec3_dot(dir, dir);
+    double det = ee * dd - ed * ed;
+    double s = det > 0.0 ? (ed * ad - dd * ae) / det : 0.0;
+    s = s < 0.0 ? 0.0 : s > 1.0 ? 1.0 : s;
+    return (ad + s * ed) / dd;
+}
+
+/* Distance of the point at range t on the ray from the segment. */
+static double edge_gap(const double a[3], const double b[3], const double dir[3], double t)
+{
+    double e[3], w[3];
+    for (int i = 0; i < 3; i++) {
+        e[i] = b[i] - a[i];
+        w[i] = t * dir[i] - a[i];
+    }
+    double s = vec3_dot(w, e) / vec3_dot(e, e);
+    s = s < 0.0 ? 0.0 : s > 1.0 ? 1.0 : s;
+    for (int i = 0; i < 3; i++)
+        w[i] -= s * e[i];
+    return sqrt(vec3_dot(w, w));
+}
+
+/* Range to a triangle that the ray does meet. Where the ray lies almost in its plane the plane's range runs away: it is
+ * kept between the edges that the ray passes. */
+static double held_range(const struct decide_ray *ray, uint32_t prim, double v[3][3])
+{
+    const double *n = ray->bvh->triangle[prim].n;
+    double range = plane_range(ray, prim), lo = INFINITY, hi = -INFINITY;
+    if (fabs(vec3_dot(n, ray->dir)) > 1e-6 * sqrt(vec3_dot(n, n))) return range;
+    for (int i = 0; i < 3; i++) {
+        const double *a = v[i], *b = v[(i + 1) % 3];
+        double t = edge_range(a, b, ray->dir), blur = 0x1p-40 * edge_length(a, b) + 0x1p-46 * fabs(t);
+        if (edge_gap(a, b, ray->dir, t) > blur + 1e-6 * edge_length(a, b)) continue; /* the ray does not pass here */
+        lo = fmin(lo, t);
+        hi = fmax(hi, t);
+    }
+    if (!(lo <= hi)) return range;
+    return range < lo || isnan(range) ? lo : range > hi ? hi : range;
+}
+
+/* Corners relative to the ray's origin, and on which side of each edge the ray passes. */
+static void look_at(const struct decide_ray *ray, uint32_t prim, double v[3][3], double side[3])
+{
+    const struct scene *scene = ray->bvh->scene;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            v[i][j] = scene->vertex_m[scene->triangle[prim][i]][j] - ray->station_m[j];
+    for (int i = 0; i < 3; i++)
+        side[i] = edge_side(v[i], v[(i + 1) % 3], ray->dir);
+}
+
+/* How far the ray passes from the nearest edge, across the ray. */
+static double edge_distance(double v[3][3], const double side[3])
+{
+    double least = INFINITY;
+    for (int i = 0; i < 3; i++)
+        least = fmin(least, fabs(side[i]) / edge_length(v[i], v[(i + 1) % 3]));
+    return least;
+}
+
+static int is_inside(const double side[3])
+{
+    return (side[0] >= 0.0 && side[1] >= 0.0 && side[2] >= 0.0) || (side[0] <= 0.0 && side[1] <= 0.0 && side[2] <= 0.0);
+}
+
+/* What double precision can tell of an edge's side. */
+static double blur(const double a[3], const double b[3])
+{
+    return 8.0 * 0x1p-53 * sqrt(fmax(vec3_dot(a, a), vec3_dot(b, b))) * edge_length(a, b);
+}
+
+/* A ray within the plane, as far as double precision can tell, does not meet the triangle; what stands on its edges it
+ * does. */
+static int is_edge_on(double v[3][3], const double side[3])
+{
+    return fabs(side[0] + side[1] + side[2]) <= blur(v[0], v[1]) + blur(v[1], v[2]) + blur(v[2], v[0]);
+}
+
+/* Remembers the triangle that the ray misses by least, in units of what double precision can tell at its edges. */
+static void note_miss(struct search *s, uint32_t prim, double v[3][3], const double side[3])
+{
+    const double *dir = s->ray->dir;
+    double sign = side[0] + side[1] + side[2] < 0.0 ? -1.0 : 1.0; /* of n . dir */
+    double gap = -INFINITY, range = 0.0;
+    for (int i = 0; i < 3; i++) {
+        const double *a = v[i], *b = v[(i + 1) % 3];
+        double out = -sign * side[i] / blur(a, b);
+        if (out <= gap) continue;
+        gap = out;
+        range = edge_range(a, b, dir);
+    }
+    if (gap >= s->near_gap || range < 0.0) return;
+    s->near_gap = gap;
+    s->near_prim = prim;
+    s->near_range_m = range;
+}
+
+static void try_triangle(struct search *s, uint32_t prim)
+{
+    double v[3][3], side[3];
+    look_at(s->ray, prim, v, side);
+    if (is_edge_on(v, side)) return;
+    if (!is_inside(side)) {
+        note_miss(s, prim, v, side);
+        return;
+    }
+    double range = held_range(s->ray, prim, v);
+    if (!(range >= 0.0)) return;
+    double same = 1e-12 * range;
+    if (range < s->range_m - same || (range <= s->range_m + same && prim < s->prim)) {
+        s->prim = prim;
+        s->range_m = range;
+        s->border_m = edge_distance(v, side);
+    }
+}
+
+/* Embree names all triangles whose boxes, or those of their leaf, are near. What lies further than the query's radius
+ * is left out by its plane. */
+static bool visit(struct RTCPointQueryFunctionArguments *args)
+{
+    const struct search *s = args->userPtr;
+    const struct bvh_triangle *tri = &s->ray->bvh->triangle[args->primID];
+    double off = vec3_dot(tri->n, s->point_m) - tri->d, reach = s->radius_m;
+    if (args->primID != s->proposed && off * off <= reach * reach * vec3_dot(tri->n, tri->n))
+        try_triangle(args->userPtr, args->primID);
+    return false;
+}
+
+/* All triangles near the point at range_m on the ray. */
+static void try_around(struct search *s, double range_m, double radius_m)
+{
+    struct RTCPointQueryContext context;
+    struct RTCPointQuery query = {.radius = (float)radius_m};
+    const struct decide_ray *ray = s->ray;
+    rtcInitPointQueryContext(&context);
+    for (int i = 0; i < 3; i++)
+        s->point_m[i] = ray->o_local[i] + range_m * ray->dir[i];
+    s->radius_m = radius_m;
+    query.x = (float)s->point_m[0];
+    query.y = (float)s->point_m[1];
+    query.z = (float)s->point_m[2];
+    rtcPointQuery(ray->bvh->rtc, &query, &context, visit, s);
+}
+
+/* How far from the proposed point along the ray an edge's neighbours may be met, and the plane itself: the width,
+ * stretched by the incidence. */
+static double slack_m(const struct decide_ray *ray, uint32_t prim, double width_m)
+{
+    const struct bvh_triangle *tri = &ray->bvh->triangle[prim];
+    double cosine = fabs(vec3_dot(tri->n, ray->dir)) / sqrt(vec3_dot(tri->n, tri->n));
+    return 4.0 * width_m * (1.0 + 1.0 / fmax(cosine, 1e-6));
+}
+
+/* Rivals whose planes the ray meets within what float can't order are tried; the others lie clearly before or behind.
+ */
+static void try_rivals(struct search *s, uint32_t prim, double range_m)
+{
+    const struct decide_ray *ray = s->ray;
+    const struct bvh *bvh = ray->bvh;
+    if (bvh->rival_first == NULL) return;
+    const struct bvh_triangle *own = &bvh->triangle[prim];
+    uint32_t end = bvh->rival_first[prim + 1];
+    if (bvh->rival_first[prim] == end) return;
+    double own_m = bvh_width_m(bvh, prim);
+    double steep = sqrt(vec3_dot(own->n, own->n)) / fabs(vec3_dot(own->n, ray->dir));
+    for (uint32_t k = bvh->rival_first[prim]; k < end; k++) {
+        const struct bvh_triangle *tri = &bvh->triangle[bvh->rival[k]];
+        double along = fabs(vec3_dot(tri->n, ray->dir)), length = sqrt(vec3_dot(tri->n, tri->n));
+        double gap = fabs((tri->d - vec3_dot(tri->n, ray->o_local)) / vec3_dot(tri->n, ray->dir) - range_m);
+        double width_m = 4.0 * fmax(own_m, bvh_width_m(bvh, bvh->rival[k]));
+        if (!(gap * along > width_m * (steep * along + length))) try_triangle(s, bvh->rival[k]);
+    }
+}
+
+void decide_prefetch(const struct bvh *bvh, const uint32_t *prim, const uint32_t *ray, uint32_t n)
+{
+    const struct scene *scene = bvh->scene;
+    for (uint32_t k = 0; k < n; k++)
+        __builtin_prefetch(scene->triangle[prim[ray[k]]], 0, 3);
+    for (uint32_t k = 0; k < n; k++)
+        for (int j = 0; j < 3; j++)
+            __builtin_prefetch(scene->vertex_m[scene->triangle[prim[ray[k]]][j]], 0, 3);
+}
+
+/* What was tried may lie anywhere on the ray; it counts up to limit_m, for behind that not everything was tried. */
+static int is_found(struct search *s, double limit_m)
+{
+    if (s->range_m <= limit_m || (s->near_gap <= 1.0 && s->near_range_m <= limit_m)) return 1;
+    s->prim = s->near_prim = RTC_INVALID_GEOMETRY_ID;
+    s->range_m = s->near_gap = INFINITY;
+    return 0;
+}
+
+void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct cast_counters *counters,
+                struct decide_hit *hit)
+{
+    struct search s = {.ray = ray,
+                       .range_m = INFINITY,
+                       .prim = RTC_INVALID_GEOMETRY_ID,
+                       .near_prim = RTC_INVALID_GEOMETRY_ID,
+                       .near_gap = INFINITY};
+    counters->near_border++;
+    for (int round = 0; round < DECIDE_MAX_ROUNDS && prim != RTC_INVALID_GEOMETRY_ID; round++) {
+        s.proposed = prim;
+        try_triangle(&s, prim);
+        /* Inside in double as well, and further from the border than float can blur: the common case. Nearer, another
+         * triangle of the edge may lie in front of it by less than float can tell. */
+        double width_m = bvh_width_m(ray->bvh, prim);
+        if (s.prim == prim && s.border_m > width_m) break;
+        counters->decided++;
+        double range_m = (double)t, slack = slack_m(ray, prim, width_m), limit_m = range_m + slack;
+        double radius_m = fmin(slack, 0.01 * range_m + 4.0 * width_m);
+        try_around(&s, range_m, radius_m);
+        if (is_found(&s, limit_m)) break;
+        counters->went_on++;
+        float org[3], dir[3];
+        for (int i = 0; i < 3; i++) {
+            org[i] = (float)ray->o_local[i];
+            dir[i] = (float)ray->dir[i];
+        }
+        struct bvh_one one = {.t_min = nextafterf((float)(range_m + 0.5 * radius_m), INFINITY), .t_max = ray->t_max};
+        bvh_intersect_one(ray->bvh, org, dir, &one);
+        prim = one.prim;
+        t = one.t;
+    }
+    if (s.prim != RTC_INVALID_GEOMETRY_ID) try_rivals(&s, s.prim, s.range_m);
+    /* So near to an edge that double precision can't tell its sides apart: the edge is hit, nothing passes. */
+    if (s.near_gap <= 1.0 && !(s.range_m <= s.near_range_m)) {
+        counters->undecided++;
+        s.prim = s.near_prim;
+        s.range_m = s.near_range_m;
+    }
+    hit->prim = s.prim;
+    hit->range_m = s.range_m;
+}

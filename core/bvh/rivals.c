@@ -1,0 +1,193 @@
+/* Rivals: triangles that lie so near behind each other somewhere that float can't tell which comes first: faces that
+ * overlap in one plane, a pole through a floor, a thin sheet. Their pairs are found once; a hit on one of them compares
+ * the planes.
+ *
+ * Embree's collision of the scene with itself gives pairs whose boxes meet; of those stay the pairs that no axis
+ * separates by more than what float may blur there (separating axes of two triangles: normals, edges crossed, edges in
+ * their planes). Neighbours that share a corner are rivals only where they overlap in one plane: at their common border
+ * the border test looks anyway. */
+#include <math.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/bvh/bvh_inside.h"
+#include "core/vec3.h"
+
+struct pairs {
+    const struct bvh *bvh;
+    pthread_mutex_t lock;
+    uint32_t (*pair)[2];
+    size_t n, capacity;
+    int failed;
+};
+
+/* Gap between the triangles along an axis; negative where they overlap by more than that. -inf for no axis. */
+static double gap_along(double a[3][3], double b[3][3], const double axis[3])
+{
+    double length = sqrt(vec3_dot(axis, axis)), lo[2] = {INFINITY, INFINITY}, hi[2] = {-INFINITY, -INFINITY};
+    if (!(length > 0.0)) return -INFINITY;
+    for (int i = 0; i < 3; i++) {
+        double x = vec3_dot(a[i], axis), y = vec3_dot(b[i], axis);
+        lo[0] = fmin(lo[0], x);
+        hi[0] = fmax(hi[0], x);
+        lo[1] = fmin(lo[1], y);
+        hi[1] = fmax(hi[1], y);
+    }
+    return fmax(lo[0] - hi[1], lo[1] - hi[0]) / length;
+}
+
+struct shape {
+    double v[3][3], e[3][3], n[3];
+};
+
+static void look_at(const struct bvh *bvh, uint32_t prim, struct shape *s)
+{
+    bvh_corners(bvh, prim, s->v);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            s->e[i][j] = s->v[(i + 1) % 3][j] - s->v[i][j];
+    vec3_cross(s->e[0], s->e[1], s->n);
+}
+
+/* True when the triangles come nearer than blur_m; within == 1: when they overlap in their planes by more than that. */
+static int no_axis_separates(struct shape *a, struct shape *b, double blur_m, int within)
+{
+    double axis[3], limit = within ? -blur_m : blur_m;
+    if (gap_along(a->v, b->v, a->n) > blur_m || gap_along(a->v, b->v, b->n) > blur_m) return 0;
+    for (int i = 0; i < 3; i++) {
+        vec3_cross(a->e[i], a->n, axis);
+        if (gap_along(a->v, b->v, axis) > limit) return 0;
+        vec3_cross(b->e[i], b->n, axis);
+        if (gap_along(a->v, b->v, axis) > limit) return 0;
+        for (int j = 0; j < 3 && !within; j++) {
+            vec3_cross(a->e[i], b->e[j], axis);
+            /* Edges that are almost parallel have no axis of their own to speak of. */
+            if (vec3_dot(axis, axis) < 1e-12 * vec3_dot(a->e[i], a->e[i]) * vec3_dot(b->e[j], b->e[j])) continue;
+            if (gap_along(a->v, b->v, axis) > blur_m) return 0;
+        }
+    }
+    return 1;
+}
+
+static int share_a_corner(struct shape *a, struct shape *b)
+{
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            if (memcmp(a->v[i], b->v[j], sizeof a->v[i]) == 0) return 1;
+    return 0;
+}
+
+static int are_rivals(const struct bvh *bvh, uint32_t i, uint32_t j)
+{
+    struct shape a, b;
+    look_at(bvh, i, &a);
+    look_at(bvh, j, &b);
+    double blur_m = 2.0 * fmax(bvh_width_m(bvh, i), bvh_width_m(bvh, j));
+    int corner = share_a_corner(&a, &b);
+    if (corner) { /* only where one lies flat on the other */
+        double c[3];
+        vec3_cross(a.n, b.n, c);
+        if (vec3_dot(c, c) > 1e-6 * vec3_dot(a.n, a.n) * vec3_dot(b.n, b.n)) return 0;
+    }
+    return no_axis_separates(&a, &b, blur_m, corner);
+}
+
+static void add_pair(struct pairs *p, uint32_t i, uint32_t j)
+{
+    pthread_mutex_lock(&p->lock);
+    if (p->n == p->capacity && !p->failed) {
+        size_t capacity = p->capacity != 0 ? 2 * p->capacity : 1024;
+        void *more = realloc(p->pair, capacity * sizeof *p->pair);
+        p->failed = more == NULL;
+        if (more != NULL) {
+            p->pair = more;
+            p->capacity = capacity;
+        }
+    }
+    if (p->n < p->capacity) {
+        p->pair[p->n][0] = i;
+        p->pair[p->n++][1] = j;
+    }
+    pthread_mutex_unlock(&p->lock);
+}
+
+/* From Embree's threads. Each pair may come in either order, or twice. */
+static void on_collision(void *user, struct RTCCollision *collision, unsigned n)
+{
+    struct pairs *p = user;
+    for (unsigned k = 0; k < n; k++) {
+        uint32_t i = collision[k].primID0, j = collision[k].primID1;
+        if (i == j || !are_rivals(p->bvh, i, j)) continue;
+        add_pair(p, i, j);
+        add_pair(p, j, i);
+    }
+}
+
+static void box_of(const struct RTCBoundsFunctionArguments *args)
+{
+    const struct bvh *bvh = args->geometryUserPtr;
+    struct RTCBounds *box = args->bounds_o;
+    double v[3][3], blur_m = 2.0 * bvh_width_m(bvh, args->primID), lo[3], hi[3];
+    bvh_corners(bvh, args->primID, v);
+    for (int j = 0; j < 3; j++) {
+        lo[j] = fmin(v[0][j], fmin(v[1][j], v[2][j])) - blur_m;
+        hi[j] = fmax(v[0][j], fmax(v[1][j], v[2][j])) + blur_m;
+    }
+    box->lower_x = (float)lo[0];
+    box->lower_y = (float)lo[1];
+    box->lower_z = (float)lo[2];
+    box->upper_x = (float)hi[0];
+    box->upper_y = (float)hi[1];
+    box->upper_z = (float)hi[2];
+}
+
+static int order_pairs(const void *a, const void *b)
+{
+    const uint32_t *p = a, *q = b;
+    if (p[0] != q[0]) return p[0] < q[0] ? -1 : 1;
+    return p[1] < q[1] ? -1 : p[1] > q[1];
+}
+
+/* Sorted pairs -> lists by triangle, each rival once; the triangles that have some are marked. */
+static int make_lists(struct bvh *bvh, struct pairs *p, struct sh_err *err)
+{
+    if (p->n == 0) return SH_OK;
+    uint32_t n = bvh->scene->n_triangles;
+    qsort(p->pair, p->n, sizeof *p->pair, order_pairs);
+    bvh->rival_first = calloc((size_t)n + 1, sizeof *bvh->rival_first);
+    bvh->rival = malloc(p->n * sizeof *bvh->rival);
+    if (bvh->rival_first == NULL || bvh->rival == NULL)
+        return sh_fail(err, SH_ENOMEM, "cast: no memory for %zu rivals", p->n);
+    uint32_t kept = 0;
+    for (size_t k = 0; k < p->n; k++) {
+        if (k > 0 && order_pairs(p->pair[k - 1], p->pair[k]) == 0) continue;
+        bvh->rival[kept++] = p->pair[k][1];
+        bvh->rival_first[p->pair[k][0] + 1]++;
+        bvh_mark_rival(bvh, p->pair[k][0]);
+    }
+    for (uint32_t i = 0; i < n; i++)
+        bvh->rival_first[i + 1] += bvh->rival_first[i];
+    return SH_OK;
+}
+
+int bvh_order_exactly(struct bvh *bvh, struct sh_err *err)
+{
+    struct pairs p = {.bvh = bvh};
+    pthread_mutex_init(&p.lock, NULL);
+    RTCGeometry geometry = rtcNewGeometry(bvh->device, RTC_GEOMETRY_TYPE_USER);
+    RTCScene boxes = rtcNewScene(bvh->device);
+    rtcSetGeometryUserPrimitiveCount(geometry, bvh->scene->n_triangles);
+    rtcSetGeometryUserData(geometry, bvh);
+    rtcSetGeometryBoundsFunction(geometry, box_of, NULL);
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometry(boxes, geometry);
+    rtcReleaseGeometry(geometry);
+    rtcCommitScene(boxes);
+    rtcCollide(boxes, boxes, on_collision, &p);
+    rtcReleaseScene(boxes);
+    int rc = p.failed ? sh_fail(err, SH_ENOMEM, "cast: no memory for pairs of triangles") : make_lists(bvh, &p, err);
+    free(p.pair);
+    pthread_mutex_destroy(&p.lock);
+    return rc;
+}

@@ -1,0 +1,64 @@
+/* Faces that stand in a mesh twice: Embree may propose either, so the later ones are taken from it. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/bvh/bvh_inside.h"
+#include "core/rng.h"
+
+/* Corners in an order that does not depend on how the face is written. */
+static void sorted_corners(const struct scene *scene, uint32_t prim, const double *corner[3])
+{
+    for (int i = 0; i < 3; i++) {
+        const double *p = scene->vertex_m[scene->triangle[prim][i]];
+        int at = i;
+        for (; at > 0 && memcmp(p, corner[at - 1], 3 * sizeof *p) < 0; at--)
+            corner[at] = corner[at - 1];
+        corner[at] = p;
+    }
+}
+
+static uint64_t hash_corners(const double *const corner[3])
+{
+    uint64_t h = 0;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            uint64_t bits;
+            memcpy(&bits, &corner[i][j], sizeof bits);
+            h = rng_mix(h + 0x9e3779b97f4a7c15ULL + bits);
+        }
+    return h;
+}
+
+static int same_corners(const double *const a[3], const double *const b[3])
+{
+    for (int i = 0; i < 3; i++)
+        if (memcmp(a[i], b[i], 3 * sizeof(double)) != 0) return 0;
+    return 1;
+}
+
+int bvh_drop_twins(const struct bvh *bvh, float *vertex, struct sh_err *err)
+{
+    const struct scene *scene = bvh->scene;
+    uint64_t size = 16;
+    while (size < 2 * (uint64_t)scene->n_triangles)
+        size *= 2;
+    uint32_t *table = malloc(size * sizeof *table);
+    if (table == NULL) return sh_fail(err, SH_ENOMEM, "cast: no memory to compare %u triangles", scene->n_triangles);
+    memset(table, 0xff, size * sizeof *table);
+    for (uint32_t prim = 0; prim < scene->n_triangles; prim++) {
+        const double *corner[3], *other[3];
+        sorted_corners(scene, prim, corner);
+        uint64_t at = hash_corners(corner) & (size - 1);
+        for (; table[at] != UINT32_MAX; at = (at + 1) & (size - 1)) {
+            sorted_corners(scene, table[at], other);
+            if (!same_corners(corner, other)) continue;
+            for (int i = 0; i < 9; i++)
+                vertex[9 * (size_t)prim + (size_t)i] = NAN; /* Embree leaves out what is not finite */
+            break;
+        }
+        if (table[at] == UINT32_MAX) table[at] = prim;
+    }
+    free(table);
+    return SH_OK;
+}

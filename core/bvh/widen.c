@@ -1,0 +1,236 @@
+/* Exact triangles, and the widened float ones for Embree. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/bvh/bvh_inside.h"
+#include "core/vec3.h"
+#include "core/huge.h"
+
+double bvh_corners(const struct bvh *bvh, uint32_t prim, double v[3][3])
+{
+    double reach2 = 0.0;
+    for (int i = 0; i < 3; i++) {
+        const double *p = bvh->scene->vertex_m[bvh->scene->triangle[prim][i]];
+        for (int j = 0; j < 3; j++)
+            v[i][j] = p[j] - bvh->origin_m[j];
+        reach2 = fmax(reach2, vec3_dot(v[i], v[i]));
+    }
+    return sqrt(reach2);
+}
+
+/* Moves corner i outward within the plane, so that both its edges move by `offset_m`: along the sum of their
+ * directions, offset / sin(angle); a sharp corner ends at most_m. */
+static void widen_corner(double v[3][3], int i, double offset_m, double most_m, double out[3])
+{
+    double e1[3], e2[3], c[3], move[3], l1, l2;
+    for (int j = 0; j < 3; j++) {
+        e1[j] = v[(i + 1) % 3][j] - v[i][j];
+        e2[j] = v[(i + 2) % 3][j] - v[i][j];
+    }
+    l1 = sqrt(vec3_dot(e1, e1));
+    l2 = sqrt(vec3_dot(e2, e2));
+    for (int j = 0; j < 3; j++) {
+        e1[j] /= l1;
+        e2[j] /= l2;
+        move[j] = e1[j] + e2[j];
+    }
+    vec3_cross(e1, e2, c);
+    double sine = sqrt(vec3_dot(c, c)), length = sqrt(vec3_dot(move, move));
+    double factor = offset_m * length < most_m * sine ? offset_m / sine : length > 0.0 ? most_m / length : 0.0;
+    for (int j = 0; j < 3; j++)
+        out[j] = v[i][j] - factor * move[j];
+}
+
+static void edge_lengths(double v[3][3], double length[3])
+{
+    for (int i = 0; i < 3; i++) {
+        double e[3];
+        for (int j = 0; j < 3; j++)
+            e[j] = v[(i + 1) % 3][j] - v[i][j];
+        length[i] = sqrt(vec3_dot(e, e));
+    }
+}
+
+/* All that float may be off by at the edges of a triangle, as a distance across the ray (bvh.h). far_m: of its farthest
+ * corner from any origin of rays. */
+static double float_error_m(const struct bvh *bvh, double far_m, const double length[3])
+{
+    double longest = fmax(fmax(length[0], length[1]), length[2]);
+    double sum = length[0] + length[1] + length[2] - longest;
+    double product = length[0] * length[1] * length[2] / (longest * longest);
+    double function = bvh->station_reach_m > 0.0 ? 8.0 : 6.5, vertices = bvh->station_reach_m > 0.0 ? 3.0 : 2.0;
+    double at_v0 = (function + vertices) * far_m;
+    double opposite = (function * sum / longest + vertices) * far_m + 15.0 * product;
+    return 0x1p-24 * fmax(at_v0, opposite);
+}
+
+double bvh_width_m(const struct bvh *bvh, uint32_t prim)
+{
+    double v[3][3], length[3], far_m = bvh_corners(bvh, prim, v) + bvh->station_reach_m;
+    edge_lengths(v, length);
+    return float_error_m(bvh, far_m, length);
+}
+
+static double with_spare(double x, uint32_t spare)
+{
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    bits = (bits & ~(uint64_t)((1U << BVH_SPARE_BITS) - 1)) | spare;
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}
+
+/* Twice the area of a triangle, its normal so long, and its longest edge. */
+static double measure(double v[3][3], double n[3], double *longest)
+{
+    double e1[3], e2[3], longest2 = 0.0;
+    for (int i = 0; i < 3; i++) {
+        double l2 = 0.0;
+        for (int j = 0; j < 3; j++)
+            l2 += (v[(i + 1) % 3][j] - v[i][j]) * (v[(i + 1) % 3][j] - v[i][j]);
+        longest2 = fmax(longest2, l2);
+        e1[i] = v[1][i] - v[0][i];
+        e2[i] = v[2][i] - v[0][i];
+    }
+    vec3_cross(e1, e2, n);
+    *longest = sqrt(longest2);
+    return sqrt(vec3_dot(n, n));
+}
+
+/* The plane with normal n, as it is stored, passes through the triangle's centre. */
+static void set_offset(struct bvh_triangle *tri, double v[3][3])
+{
+    double centre[3];
+    for (int j = 0; j < 3; j++)
+        centre[j] = v[0][j] + ((v[1][j] - v[0][j]) + (v[2][j] - v[0][j])) / 3.0;
+    tri->d = vec3_dot(tri->n, centre);
+}
+
+/* What the smallest of Embree's weights has to reach for a hit to be safe. Within the plane, the distance to edge i of
+ * the widened triangle is at least weight_i * area2' / longest'. It has to exceed what the edge was moved by, and once
+ * more that by which float is off there, width / cosine of the incidence: seen from the origin no more than the offset.
+ * From elsewhere the incidence is another one, so there the weight is multiplied by area2 * cosine first (kernels.c).
+ */
+static double guard(const struct bvh *bvh, double offset, double width_m, double longest_wide, double area2_wide,
+                    double area2)
+{
+    if (bvh->station_reach_m > 0.0) return (offset + width_m) * longest_wide * area2 / area2_wide;
+    return offset < BVH_MAX_SLANT * width_m ? 2.0 * offset * longest_wide / area2_wide : (double)INFINITY;
+}
+
+static uint32_t guard_code(double guard)
+{
+    const int64_t most = (1 << BVH_SPARE_BITS) - 1;
+    uint64_t bits;
+    memcpy(&bits, &guard, sizeof bits);
+    if (!(guard < INFINITY)) return (uint32_t)most;
+    int64_t code = (int64_t)((bits + ((1ULL << BVH_GUARD_SHIFT) - 1)) >> BVH_GUARD_SHIFT) - BVH_GUARD_BASE;
+    return (uint32_t)(code < 0 ? 0 : code > most ? most : code);
+}
+
+static void set_exact(struct bvh_triangle *tri, double v[3][3], double guard, uint16_t label)
+{
+    tri->n[0] = with_spare(tri->n[0], guard_code(guard));
+    tri->n[1] = with_spare(tri->n[1], label & ((1U << BVH_SPARE_BITS) - 1));
+    tri->n[2] = with_spare(tri->n[2], (uint32_t)label >> BVH_SPARE_BITS);
+    set_offset(tri, v);
+}
+
+void bvh_mark_rival(struct bvh *bvh, uint32_t prim)
+{
+    struct bvh_triangle *tri = &bvh->triangle[prim];
+    double v[3][3];
+    bvh_corners(bvh, prim, v);
+    tri->n[2] = with_spare(tri->n[2], bvh_spare(tri->n[2]) | BVH_RIVAL_BIT);
+    set_offset(tri, v);
+}
+
+/* How far the edges have to move within the plane, so that seen from the origin, at a slant, they have moved by
+ * width_m: width / cosine of the incidence, which at the farthest corner is the plane's distance by the corner's. */
+static double offset_m(double v[3][3], const double unit_n[3], double width_m, double far_m)
+{
+    double above_m = fabs(vec3_dot(v[0], unit_n));
+    return width_m * (above_m * BVH_MAX_SLANT > far_m ? far_m / above_m : BVH_MAX_SLANT);
+}
+
+static void widen(double v[3][3], double offset, double width_m, double wide[3][3])
+{
+    for (int i = 0; i < 3; i++)
+        widen_corner(v, i, offset, BVH_MAX_MOVE * width_m, wide[i]);
+}
+
+/* The longest edge lies opposite the first corner (bvh.h). */
+static void set_vertices(double wide[3][3], float *vertex)
+{
+    double length[3];
+    edge_lengths(wide, length);
+    int first = length[0] >= length[1] && length[0] >= length[2] ? 2 : length[1] >= length[2] ? 0 : 1;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            vertex[3 * i + j] = (float)wide[(first + i) % 3][j];
+}
+
+static void fill_triangle(struct bvh *bvh, uint32_t prim, float *vertex)
+{
+    double v[3][3], wide[3][3], unit[3], wide_n[3], length[3], longest;
+    struct bvh_triangle *tri = &bvh->triangle[prim];
+    double far_m = bvh_corners(bvh, prim, v) + bvh->station_reach_m;
+    double area2 = measure(v, tri->n, &longest);
+    for (int j = 0; j < 3; j++)
+        unit[j] = tri->n[j] / area2;
+    edge_lengths(v, length);
+    double width_m = float_error_m(bvh, far_m, length), offset = offset_m(v, unit, width_m, far_m);
+    widen(v, offset, width_m, wide);
+    edge_lengths(wide, length);
+    if (float_error_m(bvh, far_m, length) > width_m) { /* very small or thin: two sides make at most twice the third */
+        const double worst[3] = {longest, longest, longest};
+        width_m = 1.01 * float_error_m(bvh, far_m, worst);
+        offset = offset_m(v, unit, width_m, far_m);
+        widen(v, offset, width_m, wide);
+        edge_lengths(wide, length);
+    }
+    set_vertices(wide, vertex);
+    double area2_wide = measure(wide, wide_n, &longest);
+    set_exact(tri, v, guard(bvh, offset, width_m, longest, area2_wide, area2), bvh->scene->label[prim]);
+}
+
+/* Without planes nothing is decided again, and what is added at a border is told there: an eighth of what float may be
+ * off by at most. Of seven million rays into a house, terrain and leaves none slips through that; without it three do,
+ * with the whole width ten times as many meet what they would pass. Not multiplied by the slant, which is only the
+ * origin's. */
+static const double PLAIN_SHARE = 0.125;
+
+static void fill_plain(const struct bvh *bvh, uint32_t prim, float *vertex)
+{
+    double v[3][3], wide[3][3], width_m = PLAIN_SHARE * bvh_width_m(bvh, prim);
+    bvh_corners(bvh, prim, v);
+    for (int i = 0; i < 3; i++)
+        widen_corner(v, i, width_m, 4.0 * width_m, wide[i]);
+    set_vertices(wide, vertex);
+}
+
+int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err)
+{
+    const struct scene *scene = bvh->scene;
+    size_t n = scene->n_triangles;
+    if (!bvh->plain) bvh->triangle = huge_alloc((n + 1) * sizeof *bvh->triangle);
+    float *vertex =
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), 3 * n);
+    uint32_t *index =
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t), n);
+    if ((!bvh->plain && bvh->triangle == NULL) || vertex == NULL || index == NULL)
+        return sh_fail(err, SH_ENOMEM, "cast: no memory for %zu triangles", n);
+    for (uint32_t i = 0; i < n; i++)
+        if (bvh->plain)
+            fill_plain(bvh, i, vertex + 9 * (size_t)i);
+        else
+            fill_triangle(bvh, i, vertex + 9 * (size_t)i);
+    for (uint32_t i = 0; i < 3 * n; i++)
+        index[i] = i;
+    if (bvh->plain) return bvh_drop_twins(bvh, vertex, err);
+    bvh->triangle[n] = (struct bvh_triangle){
+        .n = {NAN, with_spare(NAN, LINE_LABEL_NONE & 0xfff), with_spare(NAN, LINE_LABEL_NONE >> BVH_SPARE_BITS)},
+        .d = NAN};
+    return bvh_drop_twins(bvh, vertex, err);
+}

@@ -1,0 +1,171 @@
+/* Figures of a beam, and patterns of sub-rays. */
+#include "core/footprint.h"
+
+#include <math.h>
+#include <string.h>
+
+static const double LIGHT_M_S = 299792458.0;
+
+/* t = rho^2 over the footprint: density proportional to exp(-2 t) on 0 .. 1. Means of t and t^2, by parts. */
+static double mean_t(void)
+{
+    return 0.5 - exp(-2.0) / (1.0 - exp(-2.0));
+}
+
+static double mean_t2(void)
+{
+    return mean_t() - exp(-2.0) / (1.0 - exp(-2.0));
+}
+
+/* Per distance of a line from the centre: the Gaussian, cut off at the disc's edge. */
+struct across {
+    double energy, along, across; /* energy; its second moments, by the distance and along the line */
+};
+
+static struct across across(double x)
+{
+    const double scale = 2.0 / (M_PI * (1.0 - exp(-2.0)));
+    double y2 = 1.0 - x * x, g = scale * exp(-2.0 * x * x), whole;
+    if (y2 <= 0.0) return (struct across){0.0, 0.0, 0.0};
+    whole = g * sqrt(0.5 * M_PI) * erf(sqrt(2.0 * y2));
+    return (struct across){whole, whole * x * x, 0.25 * whole - 0.5 * g * sqrt(y2) * exp(-2.0 * y2)};
+}
+
+/* Simpson's rule. With x = -cos a the integrand is smooth at the disc's edge as well. */
+static struct across between(double from, double to)
+{
+    enum { STEPS = 8 };
+    double a = acos(-fmax(-1.0, from)), b = acos(-fmin(1.0, to)), step = (b - a) / STEPS;
+    struct across sum = {0.0, 0.0, 0.0};
+    for (int i = 0; i <= STEPS; i++) {
+        double at = a + i * step, weight = i == 0 || i == STEPS ? 1.0 : i % 2 == 1 ? 4.0 : 2.0;
+        struct across here = across(-cos(at));
+        sum.energy += weight * here.energy * sin(at);
+        sum.along += weight * here.along * sin(at);
+        sum.across += weight * here.across * sin(at);
+    }
+    return (struct across){sum.energy * step / 3.0, sum.along * step / 3.0, sum.across * step / 3.0};
+}
+
+/* By Gauss's theorem: x exp(-2 r^2) is minus a quarter of the derivative of exp(-2 r^2) by x. */
+static double moment_beyond(double h)
+{
+    const double scale = 2.0 / (M_PI * (1.0 - exp(-2.0)));
+    return 0.25 * (across(h).energy - scale * exp(-2.0) * 2.0 * sqrt(fmax(0.0, 1.0 - h * h)));
+}
+
+void beam_init(struct beam *beam, double exit_m, double divergence_rad, double pulse_width_s)
+{
+    memset(beam, 0, sizeof *beam);
+    beam->exit_radius_m = 0.5 * exit_m;
+    beam->slope = 0.5 * divergence_rad;
+    beam->resolution_m = 0.5 * LIGHT_M_S * pulse_width_s;
+    for (int i = BEAM_HALF_STEPS - 1; i >= 0; i--) {
+        double h = 2.0 * i / BEAM_HALF_STEPS - 1.0;
+        struct across strip = between(h, h + 2.0 / BEAM_HALF_STEPS);
+        beam->half[i] = beam->half[i + 1] + strip.energy;
+        beam->along[i] = beam->along[i + 1] + strip.along;
+        beam->across[i] = beam->across[i + 1] + strip.across;
+    }
+    for (int i = 0; i <= BEAM_HALF_STEPS; i++)
+        beam->moment[i] = moment_beyond(2.0 * i / BEAM_HALF_STEPS - 1.0);
+    for (int i = 0; i <= BEAM_HALF_STEPS; i++)
+        beam->half[i] /= beam->half[0] > 0.0 && i > 0 ? beam->half[0] : 1.0;
+    beam->half[0] = 1.0;
+}
+
+double beam_radius(const struct beam *beam, double range_m)
+{
+    double spread = beam->slope * range_m;
+    return sqrt(beam->exit_radius_m * beam->exit_radius_m + spread * spread);
+}
+
+static double mean_t3(void)
+{
+    return 1.5 * mean_t2() - exp(-2.0) / (1.0 - exp(-2.0));
+}
+
+/* The series of sqrt((1 + t s^2) / (1 - t b^2)) - 1, b = s tan i, to third order in t, by x = 1 / cos^2 i: s^2 + b^2 =
+ * s^2 x, and what is left out is s^2 of these terms. */
+void beam_plane_series(const struct beam *beam, double term[3])
+{
+    double s2 = beam->slope * beam->slope;
+    term[0] = 0.5 * s2 * mean_t();
+    term[1] = 0.375 * s2 * s2 * mean_t2();
+    term[2] = 0.3125 * s2 * s2 * s2 * mean_t3();
+}
+
+double beam_plane_excess(const struct beam *beam, double range_m, double cosine)
+{
+    double s2 = beam->slope * beam->slope, x = 1.0 / fmax(cosine * cosine, 4.0 * s2), term[3];
+    if (s2 == 0.0) return 0.0;
+    beam_plane_series(beam, term);
+    return range_m * x * (term[0] + x * (term[1] + x * term[2]));
+}
+
+void beam_plane_variance(const struct beam *beam, double term[2])
+{
+    term[0] = 0.5 * mean_t() * beam->exit_radius_m * beam->exit_radius_m;
+    term[1] = 0.5 * mean_t() * beam->slope * beam->slope;
+}
+
+double beam_echo_width(double pulse_m, double variance_m2)
+{
+    return variance_m2 == 0.0 ? pulse_m : sqrt(pulse_m * pulse_m + 8.0 * M_LN2 * variance_m2);
+}
+
+/* Where h lies in the tables. */
+static uint32_t look_up(double h, double *part)
+{
+    double at = (h + 1.0) * (0.5 * BEAM_HALF_STEPS);
+    uint32_t i = at <= 0.0 ? 0 : at >= BEAM_HALF_STEPS ? BEAM_HALF_STEPS - 1 : (uint32_t)at;
+    *part = at - i;
+    return i;
+}
+
+void beam_half(const struct beam *beam, double h, double *energy, double *moment)
+{
+    double part;
+    uint32_t i = look_up(h, &part);
+    *energy = beam->half[i] + (beam->half[i + 1] - beam->half[i]) * part;
+    *moment = beam->moment[i] + (beam->moment[i + 1] - beam->moment[i]) * part;
+}
+
+void beam_half_squares(const struct beam *beam, double h, double *along, double *across)
+{
+    double part;
+    uint32_t i = look_up(h, &part);
+    *along = beam->along[i] + (beam->along[i + 1] - beam->along[i]) * part;
+    *across = beam->across[i] + (beam->across[i + 1] - beam->across[i]) * part;
+}
+
+void beam_rings(uint32_t rings, struct beam_pattern *pattern)
+{
+    const double all = 1.0 - exp(-2.0);
+    memset(pattern, 0, sizeof *pattern);
+    pattern->n = 1 + 3 * rings * (rings + 1);
+    pattern->rest = 0.5 * mean_t();
+    for (uint32_t k = 1, at = 1; k <= rings; k++) {
+        /* energy inside of the middle of this ring's annulus */
+        double inside = (1.0 + 3.0 * k * (k - 1) + 3.0 * k) / pattern->n;
+        double radius = sqrt(-0.5 * log(1.0 - inside * all));
+        pattern->rest -= 3.0 * k * radius * radius / pattern->n; /* half of it each way */
+        for (uint32_t i = 0; i < 6 * k; i++, at++) {
+            double phi = 2.0 * M_PI * (i + 0.5 * (k % 2)) / (6 * k);
+            pattern->x[at] = (float)(radius * cos(phi));
+            pattern->y[at] = (float)(radius * sin(phi));
+        }
+    }
+}
+
+/* T. Duff and others, Building an Orthonormal Basis, Revisited, JCGT 6(1), 2017. */
+void beam_axes(const double d[3], double e1[3], double e2[3])
+{
+    double sign = copysign(1.0, d[2]), a = -1.0 / (sign + d[2]), b = d[0] * d[1] * a;
+    e1[0] = 1.0 + sign * d[0] * d[0] * a;
+    e1[1] = sign * b;
+    e1[2] = -sign * d[0];
+    e2[0] = b;
+    e2[1] = sign + d[1] * d[1] * a;
+    e2[2] = -d[1];
+}

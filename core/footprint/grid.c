@@ -1,0 +1,385 @@
+/* Outlines by direction: every cell that a footprint can reach an edge from knows it. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/footprint/outlines.h"
+#include "core/vec3.h"
+#include "core/vecmath.h"
+
+enum {
+    N_CELLS = 6 * OUTLINE_CELLS * OUTLINE_CELLS,
+    TOGETHER = 8, /* pulses on either side of one for which it is asked */
+};
+#define NEAREST_M 0.02 /* nearer than this, all directions are near each other */
+#define PIECE     0.1  /* the longest piece of an edge, by its distance */
+
+/* Count into first[c + 1]; write at first[c]++; mark in around. */
+enum draw_what { COUNT, FILL, AROUND };
+
+struct draw {
+    struct beam_outlines *o;
+    const struct beam *beam;
+    enum draw_what what;
+    uint32_t edge;
+    float normal[3]; /* of the edge's plane */
+    uint64_t n;
+};
+
+/* Stretches of edges that count. */
+struct stretches {
+    struct outline_stretch *at;
+    size_t n, room;
+};
+
+static void put(struct draw *d, uint32_t cell, float range_m)
+{
+    struct beam_outlines *o = d->o;
+    if (d->what == AROUND) {
+        o->around[cell / 32] |= 1U << cell % 32;
+        return;
+    }
+    d->n++;
+    if (d->what == COUNT) {
+        o->first[cell + 1]++;
+        return;
+    }
+    o->entry[o->first[cell]++] = (struct outline_entry){range_m, {d->normal[0], d->normal[1], d->normal[2]}, d->edge};
+    o->any[cell / 32] |= 1U << cell % 32;
+}
+
+static void put_row(struct draw *d, uint32_t face, int32_t row, double from, double to, float range_m)
+{
+    int32_t i0 = (int32_t)floor(fmax(from, 0.0)), i1 = (int32_t)floor(fmin(to, OUTLINE_CELLS - 1));
+    for (int32_t i = i0; i <= i1; i++)
+        put(d, outline_place(face, (uint32_t)i, (uint32_t)row), range_m);
+}
+
+/* A piece from p to q (in cells) and all that is within `wide` cells of it, row by row. */
+static void draw_on_face(struct draw *d, uint32_t face, const double p[2], const double q[2], double wide,
+                         float range_m)
+{
+    double low = fmin(p[1], q[1]), high = fmax(p[1], q[1]);
+    if (high + wide < 0.0 || low - wide >= OUTLINE_CELLS) return;
+    int32_t j0 = (int32_t)floor(fmax(low - wide, 0.0)), j1 = (int32_t)floor(fmin(high + wide, OUTLINE_CELLS - 1));
+    for (int32_t j = j0; j <= j1; j++) {
+        /* the part of the piece that this row can be near to */
+        double t0 = 0.0, t1 = 1.0, rise = q[1] - p[1];
+        if (fabs(rise) > 1e-9) {
+            double ta = (j - wide - p[1]) / rise, tb = (j + 1 + wide - p[1]) / rise;
+            t0 = fmax(0.0, fmin(ta, tb));
+            t1 = fmin(1.0, fmax(ta, tb));
+        }
+        if (t0 > t1) continue;
+        double x0 = p[0] + t0 * (q[0] - p[0]), x1 = p[0] + t1 * (q[0] - p[0]);
+        put_row(d, face, j, fmin(x0, x1) - wide, fmax(x0, x1) + wide, range_m);
+    }
+}
+
+/* A short piece: on each face that it or a footprint at it may reach. */
+static void draw_piece(struct draw *d, const double p[3], const double q[3], double range_m)
+{
+    const double half = 0.5 * OUTLINE_CELLS;
+    double angle = 1.02 * beam_radius(d->beam, range_m) / range_m + 1e-6;
+    if (d->what == AROUND) angle += 1.02 * OUTLINE_AROUND_RAD;
+    for (uint32_t face = 0; face < 6; face++) {
+        int axis = (int)face / 2, ua = (axis + 1) % 3, va = (axis + 2) % 3;
+        double sign = face % 2 == 0 ? 1.0 : -1.0, zp = sign * p[axis], zq = sign * q[axis];
+        double least = 0.35 * range_m; /* a face's corner is at 0.577; a piece is short */
+        if (zp < least || zq < least) continue;
+        double a[2] = {p[ua] / zp, p[va] / zp}, b[2] = {q[ua] / zq, q[va] / zq};
+        /* on the face an angle appears larger by 1 / cos^2 from its middle */
+        double more = fmax(1.0 + a[0] * a[0] + a[1] * a[1], 1.0 + b[0] * b[0] + b[1] * b[1]);
+        double wide = 1.1 * angle * more * half + 0.01;
+        for (int i = 0; i < 2; i++) {
+            a[i] = (a[i] + 1.0) * half;
+            b[i] = (b[i] + 1.0) * half;
+        }
+        draw_on_face(d, face, a, b, wide, (float)(0.999999 * range_m));
+    }
+}
+
+static double nearest_on(const double p[3], const double q[3])
+{
+    double e[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]}, ee = vec3_dot(e, e);
+    double t = ee > 0.0 ? fmin(1.0, fmax(0.0, -vec3_dot(p, e) / ee)) : 0.0;
+    double x[3] = {p[0] + t * e[0], p[1] + t * e[1], p[2] + t * e[2]};
+    return sqrt(vec3_dot(x, x));
+}
+
+static int add_stretch(struct stretches *s, const double p[3], const double q[3], uint32_t edge)
+{
+    if (s->n == s->room) {
+        size_t room = s->room == 0 ? 4096 : 2 * s->room;
+        struct outline_stretch *more = realloc(s->at, room * sizeof *more);
+        if (more == NULL) return SH_ENOMEM;
+        s->at = more;
+        s->room = room;
+    }
+    struct outline_stretch *one = &s->at[s->n++];
+    memcpy(one->p, p, sizeof one->p);
+    memcpy(one->q, q, sizeof one->q);
+    one->edge = edge;
+    return SH_OK;
+}
+
+/* Pieces of an edge, each short as seen from the station; of these, what counts. */
+static int cut_edge(struct stretches *s, struct outline_prober *prober, const double p[3], const double q[3],
+                    uint32_t edge, double range_max_m)
+{
+    double e[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]}, middle[3];
+    double range_m = nearest_on(p, q), length = sqrt(vec3_dot(e, e));
+    if (range_m > range_max_m) return SH_OK;
+    if (length > PIECE * fmax(range_m, NEAREST_M)) {
+        for (int i = 0; i < 3; i++)
+            middle[i] = p[i] + 0.5 * e[i];
+        int rc = cut_edge(s, prober, p, middle, edge, range_max_m);
+        return rc == SH_OK ? cut_edge(s, prober, middle, q, edge, range_max_m) : rc;
+    }
+    if (range_m <= NEAREST_M) return SH_OK;
+    if (prober->probe == NULL) return add_stretch(s, p, q, edge);
+    uint32_t n = outline_probe(prober, p, q, range_m);
+    for (uint32_t i = 0, end; i < n; i = end) {
+        double a[3], b[3];
+        for (end = i + 1; end < n && prober->counts[end] == prober->counts[i];)
+            end++;
+        if (!prober->counts[i]) continue;
+        for (int k = 0; k < 3; k++) {
+            a[k] = p[k] + e[k] * i / n;
+            b[k] = p[k] + e[k] * end / n;
+        }
+        if (add_stretch(s, a, b, edge) != SH_OK) return SH_ENOMEM;
+    }
+    return SH_OK;
+}
+
+static int find_stretches(const struct beam_outlines *o, struct outline_prober *prober, double range_max_m,
+                          struct stretches *s)
+{
+    for (uint32_t k = 0; k < o->n_edges; k++) {
+        double p[3], q[3];
+        for (int i = 0; i < 3; i++) {
+            p[i] = o->edge[k].a[i];
+            q[i] = o->edge[k].b[i];
+        }
+        if (cut_edge(s, prober, p, q, k, range_max_m) != SH_OK) return SH_ENOMEM;
+    }
+    return SH_OK;
+}
+
+static int by_range(const void *a, const void *b)
+{
+    const struct outline_entry *x = a, *y = b;
+    if (x->range_m != y->range_m) return (x->range_m > y->range_m) - (x->range_m < y->range_m);
+    return (x->edge > y->edge) - (x->edge < y->edge);
+}
+
+static void edge_normal(const struct outline_edge *edge, float normal[3])
+{
+    double a[3], b[3], n[3];
+    for (int i = 0; i < 3; i++) {
+        a[i] = (double)edge->a[i];
+        b[i] = (double)edge->b[i];
+    }
+    vec3_cross(a, b, n);
+    double length = sqrt(vec3_dot(n, n));
+    for (int i = 0; i < 3; i++)
+        normal[i] = length > 0.0 ? (float)(n[i] / length) : 0.0f;
+}
+
+static uint64_t draw_all(struct beam_outlines *o, const struct beam *beam, const struct stretches *s,
+                         enum draw_what what)
+{
+    struct draw d = {.o = o, .beam = beam, .what = what};
+    for (size_t i = 0; i < s->n; i++) {
+        d.edge = s->at[i].edge;
+        if (d.what == FILL) edge_normal(&o->edge[d.edge], d.normal);
+        draw_piece(&d, s->at[i].p, s->at[i].q, nearest_on(s->at[i].p, s->at[i].q));
+    }
+    return d.n;
+}
+
+static int fill_cells(struct beam_outlines *o, const struct beam *beam, const struct stretches *s, struct sh_err *err)
+{
+    uint64_t n = draw_all(o, beam, s, COUNT);
+    if (n >= UINT32_MAX) return sh_fail(err, SH_EINPUT, "beam: too many outlines; beam.mode: rings does without them");
+    for (uint32_t c = 0; c < N_CELLS; c++)
+        o->first[c + 1] += o->first[c];
+    o->entry = malloc((size_t)(n + 1) * sizeof *o->entry);
+    if (o->entry == NULL) return sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");
+    draw_all(o, beam, s, FILL);
+    draw_all(o, beam, s, AROUND);
+    memmove(o->first + 1, o->first, N_CELLS * sizeof *o->first); /* each stands at its end now */
+    o->first[0] = 0;
+    for (uint32_t c = 0; c < N_CELLS; c++)
+        if (o->first[c + 1] - o->first[c] > 1)
+            qsort(o->entry + o->first[c], o->first[c + 1] - o->first[c], sizeof *o->entry, by_range);
+    o->info.entries = n;
+    o->info.bytes = n * sizeof *o->entry + N_CELLS * sizeof *o->first + N_CELLS / 4 + o->n_edges * sizeof *o->edge;
+    return SH_OK;
+}
+
+int beam_outlines_create(const struct scene *scene, const double station_m[3], const struct beam *beam,
+                         double range_max_m, const uint16_t *kind, const struct beam_probe *probe,
+                         struct beam_outlines **out, struct sh_err *err)
+{
+    struct stretches stretches = {.at = NULL};
+    struct outline_prober *prober = calloc(1, sizeof *prober);
+    struct beam_outlines *o = calloc(1, sizeof *o);
+    *out = NULL;
+    if (o == NULL || prober == NULL) {
+        free(o);
+        free(prober);
+        return sh_fail(err, SH_ENOMEM, "beam: no memory");
+    }
+    prober->probe = probe;
+    prober->beam = beam;
+    o->first = calloc(N_CELLS + 1, sizeof *o->first);
+    o->any = calloc(N_CELLS / 32, sizeof *o->any);
+    o->around = calloc(N_CELLS / 32, sizeof *o->around);
+    int rc =
+        o->first == NULL || o->any == NULL || o->around == NULL ? sh_fail(err, SH_ENOMEM, "beam: no memory") : SH_OK;
+    if (rc == SH_OK) rc = outline_find(scene, station_m, kind, &o->edge, &o->n_edges, &o->info.edges, err);
+    if (rc == SH_OK && find_stretches(o, prober, range_max_m * 1.01, &stretches) != SH_OK)
+        rc = sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");
+    if (rc == SH_OK) rc = fill_cells(o, beam, &stretches, err);
+    o->info.stretches = stretches.n;
+    free(stretches.at);
+    free(prober);
+    if (rc != SH_OK) {
+        beam_outlines_free(o);
+        return rc;
+    }
+    o->info.outlines = o->n_edges;
+    *out = o;
+    return SH_OK;
+}
+
+void beam_outlines_free(struct beam_outlines *o)
+{
+    if (o == NULL) return;
+    free(o->edge);
+    free(o->first);
+    free(o->any);
+    free(o->around);
+    free(o->entry);
+    free(o);
+}
+
+void beam_outlines_get_info(const struct beam_outlines *o, struct beam_outlines_info *info)
+{
+    *info = o->info;
+}
+
+/* Square of the longest way from one direction to the next. */
+VEC_CLONES
+static float longest_step2(const float *restrict dx, const float *restrict dy, const float *restrict dz, uint32_t n)
+{
+    uint32_t most = 0;
+    for (uint32_t i = 0; i + 1 < n; i++) {
+        float x = dx[i + 1] - dx[i], y = dy[i + 1] - dy[i], z = dz[i + 1] - dz[i], step2 = x * x + y * y + z * z;
+        uint32_t bits; /* in the order of the numbers, which are not negative */
+        memcpy(&bits, &step2, sizeof bits);
+        most = bits > most ? bits : most;
+    }
+    float longest;
+    memcpy(&longest, &most, sizeof longest);
+    return longest;
+}
+
+VEC_CLONES
+static void cells_of(const float *restrict dx, const float *restrict dy, const float *restrict dz, uint32_t n,
+                     uint32_t *restrict cell)
+{
+    for (uint32_t i = 0; i < n; i++)
+        cell[i] = outline_cell(dx[i], dy[i], dz[i]);
+}
+
+/* Directions looked up together. */
+struct few {
+    float dx[BEAM_NEAR_MOST], dy[BEAM_NEAR_MOST], dz[BEAM_NEAR_MOST];
+    uint32_t cell[BEAM_NEAR_MOST];
+};
+
+static int is_set(const uint32_t *bits, uint32_t cell)
+{
+    return bits[cell / 32] >> cell % 32 & 1;
+}
+
+/* Pulses some way around which there are outlines: of so many at a time, that is asked of the middle one. */
+static uint32_t list_around(const struct beam_outlines *o, const float *dx, const float *dy, const float *dz,
+                            uint32_t n, struct few *few, uint32_t *pulse)
+{
+    const float reach = (float)OUTLINE_AROUND_RAD, step = sqrtf(longest_step2(dx, dy, dz, n)) + 1e-6f;
+    const uint32_t half = step * TOGETHER > reach ? (uint32_t)(reach / step) : TOGETHER, group = 2 * half + 1;
+    uint32_t found = 0, groups = 0, base = 0;
+    if (n == 0) return 0;
+    do {
+        uint32_t middle = base + half < n ? base + half : n - 1;
+        few->dx[groups] = dx[middle];
+        few->dy[groups] = dy[middle];
+        few->dz[groups++] = dz[middle];
+        base += group;
+    } while (base < n);
+    cells_of(few->dx, few->dy, few->dz, groups, few->cell);
+    for (uint32_t k = 0; k < groups; k++) {
+        uint32_t end = (k + 1) * group < n ? (k + 1) * group : n;
+        for (uint32_t i = k * group; i < end && is_set(o->around, few->cell[k]); i++)
+            pulse[found++] = i;
+    }
+    return found;
+}
+
+/* Pulses in cells that lead to some; near->first: the cell. */
+static uint32_t in_cells(const struct beam_outlines *o, const float *dx, const float *dy, const float *dz, uint32_t n,
+                         struct beam_near *near)
+{
+    struct few few;
+    uint32_t pulse[BEAM_NEAR_MOST], around = list_around(o, dx, dy, dz, n, &few, pulse), found = 0;
+    for (uint32_t k = 0; k < around; k++) {
+        few.dx[k] = dx[pulse[k]];
+        few.dy[k] = dy[pulse[k]];
+        few.dz[k] = dz[pulse[k]];
+    }
+    cells_of(few.dx, few.dy, few.dz, around, few.cell);
+    for (uint32_t k = 0; k < around; k++) {
+        near[found].pulse = pulse[k];
+        near[found].first = few.cell[k];
+        found += (uint32_t)is_set(o->any, few.cell[k]);
+    }
+    return found;
+}
+
+/* Brings what looking for lines is going to read, step by step for all pulses at once. */
+static void look_up(const struct beam_outlines *o, struct beam_near *near, uint32_t n)
+{
+    for (uint32_t k = 0; k < n; k++)
+        __builtin_prefetch(&o->first[near[k].first], 0, 3);
+    for (uint32_t k = 0; k < n; k++) {
+        const uint32_t *first = &o->first[near[k].first];
+        near[k].first = first[0];
+        near[k].end = first[1];
+        __builtin_prefetch(&o->entry[first[0]], 0, 3);
+    }
+}
+
+/* Most cells lead to none, and most of those that lead to some are wider than the footprint; ranges are looked at
+ * later. */
+uint32_t beam_near_outlines(const struct beam_outlines *o, const struct beam *beam, const float *dx, const float *dy,
+                            const float *dz, uint32_t n, struct beam_near *near)
+{
+    uint32_t left = 0;
+    if (o->info.entries == 0) return 0;
+    uint32_t found = in_cells(o, dx, dy, dz, n, near);
+    look_up(o, near, found);
+    for (uint32_t k = 0; k < found; k++) {
+        struct beam_near one = near[k];
+        const float d[3] = {dx[one.pulse], dy[one.pulse], dz[one.pulse]};
+        while (one.first < one.end && outline_is_clear(beam, &o->entry[one.first], d))
+            one.first++;
+        if (one.first == one.end) continue;
+        __builtin_prefetch(&o->edge[o->entry[one.first].edge], 0, 3);
+        near[left++] = one;
+    }
+    return left;
+}

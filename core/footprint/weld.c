@@ -1,0 +1,172 @@
+/* Which edges of a mesh are outlines, seen from a station.
+ *
+ * An edge and the station span a plane. With triangles on both sides of it, the surface goes on beyond the edge,
+ * without a step in range; with triangles on one side only, it ends there, and where those on both sides are of
+ * different kinds, one kind does. That needs neither normals nor an order of corners. Corners at the same place, bit by
+ * bit, are one. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/footprint/outlines.h"
+#include "core/rng.h"
+#include "core/vec3.h"
+
+enum { NONE = 0xffffffff, TWO_KINDS = 4 };
+
+struct slot {
+    uint32_t low, high; /* corners; low NONE: free */
+};
+
+struct weld {
+    const struct scene *scene;
+    const double *station_m;
+    uint32_t *same; /* [n_vertices] the first vertex at the same place */
+    struct slot *slot;
+    uint8_t *sides; /* of a slot: 1 and 2; 4: of two kinds */
+    const uint16_t *kind;
+    uint16_t *of; /* of a slot: kind of its first triangle; NULL: nobody asks */
+    uint64_t mask;
+};
+
+static uint64_t power_of_two(uint64_t least)
+{
+    uint64_t n = 64;
+    while (n < least)
+        n *= 2;
+    return n;
+}
+
+static uint64_t place_key(const double p[3])
+{
+    uint64_t key = 0;
+    for (int i = 0; i < 3; i++) {
+        double x = p[i] + 0.0; /* no negative zeros */
+        uint64_t bits;
+        memcpy(&bits, &x, sizeof bits);
+        key = rng_mix(key + bits);
+    }
+    return key;
+}
+
+static int same_vertices(struct weld *w, struct sh_err *err)
+{
+    const struct scene *scene = w->scene;
+    uint64_t size = power_of_two(2 * (uint64_t)scene->n_vertices);
+    uint32_t *table = malloc(size * sizeof *table);
+    w->same = malloc((size_t)scene->n_vertices * sizeof *w->same);
+    if (table == NULL || w->same == NULL) {
+        free(table);
+        return sh_fail(err, SH_ENOMEM, "beam: no memory for %u corners", scene->n_vertices);
+    }
+    memset(table, 0xff, size * sizeof *table);
+    for (uint32_t i = 0; i < scene->n_vertices; i++) {
+        const double *p = scene->vertex_m[i];
+        uint64_t at = place_key(p) & (size - 1);
+        for (; table[at] != NONE; at = (at + 1) & (size - 1)) {
+            const double *q = scene->vertex_m[table[at]];
+            if (p[0] == q[0] && p[1] == q[1] && p[2] == q[2]) break;
+        }
+        if (table[at] == NONE) table[at] = i;
+        w->same[i] = table[at];
+    }
+    free(table);
+    return SH_OK;
+}
+
+static uint64_t find_edge(struct weld *w, uint32_t low, uint32_t high)
+{
+    uint64_t at = rng_mix((uint64_t)low << 32 | high) & w->mask;
+    while (w->slot[at].low != NONE && (w->slot[at].low != low || w->slot[at].high != high))
+        at = (at + 1) & w->mask;
+    w->slot[at] = (struct slot){low, high};
+    return at;
+}
+
+static void from_station(const struct weld *w, uint32_t vertex, double p[3])
+{
+    for (int i = 0; i < 3; i++)
+        p[i] = w->scene->vertex_m[vertex][i] - w->station_m[i];
+}
+
+/* 1 or 2; 0: the triangle is seen edge-on, and covers nothing. */
+static uint8_t side_of(const struct weld *w, uint32_t low, uint32_t high, uint32_t third)
+{
+    double p[3], q[3], r[3], n[3];
+    from_station(w, low, p);
+    from_station(w, high, q);
+    from_station(w, third, r);
+    vec3_cross(p, q, n);
+    double off = vec3_dot(n, r), length2 = vec3_dot(n, n), far2 = vec3_dot(r, r);
+    if (off * off <= 1e-20 * length2 * far2) return 0;
+    return off > 0.0 ? 1 : 2;
+}
+
+static void add_triangles(struct weld *w)
+{
+    for (uint32_t t = 0; t < w->scene->n_triangles; t++) {
+        uint32_t v[3];
+        for (int i = 0; i < 3; i++)
+            v[i] = w->same[w->scene->triangle[t][i]];
+        for (int i = 0; i < 3; i++) {
+            uint32_t a = v[i], b = v[(i + 1) % 3], low = a < b ? a : b, high = a < b ? b : a;
+            uint64_t at = find_edge(w, low, high);
+            uint8_t before = w->sides[at], side = side_of(w, low, high, v[(i + 2) % 3]);
+            w->sides[at] = before | side;
+            if (w->of == NULL || side == 0) continue;
+            uint16_t kind = w->kind[w->scene->label[t]];
+            if (before == 0) w->of[at] = kind;
+            if (w->of[at] != kind) w->sides[at] |= TWO_KINDS;
+        }
+    }
+}
+
+static int collect(const struct weld *w, struct outline_edge **edge, uint32_t *n, uint64_t *n_edges, struct sh_err *err)
+{
+    uint64_t found = 0;
+    *n_edges = 0;
+    for (uint64_t i = 0; i <= w->mask; i++) {
+        *n_edges += w->slot[i].low != NONE;
+        found += w->slot[i].low != NONE && w->sides[i] != 3;
+    }
+    if (found >= NONE) return sh_fail(err, SH_EINPUT, "beam: too many outlines");
+    *edge = malloc((size_t)(found + 1) * sizeof **edge);
+    if (*edge == NULL) return sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");
+    *n = 0;
+    for (uint64_t i = 0; i <= w->mask; i++) {
+        if (w->slot[i].low == NONE || w->sides[i] == 3) continue;
+        double a[3], b[3];
+        from_station(w, w->slot[i].low, a);
+        from_station(w, w->slot[i].high, b);
+        for (int j = 0; j < 3; j++) {
+            (*edge)[*n].a[j] = (float)a[j];
+            (*edge)[*n].b[j] = (float)b[j];
+        }
+        (*n)++;
+    }
+    return SH_OK;
+}
+
+int outline_find(const struct scene *scene, const double station_m[3], const uint16_t *kind, struct outline_edge **edge,
+                 uint32_t *n, uint64_t *n_edges, struct sh_err *err)
+{
+    struct weld w = {.scene = scene, .station_m = station_m, .kind = kind};
+    uint64_t size = power_of_two(4 * (uint64_t)scene->n_triangles);
+    w.mask = size - 1;
+    w.slot = malloc(size * sizeof *w.slot);
+    w.sides = calloc(size, 1);
+    w.of = kind != NULL ? malloc(size * sizeof *w.of) : NULL;
+    int rc = w.slot == NULL || w.sides == NULL || (kind != NULL && w.of == NULL)
+                 ? sh_fail(err, SH_ENOMEM, "beam: no memory for the edges of %u triangles", scene->n_triangles)
+                 : same_vertices(&w, err);
+    if (rc == SH_OK) {
+        memset(w.slot, 0xff, size * sizeof *w.slot);
+        add_triangles(&w);
+        rc = collect(&w, edge, n, n_edges, err);
+    }
+    free(w.same);
+    free(w.slot);
+    free(w.sides);
+    free(w.of);
+    return rc;
+}

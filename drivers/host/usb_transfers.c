@@ -1,0 +1,334 @@
+/* Source of bytes: the bulk pair of the head's vendor interface.
+ *
+ * Several reads are always under way, so that the bus never waits for this program: a ring of transfers, which the
+ * kernel completes in order and which are used up and sent off again in order. Nothing runs on a thread of its own:
+ * completions are taken in while the caller reads or waits, and between these calls the kernel fills what is under way.
+ */
+#include "drivers/host/usb_inside.h"
+
+#include <errno.h>
+#include <poll.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+/* A read is a multiple of every packet size (64, 512, 1024 bytes): so none can be sent more than it has room for. */
+enum { IN_TRANSFERS = 16, IN_BYTES = 64 << 10, OUT_BYTES = 2048, CANCEL_MS = 1000 };
+/* How long a bus may fail with the device still on it, as it does until the hub has noticed an unplugged one. */
+enum { FAILING_MS = 1000, FAILING_PAUSE_MS = 20, RELAPSE_MS = 10000 };
+
+struct in_transfer {
+    struct libusb_transfer *transfer;
+    int flying;
+    int error;   /* errno of why it could not be sent off */
+    size_t used; /* bytes that were read out of it */
+};
+
+struct failing {
+    int n;              /* failures since something got through, or since RELAPSE_MS without one */
+    int64_t give_up_ns; /* the first of them, and FAILING_MS */
+    int64_t relapse_ns; /* the last of them, and RELAPSE_MS */
+};
+
+struct host_usb {
+    libusb_context *ctx;
+    libusb_device_handle *handle;
+    struct usb_interface interface;
+    struct in_transfer in[IN_TRANSFERS];
+    int n_in, head; /* how many; the one to read from next */
+    struct failing in_failing, out_failing;
+    struct libusb_transfer *out;
+    int out_flying, out_error; /* errno of the write before */
+    uint8_t *in_data, out_data[OUT_BYTES];
+};
+
+static void LIBUSB_CALL in_done(struct libusb_transfer *transfer)
+{
+    ((struct in_transfer *)transfer->user_data)->flying = 0;
+}
+
+static int errno_of_status(enum libusb_transfer_status status)
+{
+    switch (status) {
+    case LIBUSB_TRANSFER_COMPLETED:
+        return 0;
+    case LIBUSB_TRANSFER_NO_DEVICE:
+        return ENODEV;
+    case LIBUSB_TRANSFER_CANCELLED:
+        return ECANCELED;
+    case LIBUSB_TRANSFER_TIMED_OUT:
+        return ETIMEDOUT;
+    default:
+        return EPROTO;
+    }
+}
+
+static void LIBUSB_CALL out_done(struct libusb_transfer *transfer)
+{
+    struct host_usb *usb = transfer->user_data;
+    usb->out_flying = 0;
+    usb->out_error = errno_of_status(transfer->status);
+    if (usb->out_error == 0) usb->out_failing.n = 0;
+}
+
+/* What the bus or the system says to a request: EPROTO may be over in a moment. */
+static int errno_of_rc(int rc)
+{
+    return rc == 0 ? 0 : rc == LIBUSB_ERROR_NO_DEVICE ? ENODEV : EPROTO;
+}
+
+/* Takes in what has happened, waiting for at most timeout. */
+static int handle_events(struct host_usb *usb, int64_t timeout_ns)
+{
+    struct timeval wait = {.tv_sec = timeout_ns / 1000000000, .tv_usec = timeout_ns % 1000000000 / 1000};
+    int rc = libusb_handle_events_timeout_completed(usb->ctx, &wait, NULL);
+    if (rc == 0) return 0;
+    errno = rc == LIBUSB_ERROR_INTERRUPTED ? EINTR : EIO;
+    return -1;
+}
+
+static int count_reads(const struct host_usb *usb)
+{
+    int n = 0;
+    for (int i = 0; i < usb->n_in; i++)
+        n += usb->in[i].flying;
+    return n;
+}
+
+/* Takes back the reads that are under way; what came in until then stays to be read. */
+static void cancel_reads(struct host_usb *usb)
+{
+    for (int i = 0; i < usb->n_in; i++)
+        if (usb->in[i].flying) libusb_cancel_transfer(usb->in[i].transfer);
+    int64_t deadline_ns = host_deadline_ns(CANCEL_MS);
+    while (count_reads(usb) > 0 && host_deadline_ns(0) < deadline_ns)
+        handle_events(usb, 10000000);
+}
+
+static void cancel_write(struct host_usb *usb)
+{
+    if (usb->out_flying) libusb_cancel_transfer(usb->out);
+    int64_t deadline_ns = host_deadline_ns(CANCEL_MS);
+    while (usb->out_flying && host_deadline_ns(0) < deadline_ns)
+        handle_events(usb, 10000000);
+}
+
+static int submit(struct in_transfer *in)
+{
+    in->used = 0;
+    in->transfer->actual_length = 0;
+    int rc = libusb_submit_transfer(in->transfer);
+    in->flying = rc == 0;
+    in->error = errno_of_rc(rc);
+    return rc;
+}
+
+/* An endpoint that stalled or a bus that garbled is started anew. A device that is just being unplugged shows itself
+ * first in this way, until the hub has noticed: so the second try and later ones give it a moment. 0: worth another
+ * try; ENODEV: the device is gone, or has not let anything through for too long. */
+static int recover(struct host_usb *usb, struct failing *failing, uint8_t endpoint)
+{
+    const struct timespec pause = {.tv_nsec = FAILING_PAUSE_MS * 1000000};
+    const int64_t now_ns = host_deadline_ns(0);
+    if (failing->n > 0 && now_ns > failing->relapse_ns) failing->n = 0;
+    if (failing->n++ == 0)
+        failing->give_up_ns = host_deadline_ns(FAILING_MS);
+    else if (now_ns > failing->give_up_ns)
+        return ENODEV;
+    else
+        nanosleep(&pause, NULL);
+    const int rc = libusb_clear_halt(usb->handle, endpoint);
+    failing->relapse_ns = host_deadline_ns(RELAPSE_MS);
+    return rc == LIBUSB_ERROR_NO_DEVICE ? ENODEV : 0;
+}
+
+/* The same for the reads: all are taken back first, and those that failed along with this one need no more. */
+static int recover_reads(struct host_usb *usb)
+{
+    cancel_reads(usb);
+    for (int i = 0; i < usb->n_in; i++) {
+        struct in_transfer *in = &usb->in[i];
+        if (!in->flying && errno_of_status(in->transfer->status) == EPROTO)
+            in->transfer->status = LIBUSB_TRANSFER_CANCELLED;
+        if (in->error == EPROTO) in->error = ECANCELED;
+    }
+    return recover(usb, &usb->in_failing, usb->interface.in);
+}
+
+/* The transfer at hand is used up: sends it off again, and goes on to the next. */
+static int turn(struct host_usb *usb)
+{
+    struct in_transfer *in = &usb->in[usb->head];
+    int error = in->error != 0 ? in->error : errno_of_status(in->transfer->status);
+    if (in->transfer->actual_length > 0) usb->in_failing.n = 0;
+    if (error == EPROTO) error = recover_reads(usb);
+    if (error == ENODEV) {
+        in->error = error;
+        return error;
+    }
+    usb->head = (usb->head + 1) % usb->n_in;
+    submit(in); /* where it fails, that shows when the ring comes round to it */
+    return 0;
+}
+
+static ssize_t usb_read(struct host_source *source, void *to, size_t len)
+{
+    struct host_usb *usb = source->usb;
+    int looked = 0;
+    for (;;) {
+        struct in_transfer *in = &usb->in[usb->head];
+        size_t have = in->flying || in->error != 0 ? 0 : (size_t)in->transfer->actual_length - in->used;
+        if (have > 0) {
+            size_t n = have < len ? have : len;
+            memcpy(to, in->transfer->buffer + in->used, n);
+            in->used += n;
+            return (ssize_t)n;
+        }
+        int error = 0;
+        if (!in->flying)
+            error = turn(usb);
+        else if (looked++)
+            error = EAGAIN;
+        else if (handle_events(usb, 0) != 0)
+            error = errno;
+        if (error != 0) {
+            errno = error;
+            return -1;
+        }
+    }
+}
+
+/* A write that failed is not sent again: the head may have it. Its command gets no reply in time, the next one goes out
+ * when the endpoint has been started anew. */
+static ssize_t usb_write(struct host_source *source, const void *data, size_t len)
+{
+    struct host_usb *usb = source->usb;
+    if (usb->out_flying && handle_events(usb, 0) != 0) return -1;
+    int error = usb->out_flying ? EAGAIN : usb->out_error;
+    if (error == EPROTO) error = recover(usb, &usb->out_failing, usb->interface.out);
+    if (error != 0) {
+        errno = error;
+        return -1;
+    }
+    size_t n = len < OUT_BYTES ? len : OUT_BYTES;
+    memcpy(usb->out_data, data, n);
+    usb->out->length = (int)n;
+    usb->out_error = errno_of_rc(libusb_submit_transfer(usb->out));
+    usb->out_flying = usb->out_error == 0;
+    if (usb->out_flying) return (ssize_t)n;
+    errno = usb->out_error == ENODEV ? ENODEV : EAGAIN;
+    return -1;
+}
+
+static int usb_wait(struct host_source *source, short events, int64_t deadline_ns, short *revents)
+{
+    struct host_usb *usb = source->usb;
+    int64_t left_ns = 0;
+    for (;;) {
+        if (handle_events(usb, left_ns) != 0) return -1;
+        *revents = 0;
+        if ((events & POLLIN) && !usb->in[usb->head].flying) *revents |= POLLIN;
+        if ((events & POLLOUT) && !usb->out_flying) *revents |= POLLOUT;
+        if (*revents != 0) return 1;
+        left_ns = deadline_ns == INT64_MAX ? 60000000000 : deadline_ns - host_deadline_ns(0);
+        if (left_ns <= 0) return 0;
+    }
+}
+
+static int session(struct host_usb *usb, int open)
+{
+    return libusb_control_transfer(
+        usb->handle, (uint8_t)LIBUSB_REQUEST_TYPE_VENDOR | LIBUSB_RECIPIENT_INTERFACE | LIBUSB_ENDPOINT_OUT,
+        USB_REQUEST_SESSION, (uint16_t)open, usb->interface.number, NULL, 0, USB_CONTROL_MS);
+}
+
+static void usb_free(struct host_usb *usb)
+{
+    if (usb->handle != NULL) libusb_close(usb->handle); /* forgets transfers that would not end */
+    for (int i = 0; i < IN_TRANSFERS; i++)
+        libusb_free_transfer(usb->in[i].transfer);
+    libusb_free_transfer(usb->out);
+    if (usb->ctx != NULL) libusb_exit(usb->ctx);
+    free(usb->in_data);
+    free(usb);
+}
+
+static void usb_close(struct host_source *source)
+{
+    struct host_usb *usb = source->usb;
+    session(usb, 0);
+    cancel_write(usb);
+    cancel_reads(usb);
+    libusb_release_interface(usb->handle, usb->interface.number);
+    usb_free(usb);
+}
+
+static const struct host_source_ops usb_ops = {usb_read, usb_write, usb_wait, usb_close};
+
+static int make_transfers(struct host_usb *usb, struct sh_err *err)
+{
+    usb->in_data = malloc((size_t)IN_TRANSFERS * IN_BYTES);
+    usb->out = libusb_alloc_transfer(0);
+    int missing = usb->in_data == NULL || usb->out == NULL;
+    for (int i = 0; i < IN_TRANSFERS && !missing; i++) {
+        usb->in[i].transfer = libusb_alloc_transfer(0);
+        missing = usb->in[i].transfer == NULL;
+        if (!missing)
+            libusb_fill_bulk_transfer(usb->in[i].transfer, usb->handle, usb->interface.in, usb->in_data + i * IN_BYTES,
+                                      IN_BYTES, in_done, &usb->in[i], 0);
+    }
+    if (missing) return sh_fail(err, SH_ENOMEM, "no memory for USB transfers");
+    libusb_fill_bulk_transfer(usb->out, usb->handle, usb->interface.out, usb->out_data, 0, out_done, usb, 0);
+    return SH_OK;
+}
+
+/* The system limits what may be under way (usbfs_memory_mb): fewer transfers do as well, only slower. */
+static int submit_all(struct host_usb *usb, const char *name, struct sh_err *err)
+{
+    int rc = 0;
+    while (usb->n_in < IN_TRANSFERS && (rc = submit(&usb->in[usb->n_in])) == 0)
+        usb->n_in++;
+    if (usb->n_in >= 2) return SH_OK;
+    return sh_fail(err, SH_EIO, "%s: cannot start reading: %s", name, libusb_strerror(rc));
+}
+
+static int begin(struct host_usb *usb, const char *name, struct sh_err *err)
+{
+    int rc = libusb_claim_interface(usb->handle, usb->interface.number);
+    if (rc == LIBUSB_ERROR_BUSY)
+        return sh_fail(err, SH_EIO, "%s: another program has the head's interface %d", name, usb->interface.number);
+    if (rc == LIBUSB_ERROR_NO_DEVICE) return sh_fail(err, SH_ELOST, "%s: unplugged while it was opened", name);
+    if (rc != 0) return sh_fail(err, SH_EIO, "%s: cannot claim the interface: %s", name, libusb_strerror(rc));
+    rc = session(usb, 1);
+    if (rc < 0)
+        return sh_fail(err, rc == LIBUSB_ERROR_NO_DEVICE ? SH_ELOST : SH_EIO,
+                       "%s: the head does not open the stream: %s", name, libusb_strerror(rc));
+    return SH_OK;
+}
+
+int host_usb_open(const char *source, struct host_source *out, struct sh_err *err)
+{
+    struct usb_wanted wanted;
+    int rc = host_usb_parse(source, &wanted, err);
+    if (rc != SH_OK) return rc;
+    struct host_usb *usb = calloc(1, sizeof *usb);
+    if (usb == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a USB source");
+    int e = libusb_init(&usb->ctx);
+    if (e != 0) rc = sh_fail(err, SH_EIO, "%s: no USB on this system: %s", source, libusb_strerror(e));
+    if (rc == SH_OK)
+        rc = host_usb_find(usb->ctx, &wanted, &usb->handle, &usb->interface, out->name, sizeof out->name, err);
+    if (rc == SH_OK) rc = make_transfers(usb, err);
+    if (rc == SH_OK) rc = begin(usb, out->name, err);
+    if (rc == SH_OK && (rc = submit_all(usb, out->name, err)) != SH_OK) {
+        session(usb, 0);
+        cancel_reads(usb);
+    }
+    if (rc != SH_OK) {
+        usb_free(usb);
+        return rc;
+    }
+    out->usb = usb;
+    out->ops = &usb_ops;
+    return SH_OK;
+}

@@ -1,0 +1,183 @@
+/* The usb link: the head as a USB device, with the sessions of its console and its stream (drivers/usb/head_device.h).
+ *
+ * The back end carries out the host's acts one at a time and stops when one has begun or ended a session, until that
+ * is told: so nothing can happen twice between two polls. A session that the host has ended is told to be over once
+ * what came in it is read. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "drivers/link/link_util.h"
+#include "drivers/usb/backend.h"
+#include "drivers/usb/head_device.h"
+
+struct usb_link {
+    struct scanhead_usb head;
+    const struct usb_backend_ops *ops;
+    void *backend;
+    int told[SCANHEAD_USB_SESSIONS]; /* the caller takes it to be open */
+    const char *news;                /* the back end's, until told */
+};
+
+static const char *const session_names[] = {[CONSOLE_SESSION] = "usb console", [STREAM_SESSION] = "usb stream"};
+
+static int usb_open(const struct link_spec *spec, void **link, struct sh_err *err)
+{
+    struct usb_link *self = calloc(1, sizeof *self);
+    if (self == NULL) return sh_fail(err, SH_ENOMEM, "link usb: no memory");
+    struct usb_identity id = {
+        .vid = (uint16_t)spec->vid, .pid = (uint16_t)spec->pid, .highest = (enum usb_rate)spec->speed};
+    struct usb_backend_spec backend = {.type = (enum usb_backend_type)spec->backend,
+                                       .port = spec->port,
+                                       .attach = spec->attach,
+                                       .retry_ms = spec->retry_ms};
+    snprintf(id.serial, sizeof id.serial, "%s", spec->serial);
+    snprintf(backend.address, sizeof backend.address, "%s", spec->address);
+    snprintf(backend.path, sizeof backend.path, "%s", spec->path);
+    snprintf(backend.udc, sizeof backend.udc, "%s", spec->udc);
+    self->ops = usb_backend_ops_get(backend.type);
+    int rc = self->ops != NULL ? SH_OK : sh_fail(err, SH_EINPUT, "link usb: this build has no such back end");
+    if (rc == SH_OK) rc = scanhead_usb_create(&id, &self->head, err);
+    if (rc == SH_OK) rc = self->ops->open(&backend, self->head.device, &self->backend, err);
+    if (rc != SH_OK) {
+        usb_device_free(self->head.device);
+        free(self);
+        return rc;
+    }
+    *link = self;
+    return SH_OK;
+}
+
+static void usb_endpoint(const void *link, char *buf, size_t len)
+{
+    const struct usb_link *self = link;
+    self->ops->endpoint(self->backend, buf, len);
+}
+
+/* Bulk, in bytes per second. Full speed: 19 packets of 64 bytes in a frame of 1 ms (USB 2.0, table 5-9). High speed:
+ * 10 packets of 512 in a microframe of 125 us, which host controllers reach; table 5-10 allows 13 on an otherwise idle
+ * bus. Super speed: what USB 3.0, 4.4.11, calls realistic for an application. */
+static double usb_capacity(const void *link)
+{
+    static const double rate[USB_N_RATES] = {19 * 64 * 1e3, 10 * 512 * 8e3, 400e6};
+    const struct usb_link *self = link;
+    return rate[usb_device_identity(self->head.device)->highest];
+}
+
+/* What came in a session that is over, and is not read yet. */
+static size_t left_over(const struct usb_link *self, int i)
+{
+    const uint8_t out = self->head.session[i].out;
+    uint32_t epoch = 0;
+    size_t n = usb_device_can_read(self->head.device, out, &epoch);
+    return n != 0 && epoch != usb_device_epoch(self->head.device, out) ? n : 0;
+}
+
+static int is_readable(const struct usb_link *self, int i)
+{
+    if (!self->told[i]) return 0;
+    if (!self->head.session[i].open) return left_over(self, i) != 0;
+    return usb_device_can_read(self->head.device, self->head.session[i].out, NULL) != 0;
+}
+
+static int is_writable(const struct usb_link *self, int i)
+{
+    return self->told[i] && self->head.session[i].open &&
+           usb_device_can_write(self->head.device, self->head.session[i].in);
+}
+
+static int has_to_tell(const struct usb_link *self, int i)
+{
+    return self->told[i] != self->head.session[i].open;
+}
+
+static int go_on(void *ctx)
+{
+    struct usb_link *self = ctx;
+    scanhead_usb_update(&self->head);
+    return !has_to_tell(self, CONSOLE_SESSION) && !has_to_tell(self, STREAM_SESSION);
+}
+
+static void tell(struct usb_link *self, int i, uint32_t want_write, struct link_events *events)
+{
+    const struct scanhead_usb_session *session = &self->head.session[i];
+    if (self->told[i] && !session->open && !is_readable(self, i))
+        self->told[i] = !link_events_push(events, LINK_CLOSED, i, session_names[i]);
+    if (!self->told[i]) scanhead_usb_ended(&self->head, i);
+    if (!self->told[i] && session->open) self->told[i] = link_events_push(events, LINK_OPENED, i, session_names[i]);
+    if (is_readable(self, i)) link_events_push(events, LINK_READABLE, i, NULL);
+    if ((want_write >> i & 1u) != 0 && is_writable(self, i)) link_events_push(events, LINK_WRITABLE, i, NULL);
+}
+
+static int has_news(const struct usb_link *self, uint32_t want_write)
+{
+    int news = self->ops->more(self->backend) || self->news != NULL;
+    for (int i = 0; i < SCANHEAD_USB_SESSIONS; i++)
+        news |= has_to_tell(self, i) || is_readable(self, i) || ((want_write >> i & 1u) != 0 && is_writable(self, i));
+    return news;
+}
+
+static int usb_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event, int max)
+{
+    struct usb_link *self = link;
+    struct link_events events = {event, 0, max};
+    struct pollfd fds[1 + USB_BACKEND_MAX_FDS] = {{.fd = wake_fd, .events = POLLIN}};
+    int n = self->ops->prepare(self->backend, fds + 1);
+    int rc = link_wait(fds, (nfds_t)(1 + n), has_news(self, want_write) ? 0 : timeout_ms);
+    if (rc != SH_OK) return rc;
+    link_take_wake(&fds[0], &events);
+    rc = self->ops->handle(self->backend, fds + 1, n, go_on, self);
+    if (rc != SH_OK) return rc;
+    scanhead_usb_update(&self->head);
+    self->ops->flush(self->backend);
+    for (int i = 0; i < SCANHEAD_USB_SESSIONS; i++)
+        tell(self, i, want_write, &events);
+    if (self->news == NULL) self->news = self->ops->news(self->backend);
+    if (self->news != NULL && link_events_push(&events, LINK_NOTICE, 0, self->news)) self->news = NULL;
+    return events.n;
+}
+
+static ssize_t usb_read(void *link, int session, void *buf, size_t len)
+{
+    struct usb_link *self = link;
+    if (session < 0 || session >= SCANHEAD_USB_SESSIONS || !self->told[session]) return SH_ECLOSED;
+    if (!is_readable(self, session)) return 0;
+    size_t n = usb_device_read(self->head.device, self->head.session[session].out, buf, len);
+    self->ops->flush(self->backend);
+    return (ssize_t)n;
+}
+
+/* A caller that hears here that the session is over reads no more: what is left is dropped. */
+static ssize_t usb_write(void *link, int session, const void *buf, size_t len)
+{
+    struct usb_link *self = link;
+    if (session < 0 || session >= SCANHEAD_USB_SESSIONS || !self->told[session]) return SH_ECLOSED;
+    const struct scanhead_usb_session *s = &self->head.session[session];
+    if (s->open) {
+        size_t n = usb_device_write(self->head.device, s->in, buf, len);
+        if (n != 0) self->ops->flush(self->backend);
+        return (ssize_t)n;
+    }
+    usb_device_drop(self->head.device, s->out, usb_device_epoch(self->head.device, s->out));
+    self->ops->flush(self->backend);
+    return SH_ECLOSED;
+}
+
+static void usb_close(void *link)
+{
+    struct usb_link *self = link;
+    self->ops->close(self->backend);
+    usb_device_free(self->head.device);
+    free(self);
+}
+
+const struct link_ops link_usb = {
+    .name = "usb",
+    .open = usb_open,
+    .endpoint = usb_endpoint,
+    .capacity = usb_capacity,
+    .poll = usb_poll,
+    .read = usb_read,
+    .write = usb_write,
+    .close = usb_close,
+};

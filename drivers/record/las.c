@@ -1,0 +1,272 @@
+/* .las: LAS 1.4, point data record format 6 with the label behind it; one record per echo. What the numbers mean stands
+ * in the file itself (las_header.c).
+ *
+ * Coordinates are counts of the stream's own scale from the first scan's station, so those of the first scan are the
+ * stream's very numbers, and those of further stations are rounded once, by half a count at most. Nothing is clipped:
+ * what is too far for 32 bits is an error. Longitudes go on beyond 180 or -180 degrees where a scan crosses the
+ * antimeridian: all lie within 180 degrees of the first station. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "drivers/record/las_header.h"
+#include "drivers/record/outfile.h"
+#include "drivers/record/recorder_list.h"
+#include "drivers/record/track.h"
+#include "drivers/protocol/bytes.h"
+#include "drivers/protocol/native.h"
+
+#define DEG                       (3.14159265358979323846 / 180.0)
+#define SCAN_ANGLE_COUNTS_PER_RAD (1.0 / DEG / 0.006)
+
+struct las {
+    struct outfile file;
+    struct track track;
+    struct las_facts facts;
+    const struct sh_report *report;
+    int begun, time_came_late;
+    size_t front_len;
+    uint64_t n_empty;
+};
+
+static int las_open(const char *path, const struct recorder_options *options, void **rec, struct sh_err *err)
+{
+    struct las *las = calloc(1, sizeof *las);
+    if (las == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);
+    int rc = outfile_open(&las->file, path, err);
+    if (rc != 0) {
+        free(las);
+        return rc;
+    }
+    las->report = options->report;
+    las->track.path = las->file.path;
+    las->track.wants_attributes = 1;
+    for (int i = 0; i < 3; i++)
+        las->facts.scale[i] = 1;
+    strcpy(las->facts.profile, "OTHER"); /* until points have come */
+    *rec = las;
+    return 0;
+}
+
+/* Header and records before the points, whose counts are written over at the end. */
+static int put_front(struct las *las, struct sh_err *err)
+{
+    uint8_t front[LAS_FRONT_MAX];
+    las->begun = 1;
+    las->front_len = las_front(&las->facts, front);
+    return outfile_write(&las->file, front, las->front_len, err);
+}
+
+/* Geodetic coordinates are longitude, latitude in LAS, as GIS software draws x and y. */
+static int is_swapped(const struct las *las)
+{
+    return track_crs(&las->track) == NATIVE_CRS_GEODETIC;
+}
+
+static void swap(double v[3])
+{
+    double x = v[0];
+    v[0] = v[1];
+    v[1] = x;
+}
+
+/* The stream's own counts from the first anchor, or coarser ones for a head that moves. */
+static void set_counts(struct las *las)
+{
+    const struct track *t = &las->track;
+    struct las_facts *f = &las->facts;
+    memcpy(f->offset, t->pose.shift_m, sizeof f->offset);
+    for (int i = 0; i < 3; i++)
+        f->scale[i] = t->info.geo ? t->info.scale[i] * (t->scale_m / t->info.scale_m) : t->scale_m;
+    if (!is_swapped(las)) return;
+    swap(f->offset);
+    swap(f->scale);
+}
+
+static int las_scan(void *rec, struct sh_err *err)
+{
+    struct las *las = rec;
+    const struct track *t = &las->track;
+    struct las_facts *f = &las->facts;
+    if (las->begun) return 0;
+    f->epsg = track_epsg(t);
+    f->geoid_heights = track_is_geoid(t);
+    f->moving = t->info.moving;
+    f->attributes = t->has_attributes;
+    set_counts(las);
+    snprintf(f->profile, sizeof f->profile, "%s", t->info.profile);
+    f->gps_time = scanhead_gps_time(t->sh, t->t0_ns, &f->created_gps_s) == 0;
+    if (!(f->scale[0] > 0 && f->scale[1] > 0 && f->scale[2] > 0))
+        return sh_fail(err, SH_EFORMAT, "%s: the stream's scale is %g; a LAS file needs one above 0", las->file.path,
+                       f->scale[0]);
+    return put_front(las, err);
+}
+
+static int too_far(const struct las *las, const double p[3], struct sh_err *err)
+{
+    return sh_fail(err, SH_EFORMAT,
+                   "%s: a point of station %u at (%.3f %.3f %.3f) is beyond the %.0f m from the first station that LAS "
+                   "can hold in steps of %g m; give the head a coarser output.scale_m, or each station its own file",
+                   las->file.path, las->track.info.station, p[0], p[1], p[2], 2147483647 * las->track.scale_m,
+                   las->track.scale_m);
+}
+
+/* The angle from straight down, in the head's frame. */
+static uint16_t scan_angle(const double p_socs[3])
+{
+    float flat = sqrtf((float)(p_socs[0] * p_socs[0] + p_socs[1] * p_socs[1]));
+    float up = atan2f(flat, (float)-p_socs[2]);
+    return (uint16_t)lrintf(up * (float)SCAN_ANGLE_COUNTS_PER_RAD);
+}
+
+/* 0 where not modelled, so that the rest keeps its 0.01 dB: 1 is -327.67 dB. */
+static uint16_t intensity(double reflectance_db)
+{
+    return isnan(reflectance_db) ? 0 : (uint16_t)(lrint(reflectance_db * 100) + 32768);
+}
+
+static int put_xyz(struct las *las, uint8_t *to, const double p[3], struct sh_err *err)
+{
+    struct las_facts *f = &las->facts;
+    int32_t n[3];
+    for (int i = 0; i < 3; i++) {
+        double from_offset = p[i] - f->offset[i];
+        if (i == 0 && is_swapped(las)) from_offset = remainder(from_offset, 360);
+        double counts = rint(from_offset / f->scale[i]);
+        if (!(fabs(counts) <= INT32_MAX)) return too_far(las, p, err);
+        n[i] = (int32_t)counts;
+    }
+    for (int i = 0; i < 3; i++) {
+        if (f->n_points == 0 || n[i] < f->min[i]) f->min[i] = n[i];
+        if (f->n_points == 0 || n[i] > f->max[i]) f->max[i] = n[i];
+        le_put32(to + 4 * i, (uint32_t)n[i]);
+    }
+    return 0;
+}
+
+/* Of point i of the batch. One that has waited was told the time before that. */
+static int is_told_time(const struct track *t, int i, double *gps_s)
+{
+    *gps_s = t->gps_s[i];
+    return t->has_attributes ? !isnan(*gps_s) : scanhead_gps_time(t->sh, t->point[i].t_ns, gps_s) == 0;
+}
+
+static int put_time(const struct las *las, uint8_t *to, int i, struct sh_err *err)
+{
+    double s = (double)las->track.point[i].t_ns / 1e9;
+    if (las->facts.gps_time && !is_told_time(&las->track, i, &s))
+        return sh_fail(err, SH_EFORMAT, "%s: the head tells no time any more; a LAS file holds one kind of time",
+                       las->file.path);
+    le_put_double(to, s);
+    return 0;
+}
+
+/* In the head's frame, well enough for an angle. */
+static void set_socs(const struct track *t, double p[3])
+{
+    if (t->info.crs == NATIVE_CRS_GEODETIC) {
+        const double m_deg = 6371000 * DEG, north = (p[0] - t->pose.shift_m[0]) * m_deg;
+        const double east = remainder(p[1] - t->pose.shift_m[1], 360) * m_deg * cos(p[0] * DEG);
+        p[0] = t->pose.shift_m[0] + east;
+        p[1] = t->pose.shift_m[1] + north;
+    }
+    station_pose_reverse(&t->pose, p);
+}
+
+/* 0.01 dB and 0.01 ns, as on the wire. */
+static void put_attribute(uint8_t *to, const struct scanhead_attribute *a)
+{
+    int amplitude = isnan(a->amplitude_db) ? NATIVE_AMPLITUDE_NONE : (int)lrint(100 * a->amplitude_db);
+    int width = isnan(a->width_ns) ? NATIVE_WIDTH_NONE : (int)lrint(100 * a->width_ns);
+    le_put16(to, (uint16_t)amplitude);
+    le_put16(to + 2, (uint16_t)width);
+}
+
+/* Point i of the batch. */
+static int put_point(struct las *las, uint8_t *to, int i, struct sh_err *err)
+{
+    struct track *t = &las->track;
+    const struct scanhead_point *point = &t->point[i];
+    double p_crs[3] = {point->x, point->y, point->z}, p_socs[3] = {point->x, point->y, point->z};
+    if (!t->info.geo)
+        station_pose_forward(&t->pose, p_crs);
+    else
+        set_socs(t, p_socs);
+    if (is_swapped(las)) swap(p_crs);
+    int rc = put_time(las, to + 22, i, err);
+    if (rc == 0) rc = put_xyz(las, to, p_crs, err);
+    le_put16(to + 12, intensity(point->reflectance_db));
+    to[14] = (uint8_t)(point->echo | point->echo_count << 4);
+    to[15] = 0;
+    to[16] = 0; /* never classified */
+    to[17] = 0;
+    le_put16(to + 18, t->info.moving ? 0 : scan_angle(p_socs));
+    le_put16(to + 20, (uint16_t)t->info.station);
+    le_put16(to + 30, point->label);
+    if (t->has_attributes) put_attribute(to + LAS_POINT_LEN, &t->attribute[i]);
+    return rc;
+}
+
+static int las_points(void *rec, int n, struct sh_err *err)
+{
+    struct las *las = rec;
+    uint8_t *to = outfile_room(&las->file, TRACK_BATCH * LAS_POINT_LEN_MAX, err), *at = to;
+    if (to == NULL) return SH_EIO;
+    int rc = 0;
+    double s;
+    if (!las->facts.gps_time && !las->time_came_late)
+        las->time_came_late = scanhead_gps_time(las->track.sh, 0, &s) == 0;
+    for (int i = 0; i < n; i++) {
+        const struct scanhead_point *p = &las->track.point[i];
+        if (p->echo_count == 0) {
+            las->n_empty++;
+            continue;
+        }
+        rc = put_point(las, at, i, err);
+        if (rc != 0) break;
+        at += las->facts.attributes ? LAS_POINT_LEN_MAX : LAS_POINT_LEN;
+        las->facts.n_points++;
+        if (p->echo >= 1) las->facts.n_by_return[p->echo - 1]++;
+    }
+    outfile_used(&las->file, (size_t)(at - to)); /* also before a failure: the file may be kept */
+    return rc;
+}
+
+static const struct track_ops ops = {las_scan, las_points};
+
+static int las_frame(void *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
+{
+    struct las *las = rec;
+    return track_frame(&las->track, sh, frame, &ops, las, err);
+}
+
+static int finish(struct las *las, struct sh_err *err)
+{
+    uint8_t front[LAS_FRONT_MAX];
+    int rc = track_flush(&las->track, &ops, las, err);
+    if (rc == 0 && !las->begun) rc = put_front(las, err);
+    if (rc == 0) rc = outfile_flush(&las->file, err);
+    return rc != 0 ? rc : outfile_patch(&las->file, 0, front, las_front(&las->facts, front), err);
+}
+
+static int las_close(void *rec, int keep, struct sh_err *err)
+{
+    struct las *las = rec;
+    int rc = keep ? finish(las, err) : 0;
+    if (keep && rc == 0 && las->n_empty > 0)
+        sh_warn(las->report, "%s: %llu shots without echo left out, for which LAS has no place", las->file.path,
+                (unsigned long long)las->n_empty);
+    if (keep && rc == 0 && las->time_came_late)
+        sh_warn(las->report,
+                "%s: times count from the scan's start: what the head said of its clock was lost before the first "
+                "points",
+                las->file.path);
+    if (keep && rc == 0) track_tell(&las->track, las->report);
+    int closed = outfile_close(&las->file, keep && rc == 0, err);
+    track_free(&las->track);
+    free(las);
+    return rc != 0 ? rc : closed;
+}
+
+const struct recorder_ops recorder_las = {".las", las_open, las_frame, las_close, 0};

@@ -1,0 +1,275 @@
+/* .ply: one vertex per echo. The format is described in the header's own comments.
+ *
+ * Positions are in the stream's CRS (geo), or in the scene frame (polar), as scanhead_to_scene has it.
+ *
+ * The header comes first in the file but is known last (count, names, losses). When the first points arrive
+ * the head has told how many surfaces there are, so room is left for the header: no byte of the points is
+ * written twice, which matters at 100 MB/s. Should the header outgrow its room after all, the points are
+ * copied behind it once. */
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "drivers/record/outfile.h"
+#include "drivers/record/ply_columns.h"
+#include "drivers/record/recorder_list.h"
+#include "drivers/record/track.h"
+#include "drivers/protocol/bytes.h"
+#include "drivers/protocol/native.h"
+
+enum { RECORD_LEN = 4 * 8 + 4 + 8 + 1 + 1 + 2 + 2, FRAME_LEN = 8, ATTRIBUTES_LEN = 8, TEXT_LEN = 512 };
+
+struct ply {
+    struct outfile file;
+    struct track track;
+    struct recorder_options options;
+    struct ply_facts facts;
+    struct ply_names names;
+    int begun;         /* room for the header is made */
+    size_t header_len; /* bytes of that room */
+};
+
+static int ply_open(const char *path, const struct recorder_options *options, void **rec, struct sh_err *err)
+{
+    struct ply *ply = calloc(1, sizeof *ply);
+    if (ply == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);
+    ply->options = *options;
+    ply->facts.ascii = options->ascii;
+    ply->facts.empty_shots = options->empty_shots;
+    int rc = outfile_open(&ply->file, path, err);
+    if (rc != 0) {
+        free(ply);
+        return rc;
+    }
+    ply->track.path = ply->file.path;
+    ply->track.wants_attributes = 1;
+    *rec = ply;
+    return 0;
+}
+
+/* Makes room for the header with what is known of the names. */
+static int begin(struct ply *ply, const struct scanhead *sh, uint32_t n_surfaces, struct sh_err *err)
+{
+    int rc = ply_names_grow(&ply->names, n_surfaces, err);
+    for (uint32_t i = 0; rc == 0 && i < n_surfaces; i++) {
+        const char *object, *material;
+        if (scanhead_surface(sh, i, &object, &material)) rc = ply_names_set(&ply->names, i, object, material, err);
+    }
+    if (rc != 0) return rc;
+    ply->header_len = ply_header_reserve(&ply->facts, &ply->names);
+    if (ply->header_len == 0) return sh_fail(err, SH_ENOMEM, "%s: no memory for the header", ply->file.path);
+    ply->begun = 1;
+    static const char blank[4096];
+    for (size_t left = ply->header_len; left > 0 && rc == 0;) {
+        size_t n = left < sizeof blank ? left : sizeof blank;
+        rc = outfile_write(&ply->file, blank, n, err);
+        left -= n;
+    }
+    return rc;
+}
+
+/* A vertex as far as the file has its properties. */
+struct vertex {
+    struct scanhead_point point;
+    unsigned station;
+    const double *frame;                        /* NULL where there is no such property */
+    const struct scanhead_attribute *attribute; /* likewise */
+};
+
+static size_t put_binary(uint8_t *to, const struct vertex *v)
+{
+    const struct scanhead_point *p = &v->point;
+    size_t len = RECORD_LEN;
+
+    le_put_double(to, p->x);
+    le_put_double(to + 8, p->y);
+    le_put_double(to + 16, p->z);
+    le_put_double(to + 24, p->range_m);
+    le_put_float(to + 32, (float)p->reflectance_db);
+    le_put_double(to + 36, (double)p->t_ns / 1e9);
+    to[44] = p->echo;
+    to[45] = p->echo_count;
+    le_put16(to + 46, p->label);
+    le_put16(to + 48, (uint16_t)v->station);
+    if (v->frame != NULL) {
+        le_put_double(to + len, *v->frame);
+        len += FRAME_LEN;
+    }
+    if (v->attribute == NULL) return len;
+    le_put_float(to + len, (float)v->attribute->amplitude_db);
+    le_put_float(to + len + 4, (float)v->attribute->width_ns);
+    return len + ATTRIBUTES_LEN;
+}
+
+/* Micrometres (1e-11 degrees) are the finest scale of the wire, 0.01 dB and nanoseconds its units: more digits would
+ * say nothing. "nan" without a sign, as some readers know no other. */
+static size_t put_number(char *to, size_t room, int digits, double v)
+{
+    int n = isnan(v) ? snprintf(to, room, "nan ") : snprintf(to, room, "%.*f ", digits, v);
+    return n > 0 && (size_t)n < room ? (size_t)n : room;
+}
+
+/* The length, or more than TEXT_LEN where numbers are absurdly long. */
+static size_t put_ascii(char *to, const struct vertex *v, int degrees)
+{
+    const struct scanhead_point *p = &v->point;
+    const int flat = degrees ? 12 : 6;
+    const struct {
+        double v;
+        int digits;
+    } number[] = {{p->x, flat},    {p->y, flat},           {p->z, 6},
+                  {p->range_m, 6}, {p->reflectance_db, 2}, {(double)p->t_ns / 1e9, 9}};
+    size_t n = 0;
+    for (size_t i = 0; i < sizeof number / sizeof number[0] && n < TEXT_LEN; i++)
+        n += put_number(to + n, TEXT_LEN - n, number[i].digits, number[i].v);
+    if (n >= TEXT_LEN) return TEXT_LEN + 1;
+    n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u %u %u %u ", p->echo, p->echo_count, p->label, v->station);
+    if (v->frame != NULL && n < TEXT_LEN)
+        n += (size_t)(isnan(*v->frame) ? snprintf(to + n, TEXT_LEN - n, "nan ")
+                                       : snprintf(to + n, TEXT_LEN - n, "%.9g ", *v->frame));
+    if (v->attribute != NULL && n < TEXT_LEN) n += put_number(to + n, TEXT_LEN - n, 2, v->attribute->amplitude_db);
+    if (v->attribute != NULL && n < TEXT_LEN) n += put_number(to + n, TEXT_LEN - n, 2, v->attribute->width_ns);
+    if (n >= TEXT_LEN) return TEXT_LEN + 1;
+    to[n - 1] = '\n'; /* the blank behind the last number */
+    return n;
+}
+
+/* The time may come late. */
+static void set_gps(struct ply *ply)
+{
+    struct ply_facts *facts = &ply->facts;
+    if (facts->have_gps || ply->track.n_scans != 1) return;
+    facts->have_gps = scanhead_gps_time(ply->track.sh, 0, &facts->gps_s) == 0;
+    facts->gps_s += 1e9; /* adjusted time is that much less */
+}
+
+/* Room for the header is made when the head has told how many surfaces there are. */
+static int ply_scan(void *rec, struct sh_err *err)
+{
+    struct ply *ply = rec;
+    const struct scanhead_info *info = &ply->track.info;
+    struct ply_facts *facts = &ply->facts;
+    facts->have_crs = 1;
+    facts->crs = track_crs(&ply->track);
+    facts->epsg = track_epsg(&ply->track);
+    facts->geoid_heights = track_is_geoid(&ply->track);
+    facts->moving = info->moving;
+    facts->stops = info->stop;
+    facts->attributes = ply->track.has_attributes;
+    snprintf(facts->idn, sizeof facts->idn, "%s", info->idn);
+    snprintf(facts->profile, sizeof facts->profile, "%s", info->profile);
+    return ply->begun ? 0 : begin(ply, ply->track.sh, info->n_surfaces, err);
+}
+
+static int ply_points(void *rec, int n, struct sh_err *err)
+{
+    struct ply *ply = rec;
+    const struct track *t = &ply->track;
+    uint8_t *to = outfile_room(&ply->file, TRACK_BATCH * TEXT_LEN, err);
+    if (to == NULL) return SH_EIO;
+    size_t used = 0;
+    set_gps(ply);
+    for (int i = 0; i < n; i++) {
+        struct vertex v = {.point = t->point[i], .station = t->info.station};
+        struct scanhead_point *p = &v.point;
+        if (p->echo_count == 0 && !ply->options.empty_shots) continue;
+        if (t->info.moving || t->info.stop) v.frame = t->info.moving ? &t->frame[i] : &t->info.frame;
+        if (t->has_attributes) v.attribute = &t->attribute[i];
+        if (!t->info.geo) {
+            double xyz[3] = {p->x, p->y, p->z};
+            station_pose_forward(&t->pose, xyz);
+            p->x = xyz[0];
+            p->y = xyz[1];
+            p->z = xyz[2];
+        }
+        size_t len =
+            ply->options.ascii ? put_ascii((char *)to + used, &v, ply->facts.crs == 3) : put_binary(to + used, &v);
+        if (len > TEXT_LEN)
+            return sh_fail(err, SH_EFORMAT, "%s: a coordinate beyond all measure: %g %g %g", ply->file.path, p->x, p->y,
+                           p->z);
+        used += len;
+        ply->facts.n_vertices++;
+    }
+    outfile_used(&ply->file, used);
+    return 0;
+}
+
+struct naming {
+    struct ply *ply;
+    struct sh_err *err;
+    int rc;
+};
+
+static void take_name(void *ctx, uint32_t label, const char *object, const char *material)
+{
+    struct naming *naming = ctx;
+    if (naming->rc == 0) naming->rc = ply_names_set(&naming->ply->names, label, object, material, naming->err);
+}
+
+static const struct track_ops ops = {ply_scan, ply_points};
+
+static int ply_frame(void *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
+{
+    struct ply *ply = rec;
+    scanhead_get_stats(sh, &ply->facts.stats);
+    if (frame->type != SCANHEAD_SURFACES) return track_frame(&ply->track, sh, frame, &ops, ply, err);
+    struct naming naming = {ply, err, 0};
+    native_decode_surfaces(frame->payload, frame->payload_len, take_name, &naming);
+    return naming.rc;
+}
+
+/* The header outgrew its room: the points move behind it, block by block from the end. */
+static int move_points(struct ply *ply, size_t header_len, struct sh_err *err)
+{
+    enum { BLOCK = 1 << 16 };
+    struct outfile *file = &ply->file;
+    size_t shift = header_len - ply->header_len;
+    uint64_t end = file->written;
+    uint8_t *block = malloc(BLOCK);
+    if (block == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory to move its points", file->path);
+    int rc = 0;
+    while (rc == 0 && end > ply->header_len) {
+        size_t n = end - ply->header_len < BLOCK ? (size_t)(end - ply->header_len) : BLOCK;
+        end -= n;
+        if (pread(file->fd, block, n, (off_t)end) != (ssize_t)n)
+            rc = sh_fail(err, SH_EIO, "%s: cannot read back: %s", file->part, strerror(errno));
+        else
+            rc = outfile_patch(file, end + shift, block, n, err);
+    }
+    free(block);
+    return rc;
+}
+
+static int finish(struct ply *ply, struct sh_err *err)
+{
+    int rc = track_flush(&ply->track, &ops, ply, err);
+    if (rc == 0) rc = outfile_flush(&ply->file, err);
+    ply->facts.n_without_attributes = ply->track.n_without_attributes;
+    ply->facts.n_unplaced = ply->track.n_unplaced;
+    ply->facts.n_without_pose = ply->track.n_without_pose;
+    char *header;
+    size_t len;
+    if (rc == 0) rc = ply_header_make(&ply->facts, &ply->names, ply->header_len, &header, &len, err);
+    if (rc != 0) return rc;
+    if (len > ply->header_len) rc = move_points(ply, len, err);
+    if (rc == 0) rc = outfile_patch(&ply->file, 0, header, len, err);
+    free(header);
+    return rc;
+}
+
+static int ply_close(void *rec, int keep, struct sh_err *err)
+{
+    struct ply *ply = rec;
+    int rc = keep ? finish(ply, err) : 0;
+    if (keep && rc == 0) track_tell(&ply->track, ply->options.report);
+    int closed = outfile_close(&ply->file, keep && rc == 0, err);
+    ply_names_free(&ply->names);
+    track_free(&ply->track);
+    free(ply);
+    return rc != 0 ? rc : closed;
+}
+
+const struct recorder_ops recorder_ply = {".ply", ply_open, ply_frame, ply_close, 0};

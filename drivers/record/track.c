@@ -1,0 +1,298 @@
+#include "drivers/record/track.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "drivers/protocol/native.h"
+
+int track_crs(const struct track *track)
+{
+    return track->crs;
+}
+
+int track_epsg(const struct track *track)
+{
+    return track->epsg;
+}
+
+int track_is_geoid(const struct track *track)
+{
+    return track->geoid;
+}
+
+int track_check_metres(const struct track *t, struct sh_err *err)
+{
+    if (t->crs != NATIVE_CRS_GEODETIC) return 0;
+    return sh_fail(err, SH_EFORMAT,
+                   "%s: this format holds metres, and output.crs is geodetic; allowed local, ecef, utm, or .las, .ply",
+                   t->path);
+}
+
+/* In steps of this the recording of a moving head holds 200 km in 32 bits. */
+static const double MOVING_SCALE_M = 1e-4;
+
+static int check_info(struct track *t, struct sh_err *err)
+{
+    const struct scanhead_info *info = &t->info;
+    int crs = info->geo ? info->crs : NATIVE_CRS_LOCAL, epsg = info->geo ? info->epsg : 0;
+    int geoid = info->geo && info->geoid_heights;
+    if (t->begun && (t->crs != crs || t->epsg != epsg))
+        return sh_fail(err, SH_EFORMAT, "%s: the stream went from EPSG %d to %d; a file holds one CRS", t->path,
+                       t->epsg, epsg);
+    if (t->begun && t->geoid != geoid)
+        return sh_fail(err, SH_EFORMAT, "%s: the stream went to other heights (%s); a file holds one kind", t->path,
+                       geoid ? "geoid" : "ellipsoid");
+    if (t->begun && (t->moving != info->moving || t->stops != info->stop))
+        return sh_fail(err, SH_EFORMAT, "%s: the stream went on with a head that %s; a file holds one kind", t->path,
+                       info->moving ? "moves"
+                       : info->stop ? "stops on a trajectory"
+                                    : "stands still");
+    if (t->begun && t->wants_attributes && t->has_attributes != (scanhead_has_attributes(t->sh) == 1))
+        return sh_fail(err, SH_EFORMAT, "%s: the stream went on %s attributes; a file holds one kind", t->path,
+                       t->has_attributes ? "without" : "with");
+    if (info->station > UINT16_MAX)
+        return sh_fail(err, SH_EFORMAT, "%s: station %u; a file holds stations up to 65535", t->path, info->station);
+    t->crs = crs;
+    t->epsg = epsg;
+    t->geoid = geoid;
+    t->moving = info->moving;
+    t->stops = info->stop;
+    t->has_attributes = t->wants_attributes && scanhead_has_attributes(t->sh) == 1;
+    t->scale_m = info->moving && info->scale_m > 0 && info->scale_m < MOVING_SCALE_M ? MOVING_SCALE_M : info->scale_m;
+    t->begun = 1;
+    return 0;
+}
+
+static void set_pose(struct track *t)
+{
+    static const struct station_pose same = {{0, 0, 0}, {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    if (t->info.moving && !t->info.geo)
+        t->pose = same;
+    else
+        station_pose_of(&t->info, &t->pose);
+}
+
+/* A descriptor that is no repetition, pulses that go back, another station: whichever of them reached us. */
+static int begins_scan(const struct track *t, const struct scanhead_frame *frame)
+{
+    return t->n_scans == 0 || t->new_scan || frame->pulse0 < t->last_pulse0 || t->info.station != t->last_station;
+}
+
+/* The end of a line tells where the next one begins. Where it was lost, the times in the frame do, as long as the pulse
+ * rate is that of the descriptor. */
+static uint64_t first_row(const struct track *t, const struct scanhead_frame *frame)
+{
+    if (t->have_next_line && t->next_line == frame->scan_line && t->next_line_pulse0 <= frame->pulse0)
+        return frame->pulse0 - t->next_line_pulse0;
+    double since_s = 1e-9 * (double)(frame->scan_t0_ns - frame->line_t0_ns);
+    return since_s > 0 ? (uint64_t)llround(since_s * t->info.prr_hz) : 0;
+}
+
+/* Echoes of one pulse follow each other: a new pulse begins wherever the number is 0 or 1. */
+static uint64_t number_rows(struct track *t, uint64_t row, int n)
+{
+    for (int i = 0; i < n; i++) {
+        if (t->point[i].echo <= 1) row++;
+        t->row[i] = (uint32_t)(row - 1);
+    }
+    return row;
+}
+
+/* Positions of the geo layout need no pose, the frame scalar does: not-a-number where it was lost. */
+static void set_geo_frames(struct track *t, struct scanhead *sh, int n)
+{
+    struct scanhead_pose pose;
+    for (int i = 0; i < n; i++)
+        t->frame[i] = scanhead_pose(sh, t->point[i].t_ns, &pose) == SCANHEAD_OK ? pose.frame : NAN;
+}
+
+/* How many are left, or a negative error. */
+static int place_moving(struct track *t, struct scanhead *sh, int n, struct sh_err *err)
+{
+    int kept = 0;
+    if (t->info.geo) {
+        set_geo_frames(t, sh, n);
+        return n;
+    }
+    int lost = scanhead_to_scene(sh, t->point, (uint32_t)n, t->frame);
+    if (lost < 0) return sh_fail(err, lost, "%s: %s", t->path, scanhead_error(sh));
+    for (int i = 0; i < n; i++) {
+        if (t->point[i].echo_count != 0 && isnan(t->point[i].x)) {
+            t->n_without_pose++;
+            continue;
+        }
+        t->point[kept] = t->point[i];
+        t->row[kept] = t->row[i];
+        t->index[kept] = t->index[i];
+        t->frame[kept++] = t->frame[i];
+    }
+    return kept;
+}
+
+/* Points of a frame whose attributes may follow. */
+struct track_waiting {
+    uint32_t n;
+    struct waiting_point {
+        struct scanhead_point point;
+        double frame, gps_s;
+        uint32_t row, index; /* in its frame */
+    } point[NATIVE_MAX_POINTS];
+};
+
+static int begin_waiting(struct track *t, struct sh_err *err)
+{
+    if (!t->has_attributes) return 0;
+    if (t->waiting == NULL) t->waiting = malloc(sizeof *t->waiting);
+    if (t->waiting == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory for a frame of points", t->path);
+    t->waiting->n = 0;
+    return 0;
+}
+
+/* The batch at hand. */
+static void wait_for_attributes(struct track *t, int n)
+{
+    struct track_waiting *w = t->waiting;
+    for (int i = 0; i < n && w->n < NATIVE_MAX_POINTS; i++) { /* no frame holds more */
+        struct waiting_point *p = &w->point[w->n++];
+        *p = (struct waiting_point){.point = t->point[i], .row = t->row[i], .index = t->index[i]};
+        if (t->info.moving) p->frame = t->frame[i];
+        if (scanhead_gps_time(t->sh, p->point.t_ns, &p->gps_s) != 0) p->gps_s = (double)NAN;
+    }
+}
+
+/* attribute: of all points of their frame; NULL: lost. */
+static int hand_out(struct track *t, const struct scanhead_attribute *attribute, const struct track_ops *ops, void *rec,
+                    struct sh_err *err)
+{
+    static const struct scanhead_attribute none = {(double)NAN, (double)NAN};
+    struct track_waiting *w = t->waiting;
+    int rc = 0, n = 0;
+    for (uint32_t k = 0; w != NULL && k < w->n && rc == 0; k++) {
+        const struct waiting_point *p = &w->point[k];
+        t->point[n] = p->point;
+        t->row[n] = p->row;
+        t->frame[n] = p->frame;
+        t->gps_s[n] = p->gps_s;
+        t->attribute[n] = attribute != NULL ? attribute[p->index] : none;
+        if (attribute == NULL && p->point.echo_count != 0) t->n_without_attributes++;
+        if (++n < TRACK_BATCH && k + 1 < w->n) continue;
+        rc = ops->points(rec, n, err);
+        n = 0;
+    }
+    if (w != NULL) w->n = 0;
+    return rc;
+}
+
+int track_flush(struct track *t, const struct track_ops *ops, void *rec, struct sh_err *err)
+{
+    return hand_out(t, NULL, ops, rec, err);
+}
+
+void track_free(struct track *t)
+{
+    free(t->waiting);
+    t->waiting = NULL;
+}
+
+static int take_attributes(struct track *t, struct scanhead *sh, const struct scanhead_frame *frame,
+                           const struct track_ops *ops, void *rec, struct sh_err *err)
+{
+    struct scanhead_attribute attribute[NATIVE_MAX_POINTS];
+    if (t->waiting == NULL || t->waiting->n == 0) return 0;
+    if (scanhead_attributes(sh, frame, 0, attribute, NATIVE_MAX_POINTS) < 0) return 0; /* of points that were lost */
+    return hand_out(t, attribute, ops, rec, err);
+}
+
+static void count_unheld(struct track *t, int n)
+{
+    if (t->wants_attributes || scanhead_has_attributes(t->sh) != 1) return;
+    for (int i = 0; i < n; i++)
+        t->n_attributes_unheld += t->point[i].echo_count != 0;
+}
+
+/* n points of the frame that are at hand, from `first` on. */
+static int take_batch(struct track *t, struct scanhead *sh, uint32_t first, int n, const struct track_ops *ops,
+                      void *rec, struct sh_err *err)
+{
+    for (int i = 0; i < n && t->has_attributes; i++)
+        t->index[i] = first + (uint32_t)i;
+    int kept = t->info.moving ? place_moving(t, sh, n, err) : n;
+    if (kept < 0) return kept;
+    count_unheld(t, kept);
+    if (!t->has_attributes) return ops->points(rec, kept, err);
+    wait_for_attributes(t, kept);
+    return 0;
+}
+
+static int take_points(struct track *t, struct scanhead *sh, const struct scanhead_frame *frame,
+                       const struct track_ops *ops, void *rec, struct sh_err *err)
+{
+    int rc = track_flush(t, ops, rec, err);
+    if (rc != 0) return rc;
+    if (scanhead_get_info(sh, &t->info) != 0) {
+        t->n_unplaced += frame->n_points;
+        return 0;
+    }
+    t->sh = sh;
+    int begins = begins_scan(t, frame);
+    rc = check_info(t, err);
+    t->line = frame->scan_line;
+    t->t0_ns = frame->scan_t0_ns;
+    if (rc == 0 && begins) {
+        set_pose(t);
+        t->n_scans++;
+        t->new_scan = 0;
+        if (ops->scan != NULL) rc = ops->scan(rec, err);
+    }
+    t->last_pulse0 = frame->pulse0;
+    t->last_station = t->info.station;
+    if (rc == 0) rc = begin_waiting(t, err);
+    uint64_t row = first_row(t, frame);
+    if (rc == 0 && row + frame->n_points > UINT32_MAX)
+        rc = sh_fail(err, SH_EFORMAT, "%s: line %u has more than 2^32 pulses", t->path, t->line);
+    for (uint32_t first = 0; rc == 0 && ops->points != NULL && first < frame->n_points;) {
+        int n = scanhead_points(sh, frame, first, t->point, TRACK_BATCH);
+        if (n < 0) return sh_fail(err, n, "%s: %s", t->path, scanhead_error(sh));
+        row = number_rows(t, row, n);
+        rc = take_batch(t, sh, first, n, ops, rec, err);
+        first += (uint32_t)n;
+    }
+    return rc;
+}
+
+static void take_line_end(struct track *t, const struct scanhead_frame *frame)
+{
+    struct native_line_end end;
+    t->have_next_line = native_decode_line_end(frame->payload, frame->payload_len, &end) == 0;
+    if (!t->have_next_line) return;
+    t->next_line = end.line + 1;
+    t->next_line_pulse0 = end.pulse0 + end.n_fired;
+}
+
+int track_frame(struct track *t, struct scanhead *sh, const struct scanhead_frame *frame, const struct track_ops *ops,
+                void *rec, struct sh_err *err)
+{
+    if (frame->type == SCANHEAD_POINTS) return take_points(t, sh, frame, ops, rec, err);
+    if (frame->type == SCANHEAD_ATTRIBUTES) return take_attributes(t, sh, frame, ops, rec, err);
+    if (frame->type == SCANHEAD_LINE_END) take_line_end(t, frame);
+    if (frame->type == SCANHEAD_DESCRIPTOR && (frame->flags & SCANHEAD_REPEAT) == 0) {
+        t->new_scan = 1;
+        t->have_next_line = 0;
+    }
+    return 0;
+}
+
+void track_tell(const struct track *t, const struct sh_report *report)
+{
+    if (t->n_unplaced > 0)
+        sh_warn(report, "%s: %llu points left out that came before the descriptor and the anchor of their scan",
+                t->path, (unsigned long long)t->n_unplaced);
+    if (t->n_without_pose > 0)
+        sh_warn(report, "%s: %llu points left out whose pose was lost", t->path, (unsigned long long)t->n_without_pose);
+    if (t->n_attributes_unheld > 0)
+        sh_warn(report, "%s: amplitude and width of %llu points left out, for which this format has no place", t->path,
+                (unsigned long long)t->n_attributes_unheld);
+    if (t->n_without_attributes > 0)
+        sh_warn(report, "%s: %llu points without amplitude and width, which were lost", t->path,
+                (unsigned long long)t->n_without_attributes);
+}

@@ -1,0 +1,366 @@
+/* States, endpoints and transfers. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "drivers/usb/usb_core.h"
+
+struct usb_pipe *usb_pipe(struct usb_device *device, unsigned address)
+{
+    return &device->pipe[(address & USB_ENDPOINT_NUMBER_MASK) + ((address & USB_DIR_IN) != 0 ? 16 : 0)];
+}
+
+static const struct usb_pipe *pipe_of(const struct usb_device *device, unsigned address)
+{
+    return &device->pipe[(address & USB_ENDPOINT_NUMBER_MASK) + ((address & USB_DIR_IN) != 0 ? 16 : 0)];
+}
+
+/* Takes the first transfer off the pipe and gives it back. The callback may submit again. */
+static void finish(struct usb_device *device, struct usb_pipe *pipe, enum usb_status status)
+{
+    struct usb_transfer *transfer = pipe->first;
+    pipe->first = transfer->next;
+    if (pipe->first == NULL) pipe->last = NULL;
+    pipe->used = 0;
+    transfer->next = NULL;
+    transfer->status = status;
+    device->complete(device->host_ctx, transfer);
+}
+
+/* Nothing is left to wait for in a transfer of no bytes that has come to the front of a pipe. */
+static void finish_empty(struct usb_device *device, struct usb_pipe *pipe)
+{
+    while (pipe->first != NULL && pipe->first->length == 0)
+        finish(device, pipe, USB_OK);
+}
+
+/* Only what is there now: a back end may submit anew from within complete(). */
+static void flush(struct usb_device *device, struct usb_pipe *pipe, enum usb_status status)
+{
+    struct usb_transfer *first = pipe->first;
+    pipe->first = pipe->last = NULL;
+    uint32_t used = pipe->used;
+    pipe->used = 0;
+    while (first != NULL) {
+        struct usb_transfer *transfer = first;
+        first = transfer->next;
+        transfer->next = NULL;
+        transfer->status = status;
+        transfer->actual = used;
+        used = 0;
+        device->complete(device->host_ctx, transfer);
+    }
+}
+
+/* ---- configurations */
+
+static void stop_pipe(struct usb_device *device, struct usb_pipe *pipe)
+{
+    pipe->row = NULL;
+    pipe->halted = pipe->zero_due = 0;
+    pipe->epoch++;
+    flush(device, pipe, USB_GONE);
+}
+
+static void set_interface(struct usb_device *device, unsigned interface, int active)
+{
+    const struct usb_interface_row *row = usb_find_row(device->model, interface, device->alt[interface]);
+    for (unsigned i = 0; i < row->n_endpoints; i++) {
+        struct usb_pipe *pipe = usb_pipe(device, row->endpoint[i].address);
+        if (active)
+            pipe->row = &row->endpoint[i];
+        else
+            stop_pipe(device, pipe);
+    }
+    if (device->hooks.interface != NULL) device->hooks.interface(device->ctx, interface, active);
+}
+
+void usb_enter(struct usb_device *device, enum usb_state state)
+{
+    const int n = device->model->n_interfaces;
+    enum usb_state before = device->state;
+    device->state = state;
+    for (int i = 0; i < n && before == USB_CONFIGURED; i++)
+        set_interface(device, (unsigned)i, 0);
+    memset(device->alt, 0, sizeof device->alt);
+    if (state != USB_CONFIGURED) device->u1_enabled = device->u2_enabled = 0;
+    for (int i = 0; i < n && state == USB_CONFIGURED; i++)
+        set_interface(device, (unsigned)i, 1);
+}
+
+void usb_select_alt(struct usb_device *device, unsigned interface, unsigned alt)
+{
+    set_interface(device, interface, 0);
+    device->alt[interface] = (uint8_t)alt;
+    set_interface(device, interface, 1);
+}
+
+void usb_set_halt(struct usb_device *device, struct usb_pipe *pipe, int halted)
+{
+    pipe->halted = halted;
+    if (halted) flush(device, pipe, USB_STALLED);
+    if (!halted) pipe->zero_due = 0;
+}
+
+void usb_device_halt(struct usb_device *device, uint8_t endpoint)
+{
+    struct usb_pipe *pipe = usb_pipe(device, endpoint);
+    if (pipe->row != NULL) usb_set_halt(device, pipe, 1);
+}
+
+/* ---- the bus */
+
+void usb_device_attach(struct usb_device *device, enum usb_rate rate, usb_complete complete, void *ctx)
+{
+    usb_device_detach(device);
+    device->complete = complete;
+    device->host_ctx = ctx;
+    device->rate = rate;
+    device->suspended = 0;
+    device->state = USB_DEFAULT;
+}
+
+void usb_device_detach(struct usb_device *device)
+{
+    if (device->state != USB_DETACHED) usb_enter(device, USB_DETACHED);
+}
+
+void usb_device_reset(struct usb_device *device, enum usb_rate rate)
+{
+    if (device->state == USB_DETACHED) return;
+    usb_enter(device, USB_DEFAULT);
+    device->rate = rate;
+    device->suspended = 0;
+}
+
+void usb_device_suspend(struct usb_device *device, int suspended)
+{
+    device->suspended = suspended;
+}
+
+void usb_device_assume_address(struct usb_device *device)
+{
+    if (device->state == USB_DEFAULT) device->state = USB_ADDRESSED;
+}
+
+/* ---- transfers */
+
+static void append(struct usb_pipe *pipe, struct usb_transfer *transfer)
+{
+    transfer->next = NULL;
+    if (pipe->last != NULL)
+        pipe->last->next = transfer;
+    else
+        pipe->first = transfer;
+    pipe->last = transfer;
+}
+
+void usb_device_submit(struct usb_device *device, struct usb_transfer *transfer)
+{
+    struct usb_pipe *pipe = usb_pipe(device, transfer->endpoint);
+    transfer->actual = 0;
+    transfer->zero_packet = 0;
+    transfer->epoch = pipe->epoch;
+    transfer->next = NULL;
+    transfer->status = USB_OK;
+    if (pipe->row == NULL || pipe->halted) {
+        transfer->status = pipe->row == NULL ? USB_GONE : USB_STALLED;
+        device->complete(device->host_ctx, transfer);
+        return;
+    }
+    append(pipe, transfer);
+    if (pipe->first != transfer) return;
+    /* Nothing to wait for: no bytes go either way, or the end of what was written before. */
+    if (transfer->length != 0 && !pipe->zero_due) return;
+    pipe->zero_due = 0;
+    finish(device, pipe, USB_OK);
+}
+
+int usb_device_cancel(struct usb_device *device, uint64_t id)
+{
+    for (unsigned i = 0; i < 32; i++) {
+        struct usb_pipe *pipe = &device->pipe[i];
+        struct usb_transfer *before = NULL;
+        for (struct usb_transfer *at = pipe->first; at != NULL; before = at, at = at->next) {
+            if (at->id != id) continue;
+            *(before != NULL ? &before->next : &pipe->first) = at->next;
+            if (pipe->last == at) pipe->last = before;
+            at->actual = before == NULL ? pipe->used : 0;
+            if (before == NULL) pipe->used = 0;
+            at->next = NULL;
+            at->status = USB_CANCELLED;
+            device->complete(device->host_ctx, at);
+            finish_empty(device, pipe);
+            return 1;
+        }
+    }
+    return 0;
+}
+
+/* As many whole packets as fit; a packet that does not is not taken. */
+static uint32_t fill_transfer(const struct usb_pipe *pipe, uint32_t packet, const uint8_t *data, size_t len,
+                              enum usb_status *status)
+{
+    struct usb_transfer *transfer = pipe->first;
+    uint32_t n = len < transfer->length ? (uint32_t)len : transfer->length;
+    *status = USB_OK;
+    if (len > transfer->length && n % packet != 0) {
+        *status = USB_OVERFLOW;
+        n -= n % packet;
+    }
+    memcpy(transfer->data, data, n);
+    transfer->actual = n;
+    transfer->zero_packet = *status == USB_OK && n % packet == 0 && n < transfer->length;
+    return n;
+}
+
+size_t usb_device_write(struct usb_device *device, uint8_t endpoint, const void *data, size_t len)
+{
+    struct usb_pipe *pipe = usb_pipe(device, endpoint);
+    const uint8_t *at = data;
+    size_t left = len;
+    while (left > 0 && usb_device_can_write(device, endpoint)) {
+        const uint32_t packet = pipe->row->packet[device->rate];
+        enum usb_status status;
+        uint32_t n = fill_transfer(pipe, packet, at, left, &status);
+        at += n;
+        left -= n;
+        pipe->zero_due = left == 0 && status == USB_OK && n == pipe->first->length && n % packet == 0;
+        finish(device, pipe, status);
+    }
+    return len - left;
+}
+
+int usb_device_can_write(const struct usb_device *device, uint8_t endpoint)
+{
+    const struct usb_pipe *pipe = pipe_of(device, endpoint);
+    return pipe->row != NULL && !pipe->halted && !device->suspended && pipe->first != NULL &&
+           (endpoint & USB_DIR_IN) != 0;
+}
+
+size_t usb_device_read(struct usb_device *device, uint8_t endpoint, void *data, size_t len)
+{
+    struct usb_pipe *pipe = usb_pipe(device, endpoint);
+    uint8_t *at = data;
+    size_t left = len;
+    if ((endpoint & USB_DIR_IN) != 0) return 0;
+    const uint32_t epoch = pipe->first != NULL ? pipe->first->epoch : 0;
+    while (pipe->first != NULL && pipe->first->epoch == epoch && left > 0) {
+        struct usb_transfer *transfer = pipe->first;
+        uint32_t rest = transfer->length - pipe->used, n = left < rest ? (uint32_t)left : rest;
+        memcpy(at, transfer->data + pipe->used, n);
+        at += n;
+        left -= n;
+        pipe->used += n;
+        if (pipe->used < transfer->length) break;
+        transfer->actual = transfer->length;
+        finish(device, pipe, USB_OK);
+    }
+    finish_empty(device, pipe);
+    return len - left;
+}
+
+size_t usb_device_can_read(const struct usb_device *device, uint8_t endpoint, uint32_t *epoch)
+{
+    const struct usb_pipe *pipe = pipe_of(device, endpoint);
+    if (pipe->first == NULL || (endpoint & USB_DIR_IN) != 0) return 0;
+    if (epoch != NULL) *epoch = pipe->first->epoch;
+    return pipe->first->length - pipe->used;
+}
+
+size_t usb_device_drop(struct usb_device *device, uint8_t endpoint, uint32_t epoch)
+{
+    struct usb_pipe *pipe = usb_pipe(device, endpoint);
+    size_t dropped = 0;
+    while (pipe->first != NULL && pipe->first->epoch != epoch) {
+        dropped += pipe->first->length - pipe->used;
+        pipe->first->actual = pipe->first->length;
+        finish(device, pipe, USB_OK);
+    }
+    finish_empty(device, pipe);
+    return dropped;
+}
+
+uint32_t usb_device_epoch(const struct usb_device *device, uint8_t endpoint)
+{
+    return pipe_of(device, endpoint)->epoch;
+}
+
+void usb_device_next_epoch(struct usb_device *device, uint8_t endpoint)
+{
+    usb_pipe(device, endpoint)->epoch++;
+}
+
+/* ---- the rest */
+
+/* Endpoints are used once per interface, alternate settings count up from 0. */
+static int check_model(const struct usb_model *model, struct sh_err *err)
+{
+    uint8_t owner[32];
+    memset(owner, 0xff, sizeof owner);
+    for (unsigned i = 0, number = 0, alt = 0; i < model->n_rows; i++) {
+        const struct usb_interface_row *row = &model->interface[i];
+        if (i > 0 && row->number != number) number++, alt = 0;
+        if (row->number != number || row->alt != alt++)
+            return sh_fail(err, SH_EINPUT, "usb: interface row %u is out of order", i);
+        for (unsigned k = 0; k < row->n_endpoints; k++) {
+            const uint8_t address = row->endpoint[k].address;
+            uint8_t *of = &owner[(address & USB_ENDPOINT_NUMBER_MASK) + ((address & USB_DIR_IN) != 0 ? 16 : 0)];
+            if ((address & USB_ENDPOINT_NUMBER_MASK) == 0 || (*of != 0xff && *of != number))
+                return sh_fail(err, SH_EINPUT, "usb: endpoint %02x belongs to two interfaces", address);
+            *of = (uint8_t)number;
+        }
+        if (i + 1 == model->n_rows && number + 1 != model->n_interfaces)
+            return sh_fail(err, SH_EINPUT, "usb: %u interfaces, and rows for %u", model->n_interfaces, number + 1);
+    }
+    if (model->n_interfaces == 0 || model->n_interfaces > USB_MAX_INTERFACES)
+        return sh_fail(err, SH_EINPUT, "usb: %u interfaces; allowed 1 to %d", model->n_interfaces, USB_MAX_INTERFACES);
+    return SH_OK;
+}
+
+int usb_device_create(const struct usb_model *model, const struct usb_identity *id, const struct usb_hooks *hooks,
+                      void *ctx, struct usb_device **out, struct sh_err *err)
+{
+    int rc = check_model(model, err);
+    if (rc != SH_OK) return rc;
+    struct usb_device *device = calloc(1, sizeof *device);
+    if (device == NULL) return sh_fail(err, SH_ENOMEM, "usb: no memory");
+    device->model = model;
+    device->id = *id;
+    device->hooks = *hooks;
+    device->ctx = ctx;
+    *out = device;
+    return SH_OK;
+}
+
+void usb_device_free(struct usb_device *device)
+{
+    if (device == NULL) return;
+    usb_device_detach(device);
+    free(device);
+}
+
+const struct usb_model *usb_device_model(const struct usb_device *device)
+{
+    return device->model;
+}
+
+const struct usb_identity *usb_device_identity(const struct usb_device *device)
+{
+    return &device->id;
+}
+
+enum usb_rate usb_device_rate(const struct usb_device *device)
+{
+    return device->rate;
+}
+
+int usb_device_configuration(const struct usb_device *device)
+{
+    return device->state == USB_CONFIGURED ? USB_CONFIGURATION : 0;
+}
+
+const struct usb_interface_row *usb_device_row(const struct usb_device *device, unsigned interface)
+{
+    if (device->state != USB_CONFIGURED || interface >= device->model->n_interfaces) return NULL;
+    return usb_find_row(device->model, interface, device->alt[interface]);
+}

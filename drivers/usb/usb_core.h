@@ -1,0 +1,39 @@
+/* Inside of the device core. */
+#ifndef DRIVERS_USB_USB_CORE_H
+#define DRIVERS_USB_USB_CORE_H
+
+#include "drivers/usb/usb.h"
+
+enum usb_state { USB_DETACHED, USB_DEFAULT, USB_ADDRESSED, USB_CONFIGURED };
+
+struct usb_pipe {
+    const struct usb_endpoint_row *row; /* NULL: not in the present configuration */
+    int halted;
+    int zero_due; /* IN: a zero-length packet is still to come */
+    uint32_t epoch;
+    struct usb_transfer *first, *last;
+    uint32_t used; /* OUT: bytes of the first one already read */
+};
+
+struct usb_device {
+    const struct usb_model *model;
+    struct usb_identity id;
+    struct usb_hooks hooks;
+    void *ctx;
+    usb_complete complete;
+    void *host_ctx;
+    enum usb_state state;
+    enum usb_rate rate;
+    int suspended;
+    int u1_enabled, u2_enabled;
+    uint8_t alt[USB_MAX_INTERFACES];
+    struct usb_pipe pipe[32]; /* 0..15 OUT, 16..31 IN; the two of endpoint 0 stay empty */
+};
+
+/* device.c */
+struct usb_pipe *usb_pipe(struct usb_device *device, unsigned address);
+void usb_enter(struct usb_device *device, enum usb_state state);
+void usb_select_alt(struct usb_device *device, unsigned interface, unsigned alt);
+void usb_set_halt(struct usb_device *device, struct usb_pipe *pipe, int halted);
+
+#endif

@@ -1,0 +1,133 @@
+/* scanhead check: nothing runs. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "firmware_sim/app/check_places.h"
+#include "firmware_sim/app/app.h"
+#include "firmware_sim/device/head_clock.h"
+#include "firmware_sim/loop/pose_feed.h"
+
+static const char HELP[] =
+    "scanhead check CONFIG [--set KEY=VALUE ...]: validate configuration, scene and links; nothing runs.\n"
+    "Prints where the scene and each station stand, in every frame that is known.\n\n"
+    "Configuration keys:\n\n";
+
+static const struct option OPTIONS[] = {
+    {"set", required_argument, NULL, 's'}, {"help", no_argument, NULL, 'h'}, {NULL, 0, NULL, 0}};
+
+/* Opens and closes each link, and the socket of a live platform, so that a taken port or a wrong path shows now. */
+static int check_links(const struct config *cfg, struct sh_err *err)
+{
+    for (uint32_t i = 0; i < cfg->n_links; i++) {
+        const struct link_ops *ops = link_ops_get(cfg->link[i].type);
+        if (cfg->link[i].type == LINK_FILE) continue; /* opening it would empty it */
+        void *link = NULL;
+        int rc = ops->open(&cfg->link[i], &link, err);
+        if (rc != SH_OK) return rc;
+        ops->close(link);
+    }
+    struct pose_feed *feed = NULL;
+    if (cfg->platform.kind != PLATFORM_LIVE || cfg->loop.pace == PACE_STEP) return SH_OK;
+    int rc = pose_feed_open(NULL, cfg, &feed, err);
+    pose_feed_close(feed);
+    return rc;
+}
+
+static void print_platform(const struct site *site)
+{
+    const struct config_platform *p = &site->cfg->platform;
+    if (p->kind == PLATFORM_LIVE) printf("platform  live, up to %g m from station 1\n", p->reach_m);
+    if (p->kind != PLATFORM_TRAJECTORY) return;
+    double way_m = 0.0;
+    for (size_t i = 1; i < site->n_knots; i++) {
+        const double *a = site->knot[i - 1].pose.position_m, *b = site->knot[i].pose.position_m;
+        way_m += sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]) + (b[2] - a[2]) * (b[2] - a[2]));
+    }
+    printf("platform  trajectory of %.3f s, %.3f m; %zu poses keep the head within %.3g m of it; %zu BVH\n",
+           1e-9 * (double)site->knot[site->n_knots - 1].t_ns, way_m, site->n_knots, site->knot_error_m,
+           site->n_stretches);
+}
+
+static void print_output(const struct config *cfg, const struct site *site)
+{
+    int heights = cfg->output.crs == GEOREF_UTM || cfg->output.crs == GEOREF_GEODETIC;
+    printf("output    %s, %g m per count%s\n", cfg->output.layout == LINE_GEO ? "geo" : "polar", site->scale_m,
+           !heights                       ? ""
+           : site->geoid != NULL          ? ", heights above the geoid"
+           : cfg->output.heights == HEIGHTS_AUTO ? ", heights above the ellipsoid (no geoid data is installed)"
+                                          : ", heights above the ellipsoid");
+}
+
+static int print_summary(const struct config *cfg, const struct site *site, struct sh_err *err)
+{
+    const struct scene *scene = site->scene;
+    int rc = SH_OK;
+    printf("%s: ok\n", cfg->file);
+    printf("head      %s %s (%s), %g Hz pulses, %g lines/s, pan %g deg/s\n", cfg->profile.maker, cfg->profile.model,
+           cfg->profile.name, (double)cfg->head.settings.prr_uhz * 1e-6, (double)cfg->head.settings.lines_uhz * 1e-6,
+           (double)cfg->head.settings.pan_udeg_s * 1e-6);
+    printf("scene     %u triangles, %u surfaces, x %.3f..%.3f  y %.3f..%.3f  z %.3f..%.3f m\n", scene->n_triangles,
+           scene->n_surfaces, scene->min_m[0], scene->max_m[0], scene->min_m[1], scene->max_m[1], scene->min_m[2],
+           scene->max_m[2]);
+    check_print_anchor(site, stdout);
+    if (site->stop != NULL) check_print_stops(site, stdout);
+    for (uint32_t i = 0; i < site->n_stations && rc == SH_OK && site->stop == NULL; i++)
+        rc = check_print_station(site, i, stdout, err);
+    print_platform(site);
+    print_output(cfg, site);
+    return rc;
+}
+
+static int print_time(const struct config *cfg, struct sh_err *err)
+{
+    struct head_clock clock;
+    struct utc_time utc;
+    char now[UTC_TEXT_LEN], end[UTC_TEXT_LEN];
+    int rc = head_clock_create(cfg, &clock, err);
+    if (rc != SH_OK || clock.source == HEAD_CLOCK_NONE) return rc;
+    utc_from_tai(&clock.table, clock.tai0_ns, &utc);
+    utc_format(&utc, 0, now);
+    utc_from_tai(&clock.table, utc_tai_from_posix(&clock.table, clock.table.expires_s * UTC_SECOND_NS), &utc);
+    utc_format(&utc, 0, end);
+    printf("time      %s at power-up; leap seconds are known up to %.10s\n", now, end);
+    if (clock.warning[0] != '\0') app_report_stderr.warn(app_report_stderr.ctx, clock.warning);
+    return SH_OK;
+}
+
+static int check(const struct app_sets *sets, const char *path)
+{
+    int status = APP_OK;
+    struct sh_err err = {0};
+    struct site *site = NULL;
+    struct config *cfg = app_load_config(path, sets, &status);
+    if (cfg == NULL) return status;
+    int rc = site_load(cfg, &app_report_stderr, &site, &err);
+    if (rc == SH_OK) rc = check_links(cfg, &err);
+    if (rc == SH_OK) rc = check_reach(site, &app_report_stderr, &err);
+    if (rc == SH_OK) rc = print_summary(cfg, site, &err);
+    if (rc == SH_OK) rc = print_time(cfg, &err);
+    site_free(site);
+    free(cfg);
+    return rc == SH_OK ? APP_OK : app_fail(&err);
+}
+
+int app_check(int argc, char **argv)
+{
+    struct app_sets sets;
+    memset(&sets, 0, sizeof sets);
+    int opt;
+    opterr = 0;
+    while ((opt = getopt_long(argc, argv, ":h", OPTIONS, NULL)) != -1) {
+        if (opt == 'h') {
+            fputs(HELP, stdout);
+            config_print_reference(stdout);
+            return APP_OK;
+        }
+        int status = opt == 's' ? app_add_set(&sets, optarg) : app_bad_option("check", opt, argv);
+        if (status != APP_OK) return status;
+    }
+    if (optind != argc - 1) return app_usage("check", "one CONFIG is needed");
+    return check(&sets, argv[optind]);
+}

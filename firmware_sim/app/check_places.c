@@ -1,0 +1,193 @@
+#include "firmware_sim/app/check_places.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/distance.h"
+#include "core/locate.h"
+#include "core/mat3.h"
+#include "core/vec3.h"
+
+#define DEG(rad) ((rad)*180.0 / M_PI)
+
+static double turn_deg(double deg) /* 0 <= ... < 360, and no -0 */
+{
+    double turned = fmod(deg, 360.0) + 0.0;
+    if (turned < 0.0) turned += 360.0;
+    return turned < 360.0 - 5e-7 ? turned : 0.0; /* what would print as 360 */
+}
+
+void check_print_anchor(const struct site *site, FILE *out)
+{
+    const struct config *cfg = site->cfg;
+    const struct geoframe *f = &site->anchor.frame;
+    static const char *const source[] = {
+        [ANCHOR_EXPLICIT] = "explicit", [ANCHOR_IFC] = "ifc", [ANCHOR_UTM] = "utm", [ANCHOR_ECEF] = "ecef"};
+    if (site->anchor.known && cfg->scene.anchor.source == ANCHOR_NONE) {
+        fprintf(out,
+                "anchor    station 1 of the configuration: scene point %.4f %.4f %.4f at lat %.9f lon %.9f deg, height "
+                "%.4f m; true north along y\n",
+                f->origin_m[0], f->origin_m[1], f->origin_m[2], f->lat_deg, f->lon_deg, f->height_m);
+        return;
+    }
+    if (!site->anchor.known) {
+        fputs("anchor    none: each station stands for itself, the scene's y axis is its true north\n", out);
+        return;
+    }
+    fprintf(out, "anchor    %s: ", source[cfg->scene.anchor.source]);
+    if (f->kind == GEOFRAME_TANGENT)
+        fprintf(out,
+                "scene point %.4f %.4f %.4f at lat %.9f lon %.9f deg, height %.4f m; true north %.6f deg clockwise "
+                "from y\n",
+                f->origin_m[0], f->origin_m[1], f->origin_m[2], f->lat_deg, f->lon_deg, f->height_m,
+                f->north_deg + 0.0);
+    else if (f->kind == GEOFRAME_ECEF)
+        fputs("the scene's coordinates are ECEF\n", out);
+    else if (f->zone == 0)
+        fprintf(out, "the scene's coordinates are UPS %s\n", f->north ? "north" : "south");
+    else
+        fprintf(out, "the scene's coordinates are UTM %d %s\n", f->zone, f->north ? "north" : "south");
+}
+
+/* Unit vector of the head's axis k in east, north, up at the station. */
+static int axis_enu(const struct site *site, uint32_t i, int k, double enu[3], struct sh_err *err)
+{
+    const struct placement *at = &site->station[i].at;
+    const double axis[3] = {at->rotation[k], at->rotation[3 + k], at->rotation[6 + k]};
+    double to_enu[9];
+    memcpy(to_enu, mat3_unit, sizeof to_enu);
+    int rc = site->anchor.known ? geoframe_to_enu(&site->anchor.frame, at->position_m, to_enu, err) : SH_OK;
+    if (rc == SH_OK) mat3_apply(to_enu, axis, enu);
+    return rc;
+}
+
+static void print_utm(const struct locate_grid *utm, double height_m, FILE *out)
+{
+    if (utm->zone == 0)
+        fprintf(out, "  ups       %s", utm->north ? "north" : "south");
+    else
+        fprintf(out, "  utm       %d %s", utm->zone, utm->north ? "north" : "south");
+    fprintf(out, "  %.4f %.4f %.4f m; convergence %.6f deg, scale %.8f\n", utm->easting_m, utm->northing_m, height_m,
+            utm->convergence_deg, utm->scale);
+}
+
+/* What a level range is off by in a scene whose coordinates are a grid's: the grid's scale, and the height over the
+ * ellipsoid. From two points 100 grid metres apart. */
+static int print_grid_ranges(const struct site *site, const double p_prcs[3], FILE *out, struct sh_err *err)
+{
+    double p_ecef[2][3];
+    for (int i = 0; i < 2; i++) {
+        const double p[3] = {p_prcs[0] + (i == 0 ? -50.0 : 50.0), p_prcs[1], p_prcs[2]};
+        struct georef_place at;
+        int rc = geoframe_locate(&site->anchor.frame, p, &at, err);
+        if (rc != SH_OK) return rc;
+        georef_geodetic_to_ecef(&at, p_ecef[i]);
+    }
+    const double d[3] = {p_ecef[1][0] - p_ecef[0][0], p_ecef[1][1] - p_ecef[0][1], p_ecef[1][2] - p_ecef[0][2]};
+    double off = 100.0 / sqrt(vec3_dot(d, d)) - 1.0, range_m = site->cfg->profile.range_max_m;
+    fprintf(out, "            ranges are grid lengths: a level one of %g m reads %+.4f m (%+.1f ppm)\n", range_m,
+            range_m * off, 1e6 * off);
+    return SH_OK;
+}
+
+static int print_on_earth(const struct site *site, uint32_t i, FILE *out, struct sh_err *err)
+{
+    const struct placement *at = &site->station[i].at;
+    const struct geoframe *frame = &site->anchor.frame;
+    double p_ecef[3], forward[3], up[3];
+    struct locate_grid utm;
+    int grid = site->anchor.known && frame->kind == GEOFRAME_GRID;
+    int zone, side;
+    site_grid(site, &zone, &side);
+    const struct georef_place place = {at->lat_deg, at->lon_deg, at->height_m};
+    int rc = locate_in_grid(&place, zone, &utm, err);
+    if (rc == SH_OK && side != 0 && utm.zone != 0 && utm.north != (side > 0)) {
+        utm.north = side > 0;
+        utm.northing_m += utm.north ? -1e7 : 1e7;
+    }
+    if (rc == SH_OK) rc = axis_enu(site, i, 1, forward, err);
+    if (rc == SH_OK) rc = axis_enu(site, i, 2, up, err);
+    if (rc != SH_OK) return rc;
+    georef_geodetic_to_ecef(&place, p_ecef);
+    fprintf(out, "  geodetic  lat %.9f lon %.9f deg, height %.4f m\n", at->lat_deg, at->lon_deg, at->height_m);
+    print_utm(&utm, at->height_m, out);
+    if (grid) rc = print_grid_ranges(site, at->position_m, out, err);
+    fprintf(out, "  ecef      %.4f %.4f %.4f m\n", p_ecef[0], p_ecef[1], p_ecef[2]);
+    double azimuth_deg = DEG(atan2(forward[0], forward[1])), off_plumb_deg = DEG(atan2(hypot(up[0], up[1]), up[2]));
+    fprintf(out,
+            "  y axis    azimuth %.6f deg from true north, %.6f from grid north; z axis %.6f deg off the plumb line\n",
+            turn_deg(azimuth_deg), turn_deg(azimuth_deg - utm.convergence_deg), off_plumb_deg);
+    return rc;
+}
+
+int check_print_station(const struct site *site, uint32_t i, FILE *out, struct sh_err *err)
+{
+    const struct site_station *s = &site->station[i];
+    const struct config_station *c = s->station;
+    double anchor[3];
+    georef_anchor(s->georef, anchor);
+    fprintf(out, "station %u %s, EPSG %d, anchor %.6f %.6f %.6f\n", i + 1, c->name, georef_epsg(s->georef), anchor[0],
+            anchor[1], anchor[2]);
+    fprintf(out, "  scene     %.4f %.4f %.4f m; heading %g, pitch %g, roll %g deg", s->at.position_m[0],
+            s->at.position_m[1], s->at.position_m[2], c->heading_deg, c->pitch_deg, c->roll_deg);
+    if (!isnan(s->at.floor_m)) fprintf(out, "; %g m above the floor", s->at.floor_m);
+    fputc('\n', out);
+    return s->at.on_earth ? print_on_earth(site, i, out, err) : SH_OK;
+}
+
+void check_print_stops(const struct site *site, FILE *out)
+{
+    const struct config_platform *p = &site->cfg->platform;
+    fprintf(out, "stops     %u, from %.9g s on, each %.9g s\n", site->n_stations, p->start_s, p->step_s);
+    for (uint32_t i = 0; i < site->n_stations; i++) {
+        const struct site_station *s = &site->station[i];
+        const struct config_station *c = s->station;
+        fprintf(out, "  %-9s %.9g s, frame %.9g, scene %.4f %.4f %.4f m; heading %g, pitch %g, roll %g deg", c->name,
+                s->t_s, s->frame, s->at.position_m[0], s->at.position_m[1], s->at.position_m[2],
+                turn_deg(c->heading_deg), c->pitch_deg + 0.0, c->roll_deg + 0.0);
+        if (s->at.on_earth)
+            fprintf(out, "; lat %.9f lon %.9f deg, height %.4f m", s->at.lat_deg, s->at.lon_deg, s->at.height_m);
+        fputc('\n', out);
+    }
+}
+
+/* A vertex within reach settles most cases without an index. */
+static int has_near_vertex(const struct scene *scene, const double p[3], double reach_m)
+{
+    for (uint32_t v = 0; v < scene->n_vertices; v++) {
+        double d[3] = {scene->vertex_m[v][0] - p[0], scene->vertex_m[v][1] - p[1], scene->vertex_m[v][2] - p[2]};
+        if (vec3_dot(d, d) <= reach_m * reach_m) return 1;
+    }
+    return 0;
+}
+
+static int is_reached(const struct scene *scene, const double p[3], double reach_m, int *reached, struct sh_err *err)
+{
+    struct distance *index = NULL;
+    struct distance_hit hit;
+    *reached = has_near_vertex(scene, p, reach_m);
+    for (int i = 0; i < 3; i++)
+        if (p[i] < scene->min_m[i] - reach_m || p[i] > scene->max_m[i] + reach_m) return SH_OK;
+    if (*reached) return SH_OK;
+    int rc = distance_create(scene, &index, err);
+    if (rc == SH_OK) *reached = distance_query(index, p, reach_m, &hit);
+    distance_free(index);
+    return rc;
+}
+
+int check_reach(const struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    double reach_m = site->cfg->profile.range_max_m;
+    for (uint32_t i = 0; i < site->n_stations; i++) {
+        const double *p = site->station[i].at.position_m;
+        int reached;
+        int rc = is_reached(site->scene, p, reach_m, &reached, err);
+        for (uint32_t k = 0; k < site->n_movers && rc == SH_OK && !reached; k++)
+            rc = is_reached(site->mover[k].scene, p, reach_m, &reached, err);
+        if (rc != SH_OK) return rc;
+        if (!reached)
+            sh_warn(report, "station %u %s at %.10g %.10g %.10g m: nothing within range_max_m, %g m", i + 1,
+                    site->station[i].station->name, p[0], p[1], p[2], reach_m);
+    }
+    return SH_OK;
+}

@@ -1,0 +1,205 @@
+/* scanhead map: a scan map from above, scanned off line. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/map.h"
+#include "core/mat3.h"
+#include "firmware_sim/app/app.h"
+#include "firmware_sim/app/recording.h"
+#include "firmware_sim/site/site.h"
+
+static const char HELP[] = "scanhead map CONFIG -o FILE.png [options]: scan map of the stations, from above\n\n"
+                           "Scans one frame from each station off line and draws the points: dark where many heights "
+                           "were hit (walls), hue by\n"
+                           "height. The area is that of the scene and the stations.\n\n"
+                           "  -o FILE.png      where to write\n"
+                           "  --pixel-m M      side of a pixel; default: 1200 pixels on the longer side\n"
+                           "  --set KEY=VALUE  any configuration key; may be repeated\n"
+                           "  --quiet          no progress\n";
+
+enum { OPT_PIXEL = 256, OPT_SET, OPT_QUIET, BATCH = 4096 };
+
+static const struct option OPTIONS[] = {{"pixel-m", required_argument, NULL, OPT_PIXEL},
+                                        {"set", required_argument, NULL, OPT_SET},
+                                        {"quiet", no_argument, NULL, OPT_QUIET},
+                                        {"output", required_argument, NULL, 'o'},
+                                        {"help", no_argument, NULL, 'h'},
+                                        {NULL, 0, NULL, 0}};
+
+struct map_run {
+    struct app_sets sets;
+    const char *config, *output;
+    double pixel_m;
+    int quiet;
+    struct map *map;
+    /* A scene in ECEF is seen from above station 1: east, north, up there. Else the scene's own axes. */
+    int turned;
+    double origin_m[3], to_enu[9];
+    struct scanhead_point point[BATCH];
+    double x[BATCH], y[BATCH], z[BATCH];
+};
+
+static int parse(struct map_run *run, int argc, char **argv)
+{
+    int opt, status = APP_OK;
+    opterr = 0;
+    while ((opt = getopt_long(argc, argv, ":ho:", OPTIONS, NULL)) != -1 && status == APP_OK) {
+        if (opt == 'h') {
+            fputs(HELP, stdout);
+            return APP_OK;
+        }
+        if (opt == 'o')
+            run->output = optarg;
+        else if (opt == OPT_PIXEL)
+            status = app_parse_double("map", "--pixel-m", optarg, 1e-4, 1e4, &run->pixel_m);
+        else if (opt == OPT_SET)
+            status = app_add_set(&run->sets, optarg);
+        else if (opt == OPT_QUIET)
+            run->quiet = 1;
+        else
+            status = app_bad_option("map", opt, argv);
+    }
+    if (status != APP_OK) return status;
+    if (optind != argc - 1) return app_usage("map", "one CONFIG is needed");
+    if (run->output == NULL) return app_usage("map", "-o FILE.png is needed");
+    run->config = argv[optind];
+    return -1;
+}
+
+static void to_map(const struct map_run *run, const double p_prcs[3], double p[3])
+{
+    memcpy(p, p_prcs, 3 * sizeof *p);
+    if (!run->turned) return;
+    const double d[3] = {p_prcs[0] - run->origin_m[0], p_prcs[1] - run->origin_m[1], p_prcs[2] - run->origin_m[2]};
+    mat3_apply(run->to_enu, d, p);
+}
+
+static int add_frame(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
+{
+    struct map_run *run = ctx;
+    if (frame->type != SCANHEAD_POINTS) return SH_OK;
+    for (uint32_t first = 0; first < frame->n_points;) {
+        int n = scanhead_points(sh, frame, first, run->point, BATCH);
+        if (n <= 0) return sh_fail(err, SH_ESTATE, "map: %s", scanhead_error(sh));
+        for (int i = 0; i < n; i++) {
+            double p[3];
+            to_map(run, (const double[3]){run->point[i].x, run->point[i].y, run->point[i].z}, p);
+            run->x[i] = p[0];
+            run->y[i] = p[1];
+            run->z[i] = p[2];
+        }
+        map_add_points(run->map, (size_t)n, run->x, run->y, run->z);
+        first += (uint32_t)n;
+    }
+    return SH_OK;
+}
+
+static void include(struct map_spec *spec, const double p[3])
+{
+    for (int i = 0; i < 2; i++) {
+        spec->min_m[i] = fmin(spec->min_m[i], p[i]);
+        spec->max_m[i] = fmax(spec->max_m[i], p[i]);
+    }
+}
+
+static int choose_view(struct map_run *run, const struct site *site, struct sh_err *err)
+{
+    const struct geoframe *frame = &site->anchor.frame;
+    run->turned = site->anchor.known && frame->kind == GEOFRAME_ECEF;
+    if (!run->turned) return SH_OK;
+    memcpy(run->origin_m, site->station[0].at.position_m, sizeof run->origin_m);
+    return geoframe_to_enu(frame, run->origin_m, run->to_enu, err);
+}
+
+static int create_map(struct map_run *run, const struct site *site, struct sh_err *err)
+{
+    const struct scene *scene = site->scene;
+    struct map_spec spec = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}, run->pixel_m};
+    double p[3], mark[3];
+    int rc = choose_view(run, site, err);
+    if (rc != SH_OK) return rc;
+    for (uint32_t v = 0; v < scene->n_vertices && run->turned; v++) {
+        to_map(run, scene->vertex_m[v], p);
+        include(&spec, p);
+    }
+    if (!run->turned) {
+        include(&spec, scene->min_m);
+        include(&spec, scene->max_m);
+    }
+    for (uint32_t s = 0; s < site->n_stations; s++) {
+        to_map(run, site->station[s].at.position_m, mark);
+        include(&spec, mark);
+    }
+    double span_m = fmax(spec.max_m[0] - spec.min_m[0], spec.max_m[1] - spec.min_m[1]);
+    for (int i = 0; i < 2; i++) { /* a margin, so that nothing sticks to the border */
+        spec.min_m[i] -= 0.03 * span_m;
+        spec.max_m[i] += 0.03 * span_m;
+    }
+    rc = map_create(&spec, &run->map, err);
+    for (uint32_t s = 0; s < site->n_stations && rc == SH_OK; s++) {
+        to_map(run, site->station[s].at.position_m, mark);
+        rc = map_add_station(run->map, mark[0], mark[1], err);
+    }
+    return rc;
+}
+
+static int interrupted(void)
+{
+    return app_interrupted;
+}
+
+static int draw(struct map_run *run, struct config *cfg, struct sh_err *err)
+{
+    struct offline *offline = NULL;
+    struct recording_result result;
+    struct recording_options options = {.first_station = 1,
+                                        .frames = 1,
+                                        .progress = !run->quiet,
+                                        .report = &app_report_stderr,
+                                        .frame = add_frame,
+                                        .ctx = run,
+                                        .interrupted = interrupted};
+    int rc = offline_open(cfg, &app_report_stderr, &offline, err);
+    if (rc == SH_OK) options.last_station = offline_site(offline)->n_stations;
+    if (rc == SH_OK) rc = create_map(run, offline_site(offline), err);
+    if (rc == SH_OK) rc = recording_run(offline_scanhead(offline), &options, &result, err);
+    if (rc == SH_OK && app_interrupted) rc = sh_fail(err, SH_EIO, "interrupted; nothing written");
+    if (rc == SH_OK) rc = map_write_png(run->map, run->output, err);
+    if (rc == SH_OK && !run->quiet) {
+        struct map_counts counts;
+        map_get_counts(run->map, &counts);
+        fprintf(stderr, "scanhead: %s: %llu points drawn, %llu outside of the area\n", run->output,
+                (unsigned long long)counts.drawn, (unsigned long long)counts.outside);
+    }
+    map_free(run->map);
+    offline_close(offline);
+    return rc;
+}
+
+int app_map(int argc, char **argv)
+{
+    struct map_run *run = calloc(1, sizeof *run);
+    struct sh_err err = {0};
+    if (run == NULL) {
+        sh_fail(&err, SH_ENOMEM, "no memory");
+        return app_fail(&err);
+    }
+    int status = parse(run, argc, argv);
+    if (status < 0) {
+        /* The map is in the scene's frame, whatever the configuration sends to its clients. */
+        status = app_add_set(&run->sets, "output.crs=local");
+        if (status == APP_OK) status = app_add_set(&run->sets, "output.layout=geo");
+        if (status == APP_OK) status = app_add_set(&run->sets, "output.utm_zone=0");
+        struct config *cfg = status == APP_OK ? app_load_config(run->config, &run->sets, &status) : NULL;
+        if (cfg != NULL) {
+            app_catch_signals();
+            int rc = draw(run, cfg, &err);
+            status = rc == SH_OK ? APP_OK : app_fail(&err);
+            free(cfg);
+        }
+    }
+    free(run);
+    return status;
+}

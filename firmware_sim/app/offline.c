@@ -1,0 +1,84 @@
+/* The head in this process, behind a socket pair. */
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "firmware_sim/loop/loop.h"
+#include "firmware_sim/app/recording.h"
+
+struct offline {
+    struct site *site;
+    struct device *device;
+    struct loop *loop;
+    struct scanhead *sh;
+};
+
+static int connect_client(struct offline *off, int fd, struct sh_err *err)
+{
+    char source[32], why[256];
+    snprintf(source, sizeof source, "fd:%d", fd);
+    int rc = scanhead_open(source, &off->sh, why, sizeof why);
+    if (rc != SCANHEAD_OK) close(fd);
+    return rc == SCANHEAD_OK ? SH_OK : sh_fail(err, rc, "off line: %s", why);
+}
+
+static int start(struct offline *off, struct config *cfg, const struct sh_report *report, struct sh_err *err)
+{
+    int fd[2];
+    if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, fd) != 0)
+        return sh_fail(err, SH_EIO, "socket pair: %s", strerror(errno));
+    struct link_spec spec = {.type = LINK_FD, .fd = fd[0]};
+    struct device_options device = {0};
+    struct loop_options options = {.extra = &spec, .report = report};
+    cfg->loop.pace = PACE_FAST;
+    cfg->n_links = 0;
+    int rc = site_load(cfg, report, &off->site, err);
+    if (rc == SH_OK) rc = device_create(off->site, &device, &off->device, err);
+    if (rc == SH_OK) rc = loop_create(off->site, off->device, &options, &off->loop, err);
+    if (rc != SH_OK) {
+        close(fd[0]);
+        close(fd[1]);
+        return rc;
+    }
+    rc = connect_client(off, fd[1], err);
+    return rc == SH_OK ? loop_start(off->loop, err) : rc;
+}
+
+int offline_open(struct config *cfg, const struct sh_report *report, struct offline **out, struct sh_err *err)
+{
+    *out = calloc(1, sizeof **out);
+    if (*out == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
+    int rc = start(*out, cfg, report, err);
+    if (rc != SH_OK) {
+        offline_close(*out);
+        *out = NULL;
+    }
+    return rc;
+}
+
+struct scanhead *offline_scanhead(struct offline *offline)
+{
+    return offline->sh;
+}
+
+const struct site *offline_site(const struct offline *offline)
+{
+    return offline->site;
+}
+
+void offline_close(struct offline *offline)
+{
+    if (offline == NULL) return;
+    struct loop_stats stats;
+    if (offline->sh != NULL) scanhead_close(offline->sh); /* a loop that waits for this reader goes on */
+    if (offline->loop != NULL) {
+        loop_end(offline->loop);
+        loop_join(offline->loop, &stats);
+    }
+    loop_free(offline->loop);
+    device_free(offline->device);
+    site_free(offline->site);
+    free(offline);
+}

@@ -1,0 +1,303 @@
+#include "firmware_sim/app/recording.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "drivers/protocol/native.h"
+#include "firmware_sim/base/clock.h"
+#include "firmware_sim/command/head.h"
+
+enum { REPLY_MS = 5000, NEXT_MS = 250, END_MS = 5000, BOOT_MS = 30000, REPLUG_MS = 1000, SILENT_MS = 2000 };
+
+struct recording {
+    int64_t heard_ns; /* when pulses came last, or the head was asked why none do */
+    struct scanhead *sh;
+    const struct recording_options *o;
+    struct recording_result *result;
+    int64_t next_report_ns, scan_t0_ns; /* monotonic; device time of the scan's start, -1 before it */
+    int interrupted;                    /* asked to end the whole recording */
+    int stopping;                       /* the scan at hand is to end */
+    int scan_started;                   /* SCAN_START or points were seen since SCAN:STAR */
+    int scan_over, cut_short, within_scan, broken;
+};
+
+static int command(struct recording *r, const char *line, char *reply, size_t len, struct sh_err *err)
+{
+    int rc = scanhead_command(r->sh, line, reply, len, REPLY_MS);
+    if (rc != SCANHEAD_OK) return sh_fail(err, rc, "%s: %s", line, scanhead_error(r->sh));
+    if (strncmp(reply, "ERR", 3) == 0) return sh_fail(err, SH_ESTATE, "the head refused %s: %s", line, reply);
+    return SH_OK;
+}
+
+static int set(struct recording *r, const char *header, long value, struct sh_err *err)
+{
+    char line[64], reply[512];
+    snprintf(line, sizeof line, "%s %ld", header, value);
+    return command(r, line, reply, sizeof reply, err);
+}
+
+static void count_points(struct recording *r, const struct scanhead_frame *frame)
+{
+    /* The last byte of a point holds the echo's number and the count: 0 for a shot without echo. */
+    const uint8_t *last = frame->payload + NATIVE_POINTS_HEAD_LEN + NATIVE_POINT_LEN - 1;
+    uint64_t empty = 0;
+    for (uint32_t i = 0; i < frame->n_points; i++)
+        empty += last[(size_t)i * NATIVE_POINT_LEN] == 0;
+    r->result->empty += empty;
+    r->result->points += frame->n_points - empty;
+}
+
+/* Stopped, or failed, while the mirror was still spinning up: there is no scan, so no SCAN_END comes. */
+static int gives_up(const struct scanhead_frame *frame)
+{
+    return frame->event == SCANHEAD_EV_STATE && frame->event_value[1] == HEAD_SPIN_UP &&
+           frame->event_value[0] != HEAD_SCANNING;
+}
+
+static void count_line(struct recording *r, const struct scanhead_frame *frame)
+{
+    struct scanhead_line_end end;
+    if (scanhead_line_end(r->sh, frame, &end) != SCANHEAD_OK) return;
+    r->result->crowded += end.n_crowded;
+    r->result->faint += end.n_faint;
+    r->result->unfit += end.n_unfit;
+}
+
+static void look_at(struct recording *r, const struct scanhead_frame *frame)
+{
+    r->result->frames++;
+    if (frame->type == SCANHEAD_POINTS) {
+        r->within_scan = r->scan_started = 1;
+        r->result->pulses += frame->n_pulses;
+        if (r->scan_t0_ns < 0) r->scan_t0_ns = frame->t_ns - frame->scan_t0_ns;
+    }
+    if (frame->type == SCANHEAD_LINE_END) count_line(r, frame);
+    if (frame->type != SCANHEAD_EVENT) return;
+    if (frame->event == SCANHEAD_EV_SCAN_START) {
+        r->scan_t0_ns = (int64_t)frame->event_value[1];
+        r->scan_started = 1;
+    }
+    if (frame->event == SCANHEAD_EV_SCAN_END) {
+        r->scan_over = 1;
+        r->within_scan = r->broken = 0;
+        r->result->scans++;
+        r->result->lost_pulses += frame->event_value[2];
+    }
+    if (gives_up(frame) && !r->scan_started) r->scan_over = 1;
+}
+
+static void report(struct recording *r)
+{
+    int64_t now_ns = clock_now_ns();
+    if (!r->o->progress || now_ns < r->next_report_ns) return;
+    r->next_report_ns = now_ns + 1000000000;
+    char text[96];
+    snprintf(text, sizeof text, "recording: %.2f M points, %.2f M pulses", 1e-6 * (double)r->result->points,
+             1e-6 * (double)r->result->pulses);
+    sh_progress(r->o->report, text, -1.0);
+}
+
+/* The head was unplugged: waits for it. A scan that is over when it is back has ended meanwhile; of one that is not,
+ * the rest will come. */
+static int replug(struct recording *r, struct sh_err *err)
+{
+    const int64_t end_ns = clock_now_ns() + (int64_t)(1e9 * r->o->replug_s);
+    char reply[512];
+    int rc, scanning = 0;
+    sh_warn(r->o->report, "%s; waiting for it", scanhead_error(r->sh));
+    do {
+        rc = scanhead_reattach(r->sh, REPLUG_MS);
+        if (rc == SCANHEAD_OK) rc = scanhead_command(r->sh, "HEAD:STAT?", reply, sizeof reply, REPLY_MS);
+    } while (rc != SCANHEAD_OK && clock_now_ns() < end_ns && !(r->o->interrupted != NULL && r->o->interrupted()));
+    if (rc != SCANHEAD_OK) return sh_fail(err, SH_ELOST, "the head did not come back: %s", scanhead_error(r->sh));
+    scanning = strncmp(reply, "s", 1) == 0; /* spin-up, scanning, spin-down */
+    sh_warn(r->o->report, "the head is back");
+    r->result->replugs++;
+    r->result->broken_scans += (uint64_t)(r->within_scan && !r->broken);
+    r->broken = r->within_scan && scanning;
+    if (r->within_scan && !scanning) r->scan_over = 1;
+    r->within_scan = r->broken;
+    return 0;
+}
+
+/* One frame. 1: got one; 0: none in time; negative: over. */
+static int step(struct recording *r, int timeout_ms, struct sh_err *err)
+{
+    struct scanhead_frame frame;
+    int rc = scanhead_next(r->sh, &frame, timeout_ms);
+    report(r);
+    if (rc == SCANHEAD_ETIMEOUT) return 0;
+    if ((rc == SCANHEAD_ELOST || rc == SCANHEAD_ECLOSED) && r->o->replug_s > 0.0) return replug(r, err);
+    if (rc != SCANHEAD_OK) return sh_fail(err, rc, "%s", scanhead_error(r->sh));
+    look_at(r, &frame);
+    if (frame.type == SCANHEAD_POINTS) {
+        r->heard_ns = clock_now_ns();
+        count_points(r, &frame);
+    }
+    int64_t into_ns = frame.t_ns - r->scan_t0_ns;
+    if (r->o->duration_s > 0.0 && r->scan_t0_ns >= 0 && (double)into_ns >= 1e9 * r->o->duration_s) r->stopping = 1;
+    rc = r->o->frame(r->o->ctx, r->sh, &frame, err);
+    return rc == SH_OK ? 1 : rc;
+}
+
+static int is_interrupted(struct recording *r)
+{
+    if (r->o->interrupted != NULL && r->o->interrupted()) r->interrupted = 1;
+    return r->interrupted;
+}
+
+/* Returns early, with SH_OK, when interrupted. */
+static int wait_idle(struct recording *r, struct sh_err *err)
+{
+    int64_t deadline_ns = clock_now_ns() + (int64_t)BOOT_MS * 1000000;
+    char reply[512];
+    while (clock_now_ns() < deadline_ns) {
+        if (is_interrupted(r)) return SH_OK;
+        int rc = command(r, "HEAD:STAT?", reply, sizeof reply, err);
+        if (rc != SH_OK) return rc;
+        if (strcmp(reply, "idle") == 0) return SH_OK;
+        if (strcmp(reply, "scanning") == 0 || strcmp(reply, "fault") == 0 || strcmp(reply, "off") == 0)
+            return sh_fail(err, SH_ESTATE, "the head is %s; --listen records what it does on its own", reply);
+        rc = step(r, 20, err); /* frames go on meanwhile */
+        if (rc < 0) return rc;
+    }
+    return sh_fail(err, SH_ETIMEOUT, "the head was not idle within %d s", BOOT_MS / 1000);
+}
+
+static int stop_scan(struct recording *r, struct sh_err *err)
+{
+    char reply[512];
+    int rc = scanhead_command(r->sh, "SCAN:STOP", reply, sizeof reply, REPLY_MS);
+    if (rc != SCANHEAD_OK) return sh_fail(err, rc, "SCAN:STOP: %s", scanhead_error(r->sh));
+    r->cut_short =
+        r->interrupted && strncmp(reply, "ERR", 3) != 0; /* a refusal says that the scan has just ended by itself */
+    return SH_OK;
+}
+
+/* No pulses have come for a while: frames that a slow reader lost may have held the scan's end. */
+static int look_for_end(struct recording *r, struct sh_err *err)
+{
+    struct scanhead_stats stats;
+    char reply[512];
+    scanhead_get_stats(r->sh, &stats);
+    if (stats.seq_lost + stats.reader_lost == 0) return SH_OK;
+    int rc = command(r, "HEAD:STAT?", reply, sizeof reply, err);
+    if (rc != SH_OK || strcmp(reply, "idle") != 0) return rc;
+    sh_warn(r->o->report, "the scan's end was lost; the head is idle");
+    r->scan_started = r->scan_over = 1;
+    r->within_scan = r->broken = 0;
+    return SH_OK;
+}
+
+static int follow(struct recording *r, struct sh_err *err)
+{
+    int64_t end_ns = INT64_MAX;
+    int asked = 0;
+    r->heard_ns = clock_now_ns();
+    while (!r->scan_over) {
+        if (is_interrupted(r)) r->stopping = 1;
+        if (r->stopping && r->o->listen) return SH_OK;
+        if (r->stopping && !asked) {
+            int rc = stop_scan(r, err);
+            if (rc != SH_OK) return rc;
+            asked = 1;
+            end_ns = clock_now_ns() + (int64_t)END_MS * 1000000;
+        }
+        if (clock_now_ns() > end_ns)
+            return sh_fail(err, SH_ETIMEOUT, "the head did not end the scan within %d s", END_MS / 1000);
+        int rc = step(r, NEXT_MS, err);
+        if (rc < 0) return rc;
+        if (clock_now_ns() - r->heard_ns < (int64_t)SILENT_MS * 1000000) continue;
+        rc = look_for_end(r, err);
+        if (rc != SH_OK) return rc;
+        r->heard_ns = clock_now_ns();
+    }
+    return r->scan_started || r->stopping || r->o->listen
+               ? SH_OK
+               : sh_fail(err, SH_ESTATE, "the head gave up the scan before its first pulse");
+}
+
+static int start_scan(struct recording *r, uint32_t station, struct sh_err *err)
+{
+    char reply[512];
+    int rc = wait_idle(r, err);
+    if (rc == SH_OK && r->interrupted) return SH_OK;
+    if (rc == SH_OK && station != 0) rc = set(r, "HEAD:STATION", (long)station, err);
+    if (rc == SH_OK && r->o->frames >= 0) rc = set(r, "SCAN:FRAM", r->o->frames, err);
+    return rc == SH_OK ? command(r, "SCAN:STAR", reply, sizeof reply, err) : rc;
+}
+
+static int record_scan(struct recording *r, uint32_t station, struct sh_err *err)
+{
+    r->stopping = r->scan_over = r->scan_started = r->cut_short = 0;
+    r->scan_t0_ns = -1;
+    int rc = r->o->listen ? SH_OK : start_scan(r, station, err);
+    r->scan_over = r->scan_started = 0; /* what came before the reply is of another scan */
+    if (rc != SH_OK || (r->interrupted && !r->o->listen)) return rc;
+    return follow(r, err);
+}
+
+/* A scan without end, of a head that stands, is ended by who records it, and is then complete. */
+static int is_endless(const struct recording *r)
+{
+    struct scanhead_info info;
+    return !(r->o->duration_s > 0.0) && scanhead_get_info(r->sh, &info) == SCANHEAD_OK && info.frames == 0 &&
+           !info.moving;
+}
+
+/* What an interruption left out: of the scan at hand, and of the stations from it on. */
+static void tell_missing(struct recording *r, uint32_t station)
+{
+    char *text = r->result->missing;
+    size_t room = sizeof r->result->missing;
+    int whole = r->scan_started && (!r->cut_short || is_endless(r));
+    uint32_t first = r->scan_started ? station + 1 : station, last = r->o->last_station;
+    if (r->scan_started && !whole) {
+        int n = station != 0 ? snprintf(text, room, "the end of the scan from station %u", station)
+                             : snprintf(text, room, "the end of the scan");
+        text += n;
+        room -= (size_t)n;
+    }
+    const char *and = r->scan_started && !whole ? " and " : "";
+    if (station == 0 && !r->scan_started)
+        snprintf(text, room, "the scan");
+    else if (station != 0 && first < last)
+        snprintf(text, room, "%sthe scans from stations %u to %u", and, first, last);
+    else if (station != 0 && first == last)
+        snprintf(text, room, "%sthe scan from station %u", and, first);
+}
+
+static int record_listening(struct recording *r, struct sh_err *err)
+{
+    int rc = record_scan(r, 0, err);
+    /* A scan's end is not the end: more may follow until the stream ends. */
+    while (rc == SH_OK && !r->stopping) {
+        r->scan_over = 0;
+        rc = follow(r, err);
+    }
+    return rc;
+}
+
+static int record_stations(struct recording *r, struct sh_err *err)
+{
+    uint32_t station = r->o->first_station;
+    int rc = record_scan(r, station, err);
+    while (rc == SH_OK && !r->interrupted && station < r->o->last_station)
+        rc = record_scan(r, ++station, err);
+    if (rc == SH_OK && r->interrupted) tell_missing(r, station);
+    return rc;
+}
+
+int recording_run(struct scanhead *sh, const struct recording_options *options, struct recording_result *result,
+                  struct sh_err *err)
+{
+    memset(result, 0, sizeof *result);
+    struct recording r = {.sh = sh, .o = options, .result = result, .next_report_ns = clock_now_ns() + 1000000000};
+    int rc = options->listen ? record_listening(&r, err) : record_stations(&r, err);
+    if (rc == SH_ECLOSED && options->listen && result->frames == 0)
+        return sh_fail(err, SH_EFORMAT, "the stream ended without a single frame");
+    if (rc == SH_ECLOSED && options->listen && !r.within_scan) return SH_OK;
+    result->ended_early = rc == SH_ECLOSED || rc == SH_ELOST;
+    return rc == SH_ECLOSED && r.within_scan ? sh_fail(err, rc, "the stream ended in the middle of a scan") : rc;
+}

@@ -1,0 +1,41 @@
+/* A JSON writer for statistics: RFC 8259 text into a FILE, two blanks per level, one member per line.
+ *
+ * Each value takes the key it gets in an object, or NULL in an array and at the top. The FILE stays the
+ * caller's. The C locale is assumed (nothing here calls setlocale). One writer belongs to one thread; it
+ * allocates nothing. */
+#ifndef FIRMWARE_SIM_BASE_JSON_H
+#define FIRMWARE_SIM_BASE_JSON_H
+
+#include <stdint.h>
+#include <stdio.h>
+
+#include "core/err.h"
+
+enum { JSON_MAX_DEPTH = 16 };
+
+struct json {
+    FILE *out;
+    int depth;
+    char closer[JSON_MAX_DEPTH];  /* what ends each open level */
+    char has_one[JSON_MAX_DEPTH]; /* the level has a member: the next needs a comma */
+    int misused;                  /* a key in an array, none in an object, a level closed wrongly or left open */
+};
+
+void json_begin(struct json *json, FILE *out);
+void json_open_object(struct json *json, const char *key);
+void json_close_object(struct json *json);
+void json_open_array(struct json *json, const char *key);
+void json_close_array(struct json *json);
+/* Bytes that are not UTF-8 become U+FFFD each; NULL becomes null. */
+void json_string(struct json *json, const char *key, const char *value);
+void json_int(struct json *json, const char *key, int64_t value);
+void json_uint(struct json *json, const char *key, uint64_t value);
+/* 15 to 17 digits, as many as it takes to read back the same double; null for NaN and the infinities, which JSON has
+ * not.
+ */
+void json_double(struct json *json, const char *key, double value);
+void json_bool(struct json *json, const char *key, int value);
+/* Ends the text with a newline. SH_ESTATE: the calls did not make one whole value; SH_EIO: writing failed. */
+int json_end(struct json *json, struct sh_err *err);
+
+#endif

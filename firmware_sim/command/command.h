@@ -1,0 +1,123 @@
+/* The command set: SCPI-style lines in, one reply line each, and the error queue of SCPI-99 (21.8).
+ *
+ *   *IDN?  *RST  *CLS  *OPC?  *STB?  SYSTem:ERRor[:NEXT]?  SYSTem:ERRor:COUNt?  SYSTem:VERSion?  SYSTem:CONTrol:RELease
+ *   SYSTem:CONTrol?  SYSTem:PLAN?  HEAD:PRR  HEAD:LINes  HEAD:PAN  HEAD:STATe?  HEAD:STATION  SCAN:LINE:STARt
+ * SCAN:LINE:STOP SCAN:PAN:STARt  SCAN:PAN:STOP  SCAN:FRAMes  SCAN:ECHoes  SCAN:STARt  SCAN:STOP  SCAN:COUNt?  HELP?
+ * TIME? TIME:UTC? TIME:GPS?  TIME:STEP SCAN:ECHoes takes ALL, FIRSt, LAST, STRongest or DEF: which echoes of a pulse
+ * are sent. Short and long forms, any case (HEAD:STATION has no short one: STAT is STATe); a query ends in '?'. MIN,
+ * MAX and DEF are taken as a number; a setting's query takes MIN, MAX and DEF too ("HEAD:PRR? MAX"). MIN and MAX are
+ * the limits as the profile and the other settings leave them now, so they are never refused. A setting may carry its
+ * unit as a suffix: HZ, KHZ, MHZ (mega, as SCPI has it); DEG; DEG/S; a step is in nanoseconds or NS, US, MS, S. Numbers
+ * are taken exactly or refused, never rounded. With a live platform a step may carry its pose at the step's end:
+ * `TIME:STEP 10 MS, x, y, z, roll, pitch, heading`, metres in the scene frame and degrees (core/pose.h). *STB?: 4
+ * errors are queued, 128 scanning. Outside the profile is -222; against another setting or the state -221. *CLS, like
+ * SYSTem:ERRor?, needs no control. Reply: the value, or "OK", or `ERR -222,"Data out of range; HEAD:PRR 5000000 Hz,
+ * allowed 1000 to 1200000"`.
+ *
+ * Pure: no clock, no I/O, no thread; the loop owns the device, calls in one thread and carries out the effect. */
+#ifndef FIRMWARE_SIM_COMMAND_COMMAND_H
+#define FIRMWARE_SIM_COMMAND_COMMAND_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "firmware_sim/command/head.h"
+
+enum {
+    COMMAND_MAX_LINE = 256, /* longest line without its end; longer ones are -363 and dropped whole */
+    COMMAND_MAX_REPLY = 480,
+    COMMAND_QUEUE_LEN = 32, /* errors kept; when full the last becomes -350 and counts the rest */
+};
+
+enum command_error {
+    CMD_E_NONE = 0,
+    CMD_E_SYNTAX = -102,
+    CMD_E_DATA_TYPE = -104,
+    CMD_E_NOT_ALLOWED = -108,
+    CMD_E_MISSING = -109,
+    CMD_E_HEADER = -113,
+    CMD_E_SUFFIX = -131,
+    CMD_E_PROTECTED = -203, /* another session has control */
+    CMD_E_SETTINGS = -221,  /* conflicts with the state or another setting */
+    CMD_E_RANGE = -222,
+    CMD_E_QUEUE = -350,
+    CMD_E_OVERRUN = -363,
+    /* the device's own, positive (SCPI-99 21.8.2) */
+    CMD_E_CLIENT_LOST = 101, /* a client went away */
+    CMD_E_READER = 102,      /* a reader could not follow; frames lost */
+    CMD_E_PULSES = 103,      /* the head could not keep up; pulses lost */
+    CMD_E_REFUSED = 104,     /* a client was turned away: all sessions taken */
+    CMD_E_PARTIAL = 105,     /* a client went away in the middle of a command */
+};
+
+struct command_queue {
+    struct {
+        int number;
+        char text[160];
+    } entry[COMMAND_QUEUE_LEN];
+    uint32_t first, count, overflow;
+};
+
+/* Puts number and text (may be NULL) in the queue: `number,"<standard text>; <text>"`. */
+void command_queue_push(struct command_queue *queue, int number, const char *text);
+/* Takes the oldest as `number,"text"`; `0,"No error"` when empty. */
+void command_queue_pop(struct command_queue *queue, char *buf, size_t len);
+const char *command_error_text(int number);
+
+/* What the device tells the command set; the loop keeps it up to date. */
+struct command_device {
+    const char *idn;
+    const char *plan; /* the methods in use, in a line; NULL: not known */
+    struct head_limits limits;
+    struct head_settings settings; /* as they are now; command_execute changes them only when all is well */
+    struct head_settings defaults; /* what *RST restores */
+    enum head_state state;
+    struct command_queue queue;
+    uint32_t control;                      /* session that may change things; 0: nobody, the next who does takes it */
+    uint64_t frames_done;                  /* of the scan at hand or the last one */
+    int64_t t_ns;                          /* device time */
+    char utc[40], gps[40];                 /* the same as time of day, by the head's clock; empty: unknown */
+    int step_allowed;                      /* 1 when the pace is `step` */
+    int pose_allowed;                      /* 1 when the platform is live: a step may carry its pose ... */
+    double pose_centre_m[3], pose_reach_m; /* ... so far from there at most */
+};
+
+enum command_effect {
+    COMMAND_NONE,
+    COMMAND_SETTINGS, /* settings changed */
+    COMMAND_START,    /* state event START was accepted by head_next_state */
+    COMMAND_STOP,
+    COMMAND_RESET,   /* settings are the defaults again; state event RESET accepted */
+    COMMAND_STEP,    /* let step_ns of device time pass, then send the reply */
+    COMMAND_RELEASE, /* control was given back */
+};
+
+struct command_result {
+    enum command_effect effect;
+    int64_t step_ns;
+    int have_pose;
+    double pose[6];   /* of the platform at the end of the step: x, y, z (m), roll, pitch, heading (degrees) */
+    int error;        /* 0, or the number that was queued */
+    int took_control; /* this command made the session the one in control */
+    int changes;      /* belongs in the journal: effect is not NONE or RELEASE */
+    char reply[COMMAND_MAX_REPLY]; /* one line without its end; empty for an empty line (no reply at all) */
+};
+
+/* Carries out one line (without its end) from a session (from 1; 0 is the device itself: never refused control).
+ * Changes dev->settings, dev->queue and dev->control; dev->state is changed by the loop. A change of settings is
+ * refused whole (-222, -221) and leaves them as they were. While scanning, a station change is -221. */
+void command_execute(struct command_device *dev, uint32_t session, const char *line, struct command_result *out);
+
+/* Collects bytes into lines: LF, CR or CR LF end a line. */
+struct command_lines {
+    char buf[COMMAND_MAX_LINE + 1];
+    size_t len;
+    int overrun, last_cr;
+};
+enum command_line_kind { COMMAND_LINE_NONE, COMMAND_LINE_READY, COMMAND_LINE_OVERRUN };
+/* Feeds one byte. READY: the line is in buf, NUL-terminated, until the next call. OVERRUN: a line too long just ended.
+ * A tab becomes a blank. Other bytes that are not printable ASCII stay in the line as '~', which no command has, so
+ * that it fails as what it is: a wrong command. */
+enum command_line_kind command_lines_feed(struct command_lines *lines, unsigned char byte);
+
+#endif

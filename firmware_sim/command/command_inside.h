@@ -1,0 +1,143 @@
+/* The command set from the inside: text pieces, numbers, the table's rows. */
+#ifndef FIRMWARE_SIM_COMMAND_COMMAND_INSIDE_H
+#define FIRMWARE_SIM_COMMAND_COMMAND_INSIDE_H
+
+#include "firmware_sim/command/command.h"
+
+enum {
+    COMMAND_TEXT_LEN = sizeof(((struct command_queue *)0)->entry[0].text),
+    COMMAND_CLIP_LEN = 36, /* what an error text quotes of a line, with its NUL */
+};
+
+/* ---- command_queue.c */
+
+/* `standard text; text` with every byte printable ASCII and no '"'; what is too long is cut at its end. */
+void command_error_compose(char *buf, size_t len, int number, const char *text);
+
+/* ---- command_parse.c */
+
+/* A line taken apart; header and param point into text. */
+struct command_request {
+    char text[COMMAND_MAX_LINE + 1];
+    const char *header; /* without a leading colon and the '?' */
+    size_t header_len;
+    int query;
+    char *param; /* the rest without blanks around it; "" when there is none */
+};
+
+/* Returns 0, or the error number and its reason. A blank line gives header_len 0 and 0. */
+int command_split(const char *line, struct command_request *req, const char **why);
+
+/* A header against a pattern of SCPI-99 6.2.1: the upper-case part or the whole of each word, in any case;
+ * words in brackets may be left out. */
+int command_header_matches(const char *pattern, const char *header, size_t len);
+
+/* A whole word against one pattern word ("MINimum"). */
+int command_word_matches(const char *pattern, const char *word);
+
+/* A decimal number as it was written: +-digits * 10^exponent. Digits have no zeros around them; 0 has none at
+ * all. */
+struct command_decimal {
+    char digits[COMMAND_MAX_LINE + 1];
+    int n_digits, exponent, negative;
+};
+
+/* NRf of IEEE 488.2, 7.7.2. Returns what follows the number and its blanks, or NULL when text is not a
+ * number. */
+const char *command_parse_decimal(const char *text, struct command_decimal *decimal);
+
+enum command_fit { COMMAND_FIT_EXACT, COMMAND_FIT_FINE, COMMAND_FIT_BIG };
+/* number * 10^shift as an integer. FINE: it has a fraction; BIG: it needs more than 63 bits. */
+enum command_fit command_decimal_to_int(const struct command_decimal *decimal, int shift, int64_t *value);
+
+/* value * 10^-decimals without superfluous zeros: 300000, -0.5. */
+void command_format_fixed(char *buf, size_t len, int64_t value, int decimals);
+
+/* The beginning of text, with "..." when that is not all. */
+void command_clip(char clip[COMMAND_CLIP_LEN], const char *text, size_t len);
+
+/* ---- command_table.c */
+
+struct command_unit {
+    const char *name;     /* as errors print it; "" for a plain count */
+    int decimals;         /* the integer counts 10^-decimals of the unit */
+    const char *suffixes; /* as errors list them */
+    struct {
+        const char *suffix;
+        int shift; /* power of ten to the unit */
+    } suffix[4];
+};
+
+/* A bound: of the profile, at this offset in struct head_limits, or a constant. */
+struct command_bound {
+    int of_profile;
+    int64_t value;
+};
+
+/* A setting, its profile range, and the other setting that narrows it: other + least <= value <= other +
+ * most. */
+struct command_setting {
+    size_t offset; /* in struct head_settings */
+    int is_u32;    /* the setting and its profile bounds are uint32_t, not int64_t */
+    int not_in_scan;
+    struct command_bound min, max;
+    const char *other; /* header of the other setting; NULL: none */
+    size_t other_offset;
+    int64_t least, most;      /* COMMAND_UNBOUND: no such bound */
+    const char *const *words; /* values are these, by their place; NULL: numbers */
+};
+#define COMMAND_UNBOUND INT64_MIN
+
+enum command_value_kind {
+    COMMAND_VALUE_NUMBER,
+    COMMAND_VALUE_WORD,
+    COMMAND_VALUE_MIN,
+    COMMAND_VALUE_MAX,
+    COMMAND_VALUE_DEF
+};
+
+struct command_value {
+    enum command_value_kind kind;
+    struct command_decimal decimal;
+    int shift; /* of the suffix */
+    uint32_t word;
+};
+
+struct command_call {
+    struct command_device *dev;
+    uint32_t session;
+    const struct command_row *row;
+    char *param;      /* as written; of a step, up to the pose */
+    const char *pose; /* what follows the step; NULL: nothing */
+    struct command_value value;
+    struct command_result *out;
+};
+
+struct command_row {
+    const char *header;
+    void (*query)(struct command_call *call); /* NULL: no query form */
+    void (*act)(struct command_call *call);   /* NULL: only a query */
+    const struct command_unit *unit;          /* of act's one number; NULL: act takes none */
+    const struct command_setting *setting;    /* NULL: MIN, MAX and DEF have no meaning */
+    int open;                                 /* act is open to all sessions */
+    int pose;                                 /* a pose may follow the number */
+};
+
+const struct command_row *command_table(size_t *n);
+
+/* command_pose.c: call->pose as six numbers into call->out. Returns -1 when it failed. */
+int command_take_pose(struct command_call *call);
+
+/* Queues the error and makes it the reply. */
+void command_fail(struct command_call *call, int number, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
+
+void command_reply(struct command_call *call, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
+
+/* ---- command_setting.c: query and change of any setting. */
+void command_setting_query(struct command_call *call);
+void command_setting_change(struct command_call *call);
+
+/* The number in call->value in the row's unit, or -222 with what is allowed (then returns -1). */
+int command_value_in_range(struct command_call *call, int64_t min, int64_t max, int64_t *value);
+
+#endif

@@ -1,0 +1,237 @@
+/* The only list of commands, and what each one that is no setting does. */
+#include "firmware_sim/command/command_inside.h"
+
+#include <stdio.h>
+#include <string.h>
+
+/* clang-format off */
+#define SETTING(field) offsetof(struct head_settings, field)
+#define PROFILE(field) {1, (int64_t)offsetof(struct head_limits, field)}
+#define CONSTANT(n)    {0, (n)}
+#define NO_OTHER       NULL, 0, 0, 0
+
+enum { TURN_UDEG = 360000000 };
+
+static const struct command_unit unit_hz = {"Hz", 6, "HZ, KHZ or MHZ", {{"HZ", 0}, {"KHZ", 3}, {"MHZ", 6}}};
+static const struct command_unit unit_deg = {"deg", 6, "DEG", {{"DEG", 0}}};
+static const struct command_unit unit_deg_s = {"deg/s", 6, "DEG/S", {{"DEG/S", 0}}};
+static const struct command_unit unit_ns = {"ns", 0, "NS, US, MS or S", {{"NS", 0}, {"US", 3}, {"MS", 6}, {"S", 9}}};
+static const struct command_unit unit_count = {"", 0, "no unit", {{NULL, 0}}};
+
+enum { PRR, LINES, PAN, STATION, LINE_START, LINE_STOP, PAN_START, PAN_STOP, FRAMES, ECHOES };
+
+/* In the order of enum beam_select. */
+static const char *const echo_words[] = {"ALL", "FIRSt", "LAST", "STRongest", NULL};
+
+/* A pulse rate below the line rate would leave lines without a pulse; a line or a pan sweep of no width has nothing to
+ * scan, and one beyond a turn would scan things twice. */
+static const struct command_setting settings[] = {
+    /* field, is_u32, not_in_scan, min, max, other, its field, least, most, words */
+    [PRR] = {SETTING(prr_uhz), 0, 0, PROFILE(prr_min_uhz), PROFILE(prr_max_uhz),
+             "HEAD:LINes", SETTING(lines_uhz), 0, COMMAND_UNBOUND, NULL},
+    [LINES] = {SETTING(lines_uhz), 0, 0, PROFILE(lines_min_uhz), PROFILE(lines_max_uhz),
+               "HEAD:PRR", SETTING(prr_uhz), COMMAND_UNBOUND, 0, NULL},
+    [PAN] = {SETTING(pan_udeg_s), 0, 0, CONSTANT(0), PROFILE(pan_max_udeg_s), NO_OTHER, NULL},
+    [STATION] = {SETTING(station), 1, 1, CONSTANT(1), PROFILE(n_stations), NO_OTHER, NULL},
+    [LINE_START] = {SETTING(line_start_udeg), 0, 0, PROFILE(fov_min_udeg), PROFILE(fov_max_udeg),
+                    "SCAN:LINE:STOP", SETTING(line_stop_udeg), COMMAND_UNBOUND, -1, NULL},
+    [LINE_STOP] = {SETTING(line_stop_udeg), 0, 0, PROFILE(fov_min_udeg), PROFILE(fov_max_udeg),
+                   "SCAN:LINE:STARt", SETTING(line_start_udeg), 1, COMMAND_UNBOUND, NULL},
+    [PAN_START] = {SETTING(pan_start_udeg), 0, 0, PROFILE(pan_min_udeg), PROFILE(pan_max_udeg),
+                   "SCAN:PAN:STOP", SETTING(pan_stop_udeg), -TURN_UDEG, -1, NULL},
+    [PAN_STOP] = {SETTING(pan_stop_udeg), 0, 0, PROFILE(pan_min_udeg), PROFILE(pan_max_udeg),
+                  "SCAN:PAN:STARt", SETTING(pan_start_udeg), 1, TURN_UDEG, NULL},
+    [FRAMES] = {SETTING(frames), 1, 0, CONSTANT(0), CONSTANT(UINT32_MAX), NO_OTHER, NULL},
+    [ECHOES] = {SETTING(echoes), 1, 0, CONSTANT(0), CONSTANT(3), NO_OTHER, echo_words},
+};
+/* clang-format on */
+
+static void query_idn(struct command_call *call)
+{
+    command_reply(call, "%s", call->dev->idn);
+}
+
+static void query_opc(struct command_call *call)
+{
+    command_reply(call, "1"); /* no command is still at work once its reply is out */
+}
+
+static void query_stb(struct command_call *call)
+{
+    const int errors = call->dev->queue.count > 0 ? 1 << 2 : 0;
+    const int operation = call->dev->state == HEAD_SCANNING ? 1 << 7 : 0;
+    command_reply(call, "%d", errors | operation);
+}
+
+static void query_error(struct command_call *call)
+{
+    command_queue_pop(&call->dev->queue, call->out->reply, sizeof call->out->reply);
+}
+
+static void query_error_count(struct command_call *call)
+{
+    command_reply(call, "%u", call->dev->queue.count);
+}
+
+static void query_plan(struct command_call *call)
+{
+    command_reply(call, "%s", call->dev->plan != NULL ? call->dev->plan : "not known");
+}
+
+static void query_version(struct command_call *call)
+{
+    command_reply(call, "1999.0");
+}
+
+static void query_control(struct command_call *call)
+{
+    command_reply(call, "%u", call->dev->control);
+}
+
+static void query_state(struct command_call *call)
+{
+    command_reply(call, "%s", head_state_name(call->dev->state));
+}
+
+static void query_count(struct command_call *call)
+{
+    command_reply(call, "%llu", (unsigned long long)call->dev->frames_done);
+}
+
+static void query_time(struct command_call *call)
+{
+    command_reply(call, "%lld", (long long)call->dev->t_ns);
+}
+
+/* An empty text: the head doesn't know the time. */
+static void reply_time_of_day(struct command_call *call, const char *text)
+{
+    if (text[0] == '\0')
+        command_fail(call, CMD_E_SETTINGS, "%s? needs time.epoch in the configuration", call->row->header);
+    else
+        command_reply(call, "%s", text);
+}
+
+static void query_utc(struct command_call *call)
+{
+    reply_time_of_day(call, call->dev->utc);
+}
+
+static void query_gps(struct command_call *call)
+{
+    reply_time_of_day(call, call->dev->gps);
+}
+
+static void query_help(struct command_call *call)
+{
+    size_t n, len = 0;
+    const struct command_row *row = command_table(&n);
+    for (size_t i = 0; i < n && len < sizeof call->out->reply; i++)
+        len += (size_t)snprintf(call->out->reply + len, sizeof call->out->reply - len, "%s%s%s", i == 0 ? "" : " ",
+                                row[i].header,
+                                row[i].query == NULL ? ""
+                                : row[i].act == NULL ? "?"
+                                                     : "[?]");
+}
+
+static void act_clear(struct command_call *call)
+{
+    memset(&call->dev->queue, 0, sizeof call->dev->queue);
+    command_reply(call, "OK");
+}
+
+static void act_release(struct command_call *call)
+{
+    if (call->dev->control != 0) call->out->effect = COMMAND_RELEASE;
+    call->dev->control = 0;
+    command_reply(call, "OK");
+}
+
+/* The effect, or -221 where the state machine refuses the event. */
+static int act_event(struct command_call *call, enum head_event event, enum command_effect effect)
+{
+    if (head_next_state(call->dev->state, event) < 0) {
+        command_fail(call, CMD_E_SETTINGS, "%s is not possible in state %s", call->row->header,
+                     head_state_name(call->dev->state));
+        return -1;
+    }
+    call->out->effect = effect;
+    command_reply(call, "OK");
+    return 0;
+}
+
+static void act_start(struct command_call *call)
+{
+    act_event(call, HEAD_EV_START, COMMAND_START);
+}
+
+static void act_stop(struct command_call *call)
+{
+    act_event(call, HEAD_EV_STOP, COMMAND_STOP);
+}
+
+static void act_reset(struct command_call *call)
+{
+    if (act_event(call, HEAD_EV_RESET, COMMAND_RESET) == 0) call->dev->settings = call->dev->defaults;
+}
+
+static void act_step(struct command_call *call)
+{
+    int64_t step_ns;
+    const int64_t day_ns = 86400000000000; /* a grant cannot be taken back */
+    if (command_value_in_range(call, 1, day_ns, &step_ns) != 0) return;
+    if (call->pose != NULL && command_take_pose(call) != 0) return;
+    if (!call->dev->step_allowed) {
+        command_fail(call, CMD_E_SETTINGS, "%s needs the pace step", call->row->header);
+        return;
+    }
+    call->out->effect = COMMAND_STEP;
+    call->out->step_ns = step_ns;
+    command_reply(call, "OK");
+}
+
+/* clang-format off */
+#define QUERY(header, query)       {header, query, NULL, NULL, NULL, 0, 0}
+#define ACTION(header, act, open)  {header, NULL, act, NULL, NULL, open, 0}
+#define VALUE(header, unit, which) \
+    {header, command_setting_query, command_setting_change, &(unit), &settings[which], 0, 0}
+
+static const struct command_row rows[] = {
+    QUERY("*IDN", query_idn),
+    ACTION("*RST", act_reset, 0),
+    ACTION("*CLS", act_clear, 1), /* open, as SYSTem:ERRor? empties the queue too */
+    QUERY("*OPC", query_opc),
+    QUERY("*STB", query_stb),
+    QUERY("SYSTem:ERRor[:NEXT]", query_error),
+    QUERY("SYSTem:ERRor:COUNt", query_error_count),
+    QUERY("SYSTem:VERSion", query_version),
+    QUERY("SYSTem:CONTrol", query_control),
+    QUERY("SYSTem:PLAN", query_plan),
+    ACTION("SYSTem:CONTrol:RELease", act_release, 0),
+    VALUE("HEAD:PRR", unit_hz, PRR),
+    VALUE("HEAD:LINes", unit_hz, LINES),
+    VALUE("HEAD:PAN", unit_deg_s, PAN),
+    QUERY("HEAD:STATe", query_state),
+    VALUE("HEAD:STATION", unit_count, STATION), /* no short form: STAT is STATe */
+    VALUE("SCAN:LINE:STARt", unit_deg, LINE_START),
+    VALUE("SCAN:LINE:STOP", unit_deg, LINE_STOP),
+    VALUE("SCAN:PAN:STARt", unit_deg, PAN_START),
+    VALUE("SCAN:PAN:STOP", unit_deg, PAN_STOP),
+    VALUE("SCAN:FRAMes", unit_count, FRAMES),
+    VALUE("SCAN:ECHoes", unit_count, ECHOES),
+    ACTION("SCAN:STARt", act_start, 0),
+    ACTION("SCAN:STOP", act_stop, 0),
+    QUERY("SCAN:COUNt", query_count),
+    QUERY("HELP", query_help),
+    QUERY("TIME", query_time),
+    QUERY("TIME:UTC", query_utc),
+    QUERY("TIME:GPS", query_gps),
+    {"TIME:STEP", NULL, act_step, &unit_ns, NULL, 0, 1},
+};
+/* clang-format on */
+
+const struct command_row *command_table(size_t *n)
+{
+    *n = sizeof rows / sizeof rows[0];
+    return rows;
+}

@@ -1,0 +1,162 @@
+#include "firmware_sim/command/command_inside.h"
+
+#include <stdio.h>
+#include <string.h>
+
+enum { NUMBER_LEN = 32 };
+
+static int64_t read_field(const void *base, size_t offset, int is_u32)
+{
+    uint32_t narrow;
+    int64_t wide;
+    if (is_u32) {
+        memcpy(&narrow, (const char *)base + offset, sizeof narrow);
+        return narrow;
+    }
+    memcpy(&wide, (const char *)base + offset, sizeof wide);
+    return wide;
+}
+
+static void write_field(void *base, size_t offset, int is_u32, int64_t value)
+{
+    const uint32_t narrow = (uint32_t)value; /* the range check went before */
+    if (is_u32)
+        memcpy((char *)base + offset, &narrow, sizeof narrow);
+    else
+        memcpy((char *)base + offset, &value, sizeof value);
+}
+
+static int64_t read_bound(const struct command_call *call, const struct command_bound *bound)
+{
+    if (!bound->of_profile) return bound->value;
+    return read_field(&call->dev->limits, (size_t)bound->value, call->row->setting->is_u32);
+}
+
+static int64_t read_other(const struct command_call *call)
+{
+    return read_field(&call->dev->settings, call->row->setting->other_offset, call->row->setting->is_u32);
+}
+
+/* The range at this moment: of the profile, narrowed by the other setting. */
+static void current_range(const struct command_call *call, int64_t *min, int64_t *max)
+{
+    const struct command_setting *setting = call->row->setting;
+    *min = read_bound(call, &setting->min);
+    *max = read_bound(call, &setting->max);
+    if (setting->other == NULL) return;
+    const int64_t other = read_other(call);
+    if (setting->least != COMMAND_UNBOUND && other + setting->least > *min) *min = other + setting->least;
+    if (setting->most != COMMAND_UNBOUND && other + setting->most < *max) *max = other + setting->most;
+}
+
+static int64_t special_value(const struct command_call *call)
+{
+    int64_t min, max;
+    current_range(call, &min, &max);
+    if (call->value.kind == COMMAND_VALUE_MIN) return min;
+    if (call->value.kind == COMMAND_VALUE_MAX) return max;
+    return read_field(&call->dev->defaults, call->row->setting->offset, call->row->setting->is_u32);
+}
+
+void command_setting_query(struct command_call *call)
+{
+    const struct command_setting *setting = call->row->setting;
+    const int64_t value = call->value.kind == COMMAND_VALUE_NUMBER
+                              ? read_field(&call->dev->settings, setting->offset, setting->is_u32)
+                              : special_value(call);
+    char number[NUMBER_LEN];
+    if (setting->words != NULL) {
+        command_reply(call, "%s", setting->words[value]);
+        return;
+    }
+    command_format_fixed(number, sizeof number, value, call->row->unit->decimals);
+    command_reply(call, "%s", number);
+}
+
+/* `HEADER VALUE, allowed MIN to MAX`; value is what the command said, or its number with the unit. */
+static void refuse(struct command_call *call, int number, const char *value, int64_t min, int64_t max, const char *with)
+{
+    char low[NUMBER_LEN], high[NUMBER_LEN];
+    command_format_fixed(low, sizeof low, min, call->row->unit->decimals);
+    command_format_fixed(high, sizeof high, max, call->row->unit->decimals);
+    command_fail(call, number, "%s %s, allowed %s to %s%s", call->row->header, value, low, high, with);
+}
+
+static void refuse_number(struct command_call *call, int number, int64_t value, int64_t min, int64_t max,
+                          const char *with)
+{
+    const struct command_unit *unit = call->row->unit;
+    char digits[NUMBER_LEN], text[NUMBER_LEN + 8];
+    command_format_fixed(digits, sizeof digits, value, unit->decimals);
+    snprintf(text, sizeof text, "%s%s%s", digits, unit->name[0] != '\0' ? " " : "", unit->name);
+    refuse(call, number, text, min, max, with);
+}
+
+static void refuse_fraction(struct command_call *call, const char *value)
+{
+    const struct command_unit *unit = call->row->unit;
+    char finest[NUMBER_LEN];
+    command_format_fixed(finest, sizeof finest, 1, unit->decimals);
+    if (unit->decimals == 0)
+        command_fail(call, CMD_E_RANGE, "%s %s, allowed whole numbers%s%s", call->row->header, value,
+                     unit->name[0] != '\0' ? " of " : "", unit->name);
+    else
+        command_fail(call, CMD_E_RANGE, "%s %s, allowed multiples of %s %s", call->row->header, value, finest,
+                     unit->name);
+}
+
+int command_value_in_range(struct command_call *call, int64_t min, int64_t max, int64_t *value)
+{
+    char clip[COMMAND_CLIP_LEN];
+    command_clip(clip, call->param, strlen(call->param));
+    const enum command_fit fit =
+        command_decimal_to_int(&call->value.decimal, call->value.shift + call->row->unit->decimals, value);
+    if (fit == COMMAND_FIT_EXACT && *value >= min && *value <= max) return 0;
+    if (fit == COMMAND_FIT_FINE)
+        refuse_fraction(call, clip);
+    else if (fit == COMMAND_FIT_BIG)
+        refuse(call, CMD_E_RANGE, clip, min, max, "");
+    else
+        refuse_number(call, CMD_E_RANGE, *value, min, max, "");
+    return -1;
+}
+
+/* Against the other setting; the profile's range was checked before. */
+static int check_other(struct command_call *call, int64_t value)
+{
+    int64_t min, max;
+    current_range(call, &min, &max);
+    if (value >= min && value <= max) return 0;
+    const char *other = call->row->setting->other;
+    char with[NUMBER_LEN + 24] = "", number[NUMBER_LEN];
+    if (other != NULL) {
+        command_format_fixed(number, sizeof number, read_other(call), call->row->unit->decimals);
+        snprintf(with, sizeof with, " as %s is %s", other, number);
+    }
+    refuse_number(call, CMD_E_SETTINGS, value, min, max, with);
+    return -1;
+}
+
+void command_setting_change(struct command_call *call)
+{
+    const struct command_setting *setting = call->row->setting;
+    int64_t value;
+    if (call->value.kind == COMMAND_VALUE_WORD)
+        value = call->value.word;
+    else if (call->value.kind != COMMAND_VALUE_NUMBER)
+        value = special_value(call);
+    else if (command_value_in_range(call, read_bound(call, &setting->min), read_bound(call, &setting->max), &value) !=
+             0)
+        return;
+    if (check_other(call, value) != 0) return;
+    const enum head_state state = call->dev->state;
+    const int in_scan = state == HEAD_SPIN_UP || state == HEAD_SCANNING;
+    if (setting->not_in_scan && in_scan &&
+        value != read_field(&call->dev->settings, setting->offset, setting->is_u32)) {
+        command_fail(call, CMD_E_SETTINGS, "%s can't change in state %s", call->row->header, head_state_name(state));
+        return;
+    }
+    write_field(&call->dev->settings, setting->offset, setting->is_u32, value);
+    call->out->effect = COMMAND_SETTINGS;
+    command_reply(call, "OK");
+}

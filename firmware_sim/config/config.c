@@ -1,0 +1,106 @@
+/* config_load: file, --set, profile, defaults, checks, in this order; and the reference. */
+#include "firmware_sim/config/table.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static int fail_missing(const struct cfg_reader *rd, const struct cfg_key *key, uint32_t item)
+{
+    char allowed[CFG_ALLOWED_MAX];
+    return cfg_fail_key(rd, key->path, item, "missing, and it has no default; %s", cfg_allowed(key, allowed));
+}
+
+static int fill_one(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item,
+                    const struct config_profile *profile)
+{
+    if (rd->line[cfg_row(rd, key)][item] != 0) return SH_OK;
+    if (key->def == NULL) return fail_missing(rd, key, item);
+    if (key->def[0] == '\0') return SH_OK; /* an empty text; the struct starts as zeros */
+    if (key->def[0] != '@') return cfg_store(rd, key, item, rd->root_line, key->def, "");
+    const struct cfg_key *figure = cfg_find(&cfg_profile_table, key->def + 1);
+    memcpy(cfg_address(rd, key, item), (const char *)profile + figure->offset, key->size);
+    return SH_OK;
+}
+
+int cfg_fill_defaults(struct cfg_reader *rd, const struct config_profile *profile)
+{
+    for (size_t i = 0; i < rd->table.n; i++) {
+        const struct cfg_key *key = &rd->table.keys[i], *list = cfg_list_of(&rd->table, key);
+        if (key->type == CFG_MAP) continue;
+        if (key->type == CFG_LIST) {
+            if (*cfg_list_count(rd, key) < key->min) return fail_missing(rd, key, 0);
+            continue;
+        }
+        uint32_t n = list != NULL ? *cfg_list_count(rd, list) : 1;
+        for (uint32_t item = 0; item < n; item++) {
+            int code = fill_one(rd, key, item, profile);
+            if (code != SH_OK) return code;
+        }
+    }
+    return SH_OK;
+}
+
+int config_load(const char *path, const char *const *sets, int n_sets, struct config *cfg, struct sh_err *err)
+{
+    struct cfg_reader rd;
+    memset(cfg, 0, sizeof *cfg);
+    if (strlen(path) >= sizeof cfg->file)
+        return sh_fail(err, SH_EINPUT, "%.100s...: path too long; allowed up to %zu bytes", path, sizeof cfg->file - 1);
+    snprintf(cfg->file, sizeof cfg->file, "%s", path);
+    cfg_reader_init(&rd, cfg->file, &cfg_config_table, cfg, err);
+    int code = cfg_read_file(&rd);
+    for (int i = 0; i < n_sets && code == SH_OK; i++)
+        code = cfg_apply_set(&rd, sets[i]);
+    if (code == SH_OK) code = cfg_load_profile(&rd, cfg);
+    if (code == SH_OK) code = cfg_fill_defaults(&rd, &cfg->profile);
+    if (code == SH_OK) code = cfg_check(&rd, cfg);
+    return code;
+}
+
+/* ---- the reference */
+
+static const char *type_name(const struct cfg_key *key)
+{
+    static const char *const names[] = {
+        [CFG_MAP] = "section",       [CFG_LIST] = "list",          [CFG_BOOL] = "switch",
+        [CFG_ENUM] = "word",         [CFG_COUNT] = "whole number", [CFG_MICRO] = "number, exact to 1e-6",
+        [CFG_REAL] = "number",       [CFG_TEXT] = "text",          [CFG_PATH] = "path",
+        [CFG_VEC3] = "three numbers"};
+    return names[key->type];
+}
+
+static void print_key(const struct cfg_key *key, FILE *out)
+{
+    char allowed[CFG_ALLOWED_MAX];
+    fprintf(out, "%s\n    %s", key->path, type_name(key));
+    if (key->type != CFG_MAP) {
+        if (key->unit != NULL) fprintf(out, ", %s", key->unit);
+        fprintf(out, "; %s", cfg_allowed(key, allowed));
+        if (key->def == NULL && (key->type != CFG_LIST || key->min > 0))
+            fputs("; required", out);
+        else if (key->def != NULL && key->def[0] == '@')
+            fprintf(out, "; default %s of the profile", key->def + 1);
+        else if (key->def != NULL && key->def[0] != '\0')
+            fprintf(out, "; default %s", key->def);
+        else
+            fputs("; optional", out);
+    }
+    fprintf(out, "\n    %s\n", key->help);
+}
+
+void config_print_reference(FILE *out)
+{
+    fputs("Configuration, YAML. Any key can be set with --set KEY=VALUE (elements as in "
+          "stations[0].name=gate; the\n"
+          "index after the last one appends). Numbers are decimal, as in 300000, 0.5 or 1.2e6, without a "
+          "unit.\n"
+          "Relative paths start at the file they stand in; in --set, at the working directory.\n\n",
+          out);
+    for (size_t i = 0; i < cfg_config_table.n; i++)
+        print_key(&cfg_config_table.keys[i], out);
+    fputs("\nHead profile, heads/NAME.yaml. maker and model are texts; each figure is written\n"
+          "{ value: V, from: data sheet } or { value: V, from: assumed }.\n\n",
+          out);
+    for (size_t i = 0; i < cfg_profile_table.n; i++)
+        print_key(&cfg_profile_table.keys[i], out);
+}

@@ -1,0 +1,285 @@
+/* The configuration: YAML through libyaml's document API and one table (config_table*.c) of key, type, unit, default,
+ * range and help, which alone gives parsing, defaults, errors, `--help` text and the reference.
+ *
+ * Units: as the key's name says (hz, deg, m). Everything is checked; an error is one line:
+ *   FILE:LINE: KEY: what is wrong; what is allowed
+ * Unknown keys, duplicate keys, trailing text ("30 kHz"), NaN, wrong types and values out of range are errors.
+ * Relative paths in a file are relative to that file; in --set, to the working directory. */
+#ifndef FIRMWARE_SIM_CONFIG_CONFIG_H
+#define FIRMWARE_SIM_CONFIG_CONFIG_H
+
+#include <stdint.h>
+#include <stdio.h>
+
+#include "core/footprint.h"
+#include "core/detect.h"
+#include "core/err.h"
+#include "core/georef.h"
+#include "core/line.h"
+#include "core/scene.h"
+#include "core/schedule.h"
+#include "core/surface.h"
+#include "drivers/link/link.h"
+#include "firmware_sim/command/head.h"
+
+enum {
+    CONFIG_MAX_MESHES = 64,
+    CONFIG_MAX_LINKS = 8,
+    CONFIG_MAX_STATIONS = 64,
+    CONFIG_MAX_SURFACES = 64,
+    CONFIG_MAX_STOPS = 4096,
+    CONFIG_PATH_LEN = 512
+};
+
+enum config_heights { HEIGHTS_ELLIPSOID, HEIGHTS_GEOID, HEIGHTS_AUTO };
+/* What the head speaks on a link (link_spec.protocol). */
+enum config_protocol { PROTOCOL_NATIVE, PROTOCOL_NMEA };
+enum config_pace { PACE_REALTIME, PACE_FAST, PACE_STEP };
+
+/* A head profile, config/heads/NAME.yaml: each figure is written `{ value: V, from: data sheet|assumed }`. */
+struct config_profile {
+    char name[32], maker[32], model[64];
+    int64_t prr_min_uhz, prr_max_uhz, lines_min_uhz, lines_max_uhz, pan_max_udeg_s;
+    int64_t fov_min_udeg, fov_max_udeg; /* line angle: 0 forward, 90 up, above 90 backward over the zenith */
+    int64_t pan_min_udeg, pan_max_udeg;
+    uint32_t facets;     /* lines per turn of the mirror */
+    double optical_gain; /* beam degrees per mirror degree: 2 polygon, 1 45-degree mirror */
+    double range_min_m, range_max_m;
+    double range_sigma_m, range_sigma_ppm; /* one sigma of the range noise: fixed part, and part per distance */
+    double range_sigma_at_m, range_sigma_reflectance, range_sigma_floor_m; /* where the fixed part holds; its floor */
+    double mirror_sigma_deg, pan_sigma_deg;                                /* one sigma of the angle noise */
+    struct config_reach {
+        double reflectance, range_m;
+        enum config_from { FROM_DATA_SHEET, FROM_ASSUMED } from;
+    } reach[DETECT_MAX_REACHES];
+    uint32_t n_reaches; /* 0: range_max_m on 90 % */
+    double threshold_snr, overlap_m, wavelength_nm, visibility_m, pulse_width_ns;
+    double mirror_counts, pan_counts;        /* encoder counts per turn of the beam angle; 0: ideal (2^32 counts) */
+    double beam_exit_m, beam_divergence_rad; /* core/footprint.h */
+    uint32_t max_echoes;
+    double boot_s, spin_up_s, spin_down_s;
+};
+
+struct config_mesh {
+    char file[CONFIG_PATH_LEN];
+    enum scene_up up;
+    double scale, offset_m[3];
+    /* Motion, at time t of the scan: turned by turn_deg_s * t about the vertical through pivot_m, clockwise seen from
+     * above, then shifted by move_m_s * t; with cycle_s, forth and back. All zero: the mesh stands still. */
+    double move_m_s[3], turn_deg_s, pivot_m[3], cycle_s;
+};
+
+/* How the scene lies on the Earth; core/geoframe.h. */
+enum config_anchor_source { ANCHOR_NONE, ANCHOR_EXPLICIT, ANCHOR_IFC, ANCHOR_UTM, ANCHOR_ECEF };
+struct config_anchor {
+    enum config_anchor_source source;
+    double origin_m[3], lat_deg, lon_deg, height_m, north_deg;
+    uint32_t utm_zone; /* 0: UPS */
+    int north;         /* hemisphere */
+    int height_given;  /* ifc: height_m stands in for RefElevation */
+};
+
+/* In which form a station's place on the Earth is given. */
+enum config_place { PLACE_NONE, PLACE_GEODETIC, PLACE_UTM, PLACE_ECEF };
+
+struct config_station {
+    char name[32];
+    double position_m[3];                    /* of the head's origin in the scene frame */
+    int has_position;                        /* 0: it follows from the place on the Earth, through the anchor */
+    double heading_deg, pitch_deg, roll_deg; /* cast_attitude */
+    double instrument_height_m;              /* of the head's origin above the floor below position_m */
+    int has_instrument_height;
+    enum config_place place;
+    double lat_deg, lon_deg, height_m; /* of the head's origin; height_m also with PLACE_UTM */
+    uint32_t utm_zone;                 /* 0: UPS */
+    int north;                         /* hemisphere */
+    double easting_m, northing_m;
+    double ecef_m[3];
+};
+
+enum config_platform_kind { PLATFORM_STATIC, PLATFORM_TRAJECTORY, PLATFORM_LIVE, PLATFORM_STOPS };
+enum config_at_end { PLATFORM_STOP, PLATFORM_HOLD };
+
+/* What the head stands on. Attitudes as core/pose.h has them. */
+struct config_platform {
+    enum config_platform_kind kind;
+    char file[CONFIG_PATH_LEN], waypoints[CONFIG_PATH_LEN]; /* trajectory, stops: one of them */
+    double start_s, end_s;                                  /* part of the trajectory, after its first sample */
+    int has_end;                                            /* 0: to its last sample */
+    double step_s;                                          /* stops: from each to the next */
+    enum config_at_end at_end;
+    double mount_m[3], mount_heading_deg, mount_pitch_deg, mount_roll_deg; /* of the head on the platform */
+    double reach_m, extrapolate_ms;                                        /* live */
+    char address[64];
+    uint32_t port; /* live, in real time: UDP; 0: the system chooses */
+};
+
+/* The head moves while it scans. */
+static inline int config_head_moves(const struct config_platform *platform)
+{
+    return platform->kind == PLATFORM_TRAJECTORY || platform->kind == PLATFORM_LIVE;
+}
+
+/* Time of day (head_clock.h). */
+struct config_time {
+    char epoch[40]; /* of power-up: none, utc, tai, or a date as 2026-01-01T00:00:00Z */
+    double offset_s, drift_ppm, jump_s, jump_at_s;
+};
+
+/* The GNSS receiver (gnss.h). */
+struct config_gnss {
+    uint32_t rate_hz; /* 1, 2, 4, 5, 10, 20 */
+    enum config_talker { TALKER_GN, TALKER_GP } talker;
+    uint32_t quality; /* as in GGA: 0, 1, 2, 4, 5 */
+    uint32_t satellites;
+    double hdop, accuracy_m, geoid_separation_m;
+    double lever_arm_m[3]; /* of the antenna from the head's origin, in the head's frame */
+};
+
+enum config_range_noise { RANGE_NOISE_OFF, RANGE_NOISE_ON, RANGE_NOISE_SIGNAL, RANGE_NOISE_FALSE, RANGE_NOISE_TRUE };
+
+/* Ball-shaped noise; detect_ball. */
+struct config_ball {
+    double radius_m, factor[3], distance_1_m;
+    int local;
+    uint64_t seed; /* noise.seed where it is not given */
+};
+
+struct config_signal {
+    int on, sharp;
+    double reflectance; /* of surfaces of which nothing is said */
+    double visibility_m, extinction_1_km;
+    int has_extinction; /* else by visibility_m; 0 there: the data sheet's day */
+};
+
+/* Instrument errors; core/instrument.h. */
+struct config_instrument {
+    double collimation_deg, trunnion_deg, transit_offset_m, mirror_offset_m;
+    double mirror_index_deg, mirror_scale_ppm, mirror_eccentricity_deg, mirror_phase_deg;
+    double pan_index_deg, pan_scale_ppm, pan_eccentricity_deg, pan_phase_deg;
+    double range_offset_m, range_scale_ppm;
+};
+
+enum config_choice { CHOICE_AUTO, CHOICE_OFF, CHOICE_ON, CHOICE_FALSE, CHOICE_TRUE };
+
+/* Settings at power-up, within the profile (checked). */
+struct config_head {
+    struct head_settings settings;
+    char serial[32];
+    enum detect_ambiguity ambiguity;
+    uint32_t mta_zones;
+};
+
+struct config_scene {
+    struct config_mesh mesh[CONFIG_MAX_MESHES];
+    uint32_t n_meshes;
+    double tolerance_m;
+    enum config_choice order_exactly; /* surfaces that overlap are ordered in double; auto, off or on once loaded */
+    struct config_anchor anchor;
+};
+
+struct config_output {
+    enum georef_crs crs;
+    int utm_zone;
+    enum line_layout layout;
+    int layout_given; /* 0: the default */
+    enum config_heights heights;
+    enum georef_method georef; /* GEOREF_AUTO: as the plan says */
+    double tolerance_m;        /* largest error of a georeferenced position */
+    int attributes;            /* amplitude and width of each echo go out behind the points */
+    double scale_m;            /* 0: the finest of 1e-6 x 10^n m that holds range_max_m in 31 bits */
+};
+
+struct config_beam {
+    enum beam_mode mode;
+    int measures; /* no key: `plan` casts footprints to measure what a forced beam is off, be it single rays */
+    uint32_t rings;
+};
+
+struct config_cast {
+    enum config_choice refine; /* auto, off or on once it is loaded */
+};
+
+/* Tolerances of the plan. */
+struct config_plan {
+    double tolerance_m, echo_tolerance;
+    int tolerance_given; /* 0: the default */
+};
+
+struct config_noise {
+    enum config_range_noise range; /* off, on or signal once it is loaded */
+    int angle;
+    uint64_t seed;
+    struct config_ball ball;
+};
+
+struct config_optics {
+    uint32_t depth;
+    int depth_given; /* 0: as the plan says, up to depth */
+};
+
+struct config_loop {
+    double tick_hz; /* 100..10000, a divisor of 1e9 */
+    double ahead_ms, queue_ms, late_ms;
+    uint32_t threads; /* casters; 0: one per processor */
+    enum config_pace pace;
+};
+
+/* A member a section of the file. */
+struct config {
+    char file[CONFIG_PATH_LEN];
+    char profile_file[CONFIG_PATH_LEN];
+    struct config_profile profile;
+    struct config_head head;
+    struct config_scene scene;
+    struct config_station station[CONFIG_MAX_STATIONS];
+    uint32_t n_stations;
+    struct config_platform platform;
+    struct config_output output;
+    struct link_spec link[CONFIG_MAX_LINKS];
+    uint32_t n_links;
+    struct config_beam beam;
+    struct config_cast cast;
+    struct config_plan plan;
+    struct config_noise noise;
+    struct config_signal signal;
+    struct surface_rule surface[CONFIG_MAX_SURFACES];
+    uint32_t n_surfaces;
+    struct config_optics optics;
+    struct config_instrument instrument;
+    struct config_loop loop;
+    struct config_time time;
+    struct config_gnss gnss;
+};
+
+/* Reads path, its profile, then the `key=value` settings in order (as from --set, each checked the same way, named
+ * `--set KEY` in errors). On failure cfg is unspecified. cfg is large: allocate it. */
+int config_load(const char *path, const char *const *sets, int n_sets, struct config *cfg, struct sh_err *err);
+
+/* Whether pulses are followed through glass or off mirrors. */
+int config_has_optics(const struct config *cfg);
+
+/* What a profile says about the signal; the rest of it (sharp, extinction, seed) is 0. */
+void config_signal_spec(const struct config_profile *profile, struct detect_signal_spec *spec);
+
+/* The schedule of a head with some settings. */
+void config_fill_spec(const struct config_profile *profile, const struct head_settings *settings,
+                      struct schedule_spec *spec);
+
+/* Whether anything in the scene, or the head, moves. */
+int config_moves(const struct config *cfg);
+/* True when all beams begin at one place of a scene that stands still: what an adaptive beam needs. */
+int config_beam_fixed(const struct config *cfg);
+
+/* The reference: every key with type, unit, default, range and help. */
+void config_print_reference(FILE *out);
+
+/* The profiles in a directory, one line each (name, model, what is data sheet and what is assumed). Returns how many.
+ * dir NULL: the first directory of the lookup below that exists, without a configuration. */
+int config_list_profiles(const char *dir, FILE *out, struct sh_err *err);
+
+/* Finds the directory of profiles: $SCANHEAD_HEADS, beside the configuration (heads/), beside the program (installed or
+ * in its build folder), or config/heads here. A profile is named by `head.profile: NAME`, looked up there, or by a path
+ * that ends in .yaml. */
+
+#endif

@@ -1,0 +1,106 @@
+/* Noise, signal and surfaces: what concerns more than one key. */
+#include "firmware_sim/config/table.h"
+
+#include <math.h>
+#include <string.h>
+
+static const double WHITE = 0.9; /* what a data sheet's largest range is given for */
+
+void config_signal_spec(const struct config_profile *p, struct detect_signal_spec *spec)
+{
+    *spec = (struct detect_signal_spec){.n_reaches = p->n_reaches,
+                                        .threshold_snr = p->threshold_snr,
+                                        .overlap_m = p->overlap_m,
+                                        .sigma_m = p->range_sigma_m,
+                                        .sigma_at_m = p->range_sigma_at_m,
+                                        .sigma_reflectance = p->range_sigma_reflectance,
+                                        .sigma_floor_m = p->range_sigma_floor_m,
+                                        .sigma_ppm = p->range_sigma_ppm};
+    for (uint32_t i = 0; i < p->n_reaches; i++)
+        spec->reach[i] = (struct detect_reach){p->reach[i].reflectance, p->reach[i].range_m};
+    if (p->n_reaches != 0) return;
+    spec->n_reaches = 1;
+    spec->reach[0] = (struct detect_reach){WHITE, p->range_max_m};
+}
+
+int cfg_check_reaches(const struct cfg_reader *rd, const struct config_profile *profile)
+{
+    struct detect_signal_spec spec;
+    struct detect_signal signal;
+    struct sh_err why;
+    if (profile->range_sigma_floor_m > profile->range_sigma_m)
+        return cfg_fail_key(rd, "range_sigma_floor_m", 0, "above range_sigma_m; allowed at most that");
+    config_signal_spec(profile, &spec);
+    if (detect_signal_set_up(&spec, &signal, &why) != SH_OK)
+        return cfg_fail_key(rd, "reaches", 0,
+                            "%.200s; allowed ranges that rise with the reflectance, and not faster than its "
+                            "square root",
+                            why.text);
+    return SH_OK;
+}
+
+int config_has_optics(const struct config *cfg)
+{
+    int optics = 0;
+    for (uint32_t i = 0; i < cfg->n_surfaces; i++)
+        optics |= cfg->surface[i].surface.glass > 0.0 || cfg->surface[i].surface.mirror > 0.0;
+    return optics && cfg->optics.depth > 0;
+}
+
+/* What is not given is not said. */
+static void mark_unsaid(const struct cfg_reader *rd, uint32_t i, struct surface *s)
+{
+    const struct {
+        const char *path;
+        double *value;
+    } figures[] = {{"surfaces[].reflectance", &s->reflectance},
+                   {"surfaces[].specular", &s->specular},
+                   {"surfaces[].gloss", &s->gloss},
+                   {"surfaces[].retro", &s->retro},
+                   {"surfaces[].glass", &s->glass},
+                   {"surfaces[].mirror", &s->mirror}};
+    for (size_t k = 0; k < sizeof figures / sizeof figures[0]; k++)
+        if (!cfg_is_given(rd, figures[k].path, i)) *figures[k].value = (double)NAN;
+    if (isnan(s->gloss)) s->gloss = 100.0;
+}
+
+static int check_surface(const struct cfg_reader *rd, uint32_t i, const struct surface *s)
+{
+    double sum = s->reflectance + s->specular + s->glass + s->mirror;
+    if (s->glass > 0.0 && s->mirror > 0.0)
+        return cfg_fail_key(rd, "surfaces[].mirror", i, "glass and a mirror at once; allowed either glass or mirror");
+    if (sum > 1.0 + 1e-9)
+        return cfg_fail_key(rd, "surfaces[]", i,
+                            "reflectance, specular, glass and mirror add up to %.10g; allowed at most 1", sum);
+    return SH_OK;
+}
+
+static int check_noise(const struct cfg_reader *rd, struct config *cfg)
+{
+    if (cfg->noise.range == RANGE_NOISE_FALSE) cfg->noise.range = RANGE_NOISE_OFF;
+    if (cfg->noise.range == RANGE_NOISE_TRUE) cfg->noise.range = RANGE_NOISE_ON;
+    if (!cfg_is_given(rd, "noise.ball.seed", 0)) cfg->noise.ball.seed = cfg->noise.seed;
+    if (cfg->noise.range == RANGE_NOISE_SIGNAL && !cfg->signal.on)
+        return cfg_fail_key(rd, "noise.range", 0, "signal, but there is none; allowed with signal.model: on");
+    if (cfg->noise.angle && cfg->profile.mirror_sigma_deg == 0.0 && cfg->profile.pan_sigma_deg == 0.0)
+        return cfg_fail_key(rd, "noise.angle", 0,
+                            "head profile %s gives no angle noise; required is mirror_sigma_deg or pan_sigma_deg there",
+                            cfg->profile.name);
+    if (cfg->noise.ball.radius_m > 0.0 && !cfg->noise.ball.local && cfg->platform.kind != PLATFORM_STATIC)
+        return cfg_fail_key(rd, cfg_is_given(rd, "noise.ball.axes", 0) ? "noise.ball.axes" : "noise.ball.radius_m", 0,
+                            "axes of the scene on a platform that moves; allowed axes: beam");
+    return SH_OK;
+}
+
+int cfg_check_signal(const struct cfg_reader *rd, struct config *cfg)
+{
+    int code = check_noise(rd, cfg);
+    cfg->signal.has_extinction = cfg_is_given(rd, "signal.extinction_1_km", 0);
+    if (code == SH_OK && cfg->signal.has_extinction && cfg_is_given(rd, "signal.visibility_m", 0))
+        code = cfg_fail_key(rd, "signal.extinction_1_km", 0, "and visibility_m at once; allowed one of them");
+    for (uint32_t i = 0; i < cfg->n_surfaces && code == SH_OK; i++) {
+        code = check_surface(rd, i, &cfg->surface[i].surface);
+        mark_unsaid(rd, i, &cfg->surface[i].surface);
+    }
+    return code;
+}

@@ -1,0 +1,139 @@
+/* Keys that say where things are on the Earth: the scene's anchor, and each station in one of several forms. */
+#include "firmware_sim/config/table.h"
+
+#include <stdio.h>
+#include <string.h>
+
+/* "required, allowed ..." of a key that is missing, after why. */
+static int fail_required(const struct cfg_reader *rd, const char *path, uint32_t item, const char *why)
+{
+    char allowed[CFG_ALLOWED_MAX];
+    return cfg_fail_key(rd, path, item, "missing, and %s; required, %s", why,
+                        cfg_allowed(cfg_find(&rd->table, path), allowed));
+}
+
+static int check_anchor(const struct cfg_reader *rd, struct config *cfg)
+{
+    enum { IN_EXPLICIT = 1u << ANCHOR_EXPLICIT, IN_IFC = 1u << ANCHOR_IFC, IN_UTM = 1u << ANCHOR_UTM };
+    static const struct {
+        const char *path;
+        unsigned taken, required; /* bits of sources */
+    } keys[] = {
+        {"scene.anchor.origin_m", IN_EXPLICIT, 0},
+        {"scene.anchor.lat_deg", IN_EXPLICIT, IN_EXPLICIT},
+        {"scene.anchor.lon_deg", IN_EXPLICIT, IN_EXPLICIT},
+        {"scene.anchor.height_m", IN_EXPLICIT | IN_IFC, IN_EXPLICIT},
+        {"scene.anchor.north_deg", IN_EXPLICIT, 0},
+        {"scene.anchor.utm_zone", IN_UTM, IN_UTM},
+        {"scene.anchor.hemisphere", IN_UTM, IN_UTM},
+    };
+    static const char *const has[] = {[ANCHOR_NONE] = "source alone",
+                                      [ANCHOR_EXPLICIT] = "origin_m, lat_deg, lon_deg, height_m, north_deg",
+                                      [ANCHOR_IFC] = "height_m",
+                                      [ANCHOR_UTM] = "utm_zone, hemisphere",
+                                      [ANCHOR_ECEF] = "source alone"};
+    const char *source = cfg_find(&rd->table, "scene.anchor.source")->names[cfg->scene.anchor.source];
+    char why[64];
+    for (size_t k = 0; k < CFG_LEN(keys); k++) {
+        int given = cfg_is_given(rd, keys[k].path, 0);
+        if (given && !(keys[k].taken & 1u << cfg->scene.anchor.source))
+            return cfg_fail_key(rd, keys[k].path, 0, "an anchor of source %s has no such key; allowed %s", source,
+                                has[cfg->scene.anchor.source]);
+        snprintf(why, sizeof why, "the anchor's source is %s", source);
+        if (!given && (keys[k].required & 1u << cfg->scene.anchor.source)) return fail_required(rd, keys[k].path, 0, why);
+    }
+    cfg->scene.anchor.height_given = cfg_is_given(rd, "scene.anchor.height_m", 0);
+    return SH_OK;
+}
+
+/* Keys of the forms; height_m is part of two. */
+static const struct {
+    const char *path;
+    enum config_place place;
+} form_keys[] = {
+    {"stations[].lat_deg", PLACE_GEODETIC}, {"stations[].lon_deg", PLACE_GEODETIC},
+    {"stations[].utm_zone", PLACE_UTM},     {"stations[].hemisphere", PLACE_UTM},
+    {"stations[].easting_m", PLACE_UTM},    {"stations[].northing_m", PLACE_UTM},
+    {"stations[].ecef_m", PLACE_ECEF},
+};
+
+/* Which form is given, and that it is one. */
+static int find_form(const struct cfg_reader *rd, struct config_station *station, uint32_t i)
+{
+    const char *first = NULL;
+    station->place = PLACE_NONE;
+    for (size_t k = 0; k < CFG_LEN(form_keys); k++) {
+        if (!cfg_is_given(rd, form_keys[k].path, i)) continue;
+        if (first != NULL && station->place != form_keys[k].place)
+            return cfg_fail_key(
+                rd, form_keys[k].path, i,
+                "together with %s; allowed one of lat_deg with lon_deg, easting_m with northing_m, ecef_m",
+                strrchr(first, '.') + 1);
+        first = form_keys[k].path;
+        station->place = form_keys[k].place;
+    }
+    if (!cfg_is_given(rd, "stations[].height_m", i)) return SH_OK;
+    if (station->place == PLACE_ECEF)
+        return cfg_fail_key(rd, "stations[].height_m", i, "ecef_m says the height, too; allowed one of them");
+    if (station->place == PLACE_NONE) station->place = PLACE_GEODETIC;
+    return SH_OK;
+}
+
+/* A form is whole. Zone and hemisphere may come from an anchor in UTM. */
+static int complete_form(const struct cfg_reader *rd, const struct config *cfg, struct config_station *station,
+                         uint32_t i)
+{
+    static const char *const why[] = {[PLACE_GEODETIC] = "lat_deg, lon_deg and height_m go together",
+                                      [PLACE_UTM] = "utm_zone, hemisphere, easting_m, northing_m, height_m go together",
+                                      [PLACE_ECEF] = ""};
+    int from_anchor = cfg->scene.anchor.source == ANCHOR_UTM;
+    for (size_t k = 0; k < CFG_LEN(form_keys); k++) {
+        const char *path = form_keys[k].path;
+        if (form_keys[k].place != station->place || cfg_is_given(rd, path, i)) continue;
+        if (from_anchor && strcmp(path, "stations[].utm_zone") == 0)
+            station->utm_zone = cfg->scene.anchor.utm_zone;
+        else if (from_anchor && strcmp(path, "stations[].hemisphere") == 0)
+            station->north = cfg->scene.anchor.north;
+        else
+            return fail_required(rd, path, i, why[station->place]);
+    }
+    int has_height = station->place == PLACE_GEODETIC || station->place == PLACE_UTM;
+    if (has_height && !cfg_is_given(rd, "stations[].height_m", i))
+        return fail_required(rd, "stations[].height_m", i, why[station->place]);
+    return SH_OK;
+}
+
+/* Without an anchor: where it is in the scene, and for a CRS where on the Earth. With one: either, the other follows.
+ */
+static int check_station(const struct cfg_reader *rd, const struct config *cfg, struct config_station *station,
+                         uint32_t i)
+{
+    int code = find_form(rd, station, i);
+    int anchored = cfg->scene.anchor.source != ANCHOR_NONE, nowhere = station->place == PLACE_NONE;
+    station->has_position = cfg_is_given(rd, "stations[].position_m", i);
+    station->has_instrument_height = cfg_is_given(rd, "stations[].instrument_height_m", i);
+    if (code == SH_OK && !nowhere) code = complete_form(rd, cfg, station, i);
+    if (code != SH_OK) return code;
+    if (!station->has_position && (!anchored || nowhere))
+        return fail_required(rd, "stations[].position_m", i,
+                             anchored ? "no place on the Earth is given either"
+                                      : "there is no scene.anchor to find it");
+    if (anchored && station->has_position && !nowhere)
+        return cfg_fail_key(
+            rd, "stations[].position_m", i,
+            "together with a place on the Earth, and scene.anchor gives one from the other; allowed one "
+            "of them");
+    if (!anchored && nowhere && cfg->output.crs != GEOREF_LOCAL)
+        return fail_required(rd, "stations[].lat_deg", i, "output.crs is not local and there is no scene.anchor");
+    if (!anchored && nowhere && cfg_nmea_link(cfg) >= 0)
+        return fail_required(rd, "stations[].lat_deg", i, "a link has the protocol nmea and there is no scene.anchor");
+    return SH_OK;
+}
+
+int cfg_check_places(const struct cfg_reader *rd, struct config *cfg)
+{
+    int code = check_anchor(rd, cfg);
+    for (uint32_t i = 0; i < cfg->n_stations && code == SH_OK; i++)
+        code = check_station(rd, cfg, &cfg->station[i], i);
+    return code;
+}

@@ -1,0 +1,250 @@
+/* Head profiles: where they are, reading one, listing them. */
+#include "firmware_sim/config/table.h"
+
+#include <dirent.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { MAX_DIRS = 6 };
+
+struct profile_dirs {
+    char dir[MAX_DIRS][CONFIG_PATH_LEN];
+    int n;
+};
+
+/* Where an installed program, and one in its build folder, have the profiles: beside it. */
+static void find_beside_program(struct profile_dirs *dirs)
+{
+    static const char *const beside[] = {"../share/scanhead/heads", "../config/heads"};
+    char program[CONFIG_PATH_LEN];
+    ssize_t n = readlink("/proc/self/exe", program, sizeof program - 1);
+    if (n <= 0) return;
+    program[n] = '\0';
+    char *slash = strrchr(program, '/');
+    if (slash == NULL) return;
+    slash[1] = '\0';
+    for (int i = 0; i < 2; i++) {
+        int len = snprintf(dirs->dir[dirs->n], CONFIG_PATH_LEN, "%s%s", program, beside[i]);
+        if (len > 0 && len < CONFIG_PATH_LEN) dirs->n++;
+    }
+}
+
+static void find_dirs(const char *config_file, struct profile_dirs *dirs)
+{
+    const char *given = getenv("SCANHEAD_HEADS");
+    char base[CONFIG_PATH_LEN];
+    dirs->n = 0;
+    if (given != NULL && given[0] != '\0') snprintf(dirs->dir[dirs->n++], CONFIG_PATH_LEN, "%s", given);
+    if (config_file != NULL)
+        snprintf(dirs->dir[dirs->n++], CONFIG_PATH_LEN, "%.*sheads", CONFIG_PATH_LEN - 6,
+                 cfg_dir_of(config_file, base));
+    find_beside_program(dirs);
+    snprintf(dirs->dir[dirs->n++], CONFIG_PATH_LEN, "config/heads");
+}
+
+static int is_yaml(const char *name)
+{
+    size_t len = strlen(name);
+    return len > 5 && strcmp(name + len - 5, ".yaml") == 0;
+}
+
+static int is_profile(const struct dirent *entry)
+{
+    return is_yaml(entry->d_name) && entry->d_name[0] != '.';
+}
+
+/* Is name one of "a, b, c"? */
+static int is_listed(const char *list, const char *name)
+{
+    size_t len = strlen(name);
+    for (const char *p = list; (p = strstr(p, name)) != NULL; p += len)
+        if ((p == list || p[-1] == ' ') && (p[len] == ',' || p[len] == '\0')) return 1;
+    return 0;
+}
+
+/* "a, b, c": the profiles of all directories, as far as buf reaches. */
+static void known_profiles(const struct profile_dirs *dirs, char *buf, size_t len)
+{
+    size_t used = 0;
+    buf[0] = '\0';
+    for (int d = 0; d < dirs->n; d++) {
+        struct dirent **entries = NULL;
+        int n = scandir(dirs->dir[d], &entries, is_profile, alphasort);
+        for (int i = 0; i < n; i++) {
+            int stem = (int)strlen(entries[i]->d_name) - 5;
+            char name[sizeof entries[i]->d_name];
+            snprintf(name, sizeof name, "%.*s", stem, entries[i]->d_name);
+            if (used < len && !is_listed(buf, name))
+                used += (size_t)snprintf(buf + used, len - used, "%s%s", used > 0 ? ", " : "", name);
+            free(entries[i]);
+        }
+        if (n >= 0) free(entries);
+    }
+    if (used == 0) snprintf(buf, len, "none found");
+}
+
+/* ---- one profile */
+
+static int check_profile(const struct cfg_reader *rd, const struct config_profile *p)
+{
+    if (p->prr_min_uhz > p->prr_max_uhz)
+        return cfg_fail_key(rd, "prr_min_hz", 0, "above prr_max_hz; allowed at most prr_max_hz");
+    if (p->lines_min_uhz > p->lines_max_uhz)
+        return cfg_fail_key(rd, "lines_min_hz", 0, "above lines_max_hz; allowed at most lines_max_hz");
+    if (p->prr_max_uhz < p->lines_min_uhz)
+        return cfg_fail_key(rd, "prr_max_hz", 0, "below lines_min_hz; allowed at least a pulse per line");
+    if (p->fov_min_udeg >= p->fov_max_udeg)
+        return cfg_fail_key(rd, "fov_min_deg", 0, "not below fov_max_deg; allowed below fov_max_deg");
+    if (p->pan_min_udeg >= p->pan_max_udeg || p->pan_max_udeg - p->pan_min_udeg > 360000000)
+        return cfg_fail_key(rd, "pan_max_deg", 0, "allowed above pan_min_deg and at most 360 deg from it");
+    if (p->range_min_m >= p->range_max_m)
+        return cfg_fail_key(rd, "range_min_m", 0, "not below range_max_m; allowed below range_max_m");
+    double sweep_deg = 360.0 / p->facets * p->optical_gain,
+           fov_deg = (double)(p->fov_max_udeg - p->fov_min_udeg) * 1e-6;
+    if (sweep_deg > 360.0)
+        return cfg_fail_key(rd, "optical_gain", 0,
+                            "a sweep of 360 / facets * optical_gain is %.10g deg; allowed up to 360", sweep_deg);
+    /* Rounding of the quotient and the product is far below one micro-degree. */
+    if (fov_deg > sweep_deg + 1e-9)
+        return cfg_fail_key(rd, "fov_max_deg", 0,
+                            "a field of view of %.10g deg does not fit into a sweep; allowed up to %.10g deg, "
+                            "360 / facets * optical_gain",
+                            fov_deg, sweep_deg);
+    return cfg_check_reaches(rd, p);
+}
+
+/* The file's name is the profile's: two names could differ. */
+static int name_profile(const struct cfg_reader *rd, struct config_profile *profile)
+{
+    const char *slash = strrchr(rd->file, '/');
+    const char *base = slash == NULL ? rd->file : slash + 1;
+    size_t stem = strlen(base) - 5;
+    if (stem >= sizeof profile->name)
+        return sh_fail(rd->err, SH_EINPUT,
+                       "%s: the file's name is the profile's; allowed up to %zu characters and .yaml", rd->file,
+                       sizeof profile->name - 1);
+    for (size_t i = 0; i < stem; i++)
+        if ((unsigned char)base[i] <= 0x20 || (unsigned char)base[i] >= 0x7f)
+            return sh_fail(rd->err, SH_EINPUT, "%s: the file's name is the profile's; allowed printable ASCII",
+                           rd->file);
+    memcpy(profile->name, base, stem);
+    return SH_OK;
+}
+
+static int read_profile(struct cfg_reader *rd, const char *file, struct config_profile *profile, struct sh_err *err)
+{
+    memset(profile, 0, sizeof *profile);
+    cfg_reader_init(rd, file, &cfg_profile_table, profile, err);
+    int code = name_profile(rd, profile);
+    if (code == SH_OK) code = cfg_read_file(rd);
+    if (code == SH_OK) code = cfg_fill_defaults(rd, NULL);
+    if (code == SH_OK) code = check_profile(rd, profile);
+    return code;
+}
+
+/* ---- lookup */
+
+static int fail_lookup(struct cfg_reader *rd, struct config *cfg, const struct profile_dirs *dirs)
+{
+    char known[300], shown[CFG_SHOW_MAX];
+    known_profiles(dirs, known, sizeof known);
+    return cfg_fail_key(rd, "head.profile", 0, "no profile \"%s\"; allowed %s", cfg_show(cfg->profile_file, shown),
+                        known);
+}
+
+static int find_profile(struct cfg_reader *rd, struct config *cfg)
+{
+    struct profile_dirs dirs;
+    char path[2 * CONFIG_PATH_LEN], base[CONFIG_PATH_LEN];
+    int from_set = cfg_where(rd, cfg_find(&rd->table, "head.profile"), 0) == CFG_FROM_SET;
+    find_dirs(cfg->file, &dirs);
+    int by_path = is_yaml(cfg->profile_file);
+    if (!by_path && strchr(cfg->profile_file, '/') != NULL) return fail_lookup(rd, cfg, &dirs);
+    for (int i = 0; i < (by_path ? 1 : dirs.n); i++) {
+        if (!by_path)
+            snprintf(path, sizeof path, "%s/%s.yaml", dirs.dir[i], cfg->profile_file);
+        else
+            snprintf(path, sizeof path, "%s%s",
+                     from_set || cfg->profile_file[0] == '/' ? "" : cfg_dir_of(cfg->file, base), cfg->profile_file);
+        if (access(path, F_OK) != 0) continue;
+        if (strlen(path) >= sizeof cfg->profile_file)
+            return cfg_fail_key(rd, "head.profile", 0, "its path is too long; allowed up to %zu bytes",
+                                sizeof cfg->profile_file - 1);
+        memcpy(cfg->profile_file, path, strlen(path) + 1);
+        return SH_OK;
+    }
+    return fail_lookup(rd, cfg, &dirs);
+}
+
+int cfg_load_profile(struct cfg_reader *rd, struct config *cfg)
+{
+    int code = SH_OK;
+    if (cfg->profile_file[0] == '\0')
+        code = cfg_fail_key(rd, "head.profile", 0,
+                            "missing; required is the name of a profile, or a path that ends in .yaml");
+    if (code == SH_OK) code = find_profile(rd, cfg);
+    if (code != SH_OK) return code;
+    struct cfg_reader profile_rd;
+    return read_profile(&profile_rd, cfg->profile_file, &cfg->profile, rd->err);
+}
+
+/* ---- listing */
+
+static void print_figures(const struct cfg_reader *rd, int from, const char *label, FILE *out)
+{
+    int n = 0;
+    for (size_t i = 0; i < rd->table.n; i++)
+        if (rd->from[i] == from) fprintf(out, "%s%s", n++ == 0 ? label : ", ", rd->table.keys[i].path);
+}
+
+static int list_profile(const char *dir, const char *entry, FILE *out, struct sh_err *err)
+{
+    char path[2 * CONFIG_PATH_LEN];
+    struct cfg_reader rd;
+    struct config_profile profile;
+    snprintf(path, sizeof path, "%s/%s", dir, entry);
+    int code = read_profile(&rd, path, &profile, err);
+    if (code != SH_OK) return code;
+    fprintf(out, "%-16s %s %s", profile.name, profile.maker, profile.model);
+    print_figures(&rd, 1, "; data sheet: ", out);
+    print_figures(&rd, 2, "; assumed: ", out);
+    fputc('\n', out);
+    return SH_OK;
+}
+
+int config_list_profiles(const char *dir, FILE *out, struct sh_err *err)
+{
+    struct profile_dirs dirs;
+    if (dir == NULL) {
+        find_dirs(NULL, &dirs);
+        for (int i = 0; i < dirs.n && dir == NULL; i++)
+            if (access(dirs.dir[i], R_OK) == 0) dir = dirs.dir[i];
+        if (dir == NULL) return sh_fail(err, SH_EINPUT, "no directory of head profiles found; set SCANHEAD_HEADS");
+    }
+    struct dirent **entries = NULL;
+    int n = scandir(dir, &entries, is_profile, alphasort), code = SH_OK;
+    if (n < 0) return sh_fail(err, SH_EINPUT, "%s: cannot be read; a directory of head profiles is needed", dir);
+    for (int i = 0; i < n; i++) {
+        if (code == SH_OK) code = list_profile(dir, entries[i]->d_name, out, err);
+        free(entries[i]);
+    }
+    free(entries);
+    return code == SH_OK ? n : code;
+}
+
+void config_fill_spec(const struct config_profile *profile, const struct head_settings *s, struct schedule_spec *spec)
+{
+    *spec = (struct schedule_spec){.prr_uhz = s->prr_uhz,
+                                   .lines_uhz = s->lines_uhz,
+                                   .pan_udeg_s = s->pan_udeg_s,
+                                   .fov_min_udeg = profile->fov_min_udeg,
+                                   .sweep_udeg = llround(360e6 * profile->optical_gain / profile->facets),
+                                   .line_start_udeg = s->line_start_udeg,
+                                   .line_stop_udeg = s->line_stop_udeg,
+                                   .pan_start_udeg = s->pan_start_udeg,
+                                   .pan_stop_udeg = s->pan_stop_udeg,
+                                   .frames = s->frames};
+}

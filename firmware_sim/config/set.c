@@ -1,0 +1,106 @@
+/* --set KEY=VALUE: the same rows, one value at a time. */
+#include "firmware_sim/config/table.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct set {
+    char name[CFG_PATH_MAX]; /* as the user wrote it */
+    char path[CFG_PATH_MAX]; /* generic: "stations[].name" */
+    uint32_t item;
+    int has_item;
+};
+
+/* An element number, "[2]" or ".2", at p: its end, or NULL when there is none. Numbers above the lists'
+ * limits come out as CFG_MAX_ITEMS. */
+static const char *scan_item(const char *p, uint32_t *item)
+{
+    int bracket = *p == '[';
+    const char *q = p + 1;
+    if (*q < '0' || *q > '9') return NULL;
+    for (*item = 0; *q >= '0' && *q <= '9'; q++)
+        if (*item < CFG_MAX_ITEMS) *item = *item * 10 + (uint32_t)(*q - '0');
+    if (*item > CFG_MAX_ITEMS) *item = CFG_MAX_ITEMS;
+    if (bracket && *q++ != ']') return NULL;
+    return *q == '.' || *q == '\0' ? q : NULL;
+}
+
+/* "stations.0.name" and "stations[0].name" -> "stations[].name", 0 */
+static void to_generic(struct set *set)
+{
+    size_t used = 0;
+    for (const char *p = set->name; *p != '\0' && used + 3 < sizeof set->path;) {
+        uint32_t item;
+        const char *end = (*p == '[' || *p == '.') && !set->has_item ? scan_item(p, &item) : NULL;
+        if (end == NULL) {
+            set->path[used++] = *p++;
+            continue;
+        }
+        memcpy(set->path + used, "[]", 2);
+        used += 2;
+        set->item = item;
+        set->has_item = 1;
+        p = end;
+    }
+    set->path[used] = '\0';
+}
+
+static int fail_unknown(const struct cfg_reader *rd, struct set *set)
+{
+    char parent[CFG_PATH_MAX];
+    snprintf(parent, sizeof parent, "%s", set->path);
+    char *dot = strrchr(parent, '.');
+    const char *word = dot == NULL ? set->path : set->path + (dot - parent) + 1;
+    *(dot == NULL ? parent : dot) = '\0';
+    /* Below something that is no section nothing is known: then the top is listed. */
+    const struct cfg_key *section = cfg_find(&rd->table, parent);
+    if (parent[0] != '\0' && (section == NULL || section->type != CFG_MAP))
+        return cfg_fail_unknown(rd, CFG_FROM_SET, "", 0, set->name);
+    return cfg_fail_unknown(rd, CFG_FROM_SET, parent, set->item, word);
+}
+
+/* Makes sure that the element exists; the number after the last one appends. */
+static int reach_item(struct cfg_reader *rd, const struct set *set, const struct cfg_key *list)
+{
+    uint32_t *count = cfg_list_count(rd, list);
+    if (set->item < *count) return SH_OK;
+    uint32_t last = *count < (uint32_t)list->max ? *count : (uint32_t)list->max - 1;
+    if (set->item > last)
+        return cfg_fail(rd, CFG_FROM_SET, set->name, "%s has %u elements; allowed indices 0 to %u%s", list->path,
+                        *count, last, last == *count ? ", the last appends one" : "");
+    char path[CFG_PATH_MAX];
+    snprintf(path, sizeof path, "%s[]", list->path);
+    rd->line[cfg_row(rd, cfg_find(&rd->table, path))][set->item] = CFG_FROM_SET;
+    ++*count;
+    return SH_OK;
+}
+
+int cfg_apply_set(struct cfg_reader *rd, const char *text)
+{
+    struct set set = {.item = 0};
+    char shown[CFG_SHOW_MAX];
+    const char *equals = strchr(text, '=');
+    if (equals == NULL || equals == text)
+        return cfg_fail(rd, CFG_FROM_SET, cfg_show(text, shown), "no %s; allowed KEY=VALUE, as in head.prr_hz=300000",
+                        equals == NULL ? "'='" : "key");
+    if ((size_t)(equals - text) >= sizeof set.name / 2)
+        return cfg_fail(rd, CFG_FROM_SET, cfg_show(text, shown), "unknown key; allowed up to %zu characters",
+                        sizeof set.name / 2 - 1);
+    snprintf(set.name, sizeof set.name, "%.*s", (int)(equals - text), text);
+    to_generic(&set);
+    for (char *p = set.name; *p != '\0'; p++)
+        if ((unsigned char)*p < 0x20 || *p == 0x7f) *p = '?';
+    const struct cfg_key *key = cfg_find(&rd->table, set.path);
+    if (strstr(set.name, "[]") != NULL)
+        return cfg_fail(rd, CFG_FROM_SET, set.name, "no index; allowed as in links[0].type");
+    if (key == NULL) return fail_unknown(rd, &set);
+    if (key->type == CFG_MAP || key->type == CFG_LIST)
+        return cfg_fail(rd, CFG_FROM_SET, set.name, "is %s; set one of its keys",
+                        key->type == CFG_MAP ? "a section" : "a list");
+    const struct cfg_key *list = cfg_list_of(&rd->table, key);
+    int code = list != NULL ? reach_item(rd, &set, list) : SH_OK;
+    if (code != SH_OK) return code;
+    rd->line[cfg_row(rd, key)][set.item] = CFG_FROM_SET;
+    return cfg_store(rd, key, set.item, CFG_FROM_SET, equals + 1, "");
+}

@@ -1,0 +1,128 @@
+/* Inside of the configuration: one table of rows, and a reader that fills a struct from YAML and --set by it.
+ *
+ * A row's path is generic: "stations[].lat_deg" stands for every station; its element number is `item`. Lists
+ * do not nest, so one number is enough. Reader and tables are constant after use; a reader belongs to one
+ * thread. */
+#ifndef FIRMWARE_SIM_CONFIG_TABLE_H
+#define FIRMWARE_SIM_CONFIG_TABLE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "firmware_sim/config/config.h"
+
+enum cfg_type {
+    CFG_MAP,   /* a section, or one element of a list; nothing is stored */
+    CFG_LIST,  /* offset, size: the array and its stride; count_offset: uint32_t; min..max elements */
+    CFG_BOOL,  /* on|off, true|false -> int */
+    CFG_ENUM,  /* names[value] -> int or enum */
+    CFG_COUNT, /* whole number -> 4 or 8 bytes */
+    CFG_MICRO, /* decimal number, exact to 1e-6 -> int64_t in 1e-6 units */
+    CFG_REAL,  /* double */
+    CFG_TEXT,  /* char[size] */
+    CFG_PATH,  /* char[size]; relative to the file it stands in, to the working directory in --set */
+    CFG_VEC3,  /* [x, y, z] -> double[3] */
+};
+
+enum cfg_flags {
+    CFG_FIGURE = 1, /* written { value: V, from: data sheet|assumed } */
+    CFG_HEX = 4,    /* written 0x1209, and only so: 1209 is read both ways */
+    CFG_ASCII = 2,  /* goes into *IDN?: printable ASCII without comma and quotes */
+};
+
+enum { CFG_MAX_ROWS = 192, CFG_MAX_ITEMS = 64, CFG_PATH_MAX = 96, CFG_FROM_SET = -1 };
+
+struct cfg_key {
+    const char *path;
+    enum cfg_type type;
+    const char *unit;              /* NULL: none */
+    const char *def;               /* as written in YAML; NULL: required; "@KEY": the profile's figure KEY */
+    double min, max;               /* in the unit, or number of elements */
+    const char *min_key, *max_key; /* limits from the profile, checked once it is known */
+    const char *allowed;           /* says the range where min and max can't */
+    const char *const *names;      /* enum: by value, NULL at the end */
+    size_t offset, size, count_offset;
+    int flags;
+    const char *help;
+};
+
+struct cfg_table {
+    const struct cfg_key *keys;
+    size_t n;
+};
+/* config_table.c, config_table_profile.c */
+extern const struct cfg_table cfg_config_table, cfg_profile_table;
+#define CFG_LEN(array)           (sizeof(array) / sizeof((array)[0]))
+#define CFG_MEMBER(type, member) .offset = offsetof(type, member), .size = sizeof(((type *)0)->member)
+
+struct cfg_reader {
+    const char *file;
+    struct cfg_table table;
+    void *base;                            /* struct that the offsets count from */
+    int line[CFG_MAX_ROWS][CFG_MAX_ITEMS]; /* where a key was given: line, CFG_FROM_SET, 0: not given */
+    int root_line;
+    unsigned char from[CFG_MAX_ROWS]; /* figures: 1 data sheet, 2 assumed */
+    struct sh_err *err;
+};
+
+/* ---- config_reader.c: rows, places and errors */
+void cfg_reader_init(struct cfg_reader *rd, const char *file, const struct cfg_table *table, void *base,
+                     struct sh_err *err);
+const struct cfg_key *cfg_find(const struct cfg_table *table, const char *path);
+size_t cfg_row(const struct cfg_reader *rd, const struct cfg_key *key);
+/* The list a row's elements belong to, NULL for a row outside lists. */
+const struct cfg_key *cfg_list_of(const struct cfg_table *table, const struct cfg_key *key);
+uint32_t *cfg_list_count(const struct cfg_reader *rd, const struct cfg_key *list);
+void *cfg_address(const struct cfg_reader *rd, const struct cfg_key *key, uint32_t item);
+/* "stations[].name", 2 -> "stations[2].name". buf holds CFG_PATH_MAX. */
+const char *cfg_name(const char *path, uint32_t item, char *buf);
+int cfg_is_given(const struct cfg_reader *rd, const char *path, uint32_t item);
+/* The line of a key, or of the nearest section around it that was given. */
+int cfg_where(const struct cfg_reader *rd, const struct cfg_key *key, uint32_t item);
+/* "FILE:LINE: KEY: text", or "--set KEY: text" when line is CFG_FROM_SET. Returns SH_EINPUT. */
+int cfg_fail(const struct cfg_reader *rd, int line, const char *name, const char *fmt, ...)
+    __attribute__((format(printf, 4, 5)));
+/* The same for a row of the table. */
+int cfg_fail_key(const struct cfg_reader *rd, const char *path, uint32_t item, const char *fmt, ...)
+    __attribute__((format(printf, 4, 5)));
+/* An unknown key below the section parent ("" for the top): suggests a near one and lists what is known
+ * there. */
+int cfg_fail_unknown(const struct cfg_reader *rd, int line, const char *parent, uint32_t item, const char *word);
+/* text as it can stand in one line of an error: cut, without control characters. buf holds CFG_SHOW_MAX. */
+enum { CFG_SHOW_MAX = 64 };
+const char *cfg_show(const char *text, char *buf);
+
+/* ---- config_value.c: texts to values */
+enum cfg_number { CFG_NUMBER_OK, CFG_NOT_A_NUMBER, CFG_TOO_FINE, CFG_TOO_LARGE };
+/* Exact: text * 10^decimals as a whole number. Grammar: [+-] digits [. digits] [e [+-] digits], no leading
+ * zeros, which YAML 1.1 reads as octal. */
+enum cfg_number cfg_parse_decimal(const char *text, int decimals, __int128 *out);
+/* Stores one scalar; base_dir (with its '/', may be empty) is put before relative paths. */
+int cfg_store(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, const char *text,
+              const char *base_dir);
+int cfg_store_vec3(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, int axis,
+                   const char *text);
+/* "allowed 1 to 5 Hz": what a row takes. */
+enum { CFG_ALLOWED_MAX = 200 };
+const char *cfg_allowed(const struct cfg_key *key, char *buf);
+/* Directory part of a path, with its '/'; empty for a bare name. buf holds CONFIG_PATH_LEN. */
+const char *cfg_dir_of(const char *path, char *buf);
+
+/* ---- config_yaml.c, config_set.c, config_profile.c, config_check.c */
+int cfg_read_file(struct cfg_reader *rd);
+int cfg_apply_set(struct cfg_reader *rd, const char *set);
+/* Values for what was not given, errors for what must be. profile may be NULL. */
+int cfg_fill_defaults(struct cfg_reader *rd, const struct config_profile *profile);
+/* Finds and reads the profile that head.profile names (cfg->profile_file holds the name, then the path). */
+int cfg_load_profile(struct cfg_reader *rd, struct config *cfg);
+/* Everything that concerns more than one key. */
+int cfg_check(const struct cfg_reader *rd, struct config *cfg);
+/* config_place.c: the anchor, and the forms of a station's place. */
+int cfg_check_places(const struct cfg_reader *rd, struct config *cfg);
+/* config_signal.c: noise, signal, surfaces, and what of a profile concerns them. */
+int cfg_check_signal(const struct cfg_reader *rd, struct config *cfg);
+int cfg_check_reaches(const struct cfg_reader *rd, const struct config_profile *profile);
+/* The first link of the GNSS receiver; -1: none. */
+int cfg_nmea_link(const struct config *cfg);
+
+#endif

@@ -1,0 +1,294 @@
+/* Texts to values: exact decimals, ranges, words, paths. */
+#include "firmware_sim/config/table.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <yaml.h>
+
+static int is_digit(char c)
+{
+    return c >= '0' && c <= '9';
+}
+
+/* A number as it is written. */
+struct decimal {
+    int negative;
+    __int128 digits; /* without the point */
+    int exponent;    /* value = digits * 10^exponent */
+    int too_large;
+};
+
+enum { DECIMAL_MAX_DIGITS = 30, DECIMAL_MAX_EXPONENT = 400 };
+
+static const char *take_digits(const char *p, struct decimal *d, int *n_digits, int step)
+{
+    for (; is_digit(*p); p++) {
+        if (*n_digits > 0 || *p != '0') ++*n_digits;
+        if (*n_digits > DECIMAL_MAX_DIGITS) d->too_large = 1;
+        if (!d->too_large) d->digits = d->digits * 10 + (*p - '0');
+        d->exponent += step;
+    }
+    return p;
+}
+
+static int scan_decimal(const char *p, struct decimal *d)
+{
+    memset(d, 0, sizeof *d);
+    int n_digits = 0, exponent = 0;
+    if (*p == '-' || *p == '+') d->negative = *p++ == '-';
+    if (!is_digit(*p) || (*p == '0' && is_digit(p[1]))) return 0;
+    p = take_digits(p, d, &n_digits, 0);
+    if (*p == '.') {
+        if (!is_digit(*++p)) return 0;
+        p = take_digits(p, d, &n_digits, -1);
+    }
+    if (*p == 'e' || *p == 'E') {
+        int down = *++p == '-';
+        if (*p == '-' || *p == '+') p++;
+        if (!is_digit(*p)) return 0;
+        for (; is_digit(*p); p++)
+            if (exponent < DECIMAL_MAX_EXPONENT) exponent = exponent * 10 + (*p - '0');
+        d->exponent += down ? -exponent : exponent;
+    }
+    return *p == '\0';
+}
+
+enum cfg_number cfg_parse_decimal(const char *text, int decimals, __int128 *out)
+{
+    struct decimal d;
+    if (!scan_decimal(text, &d)) return CFG_NOT_A_NUMBER;
+    if (d.too_large) return CFG_TOO_LARGE;
+    int exponent = d.exponent + decimals;
+    for (; exponent < 0 && d.digits != 0; exponent++) {
+        if (d.digits % 10 != 0) return CFG_TOO_FINE;
+        d.digits /= 10;
+    }
+    for (; exponent > 0 && d.digits != 0; exponent--) {
+        d.digits *= 10;
+        if (d.digits > (__int128)1 << 96) return CFG_TOO_LARGE;
+    }
+    *out = d.negative ? -d.digits : d.digits;
+    return CFG_NUMBER_OK;
+}
+
+static size_t put(char *buf, size_t used, const char *text)
+{
+    int n = snprintf(buf + used, CFG_ALLOWED_MAX - used, "%s", text);
+    used += (size_t)n;
+    return used < CFG_ALLOWED_MAX ? used : CFG_ALLOWED_MAX - 1;
+}
+
+static void allowed_range(const struct cfg_key *key, char *buf)
+{
+    char low[64], high[64];
+    const char *kind = key->type == CFG_COUNT ? "a whole number, " : key->type == CFG_VEC3 ? "[x, y, z], each " : "";
+    snprintf(low, sizeof low, "%.10g", key->min);
+    snprintf(high, sizeof high, "%.10g", key->max);
+    if (key->type == CFG_COUNT && key->max >= 0x1p64) snprintf(high, sizeof high, "%" PRIu64, UINT64_MAX);
+    if (key->max_key != NULL)
+        snprintf(buf, CFG_ALLOWED_MAX, "allowed %s to %s of the head profile",
+                 key->min_key != NULL ? key->min_key : low, key->max_key);
+    else
+        snprintf(buf, CFG_ALLOWED_MAX, "allowed %s%s to %s%s%s", kind, low, high, key->unit != NULL ? " " : "",
+                 key->unit != NULL ? key->unit : "");
+}
+
+const char *cfg_allowed(const struct cfg_key *key, char *buf)
+{
+    size_t used = put(buf, 0, "allowed ");
+    if (key->allowed != NULL) {
+        put(buf, used, key->allowed);
+        return buf;
+    }
+    switch (key->type) {
+    case CFG_MAP:
+        put(buf, used, "a section with keys");
+        break;
+    case CFG_LIST:
+        snprintf(buf, CFG_ALLOWED_MAX, "allowed a list of %.0f to %.0f", key->min, key->max);
+        break;
+    case CFG_BOOL:
+        put(buf, used, "on or off");
+        break;
+    case CFG_ENUM:
+        for (size_t i = 0; key->names[i] != NULL; i++)
+            used = put(buf, put(buf, used, i > 0 ? ", " : ""), key->names[i]);
+        break;
+    case CFG_TEXT:
+    case CFG_PATH:
+        snprintf(buf, CFG_ALLOWED_MAX, "allowed %s of 1 to %zu bytes%s", key->type == CFG_PATH ? "a path" : "text",
+                 key->size - 1, key->flags & CFG_ASCII ? ", printable ASCII without comma, ';' and quotes" : "");
+        break;
+    default:
+        allowed_range(key, buf);
+    }
+    return buf;
+}
+
+struct place {
+    struct cfg_reader *rd;
+    const struct cfg_key *key;
+    uint32_t item;
+    int line;
+};
+
+/* `"TEXT" is WHAT; allowed ...` for a key's value. */
+static int refuse(const struct place *at, const char *text, const char *what)
+{
+    char name[CFG_PATH_MAX], shown[CFG_SHOW_MAX], allowed[CFG_ALLOWED_MAX];
+    return cfg_fail(at->rd, at->line, cfg_name(at->key->path, at->item, name), "\"%s\" is %s; %s",
+                    cfg_show(text, shown), what, cfg_allowed(at->key, allowed));
+}
+
+static enum cfg_number parse_hex(const char *digits, __int128 *out)
+{
+    size_t n = strspn(digits, "0123456789abcdefABCDEF");
+    if (n == 0 || digits[n] != '\0') return CFG_NOT_A_NUMBER;
+    if (n > 15) return CFG_TOO_LARGE;
+    *out = (__int128)strtoull(digits, NULL, 16);
+    return CFG_NUMBER_OK;
+}
+
+static int store_whole(const struct place *at, void *dst, const char *text)
+{
+    const struct cfg_key *key = at->key;
+    int decimals = key->type == CFG_MICRO ? 6 : 0;
+    __int128 value, unit = key->type == CFG_MICRO ? 1000000 : 1;
+    const int is_hex = (key->flags & CFG_HEX) != 0;
+    if (is_hex && strncmp(text, "0x", 2) != 0) return refuse(at, text, "without 0x");
+    switch (is_hex ? parse_hex(text + 2, &value) : cfg_parse_decimal(text, decimals, &value)) {
+    case CFG_NOT_A_NUMBER:
+        return refuse(at, text, "not a number");
+    case CFG_TOO_FINE:
+        return refuse(at, text, decimals > 0 ? "finer than 6 decimals" : "not a whole number");
+    case CFG_TOO_LARGE:
+        return refuse(at, text, "out of range");
+    case CFG_NUMBER_OK:
+        break;
+    }
+    /* Limits are doubles; the only one that is not exact is 2^64 - 1, which rounds up to 2^64. */
+    if ((long double)value < (long double)key->min * (long double)unit ||
+        (long double)value > (long double)key->max * (long double)unit || value > (__int128)UINT64_MAX)
+        return refuse(at, text, "out of range");
+    if (key->size == sizeof(uint32_t)) {
+        uint32_t narrow = (uint32_t)value;
+        memcpy(dst, &narrow, sizeof narrow);
+    } else {
+        uint64_t wide = (uint64_t)value;
+        memcpy(dst, &wide, sizeof wide);
+    }
+    return SH_OK;
+}
+
+static int store_real(const struct place *at, double *dst, const char *text)
+{
+    struct decimal d;
+    if (!scan_decimal(text, &d)) return refuse(at, text, "not a number");
+    double value = strtod(text, NULL);
+    if (!isfinite(value) || value < at->key->min || value > at->key->max) return refuse(at, text, "out of range");
+    memcpy(dst, &value, sizeof value);
+    return SH_OK;
+}
+
+static int store_word(const struct place *at, void *dst, const char *text)
+{
+    static const char *const bools[] = {"off", "on", "false", "true", NULL};
+    const char *const *names = at->key->type == CFG_BOOL ? bools : at->key->names;
+    for (int i = 0; names[i] != NULL; i++) {
+        if (strcmp(names[i], text) != 0) continue;
+        int value = at->key->type == CFG_BOOL ? i % 2 : i;
+        memcpy(dst, &value, sizeof value);
+        return SH_OK;
+    }
+    return refuse(at, text, "not known");
+}
+
+/* libyaml has checked a file; this is for the command line. */
+static int is_utf8(const char *text)
+{
+    yaml_document_t doc;
+    if (!yaml_document_initialize(&doc, NULL, NULL, NULL, 1, 1)) return 0;
+    int node = yaml_document_add_scalar(&doc, NULL, (const yaml_char_t *)text, -1, YAML_ANY_SCALAR_STYLE);
+    yaml_document_delete(&doc);
+    return node != 0;
+}
+
+static int store_text(const struct place *at, char *dst, const char *text, const char *base_dir)
+{
+    if (text[0] == '\0') return refuse(at, text, "empty");
+    for (const char *p = text; *p != '\0'; p++) {
+        unsigned char c = (unsigned char)*p;
+        if (c < 0x20 || c == 0x7f) return refuse(at, text, "text with control characters");
+        if ((at->key->flags & CFG_ASCII) && (c >= 0x80 || strchr(",;\"'", c) != NULL))
+            return refuse(at, text, "text with a character that *IDN? can't carry");
+    }
+    const char *before = "";
+    if (at->key->type == CFG_PATH && text[0] != '/') before = base_dir;
+    if (at->key->type == CFG_TEXT && !is_utf8(text)) return refuse(at, text, "not UTF-8");
+    if (strlen(before) + strlen(text) >= at->key->size) return refuse(at, text, "too long");
+    snprintf(dst, at->key->size, "%s%s", before, text);
+    return SH_OK;
+}
+
+/* "[1, 2, 3]", "1,2,3": from --set and defaults. */
+static int store_vec3_text(struct place *at, const char *text)
+{
+    char part[CFG_SHOW_MAX];
+    const char *p = text;
+    int closed = *p == '[';
+    p += closed;
+    for (int axis = 0; axis < 3; axis++) {
+        p += strspn(p, " ");
+        size_t len = strcspn(p, axis < 2 ? " ," : " ]");
+        if (len == 0 || len >= sizeof part) return refuse(at, text, "not [x, y, z]");
+        memcpy(part, p, len);
+        part[len] = '\0';
+        p += len;
+        p += strspn(p, " ");
+        if (axis < 2 && *p++ != ',') return refuse(at, text, "not [x, y, z]");
+        int code = cfg_store_vec3(at->rd, at->key, at->item, at->line, axis, part);
+        if (code != SH_OK) return code;
+    }
+    return strcmp(p, closed ? "]" : "") == 0 ? SH_OK : refuse(at, text, "not [x, y, z]");
+}
+
+int cfg_store_vec3(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, int axis,
+                   const char *text)
+{
+    struct place at = {rd, key, item, line};
+    return store_real(&at, (double *)cfg_address(rd, key, item) + axis, text);
+}
+
+int cfg_store(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, const char *text,
+              const char *base_dir)
+{
+    struct place at = {rd, key, item, line};
+    void *dst = cfg_address(rd, key, item);
+    switch (key->type) {
+    case CFG_BOOL:
+    case CFG_ENUM:
+        return store_word(&at, dst, text);
+    case CFG_COUNT:
+    case CFG_MICRO:
+        return store_whole(&at, dst, text);
+    case CFG_REAL:
+        return store_real(&at, dst, text);
+    case CFG_TEXT:
+    case CFG_PATH:
+        return store_text(&at, dst, text, base_dir);
+    case CFG_VEC3:
+        return store_vec3_text(&at, text);
+    default:
+        return refuse(&at, text, "not what belongs here");
+    }
+}
+
+const char *cfg_dir_of(const char *path, char *buf)
+{
+    const char *slash = strrchr(path, '/');
+    snprintf(buf, CONFIG_PATH_LEN, "%.*s", slash == NULL ? 0 : (int)(slash - path) + 1, path);
+    return buf;
+}

@@ -1,0 +1,341 @@
+/* YAML to the struct, by the table. libyaml's document API keeps the line of each node. */
+#include "firmware_sim/config/table.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <yaml.h>
+
+enum { FILE_MAX = 1 << 20, MAX_DEPTH = 16, MAX_ANCHORS = 256 };
+
+struct walk {
+    struct cfg_reader *rd;
+    yaml_document_t *doc;
+    char base_dir[CONFIG_PATH_LEN];
+};
+
+static int line_of(const yaml_node_t *node)
+{
+    return (int)node->start_mark.line + 1;
+}
+
+static const char *text_of(const yaml_node_t *node)
+{
+    return (const char *)node->data.scalar.value;
+}
+
+static const char *kind_of(const yaml_node_t *node)
+{
+    switch (node->type) {
+    case YAML_SCALAR_NODE:
+        return node->data.scalar.length == 0 ? "nothing" : "a single value";
+    case YAML_SEQUENCE_NODE:
+        return "a list";
+    default:
+        return "a section with keys";
+    }
+}
+
+/* Tags would change what a value means; none is known here. */
+static int has_tag(const yaml_node_t *node)
+{
+    static const char *const plain[] = {
+        [YAML_SCALAR_NODE] = YAML_STR_TAG, [YAML_SEQUENCE_NODE] = YAML_SEQ_TAG, [YAML_MAPPING_NODE] = YAML_MAP_TAG};
+    return node->tag != NULL && strcmp((const char *)node->tag, plain[node->type]) != 0;
+}
+
+static int wrong_kind(const struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
+{
+    char name[CFG_PATH_MAX], allowed[CFG_ALLOWED_MAX];
+    return cfg_fail(w->rd, line_of(node), cfg_name(key->path, item, name), "here stands %s; %s", kind_of(node),
+                    cfg_allowed(key, allowed));
+}
+
+/* A scalar that may stand for a value of this type, or an error. */
+static int check_scalar(const struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
+{
+    char name[CFG_PATH_MAX], allowed[CFG_ALLOWED_MAX], shown[CFG_SHOW_MAX];
+    if (node->type != YAML_SCALAR_NODE) return wrong_kind(w, key, item, node);
+    int plain = node->data.scalar.style == YAML_PLAIN_SCALAR_STYLE;
+    if (plain && node->data.scalar.length == 0) return wrong_kind(w, key, item, node);
+    const char *why = NULL;
+    int is_text = key->type == CFG_TEXT || key->type == CFG_PATH || key->type == CFG_ENUM;
+    if (strlen(text_of(node)) != node->data.scalar.length) why = "text with control characters";
+    if (!is_text && !plain) why = "a text in quotes or of several lines";
+    if (has_tag(node)) why = "a value with a tag, which is not supported";
+    if (why == NULL) return SH_OK;
+    return cfg_fail(w->rd, line_of(node), cfg_name(key->path, item, name), "\"%s\" is %s; %s",
+                    cfg_show(text_of(node), shown), why, cfg_allowed(key, allowed));
+}
+
+static int read_scalar(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
+{
+    int code = check_scalar(w, key, item, node);
+    if (code != SH_OK) return code;
+    return cfg_store(w->rd, key, item, line_of(node), text_of(node), w->base_dir);
+}
+
+static int read_vec3(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
+{
+    char name[CFG_PATH_MAX], allowed[CFG_ALLOWED_MAX];
+    if (node->type != YAML_SEQUENCE_NODE) return wrong_kind(w, key, item, node);
+    const yaml_node_item_t *first = node->data.sequence.items.start, *top = node->data.sequence.items.top;
+    if (top - first != 3)
+        return cfg_fail(w->rd, line_of(node), cfg_name(key->path, item, name), "has %td numbers instead of 3; %s",
+                        top - first, cfg_allowed(key, allowed));
+    for (int axis = 0; axis < 3; axis++) {
+        const yaml_node_t *number = yaml_document_get_node(w->doc, first[axis]);
+        int code = check_scalar(w, key, item, number);
+        if (code == SH_OK) code = cfg_store_vec3(w->rd, key, item, line_of(number), axis, text_of(number));
+        if (code != SH_OK) return code;
+    }
+    return SH_OK;
+}
+
+/* from: data sheet|assumed */
+static int read_source(struct walk *w, const struct cfg_key *key, const yaml_node_t *node)
+{
+    static const char *const sources[] = {"data sheet", "assumed"};
+    for (unsigned char i = 0; i < 2 && node->type == YAML_SCALAR_NODE; i++) {
+        if (strcmp(text_of(node), sources[i]) != 0) continue;
+        w->rd->from[cfg_row(w->rd, key)] = (unsigned char)(i + 1);
+        return SH_OK;
+    }
+    return cfg_fail(w->rd, line_of(node), key->path,
+                    "\"from\" must say where the figure is from; allowed data sheet, "
+                    "assumed");
+}
+
+static int read_figure(struct walk *w, const struct cfg_key *key, const yaml_node_t *node)
+{
+    static const char form[] = "allowed { value: V, from: data sheet } or { value: V, from: assumed }";
+    if (node->type != YAML_MAPPING_NODE)
+        return cfg_fail(w->rd, line_of(node), key->path, "here stands %s; %s", kind_of(node), form);
+    int given[2] = {0, 0};
+    for (const yaml_node_pair_t *pair = node->data.mapping.pairs.start; pair < node->data.mapping.pairs.top; pair++) {
+        const yaml_node_t *word = yaml_document_get_node(w->doc, pair->key);
+        const yaml_node_t *value = yaml_document_get_node(w->doc, pair->value);
+        const char *text = word->type == YAML_SCALAR_NODE ? text_of(word) : "";
+        int which = strcmp(text, "value") == 0 ? 0 : strcmp(text, "from") == 0 ? 1 : -1;
+        if (which < 0 || given[which]++)
+            return cfg_fail(w->rd, line_of(word), key->path, "a key that is unknown or given twice; %s", form);
+        int code = which == 0 ? read_scalar(w, key, 0, value) : read_source(w, key, value);
+        if (code != SH_OK) return code;
+    }
+    if (!given[0] || !given[1])
+        return cfg_fail(w->rd, line_of(node), key->path, "\"%s\" is missing; %s", given[0] ? "from" : "value", form);
+    return SH_OK;
+}
+
+static int read_map(struct walk *w, const yaml_node_t *node, const char *path, uint32_t item);
+
+static int read_list(struct walk *w, const struct cfg_key *key, const yaml_node_t *node)
+{
+    if (node->type != YAML_SEQUENCE_NODE) return wrong_kind(w, key, 0, node);
+    const yaml_node_item_t *first = node->data.sequence.items.start;
+    ptrdiff_t n = node->data.sequence.items.top - first;
+    char path[CFG_PATH_MAX], allowed[CFG_ALLOWED_MAX];
+    if ((double)n > key->max)
+        return cfg_fail(w->rd, line_of(node), key->path, "%td elements are too many; %s", n, cfg_allowed(key, allowed));
+    snprintf(path, sizeof path, "%s[]", key->path);
+    const struct cfg_key *element = cfg_find(&w->rd->table, path);
+    for (uint32_t i = 0; i < (uint32_t)n; i++) {
+        const yaml_node_t *child = yaml_document_get_node(w->doc, first[i]);
+        if (child->type != YAML_MAPPING_NODE) return wrong_kind(w, element, i, child);
+        *cfg_list_count(w->rd, key) = i + 1;
+        w->rd->line[cfg_row(w->rd, element)][i] = line_of(child);
+        int code = read_map(w, child, path, i);
+        if (code != SH_OK) return code;
+    }
+    return SH_OK;
+}
+
+static int read_value(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
+{
+    char name[CFG_PATH_MAX];
+    if (node->type != YAML_SCALAR_NODE && has_tag(node))
+        return cfg_fail(w->rd, line_of(node), cfg_name(key->path, item, name), "has a tag; allowed none");
+    if (key->flags & CFG_FIGURE) return read_figure(w, key, node);
+    switch (key->type) {
+    case CFG_MAP:
+        return node->type == YAML_MAPPING_NODE ? read_map(w, node, key->path, item) : wrong_kind(w, key, item, node);
+    case CFG_LIST:
+        return read_list(w, key, node);
+    case CFG_VEC3:
+        return read_vec3(w, key, item, node);
+    default:
+        return read_scalar(w, key, item, node);
+    }
+}
+
+/* The row of a key below path, or NULL. A dotted key ("head.prr_hz: 1") is no way to write a section. */
+static const struct cfg_key *row_below(const struct walk *w, const char *path, const yaml_node_t *word)
+{
+    char full[CFG_PATH_MAX];
+    if (word->data.scalar.length != strlen(text_of(word)) || strpbrk(text_of(word), ".[]") != NULL) return NULL;
+    int len = snprintf(full, sizeof full, "%s%s%s", path, path[0] != '\0' ? "." : "", text_of(word));
+    return len < (int)sizeof full ? cfg_find(&w->rd->table, full) : NULL;
+}
+
+static int read_map(struct walk *w, const yaml_node_t *node, const char *path, uint32_t item)
+{
+    for (const yaml_node_pair_t *pair = node->data.mapping.pairs.start; pair < node->data.mapping.pairs.top; pair++) {
+        const yaml_node_t *word = yaml_document_get_node(w->doc, pair->key);
+        const yaml_node_t *value = yaml_document_get_node(w->doc, pair->value);
+        int line = line_of(word);
+        if (word->type != YAML_SCALAR_NODE)
+            return cfg_fail(w->rd, line, path[0] != '\0' ? path : "configuration",
+                            "a key that is %s; allowed words only", kind_of(word));
+        const struct cfg_key *key = row_below(w, path, word);
+        if (key == NULL) return cfg_fail_unknown(w->rd, line, path, item, text_of(word));
+        int *given = &w->rd->line[cfg_row(w->rd, key)][item];
+        char name[CFG_PATH_MAX];
+        if (*given != 0)
+            return cfg_fail(w->rd, line, cfg_name(key->path, item, name), "given twice, first on line %d; allowed once",
+                            *given);
+        *given = line;
+        int code = read_value(w, key, item, value);
+        if (code != SH_OK) return code;
+    }
+    return SH_OK;
+}
+
+/* ---- the file */
+
+static int read_bytes(const struct cfg_reader *rd, unsigned char **bytes, size_t *len)
+{
+    FILE *file = fopen(rd->file, "rb");
+    if (file == NULL)
+        return sh_fail(rd->err, SH_EINPUT, "%s: cannot be opened: %s; a YAML file is needed", rd->file,
+                       strerror(errno));
+    *bytes = malloc(FILE_MAX + 1);
+    int code = SH_OK;
+    if (*bytes == NULL) code = sh_fail(rd->err, SH_ENOMEM, "%s: no memory to read it", rd->file);
+    *len = code == SH_OK ? fread(*bytes, 1, FILE_MAX + 1, file) : 0;
+    if (code == SH_OK && ferror(file))
+        code = sh_fail(rd->err, SH_EINPUT, "%s: cannot be read: %s; a YAML file is needed", rd->file, strerror(errno));
+    if (code == SH_OK && *len > FILE_MAX)
+        code = sh_fail(rd->err, SH_EINPUT, "%s: larger than 1 MiB; allowed up to 1048576 bytes", rd->file);
+    fclose(file);
+    return code;
+}
+
+/* The start of a line, counted from 1, in the bytes; NULL when there are not that many. */
+static const unsigned char *find_line(const unsigned char *bytes, size_t len, int line)
+{
+    const unsigned char *p = bytes, *end = bytes + len;
+    while (p != NULL && --line > 0) {
+        p = memchr(p, '\n', (size_t)(end - p));
+        if (p != NULL) p++;
+    }
+    return p == end ? NULL : p;
+}
+
+static int indented_by_tab(const unsigned char *bytes, size_t len, int line)
+{
+    const unsigned char *p = find_line(bytes, len, line), *end = bytes + len;
+    if (p == NULL) return 0;
+    while (p < end && *p == ' ')
+        p++;
+    return p < end && *p == '\t';
+}
+
+/* libyaml gives a mark for what it scans and parses, and a byte offset for bytes that are not UTF-8. */
+static int fail_syntax(const struct cfg_reader *rd, const yaml_parser_t *parser, const unsigned char *bytes, size_t len)
+{
+    int line = (int)parser->problem_mark.line + 1;
+    if (parser->error == YAML_MEMORY_ERROR) return sh_fail(rd->err, SH_ENOMEM, "%s: no memory to parse it", rd->file);
+    if (parser->error == YAML_READER_ERROR) {
+        line = 1;
+        for (size_t i = 0; i < parser->problem_offset && i < len; i++)
+            line += bytes[i] == '\n';
+    }
+    const char *hint = indented_by_tab(bytes, len, line) ? "; indent with spaces, not with tabs" : "";
+    if (parser->error == YAML_READER_ERROR) hint = "; allowed UTF-8 text without control characters";
+    return sh_fail(rd->err, SH_EINPUT, "%s:%d: not YAML: %s%s%s%s", rd->file, line,
+                   parser->problem != NULL ? parser->problem : "unknown problem", parser->context != NULL ? " " : "",
+                   parser->context != NULL ? parser->context : "", hint);
+}
+
+/* A byte order mark is skipped here: libyaml would count it as a column and find the first line indented. */
+static int start_parser(const struct cfg_reader *rd, yaml_parser_t *parser, const unsigned char *bytes, size_t len)
+{
+    size_t skip = len >= 3 && memcmp(bytes, "\xef\xbb\xbf", 3) == 0 ? 3 : 0;
+    if (!yaml_parser_initialize(parser)) return sh_fail(rd->err, SH_ENOMEM, "%s: no memory to parse it", rd->file);
+    yaml_parser_set_encoding(parser, YAML_UTF8_ENCODING);
+    yaml_parser_set_input_string(parser, bytes + skip, len - skip);
+    return SH_OK;
+}
+
+/* libyaml's scanner takes time with the square of the depth of "[[[[", and of the number of anchors: both are
+ * bounded by a first pass over the events. What else is wrong is left to the second. */
+static int check_depth(const struct cfg_reader *rd, const unsigned char *bytes, size_t len)
+{
+    yaml_parser_t parser;
+    yaml_event_t event;
+    int depth = 0, anchors = 0, code = SH_OK, done = 0;
+    if (!yaml_parser_initialize(&parser)) return sh_fail(rd->err, SH_ENOMEM, "%s: no memory to parse it", rd->file);
+    yaml_parser_set_encoding(&parser, YAML_UTF8_ENCODING);
+    yaml_parser_set_input_string(&parser, bytes, len);
+    while (code == SH_OK && !done && yaml_parser_parse(&parser, &event)) {
+        int line = (int)event.start_mark.line + 1;
+        done = event.type == YAML_STREAM_END_EVENT;
+        depth += event.type == YAML_SEQUENCE_START_EVENT || event.type == YAML_MAPPING_START_EVENT;
+        depth -= event.type == YAML_SEQUENCE_END_EVENT || event.type == YAML_MAPPING_END_EVENT;
+        anchors += (event.type == YAML_SCALAR_EVENT && event.data.scalar.anchor != NULL) ||
+                   (event.type == YAML_SEQUENCE_START_EVENT && event.data.sequence_start.anchor != NULL) ||
+                   (event.type == YAML_MAPPING_START_EVENT && event.data.mapping_start.anchor != NULL);
+        yaml_event_delete(&event);
+        if (depth > MAX_DEPTH)
+            code = sh_fail(rd->err, SH_EINPUT, "%s:%d: nested too deep; allowed %d levels", rd->file, line, MAX_DEPTH);
+        else if (anchors > MAX_ANCHORS)
+            code = sh_fail(rd->err, SH_EINPUT, "%s:%d: too many anchors; allowed %d", rd->file, line, MAX_ANCHORS);
+    }
+    yaml_parser_delete(&parser);
+    return code;
+}
+
+static int read_document(struct cfg_reader *rd, yaml_document_t *doc)
+{
+    struct walk w = {.rd = rd, .doc = doc};
+    const yaml_node_t *root = yaml_document_get_root_node(doc);
+    if (root == NULL) return sh_fail(rd->err, SH_EINPUT, "%s:1: empty; a section with keys is needed", rd->file);
+    cfg_dir_of(rd->file, w.base_dir);
+    rd->root_line = line_of(root);
+    if (root->type != YAML_MAPPING_NODE)
+        return sh_fail(rd->err, SH_EINPUT, "%s:%d: here stands %s; allowed sections with keys", rd->file, line_of(root),
+                       kind_of(root));
+    return read_map(&w, root, "", 0);
+}
+
+static int read_documents(struct cfg_reader *rd, yaml_parser_t *parser, const unsigned char *bytes, size_t len)
+{
+    yaml_document_t doc, next;
+    if (!yaml_parser_load(parser, &doc)) return fail_syntax(rd, parser, bytes, len);
+    int code = read_document(rd, &doc);
+    yaml_document_delete(&doc);
+    if (code != SH_OK) return code;
+    if (!yaml_parser_load(parser, &next)) return fail_syntax(rd, parser, bytes, len);
+    const yaml_node_t *more = yaml_document_get_root_node(&next);
+    if (more != NULL)
+        code = sh_fail(rd->err, SH_EINPUT, "%s:%d: a second document; allowed one", rd->file, line_of(more));
+    yaml_document_delete(&next);
+    return code;
+}
+
+int cfg_read_file(struct cfg_reader *rd)
+{
+    unsigned char *bytes = NULL;
+    size_t len = 0;
+    yaml_parser_t parser;
+    int code = read_bytes(rd, &bytes, &len);
+    if (code == SH_OK) code = check_depth(rd, bytes, len);
+    if (code == SH_OK) code = start_parser(rd, &parser, bytes, len);
+    if (code != SH_OK) goto free_bytes;
+    code = read_documents(rd, &parser, bytes, len);
+    yaml_parser_delete(&parser);
+free_bytes:
+    free(bytes);
+    return code;
+}

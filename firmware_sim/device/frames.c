@@ -1,0 +1,92 @@
+/* What the device says of itself: descriptor, anchor, telemetry. */
+#include <math.h>
+#include <string.h>
+
+#include "firmware_sim/device/device_state.h"
+
+void device_fill_spec(const struct device *device, struct schedule_spec *spec)
+{
+    config_fill_spec(&device->site->cfg->profile, &device->cmd.settings, spec);
+}
+
+void device_fill_descriptor(const struct device *device, struct native_descriptor *d)
+{
+    const struct config *cfg = device->site->cfg;
+    const struct schedule_spec *spec = &device->segment.spec;
+    struct cast_setup setup;
+    struct bvh_info info;
+    site_cast_setup(device->site, device->station, &setup);
+    bvh_get_info(setup.bvh, &info);
+    memset(d, 0, sizeof *d);
+    memcpy(d->idn, device->idn, sizeof d->idn);
+    memcpy(d->profile, cfg->profile.name, sizeof d->profile);
+    d->layout = cfg->output.layout == LINE_GEO ? NATIVE_GEO : NATIVE_POLAR;
+    d->isa = info.packet;
+    d->prr_uhz = (uint64_t)spec->prr_uhz;
+    d->lines_uhz = (uint64_t)spec->lines_uhz;
+    d->pan_udeg_s = (uint64_t)spec->pan_udeg_s;
+    d->fov_min_udeg = spec->fov_min_udeg;
+    d->sweep_udeg = spec->sweep_udeg;
+    d->line_start_udeg = spec->line_start_udeg;
+    d->line_stop_udeg = spec->line_stop_udeg;
+    d->pan_start_udeg = spec->pan_start_udeg;
+    d->pan_stop_udeg = spec->pan_stop_udeg;
+    d->mirror_counts_per_turn = setup.mirror_counts;
+    d->pan_counts_per_turn = setup.pan_counts;
+    d->range_scale_m = setup.range_scale_m;
+    d->range_min_m = setup.range_min_m;
+    d->range_max_m = setup.range_max_m;
+    d->max_echoes = cfg->profile.max_echoes;
+    d->n_surfaces = device->site->n_surfaces;
+    d->frames = spec->frames;
+    d->scan = device->scan;
+    d->seed = cfg->noise.seed;
+    d->content = cfg->output.attributes ? (uint32_t)NATIVE_HAS_ATTRIBUTES : 0;
+}
+
+void device_fill_anchor(const struct site *site, uint32_t station, size_t stretch, struct native_anchor *a)
+{
+    static const uint32_t crs[] = {[GEOREF_LOCAL] = NATIVE_CRS_LOCAL,
+                                   [GEOREF_ECEF] = NATIVE_CRS_ECEF,
+                                   [GEOREF_UTM] = NATIVE_CRS_UTM,
+                                   [GEOREF_GEODETIC] = NATIVE_CRS_GEODETIC};
+    const struct site_station *s = &site->station[station];
+    const double *centre_m, *scale;
+    const struct georef *georef = site_georef(site, station, stretch, &centre_m, &scale);
+    memset(a, 0, sizeof *a);
+    a->crs = crs[site->cfg->output.crs];
+    a->epsg = (uint32_t)georef_epsg(georef);
+    a->station = station + 1;
+    georef_anchor(georef, a->anchor);
+    a->scale_m = site->scale_m;
+    a->lat_deg = s->at.lat_deg;
+    a->lon_deg = s->at.lon_deg;
+    a->height_m = s->at.height_m;
+    memcpy(a->station_m, s->at.position_m, sizeof a->station_m);
+    memcpy(a->rotation, s->at.rotation, sizeof a->rotation);
+    a->moving = site->moving ? NATIVE_MOVING : site->stop != NULL ? NATIVE_STOP : 0;
+    a->frame = s->frame;
+    memcpy(a->scale, scale, sizeof a->scale);
+    georef_axes(georef, a->axes);
+    if (s->leg != NULL && site->stretch[stretch].until_ns != INT64_MAX)
+        a->until_ms = (uint32_t)(site->stretch[stretch].until_ns / 1000000);
+    a->heights = georef_has_geoid(georef) ? NATIVE_HEIGHTS_GEOID : NATIVE_HEIGHTS_ELLIPSOID;
+}
+
+void device_fill_telemetry(const struct device *device, uint64_t tick, struct native_telemetry *t)
+{
+    const struct device_counters *c = &device->counters;
+    memset(t, 0, sizeof *t);
+    t->state = (uint32_t)device->state;
+    t->scan = device->scan;
+    t->pulses = atomic_load(&c->pulses);
+    t->echoes = atomic_load(&c->echoes);
+    t->lines = atomic_load(&c->lines);
+    t->lost_pulses = atomic_load(&c->lost_pulses);
+    t->late_blocks = atomic_load(&c->late_blocks);
+    t->late_max_us = (uint32_t)(atomic_load(&c->late_max_ns) / 1000);
+    t->errors_queued = device->cmd.queue.count;
+    if (device->clock.source != HEAD_CLOCK_NONE)
+        t->utc_ns =
+            utc_posix_from_tai(&device->clock.table, head_clock_ns(&device->clock, (int64_t)tick * device->tick_ns));
+}

@@ -1,0 +1,40 @@
+/* The GNSS receiver beside the head: where its antenna is at full fractions of the second, as NMEA 0183 sentences.
+ *
+ * It runs from power-up on, whether or not the head scans (but device time itself stands still in the pace fast while
+ * the head has nothing to do), and knows the true time (head_clock.h): its positions are those at multiples of
+ * 1/rate_hz of UTC. What it says comes after the moment that it names. The antenna is at the head's origin plus
+ * gnss.lever_arm_m, turned as the head stands. Noise, where there is any, is normal and independent east, north and up,
+ * keyed by noise.seed and the number of the position since power-up. Thread: constant after the clock is powered up. */
+#ifndef FIRMWARE_SIM_DEVICE_GNSS_H
+#define FIRMWARE_SIM_DEVICE_GNSS_H
+
+#include "firmware_sim/device/head_clock.h"
+#include "firmware_sim/site/site.h"
+
+struct gnss {
+    const struct site *site;
+    const struct head_clock *clock;
+    int on; /* some link speaks NMEA */
+    int64_t period_ns;
+};
+
+/* site and clock must outlive it. */
+void gnss_init(struct gnss *gnss, const struct site *site, const struct head_clock *clock);
+
+/* Positions before a device time, from power-up on; 0 where no link wants any. Real-time safe. */
+uint64_t gnss_count(const struct gnss *gnss, int64_t t_ns);
+/* Device time of a position, counted from 0. */
+int64_t gnss_time_ns(const struct gnss *gnss, uint64_t index);
+
+/* The head's pose at a time, and a little before and after, from which speed and course follow. */
+#define GNSS_STEP_NS 5000000
+struct gnss_track {
+    struct pose before, at, after; /* GNSS_STEP_NS apart */
+};
+
+/* Its sentences. A head that stands is at a station (0..n_stations-1), with track NULL; one that moves where track
+ * says, and without a fix where that is no place on the Earth. Returns the length, 0 when cap is too small. */
+size_t gnss_sentences(const struct gnss *gnss, uint64_t index, uint32_t station, const struct gnss_track *track,
+                      char *dst, size_t cap);
+
+#endif

@@ -1,0 +1,45 @@
+/* The journal: every command that had an effect, with its device time; replayed, it reproduces the session.
+ *
+ * A text file: the line `# scanhead journal 1`, then one line per command
+ *   <device tick> <device time, ns> <session> <command line>
+ * separated by one blank each, in decimal. Other lines that begin with '#' and empty lines are notes.
+ * Not real-time safe: each line is written and flushed at once, so that a crash loses none. */
+#ifndef FIRMWARE_SIM_DEVICE_JOURNAL_H
+#define FIRMWARE_SIM_DEVICE_JOURNAL_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "core/err.h"
+#include "firmware_sim/command/command.h"
+
+struct journal;
+
+/* Begins a new file. NULL on failure, with the reason in err; journal_close releases. */
+struct journal *journal_open(const char *path, struct sh_err *err);
+
+/* Adds a line. SH_EINPUT: t_ns is negative, or line is empty, too long or not printable ASCII; nothing is
+ * written. SH_EIO: the file could not be written; this and all later calls fail, and journal_close has the
+ * reason. */
+int journal_write(struct journal *journal, uint64_t tick, int64_t t_ns, uint32_t session, const char *line);
+
+/* A note, which replaying passes over: one printable line. Failures as in journal_write. */
+int journal_note(struct journal *journal, const char *text);
+
+/* Closes and releases. The first thing that went wrong in writing, with its text, or 0. NULL is nothing to
+ * close. */
+int journal_close(struct journal *journal, struct sh_err *err);
+
+struct journal_entry {
+    uint64_t tick;
+    int64_t t_ns;
+    uint32_t session;
+    char line[COMMAND_MAX_LINE + 1];
+};
+
+/* Reads a whole file, sorted by tick; commands of one tick stay in the file's order. Errors name file:line; a
+ * last line without its end is one, since its command may be cut. On failure *entries is NULL. */
+int journal_read(const char *path, struct journal_entry **entries, size_t *n, struct sh_err *err);
+void journal_free(struct journal_entry *entries);
+
+#endif

@@ -1,0 +1,80 @@
+/* The device's time of day: PPS, what TIME: answers, and the GNSS receiver. */
+#include <stdio.h>
+
+#include "firmware_sim/device/device_state.h"
+
+int device_power_up(struct device *device, int64_t now_ns, const char **warning, struct sh_err *err)
+{
+    pthread_mutex_lock(&device->lock); /* a client may ask for the time already */
+    int rc = head_clock_power_up(&device->clock, now_ns, err);
+    pthread_mutex_unlock(&device->lock);
+    *warning = device->clock.warning[0] != '\0' ? device->clock.warning : NULL;
+    return rc;
+}
+
+int64_t device_gps_ns(const struct device *device, int64_t t_ns)
+{
+    return device->clock.source != HEAD_CLOCK_NONE ? utc_gps_ns(head_clock_ns(&device->clock, t_ns)) : 0;
+}
+
+void device_say_pps(struct device *device, uint64_t tick)
+{
+    const struct head_clock *clock = &device->clock;
+    int64_t t_ns = (int64_t)tick * device->tick_ns, edge_ns, tai_s;
+    if (clock->source == HEAD_CLOCK_NONE || !head_clock_edge(clock, t_ns, t_ns + device->tick_ns, &edge_ns, &tai_s))
+        return;
+    int64_t tai_ns = tai_s * UTC_SECOND_NS;
+    char text[UTC_TEXT_LEN];
+    struct utc_time utc;
+    utc_from_tai(&clock->table, tai_ns, &utc);
+    utc_format(&utc, 0, text);
+    device_push_event(device, NATIVE_EV_PPS, (uint64_t)(utc_posix_from_tai(&clock->table, tai_ns) / UTC_SECOND_NS),
+                      (uint64_t)edge_ns, (uint64_t)(utc_gps_ns(tai_ns) / UTC_SECOND_NS), text);
+}
+
+void device_say_time(struct device *device, uint64_t tick)
+{
+    int64_t t_ns = (int64_t)tick * device->tick_ns;
+    if (device->clock.source == HEAD_CLOCK_NONE) return;
+    device_push_event(device, NATIVE_EV_TIME, 0, (uint64_t)t_ns, (uint64_t)device_gps_ns(device, t_ns), "");
+}
+
+void device_set_time_texts(struct device *device)
+{
+    struct command_device *cmd = &device->cmd;
+    const struct head_clock *clock = &device->clock;
+    cmd->utc[0] = cmd->gps[0] = '\0';
+    if (clock->source == HEAD_CLOCK_NONE) return;
+    int64_t tai_ns = head_clock_ns(clock, cmd->t_ns);
+    struct utc_time utc;
+    utc_from_tai(&clock->table, tai_ns, &utc);
+    utc_format(&utc, 9, cmd->utc);
+    struct utc_gps gps = utc_gps_week(tai_ns);
+    snprintf(cmd->gps, sizeof cmd->gps, "%lld,%lld.%09lld", (long long)gps.week, (long long)(gps.ns / UTC_SECOND_NS),
+             (long long)(gps.ns % UTC_SECOND_NS));
+}
+
+uint64_t device_gnss_count(const struct device *device, int64_t t_ns)
+{
+    return gnss_count(&device->gnss, t_ns);
+}
+
+int64_t device_gnss_time_ns(const struct device *device, uint64_t index)
+{
+    return gnss_time_ns(&device->gnss, index);
+}
+
+size_t device_gnss_sentences(struct device *device, uint64_t index, char *dst, size_t cap)
+{
+    struct gnss_track track;
+    int64_t t_ns = gnss_time_ns(&device->gnss, index);
+    pthread_mutex_lock(&device->lock);
+    uint32_t station = device->cmd.settings.station - 1;
+    int moves = device_head_pose(device, t_ns, &track.at);
+    if (moves) {
+        device_head_pose(device, t_ns - GNSS_STEP_NS, &track.before);
+        device_head_pose(device, t_ns + GNSS_STEP_NS, &track.after);
+    }
+    pthread_mutex_unlock(&device->lock);
+    return gnss_sentences(&device->gnss, index, station, moves ? &track : NULL, dst, cap);
+}

@@ -1,0 +1,60 @@
+/* The fixed-rate loop: casters ahead, one pacing thread, one thread per link.
+ *
+ * Casters claim ticks up to ahead_ms before their time and fill slots. The pacing thread sleeps on an absolute clock
+ * and releases each tick when its last pulse has fired; releasing is sealing the frames' sequence numbers, one store
+ * and one wake-up a link. A tick that isn't ready late_ms after its time is given up: announced on the wire, counted,
+ * and a gap in the pulse numbers. (What the pacing thread itself overslept, because the whole machine stood still, is
+ * added to late_ms until it has caught up.) In the paces fast and step nothing is lost: release waits for casters and
+ * readers.
+ *
+ * The pacing thread runs at SCHED_FIFO where permitted and touches no lock, allocator or log. */
+#ifndef FIRMWARE_SIM_LOOP_LOOP_H
+#define FIRMWARE_SIM_LOOP_LOOP_H
+
+#include <stdatomic.h>
+#include <stdio.h>
+
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/device/device.h"
+
+struct loop;
+
+struct loop_options {
+    int hash;                       /* keep stream_sha256 */
+    const struct link_spec *extra;  /* one more link than the configuration has; NULL: none */
+    const struct sh_report *report; /* warnings while running (from any thread); NULL: none */
+};
+
+struct loop_stats {
+    uint64_t pulses, fired_pulses, echoes, lines, scans;
+    uint64_t crowded, faint, unfit; /* hits that are no echoes: struct cast_counters */
+    uint64_t lost_pulses, lost_ticks, late_blocks, reader_lost_frames;
+    uint64_t late_poses, bad_poses; /* of a live platform */
+    double wall_s;                  /* from the release of the first pulse to that of the last */
+    double late_p50_us, late_p999_us, late_max_us;
+    int have_hash;
+    char sha256[65];
+};
+
+/* Opens all links; nothing runs yet. On failure everything opened is closed again. */
+int loop_create(const struct site *site, struct device *device, const struct loop_options *options, struct loop **out,
+                struct sh_err *err);
+
+/* One JSON line with the endpoints of all links. */
+void loop_print_endpoints(const struct loop *loop, FILE *out);
+/* "tty:..." and so on of link i, behind the links of the socket for poses, or 0 when there is no such link. */
+int loop_endpoint(const struct loop *loop, uint32_t i, char *buf, size_t len);
+
+/* Starts the threads. */
+int loop_start(struct loop *loop, struct sh_err *err);
+/* True once the run is over and its readers have what they can take. */
+int loop_is_over(const struct loop *loop);
+/* Ends the run early. Any thread. */
+void loop_end(struct loop *loop);
+/* Waits for the end, stops the threads, closes the links, fills stats. */
+void loop_join(struct loop *loop, struct loop_stats *stats);
+/* After loop_join: 0, or what kept a link from getting all it should. */
+int loop_check_links(const struct loop *loop, struct sh_err *err);
+void loop_free(struct loop *loop);
+
+#endif

@@ -1,0 +1,154 @@
+#include "firmware_sim/loop/pose_feed.h"
+
+#include <errno.h>
+#include <math.h>
+#include <netdb.h>
+#include <poll.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "drivers/link/link_util.h"
+#include "firmware_sim/base/clock.h"
+
+enum { DATAGRAM = 65536 };
+
+struct pose_feed {
+    struct device *device;
+    int fd, stop_fd;
+    char endpoint[96];
+    pthread_t thread;
+    int running;
+    int64_t told_ns; /* when a bad line was told last */
+    char text[DATAGRAM + 1];
+};
+
+int pose_feed_parse(const char *line, int64_t *t_ns, double pose[6])
+{
+    static const double most[7] = {1e9, 1e9, 1e9, 1e9, 360.0, 90.0, 360.0};
+    double v[7];
+    for (int i = 0; i < 7; i++) {
+        char *end;
+        v[i] = strtod(line, &end);
+        if (end == line || !(fabs(v[i]) <= most[i])) return -1;
+        line = end + strspn(end, " \t");
+        if (i < 6 && *line == ',') line++;
+        if (i < 6 && line == end) return -1;
+    }
+    if (line[strspn(line, " \t\r")] != '\0') return -1;
+    *t_ns = llround(1e9 * v[0]);
+    memcpy(pose, v + 1, 6 * sizeof *pose);
+    return 0;
+}
+
+static void tell_bad(struct pose_feed *feed, const char *what)
+{
+    int64_t now_ns = clock_now_ns();
+    if (feed->told_ns != 0 && now_ns - feed->told_ns < 1000000000) return;
+    feed->told_ns = now_ns;
+    device_report(feed->device, CMD_E_DATA_TYPE, what);
+}
+
+static void take_line(struct pose_feed *feed, const char *line)
+{
+    int64_t t_ns;
+    double pose[6];
+    if (line[strspn(line, " \t\r")] == '\0') return;
+    if (pose_feed_parse(line, &t_ns, pose) != 0) {
+        atomic_fetch_add(&device_counters(feed->device)->bad_poses, 1);
+        tell_bad(feed, "a pose that is not t_s x y z roll pitch heading");
+    } else if (device_pose_numbers(feed->device, t_ns, pose) != 0) {
+        tell_bad(feed, "a pose out of platform.reach_m, not after the last one, or over 1 h ahead");
+    }
+}
+
+static void take_datagram(struct pose_feed *feed)
+{
+    ssize_t n = recv(feed->fd, feed->text, DATAGRAM, MSG_DONTWAIT);
+    if (n <= 0) return;
+    feed->text[n] = '\0';
+    for (char *line = feed->text, *next; line != NULL; line = next) {
+        next = strchr(line, '\n');
+        if (next != NULL) *next++ = '\0';
+        take_line(feed, line);
+    }
+}
+
+static void *feed_main(void *arg)
+{
+    struct pose_feed *feed = arg;
+    struct pollfd slot[2] = {{.fd = feed->fd, .events = POLLIN}, {.fd = feed->stop_fd, .events = POLLIN}};
+    for (;;) {
+        if (poll(slot, 2, -1) < 0 && errno != EINTR) break;
+        if (slot[1].revents != 0) break;
+        if (slot[0].revents != 0) take_datagram(feed);
+    }
+    return NULL;
+}
+
+static int bind_to(struct pose_feed *feed, const char *address, unsigned port, struct sh_err *err)
+{
+    char service[8];
+    snprintf(service, sizeof service, "%u", port & 0xffffu);
+    struct addrinfo hints = {.ai_socktype = SOCK_DGRAM, .ai_flags = AI_PASSIVE | AI_NUMERICSERV}, *at = NULL;
+    int rc = getaddrinfo(address, service, &hints, &at);
+    if (rc != 0) return sh_fail(err, SH_EINPUT, "platform.address %s: no such address: %s", address, gai_strerror(rc));
+    feed->fd = socket(at->ai_family, at->ai_socktype | SOCK_CLOEXEC, at->ai_protocol);
+    if (feed->fd < 0 || bind(feed->fd, at->ai_addr, at->ai_addrlen) != 0)
+        rc = sh_fail(err, errno == EADDRINUSE || errno == EADDRNOTAVAIL ? SH_EINPUT : SH_EIO,
+                     "platform udp:%s:%u: cannot listen: %s", address, port, strerror(errno));
+    freeaddrinfo(at);
+    if (rc != 0) return rc;
+    struct sockaddr_storage own;
+    socklen_t len = sizeof own;
+    char text[80];
+    getsockname(feed->fd, (struct sockaddr *)&own, &len);
+    link_address_text((struct sockaddr *)&own, len, text, sizeof text);
+    snprintf(feed->endpoint, sizeof feed->endpoint, "udp:%s", text);
+    return SH_OK;
+}
+
+int pose_feed_open(struct device *device, const struct config *cfg, struct pose_feed **out, struct sh_err *err)
+{
+    *out = NULL;
+    struct pose_feed *feed = calloc(1, sizeof *feed);
+    if (feed == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
+    feed->device = device;
+    feed->fd = -1;
+    feed->stop_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    int rc = feed->stop_fd < 0 ? sh_fail(err, SH_EIO, "eventfd: %s", strerror(errno)) : SH_OK;
+    if (rc == SH_OK) rc = bind_to(feed, cfg->platform.address, cfg->platform.port, err);
+    if (rc != SH_OK) {
+        pose_feed_close(feed);
+        return rc;
+    }
+    *out = feed;
+    return SH_OK;
+}
+
+int pose_feed_start(struct pose_feed *feed, struct sh_err *err)
+{
+    int rc = pthread_create(&feed->thread, NULL, feed_main, feed);
+    if (rc != 0) return sh_fail(err, SH_EIO, "no thread for the platform's poses: %s", strerror(rc));
+    feed->running = 1;
+    return SH_OK;
+}
+
+void pose_feed_endpoint(const struct pose_feed *feed, char *buf, size_t len)
+{
+    snprintf(buf, len, "%s", feed->endpoint);
+}
+
+void pose_feed_close(struct pose_feed *feed)
+{
+    if (feed == NULL) return;
+    uint64_t one = 1;
+    if (feed->running && write(feed->stop_fd, &one, sizeof one) == sizeof one) pthread_join(feed->thread, NULL);
+    if (feed->fd >= 0) close(feed->fd);
+    if (feed->stop_fd >= 0) close(feed->stop_fd);
+    free(feed);
+}

@@ -1,0 +1,231 @@
+#include "firmware_sim/site/detection.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/rng.h"
+
+static const double DEG_RAD = M_PI / 180.0;
+static const char GHOST[] = "ghost of ";
+
+static int set_up_signal(struct site *site, struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    const struct config_profile *p = &cfg->profile;
+    struct detect_signal_spec spec;
+    struct sh_err why;
+    double wavelength_m = 1e-9 * p->wavelength_nm, day = detect_extinction_1_m(p->visibility_m, wavelength_m);
+    config_signal_spec(p, &spec);
+    spec.sharp = cfg->signal.sharp;
+    spec.seed = cfg->noise.seed;
+    if (cfg->signal.has_extinction)
+        spec.extinction_1_m = 1e-3 * cfg->signal.extinction_1_km - day;
+    else if (cfg->signal.visibility_m > 0.0)
+        spec.extinction_1_m = detect_extinction_1_m(cfg->signal.visibility_m, wavelength_m) - day;
+    if (detect_signal_set_up(&spec, &site->detect.signal, &why) != SH_OK)
+        return sh_fail(err, SH_EINPUT, "%s: %.300s", cfg->profile_file, why.text);
+    return SH_OK;
+}
+
+static void set_up_encoder(struct instrument_encoder *e, double index_deg, double scale_ppm, double eccentricity_deg,
+                           double phase_deg)
+{
+    *e = (struct instrument_encoder){index_deg * DEG_RAD, 1e-6 * scale_ppm, eccentricity_deg * DEG_RAD,
+                                     phase_deg * DEG_RAD};
+}
+
+static void set_up_instrument(const struct config *cfg, struct instrument *out)
+{
+    const struct config_instrument *k = &cfg->instrument;
+    *out = (struct instrument){.collimation_rad = k->collimation_deg * DEG_RAD,
+                               .trunnion_rad = k->trunnion_deg * DEG_RAD,
+                               .transit_offset_m = k->transit_offset_m,
+                               .mirror_offset_m = k->mirror_offset_m,
+                               .range_offset_m = k->range_offset_m,
+                               .range_scale = 1e-6 * k->range_scale_ppm,
+                               .mirror_key = rng_key(cfg->noise.seed, RNG_MIRROR),
+                               .pan_key = rng_key(cfg->noise.seed, RNG_PAN)};
+    set_up_encoder(&out->mirror, k->mirror_index_deg, k->mirror_scale_ppm, k->mirror_eccentricity_deg,
+                   k->mirror_phase_deg);
+    set_up_encoder(&out->pan, k->pan_index_deg, k->pan_scale_ppm, k->pan_eccentricity_deg, k->pan_phase_deg);
+    if (!cfg->noise.angle) return;
+    out->mirror_sigma_rad = cfg->profile.mirror_sigma_deg * DEG_RAD;
+    out->pan_sigma_rad = cfg->profile.pan_sigma_deg * DEG_RAD;
+}
+
+/* NULL: none. */
+static const struct scene_texture *texture_of(const struct site *site, uint32_t label)
+{
+    const struct scene *scene = site->scene;
+    for (uint32_t i = 0; label >= scene->n_surfaces; i++) {
+        label -= scene->n_surfaces;
+        scene = site->mover[i].scene;
+    }
+    uint32_t number = scene->surface[label].texture;
+    return number != 0 ? &scene->texture[number - 1] : NULL;
+}
+
+/* Those whose reflectance no rule says. What can't be read is told. */
+static int set_up_textures(struct site *site, const uint8_t *said, const struct sh_report *report, struct sh_err *err)
+{
+    struct sh_err why, first = {0};
+    uint32_t failed = 0;
+    int rc = SH_OK;
+    for (uint32_t i = 0; i < site->n_surfaces && rc == SH_OK; i++) {
+        const struct scene_texture *texture = said[i] ? NULL : texture_of(site, i);
+        if (texture == NULL) continue;
+        rc = surface_table_texture(&site->detect.surfaces, i, site_surface(site, i), texture, &why);
+        if (rc != SH_EINPUT) continue;
+        if (failed++ == 0) first = why;
+        rc = SH_OK;
+    }
+    if (rc != SH_OK) return sh_fail(err, rc, "%s", why.text);
+    if (failed > 0)
+        sh_warn(report,
+                "%s: %u surfaces have a texture that is not used: their colour counts, or signal.reflectance; the "
+                "first: %s",
+                site->cfg->file, failed, first.text);
+    return rc;
+}
+
+static int set_up_surfaces(struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    uint32_t fits[CONFIG_MAX_SURFACES] = {0}, unknown = 0;
+    uint8_t *is_said = calloc(site->n_surfaces, 1);
+    int rc = surface_table_alloc(site->n_surfaces, &site->detect.surfaces, err);
+    if (rc == SH_OK && is_said == NULL) rc = sh_fail(err, SH_ENOMEM, "no memory for %u surfaces", site->n_surfaces);
+    for (uint32_t i = 0; i < site->n_surfaces && rc == SH_OK; i++) {
+        int rule = surface_table_set(&site->detect.surfaces, i, site_surface(site, i), cfg->surface, cfg->n_surfaces,
+                                     cfg->signal.reflectance);
+        if (rule >= 0) fits[rule]++;
+        int said = rule >= 0 && !isnan(cfg->surface[rule].surface.reflectance);
+        is_said[i] = (uint8_t)said;
+        unknown += !said && !site_surface(site, i)->has_colour && site_surface(site, i)->texture == 0;
+    }
+    if (rc == SH_OK && cfg->signal.on) rc = set_up_textures(site, is_said, report, err);
+    free(is_said);
+    if (rc == SH_OK && cfg->signal.on && unknown > 0)
+        sh_warn(report,
+                "%s: of %u of %u surfaces neither the mesh's colour nor surfaces tells the reflectance: %g is taken "
+                "(signal.reflectance)",
+                cfg->file, unknown, site->n_surfaces, cfg->signal.reflectance);
+    for (uint32_t i = 0; i < cfg->n_surfaces && rc == SH_OK; i++)
+        if (fits[i] == 0)
+            sh_warn(report, "%s: surfaces[%u]: no surface of material \"%s\", object \"%s\" is left for it", cfg->file,
+                    i, cfg->surface[i].material, cfg->surface[i].object);
+    return rc;
+}
+
+/* Ghosts get labels of their own, and names that say so. */
+static int name_ghosts(struct site *site, struct sh_err *err)
+{
+    struct site_detect *d = &site->detect;
+    uint32_t n = site->n_surfaces;
+    if (2 * n > SCENE_MAX_SURFACES)
+        return sh_fail(err, SH_EINPUT,
+                       "%s: surfaces: %u surfaces and a mirror: each needs a second label for its ghost; "
+                       "allowed up to %d",
+                       site->cfg->file, n, SCENE_MAX_SURFACES / 2);
+    struct scene_surface *ghost = calloc(n, sizeof *ghost);
+    if (ghost == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the names of ghosts");
+    for (uint32_t i = 0; i < n; i++) {
+        const struct scene_surface *of = site_surface(site, i);
+        int room = SCENE_NAME_LEN - (int)sizeof GHOST, len = (int)strlen(of->object);
+        if (len > room)
+            for (len = room; len > 0 && ((unsigned char)of->object[len] & 0xc0) == 0x80;)
+                len--; /* between two characters of UTF-8 */
+        ghost[i] = *of;
+        snprintf(ghost[i].object, SCENE_NAME_LEN, "%s%.*s", GHOST, len, of->object);
+    }
+    d->ghost = ghost; /* from here on site_surface tells them from the others */
+    d->n_real = n;
+    site->n_surfaces = 2 * n;
+    return SH_OK;
+}
+
+int site_set_up_detect(struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    struct site_detect *d = &site->detect;
+    int rc = SH_OK;
+    d->cast = (struct cast_detect){.max_echoes = cfg->profile.max_echoes,
+                                   .separation_m = 0.5 * DETECT_LIGHT_M_S * 1e-9 * cfg->profile.pulse_width_ns,
+                                   .ambiguity = cfg->head.ambiguity,
+                                   .zones = cfg->head.mta_zones};
+    if (cfg->signal.on || cfg->n_surfaces > 0) rc = set_up_surfaces(site, report, err);
+    if (rc == SH_OK && cfg->signal.on) rc = set_up_signal(site, err);
+    if (rc != SH_OK) return rc;
+    d->cast.depth = d->surfaces.has_optics ? cfg->optics.depth : 0;
+    d->cast.surfaces = cfg->signal.on || d->cast.depth > 0 ? &d->surfaces : NULL;
+    d->cast.signal = cfg->signal.on ? &d->signal : NULL;
+    d->cast.noise_by_signal = cfg->noise.range == RANGE_NOISE_SIGNAL;
+    d->cast.ghost_label = site->n_surfaces;
+    if (d->cast.surfaces != NULL && site_casts_footprints(cfg)) {
+        d->kind = calloc(d->surfaces.n + 1, sizeof *d->kind);
+        rc = d->kind == NULL ? sh_fail(err, SH_ENOMEM, "no memory for kinds of surfaces")
+                             : surface_kinds(&d->surfaces, d->kind, err);
+    }
+    if (rc == SH_OK && d->cast.depth > 0 && d->surfaces.has_mirror) rc = name_ghosts(site, err);
+    set_up_instrument(cfg, &d->instrument);
+    if (!instrument_is_ideal(&d->instrument)) d->cast.instrument = &d->instrument;
+    if (cfg->noise.ball.radius_m > 0.0) {
+        d->ball = (struct detect_ball){
+            .radius_m = cfg->noise.ball.radius_m, .per_distance_1_m = cfg->noise.ball.distance_1_m, .local = cfg->noise.ball.local};
+        memcpy(d->ball.factor, cfg->noise.ball.factor, sizeof d->ball.factor);
+        detect_ball_keys(&d->ball, cfg->noise.ball.seed);
+        d->cast.ball = &d->ball;
+    }
+    site_set_depth(site, d->cast.depth);
+    return rc;
+}
+
+int site_casts_footprints(const struct config *cfg)
+{
+    return cfg->beam.mode != BEAM_SINGLE || cfg->beam.measures;
+}
+
+void site_set_depth(struct site *site, uint32_t depth)
+{
+    struct site_detect *d = &site->detect;
+    d->cast.depth = depth;
+    d->on = d->cast.signal != NULL || d->cast.depth > 0 || d->cast.instrument != NULL || d->cast.ball != NULL ||
+            d->cast.ambiguity != DETECT_AMBIGUITY_NONE;
+}
+
+void site_free_detect(struct site *site)
+{
+    surface_table_free(&site->detect.surfaces);
+    free(site->detect.ghost);
+    free(site->detect.kind);
+}
+
+double site_ray_reach_m(const struct site *site, const double station_m[3])
+{
+    const struct config_instrument *k = &site->cfg->instrument;
+    double beside_m = hypot(k->transit_offset_m, k->mirror_offset_m), far2 = 0.0;
+    /* What is planned by looking at the scene must not hang on whether a run or `plan` looks at it. */
+    const int looks = site->cfg->cast.refine == CHOICE_AUTO && site->cfg->plan.tolerance_given;
+    if (site_casts_footprints(site->cfg) || looks) beside_m += 0.5 * site->cfg->profile.beam_exit_m;
+    if (site->detect.cast.depth == 0) return beside_m;
+    for (int i = 0; i < 3; i++) {
+        double far = fmax(fabs(site->scene->min_m[i] - station_m[i]), fabs(site->scene->max_m[i] - station_m[i]));
+        far2 += far * far;
+    }
+    /* What moves may be anywhere. */
+    double behind_m = site->n_movers > 0 ? INFINITY : sqrt(far2) + 1e-3;
+    return beside_m + fmin(behind_m, site->cfg->profile.range_max_m);
+}
+
+double site_noise_m(const struct site *site)
+{
+    const struct config *cfg = site->cfg;
+    const struct config_profile *p = &cfg->profile;
+    double sigma_m = p->range_sigma_m + 1e-6 * p->range_sigma_ppm * p->range_max_m;
+    if (cfg->noise.range == RANGE_NOISE_SIGNAL) sigma_m += sqrt(site->detect.signal.jitter2); /* at the threshold */
+    const double *f = cfg->noise.ball.factor;
+    double ball_m = cfg->noise.ball.radius_m * (1.0 + cfg->noise.ball.distance_1_m * p->range_max_m) * fmax(f[0], fmax(f[1], f[2]));
+    return 10.0 * sigma_m + ball_m;
+}

@@ -1,0 +1,156 @@
+/* Georeferencing of a site: heights, method, counts. */
+#include "firmware_sim/site/georeference.h"
+
+#include "firmware_sim/site/detection.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* How far points can be from the place that they are relative to: that of a station, or of a leg. */
+static double reach_m(const struct site *site, const struct site_stretch *stretch)
+{
+    double way_m = stretch != NULL ? stretch->reach_m : site->live_reach_m;
+    return (site->cfg->profile.range_max_m + way_m) * SITE_MARGIN;
+}
+
+/* Where points can be, seen from there: within the scene, and within the head's range. A hundredth more, and ten sigma,
+ * for noise. */
+static void extent_from(const struct site *site, const double centre_m[3], double reach, struct plan_georef_need *need)
+{
+    double far[3], noise_m = site_noise_m(site);
+    for (int i = 0; i < 3; i++) {
+        double low = centre_m[i] - site->scene->min_m[i], high = site->scene->max_m[i] - centre_m[i];
+        far[i] = fmax(low, high) * SITE_MARGIN + noise_m;
+    }
+    need->radius_m = need->height_m = reach;
+    if (site->n_movers > 0) return;                                                 /* they may go anywhere */
+    if (site->detect.ghost != NULL || site->detect.cast.instrument != NULL) return; /* beside the scene */
+    need->radius_m = fmin(reach, hypot(far[0], far[1]));
+    need->height_m = fmin(reach, far[2]);
+}
+
+static int plan_one(const struct site *site, struct georef *georef, const double centre_m[3], double reach,
+                    struct plan_row *row, struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    struct plan_georef_need need = {.tolerance_m = cfg->output.tolerance_m, .forced = cfg->output.georef};
+    enum georef_method method;
+    struct sh_err why;
+    extent_from(site, centre_m, reach, &need);
+    int rc = plan_georef(georef, &need, &method, row, &why);
+    if (rc != SH_OK) return sh_fail(err, rc, "%s: output.georef: %.300s", cfg->file, why.text);
+    return georef_set_method(georef, method, err);
+}
+
+/* The path in legs, each with a georeference of its own about its middle: counts and polynomials have to reach no
+ * further, however long it is. */
+static int plan_legs(const struct site *site, struct site_station *s, struct sh_err *err)
+{
+    struct plan_row row;
+    s->leg = calloc(site->n_stretches, sizeof *s->leg);
+    if (s->leg == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the path");
+    for (size_t i = 0; i < site->n_stretches; i++) {
+        const struct site_stretch *stretch = &site->stretch[i];
+        int rc = georef_recentre(s->georef, stretch->centre_m, &s->leg[i].georef, err);
+        if (rc == SH_OK) rc = plan_one(site, s->leg[i].georef, stretch->centre_m, reach_m(site, stretch), &row, err);
+        if (rc != SH_OK) return rc;
+        if (i == 0 || row.cost_ns > s->plan.cost_ns ||
+            (row.cost_ns == s->plan.cost_ns && row.error_m > s->plan.error_m))
+            s->plan = row;
+    }
+    char why[sizeof row.why];
+    snprintf(why, sizeof why, "path of %zu stretches, each about its middle: %.130s", site->n_stretches, s->plan.why);
+    memcpy(s->plan.why, why, sizeof s->plan.why);
+    return SH_OK;
+}
+
+int site_plan_georef(const struct site *site, struct site_station *s, const struct sh_report *report,
+                     struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    int has_legs = site->n_knots != 0 && cfg->output.layout == LINE_GEO;
+    int rc = has_legs ? plan_legs(site, s, err)
+                      : plan_one(site, s->georef, s->at.position_m, reach_m(site, NULL), &s->plan, err);
+    if (rc == SH_OK && s->plan.error_m > cfg->output.tolerance_m && cfg->output.layout == LINE_GEO)
+        sh_warn(report, "station %s: georeferencing by %s may be off by %.2g m, more than output.tolerance_m",
+                s->station->name, s->plan.method, s->plan.error_m);
+    return rc;
+}
+
+int site_open_geoid(struct site *site, struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    struct sh_err why;
+    int has_heights = cfg->output.crs == GEOREF_UTM || cfg->output.crs == GEOREF_GEODETIC;
+    if (cfg->output.heights == HEIGHTS_ELLIPSOID || !has_heights) return SH_OK;
+    int rc = georef_geoid_open(&site->geoid, &why);
+    if (rc == SH_OK || cfg->output.heights == HEIGHTS_AUTO) return SH_OK;
+    return sh_fail(err, rc, "%s: output.heights: %.400s", cfg->file, why.text);
+}
+
+/* Of a station, or of its legs. */
+static int scale_station(const struct site *site, struct site_station *s, double scale_m, struct sh_err *err)
+{
+    int rc = SH_OK;
+    if (s->leg == NULL) return georef_scale(s->georef, scale_m, reach_m(site, NULL), s->scale, err);
+    for (size_t i = 0; i < site->n_stretches && rc == SH_OK; i++)
+        rc = georef_scale(s->leg[i].georef, scale_m, reach_m(site, &site->stretch[i]), s->leg[i].scale, err);
+    return rc;
+}
+
+/* Per station; whether they all fit. Polar points have no coordinates that need to. */
+static int scale_stations(struct site *site, double scale_m, struct sh_err *err)
+{
+    int rc = SH_OK;
+    struct sh_err why;
+    site->scale_m = scale_m;
+    for (uint32_t i = 0; i < site->n_stations && rc == SH_OK; i++) {
+        struct site_station *s = &site->station[i];
+        rc = scale_station(site, s, scale_m, &why);
+        if (site->cfg->output.layout == LINE_POLAR) rc = SH_OK;
+        if (rc != SH_OK)
+            sh_fail(err, rc, "%s: output.scale_m: station %s: %.300s", site->cfg->file, s->station->name, why.text);
+    }
+    return rc;
+}
+
+/* The finest 1e-6 x 10^n m with which the head's whole range fits into 31 bits, in the geo layout from anywhere on its
+ * leg, with a hundredth left for noise, unless the configuration names a scale. */
+static int choose_scale(struct site *site, struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    if (cfg->output.scale_m > 0.0) return scale_stations(site, cfg->output.scale_m, err);
+    double scale_m = 1e-6;
+    while (cfg->profile.range_max_m * SITE_MARGIN / scale_m > 2147483647.0)
+        scale_m *= 10.0;
+    int rc = scale_stations(site, scale_m, err);
+    while (rc != SH_OK && scale_m < 1.0)
+        rc = scale_stations(site, scale_m *= 10.0, err);
+    return rc;
+}
+
+static double count_m(const struct site *site, const struct site_station *s)
+{
+    double most_m = 0.0;
+    if (s->leg == NULL) return georef_count_m(s->georef, reach_m(site, NULL), s->scale);
+    for (size_t i = 0; i < site->n_stretches; i++)
+        most_m = fmax(most_m, georef_count_m(s->leg[i].georef, reach_m(site, &site->stretch[i]), s->leg[i].scale));
+    return most_m;
+}
+
+int site_choose_scale(struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    int rc = choose_scale(site, err);
+    for (uint32_t i = 0; i < site->n_stations && rc == SH_OK && site->cfg->output.layout == LINE_GEO; i++) {
+        double most_m = count_m(site, &site->station[i]);
+        if (most_m > site->scale_m * (1.0 + 1e-9))
+            sh_warn(
+                report,
+                "station %s: a count of longitude is up to %.2g m, all others at most %g m: near a pole 360 degrees "
+                "have to fit into 31 bits",
+                site->station[i].station->name, most_m, site->scale_m);
+    }
+    return rc;
+}

@@ -1,0 +1,182 @@
+#include "firmware_sim/site/placement.h"
+
+#include <math.h>
+#include <string.h>
+#include <strings.h>
+
+#include "core/cast.h"
+#include "core/ifc_site.h"
+#include "core/locate.h"
+#include "core/mat3.h"
+
+/* A floor at the place that was given, or this little above it, is still found. */
+#define FLOOR_ABOVE_M 0.01
+
+#define RAD(deg) ((deg)*M_PI / 180.0)
+
+static int is_ifc(const struct config_mesh *mesh)
+{
+    size_t len = strlen(mesh->file);
+    return len > 4 && strcasecmp(mesh->file + len - 4, ".ifc") == 0;
+}
+
+/* The one IFC mesh. Its frame must be the scene's but for a shift. */
+static int find_ifc(const struct config *cfg, const struct config_mesh **out, struct sh_err *err)
+{
+    *out = NULL;
+    for (uint32_t i = 0; i < cfg->scene.n_meshes; i++) {
+        const struct config_mesh *mesh = &cfg->scene.mesh[i];
+        if (!is_ifc(mesh)) continue;
+        if (*out != NULL)
+            return sh_fail(err, SH_EINPUT, "%s: scene.anchor: source ifc, but there are two IFC meshes; allowed one",
+                           cfg->file);
+        if (mesh->up != SCENE_UP_Y || mesh->scale != 1.0)
+            return sh_fail(err, SH_EINPUT,
+                           "%s: scene.anchor: source ifc needs the IFC mesh in its own axes and metres; allowed up: y, "
+                           "scale: 1",
+                           cfg->file);
+        *out = mesh;
+    }
+    if (*out != NULL) return SH_OK;
+    return sh_fail(err, SH_EINPUT, "%s: scene.anchor: source ifc, but no mesh is an .ifc file", cfg->file);
+}
+
+static int anchor_by_ifc(const struct config *cfg, const struct sh_report *report, struct geoframe *frame,
+                         struct sh_err *err)
+{
+    const struct config_mesh *mesh;
+    struct ifc_site site;
+    int rc = find_ifc(cfg, &mesh, err);
+    if (rc == SH_OK) rc = ifc_site_read(mesh->file, &site, err);
+    if (rc != SH_OK) return rc;
+    double origin_m[3], height_m = cfg->scene.anchor.height_m;
+    for (int i = 0; i < 3; i++)
+        origin_m[i] = site.origin_m[i] + mesh->offset_m[i];
+    if (!cfg->scene.anchor.height_given) {
+        height_m = isnan(site.elevation_m) ? 0.0 : site.elevation_m;
+        sh_warn(report, "%s: %s, taken as height above the ellipsoid; scene.anchor.height_m says it rightly",
+                mesh->file, isnan(site.elevation_m) ? "no RefElevation: 0 m" : "RefElevation counts from the sea");
+    }
+    if (site.has_map)
+        sh_warn(report, "%s: its IFCMAPCONVERSION is not read; the anchor is IFCSITE's latitude and longitude",
+                mesh->file);
+    const struct georef_place at = {site.lat_deg, site.lon_deg, height_m};
+    return geoframe_set_tangent(frame, origin_m, &at, site.north_deg, err);
+}
+
+int placement_find_anchor(const struct config *cfg, const struct sh_report *report, struct placement_anchor *anchor,
+                          struct sh_err *err)
+{
+    const struct config_anchor *a = &cfg->scene.anchor;
+    const struct georef_place at = {a->lat_deg, a->lon_deg, a->height_m};
+    memset(anchor, 0, sizeof *anchor);
+    anchor->known = a->source != ANCHOR_NONE;
+    switch (a->source) {
+    case ANCHOR_EXPLICIT:
+        return geoframe_set_tangent(&anchor->frame, a->origin_m, &at, a->north_deg, err);
+    case ANCHOR_IFC:
+        return anchor_by_ifc(cfg, report, &anchor->frame, err);
+    case ANCHOR_UTM:
+        return geoframe_set_grid(&anchor->frame, (int)a->utm_zone, a->north, err);
+    case ANCHOR_ECEF:
+        geoframe_set_ecef(&anchor->frame);
+        break;
+    case ANCHOR_NONE:
+        break;
+    }
+    return SH_OK;
+}
+
+/* The place on the Earth as it is given. */
+static int given_place(const struct config_station *s, struct georef_place *at, struct sh_err *err)
+{
+    int rc = SH_OK;
+    *at = (struct georef_place){s->lat_deg, s->lon_deg, s->height_m};
+    if (s->place == PLACE_UTM)
+        rc = georef_locate_utm((int)s->utm_zone, s->north, s->easting_m, s->northing_m, s->height_m, at, err);
+    if (s->place == PLACE_ECEF) rc = georef_locate_ecef(s->ecef_m, at, err);
+    return rc == SH_OK ? locate_check(at, err) : rc;
+}
+
+/* A UTM place in a scene of the same grid, and an ECEF place in a scene in ECEF, are the scene's to the last bit. */
+static int find_position(const struct config_station *s, const struct geoframe *frame, const struct georef_place *at,
+                         double position_m[3], struct sh_err *err)
+{
+    if (frame->kind == GEOFRAME_ECEF && s->place == PLACE_ECEF) {
+        memcpy(position_m, s->ecef_m, sizeof s->ecef_m);
+        return SH_OK;
+    }
+    if (frame->kind == GEOFRAME_GRID && s->place == PLACE_UTM && (int)s->utm_zone == frame->zone &&
+        s->north == frame->north) {
+        const double p[3] = {s->easting_m, s->northing_m, s->height_m};
+        memcpy(position_m, p, sizeof p);
+        return SH_OK;
+    }
+    return geoframe_find(frame, at, position_m, err);
+}
+
+/* From the place given down to the floor, and up by the instrument's height. */
+static int stand_on_floor(const struct config_station *s, const double level[9], const struct scene *scene,
+                          struct placement *out, struct sh_err *err)
+{
+    const double up[3] = {level[2], level[5], level[8]}, down[3] = {-up[0], -up[1], -up[2]};
+    double from_m[3], range_m;
+    for (int i = 0; i < 3; i++)
+        from_m[i] = out->position_m[i] + FLOOR_ABOVE_M * up[i];
+    int rc = cast_floor(scene, from_m, down, &range_m, err);
+    if (rc != SH_OK) return rc;
+    if (isnan(range_m))
+        return sh_fail(err, SH_EINPUT,
+                       "instrument_height_m, but no surface of the scene lies below %.10g %.10g %.10g m; give a place "
+                       "above the floor, or no instrument_height_m",
+                       out->position_m[0], out->position_m[1], out->position_m[2]);
+    out->floor_m = s->instrument_height_m;
+    for (int i = 0; i < 3; i++)
+        out->position_m[i] = from_m[i] + (s->instrument_height_m - range_m) * up[i];
+    return SH_OK;
+}
+
+static int find(const struct config_station *s, const struct placement_anchor *anchor, const struct scene *scene,
+                struct placement *out, struct sh_err *err)
+{
+    struct georef_place at;
+    double level[9], attitude[9];
+    int rc = given_place(s, &at, err);
+    memcpy(out->position_m, s->position_m, sizeof out->position_m);
+    if (rc == SH_OK && !s->has_position) rc = find_position(s, &anchor->frame, &at, out->position_m, err);
+    memcpy(level, mat3_unit, sizeof level);
+    if (rc == SH_OK && anchor->known) rc = geoframe_level(&anchor->frame, out->position_m, level, err);
+    if (rc == SH_OK && s->has_instrument_height) rc = stand_on_floor(s, level, scene, out, err);
+    if (rc == SH_OK && anchor->known) rc = geoframe_locate(&anchor->frame, out->position_m, &at, err);
+    if (!anchor->known) at.height_m += out->position_m[2] - s->position_m[2]; /* both are where the search began */
+    if (rc != SH_OK) return rc;
+    out->on_earth = anchor->known || s->place != PLACE_NONE;
+    out->lat_deg = at.lat_deg;
+    out->lon_deg = at.lon_deg;
+    out->height_m = at.height_m;
+    cast_attitude(RAD(s->heading_deg), RAD(s->pitch_deg), RAD(s->roll_deg), attitude);
+    mat3_multiply(level, attitude, out->rotation);
+    return SH_OK;
+}
+
+int placement_find(const struct config *cfg, uint32_t i, const struct placement_anchor *anchor,
+                   const struct scene *scene, struct placement *out, struct sh_err *err)
+{
+    struct sh_err why = {0, ""};
+    memset(out, 0, sizeof *out);
+    out->floor_m = NAN;
+    int rc = find(&cfg->station[i], anchor, scene, out, &why);
+    if (rc == SH_OK) return SH_OK;
+    return sh_fail(err, rc, "%s: stations[%u] (%s): %.300s", cfg->file, i, cfg->station[i].name, why.text);
+}
+
+int placement_georef(const struct placement *placement, const struct placement_anchor *anchor, struct georef_spec *spec,
+                     struct sh_err *err)
+{
+    if (anchor->known) return geoframe_fill(&anchor->frame, placement->position_m, spec, err);
+    memcpy(spec->station_m, placement->position_m, sizeof spec->station_m);
+    spec->lat_deg = placement->lat_deg;
+    spec->lon_deg = placement->lon_deg;
+    spec->height_m = placement->height_m;
+    return SH_OK;
+}

@@ -1,0 +1,35 @@
+/* Where the stations of a site stand: in the scene, and where the scene's anchor or the station says so, on the Earth.
+ */
+#ifndef FIRMWARE_SIM_SITE_PLACEMENT_H
+#define FIRMWARE_SIM_SITE_PLACEMENT_H
+
+#include "core/geoframe.h"
+#include "core/scene.h"
+#include "firmware_sim/config/config.h"
+
+struct placement_anchor {
+    int known; /* 0: source none */
+    struct geoframe frame;
+};
+
+/* Sets the scene's frame; reads the IFC mesh where it is the source. report may be NULL. */
+int placement_find_anchor(const struct config *cfg, const struct sh_report *report, struct placement_anchor *anchor,
+                          struct sh_err *err);
+
+struct placement {
+    double position_m[3];              /* of the head's origin, prcs */
+    double rotation[9];                /* socs -> prcs */
+    int on_earth;                      /* 0: lat_deg, lon_deg, height_m are 0 */
+    double lat_deg, lon_deg, height_m; /* of the head's origin */
+    double floor_m;                    /* distance down to the floor that was looked for; NaN: it wasn't */
+};
+
+/* Station i (0...) of the configuration. Floors are those of the scene, without what moves. */
+int placement_find(const struct config *cfg, uint32_t i, const struct placement_anchor *anchor,
+                   const struct scene *scene, struct placement *out, struct sh_err *err);
+
+/* The specification of a station's georeferencing, all but the CRS. */
+int placement_georef(const struct placement *placement, const struct placement_anchor *anchor, struct georef_spec *spec,
+                     struct sh_err *err);
+
+#endif

@@ -1,0 +1,148 @@
+/* The rows of the plan, and the order of surfaces. */
+#include "firmware_sim/site/plan_rows.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "firmware_sim/site/beam_choice.h"
+
+static struct plan_tolerance tolerance_of(const struct site *site)
+{
+    return (struct plan_tolerance){site->cfg->plan.tolerance_m, site->cfg->plan.echo_tolerance};
+}
+
+/* How far the scene goes from where the head may be. */
+static double farthest_m(const struct site *site)
+{
+    const struct config *cfg = site->cfg;
+    double far_m = 0.0;
+    if (site->moving || site->n_movers > 0) return cfg->profile.range_max_m;
+    for (uint32_t s = 0; s < site->n_stations; s++) {
+        double far2 = 0.0;
+        for (int i = 0; i < 3; i++) {
+            double at = site->station[s].at.position_m[i];
+            double far = fmax(fabs(site->scene->min_m[i] - at), fabs(site->scene->max_m[i] - at));
+            far2 += far * far;
+        }
+        far_m = fmax(far_m, sqrt(far2));
+    }
+    return fmin(far_m, cfg->profile.range_max_m);
+}
+
+int site_plan_order(struct site *site, struct sh_err *err)
+{
+    const struct plan_tolerance tolerance = tolerance_of(site);
+    const enum config_choice asked = site->cfg->scene.order_exactly;
+    struct plan_option option[2];
+    struct plan_row *row = &site->plan.order;
+    plan_order_options(farthest_m(site), option);
+    if (site->cfg->cast.refine == CHOICE_OFF) snprintf(option[1].why_not, sizeof option[1].why_not, "cast.refine is off");
+    int forced = asked == CHOICE_AUTO ? -1 : asked == CHOICE_ON;
+    site->plan.methods.order_exactly =
+        (int)plan_choose(row, "order", option, 2, forced, "scene.order_exactly", &tolerance);
+    size_t used = strlen(row->why);
+    if (!site->plan.methods.order_exactly)
+        snprintf(row->why + used, sizeof row->why - used,
+                 "; surfaces nearer to each other than the error may be taken for one another");
+    for (uint32_t i = 0; i < site->n_movers && site->plan.methods.order_exactly; i++) {
+        int rc = bvh_order_exactly(site->mover[i].bvh, err);
+        if (rc != SH_OK) return rc;
+    }
+    return SH_OK;
+}
+
+static void name_row(struct plan_row *row, const char *whose)
+{
+    char why[sizeof row->why];
+    snprintf(why, sizeof why, "%.60s: %.125s", whose, row->why);
+    memcpy(row->why, why, sizeof row->why);
+}
+
+/* A row for each station; one for all, with the largest bound, where they have the same method. */
+static void add_georef(const struct site *site, struct site_plan *plan)
+{
+    const struct site_station *s = site->station;
+    uint32_t same = 1, worst = 0;
+    for (uint32_t i = 1; i < site->n_stations; i++) {
+        same += strcmp(s[i].plan.method, s[0].plan.method) == 0;
+        if (s[i].plan.error_m > s[worst].plan.error_m) worst = i;
+    }
+    if (same == site->n_stations) {
+        struct plan_row *row = &plan->row[plan->n++];
+        *row = s[worst].plan;
+        if (site->n_stations > 1) name_row(row, "all stations");
+        return;
+    }
+    for (uint32_t i = 0; i < site->n_stations; i++) {
+        char whose[64];
+        snprintf(whose, sizeof whose, "station %u %.40s", i + 1, s[i].station->name);
+        plan->row[plan->n] = s[i].plan;
+        name_row(&plan->row[plan->n++], whose);
+    }
+}
+
+static int is_zero(const struct config_instrument *k)
+{
+    static const struct config_instrument zero;
+    return memcmp(k, &zero, sizeof zero) == 0;
+}
+
+static void ask_head(const struct site *site, struct plan_head *head)
+{
+    const struct config *cfg = site->cfg;
+    *head = (struct plan_head){
+        .cast_error_m = site->plan.cast.error_m,
+        .n_movers = site->n_movers,
+        .noise_on = cfg->noise.range != RANGE_NOISE_OFF,
+        .range_sigma_m = cfg->profile.range_sigma_m,
+        .range_sigma_ppm = cfg->profile.range_sigma_ppm,
+        .range_sigma_at_m = cfg->noise.range == RANGE_NOISE_SIGNAL ? cfg->profile.range_sigma_at_m : 0.0,
+        .ball_radius_m = cfg->noise.ball.radius_m,
+        .signal = site->detect.cast.signal != NULL,
+        .sharp = cfg->signal.sharp,
+        .ambiguity = cfg->head.ambiguity,
+        .instrument = !is_zero(&cfg->instrument),
+        .angle_noise = cfg->noise.angle,
+    };
+    for (uint32_t i = 0; i < cfg->profile.n_reaches; i++)
+        head->reach_m = fmax(head->reach_m, cfg->profile.reach[i].range_m);
+    if (cfg->profile.n_reaches == 0) head->reach_m = cfg->profile.range_max_m;
+}
+
+int site_plan_rows(struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    struct site_plan *plan = &site->plan;
+    struct plan_row of_head[PLAN_HEAD_ROWS];
+    struct plan_head head;
+    int rc = site_measure_forced(site, report, err);
+    if (rc != SH_OK) return rc;
+    ask_head(site, &head);
+    size_t n = plan_head(&head, of_head);
+    free(plan->row);
+    plan->row = calloc(n + 5 + site->n_stations, sizeof *plan->row);
+    if (plan->row == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
+    plan->n = 0;
+    plan->row[plan->n++] = plan->cast;
+    plan->row[plan->n++] = plan->order;
+    for (size_t i = 0; i < n; i++) {
+        plan->row[plan->n++] = of_head[i];
+        if (i != 0) continue; /* behind what moves */
+        plan->row[plan->n++] = plan->beam;
+        plan->row[plan->n++] = plan->optics;
+    }
+    if (site->cfg->output.layout == LINE_POLAR)
+        plan_georef_polar(&plan->row[plan->n++]);
+    else
+        add_georef(site, plan);
+    return SH_OK;
+}
+
+void site_plan_text(const struct site *site, char *text, size_t room)
+{
+    const struct site_plan *plan = &site->plan;
+    int polar = site->cfg->output.layout == LINE_POLAR;
+    snprintf(text, room, "cast %s; order %s; beam %s; optics %s; georef %s", plan->methods.plain ? "float" : "refined",
+             plan->order.method, plan->beam.method, plan->optics.method, polar ? "none" : site->station[0].plan.method);
+}

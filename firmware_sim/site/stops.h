@@ -1,0 +1,11 @@
+/* Private to site*.c: a head that scans where its platform stops. */
+#ifndef FIRMWARE_SIM_SITE_STOPS_H
+#define FIRMWARE_SIM_SITE_STOPS_H
+
+#include "firmware_sim/site/site.h"
+
+/* Puts the stops in the place of the configuration's only station. That one has been placed: without an anchor it says
+ * where on the Earth the scene lies, as an anchor at its position with the scene's y axis to true north would. */
+int site_load_stops(struct site *site, struct sh_err *err);
+
+#endif

@@ -1,0 +1,162 @@
+/* Private to app_bench.c and bench_*.c (tests/bench borrows the scenes, the rays and the plain Embree): what
+ * is measured, and the things it is measured with. Nothing here is part of a scan. tests/bench/README.md
+ * tells the method. */
+#ifndef TESTS_BENCH_BENCH_H
+#define TESTS_BENCH_BENCH_H
+
+#include "core/cast.h"
+#include "core/embree.h"
+#include "core/scene.h"
+#include "core/schedule.h"
+
+enum { BENCH_LINES = 400, BENCH_LINE_PULSES = 2500, BENCH_MIN_ROUNDS = 7, BENCH_MAX_ROUNDS = 101 };
+
+/* Beyond any wall of the scenes; the same for Embree and for us. */
+#define BENCH_RANGE_MAX_M 10000.0
+#define BENCH_SCALE_M     1e-5 /* with which that fits into 31 bits */
+
+/* ---- bench_scene.c: where is scanned */
+struct bench_target {
+    char name[32];
+    struct scene *scene;
+    double station_m[3];
+    double load_s;
+};
+/* Triangles that a name like 10k, 1M or 25000 stands for; 0: it is no number of 100 to 100M. */
+uint32_t bench_count(const char *name);
+/* "house" reads the IFC file; a number makes closed terrain, 200 m wide and 3 m rough, seen from 4.7 m above
+ * its middle. */
+int bench_target_load(const char *name, const char *house, const struct sh_report *report, struct bench_target *out,
+                      struct sh_err *err);
+void bench_target_free(struct bench_target *target);
+
+/* ---- bench_rays.c: a normal scan: lines of 100 degrees, 2500 pulses each, spread over a turn of the pan */
+struct bench_rays {
+    struct schedule_segment segment;
+    uint32_t lines, n;    /* lines * BENCH_LINE_PULSES */
+    double *dx, *dy, *dz; /* unit vectors, prcs */
+    float *fx, *fy, *fz;  /* the same for Embree */
+};
+void bench_schedule(uint32_t lines, uint32_t frames, struct schedule_spec *spec);
+int bench_rays_create(uint32_t lines, struct bench_rays *out, struct sh_err *err);
+void bench_rays_free(struct bench_rays *rays);
+/* A block of them, to be worked on while it lies in the cache, as the pipeline has its rays. */
+enum { BENCH_BLOCK = 2000 }; /* divides what 4 lines have, is a multiple of 16 */
+struct bench_block {
+    double dx[BENCH_BLOCK], dy[BENCH_BLOCK], dz[BENCH_BLOCK];
+    float fx[BENCH_BLOCK], fy[BENCH_BLOCK], fz[BENCH_BLOCK];
+};
+void bench_rays_block(const struct bench_rays *rays, uint32_t first, struct bench_block *out);
+
+/* ---- bench_embree.c: Embree as it comes: the mesh with shared vertices, rounded to float in the frame of
+ * the station */
+enum bench_feed {
+    BENCH_PREPARED, /* packets lie in memory, ready; only tfar and geomID are set again */
+    BENCH_LOADED,   /* one packet, filled from arrays of directions */
+};
+struct bench_embree {
+    RTCDevice device;
+    RTCScene rtc;
+    double build_s;
+    uint32_t n;                /* rays below */
+    const float *fx, *fy, *fz; /* of the rays; not owned */
+    uint32_t width;            /* of the packets that lie ready; 0: none */
+    void *packets;
+    uint32_t *prim; /* results of BENCH_LOADED */
+    float *t;
+};
+int bench_embree_create(const struct scene *scene, const double origin_m[3], int robust, struct bench_embree *out,
+                        struct sh_err *err);
+/* Takes n rays from the origin; the arrays stay the caller's, and n is a multiple of 16. */
+int bench_embree_rays(struct bench_embree *e, const float *fx, const float *fy, const float *fz, uint32_t n,
+                      struct sh_err *err);
+/* Makes ready for passes of this width (1, 4, 8 or 16) and feed. */
+int bench_embree_prepare(struct bench_embree *e, uint32_t width, enum bench_feed feed, struct sh_err *err);
+/* The rays' directions have changed: the packets that lie ready get them. */
+void bench_embree_refill(const struct bench_embree *e);
+/* Casts rays first .. first+n-1 (multiples of 16), results in prim and t for BENCH_LOADED. */
+void bench_embree_pass(const struct bench_embree *e, uint32_t width, enum bench_feed feed, uint32_t first, uint32_t n);
+void bench_embree_free(struct bench_embree *e);
+const char *bench_isa(void);
+long bench_embree_version(void);
+
+/* ---- bench_setup.c: what a scan needs beside the mesh, with the figures of a real head */
+struct bench_case {
+    const struct bench_target *target;
+    const struct bench_rays *rays;
+    struct bench_embree *embree, *fast; /* robust: the measure of all; without that flag */
+    struct bvh *bvh;
+    double seconds; /* measure for so long, but at least BENCH_MIN_ROUNDS */
+};
+#define BENCH_ENCODER 1048576.0 /* counts per turn of all profiles in config/heads */
+/* Station at 52.5 N, 13.4 E, positions in ECEF. */
+int bench_georef(const struct bench_target *target, struct georef **out, struct sh_err *err);
+void bench_setup(const struct bench_case *c, const struct georef *georef, struct cast_setup *setup);
+double bench_thread_s(void);                     /* processor time of this thread */
+double bench_median(double *values, uint32_t n); /* sorts them */
+
+/* ---- bench_measure.c: one thread, everything in turns, medians of the rounds' ratios */
+enum bench_stage {
+    STAGE_SCHEDULE,   /* line, run, firing times */
+    STAGE_DIRECTIONS, /* angles, sines, rotation, rounding to float */
+    STAGE_EMBREE,     /* the widened triangles */
+    STAGE_REFINE,     /* the exact range, and whether the triangle is in doubt */
+    STAGE_DECIDE,     /* those in doubt */
+    STAGE_DETECT,     /* limits, echo, label */
+    STAGE_NOISE,
+    STAGE_GEOREF, /* what the encoders read, its sines, position, CRS, counts */
+    STAGE_ENCODE, /* the frame but its checksum */
+    STAGE_CRC,
+    BENCH_STAGES
+};
+extern const char *const bench_stage_name[BENCH_STAGES];
+
+struct bench_result {
+    uint32_t rounds, pulses; /* pulses of a pass */
+    uint32_t embree_width;
+    enum bench_feed embree_feed;
+    double embree_ns, fast_ns, cast_ns, pipeline_ns, ideal_ns, staged_ns; /* per pulse: medians */
+    double cast_ratio, pipeline_ratio, ideal_ratio,
+        fast_ratio; /* Embree's time by ours: medians of the rounds' ratios */
+    double stage_ns[BENCH_STAGES];
+    int same_bytes;                /* the staged pipeline gave the bytes of the whole one */
+    struct cast_counters counters; /* of one pass */
+};
+/* Pin the thread first. */
+int bench_measure(const struct bench_case *c, struct bench_result *out, struct sh_err *err);
+
+/* ---- bench_stages.c: the whole pipeline again, with the counter of cycles read between its stages */
+struct bench_stages;
+int bench_stages_create(struct bench_stages **out, struct sh_err *err);
+void bench_stages_free(struct bench_stages *stages);
+/* One line; adds the cycles of each stage. The block and its bytes are as the pipeline makes them. Returns
+ * the bytes. */
+size_t bench_stages_line(struct bench_stages *stages, const struct cast_setup *setup,
+                         const struct schedule_segment *segment, uint64_t line, uint64_t cycles[BENCH_STAGES],
+                         struct line_block *block, uint8_t *bytes, size_t cap);
+uint64_t bench_cycles(void);
+
+/* ---- bench_loop.c: the real loop with the null link, as fast as it goes, against Embree on as many threads
+ */
+struct bench_threads {
+    uint32_t threads;
+    double embree_mrays_s, pulses_per_s, ratio; /* ratio: median of the rounds */
+    double cpu_ns;                              /* processor time of all threads per pulse */
+};
+int bench_loop(const struct bench_case *c, const struct bench_result *one, uint32_t threads, struct bench_threads *out,
+               struct sh_err *err);
+
+/* ---- bench_leaks.c: rays aimed at edges and corners of closed meshes */
+enum { BENCH_LEAK_MESHES = 4 };
+struct bench_leaks {
+    const char *mesh;
+    uint32_t triangles;
+    uint64_t rays, leaks, passed; /* passed: met the inside of the mesh behind the target; wrong as well */
+    double ns_per_ray;            /* processor time */
+    struct cast_counters counters;
+    uint64_t plain_rays, plain_leaks; /* Embree alone, robust, in packets */
+};
+int bench_leaks(uint64_t rays, uint64_t seed, uint32_t threads, const struct sh_report *report,
+                struct bench_leaks out[BENCH_LEAK_MESHES], struct sh_err *err);
+
+#endif

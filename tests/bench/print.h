@@ -1,0 +1,33 @@
+/* Private to app_bench.c: what was measured, as JSON and as a table. */
+#ifndef TESTS_BENCH_PRINT_H
+#define TESTS_BENCH_PRINT_H
+
+#include <stdio.h>
+
+#include "tests/bench/bench.h"
+
+enum { BENCH_MAX_SCENES = 16, BENCH_MAX_NOTES = 8 };
+
+struct bench_scene_report {
+    char name[32];
+    uint32_t triangles;
+    double load_s, embree_build_s;
+    struct bvh_info info;
+    struct bench_result result;
+    struct bench_threads loop[2]; /* one thread, all threads */
+    uint32_t n_loop;
+};
+
+struct bench_report {
+    struct bench_scene_report scene[BENCH_MAX_SCENES];
+    uint32_t n_scenes;
+    struct bench_leaks leaks[BENCH_LEAK_MESHES];
+    int have_leaks;
+    char note[BENCH_MAX_NOTES][192];
+    uint32_t n_notes;
+};
+
+int bench_print_json(FILE *out, const struct bench_report *report, struct sh_err *err);
+void bench_print_table(FILE *out, const struct bench_report *report);
+
+#endif

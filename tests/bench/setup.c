@@ -1,0 +1,50 @@
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "core/rng.h"
+#include "tests/bench/bench.h"
+
+int bench_georef(const struct bench_target *target, struct georef **out, struct sh_err *err)
+{
+    struct georef_spec spec = {.crs = GEOREF_ECEF, .lat_deg = 52.5167, .lon_deg = 13.4001, .height_m = 111.6};
+    memcpy(spec.station_m, target->station_m, sizeof spec.station_m);
+    return georef_create(&spec, out, err);
+}
+
+void bench_setup(const struct bench_case *c, const struct georef *georef, struct cast_setup *setup)
+{
+    *setup = (struct cast_setup){.bvh = c->bvh,
+                                 .georef = georef,
+                                 .range_min_m = 0.5,
+                                 .range_max_m = BENCH_RANGE_MAX_M,
+                                 .noise_on = 1,
+                                 .range_sigma_m = 0.005,
+                                 .noise_key = rng_key(1, RNG_RANGE),
+                                 .mirror_counts = BENCH_ENCODER,
+                                 .pan_counts = BENCH_ENCODER,
+                                 .layout = LINE_GEO,
+                                 .range_scale_m = BENCH_SCALE_M,
+                                 .xyz_scale = {BENCH_SCALE_M, BENCH_SCALE_M, BENCH_SCALE_M}};
+    memcpy(setup->station_m, c->target->station_m, sizeof setup->station_m);
+    cast_rotation(0.0, setup->rotation);
+}
+
+double bench_thread_s(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static int compare(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+double bench_median(double *values, uint32_t n)
+{
+    qsort(values, n, sizeof *values, compare);
+    return n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
+}
