@@ -103,7 +103,7 @@ check_document() { # document, as it is called
             unmarked+="$2:$line: $info"$'\n'
         elif [[ $info == *' '* ]]; then
             do_block "$work/blocks/$number" "$info"
-            report $? "$2:$line: $info" "$(cat "$work/out")"
+            report $? "$2:$line: $info" "$(tr -d "\0" <"$work/out")"
         elif ! do_block "$work/blocks/$number" "$info"; then
             unmarked+="$2:$line: $(cat "$work/out")"$'\n'
         fi
