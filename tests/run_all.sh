@@ -18,7 +18,7 @@ busy=
 for name in bench_cli clients join latency overrun same_stream signals slow_reader; do busy="$busy test_$name"; done
 
 set -- $(programs accuracy) $(programs stability)
-if [ -z "$part" ] || [ "$part" = unit ]; then set -- "$@" tests/check_includes.sh $(programs unit); fi
+if [ -z "$part" ] || [ "$part" = unit ]; then set -- "$@" tests/check_includes.sh tests/check_recipes.sh $(programs unit); fi
 if [ -z "$part" ]; then set -- "$@" $(programs unit "$build/asan"); fi
 if [ -z "$part" ] || [ "$part" = wire ]; then
     set -- "$@" tests/check_install.sh $(programs wire) --
