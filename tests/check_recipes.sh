@@ -1,5 +1,5 @@
 #!/bin/bash
-# The documents' recipes, run as they stand. Prints TAP. $SCANHEAD: the program of the build under test.
+# The documents' recipes, run as they stand, and their links. Prints TAP. $SCANHEAD: the program of the build under test.
 #
 #   check_recipes.sh [DOCUMENT...]      default: every .md below the root of the tree
 #
@@ -92,9 +92,16 @@ do_block() {
     esac
 }
 
-# One test for each block with a mark, and one that all have.
+# Links of the document $1 to files that aren't there.
+dead_links() {
+    grep -oE '\]\([^)#: ]+' "$1" | sed 's/^](//' | while read -r link; do
+        [ -e "$(dirname "$1")/$link" ] || echo "$link"
+    done
+}
+
+# One test for each block with a mark, one that all have one, and one of its links.
 check_document() { # document, as it is called
-    local number line info unmarked=
+    local number line info dead unmarked=
     rm -rf "$work/blocks"
     mkdir "$work/blocks"
     checkout
@@ -110,6 +117,9 @@ check_document() { # document, as it is called
     done 3< <(awk -v folder="$work/blocks" "$split" "$1")
     [ -z "$unmarked" ]
     report $? "$2: each block says what is done with it" "$unmarked"
+    dead=$(dead_links "$1")
+    [ -z "$dead" ]
+    report $? "$2: its links lead to files" "$dead"
 }
 
 # expect HOW_MANY_FAIL NAME LINE...: that many tests of a planted document fail.
@@ -135,6 +145,7 @@ expect 1 'a command that is indented' 'So:' '' '    build/scanhead list'
 expect 1 'a block without an end' '```text' 'x'
 expect 1 'C that does not compile' '```c as build/a.c' 'int main(void) { return x; }' '```'
 expect 1 'a configuration that is wrong' '```yaml as build/a.yaml' 'head: {profile: none}' '```'
+expect 1 'a link to a file that is not there' 'See [here](nothing.md).'
 expect 1 'a file outside of build' '```c as ../a.c' 'int a;' '```'
 limit_s=${RECIPE_LIMIT_S:-60}
 
