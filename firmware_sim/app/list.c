@@ -30,17 +30,24 @@ static int list_usb(void)
     return APP_OK;
 }
 
-int app_list(int argc, char **argv)
+static int run(int argc, char **argv)
 {
-    if (argc == 2 && (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0)) {
-        puts("scanhead list: head profiles ($SCANHEAD_HEADS, else the installed ones, else config/heads), kinds of "
-             "links, "
-             "and the heads that USB shows");
-        return APP_OK;
-    }
-    if (argc != 1) return app_usage("list", "it takes no arguments");
+    struct app_input in;
     struct sh_err err = {0};
+    int status = app_parse(&app_list, argc, argv, &in, NULL);
+    if (status != APP_GO_ON) return status;
     if (config_list_profiles(NULL, stdout, &err) < 0) return app_fail(&err);
     puts("links: pty (virtual serial port), tcp, usb (usbip, usbredir, functionfs), file, null");
     return list_usb();
 }
+
+static const struct app_option OPTIONS[] = {OPTION_END};
+
+const struct app_command app_list = {
+    .name = "list",
+    .summary = "head profiles, kinds of links, and the heads that USB shows",
+    .options = OPTIONS,
+    .notes =
+        "Profiles are looked for in the folder $SCANHEAD_HEADS, else in the installed one, else in config/heads.\n",
+    .run = run,
+};

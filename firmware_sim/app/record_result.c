@@ -1,47 +1,51 @@
 #include "firmware_sim/app/record_result.h"
 
-#include <stdio.h>
-#include <string.h>
-
+#include "firmware_sim/app/app.h"
 #include "firmware_sim/base/clock.h"
-#include "firmware_sim/base/json.h"
+
+struct received {
+    struct scanhead *sh;
+    const struct recording_result *result;
+    double wall_s;
+};
+
+static void put_received(struct json *json, const void *ctx)
+{
+    const struct received *received = ctx;
+    const struct recording_result *result = received->result;
+    struct scanhead_stats s;
+    char hex[65];
+    scanhead_get_stats(received->sh, &s);
+    scanhead_hash_hex(received->sh, hex);
+    json_open_object(json, NULL);
+    json_uint(json, "points", result->points);
+    json_uint(json, "empty_shots", result->empty);
+    json_uint(json, "pulses", result->pulses);
+    json_uint(json, "scans", result->scans);
+    json_uint(json, "frames", s.frames);
+    json_uint(json, "bytes", s.bytes);
+    json_uint(json, "bad_payload", s.bad_payload);
+    json_uint(json, "bad_bytes", s.bad_bytes);
+    json_uint(json, "seq_lost", s.seq_lost);
+    json_uint(json, "dropped", s.dropped);
+    json_uint(json, "reader_lost_frames", s.reader_lost);
+    json_uint(json, "lost_pulses", result->lost_pulses);
+    json_uint(json, "crowded_echoes", result->crowded);
+    json_uint(json, "faint_hits", result->faint);
+    json_uint(json, "unfit_echoes", result->unfit);
+    json_uint(json, "replugs", result->replugs);
+    json_double(json, "wall_s", received->wall_s);
+    json_double(json, "cpu_s", clock_cpu_s());
+    json_double(json, "pulses_per_s", received->wall_s > 0.0 ? (double)result->pulses / received->wall_s : 0.0);
+    json_string(json, "stream_sha256", hex);
+    json_close_object(json);
+}
 
 int record_write_stats(const char *path, struct scanhead *sh, const struct recording_result *result, double wall_s,
                        struct sh_err *err)
 {
-    struct scanhead_stats s;
-    char hex[65];
-    scanhead_get_stats(sh, &s);
-    scanhead_hash_hex(sh, hex);
-    FILE *out = strcmp(path, "-") == 0 ? stdout : fopen(path, "w");
-    if (out == NULL) return sh_fail(err, SH_EIO, "%s: can't be written", path);
-    struct json json;
-    json_begin(&json, out);
-    json_open_object(&json, NULL);
-    json_uint(&json, "points", result->points);
-    json_uint(&json, "empty_shots", result->empty);
-    json_uint(&json, "pulses", result->pulses);
-    json_uint(&json, "scans", result->scans);
-    json_uint(&json, "frames", s.frames);
-    json_uint(&json, "bytes", s.bytes);
-    json_uint(&json, "bad_payload", s.bad_payload);
-    json_uint(&json, "bad_bytes", s.bad_bytes);
-    json_uint(&json, "seq_lost", s.seq_lost);
-    json_uint(&json, "dropped", s.dropped);
-    json_uint(&json, "reader_lost_frames", s.reader_lost);
-    json_uint(&json, "lost_pulses", result->lost_pulses);
-    json_uint(&json, "crowded_echoes", result->crowded);
-    json_uint(&json, "faint_hits", result->faint);
-    json_uint(&json, "unfit_echoes", result->unfit);
-    json_uint(&json, "replugs", result->replugs);
-    json_double(&json, "wall_s", wall_s);
-    json_double(&json, "cpu_s", clock_cpu_s());
-    json_double(&json, "pulses_per_s", wall_s > 0.0 ? (double)result->pulses / wall_s : 0.0);
-    json_string(&json, "stream_sha256", hex);
-    json_close_object(&json);
-    int rc = json_end(&json, err);
-    if (out != stdout && fclose(out) != 0 && rc == SH_OK) rc = sh_fail(err, SH_EIO, "%s: can't be written", path);
-    return rc;
+    const struct received received = {sh, result, wall_s};
+    return app_write_json(path, put_received, &received, err);
 }
 
 /* Frames that never came: gaps in the sequence; those with a wrong checksum are among them but at the very end. */

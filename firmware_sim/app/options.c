@@ -1,0 +1,218 @@
+#include "firmware_sim/app/options.h"
+
+#include <ctype.h>
+#include <errno.h>
+#include <getopt.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { FIRST_VALUE = 256, HELP_COLUMNS = 110 };
+
+static const char *prefix(const struct app_command *command)
+{
+    return command->is_program ? "" : "scanhead ";
+}
+
+int app_usage(const struct app_command *command, const char *fmt, ...)
+{
+    char text[512];
+    va_list ap;
+    va_start(ap, fmt);
+    vsnprintf(text, sizeof text, fmt, ap);
+    va_end(ap);
+    const char *before = prefix(command);
+    fprintf(stderr, "%s%s: %s; see %s%s --help\n", before, command->name, text, before, command->name);
+    return APP_USAGE;
+}
+
+int app_add_set(struct app_sets *sets, const char *set)
+{
+    if (sets->n == APP_MAX_SETS) {
+        fprintf(stderr, "scanhead: too many settings; at most %d\n", APP_MAX_SETS);
+        return APP_USAGE;
+    }
+    sets->set[sets->n++] = set;
+    return APP_OK;
+}
+
+int app_add_key(struct app_sets *sets, const char *key, const char *value)
+{
+    if (sets->n_text == APP_MAX_KEYS) {
+        fprintf(stderr, "scanhead: options that stand for a key, such as %s: at most %d\n", key, APP_MAX_KEYS);
+        return APP_USAGE;
+    }
+    char *text = sets->text[sets->n_text++];
+    int n = snprintf(text, sizeof sets->text[0], "%s=%s", key, value);
+    if (n < 0 || (size_t)n >= sizeof sets->text[0]) {
+        fprintf(stderr, "scanhead: value of %s is too long; at most %zu characters\n", key,
+                sizeof sets->text[0] - strlen(key) - 2);
+        return APP_USAGE;
+    }
+    return app_add_set(sets, text);
+}
+
+static int parse_double(const struct app_command *command, const struct app_option *row, const char *text, double *out)
+{
+    char *end;
+    double value = strtod(text, &end);
+    if (end == text || *end != '\0' || isspace((unsigned char)text[0]) || !isfinite(value) || value < row->min ||
+        value > row->max)
+        return app_usage(command, "--%s %s: not a number from %.10g to %.10g", row->name, text, row->min, row->max);
+    *out = value;
+    return APP_OK;
+}
+
+int app_parse_long(const struct app_command *command, const char *option, const char *text, long min, long max,
+                   long *out)
+{
+    char *end;
+    errno = 0;
+    long value = strtol(text, &end, 10);
+    if (end == text || *end != '\0' || isspace((unsigned char)text[0]) || errno != 0 || value < min || value > max)
+        return app_usage(command, "--%s %s: not a whole number from %ld to %ld", option, text, min, max);
+    *out = value;
+    return APP_OK;
+}
+
+static int apply(const struct app_command *command, const struct app_option *row, const char *text,
+                 struct app_input *in, void *values)
+{
+    void *at = (char *)values + row->at;
+    switch (row->kind) {
+    case APP_FLAG:
+        *(int *)at = 1;
+        return APP_OK;
+    case APP_TEXT:
+        *(const char **)at = text;
+        return APP_OK;
+    case APP_NUMBER:
+        return parse_double(command, row, text, at);
+    case APP_WHOLE:
+        return app_parse_long(command, row->name, text, (long)row->min, (long)row->max, at);
+    case APP_KEY:
+        return app_add_key(&in->sets, row->key, text);
+    case APP_SET:
+        return app_add_set(&in->sets, text);
+    default:
+        return row->apply(values, text);
+    }
+}
+
+/* ---- help */
+
+void app_arguments(const struct app_command *command, char *buf, size_t len)
+{
+    size_t n = 0;
+    buf[0] = '\0';
+    for (int i = 0; i < APP_MAX_OPERANDS && command->operand[i] != NULL && n < len; i++)
+        n += (size_t)snprintf(buf + n, len - n, " %s", command->operand[i]);
+    if (command->needs != NULL && n < len) n += (size_t)snprintf(buf + n, len - n, " %s", command->needs);
+    if (command->options[0].kind != APP_LAST && n < len) snprintf(buf + n, len - n, " [options]");
+}
+
+/* The text from column `indent` on, where the line is now; further lines begin there, too. */
+static void print_wrapped(const char *text, int indent)
+{
+    int column = indent;
+    while (*text != '\0') {
+        const int n = (int)strcspn(text, " ");
+        if (column > indent && column + 1 + n > HELP_COLUMNS)
+            printf("\n%*s", column = indent, "");
+        else if (column > indent)
+            column += printf(" ");
+        column += printf("%.*s", n, text);
+        text += n + (text[n] == ' ');
+    }
+    putchar('\n');
+}
+
+static void print_row(const struct app_option *row, int width)
+{
+    char letter[] = "-?, ";
+    letter[1] = row->letter;
+    int n = printf("  %-4s--%s %s", row->letter != '\0' ? letter : "", row->name,
+                   row->argument != NULL ? row->argument : "");
+    printf("%*s", width - n, "");
+    print_wrapped(row->help, width);
+}
+
+static void print_help(const struct app_command *command)
+{
+    static const struct app_option help = {.name = "help", .letter = 'h', .help = "this text"};
+    char arguments[128];
+    size_t longest = strlen(help.name);
+    for (const struct app_option *row = command->options; row->kind != APP_LAST; row++) {
+        size_t n = strlen(row->name) + (row->argument != NULL ? 1 + strlen(row->argument) : 0);
+        if (n > longest) longest = n;
+    }
+    app_arguments(command, arguments, sizeof arguments);
+    const char *before = prefix(command), *name = command->name;
+    printf("%s%s: %s\n\nusage: %s%s%s\n\n", before, name, command->summary, before, name, arguments);
+    for (const struct app_option *row = command->options; row->kind != APP_LAST; row++)
+        print_row(row, (int)longest + 10);
+    print_row(&help, (int)longest + 10);
+    if (command->notes != NULL) printf("\n%s", command->notes);
+    if (command->print_more != NULL) command->print_more(stdout);
+}
+
+/* ---- parsing */
+
+/* The table as getopt_long wants it; a long option's value is FIRST_VALUE and its row. */
+static void list_options(const struct app_option *row, struct option longs[APP_MAX_OPTIONS + 2], char *letters)
+{
+    int n = 0;
+    letters += sprintf(letters, ":h");
+    for (; row[n].kind != APP_LAST && n < APP_MAX_OPTIONS; n++) {
+        int has = row[n].argument != NULL ? required_argument : no_argument;
+        longs[n] = (struct option){row[n].name, has, NULL, FIRST_VALUE + n};
+        if (row[n].letter != '\0') letters += sprintf(letters, "%c%s", row[n].letter, has ? ":" : "");
+    }
+    longs[n] = (struct option){"help", no_argument, NULL, 'h'};
+    longs[n + 1] = (struct option){NULL, 0, NULL, 0};
+}
+
+static const struct app_option *find_row(const struct app_option *row, int opt)
+{
+    if (opt >= FIRST_VALUE) return &row[opt - FIRST_VALUE];
+    while (row->kind != APP_LAST && row->letter != opt)
+        row++;
+    return row;
+}
+
+static int take_operands(const struct app_command *command, int n, char **words, struct app_input *in)
+{
+    int needed = 0;
+    while (needed < APP_MAX_OPERANDS && command->operand[needed] != NULL)
+        needed++;
+    if (n != needed && needed == 0) return app_usage(command, "it takes no arguments");
+    if (n != needed && needed == 1) return app_usage(command, "one %s is needed", command->operand[0]);
+    if (n != needed)
+        return app_usage(command, "one %s and one %s are needed", command->operand[0], command->operand[1]);
+    for (int i = 0; i < n; i++)
+        in->operand[i] = words[i];
+    return APP_GO_ON;
+}
+
+int app_parse(const struct app_command *command, int argc, char **argv, struct app_input *in, void *values)
+{
+    struct option longs[APP_MAX_OPTIONS + 2];
+    char letters[2 * APP_MAX_OPTIONS + 3];
+    int opt;
+    memset(in, 0, sizeof *in);
+    list_options(command->options, longs, letters);
+    opterr = 0;
+    optind = 0; /* from the beginning, whatever was parsed before */
+    while ((opt = getopt_long(argc, argv, letters, longs, NULL)) != -1) {
+        if (opt == 'h') {
+            print_help(command);
+            return APP_OK;
+        }
+        if (opt == ':') return app_usage(command, "option %s needs a value", argv[optind - 1]);
+        if (opt == '?') return app_usage(command, "unknown option %s", argv[optind - 1]);
+        int status = apply(command, find_row(command->options, opt), optarg, in, values);
+        if (status != APP_OK) return status;
+    }
+    return take_operands(command, argc - optind, argv + optind, in);
+}
