@@ -7,8 +7,8 @@
 #include "core/map.h"
 #include "core/mat3.h"
 #include "firmware_sim/app/app.h"
+#include "firmware_sim/app/offline.h"
 #include "firmware_sim/app/recording.h"
-#include "firmware_sim/site/site.h"
 
 enum { BATCH = 4096 };
 

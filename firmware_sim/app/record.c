@@ -4,11 +4,11 @@
 #include <string.h>
 
 #include "firmware_sim/app/app.h"
+#include "firmware_sim/app/offline.h"
 #include "firmware_sim/app/record_files.h"
 #include "firmware_sim/app/record_result.h"
 #include "firmware_sim/app/recording.h"
 #include "firmware_sim/base/clock.h"
-#include "firmware_sim/site/site.h"
 
 enum { WAIT_MS = 1000 };
 
@@ -47,6 +47,22 @@ static void print_note(void *ctx, const char *text)
 
 static const struct sh_report NOTES = {NULL, print_note, NULL};
 
+/* Follows the scans. Files are closed and statistics written also after some failures; the first failure is returned. */
+static int follow(struct record *r, struct scanhead *sh, struct recording_result *result, struct sh_err *err)
+{
+    struct sh_err why = {0};
+    const int64_t start_ns = clock_now_ns();
+    int rc = recording_run(sh, &r->recording, result, err);
+    const double wall_s = 1e-9 * (double)(clock_now_ns() - start_ns);
+    const int has_figures = rc == SH_OK || rc == SH_ELOST; /* LOST: an unplugged head has cut the recording */
+    const int keep = result->points != 0 || (rc == SH_OK && result->missing[0] == '\0');
+    int after = record_files_close(&r->files, keep, &why);
+    if (rc == SH_OK && after != SH_OK) rc = sh_fail(err, after, "%s", why.text);
+    if (!has_figures || r->stats == NULL) return rc;
+    after = record_write_stats(r->stats, sh, result, wall_s, &why);
+    return rc == SH_OK && after != SH_OK ? sh_fail(err, after, "%s", why.text) : rc;
+}
+
 static int record(struct record *r, struct scanhead *sh, struct sh_err *err)
 {
     struct recording_result result = {0};
@@ -60,16 +76,7 @@ static int record(struct record *r, struct scanhead *sh, struct sh_err *err)
     r->recording.ctx = r;
     r->recording.interrupted = app_interrupted;
     r->recording.report = &app_report_stderr;
-    int64_t start_ns = clock_now_ns();
-    rc = recording_run(sh, &r->recording, &result, err);
-    double wall_s = 1e-9 * (double)(clock_now_ns() - start_ns);
-    struct sh_err why = {0};
-    int closed = record_files_close(&r->files, result.points != 0 || (rc == SH_OK && result.missing[0] == '\0'), &why);
-    if (rc == SH_OK && closed != SH_OK) rc = sh_fail(err, closed, "%s", why.text);
-    int counts = rc == SH_OK || rc == SH_ELOST; /* also of a recording that an unplugged device has cut */
-    if (counts && r->stats != NULL && (closed = record_write_stats(r->stats, sh, &result, wall_s, &why)) != SH_OK &&
-        rc == SH_OK)
-        rc = sh_fail(err, closed, "%s", why.text);
+    rc = follow(r, sh, &result, err);
     if (rc == SH_OK || result.points != 0) say_result(r, &result);
     app_warn_left_out(result.crowded, result.unfit);
     return rc == SH_OK ? record_check_complete(sh, &result, err) : rc;
@@ -92,17 +99,32 @@ static int is_stream(const char *source)
            strncmp(source, "tcp:", 4) == 0 || strncmp(source, "fd:", 3) == 0 || ends_in(source, ".shs");
 }
 
-/* Polar points are in no CRS. */
+/* --crs takes the layout geo along: polar points are in no CRS. */
 static int set_layout(const struct record *r, struct config *cfg, struct sh_err *err)
 {
     if (!r->crs_given || cfg->output.layout == LINE_GEO) return SH_OK;
     if (cfg->output.layout_given)
         return sh_fail(
             err, SH_EINPUT,
-            "%s: output.layout is polar, whose recordings are in the scene frame; with --crs allowed geo, as "
-            "by --set output.layout=geo",
+            "%s: output.layout is polar, and polar recordings are in the scene frame; with --crs only geo is "
+            "allowed: --set output.layout=geo",
             cfg->file);
     cfg->output.layout = LINE_GEO;
+    return SH_OK;
+}
+
+/* Off line a scan must end by itself, and nobody sends poses. */
+static int check_can_end(const struct record *r, const struct config *cfg, struct sh_err *err)
+{
+    const long frames = r->recording.frames >= 0 ? r->recording.frames : (long)cfg->head.settings.frames;
+    const int arrives = cfg->platform.kind == PLATFORM_TRAJECTORY && cfg->platform.at_end == PLATFORM_STOP;
+    if (cfg->platform.kind == PLATFORM_LIVE)
+        return sh_fail(err, SH_EINPUT,
+                       "%s: platform.kind: a live platform can't be recorded off line; run it, and record its link",
+                       cfg->file);
+    if (frames == 0 && !arrives && !(r->recording.duration_s > 0.0))
+        return sh_fail(err, SH_EINPUT, "%s: head.frames is 0, a scan without end; give --frames or --duration",
+                       cfg->file);
     return SH_OK;
 }
 
@@ -110,16 +132,7 @@ static int record_config(struct config *cfg, void *ctx, struct sh_err *err)
 {
     struct record *r = ctx;
     struct offline *offline = NULL;
-    uint32_t frames = r->recording.frames >= 0 ? (uint32_t)r->recording.frames : cfg->head.settings.frames;
-    int rc = SH_OK;
-    int arrives = cfg->platform.kind == PLATFORM_TRAJECTORY && cfg->platform.at_end == PLATFORM_STOP;
-    if (cfg->platform.kind == PLATFORM_LIVE)
-        rc = sh_fail(err, SH_EINPUT,
-                     "%s: platform.kind: a live platform can't be recorded off line; run it, and record its link",
-                     cfg->file);
-    if (rc == SH_OK && frames == 0 && !arrives && !(r->recording.duration_s > 0.0))
-        rc =
-            sh_fail(err, SH_EINPUT, "%s: head.frames is 0, a scan without end; give --frames or --duration", cfg->file);
+    int rc = check_can_end(r, cfg, err);
     if (rc == SH_OK) rc = set_layout(r, cfg, err);
     if (rc == SH_OK && cfg->output.layout == LINE_GEO && cfg->output.crs == GEOREF_GEODETIC)
         rc = record_files_check_degrees(&r->files, err);
@@ -133,17 +146,15 @@ static int record_config(struct config *cfg, void *ctx, struct sh_err *err)
     return rc;
 }
 
-/* Waits for the source in parts: a signal just before one of them is seen after it. */
+/* Waits for the source in parts of WAIT_MS: a signal that comes just before a part is seen after it. */
 static int open_stream(const struct record *r, struct scanhead **sh, char *why, size_t len)
 {
     const int64_t end_ns = clock_now_ns() + (int64_t)(1e9 * r->wait_s);
     for (;;) {
-        const int64_t left_ms = (end_ns - clock_now_ns()) / 1000000;
-        int rc = scanhead_open_within(r->source,
-                                      left_ms < 0         ? 0
-                                      : left_ms < WAIT_MS ? (int)left_ms
-                                                          : WAIT_MS,
-                                      sh, why, len);
+        int64_t left_ms = (end_ns - clock_now_ns()) / 1000000;
+        if (left_ms < 0) left_ms = 0;
+        if (left_ms > WAIT_MS) left_ms = WAIT_MS;
+        int rc = scanhead_open_within(r->source, (int)left_ms, sh, why, len);
         int may_come =
             rc != SCANHEAD_OK && rc != SCANHEAD_ENOMEM && (rc != SCANHEAD_EINPUT || strncmp(r->source, "tty:", 4) == 0);
         if (!may_come || clock_now_ns() >= end_ns || app_interrupted()) return rc;

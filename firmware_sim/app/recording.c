@@ -11,7 +11,7 @@
 enum { REPLY_MS = 5000, NEXT_MS = 250, END_MS = 5000, BOOT_MS = 30000, REPLUG_MS = 1000, SILENT_MS = 2000 };
 
 struct recording {
-    int64_t heard_ns; /* when pulses came last, or the head was asked why none do */
+    int64_t heard_ns; /* when pulses came last, or when the head was last asked why none come */
     struct scanhead *sh;
     const struct recording_options *o;
     struct recording_result *result;
@@ -48,7 +48,7 @@ static void count_points(struct recording *r, const struct scanhead_frame *frame
     r->result->points += frame->n_points - empty;
 }
 
-/* Stopped, or failed, while the mirror was still spinning up: there is no scan, so no SCAN_END comes. */
+/* The head stopped or failed while the mirror was still spinning up. There is no scan, so no SCAN_END comes. */
 static int gives_up(const struct scanhead_frame *frame)
 {
     return frame->event == SCANHEAD_EV_STATE && frame->event_value[1] == HEAD_SPIN_UP &&
@@ -98,8 +98,14 @@ static void report(struct recording *r)
     sh_progress(r->o->report, text, -1.0);
 }
 
-/* The head was unplugged: waits for it. A scan that is over when it is back has ended meanwhile; of one that is not,
- * the rest will come. */
+static int is_interrupted(struct recording *r)
+{
+    if (r->o->interrupted != NULL && r->o->interrupted()) r->interrupted = 1;
+    return r->interrupted;
+}
+
+/* The head was unplugged: waits for it. Where it scans no more when it is back, the scan ended meanwhile. Where it still
+ * scans, the rest of the scan will come. */
 static int replug(struct recording *r, struct sh_err *err)
 {
     const int64_t end_ns = clock_now_ns() + (int64_t)(1e9 * r->o->replug_s);
@@ -109,7 +115,7 @@ static int replug(struct recording *r, struct sh_err *err)
     do {
         rc = scanhead_reattach(r->sh, REPLUG_MS);
         if (rc == SCANHEAD_OK) rc = scanhead_command(r->sh, "HEAD:STAT?", reply, sizeof reply, REPLY_MS);
-    } while (rc != SCANHEAD_OK && clock_now_ns() < end_ns && !(r->o->interrupted != NULL && r->o->interrupted()));
+    } while (rc != SCANHEAD_OK && clock_now_ns() < end_ns && !is_interrupted(r));
     if (rc != SCANHEAD_OK) return sh_fail(err, SH_ELOST, "the head did not come back: %s", scanhead_error(r->sh));
     scanning = strncmp(reply, "s", 1) == 0; /* spin-up, scanning, spin-down */
     sh_warn(r->o->report, "the head is back");
@@ -121,7 +127,7 @@ static int replug(struct recording *r, struct sh_err *err)
     return 0;
 }
 
-/* One frame. 1: got one; 0: none in time; negative: over. */
+/* Takes one frame. Returns 1: got one; 0: none in time; negative: the recording is over. */
 static int step(struct recording *r, int timeout_ms, struct sh_err *err)
 {
     struct scanhead_frame frame;
@@ -141,12 +147,6 @@ static int step(struct recording *r, int timeout_ms, struct sh_err *err)
     return rc == SH_OK ? 1 : rc;
 }
 
-static int is_interrupted(struct recording *r)
-{
-    if (r->o->interrupted != NULL && r->o->interrupted()) r->interrupted = 1;
-    return r->interrupted;
-}
-
 /* Returns early, with SH_OK, when interrupted. */
 static int wait_idle(struct recording *r, struct sh_err *err)
 {
@@ -159,7 +159,7 @@ static int wait_idle(struct recording *r, struct sh_err *err)
         if (strcmp(reply, "idle") == 0) return SH_OK;
         if (strcmp(reply, "scanning") == 0 || strcmp(reply, "fault") == 0 || strcmp(reply, "off") == 0)
             return sh_fail(err, SH_ESTATE, "the head is %s; --listen records what it does on its own", reply);
-        rc = step(r, 20, err); /* frames go on meanwhile */
+        rc = step(r, 20, err); /* frames keep coming meanwhile */
         if (rc < 0) return rc;
     }
     return sh_fail(err, SH_ETIMEOUT, "the head was not idle within %d s", BOOT_MS / 1000);
@@ -170,12 +170,11 @@ static int stop_scan(struct recording *r, struct sh_err *err)
     char reply[512];
     int rc = scanhead_command(r->sh, "SCAN:STOP", reply, sizeof reply, REPLY_MS);
     if (rc != SCANHEAD_OK) return sh_fail(err, rc, "SCAN:STOP: %s", scanhead_error(r->sh));
-    r->cut_short =
-        r->interrupted && strncmp(reply, "ERR", 3) != 0; /* a refusal says that the scan has just ended by itself */
+    r->cut_short = r->interrupted && strncmp(reply, "ERR", 3) != 0; /* refused: the scan has just ended by itself */
     return SH_OK;
 }
 
-/* No pulses have come for a while: frames that a slow reader lost may have held the scan's end. */
+/* No pulses have come for a while. The scan's end may be among frames that a slow reader lost. */
 static int look_for_end(struct recording *r, struct sh_err *err)
 {
     struct scanhead_stats stats;
@@ -238,7 +237,7 @@ static int record_scan(struct recording *r, uint32_t station, struct sh_err *err
     return follow(r, err);
 }
 
-/* A scan without end, of a head that stands, is ended by who records it, and is then complete. */
+/* Whoever records a scan without end, of a head that stands, ends it; it is then complete. */
 static int is_endless(const struct recording *r)
 {
     struct scanhead_info info;
@@ -246,8 +245,8 @@ static int is_endless(const struct recording *r)
            !info.moving;
 }
 
-/* What an interruption left out: of the scan at hand, and of the stations from it on. */
-static void tell_missing(struct recording *r, uint32_t station)
+/* Names what an interruption left out: of the scan at hand, and of the stations from it on. */
+static void name_missing(struct recording *r, uint32_t station)
 {
     char *text = r->result->missing;
     size_t room = sizeof r->result->missing;
@@ -271,7 +270,7 @@ static void tell_missing(struct recording *r, uint32_t station)
 static int record_listening(struct recording *r, struct sh_err *err)
 {
     int rc = record_scan(r, 0, err);
-    /* A scan's end is not the end: more may follow until the stream ends. */
+    /* More scans may follow until the stream ends. */
     while (rc == SH_OK && !r->stopping) {
         r->scan_over = 0;
         rc = follow(r, err);
@@ -285,7 +284,7 @@ static int record_stations(struct recording *r, struct sh_err *err)
     int rc = record_scan(r, station, err);
     while (rc == SH_OK && !r->interrupted && station < r->o->last_station)
         rc = record_scan(r, ++station, err);
-    if (rc == SH_OK && r->interrupted) tell_missing(r, station);
+    if (rc == SH_OK && r->interrupted) name_missing(r, station);
     return rc;
 }
 
@@ -298,6 +297,5 @@ int recording_run(struct scanhead *sh, const struct recording_options *options, 
     if (rc == SH_ECLOSED && options->listen && result->frames == 0)
         return sh_fail(err, SH_EFORMAT, "the stream ended without a single frame");
     if (rc == SH_ECLOSED && options->listen && !r.within_scan) return SH_OK;
-    result->ended_early = rc == SH_ECLOSED || rc == SH_ELOST;
     return rc == SH_ECLOSED && r.within_scan ? sh_fail(err, rc, "the stream ended in the middle of a scan") : rc;
 }
