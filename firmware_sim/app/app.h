@@ -1,7 +1,7 @@
 /* What the commands of the command line share: exit status, messages, loading, signals, files of figures.
  *
- * Each command is one file and one struct app_command. Only commands print, and only main exits. An error is one line
- * on standard error. */
+ * Each command is one file and one struct app_command. Only commands print, and only main exits. An error is
+ * one line on standard error. */
 #ifndef FIRMWARE_SIM_APP_APP_H
 #define FIRMWARE_SIM_APP_APP_H
 
@@ -19,8 +19,8 @@ extern const struct app_command app_run, app_record, app_plan, app_map, app_repo
 /* Prints "scanhead: TEXT" and gives the exit status for the error. */
 int app_fail(const struct sh_err *err);
 
-/* Loads the configuration that the first operand names, with the settings, and gives it to `work`. `work` may change
- * it; it is freed afterwards. Returns the exit status, with the reason of a failure printed. */
+/* Loads the configuration that the first operand names, with the settings, and gives it to `work`. `work` may
+ * change it; it is freed afterwards. Returns the exit status, with the reason of a failure printed. */
 int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, void *ctx, struct sh_err *err),
                     void *ctx);
 

@@ -1,7 +1,7 @@
 /* Commands and their options as tables. The rows alone give parsing, errors and --help.
  *
- * In: argv and the command's table. Out: the operands, the settings of configuration keys, and the values of the
- * options in a struct of the command's own. A row says what it sets by the offset in that struct. */
+ * In: argv and the command's table. Out: the operands, the settings of configuration keys, and the values of
+ * the options in a struct of the command's own. A row says what it sets by the offset in that struct. */
 #ifndef FIRMWARE_SIM_APP_OPTIONS_H
 #define FIRMWARE_SIM_APP_OPTIONS_H
 
@@ -97,8 +97,8 @@ struct app_input {
     struct app_sets sets;
 };
 
-/* APP_GO_ON with `in` and `values` filled, or the exit status: of a printed help, or of an error with its one line. The
- * strings are argv's own. */
+/* APP_GO_ON with `in` and `values` filled, or the exit status: of a printed help, or of an error with its one
+ * line. The strings are argv's own. */
 int app_parse(const struct app_command *command, int argc, char **argv, struct app_input *in, void *values);
 
 /* APP_OK, or APP_USAGE with the reason printed. `set` is kept, `value` copied. */

@@ -1,4 +1,5 @@
-/* scanhead plan: which method each stage will use. It loads the scene as a run does and prints what the run uses. */
+/* scanhead plan: which method each stage will use. It loads the scene as a run does and prints what the run
+ * uses. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

@@ -47,7 +47,8 @@ static void print_note(void *ctx, const char *text)
 
 static const struct sh_report NOTES = {NULL, print_note, NULL};
 
-/* Follows the scans. Files are closed and statistics written also after some failures; the first failure is returned. */
+/* Follows the scans. Files are closed and statistics written also after some failures; the first failure is
+ * returned. */
 static int follow(struct record *r, struct scanhead *sh, struct recording_result *result, struct sh_err *err)
 {
     struct sh_err why = {0};

@@ -48,8 +48,8 @@ int record_write_stats(const char *path, struct scanhead *sh, const struct recor
     return app_write_json(path, put_received, &received, err);
 }
 
-/* Frames that never came leave gaps in the sequence. Frames with a wrong checksum leave gaps, too, but not at the very
- * end of the stream. */
+/* Frames that never came leave gaps in the sequence. Frames with a wrong checksum leave gaps, too, but not at
+ * the very end of the stream. */
 static uint64_t count_lost(struct scanhead *sh)
 {
     struct scanhead_stats s;

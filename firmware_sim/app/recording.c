@@ -48,7 +48,8 @@ static void count_points(struct recording *r, const struct scanhead_frame *frame
     r->result->points += frame->n_points - empty;
 }
 
-/* The head stopped or failed while the mirror was still spinning up. There is no scan, so no SCAN_END comes. */
+/* The head stopped or failed while the mirror was still spinning up. There is no scan, so no SCAN_END
+ * comes. */
 static int gives_up(const struct scanhead_frame *frame)
 {
     return frame->event == SCANHEAD_EV_STATE && frame->event_value[1] == HEAD_SPIN_UP &&
@@ -104,8 +105,8 @@ static int is_interrupted(struct recording *r)
     return r->interrupted;
 }
 
-/* The head was unplugged: waits for it. Where it scans no more when it is back, the scan ended meanwhile. Where it still
- * scans, the rest of the scan will come. */
+/* The head was unplugged: waits for it. Where it scans no more when it is back, the scan ended meanwhile.
+ * Where it still scans, the rest of the scan will come. */
 static int replug(struct recording *r, struct sh_err *err)
 {
     const int64_t end_ns = clock_now_ns() + (int64_t)(1e9 * r->o->replug_s);

@@ -1,7 +1,7 @@
 /* Following scans through libscanhead: start a scan, pass on its frames until it ends, stop it on time.
  *
- * In: a client's handle of a head (on a wire, or of offline.h) and what to scan. Out: each frame to a callback, and what
- * came of it in figures. One recording at a time per handle; not real-time safe. */
+ * In: a client's handle of a head (on a wire, or of offline.h) and what to scan. Out: each frame to a
+ * callback, and what came of it in figures. One recording at a time per handle; not real-time safe. */
 #ifndef FIRMWARE_SIM_APP_RECORDING_H
 #define FIRMWARE_SIM_APP_RECORDING_H
 

@@ -37,7 +37,8 @@ static double now_s(void)
     return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
 }
 
-/* core/analysis reports every piece of its work. A line a second is enough for a terminal, and none for short work. */
+/* core/analysis reports every piece of its work. A line a second is enough for a terminal, and none for short
+ * work. */
 static void report_each_second(void *ctx, const char *what, double fraction)
 {
     struct report *r = ctx;

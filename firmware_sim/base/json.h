@@ -1,8 +1,9 @@
-/* The one JSON writer. In: values and their keys, one call each. Out: RFC 8259 text in a FILE, either one member per line
- * with two blanks per level, or all on one line without blanks.
+/* The one JSON writer. In: values and their keys, one call each. Out: RFC 8259 text in a FILE, either one
+ * member per line with two blanks per level, or all on one line without blanks.
  *
- * Each value takes the key it gets in an object, or NULL in an array and at the top. The FILE stays the caller's. The C
- * locale is assumed: nothing here calls setlocale. One writer belongs to one thread. It allocates nothing. */
+ * Each value takes the key it gets in an object, or NULL in an array and at the top. The FILE stays the
+ * caller's. The C locale is assumed: nothing here calls setlocale. One writer belongs to one thread. It
+ * allocates nothing. */
 #ifndef FIRMWARE_SIM_BASE_JSON_H
 #define FIRMWARE_SIM_BASE_JSON_H
 
@@ -32,7 +33,8 @@ void json_close_array(struct json *json);
 void json_string(struct json *json, const char *key, const char *value);
 void json_int(struct json *json, const char *key, int64_t value);
 void json_uint(struct json *json, const char *key, uint64_t value);
-/* 15 to 17 digits: the fewest that read back as the same double. NaN and the infinities, which JSON lacks, become null. */
+/* 15 to 17 digits: the fewest that read back as the same double. NaN and the infinities, which JSON lacks,
+ * become null. */
 void json_double(struct json *json, const char *key, double value);
 void json_bool(struct json *json, const char *key, int value);
 /* Ends the text with a newline. SH_ESTATE: the calls did not make one whole value; SH_EIO: writing failed. */

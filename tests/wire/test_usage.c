@@ -324,8 +324,8 @@ static void test_options(void **state)
 
 /* ---- help */
 
-/* -h and --help of a command, on standard output: what it does, the usage, lines of at most 110 columns. Those of check
- * end where the keys begin. */
+/* -h and --help of a command, on standard output: what it does, the usage, lines of at most 110 columns.
+ * Those of check end where the keys begin. */
 static void expect_help(struct wire *wire, const char *name, const char *option)
 {
     char want[128];
