@@ -122,17 +122,13 @@ static const struct app_option OPTIONS[] = {
 
 static const char NOTES[] =
     "Of each stage the cheapest method is used whose bounds hold. The bounds are plan.tolerance_m (RMS of the\n"
-    "ranges) and plan.echo_tolerance (share of the pulses with another number of echoes). cast.refine, beam.mode,\n"
-    "optics.depth, scene.order_exactly and output.georef force a method.\n"
+    "ranges) and plan.echo_tolerance (share of the pulses with another number of echoes). beam.mode, optics.depth,\n"
+    "scene.order_exactly and output.georef force a method.\n"
     "\n"
     "Beam and optics are tried on some thousands of the head's own pulses in the scene, always the same ones. They\n"
     "are compared with 1,027 sub-rays, or with the deepest way. The bounds are upper limits of what was found, from\n"
     "up to four of the stations, for the settings at power-up. Each stage may use the whole tolerance; the stages\n"
     "are not added up.\n"
-    "\n"
-    "Single rays are not refined where plan.tolerance_m is given and 32,768 pulses need no more than a tenth of\n"
-    "both tolerances. The share of unrefined rays counts also those whose range has an error above that tenth.\n"
-    "The error is that of the others, and includes those that may be there unseen.\n"
     "\n"
     "georef is planned for each station, from output.crs, output.tolerance_m, the scene's extent and the head's\n"
     "range_max_m. There is one row for all stations where they get the same method, else one row each.\n"
@@ -140,8 +136,8 @@ static const char NOTES[] =
     "A stage with the method none is left out: nothing in the configuration asks for it. Below each stage stand\n"
     "the methods that were not chosen, each with its reason.\n"
     "\n"
-    "Costs are in ns per pulse, beyond a single ray. They are rounded figures of `make chart`, `make bench-refine`\n"
-    "and `make bench-beam` on one core with AVX2, to compare methods by. `make bench` measures what depends on the\n"
+    "Costs are in ns per pulse, beyond a single ray. They are rounded figures of `make chart` and\n"
+    "`make bench-beam` on one core with AVX2, to compare methods by. `make bench` measures what depends on the\n"
     "scene.\n";
 
 const struct app_command app_plan = {
