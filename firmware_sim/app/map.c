@@ -1,7 +1,6 @@
 /* scanhead map: a scan map from above, scanned off line. */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/map.h"
@@ -10,7 +9,7 @@
 #include "firmware_sim/app/offline.h"
 #include "firmware_sim/app/recording.h"
 
-enum { BATCH = 4096 };
+enum { BATCH = 256 };
 
 struct map_run {
     struct app_input in;
@@ -144,31 +143,23 @@ static int set_frame(struct app_sets *sets)
 
 static int run(int argc, char **argv)
 {
-    struct map_run *run = calloc(1, sizeof *run);
-    struct sh_err err;
-    if (run == NULL) {
-        sh_fail(&err, SH_ENOMEM, "no memory");
-        return app_fail(&err);
-    }
-    int status = app_parse(&app_map, argc, argv, &run->in, run);
-    if (status == APP_GO_ON && run->output == NULL) status = app_usage(&app_map, "-o FILE.png is needed");
-    if (status == APP_GO_ON) {
-        status = set_frame(&run->in.sets);
-        if (status == APP_OK) status = app_with_config(&run->in, draw, run);
-    }
-    free(run);
-    return status;
+    struct map_run run = {0};
+    int status = app_parse(&app_map, argc, argv, &run.in, &run);
+    if (status != APP_GO_ON) return status;
+    if (run.output == NULL) return app_usage(&app_map, "-o FILE.png is needed");
+    status = set_frame(&run.in.sets);
+    return status == APP_OK ? app_with_config(&run.in, draw, &run) : status;
 }
 
 #define AT(member) offsetof(struct map_run, member)
 
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
-    {.name = "output", .letter = 'o', .argument = "FILE.png", .kind = APP_TEXT, .at = AT(output),
-     .help = "where to write"},
-    OPTION_NUMBER("pixel-m", "M", 1e-4, 1e4, AT(pixel_m), "side of a pixel; default: 1200 pixels on the longer side"),
+    {APP_TEXT, "output", "FILE.png", .letter = 'o', .at = AT(output), .help = "where to write"},
+    {APP_NUMBER, "pixel-m", "M", .min = 1e-4, .max = 1e4, .at = AT(pixel_m),
+     .help = "side of a pixel; default: 1200 pixels on the longer side"},
     OPTION_SET,
-    OPTION_FLAG("quiet", AT(quiet), "no progress"),
+    {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no progress"},
     OPTION_END
 };
 /* clang-format on */

@@ -1,7 +1,6 @@
 #include "firmware_sim/app/options.h"
 
 #include <ctype.h>
-#include <errno.h>
 #include <getopt.h>
 #include <math.h>
 #include <stdarg.h>
@@ -37,49 +36,44 @@ int app_add_set(struct app_sets *sets, const char *set)
     return APP_OK;
 }
 
-int app_add_key(struct app_sets *sets, const char *key, const char *value)
+static int add_key(struct app_sets *sets, const char *key, const char *value)
 {
     if (sets->n_text == APP_MAX_KEYS) {
         fprintf(stderr, "scanhead: options that stand for a key, such as %s: at most %d\n", key, APP_MAX_KEYS);
         return APP_USAGE;
     }
     char *text = sets->text[sets->n_text++];
-    int n = snprintf(text, sizeof sets->text[0], "%s=%s", key, value);
-    if (n < 0 || (size_t)n >= sizeof sets->text[0]) {
-        fprintf(stderr, "scanhead: value of %s is too long; at most %zu characters\n", key,
-                sizeof sets->text[0] - strlen(key) - 2);
+    const size_t room = sizeof sets->text[0], most = room - strlen(key) - 2;
+    if (strlen(value) > most) {
+        fprintf(stderr, "scanhead: value of %s is too long; at most %zu characters\n", key, most);
         return APP_USAGE;
     }
+    snprintf(text, room, "%s=%s", key, value);
     return app_add_set(sets, text);
 }
 
-static int parse_double(const struct app_command *command, const struct app_option *row, const char *text, double *out)
+/* The whole text as a number within the row's limits. */
+static int parse_number(const struct app_command *command, const struct app_option *row, const char *text, double *out)
 {
     char *end;
-    double value = strtod(text, &end);
-    if (end == text || *end != '\0' || isspace((unsigned char)text[0]) || !isfinite(value) || value < row->min ||
-        value > row->max)
-        return app_usage(command, "--%s %s: not a number from %.10g to %.10g", row->name, text, row->min, row->max);
-    *out = value;
-    return APP_OK;
-}
-
-int app_parse_long(const struct app_command *command, const char *option, const char *text, long min, long max,
-                   long *out)
-{
-    char *end;
-    errno = 0;
-    long value = strtol(text, &end, 10);
-    if (end == text || *end != '\0' || isspace((unsigned char)text[0]) || errno != 0 || value < min || value > max)
-        return app_usage(command, "--%s %s: not a whole number from %ld to %ld", option, text, min, max);
-    *out = value;
-    return APP_OK;
+    const int whole = row->kind == APP_WHOLE;
+    *out = strtod(text, &end);
+    if (end != text && *end == '\0' && !isspace((unsigned char)text[0]) && *out >= row->min && *out <= row->max &&
+        (!whole || *out == floor(*out)))
+        return APP_OK;
+    return app_usage(command, "--%s %s: not a %s from %.10g to %.10g", row->name, text,
+                     whole ? "whole number" : "number", row->min, row->max);
 }
 
 static int apply(const struct app_command *command, const struct app_option *row, const char *text,
                  struct app_input *in, void *values)
 {
+    double number = 0.0;
     void *at = (char *)values + row->at;
+    if (row->word != NULL && strcmp(text, row->word) == 0) {
+        *(long *)at = APP_WORD;
+        return APP_OK;
+    }
     switch (row->kind) {
     case APP_FLAG:
         *(int *)at = 1;
@@ -88,11 +82,16 @@ static int apply(const struct app_command *command, const struct app_option *row
         *(const char **)at = text;
         return APP_OK;
     case APP_NUMBER:
-        return parse_double(command, row, text, at);
+        return parse_number(command, row, text, at);
     case APP_WHOLE:
-        return app_parse_long(command, row->name, text, (long)row->min, (long)row->max, at);
+        if (parse_number(command, row, text, &number) != APP_OK) return APP_USAGE;
+        *(long *)at = (long)number;
+        return APP_OK;
+    case APP_KEY_GIVEN:
+        *(int *)at = 1;
+        return add_key(&in->sets, row->key, text);
     case APP_KEY:
-        return app_add_key(&in->sets, row->key, text);
+        return add_key(&in->sets, row->key, text);
     case APP_SET:
         return app_add_set(&in->sets, text);
     default:
@@ -140,7 +139,7 @@ static void print_row(const struct app_option *row, int width)
 
 static void print_help(const struct app_command *command)
 {
-    static const struct app_option help = {.name = "help", .letter = 'h', .help = "this text"};
+    static const struct app_option help = {APP_LAST, "help", NULL, .letter = 'h', .help = "this text"};
     char arguments[128];
     size_t longest = strlen(help.name);
     for (const struct app_option *row = command->options; row->kind != APP_LAST; row++) {

@@ -11,65 +11,39 @@
 /* The exit status of a command. APP_GO_ON is none: the command line was read, the command can begin. */
 enum { APP_GO_ON = -1, APP_OK = 0, APP_FAILED = 1, APP_USAGE = 2 };
 
-enum { APP_MAX_SETS = 256, APP_MAX_KEYS = 16, APP_MAX_OPERANDS = 2, APP_MAX_OPTIONS = 32 };
+enum { APP_WORD = -1, APP_MAX_SETS = 256, APP_MAX_KEYS = 16, APP_MAX_OPERANDS = 2, APP_MAX_OPTIONS = 32 };
 
+/* clang-format off */
 enum app_option_kind {
-    APP_LAST, /* the row after the last */
-    APP_FLAG,
-    APP_TEXT,
-    APP_NUMBER,
-    APP_WHOLE,
-    APP_KEY,
-    APP_SET,
-    APP_CALL
+    APP_LAST,      /* the row after the last */
+    APP_FLAG,      /* sets an int to 1 */
+    APP_TEXT,      /* sets a const char * */
+    APP_NUMBER,    /* sets a double, from min to max */
+    APP_WHOLE,     /* sets a long, from min to max */
+    APP_KEY,       /* stands for a configuration key */
+    APP_KEY_GIVEN, /* the same, and sets an int to 1 */
+    APP_SET,       /* any configuration key */
+    APP_CALL       /* calls apply */
 };
 
+/* A row begins with kind, name and argument; the rest goes by name. */
 struct app_option {
-    const char *name;     /* without the dashes */
-    char letter;          /* the short form; 0: none */
-    const char *argument; /* as --help shows it; NULL: the option takes none */
     enum app_option_kind kind;
-    size_t at;       /* FLAG: of an int, set to 1. TEXT: of a const char *. NUMBER: of a double. WHOLE: of a long */
-    double min, max; /* NUMBER, WHOLE: what is allowed */
-    const char *key; /* KEY: the configuration key that the option stands for */
-    int (*apply)(void *values, const char *text); /* CALL: returns APP_OK, or APP_USAGE with the reason printed */
+    const char *name;     /* without the dashes */
+    const char *argument; /* as --help shows it; NULL: the option takes none */
+    char letter;          /* the short form; 0: none */
+    size_t at;            /* where in the command's struct the option sets its value */
+    double min, max;
+    const char *word;     /* WHOLE: a word that is allowed, too, and gives APP_WORD; NULL: none */
+    const char *key;
+    int (*apply)(void *values, const char *text); /* APP_OK, or APP_USAGE with the reason printed */
     const char *help;
 };
 
-/* One row each. */
-#define OPTION_FLAG(n, where, h)                            \
-    {                                                       \
-        .name = n, .kind = APP_FLAG, .at = where, .help = h \
-    }
-#define OPTION_TEXT(n, a, where, h)                                        \
-    {                                                                      \
-        .name = n, .argument = a, .kind = APP_TEXT, .at = where, .help = h \
-    }
-#define OPTION_NUMBER(n, a, lo, hi, where, h)                                                      \
-    {                                                                                              \
-        .name = n, .argument = a, .kind = APP_NUMBER, .min = lo, .max = hi, .at = where, .help = h \
-    }
-#define OPTION_WHOLE(n, a, lo, hi, where, h)                                                      \
-    {                                                                                             \
-        .name = n, .argument = a, .kind = APP_WHOLE, .min = lo, .max = hi, .at = where, .help = h \
-    }
-#define OPTION_KEY(n, a, k, h)                                         \
-    {                                                                  \
-        .name = n, .argument = a, .kind = APP_KEY, .key = k, .help = h \
-    }
-#define OPTION_CALL(n, a, f, h)                                           \
-    {                                                                     \
-        .name = n, .argument = a, .kind = APP_CALL, .apply = f, .help = h \
-    }
-#define OPTION_SET                                                      \
-    {                                                                   \
-        .name = "set", .argument = "KEY=VALUE", .kind = APP_SET,        \
-        .help = "another value of a configuration key; may be repeated" \
-    }
-#define OPTION_END       \
-    {                    \
-        .kind = APP_LAST \
-    }
+/* Rows that are the same in every table. */
+#define OPTION_SET {APP_SET, "set", "KEY=VALUE", .help = "another value of a configuration key; may be repeated"}
+#define OPTION_END {.kind = APP_LAST}
+/* clang-format on */
 
 struct app_command {
     const char *name;
@@ -101,13 +75,8 @@ struct app_input {
  * line. The strings are argv's own. */
 int app_parse(const struct app_command *command, int argc, char **argv, struct app_input *in, void *values);
 
-/* APP_OK, or APP_USAGE with the reason printed. `set` is kept, `value` copied. */
+/* Adds KEY=VALUE, which must live on. APP_OK, or APP_USAGE with the reason printed. */
 int app_add_set(struct app_sets *sets, const char *set);
-int app_add_key(struct app_sets *sets, const char *key, const char *value);
-
-/* The whole text as a number from min to max: APP_OK, or APP_USAGE with the reason printed. */
-int app_parse_long(const struct app_command *command, const char *option, const char *text, long min, long max,
-                   long *out);
 
 /* Prints a usage error: one line that ends with where the help is. Returns APP_USAGE. */
 int app_usage(const struct app_command *command, const char *fmt, ...) __attribute__((format(printf, 2, 3)));

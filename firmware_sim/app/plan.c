@@ -112,9 +112,9 @@ static int run(int argc, char **argv)
 
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
-    OPTION_FLAG("json", offsetof(struct plan_options, json),
-                "an array of {stage, method, error_m, echo_share, cost_ns, forced, why, left_out}, where left_out is an "
-                "array of {method, error_m, echo_share, cost_ns, why}; null: not known, or it depends on the scene"),
+    {APP_FLAG, "json", NULL, .at = offsetof(struct plan_options, json),
+     .help = "an array of {stage, method, error_m, echo_share, cost_ns, forced, why, left_out}, where left_out is an "
+             "array of {method, error_m, echo_share, cost_ns, why}; null: not known, or it depends on the scene"},
     OPTION_SET,
     OPTION_END
 };

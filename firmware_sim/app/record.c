@@ -6,7 +6,6 @@
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/offline.h"
 #include "firmware_sim/app/record_files.h"
-#include "firmware_sim/app/record_result.h"
 #include "firmware_sim/app/recording.h"
 #include "firmware_sim/base/clock.h"
 
@@ -16,8 +15,8 @@ struct record {
     struct app_input in;
     const char *source, *stats;
     struct record_files files;
-    int all_stations, crs_given, quiet;
-    long station;
+    int crs_given, quiet;
+    long station; /* 0: as the head is set; APP_WORD: all */
     double wait_s;
     struct recording_options recording;
 };
@@ -52,15 +51,13 @@ static const struct sh_report NOTES = {NULL, print_note, NULL};
 static int follow(struct record *r, struct scanhead *sh, struct recording_result *result, struct sh_err *err)
 {
     struct sh_err why = {0};
-    const int64_t start_ns = clock_now_ns();
     int rc = recording_run(sh, &r->recording, result, err);
-    const double wall_s = 1e-9 * (double)(clock_now_ns() - start_ns);
     const int has_figures = rc == SH_OK || rc == SH_ELOST; /* LOST: an unplugged head has cut the recording */
     const int keep = result->points != 0 || (rc == SH_OK && result->missing[0] == '\0');
     int after = record_files_close(&r->files, keep, &why);
     if (rc == SH_OK && after != SH_OK) rc = sh_fail(err, after, "%s", why.text);
     if (!has_figures || r->stats == NULL) return rc;
-    after = record_write_stats(r->stats, sh, result, wall_s, &why);
+    after = app_write_json(r->stats, recording_put, result, &why);
     return rc == SH_OK && after != SH_OK ? sh_fail(err, after, "%s", why.text) : rc;
 }
 
@@ -80,7 +77,7 @@ static int record(struct record *r, struct scanhead *sh, struct sh_err *err)
     rc = follow(r, sh, &result, err);
     if (rc == SH_OK || result.points != 0) say_result(r, &result);
     app_warn_left_out(result.crowded, result.unfit);
-    return rc == SH_OK ? record_check_complete(sh, &result, err) : rc;
+    return rc == SH_OK ? recording_check_complete(&result, err) : rc;
 }
 
 static int ends_in(const char *text, const char *ending)
@@ -138,7 +135,7 @@ static int record_config(struct config *cfg, void *ctx, struct sh_err *err)
     if (rc == SH_OK && cfg->output.layout == LINE_GEO && cfg->output.crs == GEOREF_GEODETIC)
         rc = record_files_check_degrees(&r->files, err);
     if (rc == SH_OK) rc = offline_open(cfg, &app_report_stderr, &offline, err);
-    if (rc == SH_OK && r->all_stations) {
+    if (rc == SH_OK && r->station == APP_WORD) {
         r->recording.first_station = 1;
         r->recording.last_station = offline_site(offline)->n_stations;
     }
@@ -169,7 +166,7 @@ static int record_stream(struct record *r, struct sh_err *err)
     int rc = open_stream(r, &sh, why, sizeof why);
     if (rc != SCANHEAD_OK) return sh_fail(err, rc, "%s", why);
     if (ends_in(r->source, ".shs")) r->recording.listen = 1;
-    if (r->all_stations && !r->recording.listen) {
+    if (r->station == APP_WORD && !r->recording.listen) {
         char reply[512];
         rc = scanhead_command(sh, "HEAD:STATION? MAX", reply, sizeof reply, 5000);
         r->recording.first_station = 1;
@@ -182,25 +179,11 @@ static int record_stream(struct record *r, struct sh_err *err)
     return rc;
 }
 
-static int take_station(void *values, const char *text)
-{
-    struct record *r = values;
-    r->all_stations = strcmp(text, "all") == 0;
-    return r->all_stations ? APP_OK : app_parse_long(&app_record, "station", text, 1, CONFIG_MAX_STOPS, &r->station);
-}
-
 static int take_file(void *values, const char *text)
 {
     struct record *r = values;
     struct sh_err err = {0};
     return record_files_add(&r->files, text, &err) == SH_OK ? APP_OK : app_fail(&err);
-}
-
-static int take_crs(void *values, const char *text)
-{
-    struct record *r = values;
-    r->crs_given = 1;
-    return app_add_key(&r->in.sets, "output.crs", text);
 }
 
 static int run(int argc, char **argv)
@@ -212,7 +195,7 @@ static int run(int argc, char **argv)
     if (r.files.n == 0 && r.stats == NULL) return app_usage(&app_record, "-o FILE is needed");
     r.source = r.in.operand[0];
     r.recording.progress = !r.quiet;
-    r.recording.first_station = r.recording.last_station = (uint32_t)r.station;
+    if (r.station > 0) r.recording.first_station = r.recording.last_station = (uint32_t)r.station;
     app_catch_signals();
     if (is_config(r.source)) return app_with_config(&r.in, record_config, &r);
     if (!is_stream(r.source))
@@ -227,29 +210,29 @@ static int run(int argc, char **argv)
 
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
-    {.name = "output", .letter = 'o', .argument = "FILE", .kind = APP_CALL, .apply = take_file,
-     .help = "where to write; may be repeated"},
-    OPTION_CALL("station", "N|all", take_station,
-                "scan from station N, or from all one after the other into the same files"),
-    OPTION_WHOLE("frames", "N", 0, 1000000000, AT(recording.frames), "frames per scan"),
-    OPTION_NUMBER("duration", "S", 0.001, 1e8, AT(recording.duration_s),
-                  "stop each scan after S seconds of device time"),
-    OPTION_FLAG("split", AT(files.split),
-                "each scan to files of its own: NAME-1.las, NAME-2.las, ..., in the order of scans"),
-    OPTION_FLAG("listen", AT(recording.listen),
-                "send no command: record what comes until the stream ends or Ctrl-C"),
-    OPTION_NUMBER("wait", "S", 0.0, 1e8, AT(wait_s), "wait up to S seconds for SOURCE to be there"),
-    OPTION_NUMBER("replug", "S", 0.0, 1e8, AT(recording.replug_s),
-                  "when the head is unplugged, wait up to S seconds for it and go on in the same files"),
-    OPTION_FLAG("ascii", AT(files.recorder.ascii), "PLY as text"),
-    OPTION_FLAG("empty-shots", AT(files.recorder.empty_shots),
-                "keep shots without echo: .ply with NaN coordinates, .e57 with its invalid state"),
-    OPTION_TEXT("stats", "FILE", AT(stats), "write what was received as JSON; - is standard output"),
+    {APP_CALL, "output", "FILE", .letter = 'o', .apply = take_file, .help = "where to write; may be repeated"},
+    {APP_WHOLE, "station", "N|all", .min = 1, .max = CONFIG_MAX_STOPS, .word = "all", .at = AT(station),
+     .help = "scan from station N, or from all one after the other into the same files"},
+    {APP_WHOLE, "frames", "N", .min = 0, .max = 1000000000, .at = AT(recording.frames), .help = "frames per scan"},
+    {APP_NUMBER, "duration", "S", .min = 0.001, .max = 1e8, .at = AT(recording.duration_s),
+     .help = "stop each scan after S seconds of device time"},
+    {APP_FLAG, "split", NULL, .at = AT(files.split),
+     .help = "each scan to files of its own: NAME-1.las, NAME-2.las, ..., in the order of scans"},
+    {APP_FLAG, "listen", NULL, .at = AT(recording.listen),
+     .help = "send no command: record what comes until the stream ends or Ctrl-C"},
+    {APP_NUMBER, "wait", "S", .min = 0.0, .max = 1e8, .at = AT(wait_s),
+     .help = "wait up to S seconds for SOURCE to be there"},
+    {APP_NUMBER, "replug", "S", .min = 0.0, .max = 1e8, .at = AT(recording.replug_s),
+     .help = "when the head is unplugged, wait up to S seconds for it and go on in the same files"},
+    {APP_FLAG, "ascii", NULL, .at = AT(files.recorder.ascii), .help = "PLY as text"},
+    {APP_FLAG, "empty-shots", NULL, .at = AT(files.recorder.empty_shots),
+     .help = "keep shots without echo: .ply with NaN coordinates, .e57 with its invalid state"},
+    {APP_TEXT, "stats", "FILE", .at = AT(stats), .help = "write what was received as JSON; - is standard output"},
     OPTION_SET,
-    OPTION_CALL("crs", "CRS", take_crs,
-                "local, ecef, utm or geodetic: write points in it, as output.layout=geo does, too"),
-    OPTION_KEY("threads", "N", "loop.threads", "threads that cast; 0: one per processor"),
-    OPTION_FLAG("quiet", AT(quiet), "no progress"),
+    {APP_KEY_GIVEN, "crs", "CRS", .key = "output.crs", .at = AT(crs_given),
+     .help = "local, ecef, utm or geodetic: write points in it, as output.layout=geo does, too"},
+    {APP_KEY, "threads", "N", .key = "loop.threads", .help = "threads that cast; 0: one per processor"},
+    {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no progress"},
     OPTION_END
 };
 /* clang-format on */

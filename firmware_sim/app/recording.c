@@ -15,6 +15,7 @@ struct recording {
     struct scanhead *sh;
     const struct recording_options *o;
     struct recording_result *result;
+    char reply[512];
     int64_t next_report_ns, scan_t0_ns; /* monotonic; device time of the scan's start, -1 before it */
     int interrupted;                    /* asked to end the whole recording */
     int stopping;                       /* the scan at hand is to end */
@@ -22,19 +23,20 @@ struct recording {
     int scan_over, cut_short, within_scan, broken;
 };
 
-static int command(struct recording *r, const char *line, char *reply, size_t len, struct sh_err *err)
+/* The answer is in r->reply. */
+static int command(struct recording *r, const char *line, struct sh_err *err)
 {
-    int rc = scanhead_command(r->sh, line, reply, len, REPLY_MS);
+    int rc = scanhead_command(r->sh, line, r->reply, sizeof r->reply, REPLY_MS);
     if (rc != SCANHEAD_OK) return sh_fail(err, rc, "%s: %s", line, scanhead_error(r->sh));
-    if (strncmp(reply, "ERR", 3) == 0) return sh_fail(err, SH_ESTATE, "the head refused %s: %s", line, reply);
+    if (strncmp(r->reply, "ERR", 3) == 0) return sh_fail(err, SH_ESTATE, "the head refused %s: %s", line, r->reply);
     return SH_OK;
 }
 
 static int set(struct recording *r, const char *header, long value, struct sh_err *err)
 {
-    char line[64], reply[512];
+    char line[64];
     snprintf(line, sizeof line, "%s %ld", header, value);
-    return command(r, line, reply, sizeof reply, err);
+    return command(r, line, err);
 }
 
 static void count_points(struct recording *r, const struct scanhead_frame *frame)
@@ -110,15 +112,14 @@ static int is_interrupted(struct recording *r)
 static int replug(struct recording *r, struct sh_err *err)
 {
     const int64_t end_ns = clock_now_ns() + (int64_t)(1e9 * r->o->replug_s);
-    char reply[512];
     int rc, scanning = 0;
     sh_warn(r->o->report, "%s; waiting for it", scanhead_error(r->sh));
     do {
         rc = scanhead_reattach(r->sh, REPLUG_MS);
-        if (rc == SCANHEAD_OK) rc = scanhead_command(r->sh, "HEAD:STAT?", reply, sizeof reply, REPLY_MS);
+        if (rc == SCANHEAD_OK) rc = scanhead_command(r->sh, "HEAD:STAT?", r->reply, sizeof r->reply, REPLY_MS);
     } while (rc != SCANHEAD_OK && clock_now_ns() < end_ns && !is_interrupted(r));
     if (rc != SCANHEAD_OK) return sh_fail(err, SH_ELOST, "the head did not come back: %s", scanhead_error(r->sh));
-    scanning = strncmp(reply, "s", 1) == 0; /* spin-up, scanning, spin-down */
+    scanning = strncmp(r->reply, "s", 1) == 0; /* spin-up, scanning, spin-down */
     sh_warn(r->o->report, "the head is back");
     r->result->replugs++;
     r->result->broken_scans += (uint64_t)(r->within_scan && !r->broken);
@@ -152,14 +153,13 @@ static int step(struct recording *r, int timeout_ms, struct sh_err *err)
 static int wait_idle(struct recording *r, struct sh_err *err)
 {
     int64_t deadline_ns = clock_now_ns() + (int64_t)BOOT_MS * 1000000;
-    char reply[512];
     while (clock_now_ns() < deadline_ns) {
         if (is_interrupted(r)) return SH_OK;
-        int rc = command(r, "HEAD:STAT?", reply, sizeof reply, err);
+        int rc = command(r, "HEAD:STAT?", err);
         if (rc != SH_OK) return rc;
-        if (strcmp(reply, "idle") == 0) return SH_OK;
-        if (strcmp(reply, "scanning") == 0 || strcmp(reply, "fault") == 0 || strcmp(reply, "off") == 0)
-            return sh_fail(err, SH_ESTATE, "the head is %s; --listen records what it does on its own", reply);
+        if (strcmp(r->reply, "idle") == 0) return SH_OK;
+        if (strcmp(r->reply, "scanning") == 0 || strcmp(r->reply, "fault") == 0 || strcmp(r->reply, "off") == 0)
+            return sh_fail(err, SH_ESTATE, "the head is %s; --listen records what it does on its own", r->reply);
         rc = step(r, 20, err); /* frames keep coming meanwhile */
         if (rc < 0) return rc;
     }
@@ -168,10 +168,9 @@ static int wait_idle(struct recording *r, struct sh_err *err)
 
 static int stop_scan(struct recording *r, struct sh_err *err)
 {
-    char reply[512];
-    int rc = scanhead_command(r->sh, "SCAN:STOP", reply, sizeof reply, REPLY_MS);
+    int rc = scanhead_command(r->sh, "SCAN:STOP", r->reply, sizeof r->reply, REPLY_MS);
     if (rc != SCANHEAD_OK) return sh_fail(err, rc, "SCAN:STOP: %s", scanhead_error(r->sh));
-    r->cut_short = r->interrupted && strncmp(reply, "ERR", 3) != 0; /* refused: the scan has just ended by itself */
+    r->cut_short = r->interrupted && strncmp(r->reply, "ERR", 3) != 0; /* refused: the scan has just ended by itself */
     return SH_OK;
 }
 
@@ -179,11 +178,10 @@ static int stop_scan(struct recording *r, struct sh_err *err)
 static int look_for_end(struct recording *r, struct sh_err *err)
 {
     struct scanhead_stats stats;
-    char reply[512];
     scanhead_get_stats(r->sh, &stats);
     if (stats.seq_lost + stats.reader_lost == 0) return SH_OK;
-    int rc = command(r, "HEAD:STAT?", reply, sizeof reply, err);
-    if (rc != SH_OK || strcmp(reply, "idle") != 0) return rc;
+    int rc = command(r, "HEAD:STAT?", err);
+    if (rc != SH_OK || strcmp(r->reply, "idle") != 0) return rc;
     sh_warn(r->o->report, "the scan's end was lost; the head is idle");
     r->scan_started = r->scan_over = 1;
     r->within_scan = r->broken = 0;
@@ -220,12 +218,11 @@ static int follow(struct recording *r, struct sh_err *err)
 
 static int start_scan(struct recording *r, uint32_t station, struct sh_err *err)
 {
-    char reply[512];
     int rc = wait_idle(r, err);
     if (rc == SH_OK && r->interrupted) return SH_OK;
     if (rc == SH_OK && station != 0) rc = set(r, "HEAD:STATION", (long)station, err);
     if (rc == SH_OK && r->o->frames >= 0) rc = set(r, "SCAN:FRAM", r->o->frames, err);
-    return rc == SH_OK ? command(r, "SCAN:STAR", reply, sizeof reply, err) : rc;
+    return rc == SH_OK ? command(r, "SCAN:STAR", err) : rc;
 }
 
 static int record_scan(struct recording *r, uint32_t station, struct sh_err *err)
@@ -293,8 +290,12 @@ int recording_run(struct scanhead *sh, const struct recording_options *options, 
                   struct sh_err *err)
 {
     memset(result, 0, sizeof *result);
-    struct recording r = {.sh = sh, .o = options, .result = result, .next_report_ns = clock_now_ns() + 1000000000};
+    const int64_t start_ns = clock_now_ns();
+    struct recording r = {.sh = sh, .o = options, .result = result, .next_report_ns = start_ns + 1000000000};
     int rc = options->listen ? record_listening(&r, err) : record_stations(&r, err);
+    result->wall_s = 1e-9 * (double)(clock_now_ns() - start_ns);
+    scanhead_get_stats(sh, &result->stream);
+    scanhead_hash_hex(sh, result->sha256);
     if (rc == SH_ECLOSED && options->listen && result->frames == 0)
         return sh_fail(err, SH_EFORMAT, "the stream ended without a single frame");
     if (rc == SH_ECLOSED && options->listen && !r.within_scan) return SH_OK;

@@ -9,6 +9,7 @@
 
 #include "core/err.h"
 #include "drivers/host/scanhead.h"
+#include "firmware_sim/base/json.h"
 
 struct recording_options {
     int listen;                           /* send nothing; take what comes until the stream or the time ends */
@@ -30,11 +31,19 @@ struct recording_result {
     uint64_t lost_pulses;                          /* cast pulses that the head says it could not compute */
     uint64_t crowded, faint, unfit;                /* hits that are no echoes, as the line ends count them */
     char missing[128];              /* what was asked for and left out because of `interrupted`; empty: nothing */
+    double wall_s;                  /* how long the recording took */
+    struct scanhead_stats stream;   /* as the client counts */
+    char sha256[65];                /* of the stream, where scanhead_hash_start was called */
     uint64_t replugs, broken_scans; /* how often the head was away and came back; scans in which it was away */
 };
 
 /* SH_OK, or the first failure. result is filled in both cases. */
 int recording_run(struct scanhead *sh, const struct recording_options *options, struct recording_result *result,
                   struct sh_err *err);
+
+/* Writes the result as one JSON object; ctx is the struct recording_result. */
+void recording_put(struct json *json, const void *ctx);
+/* SH_OK, or what is missing: frames, pulses, parts of scans. Echoes that the head left out do not count. */
+int recording_check_complete(const struct recording_result *result, struct sh_err *err);
 
 #endif

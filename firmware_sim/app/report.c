@@ -3,12 +3,12 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "core/cloud.h"
 #include "core/mat3.h"
 #include "firmware_sim/app/app.h"
+#include "firmware_sim/base/clock.h"
 #include "firmware_sim/site/site.h"
 
 struct report {
@@ -16,7 +16,7 @@ struct report {
     const char *cloud_path;
     int json;
     double tolerance_m, max_m;
-    double reported_s; /* when progress was reported last */
+    int64_t reported_ns; /* when progress was reported last */
     struct config *cfg;
     struct site *site;
     const struct georef **georef; /* of each station */
@@ -30,28 +30,15 @@ struct report {
     struct cloud_coverage coverage;
 };
 
-static double now_s(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
-}
-
 /* core/analysis reports every piece of its work. A line a second is enough for a terminal, and none for short
  * work. */
 static void report_each_second(void *ctx, const char *what, double fraction)
 {
     struct report *r = ctx;
-    double now = now_s();
-    if (now - r->reported_s < 1) return;
-    r->reported_s = now;
+    const int64_t now_ns = clock_now_ns();
+    if (now_ns - r->reported_ns < 1000000000) return;
+    r->reported_ns = now_ns;
     sh_progress(&app_report_stderr, what, fraction);
-}
-
-static void warn(void *ctx, const char *text)
-{
-    (void)ctx;
-    sh_warn(&app_report_stderr, "%s", text);
 }
 
 /* Ghosts become shots without echo, but counted. */
@@ -70,8 +57,8 @@ static void leave_out_ghosts(struct report *r)
 
 static int load(struct report *r, struct sh_err *err)
 {
-    const struct sh_report progress = {r, warn, report_each_second};
-    r->reported_s = now_s();
+    const struct sh_report progress = {r, app_report_stderr.warn, report_each_second};
+    r->reported_ns = clock_now_ns();
     int rc = cloud_read(r->cloud_path, &progress, &r->cloud, err);
     if (rc == SH_OK) rc = site_load(r->cfg, &app_report_stderr, &r->site, err);
     if (rc == SH_OK) rc = distance_create(r->site->scene, &r->index, err);
@@ -133,9 +120,9 @@ static int compare(struct report *r, struct sh_err *err)
                                      .threads = thread_count(r->cfg),
                                      .body = site->n_movers > 0 ? body_of : NULL,
                                      .body_ctx = r};
-    const struct sh_report progress = {r, warn, report_each_second};
+    const struct sh_report progress = {r, app_report_stderr.warn, report_each_second};
     struct sh_err why = {0};
-    r->reported_s = now_s();
+    r->reported_ns = clock_now_ns();
     r->distance_m = malloc((r->cloud.n + 1) * sizeof *r->distance_m);
     r->triangle = malloc((r->cloud.n + 1) * sizeof *r->triangle);
     if (r->distance_m == NULL || r->triangle == NULL)
@@ -272,13 +259,13 @@ static int run(int argc, char **argv)
 
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
-    OPTION_NUMBER("tolerance-m", "T", 0.0, FARTHEST_M, AT(tolerance_m),
-                  "how far a point may be from the scene (default 0.001)"),
-    OPTION_NUMBER("max-m", "M", 1e-9, FARTHEST_M, AT(max_m),
-                  "how far to look for the scene; a point farther than that counts as far, and fails (default 10)"),
-    OPTION_FLAG("json", AT(json),
-                "the figures as JSON, in metres: points, empty, ghosts, mean_m, rms_m, p50_m, p95_m, p999_m, max_m, "
-                "beyond, far, tolerance_m, surfaces_hit, surfaces, triangles_hit, triangles, worst"),
+    {APP_NUMBER, "tolerance-m", "T", .min = 0.0, .max = FARTHEST_M, .at = AT(tolerance_m),
+     .help = "how far a point may be from the scene (default 0.001)"},
+    {APP_NUMBER, "max-m", "M", .min = 1e-9, .max = FARTHEST_M, .at = AT(max_m),
+     .help = "how far to look for the scene; a point farther than that counts as far, and fails (default 10)"},
+    {APP_FLAG, "json", NULL, .at = AT(json),
+     .help = "the figures as JSON, in metres: points, empty, ghosts, mean_m, rms_m, p50_m, p95_m, p999_m, max_m, "
+             "beyond, far, tolerance_m, surfaces_hit, surfaces, triangles_hit, triangles, worst"},
     OPTION_SET,
     OPTION_END
 };

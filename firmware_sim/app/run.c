@@ -150,13 +150,6 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
     return rc;
 }
 
-static int take_frames(void *values, const char *text)
-{
-    struct run_options *o = values;
-    o->device.one_scan = 1;
-    return app_add_key(&o->in.sets, "head.frames", text);
-}
-
 static int run(int argc, char **argv)
 {
     struct run_options o = {0};
@@ -170,20 +163,23 @@ static int run(int argc, char **argv)
 
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
-    OPTION_FLAG("start", AT(device.start), "scan at once, no command needed"),
-    OPTION_KEY("pace", "PACE", "loop.pace",
-               "realtime, fast (as fast as it computes), step (a peer grants time with TIME:STEP)"),
-    OPTION_NUMBER("duration", "S", 0.001, 1e8, AT(device.duration_s),
-                  "end after S seconds of device time: of scanning with --start, else since power-up"),
-    OPTION_CALL("frames", "N", take_frames, "frames per scan; with --start, end after the first scan"),
-    OPTION_KEY("threads", "N", "loop.threads", "threads that cast; 0: one per processor"),
+    {APP_FLAG, "start", NULL, .at = AT(device.start), .help = "scan at once, no command needed"},
+    {APP_KEY, "pace", "PACE", .key = "loop.pace",
+     .help = "realtime, fast (as fast as it computes), step (a peer grants time with TIME:STEP)"},
+    {APP_NUMBER, "duration", "S", .min = 0.001, .max = 1e8, .at = AT(device.duration_s),
+     .help = "end after S seconds of device time: of scanning with --start, else since power-up"},
+    {APP_KEY_GIVEN, "frames", "N", .key = "head.frames", .at = AT(device.one_scan),
+     .help = "frames per scan; with --start, end after the first scan"},
+    {APP_KEY, "threads", "N", .key = "loop.threads", .help = "threads that cast; 0: one per processor"},
     OPTION_SET,
-    OPTION_TEXT("stats", "FILE", AT(stats), "write statistics as JSON at the end; - is standard output"),
-    OPTION_TEXT("journal", "FILE", AT(device.journal), "write every command that had an effect, with its device time"),
-    OPTION_TEXT("replay-journal", "FILE", AT(device.replay), "carry out the commands of a journal at their times"),
-    OPTION_WHOLE("ready-fd", "N", 1, 65535, AT(ready_fd),
-                 "write one JSON line with the endpoints to descriptor N once all links are open"),
-    OPTION_FLAG("quiet", AT(quiet), "no messages but errors and warnings"),
+    {APP_TEXT, "stats", "FILE", .at = AT(stats), .help = "write statistics as JSON at the end; - is standard output"},
+    {APP_TEXT, "journal", "FILE", .at = AT(device.journal),
+     .help = "write every command that had an effect, with its device time"},
+    {APP_TEXT, "replay-journal", "FILE", .at = AT(device.replay),
+     .help = "carry out the commands of a journal at their times"},
+    {APP_WHOLE, "ready-fd", "N", .min = 1, .max = 65535, .at = AT(ready_fd),
+     .help = "write one JSON line with the endpoints to descriptor N once all links are open"},
+    {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no messages but errors and warnings"},
     OPTION_END
 };
 /* clang-format on */

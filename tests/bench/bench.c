@@ -24,18 +24,18 @@ struct bench_options {
 
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
-    OPTION_TEXT("scenes", "LIST", AT(scenes),
-                "of generated closed terrain by its number of triangles (10k, 2M, 25000), and house, the IFC model; "
-                "default " DEFAULT_SCENES),
-    OPTION_TEXT("house", "FILE", AT(house), "the IFC model; default " HOUSE_FILE),
-    OPTION_NUMBER("seconds", "S", 0.0, 3600.0, AT(seconds),
-                  "measure each scene for S seconds, but at least seven rounds; default 3"),
-    OPTION_WHOLE("threads", "N", 1, 64, AT(threads),
-                 "casters of the run on all threads; default: one per processor"),
-    OPTION_NUMBER("leaks", "N", 4.0, 1e12, AT(leaks),
-                  "aim N rays at edges and corners of closed meshes and count those that slip through (fails when one "
-                  "does); without --scenes nothing else is done"),
-    {.name = "output", .letter = 'o', .argument = "FILE", .kind = APP_TEXT, .at = AT(out),
+    {APP_TEXT, "scenes", "LIST", .at = AT(scenes),
+     .help = "of generated closed terrain by its number of triangles (10k, 2M, 25000), and house, the IFC model; "
+                "default " DEFAULT_SCENES},
+    {APP_TEXT, "house", "FILE", .at = AT(house), .help = "the IFC model; default " HOUSE_FILE},
+    {APP_NUMBER, "seconds", "S", .min = 0.0, .max = 3600.0, .at = AT(seconds),
+     .help = "measure each scene for S seconds, but at least seven rounds; default 3"},
+    {APP_WHOLE, "threads", "N", .min = 1, .max = 64, .at = AT(threads),
+     .help = "casters of the run on all threads; default: one per processor"},
+    {APP_NUMBER, "leaks", "N", .min = 4.0, .max = 1e12, .at = AT(leaks),
+     .help = "aim N rays at edges and corners of closed meshes and count those that slip through (fails when one "
+                  "does); without --scenes nothing else is done"},
+    {APP_TEXT, "output", "FILE", .letter = 'o', .at = AT(out),
      .help = "JSON to FILE, and a table to standard output"},
     OPTION_END
 };
