@@ -1,4 +1,4 @@
-/* scanhead check: nothing runs. */
+/* scanhead check: validates configuration, scene and links. Nothing runs. */
 #include <math.h>
 
 #include "firmware_sim/app/app.h"

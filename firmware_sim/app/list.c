@@ -21,7 +21,7 @@ static int list_usb(void)
     char why[256];
     int n = scanhead_list_usb(head, MAX_HEADS, why, sizeof why);
     if (n < 0)
-        printf("heads on USB: %s\n", why); /* a system without USB has a list all the same */
+        printf("heads on USB: %s\n", why); /* no failure: a system without USB has the rest of the list */
     else
         puts(n == 0 ? "heads on USB: none" : "heads on USB:");
     for (int i = 0; i < n && i < MAX_HEADS; i++)

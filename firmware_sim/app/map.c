@@ -1,4 +1,4 @@
-/* scanhead map: a scan map from above, scanned off line. */
+/* scanhead map: a picture of the scene from above. The head scans it off line. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-/* scanhead record: points of a scan to files. */
+/* scanhead record: the points of scans to files. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -29,8 +29,8 @@ void recording_put(struct json *json, const void *ctx)
     json_close_object(json);
 }
 
-/* Frames that never came leave gaps in the sequence. Frames with a wrong checksum leave gaps, too, but not at the
- * very end of the stream. */
+/* Frames that never came leave gaps in the sequence. Frames with a wrong checksum leave gaps, too, but not at
+ * the very end of the stream. */
 static uint64_t count_lost(const struct scanhead_stats *s)
 {
     return (s->seq_lost > s->bad_payload ? s->seq_lost : s->bad_payload) + s->dropped;

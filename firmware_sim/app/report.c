@@ -1,4 +1,4 @@
-/* scanhead report: how far a recording lies from the configuration's scene. */
+/* scanhead report: how far a recording's points lie from the scene of its configuration. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
@@ -23,7 +23,7 @@ struct report {
     struct distance *index;
     struct distance *mover_index[CAST_MAX_MOVERS]; /* of each body that moves, in its own frame */
     struct cloud cloud;
-    size_t ghosts;      /* points seen in mirrors: nothing is there, they are left out */
+    size_t ghosts;      /* points seen in mirrors: nothing is there, so they are left out */
     double *distance_m; /* per point */
     uint32_t *triangle;
     struct cloud_stats stats;
@@ -41,7 +41,7 @@ static void report_each_second(void *ctx, const char *what, double fraction)
     sh_progress(&app_report_stderr, what, fraction);
 }
 
-/* Ghosts become shots without echo, but counted. */
+/* Ghosts are counted, and become shots without echo. */
 static void leave_out_ghosts(struct report *r)
 {
     const struct site_detect *d = &r->site->detect;
@@ -58,7 +58,6 @@ static void leave_out_ghosts(struct report *r)
 static int load(struct report *r, struct sh_err *err)
 {
     const struct sh_report progress = {r, app_report_stderr.warn, report_each_second};
-    r->reported_ns = clock_now_ns();
     int rc = cloud_read(r->cloud_path, &progress, &r->cloud, err);
     if (rc == SH_OK) rc = site_load(r->cfg, &app_report_stderr, &r->site, err);
     if (rc == SH_OK) rc = distance_create(r->site->scene, &r->index, err);
@@ -75,7 +74,8 @@ static unsigned thread_count(const struct config *cfg)
     return processors > 0 ? (unsigned)processors : 1;
 }
 
-/* Where a moving body was hit, in the body's own frame: at a stop it stands all scan long. */
+/* Turns a point on a moving body into the body's own frame and gives the body's index. At a stop the body
+ * stands still during the scan. */
 static const struct distance *body_of(void *ctx, unsigned station, uint16_t label, double p_prcs[3])
 {
     const struct report *r = ctx;
@@ -122,7 +122,6 @@ static int compare(struct report *r, struct sh_err *err)
                                      .body_ctx = r};
     const struct sh_report progress = {r, app_report_stderr.warn, report_each_second};
     struct sh_err why = {0};
-    r->reported_ns = clock_now_ns();
     r->distance_m = malloc((r->cloud.n + 1) * sizeof *r->distance_m);
     r->triangle = malloc((r->cloud.n + 1) * sizeof *r->triangle);
     if (r->distance_m == NULL || r->triangle == NULL)
@@ -232,6 +231,7 @@ static int report(struct config *cfg, void *ctx, struct sh_err *err)
 {
     struct report *r = ctx;
     r->cfg = cfg;
+    r->reported_ns = clock_now_ns();
     r->cloud_path = r->in.operand[1];
     int rc = print_deviations(r, err);
     free(r->georef);

@@ -1,4 +1,4 @@
-/* scanhead run: serve the head. */
+/* scanhead run: serves the head on its links. */
 #include <errno.h>
 #include <poll.h>
 #include <stdio.h>
