@@ -6,8 +6,7 @@
 #include "firmware_sim/device/head_clock.h"
 #include "firmware_sim/loop/pose_feed.h"
 
-/* Opens and closes each link, and the socket of a live platform, so that a taken port or a wrong path shows
- * now. */
+/* Opens and closes each link, and the socket of a live platform: a taken port or a wrong path shows now. */
 static int check_links(const struct config *cfg, struct sh_err *err)
 {
     for (uint32_t i = 0; i < cfg->n_links; i++) {

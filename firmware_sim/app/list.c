@@ -15,7 +15,7 @@ static void print_head(const struct scanhead_usb_head *head)
     printf(head->problem[0] != '\0' ? "; %s\n" : "\n", head->problem);
 }
 
-static int list_usb(void)
+static void list_usb(void)
 {
     static struct scanhead_usb_head head[MAX_HEADS];
     char why[256];
@@ -27,7 +27,6 @@ static int list_usb(void)
     for (int i = 0; i < n && i < MAX_HEADS; i++)
         print_head(&head[i]);
     if (n > MAX_HEADS) printf("and %d more\n", n - MAX_HEADS);
-    return APP_OK;
 }
 
 static int run(int argc, char **argv)
@@ -38,7 +37,8 @@ static int run(int argc, char **argv)
     if (status != APP_GO_ON) return status;
     if (config_list_profiles(NULL, stdout, &err) < 0) return app_fail(&err);
     puts("links: pty (virtual serial port), tcp, usb (usbip, usbredir, functionfs), file, null");
-    return list_usb();
+    list_usb();
+    return APP_OK;
 }
 
 static const struct app_option OPTIONS[] = {OPTION_END};

@@ -60,16 +60,9 @@ static void wait_for_end(struct loop *loop)
     }
 }
 
-/* What --stats writes. */
-struct run_stats {
-    struct loop_stats loop;
-    double cpu_s;
-};
-
 static void put_stats(struct json *json, const void *ctx)
 {
-    const struct run_stats *stats = ctx;
-    const struct loop_stats *s = &stats->loop;
+    const struct loop_stats *s = ctx;
     struct rusage usage;
     getrusage(RUSAGE_SELF, &usage);
     json_open_object(json, NULL);
@@ -79,7 +72,7 @@ static void put_stats(struct json *json, const void *ctx)
     json_uint(json, "lines", s->lines);
     json_uint(json, "scans", s->scans);
     json_double(json, "wall_s", s->wall_s);
-    json_double(json, "cpu_s", stats->cpu_s);
+    json_double(json, "cpu_s", clock_cpu_s());
     json_double(json, "pulses_per_s", s->wall_s > 0.0 ? (double)s->pulses / s->wall_s : 0.0);
     json_uint(json, "lost_pulses", s->lost_pulses);
     json_uint(json, "lost_ticks", s->lost_ticks);
@@ -110,19 +103,18 @@ static void warn_of_losses(const struct loop_stats *stats)
 
 static int serve(const struct run_options *o, struct loop *loop, struct device *device, struct sh_err *err)
 {
-    struct run_stats stats;
+    struct loop_stats stats;
     int rc = loop_start(loop, err);
     if (rc == SH_OK) rc = say_ready(loop, o->ready_fd, err);
     if (rc == SH_OK)
         wait_for_end(loop);
     else
         loop_end(loop);
-    loop_join(loop, &stats.loop);
-    stats.cpu_s = clock_cpu_s();
+    loop_join(loop, &stats);
     if (rc == SH_OK && o->stats != NULL) rc = app_write_json(o->stats, put_stats, &stats, err);
     if (rc == SH_OK) rc = device_close_journal(device, err);
     if (rc == SH_OK) rc = loop_check_links(loop, err);
-    warn_of_losses(&stats.loop);
+    warn_of_losses(&stats);
     return rc;
 }
 
