@@ -38,17 +38,14 @@ int app_add_set(struct app_sets *sets, const char *set)
 
 static int add_key(struct app_sets *sets, const char *key, const char *value)
 {
-    if (sets->n_text == APP_MAX_KEYS) {
-        fprintf(stderr, "scanhead: options that stand for a key, such as %s: at most %d\n", key, APP_MAX_KEYS);
+    char *text = sets->text + sets->used;
+    const size_t room = sizeof sets->text - sets->used, n = strlen(key) + strlen(value) + 2;
+    if (n > room) {
+        fprintf(stderr, "scanhead: %s: too long; options that stand for a key have %zu characters in all\n", key,
+                sizeof sets->text);
         return APP_USAGE;
     }
-    char *text = sets->text[sets->n_text++];
-    const size_t room = sizeof sets->text[0], most = room - strlen(key) - 2;
-    if (strlen(value) > most) {
-        fprintf(stderr, "scanhead: value of %s is too long; at most %zu characters\n", key, most);
-        return APP_USAGE;
-    }
-    snprintf(text, room, "%s=%s", key, value);
+    sets->used += (size_t)snprintf(text, room, "%s=%s", key, value) + 1;
     return app_add_set(sets, text);
 }
 
@@ -89,7 +86,7 @@ static int apply(const struct app_command *command, const struct app_option *row
         return APP_OK;
     case APP_KEY_GIVEN:
         *(int *)at = 1;
-        return add_key(&in->sets, row->key, text);
+        /* fall through */
     case APP_KEY:
         return add_key(&in->sets, row->key, text);
     case APP_SET:

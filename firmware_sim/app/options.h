@@ -11,7 +11,7 @@
 /* The exit status of a command. APP_GO_ON is none: the command line was read, the command can begin. */
 enum { APP_GO_ON = -1, APP_OK = 0, APP_FAILED = 1, APP_USAGE = 2 };
 
-enum { APP_WORD = -1, APP_MAX_SETS = 256, APP_MAX_KEYS = 16, APP_MAX_OPERANDS = 2, APP_MAX_OPTIONS = 32 };
+enum { APP_WORD = -1, APP_MAX_SETS = 256, APP_MAX_OPERANDS = 2, APP_MAX_OPTIONS = 32 };
 
 /* clang-format off */
 enum app_option_kind {
@@ -61,8 +61,8 @@ struct app_command {
 struct app_sets {
     const char *set[APP_MAX_SETS];
     int n;
-    char text[APP_MAX_KEYS][64]; /* of the options that stand for a key */
-    int n_text;
+    char text[1024]; /* of the options that stand for a key, one after the other */
+    size_t used;
 };
 
 /* What a command line says, but for the command's own options. */
@@ -72,7 +72,7 @@ struct app_input {
 };
 
 /* APP_GO_ON with `in` and `values` filled, or the exit status: of a printed help, or of an error with its one
- * line. The strings are argv's own. */
+ * line. The strings are argv's own, or lie in `in`, which must stay where it is. */
 int app_parse(const struct app_command *command, int argc, char **argv, struct app_input *in, void *values);
 
 /* Adds KEY=VALUE, which must live on. APP_OK, or APP_USAGE with the reason printed. */
