@@ -1,4 +1,4 @@
-/* build/bench: speed figures. */
+/* scanhead bench: speed figures. */
 #include <errno.h>
 #include <sched.h>
 #include <stdio.h>
@@ -13,6 +13,25 @@
 #define HOUSE_FILE     "/usr/share/assimp/models/IFC/AC14-FZK-Haus.ifc"
 #define DEFAULT_SCENES "10k,100k,1M,10M,house"
 
+static const char HELP[] =
+    "scanhead bench [options]: speed figures as JSON on standard output\n\n"
+    "  --scenes LIST   of generated closed terrain by its number of triangles (10k, 2M, 25000), and house, "
+    "the IFC\n"
+    "                  model; default " DEFAULT_SCENES "\n"
+    "  --house FILE    the IFC model; default " HOUSE_FILE "\n"
+    "  --seconds S     measure each scene for S seconds, but at least seven rounds; default 3\n"
+    "  --threads N     casters of the run on all threads; default: one per processor\n"
+    "  --leaks N       aim N rays at edges and corners of closed meshes and count those that slip through "
+    "(fails when\n"
+    "                  one does); without --scenes nothing else is done\n"
+    "  -o FILE         JSON to FILE, and a table to standard output\n\n"
+    "In one run and in turns, pinned to one processor: Embree alone on prepared rays at its best packet "
+    "width; the exact\n"
+    "cast of the same rays (cast_ratio); everything from the schedule to the frame's checksum "
+    "(pipeline_ratio). Ratios are\n"
+    "medians over the rounds of Embree's time by ours. Then the same through the real loop with the null "
+    "link.\n";
+
 struct bench_options {
     const char *scenes, *house, *out;
     double seconds;
@@ -20,40 +39,38 @@ struct bench_options {
     double leaks;
 };
 
-#define AT(member) offsetof(struct bench_options, member)
+enum { OPT_SCENES = 256, OPT_HOUSE, OPT_SECONDS, OPT_THREADS, OPT_LEAKS };
 
-/* clang-format off */
-static const struct app_option OPTIONS[] = {
-    {APP_TEXT, "scenes", "LIST", .at = AT(scenes),
-     .help = "of generated closed terrain by its number of triangles (10k, 2M, 25000), and house, the IFC model; "
-                "default " DEFAULT_SCENES},
-    {APP_TEXT, "house", "FILE", .at = AT(house), .help = "the IFC model; default " HOUSE_FILE},
-    {APP_NUMBER, "seconds", "S", .min = 0.0, .max = 3600.0, .at = AT(seconds),
-     .help = "measure each scene for S seconds, but at least seven rounds; default 3"},
-    {APP_WHOLE, "threads", "N", .min = 1, .max = 64, .at = AT(threads),
-     .help = "casters of the run on all threads; default: one per processor"},
-    {APP_NUMBER, "leaks", "N", .min = 4.0, .max = 1e12, .at = AT(leaks),
-     .help = "aim N rays at edges and corners of closed meshes and count those that slip through (fails when one "
-                  "does); without --scenes nothing else is done"},
-    {APP_TEXT, "output", "FILE", .letter = 'o', .at = AT(out),
-     .help = "JSON to FILE, and a table to standard output"},
-    OPTION_END
-};
-/* clang-format on */
+static const struct option OPTIONS[] = {{"scenes", required_argument, NULL, OPT_SCENES},
+                                        {"house", required_argument, NULL, OPT_HOUSE},
+                                        {"seconds", required_argument, NULL, OPT_SECONDS},
+                                        {"threads", required_argument, NULL, OPT_THREADS},
+                                        {"leaks", required_argument, NULL, OPT_LEAKS},
+                                        {"help", no_argument, NULL, 'h'},
+                                        {NULL, 0, NULL, 0}};
 
-static const char NOTES[] =
-    "All is measured in one run and in turns, pinned to one processor: Embree alone on prepared rays at its best\n"
-    "packet width; the exact cast of the same rays (cast_ratio); everything from the schedule to the frame's\n"
-    "checksum (pipeline_ratio). Ratios are medians over the rounds of Embree's time by ours. Then the same runs\n"
-    "through the real loop with the null link.\n";
-
-static const struct app_command BENCH = {
-    .name = "bench",
-    .is_program = 1,
-    .summary = "speed figures as JSON on standard output",
-    .options = OPTIONS,
-    .notes = NOTES,
-};
+static int parse_option(struct bench_options *o, int opt, char **argv)
+{
+    switch (opt) {
+    case OPT_SCENES:
+        o->scenes = optarg;
+        return APP_OK;
+    case OPT_HOUSE:
+        o->house = optarg;
+        return APP_OK;
+    case 'o':
+        o->out = optarg;
+        return APP_OK;
+    case OPT_SECONDS:
+        return app_parse_double("bench", "--seconds", optarg, 0.0, 3600.0, &o->seconds);
+    case OPT_THREADS:
+        return app_parse_long("bench", "--threads", optarg, 1, 64, &o->threads);
+    case OPT_LEAKS:
+        return app_parse_double("bench", "--leaks", optarg, 4.0, 1e12, &o->leaks);
+    default:
+        return app_bad_option("bench", opt, argv);
+    }
+}
 
 /* The next name of a list with commas; NULL at its end. */
 static const char *next_name(const char *list, char *name, size_t len)
@@ -68,13 +85,32 @@ static int check_scenes(const char *list)
 {
     char name[32];
     uint32_t n = 0;
-    if (*list == '\0') return app_usage(&BENCH, "--scenes: a list is needed, such as %s", DEFAULT_SCENES);
+    if (*list == '\0') return app_usage("bench", "--scenes: a list is needed, such as %s", DEFAULT_SCENES);
     while ((list = next_name(list, name, sizeof name)) != NULL)
         if ((strcmp(name, "house") != 0 && bench_count(name) == 0) || ++n > BENCH_MAX_SCENES)
-            return app_usage(&BENCH,
+            return app_usage("bench",
                              "--scenes %s: allowed are up to %d of house and numbers of triangles from 100 to 100M",
                              name, BENCH_MAX_SCENES);
     return APP_OK;
+}
+
+/* Returns -1 to go on, else the exit status. */
+static int parse(struct bench_options *o, int argc, char **argv)
+{
+    int opt, status = APP_OK;
+    opterr = 0;
+    while ((opt = getopt_long(argc, argv, ":ho:", OPTIONS, NULL)) != -1) {
+        if (opt == 'h') {
+            fputs(HELP, stdout);
+            return APP_OK;
+        }
+        status = parse_option(o, opt, argv);
+        if (status != APP_OK) return status;
+    }
+    if (optind != argc) return app_usage("bench", "it takes no arguments, only options");
+    if (o->scenes == NULL && o->leaks == 0.0) o->scenes = DEFAULT_SCENES;
+    if (o->scenes != NULL) status = check_scenes(o->scenes);
+    return status == APP_OK ? -1 : status;
 }
 
 /* The calling thread to one processor, the one it runs on; `before` undoes it. */
@@ -194,11 +230,8 @@ int main(int argc, char **argv)
 {
     struct bench_options o = {.seconds = 3.0};
     struct sh_err err = {0};
-    struct app_input in;
-    int status = app_parse(&BENCH, argc, argv, &in, &o);
-    if (status != APP_GO_ON) return status;
-    if (o.scenes == NULL && o.leaks == 0.0) o.scenes = DEFAULT_SCENES;
-    if (o.scenes != NULL && check_scenes(o.scenes) != APP_OK) return APP_USAGE;
+    int status = parse(&o, argc, argv);
+    if (status >= 0) return status;
     struct bench_report *report = calloc(1, sizeof *report);
     int rc = report != NULL ? measure(&o, report, &err) : sh_fail(&err, SH_ENOMEM, "no memory");
     if (rc == SH_OK) rc = write_out(&o, report, &err);

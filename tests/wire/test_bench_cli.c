@@ -96,7 +96,7 @@ static void test_wrong_usage(void **state)
         assert_int_equal(bench(wire, wrong[i]), 2);
         char *text = wire_read(wire_path(wire, "err"), NULL);
         assert_ptr_equal(strchr(text, '\n'), text + strlen(text) - 1); /* one line */
-        assert_int_equal(strncmp(text, "bench: ", 7), 0);
+        assert_int_equal(strncmp(text, "scanhead", 8), 0);
         free(text);
     }
     static const char *const absent[] = {"bench", "--scenes", "house", "--house", "/nonexistent.ifc", NULL};
