@@ -9,11 +9,6 @@
 
 enum { FIRST_VALUE = 256, HELP_COLUMNS = 110 };
 
-static const char *prefix(const struct app_command *command)
-{
-    return command->is_program ? "" : "scanhead ";
-}
-
 int app_usage(const struct app_command *command, const char *fmt, ...)
 {
     char text[512];
@@ -21,8 +16,7 @@ int app_usage(const struct app_command *command, const char *fmt, ...)
     va_start(ap, fmt);
     vsnprintf(text, sizeof text, fmt, ap);
     va_end(ap);
-    const char *before = prefix(command);
-    fprintf(stderr, "%s%s: %s; see %s%s --help\n", before, command->name, text, before, command->name);
+    fprintf(stderr, "scanhead %s: %s; see scanhead %s --help\n", command->name, text, command->name);
     return APP_USAGE;
 }
 
@@ -144,8 +138,7 @@ static void print_help(const struct app_command *command)
         if (n > longest) longest = n;
     }
     app_arguments(command, arguments, sizeof arguments);
-    const char *before = prefix(command), *name = command->name;
-    printf("%s%s: %s\n\nusage: %s%s%s\n\n", before, name, command->summary, before, name, arguments);
+    printf("scanhead %s: %s\n\nusage: scanhead %s%s\n\n", command->name, command->summary, command->name, arguments);
     for (const struct app_option *row = command->options; row->kind != APP_LAST; row++)
         print_row(row, (int)longest + 10);
     print_row(&help, (int)longest + 10);

@@ -47,7 +47,6 @@ struct app_option {
 
 struct app_command {
     const char *name;
-    int is_program;                        /* 1: a program of its own, no command of scanhead */
     const char *operand[APP_MAX_OPERANDS]; /* all are needed; NULL after the last */
     const char *needs;                     /* options that must be given, as the usage line shows them; NULL: none */
     const char *summary;                   /* one line: what it does */
