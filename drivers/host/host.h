@@ -109,6 +109,9 @@ int host_fill(struct scanhead *sh, int64_t deadline_ns);
 /* Keeps the frame that the parser is at, for scanhead_next. */
 int host_keep(struct scanhead *sh);
 
+/* SCANHEAD_EINPUT, unless frame is the one that scanhead_next returned last, and of this type. */
+int host_check_last(struct scanhead *sh, const struct scanhead_frame *frame, enum scanhead_frame_type type);
+
 /* poses.c: takes a poses frame in; forgets all (another scan). */
 int host_absorb_poses(struct scanhead *sh, const uint8_t *payload, size_t len);
 void host_forget_poses(struct scanhead *sh);

@@ -8,6 +8,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "drivers/protocol/bytes.h"
+
 enum {
     NATIVE_SYNC = 0xd5,
     NATIVE_VERSION = 1,
@@ -22,6 +24,7 @@ enum {
     NATIVE_MAX_POSES = (NATIVE_MAX_PAYLOAD - NATIVE_POSES_HEAD_LEN) / NATIVE_POSE_LEN,
     NATIVE_ATTRIBUTES_HEAD_LEN = 16,
     NATIVE_ATTRIBUTE_LEN = 4,
+    NATIVE_SURFACES_HEAD_LEN = 8,
     NATIVE_MAX_TEXT = 512, /* longest reply line, with its CR LF */
 };
 
@@ -52,6 +55,14 @@ struct native_header {
     uint32_t length, seq, payload_crc;
     int64_t t_ns;
 };
+
+/* The header of the whole frame at `frame`. */
+void native_read_header(const uint8_t *frame, struct native_header *header);
+/* Bytes of that frame: header and payload. The one place that knows where its length stands. */
+static inline size_t native_frame_len(const uint8_t *frame)
+{
+    return NATIVE_HEADER_LEN + (size_t)le_get32(frame + 4);
+}
 
 enum native_layout { NATIVE_POLAR = 0, NATIVE_GEO = 1 };
 
@@ -116,6 +127,21 @@ struct native_point {
     uint32_t dt_ns;
     uint8_t echo, echo_count; /* both 0: shot without echo */
 };
+
+/* Point i < n_points of a checked points payload. Inline, for readers of millions a second. */
+static inline void native_decode_point(const uint8_t *payload, uint32_t i, struct native_point *out)
+{
+    const uint8_t *p = payload + NATIVE_POINTS_HEAD_LEN + (size_t)i * NATIVE_POINT_LEN;
+    uint32_t tail = le_get32(p + 16);
+    out->a = le_get32(p);
+    out->b = le_get32(p + 4);
+    out->c = le_get32(p + 8);
+    out->refl_cdb = (int16_t)le_get16(p + 12);
+    out->label = le_get16(p + 14);
+    out->dt_ns = tail & 0xffffffu;
+    out->echo = (uint8_t)(tail >> 24 & 15u);
+    out->echo_count = (uint8_t)(tail >> 28);
+}
 
 struct native_attributes { /* head of an attributes payload, 16 bytes, then n attributes of 4 */
     uint64_t pulse0;
@@ -185,11 +211,9 @@ struct native_event {
 int native_decode_descriptor(const uint8_t *payload, size_t len, struct native_descriptor *out);
 int native_decode_anchor(const uint8_t *payload, size_t len, struct native_anchor *out);
 int native_decode_points(const uint8_t *payload, size_t len, struct native_points *out);
-void native_decode_point(const uint8_t *payload, uint32_t i, struct native_point *out); /* i < n_points */
 int native_decode_attributes(const uint8_t *payload, size_t len, struct native_attributes *out);
 void native_decode_attribute(const uint8_t *payload, uint32_t i, struct native_attribute *out); /* i < n_points */
 int native_decode_line_end(const uint8_t *payload, size_t len, struct native_line_end *out);
-int native_decode_telemetry(const uint8_t *payload, size_t len, struct native_telemetry *out);
 int native_decode_event(const uint8_t *payload, size_t len, struct native_event *out);
 /* Poses payload: u32 n (2 and more), u32 0, then n poses of 80 bytes, their times rising. */
 int native_decode_poses(const uint8_t *payload, size_t len, uint32_t *n);

@@ -24,11 +24,14 @@ size_t native_encode_line_end(uint8_t *dst, size_t cap, const struct line_end *e
 size_t native_encode_poses(uint8_t *dst, size_t cap, const struct native_pose *pose, uint32_t n, int64_t t_ns,
                            int flags);
 
-/* Names of labels first.. as many as fit into one frame of at most max_payload bytes; *n_done is how many. name(ctx, i)
- * gives object and material. */
-size_t native_encode_surfaces(uint8_t *dst, size_t cap, uint32_t first, uint32_t n, size_t max_payload,
-                              void (*name)(void *ctx, uint32_t label, const char **object, const char **material),
-                              void *ctx, int64_t t_ns, int flags, uint32_t *n_done);
+/* Names of n labels from `first` on. name() gives object and material of one. */
+struct native_names {
+    uint32_t first, n;
+    void (*name)(void *ctx, uint32_t label, const char **object, const char **material);
+    void *ctx;
+};
+/* As many names as fit into one frame of at most max_payload bytes. `names` then holds those that are left. */
+size_t native_encode_surfaces(uint8_t *dst, size_t cap, size_t max_payload, struct native_names *names, int64_t t_ns);
 
 /* Sets the sequence number of the whole frame at frame and renews the header CRC. Returns the frame's length. */
 size_t native_seal(uint8_t *frame, uint32_t seq);
