@@ -107,17 +107,17 @@ static inline int record(const char *path, struct recorder_options options, int 
 {
     struct scanhead *sh;
     struct scanhead_frame frame;
-    void *rec;
+    struct recorder *rec;
     if (shs != NULL) fclose(shs);
     shs = NULL;
     const struct recorder_ops *ops = recorder_find(path, err);
     assert_non_null(ops);
     assert_int_equal(scanhead_open(shs_path, &sh, NULL, 0), 0);
-    int rc = ops->open(path, &options, &rec, err);
+    int rc = recorder_open(ops, path, &options, &rec, err);
     if (rc == 0) {
         while (rc == 0 && scanhead_next(sh, &frame, -1) == 0)
-            rc = ops->frame(rec, sh, &frame, err);
-        int closed = ops->close(rec, rc == 0 && keep, err);
+            rc = recorder_frame(rec, sh, &frame, err);
+        int closed = recorder_close(rec, rc == 0 && keep, err);
         if (rc == 0) rc = closed;
     }
     scanhead_close(sh);
