@@ -29,12 +29,19 @@ struct usb_interface {
 
 int host_usb_parse(const char *source, struct usb_wanted *wanted, struct sh_err *err);
 
+/* A head that is open. */
+struct usb_found {
+    libusb_device_handle *handle;
+    struct usb_interface interface;
+    char name[160]; /* usb:vid:pid:serial */
+};
+
 /* The vendor interface of a device's active configuration: 1, or 0 where there is none. */
 int host_usb_interface(libusb_device *device, struct usb_interface *interface);
 
-/* Opens the one head that is wanted. SH_ELOST: there is none; SH_EINPUT: there are several; SH_EPERM: with the rule
- * that gives the permission. name: "usb:vid:pid:serial" of what was opened. */
-int host_usb_find(libusb_context *ctx, const struct usb_wanted *wanted, libusb_device_handle **handle,
-                  struct usb_interface *interface, char *name, size_t name_len, struct sh_err *err);
+/* Opens the one head that is wanted; asked: the source as the caller wrote it, for errors. SH_ELOST: there is none;
+ * SH_EINPUT: there are several; SH_EPERM: the text has the rule that gives the permission. */
+int host_usb_find(libusb_context *ctx, const char *asked, const struct usb_wanted *wanted, struct usb_found *found,
+                  struct sh_err *err);
 
 #endif

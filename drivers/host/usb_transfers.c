@@ -33,10 +33,9 @@ struct failing {
 
 struct host_usb {
     libusb_context *ctx;
-    libusb_device_handle *handle;
-    struct usb_interface interface;
+    struct usb_found head;
     struct in_transfer in[IN_TRANSFERS];
-    int n_in, head; /* how many; the one to read from next */
+    int n_in, next; /* how many; the one to read from next */
     struct failing in_failing, out_failing;
     struct libusb_transfer *out;
     int out_flying, out_error; /* errno of the write before */
@@ -138,7 +137,7 @@ static int recover(struct host_usb *usb, struct failing *failing, uint8_t endpoi
         return ENODEV;
     else
         nanosleep(&pause, NULL);
-    const int rc = libusb_clear_halt(usb->handle, endpoint);
+    const int rc = libusb_clear_halt(usb->head.handle, endpoint);
     failing->relapse_ns = host_deadline_ns(RELAPSE_MS);
     return rc == LIBUSB_ERROR_NO_DEVICE ? ENODEV : 0;
 }
@@ -153,13 +152,13 @@ static int recover_reads(struct host_usb *usb)
             in->transfer->status = LIBUSB_TRANSFER_CANCELLED;
         if (in->error == EPROTO) in->error = ECANCELED;
     }
-    return recover(usb, &usb->in_failing, usb->interface.in);
+    return recover(usb, &usb->in_failing, usb->head.interface.in);
 }
 
 /* The transfer at hand is used up: sends it off again, and goes on to the next. */
 static int turn(struct host_usb *usb)
 {
-    struct in_transfer *in = &usb->in[usb->head];
+    struct in_transfer *in = &usb->in[usb->next];
     int error = in->error != 0 ? in->error : errno_of_status(in->transfer->status);
     if (in->transfer->actual_length > 0) usb->in_failing.n = 0;
     if (error == EPROTO) error = recover_reads(usb);
@@ -167,7 +166,7 @@ static int turn(struct host_usb *usb)
         in->error = error;
         return error;
     }
-    usb->head = (usb->head + 1) % usb->n_in;
+    usb->next = (usb->next + 1) % usb->n_in;
     submit(in); /* where it fails, that shows when the ring comes round to it */
     return 0;
 }
@@ -177,7 +176,7 @@ static ssize_t usb_read(struct host_source *source, void *to, size_t len)
     struct host_usb *usb = source->usb;
     int looked = 0;
     for (;;) {
-        struct in_transfer *in = &usb->in[usb->head];
+        struct in_transfer *in = &usb->in[usb->next];
         size_t have = in->flying || in->error != 0 ? 0 : (size_t)in->transfer->actual_length - in->used;
         if (have > 0) {
             size_t n = have < len ? have : len;
@@ -206,7 +205,7 @@ static ssize_t usb_write(struct host_source *source, const void *data, size_t le
     struct host_usb *usb = source->usb;
     if (usb->out_flying && handle_events(usb, 0) != 0) return -1;
     int error = usb->out_flying ? EAGAIN : usb->out_error;
-    if (error == EPROTO) error = recover(usb, &usb->out_failing, usb->interface.out);
+    if (error == EPROTO) error = recover(usb, &usb->out_failing, usb->head.interface.out);
     if (error != 0) {
         errno = error;
         return -1;
@@ -228,7 +227,7 @@ static int usb_wait(struct host_source *source, short events, int64_t deadline_n
     for (;;) {
         if (handle_events(usb, left_ns) != 0) return -1;
         *revents = 0;
-        if ((events & POLLIN) && !usb->in[usb->head].flying) *revents |= POLLIN;
+        if ((events & POLLIN) && !usb->in[usb->next].flying) *revents |= POLLIN;
         if ((events & POLLOUT) && !usb->out_flying) *revents |= POLLOUT;
         if (*revents != 0) return 1;
         left_ns = deadline_ns == INT64_MAX ? 60000000000 : deadline_ns - host_deadline_ns(0);
@@ -239,13 +238,13 @@ static int usb_wait(struct host_source *source, short events, int64_t deadline_n
 static int session(struct host_usb *usb, int open)
 {
     return libusb_control_transfer(
-        usb->handle, (uint8_t)LIBUSB_REQUEST_TYPE_VENDOR | LIBUSB_RECIPIENT_INTERFACE | LIBUSB_ENDPOINT_OUT,
-        USB_REQUEST_SESSION, (uint16_t)open, usb->interface.number, NULL, 0, USB_CONTROL_MS);
+        usb->head.handle, (uint8_t)LIBUSB_REQUEST_TYPE_VENDOR | LIBUSB_RECIPIENT_INTERFACE | LIBUSB_ENDPOINT_OUT,
+        USB_REQUEST_SESSION, (uint16_t)open, usb->head.interface.number, NULL, 0, USB_CONTROL_MS);
 }
 
 static void usb_free(struct host_usb *usb)
 {
-    if (usb->handle != NULL) libusb_close(usb->handle); /* forgets transfers that would not end */
+    if (usb->head.handle != NULL) libusb_close(usb->head.handle); /* forgets transfers that would not end */
     for (int i = 0; i < IN_TRANSFERS; i++)
         libusb_free_transfer(usb->in[i].transfer);
     libusb_free_transfer(usb->out);
@@ -260,7 +259,7 @@ static void usb_close(struct host_source *source)
     session(usb, 0);
     cancel_write(usb);
     cancel_reads(usb);
-    libusb_release_interface(usb->handle, usb->interface.number);
+    libusb_release_interface(usb->head.handle, usb->head.interface.number);
     usb_free(usb);
 }
 
@@ -275,11 +274,11 @@ static int make_transfers(struct host_usb *usb, struct sh_err *err)
         usb->in[i].transfer = libusb_alloc_transfer(0);
         missing = usb->in[i].transfer == NULL;
         if (!missing)
-            libusb_fill_bulk_transfer(usb->in[i].transfer, usb->handle, usb->interface.in, usb->in_data + i * IN_BYTES,
-                                      IN_BYTES, in_done, &usb->in[i], 0);
+            libusb_fill_bulk_transfer(usb->in[i].transfer, usb->head.handle, usb->head.interface.in,
+                                      usb->in_data + i * IN_BYTES, IN_BYTES, in_done, &usb->in[i], 0);
     }
     if (missing) return sh_fail(err, SH_ENOMEM, "no memory for USB transfers");
-    libusb_fill_bulk_transfer(usb->out, usb->handle, usb->interface.out, usb->out_data, 0, out_done, usb, 0);
+    libusb_fill_bulk_transfer(usb->out, usb->head.handle, usb->head.interface.out, usb->out_data, 0, out_done, usb, 0);
     return SH_OK;
 }
 
@@ -295,9 +294,10 @@ static int submit_all(struct host_usb *usb, const char *name, struct sh_err *err
 
 static int begin(struct host_usb *usb, const char *name, struct sh_err *err)
 {
-    int rc = libusb_claim_interface(usb->handle, usb->interface.number);
+    int rc = libusb_claim_interface(usb->head.handle, usb->head.interface.number);
     if (rc == LIBUSB_ERROR_BUSY)
-        return sh_fail(err, SH_EIO, "%s: another program has the head's interface %d", name, usb->interface.number);
+        return sh_fail(err, SH_EIO, "%s: another program has the head's interface %d", name,
+                       usb->head.interface.number);
     if (rc == LIBUSB_ERROR_NO_DEVICE) return sh_fail(err, SH_ELOST, "%s: unplugged while it was opened", name);
     if (rc != 0) return sh_fail(err, SH_EIO, "%s: cannot claim the interface: %s", name, libusb_strerror(rc));
     rc = session(usb, 1);
@@ -316,8 +316,8 @@ int host_usb_open(const char *source, struct host_source *out, struct sh_err *er
     if (usb == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a USB source");
     int e = libusb_init(&usb->ctx);
     if (e != 0) rc = sh_fail(err, SH_EIO, "%s: no USB on this system: %s", source, libusb_strerror(e));
-    if (rc == SH_OK)
-        rc = host_usb_find(usb->ctx, &wanted, &usb->handle, &usb->interface, out->name, sizeof out->name, err);
+    if (rc == SH_OK) rc = host_usb_find(usb->ctx, source, &wanted, &usb->head, err);
+    if (rc == SH_OK) snprintf(out->name, sizeof out->name, "%s", usb->head.name);
     if (rc == SH_OK) rc = make_transfers(usb, err);
     if (rc == SH_OK) rc = begin(usb, out->name, err);
     if (rc == SH_OK && (rc = submit_all(usb, out->name, err)) != SH_OK) {

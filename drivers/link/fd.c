@@ -7,7 +7,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "drivers/link/link_util.h"
+#include "drivers/link/link_poll.h"
+#include "drivers/socket/socket.h"
 
 struct fd_link {
     int fd;
@@ -37,12 +38,6 @@ static void fd_endpoint(const void *link, char *buf, size_t len)
     snprintf(buf, len, "%s", self->name);
 }
 
-static double fd_capacity(const void *link)
-{
-    (void)link;
-    return 0;
-}
-
 static int fd_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event, int max)
 {
     struct fd_link *self = link;
@@ -54,7 +49,7 @@ static int fd_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms,
     if (rc != SH_OK) return rc;
     link_take_wake(&fds[0], &events);
     if (self->told_closed) return events.n;
-    if (self->ended || link_stream_ended(self->fd, fds[1].revents)) {
+    if (self->ended || socket_ended(self->fd, fds[1].revents)) {
         self->ended = 1;
         self->told_closed = link_events_push(&events, LINK_CLOSED, 0, self->name);
         return events.n;
@@ -74,14 +69,14 @@ static ssize_t fd_read(void *link, int session, void *buf, size_t len)
 {
     struct fd_link *self = link;
     if (session != 0 || self->ended) return SH_ECLOSED;
-    return fd_done(self, link_stream_read(self->fd, buf, len));
+    return fd_done(self, socket_read(self->fd, buf, len));
 }
 
 static ssize_t fd_write(void *link, int session, const void *buf, size_t len)
 {
     struct fd_link *self = link;
     if (session != 0 || self->ended) return SH_ECLOSED;
-    return fd_done(self, link_stream_write(self->fd, buf, len));
+    return fd_done(self, socket_write(self->fd, buf, len));
 }
 
 static void fd_close(void *link)
@@ -95,7 +90,6 @@ const struct link_ops link_fd = {
     .name = "fd",
     .open = fd_open,
     .endpoint = fd_endpoint,
-    .capacity = fd_capacity,
     .poll = fd_poll,
     .read = fd_read,
     .write = fd_write,

@@ -11,7 +11,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "drivers/link/link_util.h"
+#include "drivers/link/link_poll.h"
 
 struct file_link {
     int fd;
@@ -71,12 +71,6 @@ static void file_endpoint(const void *link, char *buf, size_t len)
     snprintf(buf, len, "file:%s", file->path);
 }
 
-static double file_capacity(const void *link)
-{
-    (void)link;
-    return 0;
-}
-
 static int file_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event, int max)
 {
     struct file_link *file = link;
@@ -117,7 +111,6 @@ const struct link_ops link_file = {
     .name = "file",
     .open = file_open,
     .endpoint = file_endpoint,
-    .capacity = file_capacity,
     .poll = file_poll,
     .read = file_read,
     .write = file_write,

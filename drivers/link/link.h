@@ -57,7 +57,7 @@ struct link_ops {
     /* The endpoint as a client would name it: "tty:/dev/pts/3", "tcp:127.0.0.1:40123", "file:/x/y". */
     void (*endpoint)(const void *link, char *buf, size_t len);
 
-    /* Largest number of bytes per second this link can carry, 0 where there is no fixed limit. */
+    /* Largest number of bytes per second this link can carry. NULL where there is no fixed limit. */
     double (*capacity)(const void *link);
 
     /* Waits up to timeout_ms (-1: for ever) and fills at most max events; returns how many, or a negative SH_E.
@@ -74,9 +74,7 @@ struct link_ops {
     void (*close)(void *link);
 };
 
-/* The only list of links. NULL for an unknown type. */
+/* From the one list of links, in link.c. NULL for an unknown type. */
 const struct link_ops *link_ops_get(enum link_type type);
-/* By name ("pty", "tcp", "file", "null"); -1 when unknown. */
-int link_type_parse(const char *name);
 
 #endif

@@ -2,7 +2,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "drivers/link/link_util.h"
+#include "drivers/link/link_poll.h"
 
 struct null_link {
     int told_opened;
@@ -21,12 +21,6 @@ static void null_endpoint(const void *link, char *buf, size_t len)
 {
     (void)link;
     snprintf(buf, len, "null");
-}
-
-static double null_capacity(const void *link)
-{
-    (void)link;
-    return 0;
 }
 
 static int null_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event, int max)
@@ -61,7 +55,6 @@ const struct link_ops link_null = {
     .name = "null",
     .open = null_open,
     .endpoint = null_endpoint,
-    .capacity = null_capacity,
     .poll = null_poll,
     .read = null_read,
     .write = null_write,

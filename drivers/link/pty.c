@@ -28,7 +28,7 @@
 #include <sys/inotify.h>
 #include <unistd.h>
 
-#include "drivers/link/link_util.h"
+#include "drivers/link/link_poll.h"
 #include "drivers/link/pty_device.h"
 
 struct pty_link {
@@ -74,12 +74,6 @@ static void pty_endpoint(const void *link, char *buf, size_t len)
 {
     const struct pty_link *pty = link;
     snprintf(buf, len, "tty:%s", pty->device.path[0] != '\0' ? pty->device.path : pty->device.slave);
-}
-
-static double pty_capacity(const void *link)
-{
-    (void)link;
-    return 0;
 }
 
 static void pty_begin(struct pty_link *pty, unsigned count)
@@ -219,7 +213,6 @@ const struct link_ops link_pty = {
     .name = "pty",
     .open = pty_open,
     .endpoint = pty_endpoint,
-    .capacity = pty_capacity,
     .poll = pty_poll,
     .read = pty_read,
     .write = pty_write,

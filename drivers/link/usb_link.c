@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "drivers/link/link_util.h"
+#include "drivers/link/link_poll.h"
 #include "drivers/usb/backend.h"
 #include "drivers/usb/head_device.h"
 
@@ -111,7 +111,7 @@ static void tell(struct usb_link *self, int i, uint32_t want_write, struct link_
 
 static int has_news(const struct usb_link *self, uint32_t want_write)
 {
-    int news = self->ops->more(self->backend) || self->news != NULL;
+    int news = (self->ops->more != NULL && self->ops->more(self->backend)) || self->news != NULL;
     for (int i = 0; i < SCANHEAD_USB_SESSIONS; i++)
         news |= has_to_tell(self, i) || is_readable(self, i) || ((want_write >> i & 1u) != 0 && is_writable(self, i));
     return news;
@@ -132,7 +132,7 @@ static int usb_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     self->ops->flush(self->backend);
     for (int i = 0; i < SCANHEAD_USB_SESSIONS; i++)
         tell(self, i, want_write, &events);
-    if (self->news == NULL) self->news = self->ops->news(self->backend);
+    if (self->news == NULL && self->ops->news != NULL) self->news = self->ops->news(self->backend);
     if (self->news != NULL && link_events_push(&events, LINK_NOTICE, 0, self->news)) self->news = NULL;
     return events.n;
 }

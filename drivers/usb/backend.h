@@ -39,9 +39,10 @@ struct usb_backend_ops {
      * host's acts; the rest waits for the next call, and then also without a descriptor that is ready: `more` says so.
      * SH_EIO ends the back end for good. */
     int (*handle)(void *backend, const struct pollfd *fds, int n, int (*go_on)(void *ctx), void *ctx);
-    int (*more)(const void *backend);
+    int (*more)(const void *backend); /* NULL: poll(2) says it all */
 
-    /* What who runs the head should know, one line, and each only once; NULL: nothing. Valid until the next call. */
+    /* One line that whoever runs the head should know, each only once; NULL: nothing. Valid until the next call. The
+     * member itself is NULL for a back end that never has any. */
     const char *(*news)(void *backend);
 
     /* Sends what the core has completed, as far as the wire takes it. After usb_device_write and usb_device_read. */

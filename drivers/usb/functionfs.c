@@ -199,12 +199,6 @@ static int functionfs_more(const void *backend)
     return self->backlog;
 }
 
-static const char *functionfs_news(void *backend)
-{
-    (void)backend;
-    return NULL;
-}
-
 static void functionfs_close(void *backend)
 {
     struct functionfs *self = backend;
@@ -219,7 +213,6 @@ const struct usb_backend_ops usb_backend_functionfs = {
     .prepare = functionfs_prepare,
     .handle = functionfs_handle,
     .more = functionfs_more,
-    .news = functionfs_news,
     .flush = functionfs_flush,
     .close = functionfs_close,
 };

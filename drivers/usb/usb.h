@@ -197,7 +197,5 @@ size_t usb_device_drop(struct usb_device *device, uint8_t endpoint, uint32_t epo
  * holds IN data on its way takes it back when it has changed. */
 uint32_t usb_device_epoch(const struct usb_device *device, uint8_t endpoint);
 void usb_device_next_epoch(struct usb_device *device, uint8_t endpoint);
-/* Halts an endpoint, as a function does that wants to be asked; the host clears it. */
-void usb_device_halt(struct usb_device *device, uint8_t endpoint);
 
 #endif

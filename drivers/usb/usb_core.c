@@ -101,12 +101,6 @@ void usb_set_halt(struct usb_device *device, struct usb_pipe *pipe, int halted)
     if (!halted) pipe->zero_due = 0;
 }
 
-void usb_device_halt(struct usb_device *device, uint8_t endpoint)
-{
-    struct usb_pipe *pipe = usb_pipe(device, endpoint);
-    if (pipe->row != NULL) usb_set_halt(device, pipe, 1);
-}
-
 /* ---- the bus */
 
 void usb_device_attach(struct usb_device *device, enum usb_rate rate, usb_complete complete, void *ctx)

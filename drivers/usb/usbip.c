@@ -11,7 +11,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "drivers/link/socket.h"
+#include "drivers/socket/socket.h"
 #include "drivers/usb/backend.h"
 #include "drivers/usb/retry.h"
 #include "drivers/usb/usbip.h"
@@ -176,13 +176,6 @@ static int usbip_handle(void *backend, const struct pollfd *fds, int n, int (*go
     return rc == SH_OK ? sweep(self) : rc;
 }
 
-/* The sockets keep what was not read, and poll says so. */
-static int usbip_more(const void *backend)
-{
-    (void)backend;
-    return 0;
-}
-
 static const char *usbip_news(void *backend)
 {
     struct usbip *self = backend;
@@ -207,7 +200,6 @@ const struct usb_backend_ops usb_backend_usbip = {
     .endpoint = usbip_endpoint,
     .prepare = usbip_prepare,
     .handle = usbip_handle,
-    .more = usbip_more,
     .news = usbip_news,
     .flush = usbip_flush,
     .close = usbip_close,

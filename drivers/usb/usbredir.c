@@ -15,7 +15,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "drivers/link/socket.h"
+#include "drivers/socket/socket.h"
 #include "drivers/usb/usbredir_private.h"
 
 /* MAX_UNSENT: packets that wait for the guest to read them; above that nothing more is read from it. MAX_READS: at a
@@ -42,9 +42,8 @@ static int on_read(void *priv, uint8_t *data, int count)
     if (self->broken || self->n_reads++ >= MAX_READS || !self->go_on(self->go_on_ctx)) return 0;
     if (is_full(self)) usbredir_flush(self); /* a guest may send many packets before it reads */
     if (self->broken || is_full(self)) return 0;
-    ssize_t n = recv(self->fd, data, (size_t)count, MSG_DONTWAIT);
-    if (n > 0) return (int)n;
-    if (n < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR)) return 0;
+    ssize_t n = socket_read(self->fd, data, (size_t)count);
+    if (n >= 0) return (int)n;
     self->broken = 1;
     return -1;
 }
@@ -52,9 +51,8 @@ static int on_read(void *priv, uint8_t *data, int count)
 static int on_write(void *priv, uint8_t *data, int count)
 {
     struct usbredir *self = priv;
-    ssize_t n = send(self->fd, data, (size_t)count, MSG_DONTWAIT | MSG_NOSIGNAL);
+    ssize_t n = socket_write(self->fd, data, (size_t)count);
     if (n >= 0) return (int)n;
-    if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR || errno == ENOBUFS) return 0;
     self->broken = 1;
     return -1;
 }
@@ -230,13 +228,6 @@ static int usbredir_handle(void *backend, const struct pollfd *fds, int n, int (
     return self->listener >= 0 || rc != SH_OK ? rc : usb_retry_start(&self->retry);
 }
 
-/* The socket keeps what was not read, and poll says so. */
-static int usbredir_more(const void *backend)
-{
-    (void)backend;
-    return 0;
-}
-
 static const char *usbredir_news(void *backend)
 {
     struct usbredir *self = backend;
@@ -268,7 +259,6 @@ const struct usb_backend_ops usb_backend_usbredir = {
     .endpoint = usbredir_endpoint,
     .prepare = usbredir_prepare,
     .handle = usbredir_handle,
-    .more = usbredir_more,
     .news = usbredir_news,
     .flush = usbredir_flush,
     .close = usbredir_close,
