@@ -1,4 +1,4 @@
-/* What stands beside the points: attributes of each, sums of each line. */
+/* What comes beside the points: attributes of each, sums of each line. */
 #include <math.h>
 
 #include "drivers/host/host.h"
@@ -9,7 +9,7 @@ int scanhead_has_attributes(const struct scanhead *sh)
     return (sh->descriptor.content & NATIVE_HAS_ATTRIBUTES) != 0;
 }
 
-/* The frame right behind the last points, and about the same. */
+/* The frame that follows the last points directly, and is about the same ones. */
 static int is_of_points(const struct scanhead *sh, const struct scanhead_frame *frame)
 {
     return sh->have_points && frame->seq == sh->points_seq + 1 && frame->pulse0 == sh->of_points.pulse0 &&

@@ -1,4 +1,4 @@
-/* The insides of a scanhead handle, shared by the files of this folder. */
+/* A scanhead handle's own struct and what the files of this folder share. Private to libscanhead. */
 #ifndef DRIVERS_HOST_HOST_H
 #define DRIVERS_HOST_HOST_H
 
@@ -78,12 +78,12 @@ struct scanhead {
 /* Opens what `source` names, non-blocking. */
 int host_source_open(const char *source, struct host_source *out, struct sh_err *err);
 int host_source_is_usb(const char *source);
-/* usb.c: the same for "usb..."; out is zero but for its name. */
+/* usb_transfers.c: the same for "usb..."; out is zero but for its name. */
 int host_usb_open(const char *source, struct host_source *out, struct sh_err *err);
 extern const struct host_source_ops host_fd_ops;
 
-/* usb_watch.c: waits between two tries to open a source. NULL where a source is not on USB, or the system tells nothing
- * of devices that come: then the waits are short. Devices that come after this are not missed. */
+/* usb_watch.c: waits between two tries to open a source. NULL where a source is not on USB, or where the system does not
+ * report devices that come: then the waits are short. Devices that come after this call are not missed. */
 struct host_usb_watch *host_usb_watch_open(const char *source);
 void host_usb_watch_close(struct host_usb_watch *watch);
 /* rc: why the last try failed. 0: try again, or the deadline is over; -1: a signal came. */
@@ -91,7 +91,7 @@ int host_usb_watch_wait(struct host_usb_watch *watch, int rc, int64_t deadline_n
 
 /* io.c: whether an errno of the source's read or write means that the other side is gone. */
 int host_is_hang_up(const struct scanhead *sh, int error);
-/* What to say where nothing more will come. */
+/* Sets and returns the error for when nothing more will come. */
 int host_gone(struct scanhead *sh);
 
 /* Takes a frame into the state: descriptor, anchor, names, counters, hash. Called once per frame, in stream

@@ -29,7 +29,7 @@ static inline void sincos_turns(const struct scanhead *sh, double u, double *s, 
     *c = ck + (ck * cos_r_1 - sk * sin_r);
 }
 
-/* Point i as on the wire, and of it what all layouts share. */
+/* Point i as on the wire; what all layouts share goes to p. */
 static inline struct native_point take(const uint8_t *payload, uint32_t i, int64_t t0_ns, struct scanhead_point *p)
 {
     struct native_point w;

@@ -123,9 +123,9 @@ static int submit(struct in_transfer *in)
     return rc;
 }
 
-/* An endpoint that stalled or a bus that garbled is started anew. A device that is just being unplugged shows itself
- * first in this way, until the hub has noticed: so the second try and later ones give it a moment. 0: worth another
- * try; ENODEV: the device is gone, or has not let anything through for too long. */
+/* Starts an endpoint again that has stalled, or whose bus has garbled something. A device that is being unplugged looks
+ * the same until the hub has noticed: so the second try and later ones wait a moment. 0: worth another try; ENODEV: the
+ * device is gone, or has not let anything through for too long. */
 static int recover(struct host_usb *usb, struct failing *failing, uint8_t endpoint)
 {
     const struct timespec pause = {.tv_nsec = FAILING_PAUSE_MS * 1000000};
@@ -199,7 +199,7 @@ static ssize_t usb_read(struct host_source *source, void *to, size_t len)
 }
 
 /* A write that failed is not sent again: the head may have it. Its command gets no reply in time, the next one goes out
- * when the endpoint has been started anew. */
+ * when the endpoint has been started again. */
 static ssize_t usb_write(struct host_source *source, const void *data, size_t len)
 {
     struct host_usb *usb = source->usb;

@@ -15,7 +15,7 @@
 
 struct file_link {
     int fd;
-    int told_opened, told_closed;
+    int reported_opened, reported_closed;
     int failed; /* errno of the write that failed, 0: none */
     char path[256];
 };
@@ -75,9 +75,9 @@ static int file_poll(void *link, int wake_fd, uint32_t want_write, int timeout_m
 {
     struct file_link *file = link;
     struct link_events events = {event, 0, max};
-    if (!file->told_opened) file->told_opened = link_events_push(&events, LINK_OPENED, 0, file->path);
-    if (file->failed != 0 && !file->told_closed)
-        file->told_closed = link_events_push(&events, LINK_CLOSED, 0, strerror(file->failed));
+    if (!file->reported_opened) file->reported_opened = link_events_push(&events, LINK_OPENED, 0, file->path);
+    if (file->failed != 0 && !file->reported_closed)
+        file->reported_closed = link_events_push(&events, LINK_CLOSED, 0, strerror(file->failed));
     return link_poll_sink(wake_fd, (want_write & 1u) != 0 && file->failed == 0, timeout_ms, &events);
 }
 

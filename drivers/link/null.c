@@ -5,7 +5,7 @@
 #include "drivers/link/link_poll.h"
 
 struct null_link {
-    int told_opened;
+    int reported_opened;
 };
 
 static int null_open(const struct link_spec *spec, void **link, struct sh_err *err)
@@ -27,7 +27,7 @@ static int null_poll(void *link, int wake_fd, uint32_t want_write, int timeout_m
 {
     struct null_link *null = link;
     struct link_events events = {event, 0, max};
-    if (!null->told_opened) null->told_opened = link_events_push(&events, LINK_OPENED, 0, "null");
+    if (!null->reported_opened) null->reported_opened = link_events_push(&events, LINK_OPENED, 0, "null");
     return link_poll_sink(wake_fd, (want_write & 1u) != 0, timeout_ms, &events);
 }
 

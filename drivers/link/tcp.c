@@ -1,8 +1,7 @@
 /* The TCP link: a listener and up to max_sessions clients.
  *
  * A session is over when its peer shuts down its sending side, resets, or vanishes (keep-alive, about 25 s).
- * A client that finds all sessions taken is accepted and closed at once, so that it is told and not left
- * waiting. */
+ * A client that finds all sessions taken is accepted and closed at once, so that it does not wait in vain. */
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
@@ -16,7 +15,7 @@
 
 enum { SEND_BUFFER_BYTES = 1 << 20 };
 
-enum tcp_state { TCP_FREE, TCP_OPEN, TCP_ENDED /* LINK_CLOSED is still to be told */ };
+enum tcp_state { TCP_FREE, TCP_OPEN, TCP_ENDED /* LINK_CLOSED is still to be reported */ };
 
 struct tcp_session {
     enum tcp_state state;
@@ -105,7 +104,7 @@ static void tcp_welcome(struct tcp_link *tcp, struct link_events *events)
 }
 
 /* Returns 1 when the slot is free now. */
-static int tcp_tell_closed(struct tcp_session *session, int slot, struct link_events *events)
+static int tcp_report_closed(struct tcp_session *session, int slot, struct link_events *events)
 {
     session->state = TCP_ENDED;
     if (!link_events_push(events, LINK_CLOSED, slot, session->peer)) return 0;
@@ -123,7 +122,7 @@ static int tcp_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     fds[1] = (struct pollfd){.fd = tcp->listener, .events = POLLIN};
     for (int s = 0; s < tcp->n_sessions; s++) {
         struct tcp_session *session = &tcp->session[s];
-        if (session->state == TCP_ENDED) tcp_tell_closed(session, s, &events);
+        if (session->state == TCP_ENDED) tcp_report_closed(session, s, &events);
         fds[2 + s] = (struct pollfd){.fd = session->state == TCP_OPEN ? session->fd : -1, .events = POLLIN};
         if ((want_write >> s & 1u) != 0) fds[2 + s].events = POLLIN | POLLOUT;
     }
@@ -133,7 +132,7 @@ static int tcp_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     for (int s = 0; s < tcp->n_sessions; s++) {
         short revents = fds[2 + s].fd >= 0 ? fds[2 + s].revents : 0;
         if (socket_ended(fds[2 + s].fd, revents)) {
-            tcp_tell_closed(&tcp->session[s], s, &events);
+            tcp_report_closed(&tcp->session[s], s, &events);
             continue;
         }
         if ((revents & POLLIN) != 0) link_events_push(&events, LINK_READABLE, s, NULL);

@@ -118,7 +118,7 @@ const struct field_table fields_pose = TABLE(pose, native_pose, NATIVE_POSE_LEN,
 static size_t encode_field(const struct field *field, const char *from, uint8_t *wire)
 {
     if (field->kind == FIELD_TEXT) {
-        /* zero the rest ourselves: what stands behind the NUL in the struct must not reach the wire */
+        /* The rest is zeroed here: what follows the NUL in the struct must not reach the wire. */
         size_t len = strnlen(from, field->count - 1u);
         memcpy(wire, from, len);
         memset(wire + len, 0, field->count - len);

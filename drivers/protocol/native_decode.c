@@ -82,7 +82,7 @@ void native_decode_pose(const uint8_t *payload, uint32_t i, struct native_pose *
     fields_decode(&fields_pose, payload + NATIVE_POSES_HEAD_LEN + (size_t)i * NATIVE_POSE_LEN, NATIVE_POSE_LEN, out);
 }
 
-/* One name at *at: copies it with a NUL and moves *at behind it. */
+/* Copies the name at *at with a NUL, and moves *at to what follows it. */
 static int take_name(const uint8_t *payload, size_t len, size_t *at, char name[256])
 {
     if (*at >= len) return SH_EFORMAT;
@@ -100,7 +100,7 @@ int native_decode_surfaces(const uint8_t *payload, size_t len,
     if (len < NATIVE_SURFACES_HEAD_LEN) return SH_EFORMAT;
     uint32_t first = le_get32(payload), count = le_get32(payload + 4);
     if (count > 0xffff || first > 0xffff - count) return SH_EFORMAT;
-    /* twice, so that a payload that is wrong somewhere has no effect at all */
+    /* Twice: a payload that is wrong somewhere has no effect at all. */
     for (int pass = 0; pass < 2; pass++) {
         size_t at = NATIVE_SURFACES_HEAD_LEN;
         for (uint32_t i = 0; i < count; i++) {

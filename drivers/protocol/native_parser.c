@@ -71,7 +71,7 @@ static void count_seq(struct native_parser *parser)
     uint32_t missing = parser->header.seq - parser->next_seq;
     if (parser->have_seq && missing != 0) {
         parser->stats.seq_gaps++;
-        /* a jump back is a head that began anew: nobody knows how many frames are missing */
+        /* A jump back is a head that has started again. How many frames are missing is not known. */
         if (missing < UINT32_C(0x80000000)) parser->stats.seq_lost += missing;
     }
     parser->next_seq = parser->header.seq + 1;

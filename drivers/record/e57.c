@@ -4,7 +4,7 @@
  *
  * A binary section is a header and packets; in a packet each field has a stream of its own, of as many bits per record
  * as its range needs. All packets but the last hold a number of records that is a multiple of 8, so that no stream of
- * bits runs across packets. The XML section, which tells where all is, comes last, then headers are written over. */
+ * bits runs across packets. The XML section, which says where everything is, comes last; then headers are written over. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
-/* .las: LAS 1.4, point data record format 6 with the label behind it; one record per echo. What the numbers mean stands
- * in the file itself (las_header.c).
+/* .las: LAS 1.4, point data record format 6 followed by the label; one record per echo. What the numbers mean stands in
+ * the file itself (las_header.c).
  *
  * Coordinates are counts of the stream's own scale from the first scan's station, so those of the first scan are the
  * stream's very numbers, and those of further stations are rounded once, by half a count at most. Nothing is clipped:

@@ -2,10 +2,9 @@
  *
  * Positions are in the stream's CRS (geo), or in the scene frame (polar), as scanhead_to_scene has it.
  *
- * The header comes first in the file but is known last (count, names, losses). When the first points arrive
- * the head has told how many surfaces there are, so room is left for the header: no byte of the points is
- * written twice, which matters at 100 MB/s. Should the header outgrow its room after all, the points are
- * copied behind it once. */
+ * The header comes first in the file but is known last (count, names, losses). When the first points arrive, the number
+ * of surfaces is known, so room is left for the header. So no byte of the points is written twice, which matters at
+ * 100 MB/s. If the header outgrows its room after all, the points are copied once to where it ends. */
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
@@ -58,7 +57,7 @@ static int make_room(struct ply *ply, const struct scanhead *sh, uint32_t n_surf
     return rc;
 }
 
-/* A vertex as far as the file has its properties. */
+/* A vertex, with what the file has properties for. */
 struct vertex {
     struct scanhead_point point;
     unsigned station;
@@ -120,7 +119,7 @@ static size_t put_ascii(char *to, const struct vertex *v, int degrees)
     if (v->attribute != NULL && n < TEXT_LEN) n += put_number(to + n, TEXT_LEN - n, 2, v->attribute->amplitude_db);
     if (v->attribute != NULL && n < TEXT_LEN) n += put_number(to + n, TEXT_LEN - n, 2, v->attribute->width_ns);
     if (n >= TEXT_LEN) return TEXT_LEN + 1;
-    to[n - 1] = '\n'; /* the blank behind the last number */
+    to[n - 1] = '\n'; /* the blank after the last number */
     return n;
 }
 
@@ -132,7 +131,7 @@ static void set_gps(struct ply *ply)
     facts->have_gps = track_start_gps(&ply->base.track, &facts->gps_s);
 }
 
-/* Room for the header is made when the head has told how many surfaces there are. */
+/* Room for the header is made when the number of surfaces is known. */
 static int ply_scan(void *rec, struct sh_err *err)
 {
     struct ply *ply = rec;
@@ -203,7 +202,7 @@ static int ply_frame(void *rec, struct scanhead *sh, const struct scanhead_frame
     return naming.rc;
 }
 
-/* The header outgrew its room: the points move behind it, block by block from the end. */
+/* The header outgrew its room: the points move to where it ends, block by block from the end. */
 static int move_points(struct ply *ply, size_t header_len, struct sh_err *err)
 {
     enum { BLOCK = 1 << 16 };

@@ -29,7 +29,7 @@ struct recorder {
 /* What a format is. Each function gets the recorder's own struct as rec; each may be NULL. Errors: SH_E, text in err. */
 struct recorder_ops {
     const char *ending;     /* ".ply" */
-    size_t size;            /* of the recorder's own struct; it begins zeroed, behind its struct recorder */
+    size_t size;            /* of the recorder's own struct; after its struct recorder it begins zeroed */
     int metres;             /* 1: its coordinates are metres; the first points of a geodetic stream are refused */
     int wants_attributes;   /* 1: it has a place for amplitude and width */
     struct track_ops track; /* takes points in batches */

@@ -1,5 +1,7 @@
-/* Back ends: who carries what a host does to the device core, and what the core answers back. One ops struct, one file
- * each. A back end is driven by its owner's poll(2): no threads, nothing blocks. */
+/* Back ends: the ways between a host and the device core (usb.h). What a host does goes in, the core's answers come out.
+ *
+ * One ops struct and one file each; backend.c has the list. A back end is driven by its owner's poll(2): it has no
+ * threads, and nothing blocks. */
 #ifndef DRIVERS_USB_BACKEND_H
 #define DRIVERS_USB_BACKEND_H
 
@@ -25,7 +27,7 @@ struct usb_backend_spec {
 struct usb_backend_ops {
     const char *name;
 
-    /* Opens as spec says; nothing is left behind when it fails. The device is the caller's and outlives the back end,
+    /* Opens as spec says. When it fails, nothing of it stays. The device is the caller's and outlives the back end,
      * which attaches and detaches it. */
     int (*open)(const struct usb_backend_spec *spec, struct usb_device *device, void **backend, struct sh_err *err);
 
@@ -35,9 +37,9 @@ struct usb_backend_ops {
     /* Fills descriptors to wait for (room for USB_BACKEND_MAX_FDS) and returns how many. */
     int (*prepare)(void *backend, struct pollfd *fds);
 
-    /* After poll(2) on exactly these. Works through what came until go_on(ctx) says 0, which it asks after each of the
-     * host's acts; the rest waits for the next call, and then also without a descriptor that is ready: `more` says so.
-     * SH_EIO ends the back end for good. */
+    /* After poll(2) on exactly these. Works through what came; after each of the host's acts it asks go_on(ctx), and
+     * stops where that is 0. The rest waits for the next call, which then also comes without a descriptor that is
+     * ready: `more` says so. SH_EIO ends the back end for good. */
     int (*handle)(void *backend, const struct pollfd *fds, int n, int (*go_on)(void *ctx), void *ctx);
     int (*more)(const void *backend); /* NULL: poll(2) says it all */
 
@@ -55,8 +57,8 @@ struct usb_backend_ops {
 /* NULL for an unknown type. */
 const struct usb_backend_ops *usb_backend_ops_get(enum usb_backend_type type);
 
-/* A listening or (connect) connected socket, not blocking. On a Unix socket left behind by a process that is gone, the
- * path is taken over. `what` names it in errors; name gets "127.0.0.1:3240" or the path. backend_socket.c */
+/* A listening or (attach) connected socket, not blocking. The path of a Unix socket whose process is gone is taken
+ * over. `what` names it in errors; name gets "127.0.0.1:3240" or the path. backend_socket.c */
 int usb_backend_socket(const struct usb_backend_spec *spec, const char *what, int *fd, char *name, size_t len,
                        struct sh_err *err);
 /* Where a socket that was connected by usb_backend_socket leads, and the way there once more: without waiting and

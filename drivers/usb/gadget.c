@@ -80,7 +80,7 @@ static void remove_link(const char *dir, const char *name)
     unlink(path);
 }
 
-/* ---- what is left behind */
+/* ---- what dead processes left */
 
 static void unmount(const char *name)
 {

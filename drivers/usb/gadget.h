@@ -2,7 +2,7 @@
  * this program does itself and f_acm for a CDC-ACM console. Private to the functionfs back end.
  *
  * Why f_acm: FunctionFS takes no class-specific interface descriptors (type 24h), without which no host knows a CDC
- * console. The kernel's has them; what it lacks is told in functionfs.c. */
+ * console. The kernel's has them; what it lacks is described in functionfs_private.h. */
 #ifndef DRIVERS_USB_GADGET_H
 #define DRIVERS_USB_GADGET_H
 

@@ -27,7 +27,7 @@ enum { CONSOLE_SESSION, STREAM_SESSION, SCANHEAD_USB_SESSIONS };
 /* A session as the host sees it. */
 struct scanhead_usb_session {
     int open;
-    int again;       /* opened anew while open: open once more when its end is told */
+    int again;       /* opened again while open: opens once more when its end has been reported */
     uint8_t in, out; /* endpoints */
 };
 
@@ -35,7 +35,7 @@ struct scanhead_usb {
     struct usb_device *device;
     struct scanhead_usb_session session[SCANHEAD_USB_SESSIONS];
     uint8_t line_coding[7];
-    int state_due; /* the console's serial state is still to be told */
+    int state_due; /* the console's serial state is still to be sent */
 };
 
 /* Makes the device of head, which must be zeroed and stay where it is. usb_device_free(head->device). */
@@ -43,7 +43,7 @@ int scanhead_usb_create(const struct usb_identity *id, struct scanhead_usb *head
 /* What follows from the host's transfers rather than its requests: a stream that opens with data, the console's
  * notification. To be called after each of them. */
 void scanhead_usb_update(struct scanhead_usb *head);
-/* The end of a session has been told to who serves it. */
+/* The end of a session has been reported to whoever serves it. */
 void scanhead_usb_ended(struct scanhead_usb *head, int session);
 
 #endif

@@ -33,7 +33,7 @@ static void finish_empty(struct usb_device *device, struct usb_pipe *pipe)
         finish(device, pipe, USB_OK);
 }
 
-/* Only what is there now: a back end may submit anew from within complete(). */
+/* Only what is there now: a back end may submit again from within complete(). */
 static void flush(struct usb_device *device, struct usb_pipe *pipe, enum usb_status status)
 {
     struct usb_transfer *first = pipe->first;

@@ -57,7 +57,7 @@ static int on_write(void *priv, uint8_t *data, int count)
     return -1;
 }
 
-/* The library's remarks concern broken peers, which are cut off. */
+/* The library's remarks are about broken peers, which are cut off anyway. */
 static void on_log(void *priv, int level, const char *text)
 {
     (void)priv;
@@ -142,8 +142,8 @@ static void note_path(struct usbredir *self, const char *path)
     self->path_inode = st.st_ino;
 }
 
-/* Unless it was removed meanwhile, and another program listens there. Before the listener is closed: until then nobody
- * takes the path for left behind, and the inode's number is not given to another. */
+/* Unless it was removed meanwhile, and another program listens there. To be called before the listener is closed: until
+ * then nobody takes the path for an abandoned one, and no other file gets the inode's number. */
 static void remove_path(const struct usbredir *self)
 {
     struct stat st;
