@@ -103,7 +103,8 @@ static int copy_reply(struct scanhead *sh, char *reply, size_t reply_len)
     return SCANHEAD_OK;
 }
 
-/* What every head answers to *IDN?, and to nothing else: four fields (IEEE 488.2); an error's text is in quotes. */
+/* What every head answers to *IDN?, and to nothing else: four fields (IEEE 488.2); an error's text is in
+ * quotes. */
 static int is_identity(const char *text)
 {
     int commas = 0;
@@ -112,8 +113,8 @@ static int is_identity(const char *text)
     return commas == 3 && strchr(text, '"') == NULL;
 }
 
-/* Passes lines over until every question has its answer. One that was given up may be lost: so once there is an answer,
- * those to the others have ANSWERS_MS. */
+/* Passes lines over until every question has its answer. One that was given up may be lost: so once there is
+ * an answer, those to the others have ANSWERS_MS. */
 static int pass_over(struct scanhead *sh, int64_t deadline_ns)
 {
     int answered = 0;
@@ -135,9 +136,9 @@ static int pass_over(struct scanhead *sh, int64_t deadline_ns)
     return 0;
 }
 
-/* The first exchange on a terminal. Between open() and raw mode the terminal echoes what the head sends, and the head
- * takes it for commands; another program may have left half a line. So that line is ended, and the answers to all that
- * are passed over up to the one to a question of our own. */
+/* The first exchange on a terminal. Between open() and raw mode the terminal echoes what the head sends, and
+ * the head takes it for commands; another program may have left half a line. So that line is ended, and the
+ * answers to all that are passed over up to the one to a question of our own. */
 static int settle(struct scanhead *sh, int64_t deadline_ns)
 {
     static const char question[] = "\n*IDN?\n";

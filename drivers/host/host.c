@@ -14,8 +14,8 @@ _Static_assert(SCANHEAD_POINTS == (int)NATIVE_POINTS && SCANHEAD_POSES == (int)N
                    SCANHEAD_POSE_NONE == (int)NATIVE_POSE_NONE && SCANHEAD_LOCAL == (int)NATIVE_LOCAL,
                "types, events and flags are those on the wire");
 
-/* A source tried again and again while it isn't there. wrong_too: also when its name is wrong, for it was right once.
- */
+/* A source tried again and again while it isn't there. wrong_too: also when its name is wrong, for it was
+ * right once. */
 static int open_in_time(const char *source, int wrong_too, int64_t deadline_ns, struct host_source *out,
                         struct sh_err *err)
 {

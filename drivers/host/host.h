@@ -28,7 +28,8 @@ struct host_source_ops {
     /* Bytes moved; 0 from read: the end; -1 with errno: EAGAIN when none can be now. */
     ssize_t (*read)(struct host_source *source, void *to, size_t len);
     ssize_t (*write)(struct host_source *source, const void *data, size_t len);
-    /* poll() for POLLIN and POLLOUT until the deadline (host_deadline_ns): 1, 0 when it is over, -1 with errno. */
+    /* poll() for POLLIN and POLLOUT until the deadline (host_deadline_ns): 1, 0 when it is over, -1 with
+     * errno. */
     int (*wait)(struct host_source *source, short events, int64_t deadline_ns, short *revents);
     void (*close)(struct host_source *source);
 };
@@ -82,8 +83,9 @@ int host_source_is_usb(const char *source);
 int host_usb_open(const char *source, struct host_source *out, struct sh_err *err);
 extern const struct host_source_ops host_fd_ops;
 
-/* usb_watch.c: waits between two tries to open a source. NULL where a source is not on USB, or where the system does not
- * report devices that come: then the waits are short. Devices that come after this call are not missed. */
+/* usb_watch.c: waits between two tries to open a source. NULL where a source is not on USB, or where the
+ * system does not report devices that come: then the waits are short. Devices that come after this call are
+ * not missed. */
 struct host_usb_watch *host_usb_watch_open(const char *source);
 void host_usb_watch_close(struct host_usb_watch *watch);
 /* rc: why the last try failed. 0: try again, or the deadline is over; -1: a signal came. */

@@ -52,6 +52,13 @@ static void geocentric(double lat_deg, double lon_deg, double h, double p[3])
     p[2] = (n * (1 - e2) + h) * s;
 }
 
+/* What geo points have in common once x, y, z and range_m are set. */
+static inline void end_geo(struct scanhead_point *p)
+{
+    p->mirror_rad = p->pan_rad = NAN;
+    if (p->echo_count == 0) p->x = p->y = p->z = p->range_m = NAN;
+}
+
 static void points_geodetic(const struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                             struct scanhead_point *p, uint32_t n)
 {
@@ -68,8 +75,7 @@ static void points_geodetic(const struct scanhead *sh, const struct scanhead_fra
         geocentric(p->x, p->y, p->z, to);
         double dx = to[0] - from[0], dy = to[1] - from[1], dz = to[2] - from[2];
         p->range_m = sqrt(dx * dx + dy * dy + dz * dz);
-        p->mirror_rad = p->pan_rad = NAN;
-        if (p->echo_count == 0) p->x = p->y = p->z = p->range_m = NAN;
+        end_geo(p);
     }
 }
 
@@ -84,8 +90,7 @@ static void points_geo(const struct scanhead *sh, const struct scanhead_frame *f
         p->y = anchor[1] + dy;
         p->z = anchor[2] + dz;
         p->range_m = sh->anchor.moving & NATIVE_MOVING ? NAN : sqrt(dx * dx + dy * dy + dz * dz);
-        p->mirror_rad = p->pan_rad = NAN;
-        if (p->echo_count == 0) p->x = p->y = p->z = p->range_m = NAN;
+        end_geo(p);
     }
 }
 

@@ -1,7 +1,7 @@
 /* libscanhead: the client side of a scan head. It connects, sends commands, and hands out frames and points.
  *
- * The stream is the native protocol (drivers/protocol/PROTOCOL.md). This header is the one that `make install` installs;
- * it needs no other of the project. In ten lines:
+ * The stream is the native protocol (drivers/protocol/PROTOCOL.md). `make install` installs this header. It
+ * needs no other header of the project. In ten lines:
  *
  *     struct scanhead *sh;
  *     struct scanhead_frame frame;
@@ -14,11 +14,14 @@
  *             n = scanhead_points(sh, &frame, 0, point, 256);
  *     scanhead_close(sh);
  *
- * Results. Functions return 0, or a count, or a negative SCANHEAD_E; scanhead_error() then has one line of text.
- * Ownership. What a function returns by value or writes into the caller's memory is the caller's. Strings and payloads
- * are the handle's; how long they live is said with each.
- * Threads. A handle belongs to one thread at a time. Different handles are independent.
- * Units. Names carry them: _m metres, _rad radians, _deg degrees, _ns nanoseconds, _db decibels. NaN: no value. */
+ * Results: functions return 0, or a count, or a negative SCANHEAD_E; scanhead_error() then has a line of text.
+ *
+ * Ownership: what a function returns by value or writes into the caller's memory is the caller's. Strings and
+ * payloads are the handle's; how long they live is said with each.
+ *
+ * Threads: a handle belongs to one thread at a time. Different handles are independent.
+ *
+ * Units: names carry them: _m metres, _rad radians, _deg degrees, _ns nanoseconds, _db decibels. NaN: no value. */
 #ifndef SCANHEAD_H
 #define SCANHEAD_H
 
@@ -54,20 +57,20 @@ struct scanhead;
  *   PATH                                         a raw stream (.shs)
  * On failure *out is NULL, and err (may be NULL) gets the reason. */
 int scanhead_open(const char *source, struct scanhead **out, char *err, size_t err_len);
-/* The same, but tries again for up to timeout_ms while the source isn't there: a head that is not plugged in, a device
- * node without permissions yet. timeout_ms < 0: for ever. On USB the system's hot-plug events wake it. A wrong source
- * ends it at once, a signal ends it early. err gets the reason of the last try. */
+/* The same, but tries again for up to timeout_ms while the source isn't there: a head that is not plugged in,
+ * a device node without permissions yet. timeout_ms < 0: for ever. On USB the system's hot-plug events wake
+ * it. A wrong source ends it at once, a signal ends it early. err gets the reason of the last try. */
 int scanhead_open_within(const char *source, int timeout_ms, struct scanhead **out, char *err, size_t err_len);
 /* sh may be NULL. */
 void scanhead_close(struct scanhead *sh);
 /* The text of the last error; the handle's, until its next call. */
 const char *scanhead_error(const struct scanhead *sh);
 
-/* Waits until the same head is there again, and goes on with it. To be called after SCANHEAD_ELOST or SCANHEAD_ECLOSED,
- * once all frames that had come were taken. Counters, hash and what the stream has said of itself go on too; a jump in
- * the sequence shows what was lost meanwhile. On USB the same head is the one with the same ids and serial number.
- * SCANHEAD_ESTATE for a file or "fd:N". Any other error: it did not come back in time, or a signal came; call again, or
- * close. */
+/* Waits until the same head is there again, and goes on with it. To be called after SCANHEAD_ELOST or
+ * SCANHEAD_ECLOSED, once all frames that had come were taken. Counters, hash and what the stream has said of
+ * itself go on too; a jump in the sequence shows what was lost meanwhile. On USB the same head is the one
+ * with the same ids and serial number. SCANHEAD_ESTATE for a file or "fd:N". Any other error: it did not come
+ * back in time, or a signal came; call again, or close. */
 int scanhead_reattach(struct scanhead *sh, int timeout_ms);
 
 /* Heads on USB now. */
@@ -79,15 +82,16 @@ struct scanhead_usb_head {
     double speed_bit_s; /* 0: unknown */
     char problem[320];  /* why it can't be opened, for instance no permission; empty: it can */
 };
-/* Describes at most max of them. Returns how many there are, or SCANHEAD_EIO with the reason in err (may be NULL). */
+/* Describes at most max of them. Returns how many there are, or SCANHEAD_EIO with the reason in err (may be
+ * NULL). */
 int scanhead_list_usb(struct scanhead_usb_head *heads, int max, char *err, size_t err_len);
 
 /* Sends one command line and waits for its reply line, which comes without its line end.
- * Frames that arrive meanwhile are kept, and scanhead_next() gives them later. It keeps at most 64 MiB of them; then it
- * drops the oldest and counts them (stats.dropped).
+ * Frames that arrive meanwhile are kept, and scanhead_next() gives them later. It keeps at most 64 MiB of
+ * them; then it drops the oldest and counts them (stats.dropped).
  * A reply "ERR n,..." is returned as it is, with SCANHEAD_OK: the command was answered.
- * Before the first command on a "tty:" it sends an empty line and *IDN?, and skips all reply lines up to the answer to
- * that. For until the terminal was in raw mode, it may have echoed to the head what the head sent. */
+ * Before the first command on a "tty:" it sends an empty line and *IDN?, and skips all reply lines up to the
+ * answer to that. For until the terminal was in raw mode, it may have echoed to the head what the head sent. */
 int scanhead_command(struct scanhead *sh, const char *command, char *reply, size_t reply_len, int timeout_ms);
 
 enum scanhead_frame_type { /* as on the wire */
@@ -135,7 +139,8 @@ struct scanhead_frame {
     char event_text[96];
 };
 
-/* The next frame, in order. timeout_ms < 0 waits for ever. Frames with a wrong CRC never come out; they are counted. */
+/* The next frame, in order. timeout_ms < 0 waits for ever. Frames with a wrong CRC never come out; they are
+ * counted. */
 int scanhead_next(struct scanhead *sh, struct scanhead_frame *frame, int timeout_ms);
 
 enum { SCANHEAD_NO_LABEL = 0xffff };
@@ -151,10 +156,10 @@ struct scanhead_point {
     uint16_t label;             /* surface, or SCANHEAD_NO_LABEL */
 };
 
-/* Decodes points of the frame that scanhead_next returned last: at most max, from the index `first`. Returns how many,
- * or SCANHEAD_ESTATE before the descriptor and the anchor of the stream have come. In the geo layout range_m is the
- * distance from the anchor, which is the station: in utm within the grid, in geodetic coordinates straight through space
- * on WGS 84. It is NaN where the head moves. */
+/* Decodes points of the frame that scanhead_next returned last: at most max, from the index `first`. Returns
+ * how many, or SCANHEAD_ESTATE before the descriptor and the anchor of the stream have come. In the geo
+ * layout range_m is the distance from the anchor, which is the station: in utm within the grid, in geodetic
+ * coordinates straight through space on WGS 84. It is NaN where the head moves. */
 int scanhead_points(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                     struct scanhead_point *points, uint32_t max);
 
@@ -163,13 +168,13 @@ struct scanhead_attribute {
     double width_ns;     /* of the echo, full at half maximum; 655.35: that or more; NaN: an empty shot */
 };
 
-/* Decodes attributes from the frame of SCANHEAD_ATTRIBUTES that scanhead_next returned last: at most max, from the index
- * `first`. Attribute i belongs to point i of the last frame of SCANHEAD_POINTS. Returns how many, or SCANHEAD_ESTATE
- * where they are not those of the last points, because frames were lost. */
+/* Decodes attributes from the frame of SCANHEAD_ATTRIBUTES that scanhead_next returned last: at most max,
+ * from the index `first`. Attribute i belongs to point i of the last frame of SCANHEAD_POINTS. Returns how
+ * many, or SCANHEAD_ESTATE where they are not those of the last points, because frames were lost. */
 int scanhead_attributes(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                         struct scanhead_attribute *attributes, uint32_t max);
-/* 1: a frame of attributes follows each frame of points; 0: the head sends none; SCANHEAD_ESTATE before the descriptor
- * has come. */
+/* 1: a frame of attributes follows each frame of points; 0: the head sends none; SCANHEAD_ESTATE before the
+ * descriptor has come. */
 int scanhead_has_attributes(const struct scanhead *sh);
 
 struct scanhead_line_end {
@@ -184,10 +189,12 @@ struct scanhead_line_end {
     uint32_t n_faint;   /* hits that the head did not detect */
     uint32_t n_unfit;   /* echoes too far for the stream's integers: sent as empty shots */
 };
-/* Decodes a frame of SCANHEAD_LINE_END. SCANHEAD_EINPUT for another type, SCANHEAD_EFORMAT for a wrong payload. */
+/* Decodes a frame of SCANHEAD_LINE_END. SCANHEAD_EINPUT for another type, SCANHEAD_EFORMAT for a wrong
+ * payload. */
 int scanhead_line_end(struct scanhead *sh, const struct scanhead_frame *frame, struct scanhead_line_end *end);
 
-/* What the stream has said of itself, by descriptor and anchor. Strings are the handle's, until its next call. */
+/* What the stream has said of itself, by descriptor and anchor. Strings are the handle's, until its next
+ * call. */
 struct scanhead_info {
     const char *idn, *profile;
     int geo;           /* 1: geo layout, 0: polar */
@@ -210,8 +217,9 @@ struct scanhead_info {
 /* SCANHEAD_ESTATE before descriptor and anchor have come. */
 int scanhead_get_info(const struct scanhead *sh, struct scanhead_info *info);
 
-/* Where a moving head was. Between two poses of one frame of SCANHEAD_POSES the position goes along the straight line,
- * and the attitude turns the shorter way about one fixed axis at constant rate (slerp). The head itself moves so. */
+/* Where a moving head was. Between two poses of one frame of SCANHEAD_POSES the position goes along the
+ * straight line, and the attitude turns the shorter way about one fixed axis at constant rate (slerp). The
+ * head itself moves so. */
 struct scanhead_pose {
     int64_t t_ns;         /* since the scan's start */
     double position_m[3]; /* scene frame */
@@ -227,23 +235,23 @@ enum scanhead_pose_flags {
 /* The pose at t_ns since the scan's start. It is known for the points that came last, and some seconds back.
  * SCANHEAD_ESTATE where the stream has not said it, or the head stands still. */
 int scanhead_pose(struct scanhead *sh, int64_t t_ns, struct scanhead_pose *pose);
-/* Decodes poses of the frame of SCANHEAD_POSES that scanhead_next returned last: at most max, from the index `first`.
- * Returns how many. */
+/* Decodes poses of the frame of SCANHEAD_POSES that scanhead_next returned last: at most max, from the index
+ * `first`. Returns how many. */
 int scanhead_poses(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first, struct scanhead_pose *poses,
                    uint32_t max);
-/* Takes points of the polar layout from the head's frame to the scene frame: x, y and z in place. Where the head moves,
- * each point goes with the pose of its own time. frame (may be NULL) gets the frame scalar of each; where the head stands
- * at a stop, that of the stop. Returns how many points had no pose, because frames were lost; their coordinates are NaN.
- * SCANHEAD_ESTATE for another layout. */
+/* Takes points of the polar layout from the head's frame to the scene frame: x, y and z in place. Where the
+ * head moves, each point goes with the pose of its own time. frame (may be NULL) gets the frame scalar of
+ * each; where the head stands at a stop, that of the stop. Returns how many points had no pose, because
+ * frames were lost; their coordinates are NaN. SCANHEAD_ESTATE for another layout. */
 int scanhead_to_scene(struct scanhead *sh, struct scanhead_point *points, uint32_t n, double *frame);
 
-/* GPS time of t_ns since the scan's start (scanhead_point.t_ns) by the head's clock, in LAS's adjusted standard form:
- * seconds since 1980-01-06T00:00:00Z without leap seconds, less 1e9. Add 1e9 and divide by 604800 for week and second
- * of week. It is valid for frames up to the one that scanhead_next returned last, since it counts from the last time
- * that the head reported: at the scan's start and each second (events SCAN_START, PPS, TIME). It is exact to the
- * nanosecond where the head's clock has no drift; a double of that size has steps of 0.12 us.
- * SCANHEAD_ESTATE where the head doesn't know the time, or before the time and the scan's start have come. Where the
- * head knows the time, it comes before the first points that can be placed. */
+/* GPS time of t_ns since the scan's start (scanhead_point.t_ns) by the head's clock, in LAS's adjusted
+ * standard form: seconds since 1980-01-06T00:00:00Z without leap seconds, less 1e9. Add 1e9 and divide by
+ * 604800 for week and second of week. It is valid for frames up to the one that scanhead_next returned last,
+ * since it counts from the last time that the head reported: at the scan's start and each second (events
+ * SCAN_START, PPS, TIME). It is exact to the nanosecond where the head's clock has no drift; a double of that
+ * size has steps of 0.12 us. SCANHEAD_ESTATE where the head doesn't know the time, or before the time and the
+ * scan's start have come. Where the head knows the time, it comes before the first points that can be placed. */
 int scanhead_gps_time(const struct scanhead *sh, int64_t t_ns, double *adjusted_standard_gps_time_s);
 
 /* Name of a label: 1 and the two names (the handle's, until its next call), or 0 when they have not come yet. */
@@ -257,8 +265,8 @@ struct scanhead_stats {
 };
 void scanhead_get_stats(const struct scanhead *sh, struct scanhead_stats *stats);
 
-/* Hash of the stream so far, as PROTOCOL.md defines stream_sha256: 64 hex digits and a NUL. Counting starts with
- * scanhead_hash_start() and costs about a nanosecond per byte. */
+/* Hash of the stream so far, as PROTOCOL.md defines stream_sha256: 64 hex digits and a NUL. Counting starts
+ * with scanhead_hash_start() and costs about a nanosecond per byte. */
 void scanhead_hash_start(struct scanhead *sh);
 void scanhead_hash_hex(const struct scanhead *sh, char hex[65]);
 

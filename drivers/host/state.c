@@ -221,8 +221,8 @@ int scanhead_get_info(const struct scanhead *sh, struct scanhead_info *info)
 int scanhead_gps_time(const struct scanhead *sh, int64_t t_ns, double *adjusted_standard_gps_time_s)
 {
     if (!sh->have_gps || !sh->have_scan_t0) return SCANHEAD_ESTATE;
-    /* Modulo 2^64, so that a wrong stream can't overflow; seconds and the rest apart, so that only the sum is rounded.
-     */
+    /* Modulo 2^64, so that a wrong stream can't overflow; seconds and the rest apart, so that only the sum is
+     * rounded. */
     uint64_t gps_ns = (uint64_t)sh->gps_ns + ((uint64_t)sh->scan_t0_ns + (uint64_t)t_ns - (uint64_t)sh->gps_at_ns);
     int64_t s = (int64_t)gps_ns / 1000000000, ns = (int64_t)gps_ns % 1000000000;
     *adjusted_standard_gps_time_s = (double)(s - 1000000000) + (double)ns / 1e9;

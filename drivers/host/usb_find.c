@@ -69,8 +69,8 @@ static int is_wanted_id(const struct usb_wanted *wanted, const struct libusb_dev
     return (wanted->vid < 0 || wanted->vid == d->idVendor) && (wanted->pid < 0 || wanted->pid == d->idProduct);
 }
 
-/* A device may call itself anything. What goes to terminals and logs is printable and still different for two devices:
- * other characters, and backslashes, are written as \xNN. What does not fit is left out. */
+/* A device may call itself anything. What goes to terminals and logs is printable and still different for two
+ * devices: other characters, and backslashes, are written as \xNN. What does not fit is left out. */
 static void read_string(libusb_device_handle *handle, uint8_t index, char *text, size_t len)
 {
     unsigned char ascii[128];

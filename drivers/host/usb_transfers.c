@@ -1,9 +1,9 @@
 /* Source of bytes: the bulk pair of the head's vendor interface.
  *
- * Several reads are always under way, so that the bus never waits for this program: a ring of transfers, which the
- * kernel completes in order and which are used up and sent off again in order. Nothing runs on a thread of its own:
- * completions are taken in while the caller reads or waits, and between these calls the kernel fills what is under way.
- */
+ * Several reads are always under way, so that the bus never waits for this program: a ring of transfers,
+ * which the kernel completes in order and which are used up and sent off again in order. Nothing runs on a
+ * thread of its own: completions are taken in while the caller reads or waits, and between these calls the
+ * kernel fills what is under way. */
 #include "drivers/host/usb_inside.h"
 
 #include <errno.h>
@@ -13,7 +13,8 @@
 #include <string.h>
 #include <time.h>
 
-/* A read is a multiple of every packet size (64, 512, 1024 bytes): so none can be sent more than it has room for. */
+/* A read is a multiple of every packet size (64, 512, 1024 bytes): so none can be sent more than it has room
+ * for. */
 enum { IN_TRANSFERS = 16, IN_BYTES = 64 << 10, OUT_BYTES = 2048, CANCEL_MS = 1000 };
 /* How long a bus may fail with the device still on it, as it does until the hub has noticed an unplugged one. */
 enum { FAILING_MS = 1000, FAILING_PAUSE_MS = 20, RELAPSE_MS = 10000 };
@@ -123,9 +124,9 @@ static int submit(struct in_transfer *in)
     return rc;
 }
 
-/* Starts an endpoint again that has stalled, or whose bus has garbled something. A device that is being unplugged looks
- * the same until the hub has noticed: so the second try and later ones wait a moment. 0: worth another try; ENODEV: the
- * device is gone, or has not let anything through for too long. */
+/* Starts an endpoint again that has stalled, or whose bus has garbled something. A device that is being
+ * unplugged looks the same until the hub has noticed: so the second try and later ones wait a moment. 0:
+ * worth another try; ENODEV: the device is gone, or has not let anything through for too long. */
 static int recover(struct host_usb *usb, struct failing *failing, uint8_t endpoint)
 {
     const struct timespec pause = {.tv_nsec = FAILING_PAUSE_MS * 1000000};
@@ -198,8 +199,8 @@ static ssize_t usb_read(struct host_source *source, void *to, size_t len)
     }
 }
 
-/* A write that failed is not sent again: the head may have it. Its command gets no reply in time, the next one goes out
- * when the endpoint has been started again. */
+/* A write that failed is not sent again: the head may have it. Its command gets no reply in time, the next
+ * one goes out when the endpoint has been started again. */
 static ssize_t usb_write(struct host_source *source, const void *data, size_t len)
 {
     struct host_usb *usb = source->usb;

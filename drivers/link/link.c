@@ -1,6 +1,7 @@
 #include "drivers/link/link.h"
 
-/* The one list of links. A new one is a file of this folder that defines its link_ops, a type in link.h, and a row here. */
+/* The one list of links. A new one is a file of this folder that defines its link_ops, a type in link.h, and
+ * a row here. */
 extern const struct link_ops link_null, link_file, link_pty, link_tcp, link_usb, link_fd;
 static const struct link_ops *const links[] = {
     [LINK_NULL] = &link_null, [LINK_FILE] = &link_file, [LINK_PTY] = &link_pty,

@@ -1,9 +1,9 @@
 /* Links: how bytes of the head get to the world, and back. A link knows nothing of frames or protocols.
  *
- * A kind of link is one file of this folder with one `const struct link_ops`, whose members are the contract; null.c is
- * the skeleton for a new one, link.c has the list. A link has sessions: readers and commanders that come and go. A pty
- * or a file has one, TCP several, USB two (console and stream). One thread owns a link and makes all calls on it. Only
- * poll() waits; write() of `file` may wait for the disk. */
+ * A kind of link is one file of this folder with one `const struct link_ops`, whose members are the contract;
+ * null.c is the skeleton for a new one, link.c has the list. A link has sessions: readers and commanders that
+ * come and go. A pty or a file has one, TCP several, USB two (console and stream). One thread owns a link and
+ * makes all calls on it. Only poll() waits; write() of `file` may wait for the disk. */
 #ifndef DRIVERS_LINK_LINK_H
 #define DRIVERS_LINK_LINK_H
 
@@ -61,9 +61,10 @@ struct link_ops {
     /* Largest number of bytes per second this link can carry. NULL where there is no fixed limit. */
     double (*capacity)(const void *link);
 
-    /* Waits up to timeout_ms (-1: for ever) and fills in at most max events; returns how many, or a negative SH_E.
-     * want_write: where bit s is set, LINK_WRITABLE is reported when session s can take bytes. A session whose reader
-     * does not read must not make poll return at once. link_poll.h has what all of them need. */
+    /* Waits up to timeout_ms (-1: for ever) and fills in at most max events; returns how many, or a negative
+     * SH_E. want_write: where bit s is set, LINK_WRITABLE is reported when session s can take bytes. A
+     * session whose reader does not read must not make poll return at once. link_poll.h has what all of them
+     * need. */
     int (*poll)(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *events, int max);
 
     /* Never block (except as said above). Bytes moved; 0: none now; SH_ECLOSED: the session is gone (a

@@ -1,4 +1,5 @@
-/* What the poll functions of the links share: the events that are being filled in, the wait, the wake-up. Private. */
+/* What the poll functions of the links share: the events that are being filled in, the wait, the wake-up.
+ * Private. */
 #ifndef DRIVERS_LINK_LINK_POLL_H
 #define DRIVERS_LINK_LINK_POLL_H
 
@@ -6,8 +7,8 @@
 
 #include "drivers/link/link.h"
 
-/* Events of one poll call. push answers 0 when there is no room. The caller then leaves its state as it is, so that the
- * event comes with the next call. */
+/* Events of one poll call. push answers 0 when there is no room. The caller then leaves its state as it is,
+ * so that the event comes with the next call. */
 struct link_events {
     struct link_event *event;
     int n, max;

@@ -1,4 +1,5 @@
-/* The terminal of the pty link: the pair, its resting state and the symlink to its slave. Private to the link. */
+/* The terminal of the pty link: the pair, its resting state and the symlink to its slave. Private to the
+ * link. */
 #ifndef DRIVERS_LINK_PTY_DEVICE_H
 #define DRIVERS_LINK_PTY_DEVICE_H
 

@@ -1,8 +1,9 @@
-/* The usb link: the head as a USB device, with the sessions of its console and its stream (drivers/usb/head_device.h).
+/* The usb link: the head as a USB device, with the sessions of its console and its stream
+ * (drivers/usb/head_device.h).
  *
- * The back end carries out the host's acts one at a time. It stops when one has begun or ended a session, until that has
- * been reported: so nothing can happen twice between two polls. The end of a session is reported once what came in it
- * has been read. */
+ * The back end carries out the host's acts one at a time. It stops when one has begun or ended a session,
+ * until that has been reported: so nothing can happen twice between two polls. The end of a session is
+ * reported once what came in it has been read. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -54,9 +55,9 @@ static void usb_endpoint(const void *link, char *buf, size_t len)
     self->ops->endpoint(self->backend, buf, len);
 }
 
-/* Bulk, in bytes per second. Full speed: 19 packets of 64 bytes in a frame of 1 ms (USB 2.0, table 5-9). High speed:
- * 10 packets of 512 in a microframe of 125 us, which host controllers reach; table 5-10 allows 13 on an otherwise idle
- * bus. Super speed: what USB 3.0, 4.4.11, calls realistic for an application. */
+/* Bulk, in bytes per second. Full speed: 19 packets of 64 bytes in a frame of 1 ms (USB 2.0, table 5-9). High
+ * speed: 10 packets of 512 in a microframe of 125 us, which host controllers reach; table 5-10 allows 13 on
+ * an otherwise idle bus. Super speed: what USB 3.0, 4.4.11, calls realistic for an application. */
 static double usb_capacity(const void *link)
 {
     static const double rate[USB_N_RATES] = {19 * 64 * 1e3, 10 * 512 * 8e3, 400e6};

@@ -33,8 +33,8 @@ extern const struct field_table fields_descriptor, fields_descriptor_content, fi
 /* Writes exactly table->wire_len bytes. */
 void fields_encode(const struct field_table *table, const void *from, uint8_t *wire);
 
-/* 0, or SH_EFORMAT for a payload too short, a text without NUL, or a number that is not finite. Members without a row
- * become 0. A payload may be longer than the table: later versions grow at the end. */
+/* 0, or SH_EFORMAT for a payload too short, a text without NUL, or a number that is not finite. Members
+ * without a row become 0. A payload may be longer than the table: later versions grow at the end. */
 int fields_decode(const struct field_table *table, const uint8_t *wire, size_t len, void *to);
 
 #endif

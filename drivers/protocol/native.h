@@ -1,8 +1,9 @@
-/* The native protocol for those who read it: bytes of a stream go in, frames, reply lines and their contents come out.
+/* The native protocol for those who read it: bytes of a stream go in, frames, reply lines and their contents
+ * come out.
  *
- * PROTOCOL.md describes the frames byte by byte; the structs here hold the same fields in the same order and units.
- * native_encode.h is for those who write. Nothing here does I/O, allocates or keeps global state. All integers are
- * little-endian on the wire. */
+ * PROTOCOL.md describes the frames byte by byte; the structs here hold the same fields in the same order and
+ * units. native_encode.h is for those who write. Nothing here does I/O, allocates or keeps global state. All
+ * integers are little-endian on the wire. */
 #ifndef DRIVERS_PROTOCOL_NATIVE_H
 #define DRIVERS_PROTOCOL_NATIVE_H
 
@@ -226,11 +227,11 @@ int native_decode_surfaces(const uint8_t *payload, size_t len,
 
 /* ---- the parser: bytes in, frames and reply lines out, in order.
  *
- * native_parser_room() gives a place for the next bytes and its size. native_parser_added() takes how many came.
- * native_parser_next() then gives items until it returns NATIVE_MORE.
- * Resynchronisation: a sync byte counts only with a correct header CRC. A frame whose payload CRC is wrong is not
- * skipped; the search goes on at its second byte. So lost bytes cost only the frames that they belonged to.
- * Text is taken only in step: after garbage, reply lines are ignored until the next good frame. */
+ * native_parser_room() gives a place for the next bytes and its size. native_parser_added() takes how many
+ * came. native_parser_next() then gives items until it returns NATIVE_MORE.
+ * Resynchronisation: a sync byte counts only with a correct header CRC. A frame whose payload CRC is wrong is
+ * not skipped; the search goes on at its second byte. So lost bytes cost only the frames that they belonged
+ * to. Text is taken only in step: after garbage, reply lines are ignored until the next good frame. */
 enum native_item { NATIVE_MORE = 0, NATIVE_FRAME = 1, NATIVE_TEXT = 2 };
 
 struct native_stats {
@@ -256,16 +257,16 @@ void native_parser_init(struct native_parser *parser);
 uint8_t *native_parser_room(struct native_parser *parser, size_t *room); /* room is never 0 after NATIVE_MORE */
 void native_parser_added(struct native_parser *parser, size_t n);
 enum native_item native_parser_next(struct native_parser *parser);
-/* Nothing more will be added. What waits for more bytes is then searched as garbage, so that whole frames after a cut
- * one come out at the end of a recording too. */
+/* Nothing more will be added. What waits for more bytes is then searched as garbage, so that whole frames
+ * after a cut one come out at the end of a recording too. */
 void native_parser_finish(struct native_parser *parser);
-/* After native_parser_finish() and all its items: bytes of another connection to the same head will follow. Counters
- * and sequence go on. */
+/* After native_parser_finish() and all its items: bytes of another connection to the same head will follow.
+ * Counters and sequence go on. */
 void native_parser_resume(struct native_parser *parser);
 
-/* 1 if a frame with this header belongs to stream_sha256: the hash runs over u8 type, u32 length (LE) and the payload
- * of each descriptor, anchor, points, line-end, poses and attributes frame that has neither NATIVE_REPEAT nor
- * NATIVE_LOCAL. */
+/* 1 if a frame with this header belongs to stream_sha256: the hash runs over u8 type, u32 length (LE) and the
+ * payload of each descriptor, anchor, points, line-end, poses and attributes frame that has neither
+ * NATIVE_REPEAT nor NATIVE_LOCAL. */
 int native_is_hashed(const struct native_header *header);
 
 #endif

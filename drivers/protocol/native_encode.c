@@ -154,8 +154,8 @@ static uint32_t count_pulses(const uint8_t *echo, uint32_t n)
     return pulses;
 }
 
-/* Attributes of the block's entries first .. first + n, which the frame with this head has gone out with. 0: no room.
- */
+/* Attributes of the block's entries first .. first + n, which the frame with this head has gone out with. 0:
+ * no room. */
 static size_t put_attributes(uint8_t *dst, size_t cap, const struct line_block *block, uint32_t first,
                              const struct native_points *points, int64_t t_ns)
 {

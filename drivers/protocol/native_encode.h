@@ -1,9 +1,10 @@
 /* From the head's data to native frames: descriptor, anchor, lines, poses, names. native.h has the way back.
  *
- * Each function writes one whole frame at dst (points: as many frames as needed) and returns the length. It returns 0
- * when cap is too small, or when the input breaks a limit of the wire: a block's dt_ns of 2^24 or more, a name of more
- * than 255 bytes. t_ns is the device time in the header, flags are enum native_flags. Frames have sequence number 0
- * until native_seal. Pure; writes only into dst; allocates nothing; real-time safe; any thread. */
+ * Each function writes one whole frame at dst (points: as many frames as needed) and returns the length. It
+ * returns 0 when cap is too small, or when the input breaks a limit of the wire: a block's dt_ns of 2^24 or
+ * more, a name of more than 255 bytes. t_ns is the device time in the header, flags are enum native_flags.
+ * Frames have sequence number 0 until native_seal. Pure; writes only into dst; allocates nothing; real-time
+ * safe; any thread. */
 #ifndef DRIVERS_PROTOCOL_NATIVE_ENCODE_H
 #define DRIVERS_PROTOCOL_NATIVE_ENCODE_H
 
@@ -15,9 +16,9 @@ size_t native_encode_anchor(uint8_t *dst, size_t cap, const struct native_anchor
 size_t native_encode_telemetry(uint8_t *dst, size_t cap, const struct native_telemetry *t, int64_t t_ns, int flags);
 size_t native_encode_event(uint8_t *dst, size_t cap, const struct native_event *e, int64_t t_ns, int flags);
 
-/* A block as one or more points frames of at most NATIVE_MAX_POINTS, and after each of them the frame of its attributes
- * where the block has some. Cuts lie between pulses, so that a pulse's echoes stay in one frame. scan_t0_ns: device time
- * of the scan's start. */
+/* A block as one or more points frames of at most NATIVE_MAX_POINTS, and after each of them the frame of its
+ * attributes where the block has some. Cuts lie between pulses, so that a pulse's echoes stay in one frame.
+ * scan_t0_ns: device time of the scan's start. */
 size_t native_encode_points(uint8_t *dst, size_t cap, const struct line_block *block, int64_t scan_t0_ns);
 size_t native_encode_line_end(uint8_t *dst, size_t cap, const struct line_end *end, int64_t scan_t0_ns);
 

@@ -1,10 +1,11 @@
-/* .e57: ASTM E2807, one data3D per scan: points in the head's frame as counts of the stream's scale, and the pose that
- * takes them to the recording's frame (station_pose.h). Intensity is the reflectance in dB; row and column are shot and
- * line. The label is a field of an extension, which readers pass over that don't know it.
+/* .e57: ASTM E2807, one data3D per scan: points in the head's frame as counts of the stream's scale, and the
+ * pose that takes them to the recording's frame (station_pose.h). Intensity is the reflectance in dB; row and
+ * column are shot and line. The label is a field of an extension, which readers pass over that don't know it.
  *
- * A binary section is a header and packets; in a packet each field has a stream of its own, of as many bits per record
- * as its range needs. All packets but the last hold a number of records that is a multiple of 8, so that no stream of
- * bits runs across packets. The XML section, which says where everything is, comes last; then headers are written over. */
+ * A binary section is a header and packets; in a packet each field has a stream of its own, of as many bits
+ * per record as its range needs. All packets but the last hold a number of records that is a multiple of 8,
+ * so that no stream of bits runs across packets. The XML section, which says where everything is, comes last;
+ * then headers are written over. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,4 +1,5 @@
-/* A file that appears whole or not at all. It is written as PATH.part through a buffer, synced and renamed at the end. */
+/* A file that appears whole or not at all. It is written as PATH.part through a buffer, synced and renamed at
+ * the end. */
 #ifndef DRIVERS_RECORD_OUTFILE_H
 #define DRIVERS_RECORD_OUTFILE_H
 

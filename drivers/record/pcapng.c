@@ -1,6 +1,6 @@
-/* .pcapng: each frame of the stream as a packet, for capinfos, tshark and what else reads captures (draft-ietf-opsawg-
- * pcapng). Link type 147 (USER0): a packet is one frame of the native protocol, header and payload. Its time is the
- * frame's device time, nanoseconds since power-up. */
+/* .pcapng: each frame of the stream as a packet, for capinfos, tshark and other readers of captures
+ * (draft-ietf-opsawg-pcapng). Link type 147 (USER0): a packet is one frame of the native protocol, header and
+ * payload. Its time is the frame's device time, nanoseconds since power-up. */
 #include <string.h>
 
 #include "drivers/protocol/bytes.h"

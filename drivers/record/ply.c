@@ -2,9 +2,10 @@
  *
  * Positions are in the stream's CRS (geo), or in the scene frame (polar), as scanhead_to_scene has it.
  *
- * The header comes first in the file but is known last (count, names, losses). When the first points arrive, the number
- * of surfaces is known, so room is left for the header. So no byte of the points is written twice, which matters at
- * 100 MB/s. If the header outgrows its room after all, the points are copied once to where it ends. */
+ * The header comes first in the file but is known last (count, names, losses). When the first points arrive,
+ * the number of surfaces is known, so room is left for the header. So no byte of the points is written twice,
+ * which matters at 100 MB/s. If the header outgrows its room after all, the points are copied once to where
+ * it ends. */
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
@@ -90,8 +91,8 @@ static size_t put_binary(uint8_t *to, const struct vertex *v)
     return len + ATTRIBUTES_LEN;
 }
 
-/* Micrometres (1e-11 degrees) are the finest scale of the wire, 0.01 dB and nanoseconds its units: more digits would
- * say nothing. "nan" without a sign, as some readers know no other. */
+/* Micrometres (1e-11 degrees) are the finest scale of the wire, 0.01 dB and nanoseconds its units: more
+ * digits would say nothing. "nan" without a sign, as some readers know no other. */
 static size_t put_number(char *to, size_t room, int digits, double v)
 {
     int n = isnan(v) ? snprintf(to, room, "nan ") : snprintf(to, room, "%.*f ", digits, v);

@@ -1,10 +1,12 @@
-/* .poses.csv: where the head truly was, what a registration or a trajectory has to find.
+/* .poses.csv: where the head truly was, which a registration or a trajectory has to find.
  *
- * Of a head that stands, one row per scan: the pose takes points from the head's frame to the frame of the recordings
- * beside it (station_pose.h; at stops with the frame scalar, too), whose coordinates are NaN where they are geodetic, and
- * the axes then east, north, up. Of a head that moves, one row per pose, each time once, in the scene
- * frame, times since the scan's start: a trajectory file of its own (core/pose.h). Gaps, where frames were lost, are
- * lines of comment, and so is what links the scene frame to the CRS of the geo layout. */
+ * Of a head that stands: one row per scan. The pose takes points from the head's frame to the frame of the
+ * recordings beside it (station_pose.h). At a stop the row has the frame scalar, too. Where the recordings are
+ * geodetic, the position is NaN and the axes are east, north, up.
+ *
+ * Of a head that moves: one row per pose, each time once, in the scene frame, with times since the scan's
+ * start. That is a trajectory file of its own (core/pose.h). Lines of comment say where frames were lost, and
+ * what links the scene frame to the CRS of the geo layout. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>

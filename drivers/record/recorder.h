@@ -1,9 +1,9 @@
 /* Recorders: the frames of a stream in, one file out; which format, its ending says.
  *
- * A format is one file of this folder with a `const struct recorder_ops`, and one row in the table in recorder.c. What
- * all of them do is here and in recorder.c: the file that appears whole or not at all (outfile.h), the points and poses
- * of the stream (track.h), what was left out. A recorder's own struct begins with a struct recorder. One thread per
- * recorder. */
+ * A format is one file of this folder with a `const struct recorder_ops`, and one row in the table in
+ * recorder.c. What all of them do is here and in recorder.c: the file that appears whole or not at all
+ * (outfile.h), the points and poses of the stream (track.h), what was left out. A recorder's own struct
+ * begins with a struct recorder. One thread per recorder. */
 #ifndef DRIVERS_RECORD_RECORDER_H
 #define DRIVERS_RECORD_RECORDER_H
 
@@ -26,7 +26,8 @@ struct recorder {
     struct track track; /* file.path is its path in messages */
 };
 
-/* What a format is. Each function gets the recorder's own struct as rec; each may be NULL. Errors: SH_E, text in err. */
+/* What a format is. Each function gets the recorder's own struct as rec; each may be NULL. Errors: SH_E, text
+ * in err. */
 struct recorder_ops {
     const char *ending;     /* ".ply" */
     size_t size;            /* of the recorder's own struct; after its struct recorder it begins zeroed */
@@ -46,8 +47,8 @@ struct recorder_ops {
 /* By the path's ending. NULL, and the list of known endings in err, where there is none. */
 const struct recorder_ops *recorder_find(const char *path, struct sh_err *err);
 
-/* Opens path for writing. Nothing is written to path itself before close succeeds: the data go to a file beside it
- * (".part") that is renamed at the end. Options are copied. */
+/* Opens path for writing. Nothing is written to path itself before close succeeds: the data go to a file
+ * beside it (".part") that is renamed at the end. Options are copied. */
 int recorder_open(const struct recorder_ops *ops, const char *path, const struct recorder_options *options,
                   struct recorder **rec, struct sh_err *err);
 /* Each frame of the stream, in order, with the handle for information, points and surfaces. */

@@ -1,4 +1,5 @@
-/* .shs: the stream as it came, frame after frame, without the reply lines. scanhead_open reads it as a source. */
+/* .shs: the stream as it came, frame after frame, without the reply lines. scanhead_open reads it as a
+ * source. */
 #include "drivers/record/recorder.h"
 
 static int shs_frame(void *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)

@@ -77,8 +77,8 @@ static int begins_scan(const struct track *t, const struct scanhead_frame *frame
     return t->n_scans == 0 || t->new_scan || frame->pulse0 < t->last_pulse0 || t->info.station != t->last_station;
 }
 
-/* The end of a line says where the next one begins. Where it was lost, the times in the frame say so, as long as the
- * pulse rate is that of the descriptor. */
+/* The end of a line says where the next one begins. Where it was lost, the times in the frame say so, as long
+ * as the pulse rate is that of the descriptor. */
 static uint64_t first_row(const struct track *t, const struct scanhead_frame *frame)
 {
     if (t->have_next_line && t->next_line == frame->scan_line && t->next_line_pulse0 <= frame->pulse0)

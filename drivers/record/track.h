@@ -1,13 +1,14 @@
-/* What every recorder of points follows in a stream: where scans begin, the one frame of coordinates, the head's pose,
- * and the line and the shot of each point. Frames go in, one by one; points come out in batches.
+/* What every recorder of points follows in a stream: where scans begin, the one frame of coordinates, the
+ * head's pose, and the line and the shot of each point. Frames go in, one by one; points come out in batches.
  *
- * Points of a moving head come out where they were hit, each by the pose of its own time. In the polar layout they are
- * then in the scene frame, and the pose of the scan changes nothing. In the geo layout they are in the CRS, as those of
- * a standing head, and the pose is the first anchor's. Points of the polar layout whose pose was lost are left out and
- * counted. Those of the geo layout need no pose.
+ * Points of a moving head come out where they were hit, each by the pose of its own time. In the polar layout
+ * they are then in the scene frame, and the pose of the scan changes nothing. In the geo layout they are in
+ * the CRS, as those of a standing head, and the pose is the first anchor's. Points of the polar layout whose
+ * pose was lost are left out and counted. Those of the geo layout need no pose.
  *
- * Where a recorder wants attributes and the head sends them, points wait for the frame that follows theirs. Where that
- * frame was lost, they come out with the next points, or at the end. Their attributes are then NaN, and are counted.
+ * Where a recorder wants attributes and the head sends them, points wait for the frame that follows theirs.
+ * Where that frame was lost, they come out with the next points, or at the end. Their attributes are then
+ * NaN, and are counted.
  *
  * The owner sets path, ops, rec and wants_attributes in a zeroed struct. One thread per track. */
 #ifndef DRIVERS_RECORD_TRACK_H
@@ -24,8 +25,8 @@ struct track_waiting;
 struct track_ops {
     /* Points of a new scan will follow; track->info and pose are its. May be NULL. */
     int (*scan)(void *rec, struct sh_err *err);
-    /* n points of track->point. In the geo layout they are in the CRS; in the polar layout in the head's frame, or in
-     * the scene frame where the head moves. NULL: no points wanted. */
+    /* n points of track->point. In the geo layout they are in the CRS; in the polar layout in the head's
+     * frame, or in the scene frame where the head moves. NULL: no points wanted. */
     int (*points)(void *rec, int n, struct sh_err *err);
     int metres; /* 1: SH_EFORMAT where points of a scan are in geodetic coordinates */
 };
@@ -64,8 +65,9 @@ struct track {
     uint64_t next_line_pulse0, last_pulse0;
 };
 
-/* A new frame of the stream. SH_EFORMAT where the stream goes to what one file can't hold: another CRS, another kind of
- * heights, a head that begins or ceases to move or to send (wanted) attributes, a station number above 65535. */
+/* A new frame of the stream. SH_EFORMAT where the stream goes to what one file can't hold: another CRS,
+ * another kind of heights, a head that begins or ceases to move or to send (wanted) attributes, a station
+ * number above 65535. */
 int track_frame(struct track *track, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
 
 /* At the end: gives out the points that still wait for their attributes. */

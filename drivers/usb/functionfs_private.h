@@ -1,4 +1,5 @@
-/* The functionfs back end's own parts: endpoints with asynchronous I/O, and the console over the kernel's tty. Private. */
+/* The functionfs back end's own parts: endpoints with asynchronous I/O, and the console over the kernel's
+ * tty. Private. */
 #ifndef DRIVERS_USB_FUNCTIONFS_PRIVATE_H
 #define DRIVERS_USB_FUNCTIONFS_PRIVATE_H
 
@@ -10,9 +11,10 @@
 
 enum { FFS_SLOTS = 8, FFS_SLOT_BYTES = 32768, FFS_MAX_PIPES = 8, FFS_MAX_FAILURES = 16 };
 
-/* A slot is a buffer that goes round. IN: it waits at the core as if a host had asked for that much, is filled, and is
- * written to the kernel. OUT: it is read from the kernel, and waits at the core until the function has read it. On an
- * endpoint that is down the kernel gives it back at once; then it is idle until the next configuration comes up. */
+/* A slot is a buffer that goes round. IN: it waits at the core as if a host had asked for that much, is
+ * filled, and is written to the kernel. OUT: it is read from the kernel, and waits at the core until the
+ * function has read it. On an endpoint that is down the kernel gives it back at once; then it is idle until
+ * the next configuration comes up. */
 enum ffs_slot_state { FFS_IDLE, FFS_AT_CORE, FFS_AT_KERNEL };
 
 struct ffs_slot {
@@ -59,9 +61,10 @@ void ffs_pipes_close(struct ffs_pipes *pipes);
 /* The model's address of an endpoint by its number in FunctionFS, counted from 1; 0 where there is none. */
 uint8_t ffs_pipes_address(const struct ffs_pipes *pipes, unsigned number);
 
-/* The console. The kernel's f_acm does not report DTR. So a session begins with the first bytes of the host, and ends
- * when the host has taken none of the waiting bytes for one or two seconds. What the tty holds by then can't be taken
- * back. The next reader gets that first, cut within a frame, and then a frame of its own that brings it into step. */
+/* The console. The kernel's f_acm does not report DTR. So a session begins with the first bytes of the host,
+ * and ends when the host has taken none of the waiting bytes for one or two seconds. What the tty holds by
+ * then can't be taken back. The next reader gets that first, cut within a frame, and then a frame of its own
+ * that brings it into step. */
 struct ffs_console {
     struct usb_device *device;
     int fd;    /* of the tty; -1: not plugged in, or no console */

@@ -115,7 +115,8 @@ static void remove_all(const char *name)
     rmdir(dir);
 }
 
-/* When a process was started, in clock ticks from the machine's start: proc(5), stat, field 22. 0 or -1 with errno. */
+/* When a process was started, in clock ticks from the machine's start: proc(5), stat, field 22. 0 or -1 with
+ * errno. */
 static int started_at(long pid, unsigned long long *ticks)
 {
     char dir[32], text[1024];

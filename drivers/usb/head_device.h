@@ -1,9 +1,10 @@
-/* The scanner head as a USB device: a CDC-ACM console (interfaces 0 and 1) and a vendor interface (2) whose bulk pair
- * carries the native stream. Both are sessions of the head: commands in, replies and frames out.
+/* The scanner head as a USB device: a CDC-ACM console (interfaces 0 and 1) and a vendor interface (2) whose
+ * bulk pair carries the native stream. Both are sessions of the head: commands in, replies and frames out.
  *
- * A console session begins when the host raises DTR (SET_CONTROL_LINE_STATE) and ends when it drops it. A stream
- * session begins with the vendor request SCANHEAD_USB_STREAM, wValue 1, or with the first data on the OUT endpoint, and
- * ends with wValue 0; wValue 1 while one is open ends it and begins another. Both end when the interface goes away. */
+ * A console session begins when the host raises DTR (SET_CONTROL_LINE_STATE) and ends when it drops it. A
+ * stream session begins with the vendor request SCANHEAD_USB_STREAM, wValue 1, or with the first data on the
+ * OUT endpoint, and ends with wValue 0; wValue 1 while one is open ends it and begins another. Both end when
+ * the interface goes away. */
 #ifndef DRIVERS_USB_HEAD_DEVICE_H
 #define DRIVERS_USB_HEAD_DEVICE_H
 
@@ -40,8 +41,8 @@ struct scanhead_usb {
 
 /* Makes the device of head, which must be zeroed and stay where it is. usb_device_free(head->device). */
 int scanhead_usb_create(const struct usb_identity *id, struct scanhead_usb *head, struct sh_err *err);
-/* What follows from the host's transfers rather than its requests: a stream that opens with data, the console's
- * notification. To be called after each of them. */
+/* What follows from the host's transfers rather than its requests: a stream that opens with data, the
+ * console's notification. To be called after each of them. */
 void scanhead_usb_update(struct scanhead_usb *head);
 /* The end of a session has been reported to whoever serves it. */
 void scanhead_usb_ended(struct scanhead_usb *head, int session);

@@ -1,6 +1,7 @@
 /* A connection of a USB/IP client: DEVLIST and IMPORT, then SUBMIT and UNLINK.
  *
- * The peer is not trusted: what breaks the protocol, or asks for more memory than a host needs, ends the connection. */
+ * The peer is not trusted: what breaks the protocol, or asks for more memory than a host needs, ends the
+ * connection. */
 #include <poll.h>
 #include <unistd.h>
 

@@ -7,7 +7,8 @@
 
 #include "drivers/usb/usbip_conn.h"
 
-/* Limits of what the host has asked for and the device has not answered. A host that asks for more is cut off. */
+/* Limits of what the host has asked for and the device has not answered. A host that asks for more is cut
+ * off. */
 enum { MAX_PENDING = 4096, MAX_PENDING_BYTES = 64 << 20 };
 /* Limits of answers that are not sent yet. Above these nothing more is read until the host has taken some. */
 enum { MAX_UNSENT = 256, MAX_UNSENT_BYTES = 1 << 20 };

@@ -1,6 +1,7 @@
-/* The usbredir back end: the device for a virtual machine (QEMU's usb-redir), over a Unix socket or TCP; no root
- * needed. One guest at a time; one that has not said hello yet gives way to the next that comes. libusbredirparser does
- * the wire format, which spice/usbredir's usb-redirection-protocol.md describes; this is its "usb-host" end.
+/* The usbredir back end: the device for a virtual machine (QEMU's usb-redir), over a Unix socket or TCP; no
+ * root needed. One guest at a time; one that has not said hello yet gives way to the next that comes.
+ * libusbredirparser does the wire format, which spice/usbredir's usb-redirection-protocol.md describes; this
+ * is its "usb-host" end.
  *
  * Connecting instead of listening (attach), the device connects again when the guest hangs up. */
 #include "drivers/usb/backend.h"
@@ -18,8 +19,8 @@
 #include "drivers/socket/socket.h"
 #include "drivers/usb/usbredir_private.h"
 
-/* MAX_UNSENT: packets that wait for the guest to read them; above that nothing more is read from it. MAX_READS: at a
- * time, so that who sends without end does not have the thread to himself. */
+/* MAX_UNSENT: packets that wait for the guest to read them; above that nothing more is read from it.
+ * MAX_READS: at a time, so that who sends without end does not have the thread to himself. */
 enum { CLOSE_WAIT_MS = 500, SEND_BUFFER_BYTES = 1 << 20, MAX_UNSENT = 64, MAX_READS = 256 };
 
 static int is_full(const struct usbredir *self)
@@ -142,8 +143,8 @@ static void note_path(struct usbredir *self, const char *path)
     self->path_inode = st.st_ino;
 }
 
-/* Unless it was removed meanwhile, and another program listens there. To be called before the listener is closed: until
- * then nobody takes the path for an abandoned one, and no other file gets the inode's number. */
+/* Unless it was removed meanwhile, and another program listens there. To be called before the listener is
+ * closed: until then nobody takes the path for an abandoned one, and no other file gets the inode's number. */
 static void remove_path(const struct usbredir *self)
 {
     struct stat st;

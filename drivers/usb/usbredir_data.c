@@ -1,7 +1,7 @@
 /* The usbredir back end: bulk and interrupt packets.
  *
- * Interrupt endpoints are not asked packet by packet here: the guest starts and stops receiving, and between the two
- * one transfer of our own waits at the core. */
+ * Interrupt endpoints are not asked packet by packet here: the guest starts and stops receiving, and between
+ * the two one transfer of our own waits at the core. */
 #include "drivers/usb/backend.h"
 
 #ifdef HAVE_USBREDIR
