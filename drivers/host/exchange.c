@@ -19,7 +19,7 @@ static int take_items(struct scanhead *sh)
     }
 }
 
-/* A line that came before the command can't be its reply: it answers one that was given up. Frames may arrive
+/* Skips lines that came before the command: they answer commands that were given up. Frames may arrive
  * without end, so this looks at a few buffers only. */
 static int discard_stale(struct scanhead *sh)
 {
@@ -35,7 +35,7 @@ static int discard_stale(struct scanhead *sh)
     return 0;
 }
 
-/* Reads on while it waits to write: a head that is itself waiting to write must not lock up both. */
+/* Reads on while it waits to write. Otherwise a head that itself waits to write would block both sides. */
 static int wait_writable(struct scanhead *sh, int64_t deadline_ns)
 {
     short revents;
@@ -103,7 +103,7 @@ static int copy_reply(struct scanhead *sh, char *reply, size_t reply_len)
     return SCANHEAD_OK;
 }
 
-/* What every head answers to *IDN?, and to nothing else: four fields (IEEE 488.2); an error's text is in
+/* Whether a line is the answer to *IDN?: four fields (IEEE 488.2). No other answer has three commas without
  * quotes. */
 static int is_identity(const char *text)
 {
@@ -113,8 +113,8 @@ static int is_identity(const char *text)
     return commas == 3 && strchr(text, '"') == NULL;
 }
 
-/* Passes lines over until every question has its answer. One that was given up may be lost: so once there is
- * an answer, those to the others have ANSWERS_MS. */
+/* Skips lines until every question has its answer. A question that was given up may be lost. So once one
+ * answer is there, the others have ANSWERS_MS to come. */
 static int pass_over(struct scanhead *sh, int64_t deadline_ns)
 {
     int answered = 0;

@@ -14,8 +14,8 @@ _Static_assert(SCANHEAD_POINTS == (int)NATIVE_POINTS && SCANHEAD_POSES == (int)N
                    SCANHEAD_POSE_NONE == (int)NATIVE_POSE_NONE && SCANHEAD_LOCAL == (int)NATIVE_LOCAL,
                "types, events and flags are those on the wire");
 
-/* A source tried again and again while it isn't there. wrong_too: also when its name is wrong, for it was
- * right once. */
+/* Tries to open a source until the deadline while it isn't there. wrong_too: also while its name seems wrong,
+ * because it was right once. */
 static int open_in_time(const char *source, int wrong_too, int64_t deadline_ns, struct host_source *out,
                         struct sh_err *err)
 {
@@ -109,7 +109,7 @@ static struct host_node *pop(struct scanhead *sh)
     return node;
 }
 
-/* The oldest goes, but what it says of the stream stays known, and it stays in the hash. */
+/* Drops the oldest frame. What it says of the stream is taken in first, and it stays in the hash. */
 static int drop_oldest(struct scanhead *sh)
 {
     struct host_node *node = pop(sh);

@@ -14,14 +14,16 @@
  *             n = scanhead_points(sh, &frame, 0, point, 256);
  *     scanhead_close(sh);
  *
- * Results: functions return 0, or a count, or a negative SCANHEAD_E; scanhead_error() then has a line of text.
+ * Results: functions return 0, or a count, or a negative SCANHEAD_E; scanhead_error() then has a line of
+ * text.
  *
  * Ownership: what a function returns by value or writes into the caller's memory is the caller's. Strings and
  * payloads are the handle's; how long they live is said with each.
  *
  * Threads: a handle belongs to one thread at a time. Different handles are independent.
  *
- * Units: names carry them: _m metres, _rad radians, _deg degrees, _ns nanoseconds, _db decibels. NaN: no value. */
+ * Units: names carry them: _m metres, _rad radians, _deg degrees, _ns nanoseconds, _db decibels. NaN: no
+ * value. */
 #ifndef SCANHEAD_H
 #define SCANHEAD_H
 

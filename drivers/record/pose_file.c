@@ -1,8 +1,8 @@
 /* .poses.csv: where the head truly was, which a registration or a trajectory has to find.
  *
  * Of a head that stands: one row per scan. The pose takes points from the head's frame to the frame of the
- * recordings beside it (station_pose.h). At a stop the row has the frame scalar, too. Where the recordings are
- * geodetic, the position is NaN and the axes are east, north, up.
+ * recordings beside it (station_pose.h). At a stop the row has the frame scalar, too. Where the recordings
+ * are geodetic, the position is NaN and the axes are east, north, up.
  *
  * Of a head that moves: one row per pose, each time once, in the scene frame, with times since the scan's
  * start. That is a trajectory file of its own (core/pose.h). Lines of comment say where frames were lost, and

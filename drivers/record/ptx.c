@@ -1,11 +1,11 @@
-/* .ptx: one grid per scan, a column per line and a row per shot. Points are in the head's frame; the pose takes
- * them to the recording's frame (station_pose.h). A shot without echo is "0 0 0 0.5". So is a place of the grid
- * without a shot: lines differ by a pulse where the pulse rate is no multiple of the line rate, and lines may
- * have been lost.
+/* .ptx: one grid per scan, a column per line and a row per shot. Points are in the head's frame; the pose
+ * takes them to the recording's frame (station_pose.h). A shot without echo is "0 0 0 0.5". So is a place of
+ * the grid without a shot: lines differ by a pulse where the pulse rate is no multiple of the line rate, and
+ * lines may have been lost.
  *
- * A PTX grid has one point per shot: the first echo. Intensity is the reflectance as a fraction: 1 for a white
- * Lambertian target and for what is brighter, 0.5 where not modelled. What the grid had no room for is reported
- * at the end, with counts. */
+ * A PTX grid has one point per shot: the first echo. Intensity is the reflectance as a fraction: 1 for a
+ * white Lambertian target and for what is brighter, 0.5 where not modelled. What the grid had no room for is
+ * reported at the end, with counts. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>

@@ -63,9 +63,9 @@ const struct usb_backend_ops *usb_backend_ops_get(enum usb_backend_type type);
  * taken over. `what` names it in errors; name gets "127.0.0.1:3240" or the path. backend_socket.c */
 int usb_backend_socket(const struct usb_backend_spec *spec, const char *what, int *fd, char *name, size_t len,
                        struct sh_err *err);
-/* Where a socket that was connected by usb_backend_socket leads, and the way there once more: without waiting
- * and without asking for names. 0: *fd is connected; EINPROGRESS: it is when poll(2) finds it writable, and
- * SO_ERROR says how it went; else an errno, and *fd is -1. backend_socket.c */
+/* The address that a socket of usb_backend_socket is connected to, and connecting to it again, without
+ * waiting and without looking up names. 0: *fd is connected. EINPROGRESS: it will be when poll(2) finds it
+ * writable; usb_backend_connect_error then says how it went. Any other errno: *fd is -1. backend_socket.c */
 struct usb_backend_address {
     struct sockaddr_storage at;
     socklen_t len;
@@ -73,9 +73,9 @@ struct usb_backend_address {
 void usb_backend_peer(const struct usb_backend_spec *spec, int fd, struct usb_backend_address *out);
 int usb_backend_connect(const struct usb_backend_address *to, int *fd);
 int usb_backend_connect_error(int fd);
-/* Before closing: nothing more from us, and wait until the peer has read it and hung up, or timeout_ms pass
- * without a byte, eight times that at most. To close with requests of the peer unread would throw away
- * replies on their way. backend_socket.c */
+/* To be called before closing. Sends nothing more, and waits until the peer has read everything and hung up,
+ * or until timeout_ms pass without a byte; eight times that at most. Closing with unread requests of the peer
+ * would throw away replies on their way. backend_socket.c */
 void usb_backend_hang_up(int fd, int timeout_ms);
 
 #endif

@@ -60,8 +60,8 @@ void usb_backend_peer(const struct usb_backend_spec *spec, int fd, struct usb_ba
     if (getpeername(fd, (struct sockaddr *)&out->at, &out->len) != 0) out->len = 0;
 }
 
-/* Nobody answers on it: its owner is gone without removing it. One whose queue is full lives; that is not
- * waited for. */
+/* Nobody answers on it: its owner is gone and has not removed it. A socket whose queue is full is alive; this
+ * does not wait for it. */
 static int is_left_behind(const char *path, const struct usb_backend_address *at)
 {
     struct stat st;

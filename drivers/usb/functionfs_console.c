@@ -57,8 +57,8 @@ static void offer_tx(struct ffs_console *console)
     usb_device_submit(console->device, &console->tx);
 }
 
-/* The tty hands its bytes on in up to 16 requests, one per write, before its buffer begins to fill and shows
- * that nobody takes them. So little is written in many pieces. */
+/* The tty passes its bytes on in up to 16 requests, one per write. Only then does its buffer fill and show
+ * that nobody takes them. So a small amount is written in many pieces. */
 static void write_tx(struct ffs_console *console)
 {
     if (console->lead_pos < console->lead_len) {
