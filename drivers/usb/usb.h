@@ -9,16 +9,16 @@
  *   usb_device_control                       a control transfer, answered at once
  *   usb_device_submit, usb_device_cancel     a bulk or interrupt transfer of the host, and its withdrawal
  *
- * A transfer is one request of the host's driver (a URB). An IN transfer waits until the function writes, an OUT
- * transfer until the function has read all of it. A real bus does that by NAK. So a function that does not read
- * holds the host back. A transfer belongs to the core from submit until the host's complete() is called with it.
- * That happens exactly once, maybe within submit.
+ * A transfer is one request of the host's driver (a URB). An IN transfer waits until the function writes, an
+ * OUT transfer until the function has read all of it. A real bus does that by NAK. So a function that does
+ * not read holds the host back. A transfer belongs to the core from submit until the host's complete() is
+ * called with it. That happens exactly once, maybe within submit.
  *
- * IN packets: a transfer ends when it is full, or with a short packet. What one usb_device_write() leaves ends
- * with a short packet, or with one of zero length where it is a whole number of packets. Where the bytes filled
- * the transfer exactly, the zero-length packet ends the next transfer, unless more is written first. A transfer
- * whose rest is smaller than the next packet fails with USB_OVERFLOW, as on a real bus. That packet stays with
- * the function: nothing is lost.
+ * IN packets: a transfer ends when it is full, or with a short packet. What one usb_device_write() leaves
+ * ends with a short packet, or with one of zero length where it is a whole number of packets. Where the bytes
+ * filled the transfer exactly, the zero-length packet ends the next transfer, unless more is written first. A
+ * transfer whose rest is smaller than the next packet fails with USB_OVERFLOW, as on a real bus. That packet
+ * stays with the function: nothing is lost.
  *
  * Wire formats: Universal Serial Bus 2.0, chapter 9; USB 3.2, chapter 9 (super speed, BOS); CDC 1.2 and PSTN
  * 1.2; Microsoft OS 2.0 Descriptors Specification. Numbers in structs are in host order unless said.
@@ -184,7 +184,8 @@ int usb_device_configuration(const struct usb_device *device);
 /* The present alternate setting's row; NULL when not configured. */
 const struct usb_interface_row *usb_device_row(const struct usb_device *device, unsigned interface);
 
-/* ---- for functions. An endpoint that is not there, is halted or suspended has no room and nothing to read. */
+/* ---- for functions. An endpoint that is not there, is halted or suspended has no room and nothing to read.
+ * */
 
 /* Bytes taken by waiting IN transfers, maybe 0. */
 size_t usb_device_write(struct usb_device *device, uint8_t endpoint, const void *data, size_t len);

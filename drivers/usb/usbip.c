@@ -1,5 +1,5 @@
-/* The usbip back end: a USB/IP server, on TCP port 3240 of the loopback by default, or one connection by socket
- * pair to this machine's vhci_hcd. One host at a time has the device; others may list it.
+/* The usbip back end: a USB/IP server, on TCP port 3240 of the loopback by default, or one connection by
+ * socket pair to this machine's vhci_hcd. One host at a time has the device; others may list it.
  *
  * A connection that has not imported the device gives way when a new one needs its place, so that silent ones
  * exclude nobody. A device that is attached here comes back when the host detaches it, as one that is plugged
