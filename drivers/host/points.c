@@ -45,7 +45,7 @@ static inline struct native_point take(const uint8_t *payload, uint32_t i, int64
 /* WGS 84, NIMA TR8350.2: geodetic to geocentric. */
 static void geocentric(double lat_deg, double lon_deg, double h, double p[3])
 {
-    const double a = 6378137.0, f = 1 / 298.257223563, e2 = f * (2 - f), rad = TWO_PI / 360;
+    const double a = 6378137.0, f = 1 / 298.257223563, e2 = f * (2 - f), rad = NATIVE_RAD_PER_DEG;
     double s = sin(lat_deg * rad), c = cos(lat_deg * rad), n = a / sqrt(1 - e2 * s * s);
     p[0] = (n + h) * c * cos(lon_deg * rad);
     p[1] = (n + h) * c * sin(lon_deg * rad);

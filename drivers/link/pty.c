@@ -2,9 +2,9 @@
  *
  * When does a session begin and end? The kernel offers two signals, each with a weakness:
  *   hang-up   poll(2) on the master reports POLLHUP exactly while nobody has the slave open. It is a level: a
- *             close followed by an open before we look leaves no trace. And it is always reported. So a master
- *             that hangs up must stay out of the descriptors that we wait for, and can't report that somebody
- *             comes.
+ *             close followed by an open before we look leaves no trace. And it is always reported. So a
+ *             master that hangs up must stay out of the descriptors that we wait for, and can't report that
+ *             somebody comes.
  *   inotify   reports each open and close of the slave, in order. But it merges equal events in a row as long
  *             as we have not read them, so opens and closes can't be counted when clients overlap.
  * So inotify wakes us, and the hang-up decides:
@@ -14,9 +14,9 @@
  *   - No session: we wait for inotify only. An open event starts a session, even if the hang-up says that the
  *     client has left already: what it wrote is still to be read (echo '*RST' > /dev/pts/3).
  *   - Session: we wait for the master as well. The session ends when the master hangs up and all that was
- *     written is read. A close event is queued before the close takes effect, and an open event after the open
- *     did. An open that comes after our hang-up is therefore still unread when the watch is set up again, or
- *     seen as "no hang-up".
+ *     written is read. A close event is queued before the close takes effect, and an open event after the
+ *     open did. An open that comes after our hang-up is therefore still unread when the watch is set up
+ *     again, or seen as "no hang-up".
  *   - Session, and inotify reports that the last client went and another came before we looked: the hang-up
  *     never showed. Clients that come one after the other give open, close, open, ... without equal
  *     neighbours: nothing is merged, the count is exact, and we report LINK_CLOSED and LINK_OPENED. Only

@@ -87,6 +87,9 @@ struct native_descriptor {
 
 enum native_content { NATIVE_HAS_ATTRIBUTES = 1 }; /* a frame of attributes follows each one of points */
 
+/* Geodetic coordinates and the angles of the descriptor are in degrees. */
+#define NATIVE_RAD_PER_DEG (3.14159265358979323846 / 180.0)
+
 enum native_crs { NATIVE_CRS_LOCAL = 0, NATIVE_CRS_ECEF = 1, NATIVE_CRS_UTM = 2, NATIVE_CRS_GEODETIC = 3 };
 enum native_heights { NATIVE_HEIGHTS_ELLIPSOID = 0, NATIVE_HEIGHTS_GEOID = 1 };
 

@@ -14,8 +14,7 @@
 #include "drivers/record/las_header.h"
 #include "drivers/record/recorder.h"
 
-#define DEG                       (3.14159265358979323846 / 180.0)
-#define SCAN_ANGLE_COUNTS_PER_RAD (1.0 / DEG / 0.006)
+#define SCAN_ANGLE_COUNTS_PER_RAD (1.0 / NATIVE_RAD_PER_DEG / 0.006)
 
 struct las {
     struct recorder base;
@@ -152,8 +151,8 @@ static int put_time(const struct las *las, uint8_t *to, int i, struct sh_err *er
 static void set_socs(const struct track *t, double p[3])
 {
     if (t->info.crs == NATIVE_CRS_GEODETIC) {
-        const double m_deg = 6371000 * DEG, north = (p[0] - t->pose.shift_m[0]) * m_deg;
-        const double east = remainder(p[1] - t->pose.shift_m[1], 360) * m_deg * cos(p[0] * DEG);
+        const double m_deg = 6371000 * NATIVE_RAD_PER_DEG, north = (p[0] - t->pose.shift_m[0]) * m_deg;
+        const double east = remainder(p[1] - t->pose.shift_m[1], 360) * m_deg * cos(p[0] * NATIVE_RAD_PER_DEG);
         p[0] = t->pose.shift_m[0] + east;
         p[1] = t->pose.shift_m[1] + north;
     }
