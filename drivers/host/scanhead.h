@@ -149,8 +149,8 @@ int scanhead_next(struct scanhead *sh, struct scanhead_frame *frame, int timeout
 enum { SCANHEAD_NO_LABEL = 0xffff };
 
 struct scanhead_point {
-    /* Geo: in the stream's CRS (geodetic: degrees of latitude, degrees of longitude within -180..180, metres).
-     * Polar: in the head's frame SOCS, metres. NaN for an empty shot. */
+    /* Geo: in the stream's CRS (geodetic: degrees of latitude, degrees of longitude within -180..180,
+     * metres). Polar: in the head's frame SOCS, metres. NaN for an empty shot. */
     double x, y, z;
     double range_m;             /* NaN for an empty shot */
     double mirror_rad, pan_rad; /* encoders; NaN in the geo layout */

@@ -158,7 +158,7 @@ static int recover_reads(struct host_usb *usb)
     return recover(usb, &usb->in_failing, usb->head.interface.in);
 }
 
-/* The transfer at hand is used up: sends it off again, and goes on to the next. */
+/* The present transfer is used up: submits it again, and goes on to the next. */
 static int turn(struct host_usb *usb)
 {
     struct in_transfer *in = &usb->in[usb->next];

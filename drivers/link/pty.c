@@ -151,7 +151,7 @@ static int pty_report(struct pty_link *pty, struct link_events *events)
 static int pty_ended(const struct pty_link *pty, short revents)
 {
     if ((revents & POLLHUP) == 0 || (revents & POLLIN) != 0) return 0;
-    /* The bytes and the hang-up are not looked at in one step: now that nobody is there, look again for
+    /* The bytes and the hang-up are not looked at in one step. So, now that nobody is there, look again for
      * bytes. */
     revents = pty_now(pty);
     return (revents & POLLHUP) != 0 && (revents & POLLIN) == 0;

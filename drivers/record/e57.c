@@ -31,7 +31,7 @@ struct e57 {
     struct recorder base;
     struct e57_pages pages;
     struct e57_facts facts;
-    struct e57_scan *scan; /* the one at hand */
+    struct e57_scan *scan; /* the present one */
     unsigned n;            /* records in the streams */
     uint8_t stream[N_STREAMS][PACKET_RECORDS * 8];
     uint8_t packet[PACKET_MAX];

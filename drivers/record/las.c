@@ -1,10 +1,10 @@
 /* .las: LAS 1.4, point data record format 6 followed by the label; one record per echo. What the numbers mean
  * stands in the file itself (las_header.c).
  *
- * Coordinates are counts of the stream's own scale from the first scan's station, so those of the first scan
- * are the stream's very numbers, and those of further stations are rounded once, by half a count at most.
- * Nothing is clipped: what is too far for 32 bits is an error. Longitudes go on beyond 180 or -180 degrees
- * where a scan crosses the antimeridian: all lie within 180 degrees of the first station. */
+ * Coordinates are counts of the stream's own scale from the first scan's station. So those of the first scan
+ * are the numbers of the stream. Those of further stations are rounded once, by half a count at most. Nothing
+ * is clipped: what is too far for 32 bits is an error. Longitudes go on beyond 180 or -180 degrees where a
+ * scan crosses the antimeridian: all lie within 180 degrees of the first station. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

@@ -147,7 +147,7 @@ static int begin_waiting(struct track *t, struct sh_err *err)
     return 0;
 }
 
-/* The batch at hand. */
+/* Keeps the present batch. */
 static void wait_for_attributes(struct track *t, int n)
 {
     struct track_waiting *w = t->waiting;
@@ -207,7 +207,7 @@ static void count_unheld(struct track *t, int n)
         t->n_attributes_unheld += t->point[i].echo_count != 0;
 }
 
-/* n points of the frame that are at hand, from `first` on. */
+/* Takes the present batch: n points of the frame, from `first` on. */
 static int take_batch(struct track *t, uint32_t first, int n, struct sh_err *err)
 {
     for (int i = 0; i < n && t->has_attributes; i++)
@@ -233,7 +233,7 @@ static int begin_scan(struct track *t, struct sh_err *err)
     return t->ops->scan != NULL ? t->ops->scan(t->rec, err) : 0;
 }
 
-/* All points of the frame, the first of which has this row. */
+/* Takes all points of the frame. row: that of the first one. */
 static int take_batches(struct track *t, const struct scanhead_frame *frame, uint64_t row, struct sh_err *err)
 {
     int rc = 0;

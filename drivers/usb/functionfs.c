@@ -109,7 +109,7 @@ static void enable(struct functionfs *self)
 static void stall(struct functionfs *self, int in)
 {
     ssize_t n = in ? read(self->ep0, self->data, 0) : write(self->ep0, self->data, 0);
-    (void)n; /* fails, as it must */
+    (void)n; /* it fails, which is what stalls */
 }
 
 /* The kernel has put its own numbers in wIndex: interfaces count from 0, endpoints from 1 in the order of our

@@ -92,7 +92,7 @@ static void unmount(const char *name)
     fclose(mounts);
 }
 
-/* Everything of that name, in the order in which configfs lets go of it. What is not there does no harm. */
+/* Removes everything of that name, in the order that configfs allows. What is not there is skipped. */
 static void remove_all(const char *name)
 {
     char dir[128], function[64], link[80];

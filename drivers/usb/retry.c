@@ -35,7 +35,7 @@ static void report(struct usb_retry *retry, const char *text, const char *why)
 int usb_retry_start(struct usb_retry *retry)
 {
     retry->reported = 0;
-    report(retry, "the host has let go of the device, which plugs itself in again", "");
+    report(retry, "the host has detached the device, which plugs itself in again", "");
     return set_timer(retry, retry->pace_ms);
 }
 

@@ -12,7 +12,7 @@
 
 enum {
     MAX_URB_BYTES = 16 << 20, /* usbfs's own limit by default, of all */
-    MAX_READS = 256,          /* at a time: who sends without end does not have the thread to himself */
+    MAX_READS = 256,          /* in one call: a peer that sends without end must not occupy the thread */
 };
 
 /* Where the host's driver forbids short packets, a host controller makes an error of them. */

@@ -20,7 +20,7 @@
 #include "drivers/usb/usbredir_private.h"
 
 /* MAX_UNSENT: packets that wait for the guest to read them; above that nothing more is read from it.
- * MAX_READS: at a time, so that who sends without end does not have the thread to himself. */
+ * MAX_READS: in one call; a guest that sends without end must not occupy the thread. */
 enum { CLOSE_WAIT_MS = 500, SEND_BUFFER_BYTES = 1 << 20, MAX_UNSENT = 64, MAX_READS = 256 };
 
 static int is_full(const struct usbredir *self)
