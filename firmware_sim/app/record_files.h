@@ -15,7 +15,7 @@ struct record_files {
     struct record_file {
         const char *path;
         const struct recorder_ops *ops;
-        void *rec;
+        struct recorder *rec;
     } file[RECORD_MAX_FILES];
     int n;
     unsigned part;  /* number of the scan in split files, from 1 */

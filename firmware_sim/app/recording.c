@@ -41,11 +41,12 @@ static int set(struct recording *r, const char *header, long value, struct sh_er
 
 static void count_points(struct recording *r, const struct scanhead_frame *frame)
 {
-    /* The last byte of a point holds the echo's number and the count: 0 for a shot without echo. */
-    const uint8_t *last = frame->payload + NATIVE_POINTS_HEAD_LEN + NATIVE_POINT_LEN - 1;
     uint64_t empty = 0;
-    for (uint32_t i = 0; i < frame->n_points; i++)
-        empty += last[(size_t)i * NATIVE_POINT_LEN] == 0;
+    for (uint32_t i = 0; i < frame->n_points; i++) {
+        struct native_point point;
+        native_decode_point(frame->payload, i, &point);
+        empty += point.echo_count == 0;
+    }
     r->result->empty += empty;
     r->result->points += frame->n_points - empty;
 }
