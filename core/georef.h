@@ -23,6 +23,7 @@
 #include <stddef.h>
 
 #include "core/err.h"
+#include "core/vec3.h"
 
 enum georef_crs { GEOREF_LOCAL, GEOREF_ECEF, GEOREF_UTM, GEOREF_GEODETIC };
 enum georef_method { GEOREF_AUTO, GEOREF_EXACT, GEOREF_ORDER1, GEOREF_ORDER2, GEOREF_ORDER3, GEOREF_ORDER5 };
@@ -117,8 +118,7 @@ double georef_bound_m(const struct georef *georef, enum georef_method method, do
 
 /* n points, d_prcs relative to the centre (metres) -> difference from the anchor, in units of the CRS (metres;
  * geodetic: degrees, degrees, metres). In place is allowed. Not-a-number goes through. */
-void georef_forward(const struct georef *georef, size_t n, const double *dx, const double *dy, const double *dz,
-                    double *out_x, double *out_y, double *out_z);
+void georef_forward(const struct georef *georef, size_t n, struct vec3_in d, struct vec3_out out);
 
 /* One point back, exact: difference from the anchor -> prcs (absolute). For checks and clients, not for speed. */
 void georef_reverse(const struct georef *georef, const double d_crs[3], double p_prcs[3]);

@@ -16,7 +16,8 @@ static void jacobian(const struct georef *georef, double j[9])
         for (int side = 0; side < 2; side++) {
             double d[3] = {0.0, 0.0, 0.0};
             d[k] = side == 0 ? -STEP_M : STEP_M;
-            shim_map_forward(georef->map, 1, &d[0], &d[1], &d[2], &out[side][0], &out[side][1], &out[side][2]);
+            shim_map_forward(georef->map, 1, (struct vec3_in){&d[0], &d[1], &d[2]},
+                             (struct vec3_out){&out[side][0], &out[side][1], &out[side][2]});
         }
         for (int i = 0; i < 3; i++)
             j[3 * i + k] = (out[1][i] - out[0][i]) / (2.0 * STEP_M);

@@ -279,20 +279,19 @@ void shim_geoid_free(struct shim_geoid *geoid)
     delete geoid;
 }
 
-struct shim_map *shim_map_create(enum shim_kind kind, const double place[3], const struct shim_frame *frame,
-                                 const struct shim_zone *zone, const struct shim_geoid *geoid, char *why, size_t len)
+struct shim_map *shim_map_create(const struct shim_spec *spec, char *why, size_t len)
 {
     std::unique_ptr<shim_map> map;
     int rc = attempt(why, len, [&] {
         map.reset(new shim_map());
-        map->kind = kind;
-        map->geoid = geoid;
+        map->kind = spec->kind;
+        map->geoid = spec->geoid;
         for (int i = 0; i < 3; i++)
-            map->place[i] = place[i];
-        map->place[1] = GeographicLib::Math::AngNormalize(place[1]);
-        map->set_frame(*frame);
-        map->set_centre(utmups_zone(zone->zone));
-        map->force_side(zone->side);
+            map->place[i] = spec->place[i];
+        map->place[1] = GeographicLib::Math::AngNormalize(spec->place[1]);
+        map->set_frame(spec->frame);
+        map->set_centre(utmups_zone(spec->zone.zone));
+        map->force_side(spec->zone.side);
     });
     return rc == 0 ? map.release() : nullptr;
 }
@@ -385,22 +384,21 @@ void shim_map_convergence(const struct shim_map *map, double *convergence_deg, d
     });
 }
 
-void shim_map_forward(const struct shim_map *map, size_t n, const double *dx, const double *dy, const double *dz,
-                      double *out_x, double *out_y, double *out_z)
+void shim_map_forward(const struct shim_map *map, size_t n, struct vec3_in d, struct vec3_out out)
 {
     for (size_t i = 0; i < n; i++) {
         double x = nan_m, y = nan_m, z = nan_m;
-        /* Asked first: the projections turn some not-a-number into plain numbers. */
-        if (std::isfinite(dx[i]) && std::isfinite(dy[i]) && std::isfinite(dz[i])) {
+        /* Checked first: the projections turn some NaN into plain numbers. */
+        if (std::isfinite(d.x[i]) && std::isfinite(d.y[i]) && std::isfinite(d.z[i])) {
             try {
-                map->forward(dx[i], dy[i], dz[i], x, y, z);
+                map->forward(d.x[i], d.y[i], d.z[i], x, y, z);
             } catch (...) {
                 x = y = z = nan_m;
             }
         }
-        out_x[i] = x;
-        out_y[i] = y;
-        out_z[i] = z;
+        out.x[i] = x;
+        out.y[i] = y;
+        out.z[i] = z;
     }
 }
 

@@ -5,6 +5,8 @@
 
 #include <stddef.h>
 
+#include "core/vec3.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -52,9 +54,16 @@ struct shim_zone {
     int zone, side;
 };
 
-/* place: degrees, degrees, metres. geoid may be NULL. NULL on failure, with the reason. */
-struct shim_map *shim_map_create(enum shim_kind kind, const double place[3], const struct shim_frame *frame,
-                                 const struct shim_zone *zone, const struct shim_geoid *geoid, char *why, size_t len);
+struct shim_spec {
+    enum shim_kind kind;
+    double place[3]; /* of the centre: degrees, degrees, metres above the ellipsoid */
+    struct shim_frame frame;
+    struct shim_zone zone;
+    const struct shim_geoid *geoid; /* NULL: heights above the ellipsoid */
+};
+
+/* NULL on failure, with the reason. */
+struct shim_map *shim_map_create(const struct shim_spec *spec, char *why, size_t len);
 /* The same frame and zone about another centre, given as difference in prcs. */
 struct shim_map *shim_map_recentre(const struct shim_map *map, const double d_prcs[3], char *why, size_t len);
 void shim_map_free(struct shim_map *map);
@@ -75,8 +84,7 @@ int shim_map_epsg(const struct shim_map *map);
 void shim_map_convergence(const struct shim_map *map, double *convergence_deg, double *scale);
 
 /* Differences in prcs from the centre <-> differences from the anchor. In place is allowed. */
-void shim_map_forward(const struct shim_map *map, size_t n, const double *dx, const double *dy, const double *dz,
-                      double *out_x, double *out_y, double *out_z);
+void shim_map_forward(const struct shim_map *map, size_t n, struct vec3_in d, struct vec3_out out);
 void shim_map_reverse(const struct shim_map *map, const double d_map[3], double d_prcs[3]);
 
 #ifdef __cplusplus

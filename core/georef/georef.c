@@ -131,11 +131,16 @@ static int set_up_map(struct georef *georef, const struct georef_spec *spec, con
                       struct sh_err *err)
 {
     char why[256] = "";
-    const double place[3] = {spec->lat_deg, spec->lon_deg, spec->height_m};
-    enum shim_kind kind = spec->crs == GEOREF_UTM ? SHIM_GRID : spec->crs == GEOREF_ECEF ? SHIM_ECEF : SHIM_GEODETIC;
-    const struct shim_zone zone = {spec->utm_zone, spec->side};
-    georef->map = shim_map_create(kind, place, frame, &zone,
-                                  spec->geoid != NULL ? georef_geoid_shim(spec->geoid) : NULL, why, sizeof why);
+    const struct shim_spec map = {
+        .kind = spec->crs == GEOREF_UTM    ? SHIM_GRID
+                : spec->crs == GEOREF_ECEF ? SHIM_ECEF
+                                           : SHIM_GEODETIC,
+        .place = {spec->lat_deg, spec->lon_deg, spec->height_m},
+        .frame = *frame,
+        .zone = {spec->utm_zone, spec->side},
+        .geoid = spec->geoid != NULL ? georef_geoid_shim(spec->geoid) : NULL,
+    };
+    georef->map = shim_map_create(&map, why, sizeof why);
     if (georef->map == NULL) return fail_map(spec, why, err);
     georef->has_geoid = spec->geoid != NULL;
     georef->from_grid = spec->prcs_is_grid;
@@ -310,30 +315,29 @@ double georef_bound_m(const struct georef *georef, enum georef_method method, do
     return EXACT_MAP_M + polynomial_bound_m(&georef->polynomial, order_of(method), radius_m, height_m, weight);
 }
 
-static void rotate(const double r[9], size_t n, const double *dx, const double *dy, const double *dz, double *out_x,
-                   double *out_y, double *out_z)
+static void rotate(const double r[9], size_t n, struct vec3_in d, struct vec3_out out)
 {
     for (size_t i = 0; i < n; i++) {
-        const double x = dx[i], y = dy[i], z = dz[i];
-        out_x[i] = r[0] * x + r[1] * y + r[2] * z;
-        out_y[i] = r[3] * x + r[4] * y + r[5] * z;
-        out_z[i] = r[6] * x + r[7] * y + r[8] * z;
+        const double x = d.x[i], y = d.y[i], z = d.z[i];
+        out.x[i] = r[0] * x + r[1] * y + r[2] * z;
+        out.y[i] = r[3] * x + r[4] * y + r[5] * z;
+        out.z[i] = r[6] * x + r[7] * y + r[8] * z;
     }
 }
 
-void georef_forward(const struct georef *georef, size_t n, const double *dx, const double *dy, const double *dz,
-                    double *out_x, double *out_y, double *out_z)
+void georef_forward(const struct georef *georef, size_t n, struct vec3_in d, struct vec3_out out)
 {
-    if (!georef_has_map(georef) && georef->crs != GEOREF_ECEF) {
-        memmove(out_x, dx, n * sizeof *out_x);
-        memmove(out_y, dy, n * sizeof *out_y);
-        memmove(out_z, dz, n * sizeof *out_z);
-    } else if (!georef_has_map(georef)) {
-        rotate(georef->rotation, n, dx, dy, dz, out_x, out_y, out_z);
-    } else if (georef->method == GEOREF_EXACT) {
-        shim_map_forward(georef->map, n, dx, dy, dz, out_x, out_y, out_z);
+    if (georef_has_map(georef)) {
+        if (georef->method == GEOREF_EXACT)
+            shim_map_forward(georef->map, n, d, out);
+        else
+            polynomial_apply(&georef->polynomial, order_of(georef->method), n, d, out);
+    } else if (georef->crs == GEOREF_ECEF) {
+        rotate(georef->rotation, n, d, out);
     } else {
-        polynomial_apply(&georef->polynomial, order_of(georef->method), n, dx, dy, dz, out_x, out_y, out_z);
+        memmove(out.x, d.x, n * sizeof *out.x);
+        memmove(out.y, d.y, n * sizeof *out.y);
+        memmove(out.z, d.z, n * sizeof *out.z);
     }
 }
 

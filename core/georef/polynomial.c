@@ -84,7 +84,8 @@ static void sample_meridian(const struct shim_map *map, const struct polynomial 
     for (int i = 0; i < CUBE; i++) {
         double d[3], enu[3] = {0.0, value[1][i], value[2][i]};
         mat3_apply_transposed(p->meridian.turn, enu, d);
-        shim_map_forward(map, 1, &d[0], &d[1], &d[2], &value[0][i], &value[1][i], &value[2][i]);
+        shim_map_forward(map, 1, (struct vec3_in){&d[0], &d[1], &d[2]},
+                         (struct vec3_out){&value[0][i], &value[1][i], &value[2][i]});
         if (fabs(value[1][i]) > 90.0) value[0][i] = 2.0 * (pole - place[0]) - value[0][i];
         value[1][i] = 0.0;
     }
@@ -119,7 +120,8 @@ void polynomial_fit(const struct shim_map *map, enum polynomial_form form, doubl
         shim_map_meridian(map, &out->meridian);
         sample_meridian(map, out, value);
     } else {
-        shim_map_forward(map, CUBE, value[0], value[1], value[2], value[0], value[1], value[2]);
+        shim_map_forward(map, CUBE, (struct vec3_in){value[0], value[1], value[2]},
+                         (struct vec3_out){value[0], value[1], value[2]});
     }
     int power[3] = {0, 0, 0};
     for (int t = 0; t < POLYNOMIAL_TERMS; t++) {

@@ -40,7 +40,6 @@ double polynomial_bound_m(const struct polynomial *p, int order, double radius_m
                           const double weight[3]);
 
 /* In place is allowed. */
-void polynomial_apply(const struct polynomial *p, int order, size_t n, const double *x, const double *y,
-                      const double *z, double *out_x, double *out_y, double *out_z);
+void polynomial_apply(const struct polynomial *p, int order, size_t n, struct vec3_in d, struct vec3_out out);
 
 #endif

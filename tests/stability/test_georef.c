@@ -48,14 +48,14 @@ static void order1(const struct georef_spec *spec, const struct georef *georef, 
     struct georef *own;
     if (georef_create(spec, &own, NULL) != SH_OK) fail_msg("no georef");
     assert_int_equal(georef_set_method(own, GEOREF_ORDER1, NULL), SH_OK);
-    georef_forward(own, 1, &d[0], &d[1], &d[2], &out[0], &out[1], &out[2]);
+    georef_forward(own, 1, (struct vec3_in){&d[0], &d[1], &d[2]}, (struct vec3_out){&out[0], &out[1], &out[2]});
     georef_free(own);
     (void)georef;
 }
 
 static void exactly(const struct georef *georef, const double d[3], double out[3])
 {
-    georef_forward(georef, 1, &d[0], &d[1], &d[2], &out[0], &out[1], &out[2]);
+    georef_forward(georef, 1, (struct vec3_in){&d[0], &d[1], &d[2]}, (struct vec3_out){&out[0], &out[1], &out[2]});
 }
 
 /* Positions as floats. */

@@ -47,7 +47,7 @@ static int see(const struct geoframe *frame, enum georef_crs crs, int zone, cons
     ok(georef_create(&spec, &georef, &err));
     for (int i = 0; i < 3; i++)
         d[i] = point_m[i] - station_m[i];
-    georef_forward(georef, 1, &d[0], &d[1], &d[2], &p[0], &p[1], &p[2]);
+    georef_forward(georef, 1, (struct vec3_in){&d[0], &d[1], &d[2]}, (struct vec3_out){&p[0], &p[1], &p[2]});
     double turn[9], linear[3];
     if (georef_rotation(georef, turn)) { /* the short way that casting takes */
         mat3_apply(turn, d, linear);
