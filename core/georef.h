@@ -55,17 +55,12 @@ struct georef_place {
     double height_m;         /* ellipsoidal */
 };
 
-/* Where a position in another system lies. zone 1..60, or 0: UPS; north: hemisphere of the false origin; easting and
- * northing with it; height ellipsoidal. SH_EINPUT: not finite, or outside of what UTMUPS takes. GeographicLib. */
-int georef_locate_utm(int zone, int north, double easting_m, double northing_m, double height_m,
-                      struct georef_place *out, struct sh_err *err);
+/* The place of a position in a grid: grid_m is easting and northing, with false origin, and ellipsoidal height. zone:
+ * 1..60, or 0: UPS; north: hemisphere of the false origin. SH_EINPUT: not finite, or outside of the grid. */
+int georef_locate_utm(int zone, int north, const double grid_m[3], struct georef_place *out, struct sh_err *err);
+/* The place of a position in ECEF, and back. NaN outside of -90..90 degrees of latitude. */
 int georef_locate_ecef(const double p_ecef[3], struct georef_place *out, struct sh_err *err);
-
-/* And back. Not-a-number outside of -90..90 degrees of latitude. zone 0: by position, and *zone_used 0 where that is
- * UPS; the three out-parameters may be NULL but grid (easting, northing, height). */
 void georef_geodetic_to_ecef(const struct georef_place *place, double p_ecef[3]);
-int georef_geodetic_to_utm(const struct georef_place *place, int zone, int *zone_used, int *north, double grid[3],
-                           struct sh_err *err);
 
 /* GeographicLib's geoid data (egm96-5 unless GEOGRAPHICLIB_GEOID_NAME says another), read into memory: 19 MB. SH_EINPUT
  * when it is not installed. */

@@ -61,9 +61,6 @@ struct map_layout {
 };
 void map_get_layout(const struct map *map, struct map_layout *layout);
 
-/* The pixel of a place: 1 and column and row in the image, or 0 when it lies outside the area. */
-int map_find_pixel(const struct map *map, double x_m, double y_m, uint32_t *column, uint32_t *row);
-
 /* Writes the image: to path.part beside it first, then renamed, so that path is whole or as it was. A map
  * without points is drawn as well. Errors name the path. */
 int map_write_png(const struct map *map, const char *path, struct sh_err *err);

@@ -99,15 +99,26 @@ void trajectory_free(struct trajectory *trajectory);
 void trajectory_span(const struct trajectory *trajectory, double *first_s, double *last_s);
 void trajectory_at(const struct trajectory *trajectory, double t_s, struct pose *pose, double *frame);
 
-/* The knots of a head that is mounted on the platform, from start_s (time 0 of the knots) to end_s or the trajectory's
- * end, whichever comes first: at
- * the samples, and as many between two as keep what pose_between makes of them within tolerance_m of the curve (closed
- * bound: acceleration and lever arm times interval^2 / 8; the attitude is the same). They are at most longest_ns apart
- * while the head goes on by longest_m, or turns by 0.01 rad, within that: where it hardly moves there are no more than
- * needed. Allocates *out. SH_EINPUT for more than POSE_MAX_KNOTS. error_m: the bound that holds, more than tolerance_m
- * only where POSE_MIN_STEP_US is the limit. */
-int trajectory_knots(const struct trajectory *trajectory, double start_s, double end_s, const struct pose *mount,
-                     double tolerance_m, int64_t longest_ns, double longest_m, struct pose_knot **out, size_t *n,
-                     double *error_m, struct sh_err *err);
+/* What the knots of a path have to keep. */
+struct pose_knot_rules {
+    double start_s, end_s; /* on the trajectory */
+    double tolerance_m;    /* between two knots pose_between may differ from the trajectory by this */
+    int64_t longest_ns;    /* two knots are at most so far apart ... */
+    double longest_m;      /* ... where the head moves further than this between them, or turns by over 0.01 rad */
+};
+
+struct pose_path {
+    struct pose_knot *knot; /* the first one at time 0 */
+    size_t n;
+    double
+        error_m; /* largest distance from the trajectory: closed bound, acceleration and lever arm times step^2 / 8 */
+};
+
+/* The path of a head that is mounted on the platform, from start_s (time 0 of the knots) to end_s or the trajectory's
+ * end, whichever comes first. There is a knot at each sample, and between two samples as many as the rules ask for;
+ * error_m is more than tolerance_m only where POSE_MIN_STEP_US is the limit. The caller frees out->knot. SH_EINPUT for
+ * more than POSE_MAX_KNOTS. */
+int trajectory_knots(const struct trajectory *trajectory, const struct pose *mount, const struct pose_knot_rules *rules,
+                     struct pose_path *out, struct sh_err *err);
 
 #endif

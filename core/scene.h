@@ -81,11 +81,19 @@ struct scene {
 int scene_load(const struct scene_mesh_spec *specs, size_t n_specs, double tolerance_m, const struct sh_report *report,
                struct scene **out, struct sh_err *err);
 
-/* Builds a scene from arrays (tests and generated scenes). Copies everything; same checks as scene_load.
- * label and surface may be NULL: then there is one surface, "object"/"material". */
-int scene_from_arrays(const double (*vertex_m)[3], uint32_t n_vertices, const uint32_t (*triangle)[3],
-                      uint32_t n_triangles, const uint16_t *label, const struct scene_surface *surface,
-                      uint32_t n_surfaces, struct scene **out, struct sh_err *err);
+/* A mesh as arrays. */
+struct scene_arrays {
+    const double (*vertex_m)[3]; /* [n_vertices] prcs */
+    uint32_t n_vertices;
+    const uint32_t (*triangle)[3]; /* [n_triangles] indices into vertex_m */
+    uint32_t n_triangles;
+    const uint16_t *label;               /* [n_triangles] index into surface; NULL: all 0 */
+    const struct scene_surface *surface; /* [n_surfaces] NULL: there is one, "object"/"material" */
+    uint32_t n_surfaces;
+};
+
+/* Builds a scene from arrays, all copied, with the checks of scene_load. */
+int scene_from_arrays(const struct scene_arrays *arrays, struct scene **out, struct sh_err *err);
 
 void scene_free(struct scene *scene);
 

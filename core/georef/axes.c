@@ -2,7 +2,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/georef/private.h"
+#include "core/georef/state.h"
 #include "core/mat3.h"
 
 /* Far enough for nanometres of rounding to be 1e-10 rad, near enough for a quadratic map to be linear by symmetry. */

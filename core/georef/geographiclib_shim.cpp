@@ -258,12 +258,13 @@ int shim_locate_utm(int zone, int north, const double grid[2], double lat_lon_de
                    [&] { UTMUPS::Reverse(zone, north != 0, grid[0], grid[1], lat_lon_deg[0], lat_lon_deg[1]); });
 }
 
-int shim_to_utm(const double lat_lon_deg[2], int *zone, int *north, double grid[2], char *why, size_t len)
+int shim_grid_at(const struct georef_place *place, int zone, struct locate_grid *out, char *why, size_t len)
 {
     return attempt(why, len, [&] {
-        bool n = false;
-        UTMUPS::Forward(lat_lon_deg[0], lat_lon_deg[1], *zone, n, grid[0], grid[1], utmups_zone(*zone));
-        *north = n;
+        bool north = false;
+        UTMUPS::Forward(place->lat_deg, place->lon_deg, out->zone, north, out->easting_m, out->northing_m,
+                        out->convergence_deg, out->scale, utmups_zone(zone));
+        out->north = north;
     });
 }
 
@@ -411,14 +412,4 @@ void shim_map_reverse(const struct shim_map *map, const double d_map[3], double 
     } catch (...) {
         d_prcs[0] = d_prcs[1] = d_prcs[2] = nan_m;
     }
-}
-
-int shim_utm_forward(double lat_deg, double lon_deg, int zone, struct shim_utm *out, char *why, size_t len)
-{
-    return attempt(why, len, [&] {
-        bool north = false;
-        UTMUPS::Forward(lat_deg, lon_deg, out->zone, north, out->easting_m, out->northing_m, out->convergence_deg,
-                        out->scale, utmups_zone(zone));
-        out->north = north;
-    });
 }

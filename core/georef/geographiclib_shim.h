@@ -1,10 +1,11 @@
-/* C view of what we use of GeographicLib. Private to core/georef. No exception crosses: each becomes a text, or
- * not-a-number. */
+/* What we use of GeographicLib, for C. Only the files of core/georef include this. Angles are in degrees, lengths in
+ * metres. No exception crosses: each becomes a text, or NaN. */
 #ifndef CORE_GEOREF_GEOGRAPHICLIB_SHIM_H
 #define CORE_GEOREF_GEOGRAPHICLIB_SHIM_H
 
 #include <stddef.h>
 
+#include "core/locate.h"
 #include "core/vec3.h"
 
 #ifdef __cplusplus
@@ -17,25 +18,17 @@ void shim_ecef(double lat_deg, double lon_deg, double height_m, double p_ecef[3]
 /* east, north, up at a place -> latitude, longitude, height. */
 void shim_geodetic(double lat_deg, double lon_deg, double height_m, const double d_local[3], double geodetic[3]);
 
-/* Geodetic place (degrees, degrees, metres) of a geocentric position; not-a-number on failure. */
+/* Geodetic place (degrees, degrees, metres) of a geocentric position; NaN on failure. */
 void shim_locate_ecef(const double p_ecef[3], double place[3]);
-/* UTM zone, or UPS for zone 0, to degrees and back: 0, or -1 with the reason. zone on the way there: 0 by
- * position, -1 UPS. */
+/* Easting and northing in a UTM zone, or in UPS for zone 0, to degrees: 0, or -1 with the reason. */
 int shim_locate_utm(int zone, int north, const double grid[2], double lat_lon_deg[2], char *why, size_t len);
-int shim_to_utm(const double lat_lon_deg[2], int *zone, int *north, double grid[2], char *why, size_t len);
+/* A place in a grid, zone as for locate_in_grid: 0, or -1 with the reason. */
+int shim_grid_at(const struct georef_place *place, int zone, struct locate_grid *out, char *why, size_t len);
 
 struct shim_geoid;
 /* The default geoid with cubic interpolation, wholly in memory. NULL on failure, with the reason. */
 struct shim_geoid *shim_geoid_open(char *why, size_t len);
 void shim_geoid_free(struct shim_geoid *geoid);
-
-/* A place in a grid (locate.c): 0, or -1 with the reason. */
-struct shim_utm {
-    int zone, north; /* zone 0: UPS */
-    double easting_m, northing_m, convergence_deg, scale;
-};
-/* zone: 1..60, 0: by position, or -1: UPS */
-int shim_utm_forward(double lat_deg, double lon_deg, int zone, struct shim_utm *out, char *why, size_t len);
 
 /* From the scene frame about a centre to a grid zone, geodetic coordinates or ECEF. */
 struct shim_map;

@@ -1,7 +1,7 @@
 /* Geoid heights, through GeographicLib's data files. */
 #include <stdlib.h>
 
-#include "core/georef/private.h"
+#include "core/georef/state.h"
 
 struct georef_geoid {
     struct shim_geoid *shim;

@@ -6,13 +6,10 @@
 
 #include "core/angle.h"
 #include "core/georef/geographiclib_shim.h"
-#include "core/georef/private.h"
+#include "core/georef/state.h"
+#include "core/locate.h"
 #include "core/mat3.h"
 #include "core/vec3.h"
-
-/* Lowest land and sea bed to the edge of space: beyond, a unit or a sign is wrong. */
-#define HEIGHT_MIN_M (-12000.0)
-#define HEIGHT_MAX_M 100000.0
 
 /* Polynomials are fitted within this; within 1/64 of the distance from the axis where longitude is one of their
  * outputs: its series converges within that distance. */
@@ -21,12 +18,6 @@
 #define FIT_LEAST_M 1.0
 /* Nearer to a pole there is no longitude to begin with. */
 #define AXIS_LEAST_M 1.0
-
-static int check_range(const char *what, double value, double min, double max, const char *unit, struct sh_err *err)
-{
-    if (value >= min && value <= max) return SH_OK; /* false for not-a-number */
-    return sh_fail(err, SH_EINPUT, "georef: %s %g %s; allowed %g to %g", what, value, unit, min, max);
-}
 
 static int check_spec(const struct georef_spec *spec, struct sh_err *err)
 {
@@ -37,9 +28,7 @@ static int check_spec(const struct georef_spec *spec, struct sh_err *err)
         return sh_fail(err, SH_EINPUT, "georef: coordinate reference system %d; allowed local, ecef, utm, geodetic",
                        (int)spec->crs);
     if (spec->crs == GEOREF_LOCAL) return SH_OK;
-    int rc = check_range("latitude", spec->lat_deg, -90, 90, "deg", err);
-    if (rc == SH_OK) rc = check_range("longitude", spec->lon_deg, -180, 360, "deg", err);
-    if (rc == SH_OK) rc = check_range("height", spec->height_m, HEIGHT_MIN_M, HEIGHT_MAX_M, "m", err);
+    int rc = locate_check(&(struct georef_place){spec->lat_deg, spec->lon_deg, spec->height_m}, err);
     if (rc == SH_OK && spec->crs == GEOREF_UTM && (spec->utm_zone < GEOREF_UPS || spec->utm_zone > 60))
         rc = sh_fail(err, SH_EINPUT, "georef: UTM zone %d; allowed 1 to 60, or 0: by position", spec->utm_zone);
     return rc;

@@ -6,13 +6,12 @@
 
 #include "core/georef/geographiclib_shim.h"
 
-/* As georef.c: lowest sea bed to the edge of space. */
-#define HEIGHT_MIN_M (-12000.0)
-#define HEIGHT_MAX_M 100000.0
+/* Lowest sea bed to the edge of space: beyond, a unit or a sign is wrong. */
+static const double HEIGHT_MIN_M = -12000.0, HEIGHT_MAX_M = 100000.0;
 
 int locate_check(const struct georef_place *place, struct sh_err *err)
 {
-    /* each is false for not-a-number */
+    /* each is false for NaN */
     if (!(fabs(place->lat_deg) <= 90.0))
         return sh_fail(err, SH_EINPUT, "latitude %.10g deg; allowed -90 to 90 deg", place->lat_deg);
     if (!(place->lon_deg >= -180.0 && place->lon_deg <= 360.0))
@@ -33,21 +32,11 @@ int locate_axes(const struct georef_place *place, double p_ecef[3], double rotat
 
 int locate_in_grid(const struct georef_place *place, int zone, struct locate_grid *out, struct sh_err *err)
 {
-    char why[256] = "";
-    struct shim_utm utm;
+    char why[256] = "", name[32];
     int rc = locate_check(place, err);
     if (rc != SH_OK) return rc;
-    char name[32];
     snprintf(name, sizeof name, zone == GEOREF_UPS ? "UPS" : "UTM zone %d", zone);
-    if (zone < GEOREF_UPS || zone > 60 ||
-        shim_utm_forward(place->lat_deg, place->lon_deg, zone, &utm, why, sizeof why) != 0)
-        return sh_fail(err, SH_EINPUT, "%s does not reach latitude %.10g, longitude %.10g%s%s%s", name, place->lat_deg,
-                       place->lon_deg, why[0] != '\0' ? " (" : "", why, why[0] != '\0' ? ")" : "");
-    *out = (struct locate_grid){.zone = utm.zone,
-                                .north = utm.north,
-                                .easting_m = utm.easting_m,
-                                .northing_m = utm.northing_m,
-                                .convergence_deg = utm.convergence_deg,
-                                .scale = utm.scale};
-    return SH_OK;
+    if (zone >= GEOREF_UPS && zone <= 60 && shim_grid_at(place, zone, out, why, sizeof why) == 0) return SH_OK;
+    return sh_fail(err, SH_EINPUT, "%s does not reach latitude %.10g, longitude %.10g%s%s%s", name, place->lat_deg,
+                   place->lon_deg, why[0] != '\0' ? " (" : "", why, why[0] != '\0' ? ")" : "");
 }

@@ -2,7 +2,7 @@
 #include <math.h>
 
 #include "core/angle.h"
-#include "core/georef/private.h"
+#include "core/georef/state.h"
 
 /* Half a count less than 2^31, for rounding; -2^31 says that there is no point. */
 static const double MOST_COUNTS = 2147483646.5;

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 
 #include "core/georef/polynomial_kernels.h"
-#include "core/georef/private.h"
+#include "core/georef/state.h"
 #include "core/rng.h"
 #include "tests/bench/bench.h"
 #include "tests/bench/pin.h"

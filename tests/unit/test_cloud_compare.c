@@ -23,7 +23,8 @@ static struct scene *make_plate(void)
                                                     {.object = "floor", .material = "pine"}};
     struct scene *s;
     struct sh_err err;
-    if (scene_from_arrays(v, 4, t, 2, label, surface, 3, &s, &err) != SH_OK) fail_msg("%s", err.text);
+    if (scene_from_arrays(&(struct scene_arrays){v, 4, t, 2, label, surface, 3}, &s, &err) != SH_OK)
+        fail_msg("%s", err.text);
     return s;
 }
 

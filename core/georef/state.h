@@ -1,6 +1,6 @@
-/* Shared within core/georef. */
-#ifndef CORE_GEOREF_PRIVATE_H
-#define CORE_GEOREF_PRIVATE_H
+/* What a georef consists of. Read by the files of core/georef alone. */
+#ifndef CORE_GEOREF_STATE_H
+#define CORE_GEOREF_STATE_H
 
 #include "core/georef.h"
 #include "core/georef/polynomial.h"
