@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/analysis/map_private.h"
+#include "core/analysis/map_inside.h"
 
 /* A level must be higher than noise and slope of a floor within one pixel. */
 #define LEVEL_MIN_M 0.1

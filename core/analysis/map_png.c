@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/analysis/map_private.h"
+#include "core/analysis/map_inside.h"
 
 /* libpng reports by a callback that must not return; the reason is kept for the error text. */
 struct png_reason {

@@ -7,7 +7,7 @@
 #include <strings.h>
 #include <sys/stat.h>
 
-#include "core/scene/scene_build.h"
+#include "core/scene/build.h"
 
 static const struct {
     const char *ending;

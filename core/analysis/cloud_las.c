@@ -1,5 +1,5 @@
 /* LAS 1.2 to 1.4 (ASPRS), point formats 0 to 10, not compressed. */
-#include "core/analysis/read_las.h"
+#include "core/analysis/cloud_las.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,11 +1,11 @@
 /* LAS files as clouds; the part of cloud_read that knows them. */
-#ifndef CORE_ANALYSIS_READ_LAS_H
-#define CORE_ANALYSIS_READ_LAS_H
+#ifndef CORE_ANALYSIS_CLOUD_LAS_H
+#define CORE_ANALYSIS_CLOUD_LAS_H
 
 #include <stdbool.h>
 
 #include "core/cloud.h"
-#include "core/scene/text.h"
+#include "core/text.h"
 
 /* Does the file begin as a LAS file? */
 bool cloud_is_las(const char *path);

@@ -1,4 +1,4 @@
-#include "core/scene/scene_build.h"
+#include "core/scene/build.h"
 
 #include <math.h>
 #include <search.h>
@@ -40,6 +40,8 @@ void build_release(struct scene_build *b)
     if (b->surface_tree != NULL) tdestroy(b->surface_tree, keep_surface);
     b->surface_tree = NULL;
     triangulate_free(&b->polygon);
+    free(b->corner);
+    free(b->corner_uv);
     scene_free(b->scene);
     b->scene = NULL;
 }
@@ -57,7 +59,7 @@ void build_begin_file(struct scene_build *b, const struct scene_mesh_spec *spec)
     b->vertex0 = b->mesh_vertex0 = b->scene->n_vertices;
     b->triangle0 = b->scene->n_triangles;
     b->counts = (struct scene_counts){0};
-    b->corner_uv = NULL;
+    b->has_uv = false;
     b->not_simple = 0;
     b->file_ns = now_ns();
 }
@@ -280,30 +282,48 @@ static int add_triangle(struct scene_build *b, const uint32_t corner[3], const f
 
 int build_triangle(struct scene_build *b, const uint32_t corner[3], uint16_t label, struct sh_err *err)
 {
-    return add_triangle(b, corner, b->corner_uv != NULL ? b->corner_uv : no_uv, label, err);
+    return add_triangle(b, corner, no_uv, label, err);
 }
 
-int build_polygon(struct scene_build *b, const uint32_t *corner, size_t n, uint16_t label, struct sh_err *err)
+int build_corners(struct scene_build *b, size_t n, struct sh_err *err)
 {
-    if (n == 3) return build_triangle(b, corner, label, err);
+    if (n <= b->cap_corners) return SH_OK;
+    size_t cap = n + n / 2 + 16;
+    void *corner = realloc(b->corner, cap * sizeof *b->corner);
+    if (corner != NULL) b->corner = corner;
+    void *uv = realloc(b->corner_uv, cap * sizeof *b->corner_uv);
+    if (uv != NULL) b->corner_uv = uv;
+    if (corner == NULL || uv == NULL) return build_fail(b, SH_ENOMEM, err, "no memory for a face of %zu corners", n);
+    b->cap_corners = cap;
+    return SH_OK;
+}
+
+static int add_corners(struct scene_build *b, const uint32_t at[3], uint16_t label, struct sh_err *err)
+{
+    uint32_t corner[3];
+    float uv[3][2];
+    for (int k = 0; k < 3; k++) {
+        corner[k] = b->corner[at[k]];
+        if (b->has_uv) memcpy(uv[k], b->corner_uv[at[k]], sizeof uv[k]);
+    }
+    return add_triangle(b, corner, b->has_uv ? (const float(*)[2])uv : no_uv, label, err);
+}
+
+int build_polygon(struct scene_build *b, size_t n, uint16_t label, struct sh_err *err)
+{
+    if (n == 3) return add_corners(b, (const uint32_t[3]){0, 1, 2}, label, err);
     if (n > SCENE_MAX_CORNERS)
         return build_fail(b, SH_EINPUT, err, "a polygon has %zu corners; allowed are up to %d", n, SCENE_MAX_CORNERS);
     struct triangulate *t = &b->polygon;
     if (triangulate_reserve(t, n) != SH_OK)
         return build_fail(b, SH_ENOMEM, err, "no memory for a polygon of %zu corners", n);
     for (size_t i = 0; i < n; i++)
-        memcpy(t->p[i], b->scene->vertex_m[corner[i]], sizeof *t->p);
+        memcpy(t->p[i], b->scene->vertex_m[b->corner[i]], sizeof *t->p);
     triangulate_polygon(t, (uint32_t)n);
     if (!t->simple) b->not_simple++;
     int rc = SH_OK;
-    for (size_t i = 0; i + 2 < n && rc == SH_OK; i++) {
-        const uint32_t *c = t->triangle[i];
-        float uv[3][2];
-        for (int k = 0; b->corner_uv != NULL && k < 3; k++)
-            memcpy(uv[k], b->corner_uv[c[k]], sizeof uv[k]);
-        rc = add_triangle(b, (uint32_t[3]){corner[c[0]], corner[c[1]], corner[c[2]]},
-                          b->corner_uv != NULL ? (const float(*)[2])uv : no_uv, label, err);
-    }
+    for (size_t i = 0; i + 2 < n && rc == SH_OK; i++)
+        rc = add_corners(b, t->triangle[i], label, err);
     return rc;
 }
 
@@ -318,10 +338,9 @@ void build_announce(struct scene_build *b)
     tell(b, -1);
 }
 
-void build_base_name(const struct scene_build *b, const char **name, size_t *len)
+struct text_span build_base_name(const struct scene_build *b)
 {
-    const char *slash = strrchr(b->spec->file, '/');
-    *name = slash != NULL ? slash + 1 : b->spec->file;
-    const char *dot = strrchr(*name, '.');
-    *len = dot != NULL && dot > *name ? (size_t)(dot - *name) : strlen(*name);
+    const char *slash = strrchr(b->spec->file, '/'), *name = slash != NULL ? slash + 1 : b->spec->file;
+    const char *dot = strrchr(name, '.');
+    return (struct text_span){name, dot != NULL && dot > name ? (size_t)(dot - name) : strlen(name)};
 }

@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/analysis/read_las.h"
-#include "core/scene/ply_rows.h"
+#include "core/analysis/cloud_las.h"
+#include "core/ply.h"
 
 struct reading {
     struct ply_rows r;
@@ -28,9 +28,7 @@ static int64_t find_epsg(const struct text *file)
     int64_t epsg = CLOUD_EPSG_UNKNOWN, number;
     t.end = file->p;
     for (t.p = t.data; t.p < t.end; text_next_line(&t)) {
-        const char *word;
-        if (text_word(&t, &word) != 7 || memcmp(word, "comment", 7) != 0) continue;
-        if (text_word(&t, &word) != 4 || memcmp(word, "epsg", 4) != 0) continue;
+        if (!text_is(text_word(&t), "comment") || !text_is(text_word(&t), "epsg")) continue;
         text_skip_blanks(&t);
         if (text_integer(&t, &number) && number >= 0 && text_at_word_end(&t)) epsg = number;
     }
@@ -54,7 +52,7 @@ static int reserve(struct reading *g, const struct ply_element *e, struct sh_err
     return SH_OK;
 }
 
-static int whole(struct reading *g, enum ply_use use, const char *name, int min, int max, int *out, struct sh_err *err)
+static int whole(struct reading *g, enum ply_use use, int min, int max, int *out, struct sh_err *err)
 {
     double v = g->r.scalar[use];
     if (v >= min && v <= max && v == floor(v)) {
@@ -62,8 +60,8 @@ static int whole(struct reading *g, enum ply_use use, const char *name, int min,
         return SH_OK;
     }
     char what[96];
-    snprintf(what, sizeof what, "%s %.9g; allowed are whole numbers from %d to %d", name, v, min, max);
-    return ply_rows_fail(&g->r, err, what);
+    snprintf(what, sizeof what, "%s %.9g; allowed are whole numbers from %d to %d", ply_scalar_name[use], v, min, max);
+    return ply_fail(&g->r, err, what);
 }
 
 static int keep_point(struct reading *g, struct sh_err *err)
@@ -76,12 +74,12 @@ static int keep_point(struct reading *g, struct sh_err *err)
         char what[112];
         snprintf(what, sizeof what, "(%.9g %.9g %.9g) is no position; a shot without echo has three times nan", p[0],
                  p[1], p[2]);
-        return ply_rows_fail(&g->r, err, what);
+        return ply_fail(&g->r, err, what);
     }
     int rc = SH_OK, station = 0, label = 0, echo = 0;
-    if (c->station != NULL) rc = whole(g, PLY_STATION, "station", 1, UINT16_MAX, &station, err);
-    if (c->label != NULL && rc == SH_OK) rc = whole(g, PLY_LABEL, "label", 0, UINT16_MAX, &label, err);
-    if (c->echo != NULL && rc == SH_OK) rc = whole(g, PLY_ECHO, "echo", 0, UINT8_MAX, &echo, err);
+    if (c->station != NULL) rc = whole(g, PLY_STATION, 1, UINT16_MAX, &station, err);
+    if (c->label != NULL && rc == SH_OK) rc = whole(g, PLY_LABEL, 0, UINT16_MAX, &label, err);
+    if (c->echo != NULL && rc == SH_OK) rc = whole(g, PLY_ECHO, 0, UINT8_MAX, &echo, err);
     if (rc != SH_OK) return rc;
     memcpy(c->xyz_m[i], p, sizeof c->xyz_m[i]);
     if (c->station != NULL) c->station[i] = (uint16_t)station;
@@ -112,7 +110,7 @@ static void warn_if_coarse(const struct reading *g, const struct ply_element *e)
 
 static int read_element(struct reading *g, int i, struct sh_err *err)
 {
-    int rc = ply_rows_begin(&g->r, i, err);
+    int rc = ply_begin(&g->r, i, err);
     const struct ply_element *e = g->r.element;
     bool points = e->kind == PLY_VERTEX;
     if (rc == SH_OK && points) rc = reserve(g, e, err);
@@ -120,9 +118,9 @@ static int read_element(struct reading *g, int i, struct sh_err *err)
         sh_warn(g->report, "%s: element '%s' (%llu of it) passed over", g->r.t.path, e->name,
                 (unsigned long long)e->count);
     for (; g->r.row < e->count && rc == SH_OK; g->r.row++) {
-        rc = ply_rows_read(&g->r, err);
+        rc = ply_read(&g->r, err);
         if (rc == SH_OK && points) rc = keep_point(g, err);
-        if ((g->r.row & 0xffff) == 0) sh_progress(g->report, READING, ply_rows_fraction(&g->r));
+        if ((g->r.row & 0xffff) == 0) sh_progress(g->report, READING, ply_fraction(&g->r));
     }
     if (rc == SH_OK && points) warn_if_coarse(g, e);
     return rc;
@@ -140,7 +138,7 @@ static int read_body(struct reading *g, struct sh_err *err)
         int rc = read_element(g, i, err);
         if (rc != SH_OK) return rc;
     }
-    size_t left_over = ply_rows_left_over(&g->r);
+    size_t left_over = ply_left_over(&g->r);
     if (left_over > 0) sh_warn(g->report, "%s: %zu bytes after the last element passed over", g->r.t.path, left_over);
     return SH_OK;
 }
@@ -151,9 +149,9 @@ static int read_ply(const char *path, const struct sh_report *report, struct clo
     if (g == NULL) return sh_fail(err, SH_ENOMEM, "no memory to read %s", path);
     g->cloud = out;
     g->report = report;
-    int rc = ply_rows_open(&g->r, path, tick, g, err);
+    int rc = ply_open(&g->r, path, tick, g, err);
     if (rc == SH_OK) rc = read_body(g, err);
-    ply_rows_close(&g->r);
+    ply_close(&g->r);
     free(g);
     return rc;
 }
