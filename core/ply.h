@@ -1,7 +1,7 @@
 /* Reading PLY files, as meshes (core/scene/read_ply.c) or points (core/analysis/cloud_ply.c): text, or binary of either
  * byte order, with numbers of any type. In: a file. Out: its elements, and their rows one after the other as doubles.
  *
- * Order of calls: ply_open; for each element ply_begin, then ply_read for each of its rows; ply_close. */
+ * Order of calls: ply_open, ply_walk, ply_close. */
 #ifndef CORE_PLY_H
 #define CORE_PLY_H
 
@@ -72,12 +72,18 @@ struct ply_rows {
 int ply_open(struct ply_rows *r, const char *path, void (*tick)(void *ctx), void *ctx, struct sh_err *err);
 void ply_close(struct ply_rows *r);
 
-/* Goes to element i, which has to follow the one before; fails when the rest of the file can't hold its rows.
- */
-int ply_begin(struct ply_rows *r, int i, struct sh_err *err);
+/* Who takes the rows. */
+struct ply_user {
+    void *ctx;
+    int (*begin)(void *ctx, struct sh_err *err); /* before the rows of r->element, whose count fits into the file */
+    int (*row)(void *ctx, struct sh_err *err);   /* after each row, which is in r; row r->row of the element */
+    void (*progress)(void *ctx, double fraction);
+    const struct sh_report *report; /* gets warnings */
+    bool has_faces;                 /* faces are used, not passed over */
+};
 
-/* Reads row r->row; counting on is the caller's. */
-int ply_read(struct ply_rows *r, struct sh_err *err);
+/* Reads all rows in the order of the file. Warns of elements that nobody uses, and of bytes after the last row. */
+int ply_walk(struct ply_rows *r, const struct ply_user *user, struct sh_err *err);
 
 /* Fails with "FILE, line L: ELEMENT N of M: what", or the byte instead of the line in a binary. */
 int ply_fail(const struct ply_rows *r, struct sh_err *err, const char *what);
@@ -85,10 +91,8 @@ int ply_fail(const struct ply_rows *r, struct sh_err *err, const char *what);
 /* The line of a text, 0 in a binary. */
 uint64_t ply_line(const struct ply_rows *r);
 
-/* How much of the file is read, 0..1. */
-double ply_fraction(const struct ply_rows *r);
-
-/* Bytes after the last row, blank lines of a text aside. */
-size_t ply_left_over(struct ply_rows *r);
+/* Are x, y or z of r->element, a vertex, stored in single precision? Their numbers are read as they stand, but what they
+ * stood for was rounded. */
+bool ply_is_single(const struct ply_rows *r);
 
 #endif

@@ -1,27 +1,20 @@
-#include "core/cloud.h"
-
+/* Points from a PLY file. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/analysis/cloud_las.h"
+#include "core/analysis/cloud_readers.h"
 #include "core/ply.h"
 
 struct reading {
     struct ply_rows r;
     struct cloud *cloud;
     const struct sh_report *report;
+    bool is_single;
 };
 
-static const char *const READING = "reading the points";
-
-static void tick(void *reading)
-{
-    sh_progress(((struct reading *)reading)->report, READING, -1);
-}
-
-/* The recorder tells the coordinate reference system in a comment; other files don't, which is no fault. */
+/* Our recorder writes the coordinate reference system as a comment. Other files lack it, which is no fault. */
 static int64_t find_epsg(const struct text *file)
 {
     struct text t = *file;
@@ -33,23 +26,6 @@ static int64_t find_epsg(const struct text *file)
         if (text_integer(&t, &number) && number >= 0 && text_at_word_end(&t)) epsg = number;
     }
     return epsg;
-}
-
-static int reserve(struct reading *g, const struct ply_element *e, struct sh_err *err)
-{
-    struct cloud *c = g->cloud;
-    size_t n = (size_t)e->count; /* checked against the file's size */
-    bool station = ply_find(&g->r.h, e, PLY_STATION), label = ply_find(&g->r.h, e, PLY_LABEL),
-         echo = ply_find(&g->r.h, e, PLY_ECHO);
-    if (n == 0) return SH_OK;
-    c->xyz_m = calloc(n, sizeof *c->xyz_m);
-    if (station) c->station = calloc(n, sizeof *c->station);
-    if (label) c->label = calloc(n, sizeof *c->label);
-    if (echo) c->echo = calloc(n, sizeof *c->echo);
-    if (c->xyz_m == NULL || (station && !c->station) || (label && !c->label) || (echo && !c->echo))
-        return text_fail(&g->r.t, 0, SH_ENOMEM, err, "no memory for %zu points", n);
-    c->n = n;
-    return SH_OK;
 }
 
 static int whole(struct reading *g, enum ply_use use, int min, int max, int *out, struct sh_err *err)
@@ -64,8 +40,10 @@ static int whole(struct reading *g, enum ply_use use, int min, int max, int *out
     return ply_fail(&g->r, err, what);
 }
 
-static int keep_point(struct reading *g, struct sh_err *err)
+static int keep_point(void *reading, struct sh_err *err)
 {
+    struct reading *g = reading;
+    if (g->r.element->kind != PLY_VERTEX) return SH_OK;
     struct cloud *c = g->cloud;
     size_t i = (size_t)g->r.row;
     const double *p = &g->r.scalar[PLY_X];
@@ -88,18 +66,10 @@ static int keep_point(struct reading *g, struct sh_err *err)
     return SH_OK;
 }
 
-/* Numbers kept as float are read as they stand, yet what they stood for was rounded: a quarter of a metre for
- * a northing. */
-static void warn_if_coarse(const struct reading *g, const struct ply_element *e)
+static void warn_if_coarse(const struct reading *g)
 {
     const double worth_a_word_m = 1e-4;
-    bool is_float = false;
     double largest = 0;
-    for (int i = e->first; i < e->first + e->n_properties; i++) {
-        const struct ply_property *p = &g->r.h.property[i];
-        is_float |= p->use >= PLY_X && p->use <= PLY_Z && p->type == PLY_FLOAT;
-    }
-    if (!is_float || g->r.h.format == PLY_ASCII) return;
     for (size_t i = 0; i < g->cloud->n; i++)
         for (int k = 0; k < 3; k++)
             largest = fmax(largest, fabs(g->cloud->xyz_m[i][k]));
@@ -108,42 +78,45 @@ static void warn_if_coarse(const struct reading *g, const struct ply_element *e)
         sh_warn(g->report, "%s: stored in single precision, so good to %.2g m only", g->r.t.path, largest * 6e-8);
 }
 
-static int read_element(struct reading *g, int i, struct sh_err *err)
+static int begin_element(void *reading, struct sh_err *err)
 {
-    int rc = ply_begin(&g->r, i, err);
+    struct reading *g = reading;
     const struct ply_element *e = g->r.element;
-    bool points = e->kind == PLY_VERTEX;
-    if (rc == SH_OK && points) rc = reserve(g, e, err);
-    if (rc == SH_OK && !points && e->count > 0)
-        sh_warn(g->report, "%s: element '%s' (%llu of it) passed over", g->r.t.path, e->name,
-                (unsigned long long)e->count);
-    for (; g->r.row < e->count && rc == SH_OK; g->r.row++) {
-        rc = ply_read(&g->r, err);
-        if (rc == SH_OK && points) rc = keep_point(g, err);
-        if ((g->r.row & 0xffff) == 0) sh_progress(g->report, READING, ply_fraction(&g->r));
-    }
-    if (rc == SH_OK && points) warn_if_coarse(g, e);
-    return rc;
+    const struct ply_header *h = &g->r.h;
+    if (e->kind != PLY_VERTEX) return SH_OK;
+    g->is_single = ply_is_single(&g->r);
+    return cloud_reserve(g->cloud, (size_t)e->count, /* checked against the file's size */
+                         (ply_find(h, e, PLY_STATION) ? CLOUD_HAS_STATION : 0) |
+                             (ply_find(h, e, PLY_LABEL) ? CLOUD_HAS_LABEL : 0) |
+                             (ply_find(h, e, PLY_ECHO) ? CLOUD_HAS_ECHO : 0),
+                         err);
+}
+
+static void progress(void *reading, double fraction)
+{
+    sh_progress(((struct reading *)reading)->report, "reading the points", fraction);
+}
+
+static void tick(void *reading)
+{
+    progress(reading, -1);
 }
 
 static int read_body(struct reading *g, struct sh_err *err)
 {
+    const struct ply_user user = {g, begin_element, keep_point, progress, g->report, .has_faces = false};
     const struct ply_header *h = &g->r.h;
     bool has_points = false;
     g->cloud->epsg = find_epsg(&g->r.t);
     for (int i = 0; i < h->n_elements; i++)
         has_points |= h->element[i].kind == PLY_VERTEX;
     if (!has_points) return text_fail(&g->r.t, 0, SH_EINPUT, err, "no element vertex: there are no points");
-    for (int i = 0; i < h->n_elements; i++) {
-        int rc = read_element(g, i, err);
-        if (rc != SH_OK) return rc;
-    }
-    size_t left_over = ply_left_over(&g->r);
-    if (left_over > 0) sh_warn(g->report, "%s: %zu bytes after the last element passed over", g->r.t.path, left_over);
-    return SH_OK;
+    int rc = ply_walk(&g->r, &user, err);
+    if (rc == SH_OK && g->is_single) warn_if_coarse(g);
+    return rc;
 }
 
-static int read_ply(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err)
+int cloud_read_ply(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err)
 {
     struct reading *g = calloc(1, sizeof *g);
     if (g == NULL) return sh_fail(err, SH_ENOMEM, "no memory to read %s", path);
@@ -154,21 +127,4 @@ static int read_ply(const char *path, const struct sh_report *report, struct clo
     ply_close(&g->r);
     free(g);
     return rc;
-}
-
-int cloud_read(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err)
-{
-    *out = (struct cloud){.epsg = CLOUD_EPSG_UNKNOWN};
-    int rc = cloud_is_las(path) ? cloud_read_las(path, report, out, err) : read_ply(path, report, out, err);
-    if (rc != SH_OK) cloud_free(out);
-    return rc;
-}
-
-void cloud_free(struct cloud *cloud)
-{
-    free(cloud->xyz_m);
-    free(cloud->station);
-    free(cloud->label);
-    free(cloud->echo);
-    *cloud = (struct cloud){.epsg = CLOUD_EPSG_UNKNOWN};
 }

@@ -22,7 +22,7 @@ using GeographicLib::PolarStereographic;
 using GeographicLib::TransverseMercator;
 using GeographicLib::UTMUPS;
 
-struct shim_geoid {
+struct georef_geoid {
     Geoid geoid;
 };
 
@@ -74,7 +74,7 @@ struct shim_map {
     double in_x0, in_y0;  /* of the centre */
     /* out */
     shim_kind kind;
-    const shim_geoid *geoid;
+    const georef_geoid *geoid;
     shim_grid grid;
     double place[3];  /* of the centre */
     double anchor[3]; /* of the centre, with false origin */
@@ -268,14 +268,14 @@ int shim_grid_at(const struct georef_place *place, int zone, struct locate_grid 
     });
 }
 
-struct shim_geoid *shim_geoid_open(char *why, size_t len)
+struct georef_geoid *shim_geoid_open(char *why, size_t len)
 {
-    struct shim_geoid *geoid = nullptr;
-    attempt(why, len, [&] { geoid = new shim_geoid{Geoid(Geoid::DefaultGeoidName(), "", true, true)}; });
+    struct georef_geoid *geoid = nullptr;
+    attempt(why, len, [&] { geoid = new georef_geoid{Geoid(Geoid::DefaultGeoidName(), "", true, true)}; });
     return geoid;
 }
 
-void shim_geoid_free(struct shim_geoid *geoid)
+void georef_geoid_free(struct georef_geoid *geoid)
 {
     delete geoid;
 }

@@ -5,12 +5,12 @@
 
 #include <stddef.h>
 
-#include "core/locate.h"
-#include "core/vec3.h"
-
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+#include "core/locate.h"
+#include "core/vec3.h"
 
 /* WGS 84 geocentric position, and the rotation (row by row) of east, north, up at it to X, Y, Z. */
 void shim_ecef(double lat_deg, double lon_deg, double height_m, double p_ecef[3], double rotation[9]);
@@ -25,10 +25,8 @@ int shim_locate_utm(int zone, int north, const double grid[2], double lat_lon_de
 /* A place in a grid, zone as for locate_in_grid: 0, or -1 with the reason. */
 int shim_grid_at(const struct georef_place *place, int zone, struct locate_grid *out, char *why, size_t len);
 
-struct shim_geoid;
 /* The default geoid with cubic interpolation, wholly in memory. NULL on failure, with the reason. */
-struct shim_geoid *shim_geoid_open(char *why, size_t len);
-void shim_geoid_free(struct shim_geoid *geoid);
+struct georef_geoid *shim_geoid_open(char *why, size_t len);
 
 /* From the scene frame about a centre to a grid zone, geodetic coordinates or ECEF. */
 struct shim_map;
@@ -52,7 +50,7 @@ struct shim_spec {
     double place[3]; /* of the centre: degrees, degrees, metres above the ellipsoid */
     struct shim_frame frame;
     struct shim_zone zone;
-    const struct shim_geoid *geoid; /* NULL: heights above the ellipsoid */
+    const struct georef_geoid *geoid; /* NULL: heights above the ellipsoid */
 };
 
 /* NULL on failure, with the reason. */

@@ -34,11 +34,6 @@ static int check_spec(const struct georef_spec *spec, struct sh_err *err)
     return rc;
 }
 
-int georef_has_map(const struct georef *georef)
-{
-    return georef->map != NULL;
-}
-
 /* What differs from a unit matrix is wrong by more than rounding. */
 static int check_rotation(const double r[9], struct sh_err *err)
 {
@@ -127,7 +122,7 @@ static int set_up_map(struct georef *georef, const struct georef_spec *spec, con
         .place = {spec->lat_deg, spec->lon_deg, spec->height_m},
         .frame = *frame,
         .zone = {spec->utm_zone, spec->side},
-        .geoid = spec->geoid != NULL ? georef_geoid_shim(spec->geoid) : NULL,
+        .geoid = spec->geoid,
     };
     georef->map = shim_map_create(&map, why, sizeof why);
     if (georef->map == NULL) return fail_map(spec, why, err);

@@ -147,10 +147,9 @@ static double parts_of(const struct trajectory *tr, size_t i, const struct pose_
                        double *error_m)
 {
     const struct pose *a = &tr->sample[i].pose, *b = &tr->sample[i + 1].pose;
-    double h = tr->sample[i + 1].t_s - tr->sample[i].t_s, turn = pose_angle_between(a->quat, b->quat), chord2 = 0.0;
-    for (int k = 0; k < 3; k++)
-        chord2 += (b->position_m[k] - a->position_m[k]) * (b->position_m[k] - a->position_m[k]);
-    double moves = fmax((sqrt(chord2) + turn * arm_m) / rules->longest_m, turn / LONGEST_RAD);
+    double h = tr->sample[i + 1].t_s - tr->sample[i].t_s, turn = pose_angle_between(a->quat, b->quat);
+    double moves = fmax((trajectory_chord_m(&tr->sample[i], &tr->sample[i + 1]) + turn * arm_m) / rules->longest_m,
+                        turn / LONGEST_RAD);
     double sag = (acceleration(tr, i) + turn / h * turn / h * arm_m) * h * h / 8.0; /* in one part */
     double longest_s = 1e-9 * (double)rules->longest_ns;
     double parts = fmax(ceil(sqrt(sag / rules->tolerance_m)), fmin(ceil(h / longest_s * (1.0 - 1e-9)), ceil(moves)));

@@ -9,6 +9,7 @@
 #include <time.h>
 
 #include "core/huge.h"
+#include "core/vec3.h"
 
 static const double MAX_COORDINATE_M = 1e9;
 
@@ -238,10 +239,9 @@ static bool has_area(const double *a, const double *b, const double *c)
         v[k] = c[k] - a[k];
         w[k] = c[k] - b[k];
     }
-    double n[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
-    double longest2 = fmax(u[0] * u[0] + u[1] * u[1] + u[2] * u[2], v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-    longest2 = fmax(longest2, w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
-    return sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]) > 1e-12 * longest2;
+    double n[3], longest2 = fmax(fmax(vec3_dot(u, u), vec3_dot(v, v)), vec3_dot(w, w));
+    vec3_cross(u, v, n);
+    return sqrt(vec3_dot(n, n)) > 1e-12 * longest2;
 }
 
 static const float no_uv[3][2] = {{NAN, NAN}, {NAN, NAN}, {NAN, NAN}};

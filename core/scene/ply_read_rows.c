@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/grow.h"
+
 int ply_open(struct ply_rows *r, const char *path, void (*tick)(void *ctx), void *ctx, struct sh_err *err)
 {
     *r = (struct ply_rows){0};
@@ -22,11 +24,6 @@ void ply_close(struct ply_rows *r)
 uint64_t ply_line(const struct ply_rows *r)
 {
     return r->h.format == PLY_ASCII ? r->t.line : 0;
-}
-
-double ply_fraction(const struct ply_rows *r)
-{
-    return (double)(r->t.p - r->t.data) / (double)r->t.size;
 }
 
 /* Where a text goes wrong is its line; in a binary it is the byte. */
@@ -82,13 +79,8 @@ static int read_scalar(struct ply_rows *r, enum ply_type type, double *value, st
 
 static int keep_corner(struct ply_rows *r, double value, struct sh_err *err)
 {
-    if (r->n_corners == r->cap_corners) {
-        size_t cap = r->cap_corners * 2 + 16;
-        void *corner = realloc(r->corner, cap * sizeof *r->corner);
-        if (corner == NULL) return text_fail(&r->t, ply_line(r), SH_ENOMEM, err, "no memory for a face");
-        r->corner = corner;
-        r->cap_corners = cap;
-    }
+    if (!grow(&r->corner, &r->cap_corners, r->n_corners + 1, sizeof *r->corner))
+        return text_fail(&r->t, ply_line(r), SH_ENOMEM, err, "no memory for a face");
     r->corner[r->n_corners++] = value;
     return SH_OK;
 }
@@ -114,7 +106,7 @@ static void skip_blank_lines(struct text *t)
         text_next_line(t);
 }
 
-int ply_read(struct ply_rows *r, struct sh_err *err)
+static int read_row(struct ply_rows *r, struct sh_err *err)
 {
     const struct ply_element *e = r->element;
     r->n_corners = 0;
@@ -133,7 +125,7 @@ int ply_read(struct ply_rows *r, struct sh_err *err)
     return ply_fail(r, err, "there are more values than the header says");
 }
 
-int ply_begin(struct ply_rows *r, int i, struct sh_err *err)
+static int begin(struct ply_rows *r, int i, struct sh_err *err)
 {
     const struct ply_element *e = r->element = &r->h.element[i];
     r->row = 0;
@@ -149,8 +141,42 @@ int ply_begin(struct ply_rows *r, int i, struct sh_err *err)
                      (unsigned long long)e->count, e->name, (unsigned long long)least, (unsigned long long)rest);
 }
 
-size_t ply_left_over(struct ply_rows *r)
+bool ply_is_single(const struct ply_rows *r)
 {
+    const struct ply_element *e = r->element;
+    bool is_float = false;
+    for (int i = e->first; i < e->first + e->n_properties; i++) {
+        const struct ply_property *p = &r->h.property[i];
+        is_float |= p->use >= PLY_X && p->use <= PLY_Z && p->type == PLY_FLOAT;
+    }
+    return is_float && r->h.format != PLY_ASCII;
+}
+
+static int walk_element(struct ply_rows *r, int i, const struct ply_user *user, struct sh_err *err)
+{
+    int rc = begin(r, i, err);
+    if (rc == SH_OK) rc = user->begin(user->ctx, err);
+    for (; r->row < r->element->count && rc == SH_OK; r->row++) {
+        rc = read_row(r, err);
+        if (rc == SH_OK) rc = user->row(user->ctx, err);
+        if ((r->row & 0xffff) == 0) user->progress(user->ctx, (double)(r->t.p - r->t.data) / (double)r->t.size);
+    }
+    return rc;
+}
+
+int ply_walk(struct ply_rows *r, const struct ply_user *user, struct sh_err *err)
+{
+    for (int i = 0; i < r->h.n_elements; i++) {
+        const struct ply_element *e = &r->h.element[i];
+        int rc = walk_element(r, i, user, err);
+        if (rc != SH_OK) return rc;
+        if (e->count > 0 && (e->kind == PLY_OTHER || (e->kind == PLY_FACE && !user->has_faces)))
+            sh_warn(user->report, "%s: element '%s' (%llu of it) passed over", r->t.path, e->name,
+                    (unsigned long long)e->count);
+    }
     if (r->h.format == PLY_ASCII) skip_blank_lines(&r->t);
-    return (size_t)(r->t.end - r->t.p);
+    if (r->t.p < r->t.end)
+        sh_warn(user->report, "%s: %zu bytes after the last element passed over", r->t.path,
+                (size_t)(r->t.end - r->t.p));
+    return SH_OK;
 }

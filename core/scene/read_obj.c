@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/grow.h"
 #include "core/scene/build.h"
 #include "core/text.h"
 
@@ -58,13 +59,8 @@ static int read_uv(struct obj *o, struct sh_err *err)
         n++;
     }
     if (n == 0) return fail_at(o, err, "vt takes 1 to 3 numbers");
-    if (o->n_uv == o->cap_uv) {
-        size_t cap = o->cap_uv * 2 + 1024;
-        void *uv = realloc(o->uv, cap * sizeof *o->uv);
-        if (uv == NULL) return build_fail(o->b, SH_ENOMEM, err, "no memory for texture coordinates");
-        o->uv = uv;
-        o->cap_uv = cap;
-    }
+    if (!grow(&o->uv, &o->cap_uv, o->n_uv + 1, sizeof *o->uv))
+        return build_fail(o->b, SH_ENOMEM, err, "no memory for texture coordinates");
     o->uv[o->n_uv][0] = (float)number[0];
     o->uv[o->n_uv++][1] = (float)number[1];
     return SH_OK;

@@ -10,6 +10,7 @@ struct ply {
     struct scene_build *b;
     struct ply_rows r;
     uint16_t label;
+    bool is_single;
 };
 
 static int check_mesh(const struct ply *y, struct sh_err *err)
@@ -46,8 +47,9 @@ static int check_corners(struct ply *y, struct sh_err *err)
     return SH_OK;
 }
 
-static int use_row(struct ply *y, struct sh_err *err)
+static int use_row(void *ply, struct sh_err *err)
 {
+    struct ply *y = ply;
     y->b->line = ply_line(&y->r);
     if (y->r.element->kind == PLY_VERTEX) return build_vertex(y->b, &y->r.scalar[PLY_X], err);
     if (y->r.element->kind != PLY_FACE) return SH_OK;
@@ -59,34 +61,9 @@ static int use_row(struct ply *y, struct sh_err *err)
     return SH_OK;
 }
 
-static int read_element_rows(struct ply *y, int i, struct sh_err *err)
-{
-    int rc = ply_begin(&y->r, i, err);
-    if (rc != SH_OK) return rc;
-    const struct ply_element *e = y->r.element;
-    y->b->line = 0;
-    rc = build_reserve(y->b, e->kind == PLY_VERTEX ? e->count : 0, e->kind == PLY_FACE ? e->count : 0, err);
-    if (rc == SH_OK && e->kind == PLY_OTHER && e->count > 0)
-        sh_warn(y->b->report, "%s: element '%s' (%llu of it) passed over", y->b->name, e->name,
-                (unsigned long long)e->count);
-    for (; y->r.row < e->count && rc == SH_OK; y->r.row++) {
-        rc = ply_read(&y->r, err);
-        if (rc == SH_OK) rc = use_row(y, err);
-        if ((y->r.row & 0xffff) == 0) build_progress(y->b, ply_fraction(&y->r));
-    }
-    return rc;
-}
-
-/* Numbers kept as float in the file are read as they stand, yet what they stood for was rounded. */
 static void warn_if_coarse(const struct ply *y)
 {
     const struct scene_build *b = y->b;
-    bool is_float = false;
-    for (int i = 0; i < y->r.h.n_properties; i++) {
-        const struct ply_property *p = &y->r.h.property[i];
-        if (p->use >= PLY_X && p->use <= PLY_Z && p->type == PLY_FLOAT) is_float = true;
-    }
-    if (!is_float || y->r.h.format == PLY_ASCII) return;
     double largest = 0;
     for (uint32_t i = b->vertex0; i < b->scene->n_vertices; i++)
         for (int k = 0; k < 3; k++)
@@ -95,17 +72,28 @@ static void warn_if_coarse(const struct ply *y)
         sh_warn(b->report, "%s: stored in single precision, so good to %.2g m only", b->name, largest * 6e-8);
 }
 
+static int begin_element(void *ply, struct sh_err *err)
+{
+    struct ply *y = ply;
+    const struct ply_element *e = y->r.element;
+    y->b->line = 0;
+    if (e->kind == PLY_VERTEX) y->is_single = ply_is_single(&y->r);
+    return build_reserve(y->b, e->kind == PLY_VERTEX ? e->count : 0, e->kind == PLY_FACE ? e->count : 0, err);
+}
+
+static void progress(void *ply, double fraction)
+{
+    build_progress(((struct ply *)ply)->b, fraction);
+}
+
 static int read_body(struct ply *y, struct sh_err *err)
 {
+    const struct ply_user user = {y, begin_element, use_row, progress, y->b->report, .has_faces = true};
     int rc = build_label(y->b, build_base_name(y->b), (struct text_span){"", 0}, &y->label, err);
-    for (int i = 0; i < y->r.h.n_elements && rc == SH_OK; i++)
-        rc = read_element_rows(y, i, err);
-    if (rc != SH_OK) return rc;
-    size_t left_over = ply_left_over(&y->r);
-    if (left_over > 0) sh_warn(y->b->report, "%s: %zu bytes after the last element passed over", y->b->name, left_over);
-    warn_if_coarse(y);
+    if (rc == SH_OK) rc = ply_walk(&y->r, &user, err);
+    if (rc == SH_OK && y->is_single) warn_if_coarse(y);
     y->b->scene->n_meshes++;
-    return SH_OK;
+    return rc;
 }
 
 static void tick(void *build)
