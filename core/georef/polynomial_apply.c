@@ -1,11 +1,9 @@
 #include "core/georef/polynomial_kernels.h"
 
-enum { BLOCK = 128 };
-
 POLYNOMIAL_KERNELS(VEC_CLONES, native)
 
 static void apply_block(const struct polynomial_kernels *kernels, const struct polynomial *p, int order, size_t n,
-                        struct vec3_in d, double result[3][BLOCK])
+                        struct vec3_in d, double result[3][POLYNOMIAL_BLOCK])
 {
     switch (p->form) {
     case POLYNOMIAL_SPACE:
@@ -18,7 +16,7 @@ static void apply_block(const struct polynomial_kernels *kernels, const struct p
         memcpy(result[2], d.z, n * sizeof *d.z);
         break;
     case POLYNOMIAL_MERIDIAN:
-        kernels->meridian[order](p, n, d, (struct vec3_out){result[0], result[1], result[2]});
+        kernels->meridian[order](p, n, d, result);
         break;
     }
 }
@@ -26,9 +24,9 @@ static void apply_block(const struct polynomial_kernels *kernels, const struct p
 void polynomial_apply_with(const struct polynomial_kernels *kernels, const struct polynomial *p, int order, size_t n,
                            struct vec3_in d, struct vec3_out out)
 {
-    double result[3][BLOCK];
-    for (size_t at = 0; at < n; at += BLOCK) {
-        size_t m = n - at < BLOCK ? n - at : BLOCK;
+    double result[3][POLYNOMIAL_BLOCK];
+    for (size_t at = 0; at < n; at += POLYNOMIAL_BLOCK) {
+        size_t m = n - at < POLYNOMIAL_BLOCK ? n - at : POLYNOMIAL_BLOCK;
         apply_block(kernels, p, order, m, (struct vec3_in){d.x + at, d.y + at, d.z + at}, result);
         memcpy(out.x + at, result[0], m * sizeof *out.x);
         memcpy(out.y + at, result[1], m * sizeof *out.y);
