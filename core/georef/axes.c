@@ -42,7 +42,7 @@ static int invert(const double m[9], double out[9])
     double det = m[0] * out[0] + m[1] * out[1] + m[2] * out[2];
     for (int i = 0; i < 9; i++)
         out[i] /= det;
-    return det > 0.1; /* false for not-a-number */
+    return det > 0.1; /* false for NaN */
 }
 
 /* The map is a rotation, and stretching along its own axes before or after: the rotation is the polar factor, by

@@ -1,5 +1,6 @@
 #include "core/georef/geographiclib_shim.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <exception>
@@ -55,7 +56,7 @@ struct shim_grid {
     }
 };
 
-/* Of zones as core/georef.h has them. */
+/* The zone for UTMUPS, of a zone as core/georef.h counts them. */
 static int utmups_zone(int zone)
 {
     return zone == 0 ? int(UTMUPS::STANDARD) : zone < 0 ? int(UTMUPS::UPS) : zone;
@@ -88,8 +89,7 @@ struct shim_map {
     void set_frame(const shim_frame &frame)
     {
         from_grid = frame.is_grid != 0;
-        for (int i = 0; i < 9; i++)
-            turn[i] = frame.turn[i];
+        std::copy_n(frame.turn, 9, turn);
         local.Reset(place[0], place[1], place[2]);
         if (!from_grid) return;
         double x, y;
@@ -218,38 +218,38 @@ template <typename F> static int attempt(char *why, size_t len, F f)
     return -1;
 }
 
-void shim_ecef(double lat_deg, double lon_deg, double height_m, double p_ecef[3], double rotation[9])
+/* Runs what may throw; n values become NaN then. */
+template <typename F> static void attempt(double *value, size_t n, F f)
 {
-    for (int i = 0; i < 3; i++)
-        p_ecef[i] = nan_m;
     try {
-        std::vector<double> m(9);
-        Geocentric::WGS84().Forward(lat_deg, lon_deg, height_m, p_ecef[0], p_ecef[1], p_ecef[2], m);
-        for (size_t i = 0; i < 9; i++)
-            rotation[i] = m[i];
+        f();
     } catch (...) {
-        for (int i = 0; i < 9; i++)
-            rotation[i] = nan_m;
+        std::fill_n(value, n, nan_m);
     }
 }
 
-void shim_geodetic(double lat_deg, double lon_deg, double height_m, const double d_local[3], double geodetic[3])
+void shim_ecef(double lat_deg, double lon_deg, double height_m, double p_ecef[3], double rotation[9])
 {
-    try {
+    std::fill_n(p_ecef, 3, nan_m);
+    attempt(rotation, 9, [&] {
+        std::vector<double> m(9);
+        Geocentric::WGS84().Forward(lat_deg, lon_deg, height_m, p_ecef[0], p_ecef[1], p_ecef[2], m);
+        std::copy(m.begin(), m.end(), rotation);
+    });
+}
+
+void georef_geodetic(double lat_deg, double lon_deg, double height_m, const double d_enu[3], double geodetic[3])
+{
+    attempt(geodetic, 3, [&] {
         LocalCartesian(lat_deg, lon_deg, height_m)
-            .Reverse(d_local[0], d_local[1], d_local[2], geodetic[0], geodetic[1], geodetic[2]);
-    } catch (...) {
-        geodetic[0] = geodetic[1] = geodetic[2] = nan_m;
-    }
+            .Reverse(d_enu[0], d_enu[1], d_enu[2], geodetic[0], geodetic[1], geodetic[2]);
+    });
 }
 
 void shim_locate_ecef(const double p_ecef[3], double place[3])
 {
-    try {
-        Geocentric::WGS84().Reverse(p_ecef[0], p_ecef[1], p_ecef[2], place[0], place[1], place[2]);
-    } catch (...) {
-        place[0] = place[1] = place[2] = nan_m;
-    }
+    attempt(place, 3,
+            [&] { Geocentric::WGS84().Reverse(p_ecef[0], p_ecef[1], p_ecef[2], place[0], place[1], place[2]); });
 }
 
 int shim_locate_utm(int zone, int north, const double grid[2], double lat_lon_deg[2], char *why, size_t len)
@@ -287,8 +287,7 @@ struct shim_map *shim_map_create(const struct shim_spec *spec, char *why, size_t
         map.reset(new shim_map());
         map->kind = spec->kind;
         map->geoid = spec->geoid;
-        for (int i = 0; i < 3; i++)
-            map->place[i] = spec->place[i];
+        std::copy_n(spec->place, 3, map->place);
         map->place[1] = GeographicLib::Math::AngNormalize(spec->place[1]);
         map->set_frame(spec->frame);
         map->set_centre(utmups_zone(spec->zone.zone));
@@ -314,14 +313,12 @@ void shim_map_free(struct shim_map *map)
 
 void shim_map_anchor(const struct shim_map *map, double anchor[3])
 {
-    for (int i = 0; i < 3; i++)
-        anchor[i] = map->anchor[i];
+    std::copy_n(map->anchor, 3, anchor);
 }
 
 void shim_map_place(const struct shim_map *map, double place[3])
 {
-    for (int i = 0; i < 3; i++)
-        place[i] = map->place[i];
+    std::copy_n(map->place, 3, place);
 }
 
 /* prcs to the tangent frame's origin, to ECEF, to the centre's axes. */
@@ -405,11 +402,7 @@ void shim_map_forward(const struct shim_map *map, size_t n, struct vec3_in d, st
 
 void shim_map_reverse(const struct shim_map *map, const double d_map[3], double d_prcs[3])
 {
-    d_prcs[0] = d_prcs[1] = d_prcs[2] = nan_m;
+    std::fill_n(d_prcs, 3, nan_m);
     if (!std::isfinite(d_map[0]) || !std::isfinite(d_map[1]) || !std::isfinite(d_map[2])) return;
-    try {
-        map->reverse(d_map, d_prcs);
-    } catch (...) {
-        d_prcs[0] = d_prcs[1] = d_prcs[2] = nan_m;
-    }
+    attempt(d_prcs, 3, [&] { map->reverse(d_map, d_prcs); });
 }

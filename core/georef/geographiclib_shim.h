@@ -1,4 +1,4 @@
-/* What we use of GeographicLib, for C. Only the files of core/georef include this. Angles are in degrees, lengths in
+/* What we use of GeographicLib, for C, beside georef_geodetic and georef_geoid_free. Only the files of core/georef include this. Angles are in degrees, lengths in
  * metres. No exception crosses: each becomes a text, or NaN. */
 #ifndef CORE_GEOREF_GEOGRAPHICLIB_SHIM_H
 #define CORE_GEOREF_GEOGRAPHICLIB_SHIM_H
@@ -14,9 +14,6 @@ extern "C" {
 
 /* WGS 84 geocentric position, and the rotation (row by row) of east, north, up at it to X, Y, Z. */
 void shim_ecef(double lat_deg, double lon_deg, double height_m, double p_ecef[3], double rotation[9]);
-
-/* east, north, up at a place -> latitude, longitude, height. */
-void shim_geodetic(double lat_deg, double lon_deg, double height_m, const double d_local[3], double geodetic[3]);
 
 /* Geodetic place (degrees, degrees, metres) of a geocentric position; NaN on failure. */
 void shim_locate_ecef(const double p_ecef[3], double place[3]);

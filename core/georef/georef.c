@@ -342,8 +342,3 @@ void georef_difference(const struct georef *georef, const double p_crs[3], doubl
         d_crs[i] = p_crs[i] - georef->anchor[i];
     if (georef->crs == GEOREF_GEODETIC) d_crs[1] = remainder(d_crs[1], 360.0);
 }
-
-void georef_geodetic(double lat_deg, double lon_deg, double height_m, const double d_enu[3], double geodetic[3])
-{
-    shim_geodetic(lat_deg, lon_deg, height_m, d_enu, geodetic);
-}

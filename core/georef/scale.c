@@ -52,7 +52,7 @@ int georef_scale(const struct georef *georef, double scale_m, double reach_m, do
         else
             least_m = fmax(least_m, span[i] / unit[i] / MOST_COUNTS);
     }
-    if (least_m <= scale_m) return SH_OK; /* false for not-a-number */
+    if (least_m <= scale_m) return SH_OK; /* false for NaN */
     return sh_fail(
         err, SH_EINPUT,
         "coordinates up to %g m from their anchor do not fit into 31 bits at %g m per count; at least %.3g m", reach_m,

@@ -65,11 +65,11 @@ void build_begin_file(struct scene_build *b, const struct scene_mesh_spec *spec)
     b->file_ns = now_ns();
 }
 
-static void tell(struct scene_build *b, double fraction)
+static void report(struct scene_build *b, double fraction)
 {
     char what[sizeof b->name + 16];
     snprintf(what, sizeof what, "reading %s", b->name);
-    b->told_ns = now_ns();
+    b->reported_ns = now_ns();
     sh_progress(b->report, what, fraction);
 }
 
@@ -91,7 +91,7 @@ int build_end_file(struct scene_build *b, struct sh_err *err)
     b->scene->counts.zero_area += b->counts.zero_area;
     b->scene->counts.not_triangles += b->counts.not_triangles;
     b->scene->counts.names_cut += b->counts.names_cut;
-    if (b->told_ns > b->file_ns) tell(b, 1);
+    if (b->reported_ns > b->file_ns) report(b, 1);
     if (b->scene->n_triangles == b->triangle0)
         return build_fail(b, SH_EINPUT, err, "no triangles in it (%llu without area, %llu points and lines)",
                           (unsigned long long)b->counts.zero_area, (unsigned long long)b->counts.not_triangles);
@@ -152,8 +152,7 @@ int build_fail(struct scene_build *b, int code, struct sh_err *err, const char *
     va_start(ap, fmt);
     vsnprintf(text, sizeof text, fmt, ap);
     va_end(ap);
-    for (char *c = text; *c != '\0'; c++)
-        if ((unsigned char)*c < ' ') *c = '?'; /* what a broken file says may hold anything: one line it stays */
+    text_keep_line(text);
     return sh_fail(err, code, "%s%s: %s", b->name, place, text);
 }
 
@@ -227,10 +226,9 @@ int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err)
     return SH_OK;
 }
 
-/* Without area: the height over the longest edge is below 1e-12 of that edge. Rounding of the differences and
- * products below stays under 1e-15 of it, so the test tells zero from its own noise; a real needle is never
- * that thin: over 100 m it would be narrower than an atom. "Not greater", so that underflow counts as zero.
- */
+/* Without area: the height over the longest edge is below 1e-12 of that edge. Rounding of the differences and products
+ * stays under 1e-15 of it, so the test separates zero from noise. No real needle is that thin: over 100 m it would be
+ * narrower than an atom. The test asks for "greater", so that underflow counts as zero. */
 static bool has_area(const double *a, const double *b, const double *c)
 {
     double u[3], v[3], w[3];
@@ -330,12 +328,12 @@ int build_polygon(struct scene_build *b, size_t n, uint16_t label, struct sh_err
 void build_progress(struct scene_build *b, double fraction)
 {
     int64_t now = now_ns();
-    if (now - b->start_ns >= 1000000000 && now - b->told_ns >= 250000000) tell(b, fraction);
+    if (now - b->start_ns >= 1000000000 && now - b->reported_ns >= 250000000) report(b, fraction);
 }
 
 void build_announce(struct scene_build *b)
 {
-    tell(b, -1);
+    report(b, -1);
 }
 
 struct text_span build_base_name(const struct scene_build *b)

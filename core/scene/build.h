@@ -31,7 +31,7 @@ struct scene_build {
     uint32_t cap_vertices, cap_triangles;
     void *surface_tree;
     struct triangulate polygon;
-    int64_t start_ns, file_ns, told_ns; /* of the load, of this file, of the last report */
+    int64_t start_ns, file_ns, reported_ns; /* of the load, of this file, of the last report */
 };
 
 int build_init(struct scene_build *b, double tolerance_m, const struct sh_report *report, struct sh_err *err);

@@ -108,6 +108,12 @@ static int64_t pan_fine(const struct schedule_segment *seg, uint64_t k, uint64_t
     return base + (int64_t)((whole << 24) + fine);
 }
 
+/* Place of pulse k in the sweep of its line n, in 1/den of a line. */
+static uint64_t place_in_sweep(const struct schedule_segment *seg, uint64_t k, uint64_t n)
+{
+    return (uint64_t)((u128)seg->r0 + (u128)(k - seg->k0) * seg->num - (u128)(n - seg->line0) * seg->den);
+}
+
 void schedule_change(struct schedule_segment *seg, const struct schedule_segment *before,
                      const struct schedule_spec *spec, uint64_t k)
 {
@@ -115,7 +121,7 @@ void schedule_change(struct schedule_segment *seg, const struct schedule_segment
     uint32_t frame = frame_of_line(before, n, &first_line);
     struct schedule_line was;
     schedule_get_line(before, n, &was);
-    u128 r = (u128)before->r0 + (u128)(k - before->k0) * before->num - (u128)(n - before->line0) * before->den;
+    u128 r = place_in_sweep(before, k, n);
 
     struct schedule_segment next;
     memset(&next, 0, sizeof next);
@@ -164,9 +170,7 @@ void schedule_get_line(const struct schedule_segment *seg, uint64_t n, struct sc
     line->pulse0 = line_first_pulse(seg, n);
     uint64_t end = line_first_pulse(seg, n + 1);
     line->pulse_end = end < seg->end_pulse ? end : seg->end_pulse;
-    line->r_first_pulse =
-        (uint64_t)((u128)seg->r0 + (u128)(line->pulse0 - seg->k0) * seg->num - (u128)(n - seg->line0) * seg->den);
-    uint64_t r = line->r_first_pulse;
+    uint64_t r = line->r_first_pulse = place_in_sweep(seg, line->pulse0, n);
     uint64_t skip = r >= seg->r_first ? 0 : ceil_div(seg->r_first - r, seg->num);
     uint64_t upto = r > seg->r_last ? 0 : (seg->r_last - r) / seg->num + 1;
     line->cast0 = line->pulse0 + skip;
@@ -225,8 +229,7 @@ double schedule_pan_turn(const struct schedule_segment *seg, uint64_t k)
 
 double schedule_mirror_turn(const struct schedule_segment *seg, uint64_t k)
 {
-    uint64_t n = schedule_line_of(seg, k);
-    u128 r = (u128)seg->r0 + (u128)(k - seg->k0) * seg->num - (u128)(n - seg->line0) * seg->den;
+    uint64_t r = place_in_sweep(seg, k, schedule_line_of(seg, k));
     return (double)seg->spec.fov_min_udeg / (double)TURN_UDEG +
-           (double)(uint64_t)r * ((double)seg->spec.sweep_udeg / (double)TURN_UDEG / (double)seg->den);
+           (double)r * ((double)seg->spec.sweep_udeg / (double)TURN_UDEG / (double)seg->den);
 }
