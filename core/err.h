@@ -28,7 +28,7 @@ struct sh_err {
  * A text too long for the buffer is cut at its end. */
 int sh_fail(struct sh_err *err, int code, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
 
-/* How long work tells about itself. Each member may be NULL. Called from the thread that does the work. */
+/* Where long work reports to. Each member may be NULL. Called from the thread that does the work. */
 struct sh_report {
     void *ctx;
     void (*warn)(void *ctx, const char *text);                      /* one line, without a newline */

@@ -1,22 +1,26 @@
-/* Scene frame -> coordinate reference system, through GeographicLib (georef/geographiclib_shim.cpp is the only C++).
+/* From the scene's frame (prcs) to a coordinate reference system (CRS), through GeographicLib.
  *
- * The scene frame is the local tangent frame of the station: x east, y north, z up along the ellipsoid's normal,
- * with the station's prcs position at (lat, lon, height); or that of another place, turned against it (rotation); or a
- * grid. Coordinates leave as differences from the anchor, which is the centre (the station, until it is moved) in the
- * CRS, so that nothing is lost to large numbers; the sum anchor + difference is the position.
- *   local     prcs as it is: metres in the mesh's frame
+ * In: points of the scene, as differences from a centre in metres. Out: differences from the anchor in the CRS. The
+ * anchor is the centre's position in the CRS, so anchor + difference is the point's position, and nothing is lost to
+ * large numbers. The centre is the station, until georef_recentre moves it.
+ *
+ * The scene's frame is one of these: the tangent frame of the station (x east, y north, z up along the ellipsoid's
+ * normal); the tangent frame of another place, turned against it (rotation); a grid.
+ *   local     prcs itself: metres in the mesh's frame
  *   ecef      WGS 84 geocentric X, Y, Z: a rotation and a shift
- *   utm       easting, northing (with false origin), height; zone automatic or forced. GeographicLib's UTMUPS; UPS
- *             beyond 84 N and 80 S when the zone is automatic. Grid convergence and scale are in the map itself. From a
- *             scene in the same grid (which utm_zone 0 then means): what they are.
+ *   utm       easting, northing (with false origin), height. Zone automatic or forced; UPS beyond 84 N and 80 S when it
+ *             is automatic. Grid convergence and scale are part of the map. From a scene in the same grid (which
+ *             utm_zone 0 then means): the scene's own coordinates.
  *   geodetic  latitude and longitude in degrees, height; longitude differences the short way round, in -180..180
  *
- * Methods: exact calls GeographicLib for each point (about 0.2 us for geodetic, 0.9 us for utm); order 1, 2, 3 evaluate
- * its Taylor polynomial about the centre in a few ns, within georef_bound_m; order 5 too, where heights stay what they
- * are (a grid to another one or to geodetic). In geodetic output longitude is no polynomial but closed, which holds to
- * some radii of the scene from a pole (polynomial.h). Only what is not linear has them: local, ecef from a metric
- * frame, and a grid that the scene is in are exact whatever the method. Heights are ellipsoidal, or with a geoid above
- * it (interpolated for each point: exact only). Thread: a georef is constant after creation and georef_set_method. */
+ * Methods. Exact calls GeographicLib for each point (about 0.2 us for geodetic, 0.9 us for utm; `make chart`). Order 1,
+ * 2, 3 evaluate its Taylor polynomial about the centre in a few ns, within georef_bound_m. Order 5 exists where heights
+ * stay what they are (a grid to another one or to geodetic). In geodetic output longitude has a closed form, which holds
+ * up to some radii of the scene from a pole (georef/polynomial.h). Only a map that is not linear has polynomials. Exact
+ * with every method are local, ecef from a metric frame, and the grid that the scene is in.
+ *
+ * Heights are ellipsoidal, or above a geoid (interpolated for each point: method exact only). Thread: a georef is
+ * constant after creation and georef_set_method. */
 #ifndef CORE_GEOREF_H
 #define CORE_GEOREF_H
 
@@ -45,8 +49,8 @@ struct georef_spec {
     int prcs_is_grid;   /* 1: prcs is easting, northing, height of a grid, and station_m the station's */
     int prcs_zone;      /* its zone: 1..60, or 0: UPS */
     int prcs_north;     /* its hemisphere: 1 or 0 */
-    const struct georef_geoid
-        *geoid; /* heights above it (utm, geodetic); NULL: ellipsoidal. Has to outlive the georef. */
+    /* Heights above it (utm, geodetic); NULL: ellipsoidal. Has to outlive the georef. */
+    const struct georef_geoid *geoid;
 };
 
 /* A place on WGS 84. */
@@ -93,8 +97,7 @@ int georef_has_geoid(const struct georef *georef);
  * the ellipsoid. 0 and 1 where there is no grid, or it is the scene's own. */
 void georef_convergence(const struct georef *georef, double *convergence_rad, double *scale);
 
-/* Where differences from the anchor are a rotation of those in prcs: 1 and its matrix, row by row. Else
- * 0. */
+/* 1 and the matrix, row by row, where differences from the anchor are a rotation of those in prcs; else 0. */
 int georef_rotation(const struct georef *georef, double rotation[9]);
 
 /* Differences in prcs at the centre -> axes of the CRS (geodetic: east, north, up), row by row: the rotation that is
@@ -112,7 +115,7 @@ enum georef_method georef_method(const struct georef *georef);
 double georef_bound_m(const struct georef *georef, enum georef_method method, double radius_m, double height_m);
 
 /* n points, d_prcs relative to the centre (metres) -> difference from the anchor, in units of the CRS (metres;
- * geodetic: degrees, degrees, metres). In place is allowed. Not-a-number goes through. */
+ * geodetic: degrees, degrees, metres). In place is allowed. NaN goes through. */
 void georef_forward(const struct georef *georef, size_t n, struct vec3_in d, struct vec3_out out);
 
 /* One point back, exact: difference from the anchor -> prcs (absolute). For checks and clients, not for speed. */

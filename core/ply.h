@@ -63,7 +63,7 @@ struct ply_rows {
     struct ply_header h;
     const struct ply_element *element; /* being read */
     uint64_t row;                      /* of it, from 0 */
-    double scalar[PLY_SCALARS];        /* of the row, by ply_use; [PLY_SKIP] is rubbish */
+    double scalar[PLY_SCALARS];        /* of the row, by ply_use; [PLY_SKIP] has no meaning */
     double *corner;                    /* the list of use PLY_CORNERS */
     size_t n_corners, cap_corners;
 };

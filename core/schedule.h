@@ -1,4 +1,6 @@
-/* The schedule: pulse number -> time, mirror angle, pan angle. Integers and exact ratios; nothing accumulates.
+/* The schedule: when each pulse fires, and how far mirror and pan have turned then. In: the settings of a scan, and a pulse
+ * number. Out: nanoseconds since the scan's start, angles in turns. Integers and exact ratios; nothing accumulates.
+ * core/cast/aim.c makes directions from the turns.
  *
  * A scan is a list of segments; each change of a setting opens one. Within a segment pulse i (from its first pulse)
  * fires at t(i) = t0_ns + floor((t0_acc + i * 1e15) / prr_uhz) ns, its place in the mirror sweep is the ratio r(i)/den
@@ -74,7 +76,7 @@ void schedule_start(struct schedule_segment *seg, const struct schedule_spec *sp
 
 /* The segment that begins with pulse k of the one before, with a new spec: the pulse keeps its time, the mirror its
  * phase (to 1/den of a line), the pan its angle (to 2^-24 micro-degrees); the frame goes on to the first end of a line
- * at or behind the new pan stop. No pulse is lost or doubled. seg may be `before`. */
+ * at or beyond the new pan stop. No pulse is lost or doubled. seg may be `before`. */
 void schedule_change(struct schedule_segment *seg, const struct schedule_segment *before,
                      const struct schedule_spec *spec, uint64_t k);
 
@@ -94,8 +96,7 @@ uint64_t schedule_cut(const struct schedule_segment *seg, uint64_t k);
 void schedule_get_run(const struct schedule_segment *seg, const struct schedule_line *line, uint64_t k, uint32_t n,
                       struct schedule_run *run);
 
-/* Pan angle in turns (0 <= turn < 1 per turn, not reduced below the start) and mirror angle of any pulse: for encoders.
- */
+/* Pan angle and mirror angle of any pulse, in turns, for the encoders. The pan's is not reduced to one turn. */
 double schedule_pan_turn(const struct schedule_segment *seg, uint64_t k);
 double schedule_mirror_turn(const struct schedule_segment *seg, uint64_t k);
 

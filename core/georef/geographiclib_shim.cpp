@@ -16,12 +16,8 @@
 #include <GeographicLib/TransverseMercator.hpp>
 #include <GeographicLib/UTMUPS.hpp>
 
-using GeographicLib::Geocentric;
-using GeographicLib::Geoid;
-using GeographicLib::LocalCartesian;
-using GeographicLib::PolarStereographic;
-using GeographicLib::TransverseMercator;
-using GeographicLib::UTMUPS;
+using GeographicLib::Geocentric, GeographicLib::Geoid, GeographicLib::LocalCartesian;
+using GeographicLib::PolarStereographic, GeographicLib::TransverseMercator, GeographicLib::UTMUPS;
 
 struct georef_geoid {
     Geoid geoid;

@@ -81,7 +81,7 @@ void georef_degrees(const struct georef *georef, double height_m, double *lat_m,
     *lon_m = angle_rad(*axis_m);
 }
 
-/* What all depends on that hangs on the centre. */
+/* Sets what depends on the centre: anchor and polynomial. */
 static void set_up_centre(struct georef *georef)
 {
     struct shim_meridian meridian;

@@ -74,7 +74,7 @@ static void next_power(int power[3])
     }
 }
 
-/* Nodes in the meridian's plane, given as 0, n, u, and the map there. Behind the pole latitude goes on beyond 90
+/* Nodes in the meridian's plane, given as 0, n, u, and the map there. Beyond the pole latitude goes on beyond 90
  * degrees. */
 static void sample_meridian(const struct shim_map *map, const struct polynomial *p, double value[3][CUBE])
 {
@@ -91,7 +91,7 @@ static void sample_meridian(const struct shim_map *map, const struct polynomial 
     }
 }
 
-/* Of those of degree d, x^a y^b is the one (d-a)(d-a+1)/2 behind the first, y^b z^c the one d(d+1)/2 + c. */
+/* Of those of degree d, x^a y^b is the one (d-a)(d-a+1)/2 after the first, y^b z^c the one d(d+1)/2 + c. */
 static void set_up_plane(struct polynomial *p)
 {
     int first = 0, at = 0, meridian = p->form == POLYNOMIAL_MERIDIAN;

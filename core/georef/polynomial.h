@@ -1,11 +1,14 @@
-/* The map's Taylor polynomial about its centre, in the form that settles fastest. Private to core/georef.
+/* The map's Taylor polynomial about its centre, in the form whose series settles fastest. Used within core/georef. In:
+ * differences in prcs from the centre (metres). Out: differences from the anchor, in units of the CRS.
  *   space     three polynomials of x, y, z: a metric frame to a grid, a grid to ECEF
  *   flat      two of x, y; heights stay what they are: a grid to another grid, a UTM grid to geodetic
- *   meridian  geodetic from a metric frame or a UPS grid. With e, n, u the point's east, north, up from the centre, its
- * distance from the Earth's axis is s = hypot(a, e), a = s0 + u cos lat - n sin lat, and its longitude is off by 2
- * atan(e / (s + a)). Turned back into the centre's meridian, which moves it by s - a away from the axis, latitude and
- * height are polynomials of n and u alone, which know nothing of the pole: longitude as a polynomial is off by (scene /
- * s0)^4 s0. A UPS grid has the pole in its plane: the same with a = s0 -+ n. */
+ *   meridian  geodetic from a metric frame or a UPS grid. Let e, n, u be the point's east, north, up from the centre. Its
+ *             distance from the Earth's axis is
+ *                 s = hypot(a, e),  a = s0 + u cos lat - n sin lat,
+ *             and its longitude differs from the centre's by 2 atan(e / (s + a)). Turned back into the centre's meridian,
+ *             the point moves by s - a away from the axis. There latitude and height are polynomials of n and u alone,
+ *             which are smooth at the pole. As a polynomial longitude would have an error of (scene / s0)^4 s0. A UPS
+ *             grid has the pole in its plane: the same with a = s0 -+ n. */
 #ifndef CORE_GEOREF_POLYNOMIAL_H
 #define CORE_GEOREF_POLYNOMIAL_H
 

@@ -183,8 +183,8 @@ static int read_waypoints(struct csv *csv, struct way *way, struct sh_err *err)
     }
 }
 
-/* Heading of the way from d before t_s to d behind it, in the axes of level; left as it is where that goes straight up.
- */
+/* Heading of the way from d before t_s to d after it, in the axes of level. Where the way goes straight up the heading
+ * stays. */
 static void heading_at(const struct trajectory *curve, double t_s, double d, const double level[9], double *heading_rad)
 {
     struct pose a, b;
@@ -205,7 +205,7 @@ static double along(double f, int from_rest, int to_rest)
     return f + f * g * (f * to_rest - g * from_rest);
 }
 
-/* Parts of the way behind point i: STEP_S each, or STEP_M where that is longer. */
+/* Parts of the way after point i: STEP_S each, or STEP_M where that is longer. */
 static size_t leg_parts(const struct trajectory *curve, size_t i)
 {
     if (i + 1 >= curve->n) return 1;

@@ -229,12 +229,12 @@ static uint64_t count_faces(const struct aiScene *in, const struct aiNode *node)
 
 static int check_precision(const struct import *im, struct sh_err *err)
 {
-    double off_m = im->largest * im->b->spec->scale * SINGLE_ROUNDING;
-    if (off_m <= im->b->tolerance_m) return SH_OK;
+    double error_m = im->largest * im->b->spec->scale * SINGLE_ROUNDING;
+    if (error_m <= im->b->tolerance_m) return SH_OK;
     return build_fail(im->b, SH_EINPUT, err,
-                      "coordinates up to %.9g are read in single precision, which may be off by %.2g m; allowed "
-                      "are %.2g m: move the mesh near its origin, or convert it to .obj or .ply",
-                      im->largest, off_m, im->b->tolerance_m);
+                      "coordinates up to %.9g are read in single precision, with errors up to %.2g m; allowed are "
+                      "%.2g m: move the mesh near its origin, or convert it to .obj or .ply",
+                      im->largest, error_m, im->b->tolerance_m);
 }
 
 /* An IFC file that was cut off reads without an error, with less in it; one in which records are missing crashes

@@ -171,12 +171,12 @@ int ply_walk(struct ply_rows *r, const struct ply_user *user, struct sh_err *err
         int rc = walk_element(r, i, user, err);
         if (rc != SH_OK) return rc;
         if (e->count > 0 && (e->kind == PLY_OTHER || (e->kind == PLY_FACE && !user->has_faces)))
-            sh_warn(user->report, "%s: element '%s' (%llu of it) passed over", r->t.path, e->name,
+            sh_warn(user->report, "%s: element '%s' (%llu of it) ignored", r->t.path, e->name,
                     (unsigned long long)e->count);
     }
     if (r->h.format == PLY_ASCII) skip_blank_lines(&r->t);
     if (r->t.p < r->t.end)
-        sh_warn(user->report, "%s: %zu bytes after the last element passed over", r->t.path,
+        sh_warn(user->report, "%s: %zu bytes after the last element ignored", r->t.path,
                 (size_t)(r->t.end - r->t.p));
     return SH_OK;
 }

@@ -232,7 +232,7 @@ int read_obj(struct scene_build *b, struct sh_err *err)
     o.t.continued = true;
     if (rc == SH_OK) rc = read_statements(&o, err);
     if (rc == SH_OK && o.n_unknown > 0)
-        sh_warn(b->report, "%s: %llu unknown statements passed over; the first is '%s' in line %llu", b->name,
+        sh_warn(b->report, "%s: %llu unknown statements ignored; the first is '%s' in line %llu", b->name,
                 (unsigned long long)o.n_unknown, o.unknown, (unsigned long long)o.unknown_line);
     if (rc == SH_OK && o.library.n > 0) rc = read_mtl(b, o.library, first_surface, err);
     b->scene->n_meshes++;
