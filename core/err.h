@@ -2,7 +2,8 @@
  *
  * A function that can fail for a reason the user can act on takes a `struct sh_err *` as its last
  * argument, fills it through sh_fail() and returns the code. The text is one line: what, where, what is
- * allowed. Nothing below main prints it. Thread: a sh_err belongs to its caller; sh_fail allocates nothing. */
+ * allowed. Nothing below main prints it. Thread: a sh_err belongs to its caller; sh_fail allocates
+ * nothing. */
 #ifndef CORE_ERR_H
 #define CORE_ERR_H
 

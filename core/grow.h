@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Room for `need` elements of `size` bytes in *array (a pointer to the array's pointer, from malloc or NULL), with room
- * to spare; *room is what there is. false: no memory, and the array is as it was. */
+/* Room for `need` elements of `size` bytes in *array (a pointer to the array's pointer, from malloc or NULL),
+ * with room to spare; *room is what there is. false: no memory, and the array is as it was. */
 static inline bool grow(void *array, size_t *room, size_t need, size_t size)
 {
     if (need <= *room) return true;

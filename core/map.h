@@ -1,13 +1,16 @@
-/* The scan map: points seen from above, as a PNG (libpng). In: points and stations in prcs (metres). Out: an image.
+/* The scan map: points seen from above, as a PNG (libpng). In: points and stations in prcs (metres). Out: an
+ * image.
  *
- * x goes to the right, y (north) up. Per pixel the map keeps which height levels were hit, and the lowest point.
- *   lightness  shows structure: a pixel with points on many levels (a wall) is dark, one with floor and ceiling only is
- *              light, one without points is white. It does not depend on how dense the points lie, so far walls stand
- *              out as near ones do. Each point is drawn three pixels wide.
+ * x goes to the right, y (north) up. Per pixel the map keeps which height levels were hit, and the lowest
+ * point.
+ *   lightness  shows structure: a pixel with points on many levels (a wall) is dark, one with floor and
+ *              ceiling only is light, one without points is white. It does not depend on how dense the points
+ *              lie, so far walls stand out as near ones do. Each point is drawn three pixels wide.
  *   hue        shows the height of the lowest point above the lowest of the map
  * Both are even steps of CIE L*a*b*. Below the map: scale bar, legend of heights, north arrow.
  *
- * Ownership: map_create allocates everything, map_free releases it. Thread: one at a time. Not real-time safe. */
+ * Ownership: map_create allocates everything, map_free releases it. Thread: one at a time. Not real-time
+ * safe. */
 #ifndef CORE_MAP_H
 #define CORE_MAP_H
 

@@ -1,5 +1,6 @@
-/* Reading PLY files, as meshes (core/scene/read_ply.c) or points (core/analysis/cloud_ply.c): text, or binary of either
- * byte order, with numbers of any type. In: a file. Out: its elements, and their rows one after the other as doubles.
+/* Reading PLY files, as meshes (core/scene/read_ply.c) or points (core/analysis/cloud_ply.c): text, or binary
+ * of either byte order, with numbers of any type. In: a file. Out: its elements, and their rows one after the
+ * other as doubles.
  *
  * Order of calls: ply_open, ply_walk, ply_close. */
 #ifndef CORE_PLY_H
@@ -51,8 +52,8 @@ struct ply_header {
 extern const uint8_t ply_type_size[8];                 /* bytes, by ply_type */
 extern const char *const ply_scalar_name[PLY_SCALARS]; /* in the file, by ply_use from PLY_X on */
 
-/* Used within core/scene: leaves t at the first byte of data. A vertex has x, y and z afterwards; faces may lack their
- * list. */
+/* Used within core/scene: leaves t at the first byte of data. A vertex has x, y and z afterwards; faces may
+ * lack their list. */
 int ply_read_header(struct ply_header *h, struct text *t, struct sh_err *err);
 
 /* The element's property of that use, or NULL. */
@@ -82,7 +83,8 @@ struct ply_user {
     bool has_faces;                 /* faces are used, not passed over */
 };
 
-/* Reads all rows in the order of the file. Warns of elements that nobody uses, and of bytes after the last row. */
+/* Reads all rows in the order of the file. Warns of elements that nobody uses, and of bytes after the last
+ * row. */
 int ply_walk(struct ply_rows *r, const struct ply_user *user, struct sh_err *err);
 
 /* Fails with "FILE, line L: ELEMENT N of M: what", or the byte instead of the line in a binary. */
@@ -91,8 +93,8 @@ int ply_fail(const struct ply_rows *r, struct sh_err *err, const char *what);
 /* The line of a text, 0 in a binary. */
 uint64_t ply_line(const struct ply_rows *r);
 
-/* Are x, y or z of r->element, a vertex, stored in single precision? Their numbers are read as they stand, but what they
- * stood for was rounded. */
+/* Are x, y or z of r->element, a vertex, stored in single precision? Their numbers are read as they stand,
+ * but what they stood for was rounded. */
 bool ply_is_single(const struct ply_rows *r);
 
 #endif

@@ -1,20 +1,22 @@
-/* Where a platform, and the head on it, is and how it stands. In: angles in radians, positions in metres, trajectories
- * from CSV files. Out: attitudes as quaternions or matrices, and the pose at any time.
+/* Where a platform, and the head on it, is and how it stands. In: angles in radians, positions in metres,
+ * trajectories from CSV files. Out: attitudes as quaternions or matrices, and the pose at any time.
  *
- * Attitude, the one convention of the project: a rotation R takes the body's frame (x right, y forward, z up) to the
- * scene frame (x east, y north, z up),
+ * Attitude, the one convention of the project: a rotation R takes the body's frame (x right, y forward, z up)
+ * to the scene frame (x east, y north, z up),
  *     R = Rz(-heading) Rx(pitch) Ry(roll).
- * Heading is clockwise from north (the scene's y axis) seen from above. Pitch is positive with the nose up, roll with
- * the right side down. Quaternions are (w, x, y, z), of length one; q and -q are the same attitude:
+ * Heading is clockwise from north (the scene's y axis) seen from above. Pitch is positive with the nose up,
+ * roll with the right side down. Quaternions are (w, x, y, z), of length one; q and -q are the same attitude:
  *     q = qz(-heading) qx(pitch) qy(roll), products by Hamilton's rule.
  *
- * Between two poses the position goes along the straight line, and the attitude turns the shorter way about one fixed
- * axis at constant rate (slerp, Shoemake 1985): pose_between. The head moves like this between the poses it sends.
+ * Between two poses the position goes along the straight line, and the attitude turns the shorter way about
+ * one fixed axis at constant rate (slerp, Shoemake 1985): pose_between. The head moves like this between the
+ * poses it sends.
  *
- * A trajectory has samples further apart. There the position is a cubic Hermite curve. Its velocity at a sample is the
- * derivative of the parabola through the sample and its two neighbours, or zero where the platform stands before or after
- * it. The attitude is slerp. On a circle of 10 m at 10 m/s sampled at 10 Hz the error of the position is 0.16 mm; straight
- * lines have 12.5 mm (tests/unit/test_pose.c). Before the first and after the last sample the platform stands.
+ * A trajectory has samples further apart. There the position is a cubic Hermite curve. Its velocity at a
+ * sample is the derivative of the parabola through the sample and its two neighbours, or zero where the
+ * platform stands before or after it. The attitude is slerp. On a circle of 10 m at 10 m/s sampled at 10 Hz
+ * the error of the position is 0.16 mm; straight lines have 12.5 mm (tests/unit/test_pose.c). Before the
+ * first and after the last sample the platform stands.
  *
  * Pure, except for reading the files. Trajectories are constant after creation, any thread. */
 #ifndef CORE_POSE_H
@@ -55,7 +57,8 @@ void pose_multiply(const double a[4], const double b[4], double out[4]);
 void pose_rotate(const double quat[4], const double v[3], double out[3]);
 /* Angle between two attitudes, in [0, pi]. */
 double pose_angle_between(const double a[4], const double b[4]);
-/* The rotation from a to b in a's body frame: unit axis, and angle in [0, pi]. Axis x where they are the same. */
+/* The rotation from a to b in a's body frame: unit axis, and angle in [0, pi]. Axis x where they are the
+ * same. */
 void pose_turn(const double a[4], const double b[4], double axis[3], double *angle_rad);
 void pose_between(const struct pose *a, const struct pose *b, double fraction, struct pose *out);
 /* The pose of what is mounted on a body: mount is its pose in the body's frame. */
@@ -80,19 +83,19 @@ enum {
 /* n >= 1 samples, times rising by POSE_MIN_STEP_US at least; copied. SH_EINPUT says which sample is wrong. */
 int trajectory_from_samples(const struct pose_sample *sample, size_t n, struct trajectory **out, struct sh_err *err);
 
-/* A CSV file whose first line names the columns, in any order: t_s, x_m, y_m, z_m, and either heading_deg, pitch_deg,
- * roll_deg (heading alone will do) or qw, qx, qy, qz; frame where wanted (else the sample's number, from 0);
- * the columns scan and flags of `scanhead record -o NAME.poses.csv` are ignored, and a byte order mark of UTF-8. Lines
- * that begin with '#' and empty lines don't count. Times are within 4e9 s of 0, so that nanoseconds between any two fit
- * into 64 bits. Everything else is an error with file and line. */
+/* A CSV file whose first line names the columns, in any order: t_s, x_m, y_m, z_m, and either heading_deg,
+ * pitch_deg, roll_deg (heading alone will do) or qw, qx, qy, qz; frame where wanted (else the sample's
+ * number, from 0); the columns scan and flags of `scanhead record -o NAME.poses.csv` are ignored, and a byte
+ * order mark of UTF-8. Lines that begin with '#' and empty lines don't count. Times are within 4e9 s of 0, so
+ * that nanoseconds between any two fit into 64 bits. Everything else is an error with file and line. */
 int trajectory_read_csv(const char *path, struct trajectory **out, struct sh_err *err);
 
-/* Way-points, from a CSV file as well: x_m, y_m, z_m, speed_m_s, and pause_s where wanted. The platform goes through
- * them on the cubic Hermite curve described above. The way to the next point takes chord / speed_m_s; the last point
- * needs a speed, which is not used. At a point with pause_s it comes to rest smoothly, stands for that time and starts
- * smoothly. It heads along the path, with pitch and roll 0, about the axes that a station has there: geoframe_level of
- * frame, or the scene's own where frame is NULL. SH_EINPUT, too, where the way needs more than POSE_MAX_KNOTS samples:
- * one every 0.02 s, or every 0.01 m where that is longer. */
+/* Way-points, from a CSV file as well: x_m, y_m, z_m, speed_m_s, and pause_s where wanted. The platform goes
+ * through them on the cubic Hermite curve described above. The way to the next point takes chord / speed_m_s;
+ * the last point needs a speed, which is not used. At a point with pause_s it comes to rest smoothly, stands
+ * for that time and starts smoothly. It heads along the path, with pitch and roll 0, about the axes that a
+ * station has there: geoframe_level of frame, or the scene's own where frame is NULL. SH_EINPUT, too, where
+ * the way needs more than POSE_MAX_KNOTS samples: one every 0.02 s, or every 0.01 m where that is longer. */
 int trajectory_read_waypoints(const char *path, const struct geoframe *frame, struct trajectory **out,
                               struct sh_err *err);
 
@@ -115,10 +118,10 @@ struct pose_path {
         error_m; /* largest distance from the trajectory: closed bound, acceleration and lever arm times step^2 / 8 */
 };
 
-/* The path of a head that is mounted on the platform, from start_s (time 0 of the knots) to end_s or the trajectory's
- * end, whichever comes first. There is a knot at each sample, and between two samples as many as the rules ask for;
- * error_m is more than tolerance_m only where POSE_MIN_STEP_US is the limit. The caller frees out->knot. SH_EINPUT for
- * more than POSE_MAX_KNOTS. */
+/* The path of a head that is mounted on the platform, from start_s (time 0 of the knots) to end_s or the
+ * trajectory's end, whichever comes first. There is a knot at each sample, and between two samples as many as
+ * the rules ask for; error_m is more than tolerance_m only where POSE_MIN_STEP_US is the limit. The caller
+ * frees out->knot. SH_EINPUT for more than POSE_MAX_KNOTS. */
 int trajectory_knots(const struct trajectory *trajectory, const struct pose *mount, const struct pose_knot_rules *rules,
                      struct pose_path *out, struct sh_err *err);
 

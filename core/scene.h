@@ -1,17 +1,18 @@
-/* The scene: meshes from files, as one list of triangles with surfaces. In: files and how to place them. Out: vertices in
- * double, in the project frame (prcs): metres, z up.
+/* The scene: meshes from files, as one list of triangles with surfaces. In: files and how to place them. Out:
+ * vertices in double, in the project frame (prcs): metres, z up.
  *
- * A file's vertex v becomes R(up) * v * scale + offset_m, in double. `up: z` leaves the axes, `up: y` turns (x, y, z) to
- * (x, -z, y). Units and axes are what the spec says, never guessed. Assimp (5.2) itself changes some before that:
+ * A file's vertex v becomes R(up) * v * scale + offset_m, in double. `up: z` leaves the axes, `up: y` turns
+ * (x, y, z) to (x, -z, y). Units and axes are what the spec says, never guessed. Assimp (5.2) itself changes
+ * some before that:
  *   Collada  comes in metres and y up, its unit and up_axis applied
  *   IFC      comes in metres and y up
  *   FBX      keeps the file's unit (mostly centimetres: scale 0.01) and axes (mostly y up)
  *   glTF     is metres and y up by definition
  *   STL      has neither
- * Every placement of a mesh in a node tree counts: an object that is there five times gives its triangles five times.
- * Polygons are cut into triangles. A pair of object and material that is there already keeps its label.
- * Ownership: scene_load allocates everything, scene_free releases it. After the load a scene is constant and may be read
- * from any thread. */
+ * Every placement of a mesh in a node tree counts: an object that is there five times gives its triangles
+ * five times. Polygons are cut into triangles. A pair of object and material that is there already keeps its
+ * label. Ownership: scene_load allocates everything, scene_free releases it. After the load a scene is
+ * constant and may be read from any thread. */
 #ifndef CORE_SCENE_H
 #define CORE_SCENE_H
 
@@ -36,8 +37,8 @@ struct scene_mesh_spec {
 };
 
 /* One surface label: an object of the file with one material.
- * Object: .obj the last o or g, else (and for .ply) the file's name without folder and ending; for the others the
- * node's name, or the mesh's where that is empty. */
+ * Object: .obj the last o or g, else (and for .ply) the file's name without folder and ending; for the others
+ * the node's name, or the mesh's where that is empty. */
 struct scene_surface {
     char object[SCENE_NAME_LEN];
     char material[SCENE_NAME_LEN];
@@ -76,8 +77,9 @@ struct scene {
 };
 
 /* Loads all meshes into one scene.
- * tolerance_m: the largest error of a vertex that is allowed; a file read in single precision (all but .obj and .ply) whose largest
- *   |coordinate| * scale * 6e-8 exceeds it is refused, with the figure.
+ * tolerance_m: the largest error of a vertex that is allowed. A file read in single precision (all but .obj
+ * and
+ *   .ply) is refused, with the figure, where its largest |coordinate| * scale * 6e-8 exceeds it.
  * Errors (SH_EINPUT, naming the file): missing or unreadable, not a mesh, no triangles, a coordinate that is
  *   not finite, an index out of range, |coordinate| beyond 1e9 m, too many surfaces or triangles (2^32-1).
  * Progress goes to report about four times a second once a load takes longer than a second. */

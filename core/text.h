@@ -1,5 +1,5 @@
-/* A file in memory, and reading text from it: words, numbers, lines. In: a path. Out: its bytes, and a place in them that
- * each call moves on. Numbers are exact (nearest double) and don't depend on the locale. */
+/* A file in memory, and reading text from it: words, numbers, lines. In: a path. Out: its bytes, and a place
+ * in them that each call moves on. Numbers are exact (nearest double) and don't depend on the locale. */
 #ifndef CORE_TEXT_H
 #define CORE_TEXT_H
 

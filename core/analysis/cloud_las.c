@@ -73,8 +73,8 @@ static int read_header(struct las *las, struct sh_err *err)
     return SH_OK;
 }
 
-/* The code of the projected CRS, of ECEF, or of geodetic WGS 84, which has no code for x as longitude. What stream of
- * ours calls UPS (32661, 32761) is written as the same projection with the easting first. */
+/* The code of the projected CRS, of ECEF, or of geodetic WGS 84, which has no code for x as longitude. UPS,
+ * 32661 or 32761 in our stream, is written as the same projection with the easting first. */
 static int64_t epsg_of(const char *wkt)
 {
     static const char mark[] = "AUTHORITY[\"EPSG\",\"";

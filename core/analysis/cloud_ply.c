@@ -14,7 +14,8 @@ struct reading {
     bool is_single;
 };
 
-/* Our recorder writes the coordinate reference system as a comment. Other files lack it, which is no fault. */
+/* Our recorder writes the coordinate reference system as a comment. Other files lack it, which is no
+ * fault. */
 static int64_t find_epsg(const struct text *file)
 {
     struct text t = *file;

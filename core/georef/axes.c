@@ -5,7 +5,8 @@
 #include "core/georef/state.h"
 #include "core/mat3.h"
 
-/* Far enough for nanometres of rounding to be 1e-10 rad, near enough for a quadratic map to be linear by symmetry. */
+/* Far enough for nanometres of rounding to be 1e-10 rad, near enough for a quadratic map to be linear by
+ * symmetry. */
 static const double STEP_M = 100.0;
 
 /* Column k is what a metre along axis k becomes. */
@@ -45,8 +46,8 @@ static int invert(const double m[9], double out[9])
     return det > 0.1; /* false for NaN */
 }
 
-/* The map is a rotation, and stretching along its own axes before or after: the rotation is the polar factor, by
- * Newton's iteration (Higham 1986), which converges quadratically from near. */
+/* The map is a rotation, and stretching along its own axes before or after: the rotation is the polar factor,
+ * by Newton's iteration (Higham 1986), which converges quadratically from near. */
 void georef_axes(const struct georef *georef, double rotation[9])
 {
     double m[9], other[9];

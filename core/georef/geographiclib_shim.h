@@ -1,5 +1,6 @@
-/* What we use of GeographicLib, for C, beside georef_geodetic and georef_geoid_free. Only the files of core/georef include this. Angles are in degrees, lengths in
- * metres. No exception crosses: each becomes a text, or NaN. */
+/* What we use of GeographicLib, for C, beside georef_geodetic and georef_geoid_free. Only the files of
+ * core/georef include this. Angles are in degrees, lengths in metres. No exception crosses: each becomes a
+ * text, or NaN. */
 #ifndef CORE_GEOREF_GEOGRAPHICLIB_SHIM_H
 #define CORE_GEOREF_GEOGRAPHICLIB_SHIM_H
 
@@ -36,8 +37,8 @@ struct shim_frame {
     int zone, north; /* grid; zone 0: UPS */
 };
 
-/* The output's grid. zone: 1..60, 0 for the standard zone, which beyond 84 N and 80 S is UPS, or -1: UPS. side: 0: the
- * place's hemisphere, 1: north, -1: south. */
+/* The output's grid. zone: 1..60, 0 for the standard zone, which beyond 84 N and 80 S is UPS, or -1: UPS.
+ * side: 0: the place's hemisphere, 1: north, -1: south. */
 struct shim_zone {
     int zone, side;
 };
@@ -56,7 +57,8 @@ struct shim_map *shim_map_create(const struct shim_spec *spec, char *why, size_t
 struct shim_map *shim_map_recentre(const struct shim_map *map, const double d_prcs[3], char *why, size_t len);
 void shim_map_free(struct shim_map *map);
 
-/* Of the centre: easting and northing with false origin, degrees, or X and Y; height as it leaves, or Z. EPSG code. */
+/* Of the centre: easting and northing with false origin, degrees, or X and Y; height as it leaves, or Z. EPSG
+ * code. */
 void shim_map_anchor(const struct shim_map *map, double anchor[3]);
 /* Of the centre: degrees, degrees, ellipsoidal height. */
 void shim_map_place(const struct shim_map *map, double place[3]);

@@ -11,8 +11,8 @@
 #include "core/mat3.h"
 #include "core/vec3.h"
 
-/* Polynomials are fitted within this; within 1/64 of the distance from the axis where longitude is one of their
- * outputs: its series converges within that distance. */
+/* Polynomials are fitted within this; within 1/64 of the distance from the axis where longitude is one of
+ * their outputs: its series converges within that distance. */
 #define FIT_MAX_M   20000.0
 #define FIT_OF_AXIS (1.0 / 64.0)
 #define FIT_LEAST_M 1.0
@@ -69,8 +69,8 @@ static int is_same_grid(const struct georef_spec *spec)
            (spec->side == 0 || (spec->side > 0) == spec->prcs_north) && spec->geoid == NULL;
 }
 
-/* Metres per degree of latitude and of longitude at the centre, largest over height above it, and distance from the
- * axis. The meridian's radius of curvature is largest at the poles: a^2/b. */
+/* Metres per degree of latitude and of longitude at the centre, largest over height above it, and distance
+ * from the axis. The meridian's radius of curvature is largest at the poles: a^2/b. */
 void georef_degrees(const struct georef *georef, double height_m, double *lat_m, double *lon_m, double *axis_m)
 {
     double place[3], p[3], rotation[9];
@@ -280,7 +280,8 @@ int georef_set_method(struct georef *georef, enum georef_method method, struct s
     return SH_OK;
 }
 
-/* Rounding of positions of 6.4e6 to 1e7 m, and of GeographicLib, which states 5 nm for transverse Mercator. */
+/* Rounding of positions of 6.4e6 to 1e7 m, and of GeographicLib, which states 5 nm for transverse
+ * Mercator. */
 #define EXACT_LINEAR_M 5e-9
 #define EXACT_MAP_M    2e-8
 

@@ -183,8 +183,8 @@ static int read_waypoints(struct csv *csv, struct way *way, struct sh_err *err)
     }
 }
 
-/* Heading of the way from d before t_s to d after it, in the axes of level. Where the way goes straight up the heading
- * stays. */
+/* Heading of the way from d before t_s to d after it, in the axes of level. Where the way goes straight up
+ * the heading stays. */
 static void heading_at(const struct trajectory *curve, double t_s, double d, const double level[9], double *heading_rad)
 {
     struct pose a, b;
@@ -198,7 +198,8 @@ static void heading_at(const struct trajectory *curve, double t_s, double d, con
     if (hypot(on_m[0], on_m[1]) > d * SLOWEST_M_S) *heading_rad = atan2(on_m[0], on_m[1]);
 }
 
-/* How far along an interval the platform is after its share f of the time: f, but from or to a standstill smoothly. */
+/* How far along an interval the platform is after its share f of the time: f, but from or to a standstill
+ * smoothly. */
 static double along(double f, int from_rest, int to_rest)
 {
     double g = 1.0 - f;

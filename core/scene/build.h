@@ -63,8 +63,8 @@ int build_triangle(struct scene_build *b, const uint32_t corner[3], uint16_t lab
 int build_label(struct scene_build *b, struct text_span object, struct text_span material, uint16_t *label,
                 struct sh_err *err);
 
-/* The number, from 1, of a texture. name: its file, as the mesh or its library names it, in the folder of the mesh. An
- * image within the mesh's file comes in bytes, else NULL. *number stays where there is no memory. */
+/* The number, from 1, of a texture. name: its file, as the mesh or its library names it, in the folder of the
+ * mesh. An image within the mesh's file comes in bytes, else NULL. *number stays where there is no memory. */
 int build_texture(struct scene_build *b, struct text_span name, const void *bytes, size_t n_bytes, uint16_t *number,
                   struct sh_err *err);
 
@@ -79,8 +79,8 @@ struct text_span build_base_name(const struct scene_build *b);
 
 /* The readers. Each has the spec, and the file's name, from the builder. */
 int read_obj(struct scene_build *b, struct sh_err *err);
-/* Colours and textures of the surfaces from first_surface on, from the library that the OBJ names. Meshes often come
- * without it: then they have none, and whoever needs colours says so. */
+/* Colours and textures of the surfaces from first_surface on, from the library that the OBJ names. Meshes
+ * often come without it: then they have none, and whoever needs colours says so. */
 int read_mtl(struct scene_build *b, struct text_span name, uint32_t first_surface, struct sh_err *err);
 int read_ply(struct scene_build *b, struct sh_err *err);
 int import_assimp(struct scene_build *b, struct sh_err *err);

@@ -77,7 +77,8 @@ struct found {
     struct text_span arg[STEP_MAX_ARGS];
 };
 
-/* The record that an attribute refers to, of this type and with n attributes at least (n <= STEP_MAX_ARGS). */
+/* The record that an attribute refers to, of this type and with n attributes at least (n <=
+ * STEP_MAX_ARGS). */
 static int follow(struct reader *r, const struct step_record *from, struct text_span ref, const char *type, size_t n,
                   struct found *to)
 {
@@ -134,7 +135,8 @@ static int read_prefix(struct reader *r, const struct step_record *unit, struct 
     return fail(r, unit, "a length unit with an unknown prefix");
 }
 
-/* IFCCONVERSIONBASEDUNIT(dimensions, .LENGTHUNIT., name, #IFCMEASUREWITHUNIT(measure(x), #unit)), as of feet. */
+/* IFCCONVERSIONBASEDUNIT(dimensions, .LENGTHUNIT., name, #IFCMEASUREWITHUNIT(measure(x), #unit)), as of
+ * feet. */
 static int read_converted(struct reader *r, const struct step_record *unit, struct text_span ref, double *m)
 {
     struct found measure, si;

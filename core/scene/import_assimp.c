@@ -237,8 +237,8 @@ static int check_precision(const struct import *im, struct sh_err *err)
                       im->largest, error_m, im->b->tolerance_m);
 }
 
-/* An IFC file that was cut off reads without an error, with less in it; one in which records are missing crashes
- * Assimp. */
+/* An IFC file that was cut off reads without an error, with less in it; one in which records are missing
+ * crashes Assimp. */
 static int check_ifc(struct scene_build *b, struct sh_err *err)
 {
     static const char last[] = "END-ISO-10303-21;";

@@ -1,5 +1,5 @@
-/* The material library of an OBJ file: newmtl, Kd, the diffuse colour, and map_Kd, its texture; the rest is passed
- * over. */
+/* The material library of an OBJ file: newmtl, Kd, the diffuse colour, and map_Kd, its texture; the rest is
+ * ignored. */
 #include <stdio.h>
 #include <string.h>
 

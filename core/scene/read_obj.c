@@ -1,5 +1,5 @@
-/* Wavefront OBJ in double: v, f, o, g, usemtl, mtllib. Points and lines are counted; what has no shape is passed
- * over. */
+/* Wavefront OBJ in double: v, f, o, g, usemtl, mtllib. Points and lines are counted; what has no shape is
+ * ignored. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -22,7 +22,8 @@ static uint64_t ceil_div(u128 a, u128 b)
     return (uint64_t)((a + b - 1) / b);
 }
 
-/* Lines that the pan needs for span_fine (2^-24 micro-degrees), the first of them from r0/den on; at least one. */
+/* Lines that the pan needs for span_fine (2^-24 micro-degrees), the first of them from r0/den on; at least
+ * one. */
 static uint64_t lines_for_span(const struct schedule_segment *seg, int64_t span_fine)
 {
     const struct schedule_spec *spec = &seg->spec;
@@ -95,8 +96,9 @@ static uint32_t frame_of_line(const struct schedule_segment *seg, uint64_t n, ui
     return seg->frame0 + 1 + (uint32_t)f;
 }
 
-/* Pan at pulse k, which belongs to the frame that begins with first_line: whole micro-degrees and 2^-24 parts, rounded
- * up, so that a frame that a change cuts in two never needs a line more for what was rounded off. */
+/* Pan at pulse k, which belongs to the frame that begins with first_line: whole micro-degrees and 2^-24
+ * parts, rounded up, so that a frame that a change cuts in two never needs a line more for what was rounded
+ * off. */
 static int64_t pan_fine(const struct schedule_segment *seg, uint64_t k, uint64_t first_line)
 {
     int64_t base = first_line == seg->line0 ? seg->pan0_fine : seg->spec.pan_start_udeg * (1 << 24);
@@ -128,7 +130,8 @@ void schedule_change(struct schedule_segment *seg, const struct schedule_segment
     set_rates(&next, spec);
     next.k0 = k;
     next.t0_ns = schedule_time_ns(before, k);
-    /* The rest of a nanosecond goes over to the new rate, cut to a part of 1 / prr_uhz: it does not add up. */
+    /* The rest of a nanosecond goes over to the new rate, cut to a part of 1 / prr_uhz: it does not add
+     * up. */
     u128 rest = (before->t0_acc + (u128)(k - before->k0) * before->ns_rem) % (uint64_t)before->spec.prr_uhz;
     next.t0_acc = (uint64_t)(rest * (uint64_t)spec->prr_uhz / (uint64_t)before->spec.prr_uhz);
     next.line0 = n;
