@@ -76,9 +76,8 @@ int device_close_journal(struct device *device, struct sh_err *err);
 
 struct device_counters *device_counters(struct device *device);
 
-/* The next tick's work. Returns 0, or 1 when the run is over and there is no next tick. `released`: ticks released so
- * far. */
-int device_claim(struct device *device, uint64_t released, struct device_work *work);
+/* The next tick's work. Returns 0, or 1 when the run is over and there is no next tick. */
+int device_claim(struct device *device, struct device_work *work);
 /* A claimed tick was lost, and with it n_cast pulses to be cast, from first_cast on: counted, and what it said besides
  * points is said again in a later one. */
 void device_lost(struct device *device, const struct device_work *work, uint64_t n_cast, uint64_t first_cast);
@@ -119,7 +118,7 @@ size_t device_gnss_sentences(struct device *device, uint64_t index, char *dst, s
 /* Scans begun so far. */
 uint64_t device_scans(struct device *device);
 
-double device_tick_ns(const struct device *device);
+int64_t device_tick_ns(const struct device *device);
 
 /* The anchor of a station's points; the stretch counts only along a trajectory (site_georef). */
 void device_fill_anchor(const struct site *site, uint32_t station, size_t stretch, struct native_anchor *a);

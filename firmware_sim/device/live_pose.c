@@ -122,9 +122,9 @@ int device_head_pose(struct device *device, int64_t t_ns, struct pose *head)
     struct pose body;
     if (!site->moving || (site->n_knots == 0 && device->live.n == 0)) return 0;
     if (site->n_knots != 0) {
-        int64_t start_ns = (int64_t)device->scan_tick0 * device->tick_ns;
-        int64_t end_ns = device->scanning ? t_ns : (int64_t)device->scan_end_tick * device->tick_ns;
-        on_path(site, device->scan == 0 ? 0 : (t_ns < end_ns ? t_ns : end_ns) - start_ns, head);
+        int64_t start_ns = (int64_t)device->scan.tick0 * device->tick_ns;
+        int64_t end_ns = device->scan.on ? t_ns : (int64_t)device->scan.end_tick * device->tick_ns;
+        on_path(site, device->scan.number == 0 ? 0 : (t_ns < end_ns ? t_ns : end_ns) - start_ns, head);
         return 1;
     }
     platform_at(device, t_ns, &body);
@@ -137,14 +137,14 @@ static void make_knot(struct device *device, int64_t t_ns, struct pose_knot *kno
     const struct site *site = device->site;
     *knot = (struct pose_knot){.t_ns = t_ns};
     if (device->live.n == 0) {
-        const struct placement *at = &site->station[device->station].at;
+        const struct placement *at = &site->station[device->scan.station].at;
         memcpy(knot->pose.position_m, at->position_m, sizeof at->position_m);
         pose_from_matrix(at->rotation, knot->pose.quat);
         knot->flags = POSE_NONE;
         return;
     }
     struct pose body;
-    knot->flags = platform_at(device, (int64_t)device->scan_tick0 * device->tick_ns + t_ns, &body);
+    knot->flags = platform_at(device, (int64_t)device->scan.tick0 * device->tick_ns + t_ns, &body);
     pose_mount(&body, &site->mount, &knot->pose);
 }
 
@@ -155,7 +155,7 @@ static void count_late(struct device *device, const struct pose_knot *knot, stru
     if ((knot->flags & (POSE_LATE | POSE_NONE)) == 0) return;
     uint64_t n = atomic_fetch_add(&device->counters.late_poses, 1) + 1;
     int64_t since_ns =
-        live->n == 0 ? 0 : (int64_t)device->scan_tick0 * device->tick_ns + knot->t_ns - sample_t(live, live->n - 1);
+        live->n == 0 ? 0 : (int64_t)device->scan.tick0 * device->tick_ns + knot->t_ns - sample_t(live, live->n - 1);
     if (live->said_tick == 0 || work->tick - live->said_tick > device->tick_hz) {
         char text[96];
         snprintf(text, sizeof text,

@@ -146,7 +146,7 @@ static inline void rig_close(struct rig *rig)
 /* Claims the next tick. 0: there is none. */
 static inline int rig_claim(struct rig *rig)
 {
-    if (device_claim(rig->device, rig->next, &rig->work) != 0) {
+    if (device_claim(rig->device, &rig->work) != 0) {
         rig->over = 1;
         return 0;
     }
