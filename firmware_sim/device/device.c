@@ -112,7 +112,8 @@ int device_claim(struct device *device, struct device_work *work)
 {
     pthread_mutex_lock(&device->lock);
     /* What is still to be said has a tick more. */
-    if (device->over && device->events.n == 0 && device->overrun.ticks_said == atomic_load(&device->counters.lost_ticks)) {
+    if (device->over && device->events.n == 0 &&
+        device->overrun.ticks_said == atomic_load(&device->counters.lost_ticks)) {
         pthread_mutex_unlock(&device->lock);
         return 1;
     }
@@ -126,7 +127,8 @@ int device_claim(struct device *device, struct device_work *work)
     device_run_timers(device, tick);
     device_say_overrun(device, tick);
     device_say_pps(device, tick);
-    if (device_is_repeated(device, tick)) device_say_time(device, tick); /* who joins now knows it before the first point */
+    if (device_is_repeated(device, tick))
+        device_say_time(device, tick); /* who joins now knows it before the first point */
     device_take_events(device, work);
     work->n_events_before = work->n_events;
     if (device->scan.on) device_claim_scan(device, tick, work);
@@ -144,9 +146,10 @@ int device_claim(struct device *device, struct device_work *work)
 int device_is_idle(struct device *device)
 {
     pthread_mutex_lock(&device->lock);
-    int still = device->machine.state == HEAD_IDLE || device->machine.state == HEAD_FAULT || device->machine.state == HEAD_OFF;
-    int idle = still && device->machine.due_tick == UINT64_MAX && device->events.n == 0 && !device->ending && !device->over &&
-               device->journal.at == device->journal.n_replay && device->end_tick == UINT64_MAX;
+    int still =
+        device->machine.state == HEAD_IDLE || device->machine.state == HEAD_FAULT || device->machine.state == HEAD_OFF;
+    int idle = still && device->machine.due_tick == UINT64_MAX && device->events.n == 0 && !device->ending &&
+               !device->over && device->journal.at == device->journal.n_replay && device->end_tick == UINT64_MAX;
     pthread_mutex_unlock(&device->lock);
     return idle;
 }

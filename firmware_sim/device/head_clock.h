@@ -20,7 +20,7 @@
 
 struct head_clock {
     enum epoch_source source; /* EPOCH_NONE: the head does not know the time */
-    int64_t tai0_ns;               /* true TAI at power-up */
+    int64_t tai0_ns;          /* true TAI at power-up */
     int64_t offset_ns, drift_ppt, jump_ns, jump_at_ns;
     struct utc_table table;
     char warning[160]; /* something the user should know; empty: nothing */

@@ -57,6 +57,7 @@ void device_lost(struct device *device, const struct device_work *work, uint64_t
     if (first_cast < device->overrun.first) device->overrun.first = first_cast;
     take_back(device, work);
     if (work->describe && work->describe_flags == 0 && device->scan.on) device->scan.describe = 1;
-    if (work->scanning && work->stretch != device->scan.stretch) device->scan.anchor_lost = 1; /* maybe not in this tick */
+    if (work->scanning && work->stretch != device->scan.stretch)
+        device->scan.anchor_lost = 1; /* maybe not in this tick */
     pthread_mutex_unlock(&device->lock);
 }

@@ -7,7 +7,8 @@
 static void note_change(struct device *device, uint64_t tick, enum head_state state)
 {
     if (device->machine.n_changes == DEVICE_MAX_CHANGES) {
-        memmove(device->machine.change, device->machine.change + 1, (DEVICE_MAX_CHANGES - 1) * sizeof device->machine.change[0]);
+        memmove(device->machine.change, device->machine.change + 1,
+                (DEVICE_MAX_CHANGES - 1) * sizeof device->machine.change[0]);
         device->machine.n_changes--;
     }
     device->machine.change[device->machine.n_changes].tick = tick;

@@ -21,8 +21,7 @@ void device_say_pps(struct device *device, uint64_t tick)
 {
     const struct head_clock *clock = &device->clock;
     int64_t t_ns = (int64_t)tick * device->tick_ns, edge_ns, tai_s;
-    if (clock->source == EPOCH_NONE || !head_clock_edge(clock, t_ns, t_ns + device->tick_ns, &edge_ns, &tai_s))
-        return;
+    if (clock->source == EPOCH_NONE || !head_clock_edge(clock, t_ns, t_ns + device->tick_ns, &edge_ns, &tai_s)) return;
     int64_t tai_ns = tai_s * UTC_SECOND_NS;
     char text[UTC_TEXT_LEN];
     struct utc_time utc;

@@ -89,8 +89,8 @@ void loop_print_endpoints(const struct loop *loop, FILE *out)
     for (uint32_t i = 0; i < loop->links.n; i++) {
         char text[512];
         pump_endpoint(loop->links.pump[i], text, sizeof text);
-        fprintf(out, "%s{\"type\":\"%s\",\"endpoint\":\"%s\"%s}", i == 0 ? "" : ",", pump_type(loop->links.pump[i]), text,
-                pump_is_nmea(loop->links.pump[i]) ? ",\"protocol\":\"nmea\"" : "");
+        fprintf(out, "%s{\"type\":\"%s\",\"endpoint\":\"%s\"%s}", i == 0 ? "" : ",", pump_type(loop->links.pump[i]),
+                text, pump_is_nmea(loop->links.pump[i]) ? ",\"protocol\":\"nmea\"" : "");
     }
     if (loop->feed != NULL) {
         char text[512];

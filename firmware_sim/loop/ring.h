@@ -47,11 +47,11 @@ struct ring_tick {
     uint32_t len;
     int wake;   /* readers are woken at release though there are no frames */
     int broken; /* the frames could not be kept: the line they were of has a gap */
+    uint32_t n_marks;
+    struct ring_mark *mark;
     uint64_t n_fired, n_cast, n_lines;
     struct ring_hits hits; /* of the whole tick */
     struct ring_hits tail; /* after the last mark */
-    struct ring_mark *mark;
-    uint32_t n_marks;
 };
 
 struct ring_slot {

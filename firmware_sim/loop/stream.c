@@ -47,8 +47,7 @@ static void finish_lines(struct stream *stream, struct ring_tick *tick)
         mark->end.n_crowded = stream->line.crowded;
         mark->end.n_faint = stream->line.faint;
         mark->end.n_unfit = stream->line.unfit;
-        native_encode_line_end(tick->bytes + mark->frame_at, tick->len - mark->frame_at, &mark->end,
-                               mark->scan_t0_ns);
+        native_encode_line_end(tick->bytes + mark->frame_at, tick->len - mark->frame_at, &mark->end, mark->scan_t0_ns);
         stream->line = (struct ring_hits){0};
         stream->line_broken = 0;
     }

@@ -38,9 +38,9 @@ struct stream {
     struct stream_reader reader[RING_MAX_READERS];
 
     /* of the pacing thread alone until the stream is over */
-    uint32_t seq;          /* of the next frame */
-    struct ring_hits line; /* of the line so far */
-    int line_broken;       /* a tick was lost since the last line end */
+    uint32_t seq;                                  /* of the next frame */
+    struct ring_hits line;                         /* of the line so far */
+    int line_broken;                               /* a tick was lost since the last line end */
     _Atomic int64_t first_pulse_ns, last_pulse_ns; /* when released; 0: not yet */
 
     _Atomic uint64_t granted;    /* step: ticks that may pass */

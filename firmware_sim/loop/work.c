@@ -63,8 +63,8 @@ void worker_free(struct worker *worker)
 /* Bytes of so many points and lines. Each part of a line is a frame of its own. */
 static uint32_t line_bytes(const struct config *cfg, uint32_t n_points, uint32_t lines)
 {
-    uint32_t bytes = (uint32_t)native_points_bound(n_points) +
-                     lines * (LINE_END_BYTES + NATIVE_HEADER_LEN + NATIVE_POINTS_HEAD_LEN);
+    uint32_t bytes =
+        (uint32_t)native_points_bound(n_points) + lines * (LINE_END_BYTES + NATIVE_HEADER_LEN + NATIVE_POINTS_HEAD_LEN);
     if (cfg->output.attributes)
         bytes += (uint32_t)native_attributes_bound(n_points) +
                  lines * (uint32_t)(NATIVE_HEADER_LEN + NATIVE_ATTRIBUTES_HEAD_LEN);
@@ -125,8 +125,7 @@ static void fill_heads(struct worker *worker, const struct device_work *work)
         add_event(worker, work, i);
     if (work->describe) {
         int flags = work->describe_flags;
-        added(worker,
-              native_encode_descriptor(end_of(worker), room_of(worker), &work->descriptor, work->t_ns, flags));
+        added(worker, native_encode_descriptor(end_of(worker), room_of(worker), &work->descriptor, work->t_ns, flags));
         add_anchor(worker, &work->anchor, work->t_ns, flags);
     }
     uint32_t first = work->surfaces_first, left = work->surfaces_n;
@@ -187,8 +186,7 @@ static void take_poses(struct worker *worker, const struct device_work *work)
         memcpy(p->position_m, k->pose.position_m, sizeof p->position_m);
         memcpy(p->quat, k->pose.quat, sizeof p->quat);
     }
-    added(worker,
-          native_encode_poses(end_of(worker), room_of(worker), worker->pose, setup->n_knots, work->t_ns, 0));
+    added(worker, native_encode_poses(end_of(worker), room_of(worker), worker->pose, setup->n_knots, work->t_ns, 0));
 }
 
 /* Points behind it are about another place (site_georef). */
@@ -338,8 +336,7 @@ const struct ring_tick *worker_fill(struct worker *worker, const struct device_w
     for (uint32_t i = work->n_events_before; i < work->n_events; i++)
         add_event(worker, work, i);
     if (work->telemetry)
-        added(worker,
-              native_encode_telemetry(end_of(worker), room_of(worker), &work->telemetry_frame, work->t_ns, 0));
+        added(worker, native_encode_telemetry(end_of(worker), room_of(worker), &work->telemetry_frame, work->t_ns, 0));
     return &worker->tick;
 }
 
