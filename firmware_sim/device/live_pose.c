@@ -100,18 +100,9 @@ static uint32_t platform_at(const struct device *device, int64_t t_ns, struct po
 static void on_path(const struct site *site, int64_t t_ns, struct pose *out)
 {
     const struct pose_knot *knot = site->knot;
-    size_t low = 0, high = site->n_knots; /* knot[low] is at or before t, knot[high] behind */
-    *out = knot[0].pose;
-    if (t_ns <= knot[0].t_ns) return;
-    while (high - low > 1) {
-        size_t middle = low + (high - low) / 2;
-        if (knot[middle].t_ns <= t_ns)
-            low = middle;
-        else
-            high = middle;
-    }
+    size_t low = pose_find_knot(knot, site->n_knots, t_ns), high = low + 1;
     *out = knot[low].pose;
-    if (high < site->n_knots)
+    if (t_ns > knot[0].t_ns && high < site->n_knots)
         pose_between(&knot[low].pose, &knot[high].pose,
                      (double)(t_ns - knot[low].t_ns) / (double)(knot[high].t_ns - knot[low].t_ns), out);
 }

@@ -146,14 +146,7 @@ static uint32_t choose_knots(struct worker *worker, int64_t from_ns, int64_t to_
 {
     const struct site *site = worker->site;
     const struct pose_knot *knot = site->knot;
-    size_t lo = 0, hi = site->n_knots;
-    while (hi - lo > 1) {
-        size_t mid = lo + (hi - lo) / 2;
-        if (knot[mid].t_ns <= from_ns)
-            lo = mid;
-        else
-            hi = mid;
-    }
+    size_t lo = pose_find_knot(knot, site->n_knots, from_ns), hi;
     for (hi = lo; hi + 1 < site->n_knots && knot[hi].t_ns < to_ns;)
         hi++;
     size_t stride = (hi - lo) / (NATIVE_MAX_POSES - 2) + 1;
