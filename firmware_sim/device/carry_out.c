@@ -17,7 +17,7 @@ static void change_settings(struct device *device)
 static void stop(struct device *device, enum head_event event, uint64_t tick)
 {
     if (device->scan.on)
-        device->scan.stop_requested = 1; /* the next claim ends the scan and tells the state machine */
+        device->scan.stop_requested = 1; /* the next claim ends the scan, and then the state changes */
     else
         device_transition(device, event, tick);
 }

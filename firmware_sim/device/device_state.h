@@ -8,7 +8,7 @@
 #include "firmware_sim/device/gnss.h"
 #include "firmware_sim/device/head_clock.h"
 
-/* Poses of a live platform. Each tick begins with one of the head, made once, from those that had come. */
+/* Poses of a live platform. Each tick begins with a pose of the head, made once from the poses that had come. */
 struct device_live {
     struct {
         int64_t t_ns;     /* device time */

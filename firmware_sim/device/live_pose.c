@@ -33,7 +33,8 @@ static int is_near(const struct device *device, const struct pose *pose)
     return d2 <= device->site->cfg->platform.reach_m * device->site->cfg->platform.reach_m;
 }
 
-/* So far ahead that the time must be wrong: taken, it would keep all right ones out. A step's end is granted time. */
+/* So far ahead that the time must be wrong. Such a pose would keep all later ones out. In the pace step the time is
+ * granted, and so right. */
 static int is_early(const struct device *device, int64_t t_ns)
 {
     int64_t now_ns = (int64_t)device->next_tick * device->tick_ns;
@@ -62,7 +63,7 @@ int device_pose_numbers(struct device *device, int64_t t_ns, const double v[6])
     return device_pose(device, t_ns, &pose);
 }
 
-/* Beyond the last pose: as the last two go on, for some time and within reach; then it stands. */
+/* After the last pose: on as from the one before to the last, for extrapolate_ms and within reach. Then it stands. */
 static uint32_t extrapolate(const struct device *device, int64_t t_ns, struct pose *out)
 {
     const struct device_live *live = &device->live;
@@ -96,7 +97,7 @@ static uint32_t platform_at(const struct device *device, int64_t t_ns, struct po
     return 0;
 }
 
-/* On the trajectory; it stands before its begin and behind its end. */
+/* On the trajectory. The platform stands before its begin and after its end. */
 static void on_path(const struct site *site, int64_t t_ns, struct pose *out)
 {
     const struct pose_knot *knot = site->knot;

@@ -23,7 +23,7 @@ struct pose_feed {
     char endpoint[96];
     pthread_t thread;
     int running;
-    int64_t told_ns; /* when a bad line was told last */
+    int64_t reported_ns; /* when a bad line was reported last */
     char text[DATAGRAM + 1];
 };
 
@@ -45,11 +45,11 @@ int pose_feed_parse(const char *line, int64_t *t_ns, double pose[6])
     return 0;
 }
 
-static void tell_bad(struct pose_feed *feed, const char *what)
+static void report_bad(struct pose_feed *feed, const char *what)
 {
     int64_t now_ns = clock_now_ns();
-    if (feed->told_ns != 0 && now_ns - feed->told_ns < 1000000000) return;
-    feed->told_ns = now_ns;
+    if (feed->reported_ns != 0 && now_ns - feed->reported_ns < 1000000000) return;
+    feed->reported_ns = now_ns;
     device_report(feed->device, CMD_E_DATA_TYPE, what);
 }
 
@@ -60,9 +60,9 @@ static void take_line(struct pose_feed *feed, const char *line)
     if (line[strspn(line, " \t\r")] == '\0') return;
     if (pose_feed_parse(line, &t_ns, pose) != 0) {
         atomic_fetch_add(&device_counters(feed->device)->bad_poses, 1);
-        tell_bad(feed, "a pose that is not t_s x y z roll pitch heading");
+        report_bad(feed, "a pose that is not t_s x y z roll pitch heading");
     } else if (device_pose_numbers(feed->device, t_ns, pose) != 0) {
-        tell_bad(feed, "a pose out of platform.reach_m, not after the last one, or over 1 h ahead");
+        report_bad(feed, "a pose out of platform.reach_m, not after the last one, or over 1 h ahead");
     }
 }
 

@@ -140,8 +140,9 @@ static void fill_heads(struct worker *worker, const struct device_work *work)
     }
 }
 
-/* All poses from the last at or before the first pulse to the first at or behind the last one. Of a trajectory with
- * more than a frame holds (pulses far apart) only some: what goes out is what is cast with in any case. */
+/* All poses from the last one at or before the first pulse to the first one at or after the last pulse. A trajectory
+ * may have more of them than a frame holds, when pulses are far apart. Then only some are chosen. The poses that are
+ * sent are always those that pulses are cast with. */
 static uint32_t choose_knots(struct worker *worker, int64_t from_ns, int64_t to_ns)
 {
     const struct site *site = worker->site;
@@ -154,7 +155,7 @@ static uint32_t choose_knots(struct worker *worker, int64_t from_ns, int64_t to_
     for (size_t i = lo; i < hi; i += stride)
         worker->knot[n++] = knot[i];
     worker->knot[n++] = knot[hi];
-    if (n == 1 || knot[hi].t_ns < to_ns) { /* behind its end the head stands */
+    if (n == 1 || knot[hi].t_ns < to_ns) { /* after its end the head stands */
         worker->knot[n] = knot[hi];
         worker->knot[n++].t_ns = to_ns > knot[hi].t_ns ? to_ns : knot[hi].t_ns + 1;
     }
@@ -182,7 +183,7 @@ static void take_poses(struct worker *worker, const struct device_work *work)
     added(worker, native_encode_poses(end_of(worker), room_of(worker), worker->pose, setup->n_knots, work->t_ns, 0));
 }
 
-/* Points behind it are about another place (site_georef). */
+/* An anchor for the points that follow, which are about another place (site_georef). */
 static void move_anchor(struct worker *worker, const struct device_work *work, size_t stretch)
 {
     struct native_anchor anchor;
@@ -193,8 +194,8 @@ static void move_anchor(struct worker *worker, const struct device_work *work, s
     add_anchor(worker, &anchor, work->t_ns, 0);
 }
 
-/* Where the path of a moving head enters another stretch: what is needed for pulse k and those that follow on it,
- * before the one that is returned. */
+/* Prepares what pulse k needs on its stretch of a moving head's path. Returns the first pulse on another stretch, or
+ * end. */
 static uint64_t enter_stretch(struct worker *worker, const struct device_work *work, uint64_t k, uint64_t end)
 {
     const struct site *site = worker->site;
@@ -264,8 +265,7 @@ static void end_line(struct worker *worker, const struct device_work *work, cons
     int partial = end < line->pulse_end;
     uint64_t cast_end = line->cast_end < end ? line->cast_end : end;
     uint64_t cast_here = cast_end > line->cast0 ? cast_end - line->cast0 : 0;
-    uint64_t last =
-        end > seg->k0 ? end - 1 : end; /* stopped at once after a change of settings: there is no nearer pulse */
+    uint64_t last = end > seg->k0 ? end - 1 : end; /* stopped right after a change of settings: no pulse is nearer */
     double mirror_turn = schedule_mirror_turn(seg, last), pan_turn = schedule_pan_turn(seg, last);
     if (setup->detect != NULL && setup->detect->instrument != NULL)
         instrument_read(setup->detect->instrument, 1, &mirror_turn, &pan_turn);
@@ -315,7 +315,7 @@ static void fill_pulses(struct worker *worker, const struct device_work *work)
     if (worker->site->moving && work->pulse_end > work->pulse0) /* in the blind part of a line, too */
         move_anchor(worker, work, site_stretch_at(worker->site, schedule_time_ns(&work->segment, work->pulse_end - 1)));
     if (!work->cut_short) return;
-    /* The line that was stopped in, be some of its pulses in this tick or all in earlier ones. */
+    /* The line that was stopped. Its pulses are in this tick or in earlier ones. */
     struct schedule_line line;
     schedule_get_line(&work->segment, schedule_line_of(&work->segment, work->pulse_end), &line);
     if (line.begin < work->pulse_end) end_line(worker, work, &line, work->pulse_end);
