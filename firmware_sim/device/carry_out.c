@@ -46,7 +46,7 @@ static void carry_out(struct device *device, enum command_effect effect, uint64_
     }
 }
 
-void device_do_command(struct device *device, uint32_t session, const char *line, uint64_t released,
+static void do_command(struct device *device, uint32_t session, const char *line, uint64_t released,
                        struct command_result *out)
 {
     struct command_device *cmd = &device->cmd;
@@ -67,7 +67,7 @@ void device_command(struct device *device, uint32_t session, const char *line, u
                     struct command_result *out)
 {
     pthread_mutex_lock(&device->lock);
-    device_do_command(device, session, line, released, out);
+    do_command(device, session, line, released, out);
     pthread_mutex_unlock(&device->lock);
 }
 
@@ -111,6 +111,6 @@ void device_run_replay(struct device *device, uint64_t tick)
     while (device->journal.at < device->journal.n_replay && device->journal.replay[device->journal.at].tick <= tick) {
         const struct journal_entry *entry = &device->journal.replay[device->journal.at++];
         struct command_result result;
-        device_do_command(device, 0, entry->line, (uint64_t)(entry->t_ns / device->tick_ns), &result);
+        do_command(device, 0, entry->line, (uint64_t)(entry->t_ns / device->tick_ns), &result);
     }
 }

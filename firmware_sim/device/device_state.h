@@ -120,8 +120,6 @@ int device_is_repeated(const struct device *device, uint64_t tick);
 void device_say_overrun(struct device *device, uint64_t tick);
 
 /* carry_out.c */
-void device_do_command(struct device *device, uint32_t session, const char *line, uint64_t released,
-                       struct command_result *out);
 /* Commands of the replayed journal that are due at the tick. */
 void device_run_replay(struct device *device, uint64_t tick);
 

@@ -58,9 +58,3 @@ void links_close(struct links *links)
     for (uint32_t i = 0; i < links->n; i++)
         pump_close(links->pump[i]);
 }
-
-int links_check(const struct links *links, struct sh_err *err)
-{
-    if (!atomic_load(&links->failed)) return SH_OK;
-    return sh_fail(err, links->error.code, "%s", links->error.text);
-}

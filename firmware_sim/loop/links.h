@@ -28,7 +28,5 @@ int links_start(struct links *links, struct sh_err *err);
 /* Waits until the links have brought out what their readers take. */
 void links_join(struct links *links);
 void links_close(struct links *links);
-/* 0, or what kept a link from getting all it should. */
-int links_check(const struct links *links, struct sh_err *err);
 
 #endif

@@ -159,7 +159,9 @@ static void fill_stats(struct loop *loop, struct loop_stats *stats)
 
 int loop_check_links(const struct loop *loop, struct sh_err *err)
 {
-    return links_check(&loop->links, err);
+    const struct links *links = &loop->links;
+    if (!atomic_load(&links->failed)) return SH_OK;
+    return sh_fail(err, links->error.code, "%s", links->error.text);
 }
 
 void loop_join(struct loop *loop, struct loop_stats *stats)

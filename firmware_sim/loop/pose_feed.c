@@ -27,7 +27,8 @@ struct pose_feed {
     char text[DATAGRAM + 1];
 };
 
-int pose_feed_parse(const char *line, int64_t *t_ns, double pose[6])
+/* One line as time and x, y, z, roll, pitch, heading. 0, or -1 when it is malformed. */
+static int parse_line(const char *line, int64_t *t_ns, double pose[6])
 {
     static const double most[7] = {1e9, 1e9, 1e9, 1e9, 360.0, 90.0, 360.0};
     double v[7];
@@ -58,7 +59,7 @@ static void take_line(struct pose_feed *feed, const char *line)
     int64_t t_ns;
     double pose[6];
     if (line[strspn(line, " \t\r")] == '\0') return;
-    if (pose_feed_parse(line, &t_ns, pose) != 0) {
+    if (parse_line(line, &t_ns, pose) != 0) {
         atomic_fetch_add(&device_counters(feed->device)->bad_poses, 1);
         report_bad(feed, "a pose that is not t_s x y z roll pitch heading");
     } else if (device_pose_numbers(feed->device, t_ns, pose) != 0) {

@@ -26,7 +26,4 @@ void pose_feed_endpoint(const struct pose_feed *feed, char *buf, size_t len);
 /* Ends the thread; feed may be NULL. */
 void pose_feed_close(struct pose_feed *feed);
 
-/* One line as time and x, y, z, roll, pitch, heading. 0, or -1 when it is malformed. */
-int pose_feed_parse(const char *line, int64_t *t_ns, double v[6]);
-
 #endif

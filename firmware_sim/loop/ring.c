@@ -59,14 +59,6 @@ void ring_free(struct ring *ring)
     ring->slot = NULL;
 }
 
-size_t ring_bytes(const struct ring *ring)
-{
-    size_t bytes = ring->n_slots * sizeof *ring->slot;
-    for (uint64_t i = 0; i < ring->n_slots; i++)
-        bytes += ring->slot[i].room;
-    return bytes;
-}
-
 static int is_being_read(struct ring *ring, uint64_t tick)
 {
     for (int i = 0; i < RING_MAX_READERS; i++)

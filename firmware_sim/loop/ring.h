@@ -79,8 +79,6 @@ struct ring_size {
 
 int ring_create(struct ring *ring, const struct ring_size *size, struct sh_err *err);
 void ring_free(struct ring *ring);
-/* Bytes of all slots. Nobody may be at work in them. */
-size_t ring_bytes(const struct ring *ring);
 
 /* The slot for `tick`, empty; or NULL when the tick is lost already. */
 struct ring_slot *ring_claim(struct ring *ring, uint64_t tick);
