@@ -1,5 +1,7 @@
 #include "firmware_sim/loop/links.h"
 
+#include <math.h>
+
 #include "drivers/protocol/native.h"
 #include "firmware_sim/loop/pump.h"
 
@@ -22,9 +24,10 @@ static int check_capacity(const struct config *cfg, const struct pump *pump, str
     char endpoint[300];
     if (capacity <= 0.0 || capacity >= rate || pump_is_nmea(pump)) return SH_OK;
     pump_endpoint(pump, endpoint, sizeof endpoint);
-    return sh_fail(err, SH_EINPUT, "link %s: the stream has %.2f MB/s, the link carries %.2f MB/s; lower head.prr_hz%s",
-                   endpoint, 1e-6 * rate, 1e-6 * capacity,
-                   cfg->output.attributes ? ", or leave out output.attributes" : "");
+    return sh_fail(
+        err, SH_EINPUT, "link %s: the stream has %.2f MB/s, the link carries %.2f MB/s; lower head.prr_hz to %.0f%s",
+        endpoint, 1e-6 * rate, 1e-6 * capacity, floor(1e-6 * (double)cfg->head.settings.prr_uhz * capacity / rate),
+        cfg->output.attributes ? ", or leave out output.attributes" : "");
 }
 
 int links_open(struct links *links, const struct config *cfg, const struct link_spec *extra, struct sh_err *err)

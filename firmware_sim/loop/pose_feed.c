@@ -19,6 +19,7 @@ enum { DATAGRAM = 65536 };
 
 struct pose_feed {
     struct device *device;
+    double reach_m; /* from the station */
     int fd, stop_fd;
     char endpoint[96];
     pthread_t thread;
@@ -63,7 +64,10 @@ static void take_line(struct pose_feed *feed, const char *line)
         atomic_fetch_add(&device_counters(feed->device)->bad_poses, 1);
         report_bad(feed, "a pose that is not t_s x y z roll pitch heading");
     } else if (device_pose_numbers(feed->device, t_ns, pose) != 0) {
-        report_bad(feed, "a pose out of platform.reach_m, not after the last one, or over 1 h ahead");
+        char text[96];
+        snprintf(text, sizeof text, "a pose over %g m from the station, not after the last one, or over 1 h ahead",
+                 feed->reach_m);
+        report_bad(feed, text);
     }
 }
 
@@ -119,6 +123,7 @@ int pose_feed_open(struct device *device, const struct config *cfg, struct pose_
     struct pose_feed *feed = calloc(1, sizeof *feed);
     if (feed == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     feed->device = device;
+    feed->reach_m = cfg->platform.reach_m;
     feed->fd = -1;
     feed->stop_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     int rc = feed->stop_fd < 0 ? sh_fail(err, SH_EIO, "eventfd: %s", strerror(errno)) : SH_OK;
