@@ -128,15 +128,11 @@ static void fill_heads(struct worker *worker, const struct device_work *work)
         added(worker, native_encode_descriptor(end_of(worker), room_of(worker), &work->descriptor, work->t_ns, flags));
         add_anchor(worker, &work->anchor, work->t_ns, flags);
     }
-    uint32_t first = work->surfaces_first, left = work->surfaces_n;
-    while (left != 0) {
-        uint32_t done = 0;
-        size_t len = native_encode_surfaces(end_of(worker), room_of(worker), first, left, 8192, surface_name,
-                                            (void *)(uintptr_t)worker->site, work->t_ns, 0, &done);
-        if (len == 0 || done == 0) break;
+    struct native_names names = {work->surfaces_first, work->surfaces_n, surface_name, (void *)(uintptr_t)worker->site};
+    while (names.n != 0) {
+        size_t len = native_encode_surfaces(end_of(worker), room_of(worker), 8192, &names, work->t_ns);
+        if (len == 0) break;
         added(worker, len);
-        first += done;
-        left -= done;
     }
 }
 
