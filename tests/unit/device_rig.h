@@ -100,8 +100,6 @@ struct rig {
     struct site *site;
     struct device *device;
     struct worker *worker;
-    struct ring ring;
-    uint32_t slot_bytes;
     uint64_t next;           /* tick to be claimed */
     struct device_work work; /* the last one claimed */
     int over;
@@ -126,15 +124,12 @@ static inline struct rig *rig_open(const struct device_options *options, const c
     need(site_load(rig->cfg, NULL, &rig->site, &err), &err);
     need(device_create(rig->site, options != NULL ? options : &none, &rig->device, &err), &err);
     need(worker_create(rig->site, &rig->worker, &err), &err);
-    rig->slot_bytes = worker_slot_bytes(rig->site);
-    need(ring_create(&rig->ring, 1, 1, rig->slot_bytes, &err), &err);
     return rig;
 }
 
 static inline void rig_close(struct rig *rig)
 {
     struct sh_err err;
-    ring_free(&rig->ring);
     worker_free(rig->worker);
     need(device_close_journal(rig->device, &err), &err);
     device_free(rig->device);
@@ -146,7 +141,7 @@ static inline void rig_close(struct rig *rig)
 /* Claims the next tick. 0: there is none. */
 static inline int rig_claim(struct rig *rig)
 {
-    if (device_claim(rig->device, rig->next, &rig->work) != 0) {
+    if (device_claim(rig->device, &rig->work) != 0) {
         rig->over = 1;
         return 0;
     }
@@ -162,16 +157,12 @@ static inline void rig_go_to(struct rig *rig, uint64_t tick)
         assert_true(rig_claim(rig));
 }
 
-/* Fills the last tick claimed; the slot's bytes are good until the next call. */
-static inline const struct ring_slot *rig_fill(struct rig *rig)
+/* Makes the last tick claimed; it is good until the next call. */
+static inline const struct ring_tick *rig_fill(struct rig *rig)
 {
-    struct ring_slot *slot = ring_claim(&rig->ring, rig->work.tick);
-    assert_non_null(slot);
-    worker_fill(rig->worker, &rig->work, slot, rig->slot_bytes);
-    assert_true(slot->len <= rig->slot_bytes && slot->n_marks <= RING_MAX_MARKS);
-    assert_true(ring_ready(&rig->ring, slot, rig->work.tick));
-    ring_release(&rig->ring, rig->work.tick);
-    return slot;
+    const struct ring_tick *tick = worker_fill(rig->worker, &rig->work);
+    assert_true(tick->len <= worker_tick_bytes(rig->site) && tick->n_marks <= RING_MAX_MARKS);
+    return tick;
 }
 
 /* A command that must be taken, as of `released`; the reply is good until the next call. */
