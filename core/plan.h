@@ -39,10 +39,18 @@ struct plan_row {
     struct plan_option left[PLAN_MAX_OPTIONS]; /* what was left out; why_not says why */
 };
 
-/* Chooses, of n options, and fills row (stage, method, figures, forced, left, why). forced: the option
- * that the configuration names, by `key`; -1: none. Returns the number of the option. */
-uint32_t plan_choose(struct plan_row *row, const char *stage, const struct plan_option *option, uint32_t n, int forced,
-                     const char *key, const struct plan_tolerance *tolerance);
+/* What is to be chosen. */
+struct plan_choice {
+    const char *stage;
+    const struct plan_option *option; /* [n], from rough to exact */
+    uint32_t n;
+    int forced;      /* number of the option that the configuration names; -1: none */
+    const char *key; /* that names it */
+    struct plan_tolerance tolerance;
+};
+
+/* Chooses, fills row (stage, method, figures, forced, left, why) and returns the number of the option. */
+uint32_t plan_choose(const struct plan_choice *choice, struct plan_row *row);
 /* Whether an option's bounds hold. */
 int plan_holds(const struct plan_option *option, const struct plan_tolerance *tolerance);
 

@@ -44,9 +44,9 @@ static void leave_out(const struct georef *georef, const struct plan_georef_need
         snprintf(left->method, sizeof left->method, "%s", methods[m].name);
         snprintf(left->why_not, sizeof left->why_not, "%s",
                  !isfinite(left->error_m)            ? "it has no bound here"
-                 : left->error_m > need->tolerance_m ? "off by more than the tolerance"
+                 : left->error_m > need->tolerance_m ? "its error is above the tolerance"
                  : need->forced != GEOREF_AUTO       ? "not asked for"
-                                                     : "dearer, or no better");
+                                                     : "costs more, or is no better");
     }
 }
 

@@ -54,10 +54,10 @@ static void print_output(const struct config *cfg, const struct site *site)
 {
     int heights = cfg->output.crs == GEOREF_UTM || cfg->output.crs == GEOREF_GEODETIC;
     printf("output    %s, %g m per count%s\n", cfg->output.layout == LINE_GEO ? "geo" : "polar", site->scale_m,
-           !heights                       ? ""
-           : site->geoid != NULL          ? ", heights above the geoid"
+           !heights                              ? ""
+           : site->geoid != NULL                 ? ", heights above the geoid"
            : cfg->output.heights == HEIGHTS_AUTO ? ", heights above the ellipsoid (no geoid data is installed)"
-                                          : ", heights above the ellipsoid");
+                                                 : ", heights above the ellipsoid");
 }
 
 static int print_summary(const struct config *cfg, const struct site *site, struct sh_err *err)
@@ -86,7 +86,7 @@ static int print_time(const struct config *cfg, struct sh_err *err)
     struct utc_time utc;
     char now[UTC_TEXT_LEN], end[UTC_TEXT_LEN];
     int rc = head_clock_create(cfg, &clock, err);
-    if (rc != SH_OK || clock.source == HEAD_CLOCK_NONE) return rc;
+    if (rc != SH_OK || clock.source == EPOCH_NONE) return rc;
     utc_from_tai(&clock.table, clock.tai0_ns, &utc);
     utc_format(&utc, 0, now);
     utc_from_tai(&clock.table, utc_tai_from_posix(&clock.table, clock.table.expires_s * UTC_SECOND_NS), &utc);

@@ -7,7 +7,7 @@
 #include "core/plan.h"
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/base/json.h"
-#include "firmware_sim/site/plan_rows.h"
+#include "firmware_sim/site/site.h"
 
 static const char HELP[] =
     "scanhead plan CONFIG [options]: the method each stage will use, its error bound, its cost, why, and what was left "
@@ -125,9 +125,7 @@ static int plan_config(const struct app_sets *sets, const char *path, int as_jso
     struct site *site = NULL;
     struct config *cfg = app_load_config(path, sets, &status);
     if (cfg == NULL) return status;
-    cfg->beam.measures = 1;
-    int rc = site_load(cfg, &app_report_stderr, &site, &err);
-    if (rc == SH_OK) rc = site_plan_rows(site, &app_report_stderr, &err);
+    int rc = site_load_plan(cfg, &app_report_stderr, &site, &err);
     if (rc == SH_OK) rc = as_json ? print_json(&site->plan, &err) : print_text(&site->plan);
     site_free(site);
     free(cfg);

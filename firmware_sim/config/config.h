@@ -16,6 +16,7 @@
 #include "core/err.h"
 #include "core/georef.h"
 #include "core/line.h"
+#include "core/plan.h"
 #include "core/scene.h"
 #include "core/schedule.h"
 #include "core/surface.h"
@@ -65,9 +66,14 @@ struct config_mesh {
     enum scene_up up;
     double scale, offset_m[3];
     /* Motion, at time t of the scan: turned by turn_deg_s * t about the vertical through pivot_m, clockwise seen from
-     * above, then shifted by move_m_s * t; with cycle_s, forth and back. All zero: the mesh stands still. */
+     * above, then shifted by move_m_s * t; with cycle_s, back and forth. All zero: the mesh stands still. */
     double move_m_s[3], turn_deg_s, pivot_m[3], cycle_s;
 };
+
+static inline int config_mesh_moves(const struct config_mesh *mesh)
+{
+    return mesh->turn_deg_s != 0.0 || mesh->move_m_s[0] != 0.0 || mesh->move_m_s[1] != 0.0 || mesh->move_m_s[2] != 0.0;
+}
 
 /* How the scene lies on the Earth; core/geoframe.h. */
 enum config_anchor_source { ANCHOR_NONE, ANCHOR_EXPLICIT, ANCHOR_IFC, ANCHOR_UTM, ANCHOR_ECEF };
@@ -192,13 +198,7 @@ struct config_output {
 
 struct config_beam {
     enum beam_mode mode;
-    int measures; /* no key: `plan` casts footprints to measure what a forced beam is off, be it single rays */
     uint32_t rings;
-};
-
-/* Tolerances of the plan. */
-struct config_plan {
-    double tolerance_m, echo_tolerance;
 };
 
 struct config_noise {
@@ -234,7 +234,7 @@ struct config {
     struct link_spec link[CONFIG_MAX_LINKS];
     uint32_t n_links;
     struct config_beam beam;
-    struct config_plan plan;
+    struct plan_tolerance plan;
     struct config_noise noise;
     struct config_signal signal;
     struct surface_rule surface[CONFIG_MAX_SURFACES];
@@ -249,9 +249,6 @@ struct config {
 /* Reads path, its profile, then the `key=value` settings in order (as from --set, each checked the same way, named
  * `--set KEY` in errors). On failure cfg is unspecified. cfg is large: allocate it. */
 int config_load(const char *path, const char *const *sets, int n_sets, struct config *cfg, struct sh_err *err);
-
-/* Whether pulses are followed through glass or off mirrors. */
-int config_has_optics(const struct config *cfg);
 
 /* What a profile says about the signal; the rest of it (sharp, extinction, seed) is 0. */
 void config_signal_spec(const struct config_profile *profile, struct detect_signal_spec *spec);

@@ -11,7 +11,7 @@
 #include <unistd.h>
 
 #include "drivers/usb/backend.h"
-#include "firmware_sim/device/head_clock.h"
+#include "firmware_sim/base/epoch.h"
 
 /* Of two keys that contradict, the one to name: the first unless only the second was given. */
 static const char *given_of(const struct cfg_reader *rd, const char *first, const char *second)
@@ -121,7 +121,7 @@ static void tidy_choice(enum config_choice *choice)
 static int check_output(const struct cfg_reader *rd, struct config *cfg)
 {
     cfg->output.layout_given = cfg_is_given(rd, "output.layout", 0);
-    if (!cfg_is_given(rd, "output.tolerance_m", 0)) cfg->output.tolerance_m = fmax(1e-7, 1e-3 * cfg->plan.tolerance_m);
+    if (!cfg_is_given(rd, "output.tolerance_m", 0)) cfg->output.tolerance_m = fmax(1e-7, 1e-3 * cfg->plan.range_m);
     cfg->optics.depth_given = cfg_is_given(rd, "optics.depth", 0);
     tidy_choice(&cfg->scene.order_exactly);
     if (cfg->output.utm_zone != 0 && cfg->output.crs != GEOREF_UTM)
@@ -280,10 +280,8 @@ static int check_platform(const struct cfg_reader *rd, struct config *cfg)
 int config_moves(const struct config *cfg)
 {
     int moves = cfg->platform.kind != PLATFORM_STATIC;
-    for (uint32_t i = 0; i < cfg->scene.n_meshes; i++) {
-        const struct config_mesh *m = &cfg->scene.mesh[i];
-        moves |= m->turn_deg_s != 0.0 || m->move_m_s[0] != 0.0 || m->move_m_s[1] != 0.0 || m->move_m_s[2] != 0.0;
-    }
+    for (uint32_t i = 0; i < cfg->scene.n_meshes; i++)
+        moves |= config_mesh_moves(&cfg->scene.mesh[i]);
     return moves;
 }
 
@@ -331,16 +329,16 @@ static int check_loop(const struct cfg_reader *rd, const struct config *cfg)
 
 static int check_time(const struct cfg_reader *rd, const struct config *cfg)
 {
-    enum head_clock_source source;
+    enum epoch_source source;
     struct sh_err why;
     char shown[CFG_SHOW_MAX];
-    if (head_clock_parse(cfg->time.epoch, utc_table_builtin(), &source, NULL, &why) != SH_OK)
+    if (epoch_parse(cfg->time.epoch, utc_table_builtin(), &source, NULL, &why) != SH_OK)
         return cfg_fail_key(
             rd, "time.epoch", 0,
             "\"%s\": %.80s; allowed none, utc, tai, or a time after 1980-01-06 such as 2026-01-01T00:00:00Z",
             cfg_show(cfg->time.epoch, shown), why.text);
     int link = cfg_nmea_link(cfg);
-    if (source == HEAD_CLOCK_NONE && link >= 0)
+    if (source == EPOCH_NONE && link >= 0)
         return cfg_fail_key(rd, "links[].protocol", (uint32_t)link,
                             "nmea, but the time is not known; required is time.epoch: utc, tai, or a time such as "
                             "2026-01-01T00:00:00Z");

@@ -260,9 +260,9 @@ static const struct cfg_key config_keys[] = {
 
     {"plan", CFG_MAP, .help = "What the methods of all stages may be off; each stage takes the cheapest that holds it "
                               "(`scanhead plan`)."},
-    {"plan.tolerance_m", CFG_REAL, "m", "1e-3", 1e-6, 1, IN_CONFIG(plan.tolerance_m),
+    {"plan.tolerance_m", CFG_REAL, "m", "1e-3", 1e-6, 1, IN_CONFIG(plan.range_m),
      .help = "RMS error of the echo ranges, against a footprint of 1,000 sub-rays."},
-    {"plan.echo_tolerance", CFG_REAL, NULL, "1e-3", 1e-4, 1, IN_CONFIG(plan.echo_tolerance),
+    {"plan.echo_tolerance", CFG_REAL, NULL, "1e-3", 1e-4, 1, IN_CONFIG(plan.echo_share),
      .help = "Share of the pulses that may have another number of echoes than with 1,000 sub-rays; 1e-3 is what the "
              "plan's sample can tell."},
 

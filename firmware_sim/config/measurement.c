@@ -39,14 +39,6 @@ int cfg_check_reaches(const struct cfg_reader *rd, const struct config_profile *
     return SH_OK;
 }
 
-int config_has_optics(const struct config *cfg)
-{
-    int optics = 0;
-    for (uint32_t i = 0; i < cfg->n_surfaces; i++)
-        optics |= cfg->surface[i].surface.glass > 0.0 || cfg->surface[i].surface.mirror > 0.0;
-    return optics && cfg->optics.depth > 0;
-}
-
 /* What is not given is not said. */
 static void mark_unsaid(const struct cfg_reader *rd, uint32_t i, struct surface *s)
 {

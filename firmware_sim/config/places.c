@@ -40,7 +40,8 @@ static int check_anchor(const struct cfg_reader *rd, struct config *cfg)
             return cfg_fail_key(rd, keys[k].path, 0, "an anchor of source %s has no such key; allowed %s", source,
                                 has[cfg->scene.anchor.source]);
         snprintf(why, sizeof why, "the anchor's source is %s", source);
-        if (!given && (keys[k].required & 1u << cfg->scene.anchor.source)) return fail_required(rd, keys[k].path, 0, why);
+        if (!given && (keys[k].required & 1u << cfg->scene.anchor.source))
+            return fail_required(rd, keys[k].path, 0, why);
     }
     cfg->scene.anchor.height_given = cfg_is_given(rd, "scene.anchor.height_m", 0);
     return SH_OK;

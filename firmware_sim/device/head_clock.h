@@ -15,21 +15,16 @@
 #define FIRMWARE_SIM_DEVICE_HEAD_CLOCK_H
 
 #include "core/utc.h"
+#include "firmware_sim/base/epoch.h"
 #include "firmware_sim/config/config.h"
 
-enum head_clock_source { HEAD_CLOCK_NONE, HEAD_CLOCK_EPOCH, HEAD_CLOCK_UTC, HEAD_CLOCK_TAI };
-
 struct head_clock {
-    enum head_clock_source source; /* NONE: the head doesn't know the time */
-    int64_t tai0_ns;               /* true TAI at power-up */
+    enum epoch_source source;
+    int64_t tai0_ns; /* true TAI at power-up */
     int64_t offset_ns, drift_ppt, jump_ns, jump_at_ns;
     struct utc_table table;
     char warning[160]; /* something the user should know; empty: nothing */
 };
-
-/* What time.epoch says (an empty text is none); the date (for EPOCH) is checked. tai0_ns may be NULL. */
-int head_clock_parse(const char *epoch, const struct utc_table *table, enum head_clock_source *source, int64_t *tai0_ns,
-                     struct sh_err *err);
 
 /* Takes the table of leap seconds that is known longer: the built-in one, or the system's. */
 int head_clock_create(const struct config *cfg, struct head_clock *clock, struct sh_err *err);

@@ -11,11 +11,6 @@
 
 enum { MAX_PLACES = 4, FOOTPRINT_OPTIONS = 9 };
 
-static struct plan_tolerance tolerance_of(const struct site *site)
-{
-    return (struct plan_tolerance){site->cfg->plan.tolerance_m, site->cfg->plan.echo_tolerance};
-}
-
 /* ---- beams */
 
 /* Why footprints can't be had at all; NULL: they can. The one place that says what they go together with. */
@@ -125,7 +120,7 @@ static void list_beams(const struct site *site, struct beam_choice *choice, stru
 static int measure_beams(struct site_look *look, const struct beam_choice *choice, struct plan_option *option,
                          const struct sh_report *report, struct sh_err *err, int *holds)
 {
-    const struct plan_tolerance tolerance = tolerance_of(look->site);
+    const struct plan_tolerance *tolerance = &look->site->cfg->plan;
     double cost_ns = (double)INFINITY;
     int rc = SH_OK;
     for (uint32_t i = 0; i < FOOTPRINT_OPTIONS && rc == SH_OK; i++) {
@@ -136,7 +131,7 @@ static int measure_beams(struct site_look *look, const struct beam_choice *choic
             if (rc != SH_OK) return rc;
         }
         plan_sample_beam(look->sample, choice[i].mode, choice[i].rings, &option[i]);
-        if (!plan_holds(&option[i], &tolerance)) continue;
+        if (!plan_holds(&option[i], tolerance)) continue;
         *holds = 1;
         cost_ns = option[i].cost_ns;
     }
@@ -158,13 +153,13 @@ static int try_beams(struct site *site, const struct beam_choice *choice, struct
 
 static int choose_beam(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
-    const struct plan_tolerance tolerance = tolerance_of(site);
     struct plan_option option[FOOTPRINT_OPTIONS];
     struct beam_choice choice[FOOTPRINT_OPTIONS];
     list_beams(site, choice, option);
     int rc = no_footprint(site) == NULL ? try_beams(site, choice, option, report, err) : SH_OK;
     if (rc != SH_OK) return rc;
-    uint32_t chosen = plan_choose(&site->plan.beam, "beam", option, FOOTPRINT_OPTIONS, -1, "", &tolerance);
+    const struct plan_choice ask = {"beam", option, FOOTPRINT_OPTIONS, -1, "", site->cfg->plan};
+    uint32_t chosen = plan_choose(&ask, &site->plan.beam);
     site->plan.methods.beam = choice[chosen].mode;
     site->plan.methods.rings = choice[chosen].rings;
     return SH_OK;
@@ -174,7 +169,6 @@ static int choose_beam(struct site *site, const struct sh_report *report, struct
 static int force_beam(struct site *site, int measure, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
-    const struct plan_tolerance tolerance = tolerance_of(site);
     struct plan_option option;
     struct site_look look = {0};
     plan_beam_option(cfg->beam.mode, cfg->beam.rings, &option);
@@ -187,7 +181,7 @@ static int force_beam(struct site *site, int measure, const struct sh_report *re
     }
     site->plan.methods.beam = cfg->beam.mode;
     site->plan.methods.rings = cfg->beam.rings;
-    plan_choose(&site->plan.beam, "beam", &option, 1, 0, "beam.mode", &tolerance);
+    plan_choose(&(struct plan_choice){"beam", &option, 1, 0, "beam.mode", cfg->plan}, &site->plan.beam);
     return SH_OK;
 }
 
@@ -196,7 +190,6 @@ static int force_beam(struct site *site, int measure, const struct sh_report *re
 static int choose_optics(struct site *site, int measure, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
-    const struct plan_tolerance tolerance = tolerance_of(site);
     struct plan_option option[CAST_MAX_DEPTH + 1];
     struct site_look look = {0};
     int forced = cfg->optics.depth_given ? (int)cfg->optics.depth : -1, holds = 0;
@@ -218,11 +211,11 @@ static int choose_optics(struct site *site, int measure, const struct sh_report 
         if (d > 0) snprintf(option[d].method, sizeof option[d].method, "depth %u", d);
         if (look.sample == NULL || holds) continue;
         plan_sample_optics(look.sample, d, &option[d]);
-        holds = forced < 0 && plan_holds(&option[d], &tolerance);
+        holds = forced < 0 && plan_holds(&option[d], &cfg->plan);
     }
     site_look_close(&look);
-    site->plan.methods.depth =
-        plan_choose(&site->plan.optics, "optics", option, CAST_MAX_DEPTH + 1, forced, "optics.depth", &tolerance);
+    const struct plan_choice ask = {"optics", option, CAST_MAX_DEPTH + 1, forced, "optics.depth", cfg->plan};
+    site->plan.methods.depth = plan_choose(&ask, &site->plan.optics);
     if (forced < 0 && holds && site->plan.methods.depth == 0)
         sh_warn(report,
                 "%s: plan.tolerance_m and plan.echo_tolerance allow to take glass and mirrors as other surfaces; "

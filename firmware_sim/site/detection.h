@@ -13,7 +13,7 @@ void site_free_detect(struct site *site);
 void site_set_depth(struct site *site, uint32_t depth);
 
 /* A run, or `plan`, may cast footprints: whatever is built has room for them. */
-int site_casts_footprints(const struct config *cfg);
+int site_casts_footprints(const struct site *site);
 /* How far from the head's origin rays may begin, given where it stands: beams beside it, and ways behind glass. */
 double site_ray_reach_m(const struct site *site, const double station_m[3]);
 

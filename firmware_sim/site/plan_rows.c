@@ -8,11 +8,6 @@
 
 #include "firmware_sim/site/beam_choice.h"
 
-static struct plan_tolerance tolerance_of(const struct site *site)
-{
-    return (struct plan_tolerance){site->cfg->plan.tolerance_m, site->cfg->plan.echo_tolerance};
-}
-
 /* How far the scene goes from where the head may be. */
 static double farthest_m(const struct site *site)
 {
@@ -31,25 +26,23 @@ static double farthest_m(const struct site *site)
     return fmin(far_m, cfg->profile.range_max_m);
 }
 
-int site_plan_order(struct site *site, struct sh_err *err)
+void site_plan_order(struct site *site)
 {
-    const struct plan_tolerance tolerance = tolerance_of(site);
     const enum config_choice asked = site->cfg->scene.order_exactly;
     struct plan_option option[2];
     struct plan_row *row = &site->plan.order;
     plan_order_options(farthest_m(site), option);
-    int forced = asked == CHOICE_AUTO ? -1 : asked == CHOICE_ON;
-    site->plan.methods.order_exactly =
-        (int)plan_choose(row, "order", option, 2, forced, "scene.order_exactly", &tolerance);
+    const struct plan_choice choice = {.stage = "order",
+                                       .option = option,
+                                       .n = 2,
+                                       .forced = asked == CHOICE_AUTO ? -1 : asked == CHOICE_ON,
+                                       .key = "scene.order_exactly",
+                                       .tolerance = site->cfg->plan};
+    site->plan.methods.order_exactly = (int)plan_choose(&choice, row);
     size_t used = strlen(row->why);
     if (!site->plan.methods.order_exactly)
         snprintf(row->why + used, sizeof row->why - used,
                  "; surfaces nearer to each other than the error may be taken for one another");
-    for (uint32_t i = 0; i < site->n_movers && site->plan.methods.order_exactly; i++) {
-        int rc = bvh_order_exactly(site->mover[i].bvh, err);
-        if (rc != SH_OK) return rc;
-    }
-    return SH_OK;
 }
 
 static void name_row(struct plan_row *row, const char *whose)
@@ -143,5 +136,6 @@ void site_plan_text(const struct site *site, char *text, size_t room)
 {
     const struct site_plan *plan = &site->plan;
     int polar = site->cfg->output.layout == LINE_POLAR;
-    snprintf(text, room, "order %s; beam %s; optics %s; georef %s", plan->order.method, plan->beam.method, plan->optics.method, polar ? "none" : site->station[0].plan.method);
+    snprintf(text, room, "order %s; beam %s; optics %s; georef %s", plan->order.method, plan->beam.method,
+             plan->optics.method, polar ? "none" : site->station[0].plan.method);
 }

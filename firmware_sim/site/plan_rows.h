@@ -5,8 +5,8 @@
 
 #include "firmware_sim/site/site.h"
 
-/* Before BVHs of the scene are made: whether surfaces are ordered exactly. Orders those of what moves. */
-int site_plan_order(struct site *site, struct sh_err *err);
+/* Before BVHs are built: whether surfaces are ordered exactly. */
+void site_plan_order(struct site *site);
 /* All rows, for people to read: with bounds of what is forced, too, which no run needs. Scans are as before. */
 int site_plan_rows(struct site *site, const struct sh_report *report, struct sh_err *err);
 /* In a line: what was planned for a run. */

@@ -73,6 +73,7 @@ struct site {
     uint32_t n_movers, n_surfaces; /* surfaces of the scene, then of the movers, then their ghosts */
     struct site_detect detect;
     struct site_plan plan;
+    int measures; /* for `plan`: footprints are cast to find the error of a forced beam, even of single rays */
     struct bvh *bvh[CONFIG_MAX_STATIONS];
     uint32_t n_bvh;
     struct site_station *station;
@@ -99,6 +100,8 @@ struct site {
 
 /* cfg must outlive the site. */
 int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err);
+/* The same for `plan`: site->plan.row is filled, with bounds also of what is forced. */
+int site_load_plan(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err);
 void site_free(struct site *site);
 
 /* The grid of output.crs utm, as georef_spec has it: one for all stations of an anchored scene, that of the anchor or
@@ -111,6 +114,8 @@ uint32_t site_points_per_pulse(const struct site *site);
 
 /* Names of a label below n_surfaces. */
 const struct scene_surface *site_surface(const struct site *site, uint32_t label);
+/* The texture of a real surface; NULL: none. */
+const struct scene_texture *site_texture(const struct site *site, uint32_t label);
 
 /* On which stretch a moving head is at a time of the scan; and what the casters need there, in a setup for the station.
  */

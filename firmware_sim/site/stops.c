@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/angle.h"
 #include "firmware_sim/site/platform.h"
 
 /* The last one may be a rounding error behind the end: of times as they are written, 1e-9 of a step. */
@@ -49,15 +50,14 @@ static int place(const struct site *site, const struct pose *head, struct placem
 /* As a station of the configuration would say it. */
 static void describe(const struct pose *head, uint32_t i, struct config_station *out)
 {
-    const double deg = 180.0 / M_PI;
     double heading, pitch, roll;
     pose_to_angles(head->quat, &heading, &pitch, &roll);
     snprintf(out->name, sizeof out->name, "stop-%u", i + 1);
     memcpy(out->position_m, head->position_m, sizeof out->position_m);
     out->has_position = 1;
-    out->heading_deg = heading * deg;
-    out->pitch_deg = pitch * deg;
-    out->roll_deg = roll * deg;
+    out->heading_deg = angle_deg(heading);
+    out->pitch_deg = angle_deg(pitch);
+    out->roll_deg = angle_deg(roll);
 }
 
 static int add_stop(struct site *site, const struct site_part *part, const struct pose *mount, uint32_t i,

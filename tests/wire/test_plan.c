@@ -157,19 +157,19 @@ static void expect_plan(struct wire *wire, const char *config, const struct want
 static void test_three_plans(void **state)
 {
     struct wire *wire = *state;
-    static const struct want demo[] = {{"beam", "single", "adaptive", "dearer"},
+    static const struct want demo[] = {{"beam", "single", "adaptive", "costs more"},
                                        {"optics", "none", NULL, NULL},
                                        {"signal", "none", NULL, NULL},
-                                       {"order", "none", "double", "dearer"},
-                                       {"georef", "order2", "order1", "off by more than the tolerance"}};
-    static const struct want foliage[] = {{"beam", "adaptive", "single", "its ranges are off by more than 0.005 m"},
-                                          {"beam", "adaptive", "rings 12 (469 rays)", "dearer"},
+                                       {"order", "none", "double", "costs more"},
+                                       {"georef", "order2", "order1", "its error is above the tolerance"}};
+    static const struct want foliage[] = {{"beam", "adaptive", "single", "its range error is above 0.005 m"},
+                                          {"beam", "adaptive", "rings 12 (469 rays)", "costs more"},
                                           {"optics", "none", NULL, NULL},
                                           {"georef", "none", NULL, NULL}};
-    static const struct want glass[] = {{"beam", "single", "adaptive", "dearer"},
-                                        {"optics", "depth 3", "depth 1", "its ranges are off"},
+    static const struct want glass[] = {{"beam", "single", "adaptive", "costs more"},
+                                        {"optics", "depth 3", "depth 1", "its range error is above"},
                                         {"optics", "depth 3", "depth 2", "get another echo count"},
-                                        {"optics", "depth 3", "depth 4", "dearer"},
+                                        {"optics", "depth 3", "depth 4", "costs more"},
                                         {"signal", "range equation", NULL, NULL},
                                         {"noise", "gauss, by signal", NULL, NULL},
                                         {"georef", "rotation", NULL, NULL}};
