@@ -54,10 +54,10 @@ static void print_output(const struct config *cfg, const struct site *site)
 {
     int heights = cfg->output.crs == GEOREF_UTM || cfg->output.crs == GEOREF_GEODETIC;
     printf("output    %s, %g m per count%s\n", cfg->output.layout == LINE_GEO ? "geo" : "polar", site->scale_m,
-           !heights                              ? ""
-           : site->geoid != NULL                 ? ", heights above the geoid"
+           !heights                       ? ""
+           : site->geoid != NULL          ? ", heights above the geoid"
            : cfg->output.heights == HEIGHTS_AUTO ? ", heights above the ellipsoid (no geoid data is installed)"
-                                                 : ", heights above the ellipsoid");
+                                          : ", heights above the ellipsoid");
 }
 
 static int print_summary(const struct config *cfg, const struct site *site, struct sh_err *err)

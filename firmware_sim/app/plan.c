@@ -9,29 +9,30 @@
 #include "firmware_sim/base/json.h"
 #include "firmware_sim/site/site.h"
 
+/* clang-format off */
 static const char HELP[] =
-    "scanhead plan CONFIG [options]: the method each stage will use, its error bound, its cost, why, and what was left "
-    "out\n\n"
+    "scanhead plan CONFIG [options]: the method of each stage, its error bound, its cost, why, and what was left out;\n"
+    "last, what this machine computes of it\n\n"
     "  --json           an array of {stage, method, error_m, echo_share, cost_ns, forced, why, left_out}, left_out an\n"
-    "                   array of {method, error_m, echo_share, cost_ns, why}; null: not known, or hangs on the scene\n"
+    "                   array of {method, error_m, echo_share, cost_ns, why}; null: not known, or it depends on the scene\n"
     "  --set KEY=VALUE  another value of a configuration key\n\n"
-    "Of each stage the cheapest method is used whose bounds hold plan.tolerance_m (root mean square of the ranges) "
-    "and\n"
-    "plan.echo_tolerance (share of the pulses with another number of echoes), unless beam.mode, "
-    "optics.depth,\n"
-    "scene.order_exactly or output.georef force one. Beam and optics are tried on some thousands of the head's own "
-    "pulses\n"
-    "in the scene, always the same ones, against 1,027 sub-rays, or the deepest way; bounds are upper limits of what "
-    "was\n"
-    "found, from up to four of the stations, for the settings at power-up. Each stage may use the whole tolerance; they are not added up. georef is planned for "
-    "each\n"
-    "station, from output.crs, output.tolerance_m, the scene's extent and the head's range_max_m; one row for all "
-    "where\n"
-    "they get the same method, else one each. A stage with the method none is left out: nothing in the configuration "
-    "asks\n"
-    "for it. Costs count beyond a single ray: rounded figures of `make chart` and `make "
-    "bench-beam` on\n"
-    "one core with AVX2, to compare methods by; what hangs on the scene is measured by `make bench`.\n";
+    "Each stage uses the cheapest method whose bounds hold plan.tolerance_m (RMS error of the ranges) and\n"
+    "plan.echo_tolerance (share of the pulses with another number of echoes). beam.mode, optics.depth,\n"
+    "scene.order_exactly and output.georef force a method. Each stage may use the whole tolerance; errors are not added\n"
+    "up. A stage with the method none is left out: nothing in the configuration asks for it.\n\n"
+    "cast     one method: single rays and sub-rays have ranges within a micrometre.\n"
+    "beam,    tried on some thousands of the head's own pulses, always the same ones, from up to four of the stations,\n"
+    "optics   for the settings at power-up, against 1,027 sub-rays or the deepest way; bounds are upper limits of what\n"
+    "         was found.\n"
+    "georef   planned for each station, from output.crs, output.tolerance_m, the scene's extent and the head's largest\n"
+    "         range; one row for all stations where they get the same method, else one each.\n"
+    "total    measured on this machine, now: cost_ns is the processor time of one cast pulse, from its direction to its\n"
+    "         frame. why says how many pulses per second all processors (or loop.threads of them) compute, and what\n"
+    "         share of that the configured rate needs. Pulses in the blind part of the sweep are not cast. `run` warns\n"
+    "         above 80 %. No method is chosen by this row; only its figures differ from one call to the next.\n\n"
+    "Costs of the other rows are what a method adds to a single ray: rounded figures of `make chart` and\n"
+    "`make bench-beam` on one core with AVX2, to compare methods by. `make bench` measures what depends on the scene.\n";
+/* clang-format on */
 
 enum { OPT_JSON = 256 };
 static const struct option OPTIONS[] = {{"set", required_argument, NULL, 's'},
@@ -86,7 +87,7 @@ static void print_line(const char *stage, const char *method, const double figur
     printf("%-8s %-22s %8s %8s %6s  %s\n", stage, method, shown[0], shown[1], shown[2], why);
 }
 
-/* Not measured, for the same reason: told once. */
+/* Not measured, for the same reason: one line says it. */
 static int is_like(const struct plan_option *a, const struct plan_option *b)
 {
     return isnan(a->error_m) && isnan(b->error_m) && strcmp(a->why_not, b->why_not) == 0;

@@ -9,6 +9,7 @@
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/site/plan_rows.h"
+#include "firmware_sim/site/rate.h"
 
 static const char HELP[] =
     "scanhead run CONFIG [options]: serve the head on its links until stopped\n\n"
@@ -183,6 +184,7 @@ static int run_with(const struct run_options *o, const struct config *cfg, struc
     struct loop *loop = NULL;
     struct loop_options options = {.hash = o->stats != NULL, .report = &app_report_stderr};
     int rc = site_load(cfg, &app_report_stderr, &site, err);
+    if (rc == SH_OK) rc = site_warn_rate(site, &app_report_stderr, err);
     if (rc == SH_OK) rc = device_create(site, &o->device, &device, err);
     if (rc == SH_OK) rc = loop_create(site, device, &options, &loop, err);
     if (rc == SH_OK) {

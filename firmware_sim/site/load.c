@@ -113,7 +113,7 @@ static int create(const struct config *cfg, int measures, const struct sh_report
     site->measures = measures;
     site->moving = config_head_moves(&cfg->platform);
     int rc = load(site, report, err);
-    if (rc == SH_OK && measures) rc = site_plan_rows(site, report, err);
+    if (rc == SH_OK && measures) rc = site_plan_rows(site, err);
     if (rc == SH_OK) return SH_OK;
     site_free(site);
     *out = NULL;
