@@ -1,10 +1,12 @@
-/* The configuration: YAML through libyaml's document API and one table (config_table*.c) of key, type, unit, default,
- * range and help, which alone gives parsing, defaults, errors, `--help` text and the reference.
+/* The configuration: a YAML file and --set in, struct config out, checked. One table (keys.c) of key, type, unit,
+ * default, range and help gives parsing, defaults, errors and the reference.
  *
  * Units: as the key's name says (hz, deg, m). Everything is checked; an error is one line:
  *   FILE:LINE: KEY: what is wrong; what is allowed
  * Unknown keys, duplicate keys, trailing text ("30 kHz"), NaN, wrong types and values out of range are errors.
- * Relative paths in a file are relative to that file; in --set, to the working directory. */
+ * Relative paths in a file are relative to that file; in --set, to the working directory.
+ *
+ * The struct is constant once it is loaded: what a run measures or chooses stands in the site (firmware_sim/site). */
 #ifndef FIRMWARE_SIM_CONFIG_CONFIG_H
 #define FIRMWARE_SIM_CONFIG_CONFIG_H
 
@@ -153,9 +155,9 @@ struct config_ball {
 
 struct config_signal {
     int on, sharp;
-    double reflectance; /* of surfaces of which nothing is said */
+    double reflectance; /* of surfaces without one of their own */
     double visibility_m, extinction_1_km;
-    int has_extinction; /* else by visibility_m; 0 there: the data sheet's day */
+    int has_extinction; /* 0: by visibility_m; where that is 0, too: the air of the data sheet */
 };
 
 /* Instrument errors; core/instrument.h. */
@@ -180,7 +182,7 @@ struct config_scene {
     struct config_mesh mesh[CONFIG_MAX_MESHES];
     uint32_t n_meshes;
     double tolerance_m;
-    enum config_choice order_exactly; /* surfaces that overlap are ordered in double; auto, off or on once loaded */
+    enum config_choice order_exactly; /* surfaces that overlap are ordered in double */
     struct config_anchor anchor;
 };
 
@@ -192,7 +194,7 @@ struct config_output {
     enum config_heights heights;
     enum georef_method georef; /* GEOREF_AUTO: as the plan says */
     double tolerance_m;        /* largest error of a georeferenced position */
-    int attributes;            /* amplitude and width of each echo go out behind the points */
+    int attributes;            /* amplitude and width of each echo follow the points */
     double scale_m;            /* 0: the finest of 1e-6 x 10^n m that holds range_max_m in 31 bits */
 };
 
@@ -202,7 +204,7 @@ struct config_beam {
 };
 
 struct config_noise {
-    enum config_range_noise range; /* off, on or signal once it is loaded */
+    enum config_range_noise range; /* OFF, ON or SIGNAL; the other two are ways to write them */
     int angle;
     uint64_t seed;
     struct config_ball ball;
@@ -220,7 +222,7 @@ struct config_loop {
     enum config_pace pace;
 };
 
-/* A member a section of the file. */
+/* One member per section of the file. */
 struct config {
     char file[CONFIG_PATH_LEN];
     char profile_file[CONFIG_PATH_LEN];

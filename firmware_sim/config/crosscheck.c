@@ -1,5 +1,5 @@
-/* What concerns more than one key, or the world: limits of the profile, order of angles, files, keys of
- * links. */
+/* What concerns more than one key, or the world: limits of the head profile, order of angles, files, keys of links and
+ * platforms. Places on the Earth: places.c; noise, signal, surfaces: measurement.c. */
 #include "firmware_sim/config/table.h"
 
 #include <errno.h>
@@ -31,7 +31,7 @@ static int64_t figure(const struct config_profile *profile, const char *path)
     return value;
 }
 
-/* Settings within the profile, by the rows' min_key and max_key. */
+/* Settings within the head profile: limits that a row of keys.c names by min_key and max_key. */
 static int check_limits(const struct cfg_reader *rd, const struct config *cfg)
 {
     for (size_t i = 0; i < rd->table.n; i++) {
@@ -41,7 +41,8 @@ static int check_limits(const struct cfg_reader *rd, const struct config *cfg)
         int64_t low = key->min_key != NULL ? figure(&cfg->profile, key->min_key) : (int64_t)(key->min * 1e6);
         memcpy(&value, cfg_address(rd, key, 0), sizeof value);
         if (value < low || value > high)
-            return cfg_fail_key(rd, key->path, 0, "%.15g is outside of head profile %s; allowed %.15g to %.15g %s",
+            return cfg_fail_key(rd, key->path, 0,
+                                "%.15g is outside the limits of head profile %s; allowed %.15g to %.15g %s",
                                 from_micro(value), cfg->profile.name, from_micro(low), from_micro(high), key->unit);
     }
     return SH_OK;
@@ -51,20 +52,23 @@ static int check_head(const struct cfg_reader *rd, const struct config *cfg)
 {
     const struct head_settings *s = &cfg->head.settings;
     if (s->prr_uhz < s->lines_uhz)
-        return cfg_fail_key(rd, given_of(rd, "head.prr_hz", "head.lines_hz"), 0,
-                            "less than a pulse per line, %.15g pulses/s and %.15g lines/s; allowed prr_hz of at least "
-                            "lines_hz",
-                            from_micro(s->prr_uhz), from_micro(s->lines_uhz));
+        return cfg_fail_key(
+            rd, given_of(rd, "head.prr_hz", "head.lines_hz"), 0,
+            "less than a pulse per line, %.15g pulses/s and %.15g lines/s; allowed a prr_hz of at least "
+            "%.15g, or a lines_hz of at most %.15g",
+            from_micro(s->prr_uhz), from_micro(s->lines_uhz), from_micro(s->lines_uhz), from_micro(s->prr_uhz));
     if (s->line_start_udeg >= s->line_stop_udeg)
         return cfg_fail_key(rd, given_of(rd, "head.line_stop_deg", "head.line_start_deg"), 0,
-                            "the line goes from %.15g to %.15g deg; allowed line_start_deg below line_stop_deg",
-                            from_micro(s->line_start_udeg), from_micro(s->line_stop_udeg));
+                            "the line goes from %.15g to %.15g deg; allowed a line_start_deg below %.15g, or a "
+                            "line_stop_deg above %.15g",
+                            from_micro(s->line_start_udeg), from_micro(s->line_stop_udeg),
+                            from_micro(s->line_stop_udeg), from_micro(s->line_start_udeg));
     int64_t span_udeg = s->pan_stop_udeg - s->pan_start_udeg;
     if (span_udeg < 0 || span_udeg > 360000000)
         return cfg_fail_key(rd, given_of(rd, "head.pan_stop_deg", "head.pan_start_deg"), 0,
-                            "the pan goes from %.15g to %.15g deg; allowed pan_start_deg at most pan_stop_deg, 360 deg "
-                            "apart at most",
-                            from_micro(s->pan_start_udeg), from_micro(s->pan_stop_udeg));
+                            "the pan goes from %.15g to %.15g deg; allowed a pan_stop_deg of %.15g to %.15g",
+                            from_micro(s->pan_start_udeg), from_micro(s->pan_stop_udeg), from_micro(s->pan_start_udeg),
+                            from_micro(s->pan_start_udeg) + 360.0);
     if (s->station > cfg->n_stations && cfg->platform.kind != PLATFORM_STOPS)
         return cfg_fail_key(rd, "head.station", 0, "there is no station %u; allowed 1 to %u", s->station,
                             cfg->n_stations);
@@ -214,19 +218,19 @@ static int check_link(const struct cfg_reader *rd, struct config *cfg, uint32_t 
     return link->type == LINK_USB ? check_usb_link(rd, cfg, link, i) : SH_OK;
 }
 
-/* Which part of the trajectory, and where on it to stop. How long it is, its file says (site_platform.c). */
+/* Which part of the trajectory, and where on it to stop. How long it is, its file says (firmware_sim/site/platform.c). */
 static int check_part(const struct cfg_reader *rd, struct config *cfg)
 {
     struct config_platform *p = &cfg->platform;
     int stops = p->kind == PLATFORM_STOPS;
     p->has_end = cfg_is_given(rd, "platform.end_s", 0);
     if (p->has_end && (stops ? p->end_s < p->start_s : p->end_s <= p->start_s))
-        return cfg_fail_key(rd, "platform.end_s", 0, "%.9g s, and platform.start_s is %.9g; allowed %s", p->end_s,
-                            p->start_s, stops ? "start_s or more" : "more than start_s");
+        return cfg_fail_key(rd, "platform.end_s", 0, "%.9g s, and platform.start_s is %.9g; allowed %s %.9g s",
+                            p->end_s, p->start_s, stops ? "at least" : "more than", p->start_s);
     if (!stops) return SH_OK;
     if (!(p->step_s > 0.0))
         return cfg_fail_key(rd, cfg_is_given(rd, "platform.step_s", 0) ? "platform.step_s" : "platform.kind", 0,
-                            "stops need the time from each to the next, platform.step_s; allowed above 0 to 1e9 s");
+                            "stops need the time from each to the next, platform.step_s; allowed above 0, up to 1e9 s");
     if (cfg->n_stations > 1)
         return cfg_fail_key(rd, "stations", 0,
                             "%u of them, but platform.kind is stops, which are the stations; allowed one, which says "
@@ -269,7 +273,7 @@ static int check_platform(const struct cfg_reader *rd, struct config *cfg)
                                 cfg_find(&rd->table, "platform.kind")->names[p->kind], has[p->kind]);
     if (p->kind == PLATFORM_LIVE && cfg->loop.pace == PACE_FAST)
         return cfg_fail_key(rd, "loop.pace", 0,
-                            "nobody can say in time where a live platform is; allowed realtime, step");
+                            "the poses of a live platform come in real time; allowed realtime, step");
     if (p->kind != PLATFORM_TRAJECTORY && p->kind != PLATFORM_STOPS) return SH_OK;
     if ((p->file[0] != '\0') == (p->waypoints[0] != '\0'))
         return cfg_fail_key(rd, p->file[0] != '\0' ? "platform.waypoints" : "platform.kind", 0,
@@ -292,20 +296,20 @@ int config_beam_fixed(const struct config *cfg)
 
 static const double LEAST_PULSE_NS = 0.1; /* 15 mm of range */
 
-/* Sub-rays that meet one oblique surface have ranges apart: with hardly a range resolution each would be an echo, or,
- * too weak for one, lost. */
+/* Sub-rays that meet one oblique surface have different ranges. Where the pulse is too short to join them, each would
+ * be an echo of its own, or be lost because it is too weak. */
 static int check_pulse_width(const struct cfg_reader *rd, const struct config *cfg)
 {
     const struct config_profile *p = &cfg->profile;
     const int footprint = p->beam_exit_m != 0.0 || p->beam_divergence_rad != 0.0;
     if (cfg->beam.mode == BEAM_SINGLE || !footprint || p->pulse_width_ns >= LEAST_PULSE_NS) return SH_OK;
     return cfg_fail_key(rd, "beam.mode", 0,
-                        "pulse_width_ns of head profile %s is %.10g: too short to tell the echoes of a footprint; "
+                        "pulse_width_ns of head profile %s is %.10g: too short to tell echoes of a footprint apart; "
                         "allowed single, or a pulse_width_ns of at least %.10g",
                         p->name, p->pulse_width_ns, LEAST_PULSE_NS);
 }
 
-/* Outlines are those that are seen from one place. */
+/* An adaptive beam needs outlines, which are those seen from one place. */
 static int check_beam(const struct cfg_reader *rd, const struct config *cfg)
 {
     if (cfg->beam.mode == BEAM_SINGLE || cfg->beam.mode == BEAM_AUTO) return SH_OK;

@@ -30,7 +30,7 @@ int site_open_trajectory(const struct site *site, struct site_part *part, struct
     int wrong_end = p->has_end && part->end_s > last_s;
     if (!wrong_end && part->start_s <= last_s) return SH_OK;
     trajectory_free(part->trajectory);
-    return sh_fail(err, SH_EINPUT, "%s: platform.%s: %.9g s is behind the trajectory's end; allowed %.9g to %.9g",
+    return sh_fail(err, SH_EINPUT, "%s: platform.%s: %.9g s is after the trajectory's end; allowed %.9g to %.9g",
                    site->cfg->file, wrong_end ? "end_s" : "start_s", wrong_end ? p->end_s : p->start_s,
                    wrong_end ? p->start_s : 0.0, last_s - first_s);
 }
