@@ -80,7 +80,7 @@ int plan_georef(const struct georef *georef, const struct plan_georef_need *need
     row->forced = need->forced != GEOREF_AUTO;
     leave_out(georef, need, *method, row);
     const char *why = need->forced != GEOREF_AUTO       ? "asked for by output.georef"
-                      : !(bound_m <= need->tolerance_m) ? "nothing meets the tolerance"
+                      : !(bound_m <= need->tolerance_m) ? "no method meets the tolerance"
                       : *method != GEOREF_EXACT         ? "the cheapest that meets the tolerance"
                       : georef_has_geoid(georef)        ? "the geoid is interpolated for each point"
                                                         : "no polynomial meets the tolerance";

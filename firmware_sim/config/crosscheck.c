@@ -1,6 +1,7 @@
 /* What concerns more than one key, or the world: limits of the head profile, order of angles, files, keys of links and
  * platforms. Places on the Earth: places.c; noise, signal, surfaces: measurement.c. */
 #include "firmware_sim/config/table.h"
+#include "firmware_sim/config/words.h"
 
 #include <errno.h>
 #include <math.h>
@@ -146,25 +147,36 @@ static int check_output(const struct cfg_reader *rd, struct config *cfg)
     return SH_OK;
 }
 
+/* A key that only some kinds (of link, back end, platform) have. */
+struct owned_key {
+    const char *path;
+    unsigned kinds; /* bit per kind that has it */
+};
+
+/* The first of these keys that is given though the kind does not have it; NULL: none. */
+static const char *find_stray(const struct cfg_reader *rd, const struct owned_key *key, size_t n, unsigned kind,
+                              uint32_t item)
+{
+    for (size_t i = 0; i < n; i++)
+        if (cfg_is_given(rd, key[i].path, item) && !(key[i].kinds & 1u << kind)) return key[i].path;
+    return NULL;
+}
+
 enum { OF_USBIP = 1u << USB_BACKEND_USBIP, OF_USBREDIR = 1u << USB_BACKEND_USBREDIR };
 enum { OF_FUNCTIONFS = 1u << USB_BACKEND_FUNCTIONFS };
 
 static int check_usb_link(const struct cfg_reader *rd, const struct config *cfg, struct link_spec *link, uint32_t i)
 {
-    static const struct {
-        const char *path;
-        unsigned backends; /* bit per back end that has the key */
-    } keys[] = {
+    static const struct owned_key keys[] = {
         {"links[].path", OF_USBREDIR},
         {"links[].address", OF_USBIP | OF_USBREDIR},
         {"links[].port", OF_USBIP | OF_USBREDIR},
         {"links[].attach", OF_USBIP | OF_USBREDIR},
         {"links[].udc", OF_FUNCTIONFS},
     };
-    const char *name = cfg_find(&rd->table, "links[].backend")->names[link->backend];
-    for (size_t k = 0; k < sizeof keys / sizeof keys[0]; k++)
-        if (cfg_is_given(rd, keys[k].path, i) && !(keys[k].backends & 1u << link->backend))
-            return cfg_fail_key(rd, keys[k].path, i, "the back end %s has no such key; allowed without it", name);
+    const char *name = cfg_backend_words[link->backend];
+    const char *stray = find_stray(rd, keys, CFG_LEN(keys), link->backend, i);
+    if (stray != NULL) return cfg_fail_key(rd, stray, i, "the back end %s has no such key; allowed without it", name);
     const int has_port = cfg_is_given(rd, "links[].port", i), has_address = cfg_is_given(rd, "links[].address", i);
     if (link->path[0] != '\0' && (has_port || has_address))
         return cfg_fail_key(rd, "links[].path", i, "both a path and a port or address; allowed one of them");
@@ -182,10 +194,7 @@ static int check_usb_link(const struct cfg_reader *rd, const struct config *cfg,
 
 static int check_link(const struct cfg_reader *rd, struct config *cfg, uint32_t i)
 {
-    static const struct {
-        const char *path;
-        unsigned types; /* bit per link type that has the key */
-    } keys[] = {
+    static const struct owned_key keys[] = {
         {"links[].path", 1u << LINK_FILE | 1u << LINK_PTY | 1u << LINK_USB},
         {"links[].address", 1u << LINK_TCP | 1u << LINK_USB},
         {"links[].port", 1u << LINK_TCP | 1u << LINK_USB},
@@ -206,10 +215,10 @@ static int check_link(const struct cfg_reader *rd, struct config *cfg, uint32_t 
                                       [LINK_USB] =
                                           "type, backend, address, port, path, attach, udc, speed, vid, pid, serial"};
     struct link_spec *link = &cfg->link[i];
-    const char *type = cfg_find(&rd->table, "links[].type")->names[link->type];
-    for (size_t k = 0; k < sizeof keys / sizeof keys[0]; k++)
-        if (cfg_is_given(rd, keys[k].path, i) && !(keys[k].types & 1u << link->type))
-            return cfg_fail_key(rd, keys[k].path, i, "a %s link has no such key; allowed %s", type, has[link->type]);
+    const char *type = cfg_link_words[link->type];
+    const char *stray = find_stray(rd, keys, CFG_LEN(keys), link->type, i);
+    if (stray != NULL)
+        return cfg_fail_key(rd, stray, i, "a %s link has no such key; allowed %s", type, has[link->type]);
     if (link->type == LINK_FILE && link->path[0] == '\0')
         return cfg_fail_key(rd, "links[].path", i, "missing; required for a file link is the file to write");
     for (uint32_t k = 0; k < i && link->path[0] != '\0'; k++)
@@ -239,12 +248,10 @@ static int check_part(const struct cfg_reader *rd, struct config *cfg)
     return SH_OK;
 }
 
-static int check_platform(const struct cfg_reader *rd, struct config *cfg)
+/* Keys that this kind of platform does not have. */
+static int check_platform_keys(const struct cfg_reader *rd, const struct config_platform *p)
 {
-    static const struct {
-        const char *path;
-        unsigned kinds; /* bit per kind of platform that has the key */
-    } keys[] = {
+    static const struct owned_key keys[] = {
         {"platform.file", 1u << PLATFORM_TRAJECTORY | 1u << PLATFORM_STOPS},
         {"platform.waypoints", 1u << PLATFORM_TRAJECTORY | 1u << PLATFORM_STOPS},
         {"platform.start_s", 1u << PLATFORM_TRAJECTORY | 1u << PLATFORM_STOPS},
@@ -266,11 +273,17 @@ static int check_platform(const struct cfg_reader *rd, struct config *cfg)
         [PLATFORM_LIVE] = "reach_m, extrapolate_ms, address, port, mount_...",
         [PLATFORM_STOPS] = "file or waypoints, start_s, end_s, step_s, mount_...",
     };
+    const char *stray = find_stray(rd, keys, CFG_LEN(keys), p->kind, 0);
+    if (stray == NULL) return SH_OK;
+    return cfg_fail_key(rd, stray, 0, "a %s platform has no such key; allowed %s", cfg_platform_words[p->kind],
+                        has[p->kind]);
+}
+
+static int check_platform(const struct cfg_reader *rd, struct config *cfg)
+{
     const struct config_platform *p = &cfg->platform;
-    for (size_t k = 0; k < sizeof keys / sizeof keys[0]; k++)
-        if (cfg_is_given(rd, keys[k].path, 0) && !(keys[k].kinds & 1u << p->kind))
-            return cfg_fail_key(rd, keys[k].path, 0, "a %s platform has no such key; allowed %s",
-                                cfg_find(&rd->table, "platform.kind")->names[p->kind], has[p->kind]);
+    int code = check_platform_keys(rd, p);
+    if (code != SH_OK) return code;
     if (p->kind == PLATFORM_LIVE && cfg->loop.pace == PACE_FAST)
         return cfg_fail_key(rd, "loop.pace", 0,
                             "the poses of a live platform come in real time; allowed realtime, step");

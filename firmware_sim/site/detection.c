@@ -55,7 +55,7 @@ static void set_up_instrument(const struct config *cfg, struct instrument *out)
     out->pan_sigma_rad = angle_rad(cfg->profile.pan_sigma_deg);
 }
 
-/* Those whose reflectance no rule says. What can't be read is told. */
+/* For surfaces whose reflectance no entry of `surfaces` gives. Warns of textures that can't be read. */
 static int set_up_textures(struct site *site, const uint8_t *said, const struct sh_report *report, struct sh_err *err)
 {
     struct sh_err why, first = {0};
@@ -97,7 +97,7 @@ static int set_up_surfaces(struct site *site, const struct sh_report *report, st
     free(is_said);
     if (rc == SH_OK && cfg->signal.on && unknown > 0)
         sh_warn(report,
-                "%s: of %u of %u surfaces neither the mesh's colour nor surfaces tells the reflectance: %g is taken "
+                "%s: %u of %u surfaces have no reflectance, neither by the mesh's colour nor by surfaces: %g is taken "
                 "(signal.reflectance)",
                 cfg->file, unknown, site->n_surfaces, cfg->signal.reflectance);
     for (uint32_t i = 0; i < cfg->n_surfaces && rc == SH_OK; i++)
@@ -107,7 +107,7 @@ static int set_up_surfaces(struct site *site, const struct sh_report *report, st
     return rc;
 }
 
-/* Ghosts get labels of their own, and names that say so. */
+/* Ghosts get labels and names of their own. */
 static int name_ghosts(struct site *site, struct sh_err *err)
 {
     struct site_detect *d = &site->detect;
@@ -128,7 +128,7 @@ static int name_ghosts(struct site *site, struct sh_err *err)
         ghost[i] = *of;
         snprintf(ghost[i].object, SCENE_NAME_LEN, "%s%.*s", GHOST, len, of->object);
     }
-    d->ghost = ghost; /* from here on site_surface tells them from the others */
+    d->ghost = ghost; /* from here on site_surface knows them */
     d->n_real = n;
     site->n_surfaces = 2 * n;
     return SH_OK;
@@ -202,8 +202,8 @@ double site_ray_reach_m(const struct site *site, const double station_m[3])
         far2 += far * far;
     }
     /* What moves may be anywhere. */
-    double behind_m = site->n_movers > 0 ? INFINITY : sqrt(far2) + 1e-3;
-    return beside_m + fmin(behind_m, site->cfg->profile.range_max_m);
+    double beyond_m = site->n_movers > 0 ? INFINITY : sqrt(far2) + 1e-3;
+    return beside_m + fmin(beyond_m, site->cfg->profile.range_max_m);
 }
 
 double site_noise_m(const struct site *site)

@@ -74,8 +74,10 @@ static int plan_station(const struct site *site, struct site_station *s, const s
     int rc = has_legs ? plan_legs(site, s, err)
                       : plan_one(site, s->georef, s->at.position_m, reach_m(site, NULL), &s->plan, err);
     if (rc == SH_OK && s->plan.error_m > cfg->output.tolerance_m && cfg->output.layout == LINE_GEO)
-        sh_warn(report, "station %s: georeferencing by %s may be off by %.2g m, more than output.tolerance_m",
-                s->station->name, s->plan.method, s->plan.error_m);
+        sh_warn(
+            report,
+            "station %s: the error of georeferencing by %s may be %.2g m, more than the %.2g m of output.tolerance_m",
+            s->station->name, s->plan.method, s->plan.error_m, cfg->output.tolerance_m);
     return rc;
 }
 

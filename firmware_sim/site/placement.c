@@ -53,7 +53,7 @@ static int anchor_by_ifc(const struct config *cfg, const struct sh_report *repor
         origin_m[i] = site.origin_m[i] + mesh->offset_m[i];
     if (!cfg->scene.anchor.height_given) {
         height_m = isnan(site.elevation_m) ? 0.0 : site.elevation_m;
-        sh_warn(report, "%s: %s, taken as height above the ellipsoid; scene.anchor.height_m says it rightly",
+        sh_warn(report, "%s: %s, taken as height above the ellipsoid; scene.anchor.height_m can give that height",
                 mesh->file, isnan(site.elevation_m) ? "no RefElevation: 0 m" : "RefElevation counts from the sea");
     }
     if (site.has_map)

@@ -1,4 +1,3 @@
-/* The path of a moving head: its poses, and BVHs along it. */
 #include "firmware_sim/site/platform.h"
 
 #include <math.h>
@@ -10,8 +9,8 @@
 #include "firmware_sim/site/bvhs.h"
 #include "firmware_sim/site/detection.h"
 
-/* What the head's own path may differ from the trajectory by, and how far apart its poses are at most: the steps that a
- * path is cut in for BVHs, and those of a recorded trajectory. */
+/* Largest distance of the head's own path from the trajectory, and largest steps between its poses, in metres and ns:
+ * a path is cut into them for BVHs, and a recorded trajectory has them. */
 static const double TOLERANCE_M = 1e-4, LONGEST_M = 0.01;
 static const int64_t LONGEST_NS = 10000000;
 
@@ -50,7 +49,7 @@ static int load_knots(struct site *site, const struct sh_report *report, struct 
                        why.text);
     if (rc == SH_OK && site->knot_error_m > TOLERANCE_M * 1.001)
         sh_warn(report,
-                "the trajectory bends more than poses %g ms apart can follow: the head is off it by up to %.2g m",
+                "the trajectory bends more than poses %g ms apart can follow: the head leaves it by up to %.2g m",
                 1e-3 * POSE_MIN_STEP_US, site->knot_error_m);
     return rc;
 }
@@ -98,7 +97,7 @@ static int add_stretch(struct site *site, const double centre_m[3], double reach
     return SH_OK;
 }
 
-/* A stretch ends between two poses, and the head goes on for up to a millisecond, which 100 ms cover. */
+/* A stretch ends between two poses. The head goes on in it for up to a millisecond; 100 ms cover that. */
 static int cover_path(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     int rc = SH_OK;

@@ -1,4 +1,3 @@
-/* Stop-and-go: poses of a trajectory at equal steps of time, each a station of its own. */
 #include "firmware_sim/site/stops.h"
 
 #include <math.h>
@@ -8,7 +7,7 @@
 #include "core/angle.h"
 #include "firmware_sim/site/platform.h"
 
-/* The last one may be a rounding error behind the end: of times as they are written, 1e-9 of a step. */
+/* The last stop may lie after the end by a rounding error: 1e-9 of a step, for times as people write them. */
 static int count_stops(const struct site *site, const struct site_part *part, uint32_t *n, struct sh_err *err)
 {
     const struct config_platform *p = &site->cfg->platform;
