@@ -154,7 +154,7 @@ struct owned_key {
 };
 
 /* The first of these keys that is given though the kind does not have it; NULL: none. */
-static const char *find_stray(const struct cfg_reader *rd, const struct owned_key *key, size_t n, unsigned kind,
+static const char *find_stray(const struct cfg_reader *rd, const struct owned_key *key, size_t n, int kind,
                               uint32_t item)
 {
     for (size_t i = 0; i < n; i++)
