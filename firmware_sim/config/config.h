@@ -144,7 +144,7 @@ struct config_gnss {
     double lever_arm_m[3]; /* of the antenna from the head's origin, in the head's frame */
 };
 
-enum config_range_noise { RANGE_NOISE_OFF, RANGE_NOISE_ON, RANGE_NOISE_SIGNAL, RANGE_NOISE_FALSE, RANGE_NOISE_TRUE };
+enum config_range_noise { RANGE_NOISE_OFF, RANGE_NOISE_ON, RANGE_NOISE_SIGNAL };
 
 /* Ball-shaped noise; detect_ball. */
 struct config_ball {
@@ -168,7 +168,7 @@ struct config_instrument {
     double range_offset_m, range_scale_ppm;
 };
 
-enum config_choice { CHOICE_AUTO, CHOICE_OFF, CHOICE_ON, CHOICE_FALSE, CHOICE_TRUE };
+enum config_choice { CHOICE_AUTO, CHOICE_OFF, CHOICE_ON };
 
 /* Settings at power-up, within the profile (checked). */
 struct config_head {
@@ -204,7 +204,7 @@ struct config_beam {
 };
 
 struct config_noise {
-    enum config_range_noise range; /* OFF, ON or SIGNAL; the other two are ways to write them */
+    enum config_range_noise range;
     int angle;
     uint64_t seed;
     struct config_ball ball;
@@ -258,6 +258,11 @@ void config_signal_spec(const struct config_profile *profile, struct detect_sign
 /* The schedule of a head with some settings. */
 void config_fill_spec(const struct config_profile *profile, const struct head_settings *settings,
                       struct schedule_spec *spec);
+
+static inline int config_has_footprint(const struct config *cfg)
+{
+    return cfg->profile.beam_exit_m != 0.0 || cfg->profile.beam_divergence_rad != 0.0;
+}
 
 /* Whether anything in the scene, or the head, moves. */
 int config_moves(const struct config *cfg);

@@ -117,18 +117,11 @@ static int check_names(const struct cfg_reader *rd, struct config *cfg)
     return SH_OK;
 }
 
-static void tidy_choice(enum config_choice *choice)
-{
-    if (*choice == CHOICE_FALSE) *choice = CHOICE_OFF;
-    if (*choice == CHOICE_TRUE) *choice = CHOICE_ON;
-}
-
 static int check_output(const struct cfg_reader *rd, struct config *cfg)
 {
     cfg->output.layout_given = cfg_is_given(rd, "output.layout", 0);
     if (!cfg_is_given(rd, "output.tolerance_m", 0)) cfg->output.tolerance_m = fmax(1e-7, 1e-3 * cfg->plan.range_m);
     cfg->optics.depth_given = cfg_is_given(rd, "optics.depth", 0);
-    tidy_choice(&cfg->scene.order_exactly);
     if (cfg->output.utm_zone != 0 && cfg->output.crs != GEOREF_UTM)
         return cfg_fail_key(rd, "output.utm_zone", 0, "a zone, but output.crs is not utm; allowed only with crs: utm");
     if (cfg->output.heights == HEIGHTS_GEOID && cfg->output.crs != GEOREF_UTM && cfg->output.crs != GEOREF_GEODETIC)
@@ -314,8 +307,8 @@ static const double LEAST_PULSE_NS = 0.1; /* 15 mm of range */
 static int check_pulse_width(const struct cfg_reader *rd, const struct config *cfg)
 {
     const struct config_profile *p = &cfg->profile;
-    const int footprint = p->beam_exit_m != 0.0 || p->beam_divergence_rad != 0.0;
-    if (cfg->beam.mode == BEAM_SINGLE || !footprint || p->pulse_width_ns >= LEAST_PULSE_NS) return SH_OK;
+    if (cfg->beam.mode == BEAM_SINGLE || !config_has_footprint(cfg) || p->pulse_width_ns >= LEAST_PULSE_NS)
+        return SH_OK;
     return cfg_fail_key(rd, "beam.mode", 0,
                         "pulse_width_ns of head profile %s is %.10g: too short to tell echoes of a footprint apart; "
                         "allowed single, or a pulse_width_ns of at least %.10g",
@@ -326,7 +319,7 @@ static int check_pulse_width(const struct cfg_reader *rd, const struct config *c
 static int check_beam(const struct cfg_reader *rd, const struct config *cfg)
 {
     if (cfg->beam.mode == BEAM_SINGLE || cfg->beam.mode == BEAM_AUTO) return SH_OK;
-    if (cfg->profile.beam_exit_m == 0.0 && cfg->profile.beam_divergence_rad == 0.0)
+    if (!config_has_footprint(cfg))
         return cfg_fail_key(rd, "beam.mode", 0, "head profile %s has no footprint; allowed single", cfg->profile.name);
     if (cfg->beam.mode == BEAM_ADAPTIVE && !config_beam_fixed(cfg))
         return cfg_fail_key(rd, "beam.mode", 0, "adaptive, but %s; allowed single, rings, auto",

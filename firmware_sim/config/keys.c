@@ -61,7 +61,6 @@ static const struct cfg_key config_keys[] = {
     {"scene.tolerance_m", CFG_REAL, "m", "1e-6", 1e-9, 1, IN_CONFIG(scene.tolerance_m),
      .help = "Largest error of a vertex. Formats of single precision are refused where coordinates are too large."},
     {"scene.order_exactly", CFG_ENUM, .def = "auto", .names = cfg_choice_words, IN_CONFIG(scene.order_exactly),
-     .allowed = "auto, on or off",
      .help = "Orders surfaces that overlap or cross in double. It costs loading time, and speed where surfaces "
              "overlap. auto: on where float's resolution in the scene is coarser than plan.tolerance_m."},
     {"scene.meshes", CFG_LIST, .min = 1, .max = CONFIG_MAX_MESHES, LIST_OF(scene.mesh, scene.n_meshes),
@@ -247,7 +246,6 @@ static const struct cfg_key config_keys[] = {
 
     {"noise", CFG_MAP, .help = "Noise of the measurement."},
     {"noise.range", CFG_ENUM, .def = "off", .names = cfg_range_noise_words, IN_CONFIG(noise.range),
-     .allowed = "on or off, or signal",
      .help = "Range noise. on: the profile's range_sigma_m and ppm, for any target; signal: that figure holds at "
              "range_sigma_at_m, and noise grows as the signal fades (signal.model: on); off: exact ranges."},
     {"noise.angle", CFG_BOOL, .def = "off", IN_CONFIG(noise.angle),

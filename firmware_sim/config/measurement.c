@@ -70,8 +70,6 @@ static int check_surface(const struct cfg_reader *rd, uint32_t i, const struct s
 
 static int check_noise(const struct cfg_reader *rd, struct config *cfg)
 {
-    if (cfg->noise.range == RANGE_NOISE_FALSE) cfg->noise.range = RANGE_NOISE_OFF;
-    if (cfg->noise.range == RANGE_NOISE_TRUE) cfg->noise.range = RANGE_NOISE_ON;
     if (!cfg_is_given(rd, "noise.ball.seed", 0)) cfg->noise.ball.seed = cfg->noise.seed;
     if (cfg->noise.range == RANGE_NOISE_SIGNAL && !cfg->signal.on)
         return cfg_fail_key(rd, "noise.range", 0, "signal, but no signal is modelled; allowed with signal.model: on");

@@ -193,11 +193,11 @@ static int store_real(const struct place *at, double *dst, const char *text)
 
 static int store_word(const struct place *at, void *dst, const char *text)
 {
-    static const char *const bools[] = {"off", "on", "false", "true", NULL};
+    static const char *const bools[] = {"off", "on", NULL};
     const char *const *names = at->key->type == CFG_BOOL ? bools : at->key->names;
-    for (int i = 0; names[i] != NULL; i++) {
-        if (strcmp(names[i], text) != 0) continue;
-        int value = at->key->type == CFG_BOOL ? i % 2 : i;
+    const char *word = strcmp(text, "false") == 0 ? "off" : strcmp(text, "true") == 0 ? "on" : text;
+    for (int value = 0; names[value] != NULL; value++) {
+        if (strcmp(names[value], word) != 0) continue;
         memcpy(dst, &value, sizeof value);
         return SH_OK;
     }

@@ -31,12 +31,9 @@ const char *const cfg_platform_words[] = {[PLATFORM_STATIC] = "static",
                                           [PLATFORM_LIVE] = "live",
                                           [PLATFORM_STOPS] = "stops",
                                           NULL};
-/* Switches with a third way; crosscheck.c and measurement.c make false and true off and on. */
 const char *const cfg_range_noise_words[] = {
-    [RANGE_NOISE_OFF] = "off",     [RANGE_NOISE_ON] = "on",     [RANGE_NOISE_SIGNAL] = "signal",
-    [RANGE_NOISE_FALSE] = "false", [RANGE_NOISE_TRUE] = "true", NULL};
-const char *const cfg_choice_words[] = {[CHOICE_AUTO] = "auto",   [CHOICE_OFF] = "off",   [CHOICE_ON] = "on",
-                                        [CHOICE_FALSE] = "false", [CHOICE_TRUE] = "true", NULL};
+    [RANGE_NOISE_OFF] = "off", [RANGE_NOISE_ON] = "on", [RANGE_NOISE_SIGNAL] = "signal", NULL};
+const char *const cfg_choice_words[] = {[CHOICE_AUTO] = "auto", [CHOICE_OFF] = "off", [CHOICE_ON] = "on", NULL};
 const char *const cfg_axes_words[] = {"scene", "beam", NULL};
 const char *const cfg_detection_words[] = {"noisy", "sharp", NULL};
 const char *const cfg_ambiguity_words[] = {

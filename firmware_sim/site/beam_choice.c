@@ -35,17 +35,12 @@ static void close_trial(struct trial *trial)
 
 /* ---- beams */
 
-/* Why footprints can't be had at all; NULL: they can. The one place that says what they go together with. */
-static const char *no_footprint(const struct site *site)
+/* Why a beam is not possible here; NULL: it is. */
+static const char *why_not(const struct site *site, enum beam_mode mode)
 {
-    const struct config_profile *p = &site->cfg->profile;
-    if (p->beam_exit_m == 0.0 && p->beam_divergence_rad == 0.0) return "the head profile has no footprint";
-    return NULL;
-}
-
-/* Why an adaptive one can't be had, where footprints can; NULL: it can. */
-static const char *no_outlines(const struct site *site)
-{
+    if (mode == BEAM_SINGLE) return NULL;
+    if (!config_has_footprint(site->cfg)) return "the head profile has no footprint";
+    if (mode != BEAM_ADAPTIVE) return NULL;
     if (config_beam_fixed(site->cfg)) return NULL;
     return config_moves(site->cfg) ? "the head or a mesh moves" : "an offset of the instrument moves the beam";
 }
@@ -78,7 +73,7 @@ static void drop_beam(struct site_station *s, int with_beam)
     s->beam = NULL;
 }
 
-/* Each station's, as planned. */
+/* The beam of each station, as planned. */
 static int apply_beam(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const struct plan_methods *methods = &site->plan.methods;
@@ -122,26 +117,23 @@ struct beam_choice {
     uint32_t rings;
 };
 
-/* What there is: those of known costs in their order. */
+/* All beams, those of known cost in the order of their cost. */
 static void list_beams(const struct site *site, struct beam_choice *choice, struct plan_option *option)
 {
     static const uint32_t rings[FOOTPRINT_OPTIONS - 2] = {1, 2, 3, 4, 6, 8, 12};
-    const char *none = no_footprint(site);
     for (uint32_t i = 0; i < FOOTPRINT_OPTIONS; i++) {
         choice[i] = (struct beam_choice){i == 0   ? BEAM_SINGLE
                                          : i == 1 ? BEAM_ADAPTIVE
                                                   : BEAM_RINGS,
                                          i < 2 ? site->cfg->beam.rings : rings[i - 2]};
         plan_beam_option(choice[i].mode, choice[i].rings, &option[i]);
-        if (i > 0 && none != NULL)
-            snprintf(option[i].why_not, sizeof option[i].why_not, "%s", none);
-        else if (i == 1 && no_outlines(site) != NULL)
-            snprintf(option[i].why_not, sizeof option[i].why_not, "%s", no_outlines(site));
+        const char *why = why_not(site, choice[i].mode);
+        if (why != NULL) snprintf(option[i].why_not, sizeof option[i].why_not, "%s", why);
     }
 }
 
-/* Measures what can be had, up to what costs more than one that holds. Outlines take time to find, and only the
- * adaptive beam needs them. Returns whether one holds. */
+/* Measures the beams that are possible, up to those that cost more than one that holds. Finding outlines takes time:
+ * the adaptive beam is measured only where single rays don't hold. *holds: one of them does. */
 static int measure_beams(struct trial *trial, const struct beam_choice *choice, struct plan_option *option,
                          const struct sh_report *report, struct sh_err *err, int *holds)
 {
@@ -151,7 +143,7 @@ static int measure_beams(struct trial *trial, const struct beam_choice *choice, 
     for (uint32_t i = 0; i < FOOTPRINT_OPTIONS && rc == SH_OK; i++) {
         if (option[i].why_not[0] != '\0' || option[i].cost_ns > cost_ns) continue;
         if (choice[i].mode == BEAM_ADAPTIVE) {
-            if (*holds) continue; /* single rays do */
+            if (*holds) continue;
             rc = add_outlines(trial, report, err);
             if (rc != SH_OK) return rc;
         }
@@ -181,7 +173,7 @@ static int choose_beam(struct site *site, const struct sh_report *report, struct
     struct plan_option option[FOOTPRINT_OPTIONS];
     struct beam_choice choice[FOOTPRINT_OPTIONS];
     list_beams(site, choice, option);
-    int rc = no_footprint(site) == NULL ? try_beams(site, choice, option, report, err) : SH_OK;
+    int rc = config_has_footprint(site->cfg) ? try_beams(site, choice, option, report, err) : SH_OK;
     if (rc != SH_OK) return rc;
     const struct plan_choice ask = {"beam", option, FOOTPRINT_OPTIONS, -1, "", site->cfg->plan};
     uint32_t chosen = plan_choose(&ask, &site->plan.beam);
@@ -197,7 +189,7 @@ static int force_beam(struct site *site, const struct sh_report *report, struct 
     struct plan_option option;
     struct trial trial = {0};
     plan_beam_option(cfg->beam.mode, cfg->beam.rings, &option);
-    if (site->measures && no_footprint(site) == NULL) {
+    if (site->measures && config_has_footprint(cfg)) {
         int rc = open_beam_trial(&trial, site, report, err);
         if (rc == SH_OK && cfg->beam.mode == BEAM_ADAPTIVE) rc = add_outlines(&trial, report, err);
         if (rc == SH_OK) plan_sample_beam(trial.sample, cfg->beam.mode, cfg->beam.rings, &option);

@@ -62,7 +62,7 @@ static const struct bad bad[] = {
     {"crs: local", "layout: xyz", 17, "output.layout", "allowed polar, geo"},
     {"type: tcp", "type: udp", 14, "links[0].type", "allowed null, file, pty, tcp, usb"},
     {"output:", "loop: {pace: slow}\noutput:", 16, "loop.pace", "allowed realtime, fast, step"},
-    {"output:", "noise: {range: 1}\noutput:", 16, "noise.range", "allowed on or off"},
+    {"output:", "noise: {range: 1}\noutput:", 16, "noise.range", "allowed off, on, signal"},
     {"output:", "noise: {angle: 1}\noutput:", 16, "noise.angle", "allowed on or off"},
     {"[1, 2, 3]", "[1, 2]", 11, "stations[0].position_m", "2 numbers instead of 3"},
     {"[1, 2, 3]", "[1, 2, 3, 4]", 11, "stations[0].position_m", "4 numbers instead of 3"},
@@ -207,7 +207,7 @@ static const struct bad bad[] = {
     {"heading_deg: 90", "name: a\n  - position_m: [0, 0, 0]\n    name: a", 14, "stations[1].name", "same name"},
     /* noise, signal, surfaces, instrument */
 #define AT_16(text) "output:", text "\noutput:"
-    {AT_16("noise: {range: loud}"), 16, "noise.range", "allowed on or off, or signal"},
+    {AT_16("noise: {range: loud}"), 16, "noise.range", "allowed off, on, signal"},
     {AT_16("noise: {range: signal}"), 16, "noise.range", "allowed with signal.model: on"},
     {AT_16("noise: {ball: {radius_m: -1}}"), 16, "noise.ball.radius_m", "allowed 0 to 100 m"},
     {AT_16("noise: {ball: {axes: head}}"), 16, "noise.ball.axes", "allowed scene, beam"},
