@@ -89,7 +89,7 @@ $(BUILD)/scanhead: $(BUILD)/firmware_sim/main.c.o $(BUILD)/modules.a
 	@echo "  LD    $@"
 	$(Q)$(CC) $(SAN) -o $@ $^ $(LDLIBS)
 # What several programs of tests/ share: scenes, rays, plain Embree.
-BENCH_MAINS = $(patsubst %,tests/bench/%.c,bench chart chart_georef chart_widths beam plain refine)
+BENCH_MAINS = $(patsubst %,tests/bench/%.c,bench chart chart_georef chart_widths beam plain)
 SHARED = $(filter-out $(BENCH_MAINS),$(wildcard tests/common/*.c tests/bench/*.c))
 $(BUILD)/shared.a: $(SHARED:%=$(BUILD)/%.o)
 	@rm -f $@
@@ -175,7 +175,7 @@ bench: deps-build
 # Each program of the chart writes its panel's rows; the first one the head of the table.
 CHART = $(BUILD)/chart/speed_accuracy
 CHARTS = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_georef chart_widths beam)
-FIGURES = $(CHARTS) $(BUILD)/tests/bench/plain $(BUILD)/tests/bench/refine
+FIGURES = $(CHARTS) $(BUILD)/tests/bench/plain
 $(BUILD)/tests/bench/beam: tests/accuracy/beam_reference.c
 $(FIGURES): $(BUILD)/tests/bench/%: tests/bench/%.c $(BUILD)/shared.a $(BUILD)/modules.a
 	@mkdir -p $(@D)
@@ -185,10 +185,6 @@ $(FIGURES): $(BUILD)/tests/bench/%: tests/bench/%.c $(BUILD)/shared.a $(BUILD)/m
 bench-beam: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/beam
 	@$(BUILD)/tests/bench/beam house wires foliage leaves
-# Exact planes and the decision of doubtful hits, by rays without.
-bench-refine: deps-build
-	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/refine
-	@$(BUILD)/tests/bench/refine house 100k 1M
 # Effects that are named and not needed: by the plain cast, within 5 %.
 bench-plain: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/plain
@@ -222,6 +218,6 @@ format:
 clean:
 	rm -rf $(BUILD)
 .PHONY: ALWAYS all deps deps-test deps-build deps-guest demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb \
-	test-usb-million objects test-unit-programs test-programs bench bench-beam bench-plain bench-refine chart install format clean
+	test-usb-million objects test-unit-programs test-programs bench bench-beam bench-plain chart install format clean
 .SECONDARY:
 -include $(shell find $(BUILD) -type f -name '*.d' 2>/dev/null)

@@ -15,8 +15,8 @@
 #include "tests/bench/reference.h"
 #include "tests/bench/pin.h"
 
-enum { LINES = 200, ROUNDS = 9, CHUNK = 256, SAMPLE_STEP = 1, WIDTHS = 4, METHODS = 24 };
-enum kind { FLOAT, REFINED, DECIDED, UNREFINED }; /* the last two with the program's own BVHs */
+enum { LINES = 200, ROUNDS = 9, CHUNK = 256, SAMPLE_STEP = 1, WIDTHS = 4, METHODS = 20 };
+enum kind { FLOAT, REFINED, DECIDED }; /* the last one with the program's own BVH */
 
 static const uint32_t WIDTH[WIDTHS] = {1, 4, 8, 16};
 
@@ -47,7 +47,7 @@ struct chart {
     double station_m[3];
     struct bench_rays rays;
     struct bench_embree embree[2]; /* not robust, robust */
-    struct bvh *bvh, *plain;
+    struct bvh *bvh;
     struct caster *caster;
     double *plane; /* n, d of each triangle from the station; one more, all NaN, for misses */
     double *range_m;
@@ -61,8 +61,8 @@ struct chart {
 static void add_methods(struct chart *c)
 {
     struct method *m = c->method;
-    for (int kind = FLOAT; kind <= UNREFINED; kind++)
-        for (int robust = kind >= DECIDED; robust < 2; robust++)
+    for (int kind = FLOAT; kind <= DECIDED; kind++)
+        for (int robust = kind == DECIDED; robust < 2; robust++)
             for (int w = 0; w < WIDTHS; w++, m++) {
                 *m = (struct method){.kind = (enum kind)kind, .robust = robust, .width = WIDTH[w]};
                 m->is_default = kind == DECIDED && m->width == c->native;
@@ -109,11 +109,10 @@ static void cast(struct chart *c, const struct method *m)
 {
     const struct bench_embree *e = &c->embree[m->robust];
     const struct bench_rays *rays = &c->rays;
-    if (m->kind >= DECIDED) {
-        struct bvh *bvh = m->kind == DECIDED ? c->bvh : c->plain;
-        bvh_set_packet(bvh, m->width);
-        caster_hits(c->caster, bvh, c->station_m, BENCH_RANGE_MAX_M, rays->n, rays->dx, rays->dy, rays->dz, c->range_m,
-                    c->prim);
+    if (m->kind == DECIDED) {
+        bvh_set_packet(c->bvh, m->width);
+        caster_hits(c->caster, c->bvh, c->station_m, BENCH_RANGE_MAX_M, rays->n, rays->dx, rays->dy, rays->dz,
+                    c->range_m, c->prim);
         return;
     }
     for (uint32_t at = 0; at < rays->n; at += CHUNK) {
@@ -235,7 +234,6 @@ static int set_up(struct chart *c, struct sh_err *err)
         if (rc == SH_OK) rc = bench_embree_rays(e, c->rays.fx, c->rays.fy, c->rays.fz, c->rays.n, err);
     }
     if (rc == SH_OK) rc = bvh_create(c->scene, c->station_m, 0.0, 0, NULL, &c->bvh, err);
-    if (rc == SH_OK) rc = bvh_create_plain(c->scene, c->station_m, 0.0, 0, NULL, &c->plain, err);
     if (rc == SH_OK) rc = caster_create(&c->caster, err);
     if (rc != SH_OK) return rc;
     if (c->spec->at_edges) aim_at_edges(c);
@@ -251,7 +249,6 @@ static void tear_down(struct chart *c)
 {
     caster_free(c->caster);
     bvh_free(c->bvh);
-    bvh_free(c->plain);
     bench_embree_free(&c->embree[0]);
     bench_embree_free(&c->embree[1]);
     bench_rays_free(&c->rays);
@@ -266,11 +263,11 @@ static void tear_down(struct chart *c)
 
 static void print_rows(const struct method *method, const char *scene)
 {
-    static const char *const kind[] = {"float", "refined", "decided", "unrefined"};
+    static const char *const kind[] = {"float", "refined", "decided"};
     for (int i = 0; i < METHODS; i++) {
         const struct method *m = &method[i];
         printf("cast,%s%s %u,%s,%.3f,%.3g,%.3g,%d,%d,,\n",
-               m->kind >= DECIDED ? ""
+               m->kind == DECIDED ? ""
                : m->robust        ? "robust "
                                   : "plain ",
                kind[m->kind], m->width, scene, m->ns_median, m->err_p999_m, m->err_max_m, m->front, m->is_default);
