@@ -14,6 +14,7 @@
  * (1,027 sub-rays) ends within a few milliseconds. */
 static const int64_t WARM_NS = 2000000, MEASURE_NS = 6000000;
 enum { RUN = 64, TRIES = 4096, LEAST_RUNS = 2, MOST_RUNS = 4096 };
+enum { MAX_DT_NS = (1 << 24) - 1 };   /* a point's time within its frame has 24 bits */
 static const double MOST_SHARE = 0.8; /* above it a run is warned of */
 
 struct gauge {
@@ -58,8 +59,9 @@ static int draw(struct gauge *g, struct plan_place **place, struct schedule_run 
         if (line.cast0 >= line.cast_end) continue;
         uint64_t n = line.cast_end - line.cast0, first = line.cast0 + number % n;
         g->cast += n;
-        schedule_get_run(&p->segment, &line, first,
-                         (uint32_t)(line.cast_end - first < RUN ? line.cast_end - first : RUN), run);
+        uint64_t room = (uint64_t)(MAX_DT_NS / (p->segment.ns_quot + 1)), left = line.cast_end - first;
+        if (left > room) left = room > 1 ? room : 1;
+        schedule_get_run(&p->segment, &line, first, (uint32_t)(left < RUN ? left : RUN), run);
         return 1;
     }
     return 0;
