@@ -137,7 +137,7 @@ static const char NOTES[] =
     "The last row, total, is measured on this machine, now. Its cost is the processor time of one cast pulse in ns,\n"
     "from its direction to its frame. It says how many pulses per second the processors (or loop.threads of them)\n"
     "compute, and what share of that the configured rate needs. Pulses in the blind part of the sweep are not cast.\n"
-    "`run` warns above 80 %. No method is chosen by this row, and only its figures differ from one call to the next.\n"
+    "`run` warns above 80 %. No method is chosen by this row; only its figures differ from call to call.\n"
     "\n"
     "Other costs are in ns per pulse, beyond a single ray. They are rounded figures of `make chart` and\n"
     "`make bench-beam` on one core with AVX2, to compare methods by. `make bench` measures what depends on the\n"
@@ -146,7 +146,7 @@ static const char NOTES[] =
 const struct app_command app_plan = {
     .name = "plan",
     .operand = {"CONFIG"},
-    .summary = "which method each stage will use, its error bound and its cost; last, what this machine computes",
+    .summary = "which method each stage will use, its error bound, its cost, and the total",
     .options = OPTIONS,
     .notes = NOTES,
     .run = run,
