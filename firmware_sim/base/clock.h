@@ -14,7 +14,8 @@ int64_t clock_utc_ns(int64_t now_ns);
 int clock_tai_ns(int64_t now_ns, int64_t *tai_ns);
 /* Sleeps until the monotonic time is reached; goes on after signals. Real-time safe. */
 void clock_sleep_until_ns(int64_t t_ns);
-/* Processor time of the whole process, seconds. */
+/* Processor time of the whole process, seconds; of this thread, nanoseconds. */
 double clock_cpu_s(void);
+int64_t clock_thread_ns(void);
 
 #endif

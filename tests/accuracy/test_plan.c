@@ -113,8 +113,8 @@ static void expect_within(const char *what, const struct tally *t, const struct 
     assert_true(t->pulses >= RUNS);
     assert_true(wrong <= row->echo_share + 3.0 * sqrt(row->echo_share / n));
     assert_true(t->sum2 - 2.0 * sqrt(t->sum4) <= row->error_m * row->error_m * t->echoes + 1e-12 * t->echoes);
-    assert_true(wrong <= cfg->plan.echo_tolerance + 3.0 * sqrt(cfg->plan.echo_tolerance / n));
-    assert_true(rms <= cfg->plan.tolerance_m);
+    assert_true(wrong <= cfg->plan.echo_share + 3.0 * sqrt(cfg->plan.echo_share / n));
+    assert_true(rms <= cfg->plan.range_m);
 }
 
 static void compare_beam(struct side *side, uint32_t station, const struct schedule_run *run, const struct beam *beam,

@@ -16,7 +16,7 @@ struct bad {
 #define FRAMES_AT_4(text) LINES, "  " text "\n" LINES
 static const struct bad bad[] = {
     /* numbers */
-    {PRR, "  prr_hz: 30 kHz\n", 3, "head.prr_hz", "allowed prr_min_hz to prr_max_hz"},
+    {PRR, "  prr_hz: 30 kHz\n", 3, "head.prr_hz", "allowed 1 to 10000000 Hz, within the limits of the head profile"},
     {PRR, "  prr_hz: 300000 Hz\n", 3, "head.prr_hz", "\"300000 Hz\" is not a number"},
     {PRR, "  prr_hz: nan\n", 3, "head.prr_hz", "not a number"},
     {PRR, "  prr_hz: .nan\n", 3, "head.prr_hz", "not a number"},
@@ -62,7 +62,7 @@ static const struct bad bad[] = {
     {"crs: local", "layout: xyz", 17, "output.layout", "allowed polar, geo"},
     {"type: tcp", "type: udp", 14, "links[0].type", "allowed null, file, pty, tcp, usb"},
     {"output:", "loop: {pace: slow}\noutput:", 16, "loop.pace", "allowed realtime, fast, step"},
-    {"output:", "noise: {range: 1}\noutput:", 16, "noise.range", "allowed on or off"},
+    {"output:", "noise: {range: 1}\noutput:", 16, "noise.range", "allowed off, on, signal"},
     {"output:", "noise: {angle: 1}\noutput:", 16, "noise.angle", "allowed on or off"},
     {"[1, 2, 3]", "[1, 2]", 11, "stations[0].position_m", "2 numbers instead of 3"},
     {"[1, 2, 3]", "[1, 2, 3, 4]", 11, "stations[0].position_m", "4 numbers instead of 3"},
@@ -124,7 +124,7 @@ static const struct bad bad[] = {
     {NULL, "\n\nhead: \x01\n", 3, NULL, "control characters"},
     /* within the profile: VZ-400i, 100 kHz to 1.2 MHz, 3 to 240 lines/s, -40 to 60 deg, 0 to 360 deg */
     {PRR, "  prr_hz: 1200000.000001\n", 3, "head.prr_hz", "allowed 100000 to 1200000 Hz"},
-    {PRR, "  prr_hz: 99999.999999\n", 3, "head.prr_hz", "99999.999999 is outside of head profile riegl-vz400i"},
+    {PRR, "  prr_hz: 99999.999999\n", 3, "head.prr_hz", "99999.999999 is outside the limits of head profile riegl-vz400i"},
     {LINES, "  lines_hz: 241\n", 4, "head.lines_hz", "allowed 3 to 240 Hz"},
     {LINES, "  line_start_deg: -40.000001\n", 4, "head.line_start_deg", "allowed -40 to 60 deg"},
     {LINES, "  line_stop_deg: 61\n", 4, "head.line_stop_deg", "allowed -40 to 60 deg"},
@@ -133,9 +133,9 @@ static const struct bad bad[] = {
     {LINES, "  pan_deg_s: -1\n", 4, "head.pan_deg_s", "allowed 0 to"},
     {LINES, "  profile_x: 1\n", 4, "head.profile_x", "did you mean head.profile?"},
     /* between keys */
-    {LINES, "  line_start_deg: 20\n  line_stop_deg: 20\n", 5, "head.line_stop_deg", "below line_stop_deg"},
-    {LINES, "  line_start_deg: 60\n", 4, "head.line_start_deg", "below line_stop_deg"},
-    {LINES, "  pan_start_deg: 20\n  pan_stop_deg: 10\n", 5, "head.pan_stop_deg", "at most pan_stop_deg"},
+    {LINES, "  line_start_deg: 20\n  line_stop_deg: 20\n", 5, "head.line_stop_deg", "line_stop_deg above 20"},
+    {LINES, "  line_start_deg: 60\n", 4, "head.line_start_deg", "line_start_deg below 60"},
+    {LINES, "  pan_start_deg: 20\n  pan_stop_deg: 10\n", 5, "head.pan_stop_deg", "allowed a pan_stop_deg of 20 to 380"},
     {LINES, "  station: 2\n", 4, "head.station", "allowed 1 to 1"},
     {LINES, "  station: 0\n", 4, "head.station", "1 to 4096"},
     {"crs: local", "utm_zone: 33", 17, "output.utm_zone", "only with crs: utm"},
@@ -149,8 +149,8 @@ static const struct bad bad[] = {
     {"output:", "platform:\n  end_s: 1\noutput:", 17, "platform.end_s", "a static platform has no such key"},
     {"output:", "platform:\n  kind: live\n  end_s: 1\noutput:", 18, "platform.end_s", "a live platform has no such key"},
     {"output:", "platform:\n  kind: trajectory\n  file: a\n  step_s: 1\noutput:", 19, "platform.step_s", "a trajectory platform has no such key"},
-    {"output:", "platform:\n  kind: trajectory\n  file: a\n  start_s: 2\n  end_s: 2\noutput:", 20, "platform.end_s", "allowed more than start_s"},
-    {"output:", "platform:\n  kind: stops\n  file: a\n  step_s: 1\n  start_s: 2\n  end_s: 1.5\noutput:", 21, "platform.end_s", "allowed start_s or more"},
+    {"output:", "platform:\n  kind: trajectory\n  file: a\n  start_s: 2\n  end_s: 2\noutput:", 20, "platform.end_s", "allowed more than 2 s"},
+    {"output:", "platform:\n  kind: stops\n  file: a\n  step_s: 1\n  start_s: 2\n  end_s: 1.5\noutput:", 21, "platform.end_s", "allowed at least 2 s"},
     {"output:", "platform:\n  kind: stops\n  file: a\noutput:", 17, "platform.kind", "platform.step_s; allowed above 0"},
     {"output:", "platform:\n  kind: stops\n  file: a\n  step_s: 0\noutput:", 19, "platform.step_s", "allowed above 0"},
     {"output:", "platform:\n  kind: stops\n  file: a\n  step_s: -1\noutput:", 19, "platform.step_s", "allowed 0 to 1000000000 s"},
@@ -207,7 +207,7 @@ static const struct bad bad[] = {
     {"heading_deg: 90", "name: a\n  - position_m: [0, 0, 0]\n    name: a", 14, "stations[1].name", "same name"},
     /* noise, signal, surfaces, instrument */
 #define AT_16(text) "output:", text "\noutput:"
-    {AT_16("noise: {range: loud}"), 16, "noise.range", "allowed on or off, or signal"},
+    {AT_16("noise: {range: loud}"), 16, "noise.range", "allowed off, on, signal"},
     {AT_16("noise: {range: signal}"), 16, "noise.range", "allowed with signal.model: on"},
     {AT_16("noise: {ball: {radius_m: -1}}"), 16, "noise.ball.radius_m", "allowed 0 to 100 m"},
     {AT_16("noise: {ball: {axes: head}}"), 16, "noise.ball.axes", "allowed scene, beam"},
