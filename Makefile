@@ -88,30 +88,35 @@ $(BUILD)/libscanhead.so: $(LIBOBJ) drivers/host/libscanhead.map
 $(BUILD)/scanhead: $(BUILD)/firmware_sim/main.c.o $(BUILD)/modules.a
 	@echo "  LD    $@"
 	$(Q)$(CC) $(SAN) -o $@ $^ $(LDLIBS)
-# What several programs of tests/ share: scenes, rays, plain Embree.
-BENCH_MAINS = $(patsubst %,tests/bench/%.c,bench chart chart_georef chart_widths beam plain)
+
+# ---- test programs. tests/common and tests/bench make a library. What else a program includes from tests/ it is linked
+# with, compiled once: tests/unit/cast_rig.c where it includes cast_rig.h (tests/rigs.sh finds which).
+FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_georef chart_widths beam plain)
+BENCH_MAINS = $(FIGURES:$(BUILD)/%=%.c) tests/bench/bench.c
 SHARED = $(filter-out $(BENCH_MAINS),$(wildcard tests/common/*.c tests/bench/*.c))
+PAIRS = $(eval PAIRS := $$(shell sh tests/rigs.sh))$(PAIRS)
+RIGS = $(patsubst $(1):%,$(BUILD)/%.o,$(filter $(1):%,$(PAIRS)))
+TEST_LIBS = $(BUILD)/shared.a $(BUILD)/modules.a
 $(BUILD)/shared.a: $(SHARED:%=$(BUILD)/%.o)
 	@rm -f $@
 	@echo "  AR    $@"
 	$(Q)$(AR) rcs $@ $^
-$(BUILD)/bench: $(BUILD)/tests/bench/bench.c.o $(BUILD)/shared.a $(BUILD)/modules.a
+$(BUILD)/bench: $(BUILD)/tests/bench/bench.c.o $(TEST_LIBS)
 	@echo "  LD    $@"
 	$(Q)$(CC) $(SAN) -o $@ $^ $(LDLIBS)
-# A test program, with what its folder has besides test programs. What computes little itself is built in half the time.
-QUICK = $(if $(filter unit wire guest,$(1)),-O1)
-BESIDE = $(patsubst %,$(BUILD)/%.o,$(filter-out $(wildcard tests/$(1)/test_*.c),$(wildcard tests/$(1)/*.c)))
+$(FIGURES): $(BUILD)/%: $(BUILD)/%.c.o $(TEST_LIBS)
+	@echo "  LD    $@"
+	$(Q)$(CC) $(SAN) -o $@ $^ $(LDLIBS)
+# What computes little itself is built in half the time.
+$(BUILD)/tests/unit/% $(BUILD)/tests/wire/% $(BUILD)/tests/guest/%: OPT += -O1
 .SECONDEXPANSION:
-$(BUILD)/tests/%: tests/%.c $(BUILD)/shared.a $(BUILD)/modules.a $$(call BESIDE,$$(*D))
-	@mkdir -p $(@D)
+$(BUILD)/tests/%: $(BUILD)/tests/%.c.o $$(call RIGS,tests/$$*) $(TEST_LIBS)
 	@echo "  TEST  $@"
-	$(Q)$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) $(call QUICK,$(*D)) -MF $@.d -o $@ $< $(call BESIDE,$(*D)) $(BUILD)/shared.a $(BUILD)/modules.a -lcmocka $(LDLIBS)
-
+	$(Q)$(CC) $(SAN) -o $@ $^ -lcmocka $(LDLIBS)
 # What runs in the guest has the client library alone: it starts faster there.
-$(BUILD)/tests/guest/%: tests/guest/%.c $(BUILD)/libscanhead.a
-	@mkdir -p $(@D)
+$(BUILD)/tests/guest/%: $(BUILD)/tests/guest/%.c.o $$(call RIGS,tests/guest/$$*) $(BUILD)/libscanhead.a
 	@echo "  TEST  $@"
-	$(Q)$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) $(call QUICK,guest) -MF $@.d -o $@ $< $(BUILD)/libscanhead.a -lcmocka -lnettle -lusb-1.0 -lm -pthread
+	$(Q)$(CC) $(SAN) -o $@ $^ -lcmocka -lnettle -lusb-1.0 -lm -pthread
 
 # ---- what is missing, and only that
 define install_missing
@@ -175,12 +180,6 @@ bench: deps-build
 # Each program of the chart writes its panel's rows; the first one the head of the table.
 CHART = $(BUILD)/chart/speed_accuracy
 CHARTS = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_georef chart_widths beam)
-FIGURES = $(CHARTS) $(BUILD)/tests/bench/plain
-$(BUILD)/tests/bench/beam: tests/accuracy/beam_reference.c
-$(FIGURES): $(BUILD)/tests/bench/%: tests/bench/%.c $(BUILD)/shared.a $(BUILD)/modules.a
-	@mkdir -p $(@D)
-	@echo "  CHART $@"
-	$(Q)$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -MF $@.d -o $@ $(filter %.c,$^) $(filter %.a,$^) $(LDLIBS)
 # Footprints: cost, and error against 1,000 sub-rays; a few minutes.
 bench-beam: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/beam

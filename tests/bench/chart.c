@@ -12,7 +12,7 @@
 #include "core/rng.h"
 #include "core/vecmath.h"
 #include "tests/bench/bench.h"
-#include "tests/bench/reference.h"
+#include "tests/bench/ground_truth.h"
 #include "tests/bench/pin.h"
 
 enum { LINES = 200, ROUNDS = 9, CHUNK = 256, SAMPLE_STEP = 1, WIDTHS = 4, METHODS = 20 };
@@ -181,20 +181,20 @@ static int make_reference(struct chart *c)
     c->reference_m = malloc(most * sizeof *c->reference_m);
     c->error_m = malloc(most * sizeof *c->error_m);
     c->sample = malloc(most * sizeof *c->sample);
-    struct reference *r = reference_create(c->scene, c->station_m);
+    struct ground_truth *r = ground_truth_create(c->scene, c->station_m);
     if (c->reference_m == NULL || c->error_m == NULL || c->sample == NULL || r == NULL) return 0;
     for (uint32_t i = 0; i < most; i++) {
         uint32_t at = i * SAMPLE_STEP;
         const double dir[3] = {c->rays.dx[at], c->rays.dy[at], c->rays.dz[at]};
         int in_doubt;
-        double range_m = (double)reference_range(r, dir, &in_doubt);
+        double range_m = (double)ground_truth_range(r, dir, &in_doubt);
         doubtful += in_doubt ? 1U : 0U;
         misses += !in_doubt && !isfinite(range_m) ? 1U : 0U;
         if (in_doubt) continue;
         c->reference_m[c->n_sample] = range_m;
         c->sample[c->n_sample++] = at;
     }
-    reference_free(r);
+    ground_truth_free(r);
     fprintf(stderr, "chart: %u rays compared, %u left out that graze a silhouette\n", c->n_sample, doubtful);
     if (misses != 0) fprintf(stderr, "chart: the reference misses %u rays in a closed scene\n", misses);
     return misses == 0 && c->n_sample > most / 2;

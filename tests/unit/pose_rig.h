@@ -8,13 +8,10 @@
 #include <string.h>
 
 #include "core/pose.h"
-#include "tests/unit/cases.h"
+#include "tests/common/cases.h"
 
-static const double DEG = M_PI / 180.0;
+extern const double DEG;
 
-static inline double distance(const double a[3], const double b[3])
-{
-    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
-}
+double distance(const double a[3], const double b[3]);
 
 #endif
