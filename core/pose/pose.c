@@ -109,3 +109,16 @@ void pose_mount(const struct pose *body, const struct pose *mount, struct pose *
         out->position_m[i] = body->position_m[i] + arm[i];
     pose_multiply(body->quat, mount->quat, out->quat);
 }
+
+size_t pose_find_knot(const struct pose_knot *knot, size_t n, int64_t t_ns)
+{
+    size_t at = 0, after = n;
+    while (after - at > 1) {
+        size_t mid = at + (after - at) / 2;
+        if (knot[mid].t_ns <= t_ns)
+            at = mid;
+        else
+            after = mid;
+    }
+    return at;
+}
