@@ -136,8 +136,8 @@ call_violations() {
     )
 }
 
-# A README says in its first paragraph what belongs into the folder, and what doesn't: two sentences at least, one with "not"
-# (or an n't).
+# A README says in its first paragraph what belongs into the folder, and what doesn't: two sentences at least, and a word
+# like "not" or "only" in them.
 readme_violations() {
     (
         cd "$1" || exit 1
@@ -150,7 +150,7 @@ readme_violations() {
             awk '/^#/ && text == "" { next } NF == 0 { if (text != "") exit; next } { text = text " " $0 } END { print text }' \
                 "$folder/README.md" | awk -v folder="$folder" '
                 { sentences = gsub(/[.;:]([ )]|$)/, "&") }
-                sentences < 2 || !/(^|[^a-z])(not|no|nothing|never|elsewhere)([^a-z]|$)|n.t([^a-z]|$)/ {
+                sentences < 2 || tolower($0) !~ /(^|[^a-z])(not|no|only|nothing|never|elsewhere)([^a-z]|$)|n.t([^a-z]|$)/ {
                     print folder "/README.md: the first paragraph does not say what belongs here and what does not" }'
         done
     )
