@@ -229,7 +229,8 @@ uint32_t caster_wire(struct caster *c, const struct cast_setup *s, int linear, c
         kernel_scale_from(range_m, m->px, m->py, m->pz, s->station_m, n, c->ex, c->ey, c->ez);
     else
         kernel_scale(range_m, n, c->ex, c->ey, c->ez);
-    if (!linear) georef_forward(s->georef, n, c->ex, c->ey, c->ez, c->ex, c->ey, c->ez);
+    if (!linear)
+        georef_forward(s->georef, n, (struct vec3_in){c->ex, c->ey, c->ez}, (struct vec3_out){c->ex, c->ey, c->ez});
     return kernel_geo(c->ex, c->ey, c->ez, s->xyz_scale, n, block->a + at, block->b + at, block->c + at);
 }
 

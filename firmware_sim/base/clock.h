@@ -1,4 +1,6 @@
-/* The one clock: real, fast and stepped time behind one wait. */
+/* The system's clocks. All that reads or waits for time of the machine does it here.
+ *
+ * Out: ns, of CLOCK_MONOTONIC unless the name says otherwise. Device time (device.h) is another matter. */
 #ifndef FIRMWARE_SIM_BASE_CLOCK_H
 #define FIRMWARE_SIM_BASE_CLOCK_H
 

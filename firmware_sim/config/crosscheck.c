@@ -11,7 +11,7 @@
 #include <unistd.h>
 
 #include "drivers/usb/backend.h"
-#include "firmware_sim/device/head_clock.h"
+#include "firmware_sim/config/epoch.h"
 
 /* Of two keys that contradict, the one to name: the first unless only the second was given. */
 static const char *given_of(const struct cfg_reader *rd, const char *first, const char *second)
@@ -331,16 +331,16 @@ static int check_loop(const struct cfg_reader *rd, const struct config *cfg)
 
 static int check_time(const struct cfg_reader *rd, const struct config *cfg)
 {
-    enum head_clock_source source;
+    enum epoch_source source;
     struct sh_err why;
     char shown[CFG_SHOW_MAX];
-    if (head_clock_parse(cfg->time.epoch, utc_table_builtin(), &source, NULL, &why) != SH_OK)
+    if (epoch_parse(cfg->time.epoch, utc_table_builtin(), &source, NULL, &why) != SH_OK)
         return cfg_fail_key(
             rd, "time.epoch", 0,
             "\"%s\": %.80s; allowed none, utc, tai, or a time after 1980-01-06 such as 2026-01-01T00:00:00Z",
             cfg_show(cfg->time.epoch, shown), why.text);
     int link = cfg_nmea_link(cfg);
-    if (source == HEAD_CLOCK_NONE && link >= 0)
+    if (source == EPOCH_NONE && link >= 0)
         return cfg_fail_key(rd, "links[].protocol", (uint32_t)link,
                             "nmea, but the time is not known; required is time.epoch: utc, tai, or a time such as "
                             "2026-01-01T00:00:00Z");

@@ -93,7 +93,8 @@ static int given_place(const struct config_station *s, struct georef_place *at, 
     int rc = SH_OK;
     *at = (struct georef_place){s->lat_deg, s->lon_deg, s->height_m};
     if (s->place == PLACE_UTM)
-        rc = georef_locate_utm((int)s->utm_zone, s->north, s->easting_m, s->northing_m, s->height_m, at, err);
+        rc = georef_locate_utm((int)s->utm_zone, s->north, (const double[3]){s->easting_m, s->northing_m, s->height_m},
+                               at, err);
     if (s->place == PLACE_ECEF) rc = georef_locate_ecef(s->ecef_m, at, err);
     return rc == SH_OK ? locate_check(at, err) : rc;
 }

@@ -39,8 +39,12 @@ static int load_knots(struct site *site, const struct sh_report *report, struct 
     struct sh_err why;
     int rc = site_open_trajectory(site, &part, err);
     if (rc != SH_OK) return rc;
-    rc = trajectory_knots(part.trajectory, part.start_s, part.end_s, &site->mount, TOLERANCE_M, LONGEST_NS, LONGEST_M,
-                          &site->knot, &site->n_knots, &site->knot_error_m, &why);
+    const struct pose_knot_rules rules = {part.start_s, part.end_s, TOLERANCE_M, LONGEST_NS, LONGEST_M};
+    struct pose_path path;
+    rc = trajectory_knots(part.trajectory, &site->mount, &rules, &path, &why);
+    site->knot = path.knot;
+    site->n_knots = path.n;
+    site->knot_error_m = path.error_m;
     trajectory_free(part.trajectory);
     if (rc != SH_OK)
         return sh_fail(err, rc, "%s: platform.%s: %.300s", site->cfg->file, p->file[0] != '\0' ? "file" : "waypoints",

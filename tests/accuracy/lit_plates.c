@@ -39,7 +39,8 @@ struct scene *plates(double near_m, double far_m, int whole_back)
         vertex[v][1] = back ? far_m : near_m;
         vertex[v][2] = v % 4 >= 2 ? half : -half;
     }
-    if (scene_from_arrays((const double(*)[3])vertex, 8, triangle, 4, label, surface, 2, &scene, &err) != 0)
+    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 8, triangle, 4, label, surface, 2}, &scene,
+                          &err) != 0)
         fail_msg("%s", err.text);
     return scene;
 }

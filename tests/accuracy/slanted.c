@@ -56,7 +56,8 @@ struct scene *slanted(double range_m, double i, double about, const double u[2],
     *face = (struct face){.n = {across[1] * up[2] - across[2] * up[1], across[2] * up[0] - across[0] * up[2],
                                 across[0] * up[1] - across[1] * up[0]}};
     face->d = face->n[1] * range_m;
-    if (scene_from_arrays((const double(*)[3])vertex, 4, triangle, 2, label, &surface, 1, &scene, &err) != 0)
+    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 4, triangle, 2, label, &surface, 1},
+                          &scene, &err) != 0)
         fail_msg("%s", err.text);
     return scene;
 }

@@ -139,7 +139,8 @@ static void within_floats_of_an_edge(void **state)
     struct scene *scene;
     struct sh_err err;
     uint64_t pulses = 0, sides[2] = {0};
-    if (scene_from_arrays(vertex, 8, triangle, 4, NULL, NULL, 0, &scene, &err) != 0) fail_msg("%s", err.text);
+    if (scene_from_arrays(&(struct scene_arrays){vertex, 8, triangle, 4, NULL, NULL, 0}, &scene, &err) != 0)
+        fail_msg("%s", err.text);
     if (beam_rig_open(&rig, scene, STATION, &view, &err) != 0) fail_msg("%s", err.text);
     for (uint32_t l = 0; l < view.lines; l++) {
         beam_rig_mode(&rig, BEAM_SINGLE, 0);

@@ -184,7 +184,8 @@ static void test_caps(void **state)
             triangle[i][k] = 3 * i + k;
         }
     }
-    if (scene_from_arrays((const double(*)[3])vertex, 3 * CAPS, (const uint32_t(*)[3])triangle, CAPS, NULL, NULL, 0,
+    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 3 * CAPS, (const uint32_t(*)[3])triangle,
+                                                 CAPS, NULL, NULL, 0},
                           &scene, &err) != SH_OK)
         fail_msg("%s", err.text);
     struct tally t = look("a band of caps, 10 m by 1 mm", scene, station_m, station_m, &at_band);

@@ -267,7 +267,8 @@ static struct scene *step_edge(void)
     static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
     struct scene *scene;
     struct sh_err err;
-    if (scene_from_arrays(vertex, 8, triangle, 4, NULL, NULL, 0, &scene, &err) != 0) fail_msg("%s", err.text);
+    if (scene_from_arrays(&(struct scene_arrays){vertex, 8, triangle, 4, NULL, NULL, 0}, &scene, &err) != 0)
+        fail_msg("%s", err.text);
     return scene;
 }
 

@@ -268,8 +268,9 @@ static struct scene *make_room(const double offset_m[3])
             nt += 2;
         }
     }
-    assert_int_equal(scene_from_arrays((const double(*)[3])vertex, nv, (const uint32_t(*)[3])triangle, nt, NULL, NULL,
-                                       0, &scene, &err),
+    assert_int_equal(scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, nv,
+                                                              (const uint32_t(*)[3])triangle, nt, NULL, NULL, 0},
+                                       &scene, &err),
                      SH_OK);
     return scene;
 }

@@ -74,7 +74,8 @@ static void go(struct georef *georef, int m)
     if (METHOD[m] == FLAT)
         go_flat(georef);
     else
-        georef_forward(georef, POINTS, in[0], in[1], in[2], out[0], out[1], out[2]);
+        georef_forward(georef, POINTS, (struct vec3_in){in[0], in[1], in[2]},
+                       (struct vec3_out){out[0], out[1], out[2]});
 }
 
 static void measure_errors(struct georef *georef, int place)

@@ -56,7 +56,8 @@ static struct scene *ground(double height_m)
     static const uint32_t triangle[2][3] = {{0, 1, 2}, {0, 2, 3}};
     struct scene *scene;
     struct sh_err err;
-    if (scene_from_arrays(vertex, 4, triangle, 2, NULL, NULL, 0, &scene, &err) != 0) fail_msg("%s", err.text);
+    if (scene_from_arrays(&(struct scene_arrays){vertex, 4, triangle, 2, NULL, NULL, 0}, &scene, &err) != 0)
+        fail_msg("%s", err.text);
     return scene;
 }
 
@@ -129,7 +130,8 @@ static struct scene *door(double step_m)
         vertex[v][1] = DOOR_M + back * step_m;
         vertex[v][2] = v % 4 >= 2 ? 5.0 : -5.0;
     }
-    if (scene_from_arrays((const double(*)[3])vertex, 8, triangle, 4, NULL, NULL, 0, &scene, &err) != 0)
+    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 8, triangle, 4, NULL, NULL, 0}, &scene,
+                          &err) != 0)
         fail_msg("%s", err.text);
     return scene;
 }

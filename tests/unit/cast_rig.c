@@ -23,8 +23,9 @@ struct scene *box_scene(const double lo[3], const double hi[3])
         snprintf(surface[f].object, sizeof surface[f].object, "wall-%d", f);
         strcpy(surface[f].material, "plain");
     }
-    if (scene_from_arrays((const double(*)[3])vertex, 8, (const uint32_t(*)[3])triangle, 12, label, surface, 6, &scene,
-                          &err) != 0)
+    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 8, (const uint32_t(*)[3])triangle, 12,
+                                                 label, surface, 6},
+                          &scene, &err) != 0)
         fail_msg("%s", err.text);
     return scene;
 }

@@ -95,15 +95,12 @@ struct rig *rig_open(const struct device_options *options, const char *const *se
     need(site_load(rig->cfg, NULL, &rig->site, &err), &err);
     need(device_create(rig->site, options != NULL ? options : &none, &rig->device, &err), &err);
     need(worker_create(rig->site, &rig->worker, &err), &err);
-    rig->slot_bytes = worker_slot_bytes(rig->site);
-    need(ring_create(&rig->ring, 1, 1, rig->slot_bytes, &err), &err);
     return rig;
 }
 
 void rig_close(struct rig *rig)
 {
     struct sh_err err;
-    ring_free(&rig->ring);
     worker_free(rig->worker);
     need(device_close_journal(rig->device, &err), &err);
     device_free(rig->device);
@@ -114,7 +111,7 @@ void rig_close(struct rig *rig)
 
 int rig_claim(struct rig *rig)
 {
-    if (device_claim(rig->device, rig->next, &rig->work) != 0) {
+    if (device_claim(rig->device, &rig->work) != 0) {
         rig->over = 1;
         return 0;
     }
@@ -129,15 +126,11 @@ void rig_go_to(struct rig *rig, uint64_t tick)
         assert_true(rig_claim(rig));
 }
 
-const struct ring_slot *rig_fill(struct rig *rig)
+const struct ring_tick *rig_fill(struct rig *rig)
 {
-    struct ring_slot *slot = ring_claim(&rig->ring, rig->work.tick);
-    assert_non_null(slot);
-    worker_fill(rig->worker, &rig->work, slot, rig->slot_bytes);
-    assert_true(slot->len <= rig->slot_bytes && slot->n_marks <= RING_MAX_MARKS);
-    assert_true(ring_ready(&rig->ring, slot, rig->work.tick));
-    ring_release(&rig->ring, rig->work.tick);
-    return slot;
+    const struct ring_tick *tick = worker_fill(rig->worker, &rig->work);
+    assert_true(tick->len <= worker_tick_bytes(rig->site) && tick->n_marks <= RING_MAX_MARKS);
+    return tick;
 }
 
 const char *rig_tell(struct rig *rig, const char *line, uint64_t released)

@@ -35,8 +35,6 @@ struct rig {
     struct site *site;
     struct device *device;
     struct worker *worker;
-    struct ring ring;
-    uint32_t slot_bytes;
     uint64_t next;           /* tick to be claimed */
     struct device_work work; /* the last one claimed */
     int over;
@@ -54,8 +52,8 @@ int rig_claim(struct rig *rig);
 /* Claims until `tick` is the next. */
 void rig_go_to(struct rig *rig, uint64_t tick);
 
-/* Fills the last tick claimed; the slot's bytes are good until the next call. */
-const struct ring_slot *rig_fill(struct rig *rig);
+/* Makes the last tick claimed; it is good until the next call. */
+const struct ring_tick *rig_fill(struct rig *rig);
 
 /* A command that must be taken, as of `released`; the reply is good until the next call. */
 const char *rig_tell(struct rig *rig, const char *line, uint64_t released);

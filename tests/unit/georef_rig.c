@@ -28,5 +28,5 @@ void expect_point(const double got[3], double x, double y, double z, double tole
 
 void forward_one(const struct georef *georef, const double d[3], double out[3])
 {
-    georef_forward(georef, 1, &d[0], &d[1], &d[2], &out[0], &out[1], &out[2]);
+    georef_forward(georef, 1, (struct vec3_in){&d[0], &d[1], &d[2]}, (struct vec3_out){&out[0], &out[1], &out[2]});
 }

@@ -1,6 +1,6 @@
 /* The parts of the map among themselves. */
-#ifndef CORE_ANALYSIS_MAP_PRIVATE_H
-#define CORE_ANALYSIS_MAP_PRIVATE_H
+#ifndef CORE_ANALYSIS_MAP_INSIDE_H
+#define CORE_ANALYSIS_MAP_INSIDE_H
 
 #include "core/map.h"
 

@@ -1,8 +1,7 @@
-/* A file in memory, and reading text from it: words, numbers, lines.
- *
- * Numbers are exact (nearest double) and don't depend on the locale. */
-#ifndef CORE_SCENE_TEXT_H
-#define CORE_SCENE_TEXT_H
+/* A file in memory, and reading text from it: words, numbers, lines. In: a path. Out: its bytes, and a place
+ * in them that each call moves on. Numbers are exact (nearest double) and don't depend on the locale. */
+#ifndef CORE_TEXT_H
+#define CORE_TEXT_H
 
 #include <locale.h>
 #include <stdbool.h>
@@ -10,6 +9,15 @@
 #include <stdint.h>
 
 #include "core/err.h"
+
+/* Part of a text; the bytes stay where they are, without a NUL. */
+struct text_span {
+    const char *p;
+    size_t n;
+};
+
+/* The same text? */
+bool text_is(struct text_span span, const char *text);
 
 struct text {
     const char *path; /* the caller's */
@@ -29,6 +37,9 @@ void text_close(struct text *t);
 int text_fail(const struct text *t, uint64_t line, int code, struct sh_err *err, const char *fmt, ...)
     __attribute__((format(printf, 5, 6)));
 
+/* Makes control characters of a message question marks: what a broken file holds may be anything. */
+void text_keep_line(char *message);
+
 /* Blanks, and line ends that a backslash hides. */
 void text_skip_blanks(struct text *t);
 
@@ -41,11 +52,11 @@ bool text_at_line_end(const struct text *t);
 /* Past the end of this line, whatever is still on it. */
 void text_next_line(struct text *t);
 
-/* The next run of characters that are not blank; 0 at the line's end. */
-size_t text_word(struct text *t, const char **word);
+/* The next run of characters that are not blank; empty at the line's end. */
+struct text_span text_word(struct text *t);
 
 /* The rest of the line, without blanks at either end. */
-size_t text_rest(struct text *t, const char **rest);
+struct text_span text_rest(struct text *t);
 
 /* A number that fills the word at p; false and p unmoved when it isn't one. nan and inf are numbers here. */
 bool text_number(struct text *t, double *value);

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/angle.h"
+#include "core/grow.h"
 #include "core/mat3.h"
 #include "core/pose/csv.h"
 #include "core/pose/trajectory.h"
@@ -21,13 +22,7 @@ struct samples {
 
 static struct pose_sample *add_sample(struct samples *s)
 {
-    if (s->n == s->room) {
-        size_t room = s->room == 0 ? 256 : 2 * s->room;
-        struct pose_sample *more = realloc(s->at, room * sizeof *more);
-        if (more == NULL) return NULL;
-        s->at = more;
-        s->room = room;
-    }
+    if (!grow(&s->at, &s->room, s->n + 1, sizeof *s->at)) return NULL;
     struct pose_sample *sample = &s->at[s->n++];
     memset(sample, 0, sizeof *sample);
     return sample;
@@ -56,6 +51,15 @@ static int check_columns(const struct csv *csv, struct sh_err *err)
                      "qw, qx, qy, qz");
 }
 
+static int check_position(const struct csv *csv, int x, struct sh_err *err)
+{
+    for (int k = x; k < x + 3; k++)
+        if (fabs(csv->value[k]) > 1e9)
+            return text_fail(&csv->text, csv->line, SH_EINPUT, err, "%s %.6g; allowed -1e9 to 1e9", csv->known[k],
+                             csv->value[k]);
+    return SH_OK;
+}
+
 static int take_sample(const struct csv *csv, const struct pose_sample *before, struct pose_sample *s,
                        struct sh_err *err)
 {
@@ -74,10 +78,8 @@ static int take_sample(const struct csv *csv, const struct pose_sample *before, 
                              "an attitude out of range; allowed pitch_deg -90 to 90, roll_deg -360 to 360");
         pose_from_angles(angle_rad(fmod(v[HEADING], 360.0)), angle_rad(v[PITCH]), angle_rad(v[ROLL]), s->pose.quat);
     }
-    for (int k = X; k <= Z; k++)
-        if (fabs(v[k]) > 1e9)
-            return text_fail(&csv->text, csv->line, SH_EINPUT, err, "%s %.6g; allowed -1e9 to 1e9", sample_columns[k],
-                             v[k]);
+    int rc = check_position(csv, X, err);
+    if (rc != SH_OK) return rc;
     if (!(fabs(s->t_s) <= LATEST_S))
         return text_fail(&csv->text, csv->line, SH_EINPUT, err, "t_s %.9g; allowed %g to %g", s->t_s, -LATEST_S,
                          LATEST_S);
@@ -136,11 +138,7 @@ static int check_waypoint(const struct csv *csv, struct sh_err *err)
     if (v[PAUSE] != 0.0 && !(v[PAUSE] >= least_s && v[PAUSE] <= 86400.0))
         return text_fail(&csv->text, csv->line, SH_EINPUT, err, "pause_s %.6g; allowed 0, or %g to 86400", v[PAUSE],
                          least_s);
-    for (int k = WX; k <= WZ; k++)
-        if (fabs(v[k]) > 1e9)
-            return text_fail(&csv->text, csv->line, SH_EINPUT, err, "%s %.6g; allowed -1e9 to 1e9", waypoint_columns[k],
-                             v[k]);
-    return SH_OK;
+    return check_position(csv, WX, err);
 }
 
 /* speed_m_s: of the way to it. */
@@ -157,16 +155,11 @@ static int add_waypoint(const struct csv *csv, double speed_m_s, struct way *way
     s->pose.quat[0] = 1.0;
     s->frame = (double)(way->points.n - 1);
     if (way->points.n == 1) return SH_OK;
-    double chord2 = 0.0;
-    for (int k = 0; k < 3; k++) {
-        double d = s->pose.position_m[k] - s[-1].pose.position_m[k];
-        chord2 += d * d;
-    }
-    double way_s = sqrt(chord2) / speed_m_s;
+    double chord_m = trajectory_chord_m(s, s - 1), way_s = chord_m / speed_m_s;
     if (!(way_s >= 1e-6 * POSE_MIN_STEP_US && way_s < 1e6))
         return text_fail(&csv->text, csv->line, SH_EINPUT, err,
-                         "%.6g m from the way-point before, %.6g s at its speed; allowed %g to 1e6 s", sqrt(chord2),
-                         way_s, 1e-6 * POSE_MIN_STEP_US);
+                         "%.6g m from the way-point before, %.6g s at its speed; allowed %g to 1e6 s", chord_m, way_s,
+                         1e-6 * POSE_MIN_STEP_US);
     s->t_s = s[-1].t_s + way_s;
     if (s->t_s + way->pauses_s <= LATEST_S) return SH_OK;
     return text_fail(&csv->text, csv->line, SH_EINPUT, err, "%.9g s from the first way-point on; allowed %g",
@@ -190,8 +183,8 @@ static int read_waypoints(struct csv *csv, struct way *way, struct sh_err *err)
     }
 }
 
-/* Heading of the way from d before t_s to d behind it, in the axes of level; left as it is where that goes straight up.
- */
+/* Heading of the way from d before t_s to d after it, in the axes of level. Where the way goes straight up
+ * the heading stays. */
 static void heading_at(const struct trajectory *curve, double t_s, double d, const double level[9], double *heading_rad)
 {
     struct pose a, b;
@@ -205,48 +198,55 @@ static void heading_at(const struct trajectory *curve, double t_s, double d, con
     if (hypot(on_m[0], on_m[1]) > d * SLOWEST_M_S) *heading_rad = atan2(on_m[0], on_m[1]);
 }
 
-/* How far along an interval the platform is after its share f of the time: f, but from or to a standstill smoothly. */
+/* How far along an interval the platform is after its share f of the time: f, but from or to a standstill
+ * smoothly. */
 static double along(double f, int from_rest, int to_rest)
 {
     double g = 1.0 - f;
     return f + f * g * (f * to_rest - g * from_rest);
 }
 
-/* Parts of the way behind point i: STEP_S each, or STEP_M where that is longer. */
+/* Parts of the way after point i: STEP_S each, or STEP_M where that is longer. */
 static size_t leg_parts(const struct trajectory *curve, size_t i)
 {
     if (i + 1 >= curve->n) return 1;
-    const double *a = curve->sample[i].pose.position_m, *b = curve->sample[i + 1].pose.position_m;
-    double chord_m =
-        sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]) + (b[2] - a[2]) * (b[2] - a[2]));
+    double chord_m = trajectory_chord_m(&curve->sample[i], &curve->sample[i + 1]);
     double by_time = ceil((curve->sample[i + 1].t_s - curve->sample[i].t_s) / STEP_S);
     return (size_t)fmax(1.0, fmin(by_time, fmax(LEG_PARTS, ceil(chord_m / STEP_M))));
 }
 
-static int put_sample(const struct trajectory *curve, double curve_s, double t_s, double d,
-                      const struct geoframe *frame, double *heading_rad, struct samples *out, struct sh_err *err)
+/* Going along a curve. */
+struct walk {
+    const struct trajectory *curve;
+    const struct geoframe *frame; /* NULL: level is the scene's own */
+    struct samples out;
+    double heading_rad; /* of the last sample */
+};
+
+/* Adds the sample of time t_s: the curve at curve_s, heading as from d before to d after it. */
+static int put_sample(struct walk *w, double curve_s, double t_s, double d, struct sh_err *err)
 {
-    struct pose_sample *s = add_sample(out);
+    struct pose_sample *s = add_sample(&w->out);
     double level[9], level_quat[4], turn[4];
     if (s == NULL) return sh_fail(err, SH_ENOMEM, "no memory for its samples");
     s->t_s = t_s;
-    trajectory_at(curve, curve_s, &s->pose, &s->frame);
-    int rc = frame != NULL ? geoframe_level(frame, s->pose.position_m, level, err) : SH_OK;
+    trajectory_at(w->curve, curve_s, &s->pose, &s->frame);
+    int rc = w->frame != NULL ? geoframe_level(w->frame, s->pose.position_m, level, err) : SH_OK;
     if (rc != SH_OK) return rc;
-    heading_at(curve, curve_s, d, frame != NULL ? level : mat3_unit, heading_rad);
-    pose_from_angles(*heading_rad, 0.0, 0.0, frame != NULL ? turn : s->pose.quat);
-    if (frame == NULL) return SH_OK;
+    heading_at(w->curve, curve_s, d, w->frame != NULL ? level : mat3_unit, &w->heading_rad);
+    pose_from_angles(w->heading_rad, 0.0, 0.0, w->frame != NULL ? turn : s->pose.quat);
+    if (w->frame == NULL) return SH_OK;
     pose_from_matrix(level, level_quat);
     pose_multiply(level_quat, turn, s->pose.quat);
     return SH_OK;
 }
 
 /* The curve as samples that are near each other, heading along it, with the pauses. */
-static int follow(const struct trajectory *curve, const double *pause_s, const struct geoframe *frame,
-                  struct samples *out, struct sh_err *err)
+static int follow(struct walk *w, const double *pause_s, struct sh_err *err)
 {
+    const struct trajectory *curve = w->curve;
     const double near = 0.005; /* of a step, to either side: the heading there */
-    double heading_rad = 0.0, t_s = 0.0, before_s = STEP_S;
+    double t_s = 0.0, before_s = STEP_S;
     size_t n = 0;
     int rc = SH_OK;
     for (size_t i = 0; i < curve->n; i++)
@@ -258,12 +258,12 @@ static int follow(const struct trajectory *curve, const double *pause_s, const s
         double at_s = curve->sample[i].t_s, h = i + 1 < curve->n ? curve->sample[i + 1].t_s - at_s : 0.0;
         size_t parts = leg_parts(curve, i);
         double step_s = fmax(STEP_S, h / (double)parts), d = near * fmin(before_s, step_s);
-        if (pause_s[i] > 0.0) rc = put_sample(curve, at_s, t_s, d, frame, &heading_rad, out, err);
+        if (pause_s[i] > 0.0) rc = put_sample(w, at_s, t_s, d, err);
         t_s += pause_s[i];
         for (size_t j = 0; j < parts && rc == SH_OK; j++) {
             double f = (double)j / (double)parts;
             double on = along(f, pause_s[i] > 0.0, i + 1 < curve->n && pause_s[i + 1] > 0.0);
-            rc = put_sample(curve, at_s + h * on, t_s + h * f, d, frame, &heading_rad, out, err);
+            rc = put_sample(w, at_s + h * on, t_s + h * f, d, err);
             d = near * step_s;
         }
         before_s = step_s;
@@ -278,19 +278,20 @@ int trajectory_read_waypoints(const char *path, const struct geoframe *frame, st
     struct csv csv;
     struct way way = {0};
     struct sh_err why;
-    struct samples samples = {0};
+    struct walk walk = {.frame = frame};
     struct trajectory *curve = NULL;
     *out = NULL;
     int rc = csv_open(&csv, path, waypoint_columns, err);
     if (rc == SH_OK) rc = read_waypoints(&csv, &way, err);
     if (rc == SH_OK) rc = trajectory_from_samples(way.points.at, way.points.n, &curve, err);
-    if (rc == SH_OK && (rc = follow(curve, way.pause_s, frame, &samples, &why)) != SH_OK)
+    walk.curve = curve;
+    if (rc == SH_OK && (rc = follow(&walk, way.pause_s, &why)) != SH_OK)
         text_fail(&csv.text, 0, rc, err, "%.300s", why.text);
-    if (rc == SH_OK) rc = trajectory_from_samples(samples.at, samples.n, out, err);
+    if (rc == SH_OK) rc = trajectory_from_samples(walk.out.at, walk.out.n, out, err);
     trajectory_free(curve);
     csv_close(&csv);
     free(way.points.at);
     free(way.pause_s);
-    free(samples.at);
+    free(walk.out.at);
     return rc;
 }

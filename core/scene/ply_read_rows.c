@@ -1,40 +1,37 @@
-#include "core/scene/ply_rows.h"
+#include "core/ply.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-int ply_rows_open(struct ply_rows *r, const char *path, void (*tick)(void *ctx), void *ctx, struct sh_err *err)
+#include "core/grow.h"
+
+int ply_open(struct ply_rows *r, const char *path, void (*tick)(void *ctx), void *ctx, struct sh_err *err)
 {
     *r = (struct ply_rows){0};
     int rc = text_open(&r->t, path, tick, ctx, err);
-    return rc == SH_OK ? ply_header_read(&r->h, &r->t, err) : rc;
+    return rc == SH_OK ? ply_read_header(&r->h, &r->t, err) : rc;
 }
 
-void ply_rows_close(struct ply_rows *r)
+void ply_close(struct ply_rows *r)
 {
     free(r->corner);
     text_close(&r->t);
     *r = (struct ply_rows){0};
 }
 
-uint64_t ply_rows_line(const struct ply_rows *r)
+uint64_t ply_line(const struct ply_rows *r)
 {
     return r->h.format == PLY_ASCII ? r->t.line : 0;
 }
 
-double ply_rows_fraction(const struct ply_rows *r)
-{
-    return (double)(r->t.p - r->t.data) / (double)r->t.size;
-}
-
 /* Where a text goes wrong is its line; in a binary it is the byte. */
-int ply_rows_fail(const struct ply_rows *r, struct sh_err *err, const char *what)
+int ply_fail(const struct ply_rows *r, struct sh_err *err, const char *what)
 {
     char place[64] = "";
     if (r->h.format != PLY_ASCII) snprintf(place, sizeof place, ", byte %zu", (size_t)(r->t.p - r->t.data));
-    return text_fail(&r->t, ply_rows_line(r), SH_EINPUT, err, "%s %llu of %llu%s: %s", r->element->name,
+    return text_fail(&r->t, ply_line(r), SH_EINPUT, err, "%s %llu of %llu%s: %s", r->element->name,
                      (unsigned long long)r->row + 1, (unsigned long long)r->element->count, place, what);
 }
 
@@ -72,9 +69,9 @@ static int read_scalar(struct ply_rows *r, enum ply_type type, double *value, st
     if (r->h.format == PLY_ASCII) {
         text_skip_blanks(&r->t);
         if (text_number(&r->t, value)) return SH_OK;
-        return ply_rows_fail(r, err, text_at_line_end(&r->t) ? "a value is missing" : "a value is not a number");
+        return ply_fail(r, err, text_at_line_end(&r->t) ? "a value is missing" : "a value is not a number");
     }
-    if ((size_t)(r->t.end - r->t.p) < ply_type_size[type]) return ply_rows_fail(r, err, "the file ends within it");
+    if ((size_t)(r->t.end - r->t.p) < ply_type_size[type]) return ply_fail(r, err, "the file ends within it");
     *value = load_binary((const unsigned char *)r->t.p, type, r->h.format == PLY_BIG);
     r->t.p += ply_type_size[type];
     return SH_OK;
@@ -82,13 +79,8 @@ static int read_scalar(struct ply_rows *r, enum ply_type type, double *value, st
 
 static int keep_corner(struct ply_rows *r, double value, struct sh_err *err)
 {
-    if (r->n_corners == r->cap_corners) {
-        size_t cap = r->cap_corners * 2 + 16;
-        void *corner = realloc(r->corner, cap * sizeof *r->corner);
-        if (corner == NULL) return text_fail(&r->t, ply_rows_line(r), SH_ENOMEM, err, "no memory for a face");
-        r->corner = corner;
-        r->cap_corners = cap;
-    }
+    if (!grow(&r->corner, &r->cap_corners, r->n_corners + 1, sizeof *r->corner))
+        return text_fail(&r->t, ply_line(r), SH_ENOMEM, err, "no memory for a face");
     r->corner[r->n_corners++] = value;
     return SH_OK;
 }
@@ -99,7 +91,7 @@ static int read_list(struct ply_rows *r, const struct ply_property *p, struct sh
     int rc = read_scalar(r, p->count_type, &count, err);
     if (rc != SH_OK) return rc;
     if (!(count >= 0 && count <= UINT32_MAX) || count != floor(count))
-        return ply_rows_fail(r, err, "a list's count is not a whole number from 0");
+        return ply_fail(r, err, "a list's count is not a whole number from 0");
     for (uint64_t i = 0; i < (uint64_t)count && rc == SH_OK; i++) {
         double value;
         rc = read_scalar(r, p->type, &value, err);
@@ -114,13 +106,13 @@ static void skip_blank_lines(struct text *t)
         text_next_line(t);
 }
 
-int ply_rows_read(struct ply_rows *r, struct sh_err *err)
+static int read_row(struct ply_rows *r, struct sh_err *err)
 {
     const struct ply_element *e = r->element;
     r->n_corners = 0;
     if (r->h.format == PLY_ASCII) {
         skip_blank_lines(&r->t);
-        if (r->t.p >= r->t.end) return ply_rows_fail(r, err, "the file ends before it");
+        if (r->t.p >= r->t.end) return ply_fail(r, err, "the file ends before it");
     }
     int rc = SH_OK;
     for (int i = e->first; i < e->first + e->n_properties && rc == SH_OK; i++) {
@@ -130,10 +122,10 @@ int ply_rows_read(struct ply_rows *r, struct sh_err *err)
     if (rc != SH_OK || r->h.format != PLY_ASCII) return rc;
     text_skip_blanks(&r->t);
     if (text_at_line_end(&r->t)) return SH_OK;
-    return ply_rows_fail(r, err, "there are more values than the header says");
+    return ply_fail(r, err, "there are more values than the header says");
 }
 
-int ply_rows_begin(struct ply_rows *r, int i, struct sh_err *err)
+static int begin(struct ply_rows *r, int i, struct sh_err *err)
 {
     const struct ply_element *e = r->element = &r->h.element[i];
     r->row = 0;
@@ -149,8 +141,42 @@ int ply_rows_begin(struct ply_rows *r, int i, struct sh_err *err)
                      (unsigned long long)e->count, e->name, (unsigned long long)least, (unsigned long long)rest);
 }
 
-size_t ply_rows_left_over(struct ply_rows *r)
+bool ply_is_single(const struct ply_rows *r)
 {
+    const struct ply_element *e = r->element;
+    bool is_float = false;
+    for (int i = e->first; i < e->first + e->n_properties; i++) {
+        const struct ply_property *p = &r->h.property[i];
+        is_float |= p->use >= PLY_X && p->use <= PLY_Z && p->type == PLY_FLOAT;
+    }
+    return is_float && r->h.format != PLY_ASCII;
+}
+
+static int walk_element(struct ply_rows *r, int i, const struct ply_user *user, struct sh_err *err)
+{
+    int rc = begin(r, i, err);
+    if (rc == SH_OK) rc = user->begin(user->ctx, err);
+    for (; r->row < r->element->count && rc == SH_OK; r->row++) {
+        rc = read_row(r, err);
+        if (rc == SH_OK) rc = user->row(user->ctx, err);
+        if ((r->row & 0xffff) == 0) user->progress(user->ctx, (double)(r->t.p - r->t.data) / (double)r->t.size);
+    }
+    return rc;
+}
+
+int ply_walk(struct ply_rows *r, const struct ply_user *user, struct sh_err *err)
+{
+    for (int i = 0; i < r->h.n_elements; i++) {
+        const struct ply_element *e = &r->h.element[i];
+        int rc = walk_element(r, i, user, err);
+        if (rc != SH_OK) return rc;
+        if (e->count > 0 && (e->kind == PLY_OTHER || (e->kind == PLY_FACE && !user->has_faces)))
+            sh_warn(user->report, "%s: element '%s' (%llu of it) ignored", r->t.path, e->name,
+                    (unsigned long long)e->count);
+    }
     if (r->h.format == PLY_ASCII) skip_blank_lines(&r->t);
-    return (size_t)(r->t.end - r->t.p);
+    if (r->t.p < r->t.end)
+        sh_warn(user->report, "%s: %zu bytes after the last element ignored", r->t.path,
+                (size_t)(r->t.end - r->t.p));
+    return SH_OK;
 }

@@ -1,5 +1,5 @@
 /* Surfaces of the scene that is being built: labels, names, textures. */
-#include "core/scene/scene_build.h"
+#include "core/scene/build.h"
 
 #include <search.h>
 #include <stdio.h>
@@ -14,35 +14,35 @@ static int compare_surfaces(const void *a, const void *b)
 }
 
 /* Cut between two characters of UTF-8, not within one. */
-static unsigned copy_name(char out[SCENE_NAME_LEN], const char *name, size_t len)
+static unsigned copy_name(char out[SCENE_NAME_LEN], struct text_span name)
 {
+    size_t len = name.n;
     bool cut = len > SCENE_NAME_LEN - 1;
     if (cut) {
         len = SCENE_NAME_LEN - 1;
-        while (len > 0 && ((unsigned char)name[len] & 0xc0) == 0x80)
+        while (len > 0 && ((unsigned char)name.p[len] & 0xc0) == 0x80)
             len--;
     }
-    memcpy(out, name, len);
+    memcpy(out, name.p, len);
     out[len] = '\0';
     return cut ? 1 : 0;
 }
 
-int build_label(struct scene_build *b, const char *object, size_t object_len, const char *material, size_t material_len,
-                uint16_t *label, struct sh_err *err)
+int build_label(struct scene_build *b, struct text_span object, struct text_span material, uint16_t *label,
+                struct sh_err *err)
 {
     struct scene *s = b->scene;
     struct scene_surface *fresh = &s->surface[s->n_surfaces]; /* room for one more than allowed */
     fresh->has_colour = 0;
     fresh->texture = 0;
-    unsigned cut = copy_name(fresh->object, object, object_len);
-    cut += copy_name(fresh->material, material, material_len);
+    unsigned cut = copy_name(fresh->object, object);
+    cut += copy_name(fresh->material, material);
     struct scene_surface **found = tsearch(fresh, &b->surface_tree, compare_surfaces);
     if (found == NULL) return build_fail(b, SH_ENOMEM, err, "no memory for the scene's surfaces");
     if (*found == fresh) {
         if (s->n_surfaces == SCENE_MAX_SURFACES)
             return build_fail(b, SH_EINPUT, err,
-                              "too many surfaces (an object with one material each): "
-                              "a scene holds up to %d",
+                              "too many surfaces (an object with one material each): a scene holds up to %d",
                               SCENE_MAX_SURFACES);
         s->n_surfaces++;
         b->counts.names_cut += cut;
@@ -52,24 +52,24 @@ int build_label(struct scene_build *b, const char *object, size_t object_len, co
 }
 
 /* A name in a mesh's file is that of a file in the same folder; other systems write \. */
-static char *beside(const struct scene_build *b, const char *name, size_t len)
+static char *beside(const struct scene_build *b, struct text_span name)
 {
     const char *slash = strrchr(b->spec->file, '/');
-    size_t folder = name[0] != '/' && slash != NULL ? (size_t)(slash - b->spec->file) + 1 : 0;
-    char *path = malloc(folder + len + 1);
+    size_t folder = name.p[0] != '/' && slash != NULL ? (size_t)(slash - b->spec->file) + 1 : 0;
+    char *path = malloc(folder + name.n + 1);
     if (path == NULL) return NULL;
     memcpy(path, b->spec->file, folder);
-    for (size_t i = 0; i < len; i++)
-        path[folder + i] = name[i] == '\\' ? '/' : name[i];
-    path[folder + len] = '\0';
+    for (size_t i = 0; i < name.n; i++)
+        path[folder + i] = name.p[i] == '\\' ? '/' : name.p[i];
+    path[folder + name.n] = '\0';
     return path;
 }
 
-int build_texture(struct scene_build *b, const char *name, size_t len, const void *bytes, size_t n_bytes,
-                  uint16_t *number, struct sh_err *err)
+int build_texture(struct scene_build *b, struct text_span name, const void *bytes, size_t n_bytes, uint16_t *number,
+                  struct sh_err *err)
 {
     struct scene *s = b->scene;
-    char *file = beside(b, name, len);
+    char *file = beside(b, name);
     for (uint32_t i = 0; file != NULL && i < s->n_textures; i++)
         if (strcmp(s->texture[i].file, file) == 0) {
             free(file);

@@ -1,6 +1,6 @@
-/* Shared within core/georef. */
-#ifndef CORE_GEOREF_PRIVATE_H
-#define CORE_GEOREF_PRIVATE_H
+/* What a georef consists of. Read by the files of core/georef alone. */
+#ifndef CORE_GEOREF_STATE_H
+#define CORE_GEOREF_STATE_H
 
 #include "core/georef.h"
 #include "core/georef/polynomial.h"
@@ -18,8 +18,11 @@ struct georef {
     struct polynomial polynomial; /* of the map; half_m 0: none */
 };
 
-int georef_has_map(const struct georef *georef);
+static inline int georef_has_map(const struct georef *georef)
+{
+    return georef->map != NULL;
+}
+
 void georef_degrees(const struct georef *georef, double height_m, double *lat_m, double *lon_m, double *axis_m);
-const struct shim_geoid *georef_geoid_shim(const struct georef_geoid *geoid);
 
 #endif

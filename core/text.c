@@ -1,4 +1,4 @@
-#include "core/scene/text.h"
+#include "core/text.h"
 
 #include <errno.h>
 #include <stdarg.h>
@@ -29,6 +29,12 @@ static int read_whole(struct text *t, FILE *f, void (*tick)(void *ctx), void *ct
     return SH_OK;
 }
 
+void text_keep_line(char *message)
+{
+    for (char *c = message; *c != '\0'; c++)
+        if ((unsigned char)*c < ' ') *c = '?';
+}
+
 int text_fail(const struct text *t, uint64_t line, int code, struct sh_err *err, const char *fmt, ...)
 {
     enum { LONGEST = 120 };
@@ -40,8 +46,7 @@ int text_fail(const struct text *t, uint64_t line, int code, struct sh_err *err,
     va_start(ap, fmt);
     vsnprintf(what, sizeof what, fmt, ap);
     va_end(ap);
-    for (char *c = what; *c != '\0'; c++)
-        if ((unsigned char)*c < ' ') *c = '?'; /* a broken file may hold anything: one line it stays */
+    text_keep_line(what);
     return sh_fail(err, code, "%s%s%s: %s", cut ? "..." : "", t->path + (cut ? len - LONGEST : 0), place, what);
 }
 
@@ -121,26 +126,31 @@ bool text_at_word_end(const struct text *t)
     return at_word_end(t, t->p);
 }
 
-size_t text_word(struct text *t, const char **word)
+struct text_span text_word(struct text *t)
 {
     text_skip_blanks(t);
-    *word = t->p;
+    const char *from = t->p;
     while (!at_word_end(t, t->p))
         t->p++;
-    return (size_t)(t->p - *word);
+    return (struct text_span){from, (size_t)(t->p - from)};
 }
 
-size_t text_rest(struct text *t, const char **rest)
+struct text_span text_rest(struct text *t)
 {
     while (t->p < t->end && is_blank(*t->p))
         t->p++;
-    *rest = t->p;
+    struct text_span rest = {t->p, 0};
     while (!text_at_line_end(t))
         t->p++;
-    size_t len = (size_t)(t->p - *rest);
-    while (len > 0 && is_blank((*rest)[len - 1]))
-        len--;
-    return len;
+    rest.n = (size_t)(t->p - rest.p);
+    while (rest.n > 0 && is_blank(rest.p[rest.n - 1]))
+        rest.n--;
+    return rest;
+}
+
+bool text_is(struct text_span span, const char *text)
+{
+    return span.n == strlen(text) && memcmp(span.p, text, span.n) == 0;
 }
 
 bool text_integer(struct text *t, int64_t *value)

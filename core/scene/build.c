@@ -1,4 +1,4 @@
-#include "core/scene/scene_build.h"
+#include "core/scene/build.h"
 
 #include <math.h>
 #include <search.h>
@@ -9,6 +9,7 @@
 #include <time.h>
 
 #include "core/huge.h"
+#include "core/vec3.h"
 
 static const double MAX_COORDINATE_M = 1e9;
 
@@ -40,6 +41,8 @@ void build_release(struct scene_build *b)
     if (b->surface_tree != NULL) tdestroy(b->surface_tree, keep_surface);
     b->surface_tree = NULL;
     triangulate_free(&b->polygon);
+    free(b->corner);
+    free(b->corner_uv);
     scene_free(b->scene);
     b->scene = NULL;
 }
@@ -57,16 +60,16 @@ void build_begin_file(struct scene_build *b, const struct scene_mesh_spec *spec)
     b->vertex0 = b->mesh_vertex0 = b->scene->n_vertices;
     b->triangle0 = b->scene->n_triangles;
     b->counts = (struct scene_counts){0};
-    b->corner_uv = NULL;
+    b->has_uv = false;
     b->not_simple = 0;
     b->file_ns = now_ns();
 }
 
-static void tell(struct scene_build *b, double fraction)
+static void report(struct scene_build *b, double fraction)
 {
     char what[sizeof b->name + 16];
     snprintf(what, sizeof what, "reading %s", b->name);
-    b->told_ns = now_ns();
+    b->reported_ns = now_ns();
     sh_progress(b->report, what, fraction);
 }
 
@@ -88,7 +91,7 @@ int build_end_file(struct scene_build *b, struct sh_err *err)
     b->scene->counts.zero_area += b->counts.zero_area;
     b->scene->counts.not_triangles += b->counts.not_triangles;
     b->scene->counts.names_cut += b->counts.names_cut;
-    if (b->told_ns > b->file_ns) tell(b, 1);
+    if (b->reported_ns > b->file_ns) report(b, 1);
     if (b->scene->n_triangles == b->triangle0)
         return build_fail(b, SH_EINPUT, err, "no triangles in it (%llu without area, %llu points and lines)",
                           (unsigned long long)b->counts.zero_area, (unsigned long long)b->counts.not_triangles);
@@ -149,8 +152,7 @@ int build_fail(struct scene_build *b, int code, struct sh_err *err, const char *
     va_start(ap, fmt);
     vsnprintf(text, sizeof text, fmt, ap);
     va_end(ap);
-    for (char *c = text; *c != '\0'; c++)
-        if ((unsigned char)*c < ' ') *c = '?'; /* what a broken file says may hold anything: one line it stays */
+    text_keep_line(text);
     return sh_fail(err, code, "%s%s: %s", b->name, place, text);
 }
 
@@ -225,9 +227,8 @@ int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err)
 }
 
 /* Without area: the height over the longest edge is below 1e-12 of that edge. Rounding of the differences and
- * products below stays under 1e-15 of it, so the test tells zero from its own noise; a real needle is never
- * that thin: over 100 m it would be narrower than an atom. "Not greater", so that underflow counts as zero.
- */
+ * products stays under 1e-15 of it, so the test separates zero from noise. No real needle is that thin: over
+ * 100 m it would be narrower than an atom. The test asks for "greater", so that underflow counts as zero. */
 static bool has_area(const double *a, const double *b, const double *c)
 {
     double u[3], v[3], w[3];
@@ -236,10 +237,9 @@ static bool has_area(const double *a, const double *b, const double *c)
         v[k] = c[k] - a[k];
         w[k] = c[k] - b[k];
     }
-    double n[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
-    double longest2 = fmax(u[0] * u[0] + u[1] * u[1] + u[2] * u[2], v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-    longest2 = fmax(longest2, w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
-    return sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]) > 1e-12 * longest2;
+    double n[3], longest2 = fmax(fmax(vec3_dot(u, u), vec3_dot(v, v)), vec3_dot(w, w));
+    vec3_cross(u, v, n);
+    return sqrt(vec3_dot(n, n)) > 1e-12 * longest2;
 }
 
 static const float no_uv[3][2] = {{NAN, NAN}, {NAN, NAN}, {NAN, NAN}};
@@ -280,48 +280,65 @@ static int add_triangle(struct scene_build *b, const uint32_t corner[3], const f
 
 int build_triangle(struct scene_build *b, const uint32_t corner[3], uint16_t label, struct sh_err *err)
 {
-    return add_triangle(b, corner, b->corner_uv != NULL ? b->corner_uv : no_uv, label, err);
+    return add_triangle(b, corner, no_uv, label, err);
 }
 
-int build_polygon(struct scene_build *b, const uint32_t *corner, size_t n, uint16_t label, struct sh_err *err)
+int build_corners(struct scene_build *b, size_t n, struct sh_err *err)
 {
-    if (n == 3) return build_triangle(b, corner, label, err);
+    if (n <= b->cap_corners) return SH_OK;
+    size_t cap = n + n / 2 + 16;
+    void *corner = realloc(b->corner, cap * sizeof *b->corner);
+    if (corner != NULL) b->corner = corner;
+    void *uv = realloc(b->corner_uv, cap * sizeof *b->corner_uv);
+    if (uv != NULL) b->corner_uv = uv;
+    if (corner == NULL || uv == NULL) return build_fail(b, SH_ENOMEM, err, "no memory for a face of %zu corners", n);
+    b->cap_corners = cap;
+    return SH_OK;
+}
+
+static int add_corners(struct scene_build *b, const uint32_t at[3], uint16_t label, struct sh_err *err)
+{
+    uint32_t corner[3];
+    float uv[3][2];
+    for (int k = 0; k < 3; k++) {
+        corner[k] = b->corner[at[k]];
+        if (b->has_uv) memcpy(uv[k], b->corner_uv[at[k]], sizeof uv[k]);
+    }
+    return add_triangle(b, corner, b->has_uv ? (const float(*)[2])uv : no_uv, label, err);
+}
+
+int build_polygon(struct scene_build *b, size_t n, uint16_t label, struct sh_err *err)
+{
+    if (n == 3) return add_corners(b, (const uint32_t[3]){0, 1, 2}, label, err);
     if (n > SCENE_MAX_CORNERS)
         return build_fail(b, SH_EINPUT, err, "a polygon has %zu corners; allowed are up to %d", n, SCENE_MAX_CORNERS);
     struct triangulate *t = &b->polygon;
     if (triangulate_reserve(t, n) != SH_OK)
         return build_fail(b, SH_ENOMEM, err, "no memory for a polygon of %zu corners", n);
     for (size_t i = 0; i < n; i++)
-        memcpy(t->p[i], b->scene->vertex_m[corner[i]], sizeof *t->p);
+        memcpy(t->p[i], b->scene->vertex_m[b->corner[i]], sizeof *t->p);
     triangulate_polygon(t, (uint32_t)n);
     if (!t->simple) b->not_simple++;
     int rc = SH_OK;
-    for (size_t i = 0; i + 2 < n && rc == SH_OK; i++) {
-        const uint32_t *c = t->triangle[i];
-        float uv[3][2];
-        for (int k = 0; b->corner_uv != NULL && k < 3; k++)
-            memcpy(uv[k], b->corner_uv[c[k]], sizeof uv[k]);
-        rc = add_triangle(b, (uint32_t[3]){corner[c[0]], corner[c[1]], corner[c[2]]},
-                          b->corner_uv != NULL ? (const float(*)[2])uv : no_uv, label, err);
-    }
+    for (size_t i = 0; i + 2 < n && rc == SH_OK; i++)
+        rc = add_corners(b, t->triangle[i], label, err);
     return rc;
 }
 
 void build_progress(struct scene_build *b, double fraction)
 {
     int64_t now = now_ns();
-    if (now - b->start_ns >= 1000000000 && now - b->told_ns >= 250000000) tell(b, fraction);
+    if (now - b->start_ns >= 1000000000 && now - b->reported_ns >= 250000000) report(b, fraction);
 }
 
 void build_announce(struct scene_build *b)
 {
-    tell(b, -1);
+    report(b, -1);
 }
 
-void build_base_name(const struct scene_build *b, const char **name, size_t *len)
+struct text_span build_base_name(const struct scene_build *b)
 {
-    const char *slash = strrchr(b->spec->file, '/');
-    *name = slash != NULL ? slash + 1 : b->spec->file;
-    const char *dot = strrchr(*name, '.');
-    *len = dot != NULL && dot > *name ? (size_t)(dot - *name) : strlen(*name);
+    const char *slash = strrchr(b->spec->file, '/'), *name = slash != NULL ? slash + 1 : b->spec->file;
+    const char *dot = strrchr(name, '.');
+    return (struct text_span){name, dot != NULL && dot > name ? (size_t)(dot - name) : strlen(name)};
 }

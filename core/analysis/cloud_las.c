@@ -1,5 +1,6 @@
 /* LAS 1.2 to 1.4 (ASPRS), point formats 0 to 10, not compressed. */
-#include "core/analysis/read_las.h"
+#include "core/analysis/cloud_readers.h"
+#include "core/text.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -72,8 +73,8 @@ static int read_header(struct las *las, struct sh_err *err)
     return SH_OK;
 }
 
-/* The code of the projected CRS, of ECEF, or of geodetic WGS 84, which has no code for x as longitude. What stream of
- * ours calls UPS (32661, 32761) is written as the same projection with the easting first. */
+/* The code of the projected CRS, of ECEF, or of geodetic WGS 84, which has no code for x as longitude. UPS,
+ * 32661 or 32761 in our stream, is written as the same projection with the easting first. */
 static int64_t epsg_of(const char *wkt)
 {
     static const char mark[] = "AUTHORITY[\"EPSG\",\"";
@@ -127,21 +128,6 @@ static int read_vlrs(struct las *las, struct sh_err *err)
     return SH_OK;
 }
 
-static int reserve(struct las *las, struct sh_err *err)
-{
-    struct cloud *c = las->cloud;
-    size_t n = (size_t)las->n;
-    if (n == 0) return SH_OK;
-    c->xyz_m = calloc(n, sizeof *c->xyz_m);
-    c->station = calloc(n, sizeof *c->station);
-    c->echo = calloc(n, sizeof *c->echo);
-    if (las->label_at >= 0) c->label = calloc(n, sizeof *c->label);
-    c->n = n;
-    if (c->xyz_m == NULL || c->station == NULL || c->echo == NULL || (las->label_at >= 0 && c->label == NULL))
-        return text_fail(&las->t, 0, SH_ENOMEM, err, "no memory for %zu points", n);
-    return SH_OK;
-}
-
 static int read_points(struct las *las, struct sh_err *err)
 {
     struct cloud *c = las->cloud;
@@ -180,7 +166,9 @@ int cloud_read_las(const char *path, const struct sh_report *report, struct clou
     las.data = (const uint8_t *)las.t.data;
     if (rc == SH_OK) rc = read_header(&las, err);
     if (rc == SH_OK) rc = read_vlrs(&las, err);
-    if (rc == SH_OK) rc = reserve(&las, err);
+    if (rc == SH_OK)
+        rc = cloud_reserve(out, (size_t)las.n,
+                           CLOUD_HAS_STATION | CLOUD_HAS_ECHO | (las.label_at >= 0 ? CLOUD_HAS_LABEL : 0), err);
     if (rc == SH_OK) rc = read_points(&las, err);
     text_close(&las.t);
     return rc;
