@@ -8,7 +8,7 @@
 #include <string.h>
 #include <cmocka.h>
 
-#include "tests/accuracy/beam_reference.h"
+#include "tests/common/beam_reference.h"
 
 static void open_rig(struct beam_rig *rig, struct scene *scene, const struct beam_view *view)
 {

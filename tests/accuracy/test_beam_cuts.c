@@ -11,7 +11,7 @@
 #include "tests/common/generate.h"
 #include "core/rng.h"
 #include "core/surface.h"
-#include "tests/accuracy/beam_reference.h"
+#include "tests/common/beam_reference.h"
 
 static const double STATION[3] = {0.0, 0.0, 0.0};
 static const struct beam_view VIEW = {-20.0, 20.0, -45.0, 45.0, 6, 3000};

@@ -15,7 +15,7 @@
 #include "core/locate.h"
 #include "core/plan.h"
 #include "tests/accuracy/stations.h"
-#include "tests/geodesy.h"
+#include "tests/common/geodesy.h"
 
 enum { BATCHES = 4 };
 enum scene_frame { LEVEL, TURNED, EARTH, GRID, NEXT_GRID };

@@ -14,7 +14,7 @@
 #include "tests/common/generate.h"
 #include "core/rng.h"
 #include "core/vec3.h"
-#include "tests/accuracy/reference.h"
+#include "tests/common/reference.h"
 
 /* SH_SANITIZE: sanitizers are for the code, not for the count. */
 #ifdef SH_SANITIZE

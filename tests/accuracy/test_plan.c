@@ -14,7 +14,7 @@
 
 #include "core/cast/caster_private.h"
 #include "firmware_sim/site/plan_rows.h"
-#include "tests/accuracy/beam_reference.h"
+#include "tests/common/beam_reference.h"
 
 /* SH_SANITIZE: sanitizers are for the code, not for the count. */
 #ifdef SH_SANITIZE

@@ -14,7 +14,7 @@
 #include "core/cast.h"
 #include "tests/common/generate.h"
 #include "core/rng.h"
-#include "tests/accuracy/reference.h"
+#include "tests/common/reference.h"
 
 enum { BATCH = 1024, THREADS = 2 };
 

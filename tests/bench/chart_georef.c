@@ -1,5 +1,5 @@
 /* Speed against accuracy of the ways to georeference: rows of the chart's table to standard output. README.md tells how
- * to read it. Scene frame to UTM and UPS; errors are against tests/geodesy.h, which shares nothing with GeographicLib.
+ * to read it. Scene frame to UTM and UPS; errors are against tests/common/geodesy.h, which shares nothing with GeographicLib.
  */
 #include <math.h>
 #include <stdio.h>
@@ -8,7 +8,7 @@
 #include "core/plan.h"
 #include "core/rng.h"
 #include "tests/bench/bench.h"
-#include "tests/geodesy.h"
+#include "tests/common/geodesy.h"
 #include "tests/bench/pin.h"
 
 enum { PLACES = 6, POINTS = 2048, METHODS = 5, ROUNDS = 15, SCENES = 5 };

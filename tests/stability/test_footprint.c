@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "tests/accuracy/beam_reference.h"
+#include "tests/common/beam_reference.h"
 #include "tests/stability/table.h"
 
 enum { NAIVE_RINGS = 3, NAIVE_ROOM = 64 };

@@ -1,5 +1,5 @@
 /* Where common shortcuts on the way to the Earth fail: poles, the antimeridian, zones' borders and exceptions, heights,
- * distance from the anchor. Truth is tests/geodesy.h, which shares nothing with GeographicLib. */
+ * distance from the anchor. Truth is tests/common/geodesy.h, which shares nothing with GeographicLib. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -7,7 +7,7 @@
 #include "core/geoframe.h"
 #include "core/locate.h"
 #include "core/plan.h"
-#include "tests/geodesy.h"
+#include "tests/common/geodesy.h"
 #include "tests/stability/rig.h"
 
 enum { POINTS = 300 };

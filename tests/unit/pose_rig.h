@@ -8,14 +8,11 @@
 #include <string.h>
 
 #include "core/pose.h"
-#include "tests/unit/cases.h"
+#include "tests/common/cases.h"
 
-static const double DEG = M_PI / 180.0;
+extern const double DEG;
 
-static inline double distance(const double a[3], const double b[3])
-{
-    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
-}
+double distance(const double a[3], const double b[3]);
 
 /* The knots with the rules that the program uses. */
 static inline int find_path(const struct trajectory *tr, double start_s, double end_s, const struct pose *mount,

@@ -1,6 +1,6 @@
 /* What the device's ticks hold, as a client adds it up: no pulse and no line is lost or doubled, however a
  * scan goes on and ends. */
-#include "tests/unit/cases.h"
+#include "tests/common/cases.h"
 #include "tests/unit/device_rig.h"
 
 #include "core/schedule.h"

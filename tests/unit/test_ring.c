@@ -1,5 +1,5 @@
 /* The ring of slots: its states one by one. */
-#include "tests/unit/cases.h"
+#include "tests/common/cases.h"
 
 #include <pthread.h>
 #include <sched.h>

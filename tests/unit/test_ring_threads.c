@@ -1,5 +1,5 @@
 /* The ring of slots, with all its threads at once. */
-#include "tests/unit/cases.h"
+#include "tests/common/cases.h"
 
 #include <pthread.h>
 #include <sched.h>

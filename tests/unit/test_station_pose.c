@@ -5,7 +5,7 @@
 #include "drivers/record/crs_wkt.h"
 #include "drivers/record/track.h"
 #include "drivers/protocol/native.h"
-#include "tests/unit/cases.h"
+#include "tests/common/cases.h"
 #include "tests/unit/recorder_rig.h"
 
 static const double HEADING[9] = {0.6, 0.8, 0, -0.8, 0.6, 0, 0, 0, 1};

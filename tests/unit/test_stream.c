@@ -1,5 +1,5 @@
 /* The stream at release: numbers of frames, counts of echoes in line ends, and readers that are waited for. */
-#include "tests/unit/cases.h"
+#include "tests/common/cases.h"
 
 #include <string.h>
 

@@ -1,5 +1,5 @@
 /* Reflectance from a mesh's texture: a board of dark and light squares, whose places are known. */
-#include "tests/unit/cases.h"
+#include "tests/common/cases.h"
 
 #include <math.h>
 #include <png.h>

@@ -1,4 +1,4 @@
-#include "tests/accuracy/beam_reference.h"
+#include "tests/common/beam_reference.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,11 +1,11 @@
-#include "tests/bench/reference.h"
+#include "tests/bench/ground_truth.h"
 
 #include <math.h>
 #include <stdlib.h>
 
 enum { CELLS = 200 }; /* each way */
 
-struct reference {
+struct ground_truth {
     const struct scene *scene;
     double station_m[3];
     double min_m[2], cell_m[2], margin_m, reach_m; /* relative to the station */
@@ -15,7 +15,7 @@ struct reference {
 
 /* Cells from..to that the interval touches, its margin included: far more than double precision can be wrong
  * by. */
-static void cells_of(const struct reference *r, int axis, double lo, double hi, int *from, int *to)
+static void cells_of(const struct ground_truth *r, int axis, double lo, double hi, int *from, int *to)
 {
     double a = (lo - r->margin_m - r->min_m[axis]) / r->cell_m[axis],
            b = (hi + r->margin_m - r->min_m[axis]) / r->cell_m[axis];
@@ -23,7 +23,7 @@ static void cells_of(const struct reference *r, int axis, double lo, double hi, 
     *to = b < 0.0 ? -1 : b >= CELLS ? CELLS - 1 : (int)b;
 }
 
-static void triangle_cells(const struct reference *r, uint32_t prim, int from[2], int to[2])
+static void triangle_cells(const struct ground_truth *r, uint32_t prim, int from[2], int to[2])
 {
     for (int axis = 0; axis < 2; axis++) {
         double lo = INFINITY, hi = -INFINITY;
@@ -37,7 +37,7 @@ static void triangle_cells(const struct reference *r, uint32_t prim, int from[2]
 }
 
 /* Counts (list NULL) or lists the triangles of each cell; next is where the cell's next one goes. */
-static void each_triangle(const struct reference *r, uint32_t *next, uint32_t *list)
+static void each_triangle(const struct ground_truth *r, uint32_t *next, uint32_t *list)
 {
     for (uint32_t prim = 0; prim < r->scene->n_triangles; prim++) {
         int from[2], to[2];
@@ -50,9 +50,9 @@ static void each_triangle(const struct reference *r, uint32_t *next, uint32_t *l
     }
 }
 
-struct reference *reference_create(const struct scene *scene, const double station_m[3])
+struct ground_truth *ground_truth_create(const struct scene *scene, const double station_m[3])
 {
-    struct reference *r = calloc(1, sizeof *r);
+    struct ground_truth *r = calloc(1, sizeof *r);
     uint32_t *next = calloc(CELLS * CELLS, sizeof *next);
     if (r != NULL) r->first = calloc(CELLS * CELLS + 1, sizeof *r->first);
     if (r == NULL || next == NULL || r->first == NULL) goto failed;
@@ -79,11 +79,11 @@ struct reference *reference_create(const struct scene *scene, const double stati
     return r;
 failed:
     free(next);
-    reference_free(r);
+    ground_truth_free(r);
     return NULL;
 }
 
-void reference_free(struct reference *r)
+void ground_truth_free(struct ground_truth *r)
 {
     if (r == NULL) return;
     free(r->first);
@@ -110,7 +110,7 @@ struct met {
     long double around[2]; /* of the first one that it meets or just misses, seen from its front, from its back */
 };
 
-static void hit(const struct reference *r, uint32_t prim, const long double dir[3], struct met *met)
+static void hit(const struct ground_truth *r, uint32_t prim, const long double dir[3], struct met *met)
 {
     const long double border = 1e-15L, around = 1e-11L;
     long double v[3][3], e1[3], e2[3], p[3], q[3], s[3];
@@ -144,7 +144,7 @@ static int part_within(double dir, double lo, double hi, double reach, double *t
     return *t0 <= *t1;
 }
 
-long double reference_range(const struct reference *r, const double dir[3], int *doubtful)
+long double ground_truth_range(const struct ground_truth *r, const double dir[3], int *doubtful)
 {
     const long double d[3] = {dir[0], dir[1], dir[2]};
     const long double none = (long double)INFINITY;

@@ -8,8 +8,8 @@
  * A uniform grid finds the triangles near the ray. Cells hold every triangle whose bounds, widened by a
  * millionth of a cell, touch them, which covers the rounding of the walk through the cells; reference_brute
  * tries all triangles, for small scenes and to check the grid. */
-#ifndef TESTS_ACCURACY_REFERENCE_H
-#define TESTS_ACCURACY_REFERENCE_H
+#ifndef TESTS_COMMON_REFERENCE_H
+#define TESTS_COMMON_REFERENCE_H
 
 #include <stdint.h>
 

@@ -1,26 +1,6 @@
-/* WGS 84 in long double, from definitions and sharing nothing with GeographicLib: what tests hold our positions
- * against.
- *
- * Ellipsoid: NIMA TR8350.2. Transverse Mercator: the Gauss-Krueger projection is the analytic function that is the
- * meridian's arc on the central meridian, evaluated at complex isometric latitude (psi + i lambda): fixed point for the
- * complex latitude, the arc by Gauss-Legendre quadrature. Polar stereographic: its closed form. About 20 us a point. */
-#ifndef TESTS_GEODESY_H
-#define TESTS_GEODESY_H
+#include "tests/common/geodesy.h"
 
-#include <complex.h>
-#include <math.h>
-
-#define GEODESY_PI 3.14159265358979323846264338327950288L
-#define GEODESY_A  6378137.0L
-#define GEODESY_F  (1.0L / 298.257223563L)
-#define GEODESY_E2 (GEODESY_F * (2.0L - GEODESY_F))
-
-struct geodesy {
-    long double lat_rad, lon_rad, height_m;
-};
-
-/* lat and lon in degrees; d east, north, up from there. */
-static inline void geodesy_ecef(double lat_deg, double lon_deg, double height_m, const double d[3], long double p[3])
+void geodesy_ecef(double lat_deg, double lon_deg, double height_m, const double d[3], long double p[3])
 {
     long double lat = (long double)lat_deg * GEODESY_PI / 180, lon = (long double)lon_deg * GEODESY_PI / 180;
     long double sa = sinl(lat), ca = cosl(lat), so = sinl(lon), co = cosl(lon);
@@ -32,7 +12,7 @@ static inline void geodesy_ecef(double lat_deg, double lon_deg, double height_m,
 }
 
 /* Fixed point with a factor of e^2 a step. */
-static inline struct geodesy geodesy_locate(const long double p[3])
+static struct geodesy geodesy_locate(const long double p[3])
 {
     long double flat = hypotl(p[0], p[1]), lat = atan2l(p[2], flat * (1 - GEODESY_E2));
     for (int i = 0; i < 10; i++) {
@@ -44,15 +24,13 @@ static inline struct geodesy geodesy_locate(const long double p[3])
                             flat * cosl(lat) + p[2] * s - GEODESY_A * sqrtl(1 - GEODESY_E2 * s * s)};
 }
 
-static inline long double geodesy_isometric(long double lat)
+static long double geodesy_isometric(long double lat)
 {
     long double e = sqrtl(GEODESY_E2);
     return asinhl(tanl(lat)) - e * atanhl(e * sinl(lat));
 }
 
-enum { GEODESY_NODES = 20 };
-
-static inline void geodesy_legendre(long double x[GEODESY_NODES], long double w[GEODESY_NODES])
+static void geodesy_legendre(long double x[GEODESY_NODES], long double w[GEODESY_NODES])
 {
     for (int i = 0; i < GEODESY_NODES; i++) {
         long double t = cosl(GEODESY_PI * (i + 0.75L) / (GEODESY_NODES + 0.5L)), slope = 1;
@@ -71,8 +49,7 @@ static inline void geodesy_legendre(long double x[GEODESY_NODES], long double w[
     }
 }
 
-/* Easting from the central meridian and northing from the equator, scaled by 0.9996. */
-static inline void geodesy_utm(struct geodesy at, int zone, long double *x, long double *y)
+void geodesy_utm(struct geodesy at, int zone, long double *x, long double *y)
 {
     static long double node[GEODESY_NODES], weight[GEODESY_NODES];
     if (weight[0] == 0) geodesy_legendre(node, weight);
@@ -92,7 +69,7 @@ static inline void geodesy_utm(struct geodesy at, int zone, long double *x, long
 }
 
 /* From the pole, scaled by 0.994. */
-static inline void geodesy_ups(struct geodesy at, int north, long double *x, long double *y)
+static void geodesy_ups(struct geodesy at, int north, long double *x, long double *y)
 {
     long double e = sqrtl(GEODESY_E2), sign = north ? 1 : -1;
     long double rho = 2 * 0.994L * GEODESY_A * expl(-sign * geodesy_isometric(at.lat_rad)) /
@@ -101,8 +78,7 @@ static inline void geodesy_ups(struct geodesy at, int north, long double *x, lon
     *y = -sign * rho * cosl(at.lon_rad);
 }
 
-/* By EPSG code (4978, 4979, 326zz, 327zz, 32661, 32761), with false origin: metres, or degrees and metres. */
-static inline void geodesy_position(int epsg, const long double p_ecef[3], long double out[3])
+void geodesy_position(int epsg, const long double p_ecef[3], long double out[3])
 {
     struct geodesy at = geodesy_locate(p_ecef);
     int zone = epsg % 100, north = epsg / 100 == 326;
@@ -124,8 +100,7 @@ static inline void geodesy_position(int epsg, const long double p_ecef[3], long 
     }
 }
 
-/* Distance on the ground of anchor + d from a position as above. */
-static inline double geodesy_error_m(int epsg, const double anchor[3], const double d[3], const long double p_ecef[3])
+double geodesy_error_m(int epsg, const double anchor[3], const double d[3], const long double p_ecef[3])
 {
     long double truth[3], off[3];
     geodesy_position(epsg, p_ecef, truth);
@@ -137,5 +112,3 @@ static inline double geodesy_error_m(int epsg, const double anchor[3], const dou
     }
     return (double)sqrtl(off[0] * off[0] + off[1] * off[1] + off[2] * off[2]);
 }
-
-#endif

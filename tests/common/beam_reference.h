@@ -1,7 +1,7 @@
 /* The beam by brute force: 1,000 sub-rays a pulse, each cast by itself to its exact range, on a spiral (Vogel 1979) in
  * place of rings, and echoes from a plain reading of core/footprint.h. */
-#ifndef TESTS_ACCURACY_BEAM_REFERENCE_H
-#define TESTS_ACCURACY_BEAM_REFERENCE_H
+#ifndef TESTS_COMMON_BEAM_REFERENCE_H
+#define TESTS_COMMON_BEAM_REFERENCE_H
 
 #include "core/cast.h"
 

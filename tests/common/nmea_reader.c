@@ -1,24 +1,6 @@
-/* A reader of NMEA 0183 of the tests' own: fields, checksum, angles. */
-#ifndef TESTS_UNIT_NMEA_READER_H
-#define TESTS_UNIT_NMEA_READER_H
+#include "tests/common/nmea_reader.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
-
-#include <stdlib.h>
-#include <string.h>
-
-struct nmea_line {
-    char text[256];
-    const char *field[32]; /* [0] is talker and type */
-    int n;
-};
-
-/* One sentence of len bytes with its CR LF; type "" and n_fields 0: any. */
-static inline void read_line(const char *text, size_t len, const char *type, int n_fields, struct nmea_line *line)
+void read_line(const char *text, size_t len, const char *type, int n_fields, struct nmea_line *line)
 {
     assert_true(len > 9 && len < sizeof line->text && text[0] == '$');
     memcpy(line->text, text, len);
@@ -44,8 +26,7 @@ static inline void read_line(const char *text, size_t len, const char *type, int
     if (n_fields != 0) assert_int_equal(line->n, n_fields);
 }
 
-/* ddmm.mmm and its letter, of which there are two: degrees. */
-static inline double read_angle(const char *text, const char *letter, int degree_digits, const char letters[2])
+double read_angle(const char *text, const char *letter, int degree_digits, const char letters[2])
 {
     char degrees[4] = "";
     assert_true(strspn(text, "0123456789") == (size_t)degree_digits + 2);
@@ -55,5 +36,3 @@ static inline double read_angle(const char *text, const char *letter, int degree
     assert_true(letter[1] == '\0' && (letter[0] == letters[0] || letter[0] == letters[1]));
     return letter[0] == letters[0] ? deg : -deg;
 }
-
-#endif

@@ -1,4 +1,4 @@
-#include "tests/accuracy/reference.h"
+#include "tests/common/reference.h"
 
 #include <math.h>
 #include <stdlib.h>
