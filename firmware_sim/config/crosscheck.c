@@ -209,7 +209,7 @@ static int check_link(const struct cfg_reader *rd, struct config *cfg, uint32_t 
                                           "type, backend, address, port, path, attach, udc, speed, vid, pid, serial"};
     struct link_spec *link = &cfg->link[i];
     const char *type = cfg_link_words[link->type];
-    const char *stray = find_stray(rd, keys, CFG_LEN(keys), link->type, i);
+    const char *stray = find_stray(rd, keys, CFG_LEN(keys), (int)link->type, i);
     if (stray != NULL)
         return cfg_fail_key(rd, stray, i, "a %s link has no such key; allowed %s", type, has[link->type]);
     if (link->type == LINK_FILE && link->path[0] == '\0')
@@ -266,7 +266,7 @@ static int check_platform_keys(const struct cfg_reader *rd, const struct config_
         [PLATFORM_LIVE] = "reach_m, extrapolate_ms, address, port, mount_...",
         [PLATFORM_STOPS] = "file or waypoints, start_s, end_s, step_s, mount_...",
     };
-    const char *stray = find_stray(rd, keys, CFG_LEN(keys), p->kind, 0);
+    const char *stray = find_stray(rd, keys, CFG_LEN(keys), (int)p->kind, 0);
     if (stray == NULL) return SH_OK;
     return cfg_fail_key(rd, stray, 0, "a %s platform has no such key; allowed %s", cfg_platform_words[p->kind],
                         has[p->kind]);
