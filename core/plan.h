@@ -94,30 +94,6 @@ void plan_sample_beam(struct plan_sample *sample, enum beam_mode mode, uint32_t 
  * meets yet another one there counts as off, too: nothing is known of what is behind. */
 void plan_sample_optics(struct plan_sample *sample, uint32_t depth, struct plan_option *option);
 
-/* What single rays on plain BVHs (bvh_create_plain) are off against those that are refined: `plain` are the sample's
- * places, but for that; nothing moves there, and there is no cast_detect. A pulse that gets a range more than most_m
- * off, or an echo more or less, counts as one with another number of echoes: echo_share is the limit of 95 percent of
- * Poisson's distribution of what is found. error_m is of the others: three standard errors above the mean square, and
- * room for as many of most_m as may have been missed. */
-void plan_sample_cast(struct plan_sample *sample, const struct plan_place *plain, double most_m,
-                      struct plan_option *option);
-
-/* ---- casting */
-
-struct plan_cast_need {
-    uint32_t packet; /* rays per Embree call */
-    int forced;      /* 1: refined, 0: not; -1: by the plan, which leaves the refinement out where it misses neither
-                      * tolerance by more than PLAN_CAST_SHARE of it: beam and optics need the rest, and the sample is one */
-    const char *not_plain;     /* why plain BVHs can't be had; NULL: they can */
-    const char *not_by_itself; /* why the plan does not take them by itself; NULL: it may */
-    struct plan_tolerance tolerance;
-};
-#define PLAN_CAST_SHARE 0.1
-
-/* Chooses, and tells it in row. as_is: what plan_sample_cast found; not-a-number: it has not looked. Returns 1 for
- * plain. What is forced can be had. */
-int plan_cast(const struct plan_cast_need *need, const struct plan_option *as_is, struct plan_row *row);
-
 /* ---- the other stages */
 
 /* What of beam and optics a scan uses. */
@@ -125,7 +101,6 @@ struct plan_methods {
     enum beam_mode beam; /* BEAM_SINGLE, BEAM_RINGS, BEAM_ADAPTIVE */
     uint32_t rings;      /* of sub-rays; adaptive: where there is too much to tell apart */
     int order_exactly;   /* bvh_order_exactly */
-    int plain;           /* bvh_create_plain */
     uint32_t depth;      /* of glass and mirrors */
 };
 
@@ -134,9 +109,11 @@ void plan_beam_option(enum beam_mode mode, uint32_t rings, struct plan_option *o
 /* Fills options, in order of cost, for surfaces in a scene that lies within far_m of the head. */
 void plan_order_options(double far_m, struct plan_option option[2]);
 
+/* The row of the cast: what is always done. packet: rays per Embree call. */
+void plan_cast(uint32_t packet, struct plan_row *row);
+
 /* What the rows of the remaining stages hang on. */
 struct plan_head {
-    double cast_error_m;
     uint32_t n_movers;
     int noise_on;
     double range_sigma_m, range_sigma_ppm;

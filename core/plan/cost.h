@@ -7,9 +7,5 @@
 #define PLAN_COST_SUB_RAY  70.0   /* a ray of a ring, or behind glass */
 #define PLAN_COST_OUTLINES 8.0    /* adaptive: asking whether an outline is near, for each pulse */
 #define PLAN_COST_CUT      1000.0 /* adaptive: a pulse that one cuts */
-/* What is saved without: `make bench-refine`, whole casts in turns, 6 to 9 ns (8.8 in a house, 8.4 on a million
- * triangles); of that, `make bench`, stage "decide". */
-#define PLAN_COST_REFINE 7.0 /* ranges and labels from the triangles' planes, and wider triangles */
-#define PLAN_COST_DECIDE 0.5 /* triangles in double where float can't tell */
 
 #endif

@@ -246,36 +246,6 @@ void plan_sample_beam(struct plan_sample *s, enum beam_mode mode, uint32_t rings
     option->cost_ns = PLAN_COST_OUTLINES + outlined / pulses * PLAN_COST_CUT + sub_rays / pulses * PLAN_COST_SUB_RAY;
 }
 
-/* ---- rays that are not refined */
-
-void plan_sample_cast(struct plan_sample *s, const struct plan_place *plain, double most_m, struct plan_option *option)
-{
-    struct tally tally = {0};
-    struct look look;
-    double pulses = 0.0, wrong = 0.0;
-    for (; pulses < MAX_DRAWN && draw(s, &look); pulses += 1.0) {
-        struct echoes exact, as_is;
-        struct exact e;
-        set_up(&s->place[look.place], &e);
-        e.setup.beam = NULL;
-        cast_look(s, &e.setup, &look, &exact);
-        set_up(&plain[look.place], &e);
-        e.setup.beam = NULL;
-        cast_look(s, &e.setup, &look, &as_is);
-        int same = as_is.n == exact.n;
-        if (same && exact.n == 1) same = fabs(as_is.range_m[0] - exact.range_m[0]) <= most_m;
-        if (same)
-            compare(&tally, &as_is, &exact, 1.0, 0);
-        else
-            wrong += 1.0;
-    }
-    tally.wrong_mixed = wrong;
-    conclude(&tally, pulses, option);
-    if (!(tally.echoes > 0.0)) return;
-    /* As many as may be there and were not met, each as far off as it can be. */
-    option->error_m = sqrt(option->error_m * option->error_m + poisson_limit(0.0) / tally.echoes * most_m * most_m);
-}
-
 /* ---- glass and mirrors */
 
 /* apart: every surface on the way is an echo. */

@@ -196,14 +196,9 @@ struct config_beam {
     uint32_t rings;
 };
 
-struct config_cast {
-    enum config_choice refine; /* auto, off or on once it is loaded */
-};
-
 /* Tolerances of the plan. */
 struct config_plan {
     double tolerance_m, echo_tolerance;
-    int tolerance_given; /* 0: the default */
 };
 
 struct config_noise {
@@ -239,7 +234,6 @@ struct config {
     struct link_spec link[CONFIG_MAX_LINKS];
     uint32_t n_links;
     struct config_beam beam;
-    struct config_cast cast;
     struct config_plan plan;
     struct config_noise noise;
     struct config_signal signal;

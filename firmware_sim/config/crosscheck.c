@@ -123,9 +123,7 @@ static int check_output(const struct cfg_reader *rd, struct config *cfg)
     cfg->output.layout_given = cfg_is_given(rd, "output.layout", 0);
     if (!cfg_is_given(rd, "output.tolerance_m", 0)) cfg->output.tolerance_m = fmax(1e-7, 1e-3 * cfg->plan.tolerance_m);
     cfg->optics.depth_given = cfg_is_given(rd, "optics.depth", 0);
-    cfg->plan.tolerance_given = cfg_is_given(rd, "plan.tolerance_m", 0);
     tidy_choice(&cfg->scene.order_exactly);
-    tidy_choice(&cfg->cast.refine);
     if (cfg->output.utm_zone != 0 && cfg->output.crs != GEOREF_UTM)
         return cfg_fail_key(rd, "output.utm_zone", 0, "a zone, but output.crs is not utm; allowed only with crs: utm");
     if (cfg->output.heights == HEIGHTS_GEOID && cfg->output.crs != GEOREF_UTM && cfg->output.crs != GEOREF_GEODETIC)
@@ -322,18 +320,6 @@ static int check_beam(const struct cfg_reader *rd, const struct config *cfg)
     return SH_OK;
 }
 
-/* Embree's own hits have no planes to go on with. */
-static int check_cast(const struct cfg_reader *rd, const struct config *cfg)
-{
-    if (cfg->cast.refine != CHOICE_OFF) return SH_OK;
-    if (cfg->beam.mode != BEAM_SINGLE)
-        return cfg_fail_key(rd, "cast.refine", 0,
-                            "off, but footprints need exact planes; allowed with beam.mode: single");
-    if (cfg->scene.order_exactly == CHOICE_ON)
-        return cfg_fail_key(rd, "cast.refine", 0, "off, but scene.order_exactly is on; allowed one of them");
-    return SH_OK;
-}
-
 static int check_loop(const struct cfg_reader *rd, const struct config *cfg)
 {
     if (fmod(1e9, cfg->loop.tick_hz) == 0.0 && floor(cfg->loop.tick_hz) == cfg->loop.tick_hz) return SH_OK;
@@ -381,7 +367,6 @@ int cfg_check(const struct cfg_reader *rd, struct config *cfg)
     for (uint32_t i = 0; i < cfg->n_links && code == SH_OK; i++)
         code = check_link(rd, cfg, i);
     if (code == SH_OK) code = check_beam(rd, cfg);
-    if (code == SH_OK) code = check_cast(rd, cfg);
     if (code == SH_OK) code = check_pulse_width(rd, cfg);
     if (code == SH_OK) code = check_loop(rd, cfg);
     if (code == SH_OK) code = check_time(rd, cfg);

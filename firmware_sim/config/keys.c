@@ -258,19 +258,10 @@ static const struct cfg_key config_keys[] = {
     {"beam.echoes", CFG_ENUM, .def = "all", .names = echoes_names, IN_CONFIG(head.settings.echoes),
      .help = "Which echoes of a pulse are sent, also of glass and what is behind: all, first, last, strongest."},
 
-    {"cast", CFG_MAP, .help = "How a ray finds what it meets."},
-    {"cast.refine", CFG_ENUM, .def = "auto", .names = choice_names, IN_CONFIG(cast.refine), .allowed = "auto, on or off",
-     .help = "on: range and triangle in double where float can't tell, within a micrometre. off: as Embree has them, faster: "
-             "ranges off by some 1e-7 of themselves over the cosine of the incidence, now and then another surface beside an "
-             "edge, a stream that may differ between CPUs with other packets of rays; for single rays without signal, optics, "
-             "ambiguity, instrument errors, angle or ball noise. auto: off where plan.tolerance_m is given and a tenth of it "
-             "is enough, as `scanhead plan` says."},
-
     {"plan", CFG_MAP, .help = "What the methods of all stages may be off; each stage takes the cheapest that holds it "
                               "(`scanhead plan`)."},
     {"plan.tolerance_m", CFG_REAL, "m", "1e-3", 1e-6, 1, IN_CONFIG(plan.tolerance_m),
-     .help = "Echo ranges against a footprint of 1,000 sub-rays, root mean square. Where it is given, a tenth of it may be "
-             "what rays that are not refined are off (cast.refine)."},
+     .help = "RMS error of the echo ranges, against a footprint of 1,000 sub-rays."},
     {"plan.echo_tolerance", CFG_REAL, NULL, "1e-3", 1e-4, 1, IN_CONFIG(plan.echo_tolerance),
      .help = "Share of the pulses that may have another number of echoes than with 1,000 sub-rays; 1e-3 is what the "
              "plan's sample can tell."},

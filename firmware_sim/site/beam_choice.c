@@ -241,7 +241,7 @@ int site_choose_methods(struct site *site, const struct sh_report *report, struc
         rc = site->cfg->beam.mode == BEAM_AUTO ? choose_beam(site, report, err) : force_beam(site, 0, report, err);
     if (rc == SH_OK) rc = apply_beam(site, report, err);
     if (rc == SH_OK) site_set_depth(site, site->plan.methods.depth);
-    return rc == SH_OK ? site_choose_cast(site, 0, report, err) : rc;
+    return rc;
 }
 
 int site_measure_forced(struct site *site, const struct sh_report *report, struct sh_err *err)
@@ -249,6 +249,5 @@ int site_measure_forced(struct site *site, const struct sh_report *report, struc
     int rc = SH_OK;
     if (site->plan.optics.forced) rc = choose_optics(site, 1, report, err);
     if (rc == SH_OK && site->plan.beam.forced) rc = force_beam(site, 1, report, err);
-    if (rc == SH_OK) rc = apply_beam(site, report, err);
-    return rc == SH_OK ? site_choose_cast(site, 1, report, err) : rc;
+    return rc == SH_OK ? apply_beam(site, report, err) : rc;
 }

@@ -206,9 +206,7 @@ double site_ray_reach_m(const struct site *site, const double station_m[3])
 {
     const struct config_instrument *k = &site->cfg->instrument;
     double beside_m = hypot(k->transit_offset_m, k->mirror_offset_m), far2 = 0.0;
-    /* What is planned by looking at the scene must not hang on whether a run or `plan` looks at it. */
-    const int looks = site->cfg->cast.refine == CHOICE_AUTO && site->cfg->plan.tolerance_given;
-    if (site_casts_footprints(site->cfg) || looks) beside_m += 0.5 * site->cfg->profile.beam_exit_m;
+    if (site_casts_footprints(site->cfg)) beside_m += 0.5 * site->cfg->profile.beam_exit_m;
     if (site->detect.cast.depth == 0) return beside_m;
     for (int i = 0; i < 3; i++) {
         double far = fmax(fabs(site->scene->min_m[i] - station_m[i]), fabs(site->scene->max_m[i] - station_m[i]));

@@ -38,7 +38,6 @@ int site_plan_order(struct site *site, struct sh_err *err)
     struct plan_option option[2];
     struct plan_row *row = &site->plan.order;
     plan_order_options(farthest_m(site), option);
-    if (site->cfg->cast.refine == CHOICE_OFF) snprintf(option[1].why_not, sizeof option[1].why_not, "cast.refine is off");
     int forced = asked == CHOICE_AUTO ? -1 : asked == CHOICE_ON;
     site->plan.methods.order_exactly =
         (int)plan_choose(row, "order", option, 2, forced, "scene.order_exactly", &tolerance);
@@ -93,7 +92,6 @@ static void ask_head(const struct site *site, struct plan_head *head)
 {
     const struct config *cfg = site->cfg;
     *head = (struct plan_head){
-        .cast_error_m = site->plan.cast.error_m,
         .n_movers = site->n_movers,
         .noise_on = cfg->noise.range != RANGE_NOISE_OFF,
         .range_sigma_m = cfg->profile.range_sigma_m,
@@ -116,15 +114,17 @@ int site_plan_rows(struct site *site, const struct sh_report *report, struct sh_
     struct site_plan *plan = &site->plan;
     struct plan_row of_head[PLAN_HEAD_ROWS];
     struct plan_head head;
+    struct bvh_info bvh;
     int rc = site_measure_forced(site, report, err);
     if (rc != SH_OK) return rc;
     ask_head(site, &head);
+    bvh_get_info(site->station[0].bvh, &bvh);
     size_t n = plan_head(&head, of_head);
     free(plan->row);
     plan->row = calloc(n + 5 + site->n_stations, sizeof *plan->row);
     if (plan->row == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     plan->n = 0;
-    plan->row[plan->n++] = plan->cast;
+    plan_cast(bvh.packet, &plan->row[plan->n++]);
     plan->row[plan->n++] = plan->order;
     for (size_t i = 0; i < n; i++) {
         plan->row[plan->n++] = of_head[i];
@@ -143,6 +143,5 @@ void site_plan_text(const struct site *site, char *text, size_t room)
 {
     const struct site_plan *plan = &site->plan;
     int polar = site->cfg->output.layout == LINE_POLAR;
-    snprintf(text, room, "cast %s; order %s; beam %s; optics %s; georef %s", plan->methods.plain ? "float" : "refined",
-             plan->order.method, plan->beam.method, plan->optics.method, polar ? "none" : site->station[0].plan.method);
+    snprintf(text, room, "order %s; beam %s; optics %s; georef %s", plan->order.method, plan->beam.method, plan->optics.method, polar ? "none" : site->station[0].plan.method);
 }

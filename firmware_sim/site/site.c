@@ -222,7 +222,6 @@ int site_load(const struct config *cfg, const struct sh_report *report, struct s
     if (rc == SH_OK) rc = placement_find_anchor(cfg, report, &site->anchor, err);
     if (rc == SH_OK) rc = load_scene(site, report, err);
     if (rc == SH_OK) rc = site_set_up_detect(site, report, err);
-    if (rc == SH_OK) rc = site_check_cast(site, err);
     if (rc == SH_OK) rc = place_stations(site, err);
     if (rc == SH_OK) rc = site_plan_order(site, err);
     if (rc == SH_OK && site->moving) rc = site_load_platform(site, report, err);

@@ -53,7 +53,7 @@ struct site_detect {
 /* What was planned, once; scans take their methods from here alone. */
 struct site_plan {
     struct plan_methods methods;
-    struct plan_row cast, order, beam, optics;
+    struct plan_row order, beam, optics;
     struct plan_row *row; /* all of it, in the order of the stages */
     size_t n;
 };

@@ -96,48 +96,14 @@ static void test_order(void **state)
     assert_int_equal(plan_choose(&row, "order", option, 2, -1, "", &TOLERANCE), 1);
 }
 
-/* Rays are not refined where what that is off lies within a tenth of both tolerances: 1e-4 m, and 1e-3 of the pulses.
- */
+/* Nothing is chosen there: the row says what is always done. */
 static void test_cast(void **state)
 {
     (void)state;
-    static const struct {
-        struct plan_option as_is;
-        int forced;
-        const char *not_plain, *not_by_itself;
-        int plain;
-        const char *why, *left;
-    } cases[] = {
-        {{.error_m = 1e-4, .echo_share = 1e-3}, -1, NULL, NULL, 1, "the cheapest; holds 0.001 m", "dearer"},
-        {{.error_m = 1.1e-4, .echo_share = 1e-3},
-         -1,
-         NULL,
-         NULL,
-         0,
-         "in double where float can't",
-         "more than 0.0001 m"},
-        {{.error_m = 1e-4, .echo_share = 1.1e-3}, -1, NULL, NULL, 0, "in double where float can't", "more than 0.1 %"},
-        {{.error_m = (double)NAN, .echo_share = (double)NAN}, -1, NULL, NULL, 0, "in double", "off by more"},
-        {{.error_m = 0.0}, -1, "of sub-rays", NULL, 0, "in double where float can't", "of sub-rays"},
-        {{.error_m = 0.0}, -1, NULL, "nobody asked", 0, "in double where float can't", "nobody asked"},
-        {{.error_m = 5e-4, .echo_share = 5e-3}, 0, NULL, "nobody asked", 1, "forced by cast.refine; holds", "dearer"},
-        {{.error_m = 2e-3, .echo_share = 5e-3}, 0, NULL, NULL, 1, "forced by cast.refine; does not hold", "dearer"},
-        {{.error_m = (double)NAN, .echo_share = (double)NAN}, 0, NULL, NULL, 1, "is not known", "dearer"},
-        {{.error_m = 0.0}, 1, NULL, NULL, 0, "forced by cast.refine; holds", "not asked for"},
-    };
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        struct plan_row row;
-        const struct plan_cast_need need = {.packet = 8,
-                                            .forced = cases[i].forced,
-                                            .not_plain = cases[i].not_plain,
-                                            .not_by_itself = cases[i].not_by_itself,
-                                            .tolerance = TOLERANCE};
-        assert_int_equal(plan_cast(&need, &cases[i].as_is, &row), cases[i].plain);
-        expect(&row, cases[i].plain ? "packets of 8, float" : "packets of 8, decided", cases[i].forced >= 0,
-               cases[i].why);
-        expect_left(&row, 0, cases[i].plain ? "packets of 8, decided" : "packets of 8, float", cases[i].left);
-        assert_true(cases[i].plain ? row.cost_ns < 0.0 : row.cost_ns == 0.0);
-    }
+    struct plan_row row;
+    plan_cast(8, &row);
+    expect(&row, "packets of 8, decided", 0, "in double where float can't tell");
+    assert_true(row.error_m == 1e-6 && row.cost_ns == 0.0 && row.n_left == 0);
 }
 
 int main(void)

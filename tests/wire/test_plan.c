@@ -188,11 +188,9 @@ static void test_run_follows_plan(void **state)
     struct wire *wire = *state;
     static const struct {
         const char *set, *line;
-    } cases[] = {{"optics.depth=1", "# plan: cast refined; order none; beam single; optics depth 1; georef rotation\n"},
-                 {"plan.echo_tolerance=0.01",
-                  "# plan: cast refined; order none; beam single; optics depth 2; georef rotation\n"},
-                 {"plan.tolerance_m=1e-6",
-                  "# plan: cast refined; order double; beam single; optics depth 3; georef rotation\n"}};
+    } cases[] = {{"optics.depth=1", "# plan: order none; beam single; optics depth 1; georef rotation\n"},
+                 {"plan.echo_tolerance=0.01", "# plan: order none; beam single; optics depth 2; georef rotation\n"},
+                 {"plan.tolerance_m=1e-6", "# plan: order double; beam single; optics depth 3; georef rotation\n"}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         char journal[256];
         snprintf(journal, sizeof journal, "%s", wire_path(wire, "journal"));
@@ -224,54 +222,6 @@ static const char *few_leaves(struct wire *wire)
     free(text);
     free(whole);
     return path;
-}
-
-/* What a run says that it does, of the same configuration. */
-static void expect_run(struct wire *wire, const char *config, const char *const set[2], const char *says)
-{
-    char journal[256];
-    snprintf(journal, sizeof journal, "%s", wire_path(wire, "journal"));
-    const char *const args[] = {"run",   config,    "--start",   "--duration", "0.05",  "--pace",
-                                "fast",  "--quiet", "--journal", journal,      "--set", "head.line_stop_deg=-20",
-                                "--set", set[0],    "--set",     set[1],       NULL};
-    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
-    char *text = wire_read(journal, NULL);
-    if (strstr(text, says) == NULL) fail_msg("no %s in %s", says, text);
-    free(text);
-}
-
-/* The row of the cast. Who states no tolerance gets ranges within a micrometre. Ground 1.7 m below, seen down to 20
- * degrees below the horizon: float is off by micrometres, and there are no edges. */
-static void test_cast(void **state)
-{
-    struct wire *wire = *state;
-    char config[256];
-    snprintf(config, sizeof config, "%s", set_up(wire));
-    static const struct {
-        const char *set[2];
-        int plain, forced;
-        const char *why;
-    } cases[] = {{{"cast.refine=auto", "beam.mode=single"}, 0, 0, "plan.tolerance_m is not given"},
-                 {{"plan.tolerance_m=0.01", "cast.refine=auto"}, 1, 0, "the cheapest; holds 0.01 m"},
-                 {{"plan.tolerance_m=0.01", "cast.refine=on"}, 0, 1, "forced by cast.refine; holds 0.01 m"},
-                 {{"plan.tolerance_m=0.001", "cast.refine=off"}, 1, 1, "forced by cast.refine; holds 0.001 m"},
-                 {{"plan.tolerance_m=0.001", "signal.model=on"}, 0, 0, "signal, optics"},
-                 {{"plan.tolerance_m=0.001", "beam.mode=rings"}, 0, 0, "sub-rays"},
-                 /* float's steps at 20 m are 2 um */
-                 {{"plan.tolerance_m=1e-6", "cast.refine=off"}, 1, 1, "forced by cast.refine; does not hold 1e-06 m"},
-                 {{"plan.tolerance_m=1e-6", "cast.refine=auto"}, 0, 0, "surfaces are ordered in double"}};
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        const char *const args[] = {"plan",  config,          "--json", "--set",         "head.line_stop_deg=-20",
-                                    "--set", cases[i].set[0], "--set",  cases[i].set[1], NULL};
-        char *json = plan(wire, args, 0);
-        expect_row(json, "cast", 0, "packets of ", cases[i].plain ? 1e-3 : 1e-6, cases[i].why);
-        char *text = row(json, "cast", 0);
-        assert_non_null(strstr(text, cases[i].forced ? "\"forced\": true" : "\"forced\": false"));
-        assert_true((number_of(text, "\"cost_ns\": ") < 0.0) == cases[i].plain);
-        free(text);
-        free(json);
-        expect_run(wire, config, cases[i].set, cases[i].plain ? "# plan: cast float;" : "# plan: cast refined;");
-    }
 }
 
 /* Forced methods have bounds, too, and say whether they hold. */
@@ -333,7 +283,6 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_text, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_three_plans, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_run_follows_plan, wire_setup, wire_teardown),
-        cmocka_unit_test_setup_teardown(test_cast, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_forced, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_forced_as_chosen, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_what_cannot_be, wire_setup, wire_teardown),
