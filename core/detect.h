@@ -76,7 +76,6 @@ int detect_signal_set_up(const struct detect_signal_spec *spec, struct detect_si
 double detect_least_reflectance(const struct detect_signal *signal, double range_m);
 /* A of a return E rho(i). */
 double detect_amplitude(const struct detect_signal *signal, double range_m, double rho);
-double detect_sigma_m(const struct detect_signal *signal, double amplitude, double range_m);
 
 /* Extinction for a visibility (Koschmieder: contrast of 2 % at 550 nm), by Kruse's formula with Kim's exponents (I. Kim
  * et al., Comparison of laser beam propagation at 785 nm and 1550 nm in fog and haze, 2001). */
@@ -108,7 +107,6 @@ void detect_fixed_noise(double sigma0_m, double sigma1, uint64_t range_key, uint
  * lies beyond is lost. In both an echo is lost that comes back while the head is blind, less than range_min_m after a
  * pulse. */
 enum detect_ambiguity { DETECT_AMBIGUITY_NONE, DETECT_FOLDED, DETECT_RESOLVED };
-static const double DETECT_LIGHT_M_S = 299792458.0;
 void detect_zones(enum detect_ambiguity how, double period_s, uint32_t zones, double range_min_m, uint32_t n,
                   double *range_m);
 
@@ -120,9 +118,13 @@ struct detect_ball {
     uint64_t direction_key, radius_key;
 };
 void detect_ball_keys(struct detect_ball *ball, uint64_t seed);
-/* Moves n points given by range and angles (turns) in the head's frame; ranges of NaN are left alone. rotation: socs ->
- * prcs; NULL with local axes. */
-void detect_move_in_ball(const struct detect_ball *ball, const double rotation[9], uint32_t n, const uint64_t *key,
-                         double *range_m, double *mirror_turn, double *pan_turn);
+/* Points, given by range and angles (turns) in the head's frame; ranges of NaN are left alone. */
+struct detect_points {
+    uint32_t n;
+    const uint64_t *key;
+    double *range_m, *mirror_turn, *pan_turn;
+};
+/* rotation: socs -> prcs; NULL with local axes. */
+void detect_move_in_ball(const struct detect_ball *ball, const double rotation[9], const struct detect_points *points);
 
 #endif

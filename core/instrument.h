@@ -25,6 +25,8 @@
 
 #include <stdint.h>
 
+#include "core/vec3.h"
+
 struct instrument_encoder {
     double index_rad, scale, eccentricity_rad, phase_rad;
 };
@@ -43,16 +45,21 @@ int instrument_is_ideal(const struct instrument *instrument);
 /* True when beams begin beside the head's origin. */
 int instrument_has_offset(const struct instrument *instrument);
 
-/* Pulses from pulse0 on, scheduled at these angles: direction s of the beam and, unless ox is NULL, its origin o, both
- * in socs. */
-struct instrument_beams {
-    double *sx, *sy, *sz, *ox, *oy, *oz;
+/* Pulses from pulse0 on: angles of the axes, in turns. */
+struct instrument_turns {
+    uint64_t pulse0;
+    uint32_t n;
+    double *mirror, *pan;
 };
-void instrument_aim(const struct instrument *instrument, uint64_t pulse0, uint32_t n, const double *mirror_turn,
-                    const double *pan_turn, const struct instrument_beams *beams);
+/* Scheduled angles -> direction s of the beam and, unless o->x is NULL, its origin o (m), both in socs. */
+void instrument_aim(const struct instrument *instrument, const struct instrument_turns *turns,
+                    const struct vec3_arrays *s, const struct vec3_arrays *o);
 
-/* What the encoders say, in place. */
+/* Scheduled angles become what the encoders say, in place. */
 void instrument_read(const struct instrument *instrument, uint32_t n, double *mirror_turn, double *pan_turn);
 void instrument_range(const struct instrument *instrument, uint32_t n, double *range_m);
+
+/* Encoder reading of an angle: whole counts, modulo a turn. */
+uint32_t instrument_encoder_count(double turn, double counts_per_turn);
 
 #endif

@@ -73,6 +73,13 @@ static inline uint32_t surface_of_label(uint32_t label)
     return label & 0xffff;
 }
 
+/* The surface of a label, entry n for one beyond the table. */
+static inline const struct surface *surface_at(const struct surface_table *table, uint32_t label)
+{
+    label = surface_of_label(label);
+    return &table->surface[label < table->n ? label : table->n];
+}
+
 /* rho(i) of n hits; label beyond the table: 0. */
 void surface_return(const struct surface_table *table, uint32_t n, const uint32_t *label, const double *cos_incidence,
                     double *rho);

@@ -1,4 +1,5 @@
-/* Products of vectors of three doubles. */
+/* Vectors of three doubles: products of two of them, and arrays of them as kernels take them, an array for each
+ * component. */
 #ifndef CORE_VEC3_H
 #define CORE_VEC3_H
 
@@ -13,5 +14,23 @@ static inline void vec3_cross(const double a[3], const double b[3], double out[3
     out[1] = a[2] * b[0] - a[0] * b[2];
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
+
+struct vec3_arrays {
+    double *x, *y, *z;
+};
+struct vec3_const {
+    const double *x, *y, *z;
+};
+struct vec3_floats {
+    const float *x, *y, *z;
+};
+
+/* Of anything with arrays x, y and z: what begins at its element i. */
+#define VEC3_IN(a, i)  ((struct vec3_const){(a).x + (i), (a).y + (i), (a).z + (i)})
+#define VEC3_OUT(a, i) ((struct vec3_arrays){(a).x + (i), (a).y + (i), (a).z + (i)})
+
+/* Element i as a vector. */
+#define VEC3_AT(a, i) {(a).x[i], (a).y[i], (a).z[i]}
+#define VEC3_SET(a, i, v) ((a).x[i] = (v)[0], (a).y[i] = (v)[1], (a).z[i] = (v)[2])
 
 #endif

@@ -45,7 +45,7 @@ static double edge_length(const double a[3], const double b[3])
 
 static double plane_range(const struct decide_ray *ray, uint32_t prim)
 {
-    const struct bvh_triangle *tri = &ray->bvh->triangle[prim];
+    const struct bvh_plane *tri = &ray->bvh->triangle[prim];
     return (tri->d - vec3_dot(tri->n, ray->o_local)) / vec3_dot(tri->n, ray->dir);
 }
 
@@ -175,7 +175,7 @@ static void try_triangle(struct search *s, uint32_t prim)
 static bool visit(struct RTCPointQueryFunctionArguments *args)
 {
     const struct search *s = args->userPtr;
-    const struct bvh_triangle *tri = &s->ray->bvh->triangle[args->primID];
+    const struct bvh_plane *tri = &s->ray->bvh->triangle[args->primID];
     double off = vec3_dot(tri->n, s->point_m) - tri->d, reach = s->radius_m;
     if (args->primID != s->proposed && off * off <= reach * reach * vec3_dot(tri->n, tri->n))
         try_triangle(args->userPtr, args->primID);
@@ -202,7 +202,7 @@ static void try_around(struct search *s, double range_m, double radius_m)
  * stretched by the incidence. */
 static double slack_m(const struct decide_ray *ray, uint32_t prim, double width_m)
 {
-    const struct bvh_triangle *tri = &ray->bvh->triangle[prim];
+    const struct bvh_plane *tri = &ray->bvh->triangle[prim];
     double cosine = fabs(vec3_dot(tri->n, ray->dir)) / sqrt(vec3_dot(tri->n, tri->n));
     return 4.0 * width_m * (1.0 + 1.0 / fmax(cosine, 1e-6));
 }
@@ -214,13 +214,13 @@ static void try_rivals(struct search *s, uint32_t prim, double range_m)
     const struct decide_ray *ray = s->ray;
     const struct bvh *bvh = ray->bvh;
     if (bvh->rival_first == NULL) return;
-    const struct bvh_triangle *own = &bvh->triangle[prim];
+    const struct bvh_plane *own = &bvh->triangle[prim];
     uint32_t end = bvh->rival_first[prim + 1];
     if (bvh->rival_first[prim] == end) return;
     double own_m = bvh_width_m(bvh, prim);
     double steep = sqrt(vec3_dot(own->n, own->n)) / fabs(vec3_dot(own->n, ray->dir));
     for (uint32_t k = bvh->rival_first[prim]; k < end; k++) {
-        const struct bvh_triangle *tri = &bvh->triangle[bvh->rival[k]];
+        const struct bvh_plane *tri = &bvh->triangle[bvh->rival[k]];
         double along = fabs(vec3_dot(tri->n, ray->dir)), length = sqrt(vec3_dot(tri->n, tri->n));
         double gap = fabs((tri->d - vec3_dot(tri->n, ray->o_local)) / vec3_dot(tri->n, ray->dir) - range_m);
         double width_m = 4.0 * fmax(own_m, bvh_width_m(bvh, bvh->rival[k]));
@@ -247,7 +247,7 @@ static int is_found(struct search *s, double limit_m)
     return 0;
 }
 
-void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct cast_counters *counters,
+void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh_counters *counters,
                 struct decide_hit *hit)
 {
     struct search s = {.ray = ray,

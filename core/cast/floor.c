@@ -111,7 +111,13 @@ static int cast_down(const struct column *c, const struct scene *scene, const do
     int rc = bvh_create(scene, c->from_m, 0.0, 1, NULL, &bvh, err);
     if (rc == SH_OK) rc = bvh_order_exactly(bvh, err); /* few triangles: no need to ask whether that is wanted */
     if (rc == SH_OK) rc = caster_create(&caster, err);
-    if (rc == SH_OK) caster_hits(caster, bvh, c->from_m, far_m, 1, &down[0], &down[1], &down[2], range_m, &triangle);
+    const struct bvh_rays ray = {.n = 1,
+                                 .from.at_m = {c->from_m[0], c->from_m[1], c->from_m[2]},
+                                 .dir = {&down[0], &down[1], &down[2]},
+                                 .range_max_m = far_m,
+                                 .range_m = range_m,
+                                 .triangle = &triangle};
+    if (rc == SH_OK) caster_hits(caster, bvh, &ray);
     caster_free(caster);
     bvh_free(bvh);
     return rc;

@@ -90,11 +90,6 @@ double detect_amplitude(const struct detect_signal *signal, double range_m, doub
            vec_exp(-log_least(signal, range_m) - signal->extinction2_1_m * range_m);
 }
 
-double detect_sigma_m(const struct detect_signal *signal, double amplitude, double range_m)
-{
-    return sqrt(signal->floor2 + signal->jitter2 / (amplitude * amplitude)) + signal->per_distance * range_m;
-}
-
 double detect_extinction_1_m(double visibility_m, double wavelength_m)
 {
     double v = 1e-3 * visibility_m;
@@ -118,11 +113,15 @@ static void sum_pieces(const struct detect_signal *s, uint32_t n, const double *
 
 /* amplitude: holds g, becomes A. A range of NaN gives no A, and so no echo. */
 VEC_CLONES
-static void detect(const struct detect_signal *s, uint32_t n, const uint64_t *restrict key, const double *restrict rho,
-                   double *restrict range_m, double *restrict amplitude, int16_t *restrict refl_cdb)
+static void detect(const struct detect_signal *s, const struct detect_echoes *e)
 {
     const double per_overlap2 = s->per_overlap2, extinction2 = s->extinction2_1_m, per_snr = s->per_snr;
-    const uint64_t signal_key = s->signal_key;
+    const uint64_t signal_key = s->signal_key, *key = e->key;
+    const double *rho = e->rho;
+    double *range_m = e->range_m, *amplitude = e->amplitude;
+    int16_t *refl_cdb = e->refl_cdb;
+    const uint32_t n = e->n;
+    VEC_LOOP
     for (uint32_t i = 0; i < n; i++) {
         double r = range_m[i] > 1e-6 ? range_m[i] : 1e-6;
         double least = 2.0 * vec_log(r) + amplitude[i], o = overlap(per_overlap2, r);
@@ -143,7 +142,7 @@ static void detect(const struct detect_signal *s, uint32_t n, const uint64_t *re
 void detect_by_signal(const struct detect_signal *signal, const struct detect_echoes *e)
 {
     sum_pieces(signal, e->n, e->range_m, e->amplitude);
-    detect(signal, e->n, e->key, e->rho, e->range_m, e->amplitude, e->refl_cdb);
+    detect(signal, e);
 }
 
 VEC_CLONES

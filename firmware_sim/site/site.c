@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/light.h"
 #include "core/locate.h"
 #include "core/rng.h"
 
@@ -100,7 +101,7 @@ void site_move(const struct site *site, double t_s, struct cast_setup *setup)
             t = fmod(t_s, mesh->cycle_s);
             if (t > 0.5 * mesh->cycle_s) t = mesh->cycle_s - t;
         }
-        cast_rotation(fmod(mesh->turn_deg_s * t, 360.0) * M_PI / 180.0, out->rotation);
+        pose_heading(fmod(mesh->turn_deg_s * t, 360.0) * M_PI / 180.0, out->rotation);
         out->bvh = m->bvh;
         out->radius_m = m->radius_m;
         memcpy(out->centre_m, m->centre_m, sizeof out->centre_m);
@@ -302,7 +303,7 @@ void site_cast_setup(const struct site *site, uint32_t station, struct cast_setu
     setup->layout = site->cfg->output.layout;
     setup->beam = s->beam;
     setup->echoes = (enum beam_select)site->cfg->head.settings.echoes;
-    setup->pulse_m = 0.5 * DETECT_LIGHT_M_S * 1e-9 * profile->pulse_width_ns;
+    setup->pulse_m = 0.5 * LIGHT_SPEED_M_S * 1e-9 * profile->pulse_width_ns;
     setup->range_scale_m = site->scale_m;
     memcpy(setup->xyz_scale, s->scale, sizeof setup->xyz_scale);
 }

@@ -223,7 +223,7 @@ int beam_rig_open(struct beam_rig *rig, struct scene *scene, const double statio
                                      .range_scale_m = 1e-6,
                                      .xyz_scale = {1e-5, 1e-5, 1e-5}};
     memcpy(rig->setup.station_m, station_m, sizeof rig->setup.station_m);
-    cast_rotation(0.0, rig->setup.rotation);
+    pose_heading(0.0, rig->setup.rotation);
     int rc = bvh_create(scene, station_m, 0.01, 2, NULL, &rig->bvh, err);
     if (rc == SH_OK) rc = georef_create(&local, &rig->georef, err);
     if (rc == SH_OK) rc = caster_create(&rig->caster, err);

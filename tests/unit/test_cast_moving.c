@@ -218,7 +218,7 @@ static void test_moving_body(void **state)
     rig->setup.n_knots = 2;
     rig->setup.n_movers = 1;
     rig->setup.mover[0] = (struct cast_mover){.bvh = bvh, .centre_m = {0.0, 3.25, 0.0}, .radius_m = 1.2};
-    cast_rotation(0.0, rig->setup.mover[0].rotation);
+    pose_heading(0.0, rig->setup.mover[0].rotation);
     rig->setup.mover[0].shift_m[1] = 2.0; /* its face is at y = 5 */
     rig->spec.pan_udeg_s = 0;
     schedule_start(&rig->segment, &rig->spec);
@@ -273,7 +273,7 @@ static void test_plain(void **state)
         fail_msg("%s", err.text);
     rig->setup.n_movers = 1;
     rig->setup.mover[0] = (struct cast_mover){.radius_m = 4.0};
-    cast_rotation(0.1, rig->setup.mover[0].rotation);
+    pose_heading(0.1, rig->setup.mover[0].rotation);
     rig->setup.mover[0].shift_m[1] = 3.0;
     for (uint64_t n = 0; n < 3; n++) {
         static uint32_t range[RIG_LINE];

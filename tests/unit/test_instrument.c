@@ -219,7 +219,7 @@ static void the_caster_sends_beams_where_they_go(void **state)
     struct pose_knot knot[2] = {{.t_ns = 0}, {.t_ns = 1000000000}};
     struct schedule_line line;
     rig->setup.detect = &detect;
-    cast_rotation(0.3, rig->setup.rotation);
+    pose_heading(0.3, rig->setup.rotation);
     for (int i = 0; i < 2; i++) {
         memcpy(knot[i].pose.position_m, station_m, sizeof station_m);
         pose_from_matrix(rig->setup.rotation, knot[i].pose.quat);
