@@ -72,8 +72,6 @@ struct detect_signal {
  * falls less than with the square of the range), sigma_floor_m above sigma_m. Reaches may come in any order. */
 int detect_signal_set_up(const struct detect_signal_spec *spec, struct detect_signal *signal, struct sh_err *err);
 
-/* rho_min(R). */
-double detect_least_reflectance(const struct detect_signal *signal, double range_m);
 /* A of a return E rho(i). */
 double detect_amplitude(const struct detect_signal *signal, double range_m, double rho);
 
@@ -92,8 +90,7 @@ struct detect_echoes {
 
 /* Fills amplitude and refl_cdb; range_m becomes NaN where nothing is detected. */
 void detect_by_signal(const struct detect_signal *signal, const struct detect_echoes *echoes);
-/* After that: amplitudes in 0.01 dB above the threshold; LINE_AMPLITUDE_NONE where there is no echo, and of all without
- * a signal (NULL). */
+/* After that: amplitudes in 0.01 dB above the threshold; LINE_AMPLITUDE_NONE where there is no echo. */
 void detect_amplitudes(const struct detect_signal *signal, const struct detect_echoes *echoes, int16_t *amplitude_cdb);
 /* Range noise by the amplitude. */
 void detect_range_noise(const struct detect_signal *signal, const struct detect_echoes *echoes);

@@ -79,11 +79,6 @@ VEC_INLINE double overlap(double per_overlap2, double range_m)
     return per_overlap2 == 0.0 ? 1.0 : caught;
 }
 
-double detect_least_reflectance(const struct detect_signal *signal, double range_m)
-{
-    return vec_exp(log_least(signal, range_m));
-}
-
 double detect_amplitude(const struct detect_signal *signal, double range_m, double rho)
 {
     return rho * overlap(signal->per_overlap2, range_m) *
@@ -146,11 +141,12 @@ void detect_by_signal(const struct detect_signal *signal, const struct detect_ec
 }
 
 VEC_CLONES
-static void amplitudes(const struct detect_signal *s, uint32_t n, const uint64_t *restrict key,
-                       const double *restrict amplitude, const double *restrict range_m, int16_t *restrict out)
+void detect_amplitudes(const struct detect_signal *signal, const struct detect_echoes *e, int16_t *restrict out)
 {
-    const double per_snr = s->per_snr;
-    const uint64_t signal_key = s->signal_key;
+    const double per_snr = signal->per_snr, *amplitude = e->amplitude, *range_m = e->range_m;
+    const uint64_t signal_key = signal->signal_key, *key = e->key;
+    const uint32_t n = e->n;
+    VEC_LOOP
     for (uint32_t i = 0; i < n; i++) {
         double seen = amplitude[i] + per_snr * rng_normal(signal_key, key[i]); /* as above */
         int detected = range_m[i] == range_m[i];
@@ -160,14 +156,4 @@ static void amplitudes(const struct detect_signal *s, uint32_t n, const uint64_t
         vec_round(cdb, &bits);
         out[i] = (int16_t)(detected ? bits : (uint64_t)(uint16_t)LINE_AMPLITUDE_NONE);
     }
-}
-
-void detect_amplitudes(const struct detect_signal *signal, const struct detect_echoes *e, int16_t *amplitude_cdb)
-{
-    if (signal != NULL) {
-        amplitudes(signal, e->n, e->key, e->amplitude, e->range_m, amplitude_cdb);
-        return;
-    }
-    for (uint32_t i = 0; i < e->n; i++)
-        amplitude_cdb[i] = LINE_AMPLITUDE_NONE;
 }

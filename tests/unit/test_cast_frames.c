@@ -1,5 +1,6 @@
 /* Casting: what the counts on the wire mean. Angles, senses of rotation, encoders, positions, and frames far
  * from the origin. */
+#include "tests/common/hits.h"
 #include "tests/unit/cast_rig.h"
 
 static const double LO[3] = {-20, -17.5, -15}, HI[3] = {20, 22.5, 12.5}, HERE[3] = {2.5, 1.25, 0};
@@ -244,7 +245,7 @@ static void hits(const double lo[3], const double hi[3], const double origin[3],
 {
     static uint32_t triangle[RAYS];
     struct cast_rig *rig = cast_rig_open(box_scene(lo, hi), origin);
-    caster_hits(rig->caster, rig->bvh, station, 1000.0, RAYS, ray[0], ray[1], ray[2], range, triangle);
+    hits_from(rig->caster, rig->bvh, station, 1000.0, RAYS, ray[0], ray[1], ray[2], range, triangle);
     cast_rig_close(rig);
 }
 
@@ -315,7 +316,7 @@ static void a_station_far_from_the_bvh_s_origin_is_as_exact(void **state)
     any_rays(3);
     if (bvh_create(scene, origin, 1000.0, 1, NULL, &bvh, &err) != 0 || caster_create(&caster, &err) != 0)
         fail_msg("%s", err.text);
-    caster_hits(caster, bvh, HERE, 1000.0, RAYS, ray[0], ray[1], ray[2], range, triangle);
+    hits_from(caster, bvh, HERE, 1000.0, RAYS, ray[0], ray[1], ray[2], range, triangle);
     for (int i = 0; i < RAYS; i++) {
         const long double d[3] = {ray[0][i], ray[1][i], ray[2][i]};
         int wall = -1;
