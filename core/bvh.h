@@ -66,7 +66,10 @@ struct bvh_origins {
 static inline void bvh_origin_of(const struct bvh_origins *from, uint32_t i, double origin_m[3])
 {
     for (int k = 0; k < 3; k++)
-        origin_m[k] = from->own.x == NULL ? from->at_m[k] : (k == 0 ? from->own.x : k == 1 ? from->own.y : from->own.z)[i];
+        origin_m[k] = from->own.x == NULL ? from->at_m[k]
+                                          : (k == 0   ? from->own.x
+                                             : k == 1 ? from->own.y
+                                                      : from->own.z)[i];
 }
 
 struct bvh_rays {
@@ -88,7 +91,7 @@ struct bvh_counters {
     uint64_t near_border; /* proposals near a border, looked at in double */
     uint64_t decided;     /* of these, not clearly inside the proposed triangle: all triangles around were asked */
     uint64_t went_on;     /* of these, nothing there after all: the ray went on */
-    uint64_t undecided;   /* nearer to an edge than double precision can tell: counted as hit */
+    uint64_t undecided;   /* nearer to an edge than double precision resolves: counted as hit */
 };
 
 /* Cost by stage, for measuring: `now` counts in any unit and is read between the stages of each chunk. The stages of

@@ -39,7 +39,7 @@ enum { CAST_MAX_DEPTH = 4 };
 /* What happens between a hit and a point, as far as a configuration asks for it. Each part is left out where it is NULL
  * or 0. Where all of it is, cast_setup.detect is NULL.
  *
- * Echoes of a pulse: of each pane that it passes, and of what lies behind. A mirror has none of its own unless its
+ * Echoes of a pulse: of each pane that it passes, and of what lies beyond. A mirror has none of its own unless its
  * reflectance says so; what is seen in it is a ghost, at the length of the folded way along the beam, with a label of
  * its own: ghost_label more than the surface's. Only pulses that meet such a surface are cast again; a way does not
  * branch.
@@ -52,7 +52,7 @@ struct cast_detect {
     uint32_t depth;                       /* up to CAST_MAX_DEPTH; 0: no glass, no mirrors */
     uint32_t ghost_label;
     uint32_t max_echoes;
-    double separation_m; /* returns of glass and mirrors so near behind each other make one echo; 0: each its own */
+    double separation_m; /* returns of glass and mirrors that are nearer to each other make one echo; 0: each its own */
     enum detect_ambiguity ambiguity;
     uint32_t zones;
     const struct detect_ball *ball;
@@ -60,7 +60,7 @@ struct cast_detect {
 
 /* A beam with a footprint (core/footprint.h). Constant; any thread. With cast_detect, echoes weigh by what comes back of
  * them, each by itself is detected or not, and has noise of its own. Where a footprint of an adaptive beam lies on
- * glass or a mirror, in part or as a whole, it is cast as rings: what is seen there has outlines that nobody knows. */
+ * glass or a mirror, in part or as a whole, it is cast as rings: the outlines of what is seen there are not known. */
 struct cast_beam {
     struct beam beam;
     enum beam_mode mode; /* BEAM_RINGS, or BEAM_ADAPTIVE with outlines: then the head and the scene stand still,
@@ -93,7 +93,7 @@ struct cast_setup {
     uint32_t n_movers;
     struct cast_mover mover[CAST_MAX_MOVERS];
     /* A moving head: poses of the head (socs -> prcs) in order of time, pose_between them. They cover the firing times
-     * of the runs; before the first and behind the last the head stands. station_m is then only what geo positions are
+     * of the runs; before the first and after the last the head stands. station_m is then only what geo positions are
      * relative to, and rotation is not used. n_knots 0: the head stands still at station_m. */
     uint32_t n_knots;
     const struct pose_knot *knot;
@@ -110,7 +110,7 @@ struct cast_counters {
     /* with a beam */
     uint64_t outlined; /* adaptive: pulses whose footprint an outline cuts */
     uint64_t sub_rays; /* cast beyond the central ones */
-    uint64_t ragged;   /* adaptive: pulses with more outlines than can be told apart, cast as rings */
+    uint64_t ragged;   /* adaptive: pulses with more outlines than BEAM_MAX_LINES, cast as rings */
 };
 
 struct caster;

@@ -19,7 +19,7 @@
  * range resolution (c tau / 2 of the pulse width tau) begins a new one. An echo's range is the energy-weighted mean of
  * its returns - with two surfaces closer than the resolution, the mixed pixel's -, its surface the one that most
  * of it comes back from, its energy the sum: the centroid of equal pulses that overlap, whatever their shape. Less than
- * 1 % of the footprint's energy is no echo. Of more echoes than the head can tell, the weakest are left out, and
+ * 1 % of the footprint's energy is no echo. Of more echoes than the head can report, the weakest are left out, and
  * counted. Where surfaces are modelled (core/surface.h), what weighs is what comes back: energy times the surface's
  * return, times the share that glass and mirrors before it let through; the 1 % is still of the footprint (and where
  * nothing comes back of any of them, energy weighs). The width of an echo is that of the pulse, resolution_m, and 2.355
@@ -88,7 +88,7 @@ void beam_half_squares(const struct beam *beam, double h, double *along, double 
 /* Places of sub-rays in the unit disc, each with 1/n of the energy. */
 struct beam_pattern {
     uint32_t n;
-    float x[BEAM_SUBRAY_ROOM], y[BEAM_SUBRAY_ROOM]; /* whole words of bits; behind n: nothing */
+    float x[BEAM_SUBRAY_ROOM], y[BEAM_SUBRAY_ROOM]; /* whole words of bits; from n on: nothing */
     double rest; /* variance of the footprint's x, and of its y, less that of the places: what lies around each */
 };
 /* rings: 0 (the centre alone) to BEAM_MAX_RINGS. */
@@ -136,7 +136,7 @@ uint32_t beam_merge(const struct beam_merging *how, struct beam_return *returns,
 
 /* ---- what a footprint may reach besides the surface in its centre */
 
-/* The outlines of a scene as seen from one place: edges with the surface on one side only. Behind no outline, the
+/* The outlines of a scene as seen from one place: edges with the surface on one side only. Where there is no outline, the
  * surface that a pulse meets in its centre is all that its footprint meets: one ray will do. Edges between two
  * triangles on both sides of them are none, however sharp: ranges are continuous there. What is asked of all edges is
  * asked once, here; for a pulse one looks up the cell of its direction, which names the edges that footprints within it

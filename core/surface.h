@@ -32,7 +32,7 @@ struct surface {
 };
 
 /* What a configuration says about surfaces whose names fit. The patterns are those of the shell (fnmatch); NaN: not
- * said, and left as it is. */
+ * said, and left unchanged. */
 struct surface_rule {
     char object[SCENE_NAME_LEN], material[SCENE_NAME_LEN];
     struct surface surface;
@@ -61,11 +61,11 @@ int surface_table_set(struct surface_table *table, uint32_t label, const struct 
 int surface_kinds(const struct surface_table *table, uint16_t *kind, struct sh_err *err);
 
 /* Entry `label` gets its reflectance from a texture: a PNG, repeated in both directions, its gamma taken for that of
- * sRGB. SH_EINPUT, naming the file: can't be read. Then, and of glass and mirrors, the entry stays as it is. */
+ * sRGB. SH_EINPUT, naming the file: can't be read. Then, and for glass and mirrors, the entry stays unchanged. */
 int surface_table_texture(struct surface_table *table, uint32_t label, const struct scene_surface *named,
                           const struct scene_texture *texture, struct sh_err *err);
 
-/* Labels of hits hold the surface in their low 16 bits. The high ones, where a texture tells the reflectance there, are
+/* Labels of hits hold the surface in their low 16 bits. The high ones, where a texture holds the reflectance there, are
  * 1 + 65534 times that, else 0. uv: of the hit, finite. Only for surfaces with a texture. */
 uint32_t surface_texel(const struct surface_table *table, uint32_t label, const double uv[2]);
 static inline uint32_t surface_of_label(uint32_t label)

@@ -30,7 +30,10 @@ struct vec3_floats {
 #define VEC3_OUT(a, i) ((struct vec3_arrays){(a).x + (i), (a).y + (i), (a).z + (i)})
 
 /* Element i as a vector. */
-#define VEC3_AT(a, i) {(a).x[i], (a).y[i], (a).z[i]}
+#define VEC3_AT(a, i)                \
+    {                                \
+        (a).x[i], (a).y[i], (a).z[i] \
+    }
 #define VEC3_SET(a, i, v) ((a).x[i] = (v)[0], (a).y[i] = (v)[1], (a).z[i] = (v)[2])
 
 #endif

@@ -4,7 +4,7 @@
  * triangle it may therefore call a hit a miss, and a ray may slip through a closed mesh or past a silhouette. Here the
  * float triangles are wider than the real ones: in its own plane each has its edges further out by more than all of
  * that rounding, a distance across the ray, over the cosine of the incidence as seen from the BVH's origin. (Also for
- * edges seen end-on: their test is off by more, across the ray, but for the same reason they move by more.) Whatever a
+ * edges seen end-on: the error of their test is larger, across the ray, but for the same reason they move further.) Whatever a
  * ray really hits, Embree proposes. Proposals well inside a triangle stand. Those near its border are decided again in
  * double (decide.c). Rays from elsewhere (stations that share a BVH) find the same guarantee except at borders that
  * they see at a far smaller angle than the origin does.
@@ -17,10 +17,10 @@
  * are used. The third edge is tested by what is left of the denominator, (e1 x e2) . D - U - V: the errors of U and V,
  * and 9 |e1| |e2|, all against the length of that edge, L: 6.5 (|e1| + |e2|) / L R + 9 |e1| |e2| / L. It is therefore
  * always the longest one, so that it is at most twice as bad as the others. The weights, u = U / |den| with a
- * reciprocal good to 3 units, are off by 6 |e1| |e2| / L more. The boxes: a slab's distance is off by at most 6 units,
+ * reciprocal good to 3 units, add an error of 6 |e1| |e2| / L. The boxes: the error of a slab's distance is at most 6 units,
  * and a ray through a point m inside of all edges of a triangle spends at least 2 m within its box; m >= 6.5.
  *
- * What float still decides is the order of two surfaces that lie within its resolution behind each other, about 5e-7 of
+ * What float still decides is the order of two surfaces that lie within its resolution one after the other, about 5e-7 of
  * the range over the cosine of the incidence; unless bvh_order_exactly was called: then such rivals are known from the
  * start (rivals.c), and a hit on one compares its plane with those of the others. */
 #ifndef CORE_BVH_BVH_INSIDE_H

@@ -13,7 +13,7 @@ struct search {
     uint32_t proposed;
     uint32_t prim;            /* best so far */
     double range_m, border_m; /* its range, and how far the ray passes from its nearest edge */
-    uint32_t near_prim;       /* the one that the ray misses by least; gap 1: double precision can't tell */
+    uint32_t near_prim;       /* the one that the ray misses by least; gap 1: double precision can't decide */
     double near_gap, near_range_m;
 };
 
@@ -119,20 +119,20 @@ static int is_inside(const double side[3])
     return (side[0] >= 0.0 && side[1] >= 0.0 && side[2] >= 0.0) || (side[0] <= 0.0 && side[1] <= 0.0 && side[2] <= 0.0);
 }
 
-/* What double precision can tell of an edge's side. */
+/* The resolution of an edge's side in double precision. */
 static double blur(const double a[3], const double b[3])
 {
     return 8.0 * 0x1p-53 * sqrt(fmax(vec3_dot(a, a), vec3_dot(b, b))) * edge_length(a, b);
 }
 
-/* A ray within the plane, as far as double precision can tell, does not meet the triangle; what stands on its edges it
+/* A ray within the plane, as far as double precision shows, does not meet the triangle; what stands on its edges it
  * does. */
 static int is_edge_on(double v[3][3], const double side[3])
 {
     return fabs(side[0] + side[1] + side[2]) <= blur(v[0], v[1]) + blur(v[1], v[2]) + blur(v[2], v[0]);
 }
 
-/* Remembers the triangle that the ray misses by least, in units of what double precision can tell at its edges. */
+/* Remembers the triangle that the ray misses by least, in units of what double precision resolves at its edges. */
 static void note_miss(struct search *s, uint32_t prim, double v[3][3], const double side[3])
 {
     const double *dir = s->ray->dir;
@@ -207,7 +207,7 @@ static double slack_m(const struct decide_ray *ray, uint32_t prim, double width_
     return 4.0 * width_m * (1.0 + 1.0 / fmax(cosine, 1e-6));
 }
 
-/* Rivals whose planes the ray meets within what float can't order are tried; the others lie clearly before or behind.
+/* Rivals whose planes the ray meets within what float can't order are tried; the others lie clearly before or after it.
  */
 static void try_rivals(struct search *s, uint32_t prim, double range_m)
 {
@@ -238,7 +238,7 @@ void decide_prefetch(const struct bvh *bvh, const uint32_t *prim, const uint32_t
             __builtin_prefetch(scene->vertex_m[scene->triangle[prim[ray[k]]][j]], 0, 3);
 }
 
-/* What was tried may lie anywhere on the ray; it counts up to limit_m, for behind that not everything was tried. */
+/* What was tried may lie anywhere on the ray; it counts up to limit_m: beyond, not everything was tried. */
 static int is_found(struct search *s, double limit_m)
 {
     if (s->range_m <= limit_m || (s->near_gap <= 1.0 && s->near_range_m <= limit_m)) return 1;
@@ -260,7 +260,7 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh
         s.proposed = prim;
         try_triangle(&s, prim);
         /* Inside in double as well, and further from the border than float can blur: the common case. Nearer, another
-         * triangle of the edge may lie in front of it by less than float can tell. */
+         * triangle of the edge may lie in front of it by less than float resolves. */
         double width_m = bvh_width_m(ray->bvh, prim);
         if (s.prim == prim && s.border_m > width_m) break;
         counters->decided++;
@@ -280,7 +280,7 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh
         t = one.t;
     }
     if (s.prim != RTC_INVALID_GEOMETRY_ID) try_rivals(&s, s.prim, s.range_m);
-    /* So near to an edge that double precision can't tell its sides apart: the edge is hit, nothing passes. */
+    /* So near to an edge that double precision can't separate its sides: the edge is hit, nothing passes. */
     if (s.near_gap <= 1.0 && !(s.range_m <= s.near_range_m)) {
         counters->undecided++;
         s.prim = s.near_prim;

@@ -38,7 +38,7 @@ static inline __attribute__((always_inline)) void copy(void *to, const void *fro
  * The planes of what a packet has hit are asked for when the next one has been cast: to read them at once would mean to
  * wait for what Embree has only just written. */
 #define PACKET_FUNCTION(W)                                                                                         \
-    static void set_up_##W(struct RTCRayHit##W *packet, const struct bvh_batch *rays)                               \
+    static void set_up_##W(struct RTCRayHit##W *packet, const struct bvh_batch *rays)                              \
     {                                                                                                              \
         for (uint32_t p = 0; p < BVH_CHUNK / W; p++)                                                               \
             for (uint32_t i = 0; i < W; i++) {                                                                     \
@@ -53,14 +53,14 @@ static inline __attribute__((always_inline)) void copy(void *to, const void *fro
                 packet[p].hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;                                              \
             }                                                                                                      \
     }                                                                                                              \
-    static void place_##W(struct RTCRayHit##W *packet, const struct bvh_batch *rays, const uint32_t *first,         \
+    static void place_##W(struct RTCRayHit##W *packet, const struct bvh_batch *rays, const uint32_t *first,        \
                           uint32_t packets)                                                                        \
     {                                                                                                              \
         for (uint32_t p = 0; p < packets; p++) {                                                                   \
             const uint32_t n = first[p + 1] - first[p];                                                            \
-            copy(packet[p].ray.org_x, rays->own.x + first[p], first[p], n, W);                                        \
-            copy(packet[p].ray.org_y, rays->own.y + first[p], first[p], n, W);                                        \
-            copy(packet[p].ray.org_z, rays->own.z + first[p], first[p], n, W);                                        \
+            copy(packet[p].ray.org_x, rays->own.x + first[p], first[p], n, W);                                     \
+            copy(packet[p].ray.org_y, rays->own.y + first[p], first[p], n, W);                                     \
+            copy(packet[p].ray.org_z, rays->own.z + first[p], first[p], n, W);                                     \
         }                                                                                                          \
     }                                                                                                              \
     static void prefetch_##W(const struct bvh *bvh, const struct RTCRayHit##W *packet)                             \
@@ -82,16 +82,16 @@ static inline __attribute__((always_inline)) void copy(void *to, const void *fro
             packet->hit.v[i] = one.v;                                                                              \
         }                                                                                                          \
     }                                                                                                              \
-    static void intersect_##W(const struct bvh *bvh, struct RTCRayHit##W *packet, const struct bvh_batch *rays,     \
+    static void intersect_##W(const struct bvh *bvh, struct RTCRayHit##W *packet, const struct bvh_batch *rays,    \
                               const uint32_t *first, uint32_t packets)                                             \
     {                                                                                                              \
         PACKET_CONTEXT(context);                                                                                   \
         int valid[W] __attribute__((aligned(64)));                                                                 \
         for (uint32_t p = 0; p < packets; p++) {                                                                   \
             const uint32_t n = first[p + 1] - first[p];                                                            \
-            copy(packet[p].ray.dir_x, rays->dir.x + first[p], first[p], n, W);                                        \
-            copy(packet[p].ray.dir_y, rays->dir.y + first[p], first[p], n, W);                                        \
-            copy(packet[p].ray.dir_z, rays->dir.z + first[p], first[p], n, W);                                        \
+            copy(packet[p].ray.dir_x, rays->dir.x + first[p], first[p], n, W);                                     \
+            copy(packet[p].ray.dir_y, rays->dir.y + first[p], first[p], n, W);                                     \
+            copy(packet[p].ray.dir_z, rays->dir.z + first[p], first[p], n, W);                                     \
             for (uint32_t i = 0; i < W; i++)                                                                       \
                 packet[p].ray.tfar[i] = rays->t_max;                                                               \
             memset(packet[p].hit.geomID, 0xff, sizeof packet->hit.geomID);                                         \
@@ -109,9 +109,9 @@ static inline __attribute__((always_inline)) void copy(void *to, const void *fro
                 one_by_one_##W(bvh, &packet[p], n);                                                                \
             else                                                                                                   \
                 PACKET_CALL(W, valid, bvh->rtc, &context, &packet[p]);                                             \
-            if (p > 0) prefetch_##W(bvh, &packet[p - 1]);                                       \
+            if (p > 0) prefetch_##W(bvh, &packet[p - 1]);                                                          \
         }                                                                                                          \
-        prefetch_##W(bvh, &packet[packets - 1]);                                              \
+        prefetch_##W(bvh, &packet[packets - 1]);                                                                   \
         for (uint32_t p = 0; p < packets; p++) {                                                                   \
             const uint32_t n = first[p + 1] - first[p];                                                            \
             copy(rays->prim + first[p], packet[p].hit.primID, first[p], n, W);                                     \

@@ -5,7 +5,7 @@
 #include "core/bvh/bvh_inside.h"
 #include "core/vecmath.h"
 
-/* Embree tells a packet's directions apart by their signs, but takes what is smaller than 1e-18 for positive when it
+/* Embree sorts a packet's directions by their signs, but takes what is smaller than 1e-18 for positive when it
  * divides by it: with a component of -1e-22, all rays of that packet with its signs would be lost. So there are none.
  */
 VEC_INLINE float direction_component(double d)
@@ -78,7 +78,7 @@ VEC_INLINE uint32_t refine(const struct bvh_proposals *p, enum how how)
     return doubts;
 }
 
-/* Kept apart, so that the common case stays as fast as it is. */
+/* One function a case, so that the common one has no branch in its loop. */
 VEC_CLONES
 static uint32_t refine_from_one(const struct bvh_proposals *p)
 {

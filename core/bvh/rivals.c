@@ -1,4 +1,4 @@
-/* Rivals: triangles that lie so near behind each other somewhere that float can't tell which comes first: faces that
+/* Rivals: triangles that somewhere lie so near to each other that float can't order them along a ray: faces that
  * overlap in one plane, a pole through a floor, a thin sheet. Their pairs are found once; a hit on one of them compares
  * the planes.
  *

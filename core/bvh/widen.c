@@ -52,7 +52,7 @@ static void edge_lengths(double v[3][3], double length[3])
     }
 }
 
-/* All that float may be off by at the edges of a triangle, as a distance across the ray (bvh_inside.h). far_m: of its farthest
+/* The bound of float's error at the edges of a triangle, as a distance across the ray (bvh_inside.h). far_m: of its farthest
  * corner from any origin of rays. */
 static double float_error_m(const struct bvh *bvh, double far_m, const double length[3])
 {
@@ -109,7 +109,7 @@ static void set_offset(struct bvh_plane *tri, double v[3][3])
 
 /* What the smallest of Embree's weights has to reach for a hit to be safe. Within the plane, the distance to edge i of
  * the widened triangle is at least weight_i * area2' / longest'. It has to exceed what the edge was moved by, and once
- * more that by which float is off there, width / cosine of the incidence: seen from the origin no more than the offset.
+ * more the error of float there, width / cosine of the incidence: seen from the origin no more than the offset.
  * From elsewhere the incidence is another one, so there the weight is multiplied by area2 * cosine first
  * (refine.c). */
 static double guard(const struct bvh *bvh, double offset, double width_m, double longest_wide, double area2_wide,
@@ -211,7 +211,6 @@ int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err)
     for (uint32_t i = 0; i < 3 * n; i++)
         index[i] = i;
     bvh->triangle[n] = (struct bvh_plane){
-        .n = {NAN, with_spare(NAN, BVH_NO_LABEL & 0xfff), with_spare(NAN, BVH_NO_LABEL >> BVH_SPARE_BITS)},
-        .d = NAN};
+        .n = {NAN, with_spare(NAN, BVH_NO_LABEL & 0xfff), with_spare(NAN, BVH_NO_LABEL >> BVH_SPARE_BITS)}, .d = NAN};
     return bvh_drop_twins(bvh, vertex, err);
 }

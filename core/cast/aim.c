@@ -72,8 +72,8 @@ static void aim_ideal(struct caster *c, struct chunk *k, const struct kernel_tur
         kernel_directions(turns, rotation, &d);
     }
     if (!moves) return;
-    const struct move m = {VEC3_IN(c->socs, 0), geo ? VEC3_IN(c->read, 0) : (struct vec3_const){0},
-                           VEC3_OUT(c->d, 0), VEC3_OUT(c->list.e, 0), VEC3_OUT(c->list.p, 0)};
+    const struct move m = {VEC3_IN(c->socs, 0), geo ? VEC3_IN(c->read, 0) : (struct vec3_const){0}, VEC3_OUT(c->d, 0),
+                           VEC3_OUT(c->list.e, 0), VEC3_OUT(c->list.p, 0)};
     move(s, k->run->t0_ns, k->dt_ns, k->n, &m);
 }
 

@@ -89,7 +89,7 @@ static uint32_t merge_pulse(struct echo_list *l, const struct beam_merging *how,
     return to - 1;
 }
 
-/* How much comes back of single rays' returns, and what of it can't be told apart. */
+/* How much comes back of single rays' returns, and which of them merge. */
 static void weigh_returns(struct caster *c, const struct chunk *k)
 {
     const struct cast_detect *d = k->s->detect;

@@ -1,6 +1,6 @@
-/* Behind glass and off mirrors: only rays that meet such a surface are cast again, together.
+/* Through glass and off mirrors: only rays that meet such a surface are cast again, together.
  *
- * Packets of such rays hang on the packets of those that they go on from, and so on the pulse number: each
+ * Packets of such rays depend on the packets of the rays that they continue, and so on the pulse number: each
  * SCHEDULE_PACKET rays have packets of their own, filled up with copies of their last ray, whose number is
  * CAST_NO_PATH. */
 #include <math.h>
@@ -31,8 +31,8 @@ static void normal_of(const struct cast_setup *s, uint8_t body, uint32_t hit, do
         n[i] = (m == NULL ? at_rest[i] : vec3_dot(m->rotation + 3 * i, at_rest)) / length;
 }
 
-/* How far behind a surface a way goes on: a float's rounding of where that is (in the BVH's frame), across the surface,
- * three times over; the surface itself is then not met again. */
+/* How far beyond a surface a way goes on, so that the surface itself is not met again: three times a float's rounding of
+ * the place (in the BVH's frame), measured across the surface. */
 static double step_m(const struct cast_setup *s, const double at[3], double cosine)
 {
     double most = 0.0, origin_m[3];

@@ -178,7 +178,8 @@ static void add_met(struct caster *c, const struct chunk *k, const struct job *j
         if (k->attributes) r.sigma_m = beam_round_sigma(&s->beam->beam, r.range_m, b->cosine[j], (double)p->xx[i]);
         uint32_t before = c->sub_rays->n_returns;
         add_return(c, s, &r, b->share[j], b->rho[j]);
-        if (b->ghost[j] && c->sub_rays->n_returns > before) c->sub_rays->returns[before].label += s->detect->ghost_label;
+        if (b->ghost[j] && c->sub_rays->n_returns > before)
+            c->sub_rays->returns[before].label += s->detect->ghost_label;
     }
 }
 
@@ -323,7 +324,7 @@ static void list_echoes(struct caster *c, const struct chunk *k)
             l->range_m[at] = e[j].range_m;
             l->label[at] = e[j].label;
             l->number[at] = e[j].number;
-            l->rho[at] = (double)(float)e[j].back; /* as fine as they are told apart */
+            l->rho[at] = (double)(float)e[j].back; /* as fine as beam_merge compares them */
             if (k->attributes) l->width_m[at] = e[j].width_m;
         }
     }

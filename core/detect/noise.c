@@ -35,8 +35,8 @@ void detect_zones(enum detect_ambiguity how, double period_s, uint32_t zones, do
     for (uint32_t i = 0; i < n; i++) {
         double zone = floor(range_m[i] * per_m), within = range_m[i] - zone * zone_m;
         int blind = within < range_min_m || range_m[i] >= most_m;
-        double told = how == DETECT_FOLDED ? within : range_m[i];
-        range_m[i] = how == DETECT_AMBIGUITY_NONE ? range_m[i] : blind ? (double)NAN : told;
+        double reported = how == DETECT_FOLDED ? within : range_m[i];
+        range_m[i] = how == DETECT_AMBIGUITY_NONE ? range_m[i] : blind ? (double)NAN : reported;
     }
 }
 
@@ -60,7 +60,7 @@ static void in_unit_ball(const struct detect_ball *ball, uint64_t key, double u[
 }
 
 /* The point lies in the plane of the line angle, at `ahead` and `up`, and is moved by v: to the right, ahead (along the
- * head's horizon), up. Where the line angle looks backward over the zenith it still does behind. */
+ * head's horizon), up. Where the line angle looks backward over the zenith it still does so afterwards. */
 static void move_point(const double v[3], double *range_m, double *mirror_turn, double *pan_turn)
 {
     double s, c;

@@ -24,8 +24,8 @@ static void add_part(struct beam_parts *parts, const struct beam_part *p, int ce
     if (p->energy < LEAST_PART) return;
     uint32_t i = parts->n++;
     double x = p->x / p->energy, y = p->y / p->energy;
-    parts->part[i] = (struct beam_part){p->energy, x, y, p->xx / p->energy - x * x, p->xy / p->energy - x * y,
-                                        p->yy / p->energy - y * y};
+    parts->part[i] = (struct beam_part){
+        p->energy, x, y, p->xx / p->energy - x * x, p->xy / p->energy - x * y, p->yy / p->energy - y * y};
     if (centre) parts->centre = i;
 }
 
@@ -163,8 +163,8 @@ static void sum_squares(const struct beam_pattern *fine, const lanes_i *set, str
     }
 }
 
-static int add_places(const struct beam_pattern *fine, const struct beam_line *line, uint32_t n,
-                      int spreads, struct beam_parts *parts)
+static int add_places(const struct beam_pattern *fine, const struct beam_line *line, uint32_t n, int spreads,
+                      struct beam_parts *parts)
 {
     lanes_i part[BEAM_MAX_PARTS];
     struct sums sums[BEAM_MAX_PARTS];
@@ -181,11 +181,11 @@ static int add_places(const struct beam_pattern *fine, const struct beam_line *l
         }
         if (spreads) sum_squares(fine, &part[p], &portion);
         portion = (struct beam_part){.energy = places * each,
-                                   .x = mx * each,
-                                   .y = my * each,
-                                   .xx = portion.xx * each,
-                                   .xy = portion.xy * each,
-                                   .yy = portion.yy * each};
+                                     .x = mx * each,
+                                     .y = my * each,
+                                     .xx = portion.xx * each,
+                                     .xy = portion.xy * each,
+                                     .yy = portion.yy * each};
         add_part(parts, &portion, part[p][0] & 1);
     }
     return n_parts == 0;

@@ -85,7 +85,7 @@ static struct average average(const struct beam_merging *how, const struct beam_
     return a;
 }
 
-/* One echo from returns that hang together. Returns 0 where they are too weak for one. */
+/* One echo from returns without a gap between them. Returns 0 where they are too weak for one. */
 static int make_echo(const struct beam_merging *how, const struct beam_return *r, uint32_t n, struct beam_echo *echo)
 {
     double energy = 0.0, back = 0.0;
@@ -118,9 +118,9 @@ static void drop_weakest(struct beam_echo *e, uint32_t n)
 /* From so many returns on it is faster to look first. */
 enum { MANY = 7 };
 
-/* Most footprints lie on one surface: their returns hang together whatever their order. The nearest one goes to the
+/* Most footprints lie on one surface: there is no gap between their returns, whatever their order. The nearest one goes to the
  * front, as sorting would have it. */
-static int hang_together(double gap_m, struct beam_return *r, uint32_t n)
+static int have_no_gap(double gap_m, struct beam_return *r, uint32_t n)
 {
     uint32_t nearest = 0;
     double farthest_m = r[0].range_m;
@@ -140,7 +140,7 @@ uint32_t beam_merge(const struct beam_merging *how, struct beam_return *r, uint3
 {
     uint32_t found = 0;
     uint8_t number = 0;
-    if (n < MANY || !hang_together(how->gap_m, r, n)) sort(r, n);
+    if (n < MANY || !have_no_gap(how->gap_m, r, n)) sort(r, n);
     for (uint32_t i = 0, end; i < n; i = end) {
         for (end = i + 1; end < n && r[end].range_m - r[end - 1].range_m <= how->gap_m;)
             end++;

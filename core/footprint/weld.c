@@ -25,7 +25,7 @@ struct weld {
     struct slot *slot;
     uint8_t *sides; /* of a slot: 1 and 2; 4: of two kinds */
     const uint16_t *kind;
-    uint16_t *of; /* of a slot: kind of its first triangle; NULL: nobody asks */
+    uint16_t *of; /* of a slot: kind of its first triangle; NULL: not asked for */
     uint64_t mask;
 };
 

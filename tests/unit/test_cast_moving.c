@@ -247,7 +247,9 @@ static void test_moving_body(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_room),        cmocka_unit_test(test_same_bytes), cmocka_unit_test(test_geo),
+        cmocka_unit_test(test_room),
+        cmocka_unit_test(test_same_bytes),
+        cmocka_unit_test(test_geo),
         cmocka_unit_test(test_moving_body),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
