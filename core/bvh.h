@@ -1,14 +1,14 @@
 /* The BVH: what rays meet first in a scene, exactly.
  *
- * In: a scene (vertices in double, prcs, metres), rays as points and unit directions in prcs. Out: for each ray the
- * range (m) to what it meets first, the triangle, and its label.
+ * In: a scene (vertices in double, prcs, metres), rays as points and unit directions in prcs. Out: for each
+ * ray the range (m) to what it meets first, the triangle, and its label.
  *
- * Embree proposes a triangle from float rays, in packets of the machine's native width. The range comes from the
- * triangle's plane in double, kept beside the BVH. Where a ray passes so near to a triangle's border that float can't
- * be trusted, the triangle is chosen again in double. How that is proven: core/bvh/bvh_inside.h.
+ * Embree proposes a triangle from float rays, in packets of the machine's native width. The range comes from
+ * the triangle's plane in double, kept beside the BVH. Where a ray passes so near to a triangle's border that
+ * float can't be trusted, the triangle is chosen again in double. How that is proven: core/bvh/bvh_inside.h.
  *
- * The BVH is built in a local frame, prcs minus origin_m, where float is safe. It is constant after it is made, and
- * may be used from any thread; each thread has working memory of its own. */
+ * The BVH is built in a local frame, prcs minus origin_m, where float is safe. It is constant after it is
+ * made, and may be used from any thread; each thread has working memory of its own. */
 #ifndef CORE_BVH_H
 #define CORE_BVH_H
 
@@ -26,26 +26,27 @@ struct bvh_info {
     uint64_t bytes; /* BVH and planes */
 };
 
-/* The scene must outlive the BVH. Rays may begin up to station_reach_m from origin_m; the smaller it is, the less has
- * to be decided again. Built with `threads` threads (0: all). */
+/* The scene must outlive the BVH. Rays may begin up to station_reach_m from origin_m; the smaller it is, the
+ * less has to be decided again. Built with `threads` threads (0: all). */
 int bvh_create(const struct scene *scene, const double origin_m[3], double station_reach_m, unsigned threads,
                const struct sh_report *report, struct bvh **out, struct sh_err *err);
 void bvh_free(struct bvh *bvh);
 
-/* Orders surfaces in double where they overlap, cross, or lie one after the other within float's resolution. Their
- * labels then no longer depend on how rays are packed, and the range is that of the nearer one. Once, before casting.
- * Costs time here (about 6 us per triangle), and in casting about 20 to 50 ns for each triangle that lies so near to
- * the one that is hit: nothing in a plain scene, much in a building model whose walls overlap. Without it the error of
- * such a hit is at most the distance between the surfaces. */
+/* Orders surfaces in double where they overlap, cross, or lie one after the other within float's resolution.
+ * Their labels then no longer depend on how rays are packed, and the range is that of the nearer one. Once,
+ * before casting. Costs time here (about 6 us per triangle), and in casting about 20 to 50 ns for each
+ * triangle that lies so near to the one that is hit: nothing in a plain scene, much in a building model whose
+ * walls overlap. Without it the error of such a hit is at most the distance between the surfaces. */
 int bvh_order_exactly(struct bvh *bvh, struct sh_err *err);
-/* Rays per Embree call: 1, 4, 8 or 16; for measuring and tests. Another width than the native one may find another
- * triangle where a ray passes through an edge; ranges agree. */
+/* Rays per Embree call: 1, 4, 8 or 16; for measuring and tests. Another width than the native one may find
+ * another triangle where a ray passes through an edge; ranges agree. */
 void bvh_set_packet(struct bvh *bvh, uint32_t rays);
 void bvh_get_info(const struct bvh *bvh, struct bvh_info *info);
 void bvh_origin(const struct bvh *bvh, double origin_m[3]);
 const struct scene *bvh_scene(const struct bvh *bvh);
 
-/* The plane of a triangle in the local frame: points p of it have n . p = d. n is e1 x e2, twice the area long. */
+/* The plane of a triangle in the local frame: points p of it have n . p = d. n is e1 x e2, twice the area
+ * long. */
 struct bvh_plane {
     double n[3], d;
 } __attribute__((aligned(32))); /* half a cache line */
@@ -57,7 +58,8 @@ enum {
     BVH_NO_LABEL = 0xffff,
 };
 
-/* Where rays begin: all at one point (own.x NULL), or each at its own; prcs. Within station_reach_m of origin_m. */
+/* Where rays begin: all at one point (own.x NULL), or each at its own; prcs. Within station_reach_m of
+ * origin_m. */
 struct bvh_origins {
     double at_m[3];
     struct vec3_const own;
@@ -94,8 +96,8 @@ struct bvh_counters {
     uint64_t undecided;   /* nearer to an edge than double precision resolves: counted as hit */
 };
 
-/* Cost by stage, for measuring: `now` counts in any unit and is read between the stages of each chunk. The stages of
- * the BVH are the first; more follow in core/cast.h. */
+/* Cost by stage, for measuring: `now` counts in any unit and is read between the stages of each chunk. The
+ * stages of the BVH are the first; more follow in core/cast.h. */
 enum bvh_stage { BVH_STAGE_PREPARE, BVH_STAGE_EMBREE, BVH_STAGE_REFINE, BVH_STAGE_DECIDE, BVH_STAGES };
 struct bvh_profile {
     uint64_t (*now)(void);

@@ -1,12 +1,12 @@
 /* Casting: a run of pulses -> echoes, as entries of a block.
  *
- * In: a setup (what stays the same for all pulses of a scan) and a run (angles and times of consecutive pulses). Out: a
- * block of line.h. The stages are aim, nearest, optics, sub-rays, echoes, points; core/cast/caster.c has them in that
- * order.
+ * In: a setup (what stays the same for all pulses of a scan) and a run (angles and times of consecutive
+ * pulses). Out: a block of line.h. The stages are aim, nearest, optics, sub-rays, echoes, points;
+ * core/cast/caster.c has them in that order.
  *
  * Frames: the station is a point of prcs (m), beams are directions there, turned from socs. Ray packets are
- * SCHEDULE_PACKET pulses, cut by pulse number. On a moving platform each pulse has its own origin and rotation, from its
- * firing time alone; a head that stands still pays nothing for that. */
+ * SCHEDULE_PACKET pulses, cut by pulse number. On a moving platform each pulse has its own origin and
+ * rotation, from its firing time alone; a head that stands still pays nothing for that. */
 #ifndef CORE_CAST_H
 #define CORE_CAST_H
 
@@ -25,8 +25,9 @@
 
 enum { CAST_MAX_MOVERS = 16 };
 
-/* A rigid body that moves, with a BVH of its own, built at rest: p_prcs = rotation * p_rest + shift_m. The pose holds
- * for the runs that are cast with it; rays that pass by the sphere around the body cost one test a chunk. */
+/* A rigid body that moves, with a BVH of its own, built at rest: p_prcs = rotation * p_rest + shift_m. The
+ * pose holds for the runs that are cast with it; rays that pass by the sphere around the body cost one test a
+ * chunk. */
 struct cast_mover {
     const struct bvh *bvh;
     double centre_m[3], radius_m; /* sphere around the body at rest */
@@ -36,13 +37,13 @@ struct cast_mover {
 /* Glass and mirrors that a pulse may meet, one after the other, and still be followed. */
 enum { CAST_MAX_DEPTH = 4 };
 
-/* What happens between a hit and a point, as far as a configuration asks for it. Each part is left out where it is NULL
- * or 0. Where all of it is, cast_setup.detect is NULL.
+/* What happens between a hit and a point, as far as a configuration asks for it. Each part is left out where
+ * it is NULL or 0. Where all of it is, cast_setup.detect is NULL.
  *
- * Echoes of a pulse: of each pane that it passes, and of what lies beyond. A mirror has none of its own unless its
- * reflectance says so; what is seen in it is a ghost, at the length of the folded way along the beam, with a label of
- * its own: ghost_label more than the surface's. Only pulses that meet such a surface are cast again; a way does not
- * branch.
+ * Echoes of a pulse: of each pane that it passes, and of what lies beyond. A mirror has none of its own
+ * unless its reflectance says so; what is seen in it is a ghost, at the length of the folded way along the
+ * beam, with a label of its own: ghost_label more than the surface's. Only pulses that meet such a surface
+ * are cast again; a way does not branch.
  * Panes are of no thickness but their mesh's: not refracted. */
 struct cast_detect {
     const struct instrument *instrument;
@@ -58,9 +59,10 @@ struct cast_detect {
     const struct detect_ball *ball;
 };
 
-/* A beam with a footprint (core/footprint.h). Constant; any thread. With cast_detect, echoes weigh by what comes back of
- * them, each by itself is detected or not, and has noise of its own. Where a footprint of an adaptive beam lies on
- * glass or a mirror, in part or as a whole, it is cast as rings: the outlines of what is seen there are not known. */
+/* A beam with a footprint (core/footprint.h). Constant; any thread. With cast_detect, echoes weigh by what
+ * comes back of them, each by itself is detected or not, and has noise of its own. Where a footprint of an
+ * adaptive beam lies on glass or a mirror, in part or as a whole, it is cast as rings: the outlines of what
+ * is seen there are not known. */
 struct cast_beam {
     struct beam beam;
     enum beam_mode mode; /* BEAM_RINGS, or BEAM_ADAPTIVE with outlines: then the head and the scene stand still,
@@ -84,17 +86,18 @@ struct cast_setup {
     enum line_layout layout;
     double range_scale_m;
     double xyz_scale[3]; /* units of the CRS per count, see georef_scale */
-    /* NULL: pulses are single rays. Else the BVH's station_reach_m covers the exit radius, and blocks have room for
-     * beam->max_echoes entries a pulse. */
+    /* NULL: pulses are single rays. Else the BVH's station_reach_m covers the exit radius, and blocks have
+     * room for beam->max_echoes entries a pulse. */
     const struct cast_beam *beam;
     enum beam_select echoes; /* which of a pulse's */
     double
         pulse_m; /* c tau / 2 of the pulse, a beam's resolution_m; for the widths of echoes, where a block has room */
     uint32_t n_movers;
     struct cast_mover mover[CAST_MAX_MOVERS];
-    /* A moving head: poses of the head (socs -> prcs) in order of time, pose_between them. They cover the firing times
-     * of the runs; before the first and after the last the head stands. station_m is then only what geo positions are
-     * relative to, and rotation is not used. n_knots 0: the head stands still at station_m. */
+    /* A moving head: poses of the head (socs -> prcs) in order of time, pose_between them. They cover the
+     * firing times of the runs; before the first and after the last the head stands. station_m is then only
+     * what geo positions are relative to, and rotation is not used. n_knots 0: the head stands still at
+     * station_m. */
     uint32_t n_knots;
     const struct pose_knot *knot;
     /* NULL: every hit within the limits is one echo, the head is ideal. Its max_echoes is also the beam's. */
@@ -119,18 +122,20 @@ struct caster;
 int caster_create(struct caster **out, struct sh_err *err);
 void caster_free(struct caster *caster);
 
-/* Fills block from the run, with attributes where it has room for them: the width of a single ray's echo is the
- * pulse's, of a footprint's as core/footprint.h has it, of what glass and mirrors bring together likewise; an amplitude
- * needs a signal model. Noise of ranges moves echoes, and doesn't widen them. The block has capacity >= run->n times
- * the echoes that a pulse may have (1 + depth, beam->max_echoes). Returns the number of echoes. Allocates nothing. */
+/* Fills block from the run, with attributes where it has room for them: the width of a single ray's echo is
+ * the pulse's, of a footprint's as core/footprint.h has it, of what glass and mirrors bring together
+ * likewise; an amplitude needs a signal model. Noise of ranges moves echoes, and doesn't widen them. The
+ * block has capacity >= run->n times the echoes that a pulse may have (1 + depth, beam->max_echoes). Returns
+ * the number of echoes. Allocates nothing. */
 uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
                      struct line_block *block);
 
 /* Exact hits, with the caster's working memory; bvh.h. */
 void caster_hits(struct caster *caster, const struct bvh *bvh, const struct bvh_rays *rays);
 
-/* The outlines of a scene that are steps as seen from the station (beam_outlines_create; kind: of surface_kinds where
- * detection models surfaces). The station lies within the BVH's station_reach_m. For setting up. */
+/* The outlines of a scene that are steps as seen from the station (beam_outlines_create; kind: of
+ * surface_kinds where detection models surfaces). The station lies within the BVH's station_reach_m. For
+ * setting up. */
 int cast_outlines(const struct beam_outlines_spec *spec, const struct bvh *bvh, struct beam_outlines **out,
                   struct sh_err *err);
 
@@ -150,8 +155,8 @@ void caster_set_profile(struct caster *caster, struct bvh_profile *profile);
 
 void caster_get_counters(const struct caster *caster, struct cast_counters *counters);
 
-/* The first surface of the scene from from_m along the unit vector down: its distance in *range_m, NaN when there is
- * none. Exact as bvh_hits. For setting up: looks at every triangle once. */
+/* The first surface of the scene from from_m along the unit vector down: its distance in *range_m, NaN when
+ * there is none. Exact as bvh_hits. For setting up: looks at every triangle once. */
 int cast_floor(const struct scene *scene, const double from_m[3], const double down[3], double *range_m,
                struct sh_err *err);
 

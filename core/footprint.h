@@ -1,37 +1,41 @@
 /* The beam: a pulse is not a ray. Definitions first.
  *
- * Width. Irradiance across the beam is Gaussian, I = I0 exp(-2 r^2 / w^2); w is the 1/e^2 radius. Diameters and
- * divergences are full ones at 1/e^2. (A 1/e figure times 1.41, a FWHM figure times 1.70.)
- * With exit diameter D and divergence theta, and the waist in the exit plane, w(R)^2 = (D/2)^2 + (R theta/2)^2: the
- * hyperbola of ISO 11146-1, which holds for beams that are not diffraction-limited as well.
+ * Width. Irradiance across the beam is Gaussian, I = I0 exp(-2 r^2 / w^2); w is the 1/e^2 radius. Diameters
+ * and divergences are full ones at 1/e^2. (A 1/e figure times 1.41, a FWHM figure times 1.70.)
+ * With exit diameter D and divergence theta, and the waist in the exit plane, w(R)^2 = (D/2)^2 + (R
+ * theta/2)^2: the hyperbola of ISO 11146-1, which holds for beams that are not diffraction-limited as well.
  *
  * Footprint. The circle of radius w(R). Its energy counts as 1; the 13.5 % outside of it is not modelled.
  *
- * Sub-rays. The hyperboloid is a ruled surface: the straight line from rho D/2 (cos phi, sin phi) in the exit plane,
- * with slope rho theta/2 (-sin phi, cos phi), is rho w(R) from the axis at every R. So a sub-ray is a straight line
- * from its own point of the exit plane, at (x, y) = rho (cos phi, sin phi) of the unit disc; equal areas of energy in
- * the disc are equal areas of energy in every footprint. Its range counts along itself from the exit plane.
- * Rings: one sub-ray in the centre and 6 k on ring k = 1 .. N, 1 + 3 N (N + 1) in all, each with the same energy: ring
- * k lies where half of the energy of its annulus is inside. (Energy within rho, from the irradiance: (1 - exp(-2
- * rho^2)) / (1 - exp(-2)).)
+ * Sub-rays. The hyperboloid is a ruled surface: the straight line from rho D/2 (cos phi, sin phi) in the exit
+ * plane, with slope rho theta/2 (-sin phi, cos phi), is rho w(R) from the axis at every R. So a sub-ray is a
+ * straight line from its own point of the exit plane, at (x, y) = rho (cos phi, sin phi) of the unit disc;
+ * equal areas of energy in the disc are equal areas of energy in every footprint. Its range counts along
+ * itself from the exit plane.
+ * Rings: one sub-ray in the centre and 6 k on ring k = 1 .. N, 1 + 3 N (N + 1) in all, each with the same
+ * energy: ring k lies where half of the energy of its annulus is inside. (Energy within rho, from the
+ * irradiance: (1 - exp(-2 rho^2)) / (1 - exp(-2)).)
  *
- * Returns of a pulse, one for each sub-ray that meets something, become echoes: sorted by range, a gap larger than the
- * range resolution (c tau / 2 of the pulse width tau) begins a new one. An echo's range is the energy-weighted mean of
- * its returns - with two surfaces closer than the resolution, the mixed pixel's -, its surface the one that most
- * of it comes back from, its energy the sum: the centroid of equal pulses that overlap, whatever their shape. Less than
- * 1 % of the footprint's energy is no echo. Of more echoes than the head can report, the weakest are left out, and
- * counted. Where surfaces are modelled (core/surface.h), what weighs is what comes back: energy times the surface's
- * return, times the share that glass and mirrors before it let through; the 1 % is still of the footprint (and where
- * nothing comes back of any of them, energy weighs). The width of an echo is that of the pulse, resolution_m, and 2.355
- * sigma of its ranges, added as squares (full widths at half maximum of Gaussians). Of a return that stands for a part
- * of the footprint, or for what lies around a sub-ray, the ranges within it count as well, to first order on its plane:
- * short by half of (s tan i)^2 of the standard deviation, s = theta / 2; where lines cross in the footprint, by a few
- * percent more, as its parts are then known by places.
+ * Returns of a pulse, one for each sub-ray that meets something, become echoes: sorted by range, a gap larger
+ * than the range resolution (c tau / 2 of the pulse width tau) begins a new one. An echo's range is the
+ * energy-weighted mean of its returns - with two surfaces closer than the resolution, the mixed pixel's -,
+ * its surface the one that most of it comes back from, its energy the sum: the centroid of equal pulses that
+ * overlap, whatever their shape. Less than
+ * 1 % of the footprint's energy is no echo. Of more echoes than the head can report, the weakest are left
+ * out, and counted. Where surfaces are modelled (core/surface.h), what weighs is what comes back: energy
+ * times the surface's return, times the share that glass and mirrors before it let through; the 1 % is still
+ * of the footprint (and where nothing comes back of any of them, energy weighs). The width of an echo is that
+ * of the pulse, resolution_m, and 2.355 sigma of its ranges, added as squares (full widths at half maximum of
+ * Gaussians). Of a return that stands for a part of the footprint, or for what lies around a sub-ray, the
+ * ranges within it count as well, to first order on its plane: short by half of (s tan i)^2 of the standard
+ * deviation, s = theta / 2; where lines cross in the footprint, by a few percent more, as its parts are then
+ * known by places.
  *
- * One ray for all of the footprint. Where it lies on one plane at incidence i, the mean over it is not the range of its
- * centre: a sub-ray at (rho, phi) meets the plane at (R - rho D/2 tan i cos phi) / (1 - rho s tan i sin phi), s = theta
- * / 2, times sqrt(1 + rho^2 s^2) along itself. The mean over phi is R sqrt((1 + rho^2 s^2) / (1 - rho^2 s^2 tan^2 i)).
- * Over the footprint, with t = rho^2 distributed as exp(-2 t) on 0 .. 1, mean t = 0.343, mean t^2 = 0.187:
+ * One ray for all of the footprint. Where it lies on one plane at incidence i, the mean over it is not the
+ * range of its centre: a sub-ray at (rho, phi) meets the plane at (R - rho D/2 tan i cos phi) / (1 - rho s
+ * tan i sin phi), s = theta / 2, times sqrt(1 + rho^2 s^2) along itself. The mean over phi is R sqrt((1 +
+ * rho^2 s^2) / (1 - rho^2 s^2 tan^2 i)). Over the footprint, with t = rho^2 distributed as exp(-2 t) on 0 ..
+ * 1, mean t = 0.343, mean t^2 = 0.187:
  * R (1 + 0.343 s^2 / (2 cos^2 i) + ...), 0.14 mm at 800 m, 80 deg and 0.35 mrad. */
 #ifndef CORE_FOOTPRINT_H
 #define CORE_FOOTPRINT_H
@@ -70,17 +74,17 @@ struct beam {
 /* Lengths and angles as above; the pulse width in seconds. */
 void beam_init(struct beam *beam, double exit_m, double divergence_rad, double pulse_width_s);
 double beam_radius(const struct beam *beam, double range_m);
-/* A footprint on one plane, hit in its centre at range_m, with steep = 1 / cos^2 of the incidence: the mean of its ranges
- * in place of the centre's, as range (1 + a x + b x^2 + c x^3), x = steep. Where the plane is within a footprint's angle
- * of the beam, beyond s / cos i = 1/2, x is that of 1/2. */
+/* A footprint on one plane, hit in its centre at range_m, with steep = 1 / cos^2 of the incidence: the mean
+ * of its ranges in place of the centre's, as range (1 + a x + b x^2 + c x^3), x = steep. Where the plane is
+ * within a footprint's angle of the beam, beyond s / cos i = 1/2, x is that of 1/2. */
 void beam_plane_means(const struct beam *beam, const float *steep, uint32_t n, double *range_m);
 /* The width of its echo: for pulses of beam->resolution_m. */
 void beam_plane_widths(const struct beam *beam, const float *steep, const double *range_m, uint32_t n, float *width_m);
 /* Width of an echo whose ranges vary so: pulse_m is the pulse's own, c tau / 2. */
 double beam_echo_width(double pulse_m, double variance_m2);
 
-/* The part of the unit disc beyond the line n . u = h, n a unit vector, |h| <= 1: its energy, and the energy times the
- * distance of its centre of energy along n. */
+/* The part of the unit disc beyond the line n . u = h, n a unit vector, |h| <= 1: its energy, and the energy
+ * times the distance of its centre of energy along n. */
 void beam_half(const struct beam *beam, double h, double *energy, double *moment);
 /* Its second moments, along n and along the line. */
 void beam_half_squares(const struct beam *beam, double h, double *along, double *across);
@@ -129,21 +133,23 @@ struct beam_merging {
 };
 /* For a footprint, as defined above. */
 void beam_merging(const struct beam *beam, uint32_t most, struct beam_merging *how);
-/* Returns of one pulse -> its echoes, by range; room for most + 1 of them. The returns change places. Gives how many
- * echoes there are; *left_out counts those that were left out on top of what it holds. */
+/* Returns of one pulse -> its echoes, by range; room for most + 1 of them. The returns change places. Gives
+ * how many echoes there are; *left_out counts those that were left out on top of what it holds. */
 uint32_t beam_merge(const struct beam_merging *how, struct beam_return *returns, uint32_t n, struct beam_echo *echo,
                     uint64_t *left_out);
 
 /* ---- what a footprint may reach besides the surface in its centre */
 
-/* The outlines of a scene as seen from one place: edges with the surface on one side only. Where there is no outline, the
- * surface that a pulse meets in its centre is all that its footprint meets: one ray will do. Edges between two
- * triangles on both sides of them are none, however sharp: ranges are continuous there. What is asked of all edges is
- * asked once, here; for a pulse one looks up the cell of its direction, which names the edges that footprints within it
- * may reach, and the nearest of them. Constant after it is made; any thread. */
+/* The outlines of a scene as seen from one place: edges with the surface on one side only. Where there is no
+ * outline, the surface that a pulse meets in its centre is all that its footprint meets: one ray will do.
+ * Edges between two triangles on both sides of them are none, however sharp: ranges are continuous there.
+ * What is asked of all edges is asked once, here; for a pulse one looks up the cell of its direction, which
+ * names the edges that footprints within it may reach, and the nearest of them. Constant after it is made;
+ * any thread. */
 struct beam_outlines;
 
-/* Casts rays from the station: unit directions -> ranges, NaN for none, and the kinds of surfaces that they meet. */
+/* Casts rays from the station: unit directions -> ranges, NaN for none, and the kinds of surfaces that they
+ * meet. */
 struct beam_probe {
     void (*cast)(void *ctx, uint32_t n, const struct vec3_const *dir, double *range_m, uint16_t *kind);
     void *ctx;
@@ -154,15 +160,16 @@ struct beam_outlines_spec {
     const double *station_m; /* [3], prcs: where all pulses come from; at most exit_radius_m from it */
     const struct beam *beam;
     double range_max_m;
-    /* By label: surfaces of one kind send back the same. Edges where one kind ends are outlines, too, with or without a
-     * step. NULL: all surfaces are of one kind. */
+    /* By label: surfaces of one kind send back the same. Edges where one kind ends are outlines, too, with or
+     * without a step. NULL: all surfaces are of one kind. */
     const uint16_t *kind;
 };
-/* probe, NULL: all outlines count. Else rays are cast close along both sides of each, a footprint's radius apart. A
- * stretch of an outline is left out where it is hidden, or where the ranges on both sides agree to BEAM_LEAST_STEP_M (a
- * wall that stands on a floor; parts of a wall): it can't make another echo. Left out, as any fold between triangles is,
- * it may move a range by a sixth of the footprint's radius times the change of slope. What is hidden from the station
- * may be seen from the edge of the exit: a strip of at most its radius. */
+/* probe, NULL: all outlines count. Else rays are cast close along both sides of each, a footprint's radius
+ * apart. A stretch of an outline is left out where it is hidden, or where the ranges on both sides agree to
+ * BEAM_LEAST_STEP_M (a wall that stands on a floor; parts of a wall): it can't make another echo. Left out,
+ * as any fold between triangles is, it may move a range by a sixth of the footprint's radius times the change
+ * of slope. What is hidden from the station may be seen from the edge of the exit: a strip of at most its
+ * radius. */
 int beam_outlines_create(const struct beam_outlines_spec *spec, const struct beam_probe *probe,
                          struct beam_outlines **out, struct sh_err *err);
 void beam_outlines_free(struct beam_outlines *outlines);
@@ -187,29 +194,30 @@ enum { BEAM_MAX_LINES = 12, BEAM_MAX_PARTS = 64 };
 struct beam_line {
     double n[2], h;
 };
-/* The outlines that cross the footprint of a pulse nearer than limit_m; the lines refer to its axes. Returns their
- * number, up to BEAM_MAX_LINES, or BEAM_MAX_LINES + 1: more than that. near->next_m: from which range on there may be
- * more (INFINITY: none, or nothing crosses it up to limit_m). */
+/* The outlines that cross the footprint of a pulse nearer than limit_m; the lines refer to its axes. Returns
+ * their number, up to BEAM_MAX_LINES, or BEAM_MAX_LINES + 1: more than that. near->next_m: from which range
+ * on there may be more (INFINITY: none, or nothing crosses it up to limit_m). */
 uint32_t beam_find_lines(const struct beam_outlines *outlines, const struct beam *beam, struct beam_near *near,
                          const struct beam_sight *sight, double limit_m, struct beam_line *line);
 
-/* A part of the footprint: its energy, the centre of that, and how it spreads about it: variances and covariance of x
- * and y, where they are asked for. */
+/* A part of the footprint: its energy, the centre of that, and how it spreads about it: variances and
+ * covariance of x and y, where they are asked for. */
 struct beam_part {
     double energy, x, y, xx, xy, yy;
 };
-/* The parts that lines cut the footprint into. Each lies on one surface; convex, so that its centre of energy is in
- * it. */
+/* The parts that lines cut the footprint into. Each lies on one surface; convex, so that its centre of energy
+ * is in it. */
 struct beam_parts {
     uint32_t n, centre; /* the part with the centre of the disc */
     struct beam_part part[BEAM_MAX_PARTS];
 };
-/* fine: of BEAM_FINE_RINGS. Returns 0, or 1 where there are more than BEAM_MAX_PARTS. Parts of less than 0.05 % of the
- * energy are left out. */
+/* fine: of BEAM_FINE_RINGS. Returns 0, or 1 where there are more than BEAM_MAX_PARTS. Parts of less than 0.05
+ * % of the energy are left out. */
 int beam_cut(const struct beam *beam, const struct beam_pattern *fine, const struct beam_line *line, uint32_t n,
              int spreads, struct beam_parts *parts);
 
-/* Standard deviation of the ranges within a part that lies on the plane with normal n, range_m away in its centre. */
+/* Standard deviation of the ranges within a part that lies on the plane with normal n, range_m away in its
+ * centre. */
 float beam_part_sigma(const struct beam *beam, const struct beam_sight *sight, const double n[3], double range_m,
                       const struct beam_part *part);
 /* Likewise of a part that spreads the same all around, where only the incidence is known. */

@@ -1,19 +1,21 @@
 /* The pose of a platform, and of the head on it, over time.
  *
- * Attitude, the one convention of the project: a rotation R takes the body's frame (x right, y forward, z up) to the
- * scene frame (x east, y north, z up),
+ * Attitude, the one convention of the project: a rotation R takes the body's frame (x right, y forward, z up)
+ * to the scene frame (x east, y north, z up),
  *     R = Rz(-heading) Rx(pitch) Ry(roll),
- * heading clockwise from north (the scene's y axis) seen from above, pitch positive with the nose up, roll positive
- * with the right side down. Quaternions are (w, x, y, z), of length one, q and -q the same: q = qz(-heading) qx(pitch)
- * qy(roll), products by Hamilton's rule.
+ * heading clockwise from north (the scene's y axis) seen from above, pitch positive with the nose up, roll
+ * positive with the right side down. Quaternions are (w, x, y, z), of length one, q and -q the same: q =
+ * qz(-heading) qx(pitch) qy(roll), products by Hamilton's rule.
  *
- * Between two poses the position goes along the straight line and the attitude the shorter way about one fixed axis at
- * constant rate (slerp, Shoemake 1985): pose_between. This is what the head does between the poses it sends.
+ * Between two poses the position goes along the straight line and the attitude the shorter way about one
+ * fixed axis at constant rate (slerp, Shoemake 1985): pose_between. This is what the head does between the
+ * poses it sends.
  *
- * A trajectory has samples further apart. There the position is the cubic Hermite curve whose velocities are the
- * derivatives of the parabola through each sample and its two neighbours, zero where the platform stands on either
- * side; the attitude is slerp. On a circle of 10 m at 10 m/s sampled at 10 Hz the position is off by 0.16 mm, 12.5 mm
- * by straight lines (tests/unit/test_pose.c). Before the first and behind the last sample the platform stands.
+ * A trajectory has samples further apart. There the position is the cubic Hermite curve whose velocities are
+ * the derivatives of the parabola through each sample and its two neighbours, zero where the platform stands
+ * on either side; the attitude is slerp. On a circle of 10 m at 10 m/s sampled at 10 Hz the position is off
+ * by 0.16 mm, 12.5 mm by straight lines (tests/unit/test_pose.c). Before the first and behind the last sample
+ * the platform stands.
  *
  * Pure, but for reading the files; trajectories are constant after creation, any thread. */
 #ifndef CORE_POSE_H
@@ -62,7 +64,8 @@ void pose_multiply(const double a[4], const double b[4], double out[4]);
 void pose_rotate(const double quat[4], const double v[3], double out[3]);
 /* Angle between two attitudes, in [0, pi]. */
 double pose_angle_between(const double a[4], const double b[4]);
-/* The rotation from a to b in a's body frame: unit axis, and angle in [0, pi]. Axis x where they are the same. */
+/* The rotation from a to b in a's body frame: unit axis, and angle in [0, pi]. Axis x where they are the
+ * same. */
 void pose_turn(const double a[4], const double b[4], double axis[3], double *angle_rad);
 void pose_between(const struct pose *a, const struct pose *b, double fraction, struct pose *out);
 /* The pose of what is mounted on a body: mount is its pose in the body's frame. */
@@ -84,19 +87,19 @@ enum {
 /* n >= 1 samples, times rising by POSE_MIN_STEP_US at least; copied. SH_EINPUT says which sample is wrong. */
 int trajectory_from_samples(const struct pose_sample *sample, size_t n, struct trajectory **out, struct sh_err *err);
 
-/* A CSV file whose first line names the columns, in any order: t_s, x_m, y_m, z_m, and either heading_deg, pitch_deg,
- * roll_deg (heading alone will do) or qw, qx, qy, qz; frame where wanted (else the sample's number, from 0);
- * scan and flags, as `scanhead record -o NAME.poses.csv` writes them, are read over, as is a byte
- * order mark of UTF-8. Lines that begin with '#' and empty lines don't count. Times are within 4e9 s of 0, so that
- * nanoseconds between any two fit into 64 bits. Everything else is an error with file and line. */
+/* A CSV file whose first line names the columns, in any order: t_s, x_m, y_m, z_m, and either heading_deg,
+ * pitch_deg, roll_deg (heading alone will do) or qw, qx, qy, qz; frame where wanted (else the sample's
+ * number, from 0); scan and flags, as `scanhead record -o NAME.poses.csv` writes them, are read over, as is a
+ * byte order mark of UTF-8. Lines that begin with '#' and empty lines don't count. Times are within 4e9 s of
+ * 0, so that nanoseconds between any two fit into 64 bits. Everything else is an error with file and line. */
 int trajectory_read_csv(const char *path, struct trajectory **out, struct sh_err *err);
 
-/* Way-points, a CSV file likewise: x_m, y_m, z_m, speed_m_s, and pause_s where wanted. The platform goes through them
- * on the cubic Hermite curve described above, the way to the next point taking chord / speed_m_s (the last one's speed
- * does not matter, but must be there), and stands at a point for pause_s, where it comes to rest and starts smoothly.
- * Heading along the path, pitch and roll 0, about the axes that a station has there: geoframe_level of frame, or the
- * scene's own without one (NULL). SH_EINPUT, too, where the way is longer than POSE_MAX_KNOTS samples: every 0.02 s, or
- * every 0.01 m where that is longer. */
+/* Way-points, a CSV file likewise: x_m, y_m, z_m, speed_m_s, and pause_s where wanted. The platform goes
+ * through them on the cubic Hermite curve described above, the way to the next point taking chord / speed_m_s
+ * (the last one's speed does not matter, but must be there), and stands at a point for pause_s, where it
+ * comes to rest and starts smoothly. Heading along the path, pitch and roll 0, about the axes that a station
+ * has there: geoframe_level of frame, or the scene's own without one (NULL). SH_EINPUT, too, where the way is
+ * longer than POSE_MAX_KNOTS samples: every 0.02 s, or every 0.01 m where that is longer. */
 int trajectory_read_waypoints(const char *path, const struct geoframe *frame, struct trajectory **out,
                               struct sh_err *err);
 
@@ -104,13 +107,13 @@ void trajectory_free(struct trajectory *trajectory);
 void trajectory_span(const struct trajectory *trajectory, double *first_s, double *last_s);
 void trajectory_at(const struct trajectory *trajectory, double t_s, struct pose *pose, double *frame);
 
-/* The knots of a head that is mounted on the platform, from start_s (time 0 of the knots) to end_s or the trajectory's
- * end, whichever comes first: at
- * the samples, and as many between two as keep what pose_between makes of them within tolerance_m of the curve (closed
- * bound: acceleration and lever arm times interval^2 / 8; the attitude is the same). They are at most longest_ns apart
- * while the head goes on by longest_m, or turns by 0.01 rad, within that: where it hardly moves there are no more than
- * needed. Allocates *out. SH_EINPUT for more than POSE_MAX_KNOTS. error_m: the bound that holds, more than tolerance_m
- * only where POSE_MIN_STEP_US is the limit. */
+/* The knots of a head that is mounted on the platform, from start_s (time 0 of the knots) to end_s or the
+ * trajectory's end, whichever comes first: at
+ * the samples, and as many between two as keep what pose_between makes of them within tolerance_m of the
+ * curve (closed bound: acceleration and lever arm times interval^2 / 8; the attitude is the same). They are
+ * at most longest_ns apart while the head goes on by longest_m, or turns by 0.01 rad, within that: where it
+ * hardly moves there are no more than needed. Allocates *out. SH_EINPUT for more than POSE_MAX_KNOTS.
+ * error_m: the bound that holds, more than tolerance_m only where POSE_MIN_STEP_US is the limit. */
 int trajectory_knots(const struct trajectory *trajectory, double start_s, double end_s, const struct pose *mount,
                      double tolerance_m, int64_t longest_ns, double longest_m, struct pose_knot **out, size_t *n,
                      double *error_m, struct sh_err *err);

@@ -24,9 +24,9 @@ static int before(const double a[3], const double b[3])
     return 0;
 }
 
-/* On which side of the edge a-b the ray passes, as the distance across the ray times the edge's length; corners
- * relative to the ray's origin. Taken in one order of the corners whatever triangle asks, so that two triangles of an
- * edge get the same number with opposite signs. */
+/* On which side of the edge a-b the ray passes, as the distance across the ray times the edge's length;
+ * corners relative to the ray's origin. Taken in one order of the corners whatever triangle asks, so that two
+ * triangles of an edge get the same number with opposite signs. */
 static double edge_side(const double a[3], const double b[3], const double dir[3])
 {
     int swap = before(b, a);
@@ -76,8 +76,8 @@ static double edge_gap(const double a[3], const double b[3], const double dir[3]
     return sqrt(vec3_dot(w, w));
 }
 
-/* Range to a triangle that the ray does meet. Where the ray lies almost in its plane the plane's range runs away: it is
- * kept between the edges that the ray passes. */
+/* Range to a triangle that the ray does meet. Where the ray lies almost in its plane the plane's range runs
+ * away: it is kept between the edges that the ray passes. */
 static double held_range(const struct decide_ray *ray, uint32_t prim, double v[3][3])
 {
     const double *n = ray->bvh->triangle[prim].n;
@@ -125,14 +125,15 @@ static double blur(const double a[3], const double b[3])
     return 8.0 * 0x1p-53 * sqrt(fmax(vec3_dot(a, a), vec3_dot(b, b))) * edge_length(a, b);
 }
 
-/* A ray within the plane, as far as double precision shows, does not meet the triangle; what stands on its edges it
- * does. */
+/* A ray within the plane, as far as double precision shows, does not meet the triangle; what stands on its
+ * edges it does. */
 static int is_edge_on(double v[3][3], const double side[3])
 {
     return fabs(side[0] + side[1] + side[2]) <= blur(v[0], v[1]) + blur(v[1], v[2]) + blur(v[2], v[0]);
 }
 
-/* Remembers the triangle that the ray misses by least, in units of what double precision resolves at its edges. */
+/* Remembers the triangle that the ray misses by least, in units of what double precision resolves at its
+ * edges. */
 static void note_miss(struct search *s, uint32_t prim, double v[3][3], const double side[3])
 {
     const double *dir = s->ray->dir;
@@ -170,8 +171,8 @@ static void try_triangle(struct search *s, uint32_t prim)
     }
 }
 
-/* Embree names all triangles whose boxes, or those of their leaf, are near. What lies further than the query's radius
- * is left out by its plane. */
+/* Embree names all triangles whose boxes, or those of their leaf, are near. What lies further than the
+ * query's radius is left out by its plane. */
 static bool visit(struct RTCPointQueryFunctionArguments *args)
 {
     const struct search *s = args->userPtr;
@@ -198,8 +199,8 @@ static void try_around(struct search *s, double range_m, double radius_m)
     rtcPointQuery(ray->bvh->rtc, &query, &context, visit, s);
 }
 
-/* How far from the proposed point along the ray an edge's neighbours may be met, and the plane itself: the width,
- * stretched by the incidence. */
+/* How far from the proposed point along the ray an edge's neighbours may be met, and the plane itself: the
+ * width, stretched by the incidence. */
 static double slack_m(const struct decide_ray *ray, uint32_t prim, double width_m)
 {
     const struct bvh_plane *tri = &ray->bvh->triangle[prim];
@@ -207,8 +208,8 @@ static double slack_m(const struct decide_ray *ray, uint32_t prim, double width_
     return 4.0 * width_m * (1.0 + 1.0 / fmax(cosine, 1e-6));
 }
 
-/* Rivals whose planes the ray meets within what float can't order are tried; the others lie clearly before or after it.
- */
+/* Rivals whose planes the ray meets within what float can't order are tried; the others lie clearly before or
+ * after it. */
 static void try_rivals(struct search *s, uint32_t prim, double range_m)
 {
     const struct decide_ray *ray = s->ray;
@@ -259,8 +260,8 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh
     for (int round = 0; round < DECIDE_MAX_ROUNDS && prim != RTC_INVALID_GEOMETRY_ID; round++) {
         s.proposed = prim;
         try_triangle(&s, prim);
-        /* Inside in double as well, and further from the border than float can blur: the common case. Nearer, another
-         * triangle of the edge may lie in front of it by less than float resolves. */
+        /* Inside in double as well, and further from the border than float can blur: the common case. Nearer,
+         * another triangle of the edge may lie in front of it by less than float resolves. */
         double width_m = bvh_width_m(ray->bvh, prim);
         if (s.prim == prim && s.border_m > width_m) break;
         counters->decided++;

@@ -73,8 +73,8 @@ static void decide_one(struct bvh_work *w, struct decide_ray *ray, const struct 
     if (p->steep != NULL) p->steep[i] = bvh_steep(ray->bvh, hit.prim, dir);
 }
 
-/* Doubts are few: whole groups without any are passed at once. Each costs a chain of cache misses, so they are looked
- * up together. */
+/* Doubts are few: whole groups without any are passed at once. Each costs a chain of cache misses, so they
+ * are looked up together. */
 static void decide(struct bvh_work *w, struct decide_ray *ray, const struct bvh_rays *rays,
                    const struct bvh_proposals *p)
 {

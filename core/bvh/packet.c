@@ -22,8 +22,8 @@
 /* Of packets that were cut, those that are left with as many as this are not worth it. */
 enum { FEW = 4 };
 
-/* Numbers of 4 bytes of rays at .. at + n, whole packets of them wherever the arrays go on: what is beyond n belongs to
- * packets that come later, or to none. */
+/* Numbers of 4 bytes of rays at .. at + n, whole packets of them wherever the arrays go on: what is beyond n
+ * belongs to packets that come later, or to none. */
 static inline __attribute__((always_inline)) void copy(void *to, const void *from, uint32_t at, uint32_t n,
                                                        uint32_t width)
 {
@@ -35,8 +35,8 @@ static inline __attribute__((always_inline)) void copy(void *to, const void *fro
 }
 
 /* Packet p takes rays first[p] .. first[p + 1] - 1.
- * The planes of what a packet has hit are asked for when the next one has been cast: to read them at once would mean to
- * wait for what Embree has only just written. */
+ * The planes of what a packet has hit are asked for when the next one has been cast: to read them at once
+ * would mean to wait for what Embree has only just written. */
 #define PACKET_FUNCTION(W)                                                                                         \
     static void set_up_##W(struct RTCRayHit##W *packet, const struct bvh_batch *rays)                              \
     {                                                                                                              \
@@ -180,7 +180,8 @@ static void set_up(struct bvh_packets *packets, const struct bvh_batch *rays, ui
     packets->width = width;
 }
 
-/* Cuts rays at .. n into packets, `most` at most; gives how many, and where they begin and the last one ends. */
+/* Cuts rays at .. n into packets, `most` at most; gives how many, and where they begin and the last one ends.
+ */
 static uint32_t cut(const struct bvh_batch *rays, uint32_t width, uint32_t at, uint32_t n, uint32_t most,
                     uint32_t *first)
 {
@@ -195,8 +196,8 @@ static uint32_t cut(const struct bvh_batch *rays, uint32_t width, uint32_t at, u
     return packets;
 }
 
-/* Packets with origins of their own are kept apart from those with a common one (bvh_inside.h), which would have to be set
- * up again. */
+/* Packets with origins of their own are kept apart from those with a common one (bvh_inside.h), which would
+ * have to be set up again. */
 void bvh_intersect(const struct bvh *bvh, struct bvh_packets *packets, const struct bvh_batch *rays, uint32_t n)
 {
     const uint32_t width = bvh->info.packet;

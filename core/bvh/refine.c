@@ -1,13 +1,13 @@
-/* What double precision makes of Embree's proposals: ranges from the planes, and which proposals are in doubt. Loops over
- * arrays that compilers turn into vectors. */
+/* What double precision makes of Embree's proposals: ranges from the planes, and which proposals are in
+ * doubt. Loops over arrays that compilers turn into vectors. */
 #include <math.h>
 
 #include "core/bvh/bvh_inside.h"
 #include "core/vecmath.h"
 
-/* Embree sorts a packet's directions by their signs, but takes what is smaller than 1e-18 for positive when it
- * divides by it: with a component of -1e-22, all rays of that packet with its signs would be lost. So there are none.
- */
+/* Embree sorts a packet's directions by their signs, but takes what is smaller than 1e-18 for positive when
+ * it divides by it: with a component of -1e-22, all rays of that packet with its signs would be lost. So
+ * there are none. */
 VEC_INLINE float direction_component(double d)
 {
     float f = (float)d;
@@ -34,8 +34,8 @@ VEC_INLINE uint32_t label_of(double ny, double nz)
     return (uint32_t)((low & ((1U << BVH_SPARE_BITS) - 1)) | (high & 15) << BVH_SPARE_BITS);
 }
 
-/* Whether a hit is so near to its triangle's border that the proposal is in doubt, or the triangle has rivals. slope:
- * what the guard counts in, bvh_inside.h. */
+/* Whether a hit is so near to its triangle's border that the proposal is in doubt, or the triangle has
+ * rivals. slope: what the guard counts in, bvh_inside.h. */
 VEC_INLINE uint32_t in_doubt(double nx, double nz, double slope, float u, float v)
 {
     float w = 1.0f - u - v;

@@ -52,8 +52,8 @@ static void edge_lengths(double v[3][3], double length[3])
     }
 }
 
-/* The bound of float's error at the edges of a triangle, as a distance across the ray (bvh_inside.h). far_m: of its farthest
- * corner from any origin of rays. */
+/* The bound of float's error at the edges of a triangle, as a distance across the ray (bvh_inside.h). far_m:
+ * of its farthest corner from any origin of rays. */
 static double float_error_m(const struct bvh *bvh, double far_m, const double length[3])
 {
     double longest = fmax(fmax(length[0], length[1]), length[2]);
@@ -107,11 +107,11 @@ static void set_offset(struct bvh_plane *tri, double v[3][3])
     tri->d = vec3_dot(tri->n, centre);
 }
 
-/* What the smallest of Embree's weights has to reach for a hit to be safe. Within the plane, the distance to edge i of
- * the widened triangle is at least weight_i * area2' / longest'. It has to exceed what the edge was moved by, and once
- * more the error of float there, width / cosine of the incidence: seen from the origin no more than the offset.
- * From elsewhere the incidence is another one, so there the weight is multiplied by area2 * cosine first
- * (refine.c). */
+/* What the smallest of Embree's weights has to reach for a hit to be safe. Within the plane, the distance to
+ * edge i of the widened triangle is at least weight_i * area2' / longest'. It has to exceed what the edge was
+ * moved by, and once more the error of float there, width / cosine of the incidence: seen from the origin no
+ * more than the offset. From elsewhere the incidence is another one, so there the weight is multiplied by
+ * area2 * cosine first (refine.c). */
 static double guard(const struct bvh *bvh, double offset, double width_m, double longest_wide, double area2_wide,
                     double area2)
 {
@@ -146,8 +146,9 @@ void bvh_mark_rival(struct bvh *bvh, uint32_t prim)
     set_offset(tri, v);
 }
 
-/* How far the edges have to move within the plane, so that seen from the origin, at a slant, they have moved by
- * width_m: width / cosine of the incidence, which at the farthest corner is the plane's distance by the corner's. */
+/* How far the edges have to move within the plane, so that seen from the origin, at a slant, they have moved
+ * by width_m: width / cosine of the incidence, which at the farthest corner is the plane's distance by the
+ * corner's. */
 static double offset_m(double v[3][3], const double unit_n[3], double width_m, double far_m)
 {
     double above_m = fabs(vec3_dot(v[0], unit_n));

@@ -5,8 +5,8 @@
 
 static const double UNTURNED[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
 
-/* Socs to where positions go: straight to the CRS where that is a rotation, else to prcs. Returns 1 in the first case.
- */
+/* Socs to where positions go: straight to the CRS where that is a rotation, else to prcs. Returns 1 in the
+ * first case. */
 static int reading_rotation(const struct cast_setup *s, double to_crs[9])
 {
     double g[9];
@@ -129,7 +129,8 @@ void caster_aim(struct caster *c, struct chunk *k)
         aim_ideal(c, k, &(struct kernel_turns){k->n, l->mirror_turn, l->pan_turn});
 }
 
-/* Entries at .. at + n; c->socs is of no use any more. Those of a pulse that moves are at the times of dt_ns. */
+/* Entries at .. at + n; c->socs is of no use any more. Those of a pulse that moves are at the times of dt_ns.
+ */
 static void read_part(struct caster *c, const struct chunk *k, uint32_t at, uint32_t n, const uint32_t *dt_ns)
 {
     const struct cast_setup *s = k->s;

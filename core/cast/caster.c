@@ -1,15 +1,17 @@
 /* The way of a pulse, from its place in the schedule to a point. cast_chunk has the stages in their order:
  *
  *     aim        aim.c            angles -> where the beam goes and begins, and what the encoders read of it
- *     nearest    nearest.c        what the beam's centre meets first: the scene, and bodies that move; exact (bvh.h)
+ *     nearest    nearest.c        what the beam's centre meets first: the scene, and bodies that move; exact
+ *     (bvh.h)
  *     optics     optics.c         where that is glass or a mirror: what is seen there
  *     sub-rays   sub_rays.c       pulses with a footprint: which of them need more rays, and their echoes;
  *                sub_ray_plan.c   where in a footprint those rays lie
- *     echoes     echoes.c         which echoes are seen, how they merge, their noise, which of them a pulse sends
+ *     echoes     echoes.c         which echoes are seen, how they merge, their noise, which of them a pulse
+ *     sends
  *     points     points.c         positions, and entries of the block
  *
- * A stage that a setup does not need costs nothing. kernels*.c hold the arithmetic of the stages, texels.c looks up
- * textures. For setting up: outlines.c, floor.c. */
+ * A stage that a setup does not need costs nothing. kernels*.c hold the arithmetic of the stages, texels.c
+ * looks up textures. For setting up: outlines.c, floor.c. */
 #include "core/cast.h"
 
 #include <stdlib.h>
@@ -122,8 +124,8 @@ uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, cons
     struct chunk chunk = {.s = setup, .run = run, .block = block, .attributes = block->width_cns != NULL};
     uint32_t echoes = 0;
     begin_block(block, setup, run);
-    /* With several entries a pulse, the pulses' times wait at the end of the array: no entry overtakes the pulses that
-     * are still to come. */
+    /* With several entries a pulse, the pulses' times wait at the end of the array: no entry overtakes the
+     * pulses that are still to come. */
     int several = setup->beam != NULL || setup->detect != NULL;
     uint32_t *dt_ns = several ? block->dt_ns + block->capacity - run->n : block->dt_ns;
     kernel_times(run, dt_ns);

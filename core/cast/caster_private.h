@@ -4,7 +4,8 @@
 
 #include "core/cast/kernels.h"
 
-/* Pulses worked on at a time: the arrays stay in the second-level cache, the hits' planes are on their way. */
+/* Pulses worked on at a time: the arrays stay in the second-level cache, the hits' planes are on their way.
+ */
 enum { CHUNK = BVH_CHUNK, CAST_LIST = CHUNK * LINE_MAX_ECHOES, CAST_FOUND = CHUNK * CAST_MAX_DEPTH };
 enum { CAST_NO_PATH = 0xffffffff };
 
@@ -42,8 +43,9 @@ struct further {
     uint32_t pulse, at, n;
 };
 
-/* The echoes of a chunk. Entry i < pulses is the first of pulse i, or says that it has none (range NaN): single rays are
- * in their places without being moved. Further ones follow, those of a pulse together, by range. */
+/* The echoes of a chunk. Entry i < pulses is the first of pulse i, or says that it has none (range NaN):
+ * single rays are in their places without being moved. Further ones follow, those of a pulse together, by
+ * range. */
 struct echo_list {
     uint32_t n;
     uint32_t n_further; /* pulses with further echoes, in order */
@@ -118,8 +120,8 @@ void caster_aim_read(struct caster *c, struct chunk *k);
 
 /* ---- nearest.c */
 void caster_nearest(struct caster *c, const struct cast_setup *s, const struct met *met);
-/* ---- texels.c: labels of what has been met get the reflectance there, as surface_texel has it. Nothing where the
- * surfaces have no textures. */
+/* ---- texels.c: labels of what has been met get the reflectance there, as surface_texel has it. Nothing
+ * where the surfaces have no textures. */
 void caster_texels(const struct cast_setup *s, const struct met *met);
 
 /* ---- optics.c */

@@ -1,5 +1,5 @@
-/* What a chunk's pulses met -> echoes as the head reports them: which are seen, how they merge, which a pulse sends, and
- * their noise. One list, for single rays, footprints, and what glass and mirrors show. */
+/* What a chunk's pulses met -> echoes as the head reports them: which are seen, how they merge, which a pulse
+ * sends, and their noise. One list, for single rays, footprints, and what glass and mirrors show. */
 #include <math.h>
 #include <string.h>
 
@@ -58,8 +58,8 @@ static void take_echo(struct echo_list *l, uint32_t at, uint8_t number, const st
     l->number[at] = number;
 }
 
-/* Returns of a pulse that are nearer to each other than the range resolution make one echo. One that nothing comes back
- * from stays apart, and keeps its number. */
+/* Returns of a pulse that are nearer to each other than the range resolution make one echo. One that nothing
+ * comes back from stays apart, and keeps its number. */
 static uint32_t merge_pulse(struct echo_list *l, const struct beam_merging *how, const struct further *f)
 {
     const uint32_t n = f->n + 1;

@@ -1,4 +1,5 @@
-/* cast_floor: of all triangles only those around the vertical line become a scene, with a BVH where the ray begins. */
+/* cast_floor: of all triangles only those around the vertical line become a scene, with a BVH where the ray
+ * begins. */
 #include "core/cast.h"
 
 #include <math.h>
@@ -28,7 +29,8 @@ static void directions_across(const double down[3], double u[3], double v[3])
     vec3_cross(down, u, v);
 }
 
-/* Does the line pass through the triangle's bounds across it? Rounding stays below a millionth of a coordinate. */
+/* Does the line pass through the triangle's bounds across it? Rounding stays below a millionth of a
+ * coordinate. */
 static int is_around(const struct column *c, uint32_t prim)
 {
     double min[2] = {INFINITY, INFINITY}, max[2] = {-INFINITY, -INFINITY}, far_m = 0.0;

@@ -37,7 +37,8 @@ void kernel_directions(const struct kernel_turns *turns, const double m[9], cons
     }
 }
 
-/* The error of an encoder is at most half a count, d: sin(a + d) = sin a + d cos a - d^2/2 sin a leaves d^3/6, below
+/* The error of an encoder is at most half a count, d: sin(a + d) = sin a + d cos a - d^2/2 sin a leaves
+ * d^3/6, below
  * 1e-12 for 2^12 counts per turn and more. Ideal encoders have no error. */
 VEC_CLONES
 void kernel_directions_read(const struct cast_setup *setup, const struct kernel_turns *turns, const double m[9],

@@ -1,4 +1,5 @@
-/* Private to core/cast: the arithmetic around the cast, as loops over arrays that compilers turn into vectors. */
+/* Private to core/cast: the arithmetic around the cast, as loops over arrays that compilers turn into
+ * vectors. */
 #ifndef CORE_CAST_KERNELS_H
 #define CORE_CAST_KERNELS_H
 
@@ -14,7 +15,8 @@ struct kernel_turns {
 };
 /* Directions in prcs: rotation times (sin p cos m, cos p cos m, sin m). */
 void kernel_directions(const struct kernel_turns *turns, const double rotation[9], const struct vec3_arrays *d);
-/* The same, and beside it e: the directions as the encoders read them (whole counts), turned by to_crs instead. */
+/* The same, and beside it e: the directions as the encoders read them (whole counts), turned by to_crs
+ * instead. */
 void kernel_directions_read(const struct cast_setup *setup, const struct kernel_turns *turns, const double rotation[9],
                             const double to_crs[9], const struct vec3_arrays *d, const struct vec3_arrays *e);
 
@@ -57,8 +59,8 @@ struct kernel_wire {
 /* a: range in counts, 0 for none; b, c: encoder counts modulo a turn. */
 void kernel_polar(const struct cast_setup *setup, const double *range_m, const struct kernel_turns *turns,
                   const struct kernel_wire *out);
-/* Coordinates in counts of scale[], LINE_XYZ_NONE for NaN and for what doesn't fit. Returns how many coordinates did
- * not. */
+/* Coordinates in counts of scale[], LINE_XYZ_NONE for NaN and for what doesn't fit. Returns how many
+ * coordinates did not. */
 uint32_t kernel_geo(const struct vec3_const *p, const double scale[3], uint32_t n, const struct kernel_wire *out);
 void kernel_scale(const double *range_m, uint32_t n, const struct vec3_arrays *e);
 

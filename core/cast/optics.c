@@ -31,8 +31,8 @@ static void normal_of(const struct cast_setup *s, uint8_t body, uint32_t hit, do
         n[i] = (m == NULL ? at_rest[i] : vec3_dot(m->rotation + 3 * i, at_rest)) / length;
 }
 
-/* How far beyond a surface a way goes on, so that the surface itself is not met again: three times a float's rounding of
- * the place (in the BVH's frame), measured across the surface. */
+/* How far beyond a surface a way goes on, so that the surface itself is not met again: three times a float's
+ * rounding of the place (in the BVH's frame), measured across the surface. */
 static double step_m(const struct cast_setup *s, const double at[3], double cosine)
 {
     double most = 0.0, origin_m[3];

@@ -1,4 +1,5 @@
-/* Echoes -> points, as entries of the block: the one writer, for single rays and for pulses of several echoes. */
+/* Echoes -> points, as entries of the block: the one writer, for single rays and for pulses of several
+ * echoes. */
 #include <math.h>
 #include <string.h>
 
@@ -20,8 +21,8 @@ static void follow_pulse(struct caster *c, const struct chunk *k)
     }
 }
 
-/* Positions as a head computes them, from ranges and what its encoders read: the three numbers of echoes at .. at + n of
- * the list. Returns how many coordinates did not fit; they are LINE_XYZ_NONE. */
+/* Positions as a head computes them, from ranges and what its encoders read: the three numbers of echoes at
+ * .. at + n of the list. Returns how many coordinates did not fit; they are LINE_XYZ_NONE. */
 static uint32_t place(struct caster *c, const struct chunk *k, uint32_t at, uint32_t n, const struct kernel_wire *out)
 {
     const struct cast_setup *s = k->s;
@@ -40,7 +41,8 @@ static uint32_t place(struct caster *c, const struct chunk *k, uint32_t at, uint
     return kernel_geo(&VEC3_IN(e, 0), s->xyz_scale, n, out);
 }
 
-/* Of all entries but their times and three numbers: the first echoes of the pulses. Returns how many there are. */
+/* Of all entries but their times and three numbers: the first echoes of the pulses. Returns how many there
+ * are. */
 static uint32_t write_firsts(struct caster *c, const struct chunk *k)
 {
     const struct echo_list *l = &c->list;
@@ -139,8 +141,9 @@ static void keep_entry(struct line_block *b, uint32_t to, uint32_t from, int fit
     b->width_cns[to] = fits ? b->width_cns[from] : (uint16_t)LINE_WIDTH_NONE;
 }
 
-/* Where positions did not fit: these are no echoes, and counted; the pulse's other echoes are numbered anew, but one
- * entry of a pulse stays. Returns how many entries are left of n; *echoes: how many echoes are among them. */
+/* Where positions did not fit: these are no echoes, and counted; the pulse's other echoes are numbered anew,
+ * but one entry of a pulse stays. Returns how many entries are left of n; *echoes: how many echoes are among
+ * them. */
 static uint32_t drop_unfit(struct caster *c, struct line_block *b, uint32_t at, uint32_t n, uint32_t *echoes)
 {
     uint32_t to = at;

@@ -56,8 +56,8 @@ static int together(uint32_t a, uint32_t b)
     return a / SCHEDULE_PACKET == b / SCHEDULE_PACKET;
 }
 
-/* Which rays share a packet depends on the pulse number alone, as it does for those of the pulses: SCHEDULE_PACKET pulses
- * have packets of their own. */
+/* Which rays share a packet depends on the pulse number alone, as it does for those of the pulses:
+ * SCHEDULE_PACKET pulses have packets of their own. */
 static void mark_packets(struct sub_ray_work *w, uint32_t first)
 {
     const struct job *last = NULL;
@@ -183,7 +183,8 @@ static void add_met(struct caster *c, const struct chunk *k, const struct job *j
     }
 }
 
-/* Adaptive, and a part of the footprint lies on glass or a mirror: what can be seen there has outlines of its own. */
+/* Adaptive, and a part of the footprint lies on glass or a mirror: what can be seen there has outlines of its
+ * own. */
 static int sees_through(const struct caster *c, const struct cast_setup *s, const struct job *job)
 {
     if (job->whole || s->detect == NULL || s->detect->depth == 0) return 0;
@@ -224,8 +225,8 @@ static void run_jobs(struct caster *c, const struct chunk *k)
     w->n_jobs = w->pool.n = 0;
 }
 
-/* Whether there may be no room left for the pulses that share packets with this one, of `most` sub-rays each; asked
- * for each pulse, so that those before it that share its packets are all in. */
+/* Whether there may be no room left for the pulses that share packets with this one, of `most` sub-rays each;
+ * asked for each pulse, so that those before it that share its packets are all in. */
 static int is_full(const struct sub_ray_work *w, uint32_t pulse, uint32_t most)
 {
     _Static_assert(SCHEDULE_PACKET * (MAX_PASSES * BEAM_MAX_PARTS + BEAM_MAX_SUBRAYS) <= POOL, "room for a packet");
@@ -274,8 +275,9 @@ static void cast_whole(struct caster *c, const struct chunk *k, const uint32_t *
     if (w->n_jobs > 0) run_jobs(c, k);
 }
 
-/* Up to where outlines may cut a footprint whose centre meets a surface at that range, and 1 / cos^2 of its incidence:
- * beyond it by the slope of the surface, doubled and more, for it may bend away, and by some footprints. */
+/* Up to where outlines may cut a footprint whose centre meets a surface at that range, and 1 / cos^2 of its
+ * incidence: beyond it by the slope of the surface, doubled and more, for it may bend away, and by some
+ * footprints. */
 static double limit_m(const struct beam *beam, double range_m, float steep)
 {
     double s = steep < 1e6f ? (double)steep : 1e6;

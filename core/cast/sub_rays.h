@@ -22,8 +22,8 @@ struct pool {
     uint8_t body[POOL_ROOM];
     uint8_t begins[POOL_ROOM]; /* a packet */
     uint32_t n;
-    /* of the part that a sub-ray stands for: variances and covariance of x and y; touched only where attributes are
-     * asked for */
+    /* of the part that a sub-ray stands for: variances and covariance of x and y; touched only where
+     * attributes are asked for */
     float xx[POOL_ROOM], xy[POOL_ROOM], yy[POOL_ROOM];
 };
 
@@ -72,8 +72,8 @@ struct sub_ray_work {
 /* ---- sub_ray_plan.c: jobs, their sub-rays at the end of the pool. */
 /* Sub-rays all over the footprint. */
 void plan_whole(struct caster *c, const struct chunk *k, struct job *job);
-/* The rays that a pulse needs, given the outlines up to limit_m. Returns 0 where those of `known` outlines will do, or
- * (0) the central one. */
+/* The rays that a pulse needs, given the outlines up to limit_m. Returns 0 where those of `known` outlines
+ * will do, or (0) the central one. */
 int plan_parts(struct caster *c, const struct chunk *k, struct job *job, double limit_m, uint32_t known);
 
 #endif

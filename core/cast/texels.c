@@ -4,7 +4,8 @@
 #include "core/cast/caster_private.h"
 #include "core/surface.h"
 
-/* Barycentric coordinates of p, on the triangle's plane, by the areas seen along the largest axis of its normal. */
+/* Barycentric coordinates of p, on the triangle's plane, by the areas seen along the largest axis of its
+ * normal. */
 static void weights(const double *a, const double *b, const double *c, const double p[3], double w[3])
 {
     double u[3], v[3], n[3];

@@ -46,8 +46,8 @@ void detect_ball_keys(struct detect_ball *ball, uint64_t seed)
     ball->radius_key = rng_key(seed, RNG_BALL_RADIUS);
 }
 
-/* Uniform in the unit ball: a height uniform in -1..1 and an angle give a direction (Archimedes), the cube root of a
- * uniform number the distance. */
+/* Uniform in the unit ball: a height uniform in -1..1 and an angle give a direction (Archimedes), the cube
+ * root of a uniform number the distance. */
 static void in_unit_ball(const struct detect_ball *ball, uint64_t key, double u[3])
 {
     uint64_t bits = rng_u64(ball->direction_key, key);
@@ -59,8 +59,9 @@ static void in_unit_ball(const struct detect_ball *ball, uint64_t key, double u[
     u[2] = r * z;
 }
 
-/* The point lies in the plane of the line angle, at `ahead` and `up`, and is moved by v: to the right, ahead (along the
- * head's horizon), up. Where the line angle looks backward over the zenith it still does so afterwards. */
+/* The point lies in the plane of the line angle, at `ahead` and `up`, and is moved by v: to the right, ahead
+ * (along the head's horizon), up. Where the line angle looks backward over the zenith it still does so
+ * afterwards. */
 static void move_point(const double v[3], double *range_m, double *mirror_turn, double *pan_turn)
 {
     double s, c;

@@ -97,8 +97,8 @@ static void plane_means(const double *restrict term, float most, const float *re
     }
 }
 
-/* The series of sqrt((1 + t s^2) / (1 - t b^2)) - 1, b = s tan i, to third order in t, by x = 1 / cos^2 i: s^2 + b^2 =
- * s^2 x, and what is left out is s^2 of these terms. */
+/* The series of sqrt((1 + t s^2) / (1 - t b^2)) - 1, b = s tan i, to third order in t, by x = 1 / cos^2 i:
+ * s^2 + b^2 = s^2 x, and what is left out is s^2 of these terms. */
 void beam_plane_means(const struct beam *beam, const float *steep, uint32_t n, double *range_m)
 {
     double s2 = beam->slope * beam->slope;
@@ -107,8 +107,8 @@ void beam_plane_means(const struct beam *beam, const float *steep, uint32_t n, d
     plane_means(term, (float)(0.25 / s2), steep, n, range_m);
 }
 
-/* Variance of the ranges, to first order in s tan i: that of rho cos phi, half the mean t, times w(R)^2 tan^2 i. Beyond
- * most the plane is along the beam. */
+/* Variance of the ranges, to first order in s tan i: that of rho cos phi, half the mean t, times w(R)^2 tan^2
+ * i. Beyond most the plane is along the beam. */
 VEC_CLONES
 void beam_plane_widths(const struct beam *beam, const float *restrict steep, const double *restrict range_m, uint32_t n,
                        float *restrict width_m)
@@ -124,8 +124,8 @@ void beam_plane_widths(const struct beam *beam, const float *restrict steep, con
     }
 }
 
-/* The sub-ray at (x, y) begins at exit_radius (x e1 + y e2), with slope (x e2 - y e1): how the range changes with x and
- * y, to first order. */
+/* The sub-ray at (x, y) begins at exit_radius (x e1 + y e2), with slope (x e2 - y e1): how the range changes
+ * with x and y, to first order. */
 float beam_part_sigma(const struct beam *beam, const struct beam_sight *sight, const double n[3], double range_m,
                       const struct beam_part *part)
 {

@@ -45,8 +45,8 @@ static struct beam_part cap_of(const struct beam *beam, const struct beam_line *
     return p;
 }
 
-/* What one or two lines cut off, in closed form. All h >= 0: the caps lie beyond. Returns 0 where the lines meet in the
- * disc. */
+/* What one or two lines cut off, in closed form. All h >= 0: the caps lie beyond. Returns 0 where the lines
+ * meet in the disc. */
 static int cut_caps(const struct beam *beam, const struct beam_line *line, uint32_t n, int spreads,
                     struct beam_parts *parts)
 {
@@ -77,8 +77,8 @@ static int cut_caps(const struct beam *beam, const struct beam_line *line, uint3
     return 1;
 }
 
-/* Places of the fine pattern as sets of bits: place 16 r + i is bit r of lane i, so that one comparison of vectors
- * makes a bit of all lanes. */
+/* Places of the fine pattern as sets of bits: place 16 r + i is bit r of lane i, so that one comparison of
+ * vectors makes a bit of all lanes. */
 enum { LANES = 16, MAX_ROWS = 32 };
 _Static_assert(1 + 3 * BEAM_FINE_RINGS * (BEAM_FINE_RINGS + 1) <= LANES * MAX_ROWS, "a bit for each place");
 typedef float lanes_f __attribute__((vector_size(4 * LANES)));

@@ -58,8 +58,8 @@ static uint32_t of_strongest_surface(const struct beam_return *r, uint32_t n, in
     return best;
 }
 
-/* An echo's mean range (from the first return's), the variance of its ranges, and the index of the return that it is
- * of. */
+/* An echo's mean range (from the first return's), the variance of its ranges, and the index of the return
+ * that it is of. */
 struct average {
     double mean, variance;
     uint32_t strongest;
@@ -118,8 +118,8 @@ static void drop_weakest(struct beam_echo *e, uint32_t n)
 /* From so many returns on it is faster to look first. */
 enum { MANY = 7 };
 
-/* Most footprints lie on one surface: there is no gap between their returns, whatever their order. The nearest one goes to the
- * front, as sorting would have it. */
+/* Most footprints lie on one surface: there is no gap between their returns, whatever their order. The
+ * nearest one goes to the front, as sorting would have it. */
 static int have_no_gap(double gap_m, struct beam_return *r, uint32_t n)
 {
     uint32_t nearest = 0;

@@ -366,8 +366,8 @@ static void look_up(const struct beam_outlines *o, struct beam_near *near, uint3
     }
 }
 
-/* Most cells lead to none, and most of those that lead to some are wider than the footprint; ranges are looked at
- * later. */
+/* Most cells lead to none, and most of those that lead to some are wider than the footprint; ranges are
+ * looked at later. */
 uint32_t beam_near_outlines(const struct beam_outlines *o, const struct beam *beam, const struct vec3_floats *dir,
                             uint32_t n, struct beam_near *near)
 {

@@ -19,8 +19,8 @@ static void turn_in(const float p[3], const struct beam_sight *sight, double out
     out[2] = vec3_dot(at, sight->dir);
 }
 
-/* Where the segment is within w(z) of the axis: a quadratic inequality, for w^2 is quadratic too. Returns 0 where it
- * never is. */
+/* Where the segment is within w(z) of the axis: a quadratic inequality, for w^2 is quadratic too. Returns 0
+ * where it never is. */
 static int clip_to_beam(const struct beam *beam, struct local_edge *e)
 {
     double d[3] = {e->b[0] - e->a[0], e->b[1] - e->a[1], e->b[2] - e->a[2]}, s2 = beam->slope * beam->slope;

@@ -1,6 +1,8 @@
-/* Private to core/footprint: outlines of a scene from a station, and the cells of direction that lead to them.
+/* Private to core/footprint: outlines of a scene from a station, and the cells of direction that lead to
+ * them.
  *
- * Directions are cells of a cube's faces, n x n each: x / |z| and y / |z| of the axis with the largest component, from
+ * Directions are cells of a cube's faces, n x n each: x / |z| and y / |z| of the axis with the largest
+ * component, from
  * -1 to 1. */
 #ifndef CORE_FOOTPRINT_OUTLINES_H
 #define CORE_FOOTPRINT_OUTLINES_H
@@ -51,8 +53,8 @@ struct outline_prober {
     uint16_t kind[2 * PROBE_MOST];
     uint8_t counts[PROBE_MOST];
 };
-/* The piece from p to q in equal parts, each about a footprint's radius: how many, and in counts whether each counts.
- */
+/* The piece from p to q in equal parts, each about a footprint's radius: how many, and in counts whether each
+ * counts. */
 uint32_t outline_probe(struct outline_prober *prober, const double p[3], const double q[3], double range_m);
 
 /* weld.c: the outlines among the edges of a scene: o->edge and n_edges, and info.edges. */
@@ -81,8 +83,8 @@ static inline __attribute__((always_inline)) uint32_t outline_cell(float dx, flo
     return outline_place(face, (uint32_t)i, (uint32_t)j);
 }
 
-/* The beam passes clear of the plane through the station and the edge: most do. The footprint is widest, as an angle,
- * where the edge is nearest. */
+/* The beam passes clear of the plane through the station and the edge: most do. The footprint is widest, as
+ * an angle, where the edge is nearest. */
 static inline int outline_is_clear(const struct beam *beam, const struct outline_entry *entry, const float d[3])
 {
     const float exit = 1.01f * (float)beam->exit_radius_m, slope = 1.01f * (float)beam->slope, range = entry->range_m;
