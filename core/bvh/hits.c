@@ -6,18 +6,21 @@
 #include "core/bvh/bvh_inside.h"
 #include "core/vecmath.h"
 
-enum { DOUBTS_TOGETHER = 16 }; /* passed at once where there are none */
+enum {
+    DOUBTS_TOGETHER = 16,  /* passed at once where there are none */
+    ROOM = BVH_CHUNK + 48, /* arrays of a power of two would get into each other's way in a cache */
+};
 
 struct bvh_work {
     struct bvh_packets packets, placed; /* of rays from one point; each from its own */
     struct {
-        float x[BVH_CHUNK], y[BVH_CHUNK], z[BVH_CHUNK];
+        float x[ROOM], y[ROOM], z[ROOM];
     } dir, own_float; /* as Embree gets them */
     struct {
-        double x[BVH_CHUNK], y[BVH_CHUNK], z[BVH_CHUNK];
+        double x[ROOM], y[ROOM], z[ROOM];
     } own; /* origins, local frame */
-    uint32_t prim[BVH_CHUNK], doubt[BVH_CHUNK], label[BVH_CHUNK];
-    float t[BVH_CHUNK], u[BVH_CHUNK], v[BVH_CHUNK];
+    uint32_t prim[ROOM], doubt[ROOM], label[ROOM];
+    float t[ROOM], u[ROOM], v[ROOM];
     struct bvh_counters counters;
     struct bvh_profile *profile;
 };

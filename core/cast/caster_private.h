@@ -6,11 +6,13 @@
 
 /* Pulses worked on at a time: the arrays stay in the second-level cache, the hits' planes are on their way.
  */
-enum { CHUNK = BVH_CHUNK, CAST_LIST = CHUNK * LINE_MAX_ECHOES, CAST_FOUND = CHUNK * CAST_MAX_DEPTH };
+enum { CHUNK = BVH_CHUNK, CAST_FOUND = CHUNK * CAST_MAX_DEPTH };
+/* Arrays whose distance is a power of two, or a page, would get into each other's way in a cache. */
+enum { CHUNK_ROOM = CHUNK + 48, CAST_LIST = CHUNK * LINE_MAX_ECHOES + 80 };
 enum { CAST_NO_PATH = 0xffffffff };
 
 struct chunk_vectors {
-    double x[CHUNK], y[CHUNK], z[CHUNK];
+    double x[CHUNK_ROOM], y[CHUNK_ROOM], z[CHUNK_ROOM];
 };
 struct list_vectors {
     double x[CAST_LIST], y[CAST_LIST], z[CAST_LIST];
@@ -99,7 +101,7 @@ struct caster {
     struct bvh_profile *profile;
     struct cast_counters counters;
     struct chunk_vectors d; /* direction of the beam, prcs */
-    uint32_t hit[CHUNK];
+    uint32_t hit[CHUNK_ROOM];
     uint8_t body[CHUNK];
     struct echo_list list;
     /* touched only where something moves: */
