@@ -48,7 +48,7 @@ LDLIBS = $(EMBREE) -lassimp -lGeographicLib $(PKG_LIBS) -lstdc++ -lm -pthread
 CORE = $(wildcard core/*.c core/*/*.c) core/georef/geographiclib_shim.cpp
 PROTO = $(wildcard drivers/protocol/*.c)
 HOST = $(wildcard drivers/host/*.c)
-SRC = $(CORE) $(PROTO) $(HOST) $(wildcard drivers/link/*.c drivers/usb/*.c drivers/record/*.c firmware_sim/*/*.c)
+SRC = $(CORE) $(PROTO) $(HOST) $(wildcard drivers/socket/*.c drivers/link/*.c drivers/usb/*.c drivers/record/*.c firmware_sim/*/*.c)
 OBJ = $(SRC:%=$(BUILD)/%.o)
 LIBOBJ = $(patsubst %,$(BUILD)/%.o,core/err.c $(PROTO) $(HOST))
 PROGRAMS = $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/$(1)/test_*.c))

@@ -62,7 +62,7 @@ enum {
  * origin_m. */
 struct bvh_origins {
     double at_m[3];
-    struct vec3_const own;
+    struct vec3_in own;
 };
 
 static inline void bvh_origin_of(const struct bvh_origins *from, uint32_t i, double origin_m[3])
@@ -77,7 +77,7 @@ static inline void bvh_origin_of(const struct bvh_origins *from, uint32_t i, dou
 struct bvh_rays {
     uint32_t n; /* up to BVH_CHUNK where each begins at its own point */
     struct bvh_origins from;
-    struct vec3_const dir; /* unit vectors, prcs */
+    struct vec3_in dir;    /* unit vectors, prcs */
     double range_max_m;    /* hits beyond it may or may not be reported */
     const uint8_t *begins; /* 1: a packet begins with this ray, whether the last one is full or not; NULL: none does */
     int scattered;         /* neighbours have nothing in common: one by one */
@@ -125,10 +125,10 @@ struct vec3_floats bvh_work_directions(const struct bvh_work *work);
 void bvh_hits(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays);
 
 /* Cosine of the incidence on the triangles that were hit, 0..1; NaN where there is none. */
-void bvh_cosines(const struct bvh *bvh, const uint32_t *triangle, const struct vec3_const *dir, uint32_t n,
+void bvh_cosines(const struct bvh *bvh, const uint32_t *triangle, const struct vec3_in *dir, uint32_t n,
                  double *cosine);
 
 /* Directions as Embree gets them. */
-void bvh_to_float(const struct vec3_const *dir, uint32_t n, float *x, float *y, float *z);
+void bvh_to_float(const struct vec3_in *dir, uint32_t n, float *x, float *y, float *z);
 
 #endif

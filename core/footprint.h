@@ -151,7 +151,7 @@ struct beam_outlines;
 /* Casts rays from the station: unit directions -> ranges, NaN for none, and the kinds of surfaces that they
  * meet. */
 struct beam_probe {
-    void (*cast)(void *ctx, uint32_t n, const struct vec3_const *dir, double *range_m, uint16_t *kind);
+    void (*cast)(void *ctx, uint32_t n, const struct vec3_in *dir, double *range_m, uint16_t *kind);
     void *ctx;
 };
 /* What outlines are made for. */

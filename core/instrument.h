@@ -54,8 +54,8 @@ struct instrument_turns {
     double *mirror, *pan;
 };
 /* Scheduled angles -> direction s of the beam and, unless o->x is NULL, its origin o (m), both in socs. */
-void instrument_aim(const struct instrument *instrument, const struct instrument_turns *turns,
-                    const struct vec3_arrays *s, const struct vec3_arrays *o);
+void instrument_aim(const struct instrument *instrument, const struct instrument_turns *turns, const struct vec3_out *s,
+                    const struct vec3_out *o);
 
 /* Scheduled angles become what the encoders say, in place. */
 void instrument_read(const struct instrument *instrument, uint32_t n, double *mirror_turn, double *pan_turn);

@@ -71,6 +71,9 @@ void pose_between(const struct pose *a, const struct pose *b, double fraction, s
 /* The pose of what is mounted on a body: mount is its pose in the body's frame. */
 void pose_mount(const struct pose *body, const struct pose *mount, struct pose *out);
 
+/* The last of n >= 1 knots, in order of time, at or before t_ns; before the first one 0. */
+size_t pose_find_knot(const struct pose_knot *knot, size_t n, int64_t t_ns);
+
 struct trajectory;
 
 struct pose_sample {

@@ -15,19 +15,20 @@ static inline void vec3_cross(const double a[3], const double b[3], double out[3
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-struct vec3_arrays {
-    double *x, *y, *z;
-};
-struct vec3_const {
+/* Vectors as arrays, one per axis; the arrays stay the caller's. */
+struct vec3_in {
     const double *x, *y, *z;
+};
+struct vec3_out {
+    double *x, *y, *z;
 };
 struct vec3_floats {
     const float *x, *y, *z;
 };
 
 /* Of anything with arrays x, y and z: what begins at its element i. */
-#define VEC3_IN(a, i)  ((struct vec3_const){(a).x + (i), (a).y + (i), (a).z + (i)})
-#define VEC3_OUT(a, i) ((struct vec3_arrays){(a).x + (i), (a).y + (i), (a).z + (i)})
+#define VEC3_IN(a, i)  ((struct vec3_in){(a).x + (i), (a).y + (i), (a).z + (i)})
+#define VEC3_OUT(a, i) ((struct vec3_out){(a).x + (i), (a).y + (i), (a).z + (i)})
 
 /* Element i as a vector. */
 #define VEC3_AT(a, i)                \

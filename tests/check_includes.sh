@@ -4,7 +4,7 @@
 #   check_includes.sh [ROOT]      default: the tree this script is in
 #
 #   firmware_sim -> drivers -> core/line.h, core/err.h        core -> core
-#   drivers/host -> drivers/protocol, core/err.h              drivers/protocol, drivers/link -> nothing beside themselves
+#   drivers/host -> drivers/protocol, core/err.h              drivers/link -> drivers/usb -> drivers/protocol, drivers/socket
 #
 # First the check is tried on a tree with one violation of each kind: what it can't find there, it can't find here.
 set -u
@@ -29,9 +29,9 @@ rules='
         if (from ~ /^drivers\/record\//)
             return to ~ /^drivers\/(protocol|record)\// || to == "core/err.h" || to == "drivers/host/scanhead.h"
         if (from ~ /^drivers\/protocol\//) return to ~ /^drivers\/protocol\// || to == "core/line.h" || to == "core/err.h"
-        if (from ~ /^drivers\/link\//) return to ~ /^drivers\/(link|usb)\// || to == "core/line.h" || to == "core/err.h"
-        if (from ~ /^drivers\//)
-            return (to ~ /^drivers\// && to !~ /^drivers\/host\//) || to == "core/line.h" || to == "core/err.h"
+        if (from ~ /^drivers\/link\//) return to ~ /^drivers\/(link|usb|socket)\// || to == "core/err.h"
+        if (from ~ /^drivers\/usb\//) return to ~ /^drivers\/(protocol|usb|socket)\// || to == "core/err.h"
+        if (from ~ /^drivers\//) return to ~ /^drivers\/socket\// || to == "core/err.h"
         return to ~ /^(core|drivers|firmware_sim)\//
     }
     /^[ \t]*#[ \t]*include/ {

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "core/analysis/map_private.h"
+#include "core/angle.h"
 
 static double srgb_encode(double linear)
 {
@@ -30,9 +31,8 @@ static void lab_to_srgb(double l, double a, double b, uint8_t rgb[3])
 
 void map_colour(double structure, double height, uint8_t rgb[3])
 {
-    const double deg = 3.14159265358979323846 / 180;
     /* From blue over green and yellow to red, away from the purple that would close the circle. */
-    const double hue_rad = (255 - 205 * height) * deg;
+    const double hue_rad = angle_rad(255 - 205 * height);
     const double lightness = 90 - 70 * structure;
     const double chroma = (12 + 20 * height) * (1 - 0.45 * structure);
     lab_to_srgb(lightness, chroma * cos(hue_rad), chroma * sin(hue_rad), rgb);

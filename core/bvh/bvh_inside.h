@@ -134,7 +134,7 @@ void bvh_mark_rival(struct bvh *bvh, uint32_t prim);
 struct bvh_proposals {
     const struct bvh *bvh;
     uint32_t n;
-    struct vec3_const dir, own; /* origins in the local frame; x NULL: all at o */
+    struct vec3_in dir, own; /* origins in the local frame; x NULL: all at o */
     double o[3];
     const uint32_t *prim;
     const float *u, *v;

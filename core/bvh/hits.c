@@ -96,10 +96,10 @@ static void decide(struct bvh_work *w, struct decide_ray *ray, const struct bvh_
 }
 
 VEC_CLONES
-static void to_local(const struct vec3_const *own, const double origin_m[3], uint32_t n, const struct vec3_arrays *out)
+static void to_local(const struct vec3_in *own, const double origin_m[3], uint32_t n, const struct vec3_out *out)
 {
-    const struct vec3_const p = *own;
-    const struct vec3_arrays o = *out;
+    const struct vec3_in p = *own;
+    const struct vec3_out o = *out;
     const double x = origin_m[0], y = origin_m[1], z = origin_m[2];
     VEC_LOOP
     for (uint32_t i = 0; i < n; i++) {

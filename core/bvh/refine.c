@@ -15,9 +15,9 @@ VEC_INLINE float direction_component(double d)
 }
 
 VEC_CLONES
-void bvh_to_float(const struct vec3_const *dir, uint32_t n, float *restrict x, float *restrict y, float *restrict z)
+void bvh_to_float(const struct vec3_in *dir, uint32_t n, float *restrict x, float *restrict y, float *restrict z)
 {
-    const struct vec3_const d = *dir;
+    const struct vec3_in d = *dir;
     VEC_LOOP
     for (uint32_t i = 0; i < n; i++) {
         x[i] = direction_component(d.x[i]);
@@ -103,7 +103,7 @@ uint32_t bvh_refine(const struct bvh_proposals *p)
 }
 
 VEC_CLONES
-void bvh_cosines(const struct bvh *bvh, const uint32_t *restrict triangle, const struct vec3_const *dir, uint32_t n,
+void bvh_cosines(const struct bvh *bvh, const uint32_t *restrict triangle, const struct vec3_in *dir, uint32_t n,
                  double *restrict cosine)
 {
     const double *tri = (const double *)bvh->triangle, *dx = dir->x, *dy = dir->y, *dz = dir->z;
@@ -119,7 +119,7 @@ void bvh_cosines(const struct bvh *bvh, const uint32_t *restrict triangle, const
 
 float bvh_steep(const struct bvh *bvh, uint32_t prim, const double dir[3])
 {
-    const struct vec3_const one = {&dir[0], &dir[1], &dir[2]};
+    const struct vec3_in one = {&dir[0], &dir[1], &dir[2]};
     double cosine;
     bvh_cosines(bvh, &prim, &one, 1, &cosine);
     return prim < bvh->scene->n_triangles ? (float)(1.0 / (cosine * cosine)) : NAN;

@@ -18,30 +18,16 @@ static int reading_rotation(const struct cast_setup *s, double to_crs[9])
     return linear;
 }
 
-/* The last pose at or before t_ns, or the first. */
-static uint32_t find_knot(const struct cast_setup *s, int64_t t_ns)
-{
-    uint32_t lo = 0, hi = s->n_knots;
-    while (hi - lo > 1) {
-        uint32_t mid = lo + (hi - lo) / 2;
-        if (s->knot[mid].t_ns <= t_ns)
-            lo = mid;
-        else
-            hi = mid;
-    }
-    return lo;
-}
-
 /* Vectors of socs -> prcs, and the places of the head, each by the pose of its own time. */
 struct move {
-    struct vec3_const d, r; /* r.x NULL: only d */
-    struct vec3_arrays to_d, to_r, place;
+    struct vec3_in d, r; /* r.x NULL: only d */
+    struct vec3_out to_d, to_r, place;
 };
 
 /* Stretch by stretch between two poses; times don't fall. */
 static void move(const struct cast_setup *s, int64_t t0_ns, const uint32_t *dt_ns, uint32_t n, const struct move *m)
 {
-    for (uint32_t i = 0, k = find_knot(s, t0_ns + dt_ns[0]); i < n; k++) {
+    for (uint32_t i = 0, k = (uint32_t)pose_find_knot(s->knot, s->n_knots, t0_ns + dt_ns[0]); i < n; k++) {
         int last = k + 1 >= s->n_knots, before = s->knot[k].t_ns > t0_ns + (int64_t)dt_ns[i];
         uint32_t end = i;
         while (end < n && (last || t0_ns + (int64_t)dt_ns[end] < s->knot[before ? k : k + 1].t_ns))
@@ -62,7 +48,7 @@ static void aim_ideal(struct caster *c, struct chunk *k, const struct kernel_tur
     const struct cast_setup *s = k->s;
     const int geo = s->layout == LINE_GEO, moves = s->n_knots != 0;
     const double *rotation = moves ? UNTURNED : s->rotation;
-    const struct vec3_arrays d = moves ? VEC3_OUT(c->socs, 0) : VEC3_OUT(c->d, 0);
+    const struct vec3_out d = moves ? VEC3_OUT(c->socs, 0) : VEC3_OUT(c->d, 0);
     double to_crs[9];
     if (geo) {
         k->linear = !moves && reading_rotation(s, to_crs);
@@ -72,7 +58,7 @@ static void aim_ideal(struct caster *c, struct chunk *k, const struct kernel_tur
         kernel_directions(turns, rotation, &d);
     }
     if (!moves) return;
-    const struct move m = {VEC3_IN(c->socs, 0), geo ? VEC3_IN(c->read, 0) : (struct vec3_const){0}, VEC3_OUT(c->d, 0),
+    const struct move m = {VEC3_IN(c->socs, 0), geo ? VEC3_IN(c->read, 0) : (struct vec3_in){0}, VEC3_OUT(c->d, 0),
                            VEC3_OUT(c->list.e, 0), VEC3_OUT(c->list.p, 0)};
     move(s, k->run->t0_ns, k->dt_ns, k->n, &m);
 }
@@ -89,8 +75,8 @@ static void aim_bent(struct caster *c, struct chunk *k, const struct instrument 
     const struct cast_setup *s = k->s;
     struct echo_list *l = &c->list;
     const int offset = instrument_has_offset(instrument), moves = s->n_knots != 0;
-    const struct vec3_arrays origin = offset ? VEC3_OUT(c->read, 0) : (struct vec3_arrays){0};
-    const struct vec3_const around = offset ? VEC3_IN(c->read, 0) : (struct vec3_const){0};
+    const struct vec3_out origin = offset ? VEC3_OUT(c->read, 0) : (struct vec3_out){0};
+    const struct vec3_in around = offset ? VEC3_IN(c->read, 0) : (struct vec3_in){0};
     const struct instrument_turns turns = {k->pulse0, k->n, l->mirror_turn, l->pan_turn};
     double back[9];
     instrument_aim(instrument, &turns, &VEC3_OUT(c->socs, 0), &origin);
@@ -136,7 +122,7 @@ static void read_part(struct caster *c, const struct chunk *k, uint32_t at, uint
     const struct cast_setup *s = k->s;
     struct echo_list *l = &c->list;
     const struct kernel_turns turns = {n, l->mirror_turn + at, l->pan_turn + at};
-    const struct vec3_arrays socs = VEC3_OUT(c->socs, 0), e = VEC3_OUT(l->e, at);
+    const struct vec3_out socs = VEC3_OUT(c->socs, 0), e = VEC3_OUT(l->e, at);
     double to_crs[9];
     if (s->n_knots == 0) {
         reading_rotation(s, to_crs);

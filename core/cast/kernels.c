@@ -20,11 +20,11 @@ void kernel_angles(const struct schedule_run *run, uint32_t first, uint32_t n, d
 }
 
 VEC_CLONES
-void kernel_directions(const struct kernel_turns *turns, const double m[9], const struct vec3_arrays *out)
+void kernel_directions(const struct kernel_turns *turns, const double m[9], const struct vec3_out *out)
 {
     const double m0 = m[0], m1 = m[1], m2 = m[2], m3 = m[3], m4 = m[4], m5 = m[5], m6 = m[6], m7 = m[7], m8 = m[8];
     const struct kernel_turns t = *turns;
-    const struct vec3_arrays d = *out;
+    const struct vec3_out d = *out;
     VEC_LOOP
     for (uint32_t i = 0; i < t.n; i++) {
         double sm, cm, sp, cp;
@@ -42,7 +42,7 @@ void kernel_directions(const struct kernel_turns *turns, const double m[9], cons
  * 1e-12 for 2^12 counts per turn and more. Ideal encoders have no error. */
 VEC_CLONES
 void kernel_directions_read(const struct cast_setup *setup, const struct kernel_turns *turns, const double m[9],
-                            const double q[9], const struct vec3_arrays *out, const struct vec3_arrays *read)
+                            const double q[9], const struct vec3_out *out, const struct vec3_out *read)
 {
     const double m0 = m[0], m1 = m[1], m2 = m[2], m3 = m[3], m4 = m[4], m5 = m[5], m6 = m[6], m7 = m[7], m8 = m[8];
     const double q0 = q[0], q1 = q[1], q2 = q[2], q3 = q[3], q4 = q[4], q5 = q[5], q6 = q[6], q7 = q[7], q8 = q[8];
@@ -50,7 +50,7 @@ void kernel_directions_read(const struct cast_setup *setup, const struct kernel_
     const double use = mirror_counts >= 4294967296.0 && pan_counts >= 4294967296.0 ? 0.0 : 1.0;
     const double mirror_step = use * VEC_TURN_RAD / mirror_counts, pan_step = use * VEC_TURN_RAD / pan_counts;
     const struct kernel_turns t = *turns;
-    const struct vec3_arrays d = *out, e = *read;
+    const struct vec3_out d = *out, e = *read;
     VEC_LOOP
     for (uint32_t i = 0; i < t.n; i++) {
         double sm, cm, sp, cp;
@@ -73,10 +73,10 @@ void kernel_directions_read(const struct cast_setup *setup, const struct kernel_
 }
 
 VEC_CLONES
-int kernel_meets_sphere(const struct vec3_const *dir, uint32_t n, const double v[3], double radius_m)
+int kernel_meets_sphere(const struct vec3_in *dir, uint32_t n, const double v[3], double radius_m)
 {
     const double x = v[0], y = v[1], z = v[2], v2 = x * x + y * y + z * z, r2 = radius_m * radius_m;
-    const struct vec3_const d = *dir;
+    const struct vec3_in d = *dir;
     uint64_t meets = v2 <= r2;
     for (uint32_t i = 0; i < n; i++) {
         double along = x * d.x[i] + y * d.y[i] + z * d.z[i];
@@ -87,11 +87,11 @@ int kernel_meets_sphere(const struct vec3_const *dir, uint32_t n, const double v
 }
 
 VEC_CLONES
-void kernel_turn_back(const struct vec3_const *from, const double m[9], uint32_t n, const struct vec3_arrays *to)
+void kernel_turn_back(const struct vec3_in *from, const double m[9], uint32_t n, const struct vec3_out *to)
 {
     const double m0 = m[0], m1 = m[1], m2 = m[2], m3 = m[3], m4 = m[4], m5 = m[5], m6 = m[6], m7 = m[7], m8 = m[8];
-    const struct vec3_const d = *from;
-    const struct vec3_arrays e = *to;
+    const struct vec3_in d = *from;
+    const struct vec3_out e = *to;
     VEC_LOOP
     for (uint32_t i = 0; i < n; i++) {
         double x = d.x[i], y = d.y[i], z = d.z[i];
@@ -192,16 +192,16 @@ static uint32_t counts_of(const double *restrict x, double per_unit, uint32_t n,
     return (uint32_t)unfit;
 }
 
-uint32_t kernel_geo(const struct vec3_const *p, const double scale[3], uint32_t n, const struct kernel_wire *out)
+uint32_t kernel_geo(const struct vec3_in *p, const double scale[3], uint32_t n, const struct kernel_wire *out)
 {
     return counts_of(p->x, 1.0 / scale[0], n, out->a) + counts_of(p->y, 1.0 / scale[1], n, out->b) +
            counts_of(p->z, 1.0 / scale[2], n, out->c);
 }
 
 VEC_CLONES
-void kernel_scale(const double *restrict range_m, uint32_t n, const struct vec3_arrays *position)
+void kernel_scale(const double *restrict range_m, uint32_t n, const struct vec3_out *position)
 {
-    const struct vec3_arrays e = *position;
+    const struct vec3_out e = *position;
     VEC_LOOP
     for (uint32_t i = 0; i < n; i++) {
         e.x[i] *= range_m[i];

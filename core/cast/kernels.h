@@ -14,11 +14,11 @@ struct kernel_turns {
     const double *mirror, *pan;
 };
 /* Directions in prcs: rotation times (sin p cos m, cos p cos m, sin m). */
-void kernel_directions(const struct kernel_turns *turns, const double rotation[9], const struct vec3_arrays *d);
+void kernel_directions(const struct kernel_turns *turns, const double rotation[9], const struct vec3_out *d);
 /* The same, and beside it e: the directions as the encoders read them (whole counts), turned by to_crs
  * instead. */
 void kernel_directions_read(const struct cast_setup *setup, const struct kernel_turns *turns, const double rotation[9],
-                            const double to_crs[9], const struct vec3_arrays *d, const struct vec3_arrays *e);
+                            const double to_crs[9], const struct vec3_out *d, const struct vec3_out *e);
 
 /* ---- kernels_moving.c: pulses between two poses of a moving head */
 struct kernel_leg {
@@ -28,19 +28,19 @@ struct kernel_leg {
 };
 void kernel_leg(const struct pose_knot *a, const struct pose_knot *b, int64_t t0_ns, struct kernel_leg *leg);
 /* Directions s (socs) -> d (prcs) of n pulses, dt_ns after the run's t0. */
-void kernel_turn_leg(const struct kernel_leg *leg, const uint32_t *dt_ns, uint32_t n, const struct vec3_const *s,
-                     const struct vec3_arrays *d);
+void kernel_turn_leg(const struct kernel_leg *leg, const uint32_t *dt_ns, uint32_t n, const struct vec3_in *s,
+                     const struct vec3_out *d);
 /* Their origins, prcs. */
-void kernel_place_leg(const struct kernel_leg *leg, const uint32_t *dt_ns, uint32_t n, const struct vec3_arrays *p);
+void kernel_place_leg(const struct kernel_leg *leg, const uint32_t *dt_ns, uint32_t n, const struct vec3_out *p);
 /* p + by. */
-void kernel_shift(const struct vec3_const *p, const double by[3], uint32_t n, const struct vec3_arrays *o);
+void kernel_shift(const struct vec3_in *p, const double by[3], uint32_t n, const struct vec3_out *o);
 /* e * range + p - station. */
-void kernel_scale_from(const double *range_m, const struct vec3_const *p, const double station_m[3], uint32_t n,
-                       const struct vec3_arrays *e);
+void kernel_scale_from(const double *range_m, const struct vec3_in *p, const double station_m[3], uint32_t n,
+                       const struct vec3_out *e);
 /* True when one of the rays may meet the sphere at v (from the rays' origin). */
-int kernel_meets_sphere(const struct vec3_const *d, uint32_t n, const double v[3], double radius_m);
+int kernel_meets_sphere(const struct vec3_in *d, uint32_t n, const double v[3], double radius_m);
 /* Directions turned by the inverse of a rotation. */
-void kernel_turn_back(const struct vec3_const *d, const double rotation[9], uint32_t n, const struct vec3_arrays *e);
+void kernel_turn_back(const struct vec3_in *d, const double rotation[9], uint32_t n, const struct vec3_out *e);
 
 /* NaN for ranges outside of the head's limits. */
 void kernel_limit(double *range_m, double min_m, double max_m, uint32_t n);
@@ -61,8 +61,8 @@ void kernel_polar(const struct cast_setup *setup, const double *range_m, const s
                   const struct kernel_wire *out);
 /* Coordinates in counts of scale[], LINE_XYZ_NONE for NaN and for what doesn't fit. Returns how many
  * coordinates did not. */
-uint32_t kernel_geo(const struct vec3_const *p, const double scale[3], uint32_t n, const struct kernel_wire *out);
-void kernel_scale(const double *range_m, uint32_t n, const struct vec3_arrays *e);
+uint32_t kernel_geo(const struct vec3_in *p, const double scale[3], uint32_t n, const struct kernel_wire *out);
+void kernel_scale(const double *range_m, uint32_t n, const struct vec3_out *e);
 
 /* Firing times after the run's first pulse: j * quot + floor((acc + j * rem) / den). */
 void kernel_times(const struct schedule_run *run, uint32_t *dt_ns);

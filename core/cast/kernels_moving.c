@@ -21,14 +21,14 @@ void kernel_leg(const struct pose_knot *a, const struct pose_knot *b, int64_t t0
 /* Rodrigues' formula about the axis, then the first pose's rotation. */
 VEC_CLONES
 void kernel_turn_leg(const struct kernel_leg *leg, const uint32_t *restrict dt_ns, uint32_t n,
-                     const struct vec3_const *from, const struct vec3_arrays *to)
+                     const struct vec3_in *from, const struct vec3_out *to)
 {
     const double *m = leg->rotation;
     const double m0 = m[0], m1 = m[1], m2 = m[2], m3 = m[3], m4 = m[4], m5 = m[5], m6 = m[6], m7 = m[7], m8 = m[8];
     const double ax = leg->axis[0], ay = leg->axis[1], az = leg->axis[2], turn = leg->turn;
     const double before = leg->before_ns, span = leg->span_ns;
-    const struct vec3_const s = *from;
-    const struct vec3_arrays d = *to;
+    const struct vec3_in s = *from;
+    const struct vec3_out d = *to;
     VEC_LOOP
     for (uint32_t i = 0; i < n; i++) {
         double sine, c, sx = s.x[i], sy = s.y[i], sz = s.z[i];
@@ -44,12 +44,12 @@ void kernel_turn_leg(const struct kernel_leg *leg, const uint32_t *restrict dt_n
 
 VEC_CLONES
 void kernel_place_leg(const struct kernel_leg *leg, const uint32_t *restrict dt_ns, uint32_t n,
-                      const struct vec3_arrays *to)
+                      const struct vec3_out *to)
 {
     const double x = leg->position_m[0], y = leg->position_m[1], z = leg->position_m[2];
     const double vx = leg->shift_m[0], vy = leg->shift_m[1], vz = leg->shift_m[2];
     const double before = leg->before_ns, span = leg->span_ns;
-    const struct vec3_arrays p = *to;
+    const struct vec3_out p = *to;
     VEC_LOOP
     for (uint32_t i = 0; i < n; i++) {
         double f = (before + (double)(int32_t)dt_ns[i]) / span;
@@ -60,11 +60,11 @@ void kernel_place_leg(const struct kernel_leg *leg, const uint32_t *restrict dt_
 }
 
 VEC_CLONES
-void kernel_shift(const struct vec3_const *from, const double by[3], uint32_t n, const struct vec3_arrays *to)
+void kernel_shift(const struct vec3_in *from, const double by[3], uint32_t n, const struct vec3_out *to)
 {
     const double x = by[0], y = by[1], z = by[2];
-    const struct vec3_const p = *from;
-    const struct vec3_arrays o = *to;
+    const struct vec3_in p = *from;
+    const struct vec3_out o = *to;
     VEC_LOOP
     for (uint32_t i = 0; i < n; i++) {
         o.x[i] = p.x[i] + x;
@@ -74,12 +74,12 @@ void kernel_shift(const struct vec3_const *from, const double by[3], uint32_t n,
 }
 
 VEC_CLONES
-void kernel_scale_from(const double *restrict range_m, const struct vec3_const *origin, const double station_m[3],
-                       uint32_t n, const struct vec3_arrays *position)
+void kernel_scale_from(const double *restrict range_m, const struct vec3_in *origin, const double station_m[3],
+                       uint32_t n, const struct vec3_out *position)
 {
     const double x = station_m[0], y = station_m[1], z = station_m[2];
-    const struct vec3_const p = *origin;
-    const struct vec3_arrays e = *position;
+    const struct vec3_in p = *origin;
+    const struct vec3_out e = *position;
     VEC_LOOP
     for (uint32_t i = 0; i < n; i++) {
         e.x[i] = e.x[i] * range_m[i] + (p.x[i] - x);

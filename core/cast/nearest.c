@@ -5,7 +5,7 @@
 #include "core/cast/caster_private.h"
 
 /* How far the origins lie from the first of them. */
-static double spread_m(const struct vec3_const *p, uint32_t n)
+static double spread_m(const struct vec3_in *p, uint32_t n)
 {
     double most2 = 0.0;
     for (uint32_t i = 1; i < n; i++) {

@@ -10,7 +10,7 @@ struct look {
     uint32_t triangle[2048];
 };
 
-static void look(void *ctx, uint32_t n, const struct vec3_const *dir, double *range_m, uint16_t *kind)
+static void look(void *ctx, uint32_t n, const struct vec3_in *dir, double *range_m, uint16_t *kind)
 {
     struct look *l = ctx;
     const struct beam_outlines_spec *spec = l->spec;

@@ -28,7 +28,7 @@ static uint32_t place(struct caster *c, const struct chunk *k, uint32_t at, uint
     const struct cast_setup *s = k->s;
     struct echo_list *l = &c->list;
     const double *range_m = l->range_m + at;
-    const struct vec3_arrays e = VEC3_OUT(l->e, at);
+    const struct vec3_out e = VEC3_OUT(l->e, at);
     if (s->layout != LINE_GEO) {
         kernel_polar(s, range_m, &(struct kernel_turns){n, l->mirror_turn + at, l->pan_turn + at}, out);
         return 0;

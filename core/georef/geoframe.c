@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/angle.h"
 #include "core/locate.h"
 #include "core/mat3.h"
 
@@ -16,7 +17,7 @@ int geoframe_set_tangent(struct geoframe *frame, const double origin_m[3], const
     frame->lon_deg = at->lon_deg;
     frame->height_m = at->height_m;
     frame->north_deg = north_deg;
-    double enu[9], s = sin(north_deg * M_PI / 180.0), c = cos(north_deg * M_PI / 180.0);
+    double enu[9], s = sin(angle_rad(north_deg)), c = cos(angle_rad(north_deg));
     /* north is (s, c) in the scene, east a right angle clockwise from it */
     const double turn[9] = {c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0};
     for (int i = 0; i < 3; i++)
@@ -117,7 +118,7 @@ static int grid_to_enu(const struct geoframe *frame, const struct georef_place *
     int rc = locate_in_grid(at, frame->zone == 0 ? GEOREF_UPS : frame->zone, &utm, err);
     if (rc != SH_OK) return rc;
     /* grid north bears convergence: it is (s, c) in east and north */
-    double s = sin(utm.convergence_deg * M_PI / 180.0), c = cos(utm.convergence_deg * M_PI / 180.0);
+    double s = sin(angle_rad(utm.convergence_deg)), c = cos(angle_rad(utm.convergence_deg));
     const double turn[9] = {c, s, 0.0, -s, c, 0.0, 0.0, 0.0, 1.0};
     memcpy(rotation, turn, sizeof turn);
     return SH_OK;

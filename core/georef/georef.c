@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/angle.h"
 #include "core/georef/geographiclib_shim.h"
 #include "core/georef/private.h"
 #include "core/mat3.h"
@@ -92,8 +93,8 @@ void georef_degrees(const struct georef *georef, double height_m, double *lat_m,
     shim_map_place(georef->map, place);
     shim_ecef(place[0], place[1], place[2], p, rotation);
     *axis_m = hypot(p[0], p[1]);
-    *lat_m = (6399593.626 + fmax(place[2], 0.0) + height_m) * M_PI / 180.0;
-    *lon_m = *axis_m * M_PI / 180.0;
+    *lat_m = angle_rad(6399593.626 + fmax(place[2], 0.0) + height_m);
+    *lon_m = angle_rad(*axis_m);
 }
 
 /* What all depends on that hangs on the centre. */
@@ -260,7 +261,7 @@ void georef_convergence(const struct georef *georef, double *convergence_rad, do
     *scale = 1.0;
     if (!georef_has_map(georef)) return;
     shim_map_convergence(georef->map, convergence_rad, scale);
-    *convergence_rad *= M_PI / 180.0;
+    *convergence_rad = angle_rad(*convergence_rad);
 }
 
 int georef_rotation(const struct georef *georef, double rotation[9])

@@ -6,6 +6,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/angle.h"
 #include "core/georef/polynomial.h"
 #include "core/vecmath.h"
 
@@ -76,7 +77,7 @@ VEC_INLINE double plane5(const double *c, double p, double q)
 #define POLYNOMIAL_ATAN_LEFT (2.0 / 9.0)
 VEC_INLINE double twice_atan_deg(double t)
 {
-    const double deg = 57.29577951308232087;
+    const double deg = angle_deg(1.0);
     double q = t * t;
     return t * (2.0 * deg + q * (-2.0 / 3.0 * deg + q * (2.0 / 5.0 * deg + q * (-2.0 / 7.0 * deg))));
 }

@@ -1,6 +1,7 @@
 /* Counts on the wire: how much of the CRS's unit one is. */
 #include <math.h>
 
+#include "core/angle.h"
 #include "core/georef/private.h"
 
 /* Half a count less than 2^31, for rounding; -2^31 says that there is no point. */
@@ -32,10 +33,10 @@ static void spans(const struct georef *georef, double reach_m, double span[3], d
     double lat_m, lon_m, axis_m;
     georef_degrees(georef, reach_m, &lat_m, &lon_m, &axis_m);
     unit[0] = 1.0 / lat_m;
-    unit[1] = 180.0 / M_PI / (axis_m + reach_m);
+    unit[1] = angle_deg(1.0) / (axis_m + reach_m);
     /* A degree of latitude is at least 110,574 m less 1/57 of the depth; 12 km deep are allowed. */
-    span[0] = reach_m / (110300.0 - reach_m * M_PI / 180.0);
-    span[1] = reach_m < axis_m ? asin(reach_m / axis_m) * 180.0 / M_PI * 1.0001 : 180.0;
+    span[0] = reach_m / (110300.0 - angle_rad(reach_m));
+    span[1] = reach_m < axis_m ? angle_deg(asin(reach_m / axis_m)) * 1.0001 : 180.0;
     if (reach_m > 1e6) span[0] = 180.0;
 }
 

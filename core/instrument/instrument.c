@@ -23,14 +23,14 @@ int instrument_is_ideal(const struct instrument *k)
 }
 
 VEC_CLONES
-static void directions(const struct instrument *k, const struct instrument_turns *turns, const struct vec3_arrays *out)
+static void directions(const struct instrument *k, const struct instrument_turns *turns, const struct vec3_out *out)
 {
     const double st = sin(k->trunnion_rad), ct = cos(k->trunnion_rad), sc = sin(k->collimation_rad);
     const double cc = cos(k->collimation_rad);
     const double mirror_sigma = k->mirror_sigma_rad / VEC_TURN_RAD, pan_sigma = k->pan_sigma_rad / VEC_TURN_RAD;
     const uint64_t mirror_key = k->mirror_key, pan_key = k->pan_key;
     const struct instrument_turns t = *turns;
-    const struct vec3_arrays s = *out;
+    const struct vec3_out s = *out;
     VEC_LOOP
     for (uint32_t i = 0; i < t.n; i++) {
         double sm, cm, sp, cp;
@@ -44,11 +44,11 @@ static void directions(const struct instrument *k, const struct instrument_turns
 }
 
 VEC_CLONES
-static void origins(const struct instrument *k, const struct instrument_turns *turns, const struct vec3_arrays *out)
+static void origins(const struct instrument *k, const struct instrument_turns *turns, const struct vec3_out *out)
 {
     const double right_m = k->mirror_offset_m, ahead_m = k->transit_offset_m;
     const struct instrument_turns t = *turns;
-    const struct vec3_arrays o = *out;
+    const struct vec3_out o = *out;
     VEC_LOOP
     for (uint32_t i = 0; i < t.n; i++) {
         double sp, cp;
@@ -59,8 +59,8 @@ static void origins(const struct instrument *k, const struct instrument_turns *t
     }
 }
 
-void instrument_aim(const struct instrument *k, const struct instrument_turns *turns, const struct vec3_arrays *s,
-                    const struct vec3_arrays *o)
+void instrument_aim(const struct instrument *k, const struct instrument_turns *turns, const struct vec3_out *s,
+                    const struct vec3_out *o)
 {
     directions(k, turns, s);
     if (o->x != NULL) origins(k, turns, o);

@@ -131,3 +131,16 @@ void pose_heading(double heading_rad, double rotation[9])
     for (int i = 0; i < 9; i++)
         rotation[i] += 0.0; /* no negative zeros */
 }
+
+size_t pose_find_knot(const struct pose_knot *knot, size_t n, int64_t t_ns)
+{
+    size_t at = 0, after = n;
+    while (after - at > 1) {
+        size_t mid = at + (after - at) / 2;
+        if (knot[mid].t_ns <= t_ns)
+            at = mid;
+        else
+            after = mid;
+    }
+    return at;
+}

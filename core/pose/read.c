@@ -3,11 +3,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/angle.h"
 #include "core/mat3.h"
 #include "core/pose/csv.h"
 #include "core/pose/trajectory.h"
 
-static const double DEG = M_PI / 180.0;
 static const double STEP_S = 0.02;  /* of the samples that way-points are turned into */
 static const double STEP_M = 0.01;  /* likewise, where that is longer */
 static const double LEG_PARTS = 64; /* of a leg, however short: the curve between two points is a cubic */
@@ -72,7 +72,7 @@ static int take_sample(const struct csv *csv, const struct pose_sample *before, 
         if (fabs(v[PITCH]) > 90.0 || fabs(v[HEADING]) > 1e6 || fabs(v[ROLL]) > 360.0)
             return text_fail(&csv->text, csv->line, SH_EINPUT, err,
                              "an attitude out of range; allowed pitch_deg -90 to 90, roll_deg -360 to 360");
-        pose_from_angles(fmod(v[HEADING], 360.0) * DEG, v[PITCH] * DEG, v[ROLL] * DEG, s->pose.quat);
+        pose_from_angles(angle_rad(fmod(v[HEADING], 360.0)), angle_rad(v[PITCH]), angle_rad(v[ROLL]), s->pose.quat);
     }
     for (int k = X; k <= Z; k++)
         if (fabs(v[k]) > 1e9)

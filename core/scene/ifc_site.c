@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/angle.h"
 #include "core/scene/step.h"
 
 /* Places of attributes in a record, IFC2x3 TC1 and IFC4 ADD2. */
@@ -237,7 +238,7 @@ static int read_north(struct reader *r, struct ifc_site *site)
     if (rc == SH_OK) rc = read_numbers(r, &direction, of[0], 2, 3, north);
     if (rc != SH_OK) return rc;
     if (!(hypot(north[0], north[1]) > 1e-9)) return fail(r, &direction, "a true north without a direction");
-    site->north_deg = atan2(north[0], north[1]) * 180.0 / M_PI;
+    site->north_deg = angle_deg(atan2(north[0], north[1]));
     site->has_north = 1;
     return SH_OK;
 }

@@ -1,4 +1,4 @@
-/* What stands beside the points: attributes of each, sums of each line. */
+/* What comes beside the points: attributes of each, sums of each line. */
 #include <math.h>
 
 #include "drivers/host/host.h"
@@ -9,7 +9,7 @@ int scanhead_has_attributes(const struct scanhead *sh)
     return (sh->descriptor.content & NATIVE_HAS_ATTRIBUTES) != 0;
 }
 
-/* The frame right behind the last points, and about the same. */
+/* The frame that follows the last points directly, and is about the same ones. */
 static int is_of_points(const struct scanhead *sh, const struct scanhead_frame *frame)
 {
     return sh->have_points && frame->seq == sh->points_seq + 1 && frame->pulse0 == sh->of_points.pulse0 &&
@@ -19,8 +19,8 @@ static int is_of_points(const struct scanhead *sh, const struct scanhead_frame *
 int scanhead_attributes(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                         struct scanhead_attribute *attributes, uint32_t max)
 {
-    if (frame->type != SCANHEAD_ATTRIBUTES || frame->payload == NULL || frame->payload != sh->payload)
-        return sh_fail(&sh->err, SCANHEAD_EINPUT, "not the attributes frame that scanhead_next returned last");
+    int rc = host_check_last(sh, frame, SCANHEAD_ATTRIBUTES);
+    if (rc != 0) return rc;
     if (!is_of_points(sh, frame))
         return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: attributes of points that were lost", sh->source.name);
     if (first >= frame->n_points) return 0;
@@ -39,7 +39,7 @@ int scanhead_line_end(struct scanhead *sh, const struct scanhead_frame *frame, s
 {
     struct native_line_end wire;
     if (frame->type != SCANHEAD_LINE_END || frame->payload == NULL)
-        return sh_fail(&sh->err, SCANHEAD_EINPUT, "not a frame of a line's end");
+        return sh_fail(&sh->err, SCANHEAD_EINPUT, "not a line end frame");
     if (native_decode_line_end(frame->payload, frame->payload_len, &wire) != 0)
         return sh_fail(&sh->err, SCANHEAD_EFORMAT, "%s: a line's end that is too short", sh->source.name);
     *end = (struct scanhead_line_end){.scan_frame = wire.frame,

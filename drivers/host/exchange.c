@@ -19,7 +19,7 @@ static int take_items(struct scanhead *sh)
     }
 }
 
-/* A line that came before the command can't be its reply: it answers one that was given up. Frames may arrive
+/* Skips lines that came before the command: they answer commands that were given up. Frames may arrive
  * without end, so this looks at a few buffers only. */
 static int discard_stale(struct scanhead *sh)
 {
@@ -35,7 +35,7 @@ static int discard_stale(struct scanhead *sh)
     return 0;
 }
 
-/* Reads on while it waits to write: a head that is itself waiting to write must not lock up both. */
+/* Reads on while it waits to write. Otherwise a head that itself waits to write would block both sides. */
 static int wait_writable(struct scanhead *sh, int64_t deadline_ns)
 {
     short revents;
@@ -81,7 +81,7 @@ static int check_command(struct scanhead *sh, const char *command, size_t len)
     if (sh->source.is_file)
         return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: a recording takes no commands", sh->source.name);
     if (sh->stuck)
-        return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: half a command went out before; open the head anew",
+        return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: half a command went out before; open the head again",
                        sh->source.name);
     int blank = 1, printable = 1;
     for (size_t i = 0; i < len; i++) {
@@ -103,7 +103,8 @@ static int copy_reply(struct scanhead *sh, char *reply, size_t reply_len)
     return SCANHEAD_OK;
 }
 
-/* What every head answers to *IDN?, and to nothing else: four fields (IEEE 488.2); an error's text is in quotes. */
+/* Whether a line is the answer to *IDN?: four fields (IEEE 488.2). No other answer has three commas without
+ * quotes. */
 static int is_identity(const char *text)
 {
     int commas = 0;
@@ -112,8 +113,8 @@ static int is_identity(const char *text)
     return commas == 3 && strchr(text, '"') == NULL;
 }
 
-/* Passes lines over until every question has its answer. One that was given up may be lost: so once there is an answer,
- * those to the others have ANSWERS_MS. */
+/* Skips lines until every question has its answer. A question that was given up may be lost. So once one
+ * answer is there, the others have ANSWERS_MS to come. */
 static int pass_over(struct scanhead *sh, int64_t deadline_ns)
 {
     int answered = 0;
@@ -135,9 +136,9 @@ static int pass_over(struct scanhead *sh, int64_t deadline_ns)
     return 0;
 }
 
-/* The first exchange on a terminal. Between open() and raw mode the terminal echoes what the head sends, and the head
- * takes it for commands; another program may have left half a line. So that line is ended, and the answers to all that
- * are passed over up to the one to a question of our own. */
+/* The first exchange on a terminal. Between open() and raw mode the terminal echoes what the head sends, and
+ * the head takes it for commands; another program may have left half a line. So that line is ended, and the
+ * answers to all that are passed over up to the one to a question of our own. */
 static int settle(struct scanhead *sh, int64_t deadline_ns)
 {
     static const char question[] = "\n*IDN?\n";

@@ -4,8 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "drivers/protocol/bytes.h"
-
 _Static_assert(SCANHEAD_EINPUT == (int)SH_EINPUT && SCANHEAD_EIO == (int)SH_EIO && SCANHEAD_ENOMEM == (int)SH_ENOMEM &&
                    SCANHEAD_EPERM == (int)SH_EPERM && SCANHEAD_ETIMEOUT == (int)SH_ETIMEOUT &&
                    SCANHEAD_ECLOSED == (int)SH_ECLOSED && SCANHEAD_EFORMAT == (int)SH_EFORMAT &&
@@ -16,8 +14,8 @@ _Static_assert(SCANHEAD_POINTS == (int)NATIVE_POINTS && SCANHEAD_POSES == (int)N
                    SCANHEAD_POSE_NONE == (int)NATIVE_POSE_NONE && SCANHEAD_LOCAL == (int)NATIVE_LOCAL,
                "types, events and flags are those on the wire");
 
-/* A source tried again and again while it isn't there. wrong_too: also when its name is wrong, for it was right once.
- */
+/* Tries to open a source until the deadline while it isn't there. wrong_too: also while its name seems wrong,
+ * because it was right once. */
 static int open_in_time(const char *source, int wrong_too, int64_t deadline_ns, struct host_source *out,
                         struct sh_err *err)
 {
@@ -102,19 +100,6 @@ const char *scanhead_error(const struct scanhead *sh)
     return sh->err.text;
 }
 
-static void read_header(const uint8_t *raw, struct native_header *header)
-{
-    *header = (struct native_header){
-        .type = raw[1],
-        .version = raw[2],
-        .flags = raw[3],
-        .length = le_get32(raw + 4),
-        .seq = le_get32(raw + 8),
-        .payload_crc = le_get32(raw + 12),
-        .t_ns = (int64_t)le_get64(raw + 16),
-    };
-}
-
 static struct host_node *pop(struct scanhead *sh)
 {
     struct host_node *node = sh->first;
@@ -124,12 +109,12 @@ static struct host_node *pop(struct scanhead *sh)
     return node;
 }
 
-/* The oldest goes, but what it says of the stream stays known, and it stays in the hash. */
+/* Drops the oldest frame. What it says of the stream is taken in first, and it stays in the hash. */
 static int drop_oldest(struct scanhead *sh)
 {
     struct host_node *node = pop(sh);
     struct native_header header;
-    read_header(node->raw, &header);
+    native_read_header(node->raw, &header);
     int rc = host_absorb(sh, &header, node->raw + NATIVE_HEADER_LEN);
     sh->dropped++;
     free(node);
@@ -138,7 +123,7 @@ static int drop_oldest(struct scanhead *sh)
 
 int host_keep(struct scanhead *sh)
 {
-    size_t len = NATIVE_HEADER_LEN + (size_t)sh->parser.header.length;
+    size_t len = native_frame_len(sh->parser.frame);
     struct host_node *node = malloc(sizeof *node + len);
     if (node == NULL) return sh_fail(&sh->err, SH_ENOMEM, "no memory to keep a frame of %zu bytes", len);
     node->next = NULL;
@@ -196,7 +181,7 @@ static void fill_event(struct scanhead_frame *frame)
 static int hand_out(struct scanhead *sh, const uint8_t *raw, struct scanhead_frame *frame)
 {
     struct native_header header;
-    read_header(raw, &header);
+    native_read_header(raw, &header);
     int rc = host_absorb(sh, &header, raw + NATIVE_HEADER_LEN);
     if (rc != 0) return rc;
     *frame = (struct scanhead_frame){
@@ -207,13 +192,21 @@ static int hand_out(struct scanhead *sh, const uint8_t *raw, struct scanhead_fra
         .payload = raw + NATIVE_HEADER_LEN,
         .payload_len = header.length,
         .raw = raw,
-        .raw_len = NATIVE_HEADER_LEN + (size_t)header.length,
+        .raw_len = native_frame_len(raw),
     };
     if (header.type == NATIVE_POINTS) fill_points(sh, frame);
     if (header.type == NATIVE_ATTRIBUTES) fill_attributes(frame);
     if (header.type == NATIVE_EVENT) fill_event(frame);
     sh->payload = frame->payload;
     return SCANHEAD_OK;
+}
+
+int host_check_last(struct scanhead *sh, const struct scanhead_frame *frame, enum scanhead_frame_type type)
+{
+    static const char *const name[] = {
+        [SCANHEAD_POINTS] = "points", [SCANHEAD_POSES] = "poses", [SCANHEAD_ATTRIBUTES] = "attributes"};
+    if (frame->type == (int)type && frame->payload != NULL && frame->payload == sh->payload) return 0;
+    return sh_fail(&sh->err, SCANHEAD_EINPUT, "not the %s frame that scanhead_next returned last", name[type]);
 }
 
 int host_gone(struct scanhead *sh)

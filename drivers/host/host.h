@@ -1,4 +1,4 @@
-/* The insides of a scanhead handle, shared by the files of this folder. */
+/* A scanhead handle's own struct and what the files of this folder share. Private to libscanhead. */
 #ifndef DRIVERS_HOST_HOST_H
 #define DRIVERS_HOST_HOST_H
 
@@ -28,7 +28,8 @@ struct host_source_ops {
     /* Bytes moved; 0 from read: the end; -1 with errno: EAGAIN when none can be now. */
     ssize_t (*read)(struct host_source *source, void *to, size_t len);
     ssize_t (*write)(struct host_source *source, const void *data, size_t len);
-    /* poll() for POLLIN and POLLOUT until the deadline (host_deadline_ns): 1, 0 when it is over, -1 with errno. */
+    /* poll() for POLLIN and POLLOUT until the deadline (host_deadline_ns): 1, 0 when it is over, -1 with
+     * errno. */
     int (*wait)(struct host_source *source, short events, int64_t deadline_ns, short *revents);
     void (*close)(struct host_source *source);
 };
@@ -78,12 +79,13 @@ struct scanhead {
 /* Opens what `source` names, non-blocking. */
 int host_source_open(const char *source, struct host_source *out, struct sh_err *err);
 int host_source_is_usb(const char *source);
-/* usb.c: the same for "usb..."; out is zero but for its name. */
+/* usb_transfers.c: the same for "usb..."; out is zero but for its name. */
 int host_usb_open(const char *source, struct host_source *out, struct sh_err *err);
 extern const struct host_source_ops host_fd_ops;
 
-/* usb_watch.c: waits between two tries to open a source. NULL where a source is not on USB, or the system tells nothing
- * of devices that come: then the waits are short. Devices that come after this are not missed. */
+/* usb_watch.c: waits between two tries to open a source. NULL where a source is not on USB, or where the
+ * system does not report devices that come: then the waits are short. Devices that come after this call are
+ * not missed. */
 struct host_usb_watch *host_usb_watch_open(const char *source);
 void host_usb_watch_close(struct host_usb_watch *watch);
 /* rc: why the last try failed. 0: try again, or the deadline is over; -1: a signal came. */
@@ -91,7 +93,7 @@ int host_usb_watch_wait(struct host_usb_watch *watch, int rc, int64_t deadline_n
 
 /* io.c: whether an errno of the source's read or write means that the other side is gone. */
 int host_is_hang_up(const struct scanhead *sh, int error);
-/* What to say where nothing more will come. */
+/* Sets and returns the error for when nothing more will come. */
 int host_gone(struct scanhead *sh);
 
 /* Takes a frame into the state: descriptor, anchor, names, counters, hash. Called once per frame, in stream
@@ -108,6 +110,9 @@ int host_fill(struct scanhead *sh, int64_t deadline_ns);
 
 /* Keeps the frame that the parser is at, for scanhead_next. */
 int host_keep(struct scanhead *sh);
+
+/* SCANHEAD_EINPUT, unless frame is the one that scanhead_next returned last, and of this type. */
+int host_check_last(struct scanhead *sh, const struct scanhead_frame *frame, enum scanhead_frame_type type);
 
 /* poses.c: takes a poses frame in; forgets all (another scan). */
 int host_absorb_poses(struct scanhead *sh, const uint8_t *payload, size_t len);

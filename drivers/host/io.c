@@ -1,4 +1,5 @@
-/* Bytes in: waiting and reading, with deadlines on the monotonic clock; and the sources that are descriptors. */
+/* Bytes in: waiting and reading, with deadlines on the monotonic clock; and the sources that are descriptors.
+ * */
 #include <errno.h>
 #include <poll.h>
 #include <string.h>
@@ -56,7 +57,7 @@ int host_wait(struct scanhead *sh, short events, int64_t deadline_ns, short *rev
         if (n > 0) return 0;
         if (n == 0) return sh_fail(&sh->err, SH_ETIMEOUT, "%s: nothing came in time", sh->source.name);
         if (errno != EINTR) return sh_fail(&sh->err, SH_EIO, "%s: %s", sh->source.name, strerror(errno));
-        /* without a deadline a signal is the only way for the program to get a word in */
+        /* Without a deadline, only a signal gives the program its turn. */
         if (deadline_ns == INT64_MAX) return sh_fail(&sh->err, SH_ETIMEOUT, "%s: a signal came", sh->source.name);
     }
 }

@@ -2,7 +2,6 @@
 #include <math.h>
 
 #include "drivers/host/host.h"
-#include "drivers/protocol/bytes.h"
 
 #define TWO_PI 6.283185307179586476925
 
@@ -30,63 +29,68 @@ static inline void sincos_turns(const struct scanhead *sh, double u, double *s, 
     *c = ck + (ck * cos_r_1 - sk * sin_r);
 }
 
-/* What all layouts share. */
-static inline void common(const uint8_t *rec, int64_t t0_ns, struct scanhead_point *p)
+/* Point i as on the wire; what all layouts share goes to p. */
+static inline struct native_point take(const uint8_t *payload, uint32_t i, int64_t t0_ns, struct scanhead_point *p)
 {
-    uint32_t tail = le_get32(rec + 16);
-    int16_t refl = (int16_t)le_get16(rec + 12);
-    p->label = le_get16(rec + 14);
-    p->t_ns = t0_ns + (int64_t)(tail & 0xffffffu);
-    p->echo = (uint8_t)(tail >> 24 & 15u);
-    p->echo_count = (uint8_t)(tail >> 28);
-    p->reflectance_db = refl == INT16_MIN ? NAN : refl / 100.0;
+    struct native_point w;
+    native_decode_point(payload, i, &w);
+    p->label = w.label;
+    p->t_ns = t0_ns + (int64_t)w.dt_ns;
+    p->echo = w.echo;
+    p->echo_count = w.echo_count;
+    p->reflectance_db = w.refl_cdb == INT16_MIN ? NAN : w.refl_cdb / 100.0;
+    return w;
 }
 
 /* WGS 84, NIMA TR8350.2: geodetic to geocentric. */
 static void geocentric(double lat_deg, double lon_deg, double h, double p[3])
 {
-    const double a = 6378137.0, f = 1 / 298.257223563, e2 = f * (2 - f), rad = TWO_PI / 360;
+    const double a = 6378137.0, f = 1 / 298.257223563, e2 = f * (2 - f), rad = NATIVE_RAD_PER_DEG;
     double s = sin(lat_deg * rad), c = cos(lat_deg * rad), n = a / sqrt(1 - e2 * s * s);
     p[0] = (n + h) * c * cos(lon_deg * rad);
     p[1] = (n + h) * c * sin(lon_deg * rad);
     p[2] = (n * (1 - e2) + h) * s;
 }
 
-static void points_geodetic(const struct scanhead *sh, const uint8_t *rec, int64_t t0_ns, struct scanhead_point *p,
-                            uint32_t n)
+/* What geo points have in common once x, y, z and range_m are set. */
+static inline void end_geo(struct scanhead_point *p)
+{
+    p->mirror_rad = p->pan_rad = NAN;
+    if (p->echo_count == 0) p->x = p->y = p->z = p->range_m = NAN;
+}
+
+static void points_geodetic(const struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
+                            struct scanhead_point *p, uint32_t n)
 {
     const double *anchor = sh->anchor.anchor, *scale = sh->anchor.scale;
     double from[3], to[3];
     geocentric(anchor[0], anchor[1], anchor[2], from);
-    for (const uint8_t *end = rec + (size_t)n * NATIVE_POINT_LEN; rec < end; rec += NATIVE_POINT_LEN, p++) {
-        common(rec, t0_ns, p);
-        p->x = anchor[0] + scale[0] * (int32_t)le_get32(rec);
-        p->y = anchor[1] + scale[1] * (int32_t)le_get32(rec + 4);
-        p->z = anchor[2] + scale[2] * (int32_t)le_get32(rec + 8);
+    for (uint32_t i = first; i < first + n; i++, p++) {
+        const struct native_point w = take(frame->payload, i, frame->scan_t0_ns, p);
+        p->x = anchor[0] + scale[0] * (int32_t)w.a;
+        p->y = anchor[1] + scale[1] * (int32_t)w.b;
+        p->z = anchor[2] + scale[2] * (int32_t)w.c;
         if (p->y > 180) p->y -= 360;
         if (p->y < -180) p->y += 360;
         geocentric(p->x, p->y, p->z, to);
         double dx = to[0] - from[0], dy = to[1] - from[1], dz = to[2] - from[2];
         p->range_m = sqrt(dx * dx + dy * dy + dz * dz);
-        p->mirror_rad = p->pan_rad = NAN;
-        if (p->echo_count == 0) p->x = p->y = p->z = p->range_m = NAN;
+        end_geo(p);
     }
 }
 
-static void points_geo(const struct scanhead *sh, const uint8_t *rec, int64_t t0_ns, struct scanhead_point *p,
-                       uint32_t n)
+static void points_geo(const struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
+                       struct scanhead_point *p, uint32_t n)
 {
     const double *anchor = sh->anchor.anchor, *scale = sh->anchor.scale;
-    for (const uint8_t *end = rec + (size_t)n * NATIVE_POINT_LEN; rec < end; rec += NATIVE_POINT_LEN, p++) {
-        common(rec, t0_ns, p);
-        double dx = scale[0] * (int32_t)le_get32(rec), dy = scale[1] * (int32_t)le_get32(rec + 4),
-               dz = scale[2] * (int32_t)le_get32(rec + 8);
+    for (uint32_t i = first; i < first + n; i++, p++) {
+        const struct native_point w = take(frame->payload, i, frame->scan_t0_ns, p);
+        double dx = scale[0] * (int32_t)w.a, dy = scale[1] * (int32_t)w.b, dz = scale[2] * (int32_t)w.c;
         p->x = anchor[0] + dx;
         p->y = anchor[1] + dy;
         p->z = anchor[2] + dz;
         p->range_m = sh->anchor.moving & NATIVE_MOVING ? NAN : sqrt(dx * dx + dy * dy + dz * dz);
-        p->mirror_rad = p->pan_rad = NAN;
-        if (p->echo_count == 0) p->x = p->y = p->z = p->range_m = NAN;
+        end_geo(p);
     }
 }
 
@@ -97,8 +101,8 @@ static inline double fold(double u, double lo)
     return u - (whole > v ? whole - 1 : whole);
 }
 
-static void points_polar(const struct scanhead *sh, const uint8_t *rec, int64_t t0_ns, struct scanhead_point *p,
-                         uint32_t n)
+static void points_polar(const struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
+                         struct scanhead_point *p, uint32_t n)
 {
     const struct native_descriptor *d = &sh->descriptor;
     /* The mirror angle is given in the turn around the middle of the line, so that it runs through without a
@@ -106,13 +110,13 @@ static void points_polar(const struct scanhead *sh, const uint8_t *rec, int64_t 
     const double lo = ((double)d->line_start_udeg + (double)d->line_stop_udeg) / 720e6 - 0.5;
     const double mirror_turns = 1 / d->mirror_counts_per_turn, pan_turns = 1 / d->pan_counts_per_turn;
     const double scale = d->range_scale_m;
-    for (const uint8_t *end = rec + (size_t)n * NATIVE_POINT_LEN; rec < end; rec += NATIVE_POINT_LEN, p++) {
-        common(rec, t0_ns, p);
-        double mirror = le_get32(rec + 4) * mirror_turns, pan = le_get32(rec + 8) * pan_turns;
+    for (uint32_t i = first; i < first + n; i++, p++) {
+        const struct native_point w = take(frame->payload, i, frame->scan_t0_ns, p);
+        double mirror = w.b * mirror_turns, pan = w.c * pan_turns;
         double sin_m, cos_m, sin_pan, cos_pan;
         sincos_turns(sh, mirror, &sin_m, &cos_m);
         sincos_turns(sh, pan, &sin_pan, &cos_pan);
-        p->range_m = p->echo_count == 0 ? NAN : scale * le_get32(rec);
+        p->range_m = p->echo_count == 0 ? NAN : scale * w.a;
         double flat = p->range_m * cos_m;
         p->x = flat * sin_pan;
         p->y = flat * cos_pan;
@@ -125,20 +129,19 @@ static void points_polar(const struct scanhead *sh, const uint8_t *rec, int64_t 
 int scanhead_points(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                     struct scanhead_point *points, uint32_t max)
 {
-    if (frame->type != SCANHEAD_POINTS || frame->payload == NULL || frame->payload != sh->payload)
-        return sh_fail(&sh->err, SCANHEAD_EINPUT, "not the points frame that scanhead_next returned last");
+    int rc = host_check_last(sh, frame, SCANHEAD_POINTS);
+    if (rc != 0) return rc;
     if (!sh->have_descriptor || !sh->have_anchor)
         return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: points before the descriptor and the anchor of their scan",
                        sh->source.name);
     if (first >= frame->n_points) return 0;
     uint32_t n = frame->n_points - first;
     if (n > max) n = max;
-    const uint8_t *rec = frame->payload + NATIVE_POINTS_HEAD_LEN + (size_t)first * NATIVE_POINT_LEN;
     if (sh->descriptor.layout == NATIVE_GEO && sh->anchor.crs == NATIVE_CRS_GEODETIC)
-        points_geodetic(sh, rec, frame->scan_t0_ns, points, n);
+        points_geodetic(sh, frame, first, points, n);
     else if (sh->descriptor.layout == NATIVE_GEO)
-        points_geo(sh, rec, frame->scan_t0_ns, points, n);
+        points_geo(sh, frame, first, points, n);
     else
-        points_polar(sh, rec, frame->scan_t0_ns, points, n);
+        points_polar(sh, frame, first, points, n);
     return (int)n;
 }

@@ -115,8 +115,8 @@ int scanhead_poses(struct scanhead *sh, const struct scanhead_frame *frame, uint
                    uint32_t max)
 {
     uint32_t n, i = 0;
-    if (frame->type != SCANHEAD_POSES || frame->payload == NULL || frame->payload != sh->payload)
-        return sh_fail(&sh->err, SCANHEAD_EINPUT, "not the poses frame that scanhead_next returned last");
+    int rc = host_check_last(sh, frame, SCANHEAD_POSES);
+    if (rc != 0) return rc;
     if (native_decode_poses(frame->payload, frame->payload_len, &n) != 0) return SCANHEAD_EFORMAT;
     for (; i < max && first + i < n; i++) {
         struct native_pose p;

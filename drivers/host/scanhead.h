@@ -1,9 +1,29 @@
-/* libscanhead: the client side of a scan head. Connect, send commands, iterate frames and points.
+/* libscanhead: the client side of a scan head. It connects, sends commands, and hands out frames and points.
  *
- * The stream is the native protocol (drivers/protocol/PROTOCOL.md). Everything returned by value or into the caller's
- * memory, unless said otherwise. A handle belongs to one thread at a time; different handles are independent.
- * Functions return 0 (or a count) or a negative SCANHEAD_E; scanhead_error() then has one line of text.
- * This header needs no other of the project and is what `make install` installs. */
+ * The stream is the native protocol (drivers/protocol/PROTOCOL.md). `make install` installs this header. It
+ * needs no other header of the project. In ten lines:
+ *
+ *     struct scanhead *sh;
+ *     struct scanhead_frame frame;
+ *     struct scanhead_point point[256];
+ *     char reply[256], err[256];
+ *     if (scanhead_open("tcp:127.0.0.1:5025", &sh, err, sizeof err) != 0) ...
+ *     scanhead_command(sh, "SCAN:START", reply, sizeof reply, 1000);
+ *     while (scanhead_next(sh, &frame, -1) == 0)
+ *         if (frame.type == SCANHEAD_POINTS)
+ *             n = scanhead_points(sh, &frame, 0, point, 256);
+ *     scanhead_close(sh);
+ *
+ * Results: functions return 0, or a count, or a negative SCANHEAD_E; scanhead_error() then has a line of
+ * text.
+ *
+ * Ownership: what a function returns by value or writes into the caller's memory is the caller's. Strings and
+ * payloads are the handle's; how long they live is said with each.
+ *
+ * Threads: a handle belongs to one thread at a time. Different handles are independent.
+ *
+ * Units: names carry them: _m metres, _rad radians, _deg degrees, _ns nanoseconds, _db decibels. NaN: no
+ * value. */
 #ifndef SCANHEAD_H
 #define SCANHEAD_H
 
@@ -19,33 +39,40 @@ extern "C" {
 enum scanhead_error {
     SCANHEAD_OK = 0,
     SCANHEAD_EINPUT = -1, /* a bad argument or source */
-    SCANHEAD_EIO = -2,    /* the operating system said no */
+    SCANHEAD_EIO = -2,    /* the operating system refused */
     SCANHEAD_ENOMEM = -3,
-    SCANHEAD_EPERM = -4,
+    SCANHEAD_EPERM = -4,    /* a permission is missing; the text says which */
     SCANHEAD_ETIMEOUT = -5, /* nothing came in time; call again */
     SCANHEAD_ECLOSED = -6,  /* the head is gone, or the file is at its end */
     SCANHEAD_EFORMAT = -7,  /* not this protocol */
-    SCANHEAD_ESTATE = -8,   /* not possible now, e.g. points before descriptor and anchor were seen */
+    SCANHEAD_ESTATE = -8,   /* not possible now, for instance points before descriptor and anchor have come */
     SCANHEAD_ELOST = -9,    /* the USB head was unplugged, or isn't there */
 };
 
 struct scanhead;
 
-/* source: "usb", "usb:vid:pid", "usb:vid:pid:serial" (the head's own interface, ids in hexadecimal),
- * "tty:/dev/ttyACM0", "tcp:host:port", "fd:N" (taken over), or the path of a raw stream (.shs). On failure *out is NULL
- * and err (may be NULL) gets the reason. */
+/* Opens a head, or a recording of its stream. source is one of:
+ *   "usb", "usb:vid:pid", "usb:vid:pid:serial"   the head's own USB interface; ids in hexadecimal
+ *   "tty:/dev/ttyACM0"                           a serial port or pty
+ *   "tcp:host:port"
+ *   "fd:N"                                       an open descriptor; the handle closes it
+ *   PATH                                         a raw stream (.shs)
+ * On failure *out is NULL, and err (may be NULL) gets the reason. */
 int scanhead_open(const char *source, struct scanhead **out, char *err, size_t err_len);
-/* The same, and while the source isn't there (a head that is not plugged in, a device node without permissions yet)
- * again and again for up to timeout_ms; < 0: for ever. On USB the system's hot-plug events wake it. A wrong source ends
- * it at once, a signal early; it gives the reason of the last try. */
+/* The same, but tries again for up to timeout_ms while the source isn't there: a head that is not plugged in,
+ * a device node without permissions yet. timeout_ms < 0: for ever. On USB the system's hot-plug events wake
+ * it. A wrong source ends it at once, a signal ends it early. err gets the reason of the last try. */
 int scanhead_open_within(const char *source, int timeout_ms, struct scanhead **out, char *err, size_t err_len);
+/* sh may be NULL. */
 void scanhead_close(struct scanhead *sh);
+/* The text of the last error; the handle's, until its next call. */
 const char *scanhead_error(const struct scanhead *sh);
 
-/* After SCANHEAD_ELOST or SCANHEAD_ECLOSED, once all frames that had come were taken: waits until the same head is
- * there again and goes on with it. Counters, hash and what the stream has said go on too: a jump in the sequence tells
- * what was lost meanwhile. A USB head is the one with the same ids and serial number. SCANHEAD_ESTATE for a file or
- * "fd:N"; any other error: it did not come back in time, or a signal came; call again, or close. */
+/* Waits until the same head is there again, and goes on with it. To be called after SCANHEAD_ELOST or
+ * SCANHEAD_ECLOSED, once all frames that had come were taken. Counters, hash and what the stream has said of
+ * itself go on too; a jump in the sequence shows what was lost meanwhile. On USB the same head is the one
+ * with the same ids and serial number. SCANHEAD_ESTATE for a file or "fd:N". Any other error: it did not come
+ * back in time, or a signal came; call again, or close. */
 int scanhead_reattach(struct scanhead *sh, int timeout_ms);
 
 /* Heads on USB now. */
@@ -55,16 +82,19 @@ struct scanhead_usb_head {
     char serial[128], maker[128], product[128]; /* printable; other characters, and backslashes, as \xNN */
     int bus, device;
     double speed_bit_s; /* 0: unknown */
-    char problem[320];  /* why it can't be opened, e.g. no permission; empty: nothing */
+    char problem[320];  /* why it can't be opened, for instance no permission; empty: it can */
 };
-/* How many there are, of which at most max are described; or SCANHEAD_EIO with the reason in err (may be NULL). */
+/* Describes at most max of them. Returns how many there are, or SCANHEAD_EIO with the reason in err (may be
+ * NULL). */
 int scanhead_list_usb(struct scanhead_usb_head *heads, int max, char *err, size_t err_len);
 
-/* Sends one command line and waits for its reply line (without its end). Frames that arrive meanwhile are kept and come
- * from scanhead_next() later; at most 64 MiB of them, then the oldest are dropped and counted (stats.dropped).
+/* Sends one command line and waits for its reply line, which comes without its line end.
+ * Frames that arrive meanwhile are kept, and scanhead_next() gives them later. It keeps at most 64 MiB of
+ * them; then it drops the oldest and counts them (stats.dropped).
  * A reply "ERR n,..." is returned as it is, with SCANHEAD_OK: the command was answered.
- * The first command on a "tty:" is preceded by an empty line and *IDN?, and all reply lines up to the answer to it are
- * passed over: a terminal may have echoed to the head what it sent before the terminal was in raw mode. */
+ * Before the first command on a "tty:" it sends an empty line and *IDN?, and skips all reply lines up to the
+ * answer to that. For until the terminal was in raw mode, it may have echoed to the head what the head sent.
+ * */
 int scanhead_command(struct scanhead *sh, const char *command, char *reply, size_t reply_len, int timeout_ms);
 
 enum scanhead_frame_type { /* as on the wire */
@@ -102,24 +132,26 @@ struct scanhead_frame {
     size_t payload_len;
     const uint8_t *raw; /* the frame as on the wire, header and payload; valid as payload is */
     size_t raw_len;
-    /* SCANHEAD_POINTS; SCANHEAD_ATTRIBUTES, likewise: scan_line, n_points, pulse0 */
+    /* of SCANHEAD_POINTS; of SCANHEAD_ATTRIBUTES scan_line, n_points and pulse0 alone */
     uint32_t scan_frame, scan_line, n_points, n_pulses;
     uint64_t pulse0;
     int64_t scan_t0_ns, line_t0_ns; /* since the scan's start: of pulse0, of the line's first pulse */
-    /* SCANHEAD_EVENT */
+    /* of SCANHEAD_EVENT */
     uint32_t event; /* enum scanhead_event_code */
     uint64_t event_value[3];
     char event_text[96];
 };
 
-/* The next frame, in order. timeout_ms < 0 waits for ever. Frames with a wrong CRC never come out; they are counted. */
+/* The next frame, in order. timeout_ms < 0 waits for ever. Frames with a wrong CRC never come out; they are
+ * counted. */
 int scanhead_next(struct scanhead *sh, struct scanhead_frame *frame, int timeout_ms);
 
 enum { SCANHEAD_NO_LABEL = 0xffff };
 
 struct scanhead_point {
-    double x, y, z;             /* in the stream's CRS (geo; geodetic: degrees of latitude and of longitude
-                                 * within -180..180, metres), or the head's frame SOCS (polar); NaN for an empty shot */
+    /* Geo: in the stream's CRS (geodetic: degrees of latitude, degrees of longitude within -180..180,
+     * metres). Polar: in the head's frame SOCS, metres. NaN for an empty shot. */
+    double x, y, z;
     double range_m;             /* NaN for an empty shot */
     double mirror_rad, pan_rad; /* encoders; NaN in the geo layout */
     double reflectance_db;      /* NaN where not modelled */
@@ -128,10 +160,10 @@ struct scanhead_point {
     uint16_t label;             /* surface, or SCANHEAD_NO_LABEL */
 };
 
-/* Points of the frame that scanhead_next returned last: at most max, from the index `first`. Returns how many, or
- * SCANHEAD_ESTATE before the descriptor and the anchor of the stream were seen. In the geo layout range_m is the
- * distance from the anchor, which is the station: of utm in the grid, of geodetic straight through space on WGS 84; NaN
- * where the head moves. */
+/* Decodes points of the frame that scanhead_next returned last: at most max, from the index `first`. Returns
+ * how many, or SCANHEAD_ESTATE before the descriptor and the anchor of the stream have come. In the geo
+ * layout range_m is the distance from the anchor, which is the station: in utm within the grid, in geodetic
+ * coordinates straight through space on WGS 84. It is NaN where the head moves. */
 int scanhead_points(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                     struct scanhead_point *points, uint32_t max);
 
@@ -140,30 +172,33 @@ struct scanhead_attribute {
     double width_ns;     /* of the echo, full at half maximum; 655.35: that or more; NaN: an empty shot */
 };
 
-/* Attributes of the points of the last frame of SCANHEAD_POINTS: of that frame's point `first` and those behind it, at
- * most max, out of the frame of SCANHEAD_ATTRIBUTES that scanhead_next returned last. Returns how many, or
- * SCANHEAD_ESTATE where these are not the last points' (their own frame, or frames between, were lost). */
+/* Decodes attributes from the frame of SCANHEAD_ATTRIBUTES that scanhead_next returned last: at most max,
+ * from the index `first`. Attribute i belongs to point i of the last frame of SCANHEAD_POINTS. Returns how
+ * many, or SCANHEAD_ESTATE where they are not those of the last points, because frames were lost. */
 int scanhead_attributes(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                         struct scanhead_attribute *attributes, uint32_t max);
-/* 1: the head sends attributes, in a frame of their own directly behind each one of points; 0: it does not;
- * SCANHEAD_ESTATE before the descriptor was seen. */
+/* 1: a frame of attributes follows each frame of points; 0: the head sends none; SCANHEAD_ESTATE before the
+ * descriptor has come. */
 int scanhead_has_attributes(const struct scanhead *sh);
 
 struct scanhead_line_end {
     uint32_t scan_frame, scan_line;
-    uint64_t pulse0;                          /* the line's first pulse in the scan */
-    int64_t t0_ns, t1_ns;                     /* since the scan's start: this line's first pulse, the next one's */
-    uint32_t n_fired, n_cast;                 /* pulses of the whole sweep; of these, not in its blind part */
-    uint32_t n_echoes;                        /* sent; this and the last three are 0 also where parts were lost */
-    uint32_t mirror_count, pan_count, status; /* encoders at its last pulse; 1: last of the frame, 2: stopped within */
-    uint32_t n_crowded;                       /* echoes left out, the weakest: beyond what the head tells of a pulse */
-    uint32_t n_faint;                         /* hits that the head did not detect */
-    uint32_t n_unfit;                         /* echoes too far for the stream's integers: sent as empty shots */
+    uint64_t pulse0;          /* the line's first pulse in the scan */
+    int64_t t0_ns, t1_ns;     /* since the scan's start: this line's first pulse, the next one's */
+    uint32_t n_fired, n_cast; /* pulses of the whole sweep; of these, not in its blind part */
+    uint32_t n_echoes;        /* sent; it and the last three are 0 also where parts were lost */
+    uint32_t mirror_count, pan_count,
+        status;         /* encoders at its last pulse; bit 0: last of the frame, bit 1: stopped within */
+    uint32_t n_crowded; /* echoes left out, the weakest: a pulse had more than the head sends */
+    uint32_t n_faint;   /* hits that the head did not detect */
+    uint32_t n_unfit;   /* echoes too far for the stream's integers: sent as empty shots */
 };
-/* A frame of SCANHEAD_LINE_END, decoded. SCANHEAD_EINPUT for another one, SCANHEAD_EFORMAT for a wrong one. */
+/* Decodes a frame of SCANHEAD_LINE_END. SCANHEAD_EINPUT for another type, SCANHEAD_EFORMAT for a wrong
+ * payload. */
 int scanhead_line_end(struct scanhead *sh, const struct scanhead_frame *frame, struct scanhead_line_end *end);
 
-/* What the stream has said of itself. Strings belong to the handle. 0, or SCANHEAD_ESTATE when not seen yet. */
+/* What the stream has said of itself, by descriptor and anchor. Strings are the handle's, until its next
+ * call. */
 struct scanhead_info {
     const char *idn, *profile;
     int geo;           /* 1: geo layout, 0: polar */
@@ -173,19 +208,22 @@ struct scanhead_info {
     double anchor[3];  /* metres; geodetic: degrees, degrees, metres. Moves along with a head on a trajectory */
     double scale_m;    /* a count on the wire is at most this on the ground */
     double scale[3];   /* units of the CRS per count */
-    double lat_deg, lon_deg, height_m, station_m[3];
-    double rotation[9]; /* socs -> scene frame, row by row */
-    double axes[9];     /* scene frame at the anchor -> axes of the CRS (geodetic: east, north, up), row by row */
+    double lat_deg, lon_deg, height_m; /* the station on WGS 84, ellipsoidal height; 0 where no place is configured */
+    double station_m[3];               /* the station in the scene frame */
+    double rotation[9];                /* head's frame SOCS -> scene frame, row by row */
+    double axes[9]; /* scene frame at the anchor -> axes of the CRS (geodetic: east, north, up), row by row */
     double prr_hz, lines_hz, pan_deg_s, range_min_m, range_max_m;
     uint32_t station, n_surfaces, frames, scan;
     int moving;   /* 1: the head moves; station_m and rotation do not say where it is, poses do */
     int stop;     /* 1: the station is a stop on a trajectory */
     double frame; /* of a stop: frame scalar of the trajectory; else 0 */
 };
+/* SCANHEAD_ESTATE before descriptor and anchor have come. */
 int scanhead_get_info(const struct scanhead *sh, struct scanhead_info *info);
 
-/* Where a moving head was. Between two poses of a frame of SCANHEAD_POSES the position goes along the straight line,
- * and the attitude the shorter way about one fixed axis at constant rate (slerp); the head itself moves just so. */
+/* Where a moving head was. Between two poses of one frame of SCANHEAD_POSES the position goes along the
+ * straight line, and the attitude turns the shorter way about one fixed axis at constant rate (slerp). The
+ * head itself moves so. */
 struct scanhead_pose {
     int64_t t_ns;         /* since the scan's start */
     double position_m[3]; /* scene frame */
@@ -195,31 +233,34 @@ struct scanhead_pose {
 };
 enum scanhead_pose_flags {
     SCANHEAD_POSE_EXTRAPOLATED = 1, /* beyond the last pose that the head had been given */
-    SCANHEAD_POSE_LATE = 2,         /* too far beyond it: the head took itself to stand */
-    SCANHEAD_POSE_NONE = 4,         /* it had not been given any yet */
+    SCANHEAD_POSE_LATE = 2,         /* too long after it: the head assumed that it stands */
+    SCANHEAD_POSE_NONE = 4,         /* the head had not been given any yet */
 };
-/* The pose at a time since the scan's start, of the points that came last or some seconds before. SCANHEAD_ESTATE where
- * the stream has not said it, or the head stands still. */
+/* The pose at t_ns since the scan's start. It is known for the points that came last, and some seconds back.
+ * SCANHEAD_ESTATE where the stream has not said it, or the head stands still. */
 int scanhead_pose(struct scanhead *sh, int64_t t_ns, struct scanhead_pose *pose);
-/* Poses of the frame of SCANHEAD_POSES that scanhead_next returned last: at most max, from the index `first`. */
+/* Decodes poses of the frame of SCANHEAD_POSES that scanhead_next returned last: at most max, from the index
+ * `first`. Returns how many. */
 int scanhead_poses(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first, struct scanhead_pose *poses,
                    uint32_t max);
-/* Points of the polar layout from the head's frame to the scene frame: x, y, z in place, each with the pose of its own
- * time where the head moves. frame (may be NULL): the frame scalar of each, that of the stop where it
- * stands. Returns how many points had no pose, because frames were lost: their coordinates are NaN. A negative error
- * for another layout. */
+/* Takes points of the polar layout from the head's frame to the scene frame: x, y and z in place. Where the
+ * head moves, each point goes with the pose of its own time. frame (may be NULL) gets the frame scalar of
+ * each; where the head stands at a stop, that of the stop. Returns how many points had no pose, because
+ * frames were lost; their coordinates are NaN. SCANHEAD_ESTATE for another layout. */
 int scanhead_to_scene(struct scanhead *sh, struct scanhead_point *points, uint32_t n, double *frame);
 
-/* GPS time of t_ns since the scan's start (scanhead_point.t_ns) by the head's clock, in LAS's adjusted standard form:
- * seconds since 1980-01-06T00:00:00Z without leap seconds, less 1e9. Add 1e9 and divide by 604800 for week and second
- * of week. Good for frames up to the one that scanhead_next returned last: it goes by the last time the head told (at
- * the scan's start and each second; scanhead_frame.event SCAN_START, PPS, TIME), exact to the ns where the head's clock
- * has no drift; a double of that size has steps of 0.12 us. SCANHEAD_ESTATE where the head doesn't know the time, or
- * before it and the scan's start were seen; where the head knows it, it is there with the first points that can be
- * placed. */
+/* GPS time of t_ns since the scan's start (scanhead_point.t_ns) by the head's clock, in LAS's adjusted
+ * standard form: seconds since 1980-01-06T00:00:00Z without leap seconds, less 1e9. Add 1e9 and divide by
+ * 604800 for week and second of week. It is valid for frames up to the one that scanhead_next returned last,
+ * since it counts from the last time that the head reported: at the scan's start and each second (events
+ * SCAN_START, PPS, TIME). It is exact to the nanosecond where the head's clock has no drift; a double of that
+ * size has steps of 0.12 us. SCANHEAD_ESTATE where the head doesn't know the time, or before the time and the
+ * scan's start have come. Where the head knows the time, it comes before the first points that can be placed.
+ * */
 int scanhead_gps_time(const struct scanhead *sh, int64_t t_ns, double *adjusted_standard_gps_time_s);
 
-/* Name of a label: 1 and the two names (owned by the handle), or 0 when not seen yet. */
+/* Name of a label: 1 and the two names (the handle's, until its next call), or 0 when they have not come yet.
+ * */
 int scanhead_surface(const struct scanhead *sh, uint32_t label, const char **object, const char **material);
 
 struct scanhead_stats {
@@ -230,8 +271,8 @@ struct scanhead_stats {
 };
 void scanhead_get_stats(const struct scanhead *sh, struct scanhead_stats *stats);
 
-/* Hash of the stream so far, as PROTOCOL.md defines stream_sha256: 64 hex digits and a NUL. Counting starts with
- * scanhead_hash_start() and costs about a nanosecond per byte. */
+/* Hash of the stream so far, as PROTOCOL.md defines stream_sha256: 64 hex digits and a NUL. Counting starts
+ * with scanhead_hash_start() and costs about a nanosecond per byte. */
 void scanhead_hash_start(struct scanhead *sh);
 void scanhead_hash_hex(const struct scanhead *sh, char hex[65]);
 

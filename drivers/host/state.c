@@ -34,7 +34,7 @@ static int absorb_anchor(struct scanhead *sh, const struct native_header *header
     struct native_anchor a;
     if (native_decode_anchor(payload, header->length, &a) != 0) return bad(sh, "a wrong anchor");
     sh->anchor = a;
-    /* without the descriptor of its scan an anchor can't be told from one of the scan before */
+    /* Without the descriptor of its scan, an anchor may as well be one of the scan before. */
     sh->have_anchor = sh->have_descriptor;
     return 0;
 }
@@ -53,7 +53,7 @@ static int absorb_points(struct scanhead *sh, const struct native_header *header
     if (sh->have_pulse && points.pulse0 < sh->last_pulse0) forget(sh);
     sh->scan_t0_ns = (int64_t)((uint64_t)header->t_ns - (uint64_t)points.t0_ns);
     sh->have_scan_t0 = 1;
-    int64_t until_ns = 1000000 * (int64_t)sh->anchor.until_ms; /* behind it those of an anchor that did not reach us */
+    int64_t until_ns = 1000000 * (int64_t)sh->anchor.until_ms; /* later points have an anchor that did not reach us */
     if (sh->have_anchor && until_ns != 0 && points.t0_ns >= until_ns) sh->have_anchor = 0;
     sh->have_pulse = 1;
     sh->last_pulse0 = points.pulse0;
@@ -221,8 +221,8 @@ int scanhead_get_info(const struct scanhead *sh, struct scanhead_info *info)
 int scanhead_gps_time(const struct scanhead *sh, int64_t t_ns, double *adjusted_standard_gps_time_s)
 {
     if (!sh->have_gps || !sh->have_scan_t0) return SCANHEAD_ESTATE;
-    /* Modulo 2^64, so that a wrong stream can't overflow; seconds and the rest apart, so that only the sum is rounded.
-     */
+    /* Modulo 2^64, so that a wrong stream can't overflow; seconds and the rest apart, so that only the sum is
+     * rounded. */
     uint64_t gps_ns = (uint64_t)sh->gps_ns + ((uint64_t)sh->scan_t0_ns + (uint64_t)t_ns - (uint64_t)sh->gps_at_ns);
     int64_t s = (int64_t)gps_ns / 1000000000, ns = (int64_t)gps_ns % 1000000000;
     *adjusted_standard_gps_time_s = (double)(s - 1000000000) + (double)ns / 1e9;

@@ -69,8 +69,8 @@ static int is_wanted_id(const struct usb_wanted *wanted, const struct libusb_dev
     return (wanted->vid < 0 || wanted->vid == d->idVendor) && (wanted->pid < 0 || wanted->pid == d->idProduct);
 }
 
-/* A device may call itself anything; what goes to terminals and logs is printable, and still tells two devices apart:
- * other characters, and backslashes, as \xNN. What does not fit is left out. */
+/* A device may call itself anything. What goes to terminals and logs is printable and still different for two
+ * devices: other characters, and backslashes, are written as \xNN. What does not fit is left out. */
 static void read_string(libusb_device_handle *handle, uint8_t index, char *text, size_t len)
 {
     unsigned char ascii[128];
@@ -86,11 +86,8 @@ static void read_string(libusb_device_handle *handle, uint8_t index, char *text,
 
 struct search {
     const struct usb_wanted *wanted;
-    libusb_device_handle *handle; /* of the first that is wanted */
-    struct usb_interface interface;
-    char *name;
-    size_t name_len;
-    int n, error; /* how many are wanted; why one could not be opened */
+    struct usb_found *found; /* the first that is wanted */
+    int n, error;            /* how many are wanted; why one could not be opened */
     char others[256];
     char refused[64];
 };
@@ -108,7 +105,7 @@ static void try_device(struct search *s, libusb_device *device)
     struct libusb_device_descriptor d;
     struct usb_interface interface;
     libusb_device_handle *handle;
-    char serial[128], name[160];
+    char serial[128], name[sizeof s->found->name];
     if (libusb_get_device_descriptor(device, &d) != 0 || !is_wanted_id(s->wanted, &d) ||
         !host_usb_interface(device, &interface))
         return;
@@ -130,28 +127,24 @@ static void try_device(struct search *s, libusb_device *device)
         libusb_close(handle);
         return;
     }
-    s->handle = handle;
-    s->interface = interface;
-    snprintf(s->name, s->name_len, "%s", name);
+    *s->found = (struct usb_found){.handle = handle, .interface = interface};
+    snprintf(s->found->name, sizeof s->found->name, "%s", name);
 }
 
-int host_usb_find(libusb_context *ctx, const struct usb_wanted *wanted, libusb_device_handle **handle,
-                  struct usb_interface *interface, char *name, size_t name_len, struct sh_err *err)
+int host_usb_find(libusb_context *ctx, const char *asked, const struct usb_wanted *wanted, struct usb_found *found,
+                  struct sh_err *err)
 {
     libusb_device **list;
-    struct search s = {.wanted = wanted, .name = name, .name_len = name_len};
-    char asked[256];
-    snprintf(asked, sizeof asked, "%s", name);
+    struct search s = {.wanted = wanted, .found = found};
+    *found = (struct usb_found){.handle = NULL};
     ssize_t n = libusb_get_device_list(ctx, &list);
     if (n < 0) return sh_fail(err, SH_EIO, "%s: cannot list USB devices: %s", asked, libusb_strerror((int)n));
     for (ssize_t i = 0; i < n; i++)
         try_device(&s, list[i]);
     libusb_free_device_list(list, 1);
-    *handle = s.handle;
-    *interface = s.interface;
     if (s.n == 1) return SH_OK;
-    *handle = NULL;
-    if (s.handle != NULL) libusb_close(s.handle);
+    if (found->handle != NULL) libusb_close(found->handle);
+    found->handle = NULL;
     if (s.n > 1)
         return sh_fail(err, SH_EINPUT, "%s: %d heads are plugged in; name one of them: %s", asked, s.n, s.others);
     if (s.error == LIBUSB_ERROR_ACCESS) return sh_fail(err, SH_EPERM, "%s: the head %s: " RULE, asked, s.refused);

@@ -1,7 +1,7 @@
 /* The head as a USB device: finding it, and its vendor interface as a source of bytes, over libusb.
  *
- * The vendor interface has class, subclass and protocol FF/53/48 and one bulk pair: the native stream comes in,
- * commands go out. A vendor request to the interface opens and closes the stream session. */
+ * The vendor interface has class, subclass and protocol FF/53/48 and one bulk pair: the native stream comes
+ * in, commands go out. A vendor request to the interface opens and closes the stream session. */
 #ifndef DRIVERS_HOST_USB_INSIDE_H
 #define DRIVERS_HOST_USB_INSIDE_H
 
@@ -17,7 +17,8 @@ enum {
     USB_CONTROL_MS = 1000,
 };
 
-/* What a source asks for: "usb", "usb:vid:pid", "usb:vid:pid:serial", ids in hexadecimal as lsusb prints them. */
+/* What a source asks for: "usb", "usb:vid:pid", "usb:vid:pid:serial", ids in hexadecimal as lsusb prints
+ * them. */
 struct usb_wanted {
     int vid, pid;     /* -1: any */
     char serial[128]; /* empty: any */
@@ -29,12 +30,19 @@ struct usb_interface {
 
 int host_usb_parse(const char *source, struct usb_wanted *wanted, struct sh_err *err);
 
+/* A head that is open. */
+struct usb_found {
+    libusb_device_handle *handle;
+    struct usb_interface interface;
+    char name[160]; /* usb:vid:pid:serial */
+};
+
 /* The vendor interface of a device's active configuration: 1, or 0 where there is none. */
 int host_usb_interface(libusb_device *device, struct usb_interface *interface);
 
-/* Opens the one head that is wanted. SH_ELOST: there is none; SH_EINPUT: there are several; SH_EPERM: with the rule
- * that gives the permission. name: "usb:vid:pid:serial" of what was opened. */
-int host_usb_find(libusb_context *ctx, const struct usb_wanted *wanted, libusb_device_handle **handle,
-                  struct usb_interface *interface, char *name, size_t name_len, struct sh_err *err);
+/* Opens the one head that is wanted; asked: the source as the caller wrote it, for errors. SH_ELOST: there is
+ * none; SH_EINPUT: there are several; SH_EPERM: the text has the rule that gives the permission. */
+int host_usb_find(libusb_context *ctx, const char *asked, const struct usb_wanted *wanted, struct usb_found *found,
+                  struct sh_err *err);
 
 #endif

@@ -1,9 +1,9 @@
 /* Source of bytes: the bulk pair of the head's vendor interface.
  *
- * Several reads are always under way, so that the bus never waits for this program: a ring of transfers, which the
- * kernel completes in order and which are used up and sent off again in order. Nothing runs on a thread of its own:
- * completions are taken in while the caller reads or waits, and between these calls the kernel fills what is under way.
- */
+ * Several reads are always under way, so that the bus never waits for this program: a ring of transfers,
+ * which the kernel completes in order and which are used up and sent off again in order. Nothing runs on a
+ * thread of its own: completions are taken in while the caller reads or waits, and between these calls the
+ * kernel fills what is under way. */
 #include "drivers/host/usb_inside.h"
 
 #include <errno.h>
@@ -13,9 +13,11 @@
 #include <string.h>
 #include <time.h>
 
-/* A read is a multiple of every packet size (64, 512, 1024 bytes): so none can be sent more than it has room for. */
+/* A read is a multiple of every packet size (64, 512, 1024 bytes): so none can be sent more than it has room
+ * for. */
 enum { IN_TRANSFERS = 16, IN_BYTES = 64 << 10, OUT_BYTES = 2048, CANCEL_MS = 1000 };
-/* How long a bus may fail with the device still on it, as it does until the hub has noticed an unplugged one. */
+/* How long a bus may fail with the device still on it, as it does until the hub has noticed an unplugged one.
+ * */
 enum { FAILING_MS = 1000, FAILING_PAUSE_MS = 20, RELAPSE_MS = 10000 };
 
 struct in_transfer {
@@ -33,10 +35,9 @@ struct failing {
 
 struct host_usb {
     libusb_context *ctx;
-    libusb_device_handle *handle;
-    struct usb_interface interface;
+    struct usb_found head;
     struct in_transfer in[IN_TRANSFERS];
-    int n_in, head; /* how many; the one to read from next */
+    int n_in, next; /* how many; the one to read from next */
     struct failing in_failing, out_failing;
     struct libusb_transfer *out;
     int out_flying, out_error; /* errno of the write before */
@@ -124,9 +125,9 @@ static int submit(struct in_transfer *in)
     return rc;
 }
 
-/* An endpoint that stalled or a bus that garbled is started anew. A device that is just being unplugged shows itself
- * first in this way, until the hub has noticed: so the second try and later ones give it a moment. 0: worth another
- * try; ENODEV: the device is gone, or has not let anything through for too long. */
+/* Starts an endpoint again that has stalled, or whose bus has garbled something. A device that is being
+ * unplugged looks the same until the hub has noticed: so the second try and later ones wait a moment. 0:
+ * worth another try; ENODEV: the device is gone, or has not let anything through for too long. */
 static int recover(struct host_usb *usb, struct failing *failing, uint8_t endpoint)
 {
     const struct timespec pause = {.tv_nsec = FAILING_PAUSE_MS * 1000000};
@@ -138,12 +139,13 @@ static int recover(struct host_usb *usb, struct failing *failing, uint8_t endpoi
         return ENODEV;
     else
         nanosleep(&pause, NULL);
-    const int rc = libusb_clear_halt(usb->handle, endpoint);
+    const int rc = libusb_clear_halt(usb->head.handle, endpoint);
     failing->relapse_ns = host_deadline_ns(RELAPSE_MS);
     return rc == LIBUSB_ERROR_NO_DEVICE ? ENODEV : 0;
 }
 
-/* The same for the reads: all are taken back first, and those that failed along with this one need no more. */
+/* The same for the reads: all are taken back first, and those that failed along with this one need no more.
+ * */
 static int recover_reads(struct host_usb *usb)
 {
     cancel_reads(usb);
@@ -153,13 +155,13 @@ static int recover_reads(struct host_usb *usb)
             in->transfer->status = LIBUSB_TRANSFER_CANCELLED;
         if (in->error == EPROTO) in->error = ECANCELED;
     }
-    return recover(usb, &usb->in_failing, usb->interface.in);
+    return recover(usb, &usb->in_failing, usb->head.interface.in);
 }
 
-/* The transfer at hand is used up: sends it off again, and goes on to the next. */
+/* The present transfer is used up: submits it again, and goes on to the next. */
 static int turn(struct host_usb *usb)
 {
-    struct in_transfer *in = &usb->in[usb->head];
+    struct in_transfer *in = &usb->in[usb->next];
     int error = in->error != 0 ? in->error : errno_of_status(in->transfer->status);
     if (in->transfer->actual_length > 0) usb->in_failing.n = 0;
     if (error == EPROTO) error = recover_reads(usb);
@@ -167,7 +169,7 @@ static int turn(struct host_usb *usb)
         in->error = error;
         return error;
     }
-    usb->head = (usb->head + 1) % usb->n_in;
+    usb->next = (usb->next + 1) % usb->n_in;
     submit(in); /* where it fails, that shows when the ring comes round to it */
     return 0;
 }
@@ -177,7 +179,7 @@ static ssize_t usb_read(struct host_source *source, void *to, size_t len)
     struct host_usb *usb = source->usb;
     int looked = 0;
     for (;;) {
-        struct in_transfer *in = &usb->in[usb->head];
+        struct in_transfer *in = &usb->in[usb->next];
         size_t have = in->flying || in->error != 0 ? 0 : (size_t)in->transfer->actual_length - in->used;
         if (have > 0) {
             size_t n = have < len ? have : len;
@@ -199,14 +201,14 @@ static ssize_t usb_read(struct host_source *source, void *to, size_t len)
     }
 }
 
-/* A write that failed is not sent again: the head may have it. Its command gets no reply in time, the next one goes out
- * when the endpoint has been started anew. */
+/* A write that failed is not sent again: the head may have it. Its command gets no reply in time, the next
+ * one goes out when the endpoint has been started again. */
 static ssize_t usb_write(struct host_source *source, const void *data, size_t len)
 {
     struct host_usb *usb = source->usb;
     if (usb->out_flying && handle_events(usb, 0) != 0) return -1;
     int error = usb->out_flying ? EAGAIN : usb->out_error;
-    if (error == EPROTO) error = recover(usb, &usb->out_failing, usb->interface.out);
+    if (error == EPROTO) error = recover(usb, &usb->out_failing, usb->head.interface.out);
     if (error != 0) {
         errno = error;
         return -1;
@@ -228,7 +230,7 @@ static int usb_wait(struct host_source *source, short events, int64_t deadline_n
     for (;;) {
         if (handle_events(usb, left_ns) != 0) return -1;
         *revents = 0;
-        if ((events & POLLIN) && !usb->in[usb->head].flying) *revents |= POLLIN;
+        if ((events & POLLIN) && !usb->in[usb->next].flying) *revents |= POLLIN;
         if ((events & POLLOUT) && !usb->out_flying) *revents |= POLLOUT;
         if (*revents != 0) return 1;
         left_ns = deadline_ns == INT64_MAX ? 60000000000 : deadline_ns - host_deadline_ns(0);
@@ -239,13 +241,13 @@ static int usb_wait(struct host_source *source, short events, int64_t deadline_n
 static int session(struct host_usb *usb, int open)
 {
     return libusb_control_transfer(
-        usb->handle, (uint8_t)LIBUSB_REQUEST_TYPE_VENDOR | LIBUSB_RECIPIENT_INTERFACE | LIBUSB_ENDPOINT_OUT,
-        USB_REQUEST_SESSION, (uint16_t)open, usb->interface.number, NULL, 0, USB_CONTROL_MS);
+        usb->head.handle, (uint8_t)LIBUSB_REQUEST_TYPE_VENDOR | LIBUSB_RECIPIENT_INTERFACE | LIBUSB_ENDPOINT_OUT,
+        USB_REQUEST_SESSION, (uint16_t)open, usb->head.interface.number, NULL, 0, USB_CONTROL_MS);
 }
 
 static void usb_free(struct host_usb *usb)
 {
-    if (usb->handle != NULL) libusb_close(usb->handle); /* forgets transfers that would not end */
+    if (usb->head.handle != NULL) libusb_close(usb->head.handle); /* forgets transfers that would not end */
     for (int i = 0; i < IN_TRANSFERS; i++)
         libusb_free_transfer(usb->in[i].transfer);
     libusb_free_transfer(usb->out);
@@ -260,7 +262,7 @@ static void usb_close(struct host_source *source)
     session(usb, 0);
     cancel_write(usb);
     cancel_reads(usb);
-    libusb_release_interface(usb->handle, usb->interface.number);
+    libusb_release_interface(usb->head.handle, usb->head.interface.number);
     usb_free(usb);
 }
 
@@ -275,11 +277,11 @@ static int make_transfers(struct host_usb *usb, struct sh_err *err)
         usb->in[i].transfer = libusb_alloc_transfer(0);
         missing = usb->in[i].transfer == NULL;
         if (!missing)
-            libusb_fill_bulk_transfer(usb->in[i].transfer, usb->handle, usb->interface.in, usb->in_data + i * IN_BYTES,
-                                      IN_BYTES, in_done, &usb->in[i], 0);
+            libusb_fill_bulk_transfer(usb->in[i].transfer, usb->head.handle, usb->head.interface.in,
+                                      usb->in_data + i * IN_BYTES, IN_BYTES, in_done, &usb->in[i], 0);
     }
     if (missing) return sh_fail(err, SH_ENOMEM, "no memory for USB transfers");
-    libusb_fill_bulk_transfer(usb->out, usb->handle, usb->interface.out, usb->out_data, 0, out_done, usb, 0);
+    libusb_fill_bulk_transfer(usb->out, usb->head.handle, usb->head.interface.out, usb->out_data, 0, out_done, usb, 0);
     return SH_OK;
 }
 
@@ -295,9 +297,10 @@ static int submit_all(struct host_usb *usb, const char *name, struct sh_err *err
 
 static int begin(struct host_usb *usb, const char *name, struct sh_err *err)
 {
-    int rc = libusb_claim_interface(usb->handle, usb->interface.number);
+    int rc = libusb_claim_interface(usb->head.handle, usb->head.interface.number);
     if (rc == LIBUSB_ERROR_BUSY)
-        return sh_fail(err, SH_EIO, "%s: another program has the head's interface %d", name, usb->interface.number);
+        return sh_fail(err, SH_EIO, "%s: another program has the head's interface %d", name,
+                       usb->head.interface.number);
     if (rc == LIBUSB_ERROR_NO_DEVICE) return sh_fail(err, SH_ELOST, "%s: unplugged while it was opened", name);
     if (rc != 0) return sh_fail(err, SH_EIO, "%s: cannot claim the interface: %s", name, libusb_strerror(rc));
     rc = session(usb, 1);
@@ -316,8 +319,8 @@ int host_usb_open(const char *source, struct host_source *out, struct sh_err *er
     if (usb == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a USB source");
     int e = libusb_init(&usb->ctx);
     if (e != 0) rc = sh_fail(err, SH_EIO, "%s: no USB on this system: %s", source, libusb_strerror(e));
-    if (rc == SH_OK)
-        rc = host_usb_find(usb->ctx, &wanted, &usb->handle, &usb->interface, out->name, sizeof out->name, err);
+    if (rc == SH_OK) rc = host_usb_find(usb->ctx, source, &wanted, &usb->head, err);
+    if (rc == SH_OK) snprintf(out->name, sizeof out->name, "%s", usb->head.name);
     if (rc == SH_OK) rc = make_transfers(usb, err);
     if (rc == SH_OK) rc = begin(usb, out->name, err);
     if (rc == SH_OK && (rc = submit_all(usb, out->name, err)) != SH_OK) {

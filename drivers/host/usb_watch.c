@@ -5,8 +5,8 @@
 
 #include "drivers/host/usb_inside.h"
 
-/* No event tells of a permission that comes late, of a configuration that the kernel sets, of another program that lets
- * go: what has just come is looked at often for a while, and everything at times. */
+/* No event reports a permission that comes late, a configuration that the kernel sets, or another program
+ * that lets go. So what has just come is looked at often for a while, and everything once a second. */
 enum { PAUSE_MS = 50, HURRY_MS = 2000, LOOK_MS = 1000 };
 
 struct host_usb_watch {
@@ -22,8 +22,8 @@ static int LIBUSB_CALL on_arrival(libusb_context *ctx, libusb_device *device, li
     return 0;
 }
 
-/* libusb hears of devices from udev, once its rules are through; where no udev runs (a container, a small guest) it
- * hears nothing, and does not know that. */
+/* libusb hears of devices from udev, once its rules are through; where no udev runs (a container, a small
+ * guest) it hears nothing, and does not know that. */
 static int has_events(void)
 {
     return libusb_has_capability(LIBUSB_CAP_HAS_HOTPLUG) && access("/run/udev/control", F_OK) == 0;

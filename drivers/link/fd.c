@@ -7,11 +7,12 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "drivers/link/link_util.h"
+#include "drivers/link/link_poll.h"
+#include "drivers/socket/socket.h"
 
 struct fd_link {
     int fd;
-    int told_opened, told_closed;
+    int reported_opened, reported_closed;
     int ended;
     char name[24];
 };
@@ -37,26 +38,20 @@ static void fd_endpoint(const void *link, char *buf, size_t len)
     snprintf(buf, len, "%s", self->name);
 }
 
-static double fd_capacity(const void *link)
-{
-    (void)link;
-    return 0;
-}
-
 static int fd_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event, int max)
 {
     struct fd_link *self = link;
     struct link_events events = {event, 0, max};
-    if (!self->told_opened) self->told_opened = link_events_push(&events, LINK_OPENED, 0, self->name);
-    struct pollfd fds[2] = {{.fd = wake_fd, .events = POLLIN}, {.fd = self->told_closed ? -1 : self->fd}};
+    if (!self->reported_opened) self->reported_opened = link_events_push(&events, LINK_OPENED, 0, self->name);
+    struct pollfd fds[2] = {{.fd = wake_fd, .events = POLLIN}, {.fd = self->reported_closed ? -1 : self->fd}};
     fds[1].events = (short)(POLLIN | ((want_write & 1u) != 0 ? POLLOUT : 0));
-    int rc = link_wait(fds, 2, events.n > 0 || (self->ended && !self->told_closed) ? 0 : timeout_ms);
+    int rc = link_wait(fds, 2, events.n > 0 || (self->ended && !self->reported_closed) ? 0 : timeout_ms);
     if (rc != SH_OK) return rc;
     link_take_wake(&fds[0], &events);
-    if (self->told_closed) return events.n;
-    if (self->ended || link_stream_ended(self->fd, fds[1].revents)) {
+    if (self->reported_closed) return events.n;
+    if (self->ended || socket_ended(self->fd, fds[1].revents)) {
         self->ended = 1;
-        self->told_closed = link_events_push(&events, LINK_CLOSED, 0, self->name);
+        self->reported_closed = link_events_push(&events, LINK_CLOSED, 0, self->name);
         return events.n;
     }
     if ((fds[1].revents & POLLIN) != 0) link_events_push(&events, LINK_READABLE, 0, NULL);
@@ -74,14 +69,14 @@ static ssize_t fd_read(void *link, int session, void *buf, size_t len)
 {
     struct fd_link *self = link;
     if (session != 0 || self->ended) return SH_ECLOSED;
-    return fd_done(self, link_stream_read(self->fd, buf, len));
+    return fd_done(self, socket_read(self->fd, buf, len));
 }
 
 static ssize_t fd_write(void *link, int session, const void *buf, size_t len)
 {
     struct fd_link *self = link;
     if (session != 0 || self->ended) return SH_ECLOSED;
-    return fd_done(self, link_stream_write(self->fd, buf, len));
+    return fd_done(self, socket_write(self->fd, buf, len));
 }
 
 static void fd_close(void *link)
@@ -95,7 +90,6 @@ const struct link_ops link_fd = {
     .name = "fd",
     .open = fd_open,
     .endpoint = fd_endpoint,
-    .capacity = fd_capacity,
     .poll = fd_poll,
     .read = fd_read,
     .write = fd_write,

@@ -11,11 +11,11 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "drivers/link/link_util.h"
+#include "drivers/link/link_poll.h"
 
 struct file_link {
     int fd;
-    int told_opened, told_closed;
+    int reported_opened, reported_closed;
     int failed; /* errno of the write that failed, 0: none */
     char path[256];
 };
@@ -71,19 +71,13 @@ static void file_endpoint(const void *link, char *buf, size_t len)
     snprintf(buf, len, "file:%s", file->path);
 }
 
-static double file_capacity(const void *link)
-{
-    (void)link;
-    return 0;
-}
-
 static int file_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event, int max)
 {
     struct file_link *file = link;
     struct link_events events = {event, 0, max};
-    if (!file->told_opened) file->told_opened = link_events_push(&events, LINK_OPENED, 0, file->path);
-    if (file->failed != 0 && !file->told_closed)
-        file->told_closed = link_events_push(&events, LINK_CLOSED, 0, strerror(file->failed));
+    if (!file->reported_opened) file->reported_opened = link_events_push(&events, LINK_OPENED, 0, file->path);
+    if (file->failed != 0 && !file->reported_closed)
+        file->reported_closed = link_events_push(&events, LINK_CLOSED, 0, strerror(file->failed));
     return link_poll_sink(wake_fd, (want_write & 1u) != 0 && file->failed == 0, timeout_ms, &events);
 }
 
@@ -117,7 +111,6 @@ const struct link_ops link_file = {
     .name = "file",
     .open = file_open,
     .endpoint = file_endpoint,
-    .capacity = file_capacity,
     .poll = file_poll,
     .read = file_read,
     .write = file_write,

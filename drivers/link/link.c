@@ -1,7 +1,8 @@
-#include <string.h>
+#include "drivers/link/link.h"
 
-#include "drivers/link/link_util.h"
-
+/* The one list of links. A new one is a file of this folder that defines its link_ops, a type in link.h, and
+ * a row here. */
+extern const struct link_ops link_null, link_file, link_pty, link_tcp, link_usb, link_fd;
 static const struct link_ops *const links[] = {
     [LINK_NULL] = &link_null, [LINK_FILE] = &link_file, [LINK_PTY] = &link_pty,
     [LINK_TCP] = &link_tcp,   [LINK_USB] = &link_usb,   [LINK_FD] = &link_fd,
@@ -11,11 +12,4 @@ enum { N_LINKS = sizeof links / sizeof links[0] };
 const struct link_ops *link_ops_get(enum link_type type)
 {
     return (unsigned)type < N_LINKS ? links[type] : NULL;
-}
-
-int link_type_parse(const char *name)
-{
-    for (int type = 0; type < N_LINKS; type++)
-        if (strcmp(links[type]->name, name) == 0) return type;
-    return -1;
 }

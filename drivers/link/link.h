@@ -1,8 +1,9 @@
-/* Links: bytes <-> world. One ops struct, one file each; a link knows nothing of frames.
+/* Links: how bytes of the head get to the world, and back. A link knows nothing of frames or protocols.
  *
- * A link has sessions: readers and commanders that come and go (a pty or a file has one, TCP several, USB two: console
- * and stream). One thread owns a link and makes all calls on it; nothing but poll() waits, and write() of `file` and
- * `null`, which may. */
+ * A kind of link is one file of this folder with one `const struct link_ops`, whose members are the contract;
+ * null.c is the skeleton for a new one, link.c has the list. A link has sessions: readers and commanders that
+ * come and go. A pty or a file has one, TCP several, USB two (console and stream). One thread owns a link and
+ * makes all calls on it. Only poll() waits; write() of `file` may wait for the disk. */
 #ifndef DRIVERS_LINK_LINK_H
 #define DRIVERS_LINK_LINK_H
 
@@ -36,33 +37,34 @@ enum link_event_kind {
     LINK_OPENED,   /* a session began: it will read, and may command */
     LINK_CLOSED,   /* it is gone; what was queued for it is void; its number may be used again */
     LINK_READABLE, /* read() has something */
-    LINK_WRITABLE, /* write() will take something (only for sessions in want_write) */
+    LINK_WRITABLE, /* write() will take something; only for sessions in want_write */
     LINK_WOKEN,    /* wake_fd was signalled; poll has drained it (eventfd) */
     LINK_REFUSED,  /* somebody was turned away: all sessions taken */
-    LINK_NOTICE,   /* who runs the head should know: the text is in peer */
+    LINK_NOTICE,   /* something that whoever runs the head should know: the text is in peer */
 };
 
 struct link_event {
     enum link_event_kind kind;
     int session;    /* 0..max_sessions-1 */
-    char peer[200]; /* for LINK_OPENED, LINK_CLOSED, LINK_REFUSED: who, for the log */
+    char peer[200]; /* of LINK_OPENED, LINK_CLOSED, LINK_REFUSED: the other side's name, for the log */
 };
 
 struct link_ops {
     const char *name;
 
-    /* Opens as spec says, and nothing is left behind when it fails. The text of err names the endpoint. */
+    /* Opens as spec says. When it fails, nothing of it stays. The text of err names the endpoint. */
     int (*open)(const struct link_spec *spec, void **link, struct sh_err *err);
 
     /* The endpoint as a client would name it: "tty:/dev/pts/3", "tcp:127.0.0.1:40123", "file:/x/y". */
     void (*endpoint)(const void *link, char *buf, size_t len);
 
-    /* Largest number of bytes per second this link can carry, 0 where there is no fixed limit. */
+    /* Largest number of bytes per second this link can carry. NULL where there is no fixed limit. */
     double (*capacity)(const void *link);
 
-    /* Waits up to timeout_ms (-1: for ever) and fills at most max events; returns how many, or a negative SH_E.
-     * want_write: bit s set = tell when session s can take bytes. A session whose reader does not read must not
-     * make poll return at once. */
+    /* Waits up to timeout_ms (-1: for ever) and fills in at most max events; returns how many, or a negative
+     * SH_E. want_write: where bit s is set, LINK_WRITABLE is reported when session s can take bytes. A
+     * session whose reader does not read must not make poll return at once. link_poll.h has what all of them
+     * need. */
     int (*poll)(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *events, int max);
 
     /* Never block (except as said above). Bytes moved; 0: none now; SH_ECLOSED: the session is gone (a
@@ -74,9 +76,7 @@ struct link_ops {
     void (*close)(void *link);
 };
 
-/* The only list of links. NULL for an unknown type. */
+/* From the one list of links, in link.c. NULL for an unknown type. */
 const struct link_ops *link_ops_get(enum link_type type);
-/* By name ("pty", "tcp", "file", "null"); -1 when unknown. */
-int link_type_parse(const char *name);
 
 #endif

@@ -2,10 +2,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "drivers/link/link_util.h"
+#include "drivers/link/link_poll.h"
 
 struct null_link {
-    int told_opened;
+    int reported_opened;
 };
 
 static int null_open(const struct link_spec *spec, void **link, struct sh_err *err)
@@ -23,17 +23,11 @@ static void null_endpoint(const void *link, char *buf, size_t len)
     snprintf(buf, len, "null");
 }
 
-static double null_capacity(const void *link)
-{
-    (void)link;
-    return 0;
-}
-
 static int null_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event, int max)
 {
     struct null_link *null = link;
     struct link_events events = {event, 0, max};
-    if (!null->told_opened) null->told_opened = link_events_push(&events, LINK_OPENED, 0, "null");
+    if (!null->reported_opened) null->reported_opened = link_events_push(&events, LINK_OPENED, 0, "null");
     return link_poll_sink(wake_fd, (want_write & 1u) != 0, timeout_ms, &events);
 }
 
@@ -61,7 +55,6 @@ const struct link_ops link_null = {
     .name = "null",
     .open = null_open,
     .endpoint = null_endpoint,
-    .capacity = null_capacity,
     .poll = null_poll,
     .read = null_read,
     .write = null_write,

@@ -112,7 +112,7 @@ int pty_device_open(struct pty_device *device, const char *path, struct sh_err *
     memset(device, 0, sizeof *device);
     const char *name = path[0] != '\0' ? path : "(no symlink)";
     if (pair_open(&device->master, device->slave, sizeof device->slave) != 0)
-        return sh_fail(err, SH_EIO, "link pty:%s: no pseudo terminal to be had: %s", name, strerror(errno));
+        return sh_fail(err, SH_EIO, "link pty:%s: no pseudo terminal: %s", name, strerror(errno));
     int rc = SH_OK;
     if (slave_rest(device) != 0)
         rc = sh_fail(err, SH_EIO, "link pty:%s: %s cannot be set up: %s", name, device->slave, strerror(errno));

@@ -1,4 +1,4 @@
-/* The terminal behind the pty link: the pair, its resting state and the symlink to its slave. Private to the
+/* The terminal of the pty link: the pair, its resting state and the symlink to its slave. Private to the
  * link. */
 #ifndef DRIVERS_LINK_PTY_DEVICE_H
 #define DRIVERS_LINK_PTY_DEVICE_H
@@ -19,7 +19,7 @@ int pty_device_open(struct pty_device *device, const char *path, struct sh_err *
 
 /* Brings the slave back to how a fresh client expects it: raw, nothing to read, no exclusive use, not
  * stopped. To be called while no client has it open. Opens and closes the slave, which inotify sees. A slave
- * that refuses us (a client left TIOCEXCL behind, which only root may undo) is replaced by a new pair under
+ * that refuses us (a client left TIOCEXCL set, which only root may undo) is replaced by a new pair under
  * the same symlink; slave is then another name. SH_EIO when that fails as well. */
 int pty_device_rest(struct pty_device *device);
 

@@ -1,13 +1,14 @@
-/* The usb link: the head as a USB device, with the sessions of its console and its stream (drivers/usb/head_device.h).
+/* The usb link: the head as a USB device, with the sessions of its console and its stream
+ * (drivers/usb/head_device.h).
  *
- * The back end carries out the host's acts one at a time and stops when one has begun or ended a session, until that
- * is told: so nothing can happen twice between two polls. A session that the host has ended is told to be over once
- * what came in it is read. */
+ * The back end carries out the host's acts one at a time. It stops when one has begun or ended a session,
+ * until that has been reported: so nothing can happen twice between two polls. The end of a session is
+ * reported once what came in it has been read. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "drivers/link/link_util.h"
+#include "drivers/link/link_poll.h"
 #include "drivers/usb/backend.h"
 #include "drivers/usb/head_device.h"
 
@@ -15,8 +16,8 @@ struct usb_link {
     struct scanhead_usb head;
     const struct usb_backend_ops *ops;
     void *backend;
-    int told[SCANHEAD_USB_SESSIONS]; /* the caller takes it to be open */
-    const char *news;                /* the back end's, until told */
+    int reported[SCANHEAD_USB_SESSIONS]; /* the caller takes it to be open */
+    const char *news;                    /* the back end's, until reported */
 };
 
 static const char *const session_names[] = {[CONSOLE_SESSION] = "usb console", [STREAM_SESSION] = "usb stream"};
@@ -54,9 +55,9 @@ static void usb_endpoint(const void *link, char *buf, size_t len)
     self->ops->endpoint(self->backend, buf, len);
 }
 
-/* Bulk, in bytes per second. Full speed: 19 packets of 64 bytes in a frame of 1 ms (USB 2.0, table 5-9). High speed:
- * 10 packets of 512 in a microframe of 125 us, which host controllers reach; table 5-10 allows 13 on an otherwise idle
- * bus. Super speed: what USB 3.0, 4.4.11, calls realistic for an application. */
+/* Bulk, in bytes per second. Full speed: 19 packets of 64 bytes in a frame of 1 ms (USB 2.0, table 5-9). High
+ * speed: 10 packets of 512 in a microframe of 125 us, which host controllers reach; table 5-10 allows 13 on
+ * an otherwise idle bus. Super speed: what USB 3.0, 4.4.11, calls realistic for an application. */
 static double usb_capacity(const void *link)
 {
     static const double rate[USB_N_RATES] = {19 * 64 * 1e3, 10 * 512 * 8e3, 400e6};
@@ -75,45 +76,46 @@ static size_t left_over(const struct usb_link *self, int i)
 
 static int is_readable(const struct usb_link *self, int i)
 {
-    if (!self->told[i]) return 0;
+    if (!self->reported[i]) return 0;
     if (!self->head.session[i].open) return left_over(self, i) != 0;
     return usb_device_can_read(self->head.device, self->head.session[i].out, NULL) != 0;
 }
 
 static int is_writable(const struct usb_link *self, int i)
 {
-    return self->told[i] && self->head.session[i].open &&
+    return self->reported[i] && self->head.session[i].open &&
            usb_device_can_write(self->head.device, self->head.session[i].in);
 }
 
-static int has_to_tell(const struct usb_link *self, int i)
+static int has_to_report(const struct usb_link *self, int i)
 {
-    return self->told[i] != self->head.session[i].open;
+    return self->reported[i] != self->head.session[i].open;
 }
 
 static int go_on(void *ctx)
 {
     struct usb_link *self = ctx;
     scanhead_usb_update(&self->head);
-    return !has_to_tell(self, CONSOLE_SESSION) && !has_to_tell(self, STREAM_SESSION);
+    return !has_to_report(self, CONSOLE_SESSION) && !has_to_report(self, STREAM_SESSION);
 }
 
-static void tell(struct usb_link *self, int i, uint32_t want_write, struct link_events *events)
+static void report(struct usb_link *self, int i, uint32_t want_write, struct link_events *events)
 {
     const struct scanhead_usb_session *session = &self->head.session[i];
-    if (self->told[i] && !session->open && !is_readable(self, i))
-        self->told[i] = !link_events_push(events, LINK_CLOSED, i, session_names[i]);
-    if (!self->told[i]) scanhead_usb_ended(&self->head, i);
-    if (!self->told[i] && session->open) self->told[i] = link_events_push(events, LINK_OPENED, i, session_names[i]);
+    if (self->reported[i] && !session->open && !is_readable(self, i))
+        self->reported[i] = !link_events_push(events, LINK_CLOSED, i, session_names[i]);
+    if (!self->reported[i]) scanhead_usb_ended(&self->head, i);
+    if (!self->reported[i] && session->open)
+        self->reported[i] = link_events_push(events, LINK_OPENED, i, session_names[i]);
     if (is_readable(self, i)) link_events_push(events, LINK_READABLE, i, NULL);
     if ((want_write >> i & 1u) != 0 && is_writable(self, i)) link_events_push(events, LINK_WRITABLE, i, NULL);
 }
 
 static int has_news(const struct usb_link *self, uint32_t want_write)
 {
-    int news = self->ops->more(self->backend) || self->news != NULL;
+    int news = (self->ops->more != NULL && self->ops->more(self->backend)) || self->news != NULL;
     for (int i = 0; i < SCANHEAD_USB_SESSIONS; i++)
-        news |= has_to_tell(self, i) || is_readable(self, i) || ((want_write >> i & 1u) != 0 && is_writable(self, i));
+        news |= has_to_report(self, i) || is_readable(self, i) || ((want_write >> i & 1u) != 0 && is_writable(self, i));
     return news;
 }
 
@@ -131,8 +133,8 @@ static int usb_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     scanhead_usb_update(&self->head);
     self->ops->flush(self->backend);
     for (int i = 0; i < SCANHEAD_USB_SESSIONS; i++)
-        tell(self, i, want_write, &events);
-    if (self->news == NULL) self->news = self->ops->news(self->backend);
+        report(self, i, want_write, &events);
+    if (self->news == NULL && self->ops->news != NULL) self->news = self->ops->news(self->backend);
     if (self->news != NULL && link_events_push(&events, LINK_NOTICE, 0, self->news)) self->news = NULL;
     return events.n;
 }
@@ -140,18 +142,18 @@ static int usb_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
 static ssize_t usb_read(void *link, int session, void *buf, size_t len)
 {
     struct usb_link *self = link;
-    if (session < 0 || session >= SCANHEAD_USB_SESSIONS || !self->told[session]) return SH_ECLOSED;
+    if (session < 0 || session >= SCANHEAD_USB_SESSIONS || !self->reported[session]) return SH_ECLOSED;
     if (!is_readable(self, session)) return 0;
     size_t n = usb_device_read(self->head.device, self->head.session[session].out, buf, len);
     self->ops->flush(self->backend);
     return (ssize_t)n;
 }
 
-/* A caller that hears here that the session is over reads no more: what is left is dropped. */
+/* A caller that learns here that the session is over reads no more: what is left is dropped. */
 static ssize_t usb_write(void *link, int session, const void *buf, size_t len)
 {
     struct usb_link *self = link;
-    if (session < 0 || session >= SCANHEAD_USB_SESSIONS || !self->told[session]) return SH_ECLOSED;
+    if (session < 0 || session >= SCANHEAD_USB_SESSIONS || !self->reported[session]) return SH_ECLOSED;
     const struct scanhead_usb_session *s = &self->head.session[session];
     if (s->open) {
         size_t n = usb_device_write(self->head.device, s->in, buf, len);

@@ -15,9 +15,9 @@
     {                                                                                         \
         offsetof(struct type, member), kind, sizeof(((struct type *)0)->member) / UNIT_##kind \
     }
-#define TABLE(rows, type, wire)                                         \
-    {                                                                   \
-        rows, sizeof(rows) / sizeof(rows)[0], wire, sizeof(struct type) \
+#define TABLE(rows, type, wire, frame)                                         \
+    {                                                                          \
+        rows, sizeof(rows) / sizeof(rows)[0], wire, sizeof(struct type), frame \
     }
 
 #define DESC(member, kind) ROW(native_descriptor, member, kind)
@@ -45,6 +45,8 @@ static const struct field descriptor[] = {
     DESC(frames, FIELD_32),
     DESC(scan, FIELD_32),
     DESC(seed, FIELD_64),
+    DESC(content, FIELD_32),
+    DESC(reserved, FIELD_32),
 };
 
 #define ANCHOR(member, kind) ROW(native_anchor, member, kind)
@@ -100,19 +102,23 @@ static const struct field pose[] = {
     POSE(frame, FIELD_REAL), POSE(flags, FIELD_32),        POSE(reserved, FIELD_32),
 };
 
-const struct field_table fields_descriptor = TABLE(descriptor, native_descriptor, 272);
-const struct field_table fields_anchor = TABLE(anchor, native_anchor, 280);
-const struct field_table fields_points = TABLE(points, native_points, NATIVE_POINTS_HEAD_LEN);
-const struct field_table fields_attributes = TABLE(attributes, native_attributes, NATIVE_ATTRIBUTES_HEAD_LEN);
-const struct field_table fields_line_end = TABLE(line_end, native_line_end, 68);
-const struct field_table fields_telemetry = TABLE(telemetry, native_telemetry, 72);
-const struct field_table fields_pose = TABLE(pose, native_pose, NATIVE_POSE_LEN);
-const struct field_table fields_event = TABLE(event, native_event, 128);
+enum { N_CONTENT_FIELDS = 2 };
+const struct field_table fields_descriptor = {descriptor, sizeof descriptor / sizeof descriptor[0] - N_CONTENT_FIELDS,
+                                              272, sizeof(struct native_descriptor), NATIVE_DESCRIPTOR};
+const struct field_table fields_descriptor_content = TABLE(descriptor, native_descriptor, 280, NATIVE_DESCRIPTOR);
+const struct field_table fields_anchor = TABLE(anchor, native_anchor, 280, NATIVE_ANCHOR);
+const struct field_table fields_points = TABLE(points, native_points, NATIVE_POINTS_HEAD_LEN, NATIVE_POINTS);
+const struct field_table fields_attributes =
+    TABLE(attributes, native_attributes, NATIVE_ATTRIBUTES_HEAD_LEN, NATIVE_ATTRIBUTES);
+const struct field_table fields_line_end = TABLE(line_end, native_line_end, 68, NATIVE_LINE_END);
+const struct field_table fields_telemetry = TABLE(telemetry, native_telemetry, 72, NATIVE_TELEMETRY);
+const struct field_table fields_event = TABLE(event, native_event, 128, NATIVE_EVENT);
+const struct field_table fields_pose = TABLE(pose, native_pose, NATIVE_POSE_LEN, NATIVE_POSES);
 
 static size_t encode_field(const struct field *field, const char *from, uint8_t *wire)
 {
     if (field->kind == FIELD_TEXT) {
-        /* zero the rest ourselves: what stands behind the NUL in the struct must not reach the wire */
+        /* The rest is zeroed here: what follows the NUL in the struct must not reach the wire. */
         size_t len = strnlen(from, field->count - 1u);
         memcpy(wire, from, len);
         memset(wire + len, 0, field->count - len);

@@ -1,6 +1,7 @@
-/* Fixed payloads as tables: one row per struct member, in wire order without gaps. The same table encodes and
- * decodes, so the two can't drift apart; PROTOCOL.md gives the resulting offsets and the unit test holds
- * them. */
+/* Payloads of fixed length as tables: a row for each struct member, in wire order without gaps.
+ *
+ * The same table encodes and decodes, so the two can't differ. PROTOCOL.md gives the resulting offsets, and
+ * tests/unit/test_native.c holds them. Pure; any thread; real-time safe. */
 #ifndef DRIVERS_PROTOCOL_FIELDS_H
 #define DRIVERS_PROTOCOL_FIELDS_H
 
@@ -22,16 +23,18 @@ struct field {
 struct field_table {
     const struct field *field;
     size_t n_fields, wire_len, struct_len;
+    uint8_t type; /* enum native_type of the frame it is the payload of, or the beginning of it */
 };
 
-extern const struct field_table fields_descriptor, fields_anchor, fields_points, fields_attributes, fields_line_end,
-    fields_telemetry, fields_event, fields_pose;
+/* The descriptor has two lengths: its last two fields are sent only where content is not 0. */
+extern const struct field_table fields_descriptor, fields_descriptor_content, fields_anchor, fields_points,
+    fields_attributes, fields_line_end, fields_telemetry, fields_event, fields_pose;
 
 /* Writes exactly table->wire_len bytes. */
 void fields_encode(const struct field_table *table, const void *from, uint8_t *wire);
 
-/* 0, or SH_EFORMAT for a payload too short, a text without NUL or a number that is not finite. A payload may
- * be longer than the table: later versions grow at the end. */
+/* 0, or SH_EFORMAT for a payload too short, a text without NUL, or a number that is not finite. Members
+ * without a row become 0. A payload may be longer than the table: later versions grow at the end. */
 int fields_decode(const struct field_table *table, const uint8_t *wire, size_t len, void *to);
 
 #endif

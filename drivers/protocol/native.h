@@ -1,12 +1,16 @@
-/* The native protocol: frames as PROTOCOL.md describes them, byte by byte. Frame constants and the pure parser.
+/* The native protocol for those who read it: bytes of a stream go in, frames, reply lines and their contents
+ * come out.
  *
- * Nothing here does I/O, allocates or keeps global state. All integers are little-endian on the wire.
- * Encoding (line -> bytes) is in native_encode.h, so that a client needs only this header. */
+ * PROTOCOL.md describes the frames byte by byte; the structs here hold the same fields in the same order and
+ * units. native_encode.h is for those who write. Nothing here does I/O, allocates or keeps global state. All
+ * integers are little-endian on the wire. */
 #ifndef DRIVERS_PROTOCOL_NATIVE_H
 #define DRIVERS_PROTOCOL_NATIVE_H
 
 #include <stddef.h>
 #include <stdint.h>
+
+#include "drivers/protocol/bytes.h"
 
 enum {
     NATIVE_SYNC = 0xd5,
@@ -22,6 +26,7 @@ enum {
     NATIVE_MAX_POSES = (NATIVE_MAX_PAYLOAD - NATIVE_POSES_HEAD_LEN) / NATIVE_POSE_LEN,
     NATIVE_ATTRIBUTES_HEAD_LEN = 16,
     NATIVE_ATTRIBUTE_LEN = 4,
+    NATIVE_SURFACES_HEAD_LEN = 8,
     NATIVE_MAX_TEXT = 512, /* longest reply line, with its CR LF */
 };
 
@@ -38,8 +43,8 @@ enum native_type {
 };
 
 enum native_flags {
-    NATIVE_REPEAT = 1 << 0, /* said before (descriptor, anchor): not in the stream hash */
-    NATIVE_LOCAL = 1 << 1,  /* made for this reader only: seq is 0 and not counted */
+    NATIVE_REPEAT = 1 << 0, /* was sent before (descriptor, anchor): not in the stream hash */
+    NATIVE_LOCAL = 1 << 1,  /* made for this reader alone: seq is 0 and not counted */
 };
 
 /* Frame header, 28 bytes:
@@ -52,6 +57,14 @@ struct native_header {
     uint32_t length, seq, payload_crc;
     int64_t t_ns;
 };
+
+/* The header of the whole frame at `frame`. */
+void native_read_header(const uint8_t *frame, struct native_header *header);
+/* Bytes of that frame: header and payload. The one place that knows where its length stands. */
+static inline size_t native_frame_len(const uint8_t *frame)
+{
+    return NATIVE_HEADER_LEN + (size_t)le_get32(frame + 4);
+}
 
 enum native_layout { NATIVE_POLAR = 0, NATIVE_GEO = 1 };
 
@@ -69,10 +82,13 @@ struct native_descriptor {
     double range_min_m, range_max_m;
     uint32_t max_echoes, n_surfaces, frames, scan; /* frames per scan (0: endless); scan number from 1 */
     uint64_t seed;
-    uint32_t content, reserved; /* enum native_content; where it is 0, neither is sent */
+    uint32_t content, reserved; /* enum native_content; where content is 0, neither is sent */
 };
 
 enum native_content { NATIVE_HAS_ATTRIBUTES = 1 }; /* a frame of attributes follows each one of points */
+
+/* Geodetic coordinates and the angles of the descriptor are in degrees. */
+#define NATIVE_RAD_PER_DEG (3.14159265358979323846 / 180.0)
 
 enum native_crs { NATIVE_CRS_LOCAL = 0, NATIVE_CRS_ECEF = 1, NATIVE_CRS_UTM = 2, NATIVE_CRS_GEODETIC = 3 };
 enum native_heights { NATIVE_HEIGHTS_ELLIPSOID = 0, NATIVE_HEIGHTS_GEOID = 1 };
@@ -92,15 +108,15 @@ struct native_anchor {
     double lat_deg, lon_deg, height_m;
     double station_m[3]; /* of the station in the scene frame */
     double rotation[9];  /* socs -> scene frame, row by row: p_prcs = station_m + rotation * p_socs */
-    double scale[3];     /* geo: position = anchor + scale[k] * count[k]; 0, or not there: scale_m */
+    double scale[3];     /* geo: position = anchor + scale[k] * count[k]; 0: scale_m */
     uint32_t heights;    /* enum native_heights, of utm and geodetic */
     uint32_t until_ms;   /* of the scan: for points before that; 0: for all that follow */
     double axes[9]; /* differences in the scene frame at the anchor -> axes of the CRS, row by row, without its scale;
-                       geodetic: -> east, north, up. All 0, or not there: the unit matrix */
+                       geodetic: -> east, north, up. All 0: the unit matrix */
     double frame;   /* at a stop: frame scalar of the trajectory */
 };
 
-struct native_points { /* head of a points payload, 40 bytes, then n points of 20 */
+struct native_points { /* begin of a points payload, 40 bytes; then n points of 20 */
     uint32_t frame, line;
     uint64_t pulse0;
     int64_t t0_ns, line_t0_ns; /* since the scan's start */
@@ -117,9 +133,24 @@ struct native_point {
     uint8_t echo, echo_count; /* both 0: shot without echo */
 };
 
-struct native_attributes { /* head of an attributes payload, 16 bytes, then n attributes of 4 */
+/* Point i < n_points of a checked points payload. Inline, for readers of millions a second. */
+static inline void native_decode_point(const uint8_t *payload, uint32_t i, struct native_point *out)
+{
+    const uint8_t *p = payload + NATIVE_POINTS_HEAD_LEN + (size_t)i * NATIVE_POINT_LEN;
+    uint32_t tail = le_get32(p + 16);
+    out->a = le_get32(p);
+    out->b = le_get32(p + 4);
+    out->c = le_get32(p + 8);
+    out->refl_cdb = (int16_t)le_get16(p + 12);
+    out->label = le_get16(p + 14);
+    out->dt_ns = tail & 0xffffffu;
+    out->echo = (uint8_t)(tail >> 24 & 15u);
+    out->echo_count = (uint8_t)(tail >> 28);
+}
+
+struct native_attributes { /* begin of an attributes payload, 16 bytes; then n attributes of 4 */
     uint64_t pulse0;
-    uint32_t line, n_points; /* all three as in the points frame before */
+    uint32_t line, n_points; /* all three as in the points frame before it */
 };
 
 enum { NATIVE_AMPLITUDE_NONE = INT16_MIN, NATIVE_WIDTH_NONE = 0, NATIVE_WIDTH_MOST = UINT16_MAX };
@@ -181,15 +212,13 @@ struct native_event {
     char text[96];
 };
 
-/* ---- payload decoding: 0, or SH_EFORMAT when length or content is wrong. No pointer is kept. */
+/* ---- decoding payloads: 0, or SH_EFORMAT where length or content is wrong. No pointer is kept. */
 int native_decode_descriptor(const uint8_t *payload, size_t len, struct native_descriptor *out);
 int native_decode_anchor(const uint8_t *payload, size_t len, struct native_anchor *out);
 int native_decode_points(const uint8_t *payload, size_t len, struct native_points *out);
-void native_decode_point(const uint8_t *payload, uint32_t i, struct native_point *out); /* i < n_points */
 int native_decode_attributes(const uint8_t *payload, size_t len, struct native_attributes *out);
 void native_decode_attribute(const uint8_t *payload, uint32_t i, struct native_attribute *out); /* i < n_points */
 int native_decode_line_end(const uint8_t *payload, size_t len, struct native_line_end *out);
-int native_decode_telemetry(const uint8_t *payload, size_t len, struct native_telemetry *out);
 int native_decode_event(const uint8_t *payload, size_t len, struct native_event *out);
 /* Poses payload: u32 n (2 and more), u32 0, then n poses of 80 bytes, their times rising. */
 int native_decode_poses(const uint8_t *payload, size_t len, uint32_t *n);
@@ -201,11 +230,11 @@ int native_decode_surfaces(const uint8_t *payload, size_t len,
 
 /* ---- the parser: bytes in, frames and reply lines out, in order.
  *
- * Usage: native_parser_room() gives where to put the next bytes and how many fit; native_parser_added() says how
- * many came; native_parser_next() then gives items until it returns NATIVE_MORE.
- * Resynchronisation: a sync byte counts only with a correct header CRC; a frame whose payload CRC is wrong is not
- * skipped but searched from its second byte on, so that losing any bytes costs only the frames they belonged to.
- * Text is taken only in step: after garbage, reply lines are ignored until the next good frame. */
+ * native_parser_room() gives a place for the next bytes and its size. native_parser_added() takes how many
+ * came. native_parser_next() then gives items until it returns NATIVE_MORE.
+ * Resynchronisation: a sync byte counts only with a correct header CRC. A frame whose payload CRC is wrong is
+ * not skipped; the search goes on at its second byte. So lost bytes cost only the frames that they belonged
+ * to. Text is taken only in step: after garbage, reply lines are ignored until the next good frame. */
 enum native_item { NATIVE_MORE = 0, NATIVE_FRAME = 1, NATIVE_TEXT = 2 };
 
 struct native_stats {
@@ -231,16 +260,16 @@ void native_parser_init(struct native_parser *parser);
 uint8_t *native_parser_room(struct native_parser *parser, size_t *room); /* room is never 0 after NATIVE_MORE */
 void native_parser_added(struct native_parser *parser, size_t n);
 enum native_item native_parser_next(struct native_parser *parser);
-/* Nothing more will be added: what waits for more bytes is searched as garbage, so that whole frames behind a cut one
- * come out at the end of a recording too. */
+/* Nothing more will be added. What waits for more bytes is then searched as garbage, so that whole frames
+ * after a cut one come out at the end of a recording too. */
 void native_parser_finish(struct native_parser *parser);
-/* After native_parser_finish() and all its items: bytes of another connection to the same head follow. Counters and
- * sequence go on. */
+/* After native_parser_finish() and all its items: bytes of another connection to the same head will follow.
+ * Counters and sequence go on. */
 void native_parser_resume(struct native_parser *parser);
 
-/* 1 if a frame with this header belongs to stream_sha256: the hash runs over u8 type, u32 length (LE) and the payload
- * of each descriptor, anchor, points, line-end, poses and attributes frame that has neither NATIVE_REPEAT nor
- * NATIVE_LOCAL. */
+/* 1 if a frame with this header belongs to stream_sha256: the hash runs over u8 type, u32 length (LE) and the
+ * payload of each descriptor, anchor, points, line-end, poses and attributes frame that has neither
+ * NATIVE_REPEAT nor NATIVE_LOCAL. */
 int native_is_hashed(const struct native_header *header);
 
 #endif

@@ -5,28 +5,17 @@
 #include "drivers/protocol/fields.h"
 #include "drivers/protocol/native.h"
 
-/* The first heads sent no scales by axis, no kind of height and no axes; later ones no frame scalar. */
-enum { ANCHOR_LEN_FIRST = 168, ANCHOR_LEN_AXES = 272, ANCHOR_LEN = 280 };
-/* A descriptor that says nothing of content ends before it. */
-enum { DESCRIPTOR_LEN_CONTENT = 280, DESCRIPTOR_CONTENT_AT = 272 };
-/* Nor did they count what is no echo. */
-enum { LINE_END_LEN_FIRST = 56, LINE_END_LEN = 68 };
-
 int native_decode_descriptor(const uint8_t *payload, size_t len, struct native_descriptor *out)
 {
-    int rc = fields_decode(&fields_descriptor, payload, len, out);
+    const int has_content = len >= fields_descriptor_content.wire_len;
+    int rc = fields_decode(has_content ? &fields_descriptor_content : &fields_descriptor, payload, len, out);
     if (rc == 0 && out->layout != NATIVE_POLAR && out->layout != NATIVE_GEO) rc = SH_EFORMAT;
-    if (rc == 0 && len >= DESCRIPTOR_LEN_CONTENT) out->content = le_get32(payload + DESCRIPTOR_CONTENT_AT);
     return rc;
 }
 
 int native_decode_anchor(const uint8_t *payload, size_t len, struct native_anchor *out)
 {
-    uint8_t whole[ANCHOR_LEN] = {0};
-    if (len < ANCHOR_LEN_FIRST) return SH_EFORMAT;
-    size_t known = len < ANCHOR_LEN_AXES ? ANCHOR_LEN_FIRST : len < ANCHOR_LEN ? ANCHOR_LEN_AXES : ANCHOR_LEN;
-    memcpy(whole, payload, known);
-    int rc = fields_decode(&fields_anchor, whole, sizeof whole, out);
+    int rc = fields_decode(&fields_anchor, payload, len, out);
     if (rc != 0) return rc;
     for (int i = 0; i < 3; i++)
         if (out->scale[i] == 0) out->scale[i] = out->scale_m;
@@ -46,20 +35,6 @@ int native_decode_points(const uint8_t *payload, size_t len, struct native_point
     return rc;
 }
 
-void native_decode_point(const uint8_t *payload, uint32_t i, struct native_point *out)
-{
-    const uint8_t *p = payload + NATIVE_POINTS_HEAD_LEN + (size_t)i * NATIVE_POINT_LEN;
-    uint32_t tail = le_get32(p + 16);
-    out->a = le_get32(p);
-    out->b = le_get32(p + 4);
-    out->c = le_get32(p + 8);
-    out->refl_cdb = (int16_t)le_get16(p + 12);
-    out->label = le_get16(p + 14);
-    out->dt_ns = tail & 0xffffffu;
-    out->echo = (uint8_t)(tail >> 24 & 15u);
-    out->echo_count = (uint8_t)(tail >> 28);
-}
-
 int native_decode_attributes(const uint8_t *payload, size_t len, struct native_attributes *out)
 {
     int rc = fields_decode(&fields_attributes, payload, len, out);
@@ -76,15 +51,7 @@ void native_decode_attribute(const uint8_t *payload, uint32_t i, struct native_a
 
 int native_decode_line_end(const uint8_t *payload, size_t len, struct native_line_end *out)
 {
-    uint8_t whole[LINE_END_LEN] = {0};
-    if (len < LINE_END_LEN_FIRST) return SH_EFORMAT;
-    memcpy(whole, payload, len < LINE_END_LEN ? LINE_END_LEN_FIRST : LINE_END_LEN);
-    return fields_decode(&fields_line_end, whole, sizeof whole, out);
-}
-
-int native_decode_telemetry(const uint8_t *payload, size_t len, struct native_telemetry *out)
-{
-    return fields_decode(&fields_telemetry, payload, len, out);
+    return fields_decode(&fields_line_end, payload, len, out);
 }
 
 int native_decode_event(const uint8_t *payload, size_t len, struct native_event *out)
@@ -115,7 +82,7 @@ void native_decode_pose(const uint8_t *payload, uint32_t i, struct native_pose *
     fields_decode(&fields_pose, payload + NATIVE_POSES_HEAD_LEN + (size_t)i * NATIVE_POSE_LEN, NATIVE_POSE_LEN, out);
 }
 
-/* One name at *at: copies it with a NUL and moves *at behind it. */
+/* Copies the name at *at with a NUL, and moves *at to what follows it. */
 static int take_name(const uint8_t *payload, size_t len, size_t *at, char name[256])
 {
     if (*at >= len) return SH_EFORMAT;
@@ -130,12 +97,12 @@ static int take_name(const uint8_t *payload, size_t len, size_t *at, char name[2
 int native_decode_surfaces(const uint8_t *payload, size_t len,
                            void (*fn)(void *ctx, uint32_t label, const char *object, const char *material), void *ctx)
 {
-    if (len < 8) return SH_EFORMAT;
+    if (len < NATIVE_SURFACES_HEAD_LEN) return SH_EFORMAT;
     uint32_t first = le_get32(payload), count = le_get32(payload + 4);
     if (count > 0xffff || first > 0xffff - count) return SH_EFORMAT;
-    /* twice, so that a payload that is wrong somewhere has no effect at all */
+    /* Twice: a payload that is wrong somewhere has no effect at all. */
     for (int pass = 0; pass < 2; pass++) {
-        size_t at = 8;
+        size_t at = NATIVE_SURFACES_HEAD_LEN;
         for (uint32_t i = 0; i < count; i++) {
             char object[256], material[256];
             int rc = take_name(payload, len, &at, object);
@@ -145,6 +112,19 @@ int native_decode_surfaces(const uint8_t *payload, size_t len,
         }
     }
     return 0;
+}
+
+void native_read_header(const uint8_t *frame, struct native_header *header)
+{
+    *header = (struct native_header){
+        .type = frame[1],
+        .version = frame[2],
+        .flags = frame[3],
+        .length = le_get32(frame + 4),
+        .seq = le_get32(frame + 8),
+        .payload_crc = le_get32(frame + 12),
+        .t_ns = (int64_t)le_get64(frame + 16),
+    };
 }
 
 int native_is_hashed(const struct native_header *header)

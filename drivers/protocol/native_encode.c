@@ -23,40 +23,36 @@ size_t native_seal(uint8_t *frame, uint32_t seq)
 {
     le_put32(frame + 8, seq);
     le_put32(frame + 24, crc32c(0, frame, 24));
-    return NATIVE_HEADER_LEN + (size_t)le_get32(frame + 4);
+    return native_frame_len(frame);
 }
 
-static size_t encode_fixed(uint8_t *dst, size_t cap, enum native_type type, const struct field_table *table,
-                           const void *from, int64_t t_ns, int flags)
+static size_t encode_fixed(uint8_t *dst, size_t cap, const struct field_table *table, const void *from, int64_t t_ns,
+                           int flags)
 {
     if (cap < NATIVE_HEADER_LEN + table->wire_len) return 0;
     fields_encode(table, from, dst + NATIVE_HEADER_LEN);
-    return put_header(dst, type, flags, table->wire_len, t_ns);
+    return put_header(dst, (enum native_type)table->type, flags, table->wire_len, t_ns);
 }
 
 size_t native_encode_descriptor(uint8_t *dst, size_t cap, const struct native_descriptor *d, int64_t t_ns, int flags)
 {
-    size_t len = fields_descriptor.wire_len;
-    if (d->content == 0) return encode_fixed(dst, cap, NATIVE_DESCRIPTOR, &fields_descriptor, d, t_ns, flags);
-    if (cap < NATIVE_HEADER_LEN + len + 8) return 0;
-    fields_encode(&fields_descriptor, d, dst + NATIVE_HEADER_LEN);
-    le_put64(dst + NATIVE_HEADER_LEN + len, d->content);
-    return put_header(dst, NATIVE_DESCRIPTOR, flags, len + 8, t_ns);
+    const struct field_table *table = d->content != 0 ? &fields_descriptor_content : &fields_descriptor;
+    return encode_fixed(dst, cap, table, d, t_ns, flags);
 }
 
 size_t native_encode_anchor(uint8_t *dst, size_t cap, const struct native_anchor *a, int64_t t_ns, int flags)
 {
-    return encode_fixed(dst, cap, NATIVE_ANCHOR, &fields_anchor, a, t_ns, flags);
+    return encode_fixed(dst, cap, &fields_anchor, a, t_ns, flags);
 }
 
 size_t native_encode_telemetry(uint8_t *dst, size_t cap, const struct native_telemetry *t, int64_t t_ns, int flags)
 {
-    return encode_fixed(dst, cap, NATIVE_TELEMETRY, &fields_telemetry, t, t_ns, flags);
+    return encode_fixed(dst, cap, &fields_telemetry, t, t_ns, flags);
 }
 
 size_t native_encode_event(uint8_t *dst, size_t cap, const struct native_event *e, int64_t t_ns, int flags)
 {
-    return encode_fixed(dst, cap, NATIVE_EVENT, &fields_event, e, t_ns, flags);
+    return encode_fixed(dst, cap, &fields_event, e, t_ns, flags);
 }
 
 size_t native_encode_line_end(uint8_t *dst, size_t cap, const struct line_end *end, int64_t scan_t0_ns)
@@ -77,7 +73,7 @@ size_t native_encode_line_end(uint8_t *dst, size_t cap, const struct line_end *e
         .n_faint = end->n_faint,
         .n_unfit = end->n_unfit,
     };
-    return encode_fixed(dst, cap, NATIVE_LINE_END, &fields_line_end, &wire, scan_t0_ns + end->t1_ns, 0);
+    return encode_fixed(dst, cap, &fields_line_end, &wire, scan_t0_ns + end->t1_ns, 0);
 }
 
 size_t native_encode_poses(uint8_t *dst, size_t cap, const struct native_pose *pose, uint32_t n, int64_t t_ns,
@@ -158,8 +154,8 @@ static uint32_t count_pulses(const uint8_t *echo, uint32_t n)
     return pulses;
 }
 
-/* Attributes of the block's entries first .. first + n, which the frame with this head has gone out with. 0: no room.
- */
+/* Attributes of the block's entries first .. first + n, which the frame with this head has gone out with. 0:
+ * no room. */
 static size_t put_attributes(uint8_t *dst, size_t cap, const struct line_block *block, uint32_t first,
                              const struct native_points *points, int64_t t_ns)
 {
@@ -218,29 +214,27 @@ static size_t put_name(uint8_t *dst, size_t room, const char *name)
     return len + 1;
 }
 
-size_t native_encode_surfaces(uint8_t *dst, size_t cap, uint32_t first, uint32_t n, size_t max_payload,
-                              void (*name)(void *ctx, uint32_t label, const char **object, const char **material),
-                              void *ctx, int64_t t_ns, int flags, uint32_t *n_done)
+size_t native_encode_surfaces(uint8_t *dst, size_t cap, size_t max_payload, struct native_names *names, int64_t t_ns)
 {
-    *n_done = 0;
-    if (cap < NATIVE_HEADER_LEN + 8 || max_payload < 8) return 0;
+    if (cap < NATIVE_HEADER_LEN + NATIVE_SURFACES_HEAD_LEN || max_payload < NATIVE_SURFACES_HEAD_LEN) return 0;
     if (max_payload > NATIVE_MAX_PAYLOAD) max_payload = NATIVE_MAX_PAYLOAD;
     if (max_payload > cap - NATIVE_HEADER_LEN) max_payload = cap - NATIVE_HEADER_LEN;
     uint8_t *payload = dst + NATIVE_HEADER_LEN;
-    size_t len = 8;
+    size_t len = NATIVE_SURFACES_HEAD_LEN;
     uint32_t i;
-    for (i = 0; i < n; i++) {
+    for (i = 0; i < names->n; i++) {
         const char *object, *material;
-        name(ctx, first + i, &object, &material);
+        names->name(names->ctx, names->first + i, &object, &material);
         size_t n_object = put_name(payload + len, max_payload - len, object);
         if (n_object == 0) break;
         size_t n_material = put_name(payload + len + n_object, max_payload - len - n_object, material);
         if (n_material == 0) break;
         len += n_object + n_material;
     }
-    if (i == 0 && n > 0) return 0;
-    le_put32(payload, first);
+    if (i == 0 && names->n > 0) return 0;
+    le_put32(payload, names->first);
     le_put32(payload + 4, i);
-    *n_done = i;
-    return put_header(dst, NATIVE_SURFACES, flags, len, t_ns);
+    names->first += i;
+    names->n -= i;
+    return put_header(dst, NATIVE_SURFACES, 0, len, t_ns);
 }

@@ -45,17 +45,6 @@ void native_parser_resume(struct native_parser *parser)
     parser->in_step = 1;
 }
 
-static void read_header(const uint8_t *frame, struct native_header *header)
-{
-    header->type = frame[1];
-    header->version = frame[2];
-    header->flags = frame[3];
-    header->length = le_get32(frame + 4);
-    header->seq = le_get32(frame + 8);
-    header->payload_crc = le_get32(frame + 12);
-    header->t_ns = (int64_t)le_get64(frame + 16);
-}
-
 static enum look look_frame(struct native_parser *parser)
 {
     const uint8_t *frame = parser->buf + parser->start;
@@ -63,7 +52,7 @@ static enum look look_frame(struct native_parser *parser)
     if (have < NATIVE_HEADER_LEN) return LOOK_WAIT;
     if (crc32c(0, frame, 24) != le_get32(frame + 24)) return LOOK_BAD;
     struct native_header header;
-    read_header(frame, &header);
+    native_read_header(frame, &header);
     if (header.length > NATIVE_MAX_PAYLOAD) return LOOK_BAD;
     if (have - NATIVE_HEADER_LEN < header.length) return LOOK_WAIT;
     if (crc32c(0, frame + NATIVE_HEADER_LEN, header.length) != header.payload_crc) {
@@ -82,7 +71,7 @@ static void count_seq(struct native_parser *parser)
     uint32_t missing = parser->header.seq - parser->next_seq;
     if (parser->have_seq && missing != 0) {
         parser->stats.seq_gaps++;
-        /* a jump back is a head that began anew: nobody knows how many frames are missing */
+        /* A jump back is a head that has started again. How many frames are missing is not known. */
         if (missing < UINT32_C(0x80000000)) parser->stats.seq_lost += missing;
     }
     parser->next_seq = parser->header.seq + 1;
@@ -91,7 +80,7 @@ static void count_seq(struct native_parser *parser)
 
 static enum native_item take_frame(struct native_parser *parser)
 {
-    parser->start += NATIVE_HEADER_LEN + (size_t)parser->header.length;
+    parser->start += native_frame_len(parser->frame);
     parser->in_step = 1;
     parser->stats.frames++;
     count_seq(parser);

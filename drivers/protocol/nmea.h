@@ -1,10 +1,11 @@
-/* A GNSS fix -> NMEA 0183 sentences. Pure; writes only into dst; allocates nothing; real-time safe.
+/* A GNSS fix goes in, NMEA 0183 sentences (versions 2.3 to 4.0) come out.
  *
- * Sentences as NMEA 0183 has them from 2.3 to 4.0: "$" talker and type, fields with commas between, "*" and the XOR of
- * all characters between the two as two upper-case hex digits, CR LF. Two things go beyond the standard, as they do
- * with survey receivers: minutes have 7 decimals (a step is 0.19 mm) and heights 4, so that a GGA may be longer than 82
- * characters. A field that isn't known is empty; without a fix (quality 0) all of the position is.
- * Each function returns the length of the sentence with its end (and a NUL behind), or 0 when cap is too small. */
+ * A sentence is "$", talker and type, fields with commas between, "*", the XOR of all characters between "$"
+ * and "*" as two upper-case hex digits, CR LF. As with survey receivers, minutes have 7 decimals (a step is
+ * 0.19 mm) and heights 4. So a GGA may be longer than the 82 characters of the standard. A field that isn't
+ * known is empty; without a fix (quality 0) these are all fields of the position.
+ * Each function returns the length of the sentence with its end, and ends it by a NUL; 0 when cap is too
+ * small. Pure; writes only into dst; allocates nothing; real-time safe. */
 #ifndef DRIVERS_PROTOCOL_NMEA_H
 #define DRIVERS_PROTOCOL_NMEA_H
 

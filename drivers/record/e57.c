@@ -1,21 +1,21 @@
-/* .e57: ASTM E2807, one data3D per scan: points in the head's frame as counts of the stream's scale, and the pose that
- * takes them to the recording's frame (station_pose.h). Intensity is the reflectance in dB; row and column are shot and
- * line. The label is a field of an extension, which readers pass over that don't know it.
+/* .e57: ASTM E2807, one data3D per scan: points in the head's frame as counts of the stream's scale, and the
+ * pose that takes them to the recording's frame (station_pose.h). Intensity is the reflectance in dB; row and
+ * column are shot and line. The label is a field of an extension, which readers pass over that don't know it.
  *
- * A binary section is a header and packets; in a packet each field has a stream of its own, of as many bits per record
- * as its range needs. All packets but the last hold a number of records that is a multiple of 8, so that no stream of
- * bits runs across packets. The XML section, which tells where all is, comes last, then headers are written over. */
+ * A binary section is a header and packets; in a packet each field has a stream of its own, of as many bits
+ * per record as its range needs. All packets but the last hold a number of records that is a multiple of 8,
+ * so that no stream of bits runs across packets. The XML section, which says where everything is, comes last;
+ * then headers are written over. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "drivers/record/e57_pages.h"
-#include "drivers/record/e57_xml.h"
-#include "drivers/record/recorder_list.h"
-#include "drivers/record/track.h"
 #include "drivers/protocol/bytes.h"
 #include "drivers/protocol/crc32c.h"
+#include "drivers/record/e57_pages.h"
+#include "drivers/record/e57_xml.h"
+#include "drivers/record/recorder.h"
 
 enum {
     FILE_HEADER_LEN = 48,
@@ -28,33 +28,22 @@ enum stream { X, Y, Z, INVALID, INTENSITY, NO_INTENSITY, TIME, RETURN, RETURNS, 
 static const unsigned stream_bits[N_STREAMS] = {32, 32, 32, 2, 16, 1, 64, 4, 4, 32, 32, 16};
 
 struct e57 {
-    struct outfile file;
+    struct recorder base;
     struct e57_pages pages;
-    struct track track;
     struct e57_facts facts;
-    struct e57_scan *scan; /* the one at hand */
-    const struct sh_report *report;
-    unsigned n; /* records in the streams */
+    struct e57_scan *scan; /* the present one */
+    unsigned n;            /* records in the streams */
     uint8_t stream[N_STREAMS][PACKET_RECORDS * 8];
     uint8_t packet[PACKET_MAX];
 };
 
-static int e57_open(const char *path, const struct recorder_options *options, void **rec, struct sh_err *err)
+static int e57_begin(void *rec, struct sh_err *err)
 {
     static const uint8_t blank[FILE_HEADER_LEN];
-    struct e57 *e = calloc(1, sizeof *e);
-    if (e == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);
-    int rc = outfile_open(&e->file, path, err);
-    if (rc != 0) {
-        free(e);
-        return rc;
-    }
-    e->facts.empty_shots = options->empty_shots;
-    e->report = options->report;
-    e->track.path = e->file.path;
-    e->pages.file = &e->file;
-    *rec = e;
-    return e57_put(&e->pages, blank, sizeof blank, err); /* into the buffer: does not fail */
+    struct e57 *e = rec;
+    e->facts.empty_shots = e->base.options.empty_shots;
+    e->pages.file = &e->base.file;
+    return e57_put(&e->pages, blank, sizeof blank, err);
 }
 
 static int has_stream(const struct e57 *e, int s)
@@ -104,37 +93,38 @@ static int end_scan(struct e57 *e, struct sh_err *err)
 
 static void set_start(struct e57 *e)
 {
-    e->scan->have_start = scanhead_gps_time(e->track.sh, 0, &e->scan->start_gps_s) == 0;
-    e->scan->start_gps_s += 1e9; /* adjusted time is that much less */
+    double *s = &e->scan->start_gps_s;
+    e->scan->have_start = track_start_gps(&e->base.track, s);
+    /* A time that is not known is not written. It is part of the scan's guid all the same, with this value.
+     * */
+    if (!e->scan->have_start) *s += 1e9;
 }
 
 static int begin_scan(void *rec, struct sh_err *err)
 {
     static const uint8_t blank[SECTION_HEADER_LEN];
     struct e57 *e = rec;
-    const struct scanhead_info *info = &e->track.info;
+    const struct scanhead_info *info = &e->base.track.info;
     int rc = end_scan(e, err);
     if (rc != 0) return rc;
-    rc = track_check_metres(&e->track, err);
-    if (rc != 0) return rc;
     if (!(info->scale_m > 0))
-        return sh_fail(err, SH_EFORMAT, "%s: the stream's scale is %g m; an E57 file needs one above 0", e->file.path,
-                       info->scale_m);
+        return sh_fail(err, SH_EFORMAT, "%s: the stream's scale is %g m; an E57 file needs one above 0",
+                       e->base.file.path, info->scale_m);
     struct e57_scan *more = realloc(e->facts.scan, (e->facts.n_scans + 1) * sizeof *more);
-    if (more == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory for another scan", e->file.path);
+    if (more == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory for another scan", e->base.file.path);
     e->facts.scan = more;
     e->scan = &more[e->facts.n_scans++];
     memset(e->scan, 0, sizeof *e->scan);
     e->scan->section = e57_logical(&e->pages);
     e->scan->number = e->facts.n_scans;
     e->scan->station = info->station;
-    e->scan->pose = e->track.pose;
-    e->scan->scale_m = e->track.scale_m;
+    e->scan->pose = e->base.track.pose;
+    e->scan->scale_m = e->base.track.scale_m;
     snprintf(e->scan->idn, sizeof e->scan->idn, "%s", info->idn);
     snprintf(e->scan->profile, sizeof e->scan->profile, "%s", info->profile);
     set_start(e);
-    e->facts.epsg = track_epsg(&e->track);
-    e->facts.geoid_heights = track_is_geoid(&e->track);
+    e->facts.epsg = track_epsg(&e->base.track);
+    e->facts.geoid_heights = track_is_geoid(&e->base.track);
     return e57_put(&e->pages, blank, sizeof blank, err);
 }
 
@@ -157,7 +147,7 @@ static int put_xyz(struct e57 *e, const double p[3], struct sh_err *err)
                 err, SH_EFORMAT,
                 "%s: a point at (%.3f %.3f %.3f) from the head is beyond the %.0f m of 32 bits in steps of %g "
                 "m; give the head a coarser output.scale_m",
-                e->file.path, p[0], p[1], p[2], 2147483647 * s->scale_m, s->scale_m);
+                e->base.file.path, p[0], p[1], p[2], 2147483647 * s->scale_m, s->scale_m);
         n[i] = (int32_t)counts;
     }
     for (int i = 0; i < 3; i++) {
@@ -179,7 +169,7 @@ static int put_place(struct e57 *e, const struct scanhead_point *point, struct s
             le_put32(e->stream[X + i] + 4 * (size_t)e->n, 0x80000000u);
         return 0;
     }
-    if (e->track.info.geo) station_pose_reverse(&e->track.pose, p);
+    if (e->base.track.info.geo) station_pose_reverse(&e->base.track.pose, p);
     return put_xyz(e, p, err);
 }
 
@@ -203,13 +193,13 @@ static void put_index(struct e57 *e, const struct scanhead_point *p, uint32_t ro
     int first = s->n_records == 0 && e->n == 0;
     if (first || row < s->row_min) s->row_min = row;
     if (first || row > s->row_max) s->row_max = row;
-    if (first || e->track.line < s->column_min) s->column_min = e->track.line;
-    if (first || e->track.line > s->column_max) s->column_max = e->track.line;
+    if (first || e->base.track.line < s->column_min) s->column_min = e->base.track.line;
+    if (first || e->base.track.line > s->column_max) s->column_max = e->base.track.line;
     if (number > s->return_max) s->return_max = number;
     put_bits(e->stream[RETURN], 4, e->n, number);
     put_bits(e->stream[RETURNS], 4, e->n, p->echo_count);
     le_put32(e->stream[ROW] + 4 * (size_t)e->n, row);
-    le_put32(e->stream[COLUMN] + 4 * (size_t)e->n, e->track.line);
+    le_put32(e->stream[COLUMN] + 4 * (size_t)e->n, e->base.track.line);
 }
 
 static int e57_points(void *rec, int n, struct sh_err *err)
@@ -217,25 +207,18 @@ static int e57_points(void *rec, int n, struct sh_err *err)
     struct e57 *e = rec;
     if (!e->scan->have_start) set_start(e); /* the time may come late */
     for (int i = 0; i < n; i++) {
-        const struct scanhead_point *p = &e->track.point[i];
+        const struct scanhead_point *p = &e->base.track.point[i];
         if (p->echo_count == 0 && !e->facts.empty_shots) continue;
         int rc = put_place(e, p, err);
         if (rc != 0) return rc;
         put_intensity(e, p->reflectance_db);
         le_put_double(e->stream[TIME] + 8 * (size_t)e->n, (double)p->t_ns / 1e9);
-        put_index(e, p, e->track.row[i]);
+        put_index(e, p, e->base.track.row[i]);
         le_put16(e->stream[LABEL] + 2 * (size_t)e->n, p->label);
         if (++e->n == PACKET_RECORDS) rc = put_packet(e, err);
         if (rc != 0) return rc;
     }
     return 0;
-}
-
-static int e57_frame(void *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
-{
-    static const struct track_ops ops = {begin_scan, e57_points};
-    struct e57 *e = rec;
-    return track_frame(&e->track, sh, frame, &ops, e, err);
 }
 
 static int patch_headers(struct e57 *e, uint64_t xml, size_t xml_len, struct sh_err *err)
@@ -257,8 +240,9 @@ static int patch_headers(struct e57 *e, uint64_t xml, size_t xml_len, struct sh_
     return rc;
 }
 
-static int finish(struct e57 *e, struct sh_err *err)
+static int e57_finish_file(void *rec, struct sh_err *err)
 {
+    struct e57 *e = rec;
     char *xml;
     size_t len;
     int rc = end_scan(e, err);
@@ -272,15 +256,17 @@ static int finish(struct e57 *e, struct sh_err *err)
     return rc;
 }
 
-static int e57_close(void *rec, int keep, struct sh_err *err)
+static void e57_release(void *rec)
 {
-    struct e57 *e = rec;
-    int rc = keep ? finish(e, err) : 0;
-    if (keep && rc == 0) track_tell(&e->track, e->report);
-    int closed = outfile_close(&e->file, keep && rc == 0, err);
-    free(e->facts.scan);
-    free(e);
-    return rc != 0 ? rc : closed;
+    free(((struct e57 *)rec)->facts.scan);
 }
 
-const struct recorder_ops recorder_e57 = {".e57", e57_open, e57_frame, e57_close, 1};
+const struct recorder_ops recorder_e57 = {
+    .ending = ".e57",
+    .size = sizeof(struct e57),
+    .metres = 1,
+    .track = {.scan = begin_scan, .points = e57_points, .metres = 1},
+    .begin = e57_begin,
+    .finish = e57_finish_file,
+    .release = e57_release,
+};

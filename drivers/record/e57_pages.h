@@ -1,5 +1,5 @@
-/* The pages of an E57 file (ASTM E2807): 1020 bytes of content and their CRC-32C, big-endian, behind them. Offsets of
- * the content without the CRCs are logical, those with them physical. */
+/* The pages of an E57 file (ASTM E2807). A page is 1020 bytes of content, then their CRC-32C, big-endian.
+ * Offsets that count content alone are logical, those that count the CRCs too are physical. */
 #ifndef DRIVERS_RECORD_E57_PAGES_H
 #define DRIVERS_RECORD_E57_PAGES_H
 

@@ -1,5 +1,5 @@
-/* The XML section of an E57 file (ASTM E2807): what is in the file, and where. Pure; what it says is gathered by e57.c.
- */
+/* The XML section of an E57 file (ASTM E2807): what is in the file, and where. Facts go in (e57.c gathers
+ * them), text comes out. Pure. */
 #ifndef DRIVERS_RECORD_E57_XML_H
 #define DRIVERS_RECORD_E57_XML_H
 

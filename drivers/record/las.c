@@ -1,51 +1,36 @@
-/* .las: LAS 1.4, point data record format 6 with the label behind it; one record per echo. What the numbers mean stands
- * in the file itself (las_header.c).
+/* .las: LAS 1.4, point data record format 6 followed by the label; one record per echo. What the numbers mean
+ * stands in the file itself (las_header.c).
  *
- * Coordinates are counts of the stream's own scale from the first scan's station, so those of the first scan are the
- * stream's very numbers, and those of further stations are rounded once, by half a count at most. Nothing is clipped:
- * what is too far for 32 bits is an error. Longitudes go on beyond 180 or -180 degrees where a scan crosses the
- * antimeridian: all lie within 180 degrees of the first station. */
+ * Coordinates are counts of the stream's own scale from the first scan's station. So those of the first scan
+ * are the numbers of the stream. Those of further stations are rounded once, by half a count at most. Nothing
+ * is clipped: what is too far for 32 bits is an error. Longitudes go on beyond 180 or -180 degrees where a
+ * scan crosses the antimeridian: all lie within 180 degrees of the first station. */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
-#include "drivers/record/las_header.h"
-#include "drivers/record/outfile.h"
-#include "drivers/record/recorder_list.h"
-#include "drivers/record/track.h"
 #include "drivers/protocol/bytes.h"
 #include "drivers/protocol/native.h"
+#include "drivers/record/las_header.h"
+#include "drivers/record/recorder.h"
 
-#define DEG                       (3.14159265358979323846 / 180.0)
-#define SCAN_ANGLE_COUNTS_PER_RAD (1.0 / DEG / 0.006)
+#define SCAN_ANGLE_COUNTS_PER_RAD (1.0 / NATIVE_RAD_PER_DEG / 0.006)
 
 struct las {
-    struct outfile file;
-    struct track track;
+    struct recorder base;
     struct las_facts facts;
-    const struct sh_report *report;
     int begun, time_came_late;
     size_t front_len;
     uint64_t n_empty;
 };
 
-static int las_open(const char *path, const struct recorder_options *options, void **rec, struct sh_err *err)
+static int las_begin(void *rec, struct sh_err *err)
 {
-    struct las *las = calloc(1, sizeof *las);
-    if (las == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);
-    int rc = outfile_open(&las->file, path, err);
-    if (rc != 0) {
-        free(las);
-        return rc;
-    }
-    las->report = options->report;
-    las->track.path = las->file.path;
-    las->track.wants_attributes = 1;
+    struct las *las = rec;
+    (void)err;
     for (int i = 0; i < 3; i++)
         las->facts.scale[i] = 1;
     strcpy(las->facts.profile, "OTHER"); /* until points have come */
-    *rec = las;
     return 0;
 }
 
@@ -55,13 +40,13 @@ static int put_front(struct las *las, struct sh_err *err)
     uint8_t front[LAS_FRONT_MAX];
     las->begun = 1;
     las->front_len = las_front(&las->facts, front);
-    return outfile_write(&las->file, front, las->front_len, err);
+    return outfile_write(&las->base.file, front, las->front_len, err);
 }
 
 /* Geodetic coordinates are longitude, latitude in LAS, as GIS software draws x and y. */
 static int is_swapped(const struct las *las)
 {
-    return track_crs(&las->track) == NATIVE_CRS_GEODETIC;
+    return track_crs(&las->base.track) == NATIVE_CRS_GEODETIC;
 }
 
 static void swap(double v[3])
@@ -74,7 +59,7 @@ static void swap(double v[3])
 /* The stream's own counts from the first anchor, or coarser ones for a head that moves. */
 static void set_counts(struct las *las)
 {
-    const struct track *t = &las->track;
+    const struct track *t = &las->base.track;
     struct las_facts *f = &las->facts;
     memcpy(f->offset, t->pose.shift_m, sizeof f->offset);
     for (int i = 0; i < 3; i++)
@@ -87,7 +72,7 @@ static void set_counts(struct las *las)
 static int las_scan(void *rec, struct sh_err *err)
 {
     struct las *las = rec;
-    const struct track *t = &las->track;
+    const struct track *t = &las->base.track;
     struct las_facts *f = &las->facts;
     if (las->begun) return 0;
     f->epsg = track_epsg(t);
@@ -98,8 +83,8 @@ static int las_scan(void *rec, struct sh_err *err)
     snprintf(f->profile, sizeof f->profile, "%s", t->info.profile);
     f->gps_time = scanhead_gps_time(t->sh, t->t0_ns, &f->created_gps_s) == 0;
     if (!(f->scale[0] > 0 && f->scale[1] > 0 && f->scale[2] > 0))
-        return sh_fail(err, SH_EFORMAT, "%s: the stream's scale is %g; a LAS file needs one above 0", las->file.path,
-                       f->scale[0]);
+        return sh_fail(err, SH_EFORMAT, "%s: the stream's scale is %g; a LAS file needs one above 0",
+                       las->base.file.path, f->scale[0]);
     return put_front(las, err);
 }
 
@@ -108,8 +93,8 @@ static int too_far(const struct las *las, const double p[3], struct sh_err *err)
     return sh_fail(err, SH_EFORMAT,
                    "%s: a point of station %u at (%.3f %.3f %.3f) is beyond the %.0f m from the first station that LAS "
                    "can hold in steps of %g m; give the head a coarser output.scale_m, or each station its own file",
-                   las->file.path, las->track.info.station, p[0], p[1], p[2], 2147483647 * las->track.scale_m,
-                   las->track.scale_m);
+                   las->base.file.path, las->base.track.info.station, p[0], p[1], p[2],
+                   2147483647 * las->base.track.scale_m, las->base.track.scale_m);
 }
 
 /* The angle from straight down, in the head's frame. */
@@ -145,8 +130,8 @@ static int put_xyz(struct las *las, uint8_t *to, const double p[3], struct sh_er
     return 0;
 }
 
-/* Of point i of the batch. One that has waited was told the time before that. */
-static int is_told_time(const struct track *t, int i, double *gps_s)
+/* The time of point i of the batch. One that has waited got its time before it waited. */
+static int has_time(const struct track *t, int i, double *gps_s)
 {
     *gps_s = t->gps_s[i];
     return t->has_attributes ? !isnan(*gps_s) : scanhead_gps_time(t->sh, t->point[i].t_ns, gps_s) == 0;
@@ -154,10 +139,10 @@ static int is_told_time(const struct track *t, int i, double *gps_s)
 
 static int put_time(const struct las *las, uint8_t *to, int i, struct sh_err *err)
 {
-    double s = (double)las->track.point[i].t_ns / 1e9;
-    if (las->facts.gps_time && !is_told_time(&las->track, i, &s))
-        return sh_fail(err, SH_EFORMAT, "%s: the head tells no time any more; a LAS file holds one kind of time",
-                       las->file.path);
+    double s = (double)las->base.track.point[i].t_ns / 1e9;
+    if (las->facts.gps_time && !has_time(&las->base.track, i, &s))
+        return sh_fail(err, SH_EFORMAT, "%s: the head has ceased to say the time; a LAS file holds one kind of time",
+                       las->base.file.path);
     le_put_double(to, s);
     return 0;
 }
@@ -166,8 +151,8 @@ static int put_time(const struct las *las, uint8_t *to, int i, struct sh_err *er
 static void set_socs(const struct track *t, double p[3])
 {
     if (t->info.crs == NATIVE_CRS_GEODETIC) {
-        const double m_deg = 6371000 * DEG, north = (p[0] - t->pose.shift_m[0]) * m_deg;
-        const double east = remainder(p[1] - t->pose.shift_m[1], 360) * m_deg * cos(p[0] * DEG);
+        const double m_deg = 6371000 * NATIVE_RAD_PER_DEG, north = (p[0] - t->pose.shift_m[0]) * m_deg;
+        const double east = remainder(p[1] - t->pose.shift_m[1], 360) * m_deg * cos(p[0] * NATIVE_RAD_PER_DEG);
         p[0] = t->pose.shift_m[0] + east;
         p[1] = t->pose.shift_m[1] + north;
     }
@@ -186,7 +171,7 @@ static void put_attribute(uint8_t *to, const struct scanhead_attribute *a)
 /* Point i of the batch. */
 static int put_point(struct las *las, uint8_t *to, int i, struct sh_err *err)
 {
-    struct track *t = &las->track;
+    struct track *t = &las->base.track;
     const struct scanhead_point *point = &t->point[i];
     double p_crs[3] = {point->x, point->y, point->z}, p_socs[3] = {point->x, point->y, point->z};
     if (!t->info.geo)
@@ -211,14 +196,14 @@ static int put_point(struct las *las, uint8_t *to, int i, struct sh_err *err)
 static int las_points(void *rec, int n, struct sh_err *err)
 {
     struct las *las = rec;
-    uint8_t *to = outfile_room(&las->file, TRACK_BATCH * LAS_POINT_LEN_MAX, err), *at = to;
+    uint8_t *to = outfile_room(&las->base.file, TRACK_BATCH * LAS_POINT_LEN_MAX, err), *at = to;
     if (to == NULL) return SH_EIO;
     int rc = 0;
     double s;
     if (!las->facts.gps_time && !las->time_came_late)
-        las->time_came_late = scanhead_gps_time(las->track.sh, 0, &s) == 0;
+        las->time_came_late = scanhead_gps_time(las->base.track.sh, 0, &s) == 0;
     for (int i = 0; i < n; i++) {
-        const struct scanhead_point *p = &las->track.point[i];
+        const struct scanhead_point *p = &las->base.track.point[i];
         if (p->echo_count == 0) {
             las->n_empty++;
             continue;
@@ -229,44 +214,32 @@ static int las_points(void *rec, int n, struct sh_err *err)
         las->facts.n_points++;
         if (p->echo >= 1) las->facts.n_by_return[p->echo - 1]++;
     }
-    outfile_used(&las->file, (size_t)(at - to)); /* also before a failure: the file may be kept */
+    outfile_used(&las->base.file, (size_t)(at - to)); /* also before a failure: the file may be kept */
     return rc;
 }
 
-static const struct track_ops ops = {las_scan, las_points};
-
-static int las_frame(void *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
+static int las_finish(void *rec, struct sh_err *err)
 {
     struct las *las = rec;
-    return track_frame(&las->track, sh, frame, &ops, las, err);
-}
-
-static int finish(struct las *las, struct sh_err *err)
-{
     uint8_t front[LAS_FRONT_MAX];
-    int rc = track_flush(&las->track, &ops, las, err);
-    if (rc == 0 && !las->begun) rc = put_front(las, err);
-    if (rc == 0) rc = outfile_flush(&las->file, err);
-    return rc != 0 ? rc : outfile_patch(&las->file, 0, front, las_front(&las->facts, front), err);
-}
-
-static int las_close(void *rec, int keep, struct sh_err *err)
-{
-    struct las *las = rec;
-    int rc = keep ? finish(las, err) : 0;
-    if (keep && rc == 0 && las->n_empty > 0)
-        sh_warn(las->report, "%s: %llu shots without echo left out, for which LAS has no place", las->file.path,
-                (unsigned long long)las->n_empty);
-    if (keep && rc == 0 && las->time_came_late)
-        sh_warn(las->report,
+    int rc = las->begun ? 0 : put_front(las, err);
+    if (rc == 0) rc = outfile_flush(&las->base.file, err);
+    if (rc == 0) rc = outfile_patch(&las->base.file, 0, front, las_front(&las->facts, front), err);
+    if (rc != 0) return rc;
+    recorder_report(rec, las->n_empty, "shots without echo left out, for which LAS has no place");
+    if (las->time_came_late)
+        sh_warn(las->base.options.report,
                 "%s: times count from the scan's start: what the head said of its clock was lost before the first "
                 "points",
-                las->file.path);
-    if (keep && rc == 0) track_tell(&las->track, las->report);
-    int closed = outfile_close(&las->file, keep && rc == 0, err);
-    track_free(&las->track);
-    free(las);
-    return rc != 0 ? rc : closed;
+                las->base.file.path);
+    return 0;
 }
 
-const struct recorder_ops recorder_las = {".las", las_open, las_frame, las_close, 0};
+const struct recorder_ops recorder_las = {
+    .ending = ".las",
+    .size = sizeof(struct las),
+    .wants_attributes = 1,
+    .track = {.scan = las_scan, .points = las_points},
+    .begin = las_begin,
+    .finish = las_finish,
+};

@@ -34,7 +34,7 @@ static uint8_t *put_vlr_head(uint8_t *to, const char *user, uint16_t record, siz
     return to + LAS_VLR_HEAD_LEN;
 }
 
-/* One of the extra bytes behind a point, 2 bytes. scale 0: none; no_data as its type has it. */
+/* Describes one of the extra fields after a point, of 2 bytes. scale 0: none; no_data as its type has it. */
 static uint8_t *put_extra(uint8_t *to, uint8_t type, const char *name, int64_t no_data, double scale, const char *text)
 {
     memset(to, 0, LAS_EXTRA_LEN);

@@ -1,5 +1,5 @@
-/* The header and the variable length records of a LAS 1.4 file (ASPRS LAS 1.4 R15), point data record format 6.
- * Pure; what it says is gathered by las.c. */
+/* The header and the variable length records of a LAS 1.4 file (ASPRS LAS 1.4 R15), point data record format
+ * 6. Facts go in (las.c gathers them), bytes come out. Pure. */
 #ifndef DRIVERS_RECORD_LAS_HEADER_H
 #define DRIVERS_RECORD_LAS_HEADER_H
 
@@ -22,7 +22,7 @@ enum {
 struct las_facts {
     int epsg;
     int moving;
-    int attributes; /* amplitude and width behind the label */
+    int attributes; /* amplitude and width follow the label */
     int gps_time;   /* times are adjusted standard GPS time */
     char profile[32];
     double scale[3], offset[3]; /* of x, y, z; x and y are longitude and latitude in geodetic coordinates */
@@ -32,8 +32,8 @@ struct las_facts {
     int32_t min[3], max[3]; /* counts; only with points */
 };
 
-/* Everything before the points. Returns its length, which depends on the CRS, the time's kind and attributes alone, so
- * that it can be written again when the counts are known. */
+/* Everything before the points. Returns its length, which depends on the CRS, the time's kind and attributes
+ * alone, so that it can be written again when the counts are known. */
 size_t las_front(const struct las_facts *facts, uint8_t to[LAS_FRONT_MAX]);
 
 #endif

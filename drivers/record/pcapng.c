@@ -1,13 +1,11 @@
-/* .pcapng: each frame of the stream as a packet, for capinfos, tshark and what else reads captures (draft-ietf-opsawg-
- * pcapng). Link type 147 (USER0): a packet is one frame of the native protocol, header and payload. Its time is the
- * frame's device time, nanoseconds since power-up. */
-#include <stdlib.h>
+/* .pcapng: each frame of the stream as a packet, for capinfos, tshark and other readers of captures
+ * (draft-ietf-opsawg-pcapng). Link type 147 (USER0): a packet is one frame of the native protocol, header and
+ * payload. Its time is the frame's device time, nanoseconds since power-up. */
 #include <string.h>
 
-#include "drivers/record/outfile.h"
-#include "drivers/record/recorder_list.h"
 #include "drivers/protocol/bytes.h"
 #include "drivers/protocol/native.h"
+#include "drivers/record/recorder.h"
 
 enum {
     BLOCK_SECTION = 0x0a0d0d0a,
@@ -74,26 +72,19 @@ static size_t put_front(uint8_t *to)
     return (size_t)(end_block(interface, at) - to);
 }
 
-static int pcapng_open(const char *path, const struct recorder_options *options, void **rec, struct sh_err *err)
+static int pcapng_begin(void *rec, struct sh_err *err)
 {
+    struct recorder *pcapng = rec;
     uint8_t front[FRONT_MAX];
-    (void)options;
-    struct outfile *file = malloc(sizeof *file);
-    if (file == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);
-    int rc = outfile_open(file, path, err);
-    if (rc != 0) {
-        free(file);
-        return rc;
-    }
-    *rec = file;
-    return outfile_write(file, front, put_front(front), err); /* into the buffer: does not fail */
+    return outfile_write(&pcapng->file, front, put_front(front), err);
 }
 
 static int pcapng_frame(void *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
 {
+    struct outfile *file = &((struct recorder *)rec)->file;
     (void)sh;
     size_t len = PACKET_HEAD_LEN + (frame->raw_len + 3) / 4 * 4 + 4;
-    uint8_t *to = outfile_room(rec, len, err);
+    uint8_t *to = outfile_room(file, len, err);
     if (to == NULL) return SH_EIO;
     le_put32(to, BLOCK_PACKET);
     le_put32(to + 4, (uint32_t)len);
@@ -103,15 +94,13 @@ static int pcapng_frame(void *rec, struct scanhead *sh, const struct scanhead_fr
     le_put32(to + 20, (uint32_t)frame->raw_len);
     le_put32(to + 24, (uint32_t)frame->raw_len);
     le_put32(put_padded(to + PACKET_HEAD_LEN, frame->raw, frame->raw_len), (uint32_t)len);
-    outfile_used(rec, len);
+    outfile_used(file, len);
     return 0;
 }
 
-static int pcapng_close(void *rec, int keep, struct sh_err *err)
-{
-    int rc = outfile_close(rec, keep, err);
-    free(rec);
-    return rc;
-}
-
-const struct recorder_ops recorder_pcapng = {".pcapng", pcapng_open, pcapng_frame, pcapng_close, 0};
+const struct recorder_ops recorder_pcapng = {
+    .ending = ".pcapng",
+    .size = sizeof(struct recorder),
+    .begin = pcapng_begin,
+    .frame = pcapng_frame,
+};

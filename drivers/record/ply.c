@@ -2,10 +2,10 @@
  *
  * Positions are in the stream's CRS (geo), or in the scene frame (polar), as scanhead_to_scene has it.
  *
- * The header comes first in the file but is known last (count, names, losses). When the first points arrive
- * the head has told how many surfaces there are, so room is left for the header: no byte of the points is
- * written twice, which matters at 100 MB/s. Should the header outgrow its room after all, the points are
- * copied behind it once. */
+ * The header comes first in the file but is known last (count, names, losses). When the first points arrive,
+ * the number of surfaces is known, so room is left for the header. So no byte of the points is written twice,
+ * which matters at 100 MB/s. If the header outgrows its room after all, the points are copied once to where
+ * it ends. */
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
@@ -13,45 +13,32 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "drivers/record/outfile.h"
-#include "drivers/record/ply_columns.h"
-#include "drivers/record/recorder_list.h"
-#include "drivers/record/track.h"
 #include "drivers/protocol/bytes.h"
 #include "drivers/protocol/native.h"
+#include "drivers/record/ply_columns.h"
+#include "drivers/record/recorder.h"
 
 enum { RECORD_LEN = 4 * 8 + 4 + 8 + 1 + 1 + 2 + 2, FRAME_LEN = 8, ATTRIBUTES_LEN = 8, TEXT_LEN = 512 };
 
 struct ply {
-    struct outfile file;
-    struct track track;
-    struct recorder_options options;
+    struct recorder base;
     struct ply_facts facts;
     struct ply_names names;
     int begun;         /* room for the header is made */
     size_t header_len; /* bytes of that room */
 };
 
-static int ply_open(const char *path, const struct recorder_options *options, void **rec, struct sh_err *err)
+static int ply_begin(void *rec, struct sh_err *err)
 {
-    struct ply *ply = calloc(1, sizeof *ply);
-    if (ply == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);
-    ply->options = *options;
-    ply->facts.ascii = options->ascii;
-    ply->facts.empty_shots = options->empty_shots;
-    int rc = outfile_open(&ply->file, path, err);
-    if (rc != 0) {
-        free(ply);
-        return rc;
-    }
-    ply->track.path = ply->file.path;
-    ply->track.wants_attributes = 1;
-    *rec = ply;
+    struct ply *ply = rec;
+    (void)err;
+    ply->facts.ascii = ply->base.options.ascii;
+    ply->facts.empty_shots = ply->base.options.empty_shots;
     return 0;
 }
 
 /* Makes room for the header with what is known of the names. */
-static int begin(struct ply *ply, const struct scanhead *sh, uint32_t n_surfaces, struct sh_err *err)
+static int make_room(struct ply *ply, const struct scanhead *sh, uint32_t n_surfaces, struct sh_err *err)
 {
     int rc = ply_names_grow(&ply->names, n_surfaces, err);
     for (uint32_t i = 0; rc == 0 && i < n_surfaces; i++) {
@@ -60,18 +47,18 @@ static int begin(struct ply *ply, const struct scanhead *sh, uint32_t n_surfaces
     }
     if (rc != 0) return rc;
     ply->header_len = ply_header_reserve(&ply->facts, &ply->names);
-    if (ply->header_len == 0) return sh_fail(err, SH_ENOMEM, "%s: no memory for the header", ply->file.path);
+    if (ply->header_len == 0) return sh_fail(err, SH_ENOMEM, "%s: no memory for the header", ply->base.file.path);
     ply->begun = 1;
     static const char blank[4096];
     for (size_t left = ply->header_len; left > 0 && rc == 0;) {
         size_t n = left < sizeof blank ? left : sizeof blank;
-        rc = outfile_write(&ply->file, blank, n, err);
+        rc = outfile_write(&ply->base.file, blank, n, err);
         left -= n;
     }
     return rc;
 }
 
-/* A vertex as far as the file has its properties. */
+/* A vertex, with what the file has properties for. */
 struct vertex {
     struct scanhead_point point;
     unsigned station;
@@ -104,8 +91,8 @@ static size_t put_binary(uint8_t *to, const struct vertex *v)
     return len + ATTRIBUTES_LEN;
 }
 
-/* Micrometres (1e-11 degrees) are the finest scale of the wire, 0.01 dB and nanoseconds its units: more digits would
- * say nothing. "nan" without a sign, as some readers know no other. */
+/* Micrometres (1e-11 degrees) are the finest scale of the wire, 0.01 dB and nanoseconds its units: more
+ * digits would say nothing. "nan" without a sign, as some readers know no other. */
 static size_t put_number(char *to, size_t room, int digits, double v)
 {
     int n = isnan(v) ? snprintf(to, room, "nan ") : snprintf(to, room, "%.*f ", digits, v);
@@ -133,7 +120,7 @@ static size_t put_ascii(char *to, const struct vertex *v, int degrees)
     if (v->attribute != NULL && n < TEXT_LEN) n += put_number(to + n, TEXT_LEN - n, 2, v->attribute->amplitude_db);
     if (v->attribute != NULL && n < TEXT_LEN) n += put_number(to + n, TEXT_LEN - n, 2, v->attribute->width_ns);
     if (n >= TEXT_LEN) return TEXT_LEN + 1;
-    to[n - 1] = '\n'; /* the blank behind the last number */
+    to[n - 1] = '\n'; /* the blank after the last number */
     return n;
 }
 
@@ -141,41 +128,40 @@ static size_t put_ascii(char *to, const struct vertex *v, int degrees)
 static void set_gps(struct ply *ply)
 {
     struct ply_facts *facts = &ply->facts;
-    if (facts->have_gps || ply->track.n_scans != 1) return;
-    facts->have_gps = scanhead_gps_time(ply->track.sh, 0, &facts->gps_s) == 0;
-    facts->gps_s += 1e9; /* adjusted time is that much less */
+    if (facts->have_gps || ply->base.track.n_scans != 1) return;
+    facts->have_gps = track_start_gps(&ply->base.track, &facts->gps_s);
 }
 
-/* Room for the header is made when the head has told how many surfaces there are. */
+/* Room for the header is made when the number of surfaces is known. */
 static int ply_scan(void *rec, struct sh_err *err)
 {
     struct ply *ply = rec;
-    const struct scanhead_info *info = &ply->track.info;
+    const struct scanhead_info *info = &ply->base.track.info;
     struct ply_facts *facts = &ply->facts;
     facts->have_crs = 1;
-    facts->crs = track_crs(&ply->track);
-    facts->epsg = track_epsg(&ply->track);
-    facts->geoid_heights = track_is_geoid(&ply->track);
+    facts->crs = track_crs(&ply->base.track);
+    facts->epsg = track_epsg(&ply->base.track);
+    facts->geoid_heights = track_is_geoid(&ply->base.track);
     facts->moving = info->moving;
     facts->stops = info->stop;
-    facts->attributes = ply->track.has_attributes;
+    facts->attributes = ply->base.track.has_attributes;
     snprintf(facts->idn, sizeof facts->idn, "%s", info->idn);
     snprintf(facts->profile, sizeof facts->profile, "%s", info->profile);
-    return ply->begun ? 0 : begin(ply, ply->track.sh, info->n_surfaces, err);
+    return ply->begun ? 0 : make_room(ply, ply->base.track.sh, info->n_surfaces, err);
 }
 
 static int ply_points(void *rec, int n, struct sh_err *err)
 {
     struct ply *ply = rec;
-    const struct track *t = &ply->track;
-    uint8_t *to = outfile_room(&ply->file, TRACK_BATCH * TEXT_LEN, err);
+    const struct track *t = &ply->base.track;
+    uint8_t *to = outfile_room(&ply->base.file, TRACK_BATCH * TEXT_LEN, err);
     if (to == NULL) return SH_EIO;
     size_t used = 0;
     set_gps(ply);
     for (int i = 0; i < n; i++) {
         struct vertex v = {.point = t->point[i], .station = t->info.station};
         struct scanhead_point *p = &v.point;
-        if (p->echo_count == 0 && !ply->options.empty_shots) continue;
+        if (p->echo_count == 0 && !ply->facts.empty_shots) continue;
         if (t->info.moving || t->info.stop) v.frame = t->info.moving ? &t->frame[i] : &t->info.frame;
         if (t->has_attributes) v.attribute = &t->attribute[i];
         if (!t->info.geo) {
@@ -186,14 +172,12 @@ static int ply_points(void *rec, int n, struct sh_err *err)
             p->z = xyz[2];
         }
         size_t len =
-            ply->options.ascii ? put_ascii((char *)to + used, &v, ply->facts.crs == 3) : put_binary(to + used, &v);
-        if (len > TEXT_LEN)
-            return sh_fail(err, SH_EFORMAT, "%s: a coordinate beyond all measure: %g %g %g", ply->file.path, p->x, p->y,
-                           p->z);
+            ply->facts.ascii ? put_ascii((char *)to + used, &v, ply->facts.crs == 3) : put_binary(to + used, &v);
+        if (len > TEXT_LEN) return recorder_fail_huge(&ply->base, (double[]){p->x, p->y, p->z}, err);
         used += len;
         ply->facts.n_vertices++;
     }
-    outfile_used(&ply->file, used);
+    outfile_used(&ply->base.file, used);
     return 0;
 }
 
@@ -209,23 +193,21 @@ static void take_name(void *ctx, uint32_t label, const char *object, const char 
     if (naming->rc == 0) naming->rc = ply_names_set(&naming->ply->names, label, object, material, naming->err);
 }
 
-static const struct track_ops ops = {ply_scan, ply_points};
-
 static int ply_frame(void *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
 {
     struct ply *ply = rec;
     scanhead_get_stats(sh, &ply->facts.stats);
-    if (frame->type != SCANHEAD_SURFACES) return track_frame(&ply->track, sh, frame, &ops, ply, err);
+    if (frame->type != SCANHEAD_SURFACES) return track_frame(&ply->base.track, sh, frame, err);
     struct naming naming = {ply, err, 0};
     native_decode_surfaces(frame->payload, frame->payload_len, take_name, &naming);
     return naming.rc;
 }
 
-/* The header outgrew its room: the points move behind it, block by block from the end. */
+/* The header outgrew its room: the points move to where it ends, block by block from the end. */
 static int move_points(struct ply *ply, size_t header_len, struct sh_err *err)
 {
     enum { BLOCK = 1 << 16 };
-    struct outfile *file = &ply->file;
+    struct outfile *file = &ply->base.file;
     size_t shift = header_len - ply->header_len;
     uint64_t end = file->written;
     uint8_t *block = malloc(BLOCK);
@@ -243,33 +225,35 @@ static int move_points(struct ply *ply, size_t header_len, struct sh_err *err)
     return rc;
 }
 
-static int finish(struct ply *ply, struct sh_err *err)
+static int ply_finish(void *rec, struct sh_err *err)
 {
-    int rc = track_flush(&ply->track, &ops, ply, err);
-    if (rc == 0) rc = outfile_flush(&ply->file, err);
-    ply->facts.n_without_attributes = ply->track.n_without_attributes;
-    ply->facts.n_unplaced = ply->track.n_unplaced;
-    ply->facts.n_without_pose = ply->track.n_without_pose;
+    struct ply *ply = rec;
+    int rc = outfile_flush(&ply->base.file, err);
+    ply->facts.n_without_attributes = ply->base.track.n_without_attributes;
+    ply->facts.n_unplaced = ply->base.track.n_unplaced;
+    ply->facts.n_without_pose = ply->base.track.n_without_pose;
     char *header;
     size_t len;
     if (rc == 0) rc = ply_header_make(&ply->facts, &ply->names, ply->header_len, &header, &len, err);
     if (rc != 0) return rc;
     if (len > ply->header_len) rc = move_points(ply, len, err);
-    if (rc == 0) rc = outfile_patch(&ply->file, 0, header, len, err);
+    if (rc == 0) rc = outfile_patch(&ply->base.file, 0, header, len, err);
     free(header);
     return rc;
 }
 
-static int ply_close(void *rec, int keep, struct sh_err *err)
+static void ply_release(void *rec)
 {
-    struct ply *ply = rec;
-    int rc = keep ? finish(ply, err) : 0;
-    if (keep && rc == 0) track_tell(&ply->track, ply->options.report);
-    int closed = outfile_close(&ply->file, keep && rc == 0, err);
-    ply_names_free(&ply->names);
-    track_free(&ply->track);
-    free(ply);
-    return rc != 0 ? rc : closed;
+    ply_names_free(&((struct ply *)rec)->names);
 }
 
-const struct recorder_ops recorder_ply = {".ply", ply_open, ply_frame, ply_close, 0};
+const struct recorder_ops recorder_ply = {
+    .ending = ".ply",
+    .size = sizeof(struct ply),
+    .wants_attributes = 1,
+    .track = {.scan = ply_scan, .points = ply_points},
+    .begin = ply_begin,
+    .frame = ply_frame,
+    .finish = ply_finish,
+    .release = ply_release,
+};

@@ -1,4 +1,5 @@
-/* The header of a PLY recording, which is known only at the end and yet stands at the beginning. */
+/* The header of a PLY recording: facts and names of surfaces go in, text comes out. It stands at the
+ * beginning of the file and is known at the end, so its size is reserved first. */
 #ifndef DRIVERS_RECORD_PLY_COLUMNS_H
 #define DRIVERS_RECORD_PLY_COLUMNS_H
 

@@ -1,45 +1,28 @@
-/* .poses.csv: where the head truly was, what a registration or a trajectory has to find.
+/* .poses.csv: where the head truly was, which a registration or a trajectory has to find.
  *
- * Of a head that stands, one row per scan: the pose takes points from the head's frame to the frame of the recordings
- * beside it (station_pose.h; at stops with the frame scalar, too), whose coordinates are not-a-number where they are
- * geodetic, and the axes then east, north, up. Of a head that moves, one row per pose, each time once, in the scene
- * frame, times since the scan's start: a trajectory file of its own (core/pose.h). Gaps, where frames were lost, are
- * lines of comment, and so is what links the scene frame to the CRS of the geo layout. */
+ * Of a head that stands: one row per scan. The pose takes points from the head's frame to the frame of the
+ * recordings beside it (station_pose.h). At a stop the row has the frame scalar, too. Where the recordings
+ * are geodetic, the position is NaN and the axes are east, north, up.
+ *
+ * Of a head that moves: one row per pose, each time once, in the scene frame, with times since the scan's
+ * start. That is a trajectory file of its own (core/pose.h). Lines of comment say where frames were lost, and
+ * what links the scene frame to the CRS of the geo layout. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
-#include "drivers/record/outfile.h"
-#include "drivers/record/recorder_list.h"
-#include "drivers/record/track.h"
 #include "drivers/protocol/native.h"
+#include "drivers/record/recorder.h"
 
 enum { BATCH = 64, LINE = 512 };
 
 struct pose_file {
-    struct outfile out;
-    struct track track;
+    struct recorder base;
     int titled, begun;
     uint32_t scan;
     int64_t last_ns; /* written last */
 };
-
-static int pose_file_open(const char *path, const struct recorder_options *options, void **rec, struct sh_err *err)
-{
-    (void)options;
-    struct pose_file *file = calloc(1, sizeof *file);
-    if (file == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);
-    int rc = outfile_open(&file->out, path, err);
-    if (rc != SH_OK) {
-        free(file);
-        return rc;
-    }
-    file->track.path = file->out.path;
-    *rec = file;
-    return SH_OK;
-}
 
 enum title { STATIONS, STOPS, MOVING };
 
@@ -51,13 +34,13 @@ static int put_title(struct pose_file *file, enum title which, struct sh_err *er
         [MOVING] = "scan,t_s,x_m,y_m,z_m,qw,qx,qy,qz,frame,flags\n"};
     if (file->titled) return SH_OK;
     file->titled = 1;
-    return outfile_write(&file->out, title[which], strlen(title[which]), err);
+    return outfile_write(&file->base.file, title[which], strlen(title[which]), err);
 }
 
 static int put_station(void *rec, struct sh_err *err)
 {
     struct pose_file *file = rec;
-    const struct track *t = &file->track;
+    const struct track *t = &file->base.track;
     double q[4], p[3];
     char row[LINE];
     if (t->info.moving) return SH_OK;
@@ -70,7 +53,7 @@ static int put_station(void *rec, struct sh_err *err)
     if (t->info.stop) n += snprintf(row + n, sizeof row - (size_t)n, ",%.9g", t->info.frame);
     row[n++] = '\n';
     int rc = put_title(file, t->info.stop ? STOPS : STATIONS, err);
-    return rc != SH_OK ? rc : outfile_write(&file->out, row, (size_t)n, err);
+    return rc != SH_OK ? rc : outfile_write(&file->base.file, row, (size_t)n, err);
 }
 
 static int put(struct pose_file *file, const struct scanhead_pose *p, struct sh_err *err)
@@ -79,7 +62,7 @@ static int put(struct pose_file *file, const struct scanhead_pose *p, struct sh_
     int n = snprintf(line, sizeof line, "%u,%.9f,%.15g,%.15g,%.15g,%.17g,%.17g,%.17g,%.17g,%.9g,%d\n", file->scan,
                      1e-9 * (double)p->t_ns, p->position_m[0], p->position_m[1], p->position_m[2], p->quat[0],
                      p->quat[1], p->quat[2], p->quat[3], p->frame, p->flags);
-    return outfile_write(&file->out, line, (size_t)n, err);
+    return outfile_write(&file->base.file, line, (size_t)n, err);
 }
 
 /* Poses are in the scene frame; where the points are in a CRS: what links the two, as comments. */
@@ -99,7 +82,7 @@ static int put_link(struct pose_file *file, const struct scanhead_info *info, st
                      "%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g\n",
                      info->epsg, p[0], p[1], p[2], info->lat_deg, info->lon_deg, info->height_m, to[info->crs], r[0],
                      r[1], r[2], r[3], r[4], r[5], r[6], r[7], r[8]);
-    return outfile_write(&file->out, text, (size_t)n, err);
+    return outfile_write(&file->base.file, text, (size_t)n, err);
 }
 
 static int put_poses(struct pose_file *file, struct scanhead *sh, const struct scanhead_frame *frame,
@@ -117,7 +100,7 @@ static int put_poses(struct pose_file *file, struct scanhead *sh, const struct s
          first += (uint32_t)n) {
         static const char gap[] = "# poses are missing here\n";
         if (first == 0 && file->last_ns != INT64_MIN && pose[0].t_ns > file->last_ns)
-            rc = outfile_write(&file->out, gap, sizeof gap - 1, err);
+            rc = outfile_write(&file->base.file, gap, sizeof gap - 1, err);
         for (int i = 0; i < n && rc == SH_OK; i++) {
             if (pose[i].t_ns <= file->last_ns) continue;
             rc = put(file, &pose[i], err);
@@ -129,19 +112,20 @@ static int put_poses(struct pose_file *file, struct scanhead *sh, const struct s
 
 static int pose_file_frame(void *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
 {
-    static const struct track_ops ops = {put_station, NULL};
     struct pose_file *file = rec;
     if (frame->type == SCANHEAD_POSES) return put_poses(file, sh, frame, err);
-    return track_frame(&file->track, sh, frame, &ops, file, err);
+    return track_frame(&file->base.track, sh, frame, err);
 }
 
-static int pose_file_close(void *rec, int keep, struct sh_err *err)
+static int pose_file_finish(void *rec, struct sh_err *err)
 {
-    struct pose_file *file = rec;
-    int rc = keep ? put_title(file, STATIONS, err) : SH_OK,
-        closed = outfile_close(&file->out, keep && rc == SH_OK, err);
-    free(file);
-    return rc != SH_OK ? rc : closed;
+    return put_title(rec, STATIONS, err);
 }
 
-const struct recorder_ops recorder_poses = {".poses.csv", pose_file_open, pose_file_frame, pose_file_close, 0};
+const struct recorder_ops recorder_poses = {
+    .ending = ".poses.csv",
+    .size = sizeof(struct pose_file),
+    .track = {.scan = put_station},
+    .frame = pose_file_frame,
+    .finish = pose_file_finish,
+};

@@ -1,49 +1,32 @@
-/* .ptx: one grid per scan, a column per line and a row per shot, points in the head's frame and the pose that takes
- * them to the recording's frame (station_pose.h). A shot without echo is "0 0 0 0.5", as is a place of the grid where
- * no shot was: lines differ by a pulse where the pulse rate is no multiple of the line rate, and lines may have been
- * lost.
+/* .ptx: one grid per scan, a column per line and a row per shot. Points are in the head's frame; the pose
+ * takes them to the recording's frame (station_pose.h). A shot without echo is "0 0 0 0.5". So is a place of
+ * the grid without a shot: lines differ by a pulse where the pulse rate is no multiple of the line rate, and
+ * lines may have been lost.
  *
- * A PTX grid has one point per shot: the first echo. Intensity is the reflectance as a fraction, 1 for a white
- * Lambertian target, 0.5 where not modelled; what is brighter is 1. All that is told at the end, with counts. */
+ * A PTX grid has one point per shot: the first echo. Intensity is the reflectance as a fraction: 1 for a
+ * white Lambertian target and for what is brighter, 0.5 where not modelled. What the grid had no room for is
+ * reported at the end, with counts. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
-#include "drivers/record/outfile.h"
 #include "drivers/record/ptx_grid.h"
-#include "drivers/record/recorder_list.h"
-#include "drivers/record/track.h"
+#include "drivers/record/recorder.h"
 
 enum { LINE_MAX_LEN = 512, HEADER_MAX_LEN = 2048 };
 
 struct ptx {
-    struct outfile file;
-    struct track track;
+    struct recorder base;
     struct ptx_grid grid;
     struct station_pose pose; /* of the scan in the grid */
-    const struct sh_report *report;
     uint64_t n_left_out, n_too_bright, n_padded;
 };
 
-static int ptx_open(const char *path, const struct recorder_options *options, void **rec, struct sh_err *err)
+static int ptx_begin(void *rec, struct sh_err *err)
 {
-    struct ptx *ptx = calloc(1, sizeof *ptx);
-    if (ptx == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);
-    int rc = outfile_open(&ptx->file, path, err);
-    if (rc == 0) {
-        rc = ptx_grid_open(&ptx->grid, path, err);
-        if (rc != 0) outfile_close(&ptx->file, 0, NULL);
-    }
-    if (rc != 0) {
-        free(ptx);
-        return rc;
-    }
-    ptx->report = options->report;
-    ptx->track.path = ptx->file.path;
-    *rec = ptx;
-    return 0;
+    struct ptx *ptx = rec;
+    return ptx_grid_open(&ptx->grid, ptx->base.file.path, err);
 }
 
 /* Vectors are rows in PTX: what stands in the matrix is the rotation's transpose, the shift below it. */
@@ -60,26 +43,23 @@ static int put_header(struct ptx *ptx, struct sh_err *err)
     for (int i = 0; i < 3; i++)
         n += snprintf(text + n, sizeof text - (size_t)n, "%.15f %.15f %.15f 0\n", r[i], r[3 + i], r[6 + i]);
     n += snprintf(text + n, sizeof text - (size_t)n, "%.9f %.9f %.9f 1\n", s[0], s[1], s[2]);
-    if (n >= (int)sizeof text)
-        return sh_fail(err, SH_EFORMAT, "%s: a station beyond all measure: %g %g %g", ptx->file.path, s[0], s[1], s[2]);
-    return outfile_write(&ptx->file, text, (size_t)n, err);
+    if (n >= (int)sizeof text) return recorder_fail_huge(&ptx->base, s, err);
+    return outfile_write(&ptx->base.file, text, (size_t)n, err);
 }
 
 static int put_column(void *ctx, const struct ptx_cell *column, uint32_t n_rows, struct sh_err *err)
 {
     struct ptx *ptx = ctx;
     for (uint32_t i = 0; i < n_rows; i++) {
-        char *to = (char *)outfile_room(&ptx->file, LINE_MAX_LEN, err);
+        char *to = (char *)outfile_room(&ptx->base.file, LINE_MAX_LEN, err);
         if (to == NULL) return SH_EIO;
         const struct ptx_cell *c = &column[i];
         const double *p = c->p_socs;
         int n = c->intensity < 0
                     ? snprintf(to, LINE_MAX_LEN, "0 0 0 0.5\n")
                     : snprintf(to, LINE_MAX_LEN, "%.6f %.6f %.6f %.6f\n", p[0], p[1], p[2], (double)c->intensity);
-        if (n >= LINE_MAX_LEN)
-            return sh_fail(err, SH_EFORMAT, "%s: a coordinate beyond all measure: %g %g %g", ptx->file.path, p[0], p[1],
-                           p[2]);
-        outfile_used(&ptx->file, (size_t)n);
+        if (n >= LINE_MAX_LEN) return recorder_fail_huge(&ptx->base, p, err);
+        outfile_used(&ptx->base.file, (size_t)n);
     }
     return 0;
 }
@@ -98,8 +78,7 @@ static int ptx_scan(void *rec, struct sh_err *err)
 {
     struct ptx *ptx = rec;
     int rc = end_scan(ptx, err);
-    if (rc == 0) rc = track_check_metres(&ptx->track, err);
-    ptx->pose = ptx->track.pose;
+    ptx->pose = ptx->base.track.pose;
     return rc;
 }
 
@@ -113,7 +92,7 @@ static float intensity(struct ptx *ptx, double reflectance_db)
 static int ptx_points(void *rec, int n, struct sh_err *err)
 {
     struct ptx *ptx = rec;
-    const struct track *t = &ptx->track;
+    const struct track *t = &ptx->base.track;
     for (int i = 0; i < n; i++) {
         const struct scanhead_point *p = &t->point[i];
         if (p->echo > 1) {
@@ -130,35 +109,28 @@ static int ptx_points(void *rec, int n, struct sh_err *err)
     return 0;
 }
 
-static int ptx_frame(void *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
-{
-    static const struct track_ops ops = {ptx_scan, ptx_points};
-    struct ptx *ptx = rec;
-    return track_frame(&ptx->track, sh, frame, &ops, ptx, err);
-}
-
-static void tell(const struct ptx *ptx)
-{
-    const struct {
-        uint64_t n;
-        const char *what;
-    } loss[] = {{ptx->n_left_out, "echoes left out; a PTX grid holds the first of a shot"},
-                {ptx->n_too_bright, "echoes brighter than a white target, which PTX writes as 1"},
-                {ptx->n_padded, "places of the grid without a shot, filled like shots without echo"}};
-    for (size_t i = 0; i < sizeof loss / sizeof loss[0]; i++)
-        if (loss[i].n > 0) sh_warn(ptx->report, "%s: %" PRIu64 " %s", ptx->file.path, loss[i].n, loss[i].what);
-    track_tell(&ptx->track, ptx->report);
-}
-
-static int ptx_close(void *rec, int keep, struct sh_err *err)
+static int ptx_finish(void *rec, struct sh_err *err)
 {
     struct ptx *ptx = rec;
-    int rc = keep ? end_scan(ptx, err) : 0;
-    if (keep && rc == 0) tell(ptx);
-    int closed = outfile_close(&ptx->file, keep && rc == 0, err);
-    ptx_grid_close(&ptx->grid);
-    free(ptx);
-    return rc != 0 ? rc : closed;
+    int rc = end_scan(ptx, err);
+    if (rc != 0) return rc;
+    recorder_report(rec, ptx->n_left_out, "echoes left out; a PTX grid holds the first of a shot");
+    recorder_report(rec, ptx->n_too_bright, "echoes brighter than a white target, which PTX writes as 1");
+    recorder_report(rec, ptx->n_padded, "places of the grid without a shot, filled like shots without echo");
+    return 0;
 }
 
-const struct recorder_ops recorder_ptx = {".ptx", ptx_open, ptx_frame, ptx_close, 1};
+static void ptx_release(void *rec)
+{
+    ptx_grid_close(&((struct ptx *)rec)->grid);
+}
+
+const struct recorder_ops recorder_ptx = {
+    .ending = ".ptx",
+    .size = sizeof(struct ptx),
+    .metres = 1,
+    .track = {.scan = ptx_scan, .points = ptx_points, .metres = 1},
+    .begin = ptx_begin,
+    .finish = ptx_finish,
+    .release = ptx_release,
+};

@@ -1,11 +1,14 @@
 #include "drivers/record/recorder.h"
 
+#include <inttypes.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
-#include "drivers/record/recorder_list.h"
-
+/* The one list of formats. */
+extern const struct recorder_ops recorder_ply, recorder_las, recorder_ptx, recorder_e57, recorder_poses,
+    recorder_pcapng, recorder_shs;
 static const struct recorder_ops *const recorders[] = {&recorder_ply,   &recorder_las,    &recorder_ptx, &recorder_e57,
                                                        &recorder_poses, &recorder_pcapng, &recorder_shs};
 
@@ -22,4 +25,70 @@ const struct recorder_ops *recorder_find(const char *path, struct sh_err *err)
     }
     sh_fail(err, SH_EINPUT, "%s: no recorder for this ending; known are%s", path, known);
     return NULL;
+}
+
+int recorder_open(const struct recorder_ops *ops, const char *path, const struct recorder_options *options,
+                  struct recorder **out, struct sh_err *err)
+{
+    struct recorder *rec = calloc(1, ops->size);
+    if (rec == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);
+    int rc = outfile_open(&rec->file, path, err);
+    if (rc != SH_OK) {
+        free(rec);
+        return rc;
+    }
+    rec->ops = ops;
+    rec->options = *options;
+    rec->track.path = rec->file.path;
+    rec->track.ops = &ops->track;
+    rec->track.rec = rec;
+    rec->track.wants_attributes = ops->wants_attributes;
+    rc = ops->begin != NULL ? ops->begin(rec, err) : SH_OK;
+    if (rc != SH_OK) {
+        recorder_close(rec, 0, NULL);
+        return rc;
+    }
+    *out = rec;
+    return SH_OK;
+}
+
+int recorder_frame(struct recorder *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
+{
+    if (rec->ops->frame != NULL) return rec->ops->frame(rec, sh, frame, err);
+    return track_frame(&rec->track, sh, frame, err);
+}
+
+void recorder_report(const struct recorder *rec, uint64_t n, const char *what)
+{
+    if (n > 0) sh_warn(rec->options.report, "%s: %" PRIu64 " %s", rec->file.path, n, what);
+}
+
+int recorder_fail_huge(const struct recorder *rec, const double p[3], struct sh_err *err)
+{
+    return sh_fail(err, SH_EFORMAT, "%s: a coordinate has more digits than this format takes: %g %g %g", rec->file.path,
+                   p[0], p[1], p[2]);
+}
+
+static void report_losses(const struct recorder *rec)
+{
+    const struct track *t = &rec->track;
+    if (rec->ops->track.points == NULL) return;
+    recorder_report(rec, t->n_unplaced, "points left out that came before the descriptor and the anchor of their scan");
+    recorder_report(rec, t->n_without_pose, "points left out whose pose was lost");
+    recorder_report(rec, t->n_attributes_unheld,
+                    "points whose amplitude and width are left out; this format has no place for them");
+    recorder_report(rec, t->n_without_attributes, "points without amplitude and width, which were lost");
+}
+
+int recorder_close(struct recorder *rec, int keep, struct sh_err *err)
+{
+    const struct recorder_ops *ops = rec->ops;
+    int rc = keep ? track_flush(&rec->track, err) : SH_OK;
+    if (keep && rc == SH_OK && ops->finish != NULL) rc = ops->finish(rec, err);
+    if (keep && rc == SH_OK) report_losses(rec);
+    int closed = outfile_close(&rec->file, keep && rc == SH_OK, err);
+    track_free(&rec->track);
+    if (ops->release != NULL) ops->release(rec);
+    free(rec);
+    return rc != SH_OK ? rc : closed;
 }

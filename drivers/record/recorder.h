@@ -1,31 +1,64 @@
-/* Recorders: points -> a file, by its ending. One ops struct, one file each. */
+/* Recorders: the frames of a stream in, one file out; which format, its ending says.
+ *
+ * A format is one file of this folder with a `const struct recorder_ops`, and one row in the table in
+ * recorder.c. What all of them do is here and in recorder.c: the file that appears whole or not at all
+ * (outfile.h), the points and poses of the stream (track.h), what was left out. A recorder's own struct
+ * begins with a struct recorder. One thread per recorder. */
 #ifndef DRIVERS_RECORD_RECORDER_H
 #define DRIVERS_RECORD_RECORDER_H
 
 #include "core/err.h"
 #include "drivers/host/scanhead.h"
+#include "drivers/record/outfile.h"
+#include "drivers/record/track.h"
 
 struct recorder_options {
     int ascii;       /* PLY as text */
     int empty_shots; /* keep shots without echo, where the format can */
-    /* Told at the end what the format had no room for. May be NULL; must live until close. */
+    /* Is given, at the end, what the format had no room for. May be NULL; must live until close. */
     const struct sh_report *report;
 };
 
-struct recorder_ops {
-    const char *ending; /* ".ply" */
-    /* Opens path for writing. Nothing is written to path itself before close succeeds: the data go to a file beside it
-     * (".part") that is renamed at the end; options are copied. */
-    int (*open)(const char *path, const struct recorder_options *options, void **rec, struct sh_err *err);
-    /* Each frame of the stream, in order, with the handle for info, points and surfaces. */
-    int (*frame)(void *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
-    /* Finishes the file (counts in the header), syncs and renames. rec is void afterwards, also on failure.
-     * keep = 0: throws the file away. */
-    int (*close)(void *rec, int keep, struct sh_err *err);
-    int metres; /* 1: its coordinates are metres, a geodetic stream is refused with its first points */
+struct recorder {
+    const struct recorder_ops *ops;
+    struct recorder_options options;
+    struct outfile file;
+    struct track track; /* file.path is its path in messages */
 };
 
-/* By the path's ending; NULL and the list of known endings in err when there is none. */
+/* What a format is. Each function gets the recorder's own struct as rec; each may be NULL. Errors: SH_E, text
+ * in err. */
+struct recorder_ops {
+    const char *ending;     /* ".ply" */
+    size_t size;            /* of the recorder's own struct; after its struct recorder it begins zeroed */
+    int metres;             /* 1: its coordinates are metres; the first points of a geodetic stream are refused */
+    int wants_attributes;   /* 1: it has a place for amplitude and width */
+    struct track_ops track; /* takes points in batches */
+    /* The file is open and empty. */
+    int (*begin)(void *rec, struct sh_err *err);
+    /* Takes each frame of the stream, in order. NULL: track_frame alone takes them. */
+    int (*frame)(void *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
+    /* All points have come: completes the file (counts in the header) and reports what it had no room for. */
+    int (*finish)(void *rec, struct sh_err *err);
+    /* Frees what the recorder's own struct holds; also after begin has failed. */
+    void (*release)(void *rec);
+};
+
+/* By the path's ending. NULL, and the list of known endings in err, where there is none. */
 const struct recorder_ops *recorder_find(const char *path, struct sh_err *err);
+
+/* Opens path for writing. Nothing is written to path itself before close succeeds: the data go to a file
+ * beside it (".part") that is renamed at the end. Options are copied. */
+int recorder_open(const struct recorder_ops *ops, const char *path, const struct recorder_options *options,
+                  struct recorder **rec, struct sh_err *err);
+/* Each frame of the stream, in order, with the handle for information, points and surfaces. */
+int recorder_frame(struct recorder *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
+/* Finishes the file, syncs and renames it; keep = 0: throws it away. rec is freed, also after a failure. */
+int recorder_close(struct recorder *rec, int keep, struct sh_err *err);
+
+/* For formats: reports "PATH: n what", unless n is 0. */
+void recorder_report(const struct recorder *rec, uint64_t n, const char *what);
+/* For formats: SH_EFORMAT, for a coordinate that is too long to be written as text. */
+int recorder_fail_huge(const struct recorder *rec, const double p[3], struct sh_err *err);
 
 #endif

@@ -1,10 +1,10 @@
-/* Where the head stands in the frame that a recording's points are in: the stream's CRS (geo layout) or the scene
- * frame (polar layout).
+/* Where the head stands in the frame that a recording's points are in: the stream's CRS (geo layout) or the
+ * scene frame (polar layout).
  *
- * Recorders whose formats keep points in the scanner's frame beside a pose (PTX, E57) write points and pose so that the
- * pose takes each point to its place in the CRS, whatever the CRS: in the geo layout the points are taken back by the
- * very pose that is written. In a local frame and in ECEF what comes out is the head's own frame; in UTM and UPS it is
- * that frame with the grid's scale and bending in it, since a rigid pose can't hold them.
+ * Some formats keep points in the scanner's frame beside a pose (PTX, E57). Their recorders write points and
+ * pose so that the pose takes each point to its place in the CRS. In the geo layout they take the points back
+ * by the same pose that they write. In a local frame and in ECEF that gives the head's own frame. In UTM and
+ * UPS it gives that frame with the grid's scale and curvature in it, since a rigid pose can't hold them.
  * Pure; any thread. */
 #ifndef DRIVERS_RECORD_STATION_POSE_H
 #define DRIVERS_RECORD_STATION_POSE_H
@@ -16,8 +16,8 @@ struct station_pose {
     double rotation[9]; /* head's frame (SOCS) -> recording's frame, row by row; proper */
 };
 
-/* Shift and rotation are the anchor's. Where the head moves they say nothing of it: see track.h. In geodetic
- * coordinates the shift is degrees, degrees, metres, and the axes are east, north, up. */
+/* Shift and rotation are the anchor's. Where the head moves, they don't say where it is: see track.h. In
+ * geodetic coordinates the shift is degrees, degrees, metres, and the axes are east, north, up. */
 void station_pose_of(const struct scanhead_info *info, struct station_pose *pose);
 
 /* p = shift + rotation * p, and back. */

@@ -20,12 +20,11 @@ int track_is_geoid(const struct track *track)
     return track->geoid;
 }
 
-int track_check_metres(const struct track *t, struct sh_err *err)
+int track_start_gps(const struct track *track, double *gps_s)
 {
-    if (t->crs != NATIVE_CRS_GEODETIC) return 0;
-    return sh_fail(err, SH_EFORMAT,
-                   "%s: this format holds metres, and output.crs is geodetic; allowed local, ecef, utm, or .las, .ply",
-                   t->path);
+    if (scanhead_gps_time(track->sh, 0, gps_s) != 0) return 0;
+    *gps_s += 1e9; /* adjusted standard GPS time is that much less */
+    return 1;
 }
 
 /* In steps of this the recording of a moving head holds 200 km in 32 bits. */
@@ -78,8 +77,8 @@ static int begins_scan(const struct track *t, const struct scanhead_frame *frame
     return t->n_scans == 0 || t->new_scan || frame->pulse0 < t->last_pulse0 || t->info.station != t->last_station;
 }
 
-/* The end of a line tells where the next one begins. Where it was lost, the times in the frame do, as long as the pulse
- * rate is that of the descriptor. */
+/* The end of a line says where the next one begins. Where it was lost, the times in the frame say so, as long
+ * as the pulse rate is that of the descriptor. */
 static uint64_t first_row(const struct track *t, const struct scanhead_frame *frame)
 {
     if (t->have_next_line && t->next_line == frame->scan_line && t->next_line_pulse0 <= frame->pulse0)
@@ -98,24 +97,24 @@ static uint64_t number_rows(struct track *t, uint64_t row, int n)
     return row;
 }
 
-/* Positions of the geo layout need no pose, the frame scalar does: not-a-number where it was lost. */
-static void set_geo_frames(struct track *t, struct scanhead *sh, int n)
+/* Positions of the geo layout need no pose. The frame scalar does; it is NaN where the pose was lost. */
+static void set_geo_frames(struct track *t, int n)
 {
     struct scanhead_pose pose;
     for (int i = 0; i < n; i++)
-        t->frame[i] = scanhead_pose(sh, t->point[i].t_ns, &pose) == SCANHEAD_OK ? pose.frame : NAN;
+        t->frame[i] = scanhead_pose(t->sh, t->point[i].t_ns, &pose) == SCANHEAD_OK ? pose.frame : NAN;
 }
 
 /* How many are left, or a negative error. */
-static int place_moving(struct track *t, struct scanhead *sh, int n, struct sh_err *err)
+static int place_moving(struct track *t, int n, struct sh_err *err)
 {
     int kept = 0;
     if (t->info.geo) {
-        set_geo_frames(t, sh, n);
+        set_geo_frames(t, n);
         return n;
     }
-    int lost = scanhead_to_scene(sh, t->point, (uint32_t)n, t->frame);
-    if (lost < 0) return sh_fail(err, lost, "%s: %s", t->path, scanhead_error(sh));
+    int lost = scanhead_to_scene(t->sh, t->point, (uint32_t)n, t->frame);
+    if (lost < 0) return sh_fail(err, lost, "%s: %s", t->path, scanhead_error(t->sh));
     for (int i = 0; i < n; i++) {
         if (t->point[i].echo_count != 0 && isnan(t->point[i].x)) {
             t->n_without_pose++;
@@ -148,7 +147,7 @@ static int begin_waiting(struct track *t, struct sh_err *err)
     return 0;
 }
 
-/* The batch at hand. */
+/* Keeps the present batch. */
 static void wait_for_attributes(struct track *t, int n)
 {
     struct track_waiting *w = t->waiting;
@@ -161,8 +160,7 @@ static void wait_for_attributes(struct track *t, int n)
 }
 
 /* attribute: of all points of their frame; NULL: lost. */
-static int hand_out(struct track *t, const struct scanhead_attribute *attribute, const struct track_ops *ops, void *rec,
-                    struct sh_err *err)
+static int hand_out(struct track *t, const struct scanhead_attribute *attribute, struct sh_err *err)
 {
     static const struct scanhead_attribute none = {(double)NAN, (double)NAN};
     struct track_waiting *w = t->waiting;
@@ -176,16 +174,16 @@ static int hand_out(struct track *t, const struct scanhead_attribute *attribute,
         t->attribute[n] = attribute != NULL ? attribute[p->index] : none;
         if (attribute == NULL && p->point.echo_count != 0) t->n_without_attributes++;
         if (++n < TRACK_BATCH && k + 1 < w->n) continue;
-        rc = ops->points(rec, n, err);
+        rc = t->ops->points(t->rec, n, err);
         n = 0;
     }
     if (w != NULL) w->n = 0;
     return rc;
 }
 
-int track_flush(struct track *t, const struct track_ops *ops, void *rec, struct sh_err *err)
+int track_flush(struct track *t, struct sh_err *err)
 {
-    return hand_out(t, NULL, ops, rec, err);
+    return hand_out(t, NULL, err);
 }
 
 void track_free(struct track *t)
@@ -194,13 +192,12 @@ void track_free(struct track *t)
     t->waiting = NULL;
 }
 
-static int take_attributes(struct track *t, struct scanhead *sh, const struct scanhead_frame *frame,
-                           const struct track_ops *ops, void *rec, struct sh_err *err)
+static int take_attributes(struct track *t, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
 {
     struct scanhead_attribute attribute[NATIVE_MAX_POINTS];
     if (t->waiting == NULL || t->waiting->n == 0) return 0;
     if (scanhead_attributes(sh, frame, 0, attribute, NATIVE_MAX_POINTS) < 0) return 0; /* of points that were lost */
-    return hand_out(t, attribute, ops, rec, err);
+    return hand_out(t, attribute, err);
 }
 
 static void count_unheld(struct track *t, int n)
@@ -210,24 +207,49 @@ static void count_unheld(struct track *t, int n)
         t->n_attributes_unheld += t->point[i].echo_count != 0;
 }
 
-/* n points of the frame that are at hand, from `first` on. */
-static int take_batch(struct track *t, struct scanhead *sh, uint32_t first, int n, const struct track_ops *ops,
-                      void *rec, struct sh_err *err)
+/* Takes the present batch: n points of the frame, from `first` on. */
+static int take_batch(struct track *t, uint32_t first, int n, struct sh_err *err)
 {
     for (int i = 0; i < n && t->has_attributes; i++)
         t->index[i] = first + (uint32_t)i;
-    int kept = t->info.moving ? place_moving(t, sh, n, err) : n;
+    int kept = t->info.moving ? place_moving(t, n, err) : n;
     if (kept < 0) return kept;
     count_unheld(t, kept);
-    if (!t->has_attributes) return ops->points(rec, kept, err);
+    if (!t->has_attributes) return t->ops->points(t->rec, kept, err);
     wait_for_attributes(t, kept);
     return 0;
 }
 
-static int take_points(struct track *t, struct scanhead *sh, const struct scanhead_frame *frame,
-                       const struct track_ops *ops, void *rec, struct sh_err *err)
+static int begin_scan(struct track *t, struct sh_err *err)
 {
-    int rc = track_flush(t, ops, rec, err);
+    set_pose(t);
+    t->n_scans++;
+    t->new_scan = 0;
+    if (t->ops->metres && t->crs == NATIVE_CRS_GEODETIC)
+        return sh_fail(
+            err, SH_EFORMAT,
+            "%s: this format holds metres, and output.crs is geodetic; allowed local, ecef, utm, or .las, .ply",
+            t->path);
+    return t->ops->scan != NULL ? t->ops->scan(t->rec, err) : 0;
+}
+
+/* Takes all points of the frame. row: that of the first one. */
+static int take_batches(struct track *t, const struct scanhead_frame *frame, uint64_t row, struct sh_err *err)
+{
+    int rc = 0;
+    for (uint32_t first = 0; rc == 0 && first < frame->n_points;) {
+        int n = scanhead_points(t->sh, frame, first, t->point, TRACK_BATCH);
+        if (n < 0) return sh_fail(err, n, "%s: %s", t->path, scanhead_error(t->sh));
+        row = number_rows(t, row, n);
+        rc = take_batch(t, first, n, err);
+        first += (uint32_t)n;
+    }
+    return rc;
+}
+
+static int take_points(struct track *t, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
+{
+    int rc = track_flush(t, err);
     if (rc != 0) return rc;
     if (scanhead_get_info(sh, &t->info) != 0) {
         t->n_unplaced += frame->n_points;
@@ -238,26 +260,14 @@ static int take_points(struct track *t, struct scanhead *sh, const struct scanhe
     rc = check_info(t, err);
     t->line = frame->scan_line;
     t->t0_ns = frame->scan_t0_ns;
-    if (rc == 0 && begins) {
-        set_pose(t);
-        t->n_scans++;
-        t->new_scan = 0;
-        if (ops->scan != NULL) rc = ops->scan(rec, err);
-    }
+    if (rc == 0 && begins) rc = begin_scan(t, err);
     t->last_pulse0 = frame->pulse0;
     t->last_station = t->info.station;
     if (rc == 0) rc = begin_waiting(t, err);
     uint64_t row = first_row(t, frame);
     if (rc == 0 && row + frame->n_points > UINT32_MAX)
         rc = sh_fail(err, SH_EFORMAT, "%s: line %u has more than 2^32 pulses", t->path, t->line);
-    for (uint32_t first = 0; rc == 0 && ops->points != NULL && first < frame->n_points;) {
-        int n = scanhead_points(sh, frame, first, t->point, TRACK_BATCH);
-        if (n < 0) return sh_fail(err, n, "%s: %s", t->path, scanhead_error(sh));
-        row = number_rows(t, row, n);
-        rc = take_batch(t, sh, first, n, ops, rec, err);
-        first += (uint32_t)n;
-    }
-    return rc;
+    return rc == 0 && t->ops->points != NULL ? take_batches(t, frame, row, err) : rc;
 }
 
 static void take_line_end(struct track *t, const struct scanhead_frame *frame)
@@ -269,30 +279,14 @@ static void take_line_end(struct track *t, const struct scanhead_frame *frame)
     t->next_line_pulse0 = end.pulse0 + end.n_fired;
 }
 
-int track_frame(struct track *t, struct scanhead *sh, const struct scanhead_frame *frame, const struct track_ops *ops,
-                void *rec, struct sh_err *err)
+int track_frame(struct track *t, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
 {
-    if (frame->type == SCANHEAD_POINTS) return take_points(t, sh, frame, ops, rec, err);
-    if (frame->type == SCANHEAD_ATTRIBUTES) return take_attributes(t, sh, frame, ops, rec, err);
+    if (frame->type == SCANHEAD_POINTS) return take_points(t, sh, frame, err);
+    if (frame->type == SCANHEAD_ATTRIBUTES) return take_attributes(t, sh, frame, err);
     if (frame->type == SCANHEAD_LINE_END) take_line_end(t, frame);
     if (frame->type == SCANHEAD_DESCRIPTOR && (frame->flags & SCANHEAD_REPEAT) == 0) {
         t->new_scan = 1;
         t->have_next_line = 0;
     }
     return 0;
-}
-
-void track_tell(const struct track *t, const struct sh_report *report)
-{
-    if (t->n_unplaced > 0)
-        sh_warn(report, "%s: %llu points left out that came before the descriptor and the anchor of their scan",
-                t->path, (unsigned long long)t->n_unplaced);
-    if (t->n_without_pose > 0)
-        sh_warn(report, "%s: %llu points left out whose pose was lost", t->path, (unsigned long long)t->n_without_pose);
-    if (t->n_attributes_unheld > 0)
-        sh_warn(report, "%s: amplitude and width of %llu points left out, for which this format has no place", t->path,
-                (unsigned long long)t->n_attributes_unheld);
-    if (t->n_without_attributes > 0)
-        sh_warn(report, "%s: %llu points without amplitude and width, which were lost", t->path,
-                (unsigned long long)t->n_without_attributes);
 }

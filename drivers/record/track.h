@@ -1,32 +1,44 @@
-/* What every recorder of points follows in a stream: where scans begin, the one frame of coordinates, the head's pose,
- * and which line and which shot of the line a point is of.
+/* What every recorder of points follows in a stream: where scans begin, the one frame of coordinates, the
+ * head's pose, and the line and the shot of each point. Frames go in, one by one; points come out in batches.
  *
- * Points of a moving head come out where they were hit, each by the pose of its own time: in the polar layout in the
- * scene frame, with a pose of the scan that changes nothing; in the geo layout in the CRS, as of a standing head, and
- * the pose is the first anchor's. Those of the polar layout whose pose was lost are left out and counted; those of the
- * geo layout need none.
+ * Points of a moving head come out where they were hit, each by the pose of its own time. In the polar layout
+ * they are then in the scene frame, and the pose of the scan changes nothing. In the geo layout they are in
+ * the CRS, as those of a standing head, and the pose is the first anchor's. Points of the polar layout whose
+ * pose was lost are left out and counted. Those of the geo layout need no pose.
  *
- * Where a recorder wants attributes and the head sends them, points wait for the frame behind theirs. Without it (it
- * was lost) they come out with the next points, or at the end, with attributes that are not-a-number, and are counted.
+ * Where a recorder wants attributes and the head sends them, points wait for the frame that follows theirs.
+ * Where that frame was lost, they come out with the next points, or at the end. Their attributes are then
+ * NaN, and are counted.
  *
- * A recorder passes each frame to track_frame, what waits to track_flush at the end, and gets its points back in
- * batches. One thread per track. */
+ * The owner sets path, ops, rec and wants_attributes in a zeroed struct. One thread per track. */
 #ifndef DRIVERS_RECORD_TRACK_H
 #define DRIVERS_RECORD_TRACK_H
 
 #include "core/err.h"
-#include "drivers/record/station_pose.h"
 #include "drivers/host/scanhead.h"
+#include "drivers/record/station_pose.h"
 
 enum { TRACK_BATCH = 256 };
 
 struct track_waiting;
 
+struct track_ops {
+    /* Points of a new scan will follow; track->info and pose are its. May be NULL. */
+    int (*scan)(void *rec, struct sh_err *err);
+    /* n points of track->point. In the geo layout they are in the CRS; in the polar layout in the head's
+     * frame, or in the scene frame where the head moves. NULL: no points wanted. */
+    int (*points)(void *rec, int n, struct sh_err *err);
+    int metres; /* 1: SH_EFORMAT where points of a scan are in geodetic coordinates */
+};
+
 struct track {
-    const char *path;     /* for messages; the recorder's */
-    int wants_attributes; /* the recorder's */
+    /* set by the owner */
+    const char *path; /* for messages */
+    const struct track_ops *ops;
+    void *rec; /* what ops are called with */
+    int wants_attributes;
     /* of the frame that the points at hand are in */
-    const struct scanhead *sh;
+    struct scanhead *sh;
     struct scanhead_info info;
     struct station_pose pose;
     uint32_t line; /* in the scan, from 0 */
@@ -53,32 +65,20 @@ struct track {
     uint64_t next_line_pulse0, last_pulse0;
 };
 
-struct track_ops {
-    /* Points of a new scan will follow; track->info and pose are its. May be NULL. */
-    int (*scan)(void *rec, struct sh_err *err);
-    /* n points of track->point; may be NULL. In the geo layout they are in the CRS, in the polar layout in the head's
-     * frame, the scene frame where the head moves. */
-    int (*points)(void *rec, int n, struct sh_err *err);
-};
+/* A new frame of the stream. SH_EFORMAT where the stream goes to what one file can't hold: another CRS,
+ * another kind of heights, a head that begins or ceases to move or to send (wanted) attributes, a station
+ * number above 65535. */
+int track_frame(struct track *track, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
 
-/* SH_EFORMAT when the stream goes to another CRS or kind of heights, to a head that moves or stands, or that sends
- * attributes or does not (where they are wanted), which no recorder's file can hold, or to a station beyond 65535. */
-int track_frame(struct track *track, struct scanhead *sh, const struct scanhead_frame *frame,
-                const struct track_ops *ops, void *rec, struct sh_err *err);
-
-/* At the end: points that still wait for their attributes. */
-int track_flush(struct track *track, const struct track_ops *ops, void *rec, struct sh_err *err);
+/* At the end: gives out the points that still wait for their attributes. */
+int track_flush(struct track *track, struct sh_err *err);
 void track_free(struct track *track);
-
-/* At the end: what could not be placed, or had no attributes. */
-void track_tell(const struct track *track, const struct sh_report *report);
 
 /* The CRS of the recording's points: the stream's in the geo layout, the scene frame in the polar one. */
 int track_crs(const struct track *track);  /* enum native_crs */
 int track_epsg(const struct track *track); /* 0: none */
 int track_is_geoid(const struct track *track);
-
-/* SH_EFORMAT for geodetic coordinates, which formats with rigid poses can't hold. */
-int track_check_metres(const struct track *track, struct sh_err *err);
+/* GPS time of the present scan's start, seconds since 1980-01-06: 1, or 0 where it is not known (yet). */
+int track_start_gps(const struct track *track, double *gps_s);
 
 #endif

@@ -1,5 +1,8 @@
-/* Back ends: who carries what a host does to the device core, and what the core answers back. One ops struct, one file
- * each. A back end is driven by its owner's poll(2): no threads, nothing blocks. */
+/* Back ends: the ways between a host and the device core (usb.h). What a host does goes in, the core's
+ * answers come out.
+ *
+ * One ops struct and one file each; backend.c has the list. A back end is driven by its owner's poll(2): it
+ * has no threads, and nothing blocks. */
 #ifndef DRIVERS_USB_BACKEND_H
 #define DRIVERS_USB_BACKEND_H
 
@@ -25,8 +28,8 @@ struct usb_backend_spec {
 struct usb_backend_ops {
     const char *name;
 
-    /* Opens as spec says; nothing is left behind when it fails. The device is the caller's and outlives the back end,
-     * which attaches and detaches it. */
+    /* Opens as spec says. When it fails, nothing of it stays. The device is the caller's and outlives the
+     * back end, which attaches and detaches it. */
     int (*open)(const struct usb_backend_spec *spec, struct usb_device *device, void **backend, struct sh_err *err);
 
     /* "usbip:127.0.0.1:3240" */
@@ -35,16 +38,18 @@ struct usb_backend_ops {
     /* Fills descriptors to wait for (room for USB_BACKEND_MAX_FDS) and returns how many. */
     int (*prepare)(void *backend, struct pollfd *fds);
 
-    /* After poll(2) on exactly these. Works through what came until go_on(ctx) says 0, which it asks after each of the
-     * host's acts; the rest waits for the next call, and then also without a descriptor that is ready: `more` says so.
-     * SH_EIO ends the back end for good. */
+    /* After poll(2) on exactly these. Works through what came; after each of the host's acts it asks
+     * go_on(ctx), and stops where that is 0. The rest waits for the next call, which then also comes without
+     * a descriptor that is ready: `more` says so. SH_EIO ends the back end for good. */
     int (*handle)(void *backend, const struct pollfd *fds, int n, int (*go_on)(void *ctx), void *ctx);
-    int (*more)(const void *backend);
+    int (*more)(const void *backend); /* NULL: poll(2) says it all */
 
-    /* What who runs the head should know, one line, and each only once; NULL: nothing. Valid until the next call. */
+    /* One line that whoever runs the head should know, each only once; NULL: nothing. Valid until the next
+     * call. The member itself is NULL for a back end that never has any. */
     const char *(*news)(void *backend);
 
-    /* Sends what the core has completed, as far as the wire takes it. After usb_device_write and usb_device_read. */
+    /* Sends what the core has completed, as far as the wire takes it. After usb_device_write and
+     * usb_device_read. */
     void (*flush)(void *backend);
 
     /* Unplugs. */
@@ -54,13 +59,13 @@ struct usb_backend_ops {
 /* NULL for an unknown type. */
 const struct usb_backend_ops *usb_backend_ops_get(enum usb_backend_type type);
 
-/* A listening or (connect) connected socket, not blocking. On a Unix socket left behind by a process that is gone, the
- * path is taken over. `what` names it in errors; name gets "127.0.0.1:3240" or the path. backend_socket.c */
+/* A listening or (attach) connected socket, not blocking. The path of a Unix socket whose process is gone is
+ * taken over. `what` names it in errors; name gets "127.0.0.1:3240" or the path. backend_socket.c */
 int usb_backend_socket(const struct usb_backend_spec *spec, const char *what, int *fd, char *name, size_t len,
                        struct sh_err *err);
-/* Where a socket that was connected by usb_backend_socket leads, and the way there once more: without waiting and
- * without asking for names. 0: *fd is connected; EINPROGRESS: it is when poll(2) finds it writable, and SO_ERROR says
- * how it went; else an errno, and *fd is -1. backend_socket.c */
+/* The address that a socket of usb_backend_socket is connected to, and connecting to it again, without
+ * waiting and without looking up names. 0: *fd is connected. EINPROGRESS: it will be when poll(2) finds it
+ * writable; usb_backend_connect_error then says how it went. Any other errno: *fd is -1. backend_socket.c */
 struct usb_backend_address {
     struct sockaddr_storage at;
     socklen_t len;
@@ -68,9 +73,9 @@ struct usb_backend_address {
 void usb_backend_peer(const struct usb_backend_spec *spec, int fd, struct usb_backend_address *out);
 int usb_backend_connect(const struct usb_backend_address *to, int *fd);
 int usb_backend_connect_error(int fd);
-/* Before closing: nothing more from us, and wait until the peer has read it and hung up, or timeout_ms pass without a
- * byte, eight times that at most. To close with requests of the peer unread would throw away replies on their way.
- * backend_socket.c */
+/* To be called before closing. Sends nothing more, and waits until the peer has read everything and hung up,
+ * or until timeout_ms pass without a byte; eight times that at most. Closing with unread requests of the peer
+ * would throw away replies on their way. backend_socket.c */
 void usb_backend_hang_up(int fd, int timeout_ms);
 
 #endif

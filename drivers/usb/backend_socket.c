@@ -1,8 +1,5 @@
 /* Sockets of the back ends that talk over one. */
 #include <errno.h>
-#include <fcntl.h>
-#include <netdb.h>
-#include <netinet/in.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/socket.h>
@@ -10,36 +7,8 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "drivers/socket/socket.h"
 #include "drivers/usb/backend.h"
-
-enum { BACKLOG = 16 };
-
-static int error_code(int error)
-{
-    return error == EACCES || error == EPERM                                                           ? SH_EPERM
-           : error == EADDRINUSE || error == EADDRNOTAVAIL || error == ENOENT || error == ECONNREFUSED ? SH_EINPUT
-                                                                                                       : SH_EIO;
-}
-
-static int start(int fd, const struct sockaddr *at, socklen_t len, int connecting)
-{
-    const int one = 1;
-    if (connecting) return connect(fd, at, len);
-    setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
-    return bind(fd, at, len) == 0 ? listen(fd, BACKLOG) : -1;
-}
-
-/* Connects while blocking, since the other end is on this machine or near; not blocking from then on. */
-static int open_socket(const struct sockaddr *at, socklen_t len, int connecting)
-{
-    int fd = socket(at->sa_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    if (fd < 0) return -1;
-    if (start(fd, at, len, connecting) == 0 && fcntl(fd, F_SETFL, O_NONBLOCK) == 0) return fd;
-    int error = errno;
-    close(fd);
-    errno = error;
-    return -1;
-}
 
 int usb_backend_connect(const struct usb_backend_address *to, int *fd)
 {
@@ -91,8 +60,8 @@ void usb_backend_peer(const struct usb_backend_spec *spec, int fd, struct usb_ba
     if (getpeername(fd, (struct sockaddr *)&out->at, &out->len) != 0) out->len = 0;
 }
 
-/* Nobody answers on it: its owner is gone without removing it. One whose queue is full lives; that is not waited for.
- */
+/* Nobody answers on it: its owner is gone and has not removed it. A socket whose queue is full is alive; this
+ * does not wait for it. */
 static int is_left_behind(const char *path, const struct usb_backend_address *at)
 {
     struct stat st;
@@ -110,48 +79,11 @@ static int unix_socket(const struct usb_backend_spec *spec, const char *what, in
         return sh_fail(err, SH_EINPUT, "%s:%s: the path is too long for a socket; allowed %zu bytes", what, spec->path,
                        sizeof((struct sockaddr_un *)0)->sun_path - 1);
     if (!spec->attach && is_left_behind(spec->path, &at)) unlink(spec->path);
-    *fd = open_socket((struct sockaddr *)&at.at, at.len, spec->attach);
+    *fd = socket_open_at((struct sockaddr *)&at.at, at.len, spec->attach);
     if (*fd >= 0) return SH_OK;
-    return sh_fail(err, error_code(errno), "%s:%s: cannot %s: %s%s", what, spec->path,
+    return sh_fail(err, socket_error_code(errno), "%s:%s: cannot %s: %s%s", what, spec->path,
                    spec->attach ? "connect" : "listen", strerror(errno),
                    errno == EADDRINUSE ? "; it is in use, or not a socket: choose another path" : "");
-}
-
-static void name_socket(int fd, int connecting, char *name, size_t len)
-{
-    struct sockaddr_storage at;
-    socklen_t at_len = sizeof at;
-    char host[64], port[8];
-    int rc = connecting ? getpeername(fd, (struct sockaddr *)&at, &at_len)
-                        : getsockname(fd, (struct sockaddr *)&at, &at_len);
-    if (rc != 0 || getnameinfo((struct sockaddr *)&at, at_len, host, sizeof host, port, sizeof port,
-                               NI_NUMERICHOST | NI_NUMERICSERV) != 0)
-        return;
-    snprintf(name, len, strchr(host, ':') != NULL ? "[%s]:%s" : "%s:%s", host, port);
-}
-
-static int tcp_socket(const struct usb_backend_spec *spec, const char *what, int *fd, char *name, size_t len,
-                      struct sh_err *err)
-{
-    const char *host = spec->address[0] != '\0' ? spec->address : "127.0.0.1";
-    char service[8];
-    snprintf(service, sizeof service, "%u", (unsigned)spec->port & 0xffffu);
-    struct addrinfo hints = {.ai_socktype = SOCK_STREAM, .ai_flags = AI_PASSIVE | AI_NUMERICSERV}, *list = NULL;
-    int rc = getaddrinfo(host, service, &hints, &list);
-    if (rc != 0)
-        return sh_fail(err, SH_EINPUT, "%s:%s:%d: no such address: %s", what, host, spec->port,
-                       rc == EAI_SYSTEM ? strerror(errno) : gai_strerror(rc));
-    *fd = -1;
-    for (const struct addrinfo *at = list; at != NULL && *fd < 0; at = at->ai_next)
-        *fd = open_socket(at->ai_addr, at->ai_addrlen, spec->attach);
-    int error = errno;
-    freeaddrinfo(list);
-    if (*fd < 0)
-        return sh_fail(err, error_code(error), "%s:%s:%d: cannot %s: %s%s", what, host, spec->port,
-                       spec->attach ? "connect" : "listen", strerror(error),
-                       error == EADDRINUSE ? "; port 0 lets the system choose" : "");
-    name_socket(*fd, spec->attach, name, len);
-    return SH_OK;
 }
 
 int usb_backend_socket(const struct usb_backend_spec *spec, const char *what, int *fd, char *name, size_t len,
@@ -161,7 +93,8 @@ int usb_backend_socket(const struct usb_backend_spec *spec, const char *what, in
         snprintf(name, len, "%s", spec->path);
         return unix_socket(spec, what, fd, err);
     }
-    return tcp_socket(spec, what, fd, name, len, err);
+    const struct socket_place place = {what, spec->address, spec->port, spec->attach};
+    return socket_open(&place, fd, name, len, err);
 }
 
 void usb_backend_hang_up(int fd, int timeout_ms)

@@ -1,4 +1,5 @@
-/* Control requests: chapter 9, strictly. What the specification leaves open, or says is not specified, stalls.
+/* Control requests: chapter 9, strictly. What the specification leaves open, or says is not specified,
+ * stalls.
  *
  * Not supported, and said so by stalling: remote wake-up, latency tolerance messages, test modes (there is no
  * transceiver to test), SET_DESCRIPTOR, SYNCH_FRAME (no isochronous endpoints). */

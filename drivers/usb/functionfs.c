@@ -1,6 +1,7 @@
-/* The functionfs back end: the device on a real device controller of this machine (a board with a UDC), as a gadget of
- * the Linux kernel. The kernel answers the standard requests from the descriptors it was given; what concerns our own
- * interfaces comes as events on ep0. The core hears of a configuration as if it had answered the requests itself. */
+/* The functionfs back end: the device on a real device controller of this machine (a board with a UDC), as a
+ * gadget of the Linux kernel. The kernel answers the standard requests from the descriptors it was given;
+ * what concerns our own interfaces comes as events on ep0. The core hears of a configuration as if it had
+ * answered the requests itself. */
 #include <errno.h>
 #include <fcntl.h>
 #include <linux/usb/functionfs.h>
@@ -13,8 +14,8 @@
 #include "drivers/usb/backend.h"
 #include "drivers/usb/functionfs_private.h"
 
-/* MAX_TAKEN: completions before ep0 is looked at again, and MAX_EVENTS: events of ep0 within one call. Whatever the
- * kernel's answers are, both get their turn, and so does the owner. */
+/* MAX_TAKEN: completions before ep0 is looked at again, and MAX_EVENTS: events of ep0 within one call.
+ * Whatever the kernel's answers are, both get their turn, and so does the owner. */
 enum { CLOSE_WAIT_MS = 500, MAX_TAKEN = 2 * FFS_SLOTS * FFS_MAX_PIPES, MAX_EVENTS = 64 };
 
 static void on_complete(void *ctx, struct usb_transfer *transfer)
@@ -108,11 +109,12 @@ static void enable(struct functionfs *self)
 static void stall(struct functionfs *self, int in)
 {
     ssize_t n = in ? read(self->ep0, self->data, 0) : write(self->ep0, self->data, 0);
-    (void)n; /* fails, as it must */
+    (void)n; /* it fails, which is what stalls */
 }
 
 /* The kernel has put its own numbers in wIndex: interfaces count from 0, endpoints from 1 in the order of our
- * descriptors. To the model's. An endpoint that nobody described becomes endpoint 0, and no function answers for it. */
+ * descriptors. To the model's. An endpoint that nobody described becomes endpoint 0, and no function answers
+ * for it. */
 static void translate_index(const struct functionfs *self, struct usb_ctrlrequest *setup)
 {
     const unsigned index = le_get16(&setup->wIndex), recipient = setup->bRequestType & USB_RECIP_MASK;
@@ -178,7 +180,8 @@ static int functionfs_handle(void *backend, const struct pollfd *fds, int n, int
     struct functionfs *self = backend;
     if (n != N_FDS) return SH_OK;
     int going = go_on(ctx), any = 1;
-    /* What came on the endpoints came before the event on ep0: a session is not closed before its last data are in. */
+    /* What came on the endpoints came before the event on ep0: a session is not closed before its last data
+     * are in. */
     for (int events = 0; going && any && events < MAX_EVENTS; events++) {
         int taken = 0;
         for (; going && taken < MAX_TAKEN && ffs_pipes_take(&self->pipes); taken++)
@@ -199,12 +202,6 @@ static int functionfs_more(const void *backend)
     return self->backlog;
 }
 
-static const char *functionfs_news(void *backend)
-{
-    (void)backend;
-    return NULL;
-}
-
 static void functionfs_close(void *backend)
 {
     struct functionfs *self = backend;
@@ -219,7 +216,6 @@ const struct usb_backend_ops usb_backend_functionfs = {
     .prepare = functionfs_prepare,
     .handle = functionfs_handle,
     .more = functionfs_more,
-    .news = functionfs_news,
     .flush = functionfs_flush,
     .close = functionfs_close,
 };

@@ -38,7 +38,7 @@ int ffs_console_open(struct ffs_console *console, struct usb_device *device, int
     return SH_OK;
 }
 
-/* As the host's driver would: what the kernel's function does not tell. */
+/* As the host's driver would: the kernel's function does not report it. */
 static void set_session(struct ffs_console *console, int open)
 {
     struct usb_ctrlrequest setup = {.bRequestType = USB_DIR_OUT | USB_TYPE_CLASS | USB_RECIP_INTERFACE,
@@ -57,8 +57,8 @@ static void offer_tx(struct ffs_console *console)
     usb_device_submit(console->device, &console->tx);
 }
 
-/* The tty hands its bytes on in up to 16 requests, one per write, before its buffer begins to fill and shows that
- * nobody takes them. So little is written in many pieces. */
+/* The tty passes its bytes on in up to 16 requests, one per write. Only then does its buffer fill and show
+ * that nobody takes them. So a small amount is written in many pieces. */
 static void write_tx(struct ffs_console *console)
 {
     if (console->lead_pos < console->lead_len) {
@@ -79,7 +79,7 @@ static void write_tx(struct ffs_console *console)
     offer_tx(console);
 }
 
-/* Every second: has the host taken anything of what there is? If not, its port is closed, and what is left is void. */
+/* Every second: where bytes wait and the host has taken none, its port is closed, and the rest is void. */
 static void look_at_host(struct ffs_console *console)
 {
     uint64_t count;
@@ -96,7 +96,7 @@ static void look_at_host(struct ffs_console *console)
     offer_tx(console);
 }
 
-/* A reader takes text only in step, behind a whole frame (PROTOCOL.md, Resynchronisation). */
+/* A reader takes text only in step, after a whole frame (PROTOCOL.md, Resynchronisation). */
 static void lead_in(struct ffs_console *console)
 {
     const struct native_event event = {.code = NATIVE_EV_READER_LOST, .text = "the end of an earlier session"};

@@ -1,5 +1,5 @@
-/* Endpoints of FunctionFS. write(2) on them blocks until the host has taken the data, so they are driven by the
- * kernel's asynchronous I/O, whose completions an eventfd counts. */
+/* Endpoints of FunctionFS. write(2) on them blocks until the host has taken the data, so they are driven by
+ * the kernel's asynchronous I/O, whose completions an eventfd counts. */
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
@@ -143,8 +143,9 @@ int ffs_pipes_complete(struct ffs_pipes *pipes, struct usb_transfer *transfer)
     return 1;
 }
 
-/* A slot the kernel has given back unused. An endpoint that is down does so at once, and would again; what is left over
- * from before the present start says nothing about it. Other failures pass, or become many in a row. */
+/* A slot the kernel has given back unused. An endpoint that is down does so at once, and would again; what is
+ * left over from before the present start says nothing about it. Other failures pass, or become many in a
+ * row. */
 static int has_to_rest(const struct ffs_pipes *pipes, struct ffs_slot *slot, int64_t result)
 {
     const int is_down = result == -EAGAIN || result == -ESHUTDOWN || result == -ENODEV;

@@ -1,4 +1,5 @@
-/* Inside of the functionfs back end: endpoints with asynchronous I/O, and the console over the kernel's tty. */
+/* The functionfs back end's own parts: endpoints with asynchronous I/O, and the console over the kernel's
+ * tty. Private. */
 #ifndef DRIVERS_USB_FUNCTIONFS_PRIVATE_H
 #define DRIVERS_USB_FUNCTIONFS_PRIVATE_H
 
@@ -10,15 +11,16 @@
 
 enum { FFS_SLOTS = 8, FFS_SLOT_BYTES = 32768, FFS_MAX_PIPES = 8, FFS_MAX_FAILURES = 16 };
 
-/* A slot is a buffer that goes round: IN, it waits at the core as if a host had asked for that much, is filled, and is
- * written to the kernel; OUT, it is read from the kernel and waits at the core until the function has read it. On an
- * endpoint that is down the kernel gives it back at once: then it is idle until the next configuration comes up. */
+/* A slot is a buffer that goes round. IN: it waits at the core as if a host had asked for that much, is
+ * filled, and is written to the kernel. OUT: it is read from the kernel, and waits at the core until the
+ * function has read it. On an endpoint that is down the kernel gives it back at once; then it is idle until
+ * the next configuration comes up. */
 enum ffs_slot_state { FFS_IDLE, FFS_AT_CORE, FFS_AT_KERNEL };
 
 struct ffs_slot {
     struct usb_transfer transfer;
     enum ffs_slot_state state;
-    struct iocb io, zero; /* zero: the packet of no bytes behind it */
+    struct iocb io, zero; /* zero: the packet of no bytes after it */
     int n_io;             /* of these, at the kernel */
     uint32_t start;       /* which start they are from */
     int failures;         /* in a row */
@@ -59,10 +61,10 @@ void ffs_pipes_close(struct ffs_pipes *pipes);
 /* The model's address of an endpoint by its number in FunctionFS, counted from 1; 0 where there is none. */
 uint8_t ffs_pipes_address(const struct ffs_pipes *pipes, unsigned number);
 
-/* The console. The kernel's f_acm keeps DTR to itself, so a session begins with the first bytes of the host, and ends
- * when the host has taken nothing for a second or two of what there is for it. What the tty holds by then can't be
- * taken back: the next reader gets it first, a frame cut at its end, and then a frame of its own that brings it into
- * step. */
+/* The console. The kernel's f_acm does not report DTR. So a session begins with the first bytes of the host,
+ * and ends when the host has taken none of the waiting bytes for one or two seconds. What the tty holds by
+ * then can't be taken back. The next reader gets that first, cut within a frame, and then a frame of its own
+ * that brings it into step. */
 struct ffs_console {
     struct usb_device *device;
     int fd;    /* of the tty; -1: not plugged in, or no console */
@@ -70,10 +72,10 @@ struct ffs_console {
     int number;
     int rx_busy, tx_at_core, session;
     uint32_t tx_len, tx_pos;
-    int cut; /* a session was given up: the tty holds the rest of it */
+    int cut; /* a session was given up; the tty holds the rest of it */
     uint32_t lead_len, lead_pos;
     uint8_t lead[256];       /* goes before everything else */
-    uint64_t written, taken; /* bytes to the tty; of these, gone from its buffer when last looked at */
+    uint64_t written, taken; /* bytes to the tty; of these, no longer in its buffer when last looked at */
     struct usb_transfer rx, tx;
     uint8_t rx_bytes[4096], tx_bytes[4096];
 };

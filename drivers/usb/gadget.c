@@ -80,7 +80,7 @@ static void remove_link(const char *dir, const char *name)
     unlink(path);
 }
 
-/* ---- what is left behind */
+/* ---- what dead processes left */
 
 static void unmount(const char *name)
 {
@@ -92,7 +92,7 @@ static void unmount(const char *name)
     fclose(mounts);
 }
 
-/* Everything of that name, in the order in which configfs lets go of it. What is not there does no harm. */
+/* Removes everything of that name, in the order that configfs allows. What is not there is skipped. */
 static void remove_all(const char *name)
 {
     char dir[128], function[64], link[80];
@@ -115,7 +115,8 @@ static void remove_all(const char *name)
     rmdir(dir);
 }
 
-/* When a process was started, in clock ticks from the machine's start: proc(5), stat, field 22. 0 or -1 with errno. */
+/* When a process was started, in clock ticks from the machine's start: proc(5), stat, field 22. 0 or -1 with
+ * errno. */
 static int started_at(long pid, unsigned long long *ticks)
 {
     char dir[32], text[1024];

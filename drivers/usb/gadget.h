@@ -1,8 +1,8 @@
-/* A USB gadget of the Linux kernel, made through configfs: identity, strings, one configuration, FunctionFS for what
- * this program does itself and f_acm for a CDC-ACM console. Private to the functionfs back end.
+/* A USB gadget of the Linux kernel, made through configfs: identity, strings, one configuration, FunctionFS
+ * for what this program does itself and f_acm for a CDC-ACM console. Private to the functionfs back end.
  *
- * Why f_acm: FunctionFS takes no class-specific interface descriptors (type 24h), without which no host knows a CDC
- * console. The kernel's has them; what it lacks is told in functionfs.c. */
+ * Why f_acm: FunctionFS takes no class-specific interface descriptors (type 24h), without which no host knows
+ * a CDC console. The kernel's has them; what it lacks is described in functionfs_private.h. */
 #ifndef DRIVERS_USB_GADGET_H
 #define DRIVERS_USB_GADGET_H
 
@@ -22,8 +22,8 @@ struct gadget {
     uint8_t interface[USB_MAX_INTERFACES]; /* of the model, by number in the part */
 };
 
-/* Removes what dead processes left, then makes everything but the binding: ep0 in gadget->mount is ready to be opened.
- */
+/* Removes what dead processes left, then makes everything but the binding: ep0 in gadget->mount is ready to
+ * be opened. */
 int gadget_create(struct gadget *gadget, const struct usb_model *model, const struct usb_identity *id,
                   struct sh_err *err);
 /* Writes the descriptors and strings to ep0. */

@@ -1,4 +1,4 @@
-/* What FunctionFS is told of the device through ep0: <linux/usb/functionfs.h> has the format. */
+/* The device's descriptions that FunctionFS gets through ep0, in the format of <linux/usb/functionfs.h>. */
 #include <errno.h>
 #include <linux/usb/functionfs.h>
 #include <string.h>
@@ -15,8 +15,8 @@ static uint32_t count_descriptors(const uint8_t *bytes, size_t len)
     return n;
 }
 
-/* WinUSB the older way, by Microsoft OS 1.0, which is what the kernel's gadgets speak. One compatible id, one property
- * per function. Returns the new end. */
+/* WinUSB the older way, by Microsoft OS 1.0, which is what the kernel's gadgets speak. One compatible id, one
+ * property per function. Returns the new end. */
 static size_t put_os_descriptors(const struct usb_function_row *function, uint8_t *out, size_t at, uint32_t *count)
 {
     static const char name[] = "DeviceInterfaceGUID";
@@ -61,7 +61,7 @@ static int write_descriptors(const struct gadget *gadget, int ep0, const struct 
     uint8_t out[4 * USB_MAX_CONFIG + 256];
     const unsigned n_rates = (unsigned)id->highest + 1;
     uint32_t os_count = 0, flags = FUNCTIONFS_HAS_MS_OS_DESC;
-    size_t at = 12 + 4 * n_rates + 4; /* behind the counts */
+    size_t at = 12 + 4 * n_rates + 4; /* after the counts */
     for (unsigned rate = 0; rate < n_rates; rate++) {
         uint8_t config[USB_MAX_CONFIG];
         size_t len = usb_describe_config(&gadget->part, id, (enum usb_rate)rate, USB_DT_CONFIG, config, sizeof config);

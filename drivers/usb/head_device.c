@@ -10,26 +10,19 @@ enum { SERIAL_STATE_READY = 3, DTR = 1 }; /* carrier and data set ready */
 static const char *const strings[] = {"scanhead", "Laser scanner head", "Scanner console", "Scanner stream", NULL};
 enum { STRING_MAKER = 1, STRING_PRODUCT, STRING_CONSOLE, STRING_STREAM };
 
-/* Header 1.20; no call management; line coding, line state and break; union of both interfaces. */
-static const uint8_t console_extra[] = {5,
-                                        USB_DT_CS_INTERFACE,
-                                        USB_CDC_HEADER_TYPE,
-                                        0x20,
-                                        0x01,
-                                        5,
-                                        USB_DT_CS_INTERFACE,
-                                        USB_CDC_CALL_MANAGEMENT_TYPE,
-                                        0,
-                                        CONSOLE_DATA_INTERFACE,
-                                        4,
-                                        USB_DT_CS_INTERFACE,
-                                        USB_CDC_ACM_TYPE,
-                                        USB_CDC_CAP_LINE | USB_CDC_CAP_BRK,
-                                        5,
-                                        USB_DT_CS_INTERFACE,
-                                        USB_CDC_UNION_TYPE,
-                                        CONSOLE_INTERFACE,
-                                        CONSOLE_DATA_INTERFACE};
+/* clang-format off */
+static const uint8_t console_extra[] = {
+    5, USB_DT_CS_INTERFACE, USB_CDC_HEADER_TYPE, 0x20, 0x01, /* CDC 1.20 */
+    5, USB_DT_CS_INTERFACE, USB_CDC_CALL_MANAGEMENT_TYPE, 0, CONSOLE_DATA_INTERFACE, /* no call management */
+    4, USB_DT_CS_INTERFACE, USB_CDC_ACM_TYPE, USB_CDC_CAP_LINE | USB_CDC_CAP_BRK, /* line coding and state, break */
+    5, USB_DT_CS_INTERFACE, USB_CDC_UNION_TYPE, CONSOLE_INTERFACE, CONSOLE_DATA_INTERFACE, /* both interfaces */
+};
+static const uint8_t state_notice[] = {
+    USB_DIR_IN | USB_TYPE_CLASS | USB_RECIP_INTERFACE, USB_CDC_NOTIFY_SERIAL_STATE,
+    0, 0, CONSOLE_INTERFACE, 0, 2, 0, /* wValue, wIndex, wLength */
+    SERIAL_STATE_READY, 0,
+};
+/* clang-format on */
 
 #define BULK(number, bursts)                                                                              \
     {                                                                                                     \
@@ -185,18 +178,9 @@ int scanhead_usb_create(const struct usb_identity *id, struct scanhead_usb *head
 
 void scanhead_usb_update(struct scanhead_usb *head)
 {
-    static const uint8_t notice[] = {USB_DIR_IN | USB_TYPE_CLASS | USB_RECIP_INTERFACE,
-                                     USB_CDC_NOTIFY_SERIAL_STATE,
-                                     0,
-                                     0,
-                                     CONSOLE_INTERFACE,
-                                     0,
-                                     2,
-                                     0,
-                                     SERIAL_STATE_READY,
-                                     0};
     uint32_t epoch = 0;
-    if (head->state_due && usb_device_write(head->device, CONSOLE_NOTIFY, notice, sizeof notice) == sizeof notice)
+    if (head->state_due &&
+        usb_device_write(head->device, CONSOLE_NOTIFY, state_notice, sizeof state_notice) == sizeof state_notice)
         head->state_due = 0;
     if (!head->session[STREAM_SESSION].open && usb_device_can_read(head->device, STREAM_OUT, &epoch) != 0 &&
         epoch == usb_device_epoch(head->device, STREAM_OUT))

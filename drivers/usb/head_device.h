@@ -1,9 +1,10 @@
-/* The scanner head as a USB device: a CDC-ACM console (interfaces 0 and 1) and a vendor interface (2) whose bulk pair
- * carries the native stream. Both are sessions of the head: commands in, replies and frames out.
+/* The scanner head as a USB device: a CDC-ACM console (interfaces 0 and 1) and a vendor interface (2) whose
+ * bulk pair carries the native stream. Both are sessions of the head: commands in, replies and frames out.
  *
- * A console session begins when the host raises DTR (SET_CONTROL_LINE_STATE) and ends when it drops it. A stream
- * session begins with the vendor request SCANHEAD_USB_STREAM, wValue 1, or with the first data on the OUT endpoint, and
- * ends with wValue 0; wValue 1 while one is open ends it and begins another. Both end when the interface goes away. */
+ * A console session begins when the host raises DTR (SET_CONTROL_LINE_STATE) and ends when it drops it. A
+ * stream session begins with the vendor request SCANHEAD_USB_STREAM, wValue 1, or with the first data on the
+ * OUT endpoint, and ends with wValue 0; wValue 1 while one is open ends it and begins another. Both end when
+ * the interface goes away. */
 #ifndef DRIVERS_USB_HEAD_DEVICE_H
 #define DRIVERS_USB_HEAD_DEVICE_H
 
@@ -27,7 +28,7 @@ enum { CONSOLE_SESSION, STREAM_SESSION, SCANHEAD_USB_SESSIONS };
 /* A session as the host sees it. */
 struct scanhead_usb_session {
     int open;
-    int again;       /* opened anew while open: open once more when its end is told */
+    int again;       /* opened again while open: opens once more when its end has been reported */
     uint8_t in, out; /* endpoints */
 };
 
@@ -35,15 +36,15 @@ struct scanhead_usb {
     struct usb_device *device;
     struct scanhead_usb_session session[SCANHEAD_USB_SESSIONS];
     uint8_t line_coding[7];
-    int state_due; /* the console's serial state is still to be told */
+    int state_due; /* the console's serial state is still to be sent */
 };
 
 /* Makes the device of head, which must be zeroed and stay where it is. usb_device_free(head->device). */
 int scanhead_usb_create(const struct usb_identity *id, struct scanhead_usb *head, struct sh_err *err);
-/* What follows from the host's transfers rather than its requests: a stream that opens with data, the console's
- * notification. To be called after each of them. */
+/* What follows from the host's transfers rather than its requests: a stream that opens with data, the
+ * console's notification. To be called after each of them. */
 void scanhead_usb_update(struct scanhead_usb *head);
-/* The end of a session has been told to who serves it. */
+/* The end of a session has been reported to whoever serves it. */
 void scanhead_usb_ended(struct scanhead_usb *head, int session);
 
 #endif

@@ -26,7 +26,7 @@ void usb_retry_close(struct usb_retry *retry)
     retry->timer = -1;
 }
 
-static void tell(struct usb_retry *retry, const char *text, const char *why)
+static void report(struct usb_retry *retry, const char *text, const char *why)
 {
     snprintf(retry->news, sizeof retry->news, "%s%s", text, why);
     retry->has_news = 1;
@@ -34,8 +34,8 @@ static void tell(struct usb_retry *retry, const char *text, const char *why)
 
 int usb_retry_start(struct usb_retry *retry)
 {
-    retry->told = 0;
-    tell(retry, "the host has let go of the device, which plugs itself in again", "");
+    retry->reported = 0;
+    report(retry, "the host has detached the device, which plugs itself in again", "");
     return set_timer(retry, retry->pace_ms);
 }
 
@@ -47,13 +47,13 @@ int usb_retry_is_due(struct usb_retry *retry, short revents)
 
 void usb_retry_failed(struct usb_retry *retry, const char *why)
 {
-    if (!retry->told) tell(retry, "not plugged in, tries on: ", why);
-    retry->told = 1;
+    if (!retry->reported) report(retry, "not plugged in, will try again: ", why);
+    retry->reported = 1;
 }
 
 int usb_retry_done(struct usb_retry *retry)
 {
-    tell(retry, "plugged in again", "");
+    report(retry, "plugged in again", "");
     return set_timer(retry, 0);
 }
 

@@ -1,5 +1,5 @@
-/* A device that plugs itself in (`attach: on`) comes back after its host has let go of it: a timer for the pace of its
- * attempts, and what there is to tell. Private to the back ends. */
+/* A device that plugs itself in (`attach: on`) comes back after its host has let go of it. This is the timer
+ * for its attempts, and the news about them. Private to the back ends. */
 #ifndef DRIVERS_USB_RETRY_H
 #define DRIVERS_USB_RETRY_H
 
@@ -10,7 +10,7 @@ enum { USB_RETRY_MS = 1000, USB_RETRY_TEXT = 200 };
 struct usb_retry {
     int timer; /* timerfd; -1: never tries */
     int pace_ms;
-    int told; /* that it fails */
+    int reported; /* its failure */
     int has_news;
     char news[USB_RETRY_TEXT];
 };
@@ -22,10 +22,10 @@ void usb_retry_close(struct usb_retry *retry);
 int usb_retry_start(struct usb_retry *retry);
 /* After poll(2) on the timer: 1 when an attempt is due. */
 int usb_retry_is_due(struct usb_retry *retry, short revents);
-/* How it went. Only the first failure is told. */
+/* How an attempt went. Only the first failure is news. */
 void usb_retry_failed(struct usb_retry *retry, const char *why);
 int usb_retry_done(struct usb_retry *retry);
-/* What there is to tell, once; NULL: nothing. */
+/* The news, each once; NULL: none. */
 const char *usb_retry_news(struct usb_retry *retry);
 
 #endif

@@ -1,26 +1,27 @@
 /* The USB device core: descriptors, control requests, endpoints and cancellation, with no transport in it.
  *
- * A device is data: a struct usb_model and what it points to. The core answers all of chapter 9 from it. Above the
- * core stands the function (a link, or a test), which reads and writes endpoints and answers class and vendor requests
- * by hooks; below it stands a back end (usbip, usbredir, functionfs), which carries what the host does:
+ * A device is data: a struct usb_model and what it points to. The core answers all of chapter 9 from it.
+ * Above the core stands the function (a link, or a test), which reads and writes endpoints and answers class
+ * and vendor requests by hooks; below it stands a back end (usbip, usbredir, functionfs), which carries what
+ * the host does:
  *
  *   usb_device_attach/detach/reset/suspend   the bus
  *   usb_device_control                       a control transfer, answered at once
  *   usb_device_submit, usb_device_cancel     a bulk or interrupt transfer of the host, and its withdrawal
  *
- * A transfer is one request of the host's driver (a URB). IN waits until the function writes, OUT until the function
- * has read all of it: that is what NAK does on a real bus, so a function that does not read holds the host back. It
- * belongs to the core from submit until the host's complete() is called with it, which happens exactly once, maybe
- * within submit.
+ * A transfer is one request of the host's driver (a URB). An IN transfer waits until the function writes, an
+ * OUT transfer until the function has read all of it. A real bus does that by NAK. So a function that does
+ * not read holds the host back. A transfer belongs to the core from submit until the host's complete() is
+ * called with it. That happens exactly once, maybe within submit.
  *
- * IN packets: a transfer ends when it is full, or with a short packet. So what one usb_device_write() leaves ends with
- * a short packet, or with one of zero length where it is a whole number of packets; where that filled the transfer to
- * the last byte, the zero-length packet ends the next one, unless more is written first. A transfer whose rest is
- * smaller than the packet that comes next fails with USB_OVERFLOW, as it does on a real bus, and that packet stays
- * with the function: nothing is lost.
+ * IN packets: a transfer ends when it is full, or with a short packet. What one usb_device_write() leaves
+ * ends with a short packet, or with one of zero length where it is a whole number of packets. Where the bytes
+ * filled the transfer exactly, the zero-length packet ends the next transfer, unless more is written first. A
+ * transfer whose rest is smaller than the next packet fails with USB_OVERFLOW, as on a real bus. That packet
+ * stays with the function: nothing is lost.
  *
- * Wire formats: Universal Serial Bus 2.0, chapter 9; USB 3.2, chapter 9 (super speed, BOS); CDC 1.2 and PSTN 1.2;
- * Microsoft OS 2.0 Descriptors Specification. Numbers in structs are in host order unless said.
+ * Wire formats: Universal Serial Bus 2.0, chapter 9; USB 3.2, chapter 9 (super speed, BOS); CDC 1.2 and PSTN
+ * 1.2; Microsoft OS 2.0 Descriptors Specification. Numbers in structs are in host order unless said.
  * Thread: a device belongs to one thread. Nothing blocks. */
 #ifndef DRIVERS_USB_USB_H
 #define DRIVERS_USB_USB_H
@@ -92,8 +93,8 @@ struct usb_identity {
     enum usb_rate highest; /* fastest rate it can do */
 };
 
-/* ---- descriptors, for the core and for back ends that hand them to a kernel. Each writes at most `room` bytes and
- * returns the length of the whole, or 0 where the device has no such descriptor at this rate. */
+/* ---- descriptors, for the core and for back ends that hand them to a kernel. Each writes at most `room`
+ * bytes and returns the length of the whole, or 0 where the device has no such descriptor at this rate. */
 
 size_t usb_describe_device(const struct usb_model *model, const struct usb_identity *id, enum usb_rate rate,
                            uint8_t *out, size_t room);
@@ -135,9 +136,10 @@ struct usb_transfer {
 
 /* What the function gets to know. All may be NULL. Called within the calls of the back end. */
 struct usb_hooks {
-    /* A class or vendor request. OUT: data holds wLength bytes; return 0. IN: fill at most wLength bytes, return how
-     * many. USB_STALL refuses it. OUT with wLength above 0 and data NULL: asked before the data come; answer as if, and
-     * do nothing. The interface or endpoint it names exists in the present configuration. */
+    /* A class or vendor request. OUT: data holds wLength bytes; return 0. IN: fill at most wLength bytes,
+     * return how many. USB_STALL refuses it. OUT with wLength above 0 and data NULL: asked before the data
+     * come; answer as if, and do nothing. The interface or endpoint it names exists in the present
+     * configuration. */
     int (*request)(void *ctx, const struct usb_ctrlrequest *setup, uint8_t *data);
     /* An interface came to life or ended: configuration, alternate setting, reset, unplugging. */
     void (*interface)(void *ctx, unsigned interface, int active);
@@ -165,8 +167,8 @@ void usb_device_reset(struct usb_device *device, enum usb_rate rate);
 void usb_device_suspend(struct usb_device *device, int suspended);
 /* For back ends whose host gives no addresses: state default -> addressed. */
 void usb_device_assume_address(struct usb_device *device);
-/* A control transfer. data: OUT, the len bytes that came with it; IN, room for wLength bytes. Returns bytes (IN), 0
- * (OUT) or USB_STALL. */
+/* A control transfer. data: OUT, the len bytes that came with it; IN, room for wLength bytes. Returns bytes
+ * (IN), 0 (OUT) or USB_STALL. */
 int usb_device_control(struct usb_device *device, const struct usb_ctrlrequest *setup, uint8_t *data, uint32_t len);
 void usb_device_submit(struct usb_device *device, struct usb_transfer *transfer);
 /* 1: it was pending and completed with USB_CANCELLED within the call; 0: it is not pending (any more). */
@@ -182,7 +184,8 @@ int usb_device_configuration(const struct usb_device *device);
 /* The present alternate setting's row; NULL when not configured. */
 const struct usb_interface_row *usb_device_row(const struct usb_device *device, unsigned interface);
 
-/* ---- for functions. An endpoint that is not there, is halted or suspended has no room and nothing to read. */
+/* ---- for functions. An endpoint that is not there, is halted or suspended has no room and nothing to read.
+ * */
 
 /* Bytes taken by waiting IN transfers, maybe 0. */
 size_t usb_device_write(struct usb_device *device, uint8_t endpoint, const void *data, size_t len);
@@ -193,11 +196,9 @@ size_t usb_device_read(struct usb_device *device, uint8_t endpoint, void *data, 
 size_t usb_device_can_read(const struct usb_device *device, uint8_t endpoint, uint32_t *epoch);
 /* What waits on an OUT endpoint and came in an epoch before `epoch` is taken and dropped; returns bytes. */
 size_t usb_device_drop(struct usb_device *device, uint8_t endpoint, uint32_t epoch);
-/* A count the function may raise at borders between its sessions. OUT transfers are stamped with it; a back end that
- * holds IN data on its way takes it back when it has changed. */
+/* A count the function may raise at borders between its sessions. OUT transfers are stamped with it; a back
+ * end that holds IN data on its way takes it back when it has changed. */
 uint32_t usb_device_epoch(const struct usb_device *device, uint8_t endpoint);
 void usb_device_next_epoch(struct usb_device *device, uint8_t endpoint);
-/* Halts an endpoint, as a function does that wants to be asked; the host clears it. */
-void usb_device_halt(struct usb_device *device, uint8_t endpoint);
 
 #endif

@@ -33,7 +33,7 @@ static void finish_empty(struct usb_device *device, struct usb_pipe *pipe)
         finish(device, pipe, USB_OK);
 }
 
-/* Only what is there now: a back end may submit anew from within complete(). */
+/* Only what is there now: a back end may submit again from within complete(). */
 static void flush(struct usb_device *device, struct usb_pipe *pipe, enum usb_status status)
 {
     struct usb_transfer *first = pipe->first;
@@ -99,12 +99,6 @@ void usb_set_halt(struct usb_device *device, struct usb_pipe *pipe, int halted)
     pipe->halted = halted;
     if (halted) flush(device, pipe, USB_STALLED);
     if (!halted) pipe->zero_due = 0;
-}
-
-void usb_device_halt(struct usb_device *device, uint8_t endpoint)
-{
-    struct usb_pipe *pipe = usb_pipe(device, endpoint);
-    if (pipe->row != NULL) usb_set_halt(device, pipe, 1);
 }
 
 /* ---- the bus */

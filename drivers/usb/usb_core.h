@@ -1,4 +1,4 @@
-/* Inside of the device core. */
+/* The device core's own struct, for the two files that make it: usb_core.c and control.c. Private. */
 #ifndef DRIVERS_USB_USB_CORE_H
 #define DRIVERS_USB_USB_CORE_H
 
@@ -30,7 +30,7 @@ struct usb_device {
     struct usb_pipe pipe[32]; /* 0..15 OUT, 16..31 IN; the two of endpoint 0 stay empty */
 };
 
-/* device.c */
+/* usb_core.c */
 struct usb_pipe *usb_pipe(struct usb_device *device, unsigned address);
 void usb_enter(struct usb_device *device, enum usb_state state);
 void usb_select_alt(struct usb_device *device, unsigned interface, unsigned alt);

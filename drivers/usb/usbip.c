@@ -1,8 +1,9 @@
-/* The usbip back end: a USB/IP server of its own, TCP 3240 on loopback by default, or one connection by socket pair to
- * this machine's vhci_hcd. One host at a time has the device; others may list it.
+/* The usbip back end: a USB/IP server, on TCP port 3240 of the loopback by default, or one connection by
+ * socket pair to this machine's vhci_hcd. One host at a time has the device; others may list it.
  *
- * A connection that has not imported the device keeps its place until a new one needs it: silent ones lock nobody out.
- * A device that is attached here comes back when the host detaches it, as one that is plugged in again. */
+ * A connection that has not imported the device gives way when a new one needs its place, so that silent ones
+ * exclude nobody. A device that is attached here comes back when the host detaches it, as one that is plugged
+ * in again. */
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
@@ -11,7 +12,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "drivers/link/socket.h"
+#include "drivers/socket/socket.h"
 #include "drivers/usb/backend.h"
 #include "drivers/usb/retry.h"
 #include "drivers/usb/usbip.h"
@@ -109,7 +110,8 @@ static int usbip_prepare(void *backend, struct pollfd *fds)
     return N_FDS;
 }
 
-/* A free place, or that of the one which has been here longest without importing: one host at most has imported. */
+/* A free place, or that of the one which has been here longest without importing: one host at most has
+ * imported. */
 static struct usbip_conn *make_room(struct usbip *self)
 {
     struct usbip_conn *oldest = NULL;
@@ -176,13 +178,6 @@ static int usbip_handle(void *backend, const struct pollfd *fds, int n, int (*go
     return rc == SH_OK ? sweep(self) : rc;
 }
 
-/* The sockets keep what was not read, and poll says so. */
-static int usbip_more(const void *backend)
-{
-    (void)backend;
-    return 0;
-}
-
 static const char *usbip_news(void *backend)
 {
     struct usbip *self = backend;
@@ -207,7 +202,6 @@ const struct usb_backend_ops usb_backend_usbip = {
     .endpoint = usbip_endpoint,
     .prepare = usbip_prepare,
     .handle = usbip_handle,
-    .more = usbip_more,
     .news = usbip_news,
     .flush = usbip_flush,
     .close = usbip_close,

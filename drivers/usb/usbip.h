@@ -1,5 +1,5 @@
-/* The USB/IP protocol, version 1.1.1, as Linux describes it (Documentation/usb/usbip_protocol.rst): sizes, offsets and
- * numbers. Everything is big-endian. Private to the back end and its tests. */
+/* The USB/IP protocol, version 1.1.1, as Linux describes it (Documentation/usb/usbip_protocol.rst): sizes,
+ * offsets and numbers. Everything is big-endian. Private to the back end and its tests. */
 #ifndef DRIVERS_USB_USBIP_H
 #define DRIVERS_USB_USBIP_H
 
@@ -15,8 +15,8 @@ enum {
     OP_FAILED = 1,
     OP_BUSY = 2,
     BUSID_LEN = 32,
-    /* a device: char[256] path, char[32] bus id, u32 bus, device, speed, u16 vid, pid, bcd, u8 class, subclass,
-     * protocol, configuration, configurations, interfaces */
+    /* a device: char[256] path, char[32] bus id, u32 bus, device, speed, u16 vid, pid, bcd, u8 class,
+     * subclass, protocol, configuration, configurations, interfaces */
     OP_DEVICE = 312,
     OP_INTERFACE = 4,
     OP_IMPORT = OP_HEADER + BUSID_LEN,

@@ -1,18 +1,18 @@
 /* A connection of a USB/IP client: DEVLIST and IMPORT, then SUBMIT and UNLINK.
  *
- * The peer is not trusted: what breaks the protocol, or asks for more memory than a host needs, ends the connection. */
-#include <errno.h>
+ * The peer is not trusted: what breaks the protocol, or asks for more memory than a host needs, ends the
+ * connection. */
 #include <poll.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 #include "drivers/protocol/bytes.h"
+#include "drivers/socket/socket.h"
 #include "drivers/usb/backend.h"
 #include "drivers/usb/usbip_private.h"
 
 enum {
     MAX_URB_BYTES = 16 << 20, /* usbfs's own limit by default, of all */
-    MAX_READS = 256,          /* at a time: who sends without end does not have the thread to himself */
+    MAX_READS = 256,          /* in one call: a peer that sends without end must not occupy the thread */
 };
 
 /* Where the host's driver forbids short packets, a host controller makes an error of them. */
@@ -144,10 +144,9 @@ static void take_urb(struct usbip_conn *conn)
 /* Up to n bytes to `at`; 0: none there now, or the connection is broken. */
 static uint32_t receive(struct usbip_conn *conn, uint8_t *at, uint32_t n)
 {
-    ssize_t got = recv(conn->fd, at, n, MSG_DONTWAIT);
-    if (got > 0) return (uint32_t)got;
-    if (got == 0 || (errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR)) conn->broken = 1;
-    return 0;
+    ssize_t got = socket_read(conn->fd, at, n);
+    if (got < 0) conn->broken = 1;
+    return got > 0 ? (uint32_t)got : 0;
 }
 
 static uint32_t read_incoming(struct usbip_conn *conn)

@@ -28,13 +28,14 @@ struct usbip_conn {
 void usbip_conn_start(struct usbip_conn *conn, int fd, struct usb_device *device, int *taken);
 /* As if the device had been imported: for a host that begins with URBs. */
 void usbip_conn_import(struct usbip_conn *conn);
-/* Reads and acts until nothing is left, go_on says 0 or the connection is full; no longer than some hundred times. */
+/* Reads and acts until nothing is left, go_on says 0 or the connection is full; no longer than some hundred
+ * times. */
 void usbip_conn_read(struct usbip_conn *conn, int (*go_on)(void *ctx), void *ctx);
 /* Too many replies wait for the host to read them: nothing more is read before. */
 int usbip_conn_is_full(const struct usbip_conn *conn);
 void usbip_conn_write(struct usbip_conn *conn);
-/* Sends what is queued and waits until the peer has taken it and hung up, timeout_ms at most for each step: closing
- * with requests of the peer unread would throw away replies on their way. */
+/* Sends what is queued and waits until the peer has taken it and hung up, timeout_ms at most for each step:
+ * closing with requests of the peer unread would throw away replies on their way. */
 void usbip_conn_drain(struct usbip_conn *conn, int timeout_ms);
 /* Detaches the device if it was imported here, and frees everything. */
 void usbip_conn_end(struct usbip_conn *conn);

@@ -1,4 +1,4 @@
-/* Inside of a connection: URBs and their memory, replies and their order, operations. */
+/* The parts of a usbip connection: URBs and their memory, replies and their order, operations. Private. */
 #ifndef DRIVERS_USB_USBIP_PRIVATE_H
 #define DRIVERS_USB_USBIP_PRIVATE_H
 
@@ -7,9 +7,10 @@
 
 #include "drivers/usb/usbip_conn.h"
 
-/* Of what the host has asked for and the device has not answered; who asks for more is cut off. */
+/* Limits of what the host has asked for and the device has not answered. A host that asks for more is cut
+ * off. */
 enum { MAX_PENDING = 4096, MAX_PENDING_BYTES = 64 << 20 };
-/* Of answers that are not sent yet: above these nothing more is read until the host has taken some. */
+/* Limits of answers that are not sent yet. Above these nothing more is read until the host has taken some. */
 enum { MAX_UNSENT = 256, MAX_UNSENT_BYTES = 1 << 20 };
 
 /* The header of the reply stands before the bytes, so that both leave in one piece. */

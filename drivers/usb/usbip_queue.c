@@ -1,4 +1,5 @@
-/* Memory of a connection, and its replies: in the order in which they were queued, whatever pieces the socket takes. */
+/* Memory of a connection, and its replies: in the order in which they were queued, whatever pieces the socket
+ * takes. */
 #include <errno.h>
 #include <stdlib.h>
 #include <sys/socket.h>

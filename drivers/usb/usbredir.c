@@ -1,6 +1,7 @@
-/* The usbredir back end: the device for a virtual machine (QEMU's usb-redir), over a Unix socket or TCP; no root
- * needed. One guest at a time; one that has not said hello yet gives way to the next that comes. libusbredirparser does
- * the wire format, which spice/usbredir's usb-redirection-protocol.md describes; this is its "usb-host" end.
+/* The usbredir back end: the device for a virtual machine (QEMU's usb-redir), over a Unix socket or TCP; no
+ * root needed. One guest at a time; one that has not said hello yet gives way to the next that comes.
+ * libusbredirparser does the wire format, which spice/usbredir's usb-redirection-protocol.md describes; this
+ * is its "usb-host" end.
  *
  * Connecting instead of listening (attach), the device connects again when the guest hangs up. */
 #include "drivers/usb/backend.h"
@@ -15,11 +16,11 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "drivers/link/socket.h"
+#include "drivers/socket/socket.h"
 #include "drivers/usb/usbredir_private.h"
 
-/* MAX_UNSENT: packets that wait for the guest to read them; above that nothing more is read from it. MAX_READS: at a
- * time, so that who sends without end does not have the thread to himself. */
+/* MAX_UNSENT: packets that wait for the guest to read them; above that nothing more is read from it.
+ * MAX_READS: in one call; a guest that sends without end must not occupy the thread. */
 enum { CLOSE_WAIT_MS = 500, SEND_BUFFER_BYTES = 1 << 20, MAX_UNSENT = 64, MAX_READS = 256 };
 
 static int is_full(const struct usbredir *self)
@@ -42,9 +43,8 @@ static int on_read(void *priv, uint8_t *data, int count)
     if (self->broken || self->n_reads++ >= MAX_READS || !self->go_on(self->go_on_ctx)) return 0;
     if (is_full(self)) usbredir_flush(self); /* a guest may send many packets before it reads */
     if (self->broken || is_full(self)) return 0;
-    ssize_t n = recv(self->fd, data, (size_t)count, MSG_DONTWAIT);
-    if (n > 0) return (int)n;
-    if (n < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR)) return 0;
+    ssize_t n = socket_read(self->fd, data, (size_t)count);
+    if (n >= 0) return (int)n;
     self->broken = 1;
     return -1;
 }
@@ -52,14 +52,13 @@ static int on_read(void *priv, uint8_t *data, int count)
 static int on_write(void *priv, uint8_t *data, int count)
 {
     struct usbredir *self = priv;
-    ssize_t n = send(self->fd, data, (size_t)count, MSG_DONTWAIT | MSG_NOSIGNAL);
+    ssize_t n = socket_write(self->fd, data, (size_t)count);
     if (n >= 0) return (int)n;
-    if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR || errno == ENOBUFS) return 0;
     self->broken = 1;
     return -1;
 }
 
-/* The library's remarks concern broken peers, which are cut off. */
+/* The library's remarks are about broken peers, which are cut off anyway. */
 static void on_log(void *priv, int level, const char *text)
 {
     (void)priv;
@@ -144,8 +143,9 @@ static void note_path(struct usbredir *self, const char *path)
     self->path_inode = st.st_ino;
 }
 
-/* Unless it was removed meanwhile, and another program listens there. Before the listener is closed: until then nobody
- * takes the path for left behind, and the inode's number is not given to another. */
+/* Unless it was removed meanwhile, and another program listens there. To be called before the listener is
+ * closed: until then nobody takes the path for an abandoned one, and no other file gets the inode's number.
+ * */
 static void remove_path(const struct usbredir *self)
 {
     struct stat st;
@@ -230,13 +230,6 @@ static int usbredir_handle(void *backend, const struct pollfd *fds, int n, int (
     return self->listener >= 0 || rc != SH_OK ? rc : usb_retry_start(&self->retry);
 }
 
-/* The socket keeps what was not read, and poll says so. */
-static int usbredir_more(const void *backend)
-{
-    (void)backend;
-    return 0;
-}
-
 static const char *usbredir_news(void *backend)
 {
     struct usbredir *self = backend;
@@ -268,7 +261,6 @@ const struct usb_backend_ops usb_backend_usbredir = {
     .endpoint = usbredir_endpoint,
     .prepare = usbredir_prepare,
     .handle = usbredir_handle,
-    .more = usbredir_more,
     .news = usbredir_news,
     .flush = usbredir_flush,
     .close = usbredir_close,

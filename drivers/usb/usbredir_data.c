@@ -1,7 +1,7 @@
 /* The usbredir back end: bulk and interrupt packets.
  *
- * Interrupt endpoints are not asked packet by packet here: the guest starts and stops receiving, and between the two
- * one transfer of our own waits at the core. */
+ * Interrupt endpoints are not asked packet by packet here: the guest starts and stops receiving, and between
+ * the two one transfer of our own waits at the core. */
 #include "drivers/usb/backend.h"
 
 #ifdef HAVE_USBREDIR
@@ -196,7 +196,7 @@ static void on_cancel(void *priv, uint64_t id)
     usb_device_cancel(self->device, id);
 }
 
-/* What a device without isochronous endpoints, streams and filters is not asked for, unless to annoy it. */
+/* Requests that no correct guest makes: this device has no isochronous endpoints, streams or filters. */
 static void refuse_iso(void *priv, uint64_t id, struct usb_redir_start_iso_stream_header *start)
 {
     struct usbredir *self = priv;

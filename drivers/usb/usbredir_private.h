@@ -1,4 +1,4 @@
-/* Inside of the usbredir back end, which is split by what the guest asks for: requests, data, and the socket. */
+/* The usbredir back end's own struct, for its files: the socket, requests, data. Private. */
 #ifndef DRIVERS_USB_USBREDIR_PRIVATE_H
 #define DRIVERS_USB_USBREDIR_PRIVATE_H
 

@@ -74,14 +74,13 @@ int usbredir_is_early(struct usbredir *self)
 
 /* ---- requests */
 
-static int request(struct usbredir *self, unsigned type, unsigned code, unsigned value, unsigned index, uint8_t *data,
-                   unsigned length)
+static int request(struct usbredir *self, const struct usb_redir_control_packet_header *header, uint8_t *data)
 {
-    struct usb_ctrlrequest setup = {.bRequestType = (uint8_t)type, .bRequest = (uint8_t)code};
-    le_put16(&setup.wValue, (uint16_t)value);
-    le_put16(&setup.wIndex, (uint16_t)index);
-    le_put16(&setup.wLength, (uint16_t)length);
-    return usb_device_control(self->device, &setup, data, length);
+    struct usb_ctrlrequest setup = {.bRequestType = header->requesttype, .bRequest = header->request};
+    le_put16(&setup.wValue, header->value);
+    le_put16(&setup.wIndex, header->index);
+    le_put16(&setup.wLength, header->length);
+    return usb_device_control(self->device, &setup, data, header->length);
 }
 
 static void on_reset(void *priv)
@@ -96,7 +95,9 @@ static void on_set_configuration(void *priv, uint64_t id, struct usb_redir_set_c
 {
     struct usbredir *self = priv;
     if (usbredir_is_early(self)) return;
-    int rc = request(self, USB_DIR_OUT, USB_REQ_SET_CONFIGURATION, set->configuration, 0, NULL, 0);
+    const struct usb_redir_control_packet_header header = {.request = USB_REQ_SET_CONFIGURATION,
+                                                           .value = set->configuration};
+    int rc = request(self, &header, NULL);
     if (rc == 0) send_interfaces(self);
     struct usb_redir_configuration_status_header status = {.status = rc == 0 ? usb_redir_success : usb_redir_stall,
                                                            .configuration =
@@ -127,7 +128,11 @@ static void on_set_alt(void *priv, uint64_t id, struct usb_redir_set_alt_setting
 {
     struct usbredir *self = priv;
     if (usbredir_is_early(self)) return;
-    int rc = request(self, USB_DIR_OUT | USB_RECIP_INTERFACE, USB_REQ_SET_INTERFACE, set->alt, set->interface, NULL, 0);
+    const struct usb_redir_control_packet_header header = {.requesttype = USB_RECIP_INTERFACE,
+                                                           .request = USB_REQ_SET_INTERFACE,
+                                                           .value = set->alt,
+                                                           .index = set->interface};
+    int rc = request(self, &header, NULL);
     if (rc == 0) send_interfaces(self);
     send_alt(self, id, set->interface, rc == 0);
 }
@@ -146,8 +151,7 @@ static void answer_control(struct usbredir *self, uint64_t id, struct usb_redir_
     uint8_t *room = malloc((size_t)header->length + 1);
     int n = USB_STALL;
     if (room != NULL && !in && len == header->length && len > 0) memcpy(room, out, (size_t)len);
-    if (room != NULL && len == (in ? 0 : header->length))
-        n = request(self, header->requesttype, header->request, header->value, header->index, room, header->length);
+    if (room != NULL && len == (in ? 0 : header->length)) n = request(self, header, room);
     header->status = n >= 0 ? usb_redir_success : usb_redir_stall;
     header->length = n < 0 ? 0 : in ? (uint16_t)n : header->length;
     /* As with bulk: no data pointer in the answer to an OUT. */

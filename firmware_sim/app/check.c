@@ -1,23 +1,12 @@
-/* scanhead check: nothing runs. */
+/* scanhead check: validates configuration, scene and links. Nothing runs. */
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
-#include "firmware_sim/app/check_places.h"
 #include "firmware_sim/app/app.h"
+#include "firmware_sim/app/check_places.h"
 #include "firmware_sim/device/head_clock.h"
 #include "firmware_sim/loop/pose_feed.h"
 
-static const char HELP[] =
-    "scanhead check CONFIG [--set KEY=VALUE ...]: validate configuration, scene and links; nothing runs.\n"
-    "Prints where the scene and each station stand, in every frame that is known.\n\n"
-    "Configuration keys:\n\n";
-
-static const struct option OPTIONS[] = {
-    {"set", required_argument, NULL, 's'}, {"help", no_argument, NULL, 'h'}, {NULL, 0, NULL, 0}};
-
-/* Opens and closes each link, and the socket of a live platform, so that a taken port or a wrong path shows now. */
+/* Opens and closes each link, and the socket of a live platform: a taken port or a wrong path shows now. */
 static int check_links(const struct config *cfg, struct sh_err *err)
 {
     for (uint32_t i = 0; i < cfg->n_links; i++) {
@@ -54,10 +43,10 @@ static void print_output(const struct config *cfg, const struct site *site)
 {
     int heights = cfg->output.crs == GEOREF_UTM || cfg->output.crs == GEOREF_GEODETIC;
     printf("output    %s, %g m per count%s\n", cfg->output.layout == LINE_GEO ? "geo" : "polar", site->scale_m,
-           !heights                       ? ""
-           : site->geoid != NULL          ? ", heights above the geoid"
+           !heights                              ? ""
+           : site->geoid != NULL                 ? ", heights above the geoid"
            : cfg->output.heights == HEIGHTS_AUTO ? ", heights above the ellipsoid (no geoid data is installed)"
-                                          : ", heights above the ellipsoid");
+                                                 : ", heights above the ellipsoid");
 }
 
 static int print_summary(const struct config *cfg, const struct site *site, struct sh_err *err)
@@ -96,38 +85,38 @@ static int print_time(const struct config *cfg, struct sh_err *err)
     return SH_OK;
 }
 
-static int check(const struct app_sets *sets, const char *path)
+static int check(struct config *cfg, void *ctx, struct sh_err *err)
 {
-    int status = APP_OK;
-    struct sh_err err = {0};
+    (void)ctx;
     struct site *site = NULL;
-    struct config *cfg = app_load_config(path, sets, &status);
-    if (cfg == NULL) return status;
-    int rc = site_load(cfg, &app_report_stderr, &site, &err);
-    if (rc == SH_OK) rc = check_links(cfg, &err);
-    if (rc == SH_OK) rc = check_reach(site, &app_report_stderr, &err);
-    if (rc == SH_OK) rc = print_summary(cfg, site, &err);
-    if (rc == SH_OK) rc = print_time(cfg, &err);
+    int rc = site_load(cfg, &app_report_stderr, &site, err);
+    if (rc == SH_OK) rc = check_links(cfg, err);
+    if (rc == SH_OK) rc = check_reach(site, &app_report_stderr, err);
+    if (rc == SH_OK) rc = print_summary(cfg, site, err);
+    if (rc == SH_OK) rc = print_time(cfg, err);
     site_free(site);
-    free(cfg);
-    return rc == SH_OK ? APP_OK : app_fail(&err);
+    return rc;
 }
 
-int app_check(int argc, char **argv)
+static int run(int argc, char **argv)
 {
-    struct app_sets sets;
-    memset(&sets, 0, sizeof sets);
-    int opt;
-    opterr = 0;
-    while ((opt = getopt_long(argc, argv, ":h", OPTIONS, NULL)) != -1) {
-        if (opt == 'h') {
-            fputs(HELP, stdout);
-            config_print_reference(stdout);
-            return APP_OK;
-        }
-        int status = opt == 's' ? app_add_set(&sets, optarg) : app_bad_option("check", opt, argv);
-        if (status != APP_OK) return status;
-    }
-    if (optind != argc - 1) return app_usage("check", "one CONFIG is needed");
-    return check(&sets, argv[optind]);
+    struct app_input in;
+    int status = app_parse(&app_check, argc, argv, &in, NULL);
+    return status == APP_GO_ON ? app_with_config(&in, check, NULL) : status;
 }
+
+static const struct app_option OPTIONS[] = {OPTION_SET, OPTION_END};
+
+const struct app_command app_check = {
+    .name = "check",
+    .operand = {"CONFIG"},
+    .summary = "validate configuration, scene and links; nothing runs",
+    .options = OPTIONS,
+    .notes = "Prints where the scene and each station stand, in every frame that is known. Opens each link but files\n"
+             "and closes it again, so that a taken port or a wrong path shows.\n"
+             "\n"
+             "Configuration keys:\n"
+             "\n",
+    .print_more = config_print_reference,
+    .run = run,
+};

@@ -10,7 +10,8 @@
 
 #define DEG(rad) ((rad)*180.0 / M_PI)
 
-static double turn_deg(double deg) /* 0 <= ... < 360, and no -0 */
+/* From 0 to below 360, and no -0. */
+static double turn_deg(double deg)
 {
     double turned = fmod(deg, 360.0) + 0.0;
     if (turned < 0.0) turned += 360.0;
@@ -23,24 +24,19 @@ void check_print_anchor(const struct site *site, FILE *out)
     const struct geoframe *f = &site->anchor.frame;
     static const char *const source[] = {
         [ANCHOR_EXPLICIT] = "explicit", [ANCHOR_IFC] = "ifc", [ANCHOR_UTM] = "utm", [ANCHOR_ECEF] = "ecef"};
-    if (site->anchor.known && cfg->scene.anchor.source == ANCHOR_NONE) {
-        fprintf(out,
-                "anchor    station 1 of the configuration: scene point %.4f %.4f %.4f at lat %.9f lon %.9f deg, height "
-                "%.4f m; true north along y\n",
-                f->origin_m[0], f->origin_m[1], f->origin_m[2], f->lat_deg, f->lon_deg, f->height_m);
-        return;
-    }
+    const int of_station = cfg->scene.anchor.source == ANCHOR_NONE;
     if (!site->anchor.known) {
         fputs("anchor    none: each station stands for itself, the scene's y axis is its true north\n", out);
         return;
     }
-    fprintf(out, "anchor    %s: ", source[cfg->scene.anchor.source]);
-    if (f->kind == GEOFRAME_TANGENT)
-        fprintf(out,
-                "scene point %.4f %.4f %.4f at lat %.9f lon %.9f deg, height %.4f m; true north %.6f deg clockwise "
-                "from y\n",
-                f->origin_m[0], f->origin_m[1], f->origin_m[2], f->lat_deg, f->lon_deg, f->height_m,
-                f->north_deg + 0.0);
+    fprintf(out, "anchor    %s: ", of_station ? "station 1 of the configuration" : source[cfg->scene.anchor.source]);
+    if (of_station || f->kind == GEOFRAME_TANGENT)
+        fprintf(out, "scene point %.4f %.4f %.4f at lat %.9f lon %.9f deg, height %.4f m; true north ", f->origin_m[0],
+                f->origin_m[1], f->origin_m[2], f->lat_deg, f->lon_deg, f->height_m);
+    if (of_station)
+        fputs("along y\n", out);
+    else if (f->kind == GEOFRAME_TANGENT)
+        fprintf(out, "%.6f deg clockwise from y\n", f->north_deg + 0.0);
     else if (f->kind == GEOFRAME_ECEF)
         fputs("the scene's coordinates are ECEF\n", out);
     else if (f->zone == 0)
@@ -71,8 +67,8 @@ static void print_utm(const struct locate_grid *utm, double height_m, FILE *out)
             utm->convergence_deg, utm->scale);
 }
 
-/* What a level range is off by in a scene whose coordinates are a grid's: the grid's scale, and the height over the
- * ellipsoid. From two points 100 grid metres apart. */
+/* The error of a level range in a scene whose coordinates are a grid's. It comes from the grid's scale and from
+ * the height above the ellipsoid, and is taken from two points 100 grid metres apart. */
 static int print_grid_ranges(const struct site *site, const double p_prcs[3], FILE *out, struct sh_err *err)
 {
     double p_ecef[2][3];
@@ -84,9 +80,9 @@ static int print_grid_ranges(const struct site *site, const double p_prcs[3], FI
         georef_geodetic_to_ecef(&at, p_ecef[i]);
     }
     const double d[3] = {p_ecef[1][0] - p_ecef[0][0], p_ecef[1][1] - p_ecef[0][1], p_ecef[1][2] - p_ecef[0][2]};
-    double off = 100.0 / sqrt(vec3_dot(d, d)) - 1.0, range_m = site->cfg->profile.range_max_m;
+    double error = 100.0 / sqrt(vec3_dot(d, d)) - 1.0, range_m = site->cfg->profile.range_max_m;
     fprintf(out, "            ranges are grid lengths: a level one of %g m reads %+.4f m (%+.1f ppm)\n", range_m,
-            range_m * off, 1e6 * off);
+            range_m * error, 1e6 * error);
     return SH_OK;
 }
 
@@ -151,7 +147,7 @@ void check_print_stops(const struct site *site, FILE *out)
     }
 }
 
-/* A vertex within reach settles most cases without an index. */
+/* A vertex within reach settles most cases without an index of distances. */
 static int has_near_vertex(const struct scene *scene, const double p[3], double reach_m)
 {
     for (uint32_t v = 0; v < scene->n_vertices; v++) {

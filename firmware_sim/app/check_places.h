@@ -1,4 +1,5 @@
-/* What `scanhead check` says about places: the anchor, and each station in every frame that is known. */
+/* What `scanhead check` says about places. In: a loaded site. Out: lines with the anchor, and with each
+ * station or stop in every frame that is known: metres and degrees. */
 #ifndef FIRMWARE_SIM_APP_CHECK_PLACES_H
 #define FIRMWARE_SIM_APP_CHECK_PLACES_H
 
@@ -8,11 +9,10 @@
 
 void check_print_anchor(const struct site *site, FILE *out);
 int check_print_station(const struct site *site, uint32_t i, FILE *out, struct sh_err *err);
-
-/* A line for each stop. */
+/* One line for each stop. */
 void check_print_stops(const struct site *site, FILE *out);
 
-/* Warns of stations that have nothing within the head's range, as the scene stands at the start. */
+/* Warns of each station that has nothing within the head's range, as the scene is at the start. */
 int check_reach(const struct site *site, const struct sh_report *report, struct sh_err *err);
 
 #endif

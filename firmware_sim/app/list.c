@@ -15,32 +15,39 @@ static void print_head(const struct scanhead_usb_head *head)
     printf(head->problem[0] != '\0' ? "; %s\n" : "\n", head->problem);
 }
 
-static int list_usb(void)
+static void list_usb(void)
 {
     static struct scanhead_usb_head head[MAX_HEADS];
     char why[256];
     int n = scanhead_list_usb(head, MAX_HEADS, why, sizeof why);
     if (n < 0)
-        printf("heads on USB: %s\n", why); /* a system without USB has a list all the same */
+        printf("heads on USB: %s\n", why); /* no failure: a system without USB has the rest of the list */
     else
         puts(n == 0 ? "heads on USB: none" : "heads on USB:");
     for (int i = 0; i < n && i < MAX_HEADS; i++)
         print_head(&head[i]);
     if (n > MAX_HEADS) printf("and %d more\n", n - MAX_HEADS);
+}
+
+static int run(int argc, char **argv)
+{
+    struct app_input in;
+    struct sh_err err = {0};
+    int status = app_parse(&app_list, argc, argv, &in, NULL);
+    if (status != APP_GO_ON) return status;
+    if (config_list_profiles(NULL, stdout, &err) < 0) return app_fail(&err);
+    puts("links: pty (virtual serial port), tcp, usb (usbip, usbredir, functionfs), file, null");
+    list_usb();
     return APP_OK;
 }
 
-int app_list(int argc, char **argv)
-{
-    if (argc == 2 && (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0)) {
-        puts("scanhead list: head profiles ($SCANHEAD_HEADS, else the installed ones, else config/heads), kinds of "
-             "links, "
-             "and the heads that USB shows");
-        return APP_OK;
-    }
-    if (argc != 1) return app_usage("list", "it takes no arguments");
-    struct sh_err err = {0};
-    if (config_list_profiles(NULL, stdout, &err) < 0) return app_fail(&err);
-    puts("links: pty (virtual serial port), tcp, usb (usbip, usbredir, functionfs), file, null");
-    return list_usb();
-}
+static const struct app_option OPTIONS[] = {OPTION_END};
+
+const struct app_command app_list = {
+    .name = "list",
+    .summary = "head profiles, kinds of links, and the heads that USB shows",
+    .options = OPTIONS,
+    .notes =
+        "Profiles are looked for in the folder $SCANHEAD_HEADS, else in the installed one, else in config/heads.\n",
+    .run = run,
+};

@@ -1,72 +1,28 @@
-/* scanhead map: a scan map from above, scanned off line. */
+/* scanhead map: a picture of the scene from above. The head scans it off line. */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/map.h"
 #include "core/mat3.h"
 #include "firmware_sim/app/app.h"
+#include "firmware_sim/app/offline.h"
 #include "firmware_sim/app/recording.h"
-#include "firmware_sim/site/site.h"
 
-static const char HELP[] = "scanhead map CONFIG -o FILE.png [options]: scan map of the stations, from above\n\n"
-                           "Scans one frame from each station off line and draws the points: dark where many heights "
-                           "were hit (walls), hue by\n"
-                           "height. The area is that of the scene and the stations.\n\n"
-                           "  -o FILE.png      where to write\n"
-                           "  --pixel-m M      side of a pixel; default: 1200 pixels on the longer side\n"
-                           "  --set KEY=VALUE  any configuration key; may be repeated\n"
-                           "  --quiet          no progress\n";
-
-enum { OPT_PIXEL = 256, OPT_SET, OPT_QUIET, BATCH = 4096 };
-
-static const struct option OPTIONS[] = {{"pixel-m", required_argument, NULL, OPT_PIXEL},
-                                        {"set", required_argument, NULL, OPT_SET},
-                                        {"quiet", no_argument, NULL, OPT_QUIET},
-                                        {"output", required_argument, NULL, 'o'},
-                                        {"help", no_argument, NULL, 'h'},
-                                        {NULL, 0, NULL, 0}};
+enum { BATCH = 256 };
 
 struct map_run {
-    struct app_sets sets;
-    const char *config, *output;
+    struct app_input in;
+    const char *output;
     double pixel_m;
     int quiet;
     struct map *map;
-    /* A scene in ECEF is seen from above station 1: east, north, up there. Else the scene's own axes. */
+    /* 1: a scene in ECEF, drawn in east, north, up of station 1. 0: drawn along the axes of the scene. */
     int turned;
     double origin_m[3], to_enu[9];
     struct scanhead_point point[BATCH];
     double x[BATCH], y[BATCH], z[BATCH];
 };
-
-static int parse(struct map_run *run, int argc, char **argv)
-{
-    int opt, status = APP_OK;
-    opterr = 0;
-    while ((opt = getopt_long(argc, argv, ":ho:", OPTIONS, NULL)) != -1 && status == APP_OK) {
-        if (opt == 'h') {
-            fputs(HELP, stdout);
-            return APP_OK;
-        }
-        if (opt == 'o')
-            run->output = optarg;
-        else if (opt == OPT_PIXEL)
-            status = app_parse_double("map", "--pixel-m", optarg, 1e-4, 1e4, &run->pixel_m);
-        else if (opt == OPT_SET)
-            status = app_add_set(&run->sets, optarg);
-        else if (opt == OPT_QUIET)
-            run->quiet = 1;
-        else
-            status = app_bad_option("map", opt, argv);
-    }
-    if (status != APP_OK) return status;
-    if (optind != argc - 1) return app_usage("map", "one CONFIG is needed");
-    if (run->output == NULL) return app_usage("map", "-o FILE.png is needed");
-    run->config = argv[optind];
-    return -1;
-}
 
 static void to_map(const struct map_run *run, const double p_prcs[3], double p[3])
 {
@@ -145,13 +101,9 @@ static int create_map(struct map_run *run, const struct site *site, struct sh_er
     return rc;
 }
 
-static int interrupted(void)
+static int draw(struct config *cfg, void *ctx, struct sh_err *err)
 {
-    return app_interrupted;
-}
-
-static int draw(struct map_run *run, struct config *cfg, struct sh_err *err)
-{
+    struct map_run *run = ctx;
     struct offline *offline = NULL;
     struct recording_result result;
     struct recording_options options = {.first_station = 1,
@@ -160,12 +112,13 @@ static int draw(struct map_run *run, struct config *cfg, struct sh_err *err)
                                         .report = &app_report_stderr,
                                         .frame = add_frame,
                                         .ctx = run,
-                                        .interrupted = interrupted};
+                                        .interrupted = app_interrupted};
+    app_catch_signals();
     int rc = offline_open(cfg, &app_report_stderr, &offline, err);
     if (rc == SH_OK) options.last_station = offline_site(offline)->n_stations;
     if (rc == SH_OK) rc = create_map(run, offline_site(offline), err);
     if (rc == SH_OK) rc = recording_run(offline_scanhead(offline), &options, &result, err);
-    if (rc == SH_OK && app_interrupted) rc = sh_fail(err, SH_EIO, "interrupted; nothing written");
+    if (rc == SH_OK && app_interrupted()) rc = sh_fail(err, SH_EIO, "interrupted; nothing written");
     if (rc == SH_OK) rc = map_write_png(run->map, run->output, err);
     if (rc == SH_OK && !run->quiet) {
         struct map_counts counts;
@@ -178,28 +131,48 @@ static int draw(struct map_run *run, struct config *cfg, struct sh_err *err)
     return rc;
 }
 
-int app_map(int argc, char **argv)
+/* The map is in the scene's frame, whatever the configuration sends to its clients. */
+static int set_frame(struct app_sets *sets)
 {
-    struct map_run *run = calloc(1, sizeof *run);
-    struct sh_err err = {0};
-    if (run == NULL) {
-        sh_fail(&err, SH_ENOMEM, "no memory");
-        return app_fail(&err);
-    }
-    int status = parse(run, argc, argv);
-    if (status < 0) {
-        /* The map is in the scene's frame, whatever the configuration sends to its clients. */
-        status = app_add_set(&run->sets, "output.crs=local");
-        if (status == APP_OK) status = app_add_set(&run->sets, "output.layout=geo");
-        if (status == APP_OK) status = app_add_set(&run->sets, "output.utm_zone=0");
-        struct config *cfg = status == APP_OK ? app_load_config(run->config, &run->sets, &status) : NULL;
-        if (cfg != NULL) {
-            app_catch_signals();
-            int rc = draw(run, cfg, &err);
-            status = rc == SH_OK ? APP_OK : app_fail(&err);
-            free(cfg);
-        }
-    }
-    free(run);
+    static const char *const SETS[] = {"output.crs=local", "output.layout=geo", "output.utm_zone=0"};
+    int status = APP_OK;
+    for (size_t i = 0; i < sizeof SETS / sizeof SETS[0] && status == APP_OK; i++)
+        status = app_add_set(sets, SETS[i]);
     return status;
 }
+
+static int run(int argc, char **argv)
+{
+    struct map_run run = {0};
+    int status = app_parse(&app_map, argc, argv, &run.in, &run);
+    if (status != APP_GO_ON) return status;
+    if (run.output == NULL) return app_usage(&app_map, "-o FILE.png is needed");
+    status = set_frame(&run.in.sets);
+    return status == APP_OK ? app_with_config(&run.in, draw, &run) : status;
+}
+
+#define AT(member) offsetof(struct map_run, member)
+
+/* clang-format off */
+static const struct app_option OPTIONS[] = {
+    {APP_TEXT, "output", "FILE.png", .letter = 'o', .at = AT(output), .help = "where to write"},
+    {APP_NUMBER, "pixel-m", "M", .min = 1e-4, .max = 1e4, .at = AT(pixel_m),
+     .help = "side of a pixel; default: 1200 pixels on the longer side"},
+    OPTION_SET,
+    {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no progress"},
+    OPTION_END
+};
+/* clang-format on */
+
+const struct app_command app_map = {
+    .name = "map",
+    .operand = {"CONFIG"},
+    .needs = "-o FILE.png",
+    .summary = "scan map of the stations, from above",
+    .options = OPTIONS,
+    .notes =
+        "Scans one frame from each station off line and draws the points. A pixel is darker where more heights were\n"
+        "hit, as on walls. Its hue shows the height of its lowest point. The area is that of the scene and the\n"
+        "stations.\n",
+    .run = run,
+};

@@ -1,12 +1,13 @@
-/* The head in this process, behind a socket pair. */
+#include "firmware_sim/app/offline.h"
+
 #include <errno.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include "firmware_sim/loop/loop.h"
-#include "firmware_sim/app/recording.h"
 
 struct offline {
     struct site *site;
@@ -72,7 +73,7 @@ void offline_close(struct offline *offline)
 {
     if (offline == NULL) return;
     struct loop_stats stats;
-    if (offline->sh != NULL) scanhead_close(offline->sh); /* a loop that waits for this reader goes on */
+    if (offline->sh != NULL) scanhead_close(offline->sh); /* a loop that waited for this reader goes on */
     if (offline->loop != NULL) {
         loop_end(offline->loop);
         loop_join(offline->loop, &stats);

@@ -1,43 +1,13 @@
-/* scanhead plan: which method each stage will use. It loads the scene, as a run does, and asks what the run asks. */
+/* scanhead plan: which method each stage will use. It loads the scene as a run does and prints what the run
+ * uses. */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/plan.h"
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/base/json.h"
 #include "firmware_sim/site/plan_rows.h"
-
-static const char HELP[] =
-    "scanhead plan CONFIG [options]: the method each stage will use, its error bound, its cost, why, and what was left "
-    "out\n\n"
-    "  --json           an array of {stage, method, error_m, echo_share, cost_ns, forced, why, left_out}, left_out an\n"
-    "                   array of {method, error_m, echo_share, cost_ns, why}; null: not known, or hangs on the scene\n"
-    "  --set KEY=VALUE  another value of a configuration key\n\n"
-    "Of each stage the cheapest method is used whose bounds hold plan.tolerance_m (root mean square of the ranges) "
-    "and\n"
-    "plan.echo_tolerance (share of the pulses with another number of echoes), unless beam.mode, "
-    "optics.depth,\n"
-    "scene.order_exactly or output.georef force one. Beam and optics are tried on some thousands of the head's own "
-    "pulses\n"
-    "in the scene, always the same ones, against 1,027 sub-rays, or the deepest way; bounds are upper limits of what "
-    "was\n"
-    "found, from up to four of the stations, for the settings at power-up. Each stage may use the whole tolerance; they are not added up. georef is planned for "
-    "each\n"
-    "station, from output.crs, output.tolerance_m, the scene's extent and the head's range_max_m; one row for all "
-    "where\n"
-    "they get the same method, else one each. A stage with the method none is left out: nothing in the configuration "
-    "asks\n"
-    "for it. Costs count beyond a single ray: rounded figures of `make chart` and `make "
-    "bench-beam` on\n"
-    "one core with AVX2, to compare methods by; what hangs on the scene is measured by `make bench`.\n";
-
-enum { OPT_JSON = 256 };
-static const struct option OPTIONS[] = {{"set", required_argument, NULL, 's'},
-                                        {"json", no_argument, NULL, OPT_JSON},
-                                        {"help", no_argument, NULL, 'h'},
-                                        {NULL, 0, NULL, 0}};
 
 static void put_option(struct json *json, const struct plan_option *option)
 {
@@ -50,29 +20,27 @@ static void put_option(struct json *json, const struct plan_option *option)
     json_close_object(json);
 }
 
-static int print_json(const struct site_plan *plan, struct sh_err *err)
+static void put_rows(struct json *json, const void *ctx)
 {
-    struct json json;
-    json_begin(&json, stdout);
-    json_open_array(&json, NULL);
+    const struct site_plan *plan = ctx;
+    json_open_array(json, NULL);
     for (size_t i = 0; i < plan->n; i++) {
         const struct plan_row *row = &plan->row[i];
-        json_open_object(&json, NULL);
-        json_string(&json, "stage", row->stage);
-        json_string(&json, "method", row->method);
-        json_double(&json, "error_m", row->error_m);
-        json_double(&json, "echo_share", row->echo_share);
-        json_double(&json, "cost_ns", row->cost_ns);
-        json_bool(&json, "forced", row->forced);
-        json_string(&json, "why", row->why);
-        json_open_array(&json, "left_out");
+        json_open_object(json, NULL);
+        json_string(json, "stage", row->stage);
+        json_string(json, "method", row->method);
+        json_double(json, "error_m", row->error_m);
+        json_double(json, "echo_share", row->echo_share);
+        json_double(json, "cost_ns", row->cost_ns);
+        json_bool(json, "forced", row->forced);
+        json_string(json, "why", row->why);
+        json_open_array(json, "left_out");
         for (uint32_t k = 0; k < row->n_left; k++)
-            put_option(&json, &row->left[k]);
-        json_close_array(&json);
-        json_close_object(&json);
+            put_option(json, &row->left[k]);
+        json_close_array(json);
+        json_close_object(json);
     }
-    json_close_array(&json);
-    return json_end(&json, err);
+    json_close_array(json);
 }
 
 static void print_line(const char *stage, const char *method, const double figure[3], const char *why)
@@ -86,7 +54,7 @@ static void print_line(const char *stage, const char *method, const double figur
     printf("%-8s %-22s %8s %8s %6s  %s\n", stage, method, shown[0], shown[1], shown[2], why);
 }
 
-/* Not measured, for the same reason: told once. */
+/* Both not measured, for the same reason: printed once. */
 static int is_like(const struct plan_option *a, const struct plan_option *b)
 {
     return isnan(a->error_m) && isnan(b->error_m) && strcmp(a->why_not, b->why_not) == 0;
@@ -102,7 +70,7 @@ static void print_left(const struct plan_option *left, uint32_t more)
     print_line("", method, figure, why);
 }
 
-static int print_text(const struct site_plan *plan)
+static void print_text(const struct site_plan *plan)
 {
     printf("%-8s %-22s %8s %8s %6s  %s\n", "stage", "method", "error m", "echoes", "ns", "why");
     for (size_t i = 0; i < plan->n; i++) {
@@ -115,43 +83,68 @@ static int print_text(const struct site_plan *plan)
             print_left(&row->left[k], end - k - 1);
         }
     }
-    return SH_OK;
 }
 
-static int plan_config(const struct app_sets *sets, const char *path, int as_json)
+struct plan_options {
+    int json;
+    struct app_input in;
+};
+
+static int plan(struct config *cfg, void *ctx, struct sh_err *err)
 {
-    int status = APP_OK;
-    struct sh_err err = {0};
+    const struct plan_options *o = ctx;
     struct site *site = NULL;
-    struct config *cfg = app_load_config(path, sets, &status);
-    if (cfg == NULL) return status;
     cfg->beam.measures = 1;
-    int rc = site_load(cfg, &app_report_stderr, &site, &err);
-    if (rc == SH_OK) rc = site_plan_rows(site, &app_report_stderr, &err);
-    if (rc == SH_OK) rc = as_json ? print_json(&site->plan, &err) : print_text(&site->plan);
+    int rc = site_load(cfg, &app_report_stderr, &site, err);
+    if (rc == SH_OK) rc = site_plan_rows(site, &app_report_stderr, err);
+    if (rc == SH_OK && o->json) rc = app_write_json("-", put_rows, &site->plan, err);
+    if (rc == SH_OK && !o->json) print_text(&site->plan);
     site_free(site);
-    free(cfg);
-    return rc == SH_OK ? APP_OK : app_fail(&err);
+    return rc;
 }
 
-int app_plan(int argc, char **argv)
+static int run(int argc, char **argv)
 {
-    struct app_sets sets;
-    memset(&sets, 0, sizeof sets);
-    int opt, as_json = 0;
-    opterr = 0;
-    while ((opt = getopt_long(argc, argv, ":h", OPTIONS, NULL)) != -1) {
-        int status = APP_OK;
-        if (opt == 'h') {
-            fputs(HELP, stdout);
-            return APP_OK;
-        }
-        if (opt == OPT_JSON)
-            as_json = 1;
-        else
-            status = opt == 's' ? app_add_set(&sets, optarg) : app_bad_option("plan", opt, argv);
-        if (status != APP_OK) return status;
-    }
-    if (optind != argc - 1) return app_usage("plan", "one CONFIG is needed");
-    return plan_config(&sets, argv[optind], as_json);
+    struct plan_options o = {0};
+    int status = app_parse(&app_plan, argc, argv, &o.in, &o);
+    return status == APP_GO_ON ? app_with_config(&o.in, plan, &o) : status;
 }
+
+/* clang-format off */
+static const struct app_option OPTIONS[] = {
+    {APP_FLAG, "json", NULL, .at = offsetof(struct plan_options, json),
+     .help = "an array of {stage, method, error_m, echo_share, cost_ns, forced, why, left_out}, where left_out is an "
+             "array of {method, error_m, echo_share, cost_ns, why}; null: not known, or it depends on the scene"},
+    OPTION_SET,
+    OPTION_END
+};
+/* clang-format on */
+
+static const char NOTES[] =
+    "Of each stage the cheapest method is used whose bounds hold. The bounds are plan.tolerance_m (RMS of the\n"
+    "ranges) and plan.echo_tolerance (share of the pulses with another number of echoes). beam.mode, optics.depth,\n"
+    "scene.order_exactly and output.georef force a method.\n"
+    "\n"
+    "Beam and optics are tried on some thousands of the head's own pulses in the scene, always the same ones. They\n"
+    "are compared with 1,027 sub-rays, or with the deepest way. The bounds are upper limits of what was found, from\n"
+    "up to four of the stations, for the settings at power-up. Each stage may use the whole tolerance; the stages\n"
+    "are not added up.\n"
+    "\n"
+    "georef is planned for each station, from output.crs, output.tolerance_m, the scene's extent and the head's\n"
+    "range_max_m. There is one row for all stations where they get the same method, else one row each.\n"
+    "\n"
+    "A stage with the method none is left out: nothing in the configuration asks for it. Below each stage stand\n"
+    "the methods that were not chosen, each with its reason.\n"
+    "\n"
+    "Costs are in ns per pulse, beyond a single ray. They are rounded figures of `make chart` and\n"
+    "`make bench-beam` on one core with AVX2, to compare methods by. `make bench` measures what depends on the\n"
+    "scene.\n";
+
+const struct app_command app_plan = {
+    .name = "plan",
+    .operand = {"CONFIG"},
+    .summary = "which method each stage will use, its error bound and its cost",
+    .options = OPTIONS,
+    .notes = NOTES,
+    .run = run,
+};

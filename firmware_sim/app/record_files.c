@@ -29,11 +29,11 @@ int record_files_check_degrees(const struct record_files *files, struct sh_err *
 static int open_file(const struct record_files *files, struct record_file *file, struct sh_err *err)
 {
     char *path = NULL;
-    if (!files->split) return file->ops->open(file->path, &files->recorder, &file->rec, err);
+    if (!files->split) return recorder_open(file->ops, file->path, &files->recorder, &file->rec, err);
     const char *ending = file->path + strlen(file->path) - strlen(file->ops->ending);
     if (asprintf(&path, "%.*s-%u%s", (int)(ending - file->path), file->path, files->part, ending) < 0)
         return sh_fail(err, SH_ENOMEM, "%s: no memory for its name", file->path);
-    int rc = file->ops->open(path, &files->recorder, &file->rec, err);
+    int rc = recorder_open(file->ops, path, &files->recorder, &file->rec, err);
     free(path);
     return rc;
 }
@@ -54,7 +54,7 @@ int record_files_close(struct record_files *files, int keep, struct sh_err *err)
     for (int i = 0; i < files->n; i++) {
         struct sh_err why = {0};
         if (files->file[i].rec == NULL) continue;
-        int e = files->file[i].ops->close(files->file[i].rec, keep, &why);
+        int e = recorder_close(files->file[i].rec, keep, &why);
         files->file[i].rec = NULL;
         if (e != SH_OK && rc == SH_OK) rc = sh_fail(err, e, "%s", why.text);
     }
@@ -78,6 +78,6 @@ int record_files_frame(struct record_files *files, struct scanhead *sh, const st
     }
     if (frame->type == SCANHEAD_POINTS) files->has_points = 1;
     for (int i = 0; i < files->n && rc == SH_OK; i++)
-        rc = files->file[i].ops->frame(files->file[i].rec, sh, frame, err);
+        rc = recorder_frame(files->file[i].rec, sh, frame, err);
     return rc;
 }

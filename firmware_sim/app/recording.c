@@ -11,10 +11,11 @@
 enum { REPLY_MS = 5000, NEXT_MS = 250, END_MS = 5000, BOOT_MS = 30000, REPLUG_MS = 1000, SILENT_MS = 2000 };
 
 struct recording {
-    int64_t heard_ns; /* when pulses came last, or the head was asked why none do */
+    int64_t heard_ns; /* when pulses came last, or when the head was last asked why none come */
     struct scanhead *sh;
     const struct recording_options *o;
     struct recording_result *result;
+    char reply[512];
     int64_t next_report_ns, scan_t0_ns; /* monotonic; device time of the scan's start, -1 before it */
     int interrupted;                    /* asked to end the whole recording */
     int stopping;                       /* the scan at hand is to end */
@@ -22,33 +23,36 @@ struct recording {
     int scan_over, cut_short, within_scan, broken;
 };
 
-static int command(struct recording *r, const char *line, char *reply, size_t len, struct sh_err *err)
+/* The answer is in r->reply. */
+static int command(struct recording *r, const char *line, struct sh_err *err)
 {
-    int rc = scanhead_command(r->sh, line, reply, len, REPLY_MS);
+    int rc = scanhead_command(r->sh, line, r->reply, sizeof r->reply, REPLY_MS);
     if (rc != SCANHEAD_OK) return sh_fail(err, rc, "%s: %s", line, scanhead_error(r->sh));
-    if (strncmp(reply, "ERR", 3) == 0) return sh_fail(err, SH_ESTATE, "the head refused %s: %s", line, reply);
+    if (strncmp(r->reply, "ERR", 3) == 0) return sh_fail(err, SH_ESTATE, "the head refused %s: %s", line, r->reply);
     return SH_OK;
 }
 
 static int set(struct recording *r, const char *header, long value, struct sh_err *err)
 {
-    char line[64], reply[512];
+    char line[64];
     snprintf(line, sizeof line, "%s %ld", header, value);
-    return command(r, line, reply, sizeof reply, err);
+    return command(r, line, err);
 }
 
 static void count_points(struct recording *r, const struct scanhead_frame *frame)
 {
-    /* The last byte of a point holds the echo's number and the count: 0 for a shot without echo. */
-    const uint8_t *last = frame->payload + NATIVE_POINTS_HEAD_LEN + NATIVE_POINT_LEN - 1;
     uint64_t empty = 0;
-    for (uint32_t i = 0; i < frame->n_points; i++)
-        empty += last[(size_t)i * NATIVE_POINT_LEN] == 0;
+    for (uint32_t i = 0; i < frame->n_points; i++) {
+        struct native_point point;
+        native_decode_point(frame->payload, i, &point);
+        empty += point.echo_count == 0;
+    }
     r->result->empty += empty;
     r->result->points += frame->n_points - empty;
 }
 
-/* Stopped, or failed, while the mirror was still spinning up: there is no scan, so no SCAN_END comes. */
+/* The head stopped or failed while the mirror was still spinning up. There is no scan, so no SCAN_END
+ * comes. */
 static int gives_up(const struct scanhead_frame *frame)
 {
     return frame->event == SCANHEAD_EV_STATE && frame->event_value[1] == HEAD_SPIN_UP &&
@@ -98,20 +102,25 @@ static void report(struct recording *r)
     sh_progress(r->o->report, text, -1.0);
 }
 
-/* The head was unplugged: waits for it. A scan that is over when it is back has ended meanwhile; of one that is not,
- * the rest will come. */
+static int is_interrupted(struct recording *r)
+{
+    if (r->o->interrupted != NULL && r->o->interrupted()) r->interrupted = 1;
+    return r->interrupted;
+}
+
+/* The head was unplugged: waits for it. Where it scans no more when it is back, the scan ended meanwhile.
+ * Where it still scans, the rest of the scan will come. */
 static int replug(struct recording *r, struct sh_err *err)
 {
     const int64_t end_ns = clock_now_ns() + (int64_t)(1e9 * r->o->replug_s);
-    char reply[512];
     int rc, scanning = 0;
     sh_warn(r->o->report, "%s; waiting for it", scanhead_error(r->sh));
     do {
         rc = scanhead_reattach(r->sh, REPLUG_MS);
-        if (rc == SCANHEAD_OK) rc = scanhead_command(r->sh, "HEAD:STAT?", reply, sizeof reply, REPLY_MS);
-    } while (rc != SCANHEAD_OK && clock_now_ns() < end_ns && !(r->o->interrupted != NULL && r->o->interrupted()));
+        if (rc == SCANHEAD_OK) rc = scanhead_command(r->sh, "HEAD:STAT?", r->reply, sizeof r->reply, REPLY_MS);
+    } while (rc != SCANHEAD_OK && clock_now_ns() < end_ns && !is_interrupted(r));
     if (rc != SCANHEAD_OK) return sh_fail(err, SH_ELOST, "the head did not come back: %s", scanhead_error(r->sh));
-    scanning = strncmp(reply, "s", 1) == 0; /* spin-up, scanning, spin-down */
+    scanning = strncmp(r->reply, "s", 1) == 0; /* spin-up, scanning, spin-down */
     sh_warn(r->o->report, "the head is back");
     r->result->replugs++;
     r->result->broken_scans += (uint64_t)(r->within_scan && !r->broken);
@@ -121,7 +130,7 @@ static int replug(struct recording *r, struct sh_err *err)
     return 0;
 }
 
-/* One frame. 1: got one; 0: none in time; negative: over. */
+/* Takes one frame. Returns 1: got one; 0: none in time; negative: the recording is over. */
 static int step(struct recording *r, int timeout_ms, struct sh_err *err)
 {
     struct scanhead_frame frame;
@@ -141,25 +150,18 @@ static int step(struct recording *r, int timeout_ms, struct sh_err *err)
     return rc == SH_OK ? 1 : rc;
 }
 
-static int is_interrupted(struct recording *r)
-{
-    if (r->o->interrupted != NULL && r->o->interrupted()) r->interrupted = 1;
-    return r->interrupted;
-}
-
 /* Returns early, with SH_OK, when interrupted. */
 static int wait_idle(struct recording *r, struct sh_err *err)
 {
     int64_t deadline_ns = clock_now_ns() + (int64_t)BOOT_MS * 1000000;
-    char reply[512];
     while (clock_now_ns() < deadline_ns) {
         if (is_interrupted(r)) return SH_OK;
-        int rc = command(r, "HEAD:STAT?", reply, sizeof reply, err);
+        int rc = command(r, "HEAD:STAT?", err);
         if (rc != SH_OK) return rc;
-        if (strcmp(reply, "idle") == 0) return SH_OK;
-        if (strcmp(reply, "scanning") == 0 || strcmp(reply, "fault") == 0 || strcmp(reply, "off") == 0)
-            return sh_fail(err, SH_ESTATE, "the head is %s; --listen records what it does on its own", reply);
-        rc = step(r, 20, err); /* frames go on meanwhile */
+        if (strcmp(r->reply, "idle") == 0) return SH_OK;
+        if (strcmp(r->reply, "scanning") == 0 || strcmp(r->reply, "fault") == 0 || strcmp(r->reply, "off") == 0)
+            return sh_fail(err, SH_ESTATE, "the head is %s; --listen records what it does on its own", r->reply);
+        rc = step(r, 20, err); /* frames keep coming meanwhile */
         if (rc < 0) return rc;
     }
     return sh_fail(err, SH_ETIMEOUT, "the head was not idle within %d s", BOOT_MS / 1000);
@@ -167,23 +169,20 @@ static int wait_idle(struct recording *r, struct sh_err *err)
 
 static int stop_scan(struct recording *r, struct sh_err *err)
 {
-    char reply[512];
-    int rc = scanhead_command(r->sh, "SCAN:STOP", reply, sizeof reply, REPLY_MS);
+    int rc = scanhead_command(r->sh, "SCAN:STOP", r->reply, sizeof r->reply, REPLY_MS);
     if (rc != SCANHEAD_OK) return sh_fail(err, rc, "SCAN:STOP: %s", scanhead_error(r->sh));
-    r->cut_short =
-        r->interrupted && strncmp(reply, "ERR", 3) != 0; /* a refusal says that the scan has just ended by itself */
+    r->cut_short = r->interrupted && strncmp(r->reply, "ERR", 3) != 0; /* refused: the scan has just ended by itself */
     return SH_OK;
 }
 
-/* No pulses have come for a while: frames that a slow reader lost may have held the scan's end. */
+/* No pulses have come for a while. The scan's end may be among frames that a slow reader lost. */
 static int look_for_end(struct recording *r, struct sh_err *err)
 {
     struct scanhead_stats stats;
-    char reply[512];
     scanhead_get_stats(r->sh, &stats);
     if (stats.seq_lost + stats.reader_lost == 0) return SH_OK;
-    int rc = command(r, "HEAD:STAT?", reply, sizeof reply, err);
-    if (rc != SH_OK || strcmp(reply, "idle") != 0) return rc;
+    int rc = command(r, "HEAD:STAT?", err);
+    if (rc != SH_OK || strcmp(r->reply, "idle") != 0) return rc;
     sh_warn(r->o->report, "the scan's end was lost; the head is idle");
     r->scan_started = r->scan_over = 1;
     r->within_scan = r->broken = 0;
@@ -220,12 +219,11 @@ static int follow(struct recording *r, struct sh_err *err)
 
 static int start_scan(struct recording *r, uint32_t station, struct sh_err *err)
 {
-    char reply[512];
     int rc = wait_idle(r, err);
     if (rc == SH_OK && r->interrupted) return SH_OK;
     if (rc == SH_OK && station != 0) rc = set(r, "HEAD:STATION", (long)station, err);
     if (rc == SH_OK && r->o->frames >= 0) rc = set(r, "SCAN:FRAM", r->o->frames, err);
-    return rc == SH_OK ? command(r, "SCAN:STAR", reply, sizeof reply, err) : rc;
+    return rc == SH_OK ? command(r, "SCAN:STAR", err) : rc;
 }
 
 static int record_scan(struct recording *r, uint32_t station, struct sh_err *err)
@@ -238,7 +236,7 @@ static int record_scan(struct recording *r, uint32_t station, struct sh_err *err
     return follow(r, err);
 }
 
-/* A scan without end, of a head that stands, is ended by who records it, and is then complete. */
+/* Whoever records a scan without end, of a head that stands, ends it; it is then complete. */
 static int is_endless(const struct recording *r)
 {
     struct scanhead_info info;
@@ -246,8 +244,8 @@ static int is_endless(const struct recording *r)
            !info.moving;
 }
 
-/* What an interruption left out: of the scan at hand, and of the stations from it on. */
-static void tell_missing(struct recording *r, uint32_t station)
+/* Names what an interruption left out: of the scan at hand, and of the stations from it on. */
+static void name_missing(struct recording *r, uint32_t station)
 {
     char *text = r->result->missing;
     size_t room = sizeof r->result->missing;
@@ -271,7 +269,7 @@ static void tell_missing(struct recording *r, uint32_t station)
 static int record_listening(struct recording *r, struct sh_err *err)
 {
     int rc = record_scan(r, 0, err);
-    /* A scan's end is not the end: more may follow until the stream ends. */
+    /* More scans may follow until the stream ends. */
     while (rc == SH_OK && !r->stopping) {
         r->scan_over = 0;
         rc = follow(r, err);
@@ -285,7 +283,7 @@ static int record_stations(struct recording *r, struct sh_err *err)
     int rc = record_scan(r, station, err);
     while (rc == SH_OK && !r->interrupted && station < r->o->last_station)
         rc = record_scan(r, ++station, err);
-    if (rc == SH_OK && r->interrupted) tell_missing(r, station);
+    if (rc == SH_OK && r->interrupted) name_missing(r, station);
     return rc;
 }
 
@@ -293,11 +291,14 @@ int recording_run(struct scanhead *sh, const struct recording_options *options, 
                   struct sh_err *err)
 {
     memset(result, 0, sizeof *result);
-    struct recording r = {.sh = sh, .o = options, .result = result, .next_report_ns = clock_now_ns() + 1000000000};
+    const int64_t start_ns = clock_now_ns();
+    struct recording r = {.sh = sh, .o = options, .result = result, .next_report_ns = start_ns + 1000000000};
     int rc = options->listen ? record_listening(&r, err) : record_stations(&r, err);
+    result->wall_s = 1e-9 * (double)(clock_now_ns() - start_ns);
+    scanhead_get_stats(sh, &result->stream);
+    scanhead_hash_hex(sh, result->sha256);
     if (rc == SH_ECLOSED && options->listen && result->frames == 0)
         return sh_fail(err, SH_EFORMAT, "the stream ended without a single frame");
     if (rc == SH_ECLOSED && options->listen && !r.within_scan) return SH_OK;
-    result->ended_early = rc == SH_ECLOSED || rc == SH_ELOST;
     return rc == SH_ECLOSED && r.within_scan ? sh_fail(err, rc, "the stream ended in the middle of a scan") : rc;
 }

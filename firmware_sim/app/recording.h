@@ -1,5 +1,7 @@
-/* Taking a scan through libscanhead: start, follow until it ends, stop on time. Off line the head runs in this process,
- * at the pace `fast`, behind a socket pair; the client side is the same. */
+/* Following scans through libscanhead: start a scan, pass on its frames until it ends, stop it on time.
+ *
+ * In: a client's handle of a head (on a wire, or of offline.h) and what to scan. Out: each frame to a
+ * callback, and what came of it in figures. One recording at a time per handle; not real-time safe. */
 #ifndef FIRMWARE_SIM_APP_RECORDING_H
 #define FIRMWARE_SIM_APP_RECORDING_H
 
@@ -7,40 +9,41 @@
 
 #include "core/err.h"
 #include "drivers/host/scanhead.h"
-#include "firmware_sim/config/config.h"
+#include "firmware_sim/base/json.h"
 
 struct recording_options {
     int listen;                           /* send nothing; take what comes until the stream or the time ends */
     uint32_t first_station, last_station; /* scanned one after the other, from 1; 0: as the head is set */
     long frames;                          /* per scan; -1: as the head is set */
-    double duration_s;                    /* > 0: stop each scan after this time of scanning */
+    double duration_s;                    /* > 0: stop each scan after this device time */
     double replug_s;                      /* > 0: how long to wait for a head that was unplugged, to go on then */
-    int progress;                         /* to the report, about once a second */
+    int progress;                         /* 1: to the report, about once a second */
     const struct sh_report *report;
-    /* Each frame, in order. A negative SH_E ends the recording with it. */
+    /* Gets each frame, in order. A negative SH_E ends the recording with it. */
     int (*frame)(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
     void *ctx;
-    /* Asked often: non-zero ends the recording in good order. May be NULL. */
+    /* Asked often: non-zero ends the recording in good order. NULL: never. */
     int (*interrupted)(void);
 };
 
 struct recording_result {
-    uint64_t points, empty, frames, scans, pulses;
-    uint64_t lost_pulses;           /* as the head says: cast pulses it could not compute */
-    uint64_t crowded, faint, unfit; /* hits that are no echoes, as its line ends say */
-    int ended_early;                /* the stream ended before the scan did */
-    char missing[128];              /* what was asked for but left out because of `interrupted`; empty: nothing */
-    uint64_t replugs, broken_scans; /* how often the head was away and came back; scans in which it was */
+    uint64_t points, empty, frames, scans, pulses; /* received; empty: shots without echo */
+    uint64_t lost_pulses;                          /* cast pulses that the head says it could not compute */
+    uint64_t crowded, faint, unfit;                /* hits that are no echoes, as the line ends count them */
+    char missing[128];              /* what was asked for and left out because of `interrupted`; empty: nothing */
+    double wall_s;                  /* how long the recording took */
+    struct scanhead_stats stream;   /* as the client counts */
+    char sha256[65];                /* of the stream, where scanhead_hash_start was called */
+    uint64_t replugs, broken_scans; /* how often the head was away and came back; scans in which it was away */
 };
 
+/* SH_OK, or the first failure. result is filled in both cases. */
 int recording_run(struct scanhead *sh, const struct recording_options *options, struct recording_result *result,
                   struct sh_err *err);
 
-struct offline;
-/* Loads and runs the head of a configuration; its own links are left closed. cfg is changed (pace, links). */
-int offline_open(struct config *cfg, const struct sh_report *report, struct offline **out, struct sh_err *err);
-struct scanhead *offline_scanhead(struct offline *offline);
-const struct site *offline_site(const struct offline *offline);
-void offline_close(struct offline *offline);
+/* Writes the result as one JSON object; ctx is the struct recording_result. */
+void recording_put(struct json *json, const void *ctx);
+/* SH_OK, or what is missing: frames, pulses, parts of scans. Echoes that the head left out do not count. */
+int recording_check_complete(const struct recording_result *result, struct sh_err *err);
 
 #endif

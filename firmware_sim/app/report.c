@@ -1,88 +1,47 @@
-/* scanhead report: how far a recording lies from the configuration's scene. */
+/* scanhead report: how far a recording's points lie from the scene of its configuration. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "core/cloud.h"
 #include "core/mat3.h"
 #include "firmware_sim/app/app.h"
-#include "firmware_sim/base/json.h"
+#include "firmware_sim/base/clock.h"
 #include "firmware_sim/site/site.h"
 
-static const char help[] =
-    "usage: scanhead report CONFIG CLOUD [--json] [--max-m M] [--tolerance-m T] [--set KEY=VALUE ...]\n"
-    "\n"
-    "Measures every point of a recording against the scene of the configuration it was made with: the "
-    "distance to\n"
-    "the nearest triangle, in double precision.\n"
-    "\n"
-    "  CONFIG            the configuration of the recording: its scene, stations, output.crs and "
-    "output.layout count\n"
-    "  CLOUD             a PLY file with x, y, z and, where it has them, station, echo and label, or a LAS file\n"
-    "                    (scanhead record -o FILE.ply or FILE.las). Points without a station are taken to be of the\n"
-    "                    first one. Three times nan is a shot without echo\n"
-    "  --tolerance-m T   how far a point may be from the scene (default 0.001)\n"
-    "  --max-m M         how far to look for the scene; what is farther counts as far, and fails (default "
-    "10)\n"
-    "  --json            the figures as JSON, in metres: points, empty, ghosts, mean_m, rms_m, p50_m, p95_m, p999_m, "
-    "max_m,\n"
-    "                    beyond, far, tolerance_m, surfaces_hit, surfaces, triangles_hit, triangles, worst\n"
-    "  --set KEY=VALUE   sets a key of the configuration\n"
-    "\n"
-    "Points seen in mirrors lie where nothing is: with the mirrors in CONFIG (surfaces) they are left out.\n"
-    "Mean, RMS, percentiles (nearest rank) and maximum are over all points that are not far. Percentiles are "
-    "of the\n"
-    "points' distances, which are never negative. Bodies that move stand where they stood at the station's stop\n"
-    "(platform.kind: stops); points on what moved during a scan are refused.\n"
-    "Exit status: 0 all points are within the tolerance, 1 some are not, 2 wrong usage or input.\n";
-
 struct report {
+    struct app_input in;
     const char *cloud_path;
     int json;
     double tolerance_m, max_m;
-    double told_s; /* when progress was told last */
-    struct app_sets sets;
+    int64_t reported_ns; /* when progress was reported last */
     struct config *cfg;
     struct site *site;
     const struct georef **georef; /* of each station */
     struct distance *index;
     struct distance *mover_index[CAST_MAX_MOVERS]; /* of each body that moves, in its own frame */
     struct cloud cloud;
-    size_t ghosts;      /* points seen in mirrors: nothing is there, they are left out */
+    size_t ghosts;      /* points seen in mirrors: nothing is there, so they are left out */
     double *distance_m; /* per point */
     uint32_t *triangle;
     struct cloud_stats stats;
     struct cloud_coverage coverage;
 };
 
-static double now_s(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
-}
-
-/* core/cloud tells about every piece of its work; a line a second is enough for a terminal, and none for
- * short work. */
-static void tell_each_second(void *ctx, const char *what, double fraction)
+/* core/analysis reports every piece of its work. A line a second is enough for a terminal, and none for short
+ * work. */
+static void report_each_second(void *ctx, const char *what, double fraction)
 {
     struct report *r = ctx;
-    double now = now_s();
-    if (now - r->told_s < 1) return;
-    r->told_s = now;
+    const int64_t now_ns = clock_now_ns();
+    if (now_ns - r->reported_ns < 1000000000) return;
+    r->reported_ns = now_ns;
     sh_progress(&app_report_stderr, what, fraction);
 }
 
-static void warn(void *ctx, const char *text)
-{
-    (void)ctx;
-    sh_warn(&app_report_stderr, "%s", text);
-}
-
-/* Ghosts become shots without echo, but counted. */
+/* Ghosts are counted, and become shots without echo. */
 static void leave_out_ghosts(struct report *r)
 {
     const struct site_detect *d = &r->site->detect;
@@ -98,8 +57,7 @@ static void leave_out_ghosts(struct report *r)
 
 static int load(struct report *r, struct sh_err *err)
 {
-    const struct sh_report progress = {r, warn, tell_each_second};
-    r->told_s = now_s();
+    const struct sh_report progress = {r, app_report_stderr.warn, report_each_second};
     int rc = cloud_read(r->cloud_path, &progress, &r->cloud, err);
     if (rc == SH_OK) rc = site_load(r->cfg, &app_report_stderr, &r->site, err);
     if (rc == SH_OK) rc = distance_create(r->site->scene, &r->index, err);
@@ -116,7 +74,8 @@ static unsigned thread_count(const struct config *cfg)
     return processors > 0 ? (unsigned)processors : 1;
 }
 
-/* Where a moving body was hit, in the body's own frame: at a stop it stands all scan long. */
+/* Turns a point on a moving body into the body's own frame and gives the body's index. At a stop the body
+ * stands still during the scan. */
 static const struct distance *body_of(void *ctx, unsigned station, uint16_t label, double p_prcs[3])
 {
     const struct report *r = ctx;
@@ -133,7 +92,7 @@ static const struct distance *body_of(void *ctx, unsigned station, uint16_t labe
     return r->mover_index[k];
 }
 
-/* Elsewhere a body's place hangs on the time of each point, which not every file has. */
+/* Without stops a body's place depends on the time of each point, which not every file has. */
 static int check_bodies(const struct report *r, struct sh_err *err)
 {
     const struct site *site = r->site;
@@ -161,9 +120,8 @@ static int compare(struct report *r, struct sh_err *err)
                                      .threads = thread_count(r->cfg),
                                      .body = site->n_movers > 0 ? body_of : NULL,
                                      .body_ctx = r};
-    const struct sh_report progress = {r, warn, tell_each_second};
+    const struct sh_report progress = {r, app_report_stderr.warn, report_each_second};
     struct sh_err why = {0};
-    r->told_s = now_s();
     r->distance_m = malloc((r->cloud.n + 1) * sizeof *r->distance_m);
     r->triangle = malloc((r->cloud.n + 1) * sizeof *r->triangle);
     if (r->distance_m == NULL || r->triangle == NULL)
@@ -232,87 +190,50 @@ static void put_worst(struct json *json, const struct report *r)
     json_close_object(json);
 }
 
-static int print_json(const struct report *r, struct sh_err *err)
+static void put_figures(struct json *json, const void *ctx)
 {
+    const struct report *r = ctx;
     const struct cloud_stats *s = &r->stats;
-    struct json json;
-    json_begin(&json, stdout);
-    json_open_object(&json, NULL);
-    json_uint(&json, "points", s->points);
-    json_uint(&json, "empty", s->empty - r->ghosts);
-    json_uint(&json, "ghosts", r->ghosts);
-    json_double(&json, "mean_m", s->mean_m);
-    json_double(&json, "rms_m", s->rms_m);
-    json_double(&json, "p50_m", s->p50_m);
-    json_double(&json, "p95_m", s->p95_m);
-    json_double(&json, "p999_m", s->p999_m);
-    json_double(&json, "max_m", s->max_m);
-    json_uint(&json, "beyond", s->beyond);
-    json_uint(&json, "far", s->far);
-    json_double(&json, "tolerance_m", r->tolerance_m);
-    json_uint(&json, "surfaces_hit", r->coverage.surfaces_hit);
-    json_uint(&json, "surfaces", r->site->n_surfaces);
-    json_uint(&json, "triangles_hit", r->coverage.triangles_hit);
-    json_uint(&json, "triangles", r->site->scene->n_triangles);
-    put_worst(&json, r);
-    json_close_object(&json);
-    return json_end(&json, err);
+    json_open_object(json, NULL);
+    json_uint(json, "points", s->points);
+    json_uint(json, "empty", s->empty - r->ghosts);
+    json_uint(json, "ghosts", r->ghosts);
+    json_double(json, "mean_m", s->mean_m);
+    json_double(json, "rms_m", s->rms_m);
+    json_double(json, "p50_m", s->p50_m);
+    json_double(json, "p95_m", s->p95_m);
+    json_double(json, "p999_m", s->p999_m);
+    json_double(json, "max_m", s->max_m);
+    json_uint(json, "beyond", s->beyond);
+    json_uint(json, "far", s->far);
+    json_double(json, "tolerance_m", r->tolerance_m);
+    json_uint(json, "surfaces_hit", r->coverage.surfaces_hit);
+    json_uint(json, "surfaces", r->site->n_surfaces);
+    json_uint(json, "triangles_hit", r->coverage.triangles_hit);
+    json_uint(json, "triangles", r->site->scene->n_triangles);
+    put_worst(json, r);
+    json_close_object(json);
 }
 
-static int run(struct report *r)
+static int print_deviations(struct report *r, struct sh_err *err)
 {
-    struct sh_err err = {0};
-    int rc = load(r, &err);
-    if (rc == SH_OK) rc = compare(r, &err);
-    if (rc == SH_OK && r->json) rc = print_json(r, &err);
+    int rc = load(r, err);
+    if (rc == SH_OK) rc = compare(r, err);
+    if (rc == SH_OK && r->json) rc = app_write_json("-", put_figures, r, err);
     if (rc == SH_OK && !r->json) print_text(r);
-    if (rc == SH_OK && fflush(stdout) != 0) rc = sh_fail(&err, SH_EIO, "standard output: writing failed");
-    if (rc != SH_OK) return app_fail(&err);
-    if (r->stats.beyond == 0) return APP_OK;
-    sh_fail(&err, SH_ESTATE, "%s: %zu of %zu points are farther than %g m from the scene", r->cloud_path,
-            r->stats.beyond, r->stats.points, r->tolerance_m);
-    app_fail(&err);
-    return APP_FAILED;
+    if (rc == SH_OK && fflush(stdout) != 0) rc = sh_fail(err, SH_EIO, "standard output: writing failed");
+    if (rc != SH_OK || r->stats.beyond == 0) return rc;
+    return sh_fail(err, SH_ESTATE, "%s: %zu of %zu points are farther than %g m from the scene", r->cloud_path,
+                   r->stats.beyond, r->stats.points, r->tolerance_m);
 }
 
-/* 0 to go on, or a negative number when the help was asked for, or APP_USAGE. */
-static int parse_options(struct report *r, int argc, char **argv)
+static int report(struct config *cfg, void *ctx, struct sh_err *err)
 {
-    enum { JSON = 256, MAX_M, TOLERANCE_M, SET };
-    static const struct option options[] = {
-        {"json", no_argument, NULL, JSON},
-        {"max-m", required_argument, NULL, MAX_M},
-        {"tolerance-m", required_argument, NULL, TOLERANCE_M},
-        {"set", required_argument, NULL, SET},
-        {"help", no_argument, NULL, 'h'},
-        {NULL, 0, NULL, 0},
-    };
-    const double farthest_m = 1e9; /* no scene is larger */
-    int status = APP_OK, opt;
-    optind = 0;
-    while (status == APP_OK && (opt = getopt_long(argc, argv, ":h", options, NULL)) != -1) {
-        if (opt == JSON)
-            r->json = 1;
-        else if (opt == MAX_M)
-            status = app_parse_double("report", "--max-m", optarg, 1e-9, farthest_m, &r->max_m);
-        else if (opt == TOLERANCE_M)
-            status = app_parse_double("report", "--tolerance-m", optarg, 0, farthest_m, &r->tolerance_m);
-        else if (opt == SET)
-            status = app_add_set(&r->sets, optarg);
-        else if (opt == 'h')
-            return -1;
-        else
-            status = app_bad_option("report", opt, argv);
-    }
-    if (status != APP_OK) return status;
-    if (argc - optind != 2) return app_usage("report", "takes a configuration and a point cloud");
-    if (r->tolerance_m > r->max_m)
-        return app_usage("report", "--tolerance-m %g is more than --max-m %g", r->tolerance_m, r->max_m);
-    return APP_OK;
-}
-
-static void release(struct report *r)
-{
+    struct report *r = ctx;
+    r->cfg = cfg;
+    r->reported_ns = clock_now_ns();
+    r->cloud_path = r->in.operand[1];
+    int rc = print_deviations(r, err);
     free(r->georef);
     free(r->distance_m);
     free(r->triangle);
@@ -321,29 +242,56 @@ static void release(struct report *r)
     for (uint32_t k = 0; k < CAST_MAX_MOVERS; k++)
         distance_free(r->mover_index[k]);
     site_free(r->site);
-    free(r->cfg);
-    free(r);
+    return rc;
 }
 
-int app_report(int argc, char **argv)
+static int run(int argc, char **argv)
 {
-    struct report *r = calloc(1, sizeof *r);
-    struct sh_err err;
-    if (r == NULL) {
-        sh_fail(&err, SH_ENOMEM, "no memory");
-        return app_fail(&err);
-    }
-    r->tolerance_m = 0.001;
-    r->max_m = 10;
-    int status = parse_options(r, argc, argv);
-    if (status < 0) {
-        fputs(help, stdout);
-        status = APP_OK;
-    } else if (status == APP_OK) {
-        r->cloud_path = argv[optind + 1];
-        r->cfg = app_load_config(argv[optind], &r->sets, &status);
-        if (r->cfg != NULL) status = run(r);
-    }
-    release(r);
-    return status;
+    struct report r = {.tolerance_m = 0.001, .max_m = 10};
+    int status = app_parse(&app_report, argc, argv, &r.in, &r);
+    if (status == APP_GO_ON && r.tolerance_m > r.max_m)
+        status = app_usage(&app_report, "--tolerance-m %g is more than --max-m %g", r.tolerance_m, r.max_m);
+    return status == APP_GO_ON ? app_with_config(&r.in, report, &r) : status;
 }
+
+#define AT(member) offsetof(struct report, member)
+#define FARTHEST_M 1e9 /* no scene is larger */
+
+/* clang-format off */
+static const struct app_option OPTIONS[] = {
+    {APP_NUMBER, "tolerance-m", "T", .min = 0.0, .max = FARTHEST_M, .at = AT(tolerance_m),
+     .help = "how far a point may be from the scene (default 0.001)"},
+    {APP_NUMBER, "max-m", "M", .min = 1e-9, .max = FARTHEST_M, .at = AT(max_m),
+     .help = "how far to look for the scene; a point farther than that counts as far, and fails (default 10)"},
+    {APP_FLAG, "json", NULL, .at = AT(json),
+     .help = "the figures as JSON, in metres: points, empty, ghosts, mean_m, rms_m, p50_m, p95_m, p999_m, max_m, "
+             "beyond, far, tolerance_m, surfaces_hit, surfaces, triangles_hit, triangles, worst"},
+    OPTION_SET,
+    OPTION_END
+};
+/* clang-format on */
+
+static const char NOTES[] =
+    "CONFIG is the configuration of the recording: its scene, stations, output.crs and output.layout are used.\n"
+    "CLOUD is a LAS file, or a PLY file with x, y, z and, where it has them, station, echo and label, as\n"
+    "scanhead record writes both. Points without a station are taken to be of the first one. Three times NaN is\n"
+    "a shot without echo.\n"
+    "\n"
+    "Each point's distance to the nearest triangle of the scene is measured in double precision. Points seen in\n"
+    "mirrors lie where nothing is: with the mirrors in CONFIG (surfaces) they are left out. Mean, RMS, percentiles\n"
+    "(nearest rank) and maximum are over all points that are not far. Percentiles are of the distances, which are\n"
+    "never negative.\n"
+    "\n"
+    "Bodies that move stand where they stood at the station's stop (platform.kind: stops). Points on what moved\n"
+    "during a scan are refused.\n"
+    "\n"
+    "Exit status: 0 all points are within the tolerance, 1 some are not, 2 wrong usage or input.\n";
+
+const struct app_command app_report = {
+    .name = "report",
+    .operand = {"CONFIG", "CLOUD"},
+    .summary = "distance of a recording's points from the configuration's scene",
+    .options = OPTIONS,
+    .notes = NOTES,
+    .run = run,
+};

@@ -12,6 +12,12 @@ void json_begin(struct json *json, FILE *out)
     json->out = out;
 }
 
+void json_begin_one_line(struct json *json, FILE *out)
+{
+    json_begin(json, out);
+    json->one_line = 1;
+}
+
 /* Length of the UTF-8 sequence at p, 0 when it is not well-formed (Unicode 15, table 3-7). */
 static int utf8_len(const unsigned char *p)
 {
@@ -58,7 +64,7 @@ static void put_string(FILE *out, const char *text)
 
 static void new_line(struct json *json, int levels)
 {
-    fprintf(json->out, "\n%*s", 2 * levels, "");
+    if (!json->one_line) fprintf(json->out, "\n%*s", 2 * levels, "");
 }
 
 /* Comma, line and key before a value. */
@@ -77,7 +83,7 @@ static void put_key(struct json *json, const char *key)
     }
     if (key != NULL) {
         put_string(json->out, key);
-        fputs(": ", json->out);
+        fputs(json->one_line ? ":" : ": ", json->out);
     }
 }
 
@@ -150,7 +156,7 @@ void json_double(struct json *json, const char *key, double value)
 {
     char text[32] = "null";
     put_key(json, key);
-    /* 15 digits give back any decimal a person wrote (DBL_DIG), 17 any double. */
+    /* 15 digits keep any decimal that a person wrote (DBL_DIG), 17 any double. */
     for (int digits = 15; isfinite(value) && digits <= 17; digits++) {
         snprintf(text, sizeof text, "%.*g", digits, value);
         if (strtod(text, NULL) == value) break;

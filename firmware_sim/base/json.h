@@ -1,7 +1,8 @@
-/* A JSON writer for statistics: RFC 8259 text into a FILE, two blanks per level, one member per line.
+/* The one JSON writer. In: values and their keys, one call each. Out: RFC 8259 text in a FILE, either one
+ * member per line with two blanks per level, or all on one line without blanks.
  *
  * Each value takes the key it gets in an object, or NULL in an array and at the top. The FILE stays the
- * caller's. The C locale is assumed (nothing here calls setlocale). One writer belongs to one thread; it
+ * caller's. The C locale is assumed: nothing here calls setlocale. One writer belongs to one thread. It
  * allocates nothing. */
 #ifndef FIRMWARE_SIM_BASE_JSON_H
 #define FIRMWARE_SIM_BASE_JSON_H
@@ -15,6 +16,7 @@ enum { JSON_MAX_DEPTH = 16 };
 
 struct json {
     FILE *out;
+    int one_line;
     int depth;
     char closer[JSON_MAX_DEPTH];  /* what ends each open level */
     char has_one[JSON_MAX_DEPTH]; /* the level has a member: the next needs a comma */
@@ -22,6 +24,7 @@ struct json {
 };
 
 void json_begin(struct json *json, FILE *out);
+void json_begin_one_line(struct json *json, FILE *out);
 void json_open_object(struct json *json, const char *key);
 void json_close_object(struct json *json);
 void json_open_array(struct json *json, const char *key);
@@ -30,9 +33,8 @@ void json_close_array(struct json *json);
 void json_string(struct json *json, const char *key, const char *value);
 void json_int(struct json *json, const char *key, int64_t value);
 void json_uint(struct json *json, const char *key, uint64_t value);
-/* 15 to 17 digits, as many as it takes to read back the same double; null for NaN and the infinities, which JSON has
- * not.
- */
+/* 15 to 17 digits: the fewest that read back as the same double. NaN and the infinities, which JSON lacks,
+ * become null. */
 void json_double(struct json *json, const char *key, double value);
 void json_bool(struct json *json, const char *key, int value);
 /* Ends the text with a newline. SH_ESTATE: the calls did not make one whole value; SH_EIO: writing failed. */

@@ -1,3 +1,4 @@
+/* One line from split to reply: find its row, take its value, check control, let the row act. */
 #include "firmware_sim/command/command_inside.h"
 
 #include <stdarg.h>
@@ -21,7 +22,7 @@ void command_fail(struct command_call *call, int number, const char *fmt, ...)
     vsnprintf(text, sizeof text, fmt, ap);
     va_end(ap);
     command_queue_push(&call->dev->queue, number, text);
-    /* Composed again: in a full queue the entry is -350, but the reply tells what was wrong. */
+    /* Composed again: in a full queue the entry is -350, but the reply still says what was wrong. */
     command_error_compose(entry, sizeof entry, number, text);
     call->out->error = number;
     command_reply(call, "ERR %d,\"%s\"", number, entry);
@@ -127,7 +128,7 @@ static void do_query(struct command_call *call)
     call->value.kind = COMMAND_VALUE_NUMBER;
     if (call->param[0] != '\0' && (row->setting == NULL || !parse_special(call->param, &call->value.kind))) {
         command_fail(call, CMD_E_NOT_ALLOWED, "%s? takes %s", row->header,
-                     row->setting == NULL ? "no parameter" : "none but MIN, MAX or DEF");
+                     row->setting == NULL ? "no parameter" : "no parameter but MIN, MAX or DEF");
         return;
     }
     row->query(call);

@@ -1,20 +1,31 @@
-/* The command set: SCPI-style lines in, one reply line each, and the error queue of SCPI-99 (21.8).
+/* The command set: one SCPI-style line in, one reply line out, and the error queue of SCPI-99 (21.8).
  *
- *   *IDN?  *RST  *CLS  *OPC?  *STB?  SYSTem:ERRor[:NEXT]?  SYSTem:ERRor:COUNt?  SYSTem:VERSion?  SYSTem:CONTrol:RELease
- *   SYSTem:CONTrol?  SYSTem:PLAN?  HEAD:PRR  HEAD:LINes  HEAD:PAN  HEAD:STATe?  HEAD:STATION  SCAN:LINE:STARt
- * SCAN:LINE:STOP SCAN:PAN:STARt  SCAN:PAN:STOP  SCAN:FRAMes  SCAN:ECHoes  SCAN:STARt  SCAN:STOP  SCAN:COUNt?  HELP?
- * TIME? TIME:UTC? TIME:GPS?  TIME:STEP SCAN:ECHoes takes ALL, FIRSt, LAST, STRongest or DEF: which echoes of a pulse
- * are sent. Short and long forms, any case (HEAD:STATION has no short one: STAT is STATe); a query ends in '?'. MIN,
- * MAX and DEF are taken as a number; a setting's query takes MIN, MAX and DEF too ("HEAD:PRR? MAX"). MIN and MAX are
- * the limits as the profile and the other settings leave them now, so they are never refused. A setting may carry its
- * unit as a suffix: HZ, KHZ, MHZ (mega, as SCPI has it); DEG; DEG/S; a step is in nanoseconds or NS, US, MS, S. Numbers
- * are taken exactly or refused, never rounded. With a live platform a step may carry its pose at the step's end:
- * `TIME:STEP 10 MS, x, y, z, roll, pitch, heading`, metres in the scene frame and degrees (core/pose.h). *STB?: 4
- * errors are queued, 128 scanning. Outside the profile is -222; against another setting or the state -221. *CLS, like
- * SYSTem:ERRor?, needs no control. Reply: the value, or "OK", or `ERR -222,"Data out of range; HEAD:PRR 5000000 Hz,
- * allowed 1000 to 1200000"`.
+ *   common    *IDN?  *RST  *CLS  *OPC?  *STB?  HELP?
+ *   system    SYSTem:ERRor[:NEXT]?  SYSTem:ERRor:COUNt?  SYSTem:VERSion?  SYSTem:PLAN?
+ *             SYSTem:CONTrol?  SYSTem:CONTrol:RELease
+ *   head      HEAD:PRR  HEAD:LINes  HEAD:PAN  HEAD:STATION  HEAD:STATe?
+ *   scan      SCAN:STARt  SCAN:STOP  SCAN:COUNt?  SCAN:FRAMes  SCAN:ECHoes
+ *             SCAN:LINE:STARt  SCAN:LINE:STOP  SCAN:PAN:STARt  SCAN:PAN:STOP
+ *   time      TIME?  TIME:UTC?  TIME:GPS?  TIME:STEP
  *
- * Pure: no clock, no I/O, no thread; the loop owns the device, calls in one thread and carries out the effect. */
+ * Headers have a short form (the capitals) and a long one, in any case. HEAD:STATION has no short one: STAT
+ * is STATe. A query ends in '?'. Settings have both forms.
+ *
+ * Values. A number may be MIN, MAX or DEF, and so may the parameter of a setting's query ("HEAD:PRR? MAX").
+ * MIN and MAX are the limits as the profile and the other settings leave them now, so they are never refused.
+ * A unit may follow as a suffix: HZ, KHZ, MHZ (mega, as SCPI has it); DEG; DEG/S; of a step NS (also
+ * without), US, MS, S. Numbers are taken exactly or refused, never rounded. SCAN:ECHoes takes ALL, FIRSt,
+ * LAST, STRongest or DEF: which echoes of a pulse are sent.
+ *
+ * Steps. With a live platform a step may carry the pose at its end: `TIME:STEP 10 MS, x, y, z, roll, pitch,
+ * heading`, in metres of the scene frame and degrees (core/pose.h).
+ *
+ * Replies. The value, or "OK", or `ERR -222,"Data out of range; HEAD:PRR 5000000 Hz, allowed 1000 to
+ * 1200000"`. A value outside of the profile is -222. One that another setting or the state forbids is -221.
+ * *STB?: 4 errors are queued, 128 scanning. *CLS, as SYSTem:ERRor?, needs no control.
+ *
+ * Pure: no clock, no I/O, no thread. The loop owns the device, calls from one thread, and carries out the
+ * effect. */
 #ifndef FIRMWARE_SIM_COMMAND_COMMAND_H
 #define FIRMWARE_SIM_COMMAND_COMMAND_H
 
@@ -24,9 +35,9 @@
 #include "firmware_sim/command/head.h"
 
 enum {
-    COMMAND_MAX_LINE = 256, /* longest line without its end; longer ones are -363 and dropped whole */
+    COMMAND_MAX_LINE = 256, /* of a line without its end; a longer one is -363 and dropped whole */
     COMMAND_MAX_REPLY = 480,
-    COMMAND_QUEUE_LEN = 32, /* errors kept; when full the last becomes -350 and counts the rest */
+    COMMAND_QUEUE_LEN = 32, /* errors kept; when full, the last becomes -350 and counts the rest */
 };
 
 enum command_error {
@@ -64,22 +75,22 @@ void command_queue_push(struct command_queue *queue, int number, const char *tex
 void command_queue_pop(struct command_queue *queue, char *buf, size_t len);
 const char *command_error_text(int number);
 
-/* What the device tells the command set; the loop keeps it up to date. */
+/* The device as the command set sees it. The loop keeps it up to date. */
 struct command_device {
     const char *idn;
-    const char *plan; /* the methods in use, in a line; NULL: not known */
+    const char *plan; /* the methods in use, in one line; NULL: not known */
     struct head_limits limits;
-    struct head_settings settings; /* as they are now; command_execute changes them only when all is well */
+    struct head_settings settings; /* as they are now; a refused command leaves them */
     struct head_settings defaults; /* what *RST restores */
     enum head_state state;
     struct command_queue queue;
-    uint32_t control;                      /* session that may change things; 0: nobody, the next who does takes it */
-    uint64_t frames_done;                  /* of the scan at hand or the last one */
-    int64_t t_ns;                          /* device time */
-    char utc[40], gps[40];                 /* the same as time of day, by the head's clock; empty: unknown */
-    int step_allowed;                      /* 1 when the pace is `step` */
-    int pose_allowed;                      /* 1 when the platform is live: a step may carry its pose ... */
-    double pose_centre_m[3], pose_reach_m; /* ... so far from there at most */
+    uint32_t control;      /* session that may change things; 0: none, the next one that does takes it */
+    uint64_t frames_done;  /* of the scan at hand or the last one */
+    int64_t t_ns;          /* device time */
+    char utc[40], gps[40]; /* the same as time of day, by the clock of the head; empty: unknown */
+    int step_allowed;      /* 1 when the pace is `step` */
+    int pose_allowed;      /* 1 when the platform is live: a step may carry a pose */
+    double pose_centre_m[3], pose_reach_m; /* how far from where the pose may be; scene frame */
 };
 
 enum command_effect {
@@ -103,9 +114,10 @@ struct command_result {
     char reply[COMMAND_MAX_REPLY]; /* one line without its end; empty for an empty line (no reply at all) */
 };
 
-/* Carries out one line (without its end) from a session (from 1; 0 is the device itself: never refused control).
- * Changes dev->settings, dev->queue and dev->control; dev->state is changed by the loop. A change of settings is
- * refused whole (-222, -221) and leaves them as they were. While scanning, a station change is -221. */
+/* Carries out one line (without its end) from a session. Sessions count from 1; 0 is the device itself, which
+ * is never refused control. Changes dev->settings, dev->queue and dev->control; the loop changes dev->state.
+ * A change of settings that is refused (-222, -221) leaves them as they were. While scanning, a change of
+ * station is -221. */
 void command_execute(struct command_device *dev, uint32_t session, const char *line, struct command_result *out);
 
 /* Collects bytes into lines: LF, CR or CR LF end a line. */
@@ -115,9 +127,9 @@ struct command_lines {
     int overrun, last_cr;
 };
 enum command_line_kind { COMMAND_LINE_NONE, COMMAND_LINE_READY, COMMAND_LINE_OVERRUN };
-/* Feeds one byte. READY: the line is in buf, NUL-terminated, until the next call. OVERRUN: a line too long just ended.
- * A tab becomes a blank. Other bytes that are not printable ASCII stay in the line as '~', which no command has, so
- * that it fails as what it is: a wrong command. */
+/* Takes one byte. READY: the line is in buf, NUL-terminated, until the next call. OVERRUN: a line that was
+ * too long has ended. A tab becomes a blank. Any other byte that is not printable ASCII becomes '~', which is
+ * in no command: the line is then a wrong command. */
 enum command_line_kind command_lines_feed(struct command_lines *lines, unsigned char byte);
 
 #endif

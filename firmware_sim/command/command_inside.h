@@ -1,4 +1,5 @@
-/* The command set from the inside: text pieces, numbers, the table's rows. */
+/* The command set from the inside: pieces of a line, numbers, the rows of the table. For the files of this
+ * folder. */
 #ifndef FIRMWARE_SIM_COMMAND_COMMAND_INSIDE_H
 #define FIRMWARE_SIM_COMMAND_COMMAND_INSIDE_H
 
@@ -9,14 +10,15 @@ enum {
     COMMAND_CLIP_LEN = 36, /* what an error text quotes of a line, with its NUL */
 };
 
-/* ---- command_queue.c */
+/* ---- error_queue.c */
 
-/* `standard text; text` with every byte printable ASCII and no '"'; what is too long is cut at its end. */
+/* `standard text; text`. Bytes that are not printable ASCII become '~', and '"' becomes '\''. Cut at its end
+ * to fit. */
 void command_error_compose(char *buf, size_t len, int number, const char *text);
 
-/* ---- command_parse.c */
+/* ---- parse.c */
 
-/* A line taken apart; header and param point into text. */
+/* A line in its parts; header and param point into text. */
 struct command_request {
     char text[COMMAND_MAX_LINE + 1];
     const char *header; /* without a leading colon and the '?' */
@@ -28,15 +30,15 @@ struct command_request {
 /* Returns 0, or the error number and its reason. A blank line gives header_len 0 and 0. */
 int command_split(const char *line, struct command_request *req, const char **why);
 
-/* A header against a pattern of SCPI-99 6.2.1: the upper-case part or the whole of each word, in any case;
- * words in brackets may be left out. */
+/* Whether a header matches a pattern of SCPI-99 6.2.1: the upper-case part or the whole of each word, in any
+ * case. Words in brackets may be left out. */
 int command_header_matches(const char *pattern, const char *header, size_t len);
 
-/* A whole word against one pattern word ("MINimum"). */
+/* Whether a whole word matches one word of a pattern ("MINimum"). */
 int command_word_matches(const char *pattern, const char *word);
 
-/* A decimal number as it was written: +-digits * 10^exponent. Digits have no zeros around them; 0 has none at
- * all. */
+/* A decimal number as it was written: +-digits * 10^exponent. Digits have no zeros at either end; 0 has no
+ * digits. */
 struct command_decimal {
     char digits[COMMAND_MAX_LINE + 1];
     int n_digits, exponent, negative;
@@ -53,10 +55,10 @@ enum command_fit command_decimal_to_int(const struct command_decimal *decimal, i
 /* value * 10^-decimals without superfluous zeros: 300000, -0.5. */
 void command_format_fixed(char *buf, size_t len, int64_t value, int decimals);
 
-/* The beginning of text, with "..." when that is not all. */
+/* The beginning of text, with "..." where it is cut. */
 void command_clip(char clip[COMMAND_CLIP_LEN], const char *text, size_t len);
 
-/* ---- command_table.c */
+/* ---- commands.c */
 
 struct command_unit {
     const char *name;     /* as errors print it; "" for a plain count */
@@ -68,23 +70,23 @@ struct command_unit {
     } suffix[4];
 };
 
-/* A bound: of the profile, at this offset in struct head_limits, or a constant. */
+/* A bound. Of the profile: value is the offset in struct head_limits. Else value is the bound. */
 struct command_bound {
     int of_profile;
     int64_t value;
 };
 
-/* A setting, its profile range, and the other setting that narrows it: other + least <= value <= other +
+/* A setting, its range by the profile, and the setting that narrows it: other + least <= value <= other +
  * most. */
 struct command_setting {
-    size_t offset; /* in struct head_settings */
-    int is_u32;    /* the setting and its profile bounds are uint32_t, not int64_t */
-    int not_in_scan;
+    size_t offset;   /* in struct head_settings */
+    int is_u32;      /* the setting and its bounds are uint32_t, not int64_t */
+    int not_in_scan; /* fixed from spin-up to the end of the scan */
     struct command_bound min, max;
     const char *other; /* header of the other setting; NULL: none */
     size_t other_offset;
     int64_t least, most;      /* COMMAND_UNBOUND: no such bound */
-    const char *const *words; /* values are these, by their place; NULL: numbers */
+    const char *const *words; /* the values by name, from 0; NULL: values are numbers */
 };
 #define COMMAND_UNBOUND INT64_MIN
 
@@ -125,7 +127,7 @@ struct command_row {
 
 const struct command_row *command_table(size_t *n);
 
-/* command_pose.c: call->pose as six numbers into call->out. Returns -1 when it failed. */
+/* step_pose.c: call->pose as six numbers into call->out. Returns -1 when it failed. */
 int command_take_pose(struct command_call *call);
 
 /* Queues the error and makes it the reply. */
@@ -133,7 +135,7 @@ void command_fail(struct command_call *call, int number, const char *fmt, ...) _
 
 void command_reply(struct command_call *call, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 
-/* ---- command_setting.c: query and change of any setting. */
+/* ---- setting.c: query and change of any setting */
 void command_setting_query(struct command_call *call);
 void command_setting_change(struct command_call *call);
 

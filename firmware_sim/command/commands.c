@@ -1,4 +1,4 @@
-/* The only list of commands, and what each one that is no setting does. */
+/* The only list of commands, and what each of them does. What settings have in common is in setting.c. */
 #include "firmware_sim/command/command_inside.h"
 
 #include <stdio.h>
@@ -23,8 +23,8 @@ enum { PRR, LINES, PAN, STATION, LINE_START, LINE_STOP, PAN_START, PAN_STOP, FRA
 /* In the order of enum beam_select. */
 static const char *const echo_words[] = {"ALL", "FIRSt", "LAST", "STRongest", NULL};
 
-/* A pulse rate below the line rate would leave lines without a pulse; a line or a pan sweep of no width has nothing to
- * scan, and one beyond a turn would scan things twice. */
+/* A pulse rate below the line rate would leave lines without a pulse. A line or a pan sweep without width has
+ * nothing to scan. A pan sweep beyond a turn would scan things twice. */
 static const struct command_setting settings[] = {
     /* field, is_u32, not_in_scan, min, max, other, its field, least, most, words */
     [PRR] = {SETTING(prr_uhz), 0, 0, PROFILE(prr_min_uhz), PROFILE(prr_max_uhz),
@@ -103,7 +103,7 @@ static void query_time(struct command_call *call)
     command_reply(call, "%lld", (long long)call->dev->t_ns);
 }
 
-/* An empty text: the head doesn't know the time. */
+/* An empty text: the head does not know the time. */
 static void reply_time_of_day(struct command_call *call, const char *text)
 {
     if (text[0] == '\0')

@@ -1,3 +1,4 @@
+/* The error queue and its texts. */
 #include "firmware_sim/command/command_inside.h"
 
 #include <stdio.h>
@@ -55,7 +56,7 @@ void command_queue_push(struct command_queue *queue, int number, const char *tex
         return;
     }
     const uint32_t last = (queue->first + queue->count - 1) % COMMAND_QUEUE_LEN;
-    /* The first time two errors go: the one that gives its place and the one that found none. */
+    /* The first time two errors are lost: the one in the last place, and the new one. */
     queue->overflow = queue->entry[last].number == CMD_E_QUEUE ? queue->overflow + 1 : 2;
     queue->entry[last].number = CMD_E_QUEUE;
     char lost[40];

@@ -2,9 +2,9 @@
 
 #include <stddef.h>
 
-/* One row per state, one column per event; NO: refused, the state stays. Late events of a movement that was
- * given up (SPUN_UP after STOP) fall on NO by design. FAIL wins over everything but power. RESET while the
- * mirror turns has to brake it first; during the self test there is nothing yet to reset. */
+/* One row per state, one column per event. NO: the event is refused and the state stays. A movement that was
+ * given up may still end (SPUN_UP after STOP): that event falls on NO. FAIL is taken in every state with
+ * power. RESET while the mirror turns brakes it first. During the self test there is nothing to reset yet. */
 enum { NO = -1 };
 
 #define OFF  HEAD_OFF
@@ -17,21 +17,19 @@ enum { NO = -1 };
 
 /* clang-format off */
 static const signed char next_state[HEAD_N_STATES][HEAD_N_EVENTS] = {
-    /*             PON   POFF  BOOTED START SPUN_UP STOP  DONE  SPUN_DOWN FAIL RESET */
-    [HEAD_OFF]       = {BOOT, OFF, NO,   NO,  NO,   NO,   NO,   NO,   NO,  NO},
-    [HEAD_BOOT]      = {NO,   OFF, IDLE, NO,  NO,   NO,   NO,   NO,   FLT, NO},
-    [HEAD_IDLE]      = {NO,   OFF, NO,   UP,  NO,   NO,   NO,   NO,   FLT, IDLE},
-    [HEAD_SPIN_UP]   = {NO,   OFF, NO,   NO,  SCAN, DOWN, NO,   NO,   FLT, DOWN},
-    [HEAD_SCANNING]  = {NO,   OFF, NO,   NO,  NO,   DOWN, DOWN, NO,   FLT, DOWN},
-    [HEAD_SPIN_DOWN] = {NO,   OFF, NO,   NO,  NO,   NO,   NO,   IDLE, FLT, DOWN},
-    [HEAD_FAULT]     = {NO,   OFF, NO,   NO,  NO,   NO,   NO,   NO,   FLT, IDLE},
+    /*                  PON   POFF  BOOTED  START  SPUN_UP  STOP  DONE  SPUN_DOWN  FAIL  RESET */
+    [HEAD_OFF]       = {BOOT, OFF,  NO,     NO,    NO,      NO,   NO,   NO,        NO,   NO},
+    [HEAD_BOOT]      = {NO,   OFF,  IDLE,   NO,    NO,      NO,   NO,   NO,        FLT,  NO},
+    [HEAD_IDLE]      = {NO,   OFF,  NO,     UP,    NO,      NO,   NO,   NO,        FLT,  IDLE},
+    [HEAD_SPIN_UP]   = {NO,   OFF,  NO,     NO,    SCAN,    DOWN, NO,   NO,        FLT,  DOWN},
+    [HEAD_SCANNING]  = {NO,   OFF,  NO,     NO,    NO,      DOWN, DOWN, NO,        FLT,  DOWN},
+    [HEAD_SPIN_DOWN] = {NO,   OFF,  NO,     NO,    NO,      NO,   NO,   IDLE,      FLT,  DOWN},
+    [HEAD_FAULT]     = {NO,   OFF,  NO,     NO,    NO,      NO,   NO,   NO,        FLT,  IDLE},
 };
 /* clang-format on */
 
 static const char *const state_names[HEAD_N_STATES] = {"off",      "boot",      "idle", "spin-up",
                                                        "scanning", "spin-down", "fault"};
-static const char *const event_names[HEAD_N_EVENTS] = {"power-on", "power-off", "booted",    "start", "spun-up",
-                                                       "stop",     "done",      "spun-down", "fail",  "reset"};
 
 int head_next_state(enum head_state state, enum head_event event)
 {
@@ -43,9 +41,4 @@ int head_next_state(enum head_state state, enum head_event event)
 const char *head_state_name(enum head_state state)
 {
     return (unsigned)state < HEAD_N_STATES ? state_names[state] : "unknown";
-}
-
-const char *head_event_name(enum head_event event)
-{
-    return (unsigned)event < HEAD_N_EVENTS ? event_names[event] : "unknown";
 }

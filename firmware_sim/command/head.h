@@ -1,6 +1,8 @@
-/* The head: its state machine as a pure function, its settings and what the profile allows.
+/* The head: its state machine as a pure function, its settings, and what its profile allows. In: a state and
+ * an event. Out: the next state.
  *
- * All values are integers in micro-units (uhz = 1e-6 Hz, udeg = 1e-6 degree), so that rates and angles are exact. */
+ * Rates and angles are integers in micro-units (uhz = 1e-6 Hz, udeg = 1e-6 degree), so that they are
+ * exact. */
 #ifndef FIRMWARE_SIM_COMMAND_HEAD_H
 #define FIRMWARE_SIM_COMMAND_HEAD_H
 
@@ -32,12 +34,11 @@ enum head_event {
     HEAD_N_EVENTS
 };
 
-/* next = f(state, event). Returns the next state (which may be the same), or -1 where the event is refused and the
- * state stays. Pure, total over all pairs. */
+/* The next state (which may be the same one), or -1: the event is refused and the state stays. Defined for
+ * all pairs. */
 int head_next_state(enum head_state state, enum head_event event);
 
 const char *head_state_name(enum head_state state); /* "off", "boot", "idle", "spin-up", ... */
-const char *head_event_name(enum head_event event);
 
 struct head_settings {
     int64_t prr_uhz, lines_uhz, pan_udeg_s;
@@ -45,7 +46,7 @@ struct head_settings {
     int64_t pan_start_udeg, pan_stop_udeg;   /* start <= stop, at most a turn apart */
     uint32_t frames;                         /* frames per scan; 0: until stopped */
     uint32_t station;                        /* from 1 */
-    uint32_t echoes;                         /* enum beam_select: which of a pulse's are sent */
+    uint32_t echoes;                         /* which echoes of a pulse are sent: enum beam_select */
 };
 
 /* What the head can do: from its profile. */

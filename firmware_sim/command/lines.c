@@ -1,3 +1,4 @@
+/* Bytes to lines. */
 #include "firmware_sim/command/command.h"
 
 static char line_char(unsigned char byte)

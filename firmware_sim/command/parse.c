@@ -1,10 +1,11 @@
+/* A line in its parts, headers against patterns, and decimal numbers as they are written. */
 #include "firmware_sim/command/command_inside.h"
 
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
 
-/* Not <ctype.h>: what a letter is must not depend on the locale. */
+/* Not <ctype.h>: what a digit is must not depend on the locale. */
 static int is_digit(char c)
 {
     return c >= '0' && c <= '9';
@@ -95,8 +96,8 @@ int command_header_matches(const char *pattern, const char *header, size_t len)
     return text == NULL;
 }
 
-/* The optional exponent; leaves p where there is none. A value beyond 32000 (IEEE 488.2, 7.7.2.4.1) stays
- * there, which no mantissa of one line brings back into any range. */
+/* The optional exponent; where there is none, p comes back. A value beyond 32000 (IEEE 488.2, 7.7.2.4.1) is
+ * taken as 32000: no mantissa of one line brings that back into any range. */
 static const char *parse_exponent(const char *p, int *exponent)
 {
     *exponent = 0;

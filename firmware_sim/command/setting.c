@@ -1,3 +1,4 @@
+/* Query and change of a setting: its row gives the field, the limits and the unit. */
 #include "firmware_sim/command/command_inside.h"
 
 #include <stdio.h>
@@ -19,7 +20,7 @@ static int64_t read_field(const void *base, size_t offset, int is_u32)
 
 static void write_field(void *base, size_t offset, int is_u32, int64_t value)
 {
-    const uint32_t narrow = (uint32_t)value; /* the range check went before */
+    const uint32_t narrow = (uint32_t)value; /* the range was checked before */
     if (is_u32)
         memcpy((char *)base + offset, &narrow, sizeof narrow);
     else
@@ -37,7 +38,7 @@ static int64_t read_other(const struct command_call *call)
     return read_field(&call->dev->settings, call->row->setting->other_offset, call->row->setting->is_u32);
 }
 
-/* The range at this moment: of the profile, narrowed by the other setting. */
+/* The range now: that of the profile, narrowed by the other setting. */
 static void current_range(const struct command_call *call, int64_t *min, int64_t *max)
 {
     const struct command_setting *setting = call->row->setting;
@@ -121,7 +122,7 @@ int command_value_in_range(struct command_call *call, int64_t min, int64_t max, 
     return -1;
 }
 
-/* Against the other setting; the profile's range was checked before. */
+/* Checks against the other setting; the range of the profile was checked before. */
 static int check_other(struct command_call *call, int64_t value)
 {
     int64_t min, max;

@@ -22,14 +22,14 @@ struct hasher {
 static void hash_frames(struct hasher *h, const uint8_t *bytes, uint32_t len)
 {
     for (uint32_t at = 0; at < len;) {
-        uint32_t n = (uint32_t)bytes[at + 4] | (uint32_t)bytes[at + 5] << 8 | (uint32_t)bytes[at + 6] << 16;
-        struct native_header header = {.type = bytes[at + 1], .flags = bytes[at + 3], .length = n};
+        struct native_header header;
+        native_read_header(bytes + at, &header);
         if (native_is_hashed(&header)) {
             sha256_update(&h->sha, 1, bytes + at + 1);
             sha256_update(&h->sha, 4, bytes + at + 4);
-            sha256_update(&h->sha, n, bytes + at + NATIVE_HEADER_LEN);
+            sha256_update(&h->sha, header.length, bytes + at + NATIVE_HEADER_LEN);
         }
-        at += NATIVE_HEADER_LEN + n;
+        at += (uint32_t)native_frame_len(bytes + at);
     }
 }
 

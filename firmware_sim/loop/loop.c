@@ -120,21 +120,30 @@ int loop_endpoint(const struct loop *loop, uint32_t i, char *buf, size_t len)
     return 1;
 }
 
-void loop_print_endpoints(const struct loop *loop, FILE *out)
+static void put_endpoint(struct json *json, const char *type, const char *endpoint, int is_nmea)
 {
-    fprintf(out, "{\"endpoints\":[");
+    json_open_object(json, NULL);
+    json_string(json, "type", type);
+    json_string(json, "endpoint", endpoint);
+    if (is_nmea) json_string(json, "protocol", "nmea");
+    json_close_object(json);
+}
+
+void loop_put_endpoints(const struct loop *loop, struct json *json)
+{
+    char text[512];
+    json_open_object(json, NULL);
+    json_open_array(json, "endpoints");
     for (uint32_t i = 0; i < loop->n_pumps; i++) {
-        char text[512];
         pump_endpoint(loop->pump[i], text, sizeof text);
-        fprintf(out, "%s{\"type\":\"%s\",\"endpoint\":\"%s\"%s}", i == 0 ? "" : ",", pump_type(loop->pump[i]), text,
-                pump_is_nmea(loop->pump[i]) ? ",\"protocol\":\"nmea\"" : "");
+        put_endpoint(json, pump_type(loop->pump[i]), text, pump_is_nmea(loop->pump[i]));
     }
     if (loop->feed != NULL) {
-        char text[512];
         pose_feed_endpoint(loop->feed, text, sizeof text);
-        fprintf(out, "%s{\"type\":\"pose\",\"endpoint\":\"%s\"}", loop->n_pumps == 0 ? "" : ",", text);
+        put_endpoint(json, "pose", text, 0);
     }
-    fprintf(out, "]}\n");
+    json_close_array(json);
+    json_close_object(json);
 }
 
 /* The moment that is device time 0. */

@@ -12,8 +12,8 @@
 #define FIRMWARE_SIM_LOOP_LOOP_H
 
 #include <stdatomic.h>
-#include <stdio.h>
 
+#include "firmware_sim/base/json.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/device/device.h"
 
@@ -40,8 +40,8 @@ struct loop_stats {
 int loop_create(const struct site *site, struct device *device, const struct loop_options *options, struct loop **out,
                 struct sh_err *err);
 
-/* One JSON line with the endpoints of all links. */
-void loop_print_endpoints(const struct loop *loop, FILE *out);
+/* {"endpoints": [...]}: type and endpoint of each link, and of the socket for poses. */
+void loop_put_endpoints(const struct loop *loop, struct json *json);
 /* "tty:..." and so on of link i, behind the links of the socket for poses, or 0 when there is no such link. */
 int loop_endpoint(const struct loop *loop, uint32_t i, char *buf, size_t len);
 

@@ -12,7 +12,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "drivers/link/link_util.h"
+#include "drivers/socket/socket.h"
 #include "firmware_sim/base/clock.h"
 
 enum { DATAGRAM = 65536 };
@@ -107,7 +107,7 @@ static int bind_to(struct pose_feed *feed, const char *address, unsigned port, s
     socklen_t len = sizeof own;
     char text[80];
     getsockname(feed->fd, (struct sockaddr *)&own, &len);
-    link_address_text((struct sockaddr *)&own, len, text, sizeof text);
+    socket_address_text((struct sockaddr *)&own, len, text, sizeof text);
     snprintf(feed->endpoint, sizeof feed->endpoint, "udp:%s", text);
     return SH_OK;
 }

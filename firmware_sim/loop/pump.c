@@ -56,7 +56,7 @@ void pump_endpoint(const struct pump *pump, char *buf, size_t len)
 
 double pump_capacity(const struct pump *pump)
 {
-    return pump->ops->capacity(pump->link);
+    return pump->ops->capacity != NULL ? pump->ops->capacity(pump->link) : 0;
 }
 
 const char *pump_type(const struct pump *pump)

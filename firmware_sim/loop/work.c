@@ -90,15 +90,11 @@ static void fill_heads(struct worker *worker, const struct device_work *work, st
         added(slot, native_encode_anchor(slot->bytes + slot->len, cap - slot->len, &work->anchor, work->t_ns, flags),
               1);
     }
-    uint32_t first = work->surfaces_first, left = work->surfaces_n;
-    while (left != 0) {
-        uint32_t done = 0;
-        size_t len = native_encode_surfaces(slot->bytes + slot->len, cap - slot->len, first, left, 8192, surface_name,
-                                            (void *)(uintptr_t)worker->site, work->t_ns, 0, &done);
-        if (len == 0 || done == 0) break;
+    struct native_names names = {work->surfaces_first, work->surfaces_n, surface_name, (void *)(uintptr_t)worker->site};
+    while (names.n != 0) {
+        size_t len = native_encode_surfaces(slot->bytes + slot->len, cap - slot->len, 8192, &names, work->t_ns);
+        if (len == 0) break;
         added(slot, len, 1);
-        first += done;
-        left -= done;
     }
 }
 
@@ -106,7 +102,7 @@ static uint32_t frames_in(const uint8_t *bytes, size_t len)
 {
     uint32_t n = 0;
     for (size_t at = 0; at < len; n++)
-        at += NATIVE_HEADER_LEN + ((size_t)bytes[at + 4] | (size_t)bytes[at + 5] << 8 | (size_t)bytes[at + 6] << 16);
+        at += native_frame_len(bytes + at);
     return n;
 }
 

@@ -279,6 +279,6 @@ void beam_rig_directions(struct beam_rig *rig, uint32_t l, double *dx, double *d
     schedule_get_run(&rig->segment, &line, line.cast0, n, &run);
     kernel_angles(&run, 0, n, turn, turn + n);
     kernel_directions(&(struct kernel_turns){n, turn, turn + n}, rig->setup.rotation,
-                      &(struct vec3_arrays){dx, dy, dz});
+                      &(struct vec3_out){dx, dy, dz});
     free(turn);
 }

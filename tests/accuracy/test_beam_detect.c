@@ -133,7 +133,7 @@ static void angle_noise_moves_the_footprint(void **state)
         struct schedule_line line;
         const struct line_block *b = &l.rig.block;
         double mirror[16], pan[16], d[3][16];
-        const struct vec3_arrays beams = {d[0], d[1], d[2]}, origins = {0};
+        const struct vec3_out beams = {d[0], d[1], d[2]}, origins = {0};
         schedule_get_line(&l.rig.segment, number, &line);
         for (uint32_t p = 0; p < 16; p++) {
             mirror[p] = schedule_mirror_turn(&l.rig.segment, line.cast0 + p);

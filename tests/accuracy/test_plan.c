@@ -127,7 +127,7 @@ static void compare_beam(struct side *side, uint32_t station, const struct sched
     site_cast_setup(side->site, station, &setup);
     kernel_angles(run, 0, RUN, turn[0], turn[1]);
     kernel_directions(&(struct kernel_turns){RUN, turn[0], turn[1]}, setup.rotation,
-                      &(struct vec3_arrays){d[0], d[1], d[2]});
+                      &(struct vec3_out){d[0], d[1], d[2]});
     for (uint32_t i = 0, at = 0; i < RUN; i++) {
         struct beam_ref ref;
         const double dir[3] = {d[0][i], d[1][i], d[2][i]};

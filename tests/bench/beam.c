@@ -269,7 +269,7 @@ static void foliage(uint32_t n_leaves)
 
 int main(int argc, char **argv)
 {
-    pin();
+    pin(NULL);
     for (int i = 1; i < argc; i++) {
         as_chart |= strcmp(argv[i], "--chart") == 0;
         if (strcmp(argv[i], "house") == 0) house();

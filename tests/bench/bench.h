@@ -1,6 +1,5 @@
-/* Private to app_bench.c and bench_*.c (tests/bench borrows the scenes, the rays and the plain Embree): what
- * is measured, and the things it is measured with. Nothing here is part of a scan. tests/bench/README.md
- * tells the method. */
+/* For all programs of tests/bench: what is measured, and what it is measured with. README.md says the method.
+ * Metres and nanoseconds per pulse; positions in the scene frame. */
 #ifndef TESTS_BENCH_BENCH_H
 #define TESTS_BENCH_BENCH_H
 
@@ -15,7 +14,7 @@ enum { BENCH_LINES = 400, BENCH_LINE_PULSES = 2500, BENCH_MIN_ROUNDS = 7, BENCH_
 #define BENCH_RANGE_MAX_M 10000.0
 #define BENCH_SCALE_M     1e-5 /* with which that fits into 31 bits */
 
-/* ---- bench_scene.c: where is scanned */
+/* ---- scene.c: where is scanned */
 struct bench_target {
     char name[32];
     struct scene *scene;
@@ -30,7 +29,7 @@ int bench_target_load(const char *name, const char *house, const struct sh_repor
                       struct sh_err *err);
 void bench_target_free(struct bench_target *target);
 
-/* ---- bench_rays.c: a normal scan: lines of 100 degrees, 2500 pulses each, spread over a turn of the pan */
+/* ---- rays.c: a normal scan: lines of 100 degrees, 2500 pulses each, spread over a turn of the pan */
 struct bench_rays {
     struct schedule_segment segment;
     uint32_t lines, n;    /* lines * BENCH_LINE_PULSES */
@@ -48,7 +47,7 @@ struct bench_block {
 };
 void bench_rays_block(const struct bench_rays *rays, uint32_t first, struct bench_block *out);
 
-/* ---- bench_embree.c: Embree as it comes: the mesh with shared vertices, rounded to float in the frame of
+/* ---- embree_alone.c: Embree as it comes: the mesh with shared vertices, rounded to float in the frame of
  * the station */
 enum bench_feed {
     BENCH_PREPARED, /* packets lie in memory, ready; only tfar and geomID are set again */
@@ -80,7 +79,7 @@ void bench_embree_free(struct bench_embree *e);
 const char *bench_isa(void);
 long bench_embree_version(void);
 
-/* ---- bench_setup.c: what a scan needs beside the mesh, with the figures of a real head */
+/* ---- setup.c: what a scan needs beside the mesh, with the figures of a real head */
 struct bench_case {
     const struct bench_target *target;
     const struct bench_rays *rays;
@@ -95,7 +94,7 @@ void bench_setup(const struct bench_case *c, const struct georef *georef, struct
 double bench_thread_s(void);                     /* processor time of this thread */
 double bench_median(double *values, uint32_t n); /* sorts them */
 
-/* ---- bench_measure.c: one thread, everything in turns, medians of the rounds' ratios */
+/* ---- measure.c: one thread, everything in turns, medians of the rounds' ratios */
 enum bench_stage {
     STAGE_SCHEDULE,   /* line, run, firing times */
     STAGE_DIRECTIONS, /* angles, sines, rotation, rounding to float */
@@ -125,7 +124,7 @@ struct bench_result {
 /* Pin the thread first. */
 int bench_measure(const struct bench_case *c, struct bench_result *out, struct sh_err *err);
 
-/* ---- bench_stages.c: the whole pipeline again, with the counter of cycles read between its stages */
+/* ---- stages.c: the whole pipeline again, with the counter of cycles read between its stages */
 struct bench_stages;
 int bench_stages_create(struct bench_stages **out, struct sh_err *err);
 void bench_stages_free(struct bench_stages *stages);
@@ -136,7 +135,7 @@ size_t bench_stages_line(struct bench_stages *stages, const struct cast_setup *s
                          struct line_block *block, uint8_t *bytes, size_t cap);
 uint64_t bench_cycles(void);
 
-/* ---- bench_loop.c: the real loop with the null link, as fast as it goes, against Embree on as many threads
+/* ---- real_loop.c: the real loop with the null link, as fast as it goes, against Embree on as many threads
  */
 struct bench_threads {
     uint32_t threads;
@@ -146,7 +145,7 @@ struct bench_threads {
 int bench_loop(const struct bench_case *c, const struct bench_result *one, uint32_t threads, struct bench_threads *out,
                struct sh_err *err);
 
-/* ---- bench_leaks.c: rays aimed at edges and corners of closed meshes */
+/* ---- leaks.c: rays aimed at edges and corners of closed meshes */
 enum { BENCH_LEAK_MESHES = 4 };
 struct bench_leaks {
     const char *mesh;

@@ -316,7 +316,7 @@ int main(void)
 {
     struct sh_err err;
     static struct method all[METHODS];
-    pin();
+    pin(NULL);
     printf("panel,method,scene,ns_per_pulse,err_p999_m,err_max_m,front,default,err_rms_m,wrong_counts\n");
     for (size_t i = 0; i < sizeof SCENES / sizeof SCENES[0]; i++)
         if (draw_scene(&SCENES[i], all, &err) != SH_OK) {

@@ -183,7 +183,7 @@ static int draw_scene(int scene)
 
 int main(void)
 {
-    pin();
+    pin(NULL);
     fprintf(stderr, "chart: georef\n");
     for (int i = 0; i < SCENES; i++)
         if (draw_scene(i) != 0) return 1;

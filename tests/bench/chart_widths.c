@@ -121,7 +121,7 @@ int main(void)
 {
     struct width width[MAX_WIDTHS];
     int n = find_widths(width);
-    pin();
+    pin(NULL);
     scatter();
     for (int i = 0; i < MAPS; i++)
         if (measure(i, width, n) != 0) return 1;

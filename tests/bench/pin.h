@@ -4,13 +4,8 @@
 
 #include <sched.h>
 
-static inline void pin(void)
-{
-    cpu_set_t one;
-    int cpu = sched_getcpu();
-    CPU_ZERO(&one);
-    CPU_SET(cpu < 0 ? 0U : (unsigned)cpu, &one);
-    sched_setaffinity(0, sizeof one, &one);
-}
+/* The calling thread to the processor it runs on. before: what unpin restores; NULL: nobody asks. */
+void pin(cpu_set_t *before);
+void unpin(const cpu_set_t *before);
 
 #endif

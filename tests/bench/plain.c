@@ -156,7 +156,7 @@ int main(void)
     if (mkdtemp(folder) == NULL) return 1;
     snprintf(hall, sizeof hall, "%s/hall.obj", folder);
     if (write_hall(hall) != 0) rc = sh_fail(&err, SH_EIO, "%s can't be written", hall);
-    pin();
+    pin(NULL);
     printf("%-52s %9s %9s %7s\n", "asked for", "plain ns", "ns", "ratio");
     for (size_t i = 0; i < sizeof CASES / sizeof *CASES && rc == SH_OK; i++) {
         static struct run run;

@@ -1,4 +1,4 @@
-/* Private to app_bench.c: what was measured, as JSON and as a table. */
+/* What build/bench measured, as JSON and as a table. */
 #ifndef TESTS_BENCH_PRINT_H
 #define TESTS_BENCH_PRINT_H
 

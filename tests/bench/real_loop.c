@@ -79,13 +79,13 @@ static void fill_config(struct config *cfg, const struct bench_case *c, uint32_t
                                            .pan_counts = BENCH_ENCODER,
                                            .max_echoes = 1};
     cfg->head.settings = (struct head_settings){.prr_uhz = spec.prr_uhz,
-                                           .lines_uhz = spec.lines_uhz,
-                                           .pan_udeg_s = spec.pan_udeg_s,
-                                           .line_start_udeg = spec.line_start_udeg,
-                                           .line_stop_udeg = spec.line_stop_udeg,
-                                           .pan_stop_udeg = spec.pan_stop_udeg,
-                                           .frames = frames,
-                                           .station = 1};
+                                                .lines_uhz = spec.lines_uhz,
+                                                .pan_udeg_s = spec.pan_udeg_s,
+                                                .line_start_udeg = spec.line_start_udeg,
+                                                .line_stop_udeg = spec.line_stop_udeg,
+                                                .pan_stop_udeg = spec.pan_stop_udeg,
+                                                .frames = frames,
+                                                .station = 1};
     cfg->n_stations = 1;
     cfg->output.crs = GEOREF_ECEF;
     cfg->output.layout = LINE_GEO;

@@ -14,6 +14,7 @@
 
 #include "drivers/protocol/bytes.h"
 #include "drivers/protocol/crc32c.h"
+#include "drivers/protocol/fields.h"
 #include "drivers/protocol/native_encode.h"
 
 enum { BLOCK_MAX = 7000 };

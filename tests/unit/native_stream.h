@@ -64,11 +64,11 @@ static inline void make_stream(void)
     struct native_telemetry t = {.state = 4, .pulses = 0xd5d5};
     struct native_event e = {.code = NATIVE_EV_SCAN_START, .a = 1, .text = "OK\r\n\xd5"};
     struct line_end end = {.line = 0xd5, .n_cast = 5};
-    uint32_t done;
+    struct native_names labels = {0, 1, name_of, NULL};
     strcpy(names[0], "wall");
 #define AT stream + stream_len, STREAM_MAX - stream_len
     add_text("Maker,Model,SN1,1.0\r\n");
-    add_frame(native_encode_surfaces(AT, 0, 1, 4096, name_of, NULL, 1, 0, &done));
+    add_frame(native_encode_surfaces(AT, 4096, &labels, 1));
     add_frame(native_encode_descriptor(AT, &d, 1, 0));
     add_frame(native_encode_anchor(AT, &a, 1, 0));
     add_text("OK\r\n");

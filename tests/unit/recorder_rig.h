@@ -134,7 +134,7 @@ static inline int rig_record(const char *path, struct recorder_options options, 
     static const struct sh_report report = {NULL, rig_warn, NULL};
     struct scanhead *sh;
     struct scanhead_frame frame;
-    void *rec;
+    struct recorder *rec;
     if (rig_stream != NULL) fclose(rig_stream);
     rig_stream = NULL;
     rig_notes[0] = 0;
@@ -142,11 +142,11 @@ static inline int rig_record(const char *path, struct recorder_options options, 
     const struct recorder_ops *ops = recorder_find(path, err);
     assert_non_null(ops);
     assert_int_equal(scanhead_open(rig_shs, &sh, NULL, 0), 0);
-    int rc = ops->open(path, &options, &rec, err);
+    int rc = recorder_open(ops, path, &options, &rec, err);
     if (rc == 0) {
         while (rc == 0 && scanhead_next(sh, &frame, -1) == 0)
-            rc = ops->frame(rec, sh, &frame, err);
-        int closed = ops->close(rec, keep == RIG_KEEP_ALWAYS || (rc == 0 && keep), rc == 0 ? err : NULL);
+            rc = recorder_frame(rec, sh, &frame, err);
+        int closed = recorder_close(rec, keep == RIG_KEEP_ALWAYS || (rc == 0 && keep), rc == 0 ? err : NULL);
         if (rc == 0) rc = closed;
     }
     scanhead_close(sh);

@@ -40,7 +40,7 @@ static void tally_tick(struct rig *rig, struct tally *tally)
     uint32_t frames = 0;
     for (uint32_t at = 0; at < slot->len; frames++) {
         const uint8_t *frame = slot->bytes + at, *payload = frame + NATIVE_HEADER_LEN;
-        uint32_t len = (uint32_t)frame[4] | (uint32_t)frame[5] << 8 | (uint32_t)frame[6] << 16;
+        uint32_t len = (uint32_t)native_frame_len(frame) - NATIVE_HEADER_LEN;
         assert_int_equal(frame[0], NATIVE_SYNC);
         struct native_points points;
         struct native_line_end end;

@@ -145,10 +145,9 @@ static void name_of(void *ctx, uint32_t i, const char **object, const char **mat
 
 static void put_surfaces(int fd, const char *const (*names)[2], uint32_t first, uint32_t n)
 {
-    uint32_t done;
-    size_t len =
-        native_encode_surfaces(out, sizeof out, first, n, 4096, name_of, (void *)(uintptr_t)names, 1, 0, &done);
-    assert_int_equal(done, n);
+    struct native_names labels = {first, n, name_of, (void *)(uintptr_t)names};
+    size_t len = native_encode_surfaces(out, sizeof out, 4096, &labels, 1);
+    assert_int_equal(labels.n, 0);
     put_all(fd, out, len);
 }
 

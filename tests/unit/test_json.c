@@ -75,6 +75,28 @@ static void objects_arrays_and_values(void **ctx)
                 "}\n");
 }
 
+static void one_line_has_no_blanks(void **ctx)
+{
+    (void)ctx;
+    struct sink sink;
+    struct json *json = sink_begin(&sink);
+    json_begin_one_line(json, sink.file);
+    json_open_object(json, NULL);
+    json_open_array(json, "endpoints");
+    for (int i = 0; i < 2; i++) {
+        json_open_object(json, NULL);
+        json_string(json, "type", "a b");
+        json_int(json, "port", i);
+        json_close_object(json);
+    }
+    json_close_array(json);
+    json_open_array(json, "none");
+    json_close_array(json);
+    json_close_object(json);
+    sink_expect(&sink, SH_OK,
+                "{\"endpoints\":[{\"type\":\"a b\",\"port\":0},{\"type\":\"a b\",\"port\":1}],\"none\":[]}\n");
+}
+
 /* RFC 8259, section 7; the UTF-8 cases are those of Unicode 15, table 3-7, just in and just out. */
 static void strings_are_escaped(void **ctx)
 {
@@ -207,11 +229,9 @@ static void a_full_disk_is_reported(void **ctx)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(objects_arrays_and_values),
-        cmocka_unit_test(strings_are_escaped),
-        cmocka_unit_test(doubles_as_a_person_would_write_them),
-        cmocka_unit_test(doubles_read_back_exactly),
-        cmocka_unit_test(misuse_is_told),
+        cmocka_unit_test(objects_arrays_and_values), cmocka_unit_test(one_line_has_no_blanks),
+        cmocka_unit_test(strings_are_escaped),       cmocka_unit_test(doubles_as_a_person_would_write_them),
+        cmocka_unit_test(doubles_read_back_exactly), cmocka_unit_test(misuse_is_told),
         cmocka_unit_test(a_full_disk_is_reported),
     };
     return cmocka_run_group_tests_name("json", tests, NULL, NULL);

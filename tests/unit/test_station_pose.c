@@ -155,12 +155,12 @@ static void put_line_end(uint32_t line, uint64_t pulse0, uint32_t n_fired)
 static void test_rows(void **state)
 {
     (void)state;
-    static const struct track_ops ops = {NULL, keep_rows};
+    static const struct track_ops ops = {.points = keep_rows};
     const struct rig_point one = {1, 1, 1, 0, 0, 1, 1}, first = {1, 1, 1, 0, 0, 1, 2}, second = {1, 1, 1, 0, 0, 2, 2};
     struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
     struct scanhead *sh;
     struct scanhead_frame frame;
-    struct seen seen = {.track = {.path = "x"}};
+    struct seen seen = {.track = {.path = "x", .ops = &ops, .rec = &seen}};
     struct sh_err err = {0};
     rig_begin();
     rig_descriptor(1, 1);
@@ -174,7 +174,7 @@ static void test_rows(void **state)
     rig_stream = NULL;
     assert_int_equal(scanhead_open(rig_shs, &sh, NULL, 0), 0);
     while (scanhead_next(sh, &frame, -1) == 0)
-        assert_int_equal(track_frame(&seen.track, sh, &frame, &ops, &seen, &err), 0);
+        assert_int_equal(track_frame(&seen.track, sh, &frame, &err), 0);
     scanhead_close(sh);
     static const uint32_t want[] = {2, 3, 3, 4, 5, 3, 4};
     assert_int_equal(seen.n, 7);

@@ -231,8 +231,8 @@ static void test_kinds(void **state)
         int rc = rig_record(path, (struct recorder_options){0}, 1, &err);
         assert_int_equal(rc, which < 2 ? SH_EFORMAT : 0);
         if (which == 2)
-            assert_non_null(
-                strstr(rig_notes, "amplitude and width of 9 points left out, for which this format has no place"));
+            assert_non_null(strstr(
+                rig_notes, "9 points whose amplitude and width are left out; this format has no place for them"));
         if (which < 2)
             assert_non_null(strstr(err.text, "the stream went on without attributes; a file holds one kind"));
         unlink(path);

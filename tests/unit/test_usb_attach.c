@@ -72,7 +72,7 @@ static void test_usbip(void **state)
         vhci.refuses = 2 * round;
         close(c.fd); /* as `usbip detach` does */
         assert_int_equal(bench_expect(&bench, LINK_CLOSED, 0).session, 1);
-        expect_notice(&bench, "let go");
+        expect_notice(&bench, "detached");
         if (round > 0) expect_notice(&bench, "no such module"); /* once, however often it is tried */
         expect_notice(&bench, "plugged in again");
         assert_int_equal(vhci.refuses, 0);
@@ -104,7 +104,7 @@ static void test_pace(void **state)
     struct client c = host_of(&bench);
     close(c.fd);
     assert_int_equal(bench_expect(&bench, LINK_CLOSED, 0).session, 1);
-    expect_notice(&bench, "let go");
+    expect_notice(&bench, "detached");
     for (int i = 0; i < 3; i++)
         assert_int_equal(bench_poll(&bench, 3, 1), 0);
     assert_int_equal(vhci.attempts, attempts);

@@ -183,7 +183,7 @@ static void test_halt(void **state)
     host_submit(host, 5, 0x81, NULL, 512);
     assert_int_equal(usb_device_write(host->device, 0x81, pattern, 10), 10);
     host_expect(host, 5, USB_OK, 10);
-    usb_device_halt(host->device, 0x02); /* the function's own */
+    assert_int_equal(host_control(host, 0x02, USB_REQ_SET_FEATURE, 0, 0x02, 0, NULL), 0);
     host_expect(host, 3, USB_STALLED, 0);
     assert_int_equal(host_control(host, 0x82, USB_REQ_GET_STATUS, 0, 0x02, 2, NULL), 2);
     assert_int_equal(host_in[0], 1);

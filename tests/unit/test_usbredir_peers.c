@@ -196,15 +196,15 @@ static void check_reconnects(const struct link_spec *spec, int listener, const s
     struct guest *g = accept_device(&bench, listener);
     guest_configure(g);
     guest_free(g);
-    expect_notice(&bench, "let go");
+    expect_notice(&bench, "detached");
     g = accept_device(&bench, listener); /* it comes by itself */
     guest_configure(g);
     expect_notice(&bench, "plugged in again");
-    close(listener); /* nobody there: it says so once, and tries on */
+    close(listener); /* nobody there: it says so once, and tries again */
     if (at->sa_family == AF_UNIX) unlink(((const struct sockaddr_un *)at)->sun_path);
     guest_free(g);
-    expect_notice(&bench, "let go");
-    expect_notice(&bench, "tries on");
+    expect_notice(&bench, "detached");
+    expect_notice(&bench, "will try again");
     for (int i = 0; i < 3; i++)
         bench_poll(&bench, 0, 2);
     assert_int_equal(bench.n_queue, 0);

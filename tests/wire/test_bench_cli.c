@@ -1,11 +1,18 @@
-/* scanhead bench: the JSON has the keys that scripts rely on, figures that can be, and stages that add up. */
+/* build/bench: the JSON has the keys that scripts rely on, figures that can be, and stages that add up.
+ * The program is $BENCH, or `bench` beside $SCANHEAD. */
 #include "tests/wire/wire.h"
 
 #include <math.h>
 
 static int bench(struct wire *wire, const char *const *args)
 {
-    return wire_wait(wire, wire_spawn(wire, args, "out", "err", -1));
+    const char *head = wire_program(), *slash = strrchr(head, '/'), *given = getenv("BENCH");
+    char program[352];
+    if (given != NULL && given[0] != '\0')
+        snprintf(program, sizeof program, "%s", given);
+    else
+        snprintf(program, sizeof program, "%.*sbench", slash != NULL ? (int)(slash + 1 - head) : 0, head);
+    return wire_wait(wire, wire_spawn_program(wire, program, args, "out", "err", -1));
 }
 
 /* The number behind "key": at or after `from`. */
@@ -22,7 +29,7 @@ static double number_of(const char *from, const char *key)
 
 static void test_keys(void **state)
 {
-    static const char *const args[] = {"bench", "--scenes", "10k", "--seconds", "0.1", NULL};
+    static const char *const args[] = {"--scenes", "10k", "--seconds", "0.1", NULL};
     static const char *const stages[] = {"schedule", "directions", "embree", "refine", "decide", "detect",
                                          "noise",    "georef",     "encode", "crc",    "rest"};
     struct wire *wire = *state;
@@ -53,7 +60,7 @@ static void test_keys(void **state)
 
 static void test_leaks(void **state)
 {
-    static const char *const args[] = {"bench", "--leaks", "40000", NULL};
+    static const char *const args[] = {"--leaks", "40000", NULL};
     struct wire *wire = *state;
     assert_int_equal(bench(wire, args), 0);
     char *text = wire_read(wire_path(wire, "out"), NULL), *at = strstr(text, "\"leaks\": [");
@@ -75,7 +82,7 @@ static void test_file(void **state)
     struct wire *wire = *state;
     char json[352];
     snprintf(json, sizeof json, "%s", wire_path(wire, "bench.json"));
-    const char *const args[] = {"bench", "--leaks", "400", "-o", json, NULL};
+    const char *const args[] = {"--leaks", "400", "-o", json, NULL};
     assert_int_equal(bench(wire, args), 0);
     char *text = wire_read(json, NULL), *table = wire_read(wire_path(wire, "out"), NULL);
     assert_int_equal(text[0], '{');
@@ -86,20 +93,19 @@ static void test_file(void **state)
 
 static void test_wrong_usage(void **state)
 {
-    static const char *const wrong[][4] = {{"bench", "--scenes", "10q", NULL},     {"bench", "--scenes", "", NULL},
-                                           {"bench", "--scenes", "10k,,1M", NULL}, {"bench", "--scenes", "-10k", NULL},
-                                           {"bench", "--scenes", "200M", NULL},    {"bench", "--threads", "0", NULL},
-                                           {"bench", "--seconds", "nan", NULL},    {"bench", "--leaks", "-1", NULL},
-                                           {"bench", "something", NULL, NULL},     {"bench", "--what", NULL, NULL}};
+    static const char *const wrong[][4] = {
+        {"--scenes", "10q", NULL},  {"--scenes", "", NULL},   {"--scenes", "10k,,1M", NULL}, {"--scenes", "-10k", NULL},
+        {"--scenes", "200M", NULL}, {"--threads", "0", NULL}, {"--seconds", "nan", NULL},    {"--leaks", "-1", NULL},
+        {"something", NULL, NULL},  {"--what", NULL, NULL}};
     struct wire *wire = *state;
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         assert_int_equal(bench(wire, wrong[i]), 2);
         char *text = wire_read(wire_path(wire, "err"), NULL);
         assert_ptr_equal(strchr(text, '\n'), text + strlen(text) - 1); /* one line */
-        assert_int_equal(strncmp(text, "scanhead", 8), 0);
+        assert_int_equal(strncmp(text, "bench: ", 7), 0);
         free(text);
     }
-    static const char *const absent[] = {"bench", "--scenes", "house", "--house", "/nonexistent.ifc", NULL};
+    static const char *const absent[] = {"--scenes", "house", "--house", "/nonexistent.ifc", NULL};
     assert_int_equal(bench(wire, absent), 2);
 }
 

@@ -268,6 +268,11 @@ static const struct {
     {{"run", "CONFIG", "--replay-journal", "CONFIG"}, {"config.yaml:1", "journal"}},
     {{"check"}, {"one CONFIG"}},
     {{"check", "CONFIG", "--pace", "fast"}, {"--pace"}},
+    {{"report", "CONFIG"}, {"one CONFIG and one CLOUD", "report --help"}},
+    {{"report", "CONFIG", "DIR/x.ply", "--max-m", "0"}, {"--max-m 0", "1000000000"}},
+    {{"report", "CONFIG", "DIR/x.ply", "--json=1"}, {"unknown option --json=1"}},
+    {{"map", "CONFIG", "-o", "DIR/x.png", "--pixel-m", "1m"}, {"--pixel-m 1m", "0.0001 to 10000"}},
+    {{"record", "CONFIG", "-o", "DIR/x.ply", "--frames", "1.5"}, {"--frames 1.5", "whole number from 0"}},
     {{"record", "CONFIG"}, {"-o FILE"}},
     {{"record", "-o", "DIR/x.ply"}, {"one SOURCE"}},
     {{"record", "CONFIG", "-o", "DIR/x.xyz"}, {"x.xyz", ".ply"}},
@@ -314,6 +319,46 @@ static void test_options(void **state)
                                     OPTIONS[i].says[1] ? OPTIONS[i].says[2] : NULL, NULL};
         expect(wire, what, args, 2, says);
     }
+    assert_int_equal(complaints, 0);
+}
+
+/* ---- help */
+
+/* -h and --help of a command, on standard output: what it does, the usage, lines of at most 110 columns.
+ * Those of check end where the keys begin. */
+static void expect_help(struct wire *wire, const char *name, const char *option)
+{
+    char want[128];
+    int status = wire_wait(wire, wire_spawn(wire, (const char *const[]){name, option, NULL}, "out", "err", -1));
+    char *out = wire_read(wire_path(wire, "out"), NULL), *err = wire_read(wire_path(wire, "err"), NULL);
+    if (status != 0 || err[0] != '\0') complain("# %s %s: status %d: %s", name, option, status, err);
+    snprintf(want, sizeof want, "scanhead %s: ", name);
+    if (strncmp(out, want, strlen(want)) != 0) complain("# %s %s: begins with %.40s", name, option, out);
+    snprintf(want, sizeof want, "\n\nusage: scanhead %s", name);
+    if (strstr(out, want) == NULL) complain("# %s %s: no usage", name, option);
+    if (strstr(out, "  -h, --help ") == NULL) complain("# %s %s: no --help in it", name, option);
+    char *keys = strstr(out, "Configuration keys:");
+    if (keys != NULL) *keys = '\0';
+    for (char *at = strtok(out, "\n"); at != NULL; at = strtok(NULL, "\n"))
+        if (strlen(at) > 110) complain("# %s %s: %zu columns: %s", name, option, strlen(at), at);
+    free(out);
+    free(err);
+}
+
+static void test_help(void **state)
+{
+    struct wire *wire = *state;
+    int n = 0;
+    complaints = 0;
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, (const char *const[]){"--help", NULL}, "all", "err", -1)), 0);
+    char *all = wire_read(wire_path(wire, "all"), NULL), name[16];
+    for (const char *at = all; (at = strstr(at, "\n  scanhead ")) != NULL; at++, n++) {
+        assert_int_equal(sscanf(at, " scanhead %15s", name), 1);
+        expect_help(wire, name, "--help");
+        expect_help(wire, name, "-h");
+    }
+    free(all);
+    assert_true(n >= 7);
     assert_int_equal(complaints, 0);
 }
 
@@ -404,6 +449,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_configurations, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_meshes, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_options, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_help, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_links, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_system_failures, wire_setup, wire_teardown),
     };

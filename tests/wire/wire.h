@@ -166,12 +166,12 @@ static inline pid_t wire_fork(struct wire *wire)
     return 0;
 }
 
-/* Starts the program with args (ends with NULL); out, err: files in the folder for the two streams; ready_fd:
+/* Starts a program with args (ends with NULL); out, err: files in the folder for the two streams; ready_fd:
  * given to it as descriptor 3, or -1. */
-static inline pid_t wire_spawn(struct wire *wire, const char *const *args, const char *out, const char *err,
-                               int ready_fd)
+static inline pid_t wire_spawn_program(struct wire *wire, const char *program, const char *const *args, const char *out,
+                                       const char *err, int ready_fd)
 {
-    char *argv[WIRE_MAX_ARGS + 2] = {(char *)(uintptr_t)wire_program()};
+    char *argv[WIRE_MAX_ARGS + 2] = {(char *)(uintptr_t)program};
     int n = 1;
     for (; args[n - 1] != NULL; n++) {
         assert_true(n < WIRE_MAX_ARGS);
@@ -196,6 +196,13 @@ static inline pid_t wire_spawn(struct wire *wire, const char *const *args, const
     signal(SIGPIPE, SIG_DFL);
     execv(argv[0], argv);
     _exit(127);
+}
+
+/* Starts the head's program. */
+static inline pid_t wire_spawn(struct wire *wire, const char *const *args, const char *out, const char *err,
+                               int ready_fd)
+{
+    return wire_spawn_program(wire, wire_program(), args, out, err, ready_fd);
 }
 
 /* Waits for the end; the exit status, or 256 + the signal. */

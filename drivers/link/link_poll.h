@@ -1,0 +1,27 @@
+/* What the poll functions of the links share: the events that are being filled in, the wait, the wake-up.
+ * Private. */
+#ifndef DRIVERS_LINK_LINK_POLL_H
+#define DRIVERS_LINK_LINK_POLL_H
+
+#include <poll.h>
+
+#include "drivers/link/link.h"
+
+/* Events of one poll call. push answers 0 when there is no room. The caller then leaves its state as it is,
+ * so that the event comes with the next call. */
+struct link_events {
+    struct link_event *event;
+    int n, max;
+};
+int link_events_push(struct link_events *events, enum link_event_kind kind, int session, const char *peer);
+
+/* poll(2). An interruption by a signal counts as "nothing yet". Returns 0 or SH_EIO. */
+int link_wait(struct pollfd *fds, nfds_t n, int timeout_ms);
+
+/* Reports and drains wake_fd. slot is its entry after link_wait; an entry with fd -1 is ignored. */
+void link_take_wake(const struct pollfd *slot, struct link_events *events);
+
+/* The whole poll of links that always take bytes, never have any and never change by themselves. */
+int link_poll_sink(int wake_fd, int writable, int timeout_ms, struct link_events *events);
+
+#endif

@@ -1,0 +1,123 @@
+#include "drivers/socket/socket.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { BACKLOG = 128, IDLE_S = 10, INTERVAL_S = 5, PROBES = 3 };
+
+int socket_error_code(int error)
+{
+    return error == EACCES || error == EPERM                                                           ? SH_EPERM
+           : error == EADDRINUSE || error == EADDRNOTAVAIL || error == ENOENT || error == ECONNREFUSED ? SH_EINPUT
+                                                                                                       : SH_EIO;
+}
+
+static int start(int fd, const struct sockaddr *at, socklen_t len, int connecting)
+{
+    const int one = 1;
+    if (connecting) return connect(fd, at, len);
+    setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
+    return bind(fd, at, len) == 0 ? listen(fd, BACKLOG) : -1;
+}
+
+/* Connects while blocking, since the other end is on this machine or near; not blocking from then on. */
+int socket_open_at(const struct sockaddr *at, socklen_t len, int connecting)
+{
+    int fd = socket(at->sa_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    if (fd < 0) return -1;
+    if (start(fd, at, len, connecting) == 0 && fcntl(fd, F_SETFL, O_NONBLOCK) == 0) return fd;
+    int error = errno;
+    close(fd);
+    errno = error;
+    return -1;
+}
+
+void socket_address_text(const struct sockaddr *address, socklen_t len, char *text, size_t size)
+{
+    char host[64], port[8];
+    if (getnameinfo(address, len, host, sizeof host, port, sizeof port, NI_NUMERICHOST | NI_NUMERICSERV) != 0)
+        snprintf(text, size, "unknown address");
+    else
+        snprintf(text, size, strchr(host, ':') != NULL ? "[%s]:%s" : "%s:%s", host, port);
+}
+
+static void name_socket(int fd, int connecting, char *name, size_t len)
+{
+    struct sockaddr_storage at;
+    socklen_t at_len = sizeof at;
+    int rc = connecting ? getpeername(fd, (struct sockaddr *)&at, &at_len)
+                        : getsockname(fd, (struct sockaddr *)&at, &at_len);
+    if (rc == 0) socket_address_text((struct sockaddr *)&at, at_len, name, len);
+}
+
+int socket_open(const struct socket_place *place, int *fd, char *name, size_t len, struct sh_err *err)
+{
+    const char *host = place->host[0] != '\0' ? place->host : "127.0.0.1";
+    char service[8];
+    snprintf(service, sizeof service, "%u", (unsigned)place->port & 0xffffu);
+    struct addrinfo hints = {.ai_socktype = SOCK_STREAM, .ai_flags = AI_PASSIVE | AI_NUMERICSERV}, *list = NULL;
+    int rc = getaddrinfo(host, service, &hints, &list);
+    if (rc != 0)
+        return sh_fail(err, SH_EINPUT, "%s:%s:%d: no such address: %s", place->what, host, place->port,
+                       rc == EAI_SYSTEM ? strerror(errno) : gai_strerror(rc));
+    *fd = -1;
+    for (const struct addrinfo *at = list; at != NULL && *fd < 0; at = at->ai_next)
+        *fd = socket_open_at(at->ai_addr, at->ai_addrlen, place->connecting);
+    int error = errno;
+    freeaddrinfo(list);
+    if (*fd < 0)
+        return sh_fail(err, socket_error_code(error), "%s:%s:%d: cannot %s: %s%s", place->what, host, place->port,
+                       place->connecting ? "connect" : "listen", strerror(error),
+                       error == EADDRINUSE ? "; port 0 lets the system choose" : "");
+    name_socket(*fd, place->connecting, name, len);
+    return SH_OK;
+}
+
+void socket_tune(int fd)
+{
+    const int one = 1, idle_s = IDLE_S, interval_s = INTERVAL_S, probes = PROBES;
+    setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &one, sizeof one);
+    setsockopt(fd, SOL_SOCKET, SO_KEEPALIVE, &one, sizeof one);
+    setsockopt(fd, IPPROTO_TCP, TCP_KEEPIDLE, &idle_s, sizeof idle_s);
+    setsockopt(fd, IPPROTO_TCP, TCP_KEEPINTVL, &interval_s, sizeof interval_s);
+    setsockopt(fd, IPPROTO_TCP, TCP_KEEPCNT, &probes, sizeof probes);
+}
+
+void socket_tune_impatient(int fd)
+{
+    const unsigned timeout_ms = (IDLE_S + INTERVAL_S * PROBES) * 1000;
+    setsockopt(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, &timeout_ms, sizeof timeout_ms);
+}
+
+ssize_t socket_read(int fd, void *buf, size_t len)
+{
+    if (len == 0) return 0;
+    ssize_t n = recv(fd, buf, len, MSG_DONTWAIT);
+    if (n > 0) return n;
+    if (n < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR)) return 0;
+    return SH_ECLOSED;
+}
+
+ssize_t socket_write(int fd, const void *buf, size_t len)
+{
+    ssize_t n = send(fd, buf, len, MSG_DONTWAIT | MSG_NOSIGNAL);
+    if (n >= 0) return n;
+    /* ENOBUFS and ENOMEM: the system is short of memory for now, the connection is sound. */
+    if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR || errno == ENOBUFS || errno == ENOMEM) return 0;
+    return SH_ECLOSED;
+}
+
+int socket_ended(int fd, short revents)
+{
+    if ((revents & (POLLIN | POLLHUP | POLLERR | POLLNVAL)) == 0) return 0;
+    char byte;
+    ssize_t n = recv(fd, &byte, 1, MSG_DONTWAIT | MSG_PEEK);
+    return n == 0 || (n < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR);
+}

@@ -1,0 +1,49 @@
+/* Stream sockets, for links and USB back ends: opening, settings, bytes in and out. Nothing but socket_open
+ * waits.
+ *
+ * Errors: SH_E; where there is an err, its text names the socket by socket_place.what. Any thread. */
+#ifndef DRIVERS_SOCKET_SOCKET_H
+#define DRIVERS_SOCKET_SOCKET_H
+
+#include <stddef.h>
+#include <sys/socket.h>
+#include <sys/types.h>
+
+#include "core/err.h"
+
+/* Where a TCP socket listens or connects to. */
+struct socket_place {
+    const char *what; /* "usbip", for errors */
+    const char *host; /* numeric or name; empty: 127.0.0.1 */
+    int port;         /* 0: the system chooses */
+    int connecting;   /* 1: connects, 0: listens */
+};
+
+/* A listening or connected socket, not blocking. Waits for names and for the connection. name gets its own
+ * address or, where it connects, that of its peer, as "127.0.0.1:40123" or "[::1]:40123". SH_EPERM, SH_EINPUT
+ * (the address), SH_EIO. */
+int socket_open(const struct socket_place *place, int *fd, char *name, size_t len, struct sh_err *err);
+/* The same at a known address of any family: a descriptor, or -1 with errno. */
+int socket_open_at(const struct sockaddr *at, socklen_t len, int connecting);
+/* SH_E for an errno of either. */
+int socket_error_code(int error);
+
+/* An address as "127.0.0.1:40123" or "[::1]:40123". */
+void socket_address_text(const struct sockaddr *address, socklen_t len, char *text, size_t size);
+
+/* For a connected TCP socket; others stay as they are. Small packets leave at once. A peer that has vanished
+ * without a word ends the connection after about 25 s. With bytes under way to it, that takes until the
+ * system gives up repeating them (Linux: some 15 minutes). */
+void socket_tune(int fd);
+/* After socket_tune, for a peer that always reads: about 25 s with bytes under way, too. It also cuts off a
+ * peer that only rests for that long. */
+void socket_tune_impatient(int fd);
+
+/* Connected sockets, never blocking and never raising SIGPIPE. Bytes moved; 0: none now; SH_ECLOSED: end of
+ * stream, reset or any other failure. */
+ssize_t socket_read(int fd, void *buf, size_t len);
+ssize_t socket_write(int fd, const void *buf, size_t len);
+/* After poll(2): 1 when the peer is gone and nothing is left to read. */
+int socket_ended(int fd, short revents);
+
+#endif

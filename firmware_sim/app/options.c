@@ -1,0 +1,207 @@
+#include "firmware_sim/app/options.h"
+
+#include <ctype.h>
+#include <getopt.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { FIRST_VALUE = 256, HELP_COLUMNS = 110 };
+
+int app_usage(const struct app_command *command, const char *fmt, ...)
+{
+    char text[512];
+    va_list ap;
+    va_start(ap, fmt);
+    vsnprintf(text, sizeof text, fmt, ap);
+    va_end(ap);
+    fprintf(stderr, "scanhead %s: %s; see scanhead %s --help\n", command->name, text, command->name);
+    return APP_USAGE;
+}
+
+int app_add_set(struct app_sets *sets, const char *set)
+{
+    if (sets->n == APP_MAX_SETS) {
+        fprintf(stderr, "scanhead: too many settings; at most %d\n", APP_MAX_SETS);
+        return APP_USAGE;
+    }
+    sets->set[sets->n++] = set;
+    return APP_OK;
+}
+
+static int add_key(struct app_sets *sets, const char *key, const char *value)
+{
+    char *text = sets->text + sets->used;
+    const size_t room = sizeof sets->text - sets->used, n = strlen(key) + strlen(value) + 2;
+    if (n > room) {
+        fprintf(stderr, "scanhead: %s: too long; options that stand for a key have %zu characters in all\n", key,
+                sizeof sets->text);
+        return APP_USAGE;
+    }
+    sets->used += (size_t)snprintf(text, room, "%s=%s", key, value) + 1;
+    return app_add_set(sets, text);
+}
+
+/* The whole text as a number within the row's limits. */
+static int parse_number(const struct app_command *command, const struct app_option *row, const char *text, double *out)
+{
+    char *end;
+    const int whole = row->kind == APP_WHOLE;
+    *out = strtod(text, &end);
+    if (end != text && *end == '\0' && !isspace((unsigned char)text[0]) && *out >= row->min && *out <= row->max &&
+        (!whole || *out == floor(*out)))
+        return APP_OK;
+    return app_usage(command, "--%s %s: not a %s from %.10g to %.10g", row->name, text,
+                     whole ? "whole number" : "number", row->min, row->max);
+}
+
+static int apply(const struct app_command *command, const struct app_option *row, const char *text,
+                 struct app_input *in, void *values)
+{
+    double number = 0.0;
+    void *at = (char *)values + row->at;
+    if (row->word != NULL && strcmp(text, row->word) == 0) {
+        *(long *)at = APP_WORD;
+        return APP_OK;
+    }
+    switch (row->kind) {
+    case APP_FLAG:
+        *(int *)at = 1;
+        return APP_OK;
+    case APP_TEXT:
+        *(const char **)at = text;
+        return APP_OK;
+    case APP_NUMBER:
+        return parse_number(command, row, text, at);
+    case APP_WHOLE:
+        if (parse_number(command, row, text, &number) != APP_OK) return APP_USAGE;
+        *(long *)at = (long)number;
+        return APP_OK;
+    case APP_KEY_GIVEN:
+        *(int *)at = 1;
+        /* fall through */
+    case APP_KEY:
+        return add_key(&in->sets, row->key, text);
+    case APP_SET:
+        return app_add_set(&in->sets, text);
+    default:
+        return row->apply(values, text);
+    }
+}
+
+/* ---- help */
+
+void app_arguments(const struct app_command *command, char *buf, size_t len)
+{
+    size_t n = 0;
+    buf[0] = '\0';
+    for (int i = 0; i < APP_MAX_OPERANDS && command->operand[i] != NULL && n < len; i++)
+        n += (size_t)snprintf(buf + n, len - n, " %s", command->operand[i]);
+    if (command->needs != NULL && n < len) n += (size_t)snprintf(buf + n, len - n, " %s", command->needs);
+    if (command->options[0].kind != APP_LAST && n < len) snprintf(buf + n, len - n, " [options]");
+}
+
+/* The text from column `indent` on, where the line is now; further lines begin there, too. */
+static void print_wrapped(const char *text, int indent)
+{
+    int column = indent;
+    while (*text != '\0') {
+        const int n = (int)strcspn(text, " ");
+        if (column > indent && column + 1 + n > HELP_COLUMNS)
+            printf("\n%*s", column = indent, "");
+        else if (column > indent)
+            column += printf(" ");
+        column += printf("%.*s", n, text);
+        text += n + (text[n] == ' ');
+    }
+    putchar('\n');
+}
+
+static void print_row(const struct app_option *row, int width)
+{
+    char letter[] = "-?, ";
+    letter[1] = row->letter;
+    int n = printf("  %-4s--%s %s", row->letter != '\0' ? letter : "", row->name,
+                   row->argument != NULL ? row->argument : "");
+    printf("%*s", width - n, "");
+    print_wrapped(row->help, width);
+}
+
+static void print_help(const struct app_command *command)
+{
+    static const struct app_option help = {APP_LAST, "help", NULL, .letter = 'h', .help = "this text"};
+    char arguments[128];
+    size_t longest = strlen(help.name);
+    for (const struct app_option *row = command->options; row->kind != APP_LAST; row++) {
+        size_t n = strlen(row->name) + (row->argument != NULL ? 1 + strlen(row->argument) : 0);
+        if (n > longest) longest = n;
+    }
+    app_arguments(command, arguments, sizeof arguments);
+    printf("scanhead %s: %s\n\nusage: scanhead %s%s\n\n", command->name, command->summary, command->name, arguments);
+    for (const struct app_option *row = command->options; row->kind != APP_LAST; row++)
+        print_row(row, (int)longest + 10);
+    print_row(&help, (int)longest + 10);
+    if (command->notes != NULL) printf("\n%s", command->notes);
+    if (command->print_more != NULL) command->print_more(stdout);
+}
+
+/* ---- parsing */
+
+/* The table as getopt_long wants it; a long option's value is FIRST_VALUE and its row. */
+static void list_options(const struct app_option *row, struct option longs[APP_MAX_OPTIONS + 2], char *letters)
+{
+    int n = 0;
+    letters += sprintf(letters, ":h");
+    for (; row[n].kind != APP_LAST && n < APP_MAX_OPTIONS; n++) {
+        int has = row[n].argument != NULL ? required_argument : no_argument;
+        longs[n] = (struct option){row[n].name, has, NULL, FIRST_VALUE + n};
+        if (row[n].letter != '\0') letters += sprintf(letters, "%c%s", row[n].letter, has ? ":" : "");
+    }
+    longs[n] = (struct option){"help", no_argument, NULL, 'h'};
+    longs[n + 1] = (struct option){NULL, 0, NULL, 0};
+}
+
+static const struct app_option *find_row(const struct app_option *row, int opt)
+{
+    if (opt >= FIRST_VALUE) return &row[opt - FIRST_VALUE];
+    while (row->kind != APP_LAST && row->letter != opt)
+        row++;
+    return row;
+}
+
+static int take_operands(const struct app_command *command, int n, char **words, struct app_input *in)
+{
+    int needed = 0;
+    while (needed < APP_MAX_OPERANDS && command->operand[needed] != NULL)
+        needed++;
+    if (n != needed && needed == 0) return app_usage(command, "it takes no arguments");
+    if (n != needed && needed == 1) return app_usage(command, "one %s is needed", command->operand[0]);
+    if (n != needed)
+        return app_usage(command, "one %s and one %s are needed", command->operand[0], command->operand[1]);
+    for (int i = 0; i < n; i++)
+        in->operand[i] = words[i];
+    return APP_GO_ON;
+}
+
+int app_parse(const struct app_command *command, int argc, char **argv, struct app_input *in, void *values)
+{
+    struct option longs[APP_MAX_OPTIONS + 2];
+    char letters[2 * APP_MAX_OPTIONS + 3];
+    int opt;
+    memset(in, 0, sizeof *in);
+    list_options(command->options, longs, letters);
+    opterr = 0;
+    optind = 0; /* from the beginning, whatever was parsed before */
+    while ((opt = getopt_long(argc, argv, letters, longs, NULL)) != -1) {
+        if (opt == 'h') {
+            print_help(command);
+            return APP_OK;
+        }
+        if (opt == ':') return app_usage(command, "option %s needs a value", argv[optind - 1]);
+        if (opt == '?') return app_usage(command, "unknown option %s", argv[optind - 1]);
+        int status = apply(command, find_row(command->options, opt), optarg, in, values);
+        if (status != APP_OK) return status;
+    }
+    return take_operands(command, argc - optind, argv + optind, in);
+}

@@ -1,0 +1,86 @@
+/* Commands and their options as tables. The rows alone give parsing, errors and --help.
+ *
+ * In: argv and the command's table. Out: the operands, the settings of configuration keys, and the values of
+ * the options in a struct of the command's own. A row says what it sets by the offset in that struct. */
+#ifndef FIRMWARE_SIM_APP_OPTIONS_H
+#define FIRMWARE_SIM_APP_OPTIONS_H
+
+#include <stddef.h>
+#include <stdio.h>
+
+/* The exit status of a command. APP_GO_ON is none: the command line was read, the command can begin. */
+enum { APP_GO_ON = -1, APP_OK = 0, APP_FAILED = 1, APP_USAGE = 2 };
+
+enum { APP_WORD = -1, APP_MAX_SETS = 256, APP_MAX_OPERANDS = 2, APP_MAX_OPTIONS = 32 };
+
+/* clang-format off */
+enum app_option_kind {
+    APP_LAST,      /* the row after the last */
+    APP_FLAG,      /* sets an int to 1 */
+    APP_TEXT,      /* sets a const char * */
+    APP_NUMBER,    /* sets a double, from min to max */
+    APP_WHOLE,     /* sets a long, from min to max */
+    APP_KEY,       /* stands for a configuration key */
+    APP_KEY_GIVEN, /* the same, and sets an int to 1 */
+    APP_SET,       /* any configuration key */
+    APP_CALL       /* calls apply */
+};
+
+/* A row begins with kind, name and argument; the rest goes by name. */
+struct app_option {
+    enum app_option_kind kind;
+    const char *name;     /* without the dashes */
+    const char *argument; /* as --help shows it; NULL: the option takes none */
+    char letter;          /* the short form; 0: none */
+    size_t at;            /* where in the command's struct the option sets its value */
+    double min, max;
+    const char *word;     /* WHOLE: a word that is allowed, too, and gives APP_WORD; NULL: none */
+    const char *key;
+    int (*apply)(void *values, const char *text); /* APP_OK, or APP_USAGE with the reason printed */
+    const char *help;
+};
+
+/* Rows that are the same in every table. */
+#define OPTION_SET {APP_SET, "set", "KEY=VALUE", .help = "another value of a configuration key; may be repeated"}
+#define OPTION_END {.kind = APP_LAST}
+/* clang-format on */
+
+struct app_command {
+    const char *name;
+    const char *operand[APP_MAX_OPERANDS]; /* all are needed; NULL after the last */
+    const char *needs;                     /* options that must be given, as the usage line shows them; NULL: none */
+    const char *summary;                   /* one line: what it does */
+    const struct app_option *options;      /* ends with OPTION_END; -h and --help are in no table */
+    const char *notes;                     /* printed after the options; NULL: none */
+    void (*print_more)(FILE *out);         /* printed last; NULL: nothing */
+    int (*run)(int argc, char **argv);     /* argv[0] is the command's name; returns the exit status */
+};
+
+/* Settings of configuration keys, as KEY=VALUE: of --set, and of options that stand for a key. */
+struct app_sets {
+    const char *set[APP_MAX_SETS];
+    int n;
+    char text[1024]; /* of the options that stand for a key, one after the other */
+    size_t used;
+};
+
+/* What a command line says, but for the command's own options. */
+struct app_input {
+    const char *operand[APP_MAX_OPERANDS];
+    struct app_sets sets;
+};
+
+/* APP_GO_ON with `in` and `values` filled, or the exit status: of a printed help, or of an error with its one
+ * line. The strings are argv's own, or lie in `in`, which must stay where it is. */
+int app_parse(const struct app_command *command, int argc, char **argv, struct app_input *in, void *values);
+
+/* Adds KEY=VALUE, which must live on. APP_OK, or APP_USAGE with the reason printed. */
+int app_add_set(struct app_sets *sets, const char *set);
+
+/* Prints a usage error: one line that ends with where the help is. Returns APP_USAGE. */
+int app_usage(const struct app_command *command, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
+
+/* What follows the command's name in its usage line: operands, needed options, [options]. */
+void app_arguments(const struct app_command *command, char *buf, size_t len);
+
+#endif

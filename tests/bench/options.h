@@ -1,0 +1,26 @@
+/* The command line of build/bench: words in, what to measure out. Prints its errors, one line each. */
+#ifndef TESTS_BENCH_OPTIONS_H
+#define TESTS_BENCH_OPTIONS_H
+
+#include <stddef.h>
+
+enum { BENCH_OK = 0, BENCH_FAILED = 1, BENCH_USAGE = 2 }; /* exit status */
+
+#define BENCH_HOUSE_FILE "/usr/share/assimp/models/IFC/AC14-FZK-Haus.ifc"
+
+struct bench_options {
+    const char *scenes; /* names with commas between; NULL: none */
+    const char *house;  /* file of the IFC model; NULL: BENCH_HOUSE_FILE, left out where that is not there */
+    const char *out;    /* file for the JSON; NULL: standard output */
+    double seconds;     /* for each scene */
+    long threads;       /* of the run on all threads; 0: one per processor */
+    double leaks;       /* rays at edges and corners; 0: none */
+};
+
+/* Returns -1 to go on, else the exit status. */
+int bench_parse(struct bench_options *o, int argc, char **argv);
+
+/* The next name of a list with commas into name; NULL at the list's end, else the rest of the list. */
+const char *bench_next_name(const char *list, char *name, size_t len);
+
+#endif
