@@ -113,7 +113,7 @@ static struct scene *mirror_and_two_walls(void)
 
 /* All light of a footprint that lies on surfaces comes back. Pulse 0 of line 30 goes along an axis of the scene, to the
  * digit: some of its sub-rays have a component of -1e-22 or so, which must not cost those that are packed with them
- * (core/cast/kernels.c). */
+ * (core/bvh/refine.c). */
 static void no_light_is_lost(void **state)
 {
     (void)state;
