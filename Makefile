@@ -48,7 +48,7 @@ LDLIBS = $(EMBREE) -lassimp -lGeographicLib $(PKG_LIBS) -lstdc++ -lm -pthread
 CORE = $(wildcard core/*.c core/*/*.c) core/georef/geographiclib_shim.cpp
 PROTO = $(wildcard drivers/protocol/*.c)
 HOST = $(wildcard drivers/host/*.c)
-SRC = $(CORE) $(PROTO) $(HOST) $(wildcard drivers/socket/*.c drivers/link/*.c drivers/usb/*.c drivers/record/*.c firmware_sim/*/*.c)
+SRC = $(CORE) $(wildcard drivers/*/*.c firmware_sim/*/*.c)
 OBJ = $(SRC:%=$(BUILD)/%.o)
 LIBOBJ = $(patsubst %,$(BUILD)/%.o,core/err.c $(PROTO) $(HOST))
 PROGRAMS = $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/$(1)/test_*.c))
@@ -88,34 +88,44 @@ $(BUILD)/libscanhead.so: $(LIBOBJ) drivers/host/libscanhead.map
 $(BUILD)/scanhead: $(BUILD)/firmware_sim/main.c.o $(BUILD)/modules.a
 	@echo "  LD    $@"
 	$(Q)$(CC) $(SAN) -o $@ $^ $(LDLIBS)
-# What several programs of tests/ share: scenes, rays, plain Embree.
-BENCH_MAINS = $(patsubst %,tests/bench/%.c,bench chart chart_georef chart_widths beam plain)
-SHARED = $(filter-out $(BENCH_MAINS),$(wildcard tests/common/*.c tests/bench/*.c))
-$(BUILD)/shared.a: $(SHARED:%=$(BUILD)/%.o)
+
+# ---- test programs. A program of tests/ is linked with
+#   common.a    tests/common: scenes, references, clients                   all of them
+#   benches.a   what the programs of tests/bench share                      build/bench and the charts'
+#   its rigs    tests/unit/cast_rig.c where it includes cast_rig.h          tests of a folder; tests/rigs.sh finds which
+#   modules.a   the head, without main.c                                    all of them
+FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_georef chart_widths beam plain)
+BENCH_MAINS = $(FIGURES:$(BUILD)/%=%.c) tests/bench/bench.c
+COMMON = $(wildcard tests/common/*.c)
+BENCHES = $(filter-out $(BENCH_MAINS),$(wildcard tests/bench/*.c))
+PAIRS = $(eval PAIRS := $$(shell sh tests/rigs.sh))$(PAIRS)
+RIGS = $(patsubst $(1):%,$(BUILD)/%.o,$(filter $(1):%,$(PAIRS)))
+$(BUILD)/common.a: $(COMMON:%=$(BUILD)/%.o)
+$(BUILD)/benches.a: $(BENCHES:%=$(BUILD)/%.o)
+$(BUILD)/common.a $(BUILD)/benches.a:
 	@rm -f $@
 	@echo "  AR    $@"
 	$(Q)$(AR) rcs $@ $^
-$(BUILD)/bench: $(BUILD)/tests/bench/bench.c.o $(BUILD)/shared.a $(BUILD)/modules.a
+$(BUILD)/bench: $(BUILD)/tests/bench/bench.c.o
+$(FIGURES): $(BUILD)/%: $(BUILD)/%.c.o
+$(BUILD)/bench $(FIGURES): $(BUILD)/benches.a $(BUILD)/common.a $(BUILD)/modules.a
 	@echo "  LD    $@"
-	$(Q)$(CC) $(SAN) -o $@ $^ $(LDLIBS)
-# A test program, with what its folder has besides test programs. What computes little itself is built in half the time.
-QUICK = $(if $(filter unit wire guest,$(1)),-O1)
-BESIDE = $(patsubst %,$(BUILD)/%.o,$(filter-out $(wildcard tests/$(1)/test_*.c),$(wildcard tests/$(1)/*.c)))
+	$(Q)$(CC) $(SAN) -o $@ $(filter %.o,$^) $(filter %.a,$^) $(LDLIBS)
+# What computes little itself is built in half the time.
+$(BUILD)/tests/unit/% $(BUILD)/tests/wire/% $(BUILD)/tests/guest/%: OPT += -O1
 .SECONDEXPANSION:
-$(BUILD)/tests/%: tests/%.c $(BUILD)/shared.a $(BUILD)/modules.a $$(call BESIDE,$$(*D))
-	@mkdir -p $(@D)
+$(BUILD)/tests/%: $(BUILD)/tests/%.c.o $$(call RIGS,tests/$$*) $(BUILD)/common.a $(BUILD)/modules.a
 	@echo "  TEST  $@"
-	$(Q)$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) $(call QUICK,$(*D)) -MF $@.d -o $@ $< $(call BESIDE,$(*D)) $(BUILD)/shared.a $(BUILD)/modules.a -lcmocka $(LDLIBS)
-
+	$(Q)$(CC) $(SAN) -o $@ $^ -lcmocka $(LDLIBS)
 # What runs in the guest has the client library alone: it starts faster there.
-$(BUILD)/tests/guest/%: tests/guest/%.c $(BUILD)/libscanhead.a
-	@mkdir -p $(@D)
+$(BUILD)/tests/guest/%: $(BUILD)/tests/guest/%.c.o $$(call RIGS,tests/guest/$$*) $(BUILD)/libscanhead.a
 	@echo "  TEST  $@"
-	$(Q)$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) $(call QUICK,guest) -MF $@.d -o $@ $< $(BUILD)/libscanhead.a -lcmocka -lnettle -lusb-1.0 -lm -pthread
+	$(Q)$(CC) $(SAN) -o $@ $^ -lcmocka -lnettle -lusb-1.0 -lm -pthread
 
-# ---- what is missing, and only that
+# ---- what is missing, and only that; DEPS=no installs nothing
+DEPS ?= yes
 define install_missing
-	@missing=; for p in $(1); do dpkg-query -W -f='$${Status}' $$p 2>/dev/null | grep -q 'ok installed' || missing="$$missing $$p"; done; \
+	@[ '$(DEPS)' != no ] || exit 0; missing=; for p in $(1); do dpkg-query -W -f='$${Status}' $$p 2>/dev/null | grep -q 'ok installed' || missing="$$missing $$p"; done; \
 	if [ -n "$$missing" ]; then \
 		echo "installing:$$missing"; \
 		if [ "$$(id -u)" = 0 ]; then sudo=; elif command -v sudo >/dev/null; then sudo=sudo; \
@@ -129,7 +139,8 @@ deps: deps-test $(READERS)/installed
 $(READERS)/installed: $(wildcard tests/readers/*) | deps-test
 	@mkdir -p $(@D)
 	@cp tests/readers/* $(@D)
-	@if (cd $(@D) && npm ci --no-audit --no-fund --loglevel=error --fetch-retries=0 --fetch-timeout=30000) >$(@D)/npm.log 2>&1; then touch $@; \
+	@if [ '$(DEPS)' = no ]; then echo "DEPS=no: the readers for LAS and E57 are not installed: their tests will be skipped"; \
+	elif (cd $(@D) && npm ci --no-audit --no-fund --loglevel=error --fetch-retries=0 --fetch-timeout=30000) >$(@D)/npm.log 2>&1; then touch $@; \
 	else echo "npm could not install the readers for LAS and E57 ($(@D)/npm.log): their tests will be skipped"; fi
 deps-test:
 	$(call install_missing,$(DEPS_TEST))
@@ -143,18 +154,35 @@ demo: deps-build
 	@$(MAKE) --no-print-directory -j2 all
 	@sh config/demo.sh $(BUILD)/scanhead $(BUILD)/demo
 
-# ---- tests. Everything is built with warnings as errors, by both compilers, and again with sanitizers.
+# ---- tests. Warnings are errors. Three builds: all with gcc; what is in the head once more with clang, for its warnings
+# alone; the unit tests and what they need with sanitizers, without optimiser (and so without the warnings that it makes).
+JOBS ?= $(shell getconf _NPROCESSORS_ONLN)
 STRICT = WERROR=-Werror
-ASAN = $(STRICT) BUILD=$(BUILD)/asan OPT=-O1 CPPFLAGS=-DSH_SANITIZE SAN="-g1 -fsanitize=address,undefined -fno-sanitize-recover=all"
-CLANG = $(STRICT) BUILD=$(BUILD)/clang CC=clang CXX=clang++ OPT=-O0
+ASAN = $(STRICT) BUILD=$(BUILD)/asan OPT=-O0 CFLAGS=-w CPPFLAGS=-DSH_SANITIZE SAN="-g1 -fsanitize=address,undefined -fno-sanitize-recover=all"
+CLANG = $(STRICT) BUILD=$(BUILD)/clang CC=clang CXX=clang++ OPT=-O0 CFLAGS=-g0 CXXFLAGS=-g0
+SUBMAKE = @$(MAKE) --no-print-directory -j$(JOBS)
+RUN = SCANHEAD=$(BUILD)/test/scanhead READERS=$(READERS)
+# `make test T=test_ring` builds and runs that one alone, of whatever folder; also a script: T=check_includes, T=test_usbip_tcp.
+T ?=
+ifeq ($(T),)
 test: deps
-	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test test-programs
-	@$(MAKE) --no-print-directory -j2 $(CLANG) objects
-	@$(MAKE) --no-print-directory -j2 $(ASAN) all test-unit-programs
-	@SCANHEAD=$(BUILD)/test/scanhead READERS=$(READERS) sh tests/run_all.sh $(BUILD)
+	$(SUBMAKE) $(STRICT) BUILD=$(BUILD)/test test-programs
+	@command -v clang >/dev/null || echo "no clang: its warnings are not looked at"
+	@! command -v clang >/dev/null || $(MAKE) --no-print-directory -j$(JOBS) $(CLANG) objects
+	$(SUBMAKE) $(ASAN) test-unit-programs
+	@$(RUN) sh tests/run_all.sh $(BUILD)
+else
+ONE = $(patsubst $(BUILD)/%,%,$(filter %/$(T),$(TESTS)))
+SCRIPT = $(wildcard tests/$(T).sh tests/guest/$(T).sh)
+test: deps
+	@[ -n '$(ONE)$(SCRIPT)' ] || { echo "T=$(T): no tests/*/$(T).c, tests/$(T).sh or tests/guest/$(T).sh" >&2; exit 2; }
+	$(SUBMAKE) $(STRICT) BUILD=$(BUILD)/test $(if $(filter tests/unit/%,$(ONE)),,all $(BUILD)/test/bench) $(ONE:%=$(BUILD)/test/%) \
+		$(if $(filter tests/guest/%,$(SCRIPT)),$(patsubst $(BUILD)/%,$(BUILD)/test/%,$(call PROGRAMS,guest)))
+	@$(RUN) BUILD=$(BUILD) bash tests/run_tap.sh $(ONE:%=$(BUILD)/test/%) $(SCRIPT)
+endif
 test-unit test-wire test-accuracy test-stability test-guest: deps
-	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test test-programs
-	@SCANHEAD=$(BUILD)/test/scanhead READERS=$(READERS) sh tests/run_all.sh $(BUILD) $(@:test-%=%)
+	$(SUBMAKE) $(STRICT) BUILD=$(BUILD)/test test-programs
+	@$(RUN) sh tests/run_all.sh $(BUILD) $(@:test-%=%)
 
 # The other end of a usbredir channel goes, comes back and resets 1,000 times (`make test`: 20).
 soak-usb: deps
@@ -175,12 +203,6 @@ bench: deps-build
 # Each program of the chart writes its panel's rows; the first one the head of the table.
 CHART = $(BUILD)/chart/speed_accuracy
 CHARTS = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_georef chart_widths beam)
-FIGURES = $(CHARTS) $(BUILD)/tests/bench/plain
-$(BUILD)/tests/bench/beam: tests/accuracy/beam_reference.c
-$(FIGURES): $(BUILD)/tests/bench/%: tests/bench/%.c $(BUILD)/shared.a $(BUILD)/modules.a
-	@mkdir -p $(@D)
-	@echo "  CHART $@"
-	$(Q)$(CC) $(ALL_CPPFLAGS) $(ALL_CFLAGS) -MF $@.d -o $@ $(filter %.c,$^) $(filter %.a,$^) $(LDLIBS)
 # Footprints: cost, and error against 1,000 sub-rays; a few minutes.
 bench-beam: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/beam

@@ -1,11 +1,12 @@
-/* A recorded point cloud, and how far it lies from the scene.
+/* A recorded point cloud, and how far it lies from the scene. In: a PLY or LAS file, the scene's index of
+ * distances, the stations' georeferences. Out: points; per point a distance in metres and a triangle;
+ * statistics and coverage of them.
  *
- * A cloud is read from a PLY file (ASCII, or binary of either byte order, any number types). Element vertex
- * has the properties x, y, z and, where they are there, station (from 1), echo and label, as our recorder
- * writes them; all else is passed over. Or from a LAS file (1.2 to 1.4, not compressed): the point source ID is the
- * station, the return number the echo, the extra bytes "label" the label.
- * Ownership: cloud_read allocates, cloud_free releases. A cloud that is read is constant and may be used from any
- * thread. */
+ * PLY: ASCII, or binary of either byte order, any number types. Element vertex has the properties x, y, z
+ * and, where they are there, station (from 1), echo and label, as our recorder writes them. Everything else
+ * is ignored. LAS: 1.2 to 1.4, not compressed. There the point source ID is the station, the return number
+ * the echo, the extra bytes "label" the label. Ownership: cloud_read allocates, cloud_free releases. A cloud
+ * is constant after cloud_read, any thread. */
 #ifndef CORE_CLOUD_H
 #define CORE_CLOUD_H
 
@@ -24,7 +25,7 @@ enum {
 
 struct cloud {
     size_t n;
-    double (*xyz_m)[3]; /* [n] as in the file; three times not-a-number: a shot without echo */
+    double (*xyz_m)[3]; /* [n] as in the file; three times NaN: a shot without echo */
     uint16_t *station;  /* [n] from 1; NULL: the file has none */
     uint16_t *label;    /* [n] CLOUD_LABEL_NONE: none; NULL: the file has none */
     uint8_t *echo;      /* [n] 0: shot without echo; NULL: the file has none */
@@ -32,9 +33,9 @@ struct cloud {
 };
 
 /* Errors (SH_EINPUT, naming file and line, or byte): missing or unreadable, not a PLY or LAS file, x, y or z
- * missing, a count the file can't hold, truncated, infinite coordinates or only some of the three not a
- * number, a station, echo or label that is not a whole number in its range. Warns of other elements and of
- * bytes after the last one. */
+ * missing, a count the file can't hold, truncated, infinite coordinates, or only some of the three NaN, a
+ * station, echo or label that is not a whole number in its range. Warns of other elements and of bytes after
+ * the last one. */
 int cloud_read(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err);
 void cloud_free(struct cloud *cloud);
 
@@ -45,16 +46,17 @@ struct cloud_site {
         *georef; /* [n_stations], by station - 1; NULL: the cloud is in the scene frame already */
     uint32_t n_stations;
     double max_m; /* how far to look */
-    /* Bodies that do not stand in the scene; NULL: there are none. Takes a point of such a body's label from the scene
-     * to the body's own frame and gives the body's index; NULL: the point is of the scene. From any thread. */
+    /* Bodies that do not stand in the scene; NULL: there are none. Takes a point of such a body's label from
+     * the scene to the body's own frame and gives the body's index; NULL: the point is of the scene. From any
+     * thread. */
     const struct distance *(*body)(void *ctx, unsigned station, uint16_t label, double p_prcs[3]);
     void *body_ctx;
     unsigned threads; /* at least 1; the result does not depend on it */
 };
 
-/* Per point: its distance from the nearest triangle (not-a-number: shot without echo; INFINITY: nothing
- * within max_m) and that triangle's number, or CLOUD_TRIANGLE_NONE, also for a body's. Points without a station are of
- * the first one. SH_EINPUT: a point's station is not among n_stations. */
+/* Per point: its distance from the nearest triangle (NaN: shot without echo; INFINITY: nothing
+ * within max_m) and that triangle's number, or CLOUD_TRIANGLE_NONE, also for a body's. Points without a
+ * station are of the first one. SH_EINPUT: a point's station is not among n_stations. */
 int cloud_compare(const struct cloud *cloud, const struct cloud_site *site, const struct sh_report *report,
                   double *distance_m, uint32_t *triangle, struct sh_err *err);
 
@@ -66,13 +68,13 @@ struct cloud_coverage {
  * there is no such triangle. */
 uint16_t cloud_surface(const struct cloud *cloud, const struct scene *scene, const uint32_t *triangle, size_t i);
 
-/* How many of the n_surfaces, the scene's and then those of bodies, and of the scene's triangles have points (far ones
- * have no triangle). SH_EINPUT: a label of n_surfaces or more. */
+/* How many of the n_surfaces, the scene's and then those of bodies, and of the scene's triangles have points
+ * (far ones have no triangle). SH_EINPUT: a label of n_surfaces or more. */
 int cloud_cover(const struct cloud *cloud, const struct scene *scene, uint32_t n_surfaces, const uint32_t *triangle,
                 struct cloud_coverage *out, struct sh_err *err);
 
 /* A percentile is the nearest rank: the smallest value that at least so many of all do not exceed. Mean, RMS,
- * percentiles and maximum are over the points that are not far, and not-a-number when there are none. */
+ * percentiles and maximum are over the points that are not far, and NaN when there are none. */
 struct cloud_stats {
     size_t points; /* with coordinates, far ones included */
     size_t empty;  /* shots without echo */

@@ -1,9 +1,11 @@
-/* The exact distance of a point to the scene: Embree's point query proposes, double precision decides.
+/* The exact distance of a point to the scene. In: a scene, and a point in prcs (metres). Out: the nearest
+ * point of the mesh. Embree's point query proposes triangles, double precision decides.
  *
- * The query runs in a float frame about the scene's centre with every radius widened by that frame's rounding,
- * so no triangle that could be nearest is missed; the distance itself is point-to-triangle in double, edges and
- * face apart: barycentric regions (Ericson, Real-Time Collision Detection, 5.1.5) lose digits on needles. It is good to
- * 16 half-units in the last place of the distance to the triangle's farthest corner, at any coordinates. */
+ * The query runs in a float frame about the scene's centre. Every radius is widened by that frame's rounding,
+ * so no triangle that could be nearest is missed. The distance is point to triangle in double, edges and face
+ * apart, since barycentric regions (Ericson, Real-Time Collision Detection, 5.1.5) lose digits on needles.
+ * Its error is at most 16 half-units in the last place of the distance to the triangle's farthest corner, at
+ * any coordinates. */
 #ifndef CORE_DISTANCE_H
 #define CORE_DISTANCE_H
 

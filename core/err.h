@@ -2,7 +2,8 @@
  *
  * A function that can fail for a reason the user can act on takes a `struct sh_err *` as its last
  * argument, fills it through sh_fail() and returns the code. The text is one line: what, where, what is
- * allowed. Nothing below main prints it. Thread: a sh_err belongs to its caller; sh_fail allocates nothing. */
+ * allowed. Nothing below main prints it. Thread: a sh_err belongs to its caller; sh_fail allocates
+ * nothing. */
 #ifndef CORE_ERR_H
 #define CORE_ERR_H
 
@@ -28,7 +29,7 @@ struct sh_err {
  * A text too long for the buffer is cut at its end. */
 int sh_fail(struct sh_err *err, int code, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
 
-/* How long work tells about itself. Each member may be NULL. Called from the thread that does the work. */
+/* Where long work reports to. Each member may be NULL. Called from the thread that does the work. */
 struct sh_report {
     void *ctx;
     void (*warn)(void *ctx, const char *text);                      /* one line, without a newline */

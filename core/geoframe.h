@@ -1,14 +1,17 @@
-/* How the scene's frame (prcs) lies on the Earth: once for a scene, so that places in it and on the Earth follow from
- * each other and all stations agree.
- *   tangent  metric. One point of the scene, origin_m, is at a place on the Earth; z is the plumb line (the ellipsoid's
- *            normal) there, and true north there lies north_deg clockwise from the scene's y axis. Elsewhere z differs
- *            from the local plumb line by the angle between the two at the Earth's centre, about 0.009 deg per km.
- *   grid     prcs is easting, northing (with false origin) and ellipsoidal height of one UTM or UPS grid, as a mesh in
- *            such coordinates is. y is grid north, z the plumb line everywhere. Lengths are grid lengths: in the scene
- * a horizontal metre is `scale` (0.9996 to 1.0010 in UTM) of a true one, so ranges carry that factor; points in that
- * grid are the mesh's own coordinates to the last bit. ecef     prcs is ECEF, as a mesh in geocentric coordinates is.
- * The axes of a head are those of its place: y true north, z the plumb line. Constant after it is set up; any thread.
- * Degrees and metres. */
+/* How the scene's frame (prcs) lies on the Earth. In: points of the scene, or places on the Earth (degrees,
+ * metres). Out: the other, and rotations between the frames. It is set up once for a scene, so that all
+ * stations agree.
+ *   tangent  metric. One point of the scene, origin_m, is at a place on the Earth. z is the plumb line (the
+ *            ellipsoid's normal) there, and true north there lies north_deg clockwise from the scene's y
+ *            axis. Elsewhere z differs from the local plumb line by the angle between the two at the Earth's
+ *            centre, about 0.009 deg per km.
+ *   grid     prcs is easting, northing (with false origin) and ellipsoidal height of one UTM or UPS grid, as
+ *            a mesh in such coordinates is. y is grid north, z the plumb line everywhere. Lengths are grid
+ *            lengths: a horizontal metre of the scene is `scale` (0.9996 to 1.0010 in UTM) of a true one, so
+ *            ranges carry that factor. Points in that grid are the mesh's own coordinates to the last bit.
+ *   ecef     prcs is ECEF, as a mesh in geocentric coordinates is. The axes of a head are those of its place:
+ *            y true north, z the plumb line.
+ * Constant after it is set up; any thread. */
 #ifndef CORE_GEOFRAME_H
 #define CORE_GEOFRAME_H
 
@@ -30,12 +33,12 @@ int geoframe_set_tangent(struct geoframe *frame, const double origin_m[3], const
 int geoframe_set_grid(struct geoframe *frame, int zone, int north, struct sh_err *err);
 void geoframe_set_ecef(struct geoframe *frame);
 
-/* Point of the scene -> place on the Earth, and back. SH_EINPUT where there is none, as off a grid's table. */
+/* Point of the scene -> place on the Earth, and back. SH_EINPUT where there is none, as outside of a grid. */
 int geoframe_locate(const struct geoframe *frame, const double p_prcs[3], struct georef_place *at, struct sh_err *err);
 int geoframe_find(const struct geoframe *frame, const struct georef_place *at, double p_prcs[3], struct sh_err *err);
 
-/* Rotation of the axes that a levelled head of heading 0 has at p_prcs to prcs, row by row: the unit matrix but for
- * ecef. Its third column is up. */
+/* Rotation of the axes that a levelled head of heading 0 has at p_prcs to prcs, row by row: the unit matrix
+ * except for ecef. Its third column is up. */
 int geoframe_level(const struct geoframe *frame, const double p_prcs[3], double rotation[9], struct sh_err *err);
 
 /* Rotation of prcs to east, north, up at p_prcs; of a grid without its scale. */

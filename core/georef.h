@@ -1,28 +1,35 @@
-/* Scene frame -> coordinate reference system, through GeographicLib (georef/geographiclib_shim.cpp is the only C++).
+/* From the scene's frame (prcs) to a coordinate reference system (CRS), through GeographicLib.
  *
- * The scene frame is the local tangent frame of the station: x east, y north, z up along the ellipsoid's normal,
- * with the station's prcs position at (lat, lon, height); or that of another place, turned against it (rotation); or a
- * grid. Coordinates leave as differences from the anchor, which is the centre (the station, until it is moved) in the
- * CRS, so that nothing is lost to large numbers; the sum anchor + difference is the position.
- *   local     prcs as it is: metres in the mesh's frame
+ * In: points of the scene, as differences from a centre in metres. Out: differences from the anchor in the
+ * CRS. The anchor is the centre's position in the CRS, so anchor + difference is the point's position, and
+ * nothing is lost to large numbers. The centre is the station, until georef_recentre moves it.
+ *
+ * The scene's frame is one of these: the tangent frame of the station (x east, y north, z up along the
+ * ellipsoid's normal); the tangent frame of another place, turned against it (rotation); a grid.
+ *   local     prcs itself: metres in the mesh's frame
  *   ecef      WGS 84 geocentric X, Y, Z: a rotation and a shift
- *   utm       easting, northing (with false origin), height; zone automatic or forced. GeographicLib's UTMUPS; UPS
- *             beyond 84 N and 80 S when the zone is automatic. Grid convergence and scale are in the map itself. From a
- *             scene in the same grid (which utm_zone 0 then means): what they are.
- *   geodetic  latitude and longitude in degrees, height; longitude differences the short way round, in -180..180
+ *   utm       easting, northing (with false origin), height. Zone automatic or forced; UPS beyond 84 N and 80
+ *             S when it is automatic. Grid convergence and scale are part of the map. From a scene in the
+ *             same grid (which utm_zone 0 then means): the scene's own coordinates.
+ *   geodetic  latitude and longitude in degrees, height; longitude differences the short way round, in
+ *             -180..180
  *
- * Methods: exact calls GeographicLib for each point (about 0.2 us for geodetic, 0.9 us for utm); order 1, 2, 3 evaluate
- * its Taylor polynomial about the centre in a few ns, within georef_bound_m; order 5 too, where heights stay what they
- * are (a grid to another one or to geodetic). In geodetic output longitude is no polynomial but closed, which holds to
- * some radii of the scene from a pole (polynomial.h). Only what is not linear has them: local, ecef from a metric
- * frame, and a grid that the scene is in are exact whatever the method. Heights are ellipsoidal, or with a geoid above
- * it (interpolated for each point: exact only). Thread: a georef is constant after creation and georef_set_method. */
+ * Methods. Exact calls GeographicLib for each point (about 0.2 us for geodetic, 0.9 us for utm; `make
+ * chart`). Order 1, 2, 3 evaluate its Taylor polynomial about the centre in a few ns, within georef_bound_m.
+ * Order 5 exists where heights stay what they are (a grid to another one or to geodetic). In geodetic output
+ * longitude has a closed form, which holds up to some radii of the scene from a pole (georef/polynomial.h).
+ * Only a map that is not linear has polynomials. Exact with every method are local, ecef from a metric frame,
+ * and the grid that the scene is in.
+ *
+ * Heights are ellipsoidal, or above a geoid (interpolated for each point: method exact only). Thread: a
+ * georef is constant after creation and georef_set_method. */
 #ifndef CORE_GEOREF_H
 #define CORE_GEOREF_H
 
 #include <stddef.h>
 
 #include "core/err.h"
+#include "core/vec3.h"
 
 enum georef_crs { GEOREF_LOCAL, GEOREF_ECEF, GEOREF_UTM, GEOREF_GEODETIC };
 enum georef_method { GEOREF_AUTO, GEOREF_EXACT, GEOREF_ORDER1, GEOREF_ORDER2, GEOREF_ORDER3, GEOREF_ORDER5 };
@@ -44,8 +51,8 @@ struct georef_spec {
     int prcs_is_grid;   /* 1: prcs is easting, northing, height of a grid, and station_m the station's */
     int prcs_zone;      /* its zone: 1..60, or 0: UPS */
     int prcs_north;     /* its hemisphere: 1 or 0 */
-    const struct georef_geoid
-        *geoid; /* heights above it (utm, geodetic); NULL: ellipsoidal. Has to outlive the georef. */
+    /* Heights above it (utm, geodetic); NULL: ellipsoidal. Has to outlive the georef. */
+    const struct georef_geoid *geoid;
 };
 
 /* A place on WGS 84. */
@@ -54,20 +61,16 @@ struct georef_place {
     double height_m;         /* ellipsoidal */
 };
 
-/* Where a position in another system lies. zone 1..60, or 0: UPS; north: hemisphere of the false origin; easting and
- * northing with it; height ellipsoidal. SH_EINPUT: not finite, or outside of what UTMUPS takes. GeographicLib. */
-int georef_locate_utm(int zone, int north, double easting_m, double northing_m, double height_m,
-                      struct georef_place *out, struct sh_err *err);
+/* The place of a position in a grid: grid_m is easting and northing, with false origin, and ellipsoidal
+ * height. zone: 1..60, or 0: UPS; north: hemisphere of the false origin. SH_EINPUT: not finite, or outside of
+ * the grid. */
+int georef_locate_utm(int zone, int north, const double grid_m[3], struct georef_place *out, struct sh_err *err);
+/* The place of a position in ECEF, and back. NaN outside of -90..90 degrees of latitude. */
 int georef_locate_ecef(const double p_ecef[3], struct georef_place *out, struct sh_err *err);
-
-/* And back. Not-a-number outside of -90..90 degrees of latitude. zone 0: by position, and *zone_used 0 where that is
- * UPS; the three out-parameters may be NULL but grid (easting, northing, height). */
 void georef_geodetic_to_ecef(const struct georef_place *place, double p_ecef[3]);
-int georef_geodetic_to_utm(const struct georef_place *place, int zone, int *zone_used, int *north, double grid[3],
-                           struct sh_err *err);
 
-/* GeographicLib's geoid data (egm96-5 unless GEOGRAPHICLIB_GEOID_NAME says another), read into memory: 19 MB. SH_EINPUT
- * when it is not installed. */
+/* GeographicLib's geoid data (egm96-5 unless GEOGRAPHICLIB_GEOID_NAME says another), read into memory: 19 MB.
+ * SH_EINPUT when it is not installed. */
 int georef_geoid_open(struct georef_geoid **out, struct sh_err *err);
 void georef_geoid_free(struct georef_geoid *geoid);
 
@@ -77,15 +80,16 @@ struct georef;
 int georef_create(const struct georef_spec *spec, struct georef **out, struct sh_err *err);
 void georef_free(struct georef *georef);
 
-/* Another one about another centre, for a head that moves and for ranges that no longer fit: same scene frame, same
- * CRS, zone and false origin, polynomials and anchor about centre_m (prcs). SH_EINPUT where the zone does not reach.
- * Method as before; its bound may be another. */
+/* Another one about another centre, for a head that moves and for ranges that no longer fit: same scene
+ * frame, same CRS, zone and false origin, polynomials and anchor about centre_m (prcs). SH_EINPUT where the
+ * zone does not reach. Method as before; its bound may be another. */
 int georef_recentre(const struct georef *georef, const double centre_m[3], struct georef **out, struct sh_err *err);
 
 /* The centre in the CRS: what the differences are added to. */
 void georef_anchor(const struct georef *georef, double anchor[3]);
 
-/* EPSG code of the CRS: 4978 for ECEF, 4979 for geodetic, 326zz/327zz for UTM, 32661/32761 for UPS, 0 for local. */
+/* EPSG code of the CRS: 4978 for ECEF, 4979 for geodetic, 326zz/327zz for UTM, 32661/32761 for UPS, 0 for
+ * local. */
 int georef_epsg(const struct georef *georef);
 
 enum georef_crs georef_crs(const struct georef *georef);
@@ -93,51 +97,51 @@ enum georef_crs georef_crs(const struct georef *georef);
 /* 1: heights are above the geoid; 0: above the ellipsoid. */
 int georef_has_geoid(const struct georef *georef);
 
-/* Of the output's grid at the centre: bearing of grid north, clockwise from true north, and metres of grid per metre on
- * the ellipsoid. 0 and 1 where there is no grid, or it is the scene's own. */
+/* Of the output's grid at the centre: bearing of grid north, clockwise from true north, and metres of grid
+ * per metre on the ellipsoid. 0 and 1 where there is no grid, or it is the scene's own. */
 void georef_convergence(const struct georef *georef, double *convergence_rad, double *scale);
 
-/* Where differences from the anchor are a rotation of those in prcs: 1 and its matrix, row by row. Else
- * 0. */
+/* 1 and the matrix, row by row, where differences from the anchor are a rotation of those in prcs; else 0. */
 int georef_rotation(const struct georef *georef, double rotation[9]);
 
-/* Differences in prcs at the centre -> axes of the CRS (geodetic: east, north, up), row by row: the rotation that is
- * left of the map there without its scale. The unit matrix at a pole in geodetic output. */
+/* Differences in prcs at the centre -> axes of the CRS (geodetic: east, north, up), row by row: the rotation
+ * that is left of the map there without its scale. The unit matrix at a pole in geodetic output. */
 void georef_axes(const struct georef *georef, double rotation[9]);
 
-/* What georef_forward is to use. SH_EINPUT: GEOREF_AUTO, or an order that has no polynomial here. Before other threads
- * see the georef. */
+/* What georef_forward is to use. SH_EINPUT: GEOREF_AUTO, or an order that has no polynomial here. Before
+ * other threads see the georef. */
 int georef_set_method(struct georef *georef, enum georef_method method, struct sh_err *err);
 enum georef_method georef_method(const struct georef *georef);
 
-/* No point within radius_m (horizontally) and height_m (up or down) of the centre is further from the true position
- * than this with the method, metres on the ground; INFINITY where that is not known. polynomial.c says how it is known.
- */
+/* No point within radius_m (horizontally) and height_m (up or down) of the centre is further from the true
+ * position than this with the method, metres on the ground; INFINITY where that is not known. polynomial.c
+ * says how it is known. */
 double georef_bound_m(const struct georef *georef, enum georef_method method, double radius_m, double height_m);
 
 /* n points, d_prcs relative to the centre (metres) -> difference from the anchor, in units of the CRS (metres;
- * geodetic: degrees, degrees, metres). In place is allowed. Not-a-number goes through. */
-void georef_forward(const struct georef *georef, size_t n, const double *dx, const double *dy, const double *dz,
-                    double *out_x, double *out_y, double *out_z);
+ * geodetic: degrees, degrees, metres). In place is allowed. NaN goes through. */
+void georef_forward(const struct georef *georef, size_t n, struct vec3_in d, struct vec3_out out);
 
-/* One point back, exact: difference from the anchor -> prcs (absolute). For checks and clients, not for speed. */
+/* One point back, exact: difference from the anchor -> prcs (absolute). For checks and clients, not for
+ * speed. */
 void georef_reverse(const struct georef *georef, const double d_crs[3], double p_prcs[3]);
 
 /* Position in the CRS minus anchor, the short way round in longitude. */
 void georef_difference(const struct georef *georef, const double p_crs[3], double d_crs[3]);
 
-/* Units of the CRS per count, so that a count is at most scale_m on the ground (utm, ecef, local: just scale_m, of the
- * grid) for points within reach_m of the centre, and so that these fit into 31 bits and a sign. Degrees of longitude
- * have a scale of their own: near a pole they are long in degrees and short on the ground, and where up to 360 of them
- * don't fit otherwise, that scale alone is coarser, up to 2 pi reach_m / 2^31 on the ground. SH_EINPUT, naming the
- * smallest scale_m that would do, where the others don't fit. */
+/* Units of the CRS per count, so that a count is at most scale_m on the ground (utm, ecef, local: just
+ * scale_m, of the grid) for points within reach_m of the centre, and so that these fit into 31 bits and a
+ * sign. Degrees of longitude have a scale of their own: near a pole they are long in degrees and short on the
+ * ground, and where up to 360 of them don't fit otherwise, that scale alone is coarser, up to 2 pi reach_m /
+ * 2^31 on the ground. SH_EINPUT, naming the smallest scale_m that would do, where the others don't fit. */
 int georef_scale(const struct georef *georef, double scale_m, double reach_m, double scale[3], struct sh_err *err);
-/* The longest that a count of these is within reach_m, metres (on the ground, or of the grid): scale_m, or what
- * longitude has. */
+/* The longest that a count of these is within reach_m, metres (on the ground, or of the grid): scale_m, or
+ * what longitude has. */
 double georef_count_m(const struct georef *georef, double reach_m, const double scale[3]);
 
-/* A point east, north and up (metres) in the tangent frame at a place on WGS 84 -> its own latitude and longitude (deg,
- * longitude -180..180) and ellipsoidal height (m). GeographicLib's LocalCartesian; for single points, not for speed. */
+/* A point east, north and up (metres) in the tangent frame at a place on WGS 84 -> its own latitude and
+ * longitude (deg, longitude -180..180) and ellipsoidal height (m). GeographicLib's LocalCartesian; for single
+ * points, not for speed. */
 void georef_geodetic(double lat_deg, double lon_deg, double height_m, const double d_enu[3], double geodetic[3]);
 
 #endif

@@ -9,7 +9,7 @@ void *huge_alloc(size_t size)
     size_t align = size < page ? 64 : page;
     void *p = aligned_alloc(align, (size + align - 1) / align * align);
 #ifdef MADV_HUGEPAGE
-    if (p != NULL && align == page) madvise(p, size, MADV_HUGEPAGE); /* a wish: refused, it works all the same */
+    if (p != NULL && align == page) madvise(p, size, MADV_HUGEPAGE); /* without large pages it works as well */
 #endif
     return p;
 }

@@ -1,8 +1,9 @@
 /* Where an IFC building model stands: its IFCSITE record, which mesh readers leave out.
  *
- * Reads the STEP file (ISO 10303-21) for IfcSite.RefLatitude, RefLongitude, RefElevation; the site's ObjectPlacement,
- * whose origin is the point that they locate; and TrueNorth of the model's IfcGeometricRepresentationContext. Strict:
- * what is there but not as IFC2x3/IFC4 define it is an error, not a guess. IfcMapConversion is not read. */
+ * Reads the STEP file (ISO 10303-21) for IfcSite.RefLatitude, RefLongitude, RefElevation; the site's
+ * ObjectPlacement, whose origin is the point that they locate; and TrueNorth of the model's
+ * IfcGeometricRepresentationContext. Strict: what is there but not as IFC2x3/IFC4 define it is an error, not
+ * a guess. IfcMapConversion is not read. */
 #ifndef CORE_IFC_SITE_H
 #define CORE_IFC_SITE_H
 

@@ -4,8 +4,8 @@
  * run of consecutive cast pulses of one line, with one entry per echo, and one entry for a shot without echo.
  * Entries are in order of pulse, then of range. Times and pulse numbers count from the scan's start.
  *
- * Ownership: line_block_alloc makes the arrays for `capacity` entries, line_block_alloc_attributes those that are
- * optional, line_block_free releases them all; a block belongs to one thread. Nothing else allocates. */
+ * Ownership: line_block_alloc makes the arrays for `capacity` entries, line_block_alloc_attributes those that
+ * are optional, line_block_free releases them all; a block belongs to one thread. Nothing else allocates. */
 #ifndef CORE_LINE_H
 #define CORE_LINE_H
 
@@ -58,7 +58,8 @@ struct line_end {
     int64_t t0_ns, t1_ns;             /* first pulse of this line, first pulse of the next, since the scan's start */
     uint32_t mirror_count, pan_count; /* encoder readings at the last pulse of this line */
     uint32_t status;                  /* LINE_LAST_OF_FRAME, LINE_PARTIAL */
-    /* what was hit and is no echo of the line, see struct cast_counters; 0 also where blocks of the line were lost */
+    /* what was hit and is no echo of the line, see struct cast_counters; 0 also where blocks of the line were
+     * lost */
     uint32_t n_crowded, n_faint, n_unfit;
 };
 enum {

@@ -1,12 +1,13 @@
-/* What a single place on the Earth has besides its coordinates (core/georef.h): local axes, and convergence and scale
- * in a grid. Degrees, metres; heights above the ellipsoid. Errors (SH_EINPUT) say what is allowed. Thread: any. */
+/* One place on the Earth: is it one, its local axes, and its position, convergence and scale in a grid. In:
+ * core/georef.h's struct georef_place. Degrees, metres; heights above the ellipsoid. Errors (SH_EINPUT) say
+ * what is allowed. Any thread. */
 #ifndef CORE_LOCATE_H
 #define CORE_LOCATE_H
 
 #include "core/georef.h"
 
-/* Refuses what is no place: latitude or longitude out of range, or a height below the deepest sea or in space, where a
- * unit or a sign is wrong. */
+/* Refuses a latitude or longitude out of range, and a height below the deepest sea or in space: there a unit
+ * or a sign is wrong. */
 int locate_check(const struct georef_place *place, struct sh_err *err);
 
 /* ECEF, and the rotation of east, north, up there to X, Y, Z, row by row. Checks the place. */

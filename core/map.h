@@ -1,11 +1,13 @@
-/* The scan map: points from above, as a PNG (libpng).
+/* The scan map: points seen from above, as a PNG (libpng). In: points and stations in prcs (metres). Out: an
+ * image.
  *
- * The map looks down on prcs: x to the right, y (north) up, metres. Per pixel it keeps which height levels
- * were hit and the lowest point. Lightness shows structure: a pixel with points on many levels (a wall) is
- * dark, one with floor and ceiling only is light, one without points is white. This does not depend on how
- * dense the points lie, so far walls stand out as near ones do; each point is drawn three pixels wide. Hue
- * shows the height of the lowest point above the lowest of the map. Lightness and hue are even steps of CIE
- * L*a*b*. Below the map: scale bar, legend of heights, north arrow.
+ * x goes to the right, y (north) up. Per pixel the map keeps which height levels were hit, and the lowest
+ * point.
+ *   lightness  shows structure: a pixel with points on many levels (a wall) is dark, one with floor and
+ *              ceiling only is light, one without points is white. It does not depend on how dense the points
+ *              lie, so far walls stand out as near ones do. Each point is drawn three pixels wide.
+ *   hue        shows the height of the lowest point above the lowest of the map
+ * Both are even steps of CIE L*a*b*. Below the map: scale bar, legend of heights, north arrow.
  *
  * Ownership: map_create allocates everything, map_free releases it. Thread: one at a time. Not real-time
  * safe. */
@@ -60,9 +62,6 @@ struct map_layout {
     double pixel_m;                 /* as chosen */
 };
 void map_get_layout(const struct map *map, struct map_layout *layout);
-
-/* The pixel of a place: 1 and column and row in the image, or 0 when it lies outside the area. */
-int map_find_pixel(const struct map *map, double x_m, double y_m, uint32_t *column, uint32_t *row);
 
 /* Writes the image: to path.part beside it first, then renamed, so that path is whole or as it was. A map
  * without points is drawn as well. Errors name the path. */

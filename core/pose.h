@@ -1,23 +1,24 @@
-/* The pose of a platform, and of the head on it, over time.
+/* Where a platform, and the head on it, is and how it stands. In: angles in radians, positions in metres,
+ * trajectories from CSV files. Out: attitudes as quaternions or matrices, and the pose at any time.
  *
  * Attitude, the one convention of the project: a rotation R takes the body's frame (x right, y forward, z up)
  * to the scene frame (x east, y north, z up),
- *     R = Rz(-heading) Rx(pitch) Ry(roll),
- * heading clockwise from north (the scene's y axis) seen from above, pitch positive with the nose up, roll
- * positive with the right side down. Quaternions are (w, x, y, z), of length one, q and -q the same: q =
- * qz(-heading) qx(pitch) qy(roll), products by Hamilton's rule.
+ *     R = Rz(-heading) Rx(pitch) Ry(roll).
+ * Heading is clockwise from north (the scene's y axis) seen from above. Pitch is positive with the nose up,
+ * roll with the right side down. Quaternions are (w, x, y, z), of length one; q and -q are the same attitude:
+ *     q = qz(-heading) qx(pitch) qy(roll), products by Hamilton's rule.
  *
- * Between two poses the position goes along the straight line and the attitude the shorter way about one
- * fixed axis at constant rate (slerp, Shoemake 1985): pose_between. This is what the head does between the
+ * Between two poses the position goes along the straight line, and the attitude turns the shorter way about
+ * one fixed axis at constant rate (slerp, Shoemake 1985): pose_between. The head moves like this between the
  * poses it sends.
  *
- * A trajectory has samples further apart. There the position is the cubic Hermite curve whose velocities are
- * the derivatives of the parabola through each sample and its two neighbours, zero where the platform stands
- * on either side; the attitude is slerp. On a circle of 10 m at 10 m/s sampled at 10 Hz the position is off
- * by 0.16 mm, 12.5 mm by straight lines (tests/unit/test_pose.c). Before the first and behind the last sample
- * the platform stands.
+ * A trajectory has samples further apart. There the position is a cubic Hermite curve. Its velocity at a
+ * sample is the derivative of the parabola through the sample and its two neighbours, or zero where the
+ * platform stands before or after it. The attitude is slerp. On a circle of 10 m at 10 m/s sampled at 10 Hz
+ * the error of the position is 0.16 mm; straight lines have 12.5 mm (tests/unit/test_pose.c). Before the
+ * first and after the last sample the platform stands.
  *
- * Pure, but for reading the files; trajectories are constant after creation, any thread. */
+ * Pure, except for reading the files. Trajectories are constant after creation, any thread. */
 #ifndef CORE_POSE_H
 #define CORE_POSE_H
 
@@ -92,17 +93,17 @@ int trajectory_from_samples(const struct pose_sample *sample, size_t n, struct t
 
 /* A CSV file whose first line names the columns, in any order: t_s, x_m, y_m, z_m, and either heading_deg,
  * pitch_deg, roll_deg (heading alone will do) or qw, qx, qy, qz; frame where wanted (else the sample's
- * number, from 0); scan and flags, as `scanhead record -o NAME.poses.csv` writes them, are read over, as is a
- * byte order mark of UTF-8. Lines that begin with '#' and empty lines don't count. Times are within 4e9 s of
- * 0, so that nanoseconds between any two fit into 64 bits. Everything else is an error with file and line. */
+ * number, from 0); the columns scan and flags of `scanhead record -o NAME.poses.csv` are ignored, and a byte
+ * order mark of UTF-8. Lines that begin with '#' and empty lines don't count. Times are within 4e9 s of 0, so
+ * that nanoseconds between any two fit into 64 bits. Everything else is an error with file and line. */
 int trajectory_read_csv(const char *path, struct trajectory **out, struct sh_err *err);
 
-/* Way-points, a CSV file likewise: x_m, y_m, z_m, speed_m_s, and pause_s where wanted. The platform goes
- * through them on the cubic Hermite curve described above, the way to the next point taking chord / speed_m_s
- * (the last one's speed does not matter, but must be there), and stands at a point for pause_s, where it
- * comes to rest and starts smoothly. Heading along the path, pitch and roll 0, about the axes that a station
- * has there: geoframe_level of frame, or the scene's own without one (NULL). SH_EINPUT, too, where the way is
- * longer than POSE_MAX_KNOTS samples: every 0.02 s, or every 0.01 m where that is longer. */
+/* Way-points, from a CSV file as well: x_m, y_m, z_m, speed_m_s, and pause_s where wanted. The platform goes
+ * through them on the cubic Hermite curve described above. The way to the next point takes chord / speed_m_s;
+ * the last point needs a speed, which is not used. At a point with pause_s it comes to rest smoothly, stands
+ * for that time and starts smoothly. It heads along the path, with pitch and roll 0, about the axes that a
+ * station has there: geoframe_level of frame, or the scene's own where frame is NULL. SH_EINPUT, too, where
+ * the way needs more than POSE_MAX_KNOTS samples: one every 0.02 s, or every 0.01 m where that is longer. */
 int trajectory_read_waypoints(const char *path, const struct geoframe *frame, struct trajectory **out,
                               struct sh_err *err);
 
@@ -110,15 +111,26 @@ void trajectory_free(struct trajectory *trajectory);
 void trajectory_span(const struct trajectory *trajectory, double *first_s, double *last_s);
 void trajectory_at(const struct trajectory *trajectory, double t_s, struct pose *pose, double *frame);
 
-/* The knots of a head that is mounted on the platform, from start_s (time 0 of the knots) to end_s or the
- * trajectory's end, whichever comes first: at
- * the samples, and as many between two as keep what pose_between makes of them within tolerance_m of the
- * curve (closed bound: acceleration and lever arm times interval^2 / 8; the attitude is the same). They are
- * at most longest_ns apart while the head goes on by longest_m, or turns by 0.01 rad, within that: where it
- * hardly moves there are no more than needed. Allocates *out. SH_EINPUT for more than POSE_MAX_KNOTS.
- * error_m: the bound that holds, more than tolerance_m only where POSE_MIN_STEP_US is the limit. */
-int trajectory_knots(const struct trajectory *trajectory, double start_s, double end_s, const struct pose *mount,
-                     double tolerance_m, int64_t longest_ns, double longest_m, struct pose_knot **out, size_t *n,
-                     double *error_m, struct sh_err *err);
+/* What the knots of a path have to keep. */
+struct pose_knot_rules {
+    double start_s, end_s; /* on the trajectory */
+    double tolerance_m;    /* between two knots pose_between may differ from the trajectory by this */
+    int64_t longest_ns;    /* two knots are at most so far apart ... */
+    double longest_m;      /* ... where the head moves further than this between them, or turns by over 0.01 rad */
+};
+
+struct pose_path {
+    struct pose_knot *knot; /* the first one at time 0 */
+    size_t n;
+    double
+        error_m; /* largest distance from the trajectory: closed bound, acceleration and lever arm times step^2 / 8 */
+};
+
+/* The path of a head that is mounted on the platform, from start_s (time 0 of the knots) to end_s or the
+ * trajectory's end, whichever comes first. There is a knot at each sample, and between two samples as many as
+ * the rules ask for; error_m is more than tolerance_m only where POSE_MIN_STEP_US is the limit. The caller
+ * frees out->knot. SH_EINPUT for more than POSE_MAX_KNOTS. */
+int trajectory_knots(const struct trajectory *trajectory, const struct pose *mount, const struct pose_knot_rules *rules,
+                     struct pose_path *out, struct sh_err *err);
 
 #endif

@@ -1,8 +1,8 @@
-/* The one random generator: counter-based, so that a number depends on (seed, pulse, echo, purpose) and on nothing
- * else.
+/* The one random generator: counter-based, so that a number depends on (seed, pulse, echo, purpose) and on
+ * nothing else.
  *
- * Two rounds of the SplitMix64 finaliser (Steele, Lea, Flood, OOPSLA 2014; constants by Stafford, "mix 13") over the
- * pulse number, each keyed. Pure; any thread. */
+ * Two rounds of the SplitMix64 finaliser (Steele, Lea, Flood, OOPSLA 2014; constants by Stafford, "mix 13")
+ * over the pulse number, each keyed. Pure; any thread. */
 #ifndef CORE_RNG_H
 #define CORE_RNG_H
 
@@ -41,16 +41,16 @@ VEC_INLINE uint64_t rng_u64(uint64_t key, uint64_t pulse)
     return rng_mix(rng_mix(pulse * 0x9e3779b97f4a7c15ULL + key) ^ key);
 }
 
-/* What to ask with for an echo of a pulse: number counts from 0, so that a pulse's only echo is asked for by the pulse.
- * Pulse numbers stay below 2^56. */
+/* What to ask with for an echo of a pulse: number counts from 0, so that a pulse's only echo is asked for by
+ * the pulse. Pulse numbers stay below 2^56. */
 VEC_INLINE uint64_t rng_echo(uint64_t pulse, uint32_t number)
 {
     return pulse | (uint64_t)number << 56;
 }
 
-/* Standard normal, by Box and Muller: radius from the upper 32 bits, angle from the lower 32. The largest is 6.7.
- * cos(2 pi a) = sin(2 pi y), y = |a - 1/2| - 1/4, by the Taylor series to the 15th power: error below 7e-12 at the
- * ends. */
+/* Standard normal, by Box and Muller: radius from the upper 32 bits, angle from the lower 32. The largest is
+ * 6.7. cos(2 pi a) = sin(2 pi y), y = |a - 1/2| - 1/4, by the Taylor series to the 15th power: error below
+ * 7e-12 at the ends. */
 VEC_INLINE double rng_normal(uint64_t key, uint64_t pulse)
 {
     uint64_t bits = rng_u64(key, pulse);

@@ -1,14 +1,18 @@
-/* The scene: meshes from files, in the project frame (prcs), exact vertices in double.
+/* The scene: meshes from files, as one list of triangles with surfaces. In: files and how to place them. Out:
+ * vertices in double, in the project frame (prcs): metres, z up.
  *
- * Frame: prcs, metres, z up. A file's vertex v becomes R(up) * v * scale + offset_m, in double.
- * `up: z` leaves the axes as they are; `up: y` turns (x, y, z) to (x, -z, y).
- * Units and axes are what the spec says, never guessed. What Assimp (5.2) itself does before that: Collada comes in
- * metres and y up, its unit and up_axis applied; IFC comes in metres and y up; FBX keeps the file's unit (mostly
- * centimetres: scale 0.01) and axes (mostly y up); glTF is metres and y up by definition; STL has neither.
- * Every placement of a mesh in a node tree counts: an object that is there five times gives its triangles five times.
- * Polygons are cut into triangles; a pair of object and material that is there already keeps its label.
- * Ownership: scene_load allocates everything, scene_free releases it. After the load a scene is constant and
- * may be read from any thread. */
+ * A file's vertex v becomes R(up) * v * scale + offset_m, in double. `up: z` leaves the axes, `up: y` turns
+ * (x, y, z) to (x, -z, y). Units and axes are what the spec says, never guessed. Assimp (5.2) itself changes
+ * some before that:
+ *   Collada  comes in metres and y up, its unit and up_axis applied
+ *   IFC      comes in metres and y up
+ *   FBX      keeps the file's unit (mostly centimetres: scale 0.01) and axes (mostly y up)
+ *   glTF     is metres and y up by definition
+ *   STL      has neither
+ * Every placement of a mesh in a node tree counts: an object that is there five times gives its triangles
+ * five times. Polygons are cut into triangles. A pair of object and material that is there already keeps its
+ * label. Ownership: scene_load allocates everything, scene_free releases it. After the load a scene is
+ * constant and may be read from any thread. */
 #ifndef CORE_SCENE_H
 #define CORE_SCENE_H
 
@@ -33,8 +37,8 @@ struct scene_mesh_spec {
 };
 
 /* One surface label: an object of the file with one material.
- * Object: .obj the last o or g, else (and for .ply) the file's name without folder and ending; for the others the
- * node's name, or the mesh's where that is empty. */
+ * Object: .obj the last o or g, else (and for .ply) the file's name without folder and ending; for the others
+ * the node's name, or the mesh's where that is empty. */
 struct scene_surface {
     char object[SCENE_NAME_LEN];
     char material[SCENE_NAME_LEN];
@@ -43,7 +47,7 @@ struct scene_surface {
     uint16_t texture; /* 1 + its number in the scene's textures; 0: none */
 };
 
-/* An image that tells the diffuse colour all over a surface; not looked into here. */
+/* An image with the diffuse colour of a surface. It is not opened here. */
 struct scene_texture {
     char *file;     /* as found beside the mesh's file */
     uint8_t *bytes; /* of one that lies within it, as it would be in a file; else NULL */
@@ -73,19 +77,28 @@ struct scene {
 };
 
 /* Loads all meshes into one scene.
- * tolerance_m: what a vertex may be off; a file read in single precision (all but .obj and .ply) whose largest
- *   |coordinate| * scale * 6e-8 exceeds it is refused, with the figure.
+ * tolerance_m: the largest error of a vertex that is allowed. A file read in single precision (all but .obj
+ * and
+ *   .ply) is refused, with the figure, where its largest |coordinate| * scale * 6e-8 exceeds it.
  * Errors (SH_EINPUT, naming the file): missing or unreadable, not a mesh, no triangles, a coordinate that is
  *   not finite, an index out of range, |coordinate| beyond 1e9 m, too many surfaces or triangles (2^32-1).
  * Progress goes to report about four times a second once a load takes longer than a second. */
 int scene_load(const struct scene_mesh_spec *specs, size_t n_specs, double tolerance_m, const struct sh_report *report,
                struct scene **out, struct sh_err *err);
 
-/* Builds a scene from arrays (tests and generated scenes). Copies everything; same checks as scene_load.
- * label and surface may be NULL: then there is one surface, "object"/"material". */
-int scene_from_arrays(const double (*vertex_m)[3], uint32_t n_vertices, const uint32_t (*triangle)[3],
-                      uint32_t n_triangles, const uint16_t *label, const struct scene_surface *surface,
-                      uint32_t n_surfaces, struct scene **out, struct sh_err *err);
+/* A mesh as arrays. */
+struct scene_arrays {
+    const double (*vertex_m)[3]; /* [n_vertices] prcs */
+    uint32_t n_vertices;
+    const uint32_t (*triangle)[3]; /* [n_triangles] indices into vertex_m */
+    uint32_t n_triangles;
+    const uint16_t *label;               /* [n_triangles] index into surface; NULL: all 0 */
+    const struct scene_surface *surface; /* [n_surfaces] NULL: there is one, "object"/"material" */
+    uint32_t n_surfaces;
+};
+
+/* Builds a scene from arrays, all copied, with the checks of scene_load. */
+int scene_from_arrays(const struct scene_arrays *arrays, struct scene **out, struct sh_err *err);
 
 void scene_free(struct scene *scene);
 

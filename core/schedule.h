@@ -1,10 +1,12 @@
-/* The schedule: pulse number -> time, mirror angle, pan angle. Integers and exact ratios; nothing accumulates.
+/* The schedule: when each pulse fires, and how far mirror and pan have turned then. In: the settings of a
+ * scan, and a pulse number. Out: nanoseconds since the scan's start, angles in turns. Integers and exact
+ * ratios; nothing accumulates. core/cast/aim.c makes directions from the turns.
  *
- * A scan is a list of segments; each change of a setting opens one. Within a segment pulse i (from its first pulse)
- * fires at t(i) = t0_ns + floor((t0_acc + i * 1e15) / prr_uhz) ns, its place in the mirror sweep is the ratio r(i)/den
- * with r(i) = r0 + i*num - n*den, n the lines passed and num/den = lines_uhz/prr_uhz reduced, and the pan turns with
- * time: pan_udeg_s * i / prr from the frame's first pulse. The products are formed in 128 bits: exact for pulse numbers
- * to 2^50 (15 years at 2.2 MHz).
+ * A scan is a list of segments; each change of a setting opens one. Within a segment pulse i (from its first
+ * pulse) fires at t(i) = t0_ns + floor((t0_acc + i * 1e15) / prr_uhz) ns, its place in the mirror sweep is
+ * the ratio r(i)/den with r(i) = r0 + i*num - n*den, n the lines passed and num/den = lines_uhz/prr_uhz
+ * reduced, and the pan turns with time: pan_udeg_s * i / prr from the frame's first pulse. The products are
+ * formed in 128 bits: exact for pulse numbers to 2^50 (15 years at 2.2 MHz).
  *
  * Angles are in turns (1 turn = 2 pi rad) until a sine is needed, so that reduction is exact.
  * A frame is one sweep of the pan and a whole number of lines; with pan speed 0, or no pan range, one line.
@@ -72,9 +74,9 @@ struct schedule_line {
 /* First segment of a scan: pulse 0 at time 0, line 0, phase 0. The spec must have been checked. */
 void schedule_start(struct schedule_segment *seg, const struct schedule_spec *spec);
 
-/* The segment that begins with pulse k of the one before, with a new spec: the pulse keeps its time, the mirror its
- * phase (to 1/den of a line), the pan its angle (to 2^-24 micro-degrees); the frame goes on to the first end of a line
- * at or behind the new pan stop. No pulse is lost or doubled. seg may be `before`. */
+/* The segment that begins with pulse k of the one before, with a new spec: the pulse keeps its time, the
+ * mirror its phase (to 1/den of a line), the pan its angle (to 2^-24 micro-degrees); the frame goes on to the
+ * first end of a line at or beyond the new pan stop. No pulse is lost or doubled. seg may be `before`. */
 void schedule_change(struct schedule_segment *seg, const struct schedule_segment *before,
                      const struct schedule_spec *spec, uint64_t k);
 
@@ -94,8 +96,8 @@ uint64_t schedule_cut(const struct schedule_segment *seg, uint64_t k);
 void schedule_get_run(const struct schedule_segment *seg, const struct schedule_line *line, uint64_t k, uint32_t n,
                       struct schedule_run *run);
 
-/* Pan angle in turns (0 <= turn < 1 per turn, not reduced below the start) and mirror angle of any pulse: for encoders.
- */
+/* Pan angle and mirror angle of any pulse, in turns, for the encoders. The pan's is not reduced to one
+ * turn. */
 double schedule_pan_turn(const struct schedule_segment *seg, uint64_t k);
 double schedule_mirror_turn(const struct schedule_segment *seg, uint64_t k);
 

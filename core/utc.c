@@ -70,7 +70,8 @@ int utc_table_parse(const char *text, struct utc_table *out, struct sh_err *err)
 
 static int64_t days_since_1970(int year, int month, int day)
 {
-    /* Years that begin in March, so that the leap day is the last; (153 m + 2) / 5 days lie before month m. */
+    /* Years that begin in March, so that the leap day is the last; (153 m + 2) / 5 days lie before month
+     * m. */
     int64_t y = year - (month <= 2), m = month > 2 ? month - 3 : month + 9;
     return 365 * y + y / 4 - y / 100 + y / 400 + (153 * m + 2) / 5 + day - 1 - 719468;
 }

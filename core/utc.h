@@ -1,10 +1,10 @@
 /* UTC, TAI and GPS time.
  *
- * One continuous scale inside: TAI in nanoseconds since 1970-01-01T00:00:00 TAI, which is what CLOCK_TAI counts; dates
- * are taken from 1972 to 2199, well within int64. UTC is TAI less a whole number of seconds that a table gives; during
- * a leap second the time of day reads 23:59:60. GPS time is TAI less 19 s, counted from 1980-01-06T00:00:00Z in weeks
- * of 604,800 s (IS-GPS-200, 3.3.4 and 6.2.4); a table is not needed for it. POSIX time has no leap seconds: 23:59:60
- * has the number of the second after it (POSIX.1, 4.16).
+ * One continuous scale inside: TAI in nanoseconds since 1970-01-01T00:00:00 TAI, which is what CLOCK_TAI
+ * counts; dates are taken from 1972 to 2199, well within int64. UTC is TAI less a whole number of seconds
+ * that a table gives; during a leap second the time of day reads 23:59:60. GPS time is TAI less 19 s, counted
+ * from 1980-01-06T00:00:00Z in weeks of 604,800 s (IS-GPS-200, 3.3.4 and 6.2.4); a table is not needed for
+ * it. POSIX time has no leap seconds: 23:59:60 has the number of the second after it (POSIX.1, 4.16).
  *
  * The table is IERS Bulletin C's. It has an end: leap seconds after expires_s are not known yet.
  * Pure; any thread. */
@@ -43,13 +43,13 @@ struct utc_gps {
 
 /* What was known when this was written. */
 const struct utc_table *utc_table_builtin(void);
-/* The text of a leap-seconds.list (IERS, NIST, tzdata): NTP seconds and TAI-UTC, `#@` the expiry. On failure out is
- * unspecified; the error names the line. */
+/* The text of a leap-seconds.list (IERS, NIST, tzdata): NTP seconds and TAI-UTC, `#@` the expiry. On failure
+ * out is unspecified; the error names the line. */
 int utc_table_parse(const char *text, struct utc_table *out, struct sh_err *err);
 
 void utc_from_tai(const struct utc_table *table, int64_t tai_ns, struct utc_time *out);
-/* SH_EINPUT for a date outside 1972..2199, a date or time of day that does not exist, or a second 60 where the table
- * has none. */
+/* SH_EINPUT for a date outside 1972..2199, a date or time of day that does not exist, or a second 60 where
+ * the table has none. */
 int utc_to_tai(const struct utc_table *table, const struct utc_time *utc, int64_t *tai_ns, struct sh_err *err);
 
 int64_t utc_posix_from_tai(const struct utc_table *table, int64_t tai_ns); /* ns since 1970 */

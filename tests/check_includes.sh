@@ -1,38 +1,73 @@
 #!/bin/bash
-# The arrows between the folders, checked on every #include; and C++ stays in one file. Prints TAP.
+# The order of the rooms: which folder may use which, by #include and by call; a README in each; C++ in one file.
+# Prints TAP.
 #
-#   check_includes.sh [ROOT]      default: the tree this script is in
+#   check_includes.sh [ROOT [OBJECTS]]      ROOT: default the tree this script is in
+#                                           OBJECTS: where make has put the objects; default ROOT/build/test
 #
-#   firmware_sim -> drivers -> core/line.h, core/err.h        core -> core
-#   drivers/host -> drivers/protocol, core/err.h              drivers/link -> drivers/usb -> drivers/protocol, drivers/socket
+# In core and in firmware_sim a room may use itself and the rooms before it in this list. Files that lie in core itself are
+# the first room, `core`: errors, lines, vectors, angles, random numbers.
+core_order='core scene schedule georef pose surface instrument detect bvh sight footprint cast plan analysis'
+firmware_order='base command config site device loop app'
+# Headers in core/ that belong to a room with another name, as HEADER:ROOM.
+core_headers='cloud:analysis distance:analysis map:analysis geoframe:georef locate:georef ifc_site:scene embree:bvh'
+# Everything in firmware_sim may use core and drivers. core uses nothing else. In drivers:
+#   protocol       itself, core/line.h, core/err.h
+#   socket         itself, core/err.h
+#   usb            itself, protocol (its data), socket, core/err.h
+#   link           itself, usb, socket, core/err.h
+#   host           itself, protocol, core/err.h
+#   record         itself, protocol, host's public header, core/err.h
+# The arrows that run upward, one a line as FROM TO REASON: room FROM includes header TO, or calls what that header declares.
+# At most one in core, one in firmware_sim and one in drivers.
+upward='
+'
 #
-# First the check is tried on a tree with one violation of each kind: what it can't find there, it can't find here.
+# By call: nm on the objects. A symbol that one room's object lacks and a higher room's object defines is an arrow upward.
+# First the check is tried on trees with one violation each: what it can't find there, it can't find here.
 set -u
 
-# Prints `FILE:LINE: what is wrong` for each violation below the folder $1.
-violations() {
-    (
-        cd "$1" || exit 1
-        sources=$(find core drivers firmware_sim -name '*.[ch]' -o -name '*.cpp' -o -name '*.inc' 2>/dev/null)
-        [ -n "$sources" ] && printf '%s\n' "$sources" | LC_ALL=C sort | tr '\n' '\0' | xargs -0 awk "$rules"
-        find . \( -name .git -o -name 'build*' -o -name node_modules \) -prune -o -type f \
-            \( -name '*.cpp' -o -name '*.cc' -o -name '*.cxx' -o -name '*.c++' -o -name '*.C' -o -name '*.hpp' \
-            -o -name '*.hh' -o -name '*.hxx' -o -name '*.H' \) -print |
-            sed 's|^\./||; /^core\/georef\/geographiclib_shim\.cpp$/d; s|$|: C++ outside core/georef/geographiclib_shim.cpp|'
-    )
-}
-
+# The rules, for includes and for calls.
 rules='
-    function allowed(from, to) {
-        if (from ~ /^core\//) return to ~ /^core\//
-        if (from ~ /^drivers\/host\//) return to ~ /^drivers\/(protocol|host)\// || to == "core/err.h"
-        if (from ~ /^drivers\/record\//)
-            return to ~ /^drivers\/(protocol|record)\// || to == "core/err.h" || to == "drivers/host/scanhead.h"
-        if (from ~ /^drivers\/protocol\//) return to ~ /^drivers\/protocol\// || to == "core/line.h" || to == "core/err.h"
-        if (from ~ /^drivers\/link\//) return to ~ /^drivers\/(link|usb|socket)\// || to == "core/err.h"
-        if (from ~ /^drivers\/usb\//) return to ~ /^drivers\/(protocol|usb|socket)\// || to == "core/err.h"
-        if (from ~ /^drivers\//) return to ~ /^drivers\/socket\// || to == "core/err.h"
-        return to ~ /^(core|drivers|firmware_sim)\//
+    BEGIN {
+        n = split(core_order, list, " "); for (i = 1; i <= n; i++) rank["core/" list[i]] = i
+        n = split(firmware_order, list, " "); for (i = 1; i <= n; i++) rank["firmware_sim/" list[i]] = i
+        n = split(core_headers, list, " "); for (i = 1; i <= n; i++) { split(list[i], pair, ":"); at["core/" pair[1]] = "core/" pair[2] }
+        n = split(upward, list, "\n")
+        for (i = 1; i <= n; i++) if (split(list[i], word, " ") > 1) exception[word[1], word[2]] = 1
+    }
+    # The room that a file lies in; of a header in core/ itself the room that it declares.
+    function room(path,   part, n, name) {
+        n = split(path, part, "/")
+        if (n > 2) return part[1] "/" part[2]
+        name = path; sub(/\.[a-z]*$/, "", name)
+        if (name in at) return at[name]
+        if (part[1] == "core") return name in rank ? name : "core/core"
+        return part[1] "/" part[1]
+    }
+    function may_use(from, to,   a, b, top) {
+        a = room(from); b = room(to)
+        if (a == b) return 1
+        if ((a, to) in exception) return 1
+        split(a, top, "/")
+        if (top[1] == "core") return b in rank && b ~ /^core\// && rank[b] < rank[a]
+        if (top[1] == "firmware_sim") {
+            if (from == "firmware_sim/main.c") return to ~ /^(core|drivers|firmware_sim)\//
+            return b ~ /^(core|drivers)\// || (b in rank && b ~ /^firmware_sim\// && rank[b] < rank[a])
+        }
+        if (to == "core/err.h") return 1
+        if (a == "drivers/host" || a == "drivers/record")
+            return b == "drivers/protocol" || (a == "drivers/record" && to == "drivers/host/scanhead.h")
+        if (a == "drivers/protocol") return to == "core/line.h"
+        if (a == "drivers/link") return b == "drivers/usb" || b == "drivers/socket"
+        return a == "drivers/usb" && (b == "drivers/protocol" || b == "drivers/socket")
+    }'
+
+include_rules='
+    FNR == 1 {
+        if (FILENAME ~ /^firmware_sim\/[^\/]*$/ && FILENAME != "firmware_sim/main.c") print FILENAME ": only main.c lies here"
+        else if (FILENAME !~ /^drivers\/[^\/]+\// && FILENAME != "firmware_sim/main.c" && !(room(FILENAME) in rank))
+            print FILENAME ": a room that the order does not name"
     }
     /^[ \t]*#[ \t]*include/ {
         text = $0
@@ -45,10 +80,84 @@ rules='
         else if (mark == "<" && to !~ /^(core|drivers|firmware_sim|tests)\//) next
         else if (mark == "\"" && to !~ /^(core|drivers|firmware_sim|tests)\//)
             print FILENAME ":" FNR ": not from the root of the tree: " to
-        else if (!allowed(FILENAME, to)) print FILENAME ":" FNR ": must not include " to
+        else if (!may_use(FILENAME, to)) print FILENAME ":" FNR ": must not include " to
     }'
 
+# Of the lines of nm -A -P: what an object lacks, and which one defines it. The client library is called by its public names.
+call_rules='
+    { path = $1; sub(/\.o(\[.*\])?:$/, "", path) }
+    $3 == "U" { needs[path] = needs[path] " " $2; next }
+    $3 ~ /^[TDBRCVWi]$/ { home[$2] = path }
+    END {
+        for (path in needs) {
+            n = split(needs[path], symbol, " ")
+            for (i = 1; i <= n; i++) {
+                if (!(symbol[i] in home)) continue
+                to = home[symbol[i]]
+                sub(/\.(c|cpp)$/, ".h", to)
+                if (to ~ /^drivers\/host\// && symbol[i] ~ /^scanhead_/) to = "drivers/host/scanhead.h"
+                if (!may_use(path, to)) print path ": must not call " symbol[i] " of " home[symbol[i]]
+            }
+        }
+    }'
+
+run_rules() { # awk's program, then its arguments
+    awk -v core_order="$core_order" -v firmware_order="$firmware_order" -v core_headers="$core_headers" -v upward="$upward" \
+        "$rules $1" "${@:2}"
+}
+
+# Prints `FILE:LINE: what is wrong` for each violation below the folder $1.
+include_violations() {
+    (
+        cd "$1" || exit 1
+        readarray -t sources < <(find core drivers firmware_sim -name '*.[ch]' -o -name '*.cpp' -o -name '*.inc' 2>/dev/null | LC_ALL=C sort)
+        [ ${#sources[@]} -eq 0 ] || run_rules "$include_rules" "${sources[@]}"
+        find . \( -name .git -o -name 'build*' -o -name node_modules \) -prune -o -type f \
+            \( -name '*.cpp' -o -name '*.cc' -o -name '*.cxx' -o -name '*.c++' -o -name '*.C' -o -name '*.hpp' \
+            -o -name '*.hh' -o -name '*.hxx' -o -name '*.H' \) -print |
+            sed 's|^\./||; /^core\/georef\/geographiclib_shim\.cpp$/d; s|$|: C++ outside core/georef/geographiclib_shim.cpp|'
+    )
+}
+
+# The objects below the folder $1 whose sources are below $2.
+objects() {
+    (cd "$1" && find core drivers firmware_sim -name '*.o' 2>/dev/null) | LC_ALL=C sort |
+        while read -r object; do [ ! -e "$2/${object%.o}" ] || echo "$object"; done
+}
+
+# Prints `FILE: must not call SYMBOL of FILE` for the objects below the folder $1 of the tree $2.
+call_violations() {
+    local root
+    root=$(cd "$2" && pwd) || return
+    (
+        cd "$1" || exit 1
+        readarray -t found < <(objects . "$root")
+        [ ${#found[@]} -eq 0 ] || nm -A -P "${found[@]}" | run_rules "$call_rules" | LC_ALL=C sort
+    )
+}
+
+# A README says in its first paragraph what belongs into the folder, and what doesn't: two sentences at least, and a word
+# like "not" or "only" in them.
+readme_violations() {
+    (
+        cd "$1" || exit 1
+        find core drivers firmware_sim tests config -type d 2>/dev/null | LC_ALL=C sort | while read -r folder; do
+            [ -n "$(find "$folder" -maxdepth 1 -type f ! -name README.md -print -quit)" ] || continue
+            if [ ! -e "$folder/README.md" ]; then
+                echo "$folder: no README.md"
+                continue
+            fi
+            awk '/^#/ && text == "" { next } NF == 0 { if (text != "") exit; next } { text = text " " $0 } END { print text }' \
+                "$folder/README.md" | awk -v folder="$folder" '
+                { sentences = gsub(/[.;:]([ )]|$)/, "&") }
+                sentences < 2 || tolower($0) !~ /(^|[^a-z])(not|no|only|nothing|never|elsewhere)([^a-z]|$)|n.t([^a-z]|$)/ {
+                    print folder "/README.md: the first paragraph does not say what belongs here and what does not" }'
+        done
+    )
+}
+
 root=${1:-$(dirname "$0")/..}
+built=${2:-$root/build/test}
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
 n=0 failed=0
@@ -71,13 +180,17 @@ plant() { # file line...
 
 clean_tree() {
     rm -rf "$work/tree"
-    plant core/scene.c '#include "core/scene.h"' '#include <embree3/rtcore.h>' '#include <stdio.h>'
+    plant core/scene/load.c '#include "core/scene.h"' '#include <embree3/rtcore.h>' '#include <stdio.h>' '#include "core/err.h"'
+    plant core/plan/plan.c '#include "core/plan.h"' '#include "core/cast.h"' '#include "core/geoframe.h"'
+    plant core/cloud.h '#include "core/bvh/bvh.h"'
     plant core/georef/geographiclib_shim.cpp '#include "core/georef/shim.h"' '#include <GeographicLib/UTMUPS.hpp>'
     plant drivers/protocol/native.c '#include "drivers/protocol/native.h"' '#include "core/line.h"' '#include "core/err.h"'
     plant drivers/link/tcp.c '#include "drivers/link/link.h"' '#include "core/err.h"' '#include <sys/socket.h>'
-    plant drivers/usb/usb_core.c '#include "drivers/usb/device.h"' '#include "drivers/protocol/native.h"'
+    plant drivers/usb/usb_core.c '#include "drivers/usb/device.h"' '#include "drivers/protocol/native.h"' '#include "drivers/socket/socket.h"'
+    plant drivers/record/ply.c '#include "drivers/host/scanhead.h"' '#include "drivers/protocol/native.h"'
     plant drivers/host/open.c '#include "drivers/host/scanhead.h"' '#include "drivers/protocol/native.h"' '#include "core/err.h"'
-    plant firmware_sim/loop/loop.c '#include "core/scene.h"' '#include "drivers/link/link.h"' '#include "drivers/host/scanhead.h"' \
+    plant firmware_sim/main.c '#include "firmware_sim/app/app.h"'
+    plant firmware_sim/loop/loop.c '#include "firmware_sim/device/device.h"' '#include "core/scene.h"' '#include "drivers/link/link.h"' '#include "drivers/host/scanhead.h"' \
         '/* #include "tests/nothing.h" */' '// #include "../core/err.h"'
     plant build-asan/generated.cpp 'int built;'
 }
@@ -87,26 +200,29 @@ expect_violation() { # file line
     clean_tree
     plant "$@"
     local found
-    found=$(violations "$work/tree")
+    found=$(include_violations "$work/tree")
     [ "$(printf '%s' "$found" | grep -c '')" = 1 ] && [[ $found == "$1:"* ]]
     report $? "finds $1${2:+ with $2}" "found: ${found:-nothing}"
 }
 
 clean_tree
-found=$(violations "$work/tree")
+found=$(include_violations "$work/tree")
 [ -z "$found" ]
 report $? "a clean tree passes" "$found"
 
-expect_violation core/bad.c '#include "drivers/link/link.h"'
+expect_violation core/scene/bad.c '#include "drivers/link/link.h"'
 expect_violation core/bad.h '#include "firmware_sim/command/head.h"'
-expect_violation core/deep/bad.c '  #  include   "drivers/protocol/native.h" /* why */'
+expect_violation core/scene/bad.h '  #  include   "drivers/protocol/native.h" /* why */'
 expect_violation core/bad.c '#include <drivers/link/link.h>'
 expect_violation core/bad.c '#include "../drivers/link/link.h"'
 expect_violation core/bad.c '#include "scene.h"'
 expect_violation core/bad.c '#include "tests/unit/command_device.h"'
 expect_violation core/bad.c '#include HEADER'
 expect_violation core/georef/other.cpp 'int other;'
-expect_violation drivers/bad.h '#include "core/scene.h"'
+expect_violation drivers/record/bad.h '#include "core/scene.h"'
+expect_violation drivers/bad.h 'int bad;'
+expect_violation drivers/socket/bad.c '#include "drivers/usb/usb.h"'
+expect_violation drivers/usb/bad.c '#include "core/line.h"'
 expect_violation drivers/usb/bad.c '#include "core/georef.h"'
 expect_violation drivers/usb/bad.c '#include "firmware_sim/command/head.h"'
 expect_violation drivers/usb/bad.c '#include "drivers/host/scanhead.h"'
@@ -122,17 +238,94 @@ expect_violation drivers/host/bad.c '#include "core/line.h"'
 expect_violation drivers/host/bad.c '#include "core/scene.h"'
 expect_violation drivers/host/bad.c '#include "drivers/link/link.h"'
 expect_violation drivers/host/bad.c '#include "firmware_sim/command/head.h"'
-expect_violation firmware_sim/bad.c '#include "tests/unit/command_device.h"'
-expect_violation firmware_sim/bad.cpp 'int bad;'
+expect_violation core/err.c '#include "core/scene.h"'
+expect_violation core/line.h '#include "core/georef.h"'
+expect_violation core/scene/bad.c '#include "core/cast/caster.h"'
+expect_violation core/georef/bad.h '#include "core/map.h"'
+expect_violation core/cast/bad.c '#include "core/plan.h"'
+expect_violation core/attic/bad.c 'int bad;'
+expect_violation drivers/link/bad.c '#include "drivers/record/recorder.h"'
+expect_violation drivers/usb/bad.c '#include "drivers/link/link.h"'
+expect_violation drivers/record/bad.c '#include "drivers/host/session.h"'
+expect_violation drivers/protocol/bad.c '#include "drivers/usb/usb.h"'
+expect_violation firmware_sim/base/bad.c '#include "firmware_sim/command/command.h"'
+expect_violation firmware_sim/command/bad.c '#include "firmware_sim/config/config.h"'
+expect_violation firmware_sim/config/bad.c '#include "firmware_sim/site/site.h"'
+expect_violation firmware_sim/site/bad.c '#include "firmware_sim/device/device.h"'
+expect_violation firmware_sim/device/bad.c '#include "firmware_sim/loop/loop.h"'
+expect_violation firmware_sim/loop/bad.c '#include "firmware_sim/app/app.h"'
+expect_violation firmware_sim/app/bad.c '#include "tests/unit/command_device.h"'
+expect_violation firmware_sim/attic/bad.c '#include "core/err.h"'
+expect_violation firmware_sim/bad.c '#include "core/err.h"'
+expect_violation firmware_sim/app/bad.cpp 'int bad;'
 expect_violation tests/accuracy/bad.cc 'int bad;'
 expect_violation core/bad.hpp 'int bad;'
 
+# Two objects, the first calling the second: whether that is found.
+expect_call() { # violations caller callee [symbol]
+    local found symbol=${4:-called}
+    rm -rf "$work/tree"
+    plant "$2" "void $symbol(void); void calls(void); void calls(void) { $symbol(); }"
+    plant "$3" "void $symbol(void); void $symbol(void) {}"
+    for source in "$2" "$3"; do
+        mkdir -p "$work/tree/built/$(dirname "$source")"
+        ${CC:-cc} -c "$work/tree/$source" -o "$work/tree/built/$source.o" || return
+    done
+    found=$(call_violations "$work/tree/built" "$work/tree")
+    [ "$(printf '%s' "$found" | grep -c '')" = "$1" ] && [[ $1 = 0 || $found == "$2:"*"$symbol of $3" ]]
+    report $? "$([ "$1" = 0 ] && echo passes || echo finds) a call from $2 to $3" "found: ${found:-nothing}"
+}
+expect_call 0 core/cast/caster.c core/bvh/cast.c
+expect_call 0 firmware_sim/app/run.c firmware_sim/loop/loop.c
+expect_call 0 drivers/record/ply.c drivers/host/open.c scanhead_open
+expect_call 1 core/scene/load.c core/cast/caster.c
+expect_call 1 core/err.c core/scene/load.c
+expect_call 1 firmware_sim/site/site.c firmware_sim/device/device.c
+expect_call 1 firmware_sim/base/json.c firmware_sim/config/config.c
+expect_call 1 drivers/protocol/native.c drivers/link/tcp.c
+expect_call 1 drivers/record/ply.c drivers/host/open.c session_open
+expect_call 1 core/cast/caster.c firmware_sim/loop/loop.c
+
+expect_readme() { # violations line...
+    local found
+    rm -rf "$work/tree"
+    plant core/cast/cast.c 'int cast;'
+    [ $# -eq 1 ] || plant core/cast/README.md "${@:2}"
+    found=$(readme_violations "$work/tree")
+    [ "$(printf '%s' "$found" | grep -c '')" = "$1" ]
+    report $? "$([ "$1" = 0 ] && echo passes || echo finds) ${2:-no README} ${4:-}" "found: ${found:-nothing}"
+}
+expect_readme 0 '# cast' '' 'The stages of a pulse in their order. What one stage does alone' 'does not belong here.' '' 'More.'
+expect_readme 1
+expect_readme 1 '# cast' '' 'The stages of a pulse.'
+expect_readme 1 '# cast' '' 'The stages of a pulse. They have an order.' '' 'What does not belong here: all else. It is elsewhere.'
+
+upward_of() { printf '%s\n' "$upward" | grep -c "^$1/"; }
 for folder in core drivers firmware_sim; do
     [ -n "$(find "$root/$folder" -name '*.[ch]' -print -quit 2>/dev/null)" ]
     report $? "there are sources in $folder" "no .c or .h below $root/$folder"
+    [ "$(upward_of $folder)" -le 1 ]
+    report $? "at most one arrow runs upward in $folder" "$upward"
+    printf '%s\n' "$upward" | sed -n "s|^$folder/|# upward, by name: $folder/|p"
 done
-found=$(violations "$root")
+needless=$(upward= include_violations "$root" | sed 's|/[^/]*:[0-9]*: must not include | |')
+while read -r from to why; do
+    [ -z "$from" ] || grep -q -x "$from $to" <<<"$needless"
+    report $? "the arrow upward from $from to $to is there and has a reason" "nobody needs it any more"
+done < <(sed '/^$/d' <<<"$upward")
+found=$(include_violations "$root")
 [ -z "$found" ]
-report $? "the arrows hold in this tree" "$found"
+report $? "no include breaks the order of the rooms" "$found"
+if [ -n "$(objects "$built" "$root" 2>/dev/null | head -n 1)" ]; then
+    found=$(call_violations "$built" "$root")
+    [ -z "$found" ]
+    report $? "no call breaks the order of the rooms" "$found"
+else
+    n=$((n + 1))
+    echo "ok $n - no call breaks the order of the rooms # SKIP no objects in $built: make"
+fi
+found=$(readme_violations "$root")
+[ -z "$found" ]
+report $? "each folder has a README that says what belongs into it" "$found"
 echo "1..$n"
 exit $failed

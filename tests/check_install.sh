@@ -1,6 +1,6 @@
 #!/bin/sh
-# What `make install` installs is enough for a client: the README's example, compiled with the installed files alone, reads
-# a scan. Prints TAP. $SCANHEAD: the program of the build that is installed.
+# What `make install` installs is enough for a client: the README's example, compiled with the installed files alone,
+# reads a scan. Prints TAP. $SCANHEAD: the program of the build that is installed.
 set -u
 program=${SCANHEAD:-build/scanhead}
 work=$(mktemp -d) || exit 1
@@ -47,7 +47,7 @@ reads_a_scan() {
     head=$!
     read -r ready <"$work/ready" || { cat "$work/head.err"; return 1; }
     left=500 # a head that is asked at once may still boot
-    until LD_LIBRARY_PATH=$work/root$prefix/lib timeout 60 "$work/client" >"$work/points"; do
+    until LD_LIBRARY_PATH=$work/root$prefix/lib timeout 60 "$work/client" "tty:$work/port" >"$work/points"; do
         left=$((left - 1))
         if [ $left = 0 ] || ! grep -q 'in state boot' "$work/points"; then
             cat "$work/points"
@@ -57,8 +57,8 @@ reads_a_scan() {
     test "$(grep -c '^-\{0,1\}[0-9.]* -\{0,1\}[0-9.]* -\{0,1\}[0-9.]*$' "$work/points")" -gt 1000
 }
 
-# The only example in C; at the terminal of this test.
-sed -n '/^```c$/,/^```$/p' README.md | sed "/^\`\`\`/d; s|tty:[^\"]*|tty:$work/port|" >"$work/client.c"
+# The only example in C.
+sed -n '/^```c /,/^```$/p' README.md | sed "/^\`\`\`/d" >"$work/client.c"
 check "make install" install_it
 check "the udev rule is where udev looks below a prefix" test -s "$work/root$prefix/lib/udev/rules.d/70-scanhead.rules"
 check "the README's client, with the archive" compile client-static "$work/root$prefix/lib/libscanhead.a" -lnettle -lusb-1.0 -lm

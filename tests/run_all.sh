@@ -1,31 +1,42 @@
 #!/bin/sh
-# Runs the tests that make has built: sh tests/run_all.sh BUILD [unit|wire|accuracy|stability|guest]. Without a part all of them,
-# and the unit tests once more with the sanitizers in. Ends with one line of counts.
-# As many at a time as there are processors; those that drive a head at its limits, and the guests, have the machine to themselves.
+# Runs the tests that make has built: sh tests/run_all.sh BUILD [unit|wire|accuracy|stability|guest]. Without a part all of
+# them, and the unit tests once more with the sanitizers in. Ends with one line of counts.
+#
+# As many at a time as there are processors, those that take longest first in each folder:
+#   1. accuracy, stability, unit: they compute
+#   2. wire, which mostly waits; the guests beside it, which compute
+#   3. the wire tests that drive a head at its limits: each has the machine to itself
 set -eu
 build=$1
 part=${2:-}
+alone="bench_cli clients join latency overrun same_stream signals slow_reader"
+longest="leaks meshes beam_reference range beam plan coordinates georef_default gpsd attributes moving travel ticks"
 
-# programs FOLDER [BUILD]: the test programs of a folder, if its part is wanted.
+wanted() {
+    [ -z "$part" ] || [ "$part" = "$1" ]
+}
+
+# programs FOLDER [BUILD]: the test programs of a folder, the longest first, without those that run alone.
 programs() {
-    [ -z "$part" ] || [ "$part" = "$1" ] || return 0
-    for source in tests/"$1"/test_*.c; do
-        case " $busy " in *" $(basename "$source" .c) "*) continue ;; esac
-        [ ! -e "$source" ] || echo "${2:-$build/test}/${source%.c}"
+    for name in $longest $(cd "tests/$1" && ls test_*.c | sed 's/^test_//; s/\.c$//'); do
+        case " $alone $seen " in *" $name "*) continue ;; esac
+        seen="$seen $name"
+        [ ! -e "tests/$1/test_$name.c" ] || echo "${2:-$build/test}/tests/$1/test_$name"
     done
 }
-busy=
-for name in bench_cli clients join latency overrun same_stream signals slow_reader; do busy="$busy test_$name"; done
+seen=
 
-set -- $(programs accuracy) $(programs stability)
-if [ -z "$part" ] || [ "$part" = unit ]; then set -- "$@" tests/check_includes.sh $(programs unit); fi
+set --
+if wanted accuracy; then set -- "$@" $(programs accuracy); fi
+if wanted stability; then set -- "$@" $(programs stability); fi
+if wanted unit; then set -- "$@" tests/check_includes.sh tests/check_recipes.sh $(programs unit); fi
 if [ -z "$part" ]; then set -- "$@" $(programs unit "$build/asan"); fi
-if [ -z "$part" ] || [ "$part" = wire ]; then
-    set -- "$@" tests/check_install.sh $(programs wire) --
-    for name in $busy; do set -- "$@" "$build/test/tests/wire/$name"; done
-fi
-if [ -z "$part" ] || [ "$part" = guest ]; then
+if wanted guest; then
     export BUILD="$build"
-    set -- "$@" tests/guest/guest.sh # it takes the programs of tests/guest with it
+    set -- "$@" +tests/guest/guest.sh # it takes the programs of tests/guest with it
+fi
+if wanted wire; then
+    set -- "$@" $(programs wire) tests/check_install.sh --
+    for name in $alone; do set -- "$@" "$build/test/tests/wire/test_$name"; done
 fi
 exec bash tests/run_tap.sh -j "$(getconf _NPROCESSORS_ONLN)" "$@"

@@ -3,11 +3,11 @@
 #
 #   run_tap.sh [-t SECONDS] [-j N] PROGRAM... [-- PROGRAM...]
 #
-# SECONDS per program; default $TAP_LIMIT_S, or 300. N programs at a time, default 1; those after `--` have the machine to themselves,
-# one after the other.
-# One line per program, in the order given, and the tables of the stability and accuracy programs; of one that fails all it printed
-# but its passed tests. The reasons of skips follow, and
-# the last line is `N passed, N failed, N skipped`. Exit status 1 when anything failed, 2 for wrong usage.
+# SECONDS per program; default $TAP_LIMIT_S, or 300. N programs at a time, default 1; one that begins with `+` runs beside
+# these. Those after `--` have the machine to themselves, one after the other.
+# One line per program, in the order given, and the tables of the stability and accuracy programs; of one that fails, all
+# that it printed but its passed tests. The reasons of skips follow.
+# The last line is `N passed, N failed, N skipped`. Exit status 1 when anything failed, 2 for wrong usage.
 # What counts as a failure beside `not ok`: fewer results than planned; a status other than 0, a signal or no end
 # within the limit, where no failure says so already; and a program without any result.
 set -u
@@ -81,7 +81,7 @@ wait_one() {
     number=${running[$process]}
     unset "running[$process]"
     ended_ms[number]=$(date +%s%3N)
-    # Who ignores SIGTERM is killed, which timeout tells as 137 and not as 124.
+    # A program that ignores SIGTERM is killed, for which timeout gives 137 and not 124.
     [ $status -eq 137 ] && [ $((ended_ms[number] - started_ms[number])) -ge $((limit_s * 1000)) ] && status=124
     statuses[number]=$status
     while [ -n "${statuses[reported]:-}" ]; do
@@ -141,14 +141,22 @@ wait_all() {
     while [ ${#running[@]} -gt 0 ]; do wait_one; done
 }
 
+beside=0
 for program; do
-    if [ "$program" = -- ]; then
+    case $program in
+    --)
         wait_all
-        at_a_time=1
-        continue
-    fi
-    [ ${#running[@]} -lt "$at_a_time" ] || wait_one
-    start "$program"
+        at_a_time=1 beside=0
+        ;;
+    +*)
+        beside=$((beside + 1)) # also once it has ended: one more at a time is no harm
+        start "${program#+}"
+        ;;
+    *)
+        [ ${#running[@]} -lt $((at_a_time + beside)) ] || wait_one
+        start "$program"
+        ;;
+    esac
 done
 wait_all
 if [ -s "$work/reasons" ]; then

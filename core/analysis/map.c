@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/analysis/map_private.h"
+#include "core/analysis/map_inside.h"
 
 /* A level must be higher than noise and slope of a floor within one pixel. */
 #define LEVEL_MIN_M 0.1
@@ -133,16 +133,6 @@ void map_get_layout(const struct map *map, struct map_layout *layout)
     layout->map_width = map->width;
     layout->map_height = map->height;
     layout->pixel_m = map->pixel_m;
-}
-
-int map_find_pixel(const struct map *map, double x_m, double y_m, uint32_t *column, uint32_t *row)
-{
-    struct map_layout layout;
-    if (!locate(map, x_m, y_m, column, row)) return 0;
-    map_get_layout(map, &layout);
-    *column += layout.left;
-    *row = layout.top + map->height - 1 - *row;
-    return 1;
 }
 
 int map_write_png(const struct map *map, const char *path, struct sh_err *err)

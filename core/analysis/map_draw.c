@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/analysis/map_private.h"
+#include "core/analysis/map_inside.h"
 
 enum {
     WALL_LEVELS = 14, /* height levels hit that make a pixel as dark as it gets */

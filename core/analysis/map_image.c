@@ -2,7 +2,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/analysis/map_private.h"
+#include "core/analysis/map_inside.h"
 #include "core/angle.h"
 
 static double srgb_encode(double linear)

@@ -1,10 +1,11 @@
+/* The image as a PNG file. */
 #include <errno.h>
 #include <png.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/analysis/map_private.h"
+#include "core/analysis/map_inside.h"
 
 /* libpng reports by a callback that must not return; the reason is kept for the error text. */
 struct png_reason {
@@ -57,31 +58,30 @@ static int encode_file(const struct map_image *image, FILE *file, struct png_rea
     return rc;
 }
 
+/* Writes, closes and renames part; the reason where that fails. */
+static int write_part(const struct map_image *image, const char *part, const char *path, struct png_reason *reason)
+{
+    FILE *file = fopen(part, "wbe");
+    if (file == NULL) {
+        snprintf(reason->text, sizeof reason->text, "%s", strerror(errno));
+        return errno == EACCES ? SH_EPERM : errno == ENOENT || errno == ENOTDIR ? SH_EINPUT : SH_EIO;
+    }
+    int rc = encode_file(image, file, reason) == 0 ? SH_OK : SH_EIO;
+    int is_closed = fclose(file) == 0;
+    if (rc == SH_OK && (!is_closed || rename(part, path) != 0)) {
+        snprintf(reason->text, sizeof reason->text, "%s", strerror(errno));
+        rc = is_closed && errno == EISDIR ? SH_EINPUT : SH_EIO;
+    }
+    if (rc != SH_OK) remove(part);
+    return rc;
+}
+
 int map_png_write(const struct map_image *image, const char *path, struct sh_err *err)
 {
     struct png_reason reason = {""};
-    const size_t len = strlen(path) + sizeof ".part";
-    char *part = malloc(len);
-    if (part == NULL) return sh_fail(err, SH_ENOMEM, "map %s: no memory", path);
-    snprintf(part, len, "%s.part", path);
-    int rc = SH_OK;
-    FILE *file = fopen(part, "wbe");
-    if (file == NULL) {
-        rc = sh_fail(err,
-                     errno == EACCES                       ? SH_EPERM
-                     : errno == ENOENT || errno == ENOTDIR ? SH_EINPUT
-                                                           : SH_EIO,
-                     "map %s: cannot be written: %s", path, strerror(errno));
-        goto out;
-    }
-    if (encode_file(image, file, &reason) != 0)
-        rc = sh_fail(err, SH_EIO, "map %s: cannot be written: %s", path, reason.text);
-    if (fclose(file) != 0 && rc == SH_OK)
-        rc = sh_fail(err, SH_EIO, "map %s: cannot be written: %s", path, strerror(errno));
-    if (rc == SH_OK && rename(part, path) != 0)
-        rc = sh_fail(err, errno == EISDIR ? SH_EINPUT : SH_EIO, "map %s: cannot be written: %s", path, strerror(errno));
-    if (rc != SH_OK) remove(part);
-out:
+    char *part;
+    if (asprintf(&part, "%s.part", path) < 0) return sh_fail(err, SH_ENOMEM, "map %s: no memory", path);
+    int rc = write_part(image, part, path, &reason);
     free(part);
-    return rc;
+    return rc == SH_OK ? SH_OK : sh_fail(err, rc, "map %s: cannot be written: %s", path, reason.text);
 }

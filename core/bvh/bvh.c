@@ -53,8 +53,9 @@ int bvh_create(const struct scene *scene, const double origin_m[3], double stati
     *out = NULL;
     struct bvh *bvh = calloc(1, sizeof *bvh);
     if (bvh == NULL) return sh_fail(err, SH_ENOMEM, "bvh: no memory");
-    char config[32] = "";
-    if (threads != 0) snprintf(config, sizeof config, "threads=%u", threads);
+    /* Embree sets 128 MB aside for subdivision surfaces, of which there are none here: 1 MB, the least. */
+    char config[64] = "tessellation_cache_size=1";
+    if (threads != 0) snprintf(config, sizeof config, "tessellation_cache_size=1,threads=%u", threads);
     bvh->scene = scene;
     bvh->station_reach_m = station_reach_m;
     for (int i = 0; i < 3; i++)

@@ -93,8 +93,9 @@ static int make_scene(struct column *c, struct scene **out, struct sh_err *err)
             const uint32_t *at = bsearch(&all->triangle[c->prim[i]][k], c->vertex, c->n_vertices, sizeof *at, compare);
             triangle[i][k] = (uint32_t)(at - c->vertex);
         }
-    rc = scene_from_arrays((const double(*)[3])vertex_m, (uint32_t)c->n_vertices, (const uint32_t(*)[3])triangle,
-                           (uint32_t)c->n, NULL, NULL, 0, out, err);
+    rc = scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex_m, (uint32_t)c->n_vertices,
+                                                  (const uint32_t(*)[3])triangle, (uint32_t)c->n, NULL, NULL, 0},
+                           out, err);
 done:
     free(vertex_m);
     free(triangle);

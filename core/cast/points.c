@@ -37,7 +37,7 @@ static uint32_t place(struct caster *c, const struct chunk *k, uint32_t at, uint
         kernel_scale_from(range_m, &VEC3_IN(l->p, at), s->station_m, n, &e);
     else
         kernel_scale(range_m, n, &e);
-    if (!k->linear) georef_forward(s->georef, n, e.x, e.y, e.z, e.x, e.y, e.z);
+    if (!k->linear) georef_forward(s->georef, n, VEC3_IN(e, 0), e);
     return kernel_geo(&VEC3_IN(e, 0), s->xyz_scale, n, out);
 }
 

@@ -2,10 +2,11 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/georef/private.h"
+#include "core/georef/state.h"
 #include "core/mat3.h"
 
-/* Far enough for nanometres of rounding to be 1e-10 rad, near enough for a quadratic map to be linear by symmetry. */
+/* Far enough for nanometres of rounding to be 1e-10 rad, near enough for a quadratic map to be linear by
+ * symmetry. */
 static const double STEP_M = 100.0;
 
 /* Column k is what a metre along axis k becomes. */
@@ -16,7 +17,8 @@ static void jacobian(const struct georef *georef, double j[9])
         for (int side = 0; side < 2; side++) {
             double d[3] = {0.0, 0.0, 0.0};
             d[k] = side == 0 ? -STEP_M : STEP_M;
-            shim_map_forward(georef->map, 1, &d[0], &d[1], &d[2], &out[side][0], &out[side][1], &out[side][2]);
+            shim_map_forward(georef->map, 1, (struct vec3_in){&d[0], &d[1], &d[2]},
+                             (struct vec3_out){&out[side][0], &out[side][1], &out[side][2]});
         }
         for (int i = 0; i < 3; i++)
             j[3 * i + k] = (out[1][i] - out[0][i]) / (2.0 * STEP_M);
@@ -41,11 +43,11 @@ static int invert(const double m[9], double out[9])
     double det = m[0] * out[0] + m[1] * out[1] + m[2] * out[2];
     for (int i = 0; i < 9; i++)
         out[i] /= det;
-    return det > 0.1; /* false for not-a-number */
+    return det > 0.1; /* false for NaN */
 }
 
-/* The map is a rotation, and stretching along its own axes before or after: the rotation is the polar factor, by
- * Newton's iteration (Higham 1986), which converges quadratically from near. */
+/* The map is a rotation, and stretching along its own axes before or after: the rotation is the polar factor,
+ * by Newton's iteration (Higham 1986), which converges quadratically from near. */
 void georef_axes(const struct georef *georef, double rotation[9])
 {
     double m[9], other[9];

@@ -47,8 +47,7 @@ void geoframe_set_ecef(struct geoframe *frame)
 static int locate(const struct geoframe *frame, const double p_prcs[3], struct georef_place *at, struct sh_err *err)
 {
     double p_ecef[3], d[3];
-    if (frame->kind == GEOFRAME_GRID)
-        return georef_locate_utm(frame->zone, frame->north, p_prcs[0], p_prcs[1], p_prcs[2], at, err);
+    if (frame->kind == GEOFRAME_GRID) return georef_locate_utm(frame->zone, frame->north, p_prcs, at, err);
     memcpy(p_ecef, p_prcs, sizeof p_ecef);
     if (frame->kind == GEOFRAME_TANGENT) {
         for (int i = 0; i < 3; i++)

@@ -1,5 +1,6 @@
 #include "core/georef/geographiclib_shim.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <exception>
@@ -15,14 +16,10 @@
 #include <GeographicLib/TransverseMercator.hpp>
 #include <GeographicLib/UTMUPS.hpp>
 
-using GeographicLib::Geocentric;
-using GeographicLib::Geoid;
-using GeographicLib::LocalCartesian;
-using GeographicLib::PolarStereographic;
-using GeographicLib::TransverseMercator;
-using GeographicLib::UTMUPS;
+using GeographicLib::Geocentric, GeographicLib::Geoid, GeographicLib::LocalCartesian;
+using GeographicLib::PolarStereographic, GeographicLib::TransverseMercator, GeographicLib::UTMUPS;
 
-struct shim_geoid {
+struct georef_geoid {
     Geoid geoid;
 };
 
@@ -55,7 +52,7 @@ struct shim_grid {
     }
 };
 
-/* Of zones as core/georef.h has them. */
+/* The zone for UTMUPS, of a zone as core/georef.h counts them. */
 static int utmups_zone(int zone)
 {
     return zone == 0 ? int(UTMUPS::STANDARD) : zone < 0 ? int(UTMUPS::UPS) : zone;
@@ -74,7 +71,7 @@ struct shim_map {
     double in_x0, in_y0;  /* of the centre */
     /* out */
     shim_kind kind;
-    const shim_geoid *geoid;
+    const georef_geoid *geoid;
     shim_grid grid;
     double place[3];  /* of the centre */
     double anchor[3]; /* of the centre, with false origin */
@@ -88,8 +85,7 @@ struct shim_map {
     void set_frame(const shim_frame &frame)
     {
         from_grid = frame.is_grid != 0;
-        for (int i = 0; i < 9; i++)
-            turn[i] = frame.turn[i];
+        std::copy_n(frame.turn, 9, turn);
         local.Reset(place[0], place[1], place[2]);
         if (!from_grid) return;
         double x, y;
@@ -218,38 +214,38 @@ template <typename F> static int attempt(char *why, size_t len, F f)
     return -1;
 }
 
-void shim_ecef(double lat_deg, double lon_deg, double height_m, double p_ecef[3], double rotation[9])
+/* Runs what may throw; n values become NaN then. */
+template <typename F> static void attempt(double *value, size_t n, F f)
 {
-    for (int i = 0; i < 3; i++)
-        p_ecef[i] = nan_m;
     try {
-        std::vector<double> m(9);
-        Geocentric::WGS84().Forward(lat_deg, lon_deg, height_m, p_ecef[0], p_ecef[1], p_ecef[2], m);
-        for (size_t i = 0; i < 9; i++)
-            rotation[i] = m[i];
+        f();
     } catch (...) {
-        for (int i = 0; i < 9; i++)
-            rotation[i] = nan_m;
+        std::fill_n(value, n, nan_m);
     }
 }
 
-void shim_geodetic(double lat_deg, double lon_deg, double height_m, const double d_local[3], double geodetic[3])
+void shim_ecef(double lat_deg, double lon_deg, double height_m, double p_ecef[3], double rotation[9])
 {
-    try {
+    std::fill_n(p_ecef, 3, nan_m);
+    attempt(rotation, 9, [&] {
+        std::vector<double> m(9);
+        Geocentric::WGS84().Forward(lat_deg, lon_deg, height_m, p_ecef[0], p_ecef[1], p_ecef[2], m);
+        std::copy(m.begin(), m.end(), rotation);
+    });
+}
+
+void georef_geodetic(double lat_deg, double lon_deg, double height_m, const double d_enu[3], double geodetic[3])
+{
+    attempt(geodetic, 3, [&] {
         LocalCartesian(lat_deg, lon_deg, height_m)
-            .Reverse(d_local[0], d_local[1], d_local[2], geodetic[0], geodetic[1], geodetic[2]);
-    } catch (...) {
-        geodetic[0] = geodetic[1] = geodetic[2] = nan_m;
-    }
+            .Reverse(d_enu[0], d_enu[1], d_enu[2], geodetic[0], geodetic[1], geodetic[2]);
+    });
 }
 
 void shim_locate_ecef(const double p_ecef[3], double place[3])
 {
-    try {
-        Geocentric::WGS84().Reverse(p_ecef[0], p_ecef[1], p_ecef[2], place[0], place[1], place[2]);
-    } catch (...) {
-        place[0] = place[1] = place[2] = nan_m;
-    }
+    attempt(place, 3,
+            [&] { Geocentric::WGS84().Reverse(p_ecef[0], p_ecef[1], p_ecef[2], place[0], place[1], place[2]); });
 }
 
 int shim_locate_utm(int zone, int north, const double grid[2], double lat_lon_deg[2], char *why, size_t len)
@@ -258,41 +254,40 @@ int shim_locate_utm(int zone, int north, const double grid[2], double lat_lon_de
                    [&] { UTMUPS::Reverse(zone, north != 0, grid[0], grid[1], lat_lon_deg[0], lat_lon_deg[1]); });
 }
 
-int shim_to_utm(const double lat_lon_deg[2], int *zone, int *north, double grid[2], char *why, size_t len)
+int shim_grid_at(const struct georef_place *place, int zone, struct locate_grid *out, char *why, size_t len)
 {
     return attempt(why, len, [&] {
-        bool n = false;
-        UTMUPS::Forward(lat_lon_deg[0], lat_lon_deg[1], *zone, n, grid[0], grid[1], utmups_zone(*zone));
-        *north = n;
+        bool north = false;
+        UTMUPS::Forward(place->lat_deg, place->lon_deg, out->zone, north, out->easting_m, out->northing_m,
+                        out->convergence_deg, out->scale, utmups_zone(zone));
+        out->north = north;
     });
 }
 
-struct shim_geoid *shim_geoid_open(char *why, size_t len)
+struct georef_geoid *shim_geoid_open(char *why, size_t len)
 {
-    struct shim_geoid *geoid = nullptr;
-    attempt(why, len, [&] { geoid = new shim_geoid{Geoid(Geoid::DefaultGeoidName(), "", true, true)}; });
+    struct georef_geoid *geoid = nullptr;
+    attempt(why, len, [&] { geoid = new georef_geoid{Geoid(Geoid::DefaultGeoidName(), "", true, true)}; });
     return geoid;
 }
 
-void shim_geoid_free(struct shim_geoid *geoid)
+void georef_geoid_free(struct georef_geoid *geoid)
 {
     delete geoid;
 }
 
-struct shim_map *shim_map_create(enum shim_kind kind, const double place[3], const struct shim_frame *frame,
-                                 const struct shim_zone *zone, const struct shim_geoid *geoid, char *why, size_t len)
+struct shim_map *shim_map_create(const struct shim_spec *spec, char *why, size_t len)
 {
     std::unique_ptr<shim_map> map;
     int rc = attempt(why, len, [&] {
         map.reset(new shim_map());
-        map->kind = kind;
-        map->geoid = geoid;
-        for (int i = 0; i < 3; i++)
-            map->place[i] = place[i];
-        map->place[1] = GeographicLib::Math::AngNormalize(place[1]);
-        map->set_frame(*frame);
-        map->set_centre(utmups_zone(zone->zone));
-        map->force_side(zone->side);
+        map->kind = spec->kind;
+        map->geoid = spec->geoid;
+        std::copy_n(spec->place, 3, map->place);
+        map->place[1] = GeographicLib::Math::AngNormalize(spec->place[1]);
+        map->set_frame(spec->frame);
+        map->set_centre(utmups_zone(spec->zone.zone));
+        map->force_side(spec->zone.side);
     });
     return rc == 0 ? map.release() : nullptr;
 }
@@ -314,14 +309,12 @@ void shim_map_free(struct shim_map *map)
 
 void shim_map_anchor(const struct shim_map *map, double anchor[3])
 {
-    for (int i = 0; i < 3; i++)
-        anchor[i] = map->anchor[i];
+    std::copy_n(map->anchor, 3, anchor);
 }
 
 void shim_map_place(const struct shim_map *map, double place[3])
 {
-    for (int i = 0; i < 3; i++)
-        place[i] = map->place[i];
+    std::copy_n(map->place, 3, place);
 }
 
 /* prcs to the tangent frame's origin, to ECEF, to the centre's axes. */
@@ -385,42 +378,27 @@ void shim_map_convergence(const struct shim_map *map, double *convergence_deg, d
     });
 }
 
-void shim_map_forward(const struct shim_map *map, size_t n, const double *dx, const double *dy, const double *dz,
-                      double *out_x, double *out_y, double *out_z)
+void shim_map_forward(const struct shim_map *map, size_t n, struct vec3_in d, struct vec3_out out)
 {
     for (size_t i = 0; i < n; i++) {
         double x = nan_m, y = nan_m, z = nan_m;
-        /* Asked first: the projections turn some not-a-number into plain numbers. */
-        if (std::isfinite(dx[i]) && std::isfinite(dy[i]) && std::isfinite(dz[i])) {
+        /* Checked first: the projections turn some NaN into plain numbers. */
+        if (std::isfinite(d.x[i]) && std::isfinite(d.y[i]) && std::isfinite(d.z[i])) {
             try {
-                map->forward(dx[i], dy[i], dz[i], x, y, z);
+                map->forward(d.x[i], d.y[i], d.z[i], x, y, z);
             } catch (...) {
                 x = y = z = nan_m;
             }
         }
-        out_x[i] = x;
-        out_y[i] = y;
-        out_z[i] = z;
+        out.x[i] = x;
+        out.y[i] = y;
+        out.z[i] = z;
     }
 }
 
 void shim_map_reverse(const struct shim_map *map, const double d_map[3], double d_prcs[3])
 {
-    d_prcs[0] = d_prcs[1] = d_prcs[2] = nan_m;
+    std::fill_n(d_prcs, 3, nan_m);
     if (!std::isfinite(d_map[0]) || !std::isfinite(d_map[1]) || !std::isfinite(d_map[2])) return;
-    try {
-        map->reverse(d_map, d_prcs);
-    } catch (...) {
-        d_prcs[0] = d_prcs[1] = d_prcs[2] = nan_m;
-    }
-}
-
-int shim_utm_forward(double lat_deg, double lon_deg, int zone, struct shim_utm *out, char *why, size_t len)
-{
-    return attempt(why, len, [&] {
-        bool north = false;
-        UTMUPS::Forward(lat_deg, lon_deg, out->zone, north, out->easting_m, out->northing_m, out->convergence_deg,
-                        out->scale, utmups_zone(zone));
-        out->north = north;
-    });
+    attempt(d_prcs, 3, [&] { map->reverse(d_map, d_prcs); });
 }

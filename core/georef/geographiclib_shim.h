@@ -1,5 +1,6 @@
-/* C view of what we use of GeographicLib. Private to core/georef. No exception crosses: each becomes a text, or
- * not-a-number. */
+/* What we use of GeographicLib, for C, beside georef_geodetic and georef_geoid_free. Only the files of
+ * core/georef include this. Angles are in degrees, lengths in metres. No exception crosses: each becomes a
+ * text, or NaN. */
 #ifndef CORE_GEOREF_GEOGRAPHICLIB_SHIM_H
 #define CORE_GEOREF_GEOGRAPHICLIB_SHIM_H
 
@@ -9,31 +10,21 @@
 extern "C" {
 #endif
 
+#include "core/locate.h"
+#include "core/vec3.h"
+
 /* WGS 84 geocentric position, and the rotation (row by row) of east, north, up at it to X, Y, Z. */
 void shim_ecef(double lat_deg, double lon_deg, double height_m, double p_ecef[3], double rotation[9]);
 
-/* east, north, up at a place -> latitude, longitude, height. */
-void shim_geodetic(double lat_deg, double lon_deg, double height_m, const double d_local[3], double geodetic[3]);
-
-/* Geodetic place (degrees, degrees, metres) of a geocentric position; not-a-number on failure. */
+/* Geodetic place (degrees, degrees, metres) of a geocentric position; NaN on failure. */
 void shim_locate_ecef(const double p_ecef[3], double place[3]);
-/* UTM zone, or UPS for zone 0, to degrees and back: 0, or -1 with the reason. zone on the way there: 0 by
- * position, -1 UPS. */
+/* Easting and northing in a UTM zone, or in UPS for zone 0, to degrees: 0, or -1 with the reason. */
 int shim_locate_utm(int zone, int north, const double grid[2], double lat_lon_deg[2], char *why, size_t len);
-int shim_to_utm(const double lat_lon_deg[2], int *zone, int *north, double grid[2], char *why, size_t len);
+/* A place in a grid, zone as for locate_in_grid: 0, or -1 with the reason. */
+int shim_grid_at(const struct georef_place *place, int zone, struct locate_grid *out, char *why, size_t len);
 
-struct shim_geoid;
 /* The default geoid with cubic interpolation, wholly in memory. NULL on failure, with the reason. */
-struct shim_geoid *shim_geoid_open(char *why, size_t len);
-void shim_geoid_free(struct shim_geoid *geoid);
-
-/* A place in a grid (locate.c): 0, or -1 with the reason. */
-struct shim_utm {
-    int zone, north; /* zone 0: UPS */
-    double easting_m, northing_m, convergence_deg, scale;
-};
-/* zone: 1..60, 0: by position, or -1: UPS */
-int shim_utm_forward(double lat_deg, double lon_deg, int zone, struct shim_utm *out, char *why, size_t len);
+struct georef_geoid *shim_geoid_open(char *why, size_t len);
 
 /* From the scene frame about a centre to a grid zone, geodetic coordinates or ECEF. */
 struct shim_map;
@@ -46,20 +37,28 @@ struct shim_frame {
     int zone, north; /* grid; zone 0: UPS */
 };
 
-/* The output's grid. zone: 1..60, 0 for the standard zone, which beyond 84 N and 80 S is UPS, or -1: UPS. side: 0: the
- * place's hemisphere, 1: north, -1: south. */
+/* The output's grid. zone: 1..60, 0 for the standard zone, which beyond 84 N and 80 S is UPS, or -1: UPS.
+ * side: 0: the place's hemisphere, 1: north, -1: south. */
 struct shim_zone {
     int zone, side;
 };
 
-/* place: degrees, degrees, metres. geoid may be NULL. NULL on failure, with the reason. */
-struct shim_map *shim_map_create(enum shim_kind kind, const double place[3], const struct shim_frame *frame,
-                                 const struct shim_zone *zone, const struct shim_geoid *geoid, char *why, size_t len);
+struct shim_spec {
+    enum shim_kind kind;
+    double place[3]; /* of the centre: degrees, degrees, metres above the ellipsoid */
+    struct shim_frame frame;
+    struct shim_zone zone;
+    const struct georef_geoid *geoid; /* NULL: heights above the ellipsoid */
+};
+
+/* NULL on failure, with the reason. */
+struct shim_map *shim_map_create(const struct shim_spec *spec, char *why, size_t len);
 /* The same frame and zone about another centre, given as difference in prcs. */
 struct shim_map *shim_map_recentre(const struct shim_map *map, const double d_prcs[3], char *why, size_t len);
 void shim_map_free(struct shim_map *map);
 
-/* Of the centre: easting and northing with false origin, degrees, or X and Y; height as it leaves, or Z. EPSG code. */
+/* Of the centre: easting and northing with false origin, degrees, or X and Y; height as it leaves, or Z. EPSG
+ * code. */
 void shim_map_anchor(const struct shim_map *map, double anchor[3]);
 /* Of the centre: degrees, degrees, ellipsoidal height. */
 void shim_map_place(const struct shim_map *map, double place[3]);
@@ -75,8 +74,7 @@ int shim_map_epsg(const struct shim_map *map);
 void shim_map_convergence(const struct shim_map *map, double *convergence_deg, double *scale);
 
 /* Differences in prcs from the centre <-> differences from the anchor. In place is allowed. */
-void shim_map_forward(const struct shim_map *map, size_t n, const double *dx, const double *dy, const double *dz,
-                      double *out_x, double *out_y, double *out_z);
+void shim_map_forward(const struct shim_map *map, size_t n, struct vec3_in d, struct vec3_out out);
 void shim_map_reverse(const struct shim_map *map, const double d_map[3], double d_prcs[3]);
 
 #ifdef __cplusplus

@@ -6,27 +6,18 @@
 
 #include "core/angle.h"
 #include "core/georef/geographiclib_shim.h"
-#include "core/georef/private.h"
+#include "core/georef/state.h"
+#include "core/locate.h"
 #include "core/mat3.h"
 #include "core/vec3.h"
 
-/* Lowest land and sea bed to the edge of space: beyond, a unit or a sign is wrong. */
-#define HEIGHT_MIN_M (-12000.0)
-#define HEIGHT_MAX_M 100000.0
-
-/* Polynomials are fitted within this; within 1/64 of the distance from the axis where longitude is one of their
- * outputs: its series converges within that distance. */
+/* Polynomials are fitted within this; within 1/64 of the distance from the axis where longitude is one of
+ * their outputs: its series converges within that distance. */
 #define FIT_MAX_M   20000.0
 #define FIT_OF_AXIS (1.0 / 64.0)
 #define FIT_LEAST_M 1.0
 /* Nearer to a pole there is no longitude to begin with. */
 #define AXIS_LEAST_M 1.0
-
-static int check_range(const char *what, double value, double min, double max, const char *unit, struct sh_err *err)
-{
-    if (value >= min && value <= max) return SH_OK; /* false for not-a-number */
-    return sh_fail(err, SH_EINPUT, "georef: %s %g %s; allowed %g to %g", what, value, unit, min, max);
-}
 
 static int check_spec(const struct georef_spec *spec, struct sh_err *err)
 {
@@ -37,17 +28,10 @@ static int check_spec(const struct georef_spec *spec, struct sh_err *err)
         return sh_fail(err, SH_EINPUT, "georef: coordinate reference system %d; allowed local, ecef, utm, geodetic",
                        (int)spec->crs);
     if (spec->crs == GEOREF_LOCAL) return SH_OK;
-    int rc = check_range("latitude", spec->lat_deg, -90, 90, "deg", err);
-    if (rc == SH_OK) rc = check_range("longitude", spec->lon_deg, -180, 360, "deg", err);
-    if (rc == SH_OK) rc = check_range("height", spec->height_m, HEIGHT_MIN_M, HEIGHT_MAX_M, "m", err);
+    int rc = locate_check(&(struct georef_place){spec->lat_deg, spec->lon_deg, spec->height_m}, err);
     if (rc == SH_OK && spec->crs == GEOREF_UTM && (spec->utm_zone < GEOREF_UPS || spec->utm_zone > 60))
         rc = sh_fail(err, SH_EINPUT, "georef: UTM zone %d; allowed 1 to 60, or 0: by position", spec->utm_zone);
     return rc;
-}
-
-int georef_has_map(const struct georef *georef)
-{
-    return georef->map != NULL;
 }
 
 /* What differs from a unit matrix is wrong by more than rounding. */
@@ -85,8 +69,8 @@ static int is_same_grid(const struct georef_spec *spec)
            (spec->side == 0 || (spec->side > 0) == spec->prcs_north) && spec->geoid == NULL;
 }
 
-/* Metres per degree of latitude and of longitude at the centre, largest over height above it, and distance from the
- * axis. The meridian's radius of curvature is largest at the poles: a^2/b. */
+/* Metres per degree of latitude and of longitude at the centre, largest over height above it, and distance
+ * from the axis. The meridian's radius of curvature is largest at the poles: a^2/b. */
 void georef_degrees(const struct georef *georef, double height_m, double *lat_m, double *lon_m, double *axis_m)
 {
     double place[3], p[3], rotation[9];
@@ -97,7 +81,7 @@ void georef_degrees(const struct georef *georef, double height_m, double *lat_m,
     *lon_m = angle_rad(*axis_m);
 }
 
-/* What all depends on that hangs on the centre. */
+/* Sets what depends on the centre: anchor and polynomial. */
 static void set_up_centre(struct georef *georef)
 {
     struct shim_meridian meridian;
@@ -131,11 +115,16 @@ static int set_up_map(struct georef *georef, const struct georef_spec *spec, con
                       struct sh_err *err)
 {
     char why[256] = "";
-    const double place[3] = {spec->lat_deg, spec->lon_deg, spec->height_m};
-    enum shim_kind kind = spec->crs == GEOREF_UTM ? SHIM_GRID : spec->crs == GEOREF_ECEF ? SHIM_ECEF : SHIM_GEODETIC;
-    const struct shim_zone zone = {spec->utm_zone, spec->side};
-    georef->map = shim_map_create(kind, place, frame, &zone,
-                                  spec->geoid != NULL ? georef_geoid_shim(spec->geoid) : NULL, why, sizeof why);
+    const struct shim_spec map = {
+        .kind = spec->crs == GEOREF_UTM    ? SHIM_GRID
+                : spec->crs == GEOREF_ECEF ? SHIM_ECEF
+                                           : SHIM_GEODETIC,
+        .place = {spec->lat_deg, spec->lon_deg, spec->height_m},
+        .frame = *frame,
+        .zone = {spec->utm_zone, spec->side},
+        .geoid = spec->geoid,
+    };
+    georef->map = shim_map_create(&map, why, sizeof why);
     if (georef->map == NULL) return fail_map(spec, why, err);
     georef->has_geoid = spec->geoid != NULL;
     georef->from_grid = spec->prcs_is_grid;
@@ -291,7 +280,8 @@ int georef_set_method(struct georef *georef, enum georef_method method, struct s
     return SH_OK;
 }
 
-/* Rounding of positions of 6.4e6 to 1e7 m, and of GeographicLib, which states 5 nm for transverse Mercator. */
+/* Rounding of positions of 6.4e6 to 1e7 m, and of GeographicLib, which states 5 nm for transverse
+ * Mercator. */
 #define EXACT_LINEAR_M 5e-9
 #define EXACT_MAP_M    2e-8
 
@@ -310,30 +300,29 @@ double georef_bound_m(const struct georef *georef, enum georef_method method, do
     return EXACT_MAP_M + polynomial_bound_m(&georef->polynomial, order_of(method), radius_m, height_m, weight);
 }
 
-static void rotate(const double r[9], size_t n, const double *dx, const double *dy, const double *dz, double *out_x,
-                   double *out_y, double *out_z)
+static void rotate(const double r[9], size_t n, struct vec3_in d, struct vec3_out out)
 {
     for (size_t i = 0; i < n; i++) {
-        const double x = dx[i], y = dy[i], z = dz[i];
-        out_x[i] = r[0] * x + r[1] * y + r[2] * z;
-        out_y[i] = r[3] * x + r[4] * y + r[5] * z;
-        out_z[i] = r[6] * x + r[7] * y + r[8] * z;
+        const double x = d.x[i], y = d.y[i], z = d.z[i];
+        out.x[i] = r[0] * x + r[1] * y + r[2] * z;
+        out.y[i] = r[3] * x + r[4] * y + r[5] * z;
+        out.z[i] = r[6] * x + r[7] * y + r[8] * z;
     }
 }
 
-void georef_forward(const struct georef *georef, size_t n, const double *dx, const double *dy, const double *dz,
-                    double *out_x, double *out_y, double *out_z)
+void georef_forward(const struct georef *georef, size_t n, struct vec3_in d, struct vec3_out out)
 {
-    if (!georef_has_map(georef) && georef->crs != GEOREF_ECEF) {
-        memmove(out_x, dx, n * sizeof *out_x);
-        memmove(out_y, dy, n * sizeof *out_y);
-        memmove(out_z, dz, n * sizeof *out_z);
-    } else if (!georef_has_map(georef)) {
-        rotate(georef->rotation, n, dx, dy, dz, out_x, out_y, out_z);
-    } else if (georef->method == GEOREF_EXACT) {
-        shim_map_forward(georef->map, n, dx, dy, dz, out_x, out_y, out_z);
+    if (georef_has_map(georef)) {
+        if (georef->method == GEOREF_EXACT)
+            shim_map_forward(georef->map, n, d, out);
+        else
+            polynomial_apply(&georef->polynomial, order_of(georef->method), n, d, out);
+    } else if (georef->crs == GEOREF_ECEF) {
+        rotate(georef->rotation, n, d, out);
     } else {
-        polynomial_apply(&georef->polynomial, order_of(georef->method), n, dx, dy, dz, out_x, out_y, out_z);
+        memmove(out.x, d.x, n * sizeof *out.x);
+        memmove(out.y, d.y, n * sizeof *out.y);
+        memmove(out.z, d.z, n * sizeof *out.z);
     }
 }
 
@@ -353,9 +342,4 @@ void georef_difference(const struct georef *georef, const double p_crs[3], doubl
     for (int i = 0; i < 3; i++)
         d_crs[i] = p_crs[i] - georef->anchor[i];
     if (georef->crs == GEOREF_GEODETIC) d_crs[1] = remainder(d_crs[1], 360.0);
-}
-
-void georef_geodetic(double lat_deg, double lon_deg, double height_m, const double d_enu[3], double geodetic[3])
-{
-    shim_geodetic(lat_deg, lon_deg, height_m, d_enu, geodetic);
 }

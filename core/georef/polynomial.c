@@ -1,16 +1,18 @@
 /* The map as a polynomial: fit and bound.
  *
- * Fit. The map is taken by GeographicLib at 7 x 7 x 7 Chebyshev nodes of a cube about the centre and interpolated
- * (products of Lagrange polynomials, whose coefficients are made in long double). The nodes are kilometres apart, so
- * that the nanometres of rounding in GeographicLib's figures are divided by (20 km)^k in a coefficient of degree k and
- * come back multiplied by (scene / 20 km)^k; derivatives by small differences would do the opposite. Terms up to
- * degree 6 are kept, up to 3 or 5 are used. In the meridian the nodes lie in its plane.
+ * Fit. The map is taken by GeographicLib at 7 x 7 x 7 Chebyshev nodes of a cube about the centre and
+ * interpolated (products of Lagrange polynomials, whose coefficients are made in long double). The nodes are
+ * kilometres apart, so that the nanometres of rounding in GeographicLib's figures are divided by (20 km)^k in
+ * a coefficient of degree k and come back multiplied by (scene / 20 km)^k; derivatives by small differences
+ * would do the opposite. Terms up to degree 6 are kept, up to 3 or 5 are used. In the meridian the nodes lie
+ * in its plane.
  *
- * Bound. What an order leaves out is, for every point of the cylinder, at most the sum of the absolute values of the
- * terms left out up to degree 6, each at its own worst place; plus the rest of the series, which is taken as geometric
- * with the ratio of degree 5 to degree 4; plus ten times what the fit can have folded into lower terms of degree 7;
- * plus FLOOR_M for rounding. The first part is proven by the triangle inequality, the others are small beside it;
- * tests/accuracy/test_georef.c holds the whole against true errors at 200 places. */
+ * Bound. What an order leaves out is, for every point of the cylinder, at most the sum of the absolute values
+ * of the terms left out up to degree 6, each at its own worst place; plus the rest of the series, which is
+ * taken as geometric with the ratio of degree 5 to degree 4; plus ten times what the fit can have folded into
+ * lower terms of degree 7; plus FLOOR_M for rounding. The first part is proven by the triangle inequality,
+ * the others are small beside it; tests/accuracy/test_georef.c holds the whole against true errors at 200
+ * places. */
 #include "core/georef/polynomial.h"
 
 #include <math.h>
@@ -74,8 +76,8 @@ static void next_power(int power[3])
     }
 }
 
-/* Nodes in the meridian's plane, given as 0, n, u, and the map there. Behind the pole latitude goes on beyond 90
- * degrees. */
+/* Nodes in the meridian's plane, given as 0, n, u, and the map there. Beyond the pole latitude goes on beyond
+ * 90 degrees. */
 static void sample_meridian(const struct shim_map *map, const struct polynomial *p, double value[3][CUBE])
 {
     double place[3], pole;
@@ -84,13 +86,14 @@ static void sample_meridian(const struct shim_map *map, const struct polynomial 
     for (int i = 0; i < CUBE; i++) {
         double d[3], enu[3] = {0.0, value[1][i], value[2][i]};
         mat3_apply_transposed(p->meridian.turn, enu, d);
-        shim_map_forward(map, 1, &d[0], &d[1], &d[2], &value[0][i], &value[1][i], &value[2][i]);
+        shim_map_forward(map, 1, (struct vec3_in){&d[0], &d[1], &d[2]},
+                         (struct vec3_out){&value[0][i], &value[1][i], &value[2][i]});
         if (fabs(value[1][i]) > 90.0) value[0][i] = 2.0 * (pole - place[0]) - value[0][i];
         value[1][i] = 0.0;
     }
 }
 
-/* Of those of degree d, x^a y^b is the one (d-a)(d-a+1)/2 behind the first, y^b z^c the one d(d+1)/2 + c. */
+/* Of those of degree d, x^a y^b is the one (d-a)(d-a+1)/2 after the first, y^b z^c the one d(d+1)/2 + c. */
 static void set_up_plane(struct polynomial *p)
 {
     int first = 0, at = 0, meridian = p->form == POLYNOMIAL_MERIDIAN;
@@ -119,7 +122,8 @@ void polynomial_fit(const struct shim_map *map, enum polynomial_form form, doubl
         shim_map_meridian(map, &out->meridian);
         sample_meridian(map, out, value);
     } else {
-        shim_map_forward(map, CUBE, value[0], value[1], value[2], value[0], value[1], value[2]);
+        shim_map_forward(map, CUBE, (struct vec3_in){value[0], value[1], value[2]},
+                         (struct vec3_out){value[0], value[1], value[2]});
     }
     int power[3] = {0, 0, 0};
     for (int t = 0; t < POLYNOMIAL_TERMS; t++) {
@@ -178,8 +182,8 @@ static double series_bound_m(const struct polynomial *p, int order, double radiu
     return bound_m + 10.0 * whole_m[POLYNOMIAL_DEGREE] * ratio * reach_m / p->half_m;
 }
 
-/* Points of a frame that is turned may be as far up as they are away. Turning into the meridian moves a point by s - a,
- * at most radius^2 / 2a. */
+/* Points of a frame that is turned may be as far up as they are away. Turning into the meridian moves a point
+ * by s - a, at most radius^2 / 2a. */
 static double meridian_bound_m(const struct polynomial *p, int order, double radius_m, double height_m,
                                const double weight[3])
 {

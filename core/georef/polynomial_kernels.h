@@ -10,13 +10,14 @@
 #include "core/georef/polynomial.h"
 #include "core/vecmath.h"
 
-typedef void polynomial_space(const double c[POLYNOMIAL_USED], size_t n, const double *restrict x,
-                              const double *restrict y, const double *restrict z, double *restrict out);
-typedef void polynomial_flat(const double c[POLYNOMIAL_PLANE], size_t n, const double *restrict x,
-                             const double *restrict y, double *restrict out);
-typedef void polynomial_meridian(const struct polynomial *p, size_t n, const double *restrict x,
-                                 const double *restrict y, const double *restrict z, double *restrict out_x,
-                                 double *restrict out_y, double *restrict out_z);
+enum { POLYNOMIAL_BLOCK = 128 }; /* most points that a kernel takes at a time */
+
+/* out is none of the inputs. A restrict pointer that is a parameter: compilers don't see one that comes from
+ * a struct. */
+typedef void polynomial_space(const double c[POLYNOMIAL_USED], size_t n, struct vec3_in d, double *restrict out);
+typedef void polynomial_flat(const double c[POLYNOMIAL_PLANE], size_t n, struct vec3_in d, double *restrict out);
+typedef void polynomial_meridian(const struct polynomial *p, size_t n, struct vec3_in d,
+                                 double (*restrict out)[POLYNOMIAL_BLOCK]);
 
 /* By order; NULL where there is none. */
 struct polynomial_kernels {
@@ -27,8 +28,7 @@ struct polynomial_kernels {
 
 /* As polynomial_apply. */
 void polynomial_apply_with(const struct polynomial_kernels *kernels, const struct polynomial *p, int order, size_t n,
-                           const double *x, const double *y, const double *z, double *out_x, double *out_y,
-                           double *out_z);
+                           struct vec3_in d, struct vec3_out out);
 
 VEC_INLINE double space1(const double *c, double x, double y, double z)
 {
@@ -83,45 +83,46 @@ VEC_INLINE double twice_atan_deg(double t)
 }
 
 /* One output at a time: its coefficients stay in registers. */
-#define POLYNOMIAL_SPACE_KERNEL(ATTRIBUTE, name, order)                                                            \
-    ATTRIBUTE static void name##_space##order(const double c[POLYNOMIAL_USED], size_t n, const double *restrict x, \
-                                              const double *restrict y, const double *restrict z,                  \
-                                              double *restrict out)                                                \
-    {                                                                                                              \
-        double k[POLYNOMIAL_USED];                                                                                 \
-        memcpy(k, c, sizeof k);                                                                                    \
-        for (size_t i = 0; i < n; i++)                                                                             \
-            out[i] = space##order(k, x[i], y[i], z[i]);                                                            \
+#define POLYNOMIAL_SPACE_KERNEL(ATTRIBUTE, name, order)                                                    \
+    ATTRIBUTE static void name##_space##order(const double c[POLYNOMIAL_USED], size_t n, struct vec3_in d, \
+                                              double *restrict out)                                        \
+    {                                                                                                      \
+        const double *restrict x = d.x, *restrict y = d.y, *restrict z = d.z;                              \
+        double k[POLYNOMIAL_USED];                                                                         \
+        memcpy(k, c, sizeof k);                                                                            \
+        for (size_t i = 0; i < n; i++)                                                                     \
+            out[i] = space##order(k, x[i], y[i], z[i]);                                                    \
     }
-#define POLYNOMIAL_FLAT_KERNEL(ATTRIBUTE, name, order)                                                             \
-    ATTRIBUTE static void name##_flat##order(const double c[POLYNOMIAL_PLANE], size_t n, const double *restrict x, \
-                                             const double *restrict y, double *restrict out)                       \
-    {                                                                                                              \
-        double k[POLYNOMIAL_PLANE];                                                                                \
-        memcpy(k, c, sizeof k);                                                                                    \
-        for (size_t i = 0; i < n; i++)                                                                             \
-            out[i] = plane##order(k, x[i], y[i]);                                                                  \
+#define POLYNOMIAL_FLAT_KERNEL(ATTRIBUTE, name, order)                                                     \
+    ATTRIBUTE static void name##_flat##order(const double c[POLYNOMIAL_PLANE], size_t n, struct vec3_in d, \
+                                             double *restrict out)                                         \
+    {                                                                                                      \
+        const double *restrict x = d.x, *restrict y = d.y;                                                 \
+        double k[POLYNOMIAL_PLANE];                                                                        \
+        memcpy(k, c, sizeof k);                                                                            \
+        for (size_t i = 0; i < n; i++)                                                                     \
+            out[i] = plane##order(k, x[i], y[i]);                                                          \
     }
-#define POLYNOMIAL_MERIDIAN_KERNEL(ATTRIBUTE, name, order)                                                       \
-    ATTRIBUTE static void name##_meridian##order(                                                                \
-        const struct polynomial *p, size_t n, const double *restrict x, const double *restrict y,                \
-        const double *restrict z, double *restrict out_x, double *restrict out_y, double *restrict out_z)        \
-    {                                                                                                            \
-        double lat[POLYNOMIAL_PLANE], up[POLYNOMIAL_PLANE], t[9];                                                \
-        const double axis = p->meridian.axis_m, sine = p->meridian.sin_lat, cosine = p->meridian.cos_lat;        \
-        memcpy(lat, p->plane[0], sizeof lat);                                                                    \
-        memcpy(up, p->plane[1], sizeof up);                                                                      \
-        memcpy(t, p->meridian.turn, sizeof t);                                                                   \
-        for (size_t i = 0; i < n; i++) {                                                                         \
-            double e = t[0] * x[i] + t[1] * y[i] + t[2] * z[i], north = t[3] * x[i] + t[4] * y[i] + t[5] * z[i]; \
-            double u = t[6] * x[i] + t[7] * y[i] + t[8] * z[i], a = axis + (cosine * u - sine * north);          \
-            double half = e / (sqrt(a * a + e * e) + a), out = e * half; /* tangent of half the angle; s - a */  \
-            north -= sine * out;                                                                                 \
-            u += cosine * out;                                                                                   \
-            out_x[i] = plane##order(lat, north, u);                                                              \
-            out_y[i] = twice_atan_deg(half);                                                                     \
-            out_z[i] = plane##order(up, north, u);                                                               \
-        }                                                                                                        \
+#define POLYNOMIAL_MERIDIAN_KERNEL(ATTRIBUTE, name, order)                                                        \
+    ATTRIBUTE static void name##_meridian##order(const struct polynomial *p, size_t n, struct vec3_in d,          \
+                                                 double(*restrict out)[POLYNOMIAL_BLOCK])                         \
+    {                                                                                                             \
+        const double *restrict x = d.x, *restrict y = d.y, *restrict z = d.z;                                     \
+        double lat[POLYNOMIAL_PLANE], up[POLYNOMIAL_PLANE], t[9];                                                 \
+        const double axis = p->meridian.axis_m, sine = p->meridian.sin_lat, cosine = p->meridian.cos_lat;         \
+        memcpy(lat, p->plane[0], sizeof lat);                                                                     \
+        memcpy(up, p->plane[1], sizeof up);                                                                       \
+        memcpy(t, p->meridian.turn, sizeof t);                                                                    \
+        for (size_t i = 0; i < n; i++) {                                                                          \
+            double e = t[0] * x[i] + t[1] * y[i] + t[2] * z[i], north = t[3] * x[i] + t[4] * y[i] + t[5] * z[i];  \
+            double u = t[6] * x[i] + t[7] * y[i] + t[8] * z[i], a = axis + (cosine * u - sine * north);           \
+            double half = e / (sqrt(a * a + e * e) + a), moved = e * half; /* tangent of half the angle; s - a */ \
+            north -= sine * moved;                                                                                \
+            u += cosine * moved;                                                                                  \
+            out[0][i] = plane##order(lat, north, u);                                                              \
+            out[1][i] = twice_atan_deg(half);                                                                     \
+            out[2][i] = plane##order(up, north, u);                                                               \
+        }                                                                                                         \
     }
 #define POLYNOMIAL_KERNELS(ATTRIBUTE, name)                                           \
     POLYNOMIAL_SPACE_KERNEL(ATTRIBUTE, name, 1)                                       \

@@ -2,13 +2,13 @@
 #include <math.h>
 
 #include "core/angle.h"
-#include "core/georef/private.h"
+#include "core/georef/state.h"
 
 /* Half a count less than 2^31, for rounding; -2^31 says that there is no point. */
 static const double MOST_COUNTS = 2147483646.5;
 
-/* Largest difference of each coordinate from the anchor, in units of the CRS, and what a count of one metre would be.
- */
+/* Largest difference of each coordinate from the anchor, in units of the CRS, and what a count of one metre
+ * would be. */
 static void spans(const struct georef *georef, double reach_m, double span[3], double unit[3])
 {
     for (int i = 0; i < 3; i++) {
@@ -21,7 +21,8 @@ static void spans(const struct georef *georef, double reach_m, double span[3], d
             span[i] *= 1.1;
         return;
     }
-    /* Heights differ from those of the tangent plane by reach^2 / 2R, a geoid's by less than 1 % of the way. */
+    /* Heights differ from those of the tangent plane by reach^2 / 2R, a geoid's by less than 1 % of the
+     * way. */
     span[2] = reach_m * 1.01 + reach_m * reach_m / (2 * 6.3e6);
     if (georef->crs == GEOREF_UTM) {
         double convergence_rad, scale;
@@ -52,7 +53,7 @@ int georef_scale(const struct georef *georef, double scale_m, double reach_m, do
         else
             least_m = fmax(least_m, span[i] / unit[i] / MOST_COUNTS);
     }
-    if (least_m <= scale_m) return SH_OK; /* false for not-a-number */
+    if (least_m <= scale_m) return SH_OK; /* false for NaN */
     return sh_fail(
         err, SH_EINPUT,
         "coordinates up to %g m from their anchor do not fit into 31 bits at %g m per count; at least %.3g m", reach_m,

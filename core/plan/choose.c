@@ -26,57 +26,59 @@ static void leave_out(struct plan_row *row, const struct plan_option *option, co
     *left = *option;
     if (option->why_not[0] != '\0') return;
     if (option->error_m > tolerance->range_m)
-        snprintf(left->why_not, sizeof left->why_not, "its ranges are off by more than %.3g m", tolerance->range_m);
+        snprintf(left->why_not, sizeof left->why_not, "its range error is above %.3g m", tolerance->range_m);
     else if (option->echo_share > tolerance->echo_share)
         snprintf(left->why_not, sizeof left->why_not, "more than %.3g %% of the pulses get another echo count",
                  100.0 * tolerance->echo_share);
     else
-        snprintf(left->why_not, sizeof left->why_not, "%s", option->cost_ns <= chosen_ns ? "not asked for" : "dearer");
+        snprintf(left->why_not, sizeof left->why_not, "%s",
+                 option->cost_ns <= chosen_ns ? "not asked for" : "costs more");
 }
 
-static void say_why(struct plan_row *row, const struct plan_option *it, uint32_t can, const char *key,
-                    const struct plan_tolerance *tolerance)
+static void say_why(struct plan_row *row, const struct plan_option *it, uint32_t can, const struct plan_choice *choice)
 {
+    const struct plan_tolerance *tolerance = &choice->tolerance;
     char first[96];
     int holds = plan_holds(it, tolerance), known = !isnan(it->error_m) && !isnan(it->echo_share);
     const char *verdict = holds ? "holds" : "does not hold";
     if (row->forced)
-        snprintf(first, sizeof first, "forced by %s", key);
+        snprintf(first, sizeof first, "forced by %s", choice->key);
     else
         snprintf(first, sizeof first, "%s",
                  can == 1 ? "the only one that can be had"
                  : holds  ? "the cheapest"
-                          : "the one that is least off");
+                          : "the one with the least error");
     if (known)
         snprintf(row->why, sizeof row->why, "%s; %s %.3g m, and %.3g %% of the pulses with another echo count", first,
                  verdict, tolerance->range_m, 100.0 * tolerance->echo_share);
     else
-        snprintf(row->why, sizeof row->why, "%s; what it is off is not known", first);
+        snprintf(row->why, sizeof row->why, "%s; its error is not known", first);
 }
 
-uint32_t plan_choose(struct plan_row *row, const char *stage, const struct plan_option *option, uint32_t n, int forced,
-                     const char *key, const struct plan_tolerance *tolerance)
+uint32_t plan_choose(const struct plan_choice *choice, struct plan_row *row)
 {
+    const struct plan_option *option = choice->option;
+    const struct plan_tolerance *tolerance = &choice->tolerance;
     uint32_t chosen = 0, can = 0;
     int holds = 0;
-    for (uint32_t i = 0; i < n; i++) {
+    for (uint32_t i = 0; i < choice->n; i++) {
         can += option[i].why_not[0] == '\0';
         if (!plan_holds(&option[i], tolerance) || (holds && !(option[i].cost_ns < option[chosen].cost_ns))) continue;
         chosen = i;
         holds = 1;
     }
-    /* Of those that miss it by as much, the last: options go from rough to exact. */
-    for (uint32_t i = 0; i < n && !holds; i++) {
-        double off = excess(&option[i], tolerance), least = excess(&option[chosen], tolerance);
-        if (off < least || (off == least && off < 1e300)) chosen = i;
+    /* Of those that miss it by as much, the last, which is the most exact. */
+    for (uint32_t i = 0; i < choice->n && !holds; i++) {
+        double over = excess(&option[i], tolerance), least = excess(&option[chosen], tolerance);
+        if (over < least || (over == least && over < 1e300)) chosen = i;
     }
-    if (forced >= 0) chosen = (uint32_t)forced;
+    if (choice->forced >= 0) chosen = (uint32_t)choice->forced;
     const struct plan_option *it = &option[chosen];
-    plan_say(row, stage, it->method, it->error_m, it->cost_ns, "");
+    plan_say(row, choice->stage, it->method, it->error_m, it->cost_ns, "");
     row->echo_share = it->echo_share;
-    row->forced = forced >= 0;
-    say_why(row, it, can, key, tolerance);
-    for (uint32_t i = 0; i < n; i++)
+    row->forced = choice->forced >= 0;
+    say_why(row, it, can, choice);
+    for (uint32_t i = 0; i < choice->n; i++)
         if (i != chosen) leave_out(row, &option[i], tolerance, it->cost_ns);
     return chosen;
 }

@@ -44,9 +44,9 @@ static void leave_out(const struct georef *georef, const struct plan_georef_need
         snprintf(left->method, sizeof left->method, "%s", methods[m].name);
         snprintf(left->why_not, sizeof left->why_not, "%s",
                  !isfinite(left->error_m)            ? "it has no bound here"
-                 : left->error_m > need->tolerance_m ? "off by more than the tolerance"
+                 : left->error_m > need->tolerance_m ? "its error is above the tolerance"
                  : need->forced != GEOREF_AUTO       ? "not asked for"
-                                                     : "dearer, or no better");
+                                                     : "costs more, or is no better");
     }
 }
 
@@ -80,7 +80,7 @@ int plan_georef(const struct georef *georef, const struct plan_georef_need *need
     row->forced = need->forced != GEOREF_AUTO;
     leave_out(georef, need, *method, row);
     const char *why = need->forced != GEOREF_AUTO       ? "asked for by output.georef"
-                      : !(bound_m <= need->tolerance_m) ? "nothing meets the tolerance"
+                      : !(bound_m <= need->tolerance_m) ? "no method meets the tolerance"
                       : *method != GEOREF_EXACT         ? "the cheapest that meets the tolerance"
                       : georef_has_geoid(georef)        ? "the geoid is interpolated for each point"
                                                         : "no polynomial meets the tolerance";

@@ -32,7 +32,7 @@ void plan_cast(uint32_t packet, struct plan_row *row)
     plan_say(row, "cast", method, CAST_ERROR_M, 0.0, "triangle and range in double where float can't tell");
 }
 
-/* Within how much of the range float can't tell two surfaces apart. */
+/* Share of the range within which float can't tell two surfaces apart. */
 static const double FLOAT_ORDER = 5e-7;
 
 void plan_order_options(double far_m, struct plan_option option[2])
@@ -93,10 +93,10 @@ size_t plan_head(const struct plan_head *head, struct plan_row rows[PLAN_HEAD_RO
     row = plan_signal(row, head);
     row = plan_noise(row, head);
     if (head->ambiguity == DETECT_AMBIGUITY_NONE)
-        row = add(row, "zones", "none", 0.0, 0.0, "head.ambiguity is none: echoes are told where they are");
+        row = add(row, "zones", "none", 0.0, 0.0, "head.ambiguity is none: echoes have their true range");
     else
         row = add(row, "zones", head->ambiguity == DETECT_FOLDED ? "folded" : "resolved", 0.0, 1.0,
-                  "head.ambiguity: echoes from behind the next pulse");
+                  "head.ambiguity: echoes that return after the next pulse");
     if (head->instrument || head->angle_noise)
         row = add(row, "geometry", head->instrument ? "errors of geometry" : "angle noise", 0.0, 15.0,
                   "instrument, noise.angle: each beam is aimed by the real mechanics, read by the encoders");

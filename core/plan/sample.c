@@ -8,7 +8,7 @@
 #include "core/rng.h"
 
 /* Two rays' ranges further apart than that are not those of one smooth surface: at 80 deg, 100 m and 0.35 mrad, the
- * mean over a footprint is 2 um off its centre. */
+ * mean over a footprint differs from its centre by 2 um. */
 static const double SMOOTH_M = 5e-5;
 
 enum {
@@ -18,7 +18,7 @@ enum {
     PLAIN_EVERY = 8,    /* one of so many */
     PROBE_RINGS = 4,
     OPTICS_DRAWN = 8192,
-    TRIES = 1 << 20, /* for each pulse: few of them are cast where the field of view is narrow */
+    TRIES = 1 << 20, /* for each pulse: where the field of view is narrow, most are not cast */
     ROOM = 64,       /* in the block; more than LINE_MAX_ECHOES */
 };
 
@@ -185,11 +185,11 @@ static void prepare_beam(struct plan_sample *s)
         cast_beam(s, &s->look[i], BEAM_RINGS, &s->look[i].reference);
 }
 
-/* What was found: of mixed pulses each stands for itself, of the others each for many. */
+/* What was found. Of mixed pulses each stands for itself, of the others each stands for many. */
 struct tally {
-    double echoes, further, sum2,
-        sum4; /* further than the first of a pulse; of what ranges are off, squared; and squared again */
-    double wrong_mixed, wrong_plain;
+    double echoes, further;          /* further: beyond the first of a pulse */
+    double sum2, sum4;               /* of range errors, squared, and to the fourth power */
+    double wrong_mixed, wrong_plain; /* pulses with another number of echoes */
 };
 
 static void compare(struct tally *t, const struct echoes *got, const struct echoes *want, double weight, int mixed)
@@ -197,10 +197,10 @@ static void compare(struct tally *t, const struct echoes *got, const struct echo
     t->further += got->n > 1 ? weight * (got->n - 1) : 0.0;
     if (got->n != want->n) *(mixed ? &t->wrong_mixed : &t->wrong_plain) += weight;
     for (uint32_t i = 0; got->n == want->n && i < got->n; i++) {
-        double off = got->range_m[i] - want->range_m[i], off2 = off * off;
+        double error = got->range_m[i] - want->range_m[i], error2 = error * error;
         t->echoes += weight;
-        t->sum2 += weight * off2;
-        t->sum4 += weight * weight * off2 * off2;
+        t->sum2 += weight * error2;
+        t->sum4 += weight * weight * error2 * error2;
     }
 }
 

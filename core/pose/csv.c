@@ -7,17 +7,17 @@
 
 enum { CELL_LEN = 64 };
 
-/* The next line that counts, without blanks at its ends; 0 at the end of the file. */
-static size_t next_line(struct csv *csv, const char **line)
+/* The next line that counts, without blanks at its ends; empty at the end of the file. */
+static struct text_span next_line(struct csv *csv)
 {
     struct text *t = &csv->text;
     while (t->p < t->end) {
         csv->line = t->line;
-        size_t len = text_rest(t, line);
+        struct text_span line = text_rest(t);
         text_next_line(t);
-        if (len != 0 && (*line)[0] != '#') return len;
+        if (line.n != 0 && line.p[0] != '#') return line;
     }
-    return 0;
+    return (struct text_span){NULL, 0};
 }
 
 /* The next cell, NUL-terminated; 0: there is none; -1: too long. */
@@ -46,12 +46,11 @@ static int fail_name(const struct csv *csv, const char *name, const char *what, 
 
 static int read_names(struct csv *csv, struct sh_err *err)
 {
-    const char *line, *p;
     char cell[CELL_LEN];
-    size_t len = next_line(csv, &line);
-    if (len == 0) return text_fail(&csv->text, 0, SH_EINPUT, err, "empty; its first line has to name the columns");
-    p = line;
-    for (int got; (got = next_cell(&p, line + len, cell)) != 0;) {
+    struct text_span line = next_line(csv);
+    const char *p = line.p;
+    if (line.n == 0) return text_fail(&csv->text, 0, SH_EINPUT, err, "empty; its first line has to name the columns");
+    for (int got; (got = next_cell(&p, line.p + line.n, cell)) != 0;) {
         int k = 0;
         if (got < 0) return text_fail(&csv->text, csv->line, SH_EINPUT, err, "a column's name is too long");
         while (csv->known[k] != NULL && strcmp(csv->known[k], cell) != 0)
@@ -88,13 +87,12 @@ static int read_number(const struct csv *csv, const char *cell, double *value)
 
 int csv_next(struct csv *csv, struct sh_err *err)
 {
-    const char *line, *p;
     char cell[CELL_LEN];
-    size_t len = next_line(csv, &line);
-    if (len == 0) return 0;
-    p = line;
+    struct text_span line = next_line(csv);
+    const char *p = line.p;
+    if (line.n == 0) return 0;
     int n = 0;
-    for (int got; (got = next_cell(&p, line + len, cell)) != 0; n++) {
+    for (int got; (got = next_cell(&p, line.p + line.n, cell)) != 0; n++) {
         if (n == csv->n_columns)
             return text_fail(&csv->text, csv->line, SH_EINPUT, err, "more than the %d values that the first line names",
                              csv->n_columns);

@@ -2,7 +2,7 @@
 #ifndef CORE_POSE_CSV_H
 #define CORE_POSE_CSV_H
 
-#include "core/scene/text.h"
+#include "core/text.h"
 
 enum { CSV_MAX_COLUMNS = 16 };
 

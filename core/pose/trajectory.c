@@ -5,7 +5,7 @@
 
 #include "core/pose/trajectory.h"
 
-static const double LONGEST_RAD = 0.01; /* see trajectory_knots */
+static const double LONGEST_RAD = 0.01; /* see struct pose_knot_rules */
 
 static double chord_rate(const struct trajectory *tr, size_t i, int axis)
 {
@@ -142,22 +142,18 @@ static double acceleration(const struct trajectory *tr, size_t i)
     return sqrt(fmax(at_a, at_b));
 }
 
-/* What knots have to keep. */
-struct limits {
-    double arm_m, tolerance_m, longest_s, longest_m;
-};
-
-/* Parts that interval i is cut in, and what stays of the deviation. */
-static double parts_of(const struct trajectory *tr, size_t i, const struct limits *limits, double *error_m)
+/* Parts that interval i is cut in, and the deviation that is left. arm_m: of the head, from the body's
+ * origin. */
+static double parts_of(const struct trajectory *tr, size_t i, const struct pose_knot_rules *rules, double arm_m,
+                       double *error_m)
 {
     const struct pose *a = &tr->sample[i].pose, *b = &tr->sample[i + 1].pose;
-    double h = tr->sample[i + 1].t_s - tr->sample[i].t_s, turn = pose_angle_between(a->quat, b->quat), chord2 = 0.0;
-    for (int k = 0; k < 3; k++)
-        chord2 += (b->position_m[k] - a->position_m[k]) * (b->position_m[k] - a->position_m[k]);
-    double moves = fmax((sqrt(chord2) + turn * limits->arm_m) / limits->longest_m, turn / LONGEST_RAD);
-    double sag = (acceleration(tr, i) + turn / h * turn / h * limits->arm_m) * h * h / 8.0; /* in one part */
-    double parts =
-        fmax(ceil(sqrt(sag / limits->tolerance_m)), fmin(ceil(h / limits->longest_s * (1.0 - 1e-9)), ceil(moves)));
+    double h = tr->sample[i + 1].t_s - tr->sample[i].t_s, turn = pose_angle_between(a->quat, b->quat);
+    double moves = fmax((trajectory_chord_m(&tr->sample[i], &tr->sample[i + 1]) + turn * arm_m) / rules->longest_m,
+                        turn / LONGEST_RAD);
+    double sag = (acceleration(tr, i) + turn / h * turn / h * arm_m) * h * h / 8.0; /* in one part */
+    double longest_s = 1e-9 * (double)rules->longest_ns;
+    double parts = fmax(ceil(sqrt(sag / rules->tolerance_m)), fmin(ceil(h / longest_s * (1.0 - 1e-9)), ceil(moves)));
     double most = floor(h / (1e-6 * POSE_MIN_STEP_US));
     parts = fmax(1.0, fmin(parts, most));
     *error_m = fmax(*error_m, sag / (parts * parts));
@@ -173,39 +169,31 @@ static void set_knot(const struct trajectory *tr, double start_s, int64_t t_ns, 
     pose_mount(&body, mount, &knot->pose);
 }
 
-int trajectory_knots(const struct trajectory *tr, double start_s, double end_s, const struct pose *mount,
-                     double tolerance_m, int64_t longest_ns, double longest_m, struct pose_knot **out, size_t *n,
-                     double *error_m, struct sh_err *err)
+int trajectory_knots(const struct trajectory *tr, const struct pose *mount, const struct pose_knot_rules *rules,
+                     struct pose_path *out, struct sh_err *err)
 {
-    const double *arm = mount->position_m;
-    const struct limits limits = {sqrt(arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2]), tolerance_m,
-                                  1e-9 * (double)longest_ns, longest_m};
+    const double *arm = mount->position_m, start_s = rules->start_s, end_s = rules->end_s;
+    const double arm_m = sqrt(arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2]);
     double most = 1.0;
-    *error_m = 0.0;
+    *out = (struct pose_path){0};
     for (size_t i = 0; i + 1 < tr->n; i++)
-        if (tr->sample[i + 1].t_s > start_s && tr->sample[i].t_s < end_s) {
-            double ignored = 0.0;
-            most += parts_of(tr, i, &limits, &ignored) + 1;
-        }
+        if (tr->sample[i + 1].t_s > start_s && tr->sample[i].t_s < end_s)
+            most += parts_of(tr, i, rules, arm_m, &out->error_m) + 1;
     if (!(most <= POSE_MAX_KNOTS))
         return sh_fail(err, SH_EINPUT, "the trajectory needs up to %.0f poses from %.9g s on; allowed %d", most,
                        start_s, POSE_MAX_KNOTS);
-    size_t room = (size_t)most;
-    struct pose_knot *knot = malloc(room * sizeof *knot);
-    if (knot == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %zu poses of a trajectory", room);
-    size_t k = 0;
-    set_knot(tr, start_s, 0, mount, &knot[k++]);
+    out->knot = malloc((size_t)most * sizeof *out->knot);
+    if (out->knot == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %.0f poses of a trajectory", most);
+    set_knot(tr, start_s, 0, mount, &out->knot[out->n++]);
     for (size_t i = 0; i + 1 < tr->n && tr->sample[i].t_s < end_s; i++) {
         double a_s = tr->sample[i].t_s, b_s = tr->sample[i + 1].t_s;
         if (b_s <= start_s) continue;
-        size_t parts = (size_t)parts_of(tr, i, &limits, error_m);
+        size_t parts = (size_t)parts_of(tr, i, rules, arm_m, &out->error_m);
         for (size_t j = 1; j <= parts; j++) {
             double t_s = j == parts ? b_s : a_s + (b_s - a_s) * ((double)j / (double)parts);
             int64_t t_ns = llround(1e9 * (fmin(t_s, end_s) - start_s));
-            if (t_ns > knot[k - 1].t_ns) set_knot(tr, start_s, t_ns, mount, &knot[k++]);
+            if (t_ns > out->knot[out->n - 1].t_ns) set_knot(tr, start_s, t_ns, mount, &out->knot[out->n++]);
         }
     }
-    *out = knot;
-    *n = k;
     return SH_OK;
 }

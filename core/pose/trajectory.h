@@ -2,12 +2,24 @@
 #ifndef CORE_POSE_TRAJECTORY_H
 #define CORE_POSE_TRAJECTORY_H
 
+#include <math.h>
+
 #include "core/pose.h"
+#include "core/vec3.h"
 
 struct trajectory {
     size_t n;
     struct pose_sample *sample; /* quaternions of length one */
     double (*velocity_m_s)[3];  /* at the samples */
 };
+
+/* The straight way between two samples. */
+static inline double trajectory_chord_m(const struct pose_sample *a, const struct pose_sample *b)
+{
+    double d[3];
+    for (int k = 0; k < 3; k++)
+        d[k] = b->pose.position_m[k] - a->pose.position_m[k];
+    return sqrt(vec3_dot(d, d));
+}
 
 #endif

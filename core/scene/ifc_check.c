@@ -2,6 +2,7 @@
 
 #include <stdlib.h>
 
+#include "core/grow.h"
 #include "core/scene/step.h"
 
 struct ids {
@@ -9,26 +10,13 @@ struct ids {
     size_t n, room;
 };
 
-static int add(struct ids *ids, uint64_t id, struct sh_err *err)
-{
-    if (ids->n == ids->room) {
-        size_t room = ids->room != 0 ? 2 * ids->room : 4096;
-        uint64_t *more = realloc(ids->id, room * sizeof *more);
-        if (more == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %zu record numbers", room);
-        ids->id = more;
-        ids->room = room;
-    }
-    ids->id[ids->n++] = id;
-    return SH_OK;
-}
-
 static int compare(const void *a, const void *b)
 {
     uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
     return (x > y) - (x < y);
 }
 
-/* Numbers behind a '#', but not those in texts. */
+/* Checks the numbers after a '#', except in texts. */
 static int check_record(const struct text *t, const struct ids *ids, const struct step_record *record,
                         struct sh_err *err)
 {
@@ -54,7 +42,9 @@ static int check(struct text *t, struct ids *ids, struct sh_err *err)
     int rc, sorted = 1;
     while ((rc = step_next(t, &record, err)) == 1) {
         sorted &= ids->n == 0 || ids->id[ids->n - 1] <= record.id;
-        if ((rc = add(ids, record.id, err)) != SH_OK) return rc;
+        if (!grow(&ids->id, &ids->room, ids->n + 1, sizeof *ids->id))
+            return text_fail(t, 0, SH_ENOMEM, err, "no memory for %zu record numbers", ids->n + 1);
+        ids->id[ids->n++] = record.id;
     }
     if (rc < 0) return rc;
     if (!sorted) qsort(ids->id, ids->n, sizeof ids->id[0], compare);

@@ -4,8 +4,8 @@
 
 #include "core/err.h"
 
-/* Every reference #id must have its record: SH_EINPUT names file, line and id. References to records of a type that the
- * file's schema does not have are not found: Assimp takes those for missing. */
+/* Every reference #id must have its record: SH_EINPUT names file, line and id. References to records of a
+ * type that the file's schema does not have are not found: Assimp takes those for missing. */
 int ifc_check_references(const char *path, struct sh_err *err);
 
 #endif

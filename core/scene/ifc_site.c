@@ -30,18 +30,18 @@ static int fail(struct reader *r, const struct step_record *at, const char *what
 /* Sites without angles (of other parts of a complex) don't count. */
 static int is_located(const struct step_record *site)
 {
-    struct step_span arg[SITE_ARGS];
-    return step_split(site->args, arg, SITE_ARGS) != SITE_ARGS || !step_is(arg[SITE_LATITUDE], "$") ||
-           !step_is(arg[SITE_LONGITUDE], "$");
+    struct text_span arg[SITE_ARGS];
+    return step_split(site->args, arg, SITE_ARGS) != SITE_ARGS || !text_is(arg[SITE_LATITUDE], "$") ||
+           !text_is(arg[SITE_LONGITUDE], "$");
 }
 
 /* Contexts of type 'Model' go before those of plans. */
 static int take_context(struct reader *r, const struct step_record *record)
 {
-    struct step_span arg[CONTEXT_ARGS];
+    struct text_span arg[CONTEXT_ARGS];
     if (step_split(record->args, arg, CONTEXT_ARGS) != CONTEXT_ARGS)
         return fail(r, record, "not the 6 attributes that IFC defines");
-    int is_model = step_is(arg[CONTEXT_TYPE], "'Model'");
+    int is_model = text_is(arg[CONTEXT_TYPE], "'Model'");
     if (r->n_contexts++ == 0 || (is_model && !r->is_model)) {
         r->context = *record;
         r->is_model = is_model;
@@ -54,16 +54,16 @@ static int collect(struct reader *r)
     struct step_record record;
     int rc;
     while ((rc = step_next(&r->text, &record, r->err)) == 1) {
-        if (step_is(record.type, "IFCSITE") && is_located(&record)) {
+        if (text_is(record.type, "IFCSITE") && is_located(&record)) {
             r->site = record;
             if (r->n_sites++ > 0) return fail(r, &record, "a second site with a latitude; allowed one");
-        } else if (step_is(record.type, "IFCGEOMETRICREPRESENTATIONCONTEXT")) {
+        } else if (text_is(record.type, "IFCGEOMETRICREPRESENTATIONCONTEXT")) {
             if ((rc = take_context(r, &record)) != SH_OK) return rc;
-        } else if (step_is(record.type, "IFCPROJECT")) {
+        } else if (text_is(record.type, "IFCPROJECT")) {
             r->project = record;
             r->n_projects++;
         }
-        r->has_map |= step_is(record.type, "IFCMAPCONVERSION");
+        r->has_map |= text_is(record.type, "IFCMAPCONVERSION");
     }
     if (rc < 0) return rc;
     if (r->n_sites == 0)
@@ -71,27 +71,34 @@ static int collect(struct reader *r)
     return SH_OK;
 }
 
-/* The record that an attribute refers to, of this type and with n attributes at least (n <= STEP_MAX_ARGS). */
-static int follow(struct reader *r, const struct step_record *from, struct step_span ref, const char *type, size_t n,
-                  struct step_record *to, struct step_span *arg)
+/* A record with its attributes. */
+struct found {
+    struct step_record record;
+    struct text_span arg[STEP_MAX_ARGS];
+};
+
+/* The record that an attribute refers to, of this type and with n attributes at least (n <=
+ * STEP_MAX_ARGS). */
+static int follow(struct reader *r, const struct step_record *from, struct text_span ref, const char *type, size_t n,
+                  struct found *to)
 {
     uint64_t id;
     char what[96];
     snprintf(what, sizeof what, "no reference to %s where one is needed", type);
     if (!step_reference(ref, &id)) return fail(r, from, what);
-    int rc = step_find(&r->text, id, to, r->err);
+    int rc = step_find(&r->text, id, &to->record, r->err);
     if (rc != SH_OK) return rc;
-    if (!step_is(to->type, type)) return fail(r, from, what);
-    if (step_split(to->args, arg, STEP_MAX_ARGS) < n) return fail(r, to, "attributes are missing");
+    if (!text_is(to->record.type, type)) return fail(r, from, what);
+    if (step_split(to->record.args, to->arg, STEP_MAX_ARGS) < n) return fail(r, &to->record, "attributes are missing");
     return SH_OK;
 }
 
 /* Whole degrees, minutes, seconds, and perhaps millionths of seconds, all of one sign. */
-static int read_angle(struct reader *r, struct step_span span, const char *name, double limit_deg, double *deg)
+static int read_angle(struct reader *r, struct text_span span, const char *name, double limit_deg, double *deg)
 {
     static const double per_deg[4] = {1.0, 60.0, 3600.0, 3.6e9};
     static const long limit[4] = {360, 60, 60, 1000000};
-    struct step_span list, part[4];
+    struct text_span list, part[4];
     char what[160];
     long value[4], sign = 0;
     size_t n = step_list(span, &list) ? step_split(list, part, 4) : 0;
@@ -113,7 +120,7 @@ static int read_angle(struct reader *r, struct step_span span, const char *name,
 }
 
 /* Metres per unit of an IFCSIUNIT of length. */
-static int read_prefix(struct reader *r, const struct step_record *unit, struct step_span prefix, double *m)
+static int read_prefix(struct reader *r, const struct step_record *unit, struct text_span prefix, double *m)
 {
     static const struct {
         const char *name;
@@ -121,28 +128,30 @@ static int read_prefix(struct reader *r, const struct step_record *unit, struct 
     } known[] = {{"$", 1.0},        {".MILLI.", 1e-3}, {".CENTI.", 1e-2}, {".DECI.", 1e-1},
                  {".MICRO.", 1e-6}, {".KILO.", 1e3},   {".DECA.", 10.0},  {".HECTO.", 100.0}};
     for (size_t i = 0; i < sizeof known / sizeof known[0]; i++) {
-        if (!step_is(prefix, known[i].name)) continue;
+        if (!text_is(prefix, known[i].name)) continue;
         *m = known[i].m;
         return SH_OK;
     }
     return fail(r, unit, "a length unit with an unknown prefix");
 }
 
-/* IFCCONVERSIONBASEDUNIT(dimensions, .LENGTHUNIT., name, #IFCMEASUREWITHUNIT(measure(x), #unit)), as of feet. */
-static int read_converted(struct reader *r, const struct step_record *unit, struct step_span ref, double *m)
+/* IFCCONVERSIONBASEDUNIT(dimensions, .LENGTHUNIT., name, #IFCMEASUREWITHUNIT(measure(x), #unit)), as of
+ * feet. */
+static int read_converted(struct reader *r, const struct step_record *unit, struct text_span ref, double *m)
 {
-    struct step_span arg[STEP_MAX_ARGS], base[STEP_MAX_ARGS], list;
-    struct step_record measure, si;
+    struct found measure, si;
+    struct text_span list;
     double factor;
-    int rc = follow(r, unit, ref, "IFCMEASUREWITHUNIT", 2, &measure, arg);
-    if (rc == SH_OK) rc = follow(r, &measure, arg[1], "IFCSIUNIT", 4, &si, base);
-    if (rc == SH_OK) rc = read_prefix(r, &si, base[2], m);
+    int rc = follow(r, unit, ref, "IFCMEASUREWITHUNIT", 2, &measure);
+    if (rc == SH_OK) rc = follow(r, &measure.record, measure.arg[1], "IFCSIUNIT", 4, &si);
+    if (rc == SH_OK) rc = read_prefix(r, &si.record, si.arg[2], m);
     if (rc != SH_OK) return rc;
-    const char *open = memchr(arg[0].p, '(', arg[0].n);
-    size_t skip = open != NULL ? (size_t)(open - arg[0].p) : 0;
-    if (!step_list((struct step_span){arg[0].p + skip, arg[0].n - skip}, &list) ||
-        !step_real(&r->text, list, &factor) || factor <= 0.0)
-        return fail(r, &measure, "no factor of a length unit");
+    struct text_span value = measure.arg[0];
+    const char *open = memchr(value.p, '(', value.n);
+    size_t skip = open != NULL ? (size_t)(open - value.p) : 0;
+    if (!step_list((struct text_span){value.p + skip, value.n - skip}, &list) || !step_real(&r->text, list, &factor) ||
+        factor <= 0.0)
+        return fail(r, &measure.record, "no factor of a length unit");
     *m *= factor;
     return SH_OK;
 }
@@ -150,33 +159,33 @@ static int read_converted(struct reader *r, const struct step_record *unit, stru
 /* Metres per unit of length, as the project says. */
 static int read_unit(struct reader *r, double *m)
 {
-    struct step_span arg[STEP_MAX_ARGS], list, unit[STEP_MAX_ARGS], of[STEP_MAX_ARGS];
-    struct step_record units, record;
+    struct text_span arg[PROJECT_ARGS], list, unit[STEP_MAX_ARGS], of[STEP_MAX_ARGS];
+    struct found units;
+    struct step_record record;
     if (r->n_projects != 1)
         return text_fail(&r->text, 0, SH_EINPUT, r->err, "%d IFCPROJECT records; allowed one; %s", r->n_projects,
                          ADVICE);
-    if (step_split(r->project.args, arg, STEP_MAX_ARGS) != PROJECT_ARGS)
+    if (step_split(r->project.args, arg, PROJECT_ARGS) != PROJECT_ARGS)
         return fail(r, &r->project, "not the 9 attributes that IFC defines");
-    int rc = follow(r, &r->project, arg[PROJECT_UNITS], "IFCUNITASSIGNMENT", 1, &units, arg);
+    int rc = follow(r, &r->project, arg[PROJECT_UNITS], "IFCUNITASSIGNMENT", 1, &units);
     if (rc != SH_OK) return rc;
-    size_t n = step_list(arg[0], &list) ? step_split(list, unit, STEP_MAX_ARGS) : 0;
+    size_t n = step_list(units.arg[0], &list) ? step_split(list, unit, STEP_MAX_ARGS) : 0;
     for (size_t i = 0; i < n && i < STEP_MAX_ARGS; i++) {
         uint64_t id;
-        if (!step_reference(unit[i], &id)) return fail(r, &units, "a unit that is no reference");
+        if (!step_reference(unit[i], &id)) return fail(r, &units.record, "a unit that is no reference");
         if ((rc = step_find(&r->text, id, &record, r->err)) != SH_OK) return rc;
-        size_t n_of = step_split(record.args, of, STEP_MAX_ARGS);
-        if (n_of != 4 || !step_is(of[1], ".LENGTHUNIT.")) continue;
-        if (step_is(record.type, "IFCSIUNIT")) return read_prefix(r, &record, of[2], m);
-        if (step_is(record.type, "IFCCONVERSIONBASEDUNIT")) return read_converted(r, &record, of[3], m);
+        if (step_split(record.args, of, STEP_MAX_ARGS) != 4 || !text_is(of[1], ".LENGTHUNIT.")) continue;
+        if (text_is(record.type, "IFCSIUNIT")) return read_prefix(r, &record, of[2], m);
+        if (text_is(record.type, "IFCCONVERSIONBASEDUNIT")) return read_converted(r, &record, of[3], m);
     }
-    return fail(r, &units, "no unit of length");
+    return fail(r, &units.record, "no unit of length");
 }
 
 /* n = 2 or 3 numbers of "(a, b, c)". */
-static int read_numbers(struct reader *r, const struct step_record *at, struct step_span span, size_t min, size_t max,
+static int read_numbers(struct reader *r, const struct step_record *at, struct text_span span, size_t min, size_t max,
                         double *value)
 {
-    struct step_span list, part[3];
+    struct text_span list, part[3];
     size_t n = step_list(span, &list) ? step_split(list, part, 3) : 0;
     if (n < min || n > max) return fail(r, at, "not the numbers that are needed");
     for (size_t i = 0; i < n; i++)
@@ -185,36 +194,35 @@ static int read_numbers(struct reader *r, const struct step_record *at, struct s
 }
 
 /* Location of an IFCAXIS2PLACEMENT3D, in units of the file; axes[0], axes[1]: its z and x axes. */
-static int read_axes(struct reader *r, const struct step_record *from, struct step_span ref, double location[3],
+static int read_axes(struct reader *r, const struct step_record *from, struct text_span ref, double location[3],
                      double axes[2][3])
 {
     static const double plain[2][3] = {{0.0, 0.0, 1.0}, {1.0, 0.0, 0.0}};
-    struct step_span arg[STEP_MAX_ARGS], of[STEP_MAX_ARGS];
-    struct step_record placement, record;
-    int rc = follow(r, from, ref, "IFCAXIS2PLACEMENT3D", 3, &placement, arg);
-    if (rc == SH_OK) rc = follow(r, &placement, arg[0], "IFCCARTESIANPOINT", 1, &record, of);
-    if (rc == SH_OK) rc = read_numbers(r, &record, of[0], 3, 3, location);
+    struct found placement, found;
+    int rc = follow(r, from, ref, "IFCAXIS2PLACEMENT3D", 3, &placement);
+    if (rc == SH_OK) rc = follow(r, &placement.record, placement.arg[0], "IFCCARTESIANPOINT", 1, &found);
+    if (rc == SH_OK) rc = read_numbers(r, &found.record, found.arg[0], 3, 3, location);
     for (int i = 0; i < 2 && rc == SH_OK; i++) {
         memcpy(axes[i], plain[i], sizeof plain[i]);
-        if (step_is(arg[1 + i], "$")) continue;
-        rc = follow(r, &placement, arg[1 + i], "IFCDIRECTION", 1, &record, of);
-        if (rc == SH_OK) rc = read_numbers(r, &record, of[0], 3, 3, axes[i]);
+        if (text_is(placement.arg[1 + i], "$")) continue;
+        rc = follow(r, &placement.record, placement.arg[1 + i], "IFCDIRECTION", 1, &found);
+        if (rc == SH_OK) rc = read_numbers(r, &found.record, found.arg[0], 3, 3, axes[i]);
     }
     return rc;
 }
 
 /* The site's own placement, absolute: its location is the point that has latitude and longitude. */
-static int read_origin(struct reader *r, struct step_span ref, double unit_m, double origin_m[3])
+static int read_origin(struct reader *r, struct text_span ref, double unit_m, double origin_m[3])
 {
-    struct step_span arg[STEP_MAX_ARGS];
-    struct step_record local;
+    struct found local;
     double axes[2][3];
     memset(origin_m, 0, 3 * sizeof *origin_m);
-    if (step_is(ref, "$")) return SH_OK;
-    int rc = follow(r, &r->site, ref, "IFCLOCALPLACEMENT", 2, &local, arg);
+    if (text_is(ref, "$")) return SH_OK;
+    int rc = follow(r, &r->site, ref, "IFCLOCALPLACEMENT", 2, &local);
     if (rc != SH_OK) return rc;
-    if (!step_is(arg[0], "$")) return fail(r, &local, "the site's placement is relative to another; allowed absolute");
-    rc = read_axes(r, &local, arg[1], origin_m, axes);
+    if (!text_is(local.arg[0], "$"))
+        return fail(r, &local.record, "the site's placement is relative to another; allowed absolute");
+    rc = read_axes(r, &local.record, local.arg[1], origin_m, axes);
     for (int i = 0; i < 3; i++)
         origin_m[i] *= unit_m;
     return rc;
@@ -223,8 +231,8 @@ static int read_origin(struct reader *r, struct step_span ref, double unit_m, do
 /* TrueNorth counts in the world coordinate system, which has to be the model's own. */
 static int read_north(struct reader *r, struct ifc_site *site)
 {
-    struct step_span arg[CONTEXT_ARGS], of[STEP_MAX_ARGS];
-    struct step_record direction;
+    struct text_span arg[CONTEXT_ARGS];
+    struct found direction;
     double at[3], axes[2][3], north[3];
     if (r->n_contexts == 0) return SH_OK;
     step_split(r->context.args, arg, CONTEXT_ARGS);
@@ -233,11 +241,11 @@ static int read_north(struct reader *r, struct ifc_site *site)
     for (int i = 0; i < 3; i++)
         if (at[i] != 0.0 || fabs(axes[0][i] - (i == 2)) > 1e-9 || fabs(axes[1][i] - (i == 0)) > 1e-9)
             return fail(r, &r->context, "a WorldCoordinateSystem that is shifted or turned; allowed the origin");
-    if (step_is(arg[CONTEXT_NORTH], "$")) return SH_OK;
-    rc = follow(r, &r->context, arg[CONTEXT_NORTH], "IFCDIRECTION", 1, &direction, of);
-    if (rc == SH_OK) rc = read_numbers(r, &direction, of[0], 2, 3, north);
+    if (text_is(arg[CONTEXT_NORTH], "$")) return SH_OK;
+    rc = follow(r, &r->context, arg[CONTEXT_NORTH], "IFCDIRECTION", 1, &direction);
+    if (rc == SH_OK) rc = read_numbers(r, &direction.record, direction.arg[0], 2, 3, north);
     if (rc != SH_OK) return rc;
-    if (!(hypot(north[0], north[1]) > 1e-9)) return fail(r, &direction, "a true north without a direction");
+    if (!(hypot(north[0], north[1]) > 1e-9)) return fail(r, &direction.record, "a true north without a direction");
     site->north_deg = angle_deg(atan2(north[0], north[1]));
     site->has_north = 1;
     return SH_OK;
@@ -245,7 +253,7 @@ static int read_north(struct reader *r, struct ifc_site *site)
 
 static int read_site(struct reader *r, struct ifc_site *site)
 {
-    struct step_span arg[SITE_ARGS];
+    struct text_span arg[SITE_ARGS];
     double unit_m = 1.0;
     if (step_split(r->site.args, arg, SITE_ARGS) != SITE_ARGS)
         return fail(r, &r->site, "not the 14 attributes that IFC defines");
@@ -256,7 +264,7 @@ static int read_site(struct reader *r, struct ifc_site *site)
     if (rc == SH_OK) rc = read_north(r, site);
     if (rc != SH_OK) return rc;
     site->elevation_m = NAN;
-    if (step_is(arg[SITE_ELEVATION], "$")) return SH_OK;
+    if (text_is(arg[SITE_ELEVATION], "$")) return SH_OK;
     if (!step_real(&r->text, arg[SITE_ELEVATION], &site->elevation_m))
         return fail(r, &r->site, "RefElevation is not a number");
     site->elevation_m *= unit_m;

@@ -16,7 +16,7 @@
 #include <assimp/scene.h>
 
 #include "core/scene/ifc_check.h"
-#include "core/scene/scene_build.h"
+#include "core/scene/build.h"
 
 enum { MAX_DEPTH = 256 };
 
@@ -33,10 +33,7 @@ struct import {
     const struct aiScene *in;
     const struct aiMatrix4x4 *level[MAX_DEPTH]; /* of the node and above it, root first; identities left out */
     int n_levels;
-    double largest;   /* |coordinate| at any level, file units */
-    uint32_t *corner; /* of one face */
-    float (*corner_uv)[2];
-    size_t cap_corners;
+    double largest;           /* |coordinate| at any level, file units */
     uint64_t n_faces, n_done; /* for the progress */
 };
 
@@ -99,28 +96,21 @@ static int add_face(struct import *im, const struct aiFace *face, const struct a
         b->counts.not_triangles++;
         return SH_OK;
     }
-    if (face->mNumIndices > im->cap_corners) {
-        size_t cap = (size_t)face->mNumIndices * 2;
-        void *corner = realloc(im->corner, cap * sizeof *im->corner);
-        if (corner == NULL) return build_fail(b, SH_ENOMEM, err, "no memory for a face");
-        im->corner = corner;
-        void *uv = b->spec->textures ? realloc(im->corner_uv, cap * sizeof *im->corner_uv) : NULL;
-        if (b->spec->textures && uv == NULL) return build_fail(b, SH_ENOMEM, err, "no memory for a face");
-        im->corner_uv = uv;
-        im->cap_corners = cap;
-    }
+    int rc = build_corners(b, face->mNumIndices, err);
+    if (rc != SH_OK) return rc;
     const struct aiVector3D *uv = b->spec->textures ? mesh->mTextureCoords[0] : NULL;
-    b->corner_uv = uv != NULL ? (const float(*)[2])im->corner_uv : NULL;
+    b->has_uv = uv != NULL;
     for (unsigned i = 0; i < face->mNumIndices; i++) {
-        if (face->mIndices[i] >= mesh->mNumVertices)
-            return build_fail(b, SH_EINPUT, err, "index %u out of range; there are %u vertices", face->mIndices[i],
+        unsigned index = face->mIndices[i];
+        if (index >= mesh->mNumVertices)
+            return build_fail(b, SH_EINPUT, err, "index %u out of range; there are %u vertices", index,
                               mesh->mNumVertices);
-        im->corner[i] = b->mesh_vertex0 + face->mIndices[i];
+        b->corner[i] = b->mesh_vertex0 + index;
         if (uv == NULL) continue;
-        im->corner_uv[i][0] = uv[face->mIndices[i]].x;
-        im->corner_uv[i][1] = uv[face->mIndices[i]].y;
+        b->corner_uv[i][0] = uv[index].x;
+        b->corner_uv[i][1] = uv[index].y;
     }
-    return build_polygon(b, im->corner, face->mNumIndices, label, err);
+    return build_polygon(b, face->mNumIndices, label, err);
 }
 
 /* Linear light as sRGB has it, IEC 61966-2-1. */
@@ -175,8 +165,13 @@ static int keep_texture(const struct import *im, const struct aiMesh *mesh, stru
                        : base != NULL ? base + 1
                                       : im->b->spec->file,
                        (int)path.length, path.data);
-    return build_texture(im->b, name, (size_t)len, within != NULL ? within->pcData : NULL,
+    return build_texture(im->b, (struct text_span){name, (size_t)len}, within != NULL ? within->pcData : NULL,
                          within != NULL ? within->mWidth : 0, &surface->texture, err);
+}
+
+static struct text_span span_of(const struct aiString *text)
+{
+    return (struct text_span){text->data, strnlen(text->data, text->length)};
 }
 
 static int label_of(struct import *im, const struct aiNode *node, const struct aiMesh *mesh, uint16_t *label,
@@ -186,8 +181,7 @@ static int label_of(struct import *im, const struct aiNode *node, const struct a
     struct aiString material = {0};
     if (mesh->mMaterialIndex < im->in->mNumMaterials)
         aiGetMaterialString(im->in->mMaterials[mesh->mMaterialIndex], AI_MATKEY_NAME, &material);
-    int rc = build_label(im->b, object->data, strnlen(object->data, object->length), material.data,
-                         strnlen(material.data, material.length), label, err);
+    int rc = build_label(im->b, span_of(object), span_of(&material), label, err);
     if (rc != SH_OK) return rc;
     keep_colour(im, mesh, &im->b->scene->surface[*label]);
     return keep_texture(im, mesh, &im->b->scene->surface[*label], err);
@@ -235,16 +229,16 @@ static uint64_t count_faces(const struct aiScene *in, const struct aiNode *node)
 
 static int check_precision(const struct import *im, struct sh_err *err)
 {
-    double off_m = im->largest * im->b->spec->scale * SINGLE_ROUNDING;
-    if (off_m <= im->b->tolerance_m) return SH_OK;
+    double error_m = im->largest * im->b->spec->scale * SINGLE_ROUNDING;
+    if (error_m <= im->b->tolerance_m) return SH_OK;
     return build_fail(im->b, SH_EINPUT, err,
-                      "coordinates up to %.9g are read in single precision, which may be off by %.2g m; allowed "
-                      "are %.2g m: move the mesh near its origin, or convert it to .obj or .ply",
-                      im->largest, off_m, im->b->tolerance_m);
+                      "coordinates up to %.9g are read in single precision, with errors up to %.2g m; allowed are "
+                      "%.2g m: move the mesh near its origin, or convert it to .obj or .ply",
+                      im->largest, error_m, im->b->tolerance_m);
 }
 
-/* An IFC file that was cut off reads without an error, with less in it; one in which records are missing crashes
- * Assimp. */
+/* An IFC file that was cut off reads without an error, with less in it; one in which records are missing
+ * crashes Assimp. */
 static int check_ifc(struct scene_build *b, struct sh_err *err)
 {
     static const char last[] = "END-ISO-10303-21;";
@@ -299,8 +293,6 @@ int import_assimp(struct scene_build *b, struct sh_err *err)
     if (rc == SH_OK) rc = check_precision(&im, err);
     if (rc == SH_OK && log.n > 0)
         sh_warn(b->report, "%s: %u warnings while read, the first: %s", b->name, log.n, log.first);
-    free(im.corner);
-    free(im.corner_uv);
     aiReleaseImport(im.in);
     return rc;
 }

@@ -1,45 +1,31 @@
-/* Wavefront OBJ in double: v, f, o, g, usemtl, mtllib. Points and lines are counted; what has no shape is passed
- * over. */
+/* Wavefront OBJ in double: v, f, o, g, usemtl, mtllib. Points and lines are counted; what has no shape is
+ * ignored. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/scene/scene_build.h"
-#include "core/scene/text.h"
-
-struct span {
-    const char *text;
-    size_t len;
-};
+#include "core/grow.h"
+#include "core/scene/build.h"
+#include "core/text.h"
 
 struct obj {
     struct scene_build *b;
     struct text t;
-    uint32_t *corner;      /* of one face */
-    float (*corner_uv)[2]; /* likewise; only where textures are asked for */
-    size_t cap_corners;
     float (*uv)[2]; /* all vt so far */
     size_t n_uv, cap_uv;
-    struct span object, material, library; /* library: the last one named */
+    struct text_span object, material, library; /* library: the last one named */
     uint16_t label;
     bool label_known;
     uint64_t n_unknown, unknown_line;
     char unknown[32];
 };
 
-/* Bytes of a broken word for a message. */
-static int shown(size_t len)
-{
-    return len < 40 ? (int)len : 40;
-}
-
 static int fail_at(struct obj *o, struct sh_err *err, const char *what)
 {
-    const char *word;
-    size_t len = text_word(&o->t, &word);
+    struct text_span word = text_word(&o->t);
     o->b->line = o->t.line;
-    if (len == 0) return build_fail(o->b, SH_EINPUT, err, "%s, found the end of the line", what);
-    return build_fail(o->b, SH_EINPUT, err, "%s, found '%.*s'", what, shown(len), word);
+    if (word.n == 0) return build_fail(o->b, SH_EINPUT, err, "%s, found the end of the line", what);
+    return build_fail(o->b, SH_EINPUT, err, "%s, found '%.*s'", what, word.n < 40 ? (int)word.n : 40, word.p);
 }
 
 /* A comment may also follow on a line of numbers. */
@@ -73,13 +59,8 @@ static int read_uv(struct obj *o, struct sh_err *err)
         n++;
     }
     if (n == 0) return fail_at(o, err, "vt takes 1 to 3 numbers");
-    if (o->n_uv == o->cap_uv) {
-        size_t cap = o->cap_uv * 2 + 1024;
-        void *uv = realloc(o->uv, cap * sizeof *o->uv);
-        if (uv == NULL) return build_fail(o->b, SH_ENOMEM, err, "no memory for texture coordinates");
-        o->uv = uv;
-        o->cap_uv = cap;
-    }
+    if (!grow(&o->uv, &o->cap_uv, o->n_uv + 1, sizeof *o->uv))
+        return build_fail(o->b, SH_ENOMEM, err, "no memory for texture coordinates");
     o->uv[o->n_uv][0] = (float)number[0];
     o->uv[o->n_uv++][1] = (float)number[1];
     return SH_OK;
@@ -128,88 +109,76 @@ static int use_label(struct obj *o, struct sh_err *err)
 {
     if (o->label_known) return SH_OK;
     o->label_known = true;
-    return build_label(o->b, o->object.text, o->object.len, o->material.text, o->material.len, &o->label, err);
+    return build_label(o->b, o->object, o->material, &o->label, err);
 }
 
 static int read_face(struct obj *o, struct sh_err *err)
 {
+    struct scene_build *b = o->b;
     size_t n = 0;
-    int rc = SH_OK;
-    while (rc == SH_OK && !at_statement_end(o)) {
-        if (n == o->cap_corners) {
-            size_t cap = o->cap_corners * 2 + 16;
-            void *corner = realloc(o->corner, cap * sizeof *o->corner);
-            if (corner == NULL) return build_fail(o->b, SH_ENOMEM, err, "no memory for a face");
-            o->corner = corner;
-            void *uv = o->b->spec->textures ? realloc(o->corner_uv, cap * sizeof *o->corner_uv) : NULL;
-            if (o->b->spec->textures && uv == NULL) return build_fail(o->b, SH_ENOMEM, err, "no memory for a face");
-            o->corner_uv = uv;
-            o->cap_corners = cap;
-        }
-        rc = read_corner(o, &o->corner[n], o->corner_uv != NULL ? o->corner_uv[n] : NULL, err);
+    while (!at_statement_end(o)) {
+        int rc = build_corners(b, n + 1, err);
+        if (rc == SH_OK) rc = read_corner(o, &b->corner[n], b->spec->textures ? b->corner_uv[n] : NULL, err);
+        if (rc != SH_OK) return rc;
         n++;
     }
-    if (rc != SH_OK) return rc;
     if (n == 0) return fail_at(o, err, "f takes three corners or more");
-    o->b->line = o->t.line;
+    b->line = o->t.line;
     if (n < 3) {
-        o->b->counts.not_triangles++;
+        b->counts.not_triangles++;
         return SH_OK;
     }
-    rc = use_label(o, err);
-    o->b->corner_uv = o->n_uv > 0 ? (const float(*)[2])o->corner_uv : NULL;
-    return rc == SH_OK ? build_polygon(o->b, o->corner, n, o->label, err) : rc;
+    b->has_uv = o->n_uv > 0;
+    int rc = use_label(o, err);
+    return rc == SH_OK ? build_polygon(b, n, o->label, err) : rc;
 }
 
-static int read_name(struct obj *o, struct span *name)
+static int read_name(struct obj *o, struct text_span *name)
 {
-    name->len = text_rest(&o->t, &name->text);
+    *name = text_rest(&o->t);
     o->label_known = false;
     return SH_OK;
 }
 
 static void skip_statement(struct obj *o)
 {
-    const char *word;
     while (!at_statement_end(o))
-        text_word(&o->t, &word);
+        text_word(&o->t);
 }
 
 /* Points count one by one, a line or a free-form curve or surface as one. */
 static int count_left_out(struct obj *o, bool points)
 {
-    const char *word;
     uint64_t n = 0;
     while (!at_statement_end(o)) {
-        text_word(&o->t, &word);
+        text_word(&o->t);
         n++;
     }
     o->b->counts.not_triangles += points ? n : 1;
     return SH_OK;
 }
 
-static bool is_word(const char *word, size_t len, const char *const *list)
+static bool is_among(struct text_span word, const char *const *list)
 {
     for (; *list != NULL; list++)
-        if (strlen(*list) == len && memcmp(*list, word, len) == 0) return true;
+        if (text_is(word, *list)) return true;
     return false;
 }
 
-static int read_other(struct obj *o, const char *word, size_t len)
+static int read_other(struct obj *o, struct text_span word)
 {
     static const char *const numbers[] = {"vt",  "vn",  "vp",  "s",    "parm", "trim",   "hole", "scrv", "sp",
                                           "end", "con", "deg", "bmat", "step", "cstype", "mg",   NULL};
     static const char *const texts[] = {"usemap", "maplib",     "lod",       "bevel", "c_interp", "d_interp", "ctech",
                                         "stech",  "shadow_obj", "trace_obj", "call",  "csh",      NULL};
     static const char *const free_form[] = {"l", "curv", "curv2", "surf", NULL};
-    if (is_word(word, len, free_form)) return count_left_out(o, false);
-    if (is_word(word, len, numbers)) {
+    if (is_among(word, free_form)) return count_left_out(o, false);
+    if (is_among(word, numbers)) {
         skip_statement(o);
-    } else if (!is_word(word, len, texts)) {
+    } else if (!is_among(word, texts)) {
         if (o->n_unknown++ == 0) {
             o->unknown_line = o->t.line;
-            size_t n = len < sizeof o->unknown ? len : sizeof o->unknown - 1;
-            memcpy(o->unknown, word, n);
+            memcpy(o->unknown, word.p, word.n < sizeof o->unknown ? word.n : sizeof o->unknown - 1);
         }
     }
     return SH_OK; /* text statements: a backslash there may be a path's */
@@ -217,33 +186,21 @@ static int read_other(struct obj *o, const char *word, size_t len)
 
 static int read_statement(struct obj *o, struct sh_err *err)
 {
-    const char *word;
-    size_t len = text_word(&o->t, &word);
-    if (len == 0 || *word == '#') return SH_OK;
-    if (len == 1) {
-        switch (*word) {
-        case 'v':
-            return read_vertex(o, err);
-        case 'f':
-            return read_face(o, err);
-        case 'o':
-        case 'g':
-            return read_name(o, &o->object);
-        case 'p':
-            return count_left_out(o, true);
-        default:
-            break;
-        }
-    }
-    if (len == 2 && memcmp(word, "vt", 2) == 0 && o->b->spec->textures) return read_uv(o, err);
-    if (len == 6 && memcmp(word, "usemtl", 6) == 0) return read_name(o, &o->material);
-    if (len == 6 && memcmp(word, "mtllib", 6) == 0) {
+    struct text_span word = text_word(&o->t);
+    if (word.n == 0 || *word.p == '#') return SH_OK;
+    if (text_is(word, "v")) return read_vertex(o, err);
+    if (text_is(word, "f")) return read_face(o, err);
+    if (text_is(word, "o") || text_is(word, "g")) return read_name(o, &o->object);
+    if (text_is(word, "p")) return count_left_out(o, true);
+    if (text_is(word, "vt") && o->b->spec->textures) return read_uv(o, err);
+    if (text_is(word, "usemtl")) return read_name(o, &o->material);
+    if (text_is(word, "mtllib")) {
         o->t.continued = false; /* a backslash there may be a path's */
-        o->library.len = text_rest(&o->t, &o->library.text);
+        o->library = text_rest(&o->t);
         o->t.continued = true;
         return SH_OK;
     }
-    return read_other(o, word, len);
+    return read_other(o, word);
 }
 
 static int read_statements(struct obj *o, struct sh_err *err)
@@ -270,17 +227,15 @@ int read_obj(struct scene_build *b, struct sh_err *err)
 {
     struct obj o = {.b = b, .material = {"", 0}};
     uint32_t first_surface = b->scene->n_surfaces;
-    build_base_name(b, &o.object.text, &o.object.len);
+    o.object = build_base_name(b);
     int rc = text_open(&o.t, b->spec->file, tick, b, err);
     o.t.continued = true;
     if (rc == SH_OK) rc = read_statements(&o, err);
     if (rc == SH_OK && o.n_unknown > 0)
-        sh_warn(b->report, "%s: %llu unknown statements passed over; the first is '%s' in line %llu", b->name,
+        sh_warn(b->report, "%s: %llu unknown statements ignored; the first is '%s' in line %llu", b->name,
                 (unsigned long long)o.n_unknown, o.unknown, (unsigned long long)o.unknown_line);
-    if (rc == SH_OK && o.library.len > 0) rc = read_mtl(b, o.library.text, o.library.len, first_surface, err);
+    if (rc == SH_OK && o.library.n > 0) rc = read_mtl(b, o.library, first_surface, err);
     b->scene->n_meshes++;
-    free(o.corner);
-    free(o.corner_uv);
     free(o.uv);
     text_close(&o.t);
     return rc;

@@ -3,15 +3,14 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "core/scene/ply_rows.h"
-#include "core/scene/scene_build.h"
+#include "core/ply.h"
+#include "core/scene/build.h"
 
 struct ply {
     struct scene_build *b;
     struct ply_rows r;
-    uint32_t *corner; /* of one face, in the scene */
-    size_t cap_corners;
     uint16_t label;
+    bool is_single;
 };
 
 static int check_mesh(const struct ply *y, struct sh_err *err)
@@ -34,65 +33,37 @@ static int check_mesh(const struct ply *y, struct sh_err *err)
 static int check_corners(struct ply *y, struct sh_err *err)
 {
     uint32_t n = y->b->scene->n_vertices - y->b->vertex0;
-    if (y->r.n_corners > y->cap_corners) {
-        void *corner = realloc(y->corner, y->r.cap_corners * sizeof *y->corner);
-        if (corner == NULL) return build_fail(y->b, SH_ENOMEM, err, "no memory for a face");
-        y->corner = corner;
-        y->cap_corners = y->r.cap_corners;
-    }
+    int rc = build_corners(y->b, y->r.n_corners, err);
+    if (rc != SH_OK) return rc;
     for (size_t i = 0; i < y->r.n_corners; i++) {
         double index = y->r.corner[i];
         if (!(index >= 0 && index < n) || index != floor(index)) {
             char what[96];
             snprintf(what, sizeof what, "index %.17g out of range; there are %u vertices", index, n);
-            return ply_rows_fail(&y->r, err, what);
+            return ply_fail(&y->r, err, what);
         }
-        y->corner[i] = y->b->vertex0 + (uint32_t)index;
+        y->b->corner[i] = y->b->vertex0 + (uint32_t)index;
     }
     return SH_OK;
 }
 
-static int use_row(struct ply *y, struct sh_err *err)
+static int use_row(void *ply, struct sh_err *err)
 {
-    y->b->line = ply_rows_line(&y->r);
+    struct ply *y = ply;
+    y->b->line = ply_line(&y->r);
     if (y->r.element->kind == PLY_VERTEX) return build_vertex(y->b, &y->r.scalar[PLY_X], err);
     if (y->r.element->kind != PLY_FACE) return SH_OK;
     int rc = check_corners(y, err);
     if (rc != SH_OK) return rc;
-    if (y->r.n_corners >= 3) return build_polygon(y->b, y->corner, y->r.n_corners, y->label, err);
-    if (y->r.n_corners == 0) return ply_rows_fail(&y->r, err, "it has no corners");
+    if (y->r.n_corners >= 3) return build_polygon(y->b, y->r.n_corners, y->label, err);
+    if (y->r.n_corners == 0) return ply_fail(&y->r, err, "it has no corners");
     y->b->counts.not_triangles++;
     return SH_OK;
 }
 
-static int read_element_rows(struct ply *y, int i, struct sh_err *err)
-{
-    int rc = ply_rows_begin(&y->r, i, err);
-    if (rc != SH_OK) return rc;
-    const struct ply_element *e = y->r.element;
-    y->b->line = 0;
-    rc = build_reserve(y->b, e->kind == PLY_VERTEX ? e->count : 0, e->kind == PLY_FACE ? e->count : 0, err);
-    if (rc == SH_OK && e->kind == PLY_OTHER && e->count > 0)
-        sh_warn(y->b->report, "%s: element '%s' (%llu of it) passed over", y->b->name, e->name,
-                (unsigned long long)e->count);
-    for (; y->r.row < e->count && rc == SH_OK; y->r.row++) {
-        rc = ply_rows_read(&y->r, err);
-        if (rc == SH_OK) rc = use_row(y, err);
-        if ((y->r.row & 0xffff) == 0) build_progress(y->b, ply_rows_fraction(&y->r));
-    }
-    return rc;
-}
-
-/* Numbers kept as float in the file are read as they stand, yet what they stood for was rounded. */
 static void warn_if_coarse(const struct ply *y)
 {
     const struct scene_build *b = y->b;
-    bool is_float = false;
-    for (int i = 0; i < y->r.h.n_properties; i++) {
-        const struct ply_property *p = &y->r.h.property[i];
-        if (p->use >= PLY_X && p->use <= PLY_Z && p->type == PLY_FLOAT) is_float = true;
-    }
-    if (!is_float || y->r.h.format == PLY_ASCII) return;
     double largest = 0;
     for (uint32_t i = b->vertex0; i < b->scene->n_vertices; i++)
         for (int k = 0; k < 3; k++)
@@ -101,20 +72,28 @@ static void warn_if_coarse(const struct ply *y)
         sh_warn(b->report, "%s: stored in single precision, so good to %.2g m only", b->name, largest * 6e-8);
 }
 
+static int begin_element(void *ply, struct sh_err *err)
+{
+    struct ply *y = ply;
+    const struct ply_element *e = y->r.element;
+    y->b->line = 0;
+    if (e->kind == PLY_VERTEX) y->is_single = ply_is_single(&y->r);
+    return build_reserve(y->b, e->kind == PLY_VERTEX ? e->count : 0, e->kind == PLY_FACE ? e->count : 0, err);
+}
+
+static void progress(void *ply, double fraction)
+{
+    build_progress(((struct ply *)ply)->b, fraction);
+}
+
 static int read_body(struct ply *y, struct sh_err *err)
 {
-    const char *name;
-    size_t len;
-    build_base_name(y->b, &name, &len);
-    int rc = build_label(y->b, name, len, "", 0, &y->label, err);
-    for (int i = 0; i < y->r.h.n_elements && rc == SH_OK; i++)
-        rc = read_element_rows(y, i, err);
-    if (rc != SH_OK) return rc;
-    size_t left_over = ply_rows_left_over(&y->r);
-    if (left_over > 0) sh_warn(y->b->report, "%s: %zu bytes after the last element passed over", y->b->name, left_over);
-    warn_if_coarse(y);
+    const struct ply_user user = {y, begin_element, use_row, progress, y->b->report, .has_faces = true};
+    int rc = build_label(y->b, build_base_name(y->b), (struct text_span){"", 0}, &y->label, err);
+    if (rc == SH_OK) rc = ply_walk(&y->r, &user, err);
+    if (rc == SH_OK && y->is_single) warn_if_coarse(y);
     y->b->scene->n_meshes++;
-    return SH_OK;
+    return rc;
 }
 
 static void tick(void *build)
@@ -127,11 +106,10 @@ int read_ply(struct scene_build *b, struct sh_err *err)
     struct ply *y = calloc(1, sizeof *y);
     if (y == NULL) return build_fail(b, SH_ENOMEM, err, "no memory");
     y->b = b;
-    int rc = ply_rows_open(&y->r, b->spec->file, tick, b, err);
+    int rc = ply_open(&y->r, b->spec->file, tick, b, err);
     if (rc == SH_OK) rc = check_mesh(y, err);
     if (rc == SH_OK) rc = read_body(y, err);
-    free(y->corner);
-    ply_rows_close(&y->r);
+    ply_close(&y->r);
     free(y);
     return rc;
 }

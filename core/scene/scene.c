@@ -7,7 +7,7 @@
 #include <strings.h>
 #include <sys/stat.h>
 
-#include "core/scene/scene_build.h"
+#include "core/scene/build.h"
 
 static const struct {
     const char *ending;
@@ -58,59 +58,56 @@ int scene_load(const struct scene_mesh_spec *specs, size_t n_specs, double toler
     return rc;
 }
 
-static int copy_surfaces(struct scene_build *b, const struct scene_surface *surface, uint32_t n, struct sh_err *err)
+static int copy_surfaces(struct scene_build *b, const struct scene_arrays *arrays, struct sh_err *err)
 {
     static const struct scene_surface only = {.object = "object", .material = "material"};
-    if (surface == NULL) {
-        surface = &only;
-        n = 1;
-    }
+    const struct scene_surface *surface = arrays->surface != NULL ? arrays->surface : &only;
+    uint32_t n = arrays->surface != NULL ? arrays->n_surfaces : 1;
     if (n == 0 || n > SCENE_MAX_SURFACES)
         return build_fail(b, SH_EINPUT, err, "%u surfaces; allowed are 1 to %d", n, SCENE_MAX_SURFACES);
     memcpy(b->scene->surface, surface, n * sizeof *surface);
-    for (uint32_t i = 0; i < n; i++)
+    for (uint32_t i = 0; i < n; i++) {
         if (memchr(surface[i].object, '\0', SCENE_NAME_LEN) == NULL ||
             memchr(surface[i].material, '\0', SCENE_NAME_LEN) == NULL)
             return build_fail(b, SH_EINPUT, err, "surface %u: a name has no end", i);
-    for (uint32_t i = 0; i < n; i++)
         b->scene->surface[i].texture = 0;
+    }
     b->scene->n_surfaces = n;
     return SH_OK;
 }
 
-static int copy_triangles(struct scene_build *b, const uint32_t (*triangle)[3], uint32_t n, const uint16_t *label,
-                          struct sh_err *err)
+static int copy_triangles(struct scene_build *b, const struct scene_arrays *arrays, struct sh_err *err)
 {
-    int rc = build_reserve(b, 0, n, err);
-    for (uint32_t i = 0; i < n && rc == SH_OK; i++) {
+    int rc = build_reserve(b, 0, arrays->n_triangles, err);
+    for (uint32_t i = 0; i < arrays->n_triangles && rc == SH_OK; i++) {
+        const uint32_t *corner = arrays->triangle[i];
+        uint16_t label = arrays->label != NULL ? arrays->label[i] : 0;
         for (int k = 0; k < 3; k++)
-            if (triangle[i][k] >= b->scene->n_vertices)
+            if (corner[k] >= b->scene->n_vertices)
                 return build_fail(b, SH_EINPUT, err, "triangle %u: index %u out of range; there are %u vertices", i,
-                                  triangle[i][k], b->scene->n_vertices);
-        if (label != NULL && label[i] >= b->scene->n_surfaces)
-            return build_fail(b, SH_EINPUT, err, "triangle %u: label %u out of range; there are %u surfaces", i,
-                              label[i], b->scene->n_surfaces);
-        rc = build_triangle(b, triangle[i], label != NULL ? label[i] : 0, err);
+                                  corner[k], b->scene->n_vertices);
+        if (label >= b->scene->n_surfaces)
+            return build_fail(b, SH_EINPUT, err, "triangle %u: label %u out of range; there are %u surfaces", i, label,
+                              b->scene->n_surfaces);
+        rc = build_triangle(b, corner, label, err);
     }
     return rc;
 }
 
-int scene_from_arrays(const double (*vertex_m)[3], uint32_t n_vertices, const uint32_t (*triangle)[3],
-                      uint32_t n_triangles, const uint16_t *label, const struct scene_surface *surface,
-                      uint32_t n_surfaces, struct scene **out, struct sh_err *err)
+int scene_from_arrays(const struct scene_arrays *arrays, struct scene **out, struct sh_err *err)
 {
-    static const struct scene_mesh_spec as_it_is = {.file = "arrays", .scale = 1};
+    static const struct scene_mesh_spec spec = {.file = "arrays", .scale = 1};
     struct scene_build b;
     *out = NULL;
     int rc = build_init(&b, 0, NULL, err);
     if (rc == SH_OK) {
-        build_begin_file(&b, &as_it_is);
-        rc = copy_surfaces(&b, surface, n_surfaces, err);
+        build_begin_file(&b, &spec);
+        rc = copy_surfaces(&b, arrays, err);
     }
-    if (rc == SH_OK) rc = build_reserve(&b, n_vertices, 0, err);
-    for (uint32_t i = 0; i < n_vertices && rc == SH_OK; i++)
-        rc = build_vertex(&b, vertex_m[i], err);
-    if (rc == SH_OK) rc = copy_triangles(&b, triangle, n_triangles, label, err);
+    if (rc == SH_OK) rc = build_reserve(&b, arrays->n_vertices, 0, err);
+    for (uint32_t i = 0; i < arrays->n_vertices && rc == SH_OK; i++)
+        rc = build_vertex(&b, arrays->vertex_m[i], err);
+    if (rc == SH_OK) rc = copy_triangles(&b, arrays, err);
     if (rc == SH_OK) {
         b.scene->n_meshes = 1;
         rc = build_end_file(&b, err);

@@ -55,16 +55,16 @@ static const char *find_end(struct text *t)
     return NULL;
 }
 
-static struct step_span trim(const char *p, const char *end)
+static struct text_span trim(const char *p, const char *end)
 {
     while (p < end && strchr(" \t\r\n", *p) != NULL)
         p++;
     while (end > p && strchr(" \t\r\n", end[-1]) != NULL)
         end--;
-    return (struct step_span){p, (size_t)(end - p)};
+    return (struct text_span){p, (size_t)(end - p)};
 }
 
-static int read_record(const struct text *t, struct step_span all, struct step_record *r, struct sh_err *err)
+static int read_record(const struct text *t, struct text_span all, struct step_record *r, struct sh_err *err)
 {
     const char *p = all.p + 1, *end = all.p + all.n, *open = memchr(all.p, '(', all.n);
     const char *equals = memchr(all.p, '=', all.n);
@@ -74,7 +74,7 @@ static int read_record(const struct text *t, struct step_span all, struct step_r
     if (p == all.p + 1 || equals == NULL || trim(p, equals).n != 0 || open == NULL || open < equals || end[-1] != ')')
         return text_fail(t, r->line, SH_EINPUT, err, "not STEP: no record of the form #1= TYPE(...);");
     r->type = trim(equals + 1, open);
-    r->args = (struct step_span){open + 1, (size_t)(end - open - 2)};
+    r->args = (struct text_span){open + 1, (size_t)(end - open - 2)};
     return 1;
 }
 
@@ -102,7 +102,7 @@ int step_find(struct text *t, uint64_t id, struct step_record *record, struct sh
     return rc < 0 ? rc : text_fail(t, 0, SH_EINPUT, err, "there is no record #%llu", (unsigned long long)id);
 }
 
-size_t step_split(struct step_span list, struct step_span *part, size_t max)
+size_t step_split(struct text_span list, struct text_span *part, size_t max)
 {
     size_t n = 0;
     int depth = 0, quoted = 0;
@@ -122,28 +122,23 @@ size_t step_split(struct step_span list, struct step_span *part, size_t max)
     return n;
 }
 
-int step_is(struct step_span span, const char *text)
-{
-    return span.n == strlen(text) && memcmp(span.p, text, span.n) == 0;
-}
-
-int step_list(struct step_span span, struct step_span *inside)
+int step_list(struct text_span span, struct text_span *inside)
 {
     if (span.n < 2 || span.p[0] != '(' || span.p[span.n - 1] != ')') return 0;
-    *inside = (struct step_span){span.p + 1, span.n - 2};
+    *inside = (struct text_span){span.p + 1, span.n - 2};
     return 1;
 }
 
-int step_reference(struct step_span span, uint64_t *id)
+int step_reference(struct text_span span, uint64_t *id)
 {
     long value;
     if (span.n < 2 || span.p[0] != '#') return 0;
-    if (!step_integer((struct step_span){span.p + 1, span.n - 1}, &value) || value < 0) return 0;
+    if (!step_integer((struct text_span){span.p + 1, span.n - 1}, &value) || value < 0) return 0;
     *id = (uint64_t)value;
     return 1;
 }
 
-int step_integer(struct step_span span, long *value)
+int step_integer(struct text_span span, long *value)
 {
     size_t sign = span.n > 0 && (span.p[0] == '-' || span.p[0] == '+');
     if (span.n == sign || span.n > 18) return 0;
@@ -153,7 +148,7 @@ int step_integer(struct step_span span, long *value)
     return 1;
 }
 
-int step_real(const struct text *t, struct step_span span, double *value)
+int step_real(const struct text *t, struct text_span span, double *value)
 {
     char *end;
     if (span.n == 0 || strspn(span.p, "+-.0123456789eE") < span.n) return 0;

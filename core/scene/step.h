@@ -2,18 +2,13 @@
 #ifndef CORE_SCENE_STEP_H
 #define CORE_SCENE_STEP_H
 
-#include "core/scene/text.h"
+#include "core/text.h"
 
 enum { STEP_MAX_ARGS = 32 };
 
-struct step_span {
-    const char *p;
-    size_t n;
-};
-
 struct step_record {
     uint64_t id, line;
-    struct step_span type, args; /* arguments without their brackets */
+    struct text_span type, args; /* arguments without their brackets */
 };
 
 /* Reads the file and takes its comments out. text_close is due in any case. */
@@ -25,15 +20,14 @@ int step_next(struct text *t, struct step_record *record, struct sh_err *err);
 /* The record of a number, searched from the start. */
 int step_find(struct text *t, uint64_t id, struct step_record *record, struct sh_err *err);
 
-/* Splits at commas outside of brackets and quotes, blanks cut off. Returns how many there are; the first max are
- * stored. */
-size_t step_split(struct step_span list, struct step_span *part, size_t max);
+/* Splits at commas outside of brackets and quotes, blanks cut off. Returns how many there are; the first max
+ * are stored. */
+size_t step_split(struct text_span list, struct text_span *part, size_t max);
 
-int step_is(struct step_span span, const char *text); /* the same text? */
 /* "(a, b)" -> "a, b"; 0 when it is no list. */
-int step_list(struct step_span span, struct step_span *inside);
-int step_reference(struct step_span span, uint64_t *id); /* "#5" -> 5; 0 when it is none */
-int step_integer(struct step_span span, long *value);    /* 0 when it is none */
-int step_real(const struct text *t, struct step_span span, double *value);
+int step_list(struct text_span span, struct text_span *inside);
+int step_reference(struct text_span span, uint64_t *id); /* "#5" -> 5; 0 when it is none */
+int step_integer(struct text_span span, long *value);    /* 0 when it is none */
+int step_real(const struct text *t, struct text_span span, double *value);
 
 #endif

@@ -22,7 +22,8 @@ static uint64_t ceil_div(u128 a, u128 b)
     return (uint64_t)((a + b - 1) / b);
 }
 
-/* Lines that the pan needs for span_fine (2^-24 micro-degrees), the first of them from r0/den on; at least one. */
+/* Lines that the pan needs for span_fine (2^-24 micro-degrees), the first of them from r0/den on; at least
+ * one. */
 static uint64_t lines_for_span(const struct schedule_segment *seg, int64_t span_fine)
 {
     const struct schedule_spec *spec = &seg->spec;
@@ -95,8 +96,9 @@ static uint32_t frame_of_line(const struct schedule_segment *seg, uint64_t n, ui
     return seg->frame0 + 1 + (uint32_t)f;
 }
 
-/* Pan at pulse k, which belongs to the frame that begins with first_line: whole micro-degrees and 2^-24 parts, rounded
- * up, so that a frame that a change cuts in two never needs a line more for what was rounded off. */
+/* Pan at pulse k, which belongs to the frame that begins with first_line: whole micro-degrees and 2^-24
+ * parts, rounded up, so that a frame that a change cuts in two never needs a line more for what was rounded
+ * off. */
 static int64_t pan_fine(const struct schedule_segment *seg, uint64_t k, uint64_t first_line)
 {
     int64_t base = first_line == seg->line0 ? seg->pan0_fine : seg->spec.pan_start_udeg * (1 << 24);
@@ -108,6 +110,12 @@ static int64_t pan_fine(const struct schedule_segment *seg, uint64_t k, uint64_t
     return base + (int64_t)((whole << 24) + fine);
 }
 
+/* Place of pulse k in the sweep of its line n, in 1/den of a line. */
+static uint64_t place_in_sweep(const struct schedule_segment *seg, uint64_t k, uint64_t n)
+{
+    return (uint64_t)((u128)seg->r0 + (u128)(k - seg->k0) * seg->num - (u128)(n - seg->line0) * seg->den);
+}
+
 void schedule_change(struct schedule_segment *seg, const struct schedule_segment *before,
                      const struct schedule_spec *spec, uint64_t k)
 {
@@ -115,14 +123,15 @@ void schedule_change(struct schedule_segment *seg, const struct schedule_segment
     uint32_t frame = frame_of_line(before, n, &first_line);
     struct schedule_line was;
     schedule_get_line(before, n, &was);
-    u128 r = (u128)before->r0 + (u128)(k - before->k0) * before->num - (u128)(n - before->line0) * before->den;
+    u128 r = place_in_sweep(before, k, n);
 
     struct schedule_segment next;
     memset(&next, 0, sizeof next);
     set_rates(&next, spec);
     next.k0 = k;
     next.t0_ns = schedule_time_ns(before, k);
-    /* The rest of a nanosecond goes over to the new rate, cut to a part of 1 / prr_uhz: it does not add up. */
+    /* The rest of a nanosecond goes over to the new rate, cut to a part of 1 / prr_uhz: it does not add
+     * up. */
     u128 rest = (before->t0_acc + (u128)(k - before->k0) * before->ns_rem) % (uint64_t)before->spec.prr_uhz;
     next.t0_acc = (uint64_t)(rest * (uint64_t)spec->prr_uhz / (uint64_t)before->spec.prr_uhz);
     next.line0 = n;
@@ -164,9 +173,7 @@ void schedule_get_line(const struct schedule_segment *seg, uint64_t n, struct sc
     line->pulse0 = line_first_pulse(seg, n);
     uint64_t end = line_first_pulse(seg, n + 1);
     line->pulse_end = end < seg->end_pulse ? end : seg->end_pulse;
-    line->r_first_pulse =
-        (uint64_t)((u128)seg->r0 + (u128)(line->pulse0 - seg->k0) * seg->num - (u128)(n - seg->line0) * seg->den);
-    uint64_t r = line->r_first_pulse;
+    uint64_t r = line->r_first_pulse = place_in_sweep(seg, line->pulse0, n);
     uint64_t skip = r >= seg->r_first ? 0 : ceil_div(seg->r_first - r, seg->num);
     uint64_t upto = r > seg->r_last ? 0 : (seg->r_last - r) / seg->num + 1;
     line->cast0 = line->pulse0 + skip;
@@ -225,8 +232,7 @@ double schedule_pan_turn(const struct schedule_segment *seg, uint64_t k)
 
 double schedule_mirror_turn(const struct schedule_segment *seg, uint64_t k)
 {
-    uint64_t n = schedule_line_of(seg, k);
-    u128 r = (u128)seg->r0 + (u128)(k - seg->k0) * seg->num - (u128)(n - seg->line0) * seg->den;
+    uint64_t r = place_in_sweep(seg, k, schedule_line_of(seg, k));
     return (double)seg->spec.fov_min_udeg / (double)TURN_UDEG +
-           (double)(uint64_t)r * ((double)seg->spec.sweep_udeg / (double)TURN_UDEG / (double)seg->den);
+           (double)r * ((double)seg->spec.sweep_udeg / (double)TURN_UDEG / (double)seg->den);
 }

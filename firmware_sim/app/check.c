@@ -75,7 +75,7 @@ static int print_time(const struct config *cfg, struct sh_err *err)
     struct utc_time utc;
     char now[UTC_TEXT_LEN], end[UTC_TEXT_LEN];
     int rc = head_clock_create(cfg, &clock, err);
-    if (rc != SH_OK || clock.source == HEAD_CLOCK_NONE) return rc;
+    if (rc != SH_OK || clock.source == EPOCH_NONE) return rc;
     utc_from_tai(&clock.table, clock.tai0_ns, &utc);
     utc_format(&utc, 0, now);
     utc_from_tai(&clock.table, utc_tai_from_posix(&clock.table, clock.table.expires_s * UTC_SECOND_NS), &utc);

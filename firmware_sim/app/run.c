@@ -10,6 +10,7 @@
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/loop.h"
 #include "firmware_sim/site/plan_rows.h"
+#include "firmware_sim/site/rate.h"
 
 struct run_options {
     struct app_input in;
@@ -130,6 +131,7 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
         return sh_fail(err, SH_EINPUT, "%s: links: none; run needs at least one of pty, tcp, usb, file, null",
                        cfg->file);
     int rc = site_load(cfg, &app_report_stderr, &site, err);
+    if (rc == SH_OK) rc = site_warn_rate(site, &app_report_stderr, err);
     if (rc == SH_OK) rc = device_create(site, &o->device, &device, err);
     if (rc == SH_OK) rc = loop_create(site, device, &options, &loop, err);
     if (rc == SH_OK) {

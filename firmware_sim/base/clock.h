@@ -1,4 +1,6 @@
-/* The one clock: real, fast and stepped time behind one wait. */
+/* The system's clocks. All that reads or waits for time of the machine does it here.
+ *
+ * Out: ns, of CLOCK_MONOTONIC unless the name says otherwise. Device time (device.h) is another matter. */
 #ifndef FIRMWARE_SIM_BASE_CLOCK_H
 #define FIRMWARE_SIM_BASE_CLOCK_H
 
@@ -12,7 +14,8 @@ int64_t clock_utc_ns(int64_t now_ns);
 int clock_tai_ns(int64_t now_ns, int64_t *tai_ns);
 /* Sleeps until the monotonic time is reached; goes on after signals. Real-time safe. */
 void clock_sleep_until_ns(int64_t t_ns);
-/* Processor time of the whole process, seconds. */
+/* Processor time of the whole process, seconds; of this thread, nanoseconds. */
 double clock_cpu_s(void);
+int64_t clock_thread_ns(void);
 
 #endif

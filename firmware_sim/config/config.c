@@ -69,6 +69,21 @@ static const char *type_name(const struct cfg_key *key)
     return names[key->type];
 }
 
+/* Within 100 columns, four blanks before each line. */
+static void print_wrapped(const char *text, FILE *out)
+{
+    enum { INDENT = 4, WIDTH = 100 };
+    int column = 0;
+    while (*text != '\0') {
+        int n = (int)strcspn(text, " ");
+        int begins = column == 0 || column + 1 + n > WIDTH;
+        fprintf(out, "%s%*s%.*s", begins && column != 0 ? "\n" : "", begins ? INDENT : 1, "", n, text);
+        column = begins ? INDENT + n : column + 1 + n;
+        text += n + (text[n] == ' ');
+    }
+    fputc('\n', out);
+}
+
 static void print_key(const struct cfg_key *key, FILE *out)
 {
     char allowed[CFG_ALLOWED_MAX];
@@ -85,17 +100,18 @@ static void print_key(const struct cfg_key *key, FILE *out)
         else
             fputs("; optional", out);
     }
-    fprintf(out, "\n    %s\n", key->help);
+    fputc('\n', out);
+    print_wrapped(key->help, out);
 }
 
 void config_print_reference(FILE *out)
 {
-    fputs("Configuration, YAML. Any key can be set with --set KEY=VALUE (elements as in "
-          "stations[0].name=gate; the\n"
-          "index after the last one appends). Numbers are decimal, as in 300000, 0.5 or 1.2e6, without a "
-          "unit.\n"
+    /* clang-format off */
+    fputs("Configuration, YAML. Any key can be set with --set KEY=VALUE (elements as in stations[0].name=gate; the\n"
+          "index after the last one appends). Numbers are decimal, as in 300000, 0.5 or 1.2e6, without a unit.\n"
           "Relative paths start at the file they stand in; in --set, at the working directory.\n\n",
           out);
+    /* clang-format on */
     for (size_t i = 0; i < cfg_config_table.n; i++)
         print_key(&cfg_config_table.keys[i], out);
     fputs("\nHead profile, heads/NAME.yaml. maker and model are texts; each figure is written\n"

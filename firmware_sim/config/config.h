@@ -1,10 +1,12 @@
-/* The configuration: YAML through libyaml's document API and one table (config_table*.c) of key, type, unit, default,
- * range and help, which alone gives parsing, defaults, errors, `--help` text and the reference.
+/* The configuration: a YAML file and --set in, struct config out, checked. One table (keys.c) of key, type, unit,
+ * default, range and help gives parsing, defaults, errors and the reference.
  *
  * Units: as the key's name says (hz, deg, m). Everything is checked; an error is one line:
  *   FILE:LINE: KEY: what is wrong; what is allowed
  * Unknown keys, duplicate keys, trailing text ("30 kHz"), NaN, wrong types and values out of range are errors.
- * Relative paths in a file are relative to that file; in --set, to the working directory. */
+ * Relative paths in a file are relative to that file; in --set, to the working directory.
+ *
+ * The struct is constant once it is loaded: what a run measures or chooses stands in the site (firmware_sim/site). */
 #ifndef FIRMWARE_SIM_CONFIG_CONFIG_H
 #define FIRMWARE_SIM_CONFIG_CONFIG_H
 
@@ -16,6 +18,7 @@
 #include "core/err.h"
 #include "core/georef.h"
 #include "core/line.h"
+#include "core/plan.h"
 #include "core/scene.h"
 #include "core/schedule.h"
 #include "core/surface.h"
@@ -65,9 +68,14 @@ struct config_mesh {
     enum scene_up up;
     double scale, offset_m[3];
     /* Motion, at time t of the scan: turned by turn_deg_s * t about the vertical through pivot_m, clockwise seen from
-     * above, then shifted by move_m_s * t; with cycle_s, forth and back. All zero: the mesh stands still. */
+     * above, then shifted by move_m_s * t; with cycle_s, back and forth. All zero: the mesh stands still. */
     double move_m_s[3], turn_deg_s, pivot_m[3], cycle_s;
 };
+
+static inline int config_mesh_moves(const struct config_mesh *mesh)
+{
+    return mesh->turn_deg_s != 0.0 || mesh->move_m_s[0] != 0.0 || mesh->move_m_s[1] != 0.0 || mesh->move_m_s[2] != 0.0;
+}
 
 /* How the scene lies on the Earth; core/geoframe.h. */
 enum config_anchor_source { ANCHOR_NONE, ANCHOR_EXPLICIT, ANCHOR_IFC, ANCHOR_UTM, ANCHOR_ECEF };
@@ -136,7 +144,7 @@ struct config_gnss {
     double lever_arm_m[3]; /* of the antenna from the head's origin, in the head's frame */
 };
 
-enum config_range_noise { RANGE_NOISE_OFF, RANGE_NOISE_ON, RANGE_NOISE_SIGNAL, RANGE_NOISE_FALSE, RANGE_NOISE_TRUE };
+enum config_range_noise { RANGE_NOISE_OFF, RANGE_NOISE_ON, RANGE_NOISE_SIGNAL };
 
 /* Ball-shaped noise; detect_ball. */
 struct config_ball {
@@ -147,9 +155,9 @@ struct config_ball {
 
 struct config_signal {
     int on, sharp;
-    double reflectance; /* of surfaces of which nothing is said */
+    double reflectance; /* of surfaces without one of their own */
     double visibility_m, extinction_1_km;
-    int has_extinction; /* else by visibility_m; 0 there: the data sheet's day */
+    int has_extinction; /* 0: by visibility_m; where that is 0, too: the air of the data sheet */
 };
 
 /* Instrument errors; core/instrument.h. */
@@ -160,7 +168,7 @@ struct config_instrument {
     double range_offset_m, range_scale_ppm;
 };
 
-enum config_choice { CHOICE_AUTO, CHOICE_OFF, CHOICE_ON, CHOICE_FALSE, CHOICE_TRUE };
+enum config_choice { CHOICE_AUTO, CHOICE_OFF, CHOICE_ON };
 
 /* Settings at power-up, within the profile (checked). */
 struct config_head {
@@ -174,7 +182,7 @@ struct config_scene {
     struct config_mesh mesh[CONFIG_MAX_MESHES];
     uint32_t n_meshes;
     double tolerance_m;
-    enum config_choice order_exactly; /* surfaces that overlap are ordered in double; auto, off or on once loaded */
+    enum config_choice order_exactly; /* surfaces that overlap are ordered in double */
     struct config_anchor anchor;
 };
 
@@ -186,23 +194,17 @@ struct config_output {
     enum config_heights heights;
     enum georef_method georef; /* GEOREF_AUTO: as the plan says */
     double tolerance_m;        /* largest error of a georeferenced position */
-    int attributes;            /* amplitude and width of each echo go out behind the points */
+    int attributes;            /* amplitude and width of each echo follow the points */
     double scale_m;            /* 0: the finest of 1e-6 x 10^n m that holds range_max_m in 31 bits */
 };
 
 struct config_beam {
     enum beam_mode mode;
-    int measures; /* no key: `plan` casts footprints to measure what a forced beam is off, be it single rays */
     uint32_t rings;
 };
 
-/* Tolerances of the plan. */
-struct config_plan {
-    double tolerance_m, echo_tolerance;
-};
-
 struct config_noise {
-    enum config_range_noise range; /* off, on or signal once it is loaded */
+    enum config_range_noise range;
     int angle;
     uint64_t seed;
     struct config_ball ball;
@@ -220,7 +222,7 @@ struct config_loop {
     enum config_pace pace;
 };
 
-/* A member a section of the file. */
+/* One member per section of the file. */
 struct config {
     char file[CONFIG_PATH_LEN];
     char profile_file[CONFIG_PATH_LEN];
@@ -234,7 +236,7 @@ struct config {
     struct link_spec link[CONFIG_MAX_LINKS];
     uint32_t n_links;
     struct config_beam beam;
-    struct config_plan plan;
+    struct plan_tolerance plan;
     struct config_noise noise;
     struct config_signal signal;
     struct surface_rule surface[CONFIG_MAX_SURFACES];
@@ -250,15 +252,17 @@ struct config {
  * `--set KEY` in errors). On failure cfg is unspecified. cfg is large: allocate it. */
 int config_load(const char *path, const char *const *sets, int n_sets, struct config *cfg, struct sh_err *err);
 
-/* Whether pulses are followed through glass or off mirrors. */
-int config_has_optics(const struct config *cfg);
-
 /* What a profile says about the signal; the rest of it (sharp, extinction, seed) is 0. */
 void config_signal_spec(const struct config_profile *profile, struct detect_signal_spec *spec);
 
 /* The schedule of a head with some settings. */
 void config_fill_spec(const struct config_profile *profile, const struct head_settings *settings,
                       struct schedule_spec *spec);
+
+static inline int config_has_footprint(const struct config *cfg)
+{
+    return cfg->profile.beam_exit_m != 0.0 || cfg->profile.beam_divergence_rad != 0.0;
+}
 
 /* Whether anything in the scene, or the head, moves. */
 int config_moves(const struct config *cfg);

@@ -1,6 +1,7 @@
-/* What concerns more than one key, or the world: limits of the profile, order of angles, files, keys of
- * links. */
+/* What concerns more than one key, or the world: limits of the head profile, order of angles, files, keys of links and
+ * platforms. Places on the Earth: places.c; noise, signal, surfaces: measurement.c. */
 #include "firmware_sim/config/table.h"
+#include "firmware_sim/config/words.h"
 
 #include <errno.h>
 #include <math.h>
@@ -11,7 +12,7 @@
 #include <unistd.h>
 
 #include "drivers/usb/backend.h"
-#include "firmware_sim/device/head_clock.h"
+#include "firmware_sim/config/epoch.h"
 
 /* Of two keys that contradict, the one to name: the first unless only the second was given. */
 static const char *given_of(const struct cfg_reader *rd, const char *first, const char *second)
@@ -31,7 +32,7 @@ static int64_t figure(const struct config_profile *profile, const char *path)
     return value;
 }
 
-/* Settings within the profile, by the rows' min_key and max_key. */
+/* Settings within the head profile: limits that a row of keys.c names by min_key and max_key. */
 static int check_limits(const struct cfg_reader *rd, const struct config *cfg)
 {
     for (size_t i = 0; i < rd->table.n; i++) {
@@ -41,7 +42,8 @@ static int check_limits(const struct cfg_reader *rd, const struct config *cfg)
         int64_t low = key->min_key != NULL ? figure(&cfg->profile, key->min_key) : (int64_t)(key->min * 1e6);
         memcpy(&value, cfg_address(rd, key, 0), sizeof value);
         if (value < low || value > high)
-            return cfg_fail_key(rd, key->path, 0, "%.15g is outside of head profile %s; allowed %.15g to %.15g %s",
+            return cfg_fail_key(rd, key->path, 0,
+                                "%.15g is outside the limits of head profile %s; allowed %.15g to %.15g %s",
                                 from_micro(value), cfg->profile.name, from_micro(low), from_micro(high), key->unit);
     }
     return SH_OK;
@@ -51,20 +53,23 @@ static int check_head(const struct cfg_reader *rd, const struct config *cfg)
 {
     const struct head_settings *s = &cfg->head.settings;
     if (s->prr_uhz < s->lines_uhz)
-        return cfg_fail_key(rd, given_of(rd, "head.prr_hz", "head.lines_hz"), 0,
-                            "less than a pulse per line, %.15g pulses/s and %.15g lines/s; allowed prr_hz of at least "
-                            "lines_hz",
-                            from_micro(s->prr_uhz), from_micro(s->lines_uhz));
+        return cfg_fail_key(
+            rd, given_of(rd, "head.prr_hz", "head.lines_hz"), 0,
+            "less than a pulse per line, %.15g pulses/s and %.15g lines/s; allowed a prr_hz of at least "
+            "%.15g, or a lines_hz of at most %.15g",
+            from_micro(s->prr_uhz), from_micro(s->lines_uhz), from_micro(s->lines_uhz), from_micro(s->prr_uhz));
     if (s->line_start_udeg >= s->line_stop_udeg)
         return cfg_fail_key(rd, given_of(rd, "head.line_stop_deg", "head.line_start_deg"), 0,
-                            "the line goes from %.15g to %.15g deg; allowed line_start_deg below line_stop_deg",
-                            from_micro(s->line_start_udeg), from_micro(s->line_stop_udeg));
+                            "the line goes from %.15g to %.15g deg; allowed a line_start_deg below %.15g, or a "
+                            "line_stop_deg above %.15g",
+                            from_micro(s->line_start_udeg), from_micro(s->line_stop_udeg),
+                            from_micro(s->line_stop_udeg), from_micro(s->line_start_udeg));
     int64_t span_udeg = s->pan_stop_udeg - s->pan_start_udeg;
     if (span_udeg < 0 || span_udeg > 360000000)
         return cfg_fail_key(rd, given_of(rd, "head.pan_stop_deg", "head.pan_start_deg"), 0,
-                            "the pan goes from %.15g to %.15g deg; allowed pan_start_deg at most pan_stop_deg, 360 deg "
-                            "apart at most",
-                            from_micro(s->pan_start_udeg), from_micro(s->pan_stop_udeg));
+                            "the pan goes from %.15g to %.15g deg; allowed a pan_stop_deg of %.15g to %.15g",
+                            from_micro(s->pan_start_udeg), from_micro(s->pan_stop_udeg), from_micro(s->pan_start_udeg),
+                            from_micro(s->pan_start_udeg) + 360.0);
     if (s->station > cfg->n_stations && cfg->platform.kind != PLATFORM_STOPS)
         return cfg_fail_key(rd, "head.station", 0, "there is no station %u; allowed 1 to %u", s->station,
                             cfg->n_stations);
@@ -112,18 +117,11 @@ static int check_names(const struct cfg_reader *rd, struct config *cfg)
     return SH_OK;
 }
 
-static void tidy_choice(enum config_choice *choice)
-{
-    if (*choice == CHOICE_FALSE) *choice = CHOICE_OFF;
-    if (*choice == CHOICE_TRUE) *choice = CHOICE_ON;
-}
-
 static int check_output(const struct cfg_reader *rd, struct config *cfg)
 {
     cfg->output.layout_given = cfg_is_given(rd, "output.layout", 0);
-    if (!cfg_is_given(rd, "output.tolerance_m", 0)) cfg->output.tolerance_m = fmax(1e-7, 1e-3 * cfg->plan.tolerance_m);
+    if (!cfg_is_given(rd, "output.tolerance_m", 0)) cfg->output.tolerance_m = fmax(1e-7, 1e-3 * cfg->plan.range_m);
     cfg->optics.depth_given = cfg_is_given(rd, "optics.depth", 0);
-    tidy_choice(&cfg->scene.order_exactly);
     if (cfg->output.utm_zone != 0 && cfg->output.crs != GEOREF_UTM)
         return cfg_fail_key(rd, "output.utm_zone", 0, "a zone, but output.crs is not utm; allowed only with crs: utm");
     if (cfg->output.heights == HEIGHTS_GEOID && cfg->output.crs != GEOREF_UTM && cfg->output.crs != GEOREF_GEODETIC)
@@ -142,25 +140,36 @@ static int check_output(const struct cfg_reader *rd, struct config *cfg)
     return SH_OK;
 }
 
+/* A key that only some kinds (of link, back end, platform) have. */
+struct owned_key {
+    const char *path;
+    unsigned kinds; /* bit per kind that has it */
+};
+
+/* The first of these keys that is given though the kind does not have it; NULL: none. */
+static const char *find_stray(const struct cfg_reader *rd, const struct owned_key *key, size_t n, int kind,
+                              uint32_t item)
+{
+    for (size_t i = 0; i < n; i++)
+        if (cfg_is_given(rd, key[i].path, item) && !(key[i].kinds & 1u << kind)) return key[i].path;
+    return NULL;
+}
+
 enum { OF_USBIP = 1u << USB_BACKEND_USBIP, OF_USBREDIR = 1u << USB_BACKEND_USBREDIR };
 enum { OF_FUNCTIONFS = 1u << USB_BACKEND_FUNCTIONFS };
 
 static int check_usb_link(const struct cfg_reader *rd, const struct config *cfg, struct link_spec *link, uint32_t i)
 {
-    static const struct {
-        const char *path;
-        unsigned backends; /* bit per back end that has the key */
-    } keys[] = {
+    static const struct owned_key keys[] = {
         {"links[].path", OF_USBREDIR},
         {"links[].address", OF_USBIP | OF_USBREDIR},
         {"links[].port", OF_USBIP | OF_USBREDIR},
         {"links[].attach", OF_USBIP | OF_USBREDIR},
         {"links[].udc", OF_FUNCTIONFS},
     };
-    const char *name = cfg_find(&rd->table, "links[].backend")->names[link->backend];
-    for (size_t k = 0; k < sizeof keys / sizeof keys[0]; k++)
-        if (cfg_is_given(rd, keys[k].path, i) && !(keys[k].backends & 1u << link->backend))
-            return cfg_fail_key(rd, keys[k].path, i, "the back end %s has no such key; allowed without it", name);
+    const char *name = cfg_backend_words[link->backend];
+    const char *stray = find_stray(rd, keys, CFG_LEN(keys), link->backend, i);
+    if (stray != NULL) return cfg_fail_key(rd, stray, i, "the back end %s has no such key; allowed without it", name);
     const int has_port = cfg_is_given(rd, "links[].port", i), has_address = cfg_is_given(rd, "links[].address", i);
     if (link->path[0] != '\0' && (has_port || has_address))
         return cfg_fail_key(rd, "links[].path", i, "both a path and a port or address; allowed one of them");
@@ -178,10 +187,7 @@ static int check_usb_link(const struct cfg_reader *rd, const struct config *cfg,
 
 static int check_link(const struct cfg_reader *rd, struct config *cfg, uint32_t i)
 {
-    static const struct {
-        const char *path;
-        unsigned types; /* bit per link type that has the key */
-    } keys[] = {
+    static const struct owned_key keys[] = {
         {"links[].path", 1u << LINK_FILE | 1u << LINK_PTY | 1u << LINK_USB},
         {"links[].address", 1u << LINK_TCP | 1u << LINK_USB},
         {"links[].port", 1u << LINK_TCP | 1u << LINK_USB},
@@ -202,10 +208,10 @@ static int check_link(const struct cfg_reader *rd, struct config *cfg, uint32_t 
                                       [LINK_USB] =
                                           "type, backend, address, port, path, attach, udc, speed, vid, pid, serial"};
     struct link_spec *link = &cfg->link[i];
-    const char *type = cfg_find(&rd->table, "links[].type")->names[link->type];
-    for (size_t k = 0; k < sizeof keys / sizeof keys[0]; k++)
-        if (cfg_is_given(rd, keys[k].path, i) && !(keys[k].types & 1u << link->type))
-            return cfg_fail_key(rd, keys[k].path, i, "a %s link has no such key; allowed %s", type, has[link->type]);
+    const char *type = cfg_link_words[link->type];
+    const char *stray = find_stray(rd, keys, CFG_LEN(keys), link->type, i);
+    if (stray != NULL)
+        return cfg_fail_key(rd, stray, i, "a %s link has no such key; allowed %s", type, has[link->type]);
     if (link->type == LINK_FILE && link->path[0] == '\0')
         return cfg_fail_key(rd, "links[].path", i, "missing; required for a file link is the file to write");
     for (uint32_t k = 0; k < i && link->path[0] != '\0'; k++)
@@ -214,19 +220,19 @@ static int check_link(const struct cfg_reader *rd, struct config *cfg, uint32_t 
     return link->type == LINK_USB ? check_usb_link(rd, cfg, link, i) : SH_OK;
 }
 
-/* Which part of the trajectory, and where on it to stop. How long it is, its file says (site_platform.c). */
+/* Which part of the trajectory, and where on it to stop. How long it is, its file says (firmware_sim/site/platform.c). */
 static int check_part(const struct cfg_reader *rd, struct config *cfg)
 {
     struct config_platform *p = &cfg->platform;
     int stops = p->kind == PLATFORM_STOPS;
     p->has_end = cfg_is_given(rd, "platform.end_s", 0);
     if (p->has_end && (stops ? p->end_s < p->start_s : p->end_s <= p->start_s))
-        return cfg_fail_key(rd, "platform.end_s", 0, "%.9g s, and platform.start_s is %.9g; allowed %s", p->end_s,
-                            p->start_s, stops ? "start_s or more" : "more than start_s");
+        return cfg_fail_key(rd, "platform.end_s", 0, "%.9g s, and platform.start_s is %.9g; allowed %s %.9g s",
+                            p->end_s, p->start_s, stops ? "at least" : "more than", p->start_s);
     if (!stops) return SH_OK;
     if (!(p->step_s > 0.0))
         return cfg_fail_key(rd, cfg_is_given(rd, "platform.step_s", 0) ? "platform.step_s" : "platform.kind", 0,
-                            "stops need the time from each to the next, platform.step_s; allowed above 0 to 1e9 s");
+                            "stops need the time from each to the next, platform.step_s; allowed above 0, up to 1e9 s");
     if (cfg->n_stations > 1)
         return cfg_fail_key(rd, "stations", 0,
                             "%u of them, but platform.kind is stops, which are the stations; allowed one, which says "
@@ -235,12 +241,10 @@ static int check_part(const struct cfg_reader *rd, struct config *cfg)
     return SH_OK;
 }
 
-static int check_platform(const struct cfg_reader *rd, struct config *cfg)
+/* Keys that this kind of platform does not have. */
+static int check_platform_keys(const struct cfg_reader *rd, const struct config_platform *p)
 {
-    static const struct {
-        const char *path;
-        unsigned kinds; /* bit per kind of platform that has the key */
-    } keys[] = {
+    static const struct owned_key keys[] = {
         {"platform.file", 1u << PLATFORM_TRAJECTORY | 1u << PLATFORM_STOPS},
         {"platform.waypoints", 1u << PLATFORM_TRAJECTORY | 1u << PLATFORM_STOPS},
         {"platform.start_s", 1u << PLATFORM_TRAJECTORY | 1u << PLATFORM_STOPS},
@@ -262,14 +266,20 @@ static int check_platform(const struct cfg_reader *rd, struct config *cfg)
         [PLATFORM_LIVE] = "reach_m, extrapolate_ms, address, port, mount_...",
         [PLATFORM_STOPS] = "file or waypoints, start_s, end_s, step_s, mount_...",
     };
+    const char *stray = find_stray(rd, keys, CFG_LEN(keys), p->kind, 0);
+    if (stray == NULL) return SH_OK;
+    return cfg_fail_key(rd, stray, 0, "a %s platform has no such key; allowed %s", cfg_platform_words[p->kind],
+                        has[p->kind]);
+}
+
+static int check_platform(const struct cfg_reader *rd, struct config *cfg)
+{
     const struct config_platform *p = &cfg->platform;
-    for (size_t k = 0; k < sizeof keys / sizeof keys[0]; k++)
-        if (cfg_is_given(rd, keys[k].path, 0) && !(keys[k].kinds & 1u << p->kind))
-            return cfg_fail_key(rd, keys[k].path, 0, "a %s platform has no such key; allowed %s",
-                                cfg_find(&rd->table, "platform.kind")->names[p->kind], has[p->kind]);
+    int code = check_platform_keys(rd, p);
+    if (code != SH_OK) return code;
     if (p->kind == PLATFORM_LIVE && cfg->loop.pace == PACE_FAST)
         return cfg_fail_key(rd, "loop.pace", 0,
-                            "nobody can say in time where a live platform is; allowed realtime, step");
+                            "the poses of a live platform come in real time; allowed realtime, step");
     if (p->kind != PLATFORM_TRAJECTORY && p->kind != PLATFORM_STOPS) return SH_OK;
     if ((p->file[0] != '\0') == (p->waypoints[0] != '\0'))
         return cfg_fail_key(rd, p->file[0] != '\0' ? "platform.waypoints" : "platform.kind", 0,
@@ -280,10 +290,8 @@ static int check_platform(const struct cfg_reader *rd, struct config *cfg)
 int config_moves(const struct config *cfg)
 {
     int moves = cfg->platform.kind != PLATFORM_STATIC;
-    for (uint32_t i = 0; i < cfg->scene.n_meshes; i++) {
-        const struct config_mesh *m = &cfg->scene.mesh[i];
-        moves |= m->turn_deg_s != 0.0 || m->move_m_s[0] != 0.0 || m->move_m_s[1] != 0.0 || m->move_m_s[2] != 0.0;
-    }
+    for (uint32_t i = 0; i < cfg->scene.n_meshes; i++)
+        moves |= config_mesh_moves(&cfg->scene.mesh[i]);
     return moves;
 }
 
@@ -294,24 +302,24 @@ int config_beam_fixed(const struct config *cfg)
 
 static const double LEAST_PULSE_NS = 0.1; /* 15 mm of range */
 
-/* Sub-rays that meet one oblique surface have ranges apart: with hardly a range resolution each would be an echo, or,
- * too weak for one, lost. */
+/* Sub-rays that meet one oblique surface have different ranges. Where the pulse is too short to join them, each would
+ * be an echo of its own, or be lost because it is too weak. */
 static int check_pulse_width(const struct cfg_reader *rd, const struct config *cfg)
 {
     const struct config_profile *p = &cfg->profile;
-    const int footprint = p->beam_exit_m != 0.0 || p->beam_divergence_rad != 0.0;
-    if (cfg->beam.mode == BEAM_SINGLE || !footprint || p->pulse_width_ns >= LEAST_PULSE_NS) return SH_OK;
+    if (cfg->beam.mode == BEAM_SINGLE || !config_has_footprint(cfg) || p->pulse_width_ns >= LEAST_PULSE_NS)
+        return SH_OK;
     return cfg_fail_key(rd, "beam.mode", 0,
-                        "pulse_width_ns of head profile %s is %.10g: too short to tell the echoes of a footprint; "
+                        "pulse_width_ns of head profile %s is %.10g: too short to tell echoes of a footprint apart; "
                         "allowed single, or a pulse_width_ns of at least %.10g",
                         p->name, p->pulse_width_ns, LEAST_PULSE_NS);
 }
 
-/* Outlines are those that are seen from one place. */
+/* An adaptive beam needs outlines, which are those seen from one place. */
 static int check_beam(const struct cfg_reader *rd, const struct config *cfg)
 {
     if (cfg->beam.mode == BEAM_SINGLE || cfg->beam.mode == BEAM_AUTO) return SH_OK;
-    if (cfg->profile.beam_exit_m == 0.0 && cfg->profile.beam_divergence_rad == 0.0)
+    if (!config_has_footprint(cfg))
         return cfg_fail_key(rd, "beam.mode", 0, "head profile %s has no footprint; allowed single", cfg->profile.name);
     if (cfg->beam.mode == BEAM_ADAPTIVE && !config_beam_fixed(cfg))
         return cfg_fail_key(rd, "beam.mode", 0, "adaptive, but %s; allowed single, rings, auto",
@@ -331,16 +339,16 @@ static int check_loop(const struct cfg_reader *rd, const struct config *cfg)
 
 static int check_time(const struct cfg_reader *rd, const struct config *cfg)
 {
-    enum head_clock_source source;
+    enum epoch_source source;
     struct sh_err why;
     char shown[CFG_SHOW_MAX];
-    if (head_clock_parse(cfg->time.epoch, utc_table_builtin(), &source, NULL, &why) != SH_OK)
+    if (epoch_parse(cfg->time.epoch, utc_table_builtin(), &source, NULL, &why) != SH_OK)
         return cfg_fail_key(
             rd, "time.epoch", 0,
             "\"%s\": %.80s; allowed none, utc, tai, or a time after 1980-01-06 such as 2026-01-01T00:00:00Z",
             cfg_show(cfg->time.epoch, shown), why.text);
     int link = cfg_nmea_link(cfg);
-    if (source == HEAD_CLOCK_NONE && link >= 0)
+    if (source == EPOCH_NONE && link >= 0)
         return cfg_fail_key(rd, "links[].protocol", (uint32_t)link,
                             "nmea, but the time is not known; required is time.epoch: utc, tai, or a time such as "
                             "2026-01-01T00:00:00Z");

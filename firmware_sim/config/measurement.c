@@ -1,4 +1,4 @@
-/* Noise, signal and surfaces: what concerns more than one key. */
+/* Noise, signal and surfaces: checks that concern more than one key. */
 #include "firmware_sim/config/table.h"
 
 #include <math.h>
@@ -29,25 +29,18 @@ int cfg_check_reaches(const struct cfg_reader *rd, const struct config_profile *
     struct detect_signal signal;
     struct sh_err why;
     if (profile->range_sigma_floor_m > profile->range_sigma_m)
-        return cfg_fail_key(rd, "range_sigma_floor_m", 0, "above range_sigma_m; allowed at most that");
+        return cfg_fail_key(rd, "range_sigma_floor_m", 0, "%.10g is too much; allowed at most %.10g",
+                            profile->range_sigma_floor_m, profile->range_sigma_m);
     config_signal_spec(profile, &spec);
     if (detect_signal_set_up(&spec, &signal, &why) != SH_OK)
         return cfg_fail_key(rd, "reaches", 0,
-                            "%.200s; allowed ranges that rise with the reflectance, and not faster than its "
-                            "square root",
+                            "%.200s; allowed ranges that rise with the reflectance, and not faster than its square "
+                            "root",
                             why.text);
     return SH_OK;
 }
 
-int config_has_optics(const struct config *cfg)
-{
-    int optics = 0;
-    for (uint32_t i = 0; i < cfg->n_surfaces; i++)
-        optics |= cfg->surface[i].surface.glass > 0.0 || cfg->surface[i].surface.mirror > 0.0;
-    return optics && cfg->optics.depth > 0;
-}
-
-/* What is not given is not said. */
+/* NaN for what an entry leaves out. */
 static void mark_unsaid(const struct cfg_reader *rd, uint32_t i, struct surface *s)
 {
     const struct {
@@ -77,11 +70,9 @@ static int check_surface(const struct cfg_reader *rd, uint32_t i, const struct s
 
 static int check_noise(const struct cfg_reader *rd, struct config *cfg)
 {
-    if (cfg->noise.range == RANGE_NOISE_FALSE) cfg->noise.range = RANGE_NOISE_OFF;
-    if (cfg->noise.range == RANGE_NOISE_TRUE) cfg->noise.range = RANGE_NOISE_ON;
     if (!cfg_is_given(rd, "noise.ball.seed", 0)) cfg->noise.ball.seed = cfg->noise.seed;
     if (cfg->noise.range == RANGE_NOISE_SIGNAL && !cfg->signal.on)
-        return cfg_fail_key(rd, "noise.range", 0, "signal, but there is none; allowed with signal.model: on");
+        return cfg_fail_key(rd, "noise.range", 0, "signal, but no signal is modelled; allowed with signal.model: on");
     if (cfg->noise.angle && cfg->profile.mirror_sigma_deg == 0.0 && cfg->profile.pan_sigma_deg == 0.0)
         return cfg_fail_key(rd, "noise.angle", 0,
                             "head profile %s gives no angle noise; required is mirror_sigma_deg or pan_sigma_deg there",
@@ -97,7 +88,7 @@ int cfg_check_signal(const struct cfg_reader *rd, struct config *cfg)
     int code = check_noise(rd, cfg);
     cfg->signal.has_extinction = cfg_is_given(rd, "signal.extinction_1_km", 0);
     if (code == SH_OK && cfg->signal.has_extinction && cfg_is_given(rd, "signal.visibility_m", 0))
-        code = cfg_fail_key(rd, "signal.extinction_1_km", 0, "and visibility_m at once; allowed one of them");
+        code = cfg_fail_key(rd, "signal.extinction_1_km", 0, "given together with visibility_m; allowed one of them");
     for (uint32_t i = 0; i < cfg->n_surfaces && code == SH_OK; i++) {
         code = check_surface(rd, i, &cfg->surface[i].surface);
         mark_unsaid(rd, i, &cfg->surface[i].surface);

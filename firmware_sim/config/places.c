@@ -1,5 +1,6 @@
 /* Keys that say where things are on the Earth: the scene's anchor, and each station in one of several forms. */
 #include "firmware_sim/config/table.h"
+#include "firmware_sim/config/words.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -32,7 +33,7 @@ static int check_anchor(const struct cfg_reader *rd, struct config *cfg)
                                       [ANCHOR_IFC] = "height_m",
                                       [ANCHOR_UTM] = "utm_zone, hemisphere",
                                       [ANCHOR_ECEF] = "source alone"};
-    const char *source = cfg_find(&rd->table, "scene.anchor.source")->names[cfg->scene.anchor.source];
+    const char *source = cfg_anchor_words[cfg->scene.anchor.source];
     char why[64];
     for (size_t k = 0; k < CFG_LEN(keys); k++) {
         int given = cfg_is_given(rd, keys[k].path, 0);
@@ -40,7 +41,8 @@ static int check_anchor(const struct cfg_reader *rd, struct config *cfg)
             return cfg_fail_key(rd, keys[k].path, 0, "an anchor of source %s has no such key; allowed %s", source,
                                 has[cfg->scene.anchor.source]);
         snprintf(why, sizeof why, "the anchor's source is %s", source);
-        if (!given && (keys[k].required & 1u << cfg->scene.anchor.source)) return fail_required(rd, keys[k].path, 0, why);
+        if (!given && (keys[k].required & 1u << cfg->scene.anchor.source))
+            return fail_required(rd, keys[k].path, 0, why);
     }
     cfg->scene.anchor.height_given = cfg_is_given(rd, "scene.anchor.height_m", 0);
     return SH_OK;

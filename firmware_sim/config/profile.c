@@ -88,20 +88,16 @@ static void known_profiles(const struct profile_dirs *dirs, char *buf, size_t le
 
 /* ---- one profile */
 
-static int check_profile(const struct cfg_reader *rd, const struct config_profile *p)
+/* A figure that must not be above another one; both in millionths. strictly: nor equal to it. */
+static int check_order(const struct cfg_reader *rd, const char *low_key, int64_t low, int64_t high, int strictly)
 {
-    if (p->prr_min_uhz > p->prr_max_uhz)
-        return cfg_fail_key(rd, "prr_min_hz", 0, "above prr_max_hz; allowed at most prr_max_hz");
-    if (p->lines_min_uhz > p->lines_max_uhz)
-        return cfg_fail_key(rd, "lines_min_hz", 0, "above lines_max_hz; allowed at most lines_max_hz");
-    if (p->prr_max_uhz < p->lines_min_uhz)
-        return cfg_fail_key(rd, "prr_max_hz", 0, "below lines_min_hz; allowed at least a pulse per line");
-    if (p->fov_min_udeg >= p->fov_max_udeg)
-        return cfg_fail_key(rd, "fov_min_deg", 0, "not below fov_max_deg; allowed below fov_max_deg");
-    if (p->pan_min_udeg >= p->pan_max_udeg || p->pan_max_udeg - p->pan_min_udeg > 360000000)
-        return cfg_fail_key(rd, "pan_max_deg", 0, "allowed above pan_min_deg and at most 360 deg from it");
-    if (p->range_min_m >= p->range_max_m)
-        return cfg_fail_key(rd, "range_min_m", 0, "not below range_max_m; allowed below range_max_m");
+    if (low < high || (low == high && !strictly)) return SH_OK;
+    return cfg_fail_key(rd, low_key, 0, "%.15g is too much; allowed %s %.15g", (double)low * 1e-6,
+                        strictly ? "below" : "at most", (double)high * 1e-6);
+}
+
+static int check_sweep(const struct cfg_reader *rd, const struct config_profile *p)
+{
     double sweep_deg = 360.0 / p->facets * p->optical_gain,
            fov_deg = (double)(p->fov_max_udeg - p->fov_min_udeg) * 1e-6;
     if (sweep_deg > 360.0)
@@ -113,7 +109,27 @@ static int check_profile(const struct cfg_reader *rd, const struct config_profil
                             "a field of view of %.10g deg does not fit into a sweep; allowed up to %.10g deg, "
                             "360 / facets * optical_gain",
                             fov_deg, sweep_deg);
-    return cfg_check_reaches(rd, p);
+    return SH_OK;
+}
+
+static int check_profile(const struct cfg_reader *rd, const struct config_profile *p)
+{
+    int code = check_order(rd, "prr_min_hz", p->prr_min_uhz, p->prr_max_uhz, 0);
+    if (code == SH_OK) code = check_order(rd, "lines_min_hz", p->lines_min_uhz, p->lines_max_uhz, 0);
+    if (code == SH_OK && p->prr_max_uhz < p->lines_min_uhz)
+        return cfg_fail_key(rd, "prr_max_hz", 0, "less than a pulse per line; allowed at least %.15g",
+                            (double)p->lines_min_uhz * 1e-6);
+    if (code == SH_OK) code = check_order(rd, "fov_min_deg", p->fov_min_udeg, p->fov_max_udeg, 1);
+    if (code != SH_OK) return code;
+    const double pan_min_deg = (double)p->pan_min_udeg * 1e-6;
+    if (p->pan_min_udeg >= p->pan_max_udeg || p->pan_max_udeg - p->pan_min_udeg > 360000000)
+        return cfg_fail_key(rd, "pan_max_deg", 0, "%.15g does not fit; allowed above %.15g, up to %.15g",
+                            (double)p->pan_max_udeg * 1e-6, pan_min_deg, pan_min_deg + 360.0);
+    if (p->range_min_m >= p->range_max_m)
+        return cfg_fail_key(rd, "range_min_m", 0, "%.10g is too much; allowed below %.10g", p->range_min_m,
+                            p->range_max_m);
+    code = check_sweep(rd, p);
+    return code == SH_OK ? cfg_check_reaches(rd, p) : code;
 }
 
 /* The file's name is the profile's: two names could differ. */

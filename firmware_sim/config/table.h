@@ -1,8 +1,7 @@
-/* Inside of the configuration: one table of rows, and a reader that fills a struct from YAML and --set by it.
+/* Private to this folder: the rows of the tables, and the reader that fills a struct from YAML and --set by them.
  *
- * A row's path is generic: "stations[].lat_deg" stands for every station; its element number is `item`. Lists
- * do not nest, so one number is enough. Reader and tables are constant after use; a reader belongs to one
- * thread. */
+ * A row's path is generic: "stations[].lat_deg" stands for every station; its element number is `item`. Lists do not
+ * nest, so one number is enough. Tables are constant; a reader belongs to one thread. */
 #ifndef FIRMWARE_SIM_CONFIG_TABLE_H
 #define FIRMWARE_SIM_CONFIG_TABLE_H
 
@@ -14,8 +13,8 @@
 enum cfg_type {
     CFG_MAP,   /* a section, or one element of a list; nothing is stored */
     CFG_LIST,  /* offset, size: the array and its stride; count_offset: uint32_t; min..max elements */
-    CFG_BOOL,  /* on|off, true|false -> int */
-    CFG_ENUM,  /* names[value] -> int or enum */
+    CFG_BOOL,  /* off|on -> int */
+    CFG_ENUM,  /* names[value] -> int or enum; false and true are read as off and on here, too */
     CFG_COUNT, /* whole number -> 4 or 8 bytes */
     CFG_MICRO, /* decimal number, exact to 1e-6 -> int64_t in 1e-6 units */
     CFG_REAL,  /* double */
@@ -38,8 +37,8 @@ struct cfg_key {
     const char *unit;              /* NULL: none */
     const char *def;               /* as written in YAML; NULL: required; "@KEY": the profile's figure KEY */
     double min, max;               /* in the unit, or number of elements */
-    const char *min_key, *max_key; /* limits from the profile, checked once it is known */
-    const char *allowed;           /* says the range where min and max can't */
+    const char *min_key, *max_key; /* limits from the profile (crosscheck.c) */
+    const char *allowed;           /* the allowed values, where min and max can't say them */
     const char *const *names;      /* enum: by value, NULL at the end */
     size_t offset, size, count_offset;
     int flags;
@@ -50,7 +49,7 @@ struct cfg_table {
     const struct cfg_key *keys;
     size_t n;
 };
-/* config_table.c, config_table_profile.c */
+/* keys.c, profile_keys.c */
 extern const struct cfg_table cfg_config_table, cfg_profile_table;
 #define CFG_LEN(array)           (sizeof(array) / sizeof((array)[0]))
 #define CFG_MEMBER(type, member) .offset = offsetof(type, member), .size = sizeof(((type *)0)->member)
@@ -65,7 +64,7 @@ struct cfg_reader {
     struct sh_err *err;
 };
 
-/* ---- config_reader.c: rows, places and errors */
+/* ---- reader.c: rows, places and errors */
 void cfg_reader_init(struct cfg_reader *rd, const char *file, const struct cfg_table *table, void *base,
                      struct sh_err *err);
 const struct cfg_key *cfg_find(const struct cfg_table *table, const char *path);
@@ -92,7 +91,7 @@ int cfg_fail_unknown(const struct cfg_reader *rd, int line, const char *parent, 
 enum { CFG_SHOW_MAX = 64 };
 const char *cfg_show(const char *text, char *buf);
 
-/* ---- config_value.c: texts to values */
+/* ---- value.c: texts to values */
 enum cfg_number { CFG_NUMBER_OK, CFG_NOT_A_NUMBER, CFG_TOO_FINE, CFG_TOO_LARGE };
 /* Exact: text * 10^decimals as a whole number. Grammar: [+-] digits [. digits] [e [+-] digits], no leading
  * zeros, which YAML 1.1 reads as octal. */
@@ -108,7 +107,7 @@ const char *cfg_allowed(const struct cfg_key *key, char *buf);
 /* Directory part of a path, with its '/'; empty for a bare name. buf holds CONFIG_PATH_LEN. */
 const char *cfg_dir_of(const char *path, char *buf);
 
-/* ---- config_yaml.c, config_set.c, config_profile.c, config_check.c */
+/* ---- yaml.c, set.c, config.c, profile.c, crosscheck.c */
 int cfg_read_file(struct cfg_reader *rd);
 int cfg_apply_set(struct cfg_reader *rd, const char *set);
 /* Values for what was not given, errors for what must be. profile may be NULL. */
@@ -117,9 +116,9 @@ int cfg_fill_defaults(struct cfg_reader *rd, const struct config_profile *profil
 int cfg_load_profile(struct cfg_reader *rd, struct config *cfg);
 /* Everything that concerns more than one key. */
 int cfg_check(const struct cfg_reader *rd, struct config *cfg);
-/* config_place.c: the anchor, and the forms of a station's place. */
+/* places.c: the anchor, and the forms of a station's place. */
 int cfg_check_places(const struct cfg_reader *rd, struct config *cfg);
-/* config_signal.c: noise, signal, surfaces, and what of a profile concerns them. */
+/* measurement.c: noise, signal, surfaces, and what of a profile concerns them. */
 int cfg_check_signal(const struct cfg_reader *rd, struct config *cfg);
 int cfg_check_reaches(const struct cfg_reader *rd, const struct config_profile *profile);
 /* The first link of the GNSS receiver; -1: none. */

@@ -88,12 +88,10 @@ static void allowed_range(const struct cfg_key *key, char *buf)
     snprintf(low, sizeof low, "%.10g", key->min);
     snprintf(high, sizeof high, "%.10g", key->max);
     if (key->type == CFG_COUNT && key->max >= 0x1p64) snprintf(high, sizeof high, "%" PRIu64, UINT64_MAX);
-    if (key->max_key != NULL)
-        snprintf(buf, CFG_ALLOWED_MAX, "allowed %s to %s of the head profile",
-                 key->min_key != NULL ? key->min_key : low, key->max_key);
-    else
-        snprintf(buf, CFG_ALLOWED_MAX, "allowed %s%s to %s%s%s", kind, low, high, key->unit != NULL ? " " : "",
-                 key->unit != NULL ? key->unit : "");
+    if (key->min_key != NULL) snprintf(low, sizeof low, "%.10g", cfg_find(&cfg_profile_table, key->min_key)->min);
+    if (key->max_key != NULL) snprintf(high, sizeof high, "%.10g", cfg_find(&cfg_profile_table, key->max_key)->max);
+    snprintf(buf, CFG_ALLOWED_MAX, "allowed %s%s to %s%s%s%s", kind, low, high, key->unit != NULL ? " " : "",
+             key->unit != NULL ? key->unit : "", key->max_key != NULL ? ", within the limits of the head profile" : "");
 }
 
 const char *cfg_allowed(const struct cfg_key *key, char *buf)
@@ -195,11 +193,11 @@ static int store_real(const struct place *at, double *dst, const char *text)
 
 static int store_word(const struct place *at, void *dst, const char *text)
 {
-    static const char *const bools[] = {"off", "on", "false", "true", NULL};
+    static const char *const bools[] = {"off", "on", NULL};
     const char *const *names = at->key->type == CFG_BOOL ? bools : at->key->names;
-    for (int i = 0; names[i] != NULL; i++) {
-        if (strcmp(names[i], text) != 0) continue;
-        int value = at->key->type == CFG_BOOL ? i % 2 : i;
+    const char *word = strcmp(text, "false") == 0 ? "off" : strcmp(text, "true") == 0 ? "on" : text;
+    for (int value = 0; names[value] != NULL; value++) {
+        if (strcmp(names[value], word) != 0) continue;
         memcpy(dst, &value, sizeof value);
         return SH_OK;
     }

@@ -1,10 +1,13 @@
-/* The device: commands, states and the scan program, in device time. What a head's main processor does.
+/* The device: commands, states and the scan program. It does what a head's main processor does.
  *
- * Time is counted in ticks. Casters claim ticks in order, some way ahead of release; a claim carries the state machine
- * and the scan program to that tick and says what the tick consists of. A command takes effect at the first tick that
- * isn't claimed yet. Readers of the state see it as of the last released tick, not as of the last claimed one.
+ * In: command lines, poses of a live platform, and claims of ticks. Out: replies, and what each tick consists of
+ * (device_work). All times are device time in ns from power-up, or ticks of it.
  *
- * Thread: any; one lock inside, held for microseconds. The pacing thread never takes it. */
+ * Casters claim ticks in order, ahead of their release. A claim takes the state machine and the scan program on to that
+ * tick. A command takes effect at the first tick that is not claimed yet. A client that asks for the state gets that of
+ * the last released tick, not of the last claimed one.
+ *
+ * Thread: any. There is one lock inside, held for microseconds. The pacing thread never takes it. */
 #ifndef FIRMWARE_SIM_DEVICE_DEVICE_H
 #define FIRMWARE_SIM_DEVICE_DEVICE_H
 
@@ -23,18 +26,20 @@ enum { DEVICE_MAX_EVENTS = 24, DEVICE_MAX_POSES = 256, DEVICE_POSE_AHEAD_S = 360
 /* Counters that casters, pacing thread and readers share. */
 struct device_counters {
     _Atomic uint64_t pulses, fired, echoes, lines; /* released; pulses: cast ones */
-    _Atomic uint64_t lost_pulses, lost_ticks;      /* cast pulses and ticks that could not be computed in time */
-    _Atomic uint64_t crowded, faint, unfit;        /* released lines' hits that are no echoes: struct cast_counters */
+    _Atomic uint64_t lost_pulses, lost_ticks;      /* cast pulses and ticks not computed in time */
+    _Atomic uint64_t crowded, faint, unfit;        /* hits that are not echoes: struct cast_counters */
     _Atomic uint64_t late_blocks, late_max_ns;
     _Atomic uint64_t reader_lost_frames;
-    _Atomic uint64_t late_poses, bad_poses; /* live: made up for want of one in time; that came and could not be used */
+    /* live: poses that were made up because none came in time, and poses that came and could not be used */
+    _Atomic uint64_t late_poses, bad_poses;
 };
 
-/* What one tick consists of; all copies, so that nobody waits for anybody. Frames leave in the order of the members. */
+/* What one tick consists of. All members are copies, so that no thread waits for another. Frames leave in the order of
+ * the members. */
 struct device_work {
     uint64_t tick;
     int64_t t_ns;             /* device time at the tick's start */
-    uint32_t n_events_before; /* of event[]: those that go before the points; the rest behind */
+    uint32_t n_events_before; /* of event[]: those that go before the points; the others go after them */
     uint32_t n_events;
     struct native_event event[DEVICE_MAX_EVENTS];
     int describe, describe_flags; /* descriptor and anchor frames, with these flags */
@@ -47,13 +52,13 @@ struct device_work {
     uint64_t pulse0, pulse_end; /* pulses of this tick */
     int cut_short;              /* the scan stops at pulse_end, within a line */
     uint32_t station;
-    size_t stretch;   /* of a trajectory: the one that the last anchor was for */
+    size_t stretch;   /* of a trajectory: the one of the last anchor */
     uint32_t echoes;  /* enum beam_select */
-    uint32_t n_poses; /* live: the head's poses of this tick; 0: a head that stands still, or goes along a trajectory */
+    uint32_t n_poses; /* live: the head's poses of this tick; 0: the head stands still or follows a trajectory */
     struct pose_knot pose[DEVICE_MAX_POSES];
     int telemetry;
     struct native_telemetry telemetry_frame;
-    int wake; /* readers have something to do, be there frames or not: the receiver has a position */
+    int wake; /* readers have something to do even without frames: the receiver has a position */
 };
 
 struct device;
@@ -71,18 +76,17 @@ struct device_options {
 int device_create(const struct site *site, const struct device_options *options, struct device **out,
                   struct sh_err *err);
 void device_free(struct device *device);
-/* Closes the journal, if there is one, and says what went wrong in writing it. After the loop is joined. */
+/* Closes the journal, if there is one. Returns the first error in writing it. After the loop is joined. */
 int device_close_journal(struct device *device, struct sh_err *err);
 
 struct device_counters *device_counters(struct device *device);
 
-/* The next tick's work. Returns 0, or 1 when the run is over and there is no next tick. `released`: ticks released so
- * far. */
-int device_claim(struct device *device, uint64_t released, struct device_work *work);
-/* A claimed tick was lost, and with it n_cast pulses to be cast, from first_cast on: counted, and what it said besides
- * points is said again in a later one. */
+/* The next tick's work. Returns 0, or 1 when the run is over and there is no next tick. */
+int device_claim(struct device *device, struct device_work *work);
+/* A claimed tick was lost, and n_cast pulses to be cast with it, from first_cast on. They are counted. What else the
+ * tick said is said again in a later one. */
 void device_lost(struct device *device, const struct device_work *work, uint64_t n_cast, uint64_t first_cast);
-/* True while nothing happens without a command: off the clock, the paces `fast` and `step` wait then. */
+/* True while nothing happens without a command. The pace `fast` waits then. */
 int device_is_idle(struct device *device);
 /* Ends the run: a running scan is stopped first. Async-signal-unsafe. */
 void device_end(struct device *device);
@@ -94,10 +98,10 @@ void device_command(struct device *device, uint32_t session, const char *line, u
 void device_overlong(struct device *device, uint32_t session, struct command_result *out);
 /* A session has gone; partial: in the middle of a command. Gives control back. */
 void device_session_closed(struct device *device, uint32_t session, const char *who, int partial);
-/* Where a live platform is at a device time (of its own, before the mount): from TIME:STEP or the socket. Returns 0, or
- * 1 where it can't be used (not later than the one before, out of reach, or, but for the pace step, more than
- * DEVICE_POSE_AHEAD_S ahead of device time): then it is counted. However far apart they are, the platform moves evenly
- * from one pose to the next. */
+/* Where a live platform (not the head on it) is at a device time: from TIME:STEP or the socket. The platform moves
+ * evenly from one pose to the next, however far apart they are. Returns 0, or 1 for a pose that can't be used, which is
+ * counted: not later than the one before, out of reach, or more than DEVICE_POSE_AHEAD_S ahead of device time (not in
+ * the pace step). */
 int device_pose(struct device *device, int64_t t_ns, const struct pose *pose);
 /* The same from x, y, z (m), roll, pitch, heading (degrees). */
 int device_pose_numbers(struct device *device, int64_t t_ns, const double v[6]);
@@ -105,13 +109,12 @@ int device_pose_numbers(struct device *device, int64_t t_ns, const double v[6]);
 /* Something for the error queue (enum command_error), and an event on the wire. */
 void device_report(struct device *device, int number, const char *text);
 
-/* Device time begins now, at this time of clock_now_ns(): takes the time of day from the system where it is to come
- * from there. Before the first tick is claimed. *warning: something the user should know, or NULL; belongs to the
- * device. */
+/* Device time begins now, at this time of clock_now_ns(). The time of day is read from the system where time.epoch says
+ * so. Before the first tick is claimed. *warning: something the user should know, or NULL; it belongs to the device. */
 int device_power_up(struct device *device, int64_t now_ns, const char **warning, struct sh_err *err);
 
-/* The GNSS receiver: positions until a device time, the device time of a position (from 0), and its sentences at the
- * station where the head stands. Returns the length, 0 when cap is too small. */
+/* The GNSS receiver: how many positions there were before a device time, the device time of a position (from 0), and
+ * its sentences where the head is. Returns their length, 0 when cap is too small. */
 uint64_t device_gnss_count(const struct device *device, int64_t t_ns);
 int64_t device_gnss_time_ns(const struct device *device, uint64_t index);
 size_t device_gnss_sentences(struct device *device, uint64_t index, char *dst, size_t cap);
@@ -119,13 +122,12 @@ size_t device_gnss_sentences(struct device *device, uint64_t index, char *dst, s
 /* Scans begun so far. */
 uint64_t device_scans(struct device *device);
 
-double device_tick_ns(const struct device *device);
+int64_t device_tick_ns(const struct device *device);
 
 /* The anchor of a station's points; the stretch counts only along a trajectory (site_georef). */
 void device_fill_anchor(const struct site *site, uint32_t station, size_t stretch, struct native_anchor *a);
 
-/* The most pulses that one tick consists of, and lines that end in it, whatever the settings: a slot has to hold them.
- */
+/* The most pulses that one tick consists of, and the most lines that end in it, whatever the settings. */
 uint32_t device_tick_pulses(const struct config *cfg);
 uint32_t device_tick_lines(const struct config *cfg);
 

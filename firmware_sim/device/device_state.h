@@ -1,4 +1,4 @@
-/* Private to device*.c. */
+/* Private to the files of this folder: what the device holds, each part with one owner. */
 #ifndef FIRMWARE_SIM_DEVICE_DEVICE_STATE_H
 #define FIRMWARE_SIM_DEVICE_DEVICE_STATE_H
 
@@ -8,7 +8,7 @@
 #include "firmware_sim/device/gnss.h"
 #include "firmware_sim/device/head_clock.h"
 
-/* Poses of a live platform. Each tick begins with one of the head, made once, from those that had come. */
+/* Poses of a live platform. Each tick begins with a pose of the head, made once from the poses that had come. */
 struct device_live {
     struct {
         int64_t t_ns;     /* device time */
@@ -22,6 +22,53 @@ struct device_live {
 
 enum { DEVICE_MAX_PENDING = 256, DEVICE_MAX_CHANGES = 32, DEVICE_SURFACES_A_FRAME = 64 };
 
+/* The state machine of the head. */
+struct device_machine {
+    enum head_state state; /* as of the next tick to be claimed */
+    uint64_t due_tick;     /* of the next timed transition; UINT64_MAX: none */
+    struct {
+        uint64_t tick;
+        enum head_state state;
+    } change[DEVICE_MAX_CHANGES]; /* the last ones: readers see the state of the last released tick */
+    uint32_t n_changes;
+};
+
+/* The scan at hand, or the last one. */
+struct device_scan {
+    int on;
+    uint32_t number;     /* from 1 */
+    uint64_t tick0;      /* its first */
+    uint64_t end_tick;   /* the first one after it, when none is on */
+    uint64_t pulse_next; /* next pulse to be claimed */
+    uint64_t lost0;      /* pulses lost before it */
+    struct schedule_segment segment;
+    uint32_t station; /* from 0 */
+    size_t stretch;   /* of a trajectory: the one of the last pulse that is claimed */
+    int describe;     /* descriptor and anchor are due, as news */
+    int anchor_lost;  /* they are due as a repetition: a new anchor was in a tick that was lost */
+    int stop_requested;
+};
+
+/* Events that wait for a tick. */
+struct device_events {
+    struct native_event event[DEVICE_MAX_PENDING];
+    uint32_t n, dropped;
+};
+
+/* What the head could not compute in time, as far as events have said so. */
+struct device_overrun {
+    uint64_t ticks_said, pulses_said;
+    uint64_t first; /* first lost pulse that no event has named; UINT64_MAX: none */
+    uint64_t tick;  /* of the last event */
+};
+
+/* The journal that is written, and the one that is replayed. */
+struct device_journal {
+    struct journal *out; /* NULL: none */
+    struct journal_entry *replay;
+    size_t n_replay, at; /* next entry to carry out */
+};
+
 struct device {
     pthread_mutex_t lock;
     const struct site *site;
@@ -34,59 +81,58 @@ struct device {
     char idn[96];
     uint64_t tick_hz;
     int64_t tick_ns;
-
-    uint64_t next_tick;    /* to be claimed */
-    enum head_state state; /* as of next_tick */
-    uint64_t due_tick;     /* of the next timed transition; UINT64_MAX: none */
-    struct {
-        uint64_t tick;
-        enum head_state state;
-    } change[DEVICE_MAX_CHANGES]; /* the last changes: what a reader sees lags behind the claims */
-    uint32_t n_changes;
-
-    int scanning;
-    uint32_t scan; /* number, from 1 */
-    uint64_t scan_tick0, pulse_next, scan_lost0;
-    uint64_t scan_end_tick; /* of the last scan, when none is on */
-    struct schedule_segment segment;
-    uint32_t station; /* of the scan at hand, from 0 */
-    size_t stretch;   /* of a trajectory: the one of the last pulse that is claimed */
-    int describe;     /* descriptor and anchor are due, as news */
-    int anchor_lost;  /* they are due as a repetition: a new anchor was in a tick that was lost */
-    int stop_requested;
-
-    struct native_event pending[DEVICE_MAX_PENDING];
-    uint32_t n_pending, pending_dropped;
-    uint64_t lost_said; /* lost ticks that an event has told of */
-    uint64_t lost_pulses_said;
-    uint64_t lost_first;   /* first lost pulse that no event has told of; UINT64_MAX: none */
-    uint64_t overrun_tick; /* of the last overrun event */
-
-    struct device_live live;
+    uint64_t next_tick; /* to be claimed */
+    uint64_t end_tick;  /* of the run; UINT64_MAX: none */
     int ending, over;
-    uint64_t end_tick; /* UINT64_MAX: none */
-    struct journal *journal;
-    struct journal_entry *replay;
-    size_t n_replay, replay_at;
+    struct device_machine machine;
+    struct device_scan scan;
+    struct device_events events;
+    struct device_overrun overrun;
+    struct device_live live;
+    struct device_journal journal;
 };
 
-/* With the lock held: */
+/* ---- all with the lock held */
+
+/* events.c */
 void device_push_event(struct device *device, enum native_event_code code, uint64_t a, uint64_t b, uint64_t c,
                        const char *text);
+/* As many events into the work as fit. */
+void device_take_events(struct device *device, struct device_work *work);
+
+/* states.c */
 /* Applies a state event at a tick; does nothing where the machine refuses it. */
 void device_transition(struct device *device, enum head_event event, uint64_t tick);
+/* Timed transitions that are due at the tick. */
+void device_run_timers(struct device *device, uint64_t tick);
 enum head_state device_visible_state(const struct device *device, uint64_t released);
-void device_do_command(struct device *device, uint32_t session, const char *line, uint64_t released,
-                       struct command_result *out);
+/* Ticks of a time, rounded up. */
+uint64_t device_ticks_of(const struct device *device, double s);
 
-/* device_pose.c: with the lock held. The end of the head's path, since the scan's start; INT64_MAX: there is none. */
+/* scan.c */
+void device_begin_scan(struct device *device, uint64_t tick);
+/* What the tick has of the scan that is on: descriptor, names, pulses; and the scan's end. */
+void device_claim_scan(struct device *device, uint64_t tick, struct device_work *work);
+/* Descriptor and anchor go out in this tick, for readers that join late or because they were lost. */
+int device_is_repeated(const struct device *device, uint64_t tick);
+
+/* overrun.c: an event for what was lost since the last one. */
+void device_say_overrun(struct device *device, uint64_t tick);
+
+/* carry_out.c */
+/* Commands of the replayed journal that are due at the tick. */
+void device_run_replay(struct device *device, uint64_t tick);
+
+/* live_pose.c */
+/* The end of the head's path, since the scan's start; INT64_MAX: there is none. */
 int64_t device_path_end_ns(const struct device *device);
 /* Where the head is at a device time; 0: it stands at its station. A trajectory runs from the start of the last scan to
  * its end, and the platform stands there until the next one begins. */
 int device_head_pose(struct device *device, int64_t t_ns, struct pose *head);
 /* Poses of a live head for the pulses that the work holds. */
 void device_take_poses(struct device *device, struct device_work *work);
-/* device_time.c: the head's clock and the receiver. */
+
+/* time_of_day.c: the head's clock and the receiver. */
 /* GPS time, ns, of a device time by the head's clock; 0: unknown. */
 int64_t device_gps_ns(const struct device *device, int64_t t_ns);
 /* An event for the full second that begins in the tick, if one does. */
@@ -95,7 +141,7 @@ void device_say_time(struct device *device, uint64_t tick);
 /* What TIME:UTC? and TIME:GPS? answer at cmd.t_ns. */
 void device_set_time_texts(struct device *device);
 
-/* device_frames.c: what the frames say. */
+/* frames.c: what the frames say. */
 void device_fill_descriptor(const struct device *device, struct native_descriptor *d);
 void device_fill_telemetry(const struct device *device, uint64_t tick, struct native_telemetry *t);
 void device_fill_spec(const struct device *device, struct schedule_spec *spec);

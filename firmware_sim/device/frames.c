@@ -12,10 +12,10 @@ void device_fill_spec(const struct device *device, struct schedule_spec *spec)
 void device_fill_descriptor(const struct device *device, struct native_descriptor *d)
 {
     const struct config *cfg = device->site->cfg;
-    const struct schedule_spec *spec = &device->segment.spec;
+    const struct schedule_spec *spec = &device->scan.segment.spec;
     struct cast_setup setup;
     struct bvh_info info;
-    site_cast_setup(device->site, device->station, &setup);
+    site_cast_setup(device->site, device->scan.station, &setup);
     bvh_get_info(setup.bvh, &info);
     memset(d, 0, sizeof *d);
     memcpy(d->idn, device->idn, sizeof d->idn);
@@ -39,7 +39,7 @@ void device_fill_descriptor(const struct device *device, struct native_descripto
     d->max_echoes = cfg->profile.max_echoes;
     d->n_surfaces = device->site->n_surfaces;
     d->frames = spec->frames;
-    d->scan = device->scan;
+    d->scan = device->scan.number;
     d->seed = cfg->noise.seed;
     d->content = cfg->output.attributes ? (uint32_t)NATIVE_HAS_ATTRIBUTES : 0;
 }
@@ -77,8 +77,8 @@ void device_fill_telemetry(const struct device *device, uint64_t tick, struct na
 {
     const struct device_counters *c = &device->counters;
     memset(t, 0, sizeof *t);
-    t->state = (uint32_t)device->state;
-    t->scan = device->scan;
+    t->state = (uint32_t)device->machine.state;
+    t->scan = device->scan.number;
     t->pulses = atomic_load(&c->pulses);
     t->echoes = atomic_load(&c->echoes);
     t->lines = atomic_load(&c->lines);
@@ -86,7 +86,7 @@ void device_fill_telemetry(const struct device *device, uint64_t tick, struct na
     t->late_blocks = atomic_load(&c->late_blocks);
     t->late_max_us = (uint32_t)(atomic_load(&c->late_max_ns) / 1000);
     t->errors_queued = device->cmd.queue.count;
-    if (device->clock.source != HEAD_CLOCK_NONE)
+    if (device->clock.source != EPOCH_NONE)
         t->utc_ns =
             utc_posix_from_tai(&device->clock.table, head_clock_ns(&device->clock, (int64_t)tick * device->tick_ns));
 }

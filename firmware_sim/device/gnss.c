@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/angle.h"
 #include "core/locate.h"
 #include "core/mat3.h"
 #include "core/rng.h"
@@ -111,7 +112,7 @@ static void fill_place(const struct gnss *gnss, const struct gnss_place *place, 
     fix->geoid_separation_m = gnss->site->cfg->gnss.geoid_separation_m;
     fix->altitude_m = place->height_m - fix->geoid_separation_m;
     fix->speed_m_s = hypot(v[0], v[1]);
-    fix->course_deg = fix->speed_m_s > 0.0 ? fmod(atan2(v[0], v[1]) * 180.0 / M_PI + 360.0, 360.0) : NAN;
+    fix->course_deg = fix->speed_m_s > 0.0 ? fmod(angle_deg(atan2(v[0], v[1])) + 360.0, 360.0) : NAN;
 }
 
 static void fill_time(const struct gnss *gnss, int64_t t_ns, struct nmea_fix *fix)

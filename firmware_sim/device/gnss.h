@@ -1,10 +1,12 @@
-/* The GNSS receiver beside the head: where its antenna is at full fractions of the second, as NMEA 0183 sentences.
+/* The GNSS receiver that stands with the head.
  *
- * It runs from power-up on, whether or not the head scans (but device time itself stands still in the pace fast while
- * the head has nothing to do), and knows the true time (head_clock.h): its positions are those at multiples of
- * 1/rate_hz of UTC. What it says comes after the moment that it names. The antenna is at the head's origin plus
- * gnss.lever_arm_m, turned as the head stands. Noise, where there is any, is normal and independent east, north and up,
- * keyed by noise.seed and the number of the position since power-up. Thread: constant after the clock is powered up. */
+ * In: the head's pose and the true time (head_clock.h). Out: NMEA 0183 sentences with the position of its antenna at
+ * multiples of 1/rate_hz of UTC. A sentence comes after the moment that it names.
+ *
+ * The receiver runs from power-up on, also while the head does not scan. (In the pace fast device time itself stands
+ * still while the head has nothing to do.) The antenna is at the head's origin plus gnss.lever_arm_m in the head's
+ * frame. Its noise, if any, is normal and independent east, north and up. The noise is keyed by noise.seed and the
+ * number of the position since power-up. Thread: constant after the clock is powered up. */
 #ifndef FIRMWARE_SIM_DEVICE_GNSS_H
 #define FIRMWARE_SIM_DEVICE_GNSS_H
 
@@ -14,7 +16,7 @@
 struct gnss {
     const struct site *site;
     const struct head_clock *clock;
-    int on; /* some link speaks NMEA */
+    int on; /* a link speaks NMEA */
     int64_t period_ns;
 };
 
@@ -32,8 +34,8 @@ struct gnss_track {
     struct pose before, at, after; /* GNSS_STEP_NS apart */
 };
 
-/* Its sentences. A head that stands is at a station (0..n_stations-1), with track NULL; one that moves where track
- * says, and without a fix where that is no place on the Earth. Returns the length, 0 when cap is too small. */
+/* The sentences of a position. track NULL: the head stands at the station (0..n_stations-1). Else it is where track
+ * says; there is no fix where that is no place on the Earth. Returns the length, 0 when cap is too small. */
 size_t gnss_sentences(const struct gnss *gnss, uint64_t index, uint32_t station, const struct gnss_track *track,
                       char *dst, size_t cap);
 

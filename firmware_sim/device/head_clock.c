@@ -10,27 +10,6 @@
 static const char LEAP_FILE[] = "/usr/share/zoneinfo/leap-seconds.list";
 static const int64_t PPT = 1000000000000;
 
-int head_clock_parse(const char *epoch, const struct utc_table *table, enum head_clock_source *source, int64_t *tai0_ns,
-                     struct sh_err *err)
-{
-    static const char *const words[] = {[HEAD_CLOCK_NONE] = "none", [HEAD_CLOCK_UTC] = "utc", [HEAD_CLOCK_TAI] = "tai"};
-    struct utc_time utc;
-    int64_t tai_ns = 0;
-    if (epoch[0] == '\0') epoch = words[HEAD_CLOCK_NONE];
-    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
-        if (words[i] != NULL && strcmp(epoch, words[i]) == 0) {
-            *source = (enum head_clock_source)i;
-            return SH_OK;
-        }
-    *source = HEAD_CLOCK_EPOCH;
-    int rc = utc_parse(epoch, &utc, err);
-    if (rc == SH_OK) rc = utc_to_tai(table, &utc, &tai_ns, err);
-    if (rc == SH_OK && utc_gps_ns(tai_ns) <= 0)
-        rc = sh_fail(err, SH_EINPUT, "GPS time begins after 1980-01-06T00:00:00Z");
-    if (rc == SH_OK && tai0_ns != NULL) *tai0_ns = tai_ns;
-    return rc;
-}
-
 /* The system's table when it is there and good for longer than ours. */
 static void choose_table(struct head_clock *clock)
 {
@@ -66,7 +45,7 @@ int head_clock_create(const struct config *cfg, struct head_clock *clock, struct
 {
     memset(clock, 0, sizeof *clock);
     choose_table(clock);
-    int rc = head_clock_parse(cfg->time.epoch, &clock->table, &clock->source, &clock->tai0_ns, err);
+    int rc = epoch_parse(cfg->time.epoch, &clock->table, &clock->source, &clock->tai0_ns, err);
     clock->offset_ns = llround(cfg->time.offset_s * 1e9);
     clock->drift_ppt = llround(cfg->time.drift_ppm * 1e6);
     clock->jump_ns = llround(cfg->time.jump_s * 1e9);
@@ -76,12 +55,12 @@ int head_clock_create(const struct config *cfg, struct head_clock *clock, struct
 
 int head_clock_power_up(struct head_clock *clock, int64_t now_ns, struct sh_err *err)
 {
-    if (clock->source == HEAD_CLOCK_UTC) clock->tai0_ns = utc_tai_from_posix(&clock->table, clock_utc_ns(now_ns));
-    if (clock->source == HEAD_CLOCK_TAI && !clock_tai_ns(now_ns, &clock->tai0_ns))
+    if (clock->source == EPOCH_UTC) clock->tai0_ns = utc_tai_from_posix(&clock->table, clock_utc_ns(now_ns));
+    if (clock->source == EPOCH_TAI && !clock_tai_ns(now_ns, &clock->tai0_ns))
         return sh_fail(err, SH_ESTATE,
                        "time.epoch: tai: the system does not know TAI (its offset is 0 s: no PTP or NTP has set it); "
                        "utc goes by the table of leap seconds");
-    if (clock->source != HEAD_CLOCK_NONE) warn_expired(clock);
+    if (clock->source != EPOCH_NONE) warn_expired(clock);
     return SH_OK;
 }
 

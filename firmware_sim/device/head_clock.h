@@ -1,35 +1,34 @@
 /* The head's clock: device time -> time of day.
  *
- * Device time is the simulation's own, exact: pulses, poses, moving things and the GNSS receiver go by it, and what
- * time of day it truly is at power-up is `time.epoch`. The head's clock is what the head believes: the true time, plus
- * time.offset_s, plus time.drift_ppm of the time since power-up, plus time.jump_s from time.jump_at_s on. With all of
- * them 0 the two are the same.
+ * In: device time, ns from power-up. Out: TAI, ns (core/utc.h).
+ *
+ * Device time is exact: it is the simulation's own. Pulses, poses, moving things and the GNSS receiver go by it. The
+ * key time.epoch says what the true time of day is at power-up. The head's clock is what the head believes. It is the
+ * sum of the true time, time.offset_s, time.drift_ppm of the time since power-up, and, from time.jump_at_s on,
+ * time.jump_s. While all of them are 0, the head's clock shows the true time.
+ *
  *   by the head's clock  PPS events, the GPS time of SCAN_START (and with them scanhead_gps_time), UTC in telemetry,
  *                        TIME:UTC?, TIME:GPS?
  *   by the true time     GNSS sentences
  *   neither              device times and pulse times on the wire: they count from power-up and from the scan's start
- * The system's clock (utc, tai) is read once, at power-up. Device time then runs with CLOCK_MONOTONIC, which follows
- * what PTP or NTP do to the rate of the system's clocks, but not steps of them. Times of day are TAI in ns
- * (core/utc.h). Constant after head_clock_power_up; then any thread. */
+ *
+ * The system's clock (utc, tai) is read once, at power-up. Device time then runs with CLOCK_MONOTONIC. That clock
+ * follows what PTP or NTP do to the rate of the system's clocks, but not their steps. Constant after
+ * head_clock_power_up; then any thread. */
 #ifndef FIRMWARE_SIM_DEVICE_HEAD_CLOCK_H
 #define FIRMWARE_SIM_DEVICE_HEAD_CLOCK_H
 
 #include "core/utc.h"
 #include "firmware_sim/config/config.h"
-
-enum head_clock_source { HEAD_CLOCK_NONE, HEAD_CLOCK_EPOCH, HEAD_CLOCK_UTC, HEAD_CLOCK_TAI };
+#include "firmware_sim/config/epoch.h"
 
 struct head_clock {
-    enum head_clock_source source; /* NONE: the head doesn't know the time */
-    int64_t tai0_ns;               /* true TAI at power-up */
+    enum epoch_source source; /* EPOCH_NONE: the head does not know the time */
+    int64_t tai0_ns;          /* true TAI at power-up */
     int64_t offset_ns, drift_ppt, jump_ns, jump_at_ns;
     struct utc_table table;
     char warning[160]; /* something the user should know; empty: nothing */
 };
-
-/* What time.epoch says (an empty text is none); the date (for EPOCH) is checked. tai0_ns may be NULL. */
-int head_clock_parse(const char *epoch, const struct utc_table *table, enum head_clock_source *source, int64_t *tai0_ns,
-                     struct sh_err *err);
 
 /* Takes the table of leap seconds that is known longer: the built-in one, or the system's. */
 int head_clock_create(const struct config *cfg, struct head_clock *clock, struct sh_err *err);

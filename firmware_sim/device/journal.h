@@ -1,8 +1,9 @@
-/* The journal: every command that had an effect, with its device time; replayed, it reproduces the session.
+/* The journal: every command that had an effect, with its device time. Replayed, it reproduces the session.
  *
- * A text file: the line `# scanhead journal 1`, then one line per command
+ * In: commands as the device carries them out. Out: a text file, which can be read back. It begins with the line
+ * `# scanhead journal 1`. Then there is one line per command
  *   <device tick> <device time, ns> <session> <command line>
- * separated by one blank each, in decimal. Other lines that begin with '#' and empty lines are notes.
+ * with decimal numbers and one blank between them. Other lines that begin with '#' and empty lines are notes.
  * Not real-time safe: each line is written and flushed at once, so that a crash loses none. */
 #ifndef FIRMWARE_SIM_DEVICE_JOURNAL_H
 #define FIRMWARE_SIM_DEVICE_JOURNAL_H

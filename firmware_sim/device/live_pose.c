@@ -33,7 +33,8 @@ static int is_near(const struct device *device, const struct pose *pose)
     return d2 <= device->site->cfg->platform.reach_m * device->site->cfg->platform.reach_m;
 }
 
-/* So far ahead that the time must be wrong: taken, it would keep all right ones out. A step's end is granted time. */
+/* So far ahead that the time must be wrong. Such a pose would keep all later ones out. In the pace step the time is
+ * granted, and so right. */
 static int is_early(const struct device *device, int64_t t_ns)
 {
     int64_t now_ns = (int64_t)device->next_tick * device->tick_ns;
@@ -62,7 +63,7 @@ int device_pose_numbers(struct device *device, int64_t t_ns, const double v[6])
     return device_pose(device, t_ns, &pose);
 }
 
-/* Beyond the last pose: as the last two go on, for some time and within reach; then it stands. */
+/* After the last pose: on as from the one before to the last, for extrapolate_ms and within reach. Then it stands. */
 static uint32_t extrapolate(const struct device *device, int64_t t_ns, struct pose *out)
 {
     const struct device_live *live = &device->live;
@@ -96,22 +97,13 @@ static uint32_t platform_at(const struct device *device, int64_t t_ns, struct po
     return 0;
 }
 
-/* On the trajectory; it stands before its begin and behind its end. */
+/* On the trajectory. The platform stands before its begin and after its end. */
 static void on_path(const struct site *site, int64_t t_ns, struct pose *out)
 {
     const struct pose_knot *knot = site->knot;
-    size_t low = 0, high = site->n_knots; /* knot[low] is at or before t, knot[high] behind */
-    *out = knot[0].pose;
-    if (t_ns <= knot[0].t_ns) return;
-    while (high - low > 1) {
-        size_t middle = low + (high - low) / 2;
-        if (knot[middle].t_ns <= t_ns)
-            low = middle;
-        else
-            high = middle;
-    }
+    size_t low = pose_find_knot(knot, site->n_knots, t_ns), high = low + 1;
     *out = knot[low].pose;
-    if (high < site->n_knots)
+    if (t_ns > knot[0].t_ns && high < site->n_knots)
         pose_between(&knot[low].pose, &knot[high].pose,
                      (double)(t_ns - knot[low].t_ns) / (double)(knot[high].t_ns - knot[low].t_ns), out);
 }
@@ -122,9 +114,9 @@ int device_head_pose(struct device *device, int64_t t_ns, struct pose *head)
     struct pose body;
     if (!site->moving || (site->n_knots == 0 && device->live.n == 0)) return 0;
     if (site->n_knots != 0) {
-        int64_t start_ns = (int64_t)device->scan_tick0 * device->tick_ns;
-        int64_t end_ns = device->scanning ? t_ns : (int64_t)device->scan_end_tick * device->tick_ns;
-        on_path(site, device->scan == 0 ? 0 : (t_ns < end_ns ? t_ns : end_ns) - start_ns, head);
+        int64_t start_ns = (int64_t)device->scan.tick0 * device->tick_ns;
+        int64_t end_ns = device->scan.on ? t_ns : (int64_t)device->scan.end_tick * device->tick_ns;
+        on_path(site, device->scan.number == 0 ? 0 : (t_ns < end_ns ? t_ns : end_ns) - start_ns, head);
         return 1;
     }
     platform_at(device, t_ns, &body);
@@ -137,14 +129,14 @@ static void make_knot(struct device *device, int64_t t_ns, struct pose_knot *kno
     const struct site *site = device->site;
     *knot = (struct pose_knot){.t_ns = t_ns};
     if (device->live.n == 0) {
-        const struct placement *at = &site->station[device->station].at;
+        const struct placement *at = &site->station[device->scan.station].at;
         memcpy(knot->pose.position_m, at->position_m, sizeof at->position_m);
         pose_from_matrix(at->rotation, knot->pose.quat);
         knot->flags = POSE_NONE;
         return;
     }
     struct pose body;
-    knot->flags = platform_at(device, (int64_t)device->scan_tick0 * device->tick_ns + t_ns, &body);
+    knot->flags = platform_at(device, (int64_t)device->scan.tick0 * device->tick_ns + t_ns, &body);
     pose_mount(&body, &site->mount, &knot->pose);
 }
 
@@ -155,7 +147,7 @@ static void count_late(struct device *device, const struct pose_knot *knot, stru
     if ((knot->flags & (POSE_LATE | POSE_NONE)) == 0) return;
     uint64_t n = atomic_fetch_add(&device->counters.late_poses, 1) + 1;
     int64_t since_ns =
-        live->n == 0 ? 0 : (int64_t)device->scan_tick0 * device->tick_ns + knot->t_ns - sample_t(live, live->n - 1);
+        live->n == 0 ? 0 : (int64_t)device->scan.tick0 * device->tick_ns + knot->t_ns - sample_t(live, live->n - 1);
     if (live->said_tick == 0 || work->tick - live->said_tick > device->tick_hz) {
         char text[96];
         snprintf(text, sizeof text,

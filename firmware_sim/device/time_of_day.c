@@ -14,15 +14,14 @@ int device_power_up(struct device *device, int64_t now_ns, const char **warning,
 
 int64_t device_gps_ns(const struct device *device, int64_t t_ns)
 {
-    return device->clock.source != HEAD_CLOCK_NONE ? utc_gps_ns(head_clock_ns(&device->clock, t_ns)) : 0;
+    return device->clock.source != EPOCH_NONE ? utc_gps_ns(head_clock_ns(&device->clock, t_ns)) : 0;
 }
 
 void device_say_pps(struct device *device, uint64_t tick)
 {
     const struct head_clock *clock = &device->clock;
     int64_t t_ns = (int64_t)tick * device->tick_ns, edge_ns, tai_s;
-    if (clock->source == HEAD_CLOCK_NONE || !head_clock_edge(clock, t_ns, t_ns + device->tick_ns, &edge_ns, &tai_s))
-        return;
+    if (clock->source == EPOCH_NONE || !head_clock_edge(clock, t_ns, t_ns + device->tick_ns, &edge_ns, &tai_s)) return;
     int64_t tai_ns = tai_s * UTC_SECOND_NS;
     char text[UTC_TEXT_LEN];
     struct utc_time utc;
@@ -35,7 +34,7 @@ void device_say_pps(struct device *device, uint64_t tick)
 void device_say_time(struct device *device, uint64_t tick)
 {
     int64_t t_ns = (int64_t)tick * device->tick_ns;
-    if (device->clock.source == HEAD_CLOCK_NONE) return;
+    if (device->clock.source == EPOCH_NONE) return;
     device_push_event(device, NATIVE_EV_TIME, 0, (uint64_t)t_ns, (uint64_t)device_gps_ns(device, t_ns), "");
 }
 
@@ -44,7 +43,7 @@ void device_set_time_texts(struct device *device)
     struct command_device *cmd = &device->cmd;
     const struct head_clock *clock = &device->clock;
     cmd->utc[0] = cmd->gps[0] = '\0';
-    if (clock->source == HEAD_CLOCK_NONE) return;
+    if (clock->source == EPOCH_NONE) return;
     int64_t tai_ns = head_clock_ns(clock, cmd->t_ns);
     struct utc_time utc;
     utc_from_tai(&clock->table, tai_ns, &utc);

@@ -1,17 +1,21 @@
-/* stream_sha256 of what is released: a reader of the ring with a thread of its own. */
+#include "firmware_sim/loop/hash.h"
+
 #include <errno.h>
+#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
 
 #include <nettle/sha2.h>
 
-#include "firmware_sim/loop/loop_inside.h"
+#include "drivers/protocol/native.h"
 
 struct hasher {
-    struct loop *loop;
+    struct stream *stream;
     struct sha256_ctx sha;
-    sem_t wake;
-    uint8_t *buf;
+    int wake_fd;
+    struct ring_copy tick;
     uint64_t cursor;
     uint32_t next_seq;
     int lost;
@@ -36,74 +40,74 @@ static void hash_frames(struct hasher *h, const uint8_t *bytes, uint32_t len)
 static void *hasher_main(void *arg)
 {
     struct hasher *h = arg;
-    struct loop *loop = h->loop;
+    struct ring_copy *tick = &h->tick;
     for (;;) {
-        int over = atomic_load(&loop->pacer_done);
-        uint32_t len = 0, n_frames = 0, first_seq = 0;
-        enum ring_read got =
-            ring_read(&loop->ring, LOOP_HASH_READER, h->cursor, h->buf, loop->slot_bytes, &len, &n_frames, &first_seq);
+        int over = atomic_load(&h->stream->over);
+        enum ring_read got = ring_read(&h->stream->ring, STREAM_HASH_READER, h->cursor, tick);
         if (got == RING_NONE) {
+            uint64_t n;
             if (over) break;
-            sem_wait(&h->wake);
+            if (read(h->wake_fd, &n, sizeof n) < 0 && errno != EINTR) break;
             continue;
         }
-        if (got == RING_READ && n_frames != 0) {
+        if (got == RING_READ && tick->n_frames != 0) {
             /* Nobody is woken for empty ticks, so old ones may be gone; only a gap in the numbers is a loss. */
-            if (first_seq != h->next_seq) h->lost = 1;
-            h->next_seq = first_seq + n_frames;
-            hash_frames(h, h->buf, len);
+            if (tick->first_seq != h->next_seq) h->lost = 1;
+            h->next_seq = tick->first_seq + tick->n_frames;
+            hash_frames(h, tick->buf, tick->len);
         }
-        h->cursor++;
-        atomic_store(&loop->reader[LOOP_HASH_READER].cursor, h->cursor);
-        if (loop_waits(loop)) sem_post(&loop->progress);
+        stream_move_reader(h->stream, STREAM_HASH_READER, ++h->cursor);
     }
     return NULL;
 }
 
-int hasher_start(struct loop *loop, struct hasher **out, struct sh_err *err)
+static void hasher_free(struct hasher *h)
+{
+    if (h->wake_fd >= 0) close(h->wake_fd);
+    free(h->tick.buf);
+    free(h);
+}
+
+int hasher_start(struct stream *stream, struct hasher **out, struct sh_err *err)
 {
     *out = NULL;
     struct hasher *h = calloc(1, sizeof *h);
-    uint8_t *buf = malloc(loop->slot_bytes);
-    if (h == NULL || buf == NULL) {
-        free(h);
-        free(buf);
-        return sh_fail(err, SH_ENOMEM, "no memory");
-    }
-    h->loop = loop;
-    h->buf = buf;
+    if (h == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
+    h->stream = stream;
+    h->tick.cap = stream->tick_bytes;
+    h->tick.buf = malloc(h->tick.cap);
+    h->wake_fd = eventfd(0, EFD_CLOEXEC);
+    int rc = h->tick.buf == NULL ? sh_fail(err, SH_ENOMEM, "no memory") : SH_OK;
+    if (rc == SH_OK && h->wake_fd < 0) rc = sh_fail(err, SH_EIO, "eventfd: %s", strerror(errno));
     sha256_init(&h->sha);
-    sem_init(&h->wake, 0, 0);
-    atomic_store(&loop->reader[LOOP_HASH_READER].active, 1);
-    int rc = pthread_create(&h->thread, NULL, hasher_main, h);
-    if (rc != 0) {
-        free(h);
-        free(buf);
-        return sh_fail(err, SH_EIO, "no thread for the stream hash: %s", strerror(rc));
+    stream_set_reader(stream, STREAM_HASH_READER, 0, 1);
+    int failed = rc == SH_OK ? pthread_create(&h->thread, NULL, hasher_main, h) : 0;
+    if (failed != 0) rc = sh_fail(err, SH_EIO, "no thread for the stream hash: %s", strerror(failed));
+    if (rc != SH_OK) {
+        stream_set_reader(stream, STREAM_HASH_READER, 0, 0);
+        hasher_free(h);
+        return rc;
     }
+    stream_listen(stream, h->wake_fd);
     *out = h;
     return SH_OK;
 }
 
-void hasher_wake(struct hasher *hasher)
-{
-    sem_post(&hasher->wake);
-}
-
 int hasher_join(struct hasher *hasher, char hex[65])
 {
+    static const char digit[] = "0123456789abcdef";
+    const uint64_t one = 1;
     uint8_t digest[SHA256_DIGEST_SIZE];
+    ssize_t n = write(hasher->wake_fd, &one, sizeof one);
+    (void)n; /* a full counter is a wake-up, too */
     pthread_join(hasher->thread, NULL);
     sha256_digest(&hasher->sha, sizeof digest, digest);
     for (int i = 0; i < SHA256_DIGEST_SIZE; i++) {
-        static const char digit[] = "0123456789abcdef";
         hex[2 * i] = digit[digest[i] >> 4];
         hex[2 * i + 1] = digit[digest[i] & 15];
     }
     hex[64] = '\0';
     int good = !hasher->lost;
-    sem_destroy(&hasher->wake);
-    free(hasher->buf);
-    free(hasher);
+    hasher_free(hasher);
     return good;
 }

@@ -1,13 +1,14 @@
-/* The fixed-rate loop: casters ahead, one pacing thread, one thread per link.
+/* The fixed-rate loop: casters that compute ahead, one pacing thread, one thread per link.
  *
- * Casters claim ticks up to ahead_ms before their time and fill slots. The pacing thread sleeps on an absolute clock
- * and releases each tick when its last pulse has fired; releasing is sealing the frames' sequence numbers, one store
- * and one wake-up a link. A tick that isn't ready late_ms after its time is given up: announced on the wire, counted,
- * and a gap in the pulse numbers. (What the pacing thread itself overslept, because the whole machine stood still, is
- * added to late_ms until it has caught up.) In the paces fast and step nothing is lost: release waits for casters and
- * readers.
+ * In: the site, the device and the links of the configuration. Out: the stream on the links, and statistics.
  *
- * The pacing thread runs at SCHED_FIFO where permitted and touches no lock, allocator or log. */
+ * Casters claim ticks up to ahead_ms before their time and fill slots. The pacing thread sleeps on an absolute clock,
+ * and releases each tick when its last pulse has fired. To release is to number the frames, to publish the slot with
+ * one store, and to wake each link. A tick that is not ready late_ms after its time is given up: it is announced on
+ * the wire and counted, and its pulse numbers are missing. In the paces fast and step nothing is lost: release waits
+ * for casters and readers.
+ *
+ * The pacing thread runs at SCHED_FIFO where that is permitted. It touches no lock, allocator or log. */
 #ifndef FIRMWARE_SIM_LOOP_LOOP_H
 #define FIRMWARE_SIM_LOOP_LOOP_H
 
@@ -27,7 +28,7 @@ struct loop_options {
 
 struct loop_stats {
     uint64_t pulses, fired_pulses, echoes, lines, scans;
-    uint64_t crowded, faint, unfit; /* hits that are no echoes: struct cast_counters */
+    uint64_t crowded, faint, unfit; /* hits that are not echoes: struct cast_counters */
     uint64_t lost_pulses, lost_ticks, late_blocks, reader_lost_frames;
     uint64_t late_poses, bad_poses; /* of a live platform */
     double wall_s;                  /* from the release of the first pulse to that of the last */
@@ -42,7 +43,7 @@ int loop_create(const struct site *site, struct device *device, const struct loo
 
 /* {"endpoints": [...]}: type and endpoint of each link, and of the socket for poses. */
 void loop_put_endpoints(const struct loop *loop, struct json *json);
-/* "tty:..." and so on of link i, behind the links of the socket for poses, or 0 when there is no such link. */
+/* "tty:..." and so on of link i; after the links that of the socket for poses. 0: there is no such link. */
 int loop_endpoint(const struct loop *loop, uint32_t i, char *buf, size_t len);
 
 /* Starts the threads. */

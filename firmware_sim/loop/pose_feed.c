@@ -19,15 +19,17 @@ enum { DATAGRAM = 65536 };
 
 struct pose_feed {
     struct device *device;
+    double reach_m; /* from the station */
     int fd, stop_fd;
     char endpoint[96];
     pthread_t thread;
     int running;
-    int64_t told_ns; /* when a bad line was told last */
+    int64_t reported_ns; /* when a bad line was reported last */
     char text[DATAGRAM + 1];
 };
 
-int pose_feed_parse(const char *line, int64_t *t_ns, double pose[6])
+/* One line as time and x, y, z, roll, pitch, heading. 0, or -1 when it is malformed. */
+static int parse_line(const char *line, int64_t *t_ns, double pose[6])
 {
     static const double most[7] = {1e9, 1e9, 1e9, 1e9, 360.0, 90.0, 360.0};
     double v[7];
@@ -45,11 +47,11 @@ int pose_feed_parse(const char *line, int64_t *t_ns, double pose[6])
     return 0;
 }
 
-static void tell_bad(struct pose_feed *feed, const char *what)
+static void report_bad(struct pose_feed *feed, const char *what)
 {
     int64_t now_ns = clock_now_ns();
-    if (feed->told_ns != 0 && now_ns - feed->told_ns < 1000000000) return;
-    feed->told_ns = now_ns;
+    if (feed->reported_ns != 0 && now_ns - feed->reported_ns < 1000000000) return;
+    feed->reported_ns = now_ns;
     device_report(feed->device, CMD_E_DATA_TYPE, what);
 }
 
@@ -58,11 +60,14 @@ static void take_line(struct pose_feed *feed, const char *line)
     int64_t t_ns;
     double pose[6];
     if (line[strspn(line, " \t\r")] == '\0') return;
-    if (pose_feed_parse(line, &t_ns, pose) != 0) {
+    if (parse_line(line, &t_ns, pose) != 0) {
         atomic_fetch_add(&device_counters(feed->device)->bad_poses, 1);
-        tell_bad(feed, "a pose that is not t_s x y z roll pitch heading");
+        report_bad(feed, "a pose that is not t_s x y z roll pitch heading");
     } else if (device_pose_numbers(feed->device, t_ns, pose) != 0) {
-        tell_bad(feed, "a pose out of platform.reach_m, not after the last one, or over 1 h ahead");
+        char text[96];
+        snprintf(text, sizeof text, "a pose over %g m from the station, not after the last one, or over 1 h ahead",
+                 feed->reach_m);
+        report_bad(feed, text);
     }
 }
 
@@ -118,6 +123,7 @@ int pose_feed_open(struct device *device, const struct config *cfg, struct pose_
     struct pose_feed *feed = calloc(1, sizeof *feed);
     if (feed == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     feed->device = device;
+    feed->reach_m = cfg->platform.reach_m;
     feed->fd = -1;
     feed->stop_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     int rc = feed->stop_fd < 0 ? sh_fail(err, SH_EIO, "eventfd: %s", strerror(errno)) : SH_OK;

@@ -1,11 +1,14 @@
-/* Poses of a live platform over UDP: each datagram holds one or more lines
+/* Poses of a live platform over UDP.
+ *
+ * In: datagrams. Each one holds one or more lines
  *
  *   t_s x y z roll pitch heading
  *
- * device time in seconds (TIME? asks for it), metres in the scene frame, degrees as core/pose.h has them; blanks or
- * commas between. A thread of its own takes them in. Lines that are wrong, out of reach, not later than the one
- * before or more than DEVICE_POSE_AHEAD_S ahead of device time are counted (bad_poses), and told once per second at
- * most. */
+ * in device time in seconds (TIME? asks for it), metres in the scene frame, and degrees as core/pose.h defines them.
+ * Blanks or commas stand between the numbers. Out: calls of device_pose_numbers. A thread of its own takes them in.
+ *
+ * A line is not used when it is malformed, out of reach, not later than the one before, or more than
+ * DEVICE_POSE_AHEAD_S ahead of device time. It is counted (bad_poses), and reported once per second at most. */
 #ifndef FIRMWARE_SIM_LOOP_POSE_FEED_H
 #define FIRMWARE_SIM_LOOP_POSE_FEED_H
 
@@ -15,16 +18,12 @@
 
 struct pose_feed;
 
-/* Listens where platform.address and platform.port of the device's configuration say. device NULL: to see whether it
- * can, not to be started. */
+/* Listens where platform.address and platform.port say. device NULL: only to see whether it can; it is not started. */
 int pose_feed_open(struct device *device, const struct config *cfg, struct pose_feed **out, struct sh_err *err);
 int pose_feed_start(struct pose_feed *feed, struct sh_err *err);
 /* "udp:127.0.0.1:4711" */
 void pose_feed_endpoint(const struct pose_feed *feed, char *buf, size_t len);
 /* Ends the thread; feed may be NULL. */
 void pose_feed_close(struct pose_feed *feed);
-
-/* One line as time and x, y, z, roll, pitch, heading; 0, or -1 when it is none. */
-int pose_feed_parse(const char *line, int64_t *t_ns, double v[6]);
 
 #endif

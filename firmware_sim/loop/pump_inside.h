@@ -1,41 +1,51 @@
-/* Private to pump*.c: a link with its sessions. */
+/* Private to pump*.c, session.c and lost_frames.c: a link with its sessions. */
 #ifndef FIRMWARE_SIM_LOOP_PUMP_INSIDE_H
 #define FIRMWARE_SIM_LOOP_PUMP_INSIDE_H
 
-#include "firmware_sim/loop/loop_inside.h"
+#include <pthread.h>
+
+#include "firmware_sim/loop/pump.h"
 
 enum {
     REPLY_ROOM = 8192,
     BATCH_BYTES = 131072, /* small ticks are written together up to this */
     READ_BYTES = 65536,
-    DRAIN_NS = 2000000000, /* at the end a reader may take this long between two bytes */
 };
 
-struct session {
-    int open, lagging;
-    uint32_t id; /* from 1, over all links */
-    int reader;
-    uint64_t cursor;
-    int have_seq;
-    uint32_t next_seq;
-    uint64_t lost_frames;
+/* Command lines of a client, and the replies to them. */
+struct session_commands {
     struct command_lines lines;
     unsigned char in[READ_BYTES]; /* read, and from in_pos on not looked at yet */
     uint32_t in_len, in_pos;
-    uint8_t *out;
-    uint32_t out_len, out_pos;
     char reply[REPLY_ROOM];
     uint32_t reply_len;
     int replies_dropped;
-    int stepping; /* the reply to TIME:STEP waits until all before this tick has gone out */
+    int stepping; /* the reply to TIME:STEP waits until all before step_tick has gone out */
     uint64_t step_tick;
     char step_reply[COMMAND_MAX_REPLY];
+};
+
+struct session {
+    int open;
+    uint32_t id;     /* from 1, over all links */
+    int reader;      /* of the stream */
+    uint64_t cursor; /* next tick to take */
+    struct {
+        int have_seq; /* next_seq is known */
+        uint32_t next_seq;
+        uint64_t frames;
+        int lagging; /* the error queue has heard of it */
+    } lost;          /* lost_frames.c */
+    uint8_t *out;
+    uint32_t out_len, out_pos; /* from out_pos on not written yet */
+    struct session_commands commands;
     char peer[64];
-    int64_t moved_ns; /* when a byte last went out */
+    int64_t moved_ns; /* clock_now_ns() when a byte last went out */
 };
 
 struct pump {
-    struct loop *loop;
+    struct links *links;
+    struct stream *stream;
     const struct link_ops *ops;
     void *link;
     int nmea; /* speaks for the GNSS receiver, not for the head */
@@ -44,26 +54,38 @@ struct pump {
     struct session session[LINK_MAX_SESSIONS];
     pthread_t thread;
     int running;
-    int failed; /* a write failed; why is still to be told */
+    int failed; /* a write failed; the reason is still to come */
 };
 
-/* Counts what a session lost; the error queue hears of it once per episode. */
-void pump_count_lost(struct pump *pump, struct session *s, uint32_t n);
+/* session.c */
+void session_open(struct pump *pump, struct session *s, const char *peer);
+void session_close(struct pump *pump, struct session *s);
+/* Writes until the link is full (1) or there is nothing left (0). index: of the session on its link. */
+int session_write(struct pump *pump, struct session *s, int index);
+
+/* lost_frames.c: the one place that counts what a reader lost. */
+/* Compares the number of a tick's first frame with the one expected, and counts and announces a gap. `released`: ticks
+ * released when the tick was read. */
+void session_check_lost(struct pump *pump, struct session *s, const struct ring_copy *tick, uint64_t released);
+/* Counts n frames or sentences. The error queue gets an entry once per episode. */
+void session_count_lost(struct pump *pump, struct session *s, uint32_t n);
+/* At the end of the run: what the reader did not get is lost. */
+void session_leave(struct pump *pump, struct session *s);
 
 /* pump_commands.c */
-/* A reply line, behind those that wait already. */
+/* A reply line, after those that wait already. */
 void pump_add_reply(struct session *s, const char *text);
-/* What was read. Lines wait while a step goes on, and until earlier replies are on their way: each is carried out, and
- * answered, after the one before. Only who sends on and on without reading loses replies. */
+/* Carries out the lines that were read. Each one is carried out and answered after the one before. Lines wait while a
+ * step goes on, and while there is no room for their replies. Replies are lost only to a client that sends on and on
+ * without reading. */
 void pump_take_lines(struct pump *pump, struct session *s);
 /* Reads what the client sent, and takes its lines. */
 void pump_read_commands(struct pump *pump, struct session *s, int index);
 
-/* pump_nmea.c: a session of the GNSS receiver. Its cursor is the tick up to which it has everything. */
-/* Sentences of what was released into the buffer; where the reader is too far behind, those of half a queue are lost.
- */
+/* pump_nmea.c: a session of the GNSS receiver. It has everything before the tick at its cursor. */
+/* Sentences of what was released into the buffer. A reader that is too slow loses those of half a queue. */
 void pump_take_nmea(struct pump *pump, struct session *s);
-/* Throws away what a client sends: a receiver that is asked in another maker's language. */
+/* Throws away what a client sends: the receiver takes no commands. */
 void pump_skip_nmea(struct pump *pump, int index);
 /* Sentences that were released and not taken. */
 uint32_t pump_nmea_backlog(const struct pump *pump, const struct session *s);

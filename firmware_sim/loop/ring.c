@@ -24,29 +24,37 @@ void ring_hits_add(struct ring_hits *sum, const struct ring_hits *more)
     sum->unfit += more->unfit;
 }
 
-int ring_create(struct ring *ring, uint64_t ahead_ticks, uint64_t queue_ticks, uint32_t slot_bytes, struct sh_err *err)
+/* Room for so many bytes; what was in the slot is gone. */
+static int make_room(struct ring_slot *slot, size_t bytes)
+{
+    enum { STEP = 1024 }; /* ticks differ a little: not every one that is longer needs new memory */
+    size_t room = (bytes + STEP - 1) / STEP * STEP;
+    free(slot->store);
+    slot->store = malloc(room);
+    slot->room = slot->store != NULL ? room : 0;
+    return slot->store != NULL ? SH_OK : SH_ENOMEM;
+}
+
+int ring_create(struct ring *ring, const struct ring_size *size, struct sh_err *err)
 {
     memset(ring, 0, sizeof *ring);
-    ring->queue_ticks = queue_ticks;
-    ring->n_slots = ahead_ticks + 2 * queue_ticks + 8;
-    ring->slot_bytes = (slot_bytes + 63) / 64 * 64;
+    ring->queue_ticks = size->queue_ticks;
+    ring->n_slots = size->ahead_ticks + size->queue_ticks + size->spare_ticks + 8;
     ring->slot = calloc(ring->n_slots, sizeof *ring->slot);
-    uint8_t *bytes = ring->slot == NULL ? NULL : malloc(ring->n_slots * ring->slot_bytes);
-    if (bytes == NULL) {
-        free(ring->slot);
-        ring->slot = NULL;
-        return sh_fail(err, SH_ENOMEM, "loop: no memory for %llu slots of %u bytes; lower loop.queue_ms",
-                       (unsigned long long)ring->n_slots, ring->slot_bytes);
-    }
-    for (uint64_t i = 0; i < ring->n_slots; i++)
-        ring->slot[i].bytes = bytes + i * ring->slot_bytes;
-    return SH_OK;
+    int rc = ring->slot != NULL ? SH_OK : SH_ENOMEM;
+    for (uint64_t i = 0; i < ring->n_slots && rc == SH_OK; i++)
+        rc = make_room(&ring->slot[i], size->usual_bytes);
+    if (rc == SH_OK) return SH_OK;
+    sh_fail(err, rc, "loop: no memory for %llu slots of %u bytes; lower loop.queue_ms",
+            (unsigned long long)ring->n_slots, size->usual_bytes);
+    ring_free(ring);
+    return rc;
 }
 
 void ring_free(struct ring *ring)
 {
-    if (ring->slot == NULL) return;
-    free(ring->slot[0].bytes);
+    for (uint64_t i = 0; i < ring->n_slots && ring->slot != NULL; i++)
+        free(ring->slot[i].store);
     free(ring->slot);
     ring->slot = NULL;
 }
@@ -67,17 +75,29 @@ struct ring_slot *ring_claim(struct ring *ring, uint64_t tick)
     if (seen == state_of(tick, LOST) || !atomic_compare_exchange_strong(&slot->state, &seen, state_of(tick, COMPUTING)))
         return NULL; /* only the pacing thread can have changed it: lost */
     atomic_store(&slot->busy, 1);
-    slot->len = slot->n_frames = slot->first_seq = slot->n_marks = 0;
-    slot->tail = (struct ring_hits){0};
-    slot->wake = 0;
-    slot->n_fired = slot->n_cast = slot->n_echoes = slot->n_lines = 0;
-    slot->n_crowded = slot->n_faint = slot->n_unfit = 0;
+    slot->tick = (struct ring_tick){0};
+    slot->n_frames = slot->first_seq = 0;
     return slot;
 }
 
-int ring_ready(struct ring *ring, struct ring_slot *slot, uint64_t tick)
+int ring_put(struct ring_slot *slot, const struct ring_tick *tick)
 {
-    (void)ring;
+    const size_t align = _Alignof(struct ring_mark);
+    size_t marks_at = (tick->len + align - 1) / align * align, marks_len = tick->n_marks * sizeof *tick->mark;
+    if (marks_at + marks_len > slot->room && make_room(slot, marks_at + marks_len) != SH_OK) {
+        slot->tick = (struct ring_tick){.broken = 1};
+        return SH_ENOMEM;
+    }
+    slot->tick = *tick;
+    slot->tick.bytes = slot->store;
+    slot->tick.mark = (struct ring_mark *)(void *)(slot->store + marks_at);
+    if (tick->len != 0) memcpy(slot->tick.bytes, tick->bytes, tick->len);
+    if (marks_len != 0) memcpy(slot->tick.mark, tick->mark, marks_len);
+    return SH_OK;
+}
+
+int ring_ready(struct ring_slot *slot, uint64_t tick)
+{
     uint64_t seen = state_of(tick, COMPUTING);
     int ready = atomic_compare_exchange_strong(&slot->state, &seen, state_of(tick, READY));
     atomic_store(&slot->busy, 0);
@@ -111,8 +131,7 @@ int ring_lose(struct ring *ring, uint64_t tick)
     return 1;
 }
 
-enum ring_read ring_read(struct ring *ring, int reader, uint64_t tick, uint8_t *buf, uint32_t cap, uint32_t *len,
-                         uint32_t *n_frames, uint32_t *first_seq)
+enum ring_read ring_read(struct ring *ring, int reader, uint64_t tick, struct ring_copy *copy)
 {
     uint64_t released = atomic_load(&ring->released);
     if (tick >= released) return RING_NONE;
@@ -122,10 +141,10 @@ enum ring_read ring_read(struct ring *ring, int reader, uint64_t tick, uint8_t *
     struct ring_slot *slot = slot_of(ring, tick);
     enum ring_read result = RING_LOST;
     if (tick + ring->queue_ticks >= released && atomic_load(&slot->state) == state_of(tick, READY)) {
-        *len = slot->len;
-        *n_frames = slot->n_frames;
-        *first_seq = slot->first_seq;
-        if (slot->len <= cap) memcpy(buf, slot->bytes, slot->len);
+        copy->len = slot->tick.len;
+        copy->n_frames = slot->n_frames;
+        copy->first_seq = slot->first_seq;
+        if (copy->len != 0 && copy->len <= copy->cap) memcpy(copy->buf, slot->tick.bytes, copy->len);
         result = RING_READ;
     }
     atomic_store(&ring->hazard[reader], 0);

@@ -1,5 +1,6 @@
 #include "firmware_sim/loop/work.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -7,6 +8,9 @@
 
 struct worker {
     const struct site *site;
+    struct ring_tick tick; /* what was made of the tick at hand */
+    uint32_t cap;          /* of tick.bytes */
+    struct ring_mark mark[RING_MAX_MARKS];
     struct caster *caster;
     struct cast_counters counted; /* of the caster, as far as slots have them */
     struct line_block block;
@@ -32,7 +36,11 @@ int worker_create(const struct site *site, struct worker **out, struct sh_err *e
     if (worker == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     worker->site = site;
     uint32_t n = device_tick_pulses(site->cfg);
-    int rc = caster_create(&worker->caster, err);
+    worker->tick.mark = worker->mark;
+    worker->cap = worker_tick_bytes(site);
+    worker->tick.bytes = malloc(worker->cap);
+    int rc = worker->tick.bytes != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory");
+    if (rc == SH_OK) rc = caster_create(&worker->caster, err);
     if (rc == SH_OK) rc = line_block_alloc(&worker->block, n * site_points_per_pulse(site), err);
     if (rc == SH_OK && site->cfg->output.attributes) rc = line_block_alloc_attributes(&worker->block, err);
     if (rc != SH_OK) {
@@ -48,27 +56,50 @@ void worker_free(struct worker *worker)
     if (worker == NULL) return;
     caster_free(worker->caster);
     line_block_free(&worker->block);
+    free(worker->tick.bytes);
     free(worker);
 }
 
-uint32_t worker_slot_bytes(const struct site *site)
+/* Bytes of so many points and lines. Each part of a line is a frame of its own. */
+static uint32_t line_bytes(const struct config *cfg, uint32_t n_points, uint32_t lines)
 {
-    const struct config *cfg = site->cfg;
-    /* Each line part is a frame of its own. */
-    uint32_t poses = config_head_moves(&cfg->platform) ? NATIVE_MAX_FRAME : 0;
-    uint32_t n_points = device_tick_pulses(cfg) * site_points_per_pulse(site), lines = device_tick_lines(cfg);
-    uint32_t attributes = 0;
+    uint32_t bytes =
+        (uint32_t)native_points_bound(n_points) + lines * (LINE_END_BYTES + NATIVE_HEADER_LEN + NATIVE_POINTS_HEAD_LEN);
     if (cfg->output.attributes)
-        attributes = (uint32_t)native_attributes_bound(n_points) +
-                     lines * (uint32_t)(NATIVE_HEADER_LEN + NATIVE_ATTRIBUTES_HEAD_LEN);
-    return OVERHEAD_BYTES + poses + attributes + (uint32_t)native_points_bound(n_points) +
-           lines * (LINE_END_BYTES + NATIVE_HEADER_LEN + NATIVE_POINTS_HEAD_LEN);
+        bytes += (uint32_t)native_attributes_bound(n_points) +
+                 lines * (uint32_t)(NATIVE_HEADER_LEN + NATIVE_ATTRIBUTES_HEAD_LEN);
+    return bytes;
 }
 
-static void added(struct ring_slot *slot, size_t len, uint32_t frames)
+uint32_t worker_tick_bytes(const struct site *site)
 {
-    slot->len += (uint32_t)len;
-    if (len != 0) slot->n_frames += frames;
+    const struct config *cfg = site->cfg;
+    uint32_t poses = config_head_moves(&cfg->platform) ? NATIVE_MAX_FRAME : 0;
+    uint32_t n_points = device_tick_pulses(cfg) * site_points_per_pulse(site);
+    return OVERHEAD_BYTES + poses + line_bytes(cfg, n_points, device_tick_lines(cfg));
+}
+
+uint32_t worker_usual_bytes(const struct site *site)
+{
+    const struct head_settings *set = &site->cfg->head.settings;
+    double tick_uhz = 1e6 * site->cfg->loop.tick_hz;
+    uint32_t n_points = (uint32_t)ceil((double)set->prr_uhz / tick_uhz) + SCHEDULE_PACKET;
+    return line_bytes(site->cfg, n_points, (uint32_t)ceil((double)set->lines_uhz / tick_uhz));
+}
+
+static uint8_t *end_of(const struct worker *worker)
+{
+    return worker->tick.bytes + worker->tick.len;
+}
+
+static size_t room_of(const struct worker *worker)
+{
+    return worker->cap - worker->tick.len;
+}
+
+static void added(struct worker *worker, size_t len)
+{
+    worker->tick.len += (uint32_t)len;
 }
 
 static void surface_name(void *ctx, uint32_t label, const char **object, const char **material)
@@ -78,48 +109,41 @@ static void surface_name(void *ctx, uint32_t label, const char **object, const c
     *material = surface->material;
 }
 
-static void fill_heads(struct worker *worker, const struct device_work *work, struct ring_slot *slot, uint32_t cap)
+static void add_event(struct worker *worker, const struct device_work *work, uint32_t i)
+{
+    added(worker, native_encode_event(end_of(worker), room_of(worker), &work->event[i], work->t_ns, 0));
+}
+
+static void add_anchor(struct worker *worker, const struct native_anchor *anchor, int64_t t_ns, int flags)
+{
+    added(worker, native_encode_anchor(end_of(worker), room_of(worker), anchor, t_ns, flags));
+}
+
+static void fill_heads(struct worker *worker, const struct device_work *work)
 {
     for (uint32_t i = 0; i < work->n_events_before; i++)
-        added(slot, native_encode_event(slot->bytes + slot->len, cap - slot->len, &work->event[i], work->t_ns, 0), 1);
+        add_event(worker, work, i);
     if (work->describe) {
         int flags = work->describe_flags;
-        added(slot,
-              native_encode_descriptor(slot->bytes + slot->len, cap - slot->len, &work->descriptor, work->t_ns, flags),
-              1);
-        added(slot, native_encode_anchor(slot->bytes + slot->len, cap - slot->len, &work->anchor, work->t_ns, flags),
-              1);
+        added(worker, native_encode_descriptor(end_of(worker), room_of(worker), &work->descriptor, work->t_ns, flags));
+        add_anchor(worker, &work->anchor, work->t_ns, flags);
     }
     struct native_names names = {work->surfaces_first, work->surfaces_n, surface_name, (void *)(uintptr_t)worker->site};
     while (names.n != 0) {
-        size_t len = native_encode_surfaces(slot->bytes + slot->len, cap - slot->len, 8192, &names, work->t_ns);
+        size_t len = native_encode_surfaces(end_of(worker), room_of(worker), 8192, &names, work->t_ns);
         if (len == 0) break;
-        added(slot, len, 1);
+        added(worker, len);
     }
 }
 
-static uint32_t frames_in(const uint8_t *bytes, size_t len)
-{
-    uint32_t n = 0;
-    for (size_t at = 0; at < len; n++)
-        at += native_frame_len(bytes + at);
-    return n;
-}
-
-/* All poses from the last at or before the first pulse to the first at or behind the last one. Of a trajectory with
- * more than a frame holds (pulses far apart) only some: what goes out is what is cast with in any case. */
+/* All poses from the last one at or before the first pulse to the first one at or after the last pulse. A trajectory
+ * may have more of them than a frame holds, when pulses are far apart. Then only some are chosen. The poses that are
+ * sent are always those that pulses are cast with. */
 static uint32_t choose_knots(struct worker *worker, int64_t from_ns, int64_t to_ns)
 {
     const struct site *site = worker->site;
     const struct pose_knot *knot = site->knot;
-    size_t lo = 0, hi = site->n_knots;
-    while (hi - lo > 1) {
-        size_t mid = lo + (hi - lo) / 2;
-        if (knot[mid].t_ns <= from_ns)
-            lo = mid;
-        else
-            hi = mid;
-    }
+    size_t lo = pose_find_knot(knot, site->n_knots, from_ns), hi;
     for (hi = lo; hi + 1 < site->n_knots && knot[hi].t_ns < to_ns;)
         hi++;
     size_t stride = (hi - lo) / (NATIVE_MAX_POSES - 2) + 1;
@@ -127,14 +151,14 @@ static uint32_t choose_knots(struct worker *worker, int64_t from_ns, int64_t to_
     for (size_t i = lo; i < hi; i += stride)
         worker->knot[n++] = knot[i];
     worker->knot[n++] = knot[hi];
-    if (n == 1 || knot[hi].t_ns < to_ns) { /* behind its end the head stands */
+    if (n == 1 || knot[hi].t_ns < to_ns) { /* after its end the head stands */
         worker->knot[n] = knot[hi];
         worker->knot[n++].t_ns = to_ns > knot[hi].t_ns ? to_ns : knot[hi].t_ns + 1;
     }
     return n;
 }
 
-static void take_poses(struct worker *worker, const struct device_work *work, struct ring_slot *slot, uint32_t cap)
+static void take_poses(struct worker *worker, const struct device_work *work)
 {
     if (!worker->site->moving || work->pulse_end == work->pulse0) return;
     struct cast_setup *setup = &worker->setup;
@@ -152,41 +176,37 @@ static void take_poses(struct worker *worker, const struct device_work *work, st
         memcpy(p->position_m, k->pose.position_m, sizeof p->position_m);
         memcpy(p->quat, k->pose.quat, sizeof p->quat);
     }
-    added(slot,
-          native_encode_poses(slot->bytes + slot->len, cap - slot->len, worker->pose, setup->n_knots, work->t_ns, 0),
-          1);
+    added(worker, native_encode_poses(end_of(worker), room_of(worker), worker->pose, setup->n_knots, work->t_ns, 0));
 }
 
-/* Points behind it are about another place (site_georef). */
-static void move_anchor(struct worker *worker, const struct device_work *work, size_t stretch, struct ring_slot *slot,
-                        uint32_t cap)
+/* An anchor for the points that follow, which are about another place (site_georef). */
+static void move_anchor(struct worker *worker, const struct device_work *work, size_t stretch)
 {
     struct native_anchor anchor;
     if (stretch == worker->anchored) return;
     worker->anchored = stretch;
     if (worker->site->station[work->station].leg == NULL) return;
     device_fill_anchor(worker->site, work->station, stretch, &anchor);
-    added(slot, native_encode_anchor(slot->bytes + slot->len, cap - slot->len, &anchor, work->t_ns, 0), 1);
+    add_anchor(worker, &anchor, work->t_ns, 0);
 }
 
-/* Where the path of a moving head enters another stretch: what is needed for pulse k and those that follow on it,
- * before the one that is returned. */
-static uint64_t enter_stretch(struct worker *worker, const struct device_work *work, uint64_t k, uint64_t end,
-                              struct ring_slot *slot, uint32_t cap)
+/* Prepares what pulse k needs on its stretch of a moving head's path. Returns the first pulse on another stretch, or
+ * end. */
+static uint64_t enter_stretch(struct worker *worker, const struct device_work *work, uint64_t k, uint64_t end)
 {
     const struct site *site = worker->site;
     if (!site->moving) return end;
     size_t stretch = site_stretch_at(site, schedule_time_ns(&work->segment, k));
     if (stretch != worker->stretch) site_enter(site, work->station, stretch, &worker->setup);
     worker->stretch = stretch;
-    move_anchor(worker, work, stretch, slot, cap);
+    move_anchor(worker, work, stretch);
     if (site->stretch[stretch].until_ns == INT64_MAX) return end;
     uint64_t next = schedule_pulse_at(&work->segment, site->stretch[stretch].until_ns);
     return next < end ? next : end;
 }
 
 /* What a cast has added to the caster's counters. */
-static void count_hits(struct worker *worker, uint32_t echoes, struct ring_slot *slot)
+static void count_hits(struct worker *worker, uint32_t echoes)
 {
     struct cast_counters now, *was = &worker->counted;
     caster_get_counters(worker->caster, &now);
@@ -195,48 +215,58 @@ static void count_hits(struct worker *worker, uint32_t echoes, struct ring_slot 
                                    .faint = (uint32_t)(now.faint - was->faint),
                                    .unfit = (uint32_t)(now.unfit - was->unfit)};
     *was = now;
-    slot->n_echoes += hits.echoes;
-    slot->n_crowded += hits.crowded;
-    slot->n_faint += hits.faint;
-    slot->n_unfit += hits.unfit;
-    ring_hits_add(&slot->tail, &hits);
+    ring_hits_add(&worker->tick.hits, &hits);
+    ring_hits_add(&worker->tick.tail, &hits);
 }
 
-static void cast_run(struct worker *worker, const struct device_work *work, const struct schedule_line *line,
-                     uint64_t k, uint64_t end, struct ring_slot *slot, uint32_t cap)
+/* Pulses of a tick that belong to one line. */
+struct part {
+    struct schedule_line line;
+    uint64_t end;             /* of the line or of the tick */
+    uint64_t cast0, cast_end; /* the rest is in the blind part of the sweep */
+};
+
+static void get_part(const struct device_work *work, uint64_t k, struct part *part)
 {
+    struct schedule_line *line = &part->line;
+    schedule_get_line(&work->segment, schedule_line_of(&work->segment, k), line);
+    part->end = line->pulse_end < work->pulse_end ? line->pulse_end : work->pulse_end;
+    part->cast0 = k > line->cast0 ? k : line->cast0;
+    part->cast_end = part->end < line->cast_end ? part->end : line->cast_end;
+}
+
+static void cast_run(struct worker *worker, const struct device_work *work, const struct part *part)
+{
+    uint64_t k = part->cast0, end = part->cast_end;
     uint64_t longest = (uint64_t)(MAX_DT_NS / (work->segment.ns_quot + 1));
     if (longest == 0) longest = 1;
     while (k < end) {
         struct schedule_run run;
-        uint64_t stop = enter_stretch(worker, work, k, end, slot, cap);
+        uint64_t stop = enter_stretch(worker, work, k, end);
         uint64_t n = stop - k < longest ? stop - k : longest;
-        schedule_get_run(&work->segment, line, k, (uint32_t)n, &run);
-        uint32_t echoes = caster_cast(worker->caster, &worker->setup, &run, &worker->block);
-        count_hits(worker, echoes, slot);
-        uint8_t *at = slot->bytes + slot->len;
-        size_t len = native_encode_points(at, cap - slot->len, &worker->block, work->scan_t0_ns);
-        added(slot, len, frames_in(at, len));
-        slot->n_cast += n;
+        schedule_get_run(&work->segment, &part->line, k, (uint32_t)n, &run);
+        count_hits(worker, caster_cast(worker->caster, &worker->setup, &run, &worker->block));
+        added(worker, native_encode_points(end_of(worker), room_of(worker), &worker->block, work->scan_t0_ns));
+        worker->tick.n_cast += n;
         k += n;
     }
 }
 
 /* Writes the line-end frame. Its number of echoes is filled in at release: blocks may come from several ticks. */
-static void end_line(const struct worker *worker, const struct device_work *work, const struct schedule_line *line,
-                     uint64_t end, struct ring_slot *slot, uint32_t cap)
+static void end_line(struct worker *worker, const struct device_work *work, const struct schedule_line *line,
+                     uint64_t end)
 {
     const struct schedule_segment *seg = &work->segment;
     const struct cast_setup *setup = &worker->setup;
     int partial = end < line->pulse_end;
     uint64_t cast_end = line->cast_end < end ? line->cast_end : end;
     uint64_t cast_here = cast_end > line->cast0 ? cast_end - line->cast0 : 0;
-    uint64_t last =
-        end > seg->k0 ? end - 1 : end; /* stopped at once after a change of settings: there is no nearer pulse */
+    uint64_t last = end > seg->k0 ? end - 1 : end; /* stopped right after a change of settings: no pulse is nearer */
     double mirror_turn = schedule_mirror_turn(seg, last), pan_turn = schedule_pan_turn(seg, last);
     if (setup->detect != NULL && setup->detect->instrument != NULL)
         instrument_read(setup->detect->instrument, 1, &mirror_turn, &pan_turn);
-    struct ring_mark *mark = &slot->mark[slot->n_marks++];
+    struct ring_tick *tick = &worker->tick;
+    struct ring_mark *mark = &tick->mark[tick->n_marks++];
     mark->end = (struct line_end){.frame = line->frame,
                                   .line = (uint32_t)line->line,
                                   .pulse0 = line->begin,
@@ -249,15 +279,15 @@ static void end_line(const struct worker *worker, const struct device_work *work
                                   .status = partial               ? (uint32_t)LINE_PARTIAL
                                             : line->last_of_frame ? (uint32_t)LINE_LAST_OF_FRAME
                                                                   : 0U};
-    mark->frame_at = slot->len;
-    mark->before = slot->tail;
+    mark->frame_at = tick->len;
+    mark->before = tick->tail;
     mark->scan_t0_ns = work->scan_t0_ns;
-    slot->tail = (struct ring_hits){0};
-    slot->n_lines++;
-    added(slot, native_encode_line_end(slot->bytes + slot->len, cap - slot->len, &mark->end, work->scan_t0_ns), 1);
+    tick->tail = (struct ring_hits){0};
+    tick->n_lines++;
+    added(worker, native_encode_line_end(end_of(worker), room_of(worker), &mark->end, work->scan_t0_ns));
 }
 
-static void fill_pulses(struct worker *worker, const struct device_work *work, struct ring_slot *slot, uint32_t cap)
+static void fill_pulses(struct worker *worker, const struct device_work *work)
 {
     if (worker->setup_station != work->station + 1) {
         site_cast_setup(worker->site, work->station, &worker->setup);
@@ -270,41 +300,33 @@ static void fill_pulses(struct worker *worker, const struct device_work *work, s
         site_move(worker->site,
                   site_mover_time(worker->site, work->station, 1e-9 * (double)(work->t_ns - work->scan_t0_ns)),
                   &worker->setup);
-    take_poses(worker, work, slot, cap);
-    for (uint64_t k = work->pulse0; k < work->pulse_end;) {
-        struct schedule_line line;
-        schedule_get_line(&work->segment, schedule_line_of(&work->segment, k), &line);
-        uint64_t end = line.pulse_end < work->pulse_end ? line.pulse_end : work->pulse_end;
-        uint64_t cast0 = k > line.cast0 ? k : line.cast0;
-        uint64_t cast_end = end < line.cast_end ? end : line.cast_end;
-        if (cast0 < cast_end) cast_run(worker, work, &line, cast0, cast_end, slot, cap);
-        slot->n_fired += end - k;
-        if (end == line.pulse_end) end_line(worker, work, &line, end, slot, cap);
-        k = end;
+    take_poses(worker, work);
+    struct part part;
+    for (uint64_t k = work->pulse0; k < work->pulse_end; k = part.end) {
+        get_part(work, k, &part);
+        if (part.cast0 < part.cast_end) cast_run(worker, work, &part);
+        worker->tick.n_fired += part.end - k;
+        if (part.end == part.line.pulse_end) end_line(worker, work, &part.line, part.end);
     }
     if (worker->site->moving && work->pulse_end > work->pulse0) /* in the blind part of a line, too */
-        move_anchor(worker, work, site_stretch_at(worker->site, schedule_time_ns(&work->segment, work->pulse_end - 1)),
-                    slot, cap);
+        move_anchor(worker, work, site_stretch_at(worker->site, schedule_time_ns(&work->segment, work->pulse_end - 1)));
     if (!work->cut_short) return;
-    /* The line that was stopped in, be some of its pulses in this tick or all in earlier ones. */
+    /* The line that was stopped. Its pulses are in this tick or in earlier ones. */
     struct schedule_line line;
     schedule_get_line(&work->segment, schedule_line_of(&work->segment, work->pulse_end), &line);
-    if (line.begin < work->pulse_end) end_line(worker, work, &line, work->pulse_end, slot, cap);
+    if (line.begin < work->pulse_end) end_line(worker, work, &line, work->pulse_end);
 }
 
-void worker_fill(struct worker *worker, const struct device_work *work, struct ring_slot *slot, uint32_t slot_bytes)
+const struct ring_tick *worker_fill(struct worker *worker, const struct device_work *work)
 {
-    slot->wake = work->wake;
-    fill_heads(worker, work, slot, slot_bytes);
-    if (work->scanning) fill_pulses(worker, work, slot, slot_bytes);
+    worker->tick = (struct ring_tick){.bytes = worker->tick.bytes, .mark = worker->mark, .wake = work->wake};
+    fill_heads(worker, work);
+    if (work->scanning) fill_pulses(worker, work);
     for (uint32_t i = work->n_events_before; i < work->n_events; i++)
-        added(slot,
-              native_encode_event(slot->bytes + slot->len, slot_bytes - slot->len, &work->event[i], work->t_ns, 0), 1);
+        add_event(worker, work, i);
     if (work->telemetry)
-        added(slot,
-              native_encode_telemetry(slot->bytes + slot->len, slot_bytes - slot->len, &work->telemetry_frame,
-                                      work->t_ns, 0),
-              1);
+        added(worker, native_encode_telemetry(end_of(worker), room_of(worker), &work->telemetry_frame, work->t_ns, 0));
+    return &worker->tick;
 }
 
 uint64_t worker_count_cast(const struct device_work *work, uint64_t *first)
@@ -312,15 +334,12 @@ uint64_t worker_count_cast(const struct device_work *work, uint64_t *first)
     uint64_t n = 0;
     *first = UINT64_MAX;
     if (!work->scanning) return 0;
-    for (uint64_t k = work->pulse0; k < work->pulse_end;) {
-        struct schedule_line line;
-        schedule_get_line(&work->segment, schedule_line_of(&work->segment, k), &line);
-        uint64_t end = line.pulse_end < work->pulse_end ? line.pulse_end : work->pulse_end;
-        uint64_t cast0 = k > line.cast0 ? k : line.cast0;
-        uint64_t cast_end = end < line.cast_end ? end : line.cast_end;
-        if (cast0 < cast_end) n += cast_end - cast0;
-        if (cast0 < cast_end && *first == UINT64_MAX) *first = cast0;
-        k = end;
+    struct part part;
+    for (uint64_t k = work->pulse0; k < work->pulse_end; k = part.end) {
+        get_part(work, k, &part);
+        if (part.cast0 >= part.cast_end) continue;
+        n += part.cast_end - part.cast0;
+        if (*first == UINT64_MAX) *first = part.cast0;
     }
     return n;
 }

@@ -1,4 +1,7 @@
-/* One tick's work: casting its pulses and writing its frames into a slot. */
+/* One tick's work: casting its pulses and writing its frames.
+ *
+ * In: what the device says a tick consists of (device_work). Out: the tick's frames as bytes, the line ends that are
+ * completed at release, and its counts (ring_tick). */
 #ifndef FIRMWARE_SIM_LOOP_WORK_H
 #define FIRMWARE_SIM_LOOP_WORK_H
 
@@ -11,11 +14,13 @@ struct worker;
 int worker_create(const struct site *site, struct worker **out, struct sh_err *err);
 void worker_free(struct worker *worker);
 
-/* Bytes that a slot needs for the busiest tick that the profile allows. */
-uint32_t worker_slot_bytes(const struct site *site);
+/* Bytes of the busiest tick that the profile allows, all pulses with as many echoes as there can be. */
+uint32_t worker_tick_bytes(const struct site *site);
+/* Bytes of a usual tick at the settings of power-up: the pulses of a tick with one echo each. */
+uint32_t worker_usual_bytes(const struct site *site);
 
-/* Fills the slot. Allocates nothing. */
-void worker_fill(struct worker *worker, const struct device_work *work, struct ring_slot *slot, uint32_t slot_bytes);
+/* Makes the tick. Allocates nothing. The result is good until the next call. */
+const struct ring_tick *worker_fill(struct worker *worker, const struct device_work *work);
 
 /* Pulses of the tick that would have been cast, and the first of them (UINT64_MAX: none). */
 uint64_t worker_count_cast(const struct device_work *work, uint64_t *first);

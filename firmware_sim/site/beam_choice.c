@@ -9,26 +9,38 @@
 #include "firmware_sim/site/detection.h"
 #include "firmware_sim/site/look.h"
 
-enum { MAX_PLACES = 4, FOOTPRINT_OPTIONS = 9 };
+enum { FOOTPRINT_OPTIONS = 9, MANY_TRIANGLES = 1000000 }; /* so many: progress is reported */
 
-static struct plan_tolerance tolerance_of(const struct site *site)
+/* ---- trying methods */
+
+struct trial {
+    struct site *site;
+    struct site_look look;
+    struct plan_sample *sample;
+};
+
+/* To be closed, also after an error; a trial of zeros may be. */
+static int open_trial(struct trial *trial, struct site *site, const struct sh_report *report, struct sh_err *err)
 {
-    return (struct plan_tolerance){site->cfg->plan.tolerance_m, site->cfg->plan.echo_tolerance};
+    if (site->scene->n_triangles > MANY_TRIANGLES) sh_progress(report, "trying methods on the scene", -1.0);
+    trial->site = site;
+    site_look_open(&trial->look, site);
+    return plan_sample_create(trial->look.place, trial->look.n, &trial->sample, err);
+}
+
+static void close_trial(struct trial *trial)
+{
+    plan_sample_free(trial->sample);
 }
 
 /* ---- beams */
 
-/* Why footprints can't be had at all; NULL: they can. The one place that says what they go together with. */
-static const char *no_footprint(const struct site *site)
+/* Why a beam is not possible here; NULL: it is. */
+static const char *why_not(const struct site *site, enum beam_mode mode)
 {
-    const struct config_profile *p = &site->cfg->profile;
-    if (p->beam_exit_m == 0.0 && p->beam_divergence_rad == 0.0) return "the head profile has no footprint";
-    return NULL;
-}
-
-/* Why an adaptive one can't be had, where footprints can; NULL: it can. */
-static const char *no_outlines(const struct site *site)
-{
+    if (mode == BEAM_SINGLE) return NULL;
+    if (!config_has_footprint(site->cfg)) return "the head profile has no footprint";
+    if (mode != BEAM_ADAPTIVE) return NULL;
     if (config_beam_fixed(site->cfg)) return NULL;
     return config_moves(site->cfg) ? "the head or a mesh moves" : "an offset of the instrument moves the beam";
 }
@@ -44,7 +56,7 @@ static int make_beam(const struct site *site, struct site_station *s, int adapti
     beam_init(&beam->beam, p->beam_exit_m, p->beam_divergence_rad, 1e-9 * p->pulse_width_ns);
     beam_rings(BEAM_FINE_RINGS, &beam->fine);
     if (!adaptive || s->outlines != NULL) return SH_OK;
-    if (site->scene->n_triangles > 1000000) sh_progress(report, "looking for outlines", -1.0);
+    if (site->scene->n_triangles > MANY_TRIANGLES) sh_progress(report, "looking for outlines", -1.0);
     const struct beam_outlines_spec spec = {site->scene, s->at.position_m, &beam->beam, p->range_max_m,
                                             site->detect.kind};
     int rc = cast_outlines(&spec, s->bvh, &s->outlines, err);
@@ -62,7 +74,7 @@ static void drop_beam(struct site_station *s, int with_beam)
     s->beam = NULL;
 }
 
-/* Each station's, as planned. */
+/* The beam of each station, as planned. */
 static int apply_beam(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const struct plan_methods *methods = &site->plan.methods;
@@ -81,20 +93,23 @@ static int apply_beam(struct site *site, const struct sh_report *report, struct 
 
 /* ---- the choice of a beam */
 
-/* Footprints for the stations that are looked at. */
-static int open_look(struct site_look *look, struct site *site, const struct sh_report *report, struct sh_err *err)
+/* Footprints for the stations that are looked from. */
+static int open_beam_trial(struct trial *trial, struct site *site, const struct sh_report *report, struct sh_err *err)
 {
-    int rc = SH_OK;
-    for (uint32_t i = 0; i < site_look_count(site, MAX_PLACES) && rc == SH_OK; i++)
-        rc = make_beam(site, &site->station[site_look_station(site, MAX_PLACES, i)], 0, report, err);
-    return rc == SH_OK ? site_look_open(look, site, MAX_PLACES, report, err) : rc;
+    int rc = open_trial(trial, site, report, err);
+    for (uint32_t i = 0; i < trial->look.n && rc == SH_OK; i++) {
+        struct site_station *s = &site->station[trial->look.at[i].station];
+        rc = make_beam(site, s, 0, report, err);
+        trial->look.place[i].beam = s->beam;
+    }
+    return rc;
 }
 
-static int add_outlines(const struct site_look *look, const struct sh_report *report, struct sh_err *err)
+static int add_outlines(const struct trial *trial, const struct sh_report *report, struct sh_err *err)
 {
     int rc = SH_OK;
-    for (uint32_t i = 0; i < look->n && rc == SH_OK; i++)
-        rc = make_beam(look->site, &look->site->station[look->at[i].station], 1, report, err);
+    for (uint32_t i = 0; i < trial->look.n && rc == SH_OK; i++)
+        rc = make_beam(trial->site, &trial->site->station[trial->look.at[i].station], 1, report, err);
     return rc;
 }
 
@@ -103,41 +118,38 @@ struct beam_choice {
     uint32_t rings;
 };
 
-/* What there is: those of known costs in their order. */
+/* All beams, those of known cost in the order of their cost. */
 static void list_beams(const struct site *site, struct beam_choice *choice, struct plan_option *option)
 {
     static const uint32_t rings[FOOTPRINT_OPTIONS - 2] = {1, 2, 3, 4, 6, 8, 12};
-    const char *none = no_footprint(site);
     for (uint32_t i = 0; i < FOOTPRINT_OPTIONS; i++) {
         choice[i] = (struct beam_choice){i == 0   ? BEAM_SINGLE
                                          : i == 1 ? BEAM_ADAPTIVE
                                                   : BEAM_RINGS,
                                          i < 2 ? site->cfg->beam.rings : rings[i - 2]};
         plan_beam_option(choice[i].mode, choice[i].rings, &option[i]);
-        if (i > 0 && none != NULL)
-            snprintf(option[i].why_not, sizeof option[i].why_not, "%s", none);
-        else if (i == 1 && no_outlines(site) != NULL)
-            snprintf(option[i].why_not, sizeof option[i].why_not, "%s", no_outlines(site));
+        const char *why = why_not(site, choice[i].mode);
+        if (why != NULL) snprintf(option[i].why_not, sizeof option[i].why_not, "%s", why);
     }
 }
 
-/* Measures what can be had, up to what costs more than one that holds. Outlines take time to find, and only the
- * adaptive beam needs them. Returns whether one holds. */
-static int measure_beams(struct site_look *look, const struct beam_choice *choice, struct plan_option *option,
+/* Measures the beams that are possible, up to those that cost more than one that holds. Finding outlines takes time:
+ * the adaptive beam is measured only where single rays don't hold. *holds: one of them does. */
+static int measure_beams(struct trial *trial, const struct beam_choice *choice, struct plan_option *option,
                          const struct sh_report *report, struct sh_err *err, int *holds)
 {
-    const struct plan_tolerance tolerance = tolerance_of(look->site);
+    const struct plan_tolerance *tolerance = &trial->site->cfg->plan;
     double cost_ns = (double)INFINITY;
     int rc = SH_OK;
     for (uint32_t i = 0; i < FOOTPRINT_OPTIONS && rc == SH_OK; i++) {
         if (option[i].why_not[0] != '\0' || option[i].cost_ns > cost_ns) continue;
         if (choice[i].mode == BEAM_ADAPTIVE) {
-            if (*holds) continue; /* single rays do */
-            rc = add_outlines(look, report, err);
+            if (*holds) continue;
+            rc = add_outlines(trial, report, err);
             if (rc != SH_OK) return rc;
         }
-        plan_sample_beam(look->sample, choice[i].mode, choice[i].rings, &option[i]);
-        if (!plan_holds(&option[i], &tolerance)) continue;
+        plan_sample_beam(trial->sample, choice[i].mode, choice[i].rings, &option[i]);
+        if (!plan_holds(&option[i], tolerance)) continue;
         *holds = 1;
         cost_ns = option[i].cost_ns;
     }
@@ -147,108 +159,101 @@ static int measure_beams(struct site_look *look, const struct beam_choice *choic
 static int try_beams(struct site *site, const struct beam_choice *choice, struct plan_option *option,
                      const struct sh_report *report, struct sh_err *err)
 {
-    struct site_look look = {0};
-    int holds = 0, rc = open_look(&look, site, report, err);
-    if (rc == SH_OK) rc = measure_beams(&look, choice, option, report, err, &holds);
+    struct trial trial = {0};
+    int holds = 0, rc = open_beam_trial(&trial, site, report, err);
+    if (rc == SH_OK) rc = measure_beams(&trial, choice, option, report, err, &holds);
     if (rc == SH_OK && !holds)
         sh_warn(report, "%s: beam.mode: auto: no beam holds plan.tolerance_m and plan.echo_tolerance here",
                 site->cfg->file);
-    site_look_close(&look);
+    close_trial(&trial);
     return rc;
 }
 
 static int choose_beam(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
-    const struct plan_tolerance tolerance = tolerance_of(site);
     struct plan_option option[FOOTPRINT_OPTIONS];
     struct beam_choice choice[FOOTPRINT_OPTIONS];
     list_beams(site, choice, option);
-    int rc = no_footprint(site) == NULL ? try_beams(site, choice, option, report, err) : SH_OK;
+    int rc = config_has_footprint(site->cfg) ? try_beams(site, choice, option, report, err) : SH_OK;
     if (rc != SH_OK) return rc;
-    uint32_t chosen = plan_choose(&site->plan.beam, "beam", option, FOOTPRINT_OPTIONS, -1, "", &tolerance);
+    const struct plan_choice ask = {"beam", option, FOOTPRINT_OPTIONS, -1, "", site->cfg->plan};
+    uint32_t chosen = plan_choose(&ask, &site->plan.beam);
     site->plan.methods.beam = choice[chosen].mode;
     site->plan.methods.rings = choice[chosen].rings;
     return SH_OK;
 }
 
-/* measure: the bound, too. */
-static int force_beam(struct site *site, int measure, const struct sh_report *report, struct sh_err *err)
+/* For `plan` its error is measured, too. */
+static int force_beam(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
-    const struct plan_tolerance tolerance = tolerance_of(site);
     struct plan_option option;
-    struct site_look look = {0};
+    struct trial trial = {0};
     plan_beam_option(cfg->beam.mode, cfg->beam.rings, &option);
-    if (measure && no_footprint(site) == NULL) {
-        int rc = open_look(&look, site, report, err);
-        if (rc == SH_OK && cfg->beam.mode == BEAM_ADAPTIVE) rc = add_outlines(&look, report, err);
-        if (rc == SH_OK) plan_sample_beam(look.sample, cfg->beam.mode, cfg->beam.rings, &option);
-        site_look_close(&look);
+    if (site->measures && config_has_footprint(cfg)) {
+        int rc = open_beam_trial(&trial, site, report, err);
+        if (rc == SH_OK && cfg->beam.mode == BEAM_ADAPTIVE) rc = add_outlines(&trial, report, err);
+        if (rc == SH_OK) plan_sample_beam(trial.sample, cfg->beam.mode, cfg->beam.rings, &option);
+        close_trial(&trial);
         if (rc != SH_OK) return rc;
     }
     site->plan.methods.beam = cfg->beam.mode;
     site->plan.methods.rings = cfg->beam.rings;
-    plan_choose(&site->plan.beam, "beam", &option, 1, 0, "beam.mode", &tolerance);
+    plan_choose(&(struct plan_choice){"beam", &option, 1, 0, "beam.mode", cfg->plan}, &site->plan.beam);
     return SH_OK;
 }
 
 /* ---- glass and mirrors */
 
-static int choose_optics(struct site *site, int measure, const struct sh_report *report, struct sh_err *err)
+/* Depths up to the first that holds; where the configuration names one, all of them. Returns whether one holds. */
+static int try_depths(const struct trial *trial, int forced, struct plan_option *option)
+{
+    int holds = 0;
+    for (uint32_t d = 0; d <= CAST_MAX_DEPTH; d++) {
+        option[d] = (struct plan_option){
+            .method = "none", .error_m = (double)NAN, .echo_share = (double)NAN, .cost_ns = d == 0 ? 0.0 : (double)NAN};
+        if (d > 0) snprintf(option[d].method, sizeof option[d].method, "depth %u", d);
+        if (trial->sample == NULL || holds) continue;
+        plan_sample_optics(trial->sample, d, &option[d]);
+        holds = forced < 0 && plan_holds(&option[d], &trial->site->cfg->plan);
+    }
+    return holds;
+}
+
+static int choose_optics(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
-    const struct plan_tolerance tolerance = tolerance_of(site);
     struct plan_option option[CAST_MAX_DEPTH + 1];
-    struct site_look look = {0};
-    int forced = cfg->optics.depth_given ? (int)cfg->optics.depth : -1, holds = 0;
+    struct trial trial = {0};
+    int forced = cfg->optics.depth_given ? (int)cfg->optics.depth : -1, rc = SH_OK;
     if (!site->detect.surfaces.has_optics) {
         plan_say(&site->plan.optics, "optics", "none", 0.0, 0.0,
                  "no surface is of glass or a mirror: no pulse is cast twice");
         return SH_OK;
     }
-    if (forced < 0 || measure) {
-        int rc = site_look_open(&look, site, MAX_PLACES, report, err);
-        if (rc != SH_OK) {
-            site_look_close(&look);
-            return rc;
-        }
-    }
-    for (uint32_t d = 0; d <= CAST_MAX_DEPTH; d++) {
-        option[d] = (struct plan_option){
-            .method = "none", .error_m = (double)NAN, .echo_share = (double)NAN, .cost_ns = d == 0 ? 0.0 : (double)NAN};
-        if (d > 0) snprintf(option[d].method, sizeof option[d].method, "depth %u", d);
-        if (look.sample == NULL || holds) continue;
-        plan_sample_optics(look.sample, d, &option[d]);
-        holds = forced < 0 && plan_holds(&option[d], &tolerance);
-    }
-    site_look_close(&look);
-    site->plan.methods.depth =
-        plan_choose(&site->plan.optics, "optics", option, CAST_MAX_DEPTH + 1, forced, "optics.depth", &tolerance);
-    if (forced < 0 && holds && site->plan.methods.depth == 0)
+    if (forced < 0 || site->measures) rc = open_trial(&trial, site, report, err);
+    int holds = rc == SH_OK && try_depths(&trial, forced, option);
+    close_trial(&trial);
+    if (rc != SH_OK) return rc;
+    const struct plan_choice ask = {"optics", option, CAST_MAX_DEPTH + 1, forced, "optics.depth", cfg->plan};
+    uint32_t depth = site->plan.methods.depth = plan_choose(&ask, &site->plan.optics);
+    if (forced < 0 && holds && depth == 0)
         sh_warn(report,
                 "%s: plan.tolerance_m and plan.echo_tolerance allow to take glass and mirrors as other surfaces; "
                 "optics.depth has them followed",
                 cfg->file);
     if (forced < 0 && !holds)
-        sh_warn(report, "%s: ways through glass and off mirrors are longer than the %u that are followed", cfg->file,
-                site->plan.methods.depth);
+        sh_warn(report, "%s: ways through glass and off mirrors are longer than the %u surfaces that are followed",
+                cfg->file, depth);
     return SH_OK;
 }
 
 int site_choose_methods(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
-    int rc = choose_optics(site, 0, report, err);
-    if (rc == SH_OK)
-        rc = site->cfg->beam.mode == BEAM_AUTO ? choose_beam(site, report, err) : force_beam(site, 0, report, err);
-    if (rc == SH_OK) rc = apply_beam(site, report, err);
+    int chooses = site->cfg->beam.mode == BEAM_AUTO;
+    int rc = choose_optics(site, report, err);
+    if (rc == SH_OK && chooses) rc = choose_beam(site, report, err);
     if (rc == SH_OK) site_set_depth(site, site->plan.methods.depth);
-    return rc;
-}
-
-int site_measure_forced(struct site *site, const struct sh_report *report, struct sh_err *err)
-{
-    int rc = SH_OK;
-    if (site->plan.optics.forced) rc = choose_optics(site, 1, report, err);
-    if (rc == SH_OK && site->plan.beam.forced) rc = force_beam(site, 1, report, err);
+    if (rc == SH_OK && !chooses) rc = force_beam(site, report, err);
     return rc == SH_OK ? apply_beam(site, report, err) : rc;
 }

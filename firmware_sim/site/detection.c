@@ -5,10 +5,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/angle.h"
 #include "core/light.h"
 #include "core/rng.h"
 
-static const double DEG_RAD = M_PI / 180.0;
 static const char GHOST[] = "ghost of ";
 
 static int set_up_signal(struct site *site, struct sh_err *err)
@@ -33,15 +33,15 @@ static int set_up_signal(struct site *site, struct sh_err *err)
 static void set_up_encoder(struct instrument_encoder *e, double index_deg, double scale_ppm, double eccentricity_deg,
                            double phase_deg)
 {
-    *e = (struct instrument_encoder){index_deg * DEG_RAD, 1e-6 * scale_ppm, eccentricity_deg * DEG_RAD,
-                                     phase_deg * DEG_RAD};
+    *e = (struct instrument_encoder){angle_rad(index_deg), 1e-6 * scale_ppm, angle_rad(eccentricity_deg),
+                                     angle_rad(phase_deg)};
 }
 
 static void set_up_instrument(const struct config *cfg, struct instrument *out)
 {
     const struct config_instrument *k = &cfg->instrument;
-    *out = (struct instrument){.collimation_rad = k->collimation_deg * DEG_RAD,
-                               .trunnion_rad = k->trunnion_deg * DEG_RAD,
+    *out = (struct instrument){.collimation_rad = angle_rad(k->collimation_deg),
+                               .trunnion_rad = angle_rad(k->trunnion_deg),
                                .transit_offset_m = k->transit_offset_m,
                                .mirror_offset_m = k->mirror_offset_m,
                                .range_offset_m = k->range_offset_m,
@@ -52,30 +52,18 @@ static void set_up_instrument(const struct config *cfg, struct instrument *out)
                    k->mirror_phase_deg);
     set_up_encoder(&out->pan, k->pan_index_deg, k->pan_scale_ppm, k->pan_eccentricity_deg, k->pan_phase_deg);
     if (!cfg->noise.angle) return;
-    out->mirror_sigma_rad = cfg->profile.mirror_sigma_deg * DEG_RAD;
-    out->pan_sigma_rad = cfg->profile.pan_sigma_deg * DEG_RAD;
+    out->mirror_sigma_rad = angle_rad(cfg->profile.mirror_sigma_deg);
+    out->pan_sigma_rad = angle_rad(cfg->profile.pan_sigma_deg);
 }
 
-/* NULL: none. */
-static const struct scene_texture *texture_of(const struct site *site, uint32_t label)
-{
-    const struct scene *scene = site->scene;
-    for (uint32_t i = 0; label >= scene->n_surfaces; i++) {
-        label -= scene->n_surfaces;
-        scene = site->mover[i].scene;
-    }
-    uint32_t number = scene->surface[label].texture;
-    return number != 0 ? &scene->texture[number - 1] : NULL;
-}
-
-/* Those whose reflectance no rule says. What can't be read is told. */
+/* For surfaces whose reflectance no entry of `surfaces` gives. Warns of textures that can't be read. */
 static int set_up_textures(struct site *site, const uint8_t *said, const struct sh_report *report, struct sh_err *err)
 {
     struct sh_err why, first = {0};
     uint32_t failed = 0;
     int rc = SH_OK;
     for (uint32_t i = 0; i < site->n_surfaces && rc == SH_OK; i++) {
-        const struct scene_texture *texture = said[i] ? NULL : texture_of(site, i);
+        const struct scene_texture *texture = said[i] ? NULL : site_texture(site, i);
         if (texture == NULL) continue;
         rc = surface_table_texture(&site->detect.surfaces, i, site_surface(site, i), texture, &why);
         if (rc != SH_EINPUT) continue;
@@ -110,7 +98,7 @@ static int set_up_surfaces(struct site *site, const struct sh_report *report, st
     free(is_said);
     if (rc == SH_OK && cfg->signal.on && unknown > 0)
         sh_warn(report,
-                "%s: of %u of %u surfaces neither the mesh's colour nor surfaces tells the reflectance: %g is taken "
+                "%s: %u of %u surfaces have no reflectance, neither by the mesh's colour nor by surfaces: %g is taken "
                 "(signal.reflectance)",
                 cfg->file, unknown, site->n_surfaces, cfg->signal.reflectance);
     for (uint32_t i = 0; i < cfg->n_surfaces && rc == SH_OK; i++)
@@ -120,7 +108,7 @@ static int set_up_surfaces(struct site *site, const struct sh_report *report, st
     return rc;
 }
 
-/* Ghosts get labels of their own, and names that say so. */
+/* Ghosts get labels and names of their own. */
 static int name_ghosts(struct site *site, struct sh_err *err)
 {
     struct site_detect *d = &site->detect;
@@ -141,7 +129,7 @@ static int name_ghosts(struct site *site, struct sh_err *err)
         ghost[i] = *of;
         snprintf(ghost[i].object, SCENE_NAME_LEN, "%s%.*s", GHOST, len, of->object);
     }
-    d->ghost = ghost; /* from here on site_surface tells them from the others */
+    d->ghost = ghost; /* from here on site_surface knows them */
     d->n_real = n;
     site->n_surfaces = 2 * n;
     return SH_OK;
@@ -164,7 +152,7 @@ int site_set_up_detect(struct site *site, const struct sh_report *report, struct
     d->cast.signal = cfg->signal.on ? &d->signal : NULL;
     d->cast.noise_by_signal = cfg->noise.range == RANGE_NOISE_SIGNAL;
     d->cast.ghost_label = site->n_surfaces;
-    if (d->cast.surfaces != NULL && site_casts_footprints(cfg)) {
+    if (d->cast.surfaces != NULL && site_casts_footprints(site)) {
         d->kind = calloc(d->surfaces.n + 1, sizeof *d->kind);
         rc = d->kind == NULL ? sh_fail(err, SH_ENOMEM, "no memory for kinds of surfaces")
                              : surface_kinds(&d->surfaces, d->kind, err);
@@ -173,8 +161,9 @@ int site_set_up_detect(struct site *site, const struct sh_report *report, struct
     set_up_instrument(cfg, &d->instrument);
     if (!instrument_is_ideal(&d->instrument)) d->cast.instrument = &d->instrument;
     if (cfg->noise.ball.radius_m > 0.0) {
-        d->ball = (struct detect_ball){
-            .radius_m = cfg->noise.ball.radius_m, .per_distance_1_m = cfg->noise.ball.distance_1_m, .local = cfg->noise.ball.local};
+        d->ball = (struct detect_ball){.radius_m = cfg->noise.ball.radius_m,
+                                       .per_distance_1_m = cfg->noise.ball.distance_1_m,
+                                       .local = cfg->noise.ball.local};
         memcpy(d->ball.factor, cfg->noise.ball.factor, sizeof d->ball.factor);
         detect_ball_keys(&d->ball, cfg->noise.ball.seed);
         d->cast.ball = &d->ball;
@@ -183,9 +172,9 @@ int site_set_up_detect(struct site *site, const struct sh_report *report, struct
     return rc;
 }
 
-int site_casts_footprints(const struct config *cfg)
+int site_casts_footprints(const struct site *site)
 {
-    return cfg->beam.mode != BEAM_SINGLE || cfg->beam.measures;
+    return site->cfg->beam.mode != BEAM_SINGLE || site->measures;
 }
 
 void site_set_depth(struct site *site, uint32_t depth)
@@ -207,15 +196,15 @@ double site_ray_reach_m(const struct site *site, const double station_m[3])
 {
     const struct config_instrument *k = &site->cfg->instrument;
     double beside_m = hypot(k->transit_offset_m, k->mirror_offset_m), far2 = 0.0;
-    if (site_casts_footprints(site->cfg)) beside_m += 0.5 * site->cfg->profile.beam_exit_m;
+    if (site_casts_footprints(site)) beside_m += 0.5 * site->cfg->profile.beam_exit_m;
     if (site->detect.cast.depth == 0) return beside_m;
     for (int i = 0; i < 3; i++) {
         double far = fmax(fabs(site->scene->min_m[i] - station_m[i]), fabs(site->scene->max_m[i] - station_m[i]));
         far2 += far * far;
     }
     /* What moves may be anywhere. */
-    double behind_m = site->n_movers > 0 ? INFINITY : sqrt(far2) + 1e-3;
-    return beside_m + fmin(behind_m, site->cfg->profile.range_max_m);
+    double beyond_m = site->n_movers > 0 ? INFINITY : sqrt(far2) + 1e-3;
+    return beside_m + fmin(beyond_m, site->cfg->profile.range_max_m);
 }
 
 double site_noise_m(const struct site *site)
@@ -225,6 +214,7 @@ double site_noise_m(const struct site *site)
     double sigma_m = p->range_sigma_m + 1e-6 * p->range_sigma_ppm * p->range_max_m;
     if (cfg->noise.range == RANGE_NOISE_SIGNAL) sigma_m += sqrt(site->detect.signal.jitter2); /* at the threshold */
     const double *f = cfg->noise.ball.factor;
-    double ball_m = cfg->noise.ball.radius_m * (1.0 + cfg->noise.ball.distance_1_m * p->range_max_m) * fmax(f[0], fmax(f[1], f[2]));
+    double ball_m =
+        cfg->noise.ball.radius_m * (1.0 + cfg->noise.ball.distance_1_m * p->range_max_m) * fmax(f[0], fmax(f[1], f[2]));
     return 10.0 * sigma_m + ball_m;
 }

@@ -66,20 +66,23 @@ static int plan_legs(const struct site *site, struct site_station *s, struct sh_
     return SH_OK;
 }
 
-int site_plan_georef(const struct site *site, struct site_station *s, const struct sh_report *report,
-                     struct sh_err *err)
+static int plan_station(const struct site *site, struct site_station *s, const struct sh_report *report,
+                        struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
     int has_legs = site->n_knots != 0 && cfg->output.layout == LINE_GEO;
     int rc = has_legs ? plan_legs(site, s, err)
                       : plan_one(site, s->georef, s->at.position_m, reach_m(site, NULL), &s->plan, err);
     if (rc == SH_OK && s->plan.error_m > cfg->output.tolerance_m && cfg->output.layout == LINE_GEO)
-        sh_warn(report, "station %s: georeferencing by %s may be off by %.2g m, more than output.tolerance_m",
-                s->station->name, s->plan.method, s->plan.error_m);
+        sh_warn(
+            report,
+            "station %s: the error of georeferencing by %s may be %.2g m, more than the %.2g m of output.tolerance_m",
+            s->station->name, s->plan.method, s->plan.error_m, cfg->output.tolerance_m);
     return rc;
 }
 
-int site_open_geoid(struct site *site, struct sh_err *err)
+/* As output.heights says; site->geoid stays NULL where heights are ellipsoidal. */
+static int open_geoid(struct site *site, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
     struct sh_err why;
@@ -140,7 +143,8 @@ static double count_m(const struct site *site, const struct site_station *s)
     return most_m;
 }
 
-int site_choose_scale(struct site *site, const struct sh_report *report, struct sh_err *err)
+/* Metres per count, and the CRS's units per count for each station. */
+static int scale_all(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     int rc = choose_scale(site, err);
     for (uint32_t i = 0; i < site->n_stations && rc == SH_OK && site->cfg->output.layout == LINE_GEO; i++) {
@@ -153,4 +157,27 @@ int site_choose_scale(struct site *site, const struct sh_report *report, struct 
                 site->station[i].station->name, most_m, site->scale_m);
     }
     return rc;
+}
+
+static int add_georef(struct site *site, struct site_station *s, const struct sh_report *report, struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    struct georef_spec spec = {.crs = cfg->output.crs, .geoid = site->geoid};
+    site_grid(site, &spec.utm_zone, &spec.side);
+    int rc = placement_georef(&s->at, &site->anchor, &spec, err);
+    if (rc == SH_OK) rc = georef_create(&spec, &s->georef, err);
+    if (rc != SH_OK) return rc;
+    int epsg = georef_epsg(s->georef), first = georef_epsg(site->station[0].georef);
+    if (epsg != first)
+        sh_warn(report, "%s: station %s is in EPSG %d, station %s in %d: their points do not fit together", cfg->file,
+                s->station->name, epsg, site->station[0].station->name, first);
+    return plan_station(site, s, report, err);
+}
+
+int site_georeference(struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    int rc = open_geoid(site, err);
+    for (uint32_t i = 0; i < site->n_stations && rc == SH_OK; i++)
+        rc = add_georef(site, &site->station[i], report, err);
+    return rc == SH_OK ? scale_all(site, report, err) : rc;
 }

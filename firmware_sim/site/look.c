@@ -1,7 +1,5 @@
 #include "firmware_sim/site/look.h"
 
-#include <stdlib.h>
-
 static void enter(void *ctx, int64_t t_ns, struct cast_setup *setup)
 {
     const struct site_look_at *at = ctx;
@@ -29,34 +27,11 @@ static void fill_place(const struct site *site, struct site_look_at *at, struct 
     site_cast_setup(site, at->station, &place->setup);
 }
 
-uint32_t site_look_count(const struct site *site, uint32_t most)
+void site_look_open(struct site_look *look, const struct site *site)
 {
-    return site->n_stations < most ? site->n_stations : most;
-}
-
-uint32_t site_look_station(const struct site *site, uint32_t most, uint32_t i)
-{
-    return i * site->n_stations / site_look_count(site, most);
-}
-
-int site_look_open(struct site_look *look, struct site *site, uint32_t most, const struct sh_report *report,
-                   struct sh_err *err)
-{
-    if (site->scene->n_triangles > 1000000) sh_progress(report, "trying methods on the scene", -1.0);
-    *look = (struct site_look){.site = site, .n = site_look_count(site, most)};
-    look->place = calloc(look->n, sizeof *look->place);
-    look->at = calloc(look->n, sizeof *look->at);
-    if (look->place == NULL || look->at == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
+    look->n = site->n_stations < SITE_LOOK_STATIONS ? site->n_stations : SITE_LOOK_STATIONS;
     for (uint32_t i = 0; i < look->n; i++) {
-        look->at[i] = (struct site_look_at){site, site_look_station(site, most, i)};
+        look->at[i] = (struct site_look_at){site, i * site->n_stations / look->n};
         fill_place(site, &look->at[i], &look->place[i]);
     }
-    return plan_sample_create(look->place, look->n, &look->sample, err);
-}
-
-void site_look_close(struct site_look *look)
-{
-    plan_sample_free(look->sample);
-    free(look->place);
-    free(look->at);
 }

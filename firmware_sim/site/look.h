@@ -1,27 +1,23 @@
-/* Looking at the scene as the head does, to try methods: pulses of some of the stations, drawn by core/plan. */
+/* Looking at the scene as the head does: the places that pulses are fired from, with setups as the run's. For trying
+ * methods (core/plan draws the pulses), and for measuring what they cost. */
 #ifndef FIRMWARE_SIM_SITE_LOOK_H
 #define FIRMWARE_SIM_SITE_LOOK_H
 
 #include "firmware_sim/site/site.h"
 
+enum { SITE_LOOK_STATIONS = 4 }; /* at most so many stations are looked from */
+
 struct site_look {
-    struct site *site;
-    struct plan_place *place; /* [n] */
+    struct plan_place place[SITE_LOOK_STATIONS];
     struct site_look_at {
         const struct site *site;
         uint32_t station;
-    } * at; /* [n] */
+    } at[SITE_LOOK_STATIONS];
     uint32_t n;
-    struct plan_sample *sample;
 };
 
-/* Of `most` of the stations, or all there are: how many that makes, and which. */
-uint32_t site_look_count(const struct site *site, uint32_t most);
-uint32_t site_look_station(const struct site *site, uint32_t most, uint32_t i);
-/* Looks from these, with the beams that they have by then. To be closed, after an error, too; a look of zeros may be.
- */
-int site_look_open(struct site_look *look, struct site *site, uint32_t most, const struct sh_report *report,
-                   struct sh_err *err);
-void site_look_close(struct site_look *look);
+/* Looks from up to SITE_LOOK_STATIONS stations, evenly chosen, with the beams that they have by then. The look must not
+ * be moved or copied: its places point into it. */
+void site_look_open(struct site_look *look, const struct site *site);
 
 #endif

@@ -4,6 +4,7 @@
 #include <string.h>
 #include <strings.h>
 
+#include "core/angle.h"
 #include "core/cast.h"
 #include "core/ifc_site.h"
 #include "core/locate.h"
@@ -11,8 +12,6 @@
 
 /* A floor at the place that was given, or this little above it, is still found. */
 #define FLOOR_ABOVE_M 0.01
-
-#define RAD(deg) ((deg)*M_PI / 180.0)
 
 static int is_ifc(const struct config_mesh *mesh)
 {
@@ -54,7 +53,7 @@ static int anchor_by_ifc(const struct config *cfg, const struct sh_report *repor
         origin_m[i] = site.origin_m[i] + mesh->offset_m[i];
     if (!cfg->scene.anchor.height_given) {
         height_m = isnan(site.elevation_m) ? 0.0 : site.elevation_m;
-        sh_warn(report, "%s: %s, taken as height above the ellipsoid; scene.anchor.height_m says it rightly",
+        sh_warn(report, "%s: %s, taken as height above the ellipsoid; scene.anchor.height_m can give that height",
                 mesh->file, isnan(site.elevation_m) ? "no RefElevation: 0 m" : "RefElevation counts from the sea");
     }
     if (site.has_map)
@@ -93,7 +92,8 @@ static int given_place(const struct config_station *s, struct georef_place *at, 
     int rc = SH_OK;
     *at = (struct georef_place){s->lat_deg, s->lon_deg, s->height_m};
     if (s->place == PLACE_UTM)
-        rc = georef_locate_utm((int)s->utm_zone, s->north, s->easting_m, s->northing_m, s->height_m, at, err);
+        rc = georef_locate_utm((int)s->utm_zone, s->north, (const double[3]){s->easting_m, s->northing_m, s->height_m},
+                               at, err);
     if (s->place == PLACE_ECEF) rc = georef_locate_ecef(s->ecef_m, at, err);
     return rc == SH_OK ? locate_check(at, err) : rc;
 }
@@ -154,7 +154,7 @@ static int find(const struct config_station *s, const struct placement_anchor *a
     out->lat_deg = at.lat_deg;
     out->lon_deg = at.lon_deg;
     out->height_m = at.height_m;
-    pose_attitude(RAD(s->heading_deg), RAD(s->pitch_deg), RAD(s->roll_deg), attitude);
+    pose_attitude(angle_rad(s->heading_deg), angle_rad(s->pitch_deg), angle_rad(s->roll_deg), attitude);
     mat3_multiply(level, attitude, out->rotation);
     return SH_OK;
 }

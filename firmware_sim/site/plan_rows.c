@@ -1,4 +1,3 @@
-/* The rows of the plan, and the order of surfaces. */
 #include "firmware_sim/site/plan_rows.h"
 
 #include <math.h>
@@ -6,12 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "firmware_sim/site/beam_choice.h"
-
-static struct plan_tolerance tolerance_of(const struct site *site)
-{
-    return (struct plan_tolerance){site->cfg->plan.tolerance_m, site->cfg->plan.echo_tolerance};
-}
+#include "firmware_sim/site/rate.h"
 
 /* How far the scene goes from where the head may be. */
 static double farthest_m(const struct site *site)
@@ -31,25 +25,23 @@ static double farthest_m(const struct site *site)
     return fmin(far_m, cfg->profile.range_max_m);
 }
 
-int site_plan_order(struct site *site, struct sh_err *err)
+void site_plan_order(struct site *site)
 {
-    const struct plan_tolerance tolerance = tolerance_of(site);
     const enum config_choice asked = site->cfg->scene.order_exactly;
     struct plan_option option[2];
     struct plan_row *row = &site->plan.order;
     plan_order_options(farthest_m(site), option);
-    int forced = asked == CHOICE_AUTO ? -1 : asked == CHOICE_ON;
-    site->plan.methods.order_exactly =
-        (int)plan_choose(row, "order", option, 2, forced, "scene.order_exactly", &tolerance);
+    const struct plan_choice choice = {.stage = "order",
+                                       .option = option,
+                                       .n = 2,
+                                       .forced = asked == CHOICE_AUTO ? -1 : asked == CHOICE_ON,
+                                       .key = "scene.order_exactly",
+                                       .tolerance = site->cfg->plan};
+    site->plan.methods.order_exactly = (int)plan_choose(&choice, row);
     size_t used = strlen(row->why);
     if (!site->plan.methods.order_exactly)
         snprintf(row->why + used, sizeof row->why - used,
                  "; surfaces nearer to each other than the error may be taken for one another");
-    for (uint32_t i = 0; i < site->n_movers && site->plan.methods.order_exactly; i++) {
-        int rc = bvh_order_exactly(site->mover[i].bvh, err);
-        if (rc != SH_OK) return rc;
-    }
-    return SH_OK;
 }
 
 static void name_row(struct plan_row *row, const char *whose)
@@ -109,26 +101,24 @@ static void ask_head(const struct site *site, struct plan_head *head)
     if (cfg->profile.n_reaches == 0) head->reach_m = cfg->profile.range_max_m;
 }
 
-int site_plan_rows(struct site *site, const struct sh_report *report, struct sh_err *err)
+int site_plan_rows(struct site *site, struct sh_err *err)
 {
     struct site_plan *plan = &site->plan;
     struct plan_row of_head[PLAN_HEAD_ROWS];
     struct plan_head head;
     struct bvh_info bvh;
-    int rc = site_measure_forced(site, report, err);
-    if (rc != SH_OK) return rc;
     ask_head(site, &head);
     bvh_get_info(site->station[0].bvh, &bvh);
     size_t n = plan_head(&head, of_head);
     free(plan->row);
-    plan->row = calloc(n + 5 + site->n_stations, sizeof *plan->row);
+    plan->row = calloc(n + 6 + site->n_stations, sizeof *plan->row);
     if (plan->row == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     plan->n = 0;
     plan_cast(bvh.packet, &plan->row[plan->n++]);
     plan->row[plan->n++] = plan->order;
     for (size_t i = 0; i < n; i++) {
         plan->row[plan->n++] = of_head[i];
-        if (i != 0) continue; /* behind what moves */
+        if (i != 0) continue; /* after what moves */
         plan->row[plan->n++] = plan->beam;
         plan->row[plan->n++] = plan->optics;
     }
@@ -136,12 +126,13 @@ int site_plan_rows(struct site *site, const struct sh_report *report, struct sh_
         plan_georef_polar(&plan->row[plan->n++]);
     else
         add_georef(site, plan);
-    return SH_OK;
+    return site_rate_row(site, &plan->row[plan->n++], err);
 }
 
 void site_plan_text(const struct site *site, char *text, size_t room)
 {
     const struct site_plan *plan = &site->plan;
     int polar = site->cfg->output.layout == LINE_POLAR;
-    snprintf(text, room, "order %s; beam %s; optics %s; georef %s", plan->order.method, plan->beam.method, plan->optics.method, polar ? "none" : site->station[0].plan.method);
+    snprintf(text, room, "order %s; beam %s; optics %s; georef %s", plan->order.method, plan->beam.method,
+             plan->optics.method, polar ? "none" : site->station[0].plan.method);
 }

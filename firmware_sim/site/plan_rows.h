@@ -1,15 +1,15 @@
-/* The plan of a site: what the configuration, the scene and the head ask for; core/plan chooses, the site applies it
- * (site->plan). Nothing else decides on methods. */
+/* The plan of a site as rows for people to read, and the order of surfaces. core/plan chooses, the site applies it
+ * (site->plan); nothing else decides on methods. */
 #ifndef FIRMWARE_SIM_SITE_PLAN_ROWS_H
 #define FIRMWARE_SIM_SITE_PLAN_ROWS_H
 
 #include "firmware_sim/site/site.h"
 
-/* Before BVHs of the scene are made: whether surfaces are ordered exactly. Orders those of what moves. */
-int site_plan_order(struct site *site, struct sh_err *err);
-/* All rows, for people to read: with bounds of what is forced, too, which no run needs. Scans are as before. */
-int site_plan_rows(struct site *site, const struct sh_report *report, struct sh_err *err);
-/* In a line: what was planned for a run. */
+/* Before BVHs are built: whether surfaces are ordered exactly. */
+void site_plan_order(struct site *site);
+/* Fills site->plan.row: stage by stage, then what this machine computes of it (firmware_sim/site/rate.h). */
+int site_plan_rows(struct site *site, struct sh_err *err);
+/* In one line: the methods that a run uses. */
 void site_plan_text(const struct site *site, char *text, size_t room);
 
 #endif

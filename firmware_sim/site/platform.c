@@ -1,14 +1,16 @@
-/* The path of a moving head: its poses, and BVHs along it. */
-#include "firmware_sim/site/detection.h"
-#include "firmware_sim/site/beam_choice.h"
 #include "firmware_sim/site/platform.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* What the head's own path may differ from the trajectory by, and how far apart its poses are at most: the steps that a
- * path is cut in for BVHs, and those of a recorded trajectory. */
+#include "core/angle.h"
+#include "core/vec3.h"
+#include "firmware_sim/site/bvhs.h"
+#include "firmware_sim/site/detection.h"
+
+/* Largest distance of the head's own path from the trajectory, and largest steps between its poses, in metres and ns:
+ * a path is cut into them for BVHs, and a recorded trajectory has them. */
 static const double TOLERANCE_M = 1e-4, LONGEST_M = 0.01;
 static const int64_t LONGEST_NS = 10000000;
 
@@ -27,7 +29,7 @@ int site_open_trajectory(const struct site *site, struct site_part *part, struct
     int wrong_end = p->has_end && part->end_s > last_s;
     if (!wrong_end && part->start_s <= last_s) return SH_OK;
     trajectory_free(part->trajectory);
-    return sh_fail(err, SH_EINPUT, "%s: platform.%s: %.9g s is behind the trajectory's end; allowed %.9g to %.9g",
+    return sh_fail(err, SH_EINPUT, "%s: platform.%s: %.9g s is after the trajectory's end; allowed %.9g to %.9g",
                    site->cfg->file, wrong_end ? "end_s" : "start_s", wrong_end ? p->end_s : p->start_s,
                    wrong_end ? p->start_s : 0.0, last_s - first_s);
 }
@@ -39,22 +41,21 @@ static int load_knots(struct site *site, const struct sh_report *report, struct 
     struct sh_err why;
     int rc = site_open_trajectory(site, &part, err);
     if (rc != SH_OK) return rc;
-    rc = trajectory_knots(part.trajectory, part.start_s, part.end_s, &site->mount, TOLERANCE_M, LONGEST_NS, LONGEST_M,
-                          &site->knot, &site->n_knots, &site->knot_error_m, &why);
+    const struct pose_knot_rules rules = {part.start_s, part.end_s, TOLERANCE_M, LONGEST_NS, LONGEST_M};
+    struct pose_path path;
+    rc = trajectory_knots(part.trajectory, &site->mount, &rules, &path, &why);
+    site->knot = path.knot;
+    site->n_knots = path.n;
+    site->knot_error_m = path.error_m;
     trajectory_free(part.trajectory);
     if (rc != SH_OK)
         return sh_fail(err, rc, "%s: platform.%s: %.300s", site->cfg->file, p->file[0] != '\0' ? "file" : "waypoints",
                        why.text);
     if (rc == SH_OK && site->knot_error_m > TOLERANCE_M * 1.001)
         sh_warn(report,
-                "the trajectory bends more than poses %g ms apart can follow: the head is off it by up to %.2g m",
+                "the trajectory bends more than poses %g ms apart can follow: the head leaves it by up to %.2g m",
                 1e-3 * POSE_MIN_STEP_US, site->knot_error_m);
     return rc;
-}
-
-static double distance_m(const double a[3], const double b[3])
-{
-    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
 }
 
 /* Poses from `first` on whose box fits into the reach; returns the first that does not, centre and radius. */
@@ -91,17 +92,16 @@ static int add_stretch(struct site *site, const double centre_m[3], double reach
     struct site_stretch *more = realloc(site->stretch, (site->n_stretches + 1) * sizeof *more);
     if (more == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the path");
     site->stretch = more;
-    struct bvh **bvh = &site->bvh[site->n_bvh];
-    int rc = site_build_bvh(site, site->scene, centre_m, reach_m, report, bvh, err);
-    if (*bvh != NULL) site->n_bvh++;
+    struct bvh *bvh;
+    int rc = site_add_bvh(site, &(struct site_sphere){centre_m, reach_m}, report, &bvh, err);
     if (rc != SH_OK) return rc;
     struct site_stretch *stretch = &site->stretch[site->n_stretches++];
-    *stretch = (struct site_stretch){.until_ns = until_ns, .bvh = *bvh, .reach_m = reach_m};
+    *stretch = (struct site_stretch){.until_ns = until_ns, .bvh = bvh, .reach_m = reach_m};
     memcpy(stretch->centre_m, centre_m, sizeof stretch->centre_m);
     return SH_OK;
 }
 
-/* A stretch ends between two poses, and the head goes on for up to a millisecond, which 100 ms cover. */
+/* A stretch ends between two poses. The head goes on in it for up to a millisecond; 100 ms cover that. */
 static int cover_path(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     int rc = SH_OK;
@@ -111,7 +111,8 @@ static int cover_path(struct site *site, const struct sh_report *report, struct 
         double beyond_m = 0.0;
         int64_t until_ns = end < site->n_knots ? site->knot[end - 1].t_ns : INT64_MAX;
         for (size_t k = end; k < site->n_knots && site->knot[k - 1].t_ns < until_ns + 100000000; k++)
-            beyond_m = fmax(beyond_m, distance_m(site->knot[k].pose.position_m, site->knot[end - 1].pose.position_m));
+            beyond_m =
+                fmax(beyond_m, vec3_distance(site->knot[k].pose.position_m, site->knot[end - 1].pose.position_m));
         if (until_ns != INT64_MAX) until_ns = (until_ns + 999999) / 1000000 * 1000000; /* as an anchor says it */
         rc = add_stretch(site, centre_m, radius_m + beyond_m + 1e-3 + site_ray_reach_m(site, centre_m), until_ns,
                          report, err);
@@ -122,9 +123,9 @@ static int cover_path(struct site *site, const struct sh_report *report, struct 
 
 void site_get_mount(const struct config_platform *p, struct pose *mount)
 {
-    const double deg = M_PI / 180.0;
     memcpy(mount->position_m, p->mount_m, sizeof p->mount_m);
-    pose_from_angles(p->mount_heading_deg * deg, p->mount_pitch_deg * deg, p->mount_roll_deg * deg, mount->quat);
+    pose_from_angles(angle_rad(p->mount_heading_deg), angle_rad(p->mount_pitch_deg), angle_rad(p->mount_roll_deg),
+                     mount->quat);
 }
 
 int site_load_platform(struct site *site, const struct sh_report *report, struct sh_err *err)
@@ -135,30 +136,13 @@ int site_load_platform(struct site *site, const struct sh_report *report, struct
     if (p->kind == PLATFORM_LIVE) {
         double reach_m = 0.0;
         for (uint32_t i = 1; i < cfg->n_stations; i++)
-            reach_m = fmax(reach_m, distance_m(site->station[0].at.position_m, site->station[i].at.position_m));
+            reach_m = fmax(reach_m, vec3_distance(site->station[0].at.position_m, site->station[i].at.position_m));
         const double *arm = p->mount_m;
-        double head_m = p->reach_m + sqrt(arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2]);
+        double head_m = p->reach_m + sqrt(vec3_dot(arm, arm));
         site->live_reach_m = head_m + reach_m;
         return add_stretch(site, site->station[0].at.position_m,
                            head_m + site_ray_reach_m(site, site->station[0].at.position_m), INT64_MAX, report, err);
     }
     int rc = load_knots(site, report, err);
     return rc == SH_OK ? cover_path(site, report, err) : rc;
-}
-
-size_t site_stretch_at(const struct site *site, int64_t t_ns)
-{
-    size_t i = 0;
-    while (i + 1 < site->n_stretches && t_ns >= site->stretch[i].until_ns)
-        i++;
-    return i;
-}
-
-void site_enter(const struct site *site, uint32_t station, size_t stretch, struct cast_setup *setup)
-{
-    const double *centre_m, *scale;
-    setup->bvh = site->stretch[stretch].bvh;
-    setup->georef = site_georef(site, station, stretch, &centre_m, &scale);
-    memcpy(setup->station_m, centre_m, sizeof setup->station_m);
-    memcpy(setup->xyz_scale, scale, sizeof setup->xyz_scale);
 }

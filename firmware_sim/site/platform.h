@@ -1,4 +1,4 @@
-/* Private to site*.c: a head that moves. */
+/* Private to this folder: a head that moves while it scans. From the configured trajectory come its poses and BVHs. */
 #ifndef FIRMWARE_SIM_SITE_PLATFORM_H
 #define FIRMWARE_SIM_SITE_PLATFORM_H
 

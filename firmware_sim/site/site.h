@@ -1,5 +1,6 @@
-/* The site: what a configuration loads once and all scans share, constant afterwards. The scene, its BVHs, and per
- * station the place of the head. */
+/* The site: what a configuration loads once and all scans share. In goes a checked configuration; out come the scene,
+ * its BVHs, the stations' places (scene frame, metres) and georeferences, and the planned methods. load.c makes it,
+ * site.c reads it. It is constant once loaded: any thread. */
 #ifndef FIRMWARE_SIM_SITE_SITE_H
 #define FIRMWARE_SIM_SITE_SITE_H
 
@@ -37,7 +38,7 @@ struct site_mover {
     double centre_m[3], radius_m;
 };
 
-/* What scans do between a hit and a point; site_detect.h. */
+/* What scans do between a hit and a point (detection.h). */
 struct site_detect {
     int on; /* 0: nothing of it, and it costs nothing */
     struct cast_detect cast;
@@ -45,20 +46,20 @@ struct site_detect {
     struct detect_signal signal;
     struct instrument instrument;
     struct detect_ball ball;
-    uint32_t n_real;             /* labels of real surfaces; the others are ghosts', as many */
+    uint32_t n_real;             /* labels of real surfaces; as many labels of ghosts follow */
     struct scene_surface *ghost; /* [n_real]; NULL: no mirrors */
     uint16_t *kind;              /* [n_real] of surfaces, for outlines; NULL: not modelled */
 };
 
-/* What was planned, once; scans take their methods from here alone. */
+/* What was planned. Scans take their methods from here alone. */
 struct site_plan {
     struct plan_methods methods;
     struct plan_row order, beam, optics;
-    struct plan_row *row; /* all of it, in the order of the stages */
+    struct plan_row *row; /* `plan`: all stages in their order, then the total; else NULL */
     size_t n;
 };
 
-/* A stretch of a moving head's path, with a BVH that reaches all of it. */
+/* A stretch of a moving head's path. Its BVH reaches all of it. */
 struct site_stretch {
     int64_t until_ns; /* since the scan's start: whole milliseconds; INT64_MAX: the last one */
     struct bvh *bvh;
@@ -73,6 +74,7 @@ struct site {
     uint32_t n_movers, n_surfaces; /* surfaces of the scene, then of the movers, then their ghosts */
     struct site_detect detect;
     struct site_plan plan;
+    int measures; /* for `plan`: footprints are cast to find the error of a forced beam, even of single rays */
     struct bvh *bvh[CONFIG_MAX_STATIONS];
     uint32_t n_bvh;
     struct site_station *station;
@@ -84,14 +86,14 @@ struct site {
     struct pose mount;            /* of the head on the platform */
     struct pose_knot *knot;       /* trajectory: the head's poses from the scan's start on */
     size_t n_knots;               /* 0: live */
-    double knot_error_m;          /* what the head's path differs from the trajectory by, at most */
+    double knot_error_m;          /* largest distance of the head's path from the trajectory */
     struct site_stretch *stretch; /* in order of time */
     size_t n_stretches;
     double live_reach_m; /* of a live head from any station */
     double scale_m;      /* of positions and ranges on the wire, metres per count */
 };
 
-/* Stations further than this from a BVH's origin get one of their own: a float there has steps of 0.06 mm. */
+/* Stations further than this from a BVH's origin get a BVH of their own: there a float has steps of 0.06 mm. */
 #define SITE_BVH_REACH_M 1000.0
 
 /* Room left beyond the head's largest range, for noise. */
@@ -99,6 +101,8 @@ struct site {
 
 /* cfg must outlive the site. */
 int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err);
+/* The same for `plan`: site->plan.row is filled, with bounds also of what is forced. */
+int site_load_plan(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err);
 void site_free(struct site *site);
 
 /* The grid of output.crs utm, as georef_spec has it: one for all stations of an anchored scene, that of the anchor or
@@ -111,6 +115,8 @@ uint32_t site_points_per_pulse(const struct site *site);
 
 /* Names of a label below n_surfaces. */
 const struct scene_surface *site_surface(const struct site *site, uint32_t label);
+/* The texture of a real surface; NULL: none. */
+const struct scene_texture *site_texture(const struct site *site, uint32_t label);
 
 /* On which stretch a moving head is at a time of the scan; and what the casters need there, in a setup for the station.
  */

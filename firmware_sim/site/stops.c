@@ -1,13 +1,13 @@
-/* Stop-and-go: poses of a trajectory at equal steps of time, each a station of its own. */
 #include "firmware_sim/site/stops.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/angle.h"
 #include "firmware_sim/site/platform.h"
 
-/* The last one may be a rounding error behind the end: of times as they are written, 1e-9 of a step. */
+/* The last stop may lie after the end by a rounding error: 1e-9 of a step, for times as people write them. */
 static int count_stops(const struct site *site, const struct site_part *part, uint32_t *n, struct sh_err *err)
 {
     const struct config_platform *p = &site->cfg->platform;
@@ -49,15 +49,14 @@ static int place(const struct site *site, const struct pose *head, struct placem
 /* As a station of the configuration would say it. */
 static void describe(const struct pose *head, uint32_t i, struct config_station *out)
 {
-    const double deg = 180.0 / M_PI;
     double heading, pitch, roll;
     pose_to_angles(head->quat, &heading, &pitch, &roll);
     snprintf(out->name, sizeof out->name, "stop-%u", i + 1);
     memcpy(out->position_m, head->position_m, sizeof out->position_m);
     out->has_position = 1;
-    out->heading_deg = heading * deg;
-    out->pitch_deg = pitch * deg;
-    out->roll_deg = roll * deg;
+    out->heading_deg = angle_deg(heading);
+    out->pitch_deg = angle_deg(pitch);
+    out->roll_deg = angle_deg(roll);
 }
 
 static int add_stop(struct site *site, const struct site_part *part, const struct pose *mount, uint32_t i,

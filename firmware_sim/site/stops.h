@@ -1,4 +1,4 @@
-/* Private to site*.c: a head that scans where its platform stops. */
+/* Private to this folder: a head that scans where its platform stops. */
 #ifndef FIRMWARE_SIM_SITE_STOPS_H
 #define FIRMWARE_SIM_SITE_STOPS_H
 

@@ -55,7 +55,8 @@ void station_scatter(struct station_points *p, uint64_t stream, double radius_m,
 
 void station_forward(const struct georef *georef, struct station_points *p, double out[3][STATIONS_BATCH])
 {
-    georef_forward(georef, STATIONS_BATCH, p->in[0], p->in[1], p->in[2], out[0], out[1], out[2]);
+    georef_forward(georef, STATIONS_BATCH, (struct vec3_in){p->in[0], p->in[1], p->in[2]},
+                   (struct vec3_out){out[0], out[1], out[2]});
 }
 
 /* A degree is at most pi/180 (a^2/b + height) long, of longitude that times the cosine of latitude. */

@@ -150,7 +150,8 @@ static struct scene *slanted_front(void)
     static const struct scene_surface surface[2] = {{.object = "front"}, {.object = "back"}};
     struct scene *scene;
     struct sh_err err;
-    if (scene_from_arrays(vertex, 8, triangle, 4, label, surface, 2, &scene, &err) != 0) fail_msg("%s", err.text);
+    if (scene_from_arrays(&(struct scene_arrays){vertex, 8, triangle, 4, label, surface, 2}, &scene, &err) != 0)
+        fail_msg("%s", err.text);
     return scene;
 }
 

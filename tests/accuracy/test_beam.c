@@ -8,7 +8,7 @@
 #include <string.h>
 #include <cmocka.h>
 
-#include "tests/accuracy/beam_reference.h"
+#include "tests/common/beam_reference.h"
 
 static void open_rig(struct beam_rig *rig, struct scene *scene, const struct beam_view *view)
 {
@@ -85,7 +85,8 @@ static struct scene *wall(double range_m, double incidence_rad)
         for (int i = 0; i < 3; i++)
             vertex[v][i] = along * across[i] + (i == 1 ? range_m : i == 2 ? up : 0.0);
     }
-    if (scene_from_arrays((const double(*)[3])vertex, 4, triangle, 2, NULL, NULL, 0, &scene, &err) != 0)
+    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 4, triangle, 2, NULL, NULL, 0}, &scene,
+                          &err) != 0)
         fail_msg("%s", err.text);
     return scene;
 }
@@ -144,7 +145,8 @@ static struct scene *door(double step_m)
         vertex[v][1] = 20.0 + back * step_m;
         vertex[v][2] = v % 4 >= 2 ? 5.0 : -5.0;
     }
-    if (scene_from_arrays((const double(*)[3])vertex, 8, triangle, 4, label, surface, 2, &scene, &err) != 0)
+    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 8, triangle, 4, label, surface, 2}, &scene,
+                          &err) != 0)
         fail_msg("%s", err.text);
     return scene;
 }

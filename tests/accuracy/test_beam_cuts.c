@@ -11,7 +11,7 @@
 #include "tests/common/generate.h"
 #include "core/rng.h"
 #include "core/surface.h"
-#include "tests/accuracy/beam_reference.h"
+#include "tests/common/beam_reference.h"
 
 static const double STATION[3] = {0.0, 0.0, 0.0};
 static const struct beam_view VIEW = {-20.0, 20.0, -45.0, 45.0, 6, 3000};
@@ -139,7 +139,8 @@ static void within_floats_of_an_edge(void **state)
     struct scene *scene;
     struct sh_err err;
     uint64_t pulses = 0, sides[2] = {0};
-    if (scene_from_arrays(vertex, 8, triangle, 4, NULL, NULL, 0, &scene, &err) != 0) fail_msg("%s", err.text);
+    if (scene_from_arrays(&(struct scene_arrays){vertex, 8, triangle, 4, NULL, NULL, 0}, &scene, &err) != 0)
+        fail_msg("%s", err.text);
     if (beam_rig_open(&rig, scene, STATION, &view, &err) != 0) fail_msg("%s", err.text);
     for (uint32_t l = 0; l < view.lines; l++) {
         beam_rig_mode(&rig, BEAM_SINGLE, 0);

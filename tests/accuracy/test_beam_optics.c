@@ -105,8 +105,9 @@ static struct scene *mirror_and_two_walls(void)
     for (uint32_t t = 0; t < 6; t++)
         for (uint32_t v = 0; v < 3; v++)
             triangle[t][v] = t / 2 * 4 + (v == 0 ? 0 : v + t % 2);
-    if (scene_from_arrays((const double(*)[3])vertex, 12, (const uint32_t(*)[3])triangle, 6, label, surface, 2, &scene,
-                          &err) != 0)
+    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 12, (const uint32_t(*)[3])triangle, 6,
+                                                 label, surface, 2},
+                          &scene, &err) != 0)
         fail_msg("%s", err.text);
     return scene;
 }

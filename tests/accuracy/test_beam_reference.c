@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "tests/common/generate.h"
-#include "tests/accuracy/beam_reference.h"
+#include "tests/common/beam_reference.h"
 
 /* SH_SANITIZE: sanitizers are for the code, not for the count. */
 #ifdef SH_SANITIZE

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "tests/unit/cases.h"
+#include "tests/common/cases.h"
 
 #include "core/detect.h"
 #include "core/line.h"

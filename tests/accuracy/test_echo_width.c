@@ -176,8 +176,9 @@ static void slanted_behind_glass_and_in_motion(void **state)
             const double pane[3] = {side + (moving ? 8.0 : 0.0), 20.0, up};
             memcpy(vertex[v], v < 4 ? wall->vertex_m[v] : pane, sizeof vertex[v]);
         }
-        if (scene_from_arrays((const double(*)[3])vertex + (moving ? 4 : 0), moving ? 4 : 8, triangle, moving ? 2 : 4,
-                              moving ? label + 2 : label, surface, 2, &both, &err) != 0)
+        if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex + (moving ? 4 : 0), moving ? 4 : 8,
+                                                     triangle, moving ? 2 : 4, moving ? label + 2 : label, surface, 2},
+                              &both, &err) != 0)
             fail_msg("%s", err.text);
         open_lit(&l, both, &AHEAD, 1e-9);
         beam_init(&l.rig.beam.beam, 0.007, 0.35e-3, 0.4e-9);

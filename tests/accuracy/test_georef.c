@@ -1,4 +1,4 @@
-/* Georeferencing at 200 places all over the Earth: exact figures against definitions in long double (tests/geodesy.h),
+/* Georeferencing at 200 places all over the Earth: exact figures against definitions in long double (tests/common/geodesy.h),
  * every order's error against its bound. */
 #include <math.h>
 #include <setjmp.h>
@@ -11,7 +11,7 @@
 
 #include "core/plan.h"
 #include "tests/accuracy/stations.h"
-#include "tests/geodesy.h"
+#include "tests/common/geodesy.h"
 
 static struct georef *make(int i, enum georef_crs crs)
 {

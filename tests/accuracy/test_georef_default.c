@@ -12,9 +12,10 @@
 #include <cmocka.h>
 
 #include "core/geoframe.h"
+#include "core/locate.h"
 #include "core/plan.h"
 #include "tests/accuracy/stations.h"
-#include "tests/geodesy.h"
+#include "tests/common/geodesy.h"
 
 enum { BATCHES = 4 };
 enum scene_frame { LEVEL, TURNED, EARTH, GRID, NEXT_GRID };
@@ -53,19 +54,21 @@ static void set_frame(int i, enum scene_frame kind, struct georef_spec *spec)
     struct geoframe frame;
     struct georef_place at = {spec->lat_deg, spec->lon_deg, spec->height_m}, away = at;
     const double origin_m[3] = {512000.0, -3000.0, 7.0};
-    double p_prcs[3], grid[3];
+    double p_prcs[3];
+    struct locate_grid grid;
     struct sh_err err;
-    int zone, north, rc = SH_OK;
+    int zone, rc = SH_OK;
     if (kind == LEVEL) return;
     away.lat_deg += away.lat_deg > 0.0 ? -0.25 : 0.25;
-    rc = georef_geodetic_to_utm(&at, 0, &zone, &north, grid, &err);
+    rc = locate_in_grid(&at, 0, &grid, &err);
+    zone = grid.zone;
     if (kind == NEXT_GRID && spec->crs == GEOREF_UTM) spec->utm_zone = zone; /* 0 were the scene's own */
     if (kind == NEXT_GRID) { /* that reaches up to 1.4 degrees beyond its border, on the equator */
         at.lon_deg = spec->lon_deg = 6.0 * zone - 186.0 + 0.007 * i;
         zone = (zone + 58) % 60 + 1;
     }
     if (rc == SH_OK && kind == TURNED) rc = geoframe_set_tangent(&frame, origin_m, &away, 7.3 * i, &err);
-    if (rc == SH_OK && (kind == GRID || kind == NEXT_GRID)) rc = geoframe_set_grid(&frame, zone, north, &err);
+    if (rc == SH_OK && (kind == GRID || kind == NEXT_GRID)) rc = geoframe_set_grid(&frame, zone, grid.north, &err);
     if (kind == EARTH) geoframe_set_ecef(&frame);
     if (rc == SH_OK) rc = geoframe_find(&frame, &at, p_prcs, &err);
     if (rc == SH_OK) rc = geoframe_fill(&frame, p_prcs, spec, &err);
@@ -76,6 +79,7 @@ static void set_frame(int i, enum scene_frame kind, struct georef_spec *spec)
 static void reference(const struct georef_spec *spec, const struct georef *georef, struct station_points *p)
 {
     double rotation[9], anchor[3], base[3];
+    struct locate_grid grid;
     if (!georef_rotation(georef, rotation)) {
         station_forward(georef, p, p->exact);
         return;
@@ -93,7 +97,9 @@ static void reference(const struct georef_spec *spec, const struct georef *geore
         if (zone == 61) zone = to_pole < 12.0 ? 0 : 61;
         if (spec->crs == GEOREF_ECEF)
             georef_geodetic_to_ecef(&at, q);
-        else if (georef_geodetic_to_utm(&at, zone, NULL, NULL, q, NULL) != SH_OK)
+        else if (locate_in_grid(&at, zone, &grid, NULL) == SH_OK)
+            memcpy(q, (const double[3]){grid.easting_m, grid.northing_m, at.height_m}, sizeof q);
+        else
             fail_msg("no reference");
         for (int c = 0; c < 3; c++)
             p->exact[c][k] = q[c] - anchor[c];

@@ -14,7 +14,7 @@
 
 #include "core/cast/kernels.h"
 #include "firmware_sim/site/plan_rows.h"
-#include "tests/accuracy/beam_reference.h"
+#include "tests/common/beam_reference.h"
 
 /* SH_SANITIZE: sanitizers are for the code, not for the count. */
 #ifdef SH_SANITIZE
@@ -113,8 +113,8 @@ static void expect_within(const char *what, const struct tally *t, const struct 
     assert_true(t->pulses >= RUNS);
     assert_true(wrong <= row->echo_share + 3.0 * sqrt(row->echo_share / n));
     assert_true(t->sum2 - 2.0 * sqrt(t->sum4) <= row->error_m * row->error_m * t->echoes + 1e-12 * t->echoes);
-    assert_true(wrong <= cfg->plan.echo_tolerance + 3.0 * sqrt(cfg->plan.echo_tolerance / n));
-    assert_true(rms <= cfg->plan.tolerance_m);
+    assert_true(wrong <= cfg->plan.echo_share + 3.0 * sqrt(cfg->plan.echo_share / n));
+    assert_true(rms <= cfg->plan.range_m);
 }
 
 static void compare_beam(struct side *side, uint32_t station, const struct schedule_run *run, const struct beam *beam,
@@ -268,7 +268,8 @@ static struct scene *step_edge(void)
     static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
     struct scene *scene;
     struct sh_err err;
-    if (scene_from_arrays(vertex, 8, triangle, 4, NULL, NULL, 0, &scene, &err) != 0) fail_msg("%s", err.text);
+    if (scene_from_arrays(&(struct scene_arrays){vertex, 8, triangle, 4, NULL, NULL, 0}, &scene, &err) != 0)
+        fail_msg("%s", err.text);
     return scene;
 }
 

@@ -5,7 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "tests/unit/cases.h"
+#include "tests/common/cases.h"
 
 #include "core/rng.h"
 #include "firmware_sim/site/site.h"

@@ -15,7 +15,7 @@
 #include "tests/common/hits.h"
 #include "tests/common/generate.h"
 #include "core/rng.h"
-#include "tests/accuracy/reference.h"
+#include "tests/common/reference.h"
 
 enum { BATCH = 1024, THREADS = 2 };
 
@@ -269,8 +269,9 @@ static struct scene *make_room(const double offset_m[3])
             nt += 2;
         }
     }
-    assert_int_equal(scene_from_arrays((const double(*)[3])vertex, nv, (const uint32_t(*)[3])triangle, nt, NULL, NULL,
-                                       0, &scene, &err),
+    assert_int_equal(scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, nv,
+                                                              (const uint32_t(*)[3])triangle, nt, NULL, NULL, 0},
+                                       &scene, &err),
                      SH_OK);
     return scene;
 }

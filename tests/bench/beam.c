@@ -16,7 +16,7 @@
 #include "core/rng.h"
 #include "tests/bench/bench.h"
 #include "firmware_sim/config/table.h"
-#include "tests/accuracy/beam_reference.h"
+#include "tests/common/beam_reference.h"
 #include "tests/bench/pin.h"
 
 enum { ROUNDS = 15, FEW_ROUNDS = 3, MAX_METHODS = 8 };

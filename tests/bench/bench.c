@@ -43,12 +43,12 @@ static int measure_case(const struct bench_options *o, const struct bench_case *
 static int measure_target(const struct bench_options *o, const struct bench_target *target,
                           struct bench_scene_report *out, struct sh_err *err)
 {
-    struct bench_embree embree = {0}, fast = {0};
+    struct embree_alone embree = {0}, fast = {0};
     struct bench_rays rays = {0};
     struct bench_case c = {.target = target, .rays = &rays, .embree = &embree, .fast = &fast, .seconds = o->seconds};
     int rc = bench_rays_create(BENCH_LINES, &rays, err);
-    if (rc == SH_OK) rc = bench_embree_create(target->scene, target->station_m, 1, &embree, err);
-    if (rc == SH_OK) rc = bench_embree_create(target->scene, target->station_m, 0, &fast, err);
+    if (rc == SH_OK) rc = bench_embree(target->scene, target->station_m, 1, &embree, err);
+    if (rc == SH_OK) rc = bench_embree(target->scene, target->station_m, 0, &fast, err);
     if (rc == SH_OK) rc = bvh_create(target->scene, target->station_m, 0.0, 0, &REPORT, &c.bvh, err);
     if (rc == SH_OK) {
         snprintf(out->name, sizeof out->name, "%s", target->name);
@@ -59,8 +59,8 @@ static int measure_target(const struct bench_options *o, const struct bench_targ
         rc = measure_case(o, &c, out, err);
     }
     bvh_free(c.bvh);
-    bench_embree_free(&embree);
-    bench_embree_free(&fast);
+    embree_alone_free(&embree);
+    embree_alone_free(&fast);
     bench_rays_free(&rays);
     return rc;
 }

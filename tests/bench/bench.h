@@ -4,9 +4,9 @@
 #define TESTS_BENCH_BENCH_H
 
 #include "core/cast.h"
-#include "core/embree.h"
 #include "core/scene.h"
 #include "core/schedule.h"
+#include "tests/common/embree_alone.h"
 
 enum { BENCH_LINES = 400, BENCH_LINE_PULSES = 2500, BENCH_MIN_ROUNDS = 7, BENCH_MAX_ROUNDS = 101 };
 
@@ -47,47 +47,18 @@ struct bench_block {
 };
 void bench_rays_block(const struct bench_rays *rays, uint32_t first, struct bench_block *out);
 
-/* ---- embree_alone.c: Embree as it comes: the mesh with shared vertices, rounded to float in the frame of
- * the station */
-enum bench_feed {
-    BENCH_PREPARED, /* packets lie in memory, ready; only tfar and geomID are set again */
-    BENCH_LOADED,   /* one packet, filled from arrays of directions */
-};
-struct bench_embree {
-    RTCDevice device;
-    RTCScene rtc;
-    double build_s;
-    uint32_t n;                /* rays below */
-    const float *fx, *fy, *fz; /* of the rays; not owned */
-    uint32_t width;            /* of the packets that lie ready; 0: none */
-    void *packets;
-    uint32_t *prim; /* results of BENCH_LOADED */
-    float *t;
-};
-int bench_embree_create(const struct scene *scene, const double origin_m[3], int robust, struct bench_embree *out,
-                        struct sh_err *err);
-/* Takes n rays from the origin; the arrays stay the caller's, and n is a multiple of 16. */
-int bench_embree_rays(struct bench_embree *e, const float *fx, const float *fy, const float *fz, uint32_t n,
-                      struct sh_err *err);
-/* Makes ready for passes of this width (1, 4, 8 or 16) and feed. */
-int bench_embree_prepare(struct bench_embree *e, uint32_t width, enum bench_feed feed, struct sh_err *err);
-/* The rays' directions have changed: the packets that lie ready get them. */
-void bench_embree_refill(const struct bench_embree *e);
-/* Casts rays first .. first+n-1 (multiples of 16), results in prim and t for BENCH_LOADED. */
-void bench_embree_pass(const struct bench_embree *e, uint32_t width, enum bench_feed feed, uint32_t first, uint32_t n);
-void bench_embree_free(struct bench_embree *e);
-const char *bench_isa(void);
-long bench_embree_version(void);
-
 /* ---- setup.c: what a scan needs beside the mesh, with the figures of a real head */
 struct bench_case {
     const struct bench_target *target;
     const struct bench_rays *rays;
-    struct bench_embree *embree, *fast; /* robust: the measure of all; without that flag */
+    struct embree_alone *embree, *fast; /* robust: the measure of all; without that flag */
     struct bvh *bvh;
     double seconds; /* measure for so long, but at least BENCH_MIN_ROUNDS */
 };
 #define BENCH_ENCODER 1048576.0 /* counts per turn of all profiles in config/heads */
+/* Embree alone over a mesh, with the bench's longest range and all threads for the build. */
+int bench_embree(const struct scene *scene, const double origin_m[3], int robust, struct embree_alone *out,
+                 struct sh_err *err);
 /* Station at 52.5 N, 13.4 E, positions in ECEF. */
 int bench_georef(const struct bench_target *target, struct georef **out, struct sh_err *err);
 void bench_setup(const struct bench_case *c, const struct georef *georef, struct cast_setup *setup);
@@ -113,7 +84,7 @@ extern const char *const bench_stage_name[BENCH_STAGES];
 struct bench_result {
     uint32_t rounds, pulses; /* pulses of a pass */
     uint32_t embree_width;
-    enum bench_feed embree_feed;
+    enum embree_feed embree_feed;
     double embree_ns, fast_ns, cast_ns, pipeline_ns, ideal_ns, staged_ns; /* per pulse: medians */
     double cast_ratio, pipeline_ratio, ideal_ratio,
         fast_ratio; /* Embree's time by ours: medians of the rounds' ratios */

@@ -13,7 +13,7 @@
 #include "core/rng.h"
 #include "core/vecmath.h"
 #include "tests/bench/bench.h"
-#include "tests/bench/reference.h"
+#include "tests/bench/ground_truth.h"
 #include "tests/bench/pin.h"
 
 enum { LINES = 200, ROUNDS = 9, CHUNK = 256, SAMPLE_STEP = 1, WIDTHS = 4, METHODS = 20 };
@@ -47,7 +47,7 @@ struct chart {
     struct scene *scene;
     double station_m[3];
     struct bench_rays rays;
-    struct bench_embree embree[2]; /* not robust, robust */
+    struct embree_alone embree[2]; /* not robust, robust */
     struct bvh *bvh;
     struct caster *caster;
     double *plane; /* n, d of each triangle from the station; one more, all NaN, for misses */
@@ -108,7 +108,7 @@ static void refine(const double *restrict plane, uint32_t n_triangles, const uin
 
 static void cast(struct chart *c, const struct method *m)
 {
-    const struct bench_embree *e = &c->embree[m->robust];
+    const struct embree_alone *e = &c->embree[m->robust];
     const struct bench_rays *rays = &c->rays;
     if (m->kind == DECIDED) {
         bvh_set_packet(c->bvh, m->width);
@@ -118,7 +118,7 @@ static void cast(struct chart *c, const struct method *m)
     }
     for (uint32_t at = 0; at < rays->n; at += CHUNK) {
         uint32_t n = rays->n - at < CHUNK ? rays->n - at : CHUNK;
-        bench_embree_pass(e, m->width, BENCH_LOADED, at, n);
+        embree_alone_pass(e, m->width, EMBREE_LOADED, at, n);
         if (m->kind == REFINED)
             refine(c->plane, c->scene->n_triangles, e->prim + at, rays->dx + at, rays->dy + at, rays->dz + at, n,
                    c->range_m + at);
@@ -134,7 +134,7 @@ static int compare(const void *a, const void *b)
 /* What is missed is wrong by the whole range. */
 static void measure_error(struct chart *c, struct method *m)
 {
-    const struct bench_embree *e = &c->embree[m->robust];
+    const struct embree_alone *e = &c->embree[m->robust];
     cast(c, m);
     for (uint32_t i = 0; i < c->n_sample; i++) {
         uint32_t at = c->sample[i];
@@ -182,20 +182,20 @@ static int make_reference(struct chart *c)
     c->reference_m = malloc(most * sizeof *c->reference_m);
     c->error_m = malloc(most * sizeof *c->error_m);
     c->sample = malloc(most * sizeof *c->sample);
-    struct reference *r = reference_create(c->scene, c->station_m);
+    struct ground_truth *r = ground_truth_create(c->scene, c->station_m);
     if (c->reference_m == NULL || c->error_m == NULL || c->sample == NULL || r == NULL) return 0;
     for (uint32_t i = 0; i < most; i++) {
         uint32_t at = i * SAMPLE_STEP;
         const double dir[3] = {c->rays.dx[at], c->rays.dy[at], c->rays.dz[at]};
         int in_doubt;
-        double range_m = (double)reference_range(r, dir, &in_doubt);
+        double range_m = (double)ground_truth_range(r, dir, &in_doubt);
         doubtful += in_doubt ? 1U : 0U;
         misses += !in_doubt && !isfinite(range_m) ? 1U : 0U;
         if (in_doubt) continue;
         c->reference_m[c->n_sample] = range_m;
         c->sample[c->n_sample++] = at;
     }
-    reference_free(r);
+    ground_truth_free(r);
     fprintf(stderr, "chart: %u rays compared, %u left out that graze a silhouette\n", c->n_sample, doubtful);
     if (misses != 0) fprintf(stderr, "chart: the reference misses %u rays in a closed scene\n", misses);
     return misses == 0 && c->n_sample > most / 2;
@@ -204,9 +204,9 @@ static int make_reference(struct chart *c)
 /* Turns each ray to a corner, or to a point of an edge, of the triangle that it hits. */
 static void aim_at_edges(struct chart *c)
 {
-    const struct bench_embree *e = &c->embree[1];
+    const struct embree_alone *e = &c->embree[1];
     const uint64_t key = rng_key(1, RNG_SCENE);
-    bench_embree_pass(e, 16, BENCH_LOADED, 0, c->rays.n);
+    embree_alone_pass(e, 16, EMBREE_LOADED, 0, c->rays.n);
     for (uint32_t i = 0; i < c->rays.n; i++) {
         if (e->prim[i] == RTC_INVALID_GEOMETRY_ID) continue;
         uint64_t r = rng_u64(key, i);
@@ -230,9 +230,9 @@ static int set_up(struct chart *c, struct sh_err *err)
     int rc = generate_terrain(c->spec->triangles, c->spec->side_m, c->spec->rough_m, centre_m, 1, &c->scene, err);
     if (rc == SH_OK) rc = bench_rays_create(LINES, &c->rays, err);
     for (int robust = 0; robust < 2 && rc == SH_OK; robust++) {
-        struct bench_embree *e = &c->embree[robust];
-        rc = bench_embree_create(c->scene, c->station_m, robust, e, err);
-        if (rc == SH_OK) rc = bench_embree_rays(e, c->rays.fx, c->rays.fy, c->rays.fz, c->rays.n, err);
+        struct embree_alone *e = &c->embree[robust];
+        rc = bench_embree(c->scene, c->station_m, robust, e, err);
+        if (rc == SH_OK) rc = embree_alone_rays(e, c->rays.fx, c->rays.fy, c->rays.fz, c->rays.n, err);
     }
     if (rc == SH_OK) rc = bvh_create(c->scene, c->station_m, 0.0, 0, NULL, &c->bvh, err);
     if (rc == SH_OK) rc = caster_create(&c->caster, err);
@@ -250,8 +250,8 @@ static void tear_down(struct chart *c)
 {
     caster_free(c->caster);
     bvh_free(c->bvh);
-    bench_embree_free(&c->embree[0]);
-    bench_embree_free(&c->embree[1]);
+    embree_alone_free(&c->embree[0]);
+    embree_alone_free(&c->embree[1]);
     bench_rays_free(&c->rays);
     scene_free(c->scene);
     free(c->plane);

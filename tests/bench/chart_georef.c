@@ -1,5 +1,5 @@
 /* Speed against accuracy of the ways to georeference: rows of the chart's table to standard output. README.md tells how
- * to read it. Scene frame to UTM and UPS; errors are against tests/geodesy.h, which shares nothing with GeographicLib.
+ * to read it. Scene frame to UTM and UPS; errors are against tests/common/geodesy.h, which shares nothing with GeographicLib.
  */
 #include <math.h>
 #include <stdio.h>
@@ -8,7 +8,7 @@
 #include "core/plan.h"
 #include "core/rng.h"
 #include "tests/bench/bench.h"
-#include "tests/geodesy.h"
+#include "tests/common/geodesy.h"
 #include "tests/bench/pin.h"
 
 enum { PLACES = 6, POINTS = 2048, METHODS = 5, ROUNDS = 15, SCENES = 5 };
@@ -74,7 +74,8 @@ static void go(struct georef *georef, int m)
     if (METHOD[m] == FLAT)
         go_flat(georef);
     else
-        georef_forward(georef, POINTS, in[0], in[1], in[2], out[0], out[1], out[2]);
+        georef_forward(georef, POINTS, (struct vec3_in){in[0], in[1], in[2]},
+                       (struct vec3_out){out[0], out[1], out[2]});
 }
 
 static void measure_errors(struct georef *georef, int place)

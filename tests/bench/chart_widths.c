@@ -6,7 +6,7 @@
 #include <stdlib.h>
 
 #include "core/georef/polynomial_kernels.h"
-#include "core/georef/private.h"
+#include "core/georef/state.h"
 #include "core/rng.h"
 #include "tests/bench/bench.h"
 #include "tests/bench/pin.h"
@@ -94,18 +94,19 @@ static int measure(int map, const struct width *width, int n_widths)
         fprintf(stderr, "chart: %s\n", err.text);
         return 1;
     }
-    georef_forward(georef, POINTS, in[0], in[1], in[2], exact[0], exact[1], exact[2]);
+    georef_forward(georef, POINTS, (struct vec3_in){in[0], in[1], in[2]},
+                   (struct vec3_out){exact[0], exact[1], exact[2]});
     for (int round = 0; round < ROUNDS; round++)
         for (int w = 0; w < n_widths; w++) {
             double start_s = bench_thread_s();
             for (int k = 0; k < TIMES; k++)
-                polynomial_apply_with(width[w].kernels, &georef->polynomial, MAP[map].order, POINTS, in[0], in[1],
-                                      in[2], out[0], out[1], out[2]);
+                polynomial_apply_with(width[w].kernels, &georef->polynomial, MAP[map].order, POINTS,
+                                      (struct vec3_in){in[0], in[1], in[2]}, (struct vec3_out){out[0], out[1], out[2]});
             ns[w][round] = 1e9 * (bench_thread_s() - start_s) / TIMES / POINTS;
         }
     for (int w = 0; w < n_widths; w++) {
-        polynomial_apply_with(width[w].kernels, &georef->polynomial, MAP[map].order, POINTS, in[0], in[1], in[2],
-                              out[0], out[1], out[2]);
+        polynomial_apply_with(width[w].kernels, &georef->polynomial, MAP[map].order, POINTS,
+                              (struct vec3_in){in[0], in[1], in[2]}, (struct vec3_out){out[0], out[1], out[2]});
         compare_points(georef);
         double median = bench_median(ns[w], ROUNDS);
         printf("georef width,%s,%s,%.3f,%.3g,%.3g,0,0,,\n", MAP[map].name, width[w].name, median,

@@ -24,8 +24,9 @@ static int reserve(struct builder *b, size_t n_vertices, size_t n_triangles, str
 static int finish(struct builder *b, int rc, struct scene **out, struct sh_err *err)
 {
     if (rc == SH_OK)
-        rc = scene_from_arrays((const double(*)[3])b->vertex, b->n_vertices, (const uint32_t(*)[3])b->triangle,
-                               b->n_triangles, NULL, NULL, 0, out, err);
+        rc = scene_from_arrays(&(struct scene_arrays){(const double(*)[3])b->vertex, b->n_vertices,
+                                                      (const uint32_t(*)[3])b->triangle, b->n_triangles, NULL, NULL, 0},
+                               out, err);
     free(b->vertex);
     free(b->triangle);
     return rc;

@@ -153,11 +153,11 @@ static int run_job(struct job *job, uint32_t threads, const struct sh_report *re
 /* The same rays by Embree alone. */
 static int plain(struct job *job, struct sh_err *err)
 {
-    struct bench_embree e;
+    struct embree_alone e;
     struct batch *b = aligned_alloc(64, sizeof *b);
-    int rc = bench_embree_create(job->mesh->scene, job->mesh->station_m, 1, &e, err);
+    int rc = bench_embree(job->mesh->scene, job->mesh->station_m, 1, &e, err);
     if (rc == SH_OK && b == NULL) rc = sh_fail(err, SH_ENOMEM, "bench: no memory");
-    if (rc == SH_OK) rc = bench_embree_rays(&e, b->fx, b->fy, b->fz, BATCH, err);
+    if (rc == SH_OK) rc = embree_alone_rays(&e, b->fx, b->fy, b->fz, BATCH, err);
     uint64_t want = job->n < PLAIN_RAYS ? job->n : PLAIN_RAYS;
     for (uint64_t first = 0; rc == SH_OK && first < want; first += BATCH) {
         for (uint32_t k = 0; k < BATCH; k++) {
@@ -166,12 +166,12 @@ static int plain(struct job *job, struct sh_err *err)
             b->fy[k] = (float)b->dy[k];
             b->fz[k] = (float)b->dz[k];
         }
-        bench_embree_pass(&e, 16, BENCH_LOADED, 0, BATCH);
+        embree_alone_pass(&e, 16, EMBREE_LOADED, 0, BATCH);
         for (uint32_t k = 0; k < BATCH; k++)
             job->out->plain_leaks += judge(job->mesh, b, k, (double)e.t[k], e.prim[k], 1e-3) == 1;
         job->out->plain_rays += BATCH;
     }
-    bench_embree_free(&e);
+    embree_alone_free(&e);
     free(b);
     return rc;
 }

@@ -44,8 +44,8 @@ static int set_up(struct measure *m, struct sh_err *err)
     m->staged = malloc(m->cap);
     m->rays = aligned_alloc(64, (sizeof *m->rays + 63) / 64 * 64);
     if (m->sink == NULL || m->staged == NULL || m->rays == NULL) return sh_fail(err, SH_ENOMEM, "bench: no memory");
-    rc = bench_embree_rays(c->embree, m->rays->fx, m->rays->fy, m->rays->fz, BENCH_BLOCK, err);
-    if (rc == SH_OK) rc = bench_embree_rays(c->fast, m->rays->fx, m->rays->fy, m->rays->fz, BENCH_BLOCK, err);
+    rc = embree_alone_rays(c->embree, m->rays->fx, m->rays->fy, m->rays->fz, BENCH_BLOCK, err);
+    if (rc == SH_OK) rc = embree_alone_rays(c->fast, m->rays->fx, m->rays->fy, m->rays->fz, BENCH_BLOCK, err);
     return rc;
 }
 
@@ -94,11 +94,11 @@ static double timed_blocks(struct measure *m, int method)
     for (uint32_t first = 0; first < c->rays->n; first += BENCH_BLOCK) {
         const struct bench_block *b = m->rays;
         bench_rays_block(c->rays, first, m->rays);
-        const struct bench_embree *e = method == FAST ? c->fast : c->embree;
-        if (m->out->embree_feed == BENCH_PREPARED) bench_embree_refill(e);
+        const struct embree_alone *e = method == FAST ? c->fast : c->embree;
+        if (m->out->embree_feed == EMBREE_PREPARED) embree_alone_refill(e);
         double start_s = bench_thread_s();
         if (method != CAST)
-            bench_embree_pass(e, m->out->embree_width, m->out->embree_feed, 0, BENCH_BLOCK);
+            embree_alone_pass(e, m->out->embree_width, m->out->embree_feed, 0, BENCH_BLOCK);
         else
             hits_from(m->caster, c->bvh, m->setup.station_m, BENCH_RANGE_MAX_M, BENCH_BLOCK, b->dx, b->dy, b->dz,
                         m->range_m, m->prim);
@@ -130,11 +130,11 @@ static int choose_embree(struct measure *m, struct sh_err *err)
     static const uint32_t widths[] = {4, 8, 16};
     double best = 0.0;
     uint32_t best_width = 0;
-    enum bench_feed best_feed = BENCH_PREPARED;
+    enum embree_feed best_feed = EMBREE_PREPARED;
     for (int i = 0; i < 6; i++) {
         m->out->embree_width = widths[i / 2];
-        m->out->embree_feed = i % 2 == 0 ? BENCH_PREPARED : BENCH_LOADED;
-        int rc = bench_embree_prepare(m->c->embree, m->out->embree_width, m->out->embree_feed, err);
+        m->out->embree_feed = i % 2 == 0 ? EMBREE_PREPARED : EMBREE_LOADED;
+        int rc = embree_alone_prepare(m->c->embree, m->out->embree_width, m->out->embree_feed, err);
         if (rc != SH_OK) return rc;
         double ns[3];
         for (uint32_t k = 0; k < 3; k++)
@@ -147,8 +147,8 @@ static int choose_embree(struct measure *m, struct sh_err *err)
     }
     m->out->embree_width = best_width;
     m->out->embree_feed = best_feed;
-    int rc = bench_embree_prepare(m->c->embree, best_width, best_feed, err);
-    if (rc == SH_OK) rc = bench_embree_prepare(m->c->fast, best_width, best_feed, err);
+    int rc = embree_alone_prepare(m->c->embree, best_width, best_feed, err);
+    if (rc == SH_OK) rc = embree_alone_prepare(m->c->fast, best_width, best_feed, err);
     return rc;
 }
 

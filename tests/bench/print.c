@@ -22,9 +22,24 @@ static void cpu_name(char *buf, size_t len)
     fclose(in);
 }
 
+static const char *isa(void)
+{
+#if defined(__x86_64__)
+    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") ? "avx512"
+           : __builtin_cpu_supports("avx2")                                        ? "avx2"
+           : __builtin_cpu_supports("avx")                                         ? "avx"
+           : __builtin_cpu_supports("sse4.2")                                      ? "sse4.2"
+                                                                                   : "sse2";
+#elif defined(__aarch64__)
+    return "neon";
+#else
+    return "other";
+#endif
+}
+
 static void embree_name(char buf[32])
 {
-    long v = bench_embree_version();
+    long v = RTC_VERSION;
     snprintf(buf, 32, "%ld.%ld.%ld", v / 10000, v / 100 % 100, v % 100);
 }
 
@@ -35,7 +50,7 @@ static void put_machine(struct json *json)
     embree_name(embree);
     json_open_object(json, "machine");
     json_string(json, "cpu", cpu);
-    json_string(json, "isa", bench_isa());
+    json_string(json, "isa", isa());
     json_int(json, "processors", sysconf(_SC_NPROCESSORS_ONLN));
     json_string(json, "embree", embree);
     json_close_object(json);
@@ -107,7 +122,7 @@ static void put_scene(struct json *json, const struct bench_scene_report *s)
     put_counters(json, "per_million", &r->counters, r->pulses);
     json_uint(json, "packet", s->info.packet);
     json_uint(json, "embree_packet", r->embree_width);
-    json_string(json, "embree_feed", r->embree_feed == BENCH_PREPARED ? "prepared" : "loaded");
+    json_string(json, "embree_feed", r->embree_feed == EMBREE_PREPARED ? "prepared" : "loaded");
     json_uint(json, "rounds", r->rounds);
     json_uint(json, "pulses", r->pulses);
     json_double(json, "load_s", s->load_s);
@@ -204,7 +219,7 @@ void bench_print_table(FILE *out, const struct bench_report *report)
     char cpu[128], embree[32];
     cpu_name(cpu, sizeof cpu);
     embree_name(embree);
-    fprintf(out, "%s, %s, Embree %s\n\n", cpu, bench_isa(), embree);
+    fprintf(out, "%s, %s, Embree %s\n\n", cpu, isa(), embree);
     if (report->n_scenes != 0) {
         fprintf(out, "Embree: million rays/s alone; cast, pipeline: speed of exact hits and of everything, "
                      "Embree alone = 1\n");

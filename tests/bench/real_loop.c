@@ -14,7 +14,7 @@
 enum { ROUNDS = 3, MAX_THREADS = 64, MIN_FRAMES = 4 };
 
 struct slice {
-    const struct bench_embree *e;
+    const struct embree_alone *e;
     const struct bench_result *one;
     uint32_t first, n, passes;
     const _Atomic int *signal; /* 0: wait, 1: go, -1: never mind */
@@ -27,7 +27,7 @@ static void *slice_main(void *arg)
     while ((signal = atomic_load(s->signal)) == 0)
         sched_yield();
     for (uint32_t i = 0; signal > 0 && i < s->passes; i++)
-        bench_embree_pass(s->e, s->one->embree_width, s->one->embree_feed, s->first, s->n);
+        embree_alone_pass(s->e, s->one->embree_width, s->one->embree_feed, s->first, s->n);
     return NULL;
 }
 
@@ -173,8 +173,8 @@ int bench_loop(const struct bench_case *c, const struct bench_result *one, uint3
     station->scale[0] = station->scale[1] = station->scale[2] = BENCH_SCALE_M;
     pose_heading(0.0, station->at.rotation);
     int rc = bench_georef(c->target, &station->georef, err);
-    if (rc == SH_OK) rc = bench_embree_rays(c->embree, c->rays->fx, c->rays->fy, c->rays->fz, c->rays->n, err);
-    if (rc == SH_OK) rc = bench_embree_prepare(c->embree, one->embree_width, one->embree_feed, err);
+    if (rc == SH_OK) rc = embree_alone_rays(c->embree, c->rays->fx, c->rays->fy, c->rays->fz, c->rays->n, err);
+    if (rc == SH_OK) rc = embree_alone_prepare(c->embree, one->embree_width, one->embree_feed, err);
     if (rc == SH_OK) rc = rounds(c, one, &site, frames, out, err);
     georef_free(station->georef);
     free(cfg);

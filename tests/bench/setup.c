@@ -12,6 +12,14 @@ int bench_georef(const struct bench_target *target, struct georef **out, struct 
     return georef_create(&spec, out, err);
 }
 
+int bench_embree(const struct scene *scene, const double origin_m[3], int robust, struct embree_alone *out,
+                 struct sh_err *err)
+{
+    struct embree_alone_spec spec = {.robust = robust, .range_max_m = (float)BENCH_RANGE_MAX_M};
+    memcpy(spec.origin_m, origin_m, sizeof spec.origin_m);
+    return embree_alone_create(scene, &spec, out, err);
+}
+
 void bench_setup(const struct bench_case *c, const struct georef *georef, struct cast_setup *setup)
 {
     *setup = (struct cast_setup){.bvh = c->bvh,

@@ -89,8 +89,9 @@ int generate_terrain(uint32_t n_triangles, double side_m, double rough_m, const 
         add_sheet(&b, cells, side_m, rough_m, 0.0, centre_m, key);
         add_sheet(&b, cells, side_m, rough_m, 0.3 * side_m, centre_m, key);
         add_walls(&b, cells);
-        rc = scene_from_arrays((const double(*)[3])b.vertex, b.n_vertices, (const uint32_t(*)[3])b.triangle,
-                               b.n_triangles, NULL, NULL, 0, out, err);
+        rc = scene_from_arrays(&(struct scene_arrays){(const double(*)[3])b.vertex, b.n_vertices,
+                                                      (const uint32_t(*)[3])b.triangle, b.n_triangles, NULL, NULL, 0},
+                               out, err);
     }
     free(b.vertex);
     free(b.triangle);

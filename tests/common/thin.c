@@ -34,8 +34,10 @@ static int finish(struct builder *b, int rc, uint32_t n_surfaces, struct scene *
         surface[i].material[0] = (char)('a' + i % 26);
     }
     if (rc == SH_OK)
-        rc = scene_from_arrays((const double(*)[3])b->vertex, b->n_vertices, (const uint32_t(*)[3])b->triangle,
-                               b->n_triangles, b->label, surface, n_surfaces, out, err);
+        rc = scene_from_arrays(&(struct scene_arrays){(const double(*)[3])b->vertex, b->n_vertices,
+                                                      (const uint32_t(*)[3])b->triangle, b->n_triangles, b->label,
+                                                      surface, n_surfaces},
+                               out, err);
     free(surface);
     free(b->vertex);
     free(b->triangle);

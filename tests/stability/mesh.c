@@ -198,8 +198,10 @@ struct scene *mesh_scene(const struct mesh *mesh)
     struct scene_surface surface[MESH_LABELS] = {{.object = ""}};
     struct scene *scene;
     struct sh_err err;
-    if (scene_from_arrays((const double(*)[3])mesh->vertex, mesh->n_vertices, (const uint32_t(*)[3])mesh->triangle,
-                          mesh->n_triangles, mesh->label, surface, MESH_LABELS, &scene, &err) != SH_OK)
+    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])mesh->vertex, mesh->n_vertices,
+                                                 (const uint32_t(*)[3])mesh->triangle, mesh->n_triangles, mesh->label,
+                                                 surface, MESH_LABELS},
+                          &scene, &err) != SH_OK)
         fail_msg("%s", err.text);
     return scene;
 }

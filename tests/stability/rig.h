@@ -5,7 +5,7 @@
 #include <stdint.h>
 
 #include "core/cast.h"
-#include "tests/accuracy/reference.h"
+#include "tests/common/reference.h"
 #include "tests/stability/mesh.h"
 #include "tests/stability/naive.h"
 #include "tests/stability/table.h"

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "tests/common/generate.h"
-#include "tests/accuracy/beam_reference.h"
+#include "tests/common/beam_reference.h"
 #include "tests/stability/table.h"
 
 #ifdef SH_SANITIZE

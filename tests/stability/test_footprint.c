@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "tests/common/beam_reference.h"
 #include "tests/common/hits.h"
-#include "tests/accuracy/beam_reference.h"
 #include "tests/stability/table.h"
 
 enum { NAIVE_RINGS = 3, NAIVE_ROOM = 64 };
@@ -57,7 +57,8 @@ static struct scene *ground(double height_m)
     static const uint32_t triangle[2][3] = {{0, 1, 2}, {0, 2, 3}};
     struct scene *scene;
     struct sh_err err;
-    if (scene_from_arrays(vertex, 4, triangle, 2, NULL, NULL, 0, &scene, &err) != 0) fail_msg("%s", err.text);
+    if (scene_from_arrays(&(struct scene_arrays){vertex, 4, triangle, 2, NULL, NULL, 0}, &scene, &err) != 0)
+        fail_msg("%s", err.text);
     return scene;
 }
 
@@ -130,7 +131,8 @@ static struct scene *door(double step_m)
         vertex[v][1] = DOOR_M + back * step_m;
         vertex[v][2] = v % 4 >= 2 ? 5.0 : -5.0;
     }
-    if (scene_from_arrays((const double(*)[3])vertex, 8, triangle, 4, NULL, NULL, 0, &scene, &err) != 0)
+    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 8, triangle, 4, NULL, NULL, 0}, &scene,
+                          &err) != 0)
         fail_msg("%s", err.text);
     return scene;
 }

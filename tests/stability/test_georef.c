@@ -1,12 +1,13 @@
 /* Where common shortcuts on the way to the Earth fail: poles, the antimeridian, zones' borders and exceptions, heights,
- * distance from the anchor. Truth is tests/geodesy.h, which shares nothing with GeographicLib. */
+ * distance from the anchor. Truth is tests/common/geodesy.h, which shares nothing with GeographicLib. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "core/geoframe.h"
+#include "core/locate.h"
 #include "core/plan.h"
-#include "tests/geodesy.h"
+#include "tests/common/geodesy.h"
 #include "tests/stability/rig.h"
 
 enum { POINTS = 300 };
@@ -48,14 +49,14 @@ static void order1(const struct georef_spec *spec, const struct georef *georef, 
     struct georef *own;
     if (georef_create(spec, &own, NULL) != SH_OK) fail_msg("no georef");
     assert_int_equal(georef_set_method(own, GEOREF_ORDER1, NULL), SH_OK);
-    georef_forward(own, 1, &d[0], &d[1], &d[2], &out[0], &out[1], &out[2]);
+    georef_forward(own, 1, (struct vec3_in){&d[0], &d[1], &d[2]}, (struct vec3_out){&out[0], &out[1], &out[2]});
     georef_free(own);
     (void)georef;
 }
 
 static void exactly(const struct georef *georef, const double d[3], double out[3])
 {
-    georef_forward(georef, 1, &d[0], &d[1], &d[2], &out[0], &out[1], &out[2]);
+    georef_forward(georef, 1, (struct vec3_in){&d[0], &d[1], &d[2]}, (struct vec3_out){&out[0], &out[1], &out[2]});
 }
 
 /* Positions as floats. */
@@ -94,7 +95,8 @@ static void subtract_longitude(const struct georef_spec *spec, const struct geor
 /* Each point in the zone where it lies. */
 static void zone_by_point(const struct georef_spec *spec, const struct georef *georef, const double d[3], double out[3])
 {
-    double anchor[3], grid[3];
+    double anchor[3];
+    struct locate_grid grid;
     struct georef_spec geodetic = *spec;
     struct georef *other;
     geodetic.crs = GEOREF_GEODETIC;
@@ -103,9 +105,10 @@ static void zone_by_point(const struct georef_spec *spec, const struct georef *g
     exactly(other, d, out);
     georef_free(other);
     const struct georef_place at = {spec->lat_deg + out[0], spec->lon_deg + out[1], spec->height_m + out[2]};
-    assert_int_equal(georef_geodetic_to_utm(&at, 0, NULL, NULL, grid, NULL), SH_OK);
-    for (int k = 0; k < 3; k++)
-        out[k] = grid[k] - anchor[k];
+    assert_int_equal(locate_in_grid(&at, 0, &grid, NULL), SH_OK);
+    out[0] = grid.easting_m - anchor[0];
+    out[1] = grid.northing_m - anchor[1];
+    out[2] = at.height_m - anchor[2];
 }
 
 /* Six degrees each, everywhere. */

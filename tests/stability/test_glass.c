@@ -29,7 +29,8 @@ static struct scene *make_window(double away_m, double incidence_rad, const doub
             vertex[4 * p + v][1] = at[1] + away_m + behind[p] * c - across * s;
             vertex[4 * p + v][2] = at[2] + (v >= 2 ? half_m : -half_m);
         }
-    if (scene_from_arrays((const double(*)[3])vertex, 12, triangle, 6, label, surface, 2, &scene, &err) != SH_OK)
+    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 12, triangle, 6, label, surface, 2},
+                          &scene, &err) != SH_OK)
         fail_msg("%s", err.text);
     return scene;
 }

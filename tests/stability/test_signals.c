@@ -35,7 +35,8 @@ static struct scene *planes(const double *away_m, uint32_t n)
             label[2 * p + t] = (uint16_t)p;
         }
     }
-    if (scene_from_arrays((const double(*)[3])vertex, 4 * n, (const uint32_t(*)[3])triangle, 2 * n, label, surface, n,
+    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 4 * n, (const uint32_t(*)[3])triangle,
+                                                 2 * n, label, surface, n},
                           &scene, &err) != SH_OK)
         fail_msg("%s", err.text);
     return scene;

@@ -24,35 +24,12 @@
  * below ten such steps. GeographicLib states 5 nm for each direction of UTM. */
 #define TOL_M 1e-8
 
-static inline struct georef *make(enum georef_crs crs, double lat_deg, double lon_deg, double height_m, int zone)
-{
-    struct georef_spec spec = {.crs = crs,
-                               .station_m = {10, 20, 30},
-                               .lat_deg = lat_deg,
-                               .lon_deg = lon_deg,
-                               .height_m = height_m,
-                               .utm_zone = zone};
-    struct georef *georef = NULL;
-    struct sh_err err = {0, ""};
-    if (georef_create(&spec, &georef, &err) != SH_OK) fail_msg("%s", err.text);
-    return georef;
-}
+struct georef *make(enum georef_crs crs, double lat_deg, double lon_deg, double height_m, int zone);
 
-static inline void expect_near(double got, double want, double tolerance)
-{
-    if (!(fabs(got - want) <= tolerance)) fail_msg("%.12g instead of %.12g, off by %.3g", got, want, got - want);
-}
+void expect_near(double got, double want, double tolerance);
 
-static inline void expect_point(const double got[3], double x, double y, double z, double tolerance)
-{
-    expect_near(got[0], x, tolerance);
-    expect_near(got[1], y, tolerance);
-    expect_near(got[2], z, tolerance);
-}
+void expect_point(const double got[3], double x, double y, double z, double tolerance);
 
-static inline void forward_one(const struct georef *georef, const double d[3], double out[3])
-{
-    georef_forward(georef, 1, &d[0], &d[1], &d[2], &out[0], &out[1], &out[2]);
-}
+void forward_one(const struct georef *georef, const double d[3], double out[3]);
 
 #endif

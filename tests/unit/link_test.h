@@ -27,130 +27,31 @@ struct bench {
     int n_queue;
 };
 
-static inline int64_t now_ms(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
-}
+int64_t now_ms(void);
 
-static inline struct bench bench_open(const struct link_spec *spec)
-{
-    struct bench bench = {.ops = link_ops_get(spec->type), .wake = -1};
-    struct sh_err err = {0, ""};
-    if (bench.ops->open(spec, &bench.link, &err) != SH_OK) fail_msg("%s", err.text);
-    return bench;
-}
+struct bench bench_open(const struct link_spec *spec);
 
-static inline void bench_close(struct bench *bench)
-{
-    bench->ops->close(bench->link);
-}
+void bench_close(struct bench *bench);
 
-static inline int bench_poll(struct bench *bench, uint32_t want_write, int timeout_ms)
-{
-    int room = (int)(sizeof bench->queue / sizeof bench->queue[0]) - bench->n_queue;
-    int n = bench->ops->poll(bench->link, bench->wake, want_write, timeout_ms, bench->queue + bench->n_queue, room);
-    assert_true(n >= 0 && n <= room);
-    bench->n_queue += n;
-    return n;
-}
+int bench_poll(struct bench *bench, uint32_t want_write, int timeout_ms);
 
 /* Takes the first event of the queue; only levels (READABLE, WRITABLE) before the one waited for are passed
  * over. */
-static inline struct link_event bench_expect(struct bench *bench, enum link_event_kind kind, uint32_t want_write)
-{
-    const int64_t end_ms = now_ms() + DEADLINE_MS;
-    for (;;) {
-        while (bench->n_queue > 0) {
-            struct link_event event = bench->queue[0];
-            memmove(bench->queue, bench->queue + 1, (size_t)--bench->n_queue * sizeof event);
-            if (event.kind == kind) return event;
-            if (event.kind != LINK_READABLE && event.kind != LINK_WRITABLE)
-                fail_msg("event %d of session %d (%s) instead of %d", event.kind, event.session, event.peer, kind);
-        }
-        if (now_ms() > end_ms) fail_msg("no event %d in time", kind);
-        bench_poll(bench, want_write, 1000);
-    }
-}
+struct link_event bench_expect(struct bench *bench, enum link_event_kind kind, uint32_t want_write);
 
-static inline void bench_write_all(struct bench *bench, int session, const void *data, size_t len)
-{
-    const char *at = data;
-    while (len > 0) {
-        ssize_t n = bench->ops->write(bench->link, session, at, len);
-        assert_true(n >= 0);
-        at += n;
-        len -= (size_t)n;
-        if (len > 0) bench_expect(bench, LINK_WRITABLE, 1u << session);
-    }
-}
+void bench_write_all(struct bench *bench, int session, const void *data, size_t len);
 
-static inline void bench_read_all(struct bench *bench, int session, void *data, size_t len)
-{
-    char *at = data;
-    while (len > 0) {
-        ssize_t n = bench->ops->read(bench->link, session, at, len);
-        assert_true(n >= 0);
-        at += n;
-        len -= (size_t)n;
-        if (len > 0 && n == 0) bench_expect(bench, LINK_READABLE, 0);
-    }
-}
+void bench_read_all(struct bench *bench, int session, void *data, size_t len);
 
-static inline void fd_read_all(int fd, void *data, size_t len)
-{
-    char *at = data;
-    while (len > 0) {
-        ssize_t n = read(fd, at, len);
-        assert_true(n > 0);
-        at += n;
-        len -= (size_t)n;
-    }
-}
+void fd_read_all(int fd, void *data, size_t len);
 
 /* Writes until the link takes no more, and it is calm: with a reader that does not read, poll must wait.
  * Between two refusals the kernel may still move bytes to the reader's side, so that there is room again a
  * few times. Returns the bytes written. */
-static inline size_t bench_fill(struct bench *bench, int session)
-{
-    static char data[44000];
-    size_t total = 0;
-    for (int calm = 0, rounds = 0; calm < 3; rounds++) {
-        ssize_t n;
-        assert_true(rounds < 1000);
-        while ((n = bench->ops->write(bench->link, session, data, sizeof data)) > 0)
-            total += (size_t)n;
-        assert_int_equal(n, 0);
-        const int64_t start_ms = now_ms();
-        bench->n_queue = 0;
-        if (bench_poll(bench, 1u << session, 50) > 0) {
-            assert_int_equal(bench->queue[0].kind, LINK_WRITABLE);
-            calm = 0;
-        } else if (now_ms() - start_ms >= 49) {
-            calm++;
-        }
-        bench->n_queue = 0;
-    }
-    return total;
-}
+size_t bench_fill(struct bench *bench, int session);
 
-static inline void fd_drain(int fd, size_t len)
-{
-    static char data[65536];
-    while (len > 0) {
-        ssize_t n = read(fd, data, len < sizeof data ? len : sizeof data);
-        assert_true(n > 0);
-        len -= (size_t)n;
-    }
-}
+void fd_drain(int fd, size_t len);
 
-static inline char *test_dir(void)
-{
-    static char dir[64];
-    snprintf(dir, sizeof dir, "/tmp/test_link.XXXXXX");
-    assert_non_null(mkdtemp(dir));
-    return dir;
-}
+char *test_dir(void);
 
 #endif

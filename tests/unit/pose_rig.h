@@ -8,13 +8,18 @@
 #include <string.h>
 
 #include "core/pose.h"
-#include "tests/unit/cases.h"
+#include "tests/common/cases.h"
 
-static const double DEG = M_PI / 180.0;
+extern const double DEG;
 
-static inline double distance(const double a[3], const double b[3])
+double distance(const double a[3], const double b[3]);
+
+/* The knots with the rules that the program uses. */
+static inline int find_path(const struct trajectory *tr, double start_s, double end_s, const struct pose *mount,
+                            struct pose_path *out, struct sh_err *err)
 {
-    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
+    const struct pose_knot_rules rules = {start_s, end_s, 1e-4, 10000000, 0.01};
+    return trajectory_knots(tr, mount, &rules, out, err);
 }
 
 #endif

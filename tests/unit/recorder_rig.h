@@ -20,61 +20,20 @@
 
 enum { RIG_MAX_POINTS = 4096 };
 
-static char rig_dir[] = "/tmp/test_recorder_XXXXXX";
-static char rig_shs[64];
-static FILE *rig_stream;
-static char rig_notes[2048]; /* what the recorder told, a line each */
+extern char rig_shs[64];
+extern FILE *rig_stream;
+extern char rig_notes[2048]; /* what the recorder told, a line each */
 
-static inline void rig_put(const uint8_t *frame, size_t len)
-{
-    assert_true(len > 0);
-    assert_int_equal(fwrite(frame, 1, len, rig_stream), len);
-}
+void rig_put(const uint8_t *frame, size_t len);
 
-static inline void rig_begin(void)
-{
-    rig_stream = fopen(rig_shs, "wb");
-    assert_non_null(rig_stream);
-}
+void rig_begin(void);
 
 /* 1 kHz, so that a pulse is a millisecond. Polar: 3600 counts a turn, millimetres. */
-static inline void rig_descriptor(int geo, uint32_t scan)
-{
-    static uint8_t out[1024];
-    struct native_descriptor d = {.idn = "Maker,<Model> & Co,SN1,1.0",
-                                  .profile = "model",
-                                  .scan = scan,
-                                  .layout = geo ? NATIVE_GEO : NATIVE_POLAR,
-                                  .prr_uhz = 1000000000,
-                                  .mirror_counts_per_turn = 3600,
-                                  .pan_counts_per_turn = 3600,
-                                  .range_scale_m = 1e-3};
-    rig_put(out, native_encode_descriptor(out, sizeof out, &d, 0, 0));
-}
+void rig_descriptor(int geo, uint32_t scan);
 
-/* Heading 90 degrees: the head's y axis (forward) is the scene's x axis, its x axis (right) the scene's -y. */
-static const double RIG_ROTATION[9] = {0, 1, 0, -1, 0, 0, 0, 0, 1};
+struct native_anchor rig_anchor_of(uint32_t crs, uint32_t epsg, uint32_t station);
 
-static inline struct native_anchor rig_anchor_of(uint32_t crs, uint32_t epsg, uint32_t station)
-{
-    struct native_anchor a = {.crs = crs,
-                              .epsg = epsg,
-                              .station = station,
-                              .anchor = {500000.25, 5e6, 400.125},
-                              .scale_m = 1e-3,
-                              .lat_deg = 45,
-                              .lon_deg = 9, /* the central meridian of zone 32: no convergence */
-                              .height_m = 400.125,
-                              .station_m = {10, 20, 30}};
-    memcpy(a.rotation, RIG_ROTATION, sizeof a.rotation);
-    return a;
-}
-
-static inline void rig_anchor(const struct native_anchor *anchor)
-{
-    static uint8_t out[1024];
-    rig_put(out, native_encode_anchor(out, sizeof out, anchor, 0, 0));
-}
+void rig_anchor(const struct native_anchor *anchor);
 
 struct rig_point {
     int32_t a, b, c;
@@ -84,152 +43,31 @@ struct rig_point {
 };
 
 /* Points of one line, whose first pulse is line_pulse0; a millisecond from pulse to pulse. */
-static inline void rig_points(uint32_t line, uint64_t line_pulse0, uint64_t pulse0, const struct rig_point *p,
-                              uint32_t n)
-{
-    static uint8_t out[1 << 17], echo[RIG_MAX_POINTS];
-    static uint32_t a[RIG_MAX_POINTS], b[RIG_MAX_POINTS], c[RIG_MAX_POINTS], dt[RIG_MAX_POINTS];
-    static int16_t refl[RIG_MAX_POINTS];
-    static uint16_t label[RIG_MAX_POINTS];
-    uint32_t pulses = 0;
-    for (uint32_t i = 0; i < n; i++) {
-        if (p[i].echo <= 1) pulses++;
-        a[i] = (uint32_t)p[i].a;
-        b[i] = (uint32_t)p[i].b;
-        c[i] = (uint32_t)p[i].c;
-        dt[i] = (pulses - 1) % 16 * 1000000; /* 24 bits hold 16 ms */
-        refl[i] = p[i].refl_cdb;
-        label[i] = p[i].label;
-        echo[i] = (uint8_t)(p[i].count << 4 | p[i].echo);
-    }
-    struct line_block block = {.line = line,
-                               .pulse0 = pulse0,
-                               .n_pulses = pulses,
-                               .t0_ns = (int64_t)pulse0 * 1000000,
-                               .line_t0_ns = (int64_t)line_pulse0 * 1000000,
-                               .n_points = n,
-                               .dt_ns = dt,
-                               .a = a,
-                               .b = b,
-                               .c = c,
-                               .refl_cdb = refl,
-                               .echo = echo,
-                               .label = label};
-    rig_put(out, native_encode_points(out, sizeof out, &block, 0));
-}
-
-static inline void rig_warn(void *ctx, const char *text)
-{
-    (void)ctx;
-    size_t at = strlen(rig_notes);
-    snprintf(rig_notes + at, sizeof rig_notes - at, "%s\n", text);
-}
+void rig_points(uint32_t line, uint64_t line_pulse0, uint64_t pulse0, const struct rig_point *p, uint32_t n);
 
 /* keep: RIG_KEEP_ALWAYS also after a failure, as `record` does with what has come. */
 enum { RIG_KEEP = 1, RIG_KEEP_ALWAYS = 2 };
 
 /* Records the stream; the code of the call that failed, or of close. */
-static inline int rig_record(const char *path, struct recorder_options options, int keep, struct sh_err *err)
-{
-    static const struct sh_report report = {NULL, rig_warn, NULL};
-    struct scanhead *sh;
-    struct scanhead_frame frame;
-    struct recorder *rec;
-    if (rig_stream != NULL) fclose(rig_stream);
-    rig_stream = NULL;
-    rig_notes[0] = 0;
-    options.report = &report;
-    const struct recorder_ops *ops = recorder_find(path, err);
-    assert_non_null(ops);
-    assert_int_equal(scanhead_open(rig_shs, &sh, NULL, 0), 0);
-    int rc = recorder_open(ops, path, &options, &rec, err);
-    if (rc == 0) {
-        while (rc == 0 && scanhead_next(sh, &frame, -1) == 0)
-            rc = recorder_frame(rec, sh, &frame, err);
-        int closed = recorder_close(rec, keep == RIG_KEEP_ALWAYS || (rc == 0 && keep), rc == 0 ? err : NULL);
-        if (rc == 0) rc = closed;
-    }
-    scanhead_close(sh);
-    return rc;
-}
+int rig_record(const char *path, struct recorder_options options, int keep, struct sh_err *err);
 
-static inline const char *rig_path(const char *name)
-{
-    static char path[4][128];
-    static int turn;
-    turn = (turn + 1) % 4;
-    snprintf(path[turn], sizeof path[turn], "%s/%s", rig_dir, name);
-    return path[turn];
-}
+const char *rig_path(const char *name);
 
 /* The whole file, NUL-terminated; free() it. */
-static inline uint8_t *rig_read(const char *path, size_t *len)
-{
-    FILE *in = fopen(path, "rb");
-    assert_non_null(in);
-    uint8_t *data = calloc(1, 1 << 22);
-    *len = fread(data, 1, (1 << 22) - 1, in);
-    fclose(in);
-    return data;
-}
+uint8_t *rig_read(const char *path, size_t *len);
 
-static inline uint64_t rig_uint(const uint8_t *p, int bytes)
-{
-    uint64_t v = 0;
-    for (int i = bytes - 1; i >= 0; i--)
-        v = v << 8 | p[i];
-    return v;
-}
+uint64_t rig_uint(const uint8_t *p, int bytes);
 
-static inline int32_t rig_int32(const uint8_t *p)
-{
-    return (int32_t)(uint32_t)rig_uint(p, 4);
-}
+int32_t rig_int32(const uint8_t *p);
 
-static inline double rig_double(const uint8_t *p)
-{
-    uint64_t v = rig_uint(p, 8);
-    double d;
-    memcpy(&d, &v, 8);
-    return d;
-}
+double rig_double(const uint8_t *p);
 
 /* A stream that fails for want of space leaves nothing behind: a limit on the file's size stands for the full disk. */
-static inline void rig_check_disk_full(const char *path, rlim_t size)
-{
-    struct sh_err err = {0};
-    struct rlimit old, small;
-    char part[160];
-    void (*was)(int) = signal(SIGXFSZ, SIG_IGN);
-    fclose(rig_stream);
-    rig_stream = NULL;
-    getrlimit(RLIMIT_FSIZE, &old);
-    small = (struct rlimit){size, old.rlim_max};
-    assert_int_equal(setrlimit(RLIMIT_FSIZE, &small), 0);
-    int rc = rig_record(path, (struct recorder_options){0}, 1, &err);
-    setrlimit(RLIMIT_FSIZE, &old);
-    signal(SIGXFSZ, was);
-    snprintf(part, sizeof part, "%s.part", path);
-    assert_int_equal(rc, SH_EIO);
-    assert_non_null(strstr(err.text, path));
-    assert_int_equal(access(path, F_OK), -1);
-    assert_int_equal(access(part, F_OK), -1);
-}
+void rig_check_disk_full(const char *path, rlim_t size);
 
-static inline int rig_set_up(void **state)
-{
-    (void)state;
-    if (mkdtemp(rig_dir) == NULL) return -1;
-    snprintf(rig_shs, sizeof rig_shs, "%s/in.shs", rig_dir);
-    return 0;
-}
+int rig_set_up(void **state);
 
 /* A file that a test did not remove makes it fail. */
-static inline int rig_tear_down(void **state)
-{
-    (void)state;
-    unlink(rig_shs);
-    return rmdir(rig_dir);
-}
+int rig_tear_down(void **state);
 
 #endif

@@ -15,108 +15,34 @@
 
 #include "core/scene.h"
 
-static char folder[64];
-static char path[128];
-static char warnings[4096]; /* of the last load, a line each */
-static int n_warnings;
+extern char folder[64];
+extern char path[128];
+extern char warnings[4096]; /* of the last load, a line each */
+extern int n_warnings;
 
-static inline int make_folder(void **state)
-{
-    (void)state;
-    strcpy(folder, "/tmp/scanhead-scene-XXXXXX");
-    return mkdtemp(folder) == NULL ? -1 : 0;
-}
+int make_folder(void **state);
 
-static inline int remove_folder(void **state)
-{
-    (void)state;
-    return rmdir(folder);
-}
+int remove_folder(void **state);
 
 /* The path is good until the next call. */
-static inline const char *write_file(const char *name, const void *data, size_t len)
-{
-    snprintf(path, sizeof path, "%s/%s", folder, name);
-    FILE *f = fopen(path, "wb");
-    assert_non_null(f);
-    assert_int_equal(fwrite(data, 1, len, f), len);
-    assert_int_equal(fclose(f), 0);
-    return path;
-}
+const char *write_file(const char *name, const void *data, size_t len);
 
-static inline const char *write_text(const char *name, const char *text)
-{
-    return write_file(name, text, strlen(text));
-}
+const char *write_text(const char *name, const char *text);
 
-static inline void keep_warning(void *ctx, const char *text)
-{
-    (void)ctx;
-    n_warnings++;
-    strncat(warnings, text, sizeof warnings - strlen(warnings) - 2);
-    strcat(warnings, "\n");
-}
+void keep_warning(void *ctx, const char *text);
 
-static inline int load_spec(const struct scene_mesh_spec *spec, double tolerance_m, struct scene **out,
-                            struct sh_err *err)
-{
-    const struct sh_report report = {.warn = keep_warning};
-    n_warnings = 0;
-    warnings[0] = '\0';
-    err->text[0] = '\0';
-    return scene_load(spec, 1, tolerance_m, &report, out, err);
-}
+int load_spec(const struct scene_mesh_spec *spec, double tolerance_m, struct scene **out, struct sh_err *err);
 
 /* As it is: z up, metres, at the origin, float coordinates good to a millimetre. */
-static inline struct scene *load(const char *file)
-{
-    struct scene *scene;
-    struct sh_err err;
-    const struct scene_mesh_spec spec = {.file = file, .scale = 1};
-    int rc = load_spec(&spec, 1e-3, &scene, &err);
-    if (rc != SH_OK) fail_msg("%s", err.text);
-    return scene;
-}
+struct scene *load(const char *file);
 
-static inline struct scene *load_text(const char *name, const char *text)
-{
-    struct scene *scene = load(write_text(name, text));
-    unlink(path);
-    return scene;
-}
+struct scene *load_text(const char *name, const char *text);
 
 /* The load has to fail with a line of text that names the file and holds `expected`. */
-static inline void refuse(const char *name, const void *data, size_t len, const char *expected)
-{
-    struct scene *scene;
-    struct sh_err err;
-    const struct scene_mesh_spec spec = {.file = write_file(name, data, len), .scale = 1};
-    int rc = load_spec(&spec, 1e-3, &scene, &err);
-    unlink(path);
-    if (rc != SH_EINPUT || scene != NULL) fail_msg("%s, for '%s': returned %d", name, expected, rc);
-    if (strstr(err.text, name) == NULL || strstr(err.text, expected) == NULL || strchr(err.text, '\n') != NULL)
-        fail_msg("'%s' doesn't say '%s' of %s in one line", err.text, expected, name);
-}
+void refuse(const char *name, const void *data, size_t len, const char *expected);
 
-static inline double triangle_area(const struct scene *s, uint32_t i)
-{
-    const double *a = s->vertex_m[s->triangle[i][0]], *b = s->vertex_m[s->triangle[i][1]],
-                 *c = s->vertex_m[s->triangle[i][2]];
-    double u[3], v[3];
-    for (int k = 0; k < 3; k++) {
-        u[k] = b[k] - a[k];
-        v[k] = c[k] - a[k];
-    }
-    double n[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
-    return __builtin_sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]) / 2;
-}
+double triangle_area(const struct scene *s, uint32_t i);
 
-static inline double total_area(const struct scene *s)
-{
-    double area = 0;
-    for (uint32_t i = 0; i < s->n_triangles; i++)
-        area += triangle_area(s, i);
-    return area;
-}
+double total_area(const struct scene *s);
 
 #endif

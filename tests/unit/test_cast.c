@@ -87,7 +87,8 @@ static void ranges_to_a_tilted_plane_are_exact_to_the_planes_tilt(void **state)
         struct scene *scene;
         struct sh_err err;
         static const double origin[3] = {0};
-        if (scene_from_arrays((const double(*)[3])vertex, 4, triangle, 2, NULL, NULL, 0, &scene, &err) != 0)
+        if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 4, triangle, 2, NULL, NULL, 0}, &scene,
+                              &err) != 0)
             fail_msg("%s", err.text);
         struct cast_rig *rig = cast_rig_open(scene, origin);
         double d[3], range;
@@ -261,7 +262,8 @@ static void limits_block_or_swallow_the_echo(void **state)
     } limit[] = {{0, 10, 1}, {1.001, 10, 0}, {0.999, 10, 1}, {1, 1, 1}, {0, 0.999, 0}, {2, 6, 0}, {0, 1.001, 1}};
     struct scene *scene;
     struct sh_err err;
-    if (scene_from_arrays(vertex, 8, triangle, 4, NULL, NULL, 0, &scene, &err) != 0) fail_msg("%s", err.text);
+    if (scene_from_arrays(&(struct scene_arrays){vertex, 8, triangle, 4, NULL, NULL, 0}, &scene, &err) != 0)
+        fail_msg("%s", err.text);
     struct cast_rig *rig = cast_rig_open(scene, origin);
     struct schedule_line line;
     rig->spec.pan_udeg_s = 0;

@@ -105,7 +105,8 @@ static struct scene *make_house(const double shift_m[3])
     for (int i = 0; i < 4 * PLATES + 4; i++)
         for (int k = 0; k < 3; k++)
             v[i][k] += shift_m[k];
-    if (scene_from_arrays((const double(*)[3])v, 4 * PLATES + 4, (const uint32_t(*)[3])t, 2 * PLATES + 2, NULL, NULL, 0,
+    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])v, 4 * PLATES + 4, (const uint32_t(*)[3])t,
+                                                 2 * PLATES + 2, NULL, NULL, 0},
                           &scene, &err) != SH_OK)
         fail_msg("%s", err.text);
     return scene;
@@ -172,7 +173,9 @@ static void floors_are_ordered_exactly(void **state)
             memcpy(v[i], p, sizeof p);
         }
         struct scene *scene = NULL;
-        assert_int_equal(scene_from_arrays((const double(*)[3])v, 6, t, 2, NULL, NULL, 0, &scene, &err), SH_OK);
+        assert_int_equal(
+            scene_from_arrays(&(struct scene_arrays){(const double(*)[3])v, 6, t, 2, NULL, NULL, 0}, &scene, &err),
+            SH_OK);
         for (int i = 0; i < 50; i++) {
             const double from[3] = {0.1 * i - 2, 0.07 * i - 2, 43};
             assert_int_equal(cast_floor(scene, from, down, &range_m, &err), SH_OK);

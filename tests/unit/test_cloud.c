@@ -113,8 +113,8 @@ static void check_points(struct cloud c)
         assert_int_equal(c.echo[i], POINT[i].echo);
     }
     assert_int_equal(n_warnings, 2);
-    assert_non_null(strstr(warnings, "element 'camera' (1 of it) passed over"));
-    assert_non_null(strstr(warnings, "element 'face' (1 of it) passed over"));
+    assert_non_null(strstr(warnings, "element 'camera' (1 of it) ignored"));
+    assert_non_null(strstr(warnings, "element 'face' (1 of it) ignored"));
     cloud_free(&c);
 }
 

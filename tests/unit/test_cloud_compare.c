@@ -23,7 +23,8 @@ static struct scene *make_plate(void)
                                                     {.object = "floor", .material = "pine"}};
     struct scene *s;
     struct sh_err err;
-    if (scene_from_arrays(v, 4, t, 2, label, surface, 3, &s, &err) != SH_OK) fail_msg("%s", err.text);
+    if (scene_from_arrays(&(struct scene_arrays){v, 4, t, 2, label, surface, 3}, &s, &err) != SH_OK)
+        fail_msg("%s", err.text);
     return s;
 }
 
@@ -127,7 +128,8 @@ static void check_crs(enum georef_crs crs, int epsg)
         for (int k = 0; k < 3; k++)
             d[k] = p_prcs[i][k] - station_m[k];
         georef_anchor(georef[station[i] - 1], anchor);
-        georef_forward(georef[station[i] - 1], 1, &d[0], &d[1], &d[2], &d[0], &d[1], &d[2]);
+        georef_forward(georef[station[i] - 1], 1, (struct vec3_in){&d[0], &d[1], &d[2]},
+                       (struct vec3_out){&d[0], &d[1], &d[2]});
         for (int k = 0; k < 3; k++)
             xyz[i][k] = anchor[k] + d[k];
     }

@@ -6,7 +6,7 @@
 static void malformed_configurations_are_refused(void **state)
 {
     (void)state;
-    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+    for (size_t i = 0; i < n_bad; i++) {
         char start[256];
         int code = bad[i].old == NULL ? load_text(bad[i].with) : load_edited(bad[i].old, bad[i].with);
         int n = snprintf(start, sizeof start, "%s:%d: ", config_path, bad[i].line);
@@ -149,7 +149,8 @@ static void defaults_are_those_of_the_table(void **state)
     assert_int_equal(cfg->link[0].max_sessions, 4);
     assert_int_equal(cfg->noise.range, RANGE_NOISE_OFF);
     assert_int_equal(cfg->noise.seed, 1);
-    assert_true(cfg->loop.tick_hz == 1000 && cfg->loop.ahead_ms == 64 && cfg->loop.queue_ms == 250 && cfg->loop.late_ms == 100);
+    assert_true(cfg->loop.tick_hz == 1000 && cfg->loop.ahead_ms == 64 && cfg->loop.queue_ms == 250 &&
+                cfg->loop.late_ms == 100);
     assert_int_equal(cfg->loop.threads, 0);
     assert_int_equal(cfg->loop.pace, PACE_REALTIME);
     assert_string_equal(cfg->time.epoch, "none");

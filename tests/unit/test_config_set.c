@@ -26,7 +26,7 @@ static void set_appends_elements(void **state)
     (void)state;
     static const char *const sets[] = {"links[1].path=out.bin", "links[1].type=file", "stations.1.position_m=0,0,2",
                                        "head.station=2",        "head.station=1",     "head.station=2"};
-    write_file(config_path, base, sizeof base - 1);
+    write_file(config_path, base, strlen(base));
     assert_loads(load_sets(sets, 6));
     assert_int_equal(cfg->n_links, 2);
     assert_int_equal(cfg->link[1].type, LINK_FILE);
@@ -95,7 +95,7 @@ static void a_full_list_takes_no_more(void **state)
         snprintf(text[i], sizeof text[i], "links[%d].type=null", i + 1);
         sets[i] = text[i];
     }
-    write_file(config_path, base, sizeof base - 1);
+    write_file(config_path, base, strlen(base));
     assert_loads(load_sets(sets, 7));
     assert_int_equal(cfg->n_links, 8);
     assert_int_equal(load_sets(sets, 8), SH_EINPUT);

@@ -1,5 +1,5 @@
 /* Surfaces, signal, zones and the ball, against closed forms. */
-#include "tests/unit/cases.h"
+#include "tests/common/cases.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 /* The device in device time: each tick claimed by the test, with no threads and no clock. */
-#include "tests/unit/cases.h"
+#include "tests/common/cases.h"
 #include "tests/unit/device_rig.h"
 
 #include <math.h>

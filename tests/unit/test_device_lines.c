@@ -1,6 +1,6 @@
 /* What the device's ticks hold, as a client adds it up: no pulse and no line is lost or doubled, however a
  * scan goes on and ends. */
-#include "tests/unit/cases.h"
+#include "tests/common/cases.h"
 #include "tests/unit/device_rig.h"
 
 #include "core/schedule.h"
@@ -28,18 +28,17 @@ static void tally_line(struct tally *tally, const struct native_line_end *end)
 /* Fills the tick just claimed and adds it up, as a client would that reads the frames. */
 static void tally_tick(struct rig *rig, struct tally *tally)
 {
-    const struct ring_slot *slot = rig_fill(rig);
+    const struct ring_tick *tick = rig_fill(rig);
     if (rig->work.scanning) {
         assert_true(rig->work.pulse0 == tally->pulse_next && rig->work.pulse_end >= rig->work.pulse0);
         tally->pulse_next = rig->work.pulse_end;
     }
-    tally->n_cast += slot->n_cast;
-    tally->n_fired += slot->n_fired;
+    tally->n_cast += tick->n_cast;
+    tally->n_fired += tick->n_fired;
     uint64_t first;
-    assert_true(worker_count_cast(&rig->work, &first) == slot->n_cast);
-    uint32_t frames = 0;
-    for (uint32_t at = 0; at < slot->len; frames++) {
-        const uint8_t *frame = slot->bytes + at, *payload = frame + NATIVE_HEADER_LEN;
+    assert_true(worker_count_cast(&rig->work, &first) == tick->n_cast);
+    for (uint32_t at = 0; at < tick->len;) {
+        const uint8_t *frame = tick->bytes + at, *payload = frame + NATIVE_HEADER_LEN;
         uint32_t len = (uint32_t)native_frame_len(frame) - NATIVE_HEADER_LEN;
         assert_int_equal(frame[0], NATIVE_SYNC);
         struct native_points points;
@@ -55,7 +54,6 @@ static void tally_tick(struct rig *rig, struct tally *tally)
         }
         at += NATIVE_HEADER_LEN + len;
     }
-    assert_int_equal(frames, slot->n_frames);
 }
 
 /* After the scan's end: every pulse was in a tick, in a line end, and, when cast, a point. */
@@ -163,9 +161,33 @@ static void settings_change_in_mid_scan(void **state)
     rig_close(rig);
 }
 
+/* Slots have room for a usual tick from the start. No tick of points alone takes more, and the longest takes three
+ * quarters of it: the room fits the rates that are set, not those of the profile. */
+static void a_usual_tick_is_what_a_slot_has_room_for(void **state)
+{
+    (void)state;
+    const char *const sets[] = {"head.prr_hz=300000"};
+    struct rig *rig = rig_open(&(struct device_options){.start = 1}, sets, 1);
+    const uint32_t usual = worker_usual_bytes(rig->site);
+    uint32_t longest = 0;
+    int ticks = 0;
+    assert_true(usual < worker_tick_bytes(rig->site) / 4); /* the profile's fastest rate is 2 MHz */
+    while (ticks < 200 && rig_claim(rig)) {
+        if (!rig->work.scanning || rig->work.describe || rig->work.surfaces_n != 0 || rig->work.telemetry ||
+            rig->work.n_events != 0)
+            continue;
+        const struct ring_tick *tick = rig_fill(rig);
+        assert_true(tick->len + tick->n_marks * sizeof *tick->mark <= usual + sizeof *tick->mark);
+        if (tick->len > longest) longest = tick->len;
+        ticks++;
+    }
+    assert_true(ticks == 200 && longest > usual / 4 * 3);
+    rig_close(rig);
+}
+
 /* From the slowest rates to the fastest and back: the pulses since the last cut come at the new rate, more
- * than a tick has. No slot overflows, and the head catches up. */
-static void a_jump_of_the_rates_fits_into_the_slots(void **state)
+ * than a tick has. No buffer overflows, and the head catches up. */
+static void a_jump_of_the_rates_fits_into_a_tick(void **state)
 {
     (void)state;
     struct rig *rig = rig_open(NULL, NULL, 0);
@@ -204,7 +226,7 @@ static void a_jump_of_the_rates_fits_into_the_slots(void **state)
 }
 
 /* The lines of one tick at the slowest loop and the fastest mirror that a profile may have: 100 a tick. */
-static void many_lines_a_tick_fit_into_the_slots(void **state)
+static void many_lines_fit_into_a_tick(void **state)
 {
     (void)state;
     static char profile[4096], fast[4096], path[96];
@@ -322,8 +344,9 @@ int main(void)
         cmocka_unit_test(a_whole_scan_adds_up),
         cmocka_unit_test(a_stop_ends_the_line_at_hand_as_partial),
         cmocka_unit_test(settings_change_in_mid_scan),
-        cmocka_unit_test(a_jump_of_the_rates_fits_into_the_slots),
-        cmocka_unit_test(many_lines_a_tick_fit_into_the_slots),
+        cmocka_unit_test(a_usual_tick_is_what_a_slot_has_room_for),
+        cmocka_unit_test(a_jump_of_the_rates_fits_into_a_tick),
+        cmocka_unit_test(many_lines_fit_into_a_tick),
         cmocka_unit_test(a_run_ends_after_its_duration),
         cmocka_unit_test(an_end_from_outside_stops_the_scan_first),
         cmocka_unit_test(whatever_is_commanded_adds_up),

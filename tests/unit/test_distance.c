@@ -100,8 +100,9 @@ static struct scene *make_scene(double (*v)[3], uint32_t n_triangles)
     for (uint32_t i = 0; i < n_triangles; i++)
         for (uint32_t c = 0; c < 3; c++)
             t[i][c] = i * 3 + c;
-    int rc = scene_from_arrays((const double(*)[3])v, n_triangles * 3, (const uint32_t(*)[3])t, n_triangles, NULL, NULL,
-                               0, &scene, &err);
+    int rc = scene_from_arrays(&(struct scene_arrays){(const double(*)[3])v, n_triangles * 3, (const uint32_t(*)[3])t,
+                                                      n_triangles, NULL, NULL, 0},
+                               &scene, &err);
     free(t);
     if (rc != SH_OK) fail_msg("%s", err.text);
     assert_int_equal(scene->n_triangles, n_triangles);

@@ -47,7 +47,7 @@ static int see(const struct geoframe *frame, enum georef_crs crs, int zone, cons
     ok(georef_create(&spec, &georef, &err));
     for (int i = 0; i < 3; i++)
         d[i] = point_m[i] - station_m[i];
-    georef_forward(georef, 1, &d[0], &d[1], &d[2], &p[0], &p[1], &p[2]);
+    georef_forward(georef, 1, (struct vec3_in){&d[0], &d[1], &d[2]}, (struct vec3_out){&p[0], &p[1], &p[2]});
     double turn[9], linear[3];
     if (georef_rotation(georef, turn)) { /* the short way that casting takes */
         mat3_apply(turn, d, linear);
@@ -236,13 +236,13 @@ static void places_from_other_forms(void **state)
     ok(georef_locate_ecef((const double[3]){-A_M, 0, 0}, &at, &err));
     assert_near(fabs(at.lon_deg), 180, 0);
     assert_near(at.lat_deg, 0, 0);
-    ok(georef_locate_utm(33, 1, 500000, 0, 5, &at, &err)); /* zone 33: 12 to 18 deg */
+    ok(georef_locate_utm(33, 1, (const double[3]){500000, 0, 5}, &at, &err)); /* zone 33: 12 to 18 deg */
     assert_near(at.lat_deg, 0, 1e-13);
     assert_near(at.lon_deg, 15, 1e-13);
-    ok(georef_locate_utm(60, 0, 500000, 1e7, 5, &at, &err));
+    ok(georef_locate_utm(60, 0, (const double[3]){500000, 1e7, 5}, &at, &err));
     assert_near(at.lat_deg, 0, 1e-13);
     assert_near(at.lon_deg, 177, 1e-13);
-    ok(georef_locate_utm(0, 0, 2e6, 2e6, 5, &at, &err)); /* UPS has the pole at 2000 km, 2000 km */
+    ok(georef_locate_utm(0, 0, (const double[3]){2e6, 2e6, 5}, &at, &err)); /* UPS has the pole at 2000 km, 2000 km */
     assert_near(at.lat_deg, -90, 1e-13);
     ok(locate_in_grid(&(struct georef_place){48, 180, 0}, 0, &utm, &err)); /* 180 E is 180 W, the first zone */
     assert_int_equal(utm.zone, 1);
@@ -262,11 +262,11 @@ static void what_is_nowhere_is_refused(void **state)
         assert_int_equal(geoframe_locate(&frame, inside[i], &at, &err), SH_EINPUT);
         assert_non_null(strstr(err.text, i < 3 ? "not near the Earth's surface" : "not finite"));
     }
-    assert_int_equal(georef_locate_utm(33, 1, 1.1e6, 5e6, 0, &at, &err), SH_EINPUT);
-    assert_int_equal(georef_locate_utm(33, 1, -1e5, 5e6, 0, &at, &err), SH_EINPUT);
-    assert_int_equal(georef_locate_utm(33, 1, 5e5, 1e7, 0, &at, &err), SH_EINPUT);
-    assert_int_equal(georef_locate_utm(61, 1, 5e5, 5e6, 0, &at, &err), SH_EINPUT);
-    assert_int_equal(georef_locate_utm(33, 1, NAN, 5e6, 0, &at, &err), SH_EINPUT);
+    assert_int_equal(georef_locate_utm(33, 1, (const double[3]){1.1e6, 5e6, 0}, &at, &err), SH_EINPUT);
+    assert_int_equal(georef_locate_utm(33, 1, (const double[3]){-1e5, 5e6, 0}, &at, &err), SH_EINPUT);
+    assert_int_equal(georef_locate_utm(33, 1, (const double[3]){5e5, 1e7, 0}, &at, &err), SH_EINPUT);
+    assert_int_equal(georef_locate_utm(61, 1, (const double[3]){5e5, 5e6, 0}, &at, &err), SH_EINPUT);
+    assert_int_equal(georef_locate_utm(33, 1, (const double[3]){NAN, 5e6, 0}, &at, &err), SH_EINPUT);
     struct locate_grid utm;
     assert_int_equal(locate_in_grid(&(struct georef_place){48, 100, 0}, 33, &utm, &err), SH_EINPUT);
     assert_int_equal(locate_in_grid(&(struct georef_place){91, 0, 0}, 0, &utm, &err), SH_EINPUT);

@@ -237,15 +237,15 @@ static void check_nan(const struct georef *georef, int is_local)
     for (int i = 0; i < N; i++)
         for (int c = 0; c < 3; c++)
             in[c][i] = i % 4 == c + 1 ? (double)NAN : (double)(i + c);
-    georef_forward(georef, N, in[0], in[1], in[2], out[0], out[1], out[2]);
-    georef_forward(georef, N, in[0], in[1], in[2], in[0], in[1], in[2]);
+    georef_forward(georef, N, (struct vec3_in){in[0], in[1], in[2]}, (struct vec3_out){out[0], out[1], out[2]});
+    georef_forward(georef, N, (struct vec3_in){in[0], in[1], in[2]}, (struct vec3_out){in[0], in[1], in[2]});
     for (int i = 0; i < N; i++) {
         int nans = isnan(out[0][i]) + isnan(out[1][i]) + isnan(out[2][i]);
         assert_int_equal(nans, i % 4 == 0 ? 0 : is_local ? 1 : 3);
         for (int c = 0; c < 3; c++)
             assert_true(in[c][i] == out[c][i] || (isnan(in[c][i]) && isnan(out[c][i])));
     }
-    georef_forward(georef, 0, in[0], in[1], in[2], in[0], in[1], in[2]);
+    georef_forward(georef, 0, (struct vec3_in){in[0], in[1], in[2]}, (struct vec3_out){in[0], in[1], in[2]});
 }
 
 static void test_nan_and_in_place(void **state)

@@ -1,4 +1,5 @@
 /* Georeferencing: places in each system, the map's convergence, another centre, the scale of counts, refusals. */
+#include "core/locate.h"
 #include "tests/unit/georef_rig.h"
 
 /* There and back between systems; and where the ends of the ellipsoid's axes and the
@@ -8,30 +9,33 @@ static void test_places(void **state)
     (void)state;
     struct georef_place place;
     struct sh_err err;
-    double p[3], grid[3];
-    int zone, north;
+    struct locate_grid grid;
+    double p[3];
     assert_int_equal(georef_locate_ecef((const double[3]){0, 0, -B_M - 5}, &place, &err), SH_OK);
     expect_near(place.lat_deg, -90, 1e-12);
     expect_near(place.height_m, 5, TOL_M);
     assert_int_equal(georef_locate_ecef((const double[3]){0, A_M + 7, 0}, &place, &err), SH_OK);
     expect_point((const double[3]){place.lat_deg, place.lon_deg, place.height_m}, 0, 90, 7, TOL_M);
     assert_int_equal(georef_locate_ecef((const double[3]){NAN, 0, 0}, &place, &err), SH_EINPUT);
-    assert_int_equal(georef_locate_utm(31, 1, 500000, 0, 12, &place, &err), SH_OK);
+    assert_int_equal(georef_locate_utm(31, 1, (const double[3]){500000, 0, 12}, &place, &err), SH_OK);
     expect_point((const double[3]){place.lat_deg, place.lon_deg, place.height_m}, 0, 3, 12, 1e-13);
-    assert_int_equal(georef_locate_utm(0, 0, 2e6, 2e6, 0, &place, &err), SH_OK);
+    assert_int_equal(georef_locate_utm(0, 0, (const double[3]){2e6, 2e6, 0}, &place, &err), SH_OK);
     expect_near(place.lat_deg, -90, 1e-12);
-    assert_int_equal(georef_locate_utm(61, 1, 500000, 0, 0, &place, &err), SH_EINPUT);
-    assert_int_equal(georef_locate_utm(31, 1, 9e6, 0, 0, &place, &err), SH_EINPUT);
+    assert_int_equal(georef_locate_utm(61, 1, (const double[3]){500000, 0, 0}, &place, &err), SH_EINPUT);
+    assert_int_equal(georef_locate_utm(31, 1, (const double[3]){9e6, 0, 0}, &place, &err), SH_EINPUT);
     for (int i = 0; i < 50; i++) {
         const struct georef_place at = {-88 + 3.5 * i, -179 + 7.1 * i, 100.0 * i};
         georef_geodetic_to_ecef(&at, p);
         assert_int_equal(georef_locate_ecef(p, &place, &err), SH_OK);
         expect_point((const double[3]){place.lat_deg, remainder(place.lon_deg - at.lon_deg, 360), place.height_m},
                      at.lat_deg, 0, at.height_m, TOL_M);
-        assert_int_equal(georef_geodetic_to_utm(&at, 0, &zone, &north, grid, &err), SH_OK);
-        assert_int_equal(zone == 0, at.lat_deg >= 84 || at.lat_deg < -80);
-        assert_int_equal(north, at.lat_deg >= 0);
-        assert_int_equal(georef_locate_utm(zone, north, grid[0], grid[1], grid[2], &place, &err), SH_OK);
+        assert_int_equal(locate_in_grid(&at, 0, &grid, &err), SH_OK);
+        assert_int_equal(grid.zone == 0, at.lat_deg >= 84 || at.lat_deg < -80);
+        assert_int_equal(grid.north, at.lat_deg >= 0);
+        assert_int_equal(georef_locate_utm(grid.zone, grid.north,
+                                           (const double[3]){grid.easting_m, grid.northing_m, at.height_m}, &place,
+                                           &err),
+                         SH_OK);
         expect_point((const double[3]){place.lat_deg, remainder(place.lon_deg - at.lon_deg, 360), place.height_m},
                      at.lat_deg, 0, at.height_m, TOL_M);
     }

@@ -6,7 +6,7 @@
 #include "drivers/protocol/nmea.h"
 #include "firmware_sim/device/gnss.h"
 #include "firmware_sim/device/head_clock.h"
-#include "tests/unit/nmea_reader.h"
+#include "tests/common/nmea_reader.h"
 
 struct receiver {
     struct config *cfg;

@@ -113,18 +113,18 @@ static void jumps(void **state)
 static void epochs(void **state)
 {
     (void)state;
-    enum head_clock_source source;
+    enum epoch_source source;
     struct sh_err err;
     int64_t tai_ns;
     const struct utc_table *table = utc_table_builtin();
-    assert_true(head_clock_parse("none", table, &source, NULL, &err) == SH_OK && source == HEAD_CLOCK_NONE);
-    assert_true(head_clock_parse("utc", table, &source, NULL, &err) == SH_OK && source == HEAD_CLOCK_UTC);
-    assert_true(head_clock_parse("tai", table, &source, NULL, &err) == SH_OK && source == HEAD_CLOCK_TAI);
-    assert_int_equal(head_clock_parse("2016-12-31T23:59:60.5Z", table, &source, &tai_ns, &err), SH_OK);
-    assert_true(source == HEAD_CLOCK_EPOCH &&
+    assert_true(epoch_parse("none", table, &source, NULL, &err) == SH_OK && source == EPOCH_NONE);
+    assert_true(epoch_parse("utc", table, &source, NULL, &err) == SH_OK && source == EPOCH_UTC);
+    assert_true(epoch_parse("tai", table, &source, NULL, &err) == SH_OK && source == EPOCH_TAI);
+    assert_int_equal(epoch_parse("2016-12-31T23:59:60.5Z", table, &source, &tai_ns, &err), SH_OK);
+    assert_true(source == EPOCH_DATE &&
                 tai_ns == INT64_C(1483228836500000000)); /* 2017-01-01 less 0.5 s, and 37 */
-    assert_int_equal(head_clock_parse("now", table, &source, NULL, &err), SH_EINPUT);
-    assert_true(head_clock_parse("", table, &source, NULL, &err) == SH_OK && source == HEAD_CLOCK_NONE);
+    assert_int_equal(epoch_parse("now", table, &source, NULL, &err), SH_EINPUT);
+    assert_true(epoch_parse("", table, &source, NULL, &err) == SH_OK && source == EPOCH_NONE);
 }
 
 /* The system's clock is between what it was before and after. */

@@ -10,7 +10,7 @@
 #include <cmocka.h>
 
 #include "drivers/protocol/nmea.h"
-#include "tests/unit/nmea_reader.h"
+#include "tests/common/nmea_reader.h"
 
 static struct nmea_fix munich(void)
 {

@@ -140,8 +140,9 @@ static struct scene *window(void)
             for (uint32_t v = 0; v < 3; v++)
                 triangle[2 * p + t][v] = 4 * p + (v == 0 ? 0 : v + t);
     }
-    if (scene_from_arrays((const double(*)[3])vertex, 12, (const uint32_t(*)[3])triangle, 6, label, surface, 2, &scene,
-                          &err) != 0)
+    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 12, (const uint32_t(*)[3])triangle, 6,
+                                                 label, surface, 2},
+                          &scene, &err) != 0)
         fail_msg("%s", err.text);
     return scene;
 }
@@ -367,7 +368,7 @@ static void a_mirror_that_moves(void **state)
         o.table.surface[i].reflectance = 0.5;
     o.table.surface[6].mirror = 1.0;
     o.detect.ghost_label = 7;
-    if (scene_from_arrays(vertex, 4, triangle, 2, label, named, 7, &body, &err) != 0 ||
+    if (scene_from_arrays(&(struct scene_arrays){vertex, 4, triangle, 2, label, named, 7}, &body, &err) != 0 ||
         bvh_create(body, centre, 100.0, 1, NULL, &bvh, &err) != 0)
         fail_msg("%s", err.text);
     struct cast_mover *m = &o.rig->setup.mover[0];

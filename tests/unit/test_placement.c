@@ -88,7 +88,8 @@ static void assert_corner_agrees(const double corner[3])
         for (int k = 0; k < 3; k++)
             d[k] = corner[k] - site->station[i].at.position_m[k];
         georef_anchor(site->station[i].georef, anchor);
-        georef_forward(site->station[i].georef, 1, &d[0], &d[1], &d[2], &d[0], &d[1], &d[2]);
+        georef_forward(site->station[i].georef, 1, (struct vec3_in){&d[0], &d[1], &d[2]},
+                       (struct vec3_out){&d[0], &d[1], &d[2]});
         for (int k = 0; k < 3; k++) {
             d[k] += anchor[k];
             if (i == 0) first[k] = d[k];

@@ -29,28 +29,34 @@ static void expect_left(const struct plan_row *row, uint32_t i, const char *meth
     if (strstr(row->left[i].why_not, why) == NULL) fail_msg("%s: %s", method, row->left[i].why_not);
 }
 
+static uint32_t choose(struct plan_row *row, const char *stage, const struct plan_option *option, uint32_t n,
+                       int forced, const char *key)
+{
+    return plan_choose(&(struct plan_choice){stage, option, n, forced, key, TOLERANCE}, row);
+}
+
 /* Of those whose bounds hold the cheapest, wherever it stands; equal to the tolerance holds. */
 static void test_cheapest_that_holds(void **state)
 {
     (void)state;
     struct plan_row row;
-    assert_int_equal(plan_choose(&row, "beam", options, N, -1, "", &TOLERANCE), 3);
+    assert_int_equal(choose(&row, "beam", options, N, -1, ""), 3);
     expect(&row, "d", 0, "the cheapest; holds 0.001 m, and 1 % of the pulses");
     assert_string_equal(row.stage, "beam");
     assert_true(row.error_m == 1e-4 && row.echo_share == 1e-2 && row.cost_ns == 5.0);
     assert_int_equal(row.n_left, 3);
-    expect_left(&row, 0, "a", "its ranges are off by more than 0.001 m");
+    expect_left(&row, 0, "a", "its range error is above 0.001 m");
     expect_left(&row, 1, "b", "more than 1 % of the pulses get another echo count");
-    expect_left(&row, 2, "c", "dearer");
+    expect_left(&row, 2, "c", "costs more");
 }
 
 static void test_forced(void **state)
 {
     (void)state;
     struct plan_row row;
-    assert_int_equal(plan_choose(&row, "beam", options, N, 1, "beam.mode", &TOLERANCE), 1);
+    assert_int_equal(choose(&row, "beam", options, N, 1, "beam.mode"), 1);
     expect(&row, "b", 1, "forced by beam.mode; does not hold");
-    assert_int_equal(plan_choose(&row, "beam", options, N, 2, "beam.mode", &TOLERANCE), 2);
+    assert_int_equal(choose(&row, "beam", options, N, 2, "beam.mode"), 2);
     expect(&row, "c", 1, "forced by beam.mode; holds");
     expect_left(&row, 2, "d", "not asked for");
 }
@@ -62,14 +68,14 @@ static void test_least_off(void **state)
     struct plan_row row;
     struct plan_option some[3] = {options[1], options[0], {"e", (double)NAN, (double)NAN, 0.1, ""}};
     some[0].echo_share = 3e-2;
-    assert_int_equal(plan_choose(&row, "beam", some, 3, -1, "", &TOLERANCE), 1);
-    expect(&row, "a", 0, "the one that is least off; does not hold");
+    assert_int_equal(choose(&row, "beam", some, 3, -1, ""), 1);
+    expect(&row, "a", 0, "the one with the least error; does not hold");
     /* options go from rough to exact: where all miss by as much, the last that can be had */
     struct plan_option same[4] = {{"none", 0.0, 1.0, 0.0, ""},
                                   {"1", 0.0, 1.0, 1.0, ""},
                                   {"2", 0.0, 1.0, 2.0, ""},
                                   {"3", 0.0, 1.0, 3.0, "not here"}};
-    assert_int_equal(plan_choose(&row, "optics", same, 4, -1, "", &TOLERANCE), 2);
+    assert_int_equal(choose(&row, "optics", same, 4, -1, ""), 2);
 }
 
 /* What can't be had is not taken, whatever its figures; what is left may be unknown. */
@@ -78,8 +84,8 @@ static void test_what_cannot_be_had(void **state)
     (void)state;
     struct plan_row row;
     struct plan_option some[2] = {{"e", (double)NAN, (double)NAN, 0.0, ""}, {"f", 0.0, 0.0, 0.0, "the head moves"}};
-    assert_int_equal(plan_choose(&row, "beam", some, 2, -1, "", &TOLERANCE), 0);
-    expect(&row, "e", 0, "the only one that can be had; what it is off is not known");
+    assert_int_equal(choose(&row, "beam", some, 2, -1, ""), 0);
+    expect(&row, "e", 0, "the only one that can be had; its error is not known");
     expect_left(&row, 0, "f", "the head moves");
     assert_false(plan_holds(&some[0], &TOLERANCE) || plan_holds(&some[1], &TOLERANCE));
 }
@@ -91,9 +97,9 @@ static void test_order(void **state)
     struct plan_row row;
     struct plan_option option[2];
     plan_order_options(1900.0, option);
-    assert_int_equal(plan_choose(&row, "order", option, 2, -1, "", &TOLERANCE), 0);
+    assert_int_equal(choose(&row, "order", option, 2, -1, ""), 0);
     plan_order_options(2100.0, option);
-    assert_int_equal(plan_choose(&row, "order", option, 2, -1, "", &TOLERANCE), 1);
+    assert_int_equal(choose(&row, "order", option, 2, -1, ""), 1);
 }
 
 /* Nothing is chosen there: the row says what is always done. */

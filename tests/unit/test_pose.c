@@ -171,13 +171,14 @@ static void test_knots(void **state)
     (void)state;
     struct trajectory *tr = circle();
     struct pose mount = {.position_m = {0.5, 1.2, 2.0}}, body, head, between;
-    struct pose_knot *knot;
-    size_t n;
-    double error_m, frame, worst = 0, turned = 0;
+    struct pose_path path;
+    double frame, worst = 0, turned = 0;
     struct sh_err err;
     pose_from_angles(30 * DEG, -10 * DEG, 0, mount.quat);
-    assert_int_equal(trajectory_knots(tr, 0.25, 1e9, &mount, 1e-4, 10000000, 0.01, &knot, &n, &error_m, &err), SH_OK);
-    assert_true(error_m <= 1e-4 && knot[0].t_ns == 0 && knot[n - 1].t_ns == 9650000000);
+    assert_int_equal(find_path(tr, 0.25, 1e9, &mount, &path, &err), SH_OK);
+    const struct pose_knot *knot = path.knot;
+    const size_t n = path.n;
+    assert_true(path.error_m <= 1e-4 && knot[0].t_ns == 0 && knot[n - 1].t_ns == 9650000000);
     for (size_t i = 0; i + 1 < n; i++) {
         int64_t gap = knot[i + 1].t_ns - knot[i].t_ns;
         assert_true(gap > 0 && gap <= 10000001);
@@ -190,11 +191,11 @@ static void test_knots(void **state)
             turned = fmax(turned, pose_angle_between(head.quat, between.quat));
         }
     }
-    print_message("# %zu knots in 9.65 s: off by %.4f mm, bound %.4f mm; %.2g rad\n", n, 1e3 * worst, 1e3 * error_m,
-                  turned);
-    assert_true(worst <= error_m * 1.0001 && worst > 0.2 * error_m);
+    print_message("# %zu knots in 9.65 s: off by %.4f mm, bound %.4f mm; %.2g rad\n", n, 1e3 * worst,
+                  1e3 * path.error_m, turned);
+    assert_true(worst <= path.error_m * 1.0001 && worst > 0.2 * path.error_m);
     assert_true(turned < 1e-9); /* a knot's time is rounded to a nanosecond */
-    free(knot);
+    free(path.knot);
     trajectory_free(tr);
 }
 
@@ -204,23 +205,22 @@ static void test_knots_to_an_end(void **state)
     (void)state;
     struct trajectory *tr = circle();
     const struct pose mount = {.quat = {1, 0, 0, 0}};
-    struct pose_knot *whole, *part;
+    struct pose_path whole, part;
     struct pose last;
-    size_t n, m;
-    double error_m, frame;
+    double frame;
     struct sh_err err;
-    assert_int_equal(trajectory_knots(tr, 0.25, 1e9, &mount, 1e-4, 10000000, 0.01, &whole, &n, &error_m, &err), SH_OK);
-    assert_int_equal(trajectory_knots(tr, 0.25, 1.2345, &mount, 1e-4, 10000000, 0.01, &part, &m, &error_m, &err),
-                     SH_OK);
-    assert_true(m > 2 && m < n && part[m - 1].t_ns == 984500000 && part[m - 2].t_ns < 984500000);
-    assert_memory_equal(whole, part, (m - 1) * sizeof *part);
+    assert_int_equal(find_path(tr, 0.25, 1e9, &mount, &whole, &err), SH_OK);
+    assert_int_equal(find_path(tr, 0.25, 1.2345, &mount, &part, &err), SH_OK);
+    const size_t m = part.n;
+    assert_true(m > 2 && m < whole.n && part.knot[m - 1].t_ns == 984500000 && part.knot[m - 2].t_ns < 984500000);
+    assert_memory_equal(whole.knot, part.knot, (m - 1) * sizeof *part.knot);
     trajectory_at(tr, 1.2345, &last, &frame);
-    assert_true(distance(last.position_m, part[m - 1].pose.position_m) < 1e-12 && frame == part[m - 1].frame);
-    free(part);
-    assert_int_equal(trajectory_knots(tr, 0.25, 0.25, &mount, 1e-4, 10000000, 0.01, &part, &m, &error_m, &err), SH_OK);
-    assert_true(m == 1 && part[0].t_ns == 0);
-    free(whole);
-    free(part);
+    assert_true(distance(last.position_m, part.knot[m - 1].pose.position_m) < 1e-12 && frame == part.knot[m - 1].frame);
+    free(part.knot);
+    assert_int_equal(find_path(tr, 0.25, 0.25, &mount, &part, &err), SH_OK);
+    assert_true(part.n == 1 && part.knot[0].t_ns == 0);
+    free(whole.knot);
+    free(part.knot);
     trajectory_free(tr);
 }
 
@@ -243,14 +243,12 @@ static void test_slow_knots(void **state)
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         struct pose_sample s[2] = {{.t_s = 0, .pose = {.quat = {1, 0, 0, 0}}}, {.t_s = cases[i].s}};
         struct trajectory *tr;
-        struct pose_knot *knot;
+        struct pose_path path;
         struct sh_err err;
-        double error_m;
-        size_t n;
         s[1].pose.position_m[1] = cases[i].way_m;
         pose_from_angles(cases[i].turn_rad, 0, 0, s[1].pose.quat);
         assert_int_equal(trajectory_from_samples(s, 2, &tr, &err), SH_OK);
-        int rc = trajectory_knots(tr, 0, 1e10, &mount, 1e-4, 10000000, 0.01, &knot, &n, &error_m, &err);
+        int rc = find_path(tr, 0, 1e10, &mount, &path, &err);
         trajectory_free(tr);
         if (cases[i].most == 0) {
             assert_int_equal(rc, SH_EINPUT);
@@ -258,9 +256,9 @@ static void test_slow_knots(void **state)
             continue;
         }
         assert_int_equal(rc, SH_OK);
-        assert_true(n >= cases[i].least && n <= cases[i].most && error_m <= 1e-4);
-        assert_true(knot[n - 1].t_ns == llround(1e9 * cases[i].s));
-        free(knot);
+        assert_true(path.n >= cases[i].least && path.n <= cases[i].most && path.error_m <= 1e-4);
+        assert_true(path.knot[path.n - 1].t_ns == llround(1e9 * cases[i].s));
+        free(path.knot);
     }
 }
 

@@ -163,12 +163,10 @@ static void test_slow_waypoints(void **state)
     write_file("x_m,y_m,z_m,speed_m_s\n0,0,0,0.001\n0,5,0,0.001\n5,5,0,0.001\n");
     if (trajectory_read_waypoints(path, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
     const struct pose mount = {.quat = {1, 0, 0, 0}};
-    struct pose_knot *knot;
-    size_t n;
-    double error_m;
-    assert_int_equal(trajectory_knots(tr, 0, 1e9, &mount, 1e-4, 10000000, 0.01, &knot, &n, &error_m, &err), SH_OK);
-    assert_true(n < 3100 && error_m <= 1e-4); /* legs of 5.0 to 5.5 m, each step of theirs in up to three */
-    free(knot);
+    struct pose_path got;
+    assert_int_equal(find_path(tr, 0, 1e9, &mount, &got, &err), SH_OK);
+    assert_true(got.n < 3100 && got.error_m <= 1e-4); /* legs of 5.0 to 5.5 m, each step of theirs in up to three */
+    free(got.knot);
     trajectory_at(tr, 5000.0, &p, &frame);
     pose_to_angles(p.quat, &h, &pitch, &roll);
     assert_true(fabs(h - 45 * DEG) < 1e-3 && fabs(frame - 1) < 1e-9);

@@ -1,7 +1,7 @@
 /* The random generator. All seeds are fixed, so a run can't fail by chance; the limits are chosen as if they
  * weren't: each check would fail for one good generator in 10^5 or fewer (about 140 checks, so together for
  * one in 700). */
-#include "tests/unit/cases.h"
+#include "tests/common/cases.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -194,7 +194,9 @@ static void arrays_become_a_scene(void **state)
     struct scene *s;
     struct sh_err err;
     assert_int_equal(
-        scene_from_arrays((const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, label, surface, 2, &s, &err), SH_OK);
+        scene_from_arrays(
+            &(struct scene_arrays){(const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, label, surface, 2}, &s, &err),
+        SH_OK);
     assert_int_equal(s->n_triangles, 2);
     assert_int_equal(s->counts.zero_area, 1);
     assert_int_equal(s->label[0], 1);
@@ -202,23 +204,30 @@ static void arrays_become_a_scene(void **state)
     assert_string_equal(s->surface[1].material, "d");
     assert_true(s->max_m[0] == 1);
     scene_free(s);
-    assert_int_equal(scene_from_arrays((const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, NULL, NULL, 0, &s, &err),
-                     SH_OK);
+    assert_int_equal(
+        scene_from_arrays(&(struct scene_arrays){(const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, NULL, NULL, 0},
+                          &s, &err),
+        SH_OK);
     assert_string_equal(s->surface[0].object, "object");
     assert_string_equal(s->surface[0].material, "material");
     scene_free(s);
     label[2] = 2;
     assert_int_equal(
-        scene_from_arrays((const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, label, surface, 2, &s, &err),
+        scene_from_arrays(
+            &(struct scene_arrays){(const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, label, surface, 2}, &s, &err),
         SH_EINPUT);
     assert_non_null(strstr(err.text, "triangle 2: label 2 out of range"));
     t[2][1] = 4;
-    assert_int_equal(scene_from_arrays((const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, NULL, NULL, 0, &s, &err),
-                     SH_EINPUT);
+    assert_int_equal(
+        scene_from_arrays(&(struct scene_arrays){(const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, NULL, NULL, 0},
+                          &s, &err),
+        SH_EINPUT);
     assert_non_null(strstr(err.text, "triangle 2: index 4 out of range"));
     v[3][1] = NAN;
-    assert_int_equal(scene_from_arrays((const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, NULL, NULL, 0, &s, &err),
-                     SH_EINPUT);
+    assert_int_equal(
+        scene_from_arrays(&(struct scene_arrays){(const double(*)[3])v, 4, (const uint32_t(*)[3])t, 3, NULL, NULL, 0},
+                          &s, &err),
+        SH_EINPUT);
     assert_non_null(strstr(err.text, "vertex 4 (5 nan 5) is not finite"));
     assert_null(s);
 }

@@ -53,8 +53,7 @@ static void single_precision_is_refused(void **state)
     (void)state;
     const char *text = stl_text(500000, 5800000, "0");
     refuse("utm.stl", text, strlen(text),
-           "coordinates up to 5800001 are read in single precision, which may be "
-           "off by 0.35 m; allowed are 0.001 m");
+           "coordinates up to 5800001 are read in single precision, with errors up to 0.35 m; allowed are 0.001 m");
     struct scene *s;
     struct sh_err err;
     struct scene_mesh_spec spec = {.file = write_text("utm.stl", text), .scale = 1};

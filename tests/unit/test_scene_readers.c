@@ -73,7 +73,7 @@ static void obj_without_names(void **state)
     assert_string_equal(s->surface[0].object, "site.v2");
     assert_string_equal(s->surface[0].material, "");
     assert_int_equal(n_warnings, 1);
-    assert_non_null(strstr(warnings, "1 unknown statements passed over; the first is 'what' in line 4"));
+    assert_non_null(strstr(warnings, "1 unknown statements ignored; the first is 'what' in line 4"));
     scene_free(s);
 }
 
@@ -210,7 +210,7 @@ static void ply_is_read_exactly(void **state)
         size_t n = make_binary_ply(data, big);
         check_utm_scene(load(write_file("utm.ply", data, n)));
         unlink(path);
-        assert_non_null(strstr(warnings, "element 'camera' (1 of it) passed over"));
+        assert_non_null(strstr(warnings, "element 'camera' (1 of it) ignored"));
         /* cut off anywhere, it is refused */
         for (size_t cut = 0; cut < n; cut += 13)
             refuse("cut.ply", data, cut, "");

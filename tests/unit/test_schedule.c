@@ -1,6 +1,6 @@
 /* The schedule against a model of its own: each pulse's time, place and angle as one fraction in 128-bit
  * integers. */
-#include "tests/unit/cases.h"
+#include "tests/common/cases.h"
 
 #include <inttypes.h>
 #include <math.h>

@@ -1,6 +1,6 @@
 /* Settings that change in the middle of a scan: nothing lost or doubled, and time, mirror and pan go on where
  * they were. */
-#include "tests/unit/cases.h"
+#include "tests/common/cases.h"
 
 #include <inttypes.h>
 #include <math.h>

@@ -5,7 +5,7 @@
 #include "drivers/record/crs_wkt.h"
 #include "drivers/record/track.h"
 #include "drivers/protocol/native.h"
-#include "tests/unit/cases.h"
+#include "tests/common/cases.h"
 #include "tests/unit/recorder_rig.h"
 
 static const double HEADING[9] = {0.6, 0.8, 0, -0.8, 0.6, 0, 0, 0, 1};
@@ -37,7 +37,7 @@ static void check_directions(const struct georef_spec *spec, double tolerance)
     for (int axis = 0; axis < 3; axis++) {
         const double *h = HEADING;
         double d[3] = {h[axis], h[3 + axis], h[6 + axis]}, norm = 0;
-        georef_forward(georef, 1, &d[0], &d[1], &d[2], &d[0], &d[1], &d[2]);
+        georef_forward(georef, 1, (struct vec3_in){&d[0], &d[1], &d[2]}, (struct vec3_out){&d[0], &d[1], &d[2]});
         for (int i = 0; i < 3; i++)
             norm += d[i] * d[i];
         for (int i = 0; i < 3; i++) {

@@ -1,5 +1,5 @@
 /* Reflectance from a mesh's texture: a board of dark and light squares, whose places are known. */
-#include "tests/unit/cases.h"
+#include "tests/common/cases.h"
 
 #include <math.h>
 #include <png.h>
@@ -221,7 +221,8 @@ static void squares_move_with_the_mesh(void **state)
     struct bvh *bvh;
     struct sh_err err;
     const double centre_m[3] = {0.0, AWAY_M, 0.0};
-    assert_int_equal(scene_from_arrays(wall, 3, triangle, 1, NULL, NULL, 0, &still, &err), SH_OK);
+    assert_int_equal(scene_from_arrays(&(struct scene_arrays){wall, 3, triangle, 1, NULL, NULL, 0}, &still, &err),
+                     SH_OK);
     for (uint32_t i = 0; i < board->n_triangles; i++)
         board->label[i] = 1;
     assert_int_equal(bvh_create(board, centre_m, 100.0, 1, NULL, &bvh, &err), SH_OK);

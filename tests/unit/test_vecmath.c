@@ -1,6 +1,6 @@
 /* core/vecmath.h against the long double functions of libm, whose 64-bit mantissa is 2048 times finer than a
  * double's. */
-#include "tests/unit/cases.h"
+#include "tests/common/cases.h"
 
 #include <float.h>
 #include <math.h>

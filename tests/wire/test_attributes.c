@@ -382,8 +382,9 @@ static void test_capacity(void **state)
         assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), cases[i].status);
         if (cases[i].status == 0) continue;
         char *err = wire_read(wire_path(wire, "err"), NULL);
-        if (strstr(err, "the stream has 1.44 MB/s, the link carries 1.22 MB/s; lower head.prr_hz, or leave out "
-                        "output.attributes\n") == NULL)
+        if (strstr(err,
+                   "the stream has 1.44 MB/s, the link carries 1.22 MB/s; lower head.prr_hz to 50666, or leave out "
+                   "output.attributes\n") == NULL)
             fail_msg("%s", err);
         free(err);
     }

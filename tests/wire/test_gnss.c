@@ -2,7 +2,7 @@
  * the native stream beside them. */
 #include "tests/wire/gnss_rig.h"
 
-#include "tests/unit/nmea_reader.h"
+#include "tests/common/nmea_reader.h"
 
 static const char *const ORDER[5] = {"GNRMC", "GNGGA", "GNGSA", "GNGST", "GNZDA"};
 

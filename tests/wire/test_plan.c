@@ -157,19 +157,19 @@ static void expect_plan(struct wire *wire, const char *config, const struct want
 static void test_three_plans(void **state)
 {
     struct wire *wire = *state;
-    static const struct want demo[] = {{"beam", "single", "adaptive", "dearer"},
+    static const struct want demo[] = {{"beam", "single", "adaptive", "costs more"},
                                        {"optics", "none", NULL, NULL},
                                        {"signal", "none", NULL, NULL},
-                                       {"order", "none", "double", "dearer"},
-                                       {"georef", "order2", "order1", "off by more than the tolerance"}};
-    static const struct want foliage[] = {{"beam", "adaptive", "single", "its ranges are off by more than 0.005 m"},
-                                          {"beam", "adaptive", "rings 12 (469 rays)", "dearer"},
+                                       {"order", "none", "double", "costs more"},
+                                       {"georef", "order2", "order1", "its error is above the tolerance"}};
+    static const struct want foliage[] = {{"beam", "adaptive", "single", "its range error is above 0.005 m"},
+                                          {"beam", "adaptive", "rings 12 (469 rays)", "costs more"},
                                           {"optics", "none", NULL, NULL},
                                           {"georef", "none", NULL, NULL}};
-    static const struct want glass[] = {{"beam", "single", "adaptive", "dearer"},
-                                        {"optics", "depth 3", "depth 1", "its ranges are off"},
+    static const struct want glass[] = {{"beam", "single", "adaptive", "costs more"},
+                                        {"optics", "depth 3", "depth 1", "its range error is above"},
                                         {"optics", "depth 3", "depth 2", "get another echo count"},
-                                        {"optics", "depth 3", "depth 4", "dearer"},
+                                        {"optics", "depth 3", "depth 4", "costs more"},
                                         {"signal", "range equation", NULL, NULL},
                                         {"noise", "gauss, by signal", NULL, NULL},
                                         {"georef", "rotation", NULL, NULL}};
@@ -268,11 +268,66 @@ static void test_forced_as_chosen(void **state)
     }
     const char *const args[] = {"plan", "config/glass.yaml", "--json", NULL};
     char *json = plan(wire, args, 0), *again = plan(wire, args, 0);
-    assert_string_equal(json, again); /* the same configuration, the same plan */
+    *strstr(json, "\"total\"") = *strstr(again, "\"total\"") = '\0'; /* which is measured */
+    assert_string_equal(json, again);                                /* the same configuration, the same plan */
     free(json);
     free(again);
     assert_true(figure[0][0] > 0.0 && figure[0][1] > 0.0);
     assert_true(figure[0][0] == figure[1][0] && figure[0][1] == figure[1][1]);
+}
+
+/* The share that the last row's reason ends with, in percent, and its cost. */
+static double total_of(struct wire *wire, const char *config, const char *set, double *cost_ns)
+{
+    const char *const args[] = {"plan", config, "--json", "--set", set, "--set", "beam.rings=4", NULL};
+    char *json = plan(wire, args, 0), *text = row(json, "total", 0);
+    assert_non_null(text);
+    assert_null(strstr(strstr(json, text) + 1, "\"stage\"")); /* the last row */
+    assert_non_null(strstr(text, "\"method\": \"measured\""));
+    assert_non_null(strstr(text, "\"error_m\": null"));
+    assert_non_null(strstr(text, "\"echo_share\": null"));
+    *cost_ns = number_of(text, "\"cost_ns\": ");
+    double share = number_of(text, "need ");
+    free(text);
+    free(json);
+    return share;
+}
+
+/* 61 rays cost at least 5 times one, on whatever machine; the head fires half of its sweep at the ground. */
+static void test_total(void **state)
+{
+    struct wire *wire = *state;
+    char config[256];
+    double single_ns, rings_ns;
+    snprintf(config, sizeof config, "%s", set_up(wire));
+    double single = total_of(wire, config, "beam.mode=single", &single_ns);
+    double rings = total_of(wire, config, "beam.mode=rings", &rings_ns);
+    printf("# 61 rays: %.0f ns, one: %.0f ns\n", rings_ns, single_ns);
+    assert_true(isfinite(single_ns) && isfinite(rings_ns) && single_ns > 0.0 && single > 0.0);
+    assert_true(rings_ns >= 5.0 * single_ns && rings >= 5.0 * single);
+}
+
+/* A thousand million rays per second on one thread are too many for any machine; 50,000 are few. */
+static void test_run_warns(void **state)
+{
+    struct wire *wire = *state;
+    char config[256];
+    snprintf(config, sizeof config, "%s", set_up(wire));
+    static const struct {
+        const char *set[3];
+        int warns;
+    } cases[] = {{{"beam.mode=rings", "beam.rings=18", "head.prr_hz=1000000"}, 1},
+                 {{"beam.mode=single", "beam.rings=1", "head.prr_hz=50000"}, 0}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const char *const args[] = {"run",   config,          "--duration", "0.05",          "--set", "loop.threads=1",
+                                    "--set", cases[i].set[0], "--set",      cases[i].set[1], "--set", cases[i].set[2],
+                                    NULL};
+        assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+        char *text = wire_read(wire_path(wire, "err"), NULL), *at = strstr(text, "need about");
+        if ((at != NULL) != cases[i].warns) fail_msg("%s", text);
+        if (at != NULL) assert_null(strstr(at + 1, "need about"));
+        free(text);
+    }
 }
 
 int main(void)
@@ -284,6 +339,8 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_three_plans, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_run_follows_plan, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_forced, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_total, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_run_warns, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_forced_as_chosen, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_what_cannot_be, wire_setup, wire_teardown),
     };

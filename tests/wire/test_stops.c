@@ -235,7 +235,7 @@ static void test_wrong_parts(void **state)
         const char *set, *says;
     } wrong[] = {
         {"platform.step_s=0.0001", "platform.step_s: 10001 stops in 1 s; allowed at most 4096"},
-        {"platform.end_s=3.5", "platform.end_s: 3.5 s is behind the trajectory's end; allowed 1 to 3"},
+        {"platform.end_s=3.5", "platform.end_s: 3.5 s is after the trajectory's end; allowed 1 to 3"},
         {"head.station=6", "head.station: there is no stop 6; allowed 1 to 5"},
     };
     struct room_config stops = base(STOPS);

@@ -107,7 +107,8 @@ static double worst_m(const struct drive *scene, const struct drive *drive, enum
         assert_int_equal(isnan(s[0]), isnan(p[0]));
         if (isnan(s[0])) continue;
         echoes++;
-        georef_forward(georef, 1, &s[0], &s[1], &s[2], &want[0], &want[1], &want[2]);
+        georef_forward(georef, 1, (struct vec3_in){&s[0], &s[1], &s[2]},
+                       (struct vec3_out){&want[0], &want[1], &want[2]});
         for (int k = 0; k < 3; k++)
             off[k] = p[k] - anchor[k] - want[k];
         if (crs == GEOREF_GEODETIC) {
@@ -273,7 +274,8 @@ static void test_poses_beside_a_crs(void **state)
     for (char *row = strchr(line, '\n') + 1; *row != 0; row = strchr(row, '\n') + 1, n++) {
         double p[3], want[3];
         assert_int_equal(sscanf(row, "%*u,%*f,%lf,%lf,%lf", &p[0], &p[1], &p[2]), 3);
-        georef_forward(truth, 1, &p[0], &p[1], &p[2], &want[0], &want[1], &want[2]);
+        georef_forward(truth, 1, (struct vec3_in){&p[0], &p[1], &p[2]},
+                       (struct vec3_out){&want[0], &want[1], &want[2]});
         for (int k = 0; k < 3; k++) {
             double got = base[k] - anchor[k];
             for (int j = 0; j < 3; j++)

@@ -34,13 +34,14 @@ static void test_capacity(void **state)
         const char *speed;
         int prr_hz;
         const char *stream, *link; /* NULL: it fits */
+        int most_hz;
     } cases[] = {
-        {"full", 60000, NULL, NULL},
-        {"full", 61000, "1.22 MB/s", "1.22 MB/s"},
-        {"full", 500000, "10.00 MB/s", "1.22 MB/s"},
-        {"high", 2000000, NULL, NULL},
-        {"high", 2200000, "44.00 MB/s", "40.96 MB/s"},
-        {"super", 2200000, NULL, NULL},
+        {"full", 60000, NULL, NULL, 0},
+        {"full", 61000, "1.22 MB/s", "1.22 MB/s", 60800},
+        {"full", 500000, "10.00 MB/s", "1.22 MB/s", 60800},
+        {"high", 2000000, NULL, NULL, 0},
+        {"high", 2200000, "44.00 MB/s", "40.96 MB/s", 2048000},
+        {"super", 2200000, NULL, NULL, 0},
     };
     struct wire *wire = *state;
     room_write(wire);
@@ -48,8 +49,8 @@ static void test_capacity(void **state)
         char *err, want[128];
         write_config(wire, cases[i].speed, cases[i].prr_hz);
         const int status = run(wire, &err);
-        snprintf(want, sizeof want, "the stream has %s, the link carries %s; lower head.prr_hz\n", cases[i].stream,
-                 cases[i].link);
+        snprintf(want, sizeof want, "the stream has %s, the link carries %s; lower head.prr_hz to %d\n",
+                 cases[i].stream, cases[i].link, cases[i].most_hz);
         if (status != (cases[i].stream != NULL ? 2 : 0)) fail_msg("%s: status %d: %s", cases[i].speed, status, err);
         if (cases[i].stream != NULL) {
             if (strstr(err, want) == NULL) fail_msg("%s", err);

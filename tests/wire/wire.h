@@ -47,340 +47,87 @@ struct head {
     char ready[2048]; /* its line of JSON */
 };
 
-static inline int64_t wire_now_ms(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
-}
+int64_t wire_now_ms(void);
 
-static inline const char *wire_program(void)
-{
-    const char *program = getenv("SCANHEAD");
-    return program != NULL && program[0] != '\0' ? program : "build/scanhead";
-}
+const char *wire_program(void);
 
 /* ---- the folder */
 
-static inline int wire_setup(void **state)
-{
-    struct wire *wire = calloc(1, sizeof *wire);
-    if (wire == NULL) return -1;
-    strcpy(wire->dir, "/tmp/scanhead-wire-XXXXXX");
-    if (mkdtemp(wire->dir) == NULL) return -1;
-    signal(SIGPIPE, SIG_IGN);
-    *state = wire;
-    return 0;
-}
+int wire_setup(void **state);
 
 /* Path of a file in the folder; four of them are good at a time. */
-static inline const char *wire_path(const struct wire *wire, const char *name)
-{
-    static char path[4][352];
-    static int turn;
-    turn = (turn + 1) % 4;
-    snprintf(path[turn], sizeof path[turn], "%s/%s", wire->dir, name);
-    return path[turn];
-}
+const char *wire_path(const struct wire *wire, const char *name);
 
 /* Removes the files in the folder; the tests make no folders in it but empty ones. Returns how many there
  * were. */
-static inline int wire_empty(const struct wire *wire)
-{
-    DIR *dir = opendir(wire->dir);
-    int n = 0;
-    for (struct dirent *entry; dir != NULL && (entry = readdir(dir)) != NULL;) {
-        if (strcmp(entry->d_name, ".") == 0 || strcmp(entry->d_name, "..") == 0) continue;
-        remove(wire_path(wire, entry->d_name));
-        n++;
-    }
-    if (dir != NULL) closedir(dir);
-    return n;
-}
+int wire_empty(const struct wire *wire);
 
-static inline void wire_forget(struct wire *wire, pid_t pid)
-{
-    for (int i = 0; i < wire->n_children; i++)
-        if (wire->child[i] == pid) wire->child[i] = wire->child[--wire->n_children];
-}
+int wire_teardown(void **state);
 
-static inline int wire_teardown(void **state)
-{
-    struct wire *wire = *state;
-    for (int i = 0; i < wire->n_children; i++) {
-        kill(wire->child[i], SIGKILL);
-        waitpid(wire->child[i], NULL, 0);
-    }
-    wire_empty(wire);
-    int failed = rmdir(wire->dir);
-    free(wire);
-    return failed;
-}
+const char *wire_write(const struct wire *wire, const char *name, const void *data, size_t len);
 
-static inline const char *wire_write(const struct wire *wire, const char *name, const void *data, size_t len)
-{
-    const char *path = wire_path(wire, name);
-    FILE *f = fopen(path, "wb");
-    assert_non_null(f);
-    assert_int_equal(fwrite(data, 1, len, f), len);
-    assert_int_equal(fclose(f), 0);
-    return path;
-}
-
-static inline const char *wire_write_text(const struct wire *wire, const char *name, const char *text)
-{
-    return wire_write(wire, name, text, strlen(text));
-}
+const char *wire_write_text(const struct wire *wire, const char *name, const char *text);
 
 /* The whole file, NUL-terminated; free() it. */
-static inline char *wire_read(const char *path, size_t *len)
-{
-    FILE *f = fopen(path, "rb");
-    if (f == NULL) fail_msg("%s: %s", path, strerror(errno));
-    size_t n = 0, room = 1 << 16;
-    char *text = malloc(room + 1);
-    for (size_t got; (got = fread(text + n, 1, room - n, f)) > 0;) {
-        n += got;
-        if (n == room) text = realloc(text, (room *= 2) + 1);
-    }
-    fclose(f);
-    text[n] = '\0';
-    if (len != NULL) *len = n;
-    return text;
-}
+char *wire_read(const char *path, size_t *len);
 
 /* ---- processes */
 
-static inline pid_t wire_fork(struct wire *wire)
-{
-    assert_true(wire->n_children < WIRE_MAX_CHILDREN);
-    fflush(NULL);
-    pid_t parent = getpid(), pid = fork();
-    assert_true(pid >= 0);
-    if (pid != 0) {
-        wire->child[wire->n_children++] = pid;
-        return pid;
-    }
-    prctl(PR_SET_PDEATHSIG, SIGKILL);
-    if (getppid() != parent) _exit(127);
-    return 0;
-}
+pid_t wire_fork(struct wire *wire);
 
 /* Starts a program with args (ends with NULL); out, err: files in the folder for the two streams; ready_fd:
  * given to it as descriptor 3, or -1. */
-static inline pid_t wire_spawn_program(struct wire *wire, const char *program, const char *const *args, const char *out,
-                                       const char *err, int ready_fd)
-{
-    char *argv[WIRE_MAX_ARGS + 2] = {(char *)(uintptr_t)program};
-    int n = 1;
-    for (; args[n - 1] != NULL; n++) {
-        assert_true(n < WIRE_MAX_ARGS);
-        argv[n] = (char *)(uintptr_t)args[n - 1];
-    }
-    char out_path[352], err_path[352];
-    snprintf(out_path, sizeof out_path, "%s", wire_path(wire, out));
-    snprintf(err_path, sizeof err_path, "%s", wire_path(wire, err));
-    pid_t pid = wire_fork(wire);
-    if (pid != 0) return pid;
-    int null = open("/dev/null", O_RDONLY), o = open(out_path, O_WRONLY | O_CREAT | O_TRUNC, 0600),
-        e = open(err_path, O_WRONLY | O_CREAT | O_TRUNC, 0600);
-    /* High first: 3 may be any of those that are open. */
-    int ready = ready_fd >= 0 ? fcntl(ready_fd, F_DUPFD, 100) : -1;
-    dup2(null, 0);
-    dup2(o, 1);
-    dup2(e, 2);
-    for (int fd = 3; fd < 100; fd++)
-        close(fd);
-    if (ready >= 0) dup2(ready, 3);
-    if (ready >= 0) close(ready);
-    signal(SIGPIPE, SIG_DFL);
-    execv(argv[0], argv);
-    _exit(127);
-}
+pid_t wire_spawn_program(struct wire *wire, const char *program, const char *const *args, const char *out,
+                         const char *err, int ready_fd);
 
 /* Starts the head's program. */
-static inline pid_t wire_spawn(struct wire *wire, const char *const *args, const char *out, const char *err,
-                               int ready_fd)
-{
-    return wire_spawn_program(wire, wire_program(), args, out, err, ready_fd);
-}
+pid_t wire_spawn(struct wire *wire, const char *const *args, const char *out, const char *err, int ready_fd);
 
 /* Waits for the end; the exit status, or 256 + the signal. */
-static inline int wire_wait(struct wire *wire, pid_t pid)
-{
-    int fd = pidfd_open(pid, 0), status;
-    assert_true(fd >= 0);
-    struct pollfd slot = {.fd = fd, .events = POLLIN};
-    int n = poll(&slot, 1, DEADLINE_MS);
-    close(fd);
-    if (n != 1) fail_msg("process %d did not end within %d ms", (int)pid, DEADLINE_MS);
-    assert_int_equal(waitpid(pid, &status, 0), pid);
-    wire_forget(wire, pid);
-    return WIFEXITED(status) ? WEXITSTATUS(status) : 256 + WTERMSIG(status);
-}
+int wire_wait(struct wire *wire, pid_t pid);
 
-static inline void wire_show(const struct wire *wire, const char *name)
-{
-    char *text = wire_read(wire_path(wire, name), NULL);
-    print_message("# %s: %s\n", name, text);
-    free(text);
-}
+void wire_show(const struct wire *wire, const char *name);
 
 /* `scanhead run CONFIG ...` up to its ready line. more: further arguments, ends with NULL, or NULL. */
-static inline struct head head_start(struct wire *wire, const char *config, const char *const *more)
-{
-    struct head head = {.wire = wire};
-    const char *args[WIRE_MAX_ARGS] = {"run", config, "--ready-fd", "3", "--stats", wire_path(wire, "stats.json")};
-    char stats[352];
-    snprintf(stats, sizeof stats, "%s", args[5]);
-    args[5] = stats;
-    for (int n = 6; more != NULL && *more != NULL; n++)
-        args[n] = *more++;
-    int ready[2];
-    assert_int_equal(pipe2(ready, O_CLOEXEC), 0);
-    head.pid = wire_spawn(wire, args, "head.out", "head.err", ready[1]);
-    close(ready[1]);
-    size_t n = 0;
-    for (;;) {
-        struct pollfd slot = {.fd = ready[0], .events = POLLIN};
-        if (poll(&slot, 1, DEADLINE_MS) != 1) fail_msg("no ready line within %d ms", DEADLINE_MS);
-        ssize_t got = read(ready[0], head.ready + n, sizeof head.ready - 1 - n);
-        if (got <= 0) break;
-        n += (size_t)got;
-    }
-    close(ready[0]);
-    if (n == 0 || head.ready[n - 1] != '\n') {
-        wire_show(wire, "head.err");
-        fail_msg("the program ended without a ready line");
-    }
-    return head;
-}
+struct head head_start(struct wire *wire, const char *config, const char *const *more);
 
 /* The endpoint of the first link of a type ("tcp", "pty", "file"), as the ready line names it. */
-static inline const char *head_endpoint(const struct head *head, const char *type)
-{
-    static char endpoint[256];
-    char key[64];
-    snprintf(key, sizeof key, "{\"type\":\"%s\",\"endpoint\":\"", type);
-    const char *at = strstr(head->ready, key);
-    if (at == NULL) fail_msg("no %s link in %s", type, head->ready);
-    at += strlen(key);
-    snprintf(endpoint, sizeof endpoint, "%.*s", (int)strcspn(at, "\""), at);
-    return endpoint;
-}
+const char *head_endpoint(const struct head *head, const char *type);
 
 /* Ends the head with a signal (0: it ends by itself) and checks that it went in good order. */
-static inline void head_end(struct head *head, int signal_number)
-{
-    if (signal_number != 0) assert_int_equal(kill(head->pid, signal_number), 0);
-    int status = wire_wait(head->wire, head->pid);
-    if (status != 0) wire_show(head->wire, "head.err");
-    assert_int_equal(status, 0);
-}
+void head_end(struct head *head, int signal_number);
 
 /* ---- statistics: values of the JSON that --stats wrote. */
 
-static inline uint64_t stats_uint(const struct wire *wire, const char *key)
-{
-    char *text = wire_read(wire_path(wire, "stats.json"), NULL), name[64];
-    snprintf(name, sizeof name, "\"%s\":", key);
-    const char *at = strstr(text, name);
-    if (at == NULL) fail_msg("no %s in %s", key, text);
-    uint64_t value = strtoull(at + strlen(name), NULL, 10);
-    free(text);
-    return value;
-}
+uint64_t stats_uint(const struct wire *wire, const char *key);
 
-static inline void stats_hash(const struct wire *wire, char hex[65])
-{
-    char *text = wire_read(wire_path(wire, "stats.json"), NULL);
-    const char *at = strstr(text, "\"stream_sha256\":");
-    if (at == NULL || sscanf(at, "\"stream_sha256\": \"%64[0-9a-f]\"", hex) != 1 || strlen(hex) != 64)
-        fail_msg("no stream_sha256 in %s", text);
-    free(text);
-}
+void stats_hash(const struct wire *wire, char hex[65]);
 
 /* ---- clients */
 
-static inline struct scanhead *client_open(const char *source)
-{
-    struct scanhead *sh;
-    char why[256];
-    if (scanhead_open(source, &sh, why, sizeof why) != SCANHEAD_OK) fail_msg("%s", why);
-    return sh;
-}
+struct scanhead *client_open(const char *source);
 
 /* The reply; good until the next call. */
-static inline const char *client_ask(struct scanhead *sh, const char *command)
-{
-    static char reply[600];
-    if (scanhead_command(sh, command, reply, sizeof reply, DEADLINE_MS) != SCANHEAD_OK)
-        fail_msg("%s: %s", command, scanhead_error(sh));
-    return reply;
-}
+const char *client_ask(struct scanhead *sh, const char *command);
 
-static inline void client_tell(struct scanhead *sh, const char *command)
-{
-    const char *reply = client_ask(sh, command);
-    if (strcmp(reply, "OK") != 0) fail_msg("%s: %s", command, reply);
-}
+void client_tell(struct scanhead *sh, const char *command);
 
-static inline void client_next(struct scanhead *sh, struct scanhead_frame *frame)
-{
-    if (scanhead_next(sh, frame, DEADLINE_MS) != SCANHEAD_OK) fail_msg("%s", scanhead_error(sh));
-}
+void client_next(struct scanhead *sh, struct scanhead_frame *frame);
 
-static inline int is_event(const struct scanhead_frame *frame, uint32_t code)
-{
-    return frame->type == SCANHEAD_EVENT && frame->event == code;
-}
+int is_event(const struct scanhead_frame *frame, uint32_t code);
 
 /* Takes frames until an event of this code, and gives that one. */
-static inline void client_until(struct scanhead *sh, uint32_t code, struct scanhead_frame *frame)
-{
-    do
-        client_next(sh, frame);
-    while (!is_event(frame, code));
-}
+void client_until(struct scanhead *sh, uint32_t code, struct scanhead_frame *frame);
 
 /* Waits for the state by asking; each answer comes from the head, so this is no busy loop. Frames are taken.
  */
-static inline void client_wait_state(struct scanhead *sh, const char *state)
-{
-    int64_t end_ms = wire_now_ms() + DEADLINE_MS;
-    struct scanhead_frame frame;
-    while (strcmp(client_ask(sh, "HEAD:STAT?"), state) != 0) {
-        if (wire_now_ms() > end_ms) fail_msg("never %s", state);
-        scanhead_next(sh, &frame, 10);
-    }
-}
+void client_wait_state(struct scanhead *sh, const char *state);
 
 /* A plain socket to the "tcp:127.0.0.1:PORT" of the head. */
-static inline int raw_connect(const char *endpoint)
-{
-    const char *port = strrchr(endpoint, ':');
-    struct sockaddr_in at = {.sin_family = AF_INET, .sin_port = htons((uint16_t)atoi(port + 1))};
-    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    assert_true(fd >= 0);
-    if (connect(fd, (struct sockaddr *)&at, sizeof at) != 0) fail_msg("connect %s: %s", endpoint, strerror(errno));
-    return fd;
-}
+int raw_connect(const char *endpoint);
 
-static inline void raw_write(int fd, const void *data, size_t len)
-{
-    for (size_t done = 0; done < len;) {
-        ssize_t n = write(fd, (const char *)data + done, len - done);
-        if (n < 0) fail_msg("write: %s", strerror(errno));
-        done += (size_t)n;
-    }
-}
+void raw_write(int fd, const void *data, size_t len);
 
-static inline struct scanhead *client_from_fd(int fd)
-{
-    char source[32];
-    snprintf(source, sizeof source, "fd:%d", fd);
-    return client_open(source);
-}
+struct scanhead *client_from_fd(int fd);
 
 #endif

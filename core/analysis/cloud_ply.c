@@ -1,0 +1,131 @@
+/* Points from a PLY file. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/analysis/cloud_readers.h"
+#include "core/ply.h"
+
+struct reading {
+    struct ply_rows r;
+    struct cloud *cloud;
+    const struct sh_report *report;
+    bool is_single;
+};
+
+/* Our recorder writes the coordinate reference system as a comment. Other files lack it, which is no
+ * fault. */
+static int64_t find_epsg(const struct text *file)
+{
+    struct text t = *file;
+    int64_t epsg = CLOUD_EPSG_UNKNOWN, number;
+    t.end = file->p;
+    for (t.p = t.data; t.p < t.end; text_next_line(&t)) {
+        if (!text_is(text_word(&t), "comment") || !text_is(text_word(&t), "epsg")) continue;
+        text_skip_blanks(&t);
+        if (text_integer(&t, &number) && number >= 0 && text_at_word_end(&t)) epsg = number;
+    }
+    return epsg;
+}
+
+static int whole(struct reading *g, enum ply_use use, int min, int max, int *out, struct sh_err *err)
+{
+    double v = g->r.scalar[use];
+    if (v >= min && v <= max && v == floor(v)) {
+        *out = (int)v;
+        return SH_OK;
+    }
+    char what[96];
+    snprintf(what, sizeof what, "%s %.9g; allowed are whole numbers from %d to %d", ply_scalar_name[use], v, min, max);
+    return ply_fail(&g->r, err, what);
+}
+
+static int keep_point(void *reading, struct sh_err *err)
+{
+    struct reading *g = reading;
+    if (g->r.element->kind != PLY_VERTEX) return SH_OK;
+    struct cloud *c = g->cloud;
+    size_t i = (size_t)g->r.row;
+    const double *p = &g->r.scalar[PLY_X];
+    int n_nan = isnan(p[0]) + isnan(p[1]) + isnan(p[2]);
+    if (n_nan != 3 && !(isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]))) {
+        char what[112];
+        snprintf(what, sizeof what, "(%.9g %.9g %.9g) is no position; a shot without echo has three times nan", p[0],
+                 p[1], p[2]);
+        return ply_fail(&g->r, err, what);
+    }
+    int rc = SH_OK, station = 0, label = 0, echo = 0;
+    if (c->station != NULL) rc = whole(g, PLY_STATION, 1, UINT16_MAX, &station, err);
+    if (c->label != NULL && rc == SH_OK) rc = whole(g, PLY_LABEL, 0, UINT16_MAX, &label, err);
+    if (c->echo != NULL && rc == SH_OK) rc = whole(g, PLY_ECHO, 0, UINT8_MAX, &echo, err);
+    if (rc != SH_OK) return rc;
+    memcpy(c->xyz_m[i], p, sizeof c->xyz_m[i]);
+    if (c->station != NULL) c->station[i] = (uint16_t)station;
+    if (c->label != NULL) c->label[i] = (uint16_t)label;
+    if (c->echo != NULL) c->echo[i] = (uint8_t)echo;
+    return SH_OK;
+}
+
+static void warn_if_coarse(const struct reading *g)
+{
+    const double worth_a_word_m = 1e-4;
+    double largest = 0;
+    for (size_t i = 0; i < g->cloud->n; i++)
+        for (int k = 0; k < 3; k++)
+            largest = fmax(largest, fabs(g->cloud->xyz_m[i][k]));
+    if (g->cloud->epsg == 4979) largest *= 111320.0; /* degrees */
+    if (largest * 6e-8 > worth_a_word_m)
+        sh_warn(g->report, "%s: stored in single precision, so good to %.2g m only", g->r.t.path, largest * 6e-8);
+}
+
+static int begin_element(void *reading, struct sh_err *err)
+{
+    struct reading *g = reading;
+    const struct ply_element *e = g->r.element;
+    const struct ply_header *h = &g->r.h;
+    if (e->kind != PLY_VERTEX) return SH_OK;
+    g->is_single = ply_is_single(&g->r);
+    return cloud_reserve(g->cloud, (size_t)e->count, /* checked against the file's size */
+                         (ply_find(h, e, PLY_STATION) ? CLOUD_HAS_STATION : 0) |
+                             (ply_find(h, e, PLY_LABEL) ? CLOUD_HAS_LABEL : 0) |
+                             (ply_find(h, e, PLY_ECHO) ? CLOUD_HAS_ECHO : 0),
+                         err);
+}
+
+static void progress(void *reading, double fraction)
+{
+    sh_progress(((struct reading *)reading)->report, "reading the points", fraction);
+}
+
+static void tick(void *reading)
+{
+    progress(reading, -1);
+}
+
+static int read_body(struct reading *g, struct sh_err *err)
+{
+    const struct ply_user user = {g, begin_element, keep_point, progress, g->report, .has_faces = false};
+    const struct ply_header *h = &g->r.h;
+    bool has_points = false;
+    g->cloud->epsg = find_epsg(&g->r.t);
+    for (int i = 0; i < h->n_elements; i++)
+        has_points |= h->element[i].kind == PLY_VERTEX;
+    if (!has_points) return text_fail(&g->r.t, 0, SH_EINPUT, err, "no element vertex: there are no points");
+    int rc = ply_walk(&g->r, &user, err);
+    if (rc == SH_OK && g->is_single) warn_if_coarse(g);
+    return rc;
+}
+
+int cloud_read_ply(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err)
+{
+    struct reading *g = calloc(1, sizeof *g);
+    if (g == NULL) return sh_fail(err, SH_ENOMEM, "no memory to read %s", path);
+    g->cloud = out;
+    g->report = report;
+    int rc = ply_open(&g->r, path, tick, g, err);
+    if (rc == SH_OK) rc = read_body(g, err);
+    ply_close(&g->r);
+    free(g);
+    return rc;
+}

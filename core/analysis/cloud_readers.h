@@ -1,0 +1,21 @@
+/* The readers that cloud_read chooses from. */
+#ifndef CORE_ANALYSIS_CLOUD_READERS_H
+#define CORE_ANALYSIS_CLOUD_READERS_H
+
+#include <stdbool.h>
+
+#include "core/cloud.h"
+
+enum { CLOUD_HAS_STATION = 1, CLOUD_HAS_LABEL = 2, CLOUD_HAS_ECHO = 4 };
+
+/* Arrays for n points: positions, and those named in `has`. */
+int cloud_reserve(struct cloud *cloud, size_t n, unsigned has, struct sh_err *err);
+
+/* Does the file begin as a LAS file? */
+bool cloud_is_las(const char *path);
+
+/* As cloud_read; on failure the caller frees out. */
+int cloud_read_las(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err);
+int cloud_read_ply(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err);
+
+#endif

@@ -1,0 +1,28 @@
+/* What a georef consists of. Read by the files of core/georef alone. */
+#ifndef CORE_GEOREF_STATE_H
+#define CORE_GEOREF_STATE_H
+
+#include "core/georef.h"
+#include "core/georef/polynomial.h"
+
+struct georef {
+    enum georef_crs crs;
+    enum georef_method method;
+    double station_m[3]; /* prcs, and ... */
+    double origin[3];    /* ... there in the CRS where there is no map */
+    double centre_m[3];  /* prcs */
+    double anchor[3];
+    double rotation[9];   /* where there is no map: prcs -> CRS, row by row */
+    struct shim_map *map; /* NULL: linear */
+    int has_geoid, from_grid, epsg;
+    struct polynomial polynomial; /* of the map; half_m 0: none */
+};
+
+static inline int georef_has_map(const struct georef *georef)
+{
+    return georef->map != NULL;
+}
+
+void georef_degrees(const struct georef *georef, double height_m, double *lat_m, double *lon_m, double *axis_m);
+
+#endif

@@ -1,0 +1,100 @@
+/* Reading PLY files, as meshes (core/scene/read_ply.c) or points (core/analysis/cloud_ply.c): text, or binary
+ * of either byte order, with numbers of any type. In: a file. Out: its elements, and their rows one after the
+ * other as doubles.
+ *
+ * Order of calls: ply_open, ply_walk, ply_close. */
+#ifndef CORE_PLY_H
+#define CORE_PLY_H
+
+#include "core/text.h"
+
+enum { PLY_MAX_ELEMENTS = 16, PLY_MAX_PROPERTIES = 512 };
+
+enum ply_format { PLY_ASCII, PLY_LITTLE, PLY_BIG };
+
+enum ply_type { PLY_INT8, PLY_UINT8, PLY_INT16, PLY_UINT16, PLY_INT32, PLY_UINT32, PLY_FLOAT, PLY_DOUBLE };
+
+/* What a property is to us. */
+enum ply_use {
+    PLY_SKIP,
+    PLY_X, /* of vertices, as the others up to PLY_SCALARS */
+    PLY_Y,
+    PLY_Z,
+    PLY_STATION,
+    PLY_ECHO,
+    PLY_LABEL,
+    PLY_SCALARS,
+    PLY_CORNERS = PLY_SCALARS /* the list of a face */
+};
+
+struct ply_property {
+    enum ply_type type, count_type;
+    bool is_list;
+    enum ply_use use;
+};
+
+enum ply_kind { PLY_OTHER, PLY_VERTEX, PLY_FACE };
+
+struct ply_element {
+    char name[32];
+    enum ply_kind kind;
+    uint64_t count;
+    int first, n_properties; /* in property[] */
+};
+
+struct ply_header {
+    enum ply_format format;
+    int n_elements, n_properties;
+    struct ply_element element[PLY_MAX_ELEMENTS];
+    struct ply_property property[PLY_MAX_PROPERTIES];
+};
+
+extern const uint8_t ply_type_size[8];                 /* bytes, by ply_type */
+extern const char *const ply_scalar_name[PLY_SCALARS]; /* in the file, by ply_use from PLY_X on */
+
+/* Used within core/scene: leaves t at the first byte of data. A vertex has x, y and z afterwards; faces may
+ * lack their list. */
+int ply_read_header(struct ply_header *h, struct text *t, struct sh_err *err);
+
+/* The element's property of that use, or NULL. */
+const struct ply_property *ply_find(const struct ply_header *h, const struct ply_element *e, enum ply_use use);
+
+struct ply_rows {
+    struct text t;
+    struct ply_header h;
+    const struct ply_element *element; /* being read */
+    uint64_t row;                      /* of it, from 0 */
+    double scalar[PLY_SCALARS];        /* of the row, by ply_use; [PLY_SKIP] has no meaning */
+    double *corner;                    /* the list of use PLY_CORNERS */
+    size_t n_corners, cap_corners;
+};
+
+/* Opens the file and reads the header; path has to stay. ply_close is due in any case. */
+int ply_open(struct ply_rows *r, const char *path, void (*tick)(void *ctx), void *ctx, struct sh_err *err);
+void ply_close(struct ply_rows *r);
+
+/* Who takes the rows. */
+struct ply_user {
+    void *ctx;
+    int (*begin)(void *ctx, struct sh_err *err); /* before the rows of r->element, whose count fits into the file */
+    int (*row)(void *ctx, struct sh_err *err);   /* after each row, which is in r; row r->row of the element */
+    void (*progress)(void *ctx, double fraction);
+    const struct sh_report *report; /* gets warnings */
+    bool has_faces;                 /* faces are used, not passed over */
+};
+
+/* Reads all rows in the order of the file. Warns of elements that nobody uses, and of bytes after the last
+ * row. */
+int ply_walk(struct ply_rows *r, const struct ply_user *user, struct sh_err *err);
+
+/* Fails with "FILE, line L: ELEMENT N of M: what", or the byte instead of the line in a binary. */
+int ply_fail(const struct ply_rows *r, struct sh_err *err, const char *what);
+
+/* The line of a text, 0 in a binary. */
+uint64_t ply_line(const struct ply_rows *r);
+
+/* Are x, y or z of r->element, a vertex, stored in single precision? Their numbers are read as they stand,
+ * but what they stood for was rounded. */
+bool ply_is_single(const struct ply_rows *r);
+
+#endif

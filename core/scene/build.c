@@ -1,0 +1,344 @@
+#include "core/scene/build.h"
+
+#include <math.h>
+#include <search.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "core/huge.h"
+#include "core/vec3.h"
+
+static const double MAX_COORDINATE_M = 1e9;
+
+static int64_t now_ns(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (int64_t)t.tv_sec * 1000000000 + t.tv_nsec;
+}
+
+int build_init(struct scene_build *b, double tolerance_m, const struct sh_report *report, struct sh_err *err)
+{
+    *b = (struct scene_build){.tolerance_m = tolerance_m, .report = report, .start_ns = now_ns()};
+    b->scene = calloc(1, sizeof *b->scene);
+    if (b->scene == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a scene");
+    /* In full, since the tree holds pointers into it: pages that are not used are never touched. */
+    b->scene->surface = malloc((SCENE_MAX_SURFACES + 1) * sizeof *b->scene->surface);
+    if (b->scene->surface == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the scene's surfaces");
+    return SH_OK;
+}
+
+static void keep_surface(void *surface)
+{
+    (void)surface; /* the scene owns it */
+}
+
+void build_release(struct scene_build *b)
+{
+    if (b->surface_tree != NULL) tdestroy(b->surface_tree, keep_surface);
+    b->surface_tree = NULL;
+    triangulate_free(&b->polygon);
+    free(b->corner);
+    free(b->corner_uv);
+    scene_free(b->scene);
+    b->scene = NULL;
+}
+
+void build_begin_file(struct scene_build *b, const struct scene_mesh_spec *spec)
+{
+    size_t len = strlen(spec->file);
+    if (len < sizeof b->name)
+        memcpy(b->name, spec->file, len + 1);
+    else
+        snprintf(b->name, sizeof b->name, "...%s", spec->file + len - (sizeof b->name - 4));
+    b->spec = spec;
+    b->line = 0;
+    b->mesh = NULL;
+    b->vertex0 = b->mesh_vertex0 = b->scene->n_vertices;
+    b->triangle0 = b->scene->n_triangles;
+    b->counts = (struct scene_counts){0};
+    b->has_uv = false;
+    b->not_simple = 0;
+    b->file_ns = now_ns();
+}
+
+static void report(struct scene_build *b, double fraction)
+{
+    char what[sizeof b->name + 16];
+    snprintf(what, sizeof what, "reading %s", b->name);
+    b->reported_ns = now_ns();
+    sh_progress(b->report, what, fraction);
+}
+
+int build_end_file(struct scene_build *b, struct sh_err *err)
+{
+    b->line = 0;
+    b->mesh = NULL;
+    if (b->counts.zero_area > 0)
+        sh_warn(b->report, "%s: %llu triangles without area left out", b->name,
+                (unsigned long long)b->counts.zero_area);
+    if (b->counts.not_triangles > 0)
+        sh_warn(b->report, "%s: %llu points and lines left out", b->name, (unsigned long long)b->counts.not_triangles);
+    if (b->counts.names_cut > 0)
+        sh_warn(b->report, "%s: %llu names cut to %d bytes", b->name, (unsigned long long)b->counts.names_cut,
+                SCENE_NAME_LEN - 1);
+    if (b->not_simple > 0)
+        sh_warn(b->report, "%s: %llu polygons cross themselves; their triangles overlap", b->name,
+                (unsigned long long)b->not_simple);
+    b->scene->counts.zero_area += b->counts.zero_area;
+    b->scene->counts.not_triangles += b->counts.not_triangles;
+    b->scene->counts.names_cut += b->counts.names_cut;
+    if (b->reported_ns > b->file_ns) report(b, 1);
+    if (b->scene->n_triangles == b->triangle0)
+        return build_fail(b, SH_EINPUT, err, "no triangles in it (%llu without area, %llu points and lines)",
+                          (unsigned long long)b->counts.zero_area, (unsigned long long)b->counts.not_triangles);
+    return SH_OK;
+}
+
+/* The array as it stays: without the room to grow, and where lookups all over it are quick. */
+static void settle(void **array, size_t n, size_t size)
+{
+    void *last = huge_alloc(n * size);
+    if (last == NULL) return;
+    memcpy(last, *array, n * size);
+    free(*array);
+    *array = last;
+}
+
+int build_finish(struct scene_build *b, struct scene **out, struct sh_err *err)
+{
+    struct scene *s = b->scene;
+    if (s->n_triangles == 0) return sh_fail(err, SH_EINPUT, "the scene has no triangles");
+    if (b->surface_tree != NULL) tdestroy(b->surface_tree, keep_surface);
+    b->surface_tree = NULL;
+    settle((void **)&s->surface, s->n_surfaces, sizeof *s->surface);
+    settle((void **)&s->vertex_m, s->n_vertices, sizeof *s->vertex_m);
+    settle((void **)&s->triangle, s->n_triangles, sizeof *s->triangle);
+    settle((void **)&s->label, s->n_triangles, sizeof *s->label);
+    if (s->n_textures == 0) {
+        free(s->uv);
+        s->uv = NULL;
+    }
+    if (s->uv != NULL) settle((void **)&s->uv, s->n_triangles, sizeof *s->uv);
+    for (int k = 0; k < 3; k++) {
+        s->min_m[k] = INFINITY;
+        s->max_m[k] = -INFINITY;
+    }
+    for (uint32_t i = 0; i < s->n_triangles; i++) {
+        for (int c = 0; c < 3; c++) {
+            const double *v = s->vertex_m[s->triangle[i][c]];
+            for (int k = 0; k < 3; k++) {
+                if (v[k] < s->min_m[k]) s->min_m[k] = v[k];
+                if (v[k] > s->max_m[k]) s->max_m[k] = v[k];
+            }
+        }
+    }
+    *out = s;
+    b->scene = NULL;
+    return SH_OK;
+}
+
+int build_fail(struct scene_build *b, int code, struct sh_err *err, const char *fmt, ...)
+{
+    char place[96] = "", text[320];
+    if (b->line > 0)
+        snprintf(place, sizeof place, ", line %llu", (unsigned long long)b->line);
+    else if (b->mesh != NULL)
+        snprintf(place, sizeof place, ", mesh '%.64s'", b->mesh);
+    va_list ap;
+    va_start(ap, fmt);
+    vsnprintf(text, sizeof text, fmt, ap);
+    va_end(ap);
+    text_keep_line(text);
+    return sh_fail(err, code, "%s%s: %s", b->name, place, text);
+}
+
+/* The next capacity: at least `need`, half as much again as before, at most max. */
+static uint32_t next_capacity(uint32_t cap, uint64_t need, uint32_t max)
+{
+    uint64_t grown = (uint64_t)cap + cap / 2 + 1024;
+    if (grown < need) grown = need;
+    return grown > max ? max : (uint32_t)grown;
+}
+
+static int grow_vertices(struct scene_build *b, uint64_t need, struct sh_err *err)
+{
+    if (need > UINT32_MAX - 1)
+        return build_fail(b, SH_EINPUT, err, "too many vertices: a scene holds up to %u", UINT32_MAX - 1);
+    if (need <= b->cap_vertices) return SH_OK;
+    uint32_t cap = next_capacity(b->cap_vertices, need, UINT32_MAX - 1);
+    void *v = realloc(b->scene->vertex_m, cap * sizeof *b->scene->vertex_m);
+    if (v == NULL) return build_fail(b, SH_ENOMEM, err, "no memory for %u vertices", cap);
+    b->scene->vertex_m = v;
+    b->cap_vertices = cap;
+    return SH_OK;
+}
+
+static int grow_triangles(struct scene_build *b, uint64_t need, struct sh_err *err)
+{
+    if (need > UINT32_MAX - 1)
+        return build_fail(b, SH_EINPUT, err, "too many triangles: a scene holds up to %u", UINT32_MAX - 1);
+    if (need <= b->cap_triangles) return SH_OK;
+    uint32_t cap = next_capacity(b->cap_triangles, need, UINT32_MAX - 1);
+    void *t = realloc(b->scene->triangle, cap * sizeof *b->scene->triangle);
+    if (t != NULL) b->scene->triangle = t;
+    void *l = t != NULL ? realloc(b->scene->label, cap * sizeof *b->scene->label) : NULL;
+    if (l != NULL) b->scene->label = l;
+    void *uv = l != NULL && b->scene->uv != NULL ? realloc(b->scene->uv, cap * sizeof *b->scene->uv) : NULL;
+    if (uv != NULL) b->scene->uv = uv;
+    if (l == NULL || (b->scene->uv != NULL && uv == NULL))
+        return build_fail(b, SH_ENOMEM, err, "no memory for %u triangles", cap);
+    b->cap_triangles = cap;
+    return SH_OK;
+}
+
+int build_reserve(struct scene_build *b, uint64_t vertices, uint64_t triangles, struct sh_err *err)
+{
+    int rc = vertices > 0 ? grow_vertices(b, b->scene->n_vertices + vertices, err) : SH_OK;
+    if (rc == SH_OK && triangles > 0) rc = grow_triangles(b, b->scene->n_triangles + triangles, err);
+    return rc;
+}
+
+int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err)
+{
+    struct scene *s = b->scene;
+    const struct scene_mesh_spec *spec = b->spec;
+    unsigned long long number = s->n_vertices - b->mesh_vertex0 + 1ull;
+    if (!isfinite(v[0]) || !isfinite(v[1]) || !isfinite(v[2]))
+        return build_fail(b, SH_EINPUT, err, "vertex %llu (%g %g %g) is not finite", number, v[0], v[1], v[2]);
+    if (s->n_vertices >= b->cap_vertices) {
+        int rc = grow_vertices(b, s->n_vertices + 1ull, err);
+        if (rc != SH_OK) return rc;
+    }
+    bool y_up = spec->up == SCENE_UP_Y;
+    double turned[3] = {v[0], y_up ? -v[2] : v[1], y_up ? v[1] : v[2]};
+    double *p = s->vertex_m[s->n_vertices];
+    for (int k = 0; k < 3; k++) {
+        p[k] = turned[k] * spec->scale + spec->offset_m[k];
+        if (!(fabs(p[k]) <= MAX_COORDINATE_M))
+            return build_fail(b, SH_EINPUT, err, "vertex %llu is at %g m; allowed are coordinates up to %g m", number,
+                              p[k], MAX_COORDINATE_M);
+    }
+    s->n_vertices++;
+    return SH_OK;
+}
+
+/* Without area: the height over the longest edge is below 1e-12 of that edge. Rounding of the differences and
+ * products stays under 1e-15 of it, so the test separates zero from noise. No real needle is that thin: over
+ * 100 m it would be narrower than an atom. The test asks for "greater", so that underflow counts as zero. */
+static bool has_area(const double *a, const double *b, const double *c)
+{
+    double u[3], v[3], w[3];
+    for (int k = 0; k < 3; k++) {
+        u[k] = b[k] - a[k];
+        v[k] = c[k] - a[k];
+        w[k] = c[k] - b[k];
+    }
+    double n[3], longest2 = fmax(fmax(vec3_dot(u, u), vec3_dot(v, v)), vec3_dot(w, w));
+    vec3_cross(u, v, n);
+    return sqrt(vec3_dot(n, n)) > 1e-12 * longest2;
+}
+
+static const float no_uv[3][2] = {{NAN, NAN}, {NAN, NAN}, {NAN, NAN}};
+
+/* The first triangle that has some makes room for those of all. */
+static int keep_uv(struct scene_build *b, const float uv[3][2], struct sh_err *err)
+{
+    struct scene *s = b->scene;
+    if (s->uv == NULL) {
+        if (uv == no_uv) return SH_OK;
+        s->uv = malloc(b->cap_triangles * sizeof *s->uv);
+        if (s->uv == NULL) return build_fail(b, SH_ENOMEM, err, "no memory for texture coordinates");
+        for (uint32_t i = 0; i < s->n_triangles; i++)
+            memcpy(s->uv[i], no_uv, sizeof no_uv);
+    }
+    memcpy(s->uv[s->n_triangles], uv, sizeof no_uv);
+    return SH_OK;
+}
+
+/* uv: of the corners, or no_uv. */
+static int add_triangle(struct scene_build *b, const uint32_t corner[3], const float uv[3][2], uint16_t label,
+                        struct sh_err *err)
+{
+    struct scene *s = b->scene;
+    if (!has_area(s->vertex_m[corner[0]], s->vertex_m[corner[1]], s->vertex_m[corner[2]])) {
+        b->counts.zero_area++;
+        return SH_OK;
+    }
+    if (s->n_triangles >= b->cap_triangles) {
+        int rc = grow_triangles(b, s->n_triangles + 1ull, err);
+        if (rc != SH_OK) return rc;
+    }
+    int rc = keep_uv(b, uv, err);
+    memcpy(s->triangle[s->n_triangles], corner, sizeof *s->triangle);
+    s->label[s->n_triangles++] = label;
+    return rc;
+}
+
+int build_triangle(struct scene_build *b, const uint32_t corner[3], uint16_t label, struct sh_err *err)
+{
+    return add_triangle(b, corner, no_uv, label, err);
+}
+
+int build_corners(struct scene_build *b, size_t n, struct sh_err *err)
+{
+    if (n <= b->cap_corners) return SH_OK;
+    size_t cap = n + n / 2 + 16;
+    void *corner = realloc(b->corner, cap * sizeof *b->corner);
+    if (corner != NULL) b->corner = corner;
+    void *uv = realloc(b->corner_uv, cap * sizeof *b->corner_uv);
+    if (uv != NULL) b->corner_uv = uv;
+    if (corner == NULL || uv == NULL) return build_fail(b, SH_ENOMEM, err, "no memory for a face of %zu corners", n);
+    b->cap_corners = cap;
+    return SH_OK;
+}
+
+static int add_corners(struct scene_build *b, const uint32_t at[3], uint16_t label, struct sh_err *err)
+{
+    uint32_t corner[3];
+    float uv[3][2];
+    for (int k = 0; k < 3; k++) {
+        corner[k] = b->corner[at[k]];
+        if (b->has_uv) memcpy(uv[k], b->corner_uv[at[k]], sizeof uv[k]);
+    }
+    return add_triangle(b, corner, b->has_uv ? (const float(*)[2])uv : no_uv, label, err);
+}
+
+int build_polygon(struct scene_build *b, size_t n, uint16_t label, struct sh_err *err)
+{
+    if (n == 3) return add_corners(b, (const uint32_t[3]){0, 1, 2}, label, err);
+    if (n > SCENE_MAX_CORNERS)
+        return build_fail(b, SH_EINPUT, err, "a polygon has %zu corners; allowed are up to %d", n, SCENE_MAX_CORNERS);
+    struct triangulate *t = &b->polygon;
+    if (triangulate_reserve(t, n) != SH_OK)
+        return build_fail(b, SH_ENOMEM, err, "no memory for a polygon of %zu corners", n);
+    for (size_t i = 0; i < n; i++)
+        memcpy(t->p[i], b->scene->vertex_m[b->corner[i]], sizeof *t->p);
+    triangulate_polygon(t, (uint32_t)n);
+    if (!t->simple) b->not_simple++;
+    int rc = SH_OK;
+    for (size_t i = 0; i + 2 < n && rc == SH_OK; i++)
+        rc = add_corners(b, t->triangle[i], label, err);
+    return rc;
+}
+
+void build_progress(struct scene_build *b, double fraction)
+{
+    int64_t now = now_ns();
+    if (now - b->start_ns >= 1000000000 && now - b->reported_ns >= 250000000) report(b, fraction);
+}
+
+void build_announce(struct scene_build *b)
+{
+    report(b, -1);
+}
+
+struct text_span build_base_name(const struct scene_build *b)
+{
+    const char *slash = strrchr(b->spec->file, '/'), *name = slash != NULL ? slash + 1 : b->spec->file;
+    const char *dot = strrchr(name, '.');
+    return (struct text_span){name, dot != NULL && dot > name ? (size_t)(dot - name) : strlen(name)};
+}

@@ -1,0 +1,88 @@
+/* How the readers make a scene: vertices and faces go in file by file, in file coordinates, and the builder
+ * turns, scales, shifts, checks, cuts polygons up, names surfaces and counts what was left out. */
+#ifndef CORE_SCENE_BUILD_H
+#define CORE_SCENE_BUILD_H
+
+#include "core/scene.h"
+#include "core/scene/triangulate.h"
+#include "core/text.h"
+
+enum { SCENE_MAX_CORNERS = 65536 }; /* of one polygon: ear clipping is quadratic */
+
+struct scene_build {
+    struct scene *scene;
+    double tolerance_m;
+    const struct sh_report *report;
+    /* of the file being read */
+    const struct scene_mesh_spec *spec;
+    char name[128];              /* of the file, for messages; a long path is cut at its front */
+    uint64_t line;               /* of a text file, for messages; 0 where there is none */
+    const char *mesh;            /* name of the mesh within the file, for messages; may be NULL */
+    uint32_t vertex0, triangle0; /* the scene's size before this file */
+    uint32_t mesh_vertex0;       /* the scene's size before this mesh; messages count from here */
+    struct scene_counts counts;
+    uint64_t not_simple;
+    /* the next polygon, room by build_corners */
+    uint32_t *corner;      /* indices into the scene, which the reader has checked */
+    float (*corner_uv)[2]; /* where has_uv: their texture coordinates */
+    bool has_uv;
+    /* the builder's own */
+    size_t cap_corners;
+    uint32_t cap_vertices, cap_triangles;
+    void *surface_tree;
+    struct triangulate polygon;
+    int64_t start_ns, file_ns, reported_ns; /* of the load, of this file, of the last report */
+};
+
+int build_init(struct scene_build *b, double tolerance_m, const struct sh_report *report, struct sh_err *err);
+void build_begin_file(struct scene_build *b, const struct scene_mesh_spec *spec);
+/* Warns of what was left out; SH_EINPUT when the file gave no triangle. */
+int build_end_file(struct scene_build *b, struct sh_err *err);
+/* Hands the scene over. build_release is due in any case. */
+int build_finish(struct scene_build *b, struct scene **out, struct sh_err *err);
+void build_release(struct scene_build *b);
+
+/* Fails with "FILE, line N, mesh 'M': text". Returns code. */
+int build_fail(struct scene_build *b, int code, struct sh_err *err, const char *fmt, ...)
+    __attribute__((format(printf, 4, 5)));
+
+/* Room for that many more, so that a reader that knows its counts allocates once. */
+int build_reserve(struct scene_build *b, uint64_t vertices, uint64_t triangles, struct sh_err *err);
+
+/* v in the file's units and axes. Its index in the scene is scene->n_vertices before the call. */
+int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err);
+
+/* Makes room for n corners in corner and corner_uv; what is in them stays. */
+int build_corners(struct scene_build *b, size_t n, struct sh_err *err);
+/* Adds the polygon of the n >= 3 corners in corner. */
+int build_polygon(struct scene_build *b, size_t n, uint16_t label, struct sh_err *err);
+/* Adds one triangle without texture coordinates. corner: as above, but the caller's. */
+int build_triangle(struct scene_build *b, const uint32_t corner[3], uint16_t label, struct sh_err *err);
+
+/* The label of a pair of names; a new pair gets the next number. */
+int build_label(struct scene_build *b, struct text_span object, struct text_span material, uint16_t *label,
+                struct sh_err *err);
+
+/* The number, from 1, of a texture. name: its file, as the mesh or its library names it, in the folder of the
+ * mesh. An image within the mesh's file comes in bytes, else NULL. *number stays where there is no memory. */
+int build_texture(struct scene_build *b, struct text_span name, const void *bytes, size_t n_bytes, uint16_t *number,
+                  struct sh_err *err);
+
+/* Reports "reading FILE" about four times a second, once the load takes longer than a second. */
+void build_progress(struct scene_build *b, double fraction);
+
+/* Reports "reading FILE" with an unknown fraction, at once. */
+void build_announce(struct scene_build *b);
+
+/* The file's name without folders and ending: the object's name where a file has none. */
+struct text_span build_base_name(const struct scene_build *b);
+
+/* The readers. Each has the spec, and the file's name, from the builder. */
+int read_obj(struct scene_build *b, struct sh_err *err);
+/* Colours and textures of the surfaces from first_surface on, from the library that the OBJ names. Meshes
+ * often come without it: then they have none, and whoever needs colours says so. */
+int read_mtl(struct scene_build *b, struct text_span name, uint32_t first_surface, struct sh_err *err);
+int read_ply(struct scene_build *b, struct sh_err *err);
+int import_assimp(struct scene_build *b, struct sh_err *err);
+
+#endif

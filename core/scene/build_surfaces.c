@@ -1,0 +1,90 @@
+/* Surfaces of the scene that is being built: labels, names, textures. */
+#include "core/scene/build.h"
+
+#include <search.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static int compare_surfaces(const void *a, const void *b)
+{
+    const struct scene_surface *x = a, *y = b;
+    int order = strcmp(x->object, y->object);
+    return order != 0 ? order : strcmp(x->material, y->material);
+}
+
+/* Cut between two characters of UTF-8, not within one. */
+static unsigned copy_name(char out[SCENE_NAME_LEN], struct text_span name)
+{
+    size_t len = name.n;
+    bool cut = len > SCENE_NAME_LEN - 1;
+    if (cut) {
+        len = SCENE_NAME_LEN - 1;
+        while (len > 0 && ((unsigned char)name.p[len] & 0xc0) == 0x80)
+            len--;
+    }
+    memcpy(out, name.p, len);
+    out[len] = '\0';
+    return cut ? 1 : 0;
+}
+
+int build_label(struct scene_build *b, struct text_span object, struct text_span material, uint16_t *label,
+                struct sh_err *err)
+{
+    struct scene *s = b->scene;
+    struct scene_surface *fresh = &s->surface[s->n_surfaces]; /* room for one more than allowed */
+    fresh->has_colour = 0;
+    fresh->texture = 0;
+    unsigned cut = copy_name(fresh->object, object);
+    cut += copy_name(fresh->material, material);
+    struct scene_surface **found = tsearch(fresh, &b->surface_tree, compare_surfaces);
+    if (found == NULL) return build_fail(b, SH_ENOMEM, err, "no memory for the scene's surfaces");
+    if (*found == fresh) {
+        if (s->n_surfaces == SCENE_MAX_SURFACES)
+            return build_fail(b, SH_EINPUT, err,
+                              "too many surfaces (an object with one material each): a scene holds up to %d",
+                              SCENE_MAX_SURFACES);
+        s->n_surfaces++;
+        b->counts.names_cut += cut;
+    }
+    *label = (uint16_t)(*found - s->surface);
+    return SH_OK;
+}
+
+/* A name in a mesh's file is that of a file in the same folder; other systems write \. */
+static char *beside(const struct scene_build *b, struct text_span name)
+{
+    const char *slash = strrchr(b->spec->file, '/');
+    size_t folder = name.p[0] != '/' && slash != NULL ? (size_t)(slash - b->spec->file) + 1 : 0;
+    char *path = malloc(folder + name.n + 1);
+    if (path == NULL) return NULL;
+    memcpy(path, b->spec->file, folder);
+    for (size_t i = 0; i < name.n; i++)
+        path[folder + i] = name.p[i] == '\\' ? '/' : name.p[i];
+    path[folder + name.n] = '\0';
+    return path;
+}
+
+int build_texture(struct scene_build *b, struct text_span name, const void *bytes, size_t n_bytes, uint16_t *number,
+                  struct sh_err *err)
+{
+    struct scene *s = b->scene;
+    char *file = beside(b, name);
+    for (uint32_t i = 0; file != NULL && i < s->n_textures; i++)
+        if (strcmp(s->texture[i].file, file) == 0) {
+            free(file);
+            *number = (uint16_t)(i + 1);
+            return SH_OK;
+        }
+    struct scene_texture *more = file != NULL ? realloc(s->texture, (s->n_textures + 1) * sizeof *s->texture) : NULL;
+    if (more != NULL) s->texture = more;
+    uint8_t *copy = more != NULL && bytes != NULL ? malloc(n_bytes) : NULL;
+    if (more == NULL || (bytes != NULL && copy == NULL)) {
+        free(file);
+        return build_fail(b, SH_ENOMEM, err, "no memory for a texture");
+    }
+    if (copy != NULL) memcpy(copy, bytes, n_bytes);
+    s->texture[s->n_textures++] = (struct scene_texture){file, copy, copy != NULL ? n_bytes : 0};
+    *number = (uint16_t)s->n_textures; /* one a surface at most */
+    return SH_OK;
+}

@@ -1,0 +1,182 @@
+#include "core/ply.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/grow.h"
+
+int ply_open(struct ply_rows *r, const char *path, void (*tick)(void *ctx), void *ctx, struct sh_err *err)
+{
+    *r = (struct ply_rows){0};
+    int rc = text_open(&r->t, path, tick, ctx, err);
+    return rc == SH_OK ? ply_read_header(&r->h, &r->t, err) : rc;
+}
+
+void ply_close(struct ply_rows *r)
+{
+    free(r->corner);
+    text_close(&r->t);
+    *r = (struct ply_rows){0};
+}
+
+uint64_t ply_line(const struct ply_rows *r)
+{
+    return r->h.format == PLY_ASCII ? r->t.line : 0;
+}
+
+/* Where a text goes wrong is its line; in a binary it is the byte. */
+int ply_fail(const struct ply_rows *r, struct sh_err *err, const char *what)
+{
+    char place[64] = "";
+    if (r->h.format != PLY_ASCII) snprintf(place, sizeof place, ", byte %zu", (size_t)(r->t.p - r->t.data));
+    return text_fail(&r->t, ply_line(r), SH_EINPUT, err, "%s %llu of %llu%s: %s", r->element->name,
+                     (unsigned long long)r->row + 1, (unsigned long long)r->element->count, place, what);
+}
+
+static double load_binary(const unsigned char *p, enum ply_type type, bool big)
+{
+    uint64_t bits = 0;
+    unsigned size = ply_type_size[type];
+    for (unsigned i = 0; i < size; i++)
+        bits = bits << 8 | p[big ? i : size - 1 - i];
+    switch (type) {
+    case PLY_INT8:
+        return (int8_t)bits;
+    case PLY_INT16:
+        return (int16_t)bits;
+    case PLY_INT32:
+        return (int32_t)bits;
+    case PLY_FLOAT: {
+        uint32_t low = (uint32_t)bits;
+        float f;
+        memcpy(&f, &low, sizeof f);
+        return (double)f;
+    }
+    case PLY_DOUBLE: {
+        double d;
+        memcpy(&d, &bits, sizeof d);
+        return d;
+    }
+    default:
+        return (double)bits;
+    }
+}
+
+static int read_scalar(struct ply_rows *r, enum ply_type type, double *value, struct sh_err *err)
+{
+    if (r->h.format == PLY_ASCII) {
+        text_skip_blanks(&r->t);
+        if (text_number(&r->t, value)) return SH_OK;
+        return ply_fail(r, err, text_at_line_end(&r->t) ? "a value is missing" : "a value is not a number");
+    }
+    if ((size_t)(r->t.end - r->t.p) < ply_type_size[type]) return ply_fail(r, err, "the file ends within it");
+    *value = load_binary((const unsigned char *)r->t.p, type, r->h.format == PLY_BIG);
+    r->t.p += ply_type_size[type];
+    return SH_OK;
+}
+
+static int keep_corner(struct ply_rows *r, double value, struct sh_err *err)
+{
+    if (!grow(&r->corner, &r->cap_corners, r->n_corners + 1, sizeof *r->corner))
+        return text_fail(&r->t, ply_line(r), SH_ENOMEM, err, "no memory for a face");
+    r->corner[r->n_corners++] = value;
+    return SH_OK;
+}
+
+static int read_list(struct ply_rows *r, const struct ply_property *p, struct sh_err *err)
+{
+    double count;
+    int rc = read_scalar(r, p->count_type, &count, err);
+    if (rc != SH_OK) return rc;
+    if (!(count >= 0 && count <= UINT32_MAX) || count != floor(count))
+        return ply_fail(r, err, "a list's count is not a whole number from 0");
+    for (uint64_t i = 0; i < (uint64_t)count && rc == SH_OK; i++) {
+        double value;
+        rc = read_scalar(r, p->type, &value, err);
+        if (rc == SH_OK && p->use == PLY_CORNERS) rc = keep_corner(r, value, err);
+    }
+    return rc;
+}
+
+static void skip_blank_lines(struct text *t)
+{
+    for (text_skip_blanks(t); t->p < t->end && text_at_line_end(t); text_skip_blanks(t))
+        text_next_line(t);
+}
+
+static int read_row(struct ply_rows *r, struct sh_err *err)
+{
+    const struct ply_element *e = r->element;
+    r->n_corners = 0;
+    if (r->h.format == PLY_ASCII) {
+        skip_blank_lines(&r->t);
+        if (r->t.p >= r->t.end) return ply_fail(r, err, "the file ends before it");
+    }
+    int rc = SH_OK;
+    for (int i = e->first; i < e->first + e->n_properties && rc == SH_OK; i++) {
+        const struct ply_property *p = &r->h.property[i];
+        rc = p->is_list ? read_list(r, p, err) : read_scalar(r, p->type, &r->scalar[p->use], err);
+    }
+    if (rc != SH_OK || r->h.format != PLY_ASCII) return rc;
+    text_skip_blanks(&r->t);
+    if (text_at_line_end(&r->t)) return SH_OK;
+    return ply_fail(r, err, "there are more values than the header says");
+}
+
+static int begin(struct ply_rows *r, int i, struct sh_err *err)
+{
+    const struct ply_element *e = r->element = &r->h.element[i];
+    r->row = 0;
+    bool ascii = r->h.format == PLY_ASCII;
+    uint64_t least = 0; /* bytes of a row; in a text, a digit and a separator for each value */
+    for (int k = e->first; k < e->first + e->n_properties; k++) {
+        const struct ply_property *p = &r->h.property[k];
+        least += ascii ? 2 : ply_type_size[p->is_list ? p->count_type : p->type];
+    }
+    uint64_t rest = (uint64_t)(r->t.end - r->t.p) + ascii; /* no line end at the end */
+    if (e->count == 0 || e->count <= rest / least) return SH_OK;
+    return text_fail(&r->t, 0, SH_EINPUT, err, "%llu of element %s need %llu bytes or more each; %llu are left",
+                     (unsigned long long)e->count, e->name, (unsigned long long)least, (unsigned long long)rest);
+}
+
+bool ply_is_single(const struct ply_rows *r)
+{
+    const struct ply_element *e = r->element;
+    bool is_float = false;
+    for (int i = e->first; i < e->first + e->n_properties; i++) {
+        const struct ply_property *p = &r->h.property[i];
+        is_float |= p->use >= PLY_X && p->use <= PLY_Z && p->type == PLY_FLOAT;
+    }
+    return is_float && r->h.format != PLY_ASCII;
+}
+
+static int walk_element(struct ply_rows *r, int i, const struct ply_user *user, struct sh_err *err)
+{
+    int rc = begin(r, i, err);
+    if (rc == SH_OK) rc = user->begin(user->ctx, err);
+    for (; r->row < r->element->count && rc == SH_OK; r->row++) {
+        rc = read_row(r, err);
+        if (rc == SH_OK) rc = user->row(user->ctx, err);
+        if ((r->row & 0xffff) == 0) user->progress(user->ctx, (double)(r->t.p - r->t.data) / (double)r->t.size);
+    }
+    return rc;
+}
+
+int ply_walk(struct ply_rows *r, const struct ply_user *user, struct sh_err *err)
+{
+    for (int i = 0; i < r->h.n_elements; i++) {
+        const struct ply_element *e = &r->h.element[i];
+        int rc = walk_element(r, i, user, err);
+        if (rc != SH_OK) return rc;
+        if (e->count > 0 && (e->kind == PLY_OTHER || (e->kind == PLY_FACE && !user->has_faces)))
+            sh_warn(user->report, "%s: element '%s' (%llu of it) ignored", r->t.path, e->name,
+                    (unsigned long long)e->count);
+    }
+    if (r->h.format == PLY_ASCII) skip_blank_lines(&r->t);
+    if (r->t.p < r->t.end)
+        sh_warn(user->report, "%s: %zu bytes after the last element ignored", r->t.path,
+                (size_t)(r->t.end - r->t.p));
+    return SH_OK;
+}

@@ -1,0 +1,67 @@
+/* A file in memory, and reading text from it: words, numbers, lines. In: a path. Out: its bytes, and a place
+ * in them that each call moves on. Numbers are exact (nearest double) and don't depend on the locale. */
+#ifndef CORE_TEXT_H
+#define CORE_TEXT_H
+
+#include <locale.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "core/err.h"
+
+/* Part of a text; the bytes stay where they are, without a NUL. */
+struct text_span {
+    const char *p;
+    size_t n;
+};
+
+/* The same text? */
+bool text_is(struct text_span span, const char *text);
+
+struct text {
+    const char *path; /* the caller's */
+    char *data;       /* the whole file, with a NUL after it */
+    size_t size;
+    const char *p, *end;
+    uint64_t line;  /* of p, from 1 */
+    bool continued; /* a backslash before the line's end joins the next one (OBJ) */
+    locale_t c_locale;
+};
+
+/* Reads the whole file; tick (may be NULL) is called every 16 MiB. text_close is due in any case. */
+int text_open(struct text *t, const char *path, void (*tick)(void *ctx), void *ctx, struct sh_err *err);
+void text_close(struct text *t);
+
+/* Fails with "FILE, line N: text", or without the line when it is 0. Returns code. */
+int text_fail(const struct text *t, uint64_t line, int code, struct sh_err *err, const char *fmt, ...)
+    __attribute__((format(printf, 5, 6)));
+
+/* Makes control characters of a message question marks: what a broken file holds may be anything. */
+void text_keep_line(char *message);
+
+/* Blanks, and line ends that a backslash hides. */
+void text_skip_blanks(struct text *t);
+
+/* Does a word end at p? */
+bool text_at_word_end(const struct text *t);
+
+/* At the end of the line (LF, CR LF or CR), or of the file? */
+bool text_at_line_end(const struct text *t);
+
+/* Past the end of this line, whatever is still on it. */
+void text_next_line(struct text *t);
+
+/* The next run of characters that are not blank; empty at the line's end. */
+struct text_span text_word(struct text *t);
+
+/* The rest of the line, without blanks at either end. */
+struct text_span text_rest(struct text *t);
+
+/* A number that fills the word at p; false and p unmoved when it isn't one. nan and inf are numbers here. */
+bool text_number(struct text *t, double *value);
+
+/* Decimal digits with a sign, up to 10^18; what follows is the caller's. */
+bool text_integer(struct text *t, int64_t *value);
+
+#endif

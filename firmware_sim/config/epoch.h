@@ -1,0 +1,21 @@
+/* The key time.epoch: which time of day it is at power-up.
+ *
+ * In: the key's text and a table of leap seconds. Out: where the time comes from and, for a date, TAI in ns
+ * (core/utc.h). */
+#ifndef FIRMWARE_SIM_CONFIG_EPOCH_H
+#define FIRMWARE_SIM_CONFIG_EPOCH_H
+
+#include "core/utc.h"
+
+enum epoch_source {
+    EPOCH_NONE, /* the head does not know the time */
+    EPOCH_DATE, /* the text is a date */
+    EPOCH_UTC,  /* the system's clock */
+    EPOCH_TAI   /* the system's TAI clock */
+};
+
+/* An empty text is `none`. A date is checked. tai0_ns is set for a date only; it may be NULL. */
+int epoch_parse(const char *text, const struct utc_table *table, enum epoch_source *source, int64_t *tai0_ns,
+                struct sh_err *err);
+
+#endif

@@ -1,0 +1,63 @@
+/* Ticks and pulses that the head could not compute in time: counted here (lost_pulses, lost_ticks), and announced in
+ * an event. Frames that a slow reader lost are another matter: loop/lost_frames.c. */
+#include <stdio.h>
+#include <string.h>
+
+#include "firmware_sim/device/device_state.h"
+
+/* The event each time, the error once per episode: a second without a loss ends one. */
+void device_say_overrun(struct device *device, uint64_t tick)
+{
+    uint64_t ticks = atomic_load(&device->counters.lost_ticks);
+    if (ticks == device->overrun.ticks_said) return;
+    uint64_t pulses = atomic_load(&device->counters.lost_pulses);
+    uint64_t first = device->overrun.first != UINT64_MAX ? device->overrun.first : device->scan.pulse_next;
+    char text[96];
+    uint64_t more = pulses - device->overrun.pulses_said;
+    snprintf(text, sizeof text, "%llu pulses in %llu ticks not computed in time", (unsigned long long)more,
+             (unsigned long long)(ticks - device->overrun.ticks_said));
+    device_push_event(device, NATIVE_EV_OVERRUN, first, more, ticks - device->overrun.ticks_said, text);
+    if (device->overrun.tick == 0 || tick - device->overrun.tick > device->tick_hz)
+        command_queue_push(&device->cmd.queue, CMD_E_PULSES, text);
+    device->overrun.tick = tick;
+    device->overrun.ticks_said = ticks;
+    device->overrun.pulses_said = pulses;
+    device->overrun.first = UINT64_MAX;
+}
+
+/* Events of a lost tick go before those that came later. An overrun event is taken back instead: the next one has its
+ * losses and the new ones. So a long overload can't fill the room for events. */
+static void take_back(struct device *device, const struct device_work *work)
+{
+    uint32_t n = 0;
+    struct native_event event[DEVICE_MAX_EVENTS];
+    for (uint32_t i = 0; i < work->n_events; i++) {
+        const struct native_event *e = &work->event[i];
+        if (e->code != NATIVE_EV_OVERRUN) {
+            event[n++] = *e;
+            continue;
+        }
+        device->overrun.pulses_said -= e->b;
+        device->overrun.ticks_said -= e->c;
+        if (e->b != 0 && e->a < device->overrun.first) device->overrun.first = e->a;
+    }
+    uint32_t room = DEVICE_MAX_PENDING - device->events.n;
+    if (n > room) device->events.dropped += n - room;
+    if (n > room) n = room;
+    memmove(device->events.event + n, device->events.event, device->events.n * sizeof device->events.event[0]);
+    memcpy(device->events.event, event, n * sizeof event[0]);
+    device->events.n += n;
+}
+
+void device_lost(struct device *device, const struct device_work *work, uint64_t n_cast, uint64_t first_cast)
+{
+    pthread_mutex_lock(&device->lock);
+    atomic_fetch_add(&device->counters.lost_pulses, n_cast);
+    atomic_fetch_add(&device->counters.lost_ticks, 1);
+    if (first_cast < device->overrun.first) device->overrun.first = first_cast;
+    take_back(device, work);
+    if (work->describe && work->describe_flags == 0 && device->scan.on) device->scan.describe = 1;
+    if (work->scanning && work->stretch != device->scan.stretch)
+        device->scan.anchor_lost = 1; /* maybe not in this tick */
+    pthread_mutex_unlock(&device->lock);
+}

@@ -1,0 +1,134 @@
+/* The scan program: which pulses and frames each tick has while a scan is on. */
+#include <math.h>
+
+#include "firmware_sim/device/device_state.h"
+
+void device_begin_scan(struct device *device, uint64_t tick)
+{
+    struct schedule_spec spec;
+    device_fill_spec(device, &spec);
+    schedule_start(&device->scan.segment, &spec);
+    device->scan.on = 1;
+    device->scan.stop_requested = 0;
+    device->scan.number++;
+    device->scan.tick0 = tick;
+    device->scan.pulse_next = 0;
+    device->scan.lost0 = atomic_load(&device->counters.lost_pulses);
+    device->scan.station = device->cmd.settings.station - 1;
+    device->scan.stretch = site_stretch_at(device->site, 0);
+    device->scan.describe = 1;
+    device->scan.anchor_lost = 0;
+    device->cmd.frames_done = 0;
+    device->live.next = 0;
+    device_push_event(device, NATIVE_EV_SCAN_START, device->scan.number, tick * (uint64_t)device->tick_ns,
+                      (uint64_t)device_gps_ns(device, (int64_t)tick * device->tick_ns), "");
+    if (device->options.start && device->options.duration_s > 0.0 && device->scan.number == 1)
+        device->end_tick = tick + device_ticks_of(device, device->options.duration_s);
+}
+
+uint32_t device_tick_pulses(const struct config *cfg)
+{
+    uint32_t n = (uint32_t)ceil((double)cfg->profile.prr_max_uhz * 1e-6 / cfg->loop.tick_hz);
+    return n + n / 8 + 2 * SCHEDULE_PACKET; /* an eighth: to catch up with */
+}
+
+uint32_t device_tick_lines(const struct config *cfg)
+{
+    return (uint32_t)ceil((double)cfg->profile.lines_max_uhz * 1e-6 / cfg->loop.tick_hz) + 2;
+}
+
+/* First pulse that is too many for this tick. When the rates jump up, what is due since the last cut, up to 15 pulses
+ * at the old rate, comes at the new one and may fill several ticks. */
+static uint64_t tick_room_end(const struct device *device)
+{
+    const struct schedule_segment *seg = &device->scan.segment;
+    struct schedule_line line;
+    uint64_t last_line = schedule_line_of(seg, device->scan.pulse_next) + device_tick_lines(device->site->cfg) - 1;
+    schedule_get_line(seg, last_line, &line);
+    uint64_t end = device->scan.pulse_next + device_tick_pulses(device->site->cfg);
+    return line.pulse_end < end ? line.pulse_end : schedule_cut(seg, end);
+}
+
+/* Pulses of this tick; ends the scan when it is complete or was told to stop. Returns 1 when the scan is over. */
+static int claim_pulses(struct device *device, uint64_t tick, struct device_work *work)
+{
+    struct schedule_segment *seg = &device->scan.segment;
+    int64_t since = (int64_t)(tick - device->scan.tick0) * device->tick_ns;
+    int stop = device->scan.stop_requested || device->ending || tick >= device->end_tick;
+    work->scanning = 1;
+    work->scan_t0_ns = (int64_t)device->scan.tick0 * device->tick_ns;
+    work->segment = *seg;
+    work->station = device->scan.station;
+    work->stretch = device->scan.stretch;
+    work->echoes = device->cmd.settings.echoes;
+    work->pulse0 = device->scan.pulse_next;
+    /* A stop keeps what was fired before this tick began; else the cut leaves whole packets for the next tick. */
+    int64_t path_end_ns = device_path_end_ns(device), until_ns = stop ? since : since + device->tick_ns;
+    int arrives = path_end_ns <= until_ns; /* at the end of a trajectory */
+    uint64_t due = schedule_pulse_at(seg, arrives ? path_end_ns : until_ns);
+    uint64_t room_end = tick_room_end(device);
+    if (due > room_end) {
+        due = room_end;
+        arrives = 0;
+    }
+    uint64_t end = stop || arrives ? due : schedule_cut(seg, due);
+    int done = due >= seg->end_pulse && !stop;
+    if (done || end > seg->end_pulse) end = seg->end_pulse;
+    if (end < work->pulse0) end = work->pulse0;
+    work->pulse_end = device->scan.pulse_next = end;
+    if (end > work->pulse0) device->scan.stretch = site_stretch_at(device->site, schedule_time_ns(seg, end - 1));
+    work->cut_short = (stop || arrives) && end < seg->end_pulse;
+    device_take_poses(device, work);
+    struct schedule_line line;
+    schedule_get_line(seg, schedule_line_of(seg, end), &line);
+    device->cmd.frames_done = end >= seg->end_pulse && seg->spec.frames != 0 ? seg->spec.frames : line.frame;
+    return done || stop || arrives;
+}
+
+int device_is_repeated(const struct device *device, uint64_t tick)
+{
+    uint64_t since = tick - device->scan.tick0;
+    return device->scan.on && ((since != 0 && since % device->tick_hz == 0) || device->scan.anchor_lost);
+}
+
+static void describe(struct device *device, uint64_t tick, struct device_work *work)
+{
+    uint64_t since = tick - device->scan.tick0;
+    if (device->scan.describe || device_is_repeated(device, tick)) {
+        work->describe = 1;
+        work->describe_flags = device->scan.describe ? 0 : NATIVE_REPEAT;
+        device_fill_descriptor(device, &work->descriptor);
+        device_fill_anchor(device->site, device->scan.station, device->scan.stretch, &work->anchor);
+        device->scan.describe = device->scan.anchor_lost = 0;
+    }
+    /* All names at the scan's start, then round and round for those who join late. */
+    uint32_t n = device->site->n_surfaces;
+    uint64_t chunks = (n + DEVICE_SURFACES_A_FRAME - 1) / DEVICE_SURFACES_A_FRAME;
+    uint64_t period = device->tick_hz >= 4 ? device->tick_hz / 4 : 1;
+    if (since < chunks || since % period == 0) {
+        uint64_t chunk = since < chunks ? since : since / period % chunks;
+        work->surfaces_first = (uint32_t)chunk * DEVICE_SURFACES_A_FRAME;
+        uint32_t left = n - work->surfaces_first;
+        work->surfaces_n = left < DEVICE_SURFACES_A_FRAME ? left : DEVICE_SURFACES_A_FRAME;
+    }
+}
+
+static void end_scan(struct device *device, uint64_t tick)
+{
+    uint64_t lost = atomic_load(&device->counters.lost_pulses) - device->scan.lost0;
+    int stopped = device->scan.stop_requested;
+    device->scan.on = 0;
+    device->scan.end_tick = tick;
+    device->scan.stop_requested = 0;
+    device_push_event(device, NATIVE_EV_SCAN_END, device->scan.number, device->scan.pulse_next, lost, "");
+    device_transition(device, stopped ? HEAD_EV_STOP : HEAD_EV_DONE, tick);
+    if (device->options.one_scan) device->over = 1;
+}
+
+void device_claim_scan(struct device *device, uint64_t tick, struct device_work *work)
+{
+    describe(device, tick, work);
+    if (!claim_pulses(device, tick, work)) return;
+    end_scan(device, tick + 1);
+    device_take_events(device, work);
+}

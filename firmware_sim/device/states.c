@@ -1,0 +1,72 @@
+/* The states of the head, and when each one ends. */
+#include <math.h>
+#include <string.h>
+
+#include "firmware_sim/device/device_state.h"
+
+static void note_change(struct device *device, uint64_t tick, enum head_state state)
+{
+    if (device->machine.n_changes == DEVICE_MAX_CHANGES) {
+        memmove(device->machine.change, device->machine.change + 1,
+                (DEVICE_MAX_CHANGES - 1) * sizeof device->machine.change[0]);
+        device->machine.n_changes--;
+    }
+    device->machine.change[device->machine.n_changes].tick = tick;
+    device->machine.change[device->machine.n_changes++].state = state;
+}
+
+enum head_state device_visible_state(const struct device *device, uint64_t released)
+{
+    enum head_state state = HEAD_OFF;
+    for (uint32_t i = 0; i < device->machine.n_changes; i++)
+        if (device->machine.change[i].tick <= released) state = device->machine.change[i].state;
+    return state;
+}
+
+uint64_t device_ticks_of(const struct device *device, double s)
+{
+    return (uint64_t)ceil(s * (double)device->tick_hz - 1e-9);
+}
+
+void device_transition(struct device *device, enum head_event event, uint64_t tick)
+{
+    const struct config_profile *profile = &device->site->cfg->profile;
+    int next = head_next_state(device->machine.state, event);
+    if (next < 0 || (enum head_state)next == device->machine.state) return;
+    enum head_state before = device->machine.state;
+    device->machine.state = (enum head_state)next;
+    note_change(device, tick, device->machine.state);
+    device_push_event(device, NATIVE_EV_STATE, (uint64_t)device->machine.state, (uint64_t)before, 0,
+                      head_state_name(device->machine.state));
+    uint64_t from = tick > device->next_tick ? tick : device->next_tick;
+    switch (device->machine.state) {
+    case HEAD_BOOT:
+        device->machine.due_tick = tick + device_ticks_of(device, profile->boot_s);
+        break;
+    case HEAD_SPIN_UP: /* counted from the command, but never before the first tick that is still open */
+        device->machine.due_tick = tick + device_ticks_of(device, profile->spin_up_s);
+        if (device->machine.due_tick < device->next_tick) device->machine.due_tick = device->next_tick;
+        break;
+    case HEAD_SPIN_DOWN:
+        device->machine.due_tick = from + device_ticks_of(device, profile->spin_down_s);
+        break;
+    default:
+        device->machine.due_tick = UINT64_MAX;
+    }
+}
+
+void device_run_timers(struct device *device, uint64_t tick)
+{
+    while (device->machine.due_tick <= tick) {
+        device->machine.due_tick = UINT64_MAX;
+        if (device->machine.state == HEAD_BOOT) {
+            device_transition(device, HEAD_EV_BOOTED, tick);
+            if (device->options.start) device_transition(device, HEAD_EV_START, tick);
+        } else if (device->machine.state == HEAD_SPIN_UP) {
+            device_transition(device, HEAD_EV_SPUN_UP, tick);
+            device_begin_scan(device, tick);
+        } else if (device->machine.state == HEAD_SPIN_DOWN) {
+            device_transition(device, HEAD_EV_SPUN_DOWN, tick);
+        }
+    }
+}

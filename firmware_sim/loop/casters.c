@@ -1,0 +1,147 @@
+/* Casters: threads that claim ticks ahead of their time, compute them and put them into the stream. */
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "firmware_sim/loop/loop_inside.h"
+
+/* With claim_lock held. */
+static int may_claim(struct loop *loop)
+{
+    const struct casters *casters = &loop->casters;
+    enum config_pace pace = loop->cfg->loop.pace;
+    if (casters->next_tick >= stream_released(&loop->stream) + casters->ahead_ticks) return 0;
+    if (pace == PACE_STEP && casters->next_tick >= atomic_load(&loop->stream.granted)) return 0;
+    return pace != PACE_FAST || !device_is_idle(loop->device);
+}
+
+static void lose(struct loop *loop, const struct device_work *work)
+{
+    uint64_t first, n_cast = worker_count_cast(work, &first);
+    device_lost(loop->device, work, n_cast, first);
+}
+
+/* Claims the next tick. 1: work and slot are set (slot NULL: lost already); 0: not now; -1: the run is over. */
+static int claim(struct loop *loop, struct device_work *work, struct ring_slot **slot)
+{
+    struct casters *casters = &loop->casters;
+    int got = 0;
+    pthread_mutex_lock(&casters->claim_lock);
+    if (atomic_load(&loop->stopping)) {
+        got = -1;
+    } else if (may_claim(loop)) {
+        if (device_claim(loop->device, work) != 0) {
+            /* A tick that is still computed may yet be lost; what it says then needs one more. */
+            if (atomic_load(&casters->n_computing) == 0) {
+                atomic_store(&loop->final_tick, casters->next_tick);
+                got = -1;
+            }
+        } else {
+            atomic_fetch_add(&casters->n_computing, 1);
+            *slot = ring_claim(&loop->stream.ring, work->tick);
+            casters->next_tick = work->tick + 1;
+            got = 1;
+        }
+    }
+    pthread_mutex_unlock(&casters->claim_lock);
+    return got;
+}
+
+/* After a block that was computed in vain: the next ones are as late. Taking up each in turn just before its time is
+ * over would lose them all. So leave out as many as give the ones after them half the time ahead. */
+static void skip_ahead(struct loop *loop)
+{
+    atomic_store(&loop->casters.drop_until, stream_released(&loop->stream) + loop->casters.ahead_ticks / 2);
+}
+
+/* The frames into the slot. 0: it has no room for them, and there is no memory for more; said once per episode. */
+static int put(struct loop *loop, struct ring_slot *slot, const struct ring_tick *tick)
+{
+    _Atomic int *no_memory = &loop->casters.no_memory;
+    if (ring_put(slot, tick) == SH_OK) {
+        if (atomic_load(no_memory)) atomic_store(no_memory, 0);
+        return 1;
+    }
+    if (atomic_exchange(no_memory, 1) == 0) {
+        char text[96];
+        snprintf(text, sizeof text, "no memory for a tick of %u bytes", tick->len);
+        device_report(loop->device, CMD_E_PULSES, text);
+    }
+    return 0;
+}
+
+/* 1: the tick is ready. */
+static int compute(struct loop_caster *caster, const struct device_work *work, struct ring_slot *slot)
+{
+    struct loop *loop = caster->loop;
+    if (slot == NULL) return 0;
+    if (work->tick < atomic_load(&loop->casters.drop_until)) {
+        ring_drop(slot);
+        return 0;
+    }
+    int whole = put(loop, slot, worker_fill(caster->worker, work));
+    if (ring_ready(slot, work->tick)) return whole;
+    skip_ahead(loop);
+    return 0;
+}
+
+static void *caster_main(void *arg)
+{
+    struct loop_caster *caster = arg;
+    struct loop *loop = caster->loop;
+    struct stream *stream = &loop->stream;
+    struct device_work work;
+    for (;;) {
+        struct ring_slot *slot = NULL;
+        int got = claim(loop, &work, &slot);
+        if (got < 0) break;
+        if (got == 0) {
+            while (sem_wait(&stream->work) != 0 && errno == EINTR)
+                continue;
+            continue;
+        }
+        if (!compute(caster, &work, slot)) lose(loop, &work);
+        atomic_fetch_sub(&loop->casters.n_computing, 1);
+        if (stream->waits) sem_post(&stream->ready);
+    }
+    if (stream->waits) sem_post(&stream->ready);
+    sem_post(&stream->work); /* the next one learns of the end, too */
+    return NULL;
+}
+
+int casters_create(struct loop *loop, uint32_t n, struct sh_err *err)
+{
+    struct casters *casters = &loop->casters;
+    int rc = SH_OK;
+    pthread_mutex_init(&casters->claim_lock, NULL);
+    for (; casters->n < n && rc == SH_OK; casters->n++) {
+        casters->caster[casters->n].loop = loop;
+        rc = worker_create(loop->site, &casters->caster[casters->n].worker, err);
+    }
+    loop->stream.n_casters = casters->n;
+    return rc;
+}
+
+int casters_start(struct loop *loop, struct sh_err *err)
+{
+    struct casters *casters = &loop->casters;
+    for (; casters->n_running < casters->n; casters->n_running++) {
+        struct loop_caster *caster = &casters->caster[casters->n_running];
+        int e = pthread_create(&caster->thread, NULL, caster_main, caster);
+        if (e != 0) return sh_fail(err, SH_EIO, "loop: no thread for a caster: %s", strerror(e));
+    }
+    return SH_OK;
+}
+
+void casters_join(struct loop *loop)
+{
+    for (uint32_t i = 0; i < loop->casters.n_running; i++)
+        pthread_join(loop->casters.caster[i].thread, NULL);
+}
+
+void casters_free(struct loop *loop)
+{
+    for (uint32_t i = 0; i < loop->casters.n; i++)
+        worker_free(loop->casters.caster[i].worker);
+    pthread_mutex_destroy(&loop->casters.claim_lock);
+}

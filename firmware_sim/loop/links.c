@@ -1,0 +1,63 @@
+#include "firmware_sim/loop/links.h"
+
+#include <math.h>
+
+#include "drivers/protocol/native.h"
+#include "firmware_sim/loop/pump.h"
+
+/* Bytes per second of the points at the rates that are set, with one echo per pulse: the least that there will be. A
+ * command can raise the rates later. Further echoes and the frames' headers come on top. What a link then loses is
+ * announced. */
+static double stream_rate(const struct config *cfg)
+{
+    const struct head_settings *h = &cfg->head.settings;
+    double sweep_udeg = 360e6 * cfg->profile.optical_gain / cfg->profile.facets;
+    double used = (double)(h->line_stop_udeg - h->line_start_udeg) / sweep_udeg;
+    double point_len = NATIVE_POINT_LEN + (cfg->output.attributes ? NATIVE_ATTRIBUTE_LEN : 0);
+    return (double)h->prr_uhz * 1e-6 * (used < 1.0 ? used : 1.0) * point_len;
+}
+
+/* A link that can't carry the stream is refused before it loses any of it. */
+static int check_capacity(const struct config *cfg, const struct pump *pump, struct sh_err *err)
+{
+    double capacity = pump_capacity(pump), rate = stream_rate(cfg);
+    char endpoint[300];
+    if (capacity <= 0.0 || capacity >= rate || pump_is_nmea(pump)) return SH_OK;
+    pump_endpoint(pump, endpoint, sizeof endpoint);
+    return sh_fail(
+        err, SH_EINPUT, "link %s: the stream has %.2f MB/s, the link carries %.2f MB/s; lower head.prr_hz to %.0f%s",
+        endpoint, 1e-6 * rate, 1e-6 * capacity, floor(1e-6 * (double)cfg->head.settings.prr_uhz * capacity / rate),
+        cfg->output.attributes ? ", or leave out output.attributes" : "");
+}
+
+int links_open(struct links *links, const struct config *cfg, const struct link_spec *extra, struct sh_err *err)
+{
+    int rc = SH_OK;
+    for (uint32_t i = 0; i < cfg->n_links + (extra != NULL) && rc == SH_OK; i++) {
+        rc = pump_open(links, i, i < cfg->n_links ? &cfg->link[i] : extra, &links->pump[i], err);
+        if (rc != SH_OK) break;
+        links->n++;
+        rc = check_capacity(cfg, links->pump[i], err);
+    }
+    return rc;
+}
+
+int links_start(struct links *links, struct sh_err *err)
+{
+    int rc = SH_OK;
+    for (uint32_t i = 0; i < links->n && rc == SH_OK; i++)
+        rc = pump_start(links->pump[i], err);
+    return rc;
+}
+
+void links_join(struct links *links)
+{
+    for (uint32_t i = 0; i < links->n; i++)
+        pump_join(links->pump[i]);
+}
+
+void links_close(struct links *links)
+{
+    for (uint32_t i = 0; i < links->n; i++)
+        pump_close(links->pump[i]);
+}

@@ -1,0 +1,32 @@
+/* The links of a head: each open link is a pump (pump.h) with a thread of its own.
+ *
+ * In: the links of the configuration, and the stream. Out: frames and replies to clients, commands to the device. */
+#ifndef FIRMWARE_SIM_LOOP_LINKS_H
+#define FIRMWARE_SIM_LOOP_LINKS_H
+
+#include "firmware_sim/loop/stream.h"
+
+struct pump;
+
+struct links {
+    /* set by the caller */
+    struct stream *stream;
+    struct device *device;
+    const struct sh_report *report; /* NULL: none */
+
+    struct pump *pump[STREAM_MAX_LINKS];
+    uint32_t n;
+    _Atomic uint32_t n_busy; /* that still have something to bring out */
+    _Atomic int failed;
+    struct sh_err error; /* of the first link that failed, once failed is 1 */
+};
+
+/* Opens the links of the configuration, and one more where extra is not NULL. A link that carries less than the stream
+ * needs is refused. links_close is needed after a failure, too. */
+int links_open(struct links *links, const struct config *cfg, const struct link_spec *extra, struct sh_err *err);
+int links_start(struct links *links, struct sh_err *err);
+/* Waits until the links have brought out what their readers take. */
+void links_join(struct links *links);
+void links_close(struct links *links);
+
+#endif

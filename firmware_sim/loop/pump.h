@@ -1,0 +1,19 @@
+/* A link with its thread: frames and replies out, command lines in, for each of the link's sessions.
+ *
+ * In: the stream, through the links it belongs to, and what clients write. Out: bytes on the link. */
+#ifndef FIRMWARE_SIM_LOOP_PUMP_H
+#define FIRMWARE_SIM_LOOP_PUMP_H
+
+#include "firmware_sim/loop/links.h"
+
+/* links must outlive the pump. index: of the link, from 0; it gives the sessions their numbers. */
+int pump_open(struct links *links, uint32_t index, const struct link_spec *spec, struct pump **out, struct sh_err *err);
+int pump_start(struct pump *pump, struct sh_err *err);
+void pump_join(struct pump *pump);
+void pump_close(struct pump *pump);
+void pump_endpoint(const struct pump *pump, char *buf, size_t len);
+double pump_capacity(const struct pump *pump); /* bytes per second; 0: no fixed limit */
+const char *pump_type(const struct pump *pump);
+int pump_is_nmea(const struct pump *pump);
+
+#endif

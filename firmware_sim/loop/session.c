@@ -1,0 +1,109 @@
+/* A session of a link: takes ticks from the stream into a buffer of its own, and writes that to the link.
+ *
+ * A session copies each tick before it writes it. So a slow reader holds up nobody. When what it has to read next is
+ * too old, it loses whole frames, and goes on with newer ones (lost_frames.c). */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "firmware_sim/base/clock.h"
+#include "firmware_sim/loop/pump_inside.h"
+
+void session_open(struct pump *pump, struct session *s, const char *peer)
+{
+    if (s->out == NULL) s->out = malloc(pump->out_cap);
+    if (s->out == NULL) {
+        device_report(pump->links->device, CMD_E_REFUSED, "no memory for a session");
+        return;
+    }
+    s->open = 1;
+    s->cursor = stream_released(pump->stream);
+    memset(&s->lost, 0, sizeof s->lost);
+    s->out_len = s->out_pos = 0;
+    struct session_commands *c = &s->commands;
+    c->reply_len = c->in_len = c->in_pos = 0;
+    c->stepping = c->replies_dropped = 0;
+    memset(&c->lines, 0, sizeof c->lines);
+    s->moved_ns = clock_now_ns();
+    snprintf(s->peer, sizeof s->peer, "%.63s", peer); /* an address: shorter */
+    stream_set_reader(pump->stream, s->reader, s->cursor, 1);
+}
+
+void session_close(struct pump *pump, struct session *s)
+{
+    if (!s->open) return;
+    s->open = 0;
+    stream_set_reader(pump->stream, s->reader, s->cursor, 0);
+    if (pump->nmea) return; /* it had nothing to say */
+    const struct command_lines *lines = &s->commands.lines;
+    device_session_closed(pump->links->device, s->id, s->peer, lines->len != 0 || lines->overrun);
+    stream_poke(pump->stream);
+}
+
+/* One tick into the buffer. Returns 0 when there is none or no room. */
+static int take_tick(struct pump *pump, struct session *s)
+{
+    struct ring *ring = &pump->stream->ring;
+    uint32_t at = s->out_len + REPLY_ROOM / 8; /* leaves room for a frame that says what was lost */
+    if (at >= pump->out_cap) return 0;
+    struct ring_copy tick = {.buf = s->out + at, .cap = pump->out_cap - at};
+    enum ring_read got = ring_read(ring, s->reader, s->cursor, &tick);
+    if (got == RING_NONE || (got == RING_READ && tick.len > tick.cap)) return 0;
+    uint64_t released = stream_released(pump->stream);
+    if (got == RING_LOST && s->cursor + ring->queue_ticks < released) {
+        s->cursor = released - ring->queue_ticks / 2; /* half a queue of room to recover */
+        return 1;
+    }
+    s->cursor++;
+    if (got != RING_READ) return 1;
+    session_check_lost(pump, s, &tick, released);
+    memmove(s->out + s->out_len, tick.buf, tick.len);
+    s->out_len += tick.len;
+    return 1;
+}
+
+/* Replies into the buffer; what has no room now comes with the next. */
+static void take_replies(struct pump *pump, struct session *s)
+{
+    struct session_commands *c = &s->commands;
+    if (c->reply_len > pump->out_cap - s->out_len) return;
+    memcpy(s->out + s->out_len, c->reply, c->reply_len);
+    s->out_len += c->reply_len;
+    c->reply_len = 0;
+}
+
+static void fill(struct pump *pump, struct session *s)
+{
+    struct session_commands *c = &s->commands;
+    s->out_len = s->out_pos = 0;
+    take_replies(pump, s);
+    if (pump->nmea) pump_take_nmea(pump, s);
+    while (!pump->nmea && s->out_len < BATCH_BYTES && take_tick(pump, s))
+        continue;
+    /* The frames of a step go out before its reply: a client that has the reply has all of them. */
+    while (c->stepping && (s->cursor >= c->step_tick || atomic_load(&pump->stream->over))) {
+        c->stepping = 0;
+        pump_add_reply(s, c->step_reply);
+        pump_take_lines(pump, s);
+    }
+    pump_take_lines(pump, s); /* those that waited for room */
+    take_replies(pump, s);
+    stream_move_reader(pump->stream, s->reader, s->cursor);
+}
+
+int session_write(struct pump *pump, struct session *s, int index)
+{
+    for (;;) {
+        if (s->out_pos == s->out_len) fill(pump, s);
+        if (s->out_pos == s->out_len) return 0;
+        ssize_t n = pump->ops->write(pump->link, index, s->out + s->out_pos, s->out_len - s->out_pos);
+        if (n == 0) return 1;
+        if (n < 0) {
+            if (n != SH_ECLOSED) pump->failed = 1; /* the reason comes with LINK_CLOSED */
+            session_close(pump, s);
+            return 0;
+        }
+        s->out_pos += (uint32_t)n;
+        s->moved_ns = clock_now_ns();
+    }
+}

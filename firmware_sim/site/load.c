@@ -1,0 +1,160 @@
+/* Loading a site: site_load at the end of this file says in which order. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "firmware_sim/site/beam_choice.h"
+#include "firmware_sim/site/bvhs.h"
+#include "firmware_sim/site/detection.h"
+#include "firmware_sim/site/georeference.h"
+#include "firmware_sim/site/plan_rows.h"
+#include "firmware_sim/site/platform.h"
+#include "firmware_sim/site/stops.h"
+
+static struct scene_mesh_spec mesh_spec(const struct config *cfg, const struct config_mesh *mesh)
+{
+    struct scene_mesh_spec spec = {
+        .file = mesh->file, .up = mesh->up, .scale = mesh->scale, .textures = cfg->signal.on};
+    memcpy(spec.offset_m, mesh->offset_m, sizeof spec.offset_m);
+    return spec;
+}
+
+/* A body by itself, in its own frame: its mesh, the sphere around it, and labels that follow those there are. */
+static int add_mover(struct site *site, const struct config_mesh *mesh, const struct sh_report *report,
+                     struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    if (site->n_movers == CAST_MAX_MOVERS)
+        return sh_fail(err, SH_EINPUT, "%s: scene.meshes: too many that move; at most %d", cfg->file, CAST_MAX_MOVERS);
+    struct site_mover *m = &site->mover[site->n_movers++];
+    struct scene_mesh_spec spec = mesh_spec(cfg, mesh);
+    double half2 = 0.0;
+    m->mesh = mesh;
+    int rc = scene_load(&spec, 1, cfg->scene.tolerance_m, report, &m->scene, err);
+    if (rc != SH_OK) return rc;
+    if (site->n_surfaces + m->scene->n_surfaces > SCENE_MAX_SURFACES)
+        return sh_fail(err, SH_EINPUT, "%s: too many surfaces; at most %d", mesh->file, SCENE_MAX_SURFACES);
+    for (uint32_t i = 0; i < m->scene->n_triangles; i++)
+        m->scene->label[i] = (uint16_t)(m->scene->label[i] + site->n_surfaces);
+    site->n_surfaces += m->scene->n_surfaces;
+    for (int i = 0; i < 3; i++) {
+        double half = 0.5 * (m->scene->max_m[i] - m->scene->min_m[i]);
+        m->centre_m[i] = m->scene->min_m[i] + half;
+        half2 += half * half;
+    }
+    m->radius_m = sqrt(half2) * (1.0 + 1e-9) + 1e-6;
+    return SH_OK;
+}
+
+static int load_scene(struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    struct scene_mesh_spec spec[CONFIG_MAX_MESHES];
+    size_t n = 0;
+    for (uint32_t i = 0; i < cfg->scene.n_meshes; i++)
+        if (!config_mesh_moves(&cfg->scene.mesh[i])) spec[n++] = mesh_spec(cfg, &cfg->scene.mesh[i]);
+    if (n == 0)
+        return sh_fail(err, SH_EINPUT, "%s: scene.meshes: all of them move; at least one has to stand still",
+                       cfg->file);
+    int rc = scene_load(spec, n, cfg->scene.tolerance_m, report, &site->scene, err);
+    if (rc == SH_OK) site->n_surfaces = site->scene->n_surfaces;
+    for (uint32_t i = 0; i < cfg->scene.n_meshes && rc == SH_OK; i++)
+        if (config_mesh_moves(&cfg->scene.mesh[i])) rc = add_mover(site, &cfg->scene.mesh[i], report, err);
+    return rc;
+}
+
+/* Where the head stands, or stops. */
+static int place_stations(struct site *site, struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    int rc = SH_OK;
+    site->station = calloc(cfg->n_stations, sizeof *site->station);
+    if (site->station == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %u stations", cfg->n_stations);
+    site->n_stations = cfg->n_stations;
+    for (uint32_t i = 0; i < cfg->n_stations && rc == SH_OK; i++) {
+        site->station[i].station = &cfg->station[i];
+        rc = placement_find(cfg, i, &site->anchor, site->scene, &site->station[i].at, err);
+    }
+    return rc == SH_OK && cfg->platform.kind == PLATFORM_STOPS ? site_load_stops(site, err) : rc;
+}
+
+/* A head that moves has the BVHs of its path. */
+static int build_bvhs(struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    int rc = site_build_mover_bvhs(site, report, err);
+    if (rc != SH_OK || !site->moving) return rc == SH_OK ? site_build_station_bvhs(site, report, err) : rc;
+    rc = site_load_platform(site, report, err);
+    for (uint32_t i = 0; i < site->n_stations && rc == SH_OK; i++)
+        site->station[i].bvh = site->bvh[0];
+    return rc;
+}
+
+/* What is wrong with an IFC file's site shall be reported rather than what follows from it: the anchor comes before the
+ * scene. */
+static int load(struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    int rc = placement_find_anchor(site->cfg, report, &site->anchor, err);
+    if (rc == SH_OK) rc = load_scene(site, report, err);
+    if (rc == SH_OK) rc = site_set_up_detect(site, report, err);
+    if (rc == SH_OK) rc = place_stations(site, err);
+    if (rc == SH_OK) site_plan_order(site);
+    if (rc == SH_OK) rc = build_bvhs(site, report, err);
+    if (rc == SH_OK) rc = site_georeference(site, report, err);
+    if (rc == SH_OK) rc = site_choose_methods(site, report, err);
+    return rc;
+}
+
+static int create(const struct config *cfg, int measures, const struct sh_report *report, struct site **out,
+                  struct sh_err *err)
+{
+    struct site *site = *out = calloc(1, sizeof *site);
+    if (site == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
+    site->cfg = cfg;
+    site->measures = measures;
+    site->moving = config_head_moves(&cfg->platform);
+    int rc = load(site, report, err);
+    if (rc == SH_OK && measures) rc = site_plan_rows(site, err);
+    if (rc == SH_OK) return SH_OK;
+    site_free(site);
+    *out = NULL;
+    return rc;
+}
+
+int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err)
+{
+    return create(cfg, 0, report, out, err);
+}
+
+int site_load_plan(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err)
+{
+    return create(cfg, 1, report, out, err);
+}
+
+void site_free(struct site *site)
+{
+    if (site == NULL) return;
+    free(site->knot);
+    free(site->stop);
+    for (uint32_t i = 0; i < site->n_stations; i++) {
+        struct site_station *s = &site->station[i];
+        for (size_t k = 0; s->leg != NULL && k < site->n_stretches; k++)
+            georef_free(s->leg[k].georef);
+        free(s->leg);
+        georef_free(s->georef);
+        free(s->beam);
+        beam_outlines_free(s->outlines);
+    }
+    free(site->plan.row);
+    free(site->station);
+    for (uint32_t i = 0; i < site->n_bvh; i++)
+        bvh_free(site->bvh[i]);
+    for (uint32_t i = 0; i < site->n_movers; i++) {
+        bvh_free(site->mover[i].bvh);
+        scene_free(site->mover[i].scene);
+    }
+    scene_free(site->scene);
+    georef_geoid_free(site->geoid);
+    free(site->stretch);
+    site_free_detect(site);
+    free(site);
+}

@@ -1,0 +1,159 @@
+#!/bin/bash
+# The documents' recipes, run as they stand, and their links. Prints TAP. $SCANHEAD: the program of the build under test.
+#
+#   check_recipes.sh [DOCUMENT...]      default: every .md below the root of the tree
+#
+# The word after a fenced block's language says what is done with it:
+#
+#   sh run                      run by `sh -eu`; it must exit 0 within the time limit
+#   sh not run: REASON          not run; REASON is for the reader: root, a board, another machine, minutes
+#   c as build/NAME.c           saved under that name, and compiled against the library's header
+#   yaml as build/NAME.yaml     saved under that name, and checked by `scanhead check`
+#
+# (c and yaml take `not run: REASON`, too.) A block of these languages without such a word fails, and so does a
+# block without a language, or an indented one that begins with a command. Other languages (text, csv) are free.
+# The blocks of a document share a folder that looks like the checkout after `make`; each document has a new one.
+# First the script is tried on planted documents: what it can't find there, it can't find here.
+set -u
+
+limit_s=${RECIPE_LIMIT_S:-60}
+root=$(cd "$(dirname "$0")/.." && pwd)
+program=$(realpath "${SCANHEAD:-$root/build/scanhead}")
+work=$(mktemp -d) || exit 1
+block=
+trap '[ -z "$block" ] || kill -- "-$block" 2>/dev/null; rm -rf "$work"' EXIT
+trap 'exit 130' INT TERM
+n=0 failed=0
+
+report() { # ok? name [diagnostics]
+    n=$((n + 1))
+    [ "$1" = 0 ] && echo "ok $n - $2" && return
+    echo "not ok $n - $2"
+    [ -z "$3" ] || printf '%s\n' "$3" | tail -n 30 | sed 's/^/# /'
+    failed=1
+}
+
+# Splits the document $1: each fenced block to a file $2/N, and of each a line `N LINE INFO` to standard output. What
+# can't be told apart is a line `- LINE what is wrong`.
+split='
+    function begins_a_command(text) { return text ~ /^(\$ |(build\/|\.\/)[a-z]|(sudo|make|cc|gcc|cp|kill|exec|echo) )/ }
+    !open && /^[ \t]*(```|~~~)/ {
+        open = NR; fence = $0; sub(/^[ \t]*/, "", fence); info = fence; fence = substr(fence, 1, 3)
+        sub(/^[`~]+[ \t]*/, "", info); file = folder "/" ++count; printf "" >file
+        if (info == "") print "- " NR " a block without a language; write ```text, or say what is to be run"
+        else print count " " NR " " info
+        next
+    }
+    open { text = $0; sub(/^[ \t]*/, "", text); if (index(text, fence) == 1) { open = 0; close(file) } else print >file; next }
+    /^(    |\t)/ && blank { text = $0; sub(/^[ \t]*/, "", text); if (begins_a_command(text)) print "- " NR " an indented command; fence it" }
+    { blank = /^[ \t]*$/ }
+    END { if (open) print "- " open " a block without an end" }'
+
+# A folder that looks like the checkout after make; what recipes write stays in it.
+checkout() {
+    rm -rf "$work/tree"
+    mkdir -p "$work/tree/build"
+    cp -r "$root/config" "$work/tree/"
+    ln -s "$root/core" "$root/drivers" "$root/tests" "$work/tree/"
+    ln -s "$program" "$(dirname "$program")/libscanhead.a" "$work/tree/build/"
+}
+
+# within COMMAND...: in the checkout, within the limit, by itself in a group that ends with it. Output to $work/out.
+within() {
+    set -m
+    (cd "$work/tree" && exec timeout -k 5 "$limit_s" "$@") >"$work/out" 2>&1 </dev/null &
+    block=$!
+    set +m
+    wait "$block"
+    local status=$?
+    kill -- "-$block" 2>/dev/null
+    block=
+    [ $status -ne 124 ] || echo "did not end within $limit_s s" >>"$work/out"
+    return $status
+}
+
+# save FILE WHERE: where a recipe looks for it, which is in build/ and nowhere else.
+save() {
+    echo "$2: not a name in build/" >"$work/out"
+    [[ $2 =~ ^build/[A-Za-z0-9_.-]+$ ]] && cp "$1" "$work/tree/$2"
+}
+
+# do_block FILE INFO: 0 when the block holds what its mark promises; else the reason is in $work/out.
+do_block() {
+    local language=${2%% *} mark=${2#* }
+    [ "$language" != "$2" ] || mark=
+    echo "no mark: write \`$language run\` or \`$language not run: REASON\`" >"$work/out"
+    case $language/$mark in
+    */"not run: "?*) return 0 ;;
+    sh/run) within sh -eu "$1" ;;
+    c/"as build/"?*) save "$1" "${mark#as }" && within cc -Wall -Wextra -Werror -fsyntax-only -Idrivers/host "${mark#as }" ;;
+    yaml/"as build/"?*) save "$1" "${mark#as }" && within build/scanhead check "${mark#as }" ;;
+    sh/* | bash/* | shell/* | console/* | c/* | yaml/* | */run | */not*) return 1 ;;
+    esac
+}
+
+# Links of the document $1 to files that aren't there.
+dead_links() {
+    grep -oE '\]\([^)#: ]+' "$1" | sed 's/^](//' | while read -r link; do
+        [ -e "$(dirname "$1")/$link" ] || echo "$link"
+    done
+}
+
+# One test for each block with a mark, one that all have one, and one of its links.
+check_document() { # document, as it is called
+    local number line info dead unmarked=
+    rm -rf "$work/blocks"
+    mkdir "$work/blocks"
+    checkout
+    while read -r number line info <&3; do
+        if [ "$number" = - ]; then
+            unmarked+="$2:$line: $info"$'\n'
+        elif [[ $info == *' '* ]]; then
+            do_block "$work/blocks/$number" "$info"
+            report $? "$2:$line: $info" "$(tr -d "\0" <"$work/out")"
+        elif ! do_block "$work/blocks/$number" "$info"; then
+            unmarked+="$2:$line: $(cat "$work/out")"$'\n'
+        fi
+    done 3< <(awk -v folder="$work/blocks" "$split" "$1")
+    [ -z "$unmarked" ]
+    report $? "$2: each block says what is done with it" "$unmarked"
+    dead=$(dead_links "$1")
+    [ -z "$dead" ]
+    report $? "$2: its links lead to files" "$dead"
+}
+
+# expect HOW_MANY_FAIL NAME LINE...: that many tests of a planted document fail.
+expect() {
+    printf '%s\n' "${@:3}" >"$work/planted.md"
+    local found wanted=$1
+    found=$(n=0; check_document "$work/planted.md" planted)
+    [ "$(grep -c '^not ok' <<<"$found")" = "$wanted" ]
+    report $? "planted: $2" "$found"
+}
+
+limit_s=2
+expect 0 'a good document' '```sh run' 'echo 1 >build/a' '```' '```sh run' 'grep 1 build/a' '```' '```sh not run: root' 'false' '```' \
+    '```c as build/a.c' 'int main(void) { return 0; }' '```' '```sh run' 'cc build/a.c -o build/a; build/a' '```' '```text' 'x' '```'
+expect 1 'a command that fails' '```sh run' 'false' 'true' '```'
+expect 1 'a command that does not end' '```sh run' 'sleep 60' '```'
+expect 1 'a variable that nobody sets' '```sh run' 'echo "$nobody"' '```'
+expect 1 'shell without a mark' '```sh' 'true' '```'
+expect 1 'shell that is not run, without a reason' '```sh not run:' 'true' '```'
+expect 1 'shell with a mark that nobody knows' '```sh later' 'true' '```'
+expect 1 'a block without a language' '```' 'true' '```'
+expect 1 'a command that is indented' 'So:' '' '    build/scanhead list'
+expect 1 'a block without an end' '```text' 'x'
+expect 1 'C that does not compile' '```c as build/a.c' 'int main(void) { return x; }' '```'
+expect 1 'a configuration that is wrong' '```yaml as build/a.yaml' 'head: {profile: none}' '```'
+expect 1 'a link to a file that is not there' 'See [here](nothing.md).'
+expect 1 'a file outside of build' '```c as ../a.c' 'int a;' '```'
+limit_s=${RECIPE_LIMIT_S:-60}
+
+if [ $# -eq 0 ]; then
+    while read -r document; do set -- "$@" "$document"; done < <(cd "$root" &&
+        find . \( -name .git -o -name 'build*' -o -name node_modules \) -prune -o -name '*.md' -print | sed 's|^\./||' | LC_ALL=C sort)
+    cd "$root" || exit 1
+fi
+for document; do check_document "$document" "$document"; done
+echo "1..$n"
+exit $failed

@@ -1,0 +1,26 @@
+/* A reader of NMEA 0183 of the tests' own: fields, checksum, angles. */
+#ifndef TESTS_COMMON_NMEA_READER_H
+#define TESTS_COMMON_NMEA_READER_H
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+#include <stdlib.h>
+#include <string.h>
+
+struct nmea_line {
+    char text[256];
+    const char *field[32]; /* [0] is talker and type */
+    int n;
+};
+
+/* One sentence of len bytes with its CR LF; type "" and n_fields 0: any. */
+void read_line(const char *text, size_t len, const char *type, int n_fields, struct nmea_line *line);
+
+/* ddmm.mmm and its letter, of which there are two: degrees. */
+double read_angle(const char *text, const char *letter, int degree_digits, const char letters[2]);
+
+#endif

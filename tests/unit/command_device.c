@@ -1,0 +1,34 @@
+#include "tests/unit/command_device.h"
+
+struct command_device command_test_device(void)
+{
+    struct command_device dev = {
+        .idn = "Maker,Model,Serial,1.0",
+        .limits = {.prr_min_uhz = 1000 * MICRO,
+                   .prr_max_uhz = 1200000 * MICRO,
+                   .lines_min_uhz = 1 * MICRO,
+                   .lines_max_uhz = 2000 * MICRO,
+                   .pan_max_udeg_s = 60 * MICRO,
+                   .fov_min_udeg = -40 * MICRO,
+                   .fov_max_udeg = 60 * MICRO,
+                   .pan_min_udeg = -180 * MICRO,
+                   .pan_max_udeg = 360 * MICRO,
+                   .n_stations = 3},
+        .settings = {.prr_uhz = 300000 * MICRO,
+                     .lines_uhz = 100 * MICRO,
+                     .pan_udeg_s = 18 * MICRO,
+                     .line_start_udeg = -30 * MICRO,
+                     .line_stop_udeg = 50 * MICRO,
+                     .pan_start_udeg = 0,
+                     .pan_stop_udeg = 180 * MICRO,
+                     .frames = 1,
+                     .station = 1},
+        .state = HEAD_IDLE,
+        .frames_done = 7,
+        .t_ns = INT64_C(1234567890123),
+        .utc = "2026-01-01T00:20:34.567890123Z",
+        .gps = "2399,346852.567890123",
+    };
+    dev.defaults = dev.settings;
+    return dev;
+}

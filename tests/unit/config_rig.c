@@ -1,0 +1,119 @@
+#include "tests/unit/config_rig.h"
+
+const char base[] = "head:\n"                     /* 1 */
+                    "  profile: riegl-vz400i\n"   /* 2 */
+                    "  prr_hz: 500000\n"          /* 3 */
+                    "  lines_hz: 100\n"           /* 4 */
+                    "scene:\n"                    /* 5 */
+                    "  meshes:\n"                 /* 6 */
+                    "    - file: cube.obj\n"      /* 7 */
+                    "      up: z\n"               /* 8 */
+                    "      scale: 1\n"            /* 9 */
+                    "stations:\n"                 /* 10 */
+                    "  - position_m: [1, 2, 3]\n" /* 11 */
+                    "    heading_deg: 90\n"       /* 12 */
+                    "links:\n"                    /* 13 */
+                    "  - type: tcp\n"             /* 14 */
+                    "    port: 0\n"               /* 15 */
+                    "output:\n"                   /* 16 */
+                    "  crs: local\n";
+
+char dir[64], config_path[128];
+struct config *cfg;
+struct sh_err err;
+
+void write_file(const char *path, const void *bytes, size_t len)
+{
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(bytes, 1, len, file), len);
+    assert_int_equal(fclose(file), 0);
+}
+
+void write_in(const char *name, const char *text)
+{
+    char path[256];
+    snprintf(path, sizeof path, "%s/%s", dir, name);
+    write_file(path, text, strlen(text));
+}
+
+int load_sets(const char *const *sets, int n)
+{
+    memset(&err, 0, sizeof err);
+    return config_load(config_path, sets, n, cfg, &err);
+}
+
+int load_text(const char *text)
+{
+    write_file(config_path, text, strlen(text));
+    return load_sets(NULL, 0);
+}
+
+char *edited(const char *old, const char *with)
+{
+    const char *at = strstr(base, old);
+    assert_non_null(at);
+    char *text = malloc(sizeof base + strlen(with));
+    assert_non_null(text);
+    sprintf(text, "%.*s%s%s", (int)(at - base), base, with, at + strlen(old));
+    return text;
+}
+
+int load_edited(const char *old, const char *with)
+{
+    char *text = edited(old, with);
+    int code = load_text(text);
+    free(text);
+    return code;
+}
+
+int load_set(const char *set)
+{
+    const char *const sets[] = {set};
+    write_file(config_path, base, sizeof base - 1);
+    return load_sets(sets, 1);
+}
+
+void assert_loads(int code)
+{
+    if (code != SH_OK) fail_msg("%s", err.text);
+}
+
+void assert_says(const char *fragment)
+{
+    assert_int_equal(err.code, SH_EINPUT);
+    assert_null(strchr(err.text, '\n'));
+    if (strstr(err.text, fragment) == NULL) fail_msg("\"%s\" says nothing of \"%s\"", err.text, fragment);
+}
+
+int set_up(void **state)
+{
+    (void)state;
+    char path[512];
+    snprintf(dir, sizeof dir, "/tmp/test_config.XXXXXX");
+    if (mkdtemp(dir) == NULL || getcwd(path, sizeof path - 16) == NULL) return -1;
+    strcat(path, "/config/heads");
+    setenv("SCANHEAD_HEADS", path, 1);
+    snprintf(config_path, sizeof config_path, "%s/test.yaml", dir);
+    snprintf(path, sizeof path, "%s/heads", dir);
+    if (mkdir(path, 0700) != 0) return -1;
+    snprintf(path, sizeof path, "%s/dir.obj", dir);
+    if (mkdir(path, 0700) != 0) return -1;
+    write_in("cube.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    cfg = malloc(sizeof *cfg);
+    return cfg == NULL ? -1 : 0;
+}
+
+int tear_down(void **state)
+{
+    (void)state;
+    static const char *const made[] = {"test.yaml", "cube.obj", "heads/mine.yaml", "first/mine.yaml",
+                                       "first",     "heads",    "dir.obj",         ""};
+    char path[256];
+    free(cfg);
+    for (size_t i = 0; i < sizeof made / sizeof made[0]; i++) {
+        snprintf(path, sizeof path, "%s/%s", dir, made[i]);
+        remove(path);
+    }
+    return 0;
+}

@@ -1,0 +1,205 @@
+/* The ring of slots, with all its threads at once. */
+#include "tests/common/cases.h"
+
+#include <pthread.h>
+#include <sched.h>
+#include <stdatomic.h>
+#include <string.h>
+
+#include "firmware_sim/loop/ring.h"
+
+enum { AHEAD = 6, QUEUE = 4, SPARE = 4, SLOT_BYTES = 1000 };
+static const struct ring_size SIZE = {AHEAD, QUEUE, SPARE, SLOT_BYTES};
+
+static struct ring ring;
+
+static int open_ring(void **state)
+{
+    (void)state;
+    struct sh_err err;
+    return ring_create(&ring, &SIZE, &err);
+}
+
+static int close_ring(void **state)
+{
+    (void)state;
+    ring_free(&ring);
+    return 0;
+}
+
+/* Two casters fill slots with what only a tick's number tells; the pacing thread
+ * releases them, numbers their frames, and gives up what is not ready where the test says so; it waits for
+ * two of the readers, as in the pace `fast`, and not for the third. Slots grow all the while. */
+enum { TICKS = 120000, CASTERS = 2, READERS = 3, SLOW = 2, MAX_BYTES = 3 * SLOT_BYTES };
+
+static struct {
+    pthread_mutex_t claim_lock;
+    uint64_t next_tick; /* under claim_lock */
+    _Atomic uint64_t cursor[READERS];
+    _Atomic int done;
+    uint8_t head_lost[TICKS]; /* by the pacing thread, before the tick is released */
+    _Atomic uint64_t bad;
+    uint64_t got[READERS], too_old[READERS], lost_by_head[READERS];
+} all;
+
+static uint32_t len_of(uint64_t tick)
+{
+    return (uint32_t)(tick * 2654435761U % (MAX_BYTES - 4)) + 4;
+}
+
+static uint8_t byte_of(uint64_t tick, uint32_t i)
+{
+    return (uint8_t)((tick * 131 + i) * 0x9e3779b97f4a7c15ULL >> 56);
+}
+
+/* Of these the caster and the pacing thread decide at the same time whether they are lost. */
+static int is_raced(uint64_t tick)
+{
+    return tick % 7 == 3;
+}
+
+static void *caster_main(void *arg)
+{
+    (void)arg;
+    uint8_t bytes[MAX_BYTES];
+    for (;;) {
+        struct ring_slot *slot = NULL;
+        uint64_t tick = TICKS;
+        pthread_mutex_lock(&all.claim_lock);
+        if (all.next_tick >= TICKS) {
+            pthread_mutex_unlock(&all.claim_lock);
+            return NULL;
+        }
+        if (all.next_tick < atomic_load(&ring.released) + AHEAD) {
+            tick = all.next_tick++;
+            slot = ring_claim(&ring, tick);
+        }
+        pthread_mutex_unlock(&all.claim_lock);
+        if (slot == NULL) {
+            sched_yield();
+            continue;
+        }
+        while (is_raced(tick) && atomic_load(&ring.released) < tick)
+            sched_yield();
+        struct ring_tick made = {.bytes = bytes, .len = len_of(tick)};
+        for (uint32_t i = 0; i < made.len; i++)
+            bytes[i] = byte_of(tick, i);
+        if (ring_put(slot, &made) != SH_OK) atomic_fetch_add(&all.bad, 1);
+        ring_ready(slot, tick);
+    }
+}
+
+static int readers_have_room(uint64_t tick)
+{
+    for (int r = 0; r < READERS; r++)
+        if (r != SLOW && atomic_load(&all.cursor[r]) + QUEUE <= tick + 1) return 0;
+    return 1;
+}
+
+static void *pacer_main(void *arg)
+{
+    uint32_t *seq = arg;
+    for (uint64_t tick = 0; tick < TICKS;) {
+        struct ring_slot *slot = ring_peek(&ring, tick);
+        if (!readers_have_room(tick)) {
+            sched_yield();
+        } else if (slot != NULL) {
+            slot->first_seq = *seq;
+            slot->n_frames = 1 + (uint32_t)(tick % 5);
+            memcpy(slot->tick.bytes, seq, sizeof *seq); /* as frames are sealed */
+            *seq += slot->n_frames;
+            ring_release(&ring, tick++);
+        } else if (is_raced(tick)) {
+            all.head_lost[tick] = 1;
+            if (ring_lose(&ring, tick))
+                tick++;
+            else
+                all.head_lost[tick] = 0;
+        } else {
+            sched_yield();
+        }
+    }
+    atomic_store(&all.done, 1);
+    return NULL;
+}
+
+static int is_whole(uint64_t tick, const struct ring_copy *copy)
+{
+    uint32_t sealed;
+    memcpy(&sealed, copy->buf, sizeof sealed);
+    int whole = copy->len == len_of(tick) && copy->n_frames == 1 + tick % 5 && sealed == copy->first_seq;
+    for (uint32_t i = 4; i < copy->len && whole; i++)
+        whole = copy->buf[i] == byte_of(tick, i);
+    return whole;
+}
+
+static void *reader_main(void *arg)
+{
+    int me = (int)(intptr_t)arg;
+    uint8_t bytes[MAX_BYTES];
+    struct ring_copy copy = {.buf = bytes, .cap = sizeof bytes};
+    uint32_t next_seq = 0;
+    for (uint64_t tick = 0; tick < TICKS;) {
+        switch (ring_read(&ring, me, tick, &copy)) {
+        case RING_NONE:
+            sched_yield();
+            continue;
+        case RING_LOST:
+            if (all.head_lost[tick])
+                all.lost_by_head[me]++;
+            else
+                all.too_old[me]++;
+            break;
+        case RING_READ:
+            all.got[me]++;
+            if (!is_whole(tick, &copy) || copy.first_seq < next_seq) atomic_fetch_add(&all.bad, 1);
+            if (me != SLOW && copy.first_seq != next_seq) atomic_fetch_add(&all.bad, 1);
+            next_seq = copy.first_seq + copy.n_frames;
+            for (int i = 0; me == SLOW && i < 20; i++)
+                sched_yield();
+            break;
+        }
+        atomic_store(&all.cursor[me], ++tick);
+    }
+    return NULL;
+}
+
+static void no_tick_is_torn_with_all_threads_at_work(void **state)
+{
+    (void)state;
+    pthread_t caster[CASTERS], pacer, reader[READERS];
+    uint32_t seq = 0;
+    memset(&all, 0, sizeof all);
+    pthread_mutex_init(&all.claim_lock, NULL);
+    for (int i = 0; i < READERS; i++)
+        assert_int_equal(pthread_create(&reader[i], NULL, reader_main, (void *)(intptr_t)i), 0);
+    for (int i = 0; i < CASTERS; i++)
+        assert_int_equal(pthread_create(&caster[i], NULL, caster_main, NULL), 0);
+    assert_int_equal(pthread_create(&pacer, NULL, pacer_main, &seq), 0);
+    for (int i = 0; i < CASTERS; i++)
+        pthread_join(caster[i], NULL);
+    pthread_join(pacer, NULL);
+    for (int i = 0; i < READERS; i++)
+        pthread_join(reader[i], NULL);
+    pthread_mutex_destroy(&all.claim_lock);
+    uint64_t head_lost = 0;
+    for (int i = 0; i < TICKS; i++)
+        head_lost += all.head_lost[i];
+    print_message("# %u ticks, %u lost by the head; the slow reader got %u\n", (unsigned)TICKS, (unsigned)head_lost,
+                  (unsigned)all.got[SLOW]);
+    assert_true(atomic_load(&all.bad) == 0);
+    for (int i = 0; i < READERS; i++) {
+        assert_true(all.got[i] + all.too_old[i] + all.lost_by_head[i] == TICKS);
+        assert_true(all.lost_by_head[i] == head_lost);
+        if (i != SLOW) assert_true(all.too_old[i] == 0); /* they were waited for */
+    }
+    assert_true(all.got[SLOW] > 0 && all.too_old[SLOW] > 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(no_tick_is_torn_with_all_threads_at_work, open_ring, close_ring),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

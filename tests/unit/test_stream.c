@@ -1,0 +1,149 @@
+/* The stream at release: numbers of frames, counts of echoes in line ends, and readers that are waited for. */
+#include "tests/common/cases.h"
+
+#include <string.h>
+
+#include "drivers/protocol/native_encode.h"
+#include "firmware_sim/loop/stream.h"
+
+static const struct ring_size SIZE = {.ahead_ticks = 4, .queue_ticks = 3, .spare_ticks = 2, .usual_bytes = 512};
+static struct device_counters counters;
+static struct stream stream;
+
+static int open_stream(void **state)
+{
+    (void)state;
+    struct sh_err err;
+    memset(&stream, 0, sizeof stream);
+    memset(&counters, 0, sizeof counters);
+    stream.counters = &counters;
+    return stream_create(&stream, &SIZE, 1000000, &err);
+}
+
+static int close_stream(void **state)
+{
+    (void)state;
+    stream_free(&stream);
+    return 0;
+}
+
+/* A tick of n_events events, then, unless before < 0, a line end with so many echoes before it, then so many after. */
+static struct ring_slot *make_tick(uint64_t tick, int n_events, int before, uint32_t tail)
+{
+    static const struct native_event event = {.code = NATIVE_EV_PPS, .text = "text"};
+    uint8_t bytes[512];
+    struct ring_mark mark = {.before.echoes = (uint32_t)before, .end = {.n_fired = 9, .n_cast = 9}};
+    struct ring_tick made = {.bytes = bytes, .mark = &mark, .tail.echoes = tail};
+    struct ring_slot *slot = ring_claim(&stream.ring, tick);
+    assert_non_null(slot);
+    for (int i = 0; i < n_events; i++)
+        made.len += (uint32_t)native_encode_event(bytes + made.len, sizeof bytes - made.len, &event, 0, 0);
+    if (before >= 0) {
+        mark.frame_at = made.len;
+        made.n_marks = 1;
+        made.len += (uint32_t)native_encode_line_end(bytes + made.len, sizeof bytes - made.len, &mark.end, 0);
+    }
+    made.hits.echoes = (uint32_t)(before > 0 ? before : 0) + tail;
+    made.n_lines = made.n_marks;
+    assert_int_equal(ring_put(slot, &made), SH_OK);
+    return slot;
+}
+
+static void release(struct ring_slot *slot, uint64_t tick)
+{
+    assert_true(ring_ready(slot, tick));
+    stream_release(&stream, slot, tick, 5);
+}
+
+/* Echoes that the only line end of a tick says; its frames carry the numbers from first_seq on. */
+static uint32_t read_echoes(uint64_t tick, uint32_t first_seq, uint32_t n_frames)
+{
+    uint8_t bytes[512];
+    struct ring_copy copy = {.buf = bytes, .cap = sizeof bytes};
+    struct native_line_end end = {.n_echoes = UINT32_MAX};
+    assert_int_equal(ring_read(&stream.ring, 0, tick, &copy), RING_READ);
+    assert_true(copy.first_seq == first_seq && copy.n_frames == n_frames);
+    for (uint32_t at = 0, i = 0; at < copy.len; i++) {
+        uint32_t len = bytes[at + 4] | (uint32_t)bytes[at + 5] << 8, seq;
+        memcpy(&seq, bytes + at + 8, sizeof seq);
+        assert_int_equal(seq, first_seq + i);
+        if (bytes[at + 1] == NATIVE_LINE_END)
+            assert_int_equal(native_decode_line_end(bytes + at + NATIVE_HEADER_LEN, len, &end), 0);
+        at += NATIVE_HEADER_LEN + len;
+    }
+    return end.n_echoes;
+}
+
+static void a_line_has_the_echoes_of_all_its_ticks(void **state)
+{
+    (void)state;
+    release(make_tick(0, 2, -1, 5), 0);
+    release(make_tick(1, 0, -1, 4), 1); /* no frame */
+    release(make_tick(2, 1, 7, 2), 2);
+    assert_int_equal(read_echoes(0, 0, 2), UINT32_MAX);
+    assert_int_equal(read_echoes(1, 2, 0), UINT32_MAX);
+    assert_int_equal(read_echoes(2, 2, 2), 5 + 4 + 7);
+    release(make_tick(3, 0, 1, 0), 3);
+    assert_int_equal(read_echoes(3, 4, 1), 2 + 1);
+    assert_int_equal(counters.echoes, 5 + 4 + 7 + 2 + 1);
+    assert_int_equal(counters.lines, 2);
+}
+
+/* Whether the pacing thread gave it up or there was no memory for it. */
+static void a_line_that_lacks_a_tick_has_no_count(void **state)
+{
+    (void)state;
+    for (int lost = 0; lost < 2; lost++) {
+        uint64_t tick = lost ? 4 : 0;
+        uint32_t seq = stream.seq;
+        release(make_tick(tick, 0, -1, 5), tick);
+        if (lost) {
+            assert_true(stream_lose(&stream, tick + 1));
+        } else {
+            struct ring_slot *slot = ring_claim(&stream.ring, tick + 1);
+            slot->tick.broken = 1;
+            release(slot, tick + 1);
+            assert_int_equal(read_echoes(tick + 1, seq, 0), UINT32_MAX);
+        }
+        release(make_tick(tick + 2, 0, 7, 2), tick + 2);
+        assert_int_equal(read_echoes(tick + 2, seq, 1), 0);
+        release(make_tick(tick + 3, 0, 1, 0), tick + 3); /* the next line is whole */
+        assert_int_equal(read_echoes(tick + 3, seq + 1, 1), 2 + 1);
+    }
+}
+
+static void active_readers_hold_back(void **state)
+{
+    (void)state;
+    stream.waits = 1;
+    assert_true(stream_has_room(&stream, 100)); /* there is no reader */
+    stream_set_reader(&stream, STREAM_HASH_READER, 10, 1);
+    assert_true(stream_has_room(&stream, 11)); /* 10, 11 and 12 would fill the queue of 3 */
+    assert_false(stream_has_room(&stream, 12));
+    stream_move_reader(&stream, STREAM_HASH_READER, 11);
+    assert_true(stream_has_room(&stream, 12));
+    stream_set_reader(&stream, STREAM_HASH_READER, 11, 0);
+    assert_true(stream_has_room(&stream, 100));
+}
+
+static void grants_add_up(void **state)
+{
+    (void)state;
+    assert_int_equal(stream_grant(&stream, 1500000), 1500000);
+    assert_int_equal(stream_pass(&stream, 1500000), 1);
+    assert_int_equal(stream_grant(&stream, 600000), 2100000);
+    assert_int_equal(stream_pass(&stream, 2100000), 2);
+    assert_int_equal(stream.granted, 2);
+}
+
+int main(void)
+{
+#define WITH_STREAM(test) cmocka_unit_test_setup_teardown(test, open_stream, close_stream)
+    const struct CMUnitTest tests[] = {
+        WITH_STREAM(a_line_has_the_echoes_of_all_its_ticks),
+        WITH_STREAM(a_line_that_lacks_a_tick_has_no_count),
+        WITH_STREAM(active_readers_hold_back),
+        WITH_STREAM(grants_add_up),
+    };
+    return cmocka_run_group_tests_name("stream", tests, NULL, NULL);
+}
