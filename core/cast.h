@@ -1,19 +1,21 @@
-/* Casting: a run of pulses -> echoes. Embree proposes a triangle from float rays in packets of the machine's native
- * width; the range comes from the triangle's plane in double, kept beside the BVH, and where the ray passes so near to
- * a triangle's border that float can't be trusted, the triangle is chosen again in double. On a plain BVH Embree's hits
- * stand as they are.
+/* Casting: a run of pulses -> echoes, as entries of a block.
  *
- * Frames: the BVH is built in a local frame (prcs minus origin_m), where float is safe; the station is a point of it.
- * Ray packets are SCHEDULE_PACKET pulses, cut by pulse number. On a moving platform each pulse has its own origin and
+ * In: a setup (what stays the same for all pulses of a scan) and a run (angles and times of consecutive
+ * pulses). Out: a block of line.h. The stages are aim, nearest, optics, sub-rays, echoes, points;
+ * core/cast/caster.c has them in that order.
+ *
+ * Frames: the station is a point of prcs (m), beams are directions there, turned from socs. Ray packets are
+ * SCHEDULE_PACKET pulses, cut by pulse number. On a moving platform each pulse has its own origin and
  * rotation, from its firing time alone; a head that stands still pays nothing for that. */
 #ifndef CORE_CAST_H
 #define CORE_CAST_H
 
 #include <stdint.h>
 
-#include "core/footprint.h"
+#include "core/bvh.h"
 #include "core/detect.h"
 #include "core/err.h"
+#include "core/footprint.h"
 #include "core/georef.h"
 #include "core/instrument.h"
 #include "core/line.h"
@@ -21,45 +23,11 @@
 #include "core/scene.h"
 #include "core/schedule.h"
 
-struct bvh;
-
-struct bvh_info {
-    uint32_t packet; /* rays per Embree call: 16, 8 or 4 */
-    double build_s;
-    uint64_t bytes; /* BVH and planes */
-};
-
-/* The scene must outlive the BVH. Rays may begin up to station_reach_m from origin_m; the nearer, the less has to be
- * decided again. Built with `threads` threads (0: all). */
-int bvh_create(const struct scene *scene, const double origin_m[3], double station_reach_m, unsigned threads,
-               const struct sh_report *report, struct bvh **out, struct sh_err *err);
-/* A BVH of float alone, for speed: what Embree finds stands as it is, and nothing is decided again. Less memory, too.
- * For single rays, bodies that move included; not for beam, cast_detect, cast_outlines or bvh_order_exactly, which need
- * the planes. How far off it is: core/bvh/bvh_inside.h. Hits may differ from one width of packets to another.
- */
-int bvh_create_plain(const struct scene *scene, const double origin_m[3], double station_reach_m, unsigned threads,
-                     const struct sh_report *report, struct bvh **out, struct sh_err *err);
-/* Of the same scene, with the same origin and reach: the other kind, plain of one that is not. */
-int bvh_create_other(const struct bvh *bvh, unsigned threads, const struct sh_report *report, struct bvh **out,
-                     struct sh_err *err);
-void bvh_free(struct bvh *bvh);
-
-/* Orders surfaces in double where they overlap, cross, or lie behind each other within float's resolution: their labels
- * no longer hang on how rays are packed, and the range is that of the nearer one. Once, before casting. Costs time here
- * (about 6 us per triangle), and in casting about 20 to 50 ns for each triangle that lies so near to the one that is
- * hit: nothing in a plain scene, much in a building model whose walls overlap. Without it such a hit is off by at most
- * the distance between the surfaces. */
-int bvh_order_exactly(struct bvh *bvh, struct sh_err *err);
-/* Rays per Embree call: 1, 4, 8 or 16; for measuring and tests. Another width than the native one may find another
- * triangle where a ray passes through an edge; ranges agree. */
-void bvh_set_packet(struct bvh *bvh, uint32_t rays);
-void bvh_get_info(const struct bvh *bvh, struct bvh_info *info);
-void bvh_origin(const struct bvh *bvh, double origin_m[3]);
-
 enum { CAST_MAX_MOVERS = 16 };
 
-/* A rigid body that moves, with a BVH of its own, built at rest: p_prcs = rotation * p_rest + shift_m. The pose holds
- * for the runs that are cast with it; rays that pass by the sphere around the body cost one test a chunk. */
+/* A rigid body that moves, with a BVH of its own, built at rest: p_prcs = rotation * p_rest + shift_m. The
+ * pose holds for the runs that are cast with it; rays that pass by the sphere around the body cost one test a
+ * chunk. */
 struct cast_mover {
     const struct bvh *bvh;
     double centre_m[3], radius_m; /* sphere around the body at rest */
@@ -69,13 +37,13 @@ struct cast_mover {
 /* Glass and mirrors that a pulse may meet, one after the other, and still be followed. */
 enum { CAST_MAX_DEPTH = 4 };
 
-/* What happens between a hit and a point, as far as a configuration asks for it. Each part is left out where it is NULL
- * or 0. Where all of it is, cast_setup.detect is NULL.
+/* What happens between a hit and a point, as far as a configuration asks for it. Each part is left out where
+ * it is NULL or 0. Where all of it is, cast_setup.detect is NULL.
  *
- * Echoes of a pulse: of each pane that it passes, and of what lies behind. A mirror has none of its own unless its
- * reflectance says so; what is seen in it is a ghost, at the length of the folded way along the beam, with a label of
- * its own: ghost_label more than the surface's. Only pulses that meet such a surface are cast again; a way does not
- * branch.
+ * Echoes of a pulse: of each pane that it passes, and of what lies beyond. A mirror has none of its own
+ * unless its reflectance says so; what is seen in it is a ghost, at the length of the folded way along the
+ * beam, with a label of its own: ghost_label more than the surface's. Only pulses that meet such a surface
+ * are cast again; a way does not branch.
  * Panes are of no thickness but their mesh's: not refracted. */
 struct cast_detect {
     const struct instrument *instrument;
@@ -85,15 +53,16 @@ struct cast_detect {
     uint32_t depth;                       /* up to CAST_MAX_DEPTH; 0: no glass, no mirrors */
     uint32_t ghost_label;
     uint32_t max_echoes;
-    double separation_m; /* returns of glass and mirrors so near behind each other make one echo; 0: each its own */
+    double separation_m; /* returns of glass and mirrors that are nearer to each other make one echo; 0: each its own */
     enum detect_ambiguity ambiguity;
     uint32_t zones;
     const struct detect_ball *ball;
 };
 
-/* A beam with a footprint (core/footprint.h). Constant; any thread. With cast_detect, echoes weigh by what comes back of
- * them, each by itself is detected or not, and has noise of its own. Where a footprint of an adaptive beam lies on
- * glass or a mirror, in part or as a whole, it is cast as rings: what is seen there has outlines that nobody knows. */
+/* A beam with a footprint (core/footprint.h). Constant; any thread. With cast_detect, echoes weigh by what
+ * comes back of them, each by itself is detected or not, and has noise of its own. Where a footprint of an
+ * adaptive beam lies on glass or a mirror, in part or as a whole, it is cast as rings: the outlines of what
+ * is seen there are not known. */
 struct cast_beam {
     struct beam beam;
     enum beam_mode mode; /* BEAM_RINGS, or BEAM_ADAPTIVE with outlines: then the head and the scene stand still,
@@ -117,36 +86,34 @@ struct cast_setup {
     enum line_layout layout;
     double range_scale_m;
     double xyz_scale[3]; /* units of the CRS per count, see georef_scale */
-    /* NULL: pulses are single rays. Else the BVH's station_reach_m covers the exit radius, and blocks have room for
-     * beam->max_echoes entries a pulse. */
+    /* NULL: pulses are single rays. Else the BVH's station_reach_m covers the exit radius, and blocks have
+     * room for beam->max_echoes entries a pulse. */
     const struct cast_beam *beam;
     enum beam_select echoes; /* which of a pulse's */
     double
         pulse_m; /* c tau / 2 of the pulse, a beam's resolution_m; for the widths of echoes, where a block has room */
     uint32_t n_movers;
     struct cast_mover mover[CAST_MAX_MOVERS];
-    /* A moving head: poses of the head (socs -> prcs) in order of time, pose_between them. They cover the firing times
-     * of the runs; before the first and behind the last the head stands. station_m is then only what geo positions are
-     * relative to, and rotation is not used. n_knots 0: the head stands still at station_m. */
+    /* A moving head: poses of the head (socs -> prcs) in order of time, pose_between them. They cover the
+     * firing times of the runs; before the first and after the last the head stands. station_m is then only
+     * what geo positions are relative to, and rotation is not used. n_knots 0: the head stands still at
+     * station_m. */
     uint32_t n_knots;
     const struct pose_knot *knot;
     /* NULL: every hit within the limits is one echo, the head is ideal. Its max_echoes is also the beam's. */
     const struct cast_detect *detect;
 };
 
-/* How often the exact stage had to look twice. */
+/* What became of pulses, counted. */
 struct cast_counters {
-    uint64_t near_border; /* proposals near a border, looked at in double */
-    uint64_t decided;     /* of these, not clearly inside the proposed triangle: all triangles around were asked */
-    uint64_t went_on;     /* of these, nothing there after all: the ray went on behind */
-    uint64_t unfit;       /* echoes whose position did not fit into the wire's integers: sent as shots without echo */
-    uint64_t faint;     /* hits below the detection threshold, or in a blind time: shots without echo, or echoes less */
-    uint64_t crowded;   /* echoes beyond max_echoes: the weakest, left out */
-    uint64_t undecided; /* nearer to an edge than double precision can tell: counted as hit */
+    uint64_t near_border, decided, went_on, undecided; /* struct bvh_counters */
+    uint64_t unfit;   /* echoes whose position did not fit into the wire's integers: sent as shots without echo */
+    uint64_t faint;   /* hits below the detection threshold, or in a blind time: shots without echo, or echoes less */
+    uint64_t crowded; /* echoes beyond max_echoes: the weakest, left out */
     /* with a beam */
     uint64_t outlined; /* adaptive: pulses whose footprint an outline cuts */
     uint64_t sub_rays; /* cast beyond the central ones */
-    uint64_t ragged;   /* adaptive: pulses with more outlines than can be told apart, cast as rings */
+    uint64_t ragged;   /* adaptive: pulses with more outlines than BEAM_MAX_LINES, cast as rings */
 };
 
 struct caster;
@@ -155,63 +122,42 @@ struct caster;
 int caster_create(struct caster **out, struct sh_err *err);
 void caster_free(struct caster *caster);
 
-/* Fills block from the run, with attributes where it has room for them: the width of a single ray's echo is the
- * pulse's, of a footprint's as core/footprint.h has it, of what glass and mirrors bring together likewise; an amplitude
- * needs a signal model. Noise of ranges moves echoes, and doesn't widen them. The block has capacity >= run->n times
- * the echoes that a pulse may have (1 + depth, beam->max_echoes). Returns the number of echoes. Allocates nothing. */
+/* Fills block from the run, with attributes where it has room for them: the width of a single ray's echo is
+ * the pulse's, of a footprint's as core/footprint.h has it, of what glass and mirrors bring together
+ * likewise; an amplitude needs a signal model. Noise of ranges moves echoes, and doesn't widen them. The
+ * block has capacity >= run->n times the echoes that a pulse may have (1 + depth, beam->max_echoes). Returns
+ * the number of echoes. Allocates nothing. */
 uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
                      struct line_block *block);
 
-enum { CAST_NO_TRIANGLE = 0xffffffff };
+/* Exact hits, with the caster's working memory; bvh.h. */
+void caster_hits(struct caster *caster, const struct bvh *bvh, const struct bvh_rays *rays);
 
-/* Exact hits (a plain BVH: Embree's) of n rays from the station: unit directions in prcs -> range along the ray (NaN
- * where it meets nothing) and triangle of the scene (CAST_NO_TRIANGLE). The station lies within the BVH's
- * station_reach_m; hits beyond range_max_m may or may not be told. Range error: see tests/accuracy. Allocates nothing.
- */
-void caster_hits(struct caster *caster, const struct bvh *bvh, const double station_m[3], double range_max_m,
-                 uint32_t n, const double *dx, const double *dy, const double *dz, double *range_m, uint32_t *triangle);
+/* The outlines of a scene that are steps as seen from the station (beam_outlines_create; kind: of
+ * surface_kinds where detection models surfaces). The station lies within the BVH's station_reach_m. For
+ * setting up. */
+int cast_outlines(const struct beam_outlines_spec *spec, const struct bvh *bvh, struct beam_outlines **out,
+                  struct sh_err *err);
 
-/* The outlines of a scene that are steps as seen from the station, which lies within the BVH's station_reach_m
- * (beam_outlines_create; kind: as there, of surface_kinds where detection models surfaces). For setting up. */
-int cast_outlines(const struct scene *scene, const struct bvh *bvh, const double station_m[3], const struct beam *beam,
-                  double range_max_m, const uint16_t *kind, struct beam_outlines **out, struct sh_err *err);
-
-/* Cost by stage, for measuring: `now` counts in any unit and is read between the stages of each chunk. */
+/* Cost by stage, for measuring. */
 enum cast_stage {
-    CAST_DIRECTIONS,
-    CAST_EMBREE,
-    CAST_REFINE,
-    CAST_DECIDE,
-    CAST_DETECT,
+    CAST_DIRECTIONS = BVH_STAGE_PREPARE,
+    CAST_EMBREE = BVH_STAGE_EMBREE,
+    CAST_REFINE = BVH_STAGE_REFINE,
+    CAST_DECIDE = BVH_STAGE_DECIDE,
+    CAST_DETECT = BVH_STAGES,
     CAST_NOISE,
     CAST_POSITIONS,
     CAST_STAGES
 };
-struct cast_profile {
-    uint64_t (*now)(void);
-    uint64_t last, spent[CAST_STAGES];
-};
 /* NULL: off, which costs nothing that could be measured. The profile stays the caller's. */
-void caster_set_profile(struct caster *caster, struct cast_profile *profile);
+void caster_set_profile(struct caster *caster, struct bvh_profile *profile);
 
 void caster_get_counters(const struct caster *caster, struct cast_counters *counters);
 
-/* socs -> levelled frame (x, y horizontal, z up) of a head turned by heading, then pitch, then roll, each about the
- * axes as they are by then: rotation = Rz(-heading) Rx(pitch) Ry(roll), right-handed, column vectors, row by row: ch cr
- * + sh sp sr   sh cp   ch sr - sh sp cr -sh cr + ch sp sr   ch cp  -sh sr - ch sp cr -cp sr              sp      cp cr
- * heading: of the head's y axis, clockwise seen from above, from the frame's y axis; pitch: the y axis (forward) rises;
- * roll: the x axis (right) sinks. */
-void cast_attitude(double heading_rad, double pitch_rad, double roll_rad, double rotation[9]);
-
-/* The same of a levelled head. */
-void cast_rotation(double heading_rad, double rotation[9]);
-
-/* The first surface of the scene from from_m along the unit vector down: its distance in *range_m, NaN when there is
- * none. Exact as caster_hits. For setting up: looks at every triangle once. */
+/* The first surface of the scene from from_m along the unit vector down: its distance in *range_m, NaN when
+ * there is none. Exact as bvh_hits. For setting up: looks at every triangle once. */
 int cast_floor(const struct scene *scene, const double from_m[3], const double down[3], double *range_m,
                struct sh_err *err);
-
-/* Encoder reading of an angle: whole counts, modulo a turn. */
-uint32_t cast_encoder_count(double turn, double counts_per_turn);
 
 #endif

@@ -1,35 +1,38 @@
-/* Detection: what comes back to the head -> what it reports. Over arrays with one entry per echo, several per pulse.
+/* Detection: what comes back to the head -> what it reports. Over arrays with one entry per echo, several per
+ * pulse.
  *
- * Signal. The range equation for a target that the beam doesn't miss (W. Wagner et al., Gaussian decomposition and
- * calibration of a novel small-footprint full-waveform digitising airborne laser scanner, 2006): power falls with
- * rho(i) / R^2 and exp(-2 a R), a the extinction of the air. Here it is counted in units of the detection threshold:
+ * Signal. The range equation for a target that the beam doesn't miss (W. Wagner et al., Gaussian
+ * decomposition and calibration of a novel small-footprint full-waveform digitising airborne laser scanner,
+ * 2006): power falls with rho(i) / R^2 and exp(-2 a R), a the extinction of the air. Here it is counted in
+ * units of the detection threshold:
  *
  *     A = E rho(i) o(R) exp(-2 a R) / rho_min(R)
  *
- * with E the share of the pulse's energy that took this way, rho(i) as in surface.h, and rho_min(R) the reflectance
- * that is just seen at R. That comes from the data sheet's ranges R_k for targets of rho_k: through each of them log
- * rho_min = 2 log R + g(R), g linear between them: the extinction of the air on the data sheet's day, 2 a = slope;
- * beyond the last, and before the first, as between the nearest two, with a single one none. a is therefore only the
- * extinction beyond that of the data sheet's day.
- * o(R) = 1 - exp(-(R / R_o)^2): at short range part of the light misses the detector (Y. Fang et al., Intensity
- * correction of terrestrial laser scanning data by estimating laser transmission function, 2015, with the lens's
- * parameters taken together into R_o, near which the signal is strongest).
+ * with E the share of the pulse's energy that took this way, rho(i) as in surface.h, and rho_min(R) the
+ * reflectance that is just seen at R. That comes from the data sheet's ranges R_k for targets of rho_k:
+ * through each of them log rho_min = 2 log R + g(R), g linear between them: the extinction of the air on the
+ * data sheet's day, 2 a = slope; beyond the last, and before the first, as between the nearest two, with a
+ * single one none. a is therefore only the extinction beyond that of the data sheet's day.
+ * o(R) = 1 - exp(-(R / R_o)^2): at short range part of the light misses the detector (Y. Fang et al.,
+ * Intensity correction of terrestrial laser scanning data by estimating laser transmission function, 2015,
+ * with the lens's parameters taken together into R_o, near which the signal is strongest).
  *
- * Detection. The signal carries Gaussian noise of sigma 1/k in units of the threshold, k the signal-to-noise ratio at
- * the threshold; it is detected where A + n/k >= 1, with probability Phi(k (A - 1)). So half of the pulses see a target
- * at the data sheet's range. Reflectance, relative to a white Lambertian target at that range, met head on, in the data
- * sheet's air: (A + n/k) rho_min(R) / o(R). Amplitude in dB above the threshold, as a head measures it, is
+ * Detection. The signal carries Gaussian noise of sigma 1/k in units of the threshold, k the signal-to-noise
+ * ratio at the threshold; it is detected where A + n/k >= 1, with probability Phi(k (A - 1)). So half of the
+ * pulses see a target at the data sheet's range. Reflectance, relative to a white Lambertian target at that
+ * range, met head on, in the data sheet's air: (A + n/k) rho_min(R) / o(R). Amplitude in dB above the
+ * threshold, as a head measures it, is
  * 10 log10 (A + n/k): 0 dB or more of what is detected.
  *
- * Range noise. The time of an echo has a jitter of rise time over signal-to-noise ratio (M. Skolnik, Introduction to
- * radar systems, 1980), beside one that no signal helps against (clock, digits):
+ * Range noise. The time of an echo has a jitter of rise time over signal-to-noise ratio (M. Skolnik,
+ * Introduction to radar systems, 1980), beside one that no signal helps against (clock, digits):
  *
  *     sigma^2 = floor^2 + (X^2 - floor^2) (A_Y / A)^2,  and a part per distance added to sigma
  *
  * for a data sheet's `X at Y m`, A_Y the amplitude of a target of its reflectance at Y, head on.
  *
- * Random numbers are keyed by (seed, pulse, echo, purpose): nothing depends on what else was detected. No echo stays no
- * echo. Pure; any thread; allocates nothing. */
+ * Random numbers are keyed by (seed, pulse, echo, purpose): nothing depends on what else was detected. No
+ * echo stays no echo. Pure; any thread; allocates nothing. */
 #ifndef CORE_DETECT_H
 #define CORE_DETECT_H
 
@@ -68,18 +71,17 @@ struct detect_signal {
     uint64_t signal_key, range_key;
 };
 
-/* SH_EINPUT, without the file's name: reaches that no air explains (a darker target seen further, or a signal that
- * falls less than with the square of the range), sigma_floor_m above sigma_m. Reaches may come in any order. */
+/* SH_EINPUT, without the file's name: reaches that no air explains (a darker target seen further, or a signal
+ * that falls less than with the square of the range), sigma_floor_m above sigma_m. Reaches may come in any
+ * order. */
 int detect_signal_set_up(const struct detect_signal_spec *spec, struct detect_signal *signal, struct sh_err *err);
 
-/* rho_min(R). */
-double detect_least_reflectance(const struct detect_signal *signal, double range_m);
 /* A of a return E rho(i). */
 double detect_amplitude(const struct detect_signal *signal, double range_m, double rho);
-double detect_sigma_m(const struct detect_signal *signal, double amplitude, double range_m);
 
-/* Extinction for a visibility (Koschmieder: contrast of 2 % at 550 nm), by Kruse's formula with Kim's exponents (I. Kim
- * et al., Comparison of laser beam propagation at 785 nm and 1550 nm in fog and haze, 2001). */
+/* Extinction for a visibility (Koschmieder: contrast of 2 % at 550 nm), by Kruse's formula with Kim's
+ * exponents (I. Kim et al., Comparison of laser beam propagation at 785 nm and 1550 nm in fog and haze,
+ * 2001). */
 double detect_extinction_1_m(double visibility_m, double wavelength_m);
 
 struct detect_echoes {
@@ -93,8 +95,7 @@ struct detect_echoes {
 
 /* Fills amplitude and refl_cdb; range_m becomes NaN where nothing is detected. */
 void detect_by_signal(const struct detect_signal *signal, const struct detect_echoes *echoes);
-/* After that: amplitudes in 0.01 dB above the threshold; LINE_AMPLITUDE_NONE where there is no echo, and of all without
- * a signal (NULL). */
+/* After that: amplitudes in 0.01 dB above the threshold; LINE_AMPLITUDE_NONE where there is no echo. */
 void detect_amplitudes(const struct detect_signal *signal, const struct detect_echoes *echoes, int16_t *amplitude_cdb);
 /* Range noise by the amplitude. */
 void detect_range_noise(const struct detect_signal *signal, const struct detect_echoes *echoes);
@@ -102,27 +103,31 @@ void detect_range_noise(const struct detect_signal *signal, const struct detect_
 void detect_fixed_noise(double sigma0_m, double sigma1, uint64_t range_key, uint32_t n, const uint64_t *key,
                         double *range_m);
 
-/* Range ambiguity: an echo that comes back after the next pulse has left, beyond R_u = c T / 2 (T: time between
- * pulses). Folded: reported as of the last pulse that had left by then, R mod R_u. (It stays with its own pulse here,
- * so that its direction is that of the pulse it belongs to.) Resolved: reported where it is, within so many zones; what
- * lies beyond is lost. In both an echo is lost that comes back while the head is blind, less than range_min_m after a
- * pulse. */
+/* Range ambiguity: an echo that comes back after the next pulse has left, beyond R_u = c T / 2 (T: time
+ * between pulses). Folded: reported as of the last pulse that had left by then, R mod R_u. (It stays with its
+ * own pulse here, so that its direction is that of the pulse it belongs to.) Resolved: reported where it is,
+ * within so many zones; what lies beyond is lost. In both an echo is lost that comes back while the head is
+ * blind, less than range_min_m after a pulse. */
 enum detect_ambiguity { DETECT_AMBIGUITY_NONE, DETECT_FOLDED, DETECT_RESOLVED };
-static const double DETECT_LIGHT_M_S = 299792458.0;
 void detect_zones(enum detect_ambiguity how, double period_s, uint32_t zones, double range_min_m, uint32_t n,
                   double *range_m);
 
-/* The ball-shaped noise of TLSynth: each point is moved to anywhere in a ball around it, all places in it being as
- * likely. The ball's radius is radius_m (1 + per_distance_1_m R), then each axis is stretched by its factor. */
+/* The ball-shaped noise of TLSynth: each point is moved to anywhere in a ball around it, all places in it
+ * being as likely. The ball's radius is radius_m (1 + per_distance_1_m R), then each axis is stretched by its
+ * factor. */
 struct detect_ball {
     double radius_m, factor[3], per_distance_1_m;
     int local; /* axes: along the beam, to the right (along the mirror's axis), up; else those of the scene */
     uint64_t direction_key, radius_key;
 };
 void detect_ball_keys(struct detect_ball *ball, uint64_t seed);
-/* Moves n points given by range and angles (turns) in the head's frame; ranges of NaN are left alone. rotation: socs ->
- * prcs; NULL with local axes. */
-void detect_move_in_ball(const struct detect_ball *ball, const double rotation[9], uint32_t n, const uint64_t *key,
-                         double *range_m, double *mirror_turn, double *pan_turn);
+/* Points, given by range and angles (turns) in the head's frame; ranges of NaN are left alone. */
+struct detect_points {
+    uint32_t n;
+    const uint64_t *key;
+    double *range_m, *mirror_turn, *pan_turn;
+};
+/* rotation: socs -> prcs; NULL with local axes. */
+void detect_move_in_ball(const struct detect_ball *ball, const double rotation[9], const struct detect_points *points);
 
 #endif

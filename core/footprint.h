@@ -1,37 +1,41 @@
 /* The beam: a pulse is not a ray. Definitions first.
  *
- * Width. Irradiance across the beam is Gaussian, I = I0 exp(-2 r^2 / w^2); w is the 1/e^2 radius. Diameters and
- * divergences are full ones at 1/e^2. (A 1/e figure times 1.41, a FWHM figure times 1.70.)
- * With exit diameter D and divergence theta, and the waist in the exit plane, w(R)^2 = (D/2)^2 + (R theta/2)^2: the
- * hyperbola of ISO 11146-1, which holds for beams that are not diffraction-limited as well.
+ * Width. Irradiance across the beam is Gaussian, I = I0 exp(-2 r^2 / w^2); w is the 1/e^2 radius. Diameters
+ * and divergences are full ones at 1/e^2. (A 1/e figure times 1.41, a FWHM figure times 1.70.)
+ * With exit diameter D and divergence theta, and the waist in the exit plane, w(R)^2 = (D/2)^2 + (R
+ * theta/2)^2: the hyperbola of ISO 11146-1, which holds for beams that are not diffraction-limited as well.
  *
  * Footprint. The circle of radius w(R). Its energy counts as 1; the 13.5 % outside of it is not modelled.
  *
- * Sub-rays. The hyperboloid is a ruled surface: the straight line from rho D/2 (cos phi, sin phi) in the exit plane,
- * with slope rho theta/2 (-sin phi, cos phi), is rho w(R) from the axis at every R. So a sub-ray is a straight line
- * from its own point of the exit plane, at (x, y) = rho (cos phi, sin phi) of the unit disc; equal areas of energy in
- * the disc are equal areas of energy in every footprint. Its range counts along itself from the exit plane.
- * Rings: one sub-ray in the centre and 6 k on ring k = 1 .. N, 1 + 3 N (N + 1) in all, each with the same energy: ring
- * k lies where half of the energy of its annulus is inside. (Energy within rho, from the irradiance: (1 - exp(-2
- * rho^2)) / (1 - exp(-2)).)
+ * Sub-rays. The hyperboloid is a ruled surface: the straight line from rho D/2 (cos phi, sin phi) in the exit
+ * plane, with slope rho theta/2 (-sin phi, cos phi), is rho w(R) from the axis at every R. So a sub-ray is a
+ * straight line from its own point of the exit plane, at (x, y) = rho (cos phi, sin phi) of the unit disc;
+ * equal areas of energy in the disc are equal areas of energy in every footprint. Its range counts along
+ * itself from the exit plane.
+ * Rings: one sub-ray in the centre and 6 k on ring k = 1 .. N, 1 + 3 N (N + 1) in all, each with the same
+ * energy: ring k lies where half of the energy of its annulus is inside. (Energy within rho, from the
+ * irradiance: (1 - exp(-2 rho^2)) / (1 - exp(-2)).)
  *
- * Returns of a pulse, one for each sub-ray that meets something, become echoes: sorted by range, a gap larger than the
- * range resolution (c tau / 2 of the pulse width tau) begins a new one. An echo's range is the energy-weighted mean of
- * its returns - with two surfaces closer than the resolution, the mixed pixel's -, its surface the one that most
- * of it comes back from, its energy the sum: the centroid of equal pulses that overlap, whatever their shape. Less than
- * 1 % of the footprint's energy is no echo. Of more echoes than the head can tell, the weakest are left out, and
- * counted. Where surfaces are modelled (core/surface.h), what weighs is what comes back: energy times the surface's
- * return, times the share that glass and mirrors before it let through; the 1 % is still of the footprint (and where
- * nothing comes back of any of them, energy weighs). The width of an echo is that of the pulse, resolution_m, and 2.355
- * sigma of its ranges, added as squares (full widths at half maximum of Gaussians). Of a return that stands for a part
- * of the footprint, or for what lies around a sub-ray, the ranges within it count as well, to first order on its plane:
- * short by half of (s tan i)^2 of the standard deviation, s = theta / 2; where lines cross in the footprint, by a few
- * percent more, as its parts are then known by places.
+ * Returns of a pulse, one for each sub-ray that meets something, become echoes: sorted by range, a gap larger
+ * than the range resolution (c tau / 2 of the pulse width tau) begins a new one. An echo's range is the
+ * energy-weighted mean of its returns - with two surfaces closer than the resolution, the mixed pixel's -,
+ * its surface the one that most of it comes back from, its energy the sum: the centroid of equal pulses that
+ * overlap, whatever their shape. Less than
+ * 1 % of the footprint's energy is no echo. Of more echoes than the head can report, the weakest are left
+ * out, and counted. Where surfaces are modelled (core/surface.h), what weighs is what comes back: energy
+ * times the surface's return, times the share that glass and mirrors before it let through; the 1 % is still
+ * of the footprint (and where nothing comes back of any of them, energy weighs). The width of an echo is that
+ * of the pulse, resolution_m, and 2.355 sigma of its ranges, added as squares (full widths at half maximum of
+ * Gaussians). Of a return that stands for a part of the footprint, or for what lies around a sub-ray, the
+ * ranges within it count as well, to first order on its plane: short by half of (s tan i)^2 of the standard
+ * deviation, s = theta / 2; where lines cross in the footprint, by a few percent more, as its parts are then
+ * known by places.
  *
- * One ray for all of the footprint. Where it lies on one plane at incidence i, the mean over it is not the range of its
- * centre: a sub-ray at (rho, phi) meets the plane at (R - rho D/2 tan i cos phi) / (1 - rho s tan i sin phi), s = theta
- * / 2, times sqrt(1 + rho^2 s^2) along itself. The mean over phi is R sqrt((1 + rho^2 s^2) / (1 - rho^2 s^2 tan^2 i)).
- * Over the footprint, with t = rho^2 distributed as exp(-2 t) on 0 .. 1, mean t = 0.343, mean t^2 = 0.187:
+ * One ray for all of the footprint. Where it lies on one plane at incidence i, the mean over it is not the
+ * range of its centre: a sub-ray at (rho, phi) meets the plane at (R - rho D/2 tan i cos phi) / (1 - rho s
+ * tan i sin phi), s = theta / 2, times sqrt(1 + rho^2 s^2) along itself. The mean over phi is R sqrt((1 +
+ * rho^2 s^2) / (1 - rho^2 s^2 tan^2 i)). Over the footprint, with t = rho^2 distributed as exp(-2 t) on 0 ..
+ * 1, mean t = 0.343, mean t^2 = 0.187:
  * R (1 + 0.343 s^2 / (2 cos^2 i) + ...), 0.14 mm at 800 m, 80 deg and 0.35 mrad. */
 #ifndef CORE_FOOTPRINT_H
 #define CORE_FOOTPRINT_H
@@ -41,6 +45,7 @@
 #include "core/err.h"
 #include "core/line.h"
 #include "core/scene.h"
+#include "core/vec3.h"
 
 enum beam_mode { BEAM_SINGLE, BEAM_RINGS, BEAM_ADAPTIVE, BEAM_AUTO };
 enum beam_select { BEAM_ALL, BEAM_FIRST, BEAM_LAST, BEAM_STRONGEST };
@@ -69,19 +74,17 @@ struct beam {
 /* Lengths and angles as above; the pulse width in seconds. */
 void beam_init(struct beam *beam, double exit_m, double divergence_rad, double pulse_width_s);
 double beam_radius(const struct beam *beam, double range_m);
-/* Mean over a footprint on one plane, less the range of its centre. cosine: of the incidence, > 0. Beyond s / cos i =
- * 1/2, where the plane is within a footprint's angle of the beam, that of 1/2. */
-double beam_plane_excess(const struct beam *beam, double range_m, double cosine);
-/* The same as a polynomial: range (term[0] x + term[1] x^2 + term[2] x^3), x = 1 / cos^2 of the incidence. */
-void beam_plane_series(const struct beam *beam, double term[3]);
-/* Variance of the ranges there, to first order in s tan i: that of rho cos phi, half the mean t, times w(R)^2 tan^2 i;
- * as (term[0] + term[1] range^2) (x - 1), x as above. */
-void beam_plane_variance(const struct beam *beam, double term[2]);
+/* A footprint on one plane, hit in its centre at range_m, with steep = 1 / cos^2 of the incidence: the mean
+ * of its ranges in place of the centre's, as range (1 + a x + b x^2 + c x^3), x = steep. Where the plane is
+ * within a footprint's angle of the beam, beyond s / cos i = 1/2, x is that of 1/2. */
+void beam_plane_means(const struct beam *beam, const float *steep, uint32_t n, double *range_m);
+/* The width of its echo: for pulses of beam->resolution_m. */
+void beam_plane_widths(const struct beam *beam, const float *steep, const double *range_m, uint32_t n, float *width_m);
 /* Width of an echo whose ranges vary so: pulse_m is the pulse's own, c tau / 2. */
 double beam_echo_width(double pulse_m, double variance_m2);
 
-/* The part of the unit disc beyond the line n . u = h, n a unit vector, |h| <= 1: its energy, and the energy times the
- * distance of its centre of energy along n. */
+/* The part of the unit disc beyond the line n . u = h, n a unit vector, |h| <= 1: its energy, and the energy
+ * times the distance of its centre of energy along n. */
 void beam_half(const struct beam *beam, double h, double *energy, double *moment);
 /* Its second moments, along n and along the line. */
 void beam_half_squares(const struct beam *beam, double h, double *along, double *across);
@@ -89,7 +92,7 @@ void beam_half_squares(const struct beam *beam, double h, double *along, double 
 /* Places of sub-rays in the unit disc, each with 1/n of the energy. */
 struct beam_pattern {
     uint32_t n;
-    float x[BEAM_SUBRAY_ROOM], y[BEAM_SUBRAY_ROOM]; /* whole words of bits; behind n: nothing */
+    float x[BEAM_SUBRAY_ROOM], y[BEAM_SUBRAY_ROOM]; /* whole words of bits; from n on: nothing */
     double rest; /* variance of the footprint's x, and of its y, less that of the places: what lies around each */
 };
 /* rings: 0 (the centre alone) to BEAM_MAX_RINGS. */
@@ -97,6 +100,9 @@ void beam_rings(uint32_t rings, struct beam_pattern *pattern);
 
 /* Two axes across a beam's direction. */
 void beam_axes(const double dir[3], double e1[3], double e2[3]);
+struct beam_sight {
+    double dir[3], e1[3], e2[3];
+};
 
 /* What one sub-ray, or one part of a footprint, brings back. */
 struct beam_return {
@@ -108,48 +114,63 @@ struct beam_return {
     uint32_t triangle, label;
 };
 
-/* Echoes as arrays, in order of pulse, then of range. */
-struct beam_echoes {
-    uint32_t n, capacity;
-    uint32_t *pulse; /* index in the chunk */
-    double *range_m;
-    float *energy, *back, *cosine, *width_m;
-    uint32_t *triangle, *label;
-    uint8_t *number; /* among the pulse's, from 0, those counted that were left out: for random numbers */
+struct beam_echo {
+    double range_m;
+    double energy, back; /* sums over its returns */
+    float cosine;
+    float width_m;
+    uint32_t triangle, label;
+    uint8_t number; /* among the pulse's, from 0, those counted that were left out: for random numbers */
 };
-int beam_echoes_alloc(struct beam_echoes *echoes, uint32_t capacity, struct sh_err *err);
-void beam_echoes_free(struct beam_echoes *echoes);
 
-/* Returns of one pulse -> its echoes, at the end of the list. The returns change places. Those of the pulse's echoes
- * that exceed most are left out, those first of which least comes back; gives how many. */
-uint32_t beam_merge(const struct beam *beam, struct beam_return *returns, uint32_t n, uint32_t pulse, uint32_t most,
-                    struct beam_echoes *echoes);
+/* What makes one echo of several returns. */
+struct beam_merging {
+    double gap_m;        /* a larger one begins a new echo */
+    double pulse_m;      /* width of the pulse, c tau / 2 */
+    double least_energy; /* less is no echo */
+    int by_surface;      /* an echo is of the surface that most comes back from; else of its strongest return */
+    uint32_t most;       /* echoes of a pulse; the weakest are left out */
+};
+/* For a footprint, as defined above. */
+void beam_merging(const struct beam *beam, uint32_t most, struct beam_merging *how);
+/* Returns of one pulse -> its echoes, by range; room for most + 1 of them. The returns change places. Gives
+ * how many echoes there are; *left_out counts those that were left out on top of what it holds. */
+uint32_t beam_merge(const struct beam_merging *how, struct beam_return *returns, uint32_t n, struct beam_echo *echo,
+                    uint64_t *left_out);
 
 /* ---- what a footprint may reach besides the surface in its centre */
 
-/* The outlines of a scene as seen from one place: edges with the surface on one side only. Behind no outline, the
- * surface that a pulse meets in its centre is all that its footprint meets: one ray will do. Edges between two
- * triangles on both sides of them are none, however sharp: ranges are continuous there. What is asked of all edges is
- * asked once, here; for a pulse one looks up the cell of its direction, which names the edges that footprints within it
- * may reach, and the nearest of them. Constant after it is made; any thread. */
+/* The outlines of a scene as seen from one place: edges with the surface on one side only. Where there is no
+ * outline, the surface that a pulse meets in its centre is all that its footprint meets: one ray will do.
+ * Edges between two triangles on both sides of them are none, however sharp: ranges are continuous there.
+ * What is asked of all edges is asked once, here; for a pulse one looks up the cell of its direction, which
+ * names the edges that footprints within it may reach, and the nearest of them. Constant after it is made;
+ * any thread. */
 struct beam_outlines;
 
-/* Casts rays from the station: unit directions -> ranges, NaN for none, and the kinds of surfaces that they meet. */
+/* Casts rays from the station: unit directions -> ranges, NaN for none, and the kinds of surfaces that they
+ * meet. */
 struct beam_probe {
-    void (*cast)(void *ctx, uint32_t n, const double *dx, const double *dy, const double *dz, double *range_m,
-                 uint16_t *kind);
+    void (*cast)(void *ctx, uint32_t n, const struct vec3_in *dir, double *range_m, uint16_t *kind);
     void *ctx;
 };
-/* kind, by label: surfaces of one kind send back the same. NULL: all do, or nobody asks. Else edges where one kind ends
- * are outlines, too, with or without a step. */
-/* station_m: where all pulses come from; at most exit_radius_m off.
- * probe, NULL: all outlines count. Else rays are cast close along both sides of each, a footprint's radius apart: a
- * stretch of it is left out where it is hidden, or where the ranges on both sides agree to BEAM_LEAST_STEP_M (a wall
- * that stands on a floor; parts of a wall). Such a stretch can't make another echo; ignored as any fold between
- * triangles is, it may move a range by a sixth of the footprint's radius times the change of slope. What is hidden from
- * the station may be seen from the edge of the exit: a strip of at most its radius. */
-int beam_outlines_create(const struct scene *scene, const double station_m[3], const struct beam *beam,
-                         double range_max_m, const uint16_t *kind, const struct beam_probe *probe,
+/* What outlines are made for. */
+struct beam_outlines_spec {
+    const struct scene *scene;
+    const double *station_m; /* [3], prcs: where all pulses come from; at most exit_radius_m from it */
+    const struct beam *beam;
+    double range_max_m;
+    /* By label: surfaces of one kind send back the same. Edges where one kind ends are outlines, too, with or
+     * without a step. NULL: all surfaces are of one kind. */
+    const uint16_t *kind;
+};
+/* probe, NULL: all outlines count. Else rays are cast close along both sides of each, a footprint's radius
+ * apart. A stretch of an outline is left out where it is hidden, or where the ranges on both sides agree to
+ * BEAM_LEAST_STEP_M (a wall that stands on a floor; parts of a wall): it can't make another echo. Left out,
+ * as any fold between triangles is, it may move a range by a sixth of the footprint's radius times the change
+ * of slope. What is hidden from the station may be seen from the edge of the exit: a strip of at most its
+ * radius. */
+int beam_outlines_create(const struct beam_outlines_spec *spec, const struct beam_probe *probe,
                          struct beam_outlines **out, struct sh_err *err);
 void beam_outlines_free(struct beam_outlines *outlines);
 struct beam_outlines_info {
@@ -161,10 +182,11 @@ enum { BEAM_NEAR_MOST = 1024 };
 /* A pulse whose footprint may reach outlines first .. end. */
 struct beam_near {
     uint32_t pulse, first, end;
+    double next_m; /* beam_find_lines */
 };
 /* Those, at whatever range, of n <= BEAM_NEAR_MOST unit directions. Returns how many. */
-uint32_t beam_near_outlines(const struct beam_outlines *outlines, const struct beam *beam, const float *dx,
-                            const float *dy, const float *dz, uint32_t n, struct beam_near *near);
+uint32_t beam_near_outlines(const struct beam_outlines *outlines, const struct beam *beam,
+                            const struct vec3_floats *dir, uint32_t n, struct beam_near *near);
 
 enum { BEAM_MAX_LINES = 12, BEAM_MAX_PARTS = 64 };
 
@@ -172,30 +194,33 @@ enum { BEAM_MAX_LINES = 12, BEAM_MAX_PARTS = 64 };
 struct beam_line {
     double n[2], h;
 };
-/* The outlines that cross the footprint of a pulse nearer than limit_m. e1, e2: its beam_axes, which the lines refer
- * to. Returns their number, up to BEAM_MAX_LINES, or BEAM_MAX_LINES + 1: more than that. *next_m: from which range on
- * there may be more (INFINITY: none, or nothing crosses it up to limit_m). */
-uint32_t beam_find_lines(const struct beam_outlines *outlines, const struct beam *beam, const struct beam_near *near,
-                         const double dir[3], const double e1[3], const double e2[3], double limit_m,
-                         struct beam_line *line, double *next_m);
+/* The outlines that cross the footprint of a pulse nearer than limit_m; the lines refer to its axes. Returns
+ * their number, up to BEAM_MAX_LINES, or BEAM_MAX_LINES + 1: more than that. near->next_m: from which range
+ * on there may be more (INFINITY: none, or nothing crosses it up to limit_m). */
+uint32_t beam_find_lines(const struct beam_outlines *outlines, const struct beam *beam, struct beam_near *near,
+                         const struct beam_sight *sight, double limit_m, struct beam_line *line);
 
-/* The parts that lines cut the footprint into. Each lies on one surface; convex, so that its centre of energy is in
- * it. */
+/* A part of the footprint: its energy, the centre of that, and how it spreads about it: variances and
+ * covariance of x and y, where they are asked for. */
+struct beam_part {
+    double energy, x, y, xx, xy, yy;
+};
+/* The parts that lines cut the footprint into. Each lies on one surface; convex, so that its centre of energy
+ * is in it. */
 struct beam_parts {
     uint32_t n, centre; /* the part with the centre of the disc */
-    double energy[BEAM_MAX_PARTS], x[BEAM_MAX_PARTS], y[BEAM_MAX_PARTS];
+    struct beam_part part[BEAM_MAX_PARTS];
 };
-/* fine: of BEAM_FINE_RINGS. Returns 0, or 1 where there are more than BEAM_MAX_PARTS. Parts of less than 0.05 % of the
- * energy are left out. */
+/* fine: of BEAM_FINE_RINGS. Returns 0, or 1 where there are more than BEAM_MAX_PARTS. Parts of less than 0.05
+ * % of the energy are left out. */
 int beam_cut(const struct beam *beam, const struct beam_pattern *fine, const struct beam_line *line, uint32_t n,
-             struct beam_parts *parts);
+             int spreads, struct beam_parts *parts);
 
-/* How each part spreads about its centre of energy: variances and covariance of x and y. */
-struct beam_spread {
-    double xx[BEAM_MAX_PARTS], xy[BEAM_MAX_PARTS], yy[BEAM_MAX_PARTS];
-};
-/* beam_cut, with the parts' spreads. */
-int beam_cut_spread(const struct beam *beam, const struct beam_pattern *fine, const struct beam_line *line, uint32_t n,
-                    struct beam_parts *parts, struct beam_spread *spread);
+/* Standard deviation of the ranges within a part that lies on the plane with normal n, range_m away in its
+ * centre. */
+float beam_part_sigma(const struct beam *beam, const struct beam_sight *sight, const double n[3], double range_m,
+                      const struct beam_part *part);
+/* Likewise of a part that spreads the same all around, where only the incidence is known. */
+float beam_round_sigma(const struct beam *beam, double range_m, double cosine, double variance);
 
 #endif

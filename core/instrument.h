@@ -1,17 +1,19 @@
-/* Instrument errors: the geometry of a scanner that is not quite as designed. Its mechanics say where the beam really
- * goes, its encoders what the head believes.
+/* Instrument errors: the geometry of a scanner that is not quite as designed. Its mechanics say where the
+ * beam really goes, its encoders what the head believes.
  *
- * Terms as in D. Lichti, Error modelling, calibration and analysis of an AM-CW terrestrial laser scanner system (2007),
- * and B. Muralikrishnan et al., Volumetric performance evaluation of a laser scanner based on geometric error model
- * (2015). Here they are geometry, not its first-order expansion. Beam of line angle m (elevation) and pan p, both true
- * angles of the axes, in the frame that turns with the pan (x right, along the mirror's axis; y ahead; z up):
+ * Terms as in D. Lichti, Error modelling, calibration and analysis of an AM-CW terrestrial laser scanner
+ * system (2007), and B. Muralikrishnan et al., Volumetric performance evaluation of a laser scanner based on
+ * geometric error model (2015). Here they are geometry, not its first-order expansion. Beam of line angle m
+ * (elevation) and pan p, both true angles of the axes, in the frame that turns with the pan (x right, along
+ * the mirror's axis; y ahead; z up):
  *
  *     direction = Ry(trunnion) (sin c, cos c cos m, cos c sin m)      c: collimation
  *     origin    = (mirror_offset, transit_offset, 0)
  *
  * collimation: the beam leaves the plane across the mirror's axis, to the right; in pan by c / cos m.
  * trunnion: the mirror's axis is not level, its right end sinks; in pan by trunnion tan m.
- * transit offset: the mirror's axis passes the pan's axis, so far ahead of it; seen in range by cos m, in line angle by
+ * transit offset: the mirror's axis passes the pan's axis, so far ahead of it; seen in range by cos m, in
+ * line angle by
  * -sin m / R.
  * mirror offset: the beam leaves so far to the right of the pan's axis; seen in pan by 1 / (R cos m).
  *
@@ -24,6 +26,8 @@
 #define CORE_INSTRUMENT_H
 
 #include <stdint.h>
+
+#include "core/vec3.h"
 
 struct instrument_encoder {
     double index_rad, scale, eccentricity_rad, phase_rad;
@@ -43,16 +47,21 @@ int instrument_is_ideal(const struct instrument *instrument);
 /* True when beams begin beside the head's origin. */
 int instrument_has_offset(const struct instrument *instrument);
 
-/* Pulses from pulse0 on, scheduled at these angles: direction s of the beam and, unless ox is NULL, its origin o, both
- * in socs. */
-struct instrument_beams {
-    double *sx, *sy, *sz, *ox, *oy, *oz;
+/* Pulses from pulse0 on: angles of the axes, in turns. */
+struct instrument_turns {
+    uint64_t pulse0;
+    uint32_t n;
+    double *mirror, *pan;
 };
-void instrument_aim(const struct instrument *instrument, uint64_t pulse0, uint32_t n, const double *mirror_turn,
-                    const double *pan_turn, const struct instrument_beams *beams);
+/* Scheduled angles -> direction s of the beam and, unless o->x is NULL, its origin o (m), both in socs. */
+void instrument_aim(const struct instrument *instrument, const struct instrument_turns *turns, const struct vec3_out *s,
+                    const struct vec3_out *o);
 
-/* What the encoders say, in place. */
+/* Scheduled angles become what the encoders say, in place. */
 void instrument_read(const struct instrument *instrument, uint32_t n, double *mirror_turn, double *pan_turn);
 void instrument_range(const struct instrument *instrument, uint32_t n, double *range_m);
+
+/* Encoder reading of an angle: whole counts, modulo a turn. */
+uint32_t instrument_encoder_count(double turn, double counts_per_turn);
 
 #endif

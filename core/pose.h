@@ -53,6 +53,14 @@ void pose_to_angles(const double quat[4], double *heading_rad, double *pitch_rad
 /* R, row by row. */
 void pose_matrix(const double quat[4], double rotation[9]);
 void pose_from_matrix(const double rotation[9], double quat[4]);
+/* R of a head turned by heading, then pitch, then roll, each about the axes as they lie by then; row by row:
+ *
+ *      ch cr + sh sp sr    sh cp    ch sr - sh sp cr
+ *     -sh cr + ch sp sr    ch cp   -sh sr - ch sp cr
+ *     -cp sr               sp       cp cr              */
+void pose_attitude(double heading_rad, double pitch_rad, double roll_rad, double rotation[9]);
+/* The same of a levelled head. */
+void pose_heading(double heading_rad, double rotation[9]);
 void pose_multiply(const double a[4], const double b[4], double out[4]);
 void pose_rotate(const double quat[4], const double v[3], double out[3]);
 /* Angle between two attitudes, in [0, pi]. */

@@ -1,22 +1,26 @@
 /* Surfaces: how much of a pulse comes back from what it met.
  *
- * Monostatic: source and detector look along the same line. What returns is given relative to a white Lambertian target
- * that fills the beam and is met head on at the same range:
+ * Monostatic: source and detector look along the same line. What returns is given relative to a white
+ * Lambertian target that fills the beam and is met head on at the same range:
  *
  *     rho(i) = reflectance cos i + specular (m + 2)/2 cos^m(2i) cos i + retro
  *
  * - reflectance: Lambertian, radiance the same in all directions; cos i is the area the beam is spread over.
- * - specular: a lobe of cos^m about the mirror direction, which lies 2i from the way back; normalised so that all of it
- *   adds up to `specular` (E. P. Lafortune, Y. D. Willems, Using the modified Phong reflectance model, 1994); m is
- * `gloss`.
- * - retro: sent back into a narrow cone around where it came from, whatever the incidence: a foil has 100 to 1000.
+ * - specular: a lobe of cos^m about the mirror direction, which lies 2i from the way back; normalised so that
+ * all of it
+ *   adds up to `specular` (E. P. Lafortune, Y. D. Willems, Using the modified Phong reflectance model, 1994);
+ *   m is `gloss`.
+ * - retro: sent back into a narrow cone around where it came from, whatever the incidence: a foil has 100 to
+ * 1000.
  *
- * Glass passes a share of the power on, at each of its surfaces, in the same direction (panes are thin: no refraction).
- * A mirror sends a share on by the law of reflection.
+ * Glass passes a share of the power on, at each of its surfaces, in the same direction (panes are thin: no
+ * refraction). A mirror sends a share on by the law of reflection.
  *
- * Where the mesh has a colour, the reflectance is taken from it: the luminance of linear sRGB (ITU-R BT.709: 0.2126 R +
- * 0.7152 G + 0.0722 B). That is an assumption: what is light to the eye need not be at the laser's wavelength. Where it
- * has a diffuse texture, likewise from the texel at the hit, times the colour, channel by channel. */
+ * Where the mesh has a colour, the reflectance is taken from it: the luminance of linear sRGB (ITU-R BT.709:
+ * 0.2126 R +
+ * 0.7152 G + 0.0722 B). That is an assumption: what is light to the eye need not be at the laser's
+ * wavelength. Where it has a diffuse texture, likewise from the texel at the hit, times the colour, channel
+ * by channel. */
 #ifndef CORE_SURFACE_H
 #define CORE_SURFACE_H
 
@@ -31,8 +35,8 @@ struct surface {
     double glass, mirror;   /* shares of the power that are passed on, or reflected as by a mirror; 0..1 */
 };
 
-/* What a configuration says about surfaces whose names fit. The patterns are those of the shell (fnmatch); NaN: not
- * said, and left as it is. */
+/* What a configuration says about surfaces whose names fit. The patterns are those of the shell (fnmatch);
+ * NaN: not said, and left unchanged. */
 struct surface_rule {
     char object[SCENE_NAME_LEN], material[SCENE_NAME_LEN];
     struct surface surface;
@@ -52,25 +56,34 @@ struct surface_table {
 int surface_table_alloc(uint32_t n, struct surface_table *table, struct sh_err *err);
 void surface_table_free(struct surface_table *table);
 
-/* Fills entry `label` from the name and colour of a scene's surface and the first of n_rules rules that fits. unknown:
- * the reflectance where neither says one. Returns the number of that rule, -1: none fits. */
+/* Fills entry `label` from the name and colour of a scene's surface and the first of n_rules rules that fits.
+ * unknown: the reflectance where neither says one. Returns the number of that rule, -1: none fits. */
 int surface_table_set(struct surface_table *table, uint32_t label, const struct scene_surface *named,
                       const struct surface_rule *rule, uint32_t n_rules, double unknown);
 
 /* Labels of equal surfaces get the same number: kind[n], of the caller. */
 int surface_kinds(const struct surface_table *table, uint16_t *kind, struct sh_err *err);
 
-/* Entry `label` gets its reflectance from a texture: a PNG, repeated in both directions, its gamma taken for that of
- * sRGB. SH_EINPUT, naming the file: can't be read. Then, and of glass and mirrors, the entry stays as it is. */
+/* Entry `label` gets its reflectance from a texture: a PNG, repeated in both directions, its gamma taken for
+ * that of sRGB. SH_EINPUT, naming the file: can't be read. Then, and for glass and mirrors, the entry stays
+ * unchanged. */
 int surface_table_texture(struct surface_table *table, uint32_t label, const struct scene_surface *named,
                           const struct scene_texture *texture, struct sh_err *err);
 
-/* Labels of hits hold the surface in their low 16 bits. The high ones, where a texture tells the reflectance there, are
+/* Labels of hits hold the surface in their low 16 bits. The high ones, where a texture holds the reflectance
+ * there, are
  * 1 + 65534 times that, else 0. uv: of the hit, finite. Only for surfaces with a texture. */
 uint32_t surface_texel(const struct surface_table *table, uint32_t label, const double uv[2]);
 static inline uint32_t surface_of_label(uint32_t label)
 {
     return label & 0xffff;
+}
+
+/* The surface of a label, entry n for one beyond the table. */
+static inline const struct surface *surface_at(const struct surface_table *table, uint32_t label)
+{
+    label = surface_of_label(label);
+    return &table->surface[label < table->n ? label : table->n];
 }
 
 /* rho(i) of n hits; label beyond the table: 0. */

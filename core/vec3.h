@@ -1,16 +1,9 @@
-/* Products of vectors of three doubles. */
+/* Vectors of three doubles: products of two of them, and arrays of them as kernels take them, an array for
+ * each component. */
 #ifndef CORE_VEC3_H
 #define CORE_VEC3_H
 
 #include <math.h>
-
-/* Vectors as arrays, one per axis; the arrays stay the caller's. */
-struct vec3_in {
-    const double *x, *y, *z;
-};
-struct vec3_out {
-    double *x, *y, *z;
-};
 
 static inline double vec3_dot(const double a[3], const double b[3])
 {
@@ -29,5 +22,27 @@ static inline double vec3_distance(const double a[3], const double b[3])
     const double d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
     return sqrt(vec3_dot(d, d));
 }
+
+/* Vectors as arrays, one per axis; the arrays stay the caller's. */
+struct vec3_in {
+    const double *x, *y, *z;
+};
+struct vec3_out {
+    double *x, *y, *z;
+};
+struct vec3_floats {
+    const float *x, *y, *z;
+};
+
+/* Of anything with arrays x, y and z: what begins at its element i. */
+#define VEC3_IN(a, i)  ((struct vec3_in){(a).x + (i), (a).y + (i), (a).z + (i)})
+#define VEC3_OUT(a, i) ((struct vec3_out){(a).x + (i), (a).y + (i), (a).z + (i)})
+
+/* Element i as a vector. */
+#define VEC3_AT(a, i)                \
+    {                                \
+        (a).x[i], (a).y[i], (a).z[i] \
+    }
+#define VEC3_SET(a, i, v) ((a).x[i] = (v)[0], (a).y[i] = (v)[1], (a).z[i] = (v)[2])
 
 #endif

@@ -1,13 +1,13 @@
-/* Arithmetic that compilers turn into vectors: branch-free, the same bits on every instruction set (no FMA contraction,
- * see the Makefile), for loops over arrays. */
+/* Arithmetic that compilers turn into vectors: branch-free, the same bits on every instruction set (no FMA
+ * contraction, see the Makefile), for loops over arrays. */
 #ifndef CORE_VECMATH_H
 #define CORE_VECMATH_H
 
 #include <stdint.h>
 #include <string.h>
 
-/* The best version of a loop for the CPU at hand, chosen once at start. Sanitizers can't follow the resolver; before
- * version 18 clang gives it a name that other files don't find (llvm-project pull request 71706). */
+/* The best version of a loop for the CPU at hand, chosen once at start. Sanitizers can't follow the resolver;
+ * before version 18 clang gives it a name that other files don't find (llvm-project pull request 71706). */
 #if defined(__clang__) && __clang_major__ < 18
 #define VEC_CLONES
 #elif defined(__x86_64__) && !defined(SH_SANITIZE) && defined(__clang__)
@@ -18,6 +18,12 @@
 #define VEC_CLONES
 #endif
 #define VEC_INLINE static inline __attribute__((always_inline))
+/* Before a loop whose arrays don't overlap, where that can't be said by restrict: they came in a struct. */
+#ifdef __clang__
+#define VEC_LOOP _Pragma("clang loop vectorize(assume_safety)")
+#else
+#define VEC_LOOP _Pragma("GCC ivdep")
+#endif
 
 static const double VEC_TURN_RAD = 6.283185307179586477;
 
@@ -30,8 +36,9 @@ VEC_INLINE double vec_round(double x, uint64_t *bits)
     return shifted - magic;
 }
 
-/* Sine and cosine of an angle in turns, |turn| < 2^49: reduction to an eighth of a turn is exact, then Taylor series to
- * y^15 and y^16 with |y| <= pi/4, whose remainders are below 5e-17. Error below 2.5e-16 (tests/unit/test_vecmath.c). */
+/* Sine and cosine of an angle in turns, |turn| < 2^49: reduction to an eighth of a turn is exact, then Taylor
+ * series to y^15 and y^16 with |y| <= pi/4, whose remainders are below 5e-17. Error below 2.5e-16
+ * (tests/unit/test_vecmath.c). */
 VEC_INLINE void vec_sincos_turn(double turn, double *sine, double *cosine)
 {
     uint64_t quadrant;
@@ -60,8 +67,9 @@ VEC_INLINE void vec_sincos_turn(double turn, double *sine, double *cosine)
     *cosine = (quadrant + 1) & 2 ? -b : b;
 }
 
-/* Natural logarithm of a normal positive number: x = 2^e m, m in [sqrt(1/2), sqrt(2)), log m = 2 artanh((m-1)/(m+1)) by
- * its series to the 21st power, whose remainder is below 1e-17; relative error below 1e-15 away from x = 1. */
+/* Natural logarithm of a normal positive number: x = 2^e m, m in [sqrt(1/2), sqrt(2)), log m = 2
+ * artanh((m-1)/(m+1)) by its series to the 21st power, whose remainder is below 1e-17; relative error below
+ * 1e-15 away from x = 1. */
 VEC_INLINE double vec_log(double x)
 {
     uint64_t bits;
@@ -85,8 +93,8 @@ VEC_INLINE double vec_log(double x)
     return k * 0.693147180559945309 + 2.0 * (t + t * (z * p));
 }
 
-/* e^x; below -700 and above 700 that of the limit. x = k log 2 + r, |r| <= log(2)/2, and the Taylor series to r^13,
- * whose remainder is below 1e-17; relative error below 1e-15 (tests/unit/test_vecmath.c). */
+/* e^x; below -700 and above 700 that of the limit. x = k log 2 + r, |r| <= log(2)/2, and the Taylor series to
+ * r^13, whose remainder is below 1e-17; relative error below 1e-15 (tests/unit/test_vecmath.c). */
 VEC_INLINE double vec_exp(double x)
 {
     uint64_t bits;

@@ -27,7 +27,7 @@ static int build(struct bvh *bvh, struct sh_err *err)
         rtcCommitScene(bvh->rtc);
         int code = (int)rtcGetDeviceError(bvh->device);
         if (code != RTC_ERROR_NONE)
-            rc = sh_fail(err, SH_ENOMEM, "cast: Embree failed to build the BVH (error %d)", code);
+            rc = sh_fail(err, SH_ENOMEM, "bvh: Embree failed to build the BVH (error %d)", code);
     }
     rtcReleaseGeometry(geometry);
     return rc;
@@ -47,24 +47,23 @@ static double seconds(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-static int create(const struct scene *scene, const double origin_m[3], double station_reach_m, unsigned threads,
-                  int plain, const struct sh_report *report, struct bvh **out, struct sh_err *err)
+int bvh_create(const struct scene *scene, const double origin_m[3], double station_reach_m, unsigned threads,
+               const struct sh_report *report, struct bvh **out, struct sh_err *err)
 {
     *out = NULL;
     struct bvh *bvh = calloc(1, sizeof *bvh);
-    if (bvh == NULL) return sh_fail(err, SH_ENOMEM, "cast: no memory");
+    if (bvh == NULL) return sh_fail(err, SH_ENOMEM, "bvh: no memory");
     /* Embree sets 128 MB aside for subdivision surfaces, of which there are none here: 1 MB, the least. */
     char config[64] = "tessellation_cache_size=1";
     if (threads != 0) snprintf(config, sizeof config, "tessellation_cache_size=1,threads=%u", threads);
     bvh->scene = scene;
-    bvh->plain = plain;
     bvh->station_reach_m = station_reach_m;
     for (int i = 0; i < 3; i++)
         bvh->origin_m[i] = origin_m[i];
     bvh->device = rtcNewDevice(config);
     if (bvh->device == NULL) {
         free(bvh);
-        return sh_fail(err, SH_EIO, "cast: Embree can't start on this processor");
+        return sh_fail(err, SH_EIO, "bvh: Embree can't start on this processor");
     }
     rtcSetDeviceMemoryMonitorFunction(bvh->device, count_bytes, bvh);
     if (scene->n_triangles > 1000000) sh_progress(report, "building the BVH", -1.0);
@@ -76,28 +75,9 @@ static int create(const struct scene *scene, const double origin_m[3], double st
     }
     bvh->info.packet = native_packet(bvh->device);
     bvh->info.build_s = seconds() - start;
-    bvh->info.bytes = (uint64_t)bvh->bytes;
-    if (!plain) bvh->info.bytes += (uint64_t)scene->n_triangles * sizeof *bvh->triangle;
+    bvh->info.bytes = (uint64_t)bvh->bytes + (uint64_t)scene->n_triangles * sizeof *bvh->triangle;
     *out = bvh;
     return SH_OK;
-}
-
-int bvh_create(const struct scene *scene, const double origin_m[3], double station_reach_m, unsigned threads,
-               const struct sh_report *report, struct bvh **out, struct sh_err *err)
-{
-    return create(scene, origin_m, station_reach_m, threads, 0, report, out, err);
-}
-
-int bvh_create_plain(const struct scene *scene, const double origin_m[3], double station_reach_m, unsigned threads,
-                     const struct sh_report *report, struct bvh **out, struct sh_err *err)
-{
-    return create(scene, origin_m, station_reach_m, threads, 1, report, out, err);
-}
-
-int bvh_create_other(const struct bvh *bvh, unsigned threads, const struct sh_report *report, struct bvh **out,
-                     struct sh_err *err)
-{
-    return create(bvh->scene, bvh->origin_m, bvh->station_reach_m, threads, !bvh->plain, report, out, err);
 }
 
 void bvh_free(struct bvh *bvh)
@@ -125,4 +105,14 @@ void bvh_origin(const struct bvh *bvh, double origin_m[3])
 {
     for (int i = 0; i < 3; i++)
         origin_m[i] = bvh->origin_m[i];
+}
+
+const struct scene *bvh_scene(const struct bvh *bvh)
+{
+    return bvh->scene;
+}
+
+const struct bvh_plane *bvh_plane(const struct bvh *bvh, uint32_t triangle)
+{
+    return &bvh->triangle[triangle];
 }

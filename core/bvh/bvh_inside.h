@@ -1,45 +1,37 @@
-/* Private to core/cast: the BVH that proposes, and the exact triangles that decide.
+/* Private to core/bvh: the BVH that proposes, and the exact triangles that decide.
  *
- * Embree works in float: vertices, origin and direction are rounded, and so is its edge test. Near the edge of a
- * triangle it may therefore call a hit a miss, and a ray may slip through a closed mesh or past a silhouette. Here the
- * float triangles are wider than the real ones: in its own plane each has its edges further out by more than all of
- * that rounding, a distance across the ray, over the cosine of the incidence as seen from the BVH's origin. (Also for
- * edges seen end-on: their test is off by more, across the ray, but for the same reason they move by more.) Whatever a
- * ray really hits, Embree proposes. Proposals well inside a triangle stand. Those near its border are decided again in
- * double (decide.c). Rays from elsewhere (stations that share a BVH) find the same guarantee except at borders that
- * they see at a far smaller angle than the origin does.
+ * Embree works in float: vertices, origin and direction are rounded, and so is its edge test. Near the edge
+ * of a triangle it may therefore call a hit a miss, and a ray may slip through a closed mesh or past a
+ * silhouette. Here the float triangles are wider than the real ones: in its own plane each has its edges
+ * further out by more than all of that rounding, a distance across the ray, over the cosine of the incidence
+ * as seen from the BVH's origin. (Also for edges seen end-on: the error of their test is larger, across the
+ * ray, but for the same reason they move further.) Whatever a ray really hits, Embree proposes. Proposals
+ * well inside a triangle stand. Those near its border are decided again in double (decide.c). Rays from
+ * elsewhere (stations that share a BVH) find the same guarantee except at borders that they see at a far
+ * smaller angle than the origin does.
  *
- * So Embree need not be robust, and its faster test (Moeller and Trumbore 1997) will do. The budget, in units of 2^-24
- * of the farthest coordinate in play, R (vertex of the triangle from the BVH's origin, plus the ray's origin from it):
- * rounding of a vertex 1, of the ray's direction 1, of its origin 1 (none where it is the BVH's).
- * U = (C x D) . e, with C = v0 - o and e an edge at v0, against |e|: the cross product 2.2 (its products 1.2, its
- * differences 1), C itself 1.2 (none where o = 0), the dot product of three terms 3, e 1. Sum 6.2, or 7.4; 6.5 and 8
- * are used. The third edge is tested by what is left of the denominator, (e1 x e2) . D - U - V: the errors of U and V,
- * and 9 |e1| |e2|, all against the length of that edge, L: 6.5 (|e1| + |e2|) / L R + 9 |e1| |e2| / L. It is therefore
- * always the longest one, so that it is at most twice as bad as the others. The weights, u = U / |den| with a
- * reciprocal good to 3 units, are off by 6 |e1| |e2| / L more. The boxes: a slab's distance is off by at most 6 units,
- * and a ray through a point m inside of all edges of a triangle spends at least 2 m within its box; m >= 6.5.
+ * So Embree need not be robust, and its faster test (Moeller and Trumbore 1997) will do. The budget, in units
+ * of 2^-24 of the farthest coordinate in play, R (vertex of the triangle from the BVH's origin, plus the
+ * ray's origin from it): rounding of a vertex 1, of the ray's direction 1, of its origin 1 (none where it is
+ * the BVH's). U = (C x D) . e, with C = v0 - o and e an edge at v0, against |e|: the cross product 2.2 (its
+ * products 1.2, its differences 1), C itself 1.2 (none where o = 0), the dot product of three terms 3, e 1.
+ * Sum 6.2, or 7.4; 6.5 and 8 are used. The third edge is tested by what is left of the denominator, (e1 x e2)
+ * . D - U - V: the errors of U and V, and 9 |e1| |e2|, all against the length of that edge, L: 6.5 (|e1| +
+ * |e2|) / L R + 9 |e1| |e2| / L. It is therefore always the longest one, so that it is at most twice as bad
+ * as the others. The weights, u = U / |den| with a reciprocal good to 3 units, add an error of 6 |e1| |e2| /
+ * L. The boxes: the error of a slab's distance is at most 6 units, and a ray through a point m inside of all
+ * edges of a triangle spends at least 2 m within its box; m >= 6.5.
  *
- * A plain BVH (bvh_create_plain) leaves all of that out; its triangles are wider by an eighth of the budget, so that
- * hardly a ray slips through a closed mesh. Away from borders it names the same triangle, and its range is off by at
- * most 2^-24 (17 F + L + 2.2 S) / cos,  S = a b max(a, b) / (2 A), in the units above: F the farthest corner from the
- * BVH's origin plus the ray's origin from there; L the longest edge, a and b the others, A the area; cos of the
- * incidence. What lies along the normal: a vertex is off by 1, C by 1.2, the ray's origin by 1 and its direction by 1,
- * T = N . C by 3 and den = N . D by 3, times F each, 10.2 together; the stored edges by 1 times their length; and the
- * plane is tilted by what N = e1 x e2 is off by, 2.2 a b, against |N| = 2 A, at most max(a, b) from v0: little but for
- * caps, whose height is a small part of their length. Along the ray, times F again: the reciprocal and the products, 5,
- * and the length of the rounded direction, 1. At a silhouette a ray meets what it passes by less than an eighth of the
- * width, and float's error there.
- *
- * What float still decides is the order of two surfaces that lie within its resolution behind each other, about 5e-7 of
- * the range over the cosine of the incidence; unless bvh_order_exactly was called: then such rivals are known from the
- * start (rivals.c), and a hit on one compares its plane with those of the others. */
+ * What float still decides is the order of two surfaces that lie within its resolution one after the other,
+ * about 5e-7 of the range over the cosine of the incidence; unless bvh_order_exactly was called: then such
+ * rivals are known from the start (rivals.c), and a hit on one compares its plane with those of the others.
+ */
 #ifndef CORE_BVH_BVH_INSIDE_H
 #define CORE_BVH_BVH_INSIDE_H
 
 #include <string.h>
 
-#include "core/cast.h"
+#include "core/bvh.h"
 #include "core/embree.h"
 
 enum {
@@ -47,16 +39,12 @@ enum {
     BVH_MAX_MOVE = 32768,  /* a corner moves by at most this many widths: a few percent of R */
 };
 
-/* The exact plane of a triangle, two to a cache line; gathered as doubles (kernels.c).
- * The lowest 12 bits of each component of n carry something else: of n[0] the guard (8 bits of a double's exponent, 4
- * of its mantissa, rounded up), of n[1] and n[2] the label and whether it has rivals. They are part of n, and d goes
- * with that n, so the plane still passes exactly through the triangle; it is tilted by less than 2^-40, which at the
- * far end of a triangle of 100 m is 0.1 nm. */
-struct bvh_triangle {
-    double n[3]; /* e1 x e2, local frame: length is twice the area */
-    double d;    /* n . p = d */
-} __attribute__((aligned(32)));
-_Static_assert(sizeof(struct bvh_triangle) == 32, "half a cache line");
+/* The planes lie two to a cache line, and are gathered as doubles (refine.c).
+ * The lowest 12 bits of each component of n carry something else: of n[0] the guard (8 bits of a double's
+ * exponent, 4 of its mantissa, rounded up), of n[1] and n[2] the label and whether it has rivals. They are
+ * part of n, and d goes with that n, so the plane still passes exactly through the triangle; it is tilted by
+ * less than 2^-40, which at the far end of a triangle of 100 m is 0.1 nm. */
+_Static_assert(sizeof(struct bvh_plane) == 4 * sizeof(double), "gathered as doubles");
 enum {
     BVH_SPARE_BITS = 12,
     BVH_GUARD_SHIFT = 48,               /* of a double that keeps 4 bits of its mantissa */
@@ -70,7 +58,7 @@ static inline uint32_t bvh_spare(double x)
     return (uint32_t)(bits & ((1U << BVH_SPARE_BITS) - 1));
 }
 
-static inline uint16_t bvh_label(const struct bvh_triangle *tri)
+static inline uint16_t bvh_label(const struct bvh_plane *tri)
 {
     return (uint16_t)(bvh_spare(tri->n[1]) | (bvh_spare(tri->n[2]) & 15) << BVH_SPARE_BITS);
 }
@@ -82,8 +70,7 @@ struct bvh {
     RTCDevice device;
     RTCScene rtc;
     const struct scene *scene;
-    int plain;                     /* bvh_create_plain: no planes, and borders as they are */
-    struct bvh_triangle *triangle; /* one more than there are: the last stands for a miss, all NaN; plain: NULL */
+    struct bvh_plane *triangle; /* one more than there are: the last stands for a miss, all NaN */
     double origin_m[3];
     uint32_t *rival_first,
         *rival; /* rivals of triangle i: rival[rival_first[i] .. rival_first[i + 1]); NULL: there are none */
@@ -92,10 +79,9 @@ struct bvh {
     int64_t bytes; /* as Embree reports */
 };
 
-/* Rays are cast a chunk at a time, from one origin. Their packets lie side by side: what Embree has just written with a
- * mask is slow to read, a few packets later it isn't. What a cast leaves as it is is set once, until the origin, the
- * near end or the width change. */
-enum { BVH_CHUNK = 1024 };
+/* Rays are cast a chunk at a time, from one origin. Their packets lie side by side: what Embree has just
+ * written with a mask is slow to read, a few packets later it isn't. What a cast leaves unchanged is set
+ * once, until the origin, the near end or the width change. */
 struct bvh_packets {
     union {
         struct RTCRayHit4 by4[BVH_CHUNK / 4];
@@ -106,20 +92,20 @@ struct bvh_packets {
     uint32_t width;      /* 0: not yet */
 };
 
-/* Rays of one chunk in arrays, padded to whole packets; prim is RTC_INVALID_GEOMETRY_ID for a miss. t, u, v are
- * Embree's own, of the widened triangle. */
-struct bvh_rays {
+/* Rays of one chunk as Embree gets them, padded to whole packets; prim is RTC_INVALID_GEOMETRY_ID for a miss.
+ * t, u, v are Embree's own, of the widened triangle. */
+struct bvh_batch {
     float org[3], t_min, t_max;
-    const float *ox, *oy, *oz; /* origins of their own instead of org; NULL: none */
-    int scattered;             /* neighbours have nothing in common: one by one */
-    const uint8_t *begins; /* 1: a packet begins with this ray, whether the last one is full or not; NULL: none does */
-    const float *dx, *dy, *dz;
+    struct vec3_floats own; /* origins of their own instead of org; x NULL: none */
+    int scattered;
+    const uint8_t *begins;
+    struct vec3_floats dir;
     uint32_t *prim;
-    float *t, *u, *v; /* u NULL: neither it nor v, nor the planes, are going to be looked at */
+    float *t, *u, *v;
 };
 
 /* Casts n <= BVH_CHUNK rays, in packets of the native width, ragged ends masked. */
-void bvh_intersect(const struct bvh *bvh, struct bvh_packets *packets, const struct bvh_rays *rays, uint32_t n);
+void bvh_intersect(const struct bvh *bvh, struct bvh_packets *packets, const struct bvh_batch *rays, uint32_t n);
 /* One ray from t_min on. */
 struct bvh_one {
     float t_min, t_max; /* in */
@@ -130,17 +116,38 @@ void bvh_intersect_one(const struct bvh *bvh, const float org[3], const float di
 
 /* Corners of a triangle in the local frame; returns the largest distance from its origin. */
 double bvh_corners(const struct bvh *bvh, uint32_t prim, double v[3][3]);
-/* How far the edges of a triangle were moved outward, as seen from the origin (those of the very smallest further). */
+/* How far the edges of a triangle were moved outward, as seen from the origin (those of the very smallest
+ * further). */
 double bvh_width_m(const struct bvh *bvh, uint32_t prim);
 
 /* Fills the float buffers of a geometry with widened triangles, and bvh->triangle. */
 int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err);
 
-/* twins.c: of faces with the same three corners, however they are written, only the first stays in the float buffer. */
+/* twins.c: of faces with the same three corners, however they are written, only the first stays in the float
+ * buffer. */
 int bvh_drop_twins(const struct bvh *bvh, float *vertex, struct sh_err *err);
 
 /* Marks a triangle as having rivals; its plane is made anew to go with that. */
 void bvh_mark_rival(struct bvh *bvh, uint32_t prim);
+/* ---- refine.c */
+/* What Embree proposed, and what double precision makes of it. */
+struct bvh_proposals {
+    const struct bvh *bvh;
+    uint32_t n;
+    struct vec3_in dir, own; /* origins in the local frame; x NULL: all at o */
+    double o[3];
+    const uint32_t *prim;
+    const float *u, *v;
+    double *range_m; /* out: (d - n . o) / (n . dir) of the proposed triangle's plane; NaN for none */
+    uint32_t *label; /* out: of the proposed triangle; BVH_NO_LABEL for none */
+    float *steep;    /* out: 1 / cos^2 of the incidence, for rays from one point; NULL: not asked for */
+    uint32_t *doubt; /* out: 1 where the hit is so near to the border, across the ray, that the proposal is in doubt */
+};
+/* Returns how many are in doubt. */
+uint32_t bvh_refine(const struct bvh_proposals *proposals);
+/* 1 / cos^2 for one; RTC_INVALID_GEOMETRY_ID: NaN. */
+float bvh_steep(const struct bvh *bvh, uint32_t prim, const double dir[3]);
+
 /* ---- decide.c */
 struct decide_ray {
     const struct bvh *bvh;
@@ -157,10 +164,10 @@ struct decide_hit {
 void decide_prefetch(const struct bvh *bvh, const uint32_t *prim, const uint32_t *ray, uint32_t n);
 
 /* What Embree proposed near a border, decided in double: the nearest triangle that the ray really meets.
- * Every triangle near the proposed point is tried with edge functions that two triangles of an edge share bit by bit,
- * so that no ray passes between them; of those that are hit at the same range (to 1e-12) the lowest number wins. When
- * none is hit the ray goes on behind them. */
-void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct cast_counters *counters,
+ * Every triangle near the proposed point is tried with edge functions that two triangles of an edge share bit
+ * by bit, so that no ray passes between them; of those that are hit at the same range (to 1e-12) the lowest
+ * number wins. When none is hit the ray goes on. */
+void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh_counters *counters,
                 struct decide_hit *hit);
 
 #endif

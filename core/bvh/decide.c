@@ -13,7 +13,7 @@ struct search {
     uint32_t proposed;
     uint32_t prim;            /* best so far */
     double range_m, border_m; /* its range, and how far the ray passes from its nearest edge */
-    uint32_t near_prim;       /* the one that the ray misses by least; gap 1: double precision can't tell */
+    uint32_t near_prim;       /* the one that the ray misses by least; gap 1: double precision can't decide */
     double near_gap, near_range_m;
 };
 
@@ -24,9 +24,9 @@ static int before(const double a[3], const double b[3])
     return 0;
 }
 
-/* On which side of the edge a-b the ray passes, as the distance across the ray times the edge's length; corners
- * relative to the ray's origin. Taken in one order of the corners whatever triangle asks, so that two triangles of an
- * edge get the same number with opposite signs. */
+/* On which side of the edge a-b the ray passes, as the distance across the ray times the edge's length;
+ * corners relative to the ray's origin. Taken in one order of the corners whatever triangle asks, so that two
+ * triangles of an edge get the same number with opposite signs. */
 static double edge_side(const double a[3], const double b[3], const double dir[3])
 {
     int swap = before(b, a);
@@ -45,7 +45,7 @@ static double edge_length(const double a[3], const double b[3])
 
 static double plane_range(const struct decide_ray *ray, uint32_t prim)
 {
-    const struct bvh_triangle *tri = &ray->bvh->triangle[prim];
+    const struct bvh_plane *tri = &ray->bvh->triangle[prim];
     return (tri->d - vec3_dot(tri->n, ray->o_local)) / vec3_dot(tri->n, ray->dir);
 }
 
@@ -76,8 +76,8 @@ static double edge_gap(const double a[3], const double b[3], const double dir[3]
     return sqrt(vec3_dot(w, w));
 }
 
-/* Range to a triangle that the ray does meet. Where the ray lies almost in its plane the plane's range runs away: it is
- * kept between the edges that the ray passes. */
+/* Range to a triangle that the ray does meet. Where the ray lies almost in its plane the plane's range runs
+ * away: it is kept between the edges that the ray passes. */
 static double held_range(const struct decide_ray *ray, uint32_t prim, double v[3][3])
 {
     const double *n = ray->bvh->triangle[prim].n;
@@ -119,20 +119,21 @@ static int is_inside(const double side[3])
     return (side[0] >= 0.0 && side[1] >= 0.0 && side[2] >= 0.0) || (side[0] <= 0.0 && side[1] <= 0.0 && side[2] <= 0.0);
 }
 
-/* What double precision can tell of an edge's side. */
+/* The resolution of an edge's side in double precision. */
 static double blur(const double a[3], const double b[3])
 {
     return 8.0 * 0x1p-53 * sqrt(fmax(vec3_dot(a, a), vec3_dot(b, b))) * edge_length(a, b);
 }
 
-/* A ray within the plane, as far as double precision can tell, does not meet the triangle; what stands on its edges it
- * does. */
+/* A ray within the plane, as far as double precision shows, does not meet the triangle; what stands on its
+ * edges it does. */
 static int is_edge_on(double v[3][3], const double side[3])
 {
     return fabs(side[0] + side[1] + side[2]) <= blur(v[0], v[1]) + blur(v[1], v[2]) + blur(v[2], v[0]);
 }
 
-/* Remembers the triangle that the ray misses by least, in units of what double precision can tell at its edges. */
+/* Remembers the triangle that the ray misses by least, in units of what double precision resolves at its
+ * edges. */
 static void note_miss(struct search *s, uint32_t prim, double v[3][3], const double side[3])
 {
     const double *dir = s->ray->dir;
@@ -170,12 +171,12 @@ static void try_triangle(struct search *s, uint32_t prim)
     }
 }
 
-/* Embree names all triangles whose boxes, or those of their leaf, are near. What lies further than the query's radius
- * is left out by its plane. */
+/* Embree names all triangles whose boxes, or those of their leaf, are near. What lies further than the
+ * query's radius is left out by its plane. */
 static bool visit(struct RTCPointQueryFunctionArguments *args)
 {
     const struct search *s = args->userPtr;
-    const struct bvh_triangle *tri = &s->ray->bvh->triangle[args->primID];
+    const struct bvh_plane *tri = &s->ray->bvh->triangle[args->primID];
     double off = vec3_dot(tri->n, s->point_m) - tri->d, reach = s->radius_m;
     if (args->primID != s->proposed && off * off <= reach * reach * vec3_dot(tri->n, tri->n))
         try_triangle(args->userPtr, args->primID);
@@ -198,29 +199,29 @@ static void try_around(struct search *s, double range_m, double radius_m)
     rtcPointQuery(ray->bvh->rtc, &query, &context, visit, s);
 }
 
-/* How far from the proposed point along the ray an edge's neighbours may be met, and the plane itself: the width,
- * stretched by the incidence. */
+/* How far from the proposed point along the ray an edge's neighbours may be met, and the plane itself: the
+ * width, stretched by the incidence. */
 static double slack_m(const struct decide_ray *ray, uint32_t prim, double width_m)
 {
-    const struct bvh_triangle *tri = &ray->bvh->triangle[prim];
+    const struct bvh_plane *tri = &ray->bvh->triangle[prim];
     double cosine = fabs(vec3_dot(tri->n, ray->dir)) / sqrt(vec3_dot(tri->n, tri->n));
     return 4.0 * width_m * (1.0 + 1.0 / fmax(cosine, 1e-6));
 }
 
-/* Rivals whose planes the ray meets within what float can't order are tried; the others lie clearly before or behind.
- */
+/* Rivals whose planes the ray meets within what float can't order are tried; the others lie clearly before or
+ * after it. */
 static void try_rivals(struct search *s, uint32_t prim, double range_m)
 {
     const struct decide_ray *ray = s->ray;
     const struct bvh *bvh = ray->bvh;
     if (bvh->rival_first == NULL) return;
-    const struct bvh_triangle *own = &bvh->triangle[prim];
+    const struct bvh_plane *own = &bvh->triangle[prim];
     uint32_t end = bvh->rival_first[prim + 1];
     if (bvh->rival_first[prim] == end) return;
     double own_m = bvh_width_m(bvh, prim);
     double steep = sqrt(vec3_dot(own->n, own->n)) / fabs(vec3_dot(own->n, ray->dir));
     for (uint32_t k = bvh->rival_first[prim]; k < end; k++) {
-        const struct bvh_triangle *tri = &bvh->triangle[bvh->rival[k]];
+        const struct bvh_plane *tri = &bvh->triangle[bvh->rival[k]];
         double along = fabs(vec3_dot(tri->n, ray->dir)), length = sqrt(vec3_dot(tri->n, tri->n));
         double gap = fabs((tri->d - vec3_dot(tri->n, ray->o_local)) / vec3_dot(tri->n, ray->dir) - range_m);
         double width_m = 4.0 * fmax(own_m, bvh_width_m(bvh, bvh->rival[k]));
@@ -238,7 +239,7 @@ void decide_prefetch(const struct bvh *bvh, const uint32_t *prim, const uint32_t
             __builtin_prefetch(scene->vertex_m[scene->triangle[prim[ray[k]]][j]], 0, 3);
 }
 
-/* What was tried may lie anywhere on the ray; it counts up to limit_m, for behind that not everything was tried. */
+/* What was tried may lie anywhere on the ray; it counts up to limit_m: beyond, not everything was tried. */
 static int is_found(struct search *s, double limit_m)
 {
     if (s->range_m <= limit_m || (s->near_gap <= 1.0 && s->near_range_m <= limit_m)) return 1;
@@ -247,7 +248,7 @@ static int is_found(struct search *s, double limit_m)
     return 0;
 }
 
-void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct cast_counters *counters,
+void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh_counters *counters,
                 struct decide_hit *hit)
 {
     struct search s = {.ray = ray,
@@ -259,8 +260,8 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct cas
     for (int round = 0; round < DECIDE_MAX_ROUNDS && prim != RTC_INVALID_GEOMETRY_ID; round++) {
         s.proposed = prim;
         try_triangle(&s, prim);
-        /* Inside in double as well, and further from the border than float can blur: the common case. Nearer, another
-         * triangle of the edge may lie in front of it by less than float can tell. */
+        /* Inside in double as well, and further from the border than float can blur: the common case. Nearer,
+         * another triangle of the edge may lie in front of it by less than float resolves. */
         double width_m = bvh_width_m(ray->bvh, prim);
         if (s.prim == prim && s.border_m > width_m) break;
         counters->decided++;
@@ -280,7 +281,7 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct cas
         t = one.t;
     }
     if (s.prim != RTC_INVALID_GEOMETRY_ID) try_rivals(&s, s.prim, s.range_m);
-    /* So near to an edge that double precision can't tell its sides apart: the edge is hit, nothing passes. */
+    /* So near to an edge that double precision can't separate its sides: the edge is hit, nothing passes. */
     if (s.near_gap <= 1.0 && !(s.range_m <= s.near_range_m)) {
         counters->undecided++;
         s.prim = s.near_prim;

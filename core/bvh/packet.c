@@ -22,8 +22,8 @@
 /* Of packets that were cut, those that are left with as many as this are not worth it. */
 enum { FEW = 4 };
 
-/* Numbers of 4 bytes of rays at .. at + n, whole packets of them wherever the arrays go on: what is beyond n belongs to
- * packets that come later, or to none. */
+/* Numbers of 4 bytes of rays at .. at + n, whole packets of them wherever the arrays go on: what is beyond n
+ * belongs to packets that come later, or to none. */
 static inline __attribute__((always_inline)) void copy(void *to, const void *from, uint32_t at, uint32_t n,
                                                        uint32_t width)
 {
@@ -35,10 +35,10 @@ static inline __attribute__((always_inline)) void copy(void *to, const void *fro
 }
 
 /* Packet p takes rays first[p] .. first[p + 1] - 1.
- * The planes of what a packet has hit are asked for when the next one has been cast: to read them at once would mean to
- * wait for what Embree has only just written. */
+ * The planes of what a packet has hit are asked for when the next one has been cast: to read them at once
+ * would mean to wait for what Embree has only just written. */
 #define PACKET_FUNCTION(W)                                                                                         \
-    static void set_up_##W(struct RTCRayHit##W *packet, const struct bvh_rays *rays)                               \
+    static void set_up_##W(struct RTCRayHit##W *packet, const struct bvh_batch *rays)                              \
     {                                                                                                              \
         for (uint32_t p = 0; p < BVH_CHUNK / W; p++)                                                               \
             for (uint32_t i = 0; i < W; i++) {                                                                     \
@@ -53,14 +53,14 @@ static inline __attribute__((always_inline)) void copy(void *to, const void *fro
                 packet[p].hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;                                              \
             }                                                                                                      \
     }                                                                                                              \
-    static void place_##W(struct RTCRayHit##W *packet, const struct bvh_rays *rays, const uint32_t *first,         \
+    static void place_##W(struct RTCRayHit##W *packet, const struct bvh_batch *rays, const uint32_t *first,        \
                           uint32_t packets)                                                                        \
     {                                                                                                              \
         for (uint32_t p = 0; p < packets; p++) {                                                                   \
             const uint32_t n = first[p + 1] - first[p];                                                            \
-            copy(packet[p].ray.org_x, rays->ox + first[p], first[p], n, W);                                        \
-            copy(packet[p].ray.org_y, rays->oy + first[p], first[p], n, W);                                        \
-            copy(packet[p].ray.org_z, rays->oz + first[p], first[p], n, W);                                        \
+            copy(packet[p].ray.org_x, rays->own.x + first[p], first[p], n, W);                                     \
+            copy(packet[p].ray.org_y, rays->own.y + first[p], first[p], n, W);                                     \
+            copy(packet[p].ray.org_z, rays->own.z + first[p], first[p], n, W);                                     \
         }                                                                                                          \
     }                                                                                                              \
     static void prefetch_##W(const struct bvh *bvh, const struct RTCRayHit##W *packet)                             \
@@ -82,16 +82,16 @@ static inline __attribute__((always_inline)) void copy(void *to, const void *fro
             packet->hit.v[i] = one.v;                                                                              \
         }                                                                                                          \
     }                                                                                                              \
-    static void intersect_##W(const struct bvh *bvh, struct RTCRayHit##W *packet, const struct bvh_rays *rays,     \
+    static void intersect_##W(const struct bvh *bvh, struct RTCRayHit##W *packet, const struct bvh_batch *rays,    \
                               const uint32_t *first, uint32_t packets)                                             \
     {                                                                                                              \
         PACKET_CONTEXT(context);                                                                                   \
         int valid[W] __attribute__((aligned(64)));                                                                 \
         for (uint32_t p = 0; p < packets; p++) {                                                                   \
             const uint32_t n = first[p + 1] - first[p];                                                            \
-            copy(packet[p].ray.dir_x, rays->dx + first[p], first[p], n, W);                                        \
-            copy(packet[p].ray.dir_y, rays->dy + first[p], first[p], n, W);                                        \
-            copy(packet[p].ray.dir_z, rays->dz + first[p], first[p], n, W);                                        \
+            copy(packet[p].ray.dir_x, rays->dir.x + first[p], first[p], n, W);                                     \
+            copy(packet[p].ray.dir_y, rays->dir.y + first[p], first[p], n, W);                                     \
+            copy(packet[p].ray.dir_z, rays->dir.z + first[p], first[p], n, W);                                     \
             for (uint32_t i = 0; i < W; i++)                                                                       \
                 packet[p].ray.tfar[i] = rays->t_max;                                                               \
             memset(packet[p].hit.geomID, 0xff, sizeof packet->hit.geomID);                                         \
@@ -109,14 +109,13 @@ static inline __attribute__((always_inline)) void copy(void *to, const void *fro
                 one_by_one_##W(bvh, &packet[p], n);                                                                \
             else                                                                                                   \
                 PACKET_CALL(W, valid, bvh->rtc, &context, &packet[p]);                                             \
-            if (p > 0 && rays->u != NULL) prefetch_##W(bvh, &packet[p - 1]);                                       \
+            if (p > 0) prefetch_##W(bvh, &packet[p - 1]);                                                          \
         }                                                                                                          \
-        if (rays->u != NULL) prefetch_##W(bvh, &packet[packets - 1]);                                              \
+        prefetch_##W(bvh, &packet[packets - 1]);                                                                   \
         for (uint32_t p = 0; p < packets; p++) {                                                                   \
             const uint32_t n = first[p + 1] - first[p];                                                            \
             copy(rays->prim + first[p], packet[p].hit.primID, first[p], n, W);                                     \
             copy(rays->t + first[p], packet[p].ray.tfar, first[p], n, W);                                          \
-            if (rays->u == NULL) continue;                                                                         \
             copy(rays->u + first[p], packet[p].hit.u, first[p], n, W);                                             \
             copy(rays->v + first[p], packet[p].hit.v, first[p], n, W);                                             \
         }                                                                                                          \
@@ -147,26 +146,25 @@ void bvh_intersect_one(const struct bvh *bvh, const float org[3], const float di
     one->v = ray.hit.v;
 }
 
-static void intersect_1(const struct bvh *bvh, const struct bvh_rays *rays, uint32_t n)
+static void intersect_1(const struct bvh *bvh, const struct bvh_batch *rays, uint32_t n)
 {
     const uint32_t last = bvh->scene->n_triangles;
     for (uint32_t i = 0; i < n; i++) {
-        const float dir[3] = {rays->dx[i], rays->dy[i], rays->dz[i]};
+        const float dir[3] = {rays->dir.x[i], rays->dir.y[i], rays->dir.z[i]};
         struct bvh_one one = {.t_min = rays->t_min, .t_max = rays->t_max};
-        const float own[3] = {rays->ox != NULL ? rays->ox[i] : rays->org[0],
-                              rays->ox != NULL ? rays->oy[i] : rays->org[1],
-                              rays->ox != NULL ? rays->oz[i] : rays->org[2]};
+        const float own[3] = {rays->own.x != NULL ? rays->own.x[i] : rays->org[0],
+                              rays->own.x != NULL ? rays->own.y[i] : rays->org[1],
+                              rays->own.x != NULL ? rays->own.z[i] : rays->org[2]};
         bvh_intersect_one(bvh, own, dir, &one);
         rays->prim[i] = one.prim;
         rays->t[i] = one.t;
-        if (rays->u == NULL) continue;
         __builtin_prefetch(&bvh->triangle[one.prim < last ? one.prim : last], 0, 2);
         rays->u[i] = one.u;
         rays->v[i] = one.v;
     }
 }
 
-static void set_up(struct bvh_packets *packets, const struct bvh_rays *rays, uint32_t width)
+static void set_up(struct bvh_packets *packets, const struct bvh_batch *rays, uint32_t width)
 {
     if (packets->width == width && packets->t_min == rays->t_min &&
         memcmp(packets->org, rays->org, sizeof rays->org) == 0)
@@ -182,8 +180,9 @@ static void set_up(struct bvh_packets *packets, const struct bvh_rays *rays, uin
     packets->width = width;
 }
 
-/* Cuts rays at .. n into packets, `most` at most; gives how many, and where they begin and the last one ends. */
-static uint32_t cut(const struct bvh_rays *rays, uint32_t width, uint32_t at, uint32_t n, uint32_t most,
+/* Cuts rays at .. n into packets, `most` at most; gives how many, and where they begin and the last one ends.
+ */
+static uint32_t cut(const struct bvh_batch *rays, uint32_t width, uint32_t at, uint32_t n, uint32_t most,
                     uint32_t *first)
 {
     uint32_t packets = 0;
@@ -197,9 +196,9 @@ static uint32_t cut(const struct bvh_rays *rays, uint32_t width, uint32_t at, ui
     return packets;
 }
 
-/* Packets with origins of their own are kept apart from those with a common one (caster.h), which would have to be set
- * up again. */
-void bvh_intersect(const struct bvh *bvh, struct bvh_packets *packets, const struct bvh_rays *rays, uint32_t n)
+/* Packets with origins of their own are kept apart from those with a common one (bvh_inside.h), which would
+ * have to be set up again. */
+void bvh_intersect(const struct bvh *bvh, struct bvh_packets *packets, const struct bvh_batch *rays, uint32_t n)
 {
     const uint32_t width = bvh->info.packet;
     uint32_t first[BVH_CHUNK / 4 + 1];
@@ -212,13 +211,13 @@ void bvh_intersect(const struct bvh *bvh, struct bvh_packets *packets, const str
     for (uint32_t at = 0, k; at < n; at = first[k]) {
         k = cut(rays, width, at, n, BVH_CHUNK / width, first);
         if (width == 16) {
-            if (rays->ox != NULL) place_16(packets->at.by16, rays, first, k);
+            if (rays->own.x != NULL) place_16(packets->at.by16, rays, first, k);
             intersect_16(bvh, packets->at.by16, rays, first, k);
         } else if (width == 8) {
-            if (rays->ox != NULL) place_8(packets->at.by8, rays, first, k);
+            if (rays->own.x != NULL) place_8(packets->at.by8, rays, first, k);
             intersect_8(bvh, packets->at.by8, rays, first, k);
         } else {
-            if (rays->ox != NULL) place_4(packets->at.by4, rays, first, k);
+            if (rays->own.x != NULL) place_4(packets->at.by4, rays, first, k);
             intersect_4(bvh, packets->at.by4, rays, first, k);
         }
     }

@@ -1,11 +1,11 @@
-/* Rivals: triangles that lie so near behind each other somewhere that float can't tell which comes first: faces that
- * overlap in one plane, a pole through a floor, a thin sheet. Their pairs are found once; a hit on one of them compares
- * the planes.
+/* Rivals: triangles that somewhere lie so near to each other that float can't order them along a ray: faces
+ * that overlap in one plane, a pole through a floor, a thin sheet. Their pairs are found once; a hit on one
+ * of them compares the planes.
  *
- * Embree's collision of the scene with itself gives pairs whose boxes meet; of those stay the pairs that no axis
- * separates by more than what float may blur there (separating axes of two triangles: normals, edges crossed, edges in
- * their planes). Neighbours that share a corner are rivals only where they overlap in one plane: at their common border
- * the border test looks anyway. */
+ * Embree's collision of the scene with itself gives pairs whose boxes meet; of those stay the pairs that no
+ * axis separates by more than what float may blur there (separating axes of two triangles: normals, edges
+ * crossed, edges in their planes). Neighbours that share a corner are rivals only where they overlap in one
+ * plane: at their common border the border test looks anyway. */
 #include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
@@ -22,7 +22,8 @@ struct pairs {
     int failed;
 };
 
-/* Gap between the triangles along an axis; negative where they overlap by more than that. -inf for no axis. */
+/* Gap between the triangles along an axis; negative where they overlap by more than that. -inf for no axis.
+ */
 static double gap_along(double a[3][3], double b[3][3], const double axis[3])
 {
     double length = sqrt(vec3_dot(axis, axis)), lo[2] = {INFINITY, INFINITY}, hi[2] = {-INFINITY, -INFINITY};
@@ -50,7 +51,8 @@ static void look_at(const struct bvh *bvh, uint32_t prim, struct shape *s)
     vec3_cross(s->e[0], s->e[1], s->n);
 }
 
-/* True when the triangles come nearer than blur_m; within == 1: when they overlap in their planes by more than that. */
+/* True when the triangles come nearer than blur_m; within == 1: when they overlap in their planes by more
+ * than that. */
 static int no_axis_separates(struct shape *a, struct shape *b, double blur_m, int within)
 {
     double axis[3], limit = within ? -blur_m : blur_m;

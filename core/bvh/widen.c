@@ -52,8 +52,8 @@ static void edge_lengths(double v[3][3], double length[3])
     }
 }
 
-/* All that float may be off by at the edges of a triangle, as a distance across the ray (bvh.h). far_m: of its farthest
- * corner from any origin of rays. */
+/* The bound of float's error at the edges of a triangle, as a distance across the ray (bvh_inside.h). far_m:
+ * of its farthest corner from any origin of rays. */
 static double float_error_m(const struct bvh *bvh, double far_m, const double length[3])
 {
     double longest = fmax(fmax(length[0], length[1]), length[2]);
@@ -99,7 +99,7 @@ static double measure(double v[3][3], double n[3], double *longest)
 }
 
 /* The plane with normal n, as it is stored, passes through the triangle's centre. */
-static void set_offset(struct bvh_triangle *tri, double v[3][3])
+static void set_offset(struct bvh_plane *tri, double v[3][3])
 {
     double centre[3];
     for (int j = 0; j < 3; j++)
@@ -107,11 +107,11 @@ static void set_offset(struct bvh_triangle *tri, double v[3][3])
     tri->d = vec3_dot(tri->n, centre);
 }
 
-/* What the smallest of Embree's weights has to reach for a hit to be safe. Within the plane, the distance to edge i of
- * the widened triangle is at least weight_i * area2' / longest'. It has to exceed what the edge was moved by, and once
- * more that by which float is off there, width / cosine of the incidence: seen from the origin no more than the offset.
- * From elsewhere the incidence is another one, so there the weight is multiplied by area2 * cosine first (kernels.c).
- */
+/* What the smallest of Embree's weights has to reach for a hit to be safe. Within the plane, the distance to
+ * edge i of the widened triangle is at least weight_i * area2' / longest'. It has to exceed what the edge was
+ * moved by, and once more the error of float there, width / cosine of the incidence: seen from the origin no
+ * more than the offset. From elsewhere the incidence is another one, so there the weight is multiplied by
+ * area2 * cosine first (refine.c). */
 static double guard(const struct bvh *bvh, double offset, double width_m, double longest_wide, double area2_wide,
                     double area2)
 {
@@ -129,7 +129,7 @@ static uint32_t guard_code(double guard)
     return (uint32_t)(code < 0 ? 0 : code > most ? most : code);
 }
 
-static void set_exact(struct bvh_triangle *tri, double v[3][3], double guard, uint16_t label)
+static void set_exact(struct bvh_plane *tri, double v[3][3], double guard, uint16_t label)
 {
     tri->n[0] = with_spare(tri->n[0], guard_code(guard));
     tri->n[1] = with_spare(tri->n[1], label & ((1U << BVH_SPARE_BITS) - 1));
@@ -139,15 +139,16 @@ static void set_exact(struct bvh_triangle *tri, double v[3][3], double guard, ui
 
 void bvh_mark_rival(struct bvh *bvh, uint32_t prim)
 {
-    struct bvh_triangle *tri = &bvh->triangle[prim];
+    struct bvh_plane *tri = &bvh->triangle[prim];
     double v[3][3];
     bvh_corners(bvh, prim, v);
     tri->n[2] = with_spare(tri->n[2], bvh_spare(tri->n[2]) | BVH_RIVAL_BIT);
     set_offset(tri, v);
 }
 
-/* How far the edges have to move within the plane, so that seen from the origin, at a slant, they have moved by
- * width_m: width / cosine of the incidence, which at the farthest corner is the plane's distance by the corner's. */
+/* How far the edges have to move within the plane, so that seen from the origin, at a slant, they have moved
+ * by width_m: width / cosine of the incidence, which at the farthest corner is the plane's distance by the
+ * corner's. */
 static double offset_m(double v[3][3], const double unit_n[3], double width_m, double far_m)
 {
     double above_m = fabs(vec3_dot(v[0], unit_n));
@@ -160,7 +161,7 @@ static void widen(double v[3][3], double offset, double width_m, double wide[3][
         widen_corner(v, i, offset, BVH_MAX_MOVE * width_m, wide[i]);
 }
 
-/* The longest edge lies opposite the first corner (bvh.h). */
+/* The longest edge lies opposite the first corner (bvh_inside.h). */
 static void set_vertices(double wide[3][3], float *vertex)
 {
     double length[3];
@@ -174,7 +175,7 @@ static void set_vertices(double wide[3][3], float *vertex)
 static void fill_triangle(struct bvh *bvh, uint32_t prim, float *vertex)
 {
     double v[3][3], wide[3][3], unit[3], wide_n[3], length[3], longest;
-    struct bvh_triangle *tri = &bvh->triangle[prim];
+    struct bvh_plane *tri = &bvh->triangle[prim];
     double far_m = bvh_corners(bvh, prim, v) + bvh->station_reach_m;
     double area2 = measure(v, tri->n, &longest);
     for (int j = 0; j < 3; j++)
@@ -195,42 +196,22 @@ static void fill_triangle(struct bvh *bvh, uint32_t prim, float *vertex)
     set_exact(tri, v, guard(bvh, offset, width_m, longest, area2_wide, area2), bvh->scene->label[prim]);
 }
 
-/* Without planes nothing is decided again, and what is added at a border is told there: an eighth of what float may be
- * off by at most. Of seven million rays into a house, terrain and leaves none slips through that; without it three do,
- * with the whole width ten times as many meet what they would pass. Not multiplied by the slant, which is only the
- * origin's. */
-static const double PLAIN_SHARE = 0.125;
-
-static void fill_plain(const struct bvh *bvh, uint32_t prim, float *vertex)
-{
-    double v[3][3], wide[3][3], width_m = PLAIN_SHARE * bvh_width_m(bvh, prim);
-    bvh_corners(bvh, prim, v);
-    for (int i = 0; i < 3; i++)
-        widen_corner(v, i, width_m, 4.0 * width_m, wide[i]);
-    set_vertices(wide, vertex);
-}
-
 int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err)
 {
     const struct scene *scene = bvh->scene;
     size_t n = scene->n_triangles;
-    if (!bvh->plain) bvh->triangle = huge_alloc((n + 1) * sizeof *bvh->triangle);
+    bvh->triangle = huge_alloc((n + 1) * sizeof *bvh->triangle);
     float *vertex =
         rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), 3 * n);
     uint32_t *index =
         rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t), n);
-    if ((!bvh->plain && bvh->triangle == NULL) || vertex == NULL || index == NULL)
+    if (bvh->triangle == NULL || vertex == NULL || index == NULL)
         return sh_fail(err, SH_ENOMEM, "cast: no memory for %zu triangles", n);
     for (uint32_t i = 0; i < n; i++)
-        if (bvh->plain)
-            fill_plain(bvh, i, vertex + 9 * (size_t)i);
-        else
-            fill_triangle(bvh, i, vertex + 9 * (size_t)i);
+        fill_triangle(bvh, i, vertex + 9 * (size_t)i);
     for (uint32_t i = 0; i < 3 * n; i++)
         index[i] = i;
-    if (bvh->plain) return bvh_drop_twins(bvh, vertex, err);
-    bvh->triangle[n] = (struct bvh_triangle){
-        .n = {NAN, with_spare(NAN, LINE_LABEL_NONE & 0xfff), with_spare(NAN, LINE_LABEL_NONE >> BVH_SPARE_BITS)},
-        .d = NAN};
+    bvh->triangle[n] = (struct bvh_plane){
+        .n = {NAN, with_spare(NAN, BVH_NO_LABEL & 0xfff), with_spare(NAN, BVH_NO_LABEL >> BVH_SPARE_BITS)}, .d = NAN};
     return bvh_drop_twins(bvh, vertex, err);
 }

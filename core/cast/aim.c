@@ -1,12 +1,13 @@
-/* Where the beams of a chunk go and begin. */
-#include <math.h>
+/* Where the beams of a chunk go and begin, and where the head believes that they go. */
 #include <string.h>
 
 #include "core/cast/caster_private.h"
 
-static const double AS_IT_IS[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+static const double UNTURNED[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
 
-int caster_reading_rotation(const struct cast_setup *s, double to_crs[9])
+/* Socs to where positions go: straight to the CRS where that is a rotation, else to prcs. Returns 1 in the
+ * first case. */
+static int reading_rotation(const struct cast_setup *s, double to_crs[9])
 {
     double g[9];
     int linear = georef_rotation(s->georef, g);
@@ -17,69 +18,49 @@ int caster_reading_rotation(const struct cast_setup *s, double to_crs[9])
     return linear;
 }
 
-/* The last pose at or before t_ns, or the first. */
-static uint32_t find_knot(const struct cast_setup *s, int64_t t_ns)
-{
-    uint32_t lo = 0, hi = s->n_knots;
-    while (hi - lo > 1) {
-        uint32_t mid = lo + (hi - lo) / 2;
-        if (s->knot[mid].t_ns <= t_ns)
-            lo = mid;
-        else
-            hi = mid;
-    }
-    return lo;
-}
+/* Vectors of socs -> prcs, and the places of the head, each by the pose of its own time. */
+struct move {
+    struct vec3_in d, r; /* r.x NULL: only d */
+    struct vec3_out to_d, to_r, place;
+};
 
-/* Directions and origins of pulses first .. first + n of a run, from what its socs directions are; stretch by stretch
- * between two poses. */
-void caster_move(struct caster *c, const struct cast_setup *s, int64_t t0_ns, const uint32_t *dt_ns, uint32_t n,
-                 int geo)
+/* Stretch by stretch between two poses; times don't fall. */
+static void move(const struct cast_setup *s, int64_t t0_ns, const uint32_t *dt_ns, uint32_t n, const struct move *m)
 {
-    struct moving_rays *m = &c->moving;
-    for (uint32_t i = 0, k = find_knot(s, t0_ns + dt_ns[0]); i < n; k++) {
+    for (uint32_t i = 0, k = (uint32_t)pose_find_knot(s->knot, s->n_knots, t0_ns + dt_ns[0]); i < n; k++) {
         int last = k + 1 >= s->n_knots, before = s->knot[k].t_ns > t0_ns + (int64_t)dt_ns[i];
         uint32_t end = i;
         while (end < n && (last || t0_ns + (int64_t)dt_ns[end] < s->knot[before ? k : k + 1].t_ns))
             end++;
         struct kernel_leg leg;
         kernel_leg(&s->knot[k], &s->knot[last || before ? k : k + 1], t0_ns, &leg);
-        uint32_t part = end - i;
-        const uint32_t *dt = dt_ns + i;
-        kernel_turn_leg(&leg, dt, part, m->sx + i, m->sy + i, m->sz + i, c->dx + i, c->dy + i, c->dz + i);
-        if (geo) kernel_turn_leg(&leg, dt, part, m->rx + i, m->ry + i, m->rz + i, c->ex + i, c->ey + i, c->ez + i);
-        kernel_place_leg(&leg, dt, part, m->px + i, m->py + i, m->pz + i);
+        kernel_turn_leg(&leg, dt_ns + i, end - i, &VEC3_IN(m->d, i), &VEC3_OUT(m->to_d, i));
+        if (m->r.x != NULL) kernel_turn_leg(&leg, dt_ns + i, end - i, &VEC3_IN(m->r, i), &VEC3_OUT(m->to_r, i));
+        kernel_place_leg(&leg, dt_ns + i, end - i, &VEC3_OUT(m->place, i));
         if (before) k--;
         i = end;
     }
 }
 
-int caster_aim(struct caster *c, const struct cast_setup *s, const struct schedule_run *run, const uint32_t *dt_ns,
-               uint32_t at, uint32_t n, struct origins *from)
+/* An ideal head: its beams go where its encoders say, but for the encoders' steps. */
+static void aim_ideal(struct caster *c, struct chunk *k, const struct kernel_turns *turns)
 {
-    struct moving_rays *m = &c->moving;
-    int geo = s->layout == LINE_GEO, linear = 0;
+    const struct cast_setup *s = k->s;
+    const int geo = s->layout == LINE_GEO, moves = s->n_knots != 0;
+    const double *rotation = moves ? UNTURNED : s->rotation;
+    const struct vec3_out d = moves ? VEC3_OUT(c->socs, 0) : VEC3_OUT(c->d, 0);
     double to_crs[9];
-    kernel_angles(run, at, n, c->mirror_turn, c->pan_turn);
-    *from = (struct origins){.at_m = {s->station_m[0], s->station_m[1], s->station_m[2]}};
-    if (s->n_knots != 0) {
-        if (geo)
-            kernel_directions_read(s, c->mirror_turn, c->pan_turn, AS_IT_IS, AS_IT_IS, n, m->sx, m->sy, m->sz, m->rx,
-                                   m->ry, m->rz);
-        else
-            kernel_directions(c->mirror_turn, c->pan_turn, AS_IT_IS, n, m->sx, m->sy, m->sz);
-        caster_move(c, s, run->t0_ns, dt_ns + at, n, geo);
-        from->px = m->px;
-        from->py = m->py;
-        from->pz = m->pz;
-    } else if (geo) {
-        linear = caster_reading_rotation(s, to_crs);
-        kernel_directions_read(s, c->mirror_turn, c->pan_turn, s->rotation, to_crs, n, c->dx, c->dy, c->dz, c->ex,
-                               c->ey, c->ez);
+    if (geo) {
+        k->linear = !moves && reading_rotation(s, to_crs);
+        kernel_directions_read(s, turns, rotation, moves ? UNTURNED : to_crs, &d,
+                               moves ? &VEC3_OUT(c->read, 0) : &VEC3_OUT(c->list.e, 0));
     } else {
-        kernel_directions(c->mirror_turn, c->pan_turn, s->rotation, n, c->dx, c->dy, c->dz);
+        kernel_directions(turns, rotation, &d);
     }
-    return linear;
+    if (!moves) return;
+    const struct move m = {VEC3_IN(c->socs, 0), geo ? VEC3_IN(c->read, 0) : (struct vec3_in){0}, VEC3_OUT(c->d, 0),
+                           VEC3_OUT(c->list.e, 0), VEC3_OUT(c->list.p, 0)};
+    move(s, k->run->t0_ns, k->dt_ns, k->n, &m);
 }
 
 static void transpose(const double m[9], double t[9])
@@ -88,40 +69,86 @@ static void transpose(const double m[9], double t[9])
         t[i] = m[i % 3 * 3 + i / 3];
 }
 
-void caster_aim_bent(struct caster *c, const struct cast_setup *s, const struct schedule_run *run,
-                     const uint32_t *dt_ns, uint32_t at, uint32_t n, struct origins *from)
+/* A head whose mechanics and encoders are not: the turns become what the encoders say. */
+static void aim_bent(struct caster *c, struct chunk *k, const struct instrument *instrument)
 {
-    const struct instrument *k = s->detect->instrument;
-    struct moving_rays *m = &c->moving;
-    int moves = s->n_knots != 0, offset = k != NULL && instrument_has_offset(k);
+    const struct cast_setup *s = k->s;
+    struct echo_list *l = &c->list;
+    const int offset = instrument_has_offset(instrument), moves = s->n_knots != 0;
+    const struct vec3_out origin = offset ? VEC3_OUT(c->read, 0) : (struct vec3_out){0};
+    const struct vec3_in around = offset ? VEC3_IN(c->read, 0) : (struct vec3_in){0};
+    const struct instrument_turns turns = {k->pulse0, k->n, l->mirror_turn, l->pan_turn};
     double back[9];
-    kernel_angles(run, at, n, c->mirror_turn, c->pan_turn);
-    *from = (struct origins){.at_m = {s->station_m[0], s->station_m[1], s->station_m[2]}};
-    if (k == NULL && !moves) {
-        kernel_directions(c->mirror_turn, c->pan_turn, s->rotation, n, c->dx, c->dy, c->dz);
-        return;
-    }
-    const struct instrument_beams beams = {m->sx, m->sy, m->sz, offset ? m->rx : NULL, m->ry, m->rz};
-    if (k != NULL) {
-        instrument_aim(k, run->pulse0 + at, n, c->mirror_turn, c->pan_turn, &beams);
-        instrument_read(k, n, c->mirror_turn, c->pan_turn);
-    } else {
-        kernel_directions(c->mirror_turn, c->pan_turn, AS_IT_IS, n, m->sx, m->sy, m->sz);
-    }
+    instrument_aim(instrument, &turns, &VEC3_OUT(c->socs, 0), &origin);
+    instrument_read(instrument, k->n, l->mirror_turn, l->pan_turn);
     if (moves) {
-        caster_move(c, s, run->t0_ns, dt_ns, n, offset);
+        const struct move m = {VEC3_IN(c->socs, 0), around, VEC3_OUT(c->d, 0), VEC3_OUT(c->origin, 0),
+                               VEC3_OUT(l->p, 0)};
+        move(s, k->run->t0_ns, k->dt_ns, k->n, &m);
     } else {
         transpose(s->rotation, back);
-        kernel_turn_back(m->sx, m->sy, m->sz, back, n, c->dx, c->dy, c->dz);
-        if (!offset) return;
-        kernel_turn_back(m->rx, m->ry, m->rz, back, n, c->ex, c->ey, c->ez);
+        kernel_turn_back(&VEC3_IN(c->socs, 0), back, k->n, &VEC3_OUT(c->d, 0));
+        if (offset) kernel_turn_back(&around, back, k->n, &VEC3_OUT(c->origin, 0));
     }
-    for (uint32_t i = 0; i < n && offset; i++) {
-        m->px[i] = (moves ? m->px[i] : s->station_m[0]) + c->ex[i];
-        m->py[i] = (moves ? m->py[i] : s->station_m[1]) + c->ey[i];
-        m->pz[i] = (moves ? m->pz[i] : s->station_m[2]) + c->ez[i];
+    for (uint32_t i = 0; i < k->n && offset; i++) {
+        c->origin.x[i] += moves ? l->p.x[i] : s->station_m[0];
+        c->origin.y[i] += moves ? l->p.y[i] : s->station_m[1];
+        c->origin.z[i] += moves ? l->p.z[i] : s->station_m[2];
     }
-    from->px = m->px;
-    from->py = m->py;
-    from->pz = m->pz;
+    if (offset) k->from.own = VEC3_IN(c->origin, 0);
+    l->n = k->n;
+    caster_aim_read(c, k);
+}
+
+void caster_aim(struct caster *c, struct chunk *k)
+{
+    const struct cast_setup *s = k->s;
+    const struct instrument *instrument = s->detect != NULL ? s->detect->instrument : NULL;
+    struct echo_list *l = &c->list;
+    kernel_angles(k->run, k->first, k->n, l->mirror_turn, l->pan_turn);
+    k->from = (struct bvh_origins){.at_m = {s->station_m[0], s->station_m[1], s->station_m[2]}};
+    if (s->n_knots != 0) k->from.own = VEC3_IN(l->p, 0);
+    k->linear = 0;
+    if (instrument != NULL)
+        aim_bent(c, k, instrument);
+    else
+        aim_ideal(c, k, &(struct kernel_turns){k->n, l->mirror_turn, l->pan_turn});
+}
+
+/* Entries at .. at + n; c->socs is of no use any more. Those of a pulse that moves are at the times of dt_ns.
+ */
+static void read_part(struct caster *c, const struct chunk *k, uint32_t at, uint32_t n, const uint32_t *dt_ns)
+{
+    const struct cast_setup *s = k->s;
+    struct echo_list *l = &c->list;
+    const struct kernel_turns turns = {n, l->mirror_turn + at, l->pan_turn + at};
+    const struct vec3_out socs = VEC3_OUT(c->socs, 0), e = VEC3_OUT(l->e, at);
+    double to_crs[9];
+    if (s->n_knots == 0) {
+        reading_rotation(s, to_crs);
+        kernel_directions_read(s, &turns, s->rotation, to_crs, &socs, &e);
+        return;
+    }
+    kernel_directions_read(s, &turns, UNTURNED, UNTURNED, &socs, &VEC3_OUT(c->read, 0));
+    const struct move m = {VEC3_IN(c->read, 0), {0}, e, {0}, VEC3_OUT(l->p, at)};
+    move(s, k->run->t0_ns, dt_ns, n, &m);
+}
+
+void caster_aim_read(struct caster *c, struct chunk *k)
+{
+    const struct echo_list *l = &c->list;
+    uint32_t dt_ns[CHUNK], n = 0, done = k->n;
+    double to_crs[9];
+    if (k->s->layout != LINE_GEO) return;
+    k->linear = k->s->n_knots == 0 && reading_rotation(k->s, to_crs);
+    read_part(c, k, 0, k->n, k->dt_ns);
+    for (uint32_t g = 0; g < l->n_further && l->n > k->n; g++)
+        for (uint32_t i = 0; i < l->further[g].n; i++) {
+            dt_ns[n++] = k->dt_ns[l->further[g].pulse];
+            if (n < CHUNK) continue;
+            read_part(c, k, done, n, dt_ns);
+            done += n;
+            n = 0;
+        }
+    if (n > 0) read_part(c, k, done, n, dt_ns);
 }

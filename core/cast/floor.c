@@ -1,4 +1,5 @@
-/* cast_floor: of all triangles only those around the vertical line become a scene, with a BVH where the ray begins. */
+/* cast_floor: of all triangles only those around the vertical line become a scene, with a BVH where the ray
+ * begins. */
 #include "core/cast.h"
 
 #include <math.h>
@@ -28,7 +29,8 @@ static void directions_across(const double down[3], double u[3], double v[3])
     vec3_cross(down, u, v);
 }
 
-/* Does the line pass through the triangle's bounds across it? Rounding stays below a millionth of a coordinate. */
+/* Does the line pass through the triangle's bounds across it? Rounding stays below a millionth of a
+ * coordinate. */
 static int is_around(const struct column *c, uint32_t prim)
 {
     double min[2] = {INFINITY, INFINITY}, max[2] = {-INFINITY, -INFINITY}, far_m = 0.0;
@@ -112,7 +114,13 @@ static int cast_down(const struct column *c, const struct scene *scene, const do
     int rc = bvh_create(scene, c->from_m, 0.0, 1, NULL, &bvh, err);
     if (rc == SH_OK) rc = bvh_order_exactly(bvh, err); /* few triangles: no need to ask whether that is wanted */
     if (rc == SH_OK) rc = caster_create(&caster, err);
-    if (rc == SH_OK) caster_hits(caster, bvh, c->from_m, far_m, 1, &down[0], &down[1], &down[2], range_m, &triangle);
+    const struct bvh_rays ray = {.n = 1,
+                                 .from.at_m = {c->from_m[0], c->from_m[1], c->from_m[2]},
+                                 .dir = {&down[0], &down[1], &down[2]},
+                                 .range_max_m = far_m,
+                                 .range_m = range_m,
+                                 .triangle = &triangle};
+    if (rc == SH_OK) caster_hits(caster, bvh, &ray);
     caster_free(caster);
     bvh_free(bvh);
     return rc;

@@ -6,36 +6,39 @@
 struct look {
     struct caster *caster;
     const struct bvh *bvh;
-    const struct scene *scene;
-    const uint16_t *kind;
-    double station_m[3], range_max_m;
+    const struct beam_outlines_spec *spec;
     uint32_t triangle[2048];
 };
 
-static void look(void *ctx, uint32_t n, const double *dx, const double *dy, const double *dz, double *range_m,
-                 uint16_t *kind)
+static void look(void *ctx, uint32_t n, const struct vec3_in *dir, double *range_m, uint16_t *kind)
 {
     struct look *l = ctx;
+    const struct beam_outlines_spec *spec = l->spec;
     const uint32_t most = sizeof l->triangle / sizeof l->triangle[0];
     for (uint32_t at = 0, part; at < n; at += part) {
         part = n - at < most ? n - at : most;
-        caster_hits(l->caster, l->bvh, l->station_m, l->range_max_m, part, dx + at, dy + at, dz + at, range_m + at,
-                    l->triangle);
+        const struct bvh_rays rays = {.n = part,
+                                      .from.at_m = {spec->station_m[0], spec->station_m[1], spec->station_m[2]},
+                                      .dir = VEC3_IN(*dir, at),
+                                      .range_max_m = spec->range_max_m,
+                                      .range_m = range_m + at,
+                                      .triangle = l->triangle};
+        caster_hits(l->caster, l->bvh, &rays);
         for (uint32_t i = 0; i < part; i++)
-            kind[at + i] =
-                l->kind != NULL && l->triangle[i] != CAST_NO_TRIANGLE ? l->kind[l->scene->label[l->triangle[i]]] : 0;
+            kind[at + i] = spec->kind != NULL && l->triangle[i] != BVH_NO_TRIANGLE
+                               ? spec->kind[spec->scene->label[l->triangle[i]]]
+                               : 0;
     }
 }
 
-int cast_outlines(const struct scene *scene, const struct bvh *bvh, const double station_m[3], const struct beam *beam,
-                  double range_max_m, const uint16_t *kind, struct beam_outlines **out, struct sh_err *err)
+int cast_outlines(const struct beam_outlines_spec *spec, const struct bvh *bvh, struct beam_outlines **out,
+                  struct sh_err *err)
 {
-    struct look l = {.bvh = bvh, .scene = scene, .kind = kind, .range_max_m = range_max_m};
+    struct look l = {.bvh = bvh, .spec = spec};
     const struct beam_probe probe = {look, &l};
-    memcpy(l.station_m, station_m, sizeof l.station_m);
     int rc = caster_create(&l.caster, err);
     if (rc != SH_OK) return rc;
-    rc = beam_outlines_create(scene, station_m, beam, range_max_m, kind, &probe, out, err);
+    rc = beam_outlines_create(spec, &probe, out, err);
     caster_free(l.caster);
     return rc;
 }

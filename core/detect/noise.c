@@ -1,6 +1,7 @@
 #include <math.h>
 
 #include "core/detect.h"
+#include "core/light.h"
 #include "core/rng.h"
 #include "core/vecmath.h"
 
@@ -29,13 +30,13 @@ VEC_CLONES
 void detect_zones(enum detect_ambiguity how, double period_s, uint32_t zones, double range_min_m, uint32_t n,
                   double *restrict range_m)
 {
-    const double zone_m = 0.5 * DETECT_LIGHT_M_S * period_s, per_m = 1.0 / zone_m;
+    const double zone_m = 0.5 * LIGHT_SPEED_M_S * period_s, per_m = 1.0 / zone_m;
     const double most_m = how == DETECT_RESOLVED ? zone_m * (double)zones : (double)INFINITY;
     for (uint32_t i = 0; i < n; i++) {
         double zone = floor(range_m[i] * per_m), within = range_m[i] - zone * zone_m;
         int blind = within < range_min_m || range_m[i] >= most_m;
-        double told = how == DETECT_FOLDED ? within : range_m[i];
-        range_m[i] = how == DETECT_AMBIGUITY_NONE ? range_m[i] : blind ? (double)NAN : told;
+        double reported = how == DETECT_FOLDED ? within : range_m[i];
+        range_m[i] = how == DETECT_AMBIGUITY_NONE ? range_m[i] : blind ? (double)NAN : reported;
     }
 }
 
@@ -45,8 +46,8 @@ void detect_ball_keys(struct detect_ball *ball, uint64_t seed)
     ball->radius_key = rng_key(seed, RNG_BALL_RADIUS);
 }
 
-/* Uniform in the unit ball: a height uniform in -1..1 and an angle give a direction (Archimedes), the cube root of a
- * uniform number the distance. */
+/* Uniform in the unit ball: a height uniform in -1..1 and an angle give a direction (Archimedes), the cube
+ * root of a uniform number the distance. */
 static void in_unit_ball(const struct detect_ball *ball, uint64_t key, double u[3])
 {
     uint64_t bits = rng_u64(ball->direction_key, key);
@@ -58,8 +59,9 @@ static void in_unit_ball(const struct detect_ball *ball, uint64_t key, double u[
     u[2] = r * z;
 }
 
-/* The point lies in the plane of the line angle, at `ahead` and `up`, and is moved by v: to the right, ahead (along the
- * head's horizon), up. Where the line angle looks backward over the zenith it still does behind. */
+/* The point lies in the plane of the line angle, at `ahead` and `up`, and is moved by v: to the right, ahead
+ * (along the head's horizon), up. Where the line angle looks backward over the zenith it still does so
+ * afterwards. */
 static void move_point(const double v[3], double *range_m, double *mirror_turn, double *pan_turn)
 {
     double s, c;
@@ -74,28 +76,27 @@ static void move_point(const double v[3], double *range_m, double *mirror_turn, 
     *mirror_turn += by / VEC_TURN_RAD;
 }
 
-void detect_move_in_ball(const struct detect_ball *ball, const double m[9], uint32_t n, const uint64_t *key,
-                         double *range_m, double *mirror_turn, double *pan_turn)
+void detect_move_in_ball(const struct detect_ball *ball, const double m[9], const struct detect_points *p)
 {
-    for (uint32_t i = 0; i < n; i++) {
-        if (isnan(range_m[i])) continue;
+    for (uint32_t i = 0; i < p->n; i++) {
+        if (isnan(p->range_m[i])) continue;
         double u[3], v[3], s, c;
-        double radius_m = ball->radius_m * (1.0 + ball->per_distance_1_m * range_m[i]);
-        in_unit_ball(ball, key[i], u);
+        double radius_m = ball->radius_m * (1.0 + ball->per_distance_1_m * p->range_m[i]);
+        in_unit_ball(ball, p->key[i], u);
         for (int k = 0; k < 3; k++)
             u[k] *= radius_m * ball->factor[k];
         if (ball->local) { /* along, right, up */
-            vec_sincos_turn(mirror_turn[i], &s, &c);
+            vec_sincos_turn(p->mirror_turn[i], &s, &c);
             v[0] = u[1];
             v[1] = c * u[0] - s * u[2];
             v[2] = s * u[0] + c * u[2];
         } else {
             double x = m[0] * u[0] + m[3] * u[1] + m[6] * u[2], y = m[1] * u[0] + m[4] * u[1] + m[7] * u[2];
-            vec_sincos_turn(pan_turn[i], &s, &c);
+            vec_sincos_turn(p->pan_turn[i], &s, &c);
             v[0] = c * x - s * y; /* the pan counts clockwise: ahead is (sin, cos), right (cos, -sin) */
             v[1] = s * x + c * y;
             v[2] = m[2] * u[0] + m[5] * u[1] + m[8] * u[2];
         }
-        move_point(v, &range_m[i], &mirror_turn[i], &pan_turn[i]);
+        move_point(v, &p->range_m[i], &p->mirror_turn[i], &p->pan_turn[i]);
     }
 }

@@ -30,8 +30,8 @@ static int fit_reaches(const struct detect_signal_spec *spec, struct detect_sign
         const struct detect_reach *a = &reach[i], *b = &reach[i + 1];
         double slope =
             (log(b->reflectance / a->reflectance) - 2.0 * log(b->range_m / a->range_m)) / (b->range_m - a->range_m);
-        /* A data sheet rounds its figures to a few percent: an R^2 that fails by less than 10 % is none of its claims.
-         */
+        /* A data sheet rounds its figures to a few percent: an R^2 that fails by less than 10 % is none of
+         * its claims. */
         if (!(b->range_m > a->range_m) || slope * (b->range_m - a->range_m) < -0.1)
             return sh_fail(err, SH_EINPUT,
                            "%.4g m on %.4g and %.4g m on %.4g: a signal falls at least with the square of the range",
@@ -79,20 +79,10 @@ VEC_INLINE double overlap(double per_overlap2, double range_m)
     return per_overlap2 == 0.0 ? 1.0 : caught;
 }
 
-double detect_least_reflectance(const struct detect_signal *signal, double range_m)
-{
-    return vec_exp(log_least(signal, range_m));
-}
-
 double detect_amplitude(const struct detect_signal *signal, double range_m, double rho)
 {
     return rho * overlap(signal->per_overlap2, range_m) *
            vec_exp(-log_least(signal, range_m) - signal->extinction2_1_m * range_m);
-}
-
-double detect_sigma_m(const struct detect_signal *signal, double amplitude, double range_m)
-{
-    return sqrt(signal->floor2 + signal->jitter2 / (amplitude * amplitude)) + signal->per_distance * range_m;
 }
 
 double detect_extinction_1_m(double visibility_m, double wavelength_m)
@@ -118,11 +108,15 @@ static void sum_pieces(const struct detect_signal *s, uint32_t n, const double *
 
 /* amplitude: holds g, becomes A. A range of NaN gives no A, and so no echo. */
 VEC_CLONES
-static void detect(const struct detect_signal *s, uint32_t n, const uint64_t *restrict key, const double *restrict rho,
-                   double *restrict range_m, double *restrict amplitude, int16_t *restrict refl_cdb)
+static void detect(const struct detect_signal *s, const struct detect_echoes *e)
 {
     const double per_overlap2 = s->per_overlap2, extinction2 = s->extinction2_1_m, per_snr = s->per_snr;
-    const uint64_t signal_key = s->signal_key;
+    const uint64_t signal_key = s->signal_key, *key = e->key;
+    const double *rho = e->rho;
+    double *range_m = e->range_m, *amplitude = e->amplitude;
+    int16_t *refl_cdb = e->refl_cdb;
+    const uint32_t n = e->n;
+    VEC_LOOP
     for (uint32_t i = 0; i < n; i++) {
         double r = range_m[i] > 1e-6 ? range_m[i] : 1e-6;
         double least = 2.0 * vec_log(r) + amplitude[i], o = overlap(per_overlap2, r);
@@ -143,15 +137,16 @@ static void detect(const struct detect_signal *s, uint32_t n, const uint64_t *re
 void detect_by_signal(const struct detect_signal *signal, const struct detect_echoes *e)
 {
     sum_pieces(signal, e->n, e->range_m, e->amplitude);
-    detect(signal, e->n, e->key, e->rho, e->range_m, e->amplitude, e->refl_cdb);
+    detect(signal, e);
 }
 
 VEC_CLONES
-static void amplitudes(const struct detect_signal *s, uint32_t n, const uint64_t *restrict key,
-                       const double *restrict amplitude, const double *restrict range_m, int16_t *restrict out)
+void detect_amplitudes(const struct detect_signal *signal, const struct detect_echoes *e, int16_t *restrict out)
 {
-    const double per_snr = s->per_snr;
-    const uint64_t signal_key = s->signal_key;
+    const double per_snr = signal->per_snr, *amplitude = e->amplitude, *range_m = e->range_m;
+    const uint64_t signal_key = signal->signal_key, *key = e->key;
+    const uint32_t n = e->n;
+    VEC_LOOP
     for (uint32_t i = 0; i < n; i++) {
         double seen = amplitude[i] + per_snr * rng_normal(signal_key, key[i]); /* as above */
         int detected = range_m[i] == range_m[i];
@@ -161,14 +156,4 @@ static void amplitudes(const struct detect_signal *s, uint32_t n, const uint64_t
         vec_round(cdb, &bits);
         out[i] = (int16_t)(detected ? bits : (uint64_t)(uint16_t)LINE_AMPLITUDE_NONE);
     }
-}
-
-void detect_amplitudes(const struct detect_signal *signal, const struct detect_echoes *e, int16_t *amplitude_cdb)
-{
-    if (signal != NULL) {
-        amplitudes(signal, e->n, e->key, e->amplitude, e->range_m, amplitude_cdb);
-        return;
-    }
-    for (uint32_t i = 0; i < e->n; i++)
-        amplitude_cdb[i] = LINE_AMPLITUDE_NONE;
 }

@@ -4,7 +4,9 @@
 #include <math.h>
 #include <string.h>
 
-static const double LIGHT_M_S = 299792458.0;
+#include "core/light.h"
+#include "core/vec3.h"
+#include "core/vecmath.h"
 
 /* t = rho^2 over the footprint: density proportional to exp(-2 t) on 0 .. 1. Means of t and t^2, by parts. */
 static double mean_t(void)
@@ -59,7 +61,7 @@ void beam_init(struct beam *beam, double exit_m, double divergence_rad, double p
     memset(beam, 0, sizeof *beam);
     beam->exit_radius_m = 0.5 * exit_m;
     beam->slope = 0.5 * divergence_rad;
-    beam->resolution_m = 0.5 * LIGHT_M_S * pulse_width_s;
+    beam->resolution_m = 0.5 * LIGHT_SPEED_M_S * pulse_width_s;
     for (int i = BEAM_HALF_STEPS - 1; i >= 0; i--) {
         double h = 2.0 * i / BEAM_HALF_STEPS - 1.0;
         struct across strip = between(h, h + 2.0 / BEAM_HALF_STEPS);
@@ -85,28 +87,59 @@ static double mean_t3(void)
     return 1.5 * mean_t2() - exp(-2.0) / (1.0 - exp(-2.0));
 }
 
-/* The series of sqrt((1 + t s^2) / (1 - t b^2)) - 1, b = s tan i, to third order in t, by x = 1 / cos^2 i: s^2 + b^2 =
- * s^2 x, and what is left out is s^2 of these terms. */
-void beam_plane_series(const struct beam *beam, double term[3])
+VEC_CLONES
+static void plane_means(const double *restrict term, float most, const float *restrict steep, uint32_t n,
+                        double *restrict range_m)
+{
+    for (uint32_t i = 0; i < n; i++) {
+        double x = (double)(steep[i] < most ? steep[i] : most);
+        range_m[i] += range_m[i] * x * (term[0] + x * (term[1] + x * term[2]));
+    }
+}
+
+/* The series of sqrt((1 + t s^2) / (1 - t b^2)) - 1, b = s tan i, to third order in t, by x = 1 / cos^2 i:
+ * s^2 + b^2 = s^2 x, and what is left out is s^2 of these terms. */
+void beam_plane_means(const struct beam *beam, const float *steep, uint32_t n, double *range_m)
 {
     double s2 = beam->slope * beam->slope;
-    term[0] = 0.5 * s2 * mean_t();
-    term[1] = 0.375 * s2 * s2 * mean_t2();
-    term[2] = 0.3125 * s2 * s2 * s2 * mean_t3();
+    const double term[3] = {0.5 * s2 * mean_t(), 0.375 * s2 * s2 * mean_t2(), 0.3125 * s2 * s2 * s2 * mean_t3()};
+    if (s2 == 0.0) return;
+    plane_means(term, (float)(0.25 / s2), steep, n, range_m);
 }
 
-double beam_plane_excess(const struct beam *beam, double range_m, double cosine)
+/* Variance of the ranges, to first order in s tan i: that of rho cos phi, half the mean t, times w(R)^2 tan^2
+ * i. Beyond most the plane is along the beam. */
+VEC_CLONES
+void beam_plane_widths(const struct beam *beam, const float *restrict steep, const double *restrict range_m, uint32_t n,
+                       float *restrict width_m)
 {
-    double s2 = beam->slope * beam->slope, x = 1.0 / fmax(cosine * cosine, 4.0 * s2), term[3];
-    if (s2 == 0.0) return 0.0;
-    beam_plane_series(beam, term);
-    return range_m * x * (term[0] + x * (term[1] + x * term[2]));
+    const double full = 8.0 * M_LN2, half_t = 0.5 * mean_t(), exit_m = beam->exit_radius_m, slope = beam->slope;
+    const float most = 1e12f, pulse2 = (float)(beam->resolution_m * beam->resolution_m);
+    const float fixed = (float)(full * (half_t * exit_m * exit_m));
+    const float per_range2 = (float)(full * (half_t * slope * slope));
+    for (uint32_t i = 0; i < n; i++) {
+        float x = (steep[i] < most ? steep[i] : most) - 1.0f, r = (float)range_m[i];
+        x = x > 0.0f ? x : 0.0f;
+        width_m[i] = sqrtf(pulse2 + (fixed + per_range2 * r * r) * x);
+    }
 }
 
-void beam_plane_variance(const struct beam *beam, double term[2])
+/* The sub-ray at (x, y) begins at exit_radius (x e1 + y e2), with slope (x e2 - y e1): how the range changes
+ * with x and y, to first order. */
+float beam_part_sigma(const struct beam *beam, const struct beam_sight *sight, const double n[3], double range_m,
+                      const struct beam_part *part)
 {
-    term[0] = 0.5 * mean_t() * beam->exit_radius_m * beam->exit_radius_m;
-    term[1] = 0.5 * mean_t() * beam->slope * beam->slope;
+    double along = vec3_dot(n, sight->dir), a1 = vec3_dot(n, sight->e1) / along, a2 = vec3_dot(n, sight->e2) / along;
+    double by_x = -beam->exit_radius_m * a1 - range_m * beam->slope * a2;
+    double by_y = -beam->exit_radius_m * a2 + range_m * beam->slope * a1;
+    double variance = by_x * by_x * part->xx + 2.0 * by_x * by_y * part->xy + by_y * by_y * part->yy;
+    return (float)sqrt(variance > 0.0 ? variance : 0.0);
+}
+
+float beam_round_sigma(const struct beam *beam, double range_m, double cosine, double variance)
+{
+    double tan2 = 1.0 / fmax(cosine * cosine, 1e-12) - 1.0;
+    return (float)(beam_radius(beam, range_m) * sqrt(fmax(0.0, variance * tan2)));
 }
 
 double beam_echo_width(double pulse_m, double variance_m2)

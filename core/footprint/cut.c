@@ -7,12 +7,8 @@
 
 #define LEAST_PART 0.0005
 
-/* A part's energy, and its moments about the footprint's centre. */
-struct portion {
-    double energy, x, y, xx, xy, yy;
-};
-
-static void take_from(struct portion *a, const struct portion *b)
+/* Of a portion: its energy, and its moments about the footprint's centre. */
+static void take_from(struct beam_part *a, const struct beam_part *b)
 {
     a->energy -= b->energy;
     a->x -= b->x;
@@ -22,25 +18,21 @@ static void take_from(struct portion *a, const struct portion *b)
     a->yy -= b->yy;
 }
 
-static void add_part(struct beam_parts *parts, struct beam_spread *spread, const struct portion *p, int centre)
+/* A portion becomes a part, about its own centre. */
+static void add_part(struct beam_parts *parts, const struct beam_part *p, int centre)
 {
     if (p->energy < LEAST_PART) return;
     uint32_t i = parts->n++;
     double x = p->x / p->energy, y = p->y / p->energy;
-    parts->energy[i] = p->energy;
-    parts->x[i] = x;
-    parts->y[i] = y;
+    parts->part[i] = (struct beam_part){
+        p->energy, x, y, p->xx / p->energy - x * x, p->xy / p->energy - x * y, p->yy / p->energy - y * y};
     if (centre) parts->centre = i;
-    if (spread == NULL) return;
-    spread->xx[i] = p->xx / p->energy - x * x;
-    spread->xy[i] = p->xy / p->energy - x * y;
-    spread->yy[i] = p->yy / p->energy - y * y;
 }
 
 /* Beyond a line; second moments only where they are asked for. */
-static struct portion cap_of(const struct beam *beam, const struct beam_line *line, int squares)
+static struct beam_part cap_of(const struct beam *beam, const struct beam_line *line, int squares)
 {
-    struct portion p = {.xx = 0.0};
+    struct beam_part p = {.xx = 0.0};
     double moment, along, across, nx = line->n[0], ny = line->n[1];
     beam_half(beam, line->h, &p.energy, &moment);
     p.x = moment * nx;
@@ -53,12 +45,12 @@ static struct portion cap_of(const struct beam *beam, const struct beam_line *li
     return p;
 }
 
-/* What one or two lines cut off, in closed form. All h >= 0: the caps lie beyond. Returns 0 where the lines meet in the
- * disc. */
-static int cut_caps(const struct beam *beam, const struct beam_line *line, uint32_t n, struct beam_parts *parts,
-                    struct beam_spread *spread)
+/* What one or two lines cut off, in closed form. All h >= 0: the caps lie beyond. Returns 0 where the lines
+ * meet in the disc. */
+static int cut_caps(const struct beam *beam, const struct beam_line *line, uint32_t n, int spreads,
+                    struct beam_parts *parts)
 {
-    struct portion cap[2], rest = {.energy = 1.0};
+    struct beam_part cap[2], rest = {.energy = 1.0};
     int nested = -1; /* the line whose cap contains the other's */
     if (n == 2) {
         double cross = line[0].n[0] * line[1].n[1] - line[0].n[1] * line[1].n[0];
@@ -73,20 +65,20 @@ static int cut_caps(const struct beam *beam, const struct beam_line *line, uint3
             if (middle > out->h) nested = outer;
         }
     }
-    if (spread != NULL) rest.xx = rest.yy = beam->along[0];
+    if (spreads) rest.xx = rest.yy = beam->along[0];
     for (uint32_t i = 0; i < n; i++)
-        cap[i] = cap_of(beam, &line[i], spread != NULL);
+        cap[i] = cap_of(beam, &line[i], spreads);
     if (nested >= 0) take_from(&cap[nested], &cap[1 - nested]);
     for (uint32_t i = 0; i < n; i++) {
         take_from(&rest, &cap[i]);
-        add_part(parts, spread, &cap[i], 0);
+        add_part(parts, &cap[i], 0);
     }
-    add_part(parts, spread, &rest, 1);
+    add_part(parts, &rest, 1);
     return 1;
 }
 
-/* Places of the fine pattern as sets of bits: place 16 r + i is bit r of lane i, so that one comparison of vectors
- * makes a bit of all lanes. */
+/* Places of the fine pattern as sets of bits: place 16 r + i is bit r of lane i, so that one comparison of
+ * vectors makes a bit of all lanes. */
 enum { LANES = 16, MAX_ROWS = 32 };
 _Static_assert(1 + 3 * BEAM_FINE_RINGS * (BEAM_FINE_RINGS + 1) <= LANES * MAX_ROWS, "a bit for each place");
 typedef float lanes_f __attribute__((vector_size(4 * LANES)));
@@ -160,7 +152,7 @@ static uint32_t cut_places(const struct beam_pattern *fine, const struct beam_li
 }
 
 /* Sums of squares over the places of a set and around each, place by place: asked for only with spreads. */
-static void sum_squares(const struct beam_pattern *fine, const lanes_i *set, struct portion *p)
+static void sum_squares(const struct beam_pattern *fine, const lanes_i *set, struct beam_part *p)
 {
     for (uint32_t k = 0; k < fine->n; k++) {
         if (((uint32_t)(*set)[k % LANES] >> k / LANES & 1) == 0) continue;
@@ -171,15 +163,15 @@ static void sum_squares(const struct beam_pattern *fine, const lanes_i *set, str
     }
 }
 
-static int add_places(const struct beam_pattern *fine, const struct beam_line *line, uint32_t n,
-                      struct beam_parts *parts, struct beam_spread *spread)
+static int add_places(const struct beam_pattern *fine, const struct beam_line *line, uint32_t n, int spreads,
+                      struct beam_parts *parts)
 {
     lanes_i part[BEAM_MAX_PARTS];
     struct sums sums[BEAM_MAX_PARTS];
     const double each = 1.0 / fine->n;
     uint32_t n_parts = cut_places(fine, line, n, part, sums);
     for (uint32_t p = 0; p < n_parts; p++) {
-        struct portion portion = {.energy = 0.0};
+        struct beam_part portion = {.energy = 0.0};
         uint32_t places = 0;
         double mx = 0.0, my = 0.0;
         for (int i = 0; i < LANES; i++) {
@@ -187,30 +179,24 @@ static int add_places(const struct beam_pattern *fine, const struct beam_line *l
             mx += (double)sums[p].x[i];
             my += (double)sums[p].y[i];
         }
-        if (spread != NULL) sum_squares(fine, &part[p], &portion);
-        portion = (struct portion){.energy = places * each,
-                                   .x = mx * each,
-                                   .y = my * each,
-                                   .xx = portion.xx * each,
-                                   .xy = portion.xy * each,
-                                   .yy = portion.yy * each};
-        add_part(parts, spread, &portion, part[p][0] & 1);
+        if (spreads) sum_squares(fine, &part[p], &portion);
+        portion = (struct beam_part){.energy = places * each,
+                                     .x = mx * each,
+                                     .y = my * each,
+                                     .xx = portion.xx * each,
+                                     .xy = portion.xy * each,
+                                     .yy = portion.yy * each};
+        add_part(parts, &portion, part[p][0] & 1);
     }
     return n_parts == 0;
 }
 
-int beam_cut_spread(const struct beam *beam, const struct beam_pattern *fine, const struct beam_line *line, uint32_t n,
-                    struct beam_parts *parts, struct beam_spread *spread)
+int beam_cut(const struct beam *beam, const struct beam_pattern *fine, const struct beam_line *line, uint32_t n,
+             int spreads, struct beam_parts *parts)
 {
     parts->n = 0;
     parts->centre = BEAM_MAX_PARTS;
-    if (n <= 2 && cut_caps(beam, line, n, parts, spread)) return 0;
+    if (n <= 2 && cut_caps(beam, line, n, spreads, parts)) return 0;
     parts->n = 0;
-    return add_places(fine, line, n, parts, spread);
-}
-
-int beam_cut(const struct beam *beam, const struct beam_pattern *fine, const struct beam_line *line, uint32_t n,
-             struct beam_parts *parts)
-{
-    return beam_cut_spread(beam, fine, line, n, parts, NULL);
+    return add_places(fine, line, n, spreads, parts);
 }

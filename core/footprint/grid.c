@@ -219,8 +219,7 @@ static int fill_cells(struct beam_outlines *o, const struct beam *beam, const st
     return SH_OK;
 }
 
-int beam_outlines_create(const struct scene *scene, const double station_m[3], const struct beam *beam,
-                         double range_max_m, const uint16_t *kind, const struct beam_probe *probe,
+int beam_outlines_create(const struct beam_outlines_spec *spec, const struct beam_probe *probe,
                          struct beam_outlines **out, struct sh_err *err)
 {
     struct stretches stretches = {.at = NULL};
@@ -233,16 +232,16 @@ int beam_outlines_create(const struct scene *scene, const double station_m[3], c
         return sh_fail(err, SH_ENOMEM, "beam: no memory");
     }
     prober->probe = probe;
-    prober->beam = beam;
+    prober->beam = spec->beam;
     o->first = calloc(N_CELLS + 1, sizeof *o->first);
     o->any = calloc(N_CELLS / 32, sizeof *o->any);
     o->around = calloc(N_CELLS / 32, sizeof *o->around);
     int rc =
         o->first == NULL || o->any == NULL || o->around == NULL ? sh_fail(err, SH_ENOMEM, "beam: no memory") : SH_OK;
-    if (rc == SH_OK) rc = outline_find(scene, station_m, kind, &o->edge, &o->n_edges, &o->info.edges, err);
-    if (rc == SH_OK && find_stretches(o, prober, range_max_m * 1.01, &stretches) != SH_OK)
+    if (rc == SH_OK) rc = outline_find(spec, o, err);
+    if (rc == SH_OK && find_stretches(o, prober, spec->range_max_m * 1.01, &stretches) != SH_OK)
         rc = sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");
-    if (rc == SH_OK) rc = fill_cells(o, beam, &stretches, err);
+    if (rc == SH_OK) rc = fill_cells(o, spec->beam, &stretches, err);
     o->info.stretches = stretches.n;
     free(stretches.at);
     free(prober);
@@ -273,8 +272,9 @@ void beam_outlines_get_info(const struct beam_outlines *o, struct beam_outlines_
 
 /* Square of the longest way from one direction to the next. */
 VEC_CLONES
-static float longest_step2(const float *restrict dx, const float *restrict dy, const float *restrict dz, uint32_t n)
+static float longest_step2(const struct vec3_floats *dir, uint32_t n)
 {
+    const float *dx = dir->x, *dy = dir->y, *dz = dir->z;
     uint32_t most = 0;
     for (uint32_t i = 0; i + 1 < n; i++) {
         float x = dx[i + 1] - dx[i], y = dy[i + 1] - dy[i], z = dz[i + 1] - dz[i], step2 = x * x + y * y + z * z;
@@ -288,18 +288,26 @@ static float longest_step2(const float *restrict dx, const float *restrict dy, c
 }
 
 VEC_CLONES
-static void cells_of(const float *restrict dx, const float *restrict dy, const float *restrict dz, uint32_t n,
-                     uint32_t *restrict cell)
+static void cells_of(const struct vec3_floats *dir, uint32_t n, uint32_t *restrict cell)
 {
+    const float *dx = dir->x, *dy = dir->y, *dz = dir->z;
+    VEC_LOOP
     for (uint32_t i = 0; i < n; i++)
         cell[i] = outline_cell(dx[i], dy[i], dz[i]);
 }
 
 /* Directions looked up together. */
 struct few {
-    float dx[BEAM_NEAR_MOST], dy[BEAM_NEAR_MOST], dz[BEAM_NEAR_MOST];
+    float x[BEAM_NEAR_MOST], y[BEAM_NEAR_MOST], z[BEAM_NEAR_MOST];
     uint32_t cell[BEAM_NEAR_MOST];
 };
+
+static void take_direction(struct few *few, uint32_t to, const struct vec3_floats *dir, uint32_t from)
+{
+    few->x[to] = dir->x[from];
+    few->y[to] = dir->y[from];
+    few->z[to] = dir->z[from];
+}
 
 static int is_set(const uint32_t *bits, uint32_t cell)
 {
@@ -307,21 +315,19 @@ static int is_set(const uint32_t *bits, uint32_t cell)
 }
 
 /* Pulses some way around which there are outlines: of so many at a time, that is asked of the middle one. */
-static uint32_t list_around(const struct beam_outlines *o, const float *dx, const float *dy, const float *dz,
-                            uint32_t n, struct few *few, uint32_t *pulse)
+static uint32_t list_around(const struct beam_outlines *o, const struct vec3_floats *dir, uint32_t n, struct few *few,
+                            uint32_t *pulse)
 {
-    const float reach = (float)OUTLINE_AROUND_RAD, step = sqrtf(longest_step2(dx, dy, dz, n)) + 1e-6f;
+    const float reach = (float)OUTLINE_AROUND_RAD, step = sqrtf(longest_step2(dir, n)) + 1e-6f;
     const uint32_t half = step * TOGETHER > reach ? (uint32_t)(reach / step) : TOGETHER, group = 2 * half + 1;
     uint32_t found = 0, groups = 0, base = 0;
     if (n == 0) return 0;
     do {
         uint32_t middle = base + half < n ? base + half : n - 1;
-        few->dx[groups] = dx[middle];
-        few->dy[groups] = dy[middle];
-        few->dz[groups++] = dz[middle];
+        take_direction(few, groups++, dir, middle);
         base += group;
     } while (base < n);
-    cells_of(few->dx, few->dy, few->dz, groups, few->cell);
+    cells_of(&(struct vec3_floats){few->x, few->y, few->z}, groups, few->cell);
     for (uint32_t k = 0; k < groups; k++) {
         uint32_t end = (k + 1) * group < n ? (k + 1) * group : n;
         for (uint32_t i = k * group; i < end && is_set(o->around, few->cell[k]); i++)
@@ -331,17 +337,14 @@ static uint32_t list_around(const struct beam_outlines *o, const float *dx, cons
 }
 
 /* Pulses in cells that lead to some; near->first: the cell. */
-static uint32_t in_cells(const struct beam_outlines *o, const float *dx, const float *dy, const float *dz, uint32_t n,
+static uint32_t in_cells(const struct beam_outlines *o, const struct vec3_floats *dir, uint32_t n,
                          struct beam_near *near)
 {
     struct few few;
-    uint32_t pulse[BEAM_NEAR_MOST], around = list_around(o, dx, dy, dz, n, &few, pulse), found = 0;
-    for (uint32_t k = 0; k < around; k++) {
-        few.dx[k] = dx[pulse[k]];
-        few.dy[k] = dy[pulse[k]];
-        few.dz[k] = dz[pulse[k]];
-    }
-    cells_of(few.dx, few.dy, few.dz, around, few.cell);
+    uint32_t pulse[BEAM_NEAR_MOST], around = list_around(o, dir, n, &few, pulse), found = 0;
+    for (uint32_t k = 0; k < around; k++)
+        take_direction(&few, k, dir, pulse[k]);
+    cells_of(&(struct vec3_floats){few.x, few.y, few.z}, around, few.cell);
     for (uint32_t k = 0; k < around; k++) {
         near[found].pulse = pulse[k];
         near[found].first = few.cell[k];
@@ -363,18 +366,18 @@ static void look_up(const struct beam_outlines *o, struct beam_near *near, uint3
     }
 }
 
-/* Most cells lead to none, and most of those that lead to some are wider than the footprint; ranges are looked at
- * later. */
-uint32_t beam_near_outlines(const struct beam_outlines *o, const struct beam *beam, const float *dx, const float *dy,
-                            const float *dz, uint32_t n, struct beam_near *near)
+/* Most cells lead to none, and most of those that lead to some are wider than the footprint; ranges are
+ * looked at later. */
+uint32_t beam_near_outlines(const struct beam_outlines *o, const struct beam *beam, const struct vec3_floats *dir,
+                            uint32_t n, struct beam_near *near)
 {
     uint32_t left = 0;
     if (o->info.entries == 0) return 0;
-    uint32_t found = in_cells(o, dx, dy, dz, n, near);
+    uint32_t found = in_cells(o, dir, n, near);
     look_up(o, near, found);
     for (uint32_t k = 0; k < found; k++) {
         struct beam_near one = near[k];
-        const float d[3] = {dx[one.pulse], dy[one.pulse], dz[one.pulse]};
+        const float d[3] = VEC3_AT(*dir, one.pulse);
         while (one.first < one.end && outline_is_clear(beam, &o->entry[one.first], d))
             one.first++;
         if (one.first == one.end) continue;

@@ -11,16 +11,16 @@ struct local_edge {
     double a[3], b[3];
 };
 
-static void turn_in(const float p[3], const double e1[3], const double e2[3], const double dir[3], double out[3])
+static void turn_in(const float p[3], const struct beam_sight *sight, double out[3])
 {
     const double at[3] = {(double)p[0], (double)p[1], (double)p[2]};
-    out[0] = vec3_dot(at, e1);
-    out[1] = vec3_dot(at, e2);
-    out[2] = vec3_dot(at, dir);
+    out[0] = vec3_dot(at, sight->e1);
+    out[1] = vec3_dot(at, sight->e2);
+    out[2] = vec3_dot(at, sight->dir);
 }
 
-/* Where the segment is within w(z) of the axis: a quadratic inequality, for w^2 is quadratic too. Returns 0 where it
- * never is. */
+/* Where the segment is within w(z) of the axis: a quadratic inequality, for w^2 is quadratic too. Returns 0
+ * where it never is. */
 static int clip_to_beam(const struct beam *beam, struct local_edge *e)
 {
     double d[3] = {e->b[0] - e->a[0], e->b[1] - e->a[1], e->b[2] - e->a[2]}, s2 = beam->slope * beam->slope;
@@ -88,25 +88,24 @@ static int is_known(const struct beam_line *line, uint32_t n, const struct beam_
     return 0;
 }
 
-uint32_t beam_find_lines(const struct beam_outlines *o, const struct beam *beam, const struct beam_near *near,
-                         const double dir[3], const double e1[3], const double e2[3], double limit_m,
-                         struct beam_line *line, double *next_m)
+uint32_t beam_find_lines(const struct beam_outlines *o, const struct beam *beam, struct beam_near *near,
+                         const struct beam_sight *sight, double limit_m, struct beam_line *line)
 {
     uint32_t n = 0;
-    const float d[3] = {(float)dir[0], (float)dir[1], (float)dir[2]};
-    *next_m = INFINITY;
+    const float d[3] = {(float)sight->dir[0], (float)sight->dir[1], (float)sight->dir[2]};
+    near->next_m = INFINITY;
     for (uint32_t k = near->first; k < near->end; k++) {
         const struct outline_entry *entry = &o->entry[k];
         const struct outline_edge *edge = &o->edge[entry->edge];
         struct local_edge e;
         struct beam_line one;
         if ((double)entry->range_m > limit_m) {
-            *next_m = n > 0 ? (double)entry->range_m : (double)INFINITY;
+            near->next_m = n > 0 ? (double)entry->range_m : (double)INFINITY;
             break;
         }
         if (outline_is_clear(beam, entry, d)) continue;
-        turn_in(edge->a, e1, e2, dir, e.a);
-        turn_in(edge->b, e1, e2, dir, e.b);
+        turn_in(edge->a, sight, e.a);
+        turn_in(edge->b, sight, e.b);
         if (!clip_to_beam(beam, &e)) continue;
         if (e.a[2] > limit_m && e.b[2] > limit_m) continue; /* it is nearer elsewhere */
         if (!make_line(beam, &e, &one) || is_known(line, n, &one)) continue;

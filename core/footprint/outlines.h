@@ -1,6 +1,8 @@
-/* Private to core/beam: outlines of a scene from a station, and the cells of direction that lead to them.
+/* Private to core/footprint: outlines of a scene from a station, and the cells of direction that lead to
+ * them.
  *
- * Directions are cells of a cube's faces, n x n each: x / |z| and y / |z| of the axis with the largest component, from
+ * Directions are cells of a cube's faces, n x n each: x / |z| and y / |z| of the axis with the largest
+ * component, from
  * -1 to 1. */
 #ifndef CORE_FOOTPRINT_OUTLINES_H
 #define CORE_FOOTPRINT_OUTLINES_H
@@ -44,18 +46,19 @@ enum { PROBE_MOST = 512 };
 struct outline_prober {
     const struct beam_probe *probe; /* NULL: all counts */
     const struct beam *beam;
-    double dx[2 * PROBE_MOST], dy[2 * PROBE_MOST], dz[2 * PROBE_MOST], range_m[2 * PROBE_MOST];
+    struct {
+        double x[2 * PROBE_MOST], y[2 * PROBE_MOST], z[2 * PROBE_MOST];
+    } dir;
+    double range_m[2 * PROBE_MOST];
     uint16_t kind[2 * PROBE_MOST];
     uint8_t counts[PROBE_MOST];
 };
-/* The piece from p to q in equal parts, each about a footprint's radius: how many, and in counts whether each counts.
- */
+/* The piece from p to q in equal parts, each about a footprint's radius: how many, and in counts whether each
+ * counts. */
 uint32_t outline_probe(struct outline_prober *prober, const double p[3], const double q[3], double range_m);
 
-/* weld.c: the outlines among the edges of a scene; kind: as for beam_outlines_create. Gives *edge (malloc) and *n, and
- * how many edges there are. */
-int outline_find(const struct scene *scene, const double station_m[3], const uint16_t *kind, struct outline_edge **edge,
-                 uint32_t *n, uint64_t *n_edges, struct sh_err *err);
+/* weld.c: the outlines among the edges of a scene: o->edge and n_edges, and info.edges. */
+int outline_find(const struct beam_outlines_spec *spec, struct beam_outlines *o, struct sh_err *err);
 
 /* Cells lie in tiles of 4 x 4: `first` of a tile is one cache line. */
 static inline uint32_t outline_place(uint32_t face, uint32_t i, uint32_t j)
@@ -80,8 +83,8 @@ static inline __attribute__((always_inline)) uint32_t outline_cell(float dx, flo
     return outline_place(face, (uint32_t)i, (uint32_t)j);
 }
 
-/* The beam passes clear of the plane through the station and the edge: most do. The footprint is widest, as an angle,
- * where the edge is nearest. */
+/* The beam passes clear of the plane through the station and the edge: most do. The footprint is widest, as
+ * an angle, where the edge is nearest. */
 static inline int outline_is_clear(const struct beam *beam, const struct outline_entry *entry, const float d[3])
 {
     const float exit = 1.01f * (float)beam->exit_radius_m, slope = 1.01f * (float)beam->slope, range = entry->range_m;

@@ -19,9 +19,9 @@ static void put_pair(struct outline_prober *prober, uint32_t i, const double at[
             d[k] = at[k] + off * normal[k];
             length2 += d[k] * d[k];
         }
-        prober->dx[2 * i + side] = d[0] / sqrt(length2);
-        prober->dy[2 * i + side] = d[1] / sqrt(length2);
-        prober->dz[2 * i + side] = d[2] / sqrt(length2);
+        for (int k = 0; k < 3; k++)
+            d[k] /= sqrt(length2);
+        VEC3_SET(prober->dir, 2 * i + side, d);
     }
 }
 
@@ -52,7 +52,7 @@ uint32_t outline_probe(struct outline_prober *prober, const double p[3], const d
             at[k] = p[k] + e[k] * (i + 0.5) / n;
         put_pair(prober, i, at, normal, beside_m);
     }
-    prober->probe->cast(prober->probe->ctx, 2 * n, prober->dx, prober->dy, prober->dz, prober->range_m, prober->kind);
+    prober->probe->cast(prober->probe->ctx, 2 * n, &VEC3_IN(prober->dir, 0), prober->range_m, prober->kind);
     for (uint32_t i = 0; i < n; i++) {
         for (int k = 0; k < 3; k++)
             at[k] = p[k] + e[k] * (i + 0.5) / n;

@@ -1,9 +1,9 @@
 /* Which edges of a mesh are outlines, seen from a station.
  *
- * An edge and the station span a plane. With triangles on both sides of it, the surface goes on beyond the edge,
- * without a step in range; with triangles on one side only, it ends there, and where those on both sides are of
- * different kinds, one kind does. That needs neither normals nor an order of corners. Corners at the same place, bit by
- * bit, are one. */
+ * An edge and the station span a plane. With triangles on both sides of it, the surface goes on beyond the
+ * edge, without a step in range; with triangles on one side only, it ends there, and where those on both
+ * sides are of different kinds, one kind does. That needs neither normals nor an order of corners. Corners at
+ * the same place, bit by bit, are one. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -25,7 +25,7 @@ struct weld {
     struct slot *slot;
     uint8_t *sides; /* of a slot: 1 and 2; 4: of two kinds */
     const uint16_t *kind;
-    uint16_t *of; /* of a slot: kind of its first triangle; NULL: nobody asks */
+    uint16_t *of; /* of a slot: kind of its first triangle; NULL: not asked for */
     uint64_t mask;
 };
 
@@ -121,36 +121,35 @@ static void add_triangles(struct weld *w)
     }
 }
 
-static int collect(const struct weld *w, struct outline_edge **edge, uint32_t *n, uint64_t *n_edges, struct sh_err *err)
+static int collect(const struct weld *w, struct beam_outlines *o, struct sh_err *err)
 {
     uint64_t found = 0;
-    *n_edges = 0;
     for (uint64_t i = 0; i <= w->mask; i++) {
-        *n_edges += w->slot[i].low != NONE;
+        o->info.edges += w->slot[i].low != NONE;
         found += w->slot[i].low != NONE && w->sides[i] != 3;
     }
     if (found >= NONE) return sh_fail(err, SH_EINPUT, "beam: too many outlines");
-    *edge = malloc((size_t)(found + 1) * sizeof **edge);
-    if (*edge == NULL) return sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");
-    *n = 0;
+    o->edge = malloc((size_t)(found + 1) * sizeof *o->edge);
+    if (o->edge == NULL) return sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");
     for (uint64_t i = 0; i <= w->mask; i++) {
         if (w->slot[i].low == NONE || w->sides[i] == 3) continue;
         double a[3], b[3];
         from_station(w, w->slot[i].low, a);
         from_station(w, w->slot[i].high, b);
         for (int j = 0; j < 3; j++) {
-            (*edge)[*n].a[j] = (float)a[j];
-            (*edge)[*n].b[j] = (float)b[j];
+            o->edge[o->n_edges].a[j] = (float)a[j];
+            o->edge[o->n_edges].b[j] = (float)b[j];
         }
-        (*n)++;
+        o->n_edges++;
     }
     return SH_OK;
 }
 
-int outline_find(const struct scene *scene, const double station_m[3], const uint16_t *kind, struct outline_edge **edge,
-                 uint32_t *n, uint64_t *n_edges, struct sh_err *err)
+int outline_find(const struct beam_outlines_spec *spec, struct beam_outlines *o, struct sh_err *err)
 {
-    struct weld w = {.scene = scene, .station_m = station_m, .kind = kind};
+    const struct scene *scene = spec->scene;
+    const uint16_t *kind = spec->kind;
+    struct weld w = {.scene = scene, .station_m = spec->station_m, .kind = kind};
     uint64_t size = power_of_two(4 * (uint64_t)scene->n_triangles);
     w.mask = size - 1;
     w.slot = malloc(size * sizeof *w.slot);
@@ -162,7 +161,7 @@ int outline_find(const struct scene *scene, const double station_m[3], const uin
     if (rc == SH_OK) {
         memset(w.slot, 0xff, size * sizeof *w.slot);
         add_triangles(&w);
-        rc = collect(&w, edge, n, n_edges, err);
+        rc = collect(&w, o, err);
     }
     free(w.same);
     free(w.slot);

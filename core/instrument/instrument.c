@@ -23,43 +23,47 @@ int instrument_is_ideal(const struct instrument *k)
 }
 
 VEC_CLONES
-static void directions(const struct instrument *k, uint64_t pulse0, uint32_t n, const double *restrict mirror_turn,
-                       const double *restrict pan_turn, double *restrict sx, double *restrict sy, double *restrict sz)
+static void directions(const struct instrument *k, const struct instrument_turns *turns, const struct vec3_out *out)
 {
     const double st = sin(k->trunnion_rad), ct = cos(k->trunnion_rad), sc = sin(k->collimation_rad);
     const double cc = cos(k->collimation_rad);
     const double mirror_sigma = k->mirror_sigma_rad / VEC_TURN_RAD, pan_sigma = k->pan_sigma_rad / VEC_TURN_RAD;
     const uint64_t mirror_key = k->mirror_key, pan_key = k->pan_key;
-    for (uint32_t i = 0; i < n; i++) {
+    const struct instrument_turns t = *turns;
+    const struct vec3_out s = *out;
+    VEC_LOOP
+    for (uint32_t i = 0; i < t.n; i++) {
         double sm, cm, sp, cp;
-        vec_sincos_turn(mirror_turn[i] + mirror_sigma * rng_normal(mirror_key, pulse0 + i), &sm, &cm);
-        vec_sincos_turn(pan_turn[i] + pan_sigma * rng_normal(pan_key, pulse0 + i), &sp, &cp);
+        vec_sincos_turn(t.mirror[i] + mirror_sigma * rng_normal(mirror_key, t.pulse0 + i), &sm, &cm);
+        vec_sincos_turn(t.pan[i] + pan_sigma * rng_normal(pan_key, t.pulse0 + i), &sp, &cp);
         double x = sc * ct + cc * sm * st, y = cc * cm, z = cc * sm * ct - sc * st;
-        sx[i] = cp * x + sp * y;
-        sy[i] = cp * y - sp * x;
-        sz[i] = z;
+        s.x[i] = cp * x + sp * y;
+        s.y[i] = cp * y - sp * x;
+        s.z[i] = z;
     }
 }
 
 VEC_CLONES
-static void origins(double right_m, double ahead_m, uint32_t n, const double *restrict pan_turn, double *restrict ox,
-                    double *restrict oy, double *restrict oz)
+static void origins(const struct instrument *k, const struct instrument_turns *turns, const struct vec3_out *out)
 {
-    for (uint32_t i = 0; i < n; i++) {
+    const double right_m = k->mirror_offset_m, ahead_m = k->transit_offset_m;
+    const struct instrument_turns t = *turns;
+    const struct vec3_out o = *out;
+    VEC_LOOP
+    for (uint32_t i = 0; i < t.n; i++) {
         double sp, cp;
-        vec_sincos_turn(pan_turn[i], &sp, &cp);
-        ox[i] = cp * right_m + sp * ahead_m;
-        oy[i] = cp * ahead_m - sp * right_m;
-        oz[i] = 0.0;
+        vec_sincos_turn(t.pan[i], &sp, &cp);
+        o.x[i] = cp * right_m + sp * ahead_m;
+        o.y[i] = cp * ahead_m - sp * right_m;
+        o.z[i] = 0.0;
     }
 }
 
-void instrument_aim(const struct instrument *k, uint64_t pulse0, uint32_t n, const double *mirror_turn,
-                    const double *pan_turn, const struct instrument_beams *beams)
+void instrument_aim(const struct instrument *k, const struct instrument_turns *turns, const struct vec3_out *s,
+                    const struct vec3_out *o)
 {
-    directions(k, pulse0, n, mirror_turn, pan_turn, beams->sx, beams->sy, beams->sz);
-    if (beams->ox != NULL)
-        origins(k->mirror_offset_m, k->transit_offset_m, n, pan_turn, beams->ox, beams->oy, beams->oz);
+    directions(k, turns, s);
+    if (o->x != NULL) origins(k, turns, o);
 }
 
 VEC_CLONES
@@ -78,6 +82,13 @@ void instrument_read(const struct instrument *k, uint32_t n, double *mirror_turn
 {
     if (!reads_true(&k->mirror)) read_encoder(&k->mirror, n, mirror_turn);
     if (!reads_true(&k->pan)) read_encoder(&k->pan, n, pan_turn);
+}
+
+uint32_t instrument_encoder_count(double turn, double counts_per_turn)
+{
+    double within = turn - floor(turn);
+    double count = floor(within * counts_per_turn + 0.5);
+    return count >= counts_per_turn ? 0 : (uint32_t)(uint64_t)count;
 }
 
 VEC_CLONES

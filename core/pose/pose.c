@@ -2,6 +2,7 @@
 #include "core/pose.h"
 
 #include <math.h>
+#include <string.h>
 
 void pose_multiply(const double a[4], const double b[4], double out[4])
 {
@@ -108,6 +109,27 @@ void pose_mount(const struct pose *body, const struct pose *mount, struct pose *
     for (int i = 0; i < 3; i++)
         out->position_m[i] = body->position_m[i] + arm[i];
     pose_multiply(body->quat, mount->quat, out->quat);
+}
+
+void pose_attitude(double heading_rad, double pitch_rad, double roll_rad, double rotation[9])
+{
+    double sh = sin(heading_rad), ch = cos(heading_rad), sp = sin(pitch_rad), cp = cos(pitch_rad);
+    double sr = sin(roll_rad), cr = cos(roll_rad);
+    /* clang-format off */
+    const double r[9] = {
+        ch * cr + sh * sp * sr,  sh * cp, ch * sr - sh * sp * cr,
+        -sh * cr + ch * sp * sr, ch * cp, -sh * sr - ch * sp * cr,
+        -cp * sr,                sp,      cp * cr,
+    };
+    /* clang-format on */
+    memcpy(rotation, r, sizeof r);
+}
+
+void pose_heading(double heading_rad, double rotation[9])
+{
+    pose_attitude(heading_rad, 0.0, 0.0, rotation);
+    for (int i = 0; i < 9; i++)
+        rotation[i] += 0.0; /* no negative zeros */
 }
 
 size_t pose_find_knot(const struct pose_knot *knot, size_t n, int64_t t_ns)

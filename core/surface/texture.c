@@ -5,7 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Rows from the top; each texel as in the high bits of a label. Shared by labels of the same image and colour. */
+/* Rows from the top; each texel as in the high bits of a label. Shared by labels of the same image and
+ * colour. */
 struct surface_texture {
     uint32_t width, height, users;
     const struct scene_texture *from;

@@ -1,4 +1,4 @@
-/* Private to core/surface: images that tell the reflectance. */
+/* Private to core/surface: images that hold the reflectance. */
 #ifndef CORE_SURFACE_TEXTURE_H
 #define CORE_SURFACE_TEXTURE_H
 

@@ -274,8 +274,8 @@ static void end_line(struct worker *worker, const struct device_work *work, cons
                                   .n_cast = (uint32_t)(line->cast_before + cast_here),
                                   .t0_ns = line->begin_ns,
                                   .t1_ns = schedule_time_ns(seg, end),
-                                  .mirror_count = cast_encoder_count(mirror_turn, setup->mirror_counts),
-                                  .pan_count = cast_encoder_count(pan_turn, setup->pan_counts),
+                                  .mirror_count = instrument_encoder_count(mirror_turn, setup->mirror_counts),
+                                  .pan_count = instrument_encoder_count(pan_turn, setup->pan_counts),
                                   .status = partial               ? (uint32_t)LINE_PARTIAL
                                             : line->last_of_frame ? (uint32_t)LINE_LAST_OF_FRAME
                                                                   : 0U};

@@ -57,8 +57,9 @@ static int make_beam(const struct site *site, struct site_station *s, int adapti
     beam_rings(BEAM_FINE_RINGS, &beam->fine);
     if (!adaptive || s->outlines != NULL) return SH_OK;
     if (site->scene->n_triangles > MANY_TRIANGLES) sh_progress(report, "looking for outlines", -1.0);
-    int rc = cast_outlines(site->scene, s->bvh, s->at.position_m, &beam->beam, p->range_max_m, site->detect.kind,
-                           &s->outlines, err);
+    const struct beam_outlines_spec spec = {site->scene, s->at.position_m, &beam->beam, p->range_max_m,
+                                            site->detect.kind};
+    int rc = cast_outlines(&spec, s->bvh, &s->outlines, err);
     beam->outlines = s->outlines;
     return rc;
 }

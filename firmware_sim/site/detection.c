@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "core/angle.h"
+#include "core/light.h"
 #include "core/rng.h"
 
 static const char GHOST[] = "ghost of ";
@@ -140,7 +141,7 @@ int site_set_up_detect(struct site *site, const struct sh_report *report, struct
     struct site_detect *d = &site->detect;
     int rc = SH_OK;
     d->cast = (struct cast_detect){.max_echoes = cfg->profile.max_echoes,
-                                   .separation_m = 0.5 * DETECT_LIGHT_M_S * 1e-9 * cfg->profile.pulse_width_ns,
+                                   .separation_m = 0.5 * LIGHT_SPEED_M_S * 1e-9 * cfg->profile.pulse_width_ns,
                                    .ambiguity = cfg->head.ambiguity,
                                    .zones = cfg->head.mta_zones};
     if (cfg->signal.on || cfg->n_surfaces > 0) rc = set_up_surfaces(site, report, err);

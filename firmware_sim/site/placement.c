@@ -154,7 +154,7 @@ static int find(const struct config_station *s, const struct placement_anchor *a
     out->lat_deg = at.lat_deg;
     out->lon_deg = at.lon_deg;
     out->height_m = at.height_m;
-    cast_attitude(angle_rad(s->heading_deg), angle_rad(s->pitch_deg), angle_rad(s->roll_deg), attitude);
+    pose_attitude(angle_rad(s->heading_deg), angle_rad(s->pitch_deg), angle_rad(s->roll_deg), attitude);
     mat3_multiply(level, attitude, out->rotation);
     return SH_OK;
 }

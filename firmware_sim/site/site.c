@@ -54,7 +54,7 @@ void site_move(const struct site *site, double t_s, struct cast_setup *setup)
             t = fmod(t_s, mesh->cycle_s);
             if (t > 0.5 * mesh->cycle_s) t = mesh->cycle_s - t;
         }
-        cast_rotation(angle_rad(fmod(mesh->turn_deg_s * t, 360.0)), out->rotation);
+        pose_heading(angle_rad(fmod(mesh->turn_deg_s * t, 360.0)), out->rotation);
         out->bvh = m->bvh;
         out->radius_m = m->radius_m;
         memcpy(out->centre_m, m->centre_m, sizeof out->centre_m);

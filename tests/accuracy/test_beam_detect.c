@@ -133,13 +133,13 @@ static void angle_noise_moves_the_footprint(void **state)
         struct schedule_line line;
         const struct line_block *b = &l.rig.block;
         double mirror[16], pan[16], d[3][16];
-        const struct instrument_beams beams = {.sx = d[0], .sy = d[1], .sz = d[2]};
+        const struct vec3_out beams = {d[0], d[1], d[2]}, origins = {0};
         schedule_get_line(&l.rig.segment, number, &line);
         for (uint32_t p = 0; p < 16; p++) {
             mirror[p] = schedule_mirror_turn(&l.rig.segment, line.cast0 + p);
             pan[p] = schedule_pan_turn(&l.rig.segment, line.cast0 + p);
         }
-        instrument_aim(&k, line.cast0, 16, mirror, pan, &beams);
+        instrument_aim(&k, &(struct instrument_turns){line.cast0, 16, mirror, pan}, &beams, &origins);
         beam_rig_line(&l.rig, number);
         for (uint32_t p = 0, i = 0; p < ACROSS.pulses; p++) {
             struct edge e = at_edge(&l, d[0][p], d[1][p]);

@@ -45,10 +45,9 @@ static void outline_kinds(struct lit *l)
 {
     uint16_t kind[2];
     struct sh_err err;
+    const struct beam_outlines_spec spec = {l->rig.scene, STATION, &l->rig.beam.beam, l->rig.setup.range_max_m, kind};
     beam_outlines_free(l->rig.outlines);
-    if (surface_kinds(&l->table, kind, &err) != 0 ||
-        cast_outlines(l->rig.scene, l->rig.bvh, STATION, &l->rig.beam.beam, l->rig.setup.range_max_m, kind,
-                      &l->rig.outlines, &err) != 0)
+    if (surface_kinds(&l->table, kind, &err) != 0 || cast_outlines(&spec, l->rig.bvh, &l->rig.outlines, &err) != 0)
         fail_msg("%s", err.text);
     l->rig.beam.outlines = l->rig.outlines;
 }
@@ -115,7 +114,7 @@ static struct scene *mirror_and_two_walls(void)
 
 /* All light of a footprint that lies on surfaces comes back. Pulse 0 of line 30 goes along an axis of the scene, to the
  * digit: some of its sub-rays have a component of -1e-22 or so, which must not cost those that are packed with them
- * (core/cast/kernels.c). */
+ * (core/bvh/refine.c). */
 static void no_light_is_lost(void **state)
 {
     (void)state;

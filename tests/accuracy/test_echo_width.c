@@ -192,7 +192,7 @@ static void slanted_behind_glass_and_in_motion(void **state)
             struct cast_mover *m = &l.rig.setup.mover[0];
             if (bvh_create(wall, origin_m, 3000.0, 1, NULL, &body, &err) != 0) fail_msg("%s", err.text);
             *m = (struct cast_mover){.bvh = body, .centre_m = {0.0, range_m, 0.0}, .radius_m = 20.0};
-            cast_rotation(0.0, m->rotation);
+            pose_heading(0.0, m->rotation);
             l.rig.setup.n_movers = 1;
         }
         beam_rig_mode(&l.rig, moving ? BEAM_RINGS : BEAM_ADAPTIVE, 4);

@@ -12,6 +12,7 @@
 #include <cmocka.h>
 
 #include "core/cast.h"
+#include "tests/common/hits.h"
 #include "tests/common/generate.h"
 #include "core/rng.h"
 #include "tests/common/reference.h"
@@ -108,7 +109,7 @@ static void *run_job(void *argument)
         uint32_t n = j->end - at < BATCH ? (uint32_t)(j->end - at) : BATCH;
         for (uint32_t i = 0; i < n; i++)
             aim(j, at + i, i);
-        caster_hits(j->caster, j->bvh, j->station_m, 1e4, n, j->dx, j->dy, j->dz, j->range_m, j->triangle);
+        hits_from(j->caster, j->bvh, j->station_m, 1e4, n, j->dx, j->dy, j->dz, j->range_m, j->triangle);
         for (uint32_t i = 0; i < n; i++)
             judge(j, i);
     }

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "core/cast.h"
+#include "tests/common/hits.h"
 #include "tests/common/generate.h"
 #include "core/rng.h"
 #include "core/vecmath.h"
@@ -111,7 +112,7 @@ static void cast(struct chart *c, const struct method *m)
     const struct bench_rays *rays = &c->rays;
     if (m->kind == DECIDED) {
         bvh_set_packet(c->bvh, m->width);
-        caster_hits(c->caster, c->bvh, c->station_m, BENCH_RANGE_MAX_M, rays->n, rays->dx, rays->dy, rays->dz,
+        hits_from(c->caster, c->bvh, c->station_m, BENCH_RANGE_MAX_M, rays->n, rays->dx, rays->dy, rays->dz,
                     c->range_m, c->prim);
         return;
     }

@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "tests/common/hits.h"
 #include "tests/common/generate.h"
 #include "core/rng.h"
 #include "tests/bench/bench.h"
@@ -98,7 +99,7 @@ static void *job_main(void *arg)
         uint32_t n = job->n - first < BATCH ? (uint32_t)(job->n - first) : BATCH;
         for (uint32_t k = 0; k < n; k++)
             aim(job, first + k, b, k);
-        caster_hits(caster, job->bvh, job->mesh->station_m, BENCH_RANGE_MAX_M, n, b->dx, b->dy, b->dz, b->range_m,
+        hits_from(caster, job->bvh, job->mesh->station_m, BENCH_RANGE_MAX_M, n, b->dx, b->dy, b->dz, b->range_m,
                     b->prim);
         for (uint32_t k = 0; k < n; k++)
             counts[judge(job->mesh, b, k, b->range_m[k], b->prim[k], 1e-9)]++;

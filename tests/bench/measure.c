@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "drivers/protocol/native_encode.h"
+#include "tests/common/hits.h"
 #include "tests/bench/bench.h"
 #include "firmware_sim/base/clock.h"
 
@@ -99,7 +100,7 @@ static double timed_blocks(struct measure *m, int method)
         if (method != CAST)
             embree_alone_pass(e, m->out->embree_width, m->out->embree_feed, 0, BENCH_BLOCK);
         else
-            caster_hits(m->caster, c->bvh, m->setup.station_m, BENCH_RANGE_MAX_M, BENCH_BLOCK, b->dx, b->dy, b->dz,
+            hits_from(m->caster, c->bvh, m->setup.station_m, BENCH_RANGE_MAX_M, BENCH_BLOCK, b->dx, b->dy, b->dz,
                         m->range_m, m->prim);
         spent_s += bench_thread_s() - start_s;
     }

@@ -29,8 +29,9 @@ static void fill_line(struct bench_rays *rays, uint32_t l, double *mirror_turn, 
     schedule_get_line(&rays->segment, l, &line);
     schedule_get_run(&rays->segment, &line, line.cast0, BENCH_LINE_PULSES, &run);
     kernel_angles(&run, 0, run.n, mirror_turn, pan_turn);
-    kernel_directions(mirror_turn, pan_turn, levelled, run.n, rays->dx + at, rays->dy + at, rays->dz + at);
-    kernel_to_float(rays->dx + at, rays->dy + at, rays->dz + at, run.n, rays->fx + at, rays->fy + at, rays->fz + at);
+    const struct vec3_out d = {rays->dx + at, rays->dy + at, rays->dz + at};
+    kernel_directions(&(struct kernel_turns){run.n, mirror_turn, pan_turn}, levelled, &d);
+    bvh_to_float(&VEC3_IN(d, 0), run.n, rays->fx + at, rays->fy + at, rays->fz + at);
 }
 
 int bench_rays_create(uint32_t lines, struct bench_rays *out, struct sh_err *err)

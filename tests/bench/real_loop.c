@@ -171,7 +171,7 @@ int bench_loop(const struct bench_case *c, const struct bench_result *one, uint3
     memcpy(station->at.position_m, c->target->station_m, sizeof station->at.position_m);
     station->bvh = c->bvh;
     station->scale[0] = station->scale[1] = station->scale[2] = BENCH_SCALE_M;
-    cast_rotation(0.0, station->at.rotation);
+    pose_heading(0.0, station->at.rotation);
     int rc = bench_georef(c->target, &station->georef, err);
     if (rc == SH_OK) rc = embree_alone_rays(c->embree, c->rays->fx, c->rays->fy, c->rays->fz, c->rays->n, err);
     if (rc == SH_OK) rc = embree_alone_prepare(c->embree, one->embree_width, one->embree_feed, err);

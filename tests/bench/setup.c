@@ -35,7 +35,7 @@ void bench_setup(const struct bench_case *c, const struct georef *georef, struct
                                  .range_scale_m = BENCH_SCALE_M,
                                  .xyz_scale = {BENCH_SCALE_M, BENCH_SCALE_M, BENCH_SCALE_M}};
     memcpy(setup->station_m, c->target->station_m, sizeof setup->station_m);
-    cast_rotation(0.0, setup->rotation);
+    pose_heading(0.0, setup->rotation);
 }
 
 double bench_thread_s(void)

@@ -8,7 +8,7 @@
 
 struct bench_stages {
     struct caster *caster;
-    struct cast_profile profile;
+    struct bvh_profile profile;
 };
 
 /* Where a stage of the caster is told. */

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/cast/caster_private.h"
+#include "core/cast/kernels.h"
 
 struct met {
     double range_m;
@@ -80,8 +80,13 @@ static void cast_places(struct caster *c, const struct bvh *bvh, const struct be
         for (int k = 0; k < 3; k++)
             rays->d[k][i] /= sqrt(length);
     }
-    const struct origins from = {.px = rays->p[0], .py = rays->p[1], .pz = rays->p[2]};
-    caster_hits_from(c, bvh, &from, range_max_m, n, rays->d[0], rays->d[1], rays->d[2], rays->range_m, rays->triangle);
+    const struct bvh_rays cast = {.n = n,
+                                  .from.own = {rays->p[0], rays->p[1], rays->p[2]},
+                                  .dir = {rays->d[0], rays->d[1], rays->d[2]},
+                                  .range_max_m = range_max_m,
+                                  .range_m = rays->range_m,
+                                  .triangle = rays->triangle};
+    caster_hits(c, bvh, &cast);
 }
 
 void beam_ref_pulse(struct caster *c, const struct bvh *bvh, const struct beam *beam, const double station_m[3],
@@ -97,7 +102,7 @@ void beam_ref_pulse(struct caster *c, const struct bvh *bvh, const struct beam *
     known = 1;
     cast_places(c, bvh, beam, station_m, dir, range_max_m, N, place, &rays);
     for (int i = 0; i < N; i++)
-        if (!isnan(rays.range_m[i])) met[n++] = (struct met){rays.range_m[i], bvh->scene->label[rays.triangle[i]]};
+        if (!isnan(rays.range_m[i])) met[n++] = (struct met){rays.range_m[i], bvh_scene(bvh)->label[rays.triangle[i]]};
     double least = INFINITY, most = -INFINITY;
     for (uint32_t i = 0; i < n; i++) {
         least = fmin(least, met[i].range_m);
@@ -223,14 +228,15 @@ int beam_rig_open(struct beam_rig *rig, struct scene *scene, const double statio
                                      .range_scale_m = 1e-6,
                                      .xyz_scale = {1e-5, 1e-5, 1e-5}};
     memcpy(rig->setup.station_m, station_m, sizeof rig->setup.station_m);
-    cast_rotation(0.0, rig->setup.rotation);
+    pose_heading(0.0, rig->setup.rotation);
     int rc = bvh_create(scene, station_m, 0.01, 2, NULL, &rig->bvh, err);
     if (rc == SH_OK) rc = georef_create(&local, &rig->georef, err);
     if (rc == SH_OK) rc = caster_create(&rig->caster, err);
     if (rc == SH_OK) rc = line_block_alloc(&rig->block, view->pulses * LINE_MAX_ECHOES, err);
     if (rc == SH_OK)
-        rc = cast_outlines(scene, rig->bvh, station_m, &rig->beam.beam, rig->setup.range_max_m, NULL, &rig->outlines,
-                           err);
+        rc =
+            cast_outlines(&(struct beam_outlines_spec){scene, station_m, &rig->beam.beam, rig->setup.range_max_m, NULL},
+                          rig->bvh, &rig->outlines, err);
     rig->setup.bvh = rig->bvh;
     rig->setup.georef = rig->georef;
     rig->beam.outlines = rig->outlines;
@@ -272,6 +278,7 @@ void beam_rig_directions(struct beam_rig *rig, uint32_t l, double *dx, double *d
     double *turn = malloc(2 * n * sizeof *turn);
     schedule_get_run(&rig->segment, &line, line.cast0, n, &run);
     kernel_angles(&run, 0, n, turn, turn + n);
-    kernel_directions(turn, turn + n, rig->setup.rotation, n, dx, dy, dz);
+    kernel_directions(&(struct kernel_turns){n, turn, turn + n}, rig->setup.rotation,
+                      &(struct vec3_out){dx, dy, dz});
     free(turn);
 }

@@ -1,3 +1,4 @@
+#include "tests/common/hits.h"
 #include "tests/stability/rig.h"
 
 #include <math.h>
@@ -127,7 +128,7 @@ void rig_look(struct rig *rig)
 
 void rig_cast(struct rig *rig)
 {
-    caster_hits(rig->caster, rig->bvh, rig->station_m, 1e5, rig->n, rig->dx, rig->dy, rig->dz, rig->range_m,
+    hits_from(rig->caster, rig->bvh, rig->station_m, 1e5, rig->n, rig->dx, rig->dy, rig->dz, rig->range_m,
                 rig->triangle);
 }
 

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "tests/common/beam_reference.h"
+#include "tests/common/hits.h"
 #include "tests/stability/table.h"
 
 enum { NAIVE_RINGS = 3, NAIVE_ROOM = 64 };
@@ -36,7 +37,7 @@ static double binned_mean(const struct beam_rig *rig, const struct beam_pattern 
         }
         for (int k = 0; k < 3; k++)
             d[k] /= sqrt(length);
-        caster_hits(rig->caster, rig->bvh, p, rig->setup.range_max_m, 1, &d[0], &d[1], &d[2], &range_m[i], &triangle);
+        hits_from(rig->caster, rig->bvh, p, rig->setup.range_max_m, 1, &d[0], &d[1], &d[2], &range_m[i], &triangle);
         first = fmin(first, range_m[i]);
     }
     for (uint32_t i = 0; i < pattern->n; i++)

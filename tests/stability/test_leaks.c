@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "tests/common/hits.h"
 #include "tests/common/generate.h"
 #include "core/rng.h"
 #include "tests/stability/rig.h"
@@ -96,7 +97,7 @@ static void *run_job(void *argument)
         uint32_t n = j->end - at < BATCH ? (uint32_t)(j->end - at) : BATCH;
         for (uint32_t i = 0; i < n; i++)
             aim_ray(j, at + i, i);
-        caster_hits(j->caster, j->bvh, station_m, 1e5, n, j->dx, j->dy, j->dz, j->range_m, j->triangle);
+        hits_from(j->caster, j->bvh, station_m, 1e5, n, j->dx, j->dy, j->dz, j->range_m, j->triangle);
         j->leaks.ours += count_leaks(j, n, 0.0);
         if (at - j->first >= (j->end - j->first) / NAIVE_SHARE) continue;
         naive_hits(j->robust, 16, station_m, n, j->dx, j->dy, j->dz, j->range_m, j->triangle);

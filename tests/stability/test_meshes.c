@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/bvh/bvh_inside.h" /* the label that a triangle counts with */
+#include "tests/common/hits.h"
 #include "tests/stability/rig.h"
 
 #ifdef SH_SANITIZE
@@ -239,7 +240,7 @@ static void cast_cut(struct rig *rig, uint32_t cut)
 {
     for (uint32_t at = 0; at < rig->n; at += cut) {
         uint32_t n = rig->n - at < cut ? rig->n - at : cut;
-        caster_hits(rig->caster, rig->bvh, rig->station_m, 1e5, n, rig->dx + at, rig->dy + at, rig->dz + at,
+        hits_from(rig->caster, rig->bvh, rig->station_m, 1e5, n, rig->dx + at, rig->dy + at, rig->dz + at,
                     rig->range_m + at, rig->triangle + at);
     }
 }

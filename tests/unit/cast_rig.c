@@ -65,7 +65,7 @@ struct cast_rig *cast_rig_open(struct scene *scene, const double station_m[3])
                                      .range_scale_m = 1e-5,
                                      .xyz_scale = {1e-5, 1e-5, 1e-5}};
     memcpy(rig->setup.station_m, station_m, sizeof rig->setup.station_m);
-    cast_rotation(0.0, rig->setup.rotation);
+    pose_heading(0.0, rig->setup.rotation);
     rig->spec = (struct schedule_spec){.prr_uhz = 300000 * HZ,
                                        .lines_uhz = 100 * HZ,
                                        .pan_udeg_s = 18 * DEG,

@@ -1,4 +1,5 @@
 /* Casting: ranges against planes worked out in long double, independence of the cuts, limits and noise. */
+#include "tests/common/hits.h"
 #include "tests/unit/cast_rig.h"
 
 static const double LO[3] = {-2, -1.75, -1.5}, HI[3] = {2, 2.25, 1.25}, HERE[3] = {0.25, 0.125, 0};
@@ -44,7 +45,7 @@ static void ranges_in_a_room_are_exact_to_the_planes_tilt(void **state)
             dy[i] = d[1];
             dz[i] = d[2];
         }
-        caster_hits(rig->caster, rig->bvh, station, 1000.0, RAYS, dx, dy, dz, range, triangle);
+        hits_from(rig->caster, rig->bvh, station, 1000.0, RAYS, dx, dy, dz, range, triangle);
         for (int i = 0; i < RAYS; i++) {
             int wall = -1;
             const long double d[3] = {dx[i], dy[i], dz[i]};
@@ -96,7 +97,7 @@ static void ranges_to_a_tilted_plane_are_exact_to_the_planes_tilt(void **state)
             do
                 any_direction(&seed, d);
             while (d[0] * axis[0] + d[1] * axis[1] + d[2] * axis[2] < 0.05);
-            caster_hits(rig->caster, rig->bvh, origin, 4000.0, 1, &d[0], &d[1], &d[2], &range, &hit);
+            hits_from(rig->caster, rig->bvh, origin, 4000.0, 1, &d[0], &d[1], &d[2], &range, &hit);
             assert_true(hit < 2);
             /* the plane of that triangle's own vertices, which rounding has moved off the square's */
             const double *a = vertex[0], *b = vertex[triangle[hit][1]], *c = vertex[triangle[hit][2]];

@@ -25,7 +25,7 @@ static void assert_vector(const double got[3], double x, double y, double z)
 static void turned(double heading_deg, double pitch_deg, double roll_deg, const double p_socs[3], double p[3])
 {
     double r[9];
-    cast_attitude(RAD(heading_deg), RAD(pitch_deg), RAD(roll_deg), r);
+    pose_attitude(RAD(heading_deg), RAD(pitch_deg), RAD(roll_deg), r);
     mat3_apply(r, p_socs, p);
 }
 
@@ -69,10 +69,10 @@ static void attitude_is_the_product(void **state)
     double zx[9], want[9], got[9];
     mat3_multiply(about_z, about_x, zx);
     mat3_multiply(zx, about_y, want);
-    cast_attitude(h, p, r, got);
+    pose_attitude(h, p, r, got);
     for (int i = 0; i < 9; i++)
         assert_true(fabs(got[i] - want[i]) < 1e-15);
-    cast_rotation(h, got);
+    pose_heading(h, got);
     assert_memory_equal(got, about_z, sizeof got);
 }
 

@@ -1,5 +1,6 @@
 /* Casting: what the counts on the wire mean. Angles, senses of rotation, encoders, positions, and frames far
  * from the origin. */
+#include "tests/common/hits.h"
 #include "tests/unit/cast_rig.h"
 
 static const double LO[3] = {-20, -17.5, -15}, HI[3] = {20, 22.5, 12.5}, HERE[3] = {2.5, 1.25, 0};
@@ -17,7 +18,7 @@ static uint32_t fire(struct cast_rig *rig, int64_t mirror_udeg, int64_t pan_udeg
     rig->spec.line_stop_udeg = mirror_udeg + rig->spec.sweep_udeg;
     rig->spec.pan_start_udeg = rig->spec.pan_stop_udeg = pan_udeg;
     schedule_start(&rig->segment, &rig->spec);
-    cast_rotation(heading_rad, rig->setup.rotation);
+    pose_heading(heading_rad, rig->setup.rotation);
     schedule_get_line(&rig->segment, 0, &line);
     return cast_some(rig, &line, 0, 1);
 }
@@ -84,9 +85,9 @@ static void encoders_count_modulo_a_turn(void **state)
               {100.125, 1048576, 131072},
               {-40.0 / 360.0, 36000, 32000}};
     for (size_t i = 0; i < sizeof is / sizeof *is; i++)
-        if (cast_encoder_count(is[i].turn, is[i].counts) != is[i].count)
+        if (instrument_encoder_count(is[i].turn, is[i].counts) != is[i].count)
             fail_msg("%g turns of %g counts: %u", is[i].turn, is[i].counts,
-                     cast_encoder_count(is[i].turn, is[i].counts));
+                     instrument_encoder_count(is[i].turn, is[i].counts));
 }
 
 /* The same, of points: also with negative angles and beyond a turn. */
@@ -115,7 +116,7 @@ static void points_have_the_encoders_counts(void **state)
             if (llabs(rest - 90 * DEG) < 1000) continue;
             uint32_t got = axis ? rig->block.c[0] : rig->block.b[0];
             if (got != (uint32_t)count) fail_msg("%lld udeg of %lld counts: %u", (long long)udeg, (long long)n, got);
-            assert_int_equal(cast_encoder_count((double)udeg / 360e6, (double)n), count);
+            assert_int_equal(instrument_encoder_count((double)udeg / 360e6, (double)n), count);
         }
         if (rig->setup.mirror_counts == 7.0) assert_true(rig->block.b[0] < 7);
     }
@@ -216,7 +217,7 @@ static void geo_counts_give_the_position_back(void **state)
         rig->setup.georef = rig->georef;
         rig->setup.mirror_counts = rig->setup.pan_counts = c % 2 ? 0x1p32 : 10000;
         assert_int_equal(georef_scale(rig->georef, c % 2 ? 1e-6 : 1e-4, 100.0, rig->setup.xyz_scale, &err), 0);
-        cast_rotation(heading, rig->setup.rotation);
+        pose_heading(heading, rig->setup.rotation);
         for (uint64_t n = 0; n < 2000; n += 331) {
             uint32_t shots = cast_line(rig, n, &line);
             for (uint32_t i = 0; i < shots; i += 13)
@@ -244,7 +245,7 @@ static void hits(const double lo[3], const double hi[3], const double origin[3],
 {
     static uint32_t triangle[RAYS];
     struct cast_rig *rig = cast_rig_open(box_scene(lo, hi), origin);
-    caster_hits(rig->caster, rig->bvh, station, 1000.0, RAYS, ray[0], ray[1], ray[2], range, triangle);
+    hits_from(rig->caster, rig->bvh, station, 1000.0, RAYS, ray[0], ray[1], ray[2], range, triangle);
     cast_rig_close(rig);
 }
 
@@ -315,7 +316,7 @@ static void a_station_far_from_the_bvh_s_origin_is_as_exact(void **state)
     any_rays(3);
     if (bvh_create(scene, origin, 1000.0, 1, NULL, &bvh, &err) != 0 || caster_create(&caster, &err) != 0)
         fail_msg("%s", err.text);
-    caster_hits(caster, bvh, HERE, 1000.0, RAYS, ray[0], ray[1], ray[2], range, triangle);
+    hits_from(caster, bvh, HERE, 1000.0, RAYS, ray[0], ray[1], ray[2], range, triangle);
     for (int i = 0; i < RAYS; i++) {
         const long double d[3] = {ray[0][i], ray[1][i], ray[2][i]};
         int wall = -1;

@@ -16,8 +16,8 @@ struct shot {
 static struct shot shoot(const struct instrument *k, double mirror_turn, double pan_turn, uint64_t pulse)
 {
     struct shot shot = {.mirror = mirror_turn, .pan = pan_turn};
-    const struct instrument_beams beams = {&shot.s[0], &shot.s[1], &shot.s[2], &shot.o[0], &shot.o[1], &shot.o[2]};
-    instrument_aim(k, pulse, 1, &mirror_turn, &pan_turn, &beams);
+    const struct vec3_out s = {&shot.s[0], &shot.s[1], &shot.s[2]}, o = {&shot.o[0], &shot.o[1], &shot.o[2]};
+    instrument_aim(k, &(struct instrument_turns){pulse, 1, &mirror_turn, &pan_turn}, &s, &o);
     instrument_read(k, 1, &shot.mirror, &shot.pan);
     return shot;
 }
@@ -219,7 +219,7 @@ static void the_caster_sends_beams_where_they_go(void **state)
     struct pose_knot knot[2] = {{.t_ns = 0}, {.t_ns = 1000000000}};
     struct schedule_line line;
     rig->setup.detect = &detect;
-    cast_rotation(0.3, rig->setup.rotation);
+    pose_heading(0.3, rig->setup.rotation);
     for (int i = 0; i < 2; i++) {
         memcpy(knot[i].pose.position_m, station_m, sizeof station_m);
         pose_from_matrix(rig->setup.rotation, knot[i].pose.quat);

@@ -373,7 +373,7 @@ static void a_mirror_that_moves(void **state)
         fail_msg("%s", err.text);
     struct cast_mover *m = &o.rig->setup.mover[0];
     *m = (struct cast_mover){.bvh = bvh, .centre_m = {0, 2, 0}, .radius_m = 1.5};
-    cast_rotation(atan(1.0), m->rotation); /* clockwise: the mirror's plane is then y - 3 = -x */
+    pose_heading(atan(1.0), m->rotation); /* clockwise: the mirror's plane is then y - 3 = -x */
     for (int i = 0; i < 3; i++)
         m->shift_m[i] = centre[i] - m->rotation[3 * i + 1] * 2.0 + (i == 1);
     o.rig->setup.n_movers = 1;

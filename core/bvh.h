@@ -1,0 +1,134 @@
+/* The BVH: what rays meet first in a scene, exactly.
+ *
+ * In: a scene (vertices in double, prcs, metres), rays as points and unit directions in prcs. Out: for each
+ * ray the range (m) to what it meets first, the triangle, and its label.
+ *
+ * Embree proposes a triangle from float rays, in packets of the machine's native width. The range comes from
+ * the triangle's plane in double, kept beside the BVH. Where a ray passes so near to a triangle's border that
+ * float can't be trusted, the triangle is chosen again in double. How that is proven: core/bvh/bvh_inside.h.
+ *
+ * The BVH is built in a local frame, prcs minus origin_m, where float is safe. It is constant after it is
+ * made, and may be used from any thread; each thread has working memory of its own. */
+#ifndef CORE_BVH_H
+#define CORE_BVH_H
+
+#include <stdint.h>
+
+#include "core/err.h"
+#include "core/scene.h"
+#include "core/vec3.h"
+
+struct bvh;
+
+struct bvh_info {
+    uint32_t packet; /* rays per Embree call: 16, 8 or 4 */
+    double build_s;
+    uint64_t bytes; /* BVH and planes */
+};
+
+/* The scene must outlive the BVH. Rays may begin up to station_reach_m from origin_m; the smaller it is, the
+ * less has to be decided again. Built with `threads` threads (0: all). */
+int bvh_create(const struct scene *scene, const double origin_m[3], double station_reach_m, unsigned threads,
+               const struct sh_report *report, struct bvh **out, struct sh_err *err);
+void bvh_free(struct bvh *bvh);
+
+/* Orders surfaces in double where they overlap, cross, or lie one after the other within float's resolution.
+ * Their labels then no longer depend on how rays are packed, and the range is that of the nearer one. Once,
+ * before casting. Costs time here (about 6 us per triangle), and in casting about 20 to 50 ns for each
+ * triangle that lies so near to the one that is hit: nothing in a plain scene, much in a building model whose
+ * walls overlap. Without it the error of such a hit is at most the distance between the surfaces. */
+int bvh_order_exactly(struct bvh *bvh, struct sh_err *err);
+/* Rays per Embree call: 1, 4, 8 or 16; for measuring and tests. Another width than the native one may find
+ * another triangle where a ray passes through an edge; ranges agree. */
+void bvh_set_packet(struct bvh *bvh, uint32_t rays);
+void bvh_get_info(const struct bvh *bvh, struct bvh_info *info);
+void bvh_origin(const struct bvh *bvh, double origin_m[3]);
+const struct scene *bvh_scene(const struct bvh *bvh);
+
+/* The plane of a triangle in the local frame: points p of it have n . p = d. n is e1 x e2, twice the area
+ * long. */
+struct bvh_plane {
+    double n[3], d;
+} __attribute__((aligned(32))); /* half a cache line */
+const struct bvh_plane *bvh_plane(const struct bvh *bvh, uint32_t triangle);
+
+enum {
+    BVH_CHUNK = 1024, /* rays that are cast together */
+    BVH_NO_TRIANGLE = 0xffffffff,
+    BVH_NO_LABEL = 0xffff,
+};
+
+/* Where rays begin: all at one point (own.x NULL), or each at its own; prcs. Within station_reach_m of
+ * origin_m. */
+struct bvh_origins {
+    double at_m[3];
+    struct vec3_in own;
+};
+
+static inline void bvh_origin_of(const struct bvh_origins *from, uint32_t i, double origin_m[3])
+{
+    for (int k = 0; k < 3; k++)
+        origin_m[k] = from->own.x == NULL ? from->at_m[k]
+                                          : (k == 0   ? from->own.x
+                                             : k == 1 ? from->own.y
+                                                      : from->own.z)[i];
+}
+
+struct bvh_rays {
+    uint32_t n; /* up to BVH_CHUNK where each begins at its own point */
+    struct bvh_origins from;
+    struct vec3_in dir;    /* unit vectors, prcs */
+    double range_max_m;    /* hits beyond it may or may not be reported */
+    const uint8_t *begins; /* 1: a packet begins with this ray, whether the last one is full or not; NULL: none does */
+    int scattered;         /* neighbours have nothing in common: one by one */
+    /* out: */
+    double *range_m;    /* along the ray; NaN: it meets nothing */
+    uint32_t *triangle; /* of the scene; BVH_NO_TRIANGLE */
+    uint32_t *label;    /* BVH_NO_LABEL; NULL: not asked for */
+    float *steep;       /* 1 / cos^2 of the incidence, of rays from one point; NULL: not asked for */
+};
+
+/* How often the exact stage had to look twice. */
+struct bvh_counters {
+    uint64_t near_border; /* proposals near a border, looked at in double */
+    uint64_t decided;     /* of these, not clearly inside the proposed triangle: all triangles around were asked */
+    uint64_t went_on;     /* of these, nothing there after all: the ray went on */
+    uint64_t undecided;   /* nearer to an edge than double precision resolves: counted as hit */
+};
+
+/* Cost by stage, for measuring: `now` counts in any unit and is read between the stages of each chunk. The
+ * stages of the BVH are the first; more follow in core/cast.h. */
+enum bvh_stage { BVH_STAGE_PREPARE, BVH_STAGE_EMBREE, BVH_STAGE_REFINE, BVH_STAGE_DECIDE, BVH_STAGES };
+struct bvh_profile {
+    uint64_t (*now)(void);
+    uint64_t last, spent[2 * BVH_STAGES];
+};
+/* The time since the stage before belongs to this one. */
+static inline void bvh_stage_ends(struct bvh_profile *profile, int stage)
+{
+    if (profile == NULL) return;
+    uint64_t now = profile->now();
+    profile->spent[stage] += now - profile->last;
+    profile->last = now;
+}
+
+/* Working memory of one thread. */
+struct bvh_work;
+int bvh_work_create(struct bvh_work **out, struct sh_err *err);
+void bvh_work_free(struct bvh_work *work);
+void bvh_work_set_profile(struct bvh_work *work, struct bvh_profile *profile); /* NULL: none */
+const struct bvh_counters *bvh_work_counters(const struct bvh_work *work);
+/* Directions of the last chunk, as Embree gets them. */
+struct vec3_floats bvh_work_directions(const struct bvh_work *work);
+
+/* Exact hits. Range error: see tests/accuracy. Allocates nothing. */
+void bvh_hits(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays);
+
+/* Cosine of the incidence on the triangles that were hit, 0..1; NaN where there is none. */
+void bvh_cosines(const struct bvh *bvh, const uint32_t *triangle, const struct vec3_in *dir, uint32_t n,
+                 double *cosine);
+
+/* Directions as Embree gets them. */
+void bvh_to_float(const struct vec3_in *dir, uint32_t n, float *x, float *y, float *z);
+
+#endif

@@ -1,0 +1,126 @@
+/* What double precision makes of Embree's proposals: ranges from the planes, and which proposals are in
+ * doubt. Loops over arrays that compilers turn into vectors. */
+#include <math.h>
+
+#include "core/bvh/bvh_inside.h"
+#include "core/vecmath.h"
+
+/* Embree sorts a packet's directions by their signs, but takes what is smaller than 1e-18 for positive when
+ * it divides by it: with a component of -1e-22, all rays of that packet with its signs would be lost. So
+ * there are none. */
+VEC_INLINE float direction_component(double d)
+{
+    float f = (float)d;
+    return f < 0.0f && f > -1e-15f ? 0.0f : f;
+}
+
+VEC_CLONES
+void bvh_to_float(const struct vec3_in *dir, uint32_t n, float *restrict x, float *restrict y, float *restrict z)
+{
+    const struct vec3_in d = *dir;
+    VEC_LOOP
+    for (uint32_t i = 0; i < n; i++) {
+        x[i] = direction_component(d.x[i]);
+        y[i] = direction_component(d.y[i]);
+        z[i] = direction_component(d.z[i]);
+    }
+}
+
+VEC_INLINE uint32_t label_of(double ny, double nz)
+{
+    uint64_t low, high;
+    memcpy(&low, &ny, sizeof low);
+    memcpy(&high, &nz, sizeof high);
+    return (uint32_t)((low & ((1U << BVH_SPARE_BITS) - 1)) | (high & 15) << BVH_SPARE_BITS);
+}
+
+/* Whether a hit is so near to its triangle's border that the proposal is in doubt, or the triangle has
+ * rivals. slope: what the guard counts in, bvh_inside.h. */
+VEC_INLINE uint32_t in_doubt(double nx, double nz, double slope, float u, float v)
+{
+    float w = 1.0f - u - v;
+    float least = u < v ? u : v;
+    least = w < least ? w : least;
+    uint64_t bits, high;
+    double guard;
+    memcpy(&bits, &nx, sizeof bits);
+    bits = ((bits & ((1U << BVH_SPARE_BITS) - 1)) + BVH_GUARD_BASE) << BVH_GUARD_SHIFT;
+    memcpy(&guard, &bits, sizeof guard);
+    memcpy(&high, &nz, sizeof high);
+    return ((double)least * slope < guard) | (uint32_t)((high & BVH_RIVAL_BIT) != 0);
+}
+
+enum how { FROM_ONE, FROM_ONE_STEEP, FROM_OWN };
+
+/* A miss has the highest number there is and reads the record after the last triangle, which is all NaN. */
+VEC_INLINE uint32_t refine(const struct bvh_proposals *p, enum how how)
+{
+    const double *tri = (const double *)p->bvh->triangle, *dx = p->dir.x, *dy = p->dir.y, *dz = p->dir.z;
+    const double *px = p->own.x, *py = p->own.y, *pz = p->own.z, ox = p->o[0], oy = p->o[1], oz = p->o[2];
+    const uint32_t n_triangles = p->bvh->scene->n_triangles, n = p->n, *prim = p->prim;
+    const float *u = p->u, *v = p->v;
+    const int slanted = how != FROM_ONE || p->bvh->station_reach_m > 0.0;
+    double *range_m = p->range_m;
+    float *steep = p->steep;
+    uint32_t *label = p->label, *doubt = p->doubt, doubts = 0;
+    VEC_LOOP
+    for (uint32_t i = 0; i < n; i++) {
+        int64_t at = (int64_t)(prim[i] < n_triangles ? prim[i] : n_triangles) * 4;
+        double nx = tri[at], ny = tri[at + 1], nz = tri[at + 2];
+        double along = nx * dx[i] + ny * dy[i] + nz * dz[i];
+        double off = how == FROM_OWN ? nx * px[i] + ny * py[i] + nz * pz[i] : nx * ox + ny * oy + nz * oz;
+        range_m[i] = (tri[at + 3] - off) / along;
+        if (how == FROM_ONE_STEEP) steep[i] = (float)(nx * nx + ny * ny + nz * nz) / (float)(along * along);
+        label[i] = label_of(ny, nz);
+        doubt[i] = in_doubt(nx, nz, slanted ? fabs(along) : 1.0, u[i], v[i]) & (prim[i] < n_triangles);
+        doubts += doubt[i];
+    }
+    return doubts;
+}
+
+/* One function a case, so that the common one has no branch in its loop. */
+VEC_CLONES
+static uint32_t refine_from_one(const struct bvh_proposals *p)
+{
+    return refine(p, FROM_ONE);
+}
+
+VEC_CLONES
+static uint32_t refine_steep(const struct bvh_proposals *p)
+{
+    return refine(p, FROM_ONE_STEEP);
+}
+
+VEC_CLONES
+static uint32_t refine_from_own(const struct bvh_proposals *p)
+{
+    return refine(p, FROM_OWN);
+}
+
+uint32_t bvh_refine(const struct bvh_proposals *p)
+{
+    return p->own.x != NULL ? refine_from_own(p) : p->steep != NULL ? refine_steep(p) : refine_from_one(p);
+}
+
+VEC_CLONES
+void bvh_cosines(const struct bvh *bvh, const uint32_t *restrict triangle, const struct vec3_in *dir, uint32_t n,
+                 double *restrict cosine)
+{
+    const double *tri = (const double *)bvh->triangle, *dx = dir->x, *dy = dir->y, *dz = dir->z;
+    const uint32_t n_triangles = bvh->scene->n_triangles;
+    VEC_LOOP
+    for (uint32_t i = 0; i < n; i++) {
+        int64_t at = (int64_t)(triangle[i] < n_triangles ? triangle[i] : n_triangles) * 4;
+        double nx = tri[at], ny = tri[at + 1], nz = tri[at + 2];
+        double c = fabs(nx * dx[i] + ny * dy[i] + nz * dz[i]) / sqrt(nx * nx + ny * ny + nz * nz);
+        cosine[i] = c > 1.0 ? 1.0 : c;
+    }
+}
+
+float bvh_steep(const struct bvh *bvh, uint32_t prim, const double dir[3])
+{
+    const struct vec3_in one = {&dir[0], &dir[1], &dir[2]};
+    double cosine;
+    bvh_cosines(bvh, &prim, &one, 1, &cosine);
+    return prim < bvh->scene->n_triangles ? (float)(1.0 / (cosine * cosine)) : NAN;
+}

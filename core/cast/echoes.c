@@ -1,0 +1,267 @@
+/* What a chunk's pulses met -> echoes as the head reports them: which are seen, how they merge, which a pulse
+ * sends, and their noise. One list, for single rays, footprints, and what glass and mirrors show. */
+#include <math.h>
+#include <string.h>
+
+#include "core/cast/caster_private.h"
+#include "core/rng.h"
+
+uint32_t echoes_further(struct echo_list *l, uint32_t pulse, uint32_t n)
+{
+    uint32_t first = l->n;
+    l->further[l->n_further++] = (struct further){pulse, first, n};
+    l->n += n;
+    return first;
+}
+
+/* What the pulses of single rays met on their ways goes into the list. */
+static void list_paths(struct caster *c, const struct chunk *k)
+{
+    const struct path_rays *p = &c->paths;
+    struct echo_list *l = &c->list;
+    for (uint32_t i = 0; i < k->n; i++) {
+        uint32_t n = 0;
+        for (uint32_t j = p->first[i]; j != CAST_NO_PATH; j = p->found[j].next)
+            n++;
+        if (n == 0) continue;
+        uint32_t at = echoes_further(l, i, n), number = 1;
+        for (uint32_t j = p->first[i]; j != CAST_NO_PATH; j = p->found[j].next, at++) {
+            const struct path_hit *hit = &p->found[j];
+            l->range_m[at] = hit->range_m;
+            l->cosine[at] = hit->cosine;
+            l->energy[at] = hit->energy;
+            l->label[at] = hit->label;
+            l->ghost[at] = hit->ghost;
+            l->number[at] = (uint8_t)number++;
+        }
+    }
+}
+
+/* Index of a pulse's echo j: its first one is in the pulse's place. */
+static uint32_t place_of(const struct further *f, uint32_t j)
+{
+    return j == 0 ? f->pulse : f->at + j - 1;
+}
+
+static int comes_back(const struct echo_list *l, uint32_t i)
+{
+    return l->rho[i] > 0.0 && !isnan(l->range_m[i]);
+}
+
+/* Echo `at` of the list becomes what several returns are together. */
+static void take_echo(struct echo_list *l, uint32_t at, uint8_t number, const struct beam_echo *echo)
+{
+    l->range_m[at] = echo->range_m;
+    l->rho[at] = echo->back;
+    l->label[at] = echo->label;
+    l->width_m[at] = echo->width_m;
+    l->number[at] = number;
+}
+
+/* Returns of a pulse that are nearer to each other than the range resolution make one echo. One that nothing
+ * comes back from stays apart, and keeps its number. */
+static uint32_t merge_pulse(struct echo_list *l, const struct beam_merging *how, const struct further *f)
+{
+    const uint32_t n = f->n + 1;
+    struct beam_return r[LINE_MAX_ECHOES];
+    struct beam_echo echo[LINE_MAX_ECHOES + 1];
+    uint64_t left_out = 0;
+    uint32_t to = 0;
+    for (uint32_t j = 0; j < n; j++) {
+        uint32_t i = place_of(f, j);
+        r[j] = (struct beam_return){
+            .range_m = l->range_m[i], .energy = l->rho[i], .back = l->rho[i], .triangle = j, .label = l->label[i]};
+    }
+    for (uint32_t j = 0, end; j < n; j = end) {
+        uint32_t found = 1;
+        for (end = j; end < n && comes_back(l, place_of(f, end));)
+            end++;
+        if (end > j) {
+            found = beam_merge(how, r + j, end - j, echo, &left_out);
+        } else {
+            end = j + 1;
+            echo[0] = (struct beam_echo){
+                .range_m = r[j].range_m, .back = r[j].back, .width_m = (float)how->pulse_m, .label = r[j].label};
+        }
+        for (uint32_t e = 0; e < found; e++, to++)
+            take_echo(l, place_of(f, to), (uint8_t)to, &echo[e]);
+    }
+    return to - 1;
+}
+
+/* How much comes back of single rays' returns, and which of them merge. */
+static void weigh_returns(struct caster *c, const struct chunk *k)
+{
+    const struct cast_detect *d = k->s->detect;
+    struct echo_list *l = &c->list;
+    const struct beam_merging how = {.gap_m = d->separation_m, .pulse_m = k->s->pulse_m, .most = LINE_MAX_ECHOES};
+    for (uint32_t i = 0; i < k->n; i++)
+        l->energy[i] = 1.0;
+    if (d->surfaces == NULL) {
+        memcpy(l->rho, l->energy, k->n * sizeof *l->rho);
+        return;
+    }
+    surface_return(d->surfaces, l->n, l->label, l->cosine, l->rho);
+    for (uint32_t i = 0; i < l->n; i++)
+        l->rho[i] *= l->energy[i];
+    if (d->depth == 0) return;
+    for (uint32_t i = 0; i < l->n; i++)
+        if (caster_is_bare(k->s, l->label[i], l->rho[i])) l->range_m[i] = (double)NAN;
+    for (uint32_t i = k->n; i < l->n; i++)
+        l->label[i] += l->ghost[i] ? d->ghost_label : 0;
+    for (uint32_t g = 0; g < l->n_further && d->separation_m > 0.0; g++)
+        l->further[g].n = merge_pulse(l, &how, &l->further[g]);
+}
+
+static uint32_t count_echoes(const struct echo_list *l)
+{
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < l->n; i++)
+        n += l->range_m[i] == l->range_m[i];
+    return n;
+}
+
+/* Ranges of what is not detected become NaN. */
+static void detect(struct caster *c, const struct chunk *k)
+{
+    const struct cast_detect *d = k->s->detect;
+    const struct schedule_run *run = k->run;
+    struct echo_list *l = &c->list;
+    const struct detect_echoes echoes = {.n = l->n,
+                                         .key = l->key,
+                                         .range_m = l->range_m,
+                                         .rho = l->rho,
+                                         .amplitude = l->amplitude,
+                                         .refl_cdb = l->refl_cdb};
+    uint32_t before = count_echoes(l);
+    if (d->signal != NULL) {
+        detect_by_signal(d->signal, &echoes);
+        if (k->attributes) detect_amplitudes(d->signal, &echoes, l->amplitude_cdb);
+    }
+    if (d->ambiguity != DETECT_AMBIGUITY_NONE)
+        detect_zones(d->ambiguity, 1e-9 * ((double)run->ns_quot + (double)run->ns_rem / (double)run->ns_den), d->zones,
+                     k->s->range_min_m, l->n, l->range_m);
+    c->counters.faint += before - count_echoes(l);
+}
+
+/* Keyed by pulse and echo, whether others are sent or not. */
+static void add_noise(struct caster *c, const struct cast_setup *s)
+{
+    const struct cast_detect *d = s->detect;
+    struct echo_list *l = &c->list;
+    const struct detect_echoes echoes = {.n = l->n, .key = l->key, .range_m = l->range_m, .amplitude = l->amplitude};
+    if (d != NULL && d->noise_by_signal)
+        detect_range_noise(d->signal, &echoes);
+    else if (s->noise_on)
+        detect_fixed_noise(s->range_sigma_m, 1e-6 * s->range_sigma_ppm, s->noise_key, l->n, l->key, l->range_m);
+    if (d != NULL && d->instrument != NULL) instrument_range(d->instrument, l->n, l->range_m);
+}
+
+static void make_keys(struct echo_list *l, const struct chunk *k)
+{
+    kernel_keys(k->pulse0, l->number, k->n, l->key);
+    for (uint32_t g = 0; g < l->n_further; g++) {
+        const struct further *f = &l->further[g];
+        for (uint32_t i = f->at; i < f->at + f->n; i++)
+            l->key[i] = rng_echo(k->pulse0 + f->pulse, l->number[i]);
+    }
+}
+
+/* An echo of the pulse at hand. */
+struct heard {
+    double range_m, strength;
+    uint64_t key;
+    uint32_t label;
+    int16_t refl_cdb, amplitude_cdb;
+    float width_m;
+};
+
+static uint32_t hear(const struct echo_list *l, const double *strength, const struct further *f, struct heard *h)
+{
+    uint32_t n = 0;
+    for (uint32_t j = 0; j <= f->n; j++) {
+        uint32_t i = place_of(f, j);
+        if (!isnan(l->range_m[i]))
+            h[n++] = (struct heard){l->range_m[i],  strength[i],         l->key[i],    l->label[i],
+                                    l->refl_cdb[i], l->amplitude_cdb[i], l->width_m[i]};
+    }
+    return n;
+}
+
+/* By range, as it is sent: folding may have changed the order. */
+static void sort_heard(struct heard *h, uint32_t n)
+{
+    for (uint32_t i = 1; i < n; i++)
+        for (uint32_t k = i; k > 0 && h[k].range_m < h[k - 1].range_m; k--) {
+            struct heard swap = h[k];
+            h[k] = h[k - 1];
+            h[k - 1] = swap;
+        }
+}
+
+static uint32_t drop_weakest(struct heard *h, uint32_t n)
+{
+    uint32_t weakest = 0;
+    for (uint32_t i = 1; i < n; i++)
+        if (h[i].strength < h[weakest].strength) weakest = i;
+    memmove(h + weakest, h + weakest + 1, (n - weakest - 1) * sizeof *h);
+    return n - 1;
+}
+
+/* The echo that is asked for becomes the only one. */
+static uint32_t choose(struct heard *h, uint32_t n, enum beam_select select)
+{
+    uint32_t best = select == BEAM_LAST ? n - 1 : 0;
+    if (select == BEAM_ALL || n < 2) return n;
+    for (uint32_t i = 1; i < n && select == BEAM_STRONGEST; i++)
+        if (h[i].strength > h[best].strength) best = i;
+    h[0] = h[best];
+    return 1;
+}
+
+/* Of each pulse with several echoes only those that it sends stay in the list. */
+static void choose_echoes(struct caster *c, const struct chunk *k)
+{
+    const struct cast_setup *s = k->s;
+    struct echo_list *l = &c->list;
+    const double *strength = s->detect != NULL && s->detect->signal != NULL ? l->amplitude : l->rho;
+    const uint32_t most = s->detect != NULL ? s->detect->max_echoes : s->beam->max_echoes;
+    uint32_t end = k->n;
+    for (uint32_t g = 0; g < l->n_further; g++) {
+        struct heard h[LINE_MAX_ECHOES];
+        struct further *f = &l->further[g];
+        uint32_t n = hear(l, strength, f, h);
+        for (; n > most && n > 1; c->counters.crowded++)
+            n = drop_weakest(h, n);
+        if (s->detect != NULL && s->detect->ambiguity == DETECT_FOLDED) sort_heard(h, n);
+        n = choose(h, n, s->echoes);
+        *f = (struct further){f->pulse, end, n > 1 ? n - 1 : 0};
+        end += f->n;
+        if (n == 0) l->range_m[f->pulse] = (double)NAN;
+        for (uint32_t j = 0; j < n; j++) {
+            uint32_t i = place_of(f, j);
+            l->range_m[i] = h[j].range_m;
+            l->label[i] = h[j].label;
+            l->key[i] = h[j].key;
+            l->refl_cdb[i] = h[j].refl_cdb;
+            l->amplitude_cdb[i] = h[j].amplitude_cdb;
+            l->width_m[i] = h[j].width_m;
+        }
+    }
+    l->n = end;
+}
+
+void caster_echoes(struct caster *c, const struct chunk *k)
+{
+    const struct cast_setup *s = k->s;
+    struct echo_list *l = &c->list;
+    if (s->beam == NULL && s->detect != NULL && s->detect->depth > 0) list_paths(c, k);
+    kernel_limit(l->range_m, s->range_min_m, s->range_max_m, l->n);
+    if (s->beam == NULL && s->detect != NULL) weigh_returns(c, k);
+    if (s->detect != NULL || s->noise_on) make_keys(l, k);
+    if (s->detect != NULL) detect(c, k);
+    bvh_stage_ends(c->profile, CAST_DETECT);
+    add_noise(c, s);
+    bvh_stage_ends(c->profile, CAST_NOISE);
+    if (l->n_further > 0) choose_echoes(c, k);
+}

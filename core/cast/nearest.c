@@ -1,0 +1,80 @@
+/* What the rays of a chunk meet first: the scene that stands still, and the bodies that move in it. */
+#include <math.h>
+#include <string.h>
+
+#include "core/cast/caster_private.h"
+
+/* How far the origins lie from the first of them. */
+static double spread_m(const struct vec3_in *p, uint32_t n)
+{
+    double most2 = 0.0;
+    for (uint32_t i = 1; i < n; i++) {
+        double x = p->x[i] - p->x[0], y = p->y[i] - p->y[0], z = p->z[i] - p->z[0];
+        most2 = fmax(most2, x * x + y * y + z * z);
+    }
+    return sqrt(most2);
+}
+
+/* Of the body's hits what is nearer. */
+static void keep_nearer(struct caster *c, const struct cast_mover *m, uint8_t body, const struct met *met)
+{
+    const struct bvh_rays *rays = &met->rays;
+    for (uint32_t i = 0; i < rays->n; i++) {
+        const double range_m = c->mover_range_m[i];
+        if (!(range_m < rays->range_m[i]) && !(isnan(rays->range_m[i]) && !isnan(range_m))) continue;
+        rays->range_m[i] = range_m;
+        rays->label[i] = c->mover_label[i];
+        rays->triangle[i] = c->mover_hit[i];
+        if (met->body == NULL) continue;
+        met->body[i] = body;
+        bvh_cosines(m->bvh, c->mover_hit + i, &VEC3_IN(c->mover_d, i), 1, met->cosine + i);
+    }
+}
+
+/* A moving body, cast in its own frame: what it hides gives way. */
+static void cast_mover(struct caster *c, const struct cast_setup *s, uint32_t which, const struct met *met)
+{
+    const struct cast_mover *m = &s->mover[which];
+    const struct bvh_origins *from = &met->rays.from;
+    const int own = from->own.x != NULL;
+    const double at[3] = {own ? from->own.x[0] : from->at_m[0], own ? from->own.y[0] : from->at_m[1],
+                          own ? from->own.z[0] : from->at_m[2]};
+    const double back_m[3] = {-m->shift_m[0], -m->shift_m[1], -m->shift_m[2]};
+    const uint32_t n = met->rays.n;
+    struct bvh_rays rays = met->rays;
+    double v[3], w[3];
+    for (int i = 0; i < 3; i++) {
+        const double *row = m->rotation + 3 * i;
+        v[i] = row[0] * m->centre_m[0] + row[1] * m->centre_m[1] + row[2] * m->centre_m[2] + m->shift_m[i] - at[i];
+        w[i] = at[i] - m->shift_m[i];
+    }
+    double radius_m = m->radius_m + (own ? spread_m(&from->own, n) : 0.0);
+    if (!kernel_meets_sphere(&met->rays.dir, n, v, radius_m)) return;
+    for (int i = 0; i < 3; i++)
+        rays.from.at_m[i] = m->rotation[i] * w[0] + m->rotation[3 + i] * w[1] + m->rotation[6 + i] * w[2];
+    if (own) {
+        kernel_shift(&from->own, back_m, n, &VEC3_OUT(c->mover_p, 0));
+        kernel_turn_back(&VEC3_IN(c->mover_p, 0), m->rotation, n, &VEC3_OUT(c->mover_p, 0));
+        rays.from.own = VEC3_IN(c->mover_p, 0);
+    }
+    kernel_turn_back(&met->rays.dir, m->rotation, n, &VEC3_OUT(c->mover_d, 0));
+    rays.dir = VEC3_IN(c->mover_d, 0);
+    rays.range_m = c->mover_range_m;
+    rays.triangle = c->mover_hit;
+    rays.label = c->mover_label;
+    bvh_hits(c->bvh, m->bvh, &rays);
+    keep_nearer(c, m, (uint8_t)(which + 1), met);
+}
+
+void caster_nearest(struct caster *c, const struct cast_setup *s, const struct met *met)
+{
+    const struct bvh_rays *rays = &met->rays;
+    bvh_hits(c->bvh, s->bvh, rays);
+    if (met->body != NULL) {
+        bvh_cosines(s->bvh, rays->triangle, &rays->dir, rays->n, met->cosine);
+        memset(met->body, 0, rays->n * sizeof *met->body);
+    }
+    for (uint32_t i = 0; i < s->n_movers; i++)
+        cast_mover(c, s, i, met);
+    caster_texels(s, met);
+}

@@ -1,0 +1,195 @@
+/* Echoes -> points, as entries of the block: the one writer, for single rays and for pulses of several
+ * echoes. */
+#include <math.h>
+#include <string.h>
+
+#include "core/cast/caster_private.h"
+
+/* What further echoes have in common with the pulse's first one. */
+static void follow_pulse(struct caster *c, const struct chunk *k)
+{
+    struct echo_list *l = &c->list;
+    for (uint32_t g = 0; g < l->n_further; g++) {
+        const struct further *f = &l->further[g];
+        const double e[3] = VEC3_AT(l->e, f->pulse), p[3] = VEC3_AT(l->p, f->pulse);
+        for (uint32_t i = f->at; i < f->at + f->n; i++) {
+            l->mirror_turn[i] = l->mirror_turn[f->pulse];
+            l->pan_turn[i] = l->pan_turn[f->pulse];
+            if (k->s->layout == LINE_GEO) VEC3_SET(l->e, i, e);
+            if (k->s->n_knots != 0) VEC3_SET(l->p, i, p);
+        }
+    }
+}
+
+/* Positions as a head computes them, from ranges and what its encoders read: the three numbers of echoes at
+ * .. at + n of the list. Returns how many coordinates did not fit; they are LINE_XYZ_NONE. */
+static uint32_t place(struct caster *c, const struct chunk *k, uint32_t at, uint32_t n, const struct kernel_wire *out)
+{
+    const struct cast_setup *s = k->s;
+    struct echo_list *l = &c->list;
+    const double *range_m = l->range_m + at;
+    const struct vec3_out e = VEC3_OUT(l->e, at);
+    if (s->layout != LINE_GEO) {
+        kernel_polar(s, range_m, &(struct kernel_turns){n, l->mirror_turn + at, l->pan_turn + at}, out);
+        return 0;
+    }
+    if (s->n_knots != 0)
+        kernel_scale_from(range_m, &VEC3_IN(l->p, at), s->station_m, n, &e);
+    else
+        kernel_scale(range_m, n, &e);
+    if (!k->linear) georef_forward(s->georef, n, VEC3_IN(e, 0), e);
+    return kernel_geo(&VEC3_IN(e, 0), s->xyz_scale, n, out);
+}
+
+/* Of all entries but their times and three numbers: the first echoes of the pulses. Returns how many there
+ * are. */
+static uint32_t write_firsts(struct caster *c, const struct chunk *k)
+{
+    const struct echo_list *l = &c->list;
+    struct line_block *b = k->block;
+    int16_t *refl_cdb = b->refl_cdb + k->at; /* by a pointer of its own the loop is vectors */
+    const uint8_t *echo = b->echo + k->at;
+    const int signal = k->s->detect != NULL && k->s->detect->signal != NULL;
+    uint32_t echoes = kernel_entries(l->range_m, l->label, k->n, b->echo + k->at, b->label + k->at);
+    for (uint32_t i = 0; i < k->n; i++)
+        refl_cdb[i] = signal && echo[i] != 0 ? l->refl_cdb[i] : (int16_t)LINE_REFL_NONE;
+    if (!k->attributes) return echoes;
+    kernel_widths(l->width_m, echo, k->n, b->width_cns + k->at);
+    for (uint32_t i = 0; i < k->n; i++)
+        b->amplitude_cdb[k->at + i] = signal && echo[i] != 0 ? l->amplitude_cdb[i] : (int16_t)LINE_AMPLITUDE_NONE;
+    return echoes;
+}
+
+/* n entries of the block, but for their times. */
+static void move_entries(struct line_block *b, uint32_t to, uint32_t from, uint32_t n)
+{
+    memmove(b->a + to, b->a + from, n * sizeof *b->a);
+    memmove(b->b + to, b->b + from, n * sizeof *b->b);
+    memmove(b->c + to, b->c + from, n * sizeof *b->c);
+    memmove(b->refl_cdb + to, b->refl_cdb + from, n * sizeof *b->refl_cdb);
+    memmove(b->label + to, b->label + from, n * sizeof *b->label);
+    memmove(b->echo + to, b->echo + from, n * sizeof *b->echo);
+    if (b->width_cns == NULL) return;
+    memmove(b->width_cns + to, b->width_cns + from, n * sizeof *b->width_cns);
+    memmove(b->amplitude_cdb + to, b->amplitude_cdb + from, n * sizeof *b->amplitude_cdb);
+}
+
+/* Echo i of the list, number `echo` of its pulse, becomes entry `to`. */
+static void write_further(struct caster *c, const struct chunk *k, uint32_t to, uint32_t i, uint8_t echo)
+{
+    const struct echo_list *l = &c->list;
+    struct line_block *b = k->block;
+    const int signal = k->s->detect != NULL && k->s->detect->signal != NULL;
+    b->a[to] = c->further_a[i - k->n];
+    b->b[to] = c->further_b[i - k->n];
+    b->c[to] = c->further_c[i - k->n];
+    b->refl_cdb[to] = signal ? l->refl_cdb[i] : (int16_t)LINE_REFL_NONE;
+    b->label[to] = (uint16_t)l->label[i];
+    b->echo[to] = echo;
+    if (!k->attributes) return;
+    kernel_widths(&l->width_m[i], &echo, 1, &b->width_cns[to]);
+    b->amplitude_cdb[to] = signal ? l->amplitude_cdb[i] : (int16_t)LINE_AMPLITUDE_NONE;
+}
+
+/* The further echoes go after the first ones of their pulses: from the last one on, which moves furthest. */
+static void insert_further(struct caster *c, const struct chunk *k)
+{
+    struct line_block *b = k->block;
+    uint32_t to = k->at + c->list.n, end = k->n;
+    for (uint32_t g = c->list.n_further; g-- > 0;) {
+        const struct further *f = &c->list.further[g];
+        const uint32_t count = f->n + 1, after = end - f->pulse - 1;
+        if (f->n == 0) continue;
+        to -= after;
+        move_entries(b, to, k->at + f->pulse + 1, after);
+        for (uint32_t j = f->n; j-- > 0;)
+            write_further(c, k, --to, f->at + j, (uint8_t)((j + 2) | count << 4));
+        to--;
+        end = f->pulse;
+        move_entries(b, to, k->at + end, 1);
+        b->echo[to] = (uint8_t)(1 | count << 4);
+    }
+}
+
+/* Times of all entries. They may wait in the same array, further on: from the first one on. */
+static void write_times(const struct echo_list *l, const struct chunk *k)
+{
+    uint32_t *to = k->block->dt_ns + k->at, from = 0;
+    for (uint32_t g = 0; g < l->n_further; g++) {
+        const struct further *f = &l->further[g];
+        uint32_t dt_ns = k->dt_ns[f->pulse];
+        memmove(to, k->dt_ns + from, (f->pulse - from) * sizeof *to);
+        to += f->pulse - from;
+        for (uint32_t i = 0; i <= f->n; i++)
+            *to++ = dt_ns;
+        from = f->pulse + 1;
+    }
+    if (to != k->dt_ns + from) memmove(to, k->dt_ns + from, (k->n - from) * sizeof *to);
+}
+
+/* Moves entry `from`, which has no echo where it does not fit. */
+static void keep_entry(struct line_block *b, uint32_t to, uint32_t from, int fits)
+{
+    b->a[to] = b->a[from];
+    b->b[to] = b->b[from];
+    b->c[to] = b->c[from];
+    b->dt_ns[to] = b->dt_ns[from];
+    b->refl_cdb[to] = fits ? b->refl_cdb[from] : (int16_t)LINE_REFL_NONE;
+    b->label[to] = fits ? b->label[from] : (uint16_t)LINE_LABEL_NONE;
+    if (b->width_cns == NULL) return;
+    b->amplitude_cdb[to] = fits ? b->amplitude_cdb[from] : (int16_t)LINE_AMPLITUDE_NONE;
+    b->width_cns[to] = fits ? b->width_cns[from] : (uint16_t)LINE_WIDTH_NONE;
+}
+
+/* Where positions did not fit: these are no echoes, and counted; the pulse's other echoes are numbered anew,
+ * but one entry of a pulse stays. Returns how many entries are left of n; *echoes: how many echoes are among
+ * them. */
+static uint32_t drop_unfit(struct caster *c, struct line_block *b, uint32_t at, uint32_t n, uint32_t *echoes)
+{
+    uint32_t to = at;
+    *echoes = 0;
+    for (uint32_t i = at, end; i < at + n; i = end) {
+        uint32_t first = to, count = 0;
+        for (end = i + 1; end < at + n && (b->echo[end] & 15) > 1;)
+            end++;
+        for (uint32_t k = i; k < end; k++) {
+            int fits = b->a[k] != (uint32_t)LINE_XYZ_NONE && b->b[k] != (uint32_t)LINE_XYZ_NONE &&
+                       b->c[k] != (uint32_t)LINE_XYZ_NONE;
+            if (!fits && b->echo[k] != 0) c->counters.unfit++;
+            if (!fits && (k + 1 < end || to > first)) continue; /* but one entry stays */
+            keep_entry(b, to++, k, fits);
+            count += (uint32_t)fits;
+        }
+        *echoes += count;
+        for (uint32_t k = first; k < to; k++)
+            b->echo[k] = (uint8_t)(count == 0 ? 0 : (k - first + 1) | count << 4);
+        if (count == 0) b->a[first] = b->b[first] = b->c[first] = (uint32_t)LINE_XYZ_NONE;
+    }
+    return to - at;
+}
+
+uint32_t caster_points(struct caster *c, struct chunk *k)
+{
+    const struct cast_detect *d = k->s->detect;
+    struct echo_list *l = &c->list;
+    const struct line_block *b = k->block;
+    const uint32_t further = l->n - k->n;
+    uint32_t entries = l->n;
+    if (further > 0) follow_pulse(c, k);
+    if (d != NULL && d->ball != NULL) {
+        const struct detect_points points = {l->n, l->key, l->range_m, l->mirror_turn, l->pan_turn};
+        detect_move_in_ball(d->ball, k->s->rotation, &points);
+        caster_aim_read(c, k);
+    }
+    uint32_t echoes = write_firsts(c, k) + further;
+    uint32_t unfit = place(c, k, 0, k->n, &(struct kernel_wire){b->a + k->at, b->b + k->at, b->c + k->at});
+    if (further > 0) {
+        unfit += place(c, k, k->n, further, &(struct kernel_wire){c->further_a, c->further_b, c->further_c});
+        insert_further(c, k);
+    }
+    write_times(l, k);
+    if (unfit != 0) entries = drop_unfit(c, k->block, k->at, l->n, &echoes);
+    k->at += entries;
+    bvh_stage_ends(c->profile, CAST_POSITIONS);
+    return echoes;
+}

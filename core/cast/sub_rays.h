@@ -1,0 +1,79 @@
+/* Private to core/cast/sub_ray*.c: working memory for pulses with a footprint. */
+#ifndef CORE_CAST_SUB_RAYS_H
+#define CORE_CAST_SUB_RAYS_H
+
+#include "core/cast/caster_private.h"
+
+enum {
+    POOL = 24 * CHUNK,     /* sub-rays worked on at a time */
+    POOL_ROOM = POOL + 16, /* arrays of a power of two would get into each other's way in a cache */
+    MAX_JOBS = 256,        /* pulses with sub-rays, likewise */
+    MAX_PASSES = 4,        /* over their outlines */
+};
+
+/* Sub-rays; those of a job lie together. */
+struct pool {
+    struct {
+        double x[POOL_ROOM], y[POOL_ROOM], z[POOL_ROOM];
+    } p, d;
+    double range_m[POOL_ROOM], cosine[POOL_ROOM], energy[POOL_ROOM];
+    double rho[POOL_ROOM]; /* of the surface; touched only where surfaces are modelled */
+    uint32_t triangle[POOL_ROOM], label[POOL_ROOM];
+    uint8_t body[POOL_ROOM];
+    uint8_t begins[POOL_ROOM]; /* a packet */
+    uint32_t n;
+    /* of the part that a sub-ray stands for: variances and covariance of x and y; touched only where
+     * attributes are asked for */
+    float xx[POOL_ROOM], xy[POOL_ROOM], yy[POOL_ROOM];
+};
+
+/* What sub-rays come to through glass and off mirrors; touched only where there is such. */
+struct beyond {
+    uint32_t first[POOL_ROOM], count[POOL_ROOM]; /* of a sub-ray */
+    uint32_t n;
+    double range_m[POOL_ROOM * CAST_MAX_DEPTH], cosine[POOL_ROOM * CAST_MAX_DEPTH];
+    double share[POOL_ROOM * CAST_MAX_DEPTH]; /* of the sub-ray's energy */
+    double rho[POOL_ROOM * CAST_MAX_DEPTH];
+    uint32_t label[POOL_ROOM * CAST_MAX_DEPTH];
+    uint8_t ghost[POOL_ROOM * CAST_MAX_DEPTH];
+};
+
+/* A pulse for which one ray is not enough. */
+struct job {
+    uint32_t pulse, first, n;  /* its sub-rays */
+    uint32_t lines, passes;    /* outlines that cut it; how often they were looked at */
+    struct beam_near *near;    /* the outlines */
+    double next_m;             /* from where on outlines were left out */
+    struct beam_return centre; /* known without a ray; energy 0: none */
+    struct beam_sight sight;
+    int whole; /* sub-rays all over the footprint, whatever its outlines */
+};
+
+struct sub_ray_work {
+    float steep[CHUNK];                /* of an adaptive beam's central rays */
+    struct beam_near candidate[CHUNK]; /* pulses to look at */
+    struct beam_near reach[CHUNK];     /* with glass or mirrors: those near outlines */
+    uint32_t near[CHUNK], n_near;      /* those with sub-rays, in order */
+    uint32_t again[CHUNK], n_again;    /* glass or a mirror was met beside the centre */
+    struct job job[MAX_JOBS];
+    uint32_t n_jobs;
+    int scattered; /* the pool's rays have nothing in common */
+    struct pool pool;
+    struct beam_return returns[(BEAM_MAX_SUBRAYS + 1) * (1 + CAST_MAX_DEPTH)];
+    uint32_t n_returns;
+    struct {
+        uint32_t first, n;
+    } echoes_of[CHUNK]; /* by pulse */
+    struct beam_echo echo[CHUNK * LINE_MAX_ECHOES + 1];
+    uint32_t n_echoes;
+    struct beyond beyond;
+};
+
+/* ---- sub_ray_plan.c: jobs, their sub-rays at the end of the pool. */
+/* Sub-rays all over the footprint. */
+void plan_whole(struct caster *c, const struct chunk *k, struct job *job);
+/* The rays that a pulse needs, given the outlines up to limit_m. Returns 0 where those of `known` outlines
+ * will do, or (0) the central one. */
+int plan_parts(struct caster *c, const struct chunk *k, struct job *job, double limit_m, uint32_t known);
+
+#endif
