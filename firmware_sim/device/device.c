@@ -103,7 +103,7 @@ void device_free(struct device *device)
 {
     if (device == NULL) return;
     journal_close(device->journal.out, NULL);
-    journal_free(device->journal.replay);
+    free(device->journal.replay);
     pthread_mutex_destroy(&device->lock);
     free(device);
 }
