@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/vec3.h"
 #include "firmware_sim/device/device_state.h"
 
 #define LEN(array) ((int64_t)(sizeof(array) / sizeof((array)[0])))
@@ -26,11 +27,8 @@ static const struct pose *sample_pose(const struct device_live *live, uint64_t i
 
 static int is_near(const struct device *device, const struct pose *pose)
 {
-    const double *station_m = device->site->station[0].at.position_m;
-    double d2 = 0.0;
-    for (int i = 0; i < 3; i++)
-        d2 += (pose->position_m[i] - station_m[i]) * (pose->position_m[i] - station_m[i]);
-    return d2 <= device->site->cfg->platform.reach_m * device->site->cfg->platform.reach_m;
+    double off_m = vec3_distance(pose->position_m, device->site->station[0].at.position_m);
+    return off_m <= device->site->cfg->platform.reach_m;
 }
 
 /* So far ahead that the time must be wrong. Such a pose would keep all later ones out. In the pace step the time is
@@ -41,26 +39,19 @@ static int is_early(const struct device *device, int64_t t_ns)
     return device->site->cfg->loop.pace != PACE_STEP && t_ns > now_ns + DEVICE_POSE_AHEAD_S * INT64_C(1000000000);
 }
 
-int device_pose(struct device *device, int64_t t_ns, const struct pose *pose)
+int device_pose(struct device *device, int64_t t_ns, const double v[6])
 {
+    const double deg = M_PI / 180.0;
     struct device_live *live = &device->live;
+    struct pose pose = {.position_m = {v[0], v[1], v[2]}};
+    pose_from_angles(v[5] * deg, v[4] * deg, v[3] * deg, pose.quat);
     pthread_mutex_lock(&device->lock);
-    int bad = (live->n != 0 && t_ns <= sample_t(live, live->n - 1)) || !is_near(device, pose) || is_early(device, t_ns);
-    if (!bad) {
-        live->sample[live->n % LEN(live->sample)].t_ns = t_ns;
-        live->sample[live->n++ % LEN(live->sample)].pose = *pose;
-    }
+    int bad =
+        (live->n != 0 && t_ns <= sample_t(live, live->n - 1)) || !is_near(device, &pose) || is_early(device, t_ns);
+    if (!bad) live->sample[live->n++ % LEN(live->sample)] = (struct device_sample){t_ns, pose};
     pthread_mutex_unlock(&device->lock);
     if (bad) atomic_fetch_add(&device->counters.bad_poses, 1);
     return bad;
-}
-
-int device_pose_numbers(struct device *device, int64_t t_ns, const double v[6])
-{
-    const double deg = M_PI / 180.0;
-    struct pose pose = {.position_m = {v[0], v[1], v[2]}};
-    pose_from_angles(v[5] * deg, v[4] * deg, v[3] * deg, pose.quat);
-    return device_pose(device, t_ns, &pose);
 }
 
 /* After the last pose: on as from the one before to the last, for extrapolate_ms and within reach. Then it stands. */

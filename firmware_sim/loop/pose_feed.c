@@ -63,7 +63,7 @@ static void take_line(struct pose_feed *feed, const char *line)
     if (parse_line(line, &t_ns, pose) != 0) {
         atomic_fetch_add(&device_counters(feed->device)->bad_poses, 1);
         report_bad(feed, "a pose that is not t_s x y z roll pitch heading");
-    } else if (device_pose_numbers(feed->device, t_ns, pose) != 0) {
+    } else if (device_pose(feed->device, t_ns, pose) != 0) {
         char text[96];
         snprintf(text, sizeof text, "a pose over %g m from the station, not after the last one, or over 1 h ahead",
                  feed->reach_m);
