@@ -152,8 +152,7 @@ void pose_feed_endpoint(const struct pose_feed *feed, char *buf, size_t len)
 void pose_feed_close(struct pose_feed *feed)
 {
     if (feed == NULL) return;
-    uint64_t one = 1;
-    if (feed->running && write(feed->stop_fd, &one, sizeof one) == sizeof one) pthread_join(feed->thread, NULL);
+    if (feed->running && eventfd_write(feed->stop_fd, 1) == 0) pthread_join(feed->thread, NULL);
     if (feed->fd >= 0) close(feed->fd);
     if (feed->stop_fd >= 0) close(feed->stop_fd);
     free(feed);
