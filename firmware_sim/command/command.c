@@ -42,13 +42,11 @@ static const struct command_row *find_row(const struct command_request *req)
 /* MIN, MAX or DEF; 0 when the parameter is none of them. */
 static int parse_special(const char *param, enum command_value_kind *kind)
 {
-    static const struct {
-        const char *pattern;
-        enum command_value_kind kind;
-    } specials[] = {{"MINimum", COMMAND_VALUE_MIN}, {"MAXimum", COMMAND_VALUE_MAX}, {"DEFault", COMMAND_VALUE_DEF}};
-    for (size_t i = 0; i < sizeof specials / sizeof specials[0]; i++)
-        if (command_word_matches(specials[i].pattern, param)) {
-            *kind = specials[i].kind;
+    static const char *const specials[] = {
+        [COMMAND_VALUE_MIN] = "MINimum", [COMMAND_VALUE_MAX] = "MAXimum", [COMMAND_VALUE_DEF] = "DEFault"};
+    for (int i = COMMAND_VALUE_MIN; i <= COMMAND_VALUE_DEF; i++)
+        if (command_word_matches(specials[i], param)) {
+            *kind = (enum command_value_kind)i;
             return 1;
         }
     return 0;

@@ -38,6 +38,17 @@ static int64_t read_other(const struct command_call *call)
     return read_field(&call->dev->settings, call->row->setting->other_offset, call->row->setting->is_u32);
 }
 
+/* A value in the unit of the row. */
+struct number {
+    char text[NUMBER_LEN];
+};
+static struct number in_unit(const struct command_call *call, int64_t value)
+{
+    struct number number;
+    command_format_fixed(number.text, sizeof number.text, value, call->row->unit->decimals);
+    return number;
+}
+
 /* The range now: that of the profile, narrowed by the other setting. */
 static void current_range(const struct command_call *call, int64_t *min, int64_t *max)
 {
@@ -65,41 +76,34 @@ int command_setting_query(struct command_call *call)
     const int64_t value = call->value.kind == COMMAND_VALUE_NUMBER
                               ? read_field(&call->dev->settings, setting->offset, setting->is_u32)
                               : special_value(call);
-    char number[NUMBER_LEN];
     if (setting->words != NULL) return command_reply(call, "%s", setting->words[value]);
-    command_format_fixed(number, sizeof number, value, call->row->unit->decimals);
-    return command_reply(call, "%s", number);
+    return command_reply(call, "%s", in_unit(call, value).text);
 }
 
 /* `HEADER VALUE, allowed MIN to MAX`; value is what the command said, or its number with the unit. */
 static int refuse(struct command_call *call, int number, const char *value, int64_t min, int64_t max, const char *with)
 {
-    char low[NUMBER_LEN], high[NUMBER_LEN];
-    command_format_fixed(low, sizeof low, min, call->row->unit->decimals);
-    command_format_fixed(high, sizeof high, max, call->row->unit->decimals);
-    return command_fail(call, number, "%s %s, allowed %s to %s%s", call->row->header, value, low, high, with);
+    return command_fail(call, number, "%s %s, allowed %s to %s%s", call->row->header, value, in_unit(call, min).text,
+                        in_unit(call, max).text, with);
 }
 
 static int refuse_number(struct command_call *call, int number, int64_t value, int64_t min, int64_t max,
                          const char *with)
 {
     const struct command_unit *unit = call->row->unit;
-    char digits[NUMBER_LEN], text[NUMBER_LEN + 8];
-    command_format_fixed(digits, sizeof digits, value, unit->decimals);
-    snprintf(text, sizeof text, "%s%s%s", digits, unit->name[0] != '\0' ? " " : "", unit->name);
+    char text[NUMBER_LEN + 8];
+    snprintf(text, sizeof text, "%s%s%s", in_unit(call, value).text, unit->name[0] != '\0' ? " " : "", unit->name);
     return refuse(call, number, text, min, max, with);
 }
 
 static int refuse_fraction(struct command_call *call, const char *value)
 {
     const struct command_unit *unit = call->row->unit;
-    char finest[NUMBER_LEN];
-    command_format_fixed(finest, sizeof finest, 1, unit->decimals);
     if (unit->decimals == 0)
         return command_fail(call, CMD_E_RANGE, "%s %s, allowed whole numbers%s%s", call->row->header, value,
                             unit->name[0] != '\0' ? " of " : "", unit->name);
-    return command_fail(call, CMD_E_RANGE, "%s %s, allowed multiples of %s %s", call->row->header, value, finest,
-                        unit->name);
+    return command_fail(call, CMD_E_RANGE, "%s %s, allowed multiples of %s %s", call->row->header, value,
+                        in_unit(call, 1).text, unit->name);
 }
 
 int command_value_in_range(struct command_call *call, int64_t min, int64_t max, int64_t *value)
@@ -121,11 +125,8 @@ static int check_other(struct command_call *call, int64_t value)
     current_range(call, &min, &max);
     if (value >= min && value <= max) return 0;
     const char *other = call->row->setting->other;
-    char with[NUMBER_LEN + 24] = "", number[NUMBER_LEN];
-    if (other != NULL) {
-        command_format_fixed(number, sizeof number, read_other(call), call->row->unit->decimals);
-        snprintf(with, sizeof with, " as %s is %s", other, number);
-    }
+    char with[NUMBER_LEN + 24] = "";
+    if (other != NULL) snprintf(with, sizeof with, " as %s is %s", other, in_unit(call, read_other(call)).text);
     return refuse_number(call, CMD_E_SETTINGS, value, min, max, with);
 }
 

@@ -111,10 +111,9 @@ void device_report(struct device *device, int number, const char *text);
  * so. Before the first tick is claimed. *warning: something the user should know, or NULL; it belongs to the device. */
 int device_power_up(struct device *device, int64_t now_ns, const char **warning, struct sh_err *err);
 
-/* The GNSS receiver: how many positions there were before a device time, the device time of a position (from 0), and
- * its sentences where the head is. Returns their length, 0 when cap is too small. */
-uint64_t device_gnss_count(const struct device *device, int64_t t_ns);
-int64_t device_gnss_time_ns(const struct device *device, uint64_t index);
+/* The GNSS receiver (gnss.h), and the sentences of a position (from 0) where the head is. Returns their length, 0 when
+ * cap is too small. */
+const struct gnss *device_gnss(const struct device *device);
 size_t device_gnss_sentences(struct device *device, uint64_t index, char *dst, size_t cap);
 
 /* Scans begun so far. */

@@ -111,19 +111,6 @@ static void fill_place(const struct gnss *gnss, const struct gnss_place *place, 
     fix->course_deg = fix->speed_m_s > 0.0 ? fmod(angle_deg(atan2(v[0], v[1])) + 360.0, 360.0) : NAN;
 }
 
-static void fill_time(const struct gnss *gnss, int64_t t_ns, struct nmea_fix *fix)
-{
-    struct utc_time utc;
-    utc_from_tai(&gnss->clock->table, head_clock_true_ns(gnss->clock, t_ns), &utc);
-    fix->year = utc.year;
-    fix->month = utc.month;
-    fix->day = utc.day;
-    fix->hour = utc.hour;
-    fix->minute = utc.minute;
-    fix->second = utc.second;
-    fix->hundredth = utc.ns / 10000000;
-}
-
 size_t gnss_sentences(const struct gnss *gnss, uint64_t index, uint32_t station, const struct gnss_track *track,
                       char *dst, size_t cap)
 {
@@ -140,7 +127,7 @@ size_t gnss_sentences(const struct gnss *gnss, uint64_t index, uint32_t station,
                            .satellites = (int)c->satellites,
                            .hdop = c->hdop,
                            .sigma_m = {c->accuracy_m, c->accuracy_m, c->accuracy_m}};
-    fill_time(gnss, t_ns, &fix);
+    utc_from_tai(&gnss->clock->table, head_clock_true_ns(gnss->clock, t_ns), &fix.utc);
     fill_place(gnss, &place, &fix);
     return nmea_encode_all(dst, cap, &fix);
 }
