@@ -32,10 +32,8 @@ int command_fail(struct command_call *call, int number, const char *fmt, ...)
 
 static const struct command_row *find_row(const struct command_request *req)
 {
-    size_t n;
-    const struct command_row *row = command_table(&n);
-    for (size_t i = 0; i < n; i++)
-        if (command_header_matches(row[i].header, req->header, req->header_len)) return &row[i];
+    for (const struct command_row *row = command_rows; row->header != NULL; row++)
+        if (command_header_matches(row->header, req->header, req->header_len)) return row;
     return NULL;
 }
 

@@ -126,7 +126,7 @@ struct command_row {
     int pose;                                /* a pose may follow the number */
 };
 
-const struct command_row *command_table(size_t *n);
+extern const struct command_row command_rows[]; /* up to one without a header */
 
 /* step_pose.c: call->pose as six numbers into call->out. Returns -1 when it failed. */
 int command_take_pose(struct command_call *call);

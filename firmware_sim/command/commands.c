@@ -124,14 +124,13 @@ static int query_gps(struct command_call *call)
 
 static int query_help(struct command_call *call)
 {
-    size_t n, len = 0;
-    const struct command_row *row = command_table(&n);
-    for (size_t i = 0; i < n && len < sizeof call->out->reply; i++)
-        len += (size_t)snprintf(call->out->reply + len, sizeof call->out->reply - len, "%s%s%s", i == 0 ? "" : " ",
-                                row[i].header,
-                                row[i].query == NULL ? ""
-                                : row[i].act == NULL ? "?"
-                                                     : "[?]");
+    size_t len = 0;
+    for (const struct command_row *row = command_rows; row->header != NULL && len < sizeof call->out->reply; row++)
+        len += (size_t)snprintf(call->out->reply + len, sizeof call->out->reply - len, "%s%s%s", len == 0 ? "" : " ",
+                                row->header,
+                                row->query == NULL ? ""
+                                : row->act == NULL ? "?"
+                                                   : "[?]");
     return 0;
 }
 
@@ -194,7 +193,7 @@ static int act_step(struct command_call *call)
 #define VALUE(header, unit, which) \
     {header, command_setting_query, command_setting_change, &(unit), &settings[which], 0, 0}
 
-static const struct command_row rows[] = {
+const struct command_row command_rows[] = {
     QUERY("*IDN", query_idn),
     ACTION("*RST", act_reset, 0),
     ACTION("*CLS", act_clear, 1), /* open, as SYSTem:ERRor? empties the queue too */
@@ -225,11 +224,6 @@ static const struct command_row rows[] = {
     QUERY("TIME:UTC", query_utc),
     QUERY("TIME:GPS", query_gps),
     {"TIME:STEP", NULL, act_step, &unit_ns, NULL, 0, 1},
+    {.header = NULL},
 };
 /* clang-format on */
-
-const struct command_row *command_table(size_t *n)
-{
-    *n = sizeof rows / sizeof rows[0];
-    return rows;
-}

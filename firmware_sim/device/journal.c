@@ -17,10 +17,11 @@ struct journal {
     int error;        /* errno of the first failure */
 };
 
-/* Prints text and flushes it. */
+/* Prints text and flushes it; fails once something went wrong. */
 __attribute__((format(printf, 2, 3))) static int put(struct journal *journal, const char *fmt, ...)
 {
     va_list ap;
+    if (journal->error != 0) return SH_EIO;
     va_start(ap, fmt);
     if (vfprintf(journal->file, fmt, ap) < 0 || fflush(journal->file) != 0) journal->error = errno;
     va_end(ap);
@@ -36,7 +37,7 @@ struct journal *journal_open(const char *path, struct sh_err *err)
     }
     *journal = (struct journal){.path = path, .file = fopen(path, "we")};
     if (journal->file == NULL) journal->error = errno;
-    if (journal->error == 0 && put(journal, "%s\n", title) == SH_OK) return journal;
+    if (put(journal, "%s\n", title) == SH_OK) return journal;
     journal_close(journal, err);
     return NULL;
 }
@@ -52,14 +53,12 @@ static int is_command_line(const char *line)
 
 int journal_write(struct journal *journal, uint64_t tick, int64_t t_ns, uint32_t session, const char *line)
 {
-    if (journal->error != 0) return SH_EIO;
     if (t_ns < 0 || !is_command_line(line)) return SH_EINPUT;
     return put(journal, "%" PRIu64 " %" PRId64 " %" PRIu32 " %s\n", tick, t_ns, session, line);
 }
 
 int journal_note(struct journal *journal, const char *text)
 {
-    if (journal->error != 0) return SH_EIO;
     if (!is_command_line(text)) return SH_EINPUT;
     return put(journal, "# %s\n", text);
 }

@@ -21,9 +21,10 @@ void session_count_lost(struct pump *pump, struct session *s, uint32_t n)
 static void announce(struct pump *pump, struct session *s, uint32_t frames)
 {
     struct native_event event = {.code = NATIVE_EV_READER_LOST, .a = frames, .c = s->lost.frames};
+    int64_t now_ns = (int64_t)stream_released(pump->stream) * pump->stream->tick_ns;
     snprintf(event.text, sizeof event.text, "%u frames lost: the reader is too slow", frames);
-    s->out_len += (uint32_t)native_encode_event(s->out + s->out_len, pump->out_cap - s->out_len, &event,
-                                                stream_now_ns(pump->stream), NATIVE_LOCAL);
+    s->out_len +=
+        (uint32_t)native_encode_event(s->out + s->out_len, pump->out_cap - s->out_len, &event, now_ns, NATIVE_LOCAL);
 }
 
 void session_check_lost(struct pump *pump, struct session *s, const struct ring_copy *tick, uint64_t released)

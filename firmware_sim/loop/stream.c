@@ -144,11 +144,6 @@ uint64_t stream_released(const struct stream *stream)
     return atomic_load(&stream->ring.released);
 }
 
-int64_t stream_now_ns(const struct stream *stream)
-{
-    return (int64_t)stream_released(stream) * stream->tick_ns;
-}
-
 uint64_t stream_grant(struct stream *stream, uint64_t ns)
 {
     return atomic_fetch_add(&stream->granted_ns, ns) + ns;
