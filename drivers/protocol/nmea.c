@@ -47,7 +47,7 @@ static size_t end(struct sentence *s)
 
 static void put_time(struct sentence *s, const struct nmea_fix *fix)
 {
-    put(s, ",%02d%02d%02d.%02d", fix->utc.hour, fix->utc.minute, fix->utc.second, fix->utc.ns / 10000000);
+    put(s, ",%02d%02d%02d.%02d", fix->hour, fix->minute, fix->second, fix->hundredth);
 }
 
 /* ddmm.mmmmmmm and its letter. Rounded as a whole, so that the minutes never read 60. */
@@ -97,7 +97,7 @@ size_t nmea_encode_rmc(char *dst, size_t cap, const struct nmea_fix *fix)
         put(&s, ",%.3f,", fix->speed_m_s / KNOT_M_S);
     else /* cut, so that it never reads 360 */
         put(&s, ",%.3f,%.2f", fix->speed_m_s / KNOT_M_S, floor(fix->course_deg * 100.0) / 100.0);
-    put(&s, ",%02d%02d%02d,,,%c", fix->utc.day, fix->utc.month, fix->utc.year % 100,
+    put(&s, ",%02d%02d%02d,,,%c", fix->day, fix->month, fix->year % 100,
         mode[fix->quality >= 0 && fix->quality <= 5 ? fix->quality : 0]);
     return end(&s);
 }
@@ -134,7 +134,7 @@ size_t nmea_encode_zda(char *dst, size_t cap, const struct nmea_fix *fix)
 {
     struct sentence s = begin(dst, cap, fix, "ZDA");
     put_time(&s, fix);
-    put(&s, ",%02d,%02d,%04d,00,00", fix->utc.day, fix->utc.month, fix->utc.year);
+    put(&s, ",%02d,%02d,%04d,00,00", fix->day, fix->month, fix->year);
     return end(&s);
 }
 

@@ -12,13 +12,13 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "core/utc.h"
-
 enum { NMEA_MAX_SENTENCE = 160, NMEA_ALL_SENTENCES = 5, NMEA_MAX_ALL = NMEA_ALL_SENTENCES * NMEA_MAX_SENTENCE };
 
 struct nmea_fix {
-    char talker[2];            /* "GN", "GP" */
-    struct utc_time utc;       /* sentences have hundredths of the second, cut */
+    char talker[2];       /* "GN", "GP" */
+    int year, month, day; /* UTC */
+    int hour, minute;
+    int second, hundredth;     /* second 60 in a leap second */
     double lat_deg, lon_deg;   /* WGS 84; north and east positive; -90..90, -180..180 */
     double altitude_m;         /* above the geoid */
     double geoid_separation_m; /* geoid above the ellipsoid; ellipsoidal height = altitude + separation */

@@ -115,19 +115,26 @@ size_t gnss_sentences(const struct gnss *gnss, uint64_t index, uint32_t station,
                       char *dst, size_t cap)
 {
     const struct config_gnss *c = &gnss->site->cfg->gnss;
-    int64_t t_ns = gnss_time_ns(gnss, index);
     double noise_m[3] = {0.0, 0.0, 0.0};
     uint64_t key = rng_key(gnss->site->cfg->noise.seed, RNG_GNSS);
     for (uint64_t i = 0; i < 3 && c->accuracy_m > 0.0; i++)
         noise_m[i] = c->accuracy_m * rng_normal(key, 3 * index + i);
     struct gnss_place place = {0};
     int found = gnss_position(gnss, station, track, noise_m, &place);
+    struct utc_time utc;
+    utc_from_tai(&gnss->clock->table, head_clock_true_ns(gnss->clock, gnss_time_ns(gnss, index)), &utc);
     struct nmea_fix fix = {.talker = {'G', c->talker == TALKER_GP ? 'P' : 'N'},
+                           .year = utc.year,
+                           .month = utc.month,
+                           .day = utc.day,
+                           .hour = utc.hour,
+                           .minute = utc.minute,
+                           .second = utc.second,
+                           .hundredth = utc.ns / 10000000,
                            .quality = found ? (int)c->quality : 0,
                            .satellites = (int)c->satellites,
                            .hdop = c->hdop,
                            .sigma_m = {c->accuracy_m, c->accuracy_m, c->accuracy_m}};
-    utc_from_tai(&gnss->clock->table, head_clock_true_ns(gnss->clock, t_ns), &fix.utc);
     fill_place(gnss, &place, &fix);
     return nmea_encode_all(dst, cap, &fix);
 }

@@ -15,12 +15,12 @@
 static struct nmea_fix munich(void)
 {
     return (struct nmea_fix){.talker = {'G', 'P'},
-                             .utc.year = 1994,
-                             .utc.month = 3,
-                             .utc.day = 23,
-                             .utc.hour = 12,
-                             .utc.minute = 35,
-                             .utc.second = 19,
+                             .year = 1994,
+                             .month = 3,
+                             .day = 23,
+                             .hour = 12,
+                             .minute = 35,
+                             .second = 19,
                              .lat_deg = 48 + 7.038 / 60,
                              .lon_deg = 11 + 31.0 / 60,
                              .altitude_m = 545.4,
@@ -140,10 +140,10 @@ static void leap_second_and_hundredths(void **state)
     struct nmea_fix fix = munich();
     struct nmea_line line;
     char text[NMEA_MAX_SENTENCE];
-    fix.utc.hour = 23;
-    fix.utc.minute = 59;
-    fix.utc.second = 60;
-    fix.utc.ns = 950000000;
+    fix.hour = 23;
+    fix.minute = 59;
+    fix.second = 60;
+    fix.hundredth = 95;
     read_line(text, nmea_encode_zda(text, sizeof text, &fix), "GPZDA", 7, &line);
     assert_string_equal(line.field[1], "235960.95");
 }
