@@ -82,7 +82,7 @@ int hasher_start(struct stream *stream, struct hasher **out, struct sh_err *err)
     if (failed == 0) failed = pthread_create(&h->thread, NULL, hasher_main, h);
     if (failed != 0) {
         hasher_free(h);
-        return sh_fail(err, SH_EIO, "no thread for the stream hash: %s", strerror(failed));
+        return sh_fail(err, SH_EIO, "the stream hash cannot start: %s", strerror(failed));
     }
     stream_set_reader(stream, STREAM_HASH_READER, 0, 1);
     stream_listen(stream, h->wake_fd);

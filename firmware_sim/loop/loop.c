@@ -133,16 +133,6 @@ void loop_end(struct loop *loop)
     stream_poke(&loop->stream);
 }
 
-static void fill_stats(struct loop *loop, struct loop_stats *stats)
-{
-    const struct stream *stream = &loop->stream;
-    stats->counters = *stream->counters;
-    stats->scans = device_scans(loop->device);
-    stats->wall_s = 1e-9 * (double)(atomic_load(&stream->last_pulse_ns) - atomic_load(&stream->first_pulse_ns));
-    stats->late_p50_us = pacer_late_us(loop, 0.5);
-    stats->late_p999_us = pacer_late_us(loop, 0.999);
-}
-
 int loop_check_links(const struct loop *loop, struct sh_err *err)
 {
     const struct links *links = &loop->links;
@@ -166,5 +156,9 @@ void loop_join(struct loop *loop, struct loop_stats *stats)
     loop->feed = NULL;
     if (loop->hasher != NULL) stats->have_hash = hasher_join(loop->hasher, stats->sha256);
     loop->hasher = NULL;
-    fill_stats(loop, stats);
+    stats->counters = *stream->counters;
+    stats->scans = device_scans(loop->device);
+    stats->wall_s = 1e-9 * (double)(atomic_load(&stream->last_pulse_ns) - atomic_load(&stream->first_pulse_ns));
+    stats->late_p50_us = pacer_late_us(loop, 0.5);
+    stats->late_p999_us = pacer_late_us(loop, 0.999);
 }
