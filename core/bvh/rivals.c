@@ -46,8 +46,7 @@ static void look_at(const struct bvh *bvh, uint32_t prim, struct shape *s)
 {
     bvh_corners(bvh, prim, s->v);
     for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            s->e[i][j] = s->v[(i + 1) % 3][j] - s->v[i][j];
+        vec3_sub(s->v[(i + 1) % 3], s->v[i], s->e[i]);
     vec3_cross(s->e[0], s->e[1], s->n);
 }
 

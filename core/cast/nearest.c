@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "core/cast/caster_private.h"
+#include "core/mat3.h"
 
 /* How far the origins lie from the first of them. */
 static double spread_m(const struct vec3_in *p, uint32_t n)
@@ -50,8 +51,7 @@ static void cast_mover(struct caster *c, const struct cast_setup *s, uint32_t wh
     }
     double radius_m = m->radius_m + (own ? spread_m(&from->own, n) : 0.0);
     if (!kernel_meets_sphere(&met->rays.dir, n, v, radius_m)) return;
-    for (int i = 0; i < 3; i++)
-        rays.from.at_m[i] = m->rotation[i] * w[0] + m->rotation[3 + i] * w[1] + m->rotation[6 + i] * w[2];
+    mat3_apply_transposed(m->rotation, w, rays.from.at_m);
     if (own) {
         kernel_shift(&from->own, back_m, n, &VEC3_OUT(c->mover_p, 0));
         kernel_turn_back(&VEC3_IN(c->mover_p, 0), m->rotation, n, &VEC3_OUT(c->mover_p, 0));

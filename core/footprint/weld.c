@@ -85,8 +85,7 @@ static uint64_t find_edge(struct weld *w, uint32_t low, uint32_t high)
 
 static void from_station(const struct weld *w, uint32_t vertex, double p[3])
 {
-    for (int i = 0; i < 3; i++)
-        p[i] = w->scene->vertex_m[vertex][i] - w->station_m[i];
+    vec3_sub(w->scene->vertex_m[vertex], w->station_m, p);
 }
 
 /* 1 or 2; 0: the triangle is seen edge-on, and covers nothing. */

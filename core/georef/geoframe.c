@@ -6,6 +6,7 @@
 #include "core/angle.h"
 #include "core/locate.h"
 #include "core/mat3.h"
+#include "core/vec3.h"
 
 int geoframe_set_tangent(struct geoframe *frame, const double origin_m[3], const struct georef_place *at,
                          double north_deg, struct sh_err *err)
@@ -50,11 +51,9 @@ static int locate(const struct geoframe *frame, const double p_prcs[3], struct g
     if (frame->kind == GEOFRAME_GRID) return georef_locate_utm(frame->zone, frame->north, p_prcs, at, err);
     memcpy(p_ecef, p_prcs, sizeof p_ecef);
     if (frame->kind == GEOFRAME_TANGENT) {
-        for (int i = 0; i < 3; i++)
-            d[i] = p_prcs[i] - frame->origin_m[i];
+        vec3_sub(p_prcs, frame->origin_m, d);
         mat3_apply(frame->rotation, d, p_ecef);
-        for (int i = 0; i < 3; i++)
-            p_ecef[i] += frame->ecef_m[i];
+        vec3_add(frame->ecef_m, p_ecef, p_ecef);
     }
     return georef_locate_ecef(p_ecef, at, err);
 }
@@ -92,11 +91,9 @@ int geoframe_find(const struct geoframe *frame, const struct georef_place *at, d
     georef_geodetic_to_ecef(at, p_ecef);
     memcpy(p_prcs, p_ecef, sizeof p_ecef);
     if (frame->kind == GEOFRAME_ECEF) return SH_OK;
-    for (int i = 0; i < 3; i++)
-        d[i] = p_ecef[i] - frame->ecef_m[i];
+    vec3_sub(p_ecef, frame->ecef_m, d);
     mat3_apply_transposed(frame->rotation, d, p_prcs);
-    for (int i = 0; i < 3; i++)
-        p_prcs[i] += frame->origin_m[i];
+    vec3_add(frame->origin_m, p_prcs, p_prcs);
     return SH_OK;
 }
 

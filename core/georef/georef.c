@@ -204,11 +204,9 @@ int georef_recentre(const struct georef *georef, const double centre_m[3], struc
         set_up_centre(moved);
     } else {
         double turned[3];
-        for (int i = 0; i < 3; i++)
-            d[i] = centre_m[i] - georef->station_m[i];
+        vec3_sub(centre_m, georef->station_m, d);
         mat3_apply(georef->rotation, d, turned);
-        for (int i = 0; i < 3; i++)
-            moved->anchor[i] = georef->origin[i] + turned[i];
+        vec3_add(georef->origin, turned, moved->anchor);
     }
     if (moved->method != GEOREF_EXACT && moved->polynomial.half_m == 0.0 && georef_has_map(moved)) {
         georef_free(moved);
@@ -333,13 +331,11 @@ void georef_reverse(const struct georef *georef, const double d_crs[3], double p
         shim_map_reverse(georef->map, d_crs, d);
     else
         mat3_apply_transposed(georef->rotation, d_crs, d);
-    for (int i = 0; i < 3; i++)
-        p_prcs[i] = georef->centre_m[i] + d[i];
+    vec3_add(georef->centre_m, d, p_prcs);
 }
 
 void georef_difference(const struct georef *georef, const double p_crs[3], double d_crs[3])
 {
-    for (int i = 0; i < 3; i++)
-        d_crs[i] = p_crs[i] - georef->anchor[i];
+    vec3_sub(p_crs, georef->anchor, d_crs);
     if (georef->crs == GEOREF_GEODETIC) d_crs[1] = remainder(d_crs[1], 360.0);
 }

@@ -232,11 +232,9 @@ int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err)
 static bool has_area(const double *a, const double *b, const double *c)
 {
     double u[3], v[3], w[3];
-    for (int k = 0; k < 3; k++) {
-        u[k] = b[k] - a[k];
-        v[k] = c[k] - a[k];
-        w[k] = c[k] - b[k];
-    }
+    vec3_sub(b, a, u);
+    vec3_sub(c, a, v);
+    vec3_sub(c, b, w);
     double n[3], longest2 = fmax(fmax(vec3_dot(u, u), vec3_dot(v, v)), vec3_dot(w, w));
     vec3_cross(u, v, n);
     return sqrt(vec3_dot(n, n)) > 1e-12 * longest2;
