@@ -218,17 +218,12 @@ static int read_statements(struct obj *o, struct sh_err *err)
     return rc;
 }
 
-static void tick(void *build)
-{
-    build_progress(build, -1);
-}
-
 int read_obj(struct scene_build *b, struct sh_err *err)
 {
     struct obj o = {.b = b, .material = {"", 0}};
     uint32_t first_surface = b->scene->n_surfaces;
     o.object = build_base_name(b);
-    int rc = text_open(&o.t, b->spec->file, tick, b, err);
+    int rc = text_open(&o.t, b->spec->file, build_progress, b, err);
     o.t.continued = true;
     if (rc == SH_OK) rc = read_statements(&o, err);
     if (rc == SH_OK && o.n_unknown > 0)
