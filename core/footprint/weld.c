@@ -123,10 +123,8 @@ static void add_triangles(struct weld *w)
 static int collect(const struct weld *w, struct beam_outlines *o, struct sh_err *err)
 {
     uint64_t found = 0;
-    for (uint64_t i = 0; i <= w->mask; i++) {
-        o->info.edges += w->slot[i].low != NONE;
+    for (uint64_t i = 0; i <= w->mask; i++)
         found += w->slot[i].low != NONE && w->sides[i] != 3;
-    }
     if (found >= NONE) return sh_fail(err, SH_EINPUT, "beam: too many outlines");
     o->edge = malloc((size_t)(found + 1) * sizeof *o->edge);
     if (o->edge == NULL) return sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");

@@ -27,7 +27,7 @@ double surface_linear(double srgb)
     return srgb <= 0.04045 ? srgb / 12.92 : pow((srgb + 0.055) / 1.055, 2.4);
 }
 
-double surface_luminance(const float rgb[3])
+static double surface_luminance(const float rgb[3])
 {
     return 0.2126 * surface_linear((double)rgb[0]) + 0.7152 * surface_linear((double)rgb[1]) +
            0.0722 * surface_linear((double)rgb[2]);
