@@ -44,11 +44,10 @@ static void cast_mover(struct caster *c, const struct cast_setup *s, uint32_t wh
     const uint32_t n = met->rays.n;
     struct bvh_rays rays = met->rays;
     double v[3], w[3];
-    for (int i = 0; i < 3; i++) {
-        const double *row = m->rotation + 3 * i;
-        v[i] = row[0] * m->centre_m[0] + row[1] * m->centre_m[1] + row[2] * m->centre_m[2] + m->shift_m[i] - at[i];
-        w[i] = at[i] - m->shift_m[i];
-    }
+    mat3_apply(m->rotation, m->centre_m, v);
+    vec3_add(v, m->shift_m, v);
+    vec3_sub(v, at, v);
+    vec3_sub(at, m->shift_m, w);
     double radius_m = m->radius_m + (own ? spread_m(&from->own, n) : 0.0);
     if (!kernel_meets_sphere(&met->rays.dir, n, v, radius_m)) return;
     mat3_apply_transposed(m->rotation, w, rays.from.at_m);

@@ -105,9 +105,8 @@ static void lambert_texels(const struct surface_table *table, uint32_t n, const 
                            double *rho)
 {
     for (uint32_t i = 0; i < n; i++) {
-        uint32_t own = surface_of_label(label[i]), texel = own < table->n ? label[i] >> 16 : 0;
-        rho[i] = cosi[i] *
-                 (texel != 0 ? (texel - 1) / 65534.0 : table->surface[own < table->n ? own : table->n].reflectance);
+        uint32_t texel = surface_of_label(label[i]) < table->n ? label[i] >> 16 : 0;
+        rho[i] = cosi[i] * (texel != 0 ? (texel - 1) / 65534.0 : surface_at(table, label[i])->reflectance);
     }
 }
 
