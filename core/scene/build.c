@@ -277,12 +277,12 @@ int build_polygon(struct scene_build *b, size_t n, uint16_t label, struct sh_err
     if (triangulate_reserve(t, n) != SH_OK)
         return build_fail(b, SH_ENOMEM, err, "no memory for a polygon of %zu corners", n);
     for (size_t i = 0; i < n; i++)
-        memcpy(t->p[i], b->scene->vertex_m[b->corner[i]], sizeof *t->p);
+        memcpy(t->at[i].p, b->scene->vertex_m[b->corner[i]], sizeof t->at->p);
     triangulate_polygon(t, (uint32_t)n);
     if (!t->simple) b->not_simple++;
     int rc = SH_OK;
     for (size_t i = 0; i + 2 < n && rc == SH_OK; i++)
-        rc = add_triangle(b, t->triangle[i], label, err);
+        rc = add_triangle(b, t->at[i].triangle, label, err);
     return rc;
 }
 
