@@ -97,9 +97,9 @@ static const struct cfg_key config_keys[] = {
     {"scene.anchor.north_deg", CFG_REAL, "deg", "0", -360, 360, IN_CONFIG(scene.anchor.north_deg),
      .help = "explicit: where true north lies, clockwise from the scene's y axis."},
     {"scene.anchor.utm_zone", CFG_COUNT, NULL, "", 0, 60, IN_CONFIG(scene.anchor.utm_zone),
-     .help = "utm: zone of the meshes' coordinates; 0: UPS. Required there."},
+     .help = "utm: zone of the meshes' coordinates; 0: UPS. Required with source: utm."},
     {"scene.anchor.hemisphere", CFG_ENUM, .def = "", .names = cfg_hemisphere_words, IN_CONFIG(scene.anchor.north),
-     .help = "utm: where their northing counts from. Required there."},
+     .help = "utm: hemisphere that their northing counts from. Required with source: utm."},
 
     {"stations", CFG_LIST, .min = 1, .max = CONFIG_MAX_STATIONS, LIST_OF(station, n_stations),
      .help = "Places where the head can stand."},
@@ -150,7 +150,7 @@ static const struct cfg_key config_keys[] = {
     {"platform.end_s", CFG_REAL, "s", "0", 0, 1e9, IN_CONFIG(platform.end_s),
      .help = "trajectory, stops: where it ends, likewise; at the last sample when not given."},
     {"platform.step_s", CFG_REAL, "s", "0", 0, 1e9, IN_CONFIG(platform.step_s),
-     .help = "stops: time from each stop to the next, up to end_s. Required there."},
+     .help = "stops: time from each stop to the next, up to end_s. Required with kind: stops."},
     {"platform.at_end", CFG_ENUM, .def = "stop", .names = cfg_at_end_words, IN_CONFIG(platform.at_end),
      .help = "trajectory: at its end the scan stops, or the platform holds its last pose."},
     {"platform.mount_m", CFG_VEC3, "m", "[0, 0, 0]", -1000, 1000, IN_CONFIG(platform.mount_m),
@@ -191,7 +191,7 @@ static const struct cfg_key config_keys[] = {
      .help = "on: each points frame is followed by one with amplitude (needs signal.model: on) and width of its "
              "echoes, 4 bytes a point; .ply and .las recordings have them."},
     {"output.scale_m", CFG_REAL, "m", "0", 0, 1, IN_CONFIG(output.scale_m), .allowed = "0 (automatic) or 1e-6 to 1 m",
-     .help = "Metres per count of a range, and at most that of a coordinate. The largest range must fit into 31 "
+     .help = "Metres per count of a range; a count of a coordinate is no larger. The largest range must fit into 31 "
              "bits."},
 
     {"links", CFG_LIST, .min = 0, .max = CONFIG_MAX_LINKS, LIST_OF(link, n_links),
@@ -235,7 +235,7 @@ static const struct cfg_key config_keys[] = {
      .help = "Rings of sub-rays: n rings have 1 + 3 n (n + 1). adaptive: used where a footprint holds more edges "
              "than it can tell apart."},
     {"beam.echoes", CFG_ENUM, .def = "all", .names = cfg_echoes_words, IN_CONFIG(head.settings.echoes),
-     .help = "Which echoes of a pulse are sent, those of glass and of what is seen through it included."},
+     .help = "Which echoes of a pulse are sent. Those of glass, and of what is seen through it, are among them."},
 
     {"plan", CFG_MAP, .help = "Tolerances. Each stage uses the cheapest method that holds them (`scanhead plan`)."},
     {"plan.tolerance_m", CFG_REAL, "m", "1e-3", 1e-6, 1, IN_CONFIG(plan.range_m),

@@ -1,4 +1,7 @@
-/* The BVHs of a site: one for each body that moves, and as many of the scene as the places of the head need. */
+/* The BVHs of a site: one for each body that moves, and as many of the scene as the places of the head need.
+ *
+ * In: the loaded scene, and where rays begin (prcs, metres). Out: site->bvh and the BVHs of movers; the site owns
+ * them. */
 #ifndef FIRMWARE_SIM_SITE_BVHS_H
 #define FIRMWARE_SIM_SITE_BVHS_H
 

@@ -1,4 +1,5 @@
-/* Private to this folder: a head that moves while it scans. From the configured trajectory come its poses and BVHs. */
+/* Private to this folder: a head that moves while it scans. In: the configured trajectory.
+ * Out: its poses (scene frame, metres), and the BVHs that its path needs. */
 #ifndef FIRMWARE_SIM_SITE_PLATFORM_H
 #define FIRMWARE_SIM_SITE_PLATFORM_H
 

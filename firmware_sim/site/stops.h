@@ -1,4 +1,5 @@
-/* Private to this folder: a head that scans where its platform stops. */
+/* Private to this folder: a head that scans where its platform stops (platform.kind: stops). In: the configured
+ * trajectory and times. Out: a station for each stop, placed in the scene. */
 #ifndef FIRMWARE_SIM_SITE_STOPS_H
 #define FIRMWARE_SIM_SITE_STOPS_H
 
