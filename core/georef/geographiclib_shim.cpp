@@ -377,18 +377,11 @@ void shim_map_convergence(const struct shim_map *map, double *convergence_deg, d
 void shim_map_forward(const struct shim_map *map, size_t n, struct vec3_in d, struct vec3_out out)
 {
     for (size_t i = 0; i < n; i++) {
-        double x = nan_m, y = nan_m, z = nan_m;
+        double p[3] = {nan_m, nan_m, nan_m};
         /* Checked first: the projections turn some NaN into plain numbers. */
-        if (std::isfinite(d.x[i]) && std::isfinite(d.y[i]) && std::isfinite(d.z[i])) {
-            try {
-                map->forward(d.x[i], d.y[i], d.z[i], x, y, z);
-            } catch (...) {
-                x = y = z = nan_m;
-            }
-        }
-        out.x[i] = x;
-        out.y[i] = y;
-        out.z[i] = z;
+        if (std::isfinite(d.x[i]) && std::isfinite(d.y[i]) && std::isfinite(d.z[i]))
+            attempt(p, 3, [&] { map->forward(d.x[i], d.y[i], d.z[i], p[0], p[1], p[2]); });
+        VEC3_SET(out, i, p);
     }
 }
 
