@@ -3,7 +3,7 @@
  *     aim        aim.c            angles -> where the beam goes and begins, and what the encoders read of it
  *     nearest    nearest.c        the first surface that the beam's centre meets: what stands still, and
  *                                 bodies that move; exact (core/bvh.h)
- *     optics     optics.c         where that is glass or a mirror: what is seen there
+ *     optics     optics.c         where that is glass or a mirror: what is seen there (caster_follow)
  *     sub-rays   sub_rays.c       pulses with a footprint: which of them need more rays, and their echoes;
  *                sub_ray_plan.c   where in a footprint those rays lie
  *     echoes     echoes.c         which returns are echoes, how they merge, their noise, which of them are sent
@@ -75,34 +75,35 @@ static void begin_echoes(struct echo_list *l, const struct chunk *k)
         l->width_m[i] = (float)k->s->pulse_m;
 }
 
-/* Rings have no ray of the centre alone; the others' goes first. */
-static void cast_centres(struct caster *c, const struct chunk *k)
+/* The rays of the pulses' centres, and where goes what they meet. */
+static struct met centres(struct caster *c, const struct chunk *k)
 {
     const struct cast_setup *s = k->s;
     const int surfaces = s->detect != NULL && s->detect->surfaces != NULL && s->beam == NULL;
-    const struct met met = {.rays = {.n = k->n,
-                                     .from = k->from,
-                                     .dir = VEC3_IN(c->d, 0),
-                                     .range_max_m = s->range_max_m,
-                                     .range_m = c->list.range_m,
-                                     .triangle = c->hit,
-                                     .label = c->list.label,
-                                     .steep = s->beam != NULL ? c->sub_rays->steep : NULL},
-                            .cosine = surfaces ? c->list.cosine : NULL,
-                            .body = surfaces ? c->body : NULL};
-    if (s->beam != NULL && s->beam->mode != BEAM_ADAPTIVE) return;
-    caster_nearest(c, s, &met);
-    if (surfaces && s->detect->depth > 0) caster_follow(c, s, &met);
+    return (struct met){.rays = {.n = k->n,
+                                 .from = k->from,
+                                 .dir = VEC3_IN(c->d, 0),
+                                 .range_max_m = s->range_max_m,
+                                 .range_m = c->list.range_m,
+                                 .triangle = c->hit,
+                                 .label = c->list.label,
+                                 .steep = s->beam != NULL ? c->sub_rays->steep : NULL},
+                        .cosine = surfaces ? c->list.cosine : NULL,
+                        .body = surfaces ? c->body : NULL};
 }
 
 /* Returns the number of echoes. */
 static uint32_t cast_chunk(struct caster *c, struct chunk *k)
 {
+    const struct cast_setup *s = k->s;
+    const int central = s->beam == NULL || s->beam->mode == BEAM_ADAPTIVE; /* rings have no ray for the centre */
     if (c->profile != NULL) c->profile->last = c->profile->now();
     caster_aim(c, k);
     begin_echoes(&c->list, k);
-    cast_centres(c, k); /* nearest, optics */
-    if (k->s->beam != NULL) caster_sub_rays(c, k);
+    const struct met met = centres(c, k);
+    if (central) caster_nearest(c, s, &met);
+    if (met.body != NULL && s->detect->depth > 0) caster_follow(c, s, &met);
+    if (s->beam != NULL) caster_sub_rays(c, k);
     caster_echoes(c, k);
     return caster_points(c, k);
 }
