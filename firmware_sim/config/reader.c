@@ -50,6 +50,11 @@ void *cfg_address(const struct cfg_reader *rd, const struct cfg_key *key, uint32
     return (char *)rd->base + at;
 }
 
+const char *cfg_word(const struct cfg_reader *rd, const char *path, int value)
+{
+    return cfg_find(&rd->table, path)->names[value];
+}
+
 const char *cfg_name(const char *path, uint32_t item, char *buf)
 {
     const char *bracket = strstr(path, "[]");
