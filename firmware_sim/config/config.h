@@ -31,6 +31,7 @@ enum {
     CONFIG_MAX_STATIONS = 64,
     CONFIG_MAX_SURFACES = 64,
     CONFIG_MAX_STOPS = 4096,
+    CONFIG_MAX_THREADS = 64,
     CONFIG_PATH_LEN = 512
 };
 
@@ -263,6 +264,9 @@ static inline int config_has_footprint(const struct config *cfg)
 {
     return cfg->profile.beam_exit_m != 0.0 || cfg->profile.beam_divergence_rad != 0.0;
 }
+
+/* Threads that cast: loop.threads, or one per processor. */
+uint32_t config_threads(const struct config *cfg);
 
 /* Whether anything in the scene, or the head, moves. */
 int config_moves(const struct config *cfg);

@@ -339,7 +339,7 @@ static const struct cfg_key config_keys[] = {
      .help = "How much of the stream is kept for a link whose reader is slow."},
     {KEY(loop.late_ms), CFG_REAL, "ms", "100", 0, 10000,
      .help = "Blocks that are later than this are not sent: their pulses are lost, counted and announced."},
-    {KEY(loop.threads), CFG_COUNT, NULL, "0", 0, 64, .help = "Casting threads; 0: one per processor."},
+    {KEY(loop.threads), CFG_COUNT, NULL, "0", 0, CONFIG_MAX_THREADS, .help = "Casting threads; 0: one per processor."},
     {KEY(loop.pace), CFG_ENUM, .def = "realtime",
      WORDS([PACE_REALTIME] = "realtime", [PACE_FAST] = "fast", [PACE_STEP] = "step"),
      .help = "realtime: by the clock; fast: as fast as it computes; step: a client grants time."},

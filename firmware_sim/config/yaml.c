@@ -274,10 +274,9 @@ static int check_depth(const struct cfg_reader *rd, const unsigned char *bytes, 
 {
     yaml_parser_t parser;
     yaml_event_t event;
-    int depth = 0, anchors = 0, code = SH_OK, done = 0;
-    if (!yaml_parser_initialize(&parser)) return sh_fail(rd->err, SH_ENOMEM, "%s: no memory to parse it", rd->file);
-    yaml_parser_set_encoding(&parser, YAML_UTF8_ENCODING);
-    yaml_parser_set_input_string(&parser, bytes, len);
+    int depth = 0, anchors = 0, done = 0;
+    int code = start_parser(rd, &parser, bytes, len);
+    if (code != SH_OK) return code;
     while (code == SH_OK && !done && yaml_parser_parse(&parser, &event)) {
         int line = (int)event.start_mark.line + 1;
         done = event.type == YAML_STREAM_END_EVENT;

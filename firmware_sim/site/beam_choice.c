@@ -1,13 +1,10 @@
 /* Beam and optics: looks at the scene as the head does, has core/plan choose, and makes the beams. */
-#include "firmware_sim/site/beam_choice.h"
+#include "firmware_sim/site/site_inside.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include "firmware_sim/site/detection.h"
-#include "firmware_sim/site/look.h"
 
 enum { FOOTPRINT_OPTIONS = 9, MANY_TRIANGLES = 1000000 }; /* so many: progress is reported */
 
@@ -19,18 +16,13 @@ struct trial {
     struct plan_sample *sample;
 };
 
-/* To be closed, also after an error; a trial of zeros may be. */
+/* The sample is to be freed, also after an error. */
 static int open_trial(struct trial *trial, struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     if (site->scene->n_triangles > MANY_TRIANGLES) sh_progress(report, "trying methods on the scene", -1.0);
     trial->site = site;
     site_look_open(&trial->look, site);
     return plan_sample_create(trial->look.place, trial->look.n, &trial->sample, err);
-}
-
-static void close_trial(struct trial *trial)
-{
-    plan_sample_free(trial->sample);
 }
 
 /* ---- beams */
@@ -165,7 +157,7 @@ static int try_beams(struct site *site, const struct beam_choice *choice, struct
     if (rc == SH_OK && !holds)
         sh_warn(report, "%s: beam.mode: auto: no beam holds plan.tolerance_m and plan.echo_tolerance here",
                 site->cfg->file);
-    close_trial(&trial);
+    plan_sample_free(trial.sample);
     return rc;
 }
 
@@ -194,7 +186,7 @@ static int force_beam(struct site *site, const struct sh_report *report, struct 
         int rc = open_beam_trial(&trial, site, report, err);
         if (rc == SH_OK && cfg->beam.mode == BEAM_ADAPTIVE) rc = add_outlines(&trial, report, err);
         if (rc == SH_OK) plan_sample_beam(trial.sample, cfg->beam.mode, cfg->beam.rings, &option);
-        close_trial(&trial);
+        plan_sample_free(trial.sample);
         if (rc != SH_OK) return rc;
     }
     site->plan.methods.beam = cfg->beam.mode;
@@ -233,7 +225,7 @@ static int choose_optics(struct site *site, const struct sh_report *report, stru
     }
     if (forced < 0 || site->measures) rc = open_trial(&trial, site, report, err);
     int holds = rc == SH_OK && try_depths(&trial, forced, option);
-    close_trial(&trial);
+    plan_sample_free(trial.sample);
     if (rc != SH_OK) return rc;
     const struct plan_choice ask = {"optics", option, CAST_MAX_DEPTH + 1, forced, "optics.depth", cfg->plan};
     uint32_t depth = site->plan.methods.depth = plan_choose(&ask, &site->plan.optics);

@@ -1,4 +1,4 @@
-#include "firmware_sim/site/platform.h"
+#include "firmware_sim/site/site_inside.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -6,8 +6,6 @@
 
 #include "core/angle.h"
 #include "core/vec3.h"
-#include "firmware_sim/site/bvhs.h"
-#include "firmware_sim/site/detection.h"
 
 /* Largest distance of the head's own path from the trajectory, and largest steps between its poses, in metres and ns:
  * a path is cut into them for BVHs, and a recorded trajectory has them. */

@@ -8,7 +8,7 @@
 #include "core/rng.h"
 #include "drivers/protocol/native_encode.h"
 #include "firmware_sim/base/clock.h"
-#include "firmware_sim/site/look.h"
+#include "firmware_sim/site/site_inside.h"
 
 /* Processor time: to warm the caches, and to measure for. Runs are short enough that one of the most expensive pulses
  * (1,027 sub-rays) ends within a few milliseconds. */

@@ -1,11 +1,10 @@
-#include "firmware_sim/site/stops.h"
+#include "firmware_sim/site/site_inside.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/angle.h"
-#include "firmware_sim/site/platform.h"
 
 /* The last stop may lie after the end by a rounding error: 1e-9 of a step, for times as people write them. */
 static int count_stops(const struct site *site, const struct site_part *part, uint32_t *n, struct sh_err *err)
