@@ -104,7 +104,7 @@ static int create_map(struct map_run *run, const struct site *site, struct sh_er
 static int draw(struct config *cfg, void *ctx, struct sh_err *err)
 {
     struct map_run *run = ctx;
-    struct offline *offline = NULL;
+    struct offline offline = {0};
     struct recording_result result;
     struct recording_options options = {.first_station = 1,
                                         .frames = 1,
@@ -115,9 +115,9 @@ static int draw(struct config *cfg, void *ctx, struct sh_err *err)
                                         .interrupted = app_interrupted};
     app_catch_signals();
     int rc = offline_open(cfg, &app_report_stderr, &offline, err);
-    if (rc == SH_OK) options.last_station = offline_site(offline)->n_stations;
-    if (rc == SH_OK) rc = create_map(run, offline_site(offline), err);
-    if (rc == SH_OK) rc = recording_run(offline_scanhead(offline), &options, &result, err);
+    if (rc == SH_OK) options.last_station = offline.site->n_stations;
+    if (rc == SH_OK) rc = create_map(run, offline.site, err);
+    if (rc == SH_OK) rc = recording_run(offline.sh, &options, &result, err);
     if (rc == SH_OK && app_interrupted()) rc = sh_fail(err, SH_EIO, "interrupted; nothing written");
     if (rc == SH_OK) rc = map_write_png(run->map, run->output, err);
     if (rc == SH_OK && !run->quiet) {
@@ -127,7 +127,7 @@ static int draw(struct config *cfg, void *ctx, struct sh_err *err)
                 (unsigned long long)counts.drawn, (unsigned long long)counts.outside);
     }
     map_free(run->map);
-    offline_close(offline);
+    offline_close(&offline);
     return rc;
 }
 

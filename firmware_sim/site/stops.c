@@ -25,24 +25,18 @@ static int count_stops(const struct site *site, const struct site_part *part, ui
 static int anchor_scene(struct site *site, struct sh_err *err)
 {
     const struct placement *at = &site->station[0].at;
-    const struct georef_place place = {at->lat_deg, at->lon_deg, at->height_m};
     if (site->anchor.known || !at->on_earth) return SH_OK;
     site->anchor.known = 1;
-    return geoframe_set_tangent(&site->anchor.frame, at->position_m, &place, 0.0, err);
+    return geoframe_set_tangent(&site->anchor.frame, at->position_m, &at->place, 0.0, err);
 }
 
 static int place(const struct site *site, const struct pose *head, struct placement *at, struct sh_err *err)
 {
-    struct georef_place place = {0};
     memcpy(at->position_m, head->position_m, sizeof at->position_m);
     pose_matrix(head->quat, at->rotation);
     at->floor_m = NAN;
     at->on_earth = site->anchor.known;
-    int rc = at->on_earth ? geoframe_locate(&site->anchor.frame, at->position_m, &place, err) : SH_OK;
-    at->lat_deg = place.lat_deg;
-    at->lon_deg = place.lon_deg;
-    at->height_m = place.height_m;
-    return rc;
+    return at->on_earth ? geoframe_locate(&site->anchor.frame, at->position_m, &at->place, err) : SH_OK;
 }
 
 /* As a station of the configuration would say it. */
