@@ -56,7 +56,7 @@ struct config_profile {
         double reflectance, range_m;
         enum config_from { FROM_DATA_SHEET, FROM_ASSUMED } from;
     } reach[DETECT_MAX_REACHES];
-    uint32_t n_reaches; /* 0: range_max_m on 90 % */
+    uint32_t n_reaches; /* at least 1: range_max_m on 90 % where the file has none */
     double threshold_snr, overlap_m, wavelength_nm, visibility_m, pulse_width_ns;
     double mirror_counts, pan_counts;        /* encoder counts per turn of the beam angle; 0: ideal (2^32 counts) */
     double beam_exit_m, beam_divergence_rad; /* core/footprint.h */

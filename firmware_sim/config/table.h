@@ -123,7 +123,7 @@ int cfg_check(const struct cfg_reader *rd, struct config *cfg);
 int cfg_check_places(const struct cfg_reader *rd, struct config *cfg);
 /* measurement.c: noise, signal, surfaces, and what of a profile concerns them. */
 int cfg_check_signal(const struct cfg_reader *rd, struct config *cfg);
-int cfg_check_reaches(const struct cfg_reader *rd, const struct config_profile *profile);
+int cfg_check_reaches(const struct cfg_reader *rd, struct config_profile *profile);
 /* The first link of the GNSS receiver; -1: none. */
 int cfg_nmea_link(const struct config *cfg);
 

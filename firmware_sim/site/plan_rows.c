@@ -92,7 +92,6 @@ static void ask_head(const struct site *site, struct plan_head *head)
     };
     for (uint32_t i = 0; i < cfg->profile.n_reaches; i++)
         head->reach_m = fmax(head->reach_m, cfg->profile.reach[i].range_m);
-    if (cfg->profile.n_reaches == 0) head->reach_m = cfg->profile.range_max_m;
 }
 
 int site_plan_rows(struct site *site, struct sh_err *err)
