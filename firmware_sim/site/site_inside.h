@@ -4,7 +4,7 @@
 
 #include "firmware_sim/site/site.h"
 
-/* ---- detection.c: What a site's scans do between a hit and a point (signal, surfaces, instrument, noise),
+/* ---- detection.c: what a site's scans do between a hit and a point (signal, surfaces, instrument, noise),
  * made once from the configuration and the loaded scene. */
 
 /* The scene and its movers are loaded. Where there are mirrors, site->n_surfaces grows by the labels of ghosts. Warns
@@ -25,29 +25,17 @@ double site_farthest_m(const struct site *site, const double from_m[3]);
 /* How far noise may take a point. */
 double site_noise_m(const struct site *site);
 
-/* ---- stops.c: A head that scans where its platform stops. */
+/* ---- platform.c: a head that moves while it scans, or that scans where its platform stops. From the configured
+ * trajectory come its poses and BVHs, or the stations. */
 
 /* Puts the stops in the place of the configuration's only station. That one has been placed: without an anchor it says
  * where on the Earth the scene lies, as an anchor at its position with the scene's y axis to true north would. */
 int site_load_stops(struct site *site, struct sh_err *err);
 
-/* ---- platform.c: A head that moves while it scans. From the configured trajectory come its poses and
- * BVHs. */
-
-/* The part of the trajectory that the configuration names, in its own times. */
-struct site_part {
-    struct trajectory *trajectory; /* to be freed by who opened it */
-    double start_s, end_s;
-};
-int site_open_trajectory(const struct site *site, struct site_part *part, struct sh_err *err);
-
-/* The head on the platform. */
-void site_get_mount(const struct config_platform *platform, struct pose *mount);
-
 /* Reads the trajectory, and builds the BVHs that its path needs. */
 int site_load_platform(struct site *site, const struct sh_report *report, struct sh_err *err);
 
-/* ---- bvhs.c: The BVHs of a site: one for each body that moves, and as many of the scene as the places of
+/* ---- bvhs.c: the BVHs of a site: one for each body that moves, and as many of the scene as the places of
  * the head need. */
 
 /* Where rays begin. */
@@ -65,14 +53,14 @@ int site_build_mover_bvhs(struct site *site, const struct sh_report *report, str
 /* For heads that stand; stations near each other share one. */
 int site_build_station_bvhs(struct site *site, const struct sh_report *report, struct sh_err *err);
 
-/* ---- georeference.c: Georeferencing of a site's stations: heights, CRS, method, and how many metres a
+/* ---- georeference.c: georeferencing of a site's stations: heights, CRS, method, and how many metres a
  * count is on the wire. */
 
 /* Stations are placed, the path of a moving head is known. Fills the stations' georef, plan, scale and leg, and
  * site->scale_m. Warns where a tolerance is not met. */
 int site_georeference(struct site *site, const struct sh_report *report, struct sh_err *err);
 
-/* ---- look.c: Looking at the scene as the head does: the places that pulses are fired from, with setups as
+/* ---- look.c: looking at the scene as the head does: the places that pulses are fired from, with setups as
  * the run's. For trying methods (core/plan draws the pulses), and for measuring what they cost. */
 
 enum { SITE_LOOK_STATIONS = 4 }; /* at most so many stations are looked from */
@@ -90,7 +78,7 @@ struct site_look {
  * be moved or copied: its places point into it. */
 void site_look_open(struct site_look *look, const struct site *site);
 
-/* ---- beam_choice.c: Which beam a pulse is, and how far pulses are followed through glass and mirrors:
+/* ---- beam_choice.c: which beam a pulse is, and how far pulses are followed through glass and mirrors:
  * measured on the scene where the configuration leaves it open. */
 
 /* All else of the site is in place. Sets beam, rings and depth of site->plan.methods and the rows of beam and optics,
