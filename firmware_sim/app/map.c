@@ -5,6 +5,7 @@
 
 #include "core/map.h"
 #include "core/mat3.h"
+#include "core/vec3.h"
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/offline.h"
 #include "firmware_sim/app/recording.h"
@@ -42,9 +43,7 @@ static int add_frame(void *ctx, struct scanhead *sh, const struct scanhead_frame
         for (int i = 0; i < n; i++) {
             double p[3];
             to_map(run, (const double[3]){run->point[i].x, run->point[i].y, run->point[i].z}, p);
-            run->x[i] = p[0];
-            run->y[i] = p[1];
-            run->z[i] = p[2];
+            VEC3_SET(*run, i, p);
         }
         map_add_points(run->map, (size_t)n, run->x, run->y, run->z);
         first += (uint32_t)n;

@@ -268,10 +268,9 @@ static inline int config_has_footprint(const struct config *cfg)
 /* Threads that cast: loop.threads, or one per processor. */
 uint32_t config_threads(const struct config *cfg);
 
-/* Whether anything in the scene, or the head, moves. */
-int config_moves(const struct config *cfg);
-/* True when all beams begin at one place of a scene that stands still: what an adaptive beam needs. */
-int config_beam_fixed(const struct config *cfg);
+/* Why the beams of a scan do not all begin at one place of a scene that stands still; NULL: they do. That is what an
+ * adaptive beam needs. */
+const char *config_beam_moves(const struct config *cfg);
 
 /* The reference: every key with type, unit, default, range and help. */
 void config_print_reference(FILE *out);

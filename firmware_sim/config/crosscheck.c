@@ -286,17 +286,14 @@ static int check_platform(const struct cfg_reader *rd, struct config *cfg)
     return check_part(rd, cfg);
 }
 
-int config_moves(const struct config *cfg)
+const char *config_beam_moves(const struct config *cfg)
 {
     int moves = cfg->platform.kind != PLATFORM_STATIC;
     for (uint32_t i = 0; i < cfg->scene.n_meshes; i++)
         moves |= config_mesh_moves(&cfg->scene.mesh[i]);
-    return moves;
-}
-
-int config_beam_fixed(const struct config *cfg)
-{
-    return !config_moves(cfg) && cfg->instrument.transit_offset_m == 0.0 && cfg->instrument.mirror_offset_m == 0.0;
+    if (moves) return "the head or a mesh moves";
+    if (cfg->instrument.transit_offset_m == 0.0 && cfg->instrument.mirror_offset_m == 0.0) return NULL;
+    return "instrument.transit_offset_m or mirror_offset_m moves the beam";
 }
 
 static const double LEAST_PULSE_NS = 0.1; /* 15 mm of range */
@@ -320,10 +317,9 @@ static int check_beam(const struct cfg_reader *rd, const struct config *cfg)
     if (cfg->beam.mode == BEAM_SINGLE || cfg->beam.mode == BEAM_AUTO) return SH_OK;
     if (!config_has_footprint(cfg))
         return cfg_fail_key(rd, "beam.mode", 0, "head profile %s has no footprint; allowed single", cfg->profile.name);
-    if (cfg->beam.mode == BEAM_ADAPTIVE && !config_beam_fixed(cfg))
-        return cfg_fail_key(rd, "beam.mode", 0, "adaptive, but %s; allowed single, rings, auto",
-                            config_moves(cfg) ? "the head or a mesh moves"
-                                              : "instrument.transit_offset_m or mirror_offset_m moves the beam");
+    const char *why = config_beam_moves(cfg);
+    if (cfg->beam.mode == BEAM_ADAPTIVE && why != NULL)
+        return cfg_fail_key(rd, "beam.mode", 0, "adaptive, but %s; allowed single, rings, auto", why);
     return SH_OK;
 }
 

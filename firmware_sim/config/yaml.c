@@ -221,21 +221,12 @@ static int read_bytes(const struct cfg_reader *rd, unsigned char **bytes, size_t
     return code;
 }
 
-/* The start of a line, counted from 1, in the bytes; NULL when there are not that many. */
-static const unsigned char *find_line(const unsigned char *bytes, size_t len, int line)
-{
-    const unsigned char *p = bytes, *end = bytes + len;
-    while (p != NULL && --line > 0) {
-        p = memchr(p, '\n', (size_t)(end - p));
-        if (p != NULL) p++;
-    }
-    return p == end ? NULL : p;
-}
-
+/* A line, counted from 1, in the bytes. */
 static int indented_by_tab(const unsigned char *bytes, size_t len, int line)
 {
-    const unsigned char *p = find_line(bytes, len, line), *end = bytes + len;
-    if (p == NULL) return 0;
+    const unsigned char *p = bytes, *end = bytes + len;
+    while (p < end && line > 1)
+        line -= *p++ == '\n';
     while (p < end && *p == ' ')
         p++;
     return p < end && *p == '\t';

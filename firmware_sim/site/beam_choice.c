@@ -32,9 +32,7 @@ static const char *why_not(const struct site *site, enum beam_mode mode)
 {
     if (mode == BEAM_SINGLE) return NULL;
     if (!config_has_footprint(site->cfg)) return "the head profile has no footprint";
-    if (mode != BEAM_ADAPTIVE) return NULL;
-    if (config_beam_fixed(site->cfg)) return NULL;
-    return config_moves(site->cfg) ? "the head or a mesh moves" : "an offset of the instrument moves the beam";
+    return mode == BEAM_ADAPTIVE ? config_beam_moves(site->cfg) : NULL;
 }
 
 static int make_beam(const struct site *site, struct site_station *s, int adaptive, const struct sh_report *report,

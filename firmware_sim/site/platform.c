@@ -39,8 +39,10 @@ static int open_trajectory(const struct site *site, struct part *part, struct sh
 }
 
 /* The head on the platform. */
-static void get_mount(const struct config_platform *p, struct pose *mount)
+static void set_mount(struct site *site)
 {
+    const struct config_platform *p = &site->cfg->platform;
+    struct pose *mount = &site->mount;
     memcpy(mount->position_m, p->mount_m, sizeof p->mount_m);
     pose_from_angles(angle_rad(p->mount_heading_deg), angle_rad(p->mount_pitch_deg), angle_rad(p->mount_roll_deg),
                      mount->quat);
@@ -65,7 +67,7 @@ static int load_knots(struct site *site, const struct sh_report *report, struct 
     if (rc != SH_OK)
         return sh_fail(err, rc, "%s: platform.%s: %.300s", site->cfg->file, p->file[0] != '\0' ? "file" : "waypoints",
                        why.text);
-    if (rc == SH_OK && site->knot_error_m > TOLERANCE_M * 1.001)
+    if (site->knot_error_m > TOLERANCE_M * 1.001)
         sh_warn(report,
                 "the trajectory bends more than poses %g ms apart can follow: the head leaves it by up to %.2g m",
                 1e-3 * POSE_MIN_STEP_US, site->knot_error_m);
@@ -139,7 +141,7 @@ int site_load_platform(struct site *site, const struct sh_report *report, struct
 {
     const struct config *cfg = site->cfg;
     const struct config_platform *p = &cfg->platform;
-    get_mount(p, &site->mount);
+    set_mount(site);
     if (p->kind == PLATFORM_LIVE) {
         double reach_m = 0.0;
         for (uint32_t i = 1; i < cfg->n_stations; i++)
@@ -202,8 +204,7 @@ static void describe(const struct pose *head, uint32_t i, struct config_station 
     out->roll_deg = angle_deg(roll);
 }
 
-static int add_stop(struct site *site, const struct part *part, const struct pose *mount, uint32_t i,
-                    struct sh_err *err)
+static int add_stop(struct site *site, const struct part *part, uint32_t i, struct sh_err *err)
 {
     const struct config_platform *p = &site->cfg->platform;
     struct site_station *s = &site->station[i];
@@ -211,7 +212,7 @@ static int add_stop(struct site *site, const struct part *part, const struct pos
     struct sh_err why;
     double since_s = i * p->step_s;
     trajectory_at(part->trajectory, fmin(part->start_s + since_s, part->end_s), &body, &s->frame);
-    pose_mount(&body, mount, &head);
+    pose_mount(&body, &site->mount, &head);
     s->t_s = p->start_s + since_s;
     s->station = &site->stop[i];
     describe(&head, i, &site->stop[i]);
@@ -222,7 +223,6 @@ static int add_stop(struct site *site, const struct part *part, const struct pos
 int site_load_stops(struct site *site, struct sh_err *err)
 {
     struct part part;
-    struct pose mount;
     uint32_t n = 0;
     int rc = open_trajectory(site, &part, err);
     if (rc != SH_OK) return rc;
@@ -235,9 +235,9 @@ int site_load_stops(struct site *site, struct sh_err *err)
         site->n_stations = site->station != NULL ? n : 0;
         if (site->station == NULL || site->stop == NULL) rc = sh_fail(err, SH_ENOMEM, "no memory for %u stops", n);
     }
-    get_mount(&site->cfg->platform, &mount);
+    set_mount(site);
     for (uint32_t i = 0; i < n && rc == SH_OK; i++)
-        rc = add_stop(site, &part, &mount, i, err);
+        rc = add_stop(site, &part, i, err);
     trajectory_free(part.trajectory);
     return rc;
 }
