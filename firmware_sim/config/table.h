@@ -12,7 +12,8 @@
 
 enum cfg_type {
     CFG_MAP,   /* a section, or one element of a list; nothing is stored */
-    CFG_LIST,  /* offset, size: the array and its stride; count_offset: uint32_t; min..max elements */
+    CFG_LIST,  /* offset, size: the array and its stride; count_offset: uint32_t; min..max elements. The next row,
+                * of type CFG_MAP, is an element. */
     CFG_BOOL,  /* off|on -> int */
     CFG_ENUM,  /* names[value] -> int or enum; false and true are read as off and on here, too */
     CFG_COUNT, /* whole number -> 4 or 8 bytes */

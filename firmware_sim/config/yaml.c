@@ -135,17 +135,16 @@ static int read_list(struct walk *w, const struct cfg_key *key, const yaml_node_
     if (node->type != YAML_SEQUENCE_NODE) return wrong_kind(w, key, 0, node);
     const yaml_node_item_t *first = node->data.sequence.items.start;
     ptrdiff_t n = node->data.sequence.items.top - first;
-    char path[CFG_PATH_MAX], allowed[CFG_ALLOWED_MAX];
+    char allowed[CFG_ALLOWED_MAX];
     if ((double)n > key->max)
         return cfg_fail(w->rd, line_of(node), key->path, "%td elements are too many; %s", n, cfg_allowed(key, allowed));
-    snprintf(path, sizeof path, "%s[]", key->path);
-    const struct cfg_key *element = cfg_find(&w->rd->table, path);
+    const struct cfg_key *element = key + 1;
     for (uint32_t i = 0; i < (uint32_t)n; i++) {
         const yaml_node_t *child = yaml_document_get_node(w->doc, first[i]);
         if (child->type != YAML_MAPPING_NODE) return wrong_kind(w, element, i, child);
         *cfg_list_count(w->rd, key) = i + 1;
         w->rd->line[cfg_row(w->rd, element)][i] = line_of(child);
-        int code = read_map(w, child, path, i);
+        int code = read_map(w, child, element->path, i);
         if (code != SH_OK) return code;
     }
     return SH_OK;

@@ -83,23 +83,15 @@ static int apply_beam(struct site *site, const struct sh_report *report, struct 
 
 /* ---- the choice of a beam */
 
-/* Footprints for the stations that are looked from. */
-static int open_beam_trial(struct trial *trial, struct site *site, const struct sh_report *report, struct sh_err *err)
-{
-    int rc = open_trial(trial, site, report, err);
-    for (uint32_t i = 0; i < trial->look.n && rc == SH_OK; i++) {
-        struct site_station *s = &site->station[trial->look.at[i].station];
-        rc = make_beam(site, s, 0, report, err);
-        trial->look.place[i].beam = s->beam;
-    }
-    return rc;
-}
-
-static int add_outlines(const struct trial *trial, const struct sh_report *report, struct sh_err *err)
+/* Footprints for the stations that are looked from; outlines, too, where adaptive. */
+static int make_beams(struct trial *trial, int adaptive, const struct sh_report *report, struct sh_err *err)
 {
     int rc = SH_OK;
-    for (uint32_t i = 0; i < trial->look.n && rc == SH_OK; i++)
-        rc = make_beam(trial->site, &trial->site->station[trial->look.at[i].station], 1, report, err);
+    for (uint32_t i = 0; i < trial->look.n && rc == SH_OK; i++) {
+        struct site_station *s = &trial->site->station[trial->look.at[i].station];
+        rc = make_beam(trial->site, s, adaptive, report, err);
+        trial->look.place[i].beam = s->beam;
+    }
     return rc;
 }
 
@@ -135,7 +127,7 @@ static int measure_beams(struct trial *trial, const struct beam_choice *choice, 
         if (option[i].why_not[0] != '\0' || option[i].cost_ns > cost_ns) continue;
         if (choice[i].mode == BEAM_ADAPTIVE) {
             if (*holds) continue;
-            rc = add_outlines(trial, report, err);
+            rc = make_beams(trial, 1, report, err);
             if (rc != SH_OK) return rc;
         }
         plan_sample_beam(trial->sample, choice[i].mode, choice[i].rings, &option[i]);
@@ -150,7 +142,8 @@ static int try_beams(struct site *site, const struct beam_choice *choice, struct
                      const struct sh_report *report, struct sh_err *err)
 {
     struct trial trial = {0};
-    int holds = 0, rc = open_beam_trial(&trial, site, report, err);
+    int holds = 0, rc = open_trial(&trial, site, report, err);
+    if (rc == SH_OK) rc = make_beams(&trial, 0, report, err);
     if (rc == SH_OK) rc = measure_beams(&trial, choice, option, report, err, &holds);
     if (rc == SH_OK && !holds)
         sh_warn(report, "%s: beam.mode: auto: no beam holds plan.tolerance_m and plan.echo_tolerance here",
@@ -181,8 +174,8 @@ static int force_beam(struct site *site, const struct sh_report *report, struct 
     struct trial trial = {0};
     plan_beam_option(cfg->beam.mode, cfg->beam.rings, &option);
     if (site->measures && config_has_footprint(cfg)) {
-        int rc = open_beam_trial(&trial, site, report, err);
-        if (rc == SH_OK && cfg->beam.mode == BEAM_ADAPTIVE) rc = add_outlines(&trial, report, err);
+        int rc = open_trial(&trial, site, report, err);
+        if (rc == SH_OK) rc = make_beams(&trial, cfg->beam.mode == BEAM_ADAPTIVE, report, err);
         if (rc == SH_OK) plan_sample_beam(trial.sample, cfg->beam.mode, cfg->beam.rings, &option);
         plan_sample_free(trial.sample);
         if (rc != SH_OK) return rc;
