@@ -1,4 +1,5 @@
-/* Arrays that grow. */
+/* Arrays that grow. In: an array, and how many elements it must hold. Out: the array, moved where it had to
+ * be. */
 #ifndef CORE_GROW_H
 #define CORE_GROW_H
 

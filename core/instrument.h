@@ -1,5 +1,6 @@
 /* Instrument errors: the geometry of a scanner that is not quite as designed. Its mechanics say where the
- * beam really goes, its encoders what the head believes.
+ * beam really goes, its encoders what the head believes. In: scheduled angles in turns, errors. Out: directions
+ * and origins of beams (socs, metres), and what the encoders read (turns).
  *
  * Terms as in D. Lichti, Error modelling, calibration and analysis of an AM-CW terrestrial laser scanner
  * system (2007), and B. Muralikrishnan et al., Volumetric performance evaluation of a laser scanner based on
@@ -12,10 +13,9 @@
  *
  * collimation: the beam leaves the plane across the mirror's axis, to the right; in pan by c / cos m.
  * trunnion: the mirror's axis is not level, its right end sinks; in pan by trunnion tan m.
- * transit offset: the mirror's axis passes the pan's axis, so far ahead of it; seen in range by cos m, in
- * line angle by
- * -sin m / R.
- * mirror offset: the beam leaves so far to the right of the pan's axis; seen in pan by 1 / (R cos m).
+ * transit offset: the mirror's axis passes this far ahead of the pan's axis; seen in range by cos m, in line
+ * angle by -sin m / R.
+ * mirror offset: the beam leaves this far to the right of the pan's axis; seen in pan by 1 / (R cos m).
  *
  * Encoders, each: reading = a + index + scale a + eccentricity sin(a - phase); a: true angle, as scheduled.
  * Range: reading = (1 + range_scale) R + range_offset.

@@ -1,4 +1,5 @@
-/* Surfaces: how much of a pulse comes back from what it met.
+/* Surfaces: how much of a pulse comes back from what it met. In: label, incidence and texel of each hit. Out:
+ * the power that comes back, relative to a white target (below).
  *
  * Monostatic: source and detector look along the same line. What returns is given relative to a white
  * Lambertian target that fills the beam and is met head on at the same range:
@@ -6,21 +7,18 @@
  *     rho(i) = reflectance cos i + specular (m + 2)/2 cos^m(2i) cos i + retro
  *
  * - reflectance: Lambertian, radiance the same in all directions; cos i is the area the beam is spread over.
- * - specular: a lobe of cos^m about the mirror direction, which lies 2i from the way back; normalised so that
- * all of it
- *   adds up to `specular` (E. P. Lafortune, Y. D. Willems, Using the modified Phong reflectance model, 1994);
- *   m is `gloss`.
- * - retro: sent back into a narrow cone around where it came from, whatever the incidence: a foil has 100 to
- * 1000.
+ * - specular: a lobe of cos^m about the mirror direction, which lies 2i from the way back. It is normalised so
+ *   that all of it adds up to `specular` (E. P. Lafortune, Y. D. Willems, Using the modified Phong reflectance
+ *   model, 1994); m is `gloss`.
+ * - retro: sent back into a narrow cone around where it came from, at any incidence: a foil has 100 to 1000.
  *
  * Glass passes a share of the power on, at each of its surfaces, in the same direction (panes are thin: no
  * refraction). A mirror sends a share on by the law of reflection.
  *
- * Where the mesh has a colour, the reflectance is taken from it: the luminance of linear sRGB (ITU-R BT.709:
- * 0.2126 R +
- * 0.7152 G + 0.0722 B). That is an assumption: what is light to the eye need not be at the laser's
- * wavelength. Where it has a diffuse texture, likewise from the texel at the hit, times the colour, channel
- * by channel. */
+ * Where the mesh has a colour, the reflectance is its luminance in linear sRGB (ITU-R BT.709: 0.2126 R +
+ * 0.7152 G + 0.0722 B). That is an assumption: what is light to the eye need not be light at the laser's
+ * wavelength. Where it has a diffuse texture, the colour is multiplied by the texel at the hit, channel by
+ * channel. */
 #ifndef CORE_SURFACE_H
 #define CORE_SURFACE_H
 
@@ -70,9 +68,8 @@ int surface_kinds(const struct surface_table *table, uint16_t *kind, struct sh_e
 int surface_table_texture(struct surface_table *table, uint32_t label, const struct scene_surface *named,
                           const struct scene_texture *texture, struct sh_err *err);
 
-/* Labels of hits hold the surface in their low 16 bits. The high ones, where a texture holds the reflectance
- * there, are
- * 1 + 65534 times that, else 0. uv: of the hit, finite. Only for surfaces with a texture. */
+/* Labels of hits hold the surface in their low 16 bits. Where a texture holds the reflectance, the
+ * high ones are 1 + 65534 times that, else 0. uv: of the hit, finite. Only for surfaces with a texture. */
 uint32_t surface_texel(const struct surface_table *table, uint32_t label, const double uv[2]);
 static inline uint32_t surface_of_label(uint32_t label)
 {

@@ -1,4 +1,5 @@
-/* Private to core/pose. */
+/* Private to core/pose: what a trajectory consists of. In: samples (seconds, poses in prcs, metres), which
+ * trajectory_files.c reads. Out: the struct from which trajectory.c makes the curve and its knots. */
 #ifndef CORE_POSE_TRAJECTORY_H
 #define CORE_POSE_TRAJECTORY_H
 

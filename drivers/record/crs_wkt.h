@@ -1,4 +1,5 @@
-/* A CRS as well-known text 1 (OGC 01-009), as LAS 1.4 and E57 want it. */
+/* A CRS as well-known text 1 (OGC 01-009), as LAS 1.4 and E57 want it. In: an EPSG
+ * code, and which heights. Out: the text. */
 #ifndef DRIVERS_RECORD_CRS_WKT_H
 #define DRIVERS_RECORD_CRS_WKT_H
 

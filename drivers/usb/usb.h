@@ -184,8 +184,7 @@ int usb_device_configuration(const struct usb_device *device);
 /* The present alternate setting's row; NULL when not configured. */
 const struct usb_interface_row *usb_device_row(const struct usb_device *device, unsigned interface);
 
-/* ---- for functions. An endpoint that is not there, is halted or suspended has no room and nothing to read.
- * */
+/* ---- for functions. An endpoint that is not there, is halted or suspended has no room and nothing to read. */
 
 /* Bytes taken by waiting IN transfers, maybe 0. */
 size_t usb_device_write(struct usb_device *device, uint8_t endpoint, const void *data, size_t len);

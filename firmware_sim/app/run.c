@@ -161,7 +161,7 @@ static const struct app_option OPTIONS[] = {
     {APP_KEY, "pace", "PACE", .key = "loop.pace",
      .help = "realtime, fast (as fast as it computes), step (a peer grants time with TIME:STEP)"},
     {APP_NUMBER, "duration", "S", .min = 0.001, .max = 1e8, .at = AT(device.duration_s),
-     .help = "end after S seconds of device time: of scanning with --start, else since power-up"},
+     .help = "end after S seconds of device time; they count from power-up, with --start from the scan's start"},
     {APP_KEY_GIVEN, "frames", "N", .key = "head.frames", .at = AT(device.one_scan),
      .help = "frames per scan; with --start, end after the first scan"},
     {APP_KEY, "threads", "N", .key = "loop.threads", .help = "threads that cast; 0: one per processor"},

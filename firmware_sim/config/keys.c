@@ -99,9 +99,9 @@ static const struct cfg_key config_keys[] = {
     {KEY(scene.anchor.north_deg), CFG_REAL, "deg", "0", -360, 360,
      .help = "explicit: where true north lies, clockwise from the scene's y axis."},
     {KEY(scene.anchor.utm_zone), CFG_COUNT, NULL, "", 0, 60,
-     .help = "utm: zone of the meshes' coordinates; 0: UPS. Required there."},
+     .help = "utm: zone of the meshes' coordinates; 0: UPS. Required with source: utm."},
     {"scene.anchor.hemisphere", IN_CONFIG(scene.anchor.north), CFG_ENUM, .def = "", WORDS("south", "north"),
-     .help = "utm: where their northing counts from. Required there."},
+     .help = "utm: hemisphere that their northing counts from. Required with source: utm."},
 
     {"stations", .type = CFG_LIST, .min = 1, .max = CONFIG_MAX_STATIONS, LIST_OF(station, n_stations),
      .help = "Places where the head can stand."},
@@ -152,7 +152,7 @@ static const struct cfg_key config_keys[] = {
     {KEY(platform.end_s), CFG_REAL, "s", "0", 0, 1e9,
      .help = "trajectory, stops: where it ends, likewise; at the last sample when not given."},
     {KEY(platform.step_s), CFG_REAL, "s", "0", 0, 1e9,
-     .help = "stops: time from each stop to the next, up to end_s. Required there."},
+     .help = "stops: time from each stop to the next, up to end_s. Required with kind: stops."},
     {KEY(platform.at_end), CFG_ENUM, .def = "stop", WORDS([PLATFORM_STOP] = "stop", [PLATFORM_HOLD] = "hold"),
      .help = "trajectory: at its end the scan stops, or the platform holds its last pose."},
     {KEY(platform.mount_m), CFG_VEC3, "m", "[0, 0, 0]", -1000, 1000,
@@ -193,7 +193,8 @@ static const struct cfg_key config_keys[] = {
      .help = "on: each points frame is followed by one with amplitude (needs signal.model: on) and width of its "
              "echoes, 4 bytes a point; .ply and .las recordings have them."},
     {KEY(output.scale_m), CFG_REAL, "m", "0", 0, 1, .allowed = "0 (automatic) or 1e-6 to 1 m",
-     .help = "Metres per count of a range, and at most that of a coordinate. The largest range must fit into 31 bits."},
+     .help = "Metres per count of a range; a count of a coordinate is no larger. The largest range must fit into 31 "
+             "bits."},
 
     {"links", .type = CFG_LIST, .min = 0, .max = CONFIG_MAX_LINKS, LIST_OF(link, n_links),
      .help = "Where the head can be reached; none is needed to record off line."},
@@ -237,7 +238,7 @@ static const struct cfg_key config_keys[] = {
              "it can tell apart."},
     {"beam.echoes", SETTING(echoes), CFG_ENUM, .def = "all",
      WORDS([BEAM_ALL] = "all", [BEAM_FIRST] = "first", [BEAM_LAST] = "last", [BEAM_STRONGEST] = "strongest"),
-     .help = "Which echoes of a pulse are sent, those of glass and of what is seen through it included."},
+     .help = "Which echoes of a pulse are sent. Those of glass, and of what is seen through it, are among them."},
 
     {"plan", .type = CFG_MAP,
      .help = "Tolerances. Each stage uses the cheapest method that holds them (`scanhead plan`)."},

@@ -25,8 +25,9 @@ double site_farthest_m(const struct site *site, const double from_m[3]);
 /* How far noise may take a point. */
 double site_noise_m(const struct site *site);
 
-/* ---- platform.c: a head that moves while it scans, or that scans where its platform stops. From the configured
- * trajectory come its poses and BVHs, or the stations. */
+/* ---- platform.c: a head that moves while it scans, or that scans where its platform stops (platform.kind: stops).
+ * In: the configured trajectory and times. Out: its poses (scene frame, metres) and the BVHs that its path needs; or
+ * a station for each stop, placed in the scene. */
 
 /* Puts the stops in the place of the configuration's only station. That one has been placed: without an anchor it says
  * where on the Earth the scene lies, as an anchor at its position with the scene's y axis to true north would. */
@@ -35,8 +36,8 @@ int site_load_stops(struct site *site, struct sh_err *err);
 /* Reads the trajectory, and builds the BVHs that its path needs. */
 int site_load_platform(struct site *site, const struct sh_report *report, struct sh_err *err);
 
-/* ---- bvhs.c: the BVHs of a site: one for each body that moves, and as many of the scene as the places of
- * the head need. */
+/* ---- bvhs.c: one BVH for each body that moves, and as many of the scene as the places of the head need. In: the
+ * loaded scene, and where rays begin (prcs, metres). Out: site->bvh and the BVHs of movers; the site owns them. */
 
 /* Where rays begin. */
 struct site_sphere {
