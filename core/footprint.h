@@ -109,17 +109,15 @@ struct beam_return {
     double range_m;
     double energy; /* of the footprint's */
     double back;   /* what comes back of that, where surfaces are modelled; else the energy again */
-    float cosine;  /* of the incidence */
     float sigma_m; /* of the ranges within it */
-    uint32_t triangle, label;
+    uint32_t label;
 };
 
 struct beam_echo {
     double range_m;
     double energy, back; /* sums over its returns */
-    float cosine;
     float width_m;
-    uint32_t triangle, label;
+    uint32_t label;
     uint8_t number; /* among the pulse's, from 0, those counted that were left out: for random numbers */
 };
 
@@ -173,10 +171,6 @@ struct beam_outlines_spec {
 int beam_outlines_create(const struct beam_outlines_spec *spec, const struct beam_probe *probe,
                          struct beam_outlines **out, struct sh_err *err);
 void beam_outlines_free(struct beam_outlines *outlines);
-struct beam_outlines_info {
-    uint64_t edges, outlines, stretches, entries, bytes;
-};
-void beam_outlines_get_info(const struct beam_outlines *outlines, struct beam_outlines_info *info);
 
 enum { BEAM_NEAR_MOST = 1024 };
 /* A pulse whose footprint may reach outlines first .. end. */

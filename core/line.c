@@ -25,10 +25,6 @@ int line_block_alloc_attributes(struct line_block *block, struct sh_err *err)
     block->amplitude_cdb = calloc(block->capacity, sizeof *block->amplitude_cdb);
     block->width_cns = calloc(block->capacity, sizeof *block->width_cns);
     if (block->amplitude_cdb != NULL && block->width_cns != NULL) return SH_OK;
-    free(block->amplitude_cdb);
-    free(block->width_cns);
-    block->amplitude_cdb = NULL;
-    block->width_cns = NULL;
     return sh_fail(err, SH_ENOMEM, "line: no memory for attributes of %u points", block->capacity);
 }
 

@@ -68,7 +68,7 @@ enum {
 };
 
 int line_block_alloc(struct line_block *block, uint32_t capacity, struct sh_err *err);
-/* For a block that has its other arrays. On failure the block is as it was. */
+/* For a block that has its other arrays. */
 int line_block_alloc_attributes(struct line_block *block, struct sh_err *err);
 void line_block_free(struct line_block *block);
 

@@ -70,8 +70,6 @@ int plan_georef(const struct georef *georef, const struct plan_georef_need *need
 /* Georeferencing where points leave as range and angles. */
 void plan_georef_polar(struct plan_row *row);
 
-const char *plan_method_name(enum georef_method method);
-
 /* ---- sampling */
 
 /* Where the head fires from, and what. */

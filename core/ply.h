@@ -67,10 +67,15 @@ struct ply_rows {
     double scalar[PLY_SCALARS];        /* of the row, by ply_use; [PLY_SKIP] has no meaning */
     double *corner;                    /* the list of use PLY_CORNERS */
     size_t n_corners, cap_corners;
+    bool is_single; /* x, y or z of vertices are: read as they stand, but what they stood for was rounded */
+    void (*progress)(void *ctx, double fraction);
+    void *progress_ctx;
 };
 
-/* Opens the file and reads the header; path has to stay. ply_close is due in any case. */
-int ply_open(struct ply_rows *r, const char *path, void (*tick)(void *ctx), void *ctx, struct sh_err *err);
+/* Opens the file and reads the header; path has to stay. progress is called now (fraction -1: unknown) and by
+ * ply_walk. ply_close is due in any case. */
+int ply_open(struct ply_rows *r, const char *path, void (*progress)(void *ctx, double fraction), void *ctx,
+             struct sh_err *err);
 void ply_close(struct ply_rows *r);
 
 /* Who takes the rows. */
@@ -78,9 +83,8 @@ struct ply_user {
     void *ctx;
     int (*begin)(void *ctx, struct sh_err *err); /* before the rows of r->element, whose count fits into the file */
     int (*row)(void *ctx, struct sh_err *err);   /* after each row, which is in r; row r->row of the element */
-    void (*progress)(void *ctx, double fraction);
-    const struct sh_report *report; /* gets warnings */
-    bool has_faces;                 /* faces are used, not passed over */
+    const struct sh_report *report;              /* gets warnings */
+    bool has_faces;                              /* faces are used, not passed over */
 };
 
 /* Reads all rows in the order of the file. Warns of elements that nobody uses, and of bytes after the last
@@ -92,9 +96,5 @@ int ply_fail(const struct ply_rows *r, struct sh_err *err, const char *what);
 
 /* The line of a text, 0 in a binary. */
 uint64_t ply_line(const struct ply_rows *r);
-
-/* Are x, y or z of r->element, a vertex, stored in single precision? Their numbers are read as they stand,
- * but what they stood for was rounded. */
-bool ply_is_single(const struct ply_rows *r);
 
 #endif

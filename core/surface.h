@@ -87,7 +87,4 @@ static inline const struct surface *surface_at(const struct surface_table *table
 void surface_return(const struct surface_table *table, uint32_t n, const uint32_t *label, const double *cos_incidence,
                     double *rho);
 
-/* Reflectance of a colour (sRGB, 0..1). */
-double surface_luminance(const float rgb[3]);
-
 #endif

@@ -29,8 +29,10 @@ struct text {
     locale_t c_locale;
 };
 
-/* Reads the whole file; tick (may be NULL) is called every 16 MiB. text_close is due in any case. */
-int text_open(struct text *t, const char *path, void (*tick)(void *ctx), void *ctx, struct sh_err *err);
+/* Reads the whole file; progress (may be NULL) is called every 16 MiB, fraction -1: unknown. text_close is due
+ * in any case. */
+int text_open(struct text *t, const char *path, void (*progress)(void *ctx, double fraction), void *ctx,
+              struct sh_err *err);
 void text_close(struct text *t);
 
 /* Fails with "FILE, line N: text", or without the line when it is 0. Returns code. */

@@ -181,19 +181,12 @@ struct utc_gps utc_gps_week(int64_t tai_ns)
 
 /* ---- text */
 
-static int take_number(const char **p, int digits, int *out)
+/* Does the text begin like the form? 0 in it stands for any digit. */
+static int begins_like(const char *text, const char *form)
 {
-    *out = 0;
-    for (int i = 0; i < digits; i++, ++*p) {
-        if (**p < '0' || **p > '9') return 0;
-        *out = *out * 10 + (**p - '0');
-    }
+    for (; *form != '\0'; form++, text++)
+        if (*form == '0' ? *text < '0' || *text > '9' : *text != *form) return 0;
     return 1;
-}
-
-static int take_char(const char **p, char c)
-{
-    return *(*p)++ == c;
 }
 
 static int take_fraction(const char **p, int32_t *ns)
@@ -208,13 +201,14 @@ static int take_fraction(const char **p, int32_t *ns)
 
 int utc_parse(const char *text, struct utc_time *out, struct sh_err *err)
 {
-    const char *p = text;
-    int good = take_number(&p, 4, &out->year) && take_char(&p, '-') && take_number(&p, 2, &out->month) &&
-               take_char(&p, '-') && take_number(&p, 2, &out->day) && take_char(&p, 'T') &&
-               take_number(&p, 2, &out->hour) && take_char(&p, ':') && take_number(&p, 2, &out->minute) &&
-               take_char(&p, ':') && take_number(&p, 2, &out->second) && take_fraction(&p, &out->ns) &&
-               take_char(&p, 'Z') && *p == '\0';
-    return good ? SH_OK : sh_fail(err, SH_EINPUT, "not a time as 2026-01-01T00:00:00Z, with up to 9 decimals");
+    static const char form[] = "0000-00-00T00:00:00";
+    if (begins_like(text, form)) {
+        const char *p = text + sizeof form - 1;
+        sscanf(text, "%4d-%2d-%2dT%2d:%2d:%2d", &out->year, &out->month, &out->day, &out->hour, &out->minute,
+               &out->second);
+        if (take_fraction(&p, &out->ns) && strcmp(p, "Z") == 0) return SH_OK;
+    }
+    return sh_fail(err, SH_EINPUT, "not a time as 2026-01-01T00:00:00Z, with up to 9 decimals");
 }
 
 void utc_format(const struct utc_time *utc, int decimals, char buf[UTC_TEXT_LEN])

@@ -1,4 +1,4 @@
-/* Vectors of three doubles: products of two of them, and arrays of them as kernels take them, an array for
+/* Vectors of three doubles: sums and products of two of them, and arrays of them as kernels take them, an array for
  * each component. */
 #ifndef CORE_VEC3_H
 #define CORE_VEC3_H
@@ -17,10 +17,28 @@ static inline void vec3_cross(const double a[3], const double b[3], double out[3
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
+static inline void vec3_sub(const double a[3], const double b[3], double out[3])
+{
+    for (int i = 0; i < 3; i++)
+        out[i] = a[i] - b[i];
+}
+
+static inline void vec3_add(const double a[3], const double b[3], double out[3])
+{
+    for (int i = 0; i < 3; i++)
+        out[i] = a[i] + b[i];
+}
+
+static inline double vec3_length(const double a[3])
+{
+    return sqrt(vec3_dot(a, a));
+}
+
 static inline double vec3_distance(const double a[3], const double b[3])
 {
-    const double d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-    return sqrt(vec3_dot(d, d));
+    double d[3];
+    vec3_sub(a, b, d);
+    return vec3_length(d);
 }
 
 /* Vectors as arrays, one per axis; the arrays stay the caller's. */

@@ -1,6 +1,7 @@
 #include <math.h>
 #include <pthread.h>
 #include <stdatomic.h>
+#include <string.h>
 
 #include "core/cloud.h"
 
@@ -50,8 +51,7 @@ static void to_scene(const struct work *w, size_t i, double p_prcs[3])
     const double *p = w->cloud->xyz_m[i];
     const struct georef *georef = georef_of(w->cloud, w->site, i);
     double d_crs[3];
-    for (int k = 0; k < 3; k++)
-        p_prcs[k] = p[k];
+    memcpy(p_prcs, p, 3 * sizeof *p);
     if (georef == NULL) return;
     georef_difference(georef, p, d_crs);
     georef_reverse(georef, d_crs, p_prcs);

@@ -110,12 +110,11 @@ static int read_vlrs(struct las *las, struct sh_err *err)
 {
     uint64_t at = get(las->data + 94, 2), n = get(las->data + 100, 4);
     for (; n > 0; n--) {
-        if (at + VLR_HEAD > las->points_at) return fail(las, err, "its variable length records run into the points");
         const uint8_t *vlr = las->data + at;
-        size_t len = get(vlr + 20, 2);
-        unsigned record = (unsigned)get(vlr + 18, 2);
+        size_t len = at + VLR_HEAD <= las->points_at ? get(vlr + 20, 2) : 0;
         if (at + VLR_HEAD + len > las->points_at)
             return fail(las, err, "its variable length records run into the points");
+        unsigned record = (unsigned)get(vlr + 18, 2);
         if (strncmp((const char *)vlr + 2, "LASF_Projection", 16) == 0 && record == 2112) {
             char *wkt = strndup((const char *)vlr + VLR_HEAD, len);
             if (wkt == NULL) return text_fail(&las->t, 0, SH_ENOMEM, err, "no memory for its CRS");

@@ -11,7 +11,6 @@ struct reading {
     struct ply_rows r;
     struct cloud *cloud;
     const struct sh_report *report;
-    bool is_single;
 };
 
 /* Our recorder writes the coordinate reference system as a comment. Other files lack it, which is no
@@ -85,7 +84,6 @@ static int begin_element(void *reading, struct sh_err *err)
     const struct ply_element *e = g->r.element;
     const struct ply_header *h = &g->r.h;
     if (e->kind != PLY_VERTEX) return SH_OK;
-    g->is_single = ply_is_single(&g->r);
     return cloud_reserve(g->cloud, (size_t)e->count, /* checked against the file's size */
                          (ply_find(h, e, PLY_STATION) ? CLOUD_HAS_STATION : 0) |
                              (ply_find(h, e, PLY_LABEL) ? CLOUD_HAS_LABEL : 0) |
@@ -98,14 +96,9 @@ static void progress(void *reading, double fraction)
     sh_progress(((struct reading *)reading)->report, "reading the points", fraction);
 }
 
-static void tick(void *reading)
-{
-    progress(reading, -1);
-}
-
 static int read_body(struct reading *g, struct sh_err *err)
 {
-    const struct ply_user user = {g, begin_element, keep_point, progress, g->report, .has_faces = false};
+    const struct ply_user user = {g, begin_element, keep_point, g->report, .has_faces = false};
     const struct ply_header *h = &g->r.h;
     bool has_points = false;
     g->cloud->epsg = find_epsg(&g->r.t);
@@ -113,7 +106,7 @@ static int read_body(struct reading *g, struct sh_err *err)
         has_points |= h->element[i].kind == PLY_VERTEX;
     if (!has_points) return text_fail(&g->r.t, 0, SH_EINPUT, err, "no element vertex: there are no points");
     int rc = ply_walk(&g->r, &user, err);
-    if (rc == SH_OK && g->is_single) warn_if_coarse(g);
+    if (rc == SH_OK && g->r.is_single) warn_if_coarse(g);
     return rc;
 }
 
@@ -123,7 +116,7 @@ int cloud_read_ply(const char *path, const struct sh_report *report, struct clou
     if (g == NULL) return sh_fail(err, SH_ENOMEM, "no memory to read %s", path);
     g->cloud = out;
     g->report = report;
-    int rc = ply_open(&g->r, path, tick, g, err);
+    int rc = ply_open(&g->r, path, progress, g, err);
     if (rc == SH_OK) rc = read_body(g, err);
     ply_close(&g->r);
     free(g);

@@ -10,6 +10,7 @@
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "core/embree.h"
 #include "core/vec3.h"
@@ -30,12 +31,6 @@ struct search {
     struct distance_hit *hit;
     int found;
 };
-
-static void sub(const double a[3], const double b[3], double out[3])
-{
-    for (int k = 0; k < 3; k++)
-        out[k] = a[k] - b[k];
-}
 
 /* Points and edges from here on are relative to the query point, which is the origin: nothing of the large
  * coordinates is left in the products. */
@@ -75,13 +70,12 @@ static double nearest_on_triangle(double corner[3][3], double nearest[3])
     for (int i = 0; i < 3; i++) {
         double q[3];
         int j = (i + 1) % 3;
-        sub(corner[j], corner[i], edge[i]);
+        vec3_sub(corner[j], corner[i], edge[i]);
         nearest_on_edge(corner[i], corner[j], edge[i], q);
         double d2 = vec3_dot(q, q);
         if (d2 >= best2) continue;
         best2 = d2;
-        for (int k = 0; k < 3; k++)
-            nearest[k] = q[k];
+        memcpy(nearest, q, sizeof q);
     }
     vec3_cross(edge[0], edge[1], normal);
     double n2 = vec3_dot(normal, normal);
@@ -91,8 +85,7 @@ static double nearest_on_triangle(double corner[3][3], double nearest[3])
         foot[k] = normal[k] * height;
     double foot2 = vec3_dot(foot, foot);
     if (foot2 >= best2) return sqrt(best2);
-    for (int k = 0; k < 3; k++)
-        nearest[k] = foot[k];
+    memcpy(nearest, foot, sizeof foot);
     return sqrt(foot2);
 }
 
@@ -108,17 +101,16 @@ static bool visit_triangle(struct RTCPointQueryFunctionArguments *args)
     const struct scene *scene = s->index->scene;
     double corner[3][3], nearest[3];
     for (int i = 0; i < 3; i++)
-        sub(scene->vertex_m[scene->triangle[args->primID][i]], s->p, corner[i]);
+        vec3_sub(scene->vertex_m[scene->triangle[args->primID][i]], s->p, corner[i]);
     double d = nearest_on_triangle(corner, nearest);
-    /* The lower number of two that are as near: an answer that doesn't hang on Embree's order. */
+    /* The lower number of two that are as near: an answer that doesn't depend on Embree's order. */
     if (d > s->best_m || (s->found && d == s->best_m && args->primID > s->hit->triangle)) return false;
     bool nearer = d < s->best_m;
     s->found = 1;
     s->best_m = d;
     s->hit->distance_m = d;
     s->hit->triangle = args->primID;
-    for (int k = 0; k < 3; k++)
-        s->hit->point_m[k] = s->p[k] + nearest[k];
+    vec3_add(s->p, nearest, s->hit->point_m);
     float radius = query_radius(d, s->slack_m);
     if (!nearer || !(radius < args->query->radius)) return false;
     args->query->radius = radius;
@@ -168,9 +160,7 @@ static int embree_failed(RTCDevice device, struct sh_err *err)
 static void fill_vertices(struct distance *d, float (*out)[3])
 {
     const struct scene *s = d->scene;
-    for (uint32_t i = 0; i < s->n_vertices; i++)
-        for (int k = 0; k < 3; k++)
-            out[i][k] = 0;
+    memset(out, 0, s->n_vertices * sizeof *out);
     for (uint32_t i = 0; i < s->n_triangles; i++) {
         for (int c = 0; c < 3; c++) {
             const double *v = s->vertex_m[s->triangle[i][c]];

@@ -38,7 +38,8 @@ void map_colour(double structure, double height, uint8_t rgb[3])
     lab_to_srgb(lightness, chroma * cos(hue_rad), chroma * sin(hue_rad), rgb);
 }
 
-void map_image_blend(struct map_image *image, long column, long row, const uint8_t rgb[3], double coverage)
+/* Fills a pixel, blended by coverage 0..1; outside the image nothing happens. */
+static void blend(struct map_image *image, long column, long row, const uint8_t rgb[3], double coverage)
 {
     if (column < 0 || row < 0 || column >= (long)image->width || row >= (long)image->height) return;
     uint8_t *at = image->rgb + ((size_t)row * image->width + (size_t)column) * 3;
@@ -50,7 +51,7 @@ void map_image_fill(struct map_image *image, long column, long row, long width, 
 {
     for (long r = row; r < row + height; r++)
         for (long c = column; c < column + width; c++)
-            map_image_blend(image, c, r, rgb, 1);
+            blend(image, c, r, rgb, 1);
 }
 
 /* 5 x 7 dots, a byte per row, the left dot is bit 4. */
@@ -66,9 +67,8 @@ static const uint8_t glyph[][7] = {
     {0x10, 0x10, 0x12, 0x14, 0x18, 0x14, 0x12}, {0x11, 0x19, 0x19, 0x15, 0x13, 0x13, 0x11},
 };
 
-long map_image_text(struct map_image *image, long column, long row, long dot, const uint8_t rgb[3], const char *text)
+void map_image_text(struct map_image *image, long column, long row, long dot, const uint8_t rgb[3], const char *text)
 {
-    const long start = column;
     for (; *text != '\0'; text++, column += 6 * dot) {
         const char *found = strchr(glyph_of, *text);
         if (found == NULL) continue; /* a space */
@@ -78,7 +78,6 @@ long map_image_text(struct map_image *image, long column, long row, long dot, co
                 if ((rows[y] >> (4 - x) & 1) != 0)
                     map_image_fill(image, column + x * dot, row + y * dot, dot, dot, rgb);
     }
-    return column - start;
 }
 
 static int inside(const double corner[3][2], double x, double y)
@@ -105,6 +104,6 @@ void map_image_triangle(struct map_image *image, const double corner[3][2], cons
             int hits = 0;
             for (int s = 0; s < SUB * SUB; s++)
                 hits += inside(corner, (double)column + (s % SUB + 0.5) / SUB, (double)row + (s / SUB + 0.5) / SUB);
-            if (hits > 0) map_image_blend(image, column, row, rgb, (double)hits / (SUB * SUB));
+            if (hits > 0) blend(image, column, row, rgb, (double)hits / (SUB * SUB));
         }
 }

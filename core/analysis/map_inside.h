@@ -31,12 +31,10 @@ struct map_image {
 /* Lightness 0..1 of structure and height 0..1 -> sRGB. */
 void map_colour(double structure, double height, uint8_t rgb[3]);
 
-/* Fills a pixel, blended by coverage 0..1; outside the image nothing happens. */
-void map_image_blend(struct map_image *image, long column, long row, const uint8_t rgb[3], double coverage);
+/* Outside the image nothing happens. */
 void map_image_fill(struct map_image *image, long column, long row, long width, long height, const uint8_t rgb[3]);
-/* Text of digits and "+-. mkN", 5 x 7 dots of `dot` pixels, upper left corner at column, row. Returns its
- * width. */
-long map_image_text(struct map_image *image, long column, long row, long dot, const uint8_t rgb[3], const char *text);
+/* Text of digits and "+-. mkN", 5 x 7 dots of `dot` pixels, upper left corner at column, row. */
+void map_image_text(struct map_image *image, long column, long row, long dot, const uint8_t rgb[3], const char *text);
 void map_image_triangle(struct map_image *image, const double corner[3][2], const uint8_t rgb[3]);
 
 /* The whole image; the caller frees rgb. */

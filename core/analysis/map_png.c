@@ -7,15 +7,10 @@
 
 #include "core/analysis/map_inside.h"
 
-/* libpng reports by a callback that must not return; the reason is kept for the error text. */
-struct png_reason {
-    char text[128];
-};
-
+/* libpng reports by a callback that must not return. */
 static void on_error(png_structp png, png_const_charp text)
 {
-    struct png_reason *reason = png_get_error_ptr(png);
-    snprintf(reason->text, sizeof reason->text, "%s", text);
+    sh_fail(png_get_error_ptr(png), SH_EIO, "%s", text);
     png_longjmp(png, 1);
 }
 
@@ -28,7 +23,7 @@ static void on_warning(png_structp png, png_const_charp text)
 /* Nothing here is changed between setjmp and longjmp but through pointers. */
 static int encode(const struct map_image *image, FILE *file, png_structp png, png_infop info)
 {
-    if (setjmp(png_jmpbuf(png)) != 0) return -1;
+    if (setjmp(png_jmpbuf(png)) != 0) return SH_EIO;
     png_init_io(png, file);
     png_set_IHDR(png, info, image->width, image->height, 8, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
                  PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
@@ -37,51 +32,44 @@ static int encode(const struct map_image *image, FILE *file, png_structp png, pn
     for (uint32_t row = 0; row < image->height; row++)
         png_write_row(png, image->rgb + (size_t)row * image->width * 3);
     png_write_end(png, info);
-    return 0;
+    return SH_OK;
 }
 
-static int encode_file(const struct map_image *image, FILE *file, struct png_reason *reason)
+static int encode_file(const struct map_image *image, FILE *file, struct sh_err *why)
 {
-    int rc = -1;
     png_infop info = NULL;
-    png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, reason, on_error, on_warning);
+    png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, why, on_error, on_warning);
     if (png != NULL) info = png_create_info_struct(png);
-    if (info != NULL)
-        rc = encode(image, file, png, info);
-    else
-        snprintf(reason->text, sizeof reason->text, "no memory");
+    int rc = info != NULL ? encode(image, file, png, info) : sh_fail(why, SH_EIO, "no memory");
     png_destroy_write_struct(&png, &info);
-    if (rc == 0 && fflush(file) != 0) {
-        snprintf(reason->text, sizeof reason->text, "%s", strerror(errno));
-        rc = -1;
-    }
+    if (rc == SH_OK && fflush(file) != 0) rc = sh_fail(why, SH_EIO, "%s", strerror(errno));
     return rc;
 }
 
 /* Writes, closes and renames part; the reason where that fails. */
-static int write_part(const struct map_image *image, const char *part, const char *path, struct png_reason *reason)
+static int write_part(const struct map_image *image, const char *part, const char *path, struct sh_err *why)
 {
     FILE *file = fopen(part, "wbe");
-    if (file == NULL) {
-        snprintf(reason->text, sizeof reason->text, "%s", strerror(errno));
-        return errno == EACCES ? SH_EPERM : errno == ENOENT || errno == ENOTDIR ? SH_EINPUT : SH_EIO;
-    }
-    int rc = encode_file(image, file, reason) == 0 ? SH_OK : SH_EIO;
+    if (file == NULL)
+        return sh_fail(why,
+                       errno == EACCES                       ? SH_EPERM
+                       : errno == ENOENT || errno == ENOTDIR ? SH_EINPUT
+                                                             : SH_EIO,
+                       "%s", strerror(errno));
+    int rc = encode_file(image, file, why);
     int is_closed = fclose(file) == 0;
-    if (rc == SH_OK && (!is_closed || rename(part, path) != 0)) {
-        snprintf(reason->text, sizeof reason->text, "%s", strerror(errno));
-        rc = is_closed && errno == EISDIR ? SH_EINPUT : SH_EIO;
-    }
+    if (rc == SH_OK && (!is_closed || rename(part, path) != 0))
+        rc = sh_fail(why, is_closed && errno == EISDIR ? SH_EINPUT : SH_EIO, "%s", strerror(errno));
     if (rc != SH_OK) remove(part);
     return rc;
 }
 
 int map_png_write(const struct map_image *image, const char *path, struct sh_err *err)
 {
-    struct png_reason reason = {""};
+    struct sh_err why;
     char *part;
     if (asprintf(&part, "%s.part", path) < 0) return sh_fail(err, SH_ENOMEM, "map %s: no memory", path);
-    int rc = write_part(image, part, path, &reason);
+    int rc = write_part(image, part, path, &why);
     free(part);
-    return rc == SH_OK ? SH_OK : sh_fail(err, rc, "map %s: cannot be written: %s", path, reason.text);
+    return rc == SH_OK ? SH_OK : sh_fail(err, rc, "map %s: cannot be written: %s", path, why.text);
 }

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <time.h>
 
 static bool count_bytes(void *user, ssize_t bytes, bool post)
@@ -58,8 +59,7 @@ int bvh_create(const struct scene *scene, const double origin_m[3], double stati
     if (threads != 0) snprintf(config, sizeof config, "tessellation_cache_size=1,threads=%u", threads);
     bvh->scene = scene;
     bvh->station_reach_m = station_reach_m;
-    for (int i = 0; i < 3; i++)
-        bvh->origin_m[i] = origin_m[i];
+    memcpy(bvh->origin_m, origin_m, sizeof bvh->origin_m);
     bvh->device = rtcNewDevice(config);
     if (bvh->device == NULL) {
         free(bvh);
@@ -103,8 +103,7 @@ void bvh_set_packet(struct bvh *bvh, uint32_t rays)
 
 void bvh_origin(const struct bvh *bvh, double origin_m[3])
 {
-    for (int i = 0; i < 3; i++)
-        origin_m[i] = bvh->origin_m[i];
+    memcpy(origin_m, bvh->origin_m, sizeof bvh->origin_m);
 }
 
 const struct scene *bvh_scene(const struct bvh *bvh)

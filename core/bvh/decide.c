@@ -37,12 +37,6 @@ static double edge_side(const double a[3], const double b[3], const double dir[3
     return swap ? -side : side;
 }
 
-static double edge_length(const double a[3], const double b[3])
-{
-    double e[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
-    return sqrt(vec3_dot(e, e));
-}
-
 static double plane_range(const struct decide_ray *ray, uint32_t prim)
 {
     const struct bvh_plane *tri = &ray->bvh->triangle[prim];
@@ -85,8 +79,8 @@ static double held_range(const struct decide_ray *ray, uint32_t prim, double v[3
     if (fabs(vec3_dot(n, ray->dir)) > 1e-6 * sqrt(vec3_dot(n, n))) return range;
     for (int i = 0; i < 3; i++) {
         const double *a = v[i], *b = v[(i + 1) % 3];
-        double t = edge_range(a, b, ray->dir), blur = 0x1p-40 * edge_length(a, b) + 0x1p-46 * fabs(t);
-        if (edge_gap(a, b, ray->dir, t) > blur + 1e-6 * edge_length(a, b)) continue; /* the ray does not pass here */
+        double t = edge_range(a, b, ray->dir), blur = 0x1p-40 * vec3_distance(a, b) + 0x1p-46 * fabs(t);
+        if (edge_gap(a, b, ray->dir, t) > blur + 1e-6 * vec3_distance(a, b)) continue; /* the ray does not pass here */
         lo = fmin(lo, t);
         hi = fmax(hi, t);
     }
@@ -99,8 +93,7 @@ static void look_at(const struct decide_ray *ray, uint32_t prim, double v[3][3],
 {
     const struct scene *scene = ray->bvh->scene;
     for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            v[i][j] = scene->vertex_m[scene->triangle[prim][i]][j] - ray->station_m[j];
+        vec3_sub(scene->vertex_m[scene->triangle[prim][i]], ray->station_m, v[i]);
     for (int i = 0; i < 3; i++)
         side[i] = edge_side(v[i], v[(i + 1) % 3], ray->dir);
 }
@@ -110,7 +103,7 @@ static double edge_distance(double v[3][3], const double side[3])
 {
     double least = INFINITY;
     for (int i = 0; i < 3; i++)
-        least = fmin(least, fabs(side[i]) / edge_length(v[i], v[(i + 1) % 3]));
+        least = fmin(least, fabs(side[i]) / vec3_distance(v[i], v[(i + 1) % 3]));
     return least;
 }
 
@@ -122,7 +115,7 @@ static int is_inside(const double side[3])
 /* The resolution of an edge's side in double precision. */
 static double blur(const double a[3], const double b[3])
 {
-    return 8.0 * 0x1p-53 * sqrt(fmax(vec3_dot(a, a), vec3_dot(b, b))) * edge_length(a, b);
+    return 8.0 * 0x1p-53 * sqrt(fmax(vec3_dot(a, a), vec3_dot(b, b))) * vec3_distance(a, b);
 }
 
 /* A ray within the plane, as far as double precision shows, does not meet the triangle; what stands on its

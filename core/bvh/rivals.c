@@ -12,6 +12,7 @@
 #include <string.h>
 
 #include "core/bvh/bvh_inside.h"
+#include "core/grow.h"
 #include "core/vec3.h"
 
 struct pairs {
@@ -46,8 +47,7 @@ static void look_at(const struct bvh *bvh, uint32_t prim, struct shape *s)
 {
     bvh_corners(bvh, prim, s->v);
     for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            s->e[i][j] = s->v[(i + 1) % 3][j] - s->v[i][j];
+        vec3_sub(s->v[(i + 1) % 3], s->v[i], s->e[i]);
     vec3_cross(s->e[0], s->e[1], s->n);
 }
 
@@ -98,18 +98,11 @@ static int are_rivals(const struct bvh *bvh, uint32_t i, uint32_t j)
 static void add_pair(struct pairs *p, uint32_t i, uint32_t j)
 {
     pthread_mutex_lock(&p->lock);
-    if (p->n == p->capacity && !p->failed) {
-        size_t capacity = p->capacity != 0 ? 2 * p->capacity : 1024;
-        void *more = realloc(p->pair, capacity * sizeof *p->pair);
-        p->failed = more == NULL;
-        if (more != NULL) {
-            p->pair = more;
-            p->capacity = capacity;
-        }
-    }
-    if (p->n < p->capacity) {
+    if (grow(&p->pair, &p->capacity, p->n + 1, sizeof *p->pair)) {
         p->pair[p->n][0] = i;
         p->pair[p->n++][1] = j;
+    } else {
+        p->failed = 1;
     }
     pthread_mutex_unlock(&p->lock);
 }

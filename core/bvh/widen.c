@@ -11,9 +11,7 @@ double bvh_corners(const struct bvh *bvh, uint32_t prim, double v[3][3])
 {
     double reach2 = 0.0;
     for (int i = 0; i < 3; i++) {
-        const double *p = bvh->scene->vertex_m[bvh->scene->triangle[prim][i]];
-        for (int j = 0; j < 3; j++)
-            v[i][j] = p[j] - bvh->origin_m[j];
+        vec3_sub(bvh->scene->vertex_m[bvh->scene->triangle[prim][i]], bvh->origin_m, v[i]);
         reach2 = fmax(reach2, vec3_dot(v[i], v[i]));
     }
     return sqrt(reach2);
@@ -23,13 +21,10 @@ double bvh_corners(const struct bvh *bvh, uint32_t prim, double v[3][3])
  * directions, offset / sin(angle); a sharp corner ends at most_m. */
 static void widen_corner(double v[3][3], int i, double offset_m, double most_m, double out[3])
 {
-    double e1[3], e2[3], c[3], move[3], l1, l2;
-    for (int j = 0; j < 3; j++) {
-        e1[j] = v[(i + 1) % 3][j] - v[i][j];
-        e2[j] = v[(i + 2) % 3][j] - v[i][j];
-    }
-    l1 = sqrt(vec3_dot(e1, e1));
-    l2 = sqrt(vec3_dot(e2, e2));
+    double e1[3], e2[3], c[3], move[3];
+    vec3_sub(v[(i + 1) % 3], v[i], e1);
+    vec3_sub(v[(i + 2) % 3], v[i], e2);
+    double l1 = vec3_length(e1), l2 = vec3_length(e2);
     for (int j = 0; j < 3; j++) {
         e1[j] /= l1;
         e2[j] /= l2;
@@ -44,12 +39,8 @@ static void widen_corner(double v[3][3], int i, double offset_m, double most_m, 
 
 static void edge_lengths(double v[3][3], double length[3])
 {
-    for (int i = 0; i < 3; i++) {
-        double e[3];
-        for (int j = 0; j < 3; j++)
-            e[j] = v[(i + 1) % 3][j] - v[i][j];
-        length[i] = sqrt(vec3_dot(e, e));
-    }
+    for (int i = 0; i < 3; i++)
+        length[i] = vec3_distance(v[(i + 1) % 3], v[i]);
 }
 
 /* The bound of float's error at the edges of a triangle, as a distance across the ray (bvh_inside.h). far_m:
@@ -84,18 +75,13 @@ static double with_spare(double x, uint32_t spare)
 /* Twice the area of a triangle, its normal so long, and its longest edge. */
 static double measure(double v[3][3], double n[3], double *longest)
 {
-    double e1[3], e2[3], longest2 = 0.0;
-    for (int i = 0; i < 3; i++) {
-        double l2 = 0.0;
-        for (int j = 0; j < 3; j++)
-            l2 += (v[(i + 1) % 3][j] - v[i][j]) * (v[(i + 1) % 3][j] - v[i][j]);
-        longest2 = fmax(longest2, l2);
-        e1[i] = v[1][i] - v[0][i];
-        e2[i] = v[2][i] - v[0][i];
-    }
+    double e1[3], e2[3], length[3];
+    vec3_sub(v[1], v[0], e1);
+    vec3_sub(v[2], v[0], e2);
     vec3_cross(e1, e2, n);
-    *longest = sqrt(longest2);
-    return sqrt(vec3_dot(n, n));
+    edge_lengths(v, length);
+    *longest = fmax(fmax(length[0], length[1]), length[2]);
+    return vec3_length(n);
 }
 
 /* The plane with normal n, as it is stored, passes through the triangle's centre. */

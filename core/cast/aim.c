@@ -2,8 +2,7 @@
 #include <string.h>
 
 #include "core/cast/caster_private.h"
-
-static const double UNTURNED[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+#include "core/mat3.h"
 
 /* Socs to where positions go: straight to the CRS where that is a rotation, else to prcs. Returns 1 in the
  * first case. */
@@ -12,9 +11,7 @@ static int reading_rotation(const struct cast_setup *s, double to_crs[9])
     double g[9];
     int linear = georef_rotation(s->georef, g);
     memcpy(to_crs, s->rotation, 9 * sizeof *to_crs);
-    for (int i = 0; i < 9 && linear; i++)
-        to_crs[i] = g[i / 3 * 3] * s->rotation[i % 3] + g[i / 3 * 3 + 1] * s->rotation[3 + i % 3] +
-                    g[i / 3 * 3 + 2] * s->rotation[6 + i % 3];
+    if (linear) mat3_multiply(g, s->rotation, to_crs);
     return linear;
 }
 
@@ -47,12 +44,12 @@ static void aim_ideal(struct caster *c, struct chunk *k, const struct kernel_tur
 {
     const struct cast_setup *s = k->s;
     const int geo = s->layout == LINE_GEO, moves = s->n_knots != 0;
-    const double *rotation = moves ? UNTURNED : s->rotation;
+    const double *rotation = moves ? mat3_unit : s->rotation;
     const struct vec3_out d = moves ? VEC3_OUT(c->socs, 0) : VEC3_OUT(c->d, 0);
     double to_crs[9];
     if (geo) {
         k->linear = !moves && reading_rotation(s, to_crs);
-        kernel_directions_read(s, turns, rotation, moves ? UNTURNED : to_crs, &d,
+        kernel_directions_read(s, turns, rotation, moves ? mat3_unit : to_crs, &d,
                                moves ? &VEC3_OUT(c->read, 0) : &VEC3_OUT(c->list.e, 0));
     } else {
         kernel_directions(turns, rotation, &d);
@@ -61,12 +58,6 @@ static void aim_ideal(struct caster *c, struct chunk *k, const struct kernel_tur
     const struct move m = {VEC3_IN(c->socs, 0), geo ? VEC3_IN(c->read, 0) : (struct vec3_in){0}, VEC3_OUT(c->d, 0),
                            VEC3_OUT(c->list.e, 0), VEC3_OUT(c->list.p, 0)};
     move(s, k->run->t0_ns, k->dt_ns, k->n, &m);
-}
-
-static void transpose(const double m[9], double t[9])
-{
-    for (int i = 0; i < 9; i++)
-        t[i] = m[i % 3 * 3 + i / 3];
 }
 
 /* A head whose mechanics and encoders are not: the turns become what the encoders say. */
@@ -86,7 +77,7 @@ static void aim_bent(struct caster *c, struct chunk *k, const struct instrument 
                                VEC3_OUT(l->p, 0)};
         move(s, k->run->t0_ns, k->dt_ns, k->n, &m);
     } else {
-        transpose(s->rotation, back);
+        mat3_transpose(s->rotation, back);
         kernel_turn_back(&VEC3_IN(c->socs, 0), back, k->n, &VEC3_OUT(c->d, 0));
         if (offset) kernel_turn_back(&around, back, k->n, &VEC3_OUT(c->origin, 0));
     }
@@ -129,7 +120,7 @@ static void read_part(struct caster *c, const struct chunk *k, uint32_t at, uint
         kernel_directions_read(s, &turns, s->rotation, to_crs, &socs, &e);
         return;
     }
-    kernel_directions_read(s, &turns, UNTURNED, UNTURNED, &socs, &VEC3_OUT(c->read, 0));
+    kernel_directions_read(s, &turns, mat3_unit, mat3_unit, &socs, &VEC3_OUT(c->read, 0));
     const struct move m = {VEC3_IN(c->read, 0), {0}, e, {0}, VEC3_OUT(l->p, at)};
     move(s, k->run->t0_ns, dt_ns, n, &m);
 }

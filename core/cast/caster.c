@@ -34,7 +34,8 @@ int caster_create(struct caster **out, struct sh_err *err)
     c->profile = NULL;
     memset(&c->counters, 0, sizeof c->counters);
     int rc = bvh_work_create(&c->bvh, err);
-    if (rc == SH_OK) rc = sub_rays_create(&c->sub_rays, err);
+    if (rc == SH_OK) c->sub_rays = aligned_alloc(64, (sizeof *c->sub_rays + 63) / 64 * 64); /* likewise */
+    if (rc == SH_OK && c->sub_rays == NULL) rc = sh_fail(err, SH_ENOMEM, "cast: no memory for a caster");
     if (rc == SH_OK) return SH_OK;
     caster_free(c);
     *out = NULL;
@@ -45,7 +46,7 @@ void caster_free(struct caster *caster)
 {
     if (caster == NULL) return;
     bvh_work_free(caster->bvh);
-    sub_rays_free(caster->sub_rays);
+    free(caster->sub_rays);
     free(caster);
 }
 

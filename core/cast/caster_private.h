@@ -135,8 +135,6 @@ int caster_is_bare(const struct cast_setup *s, uint32_t label, double rho);
 void caster_follow(struct caster *c, const struct cast_setup *s, const struct met *met);
 
 /* ---- sub_rays.c */
-int sub_rays_create(struct sub_ray_work **out, struct sh_err *err);
-void sub_rays_free(struct sub_ray_work *work);
 /* The pulses of a chunk as footprints -> the list, with rho where something asks for it. */
 void caster_sub_rays(struct caster *c, const struct chunk *k);
 

@@ -70,7 +70,7 @@ static uint32_t merge_pulse(struct echo_list *l, const struct beam_merging *how,
     for (uint32_t j = 0; j < n; j++) {
         uint32_t i = place_of(f, j);
         r[j] = (struct beam_return){
-            .range_m = l->range_m[i], .energy = l->rho[i], .back = l->rho[i], .triangle = j, .label = l->label[i]};
+            .range_m = l->range_m[i], .energy = l->rho[i], .back = l->rho[i], .label = l->label[i]};
     }
     for (uint32_t j = 0, end; j < n; j = end) {
         uint32_t found = 1;

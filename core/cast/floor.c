@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/grow.h"
 #include "core/vec3.h"
 
 struct column {
@@ -52,12 +53,8 @@ static int collect(struct column *c, struct sh_err *err)
 {
     for (uint32_t i = 0; i < c->scene->n_triangles; i++) {
         if (!is_around(c, i)) continue;
-        if (c->n == c->capacity) {
-            c->capacity = 2 * c->capacity + 64;
-            uint32_t *more = realloc(c->prim, c->capacity * sizeof *more);
-            if (more == NULL) return sh_fail(err, SH_ENOMEM, "cast: no memory to look for the floor");
-            c->prim = more;
-        }
+        if (!grow(&c->prim, &c->capacity, c->n + 1, sizeof *c->prim))
+            return sh_fail(err, SH_ENOMEM, "cast: no memory to look for the floor");
         c->prim[c->n++] = i;
     }
     return SH_OK;

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "core/cast/caster_private.h"
+#include "core/mat3.h"
 
 /* How far the origins lie from the first of them. */
 static double spread_m(const struct vec3_in *p, uint32_t n)
@@ -43,15 +44,13 @@ static void cast_mover(struct caster *c, const struct cast_setup *s, uint32_t wh
     const uint32_t n = met->rays.n;
     struct bvh_rays rays = met->rays;
     double v[3], w[3];
-    for (int i = 0; i < 3; i++) {
-        const double *row = m->rotation + 3 * i;
-        v[i] = row[0] * m->centre_m[0] + row[1] * m->centre_m[1] + row[2] * m->centre_m[2] + m->shift_m[i] - at[i];
-        w[i] = at[i] - m->shift_m[i];
-    }
+    mat3_apply(m->rotation, m->centre_m, v);
+    vec3_add(v, m->shift_m, v);
+    vec3_sub(v, at, v);
+    vec3_sub(at, m->shift_m, w);
     double radius_m = m->radius_m + (own ? spread_m(&from->own, n) : 0.0);
     if (!kernel_meets_sphere(&met->rays.dir, n, v, radius_m)) return;
-    for (int i = 0; i < 3; i++)
-        rays.from.at_m[i] = m->rotation[i] * w[0] + m->rotation[3 + i] * w[1] + m->rotation[6 + i] * w[2];
+    mat3_apply_transposed(m->rotation, w, rays.from.at_m);
     if (own) {
         kernel_shift(&from->own, back_m, n, &VEC3_OUT(c->mover_p, 0));
         kernel_turn_back(&VEC3_IN(c->mover_p, 0), m->rotation, n, &VEC3_OUT(c->mover_p, 0));

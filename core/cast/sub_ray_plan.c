@@ -79,13 +79,10 @@ static int known_centre(const struct caster *c, const struct chunk *k, struct jo
     bvh_origin_of(&k->from, p, origin);
     sub_ray(&k->s->beam->beam, &job->sight, part, origin, out);
     bvh_origin(bvh, local);
-    for (int i = 0; i < 3; i++)
-        origin[i] -= local[i];
+    vec3_sub(origin, local, origin);
     r->range_m = (tri->d - vec3_dot(tri->n, origin)) / vec3_dot(tri->n, out);
     r->energy = part->energy;
     r->sigma_m = k->attributes ? beam_part_sigma(&k->s->beam->beam, &job->sight, tri->n, r->range_m, part) : 0.0f;
-    r->cosine = k->s->detect != NULL ? 1.0f / sqrtf(steep) : 0.0f;
-    r->triangle = c->hit[p];
     r->label = c->list.label[p];
     return 1;
 }

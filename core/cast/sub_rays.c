@@ -9,17 +9,6 @@
 /* Pulses with fewer sub-rays than this share packets with their neighbours. */
 enum { ALONE = 64 };
 
-int sub_rays_create(struct sub_ray_work **out, struct sh_err *err)
-{
-    *out = aligned_alloc(64, (sizeof **out + 63) / 64 * 64); /* not touched until there is a beam */
-    return *out != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "cast: no memory for a caster");
-}
-
-void sub_rays_free(struct sub_ray_work *work)
-{
-    free(work);
-}
-
 /* How much the surfaces send back that rays from `first` on have met. */
 static void weigh_pool(struct caster *c, const struct cast_setup *s, uint32_t first)
 {
@@ -136,12 +125,12 @@ static void add_return(struct caster *c, const struct cast_setup *s, const struc
     c->sub_rays->n_returns++;
 }
 
-static void add_centre(struct caster *c, const struct cast_setup *s, const struct beam_return *centre)
+static void add_centre(struct caster *c, const struct cast_setup *s, const struct job *job)
 {
-    double cosine = (double)centre->cosine, rho = 0.0;
+    double cosine = (double)(1.0f / sqrtf(c->sub_rays->steep[job->pulse])), rho = 0.0;
     if (s->detect != NULL && s->detect->surfaces != NULL)
-        surface_return(s->detect->surfaces, 1, &centre->label, &cosine, &rho);
-    add_return(c, s, centre, 1.0, rho);
+        surface_return(s->detect->surfaces, 1, &job->centre.label, &cosine, &rho);
+    add_return(c, s, &job->centre, 1.0, rho);
 }
 
 /* Of the ranges within what sub-ray i of a job stands for. */
@@ -161,19 +150,13 @@ static void add_met(struct caster *c, const struct chunk *k, const struct job *j
     const struct cast_setup *s = k->s;
     const struct pool *p = &c->sub_rays->pool;
     const struct beyond *b = &c->sub_rays->beyond;
-    struct beam_return r = {.range_m = p->range_m[i],
-                            .energy = p->energy[i],
-                            .cosine = s->detect != NULL ? (float)p->cosine[i] : 0.0f,
-                            .triangle = p->triangle[i],
-                            .label = p->label[i]};
+    struct beam_return r = {.range_m = p->range_m[i], .energy = p->energy[i], .label = p->label[i]};
     if (isnan(p->range_m[i])) return;
     if (k->attributes) r.sigma_m = met_sigma(c, s, job, i);
     add_return(c, s, &r, 1.0, p->rho[i]);
     if (s->detect == NULL || s->detect->depth == 0) return;
     for (uint32_t j = b->first[i]; j < b->first[i] + b->count[i]; j++) {
         r.range_m = b->range_m[j];
-        r.cosine = (float)b->cosine[j];
-        r.triangle = BVH_NO_TRIANGLE;
         r.label = b->label[j];
         if (k->attributes) r.sigma_m = beam_round_sigma(&s->beam->beam, r.range_m, b->cosine[j], (double)p->xx[i]);
         uint32_t before = c->sub_rays->n_returns;
@@ -203,7 +186,7 @@ static void finish_job(struct caster *c, const struct chunk *k, const struct job
         return;
     }
     w->n_returns = 0;
-    if (job->centre.energy > 0.0) add_centre(c, k->s, &job->centre);
+    if (job->centre.energy > 0.0) add_centre(c, k->s, job);
     for (uint32_t i = job->first; i < job->first + job->n; i++)
         add_met(c, k, job, i);
     /* Detection decides which of many are left out. */

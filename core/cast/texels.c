@@ -9,12 +9,9 @@
 static void weights(const double *a, const double *b, const double *c, const double p[3], double w[3])
 {
     double u[3], v[3], n[3];
-    for (int i = 0; i < 3; i++) {
-        u[i] = b[i] - a[i];
-        v[i] = c[i] - a[i];
-    }
-    for (int i = 0; i < 3; i++)
-        n[i] = u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3];
+    vec3_sub(b, a, u);
+    vec3_sub(c, a, v);
+    vec3_cross(u, v, n);
     int along = fabs(n[0]) > fabs(n[1]) ? 0 : 1;
     if (fabs(n[2]) > fabs(n[along])) along = 2;
     int x = (along + 1) % 3, y = (along + 2) % 3;

@@ -1,4 +1,5 @@
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "core/detect.h"
@@ -6,14 +7,10 @@
 #include "core/rng.h"
 #include "core/vecmath.h"
 
-static void sort_by_range(uint32_t n, struct detect_reach *reach)
+static int by_range(const void *a, const void *b)
 {
-    for (uint32_t i = 1; i < n; i++)
-        for (uint32_t k = i; k > 0 && reach[k].range_m < reach[k - 1].range_m; k--) {
-            struct detect_reach swap = reach[k];
-            reach[k] = reach[k - 1];
-            reach[k - 1] = swap;
-        }
+    const struct detect_reach *x = a, *y = b;
+    return (x->range_m > y->range_m) - (x->range_m < y->range_m);
 }
 
 /* g through the reaches: slopes between them, and how much each is more than the one before. */
@@ -22,7 +19,7 @@ static int fit_reaches(const struct detect_signal_spec *spec, struct detect_sign
     struct detect_reach reach[DETECT_MAX_REACHES];
     double before = 0.0;
     memcpy(reach, spec->reach, sizeof reach);
-    sort_by_range(spec->n_reaches, reach);
+    qsort(reach, spec->n_reaches, sizeof *reach, by_range);
     signal->n = spec->n_reaches > 1 ? spec->n_reaches - 1 : 1;
     signal->g0 = log(reach[0].reflectance) - 2.0 * log(reach[0].range_m);
     signal->at_m[0] = reach[0].range_m;

@@ -34,25 +34,22 @@ static double weight_of(const struct beam_return *r, int by_back)
     return by_back ? r->back : r->energy;
 }
 
-/* Of the surface that most comes back from, its strongest return: many weak returns may be of one surface. */
+/* A return of the surface that most comes back from: many weak returns may be of one surface. */
 static uint32_t of_strongest_surface(const struct beam_return *r, uint32_t n, int by_back)
 {
     uint32_t best = 0;
     double most = -1.0;
     for (uint32_t i = 0; i < n; i++) {
-        uint32_t first = 0, strongest = i;
+        uint32_t first = 0;
         double sum = 0.0;
         while (r[first].label != r[i].label)
             first++;
         if (first != i) continue;
-        for (uint32_t k = i; k < n; k++) {
-            if (r[k].label != r[i].label) continue;
-            sum += weight_of(&r[k], by_back);
-            if (weight_of(&r[k], by_back) > weight_of(&r[strongest], by_back)) strongest = k;
-        }
+        for (uint32_t k = i; k < n; k++)
+            if (r[k].label == r[i].label) sum += weight_of(&r[k], by_back);
         if (sum > most) {
             most = sum;
-            best = strongest;
+            best = i;
         }
     }
     return best;
@@ -99,9 +96,7 @@ static int make_echo(const struct beam_merging *how, const struct beam_return *r
     *echo = (struct beam_echo){.range_m = r[0].range_m + a.mean,
                                .energy = energy,
                                .back = back,
-                               .cosine = r[a.strongest].cosine,
                                .width_m = (float)beam_echo_width(how->pulse_m, a.variance),
-                               .triangle = r[a.strongest].triangle,
                                .label = r[a.strongest].label};
     return 1;
 }

@@ -201,6 +201,10 @@ static uint64_t draw_all(struct beam_outlines *o, const struct beam *beam, const
 
 static int fill_cells(struct beam_outlines *o, const struct beam *beam, const struct stretches *s, struct sh_err *err)
 {
+    o->first = calloc(N_CELLS + 1, sizeof *o->first);
+    o->any = calloc(N_CELLS / 32, sizeof *o->any);
+    o->around = calloc(N_CELLS / 32, sizeof *o->around);
+    if (o->first == NULL || o->any == NULL || o->around == NULL) return sh_fail(err, SH_ENOMEM, "beam: no memory");
     uint64_t n = draw_all(o, beam, s, COUNT);
     if (n >= UINT32_MAX) return sh_fail(err, SH_EINPUT, "beam: too many outlines; beam.mode: rings does without them");
     for (uint32_t c = 0; c < N_CELLS; c++)
@@ -214,8 +218,7 @@ static int fill_cells(struct beam_outlines *o, const struct beam *beam, const st
     for (uint32_t c = 0; c < N_CELLS; c++)
         if (o->first[c + 1] - o->first[c] > 1)
             qsort(o->entry + o->first[c], o->first[c + 1] - o->first[c], sizeof *o->entry, by_range);
-    o->info.entries = n;
-    o->info.bytes = n * sizeof *o->entry + N_CELLS * sizeof *o->first + N_CELLS / 4 + o->n_edges * sizeof *o->edge;
+    o->n_entries = n;
     return SH_OK;
 }
 
@@ -226,32 +229,21 @@ int beam_outlines_create(const struct beam_outlines_spec *spec, const struct bea
     struct outline_prober *prober = calloc(1, sizeof *prober);
     struct beam_outlines *o = calloc(1, sizeof *o);
     *out = NULL;
-    if (o == NULL || prober == NULL) {
-        free(o);
-        free(prober);
-        return sh_fail(err, SH_ENOMEM, "beam: no memory");
+    int rc = o != NULL && prober != NULL ? outline_find(spec, o, err) : sh_fail(err, SH_ENOMEM, "beam: no memory");
+    if (rc == SH_OK) {
+        prober->probe = probe;
+        prober->beam = spec->beam;
     }
-    prober->probe = probe;
-    prober->beam = spec->beam;
-    o->first = calloc(N_CELLS + 1, sizeof *o->first);
-    o->any = calloc(N_CELLS / 32, sizeof *o->any);
-    o->around = calloc(N_CELLS / 32, sizeof *o->around);
-    int rc =
-        o->first == NULL || o->any == NULL || o->around == NULL ? sh_fail(err, SH_ENOMEM, "beam: no memory") : SH_OK;
-    if (rc == SH_OK) rc = outline_find(spec, o, err);
     if (rc == SH_OK && find_stretches(o, prober, spec->range_max_m * 1.01, &stretches) != SH_OK)
         rc = sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");
     if (rc == SH_OK) rc = fill_cells(o, spec->beam, &stretches, err);
-    o->info.stretches = stretches.n;
     free(stretches.at);
     free(prober);
-    if (rc != SH_OK) {
+    if (rc == SH_OK)
+        *out = o;
+    else
         beam_outlines_free(o);
-        return rc;
-    }
-    o->info.outlines = o->n_edges;
-    *out = o;
-    return SH_OK;
+    return rc;
 }
 
 void beam_outlines_free(struct beam_outlines *o)
@@ -263,11 +255,6 @@ void beam_outlines_free(struct beam_outlines *o)
     free(o->around);
     free(o->entry);
     free(o);
-}
-
-void beam_outlines_get_info(const struct beam_outlines *o, struct beam_outlines_info *info)
-{
-    *info = o->info;
 }
 
 /* Square of the longest way from one direction to the next. */
@@ -372,7 +359,7 @@ uint32_t beam_near_outlines(const struct beam_outlines *o, const struct beam *be
                             uint32_t n, struct beam_near *near)
 {
     uint32_t left = 0;
-    if (o->info.entries == 0) return 0;
+    if (o->n_entries == 0) return 0;
     uint32_t found = in_cells(o, dir, n, near);
     look_up(o, near, found);
     for (uint32_t k = 0; k < found; k++) {

@@ -31,7 +31,7 @@ struct beam_outlines {
     uint32_t *any;               /* a bit for each cell: it leads to some */
     uint32_t *around;            /* likewise: some cell within OUTLINE_AROUND_RAD of a direction in it does */
     struct outline_entry *entry; /* by range */
-    struct beam_outlines_info info;
+    uint64_t n_entries;
 };
 
 /* Part of an edge that counts, from the station. */
@@ -56,7 +56,7 @@ struct outline_prober {
  * counts. */
 uint32_t outline_probe(struct outline_prober *prober, const double p[3], const double q[3], double range_m);
 
-/* weld.c: the outlines among the edges of a scene: o->edge and n_edges, and info.edges. */
+/* weld.c: the outlines among the edges of a scene: o->edge and n_edges. */
 int outline_find(const struct beam_outlines_spec *spec, struct beam_outlines *o, struct sh_err *err);
 
 /* Cells lie in tiles of 4 x 4: `first` of a tile is one cache line. */

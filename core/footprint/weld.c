@@ -85,8 +85,7 @@ static uint64_t find_edge(struct weld *w, uint32_t low, uint32_t high)
 
 static void from_station(const struct weld *w, uint32_t vertex, double p[3])
 {
-    for (int i = 0; i < 3; i++)
-        p[i] = w->scene->vertex_m[vertex][i] - w->station_m[i];
+    vec3_sub(w->scene->vertex_m[vertex], w->station_m, p);
 }
 
 /* 1 or 2; 0: the triangle is seen edge-on, and covers nothing. */
@@ -124,10 +123,8 @@ static void add_triangles(struct weld *w)
 static int collect(const struct weld *w, struct beam_outlines *o, struct sh_err *err)
 {
     uint64_t found = 0;
-    for (uint64_t i = 0; i <= w->mask; i++) {
-        o->info.edges += w->slot[i].low != NONE;
+    for (uint64_t i = 0; i <= w->mask; i++)
         found += w->slot[i].low != NONE && w->sides[i] != 3;
-    }
     if (found >= NONE) return sh_fail(err, SH_EINPUT, "beam: too many outlines");
     o->edge = malloc((size_t)(found + 1) * sizeof *o->edge);
     if (o->edge == NULL) return sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");

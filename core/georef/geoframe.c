@@ -6,17 +6,17 @@
 #include "core/angle.h"
 #include "core/locate.h"
 #include "core/mat3.h"
+#include "core/vec3.h"
 
 int geoframe_set_tangent(struct geoframe *frame, const double origin_m[3], const struct georef_place *at,
                          double north_deg, struct sh_err *err)
 {
-    memset(frame, 0, sizeof *frame);
-    frame->kind = GEOFRAME_TANGENT;
-    memcpy(frame->origin_m, origin_m, sizeof frame->origin_m);
-    frame->lat_deg = at->lat_deg;
-    frame->lon_deg = at->lon_deg;
-    frame->height_m = at->height_m;
-    frame->north_deg = north_deg;
+    *frame = (struct geoframe){.kind = GEOFRAME_TANGENT,
+                               .origin_m = {origin_m[0], origin_m[1], origin_m[2]},
+                               .lat_deg = at->lat_deg,
+                               .lon_deg = at->lon_deg,
+                               .height_m = at->height_m,
+                               .north_deg = north_deg};
     double enu[9], s = sin(angle_rad(north_deg)), c = cos(angle_rad(north_deg));
     /* north is (s, c) in the scene, east a right angle clockwise from it */
     const double turn[9] = {c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0};
@@ -30,18 +30,14 @@ int geoframe_set_tangent(struct geoframe *frame, const double origin_m[3], const
 
 int geoframe_set_grid(struct geoframe *frame, int zone, int north, struct sh_err *err)
 {
-    memset(frame, 0, sizeof *frame);
-    frame->kind = GEOFRAME_GRID;
-    frame->zone = zone;
-    frame->north = north;
+    *frame = (struct geoframe){.kind = GEOFRAME_GRID, .zone = zone, .north = north};
     if (zone >= 0 && zone <= 60) return SH_OK;
     return sh_fail(err, SH_EINPUT, "UTM zone %d; allowed 1 to 60, or 0: UPS", zone);
 }
 
 void geoframe_set_ecef(struct geoframe *frame)
 {
-    memset(frame, 0, sizeof *frame);
-    frame->kind = GEOFRAME_ECEF;
+    *frame = (struct geoframe){.kind = GEOFRAME_ECEF};
 }
 
 static int locate(const struct geoframe *frame, const double p_prcs[3], struct georef_place *at, struct sh_err *err)
@@ -50,11 +46,9 @@ static int locate(const struct geoframe *frame, const double p_prcs[3], struct g
     if (frame->kind == GEOFRAME_GRID) return georef_locate_utm(frame->zone, frame->north, p_prcs, at, err);
     memcpy(p_ecef, p_prcs, sizeof p_ecef);
     if (frame->kind == GEOFRAME_TANGENT) {
-        for (int i = 0; i < 3; i++)
-            d[i] = p_prcs[i] - frame->origin_m[i];
+        vec3_sub(p_prcs, frame->origin_m, d);
         mat3_apply(frame->rotation, d, p_ecef);
-        for (int i = 0; i < 3; i++)
-            p_ecef[i] += frame->ecef_m[i];
+        vec3_add(frame->ecef_m, p_ecef, p_ecef);
     }
     return georef_locate_ecef(p_ecef, at, err);
 }
@@ -92,11 +86,9 @@ int geoframe_find(const struct geoframe *frame, const struct georef_place *at, d
     georef_geodetic_to_ecef(at, p_ecef);
     memcpy(p_prcs, p_ecef, sizeof p_ecef);
     if (frame->kind == GEOFRAME_ECEF) return SH_OK;
-    for (int i = 0; i < 3; i++)
-        d[i] = p_ecef[i] - frame->ecef_m[i];
+    vec3_sub(p_ecef, frame->ecef_m, d);
     mat3_apply_transposed(frame->rotation, d, p_prcs);
-    for (int i = 0; i < 3; i++)
-        p_prcs[i] += frame->origin_m[i];
+    vec3_add(frame->origin_m, p_prcs, p_prcs);
     return SH_OK;
 }
 

@@ -16,6 +16,8 @@
 #include <GeographicLib/TransverseMercator.hpp>
 #include <GeographicLib/UTMUPS.hpp>
 
+#include "core/mat3.h"
+
 using GeographicLib::Geocentric, GeographicLib::Geoid, GeographicLib::LocalCartesian;
 using GeographicLib::PolarStereographic, GeographicLib::TransverseMercator, GeographicLib::UTMUPS;
 
@@ -70,7 +72,7 @@ struct shim_map {
     shim_grid in;         /* grid */
     double in_x0, in_y0;  /* of the centre */
     /* out */
-    shim_kind kind;
+    enum georef_crs crs;
     const georef_geoid *geoid;
     shim_grid grid;
     double place[3];  /* of the centre */
@@ -82,23 +84,23 @@ struct shim_map {
         return geoid == nullptr ? 0.0 : geoid->geoid(lat, lon);
     }
 
-    void set_frame(const shim_frame &frame)
+    void set_frame(const georef_spec &spec)
     {
-        from_grid = frame.is_grid != 0;
-        std::copy_n(frame.turn, 9, turn);
+        from_grid = spec.prcs_is_grid != 0;
+        std::copy_n(spec.rotation, 9, turn);
         local.Reset(place[0], place[1], place[2]);
         if (!from_grid) return;
         double x, y;
         bool north;
-        UTMUPS::Forward(place[0], place[1], in.zone, north, x, y, frame.zone);
-        in.north = frame.zone == 0 ? north : frame.north != 0;
+        UTMUPS::Forward(place[0], place[1], in.zone, north, x, y, spec.prcs_zone);
+        in.north = spec.prcs_zone == 0 ? north : spec.prcs_north != 0;
         in.project(place[0], place[1], in_x0, in_y0);
     }
 
     /* Another hemisphere's false northing; UPS has a projection for each. */
     void force_side(int side)
     {
-        if (kind != SHIM_GRID || side == 0 || grid.north == (side > 0)) return;
+        if (crs != GEOREF_UTM || side == 0 || grid.north == (side > 0)) return;
         if (grid.zone == 0) throw GeographicLib::GeographicErr("UPS of the other hemisphere");
         grid.north = side > 0;
         anchor[1] += grid.north ? -1e7 : 1e7;
@@ -109,10 +111,10 @@ struct shim_map {
     {
         const double lat = place[0], lon = place[1];
         anchor[2] = place[2] - undulation(lat, lon);
-        if (kind == SHIM_GEODETIC) {
+        if (crs == GEOREF_GEODETIC) {
             anchor[0] = lat;
             anchor[1] = lon;
-        } else if (kind == SHIM_ECEF) {
+        } else if (crs == GEOREF_ECEF) {
             Geocentric::WGS84().Forward(lat, lon, place[2], anchor[0], anchor[1], anchor[2]);
         } else {
             UTMUPS::Forward(lat, lon, grid.zone, grid.north, anchor[0], anchor[1], set_zone);
@@ -144,7 +146,7 @@ struct shim_map {
         in_x0 += d[0];
         in_y0 += d[1];
         set_centre(grid.zone);
-        if (kind != SHIM_GRID) return;
+        if (crs != GEOREF_UTM) return;
         grid.north = was_north; /* no leap of 10,000 km on the equator */
         grid.project(place[0], place[1], x0, y0);
         anchor[0] = std::round(false_x) + x0;
@@ -155,7 +157,7 @@ struct shim_map {
     {
         double lat, lon, height;
         to_place(dx, dy, dz, lat, lon, height);
-        if (kind == SHIM_ECEF) {
+        if (crs == GEOREF_ECEF) {
             Geocentric::WGS84().Forward(lat, lon, height, x, y, z);
             x -= anchor[0];
             y -= anchor[1];
@@ -163,7 +165,7 @@ struct shim_map {
             return;
         }
         z = (height - undulation(lat, lon)) - anchor[2];
-        if (kind == SHIM_GEODETIC) {
+        if (crs == GEOREF_GEODETIC) {
             x = lat - place[0];
             y = GeographicLib::Math::AngDiff(place[1], lon);
             return;
@@ -176,8 +178,8 @@ struct shim_map {
     void reverse(const double d[3], double out[3]) const
     {
         double lat = place[0] + d[0], lon = place[1] + d[1], height = d[2] + anchor[2], v[3];
-        if (kind == SHIM_GRID) grid.unproject(d[0] + x0, d[1] + y0, lat, lon);
-        if (kind == SHIM_ECEF)
+        if (crs == GEOREF_UTM) grid.unproject(d[0] + x0, d[1] + y0, lat, lon);
+        if (crs == GEOREF_ECEF)
             Geocentric::WGS84().Reverse(anchor[0] + d[0], anchor[1] + d[1], anchor[2] + d[2], lat, lon, height);
         else
             height += undulation(lat, lon);
@@ -189,10 +191,8 @@ struct shim_map {
             return;
         }
         local.Forward(lat, lon, height, v[0], v[1], v[2]);
-        for (int i = 0; i < 3; i++)
-            v[i] -= centre_m[i];
-        for (int i = 0; i < 3; i++)
-            out[i] = turn[i] * v[0] + turn[3 + i] * v[1] + turn[6 + i] * v[2];
+        vec3_sub(v, centre_m, v);
+        mat3_apply_transposed(turn, v, out);
     }
 };
 
@@ -248,10 +248,9 @@ void shim_locate_ecef(const double p_ecef[3], double place[3])
             [&] { Geocentric::WGS84().Reverse(p_ecef[0], p_ecef[1], p_ecef[2], place[0], place[1], place[2]); });
 }
 
-int shim_locate_utm(int zone, int north, const double grid[2], double lat_lon_deg[2], char *why, size_t len)
+int shim_locate_utm(int zone, int north, const double grid[2], struct georef_place *out, char *why, size_t len)
 {
-    return attempt(why, len,
-                   [&] { UTMUPS::Reverse(zone, north != 0, grid[0], grid[1], lat_lon_deg[0], lat_lon_deg[1]); });
+    return attempt(why, len, [&] { UTMUPS::Reverse(zone, north != 0, grid[0], grid[1], out->lat_deg, out->lon_deg); });
 }
 
 int shim_grid_at(const struct georef_place *place, int zone, struct locate_grid *out, char *why, size_t len)
@@ -276,18 +275,19 @@ void georef_geoid_free(struct georef_geoid *geoid)
     delete geoid;
 }
 
-struct shim_map *shim_map_create(const struct shim_spec *spec, char *why, size_t len)
+struct shim_map *shim_map_create(const struct georef_spec *spec, char *why, size_t len)
 {
     std::unique_ptr<shim_map> map;
     int rc = attempt(why, len, [&] {
         map.reset(new shim_map());
-        map->kind = spec->kind;
+        map->crs = spec->crs;
         map->geoid = spec->geoid;
-        std::copy_n(spec->place, 3, map->place);
-        map->place[1] = GeographicLib::Math::AngNormalize(spec->place[1]);
-        map->set_frame(spec->frame);
-        map->set_centre(utmups_zone(spec->zone.zone));
-        map->force_side(spec->zone.side);
+        map->place[0] = spec->lat_deg;
+        map->place[1] = GeographicLib::Math::AngNormalize(spec->lon_deg);
+        map->place[2] = spec->height_m;
+        map->set_frame(*spec);
+        map->set_centre(utmups_zone(spec->utm_zone));
+        map->force_side(spec->side);
     });
     return rc == 0 ? map.release() : nullptr;
 }
@@ -357,20 +357,16 @@ int shim_map_meridian(const struct shim_map *map, struct shim_meridian *out)
 
 int shim_map_epsg(const struct shim_map *map)
 {
-    if (map->kind == SHIM_GEODETIC) return 4979;
-    if (map->kind == SHIM_ECEF) return 4978;
-    try {
-        return UTMUPS::EncodeEPSG(map->grid.zone, map->grid.north);
-    } catch (...) {
-        return 0;
-    }
+    if (map->crs == GEOREF_GEODETIC) return 4979;
+    if (map->crs == GEOREF_ECEF) return 4978;
+    return UTMUPS::EncodeEPSG(map->grid.zone, map->grid.north);
 }
 
 void shim_map_convergence(const struct shim_map *map, double *convergence_deg, double *scale)
 {
     *convergence_deg = 0.0;
     *scale = 1.0;
-    if (map->kind != SHIM_GRID) return;
+    if (map->crs != GEOREF_UTM) return;
     char why[64];
     attempt(why, sizeof why, [&] {
         double x, y;
@@ -381,18 +377,11 @@ void shim_map_convergence(const struct shim_map *map, double *convergence_deg, d
 void shim_map_forward(const struct shim_map *map, size_t n, struct vec3_in d, struct vec3_out out)
 {
     for (size_t i = 0; i < n; i++) {
-        double x = nan_m, y = nan_m, z = nan_m;
+        double p[3] = {nan_m, nan_m, nan_m};
         /* Checked first: the projections turn some NaN into plain numbers. */
-        if (std::isfinite(d.x[i]) && std::isfinite(d.y[i]) && std::isfinite(d.z[i])) {
-            try {
-                map->forward(d.x[i], d.y[i], d.z[i], x, y, z);
-            } catch (...) {
-                x = y = z = nan_m;
-            }
-        }
-        out.x[i] = x;
-        out.y[i] = y;
-        out.z[i] = z;
+        if (std::isfinite(d.x[i]) && std::isfinite(d.y[i]) && std::isfinite(d.z[i]))
+            attempt(p, 3, [&] { map->forward(d.x[i], d.y[i], d.z[i], p[0], p[1], p[2]); });
+        VEC3_SET(out, i, p);
     }
 }
 

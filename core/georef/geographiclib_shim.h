@@ -18,8 +18,8 @@ void shim_ecef(double lat_deg, double lon_deg, double height_m, double p_ecef[3]
 
 /* Geodetic place (degrees, degrees, metres) of a geocentric position; NaN on failure. */
 void shim_locate_ecef(const double p_ecef[3], double place[3]);
-/* Easting and northing in a UTM zone, or in UPS for zone 0, to degrees: 0, or -1 with the reason. */
-int shim_locate_utm(int zone, int north, const double grid[2], double lat_lon_deg[2], char *why, size_t len);
+/* Easting and northing in a UTM zone, or in UPS for zone 0, to the degrees of a place: 0, or -1 with the reason. */
+int shim_locate_utm(int zone, int north, const double grid[2], struct georef_place *out, char *why, size_t len);
 /* A place in a grid, zone as for locate_in_grid: 0, or -1 with the reason. */
 int shim_grid_at(const struct georef_place *place, int zone, struct locate_grid *out, char *why, size_t len);
 
@@ -28,31 +28,10 @@ struct georef_geoid *shim_geoid_open(char *why, size_t len);
 
 /* From the scene frame about a centre to a grid zone, geodetic coordinates or ECEF. */
 struct shim_map;
-enum shim_kind { SHIM_GRID, SHIM_GEODETIC, SHIM_ECEF };
 
-/* How the scene frame (prcs) lies: turned against east, north, up at the place, or a grid. */
-struct shim_frame {
-    int is_grid;
-    double turn[9];  /* differences in prcs -> east, north, up, row by row */
-    int zone, north; /* grid; zone 0: UPS */
-};
-
-/* The output's grid. zone: 1..60, 0 for the standard zone, which beyond 84 N and 80 S is UPS, or -1: UPS.
- * side: 0: the place's hemisphere, 1: north, -1: south. */
-struct shim_zone {
-    int zone, side;
-};
-
-struct shim_spec {
-    enum shim_kind kind;
-    double place[3]; /* of the centre: degrees, degrees, metres above the ellipsoid */
-    struct shim_frame frame;
-    struct shim_zone zone;
-    const struct georef_geoid *geoid; /* NULL: heights above the ellipsoid */
-};
-
-/* NULL on failure, with the reason. */
-struct shim_map *shim_map_create(const struct shim_spec *spec, char *why, size_t len);
+/* spec: checked, of a CRS other than local; its rotation is one where the scene frame is no grid. NULL on
+ * failure, with the reason. */
+struct shim_map *shim_map_create(const struct georef_spec *spec, char *why, size_t len);
 /* The same frame and zone about another centre, given as difference in prcs. */
 struct shim_map *shim_map_recentre(const struct shim_map *map, const double d_prcs[3], char *why, size_t len);
 void shim_map_free(struct shim_map *map);

@@ -46,19 +46,17 @@ static int check_rotation(const double r[9], struct sh_err *err)
     return SH_OK;
 }
 
-static int set_up_frame(const struct georef_spec *spec, struct shim_frame *frame, struct sh_err *err)
+/* How the scene frame lies: a grid, or turned; a rotation of zeros stands for the unit matrix. */
+static int set_up_frame(struct georef_spec *spec, struct sh_err *err)
 {
     static const double none[9];
-    *frame = (struct shim_frame){.is_grid = spec->prcs_is_grid, .zone = spec->prcs_zone, .north = spec->prcs_north};
-    memcpy(frame->turn, mat3_unit, sizeof frame->turn);
-    if (spec->prcs_is_grid) {
-        if (spec->prcs_zone >= 0 && spec->prcs_zone <= 60) return SH_OK;
-        return sh_fail(err, SH_EINPUT, "georef: zone %d of the scene frame; allowed 1 to 60, or 0: UPS",
-                       spec->prcs_zone);
+    if (spec->crs == GEOREF_LOCAL) return SH_OK;
+    if (!spec->prcs_is_grid) {
+        if (memcmp(spec->rotation, none, sizeof none) == 0) memcpy(spec->rotation, mat3_unit, sizeof none);
+        return check_rotation(spec->rotation, err);
     }
-    if (memcmp(spec->rotation, none, sizeof none) == 0) return SH_OK;
-    memcpy(frame->turn, spec->rotation, sizeof frame->turn);
-    return check_rotation(frame->turn, err);
+    if (spec->prcs_zone >= 0 && spec->prcs_zone <= 60) return SH_OK;
+    return sh_fail(err, SH_EINPUT, "georef: zone %d of the scene frame; allowed 1 to 60, or 0: UPS", spec->prcs_zone);
 }
 
 /* Points in the grid that they are in already. */
@@ -99,32 +97,21 @@ static void set_up_centre(struct georef *georef)
 
 static int fail_map(const struct georef_spec *spec, const char *why, struct sh_err *err)
 {
-    const char *open = why[0] != '\0' ? " (" : "", *close = why[0] != '\0' ? ")" : "";
     if (spec->prcs_is_grid)
         return sh_fail(err, SH_EINPUT,
-                       "georef: the scene's grid, or the output's, does not reach latitude %g, longitude %g%s%s%s",
-                       spec->lat_deg, spec->lon_deg, open, why, close);
+                       "georef: the scene's grid, or the output's, does not reach latitude %g, longitude %g (%s)",
+                       spec->lat_deg, spec->lon_deg, why);
     if (spec->crs == GEOREF_UTM)
         return sh_fail(err, SH_EINPUT,
-                       "georef: UTM zone %d does not reach latitude %g, longitude %g%s%s%s; 0: by position",
-                       spec->utm_zone, spec->lat_deg, spec->lon_deg, open, why, close);
+                       "georef: UTM zone %d does not reach latitude %g, longitude %g (%s); 0: by position",
+                       spec->utm_zone, spec->lat_deg, spec->lon_deg, why);
     return sh_fail(err, SH_EINPUT, "georef: %s", why);
 }
 
-static int set_up_map(struct georef *georef, const struct georef_spec *spec, const struct shim_frame *frame,
-                      struct sh_err *err)
+static int set_up_map(struct georef *georef, const struct georef_spec *spec, struct sh_err *err)
 {
     char why[256] = "";
-    const struct shim_spec map = {
-        .kind = spec->crs == GEOREF_UTM    ? SHIM_GRID
-                : spec->crs == GEOREF_ECEF ? SHIM_ECEF
-                                           : SHIM_GEODETIC,
-        .place = {spec->lat_deg, spec->lon_deg, spec->height_m},
-        .frame = *frame,
-        .zone = {spec->utm_zone, spec->side},
-        .geoid = spec->geoid,
-    };
-    georef->map = shim_map_create(&map, why, sizeof why);
+    georef->map = shim_map_create(spec, why, sizeof why);
     if (georef->map == NULL) return fail_map(spec, why, err);
     georef->has_geoid = spec->geoid != NULL;
     georef->from_grid = spec->prcs_is_grid;
@@ -134,7 +121,7 @@ static int set_up_map(struct georef *georef, const struct georef_spec *spec, con
 }
 
 /* Local, ECEF from a metric frame, and a grid that the scene is in. */
-static void set_up_linear(struct georef *georef, const struct georef_spec *spec, const struct shim_frame *frame)
+static void set_up_linear(struct georef *georef, const struct georef_spec *spec)
 {
     memcpy(georef->anchor, spec->station_m, sizeof georef->anchor);
     memcpy(georef->rotation, mat3_unit, sizeof georef->rotation);
@@ -144,29 +131,28 @@ static void set_up_linear(struct georef *georef, const struct georef_spec *spec,
     if (spec->crs == GEOREF_ECEF) {
         double enu[9];
         shim_ecef(spec->lat_deg, spec->lon_deg, spec->height_m, georef->anchor, enu);
-        mat3_multiply(enu, frame->turn, georef->rotation);
+        mat3_multiply(enu, spec->rotation, georef->rotation);
         georef->epsg = 4978;
     }
     memcpy(georef->origin, georef->anchor, sizeof georef->origin);
 }
 
-int georef_create(const struct georef_spec *spec, struct georef **out, struct sh_err *err)
+int georef_create(const struct georef_spec *given, struct georef **out, struct sh_err *err)
 {
-    int rc = check_spec(spec, err);
+    struct georef_spec spec = *given;
+    int rc = check_spec(&spec, err);
+    if (rc == SH_OK) rc = set_up_frame(&spec, err);
     if (rc != SH_OK) return rc;
     struct georef *georef = calloc(1, sizeof *georef);
     if (georef == NULL) return sh_fail(err, SH_ENOMEM, "georef: no memory");
-    georef->crs = spec->crs;
+    georef->crs = spec.crs;
     georef->method = GEOREF_EXACT;
-    memcpy(georef->station_m, spec->station_m, sizeof georef->station_m);
-    memcpy(georef->centre_m, spec->station_m, sizeof georef->centre_m);
-    struct shim_frame frame;
-    rc = spec->crs == GEOREF_LOCAL ? SH_OK : set_up_frame(spec, &frame, err);
-    if (rc == SH_OK &&
-        (spec->crs == GEOREF_LOCAL || is_same_grid(spec) || (spec->crs == GEOREF_ECEF && !spec->prcs_is_grid)))
-        set_up_linear(georef, spec, &frame);
-    else if (rc == SH_OK)
-        rc = set_up_map(georef, spec, &frame, err);
+    memcpy(georef->station_m, spec.station_m, sizeof georef->station_m);
+    memcpy(georef->centre_m, spec.station_m, sizeof georef->centre_m);
+    if (spec.crs == GEOREF_LOCAL || is_same_grid(&spec) || (spec.crs == GEOREF_ECEF && !spec.prcs_is_grid))
+        set_up_linear(georef, &spec);
+    else
+        rc = set_up_map(georef, &spec, err);
     if (rc != SH_OK) {
         georef_free(georef);
         return rc;
@@ -204,11 +190,9 @@ int georef_recentre(const struct georef *georef, const double centre_m[3], struc
         set_up_centre(moved);
     } else {
         double turned[3];
-        for (int i = 0; i < 3; i++)
-            d[i] = centre_m[i] - georef->station_m[i];
+        vec3_sub(centre_m, georef->station_m, d);
         mat3_apply(georef->rotation, d, turned);
-        for (int i = 0; i < 3; i++)
-            moved->anchor[i] = georef->origin[i] + turned[i];
+        vec3_add(georef->origin, turned, moved->anchor);
     }
     if (moved->method != GEOREF_EXACT && moved->polynomial.half_m == 0.0 && georef_has_map(moved)) {
         georef_free(moved);
@@ -333,13 +317,11 @@ void georef_reverse(const struct georef *georef, const double d_crs[3], double p
         shim_map_reverse(georef->map, d_crs, d);
     else
         mat3_apply_transposed(georef->rotation, d_crs, d);
-    for (int i = 0; i < 3; i++)
-        p_prcs[i] = georef->centre_m[i] + d[i];
+    vec3_add(georef->centre_m, d, p_prcs);
 }
 
 void georef_difference(const struct georef *georef, const double p_crs[3], double d_crs[3])
 {
-    for (int i = 0; i < 3; i++)
-        d_crs[i] = p_crs[i] - georef->anchor[i];
+    vec3_sub(p_crs, georef->anchor, d_crs);
     if (georef->crs == GEOREF_GEODETIC) d_crs[1] = remainder(d_crs[1], 360.0);
 }

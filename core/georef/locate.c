@@ -44,15 +44,14 @@ int locate_in_grid(const struct georef_place *place, int zone, struct locate_gri
 
 int georef_locate_utm(int zone, int north, const double grid_m[3], struct georef_place *out, struct sh_err *err)
 {
-    double at[2];
     char why[256] = "";
     if (zone < 0 || zone > 60) return sh_fail(err, SH_EINPUT, "UTM zone %d; allowed 1 to 60, or 0: UPS", zone);
     if (!isfinite(grid_m[0]) || !isfinite(grid_m[1]) || !isfinite(grid_m[2]))
         return sh_fail(err, SH_EINPUT, "%s coordinates are not finite numbers of metres", zone == 0 ? "UPS" : "UTM");
-    if (shim_locate_utm(zone, north, grid_m, at, why, sizeof why) != 0)
+    if (shim_locate_utm(zone, north, grid_m, out, why, sizeof why) != 0)
         return sh_fail(err, SH_EINPUT, "%.3f E %.3f N is not in %s %d%c (%s)", grid_m[0], grid_m[1],
                        zone == 0 ? "UPS" : "UTM zone", zone, north ? 'N' : 'S', why);
-    *out = (struct georef_place){at[0], at[1], grid_m[2]};
+    out->height_m = grid_m[2];
     return SH_OK;
 }
 

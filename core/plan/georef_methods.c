@@ -11,11 +11,6 @@ static const struct {
                [GEOREF_ORDER1] = {"order1", 1.0}, [GEOREF_ORDER2] = {"order2", 2.0},
                [GEOREF_ORDER3] = {"order3", 4.0}, [GEOREF_ORDER5] = {"order5", 4.0}};
 
-const char *plan_method_name(enum georef_method method)
-{
-    return methods[method].name;
-}
-
 static double cost_ns(const struct georef *georef, enum georef_method method)
 {
     if (method != GEOREF_EXACT) return methods[method].cost_ns;
@@ -26,10 +21,7 @@ static double cost_ns(const struct georef *georef, enum georef_method method)
 static void say_linear(const struct georef *georef, struct plan_row *row, double error_m)
 {
     int local = georef_crs(georef) == GEOREF_LOCAL;
-    snprintf(row->method, sizeof row->method, "%s", local ? "none" : "rotation");
-    row->error_m = error_m;
-    row->cost_ns = 0.0;
-    snprintf(row->why, sizeof row->why, "%s",
+    plan_say(row, "georef", local ? "none" : "rotation", error_m, 0.0,
              local ? "points stay in the scene frame" : "ECEF is a rotation, which the head's rotation takes in");
 }
 
@@ -54,7 +46,6 @@ int plan_georef(const struct georef *georef, const struct plan_georef_need *need
                 struct plan_row *row, struct sh_err *err)
 {
     double bound_m = georef_bound_m(georef, GEOREF_EXACT, need->radius_m, need->height_m), rotation[9];
-    *row = (struct plan_row){.stage = "georef"};
     *method = GEOREF_EXACT;
     if (georef_rotation(georef, rotation)) {
         say_linear(georef, row, bound_m);
@@ -74,9 +65,7 @@ int plan_georef(const struct georef *georef, const struct plan_georef_need *need
         bound_m = b;
         break;
     }
-    snprintf(row->method, sizeof row->method, "%s", methods[*method].name);
-    row->error_m = bound_m;
-    row->cost_ns = cost_ns(georef, *method);
+    plan_say(row, "georef", methods[*method].name, bound_m, cost_ns(georef, *method), "");
     row->forced = need->forced != GEOREF_AUTO;
     leave_out(georef, need, *method, row);
     const char *why = need->forced != GEOREF_AUTO       ? "asked for by output.georef"
@@ -91,7 +80,6 @@ int plan_georef(const struct georef *georef, const struct plan_georef_need *need
 
 void plan_georef_polar(struct plan_row *row)
 {
-    *row = (struct plan_row){.stage = "georef", .method = "none"};
-    snprintf(row->why, sizeof row->why,
+    plan_say(row, "georef", "none", 0.0, 0.0,
              "output.layout is polar: points leave as range and angles, the anchor says where");
 }

@@ -4,6 +4,9 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/mat3.h"
+#include "core/vec3.h"
+
 void pose_multiply(const double a[4], const double b[4], double out[4])
 {
     const double w = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3];
@@ -67,10 +70,9 @@ void pose_from_matrix(const double rotation[9], double quat[4])
 void pose_rotate(const double quat[4], const double v[3], double out[3])
 {
     double r[9];
-    const double x = v[0], y = v[1], z = v[2];
+    const double from[3] = {v[0], v[1], v[2]};
     pose_matrix(quat, r);
-    for (int i = 0; i < 3; i++)
-        out[i] = r[3 * i] * x + r[3 * i + 1] * y + r[3 * i + 2] * z;
+    mat3_apply(r, from, out);
 }
 
 void pose_turn(const double a[4], const double b[4], double axis[3], double *angle_rad)
@@ -106,8 +108,7 @@ void pose_mount(const struct pose *body, const struct pose *mount, struct pose *
 {
     double arm[3];
     pose_rotate(body->quat, mount->position_m, arm);
-    for (int i = 0; i < 3; i++)
-        out->position_m[i] = body->position_m[i] + arm[i];
+    vec3_add(body->position_m, arm, out->position_m);
     pose_multiply(body->quat, mount->quat, out->quat);
 }
 

@@ -172,8 +172,7 @@ static void set_knot(const struct trajectory *tr, double start_s, int64_t t_ns, 
 int trajectory_knots(const struct trajectory *tr, const struct pose *mount, const struct pose_knot_rules *rules,
                      struct pose_path *out, struct sh_err *err)
 {
-    const double *arm = mount->position_m, start_s = rules->start_s, end_s = rules->end_s;
-    const double arm_m = sqrt(arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2]);
+    const double arm_m = vec3_length(mount->position_m), start_s = rules->start_s, end_s = rules->end_s;
     double most = 1.0;
     *out = (struct pose_path){0};
     for (size_t i = 0; i + 1 < tr->n; i++)

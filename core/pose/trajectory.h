@@ -17,10 +17,7 @@ struct trajectory {
 /* The straight way between two samples. */
 static inline double trajectory_chord_m(const struct pose_sample *a, const struct pose_sample *b)
 {
-    double d[3];
-    for (int k = 0; k < 3; k++)
-        d[k] = b->pose.position_m[k] - a->pose.position_m[k];
-    return sqrt(vec3_dot(d, d));
+    return vec3_distance(a->pose.position_m, b->pose.position_m);
 }
 
 #endif

@@ -192,8 +192,7 @@ static void heading_at(const struct trajectory *curve, double t_s, double d, con
     trajectory_at(curve, t_s - d, &a, &frame);
     trajectory_at(curve, t_s + d, &b, &frame);
     double step_m[3], on_m[3];
-    for (int k = 0; k < 3; k++)
-        step_m[k] = b.position_m[k] - a.position_m[k];
+    vec3_sub(b.position_m, a.position_m, step_m);
     mat3_apply_transposed(level, step_m, on_m);
     if (hypot(on_m[0], on_m[1]) > d * SLOWEST_M_S) *heading_rad = atan2(on_m[0], on_m[1]);
 }

@@ -8,6 +8,7 @@
 #include <string.h>
 #include <time.h>
 
+#include "core/grow.h"
 #include "core/huge.h"
 #include "core/vec3.h"
 
@@ -156,50 +157,31 @@ int build_fail(struct scene_build *b, int code, struct sh_err *err, const char *
     return sh_fail(err, code, "%s%s: %s", b->name, place, text);
 }
 
-/* The next capacity: at least `need`, half as much again as before, at most max. */
-static uint32_t next_capacity(uint32_t cap, uint64_t need, uint32_t max)
-{
-    uint64_t grown = (uint64_t)cap + cap / 2 + 1024;
-    if (grown < need) grown = need;
-    return grown > max ? max : (uint32_t)grown;
-}
-
 static int grow_vertices(struct scene_build *b, uint64_t need, struct sh_err *err)
 {
     if (need > UINT32_MAX - 1)
         return build_fail(b, SH_EINPUT, err, "too many vertices: a scene holds up to %u", UINT32_MAX - 1);
-    if (need <= b->cap_vertices) return SH_OK;
-    uint32_t cap = next_capacity(b->cap_vertices, need, UINT32_MAX - 1);
-    void *v = realloc(b->scene->vertex_m, cap * sizeof *b->scene->vertex_m);
-    if (v == NULL) return build_fail(b, SH_ENOMEM, err, "no memory for %u vertices", cap);
-    b->scene->vertex_m = v;
-    b->cap_vertices = cap;
-    return SH_OK;
+    if (grow(&b->scene->vertex_m, &b->cap_vertices, need, sizeof *b->scene->vertex_m)) return SH_OK;
+    return build_fail(b, SH_ENOMEM, err, "no memory for %llu vertices", (unsigned long long)need);
 }
 
 static int grow_triangles(struct scene_build *b, uint64_t need, struct sh_err *err)
 {
+    struct scene *s = b->scene;
+    size_t cap_uv = b->cap_triangles, cap_label = b->cap_triangles;
     if (need > UINT32_MAX - 1)
         return build_fail(b, SH_EINPUT, err, "too many triangles: a scene holds up to %u", UINT32_MAX - 1);
-    if (need <= b->cap_triangles) return SH_OK;
-    uint32_t cap = next_capacity(b->cap_triangles, need, UINT32_MAX - 1);
-    void *t = realloc(b->scene->triangle, cap * sizeof *b->scene->triangle);
-    if (t != NULL) b->scene->triangle = t;
-    void *l = t != NULL ? realloc(b->scene->label, cap * sizeof *b->scene->label) : NULL;
-    if (l != NULL) b->scene->label = l;
-    void *uv = l != NULL && b->scene->uv != NULL ? realloc(b->scene->uv, cap * sizeof *b->scene->uv) : NULL;
-    if (uv != NULL) b->scene->uv = uv;
-    if (l == NULL || (b->scene->uv != NULL && uv == NULL))
-        return build_fail(b, SH_ENOMEM, err, "no memory for %u triangles", cap);
-    b->cap_triangles = cap;
-    return SH_OK;
+    if ((s->uv == NULL || grow(&s->uv, &cap_uv, need, sizeof *s->uv)) &&
+        grow(&s->label, &cap_label, need, sizeof *s->label) &&
+        grow(&s->triangle, &b->cap_triangles, need, sizeof *s->triangle))
+        return SH_OK;
+    return build_fail(b, SH_ENOMEM, err, "no memory for %llu triangles", (unsigned long long)need);
 }
 
 int build_reserve(struct scene_build *b, uint64_t vertices, uint64_t triangles, struct sh_err *err)
 {
-    int rc = vertices > 0 ? grow_vertices(b, b->scene->n_vertices + vertices, err) : SH_OK;
-    if (rc == SH_OK && triangles > 0) rc = grow_triangles(b, b->scene->n_triangles + triangles, err);
-    return rc;
+    int rc = grow_vertices(b, b->scene->n_vertices + vertices, err);
+    return rc == SH_OK ? grow_triangles(b, b->scene->n_triangles + triangles, err) : rc;
 }
 
 int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err)
@@ -209,10 +191,8 @@ int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err)
     unsigned long long number = s->n_vertices - b->mesh_vertex0 + 1ull;
     if (!isfinite(v[0]) || !isfinite(v[1]) || !isfinite(v[2]))
         return build_fail(b, SH_EINPUT, err, "vertex %llu (%g %g %g) is not finite", number, v[0], v[1], v[2]);
-    if (s->n_vertices >= b->cap_vertices) {
-        int rc = grow_vertices(b, s->n_vertices + 1ull, err);
-        if (rc != SH_OK) return rc;
-    }
+    int rc = grow_vertices(b, s->n_vertices + 1ull, err);
+    if (rc != SH_OK) return rc;
     bool y_up = spec->up == SCENE_UP_Y;
     double turned[3] = {v[0], y_up ? -v[2] : v[1], y_up ? v[1] : v[2]};
     double *p = s->vertex_m[s->n_vertices];
@@ -232,11 +212,9 @@ int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err)
 static bool has_area(const double *a, const double *b, const double *c)
 {
     double u[3], v[3], w[3];
-    for (int k = 0; k < 3; k++) {
-        u[k] = b[k] - a[k];
-        v[k] = c[k] - a[k];
-        w[k] = c[k] - b[k];
-    }
+    vec3_sub(b, a, u);
+    vec3_sub(c, a, v);
+    vec3_sub(c, b, w);
     double n[3], longest2 = fmax(fmax(vec3_dot(u, u), vec3_dot(v, v)), vec3_dot(w, w));
     vec3_cross(u, v, n);
     return sqrt(vec3_dot(n, n)) > 1e-12 * longest2;
@@ -259,74 +237,58 @@ static int keep_uv(struct scene_build *b, const float uv[3][2], struct sh_err *e
     return SH_OK;
 }
 
-/* uv: of the corners, or no_uv. */
-static int add_triangle(struct scene_build *b, const uint32_t corner[3], const float uv[3][2], uint16_t label,
-                        struct sh_err *err)
-{
-    struct scene *s = b->scene;
-    if (!has_area(s->vertex_m[corner[0]], s->vertex_m[corner[1]], s->vertex_m[corner[2]])) {
-        b->counts.zero_area++;
-        return SH_OK;
-    }
-    if (s->n_triangles >= b->cap_triangles) {
-        int rc = grow_triangles(b, s->n_triangles + 1ull, err);
-        if (rc != SH_OK) return rc;
-    }
-    int rc = keep_uv(b, uv, err);
-    memcpy(s->triangle[s->n_triangles], corner, sizeof *s->triangle);
-    s->label[s->n_triangles++] = label;
-    return rc;
-}
-
-int build_triangle(struct scene_build *b, const uint32_t corner[3], uint16_t label, struct sh_err *err)
-{
-    return add_triangle(b, corner, no_uv, label, err);
-}
-
 int build_corners(struct scene_build *b, size_t n, struct sh_err *err)
 {
-    if (n <= b->cap_corners) return SH_OK;
-    size_t cap = n + n / 2 + 16;
-    void *corner = realloc(b->corner, cap * sizeof *b->corner);
-    if (corner != NULL) b->corner = corner;
-    void *uv = realloc(b->corner_uv, cap * sizeof *b->corner_uv);
-    if (uv != NULL) b->corner_uv = uv;
-    if (corner == NULL || uv == NULL) return build_fail(b, SH_ENOMEM, err, "no memory for a face of %zu corners", n);
-    b->cap_corners = cap;
-    return SH_OK;
+    size_t cap_uv = b->cap_corners;
+    if (grow(&b->corner_uv, &cap_uv, n, sizeof *b->corner_uv) &&
+        grow(&b->corner, &b->cap_corners, n, sizeof *b->corner))
+        return SH_OK;
+    return build_fail(b, SH_ENOMEM, err, "no memory for a face of %zu corners", n);
 }
 
-static int add_corners(struct scene_build *b, const uint32_t at[3], uint16_t label, struct sh_err *err)
+/* at: which three of the polygon's corners. */
+static int add_triangle(struct scene_build *b, const uint32_t at[3], uint16_t label, struct sh_err *err)
 {
+    struct scene *s = b->scene;
     uint32_t corner[3];
     float uv[3][2];
     for (int k = 0; k < 3; k++) {
         corner[k] = b->corner[at[k]];
         if (b->has_uv) memcpy(uv[k], b->corner_uv[at[k]], sizeof uv[k]);
     }
-    return add_triangle(b, corner, b->has_uv ? (const float(*)[2])uv : no_uv, label, err);
+    if (!has_area(s->vertex_m[corner[0]], s->vertex_m[corner[1]], s->vertex_m[corner[2]])) {
+        b->counts.zero_area++;
+        return SH_OK;
+    }
+    int rc = grow_triangles(b, s->n_triangles + 1ull, err);
+    if (rc == SH_OK) rc = keep_uv(b, b->has_uv ? (const float(*)[2])uv : no_uv, err);
+    if (rc != SH_OK) return rc;
+    memcpy(s->triangle[s->n_triangles], corner, sizeof *s->triangle);
+    s->label[s->n_triangles++] = label;
+    return SH_OK;
 }
 
 int build_polygon(struct scene_build *b, size_t n, uint16_t label, struct sh_err *err)
 {
-    if (n == 3) return add_corners(b, (const uint32_t[3]){0, 1, 2}, label, err);
+    if (n == 3) return add_triangle(b, (const uint32_t[3]){0, 1, 2}, label, err);
     if (n > SCENE_MAX_CORNERS)
         return build_fail(b, SH_EINPUT, err, "a polygon has %zu corners; allowed are up to %d", n, SCENE_MAX_CORNERS);
     struct triangulate *t = &b->polygon;
     if (triangulate_reserve(t, n) != SH_OK)
         return build_fail(b, SH_ENOMEM, err, "no memory for a polygon of %zu corners", n);
     for (size_t i = 0; i < n; i++)
-        memcpy(t->p[i], b->scene->vertex_m[b->corner[i]], sizeof *t->p);
+        memcpy(t->at[i].p, b->scene->vertex_m[b->corner[i]], sizeof t->at->p);
     triangulate_polygon(t, (uint32_t)n);
     if (!t->simple) b->not_simple++;
     int rc = SH_OK;
     for (size_t i = 0; i + 2 < n && rc == SH_OK; i++)
-        rc = add_corners(b, t->triangle[i], label, err);
+        rc = add_triangle(b, t->at[i].triangle, label, err);
     return rc;
 }
 
-void build_progress(struct scene_build *b, double fraction)
+void build_progress(void *build, double fraction)
 {
+    struct scene_build *b = build;
     int64_t now = now_ns();
     if (now - b->start_ns >= 1000000000 && now - b->reported_ns >= 250000000) report(b, fraction);
 }

@@ -27,8 +27,7 @@ struct scene_build {
     float (*corner_uv)[2]; /* where has_uv: their texture coordinates */
     bool has_uv;
     /* the builder's own */
-    size_t cap_corners;
-    uint32_t cap_vertices, cap_triangles;
+    size_t cap_corners, cap_vertices, cap_triangles;
     void *surface_tree;
     struct triangulate polygon;
     int64_t start_ns, file_ns, reported_ns; /* of the load, of this file, of the last report */
@@ -56,8 +55,6 @@ int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err);
 int build_corners(struct scene_build *b, size_t n, struct sh_err *err);
 /* Adds the polygon of the n >= 3 corners in corner. */
 int build_polygon(struct scene_build *b, size_t n, uint16_t label, struct sh_err *err);
-/* Adds one triangle without texture coordinates. corner: as above, but the caller's. */
-int build_triangle(struct scene_build *b, const uint32_t corner[3], uint16_t label, struct sh_err *err);
 
 /* The label of a pair of names; a new pair gets the next number. */
 int build_label(struct scene_build *b, struct text_span object, struct text_span material, uint16_t *label,
@@ -68,8 +65,9 @@ int build_label(struct scene_build *b, struct text_span object, struct text_span
 int build_texture(struct scene_build *b, struct text_span name, const void *bytes, size_t n_bytes, uint16_t *number,
                   struct sh_err *err);
 
-/* Reports "reading FILE" about four times a second, once the load takes longer than a second. */
-void build_progress(struct scene_build *b, double fraction);
+/* Reports "reading FILE" about four times a second, once the load takes longer than a second. build: a struct
+ * scene_build. */
+void build_progress(void *build, double fraction);
 
 /* Reports "reading FILE" with an unknown fraction, at once. */
 void build_announce(struct scene_build *b);

@@ -128,12 +128,12 @@ static bool is_made_up(const char *material)
 }
 
 /* The first colour that comes with a material's name stays. glTF has linear colours. */
-static void keep_colour(const struct import *im, const struct aiMesh *mesh, struct scene_surface *surface)
+static void keep_colour(const struct import *im, const struct aiMaterial *material, struct scene_surface *surface)
 {
     struct aiColor4D c;
     const char *dot = strrchr(im->b->spec->file, '.');
-    if (surface->has_colour || mesh->mMaterialIndex >= im->in->mNumMaterials || is_made_up(surface->material)) return;
-    if (aiGetMaterialColor(im->in->mMaterials[mesh->mMaterialIndex], AI_MATKEY_COLOR_DIFFUSE, &c) != AI_SUCCESS) return;
+    if (surface->has_colour || is_made_up(surface->material)) return;
+    if (aiGetMaterialColor(material, AI_MATKEY_COLOR_DIFFUSE, &c) != AI_SUCCESS) return;
     const float rgb[3] = {c.r, c.g, c.b};
     bool linear = dot != NULL && (strcasecmp(dot, ".gltf") == 0 || strcasecmp(dot, ".glb") == 0);
     for (int i = 0; i < 3; i++) {
@@ -144,27 +144,24 @@ static void keep_colour(const struct import *im, const struct aiMesh *mesh, stru
 }
 
 /* The diffuse texture, a file or ("*3") one within this. What lies there unpacked is none that is read. */
-static int keep_texture(const struct import *im, const struct aiMesh *mesh, struct scene_surface *surface,
+static int keep_texture(const struct import *im, const struct aiMaterial *material, struct scene_surface *surface,
                         struct sh_err *err)
 {
     struct aiString path;
     char name[sizeof path.data + 256];
     const char *base = strrchr(im->b->spec->file, '/');
     const struct aiTexture *within = NULL;
-    if (!im->b->spec->textures || surface->texture != 0 || mesh->mMaterialIndex >= im->in->mNumMaterials) return SH_OK;
-    if (aiGetMaterialTexture(im->in->mMaterials[mesh->mMaterialIndex], aiTextureType_DIFFUSE, 0, &path, NULL, NULL,
-                             NULL, NULL, NULL, NULL) != AI_SUCCESS)
+    if (!im->b->spec->textures || surface->texture != 0) return SH_OK;
+    if (aiGetMaterialTexture(material, aiTextureType_DIFFUSE, 0, &path, NULL, NULL, NULL, NULL, NULL, NULL) !=
+        AI_SUCCESS)
         return SH_OK;
     if (path.data[0] == '*') {
         unsigned long i = strtoul(path.data + 1, NULL, 10);
         if (i >= im->in->mNumTextures || im->in->mTextures[i]->mHeight != 0) return SH_OK;
         within = im->in->mTextures[i];
     }
-    int len = snprintf(name, sizeof name, "%.255s%.*s",
-                       within == NULL ? ""
-                       : base != NULL ? base + 1
-                                      : im->b->spec->file,
-                       (int)path.length, path.data);
+    base = within == NULL ? "" : base != NULL ? base + 1 : im->b->spec->file;
+    int len = snprintf(name, sizeof name, "%.255s%.*s", base, (int)path.length, path.data);
     return build_texture(im->b, (struct text_span){name, (size_t)len}, within != NULL ? within->pcData : NULL,
                          within != NULL ? within->mWidth : 0, &surface->texture, err);
 }
@@ -178,13 +175,14 @@ static int label_of(struct import *im, const struct aiNode *node, const struct a
                     struct sh_err *err)
 {
     const struct aiString *object = node->mName.length > 0 ? &node->mName : &mesh->mName;
-    struct aiString material = {0};
-    if (mesh->mMaterialIndex < im->in->mNumMaterials)
-        aiGetMaterialString(im->in->mMaterials[mesh->mMaterialIndex], AI_MATKEY_NAME, &material);
-    int rc = build_label(im->b, span_of(object), span_of(&material), label, err);
-    if (rc != SH_OK) return rc;
-    keep_colour(im, mesh, &im->b->scene->surface[*label]);
-    return keep_texture(im, mesh, &im->b->scene->surface[*label], err);
+    const struct aiMaterial *material = NULL;
+    struct aiString name = {0};
+    if (mesh->mMaterialIndex < im->in->mNumMaterials) material = im->in->mMaterials[mesh->mMaterialIndex];
+    if (material != NULL) aiGetMaterialString(material, AI_MATKEY_NAME, &name);
+    int rc = build_label(im->b, span_of(object), span_of(&name), label, err);
+    if (rc != SH_OK || material == NULL) return rc;
+    keep_colour(im, material, &im->b->scene->surface[*label]);
+    return keep_texture(im, material, &im->b->scene->surface[*label], err);
 }
 
 static int add_mesh(struct import *im, const struct aiNode *node, const struct aiMesh *mesh, struct sh_err *err)

@@ -7,10 +7,11 @@
 
 #include "core/grow.h"
 
-int ply_open(struct ply_rows *r, const char *path, void (*tick)(void *ctx), void *ctx, struct sh_err *err)
+int ply_open(struct ply_rows *r, const char *path, void (*progress)(void *ctx, double fraction), void *ctx,
+             struct sh_err *err)
 {
-    *r = (struct ply_rows){0};
-    int rc = text_open(&r->t, path, tick, ctx, err);
+    *r = (struct ply_rows){.progress = progress, .progress_ctx = ctx};
+    int rc = text_open(&r->t, path, progress, ctx, err);
     return rc == SH_OK ? ply_read_header(&r->h, &r->t, err) : rc;
 }
 
@@ -134,22 +135,12 @@ static int begin(struct ply_rows *r, int i, struct sh_err *err)
     for (int k = e->first; k < e->first + e->n_properties; k++) {
         const struct ply_property *p = &r->h.property[k];
         least += ascii ? 2 : ply_type_size[p->is_list ? p->count_type : p->type];
+        r->is_single |= !ascii && p->use >= PLY_X && p->use <= PLY_Z && p->type == PLY_FLOAT;
     }
     uint64_t rest = (uint64_t)(r->t.end - r->t.p) + ascii; /* no line end at the end */
     if (e->count == 0 || e->count <= rest / least) return SH_OK;
     return text_fail(&r->t, 0, SH_EINPUT, err, "%llu of element %s need %llu bytes or more each; %llu are left",
                      (unsigned long long)e->count, e->name, (unsigned long long)least, (unsigned long long)rest);
-}
-
-bool ply_is_single(const struct ply_rows *r)
-{
-    const struct ply_element *e = r->element;
-    bool is_float = false;
-    for (int i = e->first; i < e->first + e->n_properties; i++) {
-        const struct ply_property *p = &r->h.property[i];
-        is_float |= p->use >= PLY_X && p->use <= PLY_Z && p->type == PLY_FLOAT;
-    }
-    return is_float && r->h.format != PLY_ASCII;
 }
 
 static int walk_element(struct ply_rows *r, int i, const struct ply_user *user, struct sh_err *err)
@@ -159,7 +150,7 @@ static int walk_element(struct ply_rows *r, int i, const struct ply_user *user, 
     for (; r->row < r->element->count && rc == SH_OK; r->row++) {
         rc = read_row(r, err);
         if (rc == SH_OK) rc = user->row(user->ctx, err);
-        if ((r->row & 0xffff) == 0) user->progress(user->ctx, (double)(r->t.p - r->t.data) / (double)r->t.size);
+        if ((r->row & 0xffff) == 0) r->progress(r->progress_ctx, (double)(r->t.p - r->t.data) / (double)r->t.size);
     }
     return rc;
 }
@@ -176,7 +167,6 @@ int ply_walk(struct ply_rows *r, const struct ply_user *user, struct sh_err *err
     }
     if (r->h.format == PLY_ASCII) skip_blank_lines(&r->t);
     if (r->t.p < r->t.end)
-        sh_warn(user->report, "%s: %zu bytes after the last element ignored", r->t.path,
-                (size_t)(r->t.end - r->t.p));
+        sh_warn(user->report, "%s: %zu bytes after the last element ignored", r->t.path, (size_t)(r->t.end - r->t.p));
     return SH_OK;
 }

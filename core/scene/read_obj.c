@@ -35,30 +35,30 @@ static bool at_statement_end(struct obj *o)
     return text_at_line_end(&o->t) || *o->t.p == '#';
 }
 
+/* Up to the statement's end: least to most numbers, else it fails with `what`. */
+static int read_numbers(struct obj *o, int least, int most, double *number, const char *what, struct sh_err *err)
+{
+    int n = 0;
+    for (; !at_statement_end(o); n++)
+        if (n == most || !text_number(&o->t, &number[n])) return fail_at(o, err, what);
+    return n >= least ? SH_OK : fail_at(o, err, what);
+}
+
 /* x y z, then at most w or a colour, which are read and left alone: a weight is for curves only. */
 static int read_vertex(struct obj *o, struct sh_err *err)
 {
     double v[8];
-    int n = 0;
-    while (!at_statement_end(o)) {
-        if (n == 8 || !text_number(&o->t, &v[n])) return fail_at(o, err, "v takes 3 to 8 numbers");
-        n++;
-    }
-    if (n < 3) return fail_at(o, err, "v takes 3 to 8 numbers");
+    int rc = read_numbers(o, 3, 8, v, "v takes 3 to 8 numbers", err);
     o->b->line = o->t.line;
-    return build_vertex(o->b, v, err);
+    return rc == SH_OK ? build_vertex(o->b, v, err) : rc;
 }
 
 /* vt u [v [w]] */
 static int read_uv(struct obj *o, struct sh_err *err)
 {
     double number[3] = {0.0, 0.0, 0.0};
-    int n = 0;
-    while (!at_statement_end(o)) {
-        if (n == 3 || !text_number(&o->t, &number[n])) return fail_at(o, err, "vt takes 1 to 3 numbers");
-        n++;
-    }
-    if (n == 0) return fail_at(o, err, "vt takes 1 to 3 numbers");
+    int rc = read_numbers(o, 1, 3, number, "vt takes 1 to 3 numbers", err);
+    if (rc != SH_OK) return rc;
     if (!grow(&o->uv, &o->cap_uv, o->n_uv + 1, sizeof *o->uv))
         return build_fail(o->b, SH_ENOMEM, err, "no memory for texture coordinates");
     o->uv[o->n_uv][0] = (float)number[0];
@@ -140,20 +140,19 @@ static int read_name(struct obj *o, struct text_span *name)
     return SH_OK;
 }
 
-static void skip_statement(struct obj *o)
+/* Returns how many words there were. */
+static uint64_t skip_statement(struct obj *o)
 {
-    while (!at_statement_end(o))
+    uint64_t n = 0;
+    for (; !at_statement_end(o); n++)
         text_word(&o->t);
+    return n;
 }
 
 /* Points count one by one, a line or a free-form curve or surface as one. */
 static int count_left_out(struct obj *o, bool points)
 {
-    uint64_t n = 0;
-    while (!at_statement_end(o)) {
-        text_word(&o->t);
-        n++;
-    }
+    uint64_t n = skip_statement(o);
     o->b->counts.not_triangles += points ? n : 1;
     return SH_OK;
 }
@@ -218,17 +217,12 @@ static int read_statements(struct obj *o, struct sh_err *err)
     return rc;
 }
 
-static void tick(void *build)
-{
-    build_progress(build, -1);
-}
-
 int read_obj(struct scene_build *b, struct sh_err *err)
 {
     struct obj o = {.b = b, .material = {"", 0}};
     uint32_t first_surface = b->scene->n_surfaces;
     o.object = build_base_name(b);
-    int rc = text_open(&o.t, b->spec->file, tick, b, err);
+    int rc = text_open(&o.t, b->spec->file, build_progress, b, err);
     o.t.continued = true;
     if (rc == SH_OK) rc = read_statements(&o, err);
     if (rc == SH_OK && o.n_unknown > 0)

@@ -10,7 +10,6 @@ struct ply {
     struct scene_build *b;
     struct ply_rows r;
     uint16_t label;
-    bool is_single;
 };
 
 static int check_mesh(const struct ply *y, struct sh_err *err)
@@ -77,28 +76,17 @@ static int begin_element(void *ply, struct sh_err *err)
     struct ply *y = ply;
     const struct ply_element *e = y->r.element;
     y->b->line = 0;
-    if (e->kind == PLY_VERTEX) y->is_single = ply_is_single(&y->r);
     return build_reserve(y->b, e->kind == PLY_VERTEX ? e->count : 0, e->kind == PLY_FACE ? e->count : 0, err);
-}
-
-static void progress(void *ply, double fraction)
-{
-    build_progress(((struct ply *)ply)->b, fraction);
 }
 
 static int read_body(struct ply *y, struct sh_err *err)
 {
-    const struct ply_user user = {y, begin_element, use_row, progress, y->b->report, .has_faces = true};
+    const struct ply_user user = {y, begin_element, use_row, y->b->report, .has_faces = true};
     int rc = build_label(y->b, build_base_name(y->b), (struct text_span){"", 0}, &y->label, err);
     if (rc == SH_OK) rc = ply_walk(&y->r, &user, err);
-    if (rc == SH_OK && y->is_single) warn_if_coarse(y);
+    if (rc == SH_OK && y->r.is_single) warn_if_coarse(y);
     y->b->scene->n_meshes++;
     return rc;
-}
-
-static void tick(void *build)
-{
-    build_progress(build, -1);
 }
 
 int read_ply(struct scene_build *b, struct sh_err *err)
@@ -106,7 +94,7 @@ int read_ply(struct scene_build *b, struct sh_err *err)
     struct ply *y = calloc(1, sizeof *y);
     if (y == NULL) return build_fail(b, SH_ENOMEM, err, "no memory");
     y->b = b;
-    int rc = ply_open(&y->r, b->spec->file, tick, b, err);
+    int rc = ply_open(&y->r, b->spec->file, build_progress, b, err);
     if (rc == SH_OK) rc = check_mesh(y, err);
     if (rc == SH_OK) rc = read_body(y, err);
     ply_close(&y->r);

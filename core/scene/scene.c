@@ -79,6 +79,7 @@ static int copy_surfaces(struct scene_build *b, const struct scene_arrays *array
 static int copy_triangles(struct scene_build *b, const struct scene_arrays *arrays, struct sh_err *err)
 {
     int rc = build_reserve(b, 0, arrays->n_triangles, err);
+    if (rc == SH_OK) rc = build_corners(b, 3, err);
     for (uint32_t i = 0; i < arrays->n_triangles && rc == SH_OK; i++) {
         const uint32_t *corner = arrays->triangle[i];
         uint16_t label = arrays->label != NULL ? arrays->label[i] : 0;
@@ -89,7 +90,8 @@ static int copy_triangles(struct scene_build *b, const struct scene_arrays *arra
         if (label >= b->scene->n_surfaces)
             return build_fail(b, SH_EINPUT, err, "triangle %u: label %u out of range; there are %u surfaces", i, label,
                               b->scene->n_surfaces);
-        rc = build_triangle(b, corner, label, err);
+        memcpy(b->corner, corner, sizeof arrays->triangle[i]);
+        rc = build_polygon(b, 3, label, err);
     }
     return rc;
 }

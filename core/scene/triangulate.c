@@ -4,37 +4,17 @@
 #include <stdlib.h>
 
 #include "core/err.h"
-
-static bool grow(void **array, size_t n, size_t size)
-{
-    void *bigger = realloc(*array, n * size);
-    if (bigger == NULL) return false;
-    *array = bigger;
-    return true;
-}
+#include "core/grow.h"
+#include "core/vec3.h"
 
 int triangulate_reserve(struct triangulate *t, size_t n)
 {
-    if (n <= t->cap) return SH_OK;
-    size_t cap = n < 32 ? 64 : n * 2;
-    if (!grow((void **)&t->p, cap, sizeof *t->p)) return SH_ENOMEM;
-    if (!grow((void **)&t->triangle, cap, sizeof *t->triangle)) return SH_ENOMEM;
-    if (!grow((void **)&t->uv, cap, sizeof *t->uv)) return SH_ENOMEM;
-    if (!grow((void **)&t->next, cap, sizeof *t->next)) return SH_ENOMEM;
-    if (!grow((void **)&t->prev, cap, sizeof *t->prev)) return SH_ENOMEM;
-    if (!grow((void **)&t->reflex, cap, sizeof *t->reflex)) return SH_ENOMEM;
-    t->cap = cap;
-    return SH_OK;
+    return grow(&t->at, &t->cap, n, sizeof *t->at) ? SH_OK : SH_ENOMEM;
 }
 
 void triangulate_free(struct triangulate *t)
 {
-    free(t->p);
-    free(t->triangle);
-    free(t->uv);
-    free(t->next);
-    free(t->prev);
-    free(t->reflex);
+    free(t->at);
     *t = (struct triangulate){0};
 }
 
@@ -43,14 +23,11 @@ static void project(struct triangulate *t, uint32_t n)
 {
     double normal[3] = {0, 0, 0};
     for (uint32_t i = 1; i + 1 < n; i++) {
-        double a[3], b[3];
-        for (int k = 0; k < 3; k++) {
-            a[k] = t->p[i][k] - t->p[0][k];
-            b[k] = t->p[i + 1][k] - t->p[0][k];
-        }
-        normal[0] += a[1] * b[2] - a[2] * b[1];
-        normal[1] += a[2] * b[0] - a[0] * b[2];
-        normal[2] += a[0] * b[1] - a[1] * b[0];
+        double a[3], b[3], across[3];
+        vec3_sub(t->at[i].p, t->at[0].p, a);
+        vec3_sub(t->at[i + 1].p, t->at[0].p, b);
+        vec3_cross(a, b, across);
+        vec3_add(normal, across, normal);
     }
     int axis = 0;
     for (int k = 1; k < 3; k++)
@@ -62,26 +39,26 @@ static void project(struct triangulate *t, uint32_t n)
         v = swap;
     }
     for (uint32_t i = 0; i < n; i++) {
-        t->uv[i][0] = t->p[i][u] - t->p[0][u];
-        t->uv[i][1] = t->p[i][v] - t->p[0][v];
+        t->at[i].uv[0] = t->at[i].p[u] - t->at[0].p[u];
+        t->at[i].uv[1] = t->at[i].p[v] - t->at[0].p[v];
     }
 }
 
 /* Twice the signed area of the triangle (a, b, c): positive for a left turn. */
 static double turn(const struct triangulate *t, uint32_t a, uint32_t b, uint32_t c)
 {
-    const double *p = t->uv[a], *q = t->uv[b], *r = t->uv[c];
+    const double *p = t->at[a].uv, *q = t->at[b].uv, *r = t->at[c].uv;
     return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
 }
 
 static bool same_place(const struct triangulate *t, uint32_t a, uint32_t b)
 {
-    return t->uv[a][0] == t->uv[b][0] && t->uv[a][1] == t->uv[b][1];
+    return t->at[a].uv[0] == t->at[b].uv[0] && t->at[a].uv[1] == t->at[b].uv[1];
 }
 
 static bool is_clipped(const struct triangulate *t, uint32_t i)
 {
-    return t->next[i] == i;
+    return t->at[i].next == i;
 }
 
 /* A corner at the same place as one of the ear's is the other side of a keyhole and doesn't block it. */
@@ -94,23 +71,23 @@ static bool blocks(const struct triangulate *t, uint32_t i, uint32_t a, uint32_t
 
 static bool is_ear(const struct triangulate *t, uint32_t i)
 {
-    uint32_t a = t->prev[i], c = t->next[i];
+    uint32_t a = t->at[i].prev, c = t->at[i].next;
     if (!(turn(t, a, i, c) > 0)) return false;
     for (size_t k = 0; k < t->n_reflex; k++)
-        if (blocks(t, t->reflex[k], a, i, c)) return false;
+        if (blocks(t, t->at[k].reflex, a, i, c)) return false;
     return true;
 }
 
 static void clip(struct triangulate *t, uint32_t i, uint32_t *n_out)
 {
-    uint32_t a = t->prev[i], c = t->next[i];
-    uint32_t *out = t->triangle[(*n_out)++];
+    uint32_t a = t->at[i].prev, c = t->at[i].next;
+    uint32_t *out = t->at[(*n_out)++].triangle;
     out[0] = a;
     out[1] = i;
     out[2] = c;
-    t->next[a] = c;
-    t->prev[c] = a;
-    t->next[i] = i;
+    t->at[a].next = c;
+    t->at[c].prev = a;
+    t->at[i].next = i;
 }
 
 /* No ear is left: take a corner without area (nothing is lost), else the polygon crosses itself. */
@@ -118,10 +95,10 @@ static uint32_t forced_corner(struct triangulate *t, uint32_t start)
 {
     uint32_t convex = start, i = start;
     do {
-        double area = turn(t, t->prev[i], i, t->next[i]);
+        double area = turn(t, t->at[i].prev, i, t->at[i].next);
         if (area == 0) return i;
         if (area > 0) convex = i;
-        i = t->next[i];
+        i = t->at[i].next;
     } while (i != start);
     t->simple = false;
     return convex;
@@ -130,8 +107,8 @@ static uint32_t forced_corner(struct triangulate *t, uint32_t start)
 /* Ears turn left; if what is left over at last turns right, by more than rounding, edges have crossed. */
 static bool is_turned_over(const struct triangulate *t, uint32_t a, uint32_t b, uint32_t c)
 {
-    double u = t->uv[b][0] - t->uv[a][0], v = t->uv[b][1] - t->uv[a][1];
-    double s = t->uv[c][0] - t->uv[a][0], w = t->uv[c][1] - t->uv[a][1];
+    double u = t->at[b].uv[0] - t->at[a].uv[0], v = t->at[b].uv[1] - t->at[a].uv[1];
+    double s = t->at[c].uv[0] - t->at[a].uv[0], w = t->at[c].uv[1] - t->at[a].uv[1];
     return turn(t, a, b, c) < -1e-12 * (u * u + v * v + s * s + w * w);
 }
 
@@ -141,27 +118,27 @@ void triangulate_polygon(struct triangulate *t, uint32_t n)
     t->n_reflex = 0;
     project(t, n);
     for (uint32_t i = 0; i < n; i++) {
-        t->next[i] = i + 1 < n ? i + 1 : 0;
-        t->prev[i] = i > 0 ? i - 1 : n - 1;
+        t->at[i].next = i + 1 < n ? i + 1 : 0;
+        t->at[i].prev = i > 0 ? i - 1 : n - 1;
     }
     for (uint32_t i = 0; i < n; i++)
-        if (!(turn(t, t->prev[i], i, t->next[i]) > 0)) t->reflex[t->n_reflex++] = i;
+        if (!(turn(t, t->at[i].prev, i, t->at[i].next) > 0)) t->at[t->n_reflex++].reflex = i;
     uint32_t n_out = 0, left = n, tried = 0, i = 1; /* from 1: a convex polygon becomes a fan about corner 0 */
     while (left > 3) {
-        uint32_t next = t->next[i];
+        uint32_t next = t->at[i].next;
         if (is_ear(t, i)) {
             clip(t, i, &n_out);
             left--;
             tried = 0;
         } else if (++tried >= left) {
             uint32_t corner = forced_corner(t, i);
-            next = t->next[corner];
+            next = t->at[corner].next;
             clip(t, corner, &n_out);
             left--;
             tried = 0;
         }
         i = next;
     }
-    if (is_turned_over(t, t->prev[i], i, t->next[i])) t->simple = false;
+    if (is_turned_over(t, t->at[i].prev, i, t->at[i].next)) t->simple = false;
     clip(t, i, &n_out);
 }

@@ -11,21 +11,26 @@
 #include <stddef.h>
 #include <stdint.h>
 
+/* Entry i of each list; together they are a cache line. */
+struct triangulate_entry {
+    double p[3];          /* in: corner i */
+    uint32_t triangle[3]; /* out: triangle i, by numbers of corners, in the polygon's sense of rotation */
+    uint32_t next, prev;  /* of corner i, among those that are left */
+    uint32_t reflex;      /* the i-th corner that does not turn left */
+    double uv[2];         /* corner i, projected */
+};
+
 /* One work space serves any number of polygons. Zero-initialise; release with triangulate_free. */
 struct triangulate {
-    size_t cap;
-    double (*p)[3];          /* in: the corners */
-    uint32_t (*triangle)[3]; /* out: numbers of corners, in the polygon's sense of rotation */
-    bool simple;             /* out */
-    double (*uv)[2];
-    uint32_t *next, *prev, *reflex;
-    size_t n_reflex;
+    struct triangulate_entry *at;
+    size_t cap, n_reflex;
+    bool simple; /* out */
 };
 
 /* Makes room for n corners. 0 or SH_ENOMEM; the old room stays valid then. */
 int triangulate_reserve(struct triangulate *t, size_t n);
 
-/* Cuts the n >= 3 corners in t->p into n - 2 triangles. */
+/* Cuts the n >= 3 corners in t->at into n - 2 triangles. */
 void triangulate_polygon(struct triangulate *t, uint32_t n);
 
 void triangulate_free(struct triangulate *t);

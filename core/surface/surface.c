@@ -8,6 +8,9 @@
 #include "core/surface/texture.h"
 #include "core/vecmath.h"
 
+enum { FIELDS = sizeof(struct surface) / sizeof(double) };
+_Static_assert(sizeof(struct surface) == 6 * sizeof(double), "gathered as doubles");
+
 int surface_table_alloc(uint32_t n, struct surface_table *table, struct sh_err *err)
 {
     *table = (struct surface_table){.n = n};
@@ -27,15 +30,10 @@ double surface_linear(double srgb)
     return srgb <= 0.04045 ? srgb / 12.92 : pow((srgb + 0.055) / 1.055, 2.4);
 }
 
-double surface_luminance(const float rgb[3])
+static double surface_luminance(const float rgb[3])
 {
     return 0.2126 * surface_linear((double)rgb[0]) + 0.7152 * surface_linear((double)rgb[1]) +
            0.0722 * surface_linear((double)rgb[2]);
-}
-
-static void override(double *value, double said)
-{
-    if (!isnan(said)) *value = said;
 }
 
 int surface_table_set(struct surface_table *table, uint32_t label, const struct scene_surface *named,
@@ -48,15 +46,14 @@ int surface_table_set(struct surface_table *table, uint32_t label, const struct 
         if (fnmatch(rule[i].object, named->object, 0) == 0 && fnmatch(rule[i].material, named->material, 0) == 0)
             found = (int)i;
     if (found >= 0) {
-        const struct surface *said = &rule[found].surface;
-        override(&s->reflectance, said->reflectance);
-        override(&s->specular, said->specular);
-        override(&s->gloss, said->gloss);
-        override(&s->retro, said->retro);
-        override(&s->glass, said->glass);
-        override(&s->mirror, said->mirror);
+        double field[FIELDS], said[FIELDS];
+        memcpy(field, s, sizeof field);
+        memcpy(said, &rule[found].surface, sizeof said);
+        for (int k = 0; k < FIELDS; k++)
+            if (!isnan(said[k])) field[k] = said[k];
+        memcpy(s, field, sizeof field);
         /* A pane scatters what it doesn't pass on, as far as its colour says; a mirror is clean. */
-        if (isnan(said->reflectance)) s->reflectance *= s->mirror > 0.0 ? 0.0 : 1.0 - s->glass;
+        if (isnan(rule[found].surface.reflectance)) s->reflectance *= s->mirror > 0.0 ? 0.0 : 1.0 - s->glass;
     }
     table->has_lobes |= s->specular > 0.0 || s->retro > 0.0;
     table->has_mirror |= s->mirror > 0.0;
@@ -90,9 +87,6 @@ int surface_kinds(const struct surface_table *table, uint16_t *kind, struct sh_e
     return SH_OK;
 }
 
-enum { FIELDS = sizeof(struct surface) / sizeof(double) };
-_Static_assert(sizeof(struct surface) == 6 * sizeof(double), "gathered as doubles");
-
 VEC_CLONES
 static void lambert(const double *restrict field, uint32_t surfaces, uint32_t n, const uint32_t *restrict label,
                     const double *restrict cosi, double *restrict rho)
@@ -105,9 +99,8 @@ static void lambert_texels(const struct surface_table *table, uint32_t n, const 
                            double *rho)
 {
     for (uint32_t i = 0; i < n; i++) {
-        uint32_t own = surface_of_label(label[i]), texel = own < table->n ? label[i] >> 16 : 0;
-        rho[i] = cosi[i] *
-                 (texel != 0 ? (texel - 1) / 65534.0 : table->surface[own < table->n ? own : table->n].reflectance);
+        uint32_t texel = surface_of_label(label[i]) < table->n ? label[i] >> 16 : 0;
+        rho[i] = cosi[i] * (texel != 0 ? (texel - 1) / 65534.0 : surface_at(table, label[i])->reflectance);
     }
 }
 

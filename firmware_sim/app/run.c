@@ -28,11 +28,12 @@ static void say_what_runs(const struct config *cfg, const struct site *site, con
             "scanhead: %s %s, %s, %u triangles, %u surfaces; BVH in %.2f s, %.0f bytes per triangle, packets of %u\n",
             cfg->profile.maker, cfg->profile.model, cfg->profile.name, site->scene->n_triangles,
             site->scene->n_surfaces, info.build_s, (double)info.bytes / site->scene->n_triangles, info.packet);
-    char endpoint[512];
-    site_plan_text(site, endpoint, sizeof endpoint);
-    fprintf(stderr, "scanhead: plan: %s\n", endpoint);
-    for (uint32_t i = 0; loop_endpoint(loop, i, endpoint, sizeof endpoint); i++)
-        fprintf(stderr, "scanhead: link %s\n", endpoint);
+    char plan[512];
+    struct link_place place;
+    site_plan_text(site, plan, sizeof plan);
+    fprintf(stderr, "scanhead: plan: %s\n", plan);
+    for (uint32_t i = 0; loop_get_place(loop, i, &place); i++)
+        fprintf(stderr, "scanhead: link %s\n", place.endpoint);
 }
 
 static int say_ready(const struct loop *loop, long fd, struct sh_err *err)
@@ -64,42 +65,42 @@ static void wait_for_end(struct loop *loop)
 static void put_stats(struct json *json, const void *ctx)
 {
     const struct loop_stats *s = ctx;
+    const struct device_counters *c = &s->counters;
     struct rusage usage;
     getrusage(RUSAGE_SELF, &usage);
     json_open_object(json, NULL);
-    json_uint(json, "pulses", s->pulses);
-    json_uint(json, "fired_pulses", s->fired_pulses);
-    json_uint(json, "echoes", s->echoes);
-    json_uint(json, "lines", s->lines);
+    json_uint(json, "pulses", c->pulses);
+    json_uint(json, "fired_pulses", c->fired);
+    json_uint(json, "echoes", c->echoes);
+    json_uint(json, "lines", c->lines);
     json_uint(json, "scans", s->scans);
     json_double(json, "wall_s", s->wall_s);
     json_double(json, "cpu_s", clock_cpu_s());
-    json_double(json, "pulses_per_s", s->wall_s > 0.0 ? (double)s->pulses / s->wall_s : 0.0);
-    json_uint(json, "lost_pulses", s->lost_pulses);
-    json_uint(json, "lost_ticks", s->lost_ticks);
-    json_uint(json, "crowded_echoes", s->crowded);
-    json_uint(json, "faint_hits", s->faint);
-    json_uint(json, "unfit_echoes", s->unfit);
-    json_uint(json, "reader_lost_frames", s->reader_lost_frames);
-    json_uint(json, "late_blocks", s->late_blocks);
-    json_uint(json, "late_poses", s->late_poses);
-    json_uint(json, "bad_poses", s->bad_poses);
+    json_double(json, "pulses_per_s", s->wall_s > 0.0 ? (double)c->pulses / s->wall_s : 0.0);
+    json_uint(json, "lost_pulses", c->lost_pulses);
+    json_uint(json, "lost_ticks", c->lost_ticks);
+    json_uint(json, "crowded_echoes", c->crowded);
+    json_uint(json, "faint_hits", c->faint);
+    json_uint(json, "unfit_echoes", c->unfit);
+    json_uint(json, "reader_lost_frames", c->reader_lost_frames);
+    json_uint(json, "late_blocks", c->late_blocks);
+    json_uint(json, "late_poses", c->late_poses);
+    json_uint(json, "bad_poses", c->bad_poses);
     json_double(json, "late_p50_us", s->late_p50_us);
     json_double(json, "late_p999_us", s->late_p999_us);
-    json_double(json, "late_max_us", s->late_max_us);
+    json_double(json, "late_max_us", 1e-3 * (double)c->late_max_ns);
     json_int(json, "rss_peak_kib", usage.ru_maxrss);
     json_string(json, "stream_sha256", s->have_hash ? s->sha256 : NULL);
     json_close_object(json);
 }
 
-static void warn_of_losses(const struct loop_stats *stats)
+static void warn_of_losses(const struct device_counters *c)
 {
-    if (stats->lost_pulses != 0)
-        sh_warn(&app_report_stderr, "%llu pulses could not be computed in time",
-                (unsigned long long)stats->lost_pulses);
-    app_warn_left_out(stats->crowded, stats->unfit);
-    if (stats->reader_lost_frames != 0)
-        sh_warn(&app_report_stderr, "readers lost %llu frames", (unsigned long long)stats->reader_lost_frames);
+    if (c->lost_pulses != 0)
+        sh_warn(&app_report_stderr, "%llu pulses could not be computed in time", (unsigned long long)c->lost_pulses);
+    app_warn_left_out(c->crowded, c->unfit);
+    if (c->reader_lost_frames != 0)
+        sh_warn(&app_report_stderr, "readers lost %llu frames", (unsigned long long)c->reader_lost_frames);
 }
 
 static int serve(const struct run_options *o, struct loop *loop, struct device *device, struct sh_err *err)
@@ -115,7 +116,7 @@ static int serve(const struct run_options *o, struct loop *loop, struct device *
     if (rc == SH_OK && o->stats != NULL) rc = app_write_json(o->stats, put_stats, &stats, err);
     if (rc == SH_OK) rc = device_close_journal(device, err);
     if (rc == SH_OK) rc = loop_check_links(loop, err);
-    warn_of_losses(&stats);
+    warn_of_losses(&stats.counters);
     return rc;
 }
 

@@ -51,14 +51,10 @@ void clock_sleep_until_ns(int64_t t_ns)
 
 double clock_cpu_s(void)
 {
-    struct timespec t;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+    return 1e-9 * (double)read_ns(CLOCK_PROCESS_CPUTIME_ID);
 }
 
 int64_t clock_thread_ns(void)
 {
-    struct timespec t;
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return (int64_t)t.tv_sec * 1000000000 + t.tv_nsec;
+    return read_ns(CLOCK_THREAD_CPUTIME_ID);
 }

@@ -6,15 +6,16 @@
 #include <string.h>
 #include <strings.h>
 
-void command_reply(struct command_call *call, const char *fmt, ...)
+int command_reply(struct command_call *call, const char *fmt, ...)
 {
     va_list ap;
     va_start(ap, fmt);
     vsnprintf(call->out->reply, sizeof call->out->reply, fmt, ap);
     va_end(ap);
+    return 0;
 }
 
-void command_fail(struct command_call *call, int number, const char *fmt, ...)
+int command_fail(struct command_call *call, int number, const char *fmt, ...)
 {
     char text[COMMAND_TEXT_LEN], entry[COMMAND_TEXT_LEN];
     va_list ap;
@@ -26,27 +27,24 @@ void command_fail(struct command_call *call, int number, const char *fmt, ...)
     command_error_compose(entry, sizeof entry, number, text);
     call->out->error = number;
     command_reply(call, "ERR %d,\"%s\"", number, entry);
+    return -1;
 }
 
 static const struct command_row *find_row(const struct command_request *req)
 {
-    size_t n;
-    const struct command_row *row = command_table(&n);
-    for (size_t i = 0; i < n; i++)
-        if (command_header_matches(row[i].header, req->header, req->header_len)) return &row[i];
+    for (const struct command_row *row = command_rows; row->header != NULL; row++)
+        if (command_header_matches(row->header, req->header, req->header_len)) return row;
     return NULL;
 }
 
 /* MIN, MAX or DEF; 0 when the parameter is none of them. */
 static int parse_special(const char *param, enum command_value_kind *kind)
 {
-    static const struct {
-        const char *pattern;
-        enum command_value_kind kind;
-    } specials[] = {{"MINimum", COMMAND_VALUE_MIN}, {"MAXimum", COMMAND_VALUE_MAX}, {"DEFault", COMMAND_VALUE_DEF}};
-    for (size_t i = 0; i < sizeof specials / sizeof specials[0]; i++)
-        if (command_word_matches(specials[i].pattern, param)) {
-            *kind = specials[i].kind;
+    static const char *const specials[] = {
+        [COMMAND_VALUE_MIN] = "MINimum", [COMMAND_VALUE_MAX] = "MAXimum", [COMMAND_VALUE_DEF] = "DEFault"};
+    for (int i = COMMAND_VALUE_MIN; i <= COMMAND_VALUE_DEF; i++)
+        if (command_word_matches(specials[i], param)) {
+            *kind = (enum command_value_kind)i;
             return 1;
         }
     return 0;
@@ -83,8 +81,7 @@ static int parse_word(struct command_call *call)
         len += (size_t)snprintf(list + len, sizeof list - len, "%s, ", words[call->value.word]);
     }
     command_clip(clip, call->param, strlen(call->param));
-    command_fail(call, CMD_E_DATA_TYPE, "%s takes %sDEF, not '%s'", call->row->header, list, clip);
-    return -1;
+    return command_fail(call, CMD_E_DATA_TYPE, "%s takes %sDEF, not '%s'", call->row->header, list, clip);
 }
 
 /* The one parameter of a setting or a step; returns -1 when it failed. */
@@ -99,69 +96,53 @@ static int parse_value(struct command_call *call)
             comma--;
         *comma = '\0';
     } else if (comma != NULL) {
-        command_fail(call, CMD_E_NOT_ALLOWED, "%s takes one value", row->header);
-        return -1;
+        return command_fail(call, CMD_E_NOT_ALLOWED, "%s takes one value", row->header);
     }
     if (row->setting != NULL && row->setting->words != NULL) return parse_word(call);
     if (row->setting != NULL && parse_special(call->param, &call->value.kind)) return 0;
     call->value.kind = COMMAND_VALUE_NUMBER;
     command_clip(clip, call->param, strlen(call->param));
     const char *suffix = command_parse_decimal(call->param, &call->value.decimal);
-    if (suffix == NULL || (*suffix != '\0' && !is_letter(*suffix))) {
-        command_fail(call, CMD_E_DATA_TYPE, "%s takes a number%s, not '%s'", row->header,
-                     row->setting != NULL ? ", MIN, MAX or DEF" : "", clip);
-        return -1;
-    }
+    if (suffix == NULL || (*suffix != '\0' && !is_letter(*suffix)))
+        return command_fail(call, CMD_E_DATA_TYPE, "%s takes a number%s, not '%s'", row->header,
+                            row->setting != NULL ? ", MIN, MAX or DEF" : "", clip);
     if (*suffix == '\0' || suffix_shift(row->unit, suffix, &call->value.shift)) return 0;
     command_clip(clip, suffix, strlen(suffix));
-    command_fail(call, CMD_E_SUFFIX, "'%s'; %s takes %s", clip, row->header, row->unit->suffixes);
-    return -1;
+    return command_fail(call, CMD_E_SUFFIX, "'%s'; %s takes %s", clip, row->header, row->unit->suffixes);
 }
 
-static void do_query(struct command_call *call)
+static int do_query(struct command_call *call)
 {
     const struct command_row *row = call->row;
-    if (row->query == NULL) {
-        command_fail(call, CMD_E_HEADER, "%s has no query form", row->header);
-        return;
-    }
+    if (row->query == NULL) return command_fail(call, CMD_E_HEADER, "%s has no query form", row->header);
     call->value.kind = COMMAND_VALUE_NUMBER;
-    if (call->param[0] != '\0' && (row->setting == NULL || !parse_special(call->param, &call->value.kind))) {
-        command_fail(call, CMD_E_NOT_ALLOWED, "%s? takes %s", row->header,
-                     row->setting == NULL ? "no parameter" : "no parameter but MIN, MAX or DEF");
-        return;
-    }
-    row->query(call);
+    if (call->param[0] != '\0' && (row->setting == NULL || !parse_special(call->param, &call->value.kind)))
+        return command_fail(call, CMD_E_NOT_ALLOWED, "%s? takes %s", row->header,
+                            row->setting == NULL ? "no parameter" : "no parameter but MIN, MAX or DEF");
+    return row->query(call);
 }
 
-static void do_act(struct command_call *call)
+static int do_act(struct command_call *call)
 {
     const struct command_row *row = call->row;
     const uint32_t control = call->dev->control;
-    if (row->act == NULL) {
-        command_fail(call, CMD_E_HEADER, "%s is only a query, %s?", row->header, row->header);
-        return;
-    }
-    if (row->unit == NULL && call->param[0] != '\0') {
-        command_fail(call, CMD_E_NOT_ALLOWED, "%s takes no parameter", row->header);
-        return;
-    }
-    if (row->unit != NULL && call->param[0] == '\0') {
-        command_fail(call, CMD_E_MISSING, "%s takes a %s", row->header,
-                     row->setting != NULL && row->setting->words != NULL ? "word" : "number");
-        return;
-    }
-    if (row->unit != NULL && parse_value(call) != 0) return;
-    if (!row->open && call->session != 0 && control != 0 && control != call->session) {
-        command_fail(call, CMD_E_PROTECTED, "session %u has control, this is session %u", control, call->session);
-        return;
-    }
-    row->act(call);
+    if (row->act == NULL) return command_fail(call, CMD_E_HEADER, "%s is only a query, %s?", row->header, row->header);
+    if (row->unit == NULL && call->param[0] != '\0')
+        return command_fail(call, CMD_E_NOT_ALLOWED, "%s takes no parameter", row->header);
+    if (row->unit != NULL && call->param[0] == '\0')
+        return command_fail(call, CMD_E_MISSING, "%s takes a %s", row->header,
+                            row->setting != NULL && row->setting->words != NULL ? "word" : "number");
+    if (row->unit != NULL && parse_value(call) != 0) return -1;
+    if (!row->open && call->session != 0 && control != 0 && control != call->session)
+        return command_fail(call, CMD_E_PROTECTED, "session %u has control, this is session %u", control,
+                            call->session);
+    if (row->act(call) != 0) return -1;
     struct command_result *out = call->out;
     out->changes = out->effect != COMMAND_NONE && out->effect != COMMAND_RELEASE;
-    if (!out->changes || call->session == 0 || control != 0) return;
+    if (!out->changes || call->session == 0 || control != 0) return 0;
     call->dev->control = call->session;
     out->took_control = 1;
+    return 0;
 }
 
 void command_execute(struct command_device *dev, uint32_t session, const char *line, struct command_result *out)
@@ -182,10 +163,9 @@ void command_execute(struct command_device *dev, uint32_t session, const char *l
         char clip[COMMAND_CLIP_LEN];
         command_clip(clip, req.header, req.header_len);
         command_fail(&call, CMD_E_HEADER, "'%s'; HELP? lists all", clip);
-        return;
-    }
-    if (req.query)
+    } else if (req.query) {
         do_query(&call);
-    else
+    } else {
         do_act(&call);
+    }
 }

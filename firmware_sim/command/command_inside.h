@@ -117,27 +117,29 @@ struct command_call {
 
 struct command_row {
     const char *header;
-    void (*query)(struct command_call *call); /* NULL: no query form */
-    void (*act)(struct command_call *call);   /* NULL: only a query */
-    const struct command_unit *unit;          /* of act's one number; NULL: act takes none */
-    const struct command_setting *setting;    /* NULL: MIN, MAX and DEF have no meaning */
-    int open;                                 /* act is open to all sessions */
-    int pose;                                 /* a pose may follow the number */
+    /* Both return 0, or -1 when the command failed. */
+    int (*query)(struct command_call *call); /* NULL: no query form */
+    int (*act)(struct command_call *call);   /* NULL: only a query */
+    const struct command_unit *unit;         /* of act's one number; NULL: act takes none */
+    const struct command_setting *setting;   /* NULL: MIN, MAX and DEF have no meaning */
+    int open;                                /* act is open to all sessions */
+    int pose;                                /* a pose may follow the number */
 };
 
-const struct command_row *command_table(size_t *n);
+extern const struct command_row command_rows[]; /* up to one without a header */
 
 /* step_pose.c: call->pose as six numbers into call->out. Returns -1 when it failed. */
 int command_take_pose(struct command_call *call);
 
-/* Queues the error and makes it the reply. */
-void command_fail(struct command_call *call, int number, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
+/* Queues the error and makes it the reply. Returns -1. */
+int command_fail(struct command_call *call, int number, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
 
-void command_reply(struct command_call *call, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
+/* Returns 0. */
+int command_reply(struct command_call *call, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 
 /* ---- setting.c: query and change of any setting */
-void command_setting_query(struct command_call *call);
-void command_setting_change(struct command_call *call);
+int command_setting_query(struct command_call *call);
+int command_setting_change(struct command_call *call);
 
 /* The number in call->value in the row's unit, or -222 with what is allowed (then returns -1). */
 int command_value_in_range(struct command_call *call, int64_t min, int64_t max, int64_t *value);

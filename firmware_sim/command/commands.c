@@ -46,148 +46,145 @@ static const struct command_setting settings[] = {
 };
 /* clang-format on */
 
-static void query_idn(struct command_call *call)
+static int query_idn(struct command_call *call)
 {
-    command_reply(call, "%s", call->dev->idn);
+    return command_reply(call, "%s", call->dev->idn);
 }
 
-static void query_opc(struct command_call *call)
+static int query_opc(struct command_call *call)
 {
-    command_reply(call, "1"); /* no command is still at work once its reply is out */
+    return command_reply(call, "1"); /* no command is still at work once its reply is out */
 }
 
-static void query_stb(struct command_call *call)
+static int query_stb(struct command_call *call)
 {
     const int errors = call->dev->queue.count > 0 ? 1 << 2 : 0;
     const int operation = call->dev->state == HEAD_SCANNING ? 1 << 7 : 0;
-    command_reply(call, "%d", errors | operation);
+    return command_reply(call, "%d", errors | operation);
 }
 
-static void query_error(struct command_call *call)
+static int query_error(struct command_call *call)
 {
     command_queue_pop(&call->dev->queue, call->out->reply, sizeof call->out->reply);
+    return 0;
 }
 
-static void query_error_count(struct command_call *call)
+static int query_error_count(struct command_call *call)
 {
-    command_reply(call, "%u", call->dev->queue.count);
+    return command_reply(call, "%u", call->dev->queue.count);
 }
 
-static void query_plan(struct command_call *call)
+static int query_plan(struct command_call *call)
 {
-    command_reply(call, "%s", call->dev->plan != NULL ? call->dev->plan : "not known");
+    return command_reply(call, "%s", call->dev->plan != NULL ? call->dev->plan : "not known");
 }
 
-static void query_version(struct command_call *call)
+static int query_version(struct command_call *call)
 {
-    command_reply(call, "1999.0");
+    return command_reply(call, "1999.0");
 }
 
-static void query_control(struct command_call *call)
+static int query_control(struct command_call *call)
 {
-    command_reply(call, "%u", call->dev->control);
+    return command_reply(call, "%u", call->dev->control);
 }
 
-static void query_state(struct command_call *call)
+static int query_state(struct command_call *call)
 {
-    command_reply(call, "%s", head_state_name(call->dev->state));
+    return command_reply(call, "%s", head_state_name(call->dev->state));
 }
 
-static void query_count(struct command_call *call)
+static int query_count(struct command_call *call)
 {
-    command_reply(call, "%llu", (unsigned long long)call->dev->frames_done);
+    return command_reply(call, "%llu", (unsigned long long)call->dev->frames_done);
 }
 
-static void query_time(struct command_call *call)
+static int query_time(struct command_call *call)
 {
-    command_reply(call, "%lld", (long long)call->dev->t_ns);
+    return command_reply(call, "%lld", (long long)call->dev->t_ns);
 }
 
 /* An empty text: the head does not know the time. */
-static void reply_time_of_day(struct command_call *call, const char *text)
+static int reply_time_of_day(struct command_call *call, const char *text)
 {
     if (text[0] == '\0')
-        command_fail(call, CMD_E_SETTINGS, "%s? needs time.epoch in the configuration", call->row->header);
-    else
-        command_reply(call, "%s", text);
+        return command_fail(call, CMD_E_SETTINGS, "%s? needs time.epoch in the configuration", call->row->header);
+    return command_reply(call, "%s", text);
 }
 
-static void query_utc(struct command_call *call)
+static int query_utc(struct command_call *call)
 {
-    reply_time_of_day(call, call->dev->utc);
+    return reply_time_of_day(call, call->dev->utc);
 }
 
-static void query_gps(struct command_call *call)
+static int query_gps(struct command_call *call)
 {
-    reply_time_of_day(call, call->dev->gps);
+    return reply_time_of_day(call, call->dev->gps);
 }
 
-static void query_help(struct command_call *call)
+static int query_help(struct command_call *call)
 {
-    size_t n, len = 0;
-    const struct command_row *row = command_table(&n);
-    for (size_t i = 0; i < n && len < sizeof call->out->reply; i++)
-        len += (size_t)snprintf(call->out->reply + len, sizeof call->out->reply - len, "%s%s%s", i == 0 ? "" : " ",
-                                row[i].header,
-                                row[i].query == NULL ? ""
-                                : row[i].act == NULL ? "?"
-                                                     : "[?]");
+    size_t len = 0;
+    for (const struct command_row *row = command_rows; row->header != NULL && len < sizeof call->out->reply; row++)
+        len += (size_t)snprintf(call->out->reply + len, sizeof call->out->reply - len, "%s%s%s", len == 0 ? "" : " ",
+                                row->header,
+                                row->query == NULL ? ""
+                                : row->act == NULL ? "?"
+                                                   : "[?]");
+    return 0;
 }
 
-static void act_clear(struct command_call *call)
+static int act_clear(struct command_call *call)
 {
     memset(&call->dev->queue, 0, sizeof call->dev->queue);
-    command_reply(call, "OK");
+    return command_reply(call, "OK");
 }
 
-static void act_release(struct command_call *call)
+static int act_release(struct command_call *call)
 {
     if (call->dev->control != 0) call->out->effect = COMMAND_RELEASE;
     call->dev->control = 0;
-    command_reply(call, "OK");
+    return command_reply(call, "OK");
 }
 
 /* The effect, or -221 where the state machine refuses the event. */
 static int act_event(struct command_call *call, enum head_event event, enum command_effect effect)
 {
-    if (head_next_state(call->dev->state, event) < 0) {
-        command_fail(call, CMD_E_SETTINGS, "%s is not possible in state %s", call->row->header,
-                     head_state_name(call->dev->state));
-        return -1;
-    }
+    if (head_next_state(call->dev->state, event) < 0)
+        return command_fail(call, CMD_E_SETTINGS, "%s is not possible in state %s", call->row->header,
+                            head_state_name(call->dev->state));
     call->out->effect = effect;
-    command_reply(call, "OK");
+    return command_reply(call, "OK");
+}
+
+static int act_start(struct command_call *call)
+{
+    return act_event(call, HEAD_EV_START, COMMAND_START);
+}
+
+static int act_stop(struct command_call *call)
+{
+    return act_event(call, HEAD_EV_STOP, COMMAND_STOP);
+}
+
+static int act_reset(struct command_call *call)
+{
+    if (act_event(call, HEAD_EV_RESET, COMMAND_RESET) != 0) return -1;
+    call->dev->settings = call->dev->defaults;
     return 0;
 }
 
-static void act_start(struct command_call *call)
-{
-    act_event(call, HEAD_EV_START, COMMAND_START);
-}
-
-static void act_stop(struct command_call *call)
-{
-    act_event(call, HEAD_EV_STOP, COMMAND_STOP);
-}
-
-static void act_reset(struct command_call *call)
-{
-    if (act_event(call, HEAD_EV_RESET, COMMAND_RESET) == 0) call->dev->settings = call->dev->defaults;
-}
-
-static void act_step(struct command_call *call)
+static int act_step(struct command_call *call)
 {
     int64_t step_ns;
     const int64_t day_ns = 86400000000000; /* a grant cannot be taken back */
-    if (command_value_in_range(call, 1, day_ns, &step_ns) != 0) return;
-    if (call->pose != NULL && command_take_pose(call) != 0) return;
-    if (!call->dev->step_allowed) {
-        command_fail(call, CMD_E_SETTINGS, "%s needs the pace step", call->row->header);
-        return;
-    }
+    if (command_value_in_range(call, 1, day_ns, &step_ns) != 0) return -1;
+    if (call->pose != NULL && command_take_pose(call) != 0) return -1;
+    if (!call->dev->step_allowed)
+        return command_fail(call, CMD_E_SETTINGS, "%s needs the pace step", call->row->header);
     call->out->effect = COMMAND_STEP;
     call->out->step_ns = step_ns;
-    command_reply(call, "OK");
+    return command_reply(call, "OK");
 }
 
 /* clang-format off */
@@ -196,7 +193,7 @@ static void act_step(struct command_call *call)
 #define VALUE(header, unit, which) \
     {header, command_setting_query, command_setting_change, &(unit), &settings[which], 0, 0}
 
-static const struct command_row rows[] = {
+const struct command_row command_rows[] = {
     QUERY("*IDN", query_idn),
     ACTION("*RST", act_reset, 0),
     ACTION("*CLS", act_clear, 1), /* open, as SYSTem:ERRor? empties the queue too */
@@ -227,11 +224,6 @@ static const struct command_row rows[] = {
     QUERY("TIME:UTC", query_utc),
     QUERY("TIME:GPS", query_gps),
     {"TIME:STEP", NULL, act_step, &unit_ns, NULL, 0, 1},
+    {.header = NULL},
 };
 /* clang-format on */
-
-const struct command_row *command_table(size_t *n)
-{
-    *n = sizeof rows / sizeof rows[0];
-    return rows;
-}

@@ -18,9 +18,7 @@ static int is_blank(char c)
 
 static const char *skip_blanks(const char *p)
 {
-    while (is_blank(*p))
-        p++;
-    return p;
+    return p + strspn(p, " \t");
 }
 
 static size_t header_span(const char *p)

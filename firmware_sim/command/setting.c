@@ -38,6 +38,17 @@ static int64_t read_other(const struct command_call *call)
     return read_field(&call->dev->settings, call->row->setting->other_offset, call->row->setting->is_u32);
 }
 
+/* A value in the unit of the row. */
+struct number {
+    char text[NUMBER_LEN];
+};
+static struct number in_unit(const struct command_call *call, int64_t value)
+{
+    struct number number;
+    command_format_fixed(number.text, sizeof number.text, value, call->row->unit->decimals);
+    return number;
+}
+
 /* The range now: that of the profile, narrowed by the other setting. */
 static void current_range(const struct command_call *call, int64_t *min, int64_t *max)
 {
@@ -59,51 +70,40 @@ static int64_t special_value(const struct command_call *call)
     return read_field(&call->dev->defaults, call->row->setting->offset, call->row->setting->is_u32);
 }
 
-void command_setting_query(struct command_call *call)
+int command_setting_query(struct command_call *call)
 {
     const struct command_setting *setting = call->row->setting;
     const int64_t value = call->value.kind == COMMAND_VALUE_NUMBER
                               ? read_field(&call->dev->settings, setting->offset, setting->is_u32)
                               : special_value(call);
-    char number[NUMBER_LEN];
-    if (setting->words != NULL) {
-        command_reply(call, "%s", setting->words[value]);
-        return;
-    }
-    command_format_fixed(number, sizeof number, value, call->row->unit->decimals);
-    command_reply(call, "%s", number);
+    if (setting->words != NULL) return command_reply(call, "%s", setting->words[value]);
+    return command_reply(call, "%s", in_unit(call, value).text);
 }
 
 /* `HEADER VALUE, allowed MIN to MAX`; value is what the command said, or its number with the unit. */
-static void refuse(struct command_call *call, int number, const char *value, int64_t min, int64_t max, const char *with)
+static int refuse(struct command_call *call, int number, const char *value, int64_t min, int64_t max, const char *with)
 {
-    char low[NUMBER_LEN], high[NUMBER_LEN];
-    command_format_fixed(low, sizeof low, min, call->row->unit->decimals);
-    command_format_fixed(high, sizeof high, max, call->row->unit->decimals);
-    command_fail(call, number, "%s %s, allowed %s to %s%s", call->row->header, value, low, high, with);
+    return command_fail(call, number, "%s %s, allowed %s to %s%s", call->row->header, value, in_unit(call, min).text,
+                        in_unit(call, max).text, with);
 }
 
-static void refuse_number(struct command_call *call, int number, int64_t value, int64_t min, int64_t max,
-                          const char *with)
+static int refuse_number(struct command_call *call, int number, int64_t value, int64_t min, int64_t max,
+                         const char *with)
 {
     const struct command_unit *unit = call->row->unit;
-    char digits[NUMBER_LEN], text[NUMBER_LEN + 8];
-    command_format_fixed(digits, sizeof digits, value, unit->decimals);
-    snprintf(text, sizeof text, "%s%s%s", digits, unit->name[0] != '\0' ? " " : "", unit->name);
-    refuse(call, number, text, min, max, with);
+    char text[NUMBER_LEN + 8];
+    snprintf(text, sizeof text, "%s%s%s", in_unit(call, value).text, unit->name[0] != '\0' ? " " : "", unit->name);
+    return refuse(call, number, text, min, max, with);
 }
 
-static void refuse_fraction(struct command_call *call, const char *value)
+static int refuse_fraction(struct command_call *call, const char *value)
 {
     const struct command_unit *unit = call->row->unit;
-    char finest[NUMBER_LEN];
-    command_format_fixed(finest, sizeof finest, 1, unit->decimals);
     if (unit->decimals == 0)
-        command_fail(call, CMD_E_RANGE, "%s %s, allowed whole numbers%s%s", call->row->header, value,
-                     unit->name[0] != '\0' ? " of " : "", unit->name);
-    else
-        command_fail(call, CMD_E_RANGE, "%s %s, allowed multiples of %s %s", call->row->header, value, finest,
-                     unit->name);
+        return command_fail(call, CMD_E_RANGE, "%s %s, allowed whole numbers%s%s", call->row->header, value,
+                            unit->name[0] != '\0' ? " of " : "", unit->name);
+    return command_fail(call, CMD_E_RANGE, "%s %s, allowed multiples of %s %s", call->row->header, value,
+                        in_unit(call, 1).text, unit->name);
 }
 
 int command_value_in_range(struct command_call *call, int64_t min, int64_t max, int64_t *value)
@@ -113,13 +113,9 @@ int command_value_in_range(struct command_call *call, int64_t min, int64_t max, 
     const enum command_fit fit =
         command_decimal_to_int(&call->value.decimal, call->value.shift + call->row->unit->decimals, value);
     if (fit == COMMAND_FIT_EXACT && *value >= min && *value <= max) return 0;
-    if (fit == COMMAND_FIT_FINE)
-        refuse_fraction(call, clip);
-    else if (fit == COMMAND_FIT_BIG)
-        refuse(call, CMD_E_RANGE, clip, min, max, "");
-    else
-        refuse_number(call, CMD_E_RANGE, *value, min, max, "");
-    return -1;
+    if (fit == COMMAND_FIT_FINE) return refuse_fraction(call, clip);
+    if (fit == COMMAND_FIT_BIG) return refuse(call, CMD_E_RANGE, clip, min, max, "");
+    return refuse_number(call, CMD_E_RANGE, *value, min, max, "");
 }
 
 /* Checks against the other setting; the range of the profile was checked before. */
@@ -129,16 +125,12 @@ static int check_other(struct command_call *call, int64_t value)
     current_range(call, &min, &max);
     if (value >= min && value <= max) return 0;
     const char *other = call->row->setting->other;
-    char with[NUMBER_LEN + 24] = "", number[NUMBER_LEN];
-    if (other != NULL) {
-        command_format_fixed(number, sizeof number, read_other(call), call->row->unit->decimals);
-        snprintf(with, sizeof with, " as %s is %s", other, number);
-    }
-    refuse_number(call, CMD_E_SETTINGS, value, min, max, with);
-    return -1;
+    char with[NUMBER_LEN + 24] = "";
+    if (other != NULL) snprintf(with, sizeof with, " as %s is %s", other, in_unit(call, read_other(call)).text);
+    return refuse_number(call, CMD_E_SETTINGS, value, min, max, with);
 }
 
-void command_setting_change(struct command_call *call)
+int command_setting_change(struct command_call *call)
 {
     const struct command_setting *setting = call->row->setting;
     int64_t value;
@@ -148,16 +140,14 @@ void command_setting_change(struct command_call *call)
         value = special_value(call);
     else if (command_value_in_range(call, read_bound(call, &setting->min), read_bound(call, &setting->max), &value) !=
              0)
-        return;
-    if (check_other(call, value) != 0) return;
+        return -1;
+    if (check_other(call, value) != 0) return -1;
     const enum head_state state = call->dev->state;
     const int in_scan = state == HEAD_SPIN_UP || state == HEAD_SCANNING;
-    if (setting->not_in_scan && in_scan &&
-        value != read_field(&call->dev->settings, setting->offset, setting->is_u32)) {
-        command_fail(call, CMD_E_SETTINGS, "%s can't change in state %s", call->row->header, head_state_name(state));
-        return;
-    }
+    if (setting->not_in_scan && in_scan && value != read_field(&call->dev->settings, setting->offset, setting->is_u32))
+        return command_fail(call, CMD_E_SETTINGS, "%s can't change in state %s", call->row->header,
+                            head_state_name(state));
     write_field(&call->dev->settings, setting->offset, setting->is_u32, value);
     call->out->effect = COMMAND_SETTINGS;
-    command_reply(call, "OK");
+    return command_reply(call, "OK");
 }

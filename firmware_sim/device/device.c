@@ -33,13 +33,12 @@ static int set_limits(struct device *device, struct sh_err *err)
                                               .pan_max_udeg = p->pan_max_udeg,
                                               .n_stations = device->site->n_stations};
     device->cmd.settings = device->cmd.defaults = cfg->head.settings;
-    char idn[256];
-    snprintf(idn, sizeof idn, "%s,%s,%s,scanhead native %d", p->maker, p->model, cfg->head.serial, NATIVE_VERSION);
-    if (strlen(idn) >= sizeof device->idn)
+    int len = snprintf(device->idn, sizeof device->idn, "%s,%s,%s,scanhead native %d", p->maker, p->model,
+                       cfg->head.serial, NATIVE_VERSION);
+    if (len >= (int)sizeof device->idn)
         return sh_fail(err, SH_EINPUT,
                        "%s: maker, model and head.serial are together too long for *IDN?; at most %zu bytes", cfg->file,
                        sizeof device->idn - 1 - strlen(",,,scanhead native 1"));
-    strcpy(device->idn, idn);
     device->cmd.idn = device->idn;
     site_plan_text(device->site, device->plan, sizeof device->plan);
     device->cmd.plan = device->plan;
@@ -103,7 +102,7 @@ void device_free(struct device *device)
 {
     if (device == NULL) return;
     journal_close(device->journal.out, NULL);
-    journal_free(device->journal.replay);
+    free(device->journal.replay);
     pthread_mutex_destroy(&device->lock);
     free(device);
 }

@@ -98,13 +98,11 @@ void device_command(struct device *device, uint32_t session, const char *line, u
 void device_overlong(struct device *device, uint32_t session, struct command_result *out);
 /* A session has gone; partial: in the middle of a command. Gives control back. */
 void device_session_closed(struct device *device, uint32_t session, const char *who, int partial);
-/* Where a live platform (not the head on it) is at a device time: from TIME:STEP or the socket. The platform moves
- * evenly from one pose to the next, however far apart they are. Returns 0, or 1 for a pose that can't be used, which is
- * counted: not later than the one before, out of reach, or more than DEVICE_POSE_AHEAD_S ahead of device time (not in
- * the pace step). */
-int device_pose(struct device *device, int64_t t_ns, const struct pose *pose);
-/* The same from x, y, z (m), roll, pitch, heading (degrees). */
-int device_pose_numbers(struct device *device, int64_t t_ns, const double v[6]);
+/* Where a live platform (not the head on it) is at a device time: from TIME:STEP or the socket. v: x, y, z (m), roll,
+ * pitch, heading (degrees). The platform moves evenly from one pose to the next, however far apart they are. Returns 0,
+ * or 1 for a pose that can't be used, which is counted: not later than the one before, out of reach, or more than
+ * DEVICE_POSE_AHEAD_S ahead of device time (not in the pace step). */
+int device_pose(struct device *device, int64_t t_ns, const double v[6]);
 
 /* Something for the error queue (enum command_error), and an event on the wire. */
 void device_report(struct device *device, int number, const char *text);
@@ -113,10 +111,9 @@ void device_report(struct device *device, int number, const char *text);
  * so. Before the first tick is claimed. *warning: something the user should know, or NULL; it belongs to the device. */
 int device_power_up(struct device *device, int64_t now_ns, const char **warning, struct sh_err *err);
 
-/* The GNSS receiver: how many positions there were before a device time, the device time of a position (from 0), and
- * its sentences where the head is. Returns their length, 0 when cap is too small. */
-uint64_t device_gnss_count(const struct device *device, int64_t t_ns);
-int64_t device_gnss_time_ns(const struct device *device, uint64_t index);
+/* The GNSS receiver (gnss.h), and the sentences of a position (from 0) where the head is. Returns their length, 0 when
+ * cap is too small. */
+const struct gnss *device_gnss(const struct device *device);
 size_t device_gnss_sentences(struct device *device, uint64_t index, char *dst, size_t cap);
 
 /* Scans begun so far. */

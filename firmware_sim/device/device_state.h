@@ -10,7 +10,7 @@
 
 /* Poses of a live platform. Each tick begins with a pose of the head, made once from the poses that had come. */
 struct device_live {
-    struct {
+    struct device_sample {
         int64_t t_ns;     /* device time */
         struct pose pose; /* of the platform */
     } sample[64];
@@ -26,11 +26,12 @@ enum { DEVICE_MAX_PENDING = 256, DEVICE_MAX_CHANGES = 32, DEVICE_SURFACES_A_FRAM
 struct device_machine {
     enum head_state state; /* as of the next tick to be claimed */
     uint64_t due_tick;     /* of the next timed transition; UINT64_MAX: none */
-    struct {
+    /* The last ones: readers see the state of the last released tick. Number i is at i % DEVICE_MAX_CHANGES. */
+    struct device_state_change {
         uint64_t tick;
         enum head_state state;
-    } change[DEVICE_MAX_CHANGES]; /* the last ones: readers see the state of the last released tick */
-    uint32_t n_changes;
+    } change[DEVICE_MAX_CHANGES];
+    uint32_t n_changes; /* since power-up */
 };
 
 /* The scan at hand, or the last one. */
@@ -144,6 +145,5 @@ void device_set_time_texts(struct device *device);
 /* frames.c: what the frames say. */
 void device_fill_descriptor(const struct device *device, struct native_descriptor *d);
 void device_fill_telemetry(const struct device *device, uint64_t tick, struct native_telemetry *t);
-void device_fill_spec(const struct device *device, struct schedule_spec *spec);
 
 #endif

@@ -1,13 +1,7 @@
 /* What the device says of itself: descriptor, anchor, telemetry. */
-#include <math.h>
 #include <string.h>
 
 #include "firmware_sim/device/device_state.h"
-
-void device_fill_spec(const struct device *device, struct schedule_spec *spec)
-{
-    config_fill_spec(&device->site->cfg->profile, &device->cmd.settings, spec);
-}
 
 void device_fill_descriptor(const struct device *device, struct native_descriptor *d)
 {

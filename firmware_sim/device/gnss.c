@@ -38,8 +38,8 @@ int64_t gnss_time_ns(const struct gnss *gnss, uint64_t index)
 }
 
 struct gnss_place {
-    double lat_deg, lon_deg, height_m; /* of the antenna */
-    double velocity_m_s[3];            /* east, north, up */
+    double geodetic[3];     /* of the antenna: latitude, longitude (degrees), height (m) */
+    double velocity_m_s[3]; /* east, north, up */
 };
 
 /* Where a point of the scene lies on the Earth. */
@@ -71,16 +71,16 @@ static int locate_antenna(const struct gnss *gnss, const struct placement *at, c
 }
 
 /* East, north, up, from two places 2 GNSS_STEP_NS apart. */
-static void set_velocity(const double before[3], const double after[3], struct gnss_place *out)
+static void set_velocity(const double before[3], const double here[3], const double after[3], double velocity_m_s[3])
 {
-    const struct georef_place place[2] = {{before[0], before[1], before[2]}, {after[0], after[1], after[2]}};
+    const struct georef_place place[3] = {
+        {before[0], before[1], before[2]}, {here[0], here[1], here[2]}, {after[0], after[1], after[2]}};
     double p[2][3], d[3], enu[9], at_ecef[3];
-    const struct georef_place here = {out->lat_deg, out->lon_deg, out->height_m};
     georef_geodetic_to_ecef(&place[0], p[0]);
-    georef_geodetic_to_ecef(&place[1], p[1]);
+    georef_geodetic_to_ecef(&place[2], p[1]);
     for (int i = 0; i < 3; i++)
         d[i] = (p[1][i] - p[0][i]) / (2e-9 * GNSS_STEP_NS);
-    if (locate_axes(&here, at_ecef, enu, NULL) == SH_OK) mat3_apply_transposed(enu, d, out->velocity_m_s);
+    if (locate_axes(&place[1], at_ecef, enu, NULL) == SH_OK) mat3_apply_transposed(enu, d, velocity_m_s);
 }
 
 /* The antenna, and its error shift_m east, north and up. 0: nowhere on the Earth. */
@@ -89,63 +89,52 @@ static int gnss_position(const struct gnss *gnss, uint32_t station, const struct
 {
     const struct placement *at = &gnss->site->station[station].at;
     struct pose stands;
-    double g[3][3], geodetic[3];
+    double here[3], before[3], after[3];
     memcpy(stands.position_m, at->position_m, sizeof stands.position_m);
     pose_from_matrix(at->rotation, stands.quat);
-    if (!locate_antenna(gnss, at, track != NULL ? &track->at : &stands, g[1])) return 0;
-    *out = (struct gnss_place){.lat_deg = g[1][0], .lon_deg = g[1][1], .height_m = g[1][2]};
-    if (track != NULL && locate_antenna(gnss, at, &track->before, g[0]) &&
-        locate_antenna(gnss, at, &track->after, g[2]))
-        set_velocity(g[0], g[2], out);
-    georef_geodetic(g[1][0], g[1][1], g[1][2], shift_m, geodetic);
-    out->lat_deg = geodetic[0];
-    out->lon_deg = geodetic[1];
-    out->height_m = geodetic[2];
+    if (!locate_antenna(gnss, at, track != NULL ? &track->at : &stands, here)) return 0;
+    if (track != NULL && locate_antenna(gnss, at, &track->before, before) &&
+        locate_antenna(gnss, at, &track->after, after))
+        set_velocity(before, here, after, out->velocity_m_s);
+    georef_geodetic(here[0], here[1], here[2], shift_m, out->geodetic);
     return 1;
 }
 
 static void fill_place(const struct gnss *gnss, const struct gnss_place *place, struct nmea_fix *fix)
 {
     const double *v = place->velocity_m_s;
-    fix->lat_deg = place->lat_deg;
-    fix->lon_deg = place->lon_deg;
+    fix->lat_deg = place->geodetic[0];
+    fix->lon_deg = place->geodetic[1];
     fix->geoid_separation_m = gnss->site->cfg->gnss.geoid_separation_m;
-    fix->altitude_m = place->height_m - fix->geoid_separation_m;
+    fix->altitude_m = place->geodetic[2] - fix->geoid_separation_m;
     fix->speed_m_s = hypot(v[0], v[1]);
     fix->course_deg = fix->speed_m_s > 0.0 ? fmod(angle_deg(atan2(v[0], v[1])) + 360.0, 360.0) : NAN;
-}
-
-static void fill_time(const struct gnss *gnss, int64_t t_ns, struct nmea_fix *fix)
-{
-    struct utc_time utc;
-    utc_from_tai(&gnss->clock->table, head_clock_true_ns(gnss->clock, t_ns), &utc);
-    fix->year = utc.year;
-    fix->month = utc.month;
-    fix->day = utc.day;
-    fix->hour = utc.hour;
-    fix->minute = utc.minute;
-    fix->second = utc.second;
-    fix->hundredth = utc.ns / 10000000;
 }
 
 size_t gnss_sentences(const struct gnss *gnss, uint64_t index, uint32_t station, const struct gnss_track *track,
                       char *dst, size_t cap)
 {
     const struct config_gnss *c = &gnss->site->cfg->gnss;
-    int64_t t_ns = gnss_time_ns(gnss, index);
     double noise_m[3] = {0.0, 0.0, 0.0};
     uint64_t key = rng_key(gnss->site->cfg->noise.seed, RNG_GNSS);
     for (uint64_t i = 0; i < 3 && c->accuracy_m > 0.0; i++)
         noise_m[i] = c->accuracy_m * rng_normal(key, 3 * index + i);
-    struct gnss_place place;
+    struct gnss_place place = {0};
     int found = gnss_position(gnss, station, track, noise_m, &place);
-    if (!found) place = (struct gnss_place){0.0, 0.0, 0.0, {0.0, 0.0, 0.0}};
+    struct utc_time utc;
+    utc_from_tai(&gnss->clock->table, head_clock_true_ns(gnss->clock, gnss_time_ns(gnss, index)), &utc);
     struct nmea_fix fix = {.talker = {'G', c->talker == TALKER_GP ? 'P' : 'N'},
+                           .year = utc.year,
+                           .month = utc.month,
+                           .day = utc.day,
+                           .hour = utc.hour,
+                           .minute = utc.minute,
+                           .second = utc.second,
+                           .hundredth = utc.ns / 10000000,
                            .quality = found ? (int)c->quality : 0,
                            .satellites = (int)c->satellites,
                            .hdop = c->hdop,
                            .sigma_m = {c->accuracy_m, c->accuracy_m, c->accuracy_m}};
-    fill_time(gnss, t_ns, &fix);
     fill_place(gnss, &place, &fix);
     return nmea_encode_all(dst, cap, &fix);
 }

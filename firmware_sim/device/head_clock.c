@@ -77,14 +77,9 @@ static int64_t piece_ns(const struct head_clock *clock, int64_t t_ns, int after)
     return clock->tai0_ns + t_ns + clock->offset_ns + drift_ns + (after ? clock->jump_ns : 0);
 }
 
-static int is_after(const struct head_clock *clock, int64_t t_ns)
-{
-    return t_ns >= clock->jump_at_ns;
-}
-
 int64_t head_clock_ns(const struct head_clock *clock, int64_t t_ns)
 {
-    return piece_ns(clock, t_ns, is_after(clock, t_ns));
+    return piece_ns(clock, t_ns, t_ns >= clock->jump_at_ns);
 }
 
 /* The same within one piece. Its clock runs on steadily, so the edge is the first nanosecond that has reached the

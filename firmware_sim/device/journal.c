@@ -2,37 +2,43 @@
 
 #include <errno.h>
 #include <inttypes.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "core/grow.h"
 
 static const char title[] = "# scanhead journal 1";
 
 struct journal {
     FILE *file;
-    char *path;
-    int error; /* errno of the first failure */
+    const char *path; /* the caller's */
+    int error;        /* errno of the first failure */
 };
+
+/* Prints text and flushes it; fails once something went wrong. */
+__attribute__((format(printf, 2, 3))) static int put(struct journal *journal, const char *fmt, ...)
+{
+    va_list ap;
+    if (journal->error != 0) return SH_EIO;
+    va_start(ap, fmt);
+    if (vfprintf(journal->file, fmt, ap) < 0 || fflush(journal->file) != 0) journal->error = errno;
+    va_end(ap);
+    return journal->error == 0 ? SH_OK : SH_EIO;
+}
 
 struct journal *journal_open(const char *path, struct sh_err *err)
 {
     struct journal *journal = calloc(1, sizeof *journal);
-    if (journal == NULL || (journal->path = strdup(path)) == NULL) {
+    if (journal == NULL) {
         sh_fail(err, SH_ENOMEM, "journal: no memory");
-        goto fail;
+        return NULL;
     }
-    journal->file = fopen(path, "we");
-    if (journal->file == NULL) {
-        sh_fail(err, SH_EIO, "journal: %s: %s", path, strerror(errno));
-        goto fail;
-    }
-    if (fprintf(journal->file, "%s\n", title) < 0 || fflush(journal->file) != 0) {
-        sh_fail(err, SH_EIO, "journal: %s: %s", path, strerror(errno));
-        goto fail;
-    }
-    return journal;
-fail:
-    journal_close(journal, NULL);
+    *journal = (struct journal){.path = path, .file = fopen(path, "we")};
+    if (journal->file == NULL) journal->error = errno;
+    if (put(journal, "%s\n", title) == SH_OK) return journal;
+    journal_close(journal, err);
     return NULL;
 }
 
@@ -47,20 +53,14 @@ static int is_command_line(const char *line)
 
 int journal_write(struct journal *journal, uint64_t tick, int64_t t_ns, uint32_t session, const char *line)
 {
-    if (journal->error != 0) return SH_EIO;
     if (t_ns < 0 || !is_command_line(line)) return SH_EINPUT;
-    if (fprintf(journal->file, "%" PRIu64 " %" PRId64 " %" PRIu32 " %s\n", tick, t_ns, session, line) < 0 ||
-        fflush(journal->file) != 0)
-        journal->error = errno;
-    return journal->error == 0 ? SH_OK : SH_EIO;
+    return put(journal, "%" PRIu64 " %" PRId64 " %" PRIu32 " %s\n", tick, t_ns, session, line);
 }
 
 int journal_note(struct journal *journal, const char *text)
 {
-    if (journal->error != 0) return SH_EIO;
     if (!is_command_line(text)) return SH_EINPUT;
-    if (fprintf(journal->file, "# %s\n", text) < 0 || fflush(journal->file) != 0) journal->error = errno;
-    return journal->error == 0 ? SH_OK : SH_EIO;
+    return put(journal, "# %s\n", text);
 }
 
 int journal_close(struct journal *journal, struct sh_err *err)
@@ -69,7 +69,6 @@ int journal_close(struct journal *journal, struct sh_err *err)
     int error = journal->error;
     if (journal->file != NULL && fclose(journal->file) != 0 && error == 0) error = errno;
     const int rc = error == 0 ? SH_OK : sh_fail(err, SH_EIO, "journal: %s: %s", journal->path, strerror(error));
-    free(journal->path);
     free(journal);
     return rc;
 }
@@ -132,13 +131,8 @@ static int read_line(struct reader *reader, struct sh_err *err)
 
 static int add_entry(struct reader *reader, struct sh_err *err)
 {
-    if (reader->n == reader->capacity) {
-        const size_t capacity = reader->capacity == 0 ? 64 : 2 * reader->capacity;
-        struct journal_entry *grown = reallocarray(reader->entry, capacity, sizeof *grown);
-        if (grown == NULL) return sh_fail(err, SH_ENOMEM, "journal: %s: no memory", reader->path);
-        reader->entry = grown;
-        reader->capacity = capacity;
-    }
+    if (!grow(&reader->entry, &reader->capacity, reader->n + 1, sizeof *reader->entry))
+        return sh_fail(err, SH_ENOMEM, "journal: %s: no memory", reader->path);
     const char *wrong = parse_entry(reader->text, &reader->entry[reader->n]);
     if (wrong != NULL)
         return sh_fail(err, SH_EINPUT, "journal: %s:%zu: %s; a line is <tick> <ns> <session> <command>", reader->path,
@@ -154,11 +148,8 @@ static int read_all(struct reader *reader, struct sh_err *err)
     if (rc == 0 || strcmp(reader->text, title) != 0)
         return sh_fail(err, SH_EINPUT, "journal: %s:1: not a journal; the first line must be '%s'", reader->path,
                        title);
-    while ((rc = read_line(reader, err)) > 0) {
-        if (reader->text[0] == '#' || reader->text[0] == '\0') continue;
-        rc = add_entry(reader, err);
-        if (rc != SH_OK) break;
-    }
+    while (rc >= 0 && (rc = read_line(reader, err)) > 0)
+        if (reader->text[0] != '#' && reader->text[0] != '\0') rc = add_entry(reader, err);
     return rc;
 }
 
@@ -193,9 +184,4 @@ int journal_read(const char *path, struct journal_entry **entries, size_t *n, st
     *entries = reader.entry;
     *n = reader.n;
     return SH_OK;
-}
-
-void journal_free(struct journal_entry *entries)
-{
-    free(entries);
 }

@@ -16,7 +16,8 @@
 
 struct journal;
 
-/* Begins a new file. NULL on failure, with the reason in err; journal_close releases. */
+/* Begins a new file; path must outlive the journal. NULL on failure, with the reason in err; journal_close
+ * releases. */
 struct journal *journal_open(const char *path, struct sh_err *err);
 
 /* Adds a line. SH_EINPUT: t_ns is negative, or line is empty, too long or not printable ASCII; nothing is
@@ -39,8 +40,8 @@ struct journal_entry {
 };
 
 /* Reads a whole file, sorted by tick; commands of one tick stay in the file's order. Errors name file:line; a
- * last line without its end is one, since its command may be cut. On failure *entries is NULL. */
+ * last line without its end is one, since its command may be cut. On failure *entries is NULL. The caller frees
+ * it. */
 int journal_read(const char *path, struct journal_entry **entries, size_t *n, struct sh_err *err);
-void journal_free(struct journal_entry *entries);
 
 #endif

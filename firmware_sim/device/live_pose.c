@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/vec3.h"
 #include "firmware_sim/device/device_state.h"
 
 #define LEN(array) ((int64_t)(sizeof(array) / sizeof((array)[0])))
@@ -14,23 +15,15 @@ int64_t device_path_end_ns(const struct device *device)
     return site->knot[site->n_knots - 1].t_ns;
 }
 
-static int64_t sample_t(const struct device_live *live, uint64_t i)
+static const struct device_sample *sample_at(const struct device_live *live, uint64_t i)
 {
-    return live->sample[i % LEN(live->sample)].t_ns;
-}
-
-static const struct pose *sample_pose(const struct device_live *live, uint64_t i)
-{
-    return &live->sample[i % LEN(live->sample)].pose;
+    return &live->sample[i % LEN(live->sample)];
 }
 
 static int is_near(const struct device *device, const struct pose *pose)
 {
-    const double *station_m = device->site->station[0].at.position_m;
-    double d2 = 0.0;
-    for (int i = 0; i < 3; i++)
-        d2 += (pose->position_m[i] - station_m[i]) * (pose->position_m[i] - station_m[i]);
-    return d2 <= device->site->cfg->platform.reach_m * device->site->cfg->platform.reach_m;
+    double off_m = vec3_distance(pose->position_m, device->site->station[0].at.position_m);
+    return off_m <= device->site->cfg->platform.reach_m;
 }
 
 /* So far ahead that the time must be wrong. Such a pose would keep all later ones out. In the pace step the time is
@@ -41,41 +34,35 @@ static int is_early(const struct device *device, int64_t t_ns)
     return device->site->cfg->loop.pace != PACE_STEP && t_ns > now_ns + DEVICE_POSE_AHEAD_S * INT64_C(1000000000);
 }
 
-int device_pose(struct device *device, int64_t t_ns, const struct pose *pose)
+int device_pose(struct device *device, int64_t t_ns, const double v[6])
 {
+    const double deg = M_PI / 180.0;
     struct device_live *live = &device->live;
+    struct pose pose = {.position_m = {v[0], v[1], v[2]}};
+    pose_from_angles(v[5] * deg, v[4] * deg, v[3] * deg, pose.quat);
     pthread_mutex_lock(&device->lock);
-    int bad = (live->n != 0 && t_ns <= sample_t(live, live->n - 1)) || !is_near(device, pose) || is_early(device, t_ns);
-    if (!bad) {
-        live->sample[live->n % LEN(live->sample)].t_ns = t_ns;
-        live->sample[live->n++ % LEN(live->sample)].pose = *pose;
-    }
+    int bad = (live->n != 0 && t_ns <= sample_at(live, live->n - 1)->t_ns) || !is_near(device, &pose) ||
+              is_early(device, t_ns);
+    if (!bad) live->sample[live->n++ % LEN(live->sample)] = (struct device_sample){t_ns, pose};
     pthread_mutex_unlock(&device->lock);
     if (bad) atomic_fetch_add(&device->counters.bad_poses, 1);
     return bad;
-}
-
-int device_pose_numbers(struct device *device, int64_t t_ns, const double v[6])
-{
-    const double deg = M_PI / 180.0;
-    struct pose pose = {.position_m = {v[0], v[1], v[2]}};
-    pose_from_angles(v[5] * deg, v[4] * deg, v[3] * deg, pose.quat);
-    return device_pose(device, t_ns, &pose);
 }
 
 /* After the last pose: on as from the one before to the last, for extrapolate_ms and within reach. Then it stands. */
 static uint32_t extrapolate(const struct device *device, int64_t t_ns, struct pose *out)
 {
     const struct device_live *live = &device->live;
-    int64_t last_ns = sample_t(live, live->n - 1),
+    int64_t last_ns = sample_at(live, live->n - 1)->t_ns,
             most_ns = (int64_t)(device->site->cfg->platform.extrapolate_ms * 1e6);
     uint32_t flags = t_ns - last_ns > most_ns ? POSE_LATE : POSE_EXTRAPOLATED;
-    *out = *sample_pose(live, live->n - 1);
+    *out = sample_at(live, live->n - 1)->pose;
     if (live->n < 2) return flags;
-    int64_t before_ns = sample_t(live, live->n - 2);
+    int64_t before_ns = sample_at(live, live->n - 2)->t_ns;
     int64_t on_ns = flags == POSE_LATE ? last_ns + most_ns : t_ns;
     struct pose on;
-    pose_between(sample_pose(live, live->n - 2), out, (double)(on_ns - before_ns) / (double)(last_ns - before_ns), &on);
+    pose_between(&sample_at(live, live->n - 2)->pose, out, (double)(on_ns - before_ns) / (double)(last_ns - before_ns),
+                 &on);
     if (!is_near(device, &on)) return POSE_LATE;
     *out = on;
     return flags;
@@ -85,16 +72,25 @@ static uint32_t platform_at(const struct device *device, int64_t t_ns, struct po
 {
     const struct device_live *live = &device->live;
     uint64_t kept = live->n < (uint64_t)LEN(live->sample) ? live->n : (uint64_t)LEN(live->sample);
-    if (t_ns > sample_t(live, live->n - 1)) return extrapolate(device, t_ns, out);
+    if (t_ns > sample_at(live, live->n - 1)->t_ns) return extrapolate(device, t_ns, out);
     for (uint64_t i = live->n - 1; i + kept > live->n; i--) {
-        int64_t a_ns = sample_t(live, i - 1), b_ns = sample_t(live, i);
+        int64_t a_ns = sample_at(live, i - 1)->t_ns, b_ns = sample_at(live, i)->t_ns;
         if (t_ns < a_ns) continue;
-        pose_between(sample_pose(live, i - 1), sample_pose(live, i), (double)(t_ns - a_ns) / (double)(b_ns - a_ns),
-                     out);
+        pose_between(&sample_at(live, i - 1)->pose, &sample_at(live, i)->pose,
+                     (double)(t_ns - a_ns) / (double)(b_ns - a_ns), out);
         return 0;
     }
-    *out = *sample_pose(live, live->n - kept); /* before the first that is known */
+    *out = sample_at(live, live->n - kept)->pose; /* before the first that is known */
     return 0;
+}
+
+/* The head on it. Returns the flags of its pose. */
+static uint32_t live_head_at(const struct device *device, int64_t t_ns, struct pose *head)
+{
+    struct pose body;
+    uint32_t flags = platform_at(device, t_ns, &body);
+    pose_mount(&body, &device->site->mount, head);
+    return flags;
 }
 
 /* On the trajectory. The platform stands before its begin and after its end. */
@@ -111,7 +107,6 @@ static void on_path(const struct site *site, int64_t t_ns, struct pose *out)
 int device_head_pose(struct device *device, int64_t t_ns, struct pose *head)
 {
     const struct site *site = device->site;
-    struct pose body;
     if (!site->moving || (site->n_knots == 0 && device->live.n == 0)) return 0;
     if (site->n_knots != 0) {
         int64_t start_ns = (int64_t)device->scan.tick0 * device->tick_ns;
@@ -119,8 +114,7 @@ int device_head_pose(struct device *device, int64_t t_ns, struct pose *head)
         on_path(site, device->scan.number == 0 ? 0 : (t_ns < end_ns ? t_ns : end_ns) - start_ns, head);
         return 1;
     }
-    platform_at(device, t_ns, &body);
-    pose_mount(&body, &site->mount, head);
+    live_head_at(device, t_ns, head);
     return 1;
 }
 
@@ -135,9 +129,7 @@ static void make_knot(struct device *device, int64_t t_ns, struct pose_knot *kno
         knot->flags = POSE_NONE;
         return;
     }
-    struct pose body;
-    knot->flags = platform_at(device, (int64_t)device->scan.tick0 * device->tick_ns + t_ns, &body);
-    pose_mount(&body, &site->mount, &knot->pose);
+    knot->flags = live_head_at(device, (int64_t)device->scan.tick0 * device->tick_ns + t_ns, &knot->pose);
 }
 
 /* The event once per episode: a second without one ends it. */
@@ -147,7 +139,8 @@ static void count_late(struct device *device, const struct pose_knot *knot, stru
     if ((knot->flags & (POSE_LATE | POSE_NONE)) == 0) return;
     uint64_t n = atomic_fetch_add(&device->counters.late_poses, 1) + 1;
     int64_t since_ns =
-        live->n == 0 ? 0 : (int64_t)device->scan.tick0 * device->tick_ns + knot->t_ns - sample_t(live, live->n - 1);
+        live->n == 0 ? 0
+                     : (int64_t)device->scan.tick0 * device->tick_ns + knot->t_ns - sample_at(live, live->n - 1)->t_ns;
     if (live->said_tick == 0 || work->tick - live->said_tick > device->tick_hz) {
         char text[96];
         snprintf(text, sizeof text,

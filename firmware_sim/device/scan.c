@@ -6,18 +6,15 @@
 void device_begin_scan(struct device *device, uint64_t tick)
 {
     struct schedule_spec spec;
-    device_fill_spec(device, &spec);
+    config_fill_spec(&device->site->cfg->profile, &device->cmd.settings, &spec);
+    device->scan = (struct device_scan){.on = 1,
+                                        .number = device->scan.number + 1,
+                                        .tick0 = tick,
+                                        .lost0 = atomic_load(&device->counters.lost_pulses),
+                                        .station = device->cmd.settings.station - 1,
+                                        .stretch = site_stretch_at(device->site, 0),
+                                        .describe = 1};
     schedule_start(&device->scan.segment, &spec);
-    device->scan.on = 1;
-    device->scan.stop_requested = 0;
-    device->scan.number++;
-    device->scan.tick0 = tick;
-    device->scan.pulse_next = 0;
-    device->scan.lost0 = atomic_load(&device->counters.lost_pulses);
-    device->scan.station = device->cmd.settings.station - 1;
-    device->scan.stretch = site_stretch_at(device->site, 0);
-    device->scan.describe = 1;
-    device->scan.anchor_lost = 0;
     device->cmd.frames_done = 0;
     device->live.next = 0;
     device_push_event(device, NATIVE_EV_SCAN_START, device->scan.number, tick * (uint64_t)device->tick_ns,

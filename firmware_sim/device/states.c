@@ -1,26 +1,16 @@
 /* The states of the head, and when each one ends. */
 #include <math.h>
-#include <string.h>
 
 #include "firmware_sim/device/device_state.h"
 
-static void note_change(struct device *device, uint64_t tick, enum head_state state)
-{
-    if (device->machine.n_changes == DEVICE_MAX_CHANGES) {
-        memmove(device->machine.change, device->machine.change + 1,
-                (DEVICE_MAX_CHANGES - 1) * sizeof device->machine.change[0]);
-        device->machine.n_changes--;
-    }
-    device->machine.change[device->machine.n_changes].tick = tick;
-    device->machine.change[device->machine.n_changes++].state = state;
-}
-
 enum head_state device_visible_state(const struct device *device, uint64_t released)
 {
-    enum head_state state = HEAD_OFF;
-    for (uint32_t i = 0; i < device->machine.n_changes; i++)
-        if (device->machine.change[i].tick <= released) state = device->machine.change[i].state;
-    return state;
+    const struct device_machine *machine = &device->machine;
+    for (uint32_t age = 1; age <= machine->n_changes && age <= DEVICE_MAX_CHANGES; age++) {
+        const struct device_state_change *change = &machine->change[(machine->n_changes - age) % DEVICE_MAX_CHANGES];
+        if (change->tick <= released) return change->state;
+    }
+    return HEAD_OFF;
 }
 
 uint64_t device_ticks_of(const struct device *device, double s)
@@ -35,7 +25,8 @@ void device_transition(struct device *device, enum head_event event, uint64_t ti
     if (next < 0 || (enum head_state)next == device->machine.state) return;
     enum head_state before = device->machine.state;
     device->machine.state = (enum head_state)next;
-    note_change(device, tick, device->machine.state);
+    device->machine.change[device->machine.n_changes++ % DEVICE_MAX_CHANGES] =
+        (struct device_state_change){tick, device->machine.state};
     device_push_event(device, NATIVE_EV_STATE, (uint64_t)device->machine.state, (uint64_t)before, 0,
                       head_state_name(device->machine.state));
     uint64_t from = tick > device->next_tick ? tick : device->next_tick;

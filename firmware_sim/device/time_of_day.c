@@ -53,14 +53,9 @@ void device_set_time_texts(struct device *device)
              (long long)(gps.ns % UTC_SECOND_NS));
 }
 
-uint64_t device_gnss_count(const struct device *device, int64_t t_ns)
+const struct gnss *device_gnss(const struct device *device)
 {
-    return gnss_count(&device->gnss, t_ns);
-}
-
-int64_t device_gnss_time_ns(const struct device *device, uint64_t index)
-{
-    return gnss_time_ns(&device->gnss, index);
+    return &device->gnss;
 }
 
 size_t device_gnss_sentences(struct device *device, uint64_t index, char *dst, size_t cap)

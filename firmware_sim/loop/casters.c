@@ -15,12 +15,6 @@ static int may_claim(struct loop *loop)
     return pace != PACE_FAST || !device_is_idle(loop->device);
 }
 
-static void lose(struct loop *loop, const struct device_work *work)
-{
-    uint64_t first, n_cast = worker_count_cast(work, &first);
-    device_lost(loop->device, work, n_cast, first);
-}
-
 /* Claims the next tick. 1: work and slot are set (slot NULL: lost already); 0: not now; -1: the run is over. */
 static int claim(struct loop *loop, struct device_work *work, struct ring_slot **slot)
 {
@@ -45,13 +39,6 @@ static int claim(struct loop *loop, struct device_work *work, struct ring_slot *
     }
     pthread_mutex_unlock(&casters->claim_lock);
     return got;
-}
-
-/* After a block that was computed in vain: the next ones are as late. Taking up each in turn just before its time is
- * over would lose them all. So leave out as many as give the ones after them half the time ahead. */
-static void skip_ahead(struct loop *loop)
-{
-    atomic_store(&loop->casters.drop_until, stream_released(&loop->stream) + loop->casters.ahead_ticks / 2);
 }
 
 /* The frames into the slot. 0: it has no room for them, and there is no memory for more; said once per episode. */
@@ -81,7 +68,9 @@ static int compute(struct loop_caster *caster, const struct device_work *work, s
     }
     int whole = put(loop, slot, worker_fill(caster->worker, work));
     if (ring_ready(slot, work->tick)) return whole;
-    skip_ahead(loop);
+    /* Computed in vain: the next ones are as late. Taking up each in turn just before its time is over would lose them
+     * all. So leave out as many as give the ones after them half the time ahead. */
+    atomic_store(&loop->casters.drop_until, stream_released(&loop->stream) + loop->casters.ahead_ticks / 2);
     return 0;
 }
 
@@ -100,7 +89,10 @@ static void *caster_main(void *arg)
                 continue;
             continue;
         }
-        if (!compute(caster, &work, slot)) lose(loop, &work);
+        if (!compute(caster, &work, slot)) {
+            uint64_t first, n_cast = worker_count_cast(&work, &first);
+            device_lost(loop->device, &work, n_cast, first);
+        }
         atomic_fetch_sub(&loop->casters.n_computing, 1);
         if (stream->waits) sem_post(&stream->ready);
     }

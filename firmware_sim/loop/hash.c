@@ -7,6 +7,7 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
+#include <nettle/base16.h>
 #include <nettle/sha2.h>
 
 #include "drivers/protocol/native.h"
@@ -45,9 +46,8 @@ static void *hasher_main(void *arg)
         int over = atomic_load(&h->stream->over);
         enum ring_read got = ring_read(&h->stream->ring, STREAM_HASH_READER, h->cursor, tick);
         if (got == RING_NONE) {
-            uint64_t n;
-            if (over) break;
-            if (read(h->wake_fd, &n, sizeof n) < 0 && errno != EINTR) break;
+            eventfd_t n;
+            if (over || (eventfd_read(h->wake_fd, &n) != 0 && errno != EINTR)) break;
             continue;
         }
         if (got == RING_READ && tick->n_frames != 0) {
@@ -77,17 +77,14 @@ int hasher_start(struct stream *stream, struct hasher **out, struct sh_err *err)
     h->tick.cap = stream->tick_bytes;
     h->tick.buf = malloc(h->tick.cap);
     h->wake_fd = eventfd(0, EFD_CLOEXEC);
-    int rc = h->tick.buf == NULL ? sh_fail(err, SH_ENOMEM, "no memory") : SH_OK;
-    if (rc == SH_OK && h->wake_fd < 0) rc = sh_fail(err, SH_EIO, "eventfd: %s", strerror(errno));
     sha256_init(&h->sha);
-    stream_set_reader(stream, STREAM_HASH_READER, 0, 1);
-    int failed = rc == SH_OK ? pthread_create(&h->thread, NULL, hasher_main, h) : 0;
-    if (failed != 0) rc = sh_fail(err, SH_EIO, "no thread for the stream hash: %s", strerror(failed));
-    if (rc != SH_OK) {
-        stream_set_reader(stream, STREAM_HASH_READER, 0, 0);
+    int failed = h->tick.buf == NULL ? ENOMEM : h->wake_fd < 0 ? errno : 0;
+    if (failed == 0) failed = pthread_create(&h->thread, NULL, hasher_main, h);
+    if (failed != 0) {
         hasher_free(h);
-        return rc;
+        return sh_fail(err, SH_EIO, "the stream hash cannot start: %s", strerror(failed));
     }
+    stream_set_reader(stream, STREAM_HASH_READER, 0, 1);
     stream_listen(stream, h->wake_fd);
     *out = h;
     return SH_OK;
@@ -95,17 +92,10 @@ int hasher_start(struct stream *stream, struct hasher **out, struct sh_err *err)
 
 int hasher_join(struct hasher *hasher, char hex[65])
 {
-    static const char digit[] = "0123456789abcdef";
-    const uint64_t one = 1;
     uint8_t digest[SHA256_DIGEST_SIZE];
-    ssize_t n = write(hasher->wake_fd, &one, sizeof one);
-    (void)n; /* a full counter is a wake-up, too */
     pthread_join(hasher->thread, NULL);
     sha256_digest(&hasher->sha, sizeof digest, digest);
-    for (int i = 0; i < SHA256_DIGEST_SIZE; i++) {
-        hex[2 * i] = digit[digest[i] >> 4];
-        hex[2 * i + 1] = digit[digest[i] & 15];
-    }
+    base16_encode_update(hex, sizeof digest, digest);
     hex[64] = '\0';
     int good = !hasher->lost;
     hasher_free(hasher);

@@ -20,14 +20,15 @@ static double stream_rate(const struct config *cfg)
 /* A link that can't carry the stream is refused before it loses any of it. */
 static int check_capacity(const struct config *cfg, const struct pump *pump, struct sh_err *err)
 {
-    double capacity = pump_capacity(pump), rate = stream_rate(cfg);
-    char endpoint[300];
-    if (capacity <= 0.0 || capacity >= rate || pump_is_nmea(pump)) return SH_OK;
-    pump_endpoint(pump, endpoint, sizeof endpoint);
-    return sh_fail(
-        err, SH_EINPUT, "link %s: the stream has %.2f MB/s, the link carries %.2f MB/s; lower head.prr_hz to %.0f%s",
-        endpoint, 1e-6 * rate, 1e-6 * capacity, floor(1e-6 * (double)cfg->head.settings.prr_uhz * capacity / rate),
-        cfg->output.attributes ? ", or leave out output.attributes" : "");
+    struct link_place place;
+    pump_get_place(pump, &place);
+    double capacity = place.bytes_s, rate = stream_rate(cfg);
+    if (capacity <= 0.0 || capacity >= rate || place.nmea) return SH_OK;
+    return sh_fail(err, SH_EINPUT,
+                   "link %s: the stream has %.2f MB/s, the link carries %.2f MB/s; lower head.prr_hz to %.0f%s",
+                   place.endpoint, 1e-6 * rate, 1e-6 * capacity,
+                   floor(1e-6 * (double)cfg->head.settings.prr_uhz * capacity / rate),
+                   cfg->output.attributes ? ", or leave out output.attributes" : "");
 }
 
 int links_open(struct links *links, const struct config *cfg, const struct link_spec *extra, struct sh_err *err)

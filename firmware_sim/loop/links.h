@@ -8,6 +8,14 @@
 
 struct pump;
 
+/* A link as users see it. */
+struct link_place {
+    const char *type;
+    char endpoint[512];
+    double bytes_s; /* that it can carry; 0: no fixed limit */
+    int nmea;       /* speaks for the GNSS receiver, not for the head */
+};
+
 struct links {
     /* set by the caller */
     struct stream *stream;

@@ -65,38 +65,29 @@ void loop_free(struct loop *loop)
     free(loop);
 }
 
-int loop_endpoint(const struct loop *loop, uint32_t i, char *buf, size_t len)
+int loop_get_place(const struct loop *loop, uint32_t i, struct link_place *place)
 {
-    if (i == loop->links.n && loop->feed != NULL) {
-        pose_feed_endpoint(loop->feed, buf, len);
+    if (i < loop->links.n) {
+        pump_get_place(loop->links.pump[i], place);
         return 1;
     }
-    if (i >= loop->links.n) return 0;
-    pump_endpoint(loop->links.pump[i], buf, len);
+    if (i > loop->links.n || loop->feed == NULL) return 0;
+    *place = (struct link_place){.type = "pose"};
+    pose_feed_endpoint(loop->feed, place->endpoint, sizeof place->endpoint);
     return 1;
-}
-
-static void put_endpoint(struct json *json, const char *type, const char *endpoint, int is_nmea)
-{
-    json_open_object(json, NULL);
-    json_string(json, "type", type);
-    json_string(json, "endpoint", endpoint);
-    if (is_nmea) json_string(json, "protocol", "nmea");
-    json_close_object(json);
 }
 
 void loop_put_endpoints(const struct loop *loop, struct json *json)
 {
-    char text[512];
+    struct link_place place;
     json_open_object(json, NULL);
     json_open_array(json, "endpoints");
-    for (uint32_t i = 0; i < loop->links.n; i++) {
-        pump_endpoint(loop->links.pump[i], text, sizeof text);
-        put_endpoint(json, pump_type(loop->links.pump[i]), text, pump_is_nmea(loop->links.pump[i]));
-    }
-    if (loop->feed != NULL) {
-        pose_feed_endpoint(loop->feed, text, sizeof text);
-        put_endpoint(json, "pose", text, 0);
+    for (uint32_t i = 0; loop_get_place(loop, i, &place); i++) {
+        json_open_object(json, NULL);
+        json_string(json, "type", place.type);
+        json_string(json, "endpoint", place.endpoint);
+        if (place.nmea) json_string(json, "protocol", "nmea");
+        json_close_object(json);
     }
     json_close_array(json);
     json_close_object(json);
@@ -135,30 +126,6 @@ void loop_end(struct loop *loop)
     stream_poke(&loop->stream);
 }
 
-static void fill_stats(struct loop *loop, struct loop_stats *stats)
-{
-    const struct stream *stream = &loop->stream;
-    const struct device_counters *c = stream->counters;
-    stats->pulses = atomic_load(&c->pulses);
-    stats->fired_pulses = atomic_load(&c->fired);
-    stats->echoes = atomic_load(&c->echoes);
-    stats->lines = atomic_load(&c->lines);
-    stats->crowded = atomic_load(&c->crowded);
-    stats->faint = atomic_load(&c->faint);
-    stats->unfit = atomic_load(&c->unfit);
-    stats->lost_pulses = atomic_load(&c->lost_pulses);
-    stats->lost_ticks = atomic_load(&c->lost_ticks);
-    stats->late_blocks = atomic_load(&c->late_blocks);
-    stats->reader_lost_frames = atomic_load(&c->reader_lost_frames);
-    stats->late_poses = atomic_load(&c->late_poses);
-    stats->bad_poses = atomic_load(&c->bad_poses);
-    stats->scans = device_scans(loop->device);
-    stats->wall_s = 1e-9 * (double)(atomic_load(&stream->last_pulse_ns) - atomic_load(&stream->first_pulse_ns));
-    stats->late_p50_us = pacer_late_us(loop, 0.5);
-    stats->late_p999_us = pacer_late_us(loop, 0.999);
-    stats->late_max_us = 1e-3 * (double)atomic_load(&c->late_max_ns);
-}
-
 int loop_check_links(const struct loop *loop, struct sh_err *err)
 {
     const struct links *links = &loop->links;
@@ -172,13 +139,19 @@ void loop_join(struct loop *loop, struct loop_stats *stats)
     memset(stats, 0, sizeof *stats);
     if (loop->casters.n_running < loop->casters.n || !loop->pacer.running) { /* a start that failed half-way */
         atomic_store(&loop->stopping, 1);
-        if (!loop->pacer.running) atomic_store(&stream->over, 1);
+        if (!loop->pacer.running) stream_end(stream);
         stream_poke(stream);
     }
     casters_join(loop);
     pacer_join(loop);
     links_join(&loop->links);
+    pose_feed_close(loop->feed);
+    loop->feed = NULL;
     if (loop->hasher != NULL) stats->have_hash = hasher_join(loop->hasher, stats->sha256);
     loop->hasher = NULL;
-    fill_stats(loop, stats);
+    stats->counters = *stream->counters;
+    stats->scans = device_scans(loop->device);
+    stats->wall_s = 1e-9 * (double)(atomic_load(&stream->last_pulse_ns) - atomic_load(&stream->first_pulse_ns));
+    stats->late_p50_us = pacer_late_us(loop, 0.5);
+    stats->late_p999_us = pacer_late_us(loop, 0.999);
 }

@@ -17,6 +17,7 @@
 #include "firmware_sim/base/json.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/device/device.h"
+#include "firmware_sim/loop/links.h"
 
 struct loop;
 
@@ -27,12 +28,10 @@ struct loop_options {
 };
 
 struct loop_stats {
-    uint64_t pulses, fired_pulses, echoes, lines, scans;
-    uint64_t crowded, faint, unfit; /* hits that are not echoes: struct cast_counters */
-    uint64_t lost_pulses, lost_ticks, late_blocks, reader_lost_frames;
-    uint64_t late_poses, bad_poses; /* of a live platform */
-    double wall_s;                  /* from the release of the first pulse to that of the last */
-    double late_p50_us, late_p999_us, late_max_us;
+    struct device_counters counters;
+    uint64_t scans;
+    double wall_s; /* from the release of the first pulse to that of the last */
+    double late_p50_us, late_p999_us;
     int have_hash;
     char sha256[65];
 };
@@ -43,8 +42,8 @@ int loop_create(const struct site *site, struct device *device, const struct loo
 
 /* {"endpoints": [...]}: type and endpoint of each link, and of the socket for poses. */
 void loop_put_endpoints(const struct loop *loop, struct json *json);
-/* "tty:..." and so on of link i; after the links that of the socket for poses. 0: there is no such link. */
-int loop_endpoint(const struct loop *loop, uint32_t i, char *buf, size_t len);
+/* Link i; after the links the socket for poses. 0: there is no such link. */
+int loop_get_place(const struct loop *loop, uint32_t i, struct link_place *place);
 
 /* Starts the threads. */
 int loop_start(struct loop *loop, struct sh_err *err);

@@ -5,7 +5,6 @@
 #include <pthread.h>
 
 #include "firmware_sim/loop/hash.h"
-#include "firmware_sim/loop/links.h"
 #include "firmware_sim/loop/loop.h"
 #include "firmware_sim/loop/pose_feed.h"
 #include "firmware_sim/loop/stream.h"

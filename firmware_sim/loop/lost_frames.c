@@ -5,15 +5,10 @@
 #include "drivers/protocol/native_encode.h"
 #include "firmware_sim/loop/pump_inside.h"
 
-static void count(struct pump *pump, uint32_t n)
-{
-    atomic_fetch_add(&pump->stream->counters->reader_lost_frames, n);
-}
-
 void session_count_lost(struct pump *pump, struct session *s, uint32_t n)
 {
     s->lost.frames += n;
-    count(pump, n);
+    atomic_fetch_add(&pump->stream->counters->reader_lost_frames, n);
     if (!s->lost.lagging) {
         char text[96];
         snprintf(text, sizeof text, "session %u, %.50s", s->id, s->peer);
@@ -26,9 +21,10 @@ void session_count_lost(struct pump *pump, struct session *s, uint32_t n)
 static void announce(struct pump *pump, struct session *s, uint32_t frames)
 {
     struct native_event event = {.code = NATIVE_EV_READER_LOST, .a = frames, .c = s->lost.frames};
+    int64_t now_ns = (int64_t)stream_released(pump->stream) * pump->stream->tick_ns;
     snprintf(event.text, sizeof event.text, "%u frames lost: the reader is too slow", frames);
-    s->out_len += (uint32_t)native_encode_event(s->out + s->out_len, pump->out_cap - s->out_len, &event,
-                                                stream_now_ns(pump->stream), NATIVE_LOCAL);
+    s->out_len +=
+        (uint32_t)native_encode_event(s->out + s->out_len, pump->out_cap - s->out_len, &event, now_ns, NATIVE_LOCAL);
 }
 
 void session_check_lost(struct pump *pump, struct session *s, const struct ring_copy *tick, uint64_t released)
@@ -51,6 +47,6 @@ void session_leave(struct pump *pump, struct session *s)
     uint32_t missing = s->lost.have_seq ? stream->seq - s->lost.next_seq : 0; /* the pacing thread is done with seq */
     if (pump->nmea) missing = pump_nmea_backlog(pump, s);
     if (s->out_pos < s->out_len) missing++; /* at least the frame it was in the middle of */
-    if (atomic_load(&stream->over) && missing != 0) count(pump, missing);
+    if (atomic_load(&stream->over)) atomic_fetch_add(&stream->counters->reader_lost_frames, missing);
     stream_set_reader(stream, s->reader, s->cursor, 0);
 }

@@ -93,16 +93,6 @@ static void *pacer_main(void *arg)
     return NULL;
 }
 
-/* The moment that is device time 0. */
-static int power_up(struct loop *loop, struct sh_err *err)
-{
-    const char *warning;
-    loop->pacer.epoch_ns = clock_now_ns();
-    int rc = device_power_up(loop->device, loop->pacer.epoch_ns, &warning, err);
-    if (rc == SH_OK && warning != NULL) sh_warn(loop->options.report, "%s", warning);
-    return rc;
-}
-
 static int create_realtime(struct pacer *pacer, struct loop *loop)
 {
     struct sched_param param = {.sched_priority = PACER_PRIORITY};
@@ -122,8 +112,11 @@ static int create_realtime(struct pacer *pacer, struct loop *loop)
 int pacer_start(struct loop *loop, struct sh_err *err)
 {
     struct pacer *pacer = &loop->pacer;
-    int rc = power_up(loop, err);
+    const char *warning;
+    pacer->epoch_ns = clock_now_ns();
+    int rc = device_power_up(loop->device, pacer->epoch_ns, &warning, err);
     if (rc != SH_OK) return rc;
+    if (warning != NULL) sh_warn(loop->options.report, "%s", warning);
     int failed = loop->stream.waits ? EPERM : create_realtime(pacer, loop);
     if (failed == EPERM) failed = pthread_create(&pacer->thread, NULL, pacer_main, loop);
     if (failed != 0) return sh_fail(err, SH_EIO, "loop: no pacing thread: %s", strerror(failed));

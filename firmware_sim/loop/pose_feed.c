@@ -29,10 +29,9 @@ struct pose_feed {
 };
 
 /* One line as time and x, y, z, roll, pitch, heading. 0, or -1 when it is malformed. */
-static int parse_line(const char *line, int64_t *t_ns, double pose[6])
+static int parse_line(const char *line, double v[7])
 {
     static const double most[7] = {1e9, 1e9, 1e9, 1e9, 360.0, 90.0, 360.0};
-    double v[7];
     for (int i = 0; i < 7; i++) {
         char *end;
         v[i] = strtod(line, &end);
@@ -41,10 +40,7 @@ static int parse_line(const char *line, int64_t *t_ns, double pose[6])
         if (i < 6 && *line == ',') line++;
         if (i < 6 && line == end) return -1;
     }
-    if (line[strspn(line, " \t\r")] != '\0') return -1;
-    *t_ns = llround(1e9 * v[0]);
-    memcpy(pose, v + 1, 6 * sizeof *pose);
-    return 0;
+    return line[strspn(line, " \t\r")] == '\0' ? 0 : -1;
 }
 
 static void report_bad(struct pose_feed *feed, const char *what)
@@ -57,13 +53,12 @@ static void report_bad(struct pose_feed *feed, const char *what)
 
 static void take_line(struct pose_feed *feed, const char *line)
 {
-    int64_t t_ns;
-    double pose[6];
+    double v[7];
     if (line[strspn(line, " \t\r")] == '\0') return;
-    if (parse_line(line, &t_ns, pose) != 0) {
+    if (parse_line(line, v) != 0) {
         atomic_fetch_add(&device_counters(feed->device)->bad_poses, 1);
         report_bad(feed, "a pose that is not t_s x y z roll pitch heading");
-    } else if (device_pose_numbers(feed->device, t_ns, pose) != 0) {
+    } else if (device_pose(feed->device, llround(1e9 * v[0]), v + 1) != 0) {
         char text[96];
         snprintf(text, sizeof text, "a pose over %g m from the station, not after the last one, or over 1 h ahead",
                  feed->reach_m);
@@ -152,8 +147,7 @@ void pose_feed_endpoint(const struct pose_feed *feed, char *buf, size_t len)
 void pose_feed_close(struct pose_feed *feed)
 {
     if (feed == NULL) return;
-    uint64_t one = 1;
-    if (feed->running && write(feed->stop_fd, &one, sizeof one) == sizeof one) pthread_join(feed->thread, NULL);
+    if (feed->running && eventfd_write(feed->stop_fd, 1) == 0) pthread_join(feed->thread, NULL);
     if (feed->fd >= 0) close(feed->fd);
     if (feed->stop_fd >= 0) close(feed->stop_fd);
     free(feed);

@@ -23,10 +23,9 @@ int pump_open(struct links *links, uint32_t index, const struct link_spec *spec,
     pump->out_cap = links->stream->tick_bytes + BATCH_BYTES + REPLY_ROOM;
     pump->wake_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     int rc = pump->wake_fd < 0 ? sh_fail(err, SH_EIO, "eventfd: %s", strerror(errno)) : SH_OK;
-    for (uint32_t i = 0; i < LINK_MAX_SESSIONS && rc == SH_OK; i++) {
-        struct session *s = &pump->session[i];
-        s->id = index * LINK_MAX_SESSIONS + i + 1;
-        s->reader = (int)(s->id - 1);
+    for (uint32_t i = 0; i < LINK_MAX_SESSIONS; i++) {
+        pump->session[i].reader = (int)(index * LINK_MAX_SESSIONS + i);
+        pump->session[i].id = index * LINK_MAX_SESSIONS + i + 1;
     }
     if (rc == SH_OK) rc = pump->ops->open(spec, &pump->link, err);
     if (rc != SH_OK) {
@@ -48,44 +47,32 @@ void pump_close(struct pump *pump)
     free(pump);
 }
 
-void pump_endpoint(const struct pump *pump, char *buf, size_t len)
+void pump_get_place(const struct pump *pump, struct link_place *place)
 {
-    pump->ops->endpoint(pump->link, buf, len);
-}
-
-double pump_capacity(const struct pump *pump)
-{
-    return pump->ops->capacity != NULL ? pump->ops->capacity(pump->link) : 0;
-}
-
-const char *pump_type(const struct pump *pump)
-{
-    return pump->ops->name;
-}
-
-int pump_is_nmea(const struct pump *pump)
-{
-    return pump->nmea;
+    place->type = pump->ops->name;
+    place->bytes_s = pump->ops->capacity != NULL ? pump->ops->capacity(pump->link) : 0.0;
+    place->nmea = pump->nmea;
+    pump->ops->endpoint(pump->link, place->endpoint, sizeof place->endpoint);
 }
 
 /* The first link that could not write what it had to makes the run a failure. */
 static void fail_link(struct pump *pump, const char *why)
 {
     struct links *links = pump->links;
-    char endpoint[300];
+    struct link_place place;
     int none = 0;
     pump->failed = 0;
-    pump_endpoint(pump, endpoint, sizeof endpoint);
-    sh_warn(links->report, "link %s: %s; what follows is missing there", endpoint, why);
+    pump_get_place(pump, &place);
+    sh_warn(links->report, "link %s: %s; what follows is missing there", place.endpoint, why);
     if (atomic_compare_exchange_strong(&links->failed, &none, 1))
-        sh_fail(&links->error, SH_EIO, "link %s: %s; it is cut short", endpoint, why);
+        sh_fail(&links->error, SH_EIO, "link %s: %s; it is cut short", place.endpoint, why);
 }
 
 static void say_notice(struct pump *pump, const char *text)
 {
-    char endpoint[300];
-    pump_endpoint(pump, endpoint, sizeof endpoint);
-    sh_warn(pump->links->report, "link %s: %s", endpoint, text);
+    struct link_place place;
+    pump_get_place(pump, &place);
+    sh_warn(pump->links->report, "link %s: %s", place.endpoint, text);
 }
 
 static void handle(struct pump *pump, const struct link_event *event)
@@ -118,6 +105,16 @@ static void handle(struct pump *pump, const struct link_event *event)
     }
 }
 
+/* Waits for events and handles them. Negative: poll failed. */
+static int take_events(struct pump *pump, uint32_t want_write, int timeout_ms)
+{
+    struct link_event events[LINK_MAX_EVENTS];
+    int n = pump->ops->poll(pump->link, pump->wake_fd, want_write, timeout_ms, events, LINK_MAX_EVENTS);
+    for (int i = 0; i < n; i++)
+        handle(pump, &events[i]);
+    return n;
+}
+
 /* True while some session has something to bring out and its reader takes it. */
 static int has_more(struct pump *pump)
 {
@@ -133,18 +130,14 @@ static int has_more(struct pump *pump)
 static void *pump_main(void *arg)
 {
     struct pump *pump = arg;
-    struct link_event events[LINK_MAX_EVENTS];
     uint32_t want_write = 0;
     for (;;) {
         int over = atomic_load(&pump->stream->over);
         if (over && !has_more(pump)) break;
-        int n = pump->ops->poll(pump->link, pump->wake_fd, want_write, over ? 50 : -1, events, LINK_MAX_EVENTS);
-        if (n < 0) {
+        if (take_events(pump, want_write, over ? 50 : -1) < 0) {
             sh_warn(pump->links->report, "link %s: poll failed; the link is given up", pump->ops->name);
             break;
         }
-        for (int i = 0; i < n; i++)
-            handle(pump, &events[i]);
         want_write = 0;
         for (int i = 0; i < LINK_MAX_SESSIONS; i++)
             if (pump->session[i].open && session_write(pump, &pump->session[i], i)) want_write |= 1U << i;
@@ -158,10 +151,7 @@ static void *pump_main(void *arg)
 int pump_start(struct pump *pump, struct sh_err *err)
 {
     /* Sessions that are there from the start (a file's) begin with the first tick, however late the thread comes. */
-    struct link_event events[LINK_MAX_EVENTS];
-    int n = pump->ops->poll(pump->link, pump->wake_fd, 0, 0, events, LINK_MAX_EVENTS);
-    for (int i = 0; i < n; i++)
-        handle(pump, &events[i]);
+    take_events(pump, 0, 0);
     atomic_fetch_add(&pump->links->n_busy, 1);
     int rc = pthread_create(&pump->thread, NULL, pump_main, pump);
     if (rc != 0) {
@@ -174,10 +164,5 @@ int pump_start(struct pump *pump, struct sh_err *err)
 
 void pump_join(struct pump *pump)
 {
-    uint64_t one = 1;
-    if (!pump->running) return;
-    ssize_t n = write(pump->wake_fd, &one, sizeof one);
-    (void)n; /* a full counter is a wake-up, too */
-    pthread_join(pump->thread, NULL);
-    pump->running = 0;
+    if (pump->running) pthread_join(pump->thread, NULL);
 }

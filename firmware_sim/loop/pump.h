@@ -11,9 +11,6 @@ int pump_open(struct links *links, uint32_t index, const struct link_spec *spec,
 int pump_start(struct pump *pump, struct sh_err *err);
 void pump_join(struct pump *pump);
 void pump_close(struct pump *pump);
-void pump_endpoint(const struct pump *pump, char *buf, size_t len);
-double pump_capacity(const struct pump *pump); /* bytes per second; 0: no fixed limit */
-const char *pump_type(const struct pump *pump);
-int pump_is_nmea(const struct pump *pump);
+void pump_get_place(const struct pump *pump, struct link_place *place);
 
 #endif

@@ -22,7 +22,7 @@ static void start_step(struct pump *pump, struct session *s, const struct comman
     struct session_commands *c = &s->commands;
     uint64_t total_ns = stream_grant(pump->stream, (uint64_t)result->step_ns);
     if (result->have_pose) /* before time passes */
-        device_pose_numbers(pump->links->device, (int64_t)total_ns, result->pose);
+        device_pose(pump->links->device, (int64_t)total_ns, result->pose);
     c->step_tick = stream_pass(pump->stream, total_ns);
     c->stepping = 1;
     memcpy(c->step_reply, result->reply, sizeof c->step_reply);

@@ -1,10 +1,11 @@
 /* Sessions of the GNSS receiver: the same links, with NMEA sentences instead of the head's frames. */
 #include "drivers/protocol/nmea.h"
+#include "firmware_sim/device/gnss.h"
 #include "firmware_sim/loop/pump_inside.h"
 
 static uint64_t count_at(const struct pump *pump, uint64_t tick)
 {
-    return device_gnss_count(pump->links->device, (int64_t)tick * pump->stream->tick_ns);
+    return gnss_count(device_gnss(pump->links->device), (int64_t)tick * pump->stream->tick_ns);
 }
 
 static uint32_t sentences_between(const struct pump *pump, uint64_t from_tick, uint64_t to_tick)
@@ -20,8 +21,8 @@ uint32_t pump_nmea_backlog(const struct pump *pump, const struct session *s)
 /* The tick of the first position from the cursor on. */
 static uint64_t next_tick(const struct pump *pump, const struct session *s)
 {
-    const struct device *device = pump->links->device;
-    return (uint64_t)(device_gnss_time_ns(device, count_at(pump, s->cursor)) / pump->stream->tick_ns);
+    const struct gnss *gnss = device_gnss(pump->links->device);
+    return (uint64_t)(gnss_time_ns(gnss, count_at(pump, s->cursor)) / pump->stream->tick_ns);
 }
 
 /* As for frames: what is more than a queue old is lost, and the reader goes on with what is half a queue old. */

@@ -1,8 +1,8 @@
 #include "firmware_sim/loop/stream.h"
 
 #include <errno.h>
+#include <sys/eventfd.h>
 #include <time.h>
-#include <unistd.h>
 
 #include "drivers/protocol/native_encode.h"
 #include "firmware_sim/base/clock.h"
@@ -28,11 +28,8 @@ void stream_free(struct stream *stream)
 
 static void wake_readers(struct stream *stream)
 {
-    const uint64_t one = 1;
-    for (uint32_t i = 0; i < stream->n_listeners; i++) {
-        ssize_t n = write(stream->listener[i], &one, sizeof one);
-        (void)n; /* a full counter is a wake-up, too */
-    }
+    for (uint32_t i = 0; i < stream->n_listeners; i++)
+        eventfd_write(stream->listener[i], 1); /* a full counter is a wake-up, too */
 }
 
 /* Line ends get their counts of echoes; 0 says that blocks of the line are missing. */
@@ -60,11 +57,9 @@ static void count(struct stream *stream, const struct ring_tick *tick, int64_t n
     atomic_fetch_add(&c->pulses, tick->n_cast);
     atomic_fetch_add(&c->fired, tick->n_fired);
     atomic_fetch_add(&c->echoes, tick->hits.echoes);
-    if ((tick->hits.crowded | tick->hits.faint | tick->hits.unfit) != 0) {
-        atomic_fetch_add(&c->crowded, tick->hits.crowded);
-        atomic_fetch_add(&c->faint, tick->hits.faint);
-        atomic_fetch_add(&c->unfit, tick->hits.unfit);
-    }
+    atomic_fetch_add(&c->crowded, tick->hits.crowded);
+    atomic_fetch_add(&c->faint, tick->hits.faint);
+    atomic_fetch_add(&c->unfit, tick->hits.unfit);
     atomic_fetch_add(&c->lines, tick->n_lines);
     if (tick->n_fired == 0) return;
     if (atomic_load(&stream->first_pulse_ns) == 0) atomic_store(&stream->first_pulse_ns, now_ns);
@@ -134,9 +129,8 @@ void stream_listen(struct stream *stream, int fd)
 
 void stream_set_reader(struct stream *stream, int reader, uint64_t cursor, int active)
 {
-    atomic_store(&stream->reader[reader].cursor, cursor);
     atomic_store(&stream->reader[reader].active, active);
-    if (stream->waits) sem_post(&stream->progress);
+    stream_move_reader(stream, reader, cursor);
 }
 
 void stream_move_reader(struct stream *stream, int reader, uint64_t cursor)
@@ -148,11 +142,6 @@ void stream_move_reader(struct stream *stream, int reader, uint64_t cursor)
 uint64_t stream_released(const struct stream *stream)
 {
     return atomic_load(&stream->ring.released);
-}
-
-int64_t stream_now_ns(const struct stream *stream)
-{
-    return (int64_t)stream_released(stream) * stream->tick_ns;
 }
 
 uint64_t stream_grant(struct stream *stream, uint64_t ns)

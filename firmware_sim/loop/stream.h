@@ -81,7 +81,6 @@ void stream_set_reader(struct stream *stream, int reader, uint64_t cursor, int a
 /* It has read everything before a tick. */
 void stream_move_reader(struct stream *stream, int reader, uint64_t cursor);
 uint64_t stream_released(const struct stream *stream);
-int64_t stream_now_ns(const struct stream *stream); /* device time that has passed */
 /* A peer grants time. Returns the sum of all grants, ns. */
 uint64_t stream_grant(struct stream *stream, uint64_t ns);
 /* Lets device time pass up to that sum. Returns the tick before which all may pass. */

@@ -35,13 +35,12 @@ int worker_create(const struct site *site, struct worker **out, struct sh_err *e
     struct worker *worker = calloc(1, sizeof *worker);
     if (worker == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     worker->site = site;
-    uint32_t n = device_tick_pulses(site->cfg);
-    worker->tick.mark = worker->mark;
     worker->cap = worker_tick_bytes(site);
     worker->tick.bytes = malloc(worker->cap);
     int rc = worker->tick.bytes != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory");
     if (rc == SH_OK) rc = caster_create(&worker->caster, err);
-    if (rc == SH_OK) rc = line_block_alloc(&worker->block, n * site_points_per_pulse(site), err);
+    if (rc == SH_OK)
+        rc = line_block_alloc(&worker->block, device_tick_pulses(site->cfg) * site_points_per_pulse(site), err);
     if (rc == SH_OK && site->cfg->output.attributes) rc = line_block_alloc_attributes(&worker->block, err);
     if (rc != SH_OK) {
         worker_free(worker);

@@ -83,8 +83,8 @@ static void test_bounds(void **state)
                     station_forward(georef, &p, p.out);
                     double error_m = station_error_m(georef, &p);
                     if (!(error_m <= bound_m))
-                        fail_msg("place %d, EPSG %d, %s within %g m: off by %.4g m, bound %.4g m", i,
-                                 georef_epsg(georef), plan_method_name(m), radius_m[r], error_m, bound_m);
+                        fail_msg("place %d, EPSG %d, order %d within %g m: off by %.4g m, bound %.4g m", i,
+                                 georef_epsg(georef), 1 + (int)m - (int)GEOREF_ORDER1, radius_m[r], error_m, bound_m);
                     tried++;
                     if (error_m < 1e-6 || near_pole) continue;
                     loosest = fmax(loosest, bound_m / error_m);

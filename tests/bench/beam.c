@@ -173,12 +173,8 @@ static void print_table(const struct result *result)
 static void print_scene(const char *name, struct beam_rig *rig, const struct beam_view *view)
 {
     struct cast_counters before, after;
-    struct beam_outlines_info info;
     uint32_t n = view->lines * view->pulses;
-    beam_outlines_get_info(rig->outlines, &info);
-    printf("%s: %u triangles, %llu edges, %llu outlines, %llu stretches, %llu entries, %.1f MB\n", name,
-           rig->scene->n_triangles, (unsigned long long)info.edges, (unsigned long long)info.outlines,
-           (unsigned long long)info.stretches, (unsigned long long)info.entries, 1e-6 * (double)info.bytes);
+    printf("%s: %u triangles\n", name, rig->scene->n_triangles);
     beam_rig_mode(rig, BEAM_ADAPTIVE, 4);
     caster_get_counters(rig->caster, &before);
     for (uint32_t l = 0; l < view->lines; l++)

@@ -133,11 +133,11 @@ static int rounds(const struct bench_case *c, const struct bench_result *one, co
         if (rays_s[i] <= 0.0) return sh_fail(err, SH_EIO, "bench: %u threads can't be had", out->threads);
         int rc = run_loop(site, &stats, &cpu_s, err);
         if (rc != SH_OK) return rc;
-        if (stats.lost_pulses != 0 || stats.pulses != (uint64_t)frames * c->rays->n)
+        if (stats.counters.lost_pulses != 0 || stats.counters.pulses != (uint64_t)frames * c->rays->n)
             return sh_fail(err, SH_ESTATE, "bench: the loop cast %llu pulses instead of %llu",
-                           (unsigned long long)stats.pulses, (unsigned long long)frames * c->rays->n);
-        pulses_s[i] = (double)stats.pulses / stats.wall_s;
-        cpu_ns[i] = 1e9 * cpu_s / (double)stats.pulses;
+                           (unsigned long long)stats.counters.pulses, (unsigned long long)frames * c->rays->n);
+        pulses_s[i] = (double)stats.counters.pulses / stats.wall_s;
+        cpu_ns[i] = 1e9 * cpu_s / (double)stats.counters.pulses;
         ratio[i] = pulses_s[i] / rays_s[i];
     }
     out->embree_mrays_s = 1e-6 * bench_median(rays_s, ROUNDS);

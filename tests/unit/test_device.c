@@ -326,18 +326,18 @@ static void a_pose_far_ahead_keeps_no_other_out(void **state)
 {
     (void)state;
     static const char *const live[] = {"platform.kind=live"}, *const steps[] = {"platform.kind=live", "loop.pace=step"};
-    const struct pose pose = {.position_m = {1, 0, 0}, .quat = {1, 0, 0, 0}};
+    const double pose[6] = {1};
     struct rig *rig = rig_open(NULL, live, 1);
     rig_go_to(rig, 10); /* 10 ms */
     int64_t most_ns = (DEVICE_POSE_AHEAD_S * INT64_C(1000) + 10) * 1000000;
-    assert_int_equal(device_pose(rig->device, INT64_C(900000000000000), &pose), 1);
-    assert_int_equal(device_pose(rig->device, most_ns + 1, &pose), 1);
-    assert_int_equal(device_pose(rig->device, 20000000, &pose), 0);
-    assert_int_equal(device_pose(rig->device, most_ns, &pose), 0);
+    assert_int_equal(device_pose(rig->device, INT64_C(900000000000000), pose), 1);
+    assert_int_equal(device_pose(rig->device, most_ns + 1, pose), 1);
+    assert_int_equal(device_pose(rig->device, 20000000, pose), 0);
+    assert_int_equal(device_pose(rig->device, most_ns, pose), 0);
     assert_int_equal(atomic_load(&device_counters(rig->device)->bad_poses), 2);
     rig_close(rig);
     rig = rig_open(NULL, steps, 2);
-    assert_int_equal(device_pose(rig->device, INT64_C(900000000000000), &pose), 0);
+    assert_int_equal(device_pose(rig->device, INT64_C(900000000000000), pose), 0);
     rig_close(rig);
 }
 

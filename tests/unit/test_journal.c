@@ -58,13 +58,13 @@ static void what_is_written_is_read(void **ctx)
     size_t n;
     assert_int_equal(journal_read(path, &out, &n, &err), 0);
     assert_int_equal(n, 4);
-    journal_free(out);
+    free(out);
     assert_int_equal(journal_close(journal, &err), 0);
     assert_int_equal(journal_read(path, &out, &n, &err), 0);
     assert_int_equal(n, 4);
     for (size_t i = 0; i < 4; i++)
         assert_memory_equal(&out[i], &in[i], sizeof in[i]);
-    journal_free(out);
+    free(out);
 }
 
 static void the_format_is_as_documented(void **ctx)
@@ -96,11 +96,11 @@ static void sorted_by_tick_and_else_as_in_the_file(void **ctx)
     for (size_t i = 0; i < n; i++)
         strncat(order, out[i].line, 1);
     assert_string_equal(order, "ebdacf");
-    journal_free(out);
+    free(out);
     write_text(text, 21);
     assert_int_equal(journal_read(path, &out, &n, NULL), 0);
     assert_int_equal(n, 0); /* a session without commands */
-    journal_free(out);
+    free(out);
 }
 
 static void malformed_lines_are_named(void **ctx)
@@ -199,7 +199,7 @@ static void the_writer_refuses_what_the_reader_would(void **ctx)
     assert_int_equal(journal_read(path, &out, &n, NULL), 0);
     assert_int_equal(n, 1);
     assert_string_equal(out[0].line, line);
-    journal_free(out);
+    free(out);
 }
 
 static void a_full_disk_is_reported(void **ctx)

@@ -127,9 +127,9 @@ static void the_pacing_thread_does_nothing_else(void **state)
     loop_join(loop, &stats);
     loop_free(loop);
     rig_close(rig);
-    print_message("# %d sleeps, %u pulses, %u ticks lost\n", atomic_load(&sleeps), (unsigned)stats.fired_pulses,
-                  (unsigned)stats.lost_ticks);
-    assert_true(atomic_load(&sleeps) > 100 && stats.fired_pulses > 10000);
+    print_message("# %d sleeps, %u pulses, %u ticks lost\n", atomic_load(&sleeps), (unsigned)stats.counters.fired,
+                  (unsigned)stats.counters.lost_ticks);
+    assert_true(atomic_load(&sleeps) > 100 && stats.counters.fired > 10000);
     assert_int_equal(atomic_load(&forbidden), 0);
 }
 
