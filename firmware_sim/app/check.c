@@ -1,6 +1,5 @@
 /* scanhead check: validates configuration, scene and links. Nothing runs. */
-#include <math.h>
-
+#include "core/vec3.h"
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/check_places.h"
 #include "firmware_sim/device/head_clock.h"
@@ -30,10 +29,8 @@ static void print_platform(const struct site *site)
     if (p->kind == PLATFORM_LIVE) printf("platform  live, up to %g m from station 1\n", p->reach_m);
     if (p->kind != PLATFORM_TRAJECTORY) return;
     double way_m = 0.0;
-    for (size_t i = 1; i < site->n_knots; i++) {
-        const double *a = site->knot[i - 1].pose.position_m, *b = site->knot[i].pose.position_m;
-        way_m += sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]) + (b[2] - a[2]) * (b[2] - a[2]));
-    }
+    for (size_t i = 1; i < site->n_knots; i++)
+        way_m += vec3_distance(site->knot[i].pose.position_m, site->knot[i - 1].pose.position_m);
     printf("platform  trajectory of %.3f s, %.3f m; %zu poses keep the head within %.3g m of it; %zu BVH\n",
            1e-9 * (double)site->knot[site->n_knots - 1].t_ns, way_m, site->n_knots, site->knot_error_m,
            site->n_stretches);

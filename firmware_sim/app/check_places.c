@@ -3,12 +3,11 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/angle.h"
 #include "core/distance.h"
 #include "core/locate.h"
 #include "core/mat3.h"
 #include "core/vec3.h"
-
-#define DEG(rad) ((rad)*180.0 / M_PI)
 
 /* From 0 to below 360, and no -0. */
 static double turn_deg(double deg)
@@ -79,8 +78,7 @@ static int print_grid_ranges(const struct site *site, const double p_prcs[3], FI
         if (rc != SH_OK) return rc;
         georef_geodetic_to_ecef(&at, p_ecef[i]);
     }
-    const double d[3] = {p_ecef[1][0] - p_ecef[0][0], p_ecef[1][1] - p_ecef[0][1], p_ecef[1][2] - p_ecef[0][2]};
-    double error = 100.0 / sqrt(vec3_dot(d, d)) - 1.0, range_m = site->cfg->profile.range_max_m;
+    double error = 100.0 / vec3_distance(p_ecef[1], p_ecef[0]) - 1.0, range_m = site->cfg->profile.range_max_m;
     fprintf(out, "            ranges are grid lengths: a level one of %g m reads %+.4f m (%+.1f ppm)\n", range_m,
             range_m * error, 1e6 * error);
     return SH_OK;
@@ -95,8 +93,7 @@ static int print_on_earth(const struct site *site, uint32_t i, FILE *out, struct
     int grid = site->anchor.known && frame->kind == GEOFRAME_GRID;
     int zone, side;
     site_grid(site, &zone, &side);
-    const struct georef_place place = {at->lat_deg, at->lon_deg, at->height_m};
-    int rc = locate_in_grid(&place, zone, &utm, err);
+    int rc = locate_in_grid(&at->place, zone, &utm, err);
     if (rc == SH_OK && side != 0 && utm.zone != 0 && utm.north != (side > 0)) {
         utm.north = side > 0;
         utm.northing_m += utm.north ? -1e7 : 1e7;
@@ -104,12 +101,14 @@ static int print_on_earth(const struct site *site, uint32_t i, FILE *out, struct
     if (rc == SH_OK) rc = axis_enu(site, i, 1, forward, err);
     if (rc == SH_OK) rc = axis_enu(site, i, 2, up, err);
     if (rc != SH_OK) return rc;
-    georef_geodetic_to_ecef(&place, p_ecef);
-    fprintf(out, "  geodetic  lat %.9f lon %.9f deg, height %.4f m\n", at->lat_deg, at->lon_deg, at->height_m);
-    print_utm(&utm, at->height_m, out);
+    georef_geodetic_to_ecef(&at->place, p_ecef);
+    fprintf(out, "  geodetic  lat %.9f lon %.9f deg, height %.4f m\n", at->place.lat_deg, at->place.lon_deg,
+            at->place.height_m);
+    print_utm(&utm, at->place.height_m, out);
     if (grid) rc = print_grid_ranges(site, at->position_m, out, err);
     fprintf(out, "  ecef      %.4f %.4f %.4f m\n", p_ecef[0], p_ecef[1], p_ecef[2]);
-    double azimuth_deg = DEG(atan2(forward[0], forward[1])), off_plumb_deg = DEG(atan2(hypot(up[0], up[1]), up[2]));
+    double azimuth_deg = angle_deg(atan2(forward[0], forward[1])),
+           off_plumb_deg = angle_deg(atan2(hypot(up[0], up[1]), up[2]));
     fprintf(out,
             "  y axis    azimuth %.6f deg from true north, %.6f from grid north; z axis %.6f deg off the plumb line\n",
             turn_deg(azimuth_deg), turn_deg(azimuth_deg - utm.convergence_deg), off_plumb_deg);
@@ -142,7 +141,8 @@ void check_print_stops(const struct site *site, FILE *out)
                 s->t_s, s->frame, s->at.position_m[0], s->at.position_m[1], s->at.position_m[2],
                 turn_deg(c->heading_deg), c->pitch_deg + 0.0, c->roll_deg + 0.0);
         if (s->at.on_earth)
-            fprintf(out, "; lat %.9f lon %.9f deg, height %.4f m", s->at.lat_deg, s->at.lon_deg, s->at.height_m);
+            fprintf(out, "; lat %.9f lon %.9f deg, height %.4f m", s->at.place.lat_deg, s->at.place.lon_deg,
+                    s->at.place.height_m);
         fputc('\n', out);
     }
 }

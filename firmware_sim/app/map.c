@@ -5,6 +5,7 @@
 
 #include "core/map.h"
 #include "core/mat3.h"
+#include "core/vec3.h"
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/offline.h"
 #include "firmware_sim/app/recording.h"
@@ -42,9 +43,7 @@ static int add_frame(void *ctx, struct scanhead *sh, const struct scanhead_frame
         for (int i = 0; i < n; i++) {
             double p[3];
             to_map(run, (const double[3]){run->point[i].x, run->point[i].y, run->point[i].z}, p);
-            run->x[i] = p[0];
-            run->y[i] = p[1];
-            run->z[i] = p[2];
+            VEC3_SET(*run, i, p);
         }
         map_add_points(run->map, (size_t)n, run->x, run->y, run->z);
         first += (uint32_t)n;
@@ -104,7 +103,7 @@ static int create_map(struct map_run *run, const struct site *site, struct sh_er
 static int draw(struct config *cfg, void *ctx, struct sh_err *err)
 {
     struct map_run *run = ctx;
-    struct offline *offline = NULL;
+    struct offline offline = {0};
     struct recording_result result;
     struct recording_options options = {.first_station = 1,
                                         .frames = 1,
@@ -115,9 +114,9 @@ static int draw(struct config *cfg, void *ctx, struct sh_err *err)
                                         .interrupted = app_interrupted};
     app_catch_signals();
     int rc = offline_open(cfg, &app_report_stderr, &offline, err);
-    if (rc == SH_OK) options.last_station = offline_site(offline)->n_stations;
-    if (rc == SH_OK) rc = create_map(run, offline_site(offline), err);
-    if (rc == SH_OK) rc = recording_run(offline_scanhead(offline), &options, &result, err);
+    if (rc == SH_OK) options.last_station = offline.site->n_stations;
+    if (rc == SH_OK) rc = create_map(run, offline.site, err);
+    if (rc == SH_OK) rc = recording_run(offline.sh, &options, &result, err);
     if (rc == SH_OK && app_interrupted()) rc = sh_fail(err, SH_EIO, "interrupted; nothing written");
     if (rc == SH_OK) rc = map_write_png(run->map, run->output, err);
     if (rc == SH_OK && !run->quiet) {
@@ -127,7 +126,7 @@ static int draw(struct config *cfg, void *ctx, struct sh_err *err)
                 (unsigned long long)counts.drawn, (unsigned long long)counts.outside);
     }
     map_free(run->map);
-    offline_close(offline);
+    offline_close(&offline);
     return rc;
 }
 

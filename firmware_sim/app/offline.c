@@ -2,19 +2,11 @@
 
 #include <errno.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include "firmware_sim/loop/loop.h"
-
-struct offline {
-    struct site *site;
-    struct device *device;
-    struct loop *loop;
-    struct scanhead *sh;
-};
 
 static int connect_client(struct offline *off, int fd, struct sh_err *err)
 {
@@ -25,7 +17,7 @@ static int connect_client(struct offline *off, int fd, struct sh_err *err)
     return rc == SCANHEAD_OK ? SH_OK : sh_fail(err, rc, "off line: %s", why);
 }
 
-static int start(struct offline *off, struct config *cfg, const struct sh_report *report, struct sh_err *err)
+int offline_open(struct config *cfg, const struct sh_report *report, struct offline *off, struct sh_err *err)
 {
     int fd[2];
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, fd) != 0)
@@ -47,31 +39,8 @@ static int start(struct offline *off, struct config *cfg, const struct sh_report
     return rc == SH_OK ? loop_start(off->loop, err) : rc;
 }
 
-int offline_open(struct config *cfg, const struct sh_report *report, struct offline **out, struct sh_err *err)
-{
-    *out = calloc(1, sizeof **out);
-    if (*out == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
-    int rc = start(*out, cfg, report, err);
-    if (rc != SH_OK) {
-        offline_close(*out);
-        *out = NULL;
-    }
-    return rc;
-}
-
-struct scanhead *offline_scanhead(struct offline *offline)
-{
-    return offline->sh;
-}
-
-const struct site *offline_site(const struct offline *offline)
-{
-    return offline->site;
-}
-
 void offline_close(struct offline *offline)
 {
-    if (offline == NULL) return;
     struct loop_stats stats;
     if (offline->sh != NULL) scanhead_close(offline->sh); /* a loop that waited for this reader goes on */
     if (offline->loop != NULL) {
@@ -81,5 +50,4 @@ void offline_close(struct offline *offline)
     loop_free(offline->loop);
     device_free(offline->device);
     site_free(offline->site);
-    free(offline);
 }

@@ -8,15 +8,17 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/site/site.h"
 
-struct offline;
+struct offline {
+    struct scanhead *sh; /* the client's handle */
+    struct site *site;
+    /* inner state */
+    struct device *device;
+    struct loop *loop;
+};
 
 /* Loads the scene and starts the head. Its own links stay closed. cfg is changed (pace, links) and must live
- * on. */
-int offline_open(struct config *cfg, const struct sh_report *report, struct offline **out, struct sh_err *err);
-/* Both belong to `offline`. */
-struct scanhead *offline_scanhead(struct offline *offline);
-const struct site *offline_site(const struct offline *offline);
-/* Takes NULL, too. */
+ * on. `offline` begins as zeros and is to be closed, also after an error. */
+int offline_open(struct config *cfg, const struct sh_report *report, struct offline *offline, struct sh_err *err);
 void offline_close(struct offline *offline);
 
 #endif

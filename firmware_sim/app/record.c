@@ -129,7 +129,7 @@ static int check_can_end(const struct record *r, const struct config *cfg, struc
 static int record_config(struct config *cfg, void *ctx, struct sh_err *err)
 {
     struct record *r = ctx;
-    struct offline *offline = NULL;
+    struct offline offline = {0};
     int rc = check_can_end(r, cfg, err);
     if (rc == SH_OK) rc = set_layout(r, cfg, err);
     if (rc == SH_OK && cfg->output.layout == LINE_GEO && cfg->output.crs == GEOREF_GEODETIC)
@@ -137,10 +137,10 @@ static int record_config(struct config *cfg, void *ctx, struct sh_err *err)
     if (rc == SH_OK) rc = offline_open(cfg, &app_report_stderr, &offline, err);
     if (rc == SH_OK && r->station == APP_WORD) {
         r->recording.first_station = 1;
-        r->recording.last_station = offline_site(offline)->n_stations;
+        r->recording.last_station = offline.site->n_stations;
     }
-    if (rc == SH_OK) rc = record(r, offline_scanhead(offline), err);
-    offline_close(offline);
+    if (rc == SH_OK) rc = record(r, offline.sh, err);
+    offline_close(&offline);
     return rc;
 }
 

@@ -3,7 +3,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "core/cloud.h"
 #include "core/mat3.h"
@@ -67,13 +66,6 @@ static int load(struct report *r, struct sh_err *err)
     return rc;
 }
 
-static unsigned thread_count(const struct config *cfg)
-{
-    long processors = sysconf(_SC_NPROCESSORS_ONLN);
-    if (cfg->loop.threads > 0) return cfg->loop.threads;
-    return processors > 0 ? (unsigned)processors : 1;
-}
-
 /* Turns a point on a moving body into the body's own frame and gives the body's index. At a stop the body
  * stands still during the scan. */
 static const struct distance *body_of(void *ctx, unsigned station, uint16_t label, double p_prcs[3])
@@ -117,7 +109,7 @@ static int compare(struct report *r, struct sh_err *err)
                                      .georef = r->cfg->output.layout == LINE_GEO ? r->georef : NULL,
                                      .n_stations = site->n_stations,
                                      .max_m = r->max_m,
-                                     .threads = thread_count(r->cfg),
+                                     .threads = config_threads(r->cfg),
                                      .body = site->n_movers > 0 ? body_of : NULL,
                                      .body_ctx = r};
     const struct sh_report progress = {r, app_report_stderr.warn, report_each_second};

@@ -3,6 +3,7 @@
 
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 static int fail_missing(const struct cfg_reader *rd, const struct cfg_key *key, uint32_t item)
 {
@@ -55,6 +56,12 @@ int config_load(const char *path, const char *const *sets, int n_sets, struct co
     if (code == SH_OK) code = cfg_fill_defaults(&rd, &cfg->profile);
     if (code == SH_OK) code = cfg_check(&rd, cfg);
     return code;
+}
+
+uint32_t config_threads(const struct config *cfg)
+{
+    long n = cfg->loop.threads != 0 ? (long)cfg->loop.threads : sysconf(_SC_NPROCESSORS_ONLN);
+    return n < 1 ? 1 : n > CONFIG_MAX_THREADS ? CONFIG_MAX_THREADS : (uint32_t)n;
 }
 
 /* ---- the reference */

@@ -31,6 +31,7 @@ enum {
     CONFIG_MAX_STATIONS = 64,
     CONFIG_MAX_SURFACES = 64,
     CONFIG_MAX_STOPS = 4096,
+    CONFIG_MAX_THREADS = 64,
     CONFIG_PATH_LEN = 512
 };
 
@@ -55,7 +56,7 @@ struct config_profile {
         double reflectance, range_m;
         enum config_from { FROM_DATA_SHEET, FROM_ASSUMED } from;
     } reach[DETECT_MAX_REACHES];
-    uint32_t n_reaches; /* 0: range_max_m on 90 % */
+    uint32_t n_reaches; /* at least 1: range_max_m on 90 % where the file has none */
     double threshold_snr, overlap_m, wavelength_nm, visibility_m, pulse_width_ns;
     double mirror_counts, pan_counts;        /* encoder counts per turn of the beam angle; 0: ideal (2^32 counts) */
     double beam_exit_m, beam_divergence_rad; /* core/footprint.h */
@@ -264,10 +265,12 @@ static inline int config_has_footprint(const struct config *cfg)
     return cfg->profile.beam_exit_m != 0.0 || cfg->profile.beam_divergence_rad != 0.0;
 }
 
-/* Whether anything in the scene, or the head, moves. */
-int config_moves(const struct config *cfg);
-/* True when all beams begin at one place of a scene that stands still: what an adaptive beam needs. */
-int config_beam_fixed(const struct config *cfg);
+/* Threads that cast: loop.threads, or one per processor. */
+uint32_t config_threads(const struct config *cfg);
+
+/* Why the beams of a scan do not all begin at one place of a scene that stands still; NULL: they do. That is what an
+ * adaptive beam needs. */
+const char *config_beam_moves(const struct config *cfg);
 
 /* The reference: every key with type, unit, default, range and help. */
 void config_print_reference(FILE *out);

@@ -1,7 +1,6 @@
 /* What concerns more than one key, or the world: limits of the head profile, order of angles, files, keys of links and
  * platforms. Places on the Earth: places.c; noise, signal, surfaces: measurement.c. */
 #include "firmware_sim/config/table.h"
-#include "firmware_sim/config/words.h"
 
 #include <errno.h>
 #include <math.h>
@@ -167,7 +166,7 @@ static int check_usb_link(const struct cfg_reader *rd, const struct config *cfg,
         {"links[].attach", OF_USBIP | OF_USBREDIR},
         {"links[].udc", OF_FUNCTIONFS},
     };
-    const char *name = cfg_backend_words[link->backend];
+    const char *name = cfg_word(rd, "links[].backend", link->backend);
     const char *stray = find_stray(rd, keys, CFG_LEN(keys), link->backend, i);
     if (stray != NULL) return cfg_fail_key(rd, stray, i, "the back end %s has no such key; allowed without it", name);
     const int has_port = cfg_is_given(rd, "links[].port", i), has_address = cfg_is_given(rd, "links[].address", i);
@@ -208,7 +207,7 @@ static int check_link(const struct cfg_reader *rd, struct config *cfg, uint32_t 
                                       [LINK_USB] =
                                           "type, backend, address, port, path, attach, udc, speed, vid, pid, serial"};
     struct link_spec *link = &cfg->link[i];
-    const char *type = cfg_link_words[link->type];
+    const char *type = cfg_word(rd, "links[].type", (int)link->type);
     const char *stray = find_stray(rd, keys, CFG_LEN(keys), (int)link->type, i);
     if (stray != NULL)
         return cfg_fail_key(rd, stray, i, "a %s link has no such key; allowed %s", type, has[link->type]);
@@ -268,8 +267,8 @@ static int check_platform_keys(const struct cfg_reader *rd, const struct config_
     };
     const char *stray = find_stray(rd, keys, CFG_LEN(keys), (int)p->kind, 0);
     if (stray == NULL) return SH_OK;
-    return cfg_fail_key(rd, stray, 0, "a %s platform has no such key; allowed %s", cfg_platform_words[p->kind],
-                        has[p->kind]);
+    return cfg_fail_key(rd, stray, 0, "a %s platform has no such key; allowed %s",
+                        cfg_word(rd, "platform.kind", (int)p->kind), has[p->kind]);
 }
 
 static int check_platform(const struct cfg_reader *rd, struct config *cfg)
@@ -287,17 +286,14 @@ static int check_platform(const struct cfg_reader *rd, struct config *cfg)
     return check_part(rd, cfg);
 }
 
-int config_moves(const struct config *cfg)
+const char *config_beam_moves(const struct config *cfg)
 {
     int moves = cfg->platform.kind != PLATFORM_STATIC;
     for (uint32_t i = 0; i < cfg->scene.n_meshes; i++)
         moves |= config_mesh_moves(&cfg->scene.mesh[i]);
-    return moves;
-}
-
-int config_beam_fixed(const struct config *cfg)
-{
-    return !config_moves(cfg) && cfg->instrument.transit_offset_m == 0.0 && cfg->instrument.mirror_offset_m == 0.0;
+    if (moves) return "the head or a mesh moves";
+    if (cfg->instrument.transit_offset_m == 0.0 && cfg->instrument.mirror_offset_m == 0.0) return NULL;
+    return "instrument.transit_offset_m or mirror_offset_m moves the beam";
 }
 
 static const double LEAST_PULSE_NS = 0.1; /* 15 mm of range */
@@ -321,10 +317,9 @@ static int check_beam(const struct cfg_reader *rd, const struct config *cfg)
     if (cfg->beam.mode == BEAM_SINGLE || cfg->beam.mode == BEAM_AUTO) return SH_OK;
     if (!config_has_footprint(cfg))
         return cfg_fail_key(rd, "beam.mode", 0, "head profile %s has no footprint; allowed single", cfg->profile.name);
-    if (cfg->beam.mode == BEAM_ADAPTIVE && !config_beam_fixed(cfg))
-        return cfg_fail_key(rd, "beam.mode", 0, "adaptive, but %s; allowed single, rings, auto",
-                            config_moves(cfg) ? "the head or a mesh moves"
-                                              : "instrument.transit_offset_m or mirror_offset_m moves the beam");
+    const char *why = config_beam_moves(cfg);
+    if (cfg->beam.mode == BEAM_ADAPTIVE && why != NULL)
+        return cfg_fail_key(rd, "beam.mode", 0, "adaptive, but %s; allowed single, rings, auto", why);
     return SH_OK;
 }
 

@@ -18,19 +18,15 @@ void config_signal_spec(const struct config_profile *p, struct detect_signal_spe
                                         .sigma_ppm = p->range_sigma_ppm};
     for (uint32_t i = 0; i < p->n_reaches; i++)
         spec->reach[i] = (struct detect_reach){p->reach[i].reflectance, p->reach[i].range_m};
-    if (p->n_reaches != 0) return;
-    spec->n_reaches = 1;
-    spec->reach[0] = (struct detect_reach){WHITE, p->range_max_m};
 }
 
-int cfg_check_reaches(const struct cfg_reader *rd, const struct config_profile *profile)
+int cfg_check_reaches(const struct cfg_reader *rd, struct config_profile *profile)
 {
     struct detect_signal_spec spec;
     struct detect_signal signal;
     struct sh_err why;
-    if (profile->range_sigma_floor_m > profile->range_sigma_m)
-        return cfg_fail_key(rd, "range_sigma_floor_m", 0, "%.10g is too much; allowed at most %.10g",
-                            profile->range_sigma_floor_m, profile->range_sigma_m);
+    if (profile->n_reaches == 0)
+        profile->reach[profile->n_reaches++] = (struct config_reach){WHITE, profile->range_max_m, FROM_ASSUMED};
     config_signal_spec(profile, &spec);
     if (detect_signal_set_up(&spec, &signal, &why) != SH_OK)
         return cfg_fail_key(rd, "reaches", 0,

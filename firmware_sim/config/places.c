@@ -1,6 +1,5 @@
 /* Keys that say where things are on the Earth: the scene's anchor, and each station in one of several forms. */
 #include "firmware_sim/config/table.h"
-#include "firmware_sim/config/words.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -33,7 +32,7 @@ static int check_anchor(const struct cfg_reader *rd, struct config *cfg)
                                       [ANCHOR_IFC] = "height_m",
                                       [ANCHOR_UTM] = "utm_zone, hemisphere",
                                       [ANCHOR_ECEF] = "source alone"};
-    const char *source = cfg_anchor_words[cfg->scene.anchor.source];
+    const char *source = cfg_word(rd, "scene.anchor.source", (int)cfg->scene.anchor.source);
     char why[64];
     for (size_t k = 0; k < CFG_LEN(keys); k++) {
         int given = cfg_is_given(rd, keys[k].path, 0);

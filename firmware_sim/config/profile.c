@@ -88,12 +88,12 @@ static void known_profiles(const struct profile_dirs *dirs, char *buf, size_t le
 
 /* ---- one profile */
 
-/* A figure that must not be above another one; both in millionths. strictly: nor equal to it. */
-static int check_order(const struct cfg_reader *rd, const char *low_key, int64_t low, int64_t high, int strictly)
+/* A figure that must not be above another one. strictly: nor equal to it. */
+static int check_order(const struct cfg_reader *rd, const char *low_key, double low, double high, int strictly)
 {
     if (low < high || (low == high && !strictly)) return SH_OK;
-    return cfg_fail_key(rd, low_key, 0, "%.15g is too much; allowed %s %.15g", (double)low * 1e-6,
-                        strictly ? "below" : "at most", (double)high * 1e-6);
+    return cfg_fail_key(rd, low_key, 0, "%.15g is too much; allowed %s %.15g", low, strictly ? "below" : "at most",
+                        high);
 }
 
 static int check_sweep(const struct cfg_reader *rd, const struct config_profile *p)
@@ -112,23 +112,22 @@ static int check_sweep(const struct cfg_reader *rd, const struct config_profile 
     return SH_OK;
 }
 
-static int check_profile(const struct cfg_reader *rd, const struct config_profile *p)
+static int check_profile(const struct cfg_reader *rd, struct config_profile *p)
 {
-    int code = check_order(rd, "prr_min_hz", p->prr_min_uhz, p->prr_max_uhz, 0);
-    if (code == SH_OK) code = check_order(rd, "lines_min_hz", p->lines_min_uhz, p->lines_max_uhz, 0);
-    if (code == SH_OK && p->prr_max_uhz < p->lines_min_uhz)
-        return cfg_fail_key(rd, "prr_max_hz", 0, "less than a pulse per line; allowed at least %.15g",
-                            (double)p->lines_min_uhz * 1e-6);
-    if (code == SH_OK) code = check_order(rd, "fov_min_deg", p->fov_min_udeg, p->fov_max_udeg, 1);
-    if (code != SH_OK) return code;
-    const double pan_min_deg = (double)p->pan_min_udeg * 1e-6;
-    if (p->pan_min_udeg >= p->pan_max_udeg || p->pan_max_udeg - p->pan_min_udeg > 360000000)
-        return cfg_fail_key(rd, "pan_max_deg", 0, "%.15g does not fit; allowed above %.15g, up to %.15g",
-                            (double)p->pan_max_udeg * 1e-6, pan_min_deg, pan_min_deg + 360.0);
-    if (p->range_min_m >= p->range_max_m)
-        return cfg_fail_key(rd, "range_min_m", 0, "%.10g is too much; allowed below %.10g", p->range_min_m,
-                            p->range_max_m);
-    code = check_sweep(rd, p);
+    const double lines_min_hz = 1e-6 * (double)p->lines_min_uhz, prr_max_hz = 1e-6 * (double)p->prr_max_uhz;
+    const double pan_min_deg = 1e-6 * (double)p->pan_min_udeg, pan_max_deg = 1e-6 * (double)p->pan_max_udeg;
+    int code = check_order(rd, "prr_min_hz", 1e-6 * (double)p->prr_min_uhz, prr_max_hz, 0);
+    if (code == SH_OK) code = check_order(rd, "lines_min_hz", lines_min_hz, 1e-6 * (double)p->lines_max_uhz, 0);
+    if (code == SH_OK && prr_max_hz < lines_min_hz)
+        code = cfg_fail_key(rd, "prr_max_hz", 0, "less than a pulse per line; allowed at least %.15g", lines_min_hz);
+    if (code == SH_OK)
+        code = check_order(rd, "fov_min_deg", 1e-6 * (double)p->fov_min_udeg, 1e-6 * (double)p->fov_max_udeg, 1);
+    if (code == SH_OK && (p->pan_min_udeg >= p->pan_max_udeg || p->pan_max_udeg - p->pan_min_udeg > 360000000))
+        code = cfg_fail_key(rd, "pan_max_deg", 0, "%.15g does not fit; allowed above %.15g, up to %.15g", pan_max_deg,
+                            pan_min_deg, pan_min_deg + 360.0);
+    if (code == SH_OK) code = check_order(rd, "range_min_m", p->range_min_m, p->range_max_m, 1);
+    if (code == SH_OK) code = check_sweep(rd, p);
+    if (code == SH_OK) code = check_order(rd, "range_sigma_floor_m", p->range_sigma_floor_m, p->range_sigma_m, 0);
     return code == SH_OK ? cfg_check_reaches(rd, p) : code;
 }
 

@@ -50,6 +50,11 @@ void *cfg_address(const struct cfg_reader *rd, const struct cfg_key *key, uint32
     return (char *)rd->base + at;
 }
 
+const char *cfg_word(const struct cfg_reader *rd, const char *path, int value)
+{
+    return cfg_find(&rd->table, path)->names[value];
+}
+
 const char *cfg_name(const char *path, uint32_t item, char *buf)
 {
     const char *bracket = strstr(path, "[]");
@@ -166,12 +171,6 @@ static const char *word_below(const char *path, const char *parent)
     return *word != '\0' && strpbrk(word, ".[") == NULL ? word : NULL;
 }
 
-static const char *last_word(const char *path)
-{
-    const char *dot = strrchr(path, '.');
-    return dot == NULL ? path : dot + 1;
-}
-
 /* A known key that the writer may have meant: one letter or two away here, cut short here, or the same word
  * elsewhere. */
 static const char *suggest(const struct cfg_table *table, const char *parent, const char *word)
@@ -180,12 +179,12 @@ static const char *suggest(const struct cfg_table *table, const char *parent, co
     size_t best_distance = 3, len = strlen(word);
     if (len >= CFG_PATH_MAX) return NULL;
     for (size_t i = 0; i < table->n; i++) {
-        const char *path = table->keys[i].path, *here = word_below(path, parent);
+        const char *path = table->keys[i].path, *here = word_below(path, parent), *dot = strrchr(path, '.');
         size_t distance = best_distance;
         if (here != NULL) {
             distance = edit_distance(word, here);
             if (len >= 3 && (strncmp(here, word, len) == 0 || strncmp(here, word, strlen(here)) == 0)) distance = 1;
-        } else if (strcmp(last_word(path), word) == 0) {
+        } else if (strcmp(dot != NULL ? dot + 1 : path, word) == 0) {
             distance = 2;
         }
         if (distance >= best_distance || distance >= len) continue;

@@ -69,9 +69,7 @@ static int reach_item(struct cfg_reader *rd, const struct set *set, const struct
     if (set->item > last)
         return cfg_fail(rd, CFG_FROM_SET, set->name, "%s has %u elements; allowed indices 0 to %u%s", list->path,
                         *count, last, last == *count ? ", the last appends one" : "");
-    char path[CFG_PATH_MAX];
-    snprintf(path, sizeof path, "%s[]", list->path);
-    rd->line[cfg_row(rd, cfg_find(&rd->table, path))][set->item] = CFG_FROM_SET;
+    rd->line[cfg_row(rd, list) + 1][set->item] = CFG_FROM_SET;
     ++*count;
     return SH_OK;
 }

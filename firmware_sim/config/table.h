@@ -12,7 +12,8 @@
 
 enum cfg_type {
     CFG_MAP,   /* a section, or one element of a list; nothing is stored */
-    CFG_LIST,  /* offset, size: the array and its stride; count_offset: uint32_t; min..max elements */
+    CFG_LIST,  /* offset, size: the array and its stride; count_offset: uint32_t; min..max elements. The next row,
+                * of type CFG_MAP, is an element. */
     CFG_BOOL,  /* off|on -> int */
     CFG_ENUM,  /* names[value] -> int or enum; false and true are read as off and on here, too */
     CFG_COUNT, /* whole number -> 4 or 8 bytes */
@@ -33,6 +34,7 @@ enum { CFG_MAX_ROWS = 192, CFG_MAX_ITEMS = 64, CFG_PATH_MAX = 96, CFG_FROM_SET =
 
 struct cfg_key {
     const char *path;
+    size_t offset, size; /* of the member */
     enum cfg_type type;
     const char *unit;              /* NULL: none */
     const char *def;               /* as written in YAML; NULL: required; "@KEY": the profile's figure KEY */
@@ -40,7 +42,7 @@ struct cfg_key {
     const char *min_key, *max_key; /* limits from the profile (crosscheck.c) */
     const char *allowed;           /* the allowed values, where min and max can't say them */
     const char *const *names;      /* enum: by value, NULL at the end */
-    size_t offset, size, count_offset;
+    size_t count_offset;
     int flags;
     const char *help;
 };
@@ -52,7 +54,7 @@ struct cfg_table {
 /* keys.c, profile_keys.c */
 extern const struct cfg_table cfg_config_table, cfg_profile_table;
 #define CFG_LEN(array)           (sizeof(array) / sizeof((array)[0]))
-#define CFG_MEMBER(type, member) .offset = offsetof(type, member), .size = sizeof(((type *)0)->member)
+#define CFG_MEMBER(type, member) offsetof(type, member), sizeof(((type *)0)->member)
 
 struct cfg_reader {
     const char *file;
@@ -73,6 +75,8 @@ size_t cfg_row(const struct cfg_reader *rd, const struct cfg_key *key);
 const struct cfg_key *cfg_list_of(const struct cfg_table *table, const struct cfg_key *key);
 uint32_t *cfg_list_count(const struct cfg_reader *rd, const struct cfg_key *list);
 void *cfg_address(const struct cfg_reader *rd, const struct cfg_key *key, uint32_t item);
+/* The word of a key for its value. */
+const char *cfg_word(const struct cfg_reader *rd, const char *path, int value);
 /* "stations[].name", 2 -> "stations[2].name". buf holds CFG_PATH_MAX. */
 const char *cfg_name(const char *path, uint32_t item, char *buf);
 int cfg_is_given(const struct cfg_reader *rd, const char *path, uint32_t item);
@@ -120,7 +124,7 @@ int cfg_check(const struct cfg_reader *rd, struct config *cfg);
 int cfg_check_places(const struct cfg_reader *rd, struct config *cfg);
 /* measurement.c: noise, signal, surfaces, and what of a profile concerns them. */
 int cfg_check_signal(const struct cfg_reader *rd, struct config *cfg);
-int cfg_check_reaches(const struct cfg_reader *rd, const struct config_profile *profile);
+int cfg_check_reaches(const struct cfg_reader *rd, struct config_profile *profile);
 /* The first link of the GNSS receiver; -1: none. */
 int cfg_nmea_link(const struct config *cfg);
 

@@ -74,13 +74,6 @@ enum cfg_number cfg_parse_decimal(const char *text, int decimals, __int128 *out)
     return CFG_NUMBER_OK;
 }
 
-static size_t put(char *buf, size_t used, const char *text)
-{
-    int n = snprintf(buf + used, CFG_ALLOWED_MAX - used, "%s", text);
-    used += (size_t)n;
-    return used < CFG_ALLOWED_MAX ? used : CFG_ALLOWED_MAX - 1;
-}
-
 static void allowed_range(const struct cfg_key *key, char *buf)
 {
     char low[64], high[64];
@@ -94,35 +87,29 @@ static void allowed_range(const struct cfg_key *key, char *buf)
              key->unit != NULL ? key->unit : "", key->max_key != NULL ? ", within the limits of the head profile" : "");
 }
 
+static void allowed_words(const struct cfg_key *key, char *buf)
+{
+    int used = snprintf(buf, CFG_ALLOWED_MAX, "allowed ");
+    for (size_t i = 0; key->names[i] != NULL && used < CFG_ALLOWED_MAX; i++)
+        used += snprintf(buf + used, CFG_ALLOWED_MAX - (size_t)used, "%s%s", i > 0 ? ", " : "", key->names[i]);
+}
+
 const char *cfg_allowed(const struct cfg_key *key, char *buf)
 {
-    size_t used = put(buf, 0, "allowed ");
-    if (key->allowed != NULL) {
-        put(buf, used, key->allowed);
-        return buf;
-    }
-    switch (key->type) {
-    case CFG_MAP:
-        put(buf, used, "a section with keys");
-        break;
-    case CFG_LIST:
+    const char *text = key->allowed;
+    if (key->type == CFG_MAP) text = "a section with keys";
+    if (key->type == CFG_BOOL) text = "on or off";
+    if (text != NULL)
+        snprintf(buf, CFG_ALLOWED_MAX, "allowed %s", text);
+    else if (key->type == CFG_LIST)
         snprintf(buf, CFG_ALLOWED_MAX, "allowed a list of %.0f to %.0f", key->min, key->max);
-        break;
-    case CFG_BOOL:
-        put(buf, used, "on or off");
-        break;
-    case CFG_ENUM:
-        for (size_t i = 0; key->names[i] != NULL; i++)
-            used = put(buf, put(buf, used, i > 0 ? ", " : ""), key->names[i]);
-        break;
-    case CFG_TEXT:
-    case CFG_PATH:
+    else if (key->type == CFG_ENUM)
+        allowed_words(key, buf);
+    else if (key->type == CFG_TEXT || key->type == CFG_PATH)
         snprintf(buf, CFG_ALLOWED_MAX, "allowed %s of 1 to %zu bytes%s", key->type == CFG_PATH ? "a path" : "text",
                  key->size - 1, key->flags & CFG_ASCII ? ", printable ASCII without comma, ';' and quotes" : "");
-        break;
-    default:
+    else
         allowed_range(key, buf);
-    }
     return buf;
 }
 

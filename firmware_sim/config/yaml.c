@@ -135,17 +135,16 @@ static int read_list(struct walk *w, const struct cfg_key *key, const yaml_node_
     if (node->type != YAML_SEQUENCE_NODE) return wrong_kind(w, key, 0, node);
     const yaml_node_item_t *first = node->data.sequence.items.start;
     ptrdiff_t n = node->data.sequence.items.top - first;
-    char path[CFG_PATH_MAX], allowed[CFG_ALLOWED_MAX];
+    char allowed[CFG_ALLOWED_MAX];
     if ((double)n > key->max)
         return cfg_fail(w->rd, line_of(node), key->path, "%td elements are too many; %s", n, cfg_allowed(key, allowed));
-    snprintf(path, sizeof path, "%s[]", key->path);
-    const struct cfg_key *element = cfg_find(&w->rd->table, path);
+    const struct cfg_key *element = key + 1;
     for (uint32_t i = 0; i < (uint32_t)n; i++) {
         const yaml_node_t *child = yaml_document_get_node(w->doc, first[i]);
         if (child->type != YAML_MAPPING_NODE) return wrong_kind(w, element, i, child);
         *cfg_list_count(w->rd, key) = i + 1;
         w->rd->line[cfg_row(w->rd, element)][i] = line_of(child);
-        int code = read_map(w, child, path, i);
+        int code = read_map(w, child, element->path, i);
         if (code != SH_OK) return code;
     }
     return SH_OK;
@@ -221,21 +220,12 @@ static int read_bytes(const struct cfg_reader *rd, unsigned char **bytes, size_t
     return code;
 }
 
-/* The start of a line, counted from 1, in the bytes; NULL when there are not that many. */
-static const unsigned char *find_line(const unsigned char *bytes, size_t len, int line)
-{
-    const unsigned char *p = bytes, *end = bytes + len;
-    while (p != NULL && --line > 0) {
-        p = memchr(p, '\n', (size_t)(end - p));
-        if (p != NULL) p++;
-    }
-    return p == end ? NULL : p;
-}
-
+/* A line, counted from 1, in the bytes. */
 static int indented_by_tab(const unsigned char *bytes, size_t len, int line)
 {
-    const unsigned char *p = find_line(bytes, len, line), *end = bytes + len;
-    if (p == NULL) return 0;
+    const unsigned char *p = bytes, *end = bytes + len;
+    while (p < end && line > 1)
+        line -= *p++ == '\n';
     while (p < end && *p == ' ')
         p++;
     return p < end && *p == '\t';
@@ -274,10 +264,9 @@ static int check_depth(const struct cfg_reader *rd, const unsigned char *bytes, 
 {
     yaml_parser_t parser;
     yaml_event_t event;
-    int depth = 0, anchors = 0, code = SH_OK, done = 0;
-    if (!yaml_parser_initialize(&parser)) return sh_fail(rd->err, SH_ENOMEM, "%s: no memory to parse it", rd->file);
-    yaml_parser_set_encoding(&parser, YAML_UTF8_ENCODING);
-    yaml_parser_set_input_string(&parser, bytes, len);
+    int depth = 0, anchors = 0, done = 0;
+    int code = start_parser(rd, &parser, bytes, len);
+    if (code != SH_OK) return code;
     while (code == SH_OK && !done && yaml_parser_parse(&parser, &event)) {
         int line = (int)event.start_mark.line + 1;
         done = event.type == YAML_STREAM_END_EVENT;

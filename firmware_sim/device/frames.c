@@ -53,9 +53,9 @@ void device_fill_anchor(const struct site *site, uint32_t station, size_t stretc
     a->station = station + 1;
     georef_anchor(georef, a->anchor);
     a->scale_m = site->scale_m;
-    a->lat_deg = s->at.lat_deg;
-    a->lon_deg = s->at.lon_deg;
-    a->height_m = s->at.height_m;
+    a->lat_deg = s->at.place.lat_deg;
+    a->lon_deg = s->at.place.lon_deg;
+    a->height_m = s->at.place.height_m;
     memcpy(a->station_m, s->at.position_m, sizeof a->station_m);
     memcpy(a->rotation, s->at.rotation, sizeof a->rotation);
     a->moving = site->moving ? NATIVE_MOVING : site->stop != NULL ? NATIVE_STOP : 0;

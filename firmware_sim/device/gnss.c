@@ -56,7 +56,7 @@ static int locate(const struct site *site, const struct placement *at, const dou
     }
     for (int i = 0; i < 3; i++)
         d_m[i] = p_prcs[i] - at->position_m[i];
-    georef_geodetic(at->lat_deg, at->lon_deg, at->height_m, d_m, geodetic);
+    georef_geodetic(at->place.lat_deg, at->place.lon_deg, at->place.height_m, d_m, geodetic);
     return 1;
 }
 

@@ -5,18 +5,11 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
-#include <unistd.h>
 
 #include "firmware_sim/loop/loop_inside.h"
 #include "firmware_sim/loop/pump.h"
 
 static const double SPARE_MS = 250.0; /* that a reader may be interrupted for within a copy, and no claim waits */
-
-static uint32_t choose_threads(const struct config *cfg)
-{
-    long n = cfg->loop.threads != 0 ? (long)cfg->loop.threads : sysconf(_SC_NPROCESSORS_ONLN);
-    return n < 1 ? 1 : n > LOOP_MAX_THREADS ? LOOP_MAX_THREADS : (uint32_t)n;
-}
 
 static int create_stream(struct loop *loop, struct sh_err *err)
 {
@@ -50,7 +43,7 @@ int loop_create(const struct site *site, struct device *device, const struct loo
     loop->links.report = options->report;
     atomic_store(&loop->final_tick, UINT64_MAX);
     int rc = create_stream(loop, err);
-    if (rc == SH_OK) rc = casters_create(loop, choose_threads(cfg), err);
+    if (rc == SH_OK) rc = casters_create(loop, config_threads(cfg), err);
     if (rc == SH_OK) rc = links_open(&loop->links, cfg, options->extra, err);
     if (rc == SH_OK && cfg->platform.kind == PLATFORM_LIVE && cfg->loop.pace == PACE_REALTIME)
         rc = pose_feed_open(device, cfg, &loop->feed, err);

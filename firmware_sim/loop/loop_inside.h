@@ -10,7 +10,7 @@
 #include "firmware_sim/loop/stream.h"
 #include "firmware_sim/loop/work.h"
 
-enum { LOOP_MAX_THREADS = 64, LATE_BUCKETS = 64 * 8 };
+enum { LATE_BUCKETS = 64 * 8 };
 
 struct loop_caster {
     struct loop *loop;
@@ -20,7 +20,7 @@ struct loop_caster {
 
 /* casters.c */
 struct casters {
-    struct loop_caster caster[LOOP_MAX_THREADS];
+    struct loop_caster caster[CONFIG_MAX_THREADS];
     uint32_t n, n_running;
     uint64_t ahead_ticks; /* claimed and not released, at most */
     pthread_mutex_t claim_lock;

@@ -1,13 +1,10 @@
 /* Beam and optics: looks at the scene as the head does, has core/plan choose, and makes the beams. */
-#include "firmware_sim/site/beam_choice.h"
+#include "firmware_sim/site/site_inside.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include "firmware_sim/site/detection.h"
-#include "firmware_sim/site/look.h"
 
 enum { FOOTPRINT_OPTIONS = 9, MANY_TRIANGLES = 1000000 }; /* so many: progress is reported */
 
@@ -19,18 +16,13 @@ struct trial {
     struct plan_sample *sample;
 };
 
-/* To be closed, also after an error; a trial of zeros may be. */
+/* The sample is to be freed, also after an error. */
 static int open_trial(struct trial *trial, struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     if (site->scene->n_triangles > MANY_TRIANGLES) sh_progress(report, "trying methods on the scene", -1.0);
     trial->site = site;
     site_look_open(&trial->look, site);
     return plan_sample_create(trial->look.place, trial->look.n, &trial->sample, err);
-}
-
-static void close_trial(struct trial *trial)
-{
-    plan_sample_free(trial->sample);
 }
 
 /* ---- beams */
@@ -40,9 +32,7 @@ static const char *why_not(const struct site *site, enum beam_mode mode)
 {
     if (mode == BEAM_SINGLE) return NULL;
     if (!config_has_footprint(site->cfg)) return "the head profile has no footprint";
-    if (mode != BEAM_ADAPTIVE) return NULL;
-    if (config_beam_fixed(site->cfg)) return NULL;
-    return config_moves(site->cfg) ? "the head or a mesh moves" : "an offset of the instrument moves the beam";
+    return mode == BEAM_ADAPTIVE ? config_beam_moves(site->cfg) : NULL;
 }
 
 static int make_beam(const struct site *site, struct site_station *s, int adaptive, const struct sh_report *report,
@@ -93,23 +83,15 @@ static int apply_beam(struct site *site, const struct sh_report *report, struct 
 
 /* ---- the choice of a beam */
 
-/* Footprints for the stations that are looked from. */
-static int open_beam_trial(struct trial *trial, struct site *site, const struct sh_report *report, struct sh_err *err)
-{
-    int rc = open_trial(trial, site, report, err);
-    for (uint32_t i = 0; i < trial->look.n && rc == SH_OK; i++) {
-        struct site_station *s = &site->station[trial->look.at[i].station];
-        rc = make_beam(site, s, 0, report, err);
-        trial->look.place[i].beam = s->beam;
-    }
-    return rc;
-}
-
-static int add_outlines(const struct trial *trial, const struct sh_report *report, struct sh_err *err)
+/* Footprints for the stations that are looked from; outlines, too, where adaptive. */
+static int make_beams(struct trial *trial, int adaptive, const struct sh_report *report, struct sh_err *err)
 {
     int rc = SH_OK;
-    for (uint32_t i = 0; i < trial->look.n && rc == SH_OK; i++)
-        rc = make_beam(trial->site, &trial->site->station[trial->look.at[i].station], 1, report, err);
+    for (uint32_t i = 0; i < trial->look.n && rc == SH_OK; i++) {
+        struct site_station *s = &trial->site->station[trial->look.at[i].station];
+        rc = make_beam(trial->site, s, adaptive, report, err);
+        trial->look.place[i].beam = s->beam;
+    }
     return rc;
 }
 
@@ -145,7 +127,7 @@ static int measure_beams(struct trial *trial, const struct beam_choice *choice, 
         if (option[i].why_not[0] != '\0' || option[i].cost_ns > cost_ns) continue;
         if (choice[i].mode == BEAM_ADAPTIVE) {
             if (*holds) continue;
-            rc = add_outlines(trial, report, err);
+            rc = make_beams(trial, 1, report, err);
             if (rc != SH_OK) return rc;
         }
         plan_sample_beam(trial->sample, choice[i].mode, choice[i].rings, &option[i]);
@@ -160,12 +142,13 @@ static int try_beams(struct site *site, const struct beam_choice *choice, struct
                      const struct sh_report *report, struct sh_err *err)
 {
     struct trial trial = {0};
-    int holds = 0, rc = open_beam_trial(&trial, site, report, err);
+    int holds = 0, rc = open_trial(&trial, site, report, err);
+    if (rc == SH_OK) rc = make_beams(&trial, 0, report, err);
     if (rc == SH_OK) rc = measure_beams(&trial, choice, option, report, err, &holds);
     if (rc == SH_OK && !holds)
         sh_warn(report, "%s: beam.mode: auto: no beam holds plan.tolerance_m and plan.echo_tolerance here",
                 site->cfg->file);
-    close_trial(&trial);
+    plan_sample_free(trial.sample);
     return rc;
 }
 
@@ -191,10 +174,10 @@ static int force_beam(struct site *site, const struct sh_report *report, struct 
     struct trial trial = {0};
     plan_beam_option(cfg->beam.mode, cfg->beam.rings, &option);
     if (site->measures && config_has_footprint(cfg)) {
-        int rc = open_beam_trial(&trial, site, report, err);
-        if (rc == SH_OK && cfg->beam.mode == BEAM_ADAPTIVE) rc = add_outlines(&trial, report, err);
+        int rc = open_trial(&trial, site, report, err);
+        if (rc == SH_OK) rc = make_beams(&trial, cfg->beam.mode == BEAM_ADAPTIVE, report, err);
         if (rc == SH_OK) plan_sample_beam(trial.sample, cfg->beam.mode, cfg->beam.rings, &option);
-        close_trial(&trial);
+        plan_sample_free(trial.sample);
         if (rc != SH_OK) return rc;
     }
     site->plan.methods.beam = cfg->beam.mode;
@@ -233,7 +216,7 @@ static int choose_optics(struct site *site, const struct sh_report *report, stru
     }
     if (forced < 0 || site->measures) rc = open_trial(&trial, site, report, err);
     int holds = rc == SH_OK && try_depths(&trial, forced, option);
-    close_trial(&trial);
+    plan_sample_free(trial.sample);
     if (rc != SH_OK) return rc;
     const struct plan_choice ask = {"optics", option, CAST_MAX_DEPTH + 1, forced, "optics.depth", cfg->plan};
     uint32_t depth = site->plan.methods.depth = plan_choose(&ask, &site->plan.optics);

@@ -1,9 +1,8 @@
-#include "firmware_sim/site/bvhs.h"
+#include "firmware_sim/site/site_inside.h"
 
 #include <math.h>
 
 #include "core/vec3.h"
-#include "firmware_sim/site/detection.h"
 
 /* Where *out is not NULL it is the caller's, even after an error. */
 static int build(const struct site *site, const struct scene *scene, const struct site_sphere *from,

@@ -1,7 +1,5 @@
 /* Georeferencing of a site: heights, method, counts. */
-#include "firmware_sim/site/georeference.h"
-
-#include "firmware_sim/site/detection.h"
+#include "firmware_sim/site/site_inside.h"
 
 #include <math.h>
 #include <stdio.h>

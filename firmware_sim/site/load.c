@@ -3,13 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "firmware_sim/site/beam_choice.h"
-#include "firmware_sim/site/bvhs.h"
-#include "firmware_sim/site/detection.h"
-#include "firmware_sim/site/georeference.h"
+#include "firmware_sim/site/site_inside.h"
 #include "firmware_sim/site/plan_rows.h"
-#include "firmware_sim/site/platform.h"
-#include "firmware_sim/site/stops.h"
 
 static struct scene_mesh_spec mesh_spec(const struct config *cfg, const struct config_mesh *mesh)
 {

@@ -1,4 +1,4 @@
-#include "firmware_sim/site/look.h"
+#include "firmware_sim/site/site_inside.h"
 
 static void enter(void *ctx, int64_t t_ns, struct cast_setup *setup)
 {

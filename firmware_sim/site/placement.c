@@ -151,9 +151,7 @@ static int find(const struct config_station *s, const struct placement_anchor *a
     if (!anchor->known) at.height_m += out->position_m[2] - s->position_m[2]; /* both are where the search began */
     if (rc != SH_OK) return rc;
     out->on_earth = anchor->known || s->place != PLACE_NONE;
-    out->lat_deg = at.lat_deg;
-    out->lon_deg = at.lon_deg;
-    out->height_m = at.height_m;
+    out->place = at;
     pose_attitude(angle_rad(s->heading_deg), angle_rad(s->pitch_deg), angle_rad(s->roll_deg), attitude);
     mat3_multiply(level, attitude, out->rotation);
     return SH_OK;
@@ -175,8 +173,8 @@ int placement_georef(const struct placement *placement, const struct placement_a
 {
     if (anchor->known) return geoframe_fill(&anchor->frame, placement->position_m, spec, err);
     memcpy(spec->station_m, placement->position_m, sizeof spec->station_m);
-    spec->lat_deg = placement->lat_deg;
-    spec->lon_deg = placement->lon_deg;
-    spec->height_m = placement->height_m;
+    spec->lat_deg = placement->place.lat_deg;
+    spec->lon_deg = placement->place.lon_deg;
+    spec->height_m = placement->place.height_m;
     return SH_OK;
 }

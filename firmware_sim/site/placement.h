@@ -17,11 +17,11 @@ int placement_find_anchor(const struct config *cfg, const struct sh_report *repo
                           struct sh_err *err);
 
 struct placement {
-    double position_m[3];              /* of the head's origin, prcs */
-    double rotation[9];                /* socs -> prcs */
-    int on_earth;                      /* 0: lat_deg, lon_deg, height_m are 0 */
-    double lat_deg, lon_deg, height_m; /* of the head's origin */
-    double floor_m;                    /* distance down to the floor that was looked for; NaN: it wasn't */
+    double position_m[3];      /* of the head's origin, prcs */
+    double rotation[9];        /* socs -> prcs */
+    int on_earth;              /* 0: place is 0 */
+    struct georef_place place; /* of the head's origin */
+    double floor_m;            /* distance down to the floor that was looked for; NaN: it wasn't */
 };
 
 /* Station i (0...) of the configuration. Floors are those of the scene, without what moves. */

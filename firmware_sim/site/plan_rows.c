@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "firmware_sim/site/rate.h"
+#include "firmware_sim/site/site_inside.h"
 
 /* How far the scene goes from where the head may be. */
 static double farthest_m(const struct site *site)
@@ -13,15 +14,8 @@ static double farthest_m(const struct site *site)
     const struct config *cfg = site->cfg;
     double far_m = 0.0;
     if (site->moving || site->n_movers > 0) return cfg->profile.range_max_m;
-    for (uint32_t s = 0; s < site->n_stations; s++) {
-        double far2 = 0.0;
-        for (int i = 0; i < 3; i++) {
-            double at = site->station[s].at.position_m[i];
-            double far = fmax(fabs(site->scene->min_m[i] - at), fabs(site->scene->max_m[i] - at));
-            far2 += far * far;
-        }
-        far_m = fmax(far_m, sqrt(far2));
-    }
+    for (uint32_t s = 0; s < site->n_stations; s++)
+        far_m = fmax(far_m, site_farthest_m(site, site->station[s].at.position_m));
     return fmin(far_m, cfg->profile.range_max_m);
 }
 
@@ -98,7 +92,6 @@ static void ask_head(const struct site *site, struct plan_head *head)
     };
     for (uint32_t i = 0; i < cfg->profile.n_reaches; i++)
         head->reach_m = fmax(head->reach_m, cfg->profile.reach[i].range_m);
-    if (cfg->profile.n_reaches == 0) head->reach_m = cfg->profile.range_max_m;
 }
 
 int site_plan_rows(struct site *site, struct sh_err *err)

@@ -1,4 +1,4 @@
-#include "firmware_sim/site/platform.h"
+#include "firmware_sim/site/site_inside.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -6,15 +6,19 @@
 
 #include "core/angle.h"
 #include "core/vec3.h"
-#include "firmware_sim/site/bvhs.h"
-#include "firmware_sim/site/detection.h"
 
 /* Largest distance of the head's own path from the trajectory, and largest steps between its poses, in metres and ns:
  * a path is cut into them for BVHs, and a recorded trajectory has them. */
 static const double TOLERANCE_M = 1e-4, LONGEST_M = 0.01;
 static const int64_t LONGEST_NS = 10000000;
 
-int site_open_trajectory(const struct site *site, struct site_part *part, struct sh_err *err)
+/* The part of the trajectory that the configuration names, in its own times. */
+struct part {
+    struct trajectory *trajectory; /* to be freed by who opened it */
+    double start_s, end_s;
+};
+
+static int open_trajectory(const struct site *site, struct part *part, struct sh_err *err)
 {
     const struct config_platform *p = &site->cfg->platform;
     double first_s, last_s;
@@ -34,12 +38,24 @@ int site_open_trajectory(const struct site *site, struct site_part *part, struct
                    wrong_end ? p->start_s : 0.0, last_s - first_s);
 }
 
+/* The head on the platform. */
+static void set_mount(struct site *site)
+{
+    const struct config_platform *p = &site->cfg->platform;
+    struct pose *mount = &site->mount;
+    memcpy(mount->position_m, p->mount_m, sizeof p->mount_m);
+    pose_from_angles(angle_rad(p->mount_heading_deg), angle_rad(p->mount_pitch_deg), angle_rad(p->mount_roll_deg),
+                     mount->quat);
+}
+
+/* ---- a head that moves */
+
 static int load_knots(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const struct config_platform *p = &site->cfg->platform;
-    struct site_part part;
+    struct part part;
     struct sh_err why;
-    int rc = site_open_trajectory(site, &part, err);
+    int rc = open_trajectory(site, &part, err);
     if (rc != SH_OK) return rc;
     const struct pose_knot_rules rules = {part.start_s, part.end_s, TOLERANCE_M, LONGEST_NS, LONGEST_M};
     struct pose_path path;
@@ -51,7 +67,7 @@ static int load_knots(struct site *site, const struct sh_report *report, struct 
     if (rc != SH_OK)
         return sh_fail(err, rc, "%s: platform.%s: %.300s", site->cfg->file, p->file[0] != '\0' ? "file" : "waypoints",
                        why.text);
-    if (rc == SH_OK && site->knot_error_m > TOLERANCE_M * 1.001)
+    if (site->knot_error_m > TOLERANCE_M * 1.001)
         sh_warn(report,
                 "the trajectory bends more than poses %g ms apart can follow: the head leaves it by up to %.2g m",
                 1e-3 * POSE_MIN_STEP_US, site->knot_error_m);
@@ -121,18 +137,11 @@ static int cover_path(struct site *site, const struct sh_report *report, struct 
     return rc;
 }
 
-void site_get_mount(const struct config_platform *p, struct pose *mount)
-{
-    memcpy(mount->position_m, p->mount_m, sizeof p->mount_m);
-    pose_from_angles(angle_rad(p->mount_heading_deg), angle_rad(p->mount_pitch_deg), angle_rad(p->mount_roll_deg),
-                     mount->quat);
-}
-
 int site_load_platform(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
     const struct config_platform *p = &cfg->platform;
-    site_get_mount(p, &site->mount);
+    set_mount(site);
     if (p->kind == PLATFORM_LIVE) {
         double reach_m = 0.0;
         for (uint32_t i = 1; i < cfg->n_stations; i++)
@@ -145,4 +154,90 @@ int site_load_platform(struct site *site, const struct sh_report *report, struct
     }
     int rc = load_knots(site, report, err);
     return rc == SH_OK ? cover_path(site, report, err) : rc;
+}
+
+/* ---- a head that stops */
+
+/* The last stop may lie after the end by a rounding error: 1e-9 of a step, for times as people write them. */
+static int count_stops(const struct site *site, const struct part *part, uint32_t *n, struct sh_err *err)
+{
+    const struct config_platform *p = &site->cfg->platform;
+    double length_s = part->end_s - part->start_s, steps = floor(length_s / p->step_s + 1e-9);
+    if (steps + 1.0 > CONFIG_MAX_STOPS)
+        return sh_fail(err, SH_EINPUT, "%s: platform.step_s: %.0f stops in %.9g s; allowed at most %d, steps of %.9g s",
+                       site->cfg->file, steps + 1.0, length_s, CONFIG_MAX_STOPS, length_s / (CONFIG_MAX_STOPS - 1));
+    *n = (uint32_t)steps + 1;
+    if (site->cfg->head.settings.station > *n)
+        return sh_fail(err, SH_EINPUT, "%s: head.station: there is no stop %u; allowed 1 to %u", site->cfg->file,
+                       site->cfg->head.settings.station, *n);
+    return SH_OK;
+}
+
+/* The only station's place on the Earth as an anchor of the scene. */
+static int anchor_scene(struct site *site, struct sh_err *err)
+{
+    const struct placement *at = &site->station[0].at;
+    if (site->anchor.known || !at->on_earth) return SH_OK;
+    site->anchor.known = 1;
+    return geoframe_set_tangent(&site->anchor.frame, at->position_m, &at->place, 0.0, err);
+}
+
+static int place(const struct site *site, const struct pose *head, struct placement *at, struct sh_err *err)
+{
+    memcpy(at->position_m, head->position_m, sizeof at->position_m);
+    pose_matrix(head->quat, at->rotation);
+    at->floor_m = NAN;
+    at->on_earth = site->anchor.known;
+    return at->on_earth ? geoframe_locate(&site->anchor.frame, at->position_m, &at->place, err) : SH_OK;
+}
+
+/* As a station of the configuration would say it. */
+static void describe(const struct pose *head, uint32_t i, struct config_station *out)
+{
+    double heading, pitch, roll;
+    pose_to_angles(head->quat, &heading, &pitch, &roll);
+    snprintf(out->name, sizeof out->name, "stop-%u", i + 1);
+    memcpy(out->position_m, head->position_m, sizeof out->position_m);
+    out->has_position = 1;
+    out->heading_deg = angle_deg(heading);
+    out->pitch_deg = angle_deg(pitch);
+    out->roll_deg = angle_deg(roll);
+}
+
+static int add_stop(struct site *site, const struct part *part, uint32_t i, struct sh_err *err)
+{
+    const struct config_platform *p = &site->cfg->platform;
+    struct site_station *s = &site->station[i];
+    struct pose body, head;
+    struct sh_err why;
+    double since_s = i * p->step_s;
+    trajectory_at(part->trajectory, fmin(part->start_s + since_s, part->end_s), &body, &s->frame);
+    pose_mount(&body, &site->mount, &head);
+    s->t_s = p->start_s + since_s;
+    s->station = &site->stop[i];
+    describe(&head, i, &site->stop[i]);
+    int rc = place(site, &head, &s->at, &why);
+    return rc == SH_OK ? rc : sh_fail(err, rc, "%s: stop %u: %.300s", site->cfg->file, i + 1, why.text);
+}
+
+int site_load_stops(struct site *site, struct sh_err *err)
+{
+    struct part part;
+    uint32_t n = 0;
+    int rc = open_trajectory(site, &part, err);
+    if (rc != SH_OK) return rc;
+    rc = count_stops(site, &part, &n, err);
+    if (rc == SH_OK) rc = anchor_scene(site, err);
+    if (rc == SH_OK) {
+        free(site->station);
+        site->station = calloc(n, sizeof *site->station);
+        site->stop = calloc(n, sizeof *site->stop);
+        site->n_stations = site->station != NULL ? n : 0;
+        if (site->station == NULL || site->stop == NULL) rc = sh_fail(err, SH_ENOMEM, "no memory for %u stops", n);
+    }
+    set_mount(site);
+    for (uint32_t i = 0; i < n && rc == SH_OK; i++)
+        rc = add_stop(site, &part, i, err);
+    trajectory_free(part.trajectory);
+    return rc;
 }

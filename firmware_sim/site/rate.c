@@ -8,7 +8,7 @@
 #include "core/rng.h"
 #include "drivers/protocol/native_encode.h"
 #include "firmware_sim/base/clock.h"
-#include "firmware_sim/site/look.h"
+#include "firmware_sim/site/site_inside.h"
 
 /* Processor time: to warm the caches, and to measure for. Runs are short enough that one of the most expensive pulses
  * (1,027 sub-rays) ends within a few milliseconds. */
@@ -16,6 +16,13 @@ static const int64_t WARM_NS = 2000000, MEASURE_NS = 6000000;
 enum { RUN = 64, TRIES = 4096, LEAST_RUNS = 2, MOST_RUNS = 4096 };
 enum { MAX_DT_NS = (1 << 24) - 1 };   /* a point's time within its frame has 24 bits */
 static const double MOST_SHARE = 0.8; /* above it a run is warned of */
+
+struct rate {
+    double pulse_ns;          /* processor time for one cast pulse; NaN: no pulse is cast */
+    double fired_hz, cast_hz; /* of the configured rate: with the blind part of the sweep, and without */
+    unsigned processors;      /* that casting threads run on */
+    double share;             /* of these processors that cast_hz needs; 1: all of their time */
+};
 
 struct gauge {
     struct site_look look;
@@ -94,14 +101,14 @@ static double measure_ns(struct gauge *g)
     return pulses != 0 ? (double)spent_ns / (double)pulses : (double)NAN;
 }
 
-int site_measure_rate(const struct site *site, struct site_rate *rate, struct sh_err *err)
+static int measure_rate(const struct site *site, struct rate *rate, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
     struct gauge g;
     long online = sysconf(_SC_NPROCESSORS_ONLN);
     unsigned threads = cfg->loop.threads, processors = online > 0 ? (unsigned)online : 1;
-    *rate = (struct site_rate){.fired_hz = 1e-6 * (double)cfg->head.settings.prr_uhz,
-                               .processors = threads != 0 && threads < processors ? threads : processors};
+    *rate = (struct rate){.fired_hz = 1e-6 * (double)cfg->head.settings.prr_uhz,
+                          .processors = threads != 0 && threads < processors ? threads : processors};
     int rc = open_gauge(&g, site, err);
     if (rc == SH_OK) {
         rate->pulse_ns = measure_ns(&g);
@@ -115,8 +122,8 @@ int site_measure_rate(const struct site *site, struct site_rate *rate, struct sh
 int site_rate_row(const struct site *site, struct plan_row *row, struct sh_err *err)
 {
     char why[sizeof row->why];
-    struct site_rate rate;
-    int rc = site_measure_rate(site, &rate, err);
+    struct rate rate;
+    int rc = measure_rate(site, &rate, err);
     if (rc != SH_OK) return rc;
     if (isnan(rate.pulse_ns))
         snprintf(why, sizeof why, "no pulse of the configured sweep is cast");
@@ -133,9 +140,9 @@ int site_rate_row(const struct site *site, struct plan_row *row, struct sh_err *
 
 int site_warn_rate(const struct site *site, const struct sh_report *report, struct sh_err *err)
 {
-    struct site_rate rate;
+    struct rate rate;
     if (site->cfg->loop.pace != PACE_REALTIME) return SH_OK;
-    int rc = site_measure_rate(site, &rate, err);
+    int rc = measure_rate(site, &rate, err);
     if (rc == SH_OK && rate.share > MOST_SHARE)
         sh_warn(report,
                 "%s: head.prr_hz: %.3g million pulses/s to be cast need about %.0f %% of %u processors: pulses may be "

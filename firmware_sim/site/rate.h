@@ -1,19 +1,10 @@
 /* How many pulses per second this machine computes of a site, measured on the head's own pulses: the whole cast to
- * points, and their frames. Figures are of this machine at this moment, so nothing is chosen by them. */
+ * points, and their frames. Figures are of this machine at this moment, so nothing is chosen by them. Each call takes
+ * about 10 ms, at most 20. */
 #ifndef FIRMWARE_SIM_SITE_RATE_H
 #define FIRMWARE_SIM_SITE_RATE_H
 
 #include "firmware_sim/site/site.h"
-
-struct site_rate {
-    double pulse_ns;          /* processor time for one cast pulse; NaN: no pulse is cast */
-    double fired_hz, cast_hz; /* of the configured rate: with the blind part of the sweep, and without */
-    unsigned processors;      /* that casting threads run on */
-    double share;             /* of these processors that cast_hz needs; 1: all of their time */
-};
-
-/* Takes about 10 ms, at most 20. Changes nothing in the site. */
-int site_measure_rate(const struct site *site, struct site_rate *rate, struct sh_err *err);
 
 /* The plan's last row, stage total. */
 int site_rate_row(const struct site *site, struct plan_row *row, struct sh_err *err);

@@ -85,8 +85,8 @@ void site_grid(const struct site *site, int *zone, int *side)
         *side = frame->north ? 1 : -1;
         return;
     }
-    const struct georef_place at = {tangent ? frame->lat_deg : first->at.lat_deg,
-                                    tangent ? frame->lon_deg : first->at.lon_deg, 0.0};
+    const struct georef_place at = {tangent ? frame->lat_deg : first->at.place.lat_deg,
+                                    tangent ? frame->lon_deg : first->at.place.lon_deg, 0.0};
     if (locate_in_grid(&at, *zone, &utm, NULL) != SH_OK) return;
     *zone = utm.zone == 0 ? GEOREF_UPS : utm.zone;
     if (*side == 0) *side = utm.north ? 1 : -1;

@@ -38,7 +38,7 @@ struct site_mover {
     double centre_m[3], radius_m;
 };
 
-/* What scans do between a hit and a point (detection.h). */
+/* What scans do between a hit and a point (detection.c). */
 struct site_detect {
     int on; /* 0: nothing of it, and it costs nothing */
     struct cast_detect cast;

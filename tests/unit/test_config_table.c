@@ -39,6 +39,7 @@ static void the_reference_names_every_key(void **state)
 static void rows_are_sound(void **state)
 {
     (void)state;
+    char line[CFG_PATH_MAX];
     const struct cfg_table *tables[] = {&cfg_config_table, &cfg_profile_table};
     for (int t = 0; t < 2; t++)
         for (size_t i = 0; i < tables[t]->n; i++) {
@@ -54,6 +55,10 @@ static void rows_are_sound(void **state)
             if (key->max_key != NULL) assert_non_null(cfg_find(&cfg_profile_table, key->max_key));
             if (key->min_key != NULL) assert_non_null(cfg_find(&cfg_profile_table, key->min_key));
             if (strstr(key->path, "[]") != NULL) assert_non_null(cfg_list_of(tables[t], key));
+            if (key->type == CFG_LIST) {
+                snprintf(line, sizeof line, "%s[]", key->path);
+                assert_ptr_equal(cfg_find(tables[t], line), key + 1);
+            }
             assert_non_null(key->help);
         }
 }

@@ -112,10 +112,9 @@ static void each_form_leads_to_the_same_place(void **state)
     char stations[512];
     write_floor(0, 0, 0);
     ok(load(anchor, "  - {position_m: [15, -20, 2]}", "local"));
-    const struct placement at = site->station[0].at;
-    const struct georef_place place = {at.lat_deg, at.lon_deg, at.height_m};
-    ok(locate_in_grid(&place, 0, &utm, &err));
-    georef_geodetic_to_ecef(&place, p);
+    const struct georef_place at = site->station[0].at.place;
+    ok(locate_in_grid(&at, 0, &utm, &err));
+    georef_geodetic_to_ecef(&at, p);
     snprintf(stations, sizeof stations,
              "  - {position_m: [15, -20, 2]}\n  - {lat_deg: %.10f, lon_deg: %.10f, height_m: %.4f}\n"
              "  - {utm_zone: %d, hemisphere: north, easting_m: %.4f, northing_m: %.4f, height_m: %.4f}\n"
@@ -164,7 +163,7 @@ static void instrument_height_moves_the_height_on_the_earth(void **state)
     ok(load("", "  - {position_m: [0, 0, 1.5], instrument_height_m: 2, lat_deg: 50, lon_deg: 10, height_m: 80}",
             "utm"));
     assert_position(0, 0, 0, 2, 1e-9);
-    assert_near(site->station[0].at.height_m, 80.5, 1e-9);
+    assert_near(site->station[0].at.place.height_m, 80.5, 1e-9);
 }
 
 /* Two stations across a zone's border (12 deg E, 1 m and 40 m away) share the anchor's zone. */
@@ -201,7 +200,7 @@ static void a_mesh_in_utm(void **state)
     georef_anchor(site->station[0].georef, anchor_m);
     assert_memory_equal(anchor_m, exact, sizeof exact);
     assert_near(site->station[1].at.position_m[2], 112.5, 1e-9); /* floor at 111 */
-    assert_near(site->station[1].at.height_m, 112.5, 1e-9);
+    assert_near(site->station[1].at.place.height_m, 112.5, 1e-9);
     assert_corner_agrees(corner);
     ok(load(anchor,
             "  - {easting_m: 391437.1, northing_m: 5819711.2, height_m: 112.3}\n"
@@ -358,9 +357,9 @@ static void the_house_has_its_site(void **state)
             continue;
         }
         ok(code);
-        assert_near(site->station[0].at.lat_deg, 52.0 + 31.0 / 60, 1e-12);
-        assert_near(site->station[0].at.lon_deg, 13.4, 1e-12);
-        assert_near(site->station[0].at.height_m, i == 0 ? 0 : 110, 1e-8);
+        assert_near(site->station[0].at.place.lat_deg, 52.0 + 31.0 / 60, 1e-12);
+        assert_near(site->station[0].at.place.lon_deg, 13.4, 1e-12);
+        assert_near(site->station[0].at.place.height_m, i == 0 ? 0 : 110, 1e-8);
         assert_near(site->station[1].at.position_m[2], 1.6, 1e-6); /* the ground floor, in single precision */
     }
 }

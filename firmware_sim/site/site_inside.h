@@ -1,0 +1,90 @@
+/* Private to this folder: the steps of loading a site (load.c), and what they share. */
+#ifndef FIRMWARE_SIM_SITE_SITE_INSIDE_H
+#define FIRMWARE_SIM_SITE_SITE_INSIDE_H
+
+#include "firmware_sim/site/site.h"
+
+/* ---- detection.c: what a site's scans do between a hit and a point (signal, surfaces, instrument, noise),
+ * made once from the configuration and the loaded scene. */
+
+/* The scene and its movers are loaded. Where there are mirrors, site->n_surfaces grows by the labels of ghosts. Warns
+ * of entries of `surfaces` that no surface fits. */
+int site_set_up_detect(struct site *site, const struct sh_report *report, struct sh_err *err);
+void site_free_detect(struct site *site);
+
+/* How many surfaces of glass or mirrors pulses are followed through, once that is known. */
+void site_set_depth(struct site *site, uint32_t depth);
+
+/* Whether a run, or `plan`, may cast footprints: what is built then has room for them. */
+int site_casts_footprints(const struct site *site);
+/* How far from the head's origin rays may begin, given where it stands: beams beside it, and ways beyond glass. */
+double site_ray_reach_m(const struct site *site, const double station_m[3]);
+
+/* How far the scene goes, without what moves. */
+double site_farthest_m(const struct site *site, const double from_m[3]);
+/* How far noise may take a point. */
+double site_noise_m(const struct site *site);
+
+/* ---- platform.c: a head that moves while it scans, or that scans where its platform stops (platform.kind: stops).
+ * In: the configured trajectory and times. Out: its poses (scene frame, metres) and the BVHs that its path needs; or
+ * a station for each stop, placed in the scene. */
+
+/* Puts the stops in the place of the configuration's only station. That one has been placed: without an anchor it says
+ * where on the Earth the scene lies, as an anchor at its position with the scene's y axis to true north would. */
+int site_load_stops(struct site *site, struct sh_err *err);
+
+/* Reads the trajectory, and builds the BVHs that its path needs. */
+int site_load_platform(struct site *site, const struct sh_report *report, struct sh_err *err);
+
+/* ---- bvhs.c: one BVH for each body that moves, and as many of the scene as the places of the head need. In: the
+ * loaded scene, and where rays begin (prcs, metres). Out: site->bvh and the BVHs of movers; the site owns them. */
+
+/* Where rays begin. */
+struct site_sphere {
+    const double *centre_m; /* [3], prcs */
+    double radius_m;
+};
+
+/* Adds a BVH of the scene to site->bvh, surfaces ordered as planned. *out stays the site's. */
+int site_add_bvh(struct site *site, const struct site_sphere *from, const struct sh_report *report, struct bvh **out,
+                 struct sh_err *err);
+
+/* Once the order of surfaces is planned and all stations are placed. */
+int site_build_mover_bvhs(struct site *site, const struct sh_report *report, struct sh_err *err);
+/* For heads that stand; stations near each other share one. */
+int site_build_station_bvhs(struct site *site, const struct sh_report *report, struct sh_err *err);
+
+/* ---- georeference.c: georeferencing of a site's stations: heights, CRS, method, and how many metres a
+ * count is on the wire. */
+
+/* Stations are placed, the path of a moving head is known. Fills the stations' georef, plan, scale and leg, and
+ * site->scale_m. Warns where a tolerance is not met. */
+int site_georeference(struct site *site, const struct sh_report *report, struct sh_err *err);
+
+/* ---- look.c: looking at the scene as the head does: the places that pulses are fired from, with setups as
+ * the run's. For trying methods (core/plan draws the pulses), and for measuring what they cost. */
+
+enum { SITE_LOOK_STATIONS = 4 }; /* at most so many stations are looked from */
+
+struct site_look {
+    struct plan_place place[SITE_LOOK_STATIONS];
+    struct site_look_at {
+        const struct site *site;
+        uint32_t station;
+    } at[SITE_LOOK_STATIONS];
+    uint32_t n;
+};
+
+/* Looks from up to SITE_LOOK_STATIONS stations, evenly chosen, with the beams that they have by then. The look must not
+ * be moved or copied: its places point into it. */
+void site_look_open(struct site_look *look, const struct site *site);
+
+/* ---- beam_choice.c: which beam a pulse is, and how far pulses are followed through glass and mirrors:
+ * measured on the scene where the configuration leaves it open. */
+
+/* All else of the site is in place. Sets beam, rings and depth of site->plan.methods and the rows of beam and optics,
+ * and makes the stations' beams. Warns where nothing holds the tolerances. For `plan` (site->measures) the error of
+ * what is forced is measured, too. */
+int site_choose_methods(struct site *site, const struct sh_report *report, struct sh_err *err);
+
+#endif
