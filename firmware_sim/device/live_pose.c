@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/angle.h"
 #include "core/vec3.h"
 #include "firmware_sim/device/device_state.h"
 
@@ -36,10 +37,9 @@ static int is_early(const struct device *device, int64_t t_ns)
 
 int device_pose(struct device *device, int64_t t_ns, const double v[6])
 {
-    const double deg = M_PI / 180.0;
     struct device_live *live = &device->live;
     struct pose pose = {.position_m = {v[0], v[1], v[2]}};
-    pose_from_angles(v[5] * deg, v[4] * deg, v[3] * deg, pose.quat);
+    pose_from_angles(angle_rad(v[5]), angle_rad(v[4]), angle_rad(v[3]), pose.quat);
     pthread_mutex_lock(&device->lock);
     int bad = (live->n != 0 && t_ns <= sample_at(live, live->n - 1)->t_ns) || !is_near(device, &pose) ||
               is_early(device, t_ns);
