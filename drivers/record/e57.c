@@ -123,8 +123,8 @@ static int begin_scan(void *rec, struct sh_err *err)
     snprintf(e->scan->idn, sizeof e->scan->idn, "%s", info->idn);
     snprintf(e->scan->profile, sizeof e->scan->profile, "%s", info->profile);
     set_start(e);
-    e->facts.epsg = track_epsg(&e->base.track);
-    e->facts.geoid_heights = track_is_geoid(&e->base.track);
+    e->facts.epsg = e->base.track.epsg;
+    e->facts.geoid_heights = e->base.track.geoid_heights;
     return e57_put(&e->pages, blank, sizeof blank, err);
 }
 
@@ -264,7 +264,6 @@ static void e57_release(void *rec)
 const struct recorder_ops recorder_e57 = {
     .ending = ".e57",
     .size = sizeof(struct e57),
-    .metres = 1,
     .track = {.scan = begin_scan, .points = e57_points, .metres = 1},
     .begin = e57_begin,
     .finish = e57_finish_file,

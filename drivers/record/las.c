@@ -46,7 +46,7 @@ static int put_front(struct las *las, struct sh_err *err)
 /* Geodetic coordinates are longitude, latitude in LAS, as GIS software draws x and y. */
 static int is_swapped(const struct las *las)
 {
-    return track_crs(&las->base.track) == NATIVE_CRS_GEODETIC;
+    return las->base.track.crs == NATIVE_CRS_GEODETIC;
 }
 
 static void swap(double v[3])
@@ -75,8 +75,8 @@ static int las_scan(void *rec, struct sh_err *err)
     const struct track *t = &las->base.track;
     struct las_facts *f = &las->facts;
     if (las->begun) return 0;
-    f->epsg = track_epsg(t);
-    f->geoid_heights = track_is_geoid(t);
+    f->epsg = t->epsg;
+    f->geoid_heights = t->geoid_heights;
     f->moving = t->info.moving;
     f->attributes = t->has_attributes;
     set_counts(las);
@@ -238,8 +238,7 @@ static int las_finish(void *rec, struct sh_err *err)
 const struct recorder_ops recorder_las = {
     .ending = ".las",
     .size = sizeof(struct las),
-    .wants_attributes = 1,
-    .track = {.scan = las_scan, .points = las_points},
+    .track = {.scan = las_scan, .points = las_points, .wants_attributes = 1},
     .begin = las_begin,
     .finish = las_finish,
 };
