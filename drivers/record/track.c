@@ -256,7 +256,7 @@ static int take_points(struct track *t, const struct scanhead_frame *frame, stru
 
 static void take_line_end(struct track *t, const struct scanhead_frame *frame)
 {
-    struct native_line_end end;
+    struct line_end end;
     t->have_next_line = native_decode_line_end(frame->payload, frame->payload_len, &end) == 0;
     if (!t->have_next_line) return;
     t->next_line = end.line + 1;
