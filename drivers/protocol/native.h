@@ -2,8 +2,8 @@
  * come out.
  *
  * PROTOCOL.md describes the frames byte by byte; the structs here hold the same fields in the same order and
- * units; the end of a line is struct line_end (core/line.h). native_encode.h is for those who write. Nothing here does I/O, allocates or keeps global state. All
- * integers are little-endian on the wire. */
+ * units. The end of a line is core's struct line_end. native_encode.h is for those who write. Nothing here
+ * does I/O, allocates or keeps global state. All integers are little-endian on the wire. */
 #ifndef DRIVERS_PROTOCOL_NATIVE_H
 #define DRIVERS_PROTOCOL_NATIVE_H
 
