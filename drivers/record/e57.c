@@ -41,6 +41,7 @@ static int e57_begin(void *rec, struct sh_err *err)
 {
     static const uint8_t blank[FILE_HEADER_LEN];
     struct e57 *e = rec;
+    e->facts.track = &e->base.track;
     e->facts.empty_shots = e->base.options.empty_shots;
     e->pages.file = &e->base.file;
     return e57_put(&e->pages, blank, sizeof blank, err);
@@ -113,8 +114,6 @@ static int begin_scan(void *rec, struct sh_err *err)
     snprintf(e->scan->idn, sizeof e->scan->idn, "%s", info->idn);
     snprintf(e->scan->profile, sizeof e->scan->profile, "%s", info->profile);
     set_start(e);
-    e->facts.epsg = e->base.track.epsg;
-    e->facts.geoid_heights = e->base.track.geoid_heights;
     return e57_put(&e->pages, blank, sizeof blank, err);
 }
 
