@@ -1,13 +1,12 @@
 /* The way of a pulse, from its place in the schedule to a point. cast_chunk has the stages in their order:
  *
  *     aim        aim.c            angles -> where the beam goes and begins, and what the encoders read of it
- *     nearest    nearest.c        what the beam's centre meets first: the scene, and bodies that move; exact
- *     (bvh.h)
+ *     nearest    nearest.c        the first surface that the beam's centre meets: what stands still, and
+ *                                 bodies that move; exact (core/bvh.h)
  *     optics     optics.c         where that is glass or a mirror: what is seen there
  *     sub-rays   sub_rays.c       pulses with a footprint: which of them need more rays, and their echoes;
  *                sub_ray_plan.c   where in a footprint those rays lie
- *     echoes     echoes.c         which echoes are seen, how they merge, their noise, which of them a pulse
- *     sends
+ *     echoes     echoes.c         which returns are echoes, how they merge, their noise, which of them are sent
  *     points     points.c         positions, and entries of the block
  *
  * A stage that a setup does not need costs nothing. kernels*.c hold the arithmetic of the stages, texels.c

@@ -105,7 +105,7 @@ VEC_CLONES
 void kernel_limit(double *restrict range_m, double min_m, double max_m, uint32_t n)
 {
     for (uint32_t i = 0; i < n; i++)
-        range_m[i] = (range_m[i] >= min_m) & (range_m[i] <= max_m) ? range_m[i] : (double)NAN;
+        range_m[i] = ((range_m[i] >= min_m) & (range_m[i] <= max_m)) ? range_m[i] : (double)NAN;
 }
 
 VEC_CLONES

@@ -93,6 +93,7 @@ static void reference(const struct georef_spec *spec, const struct georef *geore
     for (int k = 0; k < STATIONS_BATCH; k++) {
         struct georef_place at = {base[0] + p->exact[0][k], base[1] + p->exact[1][k], base[2] + p->exact[2][k]};
         double q[3], to_pole = 90.0 - fabs(at.lat_deg);
+        at.lon_deg = remainder(at.lon_deg, 360.0); /* differences may lead across the antimeridian */
         int zone = georef_epsg(georef) % 100;
         if (zone == 61) zone = to_pole < 12.0 ? 0 : 61;
         if (spec->crs == GEOREF_ECEF)
