@@ -37,7 +37,7 @@ int scanhead_attributes(struct scanhead *sh, const struct scanhead_frame *frame,
 
 int scanhead_line_end(struct scanhead *sh, const struct scanhead_frame *frame, struct scanhead_line_end *end)
 {
-    struct native_line_end wire;
+    struct line_end wire;
     if (frame->type != SCANHEAD_LINE_END || frame->payload == NULL)
         return sh_fail(&sh->err, SCANHEAD_EINPUT, "not a line end frame");
     if (native_decode_line_end(frame->payload, frame->payload_len, &wire) != 0)

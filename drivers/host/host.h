@@ -67,6 +67,7 @@ struct scanhead {
     int64_t scan_t0_ns;        /* device time of the scan's start */
     int64_t gps_at_ns, gps_ns; /* a device time, and the GPS time the head's clock had then */
     struct host_surface *surface;
+    size_t surface_room;
     uint32_t n_surfaces;
 
     uint64_t dropped, reader_lost, pulses_lost;

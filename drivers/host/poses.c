@@ -3,6 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/mat3.h"
+#include "core/vec3.h"
 #include "drivers/host/host.h"
 
 /* Room for some seconds, and for the longest frame. */
@@ -128,26 +130,28 @@ int scanhead_poses(struct scanhead *sh, const struct scanhead_frame *frame, uint
     return (int)i;
 }
 
-static void place(const double r[9], const double at[3], struct scanhead_point *p)
+/* v, in the head's frame, becomes the point. */
+static void place(const double rotation[9], const double at[3], const double v[3], struct scanhead_point *p)
 {
-    double x = p->x, y = p->y, z = p->z;
-    p->x = at[0] + (r[0] * x + r[1] * y + r[2] * z);
-    p->y = at[1] + (r[3] * x + r[4] * y + r[5] * z);
-    p->z = at[2] + (r[6] * x + r[7] * y + r[8] * z);
+    double turned[3];
+    mat3_apply(rotation, v, turned);
+    p->x = at[0] + turned[0];
+    p->y = at[1] + turned[1];
+    p->z = at[2] + turned[2];
 }
 
 /* Rodrigues' formula in the head's frame, then the rotation at the leg's begin. */
 static void place_moving(const struct leg *leg, double f, struct scanhead_point *p)
 {
-    const double *k = leg->axis, angle = f * leg->angle_rad, s = sin(angle), v = 1 - cos(angle);
-    double ux = k[1] * p->z - k[2] * p->y, uy = k[2] * p->x - k[0] * p->z, uz = k[0] * p->y - k[1] * p->x, at[3];
-    double wx = k[1] * uz - k[2] * uy, wy = k[2] * ux - k[0] * uz, wz = k[0] * uy - k[1] * ux;
-    p->x += s * ux + v * wx;
-    p->y += s * uy + v * wy;
-    p->z += s * uz + v * wz;
-    for (int i = 0; i < 3; i++)
+    const double angle = f * leg->angle_rad, s = sin(angle), versine = 1 - cos(angle);
+    double v[3] = {p->x, p->y, p->z}, u[3], w[3], at[3];
+    vec3_cross(leg->axis, v, u);
+    vec3_cross(leg->axis, u, w);
+    for (int i = 0; i < 3; i++) {
+        v[i] += s * u[i] + versine * w[i];
         at[i] = leg->a->position_m[i] + f * (leg->b->position_m[i] - leg->a->position_m[i]);
-    place(leg->rotation, at, p);
+    }
+    place(leg->rotation, at, v, p);
 }
 
 static int to_scene_moving(struct scanhead *sh, struct scanhead_point *points, uint32_t n, double *frame)
@@ -181,7 +185,8 @@ int scanhead_to_scene(struct scanhead *sh, struct scanhead_point *points, uint32
                        sh->source.name);
     if (sh->anchor.moving & NATIVE_MOVING) return to_scene_moving(sh, points, n, frame);
     for (uint32_t i = 0; i < n; i++) {
-        place(sh->anchor.rotation, sh->anchor.station_m, &points[i]);
+        const double v[3] = {points[i].x, points[i].y, points[i].z};
+        place(sh->anchor.rotation, sh->anchor.station_m, v, &points[i]);
         if (frame != NULL) frame[i] = sh->anchor.frame;
     }
     return 0;

@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/grow.h"
 #include "drivers/host/host.h"
 #include "drivers/protocol/bytes.h"
 
@@ -99,30 +100,31 @@ static int absorb_event(struct scanhead *sh, const struct native_header *header,
 
 struct naming {
     struct scanhead *sh;
-    int no_memory;
+    int rc;
 };
 
-static int grow_surfaces(struct scanhead *sh, uint32_t n)
+static int no_names(struct scanhead *sh, uint32_t label)
 {
-    if (n <= sh->n_surfaces) return 0;
-    struct host_surface *more = realloc(sh->surface, n * sizeof *more);
-    if (more == NULL) return SH_ENOMEM;
-    memset(more + sh->n_surfaces, 0, (n - sh->n_surfaces) * sizeof *more);
-    sh->surface = more;
-    sh->n_surfaces = n;
-    return 0;
+    return sh_fail(&sh->err, SH_ENOMEM, "no memory for %u surface names", label + 1);
 }
 
 static void set_surface(void *ctx, uint32_t label, const char *object, const char *material)
 {
     struct naming *naming = ctx;
-    struct host_surface *s = &naming->sh->surface[label];
+    struct scanhead *sh = naming->sh;
+    if (!grow(&sh->surface, &sh->surface_room, label + 1, sizeof *sh->surface)) {
+        naming->rc = no_names(sh, label);
+        return;
+    }
+    while (sh->n_surfaces <= label)
+        sh->surface[sh->n_surfaces++] = (struct host_surface){NULL, NULL};
+    struct host_surface *s = &sh->surface[label];
     if (s->object != NULL && strcmp(s->object, object) == 0 && strcmp(s->material, material) == 0) return;
     struct host_surface named = {strdup(object), strdup(material)};
     if (named.object == NULL || named.material == NULL) {
         free(named.object);
         free(named.material);
-        naming->no_memory = 1;
+        naming->rc = no_names(sh, label);
         return;
     }
     free(s->object);
@@ -130,20 +132,12 @@ static void set_surface(void *ctx, uint32_t label, const char *object, const cha
     *s = named;
 }
 
-static void count_label(void *ctx, uint32_t label, const char *object, const char *material)
-{
-    (void)object, (void)material;
-    *(uint32_t *)ctx = label + 1;
-}
-
 static int absorb_surfaces(struct scanhead *sh, const struct native_header *header, const uint8_t *payload)
 {
-    uint32_t n = 0;
-    if (native_decode_surfaces(payload, header->length, count_label, &n) != 0) return bad(sh, "wrong surface names");
-    struct naming naming = {sh, grow_surfaces(sh, n) != 0};
-    if (!naming.no_memory) native_decode_surfaces(payload, header->length, set_surface, &naming);
-    if (naming.no_memory) return sh_fail(&sh->err, SH_ENOMEM, "no memory for %u surface names", n);
-    return 0;
+    struct naming naming = {sh, 0};
+    if (native_decode_surfaces(payload, header->length, set_surface, &naming) != 0)
+        return bad(sh, "wrong surface names");
+    return naming.rc;
 }
 
 static void absorb_hash(struct scanhead *sh, const struct native_header *header, const uint8_t *payload)

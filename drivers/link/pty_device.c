@@ -83,19 +83,26 @@ static int link_look(const char *path, const char *slave, struct sh_err *err)
                        err);
 }
 
+/* In place of what is there: 0, or -1 with errno. */
+static int link_replace(const char *path, const char *slave)
+{
+    char beside[300];
+    snprintf(beside, sizeof beside, "%s.%ld.tmp", path, (long)getpid());
+    if (symlink(slave, beside) != 0) return -1;
+    if (rename(beside, path) == 0) return 0;
+    int error = errno;
+    unlink(beside);
+    errno = error;
+    return -1;
+}
+
 /* Both ways are atomic: a client finds the old target, ours, or nothing. */
 static int link_make(const char *path, const char *slave, struct sh_err *err)
 {
     int rc = link_look(path, slave, err);
     if (rc < 0) return rc;
-    if (rc == 1) return symlink(slave, path) == 0 ? SH_OK : link_errno(path, err);
-    char beside[300];
-    snprintf(beside, sizeof beside, "%s.%ld.tmp", path, (long)getpid());
-    if (symlink(slave, beside) != 0) return link_errno(path, err);
-    if (rename(beside, path) == 0) return SH_OK;
-    rc = link_errno(path, err);
-    unlink(beside);
-    return rc;
+    rc = rc == 1 ? symlink(slave, path) : link_replace(path, slave);
+    return rc == 0 ? SH_OK : link_errno(path, err);
 }
 
 static int link_is_ours(const struct pty_device *device)
@@ -132,23 +139,14 @@ int pty_device_rest(struct pty_device *device)
     struct pty_device fresh = *device;
     if (pair_open(&fresh.master, fresh.slave, sizeof fresh.slave) != 0) return SH_EIO;
     int ours = device->path[0] != '\0' && link_is_ours(device);
-    if (slave_rest(&fresh) != 0) goto fail;
-    if (ours) {
-        /* The old slave exists until its master is closed, so the new link goes over the old one unlooked. */
-        char beside[300];
-        snprintf(beside, sizeof beside, "%s.%ld.tmp", fresh.path, (long)getpid());
-        if (symlink(fresh.slave, beside) != 0) goto fail;
-        if (rename(beside, fresh.path) != 0) {
-            unlink(beside);
-            goto fail;
-        }
+    /* The old slave exists until its master is closed, so the new link goes over the old one unlooked. */
+    if (slave_rest(&fresh) != 0 || (ours && link_replace(fresh.path, fresh.slave) != 0)) {
+        close(fresh.master);
+        return SH_EIO;
     }
     close(device->master);
     *device = fresh;
     return SH_OK;
-fail:
-    close(fresh.master);
-    return SH_EIO;
 }
 
 void pty_device_close(struct pty_device *device)

@@ -72,7 +72,7 @@ static const struct field attributes[] = {
     ATTRIBUTES(n_points, FIELD_32),
 };
 
-#define END(member, kind) ROW(native_line_end, member, kind)
+#define END(member, kind) ROW(line_end, member, kind)
 static const struct field line_end[] = {
     END(frame, FIELD_32),        END(line, FIELD_32),      END(pulse0, FIELD_64), END(t0_ns, FIELD_64),
     END(t1_ns, FIELD_64),        END(n_fired, FIELD_32),   END(n_cast, FIELD_32), END(n_echoes, FIELD_32),
@@ -110,10 +110,22 @@ const struct field_table fields_anchor = TABLE(anchor, native_anchor, 280, NATIV
 const struct field_table fields_points = TABLE(points, native_points, NATIVE_POINTS_HEAD_LEN, NATIVE_POINTS);
 const struct field_table fields_attributes =
     TABLE(attributes, native_attributes, NATIVE_ATTRIBUTES_HEAD_LEN, NATIVE_ATTRIBUTES);
-const struct field_table fields_line_end = TABLE(line_end, native_line_end, 68, NATIVE_LINE_END);
+const struct field_table fields_line_end = TABLE(line_end, line_end, 68, NATIVE_LINE_END);
 const struct field_table fields_telemetry = TABLE(telemetry, native_telemetry, 72, NATIVE_TELEMETRY);
 const struct field_table fields_event = TABLE(event, native_event, 128, NATIVE_EVENT);
 const struct field_table fields_pose = TABLE(pose, native_pose, NATIVE_POSE_LEN, NATIVE_POSES);
+
+/* A number of 4 or 8 bytes between the machine's order and the wire's; the same both ways. */
+static void turn(void *to, const void *from, size_t unit)
+{
+    if (unit == 4) {
+        uint32_t v = le_get32(from);
+        memcpy(to, &v, sizeof v);
+    } else {
+        uint64_t v = le_get64(from);
+        memcpy(to, &v, sizeof v);
+    }
+}
 
 static size_t encode_field(const struct field *field, const char *from, uint8_t *wire)
 {
@@ -125,17 +137,8 @@ static size_t encode_field(const struct field *field, const char *from, uint8_t 
         return field->count;
     }
     size_t unit = field->kind == FIELD_32 ? 4 : 8;
-    for (size_t i = 0; i < field->count; i++) {
-        if (unit == 4) {
-            uint32_t v;
-            memcpy(&v, from + i * unit, sizeof v);
-            le_put32(wire + i * unit, v);
-        } else {
-            uint64_t v;
-            memcpy(&v, from + i * unit, sizeof v);
-            le_put64(wire + i * unit, v);
-        }
-    }
+    for (size_t i = 0; i < field->count; i++)
+        turn(wire + i * unit, from + i * unit, unit);
     return unit * field->count;
 }
 
@@ -147,20 +150,14 @@ static int decode_field(const struct field *field, const uint8_t *wire, char *to
         memcpy(to, wire, len);
         return field->count;
     }
-    int unit = field->kind == FIELD_32 ? 4 : 8;
-    for (int i = 0; i < field->count; i++) {
-        if (unit == 4) {
-            uint32_t v = le_get32(wire + i * unit);
-            memcpy(to + i * unit, &v, sizeof v);
-            continue;
-        }
-        uint64_t v = le_get64(wire + i * unit);
-        double d;
-        memcpy(&d, &v, sizeof d);
-        if (field->kind == FIELD_REAL && !isfinite(d)) return SH_EFORMAT;
-        memcpy(to + i * unit, &v, sizeof v);
+    size_t unit = field->kind == FIELD_32 ? 4 : 8;
+    for (size_t i = 0; i < field->count; i++) {
+        double real = 0;
+        turn(to + i * unit, wire + i * unit, unit);
+        if (field->kind == FIELD_REAL) memcpy(&real, to + i * unit, sizeof real);
+        if (!isfinite(real)) return SH_EFORMAT;
     }
-    return unit * field->count;
+    return (int)unit * field->count;
 }
 
 void fields_encode(const struct field_table *table, const void *from, uint8_t *wire)

@@ -2,14 +2,15 @@
  * come out.
  *
  * PROTOCOL.md describes the frames byte by byte; the structs here hold the same fields in the same order and
- * units. native_encode.h is for those who write. Nothing here does I/O, allocates or keeps global state. All
- * integers are little-endian on the wire. */
+ * units. The end of a line is core's struct line_end. native_encode.h is for those who write. Nothing here
+ * does I/O, allocates or keeps global state. All integers are little-endian on the wire. */
 #ifndef DRIVERS_PROTOCOL_NATIVE_H
 #define DRIVERS_PROTOCOL_NATIVE_H
 
 #include <stddef.h>
 #include <stdint.h>
 
+#include "core/line.h"
 #include "drivers/protocol/bytes.h"
 
 enum {
@@ -160,15 +161,6 @@ struct native_attribute {
     uint16_t width_cns;    /* 0.01 ns, full at half maximum */
 };
 
-struct native_line_end {
-    uint32_t frame, line;
-    uint64_t pulse0;
-    int64_t t0_ns, t1_ns;
-    uint32_t n_fired, n_cast, n_echoes, mirror_count, pan_count, status;
-    uint32_t n_crowded, n_faint,
-        n_unfit; /* echoes left out, hits not detected, echoes that did not fit; 0: or unknown */
-};
-
 enum native_pose_flags { /* the values of core/pose.h */
                          NATIVE_POSE_EXTRAPOLATED = 1,
                          NATIVE_POSE_LATE = 2,
@@ -218,7 +210,7 @@ int native_decode_anchor(const uint8_t *payload, size_t len, struct native_ancho
 int native_decode_points(const uint8_t *payload, size_t len, struct native_points *out);
 int native_decode_attributes(const uint8_t *payload, size_t len, struct native_attributes *out);
 void native_decode_attribute(const uint8_t *payload, uint32_t i, struct native_attribute *out); /* i < n_points */
-int native_decode_line_end(const uint8_t *payload, size_t len, struct native_line_end *out);
+int native_decode_line_end(const uint8_t *payload, size_t len, struct line_end *out);
 int native_decode_event(const uint8_t *payload, size_t len, struct native_event *out);
 /* Poses payload: u32 n (2 and more), u32 0, then n poses of 80 bytes, their times rising. */
 int native_decode_poses(const uint8_t *payload, size_t len, uint32_t *n);

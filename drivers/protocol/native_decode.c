@@ -49,7 +49,7 @@ void native_decode_attribute(const uint8_t *payload, uint32_t i, struct native_a
     out->width_cns = le_get16(p + 2);
 }
 
-int native_decode_line_end(const uint8_t *payload, size_t len, struct native_line_end *out)
+int native_decode_line_end(const uint8_t *payload, size_t len, struct line_end *out)
 {
     return fields_decode(&fields_line_end, payload, len, out);
 }

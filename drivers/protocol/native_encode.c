@@ -57,23 +57,7 @@ size_t native_encode_event(uint8_t *dst, size_t cap, const struct native_event *
 
 size_t native_encode_line_end(uint8_t *dst, size_t cap, const struct line_end *end, int64_t scan_t0_ns)
 {
-    const struct native_line_end wire = {
-        .frame = end->frame,
-        .line = end->line,
-        .pulse0 = end->pulse0,
-        .t0_ns = end->t0_ns,
-        .t1_ns = end->t1_ns,
-        .n_fired = end->n_fired,
-        .n_cast = end->n_cast,
-        .n_echoes = end->n_echoes,
-        .mirror_count = end->mirror_count,
-        .pan_count = end->pan_count,
-        .status = end->status,
-        .n_crowded = end->n_crowded,
-        .n_faint = end->n_faint,
-        .n_unfit = end->n_unfit,
-    };
-    return encode_fixed(dst, cap, &fields_line_end, &wire, scan_t0_ns + end->t1_ns, 0);
+    return encode_fixed(dst, cap, &fields_line_end, end, scan_t0_ns + end->t1_ns, 0);
 }
 
 size_t native_encode_poses(uint8_t *dst, size_t cap, const struct native_pose *pose, uint32_t n, int64_t t_ns,

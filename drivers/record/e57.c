@@ -41,33 +41,24 @@ static int e57_begin(void *rec, struct sh_err *err)
 {
     static const uint8_t blank[FILE_HEADER_LEN];
     struct e57 *e = rec;
+    e->facts.track = &e->base.track;
     e->facts.empty_shots = e->base.options.empty_shots;
     e->pages.file = &e->base.file;
     return e57_put(&e->pages, blank, sizeof blank, err);
 }
 
-static int has_stream(const struct e57 *e, int s)
-{
-    return s != INVALID || e->facts.empty_shots;
-}
-
 /* The records gathered so far. */
 static int put_packet(struct e57 *e, struct sh_err *err)
 {
-    uint8_t *at = e->packet + PACKET_HEADER_LEN;
-    uint16_t n_streams = 0;
-    size_t len[N_STREAMS];
+    const uint16_t n_streams = e->facts.empty_shots ? N_STREAMS : N_STREAMS - 1;
+    uint8_t *len_at = e->packet + PACKET_HEADER_LEN, *at = len_at + 2 * n_streams;
     for (int s = 0; s < N_STREAMS; s++) {
-        if (!has_stream(e, s)) continue;
-        len[s] = ((size_t)e->n * stream_bits[s] + 7) / 8;
-        le_put16(at, (uint16_t)len[s]);
-        at += 2;
-        n_streams++;
-    }
-    for (int s = 0; s < N_STREAMS; s++) {
-        if (!has_stream(e, s)) continue;
-        memcpy(at, e->stream[s], len[s]);
-        at += len[s];
+        if (s == INVALID && !e->facts.empty_shots) continue;
+        size_t len = ((size_t)e->n * stream_bits[s] + 7) / 8;
+        le_put16(len_at, (uint16_t)len);
+        len_at += 2;
+        memcpy(at, e->stream[s], len);
+        at += len;
     }
     while ((at - e->packet) % 4 != 0)
         *at++ = 0;
@@ -122,8 +113,6 @@ static int begin_scan(void *rec, struct sh_err *err)
     snprintf(e->scan->idn, sizeof e->scan->idn, "%s", info->idn);
     snprintf(e->scan->profile, sizeof e->scan->profile, "%s", info->profile);
     set_start(e);
-    e->facts.epsg = track_epsg(&e->base.track);
-    e->facts.geoid_heights = track_is_geoid(&e->base.track);
     return e57_put(&e->pages, blank, sizeof blank, err);
 }
 
@@ -263,7 +252,6 @@ static void e57_release(void *rec)
 const struct recorder_ops recorder_e57 = {
     .ending = ".e57",
     .size = sizeof(struct e57),
-    .metres = 1,
     .track = {.scan = begin_scan, .points = e57_points, .metres = 1},
     .begin = e57_begin,
     .finish = e57_finish_file,

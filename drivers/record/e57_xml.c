@@ -164,7 +164,7 @@ static void put_root(FILE *out, const struct e57_facts *facts)
     put_integer(out, "versionMinor", 0);
     put_string(out, "e57LibraryVersion", "scanhead");
     if (facts->n_scans > 0 && facts->scan[0].have_start) put_time(out, "creationDateTime", facts->scan[0].start_gps_s);
-    if (crs_wkt(facts->epsg, facts->geoid_heights, wkt) > 0) put_string(out, "coordinateMetadata", wkt);
+    if (crs_wkt(facts->track->epsg, facts->track->geoid_heights, wkt) > 0) put_string(out, "coordinateMetadata", wkt);
     fputs("<data3D type=\"Vector\" allowHeterogeneousChildren=\"1\">\n", out);
     for (uint32_t i = 0; i < facts->n_scans; i++)
         put_scan(out, facts, &facts->scan[i]);

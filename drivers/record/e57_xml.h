@@ -8,6 +8,7 @@
 
 #include "core/err.h"
 #include "drivers/record/station_pose.h"
+#include "drivers/record/track.h"
 
 /* One scan: an entry of data3D. Coordinates in the head's frame. */
 struct e57_scan {
@@ -29,7 +30,8 @@ struct e57_scan {
 };
 
 struct e57_facts {
-    int epsg, geoid_heights, empty_shots;
+    const struct track *track; /* whose CRS is the file's */
+    int empty_shots;
     struct e57_scan *scan;
     uint32_t n_scans;
 };

@@ -28,6 +28,7 @@ static int las_begin(void *rec, struct sh_err *err)
 {
     struct las *las = rec;
     (void)err;
+    las->facts.track = &las->base.track;
     for (int i = 0; i < 3; i++)
         las->facts.scale[i] = 1;
     strcpy(las->facts.profile, "OTHER"); /* until points have come */
@@ -46,7 +47,7 @@ static int put_front(struct las *las, struct sh_err *err)
 /* Geodetic coordinates are longitude, latitude in LAS, as GIS software draws x and y. */
 static int is_swapped(const struct las *las)
 {
-    return track_crs(&las->base.track) == NATIVE_CRS_GEODETIC;
+    return las->base.track.crs == NATIVE_CRS_GEODETIC;
 }
 
 static void swap(double v[3])
@@ -75,10 +76,6 @@ static int las_scan(void *rec, struct sh_err *err)
     const struct track *t = &las->base.track;
     struct las_facts *f = &las->facts;
     if (las->begun) return 0;
-    f->epsg = track_epsg(t);
-    f->geoid_heights = track_is_geoid(t);
-    f->moving = t->info.moving;
-    f->attributes = t->has_attributes;
     set_counts(las);
     snprintf(f->profile, sizeof f->profile, "%s", t->info.profile);
     f->gps_time = scanhead_gps_time(t->sh, t->t0_ns, &f->created_gps_s) == 0;
@@ -210,7 +207,7 @@ static int las_points(void *rec, int n, struct sh_err *err)
         }
         rc = put_point(las, at, i, err);
         if (rc != 0) break;
-        at += las->facts.attributes ? LAS_POINT_LEN_MAX : LAS_POINT_LEN;
+        at += las->base.track.has_attributes ? LAS_POINT_LEN_MAX : LAS_POINT_LEN;
         las->facts.n_points++;
         if (p->echo >= 1) las->facts.n_by_return[p->echo - 1]++;
     }
@@ -238,8 +235,7 @@ static int las_finish(void *rec, struct sh_err *err)
 const struct recorder_ops recorder_las = {
     .ending = ".las",
     .size = sizeof(struct las),
-    .wants_attributes = 1,
-    .track = {.scan = las_scan, .points = las_points},
+    .track = {.scan = las_scan, .points = las_points, .wants_attributes = 1},
     .begin = las_begin,
     .finish = las_finish,
 };

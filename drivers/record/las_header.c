@@ -107,7 +107,7 @@ static void put_header(uint8_t *to, const struct las_facts *f, size_t front_len,
     le_put32(to + 96, (uint32_t)front_len);
     le_put32(to + 100, n_vlrs);
     to[104] = 6;
-    le_put16(to + 105, f->attributes ? LAS_POINT_LEN_MAX : LAS_POINT_LEN);
+    le_put16(to + 105, f->track->has_attributes ? LAS_POINT_LEN_MAX : LAS_POINT_LEN);
     /* the counts of 32 bits stay 0, as format 6 wants it */
     for (int i = 0; i < 3; i++) {
         le_put_double(to + 131 + 8 * i, f->scale[i]);
@@ -123,10 +123,10 @@ static void put_header(uint8_t *to, const struct las_facts *f, size_t front_len,
 
 size_t las_front(const struct las_facts *f, uint8_t to[LAS_FRONT_MAX])
 {
-    uint8_t *end = put_extra_vlr(to + LAS_HEADER_LEN, f->attributes);
-    end = put_note_vlr(end, f->gps_time, f->moving);
+    uint8_t *end = put_extra_vlr(to + LAS_HEADER_LEN, f->track->has_attributes);
+    end = put_note_vlr(end, f->gps_time, f->track->moving);
     uint8_t *crs = end;
-    end = put_crs_vlr(end, f->epsg, f->geoid_heights);
+    end = put_crs_vlr(end, f->track->epsg, f->track->geoid_heights);
     put_header(to, f, (size_t)(end - to), end > crs ? 3 : 2);
     return (size_t)(end - to);
 }

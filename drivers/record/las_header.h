@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 #include "drivers/record/crs_wkt.h"
+#include "drivers/record/track.h"
 
 enum {
     LAS_HEADER_LEN = 375,
@@ -20,14 +21,11 @@ enum {
 };
 
 struct las_facts {
-    int epsg;
-    int moving;
-    int attributes; /* amplitude and width follow the label */
-    int gps_time;   /* times are adjusted standard GPS time */
+    const struct track *track; /* whose CRS, movement and attributes are the file's */
+    int gps_time;              /* times are adjusted standard GPS time */
     char profile[32];
     double scale[3], offset[3]; /* of x, y, z; x and y are longitude and latitude in geodetic coordinates */
-    int geoid_heights;
-    double created_gps_s; /* adjusted standard GPS time of the first point, with gps_time */
+    double created_gps_s;       /* adjusted standard GPS time of the first point, with gps_time */
     uint64_t n_points, n_by_return[LAS_RETURNS];
     int32_t min[3], max[3]; /* counts; only with points */
 };

@@ -51,15 +51,16 @@ int outfile_open(struct outfile *file, const char *path, struct sh_err *err)
     return code;
 }
 
-static int write_all(struct outfile *file, const uint8_t *data, size_t len, struct sh_err *err)
+/* *at is moved on by what was written, also before a failure. */
+static int write_at(const struct outfile *file, uint64_t *at, const uint8_t *data, size_t len, struct sh_err *err)
 {
     while (len > 0) {
-        ssize_t n = write(file->fd, data, len);
+        ssize_t n = pwrite(file->fd, data, len, (off_t)*at);
         if (n < 0 && errno == EINTR) continue;
         if (n <= 0) return sh_fail(err, SH_EIO, "%s: cannot write: %s", file->part, strerror(n < 0 ? errno : ENOSPC));
         data += n;
         len -= (size_t)n;
-        file->written += (uint64_t)n;
+        *at += (uint64_t)n;
     }
     return 0;
 }
@@ -67,7 +68,7 @@ static int write_all(struct outfile *file, const uint8_t *data, size_t len, stru
 int outfile_flush(struct outfile *file, struct sh_err *err)
 {
     uint64_t before = file->written;
-    int rc = write_all(file, file->buf, file->len, err);
+    int rc = write_at(file, &file->written, file->buf, file->len, err);
     size_t done = (size_t)(file->written - before);
     /* after a failure the rest stays, so that a later attempt writes no byte twice */
     memmove(file->buf, file->buf + done, file->len - done);
@@ -90,7 +91,7 @@ int outfile_write(struct outfile *file, const void *data, size_t len, struct sh_
 {
     if (len > OUTFILE_BUFFER) {
         int rc = outfile_flush(file, err);
-        return rc != 0 ? rc : write_all(file, data, len, err);
+        return rc != 0 ? rc : write_at(file, &file->written, data, len, err);
     }
     uint8_t *to = outfile_room(file, len, err);
     if (to == NULL) return SH_EIO;
@@ -101,16 +102,7 @@ int outfile_write(struct outfile *file, const void *data, size_t len, struct sh_
 
 int outfile_patch(struct outfile *file, uint64_t at, const void *data, size_t len, struct sh_err *err)
 {
-    const uint8_t *p = data;
-    while (len > 0) {
-        ssize_t n = pwrite(file->fd, p, len, (off_t)at);
-        if (n < 0 && errno == EINTR) continue;
-        if (n <= 0) return sh_fail(err, SH_EIO, "%s: cannot write: %s", file->part, strerror(n < 0 ? errno : ENOSPC));
-        p += n;
-        at += (uint64_t)n;
-        len -= (size_t)n;
-    }
-    return 0;
+    return write_at(file, &at, data, len, err);
 }
 
 /* So that the new name survives a power cut as well. Some file systems can't sync a directory; then they need

@@ -23,7 +23,6 @@ enum { RECORD_LEN = 4 * 8 + 4 + 8 + 1 + 1 + 2 + 2, FRAME_LEN = 8, ATTRIBUTES_LEN
 struct ply {
     struct recorder base;
     struct ply_facts facts;
-    struct ply_names names;
     int begun;         /* room for the header is made */
     size_t header_len; /* bytes of that room */
 };
@@ -32,24 +31,20 @@ static int ply_begin(void *rec, struct sh_err *err)
 {
     struct ply *ply = rec;
     (void)err;
+    ply->facts.track = &ply->base.track;
     ply->facts.ascii = ply->base.options.ascii;
     ply->facts.empty_shots = ply->base.options.empty_shots;
     return 0;
 }
 
 /* Makes room for the header with what is known of the names. */
-static int make_room(struct ply *ply, const struct scanhead *sh, uint32_t n_surfaces, struct sh_err *err)
+static int make_room(struct ply *ply, uint32_t n_surfaces, struct sh_err *err)
 {
-    int rc = ply_names_grow(&ply->names, n_surfaces, err);
-    for (uint32_t i = 0; rc == 0 && i < n_surfaces; i++) {
-        const char *object, *material;
-        if (scanhead_surface(sh, i, &object, &material)) rc = ply_names_set(&ply->names, i, object, material, err);
-    }
-    if (rc != 0) return rc;
-    ply->header_len = ply_header_reserve(&ply->facts, &ply->names);
+    static const char blank[4096];
+    ply->header_len = ply_header_reserve(&ply->facts, n_surfaces);
     if (ply->header_len == 0) return sh_fail(err, SH_ENOMEM, "%s: no memory for the header", ply->base.file.path);
     ply->begun = 1;
-    static const char blank[4096];
+    int rc = 0;
     for (size_t left = ply->header_len; left > 0 && rc == 0;) {
         size_t n = left < sizeof blank ? left : sizeof blank;
         rc = outfile_write(&ply->base.file, blank, n, err);
@@ -138,16 +133,9 @@ static int ply_scan(void *rec, struct sh_err *err)
     struct ply *ply = rec;
     const struct scanhead_info *info = &ply->base.track.info;
     struct ply_facts *facts = &ply->facts;
-    facts->have_crs = 1;
-    facts->crs = track_crs(&ply->base.track);
-    facts->epsg = track_epsg(&ply->base.track);
-    facts->geoid_heights = track_is_geoid(&ply->base.track);
-    facts->moving = info->moving;
-    facts->stops = info->stop;
-    facts->attributes = ply->base.track.has_attributes;
     snprintf(facts->idn, sizeof facts->idn, "%s", info->idn);
     snprintf(facts->profile, sizeof facts->profile, "%s", info->profile);
-    return ply->begun ? 0 : make_room(ply, ply->base.track.sh, info->n_surfaces, err);
+    return ply->begun ? 0 : make_room(ply, info->n_surfaces, err);
 }
 
 static int ply_points(void *rec, int n, struct sh_err *err)
@@ -171,8 +159,8 @@ static int ply_points(void *rec, int n, struct sh_err *err)
             p->y = xyz[1];
             p->z = xyz[2];
         }
-        size_t len =
-            ply->facts.ascii ? put_ascii((char *)to + used, &v, ply->facts.crs == 3) : put_binary(to + used, &v);
+        size_t len = ply->facts.ascii ? put_ascii((char *)to + used, &v, t->crs == NATIVE_CRS_GEODETIC)
+                                      : put_binary(to + used, &v);
         if (len > TEXT_LEN) return recorder_fail_huge(&ply->base, (double[]){p->x, p->y, p->z}, err);
         used += len;
         ply->facts.n_vertices++;
@@ -181,26 +169,11 @@ static int ply_points(void *rec, int n, struct sh_err *err)
     return 0;
 }
 
-struct naming {
-    struct ply *ply;
-    struct sh_err *err;
-    int rc;
-};
-
-static void take_name(void *ctx, uint32_t label, const char *object, const char *material)
-{
-    struct naming *naming = ctx;
-    if (naming->rc == 0) naming->rc = ply_names_set(&naming->ply->names, label, object, material, naming->err);
-}
-
 static int ply_frame(void *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
 {
     struct ply *ply = rec;
     scanhead_get_stats(sh, &ply->facts.stats);
-    if (frame->type != SCANHEAD_SURFACES) return track_frame(&ply->base.track, sh, frame, err);
-    struct naming naming = {ply, err, 0};
-    native_decode_surfaces(frame->payload, frame->payload_len, take_name, &naming);
-    return naming.rc;
+    return track_frame(&ply->base.track, sh, frame, err);
 }
 
 /* The header outgrew its room: the points move to where it ends, block by block from the end. */
@@ -234,7 +207,7 @@ static int ply_finish(void *rec, struct sh_err *err)
     ply->facts.n_without_pose = ply->base.track.n_without_pose;
     char *header;
     size_t len;
-    if (rc == 0) rc = ply_header_make(&ply->facts, &ply->names, ply->header_len, &header, &len, err);
+    if (rc == 0) rc = ply_header_make(&ply->facts, ply->header_len, &header, &len, err);
     if (rc != 0) return rc;
     if (len > ply->header_len) rc = move_points(ply, len, err);
     if (rc == 0) rc = outfile_patch(&ply->base.file, 0, header, len, err);
@@ -242,18 +215,11 @@ static int ply_finish(void *rec, struct sh_err *err)
     return rc;
 }
 
-static void ply_release(void *rec)
-{
-    ply_names_free(&((struct ply *)rec)->names);
-}
-
 const struct recorder_ops recorder_ply = {
     .ending = ".ply",
     .size = sizeof(struct ply),
-    .wants_attributes = 1,
-    .track = {.scan = ply_scan, .points = ply_points},
+    .track = {.scan = ply_scan, .points = ply_points, .wants_attributes = 1},
     .begin = ply_begin,
     .frame = ply_frame,
     .finish = ply_finish,
-    .release = ply_release,
 };

@@ -45,11 +45,11 @@ static int put_station(void *rec, struct sh_err *err)
     char row[LINE];
     if (t->info.moving) return SH_OK;
     memcpy(p, t->pose.shift_m, sizeof p);
-    if (track_crs(t) == NATIVE_CRS_GEODETIC) p[0] = p[1] = p[2] = NAN;
+    if (t->crs == NATIVE_CRS_GEODETIC) p[0] = p[1] = p[2] = NAN;
     station_pose_quaternion(&t->pose, q);
     int n = snprintf(row, sizeof row, "%u,%u,%d,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g",
-                     t->n_scans, t->info.station, track_epsg(t), p[0], p[1], p[2], q[0], q[1], q[2], q[3],
-                     t->info.lat_deg, t->info.lon_deg, t->info.height_m);
+                     t->n_scans, t->info.station, t->epsg, p[0], p[1], p[2], q[0], q[1], q[2], q[3], t->info.lat_deg,
+                     t->info.lon_deg, t->info.height_m);
     if (t->info.stop) n += snprintf(row + n, sizeof row - (size_t)n, ",%.9g", t->info.frame);
     row[n++] = '\n';
     int rc = put_title(file, t->info.stop ? STOPS : STATIONS, err);

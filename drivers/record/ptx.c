@@ -128,7 +128,6 @@ static void ptx_release(void *rec)
 const struct recorder_ops recorder_ptx = {
     .ending = ".ptx",
     .size = sizeof(struct ptx),
-    .metres = 1,
     .track = {.scan = ptx_scan, .points = ptx_points, .metres = 1},
     .begin = ptx_begin,
     .finish = ptx_finish,

@@ -42,7 +42,6 @@ int recorder_open(const struct recorder_ops *ops, const char *path, const struct
     rec->track.path = rec->file.path;
     rec->track.ops = &ops->track;
     rec->track.rec = rec;
-    rec->track.wants_attributes = ops->wants_attributes;
     rc = ops->begin != NULL ? ops->begin(rec, err) : SH_OK;
     if (rc != SH_OK) {
         recorder_close(rec, 0, NULL);

@@ -31,8 +31,6 @@ struct recorder {
 struct recorder_ops {
     const char *ending;     /* ".ply" */
     size_t size;            /* of the recorder's own struct; after its struct recorder it begins zeroed */
-    int metres;             /* 1: its coordinates are metres; the first points of a geodetic stream are refused */
-    int wants_attributes;   /* 1: it has a place for amplitude and width */
     struct track_ops track; /* takes points in batches */
     /* The file is open and empty. */
     int (*begin)(void *rec, struct sh_err *err);
@@ -51,7 +49,8 @@ const struct recorder_ops *recorder_find(const char *path, struct sh_err *err);
  * beside it (".part") that is renamed at the end. Options are copied. */
 int recorder_open(const struct recorder_ops *ops, const char *path, const struct recorder_options *options,
                   struct recorder **rec, struct sh_err *err);
-/* Each frame of the stream, in order, with the handle for information, points and surfaces. */
+/* Each frame of the stream, in order, with the handle for information, points and surfaces. The handle must
+ * live until close. */
 int recorder_frame(struct recorder *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
 /* Finishes the file, syncs and renames it; keep = 0: throws it away. rec is freed, also after a failure. */
 int recorder_close(struct recorder *rec, int keep, struct sh_err *err);

@@ -3,32 +3,27 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/mat3.h"
+
 void station_pose_of(const struct scanhead_info *info, struct station_pose *pose)
 {
-    const double *m = info->axes, *r = info->rotation;
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            pose->rotation[3 * i + j] =
-                info->geo ? m[3 * i] * r[j] + m[3 * i + 1] * r[3 + j] + m[3 * i + 2] * r[6 + j] : r[3 * i + j];
+    memcpy(pose->rotation, info->rotation, sizeof pose->rotation);
+    if (info->geo) mat3_multiply(info->axes, info->rotation, pose->rotation);
     memcpy(pose->shift_m, info->geo ? info->anchor : info->station_m, sizeof pose->shift_m);
 }
 
 void station_pose_forward(const struct station_pose *pose, double p[3])
 {
-    const double *r = pose->rotation, *s = pose->shift_m;
-    double x = p[0], y = p[1], z = p[2];
-    p[0] = s[0] + (r[0] * x + r[1] * y + r[2] * z);
-    p[1] = s[1] + (r[3] * x + r[4] * y + r[5] * z);
-    p[2] = s[2] + (r[6] * x + r[7] * y + r[8] * z);
+    double turned[3];
+    mat3_apply(pose->rotation, p, turned);
+    for (int i = 0; i < 3; i++)
+        p[i] = pose->shift_m[i] + turned[i];
 }
 
 void station_pose_reverse(const struct station_pose *pose, double p[3])
 {
-    const double *r = pose->rotation, *s = pose->shift_m;
-    double x = p[0] - s[0], y = p[1] - s[1], z = p[2] - s[2];
-    p[0] = r[0] * x + r[3] * y + r[6] * z;
-    p[1] = r[1] * x + r[4] * y + r[7] * z;
-    p[2] = r[2] * x + r[5] * y + r[8] * z;
+    const double *s = pose->shift_m, from_station[3] = {p[0] - s[0], p[1] - s[1], p[2] - s[2]};
+    mat3_apply_transposed(pose->rotation, from_station, p);
 }
 
 /* By the largest of the four components, so that none is the difference of near numbers (Shepperd 1978). */

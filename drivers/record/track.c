@@ -5,21 +5,6 @@
 
 #include "drivers/protocol/native.h"
 
-int track_crs(const struct track *track)
-{
-    return track->crs;
-}
-
-int track_epsg(const struct track *track)
-{
-    return track->epsg;
-}
-
-int track_is_geoid(const struct track *track)
-{
-    return track->geoid;
-}
-
 int track_start_gps(const struct track *track, double *gps_s)
 {
     if (scanhead_gps_time(track->sh, 0, gps_s) != 0) return 0;
@@ -38,7 +23,7 @@ static int check_info(struct track *t, struct sh_err *err)
     if (t->begun && (t->crs != crs || t->epsg != epsg))
         return sh_fail(err, SH_EFORMAT, "%s: the stream went from EPSG %d to %d; a file holds one CRS", t->path,
                        t->epsg, epsg);
-    if (t->begun && t->geoid != geoid)
+    if (t->begun && t->geoid_heights != geoid)
         return sh_fail(err, SH_EFORMAT, "%s: the stream went to other heights (%s); a file holds one kind", t->path,
                        geoid ? "geoid" : "ellipsoid");
     if (t->begun && (t->moving != info->moving || t->stops != info->stop))
@@ -46,17 +31,17 @@ static int check_info(struct track *t, struct sh_err *err)
                        info->moving ? "moves"
                        : info->stop ? "stops on a trajectory"
                                     : "stands still");
-    if (t->begun && t->wants_attributes && t->has_attributes != (scanhead_has_attributes(t->sh) == 1))
+    if (t->begun && t->ops->wants_attributes && t->has_attributes != (scanhead_has_attributes(t->sh) == 1))
         return sh_fail(err, SH_EFORMAT, "%s: the stream went on %s attributes; a file holds one kind", t->path,
                        t->has_attributes ? "without" : "with");
     if (info->station > UINT16_MAX)
         return sh_fail(err, SH_EFORMAT, "%s: station %u; a file holds stations up to 65535", t->path, info->station);
     t->crs = crs;
     t->epsg = epsg;
-    t->geoid = geoid;
+    t->geoid_heights = geoid;
     t->moving = info->moving;
     t->stops = info->stop;
-    t->has_attributes = t->wants_attributes && scanhead_has_attributes(t->sh) == 1;
+    t->has_attributes = t->ops->wants_attributes && scanhead_has_attributes(t->sh) == 1;
     t->scale_m = info->moving && info->scale_m > 0 && info->scale_m < MOVING_SCALE_M ? MOVING_SCALE_M : info->scale_m;
     t->begun = 1;
     return 0;
@@ -192,17 +177,17 @@ void track_free(struct track *t)
     t->waiting = NULL;
 }
 
-static int take_attributes(struct track *t, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
+static int take_attributes(struct track *t, const struct scanhead_frame *frame, struct sh_err *err)
 {
     struct scanhead_attribute attribute[NATIVE_MAX_POINTS];
     if (t->waiting == NULL || t->waiting->n == 0) return 0;
-    if (scanhead_attributes(sh, frame, 0, attribute, NATIVE_MAX_POINTS) < 0) return 0; /* of points that were lost */
+    if (scanhead_attributes(t->sh, frame, 0, attribute, NATIVE_MAX_POINTS) < 0) return 0; /* of points that were lost */
     return hand_out(t, attribute, err);
 }
 
 static void count_unheld(struct track *t, int n)
 {
-    if (t->wants_attributes || scanhead_has_attributes(t->sh) != 1) return;
+    if (t->ops->wants_attributes || scanhead_has_attributes(t->sh) != 1) return;
     for (int i = 0; i < n; i++)
         t->n_attributes_unheld += t->point[i].echo_count != 0;
 }
@@ -247,15 +232,14 @@ static int take_batches(struct track *t, const struct scanhead_frame *frame, uin
     return rc;
 }
 
-static int take_points(struct track *t, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
+static int take_points(struct track *t, const struct scanhead_frame *frame, struct sh_err *err)
 {
     int rc = track_flush(t, err);
     if (rc != 0) return rc;
-    if (scanhead_get_info(sh, &t->info) != 0) {
+    if (scanhead_get_info(t->sh, &t->info) != 0) {
         t->n_unplaced += frame->n_points;
         return 0;
     }
-    t->sh = sh;
     int begins = begins_scan(t, frame);
     rc = check_info(t, err);
     t->line = frame->scan_line;
@@ -272,7 +256,7 @@ static int take_points(struct track *t, struct scanhead *sh, const struct scanhe
 
 static void take_line_end(struct track *t, const struct scanhead_frame *frame)
 {
-    struct native_line_end end;
+    struct line_end end;
     t->have_next_line = native_decode_line_end(frame->payload, frame->payload_len, &end) == 0;
     if (!t->have_next_line) return;
     t->next_line = end.line + 1;
@@ -281,8 +265,9 @@ static void take_line_end(struct track *t, const struct scanhead_frame *frame)
 
 int track_frame(struct track *t, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
 {
-    if (frame->type == SCANHEAD_POINTS) return take_points(t, sh, frame, err);
-    if (frame->type == SCANHEAD_ATTRIBUTES) return take_attributes(t, sh, frame, err);
+    t->sh = sh;
+    if (frame->type == SCANHEAD_POINTS) return take_points(t, frame, err);
+    if (frame->type == SCANHEAD_ATTRIBUTES) return take_attributes(t, frame, err);
     if (frame->type == SCANHEAD_LINE_END) take_line_end(t, frame);
     if (frame->type == SCANHEAD_DESCRIPTOR && (frame->flags & SCANHEAD_REPEAT) == 0) {
         t->new_scan = 1;

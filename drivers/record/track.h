@@ -10,7 +10,7 @@
  * Where that frame was lost, they come out with the next points, or at the end. Their attributes are then
  * NaN, and are counted.
  *
- * The owner sets path, ops, rec and wants_attributes in a zeroed struct. One thread per track. */
+ * The owner sets path, ops and rec in a zeroed struct. One thread per track. */
 #ifndef DRIVERS_RECORD_TRACK_H
 #define DRIVERS_RECORD_TRACK_H
 
@@ -28,7 +28,8 @@ struct track_ops {
     /* n points of track->point. In the geo layout they are in the CRS; in the polar layout in the head's
      * frame, or in the scene frame where the head moves. NULL: no points wanted. */
     int (*points)(void *rec, int n, struct sh_err *err);
-    int metres; /* 1: SH_EFORMAT where points of a scan are in geodetic coordinates */
+    int metres;           /* 1: SH_EFORMAT where points of a scan are in geodetic coordinates */
+    int wants_attributes; /* 1: it has a place for amplitude and width */
 };
 
 struct track {
@@ -36,14 +37,17 @@ struct track {
     const char *path; /* for messages */
     const struct track_ops *ops;
     void *rec; /* what ops are called with */
-    int wants_attributes;
     /* of the frame that the points at hand are in */
-    struct scanhead *sh;
+    struct scanhead *sh; /* of the last frame of any kind */
     struct scanhead_info info;
     struct station_pose pose;
     uint32_t line; /* in the scan, from 0 */
     int64_t t0_ns; /* of the first point, since the scan's start */
-    /* of the stream so far */
+    /* of the stream so far; the first six only with points (begun) */
+    int begun;
+    int crs;  /* enum native_crs; of the recording's points: of the stream in the geo layout, else the scene frame */
+    int epsg; /* 0: none */
+    int geoid_heights, moving, stops;
     uint32_t n_scans;              /* with points */
     uint64_t n_unplaced;           /* points before their descriptor and anchor were seen */
     uint64_t n_without_pose;       /* points of a moving head whose pose was lost */
@@ -57,10 +61,9 @@ struct track {
     struct scanhead_attribute attribute[TRACK_BATCH];
     double gps_s[TRACK_BATCH]; /* scanhead_gps_time of each, as of its own frame; NaN: not known */
     /* inner state */
-    int begun, new_scan, have_next_line;
+    int new_scan, have_next_line;
     uint32_t index[TRACK_BATCH]; /* of each point in its frame, where it may wait */
     struct track_waiting *waiting;
-    int crs, epsg, geoid, moving, stops;
     uint32_t next_line, last_station;
     uint64_t next_line_pulse0, last_pulse0;
 };
@@ -74,10 +77,6 @@ int track_frame(struct track *track, struct scanhead *sh, const struct scanhead_
 int track_flush(struct track *track, struct sh_err *err);
 void track_free(struct track *track);
 
-/* The CRS of the recording's points: the stream's in the geo layout, the scene frame in the polar one. */
-int track_crs(const struct track *track);  /* enum native_crs */
-int track_epsg(const struct track *track); /* 0: none */
-int track_is_geoid(const struct track *track);
 /* GPS time of the present scan's start, seconds since 1980-01-06: 1, or 0 where it is not known (yet). */
 int track_start_gps(const struct track *track, double *gps_s);
 

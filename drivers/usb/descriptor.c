@@ -1,7 +1,6 @@
 /* A model as descriptors, byte by byte. */
 #include <string.h>
 
-#include "drivers/protocol/bytes.h"
 #include "drivers/usb/usb.h"
 
 enum {
@@ -17,6 +16,12 @@ enum {
     WORKS_FROM_FULL = 1, /* bFunctionalitySupport: complete at full speed already */
     U1_EXIT_US = 10,
     U2_EXIT_US = 2047,
+    NO_LATENCY_MESSAGES = 0,
+    FULL_TO_SUPER = 0x000e, /* wSpeedsSupported: full, high and super speed */
+    NO_STREAMS = 0,
+    N_CONFIGURATIONS = 1,
+    MS_WINDOWS = 0x06030000, /* the oldest that knows the set: 8.1 */
+    LATER = 0,               /* a length that patch16 puts in at the end */
 };
 
 /* What does not fit is counted and not written. */
@@ -31,27 +36,13 @@ static void put(struct sink *to, const void *bytes, size_t n)
     to->len += n;
 }
 
-static void put8(struct sink *to, unsigned v)
-{
-    const uint8_t byte = (uint8_t)v;
-    put(to, &byte, 1);
-}
+/* Fields of a descriptor as its bytes. */
+#define PUT(to, ...) put(to, (const uint8_t[]){__VA_ARGS__}, sizeof((const uint8_t[]){__VA_ARGS__}))
+#define U8(v)        (uint8_t)(v)
+#define U16(v)       U8(v), U8((v) >> 8)
+#define U32(v)       U16(v), U16((v) >> 16)
 
-static void put16(struct sink *to, unsigned v)
-{
-    uint8_t bytes[2];
-    le_put16(bytes, (uint16_t)v);
-    put(to, bytes, 2);
-}
-
-static void put32(struct sink *to, uint32_t v)
-{
-    uint8_t bytes[4];
-    le_put32(bytes, v);
-    put(to, bytes, 4);
-}
-
-/* A field that was put before its value was known. */
+/* A length that was put before it was known. */
 static void patch16(struct sink *to, size_t at, unsigned v)
 {
     if (at < to->room) to->out[at] = (uint8_t)v;
@@ -82,20 +73,10 @@ size_t usb_describe_device(const struct usb_model *model, const struct usb_ident
                            uint8_t *out, size_t room)
 {
     struct sink to = {out, room, 0};
-    put8(&to, USB_DT_DEVICE_SIZE);
-    put8(&to, USB_DT_DEVICE);
-    put16(&to, rate == USB_RATE_SUPER ? BCD_USB_3 : BCD_USB_2);
-    put8(&to, model->class);
-    put8(&to, model->subclass);
-    put8(&to, model->protocol);
-    put8(&to, rate == USB_RATE_SUPER ? PACKET_0_SUPER : PACKET_0);
-    put16(&to, id->vid);
-    put16(&to, id->pid);
-    put16(&to, model->bcd_device);
-    put8(&to, model->manufacturer);
-    put8(&to, model->product);
-    put8(&to, serial_index(model, id));
-    put8(&to, 1); /* configurations */
+    const int super = rate == USB_RATE_SUPER;
+    PUT(&to, USB_DT_DEVICE_SIZE, USB_DT_DEVICE, U16(super ? BCD_USB_3 : BCD_USB_2), model->class, model->subclass,
+        model->protocol, super ? PACKET_0_SUPER : PACKET_0, U16(id->vid), U16(id->pid), U16(model->bcd_device),
+        model->manufacturer, model->product, U8(serial_index(model, id)), N_CONFIGURATIONS);
     return to.len;
 }
 
@@ -105,46 +86,24 @@ size_t usb_describe_qualifier(const struct usb_model *model, const struct usb_id
 {
     struct sink to = {out, room, 0};
     if (id->highest < USB_RATE_HIGH || rate == USB_RATE_SUPER) return 0;
-    put8(&to, 10);
-    put8(&to, USB_DT_DEVICE_QUALIFIER);
-    put16(&to, BCD_USB_2);
-    put8(&to, model->class);
-    put8(&to, model->subclass);
-    put8(&to, model->protocol);
-    put8(&to, PACKET_0);
-    put8(&to, 1); /* configurations */
-    put8(&to, 0);
+    PUT(&to, 10, USB_DT_DEVICE_QUALIFIER, U16(BCD_USB_2), model->class, model->subclass, model->protocol, PACKET_0,
+        N_CONFIGURATIONS, 0);
     return to.len;
 }
 
 static void put_endpoint(struct sink *to, const struct usb_endpoint_row *row, enum usb_rate rate)
 {
-    put8(to, USB_DT_ENDPOINT_SIZE);
-    put8(to, USB_DT_ENDPOINT);
-    put8(to, row->address);
-    put8(to, row->type);
-    put16(to, row->packet[rate]);
-    put8(to, row->interval[rate]);
+    PUT(to, USB_DT_ENDPOINT_SIZE, USB_DT_ENDPOINT, row->address, row->type, U16(row->packet[rate]),
+        row->interval[rate]);
     if (rate != USB_RATE_SUPER) return;
     const unsigned per_interval = row->type == USB_ENDPOINT_XFER_INT ? row->packet[rate] * (row->burst + 1u) : 0;
-    put8(to, USB_DT_SS_EP_COMP_SIZE);
-    put8(to, USB_DT_SS_ENDPOINT_COMP);
-    put8(to, row->burst);
-    put8(to, 0); /* no streams */
-    put16(to, per_interval);
+    PUT(to, USB_DT_SS_EP_COMP_SIZE, USB_DT_SS_ENDPOINT_COMP, row->burst, NO_STREAMS, U16(per_interval));
 }
 
 static void put_interface(struct sink *to, const struct usb_interface_row *row, enum usb_rate rate)
 {
-    put8(to, USB_DT_INTERFACE_SIZE);
-    put8(to, USB_DT_INTERFACE);
-    put8(to, row->number);
-    put8(to, row->alt);
-    put8(to, row->n_endpoints);
-    put8(to, row->class);
-    put8(to, row->subclass);
-    put8(to, row->protocol);
-    put8(to, row->string);
+    PUT(to, USB_DT_INTERFACE_SIZE, USB_DT_INTERFACE, row->number, row->alt, row->n_endpoints, row->class, row->subclass,
+        row->protocol, row->string);
     if (row->extra_len > 0) put(to, row->extra, row->extra_len);
     for (unsigned i = 0; i < row->n_endpoints; i++)
         put_endpoint(to, &row->endpoint[i], rate);
@@ -155,20 +114,9 @@ static void put_association(struct sink *to, const struct usb_model *model, unsi
     for (unsigned i = 0; i < model->n_functions; i++) {
         const struct usb_function_row *function = &model->function[i];
         if (function->first != interface || function->count < 2) continue;
-        put8(to, USB_DT_INTERFACE_ASSOCIATION_SIZE);
-        put8(to, USB_DT_INTERFACE_ASSOCIATION);
-        put8(to, function->first);
-        put8(to, function->count);
-        put8(to, function->class);
-        put8(to, function->subclass);
-        put8(to, function->protocol);
-        put8(to, function->string);
+        PUT(to, USB_DT_INTERFACE_ASSOCIATION_SIZE, USB_DT_INTERFACE_ASSOCIATION, function->first, function->count,
+            function->class, function->subclass, function->protocol, function->string);
     }
-}
-
-static enum usb_rate other_rate(enum usb_rate rate)
-{
-    return rate == USB_RATE_HIGH ? USB_RATE_FULL : USB_RATE_HIGH;
 }
 
 size_t usb_describe_config(const struct usb_model *model, const struct usb_identity *id, enum usb_rate rate,
@@ -177,17 +125,11 @@ size_t usb_describe_config(const struct usb_model *model, const struct usb_ident
     struct sink to = {out, room, 0};
     if (type == USB_DT_OTHER_SPEED_CONFIG) {
         if (id->highest < USB_RATE_HIGH || rate == USB_RATE_SUPER) return 0;
-        rate = other_rate(rate);
+        rate = rate == USB_RATE_HIGH ? USB_RATE_FULL : USB_RATE_HIGH;
     }
     const unsigned unit_ma = rate == USB_RATE_SUPER ? 8 : 2;
-    put8(&to, USB_DT_CONFIG_SIZE);
-    put8(&to, type);
-    put16(&to, 0); /* wTotalLength, below */
-    put8(&to, model->n_interfaces);
-    put8(&to, USB_CONFIGURATION);
-    put8(&to, 0);
-    put8(&to, 0x80 | (model->max_power_ma == 0 ? SELF_POWERED : 0));
-    put8(&to, (model->max_power_ma + unit_ma - 1) / unit_ma);
+    PUT(&to, USB_DT_CONFIG_SIZE, type, U16(LATER), model->n_interfaces, USB_CONFIGURATION, 0,
+        0x80 | (model->max_power_ma == 0 ? SELF_POWERED : 0), U8((model->max_power_ma + unit_ma - 1) / unit_ma));
     for (unsigned i = 0; i < model->n_rows; i++) {
         if (model->interface[i].alt == 0) put_association(&to, model, model->interface[i].number);
         put_interface(&to, &model->interface[i], rate);
@@ -201,15 +143,9 @@ static void put_ms_platform(struct sink *to, const struct usb_model *model, size
 {
     static const uint8_t uuid[16] = {0xdf, 0x60, 0xdd, 0xd8, 0x89, 0x45, 0xc7, 0x4c,
                                      0x9c, 0xd2, 0x65, 0x9d, 0x9e, 0x64, 0x8a, 0x9f};
-    put8(to, 28);
-    put8(to, USB_DT_DEVICE_CAPABILITY);
-    put8(to, CAP_PLATFORM);
-    put8(to, 0);
+    PUT(to, 28, USB_DT_DEVICE_CAPABILITY, CAP_PLATFORM, 0);
     put(to, uuid, sizeof uuid);
-    put32(to, 0x06030000);
-    put16(to, (unsigned)set_len);
-    put8(to, model->ms_vendor_code);
-    put8(to, 0); /* no alternate enumeration */
+    PUT(to, U32(MS_WINDOWS), U16(set_len), model->ms_vendor_code, 0); /* 0: no alternate enumeration */
 }
 
 size_t usb_describe_bos(const struct usb_model *model, const struct usb_identity *id, uint8_t *out, size_t room)
@@ -217,24 +153,11 @@ size_t usb_describe_bos(const struct usb_model *model, const struct usb_identity
     struct sink to = {out, room, 0};
     const int super = id->highest == USB_RATE_SUPER;
     const size_t ms_len = usb_describe_ms_os(model, NULL, 0);
-    put8(&to, USB_DT_BOS_SIZE);
-    put8(&to, USB_DT_BOS);
-    put16(&to, 0); /* wTotalLength, below */
-    put8(&to, 1u + (unsigned)super + (ms_len != 0));
-    put8(&to, USB_DT_USB_EXT_CAP_SIZE);
-    put8(&to, USB_DT_DEVICE_CAPABILITY);
-    put8(&to, CAP_USB_2_EXTENSION);
-    put32(&to, super ? LPM : 0);
-    if (super) {
-        put8(&to, USB_DT_USB_SS_CAP_SIZE);
-        put8(&to, USB_DT_DEVICE_CAPABILITY);
-        put8(&to, CAP_SUPER_SPEED);
-        put8(&to, 0);       /* no latency tolerance messages */
-        put16(&to, 0x000e); /* full, high and super speed */
-        put8(&to, WORKS_FROM_FULL);
-        put8(&to, U1_EXIT_US);
-        put16(&to, U2_EXIT_US);
-    }
+    PUT(&to, USB_DT_BOS_SIZE, USB_DT_BOS, U16(LATER), U8(1 + super + (ms_len != 0)));
+    PUT(&to, USB_DT_USB_EXT_CAP_SIZE, USB_DT_DEVICE_CAPABILITY, CAP_USB_2_EXTENSION, U32(super ? LPM : 0));
+    if (super)
+        PUT(&to, USB_DT_USB_SS_CAP_SIZE, USB_DT_DEVICE_CAPABILITY, CAP_SUPER_SPEED, NO_LATENCY_MESSAGES,
+            U16(FULL_TO_SUPER), WORKS_FROM_FULL, U1_EXIT_US, U16(U2_EXIT_US));
     if (ms_len != 0) put_ms_platform(&to, model, ms_len);
     patch16(&to, 2, (unsigned)to.len);
     return to.len;
@@ -267,10 +190,10 @@ static void put_utf16(struct sink *to, const char *text, size_t max)
         uint32_t code = take_utf8(&at);
         if (to->len + (code > 0xffff ? 4 : 2) > end) return;
         if (code > 0xffff) {
-            put16(to, 0xd800 + ((code - 0x10000) >> 10));
+            PUT(to, U16(0xd800 + ((code - 0x10000) >> 10)));
             code = 0xdc00 + ((code - 0x10000) & 0x3ff);
         }
-        put16(to, code);
+        PUT(to, U16(code));
     }
 }
 
@@ -280,10 +203,9 @@ size_t usb_describe_string(const struct usb_model *model, const struct usb_ident
     struct sink to = {out, room, 0};
     const unsigned n = count_strings(model), serial = serial_index(model, id);
     if (index > n && (serial == 0 || index != serial)) return 0;
-    put8(&to, 0); /* bLength, below */
-    put8(&to, USB_DT_STRING);
+    PUT(&to, LATER, USB_DT_STRING);
     if (index == 0)
-        put16(&to, USB_LANGID);
+        PUT(&to, U16(USB_LANGID));
     else
         put_utf16(&to, index == serial ? id->serial : model->string[index - 1], 252);
     if (room > 0) out[0] = (uint8_t)to.len;
@@ -299,28 +221,19 @@ static void put_property(struct sink *to, const char *guid)
 {
     static const char name[] = "DeviceInterfaceGUIDs";
     const unsigned name_len = 2 * sizeof name, data_len = 2 * ((unsigned)strlen(guid) + 2);
-    put16(to, 10 + name_len + data_len);
-    put16(to, MS_PROPERTY);
-    put16(to, MS_MULTI_SZ);
-    put16(to, name_len);
+    PUT(to, U16(10 + name_len + data_len), U16(MS_PROPERTY), U16(MS_MULTI_SZ), U16(name_len));
     put_utf16(to, name, name_len);
-    put16(to, 0);
-    put16(to, data_len);
+    PUT(to, U16(0), U16(data_len));
     put_utf16(to, guid, data_len);
-    put32(to, 0); /* end of the string, end of the list */
+    PUT(to, U16(0), U16(0)); /* end of the string, end of the list */
 }
 
 static void put_ms_function(struct sink *to, const struct usb_function_row *function)
 {
     char id[16] = {0};
     const size_t start = to->len;
-    put16(to, 8);
-    put16(to, MS_FUNCTION);
-    put8(to, function->first);
-    put8(to, 0);
-    put16(to, 0); /* length, below */
-    put16(to, 20);
-    put16(to, MS_COMPATIBLE_ID);
+    PUT(to, U16(8), U16(MS_FUNCTION), function->first, 0, U16(LATER));
+    PUT(to, U16(20), U16(MS_COMPATIBLE_ID));
     memcpy(id, function->compatible_id, strnlen(function->compatible_id, 8));
     put(to, id, sizeof id);
     if (function->guid != NULL) put_property(to, function->guid);
@@ -331,15 +244,8 @@ size_t usb_describe_ms_os(const struct usb_model *model, uint8_t *out, size_t ro
 {
     struct sink to = {out, room, 0};
     unsigned n = 0;
-    put16(&to, 10);
-    put16(&to, MS_SET_HEADER);
-    put32(&to, 0x06030000);
-    put16(&to, 0); /* length of the set, below */
-    put16(&to, 8);
-    put16(&to, MS_CONFIGURATION);
-    put8(&to, 0); /* index, not value, of the configuration */
-    put8(&to, 0);
-    put16(&to, 0); /* length of the subset, below */
+    PUT(&to, U16(10), U16(MS_SET_HEADER), U32(MS_WINDOWS), U16(LATER));
+    PUT(&to, U16(8), U16(MS_CONFIGURATION), 0, 0, U16(LATER)); /* index, not value, of the configuration */
     for (unsigned i = 0; i < model->n_functions; i++) {
         if (model->function[i].compatible_id == NULL) continue;
         put_ms_function(&to, &model->function[i]);

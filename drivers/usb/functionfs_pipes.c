@@ -36,6 +36,7 @@ static int open_pipe(struct ffs_pipe *pipe, const struct gadget *gadget, int num
     pipe->fd = open(path, O_RDWR | O_NONBLOCK | O_CLOEXEC);
     if (pipe->fd < 0) return sh_fail(err, SH_EIO, "functionfs: %s: %s", path, strerror(errno));
     for (int i = 0; i < FFS_SLOTS; i++) {
+        pipe->slot[i].pipe = pipe;
         pipe->slot[i].buffer = malloc(FFS_SLOT_BYTES);
         if (pipe->slot[i].buffer == NULL) return sh_fail(err, SH_ENOMEM, "functionfs: no memory");
     }
@@ -126,21 +127,11 @@ void ffs_pipes_stop(struct ffs_pipes *pipes)
     pipes->running = 0;
 }
 
-static struct ffs_pipe *pipe_of(struct ffs_pipes *pipes, const struct ffs_slot *slot)
-{
-    for (int i = 0; i < pipes->n; i++)
-        if (slot >= pipes->pipe[i].slot && slot < pipes->pipe[i].slot + FFS_SLOTS) return &pipes->pipe[i];
-    return NULL;
-}
-
-int ffs_pipes_complete(struct ffs_pipes *pipes, struct usb_transfer *transfer)
+void ffs_pipes_complete(struct ffs_pipes *pipes, struct usb_transfer *transfer)
 {
     struct ffs_slot *slot = (struct ffs_slot *)transfer;
-    struct ffs_pipe *pipe = pipe_of(pipes, slot);
-    if (pipe == NULL) return 0;
     slot->state = FFS_IDLE;
-    if (transfer->status == USB_OK && pipes->running) to_kernel(pipes, pipe, slot);
-    return 1;
+    if (transfer->status == USB_OK && pipes->running) to_kernel(pipes, slot->pipe, slot);
 }
 
 /* A slot the kernel has given back unused. An endpoint that is down does so at once, and would again; what is
@@ -161,7 +152,7 @@ int ffs_pipes_take(struct ffs_pipes *pipes)
     if (read(pipes->event_fd, &count, sizeof count) < 0 && errno != EAGAIN) return 0;
     if (syscall(SYS_io_getevents, pipes->aio, 1L, 1L, &event, &now) != 1) return 0;
     struct ffs_slot *slot = (struct ffs_slot *)(uintptr_t)event.data;
-    struct ffs_pipe *pipe = pipe_of(pipes, slot);
+    struct ffs_pipe *pipe = slot->pipe;
     if (--slot->n_io > 0) return 1; /* its zero-length packet is still on the way */
     if (event.res >= 0) slot->failures = 0;
     if (event.res < 0 && has_to_rest(pipes, slot, event.res))

@@ -19,6 +19,7 @@ enum ffs_slot_state { FFS_IDLE, FFS_AT_CORE, FFS_AT_KERNEL };
 
 struct ffs_slot {
     struct usb_transfer transfer;
+    struct ffs_pipe *pipe;
     enum ffs_slot_state state;
     struct iocb io, zero; /* zero: the packet of no bytes after it */
     int n_io;             /* of these, at the kernel */
@@ -53,8 +54,8 @@ void ffs_pipes_stop(struct ffs_pipes *pipes);
 int ffs_pipes_take(struct ffs_pipes *pipes);
 /* What was handed to the kernel in a session that is over is taken back: it is not for the next one. */
 void ffs_pipes_withdraw(struct ffs_pipes *pipes);
-/* The core gives a transfer back; 0: it is none of these. */
-int ffs_pipes_complete(struct ffs_pipes *pipes, struct usb_transfer *transfer);
+/* The core gives a transfer of a slot back. */
+void ffs_pipes_complete(struct ffs_pipes *pipes, struct usb_transfer *transfer);
 /* Waits until the host has taken what is at the kernel, as long as it takes something within timeout_ms. */
 void ffs_pipes_drain(struct ffs_pipes *pipes, int timeout_ms);
 void ffs_pipes_close(struct ffs_pipes *pipes);

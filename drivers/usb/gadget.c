@@ -58,26 +58,12 @@ static int make_dir(const char *dir, const char *name)
     return mkdir(path, 0755);
 }
 
-static void remove_dir(const char *dir, const char *name)
-{
-    char path[512];
-    snprintf(path, sizeof path, "%s/%s", dir, name);
-    rmdir(path);
-}
-
 static int make_link(const char *dir, const char *target, const char *name)
 {
     char from[512], to[512];
     snprintf(from, sizeof from, "%s/%s", dir, target);
     snprintf(to, sizeof to, "%s/%s", dir, name);
     return symlink(from, to);
-}
-
-static void remove_link(const char *dir, const char *name)
-{
-    char path[512];
-    snprintf(path, sizeof path, "%s/%s", dir, name);
-    unlink(path);
 }
 
 /* ---- what dead processes left */
@@ -95,23 +81,20 @@ static void unmount(const char *name)
 /* Removes everything of that name, in the order that configfs allows. What is not there is skipped. */
 static void remove_all(const char *name)
 {
-    char dir[128], function[64], link[80];
+    static const struct {
+        const char *path;
+        int named; /* the gadget's name follows */
+    } part[] = {
+        {"configs/c.1/acm.", 1}, {"configs/c.1/ffs.", 1}, {"os_desc/c.1", 0},    {"configs/c.1/strings/0x409", 0},
+        {"configs/c.1", 0},      {"functions/acm.", 1},   {"functions/ffs.", 1}, {"strings/0x409", 0}};
+    char dir[128], path[512];
     snprintf(dir, sizeof dir, "%s/%s", GADGETS, name);
     if (access(dir, F_OK) == 0) (void)write_text(dir, "UDC", "\n");
     unmount(name);
-    static const char *const kinds[] = {"acm", "ffs"};
-    for (int i = 0; i < 2; i++) {
-        snprintf(link, sizeof link, "configs/c.1/%s.%s", kinds[i], name);
-        remove_link(dir, link);
+    for (size_t i = 0; i < sizeof part / sizeof part[0]; i++) {
+        snprintf(path, sizeof path, "%s/%s%s", dir, part[i].path, part[i].named ? name : "");
+        remove(path); /* a link or a directory */
     }
-    remove_link(dir, "os_desc/c.1");
-    remove_dir(dir, "configs/c.1/strings/0x409");
-    remove_dir(dir, "configs/c.1");
-    for (int i = 0; i < 2; i++) {
-        snprintf(function, sizeof function, "functions/%s.%s", kinds[i], name);
-        remove_dir(dir, function);
-    }
-    remove_dir(dir, "strings/0x409");
     rmdir(dir);
 }
 

@@ -35,12 +35,10 @@
 
 enum {
     USB_MAX_INTERFACES = 8,
-    USB_MAX_ENDPOINTS = 30,  /* beside endpoint 0: 15 IN, 15 OUT */
-    USB_MAX_CONFIG = 512,    /* bytes of a configuration with all its descriptors */
-    USB_CONTROL_MAX = 65535, /* wLength */
-    USB_STALL = -1000,       /* of a control request; apart from the SH_E codes */
-    USB_CONFIGURATION = 1,   /* bConfigurationValue of the one configuration */
-    USB_LANGID = 0x0409,     /* English, United States */
+    USB_MAX_CONFIG = 512,  /* bytes of a configuration with all its descriptors */
+    USB_STALL = -1000,     /* of a control request; apart from the SH_E codes */
+    USB_CONFIGURATION = 1, /* bConfigurationValue of the one configuration */
+    USB_LANGID = 0x0409,   /* English, United States */
 };
 
 /* ---- a device as data */
@@ -108,6 +106,11 @@ size_t usb_describe_string(const struct usb_model *model, const struct usb_ident
                            size_t room);
 /* The Microsoft OS 2.0 descriptor set; 0 without compatible ids. */
 size_t usb_describe_ms_os(const struct usb_model *model, uint8_t *out, size_t room);
+/* Where tables of endpoints have one: 0 to 15 OUT, 16 to 31 IN. */
+static inline unsigned usb_endpoint_index(unsigned address)
+{
+    return (address & USB_ENDPOINT_NUMBER_MASK) + ((address & USB_DIR_IN) != 0 ? 16u : 0u);
+}
 /* The row of an interface's alternate setting, NULL when there is none. */
 const struct usb_interface_row *usb_find_row(const struct usb_model *model, unsigned interface, unsigned alt);
 

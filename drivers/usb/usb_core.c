@@ -6,12 +6,12 @@
 
 struct usb_pipe *usb_pipe(struct usb_device *device, unsigned address)
 {
-    return &device->pipe[(address & USB_ENDPOINT_NUMBER_MASK) + ((address & USB_DIR_IN) != 0 ? 16 : 0)];
+    return &device->pipe[usb_endpoint_index(address)];
 }
 
 static const struct usb_pipe *pipe_of(const struct usb_device *device, unsigned address)
 {
-    return &device->pipe[(address & USB_ENDPOINT_NUMBER_MASK) + ((address & USB_DIR_IN) != 0 ? 16 : 0)];
+    return &device->pipe[usb_endpoint_index(address)];
 }
 
 /* Takes the first transfer off the pipe and gives it back. The callback may submit again. */
@@ -36,18 +36,12 @@ static void finish_empty(struct usb_device *device, struct usb_pipe *pipe)
 /* Only what is there now: a back end may submit again from within complete(). */
 static void flush(struct usb_device *device, struct usb_pipe *pipe, enum usb_status status)
 {
-    struct usb_transfer *first = pipe->first;
+    struct usb_pipe old = *pipe;
     pipe->first = pipe->last = NULL;
-    uint32_t used = pipe->used;
     pipe->used = 0;
-    while (first != NULL) {
-        struct usb_transfer *transfer = first;
-        first = transfer->next;
-        transfer->next = NULL;
-        transfer->status = status;
-        transfer->actual = used;
-        used = 0;
-        device->complete(device->host_ctx, transfer);
+    while (old.first != NULL) {
+        old.first->actual = old.used;
+        finish(device, &old, status);
     }
 }
 
@@ -298,7 +292,7 @@ static int check_model(const struct usb_model *model, struct sh_err *err)
             return sh_fail(err, SH_EINPUT, "usb: interface row %u is out of order", i);
         for (unsigned k = 0; k < row->n_endpoints; k++) {
             const uint8_t address = row->endpoint[k].address;
-            uint8_t *of = &owner[(address & USB_ENDPOINT_NUMBER_MASK) + ((address & USB_DIR_IN) != 0 ? 16 : 0)];
+            uint8_t *of = &owner[usb_endpoint_index(address)];
             if ((address & USB_ENDPOINT_NUMBER_MASK) == 0 || (*of != 0xff && *of != number))
                 return sh_fail(err, SH_EINPUT, "usb: endpoint %02x belongs to two interfaces", address);
             *of = (uint8_t)number;

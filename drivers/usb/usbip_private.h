@@ -16,7 +16,6 @@ enum { MAX_UNSENT = 256, MAX_UNSENT_BYTES = 1 << 20 };
 /* The header of the reply stands before the bytes, so that both leave in one piece. */
 struct usbip_urb {
     struct usb_transfer transfer;
-    struct usbip_conn *conn;
     struct usbip_urb *next;
     uint32_t seqnum;
     int in;

@@ -15,7 +15,6 @@ struct usbip_urb *usbip_urb_new(struct usbip_conn *conn, uint32_t room)
     struct usbip_urb *urb = malloc(sizeof *urb + URB_HEADER + room);
     if (urb == NULL) return NULL;
     memset(urb, 0, sizeof *urb + URB_HEADER); /* the bytes are written before they are sent */
-    urb->conn = conn;
     urb->room = room;
     conn->n_pending++;
     conn->pending_bytes += room;

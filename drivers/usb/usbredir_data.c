@@ -17,7 +17,6 @@ enum { MAX_PENDING = 4096, MAX_PENDING_BYTES = 64 << 20, MAX_INTERRUPT = 1024 };
 
 struct redir_transfer {
     struct usb_transfer transfer;
-    struct usbredir *owner;
     struct usb_redir_bulk_packet_header bulk;
     uint8_t *packet; /* the parser's: what an OUT carries */
     uint32_t held;   /* counted in n_bytes */
@@ -41,7 +40,6 @@ static struct redir_transfer *new_transfer(struct usbredir *self, uint32_t room,
     struct redir_transfer *transfer = malloc(sizeof *transfer + room);
     if (transfer == NULL) return NULL;
     memset(transfer, 0, sizeof *transfer);
-    transfer->owner = self;
     transfer->held = bytes;
     self->n_pending++;
     self->n_bytes += bytes;

@@ -27,7 +27,7 @@ static void send_interfaces(struct usbredir *self)
         info.interface_protocol[i] = row->protocol;
         for (unsigned k = 0; k < row->n_endpoints; k++) {
             const struct usb_endpoint_row *ep = &row->endpoint[k];
-            const unsigned at = (ep->address & USB_ENDPOINT_NUMBER_MASK) + (ep->address & USB_DIR_IN ? 16u : 0u);
+            const unsigned at = usb_endpoint_index(ep->address);
             eps.type[at] = ep->type;
             eps.interval[at] = ep->interval[usb_device_rate(self->device)];
             eps.interface[at] = row->number;

@@ -18,7 +18,7 @@ int record_files_add(struct record_files *files, const char *path, struct sh_err
 int record_files_check_degrees(const struct record_files *files, struct sh_err *err)
 {
     for (int i = 0; i < files->n; i++)
-        if (files->file[i].ops->metres)
+        if (files->file[i].ops->track.metres)
             return sh_fail(err, SH_EINPUT,
                            "record: -o %s: this format holds metres, and output.crs is geodetic; allowed local, ecef, "
                            "utm, or .las, .ply",

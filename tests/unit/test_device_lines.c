@@ -14,7 +14,7 @@ struct tally {
     int64_t t_line;
 };
 
-static void tally_line(struct tally *tally, const struct native_line_end *end)
+static void tally_line(struct tally *tally, const struct line_end *end)
 {
     assert_true(end->pulse0 == tally->line_next && end->line == tally->lines);
     assert_true(end->t0_ns == tally->t_line && end->t1_ns >= end->t0_ns);
@@ -42,7 +42,7 @@ static void tally_tick(struct rig *rig, struct tally *tally)
         uint32_t len = (uint32_t)native_frame_len(frame) - NATIVE_HEADER_LEN;
         assert_int_equal(frame[0], NATIVE_SYNC);
         struct native_points points;
-        struct native_line_end end;
+        struct line_end end;
         if (frame[1] == NATIVE_POINTS) {
             assert_int_equal(native_decode_points(payload, len, &points), 0);
             assert_true(points.pulse0 >= tally->line_next && points.line == tally->lines &&

@@ -110,7 +110,7 @@ static void test_line_end(void **state)
     size_t len = native_encode_line_end(out, sizeof out, &e, 1000);
     check_frame(out, len, 4, 0, 68, 1000 + e.t1_ns);
     const uint8_t *p = out + 28;
-    struct native_line_end back;
+    struct line_end back;
     assert_int_equal(native_decode_line_end(p, 67, &back), SH_EFORMAT);
     assert_int_equal(native_decode_line_end(p, 68, &back), 0);
     assert_int_equal(wire(p, 56, 4), e.n_crowded);

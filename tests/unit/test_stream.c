@@ -60,7 +60,7 @@ static uint32_t read_echoes(uint64_t tick, uint32_t first_seq, uint32_t n_frames
 {
     uint8_t bytes[512];
     struct ring_copy copy = {.buf = bytes, .cap = sizeof bytes};
-    struct native_line_end end = {.n_echoes = UINT32_MAX};
+    struct line_end end = {.n_echoes = UINT32_MAX};
     assert_int_equal(ring_read(&stream.ring, 0, tick, &copy), RING_READ);
     assert_true(copy.first_seq == first_seq && copy.n_frames == n_frames);
     for (uint32_t at = 0, i = 0; at < copy.len; i++) {

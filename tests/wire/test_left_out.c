@@ -68,13 +68,13 @@ struct sums {
     uint64_t lines, cast, echoes, crowded, faint, unfit;
 };
 
-typedef void check_fn(const struct native_line_end *end, const struct oracle *oracle);
+typedef void check_fn(const struct line_end *end, const struct oracle *oracle);
 
 static void take_lines(struct scanhead *sh, const struct oracle *oracle, check_fn *check, struct sums *sums)
 {
     struct scanhead_frame frame;
     do {
-        struct native_line_end end;
+        struct line_end end;
         client_next(sh, &frame);
         if (frame.type != SCANHEAD_LINE_END) continue;
         assert_int_equal(native_decode_line_end(frame.payload, frame.payload_len, &end), 0);
@@ -124,7 +124,7 @@ static void scan(struct wire *wire, const char *noise, const char *more, check_f
 }
 
 /* Three returns of every pulse, two of which are told. */
-static void three_for_two(const struct native_line_end *end, const struct oracle *oracle)
+static void three_for_two(const struct line_end *end, const struct oracle *oracle)
 {
     (void)oracle;
     assert_int_equal(end->n_echoes, 2 * end->n_cast);
@@ -144,7 +144,7 @@ static void test_echoes_left_out(void **state)
 
 /* The range equation: a wall of the reflectance that is just seen at REACH_M is seen where cos i / R^2 >= 1 /
  * REACH_M^2. A part in 1e9 of that may go either way; and each hit is an echo or faint. */
-static void as_the_range_equation_says(const struct native_line_end *end, const struct oracle *oracle)
+static void as_the_range_equation_says(const struct line_end *end, const struct oracle *oracle)
 {
     uint32_t faint = 0, unsure = 0;
     for (uint64_t k = end->pulse0; k < end->pulse0 + end->n_fired; k++) {
@@ -172,7 +172,7 @@ static void test_hits_too_faint(void **state)
 }
 
 /* Every pulse has its one echo, and there is nothing else. */
-static void nothing_else(const struct native_line_end *end, const struct oracle *oracle)
+static void nothing_else(const struct line_end *end, const struct oracle *oracle)
 {
     (void)oracle;
     assert_int_equal(end->n_echoes, end->n_cast);
@@ -201,7 +201,7 @@ static double beyond(double q)
 /* How many a scan should have lost, and the variance of that. */
 static double unfit_mean, unfit_variance;
 
-static void as_the_ball_says(const struct native_line_end *end, const struct oracle *oracle)
+static void as_the_ball_says(const struct line_end *end, const struct oracle *oracle)
 {
     for (uint64_t k = end->pulse0; k < end->pulse0 + end->n_fired; k++) {
         struct room_ray ray;

@@ -76,7 +76,7 @@ static void take_points(struct account *a, struct scanhead *sh, const struct sca
  * the first line, when a tick before the scan was lost.) */
 static void take_line_end(struct account *a, const struct scanhead_frame *frame)
 {
-    struct native_line_end end;
+    struct line_end end;
     assert_int_equal(native_decode_line_end(frame->payload, frame->payload_len, &end), 0);
     note_gap(a, end.pulse0 + end.n_fired);
     int skipped =

@@ -127,7 +127,7 @@ static void check_points(struct check *c, struct scanhead *sh, const struct scan
 static void check_line_end(struct check *c, const struct scanhead_frame *frame)
 {
     const struct oracle *o = &c->oracle;
-    struct native_line_end end;
+    struct line_end end;
     uint64_t lines = oracle_frame_lines(o);
     assert_int_equal(native_decode_line_end(frame->payload, frame->payload_len, &end), 0);
     uint64_t first = oracle_first_pulse(o, c->line), next = oracle_first_pulse(o, c->line + 1);

@@ -18,7 +18,7 @@ struct scan {
     struct scanhead_point *point;
     uint32_t n_points, n_lines, n_frames;
     uint64_t pulses, n_echoes, n_several;
-    struct native_line_end line[LINES_MAX];
+    struct line_end line[LINES_MAX];
     char hash[65];
 };
 
