@@ -84,8 +84,8 @@ void scanhead_close(struct scanhead *sh)
 {
     if (sh == NULL) return;
     if (sh->source.ops != NULL) sh->source.ops->close(&sh->source);
-    free_nodes(sh->first);
-    free(sh->current);
+    free_nodes(sh->kept.first);
+    free(sh->kept.current);
     for (uint32_t i = 0; i < sh->n_surfaces; i++) {
         free(sh->surface[i].object);
         free(sh->surface[i].material);
@@ -102,10 +102,10 @@ const char *scanhead_error(const struct scanhead *sh)
 
 static struct host_node *pop(struct scanhead *sh)
 {
-    struct host_node *node = sh->first;
-    sh->first = node->next;
-    if (sh->first == NULL) sh->last = NULL;
-    sh->queued_bytes -= sizeof *node + node->len;
+    struct host_node *node = sh->kept.first;
+    sh->kept.first = node->next;
+    if (sh->kept.first == NULL) sh->kept.last = NULL;
+    sh->kept.bytes -= sizeof *node + node->len;
     return node;
 }
 
@@ -129,14 +129,14 @@ int host_keep(struct scanhead *sh)
     node->next = NULL;
     node->len = len;
     memcpy(node->raw, sh->parser.frame, len);
-    if (sh->last != NULL)
-        sh->last->next = node;
+    if (sh->kept.last != NULL)
+        sh->kept.last->next = node;
     else
-        sh->first = node;
-    sh->last = node;
-    sh->queued_bytes += sizeof *node + len;
+        sh->kept.first = node;
+    sh->kept.last = node;
+    sh->kept.bytes += sizeof *node + len;
     int rc = 0;
-    while (sh->queued_bytes > HOST_QUEUE_BYTES && rc == 0)
+    while (sh->kept.bytes > HOST_QUEUE_BYTES && rc == 0)
         rc = drop_oldest(sh);
     return rc;
 }
@@ -230,11 +230,11 @@ int scanhead_next(struct scanhead *sh, struct scanhead_frame *frame, int timeout
 {
     memset(frame, 0, sizeof *frame);
     sh->payload = NULL;
-    free(sh->current);
-    sh->current = NULL;
-    if (sh->first != NULL) {
-        sh->current = pop(sh);
-        return hand_out(sh, sh->current->raw, frame);
+    free(sh->kept.current);
+    sh->kept.current = NULL;
+    if (sh->kept.first != NULL) {
+        sh->kept.current = pop(sh);
+        return hand_out(sh, sh->kept.current->raw, frame);
     }
     int64_t deadline_ns = 0; /* asked for only when there is something to wait for */
     for (;;) {

@@ -44,14 +44,26 @@ struct host_source {
     char name[256]; /* for messages, and to open it again */
 };
 
+/* Frames that wait while a command waits for its reply. */
+struct host_kept {
+    struct host_node *first, *last, *current; /* current: the one that was handed out */
+    size_t bytes;
+};
+
+/* What the stream has said of time. */
+struct host_times {
+    int have_scan_t0, have_gps;
+    int64_t scan_t0_ns;        /* device time of the scan's start */
+    int64_t gps_at_ns, gps_ns; /* a device time, and the GPS time that the head's clock had then */
+};
+
 struct scanhead {
     struct host_source source;
     int ended; /* no more bytes will come */
     int lost;  /* because the device was unplugged */
     int stuck; /* half a command went out: nothing sensible can follow */
     struct native_parser parser;
-    struct host_node *first, *last, *current; /* kept frames; the one that was handed out */
-    size_t queued_bytes;
+    struct host_kept kept;
     const uint8_t *payload; /* of the frame that scanhead_next returned last */
     int have_points;        /* a points frame has been handed out: */
     uint32_t points_seq;
@@ -63,9 +75,7 @@ struct scanhead {
     struct native_anchor anchor;
     uint64_t last_pulse0;
     struct host_poses *poses; /* NULL: none came yet */
-    int have_scan_t0, have_gps;
-    int64_t scan_t0_ns;        /* device time of the scan's start */
-    int64_t gps_at_ns, gps_ns; /* a device time, and the GPS time the head's clock had then */
+    struct host_times times;
     struct host_surface *surface;
     size_t surface_room;
     uint32_t n_surfaces;

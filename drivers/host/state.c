@@ -52,8 +52,8 @@ static int absorb_points(struct scanhead *sh, const struct native_header *header
     struct native_points points;
     if (native_decode_points(payload, header->length, &points) != 0) return bad(sh, "wrong points");
     if (sh->have_pulse && points.pulse0 < sh->last_pulse0) forget(sh);
-    sh->scan_t0_ns = (int64_t)((uint64_t)header->t_ns - (uint64_t)points.t0_ns);
-    sh->have_scan_t0 = 1;
+    sh->times.scan_t0_ns = (int64_t)((uint64_t)header->t_ns - (uint64_t)points.t0_ns);
+    sh->times.have_scan_t0 = 1;
     int64_t until_ns = 1000000 * (int64_t)sh->anchor.until_ms; /* later points have an anchor that did not reach us */
     if (sh->have_anchor && until_ns != 0 && points.t0_ns >= until_ns) sh->have_anchor = 0;
     sh->have_pulse = 1;
@@ -70,18 +70,18 @@ static int absorb_attributes(struct scanhead *sh, const struct native_header *he
 /* The head's clock at a device time. GPS time fits: it is below 2^63 ns until 2272. */
 static void set_gps(struct scanhead *sh, uint64_t at_ns, uint64_t gps_ns)
 {
-    sh->gps_at_ns = (int64_t)at_ns;
-    sh->gps_ns = (int64_t)gps_ns;
-    sh->have_gps = 1;
+    sh->times.gps_at_ns = (int64_t)at_ns;
+    sh->times.gps_ns = (int64_t)gps_ns;
+    sh->times.have_gps = 1;
 }
 
 static void absorb_time(struct scanhead *sh, const struct native_event *event)
 {
     if (event->code == NATIVE_EV_SCAN_START) {
-        sh->scan_t0_ns = (int64_t)event->b;
-        sh->have_scan_t0 = 1;
+        sh->times.scan_t0_ns = (int64_t)event->b;
+        sh->times.have_scan_t0 = 1;
         set_gps(sh, event->b, event->c);
-        sh->have_gps = event->c != 0;
+        sh->times.have_gps = event->c != 0;
     }
     if (event->code == NATIVE_EV_TIME) set_gps(sh, event->b, event->c);
     if (event->code == NATIVE_EV_PPS) set_gps(sh, event->b, event->c * 1000000000u);
@@ -214,10 +214,11 @@ int scanhead_get_info(const struct scanhead *sh, struct scanhead_info *info)
 
 int scanhead_gps_time(const struct scanhead *sh, int64_t t_ns, double *adjusted_standard_gps_time_s)
 {
-    if (!sh->have_gps || !sh->have_scan_t0) return SCANHEAD_ESTATE;
+    if (!sh->times.have_gps || !sh->times.have_scan_t0) return SCANHEAD_ESTATE;
     /* Modulo 2^64, so that a wrong stream can't overflow; seconds and the rest apart, so that only the sum is
      * rounded. */
-    uint64_t gps_ns = (uint64_t)sh->gps_ns + ((uint64_t)sh->scan_t0_ns + (uint64_t)t_ns - (uint64_t)sh->gps_at_ns);
+    uint64_t gps_ns =
+        (uint64_t)sh->times.gps_ns + ((uint64_t)sh->times.scan_t0_ns + (uint64_t)t_ns - (uint64_t)sh->times.gps_at_ns);
     int64_t s = (int64_t)gps_ns / 1000000000, ns = (int64_t)gps_ns % 1000000000;
     *adjusted_standard_gps_time_s = (double)(s - 1000000000) + (double)ns / 1e9;
     return SCANHEAD_OK;

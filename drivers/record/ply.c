@@ -202,9 +202,9 @@ static int ply_finish(void *rec, struct sh_err *err)
 {
     struct ply *ply = rec;
     int rc = outfile_flush(&ply->base.file, err);
-    ply->facts.n_without_attributes = ply->base.track.n_without_attributes;
-    ply->facts.n_unplaced = ply->base.track.n_unplaced;
-    ply->facts.n_without_pose = ply->base.track.n_without_pose;
+    ply->facts.n_without_attributes = ply->base.track.missing.n_without_attributes;
+    ply->facts.n_unplaced = ply->base.track.missing.n_unplaced;
+    ply->facts.n_without_pose = ply->base.track.missing.n_without_pose;
     char *header;
     size_t len;
     if (rc == 0) rc = ply_header_make(&ply->facts, ply->header_len, &header, &len, err);

@@ -72,11 +72,11 @@ static void report_losses(const struct recorder *rec)
 {
     const struct track *t = &rec->track;
     if (rec->ops->track.points == NULL) return;
-    recorder_report(rec, t->n_unplaced, "points left out that came before the descriptor and the anchor of their scan");
-    recorder_report(rec, t->n_without_pose, "points left out whose pose was lost");
-    recorder_report(rec, t->n_attributes_unheld,
+    recorder_report(rec, t->missing.n_unplaced, "points left out that came before the descriptor and the anchor of their scan");
+    recorder_report(rec, t->missing.n_without_pose, "points left out whose pose was lost");
+    recorder_report(rec, t->missing.n_attributes_unheld,
                     "points whose amplitude and width are left out; this format has no place for them");
-    recorder_report(rec, t->n_without_attributes, "points without amplitude and width, which were lost");
+    recorder_report(rec, t->missing.n_without_attributes, "points without amplitude and width, which were lost");
 }
 
 int recorder_close(struct recorder *rec, int keep, struct sh_err *err)

@@ -59,15 +59,16 @@ static void set_pose(struct track *t)
 /* A descriptor that is no repetition, pulses that go back, another station: whichever of them reached us. */
 static int begins_scan(const struct track *t, const struct scanhead_frame *frame)
 {
-    return t->n_scans == 0 || t->new_scan || frame->pulse0 < t->last_pulse0 || t->info.station != t->last_station;
+    return t->n_scans == 0 || t->state.new_scan || frame->pulse0 < t->state.last_pulse0 ||
+           t->info.station != t->state.last_station;
 }
 
 /* The end of a line says where the next one begins. Where it was lost, the times in the frame say so, as long
  * as the pulse rate is that of the descriptor. */
 static uint64_t first_row(const struct track *t, const struct scanhead_frame *frame)
 {
-    if (t->have_next_line && t->next_line == frame->scan_line && t->next_line_pulse0 <= frame->pulse0)
-        return frame->pulse0 - t->next_line_pulse0;
+    if (t->state.have_next_line && t->state.next_line == frame->scan_line && t->state.next_line_pulse0 <= frame->pulse0)
+        return frame->pulse0 - t->state.next_line_pulse0;
     double since_s = 1e-9 * (double)(frame->scan_t0_ns - frame->line_t0_ns);
     return since_s > 0 ? (uint64_t)llround(since_s * t->info.prr_hz) : 0;
 }
@@ -102,7 +103,7 @@ static int place_moving(struct track *t, int n, struct sh_err *err)
     if (lost < 0) return sh_fail(err, lost, "%s: %s", t->path, scanhead_error(t->sh));
     for (int i = 0; i < n; i++) {
         if (t->point[i].echo_count != 0 && isnan(t->point[i].x)) {
-            t->n_without_pose++;
+            t->missing.n_without_pose++;
             continue;
         }
         t->point[kept] = t->point[i];
@@ -157,7 +158,7 @@ static int hand_out(struct track *t, const struct scanhead_attribute *attribute,
         t->frame[n] = p->frame;
         t->gps_s[n] = p->gps_s;
         t->attribute[n] = attribute != NULL ? attribute[p->index] : none;
-        if (attribute == NULL && p->point.echo_count != 0) t->n_without_attributes++;
+        if (attribute == NULL && p->point.echo_count != 0) t->missing.n_without_attributes++;
         if (++n < TRACK_BATCH && k + 1 < w->n) continue;
         rc = t->ops->points(t->rec, n, err);
         n = 0;
@@ -189,7 +190,7 @@ static void count_unheld(struct track *t, int n)
 {
     if (t->ops->wants_attributes || scanhead_has_attributes(t->sh) != 1) return;
     for (int i = 0; i < n; i++)
-        t->n_attributes_unheld += t->point[i].echo_count != 0;
+        t->missing.n_attributes_unheld += t->point[i].echo_count != 0;
 }
 
 /* Takes the present batch: n points of the frame, from `first` on. */
@@ -209,7 +210,7 @@ static int begin_scan(struct track *t, struct sh_err *err)
 {
     set_pose(t);
     t->n_scans++;
-    t->new_scan = 0;
+    t->state.new_scan = 0;
     if (t->ops->metres && t->crs == NATIVE_CRS_GEODETIC)
         return sh_fail(
             err, SH_EFORMAT,
@@ -237,7 +238,7 @@ static int take_points(struct track *t, const struct scanhead_frame *frame, stru
     int rc = track_flush(t, err);
     if (rc != 0) return rc;
     if (scanhead_get_info(t->sh, &t->info) != 0) {
-        t->n_unplaced += frame->n_points;
+        t->missing.n_unplaced += frame->n_points;
         return 0;
     }
     int begins = begins_scan(t, frame);
@@ -245,8 +246,8 @@ static int take_points(struct track *t, const struct scanhead_frame *frame, stru
     t->line = frame->scan_line;
     t->t0_ns = frame->scan_t0_ns;
     if (rc == 0 && begins) rc = begin_scan(t, err);
-    t->last_pulse0 = frame->pulse0;
-    t->last_station = t->info.station;
+    t->state.last_pulse0 = frame->pulse0;
+    t->state.last_station = t->info.station;
     if (rc == 0) rc = begin_waiting(t, err);
     uint64_t row = first_row(t, frame);
     if (rc == 0 && row + frame->n_points > UINT32_MAX)
@@ -257,10 +258,10 @@ static int take_points(struct track *t, const struct scanhead_frame *frame, stru
 static void take_line_end(struct track *t, const struct scanhead_frame *frame)
 {
     struct line_end end;
-    t->have_next_line = native_decode_line_end(frame->payload, frame->payload_len, &end) == 0;
-    if (!t->have_next_line) return;
-    t->next_line = end.line + 1;
-    t->next_line_pulse0 = end.pulse0 + end.n_fired;
+    t->state.have_next_line = native_decode_line_end(frame->payload, frame->payload_len, &end) == 0;
+    if (!t->state.have_next_line) return;
+    t->state.next_line = end.line + 1;
+    t->state.next_line_pulse0 = end.pulse0 + end.n_fired;
 }
 
 int track_frame(struct track *t, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
@@ -270,8 +271,8 @@ int track_frame(struct track *t, struct scanhead *sh, const struct scanhead_fram
     if (frame->type == SCANHEAD_ATTRIBUTES) return take_attributes(t, frame, err);
     if (frame->type == SCANHEAD_LINE_END) take_line_end(t, frame);
     if (frame->type == SCANHEAD_DESCRIPTOR && (frame->flags & SCANHEAD_REPEAT) == 0) {
-        t->new_scan = 1;
-        t->have_next_line = 0;
+        t->state.new_scan = 1;
+        t->state.have_next_line = 0;
     }
     return 0;
 }

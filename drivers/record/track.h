@@ -32,6 +32,21 @@ struct track_ops {
     int wants_attributes; /* 1: it has a place for amplitude and width */
 };
 
+/* Points that are not in the recording, or not with all that was sent. */
+struct track_missing {
+    uint64_t n_unplaced;           /* points before their descriptor and anchor were seen */
+    uint64_t n_without_pose;       /* points of a moving head whose pose was lost */
+    uint64_t n_without_attributes; /* echoes whose attributes were lost */
+    uint64_t n_attributes_unheld;  /* echoes with attributes that the recorder has no place for */
+};
+
+/* Where in its scan the stream is; of track.c alone. */
+struct track_state {
+    int new_scan, have_next_line;
+    uint32_t next_line, last_station;
+    uint64_t next_line_pulse0, last_pulse0;
+};
+
 struct track {
     /* set by the owner */
     const char *path; /* for messages */
@@ -48,12 +63,9 @@ struct track {
     int crs;  /* enum native_crs; of the recording's points: of the stream in the geo layout, else the scene frame */
     int epsg; /* 0: none */
     int geoid_heights, moving, stops;
-    uint32_t n_scans;              /* with points */
-    uint64_t n_unplaced;           /* points before their descriptor and anchor were seen */
-    uint64_t n_without_pose;       /* points of a moving head whose pose was lost */
-    uint64_t n_without_attributes; /* echoes whose attributes were lost */
-    uint64_t n_attributes_unheld;  /* echoes with attributes that the recorder has no place for */
-    double scale_m;                /* of coordinates in the recording: the stream's; coarser where the head moves far */
+    uint32_t n_scans; /* with points */
+    struct track_missing missing;
+    double scale_m; /* of coordinates in the recording: the stream's; coarser where the head moves far */
     struct scanhead_point point[TRACK_BATCH];
     uint32_t row[TRACK_BATCH]; /* of each point: pulses since the line's first, the blind ones included */
     double frame[TRACK_BATCH]; /* of each point of a moving head: frame scalar of the trajectory; NaN: lost */
@@ -61,11 +73,9 @@ struct track {
     struct scanhead_attribute attribute[TRACK_BATCH];
     double gps_s[TRACK_BATCH]; /* scanhead_gps_time of each, as of its own frame; NaN: not known */
     /* inner state */
-    int new_scan, have_next_line;
     uint32_t index[TRACK_BATCH]; /* of each point in its frame, where it may wait */
     struct track_waiting *waiting;
-    uint32_t next_line, last_station;
-    uint64_t next_line_pulse0, last_pulse0;
+    struct track_state state;
 };
 
 /* A new frame of the stream. SH_EFORMAT where the stream goes to what one file can't hold: another CRS,
