@@ -49,8 +49,7 @@ static int take_endpoints(const struct libusb_interface_descriptor *d, struct us
     return out->in != 0 && out->out != 0;
 }
 
-/* The vendor interface of a device's active configuration: 1, or 0 where there is none. */
-static int find_interface(libusb_device *device, struct usb_interface *interface)
+int host_usb_interface(libusb_device *device, struct usb_interface *interface)
 {
     struct libusb_config_descriptor *config;
     int found = 0;
@@ -108,7 +107,7 @@ static void try_device(struct search *s, libusb_device *device)
     libusb_device_handle *handle;
     char serial[128], name[sizeof s->found->name];
     if (libusb_get_device_descriptor(device, &d) != 0 || !is_wanted_id(s->wanted, &d) ||
-        !find_interface(device, &interface))
+        !host_usb_interface(device, &interface))
         return;
     int rc = libusb_open(device, &handle);
     if (rc != 0) {
@@ -188,7 +187,7 @@ int scanhead_list_usb(struct scanhead_usb_head *heads, int max, char *err, size_
     for (ssize_t i = 0; i < n; i++) {
         struct libusb_device_descriptor d;
         struct usb_interface interface;
-        if (libusb_get_device_descriptor(list[i], &d) != 0 || !find_interface(list[i], &interface)) continue;
+        if (libusb_get_device_descriptor(list[i], &d) != 0 || !host_usb_interface(list[i], &interface)) continue;
         if (n_heads < max) describe(list[i], &d, &heads[n_heads]);
         n_heads++;
     }

@@ -37,6 +37,9 @@ struct usb_found {
     char name[160]; /* usb:vid:pid:serial */
 };
 
+/* The vendor interface of a device's active configuration: 1, or 0 where there is none. */
+int host_usb_interface(libusb_device *device, struct usb_interface *interface);
+
 /* Opens the one head that is wanted; asked: the source as the caller wrote it, for errors. SH_ELOST: there is
  * none; SH_EINPUT: there are several; SH_EPERM: the text has the rule that gives the permission. */
 int host_usb_find(libusb_context *ctx, const char *asked, const struct usb_wanted *wanted, struct usb_found *found,
