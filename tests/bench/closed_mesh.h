@@ -1,4 +1,4 @@
-/* Private to bench_leaks.c: closed meshes with a station inside. */
+/* Private to leaks.c: closed meshes with a station inside. */
 #ifndef TESTS_BENCH_CLOSED_MESH_H
 #define TESTS_BENCH_CLOSED_MESH_H
 

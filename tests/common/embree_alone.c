@@ -91,7 +91,7 @@ int embree_alone_rays(struct embree_alone *e, const float *fx, const float *fy, 
     return e->prim != NULL && e->t != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "Embree alone: no memory for %u rays", n);
 }
 
-/* What the cast of a packet leaves as it is is set once. Misaligned packets or masks make Embree crash. */
+/* Members that the cast of a packet leaves alone are set once. Misaligned packets or masks make Embree crash. */
 #define PACKET_FUNCTIONS(W)                                                                                           \
     static void set_##W(struct RTCRayHit##W *p, const struct embree_alone *e)                                         \
     {                                                                                                                 \

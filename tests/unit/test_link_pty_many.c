@@ -137,7 +137,7 @@ static void test_nobody_missed(void **state)
     assert_true(WIFEXITED(status));
     assert_int_equal(WEXITSTATUS(status), 0);
     /* One each. A client that comes while we are at the end of the one before may be told as one with it: how often
-     * hangs on how the machine schedules us, so the lower limit only says that most are told apart. */
+     * depends on how the machine schedules us, so the lower limit only says that most are told apart. */
     assert_in_range(sessions, 1500, 3000);
     if (open_now) read_to_end(&bench);
     bench_close(&bench);

@@ -126,7 +126,7 @@ static void test_wall_that_goes_away(void **state)
             assert_range(l, i, nearest_m / cosl(l->azimuth[i]), wall_m < 50.0);
     }
     site_free(site);
-    /* Forth and back within 4 s: at 3 s as at 1 s, at 10.5 s as at 2.5 s, which is 1.5 s on the way back. */
+    /* Back and forth within 4 s: at 3 s as at 1 s, at 10.5 s as at 2.5 s, which is 1.5 s on the way back. */
     site = load(WALL, ", move_m_s: [0, 1, 0], cycle_s: 4", cfg);
     static const double cycle[][2] = {{0, 0}, {1, 1}, {2, 2}, {3, 1}, {4, 0}, {10.5, 1.5}};
     for (int n = 0; n < 6; n++) {
