@@ -118,8 +118,8 @@ enum georef_method georef_method(const struct georef *georef);
  * says how it is known. */
 double georef_bound_m(const struct georef *georef, enum georef_method method, double radius_m, double height_m);
 
-/* n points, d_prcs relative to the centre (metres) -> difference from the anchor, in units of the CRS (metres;
- * geodetic: degrees, degrees, metres). In place is allowed. NaN goes through. */
+/* n points, d_prcs relative to the centre (metres) -> difference from the anchor, in units of the CRS
+ * (metres; geodetic: degrees, degrees, metres). In place is allowed. NaN goes through. */
 void georef_forward(const struct georef *georef, size_t n, struct vec3_in d, struct vec3_out out);
 
 /* One point back, exact: difference from the anchor -> prcs (absolute). For checks and clients, not for

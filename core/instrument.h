@@ -1,6 +1,6 @@
 /* Instrument errors: the geometry of a scanner that is not quite as designed. Its mechanics say where the
- * beam really goes, its encoders what the head believes. In: scheduled angles in turns, errors. Out: directions
- * and origins of beams (socs, metres), and what the encoders read (turns).
+ * beam really goes, its encoders what the head believes. In: scheduled angles in turns, errors. Out:
+ * directions and origins of beams (socs, metres), and what the encoders read (turns).
  *
  * Terms as in D. Lichti, Error modelling, calibration and analysis of an AM-CW terrestrial laser scanner
  * system (2007), and B. Muralikrishnan et al., Volumetric performance evaluation of a laser scanner based on

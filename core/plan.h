@@ -1,11 +1,12 @@
-/* The plan: which method each stage uses. In go a tolerance, the options of a stage and what is known of head and scene;
- * out come the method, and a row that says its error bound (m), its cost (ns per pulse), what was left out, and why.
+/* The plan: which method each stage uses. In go a tolerance, the options of a stage and what is known of head
+ * and scene; out come the method, and a row that says its error bound (m), its cost (ns per pulse), what was
+ * left out, and why.
  *
- * Each stage takes the cheapest option whose bounds hold the tolerance. Where none does, it takes the one with the least
- * error, and the row says so. Bounds are proven (order, georeferencing) or found by sampling: some thousands of the
- * head's own pulses, drawn with a fixed key, are cast with the option and with the reference. Costs are rounded figures
- * (core/plan/cost.h). They are not measured while planning, so that the same scene, head and tolerance always have the
- * same plan. No clock, no files. */
+ * Each stage takes the cheapest option whose bounds hold the tolerance. Where none does, it takes the one
+ * with the least error, and the row says so. Bounds are proven (order, georeferencing) or found by sampling:
+ * some thousands of the head's own pulses, drawn with a fixed key, are cast with the option and with the
+ * reference. Costs are rounded figures (core/plan/cost.h). They are not measured while planning, so that the
+ * same scene, head and tolerance always have the same plan. No clock, no files. */
 #ifndef CORE_PLAN_H
 #define CORE_PLAN_H
 
@@ -64,7 +65,8 @@ struct plan_georef_need {
     enum georef_method forced; /* GEOREF_AUTO: the cheapest one whose bound meets the tolerance, else exact */
 };
 
-/* Chooses the method and fills row. SH_EINPUT: what is forced has no bound here. The georef is not changed. */
+/* Chooses the method and fills row. SH_EINPUT: what is forced has no bound here. The georef is not
+ * changed. */
 int plan_georef(const struct georef *georef, const struct plan_georef_need *need, enum georef_method *method,
                 struct plan_row *row, struct sh_err *err);
 /* Georeferencing where points leave as range and angles. */
@@ -85,19 +87,20 @@ struct plan_place {
 
 struct plan_sample;
 
-/* Draws equally many pulses of all places. 61 sub-rays show which pulses meet one smooth surface. These are many and
- * alike: only some of them are cast with the reference. The places must outlive the sample. */
+/* Draws equally many pulses of all places. 61 sub-rays show which pulses meet one smooth surface. These are
+ * many and alike: only some of them are cast with the reference. The places must outlive the sample. */
 int plan_sample_create(struct plan_place *place, uint32_t n_places, struct plan_sample **out, struct sh_err *err);
 void plan_sample_free(struct plan_sample *sample);
 
-/* The error of a beam against BEAM_MAX_RINGS rings (1,027 sub-rays): sets error_m and echo_share of option, and for
- * BEAM_ADAPTIVE, whose places have outlines, cost_ns. BEAM_SINGLE: one ray. Both figures are upper limits: error_m is
- * three standard errors above the mean square. echo_share is the 95 % limit of Poisson's distribution for the pulses
- * that do not meet one smooth surface; the others count as they are found. The first call casts the reference. */
+/* The error of a beam against BEAM_MAX_RINGS rings (1,027 sub-rays): sets error_m and echo_share of option,
+ * and for BEAM_ADAPTIVE, whose places have outlines, cost_ns. BEAM_SINGLE: one ray. Both figures are upper
+ * limits: error_m is three standard errors above the mean square. echo_share is the 95 % limit of Poisson's
+ * distribution for the pulses that do not meet one smooth surface; the others count as they are found. The
+ * first call casts the reference. */
 void plan_sample_beam(struct plan_sample *sample, enum beam_mode mode, uint32_t rings, struct plan_option *option);
 
-/* The error of following pulses through only `depth` surfaces of glass or mirrors, against CAST_MAX_DEPTH. A pulse
- * whose way is longer than that counts as wrong, too: nothing is known of what it meets further on. */
+/* The error of following pulses through only `depth` surfaces of glass or mirrors, against CAST_MAX_DEPTH. A
+ * pulse whose way is longer than that counts as wrong, too: nothing is known of what it meets further on. */
 void plan_sample_optics(struct plan_sample *sample, uint32_t depth, struct plan_option *option);
 
 /* ---- the other stages */

@@ -29,8 +29,8 @@ struct text {
     locale_t c_locale;
 };
 
-/* Reads the whole file; progress (may be NULL) is called every 16 MiB, fraction -1: unknown. text_close is due
- * in any case. */
+/* Reads the whole file; progress (may be NULL) is called every 16 MiB, fraction -1: unknown. text_close is
+ * due in any case. */
 int text_open(struct text *t, const char *path, void (*progress)(void *ctx, double fraction), void *ctx,
               struct sh_err *err);
 void text_close(struct text *t);

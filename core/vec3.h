@@ -1,5 +1,5 @@
-/* Vectors of three doubles: sums and products of two of them, and arrays of them as kernels take them, an array for
- * each component. */
+/* Vectors of three doubles: sums and products of two of them, and arrays of them as kernels take them, an
+ * array for each component. */
 #ifndef CORE_VEC3_H
 #define CORE_VEC3_H
 

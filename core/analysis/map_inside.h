@@ -1,5 +1,5 @@
-/* Private to core/analysis: the parts of the map. Points (prcs, metres) make pixels (map.c); pixels make an RGB
- * image (map_draw.c, map_image.c), and that a PNG file (map_png.c). */
+/* Private to core/analysis: the parts of the map. Points (prcs, metres) make pixels (map.c); pixels make an
+ * RGB image (map_draw.c, map_image.c), and that a PNG file (map_png.c). */
 #ifndef CORE_ANALYSIS_MAP_INSIDE_H
 #define CORE_ANALYSIS_MAP_INSIDE_H
 

@@ -1,8 +1,8 @@
 /* Private to core/footprint: outlines of a scene from a station, and the cells of direction that lead to
  * them.
  *
- * A direction belongs to a cell of one of a cube's faces, n x n cells each. Let z be its largest component: the
- * cell follows from x / |z| and y / |z|, both from -1 to 1. */
+ * A direction belongs to a cell of one of a cube's faces, n x n cells each. Let z be its largest component:
+ * the cell follows from x / |z| and y / |z|, both from -1 to 1. */
 #ifndef CORE_FOOTPRINT_OUTLINES_H
 #define CORE_FOOTPRINT_OUTLINES_H
 

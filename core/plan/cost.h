@@ -1,6 +1,7 @@
-/* What methods cost: rounded ns of one core, to compare methods by. To get them again: `make bench-beam` measures single
- * rays, sub-rays and the adaptive beam (house, wires, foliage), `make bench` stages, `make chart` ways to georeference.
- * Sub-rays cost 65 ns in a house and 105 ns among leaves, a pulse that outlines cut 0.2 to 2.2 us. */
+/* What methods cost: rounded ns of one core, to compare methods by. To get them again: `make bench-beam`
+ * measures single rays, sub-rays and the adaptive beam (house, wires, foliage), `make bench` stages, `make
+ * chart` ways to georeference. Sub-rays cost 65 ns in a house and 105 ns among leaves, a pulse that outlines
+ * cut 0.2 to 2.2 us. */
 #ifndef CORE_PLAN_COST_H
 #define CORE_PLAN_COST_H
 

@@ -7,8 +7,8 @@
 #include "core/plan/cost.h"
 #include "core/rng.h"
 
-/* Two rays' ranges further apart than that are not those of one smooth surface: at 80 deg, 100 m and 0.35 mrad, the
- * mean over a footprint differs from its centre by 2 um. */
+/* Two rays' ranges further apart than that are not those of one smooth surface: at 80 deg, 100 m and 0.35
+ * mrad, the mean over a footprint differs from its centre by 2 um. */
 static const double SMOOTH_M = 5e-5;
 
 enum {
@@ -204,8 +204,8 @@ static void compare(struct tally *t, const struct echoes *got, const struct echo
     }
 }
 
-/* Upper limit, at 95 %, of a Poisson mean of which `found` were found: half the quantile of chi-squared with 2 found +
- * 2 degrees of freedom, after Wilson and Hilferty (1931). */
+/* Upper limit, at 95 %, of a Poisson mean of which `found` were found: half the quantile of chi-squared with
+ * 2 found + 2 degrees of freedom, after Wilson and Hilferty (1931). */
 static double poisson_limit(double found)
 {
     double k = found + 1.0, root = 1.0 - 1.0 / (9.0 * k) + 1.645 / (3.0 * sqrt(k));

@@ -1,5 +1,5 @@
-/* Private to core/surface: images that hold the reflectance. In: sRGB values 0 to 1, a table with textures. Out:
- * linear values; the textures freed. */
+/* Private to core/surface: images that hold the reflectance. In: sRGB values 0 to 1, a table with textures.
+ * Out: linear values; the textures freed. */
 #ifndef CORE_SURFACE_TEXTURE_H
 #define CORE_SURFACE_TEXTURE_H
 

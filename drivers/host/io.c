@@ -1,4 +1,5 @@
-/* Bytes in: waiting and reading, with deadlines on the monotonic clock; and the sources that are descriptors. */
+/* Bytes in: waiting and reading, with deadlines on the monotonic clock; and the sources that are
+ * descriptors. */
 #include <errno.h>
 #include <poll.h>
 #include <string.h>

@@ -88,12 +88,12 @@ struct scanhead_usb_head {
  * NULL). */
 int scanhead_list_usb(struct scanhead_usb_head *heads, int max, char *err, size_t err_len);
 
-/* Sends one command line and waits for its reply line, which comes without its line end.
- * Frames that arrive meanwhile are kept, and scanhead_next() gives them later. It keeps at most 64 MiB of
- * them; then it drops the oldest and counts them (stats.dropped).
- * A reply "ERR n,..." is returned as it is, with SCANHEAD_OK: the command was answered.
- * Before the first command on a "tty:" it sends an empty line and *IDN?, and skips all reply lines up to the
- * answer to that. For until the terminal was in raw mode, it may have echoed to the head what the head sent. */
+/* Sends one command line and waits for its reply line, which comes without its line end. Frames that arrive
+ * meanwhile are kept, and scanhead_next() gives them later. It keeps at most 64 MiB of them; then it drops
+ * the oldest and counts them (stats.dropped). A reply "ERR n,..." is returned as it is, with SCANHEAD_OK: the
+ * command was answered. Before the first command on a "tty:" it sends an empty line and *IDN?, and skips all
+ * reply lines up to the answer to that. For until the terminal was in raw mode, it may have echoed to the
+ * head what the head sent. */
 int scanhead_command(struct scanhead *sh, const char *command, char *reply, size_t reply_len, int timeout_ms);
 
 enum scanhead_frame_type { /* as on the wire */
@@ -254,10 +254,12 @@ int scanhead_to_scene(struct scanhead *sh, struct scanhead_point *points, uint32
  * since it counts from the last time that the head reported: at the scan's start and each second (events
  * SCAN_START, PPS, TIME). It is exact to the nanosecond where the head's clock has no drift; a double of that
  * size has steps of 0.12 us. SCANHEAD_ESTATE where the head doesn't know the time, or before the time and the
- * scan's start have come. Where the head knows the time, it comes before the first points that can be placed. */
+ * scan's start have come. Where the head knows the time, it comes before the first points that can be
+ * placed. */
 int scanhead_gps_time(const struct scanhead *sh, int64_t t_ns, double *adjusted_standard_gps_time_s);
 
-/* Name of a label: 1 and the two names (the handle's, until its next call), or 0 when they have not come yet. */
+/* Name of a label: 1 and the two names (the handle's, until its next call), or 0 when they have not come
+ * yet. */
 int scanhead_surface(const struct scanhead *sh, uint32_t label, const char **object, const char **material);
 
 struct scanhead_stats {

@@ -16,7 +16,8 @@
 /* A read is a multiple of every packet size (64, 512, 1024 bytes): so none can be sent more than it has room
  * for. */
 enum { IN_TRANSFERS = 16, IN_BYTES = 64 << 10, OUT_BYTES = 2048, CANCEL_MS = 1000 };
-/* How long a bus may fail with the device still on it, as it does until the hub has noticed an unplugged one. */
+/* How long a bus may fail with the device still on it, as it does until the hub has noticed an unplugged
+ * one. */
 enum { FAILING_MS = 1000, FAILING_PAUSE_MS = 20, RELAPSE_MS = 10000 };
 
 struct in_transfer {
@@ -143,7 +144,8 @@ static int recover(struct host_usb *usb, struct failing *failing, uint8_t endpoi
     return rc == LIBUSB_ERROR_NO_DEVICE ? ENODEV : 0;
 }
 
-/* The same for the reads: all are taken back first, and those that failed along with this one need no more. */
+/* The same for the reads: all are taken back first, and those that failed along with this one need no
+ * more. */
 static int recover_reads(struct host_usb *usb)
 {
     cancel_reads(usb);

@@ -7,7 +7,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* CRC of data after a part whose CRC is `crc` (0 at the start): crc32c(crc32c(0, a), b) is that of a then b. */
+/* CRC of data after a part whose CRC is `crc` (0 at the start): crc32c(crc32c(0, a), b) is that of a then
+ * b. */
 uint32_t crc32c(uint32_t crc, const void *data, size_t len);
 
 /* The two ways, for tests and the bench. The hardware one may only be called when crc32c_has_hw(). */

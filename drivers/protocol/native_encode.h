@@ -32,10 +32,12 @@ struct native_names {
     void (*name)(void *ctx, uint32_t label, const char **object, const char **material);
     void *ctx;
 };
-/* As many names as fit into one frame of at most max_payload bytes. `names` then holds those that are left. */
+/* As many names as fit into one frame of at most max_payload bytes. `names` then holds those that are
+ * left. */
 size_t native_encode_surfaces(uint8_t *dst, size_t cap, size_t max_payload, struct native_names *names, int64_t t_ns);
 
-/* Sets the sequence number of the whole frame at frame and renews the header CRC. Returns the frame's length. */
+/* Sets the sequence number of the whole frame at frame and renews the header CRC. Returns the frame's
+ * length. */
 size_t native_seal(uint8_t *frame, uint32_t seq);
 
 /* The most bytes that native_encode_points can need for n_points, and the most that their attributes add. */

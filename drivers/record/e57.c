@@ -86,7 +86,8 @@ static void set_start(struct e57 *e)
 {
     double *s = &e->scan->start_gps_s;
     e->scan->have_start = track_start_gps(&e->base.track, s);
-    /* A time that is not known is not written. It is part of the scan's guid all the same, with this value. */
+    /* A time that is not known is not written. It is part of the scan's guid all the same, with this
+     * value. */
     if (!e->scan->have_start) *s += 1e9;
 }
 

@@ -20,7 +20,8 @@ static void release(struct outfile *file)
     file->fd = -1;
 }
 
-/* The part file, empty and ours alone: two recordings into one file, by whatever names, would end in neither. */
+/* The part file, empty and ours alone: two recordings into one file, by whatever names, would end in
+ * neither. */
 static int create_part(struct outfile *file, struct sh_err *err)
 {
     struct stat st;

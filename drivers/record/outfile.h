@@ -28,7 +28,8 @@ void outfile_used(struct outfile *file, size_t n);
 int outfile_flush(struct outfile *file, struct sh_err *err);
 /* Overwrites bytes that were flushed. */
 int outfile_patch(struct outfile *file, uint64_t at, const void *data, size_t len, struct sh_err *err);
-/* keep: flush, sync, rename. Else, and when that fails, PATH.part is removed. Frees everything in any case. */
+/* keep: flush, sync, rename. Else, and when that fails, PATH.part is removed. Frees everything in any
+ * case. */
 int outfile_close(struct outfile *file, int keep, struct sh_err *err);
 
 #endif

@@ -22,7 +22,8 @@ struct ply_facts {
     struct scanhead_stats stats;
 };
 
-/* Bytes to leave for the header: all that is known now, and room for those names of n_surfaces that are not. */
+/* Bytes to leave for the header: all that is known now, and room for those names of n_surfaces that are
+ * not. */
 size_t ply_header_reserve(const struct ply_facts *facts, uint32_t n_surfaces);
 
 /* The header, padded by comment lines to `size` bytes. *len is what it takes, which is more than size where

@@ -144,7 +144,8 @@ static void note_path(struct usbredir *self, const char *path)
 }
 
 /* Unless it was removed meanwhile, and another program listens there. To be called before the listener is
- * closed: until then nobody takes the path for an abandoned one, and no other file gets the inode's number. */
+ * closed: until then nobody takes the path for an abandoned one, and no other file gets the inode's
+ * number. */
 static void remove_path(const struct usbredir *self)
 {
     struct stat st;

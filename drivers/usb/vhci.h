@@ -1,4 +1,5 @@
-/* Plugs one end of a socket into this machine's virtual host controller (vhci_hcd) without any tool. Private. */
+/* Plugs one end of a socket into this machine's virtual host controller (vhci_hcd) without any tool.
+ * Private. */
 #ifndef DRIVERS_USB_VHCI_H
 #define DRIVERS_USB_VHCI_H
 

@@ -1,12 +1,13 @@
-/* The configuration: a YAML file and --set in, struct config out, checked. One table (keys.c) of key, type, unit,
- * default, range and help gives parsing, defaults, errors and the reference.
+/* The configuration: a YAML file and --set in, struct config out, checked. One table (keys.c) of key, type,
+ * unit, default, range and help gives parsing, defaults, errors and the reference.
  *
  * Units: as the key's name says (hz, deg, m). Everything is checked; an error is one line:
  *   FILE:LINE: KEY: what is wrong; what is allowed
- * Unknown keys, duplicate keys, trailing text ("30 kHz"), NaN, wrong types and values out of range are errors.
- * Relative paths in a file are relative to that file; in --set, to the working directory.
+ * Unknown keys, duplicate keys, trailing text ("30 kHz"), NaN, wrong types and values out of range are
+ * errors. Relative paths in a file are relative to that file; in --set, to the working directory.
  *
- * The struct is constant once it is loaded: what a run measures or chooses stands in the site (firmware_sim/site). */
+ * The struct is constant once it is loaded: what a run measures or chooses stands in the site
+ * (firmware_sim/site). */
 #ifndef FIRMWARE_SIM_CONFIG_CONFIG_H
 #define FIRMWARE_SIM_CONFIG_CONFIG_H
 
@@ -68,8 +69,9 @@ struct config_mesh {
     char file[CONFIG_PATH_LEN];
     enum scene_up up;
     double scale, offset_m[3];
-    /* Motion, at time t of the scan: turned by turn_deg_s * t about the vertical through pivot_m, clockwise seen from
-     * above, then shifted by move_m_s * t; with cycle_s, back and forth. All zero: the mesh stands still. */
+    /* Motion, at time t of the scan: turned by turn_deg_s * t about the vertical through pivot_m, clockwise
+     * seen from above, then shifted by move_m_s * t; with cycle_s, back and forth. All zero: the mesh stands
+     * still. */
     double move_m_s[3], turn_deg_s, pivot_m[3], cycle_s;
 };
 
@@ -249,8 +251,8 @@ struct config {
     struct config_gnss gnss;
 };
 
-/* Reads path, its profile, then the `key=value` settings in order (as from --set, each checked the same way, named
- * `--set KEY` in errors). On failure cfg is unspecified. cfg is large: allocate it. */
+/* Reads path, its profile, then the `key=value` settings in order (as from --set, each checked the same way,
+ * named `--set KEY` in errors). On failure cfg is unspecified. cfg is large: allocate it. */
 int config_load(const char *path, const char *const *sets, int n_sets, struct config *cfg, struct sh_err *err);
 
 /* What a profile says about the signal; the rest of it (sharp, extinction, seed) is 0. */
@@ -268,19 +270,19 @@ static inline int config_has_footprint(const struct config *cfg)
 /* Threads that cast: loop.threads, or one per processor. */
 uint32_t config_threads(const struct config *cfg);
 
-/* Why the beams of a scan do not all begin at one place of a scene that stands still; NULL: they do. That is what an
- * adaptive beam needs. */
+/* Why the beams of a scan do not all begin at one place of a scene that stands still; NULL: they do. That is
+ * what an adaptive beam needs. */
 const char *config_beam_moves(const struct config *cfg);
 
 /* The reference: every key with type, unit, default, range and help. */
 void config_print_reference(FILE *out);
 
-/* The profiles in a directory, one line each (name, model, what is data sheet and what is assumed). Returns how many.
- * dir NULL: the first directory of the lookup below that exists, without a configuration. */
+/* The profiles in a directory, one line each (name, model, what is data sheet and what is assumed). Returns
+ * how many. dir NULL: the first directory of the lookup below that exists, without a configuration. */
 int config_list_profiles(const char *dir, FILE *out, struct sh_err *err);
 
-/* Finds the directory of profiles: $SCANHEAD_HEADS, beside the configuration (heads/), beside the program (installed or
- * in its build folder), or config/heads here. A profile is named by `head.profile: NAME`, looked up there, or by a path
- * that ends in .yaml. */
+/* Finds the directory of profiles: $SCANHEAD_HEADS, beside the configuration (heads/), beside the program
+ * (installed or in its build folder), or config/heads here. A profile is named by `head.profile: NAME`,
+ * looked up there, or by a path that ends in .yaml. */
 
 #endif

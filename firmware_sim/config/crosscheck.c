@@ -1,5 +1,5 @@
-/* What concerns more than one key, or the world: limits of the head profile, order of angles, files, keys of links and
- * platforms. Places on the Earth: places.c; noise, signal, surfaces: measurement.c. */
+/* What concerns more than one key, or the world: limits of the head profile, order of angles, files, keys of
+ * links and platforms. Places on the Earth: places.c; noise, signal, surfaces: measurement.c. */
 #include "firmware_sim/config/table.h"
 
 #include <errno.h>
@@ -219,7 +219,8 @@ static int check_link(const struct cfg_reader *rd, struct config *cfg, uint32_t 
     return link->type == LINK_USB ? check_usb_link(rd, cfg, link, i) : SH_OK;
 }
 
-/* Which part of the trajectory, and where on it to stop. How long it is, its file says (firmware_sim/site/platform.c). */
+/* Which part of the trajectory, and where on it to stop. How long it is, its file says
+ * (firmware_sim/site/platform.c). */
 static int check_part(const struct cfg_reader *rd, struct config *cfg)
 {
     struct config_platform *p = &cfg->platform;
@@ -298,8 +299,8 @@ const char *config_beam_moves(const struct config *cfg)
 
 static const double LEAST_PULSE_NS = 0.1; /* 15 mm of range */
 
-/* Sub-rays that meet one oblique surface have different ranges. Where the pulse is too short to join them, each would
- * be an echo of its own, or be lost because it is too weak. */
+/* Sub-rays that meet one oblique surface have different ranges. Where the pulse is too short to join them,
+ * each would be an echo of its own, or be lost because it is too weak. */
 static int check_pulse_width(const struct cfg_reader *rd, const struct config *cfg)
 {
     const struct config_profile *p = &cfg->profile;

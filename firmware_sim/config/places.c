@@ -1,4 +1,5 @@
-/* Keys that say where things are on the Earth: the scene's anchor, and each station in one of several forms. */
+/* Keys that say where things are on the Earth: the scene's anchor, and each station in one of several
+ * forms. */
 #include "firmware_sim/config/table.h"
 
 #include <stdio.h>
@@ -104,7 +105,8 @@ static int complete_form(const struct cfg_reader *rd, const struct config *cfg, 
     return SH_OK;
 }
 
-/* Without an anchor: where it is in the scene, and for a CRS where on the Earth. With one: either, the other follows.
+/* Without an anchor: where it is in the scene, and for a CRS where on the Earth. With one: either, the other
+ * follows.
  */
 static int check_station(const struct cfg_reader *rd, const struct config *cfg, struct config_station *station,
                          uint32_t i)

@@ -1,7 +1,8 @@
 /* The table of a head profile's keys. */
 #include "firmware_sim/config/table.h"
 
-/* How a row begins: path, offset and size. Where path and member have different names, the path stands before. */
+/* How a row begins: path, offset and size. Where path and member have different names, the path stands
+ * before. */
 #define IN_PROFILE(member) CFG_MEMBER(struct config_profile, member)
 #define KEY(member)        #member, IN_PROFILE(member)
 #define REACH(member)      "reaches[]." #member, CFG_MEMBER(struct config_reach, member)

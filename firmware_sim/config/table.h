@@ -1,7 +1,8 @@
-/* Private to this folder: the rows of the tables, and the reader that fills a struct from YAML and --set by them.
+/* Private to this folder: the rows of the tables, and the reader that fills a struct from YAML and --set by
+ * them.
  *
- * A row's path is generic: "stations[].lat_deg" stands for every station; its element number is `item`. Lists do not
- * nest, so one number is enough. Tables are constant; a reader belongs to one thread. */
+ * A row's path is generic: "stations[].lat_deg" stands for every station; its element number is `item`. Lists
+ * do not nest, so one number is enough. Tables are constant; a reader belongs to one thread. */
 #ifndef FIRMWARE_SIM_CONFIG_TABLE_H
 #define FIRMWARE_SIM_CONFIG_TABLE_H
 

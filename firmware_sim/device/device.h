@@ -1,11 +1,11 @@
 /* The device: commands, states and the scan program. It does what a head's main processor does.
  *
- * In: command lines, poses of a live platform, and claims of ticks. Out: replies, and what each tick consists of
- * (device_work). All times are device time in ns from power-up, or ticks of it.
+ * In: command lines, poses of a live platform, and claims of ticks. Out: replies, and what each tick consists
+ * of (device_work). All times are device time in ns from power-up, or ticks of it.
  *
- * Casters claim ticks in order, ahead of their release. A claim takes the state machine and the scan program on to that
- * tick. A command takes effect at the first tick that is not claimed yet. A client that asks for the state gets that of
- * the last released tick, not of the last claimed one.
+ * Casters claim ticks in order, ahead of their release. A claim takes the state machine and the scan program
+ * on to that tick. A command takes effect at the first tick that is not claimed yet. A client that asks for
+ * the state gets that of the last released tick, not of the last claimed one.
  *
  * Thread: any. There is one lock inside, held for microseconds. The pacing thread never takes it. */
 #ifndef FIRMWARE_SIM_DEVICE_DEVICE_H
@@ -34,8 +34,8 @@ struct device_counters {
     _Atomic uint64_t late_poses, bad_poses;
 };
 
-/* What one tick consists of. All members are copies, so that no thread waits for another. Frames leave in the order of
- * the members. */
+/* What one tick consists of. All members are copies, so that no thread waits for another. Frames leave in the
+ * order of the members. */
 struct device_work {
     uint64_t tick;
     int64_t t_ns;             /* device time at the tick's start */
@@ -83,8 +83,8 @@ struct device_counters *device_counters(struct device *device);
 
 /* The next tick's work. Returns 0, or 1 when the run is over and there is no next tick. */
 int device_claim(struct device *device, struct device_work *work);
-/* A claimed tick was lost, and n_cast pulses to be cast with it, from first_cast on. They are counted. What else the
- * tick said is said again in a later one. */
+/* A claimed tick was lost, and n_cast pulses to be cast with it, from first_cast on. They are counted. What
+ * else the tick said is said again in a later one. */
 void device_lost(struct device *device, const struct device_work *work, uint64_t n_cast, uint64_t first_cast);
 /* True while nothing happens without a command. The pace `fast` waits then. */
 int device_is_idle(struct device *device);
@@ -98,21 +98,22 @@ void device_command(struct device *device, uint32_t session, const char *line, u
 void device_overlong(struct device *device, uint32_t session, struct command_result *out);
 /* A session has gone; partial: in the middle of a command. Gives control back. */
 void device_session_closed(struct device *device, uint32_t session, const char *who, int partial);
-/* Where a live platform (not the head on it) is at a device time: from TIME:STEP or the socket. v: x, y, z (m), roll,
- * pitch, heading (degrees). The platform moves evenly from one pose to the next, however far apart they are. Returns 0,
- * or 1 for a pose that can't be used, which is counted: not later than the one before, out of reach, or more than
- * DEVICE_POSE_AHEAD_S ahead of device time (not in the pace step). */
+/* Where a live platform (not the head on it) is at a device time: from TIME:STEP or the socket. v: x, y, z
+ * (m), roll, pitch, heading (degrees). The platform moves evenly from one pose to the next, however far apart
+ * they are. Returns 0, or 1 for a pose that can't be used, which is counted: not later than the one before,
+ * out of reach, or more than DEVICE_POSE_AHEAD_S ahead of device time (not in the pace step). */
 int device_pose(struct device *device, int64_t t_ns, const double v[6]);
 
 /* Something for the error queue (enum command_error), and an event on the wire. */
 void device_report(struct device *device, int number, const char *text);
 
-/* Device time begins now, at this time of clock_now_ns(). The time of day is read from the system where time.epoch says
- * so. Before the first tick is claimed. *warning: something the user should know, or NULL; it belongs to the device. */
+/* Device time begins now, at this time of clock_now_ns(). The time of day is read from the system where
+ * time.epoch says so. Before the first tick is claimed. *warning: something the user should know, or NULL; it
+ * belongs to the device. */
 int device_power_up(struct device *device, int64_t now_ns, const char **warning, struct sh_err *err);
 
-/* The GNSS receiver (gnss.h), and the sentences of a position (from 0) where the head is. Returns their length, 0 when
- * cap is too small. */
+/* The GNSS receiver (gnss.h), and the sentences of a position (from 0) where the head is. Returns their
+ * length, 0 when cap is too small. */
 const struct gnss *device_gnss(const struct device *device);
 size_t device_gnss_sentences(struct device *device, uint64_t index, char *dst, size_t cap);
 

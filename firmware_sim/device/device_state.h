@@ -8,7 +8,8 @@
 #include "firmware_sim/device/gnss.h"
 #include "firmware_sim/device/head_clock.h"
 
-/* Poses of a live platform. Each tick begins with a pose of the head, made once from the poses that had come. */
+/* Poses of a live platform. Each tick begins with a pose of the head, made once from the poses that had
+ * come. */
 struct device_live {
     struct device_sample {
         int64_t t_ns;     /* device time */
@@ -26,7 +27,8 @@ enum { DEVICE_MAX_PENDING = 256, DEVICE_MAX_CHANGES = 32, DEVICE_SURFACES_A_FRAM
 struct device_machine {
     enum head_state state; /* as of the next tick to be claimed */
     uint64_t due_tick;     /* of the next timed transition; UINT64_MAX: none */
-    /* The last ones: readers see the state of the last released tick. Number i is at i % DEVICE_MAX_CHANGES. */
+    /* The last ones: readers see the state of the last released tick. Number i is at i %
+     * DEVICE_MAX_CHANGES. */
     struct device_state_change {
         uint64_t tick;
         enum head_state state;
@@ -127,8 +129,8 @@ void device_run_replay(struct device *device, uint64_t tick);
 /* live_pose.c */
 /* The end of the head's path, since the scan's start; INT64_MAX: there is none. */
 int64_t device_path_end_ns(const struct device *device);
-/* Where the head is at a device time; 0: it stands at its station. A trajectory runs from the start of the last scan to
- * its end, and the platform stands there until the next one begins. */
+/* Where the head is at a device time; 0: it stands at its station. A trajectory runs from the start of the
+ * last scan to its end, and the platform stands there until the next one begins. */
 int device_head_pose(struct device *device, int64_t t_ns, struct pose *head);
 /* Poses of a live head for the pulses that the work holds. */
 void device_take_poses(struct device *device, struct device_work *work);

@@ -1,12 +1,13 @@
 /* The GNSS receiver that stands with the head.
  *
- * In: the head's pose and the true time (head_clock.h). Out: NMEA 0183 sentences with the position of its antenna at
- * multiples of 1/rate_hz of UTC. A sentence comes after the moment that it names.
+ * In: the head's pose and the true time (head_clock.h). Out: NMEA 0183 sentences with the position of its
+ * antenna at multiples of 1/rate_hz of UTC. A sentence comes after the moment that it names.
  *
- * The receiver runs from power-up on, also while the head does not scan. (In the pace fast device time itself stands
- * still while the head has nothing to do.) The antenna is at the head's origin plus gnss.lever_arm_m in the head's
- * frame. Its noise, if any, is normal and independent east, north and up. The noise is keyed by noise.seed and the
- * number of the position since power-up. Thread: constant after the clock is powered up. */
+ * The receiver runs from power-up on, also while the head does not scan. (In the pace fast device time itself
+ * stands still while the head has nothing to do.) The antenna is at the head's origin plus gnss.lever_arm_m
+ * in the head's frame. Its noise, if any, is normal and independent east, north and up. The noise is keyed by
+ * noise.seed and the number of the position since power-up. Thread: constant after the clock is powered
+ * up. */
 #ifndef FIRMWARE_SIM_DEVICE_GNSS_H
 #define FIRMWARE_SIM_DEVICE_GNSS_H
 
@@ -34,8 +35,9 @@ struct gnss_track {
     struct pose before, at, after; /* GNSS_STEP_NS apart */
 };
 
-/* The sentences of a position. track NULL: the head stands at the station (0..n_stations-1). Else it is where track
- * says; there is no fix where that is no place on the Earth. Returns the length, 0 when cap is too small. */
+/* The sentences of a position. track NULL: the head stands at the station (0..n_stations-1). Else it is where
+ * track says; there is no fix where that is no place on the Earth. Returns the length, 0 when cap is too
+ * small. */
 size_t gnss_sentences(const struct gnss *gnss, uint64_t index, uint32_t station, const struct gnss_track *track,
                       char *dst, size_t cap);
 

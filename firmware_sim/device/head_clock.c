@@ -82,8 +82,8 @@ int64_t head_clock_ns(const struct head_clock *clock, int64_t t_ns)
     return piece_ns(clock, t_ns, t_ns >= clock->jump_at_ns);
 }
 
-/* The same within one piece. Its clock runs on steadily, so the edge is the first nanosecond that has reached the
- * second, and is found by halving. */
+/* The same within one piece. Its clock runs on steadily, so the edge is the first nanosecond that has reached
+ * the second, and is found by halving. */
 static int find_edge(const struct head_clock *clock, int64_t from_ns, int64_t to_ns, int after, int64_t *edge_ns,
                      int64_t *tai_s)
 {

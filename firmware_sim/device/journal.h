@@ -1,7 +1,7 @@
 /* The journal: every command that had an effect, with its device time. Replayed, it reproduces the session.
  *
- * In: commands as the device carries them out. Out: a text file, which can be read back. It begins with the line
- * `# scanhead journal 1`. Then there is one line per command
+ * In: commands as the device carries them out. Out: a text file, which can be read back. It begins with the
+ * line `# scanhead journal 1`. Then there is one line per command
  *   <device tick> <device time, ns> <session> <command line>
  * with decimal numbers and one blank between them. Other lines that begin with '#' and empty lines are notes.
  * Not real-time safe: each line is written and flushed at once, so that a crash loses none. */
@@ -40,8 +40,8 @@ struct journal_entry {
 };
 
 /* Reads a whole file, sorted by tick; commands of one tick stay in the file's order. Errors name file:line; a
- * last line without its end is one, since its command may be cut. On failure *entries is NULL. The caller frees
- * it. */
+ * last line without its end is one, since its command may be cut. On failure *entries is NULL. The caller
+ * frees it. */
 int journal_read(const char *path, struct journal_entry **entries, size_t *n, struct sh_err *err);
 
 #endif

@@ -27,8 +27,8 @@ static int is_near(const struct device *device, const struct pose *pose)
     return off_m <= device->site->cfg->platform.reach_m;
 }
 
-/* So far ahead that the time must be wrong. Such a pose would keep all later ones out. In the pace step the time is
- * granted, and so right. */
+/* So far ahead that the time must be wrong. Such a pose would keep all later ones out. In the pace step the
+ * time is granted, and so right. */
 static int is_early(const struct device *device, int64_t t_ns)
 {
     int64_t now_ns = (int64_t)device->next_tick * device->tick_ns;
@@ -49,7 +49,8 @@ int device_pose(struct device *device, int64_t t_ns, const double v[6])
     return bad;
 }
 
-/* After the last pose: on as from the one before to the last, for extrapolate_ms and within reach. Then it stands. */
+/* After the last pose: on as from the one before to the last, for extrapolate_ms and within reach. Then it
+ * stands. */
 static uint32_t extrapolate(const struct device *device, int64_t t_ns, struct pose *out)
 {
     const struct device_live *live = &device->live;

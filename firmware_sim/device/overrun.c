@@ -1,5 +1,5 @@
-/* Ticks and pulses that the head could not compute in time: counted here (lost_pulses, lost_ticks), and announced in
- * an event. Frames that a slow reader lost are another matter: loop/lost_frames.c. */
+/* Ticks and pulses that the head could not compute in time: counted here (lost_pulses, lost_ticks), and
+ * announced in an event. Frames that a slow reader lost are another matter: loop/lost_frames.c. */
 #include <stdio.h>
 #include <string.h>
 
@@ -25,8 +25,8 @@ void device_say_overrun(struct device *device, uint64_t tick)
     device->overrun.first = UINT64_MAX;
 }
 
-/* Events of a lost tick go before those that came later. An overrun event is taken back instead: the next one has its
- * losses and the new ones. So a long overload can't fill the room for events. */
+/* Events of a lost tick go before those that came later. An overrun event is taken back instead: the next one
+ * has its losses and the new ones. So a long overload can't fill the room for events. */
 static void take_back(struct device *device, const struct device_work *work)
 {
     uint32_t n = 0;

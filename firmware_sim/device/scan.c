@@ -34,8 +34,8 @@ uint32_t device_tick_lines(const struct config *cfg)
     return (uint32_t)ceil((double)cfg->profile.lines_max_uhz * 1e-6 / cfg->loop.tick_hz) + 2;
 }
 
-/* First pulse that is too many for this tick. When the rates jump up, what is due since the last cut, up to 15 pulses
- * at the old rate, comes at the new one and may fill several ticks. */
+/* First pulse that is too many for this tick. When the rates jump up, what is due since the last cut, up to
+ * 15 pulses at the old rate, comes at the new one and may fill several ticks. */
 static uint64_t tick_room_end(const struct device *device)
 {
     const struct schedule_segment *seg = &device->scan.segment;
@@ -46,7 +46,8 @@ static uint64_t tick_room_end(const struct device *device)
     return line.pulse_end < end ? line.pulse_end : schedule_cut(seg, end);
 }
 
-/* Pulses of this tick; ends the scan when it is complete or was told to stop. Returns 1 when the scan is over. */
+/* Pulses of this tick; ends the scan when it is complete or was told to stop. Returns 1 when the scan is
+ * over. */
 static int claim_pulses(struct device *device, uint64_t tick, struct device_work *work)
 {
     struct schedule_segment *seg = &device->scan.segment;
@@ -59,7 +60,8 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
     work->stretch = device->scan.stretch;
     work->echoes = device->cmd.settings.echoes;
     work->pulse0 = device->scan.pulse_next;
-    /* A stop keeps what was fired before this tick began; else the cut leaves whole packets for the next tick. */
+    /* A stop keeps what was fired before this tick began; else the cut leaves whole packets for the next
+     * tick. */
     int64_t path_end_ns = device_path_end_ns(device), until_ns = stop ? since : since + device->tick_ns;
     int arrives = path_end_ns <= until_ns; /* at the end of a trajectory */
     uint64_t due = schedule_pulse_at(seg, arrives ? path_end_ns : until_ns);

@@ -15,7 +15,8 @@ static int may_claim(struct loop *loop)
     return pace != PACE_FAST || !device_is_idle(loop->device);
 }
 
-/* Claims the next tick. 1: work and slot are set (slot NULL: lost already); 0: not now; -1: the run is over. */
+/* Claims the next tick. 1: work and slot are set (slot NULL: lost already); 0: not now; -1: the run is
+ * over. */
 static int claim(struct loop *loop, struct device_work *work, struct ring_slot **slot)
 {
     struct casters *casters = &loop->casters;
@@ -41,7 +42,8 @@ static int claim(struct loop *loop, struct device_work *work, struct ring_slot *
     return got;
 }
 
-/* The frames into the slot. 0: it has no room for them, and there is no memory for more; said once per episode. */
+/* The frames into the slot. 0: it has no room for them, and there is no memory for more; said once per
+ * episode. */
 static int put(struct loop *loop, struct ring_slot *slot, const struct ring_tick *tick)
 {
     _Atomic int *no_memory = &loop->casters.no_memory;
@@ -68,8 +70,8 @@ static int compute(struct loop_caster *caster, const struct device_work *work, s
     }
     int whole = put(loop, slot, worker_fill(caster->worker, work));
     if (ring_ready(slot, work->tick)) return whole;
-    /* Computed in vain: the next ones are as late. Taking up each in turn just before its time is over would lose them
-     * all. So leave out as many as give the ones after them half the time ahead. */
+    /* Computed in vain: the next ones are as late. Taking up each in turn just before its time is over would
+     * lose them all. So leave out as many as give the ones after them half the time ahead. */
     atomic_store(&loop->casters.drop_until, stream_released(&loop->stream) + loop->casters.ahead_ticks / 2);
     return 0;
 }

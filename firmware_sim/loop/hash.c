@@ -51,7 +51,8 @@ static void *hasher_main(void *arg)
             continue;
         }
         if (got == RING_READ && tick->n_frames != 0) {
-            /* Nobody is woken for empty ticks, so old ones may be gone; only a gap in the numbers is a loss. */
+            /* Nobody is woken for empty ticks, so old ones may be gone; only a gap in the numbers is a
+             * loss. */
             if (tick->first_seq != h->next_seq) h->lost = 1;
             h->next_seq = tick->first_seq + tick->n_frames;
             hash_frames(h, tick->buf, tick->len);

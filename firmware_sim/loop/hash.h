@@ -10,7 +10,8 @@ struct hasher;
 
 /* Before the pacing thread starts. */
 int hasher_start(struct stream *stream, struct hasher **out, struct sh_err *err);
-/* Waits until the stream is over and read. 1: hex is the hash; 0: the hasher itself could not follow. Frees it. */
+/* Waits until the stream is over and read. 1: hex is the hash; 0: the hasher itself could not follow. Frees
+ * it. */
 int hasher_join(struct hasher *hasher, char hex[65]);
 
 #endif

@@ -5,9 +5,9 @@
 #include "drivers/protocol/native.h"
 #include "firmware_sim/loop/pump.h"
 
-/* Bytes per second of the points at the rates that are set, with one echo per pulse: the least that there will be. A
- * command can raise the rates later. Further echoes and the frames' headers come on top. What a link then loses is
- * announced. */
+/* Bytes per second of the points at the rates that are set, with one echo per pulse: the least that there
+ * will be. A command can raise the rates later. Further echoes and the frames' headers come on top. What a
+ * link then loses is announced. */
 static double stream_rate(const struct config *cfg)
 {
     const struct head_settings *h = &cfg->head.settings;

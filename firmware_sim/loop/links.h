@@ -1,6 +1,7 @@
 /* The links of a head: each open link is a pump (pump.h) with a thread of its own.
  *
- * In: the links of the configuration, and the stream. Out: frames and replies to clients, commands to the device. */
+ * In: the links of the configuration, and the stream. Out: frames and replies to clients, commands to the
+ * device. */
 #ifndef FIRMWARE_SIM_LOOP_LINKS_H
 #define FIRMWARE_SIM_LOOP_LINKS_H
 
@@ -29,8 +30,8 @@ struct links {
     struct sh_err error; /* of the first link that failed, once failed is 1 */
 };
 
-/* Opens the links of the configuration, and one more where extra is not NULL. A link that carries less than the stream
- * needs is refused. links_close is needed after a failure, too. */
+/* Opens the links of the configuration, and one more where extra is not NULL. A link that carries less than
+ * the stream needs is refused. links_close is needed after a failure, too. */
 int links_open(struct links *links, const struct config *cfg, const struct link_spec *extra, struct sh_err *err);
 int links_start(struct links *links, struct sh_err *err);
 /* Waits until the links have brought out what their readers take. */

@@ -93,8 +93,8 @@ void loop_put_endpoints(const struct loop *loop, struct json *json)
     json_close_object(json);
 }
 
-/* What there is, so that nothing the pacing thread touches is paged out or in. Before the threads, whose stacks would
- * be locked whole. */
+/* What there is, so that nothing the pacing thread touches is paged out or in. Before the threads, whose
+ * stacks would be locked whole. */
 static void lock_memory(const struct loop *loop)
 {
     if (loop->stream.waits || mlockall(MCL_CURRENT) == 0) return;

@@ -1,4 +1,5 @@
-/* Private to loop.c, casters.c and pacer.c: the struct loop, whose parts each belong to one of these files. */
+/* Private to loop.c, casters.c and pacer.c: the struct loop, whose parts each belong to one of these
+ * files. */
 #ifndef FIRMWARE_SIM_LOOP_LOOP_INSIDE_H
 #define FIRMWARE_SIM_LOOP_LOOP_INSIDE_H
 

@@ -1,5 +1,6 @@
-/* Frames that a reader lost: counted here (reader_lost_frames), announced to the reader in an event of its own, and
- * reported to the error queue. Pulses that the head could not compute in time are another matter: device/overrun.c. */
+/* Frames that a reader lost: counted here (reader_lost_frames), announced to the reader in an event of its
+ * own, and reported to the error queue. Pulses that the head could not compute in time are another matter:
+ * device/overrun.c. */
 #include <stdio.h>
 
 #include "drivers/protocol/native_encode.h"

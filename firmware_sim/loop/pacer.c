@@ -1,5 +1,5 @@
-/* The pacing thread: releases each tick when its time has come. It takes no lock, allocates and logs nothing, and
- * calls the system for the clock and for wake-ups alone. */
+/* The pacing thread: releases each tick when its time has come. It takes no lock, allocates and logs nothing,
+ * and calls the system for the clock and for wake-ups alone. */
 #include <errno.h>
 #include <sched.h>
 #include <string.h>
@@ -40,8 +40,8 @@ static void note_late(struct loop *loop, int64_t late_ns)
     if (ns > atomic_load(&counters->late_max_ns)) atomic_store(&counters->late_max_ns, ns);
 }
 
-/* A tick that is not ready late_ms after its time is given up. What the pacing thread itself overslept is added to
- * late_ms (credit) until it has caught up. */
+/* A tick that is not ready late_ms after its time is given up. What the pacing thread itself overslept is
+ * added to late_ms (credit) until it has caught up. */
 static void pace_realtime(struct loop *loop)
 {
     struct stream *stream = &loop->stream;

@@ -4,11 +4,13 @@
  *
  *   t_s x y z roll pitch heading
  *
- * in device time in seconds (TIME? asks for it), metres in the scene frame, and degrees as core/pose.h defines them.
- * Blanks or commas stand between the numbers. Out: calls of device_pose. A thread of its own takes them in.
+ * in device time in seconds (TIME? asks for it), metres in the scene frame, and degrees as core/pose.h
+ * defines them. Blanks or commas stand between the numbers. Out: calls of device_pose. A thread of its own
+ * takes them in.
  *
  * A line is not used when it is malformed, out of reach, not later than the one before, or more than
- * DEVICE_POSE_AHEAD_S ahead of device time. It is counted (bad_poses), and reported once per second at most. */
+ * DEVICE_POSE_AHEAD_S ahead of device time. It is counted (bad_poses), and reported once per second at
+ * most. */
 #ifndef FIRMWARE_SIM_LOOP_POSE_FEED_H
 #define FIRMWARE_SIM_LOOP_POSE_FEED_H
 
@@ -18,7 +20,8 @@
 
 struct pose_feed;
 
-/* Listens where platform.address and platform.port say. device NULL: only to see whether it can; it is not started. */
+/* Listens where platform.address and platform.port say. device NULL: only to see whether it can; it is not
+ * started. */
 int pose_feed_open(struct device *device, const struct config *cfg, struct pose_feed **out, struct sh_err *err);
 int pose_feed_start(struct pose_feed *feed, struct sh_err *err);
 /* "udp:127.0.0.1:4711" */

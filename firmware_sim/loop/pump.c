@@ -150,7 +150,8 @@ static void *pump_main(void *arg)
 
 int pump_start(struct pump *pump, struct sh_err *err)
 {
-    /* Sessions that are there from the start (a file's) begin with the first tick, however late the thread comes. */
+    /* Sessions that are there from the start (a file's) begin with the first tick, however late the thread
+     * comes. */
     take_events(pump, 0, 0);
     atomic_fetch_add(&pump->links->n_busy, 1);
     int rc = pthread_create(&pump->thread, NULL, pump_main, pump);

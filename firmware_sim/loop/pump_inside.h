@@ -64,8 +64,8 @@ void session_close(struct pump *pump, struct session *s);
 int session_write(struct pump *pump, struct session *s, int index);
 
 /* lost_frames.c: the one place that counts what a reader lost. */
-/* Compares the number of a tick's first frame with the one expected, and counts and announces a gap. `released`: ticks
- * released when the tick was read. */
+/* Compares the number of a tick's first frame with the one expected, and counts and announces a gap.
+ * `released`: ticks released when the tick was read. */
 void session_check_lost(struct pump *pump, struct session *s, const struct ring_copy *tick, uint64_t released);
 /* Counts n frames or sentences. The error queue gets an entry once per episode. */
 void session_count_lost(struct pump *pump, struct session *s, uint32_t n);
@@ -75,9 +75,9 @@ void session_leave(struct pump *pump, struct session *s);
 /* pump_commands.c */
 /* A reply line, after those that wait already. */
 void pump_add_reply(struct session *s, const char *text);
-/* Carries out the lines that were read. Each one is carried out and answered after the one before. Lines wait while a
- * step goes on, and while there is no room for their replies. Replies are lost only to a client that sends on and on
- * without reading. */
+/* Carries out the lines that were read. Each one is carried out and answered after the one before. Lines wait
+ * while a step goes on, and while there is no room for their replies. Replies are lost only to a client that
+ * sends on and on without reading. */
 void pump_take_lines(struct pump *pump, struct session *s);
 /* Reads what the client sent, and takes its lines. */
 void pump_read_commands(struct pump *pump, struct session *s, int index);

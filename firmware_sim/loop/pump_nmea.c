@@ -25,7 +25,8 @@ static uint64_t next_tick(const struct pump *pump, const struct session *s)
     return (uint64_t)(gnss_time_ns(gnss, count_at(pump, s->cursor)) / pump->stream->tick_ns);
 }
 
-/* As for frames: what is more than a queue old is lost, and the reader goes on with what is half a queue old. */
+/* As for frames: what is more than a queue old is lost, and the reader goes on with what is half a queue
+ * old. */
 static void lose_old(struct pump *pump, struct session *s, uint64_t released)
 {
     uint64_t queue_ticks = pump->stream->ring.queue_ticks;

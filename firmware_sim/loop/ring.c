@@ -136,7 +136,8 @@ enum ring_read ring_read(struct ring *ring, int reader, uint64_t tick, struct ri
     uint64_t released = atomic_load(&ring->released);
     if (tick >= released) return RING_NONE;
     atomic_store(&ring->hazard[reader], tick + 1);
-    /* Looked at again after the hazard is up: a claim that did not see it comes only once the tick is this old. */
+    /* Looked at again after the hazard is up: a claim that did not see it comes only once the tick is this
+     * old. */
     released = atomic_load(&ring->released);
     struct ring_slot *slot = slot_of(ring, tick);
     enum ring_read result = RING_LOST;

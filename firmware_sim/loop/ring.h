@@ -1,18 +1,20 @@
-/* The ring of slots between casters, the pacing thread and readers: one slot per tick, with the tick's frames.
+/* The ring of slots between casters, the pacing thread and readers: one slot per tick, with the tick's
+ * frames.
  *
- * A caster claims the slot of a tick, puts in what it made, and marks it ready. The pacing thread releases the tick
- * when its time has come. A tick that is not ready in time is marked lost instead. Readers copy released ticks at
- * their own speed. A tick is there for them as long as it is among the last queue_ticks released.
+ * A caster claims the slot of a tick, puts in what it made, and marks it ready. The pacing thread releases
+ * the tick when its time has come. A tick that is not ready in time is marked lost instead. Readers copy
+ * released ticks at their own speed. A tick is there for them as long as it is among the last queue_ticks
+ * released.
  *
- * Nobody waits for a reader here (stream.h does, in the paces fast and step). A reader in the middle of a copy says
- * so (hazard), and the slot is not claimed until the copy is over.
+ * Nobody waits for a reader here (stream.h does, in the paces fast and step). A reader in the middle of a
+ * copy says so (hazard), and the slot is not claimed until the copy is over.
  *
- * Memory: each slot has room for a usual tick from the start, and more once a tick needed more. The caster makes that
- * room while the slot is its own, so that the pacing thread never allocates.
+ * Memory: each slot has room for a usual tick from the start, and more once a tick needed more. The caster
+ * makes that room while the slot is its own, so that the pacing thread never allocates.
  *
- * Threads: one claim at a time, which the caller sees to; put and ready by the claiming caster; release and lose by
- * the pacing thread alone; read by any number of readers, each with its own hazard number. There are no locks. A claim
- * may yield to a reader. */
+ * Threads: one claim at a time, which the caller sees to; put and ready by the claiming caster; release and
+ * lose by the pacing thread alone; read by any number of readers, each with its own hazard number. There are
+ * no locks. A claim may yield to a reader. */
 #ifndef FIRMWARE_SIM_LOOP_RING_H
 #define FIRMWARE_SIM_LOOP_RING_H
 
@@ -23,8 +25,8 @@
 #include "core/err.h"
 #include "core/line.h"
 
-/* Readers: eight sessions of each of nine links, and the hash. Marks: 10,000 lines per second in ticks of 10 ms, and
- * the two more of device_tick_lines. */
+/* Readers: eight sessions of each of nine links, and the hash. Marks: 10,000 lines per second in ticks of 10
+ * ms, and the two more of device_tick_lines. */
 enum { RING_MAX_READERS = 73, RING_MAX_MARKS = 104 };
 
 /* What pulses hit: echoes, and what is no echo (struct cast_counters). */
@@ -82,8 +84,8 @@ void ring_free(struct ring *ring);
 
 /* The slot for `tick`, empty; or NULL when the tick is lost already. */
 struct ring_slot *ring_claim(struct ring *ring, uint64_t tick);
-/* Copies frames, marks and counts into a claimed slot, and makes room for them where they need more than it has.
- * SH_ENOMEM: there is none; the slot then holds no frame, and says that it is broken. */
+/* Copies frames, marks and counts into a claimed slot, and makes room for them where they need more than it
+ * has. SH_ENOMEM: there is none; the slot then holds no frame, and says that it is broken. */
 int ring_put(struct ring_slot *slot, const struct ring_tick *tick);
 /* The caster is done with the slot. 0 when the tick was lost meanwhile. */
 int ring_ready(struct ring_slot *slot, uint64_t tick);
@@ -104,8 +106,8 @@ struct ring_copy {
     uint32_t len, n_frames, first_seq; /* first_seq: the first frame's number; without frames that of the next one */
 };
 enum ring_read { RING_READ, RING_NONE, RING_LOST };
-/* Copies the frames of `tick`. RING_NONE: it is not released yet. RING_LOST: it is too old, or the head itself lost it.
- * RING_READ with len > cap: it did not fit, and nothing was copied. */
+/* Copies the frames of `tick`. RING_NONE: it is not released yet. RING_LOST: it is too old, or the head
+ * itself lost it. RING_READ with len > cap: it did not fit, and nothing was copied. */
 enum ring_read ring_read(struct ring *ring, int reader, uint64_t tick, struct ring_copy *copy);
 
 #endif

@@ -1,7 +1,7 @@
 /* A session of a link: takes ticks from the stream into a buffer of its own, and writes that to the link.
  *
- * A session copies each tick before it writes it. So a slow reader holds up nobody. When what it has to read next is
- * too old, it loses whole frames, and goes on with newer ones (lost_frames.c). */
+ * A session copies each tick before it writes it. So a slow reader holds up nobody. When what it has to read
+ * next is too old, it loses whole frames, and goes on with newer ones (lost_frames.c). */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

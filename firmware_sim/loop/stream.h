@@ -1,10 +1,11 @@
 /* The stream: what casters, the pacing thread and readers share while the loop runs.
  *
- * In: ticks that casters filled (ring.h). Out: the native frames of each released tick, numbered, for every reader at
- * its own speed. Readers are the sessions of links (pump.h) and the hash of the stream (hash.c).
+ * In: ticks that casters filled (ring.h). Out: the native frames of each released tick, numbered, for every
+ * reader at its own speed. Readers are the sessions of links (pump.h) and the hash of the stream (hash.c).
  *
- * The stream holds the ring, how far each reader is, the number of the next frame, what is counted at release, the
- * time that a peer granted (pace step), and all wake-ups. It knows nothing of casting, of links or of commands.
+ * The stream holds the ring, how far each reader is, the number of the next frame, what is counted at
+ * release, the time that a peer granted (pace step), and all wake-ups. It knows nothing of casting, of links
+ * or of commands.
  *
  * Units: ticks from power-up, device time in ns. */
 #ifndef FIRMWARE_SIM_LOOP_STREAM_H
@@ -56,19 +57,21 @@ struct stream {
     uint32_t n_listeners;
 };
 
-/* A stream as long as `size`, in ticks of tick_ns. tick_bytes, waits, counters and n_casters are the caller's to set,
- * before any thread starts. */
+/* A stream as long as `size`, in ticks of tick_ns. tick_bytes, waits, counters and n_casters are the caller's
+ * to set, before any thread starts. */
 int stream_create(struct stream *stream, const struct ring_size *size, int64_t tick_ns, struct sh_err *err);
 void stream_free(struct stream *stream);
 
 /* ---- the pacing thread; real-time safe */
-/* Completes the slot's line ends, numbers its frames, counts it, publishes it and wakes readers and casters. */
+/* Completes the slot's line ends, numbers its frames, counts it, publishes it and wakes readers and
+ * casters. */
 void stream_release(struct stream *stream, struct ring_slot *slot, uint64_t tick, int64_t now_ns);
 /* Gives a tick up. 0 when it became ready in the same moment. */
 int stream_lose(struct stream *stream, uint64_t tick);
 /* True when every active reader has gone on so far that this tick may be released. */
 int stream_has_room(const struct stream *stream, uint64_t tick);
-/* Waits until a reader went on. Once the run is to end, readers that stand still for 2 s hold back nothing any more. */
+/* Waits until a reader went on. Once the run is to end, readers that stand still for 2 s hold back nothing
+ * any more. */
 void stream_wait_for_readers(struct stream *stream, uint64_t tick);
 /* Nothing more will be released. */
 void stream_end(struct stream *stream);
@@ -85,7 +88,8 @@ uint64_t stream_released(const struct stream *stream);
 uint64_t stream_grant(struct stream *stream, uint64_t ns);
 /* Lets device time pass up to that sum. Returns the tick before which all may pass. */
 uint64_t stream_pass(struct stream *stream, uint64_t total_ns);
-/* Something happened that casters or the pacing thread may wait for: a command, a grant, the end. Any thread. */
+/* Something happened that casters or the pacing thread may wait for: a command, a grant, the end. Any
+ * thread. */
 void stream_poke(struct stream *stream);
 
 #endif

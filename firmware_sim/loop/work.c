@@ -135,9 +135,9 @@ static void fill_heads(struct worker *worker, const struct device_work *work)
     }
 }
 
-/* All poses from the last one at or before the first pulse to the first one at or after the last pulse. A trajectory
- * may have more of them than a frame holds, when pulses are far apart. Then only some are chosen. The poses that are
- * sent are always those that pulses are cast with. */
+/* All poses from the last one at or before the first pulse to the first one at or after the last pulse. A
+ * trajectory may have more of them than a frame holds, when pulses are far apart. Then only some are chosen.
+ * The poses that are sent are always those that pulses are cast with. */
 static uint32_t choose_knots(struct worker *worker, int64_t from_ns, int64_t to_ns)
 {
     const struct site *site = worker->site;
@@ -189,8 +189,8 @@ static void move_anchor(struct worker *worker, const struct device_work *work, s
     add_anchor(worker, &anchor, work->t_ns, 0);
 }
 
-/* Prepares what pulse k needs on its stretch of a moving head's path. Returns the first pulse on another stretch, or
- * end. */
+/* Prepares what pulse k needs on its stretch of a moving head's path. Returns the first pulse on another
+ * stretch, or end. */
 static uint64_t enter_stretch(struct worker *worker, const struct device_work *work, uint64_t k, uint64_t end)
 {
     const struct site *site = worker->site;
@@ -251,7 +251,8 @@ static void cast_run(struct worker *worker, const struct device_work *work, cons
     }
 }
 
-/* Writes the line-end frame. Its number of echoes is filled in at release: blocks may come from several ticks. */
+/* Writes the line-end frame. Its number of echoes is filled in at release: blocks may come from several
+ * ticks. */
 static void end_line(struct worker *worker, const struct device_work *work, const struct schedule_line *line,
                      uint64_t end)
 {

@@ -1,7 +1,7 @@
 /* One tick's work: casting its pulses and writing its frames.
  *
- * In: what the device says a tick consists of (device_work). Out: the tick's frames as bytes, the line ends that are
- * completed at release, and its counts (ring_tick). */
+ * In: what the device says a tick consists of (device_work). Out: the tick's frames as bytes, the line ends
+ * that are completed at release, and its counts (ring_tick). */
 #ifndef FIRMWARE_SIM_LOOP_WORK_H
 #define FIRMWARE_SIM_LOOP_WORK_H
 

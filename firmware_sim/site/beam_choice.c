@@ -115,8 +115,8 @@ static void list_beams(const struct site *site, struct beam_choice *choice, stru
     }
 }
 
-/* Measures the beams that are possible, up to those that cost more than one that holds. Finding outlines takes time:
- * the adaptive beam is measured only where single rays don't hold. *holds: one of them does. */
+/* Measures the beams that are possible, up to those that cost more than one that holds. Finding outlines
+ * takes time: the adaptive beam is measured only where single rays don't hold. *holds: one of them does. */
 static int measure_beams(struct trial *trial, const struct beam_choice *choice, struct plan_option *option,
                          const struct sh_report *report, struct sh_err *err, int *holds)
 {
@@ -188,7 +188,8 @@ static int force_beam(struct site *site, const struct sh_report *report, struct 
 
 /* ---- glass and mirrors */
 
-/* Depths up to the first that holds; where the configuration names one, all of them. Returns whether one holds. */
+/* Depths up to the first that holds; where the configuration names one, all of them. Returns whether one
+ * holds. */
 static int try_depths(const struct trial *trial, int forced, struct plan_option *option)
 {
     int holds = 0;

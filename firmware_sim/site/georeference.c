@@ -13,8 +13,8 @@ static double reach_m(const struct site *site, const struct site_stretch *stretc
     return (site->cfg->profile.range_max_m + way_m) * SITE_MARGIN;
 }
 
-/* Where points can be, seen from there: within the scene, and within the head's range. A hundredth more, and ten sigma,
- * for noise. */
+/* Where points can be, seen from there: within the scene, and within the head's range. A hundredth more, and
+ * ten sigma, for noise. */
 static void extent_from(const struct site *site, const double centre_m[3], double reach, struct plan_georef_need *need)
 {
     double far[3], noise_m = site_noise_m(site);
@@ -42,8 +42,8 @@ static int plan_one(const struct site *site, struct georef *georef, const double
     return georef_set_method(georef, method, err);
 }
 
-/* The path in legs, each with a georeference of its own about its middle: counts and polynomials have to reach no
- * further, however long it is. */
+/* The path in legs, each with a georeference of its own about its middle: counts and polynomials have to
+ * reach no further, however long it is. */
 static int plan_legs(const struct site *site, struct site_station *s, struct sh_err *err)
 {
     struct plan_row row;
@@ -117,8 +117,8 @@ static int scale_stations(struct site *site, double scale_m, struct sh_err *err)
     return rc;
 }
 
-/* The finest 1e-6 x 10^n m with which the head's whole range fits into 31 bits, in the geo layout from anywhere on its
- * leg, with a hundredth left for noise, unless the configuration names a scale. */
+/* The finest 1e-6 x 10^n m with which the head's whole range fits into 31 bits, in the geo layout from
+ * anywhere on its leg, with a hundredth left for noise, unless the configuration names a scale. */
 static int choose_scale(struct site *site, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;

@@ -14,7 +14,8 @@ static struct scene_mesh_spec mesh_spec(const struct config *cfg, const struct c
     return spec;
 }
 
-/* A body by itself, in its own frame: its mesh, the sphere around it, and labels that follow those there are. */
+/* A body by itself, in its own frame: its mesh, the sphere around it, and labels that follow those there
+ * are. */
 static int add_mover(struct site *site, const struct config_mesh *mesh, const struct sh_report *report,
                      struct sh_err *err)
 {
@@ -84,8 +85,8 @@ static int build_bvhs(struct site *site, const struct sh_report *report, struct 
     return rc;
 }
 
-/* What is wrong with an IFC file's site shall be reported rather than what follows from it: the anchor comes before the
- * scene. */
+/* What is wrong with an IFC file's site shall be reported rather than what follows from it: the anchor comes
+ * before the scene. */
 static int load(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     int rc = placement_find_anchor(site->cfg, report, &site->anchor, err);

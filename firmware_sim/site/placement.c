@@ -98,7 +98,8 @@ static int given_place(const struct config_station *s, struct georef_place *at, 
     return rc == SH_OK ? locate_check(at, err) : rc;
 }
 
-/* A UTM place in a scene of the same grid, and an ECEF place in a scene in ECEF, are the scene's to the last bit. */
+/* A UTM place in a scene of the same grid, and an ECEF place in a scene in ECEF, are the scene's to the last
+ * bit. */
 static int find_position(const struct config_station *s, const struct geoframe *frame, const struct georef_place *at,
                          double position_m[3], struct sh_err *err)
 {

@@ -1,4 +1,5 @@
-/* Where the stations of a site stand: in the scene, and where the scene's anchor or the station says so, on the Earth.
+/* Where the stations of a site stand: in the scene, and where the scene's anchor or the station says so, on
+ * the Earth.
  */
 #ifndef FIRMWARE_SIM_SITE_PLACEMENT_H
 #define FIRMWARE_SIM_SITE_PLACEMENT_H

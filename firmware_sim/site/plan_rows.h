@@ -1,5 +1,5 @@
-/* The plan of a site as rows for people to read, and the order of surfaces. core/plan chooses, the site applies it
- * (site->plan); nothing else decides on methods. */
+/* The plan of a site as rows for people to read, and the order of surfaces. core/plan chooses, the site
+ * applies it (site->plan); nothing else decides on methods. */
 #ifndef FIRMWARE_SIM_SITE_PLAN_ROWS_H
 #define FIRMWARE_SIM_SITE_PLAN_ROWS_H
 

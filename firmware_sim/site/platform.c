@@ -7,8 +7,8 @@
 #include "core/angle.h"
 #include "core/vec3.h"
 
-/* Largest distance of the head's own path from the trajectory, and largest steps between its poses, in metres and ns:
- * a path is cut into them for BVHs, and a recorded trajectory has them. */
+/* Largest distance of the head's own path from the trajectory, and largest steps between its poses, in metres
+ * and ns: a path is cut into them for BVHs, and a recorded trajectory has them. */
 static const double TOLERANCE_M = 1e-4, LONGEST_M = 0.01;
 static const int64_t LONGEST_NS = 10000000;
 

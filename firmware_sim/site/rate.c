@@ -10,8 +10,8 @@
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/site/site_inside.h"
 
-/* Processor time: to warm the caches, and to measure for. Runs are short enough that one of the most expensive pulses
- * (1,027 sub-rays) ends within a few milliseconds. */
+/* Processor time: to warm the caches, and to measure for. Runs are short enough that one of the most
+ * expensive pulses (1,027 sub-rays) ends within a few milliseconds. */
 static const int64_t WARM_NS = 2000000, MEASURE_NS = 6000000;
 enum { RUN = 64, TRIES = 4096, LEAST_RUNS = 2, MOST_RUNS = 4096 };
 enum { MAX_DT_NS = (1 << 24) - 1 };   /* a point's time within its frame has 24 bits */

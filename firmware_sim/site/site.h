@@ -1,6 +1,6 @@
-/* The site: what a configuration loads once and all scans share. In goes a checked configuration; out come the scene,
- * its BVHs, the stations' places (scene frame, metres) and georeferences, and the planned methods. load.c makes it,
- * site.c reads it. It is constant once loaded: any thread. */
+/* The site: what a configuration loads once and all scans share. In goes a checked configuration; out come
+ * the scene, its BVHs, the stations' places (scene frame, metres) and georeferences, and the planned methods.
+ * load.c makes it, site.c reads it. It is constant once loaded: any thread. */
 #ifndef FIRMWARE_SIM_SITE_SITE_H
 #define FIRMWARE_SIM_SITE_SITE_H
 
@@ -93,7 +93,8 @@ struct site {
     double scale_m;      /* of positions and ranges on the wire, metres per count */
 };
 
-/* Stations further than this from a BVH's origin get a BVH of their own: there a float has steps of 0.06 mm. */
+/* Stations further than this from a BVH's origin get a BVH of their own: there a float has steps of 0.06
+ * mm. */
 #define SITE_BVH_REACH_M 1000.0
 
 /* Room left beyond the head's largest range, for noise. */
@@ -105,9 +106,9 @@ int site_load(const struct config *cfg, const struct sh_report *report, struct s
 int site_load_plan(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err);
 void site_free(struct site *site);
 
-/* The grid of output.crs utm, as georef_spec has it: one for all stations of an anchored scene, that of the anchor or
- * of the first station, unless output.utm_zone or the scene's own grid says it; else by position. The hemisphere of the
- * false northing is that in which the first station is given, if it is given in UTM. */
+/* The grid of output.crs utm, as georef_spec has it: one for all stations of an anchored scene, that of the
+ * anchor or of the first station, unless output.utm_zone or the scene's own grid says it; else by position.
+ * The hemisphere of the false northing is that in which the first station is given, if it is given in UTM. */
 void site_grid(const struct site *site, int *zone, int *side);
 
 /* Entries that a pulse may need in a block: its echoes, as far as the plan allows for more than one. */
@@ -118,13 +119,14 @@ const struct scene_surface *site_surface(const struct site *site, uint32_t label
 /* The texture of a real surface; NULL: none. */
 const struct scene_texture *site_texture(const struct site *site, uint32_t label);
 
-/* On which stretch a moving head is at a time of the scan; and what the casters need there, in a setup for the station.
+/* On which stretch a moving head is at a time of the scan; and what the casters need there, in a setup for
+ * the station.
  */
 size_t site_stretch_at(const struct site *site, int64_t t_ns);
 void site_enter(const struct site *site, uint32_t station, size_t stretch, struct cast_setup *setup);
 
-/* The georeference of a station's points on a stretch, what the anchor is in the scene, and its scale. The stretch
- * counts only along a trajectory. */
+/* The georeference of a station's points on a stretch, what the anchor is in the scene, and its scale. The
+ * stretch counts only along a trajectory. */
 const struct georef *site_georef(const struct site *site, uint32_t station, size_t stretch, const double **centre_m,
                                  const double **scale);
 

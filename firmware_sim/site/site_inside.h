@@ -7,8 +7,8 @@
 /* ---- detection.c: what a site's scans do between a hit and a point (signal, surfaces, instrument, noise),
  * made once from the configuration and the loaded scene. */
 
-/* The scene and its movers are loaded. Where there are mirrors, site->n_surfaces grows by the labels of ghosts. Warns
- * of entries of `surfaces` that no surface fits. */
+/* The scene and its movers are loaded. Where there are mirrors, site->n_surfaces grows by the labels of
+ * ghosts. Warns of entries of `surfaces` that no surface fits. */
 int site_set_up_detect(struct site *site, const struct sh_report *report, struct sh_err *err);
 void site_free_detect(struct site *site);
 
@@ -17,7 +17,8 @@ void site_set_depth(struct site *site, uint32_t depth);
 
 /* Whether a run, or `plan`, may cast footprints: what is built then has room for them. */
 int site_casts_footprints(const struct site *site);
-/* How far from the head's origin rays may begin, given where it stands: beams beside it, and ways beyond glass. */
+/* How far from the head's origin rays may begin, given where it stands: beams beside it, and ways beyond
+ * glass. */
 double site_ray_reach_m(const struct site *site, const double station_m[3]);
 
 /* How far the scene goes, without what moves. */
@@ -26,18 +27,20 @@ double site_farthest_m(const struct site *site, const double from_m[3]);
 double site_noise_m(const struct site *site);
 
 /* ---- platform.c: a head that moves while it scans, or that scans where its platform stops (platform.kind: stops).
- * In: the configured trajectory and times. Out: its poses (scene frame, metres) and the BVHs that its path needs; or
- * a station for each stop, placed in the scene. */
+ * In: the configured trajectory and times. Out: its poses (scene frame, metres) and the BVHs that its path
+ * needs; or a station for each stop, placed in the scene. */
 
-/* Puts the stops in the place of the configuration's only station. That one has been placed: without an anchor it says
- * where on the Earth the scene lies, as an anchor at its position with the scene's y axis to true north would. */
+/* Puts the stops in the place of the configuration's only station. That one has been placed: without an
+ * anchor it says where on the Earth the scene lies, as an anchor at its position with the scene's y axis to
+ * true north would. */
 int site_load_stops(struct site *site, struct sh_err *err);
 
 /* Reads the trajectory, and builds the BVHs that its path needs. */
 int site_load_platform(struct site *site, const struct sh_report *report, struct sh_err *err);
 
 /* ---- bvhs.c: one BVH for each body that moves, and as many of the scene as the places of the head need. In: the
- * loaded scene, and where rays begin (prcs, metres). Out: site->bvh and the BVHs of movers; the site owns them. */
+ * loaded scene, and where rays begin (prcs, metres). Out: site->bvh and the BVHs of movers; the site owns
+ * them. */
 
 /* Where rays begin. */
 struct site_sphere {
@@ -57,8 +60,8 @@ int site_build_station_bvhs(struct site *site, const struct sh_report *report, s
 /* ---- georeference.c: georeferencing of a site's stations: heights, CRS, method, and how many metres a
  * count is on the wire. */
 
-/* Stations are placed, the path of a moving head is known. Fills the stations' georef, plan, scale and leg, and
- * site->scale_m. Warns where a tolerance is not met. */
+/* Stations are placed, the path of a moving head is known. Fills the stations' georef, plan, scale and leg,
+ * and site->scale_m. Warns where a tolerance is not met. */
 int site_georeference(struct site *site, const struct sh_report *report, struct sh_err *err);
 
 /* ---- look.c: looking at the scene as the head does: the places that pulses are fired from, with setups as
@@ -75,16 +78,16 @@ struct site_look {
     uint32_t n;
 };
 
-/* Looks from up to SITE_LOOK_STATIONS stations, evenly chosen, with the beams that they have by then. The look must not
- * be moved or copied: its places point into it. */
+/* Looks from up to SITE_LOOK_STATIONS stations, evenly chosen, with the beams that they have by then. The
+ * look must not be moved or copied: its places point into it. */
 void site_look_open(struct site_look *look, const struct site *site);
 
 /* ---- beam_choice.c: which beam a pulse is, and how far pulses are followed through glass and mirrors:
  * measured on the scene where the configuration leaves it open. */
 
-/* All else of the site is in place. Sets beam, rings and depth of site->plan.methods and the rows of beam and optics,
- * and makes the stations' beams. Warns where nothing holds the tolerances. For `plan` (site->measures) the error of
- * what is forced is measured, too. */
+/* All else of the site is in place. Sets beam, rings and depth of site->plan.methods and the rows of beam and
+ * optics, and makes the stations' beams. Warns where nothing holds the tolerances. For `plan`
+ * (site->measures) the error of what is forced is measured, too. */
 int site_choose_methods(struct site *site, const struct sh_report *report, struct sh_err *err);
 
 #endif
