@@ -15,11 +15,7 @@ extern const double DEG;
 double distance(const double a[3], const double b[3]);
 
 /* The knots with the rules that the program uses. */
-static inline int find_path(const struct trajectory *tr, double start_s, double end_s, const struct pose *mount,
-                            struct pose_path *out, struct sh_err *err)
-{
-    const struct pose_knot_rules rules = {start_s, end_s, 1e-4, 10000000, 0.01};
-    return trajectory_knots(tr, mount, &rules, out, err);
-}
+int find_path(const struct trajectory *tr, double start_s, double end_s, const struct pose *mount,
+              struct pose_path *out, struct sh_err *err);
 
 #endif

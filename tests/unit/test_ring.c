@@ -9,27 +9,9 @@
 #include <string.h>
 #include <sys/resource.h>
 
-#include "firmware_sim/loop/ring.h"
+#include "tests/unit/ring_rig.h"
 
-enum { AHEAD = 6, QUEUE = 4, SPARE = 4, SLOT_BYTES = 1000 };
-static const struct ring_size SIZE = {AHEAD, QUEUE, SPARE, SLOT_BYTES};
-
-static struct ring ring;
 static uint8_t buf[2048];
-
-static int open_ring(void **state)
-{
-    (void)state;
-    struct sh_err err;
-    return ring_create(&ring, &SIZE, &err);
-}
-
-static int close_ring(void **state)
-{
-    (void)state;
-    ring_free(&ring);
-    return 0;
-}
 
 static void put(struct ring_slot *slot, const char *text)
 {

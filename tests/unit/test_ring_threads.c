@@ -6,26 +6,7 @@
 #include <stdatomic.h>
 #include <string.h>
 
-#include "firmware_sim/loop/ring.h"
-
-enum { AHEAD = 6, QUEUE = 4, SPARE = 4, SLOT_BYTES = 1000 };
-static const struct ring_size SIZE = {AHEAD, QUEUE, SPARE, SLOT_BYTES};
-
-static struct ring ring;
-
-static int open_ring(void **state)
-{
-    (void)state;
-    struct sh_err err;
-    return ring_create(&ring, &SIZE, &err);
-}
-
-static int close_ring(void **state)
-{
-    (void)state;
-    ring_free(&ring);
-    return 0;
-}
+#include "tests/unit/ring_rig.h"
 
 /* Two casters fill slots with what only a tick's number tells; the pacing thread
  * releases them, numbers their frames, and gives up what is not ready where the test says so; it waits for
