@@ -135,6 +135,12 @@ static int name_ghosts(struct site *site, struct sh_err *err)
     return SH_OK;
 }
 
+/* Whether a run, or `plan`, may cast footprints: what is built then has room for them. */
+static int casts_footprints(const struct site *site)
+{
+    return site->cfg->beam.mode != BEAM_SINGLE || site->measures;
+}
+
 int site_set_up_detect(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
@@ -152,7 +158,7 @@ int site_set_up_detect(struct site *site, const struct sh_report *report, struct
     d->cast.signal = cfg->signal.on ? &d->signal : NULL;
     d->cast.noise_by_signal = cfg->noise.range == RANGE_NOISE_SIGNAL;
     d->cast.ghost_label = site->n_surfaces;
-    if (d->cast.surfaces != NULL && site_casts_footprints(site)) {
+    if (d->cast.surfaces != NULL && casts_footprints(site)) {
         d->kind = calloc(d->surfaces.n + 1, sizeof *d->kind);
         rc = d->kind == NULL ? sh_fail(err, SH_ENOMEM, "no memory for kinds of surfaces")
                              : surface_kinds(&d->surfaces, d->kind, err);
@@ -170,11 +176,6 @@ int site_set_up_detect(struct site *site, const struct sh_report *report, struct
     }
     site_set_depth(site, d->cast.depth);
     return rc;
-}
-
-int site_casts_footprints(const struct site *site)
-{
-    return site->cfg->beam.mode != BEAM_SINGLE || site->measures;
 }
 
 void site_set_depth(struct site *site, uint32_t depth)
@@ -206,7 +207,7 @@ double site_ray_reach_m(const struct site *site, const double station_m[3])
 {
     const struct config_instrument *k = &site->cfg->instrument;
     double beside_m = hypot(k->transit_offset_m, k->mirror_offset_m);
-    if (site_casts_footprints(site)) beside_m += 0.5 * site->cfg->profile.beam_exit_m;
+    if (casts_footprints(site)) beside_m += 0.5 * site->cfg->profile.beam_exit_m;
     if (site->detect.cast.depth == 0) return beside_m;
     /* What moves may be anywhere. */
     double beyond_m = site->n_movers > 0 ? INFINITY : site_farthest_m(site, station_m) + 1e-3;

@@ -15,8 +15,6 @@ void site_free_detect(struct site *site);
 /* How many surfaces of glass or mirrors pulses are followed through, once that is known. */
 void site_set_depth(struct site *site, uint32_t depth);
 
-/* Whether a run, or `plan`, may cast footprints: what is built then has room for them. */
-int site_casts_footprints(const struct site *site);
 /* How far from the head's origin rays may begin, given where it stands: beams beside it, and ways beyond
  * glass. */
 double site_ray_reach_m(const struct site *site, const double station_m[3]);
