@@ -5,57 +5,73 @@
 #include <string.h>
 #include <unistd.h>
 
-static int fail_missing(const struct cfg_reader *rd, const struct cfg_key *key, uint32_t item)
+static void fail_missing(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item)
 {
     char allowed[CFG_ALLOWED_MAX];
-    return cfg_fail_key(rd, key->path, item, "missing, and it has no default; %s", cfg_allowed(key, allowed));
+    cfg_fail_key(rd, key->path, item, "missing, and it has no default; %s", cfg_allowed(key, allowed));
 }
 
-static int fill_one(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item,
-                    const struct config_profile *profile)
+/* A bad value gives way to the default, so that what is computed from it can't fail. */
+static void fill_one(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item,
+                     const struct config_profile *profile)
 {
-    if (rd->line[cfg_row(rd, key)][item] != 0) return SH_OK;
-    if (key->def == NULL) return fail_missing(rd, key, item);
-    if (key->def[0] == '\0') return SH_OK; /* an empty text; the struct starts as zeros */
-    if (key->def[0] != '@') return cfg_store(rd, key, item, rd->root_line, key->def, "");
-    const struct cfg_key *figure = cfg_find(&cfg_profile_table, key->def + 1);
-    memcpy(cfg_address(rd, key, item), (const char *)profile + figure->offset, key->size);
-    return SH_OK;
+    unsigned char *bad = &rd->bad[cfg_row(rd, key)][item];
+    if (rd->line[cfg_row(rd, key)][item] != 0 && !*bad) return;
+    if (key->def == NULL && !*bad) fail_missing(rd, key, item);
+    if (key->def == NULL || key->def[0] == '\0') return; /* an empty text; the struct starts as zeros */
+    if (key->def[0] != '@') {
+        cfg_store(rd, key, item, rd->root_line, key->def, "");
+    } else if (rd->profile_read) {
+        const struct cfg_key *figure = cfg_find(&cfg_profile_table, key->def + 1);
+        memcpy(cfg_address(rd, key, item), (const char *)profile + figure->offset, key->size);
+    } else {
+        *bad = 1;
+    }
 }
 
-int cfg_fill_defaults(struct cfg_reader *rd, const struct config_profile *profile)
+void cfg_fill_defaults(struct cfg_reader *rd, const struct config_profile *profile)
 {
     for (size_t i = 0; i < rd->table.n; i++) {
         const struct cfg_key *key = &rd->table.keys[i], *list = cfg_list_of(&rd->table, key);
         if (key->type == CFG_MAP) continue;
         if (key->type == CFG_LIST) {
-            if (*cfg_list_count(rd, key) < key->min) return fail_missing(rd, key, 0);
+            if (*cfg_list_count(rd, key) < key->min) fail_missing(rd, key, 0);
             continue;
         }
         uint32_t n = list != NULL ? *cfg_list_count(rd, list) : 1;
-        for (uint32_t item = 0; item < n; item++) {
-            int code = fill_one(rd, key, item, profile);
-            if (code != SH_OK) return code;
-        }
+        for (uint32_t item = 0; item < n; item++)
+            fill_one(rd, key, item, profile);
     }
-    return SH_OK;
+}
+
+int config_load_all(const char *path, const char *const *sets, int n_sets, struct config *cfg,
+                    struct config_faults *faults)
+{
+    struct cfg_reader rd;
+    memset(cfg, 0, sizeof *cfg);
+    memset(faults, 0, sizeof *faults);
+    if (strlen(path) >= sizeof cfg->file) {
+        faults->n = 1;
+        return sh_fail(&faults->fault[0], SH_EINPUT, "%.100s...: path too long; allowed up to %zu bytes", path,
+                       sizeof cfg->file - 1);
+    }
+    snprintf(cfg->file, sizeof cfg->file, "%s", path);
+    cfg_reader_init(&rd, cfg->file, &cfg_config_table, cfg, faults);
+    if (cfg_read_file(&rd) == SH_OK) {
+        for (int i = 0; i < n_sets; i++)
+            cfg_apply_set(&rd, sets[i]);
+        cfg_load_profile(&rd, cfg);
+        cfg_fill_defaults(&rd, &cfg->profile);
+        cfg_check(&rd, cfg);
+    }
+    return faults->n == 0 ? SH_OK : faults->fault[0].code;
 }
 
 int config_load(const char *path, const char *const *sets, int n_sets, struct config *cfg, struct sh_err *err)
 {
-    struct cfg_reader rd;
-    memset(cfg, 0, sizeof *cfg);
-    if (strlen(path) >= sizeof cfg->file)
-        return sh_fail(err, SH_EINPUT, "%.100s...: path too long; allowed up to %zu bytes", path, sizeof cfg->file - 1);
-    snprintf(cfg->file, sizeof cfg->file, "%s", path);
-    cfg_reader_init(&rd, cfg->file, &cfg_config_table, cfg, err);
-    int code = cfg_read_file(&rd);
-    for (int i = 0; i < n_sets && code == SH_OK; i++)
-        code = cfg_apply_set(&rd, sets[i]);
-    if (code == SH_OK) code = cfg_load_profile(&rd, cfg);
-    if (code == SH_OK) code = cfg_fill_defaults(&rd, &cfg->profile);
-    if (code == SH_OK) code = cfg_check(&rd, cfg);
-    return code;
+    struct config_faults faults;
+    int code = config_load_all(path, sets, n_sets, cfg, &faults);
+    return code == SH_OK ? SH_OK : sh_fail(err, code, "%s", faults.fault[0].text);
 }
 
 uint32_t config_threads(const struct config *cfg)

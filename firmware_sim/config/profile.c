@@ -89,75 +89,77 @@ static void known_profiles(const struct profile_dirs *dirs, char *buf, size_t le
 /* ---- one profile */
 
 /* A figure that must not be above another one. strictly: nor equal to it. */
-static int check_order(const struct cfg_reader *rd, const char *low_key, double low, double high, int strictly)
+static void check_order(struct cfg_reader *rd, const char *low_key, double low, const char *high_key, double high,
+                        int strictly)
 {
-    if (low < high || (low == high && !strictly)) return SH_OK;
-    return cfg_fail_key(rd, low_key, 0, "%.15g is too much; allowed %s %.15g", low, strictly ? "below" : "at most",
-                        high);
+    if (low < high || (low == high && !strictly) || !CFG_SOUND(rd, 0, low_key, high_key)) return;
+    cfg_fail_key(rd, low_key, 0, "%.15g is too much; allowed %s %.15g", low, strictly ? "below" : "at most", high);
 }
 
-static int check_sweep(const struct cfg_reader *rd, const struct config_profile *p)
+static void check_sweep(struct cfg_reader *rd, const struct config_profile *p)
 {
     double sweep_deg = 360.0 / p->facets * p->optical_gain,
            fov_deg = (double)(p->fov_max_udeg - p->fov_min_udeg) * 1e-6;
+    if (!CFG_SOUND(rd, 0, "facets", "optical_gain")) return;
     if (sweep_deg > 360.0)
-        return cfg_fail_key(rd, "optical_gain", 0,
-                            "a sweep of 360 / facets * optical_gain is %.10g deg; allowed up to 360", sweep_deg);
+        cfg_fail_key(rd, "optical_gain", 0, "a sweep of 360 / facets * optical_gain is %.10g deg; allowed up to 360",
+                     sweep_deg);
     /* Rounding of the quotient and the product is far below one micro-degree. */
-    if (fov_deg > sweep_deg + 1e-9)
-        return cfg_fail_key(rd, "fov_max_deg", 0,
-                            "a field of view of %.10g deg does not fit into a sweep; allowed up to %.10g deg, "
-                            "360 / facets * optical_gain",
-                            fov_deg, sweep_deg);
-    return SH_OK;
+    else if (fov_deg > sweep_deg + 1e-9 && CFG_SOUND(rd, 0, "fov_min_deg", "fov_max_deg"))
+        cfg_fail_key(rd, "fov_max_deg", 0,
+                     "a field of view of %.10g deg does not fit into a sweep; allowed up to %.10g deg, "
+                     "360 / facets * optical_gain",
+                     fov_deg, sweep_deg);
 }
 
-static int check_profile(const struct cfg_reader *rd, struct config_profile *p)
+static void check_profile(struct cfg_reader *rd, struct config_profile *p)
 {
     const double lines_min_hz = 1e-6 * (double)p->lines_min_uhz, prr_max_hz = 1e-6 * (double)p->prr_max_uhz;
     const double pan_min_deg = 1e-6 * (double)p->pan_min_udeg, pan_max_deg = 1e-6 * (double)p->pan_max_udeg;
-    int code = check_order(rd, "prr_min_hz", 1e-6 * (double)p->prr_min_uhz, prr_max_hz, 0);
-    if (code == SH_OK) code = check_order(rd, "lines_min_hz", lines_min_hz, 1e-6 * (double)p->lines_max_uhz, 0);
-    if (code == SH_OK && prr_max_hz < lines_min_hz)
-        code = cfg_fail_key(rd, "prr_max_hz", 0, "less than a pulse per line; allowed at least %.15g", lines_min_hz);
-    if (code == SH_OK)
-        code = check_order(rd, "fov_min_deg", 1e-6 * (double)p->fov_min_udeg, 1e-6 * (double)p->fov_max_udeg, 1);
-    if (code == SH_OK && (p->pan_min_udeg >= p->pan_max_udeg || p->pan_max_udeg - p->pan_min_udeg > 360000000))
-        code = cfg_fail_key(rd, "pan_max_deg", 0, "%.15g does not fit; allowed above %.15g, up to %.15g", pan_max_deg,
-                            pan_min_deg, pan_min_deg + 360.0);
-    if (code == SH_OK) code = check_order(rd, "range_min_m", p->range_min_m, p->range_max_m, 1);
-    if (code == SH_OK) code = check_sweep(rd, p);
-    if (code == SH_OK) code = check_order(rd, "range_sigma_floor_m", p->range_sigma_floor_m, p->range_sigma_m, 0);
-    return code == SH_OK ? cfg_check_reaches(rd, p) : code;
+    check_order(rd, "prr_min_hz", 1e-6 * (double)p->prr_min_uhz, "prr_max_hz", prr_max_hz, 0);
+    check_order(rd, "lines_min_hz", lines_min_hz, "lines_max_hz", 1e-6 * (double)p->lines_max_uhz, 0);
+    if (prr_max_hz < lines_min_hz && CFG_SOUND(rd, 0, "prr_max_hz", "lines_min_hz"))
+        cfg_fail_key(rd, "prr_max_hz", 0, "less than a pulse per line; allowed at least %.15g", lines_min_hz);
+    check_order(rd, "fov_min_deg", 1e-6 * (double)p->fov_min_udeg, "fov_max_deg", 1e-6 * (double)p->fov_max_udeg, 1);
+    if ((p->pan_min_udeg >= p->pan_max_udeg || p->pan_max_udeg - p->pan_min_udeg > 360000000) &&
+        CFG_SOUND(rd, 0, "pan_min_deg", "pan_max_deg"))
+        cfg_fail_key(rd, "pan_max_deg", 0, "%.15g does not fit; allowed above %.15g, up to %.15g", pan_max_deg,
+                     pan_min_deg, pan_min_deg + 360.0);
+    check_order(rd, "range_min_m", p->range_min_m, "range_max_m", p->range_max_m, 1);
+    check_sweep(rd, p);
+    check_order(rd, "range_sigma_floor_m", p->range_sigma_floor_m, "range_sigma_m", p->range_sigma_m, 0);
+    cfg_check_reaches(rd, p);
 }
 
 /* The file's name is the profile's: two names could differ. */
-static int name_profile(const struct cfg_reader *rd, struct config_profile *profile)
+static int name_profile(struct cfg_reader *rd, struct config_profile *profile)
 {
     const char *slash = strrchr(rd->file, '/');
     const char *base = slash == NULL ? rd->file : slash + 1;
     size_t stem = strlen(base) - 5;
     if (stem >= sizeof profile->name)
-        return sh_fail(rd->err, SH_EINPUT,
-                       "%s: the file's name is the profile's; allowed up to %zu characters and .yaml", rd->file,
-                       sizeof profile->name - 1);
+        return cfg_fail_file(rd, SH_EINPUT, 0,
+                             "the file's name is the profile's; allowed up to %zu characters and .yaml",
+                             sizeof profile->name - 1);
     for (size_t i = 0; i < stem; i++)
         if ((unsigned char)base[i] <= 0x20 || (unsigned char)base[i] >= 0x7f)
-            return sh_fail(rd->err, SH_EINPUT, "%s: the file's name is the profile's; allowed printable ASCII",
-                           rd->file);
+            return cfg_fail_file(rd, SH_EINPUT, 0, "the file's name is the profile's; allowed printable ASCII");
     memcpy(profile->name, base, stem);
     return SH_OK;
 }
 
-static int read_profile(struct cfg_reader *rd, const char *file, struct config_profile *profile, struct sh_err *err)
+/* Returns whether it has no fault. */
+static int read_profile(struct cfg_reader *rd, const char *file, struct config_profile *profile,
+                        struct config_faults *faults)
 {
+    const uint32_t before = faults->n;
     memset(profile, 0, sizeof *profile);
-    cfg_reader_init(rd, file, &cfg_profile_table, profile, err);
-    int code = name_profile(rd, profile);
-    if (code == SH_OK) code = cfg_read_file(rd);
-    if (code == SH_OK) code = cfg_fill_defaults(rd, NULL);
-    if (code == SH_OK) code = check_profile(rd, profile);
-    return code;
+    cfg_reader_init(rd, file, &cfg_profile_table, profile, faults);
+    if (name_profile(rd, profile) == SH_OK && cfg_read_file(rd) == SH_OK) {
+        cfg_fill_defaults(rd, NULL);
+        check_profile(rd, profile);
+    }
+    return faults->n == before;
 }
 
 /* ---- lookup */
@@ -194,16 +196,15 @@ static int find_profile(struct cfg_reader *rd, struct config *cfg)
     return fail_lookup(rd, cfg, &dirs);
 }
 
-int cfg_load_profile(struct cfg_reader *rd, struct config *cfg)
+void cfg_load_profile(struct cfg_reader *rd, struct config *cfg)
 {
-    int code = SH_OK;
-    if (cfg->profile_file[0] == '\0')
-        code = cfg_fail_key(rd, "head.profile", 0,
-                            "missing; required is the name of a profile, or a path that ends in .yaml");
-    if (code == SH_OK) code = find_profile(rd, cfg);
-    if (code != SH_OK) return code;
     struct cfg_reader profile_rd;
-    return read_profile(&profile_rd, cfg->profile_file, &cfg->profile, rd->err);
+    if (!CFG_SOUND(rd, 0, "head.profile")) return;
+    if (cfg->profile_file[0] == '\0')
+        cfg_fail_key(rd, "head.profile", 0,
+                     "missing; required is the name of a profile, or a path that ends in .yaml");
+    else if (find_profile(rd, cfg) == SH_OK)
+        rd->profile_read = read_profile(&profile_rd, cfg->profile_file, &cfg->profile, rd->faults);
 }
 
 /* ---- listing */
@@ -220,9 +221,10 @@ static int list_profile(const char *dir, const char *entry, FILE *out, struct sh
     char path[2 * CONFIG_PATH_LEN];
     struct cfg_reader rd;
     struct config_profile profile;
+    struct config_faults faults = {0};
     snprintf(path, sizeof path, "%s/%s", dir, entry);
-    int code = read_profile(&rd, path, &profile, err);
-    if (code != SH_OK) return code;
+    if (!read_profile(&rd, path, &profile, &faults))
+        return sh_fail(err, faults.fault[0].code, "%s", faults.fault[0].text);
     fprintf(out, "%-16s %s %s", profile.name, profile.maker, profile.model);
     print_figures(&rd, 1, "; data sheet: ", out);
     print_figures(&rd, 2, "; assumed: ", out);

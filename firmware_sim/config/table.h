@@ -60,16 +60,18 @@ extern const struct cfg_table cfg_config_table, cfg_profile_table;
 struct cfg_reader {
     const char *file;
     struct cfg_table table;
-    void *base;                            /* struct that the offsets count from */
-    int line[CFG_MAX_ROWS][CFG_MAX_ITEMS]; /* where a key was given: line, CFG_FROM_SET, 0: not given */
+    void *base;                                     /* struct that the offsets count from */
+    int line[CFG_MAX_ROWS][CFG_MAX_ITEMS];          /* where a key was given: line, CFG_FROM_SET, 0: not given */
+    unsigned char bad[CFG_MAX_ROWS][CFG_MAX_ITEMS]; /* 1: a fault of this key was told; its value says nothing */
     int root_line;
+    int profile_read;                 /* the head profile has no fault */
     unsigned char from[CFG_MAX_ROWS]; /* figures: 1 data sheet, 2 assumed */
-    struct sh_err *err;
+    struct config_faults *faults;
 };
 
-/* ---- reader.c: rows, places and errors */
+/* ---- reader.c: rows and places */
 void cfg_reader_init(struct cfg_reader *rd, const char *file, const struct cfg_table *table, void *base,
-                     struct sh_err *err);
+                     struct config_faults *faults);
 const struct cfg_key *cfg_find(const struct cfg_table *table, const char *path);
 size_t cfg_row(const struct cfg_reader *rd, const struct cfg_key *key);
 /* The list a row's elements belong to, NULL for a row outside lists. */
@@ -83,15 +85,34 @@ const char *cfg_name(const char *path, uint32_t item, char *buf);
 int cfg_is_given(const struct cfg_reader *rd, const char *path, uint32_t item);
 /* The line of a key, or of the nearest section around it that was given. */
 int cfg_where(const struct cfg_reader *rd, const struct cfg_key *key, uint32_t item);
-/* "FILE:LINE: KEY: text", or "--set KEY: text" when line is CFG_FROM_SET. Returns SH_EINPUT. */
-int cfg_fail(const struct cfg_reader *rd, int line, const char *name, const char *fmt, ...)
+/* The section around a path, in place: "links[].type" -> "links[]" -> "links" -> "". */
+void cfg_cut_to_parent(char *path);
+/* The last word of path, when path is a key directly below parent ("": the top); NULL otherwise. */
+const char *cfg_word_below(const char *path, const char *parent);
+
+/* ---- fault.c: what is wrong, and with what. Each call adds a fault to the reader's list and returns its code,
+ * SH_EINPUT. Reading goes on after it. */
+/* "FILE:LINE: text", without the line when it is 0. Returns code. */
+int cfg_fail_file(struct cfg_reader *rd, int code, int line, const char *fmt, ...)
     __attribute__((format(printf, 4, 5)));
-/* The same for a row of the table. */
-int cfg_fail_key(const struct cfg_reader *rd, const char *path, uint32_t item, const char *fmt, ...)
+/* "FILE:LINE: KEY: text", or "--set KEY: text" when line is CFG_FROM_SET. */
+int cfg_fail(struct cfg_reader *rd, int line, const char *name, const char *fmt, ...)
     __attribute__((format(printf, 4, 5)));
-/* An unknown key below the section parent ("" for the top): suggests a near one and lists what is known
- * there. */
-int cfg_fail_unknown(const struct cfg_reader *rd, int line, const char *parent, uint32_t item, const char *word);
+/* The same for the value of a key, which is bad from now on. */
+int cfg_fail_value(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, const char *fmt, ...)
+    __attribute__((format(printf, 5, 6)));
+/* The same where the key stands, or should. Nothing is added where a fault of it, or of a section around it, was
+ * told before: what follows from a fault is none of its own. */
+int cfg_fail_key(struct cfg_reader *rd, const char *path, uint32_t item, const char *fmt, ...)
+    __attribute__((format(printf, 4, 5)));
+/* An unknown key below the section parent ("" for the top): suggests a near one and lists what is known there.
+ * The near one counts as bad: it isn't missing, too. */
+int cfg_fail_unknown(struct cfg_reader *rd, int line, const char *parent, uint32_t item, const char *word);
+/* Whether all of these keys (sections: with all in them) were read well, so that a check can ask them. */
+int cfg_are_sound(const struct cfg_reader *rd, uint32_t item, const char *const *paths, size_t n);
+#define CFG_SOUND(rd, item, ...)                                          \
+    cfg_are_sound((rd), (item), (const char *const[]){__VA_ARGS__}, \
+                  sizeof((const char *const[]){__VA_ARGS__}) / sizeof(const char *))
 /* text as it can stand in one line of an error: cut, without control characters. buf holds CFG_SHOW_MAX. */
 enum { CFG_SHOW_MAX = 64 };
 const char *cfg_show(const char *text, char *buf);
@@ -112,20 +133,25 @@ const char *cfg_allowed(const struct cfg_key *key, char *buf);
 /* Directory part of a path, with its '/'; empty for a bare name. buf holds CONFIG_PATH_LEN. */
 const char *cfg_dir_of(const char *path, char *buf);
 
-/* ---- yaml.c, set.c, config.c, profile.c, crosscheck.c */
+/* ---- yaml.c, set.c, config.c, profile.c, crosscheck.c. What is wrong with values goes to the list of faults. */
+/* SH_OK, or the code of a fault that leaves nothing to check: no file, no YAML, no section. */
 int cfg_read_file(struct cfg_reader *rd);
-int cfg_apply_set(struct cfg_reader *rd, const char *set);
-/* Values for what was not given, errors for what must be. profile may be NULL. */
-int cfg_fill_defaults(struct cfg_reader *rd, const struct config_profile *profile);
+void cfg_apply_set(struct cfg_reader *rd, const char *set);
+/* Values for what was not given or is bad, errors for what must be. profile may be NULL. */
+void cfg_fill_defaults(struct cfg_reader *rd, const struct config_profile *profile);
 /* Finds and reads the profile that head.profile names (cfg->profile_file holds the name, then the path). */
-int cfg_load_profile(struct cfg_reader *rd, struct config *cfg);
-/* Everything that concerns more than one key. */
-int cfg_check(const struct cfg_reader *rd, struct config *cfg);
+void cfg_load_profile(struct cfg_reader *rd, struct config *cfg);
+/* Everything that concerns more than one key, as far as these were read well. */
+void cfg_check(struct cfg_reader *rd, struct config *cfg);
 /* places.c: the anchor, and the forms of a station's place. */
-int cfg_check_places(const struct cfg_reader *rd, struct config *cfg);
+void cfg_check_places(struct cfg_reader *rd, struct config *cfg);
 /* measurement.c: noise, signal, surfaces, and what of a profile concerns them. */
-int cfg_check_signal(const struct cfg_reader *rd, struct config *cfg);
-int cfg_check_reaches(const struct cfg_reader *rd, struct config_profile *profile);
+void cfg_check_signal(struct cfg_reader *rd, struct config *cfg);
+void cfg_check_reaches(struct cfg_reader *rd, struct config_profile *profile);
+/* owned.c: keys that only some kinds of link have, and what a link needs. */
+void cfg_check_links(struct cfg_reader *rd, struct config *cfg);
+/* The same for keys of platforms. Returns whether all of them belong to this kind. */
+int cfg_check_platform_keys(struct cfg_reader *rd, const struct config_platform *platform);
 /* The first link of the GNSS receiver; -1: none. */
 int cfg_nmea_link(const struct config *cfg);
 

@@ -123,9 +123,9 @@ struct place {
 /* `"TEXT" is WHAT; allowed ...` for a key's value. */
 static int refuse(const struct place *at, const char *text, const char *what)
 {
-    char name[CFG_PATH_MAX], shown[CFG_SHOW_MAX], allowed[CFG_ALLOWED_MAX];
-    return cfg_fail(at->rd, at->line, cfg_name(at->key->path, at->item, name), "\"%s\" is %s; %s",
-                    cfg_show(text, shown), what, cfg_allowed(at->key, allowed));
+    char shown[CFG_SHOW_MAX], allowed[CFG_ALLOWED_MAX];
+    return cfg_fail_value(at->rd, at->key, at->item, at->line, "\"%s\" is %s; %s", cfg_show(text, shown), what,
+                          cfg_allowed(at->key, allowed));
 }
 
 static enum cfg_number parse_hex(const char *digits, __int128 *out)

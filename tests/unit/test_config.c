@@ -3,6 +3,16 @@
 
 /* ---- malformed configurations */
 
+/* Whether one of the faults begins with start and has the fragment. */
+static int is_told(const char *start, const char *fragment)
+{
+    for (uint32_t i = 0; i < faults.n && i < CONFIG_MAX_FAULTS; i++)
+        if (strncmp(faults.fault[i].text, start, strlen(start)) == 0 &&
+            strstr(faults.fault[i].text, fragment) != NULL)
+            return 1;
+    return 0;
+}
+
 static void malformed_configurations_are_refused(void **state)
 {
     (void)state;
@@ -12,9 +22,14 @@ static void malformed_configurations_are_refused(void **state)
         int n = snprintf(start, sizeof start, "%s:%d: ", config_path, bad[i].line);
         if (bad[i].key != NULL) snprintf(start + n, sizeof start - (size_t)n, "%s: ", bad[i].key);
         if (code != SH_EINPUT || err.code != code) fail_msg("case %zu (%s): code %d", i, bad[i].with, code);
-        if (strncmp(err.text, start, strlen(start)) != 0 || strstr(err.text, bad[i].fragment) == NULL)
+        if (!is_told(start, bad[i].fragment))
             fail_msg("case %zu (%s): \"%s\", expected \"%s...%s\"", i, bad[i].with, err.text, start, bad[i].fragment);
-        if (strpbrk(err.text, "\n\r") != NULL) fail_msg("case %zu: more than one line: %s", i, err.text);
+        for (uint32_t k = 0; k < faults.n; k++)
+            if (strpbrk(faults.fault[k].text, "\n\r") != NULL) fail_msg("case %zu: more than one line", i);
+        /* Nothing is told that only follows from it. In a file of its own more is wrong: much is missing. */
+        if (bad[i].old != NULL && faults.n != 1)
+            fail_msg("case %zu (%s): %u faults: %s, %s", i, bad[i].with, faults.n, faults.fault[0].text,
+                     faults.fault[1].text);
     }
 }
 
