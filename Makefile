@@ -37,6 +37,7 @@ SAN ?=
 # No contraction to FMA: the same numbers on every instruction set. errno and traps of libm are not used.
 FP = -ffp-contract=off -fno-math-errno -fno-trapping-math
 HEADS_DIR = $(PREFIX)/share/scanhead/heads
+SCENES_DIR = $(PREFIX)/share/scanhead/scenes
 UDEV_DIR = $(PREFIX)/lib/udev/rules.d
 PC_DIR = $(PREFIX)/lib/pkgconfig
 ALL_CPPFLAGS = -I. -D_GNU_SOURCE $(if $(USBREDIR),-DHAVE_USBREDIR) -MMD -MP $(CPPFLAGS)
@@ -226,13 +227,14 @@ test-programs: all $(BUILD)/bench $(TESTS) $(FIGURES)
 
 install: all
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib $(DESTDIR)$(PREFIX)/include $(DESTDIR)$(HEADS_DIR) \
-		$(DESTDIR)$(UDEV_DIR) $(DESTDIR)$(PC_DIR)
+		$(DESTDIR)$(SCENES_DIR) $(DESTDIR)$(UDEV_DIR) $(DESTDIR)$(PC_DIR)
 	install $(BUILD)/scanhead $(DESTDIR)$(PREFIX)/bin/
 	install -m 644 $(BUILD)/libscanhead.a $(DESTDIR)$(PREFIX)/lib/
 	install $(BUILD)/libscanhead.so $(DESTDIR)$(PREFIX)/lib/libscanhead.so.1
 	ln -sf libscanhead.so.1 $(DESTDIR)$(PREFIX)/lib/libscanhead.so
 	install -m 644 drivers/host/scanhead.h $(DESTDIR)$(PREFIX)/include/
 	install -m 644 config/heads/*.yaml $(DESTDIR)$(HEADS_DIR)/
+	install -m 644 config/scenes/glass_room.obj $(DESTDIR)$(SCENES_DIR)/
 	install -m 644 drivers/host/70-scanhead.rules $(DESTDIR)$(UDEV_DIR)/
 	sed 's|@PREFIX@|$(PREFIX)|' drivers/host/libscanhead.pc.in > $(DESTDIR)$(PC_DIR)/libscanhead.pc
 format:

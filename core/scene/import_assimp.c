@@ -15,6 +15,7 @@
 #include <assimp/config.h>
 #include <assimp/scene.h>
 
+#include "core/infile.h"
 #include "core/scene/ifc_check.h"
 #include "core/scene/build.h"
 
@@ -243,8 +244,9 @@ static int check_ifc(struct scene_build *b, struct sh_err *err)
     char tail[1024] = "";
     size_t len = strlen(b->spec->file);
     if (strcasecmp(b->spec->file + len - 4, ".ifc") != 0) return SH_OK;
-    FILE *f = fopen(b->spec->file, "rb");
-    if (f == NULL) return SH_OK; /* Assimp says why */
+    const char *why;
+    FILE *f = infile_open(b->spec->file, &why);
+    if (f == NULL) return build_fail(b, SH_EINPUT, err, "%s", why);
     if (fseek(f, -(long)(sizeof tail), SEEK_END) != 0) rewind(f);
     size_t got = fread(tail, 1, sizeof tail, f);
     fclose(f);

@@ -1,4 +1,4 @@
-/* config_load: file, --set, profile, defaults, checks, in this order; and the reference. */
+/* config_load: file, --set, profile, defaults, checks, in this order. */
 #include "firmware_sim/config/table.h"
 
 #include <stdio.h>
@@ -78,68 +78,4 @@ uint32_t config_threads(const struct config *cfg)
 {
     long n = cfg->loop.threads != 0 ? (long)cfg->loop.threads : sysconf(_SC_NPROCESSORS_ONLN);
     return n < 1 ? 1 : n > CONFIG_MAX_THREADS ? CONFIG_MAX_THREADS : (uint32_t)n;
-}
-
-/* ---- the reference */
-
-static const char *type_name(const struct cfg_key *key)
-{
-    static const char *const names[] = {
-        [CFG_MAP] = "section",       [CFG_LIST] = "list",          [CFG_BOOL] = "switch",
-        [CFG_ENUM] = "word",         [CFG_COUNT] = "whole number", [CFG_MICRO] = "number, exact to 1e-6",
-        [CFG_REAL] = "number",       [CFG_TEXT] = "text",          [CFG_PATH] = "path",
-        [CFG_VEC3] = "three numbers"};
-    return names[key->type];
-}
-
-/* Within 100 columns, four blanks before each line. */
-static void print_wrapped(const char *text, FILE *out)
-{
-    enum { INDENT = 4, WIDTH = 100 };
-    int column = 0;
-    while (*text != '\0') {
-        int n = (int)strcspn(text, " ");
-        int begins = column == 0 || column + 1 + n > WIDTH;
-        fprintf(out, "%s%*s%.*s", begins && column != 0 ? "\n" : "", begins ? INDENT : 1, "", n, text);
-        column = begins ? INDENT + n : column + 1 + n;
-        text += n + (text[n] == ' ');
-    }
-    fputc('\n', out);
-}
-
-static void print_key(const struct cfg_key *key, FILE *out)
-{
-    char allowed[CFG_ALLOWED_MAX];
-    fprintf(out, "%s\n    %s", key->path, type_name(key));
-    if (key->type != CFG_MAP) {
-        if (key->unit != NULL) fprintf(out, ", %s", key->unit);
-        fprintf(out, "; %s", cfg_allowed(key, allowed));
-        if (key->def == NULL && (key->type != CFG_LIST || key->min > 0))
-            fputs("; required", out);
-        else if (key->def != NULL && key->def[0] == '@')
-            fprintf(out, "; default %s of the profile", key->def + 1);
-        else if (key->def != NULL && key->def[0] != '\0')
-            fprintf(out, "; default %s", key->def);
-        else
-            fputs("; optional", out);
-    }
-    fputc('\n', out);
-    print_wrapped(key->help, out);
-}
-
-void config_print_reference(FILE *out)
-{
-    /* clang-format off */
-    fputs("Configuration, YAML. Any key can be set with --set KEY=VALUE (elements as in stations[0].name=gate; the\n"
-          "index after the last one appends). Numbers are decimal, as in 300000, 0.5 or 1.2e6, without a unit.\n"
-          "Relative paths start at the file they stand in; in --set, at the working directory.\n\n",
-          out);
-    /* clang-format on */
-    for (size_t i = 0; i < cfg_config_table.n; i++)
-        print_key(&cfg_config_table.keys[i], out);
-    fputs("\nHead profile, heads/NAME.yaml. maker and model are texts; each figure is written\n"
-          "{ value: V, from: data sheet } or { value: V, from: assumed }.\n\n",
-          out);
-    for (size_t i = 0; i < cfg_profile_table.n; i++)
-        print_key(&cfg_profile_table.keys[i], out);
 }

@@ -292,6 +292,14 @@ const char *config_beam_moves(const struct config *cfg);
 /* The reference: every key with type, unit, default, range and help. */
 void config_print_reference(FILE *out);
 
+/* The same for one section ("head", "scene.anchor"), for one key, or for "profile": the keys of head profiles.
+ * SH_EINPUT names the sections that there are. */
+int config_print_section(const char *section, FILE *out, struct sh_err *err);
+
+/* A configuration with all keys, each with its help, that loads: the needed ones stand there, the others behind a
+ * '#' with their defaults. It names a profile and a mesh that come with the program. */
+int config_print_example(FILE *out, struct sh_err *err);
+
 /* The profiles in a directory, one line each (name, model, what is data sheet and what is assumed). Returns
  * how many. dir NULL: the first directory of the lookup below that exists, without a configuration. */
 int config_list_profiles(const char *dir, FILE *out, struct sh_err *err);

@@ -15,21 +15,25 @@ struct profile_dirs {
     int n;
 };
 
-/* Where an installed program, and one in its build folder, have the profiles: beside it. */
-static void find_beside_program(struct profile_dirs *dirs)
+int cfg_shared_path(int i, const char *name, char *buf)
 {
-    static const char *const beside[] = {"../share/scanhead/heads", "../config/heads"};
+    static const char *const beside[] = {"../share/scanhead", "../config"};
     char program[CONFIG_PATH_LEN];
-    ssize_t n = readlink("/proc/self/exe", program, sizeof program - 1);
-    if (n <= 0) return;
-    program[n] = '\0';
-    char *slash = strrchr(program, '/');
-    if (slash == NULL) return;
-    slash[1] = '\0';
-    for (int i = 0; i < 2; i++) {
-        int len = snprintf(dirs->dir[dirs->n], CONFIG_PATH_LEN, "%s%s", program, beside[i]);
-        if (len > 0 && len < CONFIG_PATH_LEN) dirs->n++;
-    }
+    if (i == 2) snprintf(buf, CONFIG_PATH_LEN, "config/%s", name);
+    if (i >= 2) return i == 2;
+    const ssize_t n = readlink("/proc/self/exe", program, sizeof program - 1);
+    char *slash = n > 0 ? memrchr(program, '/', (size_t)n) : NULL;
+    if (slash == NULL) slash = program;
+    const int len = snprintf(buf, CONFIG_PATH_LEN, "%.*s/%s/%s", (int)(slash - program), program, beside[i], name);
+    if (len >= CONFIG_PATH_LEN) buf[0] = '\0'; /* nothing is there */
+    return 1;
+}
+
+int cfg_find_shared(const char *name, char *buf)
+{
+    for (int i = 0; cfg_shared_path(i, name, buf); i++)
+        if (access(buf, R_OK) == 0) return 1;
+    return 0;
 }
 
 static void find_dirs(const char *config_file, struct profile_dirs *dirs)
@@ -41,8 +45,8 @@ static void find_dirs(const char *config_file, struct profile_dirs *dirs)
     if (config_file != NULL)
         snprintf(dirs->dir[dirs->n++], CONFIG_PATH_LEN, "%.*sheads", CONFIG_PATH_LEN - 6,
                  cfg_dir_of(config_file, base));
-    find_beside_program(dirs);
-    snprintf(dirs->dir[dirs->n++], CONFIG_PATH_LEN, "config/heads");
+    for (int i = 0; cfg_shared_path(i, "heads", dirs->dir[dirs->n]); i++)
+        if (dirs->dir[dirs->n][0] != '\0') dirs->n++;
 }
 
 static int is_yaml(const char *name)

@@ -29,6 +29,7 @@ enum cfg_flags {
     CFG_FIGURE = 1, /* written { value: V, from: data sheet|assumed } */
     CFG_HEX = 4,    /* written 0x1209, and only so: 1209 is read both ways */
     CFG_ASCII = 2,  /* goes into *IDN?: printable ASCII without comma and quotes */
+    CFG_NEEDED = 8, /* has no default that does in most configurations: the example gives it a value */
 };
 
 enum { CFG_MAX_ROWS = 192, CFG_MAX_ITEMS = 64, CFG_PATH_MAX = 96, CFG_FROM_SET = -1 };
@@ -45,6 +46,7 @@ struct cfg_key {
     const char *const *names;      /* enum: by value, NULL at the end */
     size_t count_offset;
     int flags;
+    const char *example; /* a value for the example, where there is no default */
     const char *help;
 };
 
@@ -139,6 +141,11 @@ int cfg_read_file(struct cfg_reader *rd);
 void cfg_apply_set(struct cfg_reader *rd, const char *set);
 /* Values for what was not given or is bad, errors for what must be. profile may be NULL. */
 void cfg_fill_defaults(struct cfg_reader *rd, const struct config_profile *profile);
+/* Where a file that comes with the program ("heads", "scenes/x.obj") may be, for i from 0: beside an installed
+ * program, beside one in its build folder, in config/ here. buf holds CONFIG_PATH_LEN. 0: there is no i-th place. */
+int cfg_shared_path(int i, const char *name, char *buf);
+/* The first of these places that has it; 0: none. */
+int cfg_find_shared(const char *name, char *buf);
 /* Finds and reads the profile that head.profile names (cfg->profile_file holds the name, then the path). */
 void cfg_load_profile(struct cfg_reader *rd, struct config *cfg);
 /* Everything that concerns more than one key, as far as these were read well. */

@@ -51,8 +51,8 @@ static int set_limits(struct device *device, struct sh_err *err)
 
 static int open_journals(struct device *device, struct sh_err *err)
 {
-    int rc = SH_OK;
-    if (device->options.replay != NULL)
+    int rc = journal_check_paths(device->options.journal, device->options.replay, err);
+    if (rc == SH_OK && device->options.replay != NULL)
         rc = journal_read(device->options.replay, &device->journal.replay, &device->journal.n_replay, err);
     if (rc != SH_OK || device->options.journal == NULL) return rc;
     device->journal.out = journal_open(device->options.journal, err);

@@ -231,9 +231,11 @@ static void test_meshes(void **state)
     write_config(wire, "file: room.obj", "file: dir.obj");
     snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
     expect(wire, "directory", (const char *const[]){"run", config, NULL}, 2,
-           (const char *const[]){"config.yaml:4:", "dir.obj is not a file", NULL});
+           (const char *const[]){"config.yaml:4:", "dir.obj: a directory, not a file", NULL});
     assert_int_equal(complaints, 0);
 }
+
+static const char JOURNAL[] = "# scanhead journal 1\n0 0 1 *RST\n";
 
 /* ---- options. CONFIG stands for a good configuration, DIR for the folder. */
 
@@ -241,11 +243,36 @@ static const struct {
     const char *args[8];
     const char *says[3];
 } OPTIONS[] = {
-    {{"fly"}, {"unknown command fly", "--help"}},
+    {{"fly"}, {"unknown command fly;", "--help"}},
+    {{"recrod", "CONFIG"}, {"unknown command recrod, did you mean record?"}},
     {{"run"}, {"one CONFIG"}},
-    {{"run", "CONFIG", "CONFIG"}, {"one CONFIG"}},
+    {{"run", "CONFIG", "CONFIG"}, {"one CONFIG is needed, and 2 are given", "config.yaml, ", "config.yaml; see"}},
+    {{"run", "--", "CONFIG", "--start"}, {"one CONFIG is needed, and 2 are given", "--start"}},
+    {{"report", "CONFIG", "DIR/x.ply", "DIR/y.ply"}, {"y.ply is one too many"}},
+    {{"run", "DIR/scan.shs"}, {"scan.shs is a recorded stream", "scanhead record ", "scan.shs -o points.ply"}},
+    {{"check", "DIR/SCAN.SHS"}, {"SCAN.SHS is a recorded stream"}},
+    {{"plan", "DIR/room.obj"}, {"room.obj is a mesh", "scanhead init ", "room.obj writes a configuration"}},
+    {{"record", "DIR/room.ifc", "-o", "DIR/x.ply"}, {"room.ifc is a mesh, and SOURCE is a head", "scanhead init "}},
+    {{"report", "DIR/x.ply", "CONFIG"}, {"x.ply is a mesh or a point cloud, and CONFIG is a configuration"}},
+    {{"check", "DIR/x.las"}, {"x.las is a recording", "scanhead report CONFIG "}},
+    {{"run", "CONFIG", "-start"}, {"-start: did you mean --start?"}},
+    {{"run", "CONFIG", "-stats=x"}, {"-stats=x: did you mean --stats?"}},
+    {{"run", "CONFIG", "--strat"}, {"unknown option --strat, did you mean --start?"}},
+    {{"run", "CONFIG", "--thread=2", "--durations", "2"}, {"unknown option --durations, did you mean --duration?"}},
+    {{"run", "CONFIG", "--start=1"}, {"--start=1: the option takes no value"}},
+    {{"record", "CONFIG", "-out", "DIR/x.ply"}, {"-out: did you mean --output FILE, or -o FILE?"}},
+    {{"record", "-out", "DIR/x.ply", "CONFIG"}, {"-out: did you mean --output FILE, or -o FILE?"}},
+    {{"record", "CONFIG", "-o", "DIR/x.ply", "-station", "2"}, {"-station: did you mean --station?"}},
     {{"run", "DIR/none.yaml"}, {"none.yaml", "No such file"}},
     {{"run", "DIR"}, {"irectory"}},
+    {{"run", "DIR/fifo"}, {"fifo: cannot be opened: a FIFO, not a file"}},
+    {{"run", "CONFIG", "--replay-journal", "DIR/fifo"}, {"fifo: a FIFO, not a file"}},
+    {{"run", "CONFIG", "--replay-journal", "/dev/zero"}, {"/dev/zero: a device, not a file"}},
+    {{"run", "CONFIG", "--journal", "DIR/journal", "--replay-journal", "DIR/./journal"}, {"--journal ", "overwrite"}},
+    {{"run", "CONFIG", "--journal", "DIR/link", "--replay-journal", "DIR/journal"}, {"--journal ", "overwrite"}},
+    {{"record", "DIR/fifo.shs", "-o", "DIR/x.ply"}, {"fifo.shs: is a FIFO, not a recorded stream"}},
+    {{"report", "CONFIG", "DIR/fifo"}, {"fifo: a FIFO, not a file"}},
+    {{"check", "--help", "haed"}, {"no section \"haed\", did you mean head?", "scene, stations", "profile"}},
     {{"run", "CONFIG", "--fast"}, {"--fast", "run --help"}},
     {{"run", "CONFIG", "--pace"}, {"--pace", "needs a value"}},
     {{"run", "CONFIG", "--pace", "foo"}, {"loop.pace", "realtime", "step"}},
@@ -270,7 +297,7 @@ static const struct {
     {{"check", "CONFIG", "--pace", "fast"}, {"--pace"}},
     {{"report", "CONFIG"}, {"one CONFIG and one CLOUD", "report --help"}},
     {{"report", "CONFIG", "DIR/x.ply", "--max-m", "0"}, {"--max-m 0", "1000000000"}},
-    {{"report", "CONFIG", "DIR/x.ply", "--json=1"}, {"unknown option --json=1"}},
+    {{"report", "CONFIG", "DIR/x.ply", "--json=1"}, {"--json=1: the option takes no value"}},
     {{"map", "CONFIG", "-o", "DIR/x.png", "--pixel-m", "1m"}, {"--pixel-m 1m", "0.0001 to 10000"}},
     {{"record", "CONFIG", "-o", "DIR/x.ply", "--frames", "1.5"}, {"--frames 1.5", "whole number from 0"}},
     {{"record", "CONFIG"}, {"-o FILE"}},
@@ -282,7 +309,6 @@ static const struct {
     {{"record", "CONFIG", "-o", "DIR/x.ply", "--crs", "moon"}, {"output.crs", "utm"}},
     {{"record", "tcp:localhost", "-o", "DIR/x.ply"}, {"tcp:localhost", "PORT"}},
     {{"record", "DIR/none.shs", "-o", "DIR/x.ply"}, {"none.shs", "No such file"}},
-    {{"record", "tty:DIR/none", "-o", "DIR/x.ply"}, {"none", "No such file"}},
     {{"record", "tty:/dev/null", "-o", "DIR/x.ply"}, {"/dev/null", "terminal"}},
     {{"record", "tcp:localhost:1", "--set", "a=b", "-o", "DIR/x.ply"}, {"--set", "CONFIG"}},
     {{"map", "CONFIG"}, {"-o"}},
@@ -308,6 +334,10 @@ static void test_options(void **state)
     complaints = 0;
     room_write(wire);
     wire_write_text(wire, "config.yaml", GOOD);
+    wire_write_text(wire, "journal", JOURNAL);
+    assert_int_equal(symlink("journal", wire_path(wire, "link")), 0);
+    assert_int_equal(mkfifo(wire_path(wire, "fifo"), 0600), 0);
+    assert_int_equal(mkfifo(wire_path(wire, "fifo.shs"), 0600), 0);
     for (size_t i = 0; i < sizeof OPTIONS / sizeof OPTIONS[0]; i++) {
         char word[8][352], what[128] = "";
         const char *args[9] = {0};
@@ -319,10 +349,80 @@ static void test_options(void **state)
                                     OPTIONS[i].says[1] ? OPTIONS[i].says[2] : NULL, NULL};
         expect(wire, what, args, 2, says);
     }
+    char *journal = wire_read(wire_path(wire, "journal"), NULL);
+    assert_string_equal(journal, JOURNAL);
+    free(journal);
     assert_int_equal(complaints, 0);
 }
 
+/* A value that begins with letters of an option is a value: -o with the file "utx.ply" in the working folder. */
+static void test_short_forms(void **state)
+{
+    struct wire *wire = *state;
+    char option[352];
+    room_write(wire);
+    wire_write_text(wire, "config.yaml", GOOD);
+    snprintf(option, sizeof option, "-o%s", wire_path(wire, "x.ply"));
+    const char *const args[] = {"record", option, wire_path(wire, "config.yaml"), "--quiet", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+    assert_int_equal(access(wire_path(wire, "x.ply"), R_OK), 0);
+}
+
+/* All faults of a configuration, a line each, at most 20. */
+static void test_all_faults(void **state)
+{
+    struct wire *wire = *state;
+    char text[4096], config[352];
+    int n = snprintf(text, sizeof text, "head: {profile: full-sweep, prr_hz: fast, frame: 1}\nscene: {meshes: []}\n"
+                                        "stations: [{position_m: [0, 0]}]\nsurfaces:\n");
+    for (int i = 0; i < 19; i++)
+        n += snprintf(text + n, sizeof text - (size_t)n, "  - {retro: -1}\n");
+    snprintf(config, sizeof config, "%s", wire_write_text(wire, "config.yaml", text));
+    const char *const args[] = {"check", config, NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 2);
+    char *told = wire_read(wire_path(wire, "err"), NULL), *rest = told;
+    static const char *const keys[] = {":1: head.prr_hz: ", ":1: head.frame: unknown key, did you mean head.frames?",
+                                       ":2: scene.meshes: ", ":3: stations[0].position_m: ",
+                                       ":5: surfaces[0].retro: "};
+    for (int line = 0; line < 20; line++) {
+        assert_int_equal(strncmp(rest, "scanhead: ", 10), 0);
+        if (line < 5 && strncmp(rest + 10 + strlen(config), keys[line], strlen(keys[line])) != 0) fail_msg("%s", rest);
+        rest = strchr(rest, '\n') + 1;
+    }
+    assert_string_equal(rest, "scanhead: and 3 more\n");
+    free(told);
+}
+
 /* ---- help */
+
+/* The example passes `check`, and each of its keys is the one that the help has. */
+static void test_example(void **state)
+{
+    struct wire *wire = *state;
+    char config[352];
+    assert_int_equal(
+        wire_wait(wire, wire_spawn(wire, (const char *const[]){"check", "--example", NULL}, "x.yaml", "err", -1)), 0);
+    snprintf(config, sizeof config, "%s", wire_path(wire, "x.yaml"));
+    const int status = wire_wait(wire, wire_spawn(wire, (const char *const[]){"check", config, NULL}, "out", "err", -1));
+    char *err = wire_read(wire_path(wire, "err"), NULL);
+    if (status != 0 || err[0] != '\0') fail_msg("status %d: %s", status, err);
+    free(err);
+}
+
+static void test_help_of_a_section(void **state)
+{
+    struct wire *wire = *state;
+    static const char *const parts[] = {"plan", "scene.anchor", "head.prr_hz", "profile"};
+    static const char *const begins[] = {"plan\n", "scene.anchor\n", "head.prr_hz\n", "Head profile"};
+    for (int i = 0; i < 4; i++) {
+        const char *const args[] = {"check", "--help", parts[i], NULL};
+        assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+        char *out = wire_read(wire_path(wire, "out"), NULL);
+        assert_int_equal(strncmp(out, begins[i], strlen(begins[i])), 0);
+        assert_true(strstr(out, "\nloop") == NULL && strstr(out, "usage:") == NULL);
+        free(out);
+    }
+}
 
 /* -h and --help of a command, on standard output: what it does, the usage, lines of at most 110 columns.
  * Those of check end where the keys begin. */
@@ -449,7 +549,11 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_configurations, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_meshes, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_options, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_short_forms, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_all_faults, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_help, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_help_of_a_section, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_example, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_links, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_system_failures, wire_setup, wire_teardown),
     };
