@@ -28,7 +28,10 @@ static int open_tty(const char *path, struct host_source *out, struct sh_err *er
 {
     out->fd = open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
     if (out->fd < 0)
-        return fail_open(err, errno == EACCES || errno == EPERM ? SH_EPERM : errno == ENOENT ? SH_ELOST : SH_EIO,
+        return fail_open(err,
+                         errno == EACCES || errno == EPERM ? SH_EPERM
+                         : errno == ENOENT                 ? SH_ELOST
+                                                           : SH_EIO,
                          out->name);
     struct termios tio;
     if (tcgetattr(out->fd, &tio) != 0)

@@ -130,15 +130,16 @@ const struct app_command app_check = {
     .operand = {"CONFIG"},
     .summary = "validate configuration, scene and links; nothing runs",
     .options = OPTIONS,
-    .notes = "Prints where the scene and each station stand, in every frame that is known. Opens each link but files\n"
-             "and closes it again, so that a taken port or a wrong path shows. Of a wrong configuration all faults are\n"
-             "shown, up to 20, each with its line.\n"
-             "\n"
-             "--help SECTION prints the keys of one section: --help head, --help scene.anchor. --help profile prints\n"
-             "those of head profiles.\n"
-             "\n"
-             "Configuration keys:\n"
-             "\n",
+    .notes =
+        "Prints where the scene and each station stand, in every frame that is known. Opens each link but files\n"
+        "and closes it again, so that a taken port or a wrong path shows. Of a wrong configuration all faults are\n"
+        "shown, up to 20, each with its line.\n"
+        "\n"
+        "--help SECTION prints the keys of one section: --help head, --help scene.anchor. --help profile prints\n"
+        "those of head profiles.\n"
+        "\n"
+        "Configuration keys:\n"
+        "\n",
     .print_more = config_print_reference,
     .part = "[SECTION]",
     .print_part = print_section,

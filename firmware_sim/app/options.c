@@ -268,8 +268,7 @@ static int take_operands(const struct app_command *command, int n, char *const *
         needed++;
     if (n > needed) return too_many(command, needed, n, words);
     if (n < needed && needed == 1) return app_usage(command, "one %s is needed", command->operand[0]);
-    if (n < needed)
-        return app_usage(command, "one %s and one %s are needed", command->operand[0], command->operand[1]);
+    if (n < needed) return app_usage(command, "one %s and one %s are needed", command->operand[0], command->operand[1]);
     for (int i = 0; i < n; i++) {
         if (check_ending(command, command->operand[i], words[i]) != APP_OK) return APP_USAGE;
         in->operand[i] = words[i];
@@ -281,8 +280,8 @@ static int take_operands(const struct app_command *command, int n, char *const *
 
 /* One option as getopt gave it, from `word`. APP_OK to go on, APP_GO_ON never, else the exit status; *done is set
  * when the command line ends here. */
-static int take_option(const struct app_command *command, int opt, const char *word, struct app_input *in,
-                       void *values, int *done)
+static int take_option(const struct app_command *command, int opt, const char *word, struct app_input *in, void *values,
+                       int *done)
 {
     const struct app_option *row = find_row(command->options, opt);
     if (check_dash(command, word) != APP_OK) return APP_USAGE;
@@ -315,8 +314,7 @@ int app_parse(const struct app_command *command, int argc, char **argv, struct a
             if (n < APP_MAX_WORDS) words[n++] = optarg;
             continue;
         }
-        if (opt == 'h')
-            return help(command, argc > optind ? argv[optind] : NULL);
+        if (opt == 'h') return help(command, argc > optind ? argv[optind] : NULL);
         const int status = take_option(command, opt, argv[at], in, values, &done);
         if (status != APP_OK || done) return status;
     }

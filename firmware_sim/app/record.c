@@ -270,7 +270,10 @@ static const char HELP_NOTES[] =
     "  Frames or pulses were lost on the way.\n"
     "  The head was away within a scan.\n"
     "\n"
-    "FILE keeps what came.\n";
+    "FILE keeps what came.\n"
+    "\n"
+    "Ctrl-C, or SIGTERM, ends a recording in good order. A second signal within a second counts as the same one;\n"
+    "a third, or one that comes later, ends it at once.\n";
 
 const struct app_command app_record = {
     .name = "record",

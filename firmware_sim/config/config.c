@@ -8,7 +8,7 @@
 static void fail_missing(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item)
 {
     char allowed[CFG_ALLOWED_MAX];
-    cfg_fail_key(rd, key->path, item, "missing, and it has no default; %s", cfg_allowed(key, allowed));
+    cfg_fail_key(rd, key->path, item, "missing, and it has no default; %s", cfg_allowed(key, rd->profile, allowed));
 }
 
 /* A bad value gives way to the default, so that what is computed from it can't fail. */
@@ -44,27 +44,41 @@ void cfg_fill_defaults(struct cfg_reader *rd, const struct config_profile *profi
     }
 }
 
+/* known: the profile, where it was read before; NULL: not yet. Returns whether cfg->profile is read. */
+static int load_once(const char *const *sets, int n_sets, struct config *cfg, const struct config_profile *known,
+                     struct config_faults *faults)
+{
+    struct cfg_reader rd;
+    memset(faults, 0, sizeof *faults);
+    cfg_reader_init(&rd, cfg->file, &cfg_config_table, cfg, faults);
+    rd.profile = known;
+    if (cfg_read_file(&rd) != SH_OK) return 0;
+    for (int i = 0; i < n_sets; i++)
+        cfg_apply_set(&rd, sets[i]);
+    cfg_load_profile(&rd, cfg);
+    cfg_fill_defaults(&rd, &cfg->profile);
+    cfg_check(&rd, cfg);
+    return rd.profile_read;
+}
+
 int config_load_all(const char *path, const char *const *sets, int n_sets, struct config *cfg,
                     struct config_faults *faults)
 {
-    struct cfg_reader rd;
     memset(cfg, 0, sizeof *cfg);
-    memset(faults, 0, sizeof *faults);
     if (strlen(path) >= sizeof cfg->file) {
         faults->n = 1;
         return sh_fail(&faults->fault[0], SH_EINPUT, "%.100s...: path too long; allowed up to %zu bytes", path,
                        sizeof cfg->file - 1);
     }
     snprintf(cfg->file, sizeof cfg->file, "%s", path);
-    cfg_reader_init(&rd, cfg->file, &cfg_config_table, cfg, faults);
-    if (cfg_read_file(&rd) == SH_OK) {
-        for (int i = 0; i < n_sets; i++)
-            cfg_apply_set(&rd, sets[i]);
-        cfg_load_profile(&rd, cfg);
-        cfg_fill_defaults(&rd, &cfg->profile);
-        cfg_check(&rd, cfg);
-    }
-    return faults->n == 0 ? SH_OK : faults->fault[0].code;
+    const int has_profile = load_once(sets, n_sets, cfg, NULL, faults);
+    if (faults->n == 0) return SH_OK;
+    /* Values are read before the profile, but its limits belong into their errors: so once more. */
+    const struct config_profile profile = cfg->profile;
+    memset(cfg, 0, sizeof *cfg);
+    snprintf(cfg->file, sizeof cfg->file, "%s", path);
+    if (has_profile) load_once(sets, n_sets, cfg, &profile, faults);
+    return faults->fault[0].code;
 }
 
 int config_load(const char *path, const char *const *sets, int n_sets, struct config *cfg, struct sh_err *err)

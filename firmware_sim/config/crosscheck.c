@@ -21,25 +21,17 @@ static double from_micro(int64_t micro)
     return (double)micro / 1e6;
 }
 
-static int64_t figure(const struct config_profile *profile, const char *path)
-{
-    int64_t value;
-    memcpy(&value, (const char *)profile + cfg_find(&cfg_profile_table, path)->offset, sizeof value);
-    return value;
-}
-
 /* Settings within the head profile: limits that a row of keys.c names by min_key and max_key. */
 static void check_limits(struct cfg_reader *rd, const struct config *cfg)
 {
     for (size_t i = 0; i < rd->table.n && rd->profile_read; i++) {
         const struct cfg_key *key = &rd->table.keys[i];
         if (key->max_key == NULL) continue;
-        int64_t value, high = figure(&cfg->profile, key->max_key);
-        int64_t low = key->min_key != NULL ? figure(&cfg->profile, key->min_key) : (int64_t)(key->min * 1e6);
+        int64_t value, high = cfg_figure(&cfg->profile, key->max_key);
+        int64_t low = key->min_key != NULL ? cfg_figure(&cfg->profile, key->min_key) : (int64_t)(key->min * 1e6);
         memcpy(&value, cfg_address(rd, key, 0), sizeof value);
         if (value < low || value > high)
-            cfg_fail_key(rd, key->path, 0,
-                         "%.15g is outside the limits of head profile %s; allowed %.15g to %.15g %s",
+            cfg_fail_key(rd, key->path, 0, "%.15g is outside the limits of head profile %s; allowed %.15g to %.15g %s",
                          from_micro(value), cfg->profile.name, from_micro(low), from_micro(high), key->unit);
     }
 }
@@ -121,8 +113,7 @@ static void check_output(struct cfg_reader *rd, struct config *cfg)
         cfg_fail_key(rd, "output.scale_m", 0,
                      "%.10g is too fine: %.10g m of head profile %s do not fit into 31 bits; allowed above %.4g to "
                      "1 m",
-                     output->scale_m, cfg->profile.range_max_m, cfg->profile.name,
-                     cfg->profile.range_max_m / 0x1p31);
+                     output->scale_m, cfg->profile.range_max_m, cfg->profile.name, cfg->profile.range_max_m / 0x1p31);
 }
 
 /* Which part of the trajectory, and where on it to stop. How long it is, its file says
@@ -206,10 +197,9 @@ static void check_time(struct cfg_reader *rd, const struct config *cfg)
     char shown[CFG_SHOW_MAX];
     const int link = cfg_nmea_link(cfg);
     if (epoch_parse(cfg->time.epoch, utc_table_builtin(), &source, NULL, &why) != SH_OK)
-        cfg_fail_key(
-            rd, "time.epoch", 0,
-            "\"%s\": %.80s; allowed none, utc, tai, or a time after 1980-01-06 such as 2026-01-01T00:00:00Z",
-            cfg_show(cfg->time.epoch, shown), why.text);
+        cfg_fail_key(rd, "time.epoch", 0,
+                     "\"%s\": %.80s; allowed none, utc, tai, or a time after 1980-01-06 such as 2026-01-01T00:00:00Z",
+                     cfg_show(cfg->time.epoch, shown), why.text);
     else if (source == EPOCH_NONE && link >= 0 && CFG_SOUND(rd, 0, "time.epoch"))
         cfg_fail_key(rd, "links[].protocol", (uint32_t)link,
                      "nmea, but the time is not known; required is time.epoch: utc, tai, or a time such as "

@@ -63,8 +63,8 @@ static void check_surface(struct cfg_reader *rd, uint32_t i, const struct surfac
     if (s->glass > 0.0 && s->mirror > 0.0)
         cfg_fail_key(rd, "surfaces[].mirror", i, "glass and a mirror at once; allowed either glass or mirror");
     else if (sum > 1.0 + 1e-9)
-        cfg_fail_key(rd, "surfaces[]", i,
-                     "reflectance, specular, glass and mirror add up to %.10g; allowed at most 1", sum);
+        cfg_fail_key(rd, "surfaces[]", i, "reflectance, specular, glass and mirror add up to %.10g; allowed at most 1",
+                     sum);
 }
 
 static void check_noise(struct cfg_reader *rd, struct config *cfg)

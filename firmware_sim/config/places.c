@@ -10,7 +10,7 @@ static int fail_required(struct cfg_reader *rd, const char *path, uint32_t item,
 {
     char allowed[CFG_ALLOWED_MAX];
     return cfg_fail_key(rd, path, item, "missing, and %s; required, %s", why,
-                        cfg_allowed(cfg_find(&rd->table, path), allowed));
+                        cfg_allowed(cfg_find(&rd->table, path), rd->profile, allowed));
 }
 
 static void check_anchor(struct cfg_reader *rd, struct config *cfg)
@@ -81,8 +81,7 @@ static int find_form(struct cfg_reader *rd, struct config_station *station, uint
 }
 
 /* A form is whole. Zone and hemisphere may come from an anchor in UTM. */
-static int complete_form(struct cfg_reader *rd, const struct config *cfg, struct config_station *station,
-                         uint32_t i)
+static int complete_form(struct cfg_reader *rd, const struct config *cfg, struct config_station *station, uint32_t i)
 {
     static const char *const why[] = {[PLACE_GEODETIC] = "lat_deg, lon_deg and height_m go together",
                                       [PLACE_UTM] = "utm_zone, hemisphere, easting_m, northing_m, height_m go together",

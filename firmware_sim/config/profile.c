@@ -205,8 +205,7 @@ void cfg_load_profile(struct cfg_reader *rd, struct config *cfg)
     struct cfg_reader profile_rd;
     if (!CFG_SOUND(rd, 0, "head.profile")) return;
     if (cfg->profile_file[0] == '\0')
-        cfg_fail_key(rd, "head.profile", 0,
-                     "missing; required is the name of a profile, or a path that ends in .yaml");
+        cfg_fail_key(rd, "head.profile", 0, "missing; required is the name of a profile, or a path that ends in .yaml");
     else if (find_profile(rd, cfg) == SH_OK)
         rd->profile_read = read_profile(&profile_rd, cfg->profile_file, &cfg->profile, rd->faults);
 }

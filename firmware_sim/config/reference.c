@@ -44,7 +44,7 @@ static void print_key(const struct cfg_key *key, FILE *out)
     fprintf(out, "%s\n    %s", key->path, type_name(key));
     if (key->type != CFG_MAP) {
         if (key->unit != NULL) fprintf(out, ", %s", key->unit);
-        fprintf(out, "; %s", cfg_allowed(key, allowed));
+        fprintf(out, "; %s", cfg_allowed(key, NULL, allowed));
         if (key->def == NULL && (key->type != CFG_LIST || key->min > 0))
             fputs("; required", out);
         else if (key->def != NULL && key->def[0] == '@')
@@ -156,9 +156,7 @@ static const char *value_of(const struct cfg_key *key, const struct config_profi
     if (text == NULL) return "";
     snprintf(buf, len, "%s", text);
     if (text[0] == '@') {
-        int64_t micro;
-        memcpy(&micro, (const char *)profile + cfg_find(&cfg_profile_table, text + 1)->offset, sizeof micro);
-        snprintf(buf, len, "%.15g", 1e-6 * (double)micro);
+        snprintf(buf, len, "%.15g", 1e-6 * (double)cfg_figure(profile, text + 1));
     } else if (key->type == CFG_PATH && is_needed(key) && cfg_find_shared(text, shared) &&
                (whole = realpath(shared, NULL)) != NULL) {
         snprintf(buf, len, "%s", whole);
@@ -185,7 +183,7 @@ static void print_example_key(const struct cfg_key *key, const struct config_pro
         print_wrapped(key->help, indent + 2, "# ", out);
         return;
     }
-    snprintf(help, sizeof help, "%s (%s)", key->help, cfg_allowed(key, allowed));
+    snprintf(help, sizeof help, "%s (%s)", key->help, cfg_allowed(key, profile, allowed));
     print_wrapped(help, indent, "# ", out);
     fprintf(out, "%s%*s%s: %s\n", hidden, indent, "", word, value_of(key, profile, value, sizeof value));
 }
@@ -206,10 +204,11 @@ int config_print_example(FILE *out, struct sh_err *err)
     if (cfg == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     int code = load_example_profile(cfg, err);
     if (code == SH_OK)
-        fputs("# All keys of a configuration. Lines without a # are needed. Each other key stands with its default, or\n"
-              "# with a value that shows its form. To change one, take the # away from the first column, also from the\n"
-              "# sections around it. Not all of them go together: `scanhead check` says which do.\n",
-              out);
+        fputs(
+            "# All keys of a configuration. Lines without a # are needed. Each other key stands with its default, or\n"
+            "# with a value that shows its form. To change one, take the # away from the first column, also from the\n"
+            "# sections around it. Not all of them go together: `scanhead check` says which do.\n",
+            out);
     for (size_t i = 0; i < cfg_config_table.n && code == SH_OK; i++)
         print_example_key(&cfg_config_table.keys[i], &cfg->profile, out);
     free(cfg);

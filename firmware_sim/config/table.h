@@ -66,8 +66,9 @@ struct cfg_reader {
     int line[CFG_MAX_ROWS][CFG_MAX_ITEMS];          /* where a key was given: line, CFG_FROM_SET, 0: not given */
     unsigned char bad[CFG_MAX_ROWS][CFG_MAX_ITEMS]; /* 1: a fault of this key was told; its value says nothing */
     int root_line;
-    int profile_read;                 /* the head profile has no fault */
-    unsigned char from[CFG_MAX_ROWS]; /* figures: 1 data sheet, 2 assumed */
+    int profile_read;                     /* the head profile has no fault */
+    const struct config_profile *profile; /* for the limits in errors; NULL: not known */
+    unsigned char from[CFG_MAX_ROWS];     /* figures: 1 data sheet, 2 assumed */
     struct config_faults *faults;
 };
 
@@ -112,7 +113,7 @@ int cfg_fail_key(struct cfg_reader *rd, const char *path, uint32_t item, const c
 int cfg_fail_unknown(struct cfg_reader *rd, int line, const char *parent, uint32_t item, const char *word);
 /* Whether all of these keys (sections: with all in them) were read well, so that a check can ask them. */
 int cfg_are_sound(const struct cfg_reader *rd, uint32_t item, const char *const *paths, size_t n);
-#define CFG_SOUND(rd, item, ...)                                          \
+#define CFG_SOUND(rd, item, ...)                                    \
     cfg_are_sound((rd), (item), (const char *const[]){__VA_ARGS__}, \
                   sizeof((const char *const[]){__VA_ARGS__}) / sizeof(const char *))
 /* text as it can stand in one line of an error: cut, without control characters. buf holds CFG_SHOW_MAX. */
@@ -129,9 +130,10 @@ int cfg_store(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, i
               const char *base_dir);
 int cfg_store_vec3(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, int axis,
                    const char *text);
-/* "allowed 1 to 5 Hz": what a row takes. */
+/* "allowed 1 to 5 Hz": what a row takes. profile gives the limits that depend on it; NULL: those of all
+ * profiles. */
 enum { CFG_ALLOWED_MAX = 200 };
-const char *cfg_allowed(const struct cfg_key *key, char *buf);
+const char *cfg_allowed(const struct cfg_key *key, const struct config_profile *profile, char *buf);
 /* Directory part of a path, with its '/'; empty for a bare name. buf holds CONFIG_PATH_LEN. */
 const char *cfg_dir_of(const char *path, char *buf);
 
@@ -146,6 +148,8 @@ void cfg_fill_defaults(struct cfg_reader *rd, const struct config_profile *profi
 int cfg_shared_path(int i, const char *name, char *buf);
 /* The first of these places that has it; 0: none. */
 int cfg_find_shared(const char *name, char *buf);
+/* A figure of a profile that is written in 1e-6 units. */
+int64_t cfg_figure(const struct config_profile *profile, const char *path);
 /* Finds and reads the profile that head.profile names (cfg->profile_file holds the name, then the path). */
 void cfg_load_profile(struct cfg_reader *rd, struct config *cfg);
 /* Everything that concerns more than one key, as far as these were read well. */

@@ -50,7 +50,7 @@ static int wrong_kind(const struct walk *w, const struct cfg_key *key, uint32_t 
 {
     char allowed[CFG_ALLOWED_MAX];
     return cfg_fail_value(w->rd, key, item, line_of(node), "here stands %s; %s", kind_of(node),
-                          cfg_allowed(key, allowed));
+                          cfg_allowed(key, w->rd->profile, allowed));
 }
 
 /* A scalar that may stand for a value of this type, or an error. */
@@ -67,7 +67,7 @@ static int check_scalar(const struct walk *w, const struct cfg_key *key, uint32_
     if (has_tag(node)) why = "a value with a tag, which is not supported";
     if (why == NULL) return SH_OK;
     return cfg_fail_value(w->rd, key, item, line_of(node), "\"%s\" is %s; %s", cfg_show(text_of(node), shown), why,
-                          cfg_allowed(key, allowed));
+                          cfg_allowed(key, w->rd->profile, allowed));
 }
 
 static void read_scalar(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
@@ -86,7 +86,7 @@ static void read_vec3(struct walk *w, const struct cfg_key *key, uint32_t item, 
     const yaml_node_item_t *first = node->data.sequence.items.start, *top = node->data.sequence.items.top;
     if (top - first != 3) {
         cfg_fail_value(w->rd, key, item, line_of(node), "has %td numbers instead of 3; %s", top - first,
-                       cfg_allowed(key, allowed));
+                       cfg_allowed(key, w->rd->profile, allowed));
         return;
     }
     for (int axis = 0; axis < 3; axis++) {
@@ -147,7 +147,8 @@ static void read_list(struct walk *w, const struct cfg_key *key, const yaml_node
     const yaml_node_item_t *first = node->data.sequence.items.start;
     ptrdiff_t n = node->data.sequence.items.top - first;
     if ((double)n > key->max) {
-        cfg_fail_value(w->rd, key, 0, line_of(node), "%td elements are too many; %s", n, cfg_allowed(key, allowed));
+        cfg_fail_value(w->rd, key, 0, line_of(node), "%td elements are too many; %s", n,
+                       cfg_allowed(key, w->rd->profile, allowed));
         return;
     }
     const struct cfg_key *element = key + 1;
@@ -264,8 +265,8 @@ static int fail_syntax(struct cfg_reader *rd, const yaml_parser_t *parser, const
     const char *hint = indented_by_tab(bytes, len, line) ? "; indent with spaces, not with tabs" : "";
     if (parser->error == YAML_READER_ERROR) hint = "; allowed UTF-8 text without control characters";
     return cfg_fail_file(rd, SH_EINPUT, line, "not YAML: %s%s%s%s",
-                   parser->problem != NULL ? parser->problem : "unknown problem", parser->context != NULL ? " " : "",
-                   parser->context != NULL ? parser->context : "", hint);
+                         parser->problem != NULL ? parser->problem : "unknown problem",
+                         parser->context != NULL ? " " : "", parser->context != NULL ? parser->context : "", hint);
 }
 
 /* A byte order mark is skipped here: libyaml would count it as a column and find the first line indented. */
@@ -327,8 +328,7 @@ static int read_documents(struct cfg_reader *rd, yaml_parser_t *parser, const un
     if (code != SH_OK) return code;
     if (!yaml_parser_load(parser, &next)) return fail_syntax(rd, parser, bytes, len);
     const yaml_node_t *more = yaml_document_get_root_node(&next);
-    if (more != NULL)
-        code = cfg_fail_file(rd, SH_EINPUT, line_of(more), "a second document; allowed one");
+    if (more != NULL) code = cfg_fail_file(rd, SH_EINPUT, line_of(more), "a second document; allowed one");
     yaml_document_delete(&next);
     return code;
 }

@@ -4,7 +4,7 @@
 #define FRAMES_AT_4(text) LINES, "  " text "\n" LINES
 const struct bad bad[] = {
     /* numbers */
-    {PRR, "  prr_hz: 30 kHz\n", 3, "head.prr_hz", "allowed 1 to 10000000 Hz, within the limits of the head profile"},
+    {PRR, "  prr_hz: 30 kHz\n", 3, "head.prr_hz", "\"30 kHz\" is not a number; allowed 100000 to 1200000 Hz"},
     {PRR, "  prr_hz: 300000 Hz\n", 3, "head.prr_hz", "\"300000 Hz\" is not a number"},
     {PRR, "  prr_hz: nan\n", 3, "head.prr_hz", "not a number"},
     {PRR, "  prr_hz: .nan\n", 3, "head.prr_hz", "not a number"},

@@ -14,9 +14,8 @@ static void assert_faults(const char *const *starts, uint32_t n)
         if (strncmp(got, want, strlen(want)) != 0) fail_msg("fault %u is \"%s\", expected \"%s\"", i, got, want);
     }
 }
-#define ASSERT_FAULTS(...)                             \
-    assert_faults((const char *const[]){__VA_ARGS__}, \
-                  sizeof((const char *const[]){__VA_ARGS__}) / sizeof(const char *))
+#define ASSERT_FAULTS(...) \
+    assert_faults((const char *const[]){__VA_ARGS__}, sizeof((const char *const[]){__VA_ARGS__}) / sizeof(const char *))
 
 static void all_faults_are_told_in_order(void **state)
 {
@@ -34,9 +33,8 @@ static void all_faults_are_told_in_order(void **state)
     assert_int_equal(load_sets(sets, 2), SH_EINPUT);
     ASSERT_FAULTS("1: head.prr_hz: ", "2: head.serial: ", "2: head.colour: ", "2: head.lines_hz: ",
                   "3: scene.meshes[0].up: ", "3: scene.meshes[0].scale: missing", "5: stations[0].position_m: ",
-                  "5: stations[0].heading_deg: ", "6: links[0].address: ", "6: links[0].port: ",
-                  "7: output.utm_zone: ", "7: output.heights: ", "8: loop.tick_hz: ", "--set head.frames: ",
-                  "--set gnss.quality: ");
+                  "5: stations[0].heading_deg: ", "6: links[0].address: ", "6: links[0].port: ", "7: output.utm_zone: ",
+                  "7: output.heights: ", "8: loop.tick_hz: ", "--set head.frames: ", "--set gnss.quality: ");
     /* The first is what the shorter call gives. */
     struct sh_err first;
     assert_int_equal(config_load(config_path, sets, 2, cfg, &first), SH_EINPUT);
@@ -54,8 +52,8 @@ static void what_follows_from_a_fault_is_not_told(void **state)
         {"stations:", "station:", "10: station: unknown key, did you mean stations?"},
         {"position_m", "positon_m", "11: stations[0].positon_m: unknown key"},
         {"  - position_m: [1, 2, 3]\n    heading_deg: 90\n", "  gate\n", "11: stations: here stands a single value"},
-        {"type: tcp", "type: tpc", "14: links[0].type: "},                       /* what has a port? */
-        {"riegl-vz400i", "riegl", "2: head.profile: "},                         /* what are its limits? */
+        {"type: tcp", "type: tpc", "14: links[0].type: "},                    /* what has a port? */
+        {"riegl-vz400i", "riegl", "2: head.profile: "},                       /* what are its limits? */
         {LINES, "  lines_hz: 1e6\n", "4: head.lines_hz: 1000000 is outside"}, /* more than pulses */
         {LINES, "  line_start_deg: 99\n  line_stop_deg: 5\n", "4: head.line_start_deg: 99 is outside"},
         {"output:", "noise: {range: signal}\nsignal: {model: loud}\noutput:", "17: signal.model: "},

@@ -34,8 +34,7 @@ static int outcome(const int *signals, int n)
     assert_int_equal(WEXITSTATUS(status), 0);
     return 0;
 }
-#define OUTCOME(...) \
-    outcome((const int[]){__VA_ARGS__}, (int)(sizeof((const int[]){__VA_ARGS__}) / sizeof(int)))
+#define OUTCOME(...) outcome((const int[]){__VA_ARGS__}, (int)(sizeof((const int[]){__VA_ARGS__}) / sizeof(int)))
 
 static void two_at_once_are_one(void **state)
 {
