@@ -34,7 +34,9 @@ struct account {
     struct oracle oracle;
     uint64_t received, next, gaps, missing;   /* pulses; the last two from jumps of the pulse number */
     uint64_t first_missing, told, told_first; /* by overrun events */
+    uint64_t scan_cast, scan_lost; /* by the telemetry before the scan's end */
     int events, scan_over;
+    uint64_t end_lost; /* by the scan's end */
     int in_second_half; /* points frames */
     int64_t t_ns, line;
     uint64_t whole_lines, broken_lines;
@@ -102,8 +104,15 @@ static void take(struct account *a, struct scanhead *sh, const struct scanhead_f
         if (a->events++ == 0 || frame->event_value[0] < a->told_first) a->told_first = frame->event_value[0];
         a->told += frame->event_value[1];
     }
+    if (frame->type == SCANHEAD_TELEMETRY) {
+        struct native_telemetry t;
+        assert_int_equal(native_decode_telemetry(frame->payload, frame->payload_len, &t), 0);
+        a->scan_cast = t.scan_cast;
+        a->scan_lost = t.scan_lost;
+    }
     if (is_event(frame, SCANHEAD_EV_SCAN_END)) {
         assert_int_equal(frame->event_value[1], oracle_end(&a->oracle));
+        a->end_lost = frame->event_value[2];
         a->scan_over = 1;
     }
 }
@@ -135,14 +144,31 @@ static void follow(struct account *a, struct scanhead *sh)
     assert_int_equal(stats.pulses_lost, a->told);
 }
 
+/* The statistics: fired = blind + cast, cast = delivered + lost, delivered = to the reader + lost with frames. */
+static void check_sums(const struct wire *wire, const struct oracle *oracle)
+{
+    uint64_t fired = oracle_end(oracle), cast = oracle_count_cast(oracle, 0, fired);
+    assert_int_equal(stats_uint(wire, "fired_pulses"), fired);
+    assert_int_equal(stats_uint(wire, "blind_pulses"), fired - cast);
+    assert_int_equal(stats_uint(wire, "cast_pulses"), cast);
+    assert_int_equal(stats_uint(wire, "pulses") + stats_uint(wire, "lost_pulses"), cast);
+    assert_int_equal(stats_link_uint(wire, "pulses") + stats_link_uint(wire, "lost_pulses"),
+                     stats_uint(wire, "pulses"));
+    assert_int_equal(stats_link_uint(wire, "lost_pulses"), stats_uint(wire, "reader_lost_pulses"));
+}
+
 static void check_balance(const struct account *a, const struct wire *wire)
 {
     uint64_t cast = oracle_count_cast(&a->oracle, 0, oracle_end(&a->oracle));
     assert_int_equal(a->received + a->missing, cast);
     assert_int_equal(a->told, a->missing);
+    assert_int_equal(a->end_lost, a->missing); /* however late it was lost */
+    assert_int_equal(a->scan_cast, cast);
+    assert_int_equal(a->scan_lost, a->missing);
     assert_int_equal(stats_uint(wire, "pulses"), a->received);
     assert_int_equal(stats_uint(wire, "lost_pulses"), a->missing);
     assert_int_equal(stats_uint(wire, "reader_lost_frames"), 0);
+    check_sums(wire, &a->oracle);
 }
 
 static void overload(struct wire *wire, const char *threads)
@@ -250,11 +276,12 @@ static void test_end_of_an_overloaded_run(void **state)
     struct head head = head_start(wire, room_config_write(wire, &config), more);
     struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
     client_until(sh, SCANHEAD_EV_SCAN_END, &frame);
+    uint64_t lost = frame.event_value[2];
     scanhead_close(sh);
     head_end(&head, 0);
     struct oracle oracle = oracle_of(&config, -40, 60, 100);
-    assert_int_equal(stats_uint(wire, "pulses") + stats_uint(wire, "lost_pulses"),
-                     oracle_count_cast(&oracle, 0, oracle_end(&oracle)));
+    check_sums(wire, &oracle);
+    assert_int_equal(lost, stats_uint(wire, "lost_pulses"));
 }
 
 int main(void)
