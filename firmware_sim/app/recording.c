@@ -142,6 +142,12 @@ static int replug(struct recording *r, struct sh_err *err)
     return 0;
 }
 
+static int is_long_enough(const struct recording *r, const struct scanhead_frame *frame)
+{
+    if (!(r->o->duration_s > 0.0) || r->o->head_ends || r->scan_t0_ns < 0) return 0;
+    return (double)(frame->t_ns - r->scan_t0_ns) >= 1e9 * r->o->duration_s;
+}
+
 /* Takes one frame. Returns 1: got one; 0: none in time; negative: the recording is over. */
 static int step(struct recording *r, int timeout_ms, struct sh_err *err)
 {
@@ -156,8 +162,7 @@ static int step(struct recording *r, int timeout_ms, struct sh_err *err)
         r->heard_ns = clock_now_ns();
         count_points(r, &frame);
     }
-    int64_t into_ns = frame.t_ns - r->scan_t0_ns;
-    if (r->o->duration_s > 0.0 && r->scan_t0_ns >= 0 && (double)into_ns >= 1e9 * r->o->duration_s) r->stopping = 1;
+    if (is_long_enough(r, &frame)) r->stopping = 1;
     rc = r->o->frame(r->o->ctx, r->sh, &frame, err);
     return rc == SH_OK ? 1 : rc;
 }

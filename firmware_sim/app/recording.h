@@ -16,7 +16,8 @@ struct recording_options {
     int listen;                           /* send nothing; take what comes until the stream or the time ends */
     uint32_t first_station, last_station; /* scanned one after the other, from 1; 0: as the head is set */
     long frames;                          /* per scan; -1: as the head is set */
-    double duration_s;                    /* > 0: stop each scan after this device time */
+    double duration_s;                    /* > 0: stop each scan after this device time ... */
+    int head_ends;                        /* ... which the head does by itself: no command is needed */
     double replug_s;                      /* > 0: how long to wait for a head that was unplugged, to go on then */
     int progress;                         /* 1: to the report, about once a second */
     const struct sh_report *report;

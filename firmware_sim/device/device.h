@@ -72,6 +72,7 @@ struct device_options {
     int one_scan; /* end the run when the first scan is over */
     double
         duration_s; /* > 0: end the run after this time, from the first scan's start with `start`, else from power-up */
+    double scan_s;       /* > 0: end each scan after this time, to the pulse */
     const char *journal; /* NULL: none */
     const char *replay;  /* NULL: none */
 };
