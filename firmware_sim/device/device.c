@@ -178,6 +178,15 @@ uint64_t device_scans(struct device *device)
     return scans;
 }
 
+int64_t device_scan_ns(struct device *device)
+{
+    pthread_mutex_lock(&device->lock);
+    const struct device_scan *scan = &device->scan;
+    int64_t ticks = scan->number != 0 && !scan->on ? (int64_t)(scan->end_tick - scan->tick0) : 0;
+    pthread_mutex_unlock(&device->lock);
+    return ticks * device->tick_ns;
+}
+
 int64_t device_tick_ns(const struct device *device)
 {
     return device->tick_ns;

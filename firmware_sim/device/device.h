@@ -124,6 +124,8 @@ size_t device_gnss_sentences(struct device *device, uint64_t index, char *dst, s
 
 /* Scans begun so far. */
 uint64_t device_scans(struct device *device);
+/* How long the last scan was, in whole ticks; 0: none has ended. */
+int64_t device_scan_ns(struct device *device);
 
 int64_t device_tick_ns(const struct device *device);
 
