@@ -126,7 +126,8 @@ static void say_short_scan(const struct run_options *o, struct device *device)
     if (o->quiet || !o->device.start || app_interrupted() || device_scans(device) != 1) return;
     if (scan_s <= 0.0 || scan_s + 1.5 * tick_s > o->device.duration_s) return;
     fprintf(stderr, "scanhead: the scan was over after %.3f s, before --duration %.10g: %s\n", scan_s,
-            o->device.duration_s, o->frames_given ? "all its frames were scanned" : "its path ended, or it was stopped");
+            o->device.duration_s,
+            o->frames_given ? "all its frames were scanned" : "its path ended, or it was stopped");
 }
 
 static int serve(const struct run_options *o, struct loop *loop, struct device *device, struct sh_err *err)
@@ -148,6 +149,15 @@ static int serve(const struct run_options *o, struct loop *loop, struct device *
     return rc;
 }
 
+static void warn_of_replay(const struct run_options *o, const struct device *device)
+{
+    if (o->device.replay == NULL || device_replay_ends(device) || o->device.duration_s > 0.0) return;
+    sh_warn(&app_report_stderr,
+            "%s has no end, as its head was killed; after its last command the head runs until it is stopped, or for "
+            "--duration S",
+            o->device.replay);
+}
+
 static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
 {
     const struct run_options *o = ctx;
@@ -166,6 +176,7 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
     if (rc == SH_OK) rc = loop_create(site, device, &options, &loop, err);
     if (rc == SH_OK) {
         if (!o->quiet) say_what_runs(cfg, site, loop);
+        warn_of_replay(o, device);
         rc = serve(o, loop, device, err);
     }
     loop_free(loop);
@@ -209,9 +220,9 @@ static const struct app_option OPTIONS[] = {
     OPTION_SET,
     {APP_TEXT, "stats", "FILE", .at = AT(stats), .help = "write statistics as JSON at the end; - is standard output"},
     {APP_TEXT, "journal", "FILE", .at = AT(device.journal),
-     .help = "write every command that had an effect, with its device time"},
+     .help = "write every command that had an effect, with its device time, and the end"},
     {APP_TEXT, "replay-journal", "FILE", .at = AT(device.replay),
-     .help = "carry out the commands of a journal at their times"},
+     .help = "carry out the commands of a journal at their times, and end where its run ended"},
     {APP_WHOLE, "ready-fd", "N", .min = 1, .max = 65535, .at = AT(ready_fd),
      .help = "write one JSON line with the endpoints to descriptor N once all links are open"},
     {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no messages but errors and warnings"},

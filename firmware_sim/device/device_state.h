@@ -70,6 +70,8 @@ struct device_journal {
     struct journal *out; /* NULL: none */
     struct journal_entry *replay;
     size_t n_replay, at; /* next entry to carry out */
+    int ends;            /* the replayed one has an end */
+    uint64_t end_tick;   /* where the run at hand ended, once it is over */
 };
 
 struct device {

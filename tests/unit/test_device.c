@@ -42,7 +42,8 @@ static void a_scan_goes_through_all_states_in_time(void **state)
     assert_string_equal(rig_state(rig, 330), "scanning");
     const struct native_event *end = rig_wait(rig, NATIVE_EV_SCAN_END, 600);
     assert_true(rig->work.tick == 829 && end->a == 1 && end->b == 150000 &&
-                end->c == atomic_load(&device_counters(rig->device)->cast)); /* its release takes off what was delivered */
+                end->c ==
+                    atomic_load(&device_counters(rig->device)->cast)); /* its release takes off what was delivered */
     assert_true(rig->work.pulse_end == 150000 && !rig->work.cut_short);
     assert_string_equal(rig_state(rig, 829), "scanning");
     assert_string_equal(rig_state(rig, 830), "spin-down");
