@@ -144,7 +144,7 @@ int device_claim(struct device *device, struct device_work *work)
 {
     pthread_mutex_lock(&device->lock);
     /* What is still to be said has a tick more. */
-    if (device->over && device->events.n == 0 &&
+    if (device->over && device->events.n == 0 && device->held == 0 &&
         device->overrun.ticks_said == atomic_load(&device->counters.lost_ticks)) {
         pthread_mutex_unlock(&device->lock);
         return 1;
@@ -159,6 +159,7 @@ int device_claim(struct device *device, struct device_work *work)
     device_run_replay(device, tick);
     device_run_timers(device, tick);
     device_say_overrun(device, tick);
+    device_say_held(device, tick);
     device_say_pps(device, tick);
     if (device_is_repeated(device, tick))
         device_say_time(device, tick); /* who joins now knows it before the first point */
@@ -181,8 +182,9 @@ int device_is_idle(struct device *device)
     pthread_mutex_lock(&device->lock);
     int still =
         device->machine.state == HEAD_IDLE || device->machine.state == HEAD_FAULT || device->machine.state == HEAD_OFF;
-    int idle = still && device->machine.due_tick == UINT64_MAX && device->events.n == 0 && !device->ending &&
-               !device->over && device->journal.at == device->journal.n_replay && device->end_tick == UINT64_MAX;
+    int idle = still && device->machine.due_tick == UINT64_MAX && device->events.n == 0 && device->held == 0 &&
+               !device->ending && !device->over && device->journal.at == device->journal.n_replay &&
+               device->end_tick == UINT64_MAX;
     pthread_mutex_unlock(&device->lock);
     return idle;
 }
