@@ -110,7 +110,8 @@ static void test_a_flood_of_errors(void **state)
     struct flood f = {.fd = raw_connect(head_endpoint(&head, "tcp"))};
     pthread_t thread;
     assert_int_equal(pthread_create(&thread, NULL, flood, &f), 0);
-    while (!atomic_load(&f.over) || told.single + told.held < LINES) {
+    for (int64_t end_ms = wire_now_ms() + DEADLINE_MS; !atomic_load(&f.over) || told.single + told.held < LINES;) {
+        if (wire_now_ms() > end_ms) fail_msg("%" PRIu64 " errors told of", told.single + told.held);
         client_next(sh, &frame);
         take(&told, &frame);
     }
