@@ -12,8 +12,6 @@
 #include "core/huge.h"
 #include "core/vec3.h"
 
-static const double MAX_COORDINATE_M = 1e9;
-
 static int64_t now_ns(void)
 {
     struct timespec t;
@@ -198,9 +196,9 @@ int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err)
     double *p = s->vertex_m[s->n_vertices];
     for (int k = 0; k < 3; k++) {
         p[k] = turned[k] * spec->scale + spec->offset_m[k];
-        if (!(fabs(p[k]) <= MAX_COORDINATE_M))
+        if (!(fabs(p[k]) <= BUILD_MAX_COORDINATE_M))
             return build_fail(b, SH_EINPUT, err, "vertex %llu is at %g m; allowed are coordinates up to %g m", number,
-                              p[k], MAX_COORDINATE_M);
+                              p[k], BUILD_MAX_COORDINATE_M);
     }
     s->n_vertices++;
     return SH_OK;

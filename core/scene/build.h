@@ -8,6 +8,7 @@
 #include "core/text.h"
 
 enum { SCENE_MAX_CORNERS = 65536 }; /* of one polygon: ear clipping is quadratic */
+#define BUILD_MAX_COORDINATE_M 1e9
 
 struct scene_build {
     struct scene *scene;
@@ -81,6 +82,6 @@ int read_obj(struct scene_build *b, struct sh_err *err);
  * often come without it: then they have none, and whoever needs colours says so. */
 int read_mtl(struct scene_build *b, struct text_span name, uint32_t first_surface, struct sh_err *err);
 int read_ply(struct scene_build *b, struct sh_err *err);
-int import_assimp(struct scene_build *b, struct sh_err *err);
+int import_apart(struct scene_build *b, struct sh_err *err); /* core/scene/import.h */
 
 #endif

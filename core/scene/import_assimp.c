@@ -4,7 +4,6 @@
  * one level after the other, so that the largest coordinate on the way is known: that is what single
  * precision has rounded. */
 #include <math.h>
-#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,7 +15,7 @@
 #include <assimp/scene.h>
 
 #include "core/scene/ifc_check.h"
-#include "core/scene/build.h"
+#include "core/scene/import.h"
 
 enum { MAX_DEPTH = 256 };
 
@@ -252,12 +251,9 @@ static int check_ifc(struct scene_build *b, struct sh_err *err)
     return build_fail(b, SH_EINPUT, err, "cut off: it doesn't end with %s", last);
 }
 
-/* The logger and the text of the last error are Assimp's globals, hence the lock. */
 static const struct aiScene *import_file(struct scene_build *b, struct import_log *log, struct sh_err *err)
 {
-    static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
     struct aiLogStream stream = {.callback = keep_log, .user = (char *)(void *)log};
-    pthread_mutex_lock(&lock);
     aiAttachLogStream(&stream);
     struct aiPropertyStore *options = aiCreatePropertyStore();
     aiSetImportPropertyInteger(options, AI_CONFIG_IMPORT_COLLADA_USE_COLLADA_NAMES, 1);      /* not the ids */
@@ -271,7 +267,6 @@ static const struct aiScene *import_file(struct scene_build *b, struct import_lo
         if (in != NULL) aiReleaseImport(in);
         in = NULL;
     }
-    pthread_mutex_unlock(&lock);
     return in;
 }
 

@@ -9,7 +9,12 @@
 static struct scene_mesh_spec mesh_spec(const struct config *cfg, const struct config_mesh *mesh)
 {
     struct scene_mesh_spec spec = {
-        .file = mesh->file, .up = mesh->up, .scale = mesh->scale, .textures = cfg->signal.on};
+        .file = mesh->file,
+        .up = mesh->up,
+        .scale = mesh->scale,
+        .textures = cfg->signal.on,
+        .limits = &cfg->scene.import,
+    };
     memcpy(spec.offset_m, mesh->offset_m, sizeof spec.offset_m);
     return spec;
 }
