@@ -66,9 +66,9 @@ int build_label(struct scene_build *b, struct text_span object, struct text_span
 int build_texture(struct scene_build *b, struct text_span name, const void *bytes, size_t n_bytes, uint16_t *number,
                   struct sh_err *err);
 
-/* Reports "reading FILE" about four times a second, once the load takes longer than a second. build: a struct
- * scene_build. */
-void build_progress(void *build, double fraction);
+/* Reports "reading FILE" about four times a second, once the load takes longer than a second, and heeds the
+ * stop: SH_ESTOPPED. build: a struct scene_build. */
+int build_progress(void *build, double fraction, struct sh_err *err);
 
 /* Reports "reading FILE" with an unknown fraction, at once. */
 void build_announce(struct scene_build *b);

@@ -192,7 +192,8 @@ static int add_mesh(struct import *im, const struct aiNode *node, const struct a
     if (rc == SH_OK) rc = add_vertices(im, mesh, err);
     for (unsigned i = 0; i < mesh->mNumFaces && rc == SH_OK; i++) {
         rc = add_face(im, &mesh->mFaces[i], mesh, label, err);
-        if ((im->n_done++ & 0xffff) == 0) build_progress(im->b, (double)im->n_done / (double)im->n_faces);
+        if (rc == SH_OK && (im->n_done++ & 0xffff) == 0)
+            rc = build_progress(im->b, (double)im->n_done / (double)im->n_faces, err);
     }
     im->b->scene->n_meshes++;
     im->b->mesh = NULL;
