@@ -62,7 +62,13 @@ static void print_progress(void *ctx, const char *what, double fraction)
         fprintf(stderr, "scanhead: %s: %.0f %%\n", what, 100.0 * fraction);
 }
 
-const struct sh_report app_report_stderr = {NULL, print_warning, print_progress};
+static int asked_to_stop(void *ctx)
+{
+    (void)ctx;
+    return app_interrupted();
+}
+
+const struct sh_report app_report_stderr = {NULL, print_warning, print_progress, asked_to_stop};
 
 void app_warn_left_out(uint64_t crowded, uint64_t unfit)
 {

@@ -44,7 +44,7 @@ static void print_note(void *ctx, const char *text)
     fprintf(stderr, "scanhead: %s\n", text);
 }
 
-static const struct sh_report NOTES = {NULL, print_note, NULL};
+static const struct sh_report NOTES = {.warn = print_note};
 
 /* Follows the scans. Files are closed and statistics written also after some failures; the first failure is
  * returned. */
