@@ -6,6 +6,8 @@
 #include "drivers/protocol/bytes.h"
 
 enum { SERIAL_STATE_READY = 3, DTR = 1 }; /* carrier and data set ready */
+/* bInterfaceProtocol: no AT commands (1). Modem managers send those to every port that says it takes them. */
+enum { CONSOLE_PROTOCOL = USB_CDC_PROTO_NONE };
 
 static const char *const strings[] = {"scanhead", "Laser scanner head", "Scanner console", "Scanner stream", NULL};
 enum { STRING_MAKER = 1, STRING_PRODUCT, STRING_CONSOLE, STRING_STREAM };
@@ -39,7 +41,7 @@ static const struct usb_interface_row interfaces[] = {
     {.number = CONSOLE_INTERFACE,
      .class = USB_CLASS_COMM,
      .subclass = USB_CDC_SUBCLASS_ACM,
-     .protocol = USB_CDC_ACM_PROTO_AT_V25TER,
+     .protocol = CONSOLE_PROTOCOL,
      .string = STRING_CONSOLE,
      .extra = console_extra,
      .extra_len = sizeof console_extra,
@@ -60,7 +62,7 @@ static const struct usb_function_row functions[] = {
      .count = 2,
      .class = USB_CLASS_COMM,
      .subclass = USB_CDC_SUBCLASS_ACM,
-     .protocol = USB_CDC_ACM_PROTO_AT_V25TER,
+     .protocol = CONSOLE_PROTOCOL,
      .string = STRING_CONSOLE},
     {.first = STREAM_INTERFACE,
      .count = 1,
@@ -116,6 +118,7 @@ static int console_request(struct scanhead_usb *head, uint8_t request, unsigned 
         return value == 0 && length == sizeof head->line_coding ? set_line_coding(head, data) : USB_STALL;
     case USB_CDC_REQ_SET_CONTROL_LINE_STATE:
         if (length != 0 || (value & ~3u) != 0) return USB_STALL;
+        if ((value & DTR) != 0 && !head->session[CONSOLE_SESSION].open) head->state_due = 1; /* to who opens the port */
         set_open(head, CONSOLE_SESSION, (value & DTR) != 0);
         return 0;
     case USB_CDC_REQ_SEND_BREAK: /* there is no line to hold */

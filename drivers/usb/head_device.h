@@ -36,7 +36,7 @@ struct scanhead_usb {
     struct usb_device *device;
     struct scanhead_usb_session session[SCANHEAD_USB_SESSIONS];
     uint8_t line_coding[7];
-    int state_due; /* the console's serial state is still to be sent */
+    int state_due; /* the serial state is still to be sent: the console came to life, or DTR rose */
 };
 
 /* Makes the device of head, which must be zeroed and stay where it is. usb_device_free(head->device). */
