@@ -7,10 +7,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "drivers/link/link_poll.h"
 #include "drivers/usb/backend.h"
 #include "drivers/usb/head_device.h"
+#include "drivers/usb/own_identity.h"
 
 struct usb_link {
     struct scanhead_usb head;
@@ -18,9 +20,17 @@ struct usb_link {
     void *backend;
     int reported[SCANHEAD_USB_SESSIONS]; /* the caller takes it to be open */
     const char *news;                    /* the back end's, until reported */
+    int claim;                           /* of the head's own number; -1: its identity is configured */
 };
 
 static const char *const session_names[] = {[CONSOLE_SESSION] = "usb console", [STREAM_SESSION] = "usb stream"};
+
+static void free_link(struct usb_link *self)
+{
+    usb_device_free(self->head.device);
+    if (self->claim >= 0) close(self->claim);
+    free(self);
+}
 
 static int usb_open(const struct link_spec *spec, void **link, struct sh_err *err)
 {
@@ -33,16 +43,17 @@ static int usb_open(const struct link_spec *spec, void **link, struct sh_err *er
                                        .attach = spec->attach,
                                        .retry_ms = spec->retry_ms};
     snprintf(id.serial, sizeof id.serial, "%s", spec->serial);
+    self->claim = -1;
     snprintf(backend.address, sizeof backend.address, "%s", spec->address);
     snprintf(backend.path, sizeof backend.path, "%s", spec->path);
     snprintf(backend.udc, sizeof backend.udc, "%s", spec->udc);
     self->ops = usb_backend_ops_get(backend.type);
     int rc = self->ops != NULL ? SH_OK : sh_fail(err, SH_EINPUT, "link usb: this build has no such back end");
+    if (rc == SH_OK && spec->own_serial) rc = usb_own_identity(&id, &self->claim, err);
     if (rc == SH_OK) rc = scanhead_usb_create(&id, &self->head, err);
     if (rc == SH_OK) rc = self->ops->open(&backend, self->head.device, &self->backend, err);
     if (rc != SH_OK) {
-        usb_device_free(self->head.device);
-        free(self);
+        free_link(self);
         return rc;
     }
     *link = self;
@@ -169,8 +180,7 @@ static void usb_close(void *link)
 {
     struct usb_link *self = link;
     self->ops->close(self->backend);
-    usb_device_free(self->head.device);
-    free(self);
+    free_link(self);
 }
 
 const struct link_ops link_usb = {

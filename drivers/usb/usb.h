@@ -88,6 +88,7 @@ struct usb_model {
 struct usb_identity {
     uint16_t vid, pid;
     char serial[64];       /* UTF-8; empty: no serial number string */
+    unsigned number;       /* of this head among those on the machine, from 1; 0: it has none */
     enum usb_rate highest; /* fastest rate it can do */
 };
 
