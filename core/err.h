@@ -18,6 +18,7 @@ enum sh_code {
     SH_EFORMAT = -7,  /* bytes that are not what the protocol says */
     SH_ESTATE = -8,   /* not possible in the present state */
     SH_ELOST = -9,    /* a device is not there, or not any more */
+    SH_ERESET = -10,  /* a device is still there, but what was open on it is over */
 };
 
 struct sh_err {

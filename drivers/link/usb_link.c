@@ -122,9 +122,17 @@ static void report(struct usb_link *self, int i, uint32_t want_write, struct lin
     if ((want_write >> i & 1u) != 0 && is_writable(self, i)) link_events_push(events, LINK_WRITABLE, i, NULL);
 }
 
+/* A back end that was unplugged may have more to say of it. */
+static void take_news(struct usb_link *self)
+{
+    if (self->news == NULL && self->ops->news != NULL) self->news = self->ops->news(self->backend);
+    if (self->news != NULL && self->head.cut == USB_END_UNPLUGGED) self->head.cut_due = 0;
+    if (self->news == NULL) self->news = scanhead_usb_cut(&self->head);
+}
+
 static int has_news(const struct usb_link *self, uint32_t want_write)
 {
-    int news = (self->ops->more != NULL && self->ops->more(self->backend)) || self->news != NULL;
+    int news = (self->ops->more != NULL && self->ops->more(self->backend)) || self->news != NULL || self->head.cut_due;
     for (int i = 0; i < SCANHEAD_USB_SESSIONS; i++)
         news |= has_to_report(self, i) || is_readable(self, i) || ((want_write >> i & 1u) != 0 && is_writable(self, i));
     return news;
@@ -145,7 +153,7 @@ static int usb_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     self->ops->flush(self->backend);
     for (int i = 0; i < SCANHEAD_USB_SESSIONS; i++)
         report(self, i, want_write, &events);
-    if (self->news == NULL && self->ops->news != NULL) self->news = self->ops->news(self->backend);
+    take_news(self);
     if (self->news != NULL && link_events_push(&events, LINK_NOTICE, 0, self->news)) self->news = NULL;
     return events.n;
 }

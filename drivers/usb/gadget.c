@@ -356,6 +356,13 @@ static enum usb_rate read_rate(const struct gadget *gadget, const char *file)
                                            : USB_RATE_FULL;
 }
 
+int gadget_is_on_bus(const struct gadget *gadget)
+{
+    char dir[320], state[32] = "";
+    snprintf(dir, sizeof dir, "%s/%s", CONTROLLERS, gadget->udc);
+    return read_text(dir, "state", state, sizeof state) == 0 && strcmp(state, "not attached") != 0;
+}
+
 enum usb_rate gadget_rate(const struct gadget *gadget)
 {
     return read_rate(gadget, "current_speed");

@@ -166,8 +166,25 @@ static void on_interface(void *ctx, unsigned interface, int active)
         head->state_due = active;
         memcpy(head->line_coding, line_coding_at_rest, sizeof head->line_coding);
     }
+    const int session = interface == STREAM_INTERFACE ? STREAM_SESSION : CONSOLE_SESSION;
     if (active) return;
-    set_open(head, interface == STREAM_INTERFACE ? STREAM_SESSION : CONSOLE_SESSION, 0);
+    if (head->session[session].open) {
+        head->cut_due = 1;
+        head->cut = usb_device_end(head->device);
+    }
+    set_open(head, session, 0);
+}
+
+const char *scanhead_usb_cut(struct scanhead_usb *head)
+{
+    static const char *const why[] = {
+        [USB_END_CONFIGURED] = "the host configured the device anew, as after a reset of the bus: sessions ended, the "
+                               "device stays plugged in",
+        [USB_END_RESET] = "the host reset the bus: sessions ended, the device stays plugged in",
+        [USB_END_UNPLUGGED] = "unplugged: sessions ended"};
+    if (!head->cut_due) return NULL;
+    head->cut_due = 0;
+    return why[head->cut];
 }
 
 int scanhead_usb_create(const struct usb_identity *id, struct scanhead_usb *head, struct sh_err *err)
