@@ -19,6 +19,7 @@ enum sh_code {
     SH_ESTATE = -8,   /* not possible in the present state */
     SH_ELOST = -9,    /* a device is not there, or not any more */
     SH_ESTOPPED = -10, /* whoever asked for the work wants it to end: exit status 1 */
+    SH_ERESET = -11,  /* a device is still there, but what was open on it is over */
 };
 
 struct sh_err {

@@ -52,7 +52,7 @@ static int follow(struct record *r, struct scanhead *sh, struct recording_result
 {
     struct sh_err why = {0};
     int rc = recording_run(sh, &r->recording, result, err);
-    const int has_figures = rc == SH_OK || rc == SH_ELOST; /* LOST: an unplugged head has cut the recording */
+    const int has_figures = rc == SH_OK || rc == SH_ELOST || rc == SH_ERESET; /* the bus has cut the recording */
     const int keep = result->points != 0 || (rc == SH_OK && result->missing[0] == '\0');
     int after = record_files_close(&r->files, keep, &why);
     if (rc == SH_OK && after != SH_OK) rc = sh_fail(err, after, "%s", why.text);

@@ -235,7 +235,8 @@ static const struct cfg_key config_keys[] = {
      .help = "usb: vendor id; the default pair is set aside for private tests."},
     {LINK(pid), CFG_COUNT, NULL, "0x0001", 0, 65535, .flags = CFG_HEX, .allowed = "0x0000 to 0xffff",
      .help = "usb: product id."},
-    {LINK(serial), CFG_TEXT, .def = "", .help = "usb: serial number; head.serial when not given."},
+    {LINK(serial), CFG_TEXT, .def = "", .help = "usb: serial number. When not given: head.serial where that is given, else SIM-0001 and eight digits that "
+             "are this head's own on this machine. Only the USB device has them, not *IDN?."},
 
     {"beam", .type = CFG_MAP, .help = "The footprint of the pulses."},
     {KEY(beam.mode), CFG_ENUM, .def = "single",
