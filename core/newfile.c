@@ -44,8 +44,8 @@ static int fail_link(const char *path, struct sh_err *err)
     char to[200];
     ssize_t n = readlink(path, to, sizeof to - 1);
     to[n > 0 ? n : 0] = '\0';
-    return sh_fail(err, SH_EINPUT, "%s: is a symbolic link to %s; links are not followed: remove it, or name its target",
-                   path, to);
+    return sh_fail(err, SH_EINPUT,
+                   "%s: is a symbolic link to %s; links are not followed: remove it, or name its target", path, to);
 }
 
 static int fail_hard_link(const char *path, const struct stat *st, struct sh_err *err)
@@ -97,7 +97,10 @@ int newfile_open(const char *path, int *out, struct sh_err *err)
         fd = open(path, flags, 0666);
     }
     if (fd < 0 && errno == ENXIO)
-        return sh_fail(err, SH_EINPUT, "%s: nobody reads from it: it is a FIFO without a reader, or a socket", path);
+        return sh_fail(err, SH_EINPUT,
+                       "%s: is a FIFO that nobody reads, or a socket; allowed are a regular file, a device, and a FIFO "
+                       "with a reader",
+                       path);
     if (fd < 0) return fail(path, "be opened for writing", err);
     int rc = SH_OK;
     if (fstat(fd, &st) != 0 || fcntl(fd, F_SETFL, 0) != 0) rc = fail(path, "be opened for writing", err);
@@ -157,7 +160,8 @@ int newfile_part(const char *path, const char *part, int *out, struct sh_err *er
         if (rc < 0) break;
         rc = SH_OK;
         if (flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
-            rc = sh_fail(err, SH_EINPUT, "%s: is being written by another recording; allowed is a file of its own", part);
+            rc = sh_fail(err, SH_EINPUT, "%s: is being written by another recording; allowed is a file of its own",
+                         part);
         /* a file system without locks has none to offer; then the name alone counts */
         else if (is_named(part, fd)) {
             if (ftruncate(fd, 0) != 0) rc = fail(part, "create", err);

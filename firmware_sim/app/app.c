@@ -94,7 +94,8 @@ int app_write_json(const char *path, void (*put)(struct json *json, const void *
     struct json json;
     json_begin(&json, out);
     put(&json, ctx);
-    if (json_end(&json, &why) != SH_OK) rc = sh_fail(err, why.code, "%s: %s", to_stdout ? "standard output" : path, why.text);
+    if (json_end(&json, &why) != SH_OK)
+        rc = sh_fail(err, why.code, "%s: %s", to_stdout ? "standard output" : path, why.text);
     if (!to_stdout && fclose(out) != 0 && rc == SH_OK) rc = sh_fail(err, SH_EIO, "%s: %s", path, strerror(errno));
     return rc;
 }
