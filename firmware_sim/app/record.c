@@ -64,6 +64,7 @@ static int follow(struct record *r, struct scanhead *sh, struct recording_result
     const int keep = result->points != 0 || (rc == SH_OK && result->missing[0] == '\0');
     r->interrupted = app_interrupted();
     int after = record_files_close(&r->files, keep, &why);
+    if (rc != SH_OK && after != SH_OK) sh_warn(&app_report_stderr, "%s", why.text);
     if (rc == SH_OK && after != SH_OK) rc = sh_fail(err, after, "%s", why.text);
     if (!has_figures || r->stats == NULL) return rc;
     after = app_write_json(r->stats, recording_put, result, &why);
