@@ -41,12 +41,12 @@ static void need_python(void)
 /* ---- recordings */
 
 static const struct room_config SMALL = {
-    .prr_hz = 20000, .lines_hz = 50, .pan_deg_s = 100, .pan_stop_deg = 10, .frames = 1, .links = LINK_YAML_TCP};
+    .prr_hz = 20000, .lines_hz = 50, .pan_deg_s = 100, .pan_stop_deg = 5, .frames = 1, .links = LINK_YAML_TCP};
 
 static const struct room_config RIDE = {.prr_hz = 20000,
                                         .lines_hz = 50,
                                         .pan_deg_s = 50,
-                                        .pan_stop_deg = 9,
+                                        .pan_stop_deg = 4,
                                         .frames = 1,
                                         .links = LINK_YAML_TCP,
                                         .more = "platform: {kind: trajectory, file: ride.csv}\n"};
@@ -235,7 +235,7 @@ static void test_same_numbers(void **state)
         for (int k = 0; k < 2; k++) {
             uint64_t points = same_stream(wire, path, hash, flavours[k]);
             if (points == 0) print_message("# numpy is missing (Debian: python3-numpy): compared without it\n");
-            assert_true(points == 0 || points >= 2000);
+            assert_true(points == 0 || points >= 1000);
         }
     }
 }
@@ -263,16 +263,14 @@ static void test_both_layouts(void **state)
         snprintf(polar, sizeof polar, "%s", record(wire, &SMALL, "polar.shs", keys));
         snprintf(keys, sizeof keys, "output.layout=geo output.tolerance_m=1e-6 %s", places[i]);
         snprintf(geo, sizeof geo, "%s", record(wire, &SMALL, "geo.shs", keys));
-        for (int k = 0; k < 2; k++) {
-            const char *said = ask_python(wire, flavours[k], "crs", polar, geo);
-            unsigned n;
-            double crs_m, scene_m;
-            if (said == NULL) continue;
-            assert_int_equal(sscanf(said, "%u %lf %lf", &n, &crs_m, &scene_m), 3);
-            assert_true(n > 1000);
-            if (!(crs_m < 2.6e-6 && scene_m < 2.6e-6))
-                fail_msg("%s, place %zu: %g m in the CRS, %g m in the scene", flavours[k], i, crs_m, scene_m);
-        }
+        const char *said = ask_python(wire, flavours[i % 2], "crs", polar, geo);
+        unsigned n;
+        double crs_m, scene_m;
+        if (said == NULL) continue;
+        assert_int_equal(sscanf(said, "%u %lf %lf", &n, &crs_m, &scene_m), 3);
+        assert_true(n >= 1000);
+        if (!(crs_m < 2.6e-6 && scene_m < 2.6e-6))
+            fail_msg("%s: %g m in the CRS, %g m in the scene", places[i], crs_m, scene_m);
     }
 }
 
@@ -330,7 +328,7 @@ static void test_damaged(void **state)
     size_t len;
     char *bytes = wire_read(record(wire, &SMALL, "a.shs", ""), &len);
     uint8_t *out = malloc(2 * len + 16);
-    for (dice = 1; dice < 4; dice++) {
+    for (dice = 1; dice < 3; dice++) {
         const uint32_t seed = dice;
         const char *path = wire_write(wire, "b.shs", out, damage(out, bytes, len));
         struct scanhead_stats stats;
@@ -368,7 +366,7 @@ static void test_hostile(void **state)
         const char *said = ask_python(wire, flavours[k], "hostile", path, seeds[k]);
         if (said == NULL) continue;
         assert_int_equal(sscanf(said, "%u %u", &taken, &refused), 2);
-        assert_true(taken > 300 && refused > 300);
+        assert_true(taken > 200 && refused > 100);
     }
 }
 
