@@ -35,7 +35,7 @@ static void say_result(const struct record *r, const struct recording_result *re
         snprintf(faint, sizeof faint, ", %llu hits not detected", (unsigned long long)result->faint);
     fprintf(stderr, "scanhead: %llu points, %llu shots without echo%s, %llu scans\n",
             (unsigned long long)result->points, (unsigned long long)result->empty, faint,
-            (unsigned long long)result->scans);
+            (unsigned long long)result->counts.scans);
 }
 
 static void print_note(void *ctx, const char *text)

@@ -9,6 +9,7 @@
 
 #include "core/err.h"
 #include "drivers/host/scanhead.h"
+#include "firmware_sim/app/recording_counts.h"
 #include "firmware_sim/base/json.h"
 
 struct recording_options {
@@ -27,9 +28,9 @@ struct recording_options {
 };
 
 struct recording_result {
-    uint64_t points, empty, frames, scans, pulses; /* received; empty: shots without echo */
-    uint64_t lost_pulses;                          /* cast pulses that the head says it could not compute */
-    uint64_t crowded, faint, unfit;                /* hits that are no echoes, as the line ends count them */
+    uint64_t points, empty, frames; /* received; empty: shots without echo */
+    struct recording_counts counts; /* of pulses and scans */
+    uint64_t crowded, faint, unfit; /* hits that are no echoes, as the line ends count them */
     char missing[128];              /* what was asked for and left out because of `interrupted`; empty: nothing */
     double wall_s;                  /* how long the recording took */
     struct scanhead_stats stream;   /* as the client counts */

@@ -108,6 +108,13 @@ void device_free(struct device *device)
     free(device);
 }
 
+static int ends_scan(const struct device_work *work)
+{
+    for (uint32_t i = 0; i < work->n_events; i++)
+        if (work->event[i].code == NATIVE_EV_SCAN_END) return 1;
+    return 0;
+}
+
 int device_claim(struct device *device, struct device_work *work)
 {
     pthread_mutex_lock(&device->lock);
@@ -135,10 +142,8 @@ int device_claim(struct device *device, struct device_work *work)
         device_claim_scan(device, tick, work);
     else if (repeated)
         device_describe(device, work);
-    if (tick % device->tick_hz == 0) {
-        work->telemetry = 1;
-        device_fill_telemetry(device, tick, &work->telemetry_frame);
-    }
+    work->telemetry = tick % device->tick_hz == 0;
+    if (work->telemetry || ends_scan(work)) device_fill_telemetry(device, tick, &work->telemetry_frame);
     work->wake = gnss_count(&device->gnss, work->t_ns) != gnss_count(&device->gnss, work->t_ns + device->tick_ns);
     if (device->ending || tick >= device->end_tick) device->over = 1;
     device->next_tick = tick + 1;

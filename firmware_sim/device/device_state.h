@@ -43,7 +43,7 @@ struct device_scan {
     uint64_t tick0;      /* its first */
     uint64_t end_tick;   /* the first one after it, when none is on */
     uint64_t pulse_next; /* next pulse to be claimed */
-    uint64_t lost0;      /* pulses lost before it */
+    uint64_t cast;       /* of the pulses before, those that are cast */
     struct schedule_segment segment;
     uint32_t station; /* from 0 */
     size_t stretch;   /* of a trajectory: the one of the last pulse that is claimed */

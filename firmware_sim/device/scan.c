@@ -10,7 +10,6 @@ void device_begin_scan(struct device *device, uint64_t tick)
     device->scan = (struct device_scan){.on = 1,
                                         .number = device->scan.number + 1,
                                         .tick0 = tick,
-                                        .lost0 = atomic_load(&device->counters.lost_pulses),
                                         .station = device->cmd.settings.station - 1,
                                         .stretch = site_stretch_at(device->site, 0),
                                         .describe = 1};
@@ -46,6 +45,29 @@ static uint64_t tick_room_end(const struct device *device)
     return line.pulse_end < end ? line.pulse_end : schedule_cut(seg, end);
 }
 
+/* Counts the pulses that the tick has: in the work, in the scan and in all. */
+static void count_pulses(struct device *device, struct device_work *work)
+{
+    const struct schedule_segment *seg = &work->segment;
+    work->scan = device->scan.number;
+    work->n_cast = 0;
+    work->cast0 = UINT64_MAX;
+    for (uint64_t k = work->pulse0; k < work->pulse_end;) {
+        struct schedule_line line;
+        schedule_get_line(seg, schedule_line_of(seg, k), &line);
+        uint64_t end = line.pulse_end < work->pulse_end ? line.pulse_end : work->pulse_end;
+        uint64_t first = k > line.cast0 ? k : line.cast0, cast_end = end < line.cast_end ? end : line.cast_end;
+        if (first < cast_end) {
+            work->n_cast += cast_end - first;
+            if (work->cast0 == UINT64_MAX) work->cast0 = first;
+        }
+        k = end;
+    }
+    device->scan.cast += work->n_cast;
+    atomic_fetch_add(&device->counters.fired, work->pulse_end - work->pulse0);
+    atomic_fetch_add(&device->counters.cast, work->n_cast);
+}
+
 /* Pulses of this tick; ends the scan when it is complete or was told to stop. Returns 1 when the scan is
  * over. */
 static int claim_pulses(struct device *device, uint64_t tick, struct device_work *work)
@@ -75,6 +97,7 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
     if (done || end > seg->end_pulse) end = seg->end_pulse;
     if (end < work->pulse0) end = work->pulse0;
     work->pulse_end = device->scan.pulse_next = end;
+    count_pulses(device, work);
     if (end > work->pulse0) device->scan.stretch = site_stretch_at(device->site, schedule_time_ns(seg, end - 1));
     work->cut_short = (stop || arrives) && end < seg->end_pulse;
     device_take_poses(device, work);
@@ -125,14 +148,16 @@ static void describe(struct device *device, uint64_t tick, struct device_work *w
     }
 }
 
+/* Ticks before this one may yet be lost. So the event has the pulses that were cast, and its release takes
+ * off those that were delivered (stream.c). */
 static void end_scan(struct device *device, uint64_t tick)
 {
-    uint64_t lost = atomic_load(&device->counters.lost_pulses) - device->scan.lost0;
     int stopped = device->scan.stop_requested;
     device->scan.on = 0;
     device->scan.end_tick = tick;
     device->scan.stop_requested = 0;
-    device_push_event(device, NATIVE_EV_SCAN_END, device->scan.number, device->scan.pulse_next, lost, "");
+    device_push_event(device, NATIVE_EV_SCAN_END, device->scan.number, device->scan.pulse_next,
+                      device->scan.cast, "");
     device_transition(device, stopped ? HEAD_EV_STOP : HEAD_EV_DONE, tick);
     if (device->options.one_scan) device->over = 1;
 }

@@ -131,8 +131,8 @@ _LAYOUT = {
     POINTS: ("<IIQqqII", "frame line pulse0 t0_ns line_t0_ns n_pulses n_points"),
     LINE_END: ("<IIQqq9I", "frame line pulse0 t0_ns t1_ns n_fired n_cast n_echoes mirror_count pan_count status "
                "n_crowded n_faint n_unfit"),
-    TELEMETRY: ("<II5QIIQq", "state scan pulses echoes lines lost_pulses late_blocks late_max_us errors_queued "
-                "reader_lost_frames utc_ns"),
+    TELEMETRY: ("<II5QIIQq3Q", "state scan pulses echoes lines lost_pulses late_blocks late_max_us "
+                "errors_queued reader_lost_frames utc_ns scan_fired scan_cast scan_lost"),
     EVENT: ("<IIQQQ96s", "code reserved a b c text"),
     ATTRIBUTES: ("<QII", "pulse0 line n_points"),
 }
