@@ -104,6 +104,7 @@ int device_create(const struct site *site, const struct device_options *options,
         device_free(device);
         return rc;
     }
+    device_before_scans(device);
     device_transition(device, HEAD_EV_POWER_ON, 0);
     *out = device;
     return SH_OK;
@@ -161,11 +162,14 @@ int device_claim(struct device *device, struct device_work *work)
     device_say_overrun(device, tick);
     device_say_held(device, tick);
     device_say_pps(device, tick);
-    if (device_is_repeated(device, tick))
-        device_say_time(device, tick); /* who joins now knows it before the first point */
+    const int repeated = device_is_repeated(device, tick);
+    if (repeated) device_say_time(device, tick); /* who joins now knows it before the first point */
     device_take_events(device, work);
     work->n_events_before = work->n_events;
-    if (device->scan.on) device_claim_scan(device, tick, work);
+    if (device->scan.on)
+        device_claim_scan(device, tick, work);
+    else if (repeated)
+        device_describe(device, work);
     work->telemetry = tick % device->tick_hz == 0;
     if (work->telemetry || ends_scan(work)) device_fill_telemetry(device, tick, &work->telemetry_frame);
     work->wake = gnss_count(&device->gnss, work->t_ns) != gnss_count(&device->gnss, work->t_ns + device->tick_ns);

@@ -121,19 +121,32 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
 int device_is_repeated(const struct device *device, uint64_t tick)
 {
     uint64_t since = tick - device->scan.tick0;
-    return device->scan.on && ((since != 0 && since % device->tick_hz == 0) || device->scan.anchor_lost);
+    if (!device->scan.on) return device->machine.state >= HEAD_IDLE && tick % device->tick_hz == 0;
+    return (since != 0 && since % device->tick_hz == 0) || device->scan.anchor_lost;
+}
+
+void device_before_scans(struct device *device)
+{
+    struct schedule_spec spec;
+    config_fill_spec(&device->site->cfg->profile, &device->cmd.settings, &spec);
+    schedule_start(&device->scan.segment, &spec);
+    device->scan.station = device->cmd.settings.station - 1;
+    device->scan.stretch = site_stretch_at(device->site, 0);
+}
+
+void device_describe(struct device *device, struct device_work *work)
+{
+    work->describe = 1;
+    work->describe_flags = device->scan.describe ? 0 : NATIVE_REPEAT;
+    device_fill_descriptor(device, &work->descriptor);
+    device_fill_anchor(device->site, device->scan.station, device->scan.stretch, &work->anchor);
+    device->scan.describe = device->scan.anchor_lost = 0;
 }
 
 static void describe(struct device *device, uint64_t tick, struct device_work *work)
 {
     uint64_t since = tick - device->scan.tick0;
-    if (device->scan.describe || device_is_repeated(device, tick)) {
-        work->describe = 1;
-        work->describe_flags = device->scan.describe ? 0 : NATIVE_REPEAT;
-        device_fill_descriptor(device, &work->descriptor);
-        device_fill_anchor(device->site, device->scan.station, device->scan.stretch, &work->anchor);
-        device->scan.describe = device->scan.anchor_lost = 0;
-    }
+    if (device->scan.describe || device_is_repeated(device, tick)) device_describe(device, work);
     /* All names at the scan's start, then round and round for those who join late. */
     uint32_t n = device->site->n_surfaces;
     uint64_t chunks = (n + DEVICE_SURFACES_A_FRAME - 1) / DEVICE_SURFACES_A_FRAME;

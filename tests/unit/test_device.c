@@ -106,6 +106,23 @@ static void a_stop_in_spin_up_never_scans(void **state)
     rig_close(rig);
 }
 
+/* A reader that joins a head at rest has descriptor and anchor within a second, too. They begin nothing. */
+static void a_head_at_rest_describes_itself_each_second(void **state)
+{
+    (void)state;
+    struct rig *rig = rig_open(NULL, NULL, 0);
+    for (int n = 0; n < 2200 && rig_claim(rig); n++) {
+        const struct device_work *work = &rig->work;
+        assert_int_equal(work->describe, n != 0 && n % 1000 == 0);
+        if (!work->describe) continue;
+        assert_int_equal(work->describe_flags, NATIVE_REPEAT);
+        assert_int_equal(work->descriptor.scan, 0);
+        assert_true(work->descriptor.prr_uhz > 0 && work->anchor.station == 1);
+        assert_string_equal(work->descriptor.idn, rig_tell(rig, "*IDN?", rig->next));
+    }
+    rig_close(rig);
+}
+
 /* Every command with every kind of argument, thousands of times: only power and failures lead to off and
  * fault. */
 static void no_command_leads_to_off_or_fault(void **state)
@@ -420,6 +437,7 @@ int main(void)
         cmocka_unit_test(a_command_reaches_the_beam_within_100_ms),
         cmocka_unit_test(no_spin_up_time_starts_with_the_next_tick),
         cmocka_unit_test(a_stop_in_spin_up_never_scans),
+        cmocka_unit_test(a_head_at_rest_describes_itself_each_second),
         cmocka_unit_test(no_command_leads_to_off_or_fault),
         cmocka_unit_test(descriptor_and_anchor_come_first_and_every_second),
         cmocka_unit_test(all_names_are_said_round_and_round),
