@@ -98,7 +98,7 @@ static int add_face(struct import *im, const struct aiFace *face, const struct a
     }
     int rc = build_corners(b, face->mNumIndices, err);
     if (rc != SH_OK) return rc;
-    const struct aiVector3D *uv = b->spec->textures ? mesh->mTextureCoords[0] : NULL;
+    const struct aiVector3D *uv = build_wants_textures(b) ? mesh->mTextureCoords[0] : NULL;
     b->has_uv = uv != NULL;
     for (unsigned i = 0; i < face->mNumIndices; i++) {
         unsigned index = face->mIndices[i];
@@ -151,7 +151,7 @@ static int keep_texture(const struct import *im, const struct aiMaterial *materi
     char name[sizeof path.data + 256];
     const char *base = strrchr(im->b->spec->file, '/');
     const struct aiTexture *within = NULL;
-    if (!im->b->spec->textures || surface->texture != 0) return SH_OK;
+    if (!build_wants_textures(im->b) || surface->texture != 0) return SH_OK;
     if (aiGetMaterialTexture(material, aiTextureType_DIFFUSE, 0, &path, NULL, NULL, NULL, NULL, NULL, NULL) !=
         AI_SUCCESS)
         return SH_OK;
@@ -162,8 +162,10 @@ static int keep_texture(const struct import *im, const struct aiMaterial *materi
     }
     base = within == NULL ? "" : base != NULL ? base + 1 : im->b->spec->file;
     int len = snprintf(name, sizeof name, "%.255s%.*s", base, (int)path.length, path.data);
-    return build_texture(im->b, (struct text_span){name, (size_t)len}, within != NULL ? within->pcData : NULL,
-                         within != NULL ? within->mWidth : 0, &surface->texture, err);
+    const struct build_image image = {.name = {name, (size_t)len},
+                                      .bytes = within != NULL ? within->pcData : NULL,
+                                      .n_bytes = within != NULL ? within->mWidth : 0};
+    return build_texture(im->b, &image, &surface->texture, err);
 }
 
 static struct text_span span_of(const struct aiString *text)

@@ -47,9 +47,10 @@ static int set_texture(struct scene_build *b, uint32_t first, struct text_span m
                 break;
             }
     if (name.n == 0) return SH_OK;
+    const struct build_image image = {.name = name};
     for (uint32_t i = first; i < scene->n_surfaces && rc == SH_OK; i++) {
         struct scene_surface *s = &scene->surface[i];
-        if (s->texture == 0 && has_material(s, material)) rc = build_texture(b, name, NULL, 0, &s->texture, err);
+        if (s->texture == 0 && has_material(s, material)) rc = build_texture(b, &image, &s->texture, err);
     }
     return rc;
 }
@@ -63,7 +64,7 @@ static int read_materials(struct scene_build *b, struct text *t, uint32_t first,
         struct text_span word = text_word(t);
         if (text_is(word, "newmtl")) material = text_rest(t);
         if (text_is(word, "Kd") && read_colour(t, rgb)) set_colour(b->scene, first, material, rgb);
-        if (text_is(word, "map_Kd") && b->spec->textures) rc = set_texture(b, first, material, text_rest(t), err);
+        if (text_is(word, "map_Kd") && build_wants_textures(b)) rc = set_texture(b, first, material, text_rest(t), err);
     }
     return rc;
 }

@@ -70,6 +70,9 @@ static const struct cfg_key config_keys[] = {
      WORDS([CHOICE_AUTO] = "auto", [CHOICE_OFF] = "off", [CHOICE_ON] = "on"),
      .help = "Orders surfaces that overlap or cross in double. It costs loading time, and speed where surfaces "
              "overlap. auto: on where float's resolution in the scene is coarser than plan.tolerance_m."},
+    {KEY(scene.cutouts), CFG_BOOL, .def = "on",
+     .help = "Rays pass where a texture's alpha or opacity map is below a half, as between leaves. Textures are then "
+             "read when the scene is loaded; without such a texture it costs nothing more."},
     {"scene.meshes", .type = CFG_LIST, .min = 1, .max = CONFIG_MAX_MESHES, LIST_OF(scene.mesh, scene.n_meshes),
      .help = "Mesh files; together they are the scene."},
     {"scene.meshes[]", .type = CFG_MAP, .help = "A mesh file."},
