@@ -108,6 +108,16 @@ static int has_transparent_colour(const uint8_t *bytes, size_t n)
     return bytes[0] == 0x89 && memmem(bytes, data != NULL ? (size_t)(data - bytes) : n, "tRNS", 4) != NULL;
 }
 
+/* stb_image fills in what a TGA or BMP lacks, in silence. Both say the bits of a texel; packed ones are as long as
+ * they are. */
+static int is_cut_off(const uint8_t *bytes, size_t n, uint64_t texels)
+{
+    if (n < 31 || bytes[0] == 0x89 || (bytes[0] == 0xff && bytes[1] == 0xd8)) return 0;
+    const int is_bmp = bytes[0] == 'B' && bytes[1] == 'M', is_packed = is_bmp ? bytes[30] == 1 : bytes[2] > 3;
+    const uint64_t first = is_bmp ? bytes[10] + 256U * bytes[11] : 18U + bytes[0]; /* byte of the texels */
+    return !is_packed && first + texels * bytes[is_bmp ? 28 : 16] / 8 > n;
+}
+
 static int decode(const struct texture_source *source, const uint8_t *bytes, size_t n_bytes,
                   struct texture_image *image, struct sh_err *err)
 {
@@ -122,6 +132,7 @@ static int decode(const struct texture_source *source, const uint8_t *bytes, siz
         return fail_read(file, stbi_failure_reason(), err);
     int rc = check_size(file, (uint32_t)width, (uint32_t)height, err);
     if (rc != SH_OK) return rc;
+    if (is_cut_off(bytes, n_bytes, (uint64_t)width * (uint64_t)height)) return fail_read(file, "it is cut off", err);
     image->width = (uint32_t)width;
     image->height = (uint32_t)height;
     image->has_alpha = channels == 2 || channels == 4 || has_transparent_colour(bytes, n_bytes);
