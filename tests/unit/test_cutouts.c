@@ -8,7 +8,7 @@
 #include "core/cast.h"
 #include "tests/common/cases.h"
 
-enum { SQUARES = 8, TEXELS = 4, RAYS = 20000, LAYERS = 60 };
+enum { SQUARES = 8, TEXELS = 4, RAYS = 20000, LAYERS = 40 };
 
 /* Square 0, 0 is the lower left one; it is a hole. */
 static int is_solid(int column, int row)
@@ -230,9 +230,10 @@ static void a_stack_of_any_number_is_seen_through(void **state)
     }
     struct scene *scene = end_obj(0, 1);
     aim(0.19, 0.1);
+    rays.n = RAYS / 4;
     cast_all(scene, 0.2, 0, 1); /* float does not order surfaces that are so near */
     uint32_t on_wall = 0;
-    assert_true(compare(truth, LAYERS + 1) > RAYS / 3);
+    assert_true(compare(truth, LAYERS + 1) > rays.n / 3);
     for (uint32_t i = 0; i < rays.n; i++)
         on_wall +=
             rays.label[i] == 1 && fabs(rays.px[i] + 10 * rays.x[i]) < 1.8 && fabs(rays.pz[i] + 10 * rays.z[i]) < 1.8;
