@@ -29,6 +29,14 @@ enum {
     SCENE_MAX_SURFACES = 65534, /* labels are 16 bits on the wire; 0xffff means "none" */
 };
 
+/* What reading one file by Assimp may take. */
+struct scene_import_limits {
+    uint32_t memory_mib; /* on top of what the program has; the scene on its way back likewise */
+    double time_s;       /* by the clock on the wall; of processor time likewise */
+    uint32_t files;      /* open at a time */
+};
+extern const struct scene_import_limits scene_import_defaults;
+
 struct scene_mesh_spec {
     const char *file; /* ending chooses the reader: .obj .ply in double; .stl .gltf .glb .fbx .dae .ifc by Assimp */
     enum scene_up up;
@@ -36,6 +44,7 @@ struct scene_mesh_spec {
     double offset_m[3]; /* added after axes and scale */
     int textures;       /* keep texture coordinates, and the names of textures: of .obj, and of what Assimp reads */
     int cutouts;        /* look for holes in textures; without `textures` only what has holes is kept */
+    const struct scene_import_limits *limits; /* NULL: the defaults */
 };
 
 /* One surface label: an object of the file with one material.
@@ -85,6 +94,7 @@ struct scene {
     struct texture_mask **mask; /* [n_masks] */
     uint32_t n_masks;
     uint32_t label0;           /* what a user has added to all labels: label[i] - label0 is an index into surface */
+    double error_m;            /* of the vertices, by rounding to single precision; 0: none */
     double min_m[3], max_m[3]; /* bounds of the used vertices, prcs */
     struct scene_counts counts;
 };
@@ -92,9 +102,14 @@ struct scene {
 /* Loads all meshes into one scene.
  * tolerance_m: the largest error of a vertex that is allowed. A file read in single precision (all
  *   but .obj and .ply) is refused, with the figure, where its largest |coordinate| * scale * 6e-8 exceeds it.
+ *   An error above 1e-6 m is warned of, also that of a binary .ply with float coordinates.
  * Errors (SH_EINPUT, naming the file): missing or unreadable, not a mesh, no triangles, a coordinate that is
  *   not finite, an index out of range, |coordinate| beyond 1e9 m, too many surfaces or triangles (2^32-1).
- * Progress goes to report about four times a second once a load takes longer than a second. */
+ * Progress goes to report about four times a second once a load takes longer than a second. SH_ESTOPPED where
+ *   report asks to stop.
+ * Assimp reads in a process of its own, forked here: it crashes, hangs or takes all memory on some broken
+ *   files. Its death and its limits are SH_EINPUT, too. No zombie stays, and it does not outlive the thread
+ *   that calls. */
 int scene_load(const struct scene_mesh_spec *specs, size_t n_specs, double tolerance_m, const struct sh_report *report,
                struct scene **out, struct sh_err *err);
 

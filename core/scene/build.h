@@ -8,6 +8,7 @@
 #include "core/text.h"
 
 enum { SCENE_MAX_CORNERS = 65536 }; /* of one polygon: ear clipping is quadratic */
+#define BUILD_MAX_COORDINATE_M 1e9
 
 struct scene_build {
     struct scene *scene;
@@ -56,6 +57,10 @@ int build_corners(struct scene_build *b, size_t n, struct sh_err *err);
 /* Adds the polygon of the n >= 3 corners in corner. */
 int build_polygon(struct scene_build *b, size_t n, uint16_t label, struct sh_err *err);
 
+/* The file's coordinates, up to `largest` in its units, have been rounded to single precision: keeps the error
+ * of that, warns of more than a micrometre, and fails where it is more than allowed, if `refuse`. */
+int build_single(struct scene_build *b, double largest, bool refuse, struct sh_err *err);
+
 /* The label of a pair of names; a new pair gets the next number. */
 int build_label(struct scene_build *b, struct text_span object, struct text_span material, uint16_t *label,
                 struct sh_err *err);
@@ -76,9 +81,9 @@ static inline bool build_wants_textures(const struct scene_build *b)
     return b->spec->textures || b->spec->cutouts;
 }
 
-/* Reports "reading FILE" about four times a second, once the load takes longer than a second. build: a struct
- * scene_build. */
-void build_progress(void *build, double fraction);
+/* Reports "reading FILE" about four times a second, once the load takes longer than a second, and heeds the
+ * stop: SH_ESTOPPED. build: a struct scene_build. */
+int build_progress(void *build, double fraction, struct sh_err *err);
 
 /* Reports "reading FILE" with an unknown fraction, at once. */
 void build_announce(struct scene_build *b);
@@ -98,6 +103,6 @@ int read_obj(struct scene_build *b, struct sh_err *err);
  * often come without it: then they have none, and whoever needs colours says so. */
 int read_mtl(struct scene_build *b, struct text_span name, uint32_t first_surface, struct sh_err *err);
 int read_ply(struct scene_build *b, struct sh_err *err);
-int import_assimp(struct scene_build *b, struct sh_err *err);
+int import_apart(struct scene_build *b, struct sh_err *err); /* core/scene/import.h */
 
 #endif

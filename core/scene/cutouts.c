@@ -112,7 +112,8 @@ int scene_find_cutouts(struct scene *s, const struct sh_report *report, struct s
         struct scene_texture *texture = &s->texture[number - 1];
         const int how = cuts_how(s, number);
         if (how == 0) continue;
-        rc = scene_read_texture(texture, how == 1, &image, &why);
+        rc = sh_check_stop(report, &why);
+        if (rc == SH_OK) rc = scene_read_texture(texture, how == 1, &image, &why);
         if (rc == SH_OK) rc = cut_out(s, number, &image, &why);
         texture_image_free(&image);
         if (rc != SH_EINPUT) continue;

@@ -18,8 +18,16 @@ struct record {
     int crs_given, quiet;
     long station; /* 0: as the head is set; APP_WORD: all */
     double wait_s;
+    int interrupted; /* before the files were completed, which an interrupted recording does, too */
     struct recording_options recording;
 };
+
+/* A signal while files are completed. */
+static int gives_up(void *ctx)
+{
+    const struct record *r = ctx;
+    return app_interrupted() && !r->interrupted;
+}
 
 static int write_frame(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
 {
@@ -44,7 +52,7 @@ static void print_note(void *ctx, const char *text)
     fprintf(stderr, "scanhead: %s\n", text);
 }
 
-static const struct sh_report NOTES = {NULL, print_note, NULL};
+static const struct sh_report NOTES = {.warn = print_note};
 
 /* Follows the scans. Files are closed and statistics written also after some failures; the first failure is
  * returned. */
@@ -52,9 +60,11 @@ static int follow(struct record *r, struct scanhead *sh, struct recording_result
 {
     struct sh_err why = {0};
     int rc = recording_run(sh, &r->recording, result, err);
-    const int has_figures = rc == SH_OK || rc == SH_ELOST; /* LOST: an unplugged head has cut the recording */
+    const int has_figures = rc == SH_OK || rc == SH_ELOST || rc == SH_ERESET; /* the bus has cut the recording */
     const int keep = result->points != 0 || (rc == SH_OK && result->missing[0] == '\0');
+    r->interrupted = app_interrupted();
     int after = record_files_close(&r->files, keep, &why);
+    if (rc != SH_OK && after != SH_OK) sh_warn(&app_report_stderr, "%s", why.text);
     if (rc == SH_OK && after != SH_OK) rc = sh_fail(err, after, "%s", why.text);
     if (!has_figures || r->stats == NULL) return rc;
     after = app_write_json(r->stats, recording_put, result, &why);
@@ -65,6 +75,8 @@ static int record(struct record *r, struct scanhead *sh, struct sh_err *err)
 {
     struct recording_result result = {0};
     if (r->stats != NULL) scanhead_hash_start(sh);
+    r->files.recorder.stop = gives_up;
+    r->files.recorder.stop_ctx = r;
     int rc = record_files_open(&r->files, err);
     if (rc != SH_OK) {
         record_files_close(&r->files, 0, NULL);

@@ -108,9 +108,9 @@ static int is_interrupted(struct recording *r)
     return r->interrupted;
 }
 
-/* The head was unplugged: waits for it. Where it scans no more when it is back, the scan ended meanwhile.
+/* The head was unplugged, or its bus reset: waits for it. Where it scans no more when it is back, the scan ended meanwhile.
  * Where it still scans, the rest of the scan will come. */
-static int replug(struct recording *r, struct sh_err *err)
+static int replug(struct recording *r, int reset, struct sh_err *err)
 {
     const int64_t end_ns = clock_now_ns() + (int64_t)(1e9 * r->o->replug_s);
     int rc, scanning = 0;
@@ -122,7 +122,7 @@ static int replug(struct recording *r, struct sh_err *err)
     if (rc != SCANHEAD_OK) return sh_fail(err, SH_ELOST, "the head did not come back: %s", scanhead_error(r->sh));
     scanning = strncmp(r->reply, "s", 1) == 0; /* spin-up, scanning, spin-down */
     sh_warn(r->o->report, "the head is back");
-    r->result->replugs++;
+    *(reset ? &r->result->bus_resets : &r->result->replugs) += 1;
     r->result->broken_scans += (uint64_t)(r->within_scan && !r->broken);
     r->broken = r->within_scan && scanning;
     if (r->within_scan && !scanning) r->scan_over = 1;
@@ -137,7 +137,8 @@ static int step(struct recording *r, int timeout_ms, struct sh_err *err)
     int rc = scanhead_next(r->sh, &frame, timeout_ms);
     report(r);
     if (rc == SCANHEAD_ETIMEOUT) return 0;
-    if ((rc == SCANHEAD_ELOST || rc == SCANHEAD_ECLOSED) && r->o->replug_s > 0.0) return replug(r, err);
+    if ((rc == SCANHEAD_ELOST || rc == SCANHEAD_ERESET || rc == SCANHEAD_ECLOSED) && r->o->replug_s > 0.0)
+        return replug(r, rc == SCANHEAD_ERESET, err);
     if (rc != SCANHEAD_OK) return sh_fail(err, rc, "%s", scanhead_error(r->sh));
     look_at(r, &frame);
     if (frame.type == SCANHEAD_POINTS) {

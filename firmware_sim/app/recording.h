@@ -35,6 +35,7 @@ struct recording_result {
     struct scanhead_stats stream;   /* as the client counts */
     char sha256[65];                /* of the stream, where scanhead_hash_start was called */
     uint64_t replugs, broken_scans; /* how often the head was away and came back; scans in which it was away */
+    uint64_t bus_resets;            /* how often its USB bus was reset, which ended the session */
 };
 
 /* SH_OK, or the first failure. result is filled in both cases. */

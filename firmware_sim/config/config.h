@@ -187,6 +187,7 @@ struct config_scene {
     double tolerance_m;
     enum config_choice order_exactly; /* surfaces that overlap are ordered in double */
     int cutouts;                      /* rays pass where a texture's alpha is below a half */
+    struct scene_import_limits import;
     struct config_anchor anchor;
 };
 

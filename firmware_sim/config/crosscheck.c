@@ -120,6 +120,8 @@ static int check_output(const struct cfg_reader *rd, struct config *cfg)
 {
     cfg->output.layout_given = cfg_is_given(rd, "output.layout", 0);
     if (!cfg_is_given(rd, "output.tolerance_m", 0)) cfg->output.tolerance_m = fmax(1e-7, 1e-3 * cfg->plan.range_m);
+    if (!cfg_is_given(rd, "scene.tolerance_m", 0))
+        cfg->scene.tolerance_m = cfg_is_given(rd, "plan.tolerance_m", 0) ? 0.1 * cfg->plan.range_m : 1.0;
     cfg->optics.depth_given = cfg_is_given(rd, "optics.depth", 0);
     if (cfg->output.utm_zone != 0 && cfg->output.crs != GEOREF_UTM)
         return cfg_fail_key(rd, "output.utm_zone", 0, "a zone, but output.crs is not utm; allowed only with crs: utm");
@@ -180,7 +182,10 @@ static int check_usb_link(const struct cfg_reader *rd, const struct config *cfg,
     if (link->backend == USB_BACKEND_USBREDIR && link->attach && link->path[0] == '\0' && link->port == 0)
         return cfg_fail_key(rd, "links[].port", i, "0, and the head is to connect to it; allowed 1 to 65535");
     if (link->backend == USB_BACKEND_USBIP && !has_port) link->port = USB_BACKEND_USBIP_PORT;
-    if (link->serial[0] == '\0') snprintf(link->serial, sizeof link->serial, "%s", cfg->head.serial);
+    if (link->serial[0] == '\0') {
+        snprintf(link->serial, sizeof link->serial, "%s", cfg->head.serial);
+        link->own_serial = !cfg_is_given(rd, "head.serial", 0);
+    }
     return SH_OK;
 }
 
