@@ -50,7 +50,7 @@ static const struct cfg_key config_keys[] = {
      WITHIN("pan_min_deg", "pan_max_deg"), .help = "Pan angle where a frame starts."},
     {"head.pan_stop_deg", SETTING(pan_stop_udeg), CFG_MICRO, "deg", "@pan_max_deg",
      WITHIN("pan_min_deg", "pan_max_deg"), .help = "Pan angle where a frame ends; at most a turn after its start."},
-    {"head.frames", SETTING(frames), CFG_COUNT, NULL, "1", 0, 1000000,
+    {"head.frames", SETTING(frames), CFG_COUNT, NULL, "1", 0, HEAD_MAX_FRAMES,
      .help = "Frames (pan sweeps) per scan; 0: until stopped."},
     {"head.station", SETTING(station), CFG_COUNT, NULL, "1", 1, CONFIG_MAX_STOPS,
      .help = "Station where the head stands, counted from 1."},
