@@ -133,7 +133,7 @@ static void cast_all(const struct scene *scene, double reach_m, uint32_t packet,
     struct caster *caster;
     struct sh_err err;
     if (bvh_create(scene, origin_m, 2.0 * reach_m, 1, NULL, &bvh, &err) != SH_OK ||
-        caster_create(&caster, &err) != SH_OK || (exactly && bvh_order_exactly(bvh, &err) != SH_OK))
+        caster_create(&caster, &err) != SH_OK || (exactly && bvh_order_exactly(bvh, NULL, &err) != SH_OK))
         fail_msg("%s", err.text);
     if (packet != 0) bvh_set_packet(bvh, packet);
     for (uint32_t at = 0; at < rays.n; at += BVH_CHUNK) {
