@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 static int compare_surfaces(const void *a, const void *b)
 {
@@ -53,7 +54,7 @@ int build_label(struct scene_build *b, struct text_span object, struct text_span
 }
 
 /* A name in a mesh's file is that of a file in the same folder; other systems write \. */
-static char *beside(const struct scene_build *b, struct text_span name)
+static char *in_folder(const struct scene_build *b, struct text_span name)
 {
     const char *slash = strrchr(b->spec->file, '/');
     size_t folder = name.p[0] != '/' && slash != NULL ? (size_t)(slash - b->spec->file) + 1 : 0;
@@ -66,6 +67,26 @@ static char *beside(const struct scene_build *b, struct text_span name)
     return path;
 }
 
+/* Many meshes name the place where an image once was, on another machine. Where there is none, but a file of that
+ * name lies beside the mesh, it is that one. */
+static char *beside(const struct scene_build *b, const struct build_image *image)
+{
+    const struct text_span name = image->name;
+    char *path = in_folder(b, name), *near;
+    size_t last = name.n;
+    if (path == NULL || image->bytes != NULL || access(path, F_OK) == 0) return path;
+    while (last > 0 && name.p[last - 1] != '/' && name.p[last - 1] != '\\')
+        last--;
+    if (last == 0 || last == name.n) return path;
+    near = in_folder(b, (struct text_span){name.p + last, name.n - last});
+    if (near == NULL || access(near, F_OK) != 0) {
+        free(near);
+        return path;
+    }
+    free(path);
+    return near;
+}
+
 static bool is_same(const struct scene_texture *t, const char *file, const struct build_image *image)
 {
     return strcmp(t->file, file) == 0 && memcmp(t->wrap, image->wrap, sizeof t->wrap) == 0;
@@ -74,7 +95,7 @@ static bool is_same(const struct scene_texture *t, const char *file, const struc
 int build_texture(struct scene_build *b, const struct build_image *image, uint16_t *number, struct sh_err *err)
 {
     struct scene *s = b->scene;
-    char *file = beside(b, image->name);
+    char *file = beside(b, image);
     for (uint32_t i = 0; file != NULL && i < s->n_textures; i++)
         if (is_same(&s->texture[i], file, image)) {
             free(file);

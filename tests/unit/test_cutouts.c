@@ -42,7 +42,8 @@ static void write_board(const char *name, int cut)
 
 static const char MATERIALS[] = "newmtl board\nmap_Kd board.png\nnewmtl full\nmap_Kd full.png\nnewmtl wall\n"
                                 "newmtl clamped\nmap_Kd -clamp on board.png\nnewmtl mapped\nmap_Kd full.png\n"
-                                "map_d board.png\nnewmtl gone\nmap_Kd none.png\n";
+                                "map_d board.png\nnewmtl gone\nmap_Kd none.png\nnewmtl moved\n"
+                                "map_Kd C:\\users\\me\\board.png\n";
 
 static int make_files(void **state)
 {
@@ -337,6 +338,19 @@ static void wrap_modes_and_opacity_maps_of_obj_count(void **state)
     scene_free(scene);
 }
 
+/* Where it was on the machine that the mesh is from. */
+static void an_image_beside_the_mesh_is_found(void **state)
+{
+    (void)state;
+    begin_obj();
+    quad("moved", 10, 2, 0);
+    struct scene *scene = end_obj(1, 1);
+    assert_int_equal(n_warnings, 0);
+    assert_string_equal(scene->texture[0].file, file_of("board.png"));
+    assert_non_null(scene->cutout);
+    scene_free(scene);
+}
+
 static void a_scene_without_holes_has_nothing_of_it(void **state)
 {
     (void)state;
@@ -383,6 +397,7 @@ int main(void)
                                        cmocka_unit_test(what_lies_in_the_same_plane_stops_the_ray),
                                        cmocka_unit_test(nothing_is_lost_behind_a_card_above_the_floor),
                                        cmocka_unit_test(wrap_modes_and_opacity_maps_of_obj_count),
+                                       cmocka_unit_test(an_image_beside_the_mesh_is_found),
                                        cmocka_unit_test(a_scene_without_holes_has_nothing_of_it),
                                        cmocka_unit_test(the_floor_is_looked_for_through_holes)};
     return cmocka_run_group_tests(tests, make_files, remove_files);
