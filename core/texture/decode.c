@@ -118,6 +118,26 @@ static int is_cut_off(const uint8_t *bytes, size_t n, uint64_t texels)
     return !is_packed && first + texels * bytes[is_bmp ? 28 : 16] / 8 > n;
 }
 
+/* A table of a JPEG's Huffman codes that says more than 256 of them: stb_image 2.27 writes them all, past the end of
+ * its array. Every place that looks like such a table is asked, since a decoder may get to any of them. */
+static int has_long_table(const uint8_t *bytes, size_t n)
+{
+    const uint8_t *end = bytes + n, *marker = bytes;
+    if (bytes[0] != 0xff || bytes[1] != 0xd8) return 0;
+    while ((marker = memmem(marker, (size_t)(end - marker), "\xff\xc4", 2)) != NULL) {
+        const uint8_t *table = marker + 4; /* after the segment's length */
+        for (ptrdiff_t codes = 0; end - table > 1 && table[0] >> 4 <= 1 && (table[0] & 15) <= 3; table += 17 + codes) {
+            codes = 0;
+            for (int i = 1; i <= 16 && i < end - table; i++) /* beyond the end it reads zeros */
+                codes += table[i];
+            if (codes > 256) return 1;
+            if (end - table <= 17 + codes) break;
+        }
+        marker += 2;
+    }
+    return 0;
+}
+
 static int decode(const struct texture_source *source, const uint8_t *bytes, size_t n_bytes,
                   struct texture_image *image, struct sh_err *err)
 {
@@ -127,6 +147,7 @@ static int decode(const struct texture_source *source, const uint8_t *bytes, siz
     if (n_bytes > TEXTURE_MAX_FILE)
         return sh_fail(err, SH_EINPUT, "%s: an image of %zu bytes; allowed are up to %d", file, n_bytes,
                        TEXTURE_MAX_FILE);
+    if (n_bytes > 1 && has_long_table(bytes, n_bytes)) return fail_read(file, "a table of more than 256 codes", err);
     memory_left = TEXTURE_MAX_MEMORY;
     if (!stbi_info_from_memory(bytes, (int)n_bytes, &width, &height, &channels))
         return fail_read(file, stbi_failure_reason(), err);

@@ -284,6 +284,12 @@ static void hostile_files_take_no_gigabytes(void **state)
     fails(write_file("cut.png", JPEG, 40), "no image that can be read");
     fails(write_file("cut.tga", tga, write_tga(tga, 4, 1) - 1), "it is cut off");
     fails(write_file("cut.bmp", tga, write_bmp(tga, 3) - 60), "it is cut off");
+    memcpy(tga, JPEG, sizeof JPEG);
+    uint8_t *table = memmem(tga, sizeof JPEG, "\xff\xc4", 2);
+    assert_non_null(table);
+    memset(table + 5, 0xff, 16); /* 16 times 255 codes: the decoder's array has 257 entries */
+    fails(write_file("table.jpg", tga, sizeof JPEG), "a table of more than 256 codes");
+    fails(write_file("end.jpg", tga, (size_t)(table + 9 - tga)), "a table of more than 256 codes");
     snprintf(path, sizeof path, "%s/none.png", folder);
     fails(path, "No such file");
     snprintf(path, sizeof path, "%s/pipe.png", folder);
