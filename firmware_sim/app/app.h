@@ -14,7 +14,7 @@
 #include "firmware_sim/config/config.h"
 
 /* main.c lists them. */
-extern const struct app_command app_run, app_record, app_plan, app_map, app_report, app_check, app_list;
+extern const struct app_command app_run, app_record, app_plan, app_map, app_report, app_check, app_list, app_init;
 
 /* Prints "scanhead: TEXT" and gives the exit status for the error. */
 int app_fail(const struct sh_err *err);
