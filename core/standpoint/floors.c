@@ -50,7 +50,7 @@ static void take_layer(struct survey *s, struct column *column, struct floors *f
         struct column *c = &column[i];
         if (isnan(s->rays.range_m[i])) continue;
         const double z_m = c->top_m - s->rays.range_m[i], cosine = survey_cosine(s, i);
-        floors->covered += isinf(c->last_m);
+        if (isinf(c->last_m)) floors->covered++;
         if (fabs(cosine) >= LEVEL && c->last_m - z_m >= LEAST_ROOM_M)
             floors->floor[floors->n++] = (struct floor){.at_m = {s->rays.from_x[i], s->rays.from_y[i], z_m},
                                                         .room_m = c->last_m - z_m,
