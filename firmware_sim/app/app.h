@@ -34,6 +34,9 @@ void app_catch_signals(void);
 /* Prints a warning for each kind of echoes that the head left out of the stream. */
 void app_warn_left_out(uint64_t crowded, uint64_t unfit);
 
+/* Prints a warning where fewer than one pulse in twenty has an echo. */
+void app_warn_empty(uint64_t pulses, uint64_t with_echo, uint64_t faint);
+
 /* One JSON value, written by `put`, to a file; path "-" is standard output. */
 int app_write_json(const char *path, void (*put)(struct json *json, const void *ctx), const void *ctx,
                    struct sh_err *err);
