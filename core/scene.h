@@ -28,12 +28,21 @@ enum {
     SCENE_MAX_SURFACES = 65534, /* labels are 16 bits on the wire; 0xffff means "none" */
 };
 
+/* What reading one file by Assimp may take. */
+struct scene_import_limits {
+    uint32_t memory_mib; /* on top of what the program has; the scene on its way back likewise */
+    double time_s;       /* by the clock on the wall; of processor time likewise */
+    uint32_t files;      /* open at a time */
+};
+extern const struct scene_import_limits scene_import_defaults;
+
 struct scene_mesh_spec {
     const char *file; /* ending chooses the reader: .obj .ply in double; .stl .gltf .glb .fbx .dae .ifc by Assimp */
     enum scene_up up;
     double scale;       /* metres per unit of the file, > 0 */
     double offset_m[3]; /* added after axes and scale */
     int textures;       /* keep texture coordinates, and the names of textures: of .obj, and of what Assimp reads */
+    const struct scene_import_limits *limits; /* NULL: the defaults */
 };
 
 /* One surface label: an object of the file with one material.
@@ -88,7 +97,11 @@ struct scene {
  *   but .obj and .ply) is refused, with the figure, where its largest |coordinate| * scale * 6e-8 exceeds it.
  * Errors (SH_EINPUT, naming the file): missing or unreadable, not a mesh, no triangles, a coordinate that is
  *   not finite, an index out of range, |coordinate| beyond 1e9 m, too many surfaces or triangles (2^32-1).
- * Progress goes to report about four times a second once a load takes longer than a second. */
+ * Progress goes to report about four times a second once a load takes longer than a second. SH_ESTOPPED where
+ *   report asks to stop.
+ * Assimp reads in a process of its own, forked here: it crashes, hangs or takes all memory on some broken
+ *   files. Its death and its limits are SH_EINPUT, too. No zombie stays, and it does not outlive the thread
+ *   that calls. */
 int scene_load(const struct scene_mesh_spec *specs, size_t n_specs, double tolerance_m, const struct sh_report *report,
                struct scene **out, struct sh_err *err);
 

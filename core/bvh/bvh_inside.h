@@ -121,11 +121,13 @@ double bvh_corners(const struct bvh *bvh, uint32_t prim, double v[3][3]);
 double bvh_width_m(const struct bvh *bvh, uint32_t prim);
 
 /* Fills the float buffers of a geometry with widened triangles, and bvh->triangle. */
-int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err);
+int bvh_fill(struct bvh *bvh, RTCGeometry geometry, const struct sh_report *report, struct sh_err *err);
+/* Builds the BVH of a scene of Embree's, unless report asks to stop. */
+int bvh_commit(struct bvh *bvh, RTCScene scene, const struct sh_report *report, struct sh_err *err);
 
 /* twins.c: of faces with the same three corners, however they are written, only the first stays in the float
  * buffer. */
-int bvh_drop_twins(const struct bvh *bvh, float *vertex, struct sh_err *err);
+int bvh_drop_twins(const struct bvh *bvh, float *vertex, const struct sh_report *report, struct sh_err *err);
 
 /* Marks a triangle as having rivals; its plane is made anew to go with that. */
 void bvh_mark_rival(struct bvh *bvh, uint32_t prim);

@@ -17,6 +17,7 @@
 
 struct pairs {
     const struct bvh *bvh;
+    const struct sh_report *report;
     pthread_mutex_t lock;
     uint32_t (*pair)[2];
     size_t n, capacity;
@@ -111,6 +112,7 @@ static void add_pair(struct pairs *p, uint32_t i, uint32_t j)
 static void on_collision(void *user, struct RTCCollision *collision, unsigned n)
 {
     struct pairs *p = user;
+    if (sh_stopped(p->report)) return; /* Embree's collision can't be ended: what is left of it costs little */
     for (unsigned k = 0; k < n; k++) {
         uint32_t i = collision[k].primID0, j = collision[k].primID1;
         if (i == j || !are_rivals(p->bvh, i, j)) continue;
@@ -166,9 +168,9 @@ static int make_lists(struct bvh *bvh, struct pairs *p, struct sh_err *err)
     return SH_OK;
 }
 
-int bvh_order_exactly(struct bvh *bvh, struct sh_err *err)
+int bvh_order_exactly(struct bvh *bvh, const struct sh_report *report, struct sh_err *err)
 {
-    struct pairs p = {.bvh = bvh};
+    struct pairs p = {.bvh = bvh, .report = report};
     pthread_mutex_init(&p.lock, NULL);
     RTCGeometry geometry = rtcNewGeometry(bvh->device, RTC_GEOMETRY_TYPE_USER);
     RTCScene boxes = rtcNewScene(bvh->device);
@@ -178,10 +180,12 @@ int bvh_order_exactly(struct bvh *bvh, struct sh_err *err)
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(boxes, geometry);
     rtcReleaseGeometry(geometry);
-    rtcCommitScene(boxes);
-    rtcCollide(boxes, boxes, on_collision, &p);
+    int rc = bvh_commit(bvh, boxes, report, err);
+    if (rc == SH_OK) rtcCollide(boxes, boxes, on_collision, &p);
     rtcReleaseScene(boxes);
-    int rc = p.failed ? sh_fail(err, SH_ENOMEM, "cast: no memory for pairs of triangles") : make_lists(bvh, &p, err);
+    if (rc == SH_OK) rc = sh_check_stop(report, err);
+    if (rc == SH_OK && p.failed) rc = sh_fail(err, SH_ENOMEM, "cast: no memory for pairs of triangles");
+    if (rc == SH_OK) rc = make_lists(bvh, &p, err);
     free(p.pair);
     pthread_mutex_destroy(&p.lock);
     return rc;

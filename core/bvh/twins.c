@@ -37,7 +37,7 @@ static int same_corners(const double *const a[3], const double *const b[3])
     return 1;
 }
 
-int bvh_drop_twins(const struct bvh *bvh, float *vertex, struct sh_err *err)
+int bvh_drop_twins(const struct bvh *bvh, float *vertex, const struct sh_report *report, struct sh_err *err)
 {
     const struct scene *scene = bvh->scene;
     uint64_t size = 16;
@@ -46,7 +46,9 @@ int bvh_drop_twins(const struct bvh *bvh, float *vertex, struct sh_err *err)
     uint32_t *table = malloc(size * sizeof *table);
     if (table == NULL) return sh_fail(err, SH_ENOMEM, "cast: no memory to compare %u triangles", scene->n_triangles);
     memset(table, 0xff, size * sizeof *table);
-    for (uint32_t prim = 0; prim < scene->n_triangles; prim++) {
+    int rc = SH_OK;
+    for (uint32_t prim = 0; prim < scene->n_triangles && rc == SH_OK; prim++) {
+        if ((prim & 0xffff) == 0) rc = sh_check_stop(report, err);
         const double *corner[3], *other[3];
         sorted_corners(scene, prim, corner);
         uint64_t at = hash_corners(corner) & (size - 1);
@@ -60,5 +62,5 @@ int bvh_drop_twins(const struct bvh *bvh, float *vertex, struct sh_err *err)
         if (table[at] == UINT32_MAX) table[at] = prim;
     }
     free(table);
-    return SH_OK;
+    return rc;
 }

@@ -12,8 +12,6 @@
 #include "core/huge.h"
 #include "core/vec3.h"
 
-static const double MAX_COORDINATE_M = 1e9;
-
 static int64_t now_ns(void)
 {
     struct timespec t;
@@ -101,13 +99,53 @@ int build_end_file(struct scene_build *b, struct sh_err *err)
 }
 
 /* The array as it stays: without the room to grow, and where lookups all over it are quick. */
-static void settle(void **array, size_t n, size_t size)
+static int settle(const struct scene_build *b, void **array, size_t n, size_t size, struct sh_err *err)
 {
-    void *last = huge_alloc(n * size);
-    if (last == NULL) return;
-    memcpy(last, *array, n * size);
+    const size_t step = (size_t)16 << 20;
+    char *last = huge_alloc(n * size);
+    if (last == NULL) return SH_OK;
+    for (size_t at = 0; at < n * size; at += step) {
+        if (sh_check_stop(b->report, err) != SH_OK) {
+            free(last);
+            return SH_ESTOPPED;
+        }
+        memcpy(last + at, (char *)*array + at, n * size - at < step ? n * size - at : step);
+    }
     free(*array);
     *array = last;
+    return SH_OK;
+}
+
+static int settle_all(const struct scene_build *b, struct sh_err *err)
+{
+    struct scene *s = b->scene;
+    int rc = settle(b, (void **)&s->surface, s->n_surfaces, sizeof *s->surface, err);
+    if (rc == SH_OK) rc = settle(b, (void **)&s->vertex_m, s->n_vertices, sizeof *s->vertex_m, err);
+    if (rc == SH_OK) rc = settle(b, (void **)&s->triangle, s->n_triangles, sizeof *s->triangle, err);
+    if (rc == SH_OK) rc = settle(b, (void **)&s->label, s->n_triangles, sizeof *s->label, err);
+    if (rc == SH_OK && s->uv != NULL) rc = settle(b, (void **)&s->uv, s->n_triangles, sizeof *s->uv, err);
+    return rc;
+}
+
+static int find_bounds(const struct scene_build *b, struct sh_err *err)
+{
+    struct scene *s = b->scene;
+    int rc = SH_OK;
+    for (int k = 0; k < 3; k++) {
+        s->min_m[k] = INFINITY;
+        s->max_m[k] = -INFINITY;
+    }
+    for (uint32_t i = 0; i < s->n_triangles && rc == SH_OK; i++) {
+        for (int c = 0; c < 3; c++) {
+            const double *v = s->vertex_m[s->triangle[i][c]];
+            for (int k = 0; k < 3; k++) {
+                if (v[k] < s->min_m[k]) s->min_m[k] = v[k];
+                if (v[k] > s->max_m[k]) s->max_m[k] = v[k];
+            }
+        }
+        if ((i & 0xfffff) == 0) rc = sh_check_stop(b->report, err);
+    }
+    return rc;
 }
 
 int build_finish(struct scene_build *b, struct scene **out, struct sh_err *err)
@@ -116,28 +154,13 @@ int build_finish(struct scene_build *b, struct scene **out, struct sh_err *err)
     if (s->n_triangles == 0) return sh_fail(err, SH_EINPUT, "the scene has no triangles");
     if (b->surface_tree != NULL) tdestroy(b->surface_tree, keep_surface);
     b->surface_tree = NULL;
-    settle((void **)&s->surface, s->n_surfaces, sizeof *s->surface);
-    settle((void **)&s->vertex_m, s->n_vertices, sizeof *s->vertex_m);
-    settle((void **)&s->triangle, s->n_triangles, sizeof *s->triangle);
-    settle((void **)&s->label, s->n_triangles, sizeof *s->label);
     if (s->n_textures == 0) {
         free(s->uv);
         s->uv = NULL;
     }
-    if (s->uv != NULL) settle((void **)&s->uv, s->n_triangles, sizeof *s->uv);
-    for (int k = 0; k < 3; k++) {
-        s->min_m[k] = INFINITY;
-        s->max_m[k] = -INFINITY;
-    }
-    for (uint32_t i = 0; i < s->n_triangles; i++) {
-        for (int c = 0; c < 3; c++) {
-            const double *v = s->vertex_m[s->triangle[i][c]];
-            for (int k = 0; k < 3; k++) {
-                if (v[k] < s->min_m[k]) s->min_m[k] = v[k];
-                if (v[k] > s->max_m[k]) s->max_m[k] = v[k];
-            }
-        }
-    }
+    int rc = settle_all(b, err);
+    if (rc == SH_OK) rc = find_bounds(b, err);
+    if (rc != SH_OK) return rc;
     *out = s;
     b->scene = NULL;
     return SH_OK;
@@ -199,9 +222,9 @@ int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err)
     double *p = s->vertex_m[s->n_vertices];
     for (int k = 0; k < 3; k++) {
         p[k] = turned[k] * spec->scale + spec->offset_m[k];
-        if (!(fabs(p[k]) <= MAX_COORDINATE_M))
+        if (!(fabs(p[k]) <= BUILD_MAX_COORDINATE_M))
             return build_fail(b, SH_EINPUT, err, "vertex %llu is at %g m; allowed are coordinates up to %g m", number,
-                              p[k], MAX_COORDINATE_M);
+                              p[k], BUILD_MAX_COORDINATE_M);
     }
     s->n_vertices++;
     return SH_OK;
@@ -287,11 +310,12 @@ int build_polygon(struct scene_build *b, size_t n, uint16_t label, struct sh_err
     return rc;
 }
 
-void build_progress(void *build, double fraction)
+int build_progress(void *build, double fraction, struct sh_err *err)
 {
     struct scene_build *b = build;
     int64_t now = now_ns();
     if (now - b->start_ns >= 1000000000 && now - b->reported_ns >= 250000000) report(b, fraction);
+    return sh_check_stop(b->report, err);
 }
 
 void build_announce(struct scene_build *b)

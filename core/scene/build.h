@@ -8,6 +8,7 @@
 #include "core/text.h"
 
 enum { SCENE_MAX_CORNERS = 65536 }; /* of one polygon: ear clipping is quadratic */
+#define BUILD_MAX_COORDINATE_M 1e9
 
 struct scene_build {
     struct scene *scene;
@@ -65,9 +66,9 @@ int build_label(struct scene_build *b, struct text_span object, struct text_span
 int build_texture(struct scene_build *b, struct text_span name, const void *bytes, size_t n_bytes, uint16_t *number,
                   struct sh_err *err);
 
-/* Reports "reading FILE" about four times a second, once the load takes longer than a second. build: a struct
- * scene_build. */
-void build_progress(void *build, double fraction);
+/* Reports "reading FILE" about four times a second, once the load takes longer than a second, and heeds the
+ * stop: SH_ESTOPPED. build: a struct scene_build. */
+int build_progress(void *build, double fraction, struct sh_err *err);
 
 /* Reports "reading FILE" with an unknown fraction, at once. */
 void build_announce(struct scene_build *b);
@@ -81,6 +82,6 @@ int read_obj(struct scene_build *b, struct sh_err *err);
  * often come without it: then they have none, and whoever needs colours says so. */
 int read_mtl(struct scene_build *b, struct text_span name, uint32_t first_surface, struct sh_err *err);
 int read_ply(struct scene_build *b, struct sh_err *err);
-int import_assimp(struct scene_build *b, struct sh_err *err);
+int import_apart(struct scene_build *b, struct sh_err *err); /* core/scene/import.h */
 
 #endif

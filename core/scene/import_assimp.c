@@ -4,7 +4,6 @@
  * one level after the other, so that the largest coordinate on the way is known: that is what single
  * precision has rounded. */
 #include <math.h>
-#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,7 +15,7 @@
 #include <assimp/scene.h>
 
 #include "core/scene/ifc_check.h"
-#include "core/scene/build.h"
+#include "core/scene/import.h"
 #include "core/scene/import_says.h"
 
 enum { MAX_DEPTH = 256 };
@@ -194,7 +193,8 @@ static int add_mesh(struct import *im, const struct aiNode *node, const struct a
     if (rc == SH_OK) rc = add_vertices(im, mesh, err);
     for (unsigned i = 0; i < mesh->mNumFaces && rc == SH_OK; i++) {
         rc = add_face(im, &mesh->mFaces[i], mesh, label, err);
-        if ((im->n_done++ & 0xffff) == 0) build_progress(im->b, (double)im->n_done / (double)im->n_faces);
+        if (rc == SH_OK && (im->n_done++ & 0xffff) == 0)
+            rc = build_progress(im->b, (double)im->n_done / (double)im->n_faces, err);
     }
     im->b->scene->n_meshes++;
     im->b->mesh = NULL;
@@ -253,12 +253,9 @@ static int check_ifc(struct scene_build *b, struct sh_err *err)
     return build_fail(b, SH_EINPUT, err, "cut off: it doesn't end with %s", last);
 }
 
-/* The logger and the text of the last error are Assimp's globals, hence the lock. */
 static const struct aiScene *import_file(struct scene_build *b, struct import_log *log, struct sh_err *err)
 {
-    static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
     struct aiLogStream stream = {.callback = keep_log, .user = (char *)(void *)log};
-    pthread_mutex_lock(&lock);
     aiAttachLogStream(&stream);
     struct aiPropertyStore *options = aiCreatePropertyStore();
     aiSetImportPropertyInteger(options, AI_CONFIG_IMPORT_COLLADA_USE_COLLADA_NAMES, 1);      /* not the ids */
@@ -272,7 +269,6 @@ static const struct aiScene *import_file(struct scene_build *b, struct import_lo
         if (in != NULL) aiReleaseImport(in);
         in = NULL;
     }
-    pthread_mutex_unlock(&lock);
     return in;
 }
 

@@ -210,9 +210,9 @@ static int read_statements(struct obj *o, struct sh_err *err)
         return build_fail(o->b, SH_EINPUT, err, "not a text in UTF-8 or ASCII");
     int rc = SH_OK;
     for (uint64_t i = 0; o->t.p < o->t.end && rc == SH_OK; i++) {
-        rc = read_statement(o, err);
+        if ((i & 0xffff) == 0) rc = build_progress(o->b, (double)(o->t.p - o->t.data) / (double)o->t.size, err);
+        if (rc == SH_OK) rc = read_statement(o, err);
         text_next_line(&o->t);
-        if ((i & 0xffff) == 0) build_progress(o->b, (double)(o->t.p - o->t.data) / (double)o->t.size);
     }
     return rc;
 }

@@ -9,12 +9,14 @@
 
 #include "core/scene/build.h"
 
+const struct scene_import_limits scene_import_defaults = {.memory_mib = 8192, .time_s = 300, .files = 64};
+
 static const struct {
     const char *ending;
     int (*read)(struct scene_build *b, struct sh_err *err);
 } readers[] = {
-    {".obj", read_obj},      {".ply", read_ply},      {".stl", import_assimp}, {".gltf", import_assimp},
-    {".glb", import_assimp}, {".fbx", import_assimp}, {".dae", import_assimp}, {".ifc", import_assimp},
+    {".obj", read_obj},      {".ply", read_ply},      {".stl", import_apart}, {".gltf", import_apart},
+    {".glb", import_apart}, {".fbx", import_apart}, {".dae", import_apart}, {".ifc", import_apart},
 };
 
 static int check_spec(struct scene_build *b, struct sh_err *err)

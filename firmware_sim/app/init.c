@@ -7,28 +7,25 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "core/angle.h"
+#include "core/newfile.h"
 #include "core/text.h"
 #include "firmware_sim/app/app.h"
+#include "firmware_sim/app/init_mesh.h"
 #include "firmware_sim/app/init_text.h"
 #include "firmware_sim/site/site.h"
 
 /* The head for rooms sees up to the ceiling; the other one sees farther. */
 static const char *const ROOM_PROFILE = "leica-rtc360", *const PROFILE = "riegl-vz600i";
 
-/* Larger than this in metres, a mesh without a unit is taken to be in millimetres. */
-static const double LARGEST_M = 2000.0;
-
 struct init_run {
     struct app_input in;
-    const char *mesh, *output, *up; /* up: "y", "z"; NULL: not given */
-    double scale;                   /* 0: not given */
+    struct init_wish wish;
+    const char *output;
     int force;
     char default_output[CONFIG_PATH_LEN], name[128]; /* of the configuration; of the mesh, as shown */
-    char draft[CONFIG_PATH_LEN];                     /* beside it, until it is checked */
     struct init_mesh as;
 };
 
@@ -42,96 +39,6 @@ static int ends_in(const char *text, const char *ending)
 {
     size_t n = strlen(text), m = strlen(ending);
     return n > m && strcasecmp(text + n - m, ending) == 0;
-}
-
-/* ---- unit and axes */
-
-static double largest_size(const struct scene *scene)
-{
-    double size = 0.0;
-    for (int i = 0; i < 3; i++)
-        size = fmax(size, scene->max_m[i] - scene->min_m[i]);
-    return size;
-}
-
-static const char *said_by(const struct init_run *run)
-{
-    return ends_in(run->mesh, ".fbx") ? "as the file says" : "as the format defines it";
-}
-
-static void choose_up(struct init_run *run, const struct scene *scene)
-{
-    const int says = scene->says.up;
-    const char *from = "given by --up";
-    int y_up = says == 2 || says == -2;
-    if (run->up != NULL)
-        y_up = strcmp(run->up, "y") == 0;
-    else if (says == 2 || says == 3)
-        from = said_by(run);
-    else
-        from = says == 0 ? "assumed: the file doesn't say; y is up in many a file" : "assumed";
-    run->as.up = y_up ? SCENE_UP_Y : SCENE_UP_Z;
-    snprintf(run->as.up_from, sizeof run->as.up_from, "%s", from);
-    if (run->up != NULL || says == 2 || says == 3) return;
-    if (says == 0)
-        sh_warn(&app_report_stderr,
-                "%s: which axis points up is not in the file: z is assumed; if the mesh lies on "
-                "its side, --up y",
-                run->name);
-    else
-        sh_warn(&app_report_stderr, "%s: its %s%c axis points up, which no key can say: %c is assumed (--up y, --up z)",
-                run->name, says < 0 ? "-" : "", "xyz"[abs(says) - 1], y_up ? 'y' : 'z');
-}
-
-static void choose_scale(struct init_run *run, const struct scene *scene)
-{
-    struct init_mesh *as = &run->as;
-    const double size = largest_size(scene);
-    as->scale = run->scale;
-    snprintf(as->scale_from, sizeof as->scale_from, "given by --scale");
-    if (run->scale > 0.0) return;
-    if (scene->says.unit_m > 0.0) {
-        as->scale = scene->says.unit_m;
-        snprintf(as->scale_from, sizeof as->scale_from, "%s", said_by(run));
-        return;
-    }
-    as->scale = size > LARGEST_M ? 0.001 : 1.0;
-    snprintf(as->scale_from, sizeof as->scale_from, "assumed: the file doesn't say");
-    sh_warn(&app_report_stderr,
-            "%s: its unit is not in the file: %s is assumed, which makes the mesh %.4g m large; "
-            "--scale sets another one",
-            run->name, as->scale == 1.0 ? "a metre" : "a millimetre", as->scale * size);
-}
-
-/* To metres, z up: what the configuration will do. */
-static void turn(struct scene *scene, const struct init_mesh *as)
-{
-    const int y_up = as->up == SCENE_UP_Y;
-    const double low[3] = {scene->min_m[0], scene->min_m[1], scene->min_m[2]}, *high = scene->max_m;
-    const double min[3] = {low[0], y_up ? -high[2] : low[1], y_up ? low[1] : low[2]};
-    const double max[3] = {high[0], y_up ? -low[2] : high[1], y_up ? high[1] : high[2]};
-    for (uint32_t i = 0; i < scene->n_vertices; i++) {
-        double *v = scene->vertex_m[i], turned[3] = {v[0], y_up ? -v[2] : v[1], y_up ? v[1] : v[2]};
-        for (int k = 0; k < 3; k++)
-            v[k] = turned[k] * as->scale;
-    }
-    for (int k = 0; k < 3; k++) {
-        scene->min_m[k] = min[k] * as->scale;
-        scene->max_m[k] = max[k] * as->scale;
-    }
-}
-
-/* Without tolerance and warnings: both come when the configuration is checked. */
-static int load_mesh(struct init_run *run, struct scene **scene, struct sh_err *err)
-{
-    const struct sh_report progress = {NULL, NULL, app_report_stderr.progress};
-    const struct scene_mesh_spec spec = {.file = run->mesh, .up = SCENE_UP_Z, .scale = 1.0};
-    int rc = scene_load(&spec, 1, INFINITY, &progress, scene, err);
-    if (rc != SH_OK) return rc;
-    choose_up(run, *scene);
-    choose_scale(run, *scene);
-    turn(*scene, &run->as);
-    return SH_OK;
 }
 
 /* ---- place */
@@ -149,11 +56,11 @@ static int find_place(const struct init_run *run, const struct scene *scene, str
         rc = sh_fail(err, SH_EINPUT,
                      "%s: no place was found from where a head that sees %g to %g m meets anything: the mesh is %.3g m "
                      "large; --scale sets metres per unit, now %g",
-                     run->name, profile->range_min_m, profile->range_max_m, largest_size(scene), run->as.scale);
+                     run->name, profile->range_min_m, profile->range_max_m, init_largest_m(scene), run->as.scale);
     if (rc != SH_OK || at->kind != STANDPOINT_INSIDE) return rc;
     struct config_profile room;
     rc = config_load_profile(ROOM_PROFILE, run->output, &room, err);
-    if (rc == SH_OK && largest_size(scene) <= room.range_max_m) *profile = room;
+    if (rc == SH_OK && init_largest_m(scene) <= room.range_max_m) *profile = room;
     return rc;
 }
 
@@ -164,7 +71,8 @@ static int find_path(const struct init_run *run, char path[CONFIG_PATH_LEN], str
 {
     char folder[CONFIG_PATH_LEN], mesh[PATH_MAX], from[PATH_MAX];
     snprintf(folder, sizeof folder, "%s", run->output);
-    if (realpath(run->mesh, mesh) == NULL) return sh_fail(err, SH_EINPUT, "%s: %s", run->mesh, strerror(errno));
+    if (realpath(run->wish.file, mesh) == NULL)
+        return sh_fail(err, SH_EINPUT, "%s: %s", run->wish.file, strerror(errno));
     if (realpath(dirname(folder), from) == NULL) return sh_fail(err, SH_EINPUT, "%s: %s", folder, strerror(errno));
     size_t same = 0, used = 0;
     for (size_t i = 0; mesh[i] == from[i] || (from[i] == '\0' && mesh[i] == '/'); i++) {
@@ -181,28 +89,25 @@ static int find_path(const struct init_run *run, char path[CONFIG_PATH_LEN], str
     return SH_OK;
 }
 
-static int write_draft(struct init_run *run, const struct init_text *text, struct sh_err *err)
+static int write_draft(const char *path, const char *draft, const struct init_text *text, int *fd, struct sh_err *err)
 {
-    snprintf(run->draft, sizeof run->draft, "%s.XXXXXX", run->output);
-    int fd = mkstemp(run->draft);
-    FILE *out = fd >= 0 ? fdopen(fd, "w") : NULL;
-    if (fd < 0) run->draft[0] = '\0';
-    if (out == NULL) return sh_fail(err, SH_EIO, "%s: %s", run->output, strerror(errno));
-    mode_t mask = umask(0);
-    umask(mask);
-    fchmod(fd, 0666 & ~mask);
-    init_write_text(text, out);
-    int failed = ferror(out);
-    failed |= fclose(out) != 0;
-    return failed ? sh_fail(err, SH_EIO, "%s: %s", run->output, strerror(errno)) : SH_OK;
+    int rc = newfile_part(path, draft, fd, err);
+    if (rc != SH_OK) return rc;
+    FILE *out = fdopen(dup(*fd), "w");
+    if (out != NULL) init_write_text(text, out);
+    int failed = out == NULL || ferror(out);
+    if (out != NULL) failed |= fclose(out) != 0;
+    if (failed) rc = sh_fail(err, SH_EIO, "%s: %s", path, strerror(errno));
+    if (rc != SH_OK) newfile_drop(draft, *fd);
+    return rc;
 }
 
 /* The draft as any command would take it. */
-static int check_draft(const struct init_run *run, struct sh_err *err)
+static int check_draft(const struct init_run *run, const char *draft, struct sh_err *err)
 {
     struct config *cfg = calloc(1, sizeof *cfg);
     struct site *site = NULL;
-    int rc = cfg != NULL ? config_load(run->draft, NULL, 0, cfg, err) : sh_fail(err, SH_ENOMEM, "no memory");
+    int rc = cfg != NULL ? config_load(draft, NULL, 0, cfg, err) : sh_fail(err, SH_ENOMEM, "no memory");
     if (rc == SH_OK) {
         snprintf(cfg->file, sizeof cfg->file, "%s", run->output); /* for messages */
         rc = site_load(cfg, &app_report_stderr, &site, err);
@@ -218,15 +123,17 @@ static int refuse_to_overwrite(const struct init_run *run, struct sh_err *err)
                    run->output);
 }
 
-static int put_in_place(struct init_run *run, struct sh_err *err)
+static int write_checked(const struct init_run *run, const struct init_text *text, struct sh_err *err)
 {
-    /* Not every file system knows how not to replace; there the look at the beginning has to do. */
-    int rc = renameat2(AT_FDCWD, run->draft, AT_FDCWD, run->output, run->force ? 0 : RENAME_NOREPLACE);
-    if (rc != 0 && errno == EINVAL) rc = rename(run->draft, run->output);
-    if (rc != 0 && errno == EEXIST) return refuse_to_overwrite(run, err);
-    if (rc != 0) return sh_fail(err, SH_EIO, "%s: %s", run->output, strerror(errno));
-    run->draft[0] = '\0';
-    return SH_OK;
+    char draft[CONFIG_PATH_LEN];
+    int fd;
+    snprintf(draft, sizeof draft, "%s.part", run->output);
+    int rc = write_draft(run->output, draft, text, &fd, err);
+    if (rc != SH_OK) return rc;
+    rc = check_draft(run, draft, err);
+    if (rc == SH_OK) return newfile_keep(run->output, draft, fd, err);
+    newfile_drop(draft, fd);
+    return rc;
 }
 
 static void say_result(const struct init_run *run, const struct scene *s, const struct standpoint *at)
@@ -265,11 +172,8 @@ static int write_config(struct init_run *run, const struct scene *scene, struct 
                              .profile = &profile,
                              .at = &at};
     init_choose_scan(&profile, &at, &text.scan);
-    rc = write_draft(run, &text, err);
-    if (rc == SH_OK) rc = check_draft(run, err);
-    if (rc == SH_OK) rc = put_in_place(run, err);
+    rc = write_checked(run, &text, err);
     if (rc == SH_OK) say_result(run, scene, &at);
-    if (run->draft[0] != '\0') unlink(run->draft);
     return rc;
 }
 
@@ -278,7 +182,7 @@ static int write_config(struct init_run *run, const struct scene *scene, struct 
 /* house.ifc becomes house.yaml, here. */
 static int choose_output(struct init_run *run)
 {
-    const char *base = base_of(run->mesh), *dot = strrchr(base, '.');
+    const char *base = base_of(run->wish.file), *dot = strrchr(base, '.');
     int stem = dot != NULL && dot != base ? (int)(dot - base) : (int)strlen(base);
     snprintf(run->name, sizeof run->name, "%s", base);
     text_keep_line(run->name);
@@ -286,8 +190,8 @@ static int choose_output(struct init_run *run)
         snprintf(run->default_output, sizeof run->default_output, "%.*s.yaml", stem, base);
         run->output = run->default_output;
     }
-    if (strlen(run->output) + 8 > sizeof run->draft)
-        return app_usage(&app_init, "-o: the path is too long; allowed up to %zu bytes", sizeof run->draft - 8);
+    if (strlen(run->output) > CONFIG_PATH_LEN - 8)
+        return app_usage(&app_init, "-o: the path is too long; allowed up to %d bytes", CONFIG_PATH_LEN - 8);
     if (ends_in(run->output, ".yaml") || ends_in(run->output, ".yml")) return APP_GO_ON;
     return app_usage(&app_init, "-o %s: allowed is a name that ends in .yaml or .yml", run->output);
 }
@@ -297,7 +201,7 @@ static int init(struct init_run *run, struct sh_err *err)
     struct scene *scene = NULL;
     if (!run->force && faccessat(AT_FDCWD, run->output, F_OK, AT_SYMLINK_NOFOLLOW) == 0)
         return refuse_to_overwrite(run, err);
-    int rc = load_mesh(run, &scene, err);
+    int rc = init_load_mesh(&run->wish, run->name, &scene, &run->as, err);
     if (rc == SH_OK) rc = write_config(run, scene, err);
     scene_free(scene);
     return rc;
@@ -309,12 +213,13 @@ static int run(int argc, char **argv)
     struct init_run run = {0};
     int status = app_parse(&app_init, argc, argv, &run.in, &run);
     if (status == APP_GO_ON) {
-        run.mesh = run.in.operand[0];
+        run.wish.file = run.in.operand[0];
         status = choose_output(&run);
     }
     if (status != APP_GO_ON) return status;
-    if (run.up != NULL && strcmp(run.up, "y") != 0 && strcmp(run.up, "z") != 0)
-        return app_usage(&app_init, "--up %s: allowed y, z", run.up);
+    if (run.wish.up != NULL && strcmp(run.wish.up, "y") != 0 && strcmp(run.wish.up, "z") != 0)
+        return app_usage(&app_init, "--up %s: allowed y, z", run.wish.up);
+    app_catch_signals();
     return init(&run, &err) == SH_OK ? APP_OK : app_fail(&err);
 }
 
@@ -325,8 +230,8 @@ static const struct app_option OPTIONS[] = {
     {APP_TEXT, "output", "FILE.yaml", .letter = 'o', .at = AT(output),
      .help = "where to write; default: the mesh's name, with .yaml, in the working directory"},
     {APP_FLAG, "force", NULL, .at = AT(force), .help = "replace FILE.yaml where it is there already"},
-    {APP_TEXT, "up", "y|z", .at = AT(up), .help = "the axis that points up, in place of what the file says"},
-    {APP_NUMBER, "scale", "M", .min = 1e-9, .max = 1e9, .at = AT(scale),
+    {APP_TEXT, "up", "y|z", .at = AT(wish.up), .help = "the axis that points up, in place of what the file says"},
+    {APP_NUMBER, "scale", "M", .min = 1e-9, .max = 1e9, .at = AT(wish.scale),
      .help = "metres per unit, in place of what the file says"},
     OPTION_END
 };

@@ -5,16 +5,9 @@
 
 #include <stdio.h>
 
-#include "core/scene.h"
 #include "core/standpoint.h"
+#include "firmware_sim/app/init_mesh.h"
 #include "firmware_sim/config/config.h"
-
-/* How a mesh is read: unit and axes, each with where it is from. */
-struct init_mesh {
-    enum scene_up up;
-    double scale; /* metres per unit */
-    char up_from[64], scale_from[64];
-};
 
 /* A coarse scan of what the station sees. */
 struct init_scan {

@@ -114,7 +114,7 @@ static int draw(struct config *cfg, void *ctx, struct sh_err *err)
                                         .ctx = run,
                                         .interrupted = app_interrupted};
     app_catch_signals();
-    int rc = offline_open(cfg, &app_report_stderr, &offline, err);
+    int rc = offline_open(cfg, 0.0, &app_report_stderr, &offline, err);
     if (rc == SH_OK) options.last_station = offline.site->n_stations;
     if (rc == SH_OK) rc = create_map(run, offline.site, err);
     if (rc == SH_OK) rc = recording_run(offline.sh, &options, &result, err);

@@ -62,27 +62,41 @@ static void wait_for_end(struct loop *loop)
     }
 }
 
+struct run_stats {
+    const struct loop *loop;
+    struct loop_stats stats;
+};
+
+static void put_pulses(struct json *json, const struct device_counters *c)
+{
+    json_uint(json, "pulses", c->pulses);
+    json_uint(json, "fired_pulses", c->fired);
+    json_uint(json, "blind_pulses", c->fired - c->cast);
+    json_uint(json, "cast_pulses", c->cast);
+    json_uint(json, "lost_pulses", c->lost_pulses);
+    json_uint(json, "lost_ticks", c->lost_ticks);
+}
+
 static void put_stats(struct json *json, const void *ctx)
 {
-    const struct loop_stats *s = ctx;
+    const struct run_stats *run = ctx;
+    const struct loop_stats *s = &run->stats;
     const struct device_counters *c = &s->counters;
     struct rusage usage;
     getrusage(RUSAGE_SELF, &usage);
     json_open_object(json, NULL);
-    json_uint(json, "pulses", c->pulses);
-    json_uint(json, "fired_pulses", c->fired);
+    put_pulses(json, c);
     json_uint(json, "echoes", c->echoes);
     json_uint(json, "lines", c->lines);
     json_uint(json, "scans", s->scans);
     json_double(json, "wall_s", s->wall_s);
     json_double(json, "cpu_s", clock_cpu_s());
     json_double(json, "pulses_per_s", s->wall_s > 0.0 ? (double)c->pulses / s->wall_s : 0.0);
-    json_uint(json, "lost_pulses", c->lost_pulses);
-    json_uint(json, "lost_ticks", c->lost_ticks);
     json_uint(json, "crowded_echoes", c->crowded);
     json_uint(json, "faint_hits", c->faint);
     json_uint(json, "unfit_echoes", c->unfit);
     json_uint(json, "reader_lost_frames", c->reader_lost_frames);
+    json_uint(json, "reader_lost_pulses", c->reader_lost_pulses);
     json_uint(json, "late_blocks", c->late_blocks);
     json_uint(json, "late_poses", c->late_poses);
     json_uint(json, "bad_poses", c->bad_poses);
@@ -91,6 +105,7 @@ static void put_stats(struct json *json, const void *ctx)
     json_double(json, "late_max_us", 1e-3 * (double)c->late_max_ns);
     json_int(json, "rss_peak_kib", usage.ru_maxrss);
     json_string(json, "stream_sha256", s->have_hash ? s->sha256 : NULL);
+    loop_put_links(run->loop, json);
     json_close_object(json);
 }
 
@@ -101,23 +116,25 @@ static void warn_of_losses(const struct device_counters *c)
     app_warn_left_out(c->crowded, c->unfit);
     app_warn_empty(c->pulses, c->echoes, c->faint);
     if (c->reader_lost_frames != 0)
-        sh_warn(&app_report_stderr, "readers lost %llu frames", (unsigned long long)c->reader_lost_frames);
+        sh_warn(&app_report_stderr, "readers lost %llu frames with %llu pulses",
+                (unsigned long long)c->reader_lost_frames, (unsigned long long)c->reader_lost_pulses);
 }
 
 static int serve(const struct run_options *o, struct loop *loop, struct device *device, struct sh_err *err)
 {
-    struct loop_stats stats;
+    struct run_stats run = {.loop = loop};
+    struct loop_stats *stats = &run.stats;
     int rc = loop_start(loop, err);
     if (rc == SH_OK) rc = say_ready(loop, o->ready_fd, err);
     if (rc == SH_OK)
         wait_for_end(loop);
     else
         loop_end(loop);
-    loop_join(loop, &stats);
-    if (rc == SH_OK && o->stats != NULL) rc = app_write_json(o->stats, put_stats, &stats, err);
+    loop_join(loop, stats);
+    if (rc == SH_OK && o->stats != NULL) rc = app_write_json(o->stats, put_stats, &run, err);
     if (rc == SH_OK) rc = device_close_journal(device, err);
     if (rc == SH_OK) rc = loop_check_links(loop, err);
-    warn_of_losses(&stats.counters);
+    warn_of_losses(&stats->counters);
     return rc;
 }
 

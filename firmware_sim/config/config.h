@@ -186,6 +186,7 @@ struct config_scene {
     uint32_t n_meshes;
     double tolerance_m;
     enum config_choice order_exactly; /* surfaces that overlap are ordered in double */
+    struct scene_import_limits import;
     struct config_anchor anchor;
 };
 

@@ -180,7 +180,10 @@ static int check_usb_link(const struct cfg_reader *rd, const struct config *cfg,
     if (link->backend == USB_BACKEND_USBREDIR && link->attach && link->path[0] == '\0' && link->port == 0)
         return cfg_fail_key(rd, "links[].port", i, "0, and the head is to connect to it; allowed 1 to 65535");
     if (link->backend == USB_BACKEND_USBIP && !has_port) link->port = USB_BACKEND_USBIP_PORT;
-    if (link->serial[0] == '\0') snprintf(link->serial, sizeof link->serial, "%s", cfg->head.serial);
+    if (link->serial[0] == '\0') {
+        snprintf(link->serial, sizeof link->serial, "%s", cfg->head.serial);
+        link->own_serial = !cfg_is_given(rd, "head.serial", 0);
+    }
     return SH_OK;
 }
 

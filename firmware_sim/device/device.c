@@ -86,6 +86,7 @@ int device_create(const struct site *site, const struct device_options *options,
         device_free(device);
         return rc;
     }
+    device_before_scans(device);
     device_transition(device, HEAD_EV_POWER_ON, 0);
     *out = device;
     return SH_OK;
@@ -107,6 +108,13 @@ void device_free(struct device *device)
     free(device);
 }
 
+static int ends_scan(const struct device_work *work)
+{
+    for (uint32_t i = 0; i < work->n_events; i++)
+        if (work->event[i].code == NATIVE_EV_SCAN_END) return 1;
+    return 0;
+}
+
 int device_claim(struct device *device, struct device_work *work)
 {
     pthread_mutex_lock(&device->lock);
@@ -126,15 +134,16 @@ int device_claim(struct device *device, struct device_work *work)
     device_run_timers(device, tick);
     device_say_overrun(device, tick);
     device_say_pps(device, tick);
-    if (device_is_repeated(device, tick))
-        device_say_time(device, tick); /* who joins now knows it before the first point */
+    const int repeated = device_is_repeated(device, tick);
+    if (repeated) device_say_time(device, tick); /* who joins now knows it before the first point */
     device_take_events(device, work);
     work->n_events_before = work->n_events;
-    if (device->scan.on) device_claim_scan(device, tick, work);
-    if (tick % device->tick_hz == 0) {
-        work->telemetry = 1;
-        device_fill_telemetry(device, tick, &work->telemetry_frame);
-    }
+    if (device->scan.on)
+        device_claim_scan(device, tick, work);
+    else if (repeated)
+        device_describe(device, work);
+    work->telemetry = tick % device->tick_hz == 0;
+    if (work->telemetry || ends_scan(work)) device_fill_telemetry(device, tick, &work->telemetry_frame);
     work->wake = gnss_count(&device->gnss, work->t_ns) != gnss_count(&device->gnss, work->t_ns + device->tick_ns);
     if (device->ending || tick >= device->end_tick) device->over = 1;
     device->next_tick = tick + 1;

@@ -43,7 +43,7 @@ struct device_scan {
     uint64_t tick0;      /* its first */
     uint64_t end_tick;   /* the first one after it, when none is on */
     uint64_t pulse_next; /* next pulse to be claimed */
-    uint64_t lost0;      /* pulses lost before it */
+    uint64_t cast;       /* of the pulses before, those that are cast */
     struct schedule_segment segment;
     uint32_t station; /* from 0 */
     size_t stretch;   /* of a trajectory: the one of the last pulse that is claimed */
@@ -116,8 +116,11 @@ uint64_t device_ticks_of(const struct device *device, double s);
 void device_begin_scan(struct device *device, uint64_t tick);
 /* What the tick has of the scan that is on: descriptor, names, pulses; and the scan's end. */
 void device_claim_scan(struct device *device, uint64_t tick, struct device_work *work);
-/* Descriptor and anchor go out in this tick, for readers that join late or because they were lost. */
+/* Descriptor and anchor go out in this tick, for readers that join late or because they were lost. Between scans
+ * they are those of the last one; before the first, of scan 0 with the settings of power-up. */
 int device_is_repeated(const struct device *device, uint64_t tick);
+void device_before_scans(struct device *device);
+void device_describe(struct device *device, struct device_work *work);
 
 /* overrun.c: an event for what was lost since the last one. */
 void device_say_overrun(struct device *device, uint64_t tick);

@@ -6,8 +6,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "core/grow.h"
+#include "core/newfile.h"
 
 static const char title[] = "# scanhead journal 1";
 
@@ -35,8 +37,18 @@ struct journal *journal_open(const char *path, struct sh_err *err)
         sh_fail(err, SH_ENOMEM, "journal: no memory");
         return NULL;
     }
-    *journal = (struct journal){.path = path, .file = fopen(path, "we")};
-    if (journal->file == NULL) journal->error = errno;
+    struct sh_err why = {0};
+    int fd, rc = newfile_open(path, &fd, &why);
+    if (rc != SH_OK) {
+        sh_fail(err, rc, "journal: %s", why.text);
+        free(journal);
+        return NULL;
+    }
+    *journal = (struct journal){.path = path, .file = fdopen(fd, "w")};
+    if (journal->file == NULL) {
+        journal->error = errno;
+        close(fd);
+    }
     if (put(journal, "%s\n", title) == SH_OK) return journal;
     journal_close(journal, err);
     return NULL;

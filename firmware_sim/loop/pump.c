@@ -55,6 +55,11 @@ void pump_get_place(const struct pump *pump, struct link_place *place)
     pump->ops->endpoint(pump->link, place->endpoint, sizeof place->endpoint);
 }
 
+void pump_get_counts(const struct pump *pump, struct link_counts *counts)
+{
+    *counts = pump->counts;
+}
+
 /* The first link that could not write what it had to makes the run a failure. */
 static void fail_link(struct pump *pump, const char *why)
 {

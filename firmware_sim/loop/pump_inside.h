@@ -31,8 +31,9 @@ struct session {
     int reader;      /* of the stream */
     uint64_t cursor; /* next tick to take */
     struct {
-        int have_seq; /* next_seq is known */
+        int have_seq; /* next_seq is known, and so is: */
         uint32_t next_seq;
+        uint64_t next_pulse; /* pulses delivered before the frame of that number */
         uint64_t frames;
         int lagging; /* the error queue has heard of it */
     } lost;          /* lost_frames.c */
@@ -44,6 +45,7 @@ struct session {
 };
 
 struct pump {
+    struct link_counts counts; /* of all its sessions so far */
     struct links *links;
     struct stream *stream;
     const struct link_ops *ops;
@@ -63,12 +65,14 @@ void session_close(struct pump *pump, struct session *s);
 /* Writes until the link is full (1) or there is nothing left (0). index: of the session on its link. */
 int session_write(struct pump *pump, struct session *s, int index);
 
-/* lost_frames.c: the one place that counts what a reader lost. */
+/* lost_frames.c: the one place that counts what a reader got and what it lost. */
 /* Compares the number of a tick's first frame with the one expected, and counts and announces a gap.
  * `released`: ticks released when the tick was read. */
 void session_check_lost(struct pump *pump, struct session *s, const struct ring_copy *tick, uint64_t released);
-/* Counts n frames or sentences. The error queue gets an entry once per episode. */
-void session_count_lost(struct pump *pump, struct session *s, uint32_t n);
+/* Counts n frames or sentences, and the pulses in them. The error queue gets an entry once per episode. */
+void session_count_lost(struct pump *pump, struct session *s, uint32_t n, uint64_t pulses);
+/* The client went away: what was not written to it it did not get, nor did it lose it. */
+void session_gone(struct pump *pump, struct session *s);
 /* At the end of the run: what the reader did not get is lost. */
 void session_leave(struct pump *pump, struct session *s);
 

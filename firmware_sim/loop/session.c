@@ -33,6 +33,7 @@ void session_close(struct pump *pump, struct session *s)
 {
     if (!s->open) return;
     s->open = 0;
+    session_gone(pump, s);
     stream_set_reader(pump->stream, s->reader, s->cursor, 0);
     if (pump->nmea) return; /* it had nothing to say */
     const struct command_lines *lines = &s->commands.lines;

@@ -22,7 +22,7 @@ static int open_trial(struct trial *trial, struct site *site, const struct sh_re
     if (site->scene->n_triangles > MANY_TRIANGLES) sh_progress(report, "trying methods on the scene", -1.0);
     trial->site = site;
     site_look_open(&trial->look, site);
-    return plan_sample_create(trial->look.place, trial->look.n, &trial->sample, err);
+    return plan_sample_create(trial->look.place, trial->look.n, report, &trial->sample, err);
 }
 
 /* ---- beams */
@@ -48,7 +48,7 @@ static int make_beam(const struct site *site, struct site_station *s, int adapti
     if (!adaptive || s->outlines != NULL) return SH_OK;
     if (site->scene->n_triangles > MANY_TRIANGLES) sh_progress(report, "looking for outlines", -1.0);
     const struct beam_outlines_spec spec = {site->scene, s->at.position_m, &beam->beam, p->range_max_m,
-                                            site->detect.kind};
+                                            site->detect.kind, report};
     int rc = cast_outlines(&spec, s->bvh, &s->outlines, err);
     beam->outlines = s->outlines;
     return rc;
@@ -131,6 +131,7 @@ static int measure_beams(struct trial *trial, const struct beam_choice *choice, 
             if (rc != SH_OK) return rc;
         }
         plan_sample_beam(trial->sample, choice[i].mode, choice[i].rings, &option[i]);
+        rc = sh_check_stop(report, err);
         if (!plan_holds(&option[i], tolerance)) continue;
         *holds = 1;
         cost_ns = option[i].cost_ns;
@@ -178,6 +179,7 @@ static int force_beam(struct site *site, const struct sh_report *report, struct 
         if (rc == SH_OK) rc = make_beams(&trial, cfg->beam.mode == BEAM_ADAPTIVE, report, err);
         if (rc == SH_OK) plan_sample_beam(trial.sample, cfg->beam.mode, cfg->beam.rings, &option);
         plan_sample_free(trial.sample);
+        if (rc == SH_OK) rc = sh_check_stop(report, err);
         if (rc != SH_OK) return rc;
     }
     site->plan.methods.beam = cfg->beam.mode;
@@ -218,6 +220,7 @@ static int choose_optics(struct site *site, const struct sh_report *report, stru
     if (forced < 0 || site->measures) rc = open_trial(&trial, site, report, err);
     int holds = rc == SH_OK && try_depths(&trial, forced, option);
     plan_sample_free(trial.sample);
+    if (rc == SH_OK) rc = sh_check_stop(report, err);
     if (rc != SH_OK) return rc;
     const struct plan_choice ask = {"optics", option, CAST_MAX_DEPTH + 1, forced, "optics.depth", cfg->plan};
     uint32_t depth = site->plan.methods.depth = plan_choose(&ask, &site->plan.optics);

@@ -31,7 +31,7 @@ double site_noise_m(const struct site *site);
 /* Puts the stops in the place of the configuration's only station. That one has been placed: without an
  * anchor it says where on the Earth the scene lies, as an anchor at its position with the scene's y axis to
  * true north would. */
-int site_load_stops(struct site *site, struct sh_err *err);
+int site_load_stops(struct site *site, const struct sh_report *report, struct sh_err *err);
 
 /* Reads the trajectory, and builds the BVHs that its path needs. */
 int site_load_platform(struct site *site, const struct sh_report *report, struct sh_err *err);

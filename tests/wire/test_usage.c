@@ -429,7 +429,7 @@ static void test_system_failures(void **state)
     expect(wire, "statistics in no folder",
            (const char *const[]){"run", config, "--duration", "0.1", "--pace", "fast", "--quiet", "--stats", "/none/x",
                                  NULL},
-           1, (const char *const[]){"/none/x", "No such file", NULL});
+           2, (const char *const[]){"/none/x", "No such file", NULL});
     struct sockaddr_in at = {.sin_family = AF_INET};
     socklen_t len = sizeof at;
     int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);

@@ -1,0 +1,151 @@
+"""What test_python.c asks of the Python client. Its answers are binary rows or plain numbers.
+
+    python_client.py FOLDER_OF_THE_CLIENT numpy|plain WHAT ...
+        dump SOURCE OUT         points, attributes, poses and times, frame by frame, as test_python.c reads them
+        live SOURCE             a session with a running head
+        crs POLAR GEO           the same scan in both layouts: the largest differences in the CRS and in the scene, m
+        count FILE              the parser's counters
+        hostile FILE SEED       frames of FILE with wrong contents and good checksums: nothing but ScanheadError
+"""
+import math
+import random
+import resource
+import struct
+import sys
+
+sys.path.insert(0, sys.argv[1])
+if sys.argv[2] == "plain":
+    sys.modules["numpy"] = None
+import scanhead  # noqa: E402
+
+ROW = struct.Struct("<10dqiii")
+NAN3 = ([math.nan], [math.nan], [math.nan])
+
+
+def rows_of(head, points):
+    plain = [list(c) for c in (points.x, points.y, points.z, points.range_m, points.mirror_rad, points.pan_rad,
+                               points.reflectance_db)]
+    polar = points.layout == scanhead.POLAR
+    scene = [list(c) for c in (head.to_scene(points) if polar else [column * len(points) for column in NAN3])]
+    for row in zip(*plain, *scene, points.t_ns, points.echo, points.echo_count, points.label):
+        yield ROW.pack(*row[:10], *(int(v) for v in row[10:]))
+
+
+def dump(source, out):
+    head = scanhead.open(source)
+    with open(out, "wb") as file:
+        for frame in head.frames():
+            if frame.type == scanhead.POINTS:
+                points = head.points(frame)
+                file.write(struct.pack("<cI", b"P", len(points)))
+                file.writelines(rows_of(head, points))
+                pose = head.pose(frame.fields["t0_ns"] + 1000)
+                gps_ns = head.gps_time_ns(frame.fields["t0_ns"])
+                file.write(struct.pack("<q8di", -1 if gps_ns is None else gps_ns, *(pose.position_m + pose.quat if pose
+                                       else (0,) * 7), pose.frame if pose else 0, pose.flags if pose else -1))
+            elif frame.type == scanhead.ATTRIBUTES:
+                columns = head.attributes(frame)
+                file.write(struct.pack("<cI", b"A", len(columns[0])))
+                file.writelines(struct.pack("<2d", *row) for row in zip(*columns))
+        file.write(struct.pack("<cI", b"E", len(head.surfaces)))
+    print(head.stream_sha256())
+
+
+def live(source):
+    head = scanhead.open(source)
+    try:
+        head.command("HEAD:PRR 1 S")
+    except scanhead.CommandError as error:
+        print(error.number)
+    while head.command("HEAD:STATe?") != "idle":
+        head.next_frame()
+    head.command("SCAN:STARt")
+    pulses = 0
+    for frame in head.frames(timeout_s=30):
+        pulses += frame.fields["n_pulses"] if frame.type == scanhead.POINTS else 0
+        if frame.is_event(scanhead.EV_SCAN_END):
+            break
+    print(pulses, head.parser.seq_lost, head.dropped, head.stream_sha256())
+    try:
+        for _ in range(1000000):
+            head.next_frame(0.0)
+    except scanhead.Timeout:
+        print("timeout")
+
+
+def columns_of(path):
+    head, places = scanhead.open(path), []
+    for frame in head.frames():
+        if frame.type == scanhead.POINTS:
+            points = head.points(frame)
+            places += zip(*head.to_crs(points), *head.to_scene(points))
+    return head.anchor, places
+
+
+def crs(polar, geo):
+    (anchor, ours), (_, truth) = columns_of(polar), columns_of(geo)
+    unit = (1, 1, 1)
+    if anchor["crs"] == scanhead.CRS_GEODETIC:
+        unit = 111320, 111320 * math.cos(math.radians(anchor["lat_deg"])), 1
+    worst, n = [0.0, 0.0], 0
+    for a, b in zip(ours, truth):
+        if math.isnan(a[0]) or math.isnan(b[0]):
+            assert math.isnan(a[0]) and math.isnan(b[0])
+            continue
+        turn = 360 if anchor["crs"] == scanhead.CRS_GEODETIC else math.inf
+        d = [u * (math.remainder(p - q, turn) if k == 1 else p - q) for k, (u, p, q) in enumerate(zip(unit, a, b))]
+        worst[0] = max(worst[0], math.hypot(*d))
+        worst[1] = max(worst[1], math.dist(a[3:], b[3:]))
+        n += 1
+    assert len(ours) == len(truth)
+    print(n, *worst)
+
+
+def count(path):
+    head = scanhead.open(path)
+    frames = sum(1 for _ in head.frames())
+    p = head.parser
+    assert frames == p.frames
+    print(p.bytes, p.frames, p.bad_payload, p.bad_bytes, p.seq_gaps, p.seq_lost)
+
+
+def hostile(path, seed):
+    """A tenth of the payloads get another length, the others up to 8 other bytes; each frame is then made whole."""
+    resource.setrlimit(resource.RLIMIT_AS, (1 << 30, 1 << 30))
+    dice = random.Random(int(seed))
+    frames = [f for f in scanhead.open(path).frames()]
+    edges = [b"\0" * 8, b"\xff" * 8, struct.pack("<d", math.inf), struct.pack("<d", 1e308), struct.pack("<d", 5e-324)]
+    with open(path + ".hostile", "wb") as out:
+        for _ in range(700):
+            frame = dice.choice(frames)
+            payload = bytearray(frame.payload)
+            for _ in range(dice.randrange(9)):
+                at = dice.randrange(len(payload) or 1) & -dice.choice((1, 8))
+                piece = dice.choice(edges + [dice.randbytes(4)])
+                payload[at:at + len(piece)] = piece[:max(0, len(payload) - at)]
+            if dice.randrange(10) == 0:
+                payload = payload[:dice.randrange(len(payload) + 1)]
+            kind = frame.type if dice.randrange(20) else dice.randrange(256)
+            head = struct.pack("<BBBBIIIq", 0xD5, kind, 1, dice.choice((0, 0, 0, 1, 2)), len(payload), dice.randrange(2**32),
+                               scanhead.crc32c(bytes(payload)), dice.choice((0, -2**63, 2**63 - 1, frame.t_ns)))
+            out.write(head + struct.pack("<I", scanhead.crc32c(head)) + payload + dice.choice((b"", b"\xd5", b"ERR\r\n")))
+    head, taken, refused = scanhead.open(path + ".hostile"), 0, 0
+    while True:
+        try:
+            frame = head.next_frame()
+            if frame is None:
+                break
+            taken += 1
+            if frame.type == scanhead.POINTS:
+                points = head.points(frame)
+                head.to_scene(points), head.to_crs(points)
+                head.pose(frame.fields["t0_ns"]), head.gps_time_ns(frame.fields["t0_ns"])
+            elif frame.type == scanhead.ATTRIBUTES:
+                head.attributes(frame)
+        except scanhead.ScanheadError:
+            refused += 1
+    assert head.parser.frames == 700
+    print(taken, refused)
+
+
+{"dump": dump, "live": live, "crs": crs, "count": count, "hostile": hostile}[sys.argv[3]](*sys.argv[4:])
