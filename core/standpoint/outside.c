@@ -8,8 +8,9 @@
 
 enum { SIDES = 8, HEIGHTS = 3, GRID = 24 };
 
-/* Front, half front, sides, backs: azimuths at which the station looks, and how much less each is liked. */
+/* Front, half front, sides, backs: azimuths at which the station looks, and what each is worth. */
 static const double side_deg[SIDES] = {0, 45, -45, 90, -90, 135, -135, 180};
+static const double side_worth[SIDES] = {1.0, 0.95, 0.95, 0.9, 0.9, 0.85, 0.85, 0.8};
 static const double height_deg[HEIGHTS] = {8, 22, 35}, height_worth[HEIGHTS] = {1.0, 0.9, 0.8};
 
 /* The distance from the centre: the sphere around the scene fills 47 degrees. Not nearer than the head sees;
@@ -72,7 +73,7 @@ void survey_outside(struct survey *s, struct standpoint *out)
         frame(s, ahead, &at);
         if (!(at.line1_rad > at.line0_rad)) continue;
         struct survey_sight sight = look(s, &at);
-        double liked = height_worth[k / SIDES] * (k % SIDES == 0 ? 1.0 : 0.9) * (0.5 + 0.5 * sight.front);
+        double liked = height_worth[k / SIDES] * side_worth[k % SIDES] * (0.5 + 0.5 * sight.front);
         double value = sight.seen * at.pan_rad * (at.line1_rad - at.line0_rad) * liked;
         if (value <= best) continue;
         best = value;
