@@ -6,7 +6,7 @@
 
 /* The only list of commands. */
 static const struct app_command *const COMMANDS[] = {
-    &app_run, &app_record, &app_plan, &app_map, &app_report, &app_check, &app_list, NULL,
+    &app_run, &app_record, &app_plan, &app_map, &app_report, &app_check, &app_list, &app_init, NULL,
 };
 
 static void print_help(FILE *out)

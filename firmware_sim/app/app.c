@@ -84,6 +84,14 @@ void app_warn_left_out(uint64_t crowded, uint64_t unfit)
                 (unsigned long long)unfit);
 }
 
+void app_warn_empty(uint64_t pulses, uint64_t with_echo, uint64_t faint)
+{
+    if (pulses == 0 || with_echo >= pulses / 20) return;
+    sh_warn(&app_report_stderr, "mostly empty: %llu of %llu pulses have an echo, %.2g %%; %llu hits were not detected",
+            (unsigned long long)with_echo, (unsigned long long)pulses, 100.0 * (double)with_echo / (double)pulses,
+            (unsigned long long)faint);
+}
+
 int app_write_json(const char *path, void (*put)(struct json *json, const void *ctx), const void *ctx,
                    struct sh_err *err)
 {

@@ -89,6 +89,8 @@ static int record(struct record *r, struct scanhead *sh, struct sh_err *err)
     rc = follow(r, sh, &result, err);
     if (rc == SH_OK || result.points != 0) say_result(r, &result);
     app_warn_left_out(result.crowded, result.unfit);
+    if (rc == SH_OK && result.empty <= result.counts.pulses)
+        app_warn_empty(result.counts.pulses, result.counts.pulses - result.empty, result.faint);
     return rc == SH_OK ? recording_check_complete(&result, err) : rc;
 }
 

@@ -283,6 +283,9 @@ void config_print_reference(FILE *out);
  * how many. dir NULL: the first directory of the lookup below that exists, without a configuration. */
 int config_list_profiles(const char *dir, FILE *out, struct sh_err *err);
 
+/* Reads the profile NAME, looked up as for a configuration that lies at config_file. */
+int config_load_profile(const char *name, const char *config_file, struct config_profile *profile, struct sh_err *err);
+
 /* Finds the directory of profiles: $SCANHEAD_HEADS, beside the configuration (heads/), beside the program
  * (installed or in its build folder), or config/heads here. A profile is named by `head.profile: NAME`,
  * looked up there, or by a path that ends in .yaml. */

@@ -88,4 +88,10 @@ void site_look_open(struct site_look *look, const struct site *site);
  * (site->measures) the error of what is forced is measured, too. */
 int site_choose_methods(struct site *site, const struct sh_report *report, struct sh_err *err);
 
+/* ---- doubts.c: what is allowed, and hardly meant. Once the scene has its BVHs. */
+
+/* Warns, with figures, of a scene of an unlikely size, of stations that see nothing or little, of lines
+ * without a pulse, and of attributes that nothing fills. */
+int site_warn_doubts(const struct site *site, const struct sh_report *report, struct sh_err *err);
+
 #endif
