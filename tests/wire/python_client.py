@@ -5,10 +5,12 @@
         live SOURCE             a session with a running head
         crs POLAR GEO           the same scan in both layouts: the largest differences in the CRS and in the scene, m
         count FILE              the parser's counters
+        samples PAGE OUT        decodes the frames in hex of PAGE; what is said below each must be what they hold
         hostile FILE SEED       frames of FILE with wrong contents and good checksums: nothing but ScanheadError
 """
 import math
 import random
+import re
 import resource
 import struct
 import sys
@@ -148,4 +150,45 @@ def hostile(path, seed):
     print(taken, refused)
 
 
-{"dump": dump, "live": live, "crs": crs, "count": count, "hostile": hostile}[sys.argv[3]](*sys.argv[4:])
+def words(value):
+    if isinstance(value, tuple):
+        return " ".join(words(v) for v in value)
+    return repr(value + 0.0) if isinstance(value, float) else str(value)
+
+
+def said_of(head, frame):
+    """The words below a sample: fields as `name value;`, then records, one a line."""
+    names = "? descriptor anchor points line-end telemetry event surfaces poses attributes".split()
+    flags = "".join(f" {name}" for bit, name in ((1, "REPEAT"), (2, "LOCAL")) if frame.flags & bit)
+    text = [f"{names[frame.type]}{flags}; seq {frame.seq}; t_ns {frame.t_ns}"]
+    text += [f"{name} {words(value)}" for name, value in frame.fields.items()]
+    if frame.type == scanhead.POINTS:
+        p = head.points(frame)
+        for at, echo, n, label, db, t_ns, place in zip(zip(p.x, p.y, p.z), p.echo, p.echo_count, p.label,
+                                                       p.reflectance_db, p.t_ns, zip(*head.to_scene(p))):
+            text += [f"echo {echo} of {n}, label {label}, {db:.2f} dB, t_ns {t_ns}, head's frame {at[0]:.4f} {at[1]:.4f} "
+                     f"{at[2]:.4f}, scene {place[0]:.4f} {place[1]:.4f} {place[2]:.4f}"]
+    if frame.type == scanhead.ATTRIBUTES:
+        text += [f"amplitude {a:.2f} dB, width {w:.2f} ns" for a, w in zip(*head.attributes(frame))]
+    if frame.type == scanhead.SURFACES:
+        text += [f"label {label}: {object_name} of {material}" for label, (object_name, material) in head.surfaces.items()]
+    if frame.type == scanhead.POSES:
+        for t_ns in struct.unpack_from("<q72xq", frame.payload, 8):
+            text += ["pose " + "; ".join(f"{n} {words(v)}" for n, v in head.pose(t_ns)._asdict().items())]
+    return "; ".join(text)
+
+
+def samples(page, out):
+    blocks = re.findall(r"```text\n(d5 [0-9a-f \n]*)```\n\n```text\n(.*?)```", open(page).read(), re.S)
+    with open(out, "wb") as file:
+        file.writelines(bytes.fromhex(frame) for frame, _ in blocks)
+    head, types = scanhead.open(out), []
+    for frame, (_, said) in zip(head.frames(), blocks):
+        ours = said_of(head, frame)
+        assert " ".join(said.split()) == " ".join(ours.split()), f"the page says\n{said}\nthe frame holds\n{ours}"
+        types.append(frame.type)
+    assert head.parser.bad_bytes == 0
+    print(*types, head.stream_sha256())
+
+
+{"dump": dump, "samples": samples, "live": live, "crs": crs, "count": count, "hostile": hostile}[sys.argv[3]](*sys.argv[4:])
