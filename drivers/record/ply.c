@@ -186,7 +186,7 @@ static int move_points(struct ply *ply, size_t header_len, struct sh_err *err)
     uint8_t *block = malloc(BLOCK);
     if (block == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory to move its points", file->path);
     int rc = 0;
-    while (rc == 0 && end > ply->header_len) {
+    while (rc == 0 && end > ply->header_len && (rc = recorder_check_stop(&ply->base, err)) == 0) {
         size_t n = end - ply->header_len < BLOCK ? (size_t)(end - ply->header_len) : BLOCK;
         end -= n;
         if (pread(file->fd, block, n, (off_t)end) != (ssize_t)n)

@@ -63,22 +63,40 @@ static int begins_scan(const struct track *t, const struct scanhead_frame *frame
            t->info.station != t->state.last_station;
 }
 
+/* The nearest whole number; UINT32_MAX for what is larger, also for what is no number. */
+static uint32_t whole_u32(double v)
+{
+    return v <= 0 ? 0 : v < UINT32_MAX ? (uint32_t)llround(v) : UINT32_MAX;
+}
+
+/* A frame is one sweep of the pan and a whole number of lines; without a way to go, one line (core/schedule.h). Lines
+ * are of equal length but for a pulse. */
+static void set_limits(struct track *t, const struct native_descriptor *d)
+{
+    const double lines_hz = 1e-6 * (double)d->lines_uhz, prr_hz = 1e-6 * (double)d->prr_uhz;
+    const double sweep_s =
+        d->pan_udeg_s > 0 ? ((double)d->pan_stop_udeg - (double)d->pan_start_udeg) / (double)d->pan_udeg_s : 0;
+    t->max_pulses = lines_hz > 0 && prr_hz > 0 ? whole_u32(ceil(prr_hz / lines_hz) + 1) : UINT32_MAX;
+    t->max_lines = d->frames > 0 ? whole_u32(d->frames * (ceil(fabs(sweep_s) * lines_hz) + 1)) : UINT32_MAX;
+}
+
 /* The end of a line says where the next one begins. Where it was lost, the times in the frame say so, as long
  * as the pulse rate is that of the descriptor. */
 static uint64_t first_row(const struct track *t, const struct scanhead_frame *frame)
 {
     if (t->state.have_next_line && t->state.next_line == frame->scan_line && t->state.next_line_pulse0 <= frame->pulse0)
         return frame->pulse0 - t->state.next_line_pulse0;
-    double since_s = 1e-9 * (double)(frame->scan_t0_ns - frame->line_t0_ns);
-    return since_s > 0 ? (uint64_t)llround(since_s * t->info.prr_hz) : 0;
+    double since_s = 1e-9 * ((double)frame->scan_t0_ns - (double)frame->line_t0_ns);
+    return whole_u32(since_s * t->info.prr_hz);
 }
 
-/* Echoes of one pulse follow each other: a new pulse begins wherever the number is 0 or 1. */
+/* Echoes of one pulse follow each other: a new pulse begins wherever the number is 0 or 1. A frame that begins
+ * with a later echo is none of a head's; that echo goes to the row before. */
 static uint64_t number_rows(struct track *t, uint64_t row, int n)
 {
     for (int i = 0; i < n; i++) {
         if (t->point[i].echo <= 1) row++;
-        t->row[i] = (uint32_t)(row - 1);
+        t->row[i] = (uint32_t)(row > 0 ? row - 1 : 0);
     }
     return row;
 }
@@ -270,6 +288,9 @@ int track_frame(struct track *t, struct scanhead *sh, const struct scanhead_fram
     if (frame->type == SCANHEAD_POINTS) return take_points(t, frame, err);
     if (frame->type == SCANHEAD_ATTRIBUTES) return take_attributes(t, frame, err);
     if (frame->type == SCANHEAD_LINE_END) take_line_end(t, frame);
+    struct native_descriptor d;
+    if (frame->type == SCANHEAD_DESCRIPTOR && native_decode_descriptor(frame->payload, frame->payload_len, &d) == 0)
+        set_limits(t, &d);
     if (frame->type == SCANHEAD_DESCRIPTOR && (frame->flags & SCANHEAD_REPEAT) == 0) {
         t->state.new_scan = 1;
         t->state.have_next_line = 0;

@@ -210,6 +210,24 @@ void cfg_load_profile(struct cfg_reader *rd, struct config *cfg)
         rd->profile_read = read_profile(&profile_rd, cfg->profile_file, &cfg->profile, rd->faults);
 }
 
+int config_load_profile(const char *name, const char *config_file, struct config_profile *profile, struct sh_err *err)
+{
+    struct profile_dirs dirs;
+    struct cfg_reader rd;
+    struct config_faults faults = {0};
+    char path[2 * CONFIG_PATH_LEN], known[300];
+    find_dirs(config_file, &dirs);
+    for (int i = 0; i < dirs.n; i++) {
+        snprintf(path, sizeof path, "%s/%s.yaml", dirs.dir[i], name);
+        if (access(path, F_OK) != 0) continue;
+        if (read_profile(&rd, path, profile, &faults)) return SH_OK;
+        return sh_fail(err, faults.fault[0].code, "%s", faults.fault[0].text);
+    }
+    known_profiles(&dirs, known, sizeof known);
+    return sh_fail(err, SH_EINPUT, "no head profile %s; found were: %s; SCANHEAD_HEADS can name their directory", name,
+                   known);
+}
+
 /* ---- listing */
 
 static void print_figures(const struct cfg_reader *rd, int from, const char *label, FILE *out)

@@ -188,29 +188,16 @@ static void print_example_key(const struct cfg_key *key, const struct config_pro
     fprintf(out, "%s%*s%s: %s\n", hidden, indent, "", word, value_of(key, profile, value, sizeof value));
 }
 
-static int load_example_profile(struct config *cfg, struct sh_err *err)
-{
-    struct cfg_reader rd;
-    struct config_faults faults = {0};
-    cfg_reader_init(&rd, "the example", &cfg_config_table, cfg, &faults);
-    snprintf(cfg->profile_file, sizeof cfg->profile_file, "%s", cfg_find(&cfg_config_table, "head.profile")->example);
-    cfg_load_profile(&rd, cfg);
-    return faults.n == 0 ? SH_OK : sh_fail(err, faults.fault[0].code, "%s", faults.fault[0].text);
-}
-
 int config_print_example(FILE *out, struct sh_err *err)
 {
-    struct config *cfg = calloc(1, sizeof *cfg);
-    if (cfg == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
-    int code = load_example_profile(cfg, err);
-    if (code == SH_OK)
-        fputs(
-            "# All keys of a configuration. Lines without a # are needed. Each other key stands with its default, or\n"
-            "# with a value that shows its form. To change one, take the # away from the first column, also from the\n"
-            "# sections around it. Not all of them go together: `scanhead check` says which do.\n",
-            out);
-    for (size_t i = 0; i < cfg_config_table.n && code == SH_OK; i++)
-        print_example_key(&cfg_config_table.keys[i], &cfg->profile, out);
-    free(cfg);
-    return code;
+    struct config_profile profile;
+    int code = config_load_profile(cfg_find(&cfg_config_table, "head.profile")->example, NULL, &profile, err);
+    if (code != SH_OK) return code;
+    fputs("# All keys of a configuration. Lines without a # are needed. Each other key stands with its default, or\n"
+          "# with a value that shows its form. To change one, take the # away from the first column, also from the\n"
+          "# sections around it. Not all of them go together: `scanhead check` says which do.\n",
+          out);
+    for (size_t i = 0; i < cfg_config_table.n; i++)
+        print_example_key(&cfg_config_table.keys[i], &profile, out);
+    return SH_OK;
 }

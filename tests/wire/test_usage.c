@@ -12,7 +12,8 @@ static const char GOOD[] = "head: {profile: full-sweep, prr_hz: 100000, lines_hz
                            "    - {file: room.obj, up: z, scale: 1}\n"
                            "stations:\n"
                            "  - {position_m: [0, 0, 0]}\n"
-                           "links: [{type: \"null\"}]\n";
+                           "links: [{type: \"null\"}]\n"
+                           "plan: {tolerance_m: 1e-3}\n"; /* and a tenth of it for meshes */
 
 /* How many files the folder holds. */
 static int count_files(const struct wire *wire)
@@ -461,7 +462,7 @@ static void test_system_failures(void **state)
     expect(wire, "statistics in no folder",
            (const char *const[]){"run", config, "--duration", "0.1", "--pace", "fast", "--quiet", "--stats", "/none/x",
                                  NULL},
-           1, (const char *const[]){"/none/x", "No such file", NULL});
+           2, (const char *const[]){"/none/x", "No such file", NULL});
     struct sockaddr_in at = {.sin_family = AF_INET};
     socklen_t len = sizeof at;
     int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
