@@ -7,8 +7,8 @@
 
 #include <stdio.h>
 
-/* Opens path for reading; never waits. NULL on failure, with *why: "No such file or directory", "a FIFO, not a
- * file", ... The words live until the thread's next call of strerror. */
+/* Opens path for reading; never waits. NULL on failure, with *why: "No such file or directory", "a FIFO,
+ * not a file", ... The words live until the thread's next call of strerror. */
 FILE *infile_open(const char *path, const char **why);
 
 #endif

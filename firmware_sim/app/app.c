@@ -12,8 +12,8 @@
 
 static volatile sig_atomic_t interrupted;
 
-/* Signals that come together are one wish to end: `timeout` sends two, one to the process and one to its group.
- * From the third on, or a second after the first, they mean now. */
+/* Signals that come together are one wish to end: `timeout` sends two, one to the process and one to its
+ * group. From the third on, or a second after the first, they mean now. */
 enum { SIGNALS_TOGETHER = 2 };
 static const int64_t TOGETHER_NS = 1000000000;
 

@@ -25,11 +25,13 @@ int app_fail(const struct sh_err *err);
 int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, void *ctx, struct sh_err *err),
                     void *ctx);
 
-/* Warnings and progress to standard error, each line with the program's name. Asks to stop once interrupted. */
+/* Warnings and progress to standard error, each line with the program's name. Asks to stop once
+ * interrupted. */
 extern const struct sh_report app_report_stderr;
 
-/* 1 after SIGINT or SIGTERM, once app_catch_signals was called: the command ends in good order. A second signal
- * within a second counts as the same one. A third, or one that comes later, ends the process at once. */
+/* 1 after SIGINT or SIGTERM, once app_catch_signals was called: the command ends in good order. A second
+ * signal within a second counts as the same one. A third, or one that comes later, ends the process at
+ * once. */
 int app_interrupted(void);
 void app_catch_signals(void);
 

@@ -278,8 +278,8 @@ static int take_operands(const struct app_command *command, int n, char *const *
 
 /* ---- parsing */
 
-/* One option as getopt gave it, from `word`. APP_OK to go on, APP_GO_ON never, else the exit status; *done is set
- * when the command line ends here. */
+/* One option as getopt gave it, from `word`. APP_OK, or the exit status of an error. *done: the command line
+ * ends with it. */
 static int take_option(const struct app_command *command, int opt, const char *word, struct app_input *in, void *values,
                        int *done)
 {
@@ -314,7 +314,8 @@ int app_parse(const struct app_command *command, int argc, char **argv, struct a
             if (n < APP_MAX_WORDS) words[n++] = optarg;
             continue;
         }
-        if (opt == 'h') return help(command, argc > optind ? argv[optind] : NULL);
+        if (opt == 'h')
+            return help(command, argc > optind && argv[optind][0] != '-' ? argv[optind] : NULL);
         const int status = take_option(command, opt, argv[at], in, values, &done);
         if (status != APP_OK || done) return status;
     }

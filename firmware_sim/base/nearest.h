@@ -9,8 +9,8 @@
 enum { NEAREST_MAX = 96 };
 size_t nearest_distance(const char *a, const char *b);
 
-/* Whether `known` may have been meant by `word`: at most two letters differ, and not all of them; or one is the
- * other's beginning, of three letters at least. */
+/* Whether `known` may have been meant by `word`: at most two letters differ, and not all of them; or one is
+ * the other's beginning, of three letters at least. */
 int nearest_is_near(const char *word, const char *known);
 
 #endif

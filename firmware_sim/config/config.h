@@ -1,8 +1,8 @@
 /* The configuration: a YAML file and --set in, struct config out, checked. One table (keys.c) of key, type,
  * unit, default, range and help gives parsing, defaults, errors and the reference.
  *
- * Units: as the key's name says (hz, deg, m). Everything is checked. All faults are found at once; each is one
- * line:
+ * Units: as the key's name says (hz, deg, m). Everything is checked. All faults are found at once; each is
+ * one line:
  *   FILE:LINE: KEY: what is wrong; what is allowed
  * Unknown keys, duplicate keys, trailing text ("30 kHz"), NaN, wrong types and values out of range are
  * errors. Relative paths in a file are relative to that file; in --set, to the working directory.
@@ -294,12 +294,12 @@ const char *config_beam_moves(const struct config *cfg);
 /* The reference: every key with type, unit, default, range and help. */
 void config_print_reference(FILE *out);
 
-/* The same for one section ("head", "scene.anchor"), for one key, or for "profile": the keys of head profiles.
- * SH_EINPUT names the sections that there are. */
+/* The same for one section ("head", "scene.anchor"), for one key, or for "profile": the keys of head
+ * profiles. SH_EINPUT names the sections that there are. */
 int config_print_section(const char *section, FILE *out, struct sh_err *err);
 
-/* A configuration with all keys, each with its help, that loads: the needed ones stand there, the others behind a
- * '#' with their defaults. It names a profile and a mesh that come with the program. */
+/* A configuration with all keys, each with its help, that loads: the needed ones stand there, the others
+ * behind a '#' with their defaults. It names a profile and a mesh that come with the program. */
 int config_print_example(FILE *out, struct sh_err *err);
 
 /* The profiles in a directory, one line each (name, model, what is data sheet and what is assumed). Returns

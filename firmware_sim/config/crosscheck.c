@@ -165,8 +165,9 @@ const char *config_beam_moves(const struct config *cfg)
 static const double LEAST_PULSE_NS = 0.1; /* 15 mm of range */
 
 /* A footprint needs a beam that has one, and a pulse that is not too short: sub-rays that meet one oblique
- * surface have different ranges. Where the pulse is too short to join them, each would be an echo of its own, or
- * be lost because it is too weak. An adaptive beam needs outlines, which are those seen from one place. */
+ * surface have different ranges. Where the pulse is too short to join them, each would be an echo of its
+ * own, or be lost because it is too weak. An adaptive beam needs outlines, which are those seen from one
+ * place. */
 static void check_beam(struct cfg_reader *rd, const struct config *cfg)
 {
     const struct config_profile *p = &cfg->profile;

@@ -93,8 +93,8 @@ void cfg_cut_to_parent(char *path);
 /* The last word of path, when path is a key directly below parent ("": the top); NULL otherwise. */
 const char *cfg_word_below(const char *path, const char *parent);
 
-/* ---- fault.c: what is wrong, and with what. Each call adds a fault to the reader's list and returns its code,
- * SH_EINPUT. Reading goes on after it. */
+/* ---- fault.c: what is wrong, and with what. Each call adds a fault to the reader's list and returns its
+ * code, SH_EINPUT. Reading goes on after it. */
 /* "FILE:LINE: text", without the line when it is 0. Returns code. */
 int cfg_fail_file(struct cfg_reader *rd, int code, int line, const char *fmt, ...)
     __attribute__((format(printf, 4, 5)));
@@ -104,12 +104,12 @@ int cfg_fail(struct cfg_reader *rd, int line, const char *name, const char *fmt,
 /* The same for the value of a key, which is bad from now on. */
 int cfg_fail_value(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, const char *fmt, ...)
     __attribute__((format(printf, 5, 6)));
-/* The same where the key stands, or should. Nothing is added where a fault of it, or of a section around it, was
- * told before: what follows from a fault is none of its own. */
+/* The same where the key stands, or should. Nothing is added where a fault of it, or of a section around
+ * it, was told before: what follows from a fault is none of its own. */
 int cfg_fail_key(struct cfg_reader *rd, const char *path, uint32_t item, const char *fmt, ...)
     __attribute__((format(printf, 4, 5)));
-/* An unknown key below the section parent ("" for the top): suggests a near one and lists what is known there.
- * The near one counts as bad: it isn't missing, too. */
+/* An unknown key below the section parent ("" for the top): suggests a near one and lists what is known
+ * there. The near one counts as bad: it isn't missing, too. */
 int cfg_fail_unknown(struct cfg_reader *rd, int line, const char *parent, uint32_t item, const char *word);
 /* Whether all of these keys (sections: with all in them) were read well, so that a check can ask them. */
 int cfg_are_sound(const struct cfg_reader *rd, uint32_t item, const char *const *paths, size_t n);
@@ -137,14 +137,16 @@ const char *cfg_allowed(const struct cfg_key *key, const struct config_profile *
 /* Directory part of a path, with its '/'; empty for a bare name. buf holds CONFIG_PATH_LEN. */
 const char *cfg_dir_of(const char *path, char *buf);
 
-/* ---- yaml.c, set.c, config.c, profile.c, crosscheck.c. What is wrong with values goes to the list of faults. */
+/* ---- yaml.c, set.c, config.c, profile.c, crosscheck.c. What is wrong with values goes to the list of
+ * faults. */
 /* SH_OK, or the code of a fault that leaves nothing to check: no file, no YAML, no section. */
 int cfg_read_file(struct cfg_reader *rd);
 void cfg_apply_set(struct cfg_reader *rd, const char *set);
 /* Values for what was not given or is bad, errors for what must be. profile may be NULL. */
 void cfg_fill_defaults(struct cfg_reader *rd, const struct config_profile *profile);
-/* Where a file that comes with the program ("heads", "scenes/x.obj") may be, for i from 0: beside an installed
- * program, beside one in its build folder, in config/ here. buf holds CONFIG_PATH_LEN. 0: there is no i-th place. */
+/* Where a file that comes with the program ("heads", "scenes/x.obj") may be, for i from 0: beside an
+ * installed program, beside one in its build folder, in config/ here. buf holds CONFIG_PATH_LEN. 0: there
+ * is no i-th place. */
 int cfg_shared_path(int i, const char *name, char *buf);
 /* The first of these places that has it; 0: none. */
 int cfg_find_shared(const char *name, char *buf);

@@ -128,8 +128,8 @@ static const char *parse_entry(const char *text, struct journal_entry *entry)
     return NULL;
 }
 
-/* Longer than any line that is written, and notes of people; and more commands than fit into a day at one each
- * 10 ms. What is beyond is no journal, and would take the memory. */
+/* Longer than any line that is written, and notes of people; and more commands than fit into a day at one
+ * each 10 ms. What is beyond is no journal, and would take the memory. */
 enum { LINE_MAX_LEN = 1023, MAX_ENTRIES = 10000000 };
 
 struct reader {

@@ -1,5 +1,5 @@
-/* All faults of a configuration at once, in their order, and none that only follows from another one; and files
- * that are none. */
+/* All faults of a configuration at once, in their order, and none that only follows from another one; and
+ * files that are none. */
 #include "tests/unit/config_rig.h"
 
 /* The faults are these, in this order: each begins with PATH:LINE: KEY, or as it stands here. */

@@ -11,8 +11,8 @@
 
 #include "firmware_sim/app/app.h"
 
-/* What becomes of a process that gets these signals, one after the other (0: a second and a bit passes before the
- * next): 0 it goes on and knows of them, else the signal that ended it. */
+/* What becomes of a process that gets these signals, one after the other (0: a second and a bit passes
+ * before the next): 0 it goes on and knows of them, else the signal that ended it. */
 static int outcome(const int *signals, int n)
 {
     const pid_t pid = fork();

@@ -1,8 +1,8 @@
-/* What `scanhead check` prints: all faults of a configuration, the keys of a section, an example that passes. And
- * short options as getopt takes them. */
+/* What `scanhead check` prints: all faults of a configuration, the keys of a section, an example that
+ * passes. And short options as getopt takes them. */
 #include "tests/wire/room.h"
 
-/* A value that begins with letters of an option is a value: -o with the file "utx.ply" in the working folder. */
+/* A value may follow its letter at once: -oFILE. */
 static void test_short_forms(void **state)
 {
     struct wire *wire = *state;

@@ -1,10 +1,11 @@
-/* One exit status for one kind of failure, whichever command meets it: the table of firmware_sim/app/README.md. */
+/* One exit status for one kind of failure, whichever command meets it: the table of
+ * firmware_sim/app/README.md. */
 #include "tests/wire/room.h"
 
 enum { DONE = 0, FAILED = 1, WRONG = 2, MAX_WORDS = 12 };
 
-/* CONFIG: a good configuration; DIR: the folder; NOBODY: an address where nobody listens. Words are separated by
- * blanks. */
+/* CONFIG: a good configuration; DIR: the folder; NOBODY: an address where nobody listens. Words are
+ * separated by blanks. */
 static const struct {
     const char *line;
     int status;
@@ -18,6 +19,8 @@ static const struct {
     {"report CONFIG DIR/scan.ply --tolerance-m 0.001", DONE},
     {"run CONFIG --start --frames 1 --pace fast --quiet --journal DIR/journal", DONE},
     {"run CONFIG --start --frames 1 --pace fast --quiet --replay-journal DIR/journal", DONE},
+    {"init DIR/room.obj -o DIR/new.yaml", DONE},
+    {"check DIR/new.yaml --help --set", DONE},
 
     /* the command line */
     {"", WRONG},
@@ -29,6 +32,8 @@ static const struct {
     {"report CONFIG DIR/scan.ply --fly", WRONG},
     {"check CONFIG --fly", WRONG},
     {"list --fly", WRONG},
+    {"init DIR/room.obj --fly", WRONG},
+    {"init", WRONG},
     {"run CONFIG --duration 0", WRONG},
     {"record CONFIG -o DIR/x.ply --duration 0", WRONG},
     {"map CONFIG -o DIR/x.png --pixel-m 0", WRONG},
@@ -59,6 +64,8 @@ static const struct {
     {"run CONFIG --set links[0].address=300.1.1.1", WRONG},
 
     /* input files: not there, or not what is read */
+    {"init DIR/none.obj", WRONG},
+    {"init DIR/fifo.obj", WRONG},
     {"report CONFIG DIR/none.ply", WRONG},
     {"report CONFIG DIR/faulty.yaml", WRONG},
     {"record DIR/none.shs -o DIR/x.ply", WRONG},
@@ -70,6 +77,11 @@ static const struct {
 
     /* files to write whose path is wrong */
     {"record CONFIG -o DIR/none/x.ply", WRONG},
+    {"record CONFIG -o DIR/x.ply --quiet --stats DIR/none/x", WRONG},
+    {"map CONFIG -o DIR/none/x.png", WRONG},
+    {"init DIR/room.obj -o DIR/none/x.yaml", WRONG},
+    {"run CONFIG --duration 0.01 --pace fast --quiet --stats DIR/none/x", WRONG},
+    {"run CONFIG --duration 0.01 --pace fast --quiet --journal DIR/none/x", WRONG},
 
     /* a head that is not there; what was asked for and did not come */
     {"record tcp:NOBODY -o DIR/x.ply", FAILED},
@@ -131,6 +143,7 @@ static void write_files(const struct wire *wire)
     wire_write_text(wire, "faulty.yaml", "head: {profile: full-sweep, frames: -1}\n");
     assert_int_equal(mkfifo(wire_path(wire, "fifo.yaml"), 0600), 0);
     assert_int_equal(mkfifo(wire_path(wire, "fifo.shs"), 0600), 0);
+    assert_int_equal(mkfifo(wire_path(wire, "fifo.obj"), 0600), 0);
 }
 
 static void test_every_command(void **state)
