@@ -21,7 +21,7 @@ struct las {
     struct las_facts facts;
     int begun, time_came_late;
     size_t front_len;
-    uint64_t n_empty;
+    uint64_t n_empty, n_no_angle;
 };
 
 static int las_begin(void *rec, struct sh_err *err)
@@ -95,10 +95,14 @@ static int too_far(const struct las *las, const double p[3], struct sh_err *err)
 }
 
 /* The angle from straight down, in the head's frame. */
-static uint16_t scan_angle(const double p_socs[3])
+static uint16_t scan_angle(struct las *las, const double p_socs[3])
 {
     float flat = sqrtf((float)(p_socs[0] * p_socs[0] + p_socs[1] * p_socs[1]));
     float up = atan2f(flat, (float)-p_socs[2]);
+    if (isnan(up)) {
+        las->n_no_angle++;
+        return 0;
+    }
     return (uint16_t)lrintf(up * (float)SCAN_ANGLE_COUNTS_PER_RAD);
 }
 
@@ -183,7 +187,7 @@ static int put_point(struct las *las, uint8_t *to, int i, struct sh_err *err)
     to[15] = 0;
     to[16] = 0; /* never classified */
     to[17] = 0;
-    le_put16(to + 18, t->info.moving ? 0 : scan_angle(p_socs));
+    le_put16(to + 18, t->info.moving ? 0 : scan_angle(las, p_socs));
     le_put16(to + 20, (uint16_t)t->info.station);
     le_put16(to + 30, point->label);
     if (t->has_attributes) put_attribute(to + LAS_POINT_LEN, &t->attribute[i]);
@@ -224,6 +228,8 @@ static int las_finish(void *rec, struct sh_err *err)
     if (rc == 0) rc = outfile_patch(&las->base.file, 0, front, las_front(&las->facts, front), err);
     if (rc != 0) return rc;
     recorder_report(rec, las->n_empty, "shots without echo left out, for which LAS has no place");
+    recorder_report(rec, las->n_no_angle,
+                    "points without a scan angle (0 is written): the scan's pose is beyond any number");
     if (las->time_came_late)
         sh_warn(las->base.options.report,
                 "%s: times count from the scan's start: what the head said of its clock was lost before the first "

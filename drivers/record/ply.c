@@ -141,7 +141,8 @@ static int ply_scan(void *rec, struct sh_err *err)
 static int ply_points(void *rec, int n, struct sh_err *err)
 {
     struct ply *ply = rec;
-    const struct track *t = &ply->base.track;
+    struct track *t = &ply->base.track;
+    int rc = 0;
     uint8_t *to = outfile_room(&ply->base.file, TRACK_BATCH * TEXT_LEN, err);
     if (to == NULL) return SH_EIO;
     size_t used = 0;
@@ -159,14 +160,18 @@ static int ply_points(void *rec, int n, struct sh_err *err)
             p->y = xyz[1];
             p->z = xyz[2];
         }
+        if (p->echo_count != 0 && track_is_nowhere(t, p->x, p->y, p->z)) continue;
         size_t len = ply->facts.ascii ? put_ascii((char *)to + used, &v, t->crs == NATIVE_CRS_GEODETIC)
                                       : put_binary(to + used, &v);
-        if (len > TEXT_LEN) return recorder_fail_huge(&ply->base, (double[]){p->x, p->y, p->z}, err);
+        if (len > TEXT_LEN) {
+            rc = recorder_fail_huge(&ply->base, (double[]){p->x, p->y, p->z}, err);
+            break;
+        }
         used += len;
         ply->facts.n_vertices++;
     }
-    outfile_used(&ply->base.file, used);
-    return 0;
+    outfile_used(&ply->base.file, used); /* also before a failure: the file may be kept */
+    return rc;
 }
 
 static int ply_frame(void *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
