@@ -2,6 +2,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/offline.h"
@@ -177,7 +178,10 @@ static int record_stream(struct record *r, struct sh_err *err)
     char why[512];
     int rc = open_stream(r, &sh, why, sizeof why);
     if (rc != SCANHEAD_OK) return sh_fail(err, rc, "%s", why);
+    struct stat st;
     if (ends_in(r->source, ".shs")) r->recording.listen = 1;
+    if (r->recording.listen && stat(r->source, &st) == 0 && S_ISREG(st.st_mode))
+        r->recording.source_bytes = (uint64_t)st.st_size;
     if (r->station == APP_WORD && !r->recording.listen) {
         char reply[512];
         rc = scanhead_command(sh, "HEAD:STATION? MAX", reply, sizeof reply, 5000);
