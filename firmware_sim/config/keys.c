@@ -259,7 +259,8 @@ static const struct cfg_key config_keys[] = {
     {KEY(noise.angle), CFG_BOOL, .def = "off",
      .help = "Angle noise of the profile's mirror_sigma_deg and pan_sigma_deg: the beam deviates, the encoders do not "
              "show it."},
-    {KEY(noise.seed), CFG_COUNT, NULL, "1", 0, 18446744073709551615.0, .help = "Seed of the random numbers."},
+    {KEY(noise.seed), CFG_COUNT, NULL, "1", 0, 18446744073709551615.0, 
+     .help = "Seed of the random numbers. Noise also differs by station, and by scan since power-up at a station."},
     {"noise.ball", .type = CFG_MAP, .help = "Ball-shaped noise: each point moves to anywhere in a ball around it."},
     {KEY(noise.ball.radius_m), CFG_REAL, "m", "0", 0, 100, .help = "Radius of the ball; 0: none."},
     {KEY(noise.ball.distance_1_m), CFG_REAL, "1/m", "0", 0, 100,

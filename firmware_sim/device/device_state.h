@@ -45,10 +45,11 @@ struct device_scan {
     uint64_t pulse_next; /* next pulse to be claimed */
     uint64_t lost0;      /* pulses lost before it */
     struct schedule_segment segment;
-    uint32_t station; /* from 0 */
-    size_t stretch;   /* of a trajectory: the one of the last pulse that is claimed */
-    int describe;     /* descriptor and anchor are due, as news */
-    int anchor_lost;  /* they are due as a repetition: a new anchor was in a tick that was lost */
+    uint32_t station;      /* from 0 */
+    uint32_t station_scan; /* which of its scans */
+    size_t stretch;        /* of a trajectory: the one of the last pulse that is claimed */
+    int describe;          /* descriptor and anchor are due, as news */
+    int anchor_lost;       /* they are due as a repetition: a new anchor was in a tick that was lost */
     int stop_requested;
 };
 
@@ -89,6 +90,7 @@ struct device {
     int ending, over;
     struct device_machine machine;
     struct device_scan scan;
+    uint32_t *station_scans; /* [n_stations] since power-up */
     struct device_events events;
     struct device_overrun overrun;
     struct device_live live;
