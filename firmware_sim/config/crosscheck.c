@@ -97,6 +97,8 @@ static void check_names(struct cfg_reader *rd, struct config *cfg)
 static void check_output(struct cfg_reader *rd, struct config *cfg)
 {
     const struct config_output *output = &cfg->output;
+    const int bits = output->layout == LINE_POLAR ? 32 : 31; /* a range has no sign */
+    const double counts = ldexp(1.0, bits);
     cfg->output.layout_given = cfg_is_given(rd, "output.layout", 0);
     if (!cfg_is_given(rd, "output.tolerance_m", 0)) cfg->output.tolerance_m = fmax(1e-7, 1e-3 * cfg->plan.range_m);
     if (!cfg_is_given(rd, "scene.tolerance_m", 0))
@@ -111,11 +113,12 @@ static void check_output(struct cfg_reader *rd, struct config *cfg)
     if (output->scale_m != 0.0 && output->scale_m < 1e-6)
         cfg_fail_key(rd, "output.scale_m", 0, "%.10g is out of range; allowed 0 (automatic) or 1e-6 to 1 m",
                      output->scale_m);
-    else if (output->scale_m != 0.0 && rd->profile_read && cfg->profile.range_max_m / output->scale_m >= 0x1p31)
+    else if (output->scale_m != 0.0 && rd->profile_read && cfg->profile.range_max_m / output->scale_m >= counts)
         cfg_fail_key(rd, "output.scale_m", 0,
-                     "%.10g is too fine: %.10g m of head profile %s do not fit into 31 bits; allowed above %.4g to "
-                     "1 m",
-                     output->scale_m, cfg->profile.range_max_m, cfg->profile.name, cfg->profile.range_max_m / 0x1p31);
+                     "%.10g is too fine: %.10g m of head profile %s do not fit into %d bits; allowed above %.4g to "
+                     "1 m, or 0 (automatic)",
+                     output->scale_m, cfg->profile.range_max_m, cfg->profile.name, bits,
+                     cfg->profile.range_max_m / counts);
 }
 
 /* Which part of the trajectory, and where on it to stop. How long it is, its file says
