@@ -73,7 +73,13 @@ static void print_progress(void *ctx, const char *what, double fraction)
         fprintf(stderr, "scanhead: %s: %.0f %%%s\n", what, 100.0 * fraction, left);
 }
 
-const struct sh_report app_report_stderr = {NULL, print_warning, print_progress};
+static int asked_to_stop(void *ctx)
+{
+    (void)ctx;
+    return app_interrupted();
+}
+
+const struct sh_report app_report_stderr = {NULL, print_warning, print_progress, asked_to_stop};
 
 void app_warn_left_out(uint64_t crowded, uint64_t unfit)
 {
@@ -84,6 +90,14 @@ void app_warn_left_out(uint64_t crowded, uint64_t unfit)
     if (unfit != 0)
         sh_warn(&app_report_stderr, "%llu echoes left out, too far from the anchor for the stream's integers",
                 (unsigned long long)unfit);
+}
+
+void app_warn_empty(uint64_t pulses, uint64_t with_echo, uint64_t faint)
+{
+    if (pulses == 0 || with_echo >= pulses / 20) return;
+    sh_warn(&app_report_stderr, "mostly empty: %llu of %llu pulses have an echo, %.2g %%; %llu hits were not detected",
+            (unsigned long long)with_echo, (unsigned long long)pulses, 100.0 * (double)with_echo / (double)pulses,
+            (unsigned long long)faint);
 }
 
 int app_write_json(const char *path, void (*put)(struct json *json, const void *ctx), const void *ctx,

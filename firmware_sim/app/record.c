@@ -44,7 +44,7 @@ static void say_result(const struct record *r, const struct recording_result *re
         snprintf(faint, sizeof faint, ", %llu hits not detected", (unsigned long long)result->faint);
     fprintf(stderr, "scanhead: %llu points, %llu shots without echo%s, %llu scans\n",
             (unsigned long long)result->points, (unsigned long long)result->empty, faint,
-            (unsigned long long)result->scans);
+            (unsigned long long)result->counts.scans);
 }
 
 static void print_note(void *ctx, const char *text)
@@ -53,7 +53,7 @@ static void print_note(void *ctx, const char *text)
     fprintf(stderr, "scanhead: %s\n", text);
 }
 
-static const struct sh_report NOTES = {NULL, print_note, NULL};
+static const struct sh_report NOTES = {.warn = print_note};
 
 /* Follows the scans. Files are closed and statistics written also after some failures; the first failure is
  * returned. */
@@ -61,7 +61,7 @@ static int follow(struct record *r, struct scanhead *sh, struct recording_result
 {
     struct sh_err why = {0};
     int rc = recording_run(sh, &r->recording, result, err);
-    const int has_figures = rc == SH_OK || rc == SH_ELOST; /* LOST: an unplugged head has cut the recording */
+    const int has_figures = rc == SH_OK || rc == SH_ELOST || rc == SH_ERESET; /* the bus has cut the recording */
     const int keep = result->points != 0 || (rc == SH_OK && result->missing[0] == '\0');
     r->interrupted = app_interrupted();
     int after = record_files_close(&r->files, keep, &why);
@@ -90,6 +90,8 @@ static int record(struct record *r, struct scanhead *sh, struct sh_err *err)
     rc = follow(r, sh, &result, err);
     if (rc == SH_OK || result.points != 0) say_result(r, &result);
     app_warn_left_out(result.crowded, result.unfit);
+    if (rc == SH_OK && result.empty <= result.counts.pulses)
+        app_warn_empty(result.counts.pulses, result.counts.pulses - result.empty, result.faint);
     return rc == SH_OK ? recording_check_complete(&result, err) : rc;
 }
 
@@ -147,7 +149,8 @@ static int record_config(struct config *cfg, void *ctx, struct sh_err *err)
     if (rc == SH_OK) rc = set_layout(r, cfg, err);
     if (rc == SH_OK && cfg->output.layout == LINE_GEO && cfg->output.crs == GEOREF_GEODETIC)
         rc = record_files_check_degrees(&r->files, err);
-    if (rc == SH_OK) rc = offline_open(cfg, &app_report_stderr, &offline, err);
+    if (rc == SH_OK) rc = offline_open(cfg, r->recording.duration_s, &app_report_stderr, &offline, err);
+    r->recording.head_ends = 1;
     if (rc == SH_OK && r->station == APP_WORD) {
         r->recording.first_station = 1;
         r->recording.last_station = offline.site->n_stations;
@@ -265,9 +268,11 @@ static const struct app_option OPTIONS[] = {
     {APP_CALL, "output", "FILE", .letter = 'o', .apply = take_file, .help = "where to write; may be repeated"},
     {APP_WHOLE, "station", "N|all", .min = 1, .max = CONFIG_MAX_STOPS, .word = "all", .at = AT(station),
      .help = "scan from station N, or from all one after the other into the same files"},
-    {APP_WHOLE, "frames", "N", .min = 0, .max = 1000000000, .at = AT(recording.frames), .help = "frames per scan"},
+    {APP_WHOLE, "frames", "N", .min = 0, .max = HEAD_MAX_FRAMES, .at = AT(recording.frames),
+     .help = "frames per scan; 0: without end"},
     {APP_NUMBER, "duration", "S", .min = 0.001, .max = 1e8, .at = AT(recording.duration_s),
-     .help = "stop each scan after S seconds of device time"},
+     .help = "end each scan after S seconds of device time: of a CONFIG to the pulse, of a head on a wire as "
+             "soon as it takes the command"},
     {APP_FLAG, "split", NULL, .at = AT(files.split),
      .help = "each scan to files of its own: NAME-1.las, NAME-2.las, ..., in the order of scans"},
     {APP_FLAG, "listen", NULL, .at = AT(recording.listen),
