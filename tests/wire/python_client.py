@@ -169,6 +169,22 @@ def hostile(path, seed):
             refused += 1
     assert head.parser.frames == 700
     print(taken, refused)
+    bombs(path)
+
+
+def framed(kind, flags, length, payload):
+    head = struct.pack("<BBBBIIIq", 0xD5, kind, 1, flags, length, 0, scanhead.crc32c(payload), 0)
+    return head + struct.pack("<I", scanhead.crc32c(head)) + payload
+
+
+def bombs(path):
+    """Good headers that promise 64 KiB, small good frames between: if each payload were summed anew this were
+    200 MB, a minute; it must take less than 10 s of processor time."""
+    resource.setrlimit(resource.RLIMIT_CPU, (10, 10))
+    with open(path + ".bombs", "wb") as out:
+        out.write((framed(3, 0, 65536, b"") + framed(200, scanhead.LOCAL, 0, b"")) * 3000)
+    head = scanhead.open(path + ".bombs")
+    assert sum(1 for _ in head.frames()) == 3000 and head.parser.bad_bytes == 3000 * 28
 
 
 def words(value):
