@@ -140,16 +140,14 @@ class _RunningCrc:
 
     def __init__(self) -> None:
         self._registers = array.array("I", [0])  # before each byte of the buffer, and after the last
+        self.until = 0  # where the last wrong payload ends
 
     def dropped(self, n: int) -> None:
         """The buffer's first n bytes have gone."""
         del self._registers[:n]
+        self.until -= n
         if not self._registers:
             self._registers.append(0)
-
-    def summed(self) -> int:
-        """How many bytes of the buffer have been."""
-        return len(self._registers) - 1
 
     def crc(self, data: bytearray, begin: int, end: int) -> int:
         table, registers = _crc_table[0], self._registers
@@ -301,10 +299,11 @@ class Parser:
         running = self._running
         if (crc32c(payload) if running is None else running.crc(self._bytes, begin, begin + length)) != crc:
             self.bad_payload += 1
-            self._running = self._running or _RunningCrc()
+            self._running = running or _RunningCrc()
+            self._running.until = max(self._running.until, begin + length)
             return None, False
         self._at, self._in_step = begin + length, True
-        if self._running is not None and self._running.summed() <= self._at:
+        if running is not None and running.until <= self._at:
             self._running = None
         self.frames += 1
         if not flags & LOCAL:
