@@ -7,6 +7,7 @@
                             scene; in the CRS with the formula of PROTOCOL.md
         count FILE          the parser's counters
         samples PAGE OUT    decodes the frames in hex of PAGE; what is said below each is what it holds
+        tables PAGE FILE    decodes FILE's frames by PAGE's tables alone; the client must read the same
         hostile FILE SEED   frames of FILE with wrong contents and good checksums: only ScanheadError comes
 """
 import math
@@ -227,6 +228,41 @@ def samples(page, out):
         types.append(frame.type)
     assert head.parser.bad_bytes == 0
     print(*types, head.stream_sha256())
+
+
+CODES = {"u32": "I", "u64": "Q", "i64": "q", "f64": "d", "char": "s"}
+
+
+def tables_of(page):
+    """For each type of frame, the struct format that the first table of its section gives."""
+    found = {}
+    for kind, section in re.findall(r"\n### ([1-9]) [a-z ]+\n(.*?)(?=\n##)", open(page).read(), re.S):
+        form = "<"
+        for line in section[section.index("| ---"):].split("\n")[1:]:
+            row = re.match(r"\| (\d+) \| ([a-z]+\d*)(?:\[(\d+)\])? \|", line)
+            if row is None:
+                break
+            assert struct.calcsize(form) == int(row[1]), f"type {kind}: a gap before offset {row[1]}"
+            form += (row[3] or "") + CODES[row[2]]
+        found[int(kind)] = struct.Struct(form)
+    return found
+
+
+def flat(fields):
+    for value in fields.values():
+        yield from value if isinstance(value, tuple) else (value,)
+
+
+def tables(page, path):
+    forms, seen = tables_of(page), []
+    for frame in scanhead.open(path).frames():
+        if not frame.fields:
+            continue
+        theirs = [v.split(b"\0")[0].decode() if isinstance(v, bytes) else v
+                  for v in forms[frame.type].unpack_from(frame.payload)]
+        assert theirs == list(flat(frame.fields)), (frame.type, theirs, frame.fields)
+        seen.append(frame.type)
+    print(*seen)
 
 
 if __name__ == "__main__":
