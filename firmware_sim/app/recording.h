@@ -16,9 +16,11 @@ struct recording_options {
     int listen;                           /* send nothing; take what comes until the stream or the time ends */
     uint32_t first_station, last_station; /* scanned one after the other, from 1; 0: as the head is set */
     long frames;                          /* per scan; -1: as the head is set */
-    double duration_s;                    /* > 0: stop each scan after this device time */
+    double duration_s;                    /* > 0: stop each scan after this device time ... */
+    int head_ends;                        /* ... which the head does by itself: no command is needed */
     double replug_s;                      /* > 0: how long to wait for a head that was unplugged, to go on then */
     int progress;                         /* 1: to the report, about once a second */
+    uint64_t source_bytes;                /* of a stream in a file, for progress; 0: not known */
     const struct sh_report *report;
     /* Gets each frame, in order. A negative SH_E ends the recording with it. */
     int (*frame)(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
@@ -36,6 +38,7 @@ struct recording_result {
     struct scanhead_stats stream;   /* as the client counts */
     char sha256[65];                /* of the stream, where scanhead_hash_start was called */
     uint64_t replugs, broken_scans; /* how often the head was away and came back; scans in which it was away */
+    uint64_t bus_resets;            /* how often its USB bus was reset, which ended the session */
 };
 
 /* SH_OK, or the first failure. result is filled in both cases. */

@@ -27,6 +27,7 @@ void recording_put(struct json *json, const void *ctx)
     json_uint(json, "faint_hits", result->faint);
     json_uint(json, "unfit_echoes", result->unfit);
     json_uint(json, "replugs", result->replugs);
+    json_uint(json, "bus_resets", result->bus_resets);
     json_double(json, "wall_s", result->wall_s);
     json_double(json, "cpu_s", clock_cpu_s());
     json_double(json, "pulses_per_s", result->wall_s > 0.0 ? (double)counts->pulses / result->wall_s : 0.0);
@@ -48,10 +49,10 @@ int recording_check_complete(const struct recording_result *result, struct sh_er
     const uint64_t pulses = s->pulses_lost > result->counts.lost ? s->pulses_lost : result->counts.lost;
     if (result->missing[0] != '\0') return sh_fail(err, SH_ESTATE, "interrupted; missing: %s", result->missing);
     if (result->broken_scans != 0)
-        return sh_fail(
-            err, SH_ELOST,
-            "the recording is not complete: the head was away within %llu scans; %llu frames known to be lost",
-            (unsigned long long)result->broken_scans, lost);
+        return sh_fail(err, SH_ELOST,
+                       "the recording is not complete: %s within %llu scans; %llu frames known to be lost",
+                       result->replugs == 0 && result->bus_resets != 0 ? "the USB bus was reset" : "the head was away",
+                       (unsigned long long)result->broken_scans, lost);
     if (lost == 0 && pulses == 0) return SH_OK;
     return sh_fail(err, SH_EIO,
                    "the recording is not complete: %llu frames lost to this reader, %llu pulses by the head; "

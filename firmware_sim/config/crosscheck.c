@@ -120,6 +120,8 @@ static int check_output(const struct cfg_reader *rd, struct config *cfg)
 {
     cfg->output.layout_given = cfg_is_given(rd, "output.layout", 0);
     if (!cfg_is_given(rd, "output.tolerance_m", 0)) cfg->output.tolerance_m = fmax(1e-7, 1e-3 * cfg->plan.range_m);
+    if (!cfg_is_given(rd, "scene.tolerance_m", 0))
+        cfg->scene.tolerance_m = cfg_is_given(rd, "plan.tolerance_m", 0) ? 0.1 * cfg->plan.range_m : 1.0;
     cfg->optics.depth_given = cfg_is_given(rd, "optics.depth", 0);
     if (cfg->output.utm_zone != 0 && cfg->output.crs != GEOREF_UTM)
         return cfg_fail_key(rd, "output.utm_zone", 0, "a zone, but output.crs is not utm; allowed only with crs: utm");
@@ -130,12 +132,14 @@ static int check_output(const struct cfg_reader *rd, struct config *cfg)
     if (cfg->output.scale_m < 1e-6)
         return cfg_fail_key(rd, "output.scale_m", 0, "%.10g is out of range; allowed 0 (automatic) or 1e-6 to 1 m",
                             cfg->output.scale_m);
-    if (cfg->profile.range_max_m / cfg->output.scale_m >= 0x1p31)
+    const int bits = cfg->output.layout == LINE_POLAR ? 32 : 31; /* a range has no sign */
+    const double counts = ldexp(1.0, bits);
+    if (cfg->profile.range_max_m / cfg->output.scale_m >= counts)
         return cfg_fail_key(
             rd, "output.scale_m", 0,
-            "%.10g is too fine: %.10g m of head profile %s do not fit into 31 bits; allowed above %.4g to "
-            "1 m",
-            cfg->output.scale_m, cfg->profile.range_max_m, cfg->profile.name, cfg->profile.range_max_m / 0x1p31);
+            "%.10g is too fine: %.10g m of head profile %s do not fit into %d bits; allowed above %.4g to "
+            "1 m, or 0 (automatic)",
+            cfg->output.scale_m, cfg->profile.range_max_m, cfg->profile.name, bits, cfg->profile.range_max_m / counts);
     return SH_OK;
 }
 
@@ -180,7 +184,10 @@ static int check_usb_link(const struct cfg_reader *rd, const struct config *cfg,
     if (link->backend == USB_BACKEND_USBREDIR && link->attach && link->path[0] == '\0' && link->port == 0)
         return cfg_fail_key(rd, "links[].port", i, "0, and the head is to connect to it; allowed 1 to 65535");
     if (link->backend == USB_BACKEND_USBIP && !has_port) link->port = USB_BACKEND_USBIP_PORT;
-    if (link->serial[0] == '\0') snprintf(link->serial, sizeof link->serial, "%s", cfg->head.serial);
+    if (link->serial[0] == '\0') {
+        snprintf(link->serial, sizeof link->serial, "%s", cfg->head.serial);
+        link->own_serial = !cfg_is_given(rd, "head.serial", 0);
+    }
     return SH_OK;
 }
 

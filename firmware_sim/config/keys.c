@@ -50,7 +50,7 @@ static const struct cfg_key config_keys[] = {
      WITHIN("pan_min_deg", "pan_max_deg"), .help = "Pan angle where a frame starts."},
     {"head.pan_stop_deg", SETTING(pan_stop_udeg), CFG_MICRO, "deg", "@pan_max_deg",
      WITHIN("pan_min_deg", "pan_max_deg"), .help = "Pan angle where a frame ends; at most a turn after its start."},
-    {"head.frames", SETTING(frames), CFG_COUNT, NULL, "1", 0, 1000000,
+    {"head.frames", SETTING(frames), CFG_COUNT, NULL, "1", 0, HEAD_MAX_FRAMES,
      .help = "Frames (pan sweeps) per scan; 0: until stopped."},
     {"head.station", SETTING(station), CFG_COUNT, NULL, "1", 1, CONFIG_MAX_STOPS,
      .help = "Station where the head stands, counted from 1."},
@@ -64,12 +64,23 @@ static const struct cfg_key config_keys[] = {
      .help = "resolved: zones of c / (2 prr_hz) that the head tells apart; nothing is seen beyond them."},
 
     {"scene", .type = CFG_MAP, .help = "What is scanned."},
-    {KEY(scene.tolerance_m), CFG_REAL, "m", "1e-6", 1e-9, 1,
-     .help = "Largest error of a vertex. Formats of single precision are refused where coordinates are too large."},
+    {KEY(scene.tolerance_m), CFG_REAL, "m", "", 1e-9, 1,
+     .help = "Largest error of a vertex. Formats of single precision are refused where coordinates are too large. When "
+             "not given: a tenth of plan.tolerance_m, or 1 m where that isn't given either. Above 1e-6 m is a warning."},
     {KEY(scene.order_exactly), CFG_ENUM, .def = "auto",
      WORDS([CHOICE_AUTO] = "auto", [CHOICE_OFF] = "off", [CHOICE_ON] = "on"),
      .help = "Orders surfaces that overlap or cross in double. It costs loading time, and speed where surfaces "
              "overlap. auto: on where float's resolution in the scene is coarser than plan.tolerance_m."},
+    {KEY(scene.cutouts), CFG_BOOL, .def = "on",
+     .help = "Rays pass where a texture's alpha or opacity map is below a half, as between leaves. Textures are then "
+             "read when the scene is loaded; without such a texture it costs nothing more."},
+    {"scene.import_memory_mib", IN_CONFIG(scene.import.memory_mib), CFG_COUNT, "MiB", "8192", 16, 1 << 24,
+     .help = "Memory that Assimp may take for one mesh (all formats but .obj and .ply); more is an error. Assimp reads "
+             "in a process of its own, since broken files make it crash, hang or take all memory."},
+    {"scene.import_s", IN_CONFIG(scene.import.time_s), CFG_REAL, "s", "300", 0.1, 1e6,
+     .help = "Time that Assimp may take for one mesh; more is an error."},
+    {"scene.import_files", IN_CONFIG(scene.import.files), CFG_COUNT, NULL, "64", 4, 1000,
+     .help = "Files that Assimp may have open at a time: a mesh and those that it names."},
     {"scene.meshes", .type = CFG_LIST, .min = 1, .max = CONFIG_MAX_MESHES, LIST_OF(scene.mesh, scene.n_meshes),
      .help = "Mesh files; together they are the scene."},
     {"scene.meshes[]", .type = CFG_MAP, .help = "A mesh file."},
@@ -195,8 +206,8 @@ static const struct cfg_key config_keys[] = {
      .help = "on: each points frame is followed by one with amplitude (needs signal.model: on) and width of its "
              "echoes, 4 bytes a point; .ply and .las recordings have them."},
     {KEY(output.scale_m), CFG_REAL, "m", "0", 0, 1, .allowed = "0 (automatic) or 1e-6 to 1 m",
-     .help = "Metres per count of a range; a count of a coordinate is no larger. The largest range must fit into 31 "
-             "bits."},
+     .help = "Metres per count of a range; a count of a coordinate is no larger. The largest range must fit into 32 "
+             "bits, a coordinate into 31. automatic: 1e-6 m up to 4294 m of range (geo: 2147 m), then ten times as much."},
 
     {"links", .type = CFG_LIST, .min = 0, .max = CONFIG_MAX_LINKS, LIST_OF(link, n_links),
      .help = "Where the head can be reached; none is needed to record off line."},
@@ -228,7 +239,8 @@ static const struct cfg_key config_keys[] = {
      .help = "usb: vendor id; the default pair is set aside for private tests."},
     {LINK(pid), CFG_COUNT, NULL, "0x0001", 0, 65535, .flags = CFG_HEX, .allowed = "0x0000 to 0xffff",
      .help = "usb: product id."},
-    {LINK(serial), CFG_TEXT, .def = "", .help = "usb: serial number; head.serial when not given."},
+    {LINK(serial), CFG_TEXT, .def = "", .help = "usb: serial number. When not given: head.serial where that is given, else SIM-0001 and eight digits that "
+             "are this head's own on this machine. Only the USB device has them, not *IDN?."},
 
     {"beam", .type = CFG_MAP, .help = "The footprint of the pulses."},
     {KEY(beam.mode), CFG_ENUM, .def = "single",
@@ -258,7 +270,8 @@ static const struct cfg_key config_keys[] = {
     {KEY(noise.angle), CFG_BOOL, .def = "off",
      .help = "Angle noise of the profile's mirror_sigma_deg and pan_sigma_deg: the beam deviates, the encoders do not "
              "show it."},
-    {KEY(noise.seed), CFG_COUNT, NULL, "1", 0, 18446744073709551615.0, .help = "Seed of the random numbers."},
+    {KEY(noise.seed), CFG_COUNT, NULL, "1", 0, 18446744073709551615.0, 
+     .help = "Seed of the random numbers. Noise also differs by station, and by scan since power-up at a station."},
     {"noise.ball", .type = CFG_MAP, .help = "Ball-shaped noise: each point moves to anywhere in a ball around it."},
     {KEY(noise.ball.radius_m), CFG_REAL, "m", "0", 0, 100, .help = "Radius of the ball; 0: none."},
     {KEY(noise.ball.distance_1_m), CFG_REAL, "1/m", "0", 0, 100,
@@ -298,9 +311,11 @@ static const struct cfg_key config_keys[] = {
      .help = "Retro-reflector: its signal is that of a white target times this, at any incidence; foils have 100 to "
              "1000."},
     {SURFACE(glass), CFG_REAL, NULL, "", 0, 1,
-     .help = "Share of the power that passes each surface: the pane and what is seen through it give echoes."},
+     .help = "Share of the power that passes each surface: the pane and what is seen through it give echoes. It counts on "
+             "the way there and back: beyond two surfaces (a pane) of 0.9 an echo has 0.9^4 of its power."},
     {SURFACE(mirror), CFG_REAL, NULL, "", 0, 1,
-     .help = "Share of the power that is mirrored: ghost points, with surfaces of their own."},
+     .help = "Share of the power that is mirrored: ghost points, with surfaces of their own. It counts on the way there "
+             "and back: in a mirror of 0.9 an echo has 0.81 of its power."},
 
     {"optics", .type = CFG_MAP, .help = "Pulses that meet glass or a mirror."},
     {KEY(optics.depth), CFG_COUNT, NULL, "4", 0, CAST_MAX_DEPTH,
