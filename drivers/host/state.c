@@ -246,8 +246,7 @@ void scanhead_get_stats(const struct scanhead *sh, struct scanhead_stats *stats)
         .dropped = sh->dropped,
         .reader_lost = sh->reader_lost,
         /* both count the same; of either, some may not have come */
-        .pulses_lost =
-            sh->pulses_lost_told > sh->pulses_lost_ended ? sh->pulses_lost_told : sh->pulses_lost_ended,
+        .pulses_lost = sh->pulses_lost_told > sh->pulses_lost_ended ? sh->pulses_lost_told : sh->pulses_lost_ended,
     };
 }
 

@@ -317,5 +317,6 @@ int recording_run(struct scanhead *sh, const struct recording_options *options, 
     if (rc == SH_ECLOSED && options->listen && result->frames == 0)
         return sh_fail(err, SH_EFORMAT, "the stream ended without a single frame");
     if (rc == SH_ECLOSED && options->listen && !result->counts.within) return SH_OK;
-    return rc == SH_ECLOSED && result->counts.within ? sh_fail(err, rc, "the stream ended in the middle of a scan") : rc;
+    return rc == SH_ECLOSED && result->counts.within ? sh_fail(err, rc, "the stream ended in the middle of a scan")
+                                                     : rc;
 }

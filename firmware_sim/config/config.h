@@ -186,6 +186,7 @@ struct config_scene {
     uint32_t n_meshes;
     double tolerance_m;
     enum config_choice order_exactly; /* surfaces that overlap are ordered in double */
+    int cutouts;                      /* rays pass where a texture's alpha is below a half */
     struct scene_import_limits import;
     struct config_anchor anchor;
 };

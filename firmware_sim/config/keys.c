@@ -64,12 +64,16 @@ static const struct cfg_key config_keys[] = {
      .help = "resolved: zones of c / (2 prr_hz) that the head tells apart; nothing is seen beyond them."},
 
     {"scene", .type = CFG_MAP, .help = "What is scanned."},
-    {KEY(scene.tolerance_m), CFG_REAL, "m", "1e-6", 1e-9, 1,
-     .help = "Largest error of a vertex. Formats of single precision are refused where coordinates are too large."},
+    {KEY(scene.tolerance_m), CFG_REAL, "m", "", 1e-9, 1,
+     .help = "Largest error of a vertex. Formats of single precision are refused where coordinates are too large. When "
+             "not given: a tenth of plan.tolerance_m, or 1 m where that isn't given either. Above 1e-6 m is a warning."},
     {KEY(scene.order_exactly), CFG_ENUM, .def = "auto",
      WORDS([CHOICE_AUTO] = "auto", [CHOICE_OFF] = "off", [CHOICE_ON] = "on"),
      .help = "Orders surfaces that overlap or cross in double. It costs loading time, and speed where surfaces "
              "overlap. auto: on where float's resolution in the scene is coarser than plan.tolerance_m."},
+    {KEY(scene.cutouts), CFG_BOOL, .def = "on",
+     .help = "Rays pass where a texture's alpha or opacity map is below a half, as between leaves. Textures are then "
+             "read when the scene is loaded; without such a texture it costs nothing more."},
     {"scene.import_memory_mib", IN_CONFIG(scene.import.memory_mib), CFG_COUNT, "MiB", "8192", 16, 1 << 24,
      .help = "Memory that Assimp may take for one mesh (all formats but .obj and .ply); more is an error. Assimp reads "
              "in a process of its own, since broken files make it crash, hang or take all memory."},

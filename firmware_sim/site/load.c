@@ -13,6 +13,7 @@ static struct scene_mesh_spec mesh_spec(const struct config *cfg, const struct c
         .up = mesh->up,
         .scale = mesh->scale,
         .textures = cfg->signal.on,
+        .cutouts = cfg->scene.cutouts,
         .limits = &cfg->scene.import,
     };
     memcpy(spec.offset_m, mesh->offset_m, sizeof spec.offset_m);
@@ -37,6 +38,7 @@ static int add_mover(struct site *site, const struct config_mesh *mesh, const st
         return sh_fail(err, SH_EINPUT, "%s: too many surfaces; at most %d", mesh->file, SCENE_MAX_SURFACES);
     for (uint32_t i = 0; i < m->scene->n_triangles; i++)
         m->scene->label[i] = (uint16_t)(m->scene->label[i] + site->n_surfaces);
+    m->scene->label0 = site->n_surfaces;
     site->n_surfaces += m->scene->n_surfaces;
     for (int i = 0; i < 3; i++) {
         double half = 0.5 * (m->scene->max_m[i] - m->scene->min_m[i]);

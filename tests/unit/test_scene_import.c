@@ -37,8 +37,8 @@ static const char *stl_text(double x, double y, const char *z)
 static void stl_is_read(void **state)
 {
     (void)state;
-    struct scene *s = load_text("a.STL", stl_text(10, 20, "0.5"));
-    static const double v[3][3] = {{10, 20, 0}, {11, 20, 0.5}, {10, 21, 0}};
+    struct scene *s = load_text("a.STL", stl_text(10, 15, "0.5"));
+    static const double v[3][3] = {{10, 15, 0}, {11, 15, 0.5}, {10, 16, 0}};
     assert_int_equal(s->n_triangles, 1);
     assert_int_equal(s->n_meshes, 1);
     assert_memory_equal(s->vertex_m, v, sizeof v);
