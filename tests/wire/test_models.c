@@ -117,7 +117,7 @@ static void each_is_scanned_or_refused(void **state)
     }
     print_message("%d models: %d scanned; refused: %d for single precision, %d without triangles, %d broken\n",
                   n_models, scanned, single, empty, broken);
-    assert_true(scanned >= 73); /* as many as were read before, at scale 1 */
+    assert_true(scanned >= 100); /* 101 of Debian 12's 140; Assimp of another version may read others */
 }
 
 int main(void)
