@@ -1,11 +1,14 @@
 #include "firmware_sim/app/app.h"
 
 #include <errno.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 #include "core/newfile.h"
+#include "firmware_sim/app/progress.h"
+#include "firmware_sim/base/clock.h"
 
 static volatile sig_atomic_t interrupted;
 
@@ -58,11 +61,16 @@ static void print_warning(void *ctx, const char *text)
 
 static void print_progress(void *ctx, const char *what, double fraction)
 {
+    static struct progress_pace pace;
+    const double left_s = progress_left_s(&pace, what, fraction, clock_now_ns());
+    char left[48] = "";
     (void)ctx;
+    if (left_s >= 0.0 && left_s < 120.0) snprintf(left, sizeof left, ", %.0f s left", ceil(left_s));
+    if (left_s >= 120.0) snprintf(left, sizeof left, ", %.0f min left", ceil(left_s / 60.0));
     if (fraction < 0.0)
         fprintf(stderr, "scanhead: %s ...\n", what);
     else
-        fprintf(stderr, "scanhead: %s: %.0f %%\n", what, 100.0 * fraction);
+        fprintf(stderr, "scanhead: %s: %.0f %%%s\n", what, 100.0 * fraction, left);
 }
 
 static int asked_to_stop(void *ctx)

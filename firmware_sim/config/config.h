@@ -200,7 +200,7 @@ struct config_output {
     enum georef_method georef; /* GEOREF_AUTO: as the plan says */
     double tolerance_m;        /* largest error of a georeferenced position */
     int attributes;            /* amplitude and width of each echo follow the points */
-    double scale_m;            /* 0: the finest of 1e-6 x 10^n m that holds range_max_m in 31 bits */
+    double scale_m;            /* 0: the finest of 1e-6 x 10^n m that holds range_max_m (polar: 32 bits, geo: 31) */
 };
 
 struct config_beam {

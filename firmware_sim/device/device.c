@@ -95,7 +95,9 @@ int device_create(const struct site *site, const struct device_options *options,
     device->machine.due_tick = device->end_tick = device->overrun.first = UINT64_MAX;
     if (options->duration_s > 0.0 && !options->start)
         device->end_tick = (uint64_t)ceil(options->duration_s * (double)device->tick_hz);
-    int rc = set_limits(device, err);
+    device->station_scans = calloc(site->n_stations, sizeof *device->station_scans);
+    int rc = device->station_scans != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory");
+    if (rc == SH_OK) rc = set_limits(device, err);
     if (rc == SH_OK) rc = check_live(device, err);
     if (rc == SH_OK) rc = head_clock_create(site->cfg, &device->clock, err);
     gnss_init(&device->gnss, site, &device->clock);
@@ -130,6 +132,7 @@ void device_free(struct device *device)
     if (device == NULL) return;
     journal_close(device->journal.out, NULL);
     free(device->journal.replay);
+    free(device->station_scans);
     pthread_mutex_destroy(&device->lock);
     free(device);
 }

@@ -56,9 +56,10 @@ struct device_work {
     uint64_t n_cast, cast0;     /* of these, how many are cast, and the first of them; UINT64_MAX: none */
     int cut_short;              /* the scan stops at pulse_end, within a line */
     uint32_t station;
-    size_t stretch;   /* of a trajectory: the one of the last anchor */
-    uint32_t echoes;  /* enum beam_select */
-    uint32_t n_poses; /* live: the head's poses of this tick; 0: the head stands still or follows a trajectory */
+    uint32_t station_scan; /* which scan it is of that station's since power-up, from 1 */
+    size_t stretch;        /* of a trajectory: the one of the last anchor */
+    uint32_t echoes;       /* enum beam_select */
+    uint32_t n_poses;      /* live: the head's poses of this tick; 0: the head stands still or follows a trajectory */
     struct pose_knot pose[DEVICE_MAX_POSES];
     int telemetry; /* due at the tick's end; it goes before each SCAN_END, too */
     struct native_telemetry telemetry_frame;

@@ -46,10 +46,11 @@ struct device_scan {
     uint64_t pulse_next; /* next pulse to be claimed */
     uint64_t cast;       /* of the pulses before, those that are cast */
     struct schedule_segment segment;
-    uint32_t station; /* from 0 */
-    size_t stretch;   /* of a trajectory: the one of the last pulse that is claimed */
-    int describe;     /* descriptor and anchor are due, as news */
-    int anchor_lost;  /* they are due as a repetition: a new anchor was in a tick that was lost */
+    uint32_t station;      /* from 0 */
+    uint32_t station_scan; /* which of its scans */
+    size_t stretch;        /* of a trajectory: the one of the last pulse that is claimed */
+    int describe;          /* descriptor and anchor are due, as news */
+    int anchor_lost;       /* they are due as a repetition: a new anchor was in a tick that was lost */
     int stop_requested;
 };
 
@@ -101,6 +102,7 @@ struct device {
     int ending, over;
     struct device_machine machine;
     struct device_scan scan;
+    uint32_t *station_scans; /* [n_stations] since power-up */
     struct device_events events;
     struct device_errors errors[DEVICE_MAX_SESSIONS + 1]; /* of session i; 0: the head */
     uint64_t held;                                        /* errors in all that no event has said */

@@ -11,6 +11,7 @@ void device_begin_scan(struct device *device, uint64_t tick)
                                         .number = device->scan.number + 1,
                                         .tick0 = tick,
                                         .station = device->cmd.settings.station - 1,
+                                        .station_scan = ++device->station_scans[device->cmd.settings.station - 1],
                                         .stretch = site_stretch_at(device->site, 0),
                                         .describe = 1};
     schedule_start(&device->scan.segment, &spec);
@@ -90,6 +91,7 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
     work->scan_t0_ns = (int64_t)device->scan.tick0 * device->tick_ns;
     work->segment = *seg;
     work->station = device->scan.station;
+    work->station_scan = device->scan.station_scan;
     work->stretch = device->scan.stretch;
     work->echoes = device->cmd.settings.echoes;
     work->pulse0 = device->scan.pulse_next;

@@ -21,8 +21,10 @@ double site_ray_reach_m(const struct site *site, const double station_m[3]);
 
 /* How far the scene goes, without what moves. */
 double site_farthest_m(const struct site *site, const double from_m[3]);
-/* How far noise may take a point. */
+/* How far noise may take a point, whether it is on or not; of that, the ball; a range, ten sigma of its noise. */
 double site_noise_m(const struct site *site);
+double site_ball_m(const struct site *site);
+double site_range_noise_m(const struct site *site);
 
 /* ---- platform.c: a head that moves while it scans, or that scans where its platform stops (platform.kind: stops).
  * In: the configured trajectory and times. Out: its poses (scene frame, metres) and the BVHs that its path
