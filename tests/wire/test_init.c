@@ -183,6 +183,21 @@ static void a_scan_of_nothing_is_told(void **state)
     forget();
 }
 
+static void a_colour_that_nothing_fills_is_told(void **state)
+{
+    struct wire *wire = *state;
+    write_room(wire, "room.obj", 1, 0);
+    assert_int_equal(RUN(wire, "init", "room.obj"), 0);
+    assert_int_equal(RUN(wire, "record", "room.yaml", "-o", "grey.ply", "--colour", "reflectance", "--quiet"), 0);
+    contains(text, "--colour reflectance: none of ");
+    contains(text, "it needs the head's signal.model: on");
+    assert_int_equal(RUN(wire, "record", "room.yaml", "-o", "grey.ply", "--colour", "reflectance", "--quiet", "--set",
+                         "signal.model=on", "--set", "surfaces.0.reflectance=0.5"),
+                     0);
+    assert_string_equal(text, "");
+    forget();
+}
+
 static void a_map_is_a_png(void **state)
 {
     struct wire *wire = *state;
@@ -203,6 +218,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(what_is_there_stays, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(wrong_use_says_what_is_allowed, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(a_scan_of_nothing_is_told, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(a_colour_that_nothing_fills_is_told, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(a_map_is_a_png, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
