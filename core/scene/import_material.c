@@ -99,8 +99,8 @@ static const struct aiTexture *find_within(const struct aiScene *in, const char 
     return *number >= 0 && *number < (long)in->mNumTextures ? in->mTextures[*number] : NULL;
 }
 
-/* An image that lies within is named after the mesh's file, with its number. Height 0: it is packed, and the width
- * counts bytes. */
+/* An image that lies within is named after the mesh's file, with its number. Height 0: it is packed, and
+ * the width counts bytes. */
 static int add_image(struct scene_build *b, const struct aiScene *in, const struct slot *slot, uint16_t *number,
                      struct sh_err *err)
 {

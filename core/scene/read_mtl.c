@@ -34,8 +34,8 @@ static bool read_colour(struct text *t, double rgb[3])
     return true;
 }
 
-/* The options of a map, up to the file's name: of -clamp the value. Others take numbers and words of their own;
- * the name is then the last word. Without options it may have blanks. */
+/* The options of a map, up to the file's name: of -clamp the value. Others take numbers and words of their
+ * own; the name is then the last word. Without options it may have blanks. */
 static struct text_span map_file(struct text_span map, enum texture_wrap wrap[2])
 {
     struct text_span last = map, before = {"", 0};

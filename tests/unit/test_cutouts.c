@@ -157,8 +157,8 @@ struct layer {
     int cut, label;
 };
 
-/* Texel borders and edges nearer than this to a ray are left alone: coordinates of textures are floats, good to
- * 6e-8 of 1 + shift, in squares 8 times that. */
+/* Texel borders and edges nearer than this to a ray are left alone: coordinates of textures are floats,
+ * good to 6e-8 of 1 + shift, in squares 8 times that. */
 static const double NEAR = 4e-6;
 
 /* 1: ray i meets the layer; 0: it does not; -1: too near to a border. */
@@ -218,7 +218,8 @@ static void half_of_a_board_is_seen_through(void **state)
     scene_free(scene);
 }
 
-/* A micrometre apart, which glass would step over; each shifted by a part of a square, so that some rays pass all. */
+/* A micrometre apart, which glass would step over; each shifted by a part of a square, so that some rays
+ * pass all. */
 static void a_stack_of_any_number_is_seen_through(void **state)
 {
     (void)state;
@@ -272,8 +273,8 @@ static void what_lies_in_the_same_plane_stops_the_ray(void **state)
     scene_free(scene);
 }
 
-/* Cards stand in front of a floor that is seen at a small angle: behind a hole the float distance of the floor may
- * be less than the card's. */
+/* Cards stand in front of a floor that is seen at a small angle: behind a hole the float distance of the
+ * floor may be less than the card's. */
 static void nothing_is_lost_behind_a_card_above_the_floor(void **state)
 {
     (void)state;

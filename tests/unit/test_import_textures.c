@@ -1,5 +1,5 @@
-/* Textures as Assimp hands them over: within the file, with wrap modes, a second set of coordinates, and what the
- * format says of alpha. */
+/* Textures as Assimp hands them over: within the file, with wrap modes, a second set of coordinates, and
+ * what the format says of alpha. */
 #include "tests/unit/scene_files.h"
 
 #include <math.h>
