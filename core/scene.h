@@ -77,6 +77,12 @@ struct scene_counts {
     uint64_t names_cut;     /* object or material names cut to SCENE_NAME_LEN - 1 bytes */
 };
 
+/* What a file, or its format by definition, says of its unit and axes. Nothing follows from it by itself. */
+struct scene_says {
+    double unit_m; /* metres per unit; 0: it doesn't say */
+    int up;        /* the axis that points up: 1 x, 2 y, 3 z; negative: down; 0: it doesn't say */
+};
+
 struct scene {
     uint32_t n_vertices, n_triangles, n_surfaces;
     uint32_t n_meshes;             /* placements in node trees; one for each .obj or .ply */
@@ -97,6 +103,7 @@ struct scene {
     double error_m;            /* of the vertices, by rounding to single precision; 0: none */
     double min_m[3], max_m[3]; /* bounds of the used vertices, prcs */
     struct scene_counts counts;
+    struct scene_says says; /* of the last file */
 };
 
 /* Loads all meshes into one scene.

@@ -2,11 +2,12 @@
 #include <errno.h>
 #include <string.h>
 
+#include "drivers/host/scanhead.h"
 #include "firmware_sim/app/app.h"
 
 /* The only list of commands. */
 static const struct app_command *const COMMANDS[] = {
-    &app_run, &app_record, &app_plan, &app_map, &app_report, &app_check, &app_list, NULL,
+    &app_run, &app_record, &app_plan, &app_map, &app_report, &app_check, &app_list, &app_init, NULL,
 };
 
 static void print_help(FILE *out)
@@ -17,7 +18,7 @@ static void print_help(FILE *out)
         app_arguments(*c, arguments, sizeof arguments);
         fprintf(out, "  scanhead %s%-*s %s\n", (*c)->name, 38 - (int)strlen((*c)->name), arguments, (*c)->summary);
     }
-    fprintf(out, "\nEach command has --help. `scanhead check --help` lists all configuration keys.\n"
+    fprintf(out, "\nEach command has --help; --version says which release this is. `scanhead check --help` lists all configuration keys.\n"
                  "Exit status: 0 done, 1 failed, 2 wrong usage, configuration or input.\n");
 }
 
@@ -29,6 +30,10 @@ static int run(int argc, char **argv)
     }
     if (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0 || strcmp(argv[1], "help") == 0) {
         print_help(stdout);
+        return APP_OK;
+    }
+    if (strcmp(argv[1], "--version") == 0) {
+        printf("scanhead %s\n", scanhead_version());
         return APP_OK;
     }
     for (const struct app_command *const *c = COMMANDS; *c != NULL; c++)

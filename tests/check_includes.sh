@@ -7,7 +7,7 @@
 #
 # In core and in firmware_sim a room may use itself and the rooms before it in this list. Files that lie in core itself are
 # the first room, `core`: errors, lines, vectors, angles, random numbers.
-core_order='core texture scene schedule georef pose surface instrument detect bvh sight footprint cast plan analysis'
+core_order='core texture scene schedule georef pose surface instrument detect bvh sight footprint cast plan analysis standpoint'
 firmware_order='base command config site device loop app'
 # Headers in core/ that belong to a room with another name, as HEADER:ROOM.
 core_headers='cloud:analysis distance:analysis map:analysis geoframe:georef locate:georef ifc_site:scene embree:bvh'

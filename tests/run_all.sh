@@ -30,7 +30,7 @@ set --
 if wanted unit; then set -- "$@" +tests/check_recipes.sh; fi
 if wanted accuracy; then set -- "$@" $(programs accuracy); fi
 if wanted stability; then set -- "$@" $(programs stability); fi
-if wanted unit; then set -- "$@" tests/check_includes.sh $(programs unit); fi
+if wanted unit; then set -- "$@" tests/check_includes.sh tests/check_make.sh $(programs unit); fi
 if [ -z "$part" ]; then set -- "$@" $(programs unit "$build/asan"); fi
 if wanted guest; then
     export BUILD="$build"

@@ -59,6 +59,7 @@ void build_begin_file(struct scene_build *b, const struct scene_mesh_spec *spec)
     b->vertex0 = b->mesh_vertex0 = b->scene->n_vertices;
     b->triangle0 = b->scene->n_triangles;
     b->counts = (struct scene_counts){0};
+    b->scene->says = (struct scene_says){0};
     b->has_uv = false;
     b->not_simple = 0;
     b->file_ns = now_ns();

@@ -17,6 +17,7 @@
 #include "core/scene/ifc_check.h"
 #include "core/scene/import.h"
 #include "core/scene/import_material.h"
+#include "core/scene/import_says.h"
 
 enum { MAX_DEPTH = 256 };
 
@@ -221,6 +222,7 @@ int import_assimp(struct scene_build *b, struct sh_err *err)
     if (stat(b->spec->file, &st) == 0 && st.st_size > 8 << 20) build_announce(b);
     im.in = import_file(b, &log, err);
     if (im.in == NULL) return SH_EINPUT;
+    b->scene->says = import_says(im.in, b->spec->file);
     im.n_faces = count_faces(im.in, im.in->mRootNode);
     rc = add_node(&im, im.in->mRootNode, 0, err);
     if (rc == SH_OK) rc = build_single(b, im.largest, true, err);

@@ -23,6 +23,7 @@ struct result_head {
     uint32_t n_vertices, n_triangles, n_surfaces, n_meshes, n_textures, has_uv;
     struct scene_counts counts;
     double error_m;
+    struct scene_says says;
 };
 
 /* Before its name and its bytes. */
@@ -81,7 +82,8 @@ int import_result_write(struct scene *scene, int fd, struct sh_err *err)
                                .n_textures = s->n_textures,
                                .has_uv = s->uv != NULL,
                                .counts = s->counts,
-                               .error_m = s->error_m};
+                               .error_m = s->error_m,
+                               .says = s->says};
     memcpy(head.magic, MAGIC, sizeof head.magic);
     int rc = put(fd, &head, sizeof head, err);
     if (rc == SH_OK) rc = put_textures(s, fd, err);
@@ -308,6 +310,9 @@ static int take_head(struct result *r)
     if (rc == SH_OK && !(r->head.error_m >= 0.0 && r->head.error_m <= BUILD_MAX_COORDINATE_M))
         rc = wrong(r, "the error of its vertices, above m:", 0);
     if (rc == SH_OK && least_size(&r->head) > r->size) rc = wrong(r, "its size is", r->size);
+    if (rc == SH_OK && !(r->head.says.unit_m >= 0.0 && r->head.says.unit_m <= BUILD_MAX_COORDINATE_M))
+        rc = wrong(r, "its unit:", 0);
+    if (rc == SH_OK && (r->head.says.up < -3 || r->head.says.up > 3)) rc = wrong(r, "its axes:", 0);
     return rc;
 }
 
@@ -319,6 +324,7 @@ static void count(struct result *r)
     s->counts.names_cut += r->head.counts.names_cut;
     s->n_meshes += r->head.n_meshes;
     s->error_m = fmax(s->error_m, r->head.error_m);
+    s->says = r->head.says;
 }
 
 int import_result_read(struct scene_build *b, int fd, struct sh_err *err)

@@ -15,6 +15,11 @@ _Static_assert(SCANHEAD_POINTS == (int)NATIVE_POINTS && SCANHEAD_POSES == (int)N
                    SCANHEAD_POSE_NONE == (int)NATIVE_POSE_NONE && SCANHEAD_LOCAL == (int)NATIVE_LOCAL,
                "types, events and flags are those on the wire");
 
+const char *scanhead_version(void)
+{
+    return SCANHEAD_VERSION;
+}
+
 /* Tries to open a source until the deadline while it isn't there. wrong_too: also while its name seems wrong,
  * because it was right once. */
 static int open_in_time(const char *source, int wrong_too, int64_t deadline_ns, struct host_source *out,

@@ -34,7 +34,12 @@
 extern "C" {
 #endif
 
+/* Of this release, the only place that says it: program, library and libscanhead.pc have the same. */
+#define SCANHEAD_VERSION "1.0.0"
 #define SCANHEAD_API_VERSION 1
+
+/* SCANHEAD_VERSION of the library that the program runs with. */
+const char *scanhead_version(void);
 
 enum scanhead_error {
     SCANHEAD_OK = 0,

@@ -15,7 +15,8 @@ static int absorb_descriptor(struct scanhead *sh, const struct native_header *he
 {
     struct native_descriptor d;
     if (native_decode_descriptor(payload, header->length, &d) != 0) return bad(sh, "a wrong descriptor");
-    if (d.layout == NATIVE_POLAR && !(d.mirror_counts_per_turn > 0 && d.pan_counts_per_turn > 0 && d.range_scale_m > 0))
+    if (d.layout == NATIVE_POLAR &&
+        !(d.mirror_counts_per_turn >= 1 && d.pan_counts_per_turn >= 1 && d.range_scale_m > 0))
         return bad(sh, "a polar descriptor without scales");
     if (d.n_surfaces > SCANHEAD_NO_LABEL) return bad(sh, "a descriptor with more surfaces than labels");
     /* The anchor of another scan may be that of another station; a descriptor that is not a repetition begins
@@ -246,8 +247,7 @@ void scanhead_get_stats(const struct scanhead *sh, struct scanhead_stats *stats)
         .dropped = sh->dropped,
         .reader_lost = sh->reader_lost,
         /* both count the same; of either, some may not have come */
-        .pulses_lost =
-            sh->pulses_lost_told > sh->pulses_lost_ended ? sh->pulses_lost_told : sh->pulses_lost_ended,
+        .pulses_lost = sh->pulses_lost_told > sh->pulses_lost_ended ? sh->pulses_lost_told : sh->pulses_lost_ended,
     };
 }
 

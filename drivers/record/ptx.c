@@ -21,7 +21,6 @@
 
 enum {
     LINE_MAX_LEN = 512,
-    HEADER_MAX_LEN = 2048,
     ROWS_MAX = 1 << 22,     /* of a grid, whose column is held in memory: 160 MiB. Heads have up to 550,000 */
     PADDING_FREE = 1 << 24, /* 160 MiB of text; a scan of 4,500 lines of 3,700 pulses of which one line came */
     PADDING_PER_SHOT = 8,
@@ -44,22 +43,27 @@ static int ptx_begin(void *rec, struct sh_err *err)
     return ptx_grid_open(&ptx->grid, ptx->base.file.path, err);
 }
 
+static int put_vector(struct ptx *ptx, int digits, const double v[3], const char *end, struct sh_err *err)
+{
+    char text[LINE_MAX_LEN];
+    int n = snprintf(text, sizeof text, "%.*f %.*f %.*f%s\n", digits, v[0], digits, v[1], digits, v[2], end);
+    if (n >= (int)sizeof text) return recorder_fail_huge(&ptx->base, v, err);
+    return outfile_write(&ptx->base.file, text, (size_t)n, err);
+}
+
 /* Vectors are rows in PTX: what stands in the matrix is the rotation's transpose, the shift below it. */
 static int put_header(struct ptx *ptx, struct sh_err *err)
 {
     const struct ptx_grid *g = &ptx->grid;
     const double *r = ptx->pose.rotation, *s = ptx->pose.shift_m;
-    char text[HEADER_MAX_LEN];
-    int n =
-        snprintf(text, sizeof text, "%" PRIu64 "\n%" PRIu64 "\n%.9f %.9f %.9f\n",
-                 (uint64_t)g->column_max - g->column_min + 1, (uint64_t)g->row_max - g->row_min + 1, s[0], s[1], s[2]);
-    for (int i = 0; i < 3; i++)
-        n += snprintf(text + n, sizeof text - (size_t)n, "%.15f %.15f %.15f\n", r[i], r[3 + i], r[6 + i]);
-    for (int i = 0; i < 3; i++)
-        n += snprintf(text + n, sizeof text - (size_t)n, "%.15f %.15f %.15f 0\n", r[i], r[3 + i], r[6 + i]);
-    n += snprintf(text + n, sizeof text - (size_t)n, "%.9f %.9f %.9f 1\n", s[0], s[1], s[2]);
-    if (n >= (int)sizeof text) return recorder_fail_huge(&ptx->base, s, err);
-    return outfile_write(&ptx->base.file, text, (size_t)n, err);
+    char size[64];
+    int n = snprintf(size, sizeof size, "%" PRIu64 "\n%" PRIu64 "\n", (uint64_t)g->column_max - g->column_min + 1,
+                     (uint64_t)g->row_max - g->row_min + 1);
+    int rc = outfile_write(&ptx->base.file, size, (size_t)n, err);
+    if (rc == 0) rc = put_vector(ptx, 9, s, "", err);
+    for (int i = 0; rc == 0 && i < 6; i++)
+        rc = put_vector(ptx, 15, (const double[]){r[i % 3], r[3 + i % 3], r[6 + i % 3]}, i < 3 ? "" : " 0", err);
+    return rc == 0 ? put_vector(ptx, 9, s, " 1", err) : rc;
 }
 
 static int put_column(void *ctx, const struct ptx_cell *column, uint32_t n_rows, struct sh_err *err)
@@ -127,7 +131,7 @@ static float intensity(struct ptx *ptx, double reflectance_db)
 static int ptx_points(void *rec, int n, struct sh_err *err)
 {
     struct ptx *ptx = rec;
-    const struct track *t = &ptx->base.track;
+    struct track *t = &ptx->base.track;
     if (n > 0 && !has_room(ptx, (uint32_t)n)) {
         int rc = end_scan(ptx, err);
         if (rc != 0) return rc;
@@ -145,6 +149,7 @@ static int ptx_points(void *rec, int n, struct sh_err *err)
         if (p->echo_count == 0) continue;
         struct ptx_cell cell = {t->line, t->row[i], intensity(ptx, p->reflectance_db), {p->x, p->y, p->z}};
         if (t->info.geo) station_pose_reverse(&t->pose, cell.p_socs);
+        if (track_is_nowhere(t, cell.p_socs[0], cell.p_socs[1], cell.p_socs[2])) continue;
         int rc = ptx_grid_cell(&ptx->grid, &cell, err);
         if (rc != 0) return rc;
     }

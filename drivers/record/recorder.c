@@ -82,6 +82,8 @@ static void report_losses(const struct recorder *rec)
     recorder_report(rec, t->missing.n_unplaced,
                     "points left out that came before the descriptor and the anchor of their scan");
     recorder_report(rec, t->missing.n_without_pose, "points left out whose pose was lost");
+    recorder_report(rec, t->missing.n_nowhere,
+                    "points left out whose coordinates are infinite or no numbers: the stream is broken");
     recorder_report(rec, t->missing.n_attributes_unheld,
                     "points whose amplitude and width are left out; this format has no place for them");
     recorder_report(rec, t->missing.n_without_attributes, "points without amplitude and width, which were lost");

@@ -9,12 +9,16 @@
 
 #include "core/err.h"
 #include "drivers/host/scanhead.h"
+#include "drivers/record/colour.h"
 #include "drivers/record/outfile.h"
 #include "drivers/record/track.h"
 
 struct recorder_options {
-    int ascii;       /* PLY as text */
-    int empty_shots; /* keep shots without echo, where the format can */
+    int ascii;               /* PLY as text */
+    int empty_shots;         /* keep shots without echo, where the format can */
+    enum colour_kind colour; /* of .ply and .las */
+    int scalar_names;        /* PLY's columns besides coordinates and colour are called scalar_NAME */
+    int las_minor;           /* LAS 1.2 or 1.4: 2 or 4; 0: 4 */
     /* Is given, at the end, what the format had no room for. May be NULL; must live until close. */
     const struct sh_report *report;
     /* Asked while a file is completed, which may take long: non-zero gives the file up. NULL: never. */

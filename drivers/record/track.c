@@ -101,6 +101,34 @@ static uint64_t number_rows(struct track *t, uint64_t row, int n)
     return row;
 }
 
+int track_is_nowhere(struct track *t, double x, double y, double z)
+{
+    int nowhere = !isfinite(x) || !isfinite(y) || !isfinite(z);
+    t->missing.n_nowhere += (uint64_t)nowhere;
+    return nowhere;
+}
+
+static void keep_point(struct track *t, int from, int to)
+{
+    t->point[to] = t->point[from];
+    t->row[to] = t->row[from];
+    t->index[to] = t->index[from];
+    t->frame[to] = t->frame[from];
+}
+
+/* How many are left. */
+static int leave_out_nowhere(struct track *t, int n)
+{
+    int kept = 0;
+    for (int i = 0; i < n; i++) {
+        const struct scanhead_point *p = &t->point[i];
+        if (p->echo_count != 0 && track_is_nowhere(t, p->x, p->y, p->z)) continue;
+        if (kept != i) keep_point(t, i, kept);
+        kept++;
+    }
+    return kept;
+}
+
 /* Positions of the geo layout need no pose. The frame scalar does; it is NaN where the pose was lost. */
 static void set_geo_frames(struct track *t, int n)
 {
@@ -124,10 +152,7 @@ static int place_moving(struct track *t, int n, struct sh_err *err)
             t->missing.n_without_pose++;
             continue;
         }
-        t->point[kept] = t->point[i];
-        t->row[kept] = t->row[i];
-        t->index[kept] = t->index[i];
-        t->frame[kept++] = t->frame[i];
+        keep_point(t, i, kept++);
     }
     return kept;
 }
@@ -218,6 +243,7 @@ static int take_batch(struct track *t, uint32_t first, int n, struct sh_err *err
         t->index[i] = first + (uint32_t)i;
     int kept = t->info.moving ? place_moving(t, n, err) : n;
     if (kept < 0) return kept;
+    kept = leave_out_nowhere(t, kept);
     count_unheld(t, kept);
     if (!t->has_attributes) return t->ops->points(t->rec, kept, err);
     wait_for_attributes(t, kept);
@@ -268,7 +294,7 @@ static int take_points(struct track *t, const struct scanhead_frame *frame, stru
     t->state.last_station = t->info.station;
     if (rc == 0) rc = begin_waiting(t, err);
     uint64_t row = first_row(t, frame);
-    if (rc == 0 && row + frame->n_points > UINT32_MAX)
+    if (rc == 0 && row > UINT32_MAX - frame->n_points)
         rc = sh_fail(err, SH_EFORMAT, "%s: line %u has more than 2^32 pulses", t->path, t->line);
     return rc == 0 && t->ops->points != NULL ? take_batches(t, frame, row, err) : rc;
 }

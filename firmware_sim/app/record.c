@@ -2,6 +2,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/offline.h"
@@ -89,6 +90,8 @@ static int record(struct record *r, struct scanhead *sh, struct sh_err *err)
     rc = follow(r, sh, &result, err);
     if (rc == SH_OK || result.points != 0) say_result(r, &result);
     app_warn_left_out(result.crowded, result.unfit);
+    if (rc == SH_OK && result.empty <= result.counts.pulses)
+        app_warn_empty(result.counts.pulses, result.counts.pulses - result.empty, result.faint);
     return rc == SH_OK ? recording_check_complete(&result, err) : rc;
 }
 
@@ -178,7 +181,10 @@ static int record_stream(struct record *r, struct sh_err *err)
     char why[512];
     int rc = open_stream(r, &sh, why, sizeof why);
     if (rc != SCANHEAD_OK) return sh_fail(err, rc, "%s", why);
+    struct stat st;
     if (ends_in(r->source, ".shs")) r->recording.listen = 1;
+    if (r->recording.listen && stat(r->source, &st) == 0 && S_ISREG(st.st_mode))
+        r->recording.source_bytes = (uint64_t)st.st_size;
     if (r->station == APP_WORD && !r->recording.listen) {
         char reply[512];
         rc = scanhead_command(sh, "HEAD:STATION? MAX", reply, sizeof reply, 5000);
@@ -197,6 +203,42 @@ static int take_file(void *values, const char *text)
     struct record *r = values;
     struct sh_err err = {0};
     return record_files_add(&r->files, text, &err) == SH_OK ? APP_OK : app_fail(&err);
+}
+
+/* The index of a word; APP_USAGE with the reason printed. */
+static int take_word(const char *option, const char *const *words, int n, const char *text, int *index)
+{
+    char allowed[64] = "";
+    for (*index = 0; *index < n; ++*index) {
+        if (strcmp(text, words[*index]) == 0) return APP_OK;
+        snprintf(allowed + strlen(allowed), sizeof allowed - strlen(allowed), "%s%s", *index > 0 ? ", " : "",
+                 words[*index]);
+    }
+    return app_usage(&app_record, "--%s %s: allowed are %s", option, text, allowed);
+}
+
+static int take_colour(void *values, const char *text)
+{
+    static const char *const words[] = {
+        [COLOUR_NONE] = "none", [COLOUR_REFLECTANCE] = "reflectance", [COLOUR_LABEL] = "label"};
+    struct record *r = values;
+    int i, status = take_word("colour", words, 3, text, &i);
+    if (status == APP_OK) r->files.recorder.colour = (enum colour_kind)i;
+    return status;
+}
+
+static int take_ply_names(void *values, const char *text)
+{
+    static const char *const words[] = {"scanhead", "cloudcompare"};
+    return take_word("ply-names", words, 2, text, &((struct record *)values)->files.recorder.scalar_names);
+}
+
+static int take_las_version(void *values, const char *text)
+{
+    static const char *const words[] = {"1.2", "1.4"};
+    int i, status = take_word("las-version", words, 2, text, &i);
+    if (status == APP_OK) ((struct record *)values)->files.recorder.las_minor = 2 + 2 * i;
+    return status;
 }
 
 static int run(int argc, char **argv)
@@ -240,6 +282,12 @@ static const struct app_option OPTIONS[] = {
     {APP_NUMBER, "replug", "S", .min = 0.0, .max = 1e8, .at = AT(recording.replug_s),
      .help = "when the head is unplugged, wait up to S seconds for it and go on in the same files"},
     {APP_FLAG, "ascii", NULL, .at = AT(files.recorder.ascii), .help = "PLY as text"},
+    {APP_CALL, "ply-names", "WHOSE", .apply = take_ply_names,
+     .help = "scanhead: range, time, ... (the default), or cloudcompare: scalar_range, scalar_time, ..., which it shows"},
+    {APP_CALL, "colour", "BY", .apply = take_colour,
+     .help = "reflectance (grey, -30 to 0 dB) or label (a hue per surface): .ply and .las with red, green, blue"},
+    {APP_CALL, "las-version", "1.2|1.4", .apply = take_las_version,
+     .help = "of .las; 1.2 is for older readers and holds no labels, five returns of a pulse (default 1.4)"},
     {APP_FLAG, "empty-shots", NULL, .at = AT(files.recorder.empty_shots),
      .help = "keep shots without echo: .ply with NaN coordinates, .e57 with its invalid state"},
     {APP_TEXT, "stats", "FILE", .at = AT(stats), .help = "write what was received as JSON; - is standard output"},
@@ -266,8 +314,8 @@ static const char HELP_NOTES[] =
     "The ending of FILE says what is written:\n"
     "\n"
     "  .ply                 points, binary or text, with double coordinates, label and station\n"
-    "  .las                 LAS 1.4, point format 6: points with CRS, time, returns, label; station as point\n"
-    "                       source ID\n"
+    "  .las                 LAS 1.4, point format 6 (7 with --colour): points with CRS, time, returns, label;\n"
+    "                       station as point source ID\n"
     "  .ptx                 a grid per scan, with the scan's pose; shots without echo are in it\n"
     "  .e57                 points of each scan, with its pose\n"
     "  .poses.csv           true position and orientation of each scan, or a moving head's trajectory\n"

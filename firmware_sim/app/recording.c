@@ -1,10 +1,12 @@
 #include "firmware_sim/app/recording.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "drivers/protocol/native.h"
+#include "firmware_sim/app/progress.h"
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/command/head.h"
 
@@ -21,6 +23,8 @@ struct recording {
     int stopping;                       /* the scan at hand is to end */
     int scan_started;                   /* SCAN_START or points were seen since SCAN:STAR */
     int scan_over, cut_short, broken;
+    double scan_s, into_s; /* how long the scan lasts, 0: not known; how far it is */
+    uint32_t station;      /* at hand */
 };
 
 /* The answer is in r->reply. */
@@ -92,6 +96,7 @@ static void look_at(struct recording *r, const struct scanhead_frame *frame)
         r->scan_started = 1;
         if (r->scan_t0_ns < 0) r->scan_t0_ns = frame->t_ns - frame->scan_t0_ns;
     }
+    if (frame->type == SCANHEAD_DESCRIPTOR) r->scan_s = progress_scan_s(frame);
     if (frame->type == SCANHEAD_LINE_END) count_line(r, frame);
     if (frame->type != SCANHEAD_EVENT) return;
     if (frame->event == SCANHEAD_EV_SCAN_START) {
@@ -99,6 +104,20 @@ static void look_at(struct recording *r, const struct scanhead_frame *frame)
         r->scan_started = 1;
     }
     if (gives_up(frame) && !r->scan_started) r->scan_over = 1;
+}
+
+/* Of all that was asked for; negative where its end is not known. */
+static double fraction_done(const struct recording *r)
+{
+    const struct recording_options *o = r->o;
+    struct scanhead_stats stats;
+    scanhead_get_stats(r->sh, &stats);
+    if (o->source_bytes > 0) return fmin(1.0, (double)stats.bytes / (double)o->source_bytes);
+    double scan_s = r->scan_s;
+    if (o->duration_s > 0.0 && (!(scan_s > 0.0) || o->duration_s < scan_s)) scan_s = o->duration_s;
+    if (o->listen || !(scan_s > 0.0)) return -1.0;
+    const double n = 1.0 + o->last_station - o->first_station, before = (double)r->station - o->first_station;
+    return (before + fmin(1.0, fmax(0.0, r->into_s / scan_s))) / n;
 }
 
 static void report(struct recording *r)
@@ -109,7 +128,7 @@ static void report(struct recording *r)
     char text[96];
     snprintf(text, sizeof text, "recording: %.2f M points, %.2f M pulses", 1e-6 * (double)r->result->points,
              1e-6 * (double)r->result->counts.pulses);
-    sh_progress(r->o->report, text, -1.0);
+    sh_progress(r->o->report, text, fraction_done(r));
 }
 
 static int is_interrupted(struct recording *r)
@@ -163,6 +182,7 @@ static int step(struct recording *r, int timeout_ms, struct sh_err *err)
         r->heard_ns = clock_now_ns();
         count_points(r, &frame);
     }
+    if (r->scan_t0_ns >= 0) r->into_s = 1e-9 * (double)(frame.t_ns - r->scan_t0_ns);
     if (is_long_enough(r, &frame)) r->stopping = 1;
     rc = r->o->frame(r->o->ctx, r->sh, &frame, err);
     return rc == SH_OK ? 1 : rc;
@@ -247,6 +267,8 @@ static int record_scan(struct recording *r, uint32_t station, struct sh_err *err
 {
     r->stopping = r->scan_over = r->scan_started = r->cut_short = 0;
     r->scan_t0_ns = -1;
+    r->into_s = 0.0;
+    r->station = station;
     int rc = r->o->listen ? SH_OK : start_scan(r, station, err);
     r->scan_over = r->scan_started = 0; /* what came before the reply is of another scan */
     if (rc != SH_OK || (r->interrupted && !r->o->listen)) return rc;
@@ -317,5 +339,6 @@ int recording_run(struct scanhead *sh, const struct recording_options *options, 
     if (rc == SH_ECLOSED && options->listen && result->frames == 0)
         return sh_fail(err, SH_EFORMAT, "the stream ended without a single frame");
     if (rc == SH_ECLOSED && options->listen && !result->counts.within) return SH_OK;
-    return rc == SH_ECLOSED && result->counts.within ? sh_fail(err, rc, "the stream ended in the middle of a scan") : rc;
+    return rc == SH_ECLOSED && result->counts.within ? sh_fail(err, rc, "the stream ended in the middle of a scan")
+                                                     : rc;
 }

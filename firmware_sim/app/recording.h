@@ -20,6 +20,7 @@ struct recording_options {
     int head_ends;                        /* ... which the head does by itself: no command is needed */
     double replug_s;                      /* > 0: how long to wait for a head that was unplugged, to go on then */
     int progress;                         /* 1: to the report, about once a second */
+    uint64_t source_bytes;                /* of a stream in a file, for progress; 0: not known */
     const struct sh_report *report;
     /* Gets each frame, in order. A negative SH_E ends the recording with it. */
     int (*frame)(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);

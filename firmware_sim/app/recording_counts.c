@@ -65,7 +65,8 @@ static enum recording_news take_scan_end(struct recording_counts *c, const struc
     uint64_t lost = frame->event_value[2];
     if (number == c->ended && !c->within) return RECORDING_SCAN_OVER; /* telemetry has said so */
     enter(c, number);
-    end(c, frame->event_value[1], c->told.scan == number ? c->told.cast : c->scan.pulses + lost + c->scan.left_out, lost);
+    end(c, frame->event_value[1], c->told.scan == number ? c->told.cast : c->scan.pulses + lost + c->scan.left_out,
+        lost);
     return RECORDING_SCAN_OVER;
 }
 

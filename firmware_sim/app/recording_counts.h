@@ -26,7 +26,7 @@ struct recording_counts {
     struct {
         uint32_t scan; /* 0: none came */
         uint64_t cast;
-    } told; /* by the last telemetry */
+    } told;         /* by the last telemetry */
     uint32_t ended; /* number of the last scan that ended, until the next one begins */
 };
 

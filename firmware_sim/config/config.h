@@ -200,7 +200,7 @@ struct config_output {
     enum georef_method georef; /* GEOREF_AUTO: as the plan says */
     double tolerance_m;        /* largest error of a georeferenced position */
     int attributes;            /* amplitude and width of each echo follow the points */
-    double scale_m;            /* 0: the finest of 1e-6 x 10^n m that holds range_max_m in 31 bits */
+    double scale_m;            /* 0: the finest of 1e-6 x 10^n m that holds range_max_m (polar: 32 bits, geo: 31) */
 };
 
 struct config_beam {
@@ -282,6 +282,9 @@ void config_print_reference(FILE *out);
 /* The profiles in a directory, one line each (name, model, what is data sheet and what is assumed). Returns
  * how many. dir NULL: the first directory of the lookup below that exists, without a configuration. */
 int config_list_profiles(const char *dir, FILE *out, struct sh_err *err);
+
+/* Reads the profile NAME, looked up as for a configuration that lies at config_file. */
+int config_load_profile(const char *name, const char *config_file, struct config_profile *profile, struct sh_err *err);
 
 /* Finds the directory of profiles: $SCANHEAD_HEADS, beside the configuration (heads/), beside the program
  * (installed or in its build folder), or config/heads here. A profile is named by `head.profile: NAME`,

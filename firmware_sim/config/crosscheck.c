@@ -132,12 +132,14 @@ static int check_output(const struct cfg_reader *rd, struct config *cfg)
     if (cfg->output.scale_m < 1e-6)
         return cfg_fail_key(rd, "output.scale_m", 0, "%.10g is out of range; allowed 0 (automatic) or 1e-6 to 1 m",
                             cfg->output.scale_m);
-    if (cfg->profile.range_max_m / cfg->output.scale_m >= 0x1p31)
+    const int bits = cfg->output.layout == LINE_POLAR ? 32 : 31; /* a range has no sign */
+    const double counts = ldexp(1.0, bits);
+    if (cfg->profile.range_max_m / cfg->output.scale_m >= counts)
         return cfg_fail_key(
             rd, "output.scale_m", 0,
-            "%.10g is too fine: %.10g m of head profile %s do not fit into 31 bits; allowed above %.4g to "
-            "1 m",
-            cfg->output.scale_m, cfg->profile.range_max_m, cfg->profile.name, cfg->profile.range_max_m / 0x1p31);
+            "%.10g is too fine: %.10g m of head profile %s do not fit into %d bits; allowed above %.4g to "
+            "1 m, or 0 (automatic)",
+            cfg->output.scale_m, cfg->profile.range_max_m, cfg->profile.name, bits, cfg->profile.range_max_m / counts);
     return SH_OK;
 }
 

@@ -206,8 +206,8 @@ static const struct cfg_key config_keys[] = {
      .help = "on: each points frame is followed by one with amplitude (needs signal.model: on) and width of its "
              "echoes, 4 bytes a point; .ply and .las recordings have them."},
     {KEY(output.scale_m), CFG_REAL, "m", "0", 0, 1, .allowed = "0 (automatic) or 1e-6 to 1 m",
-     .help = "Metres per count of a range; a count of a coordinate is no larger. The largest range must fit into 31 "
-             "bits."},
+     .help = "Metres per count of a range; a count of a coordinate is no larger. The largest range must fit into 32 "
+             "bits, a coordinate into 31. automatic: 1e-6 m up to 4294 m of range (geo: 2147 m), then ten times as much."},
 
     {"links", .type = CFG_LIST, .min = 0, .max = CONFIG_MAX_LINKS, LIST_OF(link, n_links),
      .help = "Where the head can be reached; none is needed to record off line."},
@@ -270,7 +270,8 @@ static const struct cfg_key config_keys[] = {
     {KEY(noise.angle), CFG_BOOL, .def = "off",
      .help = "Angle noise of the profile's mirror_sigma_deg and pan_sigma_deg: the beam deviates, the encoders do not "
              "show it."},
-    {KEY(noise.seed), CFG_COUNT, NULL, "1", 0, 18446744073709551615.0, .help = "Seed of the random numbers."},
+    {KEY(noise.seed), CFG_COUNT, NULL, "1", 0, 18446744073709551615.0, 
+     .help = "Seed of the random numbers. Noise also differs by station, and by scan since power-up at a station."},
     {"noise.ball", .type = CFG_MAP, .help = "Ball-shaped noise: each point moves to anywhere in a ball around it."},
     {KEY(noise.ball.radius_m), CFG_REAL, "m", "0", 0, 100, .help = "Radius of the ball; 0: none."},
     {KEY(noise.ball.distance_1_m), CFG_REAL, "1/m", "0", 0, 100,
@@ -310,9 +311,11 @@ static const struct cfg_key config_keys[] = {
      .help = "Retro-reflector: its signal is that of a white target times this, at any incidence; foils have 100 to "
              "1000."},
     {SURFACE(glass), CFG_REAL, NULL, "", 0, 1,
-     .help = "Share of the power that passes each surface: the pane and what is seen through it give echoes."},
+     .help = "Share of the power that passes each surface: the pane and what is seen through it give echoes. It counts on "
+             "the way there and back: beyond two surfaces (a pane) of 0.9 an echo has 0.9^4 of its power."},
     {SURFACE(mirror), CFG_REAL, NULL, "", 0, 1,
-     .help = "Share of the power that is mirrored: ghost points, with surfaces of their own."},
+     .help = "Share of the power that is mirrored: ghost points, with surfaces of their own. It counts on the way there "
+             "and back: in a mirror of 0.9 an echo has 0.81 of its power."},
 
     {"optics", .type = CFG_MAP, .help = "Pulses that meet glass or a mirror."},
     {KEY(optics.depth), CFG_COUNT, NULL, "4", 0, CAST_MAX_DEPTH,

@@ -12,6 +12,7 @@
 #include "core/newfile.h"
 
 static const char title[] = "# scanhead journal 1";
+static const char end_line[] = "END"; /* no command has this name */
 
 struct journal {
     FILE *file;
@@ -67,6 +68,16 @@ int journal_write(struct journal *journal, uint64_t tick, int64_t t_ns, uint32_t
 {
     if (t_ns < 0 || !is_command_line(line)) return SH_EINPUT;
     return put(journal, "%" PRIu64 " %" PRId64 " %" PRIu32 " %s\n", tick, t_ns, session, line);
+}
+
+int journal_end(struct journal *journal, uint64_t tick, int64_t t_ns)
+{
+    return journal_write(journal, tick, t_ns, 0, end_line);
+}
+
+int journal_is_end(const struct journal_entry *entry)
+{
+    return entry->session == 0 && strcmp(entry->line, end_line) == 0;
 }
 
 int journal_note(struct journal *journal, const char *text)

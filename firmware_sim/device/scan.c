@@ -11,6 +11,7 @@ void device_begin_scan(struct device *device, uint64_t tick)
                                         .number = device->scan.number + 1,
                                         .tick0 = tick,
                                         .station = device->cmd.settings.station - 1,
+                                        .station_scan = ++device->station_scans[device->cmd.settings.station - 1],
                                         .stretch = site_stretch_at(device->site, 0),
                                         .describe = 1};
     schedule_start(&device->scan.segment, &spec);
@@ -18,8 +19,10 @@ void device_begin_scan(struct device *device, uint64_t tick)
     device->live.next = 0;
     device_push_event(device, NATIVE_EV_SCAN_START, device->scan.number, tick * (uint64_t)device->tick_ns,
                       (uint64_t)device_gps_ns(device, (int64_t)tick * device->tick_ns), "");
-    if (device->options.start && device->options.duration_s > 0.0 && device->scan.number == 1)
-        device->end_tick = tick + device_ticks_of(device, device->options.duration_s);
+    if (device->options.start && device->options.duration_s > 0.0 && device->scan.number == 1) {
+        uint64_t end_tick = tick + device_ticks_of(device, device->options.duration_s);
+        if (end_tick < device->end_tick) device->end_tick = end_tick; /* a journal may end it earlier */
+    }
 }
 
 uint32_t device_tick_pulses(const struct config *cfg)
@@ -88,6 +91,7 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
     work->scan_t0_ns = (int64_t)device->scan.tick0 * device->tick_ns;
     work->segment = *seg;
     work->station = device->scan.station;
+    work->station_scan = device->scan.station_scan;
     work->stretch = device->scan.stretch;
     work->echoes = device->cmd.settings.echoes;
     work->pulse0 = device->scan.pulse_next;
@@ -165,8 +169,7 @@ static void end_scan(struct device *device, uint64_t tick)
     device->scan.on = 0;
     device->scan.end_tick = tick;
     device->scan.stop_requested = 0;
-    device_push_event(device, NATIVE_EV_SCAN_END, device->scan.number, device->scan.pulse_next,
-                      device->scan.cast, "");
+    device_push_event(device, NATIVE_EV_SCAN_END, device->scan.number, device->scan.pulse_next, device->scan.cast, "");
     device_transition(device, stopped ? HEAD_EV_STOP : HEAD_EV_DONE, tick);
     if (device->options.one_scan) device->over = 1;
 }

@@ -93,7 +93,7 @@ void session_leave(struct pump *pump, struct session *s)
     uint32_t frames = 0;
     if (pump->nmea) {
         frames = pump_nmea_backlog(pump, s) + (s->out_pos < s->out_len); /* at least the one it is in the middle of */
-    } else if (s->lost.have_seq) { /* the pacing thread is done with seq */
+    } else if (s->lost.have_seq) {                                       /* the pacing thread is done with seq */
         frames = count_unwritten(s, &unwritten) + stream->seq - s->lost.next_seq;
         pulses = unwritten + atomic_load(&stream->counters->pulses) - s->lost.next_pulse;
     }

@@ -136,16 +136,18 @@ static void *pump_main(void *arg)
 {
     struct pump *pump = arg;
     uint32_t want_write = 0;
+    int rested = 0;
     for (;;) {
         int over = atomic_load(&pump->stream->over);
         if (over && !has_more(pump)) break;
-        if (take_events(pump, want_write, over ? 50 : -1) < 0) {
+        if (take_events(pump, want_write, rested ? 0 : over ? 50 : -1) < 0) {
             sh_warn(pump->links->report, "link %s: poll failed; the link is given up", pump->ops->name);
             break;
         }
         want_write = 0;
         for (int i = 0; i < LINK_MAX_SESSIONS; i++)
             if (pump->session[i].open && session_write(pump, &pump->session[i], i)) want_write |= 1U << i;
+        rested = pump_rest(pump);
     }
     for (int i = 0; i < LINK_MAX_SESSIONS; i++)
         if (pump->session[i].open) session_leave(pump, &pump->session[i]);

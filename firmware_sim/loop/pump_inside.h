@@ -10,6 +10,8 @@ enum {
     REPLY_ROOM = 8192,
     BATCH_BYTES = 131072, /* small ticks are written together up to this */
     READ_BYTES = 65536,
+    WRONG_AT_ONCE = 128, /* wrong lines of a session, and then a rest of so long for its link: */
+    REST_NS = 2000000,
 };
 
 /* Command lines of a client, and the replies to them. */
@@ -20,7 +22,8 @@ struct session_commands {
     char reply[REPLY_ROOM];
     uint32_t reply_len;
     int replies_dropped;
-    int stepping; /* the reply to TIME:STEP waits until all before step_tick has gone out */
+    uint32_t wrong; /* lines since the last rest */
+    int stepping;   /* the reply to TIME:STEP waits until all before step_tick has gone out */
     uint64_t step_tick;
     char step_reply[COMMAND_MAX_REPLY];
 };
@@ -83,6 +86,9 @@ void pump_add_reply(struct session *s, const char *text);
  * while a step goes on, and while there is no room for their replies. Replies are lost only to a client that
  * sends on and on without reading. */
 void pump_take_lines(struct pump *pump, struct session *s);
+/* A client that is wrong as fast as it can be would cost a processor. So a link rests when one of its sessions had
+ * WRONG_AT_ONCE wrong lines. 1: it did, and more lines may wait. */
+int pump_rest(struct pump *pump);
 /* Reads what the client sent, and takes its lines. */
 void pump_read_commands(struct pump *pump, struct session *s, int index);
 

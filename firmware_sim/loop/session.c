@@ -23,6 +23,7 @@ void session_open(struct pump *pump, struct session *s, const char *peer)
     struct session_commands *c = &s->commands;
     c->reply_len = c->in_len = c->in_pos = 0;
     c->stepping = c->replies_dropped = 0;
+    c->wrong = 0;
     memset(&c->lines, 0, sizeof c->lines);
     s->moved_ns = clock_now_ns();
     snprintf(s->peer, sizeof s->peer, "%.63s", peer); /* an address: shorter */

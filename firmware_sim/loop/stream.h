@@ -40,9 +40,9 @@ struct stream {
     struct stream_reader reader[RING_MAX_READERS];
 
     /* of the pacing thread alone until the stream is over */
-    uint32_t seq;                                  /* of the next frame */
-    struct ring_hits line;                         /* of the line so far */
-    int line_broken;                               /* a tick was lost since the last line end */
+    uint32_t seq;          /* of the next frame */
+    struct ring_hits line; /* of the line so far */
+    int line_broken;       /* a tick was lost since the last line end */
     struct stream_scan {
         uint32_t number;
         uint64_t delivered; /* pulses */

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/rng.h"
 #include "drivers/protocol/native_encode.h"
 
 struct worker {
@@ -302,6 +303,7 @@ static void fill_pulses(struct worker *worker, const struct device_work *work)
     }
     worker->anchored = work->stretch;
     worker->setup.echoes = (enum beam_select)work->echoes;
+    worker->setup.scan_key = rng_scan(work->station + 1, work->station_scan);
     if (worker->site->n_movers != 0)
         site_move(worker->site,
                   site_mover_time(worker->site, work->station, 1e-9 * (double)(work->t_ns - work->scan_t0_ns)),

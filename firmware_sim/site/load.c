@@ -103,6 +103,7 @@ static int load(struct site *site, const struct sh_report *report, struct sh_err
     if (rc == SH_OK) rc = place_stations(site, report, err);
     if (rc == SH_OK) site_plan_order(site);
     if (rc == SH_OK) rc = build_bvhs(site, report, err);
+    if (rc == SH_OK) rc = site_warn_doubts(site, report, err); /* trying beams may take long where little is seen */
     if (rc == SH_OK) rc = site_georeference(site, report, err);
     if (rc == SH_OK) rc = site_choose_methods(site, report, err);
     return rc;

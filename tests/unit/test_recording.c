@@ -234,12 +234,9 @@ static void test_broken_once_more_after_a_lost_end(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_unplugged_within_a_scan),
-        cmocka_unit_test(test_unplugged_after_a_lost_end),
-        cmocka_unit_test(test_telemetry_after_a_lost_end),
-        cmocka_unit_test(test_joined_within_a_scan),
-        cmocka_unit_test(test_an_end_after_telemetry),
-        cmocka_unit_test(test_broken_once_more_after_a_lost_end),
+        cmocka_unit_test(test_unplugged_within_a_scan),    cmocka_unit_test(test_unplugged_after_a_lost_end),
+        cmocka_unit_test(test_telemetry_after_a_lost_end), cmocka_unit_test(test_joined_within_a_scan),
+        cmocka_unit_test(test_an_end_after_telemetry),     cmocka_unit_test(test_broken_once_more_after_a_lost_end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -34,10 +34,10 @@ struct account {
     struct oracle oracle;
     uint64_t received, next, gaps, missing;   /* pulses; the last two from jumps of the pulse number */
     uint64_t first_missing, told, told_first; /* by overrun events */
-    uint64_t scan_cast, scan_lost; /* by the telemetry before the scan's end */
+    uint64_t scan_cast, scan_lost;            /* by the telemetry before the scan's end */
     int events, scan_over;
-    uint64_t end_lost; /* by the scan's end */
-    uint64_t readers;  /* that were there for the whole scan; 0: this one alone */
+    uint64_t end_lost;  /* by the scan's end */
+    uint64_t readers;   /* that were there for the whole scan; 0: this one alone */
     int in_second_half; /* points frames */
     int64_t t_ns, line;
     uint64_t whole_lines, broken_lines;
@@ -196,7 +196,7 @@ static void overload(struct wire *wire, const char *threads)
     pid_t recorder = wire_spawn(wire, args, "record.out", "record.err", -1);
     follow(&a, sh);
     assert_int_equal(wire_wait(wire, recorder), 1); /* not complete */
-    assert_true(a.missing > 0); /* a caster computes about a seventh of them in time */
+    assert_true(a.missing > 0);                     /* a caster computes about a seventh of them in time */
     assert_int_equal(a.told_first, a.first_missing);
     /* What can be computed goes on coming; it does not end with what was computed ahead at the start. */
     assert_true(a.in_second_half > 0); /* how much is the machine's affair */

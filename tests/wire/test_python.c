@@ -13,11 +13,12 @@ static const char *ask_python(struct wire *wire, const char *flavour, const char
     static char *text;
     const char *const args[] = {"tests/wire/python_client.py", "drivers/host/python", flavour, what, a, b, NULL};
     const char *const probe[] = {"-c", "import numpy", NULL};
+    static int has_numpy = -1;
     free(text);
     text = NULL;
-    if (strcmp(flavour, "numpy") == 0 &&
-        wire_wait(wire, wire_spawn_program(wire, python, probe, "probe.out", "probe.err", -1)) != 0)
-        return NULL;
+    if (has_numpy < 0)
+        has_numpy = wire_wait(wire, wire_spawn_program(wire, python, probe, "probe.out", "probe.err", -1)) == 0;
+    if (strcmp(flavour, "numpy") == 0 && !has_numpy) return NULL;
     int status = wire_wait(wire, wire_spawn_program(wire, python, args, "python.out", "python.err", -1));
     if (status != 0) wire_show(wire, "python.err");
     assert_int_equal(status, 0);
@@ -265,12 +266,15 @@ static void test_both_layouts(void **state)
         snprintf(geo, sizeof geo, "%s", record(wire, &SMALL, "geo.shs", keys));
         const char *said = ask_python(wire, flavours[i % 2], "crs", polar, geo);
         unsigned n;
-        double crs_m, scene_m;
+        double crs_m, scene_m, page_m;
         if (said == NULL) continue;
-        assert_int_equal(sscanf(said, "%u %lf %lf", &n, &crs_m, &scene_m), 3);
+        assert_int_equal(sscanf(said, "%u %lf %lf %lf", &n, &crs_m, &scene_m, &page_m), 4);
         assert_true(n >= 1000);
         if (!(crs_m < 2.6e-6 && scene_m < 2.6e-6))
             fail_msg("%s: %g m in the CRS, %g m in the scene", places[i], crs_m, scene_m);
+        /* The map's tangent, 9 m away at most: 81 / 2R = 6.4e-6 m; R is good to half a percent, of 9 m h / R at the
+         * height of 2800 m 2.0e-5 m. */
+        if (!(page_m < 2.9e-5)) fail_msg("%s: the page's formula is %g m off", places[i], page_m);
     }
 }
 

@@ -245,33 +245,6 @@ static void test_signal_while_completing(void **state)
     assert_int_equal(access(wire_path(wire, "a.ptx.part"), F_OK), -1);
 }
 
-/* Off line it is device time, to the pulse: the same pulses and the same hash each time. */
-static void test_duration_is_device_time(void **state)
-{
-    static const struct room_config config = {
-        .prr_hz = 400000.7, .lines_hz = 97, .pan_deg_s = 90, .pan_stop_deg = 360, .frames = 1, .links = LINK_YAML_TCP};
-    static const char *const threads[] = {"1", "2", "3", "2"};
-    struct wire *wire = *state;
-    struct oracle oracle = oracle_of(&config, -40, 60, 100);
-    char path[352], stats[352], first[65], other[65];
-    uint64_t fired = 0;
-    room_write(wire);
-    snprintf(path, sizeof path, "%s", room_config_write(wire, &config));
-    snprintf(stats, sizeof stats, "%s", wire_path(wire, "stats.json"));
-    while (oracle_time_ns(&oracle, fired) < 250000000)
-        fired++;
-    for (size_t i = 0; i < sizeof threads / sizeof *threads; i++) {
-        const char *const args[] = {"record",    path,       "--duration", "0.25",    "--stats", stats,
-                                    "--threads", threads[i], "--quiet",    NULL};
-        assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
-        assert_int_equal(stats_uint(wire, "fired_pulses"), fired);
-        assert_int_equal(stats_uint(wire, "pulses"), oracle_count_cast(&oracle, 0, fired));
-        assert_int_equal(stats_uint(wire, "cast_pulses"), stats_uint(wire, "pulses"));
-        stats_hash(wire, i == 0 ? first : other);
-        if (i != 0) assert_string_equal(other, first);
-    }
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -282,7 +255,6 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_duration_of_each, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_lines_far_apart, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_signal_while_completing, wire_setup, wire_teardown),
-        cmocka_unit_test_setup_teardown(test_duration_is_device_time, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests_name("record files", tests, NULL, NULL);
 }

@@ -42,6 +42,7 @@ POLAR, GEO = 0, 1  # layouts
 CRS_LOCAL, CRS_ECEF, CRS_UTM, CRS_GEODETIC = range(4)
 NO_LABEL = 0xFFFF
 
+_HASHED = (DESCRIPTOR, ANCHOR, POINTS, LINE_END, POSES, ATTRIBUTES)
 _HEADER_LEN, _MAX_PAYLOAD, _MAX_TEXT = 28, 65536, 512
 _QUEUE_BYTES, _KEEP_POSES, _CHUNK = 64 << 20, 8192, 1 << 16
 _NAN = math.nan
@@ -102,7 +103,8 @@ def _crc_pure(data: bytes) -> int:
 
 def _crc_numpy(data: bytes) -> int:
     """Rows of 256 bytes: each byte's share by its place, the rows then one after the other. Zeros before the
-    message add nothing, so the first row is filled up with them; the register's start is its first 4 bytes."""
+    message add nothing, so the first row is filled up with them. The register's start is XORed into the
+    message's first 4 bytes."""
     rows = -(-len(data) // _ROW)
     padded = np.zeros(rows * _ROW, dtype=np.uint8)
     padded[rows * _ROW - len(data):] = np.frombuffer(data, dtype=np.uint8)
@@ -123,21 +125,33 @@ def crc32c(data: bytes) -> int:
 # ---- payloads of fixed layout: (struct format, names; NAME:N is N numbers)
 
 _LAYOUT = {
-    DESCRIPTOR: ("<96s32sII3Q6q5dIIIIQ", "idn profile layout isa prr_uhz lines_uhz pan_udeg_s fov_min_udeg "
-                 "sweep_udeg line_start_udeg line_stop_udeg pan_start_udeg pan_stop_udeg mirror_counts_per_turn "
-                 "pan_counts_per_turn range_scale_m range_min_m range_max_m max_echoes n_surfaces frames scan seed"),
+    DESCRIPTOR: ("<96s32sII3Q6q5dIIIIQ", "idn profile layout isa prr_uhz lines_uhz pan_udeg_s "
+                 "fov_min_udeg sweep_udeg line_start_udeg line_stop_udeg pan_start_udeg pan_stop_udeg "
+                 "mirror_counts_per_turn pan_counts_per_turn range_scale_m range_min_m range_max_m "
+                 "max_echoes n_surfaces frames scan seed"),
     ANCHOR: ("<4I3dd3d3d9d3dII9dd", "crs epsg station moving anchor:3 scale_m lat_deg lon_deg height_m "
              "station_m:3 rotation:9 scale:3 heights until_ms axes:9 frame"),
     POINTS: ("<IIQqqII", "frame line pulse0 t0_ns line_t0_ns n_pulses n_points"),
-    LINE_END: ("<IIQqq9I", "frame line pulse0 t0_ns t1_ns n_fired n_cast n_echoes mirror_count pan_count status "
-               "n_crowded n_faint n_unfit"),
-    TELEMETRY: ("<II5QIIQq3Q", "state scan pulses echoes lines lost_pulses late_blocks late_max_us "
-                "errors_queued reader_lost_frames utc_ns scan_fired scan_cast scan_lost"),
+    LINE_END: ("<IIQqq9I", "frame line pulse0 t0_ns t1_ns n_fired n_cast n_echoes mirror_count pan_count "
+               "status n_crowded n_faint n_unfit"),
+    TELEMETRY: ("<II5QIIQq", "state scan pulses echoes lines lost_pulses late_blocks late_max_us "
+                "errors_queued reader_lost_frames utc_ns"),
     EVENT: ("<IIQQQ96s", "code reserved a b c text"),
     ATTRIBUTES: ("<QII", "pulse0 line n_points"),
 }
-_UNPACK = {kind: (struct.Struct(form), [(part.partition(":")[0], int(part.partition(":")[2] or 0))
-                                        for part in names.split()]) for kind, (form, names) in _LAYOUT.items()}
+_MORE = {  # what payloads may have behind that
+    DESCRIPTOR: ("<II", "content reserved"),
+    TELEMETRY: ("<3Q", "scan_fired scan_cast scan_lost"),
+}
+
+
+def _unpacker(form: str, names: str) -> Tuple[struct.Struct, List[Tuple[str, int]]]:
+    parts = [name.partition(":") for name in names.split()]
+    return struct.Struct(form), [(name, int(count or 0)) for name, _, count in parts]
+
+
+_UNPACK = {kind: _unpacker(*layout) for kind, layout in _LAYOUT.items()}
+_UNPACK_MORE = {kind: _unpacker(*layout) for kind, layout in _MORE.items()}
 _POSE = struct.Struct("<q3d4ddII")
 _POINT = struct.Struct("<IIIhHI")
 
@@ -149,21 +163,32 @@ def _text(field: bytes) -> str:
     return field[:end].decode("ascii", "replace")
 
 
-def _decode(kind: int, payload: bytes) -> Dict[str, object]:
-    """The fixed part of a payload by its names. What follows the part that is known is left alone."""
-    form, names = _UNPACK[kind]
-    if len(payload) < form.size:
-        raise ScanheadError(f"a frame of type {kind} with {len(payload)} bytes; at least {form.size} are needed")
-    values, at, fields = form.unpack_from(payload), 0, {}
+def _take(layout, payload: bytes, offset: int) -> Dict[str, object]:
+    form, names = layout
+    values, at, fields = form.unpack_from(payload, offset), 0, {}
     for name, count in names:
         value = values[at:at + count] if count else values[at]
         fields[name] = _text(value) if isinstance(value, bytes) else value
         at += count or 1
+    if not all(math.isfinite(v) for v in values if isinstance(v, float)):
+        raise ScanheadError("a frame with a good CRC holds a number that is not finite")
+    return fields
+
+
+def _decode(kind: int, payload: bytes) -> Dict[str, object]:
+    """The fixed part of a payload by its names. What follows the part that is known is left alone."""
+    form = _UNPACK[kind][0]
+    if len(payload) < form.size:
+        raise ScanheadError(f"a frame of type {kind} with {len(payload)} bytes; {form.size} are the least")
+    fields = _take(_UNPACK[kind], payload, 0)
+    more = _UNPACK_MORE.get(kind)
+    if more is not None and len(payload) >= form.size + more[0].size:
+        fields.update(_take(more, payload, form.size))
     return fields
 
 
 class Frame(NamedTuple):
-    """A frame as it came. t_ns: device time. fields: the fixed part of the payload, named as in PROTOCOL.md."""
+    """A frame as it came. t_ns: device time. fields: the fixed part of the payload by its names."""
     type: int
     version: int
     flags: int
@@ -265,8 +290,8 @@ class Points:
     x, y, z: polar layout: metres in the head's frame; geo layout: in the CRS (geodetic: degrees of latitude,
     degrees of longitude within -180..180, metres). range_m; mirror_rad and pan_rad (polar); reflectance_db;
     t_ns since the scan's start; echo and echo_count (0, 0: a shot without echo, its place is NaN); label."""
-    __slots__ = ("x", "y", "z", "range_m", "mirror_rad", "pan_rad", "reflectance_db", "t_ns", "echo", "echo_count",
-                 "label", "layout")
+    __slots__ = ("x", "y", "z", "range_m", "mirror_rad", "pan_rad", "reflectance_db", "t_ns", "echo",
+                 "echo_count", "label", "layout")
 
     def __len__(self) -> int:
         return len(self.t_ns)
@@ -292,8 +317,8 @@ if np is not None:
 
 
 def _sincos(turns):
-    """sin and cos of turns >= 0, a float or an array: whole 1/256 turns by table, the rest by its series, whose
-    next terms are below 2^-56. libscanhead computes the same, in the same order."""
+    """sin and cos of turns >= 0, a float or an array: whole 1/256 turns by table, the rest by its series,
+    whose next terms are below 2^-56. libscanhead computes the same, in the same order."""
     part = turns * _PARTS
     if np is not None and isinstance(turns, np.ndarray):
         k = (part + 0.5).astype(np.int64)
@@ -353,7 +378,8 @@ def _empty_as_nan(values, count):
 
 
 def _polar_points(p: Points, raw, d: Dict) -> None:
-    mirror_turn, pan_turn, scale = 1 / d["mirror_counts_per_turn"], 1 / d["pan_counts_per_turn"], d["range_scale_m"]
+    mirror_turn, pan_turn = 1 / d["mirror_counts_per_turn"], 1 / d["pan_counts_per_turn"]
+    scale = d["range_scale_m"]
     low = (d["line_start_udeg"] + d["line_stop_udeg"]) / 720e6 - 0.5
 
     def place(a, b, c):
@@ -378,8 +404,9 @@ def _short_way(lon_deg: float) -> float:
 
 def _signed(column):
     """The coordinates of the geo layout are signed."""
-    return column.view(np.int32).astype(np.float64) if np is not None and isinstance(column, np.ndarray) else \
-        [float((v ^ 0x80000000) - 0x80000000) for v in column]
+    if np is not None:
+        return np.ascontiguousarray(column).view(np.int32).astype(np.float64)
+    return [float((v ^ 0x80000000) - 0x80000000) for v in column]
 
 
 def _scaled(column, scale: float, shift: float = 0.0):
@@ -390,13 +417,12 @@ def _scaled(column, scale: float, shift: float = 0.0):
 
 def _geo_points(p: Points, raw, a: Dict) -> None:
     """range_m: from the anchor where that is the station; geodetic: straight through space."""
-    counts = [np.ascontiguousarray(c) if np is not None else c for c in raw[:3]]
-    d = [_scaled(_signed(c), s) for c, s in zip(counts, a["scale"])]
+    d = [_scaled(_signed(c), s) for c, s in zip(raw[:3], a["scale"])]
     x, y, z = (_scaled(v, 1.0, shift) for v, shift in zip(d, a["anchor"]))
     if a["crs"] == CRS_GEODETIC:
         y = _mapped(_short_way, y)
         home = geodetic_to_ecef(*a["anchor"])
-        p.range_m = _mapped(lambda *at: _length(*(u - v for u, v in zip(geodetic_to_ecef(*at), home))), x, y, z)
+        p.range_m = _mapped(lambda *at: _distance(geodetic_to_ecef(*at), home), x, y, z)
     elif a["moving"] & 1:
         p.range_m = _column((_NAN for _ in range(len(p))), len(p))
     else:
@@ -407,6 +433,10 @@ def _geo_points(p: Points, raw, a: Dict) -> None:
 
 def _length(x: float, y: float, z: float) -> float:
     return math.sqrt(x * x + y * y + z * z)
+
+
+def _distance(a, b) -> float:
+    return _length(a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 # ---- poses of a moving head
@@ -428,8 +458,8 @@ def _apply_transposed(m, v):
 
 
 def _multiply(a, b):
-    return tuple(a[i // 3 * 3] * b[i % 3] + a[i // 3 * 3 + 1] * b[3 + i % 3] + a[i // 3 * 3 + 2] * b[6 + i % 3]
-                 for i in range(9))
+    return tuple(sum(a[3 * row + k] * b[3 * k + column] for k in range(3))
+                 for row in range(3) for column in range(3))
 
 
 def _cross(a, b):
@@ -461,8 +491,10 @@ class _Leg(NamedTuple):
 
 
 def _quat_times(a, b):
-    return (a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-            a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0])
+    return (a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+            a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+            a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+            a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0])
 
 
 def _leg(a: Pose, b: Pose) -> _Leg:
@@ -486,10 +518,14 @@ class _Poses:
         n = struct.unpack_from("<I", payload)[0] if len(payload) >= 8 else 0
         if n < 2 or n > (len(payload) - 8) // _POSE.size:
             raise ScanheadError("a poses frame with a wrong number of poses")
-        poses = [Pose(p[0], p[1:4], p[4:8], p[8], p[9]) for p in _POSE.iter_unpack(payload[8:8 + n * _POSE.size])]
+        records = _POSE.iter_unpack(payload[8:8 + n * _POSE.size])
+        poses = [Pose(p[0], p[1:4], p[4:8], p[8], p[9]) for p in records]
         times = [p.t_ns for p in poses]
-        if any(a >= b for a, b in zip(times, times[1:])) or any(abs(sum(v * v for v in p.quat) - 1) > 1e-9 for p in poses):
-            raise ScanheadError("a poses frame whose times do not rise, or whose quaternions are not of length one")
+        if any(a >= b for a, b in zip(times, times[1:])):
+            raise ScanheadError("a poses frame whose times do not rise")
+        if not all(abs(sum(v * v for v in p.quat) - 1) < 1e-9 and
+                   all(map(math.isfinite, p.position_m + (p.frame,))) for p in poses):
+            raise ScanheadError("a poses frame with numbers that are no pose")
         self._frames.append((times, poses))
         self._n += n
         while self._n > _KEEP_POSES:
@@ -514,12 +550,14 @@ def _place_moving(leg: _Leg, t_ns: int, v) -> Tuple[float, float, float]:
     return tuple(p + t for p, t in zip(leg.position_m(f), turned))
 
 
-# ---- places on the Earth: WGS 84 (NIMA TR8350.2); transverse Mercator as Krueger's series in the form of Karney,
-# Journal of Geodesy 85 (2011) 475; polar stereographic as Snyder, USGS Professional Paper 1395 (1987) 161
+# ---- places on the Earth: WGS 84 (NIMA TR8350.2); transverse Mercator as Krueger's series in the form of
+# Karney, Journal of Geodesy 85 (2011) 475; polar stereographic as Snyder, USGS Professional Paper 1395
+# (1987) 161
 
 class _Plain:
     """The functions of numpy that are used here, for plain floats."""
-    sin, cos, tan, sinh, cosh, sqrt, hypot = math.sin, math.cos, math.tan, math.sinh, math.cosh, math.sqrt, math.hypot
+    sin, cos, tan, sinh, cosh = math.sin, math.cos, math.tan, math.sinh, math.cosh
+    sqrt, hypot = math.sqrt, math.hypot
     arctan, arctan2, arcsinh, arctanh = math.atan, math.atan2, math.asinh, math.atanh
 
 
@@ -546,8 +584,8 @@ def geodetic_to_ecef(lat_deg, lon_deg, height_m, m=_Plain):
 
 
 def ecef_to_geodetic(x_m, y_m, z_m, m=_Plain):
-    """Latitude, longitude in degrees, ellipsoidal height in metres. Bowring's iteration (Survey Review 23, 1976);
-    near the Earth three steps leave rounding alone."""
+    """Latitude, longitude in degrees, ellipsoidal height in metres. Bowring's iteration (Survey Review 23,
+    1976); near the Earth three steps leave rounding alone."""
     p = m.hypot(x_m, y_m)
     beta = m.arctan2(z_m, (1 - _F) * p)
     for _ in range(3):
@@ -602,7 +640,8 @@ class _Grid:
         lon = (lon_deg - self.lon0_deg) * _RAD
         xi, eta = m.arctan2(tau_c, m.cos(lon)), m.arcsinh(m.sin(lon) / m.hypot(tau_c, m.cos(lon)))
         a, b = _series(_ALPHA, xi, eta, m)
-        return 5e5 + 0.9996 * _RADIUS_M * (eta + b), (1e7 if self.south else 0.0) + 0.9996 * _RADIUS_M * (xi + a)
+        north0_m, radius_m = 1e7 if self.south else 0.0, 0.9996 * _RADIUS_M
+        return 5e5 + radius_m * (eta + b), north0_m + radius_m * (xi + a)
 
     def inverse(self, easting_m, northing_m, m):
         if self.ups:
@@ -626,7 +665,7 @@ class _Grid:
 
 
 def _grid_of(station_m, lat_deg: float, lon_deg: float) -> Optional[int]:
-    """The EPSG code of the grid in which the place's coordinates are the station's: the scene is in that grid."""
+    """The EPSG code of the grid in which the place has the station's coordinates: that of the scene."""
     zone = int((lon_deg + 180) // 6)
     codes = [side + (zone + k) % 60 + 1 for side in (32600, 32700) for k in (-1, 0, 1)] + [32661, 32761]
     for epsg in codes:
@@ -637,8 +676,8 @@ def _grid_of(station_m, lat_deg: float, lon_deg: float) -> Optional[int]:
 
 
 class _Earth:
-    """From the scene to the CRS and back, as the anchor says: exact but for rounding, the series' 0.1 um, and a
-    geoid that is taken to be as high everywhere as at the station."""
+    """From the scene to the CRS and back, as the anchor says: exact but for rounding, the series' 0.1 um, and
+    a geoid that is taken to be as high everywhere as at the station."""
 
     def __init__(self, anchor: Dict, layout: int) -> None:
         self.crs, self.station_m = anchor["crs"], anchor["station_m"]
@@ -654,7 +693,7 @@ class _Earth:
         grid = _grid_of(self.station_m, *place[:2])
         self.same = grid is not None and grid == anchor["epsg"]
         if grid is not None and not self.same:
-            raise ScanheadError(f"the scene is in the grid of EPSG {grid}; ask the head for output.layout geo")
+            raise ScanheadError(f"the scene is in the grid of EPSG {grid}; take output.layout geo")
         self.grid = _Grid(anchor["epsg"]) if self.crs == CRS_UTM else None
         self.home = geodetic_to_ecef(*place)
         self.turn = self._rotation(anchor)
@@ -669,7 +708,8 @@ class _Earth:
             lat_deg, lon_deg = self.grid.inverse(*anchor["anchor"][:2], _Plain)
             g = self.grid.convergence_rad(lat_deg, lon_deg)
             turn = _multiply((math.cos(g), math.sin(g), 0, -math.sin(g), math.cos(g), 0, 0, 0, 1), turn)
-        s, c, sl, cl = math.sin(lat_deg * _RAD), math.cos(lat_deg * _RAD), math.sin(lon_deg * _RAD), math.cos(lon_deg * _RAD)
+        s, c = math.sin(lat_deg * _RAD), math.cos(lat_deg * _RAD)
+        sl, cl = math.sin(lon_deg * _RAD), math.cos(lon_deg * _RAD)
         return _multiply((-sl, -s * cl, c * cl, cl, -s * sl, c * sl, 0, c, s), turn)
 
     def forward(self, x_m, y_m, z_m, m):
@@ -811,9 +851,10 @@ class Head:
     def query(self, line: str, timeout_s: float = 5.0) -> str:
         """Sends one command line and gives its reply line as it is, also "ERR number,text". Frames that come
         meanwhile are kept for frames()."""
-        if self._source.is_file or self._stuck:
-            raise ScanheadError(f"{self._source.name}: a recording takes no commands" if self._source.is_file else
-                                f"{self._source.name}: half a command went out before; open the head again")
+        if self._source.is_file:
+            raise ScanheadError(f"{self._source.name}: a recording takes no commands")
+        if self._stuck:
+            raise ScanheadError(f"{self._source.name}: half a command went out before; open the head again")
         if not line.strip() or len(line) > 256 or not all(" " <= c <= "~" for c in line):
             raise ScanheadError("not a command: one line of 1 to 256 printable ASCII characters")
         deadline_s = time.monotonic() + timeout_s
@@ -858,17 +899,27 @@ class Head:
                 return
 
     def _send(self, text: str, deadline_s: float) -> None:
-        data = text.encode("ascii")
-        done = 0
+        data, done = text.encode("ascii"), 0
         try:
             while done < len(data):
                 try:
                     done += os.write(self._source.fd, data[done:])
                 except BlockingIOError:  # a head that waits to write itself is read on
-                    self._fill(deadline_s, write=True)
+                    self._wait_writable(deadline_s)
+        except Timeout:
+            raise
         except OSError as error:
+            raise Closed(f"{self._source.name}: {error.strerror}") from None
+        finally:
             self._stuck = 0 < done < len(data)
-            raise error if isinstance(error, Timeout) else Closed(f"{self._source.name}: {error.strerror}") from None
+
+    def _wait_writable(self, deadline_s: float) -> None:
+        self._fill(deadline_s, write=True)
+        item = self.parser.next()
+        while item is not None:
+            if isinstance(item, Frame):
+                self._keep(item)
+            item = self.parser.next()
 
     def _reply(self, deadline_s: float) -> str:
         while True:
@@ -889,7 +940,7 @@ class Head:
     # -- frames
 
     def frames(self, timeout_s: Optional[float] = None) -> Iterator[Frame]:
-        """Frames in order. Ends with a recording; a head that is gone is Closed, none within timeout_s Timeout."""
+        """Frames in order. It ends with a recording. Closed: the head is gone; Timeout: none in timeout_s."""
         while True:
             frame = self.next_frame(timeout_s)
             if frame is None:
@@ -897,7 +948,7 @@ class Head:
             yield frame
 
     def next_frame(self, timeout_s: Optional[float] = None) -> Optional[Frame]:
-        """The next frame; None at a recording's end. Reply lines between are of no command that is awaited."""
+        """The next frame; None at a recording's end. Reply lines are skipped: nobody waits for them."""
         deadline_s = None if timeout_s is None else time.monotonic() + timeout_s
         frame = None  # type: Union[Frame, str, None]
         if self._queue:
@@ -913,15 +964,15 @@ class Head:
 
     def _absorb(self, frame: Frame) -> Frame:
         if frame.version != 1:
-            raise ScanheadError(f"the head speaks version {frame.version} of the protocol; this client reads 1")
-        if not frame.flags & (REPEAT | LOCAL) and frame.type in (DESCRIPTOR, ANCHOR, POINTS, LINE_END, POSES, ATTRIBUTES):
+            raise ScanheadError(f"the head speaks version {frame.version}; this client reads 1")
+        if not frame.flags & (REPEAT | LOCAL) and frame.type in _HASHED:
             self._sha256.update(struct.pack("<BI", frame.type, len(frame.payload)))
             self._sha256.update(frame.payload)
         if frame.type in _UNPACK:
             frame = frame._replace(fields=_decode(frame.type, frame.payload))
-        act = {DESCRIPTOR: self._absorb_descriptor, ANCHOR: self._absorb_anchor, POINTS: self._absorb_points,
-               EVENT: self._absorb_event, SURFACES: self._absorb_surfaces, ATTRIBUTES: self._absorb_attributes,
-               POSES: lambda f: self._poses.absorb(f.payload)}.get(frame.type)
+        act = {DESCRIPTOR: self._absorb_descriptor, ANCHOR: self._absorb_anchor,
+               POINTS: self._absorb_points, EVENT: self._absorb_event, SURFACES: self._absorb_surfaces,
+               POSES: self._absorb_poses, ATTRIBUTES: self._absorb_attributes}.get(frame.type)
         if act is not None:
             act(frame)
         return frame
@@ -932,8 +983,6 @@ class Head:
 
     def _absorb_descriptor(self, frame: Frame) -> None:
         d = frame.fields
-        if len(frame.payload) >= 280:
-            d["content"] = struct.unpack_from("<I", frame.payload, 272)[0]
         d.setdefault("content", 0)
         turns = d["mirror_counts_per_turn"], d["pan_counts_per_turn"]
         if d["layout"] not in (POLAR, GEO) or d["n_surfaces"] > NO_LABEL:
@@ -965,6 +1014,9 @@ class Head:
         self._last_pulse0 = p["pulse0"]
         self._scan_t0_ns = frame.t_ns - p["t0_ns"]
         self._points_key = (frame.seq + 1) % 2**32, p["pulse0"], p["line"], p["n_points"]
+
+    def _absorb_poses(self, frame: Frame) -> None:
+        self._poses.absorb(frame.payload)
 
     def _absorb_attributes(self, frame: Frame) -> None:
         if frame.fields["n_points"] > (len(frame.payload) - 16) // 4:
@@ -1019,12 +1071,13 @@ class Head:
         return self.descriptor is not None and self.anchor is not None
 
     def attributes(self, frame: Frame) -> Optional[Tuple]:
-        """Columns amplitude_db and width_ns of the points of the frame before; None where they are others'."""
-        if self._points_key != (frame.seq, frame.fields["pulse0"], frame.fields["line"], frame.fields["n_points"]):
+        """Columns amplitude_db and width_ns of the points in the frame before; None: those were lost."""
+        n = frame.fields["n_points"]
+        if self._points_key != (frame.seq, frame.fields["pulse0"], frame.fields["line"], n):
             return None
-        n, raw = frame.fields["n_points"], struct.iter_unpack("<hH", frame.payload[16:16 + 4 * frame.fields["n_points"]])
-        pairs = [(_NAN if a == -32768 else a / 100.0, w / 100.0 if w else _NAN) for a, w in raw]
-        return _column((a for a, _ in pairs), n), _column((w for _, w in pairs), n)
+        raw = list(struct.iter_unpack("<hH", frame.payload[16:16 + 4 * n]))
+        return (_column((_NAN if a == -32768 else a / 100.0 for a, _ in raw), n),
+                _column((w / 100.0 if w else _NAN for _, w in raw), n))
 
     def to_scene(self, p: Points) -> Tuple:
         """x, y, z in the scene frame, metres; of a moving head each point with the pose of its time. NaN: no
@@ -1034,7 +1087,8 @@ class Head:
         if self.anchor["moving"] & 1:
             return self._to_scene_moving(p)
         turn, at = self.anchor["rotation"], self.anchor["station_m"]
-        return _by_row(lambda x, y, z, m: [s + v for s, v in zip(at, _apply(turn, (x, y, z)))], (p.x, p.y, p.z))
+        return _by_row(lambda x, y, z, m: [s + v for s, v in zip(at, _apply(turn, (x, y, z)))],
+                       (p.x, p.y, p.z))
 
     def to_crs(self, p: Points) -> Tuple:
         """x, y, z in the CRS of the anchor: metres, or degrees, degrees, metres. Points of a tilted or moving
@@ -1050,9 +1104,10 @@ class Head:
 
     def _to_scene_moving(self, p: Points) -> Tuple:
         rows, leg = [], None  # type: List, Optional[_Leg]
-        times, points = (p.t_ns.tolist(), zip(p.x.tolist(), p.y.tolist(), p.z.tolist())) if np is not None else \
-            (p.t_ns, zip(p.x, p.y, p.z))
-        for t_ns, v in zip(times, points):
+        columns = (p.t_ns, p.x, p.y, p.z)
+        if np is not None:
+            columns = (c.tolist() for c in columns)
+        for t_ns, *v in zip(*columns):
             if leg is None or not leg.a.t_ns <= t_ns < leg.b.t_ns:
                 leg = self._poses.leg(t_ns)
             rows.append((_NAN, _NAN, _NAN) if leg is None else _place_moving(leg, t_ns, v))
@@ -1071,8 +1126,8 @@ class Head:
                     leg.a.frame + f * (leg.b.frame - leg.a.frame), leg.a.flags | leg.b.flags)
 
     def gps_time_ns(self, t_ns: int) -> Optional[int]:
-        """GPS time of t_ns after the scan's start: ns since 1980-01-06T00:00:00Z without leap seconds. None: the
-        head does not know the time, or has not said it yet."""
+        """GPS time of t_ns after the scan's start: ns since 1980-01-06T00:00:00Z without leap seconds. None:
+        the head does not know the time, or has not said it yet."""
         if self._gps is None or self._scan_t0_ns is None:
             return None
         return self._gps[1] + self._scan_t0_ns + t_ns - self._gps[0]
@@ -1097,8 +1152,8 @@ def _summary(head: Head) -> None:
         if frame.type == POINTS and head.can_place():
             count = head.points(frame).echo_count
             echoes += int(np.count_nonzero(count)) if np is not None else sum(n > 0 for n in count)
-    names = ("", "descriptors", "anchors", "points frames", "line ends", "telemetry", "events", "names", "poses",
-             "attributes")
+    names = ("", "descriptors", "anchors", "points frames", "line ends", "telemetry", "events", "names",
+             "poses", "attributes")
     print(*(f"{kinds[k]} {names[k]}" for k in sorted(kinds) if k < len(names)), sep=", ")
     print(f"{echoes} echoes; frames lost: {head.parser.seq_lost}, bytes skipped: {head.parser.bad_bytes}")
     print(f"stream_sha256 {head.stream_sha256()}")
