@@ -304,7 +304,7 @@ static const struct cfg_key config_keys[] = {
     {RULE(material), CFG_TEXT, .def = "*", .help = "Material's name; * and ? stand for others, as in a shell."},
     {RULE(object), CFG_TEXT, .def = "*", .help = "Object's name, in the same way."},
     {SURFACE(reflectance), CFG_REAL, NULL, "", 0, 1, .example = "0.4",
-     .help = "Lambertian reflectance; 0 absorbs. When not given: luminance of the mesh's texture (PNG) or colour."},
+     .help = "Lambertian reflectance; 0 absorbs. When not given: luminance of the mesh's texture or colour."},
     {SURFACE(specular), CFG_REAL, NULL, "", 0, 1, .example = "0.1", .help = "Share that is reflected in a lobe."},
     {SURFACE(gloss), CFG_REAL, NULL, "", 0, 1e6, .example = "100", .help = "Exponent of the lobe's cosine; 100 when not given."},
     {SURFACE(retro), CFG_REAL, NULL, "", 0, 1e6, .example = "300",
