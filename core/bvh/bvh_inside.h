@@ -114,6 +114,10 @@ struct bvh_one {
 };
 void bvh_intersect_one(const struct bvh *bvh, const float org[3], const float dir[3], struct bvh_one *one);
 
+/* What a ray meets no further than this from where it begins is no hit: there it begins on the surface, and
+ * goes on. Half of the wire's finest count, and far more than rounding leaves of zero. */
+#define BVH_AT_ORIGIN_M 5e-7
+
 /* Corners of a triangle in the local frame; returns the largest distance from its origin. */
 double bvh_corners(const struct bvh *bvh, uint32_t prim, double v[3][3]);
 /* How far the edges of a triangle were moved outward, as seen from the origin (those of the very smallest

@@ -139,7 +139,7 @@ static void note_miss(struct search *s, uint32_t prim, double v[3][3], const dou
         gap = out;
         range = edge_range(a, b, dir);
     }
-    if (gap >= s->near_gap || range < 0.0) return;
+    if (gap >= s->near_gap || range <= BVH_AT_ORIGIN_M) return;
     s->near_gap = gap;
     s->near_prim = prim;
     s->near_range_m = range;
@@ -155,7 +155,7 @@ static void try_triangle(struct search *s, uint32_t prim)
         return;
     }
     double range = held_range(s->ray, prim, v);
-    if (!(range >= 0.0)) return;
+    if (!(range > BVH_AT_ORIGIN_M)) return;
     double same = 1e-12 * range;
     if (range < s->range_m - same || (range <= s->range_m + same && prim < s->prim)) {
         s->prim = prim;
