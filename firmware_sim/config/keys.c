@@ -237,8 +237,9 @@ static const struct cfg_key config_keys[] = {
      .help = "single: one ray per pulse; rings: sub-rays over the footprint; adaptive: sub-rays where the footprint "
              "reaches over an edge, or onto glass or a mirror; auto: as `scanhead plan` says."},
     {KEY(beam.rings), CFG_COUNT, NULL, "4", 0, BEAM_MAX_RINGS,
-     .help = "Rings of sub-rays: n rings have 1 + 3 n (n + 1). adaptive: used where a footprint holds more edges than "
-             "it can tell apart."},
+     .help = "Rings of sub-rays: n rings have 1 + 3 n (n + 1). At a plane's end a range is wrong by up to 0.35 / n^0.75 "
+             "of the footprint's radius times the tangent of the incidence: 9 mm with 4 rings, 0.35 mrad, 100 m and 77 "
+             "deg. Outlines are exact. adaptive: used where a footprint holds more edges than it can tell apart."},
     {"beam.echoes", SETTING(echoes), CFG_ENUM, .def = "all",
      WORDS([BEAM_ALL] = "all", [BEAM_FIRST] = "first", [BEAM_LAST] = "last", [BEAM_STRONGEST] = "strongest"),
      .help = "Which echoes of a pulse are sent. Those of glass, and of what is seen through it, are among them."},
