@@ -27,7 +27,8 @@ struct bvh_info {
 };
 
 /* The scene must outlive the BVH. Rays may begin up to station_reach_m from origin_m; the smaller it is, the
- * less has to be decided again. Built with `threads` threads (0: all). */
+ * less has to be decided again. Built with `threads` threads (0: all). SH_ESTOPPED where report asks to stop,
+ * SH_ENOMEM where Embree or this module gets no memory. */
 int bvh_create(const struct scene *scene, const double origin_m[3], double station_reach_m, unsigned threads,
                const struct sh_report *report, struct bvh **out, struct sh_err *err);
 void bvh_free(struct bvh *bvh);
@@ -37,7 +38,7 @@ void bvh_free(struct bvh *bvh);
  * before casting. Costs time here (about 6 us per triangle), and in casting about 20 to 50 ns for each
  * triangle that lies so near to the one that is hit: nothing in a plain scene, much in a building model whose
  * walls overlap. Without it the error of such a hit is at most the distance between the surfaces. */
-int bvh_order_exactly(struct bvh *bvh, struct sh_err *err);
+int bvh_order_exactly(struct bvh *bvh, const struct sh_report *report, struct sh_err *err);
 /* Rays per Embree call: 1, 4, 8 or 16; for measuring and tests. Another width than the native one may find
  * another triangle where a ray passes through an edge; ranges agree. */
 void bvh_set_packet(struct bvh *bvh, uint32_t rays);

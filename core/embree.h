@@ -1,5 +1,5 @@
-/* Embree 3 or 4: the one place that includes it. Which one, the Makefile decides (SH_EMBREE), with the library
- * that it links. Point queries are the same in both. */
+/* Embree 3 or 4: the one place that includes it, and what its errors mean. Which one, the Makefile decides
+ * (SH_EMBREE), with the library that it links. Point queries are the same in both. */
 #ifndef CORE_EMBREE_H
 #define CORE_EMBREE_H
 
@@ -10,5 +10,10 @@
 #else
 #error "SH_EMBREE is 3 or 4, as the Makefile says it"
 #endif
+
+#include "core/err.h"
+
+/* The error that one of Embree's is. what: what was to be made. */
+int embree_fail(enum RTCError code, const char *what, struct sh_err *err);
 
 #endif

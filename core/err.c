@@ -29,3 +29,13 @@ void sh_progress(const struct sh_report *report, const char *what, double fracti
 {
     if (report != NULL && report->progress != NULL) report->progress(report->ctx, what, fraction);
 }
+
+int sh_stopped(const struct sh_report *report)
+{
+    return report != NULL && report->stop != NULL && report->stop(report->ctx);
+}
+
+int sh_check_stop(const struct sh_report *report, struct sh_err *err)
+{
+    return sh_stopped(report) ? sh_fail(err, SH_ESTOPPED, "interrupted while loading; nothing ran") : SH_OK;
+}

@@ -9,16 +9,17 @@
 
 enum sh_code {
     SH_OK = 0,
-    SH_EINPUT = -1,   /* wrong usage, configuration or input file: exit status 2 */
-    SH_EIO = -2,      /* the operating system or a peer failed: exit status 1 */
-    SH_ENOMEM = -3,   /* no memory: exit status 1 */
-    SH_EPERM = -4,    /* a permission is missing; the text says which */
-    SH_ETIMEOUT = -5, /* nothing happened in time */
-    SH_ECLOSED = -6,  /* the other end is gone */
-    SH_EFORMAT = -7,  /* bytes that are not what the protocol says */
-    SH_ESTATE = -8,   /* not possible in the present state */
-    SH_ELOST = -9,    /* a device is not there, or not any more */
-    SH_ERESET = -10,  /* a device is still there, but what was open on it is over */
+    SH_EINPUT = -1,    /* wrong usage, configuration or input file: exit status 2 */
+    SH_EIO = -2,       /* the operating system or a peer failed: exit status 1 */
+    SH_ENOMEM = -3,    /* no memory: exit status 1 */
+    SH_EPERM = -4,     /* a permission is missing; the text says which */
+    SH_ETIMEOUT = -5,  /* nothing happened in time */
+    SH_ECLOSED = -6,   /* the other end is gone */
+    SH_EFORMAT = -7,   /* bytes that are not what the protocol says */
+    SH_ESTATE = -8,    /* not possible in the present state */
+    SH_ELOST = -9,     /* a device is not there, or not any more */
+    SH_ERESET = -10,   /* a device is still there, but what was open on it is over */
+    SH_ESTOPPED = -11, /* whoever asked for the work wants it to end: exit status 1 */
 };
 
 struct sh_err {
@@ -35,9 +36,17 @@ struct sh_report {
     void *ctx;
     void (*warn)(void *ctx, const char *text);                      /* one line, without a newline */
     void (*progress)(void *ctx, const char *what, double fraction); /* 0..1; negative where unknown */
+    /* 1: the work is to end soon, within a tenth of a second. From any thread of the work, and often: it only
+     * looks at a flag. */
+    int (*stop)(void *ctx);
 };
 
 void sh_warn(const struct sh_report *report, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 void sh_progress(const struct sh_report *report, const char *what, double fraction);
+
+/* Whether the work is to end. report may be NULL. */
+int sh_stopped(const struct sh_report *report);
+/* The same as an error: SH_OK, or SH_ESTOPPED with its line of text. */
+int sh_check_stop(const struct sh_report *report, struct sh_err *err);
 
 #endif

@@ -167,6 +167,7 @@ struct beam_outlines_spec {
     /* By label: surfaces of one kind send back the same. Edges where one kind ends are outlines, too, with or
      * without a step. NULL: all surfaces are of one kind. */
     const uint16_t *kind;
+    const struct sh_report *report; /* SH_ESTOPPED where it asks to stop; NULL: nothing does */
 };
 /* probe, NULL: all outlines count. Else rays are cast close along both sides of each, a footprint's radius
  * apart. A stretch of an outline is left out where it is hidden, or where the ranges on both sides agree to

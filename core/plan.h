@@ -88,8 +88,10 @@ struct plan_place {
 struct plan_sample;
 
 /* Draws equally many pulses of all places. 61 sub-rays show which pulses meet one smooth surface. These are
- * many and alike: only some of them are cast with the reference. The places must outlive the sample. */
-int plan_sample_create(struct plan_place *place, uint32_t n_places, struct plan_sample **out, struct sh_err *err);
+ * many and alike: only some of them are cast with the reference. The places must outlive the sample.
+ * Where report asks to stop, sampling ends at once, and its figures mean nothing. */
+int plan_sample_create(struct plan_place *place, uint32_t n_places, const struct sh_report *report,
+                       struct plan_sample **out, struct sh_err *err);
 void plan_sample_free(struct plan_sample *sample);
 
 /* The error of a beam against BEAM_MAX_RINGS rings (1,027 sub-rays): sets error_m and echo_share of option,
@@ -118,6 +120,8 @@ void plan_beam_option(enum beam_mode mode, uint32_t rings, struct plan_option *o
 /* Fills options, in order of cost, for surfaces in a scene that lies within far_m of the head. */
 void plan_order_options(double far_m, struct plan_option option[2]);
 
+/* The row of the mesh: what its vertices may be off by, see struct scene. */
+void plan_mesh(double error_m, struct plan_row *row);
 /* The row of the cast: what is always done. packet: rays per Embree call. */
 void plan_cast(uint32_t packet, struct plan_row *row);
 

@@ -68,14 +68,13 @@ struct ply_rows {
     double *corner;                    /* the list of use PLY_CORNERS */
     size_t n_corners, cap_corners;
     bool is_single; /* x, y or z of vertices are: read as they stand, but what they stood for was rounded */
-    void (*progress)(void *ctx, double fraction);
+    text_progress *progress;
     void *progress_ctx;
 };
 
 /* Opens the file and reads the header; path has to stay. progress is called now (fraction -1: unknown) and by
  * ply_walk. ply_close is due in any case. */
-int ply_open(struct ply_rows *r, const char *path, void (*progress)(void *ctx, double fraction), void *ctx,
-             struct sh_err *err);
+int ply_open(struct ply_rows *r, const char *path, text_progress *progress, void *ctx, struct sh_err *err);
 void ply_close(struct ply_rows *r);
 
 /* Who takes the rows. */

@@ -75,6 +75,8 @@ void pose_mount(const struct pose *body, const struct pose *mount, struct pose *
 /* The last of n >= 1 knots, in order of time, at or before t_ns; before the first one 0. */
 size_t pose_find_knot(const struct pose_knot *knot, size_t n, int64_t t_ns);
 
+/* Files of millions of samples take seconds: what has a report ends with SH_ESTOPPED where that asks to
+ * stop. */
 struct trajectory;
 
 struct pose_sample {
@@ -96,7 +98,7 @@ int trajectory_from_samples(const struct pose_sample *sample, size_t n, struct t
  * number, from 0); the columns scan and flags of `scanhead record -o NAME.poses.csv` are ignored, and a byte
  * order mark of UTF-8. Lines that begin with '#' and empty lines don't count. Times are within 4e9 s of 0, so
  * that nanoseconds between any two fit into 64 bits. Everything else is an error with file and line. */
-int trajectory_read_csv(const char *path, struct trajectory **out, struct sh_err *err);
+int trajectory_read_csv(const char *path, const struct sh_report *report, struct trajectory **out, struct sh_err *err);
 
 /* Way-points, from a CSV file as well: x_m, y_m, z_m, speed_m_s, and pause_s where wanted. The platform goes
  * through them on the cubic Hermite curve described above. The way to the next point takes chord / speed_m_s;
@@ -104,8 +106,8 @@ int trajectory_read_csv(const char *path, struct trajectory **out, struct sh_err
  * for that time and starts smoothly. It heads along the path, with pitch and roll 0, about the axes that a
  * station has there: geoframe_level of frame, or the scene's own where frame is NULL. SH_EINPUT, too, where
  * the way needs more than POSE_MAX_KNOTS samples: one every 0.02 s, or every 0.01 m where that is longer. */
-int trajectory_read_waypoints(const char *path, const struct geoframe *frame, struct trajectory **out,
-                              struct sh_err *err);
+int trajectory_read_waypoints(const char *path, const struct geoframe *frame, const struct sh_report *report,
+                              struct trajectory **out, struct sh_err *err);
 
 void trajectory_free(struct trajectory *trajectory);
 void trajectory_span(const struct trajectory *trajectory, double *first_s, double *last_s);
@@ -131,6 +133,6 @@ struct pose_path {
  * the rules ask for; error_m is more than tolerance_m only where POSE_MIN_STEP_US is the limit. The caller
  * frees out->knot. SH_EINPUT for more than POSE_MAX_KNOTS. */
 int trajectory_knots(const struct trajectory *trajectory, const struct pose *mount, const struct pose_knot_rules *rules,
-                     struct pose_path *out, struct sh_err *err);
+                     const struct sh_report *report, struct pose_path *out, struct sh_err *err);
 
 #endif

@@ -8,8 +8,7 @@
 #include <sys/stat.h>
 
 /* Read, not mapped: a file that shrinks while it is mapped would end the process. */
-static int read_whole(struct text *t, FILE *f, void (*progress)(void *ctx, double fraction), void *ctx,
-                      struct sh_err *err)
+static int read_whole(struct text *t, FILE *f, text_progress *progress, void *ctx, struct sh_err *err)
 {
     struct stat st;
     if (fstat(fileno(f), &st) != 0) return text_fail(t, 0, SH_EINPUT, err, "%s", strerror(errno));
@@ -24,7 +23,8 @@ static int read_whole(struct text *t, FILE *f, void (*progress)(void *ctx, doubl
         if (got < want)
             return text_fail(t, 0, SH_EINPUT, err, "%s", ferror(f) ? strerror(errno) : "got shorter while read");
         at += got;
-        if (progress != NULL) progress(ctx, -1.0);
+        int rc = progress != NULL ? progress(ctx, -1.0, err) : SH_OK;
+        if (rc != SH_OK) return rc;
     }
     t->data[t->size] = '\0';
     return SH_OK;
@@ -51,8 +51,7 @@ int text_fail(const struct text *t, uint64_t line, int code, struct sh_err *err,
     return sh_fail(err, code, "%s%s%s: %s", cut ? "..." : "", t->path + (cut ? len - LONGEST : 0), place, what);
 }
 
-int text_open(struct text *t, const char *path, void (*progress)(void *ctx, double fraction), void *ctx,
-              struct sh_err *err)
+int text_open(struct text *t, const char *path, text_progress *progress, void *ctx, struct sh_err *err)
 {
     *t = (struct text){.path = path, .line = 1};
     FILE *f = fopen(path, "rb");

@@ -29,10 +29,11 @@ struct text {
     locale_t c_locale;
 };
 
-/* Reads the whole file; progress (may be NULL) is called every 16 MiB, fraction -1: unknown. text_close is
- * due in any case. */
-int text_open(struct text *t, const char *path, void (*progress)(void *ctx, double fraction), void *ctx,
-              struct sh_err *err);
+/* Called every 16 MiB that are read, fraction -1: unknown. What is not 0 ends the reading, with err filled. */
+typedef int text_progress(void *ctx, double fraction, struct sh_err *err);
+
+/* Reads the whole file; progress may be NULL. text_close is due in any case. */
+int text_open(struct text *t, const char *path, text_progress *progress, void *ctx, struct sh_err *err);
 void text_close(struct text *t);
 
 /* Fails with "FILE, line N: text", or without the line when it is 0. Returns code. */

@@ -1,4 +1,5 @@
 /* scanhead: the command line. */
+#include <errno.h>
 #include <string.h>
 
 #include "drivers/host/scanhead.h"
@@ -6,7 +7,7 @@
 
 /* The only list of commands. */
 static const struct app_command *const COMMANDS[] = {
-    &app_run, &app_record, &app_plan, &app_map, &app_report, &app_check, &app_list, NULL,
+    &app_run, &app_record, &app_plan, &app_map, &app_report, &app_check, &app_list, &app_init, NULL,
 };
 
 static void print_help(FILE *out)
@@ -21,7 +22,7 @@ static void print_help(FILE *out)
                  "Exit status: 0 done, 1 failed, 2 wrong usage, configuration or input.\n");
 }
 
-int main(int argc, char **argv)
+static int run(int argc, char **argv)
 {
     if (argc < 2) {
         print_help(stderr);
@@ -39,4 +40,16 @@ int main(int argc, char **argv)
         if (strcmp(argv[1], (*c)->name) == 0) return (*c)->run(argc - 1, argv + 1);
     fprintf(stderr, "scanhead: unknown command %s; see scanhead --help\n", argv[1]);
     return APP_USAGE;
+}
+
+/* What a command printed may still be in the buffer. A full disk or a closed pipe shows only here. */
+int main(int argc, char **argv)
+{
+    int status = run(argc, argv);
+    errno = 0;
+    const int failed = fflush(stdout) != 0 || ferror(stdout) != 0;
+    if (!failed || status != APP_OK) return status;
+    fprintf(stderr, "scanhead: standard output: writing failed%s%s\n", errno != 0 ? ": " : "",
+            errno != 0 ? strerror(errno) : "");
+    return APP_FAILED;
 }

@@ -79,5 +79,7 @@ check "the udev rule is where udev looks below a prefix" test -s "$work/root$pre
 check "the README's client, with the archive" compile client-static "$work/root$prefix/lib/libscanhead.a" -lnettle -lusb-1.0 -lm
 check "the README's client, with the shared library" compile client $(config --libs)
 check "and it reads a scan" reads_a_scan
+check "the client in Python asks the same head" timeout 60 python3 "$work/root$prefix/share/scanhead/python/scanhead.py" \
+    "tty:$work/port" TIME?
 check "one version: program, library, header and pkg-config" versions_agree
 echo "1..$tests"

@@ -91,9 +91,11 @@ static int begin_element(void *reading, struct sh_err *err)
                          err);
 }
 
-static void progress(void *reading, double fraction)
+static int progress(void *reading, double fraction, struct sh_err *err)
 {
-    sh_progress(((struct reading *)reading)->report, "reading the points", fraction);
+    const struct sh_report *report = ((struct reading *)reading)->report;
+    sh_progress(report, "reading the points", fraction);
+    return sh_check_stop(report, err);
 }
 
 static int read_body(struct reading *g, struct sh_err *err)

@@ -151,9 +151,7 @@ int distance_query(const struct distance *index, const double p_prcs[3], double 
 static int embree_failed(RTCDevice device, struct sh_err *err)
 {
     enum RTCError code = rtcGetDeviceError(device);
-    if (code == RTC_ERROR_NONE) return SH_OK;
-    if (code == RTC_ERROR_OUT_OF_MEMORY) return sh_fail(err, SH_ENOMEM, "no memory for the distance index");
-    return sh_fail(err, SH_EIO, "Embree failed to build the distance index (error %d)", (int)code);
+    return code == RTC_ERROR_NONE ? SH_OK : embree_fail(code, "the index for distances", err);
 }
 
 /* Vertices that no triangle uses may lie anywhere, so they go to the centre. */
@@ -173,7 +171,7 @@ static void fill_vertices(struct distance *d, float (*out)[3])
 static int build_bvh(struct distance *d, struct sh_err *err)
 {
     d->device = rtcNewDevice(NULL);
-    if (d->device == NULL) return sh_fail(err, SH_EIO, "Embree found no device it can use");
+    if (d->device == NULL) return embree_failed(NULL, err);
     d->bvh = rtcNewScene(d->device);
     RTCGeometry mesh = rtcNewGeometry(d->device, RTC_GEOMETRY_TYPE_TRIANGLE);
     float(*vertex)[3] = rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof *vertex,

@@ -6,6 +6,13 @@
 #include <string.h>
 #include <time.h>
 
+/* Rays may look at all that is proposed (bvh_walk_along). */
+#if RTC_VERSION_MAJOR >= 4
+#define LOOKS_THROUGH RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS
+#else
+#define LOOKS_THROUGH RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION
+#endif
+
 static bool count_bytes(void *user, ssize_t bytes, bool post)
 {
     (void)post;
@@ -14,21 +21,45 @@ static bool count_bytes(void *user, ssize_t bytes, bool post)
     return true;
 }
 
-static int build(struct bvh *bvh, struct sh_err *err)
+/* From Embree's threads, often; false ends the building. */
+static bool go_on(void *report, double fraction)
+{
+    (void)fraction;
+    return !sh_stopped(report);
+}
+
+/* What Embree's last error was, since that was asked last. */
+static int check_device(RTCDevice device, const struct sh_report *report, struct sh_err *err)
+{
+    enum RTCError code = rtcGetDeviceError(device);
+    if (code == RTC_ERROR_NONE) return SH_OK;
+    if (code == RTC_ERROR_CANCELLED && sh_stopped(report)) return sh_check_stop(report, err);
+    return embree_fail(code, "bvh", err);
+}
+
+int bvh_commit(struct bvh *bvh, RTCScene scene, const struct sh_report *report, struct sh_err *err)
+{
+    union { /* Embree only passes it on */
+        const void *in;
+        void *out;
+    } ctx = {.in = report};
+    rtcSetSceneProgressMonitorFunction(scene, go_on, ctx.out);
+    rtcCommitScene(scene);
+    return check_device(bvh->device, report, err);
+}
+
+static int build(struct bvh *bvh, const struct sh_report *report, struct sh_err *err)
 {
     RTCGeometry geometry = rtcNewGeometry(bvh->device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    int rc = bvh_fill(bvh, geometry, err);
+    int rc = bvh_fill(bvh, geometry, report, err);
     if (rc == SH_OK) {
         rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_HIGH);
         rtcCommitGeometry(geometry);
         bvh->rtc = rtcNewScene(bvh->device);
-        rtcSetSceneFlags(bvh->rtc, RTC_SCENE_FLAG_NONE);
+        rtcSetSceneFlags(bvh->rtc, bvh->scene->cutout != NULL ? LOOKS_THROUGH : RTC_SCENE_FLAG_NONE);
         rtcSetSceneBuildQuality(bvh->rtc, RTC_BUILD_QUALITY_HIGH);
         rtcAttachGeometry(bvh->rtc, geometry);
-        rtcCommitScene(bvh->rtc);
-        int code = (int)rtcGetDeviceError(bvh->device);
-        if (code != RTC_ERROR_NONE)
-            rc = sh_fail(err, SH_ENOMEM, "bvh: Embree failed to build the BVH (error %d)", code);
+        rc = bvh_commit(bvh, bvh->rtc, report, err);
     }
     rtcReleaseGeometry(geometry);
     return rc;
@@ -63,12 +94,12 @@ int bvh_create(const struct scene *scene, const double origin_m[3], double stati
     bvh->device = rtcNewDevice(config);
     if (bvh->device == NULL) {
         free(bvh);
-        return sh_fail(err, SH_EIO, "bvh: Embree can't start on this processor");
+        return embree_fail(rtcGetDeviceError(NULL), "bvh", err);
     }
     rtcSetDeviceMemoryMonitorFunction(bvh->device, count_bytes, bvh);
     if (scene->n_triangles > 1000000) sh_progress(report, "building the BVH", -1.0);
     double start = seconds();
-    int rc = build(bvh, err);
+    int rc = build(bvh, report, err);
     if (rc != SH_OK) {
         bvh_free(bvh);
         return rc;

@@ -25,7 +25,11 @@
  * What float still decides is the order of two surfaces that lie within its resolution one after the other,
  * about 5e-7 of the range over the cosine of the incidence; unless bvh_order_exactly was called: then such
  * rivals are known from the start (rivals.c), and a hit on one compares its plane with those of the others.
- */
+ *
+ * Triangles with holes (scene->cutout) are marked as if they had rivals, so that all their hits are decided in
+ * double. A hit in a hole is none. The ray is then cast once more, alone, past every triangle that Embree
+ * proposes on its way, and each of them is decided in double: there is no place where the ray sets out again,
+ * nothing that it could meet twice or step over, and no limit to the number of layers. */
 #ifndef CORE_BVH_BVH_INSIDE_H
 #define CORE_BVH_BVH_INSIDE_H
 
@@ -63,7 +67,7 @@ static inline uint16_t bvh_label(const struct bvh_plane *tri)
     return (uint16_t)(bvh_spare(tri->n[1]) | (bvh_spare(tri->n[2]) & 15) << BVH_SPARE_BITS);
 }
 
-/* The last spare bit of n[2]: the triangle has rivals. */
+/* The last spare bit of n[2]: the triangle has rivals, or a texture with holes; each hit is decided. */
 enum { BVH_RIVAL_BIT = 1 << (BVH_SPARE_BITS - 1) };
 
 struct bvh {
@@ -118,6 +122,15 @@ void bvh_intersect_one(const struct bvh *bvh, const float org[3], const float di
  * goes on. Half of the wire's finest count, and far more than rounding leaves of zero. */
 #define BVH_AT_ORIGIN_M 5e-7
 
+/* One ray through all that Embree proposes on its way, in no order. is_met: whether the ray really meets that
+ * triangle; what lies behind by the float distance is then left out. Only where the scene has cutouts. */
+struct bvh_walk {
+    int (*is_met)(void *ctx, uint32_t prim);
+    void *ctx;
+};
+void bvh_walk_along(const struct bvh *bvh, const float org[3], const float dir[3], float t_max,
+                    const struct bvh_walk *walk);
+
 /* Corners of a triangle in the local frame; returns the largest distance from its origin. */
 double bvh_corners(const struct bvh *bvh, uint32_t prim, double v[3][3]);
 /* How far the edges of a triangle were moved outward, as seen from the origin (those of the very smallest
@@ -125,13 +138,15 @@ double bvh_corners(const struct bvh *bvh, uint32_t prim, double v[3][3]);
 double bvh_width_m(const struct bvh *bvh, uint32_t prim);
 
 /* Fills the float buffers of a geometry with widened triangles, and bvh->triangle. */
-int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err);
+int bvh_fill(struct bvh *bvh, RTCGeometry geometry, const struct sh_report *report, struct sh_err *err);
+/* Builds the BVH of a scene of Embree's, unless report asks to stop. */
+int bvh_commit(struct bvh *bvh, RTCScene scene, const struct sh_report *report, struct sh_err *err);
 
 /* twins.c: of faces with the same three corners, however they are written, only the first stays in the float
  * buffer. */
-int bvh_drop_twins(const struct bvh *bvh, float *vertex, struct sh_err *err);
+int bvh_drop_twins(const struct bvh *bvh, float *vertex, const struct sh_report *report, struct sh_err *err);
 
-/* Marks a triangle as having rivals; its plane is made anew to go with that. */
+/* Marks a triangle as having rivals or holes; its plane is made anew to go with that. */
 void bvh_mark_rival(struct bvh *bvh, uint32_t prim);
 /* ---- refine.c */
 /* What Embree proposed, and what double precision makes of it. */

@@ -15,8 +15,12 @@
 #include "core/grow.h"
 #include "core/vec3.h"
 
+enum { PART = 1 << 15 }; /* triangles: about a tenth of a second */
+
 struct pairs {
     const struct bvh *bvh;
+    const struct sh_report *report;
+    uint32_t first; /* triangle of the part at hand */
     pthread_mutex_t lock;
     uint32_t (*pair)[2];
     size_t n, capacity;
@@ -107,24 +111,31 @@ static void add_pair(struct pairs *p, uint32_t i, uint32_t j)
     pthread_mutex_unlock(&p->lock);
 }
 
-/* From Embree's threads. Each pair may come in either order, or twice. */
+/* From Embree's threads. Each pair comes in both orders, from the parts of both. */
 static void on_collision(void *user, struct RTCCollision *collision, unsigned n)
 {
     struct pairs *p = user;
+    if (sh_stopped(p->report)) return;
     for (unsigned k = 0; k < n; k++) {
-        uint32_t i = collision[k].primID0, j = collision[k].primID1;
-        if (i == j || !are_rivals(p->bvh, i, j)) continue;
-        add_pair(p, i, j);
-        add_pair(p, j, i);
+        uint32_t i = p->first + collision[k].primID0, j = collision[k].primID1;
+        if (i != j && are_rivals(p->bvh, i, j)) add_pair(p, i, j);
     }
 }
 
+/* Embree's boxes of some triangles. */
+struct boxes {
+    const struct bvh *bvh;
+    uint32_t first, n;
+    RTCScene rtc;
+};
+
 static void box_of(const struct RTCBoundsFunctionArguments *args)
 {
-    const struct bvh *bvh = args->geometryUserPtr;
+    const struct boxes *boxes = args->geometryUserPtr;
+    const uint32_t prim = boxes->first + args->primID;
     struct RTCBounds *box = args->bounds_o;
-    double v[3][3], blur_m = 2.0 * bvh_width_m(bvh, args->primID), lo[3], hi[3];
-    bvh_corners(bvh, args->primID, v);
+    double v[3][3], blur_m = 2.0 * bvh_width_m(boxes->bvh, prim), lo[3], hi[3];
+    bvh_corners(boxes->bvh, prim, v);
     for (int j = 0; j < 3; j++) {
         lo[j] = fmin(v[0][j], fmin(v[1][j], v[2][j])) - blur_m;
         hi[j] = fmax(v[0][j], fmax(v[1][j], v[2][j])) + blur_m;
@@ -166,22 +177,42 @@ static int make_lists(struct bvh *bvh, struct pairs *p, struct sh_err *err)
     return SH_OK;
 }
 
-int bvh_order_exactly(struct bvh *bvh, struct sh_err *err)
+static int make_boxes(struct bvh *bvh, struct boxes *boxes, const struct sh_report *report, struct sh_err *err)
 {
-    struct pairs p = {.bvh = bvh};
-    pthread_mutex_init(&p.lock, NULL);
     RTCGeometry geometry = rtcNewGeometry(bvh->device, RTC_GEOMETRY_TYPE_USER);
-    RTCScene boxes = rtcNewScene(bvh->device);
-    rtcSetGeometryUserPrimitiveCount(geometry, bvh->scene->n_triangles);
-    rtcSetGeometryUserData(geometry, bvh);
+    boxes->rtc = rtcNewScene(bvh->device);
+    rtcSetGeometryUserPrimitiveCount(geometry, boxes->n);
+    rtcSetGeometryUserData(geometry, boxes);
     rtcSetGeometryBoundsFunction(geometry, box_of, NULL);
     rtcCommitGeometry(geometry);
-    rtcAttachGeometry(boxes, geometry);
+    rtcAttachGeometry(boxes->rtc, geometry);
     rtcReleaseGeometry(geometry);
-    rtcCommitScene(boxes);
-    rtcCollide(boxes, boxes, on_collision, &p);
-    rtcReleaseScene(boxes);
-    int rc = p.failed ? sh_fail(err, SH_ENOMEM, "cast: no memory for pairs of triangles") : make_lists(bvh, &p, err);
+    return bvh_commit(bvh, boxes->rtc, report, err);
+}
+
+/* Part by part against all: a collision of Embree's can't be ended on the way. */
+static int collide(struct bvh *bvh, struct pairs *p, struct sh_err *err)
+{
+    const uint32_t n = bvh->scene->n_triangles;
+    struct boxes all = {.bvh = bvh, .n = n};
+    int rc = make_boxes(bvh, &all, p->report, err);
+    for (p->first = 0; p->first < n && rc == SH_OK; p->first += n - p->first < PART ? n - p->first : PART) {
+        struct boxes part = {.bvh = bvh, .first = p->first, .n = n - p->first < PART ? n - p->first : PART};
+        rc = make_boxes(bvh, &part, p->report, err);
+        if (rc == SH_OK) rtcCollide(part.rtc, all.rtc, on_collision, p);
+        rtcReleaseScene(part.rtc);
+        if (rc == SH_OK) rc = sh_check_stop(p->report, err);
+    }
+    rtcReleaseScene(all.rtc);
+    return rc == SH_OK && p->failed ? sh_fail(err, SH_ENOMEM, "bvh: no memory for pairs of triangles") : rc;
+}
+
+int bvh_order_exactly(struct bvh *bvh, const struct sh_report *report, struct sh_err *err)
+{
+    struct pairs p = {.bvh = bvh, .report = report};
+    pthread_mutex_init(&p.lock, NULL);
+    int rc = collide(bvh, &p, err);
+    if (rc == SH_OK) rc = make_lists(bvh, &p, err);
     free(p.pair);
     pthread_mutex_destroy(&p.lock);
     return rc;

@@ -37,7 +37,21 @@ static int same_corners(const double *const a[3], const double *const b[3])
     return 1;
 }
 
-int bvh_drop_twins(const struct bvh *bvh, float *vertex, struct sh_err *err)
+/* Whether both have holes in the same places, or none: the same image at the same corners. */
+static int same_holes(const struct scene *scene, uint32_t a, uint32_t b)
+{
+    const uint32_t *p = scene->triangle[a], *q = scene->triangle[b];
+    if (scene_cutout(scene, a) != scene_cutout(scene, b)) return 0;
+    if (scene_cutout(scene, a) == NULL) return 1;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            if (memcmp(scene->vertex_m[p[i]], scene->vertex_m[q[j]], sizeof *scene->vertex_m) == 0 &&
+                memcmp(scene->uv[a][i], scene->uv[b][j], sizeof scene->uv[a][i]) != 0)
+                return 0;
+    return 1;
+}
+
+int bvh_drop_twins(const struct bvh *bvh, float *vertex, const struct sh_report *report, struct sh_err *err)
 {
     const struct scene *scene = bvh->scene;
     uint64_t size = 16;
@@ -46,13 +60,16 @@ int bvh_drop_twins(const struct bvh *bvh, float *vertex, struct sh_err *err)
     uint32_t *table = malloc(size * sizeof *table);
     if (table == NULL) return sh_fail(err, SH_ENOMEM, "cast: no memory to compare %u triangles", scene->n_triangles);
     memset(table, 0xff, size * sizeof *table);
-    for (uint32_t prim = 0; prim < scene->n_triangles; prim++) {
+    int rc = SH_OK;
+    for (uint32_t prim = 0; prim < scene->n_triangles && rc == SH_OK; prim++) {
+        if ((prim & 0xffff) == 0) rc = sh_check_stop(report, err);
         const double *corner[3], *other[3];
         sorted_corners(scene, prim, corner);
         uint64_t at = hash_corners(corner) & (size - 1);
         for (; table[at] != UINT32_MAX; at = (at + 1) & (size - 1)) {
             sorted_corners(scene, table[at], other);
             if (!same_corners(corner, other)) continue;
+            if (scene->cutout != NULL && !same_holes(scene, prim, table[at])) continue;
             for (int i = 0; i < 9; i++)
                 vertex[9 * (size_t)prim + (size_t)i] = NAN; /* Embree leaves out what is not finite */
             break;
@@ -60,5 +77,5 @@ int bvh_drop_twins(const struct bvh *bvh, float *vertex, struct sh_err *err)
         if (table[at] == UINT32_MAX) table[at] = prim;
     }
     free(table);
-    return SH_OK;
+    return rc;
 }

@@ -182,7 +182,7 @@ static void fill_triangle(struct bvh *bvh, uint32_t prim, float *vertex)
     set_exact(tri, v, guard(bvh, offset, width_m, longest, area2_wide, area2), bvh->scene->label[prim]);
 }
 
-int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err)
+int bvh_fill(struct bvh *bvh, RTCGeometry geometry, const struct sh_report *report, struct sh_err *err)
 {
     const struct scene *scene = bvh->scene;
     size_t n = scene->n_triangles;
@@ -193,11 +193,15 @@ int bvh_fill(struct bvh *bvh, RTCGeometry geometry, struct sh_err *err)
         rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t), n);
     if (bvh->triangle == NULL || vertex == NULL || index == NULL)
         return sh_fail(err, SH_ENOMEM, "cast: no memory for %zu triangles", n);
-    for (uint32_t i = 0; i < n; i++)
+    for (uint32_t i = 0; i < n; i++) {
+        if ((i & 0xffff) == 0 && sh_check_stop(report, err) != SH_OK) return SH_ESTOPPED;
         fill_triangle(bvh, i, vertex + 9 * (size_t)i);
+    }
     for (uint32_t i = 0; i < 3 * n; i++)
         index[i] = i;
+    for (uint32_t i = 0; i < n && scene->cutout != NULL; i++)
+        if (scene_cutout(scene, i) != NULL) bvh_mark_rival(bvh, i);
     bvh->triangle[n] = (struct bvh_plane){
         .n = {NAN, with_spare(NAN, BVH_NO_LABEL & 0xfff), with_spare(NAN, BVH_NO_LABEL >> BVH_SPARE_BITS)}, .d = NAN};
-    return bvh_drop_twins(bvh, vertex, err);
+    return bvh_drop_twins(bvh, vertex, report, err);
 }

@@ -153,16 +153,18 @@ static int cut_edge(struct stretches *s, struct outline_prober *prober, const do
     return SH_OK;
 }
 
-static int find_stretches(const struct beam_outlines *o, struct outline_prober *prober, double range_max_m,
-                          struct stretches *s)
+static int find_stretches(const struct beam_outlines *o, struct outline_prober *prober,
+                          const struct beam_outlines_spec *spec, struct stretches *s, struct sh_err *err)
 {
     for (uint32_t k = 0; k < o->n_edges; k++) {
         double p[3], q[3];
+        if ((k & 0xfff) == 0 && sh_check_stop(spec->report, err) != SH_OK) return SH_ESTOPPED;
         for (int i = 0; i < 3; i++) {
             p[i] = o->edge[k].a[i];
             q[i] = o->edge[k].b[i];
         }
-        if (cut_edge(s, prober, p, q, k, range_max_m) != SH_OK) return SH_ENOMEM;
+        if (cut_edge(s, prober, p, q, k, spec->range_max_m * 1.01) != SH_OK)
+            return sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");
     }
     return SH_OK;
 }
@@ -187,39 +189,53 @@ static void edge_normal(const struct outline_edge *edge, float normal[3])
         normal[i] = length > 0.0 ? (float)(n[i] / length) : 0.0f;
 }
 
-static uint64_t draw_all(struct beam_outlines *o, const struct beam *beam, const struct stretches *s,
-                         enum draw_what what)
+static int draw_all(struct beam_outlines *o, const struct beam_outlines_spec *spec, const struct stretches *s,
+                    enum draw_what what, uint64_t *n, struct sh_err *err)
 {
-    struct draw d = {.o = o, .beam = beam, .what = what};
+    struct draw d = {.o = o, .beam = spec->beam, .what = what};
     for (size_t i = 0; i < s->n; i++) {
+        if ((i & 0xfff) == 0 && sh_check_stop(spec->report, err) != SH_OK) return SH_ESTOPPED;
         d.edge = s->at[i].edge;
         if (d.what == FILL) edge_normal(&o->edge[d.edge], d.normal);
         draw_piece(&d, s->at[i].p, s->at[i].q, nearest_on(s->at[i].p, s->at[i].q));
     }
-    return d.n;
+    if (n != NULL) *n = d.n;
+    return SH_OK;
 }
 
-static int fill_cells(struct beam_outlines *o, const struct beam *beam, const struct stretches *s, struct sh_err *err)
+/* After filling, each of o->first stands at its cell's end. */
+static int sort_cells(struct beam_outlines *o, const struct beam_outlines_spec *spec, struct sh_err *err)
 {
+    memmove(o->first + 1, o->first, N_CELLS * sizeof *o->first);
+    o->first[0] = 0;
+    for (uint32_t c = 0; c < N_CELLS; c++) {
+        if ((c & 0xfff) == 0 && sh_check_stop(spec->report, err) != SH_OK) return SH_ESTOPPED;
+        if (o->first[c + 1] - o->first[c] > 1)
+            qsort(o->entry + o->first[c], o->first[c + 1] - o->first[c], sizeof *o->entry, by_range);
+    }
+    return SH_OK;
+}
+
+static int fill_cells(struct beam_outlines *o, const struct beam_outlines_spec *spec, const struct stretches *s,
+                      struct sh_err *err)
+{
+    uint64_t n;
     o->first = calloc(N_CELLS + 1, sizeof *o->first);
     o->any = calloc(N_CELLS / 32, sizeof *o->any);
     o->around = calloc(N_CELLS / 32, sizeof *o->around);
     if (o->first == NULL || o->any == NULL || o->around == NULL) return sh_fail(err, SH_ENOMEM, "beam: no memory");
-    uint64_t n = draw_all(o, beam, s, COUNT);
+    int rc = draw_all(o, spec, s, COUNT, &n, err);
+    if (rc != SH_OK) return rc;
     if (n >= UINT32_MAX) return sh_fail(err, SH_EINPUT, "beam: too many outlines; beam.mode: rings does without them");
     for (uint32_t c = 0; c < N_CELLS; c++)
         o->first[c + 1] += o->first[c];
     o->entry = malloc((size_t)(n + 1) * sizeof *o->entry);
     if (o->entry == NULL) return sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");
-    draw_all(o, beam, s, FILL);
-    draw_all(o, beam, s, AROUND);
-    memmove(o->first + 1, o->first, N_CELLS * sizeof *o->first); /* each stands at its end now */
-    o->first[0] = 0;
-    for (uint32_t c = 0; c < N_CELLS; c++)
-        if (o->first[c + 1] - o->first[c] > 1)
-            qsort(o->entry + o->first[c], o->first[c + 1] - o->first[c], sizeof *o->entry, by_range);
+    rc = draw_all(o, spec, s, FILL, NULL, err);
+    if (rc == SH_OK) rc = draw_all(o, spec, s, AROUND, NULL, err);
+    if (rc == SH_OK) rc = sort_cells(o, spec, err);
     o->n_entries = n;
-    return SH_OK;
+    return rc;
 }
 
 int beam_outlines_create(const struct beam_outlines_spec *spec, const struct beam_probe *probe,
@@ -234,9 +250,8 @@ int beam_outlines_create(const struct beam_outlines_spec *spec, const struct bea
         prober->probe = probe;
         prober->beam = spec->beam;
     }
-    if (rc == SH_OK && find_stretches(o, prober, spec->range_max_m * 1.01, &stretches) != SH_OK)
-        rc = sh_fail(err, SH_ENOMEM, "beam: no memory for outlines");
-    if (rc == SH_OK) rc = fill_cells(o, spec->beam, &stretches, err);
+    if (rc == SH_OK) rc = find_stretches(o, prober, spec, &stretches, err);
+    if (rc == SH_OK) rc = fill_cells(o, spec, &stretches, err);
     free(stretches.at);
     free(prober);
     if (rc == SH_OK)

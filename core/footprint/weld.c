@@ -21,6 +21,7 @@ struct slot {
 struct weld {
     const struct scene *scene;
     const double *station_m;
+    const struct sh_report *report;
     uint32_t *same; /* [n_vertices] the first vertex at the same place */
     struct slot *slot;
     uint8_t *sides; /* of a slot: 1 and 2; 4: of two kinds */
@@ -60,7 +61,9 @@ static int same_vertices(struct weld *w, struct sh_err *err)
         return sh_fail(err, SH_ENOMEM, "beam: no memory for %u corners", scene->n_vertices);
     }
     memset(table, 0xff, size * sizeof *table);
-    for (uint32_t i = 0; i < scene->n_vertices; i++) {
+    int rc = SH_OK;
+    for (uint32_t i = 0; i < scene->n_vertices && rc == SH_OK; i++) {
+        if ((i & 0xffff) == 0) rc = sh_check_stop(w->report, err);
         const double *p = scene->vertex_m[i];
         uint64_t at = place_key(p) & (size - 1);
         for (; table[at] != NONE; at = (at + 1) & (size - 1)) {
@@ -71,7 +74,7 @@ static int same_vertices(struct weld *w, struct sh_err *err)
         w->same[i] = table[at];
     }
     free(table);
-    return SH_OK;
+    return rc;
 }
 
 static uint64_t find_edge(struct weld *w, uint32_t low, uint32_t high)
@@ -101,9 +104,10 @@ static uint8_t side_of(const struct weld *w, uint32_t low, uint32_t high, uint32
     return off > 0.0 ? 1 : 2;
 }
 
-static void add_triangles(struct weld *w)
+static int add_triangles(struct weld *w, struct sh_err *err)
 {
     for (uint32_t t = 0; t < w->scene->n_triangles; t++) {
+        if ((t & 0xffff) == 0 && sh_check_stop(w->report, err) != SH_OK) return SH_ESTOPPED;
         uint32_t v[3];
         for (int i = 0; i < 3; i++)
             v[i] = w->same[w->scene->triangle[t][i]];
@@ -118,6 +122,7 @@ static void add_triangles(struct weld *w)
             if (w->of[at] != kind) w->sides[at] |= TWO_KINDS;
         }
     }
+    return SH_OK;
 }
 
 static int collect(const struct weld *w, struct beam_outlines *o, struct sh_err *err)
@@ -146,7 +151,7 @@ int outline_find(const struct beam_outlines_spec *spec, struct beam_outlines *o,
 {
     const struct scene *scene = spec->scene;
     const uint16_t *kind = spec->kind;
-    struct weld w = {.scene = scene, .station_m = spec->station_m, .kind = kind};
+    struct weld w = {.scene = scene, .station_m = spec->station_m, .report = spec->report, .kind = kind};
     uint64_t size = power_of_two(4 * (uint64_t)scene->n_triangles);
     w.mask = size - 1;
     w.slot = malloc(size * sizeof *w.slot);
@@ -157,9 +162,9 @@ int outline_find(const struct beam_outlines_spec *spec, struct beam_outlines *o,
                  : same_vertices(&w, err);
     if (rc == SH_OK) {
         memset(w.slot, 0xff, size * sizeof *w.slot);
-        add_triangles(&w);
-        rc = collect(&w, o, err);
+        rc = add_triangles(&w, err);
     }
+    if (rc == SH_OK) rc = collect(&w, o, err);
     free(w.same);
     free(w.slot);
     free(w.sides);

@@ -38,6 +38,7 @@ struct look {
 struct plan_sample {
     struct plan_place *place;
     uint32_t n_places;
+    const struct sh_report *report;
     struct caster *caster;
     struct line_block block;
     uint64_t key, tries;
@@ -49,11 +50,12 @@ struct plan_sample {
     uint32_t n_ways;
 };
 
-int plan_sample_create(struct plan_place *place, uint32_t n_places, struct plan_sample **out, struct sh_err *err)
+int plan_sample_create(struct plan_place *place, uint32_t n_places, const struct sh_report *report,
+                       struct plan_sample **out, struct sh_err *err)
 {
     struct plan_sample *s = *out = calloc(1, sizeof *s);
     if (s == NULL) return sh_fail(err, SH_ENOMEM, "plan: no memory");
-    *s = (struct plan_sample){.place = place, .n_places = n_places, .key = rng_key(1, RNG_PLAN)};
+    *s = (struct plan_sample){.place = place, .n_places = n_places, .report = report, .key = rng_key(1, RNG_PLAN)};
     s->look = calloc(MIXED_LOOKS + PLAIN_LOOKS, sizeof *s->look);
     s->way = calloc(OPTICS_DRAWN, sizeof *s->way);
     int rc = s->look != NULL && s->way != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "plan: no memory");
@@ -79,7 +81,7 @@ void plan_sample_free(struct plan_sample *s)
 /* The next pulse by chance that is cast. Returns 0 where none is found. */
 static int draw(struct plan_sample *s, struct look *look)
 {
-    for (int i = 0; i < TRIES; i++) {
+    for (int i = 0; i < TRIES && !sh_stopped(s->report); i++) {
         uint64_t number = s->tries++;
         look->place = (uint32_t)(number % s->n_places);
         const struct plan_place *p = &s->place[look->place];
@@ -181,7 +183,7 @@ static void prepare_beam(struct plan_sample *s)
     set_rings(s, PROBE_RINGS);
     draw_looks(s);
     set_rings(s, BEAM_MAX_RINGS);
-    for (uint32_t i = 0; i < s->n_looks; i++)
+    for (uint32_t i = 0; i < s->n_looks && !sh_stopped(s->report); i++)
         cast_beam(s, &s->look[i], BEAM_RINGS, &s->look[i].reference);
 }
 
@@ -230,7 +232,7 @@ void plan_sample_beam(struct plan_sample *s, enum beam_mode mode, uint32_t rings
     set_rings(s, rings);
     double plain_weight = s->plain_looks != 0 ? (double)s->plain / (double)s->plain_looks : 0.0;
     caster_get_counters(s->caster, &before);
-    for (uint32_t i = 0; i < s->n_looks; i++) {
+    for (uint32_t i = 0; i < s->n_looks && !sh_stopped(s->report); i++) {
         const struct look *look = &s->look[i];
         double weight = look->mixed ? 1.0 : plain_weight;
         cast_beam(s, look, mode, &got);
@@ -283,7 +285,7 @@ void plan_sample_optics(struct plan_sample *s, uint32_t depth, struct plan_optio
         way->mixed = way->reference.n > CAST_MAX_DEPTH && leads_on(s, &way->reference);
         cast_way(s, way, CAST_MAX_DEPTH, 0, &way->reference);
     }
-    for (uint32_t i = 0; i < s->n_ways; i++) {
+    for (uint32_t i = 0; i < s->n_ways && !sh_stopped(s->report); i++) {
         const struct look *way = &s->way[i];
         cast_way(s, way, depth, 0, &got);
         compare(&tally, &got, &way->reference, 1.0, 1);

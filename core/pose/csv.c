@@ -63,11 +63,19 @@ static int read_names(struct csv *csv, struct sh_err *err)
     return SH_OK;
 }
 
-int csv_open(struct csv *csv, const char *path, const char *const *known, struct sh_err *err)
+static int csv_heed_stop(void *csv, double fraction, struct sh_err *err)
+{
+    (void)fraction;
+    return sh_check_stop(((const struct csv *)csv)->report, err);
+}
+
+int csv_open(struct csv *csv, const char *path, const char *const *known, const struct sh_report *report,
+             struct sh_err *err)
 {
     memset(csv, 0, sizeof *csv);
     csv->known = known;
-    int rc = text_open(&csv->text, path, NULL, NULL, err);
+    csv->report = report;
+    int rc = text_open(&csv->text, path, csv_heed_stop, csv, err);
     if (rc == SH_OK && csv->text.size >= 3 && memcmp(csv->text.p, "\xef\xbb\xbf", 3) == 0)
         csv->text.p += 3; /* a byte order mark, as spreadsheets write it */
     return rc == SH_OK ? read_names(csv, err) : rc;
@@ -91,6 +99,7 @@ int csv_next(struct csv *csv, struct sh_err *err)
     struct text_span line = next_line(csv);
     const char *p = line.p;
     if (line.n == 0) return 0;
+    if ((csv->line & 0xfff) == 0 && sh_check_stop(csv->report, err) != SH_OK) return SH_ESTOPPED;
     int n = 0;
     for (int got; (got = next_cell(&p, line.p + line.n, cell)) != 0; n++) {
         if (n == csv->n_columns)

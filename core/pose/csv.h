@@ -14,10 +14,13 @@ struct csv {
     uint32_t has;                  /* bit per known column */
     double value[CSV_MAX_COLUMNS]; /* of the line read last, by known column; 0 where there is none */
     uint64_t line;                 /* its number */
+    const struct sh_report *report;
 };
 
-/* Reads the header; csv_close is due in any case. Unknown or doubled names are errors. */
-int csv_open(struct csv *csv, const char *path, const char *const *known, struct sh_err *err);
+/* Reads the header; csv_close is due in any case. Unknown or doubled names are errors. Here and in
+ * csv_next the stop of report is heeded. */
+int csv_open(struct csv *csv, const char *path, const char *const *known, const struct sh_report *report,
+             struct sh_err *err);
 void csv_close(struct csv *csv);
 /* 1: a line is in value; 0: the end; or a negative error. */
 int csv_next(struct csv *csv, struct sh_err *err);

@@ -170,7 +170,7 @@ static void set_knot(const struct trajectory *tr, double start_s, int64_t t_ns, 
 }
 
 int trajectory_knots(const struct trajectory *tr, const struct pose *mount, const struct pose_knot_rules *rules,
-                     struct pose_path *out, struct sh_err *err)
+                     const struct sh_report *report, struct pose_path *out, struct sh_err *err)
 {
     const double arm_m = vec3_length(mount->position_m), start_s = rules->start_s, end_s = rules->end_s;
     double most = 1.0;
@@ -188,6 +188,7 @@ int trajectory_knots(const struct trajectory *tr, const struct pose *mount, cons
         double a_s = tr->sample[i].t_s, b_s = tr->sample[i + 1].t_s;
         if (b_s <= start_s) continue;
         size_t parts = (size_t)parts_of(tr, i, rules, arm_m, &out->error_m);
+        if ((i & 0xfff) == 0 && sh_check_stop(report, err) != SH_OK) return SH_ESTOPPED;
         for (size_t j = 1; j <= parts; j++) {
             double t_s = j == parts ? b_s : a_s + (b_s - a_s) * ((double)j / (double)parts);
             int64_t t_ns = llround(1e9 * (fmin(t_s, end_s) - start_s));

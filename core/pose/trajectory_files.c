@@ -104,12 +104,12 @@ static int read_samples(struct csv *csv, struct samples *samples, struct sh_err 
     return rc;
 }
 
-int trajectory_read_csv(const char *path, struct trajectory **out, struct sh_err *err)
+int trajectory_read_csv(const char *path, const struct sh_report *report, struct trajectory **out, struct sh_err *err)
 {
     struct csv csv;
     struct samples samples = {0};
     *out = NULL;
-    int rc = csv_open(&csv, path, sample_columns, err);
+    int rc = csv_open(&csv, path, sample_columns, report, err);
     if (rc == SH_OK) rc = read_samples(&csv, &samples, err);
     if (rc == SH_OK && samples.n == 0) rc = text_fail(&csv.text, 0, SH_EINPUT, err, "no samples below the first line");
     if (rc == SH_OK) rc = trajectory_from_samples(samples.at, samples.n, out, err);
@@ -218,6 +218,7 @@ static size_t leg_parts(const struct trajectory *curve, size_t i)
 struct walk {
     const struct trajectory *curve;
     const struct geoframe *frame; /* NULL: level is the scene's own */
+    const struct sh_report *report;
     struct samples out;
     double heading_rad; /* of the last sample */
 };
@@ -227,6 +228,7 @@ static int put_sample(struct walk *w, double curve_s, double t_s, double d, stru
 {
     struct pose_sample *s = add_sample(&w->out);
     double level[9], level_quat[4], turn[4];
+    if ((w->out.n & 0xfff) == 0 && sh_check_stop(w->report, err) != SH_OK) return SH_ESTOPPED;
     if (s == NULL) return sh_fail(err, SH_ENOMEM, "no memory for its samples");
     s->t_s = t_s;
     trajectory_at(w->curve, curve_s, &s->pose, &s->frame);
@@ -271,21 +273,22 @@ static int follow(struct walk *w, const double *pause_s, struct sh_err *err)
     return rc;
 }
 
-int trajectory_read_waypoints(const char *path, const struct geoframe *frame, struct trajectory **out,
-                              struct sh_err *err)
+int trajectory_read_waypoints(const char *path, const struct geoframe *frame, const struct sh_report *report,
+                              struct trajectory **out, struct sh_err *err)
 {
     struct csv csv;
     struct way way = {0};
     struct sh_err why;
-    struct walk walk = {.frame = frame};
+    struct walk walk = {.frame = frame, .report = report};
     struct trajectory *curve = NULL;
     *out = NULL;
-    int rc = csv_open(&csv, path, waypoint_columns, err);
+    int rc = csv_open(&csv, path, waypoint_columns, report, err);
     if (rc == SH_OK) rc = read_waypoints(&csv, &way, err);
     if (rc == SH_OK) rc = trajectory_from_samples(way.points.at, way.points.n, &curve, err);
     walk.curve = curve;
     if (rc == SH_OK && (rc = follow(&walk, way.pause_s, &why)) != SH_OK)
-        text_fail(&csv.text, 0, rc, err, "%.300s", why.text);
+        rc = rc == SH_ESTOPPED ? sh_fail(err, rc, "%s", why.text)
+                               : text_fail(&csv.text, 0, rc, err, "%.300s", why.text);
     if (rc == SH_OK) rc = trajectory_from_samples(walk.out.at, walk.out.n, out, err);
     trajectory_free(curve);
     csv_close(&csv);

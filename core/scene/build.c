@@ -12,8 +12,6 @@
 #include "core/huge.h"
 #include "core/vec3.h"
 
-static const double MAX_COORDINATE_M = 1e9;
-
 static int64_t now_ns(void)
 {
     struct timespec t;
@@ -61,6 +59,7 @@ void build_begin_file(struct scene_build *b, const struct scene_mesh_spec *spec)
     b->vertex0 = b->mesh_vertex0 = b->scene->n_vertices;
     b->triangle0 = b->scene->n_triangles;
     b->counts = (struct scene_counts){0};
+    b->scene->says = (struct scene_says){0};
     b->has_uv = false;
     b->not_simple = 0;
     b->file_ns = now_ns();
@@ -100,13 +99,53 @@ int build_end_file(struct scene_build *b, struct sh_err *err)
 }
 
 /* The array as it stays: without the room to grow, and where lookups all over it are quick. */
-static void settle(void **array, size_t n, size_t size)
+static int settle(const struct scene_build *b, void **array, size_t n, size_t size, struct sh_err *err)
 {
-    void *last = huge_alloc(n * size);
-    if (last == NULL) return;
-    memcpy(last, *array, n * size);
+    const size_t step = (size_t)16 << 20;
+    char *last = huge_alloc(n * size);
+    if (last == NULL) return SH_OK;
+    for (size_t at = 0; at < n * size; at += step) {
+        if (sh_check_stop(b->report, err) != SH_OK) {
+            free(last);
+            return SH_ESTOPPED;
+        }
+        memcpy(last + at, (char *)*array + at, n * size - at < step ? n * size - at : step);
+    }
     free(*array);
     *array = last;
+    return SH_OK;
+}
+
+static int settle_all(const struct scene_build *b, struct sh_err *err)
+{
+    struct scene *s = b->scene;
+    int rc = settle(b, (void **)&s->surface, s->n_surfaces, sizeof *s->surface, err);
+    if (rc == SH_OK) rc = settle(b, (void **)&s->vertex_m, s->n_vertices, sizeof *s->vertex_m, err);
+    if (rc == SH_OK) rc = settle(b, (void **)&s->triangle, s->n_triangles, sizeof *s->triangle, err);
+    if (rc == SH_OK) rc = settle(b, (void **)&s->label, s->n_triangles, sizeof *s->label, err);
+    if (rc == SH_OK && s->uv != NULL) rc = settle(b, (void **)&s->uv, s->n_triangles, sizeof *s->uv, err);
+    return rc;
+}
+
+static int find_bounds(const struct scene_build *b, struct sh_err *err)
+{
+    struct scene *s = b->scene;
+    int rc = SH_OK;
+    for (int k = 0; k < 3; k++) {
+        s->min_m[k] = INFINITY;
+        s->max_m[k] = -INFINITY;
+    }
+    for (uint32_t i = 0; i < s->n_triangles && rc == SH_OK; i++) {
+        for (int c = 0; c < 3; c++) {
+            const double *v = s->vertex_m[s->triangle[i][c]];
+            for (int k = 0; k < 3; k++) {
+                if (v[k] < s->min_m[k]) s->min_m[k] = v[k];
+                if (v[k] > s->max_m[k]) s->max_m[k] = v[k];
+            }
+        }
+        if ((i & 0xfffff) == 0) rc = sh_check_stop(b->report, err);
+    }
+    return rc;
 }
 
 int build_finish(struct scene_build *b, struct scene **out, struct sh_err *err)
@@ -115,28 +154,13 @@ int build_finish(struct scene_build *b, struct scene **out, struct sh_err *err)
     if (s->n_triangles == 0) return sh_fail(err, SH_EINPUT, "the scene has no triangles");
     if (b->surface_tree != NULL) tdestroy(b->surface_tree, keep_surface);
     b->surface_tree = NULL;
-    settle((void **)&s->surface, s->n_surfaces, sizeof *s->surface);
-    settle((void **)&s->vertex_m, s->n_vertices, sizeof *s->vertex_m);
-    settle((void **)&s->triangle, s->n_triangles, sizeof *s->triangle);
-    settle((void **)&s->label, s->n_triangles, sizeof *s->label);
     if (s->n_textures == 0) {
         free(s->uv);
         s->uv = NULL;
     }
-    if (s->uv != NULL) settle((void **)&s->uv, s->n_triangles, sizeof *s->uv);
-    for (int k = 0; k < 3; k++) {
-        s->min_m[k] = INFINITY;
-        s->max_m[k] = -INFINITY;
-    }
-    for (uint32_t i = 0; i < s->n_triangles; i++) {
-        for (int c = 0; c < 3; c++) {
-            const double *v = s->vertex_m[s->triangle[i][c]];
-            for (int k = 0; k < 3; k++) {
-                if (v[k] < s->min_m[k]) s->min_m[k] = v[k];
-                if (v[k] > s->max_m[k]) s->max_m[k] = v[k];
-            }
-        }
-    }
+    int rc = settle_all(b, err);
+    if (rc == SH_OK) rc = find_bounds(b, err);
+    if (rc != SH_OK) return rc;
     *out = s;
     b->scene = NULL;
     return SH_OK;
@@ -155,6 +179,35 @@ int build_fail(struct scene_build *b, int code, struct sh_err *err, const char *
     va_end(ap);
     text_keep_line(text);
     return sh_fail(err, code, "%s%s: %s", b->name, place, text);
+}
+
+/* Up to the next number of two digits. */
+static double two_digits_up(double x)
+{
+    double digit = pow(10.0, floor(log10(x)) - 1.0);
+    return ceil(x / digit * (1.0 - 1e-9)) * digit;
+}
+
+int build_single(struct scene_build *b, double largest, bool refuse, struct sh_err *err)
+{
+    const double rounding = 6e-8, most_m = 1.0; /* 2^-24: of the nearest float; of the tolerance */
+    double error_m = largest * b->spec->scale * rounding;
+    char set[48] = "";
+    if (!(error_m > 0.0)) return SH_OK;
+    error_m = two_digits_up(error_m);
+    if (error_m > b->tolerance_m && refuse) {
+        if (error_m <= most_m) snprintf(set, sizeof set, "set it to %.2g, ", error_m);
+        return build_fail(b, SH_EINPUT, err,
+                          "coordinates up to %.9g are read in single precision, with errors up to %.2g m; allowed are "
+                          "%.2g m (scene.tolerance_m, or else a tenth of plan.tolerance_m): %smove the mesh near its "
+                          "origin, or convert it to .obj or .ply",
+                          largest, error_m, b->tolerance_m, set);
+    }
+    b->scene->error_m = fmax(b->scene->error_m, error_m);
+    if (error_m > 1e-6)
+        sh_warn(b->report, "%s: in single precision, so good to %.2g m only: coordinates go up to %.9g", b->name,
+                error_m, largest);
+    return SH_OK;
 }
 
 static int grow_vertices(struct scene_build *b, uint64_t need, struct sh_err *err)
@@ -198,9 +251,9 @@ int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err)
     double *p = s->vertex_m[s->n_vertices];
     for (int k = 0; k < 3; k++) {
         p[k] = turned[k] * spec->scale + spec->offset_m[k];
-        if (!(fabs(p[k]) <= MAX_COORDINATE_M))
+        if (!(fabs(p[k]) <= BUILD_MAX_COORDINATE_M))
             return build_fail(b, SH_EINPUT, err, "vertex %llu is at %g m; allowed are coordinates up to %g m", number,
-                              p[k], MAX_COORDINATE_M);
+                              p[k], BUILD_MAX_COORDINATE_M);
     }
     s->n_vertices++;
     return SH_OK;
@@ -286,11 +339,12 @@ int build_polygon(struct scene_build *b, size_t n, uint16_t label, struct sh_err
     return rc;
 }
 
-void build_progress(void *build, double fraction)
+int build_progress(void *build, double fraction, struct sh_err *err)
 {
     struct scene_build *b = build;
     int64_t now = now_ns();
     if (now - b->start_ns >= 1000000000 && now - b->reported_ns >= 250000000) report(b, fraction);
+    return sh_check_stop(b->report, err);
 }
 
 void build_announce(struct scene_build *b)

@@ -4,7 +4,6 @@
  * one level after the other, so that the largest coordinate on the way is known: that is what single
  * precision has rounded. */
 #include <math.h>
-#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,11 +15,11 @@
 #include <assimp/scene.h>
 
 #include "core/scene/ifc_check.h"
-#include "core/scene/build.h"
+#include "core/scene/import.h"
+#include "core/scene/import_material.h"
+#include "core/scene/import_says.h"
 
 enum { MAX_DEPTH = 256 };
-
-static const double SINGLE_ROUNDING = 6e-8; /* 2^-24: of the nearest float */
 
 /* What Assimp says while it reads; some of it is geometry that it left out. */
 struct import_log {
@@ -33,6 +32,7 @@ struct import {
     const struct aiScene *in;
     const struct aiMatrix4x4 *level[MAX_DEPTH]; /* of the node and above it, root first; identities left out */
     int n_levels;
+    unsigned uv_set;          /* of the mesh at hand */
     double largest;           /* |coordinate| at any level, file units */
     uint64_t n_faces, n_done; /* for the progress */
 };
@@ -98,7 +98,7 @@ static int add_face(struct import *im, const struct aiFace *face, const struct a
     }
     int rc = build_corners(b, face->mNumIndices, err);
     if (rc != SH_OK) return rc;
-    const struct aiVector3D *uv = b->spec->textures ? mesh->mTextureCoords[0] : NULL;
+    const struct aiVector3D *uv = build_wants_textures(b) ? mesh->mTextureCoords[im->uv_set] : NULL;
     b->has_uv = uv != NULL;
     for (unsigned i = 0; i < face->mNumIndices; i++) {
         unsigned index = face->mIndices[i];
@@ -113,59 +113,6 @@ static int add_face(struct import *im, const struct aiFace *face, const struct a
     return build_polygon(b, face->mNumIndices, label, err);
 }
 
-/* Linear light as sRGB has it, IEC 61966-2-1. */
-static float to_srgb(float linear)
-{
-    double c = (double)linear;
-    return (float)(c <= 0.0031308 ? 12.92 * c : 1.055 * pow(c, 1.0 / 2.4) - 0.055);
-}
-
-/* Materials that Assimp makes up where a file has none. */
-static bool is_made_up(const char *material)
-{
-    return material[0] == '\0' || strcmp(material, AI_DEFAULT_MATERIAL_NAME) == 0 ||
-           strcmp(material, "<IFCDefault>") == 0;
-}
-
-/* The first colour that comes with a material's name stays. glTF has linear colours. */
-static void keep_colour(const struct import *im, const struct aiMaterial *material, struct scene_surface *surface)
-{
-    struct aiColor4D c;
-    const char *dot = strrchr(im->b->spec->file, '.');
-    if (surface->has_colour || is_made_up(surface->material)) return;
-    if (aiGetMaterialColor(material, AI_MATKEY_COLOR_DIFFUSE, &c) != AI_SUCCESS) return;
-    const float rgb[3] = {c.r, c.g, c.b};
-    bool linear = dot != NULL && (strcasecmp(dot, ".gltf") == 0 || strcasecmp(dot, ".glb") == 0);
-    for (int i = 0; i < 3; i++) {
-        if (!(rgb[i] >= 0.0f && rgb[i] <= 1.0f)) return; /* no colour of a surface */
-        surface->colour[i] = linear ? to_srgb(rgb[i]) : rgb[i];
-    }
-    surface->has_colour = 1;
-}
-
-/* The diffuse texture, a file or ("*3") one within this. What lies there unpacked is none that is read. */
-static int keep_texture(const struct import *im, const struct aiMaterial *material, struct scene_surface *surface,
-                        struct sh_err *err)
-{
-    struct aiString path;
-    char name[sizeof path.data + 256];
-    const char *base = strrchr(im->b->spec->file, '/');
-    const struct aiTexture *within = NULL;
-    if (!im->b->spec->textures || surface->texture != 0) return SH_OK;
-    if (aiGetMaterialTexture(material, aiTextureType_DIFFUSE, 0, &path, NULL, NULL, NULL, NULL, NULL, NULL) !=
-        AI_SUCCESS)
-        return SH_OK;
-    if (path.data[0] == '*') {
-        unsigned long i = strtoul(path.data + 1, NULL, 10);
-        if (i >= im->in->mNumTextures || im->in->mTextures[i]->mHeight != 0) return SH_OK;
-        within = im->in->mTextures[i];
-    }
-    base = within == NULL ? "" : base != NULL ? base + 1 : im->b->spec->file;
-    int len = snprintf(name, sizeof name, "%.255s%.*s", base, (int)path.length, path.data);
-    return build_texture(im->b, (struct text_span){name, (size_t)len}, within != NULL ? within->pcData : NULL,
-                         within != NULL ? within->mWidth : 0, &surface->texture, err);
-}
-
 static struct text_span span_of(const struct aiString *text)
 {
     return (struct text_span){text->data, strnlen(text->data, text->length)};
@@ -177,12 +124,14 @@ static int label_of(struct import *im, const struct aiNode *node, const struct a
     const struct aiString *object = node->mName.length > 0 ? &node->mName : &mesh->mName;
     const struct aiMaterial *material = NULL;
     struct aiString name = {0};
+    im->uv_set = 0;
     if (mesh->mMaterialIndex < im->in->mNumMaterials) material = im->in->mMaterials[mesh->mMaterialIndex];
     if (material != NULL) aiGetMaterialString(material, AI_MATKEY_NAME, &name);
     int rc = build_label(im->b, span_of(object), span_of(&name), label, err);
     if (rc != SH_OK || material == NULL) return rc;
-    keep_colour(im, material, &im->b->scene->surface[*label]);
-    return keep_texture(im, material, &im->b->scene->surface[*label], err);
+    unsigned uv_set = import_uv_set(material);
+    if (uv_set < AI_MAX_NUMBER_OF_TEXTURECOORDS && mesh->mTextureCoords[uv_set] != NULL) im->uv_set = uv_set;
+    return import_material(im->b, im->in, material, &im->b->scene->surface[*label], err);
 }
 
 static int add_mesh(struct import *im, const struct aiNode *node, const struct aiMesh *mesh, struct sh_err *err)
@@ -193,7 +142,8 @@ static int add_mesh(struct import *im, const struct aiNode *node, const struct a
     if (rc == SH_OK) rc = add_vertices(im, mesh, err);
     for (unsigned i = 0; i < mesh->mNumFaces && rc == SH_OK; i++) {
         rc = add_face(im, &mesh->mFaces[i], mesh, label, err);
-        if ((im->n_done++ & 0xffff) == 0) build_progress(im->b, (double)im->n_done / (double)im->n_faces);
+        if (rc == SH_OK && (im->n_done++ & 0xffff) == 0)
+            rc = build_progress(im->b, (double)im->n_done / (double)im->n_faces, err);
     }
     im->b->scene->n_meshes++;
     im->b->mesh = NULL;
@@ -225,16 +175,6 @@ static uint64_t count_faces(const struct aiScene *in, const struct aiNode *node)
     return n;
 }
 
-static int check_precision(const struct import *im, struct sh_err *err)
-{
-    double error_m = im->largest * im->b->spec->scale * SINGLE_ROUNDING;
-    if (error_m <= im->b->tolerance_m) return SH_OK;
-    return build_fail(im->b, SH_EINPUT, err,
-                      "coordinates up to %.9g are read in single precision, with errors up to %.2g m; allowed are "
-                      "%.2g m: move the mesh near its origin, or convert it to .obj or .ply",
-                      im->largest, error_m, im->b->tolerance_m);
-}
-
 /* An IFC file that was cut off reads without an error, with less in it; one in which records are missing
  * crashes Assimp. */
 static int check_ifc(struct scene_build *b, struct sh_err *err)
@@ -252,12 +192,9 @@ static int check_ifc(struct scene_build *b, struct sh_err *err)
     return build_fail(b, SH_EINPUT, err, "cut off: it doesn't end with %s", last);
 }
 
-/* The logger and the text of the last error are Assimp's globals, hence the lock. */
 static const struct aiScene *import_file(struct scene_build *b, struct import_log *log, struct sh_err *err)
 {
-    static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
     struct aiLogStream stream = {.callback = keep_log, .user = (char *)(void *)log};
-    pthread_mutex_lock(&lock);
     aiAttachLogStream(&stream);
     struct aiPropertyStore *options = aiCreatePropertyStore();
     aiSetImportPropertyInteger(options, AI_CONFIG_IMPORT_COLLADA_USE_COLLADA_NAMES, 1);      /* not the ids */
@@ -271,7 +208,6 @@ static const struct aiScene *import_file(struct scene_build *b, struct import_lo
         if (in != NULL) aiReleaseImport(in);
         in = NULL;
     }
-    pthread_mutex_unlock(&lock);
     return in;
 }
 
@@ -286,9 +222,10 @@ int import_assimp(struct scene_build *b, struct sh_err *err)
     if (stat(b->spec->file, &st) == 0 && st.st_size > 8 << 20) build_announce(b);
     im.in = import_file(b, &log, err);
     if (im.in == NULL) return SH_EINPUT;
+    b->scene->says = import_says(im.in, b->spec->file);
     im.n_faces = count_faces(im.in, im.in->mRootNode);
     rc = add_node(&im, im.in->mRootNode, 0, err);
-    if (rc == SH_OK) rc = check_precision(&im, err);
+    if (rc == SH_OK) rc = build_single(b, im.largest, true, err);
     if (rc == SH_OK && log.n > 0)
         sh_warn(b->report, "%s: %u warnings while read, the first: %s", b->name, log.n, log.first);
     aiReleaseImport(im.in);

@@ -7,8 +7,7 @@
 
 #include "core/grow.h"
 
-int ply_open(struct ply_rows *r, const char *path, void (*progress)(void *ctx, double fraction), void *ctx,
-             struct sh_err *err)
+int ply_open(struct ply_rows *r, const char *path, text_progress *progress, void *ctx, struct sh_err *err)
 {
     *r = (struct ply_rows){.progress = progress, .progress_ctx = ctx};
     int rc = text_open(&r->t, path, progress, ctx, err);
@@ -148,9 +147,10 @@ static int walk_element(struct ply_rows *r, int i, const struct ply_user *user, 
     int rc = begin(r, i, err);
     if (rc == SH_OK) rc = user->begin(user->ctx, err);
     for (; r->row < r->element->count && rc == SH_OK; r->row++) {
-        rc = read_row(r, err);
+        if ((r->row & 0xffff) == 0)
+            rc = r->progress(r->progress_ctx, (double)(r->t.p - r->t.data) / (double)r->t.size, err);
+        if (rc == SH_OK) rc = read_row(r, err);
         if (rc == SH_OK) rc = user->row(user->ctx, err);
-        if ((r->row & 0xffff) == 0) r->progress(r->progress_ctx, (double)(r->t.p - r->t.data) / (double)r->t.size);
     }
     return rc;
 }

@@ -1,5 +1,5 @@
-/* The material library of an OBJ file: newmtl, Kd, the diffuse colour, and map_Kd, its texture; the rest is
- * ignored. */
+/* The material library of an OBJ file: newmtl; Kd, the diffuse colour; map_Kd, its texture; map_d, what cuts
+ * holes. The rest is ignored. */
 #include <stdio.h>
 #include <string.h>
 
@@ -34,22 +34,39 @@ static bool read_colour(struct text *t, double rgb[3])
     return true;
 }
 
-/* map_Kd [options] FILE. A name with blanks may stand where there are no options. */
-static int set_texture(struct scene_build *b, uint32_t first, struct text_span material, struct text_span name,
-                       struct sh_err *err)
+/* The options of a map, up to the file's name: of -clamp the value. Others take numbers and words of their own;
+ * the name is then the last word. Without options it may have blanks. */
+static struct text_span map_file(struct text_span map, enum texture_wrap wrap[2])
+{
+    struct text_span last = map, before = {"", 0};
+    bool options = map.n > 0 && map.p[0] == '-';
+    const char *end = map.p + map.n;
+    wrap[0] = wrap[1] = TEXTURE_REPEAT;
+    for (const char *p = map.p; options && p < end;) {
+        const char *from = p;
+        while (p < end && *p != ' ' && *p != '\t')
+            p++;
+        last = (struct text_span){from, (size_t)(p - from)};
+        if (text_is(before, "-clamp") && text_is(last, "on")) wrap[0] = wrap[1] = TEXTURE_CLAMP;
+        before = last;
+        while (p < end && (*p == ' ' || *p == '\t'))
+            p++;
+    }
+    return last;
+}
+
+/* map_Kd or map_d [options] FILE */
+static int set_texture(struct scene_build *b, uint32_t first, struct text_span material, struct text_span map,
+                       bool is_opacity, struct sh_err *err)
 {
     struct scene *scene = b->scene;
+    struct build_image image = {0};
     int rc = SH_OK;
-    if (name.n > 0 && name.p[0] == '-')
-        for (size_t i = name.n; i > 0; i--)
-            if (name.p[i - 1] == ' ' || name.p[i - 1] == '\t') {
-                name = (struct text_span){name.p + i, name.n - i};
-                break;
-            }
-    if (name.n == 0) return SH_OK;
-    for (uint32_t i = first; i < scene->n_surfaces && rc == SH_OK; i++) {
+    image.name = map_file(map, image.wrap);
+    for (uint32_t i = first; i < scene->n_surfaces && image.name.n > 0 && rc == SH_OK; i++) {
         struct scene_surface *s = &scene->surface[i];
-        if (s->texture == 0 && has_material(s, material)) rc = build_texture(b, name, NULL, 0, &s->texture, err);
+        uint16_t *number = is_opacity ? &s->opacity : &s->texture;
+        if (*number == 0 && has_material(s, material)) rc = build_texture(b, &image, number, err);
     }
     return rc;
 }
@@ -63,7 +80,9 @@ static int read_materials(struct scene_build *b, struct text *t, uint32_t first,
         struct text_span word = text_word(t);
         if (text_is(word, "newmtl")) material = text_rest(t);
         if (text_is(word, "Kd") && read_colour(t, rgb)) set_colour(b->scene, first, material, rgb);
-        if (text_is(word, "map_Kd") && b->spec->textures) rc = set_texture(b, first, material, text_rest(t), err);
+        bool is_opacity = text_is(word, "map_d");
+        if ((is_opacity || text_is(word, "map_Kd")) && build_wants_textures(b))
+            rc = set_texture(b, first, material, text_rest(t), is_opacity, err);
     }
     return rc;
 }

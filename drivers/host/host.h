@@ -81,7 +81,8 @@ struct scanhead {
     size_t surface_room;
     uint32_t n_surfaces;
 
-    uint64_t dropped, reader_lost, pulses_lost;
+    uint64_t dropped, reader_lost;
+    uint64_t pulses_lost_told, pulses_lost_ended; /* by OVERRUN events, by SCAN_END events */
     int hashing;
     struct sha256_ctx sha256;
     struct sh_err err;

@@ -1,8 +1,14 @@
 #include "firmware_sim/app/app.h"
 
 #include <errno.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
+
+#include "core/newfile.h"
+#include "firmware_sim/app/progress.h"
+#include "firmware_sim/base/clock.h"
 
 static volatile sig_atomic_t interrupted;
 
@@ -55,14 +61,25 @@ static void print_warning(void *ctx, const char *text)
 
 static void print_progress(void *ctx, const char *what, double fraction)
 {
+    static struct progress_pace pace;
+    const double left_s = progress_left_s(&pace, what, fraction, clock_now_ns());
+    char left[48] = "";
     (void)ctx;
+    if (left_s >= 0.0 && left_s < 120.0) snprintf(left, sizeof left, ", %.0f s left", ceil(left_s));
+    if (left_s >= 120.0) snprintf(left, sizeof left, ", %.0f min left", ceil(left_s / 60.0));
     if (fraction < 0.0)
         fprintf(stderr, "scanhead: %s ...\n", what);
     else
-        fprintf(stderr, "scanhead: %s: %.0f %%\n", what, 100.0 * fraction);
+        fprintf(stderr, "scanhead: %s: %.0f %%%s\n", what, 100.0 * fraction, left);
 }
 
-const struct sh_report app_report_stderr = {NULL, print_warning, print_progress};
+static int asked_to_stop(void *ctx)
+{
+    (void)ctx;
+    return app_interrupted();
+}
+
+const struct sh_report app_report_stderr = {NULL, print_warning, print_progress, asked_to_stop};
 
 void app_warn_left_out(uint64_t crowded, uint64_t unfit)
 {
@@ -75,15 +92,32 @@ void app_warn_left_out(uint64_t crowded, uint64_t unfit)
                 (unsigned long long)unfit);
 }
 
+void app_warn_empty(uint64_t pulses, uint64_t with_echo, uint64_t faint)
+{
+    if (pulses == 0 || with_echo >= pulses / 20) return;
+    sh_warn(&app_report_stderr, "mostly empty: %llu of %llu pulses have an echo, %.2g %%; %llu hits were not detected",
+            (unsigned long long)with_echo, (unsigned long long)pulses, 100.0 * (double)with_echo / (double)pulses,
+            (unsigned long long)faint);
+}
+
 int app_write_json(const char *path, void (*put)(struct json *json, const void *ctx), const void *ctx,
                    struct sh_err *err)
 {
-    FILE *out = strcmp(path, "-") == 0 ? stdout : fopen(path, "w");
-    if (out == NULL) return sh_fail(err, SH_EIO, "%s: %s", path, strerror(errno));
+    const int to_stdout = strcmp(path, "-") == 0;
+    struct sh_err why = {0};
+    int fd = -1, rc = to_stdout ? SH_OK : newfile_open(path, &fd, err);
+    if (rc != SH_OK) return rc;
+    FILE *out = to_stdout ? stdout : fdopen(fd, "w");
+    if (out == NULL) {
+        rc = sh_fail(err, SH_EIO, "%s: %s", path, strerror(errno));
+        close(fd);
+        return rc;
+    }
     struct json json;
     json_begin(&json, out);
     put(&json, ctx);
-    int rc = json_end(&json, err);
-    if (out != stdout && fclose(out) != 0 && rc == SH_OK) rc = sh_fail(err, SH_EIO, "%s: %s", path, strerror(errno));
+    if (json_end(&json, &why) != SH_OK)
+        rc = sh_fail(err, why.code, "%s: %s", to_stdout ? "standard output" : path, why.text);
+    if (!to_stdout && fclose(out) != 0 && rc == SH_OK) rc = sh_fail(err, SH_EIO, "%s: %s", path, strerror(errno));
     return rc;
 }

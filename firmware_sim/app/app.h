@@ -14,7 +14,7 @@
 #include "firmware_sim/config/config.h"
 
 /* main.c lists them. */
-extern const struct app_command app_run, app_record, app_plan, app_map, app_report, app_check, app_list;
+extern const struct app_command app_run, app_record, app_plan, app_map, app_report, app_check, app_list, app_init;
 
 /* Prints "scanhead: TEXT" and gives the exit status for the error. */
 int app_fail(const struct sh_err *err);
@@ -24,7 +24,7 @@ int app_fail(const struct sh_err *err);
 int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, void *ctx, struct sh_err *err),
                     void *ctx);
 
-/* Warnings and progress to standard error, each line with the program's name. */
+/* Warnings and progress to standard error, each line with the program's name. Asks to stop once interrupted. */
 extern const struct sh_report app_report_stderr;
 
 /* 1 after SIGINT or SIGTERM, once app_catch_signals was called. A second signal ends the process at once. */
@@ -33,6 +33,9 @@ void app_catch_signals(void);
 
 /* Prints a warning for each kind of echoes that the head left out of the stream. */
 void app_warn_left_out(uint64_t crowded, uint64_t unfit);
+
+/* Prints a warning where fewer than one pulse in twenty has an echo. */
+void app_warn_empty(uint64_t pulses, uint64_t with_echo, uint64_t faint);
 
 /* One JSON value, written by `put`, to a file; path "-" is standard output. */
 int app_write_json(const char *path, void (*put)(struct json *json, const void *ctx), const void *ctx,

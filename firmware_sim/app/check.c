@@ -88,7 +88,6 @@ static int check(struct config *cfg, void *ctx, struct sh_err *err)
     struct site *site = NULL;
     int rc = site_load(cfg, &app_report_stderr, &site, err);
     if (rc == SH_OK) rc = check_links(cfg, err);
-    if (rc == SH_OK) rc = check_reach(site, &app_report_stderr, err);
     if (rc == SH_OK) rc = print_summary(cfg, site, err);
     if (rc == SH_OK) rc = print_time(cfg, err);
     site_free(site);

@@ -56,7 +56,7 @@ static void leave_out_ghosts(struct report *r)
 
 static int load(struct report *r, struct sh_err *err)
 {
-    const struct sh_report progress = {r, app_report_stderr.warn, report_each_second};
+    const struct sh_report progress = {r, app_report_stderr.warn, report_each_second, NULL};
     int rc = cloud_read(r->cloud_path, &progress, &r->cloud, err);
     if (rc == SH_OK) rc = site_load(r->cfg, &app_report_stderr, &r->site, err);
     if (rc == SH_OK) rc = distance_create(r->site->scene, &r->index, err);
@@ -112,7 +112,7 @@ static int compare(struct report *r, struct sh_err *err)
                                      .threads = config_threads(r->cfg),
                                      .body = site->n_movers > 0 ? body_of : NULL,
                                      .body_ctx = r};
-    const struct sh_report progress = {r, app_report_stderr.warn, report_each_second};
+    const struct sh_report progress = {r, app_report_stderr.warn, report_each_second, NULL};
     struct sh_err why = {0};
     r->distance_m = malloc((r->cloud.n + 1) * sizeof *r->distance_m);
     r->triangle = malloc((r->cloud.n + 1) * sizeof *r->triangle);

@@ -186,6 +186,8 @@ struct config_scene {
     uint32_t n_meshes;
     double tolerance_m;
     enum config_choice order_exactly; /* surfaces that overlap are ordered in double */
+    int cutouts;                      /* rays pass where a texture's alpha is below a half */
+    struct scene_import_limits import;
     struct config_anchor anchor;
 };
 
@@ -280,6 +282,9 @@ void config_print_reference(FILE *out);
 /* The profiles in a directory, one line each (name, model, what is data sheet and what is assumed). Returns
  * how many. dir NULL: the first directory of the lookup below that exists, without a configuration. */
 int config_list_profiles(const char *dir, FILE *out, struct sh_err *err);
+
+/* Reads the profile NAME, looked up as for a configuration that lies at config_file. */
+int config_load_profile(const char *name, const char *config_file, struct config_profile *profile, struct sh_err *err);
 
 /* Finds the directory of profiles: $SCANHEAD_HEADS, beside the configuration (heads/), beside the program
  * (installed or in its build folder), or config/heads here. A profile is named by `head.profile: NAME`,

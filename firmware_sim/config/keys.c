@@ -50,7 +50,7 @@ static const struct cfg_key config_keys[] = {
      WITHIN("pan_min_deg", "pan_max_deg"), .help = "Pan angle where a frame starts."},
     {"head.pan_stop_deg", SETTING(pan_stop_udeg), CFG_MICRO, "deg", "@pan_max_deg",
      WITHIN("pan_min_deg", "pan_max_deg"), .help = "Pan angle where a frame ends; at most a turn after its start."},
-    {"head.frames", SETTING(frames), CFG_COUNT, NULL, "1", 0, 1000000,
+    {"head.frames", SETTING(frames), CFG_COUNT, NULL, "1", 0, HEAD_MAX_FRAMES,
      .help = "Frames (pan sweeps) per scan; 0: until stopped."},
     {"head.station", SETTING(station), CFG_COUNT, NULL, "1", 1, CONFIG_MAX_STOPS,
      .help = "Station where the head stands, counted from 1."},
@@ -64,12 +64,23 @@ static const struct cfg_key config_keys[] = {
      .help = "resolved: zones of c / (2 prr_hz) that the head tells apart; nothing is seen beyond them."},
 
     {"scene", .type = CFG_MAP, .help = "What is scanned."},
-    {KEY(scene.tolerance_m), CFG_REAL, "m", "1e-6", 1e-9, 1,
-     .help = "Largest error of a vertex. Formats of single precision are refused where coordinates are too large."},
+    {KEY(scene.tolerance_m), CFG_REAL, "m", "", 1e-9, 1,
+     .help = "Largest error of a vertex. Formats of single precision are refused where coordinates are too large. When "
+             "not given: a tenth of plan.tolerance_m, or 1 m where that isn't given either. Above 1e-6 m is a warning."},
     {KEY(scene.order_exactly), CFG_ENUM, .def = "auto",
      WORDS([CHOICE_AUTO] = "auto", [CHOICE_OFF] = "off", [CHOICE_ON] = "on"),
      .help = "Orders surfaces that overlap or cross in double. It costs loading time, and speed where surfaces "
              "overlap. auto: on where float's resolution in the scene is coarser than plan.tolerance_m."},
+    {KEY(scene.cutouts), CFG_BOOL, .def = "on",
+     .help = "Rays pass where a texture's alpha or opacity map is below a half, as between leaves. Textures are then "
+             "read when the scene is loaded; without such a texture it costs nothing more."},
+    {"scene.import_memory_mib", IN_CONFIG(scene.import.memory_mib), CFG_COUNT, "MiB", "8192", 16, 1 << 24,
+     .help = "Memory that Assimp may take for one mesh (all formats but .obj and .ply); more is an error. Assimp reads "
+             "in a process of its own, since broken files make it crash, hang or take all memory."},
+    {"scene.import_s", IN_CONFIG(scene.import.time_s), CFG_REAL, "s", "300", 0.1, 1e6,
+     .help = "Time that Assimp may take for one mesh; more is an error."},
+    {"scene.import_files", IN_CONFIG(scene.import.files), CFG_COUNT, NULL, "64", 4, 1000,
+     .help = "Files that Assimp may have open at a time: a mesh and those that it names."},
     {"scene.meshes", .type = CFG_LIST, .min = 1, .max = CONFIG_MAX_MESHES, LIST_OF(scene.mesh, scene.n_meshes),
      .help = "Mesh files; together they are the scene."},
     {"scene.meshes[]", .type = CFG_MAP, .help = "A mesh file."},

@@ -206,6 +206,21 @@ int cfg_load_profile(struct cfg_reader *rd, struct config *cfg)
     return read_profile(&profile_rd, cfg->profile_file, &cfg->profile, rd->err);
 }
 
+int config_load_profile(const char *name, const char *config_file, struct config_profile *profile, struct sh_err *err)
+{
+    struct profile_dirs dirs;
+    struct cfg_reader rd;
+    char path[2 * CONFIG_PATH_LEN], known[300];
+    find_dirs(config_file, &dirs);
+    for (int i = 0; i < dirs.n; i++) {
+        snprintf(path, sizeof path, "%s/%s.yaml", dirs.dir[i], name);
+        if (access(path, F_OK) == 0) return read_profile(&rd, path, profile, err);
+    }
+    known_profiles(&dirs, known, sizeof known);
+    return sh_fail(err, SH_EINPUT, "no head profile %s; found were: %s; SCANHEAD_HEADS can name their directory", name,
+                   known);
+}
+
 /* ---- listing */
 
 static void print_figures(const struct cfg_reader *rd, int from, const char *label, FILE *out)

@@ -6,10 +6,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "core/grow.h"
+#include "core/newfile.h"
 
 static const char title[] = "# scanhead journal 1";
+static const char end_line[] = "END"; /* no command has this name */
 
 struct journal {
     FILE *file;
@@ -35,8 +38,18 @@ struct journal *journal_open(const char *path, struct sh_err *err)
         sh_fail(err, SH_ENOMEM, "journal: no memory");
         return NULL;
     }
-    *journal = (struct journal){.path = path, .file = fopen(path, "we")};
-    if (journal->file == NULL) journal->error = errno;
+    struct sh_err why = {0};
+    int fd, rc = newfile_open(path, &fd, &why);
+    if (rc != SH_OK) {
+        sh_fail(err, rc, "journal: %s", why.text);
+        free(journal);
+        return NULL;
+    }
+    *journal = (struct journal){.path = path, .file = fdopen(fd, "w")};
+    if (journal->file == NULL) {
+        journal->error = errno;
+        close(fd);
+    }
     if (put(journal, "%s\n", title) == SH_OK) return journal;
     journal_close(journal, err);
     return NULL;
@@ -55,6 +68,16 @@ int journal_write(struct journal *journal, uint64_t tick, int64_t t_ns, uint32_t
 {
     if (t_ns < 0 || !is_command_line(line)) return SH_EINPUT;
     return put(journal, "%" PRIu64 " %" PRId64 " %" PRIu32 " %s\n", tick, t_ns, session, line);
+}
+
+int journal_end(struct journal *journal, uint64_t tick, int64_t t_ns)
+{
+    return journal_write(journal, tick, t_ns, 0, end_line);
+}
+
+int journal_is_end(const struct journal_entry *entry)
+{
+    return entry->session == 0 && strcmp(entry->line, end_line) == 0;
 }
 
 int journal_note(struct journal *journal, const char *text)

@@ -22,17 +22,28 @@ static int open_trial(struct trial *trial, struct site *site, const struct sh_re
     if (site->scene->n_triangles > MANY_TRIANGLES) sh_progress(report, "trying methods on the scene", -1.0);
     trial->site = site;
     site_look_open(&trial->look, site);
-    return plan_sample_create(trial->look.place, trial->look.n, &trial->sample, err);
+    return plan_sample_create(trial->look.place, trial->look.n, report, &trial->sample, err);
 }
 
 /* ---- beams */
+
+/* What textures cut out of surfaces has outlines that nobody knows. */
+static const char *has_cutouts(const struct site *site)
+{
+    int cutouts = site->scene->cutout != NULL;
+    for (uint32_t i = 0; i < site->n_movers; i++)
+        cutouts |= site->mover[i].scene->cutout != NULL;
+    return cutouts ? "outlines of what textures cut out (scene.cutouts) are not known" : NULL;
+}
 
 /* Why a beam is not possible here; NULL: it is. */
 static const char *why_not(const struct site *site, enum beam_mode mode)
 {
     if (mode == BEAM_SINGLE) return NULL;
     if (!config_has_footprint(site->cfg)) return "the head profile has no footprint";
-    return mode == BEAM_ADAPTIVE ? config_beam_moves(site->cfg) : NULL;
+    if (mode != BEAM_ADAPTIVE) return NULL;
+    const char *moves = config_beam_moves(site->cfg);
+    return moves != NULL ? moves : has_cutouts(site);
 }
 
 static int make_beam(const struct site *site, struct site_station *s, int adaptive, const struct sh_report *report,
@@ -47,8 +58,8 @@ static int make_beam(const struct site *site, struct site_station *s, int adapti
     beam_rings(BEAM_FINE_RINGS, &beam->fine);
     if (!adaptive || s->outlines != NULL) return SH_OK;
     if (site->scene->n_triangles > MANY_TRIANGLES) sh_progress(report, "looking for outlines", -1.0);
-    const struct beam_outlines_spec spec = {site->scene, s->at.position_m, &beam->beam, p->range_max_m,
-                                            site->detect.kind};
+    const struct beam_outlines_spec spec = {site->scene,    s->at.position_m,  &beam->beam,
+                                            p->range_max_m, site->detect.kind, report};
     int rc = cast_outlines(&spec, s->bvh, &s->outlines, err);
     beam->outlines = s->outlines;
     return rc;
@@ -131,6 +142,7 @@ static int measure_beams(struct trial *trial, const struct beam_choice *choice, 
             if (rc != SH_OK) return rc;
         }
         plan_sample_beam(trial->sample, choice[i].mode, choice[i].rings, &option[i]);
+        rc = sh_check_stop(report, err);
         if (!plan_holds(&option[i], tolerance)) continue;
         *holds = 1;
         cost_ns = option[i].cost_ns;
@@ -182,12 +194,17 @@ static int force_beam(struct site *site, const struct sh_report *report, struct 
     const struct config *cfg = site->cfg;
     struct plan_option option;
     struct trial trial = {0};
+    const char *why = cfg->beam.mode == BEAM_ADAPTIVE ? has_cutouts(site) : NULL;
+    if (why != NULL)
+        return sh_fail(err, SH_EINPUT, "%s: beam.mode: adaptive: %s; allowed here are single, rings and auto",
+                       cfg->file, why);
     plan_beam_option(cfg->beam.mode, cfg->beam.rings, &option);
     if (site->measures && config_has_footprint(cfg)) {
         int rc = open_trial(&trial, site, report, err);
         if (rc == SH_OK) rc = make_beams(&trial, cfg->beam.mode == BEAM_ADAPTIVE, report, err);
         if (rc == SH_OK) plan_sample_beam(trial.sample, cfg->beam.mode, cfg->beam.rings, &option);
         plan_sample_free(trial.sample);
+        if (rc == SH_OK) rc = sh_check_stop(report, err);
         if (rc != SH_OK) return rc;
     }
     site->plan.methods.beam = cfg->beam.mode;
@@ -229,6 +246,7 @@ static int choose_optics(struct site *site, const struct sh_report *report, stru
     if (forced < 0 || site->measures) rc = open_trial(&trial, site, report, err);
     int holds = rc == SH_OK && try_depths(&trial, forced, option);
     plan_sample_free(trial.sample);
+    if (rc == SH_OK) rc = sh_check_stop(report, err);
     if (rc != SH_OK) return rc;
     const struct plan_choice ask = {"optics", option, CAST_MAX_DEPTH + 1, forced, "optics.depth", cfg->plan};
     uint32_t depth = site->plan.methods.depth = plan_choose(&ask, &site->plan.optics);

@@ -10,7 +10,7 @@ static int build(const struct site *site, const struct scene *scene, const struc
 {
     *out = NULL;
     int rc = bvh_create(scene, from->centre_m, from->radius_m, site->cfg->loop.threads, report, out, err);
-    return rc == SH_OK && site->plan.methods.order_exactly ? bvh_order_exactly(*out, err) : rc;
+    return rc == SH_OK && site->plan.methods.order_exactly ? bvh_order_exactly(*out, report, err) : rc;
 }
 
 int site_build_mover_bvhs(struct site *site, const struct sh_report *report, struct sh_err *err)

@@ -64,8 +64,9 @@ static int set_up_textures(struct site *site, const uint8_t *said, const struct 
     int rc = SH_OK;
     for (uint32_t i = 0; i < site->n_surfaces && rc == SH_OK; i++) {
         const struct scene_texture *texture = said[i] ? NULL : site_texture(site, i);
-        if (texture == NULL) continue;
-        rc = surface_table_texture(&site->detect.surfaces, i, site_surface(site, i), texture, &why);
+        if (texture == NULL || texture->unreadable) continue;
+        rc = sh_check_stop(report, &why);
+        if (rc == SH_OK) rc = surface_table_texture(&site->detect.surfaces, i, site_surface(site, i), texture, &why);
         if (rc != SH_EINPUT) continue;
         if (failed++ == 0) first = why;
         rc = SH_OK;

@@ -202,7 +202,8 @@ static int add_georef(struct site *site, struct site_station *s, const struct sh
     const struct config *cfg = site->cfg;
     struct georef_spec spec = {.crs = cfg->output.crs, .geoid = site->geoid};
     site_grid(site, &spec.utm_zone, &spec.side);
-    int rc = placement_georef(&s->at, &site->anchor, &spec, err);
+    int rc = sh_check_stop(report, err);
+    if (rc == SH_OK) rc = placement_georef(&s->at, &site->anchor, &spec, err);
     if (rc == SH_OK) rc = georef_create(&spec, &s->georef, err);
     if (rc != SH_OK) return rc;
     int epsg = georef_epsg(s->georef), first = georef_epsg(site->station[0].georef);

@@ -9,7 +9,13 @@
 static struct scene_mesh_spec mesh_spec(const struct config *cfg, const struct config_mesh *mesh)
 {
     struct scene_mesh_spec spec = {
-        .file = mesh->file, .up = mesh->up, .scale = mesh->scale, .textures = cfg->signal.on};
+        .file = mesh->file,
+        .up = mesh->up,
+        .scale = mesh->scale,
+        .textures = cfg->signal.on,
+        .cutouts = cfg->scene.cutouts,
+        .limits = &cfg->scene.import,
+    };
     memcpy(spec.offset_m, mesh->offset_m, sizeof spec.offset_m);
     return spec;
 }
@@ -32,6 +38,7 @@ static int add_mover(struct site *site, const struct config_mesh *mesh, const st
         return sh_fail(err, SH_EINPUT, "%s: too many surfaces; at most %d", mesh->file, SCENE_MAX_SURFACES);
     for (uint32_t i = 0; i < m->scene->n_triangles; i++)
         m->scene->label[i] = (uint16_t)(m->scene->label[i] + site->n_surfaces);
+    m->scene->label0 = site->n_surfaces;
     site->n_surfaces += m->scene->n_surfaces;
     for (int i = 0; i < 3; i++) {
         double half = 0.5 * (m->scene->max_m[i] - m->scene->min_m[i]);
@@ -60,7 +67,7 @@ static int load_scene(struct site *site, const struct sh_report *report, struct 
 }
 
 /* Where the head stands, or stops. */
-static int place_stations(struct site *site, struct sh_err *err)
+static int place_stations(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
     int rc = SH_OK;
@@ -70,8 +77,9 @@ static int place_stations(struct site *site, struct sh_err *err)
     for (uint32_t i = 0; i < cfg->n_stations && rc == SH_OK; i++) {
         site->station[i].station = &cfg->station[i];
         rc = placement_find(cfg, i, &site->anchor, site->scene, &site->station[i].at, err);
+        if (rc == SH_OK) rc = sh_check_stop(report, err);
     }
-    return rc == SH_OK && cfg->platform.kind == PLATFORM_STOPS ? site_load_stops(site, err) : rc;
+    return rc == SH_OK && cfg->platform.kind == PLATFORM_STOPS ? site_load_stops(site, report, err) : rc;
 }
 
 /* A head that moves has the BVHs of its path. */
@@ -92,9 +100,10 @@ static int load(struct site *site, const struct sh_report *report, struct sh_err
     int rc = placement_find_anchor(site->cfg, report, &site->anchor, err);
     if (rc == SH_OK) rc = load_scene(site, report, err);
     if (rc == SH_OK) rc = site_set_up_detect(site, report, err);
-    if (rc == SH_OK) rc = place_stations(site, err);
+    if (rc == SH_OK) rc = place_stations(site, report, err);
     if (rc == SH_OK) site_plan_order(site);
     if (rc == SH_OK) rc = build_bvhs(site, report, err);
+    if (rc == SH_OK) rc = site_warn_doubts(site, report, err); /* trying beams may take long where little is seen */
     if (rc == SH_OK) rc = site_georeference(site, report, err);
     if (rc == SH_OK) rc = site_choose_methods(site, report, err);
     return rc;

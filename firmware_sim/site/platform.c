@@ -18,13 +18,14 @@ struct part {
     double start_s, end_s;
 };
 
-static int open_trajectory(const struct site *site, struct part *part, struct sh_err *err)
+static int open_trajectory(const struct site *site, const struct sh_report *report, struct part *part,
+                           struct sh_err *err)
 {
     const struct config_platform *p = &site->cfg->platform;
     double first_s, last_s;
     int rc = p->file[0] != '\0'
-                 ? trajectory_read_csv(p->file, &part->trajectory, err)
-                 : trajectory_read_waypoints(p->waypoints, site->anchor.known ? &site->anchor.frame : NULL,
+                 ? trajectory_read_csv(p->file, report, &part->trajectory, err)
+                 : trajectory_read_waypoints(p->waypoints, site->anchor.known ? &site->anchor.frame : NULL, report,
                                              &part->trajectory, err);
     if (rc != SH_OK) return rc;
     trajectory_span(part->trajectory, &first_s, &last_s);
@@ -55,15 +56,16 @@ static int load_knots(struct site *site, const struct sh_report *report, struct 
     const struct config_platform *p = &site->cfg->platform;
     struct part part;
     struct sh_err why;
-    int rc = open_trajectory(site, &part, err);
+    int rc = open_trajectory(site, report, &part, err);
     if (rc != SH_OK) return rc;
     const struct pose_knot_rules rules = {part.start_s, part.end_s, TOLERANCE_M, LONGEST_NS, LONGEST_M};
     struct pose_path path;
-    rc = trajectory_knots(part.trajectory, &site->mount, &rules, &path, &why);
+    rc = trajectory_knots(part.trajectory, &site->mount, &rules, report, &path, &why);
     site->knot = path.knot;
     site->n_knots = path.n;
     site->knot_error_m = path.error_m;
     trajectory_free(part.trajectory);
+    if (rc == SH_ESTOPPED) return sh_check_stop(report, err);
     if (rc != SH_OK)
         return sh_fail(err, rc, "%s: platform.%s: %.300s", site->cfg->file, p->file[0] != '\0' ? "file" : "waypoints",
                        why.text);
@@ -220,11 +222,11 @@ static int add_stop(struct site *site, const struct part *part, uint32_t i, stru
     return rc == SH_OK ? rc : sh_fail(err, rc, "%s: stop %u: %.300s", site->cfg->file, i + 1, why.text);
 }
 
-int site_load_stops(struct site *site, struct sh_err *err)
+int site_load_stops(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     struct part part;
     uint32_t n = 0;
-    int rc = open_trajectory(site, &part, err);
+    int rc = open_trajectory(site, report, &part, err);
     if (rc != SH_OK) return rc;
     rc = count_stops(site, &part, &n, err);
     if (rc == SH_OK) rc = anchor_scene(site, err);
@@ -237,7 +239,7 @@ int site_load_stops(struct site *site, struct sh_err *err)
     }
     set_mount(site);
     for (uint32_t i = 0; i < n && rc == SH_OK; i++)
-        rc = add_stop(site, &part, i, err);
+        if ((rc = sh_check_stop(report, err)) == SH_OK) rc = add_stop(site, &part, i, err);
     trajectory_free(part.trajectory);
     return rc;
 }

@@ -33,7 +33,7 @@ double site_range_noise_m(const struct site *site);
 /* Puts the stops in the place of the configuration's only station. That one has been placed: without an
  * anchor it says where on the Earth the scene lies, as an anchor at its position with the scene's y axis to
  * true north would. */
-int site_load_stops(struct site *site, struct sh_err *err);
+int site_load_stops(struct site *site, const struct sh_report *report, struct sh_err *err);
 
 /* Reads the trajectory, and builds the BVHs that its path needs. */
 int site_load_platform(struct site *site, const struct sh_report *report, struct sh_err *err);
@@ -89,5 +89,11 @@ void site_look_open(struct site_look *look, const struct site *site);
  * optics, and makes the stations' beams. Warns where nothing holds the tolerances. For `plan`
  * (site->measures) the error of what is forced is measured, too. */
 int site_choose_methods(struct site *site, const struct sh_report *report, struct sh_err *err);
+
+/* ---- doubts.c: what is allowed, and hardly meant. Once the scene has its BVHs. */
+
+/* Warns, with figures, of a scene of an unlikely size, of stations that see nothing or little, of lines
+ * without a pulse, and of attributes that nothing fills. */
+int site_warn_doubts(const struct site *site, const struct sh_report *report, struct sh_err *err);
 
 #endif

@@ -45,7 +45,7 @@ static void outline_kinds(struct lit *l)
 {
     uint16_t kind[2];
     struct sh_err err;
-    const struct beam_outlines_spec spec = {l->rig.scene, STATION, &l->rig.beam.beam, l->rig.setup.range_max_m, kind};
+    const struct beam_outlines_spec spec = {l->rig.scene, STATION, &l->rig.beam.beam, l->rig.setup.range_max_m, kind, NULL};
     beam_outlines_free(l->rig.outlines);
     if (surface_kinds(&l->table, kind, &err) != 0 || cast_outlines(&spec, l->rig.bvh, &l->rig.outlines, &err) != 0)
         fail_msg("%s", err.text);

@@ -235,7 +235,7 @@ int beam_rig_open(struct beam_rig *rig, struct scene *scene, const double statio
     if (rc == SH_OK) rc = line_block_alloc(&rig->block, view->pulses * LINE_MAX_ECHOES, err);
     if (rc == SH_OK)
         rc =
-            cast_outlines(&(struct beam_outlines_spec){scene, station_m, &rig->beam.beam, rig->setup.range_max_m, NULL},
+            cast_outlines(&(struct beam_outlines_spec){scene, station_m, &rig->beam.beam, rig->setup.range_max_m, NULL, NULL},
                           rig->bvh, &rig->outlines, err);
     rig->setup.bvh = rig->bvh;
     rig->setup.georef = rig->georef;

@@ -20,14 +20,14 @@ void rig_rebuild(struct rig *rig, const double origin_m[3], unsigned threads)
     rig->bvh = NULL;
     if (bvh_create(rig->scene, origin_m, distance_m(origin_m, rig->station_m), threads, NULL, &rig->bvh, &err) != SH_OK)
         fail_msg("%s", err.text);
-    if (rig->exact_order && bvh_order_exactly(rig->bvh, &err) != SH_OK) fail_msg("%s", err.text);
+    if (rig->exact_order && bvh_order_exactly(rig->bvh, NULL, &err) != SH_OK) fail_msg("%s", err.text);
 }
 
 void rig_order_exactly(struct rig *rig)
 {
     struct sh_err err;
     rig->exact_order = 1;
-    if (bvh_order_exactly(rig->bvh, &err) != SH_OK) fail_msg("%s", err.text);
+    if (bvh_order_exactly(rig->bvh, NULL, &err) != SH_OK) fail_msg("%s", err.text);
 }
 
 void rig_open(struct rig *rig, struct scene *scene, const double station_m[3], const double origin_m[3])

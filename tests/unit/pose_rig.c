@@ -11,5 +11,5 @@ int find_path(const struct trajectory *tr, double start_s, double end_s, const s
               struct pose_path *out, struct sh_err *err)
 {
     const struct pose_knot_rules rules = {start_s, end_s, 1e-4, 10000000, 0.01};
-    return trajectory_knots(tr, mount, &rules, out, err);
+    return trajectory_knots(tr, mount, &rules, NULL, out, err);
 }

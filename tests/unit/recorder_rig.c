@@ -100,7 +100,7 @@ static void rig_warn(void *ctx, const char *text)
 
 int rig_record(const char *path, struct recorder_options options, int keep, struct sh_err *err)
 {
-    static const struct sh_report report = {NULL, rig_warn, NULL};
+    static const struct sh_report report = {.warn = rig_warn};
     struct scanhead *sh;
     struct scanhead_frame frame;
     struct recorder *rec;

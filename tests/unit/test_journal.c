@@ -73,13 +73,23 @@ static void the_format_is_as_documented(void **ctx)
     struct journal *journal = journal_open(path, NULL);
     assert_non_null(journal);
     assert_int_equal(journal_write(journal, 12, 12000000, 2, "HEAD:PRR 300000"), 0);
+    assert_int_equal(journal_end(journal, 15, 15000000), 0);
     assert_int_equal(journal_close(journal, NULL), 0);
     char text[128] = "";
     FILE *file = fopen(path, "r");
     assert_non_null(file);
     text[fread(text, 1, sizeof text - 1, file)] = '\0';
     fclose(file);
-    assert_string_equal(text, "# scanhead journal 1\n12 12000000 2 HEAD:PRR 300000\n");
+    assert_string_equal(text, "# scanhead journal 1\n12 12000000 2 HEAD:PRR 300000\n15 15000000 0 END\n");
+    struct journal_entry *out;
+    size_t n;
+    assert_int_equal(journal_read(path, &out, &n, NULL), 0);
+    assert_int_equal(n, 2);
+    assert_false(journal_is_end(&out[0]));
+    assert_true(journal_is_end(&out[1]) && out[1].tick == 15);
+    out[1].session = 1; /* a client that sent it: a wrong command */
+    assert_false(journal_is_end(&out[1]));
+    free(out);
 }
 
 static void sorted_by_tick_and_else_as_in_the_file(void **ctx)
@@ -210,7 +220,7 @@ static void a_full_disk_is_reported(void **ctx)
     assert_int_equal(err.code, SH_EIO);
     assert_non_null(strstr(err.text, "/dev/full: No space left"));
     assert_null(journal_open("/nonexistent/j", &err));
-    assert_non_null(strstr(err.text, "/nonexistent/j: No such file"));
+    assert_non_null(strstr(err.text, "/nonexistent/j: cannot be opened for writing: No such file"));
     /* Later: the file may grow to 100 bytes, so the second of these lines does not fit. */
     struct rlimit before, small;
     assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);

@@ -36,7 +36,7 @@ static void test_csv(void **state)
     double frame, first, last;
     write_file("\xef\xbb\xbf# a comment behind a byte order mark\n\nt_s, x_m,y_m,z_m,roll_deg,pitch_deg,heading_deg\r\n"
                "0,1,2,3,5,-6,370\r\n# another\n2.5,3,2,3,0,0,90\n");
-    if (trajectory_read_csv(path, &angles, &err) != SH_OK) fail_msg("%s", err.text);
+    if (trajectory_read_csv(path, NULL, &angles, &err) != SH_OK) fail_msg("%s", err.text);
     trajectory_span(angles, &first, &last);
     assert_true(first == 0.0 && last == 2.5);
     trajectory_at(angles, 0.0, &a, &frame);
@@ -47,7 +47,7 @@ static void test_csv(void **state)
              "frame,qw,qx,qy,qz,z_m,y_m,x_m,t_s\n7,%.17g,%.17g,%.17g,%.17g,3,2,1,0\n8,1,0,0,0,3,2,3,2\n", b.quat[0],
              b.quat[1], b.quat[2], b.quat[3]);
     write_file(text);
-    if (trajectory_read_csv(path, &quats, &err) != SH_OK) fail_msg("%s", err.text);
+    if (trajectory_read_csv(path, NULL, &quats, &err) != SH_OK) fail_msg("%s", err.text);
     trajectory_at(quats, 0.0, &b, &frame);
     assert_true(pose_angle_between(a.quat, b.quat) < 1e-14 && frame == 7.0 && b.position_m[0] == 1.0);
     trajectory_free(angles);
@@ -87,7 +87,7 @@ static void test_csv_errors(void **state)
         struct trajectory *tr;
         struct sh_err err = {0};
         write_file(wrong[i].text);
-        assert_int_equal(trajectory_read_csv(path, &tr, &err), SH_EINPUT);
+        assert_int_equal(trajectory_read_csv(path, NULL, &tr, &err), SH_EINPUT);
         assert_null(tr);
         if (strstr(err.text, path) == NULL || strstr(err.text, wrong[i].where) == NULL ||
             strstr(err.text, wrong[i].what) == NULL)
@@ -95,7 +95,7 @@ static void test_csv_errors(void **state)
     }
     struct trajectory *tr;
     struct sh_err err;
-    assert_int_equal(trajectory_read_csv("/nonexistent/x.csv", &tr, &err), SH_EINPUT);
+    assert_int_equal(trajectory_read_csv("/nonexistent/x.csv", NULL, &tr, &err), SH_EINPUT);
 }
 
 static void test_waypoints(void **state)
@@ -107,7 +107,7 @@ static void test_waypoints(void **state)
     double frame, h, pitch, roll, first, last;
     /* North at 5 m/s for 20 m, stand for 2 s, on for 10 m at 2 m/s. */
     write_file("x_m,y_m,z_m,speed_m_s,pause_s\n0,0,1,5,0\n0,10,1,5,0\n0,20,1,2,2\n0,30,1,2,0\n");
-    if (trajectory_read_waypoints(path, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
+    if (trajectory_read_waypoints(path, NULL, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
     trajectory_span(tr, &first, &last);
     assert_true(first == 0.0 && fabs(last - 11.0) < 1e-12);
     trajectory_at(tr, 1.0, &p, &frame);
@@ -121,7 +121,7 @@ static void test_waypoints(void **state)
     trajectory_free(tr);
     /* A pause in a bend: the car stands as it came and leaves as it stands, without a jerk of its nose. */
     write_file("x_m,y_m,z_m,speed_m_s,pause_s\n0,0,0,5,0\n0,20,0,5,1\n20,20,0,5,0\n");
-    if (trajectory_read_waypoints(path, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
+    if (trajectory_read_waypoints(path, NULL, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
     struct pose before;
     trajectory_at(tr, 0.0, &before, &frame);
     for (double t = 0.01; t <= 9.0; t += 0.01) {
@@ -133,7 +133,7 @@ static void test_waypoints(void **state)
     trajectory_free(tr);
     /* A corner: heading turns from north to east, in the end along the last leg. */
     write_file("x_m,y_m,z_m,speed_m_s\n0,0,0,10\n0,50,0,10\n50,50,0,10\n100,50,0,10\n");
-    if (trajectory_read_waypoints(path, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
+    if (trajectory_read_waypoints(path, NULL, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
     trajectory_at(tr, 5.0, &p, &frame);
     pose_to_angles(p.quat, &h, &pitch, &roll);
     assert_true(fabs(h - 45 * DEG) < 1e-3); /* equal times before and behind: the parabola halves the angle */
@@ -146,7 +146,7 @@ static void test_waypoints(void **state)
         "x_m,y_m,z_m,speed_m_s\n0,0,0,1\n0,0,0,1\n", "x_m,y_m,z_m,speed_m_s,pause_s\n0,0,0,1,-1\n1,0,0,1,0\n"};
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         write_file(wrong[i]);
-        assert_int_equal(trajectory_read_waypoints(path, NULL, &tr, &err), SH_EINPUT);
+        assert_int_equal(trajectory_read_waypoints(path, NULL, NULL, &tr, &err), SH_EINPUT);
         assert_non_null(strstr(err.text, path));
     }
 }
@@ -161,7 +161,7 @@ static void test_slow_waypoints(void **state)
     struct pose p;
     double frame, h, pitch, roll;
     write_file("x_m,y_m,z_m,speed_m_s\n0,0,0,0.001\n0,5,0,0.001\n5,5,0,0.001\n");
-    if (trajectory_read_waypoints(path, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
+    if (trajectory_read_waypoints(path, NULL, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
     const struct pose mount = {.quat = {1, 0, 0, 0}};
     struct pose_path got;
     assert_int_equal(find_path(tr, 0, 1e9, &mount, &got, &err), SH_OK);
@@ -175,7 +175,7 @@ static void test_slow_waypoints(void **state)
     for (int i = 0; i < 120; i++) /* each 999 m at 1 mm/s: 99,900 samples */
         snprintf(text + strlen(text), sizeof text - strlen(text), "%d,0,0,0.001\n", 999 * i);
     write_file(text);
-    assert_int_equal(trajectory_read_waypoints(path, NULL, &tr, &err), SH_EINPUT);
+    assert_int_equal(trajectory_read_waypoints(path, NULL, NULL, &tr, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, path));
     assert_non_null(strstr(err.text, "allowed 10000000"));
     FILE *f = fopen(path, "w");
@@ -184,7 +184,7 @@ static void test_slow_waypoints(void **state)
     for (int i = 0; i < 50000; i++) /* a day each: 4e9 s are over with the 46,297th */
         fprintf(f, "0,%d,0,1000,86400\n", i);
     assert_int_equal(fclose(f), 0);
-    assert_int_equal(trajectory_read_waypoints(path, NULL, &tr, &err), SH_EINPUT);
+    assert_int_equal(trajectory_read_waypoints(path, NULL, NULL, &tr, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, "line 46298: "));
     assert_non_null(strstr(err.text, "allowed 4e+09"));
 }
@@ -209,7 +209,7 @@ static void test_level_waypoints(void **state)
             snprintf(text + strlen(text), sizeof text - strlen(text), "%.9f,%.9f,%.9f,%g\n", at_m[0] + 10 * k * east[0],
                      at_m[1] + 10 * k * east[1], at_m[2] + 10 * k * east[2], i == 1 ? 0.001 : 5.0);
         write_file(text);
-        if (trajectory_read_waypoints(path, &ecef, &tr, &err) != SH_OK) fail_msg("%s", err.text);
+        if (trajectory_read_waypoints(path, &ecef, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
         trajectory_at(tr, i == 1 ? 1e4 : 2.0, &p, &frame);
         pose_matrix(p.quat, r);
         for (int k = 0; k < 3; k++) {

@@ -142,7 +142,7 @@ static struct seen compare(const struct scene *scene, const struct surface_table
     struct beam_outlines *outlines = NULL;
     setup.beam = beam;
     if (beam != NULL && beam->mode == BEAM_ADAPTIVE) {
-        const struct beam_outlines_spec wanted = {scene, at, &beam->beam, 2000.0, NULL};
+        const struct beam_outlines_spec wanted = {scene, at, &beam->beam, 2000.0, NULL, NULL};
         if (cast_outlines(&wanted, bvh, &outlines, &err) != SH_OK)
             fail_msg("%s", err.text);
         beam->outlines = outlines;

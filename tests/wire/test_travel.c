@@ -285,7 +285,7 @@ static void test_poses_beside_a_crs(void **state)
     }
     assert_true(n > 10);
     struct trajectory *trajectory;
-    int rc = trajectory_read_csv(path, &trajectory, &err);
+    int rc = trajectory_read_csv(path, NULL, &trajectory, &err);
     if (rc != SH_OK) fail_msg("%s", err.text);
     trajectory_free(trajectory);
     georef_free(truth);

@@ -88,10 +88,7 @@ static const struct config_case CONFIGS[] = {
      "prr_hz: 100000",
      "prr_hz: 100 kHz",
      {"config.yaml:1:", "head.prr_hz", "not a number", "1 to 10000000 Hz"}},
-    {"NaN",
-     "prr_hz: 100000",
-     "prr_hz: .nan",
-     {"config.yaml:1:", "head.prr_hz", "not a number", "1 to 10000000 Hz"}},
+    {"NaN", "prr_hz: 100000", "prr_hz: .nan", {"config.yaml:1:", "head.prr_hz", "not a number", "1 to 10000000 Hz"}},
     {"nan", "prr_hz: 100000", "prr_hz: nan", {"config.yaml:1:", "head.prr_hz"}},
     {"infinity", "lines_hz: 50", "lines_hz: .inf", {"config.yaml:1:", "head.lines_hz", "0.25 to 10000 Hz"}},
     {"above the profile",
@@ -285,6 +282,9 @@ static const struct {
     {{"record", "tty:DIR/none", "-o", "DIR/x.ply"}, {"none", "No such file"}},
     {{"record", "tty:/dev/null", "-o", "DIR/x.ply"}, {"/dev/null", "terminal"}},
     {{"record", "tcp:localhost:1", "--set", "a=b", "-o", "DIR/x.ply"}, {"--set", "CONFIG"}},
+    {{"record", "CONFIG", "-o", "DIR/x.las", "--las-version", "1.3"}, {"--las-version 1.3", "1.2, 1.4"}},
+    {{"record", "CONFIG", "-o", "DIR/x.ply", "--colour", "red"}, {"--colour red", "reflectance, label"}},
+    {{"record", "CONFIG", "-o", "DIR/x.ply", "--ply-names", "x"}, {"--ply-names x", "scanhead, cloudcompare"}},
     {{"map", "CONFIG"}, {"-o"}},
     {{"list", "all"}, {"no arguments"}},
 };
@@ -429,7 +429,7 @@ static void test_system_failures(void **state)
     expect(wire, "statistics in no folder",
            (const char *const[]){"run", config, "--duration", "0.1", "--pace", "fast", "--quiet", "--stats", "/none/x",
                                  NULL},
-           1, (const char *const[]){"/none/x", "No such file", NULL});
+           2, (const char *const[]){"/none/x", "No such file", NULL});
     struct sockaddr_in at = {.sin_family = AF_INET};
     socklen_t len = sizeof at;
     int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
