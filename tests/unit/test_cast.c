@@ -342,8 +342,8 @@ static struct scene *tetrahedron(const double vertex[4][3])
     return scene;
 }
 
-/* From corner 0 along d to the opposite face, by the ray's shares of the three edges that leave the corner; NaN: it does
- * not go there, INFINITY: too near to an edge to say. */
+/* From corner 0 along d to the opposite face, by the ray's shares of the three edges that leave the corner; NaN: it
+ * does not go there, INFINITY: too near to an edge to say. */
 static double opposite_range(const double vertex[4][3], const double d[3])
 {
     double e[3][3], share[3], sum = 0.0;
