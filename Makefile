@@ -26,8 +26,8 @@ Q_0 = @
 Q = $(Q_$(V))
 
 # What a fresh Debian 12 needs. Building and the demo:
-DEPS_BUILD = gcc g++ make pkg-config libc6-dev libembree-dev libassimp-dev libgeographiclib-dev libyaml-dev libpng-dev libstb-dev \
-	nettle-dev libusb-1.0-0-dev libusbredirparser-dev assimp-testmodels
+DEPS_BUILD = gcc g++ make pkg-config libc6-dev libembree-dev libassimp-dev libgeographiclib-dev libyaml-dev libpng-dev \
+	libstb-dev nettle-dev libusb-1.0-0-dev libusbredirparser-dev assimp-testmodels
 # and the tests, with the second compiler and its sanitizers, clients and readers of recordings that are not ours:
 DEPS_TEST = $(DEPS_BUILD) libcmocka-dev clang libclang-rt-dev gpsd gpsd-clients cloudcompare proj-bin python3-numpy \
 	$(if $(shell command -v npm),,nodejs npm)
