@@ -18,7 +18,8 @@ static void print_help(FILE *out)
         app_arguments(*c, arguments, sizeof arguments);
         fprintf(out, "  scanhead %s%-*s %s\n", (*c)->name, 38 - (int)strlen((*c)->name), arguments, (*c)->summary);
     }
-    fprintf(out, "\nEach command has --help; --version says which release this is. `scanhead check --help` lists all configuration keys.\n"
+    fprintf(out, "\nEach command has --help. `scanhead check --help` lists all configuration keys.\n"
+                 "scanhead --version says which release this is.\n"
                  "Exit status: 0 done, 1 failed, 2 wrong usage, configuration or input.\n");
 }
 

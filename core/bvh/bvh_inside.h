@@ -119,6 +119,10 @@ struct bvh_one {
 };
 void bvh_intersect_one(const struct bvh *bvh, const float org[3], const float dir[3], struct bvh_one *one);
 
+/* What a ray meets no further than this from where it begins is no hit: there it begins on the surface, and
+ * goes on. Half of the wire's finest count, and far more than rounding leaves of zero. */
+#define BVH_AT_ORIGIN_M 5e-7
+
 /* One ray through all that Embree proposes on its way, in no order. is_met: whether the ray really meets that
  * triangle; what lies behind by the float distance is then left out. Only where the scene has cutouts. */
 struct bvh_walk {

@@ -207,7 +207,8 @@ static const struct cfg_key config_keys[] = {
              "echoes, 4 bytes a point; .ply and .las recordings have them."},
     {KEY(output.scale_m), CFG_REAL, "m", "0", 0, 1, .allowed = "0 (automatic) or 1e-6 to 1 m",
      .help = "Metres per count of a range; a count of a coordinate is no larger. The largest range must fit into 32 "
-             "bits, a coordinate into 31. automatic: 1e-6 m up to 4294 m of range (geo: 2147 m), then ten times as much."},
+             "bits, a coordinate into 31. automatic: 1e-6 m up to 4294 m of range (geo: 2147 m), then ten times as "
+             "much."},
 
     {"links", .type = CFG_LIST, .min = 0, .max = CONFIG_MAX_LINKS, LIST_OF(link, n_links),
      .help = "Where the head can be reached; none is needed to record off line."},
@@ -239,7 +240,8 @@ static const struct cfg_key config_keys[] = {
      .help = "usb: vendor id; the default pair is set aside for private tests."},
     {LINK(pid), CFG_COUNT, NULL, "0x0001", 0, 65535, .flags = CFG_HEX, .allowed = "0x0000 to 0xffff",
      .help = "usb: product id."},
-    {LINK(serial), CFG_TEXT, .def = "", .example = "SIM-0002", .help = "usb: serial number. When not given: head.serial where that is given, else SIM-0001 and eight digits that "
+    {LINK(serial), CFG_TEXT, .def = "", .example = "SIM-0002",
+     .help = "usb: serial number. When not given: head.serial where that is given, else SIM-0001 and eight digits that "
              "are this head's own on this machine. Only the USB device has them, not *IDN?."},
 
     {"beam", .type = CFG_MAP, .help = "The footprint of the pulses."},
@@ -248,8 +250,10 @@ static const struct cfg_key config_keys[] = {
      .help = "single: one ray per pulse; rings: sub-rays over the footprint; adaptive: sub-rays where the footprint "
              "reaches over an edge, or onto glass or a mirror; auto: as `scanhead plan` says."},
     {KEY(beam.rings), CFG_COUNT, NULL, "4", 0, BEAM_MAX_RINGS,
-     .help = "Rings of sub-rays: n rings have 1 + 3 n (n + 1). adaptive: used where a footprint holds more edges than "
-             "it can tell apart."},
+     .help = "Rings of sub-rays: n rings have 1 + 3 n (n + 1). At a plane's end a range is wrong by up to "
+             "0.35 / n^0.75 of the footprint's radius times the tangent of the incidence: 9 mm with 4 rings, "
+             "0.35 mrad, 100 m and 77 deg. Outlines are exact. adaptive: used where a footprint holds more edges than it can tell "
+             "apart."},
     {"beam.echoes", SETTING(echoes), CFG_ENUM, .def = "all",
      WORDS([BEAM_ALL] = "all", [BEAM_FIRST] = "first", [BEAM_LAST] = "last", [BEAM_STRONGEST] = "strongest"),
      .help = "Which echoes of a pulse are sent. Those of glass, and of what is seen through it, are among them."},
@@ -306,16 +310,17 @@ static const struct cfg_key config_keys[] = {
     {SURFACE(reflectance), CFG_REAL, NULL, "", 0, 1, .example = "0.4",
      .help = "Lambertian reflectance; 0 absorbs. When not given: luminance of the mesh's texture or colour."},
     {SURFACE(specular), CFG_REAL, NULL, "", 0, 1, .example = "0.1", .help = "Share that is reflected in a lobe."},
-    {SURFACE(gloss), CFG_REAL, NULL, "", 0, 1e6, .example = "100", .help = "Exponent of the lobe's cosine; 100 when not given."},
+    {SURFACE(gloss), CFG_REAL, NULL, "", 0, 1e6, .example = "100",
+     .help = "Exponent of the lobe's cosine; 100 when not given."},
     {SURFACE(retro), CFG_REAL, NULL, "", 0, 1e6, .example = "300",
      .help = "Retro-reflector: its signal is that of a white target times this, at any incidence; foils have 100 to "
              "1000."},
     {SURFACE(glass), CFG_REAL, NULL, "", 0, 1, .example = "0.9",
-     .help = "Share of the power that passes each surface: the pane and what is seen through it give echoes. It counts on "
-             "the way there and back: beyond two surfaces (a pane) of 0.9 an echo has 0.9^4 of its power."},
+     .help = "Share of the power that passes each surface: the pane and what is seen through it give echoes. It counts "
+             "on the way there and back: beyond two surfaces (a pane) of 0.9 an echo has 0.9^4 of its power."},
     {SURFACE(mirror), CFG_REAL, NULL, "", 0, 1, .example = "0.9",
-     .help = "Share of the power that is mirrored: ghost points, with surfaces of their own. It counts on the way there "
-             "and back: in a mirror of 0.9 an echo has 0.81 of its power."},
+     .help = "Share of the power that is mirrored: ghost points, with surfaces of their own. It counts on the way "
+             "there and back: in a mirror of 0.9 an echo has 0.81 of its power."},
 
     {"optics", .type = CFG_MAP, .help = "Pulses that meet glass or a mirror."},
     {KEY(optics.depth), CFG_COUNT, NULL, "4", 0, CAST_MAX_DEPTH,
