@@ -83,6 +83,17 @@ static int follow(struct record *r, struct scanhead *sh, struct recording_result
     return rc == SH_OK && after != SH_OK ? sh_fail(err, after, "%s", why.text) : rc;
 }
 
+static void warn_of_little(const struct record *r, const struct recording_result *result)
+{
+    const uint64_t pulses = result->counts.pulses;
+    if (result->empty <= pulses) app_warn_empty(pulses, pulses - result->empty, result->faint);
+    if (r->files.recorder.colour == COLOUR_REFLECTANCE && result->points != 0 && result->with_reflectance == 0)
+        sh_warn(&app_report_stderr,
+                "--colour reflectance: none of %llu points has one, all have the colour for that; it needs the head's "
+                "signal.model: on",
+                (unsigned long long)result->points);
+}
+
 static int record(struct record *r, struct scanhead *sh, struct sh_err *err)
 {
     struct recording_result result = {0};
@@ -101,8 +112,7 @@ static int record(struct record *r, struct scanhead *sh, struct sh_err *err)
     rc = follow(r, sh, &result, err);
     if (rc == SH_OK || result.points != 0) say_result(r, &result);
     app_warn_left_out(result.crowded, result.unfit);
-    if (rc == SH_OK && result.empty <= result.counts.pulses)
-        app_warn_empty(result.counts.pulses, result.counts.pulses - result.empty, result.faint);
+    if (rc == SH_OK) warn_of_little(r, &result);
     return rc == SH_OK ? recording_check_complete(&result, err) : rc;
 }
 
@@ -344,7 +354,10 @@ static const char HELP_NOTES[] =
     "  Frames or pulses were lost on the way.\n"
     "  The head was away within a scan.\n"
     "\n"
-    "FILE keeps what came.\n";
+    "FILE keeps what came.\n"
+    "\n"
+    "Ctrl-C, or SIGTERM, ends a recording in good order. A second signal within a second counts as the same one;\n"
+    "a third, or one that comes later, ends it at once.\n";
 
 const struct app_command app_record = {
     .name = "record",

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/line.h"
 #include "drivers/protocol/native.h"
 #include "firmware_sim/app/progress.h"
 #include "firmware_sim/base/clock.h"
@@ -45,12 +46,14 @@ static int set(struct recording *r, const char *header, long value, struct sh_er
 
 static void count_points(struct recording *r, const struct scanhead_frame *frame)
 {
-    uint64_t empty = 0;
+    uint64_t empty = 0, with_reflectance = 0;
     for (uint32_t i = 0; i < frame->n_points; i++) {
         struct native_point point;
         native_decode_point(frame->payload, i, &point);
         empty += point.echo_count == 0;
+        with_reflectance += point.echo_count != 0 && point.refl_cdb != LINE_REFL_NONE;
     }
+    r->result->with_reflectance += with_reflectance;
     r->result->empty += empty;
     r->result->points += frame->n_points - empty;
 }
@@ -137,8 +140,8 @@ static int is_interrupted(struct recording *r)
     return r->interrupted;
 }
 
-/* The head was unplugged, or its bus reset: waits for it. Where it scans no more when it is back, the scan ended meanwhile.
- * Where it still scans, the rest of the scan will come. */
+/* The head was unplugged, or its bus reset: waits for it. Where it scans no more when it is back, the scan ended
+ * meanwhile. Where it still scans, the rest of the scan will come. */
 static int replug(struct recording *r, int reset, struct sh_err *err)
 {
     const int64_t end_ns = clock_now_ns() + (int64_t)(1e9 * r->o->replug_s);

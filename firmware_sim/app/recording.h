@@ -31,6 +31,7 @@ struct recording_options {
 
 struct recording_result {
     uint64_t points, empty, frames; /* received; empty: shots without echo */
+    uint64_t with_reflectance;      /* points whose reflectance is modelled */
     struct recording_counts counts; /* of pulses and scans */
     uint64_t crowded, faint, unfit; /* hits that are no echoes, as the line ends count them */
     char missing[128];              /* what was asked for and left out because of `interrupted`; empty: nothing */
