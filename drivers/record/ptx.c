@@ -30,8 +30,9 @@ enum {
 struct ptx {
     struct recorder base;
     struct ptx_grid grid;
-    struct station_pose pose;     /* of the scan in the grid */
-    uint32_t last_line, last_row; /* of the grid's last shot */
+    struct station_pose pose;          /* of the scan in the grid */
+    uint32_t last_line, last_row;      /* of the grid's last shot */
+    uint64_t n_columns, n_unsaid_rows; /* of the grid, written */
     uint64_t n_left_out, n_too_bright;
     uint64_t n_ended_shots, n_padded; /* of the grids that are written */
     uint64_t n_split;                 /* grids that go on with the scan of the one before */
@@ -66,10 +67,24 @@ static int put_header(struct ptx *ptx, struct sh_err *err)
     return rc == 0 ? put_vector(ptx, 9, s, " 1", err) : rc;
 }
 
+/* A large grid takes long. */
+static void say_progress(struct ptx *ptx, uint32_t n_rows)
+{
+    char what[LINE_MAX_LEN];
+    ptx->n_columns++;
+    ptx->n_unsaid_rows += n_rows;
+    if (ptx->n_unsaid_rows < ROWS_BETWEEN_STOPS) return;
+    ptx->n_unsaid_rows = 0;
+    snprintf(what, sizeof what, "completing %s", ptx->base.file.path);
+    sh_progress(ptx->base.options.report, what,
+                (double)ptx->n_columns / ((double)ptx->grid.column_max - ptx->grid.column_min + 1));
+}
+
 static int put_column(void *ctx, const struct ptx_cell *column, uint32_t n_rows, struct sh_err *err)
 {
     struct ptx *ptx = ctx;
     int rc = recorder_check_stop(&ptx->base, err);
+    say_progress(ptx, n_rows);
     for (uint32_t i = 0; rc == 0 && i < n_rows; i++) {
         if (i % ROWS_BETWEEN_STOPS == ROWS_BETWEEN_STOPS - 1) rc = recorder_check_stop(&ptx->base, err);
         char *to = (char *)outfile_room(&ptx->base.file, LINE_MAX_LEN, err);
@@ -92,6 +107,7 @@ static int end_scan(struct ptx *ptx, struct sh_err *err)
     uint64_t columns = (uint64_t)g->column_max - g->column_min + 1, rows = (uint64_t)g->row_max - g->row_min + 1;
     ptx->n_padded += columns * rows - g->n_shots;
     ptx->n_ended_shots += g->n_shots;
+    ptx->n_columns = 0;
     int rc = put_header(ptx, err);
     return rc != 0 ? rc : ptx_grid_drain(g, put_column, ptx, err);
 }

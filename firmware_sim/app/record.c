@@ -20,6 +20,7 @@ struct record {
     long station; /* 0: as the head is set; APP_WORD: all */
     double wait_s;
     struct sh_report notes; /* of the recorders */
+    int64_t reported_ns;    /* when their progress was printed last */
     int interrupted;        /* before the files were completed, which an interrupted recording does, too */
     struct recording_options recording;
 };
@@ -54,6 +55,16 @@ static void print_note(void *ctx, const char *text)
     fprintf(stderr, "scanhead: %s\n", text);
 }
 
+/* Of completing a file: a line a second, and none for short work. */
+static void print_completing(void *ctx, const char *what, double fraction)
+{
+    struct record *r = ctx;
+    const int64_t now_ns = clock_now_ns();
+    if (!r->recording.progress || now_ns - r->reported_ns < 1000000000) return;
+    r->reported_ns = now_ns;
+    sh_progress(&app_report_stderr, what, fraction);
+}
+
 /* Follows the scans. Files are closed and statistics written also after some failures; the first failure is
  * returned. */
 static int follow(struct record *r, struct scanhead *sh, struct recording_result *result, struct sh_err *err)
@@ -63,6 +74,7 @@ static int follow(struct record *r, struct scanhead *sh, struct recording_result
     const int has_figures = rc == SH_OK || rc == SH_ELOST || rc == SH_ERESET; /* the bus has cut the recording */
     const int keep = result->points != 0 || (rc == SH_OK && result->missing[0] == '\0');
     r->interrupted = app_interrupted();
+    r->reported_ns = clock_now_ns();
     int after = record_files_close(&r->files, keep, &why);
     if (rc != SH_OK && after != SH_OK) sh_warn(&app_report_stderr, "%s", why.text);
     if (rc == SH_OK && after != SH_OK) rc = sh_fail(err, after, "%s", why.text);
@@ -86,7 +98,7 @@ static int record(struct record *r, struct scanhead *sh, struct sh_err *err)
 {
     struct recording_result result = {0};
     if (r->stats != NULL) scanhead_hash_start(sh);
-    r->notes = (struct sh_report){.ctx = r, .warn = print_note, .stop = gives_up};
+    r->notes = (struct sh_report){r, print_note, print_completing, gives_up};
     r->files.recorder.report = &r->notes;
     int rc = record_files_open(&r->files, err);
     if (rc != SH_OK) {
