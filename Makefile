@@ -26,8 +26,8 @@ Q_0 = @
 Q = $(Q_$(V))
 
 # What a fresh Debian 12 needs. Building and the demo:
-DEPS_BUILD = gcc g++ make pkg-config libc6-dev libembree-dev libassimp-dev libgeographiclib-dev libyaml-dev libpng-dev libstb-dev \
-	nettle-dev libusb-1.0-0-dev libusbredirparser-dev assimp-testmodels
+DEPS_BUILD = gcc g++ make pkg-config libc6-dev libembree-dev libassimp-dev libgeographiclib-dev libyaml-dev libpng-dev \
+	libstb-dev nettle-dev libusb-1.0-0-dev libusbredirparser-dev assimp-testmodels
 # and the tests, with the second compiler and its sanitizers, clients and readers of recordings that are not ours:
 DEPS_TEST = $(DEPS_BUILD) libcmocka-dev clang libclang-rt-dev gpsd gpsd-clients cloudcompare proj-bin python3-numpy \
 	$(if $(shell command -v npm),,nodejs npm)
@@ -57,6 +57,7 @@ SAN ?=
 # No contraction to FMA: the same numbers on every instruction set. errno and traps of libm are not used.
 FP = -ffp-contract=off -fno-math-errno -fno-trapping-math
 HEADS_DIR = $(PREFIX)/share/scanhead/heads
+SCENES_DIR = $(PREFIX)/share/scanhead/scenes
 UDEV_DIR = $(PREFIX)/lib/udev/rules.d
 PC_DIR = $(PREFIX)/lib/pkgconfig
 ALL_CPPFLAGS = -I. -D_GNU_SOURCE -DSH_EMBREE=$(EMBREE_VERSION) $(if $(USBREDIR),-DHAVE_USBREDIR) -MMD -MP $(CPPFLAGS)
@@ -255,7 +256,7 @@ test-programs: all $(BUILD)/bench $(TESTS) $(FIGURES)
 
 install: all
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib $(DESTDIR)$(PREFIX)/include $(DESTDIR)$(HEADS_DIR) \
-		$(DESTDIR)$(UDEV_DIR) $(DESTDIR)$(PC_DIR) $(DESTDIR)$(PREFIX)/share/scanhead/python
+		$(DESTDIR)$(SCENES_DIR) $(DESTDIR)$(UDEV_DIR) $(DESTDIR)$(PC_DIR) $(DESTDIR)$(PREFIX)/share/scanhead/python
 	install $(BUILD)/scanhead $(DESTDIR)$(PREFIX)/bin/
 	install -m 644 $(BUILD)/libscanhead.a $(DESTDIR)$(PREFIX)/lib/
 	install $(BUILD)/libscanhead.so $(DESTDIR)$(PREFIX)/lib/libscanhead.so.1
@@ -263,6 +264,7 @@ install: all
 	install -m 644 drivers/host/scanhead.h $(DESTDIR)$(PREFIX)/include/
 	install -m 644 drivers/host/python/scanhead.py $(DESTDIR)$(PREFIX)/share/scanhead/python/
 	install -m 644 config/heads/*.yaml $(DESTDIR)$(HEADS_DIR)/
+	install -m 644 config/scenes/glass_room.obj $(DESTDIR)$(SCENES_DIR)/
 	install -m 644 drivers/host/70-scanhead.rules $(DESTDIR)$(UDEV_DIR)/
 	sed "s|@PREFIX@|$(PREFIX)|; s|@VERSION@|$$(sed -n 's/^#define SCANHEAD_VERSION "\(.*\)"$$/\1/p' \
 		drivers/host/scanhead.h)|" drivers/host/libscanhead.pc.in > $(DESTDIR)$(PC_DIR)/libscanhead.pc

@@ -35,7 +35,12 @@ int sh_stopped(const struct sh_report *report)
     return report != NULL && report->stop != NULL && report->stop(report->ctx);
 }
 
+int sh_fail_stopped(struct sh_err *err)
+{
+    return sh_fail(err, SH_ESTOPPED, "interrupted while loading; nothing ran");
+}
+
 int sh_check_stop(const struct sh_report *report, struct sh_err *err)
 {
-    return sh_stopped(report) ? sh_fail(err, SH_ESTOPPED, "interrupted while loading; nothing ran") : SH_OK;
+    return sh_stopped(report) ? sh_fail_stopped(err) : SH_OK;
 }

@@ -36,8 +36,8 @@ struct sh_report {
     void *ctx;
     void (*warn)(void *ctx, const char *text);                      /* one line, without a newline */
     void (*progress)(void *ctx, const char *what, double fraction); /* 0..1; negative where unknown */
-    /* 1: the work is to end soon, within a tenth of a second. From any thread of the work, and often: it only
-     * looks at a flag. */
+    /* 1: the work is to end, from now on at every call. From any thread of the work, and often: it only looks
+     * at a flag. */
     int (*stop)(void *ctx);
 };
 
@@ -46,7 +46,9 @@ void sh_progress(const struct sh_report *report, const char *what, double fracti
 
 /* Whether the work is to end. report may be NULL. */
 int sh_stopped(const struct sh_report *report);
-/* The same as an error: SH_OK, or SH_ESTOPPED with its line of text. */
+/* SH_ESTOPPED, with its line of text. */
+int sh_fail_stopped(struct sh_err *err);
+/* SH_OK, or sh_fail_stopped where the work is to end. */
 int sh_check_stop(const struct sh_report *report, struct sh_err *err);
 
 #endif

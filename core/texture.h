@@ -28,7 +28,7 @@ struct texture_source {
     const char *file;     /* read where bytes is NULL; names the image in messages */
     const uint8_t *bytes; /* of an image that lies within another file */
     size_t n_bytes;
-    uint32_t raw_width, raw_height; /* bytes are texels of blue, green, red, alpha; 0: they are as in a file */
+    uint32_t raw_width, raw_height; /* bytes are blue, green, red, alpha of texels; 0: as in a file */
     int alpha_only;                 /* an image without alpha need not be decoded */
 };
 

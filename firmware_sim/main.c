@@ -18,8 +18,21 @@ static void print_help(FILE *out)
         app_arguments(*c, arguments, sizeof arguments);
         fprintf(out, "  scanhead %s%-*s %s\n", (*c)->name, 38 - (int)strlen((*c)->name), arguments, (*c)->summary);
     }
-    fprintf(out, "\nEach command has --help; --version says which release this is. `scanhead check --help` lists all configuration keys.\n"
+    fprintf(out, "\nEach command has --help. `scanhead check --help` lists all configuration keys.\n"
+                 "scanhead --version says which release this is.\n"
                  "Exit status: 0 done, 1 failed, 2 wrong usage, configuration or input.\n");
+}
+
+static int fail_unknown(const char *word)
+{
+    enum { N = sizeof COMMANDS / sizeof COMMANDS[0] - 1 };
+    const char *known[N], *meant;
+    for (size_t i = 0; i < N; i++)
+        known[i] = COMMANDS[i]->name;
+    meant = app_nearest(word, known, N);
+    fprintf(stderr, "scanhead: unknown command %s%s%s%s; see scanhead --help\n", word,
+            meant != NULL ? ", did you mean " : "", meant != NULL ? meant : "", meant != NULL ? "?" : "");
+    return APP_USAGE;
 }
 
 static int run(int argc, char **argv)
@@ -38,8 +51,7 @@ static int run(int argc, char **argv)
     }
     for (const struct app_command *const *c = COMMANDS; *c != NULL; c++)
         if (strcmp(argv[1], (*c)->name) == 0) return (*c)->run(argc - 1, argv + 1);
-    fprintf(stderr, "scanhead: unknown command %s; see scanhead --help\n", argv[1]);
-    return APP_USAGE;
+    return fail_unknown(argv[1]);
 }
 
 /* What a command printed may still be in the buffer. A full disk or a closed pipe shows only here. */

@@ -76,6 +76,12 @@ END
 sed -n '/^```c /,/^```$/p' README.md | sed "/^\`\`\`/d" >"$work/client.c"
 check "make install" install_it
 check "the udev rule is where udev looks below a prefix" test -s "$work/root$prefix/lib/udev/rules.d/70-scanhead.rules"
+# A profile and a mesh come with the program.
+example_passes() {
+    "$work/root$prefix/bin/scanhead" check --example >"$work/example.yaml" && grep "file: $work/root" "$work/example.yaml" &&
+        "$work/root$prefix/bin/scanhead" check "$work/example.yaml"
+}
+check "the installed program's example passes its check" example_passes
 check "the README's client, with the archive" compile client-static "$work/root$prefix/lib/libscanhead.a" -lnettle -lusb-1.0 -lm
 check "the README's client, with the shared library" compile client $(config --libs)
 check "and it reads a scan" reads_a_scan

@@ -29,11 +29,11 @@ static bool go_on(void *report, double fraction)
 }
 
 /* What Embree's last error was, since that was asked last. */
-static int check_device(RTCDevice device, const struct sh_report *report, struct sh_err *err)
+static int check_device(RTCDevice device, struct sh_err *err)
 {
     enum RTCError code = rtcGetDeviceError(device);
     if (code == RTC_ERROR_NONE) return SH_OK;
-    if (code == RTC_ERROR_CANCELLED && sh_stopped(report)) return sh_check_stop(report, err);
+    if (code == RTC_ERROR_CANCELLED) return sh_fail_stopped(err);
     return embree_fail(code, "bvh", err);
 }
 
@@ -45,7 +45,7 @@ int bvh_commit(struct bvh *bvh, RTCScene scene, const struct sh_report *report, 
     } ctx = {.in = report};
     rtcSetSceneProgressMonitorFunction(scene, go_on, ctx.out);
     rtcCommitScene(scene);
-    return check_device(bvh->device, report, err);
+    return check_device(bvh->device, err);
 }
 
 static int build(struct bvh *bvh, const struct sh_report *report, struct sh_err *err)

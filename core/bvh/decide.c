@@ -154,7 +154,7 @@ static void note_miss(struct search *s, uint32_t prim, double v[3][3], const dou
         gap = out;
         range = edge_range(a, b, dir);
     }
-    if (range < 0.0) return;
+    if (range <= BVH_AT_ORIGIN_M) return;
     if (s->holes && gap <= 1.0 && s->near_gap <= 1.0 ? range >= s->near_range_m : gap >= s->near_gap) return;
     if (gap <= 1.0 && is_hole(s, prim, v, range)) return;
     s->near_gap = gap;
@@ -173,7 +173,7 @@ static int try_triangle(struct search *s, uint32_t prim)
         return 0;
     }
     double range = held_range(s->ray, prim, v);
-    if (!(range >= 0.0) || is_hole(s, prim, v, range)) return 0;
+    if (!(range > BVH_AT_ORIGIN_M) || is_hole(s, prim, v, range)) return 0;
     double same = 1e-12 * range;
     if (range < s->range_m - same || (range <= s->range_m + same && prim < s->prim)) {
         s->prim = prim;

@@ -67,8 +67,8 @@ static char *in_folder(const struct scene_build *b, struct text_span name)
     return path;
 }
 
-/* Many meshes name the place where an image once was, on another machine. Where there is none, but a file of that
- * name lies beside the mesh, it is that one. */
+/* Many meshes name the place where an image once was, on another machine. Where there is none, but a file
+ * of that name lies beside the mesh, it is that one. */
 static char *beside(const struct scene_build *b, const struct build_image *image)
 {
     const struct text_span name = image->name;

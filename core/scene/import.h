@@ -50,7 +50,7 @@ int import_assimp(struct scene_build *b, struct sh_err *err);
 /* Writes the scene to an empty file. Its arrays are released on the way. */
 int import_result_write(struct scene *scene, int fd, struct sh_err *err);
 
-/* Adds the scene in the file to b, after b's other files. Nothing in it is trusted: SH_EFORMAT says what is
+/* Adds the scene in the file to b, after b's other files. Nothing in it is trusted: SH_EINPUT says what is
  * wrong. What has been read is cut out of the file. */
 int import_result_read(struct scene_build *b, int fd, struct sh_err *err);
 

@@ -190,7 +190,7 @@ static int fail_by_signal(const struct apart *a, int number, struct sh_err *err)
 
 static int judge(struct apart *a, enum end end, struct sh_err *err)
 {
-    if (end == END_STOPPED) return sh_check_stop(a->task.b->report, err);
+    if (end == END_STOPPED) return sh_fail_stopped(err);
     if (end == END_TIME) return fail_by_time(a, err);
     if (end == END_MEMORY) return fail_by_memory(a, err);
     if (WIFSIGNALED(a->status)) return fail_by_signal(a, WTERMSIG(a->status), err);

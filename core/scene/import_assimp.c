@@ -14,6 +14,7 @@
 #include <assimp/config.h>
 #include <assimp/scene.h>
 
+#include "core/infile.h"
 #include "core/scene/ifc_check.h"
 #include "core/scene/import.h"
 #include "core/scene/import_material.h"
@@ -32,7 +33,8 @@ struct import {
     const struct aiScene *in;
     const struct aiMatrix4x4 *level[MAX_DEPTH]; /* of the node and above it, root first; identities left out */
     int n_levels;
-    unsigned uv_set;          /* of the mesh at hand */
+    struct import_uv uv;      /* of the mesh at hand */
+    unsigned n_turned;        /* meshes whose texture is turned */
     double largest;           /* |coordinate| at any level, file units */
     uint64_t n_faces, n_done; /* for the progress */
 };
@@ -98,7 +100,7 @@ static int add_face(struct import *im, const struct aiFace *face, const struct a
     }
     int rc = build_corners(b, face->mNumIndices, err);
     if (rc != SH_OK) return rc;
-    const struct aiVector3D *uv = build_wants_textures(b) ? mesh->mTextureCoords[im->uv_set] : NULL;
+    const struct aiVector3D *uv = build_wants_textures(b) ? mesh->mTextureCoords[im->uv.set] : NULL;
     b->has_uv = uv != NULL;
     for (unsigned i = 0; i < face->mNumIndices; i++) {
         unsigned index = face->mIndices[i];
@@ -107,8 +109,8 @@ static int add_face(struct import *im, const struct aiFace *face, const struct a
                               mesh->mNumVertices);
         b->corner[i] = b->mesh_vertex0 + index;
         if (uv == NULL) continue;
-        b->corner_uv[i][0] = uv[index].x;
-        b->corner_uv[i][1] = uv[index].y;
+        b->corner_uv[i][0] = (float)((double)uv[index].x * im->uv.scale[0] + im->uv.shift[0]);
+        b->corner_uv[i][1] = (float)((double)uv[index].y * im->uv.scale[1] + im->uv.shift[1]);
     }
     return build_polygon(b, face->mNumIndices, label, err);
 }
@@ -124,13 +126,13 @@ static int label_of(struct import *im, const struct aiNode *node, const struct a
     const struct aiString *object = node->mName.length > 0 ? &node->mName : &mesh->mName;
     const struct aiMaterial *material = NULL;
     struct aiString name = {0};
-    im->uv_set = 0;
     if (mesh->mMaterialIndex < im->in->mNumMaterials) material = im->in->mMaterials[mesh->mMaterialIndex];
+    import_uv(material, &im->uv);
+    im->n_turned += im->uv.is_turned && build_wants_textures(im->b);
+    if (im->uv.set >= AI_MAX_NUMBER_OF_TEXTURECOORDS || mesh->mTextureCoords[im->uv.set] == NULL) im->uv.set = 0;
     if (material != NULL) aiGetMaterialString(material, AI_MATKEY_NAME, &name);
     int rc = build_label(im->b, span_of(object), span_of(&name), label, err);
     if (rc != SH_OK || material == NULL) return rc;
-    unsigned uv_set = import_uv_set(material);
-    if (uv_set < AI_MAX_NUMBER_OF_TEXTURECOORDS && mesh->mTextureCoords[uv_set] != NULL) im->uv_set = uv_set;
     return import_material(im->b, im->in, material, &im->b->scene->surface[*label], err);
 }
 
@@ -183,8 +185,9 @@ static int check_ifc(struct scene_build *b, struct sh_err *err)
     char tail[1024] = "";
     size_t len = strlen(b->spec->file);
     if (strcasecmp(b->spec->file + len - 4, ".ifc") != 0) return SH_OK;
-    FILE *f = fopen(b->spec->file, "rb");
-    if (f == NULL) return SH_OK; /* Assimp says why */
+    const char *why;
+    FILE *f = infile_open(b->spec->file, &why);
+    if (f == NULL) return build_fail(b, SH_EINPUT, err, "%s", why);
     if (fseek(f, -(long)(sizeof tail), SEEK_END) != 0) rewind(f);
     size_t got = fread(tail, 1, sizeof tail, f);
     fclose(f);
@@ -228,6 +231,9 @@ int import_assimp(struct scene_build *b, struct sh_err *err)
     if (rc == SH_OK) rc = build_single(b, im.largest, true, err);
     if (rc == SH_OK && log.n > 0)
         sh_warn(b->report, "%s: %u warnings while read, the first: %s", b->name, log.n, log.first);
+    if (rc == SH_OK && im.n_turned > 0)
+        sh_warn(b->report, "%s: the textures of %u meshes are turned: they are read as if they were not", b->name,
+                im.n_turned);
     aiReleaseImport(im.in);
     return rc;
 }

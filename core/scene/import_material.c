@@ -67,10 +67,23 @@ static bool find_diffuse(const struct aiMaterial *material, struct slot *slot)
     return find_slot(material, aiTextureType_DIFFUSE, slot) || find_slot(material, aiTextureType_BASE_COLOR, slot);
 }
 
-unsigned import_uv_set(const struct aiMaterial *material)
+void import_uv(const struct aiMaterial *material, struct import_uv *uv)
 {
     struct slot slot;
-    return find_diffuse(material, &slot) || find_slot(material, aiTextureType_OPACITY, &slot) ? slot.uv_set : 0;
+    struct aiUVTransform lay;
+    enum aiTextureType type = aiTextureType_DIFFUSE;
+    *uv = (struct import_uv){.scale = {1.0, 1.0}};
+    if (material == NULL) return;
+    if (!find_slot(material, type, &slot) && !find_slot(material, type = aiTextureType_BASE_COLOR, &slot) &&
+        !find_slot(material, type = aiTextureType_OPACITY, &slot))
+        return;
+    uv->set = slot.uv_set;
+    if (aiGetMaterialUVTransform(material, AI_MATKEY_UVTRANSFORM(type, 0), &lay) != AI_SUCCESS) return;
+    uv->scale[0] = (double)lay.mScaling.x;
+    uv->scale[1] = (double)lay.mScaling.y;
+    uv->shift[0] = (double)lay.mTranslation.x;
+    uv->shift[1] = (double)lay.mTranslation.y;
+    uv->is_turned = fabs((double)lay.mRotation) > 1e-6;
 }
 
 static enum texture_wrap wrap_of(enum aiTextureMapMode mode)
@@ -99,8 +112,8 @@ static const struct aiTexture *find_within(const struct aiScene *in, const char 
     return *number >= 0 && *number < (long)in->mNumTextures ? in->mTextures[*number] : NULL;
 }
 
-/* An image that lies within is named after the mesh's file, with its number. Height 0: it is packed, and the width
- * counts bytes. */
+/* An image that lies within is named after the mesh's file, with its number. Height 0: it is packed, and
+ * the width counts bytes. */
 static int add_image(struct scene_build *b, const struct aiScene *in, const struct slot *slot, uint16_t *number,
                      struct sh_err *err)
 {

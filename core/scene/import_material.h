@@ -11,7 +11,13 @@ struct aiMaterial;
 int import_material(struct scene_build *b, const struct aiScene *in, const struct aiMaterial *material,
                     struct scene_surface *surface, struct sh_err *err);
 
-/* Which of a mesh's sets of texture coordinates the material's textures use. */
-unsigned import_uv_set(const struct aiMaterial *material);
+/* How the material's textures lie on a mesh: coordinates of a set, times scale, plus shift. */
+struct import_uv {
+    unsigned set;
+    double scale[2], shift[2];
+    bool is_turned; /* and turned, which is not read: Assimp says it in ways that differ by format */
+};
+/* material: NULL for none. */
+void import_uv(const struct aiMaterial *material, struct import_uv *uv);
 
 #endif

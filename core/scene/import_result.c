@@ -109,7 +109,7 @@ struct result {
 
 static int wrong(const struct result *r, const char *what, uint64_t number)
 {
-    return build_fail(r->b, SH_EFORMAT, r->err, "Assimp's result makes no sense: %s %llu", what,
+    return build_fail(r->b, SH_EINPUT, r->err, "what Assimp gave back makes no sense: %s %llu; the file is broken", what,
                       (unsigned long long)number);
 }
 

@@ -1,6 +1,8 @@
 /* The material library of an OBJ file: newmtl; Kd, the diffuse colour; map_Kd, its texture; map_d, what cuts
  * holes. The rest is ignored. */
+#include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "core/scene/build.h"
@@ -34,39 +36,81 @@ static bool read_colour(struct text *t, double rgb[3])
     return true;
 }
 
-/* The options of a map, up to the file's name: of -clamp the value. Others take numbers and words of their own;
- * the name is then the last word. Without options it may have blanks. */
-static struct text_span map_file(struct text_span map, enum texture_wrap wrap[2])
+/* A map: where its image lies, and how. */
+struct map {
+    struct build_image image;
+    double scale[2], shift[2];
+};
+
+static struct text_span next_word(const char **p, const char *end)
 {
-    struct text_span last = map, before = {"", 0};
-    bool options = map.n > 0 && map.p[0] == '-';
-    const char *end = map.p + map.n;
-    wrap[0] = wrap[1] = TEXTURE_REPEAT;
-    for (const char *p = map.p; options && p < end;) {
-        const char *from = p;
-        while (p < end && *p != ' ' && *p != '\t')
-            p++;
-        last = (struct text_span){from, (size_t)(p - from)};
-        if (text_is(before, "-clamp") && text_is(last, "on")) wrap[0] = wrap[1] = TEXTURE_CLAMP;
-        before = last;
-        while (p < end && (*p == ' ' || *p == '\t'))
-            p++;
-    }
-    return last;
+    const char *from = *p;
+    while (*p < end && **p != ' ' && **p != '\t')
+        (*p)++;
+    struct text_span word = {from, (size_t)(*p - from)};
+    while (*p < end && (**p == ' ' || **p == '\t'))
+        (*p)++;
+    return word;
 }
 
-/* map_Kd or map_d [options] FILE */
-static int set_texture(struct scene_build *b, uint32_t first, struct text_span material, struct text_span map,
+static bool is_number(struct text_span word, double *value)
+{
+    char text[32], *end;
+    if (word.n == 0 || word.n >= sizeof text) return false;
+    memcpy(text, word.p, word.n);
+    text[word.n] = '\0';
+    *value = strtod(text, &end);
+    return *end == '\0' && isfinite(*value);
+}
+
+/* Options before the file's name: -clamp on, -s u v w, -o u v w. Others take numbers and words of their
+ * own; the name is then the last word. Without options it may have blanks. */
+static void read_map(struct text_span text, struct map *map)
+{
+    struct text_span option = {"", 0};
+    const char *p = text.p, *end = text.p + text.n;
+    double value;
+    *map = (struct map){.image.name = text, .scale = {1.0, 1.0}};
+    if (text.n == 0 || text.p[0] != '-') return;
+    for (int n = 0; p < end;) {
+        struct text_span word = map->image.name = next_word(&p, end);
+        if (word.p[0] == '-' && !is_number(word, &value)) {
+            option = word;
+            n = 0;
+            continue;
+        }
+        if (text_is(option, "-clamp") && text_is(word, "on")) map->image.wrap[0] = map->image.wrap[1] = TEXTURE_CLAMP;
+        if (n < 2 && text_is(option, "-s") && is_number(word, &value)) map->scale[n] = value;
+        if (n < 2 && text_is(option, "-o") && is_number(word, &value)) map->shift[n] = value;
+        n++;
+    }
+}
+
+/* How an image lies on the triangles of a surface: their coordinates on it, from those of the file. */
+static void move_uv(struct scene_build *b, uint32_t label, const struct map *map)
+{
+    struct scene *s = b->scene;
+    if (s->uv == NULL || (map->scale[0] == 1.0 && map->scale[1] == 1.0 && map->shift[0] == 0.0 && map->shift[1] == 0.0))
+        return;
+    for (uint32_t i = b->triangle0; i < s->n_triangles; i++)
+        for (int k = 0; k < 6 && s->label[i] == label; k++)
+            s->uv[i][k / 2][k % 2] = (float)((double)s->uv[i][k / 2][k % 2] * map->scale[k % 2] + map->shift[k % 2]);
+}
+
+/* map_Kd or map_d. Of a surface with both, the first one says how they lie. */
+static int set_texture(struct scene_build *b, uint32_t first, struct text_span material, struct text_span text,
                        bool is_opacity, struct sh_err *err)
 {
     struct scene *scene = b->scene;
-    struct build_image image = {0};
+    struct map map;
     int rc = SH_OK;
-    image.name = map_file(map, image.wrap);
-    for (uint32_t i = first; i < scene->n_surfaces && image.name.n > 0 && rc == SH_OK; i++) {
+    read_map(text, &map);
+    for (uint32_t i = first; i < scene->n_surfaces && map.image.name.n > 0 && rc == SH_OK; i++) {
         struct scene_surface *s = &scene->surface[i];
         uint16_t *number = is_opacity ? &s->opacity : &s->texture;
-        if (*number == 0 && has_material(s, material)) rc = build_texture(b, &image, number, err);
+        if (*number != 0 || !has_material(s, material)) continue;
+        if (s->opacity == 0 && s->texture == 0) move_uv(b, i, &map);
+        rc = build_texture(b, &map.image, number, err);
     }
     return rc;
 }

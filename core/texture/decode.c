@@ -108,8 +108,8 @@ static int has_transparent_colour(const uint8_t *bytes, size_t n)
     return bytes[0] == 0x89 && memmem(bytes, data != NULL ? (size_t)(data - bytes) : n, "tRNS", 4) != NULL;
 }
 
-/* stb_image fills in what a TGA or BMP lacks, in silence. Both say the bits of a texel; packed ones are as long as
- * they are. */
+/* stb_image fills in what a TGA or BMP lacks, in silence. Both say the bits of a texel; packed ones are as
+ * long as they are. */
 static int is_cut_off(const uint8_t *bytes, size_t n, uint64_t texels)
 {
     if (n < 31 || bytes[0] == 0x89 || (bytes[0] == 0xff && bytes[1] == 0xd8)) return 0;
@@ -118,8 +118,9 @@ static int is_cut_off(const uint8_t *bytes, size_t n, uint64_t texels)
     return !is_packed && first + texels * bytes[is_bmp ? 28 : 16] / 8 > n;
 }
 
-/* A table of a JPEG's Huffman codes that says more than 256 of them: stb_image 2.27 writes them all, past the end of
- * its array. Every place that looks like such a table is asked, since a decoder may get to any of them. */
+/* A table of a JPEG's Huffman codes that says more than 256 of them: stb_image 2.27 writes them all, past
+ * the end of its array. Every place that looks like such a table is asked, since a decoder may get to any
+ * of them. */
 static int has_long_table(const uint8_t *bytes, size_t n)
 {
     const uint8_t *end = bytes + n, *marker = bytes;

@@ -51,7 +51,7 @@ enum scanhead_error {
     SCANHEAD_ECLOSED = -6,  /* the head is gone, or the file is at its end */
     SCANHEAD_EFORMAT = -7,  /* not this protocol */
     SCANHEAD_ESTATE = -8,   /* not possible now, for instance points before descriptor and anchor have come */
-    SCANHEAD_ELOST = -9,    /* the USB head was unplugged, or isn't there */
+    SCANHEAD_ELOST = -9,    /* the head was unplugged, or isn't there */
     SCANHEAD_ERESET = -10,  /* the USB bus was reset: the head is there, the session is over */
 };
 

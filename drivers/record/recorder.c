@@ -64,9 +64,8 @@ void recorder_report(const struct recorder *rec, uint64_t n, const char *what)
 
 int recorder_check_stop(const struct recorder *rec, struct sh_err *err)
 {
-    const struct recorder_options *o = &rec->options;
-    if (o->stop == NULL || !o->stop(o->stop_ctx)) return SH_OK;
-    return sh_fail(err, SH_EIO, "%s: interrupted while it was completed; it is not written", rec->file.path);
+    if (!sh_stopped(rec->options.report)) return SH_OK;
+    return sh_fail(err, SH_ESTOPPED, "%s: interrupted while it was completed; it is not written", rec->file.path);
 }
 
 int recorder_fail_huge(const struct recorder *rec, const double p[3], struct sh_err *err)

@@ -19,11 +19,9 @@ struct recorder_options {
     enum colour_kind colour; /* of .ply and .las */
     int scalar_names;        /* PLY's columns besides coordinates and colour are called scalar_NAME */
     int las_minor;           /* LAS 1.2 or 1.4: 2 or 4; 0: 4 */
-    /* Is given, at the end, what the format had no room for. May be NULL; must live until close. */
+    /* Is given, at the end, what the format had no room for. Its stop gives up a file that is being completed, which may
+     * take long. May be NULL; must live until close. */
     const struct sh_report *report;
-    /* Asked while a file is completed, which may take long: non-zero gives the file up. NULL: never. */
-    int (*stop)(void *ctx);
-    void *stop_ctx;
 };
 
 struct recorder {
@@ -64,7 +62,7 @@ int recorder_close(struct recorder *rec, int keep, struct sh_err *err);
 
 /* For formats: reports "PATH: n what", unless n is 0. */
 void recorder_report(const struct recorder *rec, uint64_t n, const char *what);
-/* For formats, in work of more than a tenth of a second: SH_EIO once the caller wants no more. */
+/* For formats, in work of more than a tenth of a second: SH_ESTOPPED once the caller wants no more. */
 int recorder_check_stop(const struct recorder *rec, struct sh_err *err);
 /* For formats: SH_EFORMAT, for a coordinate that is too long to be written as text. */
 int recorder_fail_huge(const struct recorder *rec, const double p[3], struct sh_err *err);

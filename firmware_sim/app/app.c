@@ -2,6 +2,7 @@
 
 #include <errno.h>
 #include <math.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -13,10 +14,26 @@
 
 static volatile sig_atomic_t interrupted;
 
+/* Signals that come together are one wish to end: `timeout` sends two, one to the process and one to its
+ * group. From the third on, or a second after the first, they mean now. */
+enum { SIGNALS_TOGETHER = 2 };
+static const int64_t TOGETHER_NS = 1000000000;
+
 static void on_signal(int number)
 {
-    (void)number;
+    static _Atomic int64_t first_ns; /* lock-free, as a handler needs it */
+    static atomic_int n;
+    const int saved = errno;
+    int64_t since_ns = 0;
+    const int64_t now_ns = clock_now_ns();
+    if (!atomic_compare_exchange_strong(&first_ns, &since_ns, now_ns) && now_ns - since_ns > TOGETHER_NS)
+        atomic_store(&n, SIGNALS_TOGETHER);
     interrupted = 1;
+    if (atomic_fetch_add(&n, 1) >= SIGNALS_TOGETHER) {
+        signal(number, SIG_DFL);
+        raise(number); /* comes when this function returns */
+    }
+    errno = saved;
 }
 
 int app_interrupted(void)
@@ -28,8 +45,7 @@ void app_catch_signals(void)
 {
     struct sigaction action;
     memset(&action, 0, sizeof action);
-    action.sa_handler = on_signal;
-    action.sa_flags = (int)SA_RESETHAND; /* no SA_RESTART: waits end at once */
+    action.sa_handler = on_signal; /* no SA_RESTART: waits end at once */
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
     signal(SIGPIPE, SIG_IGN);
@@ -42,14 +58,31 @@ int app_fail(const struct sh_err *err)
     return err->code == SH_EINPUT ? APP_USAGE : APP_FAILED;
 }
 
+/* Every fault in its line. */
+static int fail_config(const struct config_faults *faults)
+{
+    int status = APP_USAGE;
+    for (uint32_t i = 0; i < faults->n && i < CONFIG_MAX_FAULTS; i++)
+        status = app_fail(&faults->fault[i]);
+    if (faults->n > CONFIG_MAX_FAULTS) fprintf(stderr, "scanhead: and %u more\n", faults->n - CONFIG_MAX_FAULTS);
+    return status;
+}
+
 int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, void *ctx, struct sh_err *err),
                     void *ctx)
 {
     struct sh_err err = {0};
+    struct config_faults faults;
     struct config *cfg = calloc(1, sizeof *cfg);
-    int rc = cfg != NULL ? config_load(in->operand[0], in->sets.set, in->sets.n, cfg, &err)
-                         : sh_fail(&err, SH_ENOMEM, "no memory");
-    if (rc == SH_OK) rc = work(cfg, ctx, &err);
+    if (cfg == NULL) {
+        sh_fail(&err, SH_ENOMEM, "no memory");
+        return app_fail(&err);
+    }
+    if (config_load_all(in->operand[0], in->sets.set, in->sets.n, cfg, &faults) != SH_OK) {
+        free(cfg);
+        return fail_config(&faults);
+    }
+    const int rc = work(cfg, ctx, &err);
     free(cfg);
     return rc == SH_OK ? APP_OK : app_fail(&err);
 }

@@ -19,7 +19,8 @@ struct record {
     int crs_given, quiet;
     long station; /* 0: as the head is set; APP_WORD: all */
     double wait_s;
-    int interrupted; /* before the files were completed, which an interrupted recording does, too */
+    struct sh_report notes; /* of the recorders */
+    int interrupted;        /* before the files were completed, which an interrupted recording does, too */
     struct recording_options recording;
 };
 
@@ -53,8 +54,6 @@ static void print_note(void *ctx, const char *text)
     fprintf(stderr, "scanhead: %s\n", text);
 }
 
-static const struct sh_report NOTES = {.warn = print_note};
-
 /* Follows the scans. Files are closed and statistics written also after some failures; the first failure is
  * returned. */
 static int follow(struct record *r, struct scanhead *sh, struct recording_result *result, struct sh_err *err)
@@ -87,8 +86,8 @@ static int record(struct record *r, struct scanhead *sh, struct sh_err *err)
 {
     struct recording_result result = {0};
     if (r->stats != NULL) scanhead_hash_start(sh);
-    r->files.recorder.stop = gives_up;
-    r->files.recorder.stop_ctx = r;
+    r->notes = (struct sh_report){.ctx = r, .warn = print_note, .stop = gives_up};
+    r->files.recorder.report = &r->notes;
     int rc = record_files_open(&r->files, err);
     if (rc != SH_OK) {
         record_files_close(&r->files, 0, NULL);
@@ -254,7 +253,7 @@ static int take_las_version(void *values, const char *text)
 static int run(int argc, char **argv)
 {
     struct sh_err err = {0};
-    struct record r = {.recording = {.frames = -1}, .files = {.recorder = {.report = &NOTES}}};
+    struct record r = {.recording = {.frames = -1}};
     int status = app_parse(&app_record, argc, argv, &r.in, &r);
     if (status != APP_GO_ON) return status;
     if (r.files.n == 0 && r.stats == NULL) return app_usage(&app_record, "-o FILE is needed");
@@ -343,7 +342,10 @@ static const char HELP_NOTES[] =
     "  Frames or pulses were lost on the way.\n"
     "  The head was away within a scan.\n"
     "\n"
-    "FILE keeps what came.\n";
+    "FILE keeps what came.\n"
+    "\n"
+    "Ctrl-C, or SIGTERM, ends a recording in good order. A second signal within a second counts as the same one;\n"
+    "a third, or one that comes later, ends it at once.\n";
 
 const struct app_command app_record = {
     .name = "record",

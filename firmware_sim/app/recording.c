@@ -140,8 +140,8 @@ static int is_interrupted(struct recording *r)
     return r->interrupted;
 }
 
-/* The head was unplugged, or its bus reset: waits for it. Where it scans no more when it is back, the scan ended meanwhile.
- * Where it still scans, the rest of the scan will come. */
+/* The head was unplugged, or its bus reset: waits for it. Where it scans no more when it is back, the scan ended
+ * meanwhile. Where it still scans, the rest of the scan will come. */
 static int replug(struct recording *r, int reset, struct sh_err *err)
 {
     const int64_t end_ns = clock_now_ns() + (int64_t)(1e9 * r->o->replug_s);

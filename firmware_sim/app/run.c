@@ -231,10 +231,15 @@ static const struct app_option OPTIONS[] = {
 };
 /* clang-format on */
 
+static const char NOTES[] =
+    "Ctrl-C, or SIGTERM, ends the head in good order. A second signal within a second counts as the same one; a\n"
+    "third, or one that comes later, ends it at once.\n";
+
 const struct app_command app_run = {
     .name = "run",
     .operand = {"CONFIG"},
     .summary = "serve the head on its links until stopped",
     .options = OPTIONS,
+    .notes = NOTES,
     .run = run,
 };

@@ -71,7 +71,8 @@ static int open_replay(struct device *device, struct sh_err *err)
 
 static int open_journals(struct device *device, struct sh_err *err)
 {
-    int rc = device->options.replay != NULL ? open_replay(device, err) : SH_OK;
+    int rc = journal_check_paths(device->options.journal, device->options.replay, err);
+    if (rc == SH_OK && device->options.replay != NULL) rc = open_replay(device, err);
     if (rc != SH_OK || device->options.journal == NULL) return rc;
     device->journal.out = journal_open(device->options.journal, err);
     if (device->journal.out == NULL) return err->code;

@@ -40,16 +40,20 @@ int journal_close(struct journal *journal, struct sh_err *err);
 struct journal_entry {
     uint64_t tick;
     int64_t t_ns;
-    uint32_t session;
+    uint32_t session, line_no; /* line of the file, from 1 */
     char line[COMMAND_MAX_LINE + 1];
 };
 
 /* 1: no command, but the end of the run. */
 int journal_is_end(const struct journal_entry *entry);
 
-/* Reads a whole file, sorted by tick; commands of one tick stay in the file's order. Errors name file:line; a
- * last line without its end is one, since its command may be cut. On failure *entries is NULL. The caller
- * frees it. */
+/* Fails when a journal to write is the one to replay, by whatever path or link: opening it would empty it.
+ * Either may be NULL. */
+int journal_check_paths(const char *path, const char *replay, struct sh_err *err);
+
+/* Reads a whole file, sorted by tick; commands of one tick stay in the file's order. Errors name file:line;
+ * a last line without its end is one, since its command may be cut. Lines have up to 1,023 bytes, a journal
+ * up to 10,000,000 commands. On failure *entries is NULL. The caller frees it. */
 int journal_read(const char *path, struct journal_entry **entries, size_t *n, struct sh_err *err);
 
 #endif

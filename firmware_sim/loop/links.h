@@ -17,11 +17,12 @@ struct link_place {
     int nmea;       /* speaks for the GNSS receiver, not for the head */
 };
 
-/* What the readers of a link got and lost. PROTOCOL.md defines the words (What the counts mean). */
+/* What the readers of a link got, and what was left out for them. PROTOCOL.md defines the words (What the counts
+ * mean). */
 struct link_counts {
-    uint64_t pulses;      /* in frames that were written out to the link as a whole */
-    uint64_t lost_pulses; /* in frames that were left out */
-    uint64_t lost_frames; /* left out: frames of the head, sentences of its GNSS receiver */
+    uint64_t received_pulses; /* in frames that were written out to the link as a whole */
+    uint64_t left_out_pulses;
+    uint64_t left_out_frames; /* of the head, or sentences of its GNSS receiver */
 };
 
 struct links {

@@ -103,9 +103,9 @@ void loop_put_links(const struct loop *loop, struct json *json)
         pump_get_counts(loop->links.pump[i], &counts);
         json_open_object(json, NULL);
         json_string(json, "endpoint", place.endpoint);
-        json_uint(json, "pulses", counts.pulses);
-        json_uint(json, "lost_pulses", counts.lost_pulses);
-        json_uint(json, "lost_frames", counts.lost_frames);
+        json_uint(json, "received_pulses", counts.received_pulses);
+        json_uint(json, "left_out_pulses", counts.left_out_pulses);
+        json_uint(json, "left_out_frames", counts.left_out_frames);
         json_close_object(json);
     }
     json_close_array(json);

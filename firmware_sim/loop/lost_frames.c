@@ -8,8 +8,8 @@
 
 static void count_lost(struct pump *pump, uint32_t n, uint64_t pulses)
 {
-    pump->counts.lost_frames += n;
-    pump->counts.lost_pulses += pulses;
+    pump->counts.left_out_frames += n;
+    pump->counts.left_out_pulses += pulses;
     atomic_fetch_add(&pump->stream->counters->reader_lost_frames, n);
     atomic_fetch_add(&pump->stream->counters->reader_lost_pulses, pulses);
 }
@@ -50,7 +50,7 @@ void session_check_lost(struct pump *pump, struct session *s, const struct ring_
     s->lost.have_seq |= tick->n_frames != 0;
     s->lost.next_seq = tick->first_seq + tick->n_frames;
     s->lost.next_pulse = tick->pulses_before + tick->n_cast;
-    pump->counts.pulses += tick->n_cast;
+    pump->counts.received_pulses += tick->n_cast;
 }
 
 /* Frames of the stream, and pulses in them, that lie in the session's buffer and were not written as a whole.
@@ -83,7 +83,7 @@ void session_gone(struct pump *pump, struct session *s)
     uint64_t pulses;
     if (pump->nmea) return;
     count_unwritten(s, &pulses);
-    pump->counts.pulses -= pulses;
+    pump->counts.received_pulses -= pulses;
 }
 
 void session_leave(struct pump *pump, struct session *s)
@@ -97,7 +97,7 @@ void session_leave(struct pump *pump, struct session *s)
         frames = count_unwritten(s, &unwritten) + stream->seq - s->lost.next_seq;
         pulses = unwritten + atomic_load(&stream->counters->pulses) - s->lost.next_pulse;
     }
-    pump->counts.pulses -= unwritten;
+    pump->counts.received_pulses -= unwritten;
     if (atomic_load(&stream->over)) count_lost(pump, frames, pulses);
     stream_set_reader(stream, s->reader, s->cursor, 0);
 }

@@ -164,6 +164,15 @@ static int try_beams(struct site *site, const struct beam_choice *choice, struct
     return rc;
 }
 
+/* The tolerance is an RMS over all echoes; few are at an end of a plane. */
+static void say_end_error(const struct plan_methods *methods, struct plan_row *row)
+{
+    const size_t used = strlen(row->why);
+    if (methods->beam != BEAM_RINGS) return;
+    snprintf(row->why + used, sizeof row->why - used, "; at a plane's end up to %.2g w tan i (beam radius, incidence)",
+             beam_end_error(methods->rings));
+}
+
 static int choose_beam(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     struct plan_option option[FOOTPRINT_OPTIONS];
@@ -175,6 +184,7 @@ static int choose_beam(struct site *site, const struct sh_report *report, struct
     uint32_t chosen = plan_choose(&ask, &site->plan.beam);
     site->plan.methods.beam = choice[chosen].mode;
     site->plan.methods.rings = choice[chosen].rings;
+    say_end_error(&site->plan.methods, &site->plan.beam);
     return SH_OK;
 }
 
@@ -200,6 +210,7 @@ static int force_beam(struct site *site, const struct sh_report *report, struct 
     site->plan.methods.beam = cfg->beam.mode;
     site->plan.methods.rings = cfg->beam.rings;
     plan_choose(&(struct plan_choice){"beam", &option, 1, 0, "beam.mode", cfg->plan}, &site->plan.beam);
+    say_end_error(&site->plan.methods, &site->plan.beam);
     return SH_OK;
 }
 

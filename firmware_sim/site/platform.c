@@ -65,7 +65,7 @@ static int load_knots(struct site *site, const struct sh_report *report, struct 
     site->n_knots = path.n;
     site->knot_error_m = path.error_m;
     trajectory_free(part.trajectory);
-    if (rc == SH_ESTOPPED) return sh_check_stop(report, err);
+    if (rc == SH_ESTOPPED) return sh_fail_stopped(err);
     if (rc != SH_OK)
         return sh_fail(err, rc, "%s: platform.%s: %.300s", site->cfg->file, p->file[0] != '\0' ? "file" : "waypoints",
                        why.text);

@@ -42,8 +42,9 @@ static void write_board(const char *name, int cut)
 
 static const char MATERIALS[] = "newmtl board\nmap_Kd board.png\nnewmtl full\nmap_Kd full.png\nnewmtl wall\n"
                                 "newmtl clamped\nmap_Kd -clamp on board.png\nnewmtl mapped\nmap_Kd full.png\n"
-                                "map_d board.png\nnewmtl gone\nmap_Kd none.png\nnewmtl moved\n"
-                                "map_Kd C:\\users\\me\\board.png\n";
+                                "map_d board.png\nnewmtl gone\nmap_Kd none.png\n"
+                                "newmtl scaled\nmap_Kd -s 2 0.5 1 -bm 1 -o 0.375 -0 0 board.png\n"
+                                "newmtl moved\nmap_Kd C:\\users\\me\\board.png\n";
 
 static int make_files(void **state)
 {
@@ -157,8 +158,8 @@ struct layer {
     int cut, label;
 };
 
-/* Texel borders and edges nearer than this to a ray are left alone: coordinates of textures are floats, good to
- * 6e-8 of 1 + shift, in squares 8 times that. */
+/* Texel borders and edges nearer than this to a ray are left alone: coordinates of textures are floats,
+ * good to 6e-8 of 1 + shift, in squares 8 times that. */
 static const double NEAR = 4e-6;
 
 /* 1: ray i meets the layer; 0: it does not; -1: too near to a border. */
@@ -218,7 +219,8 @@ static void half_of_a_board_is_seen_through(void **state)
     scene_free(scene);
 }
 
-/* A micrometre apart, which glass would step over; each shifted by a part of a square, so that some rays pass all. */
+/* A micrometre apart, which glass would step over; each shifted by a part of a square, so that some rays
+ * pass all. */
 static void a_stack_of_any_number_is_seen_through(void **state)
 {
     (void)state;
@@ -272,8 +274,8 @@ static void what_lies_in_the_same_plane_stops_the_ray(void **state)
     scene_free(scene);
 }
 
-/* Cards stand in front of a floor that is seen at a small angle: behind a hole the float distance of the floor may
- * be less than the card's. */
+/* Cards stand in front of a floor that is seen at a small angle: behind a hole the float distance of the
+ * floor may be less than the card's. */
 static void nothing_is_lost_behind_a_card_above_the_floor(void **state)
 {
     (void)state;
@@ -339,6 +341,26 @@ static void wrap_modes_and_opacity_maps_of_obj_count(void **state)
 }
 
 /* Where it was on the machine that the mesh is from. */
+/* Twice the image a side, shifted by three eighths: as the board with such coordinates. */
+static void scale_and_offset_of_obj_count(void **state)
+{
+    (void)state;
+    begin_obj();
+    quad("scaled", 10, 2, 0);
+    quad("wall", 20, 9, 0);
+    struct scene *scene = end_obj(0, 1);
+    assert_int_equal(n_warnings, 0);
+    aim(0.19, 0.0);
+    cast_all(scene, 0.0, 0, 0);
+    for (uint32_t i = 0; i < rays.n; i++) {
+        double x = 10.0 * rays.x[i] / rays.y[i], z = 10.0 * rays.z[i] / rays.y[i];
+        double u = SQUARES * (2.0 * (x + 2.0) / 4.0 + 0.375), v = SQUARES * 0.5 * (z + 2.0) / 4.0;
+        if (fabs(v - round(v)) < NEAR || fabs(u - round(u)) < NEAR || fabs(x) > 2.0 || fabs(z) > 2.0) continue;
+        assert_int_equal(rays.label[i], is_solid((int)u, (int)v) ? 0 : 1);
+    }
+    scene_free(scene);
+}
+
 static void an_image_beside_the_mesh_is_found(void **state)
 {
     (void)state;
@@ -397,6 +419,7 @@ int main(void)
                                        cmocka_unit_test(what_lies_in_the_same_plane_stops_the_ray),
                                        cmocka_unit_test(nothing_is_lost_behind_a_card_above_the_floor),
                                        cmocka_unit_test(wrap_modes_and_opacity_maps_of_obj_count),
+                                       cmocka_unit_test(scale_and_offset_of_obj_count),
                                        cmocka_unit_test(an_image_beside_the_mesh_is_found),
                                        cmocka_unit_test(a_scene_without_holes_has_nothing_of_it),
                                        cmocka_unit_test(the_floor_is_looked_for_through_holes)};

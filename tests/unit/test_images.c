@@ -152,8 +152,9 @@ static void each_format_has_the_same_picture(void **state)
     check_file(write_file("e.tga", bytes, write_tga(bytes, 3, 0)), 0, 0);
     check_file(write_file("f.tga", bytes, write_tga(bytes, 4, 1)), 1, 0);
     check_file(write_file("g.tga", bytes, write_packed_tga(bytes)), 0, 0);
-    /* Flat blocks have one coefficient a channel, 8 times its mean and a multiple of 2. Luma and chroma are whole
-     * numbers, so off by a half, and an eighth more: 0.7 (1 + 1.772) in blue (JFIF), and one by rounding. */
+    /* Flat blocks have one coefficient a channel, 8 times its mean and a multiple of 2. Luma and chroma
+     * are whole numbers, so off by a half, and an eighth more: 0.7 (1 + 1.772) in blue (JFIF), and one by
+     * rounding. */
     check_file(write_file("h.jpg", JPEG, sizeof JPEG), 0, 3);
 }
 

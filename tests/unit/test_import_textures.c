@@ -1,5 +1,5 @@
-/* Textures as Assimp hands them over: within the file, with wrap modes, a second set of coordinates, and what the
- * format says of alpha. */
+/* Textures as Assimp hands them over: within the file, with wrap modes, a second set of coordinates, and
+ * what the format says of alpha. */
 #include "tests/unit/scene_files.h"
 
 #include <math.h>
@@ -36,7 +36,7 @@ static size_t make_png(uint8_t *png, size_t room)
 }
 
 /* A square of two triangles; its second set of coordinates has the image, the first lies all in one point. */
-static void write_gltf(const char *material)
+static void write_gltf(const char *material, const char *lay)
 {
     static const float p[4][3] = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}}, zero[4][2];
     static const float uv[4][2] = {{0, 1}, {1, 1}, {1, 0}, {0, 0}};
@@ -51,10 +51,11 @@ static void write_gltf(const char *material)
     write_file("m.bin", bin, 124 + n);
     snprintf(
         text, sizeof text,
-        "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0}],"
+        "{\"asset\":{\"version\":\"2.0\"},\"extensionsUsed\":[\"KHR_texture_transform\"],"
+        "\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0}],"
         "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0,\"TEXCOORD_0\":1,\"TEXCOORD_1\":2},"
         "\"indices\":3,\"material\":0}]}],\"materials\":[{\"name\":\"leaf\",%s\"pbrMetallicRoughness\":{"
-        "\"baseColorTexture\":{\"index\":0,\"texCoord\":1}}}],\"textures\":[{\"source\":0,\"sampler\":0}],"
+        "\"baseColorTexture\":{\"index\":0,\"texCoord\":1%s}}}],\"textures\":[{\"source\":0,\"sampler\":0}],"
         "\"samplers\":[{\"wrapS\":33071,\"wrapT\":33648}],\"images\":[{\"bufferView\":4,"
         "\"mimeType\":\"image/png\"}],\"accessors\":["
         "{\"bufferView\":0,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\",\"min\":[-1,-1,0],\"max\":[1,1,0]},"
@@ -65,7 +66,7 @@ static void write_gltf(const char *material)
         "{\"buffer\":0,\"byteOffset\":80,\"byteLength\":32},{\"buffer\":0,\"byteOffset\":112,\"byteLength\":12},"
         "{\"buffer\":0,\"byteOffset\":124,\"byteLength\":%zu}],"
         "\"buffers\":[{\"uri\":\"m.bin\",\"byteLength\":%zu}]}",
-        material, n, 124 + n);
+        material, lay, n, 124 + n);
     write_text("m.gltf", text);
 }
 
@@ -99,7 +100,7 @@ static void check_holes(const struct scene *scene, int below)
 static void gltf_has_it_within(void **state)
 {
     (void)state;
-    write_gltf("\"alphaMode\":\"BLEND\",");
+    write_gltf("\"alphaMode\":\"BLEND\",", "");
     struct scene *scene = load_mesh("m.gltf", 1);
     assert_int_equal(n_warnings, 0);
     assert_int_equal(scene->n_textures, 1);
@@ -108,13 +109,39 @@ static void gltf_has_it_within(void **state)
     assert_int_equal(scene->texture[0].wrap[1], TEXTURE_MIRROR);
     check_holes(scene, 128);
     scene_free(scene);
-    write_gltf("\"alphaMode\":\"MASK\",\"alphaCutoff\":0.25,");
+    write_gltf("\"alphaMode\":\"MASK\",\"alphaCutoff\":0.25,", "");
     scene = load_mesh("m.gltf", 0);
     check_holes(scene, 64);
     scene_free(scene);
-    write_gltf(""); /* opaque is the default: alpha says nothing */
+    write_gltf("", ""); /* opaque is the default: alpha says nothing */
     scene = load_mesh("m.gltf", 0);
     assert_true(scene->cutout == NULL && scene->uv == NULL);
+    scene_free(scene);
+}
+
+/* KHR_texture_transform: a coordinate of the image, from its upper left, is offset + scale * that of the mesh. */
+static void gltf_scales_and_shifts(void **state)
+{
+    (void)state;
+    static const char lay[] = ",\"extensions\":{\"KHR_texture_transform\":{\"offset\":[0.25,0.125],"
+                              "\"scale\":[0.5,0.25]%s}}";
+    char text[256];
+    snprintf(text, sizeof text, lay, "");
+    write_gltf("", text);
+    struct scene *scene = load_mesh("m.gltf", 1);
+    assert_int_equal(n_warnings, 0);
+    for (uint32_t i = 0; i < scene->n_triangles; i++)
+        for (int c = 0; c < 3; c++) {
+            const double *v = scene->vertex_m[scene->triangle[i][c]];
+            double u = 0.25 + 0.5 * (v[0] + 1.0) / 2.0, down = 0.125 + 0.25 * (1.0 - v[1]) / 2.0;
+            assert_true(fabs((double)scene->uv[i][c][0] - u) < 1e-6);
+            assert_true(fabs((double)scene->uv[i][c][1] - (1.0 - down)) < 1e-6);
+        }
+    scene_free(scene);
+    snprintf(text, sizeof text, lay, ",\"rotation\":0.5");
+    write_gltf("", text);
+    scene = load_mesh("m.gltf", 1);
+    assert_non_null(strstr(warnings, "the textures of 1 meshes are turned"));
     scene_free(scene);
 }
 
@@ -167,7 +194,7 @@ static void collada_has_an_opacity_map(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(gltf_has_it_within),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(gltf_has_it_within), cmocka_unit_test(gltf_scales_and_shifts),
                                        cmocka_unit_test(collada_has_an_opacity_map)};
     return cmocka_run_group_tests(tests, make_folder, remove_files);
 }

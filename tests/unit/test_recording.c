@@ -129,6 +129,15 @@ static int take_frame(void *ctx, struct scanhead *sh, const struct scanhead_fram
     return SH_OK;
 }
 
+static double last_fraction;
+
+static void keep_fraction(void *ctx, const char *what, double fraction)
+{
+    (void)ctx;
+    (void)what;
+    last_fraction = fraction;
+}
+
 static void record(const enum deed *script, struct recording_result *result)
 {
     struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
@@ -143,8 +152,16 @@ static void record(const enum deed *script, struct recording_result *result)
     if (scanhead_open(source, &sh, why, sizeof why) != SCANHEAD_OK) fail_msg("%s", why);
     pthread_t thread;
     assert_int_equal(pthread_create(&thread, NULL, play, NULL), 0);
-    const struct recording_options options = {
-        .listen = 1, .frames = -1, .replug_s = 20, .frame = take_frame, .interrupted = is_over};
+    const struct sh_report report = {.progress = keep_fraction};
+    const struct recording_options options = {.listen = 1,
+                                              .frames = -1,
+                                              .replug_s = 20,
+                                              .progress = 1,
+                                              .source_bytes = 1000000,
+                                              .report = &report,
+                                              .frame = take_frame,
+                                              .interrupted = is_over};
+    last_fraction = -1;
     struct sh_err err = {0, ""};
     int rc = recording_run(sh, &options, result, &err);
     scanhead_close(sh);
@@ -176,6 +193,8 @@ static void test_unplugged_after_a_lost_end(void **state)
     record(after, &result);
     assert_int_equal(result.replugs, 1);
     assert_int_equal(result.broken_scans, 0);
+    /* the silence took two seconds, within which came reports: of a source of a million bytes, two frames */
+    assert_true(last_fraction > 0 && last_fraction < 0.01);
 }
 
 static void check_counts(const struct recording_counts *counts, uint64_t pulses)

@@ -7,6 +7,7 @@
                             scene; in the CRS with the formula of PROTOCOL.md
         count FILE          the parser's counters
         samples PAGE OUT    decodes the frames in hex of PAGE; what is said below each is what it holds
+        tables PAGE FILE    decodes FILE's frames by PAGE's tables alone; the client must read the same
         hostile FILE SEED   frames of FILE with wrong contents and good checksums: only ScanheadError comes
 """
 import math
@@ -169,6 +170,22 @@ def hostile(path, seed):
             refused += 1
     assert head.parser.frames == 700
     print(taken, refused)
+    bombs(path)
+
+
+def framed(kind, flags, length, payload):
+    head = struct.pack("<BBBBIIIq", 0xD5, kind, 1, flags, length, 0, scanhead.crc32c(payload), 0)
+    return head + struct.pack("<I", scanhead.crc32c(head)) + payload
+
+
+def bombs(path):
+    """Good headers that promise 64 KiB, small good frames between: if each payload were summed anew this were
+    200 MB, a minute; it must take less than 10 s of processor time."""
+    resource.setrlimit(resource.RLIMIT_CPU, (10, 10))
+    with open(path + ".bombs", "wb") as out:
+        out.write((framed(3, 0, 65536, b"") + framed(200, scanhead.LOCAL, 0, b"")) * 3000)
+    head = scanhead.open(path + ".bombs")
+    assert sum(1 for _ in head.frames()) == 3000 and head.parser.bad_bytes == 3000 * 28
 
 
 def words(value):
@@ -211,6 +228,41 @@ def samples(page, out):
         types.append(frame.type)
     assert head.parser.bad_bytes == 0
     print(*types, head.stream_sha256())
+
+
+CODES = {"u32": "I", "u64": "Q", "i64": "q", "f64": "d", "char": "s"}
+
+
+def tables_of(page):
+    """For each type of frame, the struct format that the first table of its section gives."""
+    found = {}
+    for kind, section in re.findall(r"\n### ([1-9]) [a-z ]+\n(.*?)(?=\n##)", open(page).read(), re.S):
+        form = "<"
+        for line in section[section.index("| ---"):].split("\n")[1:]:
+            row = re.match(r"\| (\d+) \| ([a-z]+\d*)(?:\[(\d+)\])? \|", line)
+            if row is None:
+                break
+            assert struct.calcsize(form) == int(row[1]), f"type {kind}: a gap before offset {row[1]}"
+            form += (row[3] or "") + CODES[row[2]]
+        found[int(kind)] = struct.Struct(form)
+    return found
+
+
+def flat(fields):
+    for value in fields.values():
+        yield from value if isinstance(value, tuple) else (value,)
+
+
+def tables(page, path):
+    forms, seen = tables_of(page), []
+    for frame in scanhead.open(path).frames():
+        if not frame.fields:
+            continue
+        theirs = [v.split(b"\0")[0].decode() if isinstance(v, bytes) else v
+                  for v in forms[frame.type].unpack_from(frame.payload)]
+        assert theirs == list(flat(frame.fields)), (frame.type, theirs, frame.fields)
+        seen.append(frame.type)
+    print(*seen)
 
 
 if __name__ == "__main__":

@@ -154,9 +154,9 @@ static void check_sums(const struct wire *wire, const struct oracle *oracle, uin
     assert_int_equal(stats_uint(wire, "blind_pulses"), fired - cast);
     assert_int_equal(stats_uint(wire, "cast_pulses"), cast);
     assert_int_equal(stats_uint(wire, "pulses") + stats_uint(wire, "lost_pulses"), cast);
-    assert_int_equal(stats_link_uint(wire, "pulses") + stats_link_uint(wire, "lost_pulses"),
+    assert_int_equal(stats_link_uint(wire, "received_pulses") + stats_link_uint(wire, "left_out_pulses"),
                      readers * stats_uint(wire, "pulses"));
-    assert_int_equal(stats_link_uint(wire, "lost_pulses"), stats_uint(wire, "reader_lost_pulses"));
+    assert_int_equal(stats_link_uint(wire, "left_out_pulses"), stats_uint(wire, "reader_lost_pulses"));
 }
 
 static void check_balance(const struct account *a, const struct wire *wire)

@@ -211,14 +211,27 @@ static void test_lines_far_apart(void **state)
     free(err);
 }
 
-/* Waits until the file is written to. */
-static void wait_for_bytes(const struct wire *wire, const char *name)
+static int has_bytes(const struct wire *wire, const char *name)
+{
+    struct stat st = {0};
+    return stat(wire_path(wire, name), &st) == 0 && st.st_size > 0;
+}
+
+static int has_percent(const struct wire *wire, const char *name)
+{
+    char *text = access(wire_path(wire, name), F_OK) == 0 ? wire_read(wire_path(wire, name), NULL) : NULL;
+    int has = text != NULL && strchr(text, '%') != NULL;
+    free(text);
+    return has;
+}
+
+/* Waits until the file is written to, and it is so. */
+static void wait_for(const struct wire *wire, const char *name, int (*is_so)(const struct wire *, const char *))
 {
     _Alignas(struct inotify_event) char buf[4096];
     struct pollfd p = {.fd = inotify_init1(IN_CLOEXEC), .events = POLLIN};
-    struct stat st = {0};
     assert_true(inotify_add_watch(p.fd, wire->dir, IN_MODIFY) >= 0);
-    while (stat(wire_path(wire, name), &st) != 0 || st.st_size == 0) {
+    while (!is_so(wire, name)) {
         assert_int_equal(poll(&p, 1, DEADLINE_MS), 1);
         assert_true(read(p.fd, buf, sizeof buf) > 0);
     }
@@ -235,7 +248,7 @@ static void test_signal_while_completing(void **state)
     snprintf(ptx, sizeof ptx, "%s", wire_path(wire, "a.ptx"));
     const char *const args[] = {"record", stream, "-o", ptx, "--quiet", NULL};
     pid_t pid = wire_spawn(wire, args, "out", "err", -1);
-    wait_for_bytes(wire, "a.ptx.part");
+    wait_for(wire, "a.ptx.part", has_bytes);
     assert_int_equal(kill(pid, SIGTERM), 0);
     assert_int_equal(wire_wait(wire, pid), 1);
     char *err = wire_read(wire_path(wire, "err"), NULL);
@@ -243,6 +256,28 @@ static void test_signal_while_completing(void **state)
     free(err);
     assert_int_equal(access(ptx, F_OK), -1);
     assert_int_equal(access(wire_path(wire, "a.ptx.part"), F_OK), -1);
+}
+
+/* Two stations, of which the first takes long: less than half of it is done, and the share is known. The first report
+ * comes after a second. */
+static void test_percent(void **state)
+{
+    struct wire *wire = *state;
+    char config[352], path[352];
+    unsigned percent;
+    begin(wire, config);
+    snprintf(path, sizeof path, "%s", wire_path(wire, "a.shs"));
+    const char *const args[] = {"record", config,     "-o",     path,    "--station",
+                                "all",    "--frames", "100000", "--set", "stations.1.position_m=[1, 0, 0]",
+                                NULL};
+    wire_write_text(wire, "err", "");
+    pid_t pid = wire_spawn(wire, args, "out", "err", -1);
+    wait_for(wire, "err", has_percent);
+    assert_int_equal(kill(pid, SIGTERM), 0);
+    assert_int_equal(wire_wait(wire, pid), 1);
+    char *err = wire_read(wire_path(wire, "err"), NULL), *at = strstr(err, " M pulses: ");
+    if (at == NULL || sscanf(at, " M pulses: %u %%", &percent) != 1 || percent >= 50) fail_msg("%s", err);
+    free(err);
 }
 
 int main(void)
@@ -253,6 +288,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_degrees, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_crs, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_duration_of_each, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_percent, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_lines_far_apart, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_signal_while_completing, wire_setup, wire_teardown),
     };

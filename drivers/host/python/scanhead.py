@@ -17,6 +17,7 @@ NaN: no value. Errors are exceptions. A Head belongs to one thread at a time.
 What is kept is bounded: one frame of bytes (64 KiB), 64 MiB of frames that came while a reply was awaited,
 8192 poses, 65535 names.
 """
+import array
 import bisect
 import collections
 import hashlib
@@ -122,6 +123,48 @@ def crc32c(data: bytes) -> int:
     return _crc_numpy(data) if np is not None and len(data) >= 512 else _crc_pure(data)
 
 
+def _shift_tables() -> List[List[List[int]]]:
+    """Level k, place i: what byte i of a register becomes when 2^k zero bytes follow; linear."""
+    levels = [[[_crc_table[0][v << 8 * i & 255] ^ v << 8 * i >> 8 for v in range(256)] for i in range(4)]]
+    for _ in range(16):
+        a, b, c, d = levels[-1]
+        levels.append([[a[v & 255] ^ b[v >> 8 & 255] ^ c[v >> 16 & 255] ^ d[v >> 24] for v in column]
+                       for column in levels[-1]])
+    return levels
+
+
+class _RunningCrc:
+    """CRCs of any pieces of a buffer, each byte summed once. For a damaged or hostile stream: there payloads
+    that are wrong may overlap, up to 65536 for a byte."""
+    _shifts = None  # type: Optional[List[List[List[int]]]]
+
+    def __init__(self) -> None:
+        self._registers = array.array("I", [0])  # before each byte of the buffer, and after the last
+        self.until = 0  # where the last wrong payload ends
+
+    def dropped(self, n: int) -> None:
+        """The buffer's first n bytes have gone."""
+        del self._registers[:n]
+        self.until -= n
+        if not self._registers:
+            self._registers.append(0)
+
+    def crc(self, data: bytearray, begin: int, end: int) -> int:
+        table, registers = _crc_table[0], self._registers
+        crc = registers[-1]
+        for byte in data[len(registers) - 1:end]:
+            crc = table[(crc ^ byte) & 255] ^ crc >> 8
+            registers.append(crc)
+        if _RunningCrc._shifts is None:
+            _RunningCrc._shifts = _shift_tables()
+        register = registers[begin] ^ 0xFFFFFFFF
+        for level, (a, b, c, d) in enumerate(_RunningCrc._shifts):
+            if (end - begin) >> level & 1:
+                register = (a[register & 255] ^ b[register >> 8 & 255] ^ c[register >> 16 & 255] ^
+                            d[register >> 24])
+        return register ^ registers[end] ^ 0xFFFFFFFF
+
+
 # ---- payloads of fixed layout: (struct format, names; NAME:N is N numbers)
 
 _LAYOUT = {
@@ -209,11 +252,14 @@ class Parser:
     def __init__(self) -> None:
         self._bytes, self._at = bytearray(), 0
         self._in_step, self._next_seq = True, None  # type: bool, Optional[int]
+        self._running = None  # type: Optional[_RunningCrc]
         self.bytes = self.frames = self.bad_payload = self.bad_bytes = 0
         self.seq_gaps = self.seq_lost = 0  # jumps of the sequence; frames missing by jumps forward
 
     def feed(self, data: bytes) -> None:
         del self._bytes[:self._at]
+        if self._running is not None:
+            self._running.dropped(self._at)
         self._at = 0
         self._bytes += data
         self.bytes += len(data)
@@ -243,19 +289,22 @@ class Parser:
         header = bytes(self._bytes[self._at:self._at + _HEADER_LEN])
         if len(header) < _HEADER_LEN:
             return None, True
-        if _crc_pure(header[:24]) != int.from_bytes(header[24:], "little"):
-            return None, False
-        kind, version, flags, length, seq, crc, t_ns = struct.unpack_from("<xBBBIIIq", header)
-        if length > _MAX_PAYLOAD:
+        kind, version, flags, length, seq, crc, t_ns, header_crc = struct.unpack("<xBBBIIIqI", header)
+        if length > _MAX_PAYLOAD or _crc_pure(header[:24]) != header_crc:
             return None, False
         begin = self._at + _HEADER_LEN
         if len(self._bytes) < begin + length:
             return None, True
         payload = bytes(self._bytes[begin:begin + length])
-        if crc32c(payload) != crc:
+        running = self._running
+        if (crc32c(payload) if running is None else running.crc(self._bytes, begin, begin + length)) != crc:
             self.bad_payload += 1
+            self._running = running or _RunningCrc()
+            self._running.until = max(self._running.until, begin + length)
             return None, False
         self._at, self._in_step = begin + length, True
+        if running is not None and running.until <= self._at:
+            self._running = None
         self.frames += 1
         if not flags & LOCAL:
             self._count(seq)
