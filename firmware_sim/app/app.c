@@ -5,6 +5,7 @@
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <unistd.h>
 
 #include "core/newfile.h"
@@ -123,6 +124,12 @@ void app_warn_left_out(uint64_t crowded, uint64_t unfit)
     if (unfit != 0)
         sh_warn(&app_report_stderr, "%llu echoes left out, too far from the anchor for the stream's integers",
                 (unsigned long long)unfit);
+}
+
+int app_ends_in(const char *path, const char *ending)
+{
+    const size_t n = strlen(path), m = strlen(ending);
+    return n > m && strcasecmp(path + n - m, ending) == 0;
 }
 
 void app_warn_empty(uint64_t pulses, uint64_t with_echo, uint64_t faint)

@@ -38,6 +38,9 @@ void app_catch_signals(void);
 /* Prints a warning for each kind of echoes that the head left out of the stream. */
 void app_warn_left_out(uint64_t crowded, uint64_t unfit);
 
+/* Whether a path ends in that, with something before it; case doesn't count. */
+int app_ends_in(const char *path, const char *ending);
+
 /* Prints a warning where fewer than one pulse in twenty has an echo. */
 void app_warn_empty(uint64_t pulses, uint64_t with_echo, uint64_t faint);
 

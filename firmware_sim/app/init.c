@@ -6,7 +6,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 #include <unistd.h>
 
 #include "core/angle.h"
@@ -33,12 +32,6 @@ static const char *base_of(const char *path)
 {
     const char *slash = strrchr(path, '/');
     return slash != NULL ? slash + 1 : path;
-}
-
-static int ends_in(const char *text, const char *ending)
-{
-    size_t n = strlen(text), m = strlen(ending);
-    return n > m && strcasecmp(text + n - m, ending) == 0;
 }
 
 /* ---- place */
@@ -150,7 +143,7 @@ static void say_result(const struct init_run *run, const struct scene *s, const 
     printf("station   %.4f %.4f %.4f m, %s; %.0f %% of the view meets something\n", p[0], p[1], p[2], where,
            100.0 * at->seen);
     if (at->faces_out) puts("          there is room inside, but its faces point outward: taken as a closed body");
-    printf("written   %s\n", run->output);
+    printf("written   %s; next: scanhead record %s -o scan.ply\n", run->output, run->output);
 }
 
 static int write_config(struct init_run *run, const struct scene *scene, struct sh_err *err)
@@ -192,7 +185,7 @@ static int choose_output(struct init_run *run)
     }
     if (strlen(run->output) > CONFIG_PATH_LEN - 8)
         return app_usage(&app_init, "-o: the path is too long; allowed up to %d bytes", CONFIG_PATH_LEN - 8);
-    if (ends_in(run->output, ".yaml") || ends_in(run->output, ".yml")) return APP_GO_ON;
+    if (app_ends_in(run->output, ".yaml") || app_ends_in(run->output, ".yml")) return APP_GO_ON;
     return app_usage(&app_init, "-o %s: allowed is a name that ends in .yaml or .yml", run->output);
 }
 

@@ -2,7 +2,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <strings.h>
 
 #include "core/map.h"
 #include "core/mat3.h"
@@ -141,19 +140,13 @@ static int set_frame(struct app_sets *sets)
     return status;
 }
 
-static int ends_in_png(const char *path)
-{
-    const size_t len = strlen(path);
-    return len > 4 && strcasecmp(path + len - 4, ".png") == 0;
-}
-
 static int run(int argc, char **argv)
 {
     struct map_run run = {0};
     int status = app_parse(&app_map, argc, argv, &run.in, &run);
     if (status != APP_GO_ON) return status;
     if (run.output == NULL) return app_usage(&app_map, "-o FILE.png is needed");
-    if (!ends_in_png(run.output))
+    if (!app_ends_in(run.output, ".png"))
         return app_usage(&app_map, "-o %s: it would hold a PNG; allowed is a name that ends in .png", run.output);
     status = set_frame(&run.in.sets);
     return status == APP_OK ? app_with_config(&run.in, draw, &run) : status;
