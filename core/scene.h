@@ -108,7 +108,8 @@ struct scene {
 
 /* Loads all meshes into one scene.
  * tolerance_m: the largest error of a vertex that is allowed. A file read in single precision (all
- *   but .obj and .ply) is refused, with the figure, where its largest |coordinate| * scale * 6e-8 exceeds it.
+ *   but .obj and .ply) is refused, with the figure, where 6e-8 of its coordinates, and of the numbers that place
+ *   them, come to more.
  *   An error above 1e-6 m is warned of, also that of a binary .ply with float coordinates.
  * Errors (SH_EINPUT, naming the file): missing or unreadable, not a mesh, no triangles, a coordinate that is
  *   not finite, an index out of range, |coordinate| beyond 1e9 m, too many surfaces or triangles (2^32-1).

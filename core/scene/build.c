@@ -188,10 +188,10 @@ static double two_digits_up(double x)
     return ceil(x / digit * (1.0 - 1e-9)) * digit;
 }
 
-int build_single(struct scene_build *b, double largest, bool refuse, struct sh_err *err)
+int build_single(struct scene_build *b, double largest, double error, bool refuse, struct sh_err *err)
 {
-    const double rounding = 6e-8, most_m = 1.0; /* 2^-24: of the nearest float; of the tolerance */
-    double error_m = largest * b->spec->scale * rounding;
+    const double most_m = 1.0; /* of the tolerance */
+    double error_m = error * b->spec->scale;
     char set[48] = "";
     if (!(error_m > 0.0)) return SH_OK;
     error_m = two_digits_up(error_m);

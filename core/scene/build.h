@@ -57,9 +57,12 @@ int build_corners(struct scene_build *b, size_t n, struct sh_err *err);
 /* Adds the polygon of the n >= 3 corners in corner. */
 int build_polygon(struct scene_build *b, size_t n, uint16_t label, struct sh_err *err);
 
-/* The file's coordinates, up to `largest` in its units, have been rounded to single precision: keeps the
- * error of that, warns of more than a micrometre, and fails where it is more than allowed, if `refuse`. */
-int build_single(struct scene_build *b, double largest, bool refuse, struct sh_err *err);
+#define BUILD_SINGLE_ROUNDING 6e-8 /* 2^-24: of the nearest float */
+
+/* The file's coordinates, up to `largest`, were rounded to single precision, and so are off by up to
+ * `error`; both in its units. Keeps that, warns of more than a micrometre, and fails where it is more than
+ * allowed, if `refuse`. */
+int build_single(struct scene_build *b, double largest, double error, bool refuse, struct sh_err *err);
 
 /* The label of a pair of names; a new pair gets the next number. */
 int build_label(struct scene_build *b, struct text_span object, struct text_span material, uint16_t *label,

@@ -1,8 +1,7 @@
 /* STL, glTF, FBX, Collada and IFC through Assimp's C interface, node tree and all.
  *
  * No post-processing: polygons are cut by our own triangulation, and node transforms are applied in double,
- * one level after the other, so that the largest coordinate on the way is known: that is what single
- * precision has rounded. */
+ * one level after the other, so that what single precision has rounded on the way is known. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -36,6 +35,7 @@ struct import {
     struct import_uv uv;      /* of the mesh at hand */
     unsigned n_turned;        /* meshes whose texture is turned */
     double largest;           /* |coordinate| at any level, file units */
+    double error;             /* of a coordinate once it is placed, file units */
     uint64_t n_faces, n_done; /* for the progress */
 };
 
@@ -73,13 +73,51 @@ static double largest_of(const double v[3], double largest)
     return largest;
 }
 
+/* What rounding to single precision does to one coordinate: those of the vertices, up to `most` in each
+ * direction, and the numbers of a matrix. 0 and 1 are exact. */
+static void add_rounding(const ai_real row[4], const double most[3], const double error[3], double *out_most,
+                         double *out_error)
+{
+    *out_most = fabs((double)row[3]);
+    *out_error = BUILD_SINGLE_ROUNDING * fabs((double)row[3]);
+    for (int k = 0; k < 3; k++) {
+        double factor = fabs((double)row[k]);
+        *out_most += factor * most[k];
+        *out_error += factor * error[k];
+        if (factor != 0.0 && factor != 1.0) *out_error += BUILD_SINGLE_ROUNDING * factor * most[k];
+    }
+}
+
+/* Vertices of a mesh, up to `most` in each direction, through all levels. */
+static void keep_error(struct import *im, const double most_in[3])
+{
+    double most[3], error[3], next_most[3], next_error[3];
+    for (int i = 0; i < 3; i++) {
+        most[i] = most_in[i];
+        error[i] = BUILD_SINGLE_ROUNDING * most[i];
+    }
+    for (int k = im->n_levels - 1; k >= 0; k--) {
+        const struct aiMatrix4x4 *m = im->level[k];
+        const ai_real row[3][4] = {
+            {m->a1, m->a2, m->a3, m->a4}, {m->b1, m->b2, m->b3, m->b4}, {m->c1, m->c2, m->c3, m->c4}};
+        for (int i = 0; i < 3; i++)
+            add_rounding(row[i], most, error, &next_most[i], &next_error[i]);
+        memcpy(most, next_most, sizeof most);
+        memcpy(error, next_error, sizeof error);
+    }
+    im->error = largest_of(error, im->error);
+}
+
 static int add_vertices(struct import *im, const struct aiMesh *mesh, struct sh_err *err)
 {
+    double most[3] = {0.0, 0.0, 0.0};
     im->b->mesh_vertex0 = im->b->scene->n_vertices;
     int rc = build_reserve(im->b, mesh->mNumVertices, mesh->mNumFaces, err);
     for (unsigned i = 0; i < mesh->mNumVertices && rc == SH_OK; i++) {
         const struct aiVector3D *in = &mesh->mVertices[i];
         double v[3] = {(double)in->x, (double)in->y, (double)in->z};
+        for (int k = 0; k < 3; k++)
+            most[k] = fmax(most[k], fabs(v[k]));
         im->largest = largest_of(v, im->largest);
         for (int k = im->n_levels - 1; k >= 0; k--) {
             transform(im->level[k], v);
@@ -87,6 +125,7 @@ static int add_vertices(struct import *im, const struct aiMesh *mesh, struct sh_
         }
         rc = build_vertex(im->b, v, err);
     }
+    keep_error(im, most);
     return rc;
 }
 
@@ -228,7 +267,7 @@ int import_assimp(struct scene_build *b, struct sh_err *err)
     b->scene->says = import_says(im.in, b->spec->file);
     im.n_faces = count_faces(im.in, im.in->mRootNode);
     rc = add_node(&im, im.in->mRootNode, 0, err);
-    if (rc == SH_OK) rc = build_single(b, im.largest, true, err);
+    if (rc == SH_OK) rc = build_single(b, im.largest, im.error, true, err);
     if (rc == SH_OK && log.n > 0)
         sh_warn(b->report, "%s: %u warnings while read, the first: %s", b->name, log.n, log.first);
     if (rc == SH_OK && im.n_turned > 0)

@@ -68,7 +68,8 @@ static int note_rounding(const struct ply *y, struct sh_err *err)
     for (uint32_t i = b->vertex0; i < b->scene->n_vertices; i++)
         for (int k = 0; k < 3; k++)
             largest = fmax(largest, fabs(b->scene->vertex_m[i][k] - b->spec->offset_m[k]));
-    return build_single(y->b, largest / b->spec->scale, false, err);
+    largest /= b->spec->scale;
+    return build_single(y->b, largest, largest * BUILD_SINGLE_ROUNDING, false, err);
 }
 
 static int begin_element(void *ply, struct sh_err *err)

@@ -11,7 +11,7 @@ static const char HALL[] = "solid hall\nfacet normal 0 0 1\nouter loop\nvertex -
 
 static int remove_files(void **state)
 {
-    static const char *const file[] = {"hall.stl", "hall.ply", "run.yaml"};
+    static const char *const file[] = {"hall.stl", "hall.ply", "m.gltf", "run.yaml"};
     char name[160];
     for (size_t i = 0; i < sizeof file / sizeof *file; i++) {
         snprintf(name, sizeof name, "%s/%s", folder, file[i]);
@@ -101,10 +101,33 @@ static void float_columns_of_ply_are_told(void **state)
     check_accepted("hall.ply", "  tolerance_m: 1e-9\n", ""); /* what is done is done: never refused */
 }
 
+/* Corners at 0 and 1, made 100 times larger and then 100 times smaller: in units of 6e-8 the corner is off
+ * by 1, then by 100 and 100 for the factor, then by 2 and 1 for the other factor. That they were at 100 is
+ * no error. */
+static void an_error_is_scaled_as_the_mesh_is(void **state)
+{
+    (void)state;
+    static const char gltf[] =
+        "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":["
+        "{\"scale\":[0.01,0.01,0.01],\"children\":[1]},{\"scale\":[100,100,100],\"mesh\":0}],"
+        "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],"
+        "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}],"
+        "\"bufferViews\":[{\"buffer\":0,\"byteLength\":36}],"
+        "\"buffers\":[{\"byteLength\":36,\"uri\":\"data:application/octet-stream;base64,"
+        "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA\"}]}";
+    struct scene *scene;
+    struct sh_err err;
+    const struct scene_mesh_spec spec = {.file = write_text("m.gltf", gltf), .scale = 1};
+    if (load_spec(&spec, 1e-6, &scene, &err) != SH_OK) fail_msg("%s", err.text);
+    assert_int_equal(n_warnings, 0);
+    assert_true(fabs(scene->error_m - 1.8e-7) < 1e-12);
+    scene_free(scene);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(as_much_as_the_format_holds_is_allowed),
-                                       cmocka_unit_test(a_refusal_names_key_and_figure),
-                                       cmocka_unit_test(float_columns_of_ply_are_told)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(as_much_as_the_format_holds_is_allowed), cmocka_unit_test(a_refusal_names_key_and_figure),
+        cmocka_unit_test(an_error_is_scaled_as_the_mesh_is), cmocka_unit_test(float_columns_of_ply_are_told)};
     return cmocka_run_group_tests(tests, make_folder, remove_files);
 }
