@@ -14,8 +14,10 @@ import math
 import random
 import re
 import resource
+import socket
 import struct
 import sys
+import threading
 
 sys.path.insert(0, sys.argv[1])
 if sys.argv[2] == "plain":
@@ -171,6 +173,9 @@ def hostile(path, seed):
     assert head.parser.frames == 700
     print(taken, refused)
     bombs(path)
+    chatter(framed(200, scanhead.LOCAL, 0, b""))
+    chatter(b"OK\r\n")
+    chatter(b"\x80")
 
 
 def framed(kind, flags, length, payload):
@@ -263,6 +268,30 @@ def tables(page, path):
         assert theirs == list(flat(frame.fields)), (frame.type, theirs, frame.fields)
         seen.append(frame.type)
     print(*seen)
+
+
+def chatter(data):
+    """A head that sends without end and never what is waited for: calls end with their time all the same."""
+    ours, theirs = socket.socketpair()
+
+    def send():
+        try:
+            while True:
+                theirs.sendall(data * 100)
+        except OSError:
+            theirs.close()
+
+    sender = threading.Thread(target=send)
+    sender.start()
+    ours.setblocking(False)
+    head = scanhead.Head(scanhead._Source("pair", ours.fileno(), ours))
+    try:
+        head.query("*IDN?", 0.05) if data[0] == 0xD5 else head.next_frame(0.05)
+        assert False, "something came"
+    except scanhead.Timeout:
+        pass
+    head.close()
+    sender.join()
 
 
 if __name__ == "__main__":

@@ -889,11 +889,13 @@ class Head:
 
     def _next_item(self, deadline_s: Optional[float]) -> Union[Frame, str, None]:
         """A frame or a line; None at the end."""
-        while True:
-            item = self.parser.next(self._ended)
-            if item is not None or self._ended:
-                return item
+        item = self.parser.next(self._ended)
+        while item is None and not self._ended:
             self._fill(deadline_s)
+            item = self.parser.next(self._ended)
+            if item is None:
+                self._check(deadline_s)
+        return item
 
     # -- commands
 
@@ -962,8 +964,16 @@ class Head:
         finally:
             self._stuck = 0 < done < len(data)
 
+    def _check(self, deadline_s: Optional[float]) -> None:
+        """For loops that a head could keep busy with what nobody waits for."""
+        if deadline_s is not None and time.monotonic() > deadline_s:
+            raise Timeout(f"{self._source.name}: what was waited for did not come in time")
+
     def _wait_writable(self, deadline_s: float) -> None:
+        self._check(deadline_s)
         self._fill(deadline_s, write=True)
+        if self._ended:
+            raise Closed(f"{self._source.name}: the head is gone")
         item = self.parser.next()
         while item is not None:
             if isinstance(item, Frame):
@@ -978,6 +988,7 @@ class Head:
             if item is None:
                 raise Closed(f"{self._source.name}: the head is gone")
             self._keep(item)
+            self._check(deadline_s)
 
     def _keep(self, frame: Frame) -> None:
         self._queue.append(frame)
@@ -1009,6 +1020,8 @@ class Head:
                 if self._source.is_file:
                     return None
                 raise Closed(f"{self._source.name}: the head is gone")
+            if not isinstance(frame, Frame):
+                self._check(deadline_s)
         return self._absorb(frame)
 
     def _absorb(self, frame: Frame) -> Frame:
