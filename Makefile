@@ -2,33 +2,53 @@
 # `make demo` and `make test` install what is missing (Debian; sudo when not root), build and run.
 BUILD ?= build
 PREFIX ?= /usr/local
+# For another machine: CROSS_COMPILE=aarch64-linux-gnu-, or a compiler whose name or --target says it. Whatever tool is not
+# given has the same prefix.
 ifeq ($(origin CC),default)
-CC = gcc
+CROSS_COMPILE ?=
+CC = $(CROSS_COMPILE)gcc
+else
+by_target = $(patsubst --target=%,%-,$(filter --target=%,$(CC)))
+by_name = $(foreach w,$(notdir $(CC)),$(if $(findstring -gcc,$(w)),$(firstword $(subst -gcc, ,$(w)))-))
+CROSS_COMPILE ?= $(strip $(by_target) $(by_name))
 endif
 ifeq ($(origin CXX),default)
-CXX = g++
+CXX = $(CROSS_COMPILE)g++
 endif
+ifeq ($(origin AR),default)
+AR = $(CROSS_COMPILE)ar
+endif
+OBJCOPY ?= $(CROSS_COMPILE)objcopy
+PKG_CONFIG ?= $(CROSS_COMPILE)pkg-config
+TARGET = $(eval TARGET := $$(shell $(CC) -dumpmachine))$(TARGET)
 V ?= 0
 Q_0 = @
 Q = $(Q_$(V))
 
 # What a fresh Debian 12 needs. Building and the demo:
 DEPS_BUILD = gcc g++ make pkg-config libc6-dev libembree-dev libassimp-dev libgeographiclib-dev libyaml-dev libpng-dev \
-	nettle-dev libusb-1.0-0-dev libusbredirparser-dev assimp-testmodels
+	libstb-dev nettle-dev libusb-1.0-0-dev libusbredirparser-dev assimp-testmodels
 # and the tests, with the second compiler and its sanitizers, clients and readers of recordings that are not ours:
-DEPS_TEST = $(DEPS_BUILD) libcmocka-dev clang libclang-rt-dev gpsd gpsd-clients cloudcompare proj-bin python3-minimal \
+DEPS_TEST = $(DEPS_BUILD) libcmocka-dev clang libclang-rt-dev gpsd gpsd-clients cloudcompare proj-bin python3-numpy \
 	$(if $(shell command -v npm),,nodejs npm)
 # The guest tests; they are skipped where these can't be had. The kernel (linux-image-amd64) is fetched, not installed.
 DEPS_GUEST = qemu-system-x86 busybox-static cpio kmod xz-utils usbutils usbip
 
 # Without libusbredirparser everything builds but the back end that needs it.
-USBREDIR = $(eval USBREDIR := $$(shell pkg-config --exists libusbredirparser-0.5 && echo libusbredirparser-0.5))$(USBREDIR)
+USBREDIR = $(eval USBREDIR := $$(shell $(PKG_CONFIG) --exists libusbredirparser-0.5 && echo libusbredirparser-0.5))$(USBREDIR)
 PKGS = yaml-0.1 libpng nettle libusb-1.0 $(USBREDIR)
-PKG_CFLAGS = $(eval PKG_CFLAGS := $$(shell pkg-config --cflags $(PKGS)))$(PKG_CFLAGS)
-PKG_LIBS = $(eval PKG_LIBS := $$(shell pkg-config --libs $(PKGS)))$(PKG_LIBS)
+ask_pkg_config = $(shell $(PKG_CONFIG) $(1) $(PKGS))$(if $(filter-out 0,$(.SHELLSTATUS)),$(error $(PKG_CONFIG) does not \
+	find all of $(PKGS): make deps-build, or PKG_CONFIG=... for another machine))
+PKG_CFLAGS = $(eval PKG_CFLAGS := $$(call ask_pkg_config,--cflags))$(PKG_CFLAGS)
+PKG_LIBS = $(eval PKG_LIBS := $$(call ask_pkg_config,--libs))$(PKG_LIBS)
+# Embree: the version of headers and library, decided here alone. EMBREE=4 asks for that one; else 3 where both are.
+has_embree = $(shell echo '\#include <embree$(1)/rtcore.h>' | $(CC) $(CPPFLAGS) -E -xc - >/dev/null 2>&1 && echo $(1))
+find_embree = $(or $(firstword $(foreach v,$(filter 3 4,$(or $(EMBREE),3 4)),$(call has_embree,$(v)))),$(error no \
+	Embree $(or $(EMBREE),3 or 4) for $(CC); allowed 3 and 4: make deps-build, or EMBREE= for the one that is there))
+EMBREE_VERSION = $(eval EMBREE_VERSION := $$(call find_embree))$(EMBREE_VERSION)
 OPT ?= -O3 $(VEC_WIDTH)
 # Whole vectors where there are 512 bits; gcc and clang both know the option on x86 alone.
-VEC_WIDTH = $(if $(filter x86_64,$(shell uname -m)),-mprefer-vector-width=512)
+VEC_WIDTH = $(if $(filter x86_64-%,$(TARGET)),-mprefer-vector-width=512)
 WARN = -Wall -Wextra -Wconversion -Wshadow
 CWARN = $(WARN) -Wstrict-prototypes -Wmissing-prototypes
 # `make test` turns warnings into errors; a user's newer compiler may warn in peace.
@@ -37,13 +57,13 @@ SAN ?=
 # No contraction to FMA: the same numbers on every instruction set. errno and traps of libm are not used.
 FP = -ffp-contract=off -fno-math-errno -fno-trapping-math
 HEADS_DIR = $(PREFIX)/share/scanhead/heads
+SCENES_DIR = $(PREFIX)/share/scanhead/scenes
 UDEV_DIR = $(PREFIX)/lib/udev/rules.d
 PC_DIR = $(PREFIX)/lib/pkgconfig
-ALL_CPPFLAGS = -I. -D_GNU_SOURCE $(if $(USBREDIR),-DHAVE_USBREDIR) -MMD -MP $(CPPFLAGS)
+ALL_CPPFLAGS = -I. -D_GNU_SOURCE -DSH_EMBREE=$(EMBREE_VERSION) $(if $(USBREDIR),-DHAVE_USBREDIR) -MMD -MP $(CPPFLAGS)
 ALL_CFLAGS = -std=c11 $(OPT) -g $(FP) $(CWARN) $(WERROR) -fPIC -pthread $(SAN) $(PKG_CFLAGS) $(CFLAGS)
 ALL_CXXFLAGS = -std=c++17 $(OPT) -g $(FP) $(WARN) $(WERROR) -fPIC -pthread $(SAN) $(CXXFLAGS)
-EMBREE = $(if $(wildcard /usr/include/embree4/rtcore.h),-lembree4,-lembree3)
-LDLIBS = $(EMBREE) -lassimp -lGeographicLib $(PKG_LIBS) -lstdc++ -lm -pthread
+LDLIBS = -lembree$(EMBREE_VERSION) -lassimp -lGeographicLib $(PKG_LIBS) -lstdc++ -lm -pthread
 
 CORE = $(wildcard core/*.c core/*/*.c) core/georef/geographiclib_shim.cpp
 PROTO = $(wildcard drivers/protocol/*.c)
@@ -66,18 +86,28 @@ $(BUILD)/%.cpp.o: %.cpp
 	@mkdir -p $(@D)
 	@echo "  CXX   $<"
 	$(Q)$(CXX) $(ALL_CPPFLAGS) $(ALL_CXXFLAGS) -c $< -o $@
-# Objects that ask for libusbredirparser are built again once it has come or gone.
-$(BUILD)/usbredir: ALWAYS
+# Objects that ask for libusbredirparser or Embree are built again once that has come, gone or changed.
+$(BUILD)/usbredir: CHOICE = $(USBREDIR)
+$(BUILD)/embree: CHOICE = $(EMBREE_VERSION)
+$(BUILD)/usbredir $(BUILD)/embree: ALWAYS
 	@mkdir -p $(@D)
-	@echo '$(USBREDIR)' | cmp -s - $@ || echo '$(USBREDIR)' >$@
+	@echo '$(CHOICE)' | cmp -s - $@ || echo '$(CHOICE)' >$@
 $(filter $(BUILD)/drivers/usb/usbredir%,$(OBJ)): $(BUILD)/usbredir
+$(patsubst %,$(BUILD)/%.o,$(wildcard core/bvh/*.c core/analysis/distance.c tests/*/*.c)): $(BUILD)/embree
 ALWAYS:
 # All modules for the program and the tests, and the client library alone.
 $(BUILD)/modules.a: $(OBJ)
 	@rm -f $@
 	@echo "  AR    $@"
 	$(Q)$(AR) rcs $@ $^
-$(BUILD)/libscanhead.a: $(LIBOBJ)
+# In the archive, too, what is not the library's interface is nobody else's to meet: one object, its other names local.
+$(BUILD)/libscanhead.o: $(LIBOBJ)
+	@echo "  LD    $@"
+	$(Q)$(CC) -r -nostdlib -o $@ $^
+	$(Q)$(OBJCOPY) --wildcard --keep-global-symbol='scanhead_*' $@
+$(BUILD)/libscanhead.a: $(BUILD)/libscanhead.o
+$(BUILD)/client.a: $(LIBOBJ)
+$(BUILD)/libscanhead.a $(BUILD)/client.a:
 	@rm -f $@
 	@echo "  AR    $@"
 	$(Q)$(AR) rcs $@ $^
@@ -117,8 +147,8 @@ $(BUILD)/tests/unit/% $(BUILD)/tests/wire/% $(BUILD)/tests/guest/%: OPT += -O1
 $(BUILD)/tests/%: $(BUILD)/tests/%.c.o $$(call RIGS,tests/$$*) $(BUILD)/common.a $(BUILD)/modules.a
 	@echo "  TEST  $@"
 	$(Q)$(CC) $(SAN) -o $@ $^ -lcmocka $(LDLIBS)
-# What runs in the guest has the client library alone: it starts faster there.
-$(BUILD)/tests/guest/%: $(BUILD)/tests/guest/%.c.o $$(call RIGS,tests/guest/$$*) $(BUILD)/libscanhead.a
+# What runs in the guest has the client library alone, with its inside: it starts faster there.
+$(BUILD)/tests/guest/%: $(BUILD)/tests/guest/%.c.o $$(call RIGS,tests/guest/$$*) $(BUILD)/client.a
 	@echo "  TEST  $@"
 	$(Q)$(CC) $(SAN) -o $@ $^ -lcmocka -lnettle -lusb-1.0 -lm -pthread
 
@@ -233,15 +263,18 @@ test-programs: all $(BUILD)/bench $(TESTS) $(FIGURES)
 
 install: all
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib $(DESTDIR)$(PREFIX)/include $(DESTDIR)$(HEADS_DIR) \
-		$(DESTDIR)$(UDEV_DIR) $(DESTDIR)$(PC_DIR)
+		$(DESTDIR)$(SCENES_DIR) $(DESTDIR)$(UDEV_DIR) $(DESTDIR)$(PC_DIR) $(DESTDIR)$(PREFIX)/share/scanhead/python
 	install $(BUILD)/scanhead $(DESTDIR)$(PREFIX)/bin/
 	install -m 644 $(BUILD)/libscanhead.a $(DESTDIR)$(PREFIX)/lib/
 	install $(BUILD)/libscanhead.so $(DESTDIR)$(PREFIX)/lib/libscanhead.so.1
 	ln -sf libscanhead.so.1 $(DESTDIR)$(PREFIX)/lib/libscanhead.so
 	install -m 644 drivers/host/scanhead.h $(DESTDIR)$(PREFIX)/include/
+	install -m 644 drivers/host/python/scanhead.py $(DESTDIR)$(PREFIX)/share/scanhead/python/
 	install -m 644 config/heads/*.yaml $(DESTDIR)$(HEADS_DIR)/
+	install -m 644 config/scenes/glass_room.obj $(DESTDIR)$(SCENES_DIR)/
 	install -m 644 drivers/host/70-scanhead.rules $(DESTDIR)$(UDEV_DIR)/
-	sed 's|@PREFIX@|$(PREFIX)|' drivers/host/libscanhead.pc.in > $(DESTDIR)$(PC_DIR)/libscanhead.pc
+	sed "s|@PREFIX@|$(PREFIX)|; s|@VERSION@|$$(sed -n 's/^#define SCANHEAD_VERSION "\(.*\)"$$/\1/p' \
+		drivers/host/scanhead.h)|" drivers/host/libscanhead.pc.in > $(DESTDIR)$(PC_DIR)/libscanhead.pc
 format:
 	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')
 clean:

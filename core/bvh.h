@@ -122,7 +122,8 @@ const struct bvh_counters *bvh_work_counters(const struct bvh_work *work);
 /* Directions of the last chunk, as Embree gets them. */
 struct vec3_floats bvh_work_directions(const struct bvh_work *work);
 
-/* Exact hits. Range error: see tests/accuracy. Allocates nothing. */
+/* Exact hits. What a ray begins on, within half a micrometre, it does not meet. Range error: see
+ * tests/accuracy. Allocates nothing. */
 void bvh_hits(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays);
 
 /* Cosine of the incidence on the triangles that were hit, 0..1; NaN where there is none. */

@@ -82,6 +82,7 @@ struct cast_setup {
     int noise_on;
     double range_sigma_m, range_sigma_ppm;
     uint64_t noise_key;               /* rng_key(seed, RNG_RANGE) */
+    uint64_t scan_key;                /* rng_scan: of all noise */
     double mirror_counts, pan_counts; /* encoder counts per turn; 2^32: ideal, positions take the true angle */
     enum line_layout layout;
     double range_scale_m;

@@ -31,7 +31,7 @@
  *
  * for a data sheet's `X at Y m`, A_Y the amplitude of a target of its reflectance at Y, head on.
  *
- * Random numbers are keyed by (seed, pulse, echo, purpose): nothing depends on what else was detected. No
+ * Random numbers are keyed by (seed, scan, pulse, echo, purpose): nothing depends on what else was detected. No
  * echo stays no echo. Pure; any thread; allocates nothing. */
 #ifndef CORE_DETECT_H
 #define CORE_DETECT_H
@@ -91,6 +91,7 @@ struct detect_echoes {
     const double *rho;   /* surface_return, times the share of the pulse's energy that took this way */
     double *amplitude;   /* A, without noise */
     int16_t *refl_cdb;   /* 0.01 dB; LINE_REFL_NONE where there is no echo */
+    uint64_t scan_key;   /* rng_scan */
 };
 
 /* Fills amplitude and refl_cdb; range_m becomes NaN where nothing is detected. */
@@ -126,6 +127,7 @@ struct detect_points {
     uint32_t n;
     const uint64_t *key;
     double *range_m, *mirror_turn, *pan_turn;
+    uint64_t scan_key; /* rng_scan */
 };
 /* rotation: socs -> prcs; NULL with local axes. */
 void detect_move_in_ball(const struct detect_ball *ball, const double rotation[9], const struct detect_points *points);

@@ -1,14 +1,14 @@
-/* Embree 3 or 4, whichever is installed: the one place that includes it. Version 3 comes first where both
- * are, since the Makefile links it; point queries are the same in both. And what its errors mean. */
+/* Embree 3 or 4: the one place that includes it, and what its errors mean. Which one, the Makefile decides
+ * (SH_EMBREE), with the library that it links. Point queries are the same in both. */
 #ifndef CORE_EMBREE_H
 #define CORE_EMBREE_H
 
-#if __has_include(<embree3/rtcore.h>)
+#if SH_EMBREE == 3
 #include <embree3/rtcore.h>
-#elif __has_include(<embree4/rtcore.h>)
+#elif SH_EMBREE == 4
 #include <embree4/rtcore.h>
 #else
-#error "Embree is missing: install libembree-dev"
+#error "SH_EMBREE is 3 or 4, as the Makefile says it"
 #endif
 
 #include "core/err.h"

@@ -9,16 +9,17 @@
 
 enum sh_code {
     SH_OK = 0,
-    SH_EINPUT = -1,   /* wrong usage, configuration or input file: exit status 2 */
-    SH_EIO = -2,      /* the operating system or a peer failed: exit status 1 */
-    SH_ENOMEM = -3,   /* no memory: exit status 1 */
-    SH_EPERM = -4,    /* a permission is missing; the text says which */
-    SH_ETIMEOUT = -5, /* nothing happened in time */
-    SH_ECLOSED = -6,  /* the other end is gone */
-    SH_EFORMAT = -7,  /* bytes that are not what the protocol says */
-    SH_ESTATE = -8,   /* not possible in the present state */
-    SH_ELOST = -9,    /* a device is not there, or not any more */
-    SH_ESTOPPED = -10, /* whoever asked for the work wants it to end: exit status 1 */
+    SH_EINPUT = -1,    /* wrong usage, configuration or input file: exit status 2 */
+    SH_EIO = -2,       /* the operating system or a peer failed: exit status 1 */
+    SH_ENOMEM = -3,    /* no memory: exit status 1 */
+    SH_EPERM = -4,     /* a permission is missing; the text says which */
+    SH_ETIMEOUT = -5,  /* nothing happened in time */
+    SH_ECLOSED = -6,   /* the other end is gone */
+    SH_EFORMAT = -7,   /* bytes that are not what the protocol says */
+    SH_ESTATE = -8,    /* not possible in the present state */
+    SH_ELOST = -9,     /* a device is not there, or not any more */
+    SH_ERESET = -10,   /* a device is still there, but what was open on it is over */
+    SH_ESTOPPED = -11, /* whoever asked for the work wants it to end: exit status 1 */
 };
 
 struct sh_err {

@@ -98,6 +98,12 @@ struct beam_pattern {
 /* rings: 0 (the centre alone) to BEAM_MAX_RINGS. */
 void beam_rings(uint32_t rings, struct beam_pattern *pattern);
 
+/* At the end of a plane those sub-rays that still meet it stand for the part of the footprint that does. Their
+ * middle is off by less than this times w, and the echo's range by less than this times w(R) tan i: 0.12 with 4
+ * rings, 0.05 with 12; the RMS over all cuts is about a quarter. No fit through the same sub-rays does better,
+ * for each is all or nothing of 1/n of the energy; outlines cut exactly. */
+double beam_end_error(uint32_t rings);
+
 /* Two axes across a beam's direction. */
 void beam_axes(const double dir[3], double e1[3], double e2[3]);
 struct beam_sight {

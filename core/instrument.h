@@ -52,6 +52,7 @@ struct instrument_turns {
     uint64_t pulse0;
     uint32_t n;
     double *mirror, *pan;
+    uint64_t scan_key; /* rng_scan */
 };
 /* Scheduled angles -> direction s of the beam and, unless o->x is NULL, its origin o (m), both in socs. */
 void instrument_aim(const struct instrument *instrument, const struct instrument_turns *turns, const struct vec3_out *s,

@@ -120,6 +120,8 @@ void plan_beam_option(enum beam_mode mode, uint32_t rings, struct plan_option *o
 /* Fills options, in order of cost, for surfaces in a scene that lies within far_m of the head. */
 void plan_order_options(double far_m, struct plan_option option[2]);
 
+/* The row of the mesh: what its vertices may be off by, see struct scene. */
+void plan_mesh(double error_m, struct plan_row *row);
 /* The row of the cast: what is always done. packet: rays per Embree call. */
 void plan_cast(uint32_t packet, struct plan_row *row);
 

@@ -1,5 +1,5 @@
-/* The one random generator: counter-based, so that a number depends on (seed, pulse, echo, purpose) and on
- * nothing else.
+/* The one random generator: counter-based, so that a number depends on (seed, station, scan, pulse, echo,
+ * purpose) and on nothing else.
  *
  * Two rounds of the SplitMix64 finaliser (Steele, Lea, Flood, OOPSLA 2014; constants by Stafford, "mix 13")
  * over the pulse number, each keyed. Pure; any thread. */
@@ -34,6 +34,13 @@ VEC_INLINE uint64_t rng_mix(uint64_t x)
 VEC_INLINE uint64_t rng_key(uint64_t seed, enum rng_purpose purpose)
 {
     return rng_mix(rng_mix(seed + 0x9e3779b97f4a7c15ULL) + (uint64_t)purpose * 0xd1b54a32d192ed03ULL);
+}
+
+/* What keeps the draws of a scan apart from those of all others, to be XORed into keys: the station and which
+ * of its scans it is, both counted from 1. 0 for the first scan at the first station. Once per scan. */
+VEC_INLINE uint64_t rng_scan(uint32_t station, uint32_t scan)
+{
+    return rng_mix((uint64_t)(station - 1) << 32 | (scan - 1));
 }
 
 VEC_INLINE uint64_t rng_u64(uint64_t key, uint64_t pulse)

@@ -20,6 +20,7 @@
 #include <stddef.h>
 
 #include "core/err.h"
+#include "core/texture.h"
 
 enum scene_up { SCENE_UP_Z, SCENE_UP_Y };
 
@@ -42,6 +43,7 @@ struct scene_mesh_spec {
     double scale;       /* metres per unit of the file, > 0 */
     double offset_m[3]; /* added after axes and scale */
     int textures;       /* keep texture coordinates, and the names of textures: of .obj, and of what Assimp reads */
+    int cutouts;        /* look for holes in textures; without `textures` only what has holes is kept */
     const struct scene_import_limits *limits; /* NULL: the defaults */
 };
 
@@ -53,14 +55,19 @@ struct scene_surface {
     char material[SCENE_NAME_LEN];
     float colour[3]; /* diffuse, sRGB, 0..1: of glTF, FBX, Collada and IFC, and of OBJ with an mtllib (Kd) */
     int has_colour;
-    uint16_t texture; /* 1 + its number in the scene's textures; 0: none */
+    uint16_t texture; /* of the diffuse colour: 1 + its number in the scene's textures; 0: none */
+    uint16_t opacity; /* what cuts holes, likewise; 0: the alpha of texture does */
+    float solid;      /* what is less opaque than this is a hole: 0.5, or what the format says; 0: there are none */
 };
 
-/* An image with the diffuse colour of a surface. It is not opened here. */
+/* An image that lies on surfaces. */
 struct scene_texture {
     char *file;     /* as found beside the mesh's file */
-    uint8_t *bytes; /* of one that lies within it, as it would be in a file; else NULL */
+    uint8_t *bytes; /* of one that lies within it; else NULL */
     size_t n_bytes;
+    uint32_t raw_width, raw_height; /* struct texture_source */
+    enum texture_wrap wrap[2];
+    int unreadable; /* known, and warned of */
 };
 
 /* What the import left out or changed; each kind that is not 0 is also reported as one warning per file. */
@@ -70,6 +77,12 @@ struct scene_counts {
     uint64_t names_cut;     /* object or material names cut to SCENE_NAME_LEN - 1 bytes */
 };
 
+/* What a file, or its format by definition, says of its unit and axes. Nothing follows from it by itself. */
+struct scene_says {
+    double unit_m; /* metres per unit; 0: it doesn't say */
+    int up;        /* the axis that points up: 1 x, 2 y, 3 z; negative: down; 0: it doesn't say */
+};
+
 struct scene {
     uint32_t n_vertices, n_triangles, n_surfaces;
     uint32_t n_meshes;             /* placements in node trees; one for each .obj or .ply */
@@ -77,17 +90,26 @@ struct scene {
     uint32_t (*triangle)[3];       /* [n_triangles] indices into vertex_m */
     uint16_t *label;               /* [n_triangles] index into surface */
     struct scene_surface *surface; /* [n_surfaces] */
-    /* Only where a spec asks for textures and there are some; else NULL, 0. */
+    /* Only where a spec asks for textures, or a texture has holes; else NULL, 0. */
     float (*uv)[3][2];             /* [n_triangles] of the corners; the image's lower left corner is 0, 0; NaN: none */
     struct scene_texture *texture; /* [n_textures] */
     uint32_t n_textures;
+    /* Holes: [n_surfaces], NULL for surfaces without; NULL: no surface has any, and nothing is spent on them.
+     * The masks are owned by `mask`. */
+    const struct texture_mask **cutout;
+    struct texture_mask **mask; /* [n_masks] */
+    uint32_t n_masks;
+    uint32_t label0;           /* what a user has added to all labels: label[i] - label0 is an index into surface */
+    double error_m;            /* of the vertices, by rounding to single precision; 0: none */
     double min_m[3], max_m[3]; /* bounds of the used vertices, prcs */
     struct scene_counts counts;
+    struct scene_says says; /* of the last file */
 };
 
 /* Loads all meshes into one scene.
  * tolerance_m: the largest error of a vertex that is allowed. A file read in single precision (all
  *   but .obj and .ply) is refused, with the figure, where its largest |coordinate| * scale * 6e-8 exceeds it.
+ *   An error above 1e-6 m is warned of, also that of a binary .ply with float coordinates.
  * Errors (SH_EINPUT, naming the file): missing or unreadable, not a mesh, no triangles, a coordinate that is
  *   not finite, an index out of range, |coordinate| beyond 1e9 m, too many surfaces or triangles (2^32-1).
  * Progress goes to report about four times a second once a load takes longer than a second. SH_ESTOPPED where
@@ -113,5 +135,20 @@ struct scene_arrays {
 int scene_from_arrays(const struct scene_arrays *arrays, struct scene **out, struct sh_err *err);
 
 void scene_free(struct scene *scene);
+
+/* The image of a texture: texture_read. */
+int scene_read_texture(const struct scene_texture *texture, int alpha_only, struct texture_image *image,
+                       struct sh_err *err);
+
+/* Texture coordinates at point p of a triangle's plane; scene->uv is there. corner and p in the same frame,
+ * turned or shifted as it may be. */
+void scene_uv_at(const struct scene *scene, uint32_t triangle, const double *const corner[3], const double p[3],
+                 double uv[2]);
+
+/* Whether the triangle has a hole at p. Only where scene->cutout is there. */
+static inline const struct texture_mask *scene_cutout(const struct scene *scene, uint32_t triangle)
+{
+    return scene->cutout[scene->label[triangle] - scene->label0];
+}
 
 #endif

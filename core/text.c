@@ -7,12 +7,13 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "core/infile.h"
+
 /* Read, not mapped: a file that shrinks while it is mapped would end the process. */
 static int read_whole(struct text *t, FILE *f, text_progress *progress, void *ctx, struct sh_err *err)
 {
     struct stat st;
     if (fstat(fileno(f), &st) != 0) return text_fail(t, 0, SH_EINPUT, err, "%s", strerror(errno));
-    if (!S_ISREG(st.st_mode)) return text_fail(t, 0, SH_EINPUT, err, "not a file");
     t->size = (size_t)st.st_size;
     t->data = malloc(t->size + 1);
     if (t->data == NULL) return text_fail(t, 0, SH_ENOMEM, err, "no memory for %zu bytes", t->size);
@@ -54,8 +55,9 @@ int text_fail(const struct text *t, uint64_t line, int code, struct sh_err *err,
 int text_open(struct text *t, const char *path, text_progress *progress, void *ctx, struct sh_err *err)
 {
     *t = (struct text){.path = path, .line = 1};
-    FILE *f = fopen(path, "rb");
-    if (f == NULL) return text_fail(t, 0, SH_EINPUT, err, "%s", strerror(errno));
+    const char *why;
+    FILE *f = infile_open(path, &why);
+    if (f == NULL) return text_fail(t, 0, SH_EINPUT, err, "%s", why);
     int rc = read_whole(t, f, progress, ctx, err);
     fclose(f);
     if (rc != SH_OK) return rc;

@@ -1,11 +1,13 @@
 /* scanhead: the command line. */
+#include <errno.h>
 #include <string.h>
 
+#include "drivers/host/scanhead.h"
 #include "firmware_sim/app/app.h"
 
 /* The only list of commands. */
 static const struct app_command *const COMMANDS[] = {
-    &app_run, &app_record, &app_plan, &app_map, &app_report, &app_check, &app_list, NULL,
+    &app_run, &app_record, &app_plan, &app_map, &app_report, &app_check, &app_list, &app_init, NULL,
 };
 
 static void print_help(FILE *out)
@@ -17,10 +19,23 @@ static void print_help(FILE *out)
         fprintf(out, "  scanhead %s%-*s %s\n", (*c)->name, 38 - (int)strlen((*c)->name), arguments, (*c)->summary);
     }
     fprintf(out, "\nEach command has --help. `scanhead check --help` lists all configuration keys.\n"
+                 "scanhead --version says which release this is.\n"
                  "Exit status: 0 done, 1 failed, 2 wrong usage, configuration or input.\n");
 }
 
-int main(int argc, char **argv)
+static int fail_unknown(const char *word)
+{
+    enum { N = sizeof COMMANDS / sizeof COMMANDS[0] - 1 };
+    const char *known[N], *meant;
+    for (size_t i = 0; i < N; i++)
+        known[i] = COMMANDS[i]->name;
+    meant = app_nearest(word, known, N);
+    fprintf(stderr, "scanhead: unknown command %s%s%s%s; see scanhead --help\n", word,
+            meant != NULL ? ", did you mean " : "", meant != NULL ? meant : "", meant != NULL ? "?" : "");
+    return APP_USAGE;
+}
+
+static int run(int argc, char **argv)
 {
     if (argc < 2) {
         print_help(stderr);
@@ -30,8 +45,23 @@ int main(int argc, char **argv)
         print_help(stdout);
         return APP_OK;
     }
+    if (strcmp(argv[1], "--version") == 0) {
+        printf("scanhead %s\n", scanhead_version());
+        return APP_OK;
+    }
     for (const struct app_command *const *c = COMMANDS; *c != NULL; c++)
         if (strcmp(argv[1], (*c)->name) == 0) return (*c)->run(argc - 1, argv + 1);
-    fprintf(stderr, "scanhead: unknown command %s; see scanhead --help\n", argv[1]);
-    return APP_USAGE;
+    return fail_unknown(argv[1]);
+}
+
+/* What a command printed may still be in the buffer. A full disk or a closed pipe shows only here. */
+int main(int argc, char **argv)
+{
+    int status = run(argc, argv);
+    errno = 0;
+    const int failed = fflush(stdout) != 0 || ferror(stdout) != 0;
+    if (!failed || status != APP_OK) return status;
+    fprintf(stderr, "scanhead: standard output: writing failed%s%s\n", errno != 0 ? ": " : "",
+            errno != 0 ? strerror(errno) : "");
+    return APP_FAILED;
 }

@@ -57,11 +57,35 @@ reads_a_scan() {
     test "$(grep -c '^-\{0,1\}[0-9.]* -\{0,1\}[0-9.]* -\{0,1\}[0-9.]*$' "$work/points")" -gt 1000
 }
 
+# Program, library, header and libscanhead.pc say the same.
+versions_agree() {
+    version=$(config --modversion)
+    expr "$version" : '[0-9][0-9]*\.[0-9]' >/dev/null || { echo "no version in libscanhead.pc: $version"; return 1; }
+    cat >"$work/version.c" <<END
+#include <scanhead.h>
+#include <stdio.h>
+#include <string.h>
+int main(void) { return puts(scanhead_version()) < 0 || strcmp(scanhead_version(), SCANHEAD_VERSION) != 0; }
+END
+    (cd "$work" && ${CC:-cc} version.c $(config --cflags) $(config --libs) -o version) || return
+    test "$(LD_LIBRARY_PATH=$work/root$prefix/lib "$work/version")" = "$version" &&
+        test "$("$work/root$prefix/bin/scanhead" --version)" = "scanhead $version"
+}
+
 # The only example in C.
 sed -n '/^```c /,/^```$/p' README.md | sed "/^\`\`\`/d" >"$work/client.c"
 check "make install" install_it
 check "the udev rule is where udev looks below a prefix" test -s "$work/root$prefix/lib/udev/rules.d/70-scanhead.rules"
+# A profile and a mesh come with the program.
+example_passes() {
+    "$work/root$prefix/bin/scanhead" check --example >"$work/example.yaml" && grep "file: $work/root" "$work/example.yaml" &&
+        "$work/root$prefix/bin/scanhead" check "$work/example.yaml"
+}
+check "the installed program's example passes its check" example_passes
 check "the README's client, with the archive" compile client-static "$work/root$prefix/lib/libscanhead.a" -lnettle -lusb-1.0 -lm
 check "the README's client, with the shared library" compile client $(config --libs)
 check "and it reads a scan" reads_a_scan
+check "the client in Python asks the same head" timeout 60 python3 "$work/root$prefix/share/scanhead/python/scanhead.py" \
+    "tty:$work/port" TIME?
+check "one version: program, library, header and pkg-config" versions_agree
 echo "1..$tests"

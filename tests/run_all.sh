@@ -3,7 +3,7 @@
 # them, and the unit tests once more with the sanitizers in. Ends with one line of counts.
 #
 # As many at a time as there are processors, those that take longest first in each folder:
-#   1. accuracy, stability, unit: they compute
+#   1. accuracy, stability, unit: they compute; the recipes beside them, which mostly wait
 #   2. wire, which mostly waits; the guests beside it, which compute
 #   3. the wire tests that drive a head at its limits: each has the machine to itself
 set -eu
@@ -27,9 +27,10 @@ programs() {
 seen=
 
 set --
+if wanted unit; then set -- "$@" +tests/check_recipes.sh; fi
 if wanted accuracy; then set -- "$@" $(programs accuracy); fi
 if wanted stability; then set -- "$@" $(programs stability); fi
-if wanted unit; then set -- "$@" tests/check_includes.sh tests/check_recipes.sh $(programs unit); fi
+if wanted unit; then set -- "$@" tests/check_includes.sh tests/check_make.sh $(programs unit); fi
 if [ -z "$part" ]; then set -- "$@" $(programs unit "$build/asan"); fi
 if wanted guest; then
     export BUILD="$build"

@@ -1,5 +1,6 @@
 /* LAS 1.2 to 1.4 (ASPRS), point formats 0 to 10, not compressed. */
 #include "core/analysis/cloud_readers.h"
+#include "core/infile.h"
 #include "core/text.h"
 
 #include <math.h>
@@ -42,7 +43,8 @@ static double get_double(const uint8_t *p)
 bool cloud_is_las(const char *path)
 {
     char magic[4] = "";
-    FILE *in = fopen(path, "rb");
+    const char *why;
+    FILE *in = infile_open(path, &why);
     if (in == NULL) return false;
     size_t n = fread(magic, 1, sizeof magic, in);
     fclose(in);

@@ -4,8 +4,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "core/analysis/map_inside.h"
+#include "core/newfile.h"
 
 /* libpng reports by a callback that must not return. */
 static void on_error(png_structp png, png_const_charp text)
@@ -46,30 +48,26 @@ static int encode_file(const struct map_image *image, FILE *file, struct sh_err 
     return rc;
 }
 
-/* Writes, closes and renames part; the reason where that fails. */
-static int write_part(const struct map_image *image, const char *part, const char *path, struct sh_err *why)
+/* fd is taken in any case. */
+static int write_part(const struct map_image *image, const char *path, const char *part, int fd, struct sh_err *err)
 {
-    FILE *file = fopen(part, "wbe");
-    if (file == NULL)
-        return sh_fail(why,
-                       errno == EACCES                       ? SH_EPERM
-                       : errno == ENOENT || errno == ENOTDIR ? SH_EINPUT
-                                                             : SH_EIO,
-                       "%s", strerror(errno));
-    int rc = encode_file(image, file, why);
-    int is_closed = fclose(file) == 0;
-    if (rc == SH_OK && (!is_closed || rename(part, path) != 0))
-        rc = sh_fail(why, is_closed && errno == EISDIR ? SH_EINPUT : SH_EIO, "%s", strerror(errno));
-    if (rc != SH_OK) remove(part);
-    return rc;
+    struct sh_err why = {0};
+    FILE *file = fdopen(dup(fd), "wb");
+    int rc = file != NULL ? encode_file(image, file, &why) : sh_fail(&why, SH_EIO, "%s", strerror(errno));
+    if (file != NULL && fclose(file) != 0 && rc == SH_OK) rc = sh_fail(&why, SH_EIO, "%s", strerror(errno));
+    if (rc == SH_OK) return newfile_keep(path, part, fd, err);
+    newfile_drop(part, fd);
+    return sh_fail(err, rc, "%s: cannot be written: %s", path, why.text);
 }
 
 int map_png_write(const struct map_image *image, const char *path, struct sh_err *err)
 {
-    struct sh_err why;
+    struct sh_err why = {0};
     char *part;
+    int fd;
     if (asprintf(&part, "%s.part", path) < 0) return sh_fail(err, SH_ENOMEM, "map %s: no memory", path);
-    int rc = write_part(image, part, path, &why);
+    int rc = newfile_part(path, part, &fd, &why);
+    if (rc == SH_OK) rc = write_part(image, path, part, fd, &why);
     free(part);
-    return rc == SH_OK ? SH_OK : sh_fail(err, rc, "map %s: cannot be written: %s", path, why.text);
+    return rc == SH_OK ? SH_OK : sh_fail(err, rc, "map %s", why.text);
 }

@@ -6,6 +6,13 @@
 #include <string.h>
 #include <time.h>
 
+/* Rays may look at all that is proposed (bvh_walk_along). */
+#if RTC_VERSION_MAJOR >= 4
+#define LOOKS_THROUGH RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS
+#else
+#define LOOKS_THROUGH RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION
+#endif
+
 static bool count_bytes(void *user, ssize_t bytes, bool post)
 {
     (void)post;
@@ -49,7 +56,7 @@ static int build(struct bvh *bvh, const struct sh_report *report, struct sh_err 
         rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_HIGH);
         rtcCommitGeometry(geometry);
         bvh->rtc = rtcNewScene(bvh->device);
-        rtcSetSceneFlags(bvh->rtc, RTC_SCENE_FLAG_NONE);
+        rtcSetSceneFlags(bvh->rtc, bvh->scene->cutout != NULL ? LOOKS_THROUGH : RTC_SCENE_FLAG_NONE);
         rtcSetSceneBuildQuality(bvh->rtc, RTC_BUILD_QUALITY_HIGH);
         rtcAttachGeometry(bvh->rtc, geometry);
         rc = bvh_commit(bvh, bvh->rtc, report, err);

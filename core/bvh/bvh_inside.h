@@ -1,31 +1,36 @@
 /* Private to core/bvh: the BVH that proposes, and the exact triangles that decide.
  *
- * Embree works in float: vertices, origin and direction are rounded, and so is its edge test. Near the edge
- * of a triangle it may therefore call a hit a miss, and a ray may slip through a closed mesh or past a
- * silhouette. Here the float triangles are wider than the real ones: in its own plane each has its edges
- * further out by more than all of that rounding, a distance across the ray, over the cosine of the incidence
- * as seen from the BVH's origin. (Also for edges seen end-on: the error of their test is larger, across the
- * ray, but for the same reason they move further.) Whatever a ray really hits, Embree proposes. Proposals
- * well inside a triangle stand. Those near its border are decided again in double (decide.c). Rays from
- * elsewhere (stations that share a BVH) find the same guarantee except at borders that they see at a far
- * smaller angle than the origin does.
+ * Embree works in float: vertices, origin and direction are rounded, and so is its edge test. Near the
+ * edge of a triangle it may therefore call a hit a miss, and a ray may slip through a closed mesh or past
+ * a silhouette. Here the float triangles are wider than the real ones: in its own plane each has its edges
+ * further out by more than all of that rounding, a distance across the ray, over the cosine of the
+ * incidence as seen from the BVH's origin. (Also for edges seen end-on: the error of their test is larger,
+ * across the ray, but for the same reason they move further.) Whatever a ray really hits, Embree proposes.
+ * Proposals well inside a triangle stand. Those near its border are decided again in double (decide.c).
+ * Rays from elsewhere (stations that share a BVH) find the same guarantee except at borders that they see
+ * at a far smaller angle than the origin does.
  *
- * So Embree need not be robust, and its faster test (Moeller and Trumbore 1997) will do. The budget, in units
- * of 2^-24 of the farthest coordinate in play, R (vertex of the triangle from the BVH's origin, plus the
- * ray's origin from it): rounding of a vertex 1, of the ray's direction 1, of its origin 1 (none where it is
- * the BVH's). U = (C x D) . e, with C = v0 - o and e an edge at v0, against |e|: the cross product 2.2 (its
- * products 1.2, its differences 1), C itself 1.2 (none where o = 0), the dot product of three terms 3, e 1.
- * Sum 6.2, or 7.4; 6.5 and 8 are used. The third edge is tested by what is left of the denominator, (e1 x e2)
- * . D - U - V: the errors of U and V, and 9 |e1| |e2|, all against the length of that edge, L: 6.5 (|e1| +
- * |e2|) / L R + 9 |e1| |e2| / L. It is therefore always the longest one, so that it is at most twice as bad
- * as the others. The weights, u = U / |den| with a reciprocal good to 3 units, add an error of 6 |e1| |e2| /
- * L. The boxes: the error of a slab's distance is at most 6 units, and a ray through a point m inside of all
- * edges of a triangle spends at least 2 m within its box; m >= 6.5.
+ * So Embree need not be robust, and its faster test (Moeller and Trumbore 1997) will do. The budget, in
+ * units of 2^-24 of the farthest coordinate in play, R (vertex of the triangle from the BVH's origin, plus
+ * the ray's origin from it): rounding of a vertex 1, of the ray's direction 1, of its origin 1 (none where
+ * it is the BVH's). U = (C x D) . e, with C = v0 - o and e an edge at v0, against |e|: the cross product
+ * 2.2 (its products 1.2, its differences 1), C itself 1.2 (none where o = 0), the dot product of three
+ * terms 3, e 1. Sum 6.2, or 7.4; 6.5 and 8 are used. The third edge is tested by what is left of the
+ * denominator, (e1 x e2) . D - U - V: the errors of U and V, and 9 |e1| |e2|, all against the length of
+ * that edge, L: 6.5 (|e1| + |e2|) / L R + 9 |e1| |e2| / L. It is therefore always the longest one, so that
+ * it is at most twice as bad as the others. The weights, u = U / |den| with a reciprocal good to 3 units,
+ * add an error of 6 |e1| |e2| / L. The boxes: the error of a slab's distance is at most 6 units, and a ray
+ * through a point m inside of all edges of a triangle spends at least 2 m within its box; m >= 6.5.
  *
- * What float still decides is the order of two surfaces that lie within its resolution one after the other,
- * about 5e-7 of the range over the cosine of the incidence; unless bvh_order_exactly was called: then such
- * rivals are known from the start (rivals.c), and a hit on one compares its plane with those of the others.
- */
+ * What float still decides is the order of two surfaces that lie within its resolution one after the
+ * other, about 5e-7 of the range over the cosine of the incidence; unless bvh_order_exactly was called:
+ * then such rivals are known from the start (rivals.c), and a hit on one compares its plane with those of
+ * the others.
+ *
+ * Triangles with holes (scene->cutout) are marked as if they had rivals, so that all their hits are
+ * decided in double. A hit in a hole is none. The ray is then cast once more, alone, past every triangle
+ * that Embree proposes on its way, and each of them is decided in double: there is no place where the ray
+ * sets out again, nothing that it could meet twice or step over, and no limit to the number of layers. */
 #ifndef CORE_BVH_BVH_INSIDE_H
 #define CORE_BVH_BVH_INSIDE_H
 
@@ -63,7 +68,7 @@ static inline uint16_t bvh_label(const struct bvh_plane *tri)
     return (uint16_t)(bvh_spare(tri->n[1]) | (bvh_spare(tri->n[2]) & 15) << BVH_SPARE_BITS);
 }
 
-/* The last spare bit of n[2]: the triangle has rivals. */
+/* The last spare bit of n[2]: the triangle has rivals, or a texture with holes; each hit is decided. */
 enum { BVH_RIVAL_BIT = 1 << (BVH_SPARE_BITS - 1) };
 
 struct bvh {
@@ -114,6 +119,19 @@ struct bvh_one {
 };
 void bvh_intersect_one(const struct bvh *bvh, const float org[3], const float dir[3], struct bvh_one *one);
 
+/* What a ray meets no further than this from where it begins is no hit: there it begins on the surface, and
+ * goes on. Half of the wire's finest count, and far more than rounding leaves of zero. */
+#define BVH_AT_ORIGIN_M 5e-7
+
+/* One ray through all that Embree proposes on its way, in no order. is_met: whether the ray really meets that
+ * triangle; what lies behind by the float distance is then left out. Only where the scene has cutouts. */
+struct bvh_walk {
+    int (*is_met)(void *ctx, uint32_t prim);
+    void *ctx;
+};
+void bvh_walk_along(const struct bvh *bvh, const float org[3], const float dir[3], float t_max,
+                    const struct bvh_walk *walk);
+
 /* Corners of a triangle in the local frame; returns the largest distance from its origin. */
 double bvh_corners(const struct bvh *bvh, uint32_t prim, double v[3][3]);
 /* How far the edges of a triangle were moved outward, as seen from the origin (those of the very smallest
@@ -129,7 +147,7 @@ int bvh_commit(struct bvh *bvh, RTCScene scene, const struct sh_report *report, 
  * buffer. */
 int bvh_drop_twins(const struct bvh *bvh, float *vertex, const struct sh_report *report, struct sh_err *err);
 
-/* Marks a triangle as having rivals; its plane is made anew to go with that. */
+/* Marks a triangle as having rivals or holes; its plane is made anew to go with that. */
 void bvh_mark_rival(struct bvh *bvh, uint32_t prim);
 /* ---- refine.c */
 /* What Embree proposed, and what double precision makes of it. */

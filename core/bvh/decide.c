@@ -15,6 +15,7 @@ struct search {
     double range_m, border_m; /* its range, and how far the ray passes from its nearest edge */
     uint32_t near_prim;       /* the one that the ray misses by least; gap 1: double precision can't decide */
     double near_gap, near_range_m;
+    int holes; /* the ray passed through one */
 };
 
 static int before(const double a[3], const double b[3])
@@ -125,6 +126,20 @@ static int is_edge_on(double v[3][3], const double side[3])
     return fabs(side[0] + side[1] + side[2]) <= blur(v[0], v[1]) + blur(v[1], v[2]) + blur(v[2], v[0]);
 }
 
+/* Whether the triangle has a hole where the ray is at that range. */
+static int is_hole(struct search *s, uint32_t prim, double v[3][3], double range_m)
+{
+    const struct scene *scene = s->ray->bvh->scene;
+    if (scene->cutout == NULL || scene_cutout(scene, prim) == NULL) return 0;
+    const double *const corner[3] = {v[0], v[1], v[2]};
+    const double *dir = s->ray->dir, p[3] = {range_m * dir[0], range_m * dir[1], range_m * dir[2]};
+    double uv[2];
+    scene_uv_at(scene, prim, corner, p, uv);
+    if (!texture_is_hole(scene_cutout(scene, prim), uv)) return 0;
+    s->holes = 1;
+    return 1;
+}
+
 /* Remembers the triangle that the ray misses by least, in units of what double precision resolves at its
  * edges. */
 static void note_miss(struct search *s, uint32_t prim, double v[3][3], const double side[3])
@@ -139,29 +154,33 @@ static void note_miss(struct search *s, uint32_t prim, double v[3][3], const dou
         gap = out;
         range = edge_range(a, b, dir);
     }
-    if (gap >= s->near_gap || range < 0.0) return;
+    if (range <= BVH_AT_ORIGIN_M) return;
+    if (s->holes && gap <= 1.0 && s->near_gap <= 1.0 ? range >= s->near_range_m : gap >= s->near_gap) return;
+    if (gap <= 1.0 && is_hole(s, prim, v, range)) return;
     s->near_gap = gap;
     s->near_prim = prim;
     s->near_range_m = range;
 }
 
-static void try_triangle(struct search *s, uint32_t prim)
+/* Returns whether the ray meets it. */
+static int try_triangle(struct search *s, uint32_t prim)
 {
     double v[3][3], side[3];
     look_at(s->ray, prim, v, side);
-    if (is_edge_on(v, side)) return;
+    if (is_edge_on(v, side)) return 0;
     if (!is_inside(side)) {
         note_miss(s, prim, v, side);
-        return;
+        return 0;
     }
     double range = held_range(s->ray, prim, v);
-    if (!(range >= 0.0)) return;
+    if (!(range > BVH_AT_ORIGIN_M) || is_hole(s, prim, v, range)) return 0;
     double same = 1e-12 * range;
     if (range < s->range_m - same || (range <= s->range_m + same && prim < s->prim)) {
         s->prim = prim;
         s->range_m = range;
         s->border_m = edge_distance(v, side);
     }
+    return 1;
 }
 
 /* Embree names all triangles whose boxes, or those of their leaf, are near. What lies further than the
@@ -232,6 +251,14 @@ void decide_prefetch(const struct bvh *bvh, const uint32_t *prim, const uint32_t
             __builtin_prefetch(scene->vertex_m[scene->triangle[prim[ray[k]]][j]], 0, 3);
 }
 
+static void to_floats(const struct decide_ray *ray, float org[3], float dir[3])
+{
+    for (int i = 0; i < 3; i++) {
+        org[i] = (float)ray->o_local[i];
+        dir[i] = (float)ray->dir[i];
+    }
+}
+
 /* What was tried may lie anywhere on the ray; it counts up to limit_m: beyond, not everything was tried. */
 static int is_found(struct search *s, double limit_m)
 {
@@ -239,6 +266,21 @@ static int is_found(struct search *s, double limit_m)
     s->prim = s->near_prim = RTC_INVALID_GEOMETRY_ID;
     s->range_m = s->near_gap = INFINITY;
     return 0;
+}
+
+static int is_met(void *search, uint32_t prim)
+{
+    return try_triangle(search, prim);
+}
+
+/* The ray passed through a hole: all that Embree proposes along it is tried, from its origin on. What was
+ * tried so far is tried again, which changes nothing. */
+static void look_through(struct search *s)
+{
+    float org[3], dir[3];
+    const struct bvh_walk walk = {is_met, s};
+    to_floats(s->ray, org, dir);
+    bvh_walk_along(s->ray->bvh, org, dir, s->ray->t_max, &walk);
 }
 
 void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh_counters *counters,
@@ -258,21 +300,21 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh
         double width_m = bvh_width_m(ray->bvh, prim);
         if (s.prim == prim && s.border_m > width_m) break;
         counters->decided++;
+        if (s.holes) break;
         double range_m = (double)t, slack = slack_m(ray, prim, width_m), limit_m = range_m + slack;
         double radius_m = fmin(slack, 0.01 * range_m + 4.0 * width_m);
         try_around(&s, range_m, radius_m);
+        if (s.holes) break;
         if (is_found(&s, limit_m)) break;
         counters->went_on++;
         float org[3], dir[3];
-        for (int i = 0; i < 3; i++) {
-            org[i] = (float)ray->o_local[i];
-            dir[i] = (float)ray->dir[i];
-        }
+        to_floats(ray, org, dir);
         struct bvh_one one = {.t_min = nextafterf((float)(range_m + 0.5 * radius_m), INFINITY), .t_max = ray->t_max};
         bvh_intersect_one(ray->bvh, org, dir, &one);
         prim = one.prim;
         t = one.t;
     }
+    if (s.holes) look_through(&s);
     if (s.prim != RTC_INVALID_GEOMETRY_ID) try_rivals(&s, s.prim, s.range_m);
     /* So near to an edge that double precision can't separate its sides: the edge is hit, nothing passes. */
     if (s.near_gap <= 1.0 && !(s.range_m <= s.near_range_m)) {

@@ -125,25 +125,71 @@ PACKET_FUNCTION(4)
 PACKET_FUNCTION(8)
 PACKET_FUNCTION(16)
 
-void bvh_intersect_one(const struct bvh *bvh, const float org[3], const float dir[3], struct bvh_one *one)
+static struct RTCRayHit one_ray(const float org[3], const float dir[3], float t_min, float t_max)
 {
-    PACKET_CONTEXT(context);
     struct RTCRayHit ray = {.ray = {.org_x = org[0],
                                     .org_y = org[1],
                                     .org_z = org[2],
-                                    .tnear = one->t_min,
+                                    .tnear = t_min,
                                     .dir_x = dir[0],
                                     .dir_y = dir[1],
                                     .dir_z = dir[2],
-                                    .tfar = one->t_max,
+                                    .tfar = t_max,
                                     .mask = 0xffffffffU},
                             .hit = {.geomID = RTC_INVALID_GEOMETRY_ID, .primID = RTC_INVALID_GEOMETRY_ID}};
     ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    return ray;
+}
+
+void bvh_intersect_one(const struct bvh *bvh, const float org[3], const float dir[3], struct bvh_one *one)
+{
+    PACKET_CONTEXT(context);
+    struct RTCRayHit ray = one_ray(org, dir, one->t_min, one->t_max);
     PACKET_ONE(bvh->rtc, &context, &ray);
     one->prim = ray.hit.primID;
     one->t = ray.ray.tfar;
     one->u = ray.hit.u;
     one->v = ray.hit.v;
+}
+
+/* A ray that looks at all that Embree proposes on its way. Embree hands its context to the filter. */
+#if RTC_VERSION_MAJOR >= 4
+struct walk {
+    struct RTCRayQueryContext context;
+    const struct bvh_walk *walk;
+};
+#else
+struct walk {
+    struct RTCIntersectContext context;
+    const struct bvh_walk *walk;
+};
+#endif
+
+static void on_proposal(const struct RTCFilterFunctionNArguments *args)
+{
+    const struct bvh_walk *walk = ((const struct walk *)(const void *)args->context)->walk;
+    const struct RTCHit *hit = (const void *)args->hit; /* of one ray */
+    if (args->valid[0] != 0 && !walk->is_met(walk->ctx, hit->primID)) args->valid[0] = 0;
+}
+
+void bvh_walk_along(const struct bvh *bvh, const float org[3], const float dir[3], float t_max,
+                    const struct bvh_walk *walk)
+{
+    struct walk own = {.walk = walk};
+    struct RTCRayHit ray = one_ray(org, dir, 0.0f, t_max);
+#if RTC_VERSION_MAJOR >= 4
+    struct RTCIntersectArguments how;
+    rtcInitRayQueryContext(&own.context);
+    rtcInitIntersectArguments(&how);
+    how.flags = RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER;
+    how.context = &own.context;
+    how.filter = on_proposal;
+    rtcIntersect1(bvh->rtc, &ray, &how);
+#else
+    rtcInitIntersectContext(&own.context);
+    own.context.filter = on_proposal;
+    rtcIntersect1(bvh->rtc, &own.context, &ray);
+#endif
 }
 
 static void intersect_1(const struct bvh *bvh, const struct bvh_batch *rays, uint32_t n)

@@ -72,7 +72,8 @@ VEC_INLINE uint32_t refine(const struct bvh_proposals *p, enum how how)
         range_m[i] = (tri[at + 3] - off) / along;
         if (how == FROM_ONE_STEEP) steep[i] = (float)(nx * nx + ny * ny + nz * nz) / (float)(along * along);
         label[i] = label_of(ny, nz);
-        doubt[i] = in_doubt(nx, nz, slanted ? fabs(along) : 1.0, u[i], v[i]) & (prim[i] < n_triangles);
+        doubt[i] = (in_doubt(nx, nz, slanted ? fabs(along) : 1.0, u[i], v[i]) | (range_m[i] <= BVH_AT_ORIGIN_M)) &
+                   (prim[i] < n_triangles);
         doubts += doubt[i];
     }
     return doubts;

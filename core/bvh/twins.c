@@ -37,6 +37,20 @@ static int same_corners(const double *const a[3], const double *const b[3])
     return 1;
 }
 
+/* Whether both have holes in the same places, or none: the same image at the same corners. */
+static int same_holes(const struct scene *scene, uint32_t a, uint32_t b)
+{
+    const uint32_t *p = scene->triangle[a], *q = scene->triangle[b];
+    if (scene_cutout(scene, a) != scene_cutout(scene, b)) return 0;
+    if (scene_cutout(scene, a) == NULL) return 1;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            if (memcmp(scene->vertex_m[p[i]], scene->vertex_m[q[j]], sizeof *scene->vertex_m) == 0 &&
+                memcmp(scene->uv[a][i], scene->uv[b][j], sizeof scene->uv[a][i]) != 0)
+                return 0;
+    return 1;
+}
+
 int bvh_drop_twins(const struct bvh *bvh, float *vertex, const struct sh_report *report, struct sh_err *err)
 {
     const struct scene *scene = bvh->scene;
@@ -55,6 +69,7 @@ int bvh_drop_twins(const struct bvh *bvh, float *vertex, const struct sh_report 
         for (; table[at] != UINT32_MAX; at = (at + 1) & (size - 1)) {
             sorted_corners(scene, table[at], other);
             if (!same_corners(corner, other)) continue;
+            if (scene->cutout != NULL && !same_holes(scene, prim, table[at])) continue;
             for (int i = 0; i < 9; i++)
                 vertex[9 * (size_t)prim + (size_t)i] = NAN; /* Embree leaves out what is not finite */
             break;

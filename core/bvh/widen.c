@@ -199,6 +199,8 @@ int bvh_fill(struct bvh *bvh, RTCGeometry geometry, const struct sh_report *repo
     }
     for (uint32_t i = 0; i < 3 * n; i++)
         index[i] = i;
+    for (uint32_t i = 0; i < n && scene->cutout != NULL; i++)
+        if (scene_cutout(scene, i) != NULL) bvh_mark_rival(bvh, i);
     bvh->triangle[n] = (struct bvh_plane){
         .n = {NAN, with_spare(NAN, BVH_NO_LABEL & 0xfff), with_spare(NAN, BVH_NO_LABEL >> BVH_SPARE_BITS)}, .d = NAN};
     return bvh_drop_twins(bvh, vertex, report, err);

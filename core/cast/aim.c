@@ -68,7 +68,7 @@ static void aim_bent(struct caster *c, struct chunk *k, const struct instrument 
     const int offset = instrument_has_offset(instrument), moves = s->n_knots != 0;
     const struct vec3_out origin = offset ? VEC3_OUT(c->read, 0) : (struct vec3_out){0};
     const struct vec3_in around = offset ? VEC3_IN(c->read, 0) : (struct vec3_in){0};
-    const struct instrument_turns turns = {k->pulse0, k->n, l->mirror_turn, l->pan_turn};
+    const struct instrument_turns turns = {k->pulse0, k->n, l->mirror_turn, l->pan_turn, k->s->scan_key};
     double back[9];
     instrument_aim(instrument, &turns, &VEC3_OUT(c->socs, 0), &origin);
     instrument_read(instrument, k->n, l->mirror_turn, l->pan_turn);

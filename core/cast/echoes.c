@@ -132,7 +132,8 @@ static void detect(struct caster *c, const struct chunk *k)
                                          .range_m = l->range_m,
                                          .rho = l->rho,
                                          .amplitude = l->amplitude,
-                                         .refl_cdb = l->refl_cdb};
+                                         .refl_cdb = l->refl_cdb,
+                                         .scan_key = k->s->scan_key};
     uint32_t before = count_echoes(l);
     if (d->signal != NULL) {
         detect_by_signal(d->signal, &echoes);
@@ -144,16 +145,18 @@ static void detect(struct caster *c, const struct chunk *k)
     c->counters.faint += before - count_echoes(l);
 }
 
-/* Keyed by pulse and echo, whether others are sent or not. */
+/* Keyed by scan, pulse and echo, whether others are sent or not. */
 static void add_noise(struct caster *c, const struct cast_setup *s)
 {
     const struct cast_detect *d = s->detect;
     struct echo_list *l = &c->list;
-    const struct detect_echoes echoes = {.n = l->n, .key = l->key, .range_m = l->range_m, .amplitude = l->amplitude};
+    const struct detect_echoes echoes = {
+        .n = l->n, .key = l->key, .range_m = l->range_m, .amplitude = l->amplitude, .scan_key = s->scan_key};
     if (d != NULL && d->noise_by_signal)
         detect_range_noise(d->signal, &echoes);
     else if (s->noise_on)
-        detect_fixed_noise(s->range_sigma_m, 1e-6 * s->range_sigma_ppm, s->noise_key, l->n, l->key, l->range_m);
+        detect_fixed_noise(s->range_sigma_m, 1e-6 * s->range_sigma_ppm, s->noise_key ^ s->scan_key, l->n, l->key,
+                           l->range_m);
     if (d != NULL && d->instrument != NULL) instrument_range(d->instrument, l->n, l->range_m);
 }
 

@@ -66,6 +66,23 @@ static int compare(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+/* The holes of the triangles around the line. */
+static int keep_cutouts(const struct column *c, struct scene *around, struct sh_err *err)
+{
+    const struct scene *all = c->scene;
+    around->uv = malloc(c->n * sizeof *around->uv);
+    around->cutout = malloc(all->n_surfaces * sizeof *around->cutout);
+    if (around->uv == NULL || around->cutout == NULL)
+        return sh_fail(err, SH_ENOMEM, "cast: no memory to look for the floor");
+    memcpy(around->cutout, all->cutout, all->n_surfaces * sizeof *around->cutout);
+    around->label0 = all->label0;
+    for (size_t i = 0; i < c->n; i++) {
+        memcpy(around->uv[i], all->uv[c->prim[i]], sizeof *around->uv);
+        around->label[i] = all->label[c->prim[i]];
+    }
+    return SH_OK;
+}
+
 /* Neighbours keep their common vertices: the exact stage finds neighbours by them. */
 static int make_scene(struct column *c, struct scene **out, struct sh_err *err)
 {
@@ -93,6 +110,7 @@ static int make_scene(struct column *c, struct scene **out, struct sh_err *err)
     rc = scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex_m, (uint32_t)c->n_vertices,
                                                   (const uint32_t(*)[3])triangle, (uint32_t)c->n, NULL, NULL, 0},
                            out, err);
+    if (rc == SH_OK && all->cutout != NULL) rc = keep_cutouts(c, *out, err);
 done:
     free(vertex_m);
     free(triangle);

@@ -177,7 +177,7 @@ uint32_t caster_points(struct caster *c, struct chunk *k)
     uint32_t entries = l->n;
     if (further > 0) follow_pulse(c, k);
     if (d != NULL && d->ball != NULL) {
-        const struct detect_points points = {l->n, l->key, l->range_m, l->mirror_turn, l->pan_turn};
+        const struct detect_points points = {l->n, l->key, l->range_m, l->mirror_turn, l->pan_turn, k->s->scan_key};
         detect_move_in_ball(d->ball, k->s->rotation, &points);
         caster_aim_read(c, k);
     }

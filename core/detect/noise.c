@@ -9,7 +9,7 @@ VEC_CLONES
 void detect_range_noise(const struct detect_signal *signal, const struct detect_echoes *echoes)
 {
     const double floor2 = signal->floor2, jitter2 = signal->jitter2, per_distance = signal->per_distance;
-    const uint64_t range_key = signal->range_key, *restrict key = echoes->key;
+    const uint64_t range_key = signal->range_key ^ echoes->scan_key, *restrict key = echoes->key;
     const double *restrict amplitude = echoes->amplitude;
     double *restrict range_m = echoes->range_m;
     for (uint32_t i = 0; i < echoes->n; i++) {
@@ -48,11 +48,12 @@ void detect_ball_keys(struct detect_ball *ball, uint64_t seed)
 
 /* Uniform in the unit ball: a height uniform in -1..1 and an angle give a direction (Archimedes), the cube
  * root of a uniform number the distance. */
-static void in_unit_ball(const struct detect_ball *ball, uint64_t key, double u[3])
+static void in_unit_ball(const struct detect_ball *ball, uint64_t scan_key, uint64_t key, double u[3])
 {
-    uint64_t bits = rng_u64(ball->direction_key, key);
+    uint64_t bits = rng_u64(ball->direction_key ^ scan_key, key);
     double z = ((double)(bits >> 32) + 0.5) * 0x1p-31 - 1.0, s, c;
-    double r = cbrt(((double)(rng_u64(ball->radius_key, key) >> 11) + 0.5) * 0x1p-53), across = r * sqrt(1.0 - z * z);
+    double r = cbrt(((double)(rng_u64(ball->radius_key ^ scan_key, key) >> 11) + 0.5) * 0x1p-53),
+           across = r * sqrt(1.0 - z * z);
     vec_sincos_turn((double)(bits & 0xffffffffU) * 0x1p-32, &s, &c);
     u[0] = across * c;
     u[1] = across * s;
@@ -82,7 +83,7 @@ void detect_move_in_ball(const struct detect_ball *ball, const double m[9], cons
         if (isnan(p->range_m[i])) continue;
         double u[3], v[3], s, c;
         double radius_m = ball->radius_m * (1.0 + ball->per_distance_1_m * p->range_m[i]);
-        in_unit_ball(ball, p->key[i], u);
+        in_unit_ball(ball, p->scan_key, p->key[i], u);
         for (int k = 0; k < 3; k++)
             u[k] *= radius_m * ball->factor[k];
         if (ball->local) { /* along, right, up */

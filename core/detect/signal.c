@@ -108,7 +108,7 @@ VEC_CLONES
 static void detect(const struct detect_signal *s, const struct detect_echoes *e)
 {
     const double per_overlap2 = s->per_overlap2, extinction2 = s->extinction2_1_m, per_snr = s->per_snr;
-    const uint64_t signal_key = s->signal_key, *key = e->key;
+    const uint64_t signal_key = s->signal_key ^ e->scan_key, *key = e->key;
     const double *rho = e->rho;
     double *range_m = e->range_m, *amplitude = e->amplitude;
     int16_t *refl_cdb = e->refl_cdb;
@@ -141,7 +141,7 @@ VEC_CLONES
 void detect_amplitudes(const struct detect_signal *signal, const struct detect_echoes *e, int16_t *restrict out)
 {
     const double per_snr = signal->per_snr, *amplitude = e->amplitude, *range_m = e->range_m;
-    const uint64_t signal_key = signal->signal_key, *key = e->key;
+    const uint64_t signal_key = signal->signal_key ^ e->scan_key, *key = e->key;
     const uint32_t n = e->n;
     VEC_LOOP
     for (uint32_t i = 0; i < n; i++) {

@@ -191,6 +191,13 @@ void beam_rings(uint32_t rings, struct beam_pattern *pattern)
     }
 }
 
+/* Above what all cuts of the patterns of 1 to 18 rings give that leave 1 % of the energy (test_beam.c). The centre
+ * alone may stand for a sliver at the footprint's rim. */
+double beam_end_error(uint32_t rings)
+{
+    return rings == 0 ? 1.0 : 0.35 * pow(rings, -0.75);
+}
+
 /* T. Duff and others, Building an Orthonormal Basis, Revisited, JCGT 6(1), 2017. */
 void beam_axes(const double d[3], double e1[3], double e2[3])
 {

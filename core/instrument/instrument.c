@@ -28,7 +28,7 @@ static void directions(const struct instrument *k, const struct instrument_turns
     const double st = sin(k->trunnion_rad), ct = cos(k->trunnion_rad), sc = sin(k->collimation_rad);
     const double cc = cos(k->collimation_rad);
     const double mirror_sigma = k->mirror_sigma_rad / VEC_TURN_RAD, pan_sigma = k->pan_sigma_rad / VEC_TURN_RAD;
-    const uint64_t mirror_key = k->mirror_key, pan_key = k->pan_key;
+    const uint64_t mirror_key = k->mirror_key ^ turns->scan_key, pan_key = k->pan_key ^ turns->scan_key;
     const struct instrument_turns t = *turns;
     const struct vec3_out s = *out;
     VEC_LOOP

@@ -25,6 +25,15 @@ static struct plan_row *add(struct plan_row *row, const char *stage, const char 
 /* What the cast promises for incidence up to 89.9 degrees; tests/stability holds it to that. */
 static const double CAST_ERROR_M = 1e-6;
 
+void plan_mesh(double error_m, struct plan_row *row)
+{
+    if (error_m > 0.0)
+        plan_say(row, "mesh", "single precision", error_m, 0.0,
+                 "its coordinates were rounded to single precision: in the file, or where it was read");
+    else
+        plan_say(row, "mesh", "double", 0.0, 0.0, "its vertices are as the file says them");
+}
+
 void plan_cast(uint32_t packet, struct plan_row *row)
 {
     char method[sizeof row->method];

@@ -59,6 +59,7 @@ void build_begin_file(struct scene_build *b, const struct scene_mesh_spec *spec)
     b->vertex0 = b->mesh_vertex0 = b->scene->n_vertices;
     b->triangle0 = b->scene->n_triangles;
     b->counts = (struct scene_counts){0};
+    b->scene->says = (struct scene_says){0};
     b->has_uv = false;
     b->not_simple = 0;
     b->file_ns = now_ns();
@@ -178,6 +179,35 @@ int build_fail(struct scene_build *b, int code, struct sh_err *err, const char *
     va_end(ap);
     text_keep_line(text);
     return sh_fail(err, code, "%s%s: %s", b->name, place, text);
+}
+
+/* Up to the next number of two digits. */
+static double two_digits_up(double x)
+{
+    double digit = pow(10.0, floor(log10(x)) - 1.0);
+    return ceil(x / digit * (1.0 - 1e-9)) * digit;
+}
+
+int build_single(struct scene_build *b, double largest, bool refuse, struct sh_err *err)
+{
+    const double rounding = 6e-8, most_m = 1.0; /* 2^-24: of the nearest float; of the tolerance */
+    double error_m = largest * b->spec->scale * rounding;
+    char set[48] = "";
+    if (!(error_m > 0.0)) return SH_OK;
+    error_m = two_digits_up(error_m);
+    if (error_m > b->tolerance_m && refuse) {
+        if (error_m <= most_m) snprintf(set, sizeof set, "set it to %.2g, ", error_m);
+        return build_fail(b, SH_EINPUT, err,
+                          "coordinates up to %.9g are read in single precision, with errors up to %.2g m; allowed are "
+                          "%.2g m (scene.tolerance_m, or else a tenth of plan.tolerance_m): %smove the mesh near its "
+                          "origin, or convert it to .obj or .ply",
+                          largest, error_m, b->tolerance_m, set);
+    }
+    b->scene->error_m = fmax(b->scene->error_m, error_m);
+    if (error_m > 1e-6)
+        sh_warn(b->report, "%s: in single precision, so good to %.2g m only: coordinates go up to %.9g", b->name,
+                error_m, largest);
+    return SH_OK;
 }
 
 static int grow_vertices(struct scene_build *b, uint64_t need, struct sh_err *err)

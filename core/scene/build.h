@@ -57,14 +57,29 @@ int build_corners(struct scene_build *b, size_t n, struct sh_err *err);
 /* Adds the polygon of the n >= 3 corners in corner. */
 int build_polygon(struct scene_build *b, size_t n, uint16_t label, struct sh_err *err);
 
+/* The file's coordinates, up to `largest` in its units, have been rounded to single precision: keeps the
+ * error of that, warns of more than a micrometre, and fails where it is more than allowed, if `refuse`. */
+int build_single(struct scene_build *b, double largest, bool refuse, struct sh_err *err);
+
 /* The label of a pair of names; a new pair gets the next number. */
 int build_label(struct scene_build *b, struct text_span object, struct text_span material, uint16_t *label,
                 struct sh_err *err);
 
-/* The number, from 1, of a texture. name: its file, as the mesh or its library names it, in the folder of the
- * mesh. An image within the mesh's file comes in bytes, else NULL. *number stays where there is no memory. */
-int build_texture(struct scene_build *b, struct text_span name, const void *bytes, size_t n_bytes, uint16_t *number,
-                  struct sh_err *err);
+/* A texture as a reader finds it. */
+struct build_image {
+    struct text_span name; /* its file, as the mesh or its library names it, in the folder of the mesh */
+    const void *bytes;     /* of an image within the mesh's file, else NULL */
+    size_t n_bytes;
+    uint32_t raw_width, raw_height; /* struct texture_source */
+    enum texture_wrap wrap[2];
+};
+/* Its number, from 1. *number stays where there is no memory. */
+int build_texture(struct scene_build *b, const struct build_image *image, uint16_t *number, struct sh_err *err);
+/* Whether texture coordinates and textures are to be read. */
+static inline bool build_wants_textures(const struct scene_build *b)
+{
+    return b->spec->textures || b->spec->cutouts;
+}
 
 /* Reports "reading FILE" about four times a second, once the load takes longer than a second, and heeds the
  * stop: SH_ESTOPPED. build: a struct scene_build. */
@@ -75,6 +90,12 @@ void build_announce(struct scene_build *b);
 
 /* The file's name without folders and ending: the object's name where a file has none. */
 struct text_span build_base_name(const struct scene_build *b);
+
+/* ---- cutouts.c */
+/* Holes in the textures of a scene that is complete. Warns of textures that can't be read. */
+int scene_find_cutouts(struct scene *scene, const struct sh_report *report, struct sh_err *err);
+/* Texture coordinates and textures go, unless they have holes. */
+void scene_drop_textures(struct scene *scene);
 
 /* The readers. Each has the spec, and the file's name, from the builder. */
 int read_obj(struct scene_build *b, struct sh_err *err);

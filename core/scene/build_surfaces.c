@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 static int compare_surfaces(const void *a, const void *b)
 {
@@ -34,7 +35,8 @@ int build_label(struct scene_build *b, struct text_span object, struct text_span
     struct scene *s = b->scene;
     struct scene_surface *fresh = &s->surface[s->n_surfaces]; /* room for one more than allowed */
     fresh->has_colour = 0;
-    fresh->texture = 0;
+    fresh->texture = fresh->opacity = 0;
+    fresh->solid = 0.5f;
     unsigned cut = copy_name(fresh->object, object);
     cut += copy_name(fresh->material, material);
     struct scene_surface **found = tsearch(fresh, &b->surface_tree, compare_surfaces);
@@ -52,7 +54,7 @@ int build_label(struct scene_build *b, struct text_span object, struct text_span
 }
 
 /* A name in a mesh's file is that of a file in the same folder; other systems write \. */
-static char *beside(const struct scene_build *b, struct text_span name)
+static char *in_folder(const struct scene_build *b, struct text_span name)
 {
     const char *slash = strrchr(b->spec->file, '/');
     size_t folder = name.p[0] != '/' && slash != NULL ? (size_t)(slash - b->spec->file) + 1 : 0;
@@ -65,26 +67,59 @@ static char *beside(const struct scene_build *b, struct text_span name)
     return path;
 }
 
-int build_texture(struct scene_build *b, struct text_span name, const void *bytes, size_t n_bytes, uint16_t *number,
-                  struct sh_err *err)
+/* Many meshes name the place where an image once was, on another machine. Where there is none, but a file
+ * of that name lies beside the mesh, it is that one. */
+static char *beside(const struct scene_build *b, const struct build_image *image)
+{
+    const struct text_span name = image->name;
+    char *path = in_folder(b, name), *near;
+    size_t last = name.n;
+    if (path == NULL || image->bytes != NULL || access(path, F_OK) == 0) return path;
+    while (last > 0 && name.p[last - 1] != '/' && name.p[last - 1] != '\\')
+        last--;
+    if (last == 0 || last == name.n) return path;
+    near = in_folder(b, (struct text_span){name.p + last, name.n - last});
+    if (near == NULL || access(near, F_OK) != 0) {
+        free(near);
+        return path;
+    }
+    free(path);
+    return near;
+}
+
+static bool is_same(const struct scene_texture *t, const char *file, const struct build_image *image)
+{
+    return strcmp(t->file, file) == 0 && memcmp(t->wrap, image->wrap, sizeof t->wrap) == 0;
+}
+
+int build_texture(struct scene_build *b, const struct build_image *image, uint16_t *number, struct sh_err *err)
 {
     struct scene *s = b->scene;
-    char *file = beside(b, name);
+    char *file = beside(b, image);
     for (uint32_t i = 0; file != NULL && i < s->n_textures; i++)
-        if (strcmp(s->texture[i].file, file) == 0) {
+        if (is_same(&s->texture[i], file, image)) {
             free(file);
             *number = (uint16_t)(i + 1);
             return SH_OK;
         }
+    if (s->n_textures == UINT16_MAX) {
+        free(file);
+        return build_fail(b, SH_EINPUT, err, "too many textures: a scene holds up to %d", UINT16_MAX);
+    }
     struct scene_texture *more = file != NULL ? realloc(s->texture, (s->n_textures + 1) * sizeof *s->texture) : NULL;
     if (more != NULL) s->texture = more;
-    uint8_t *copy = more != NULL && bytes != NULL ? malloc(n_bytes) : NULL;
-    if (more == NULL || (bytes != NULL && copy == NULL)) {
+    uint8_t *copy = more != NULL && image->bytes != NULL ? malloc(image->n_bytes + 1) : NULL;
+    if (more == NULL || (image->bytes != NULL && copy == NULL)) {
         free(file);
         return build_fail(b, SH_ENOMEM, err, "no memory for a texture");
     }
-    if (copy != NULL) memcpy(copy, bytes, n_bytes);
-    s->texture[s->n_textures++] = (struct scene_texture){file, copy, copy != NULL ? n_bytes : 0};
-    *number = (uint16_t)s->n_textures; /* one a surface at most */
+    if (copy != NULL) memcpy(copy, image->bytes, image->n_bytes);
+    s->texture[s->n_textures++] = (struct scene_texture){.file = file,
+                                                         .bytes = copy,
+                                                         .n_bytes = copy != NULL ? image->n_bytes : 0,
+                                                         .raw_width = image->raw_width,
+                                                         .raw_height = image->raw_height,
+                                                         .wrap = {image->wrap[0], image->wrap[1]}};
+    *number = (uint16_t)s->n_textures;
     return SH_OK;
 }

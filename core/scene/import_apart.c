@@ -87,8 +87,7 @@ static int start(struct apart *a, struct sh_err *err)
     if (a->pid == 0) import_child(&a->task);
     int why = errno;
     pthread_sigmask(SIG_SETMASK, &before, NULL);
-    if (a->pid < 0)
-        return build_fail(a->task.b, SH_EIO, err, "no process can be made to read it: %s", strerror(why));
+    if (a->pid < 0) return build_fail(a->task.b, SH_EIO, err, "no process can be made to read it: %s", strerror(why));
     close(a->note[1]);
     a->note[1] = -1;
     a->pid_fd = pidfd_open(a->pid, 0);

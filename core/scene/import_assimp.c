@@ -14,12 +14,13 @@
 #include <assimp/config.h>
 #include <assimp/scene.h>
 
+#include "core/infile.h"
 #include "core/scene/ifc_check.h"
 #include "core/scene/import.h"
+#include "core/scene/import_material.h"
+#include "core/scene/import_says.h"
 
 enum { MAX_DEPTH = 256 };
-
-static const double SINGLE_ROUNDING = 6e-8; /* 2^-24: of the nearest float */
 
 /* What Assimp says while it reads; some of it is geometry that it left out. */
 struct import_log {
@@ -32,6 +33,8 @@ struct import {
     const struct aiScene *in;
     const struct aiMatrix4x4 *level[MAX_DEPTH]; /* of the node and above it, root first; identities left out */
     int n_levels;
+    struct import_uv uv;      /* of the mesh at hand */
+    unsigned n_turned;        /* meshes whose texture is turned */
     double largest;           /* |coordinate| at any level, file units */
     uint64_t n_faces, n_done; /* for the progress */
 };
@@ -97,7 +100,7 @@ static int add_face(struct import *im, const struct aiFace *face, const struct a
     }
     int rc = build_corners(b, face->mNumIndices, err);
     if (rc != SH_OK) return rc;
-    const struct aiVector3D *uv = b->spec->textures ? mesh->mTextureCoords[0] : NULL;
+    const struct aiVector3D *uv = build_wants_textures(b) ? mesh->mTextureCoords[im->uv.set] : NULL;
     b->has_uv = uv != NULL;
     for (unsigned i = 0; i < face->mNumIndices; i++) {
         unsigned index = face->mIndices[i];
@@ -106,63 +109,10 @@ static int add_face(struct import *im, const struct aiFace *face, const struct a
                               mesh->mNumVertices);
         b->corner[i] = b->mesh_vertex0 + index;
         if (uv == NULL) continue;
-        b->corner_uv[i][0] = uv[index].x;
-        b->corner_uv[i][1] = uv[index].y;
+        b->corner_uv[i][0] = (float)((double)uv[index].x * im->uv.scale[0] + im->uv.shift[0]);
+        b->corner_uv[i][1] = (float)((double)uv[index].y * im->uv.scale[1] + im->uv.shift[1]);
     }
     return build_polygon(b, face->mNumIndices, label, err);
-}
-
-/* Linear light as sRGB has it, IEC 61966-2-1. */
-static float to_srgb(float linear)
-{
-    double c = (double)linear;
-    return (float)(c <= 0.0031308 ? 12.92 * c : 1.055 * pow(c, 1.0 / 2.4) - 0.055);
-}
-
-/* Materials that Assimp makes up where a file has none. */
-static bool is_made_up(const char *material)
-{
-    return material[0] == '\0' || strcmp(material, AI_DEFAULT_MATERIAL_NAME) == 0 ||
-           strcmp(material, "<IFCDefault>") == 0;
-}
-
-/* The first colour that comes with a material's name stays. glTF has linear colours. */
-static void keep_colour(const struct import *im, const struct aiMaterial *material, struct scene_surface *surface)
-{
-    struct aiColor4D c;
-    const char *dot = strrchr(im->b->spec->file, '.');
-    if (surface->has_colour || is_made_up(surface->material)) return;
-    if (aiGetMaterialColor(material, AI_MATKEY_COLOR_DIFFUSE, &c) != AI_SUCCESS) return;
-    const float rgb[3] = {c.r, c.g, c.b};
-    bool linear = dot != NULL && (strcasecmp(dot, ".gltf") == 0 || strcasecmp(dot, ".glb") == 0);
-    for (int i = 0; i < 3; i++) {
-        if (!(rgb[i] >= 0.0f && rgb[i] <= 1.0f)) return; /* no colour of a surface */
-        surface->colour[i] = linear ? to_srgb(rgb[i]) : rgb[i];
-    }
-    surface->has_colour = 1;
-}
-
-/* The diffuse texture, a file or ("*3") one within this. What lies there unpacked is none that is read. */
-static int keep_texture(const struct import *im, const struct aiMaterial *material, struct scene_surface *surface,
-                        struct sh_err *err)
-{
-    struct aiString path;
-    char name[sizeof path.data + 256];
-    const char *base = strrchr(im->b->spec->file, '/');
-    const struct aiTexture *within = NULL;
-    if (!im->b->spec->textures || surface->texture != 0) return SH_OK;
-    if (aiGetMaterialTexture(material, aiTextureType_DIFFUSE, 0, &path, NULL, NULL, NULL, NULL, NULL, NULL) !=
-        AI_SUCCESS)
-        return SH_OK;
-    if (path.data[0] == '*') {
-        unsigned long i = strtoul(path.data + 1, NULL, 10);
-        if (i >= im->in->mNumTextures || im->in->mTextures[i]->mHeight != 0) return SH_OK;
-        within = im->in->mTextures[i];
-    }
-    base = within == NULL ? "" : base != NULL ? base + 1 : im->b->spec->file;
-    int len = snprintf(name, sizeof name, "%.255s%.*s", base, (int)path.length, path.data);
-    return build_texture(im->b, (struct text_span){name, (size_t)len}, within != NULL ? within->pcData : NULL,
-                         within != NULL ? within->mWidth : 0, &surface->texture, err);
 }
 
 static struct text_span span_of(const struct aiString *text)
@@ -177,11 +127,13 @@ static int label_of(struct import *im, const struct aiNode *node, const struct a
     const struct aiMaterial *material = NULL;
     struct aiString name = {0};
     if (mesh->mMaterialIndex < im->in->mNumMaterials) material = im->in->mMaterials[mesh->mMaterialIndex];
+    import_uv(material, &im->uv);
+    im->n_turned += im->uv.is_turned && build_wants_textures(im->b);
+    if (im->uv.set >= AI_MAX_NUMBER_OF_TEXTURECOORDS || mesh->mTextureCoords[im->uv.set] == NULL) im->uv.set = 0;
     if (material != NULL) aiGetMaterialString(material, AI_MATKEY_NAME, &name);
     int rc = build_label(im->b, span_of(object), span_of(&name), label, err);
     if (rc != SH_OK || material == NULL) return rc;
-    keep_colour(im, material, &im->b->scene->surface[*label]);
-    return keep_texture(im, material, &im->b->scene->surface[*label], err);
+    return import_material(im->b, im->in, material, &im->b->scene->surface[*label], err);
 }
 
 static int add_mesh(struct import *im, const struct aiNode *node, const struct aiMesh *mesh, struct sh_err *err)
@@ -225,16 +177,6 @@ static uint64_t count_faces(const struct aiScene *in, const struct aiNode *node)
     return n;
 }
 
-static int check_precision(const struct import *im, struct sh_err *err)
-{
-    double error_m = im->largest * im->b->spec->scale * SINGLE_ROUNDING;
-    if (error_m <= im->b->tolerance_m) return SH_OK;
-    return build_fail(im->b, SH_EINPUT, err,
-                      "coordinates up to %.9g are read in single precision, with errors up to %.2g m; allowed are "
-                      "%.2g m: move the mesh near its origin, or convert it to .obj or .ply",
-                      im->largest, error_m, im->b->tolerance_m);
-}
-
 /* An IFC file that was cut off reads without an error, with less in it; one in which records are missing
  * crashes Assimp. */
 static int check_ifc(struct scene_build *b, struct sh_err *err)
@@ -243,8 +185,9 @@ static int check_ifc(struct scene_build *b, struct sh_err *err)
     char tail[1024] = "";
     size_t len = strlen(b->spec->file);
     if (strcasecmp(b->spec->file + len - 4, ".ifc") != 0) return SH_OK;
-    FILE *f = fopen(b->spec->file, "rb");
-    if (f == NULL) return SH_OK; /* Assimp says why */
+    const char *why;
+    FILE *f = infile_open(b->spec->file, &why);
+    if (f == NULL) return build_fail(b, SH_EINPUT, err, "%s", why);
     if (fseek(f, -(long)(sizeof tail), SEEK_END) != 0) rewind(f);
     size_t got = fread(tail, 1, sizeof tail, f);
     fclose(f);
@@ -282,11 +225,15 @@ int import_assimp(struct scene_build *b, struct sh_err *err)
     if (stat(b->spec->file, &st) == 0 && st.st_size > 8 << 20) build_announce(b);
     im.in = import_file(b, &log, err);
     if (im.in == NULL) return SH_EINPUT;
+    b->scene->says = import_says(im.in, b->spec->file);
     im.n_faces = count_faces(im.in, im.in->mRootNode);
     rc = add_node(&im, im.in->mRootNode, 0, err);
-    if (rc == SH_OK) rc = check_precision(&im, err);
+    if (rc == SH_OK) rc = build_single(b, im.largest, true, err);
     if (rc == SH_OK && log.n > 0)
         sh_warn(b->report, "%s: %u warnings while read, the first: %s", b->name, log.n, log.first);
+    if (rc == SH_OK && im.n_turned > 0)
+        sh_warn(b->report, "%s: the textures of %u meshes are turned: they are read as if they were not", b->name,
+                im.n_turned);
     aiReleaseImport(im.in);
     return rc;
 }

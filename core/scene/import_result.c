@@ -22,11 +22,14 @@ struct result_head {
     char magic[8];
     uint32_t n_vertices, n_triangles, n_surfaces, n_meshes, n_textures, has_uv;
     struct scene_counts counts;
+    double error_m;
+    struct scene_says says;
 };
 
 /* Before its name and its bytes. */
 struct result_texture {
     uint64_t name_len, n_bytes;
+    uint32_t raw_width, raw_height, wrap[2];
 };
 
 /* ---- writing */
@@ -49,7 +52,11 @@ static int put_textures(const struct scene *s, int fd, struct sh_err *err)
     int rc = SH_OK;
     for (uint32_t i = 0; i < s->n_textures && rc == SH_OK; i++) {
         const struct scene_texture *texture = &s->texture[i];
-        const struct result_texture size = {strlen(texture->file), texture->n_bytes};
+        const struct result_texture size = {.name_len = strlen(texture->file),
+                                            .n_bytes = texture->n_bytes,
+                                            .raw_width = texture->raw_width,
+                                            .raw_height = texture->raw_height,
+                                            .wrap = {texture->wrap[0], texture->wrap[1]}};
         rc = put(fd, &size, sizeof size, err);
         if (rc == SH_OK) rc = put(fd, texture->file, size.name_len, err);
         if (rc == SH_OK) rc = put(fd, texture->bytes, size.n_bytes, err);
@@ -74,7 +81,9 @@ int import_result_write(struct scene *scene, int fd, struct sh_err *err)
                                .n_meshes = s->n_meshes,
                                .n_textures = s->n_textures,
                                .has_uv = s->uv != NULL,
-                               .counts = s->counts};
+                               .counts = s->counts,
+                               .error_m = s->error_m,
+                               .says = s->says};
     memcpy(head.magic, MAGIC, sizeof head.magic);
     int rc = put(fd, &head, sizeof head, err);
     if (rc == SH_OK) rc = put_textures(s, fd, err);
@@ -126,14 +135,20 @@ static int take(struct result *r, void *data, size_t size)
 }
 
 /* A name in the folder of the mesh comes back with that folder. */
-static int add_texture(struct result *r, const char *file, size_t len, const void *bytes, size_t n_bytes,
+static int add_texture(struct result *r, const char *file, const void *bytes, const struct result_texture *size,
                        uint32_t i)
 {
     const char *mesh = r->b->spec->file, *slash = strrchr(mesh, '/');
     size_t folder = slash != NULL && file[0] != '/' ? (size_t)(slash - mesh) + 1 : 0;
-    if (len < folder || memcmp(file, mesh, folder) != 0) return wrong(r, "the path of texture", i);
-    return build_texture(r->b, (struct text_span){file + folder, len - folder}, bytes, n_bytes, &r->texture[i],
-                         r->err);
+    if (size->name_len < folder || memcmp(file, mesh, folder) != 0) return wrong(r, "the path of texture", i);
+    if (size->wrap[0] > TEXTURE_DECAL || size->wrap[1] > TEXTURE_DECAL) return wrong(r, "how it repeats, texture", i);
+    const struct build_image image = {.name = {file + folder, size->name_len - folder},
+                                      .bytes = size->n_bytes > 0 ? bytes : NULL,
+                                      .n_bytes = size->n_bytes,
+                                      .raw_width = size->raw_width,
+                                      .raw_height = size->raw_height,
+                                      .wrap = {(enum texture_wrap)size->wrap[0], (enum texture_wrap)size->wrap[1]}};
+    return build_texture(r->b, &image, &r->texture[i], r->err);
 }
 
 static int take_texture(struct result *r, uint32_t i)
@@ -148,8 +163,7 @@ static int take_texture(struct result *r, uint32_t i)
     if (rc == SH_OK) rc = take(r, file, size.name_len);
     if (rc == SH_OK) rc = take(r, bytes, size.n_bytes);
     if (rc == SH_OK && memchr(file, '\0', size.name_len) != NULL) rc = wrong(r, "the name of texture", i);
-    if (rc == SH_OK)
-        rc = add_texture(r, file, size.name_len, size.n_bytes > 0 ? bytes : NULL, size.n_bytes, i);
+    if (rc == SH_OK) rc = add_texture(r, file, bytes, &size, i);
     free(file);
     free(bytes);
     return rc;
@@ -158,7 +172,8 @@ static int take_texture(struct result *r, uint32_t i)
 static int take_textures(struct result *r)
 {
     int rc = SH_OK;
-    if (r->head.n_textures > r->head.n_surfaces) return wrong(r, "number of textures:", r->head.n_textures);
+    if (r->head.n_textures > 2 * (uint64_t)r->head.n_surfaces)
+        return wrong(r, "number of textures:", r->head.n_textures);
     r->texture = calloc(r->head.n_textures + 1u, sizeof *r->texture);
     if (r->texture == NULL) return build_fail(r->b, SH_ENOMEM, r->err, "no memory for textures");
     for (uint32_t i = 0; i < r->head.n_textures && rc == SH_OK; i++)
@@ -178,14 +193,18 @@ static int add_surface(struct result *r, const struct scene_surface *in, uint32_
     size_t object = strnlen(in->object, SCENE_NAME_LEN), material = strnlen(in->material, SCENE_NAME_LEN);
     if (object == SCENE_NAME_LEN || material == SCENE_NAME_LEN) return wrong(r, "a name of surface", i);
     if (in->has_colour && !is_colour(in)) return wrong(r, "the colour of surface", i);
-    if (in->texture > r->head.n_textures) return wrong(r, "the texture of surface", i);
+    if (in->texture > r->head.n_textures || in->opacity > r->head.n_textures)
+        return wrong(r, "the texture of surface", i);
+    if (!(in->solid >= 0.0f && in->solid <= 1.0f)) return wrong(r, "the opacity of surface", i);
     int rc = build_label(r->b, (struct text_span){in->object, object}, (struct text_span){in->material, material},
                          &r->label[i], r->err);
     if (rc != SH_OK) return rc;
     struct scene_surface *out = &r->b->scene->surface[r->label[i]];
     if (!out->has_colour && in->has_colour) memcpy(out->colour, in->colour, sizeof out->colour);
     out->has_colour |= in->has_colour;
+    if (out->texture == 0 && out->opacity == 0) out->solid = in->solid;
     if (out->texture == 0 && in->texture != 0) out->texture = r->texture[in->texture - 1];
+    if (out->opacity == 0 && in->opacity != 0) out->opacity = r->texture[in->opacity - 1];
     return SH_OK;
 }
 
@@ -284,10 +303,16 @@ static int take_head(struct result *r)
     if (fstat(r->fd, &st) != 0) return build_fail(r->b, SH_EIO, r->err, "%s", strerror(errno));
     r->size = (uint64_t)st.st_size;
     int rc = take(r, &r->head, sizeof r->head);
-    if (rc == SH_OK && memcmp(r->head.magic, MAGIC, sizeof MAGIC) != 0) rc = wrong(r, "its head is not one, of byte", 0);
+    if (rc == SH_OK && memcmp(r->head.magic, MAGIC, sizeof MAGIC) != 0)
+        rc = wrong(r, "its head is not one, of byte", 0);
     if (rc == SH_OK && r->head.n_triangles == 0) rc = wrong(r, "number of triangles:", 0);
     if (rc == SH_OK && r->head.has_uv > 1) rc = wrong(r, "texture coordinates:", r->head.has_uv);
+    if (rc == SH_OK && !(r->head.error_m >= 0.0 && r->head.error_m <= BUILD_MAX_COORDINATE_M))
+        rc = wrong(r, "the error of its vertices, above m:", 0);
     if (rc == SH_OK && least_size(&r->head) > r->size) rc = wrong(r, "its size is", r->size);
+    if (rc == SH_OK && !(r->head.says.unit_m >= 0.0 && r->head.says.unit_m <= BUILD_MAX_COORDINATE_M))
+        rc = wrong(r, "its unit:", 0);
+    if (rc == SH_OK && (r->head.says.up < -3 || r->head.says.up > 3)) rc = wrong(r, "its axes:", 0);
     return rc;
 }
 
@@ -298,6 +323,8 @@ static void count(struct result *r)
     s->counts.not_triangles += r->head.counts.not_triangles;
     s->counts.names_cut += r->head.counts.names_cut;
     s->n_meshes += r->head.n_meshes;
+    s->error_m = fmax(s->error_m, r->head.error_m);
+    s->says = r->head.says;
 }
 
 int import_result_read(struct scene_build *b, int fd, struct sh_err *err)

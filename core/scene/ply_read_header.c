@@ -60,6 +60,9 @@ static enum ply_use use_of(const struct ply_element *e, const struct ply_propert
     if (e->kind == PLY_FACE && p->is_list && (text_is(name, "vertex_indices") || text_is(name, "vertex_index")))
         return PLY_CORNERS;
     if (e->kind != PLY_VERTEX || p->is_list) return PLY_SKIP;
+    static const char prefix[] = "scalar_"; /* CloudCompare's */
+    const size_t n = sizeof prefix - 1;
+    if (name.n > n && memcmp(name.p, prefix, n) == 0) name = (struct text_span){name.p + n, name.n - n};
     for (unsigned i = PLY_X; i < PLY_SCALARS; i++)
         if (text_is(name, ply_scalar_name[i])) return (enum ply_use)i;
     return PLY_SKIP;

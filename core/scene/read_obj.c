@@ -118,7 +118,7 @@ static int read_face(struct obj *o, struct sh_err *err)
     size_t n = 0;
     while (!at_statement_end(o)) {
         int rc = build_corners(b, n + 1, err);
-        if (rc == SH_OK) rc = read_corner(o, &b->corner[n], b->spec->textures ? b->corner_uv[n] : NULL, err);
+        if (rc == SH_OK) rc = read_corner(o, &b->corner[n], build_wants_textures(b) ? b->corner_uv[n] : NULL, err);
         if (rc != SH_OK) return rc;
         n++;
     }
@@ -191,7 +191,7 @@ static int read_statement(struct obj *o, struct sh_err *err)
     if (text_is(word, "f")) return read_face(o, err);
     if (text_is(word, "o") || text_is(word, "g")) return read_name(o, &o->object);
     if (text_is(word, "p")) return count_left_out(o, true);
-    if (text_is(word, "vt") && o->b->spec->textures) return read_uv(o, err);
+    if (text_is(word, "vt") && build_wants_textures(o->b)) return read_uv(o, err);
     if (text_is(word, "usemtl")) return read_name(o, &o->material);
     if (text_is(word, "mtllib")) {
         o->t.continued = false; /* a backslash there may be a path's */

@@ -60,15 +60,15 @@ static int use_row(void *ply, struct sh_err *err)
     return SH_OK;
 }
 
-static void warn_if_coarse(const struct ply *y)
+/* What they stood for was rounded when the file was written: nothing can be done about that here. */
+static int note_rounding(const struct ply *y, struct sh_err *err)
 {
     const struct scene_build *b = y->b;
     double largest = 0;
     for (uint32_t i = b->vertex0; i < b->scene->n_vertices; i++)
         for (int k = 0; k < 3; k++)
             largest = fmax(largest, fabs(b->scene->vertex_m[i][k] - b->spec->offset_m[k]));
-    if (largest * 6e-8 > b->tolerance_m)
-        sh_warn(b->report, "%s: stored in single precision, so good to %.2g m only", b->name, largest * 6e-8);
+    return build_single(y->b, largest / b->spec->scale, false, err);
 }
 
 static int begin_element(void *ply, struct sh_err *err)
@@ -84,7 +84,7 @@ static int read_body(struct ply *y, struct sh_err *err)
     const struct ply_user user = {y, begin_element, use_row, y->b->report, .has_faces = true};
     int rc = build_label(y->b, build_base_name(y->b), (struct text_span){"", 0}, &y->label, err);
     if (rc == SH_OK) rc = ply_walk(&y->r, &user, err);
-    if (rc == SH_OK && y->r.is_single) warn_if_coarse(y);
+    if (rc == SH_OK && y->r.is_single) rc = note_rounding(y, err);
     y->b->scene->n_meshes++;
     return rc;
 }

@@ -15,7 +15,7 @@ static const struct {
     const char *ending;
     int (*read)(struct scene_build *b, struct sh_err *err);
 } readers[] = {
-    {".obj", read_obj},      {".ply", read_ply},      {".stl", import_apart}, {".gltf", import_apart},
+    {".obj", read_obj},     {".ply", read_ply},     {".stl", import_apart}, {".gltf", import_apart},
     {".glb", import_apart}, {".fbx", import_apart}, {".dae", import_apart}, {".ifc", import_apart},
 };
 
@@ -47,6 +47,19 @@ static int load_file(struct scene_build *b, const struct scene_mesh_spec *spec, 
     return build_fail(b, SH_EINPUT, err, "unknown ending; allowed are .obj .ply .stl .gltf .glb .fbx .dae .ifc");
 }
 
+static int look_for_cutouts(struct scene *scene, const struct scene_mesh_spec *specs, size_t n_specs,
+                            const struct sh_report *report, struct sh_err *err)
+{
+    int textures = 0, cutouts = 0, rc = SH_OK;
+    for (size_t i = 0; i < n_specs; i++) {
+        textures |= specs[i].textures;
+        cutouts |= specs[i].cutouts;
+    }
+    if (cutouts && scene->n_textures > 0) rc = scene_find_cutouts(scene, report, err);
+    if (!textures) scene_drop_textures(scene);
+    return rc;
+}
+
 int scene_load(const struct scene_mesh_spec *specs, size_t n_specs, double tolerance_m, const struct sh_report *report,
                struct scene **out, struct sh_err *err)
 {
@@ -56,7 +69,11 @@ int scene_load(const struct scene_mesh_spec *specs, size_t n_specs, double toler
     for (size_t i = 0; i < n_specs && rc == SH_OK; i++)
         rc = load_file(&b, &specs[i], err);
     if (rc == SH_OK) rc = build_finish(&b, out, err);
+    if (rc == SH_OK) rc = look_for_cutouts(*out, specs, n_specs, report, err);
     build_release(&b);
+    if (rc == SH_OK) return rc;
+    scene_free(*out);
+    *out = NULL;
     return rc;
 }
 
@@ -72,7 +89,7 @@ static int copy_surfaces(struct scene_build *b, const struct scene_arrays *array
         if (memchr(surface[i].object, '\0', SCENE_NAME_LEN) == NULL ||
             memchr(surface[i].material, '\0', SCENE_NAME_LEN) == NULL)
             return build_fail(b, SH_EINPUT, err, "surface %u: a name has no end", i);
-        b->scene->surface[i].texture = 0;
+        b->scene->surface[i].texture = b->scene->surface[i].opacity = 0;
     }
     b->scene->n_surfaces = n;
     return SH_OK;
@@ -134,5 +151,9 @@ void scene_free(struct scene *scene)
         free(scene->texture[i].bytes);
     }
     free(scene->texture);
+    for (uint32_t i = 0; i < scene->n_masks; i++)
+        free(scene->mask[i]);
+    free(scene->mask);
+    free(scene->cutout);
     free(scene);
 }

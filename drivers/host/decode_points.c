@@ -35,7 +35,7 @@ static inline struct native_point take(const uint8_t *payload, uint32_t i, int64
     struct native_point w;
     native_decode_point(payload, i, &w);
     p->label = w.label;
-    p->t_ns = t0_ns + (int64_t)w.dt_ns;
+    p->t_ns = (int64_t)((uint64_t)t0_ns + w.dt_ns); /* wraps where a broken stream's t0_ns is the largest */
     p->echo = w.echo;
     p->echo_count = w.echo_count;
     p->reflectance_db = w.refl_cdb == INT16_MIN ? NAN : w.refl_cdb / 100.0;

@@ -48,9 +48,9 @@ static int wait_writable(struct scanhead *sh, int64_t deadline_ns)
 }
 
 /* What had come can still be read. */
-static int gone_while_writing(struct scanhead *sh)
+static int gone_while_writing(struct scanhead *sh, int error)
 {
-    sh->lost = sh->source.usb != NULL;
+    host_note_loss(sh, error);
     return host_gone(sh);
 }
 
@@ -65,7 +65,7 @@ static int send_all(struct scanhead *sh, const char *data, size_t len, int64_t d
         else if (n < 0 && errno == EAGAIN)
             rc = wait_writable(sh, deadline_ns);
         else if (n < 0 && host_is_hang_up(sh, errno))
-            rc = gone_while_writing(sh);
+            rc = gone_while_writing(sh, errno);
         else if (n < 0 && errno != EINTR)
             rc = sh_fail(&sh->err, SH_EIO, "%s: cannot write: %s", sh->source.name, strerror(errno));
         if (rc != 0) {

@@ -7,12 +7,18 @@
 _Static_assert(SCANHEAD_EINPUT == (int)SH_EINPUT && SCANHEAD_EIO == (int)SH_EIO && SCANHEAD_ENOMEM == (int)SH_ENOMEM &&
                    SCANHEAD_EPERM == (int)SH_EPERM && SCANHEAD_ETIMEOUT == (int)SH_ETIMEOUT &&
                    SCANHEAD_ECLOSED == (int)SH_ECLOSED && SCANHEAD_EFORMAT == (int)SH_EFORMAT &&
-                   SCANHEAD_ESTATE == (int)SH_ESTATE && SCANHEAD_ELOST == (int)SH_ELOST,
+                   SCANHEAD_ESTATE == (int)SH_ESTATE && SCANHEAD_ELOST == (int)SH_ELOST &&
+                   SCANHEAD_ERESET == (int)SH_ERESET,
                "the library's errors are those of core/err.h");
 _Static_assert(SCANHEAD_POINTS == (int)NATIVE_POINTS && SCANHEAD_POSES == (int)NATIVE_POSES &&
                    SCANHEAD_ATTRIBUTES == (int)NATIVE_ATTRIBUTES && SCANHEAD_EV_PPS == (int)NATIVE_EV_PPS &&
                    SCANHEAD_POSE_NONE == (int)NATIVE_POSE_NONE && SCANHEAD_LOCAL == (int)NATIVE_LOCAL,
                "types, events and flags are those on the wire");
+
+const char *scanhead_version(void)
+{
+    return SCANHEAD_VERSION;
+}
 
 /* Tries to open a source until the deadline while it isn't there. wrong_too: also while its name seems wrong,
  * because it was right once. */
@@ -66,7 +72,7 @@ int scanhead_reattach(struct scanhead *sh, int timeout_ms)
     snprintf(name, sizeof name, "%s", sh->source.name);
     int rc = open_in_time(name, 1, host_deadline_ns(timeout_ms), &sh->source, &sh->err);
     if (rc != SH_OK) return rc;
-    sh->ended = sh->lost = sh->stuck = 0;
+    sh->ended = sh->lost = sh->reset = sh->stuck = 0;
     native_parser_resume(&sh->parser);
     return SCANHEAD_OK;
 }
@@ -211,6 +217,10 @@ int host_check_last(struct scanhead *sh, const struct scanhead_frame *frame, enu
 
 int host_gone(struct scanhead *sh)
 {
+    if (sh->reset)
+        return sh_fail(&sh->err, SCANHEAD_ERESET,
+                       "%s: the USB bus was reset: the head is still plugged in, and its session is over",
+                       sh->source.name);
     if (sh->lost)
         return sh_fail(&sh->err, SCANHEAD_ELOST, "%s: the head was unplugged, or answers no more", sh->source.name);
     return sh_fail(&sh->err, SCANHEAD_ECLOSED, sh->source.is_file ? "%s: end of the recording" : "%s: the head is gone",

@@ -61,6 +61,7 @@ struct scanhead {
     struct host_source source;
     int ended; /* no more bytes will come */
     int lost;  /* because the device was unplugged */
+    int reset; /* because the bus was reset, with the device still on it */
     int stuck; /* half a command went out: nothing sensible can follow */
     struct native_parser parser;
     struct host_kept kept;
@@ -80,7 +81,8 @@ struct scanhead {
     size_t surface_room;
     uint32_t n_surfaces;
 
-    uint64_t dropped, reader_lost, pulses_lost;
+    uint64_t dropped, reader_lost;
+    uint64_t pulses_lost_told, pulses_lost_ended; /* by OVERRUN events, by SCAN_END events */
     int hashing;
     struct sha256_ctx sha256;
     struct sh_err err;
@@ -104,6 +106,8 @@ int host_usb_watch_wait(struct host_usb_watch *watch, int rc, int64_t deadline_n
 
 /* io.c: whether an errno of the source's read or write means that the other side is gone. */
 int host_is_hang_up(const struct scanhead *sh, int error);
+/* What that errno says of a head on USB: unplugged, or its bus reset. */
+void host_note_loss(struct scanhead *sh, int error);
 /* Sets and returns the error for when nothing more will come. */
 int host_gone(struct scanhead *sh);
 

@@ -65,9 +65,15 @@ int host_wait(struct scanhead *sh, short events, int64_t deadline_ns, short *rev
 /* A pty whose master is closed says EIO; a reset connection is as gone as a closed one. */
 int host_is_hang_up(const struct scanhead *sh, int error)
 {
-    if (sh->source.usb != NULL) return error == ENODEV;
+    if (sh->source.usb != NULL) return error == ENODEV || error == ECONNRESET;
     return !sh->source.is_file && (error == EIO || error == ECONNRESET || error == EPIPE || error == ENODEV ||
                                    error == ENXIO || error == ETIMEDOUT);
+}
+
+void host_note_loss(struct scanhead *sh, int error)
+{
+    sh->reset = sh->source.usb != NULL && error == ECONNRESET;
+    sh->lost = sh->source.usb != NULL && !sh->reset;
 }
 
 int host_fill(struct scanhead *sh, int64_t deadline_ns)
@@ -83,7 +89,7 @@ int host_fill(struct scanhead *sh, int64_t deadline_ns)
         if (n == 0 || host_is_hang_up(sh, errno)) {
             native_parser_finish(&sh->parser);
             sh->ended = 1;
-            sh->lost = sh->source.usb != NULL;
+            host_note_loss(sh, n < 0 ? errno : 0);
             return 0;
         }
         if (errno == EINTR) continue;

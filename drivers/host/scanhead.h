@@ -34,7 +34,12 @@
 extern "C" {
 #endif
 
+/* Of this release, the only place that says it: program, library and libscanhead.pc have the same. */
+#define SCANHEAD_VERSION "1.0.0"
 #define SCANHEAD_API_VERSION 1
+
+/* SCANHEAD_VERSION of the library that the program runs with. */
+const char *scanhead_version(void);
 
 enum scanhead_error {
     SCANHEAD_OK = 0,
@@ -46,7 +51,8 @@ enum scanhead_error {
     SCANHEAD_ECLOSED = -6,  /* the head is gone, or the file is at its end */
     SCANHEAD_EFORMAT = -7,  /* not this protocol */
     SCANHEAD_ESTATE = -8,   /* not possible now, for instance points before descriptor and anchor have come */
-    SCANHEAD_ELOST = -9,    /* the USB head was unplugged, or isn't there */
+    SCANHEAD_ELOST = -9,    /* the head was unplugged, or isn't there */
+    SCANHEAD_ERESET = -10,  /* the USB bus was reset: the head is there, the session is over */
 };
 
 struct scanhead;
@@ -68,8 +74,8 @@ void scanhead_close(struct scanhead *sh);
 /* The text of the last error; the handle's, until its next call. */
 const char *scanhead_error(const struct scanhead *sh);
 
-/* Waits until the same head is there again, and goes on with it. To be called after SCANHEAD_ELOST or
- * SCANHEAD_ECLOSED, once all frames that had come were taken. Counters, hash and what the stream has said of
+/* Waits until the same head is there again, and goes on with it. To be called after SCANHEAD_ELOST,
+ * SCANHEAD_ERESET or SCANHEAD_ECLOSED, once all frames that had come were taken. Counters, hash and what the stream has said of
  * itself go on too; a jump in the sequence shows what was lost meanwhile. On USB the same head is the one
  * with the same ids and serial number. SCANHEAD_ESTATE for a file or "fd:N". Any other error: it did not come
  * back in time, or a signal came; call again, or close. */

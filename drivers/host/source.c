@@ -17,9 +17,8 @@
 
 enum { CONNECT_TIMEOUT_MS = 10000, RECEIVE_BUFFER = 4 << 20 };
 
-static int fail_open(struct sh_err *err, const char *name)
+static int fail_open(struct sh_err *err, int code, const char *name)
 {
-    int code = errno == EACCES || errno == EPERM ? SH_EPERM : errno == ENOENT ? SH_EINPUT : SH_EIO;
     return sh_fail(err, code,
                    "%s: cannot open: %s (a source is usb, tty:PATH, tcp:HOST:PORT, fd:N or the path of a .shs file)",
                    name, strerror(errno));
@@ -28,7 +27,12 @@ static int fail_open(struct sh_err *err, const char *name)
 static int open_tty(const char *path, struct host_source *out, struct sh_err *err)
 {
     out->fd = open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-    if (out->fd < 0) return fail_open(err, out->name);
+    if (out->fd < 0)
+        return fail_open(err,
+                         errno == EACCES || errno == EPERM ? SH_EPERM
+                         : errno == ENOENT                 ? SH_ELOST
+                                                           : SH_EIO,
+                         out->name);
     struct termios tio;
     if (tcgetattr(out->fd, &tio) != 0)
         return sh_fail(err, SH_EINPUT, "%s: not a terminal device: %s", out->name, strerror(errno));
@@ -148,13 +152,18 @@ static int open_fd(const char *number, struct host_source *out, struct sh_err *e
     return 0;
 }
 
+/* A regular file: a FIFO would wait for its writer (fd:N takes one), a device may have no end. */
 static int open_file(const char *path, struct host_source *out, struct sh_err *err)
 {
-    out->fd = open(path, O_RDONLY | O_CLOEXEC);
-    if (out->fd < 0) return fail_open(err, out->name);
+    out->fd = open(path, O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+    if (out->fd < 0) return fail_open(err, SH_EINPUT, out->name);
     struct stat st;
-    if (fstat(out->fd, &st) == 0 && S_ISDIR(st.st_mode))
-        return sh_fail(err, SH_EINPUT, "%s: is a directory, not a recorded stream", out->name);
+    if (fstat(out->fd, &st) == 0 && !S_ISREG(st.st_mode))
+        return sh_fail(err, SH_EINPUT, "%s: is a %s, not a recorded stream%s", out->name,
+                       S_ISDIR(st.st_mode)    ? "directory"
+                       : S_ISFIFO(st.st_mode) ? "FIFO"
+                                              : "device",
+                       S_ISFIFO(st.st_mode) ? "; fd:N reads one that is open" : "");
     out->is_file = 1;
     return 0;
 }

@@ -15,7 +15,8 @@ static int absorb_descriptor(struct scanhead *sh, const struct native_header *he
 {
     struct native_descriptor d;
     if (native_decode_descriptor(payload, header->length, &d) != 0) return bad(sh, "a wrong descriptor");
-    if (d.layout == NATIVE_POLAR && !(d.mirror_counts_per_turn > 0 && d.pan_counts_per_turn > 0 && d.range_scale_m > 0))
+    if (d.layout == NATIVE_POLAR &&
+        !(d.mirror_counts_per_turn >= 1 && d.pan_counts_per_turn >= 1 && d.range_scale_m > 0))
         return bad(sh, "a polar descriptor without scales");
     if (d.n_surfaces > SCANHEAD_NO_LABEL) return bad(sh, "a descriptor with more surfaces than labels");
     /* The anchor of another scan may be that of another station; a descriptor that is not a repetition begins
@@ -92,7 +93,8 @@ static int absorb_event(struct scanhead *sh, const struct native_header *header,
     struct native_event event;
     if (native_decode_event(payload, header->length, &event) != 0) return bad(sh, "a wrong event");
     if (event.code == NATIVE_EV_READER_LOST) sh->reader_lost = event.c;
-    if (event.code == NATIVE_EV_OVERRUN) sh->pulses_lost += event.b;
+    if (event.code == NATIVE_EV_OVERRUN) sh->pulses_lost_told += event.b;
+    if (event.code == NATIVE_EV_SCAN_END) sh->pulses_lost_ended += event.c;
     if (event.code == NATIVE_EV_SCAN_START && sh->have_descriptor && event.a != sh->descriptor.scan) forget(sh);
     absorb_time(sh, &event);
     return 0;
@@ -244,7 +246,8 @@ void scanhead_get_stats(const struct scanhead *sh, struct scanhead_stats *stats)
         .seq_lost = s->seq_lost,
         .dropped = sh->dropped,
         .reader_lost = sh->reader_lost,
-        .pulses_lost = sh->pulses_lost,
+        /* both count the same; of either, some may not have come */
+        .pulses_lost = sh->pulses_lost_told > sh->pulses_lost_ended ? sh->pulses_lost_told : sh->pulses_lost_ended,
     };
 }
 

@@ -158,14 +158,26 @@ static int recover_reads(struct host_usb *usb)
     return recover(usb, &usb->in_failing, usb->head.interface.in);
 }
 
+/* The kernel ends transfers alike when a device goes and when another program or the system resets its bus. After a
+ * reset the device still answers. */
+static int gone_or_reset(struct host_usb *usb)
+{
+    uint8_t status[2];
+    const uint8_t type = (uint8_t)LIBUSB_REQUEST_TYPE_STANDARD | LIBUSB_RECIPIENT_DEVICE | LIBUSB_ENDPOINT_IN;
+    const int n = libusb_control_transfer(usb->head.handle, type, LIBUSB_REQUEST_GET_STATUS, 0, 0, status,
+                                          sizeof status, USB_CONTROL_MS);
+    return n == sizeof status ? ECONNRESET : ENODEV;
+}
+
 /* The present transfer is used up: submits it again, and goes on to the next. */
 static int turn(struct host_usb *usb)
 {
     struct in_transfer *in = &usb->in[usb->next];
-    int error = in->error != 0 ? in->error : errno_of_status(in->transfer->status);
+    int error = in->error;
+    if (error == 0 && (error = errno_of_status(in->transfer->status)) == ENODEV) error = gone_or_reset(usb);
     if (in->transfer->actual_length > 0) usb->in_failing.n = 0;
     if (error == EPROTO) error = recover_reads(usb);
-    if (error == ENODEV) {
+    if (error == ENODEV || error == ECONNRESET) {
         in->error = error;
         return error;
     }
@@ -208,6 +220,7 @@ static ssize_t usb_write(struct host_source *source, const void *data, size_t le
     struct host_usb *usb = source->usb;
     if (usb->out_flying && handle_events(usb, 0) != 0) return -1;
     int error = usb->out_flying ? EAGAIN : usb->out_error;
+    if (error == ENODEV) error = gone_or_reset(usb);
     if (error == EPROTO) error = recover(usb, &usb->out_failing, usb->head.interface.out);
     if (error != 0) {
         errno = error;

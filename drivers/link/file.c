@@ -11,6 +11,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "core/newfile.h"
 #include "drivers/link/link_poll.h"
 
 struct file_link {
@@ -20,34 +21,22 @@ struct file_link {
     char path[256];
 };
 
-static int file_fail(struct sh_err *err, const char *path, int error)
-{
-    int code = error == EACCES || error == EPERM || error == EROFS                                          ? SH_EPERM
-               : error == ENOENT || error == ENOTDIR || error == EISDIR || error == ENXIO || error == ELOOP ? SH_EINPUT
-                                                                                                            : SH_EIO;
-    return sh_fail(err, code, "link file:%s: cannot be opened for writing: %s", path, strerror(error));
-}
-
-/* Not blocking, so that a FIFO cannot hold us; truncated only once it is known to be a file. */
 static int file_open_fd(const char *path, int *out, struct sh_err *err)
 {
+    struct sh_err why = {0};
     struct stat st;
-    int fd = open(path, O_WRONLY | O_CREAT | O_APPEND | O_NONBLOCK | O_NOCTTY | O_CLOEXEC, 0666);
-    if (fd < 0 && errno == ENXIO) goto kind; /* a FIFO without a reader, or a socket */
-    if (fd < 0) return file_fail(err, path, errno);
-    if (fstat(fd, &st) != 0 || fcntl(fd, F_SETFL, O_APPEND) != 0) goto system;
-    if (!S_ISREG(st.st_mode) && !S_ISCHR(st.st_mode)) goto kind;
-    if (S_ISREG(st.st_mode) && ftruncate(fd, 0) != 0) goto system;
-    *out = fd;
-    return SH_OK;
-system:
-    sh_fail(err, SH_EIO, "link file:%s: %s", path, strerror(errno));
-    close(fd);
-    return SH_EIO;
-kind:
-    if (fd >= 0) close(fd);
-    return sh_fail(err, SH_EINPUT, "link file:%s: neither a regular file nor a character device; use a pty or tcp link",
-                   path);
+    int fd, rc = newfile_open(path, &fd, &why);
+    if (rc != SH_OK) return sh_fail(err, rc, "link file:%s", why.text);
+    if (fstat(fd, &st) != 0 || fcntl(fd, F_SETFL, O_APPEND) != 0)
+        rc = sh_fail(err, SH_EIO, "link file:%s: %s", path, strerror(errno));
+    else if (!S_ISREG(st.st_mode) && !S_ISCHR(st.st_mode))
+        rc = sh_fail(err, SH_EINPUT,
+                     "link file:%s: neither a regular file nor a character device; use a pty or tcp link", path);
+    if (rc != SH_OK)
+        close(fd);
+    else
+        *out = fd;
+    return rc;
 }
 
 static int file_open(const struct link_spec *spec, void **link, struct sh_err *err)

@@ -31,6 +31,7 @@ struct link_spec {
     int attach, retry_ms, vid, pid;
     char udc[64];
     char serial[64]; /* empty: no serial number string */
+    int own_serial;  /* serial is only its beginning: drivers/usb/own_identity.h has the rest */
 };
 
 enum link_event_kind {

@@ -66,6 +66,15 @@ static int link_errno(const char *path, struct sh_err *err)
     return sh_fail(err, code, "link pty:%s: the symlink cannot be made: %s", path, strerror(errno));
 }
 
+/* The link of a head that was killed, whose terminal's number another program has got since: ours, as the name
+ * of a slave, and older than the terminal. A head makes the terminal first. */
+static int is_left_over(const char *text, const struct stat *link, const struct stat *terminal)
+{
+    const struct timespec made = link->st_mtim, born = terminal->st_ctim;
+    if (link->st_uid != geteuid() || strncmp(text, "/dev/pts/", 9) != 0 || !S_ISCHR(terminal->st_mode)) return 0;
+    return made.tv_sec < born.tv_sec || (made.tv_sec == born.tv_sec && made.tv_nsec < born.tv_nsec);
+}
+
 /* 1: there is nothing at path, 0: a symlink that may be replaced, or an error. */
 static int link_look(const char *path, const char *slave, struct sh_err *err)
 {
@@ -76,7 +85,7 @@ static int link_look(const char *path, const char *slave, struct sh_err *err)
     ssize_t n = readlink(path, text, sizeof text - 1);
     if (n < 0) return link_errno(path, err);
     text[n] = '\0';
-    if (strcmp(text, slave) == 0 || stat(path, &target) != 0) return 0;
+    if (strcmp(text, slave) == 0 || stat(path, &target) != 0 || is_left_over(text, &self, &target)) return 0;
     return link_refuse(path,
                        S_ISCHR(target.st_mode) ? "leads to a terminal in use by another program"
                                                : "leads to something that is not a terminal of ours",

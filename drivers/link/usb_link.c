@@ -7,10 +7,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "drivers/link/link_poll.h"
 #include "drivers/usb/backend.h"
 #include "drivers/usb/head_device.h"
+#include "drivers/usb/own_identity.h"
 
 struct usb_link {
     struct scanhead_usb head;
@@ -18,9 +20,17 @@ struct usb_link {
     void *backend;
     int reported[SCANHEAD_USB_SESSIONS]; /* the caller takes it to be open */
     const char *news;                    /* the back end's, until reported */
+    int claim;                           /* of the head's own number; -1: its identity is configured */
 };
 
 static const char *const session_names[] = {[CONSOLE_SESSION] = "usb console", [STREAM_SESSION] = "usb stream"};
+
+static void free_link(struct usb_link *self)
+{
+    usb_device_free(self->head.device);
+    if (self->claim >= 0) close(self->claim);
+    free(self);
+}
 
 static int usb_open(const struct link_spec *spec, void **link, struct sh_err *err)
 {
@@ -33,16 +43,17 @@ static int usb_open(const struct link_spec *spec, void **link, struct sh_err *er
                                        .attach = spec->attach,
                                        .retry_ms = spec->retry_ms};
     snprintf(id.serial, sizeof id.serial, "%s", spec->serial);
+    self->claim = -1;
     snprintf(backend.address, sizeof backend.address, "%s", spec->address);
     snprintf(backend.path, sizeof backend.path, "%s", spec->path);
     snprintf(backend.udc, sizeof backend.udc, "%s", spec->udc);
     self->ops = usb_backend_ops_get(backend.type);
     int rc = self->ops != NULL ? SH_OK : sh_fail(err, SH_EINPUT, "link usb: this build has no such back end");
+    if (rc == SH_OK && spec->own_serial) rc = usb_own_identity(&id, &self->claim, err);
     if (rc == SH_OK) rc = scanhead_usb_create(&id, &self->head, err);
     if (rc == SH_OK) rc = self->ops->open(&backend, self->head.device, &self->backend, err);
     if (rc != SH_OK) {
-        usb_device_free(self->head.device);
-        free(self);
+        free_link(self);
         return rc;
     }
     *link = self;
@@ -111,9 +122,17 @@ static void report(struct usb_link *self, int i, uint32_t want_write, struct lin
     if ((want_write >> i & 1u) != 0 && is_writable(self, i)) link_events_push(events, LINK_WRITABLE, i, NULL);
 }
 
+/* A back end that was unplugged may have more to say of it. */
+static void take_news(struct usb_link *self)
+{
+    if (self->news == NULL && self->ops->news != NULL) self->news = self->ops->news(self->backend);
+    if (self->news != NULL && self->head.cut == USB_END_UNPLUGGED) self->head.cut_due = 0;
+    if (self->news == NULL) self->news = scanhead_usb_cut(&self->head);
+}
+
 static int has_news(const struct usb_link *self, uint32_t want_write)
 {
-    int news = (self->ops->more != NULL && self->ops->more(self->backend)) || self->news != NULL;
+    int news = (self->ops->more != NULL && self->ops->more(self->backend)) || self->news != NULL || self->head.cut_due;
     for (int i = 0; i < SCANHEAD_USB_SESSIONS; i++)
         news |= has_to_report(self, i) || is_readable(self, i) || ((want_write >> i & 1u) != 0 && is_writable(self, i));
     return news;
@@ -134,7 +153,7 @@ static int usb_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     self->ops->flush(self->backend);
     for (int i = 0; i < SCANHEAD_USB_SESSIONS; i++)
         report(self, i, want_write, &events);
-    if (self->news == NULL && self->ops->news != NULL) self->news = self->ops->news(self->backend);
+    take_news(self);
     if (self->news != NULL && link_events_push(&events, LINK_NOTICE, 0, self->news)) self->news = NULL;
     return events.n;
 }
@@ -169,8 +188,7 @@ static void usb_close(void *link)
 {
     struct usb_link *self = link;
     self->ops->close(self->backend);
-    usb_device_free(self->head.device);
-    free(self);
+    free_link(self);
 }
 
 const struct link_ops link_usb = {

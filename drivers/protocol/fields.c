@@ -87,7 +87,8 @@ static const struct field telemetry[] = {
     TELE(lines, FIELD_64),         TELE(lost_pulses, FIELD_64),
     TELE(late_blocks, FIELD_64),   TELE(late_max_us, FIELD_32),
     TELE(errors_queued, FIELD_32), TELE(reader_lost_frames, FIELD_64),
-    TELE(utc_ns, FIELD_64),
+    TELE(utc_ns, FIELD_64),        TELE(scan_fired, FIELD_64),
+    TELE(scan_cast, FIELD_64),     TELE(scan_lost, FIELD_64),
 };
 
 #define EVENT(member, kind) ROW(native_event, member, kind)
@@ -111,7 +112,7 @@ const struct field_table fields_points = TABLE(points, native_points, NATIVE_POI
 const struct field_table fields_attributes =
     TABLE(attributes, native_attributes, NATIVE_ATTRIBUTES_HEAD_LEN, NATIVE_ATTRIBUTES);
 const struct field_table fields_line_end = TABLE(line_end, line_end, 68, NATIVE_LINE_END);
-const struct field_table fields_telemetry = TABLE(telemetry, native_telemetry, 72, NATIVE_TELEMETRY);
+const struct field_table fields_telemetry = TABLE(telemetry, native_telemetry, 96, NATIVE_TELEMETRY);
 const struct field_table fields_event = TABLE(event, native_event, 128, NATIVE_EVENT);
 const struct field_table fields_pose = TABLE(pose, native_pose, NATIVE_POSE_LEN, NATIVE_POSES);
 

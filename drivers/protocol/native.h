@@ -179,8 +179,9 @@ struct native_telemetry {
     uint32_t scan;
     uint64_t pulses, echoes, lines, lost_pulses, late_blocks;
     uint32_t late_max_us, errors_queued;
-    uint64_t reader_lost_frames; /* of the reader who gets this frame; 0 in the common stream */
-    int64_t utc_ns;              /* UTC of this frame's device time, ns since 1970, 0 when unknown */
+    uint64_t reader_lost_frames;               /* of the reader who gets this frame; 0 in the common stream */
+    int64_t utc_ns;                            /* UTC of this frame's device time, ns since 1970, 0 when unknown */
+    uint64_t scan_fired, scan_cast, scan_lost; /* pulses of that scan up to here */
 };
 
 enum native_event_code {
@@ -188,9 +189,11 @@ enum native_event_code {
     NATIVE_EV_SCAN_START = 2,  /* a: scan number, b: device time of pulse 0, ns, c: its GPS time, ns; 0: unknown */
     NATIVE_EV_SCAN_END = 3,    /* a: scan number, b: pulses fired, c: pulses lost */
     NATIVE_EV_OVERRUN = 4,     /* the head could not keep up; a: first lost pulse, b: pulses lost, c: ticks lost */
-    NATIVE_EV_READER_LOST = 5, /* this reader could not follow; a: frames lost now, b: 0, c: frames lost in all */
+    NATIVE_EV_READER_LOST = 5, /* this reader could not follow; a: frames lost now, b: pulses in them, c: frames lost
+                                  in all */
     NATIVE_EV_CONTROL = 6,     /* who may command; a: session number, 0: nobody */
-    NATIVE_EV_ERROR = 7,       /* a: SCPI error number (two's complement) */
+    NATIVE_EV_ERROR = 7,       /* a: SCPI error number (two's complement), b: session, 0: the head, c: 0, or how many
+                                  errors of the session were held back */
     NATIVE_EV_SETTINGS = 8,    /* a: first pulse with the new settings */
     NATIVE_EV_POSE_LATE = 9,   /* no pose in time; a: poses made up so far, c: ns since the last one that came */
     NATIVE_EV_PPS = 10,  /* a full second of the head's clock; a: UTC, s since 1970, b: device time of the edge, ns,
@@ -211,6 +214,7 @@ int native_decode_points(const uint8_t *payload, size_t len, struct native_point
 int native_decode_attributes(const uint8_t *payload, size_t len, struct native_attributes *out);
 void native_decode_attribute(const uint8_t *payload, uint32_t i, struct native_attribute *out); /* i < n_points */
 int native_decode_line_end(const uint8_t *payload, size_t len, struct line_end *out);
+int native_decode_telemetry(const uint8_t *payload, size_t len, struct native_telemetry *out);
 int native_decode_event(const uint8_t *payload, size_t len, struct native_event *out);
 /* Poses payload: u32 n (2 and more), u32 0, then n poses of 80 bytes, their times rising. */
 int native_decode_poses(const uint8_t *payload, size_t len, uint32_t *n);

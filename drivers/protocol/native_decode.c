@@ -54,6 +54,11 @@ int native_decode_line_end(const uint8_t *payload, size_t len, struct line_end *
     return fields_decode(&fields_line_end, payload, len, out);
 }
 
+int native_decode_telemetry(const uint8_t *payload, size_t len, struct native_telemetry *out)
+{
+    return fields_decode(&fields_telemetry, payload, len, out);
+}
+
 int native_decode_event(const uint8_t *payload, size_t len, struct native_event *out)
 {
     return fields_decode(&fields_event, payload, len, out);

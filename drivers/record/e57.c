@@ -224,7 +224,8 @@ static int patch_headers(struct e57 *e, uint64_t xml, size_t xml_len, struct sh_
         uint8_t section[SECTION_HEADER_LEN] = {1}; /* a compressed vector; no index of its packets */
         le_put64(section + 8, s->section_len);
         le_put64(section + 16, e57_physical(s->section + SECTION_HEADER_LEN));
-        rc = e57_patch(&e->pages, s->section, section, sizeof section, err);
+        rc = recorder_check_stop(&e->base, err); /* a page is read and written for each */
+        if (rc == 0) rc = e57_patch(&e->pages, s->section, section, sizeof section, err);
     }
     return rc;
 }

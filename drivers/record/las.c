@@ -1,5 +1,6 @@
-/* .las: LAS 1.4, point data record format 6 followed by the label; one record per echo. What the numbers mean
- * stands in the file itself (las_header.c).
+/* .las: LAS 1.4, point data record format 6 (7 with colour) followed by the label; one record per echo. On
+ * request LAS 1.2 for older readers: format 1 (3), five returns, no labels, scan angles or attributes. What the
+ * numbers mean stands in the file itself (las_header.c).
  *
  * Coordinates are counts of the stream's own scale from the first scan's station. So those of the first scan
  * are the numbers of the stream. Those of further stations are rounded once, by half a count at most. Nothing
@@ -21,7 +22,8 @@ struct las {
     struct las_facts facts;
     int begun, time_came_late;
     size_t front_len;
-    uint64_t n_empty;
+    uint64_t n_empty, n_no_angle;
+    uint64_t n_beyond_returns, n_returns_cut; /* LAS 1.2 */
 };
 
 static int las_begin(void *rec, struct sh_err *err)
@@ -29,6 +31,8 @@ static int las_begin(void *rec, struct sh_err *err)
     struct las *las = rec;
     (void)err;
     las->facts.track = &las->base.track;
+    las->facts.minor = las->base.options.las_minor == 2 ? 2 : 4;
+    las->facts.has_colour = las->base.options.colour != COLOUR_NONE;
     for (int i = 0; i < 3; i++)
         las->facts.scale[i] = 1;
     strcpy(las->facts.profile, "OTHER"); /* until points have come */
@@ -95,10 +99,14 @@ static int too_far(const struct las *las, const double p[3], struct sh_err *err)
 }
 
 /* The angle from straight down, in the head's frame. */
-static uint16_t scan_angle(const double p_socs[3])
+static uint16_t scan_angle(struct las *las, const double p_socs[3])
 {
     float flat = sqrtf((float)(p_socs[0] * p_socs[0] + p_socs[1] * p_socs[1]));
     float up = atan2f(flat, (float)-p_socs[2]);
+    if (isnan(up)) {
+        las->n_no_angle++;
+        return 0;
+    }
     return (uint16_t)lrintf(up * (float)SCAN_ANGLE_COUNTS_PER_RAD);
 }
 
@@ -108,10 +116,9 @@ static uint16_t intensity(double reflectance_db)
     return isnan(reflectance_db) ? 0 : (uint16_t)(lrint(reflectance_db * 100) + 32768);
 }
 
-static int put_xyz(struct las *las, uint8_t *to, const double p[3], struct sh_err *err)
+static int set_xyz(struct las *las, int32_t n[3], const double p[3], struct sh_err *err)
 {
     struct las_facts *f = &las->facts;
-    int32_t n[3];
     for (int i = 0; i < 3; i++) {
         double from_offset = p[i] - f->offset[i];
         if (i == 0 && is_swapped(las)) from_offset = remainder(from_offset, 360);
@@ -122,7 +129,6 @@ static int put_xyz(struct las *las, uint8_t *to, const double p[3], struct sh_er
     for (int i = 0; i < 3; i++) {
         if (f->n_points == 0 || n[i] < f->min[i]) f->min[i] = n[i];
         if (f->n_points == 0 || n[i] > f->max[i]) f->max[i] = n[i];
-        le_put32(to + 4 * i, (uint32_t)n[i]);
     }
     return 0;
 }
@@ -134,13 +140,12 @@ static int has_time(const struct track *t, int i, double *gps_s)
     return t->has_attributes ? !isnan(*gps_s) : scanhead_gps_time(t->sh, t->point[i].t_ns, gps_s) == 0;
 }
 
-static int put_time(const struct las *las, uint8_t *to, int i, struct sh_err *err)
+static int set_time(const struct las *las, double *time_s, int i, struct sh_err *err)
 {
-    double s = (double)las->base.track.point[i].t_ns / 1e9;
-    if (las->facts.gps_time && !has_time(&las->base.track, i, &s))
+    *time_s = (double)las->base.track.point[i].t_ns / 1e9;
+    if (las->facts.gps_time && !has_time(&las->base.track, i, time_s))
         return sh_fail(err, SH_EFORMAT, "%s: the head has ceased to say the time; a LAS file holds one kind of time",
                        las->base.file.path);
-    le_put_double(to, s);
     return 0;
 }
 
@@ -157,12 +162,22 @@ static void set_socs(const struct track *t, double p[3])
 }
 
 /* 0.01 dB and 0.01 ns, as on the wire. */
-static void put_attribute(uint8_t *to, const struct scanhead_attribute *a)
+static void set_attribute(struct las_point *to, const struct scanhead_attribute *a)
 {
     int amplitude = isnan(a->amplitude_db) ? NATIVE_AMPLITUDE_NONE : (int)lrint(100 * a->amplitude_db);
     int width = isnan(a->width_ns) ? NATIVE_WIDTH_NONE : (int)lrint(100 * a->width_ns);
-    le_put16(to, (uint16_t)amplitude);
-    le_put16(to + 2, (uint16_t)width);
+    to->amplitude = (uint16_t)amplitude;
+    to->width = (uint16_t)width;
+}
+
+/* LAS 1.2 counts to five. */
+static void set_returns(struct las *las, struct las_point *to, const struct scanhead_point *point)
+{
+    to->echo = point->echo;
+    to->echo_count = point->echo_count;
+    if (las->facts.minor != 2 || to->echo_count <= LAS_12_RETURNS) return;
+    to->echo_count = LAS_12_RETURNS;
+    las->n_returns_cut++;
 }
 
 /* Point i of the batch. */
@@ -170,24 +185,39 @@ static int put_point(struct las *las, uint8_t *to, int i, struct sh_err *err)
 {
     struct track *t = &las->base.track;
     const struct scanhead_point *point = &t->point[i];
+    struct las_point las_point = {
+        .intensity = intensity(point->reflectance_db), .station = (uint16_t)t->info.station, .label = point->label};
     double p_crs[3] = {point->x, point->y, point->z}, p_socs[3] = {point->x, point->y, point->z};
     if (!t->info.geo)
         station_pose_forward(&t->pose, p_crs);
     else
         set_socs(t, p_socs);
     if (is_swapped(las)) swap(p_crs);
-    int rc = put_time(las, to + 22, i, err);
-    if (rc == 0) rc = put_xyz(las, to, p_crs, err);
-    le_put16(to + 12, intensity(point->reflectance_db));
-    to[14] = (uint8_t)(point->echo | point->echo_count << 4);
-    to[15] = 0;
-    to[16] = 0; /* never classified */
-    to[17] = 0;
-    le_put16(to + 18, t->info.moving ? 0 : scan_angle(p_socs));
-    le_put16(to + 20, (uint16_t)t->info.station);
-    le_put16(to + 30, point->label);
-    if (t->has_attributes) put_attribute(to + LAS_POINT_LEN, &t->attribute[i]);
-    return rc;
+    int rc = set_time(las, &las_point.time_s, i, err);
+    if (rc == 0) rc = set_xyz(las, las_point.xyz, p_crs, err);
+    if (rc != 0) return rc;
+    set_returns(las, &las_point, point);
+    if (!t->info.moving && las->facts.minor != 2) las_point.scan_angle = scan_angle(las, p_socs);
+    if (t->has_attributes) set_attribute(&las_point, &t->attribute[i]);
+    if (las->facts.has_colour) colour_of(las->base.options.colour, point, las_point.rgb);
+    las_put_point(&las->facts, &las_point, to);
+    return 0;
+}
+
+/* Has the version no room for it? Counts why. */
+static int is_left_out(struct las *las, const struct scanhead_point *p)
+{
+    const int beyond = las->facts.minor == 2 && p->echo > LAS_12_RETURNS;
+    las->n_empty += p->echo_count == 0;
+    las->n_beyond_returns += p->echo_count != 0 && beyond;
+    return p->echo_count == 0 || beyond;
+}
+
+static int check_count(const struct las *las, struct sh_err *err)
+{
+    if (las->facts.minor != 2 || las->facts.n_points < UINT32_MAX) return 0;
+    return sh_fail(err, SH_EFORMAT, "%s: LAS 1.2 holds up to 4294967295 points; use --las-version 1.4, or --split",
+                   las->base.file.path);
 }
 
 static int las_points(void *rec, int n, struct sh_err *err)
@@ -201,13 +231,11 @@ static int las_points(void *rec, int n, struct sh_err *err)
         las->time_came_late = scanhead_gps_time(las->base.track.sh, 0, &s) == 0;
     for (int i = 0; i < n; i++) {
         const struct scanhead_point *p = &las->base.track.point[i];
-        if (p->echo_count == 0) {
-            las->n_empty++;
-            continue;
-        }
-        rc = put_point(las, at, i, err);
+        if (is_left_out(las, p)) continue;
+        rc = check_count(las, err);
+        if (rc == 0) rc = put_point(las, at, i, err);
         if (rc != 0) break;
-        at += las->base.track.has_attributes ? LAS_POINT_LEN_MAX : LAS_POINT_LEN;
+        at += las_point_len(&las->facts);
         las->facts.n_points++;
         if (p->echo >= 1) las->facts.n_by_return[p->echo - 1]++;
     }
@@ -224,6 +252,13 @@ static int las_finish(void *rec, struct sh_err *err)
     if (rc == 0) rc = outfile_patch(&las->base.file, 0, front, las_front(&las->facts, front), err);
     if (rc != 0) return rc;
     recorder_report(rec, las->n_empty, "shots without echo left out, for which LAS has no place");
+    recorder_report(rec, las->n_beyond_returns, "echoes left out: the sixth and later ones, of which LAS 1.2 has none");
+    recorder_report(rec, las->n_returns_cut, "points with more echoes than LAS 1.2 counts; it says 5");
+    if (las->facts.minor == 2 && las->facts.n_points != 0)
+        sh_warn(las->base.options.report, "%s: LAS 1.2 has no place for labels and scan angles%s; they are left out",
+                las->base.file.path, las->base.track.has_attributes ? ", amplitude and width" : "");
+    recorder_report(rec, las->n_no_angle,
+                    "points without a scan angle (0 is written): the scan's pose is beyond any number");
     if (las->time_came_late)
         sh_warn(las->base.options.report,
                 "%s: times count from the scan's start: what the head said of its clock was lost before the first "

@@ -56,17 +56,20 @@ static uint8_t *put_extra_vlr(uint8_t *to, int attributes)
     return put_extra(to, EXTRA_UINT16, "width", 0, 0.01, "ns FWHM; 655.35: that or more");
 }
 
-static uint8_t *put_note_vlr(uint8_t *to, int gps_time, int moving)
+static uint8_t *put_note_vlr(uint8_t *to, const struct las_facts *f)
 {
     char note[LAS_NOTE_MAX];
+    int gps_time = f->gps_time, moving = f->track->moving;
     int n =
         snprintf(note, sizeof note,
                  "GPS time: %s. Intensity: 32768 + 100 times the reflectance in dB (0 dB: a white Lambertian "
-                 "target), 0: not modelled. Scan angle: %s. Point source ID: station. Label: surface hit.",
+                 "target), 0: not modelled. Scan angle: %s. Point source ID: station.%s",
                  gps_time ? "adjusted standard GPS time" : "seconds since the scan's start, of no absolute clock",
-                 moving ? "not given, the head moves"
-                        : "in the head's frame, from straight down (0) over the horizon (90 degrees) to straight up "
-                          "(180)");
+                 f->minor == 2 ? "not given"
+                 : moving      ? "not given, the head moves"
+                          : "in the head's frame, from straight down (0) over the horizon (90 degrees) to straight up "
+                            "(180)",
+                 f->minor == 2 ? "" : " Label: surface hit.");
     to = put_vlr_head(to, "LASF_Spec", 3, (size_t)n + 1, "text area description");
     memcpy(to, note, (size_t)n + 1);
     return to + n + 1;
@@ -83,6 +86,40 @@ static uint8_t *put_crs_vlr(uint8_t *to, int epsg, int geoid)
     return to + n + 1;
 }
 
+/* The CRS of LAS 1.2: GeoTIFF's directory of keys (OGC 19-008), each of number, 0, 1 and value. */
+static uint8_t *put_keys_vlr(uint8_t *to, int epsg, int geoid)
+{
+    enum { MODEL = 1024, RASTER = 1025, GEODETIC = 2048, GEOCENTRIC_LENGTHS = 2052, ANGLES = 2054 };
+    enum { PROJECTED = 3072, LENGTHS = 3076 };
+    enum { VERTICAL = 4096, HEIGHTS = 4099, METRE = 9001, DEGREE = 9102 };
+    const int model = epsg == 4978 ? 3 : epsg == 4979 ? 2 : 1;
+    const int projected = epsg == 32661 ? 5041 : epsg == 32761 ? 5042 : epsg; /* UPS, the easting first */
+    const int vertical = geoid ? 5773 : 5030;                                 /* EGM96; WGS 84's ellipsoid */
+    const int key[][2] = {{MODEL, model},
+                          {RASTER, 1},
+                          {GEODETIC, model == 3   ? 4978
+                                     : model == 2 ? 4326
+                                                  : 0},
+                          {GEOCENTRIC_LENGTHS, model == 3 ? METRE : 0},
+                          {ANGLES, model == 2 ? DEGREE : 0},
+                          {PROJECTED, model == 1 ? projected : 0},
+                          {LENGTHS, model == 1 ? METRE : 0},
+                          {VERTICAL, model != 3 ? vertical : 0},
+                          {HEIGHTS, model != 3 ? METRE : 0}};
+    if (epsg == 0) return to;
+    uint8_t *directory = to + LAS_VLR_HEAD_LEN, *at = directory + 8;
+    for (size_t i = 0; i < sizeof key / sizeof key[0]; i++) {
+        const uint16_t word[4] = {(uint16_t)key[i][0], 0, 1, (uint16_t)key[i][1]};
+        for (int k = 0; k < 4 && key[i][1] != 0; k++, at += 2)
+            le_put16(at, word[k]);
+    }
+    const uint16_t head[4] = {1, 1, 0, (uint16_t)((at - directory) / 8 - 1)};
+    for (int k = 0; k < 4; k++)
+        le_put16(directory + 2 * k, head[k]);
+    put_vlr_head(to, "LASF_Projection", 34735, (size_t)(at - directory), "GeoTIFF GeoKeyDirectoryTag");
+    return at;
+}
+
 /* Day of the year and year, in GPS time: leap seconds don't matter to a day but for seconds. */
 static void put_date(uint8_t *to, const struct las_facts *f)
 {
@@ -93,22 +130,45 @@ static void put_date(uint8_t *to, const struct las_facts *f)
     le_put16(to + 2, (uint16_t)(day.tm_year + 1900));
 }
 
+static uint8_t format_of(const struct las_facts *f)
+{
+    return (uint8_t)(f->minor == 2 ? (f->has_colour ? 3 : 1) : (f->has_colour ? 7 : 6));
+}
+
+/* Where counts stand differs; format 6 and 7 leave those of 32 bits 0. */
+static void put_counts(uint8_t *to, const struct las_facts *f)
+{
+    if (f->minor != 2) le_put64(to + 247, f->n_points);
+    if (f->minor == 2) le_put32(to + 107, (uint32_t)f->n_points);
+    for (int i = 0; i < (f->minor == 2 ? LAS_12_RETURNS : LAS_RETURNS); i++) {
+        if (f->minor == 2)
+            le_put32(to + 111 + 4 * i, (uint32_t)f->n_by_return[i]);
+        else
+            le_put64(to + 255 + 8 * i, f->n_by_return[i]);
+    }
+}
+
+static size_t header_len(const struct las_facts *f)
+{
+    return f->minor == 2 ? LAS_HEADER_12_LEN : LAS_HEADER_LEN;
+}
+
 static void put_header(uint8_t *to, const struct las_facts *f, size_t front_len, uint32_t n_vlrs)
 {
-    memset(to, 0, LAS_HEADER_LEN);
+    memset(to, 0, header_len(f));
     memcpy(to, "LASF", 4);
-    le_put16(to + 6, (uint16_t)(ENCODING_WKT | (f->gps_time ? ENCODING_GPS_STANDARD : 0)));
+    le_put16(to + 6, (uint16_t)((f->minor == 2 ? 0 : ENCODING_WKT) | (f->gps_time ? ENCODING_GPS_STANDARD : 0)));
     to[24] = 1;
-    to[25] = 4;
+    to[25] = (uint8_t)f->minor;
     put_text(to + 26, 32, f->profile);
     put_text(to + 58, 32, "scanhead");
     put_date(to + 90, f);
-    le_put16(to + 94, LAS_HEADER_LEN);
+    le_put16(to + 94, (uint16_t)header_len(f));
     le_put32(to + 96, (uint32_t)front_len);
     le_put32(to + 100, n_vlrs);
-    to[104] = 6;
-    le_put16(to + 105, f->track->has_attributes ? LAS_POINT_LEN_MAX : LAS_POINT_LEN);
-    /* the counts of 32 bits stay 0, as format 6 wants it */
+    to[104] = format_of(f);
+    le_put16(to + 105, (uint16_t)las_point_len(f));
+    put_counts(to, f);
     for (int i = 0; i < 3; i++) {
         le_put_double(to + 131 + 8 * i, f->scale[i]);
         le_put_double(to + 155 + 8 * i, f->offset[i]);
@@ -116,17 +176,65 @@ static void put_header(uint8_t *to, const struct las_facts *f, size_t front_len,
         le_put_double(to + 179 + 16 * i, f->max[i] * f->scale[i] + f->offset[i]);
         le_put_double(to + 187 + 16 * i, f->min[i] * f->scale[i] + f->offset[i]);
     }
-    le_put64(to + 247, f->n_points);
-    for (int i = 0; i < LAS_RETURNS; i++)
-        le_put64(to + 255 + 8 * i, f->n_by_return[i]);
 }
 
 size_t las_front(const struct las_facts *f, uint8_t to[LAS_FRONT_MAX])
 {
-    uint8_t *end = put_extra_vlr(to + LAS_HEADER_LEN, f->track->has_attributes);
-    end = put_note_vlr(end, f->gps_time, f->track->moving);
+    const struct track *t = f->track;
+    uint8_t *end = to + header_len(f);
+    if (f->minor != 2) end = put_extra_vlr(end, t->has_attributes);
+    end = put_note_vlr(end, f);
     uint8_t *crs = end;
-    end = put_crs_vlr(end, f->track->epsg, f->track->geoid_heights);
-    put_header(to, f, (size_t)(end - to), end > crs ? 3 : 2);
+    end = f->minor == 2 ? put_keys_vlr(end, t->epsg, t->geoid_heights) : put_crs_vlr(end, t->epsg, t->geoid_heights);
+    put_header(to, f, (size_t)(end - to), (f->minor != 2) + 1u + (end > crs));
     return (size_t)(end - to);
+}
+
+size_t las_point_len(const struct las_facts *f)
+{
+    static const uint8_t own[8] = {20, 28, 26, 34, 57, 63, 30, 36}; /* by format */
+    size_t extra = LAS_LABEL_LEN + (f->track->has_attributes ? LAS_ATTRIBUTES_LEN : 0u);
+    return own[format_of(f)] + (f->minor == 2 ? 0 : extra);
+}
+
+static void put_colour(uint8_t *to, const uint8_t rgb[3])
+{
+    for (int i = 0; i < 3; i++)
+        le_put16(to + 2 * i, (uint16_t)(257 * rgb[i])); /* 255 is 65535 */
+}
+
+/* Format 1 or 3. Classification 0: never classified. */
+static void put_point_12(const struct las_facts *f, const struct las_point *p, uint8_t *to)
+{
+    to[14] = (uint8_t)(p->echo | p->echo_count << 3);
+    le_put16(to + 18, p->station);
+    le_put_double(to + 20, p->time_s);
+    if (f->has_colour) put_colour(to + 28, p->rgb);
+}
+
+/* Format 6 or 7, and the extra bytes. */
+static void put_point_14(const struct las_facts *f, const struct las_point *p, uint8_t *to)
+{
+    to[14] = (uint8_t)(p->echo | p->echo_count << 4);
+    le_put16(to + 18, p->scan_angle);
+    le_put16(to + 20, p->station);
+    le_put_double(to + 22, p->time_s);
+    if (f->has_colour) put_colour(to + 30, p->rgb);
+    uint8_t *extra = to + (f->has_colour ? 36 : 30);
+    le_put16(extra, p->label);
+    if (!f->track->has_attributes) return;
+    le_put16(extra + 2, p->amplitude);
+    le_put16(extra + 4, p->width);
+}
+
+void las_put_point(const struct las_facts *f, const struct las_point *p, uint8_t *to)
+{
+    memset(to, 0, las_point_len(f));
+    for (int i = 0; i < 3; i++)
+        le_put32(to + 4 * i, (uint32_t)p->xyz[i]);
+    le_put16(to + 12, p->intensity);
+    if (f->minor == 2)
+        put_point_12(f, p, to);
+    else
+        put_point_14(f, p, to);
 }

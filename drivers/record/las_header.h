@@ -1,5 +1,6 @@
-/* The header and the variable length records of a LAS 1.4 file (ASPRS LAS 1.4 R15), point data record format
- * 6. Facts go in (las.c gathers them), bytes come out. Pure. */
+/* The header and the variable length records of a LAS file, and one point's record. LAS 1.4 (ASPRS LAS 1.4 R15)
+ * with point data record format 6, or 7 with colour; LAS 1.2 with format 1, or 3. Facts go in (las.c gathers
+ * them), bytes come out. Pure. */
 #ifndef DRIVERS_RECORD_LAS_HEADER_H
 #define DRIVERS_RECORD_LAS_HEADER_H
 
@@ -11,16 +12,21 @@
 
 enum {
     LAS_HEADER_LEN = 375,
+    LAS_HEADER_12_LEN = 227,
     LAS_VLR_HEAD_LEN = 54,
     LAS_EXTRA_LEN = 192,
-    LAS_POINT_LEN = 30 + 2,                    /* format 6, and the label */
-    LAS_POINT_LEN_MAX = LAS_POINT_LEN + 2 + 2, /* and amplitude and width */
+    LAS_LABEL_LEN = 2,      /* extra bytes of 1.4, after the format's own */
+    LAS_ATTRIBUTES_LEN = 4, /* and after these */
+    LAS_POINT_LEN_MAX = 36 + LAS_LABEL_LEN + LAS_ATTRIBUTES_LEN,
     LAS_RETURNS = 15,
+    LAS_12_RETURNS = 5,
     LAS_NOTE_MAX = 512,
     LAS_FRONT_MAX = LAS_HEADER_LEN + 3 * LAS_VLR_HEAD_LEN + 3 * LAS_EXTRA_LEN + CRS_WKT_MAX + LAS_NOTE_MAX,
 };
 
 struct las_facts {
+    int minor; /* 4, or 2 */
+    int has_colour;
     const struct track *track; /* whose CRS, movement and attributes are the file's */
     int gps_time;              /* times are adjusted standard GPS time */
     char profile[32];
@@ -29,6 +35,19 @@ struct las_facts {
     uint64_t n_points, n_by_return[LAS_RETURNS];
     int32_t min[3], max[3]; /* counts; only with points */
 };
+
+struct las_point {
+    int32_t xyz[3]; /* counts */
+    uint16_t intensity, scan_angle, station, label;
+    uint8_t echo, echo_count; /* within the version's returns */
+    double time_s;
+    uint16_t amplitude, width; /* with attributes */
+    uint8_t rgb[3];
+};
+
+/* How many bytes a point takes; at most LAS_POINT_LEN_MAX. */
+size_t las_point_len(const struct las_facts *facts);
+void las_put_point(const struct las_facts *facts, const struct las_point *point, uint8_t *to);
 
 /* Everything before the points. Returns its length, which depends on the CRS, the time's kind and attributes
  * alone, so that it can be written again when the counts are known. */

@@ -1,5 +1,4 @@
-/* A file that appears whole or not at all. It is written as PATH.part through a buffer, synced and renamed at
- * the end. */
+/* A file that appears whole or not at all (core/newfile.h). It is written as PATH.part through a buffer. */
 #ifndef DRIVERS_RECORD_OUTFILE_H
 #define DRIVERS_RECORD_OUTFILE_H
 
@@ -18,7 +17,7 @@ struct outfile {
     uint64_t written; /* bytes of the file that are before buf */
 };
 
-/* Errors name the path; SH_EPERM, SH_EINPUT (no such directory), SH_EIO, SH_ENOMEM. */
+/* Errors name the path; SH_EPERM, SH_EINPUT (no such folder, a link, a device), SH_EIO, SH_ENOMEM. */
 int outfile_open(struct outfile *file, const char *path, struct sh_err *err);
 int outfile_write(struct outfile *file, const void *data, size_t len, struct sh_err *err);
 /* Room for n <= OUTFILE_BUFFER bytes, to be filled before the next call; outfile_used() says how many were.

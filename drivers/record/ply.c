@@ -18,7 +18,7 @@
 #include "drivers/record/ply_columns.h"
 #include "drivers/record/recorder.h"
 
-enum { RECORD_LEN = 4 * 8 + 4 + 8 + 1 + 1 + 2 + 2, FRAME_LEN = 8, ATTRIBUTES_LEN = 8, TEXT_LEN = 512 };
+enum { RECORD_LEN = 4 * 8 + 4 + 8 + 1 + 1 + 2 + 2, FRAME_LEN = 8, ATTRIBUTES_LEN = 8, COLOUR_LEN = 3, TEXT_LEN = 512 };
 
 struct ply {
     struct recorder base;
@@ -34,6 +34,8 @@ static int ply_begin(void *rec, struct sh_err *err)
     ply->facts.track = &ply->base.track;
     ply->facts.ascii = ply->base.options.ascii;
     ply->facts.empty_shots = ply->base.options.empty_shots;
+    ply->facts.scalar_names = ply->base.options.scalar_names;
+    ply->facts.colour = ply->base.options.colour;
     return 0;
 }
 
@@ -59,6 +61,8 @@ struct vertex {
     unsigned station;
     const double *frame;                        /* NULL where there is no such property */
     const struct scanhead_attribute *attribute; /* likewise */
+    int has_colour;
+    uint8_t rgb[3];
 };
 
 static size_t put_binary(uint8_t *to, const struct vertex *v)
@@ -80,10 +84,14 @@ static size_t put_binary(uint8_t *to, const struct vertex *v)
         le_put_double(to + len, *v->frame);
         len += FRAME_LEN;
     }
-    if (v->attribute == NULL) return len;
-    le_put_float(to + len, (float)v->attribute->amplitude_db);
-    le_put_float(to + len + 4, (float)v->attribute->width_ns);
-    return len + ATTRIBUTES_LEN;
+    if (v->attribute != NULL) {
+        le_put_float(to + len, (float)v->attribute->amplitude_db);
+        le_put_float(to + len + 4, (float)v->attribute->width_ns);
+        len += ATTRIBUTES_LEN;
+    }
+    if (!v->has_colour) return len;
+    memcpy(to + len, v->rgb, COLOUR_LEN);
+    return len + COLOUR_LEN;
 }
 
 /* Micrometres (1e-11 degrees) are the finest scale of the wire, 0.01 dB and nanoseconds its units: more
@@ -114,6 +122,8 @@ static size_t put_ascii(char *to, const struct vertex *v, int degrees)
                                        : snprintf(to + n, TEXT_LEN - n, "%.9g ", *v->frame));
     if (v->attribute != NULL && n < TEXT_LEN) n += put_number(to + n, TEXT_LEN - n, 2, v->attribute->amplitude_db);
     if (v->attribute != NULL && n < TEXT_LEN) n += put_number(to + n, TEXT_LEN - n, 2, v->attribute->width_ns);
+    if (v->has_colour && n < TEXT_LEN)
+        n += (size_t)snprintf(to + n, TEXT_LEN - n, "%u %u %u ", v->rgb[0], v->rgb[1], v->rgb[2]);
     if (n >= TEXT_LEN) return TEXT_LEN + 1;
     to[n - 1] = '\n'; /* the blank after the last number */
     return n;
@@ -138,35 +148,48 @@ static int ply_scan(void *rec, struct sh_err *err)
     return ply->begun ? 0 : make_room(ply, info->n_surfaces, err);
 }
 
+/* Point i of the batch, placed; 0: it is left out. */
+static int take_vertex(struct ply *ply, int i, struct vertex *v)
+{
+    struct track *t = &ply->base.track;
+    struct scanhead_point *p = &v->point;
+    *v = (struct vertex){.point = t->point[i], .station = t->info.station};
+    if (p->echo_count == 0 && !ply->facts.empty_shots) return 0;
+    if (t->info.moving || t->info.stop) v->frame = t->info.moving ? &t->frame[i] : &t->info.frame;
+    if (t->has_attributes) v->attribute = &t->attribute[i];
+    v->has_colour = ply->facts.colour != COLOUR_NONE;
+    if (v->has_colour) colour_of(ply->facts.colour, p, v->rgb);
+    if (t->info.geo) return 1;
+    double xyz[3] = {p->x, p->y, p->z};
+    station_pose_forward(&t->pose, xyz);
+    p->x = xyz[0];
+    p->y = xyz[1];
+    p->z = xyz[2];
+    return p->echo_count == 0 || !track_is_nowhere(t, p->x, p->y, p->z);
+}
+
 static int ply_points(void *rec, int n, struct sh_err *err)
 {
     struct ply *ply = rec;
-    const struct track *t = &ply->base.track;
+    const int degrees = ply->base.track.crs == NATIVE_CRS_GEODETIC;
+    int rc = 0;
     uint8_t *to = outfile_room(&ply->base.file, TRACK_BATCH * TEXT_LEN, err);
     if (to == NULL) return SH_EIO;
     size_t used = 0;
     set_gps(ply);
     for (int i = 0; i < n; i++) {
-        struct vertex v = {.point = t->point[i], .station = t->info.station};
-        struct scanhead_point *p = &v.point;
-        if (p->echo_count == 0 && !ply->facts.empty_shots) continue;
-        if (t->info.moving || t->info.stop) v.frame = t->info.moving ? &t->frame[i] : &t->info.frame;
-        if (t->has_attributes) v.attribute = &t->attribute[i];
-        if (!t->info.geo) {
-            double xyz[3] = {p->x, p->y, p->z};
-            station_pose_forward(&t->pose, xyz);
-            p->x = xyz[0];
-            p->y = xyz[1];
-            p->z = xyz[2];
+        struct vertex v;
+        if (!take_vertex(ply, i, &v)) continue;
+        size_t len = ply->facts.ascii ? put_ascii((char *)to + used, &v, degrees) : put_binary(to + used, &v);
+        if (len > TEXT_LEN) {
+            rc = recorder_fail_huge(&ply->base, (double[]){v.point.x, v.point.y, v.point.z}, err);
+            break;
         }
-        size_t len = ply->facts.ascii ? put_ascii((char *)to + used, &v, t->crs == NATIVE_CRS_GEODETIC)
-                                      : put_binary(to + used, &v);
-        if (len > TEXT_LEN) return recorder_fail_huge(&ply->base, (double[]){p->x, p->y, p->z}, err);
         used += len;
         ply->facts.n_vertices++;
     }
-    outfile_used(&ply->base.file, used);
-    return 0;
+    outfile_used(&ply->base.file, used); /* also before a failure: the file may be kept */
+    return rc;
 }
 
 static int ply_frame(void *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
@@ -186,7 +209,7 @@ static int move_points(struct ply *ply, size_t header_len, struct sh_err *err)
     uint8_t *block = malloc(BLOCK);
     if (block == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory to move its points", file->path);
     int rc = 0;
-    while (rc == 0 && end > ply->header_len) {
+    while (rc == 0 && end > ply->header_len && (rc = recorder_check_stop(&ply->base, err)) == 0) {
         size_t n = end - ply->header_len < BLOCK ? (size_t)(end - ply->header_len) : BLOCK;
         end -= n;
         if (pread(file->fd, block, n, (off_t)end) != (ssize_t)n)

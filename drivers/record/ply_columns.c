@@ -85,6 +85,10 @@ static void put_comments(FILE *out, const struct ply_facts *facts)
             "comment points_without_pose %" PRIu64 "\n",
             facts->n_without_pose);
     if (t->stops) fputs("comment the stations are stops on a trajectory; frame: its frame scalar there\n", out);
+    if (facts->colour != COLOUR_NONE)
+        fprintf(out, "comment red green blue show the %s\n",
+                facts->colour == COLOUR_LABEL ? "label"
+                                              : "reflectance, black is -30 dB, white 0 dB, blue not modelled");
     fprintf(out, "comment empty_shots %s\n", facts->empty_shots ? "kept" : "left out");
     fprintf(out,
             "comment frames_lost %" PRIu64 " reader_lost %" PRIu64 " dropped %" PRIu64 " bad_payload %" PRIu64 "\n",
@@ -104,18 +108,31 @@ static void put_padding(FILE *out, size_t n)
     }
 }
 
+/* CloudCompare shows columns of other names than these only where it is told to. */
+static void put_column(FILE *out, const struct ply_facts *facts, const char *type, const char *name)
+{
+    fprintf(out, "property %s %s%s\n", type, facts->scalar_names ? "scalar_" : "", name);
+}
+
 static void put_header(FILE *out, const struct ply_facts *facts, size_t padding)
 {
     fprintf(out, "ply\nformat %s 1.0\n", facts->ascii ? "ascii" : "binary_little_endian");
     put_comments(out, facts);
     put_padding(out, padding);
     fprintf(out, "element vertex %" PRIu64 "\n", facts->n_vertices);
-    fputs("property double x\nproperty double y\nproperty double z\nproperty double range\n"
-          "property float reflectance\nproperty double time\nproperty uchar echo\nproperty uchar echo_count\n"
-          "property ushort label\nproperty ushort station\n",
-          out);
-    if (facts->track->moving || facts->track->stops) fputs("property double frame\n", out);
-    if (facts->track->has_attributes) fputs("property float amplitude\nproperty float width\n", out);
+    for (int i = 0; i < 3; i++)
+        fprintf(out, "property double %c\n", "xyz"[i]);
+    static const char *const always[][2] = {{"double", "range"},  {"float", "reflectance"}, {"double", "time"},
+                                            {"uchar", "echo"},    {"uchar", "echo_count"},  {"ushort", "label"},
+                                            {"ushort", "station"}};
+    for (size_t i = 0; i < sizeof always / sizeof always[0]; i++)
+        put_column(out, facts, always[i][0], always[i][1]);
+    if (facts->track->moving || facts->track->stops) put_column(out, facts, "double", "frame");
+    if (facts->track->has_attributes) {
+        put_column(out, facts, "float", "amplitude");
+        put_column(out, facts, "float", "width");
+    }
+    if (facts->colour != COLOUR_NONE) fputs("property uchar red\nproperty uchar green\nproperty uchar blue\n", out);
     fputs("end_header\n", out);
 }
 

@@ -8,11 +8,13 @@
 
 #include "core/err.h"
 #include "drivers/host/scanhead.h"
+#include "drivers/record/colour.h"
 #include "drivers/record/track.h"
 
 struct ply_facts {
     const struct track *track; /* its kind of points, and the handle that knows the surfaces' names */
-    int ascii, empty_shots;
+    int ascii, empty_shots, scalar_names;
+    enum colour_kind colour;
     uint64_t n_vertices, n_unplaced; /* points before their descriptor and anchor were seen */
     uint64_t n_without_pose;         /* points of a moving head whose pose was lost */
     uint64_t n_without_attributes;   /* echoes */

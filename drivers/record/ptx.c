@@ -5,7 +5,12 @@
  *
  * A PTX grid has one point per shot: the first echo. Intensity is the reflectance as a fraction: 1 for a
  * white Lambertian target and for what is brighter, 0.5 where not modelled. What the grid had no room for is
- * reported at the end, with counts. */
+ * reported at the end, with counts.
+ *
+ * Places without a shot are bounded, so that a small stream never makes a huge file. A grid has no more lines,
+ * and pulses in a line, than the descriptor says a scan can have. All grids together are filled up by
+ * PADDING_FREE places and PADDING_PER_SHOT more for each shot. Where more is missing, or lines go back,
+ * another grid begins with the same pose: no point is lost, and the grids are reported. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -14,13 +19,22 @@
 #include "drivers/record/ptx_grid.h"
 #include "drivers/record/recorder.h"
 
-enum { LINE_MAX_LEN = 512, HEADER_MAX_LEN = 2048 };
+enum {
+    LINE_MAX_LEN = 512,
+    ROWS_MAX = 1 << 22,     /* of a grid, whose column is held in memory: 160 MiB. Heads have up to 550,000 */
+    PADDING_FREE = 1 << 24, /* 160 MiB of text; a scan of 4,500 lines of 3,700 pulses of which one line came */
+    PADDING_PER_SHOT = 8,
+    ROWS_BETWEEN_STOPS = 1 << 16,
+};
 
 struct ptx {
     struct recorder base;
     struct ptx_grid grid;
-    struct station_pose pose; /* of the scan in the grid */
-    uint64_t n_left_out, n_too_bright, n_padded;
+    struct station_pose pose;     /* of the scan in the grid */
+    uint32_t last_line, last_row; /* of the grid's last shot */
+    uint64_t n_left_out, n_too_bright;
+    uint64_t n_ended_shots, n_padded; /* of the grids that are written */
+    uint64_t n_split;                 /* grids that go on with the scan of the one before */
 };
 
 static int ptx_begin(void *rec, struct sh_err *err)
@@ -29,28 +43,35 @@ static int ptx_begin(void *rec, struct sh_err *err)
     return ptx_grid_open(&ptx->grid, ptx->base.file.path, err);
 }
 
+static int put_vector(struct ptx *ptx, int digits, const double v[3], const char *end, struct sh_err *err)
+{
+    char text[LINE_MAX_LEN];
+    int n = snprintf(text, sizeof text, "%.*f %.*f %.*f%s\n", digits, v[0], digits, v[1], digits, v[2], end);
+    if (n >= (int)sizeof text) return recorder_fail_huge(&ptx->base, v, err);
+    return outfile_write(&ptx->base.file, text, (size_t)n, err);
+}
+
 /* Vectors are rows in PTX: what stands in the matrix is the rotation's transpose, the shift below it. */
 static int put_header(struct ptx *ptx, struct sh_err *err)
 {
     const struct ptx_grid *g = &ptx->grid;
     const double *r = ptx->pose.rotation, *s = ptx->pose.shift_m;
-    char text[HEADER_MAX_LEN];
-    int n =
-        snprintf(text, sizeof text, "%" PRIu64 "\n%" PRIu64 "\n%.9f %.9f %.9f\n",
-                 (uint64_t)g->column_max - g->column_min + 1, (uint64_t)g->row_max - g->row_min + 1, s[0], s[1], s[2]);
-    for (int i = 0; i < 3; i++)
-        n += snprintf(text + n, sizeof text - (size_t)n, "%.15f %.15f %.15f\n", r[i], r[3 + i], r[6 + i]);
-    for (int i = 0; i < 3; i++)
-        n += snprintf(text + n, sizeof text - (size_t)n, "%.15f %.15f %.15f 0\n", r[i], r[3 + i], r[6 + i]);
-    n += snprintf(text + n, sizeof text - (size_t)n, "%.9f %.9f %.9f 1\n", s[0], s[1], s[2]);
-    if (n >= (int)sizeof text) return recorder_fail_huge(&ptx->base, s, err);
-    return outfile_write(&ptx->base.file, text, (size_t)n, err);
+    char size[64];
+    int n = snprintf(size, sizeof size, "%" PRIu64 "\n%" PRIu64 "\n", (uint64_t)g->column_max - g->column_min + 1,
+                     (uint64_t)g->row_max - g->row_min + 1);
+    int rc = outfile_write(&ptx->base.file, size, (size_t)n, err);
+    if (rc == 0) rc = put_vector(ptx, 9, s, "", err);
+    for (int i = 0; rc == 0 && i < 6; i++)
+        rc = put_vector(ptx, 15, (const double[]){r[i % 3], r[3 + i % 3], r[6 + i % 3]}, i < 3 ? "" : " 0", err);
+    return rc == 0 ? put_vector(ptx, 9, s, " 1", err) : rc;
 }
 
 static int put_column(void *ctx, const struct ptx_cell *column, uint32_t n_rows, struct sh_err *err)
 {
     struct ptx *ptx = ctx;
-    for (uint32_t i = 0; i < n_rows; i++) {
+    int rc = recorder_check_stop(&ptx->base, err);
+    for (uint32_t i = 0; rc == 0 && i < n_rows; i++) {
+        if (i % ROWS_BETWEEN_STOPS == ROWS_BETWEEN_STOPS - 1) rc = recorder_check_stop(&ptx->base, err);
         char *to = (char *)outfile_room(&ptx->base.file, LINE_MAX_LEN, err);
         if (to == NULL) return SH_EIO;
         const struct ptx_cell *c = &column[i];
@@ -61,7 +82,7 @@ static int put_column(void *ctx, const struct ptx_cell *column, uint32_t n_rows,
         if (n >= LINE_MAX_LEN) return recorder_fail_huge(&ptx->base, p, err);
         outfile_used(&ptx->base.file, (size_t)n);
     }
-    return 0;
+    return rc;
 }
 
 static int end_scan(struct ptx *ptx, struct sh_err *err)
@@ -70,8 +91,26 @@ static int end_scan(struct ptx *ptx, struct sh_err *err)
     if (g->n_shots == 0) return 0;
     uint64_t columns = (uint64_t)g->column_max - g->column_min + 1, rows = (uint64_t)g->row_max - g->row_min + 1;
     ptx->n_padded += columns * rows - g->n_shots;
+    ptx->n_ended_shots += g->n_shots;
     int rc = put_header(ptx, err);
     return rc != 0 ? rc : ptx_grid_drain(g, put_column, ptx, err);
+}
+
+/* Do the n points of the present batch, which are of one line, belong into the grid as it is? */
+static int has_room(const struct ptx *ptx, uint32_t n)
+{
+    const struct ptx_grid *g = &ptx->grid;
+    const struct track *t = &ptx->base.track;
+    const uint32_t first = t->row[0], last = t->row[n - 1];
+    if (g->n_shots == 0) return 1;
+    const uint32_t after = ptx->last_row + (t->point[0].echo <= 1); /* further echoes belong to the last shot */
+    if (t->line < ptx->last_line || (t->line == ptx->last_line && first < after)) return 0;
+    const uint64_t columns = (uint64_t)t->line - g->column_min + 1;
+    const uint64_t rows =
+        (uint64_t)(last > g->row_max ? last : g->row_max) - (first < g->row_min ? first : g->row_min) + 1;
+    const uint64_t shots = g->n_shots + n;
+    return columns <= t->max_lines && rows <= t->max_pulses && rows <= ROWS_MAX &&
+           ptx->n_padded + columns * rows <= PADDING_FREE + shots + PADDING_PER_SHOT * (ptx->n_ended_shots + shots);
 }
 
 static int ptx_scan(void *rec, struct sh_err *err)
@@ -92,17 +131,25 @@ static float intensity(struct ptx *ptx, double reflectance_db)
 static int ptx_points(void *rec, int n, struct sh_err *err)
 {
     struct ptx *ptx = rec;
-    const struct track *t = &ptx->base.track;
+    struct track *t = &ptx->base.track;
+    if (n > 0 && !has_room(ptx, (uint32_t)n)) {
+        int rc = end_scan(ptx, err);
+        if (rc != 0) return rc;
+        ptx->n_split++;
+    }
     for (int i = 0; i < n; i++) {
         const struct scanhead_point *p = &t->point[i];
         if (p->echo > 1) {
             ptx->n_left_out++;
             continue;
         }
+        ptx->last_line = t->line;
+        ptx->last_row = t->row[i];
         ptx_grid_shot(&ptx->grid, t->line, t->row[i]);
         if (p->echo_count == 0) continue;
         struct ptx_cell cell = {t->line, t->row[i], intensity(ptx, p->reflectance_db), {p->x, p->y, p->z}};
         if (t->info.geo) station_pose_reverse(&t->pose, cell.p_socs);
+        if (track_is_nowhere(t, cell.p_socs[0], cell.p_socs[1], cell.p_socs[2])) continue;
         int rc = ptx_grid_cell(&ptx->grid, &cell, err);
         if (rc != 0) return rc;
     }
@@ -116,6 +163,9 @@ static int ptx_finish(void *rec, struct sh_err *err)
     if (rc != 0) return rc;
     recorder_report(rec, ptx->n_left_out, "echoes left out; a PTX grid holds the first of a shot");
     recorder_report(rec, ptx->n_too_bright, "echoes brighter than a white target, which PTX writes as 1");
+    recorder_report(
+        rec, ptx->n_split,
+        "grids begun within a scan: so many lines or pulses are missing before them that they are not filled up");
     recorder_report(rec, ptx->n_padded, "places of the grid without a shot, filled like shots without echo");
     return 0;
 }

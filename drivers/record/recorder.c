@@ -62,6 +62,12 @@ void recorder_report(const struct recorder *rec, uint64_t n, const char *what)
     if (n > 0) sh_warn(rec->options.report, "%s: %" PRIu64 " %s", rec->file.path, n, what);
 }
 
+int recorder_check_stop(const struct recorder *rec, struct sh_err *err)
+{
+    if (!sh_stopped(rec->options.report)) return SH_OK;
+    return sh_fail(err, SH_ESTOPPED, "%s: interrupted while it was completed; it is not written", rec->file.path);
+}
+
 int recorder_fail_huge(const struct recorder *rec, const double p[3], struct sh_err *err)
 {
     return sh_fail(err, SH_EFORMAT, "%s: a coordinate has more digits than this format takes: %g %g %g", rec->file.path,
@@ -72,8 +78,11 @@ static void report_losses(const struct recorder *rec)
 {
     const struct track *t = &rec->track;
     if (rec->ops->track.points == NULL) return;
-    recorder_report(rec, t->missing.n_unplaced, "points left out that came before the descriptor and the anchor of their scan");
+    recorder_report(rec, t->missing.n_unplaced,
+                    "points left out that came before the descriptor and the anchor of their scan");
     recorder_report(rec, t->missing.n_without_pose, "points left out whose pose was lost");
+    recorder_report(rec, t->missing.n_nowhere,
+                    "points left out whose coordinates are infinite or no numbers: the stream is broken");
     recorder_report(rec, t->missing.n_attributes_unheld,
                     "points whose amplitude and width are left out; this format has no place for them");
     recorder_report(rec, t->missing.n_without_attributes, "points without amplitude and width, which were lost");

@@ -9,13 +9,18 @@
 
 #include "core/err.h"
 #include "drivers/host/scanhead.h"
+#include "drivers/record/colour.h"
 #include "drivers/record/outfile.h"
 #include "drivers/record/track.h"
 
 struct recorder_options {
-    int ascii;       /* PLY as text */
-    int empty_shots; /* keep shots without echo, where the format can */
-    /* Is given, at the end, what the format had no room for. May be NULL; must live until close. */
+    int ascii;               /* PLY as text */
+    int empty_shots;         /* keep shots without echo, where the format can */
+    enum colour_kind colour; /* of .ply and .las */
+    int scalar_names;        /* PLY's columns besides coordinates and colour are called scalar_NAME */
+    int las_minor;           /* LAS 1.2 or 1.4: 2 or 4; 0: 4 */
+    /* Is given, at the end, what the format had no room for. Its stop gives up a file that is being completed, which may
+     * take long. May be NULL; must live until close. */
     const struct sh_report *report;
 };
 
@@ -57,6 +62,8 @@ int recorder_close(struct recorder *rec, int keep, struct sh_err *err);
 
 /* For formats: reports "PATH: n what", unless n is 0. */
 void recorder_report(const struct recorder *rec, uint64_t n, const char *what);
+/* For formats, in work of more than a tenth of a second: SH_ESTOPPED once the caller wants no more. */
+int recorder_check_stop(const struct recorder *rec, struct sh_err *err);
 /* For formats: SH_EFORMAT, for a coordinate that is too long to be written as text. */
 int recorder_fail_huge(const struct recorder *rec, const double p[3], struct sh_err *err);
 

@@ -63,24 +63,70 @@ static int begins_scan(const struct track *t, const struct scanhead_frame *frame
            t->info.station != t->state.last_station;
 }
 
+/* The nearest whole number; UINT32_MAX for what is larger, also for what is no number. */
+static uint32_t whole_u32(double v)
+{
+    return v <= 0 ? 0 : v < UINT32_MAX ? (uint32_t)llround(v) : UINT32_MAX;
+}
+
+/* A frame is one sweep of the pan and a whole number of lines; without a way to go, one line (core/schedule.h). Lines
+ * are of equal length but for a pulse. */
+static void set_limits(struct track *t, const struct native_descriptor *d)
+{
+    const double lines_hz = 1e-6 * (double)d->lines_uhz, prr_hz = 1e-6 * (double)d->prr_uhz;
+    const double sweep_s =
+        d->pan_udeg_s > 0 ? ((double)d->pan_stop_udeg - (double)d->pan_start_udeg) / (double)d->pan_udeg_s : 0;
+    t->max_pulses = lines_hz > 0 && prr_hz > 0 ? whole_u32(ceil(prr_hz / lines_hz) + 1) : UINT32_MAX;
+    t->max_lines = d->frames > 0 ? whole_u32(d->frames * (ceil(fabs(sweep_s) * lines_hz) + 1)) : UINT32_MAX;
+}
+
 /* The end of a line says where the next one begins. Where it was lost, the times in the frame say so, as long
  * as the pulse rate is that of the descriptor. */
 static uint64_t first_row(const struct track *t, const struct scanhead_frame *frame)
 {
     if (t->state.have_next_line && t->state.next_line == frame->scan_line && t->state.next_line_pulse0 <= frame->pulse0)
         return frame->pulse0 - t->state.next_line_pulse0;
-    double since_s = 1e-9 * (double)(frame->scan_t0_ns - frame->line_t0_ns);
-    return since_s > 0 ? (uint64_t)llround(since_s * t->info.prr_hz) : 0;
+    double since_s = 1e-9 * ((double)frame->scan_t0_ns - (double)frame->line_t0_ns);
+    return whole_u32(since_s * t->info.prr_hz);
 }
 
-/* Echoes of one pulse follow each other: a new pulse begins wherever the number is 0 or 1. */
+/* Echoes of one pulse follow each other: a new pulse begins wherever the number is 0 or 1. A frame that begins
+ * with a later echo is none of a head's; that echo goes to the row before. */
 static uint64_t number_rows(struct track *t, uint64_t row, int n)
 {
     for (int i = 0; i < n; i++) {
         if (t->point[i].echo <= 1) row++;
-        t->row[i] = (uint32_t)(row - 1);
+        t->row[i] = (uint32_t)(row > 0 ? row - 1 : 0);
     }
     return row;
+}
+
+int track_is_nowhere(struct track *t, double x, double y, double z)
+{
+    int nowhere = !isfinite(x) || !isfinite(y) || !isfinite(z);
+    t->missing.n_nowhere += (uint64_t)nowhere;
+    return nowhere;
+}
+
+static void keep_point(struct track *t, int from, int to)
+{
+    t->point[to] = t->point[from];
+    t->row[to] = t->row[from];
+    t->index[to] = t->index[from];
+    t->frame[to] = t->frame[from];
+}
+
+/* How many are left. */
+static int leave_out_nowhere(struct track *t, int n)
+{
+    int kept = 0;
+    for (int i = 0; i < n; i++) {
+        const struct scanhead_point *p = &t->point[i];
+        if (p->echo_count != 0 && track_is_nowhere(t, p->x, p->y, p->z)) continue;
+        if (kept != i) keep_point(t, i, kept);
+        kept++;
+    }
+    return kept;
 }
 
 /* Positions of the geo layout need no pose. The frame scalar does; it is NaN where the pose was lost. */
@@ -106,10 +152,7 @@ static int place_moving(struct track *t, int n, struct sh_err *err)
             t->missing.n_without_pose++;
             continue;
         }
-        t->point[kept] = t->point[i];
-        t->row[kept] = t->row[i];
-        t->index[kept] = t->index[i];
-        t->frame[kept++] = t->frame[i];
+        keep_point(t, i, kept++);
     }
     return kept;
 }
@@ -200,6 +243,7 @@ static int take_batch(struct track *t, uint32_t first, int n, struct sh_err *err
         t->index[i] = first + (uint32_t)i;
     int kept = t->info.moving ? place_moving(t, n, err) : n;
     if (kept < 0) return kept;
+    kept = leave_out_nowhere(t, kept);
     count_unheld(t, kept);
     if (!t->has_attributes) return t->ops->points(t->rec, kept, err);
     wait_for_attributes(t, kept);
@@ -250,7 +294,7 @@ static int take_points(struct track *t, const struct scanhead_frame *frame, stru
     t->state.last_station = t->info.station;
     if (rc == 0) rc = begin_waiting(t, err);
     uint64_t row = first_row(t, frame);
-    if (rc == 0 && row + frame->n_points > UINT32_MAX)
+    if (rc == 0 && row > UINT32_MAX - frame->n_points)
         rc = sh_fail(err, SH_EFORMAT, "%s: line %u has more than 2^32 pulses", t->path, t->line);
     return rc == 0 && t->ops->points != NULL ? take_batches(t, frame, row, err) : rc;
 }
@@ -270,6 +314,9 @@ int track_frame(struct track *t, struct scanhead *sh, const struct scanhead_fram
     if (frame->type == SCANHEAD_POINTS) return take_points(t, frame, err);
     if (frame->type == SCANHEAD_ATTRIBUTES) return take_attributes(t, frame, err);
     if (frame->type == SCANHEAD_LINE_END) take_line_end(t, frame);
+    struct native_descriptor d;
+    if (frame->type == SCANHEAD_DESCRIPTOR && native_decode_descriptor(frame->payload, frame->payload_len, &d) == 0)
+        set_limits(t, &d);
     if (frame->type == SCANHEAD_DESCRIPTOR && (frame->flags & SCANHEAD_REPEAT) == 0) {
         t->state.new_scan = 1;
         t->state.have_next_line = 0;

@@ -36,6 +36,7 @@ struct track_ops {
 struct track_missing {
     uint64_t n_unplaced;           /* points before their descriptor and anchor were seen */
     uint64_t n_without_pose;       /* points of a moving head whose pose was lost */
+    uint64_t n_nowhere;            /* echoes whose coordinates are beyond any number, of a broken stream */
     uint64_t n_without_attributes; /* echoes whose attributes were lost */
     uint64_t n_attributes_unheld;  /* echoes with attributes that the recorder has no place for */
 };
@@ -65,6 +66,8 @@ struct track {
     int geoid_heights, moving, stops;
     uint32_t n_scans; /* with points */
     struct track_missing missing;
+    /* What the descriptor says a scan can have at most: lines, and pulses in one of them; UINT32_MAX: no end. */
+    uint32_t max_lines, max_pulses;
     double scale_m; /* of coordinates in the recording: the stream's; coarser where the head moves far */
     struct scanhead_point point[TRACK_BATCH];
     uint32_t row[TRACK_BATCH]; /* of each point: pulses since the line's first, the blind ones included */
@@ -82,6 +85,10 @@ struct track {
  * another kind of heights, a head that begins or ceases to move or to send (wanted) attributes, a station
  * number above 65535. */
 int track_frame(struct track *track, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
+
+/* 1 where an echo's position is infinite or no number: a broken stream's. It is counted, and to be left out. Points come
+ * out of the track with finite coordinates; a recorder that transforms them asks again. */
+int track_is_nowhere(struct track *track, double x, double y, double z);
 
 /* At the end: gives out the points that still wait for their attributes. */
 int track_flush(struct track *track, struct sh_err *err);

@@ -107,7 +107,7 @@ static int set_configuration(struct usb_device *device, const struct setup *s, u
     (void)data;
     if (device->state == USB_DEFAULT || s->index != 0 || s->length != 0) return USB_STALL;
     if (s->value != 0 && s->value != USB_CONFIGURATION) return USB_STALL;
-    usb_enter(device, s->value != 0 ? USB_CONFIGURED : USB_ADDRESSED);
+    usb_enter(device, s->value != 0 ? USB_CONFIGURED : USB_ADDRESSED, USB_END_CONFIGURED);
     return 0;
 }
 

@@ -4,11 +4,12 @@
 #include "drivers/usb/usb.h"
 
 enum {
-    BCD_USB_2 = 0x0210,  /* the least that may have a BOS */
-    BCD_USB_3 = 0x0320,  /* at super speed */
-    PACKET_0 = 64,       /* bMaxPacketSize0, full and high speed */
-    PACKET_0_SUPER = 9,  /* the same at super speed: 2^9 */
-    SELF_POWERED = 0x40, /* bmAttributes, with bit 7, which is always set */
+    BCD_USB_2 = 0x0200,
+    BCD_USB_2_BOS = 0x0210, /* the least that may have a BOS */
+    BCD_USB_3 = 0x0320,     /* at super speed */
+    PACKET_0 = 64,          /* bMaxPacketSize0, full and high speed */
+    PACKET_0_SUPER = 9,     /* the same at super speed: 2^9 */
+    SELF_POWERED = 0x40,    /* bmAttributes, with bit 7, which is always set */
     CAP_USB_2_EXTENSION = 2,
     CAP_SUPER_SPEED = 3,
     CAP_PLATFORM = 5,
@@ -69,12 +70,23 @@ static unsigned serial_index(const struct usb_model *model, const struct usb_ide
     return id->serial[0] != '\0' ? count_strings(model) + 1 : 0;
 }
 
+/* Below super speed the one thing that a BOS can say is the platform capability. */
+static int has_bos(const struct usb_model *model, const struct usb_identity *id)
+{
+    return id->highest == USB_RATE_SUPER || usb_describe_ms_os(model, NULL, 0) != 0;
+}
+
+static unsigned bcd_usb(const struct usb_model *model, const struct usb_identity *id, enum usb_rate rate)
+{
+    return rate == USB_RATE_SUPER ? BCD_USB_3 : has_bos(model, id) ? BCD_USB_2_BOS : BCD_USB_2;
+}
+
 size_t usb_describe_device(const struct usb_model *model, const struct usb_identity *id, enum usb_rate rate,
                            uint8_t *out, size_t room)
 {
     struct sink to = {out, room, 0};
     const int super = rate == USB_RATE_SUPER;
-    PUT(&to, USB_DT_DEVICE_SIZE, USB_DT_DEVICE, U16(super ? BCD_USB_3 : BCD_USB_2), model->class, model->subclass,
+    PUT(&to, USB_DT_DEVICE_SIZE, USB_DT_DEVICE, U16(bcd_usb(model, id, rate)), model->class, model->subclass,
         model->protocol, super ? PACKET_0_SUPER : PACKET_0, U16(id->vid), U16(id->pid), U16(model->bcd_device),
         model->manufacturer, model->product, U8(serial_index(model, id)), N_CONFIGURATIONS);
     return to.len;
@@ -86,8 +98,8 @@ size_t usb_describe_qualifier(const struct usb_model *model, const struct usb_id
 {
     struct sink to = {out, room, 0};
     if (id->highest < USB_RATE_HIGH || rate == USB_RATE_SUPER) return 0;
-    PUT(&to, 10, USB_DT_DEVICE_QUALIFIER, U16(BCD_USB_2), model->class, model->subclass, model->protocol, PACKET_0,
-        N_CONFIGURATIONS, 0);
+    PUT(&to, 10, USB_DT_DEVICE_QUALIFIER, U16(bcd_usb(model, id, rate)), model->class, model->subclass, model->protocol,
+        PACKET_0, N_CONFIGURATIONS, 0);
     return to.len;
 }
 
@@ -153,11 +165,13 @@ size_t usb_describe_bos(const struct usb_model *model, const struct usb_identity
     struct sink to = {out, room, 0};
     const int super = id->highest == USB_RATE_SUPER;
     const size_t ms_len = usb_describe_ms_os(model, NULL, 0);
-    PUT(&to, USB_DT_BOS_SIZE, USB_DT_BOS, U16(LATER), U8(1 + super + (ms_len != 0)));
-    PUT(&to, USB_DT_USB_EXT_CAP_SIZE, USB_DT_DEVICE_CAPABILITY, CAP_USB_2_EXTENSION, U32(super ? LPM : 0));
-    if (super)
+    if (!has_bos(model, id)) return 0;
+    PUT(&to, USB_DT_BOS_SIZE, USB_DT_BOS, U16(LATER), U8(2 * super + (ms_len != 0)));
+    if (super) {
+        PUT(&to, USB_DT_USB_EXT_CAP_SIZE, USB_DT_DEVICE_CAPABILITY, CAP_USB_2_EXTENSION, U32(LPM));
         PUT(&to, USB_DT_USB_SS_CAP_SIZE, USB_DT_DEVICE_CAPABILITY, CAP_SUPER_SPEED, NO_LATENCY_MESSAGES,
             U16(FULL_TO_SUPER), WORKS_FROM_FULL, U1_EXIT_US, U16(U2_EXIT_US));
+    }
     if (ms_len != 0) put_ms_platform(&to, model, ms_len);
     patch16(&to, 2, (unsigned)to.len);
     return to.len;

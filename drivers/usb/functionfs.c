@@ -85,10 +85,14 @@ static int functionfs_prepare(void *backend, struct pollfd *fds)
     return N_FDS;
 }
 
-static void disable(struct functionfs *self)
+/* The kernel reports a reset, a configuration that was taken away and an unplugging alike. */
+static void disable(struct functionfs *self, int unplugged)
 {
     ffs_pipes_stop(&self->pipes);
-    usb_device_detach(self->device);
+    if (unplugged)
+        usb_device_detach(self->device);
+    else
+        usb_device_reset(self->device, usb_device_rate(self->device));
     ffs_console_stop(&self->console);
 }
 
@@ -97,7 +101,7 @@ static void enable(struct functionfs *self)
 {
     struct usb_ctrlrequest setup = {.bRequest = USB_REQ_SET_CONFIGURATION};
     le_put16(&setup.wValue, USB_CONFIGURATION);
-    disable(self); /* the kernel leaves out the event before when it was not read in time */
+    disable(self, 0); /* the kernel leaves out the event before when it was not read in time */
     usb_device_attach(self->device, gadget_rate(&self->gadget), on_complete, self);
     usb_device_assume_address(self->device);
     usb_device_control(self->device, &setup, NULL, 0);
@@ -153,8 +157,10 @@ static int take_event(struct functionfs *self)
         enable(self);
         break;
     case FUNCTIONFS_DISABLE:
+        disable(self, !gadget_is_on_bus(&self->gadget));
+        break;
     case FUNCTIONFS_UNBIND:
-        disable(self);
+        disable(self, 1);
         break;
     case FUNCTIONFS_SETUP:
         answer(self, event.u.setup);

@@ -256,6 +256,15 @@ static int make_function(struct gadget *gadget, const char *kind, struct sh_err 
     return SH_OK;
 }
 
+/* The model's protocol for f_acm, which reports AT commands (1) by itself. Before Linux 6.13 it can't be told. */
+static int set_console_protocol(const struct gadget *gadget, const struct usb_model *model, struct sh_err *err)
+{
+    char file[96];
+    snprintf(file, sizeof file, "functions/acm.%s/protocol", gadget->name);
+    if (write_text(gadget->dir, file, "%u", model->function[0].protocol) == 0 || errno == ENOENT) return SH_OK;
+    return sh_fail(err, SH_EIO, "functionfs: %s/%s: %s", gadget->dir, file, strerror(errno));
+}
+
 static int find_tty(struct gadget *gadget, struct sh_err *err)
 {
     char file[96], text[16];
@@ -292,6 +301,7 @@ int gadget_create(struct gadget *gadget, const struct usb_model *model, const st
     if (rc == SH_OK && (write_identity(gadget, model, id) != 0 || write_configuration(gadget, model) != 0))
         rc = sh_fail(err, SH_EIO, "functionfs: %s cannot be filled in: %s", gadget->dir, strerror(errno));
     if (rc == SH_OK && gadget->tty_number >= 0) rc = make_function(gadget, "acm", err);
+    if (rc == SH_OK && gadget->tty_number >= 0) rc = set_console_protocol(gadget, model, err);
     if (rc == SH_OK && gadget->tty_number >= 0) rc = find_tty(gadget, err);
     if (rc == SH_OK) rc = make_function(gadget, "ffs", err);
     if (rc == SH_OK) rc = mount_instance(gadget, err);
@@ -344,6 +354,13 @@ static enum usb_rate read_rate(const struct gadget *gadget, const char *file)
     return strncmp(text, "super", 5) == 0  ? USB_RATE_SUPER
            : strncmp(text, "high", 4) == 0 ? USB_RATE_HIGH
                                            : USB_RATE_FULL;
+}
+
+int gadget_is_on_bus(const struct gadget *gadget)
+{
+    char dir[320], state[32] = "";
+    snprintf(dir, sizeof dir, "%s/%s", CONTROLLERS, gadget->udc);
+    return read_text(dir, "state", state, sizeof state) == 0 && strcmp(state, "not attached") != 0;
 }
 
 enum usb_rate gadget_rate(const struct gadget *gadget)

@@ -30,6 +30,8 @@ int gadget_create(struct gadget *gadget, const struct usb_model *model, const st
 int gadget_describe(const struct gadget *gadget, int ep0, const struct usb_identity *id, struct sh_err *err);
 /* Plugs in: udc, or the first free controller where that is empty. */
 int gadget_bind(struct gadget *gadget, const char *udc, struct sh_err *err);
+/* 0: its controller sees no host. */
+int gadget_is_on_bus(const struct gadget *gadget);
 /* Of the bus it is on. */
 enum usb_rate gadget_rate(const struct gadget *gadget);
 /* SH_EINPUT: the controller it is bound to is not as fast. */

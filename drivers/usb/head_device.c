@@ -6,6 +6,8 @@
 #include "drivers/protocol/bytes.h"
 
 enum { SERIAL_STATE_READY = 3, DTR = 1 }; /* carrier and data set ready */
+/* bInterfaceProtocol: no AT commands (1). Modem managers send those to every port that says it takes them. */
+enum { CONSOLE_PROTOCOL = USB_CDC_PROTO_NONE };
 
 static const char *const strings[] = {"scanhead", "Laser scanner head", "Scanner console", "Scanner stream", NULL};
 enum { STRING_MAKER = 1, STRING_PRODUCT, STRING_CONSOLE, STRING_STREAM };
@@ -39,7 +41,7 @@ static const struct usb_interface_row interfaces[] = {
     {.number = CONSOLE_INTERFACE,
      .class = USB_CLASS_COMM,
      .subclass = USB_CDC_SUBCLASS_ACM,
-     .protocol = USB_CDC_ACM_PROTO_AT_V25TER,
+     .protocol = CONSOLE_PROTOCOL,
      .string = STRING_CONSOLE,
      .extra = console_extra,
      .extra_len = sizeof console_extra,
@@ -60,7 +62,7 @@ static const struct usb_function_row functions[] = {
      .count = 2,
      .class = USB_CLASS_COMM,
      .subclass = USB_CDC_SUBCLASS_ACM,
-     .protocol = USB_CDC_ACM_PROTO_AT_V25TER,
+     .protocol = CONSOLE_PROTOCOL,
      .string = STRING_CONSOLE},
     {.first = STREAM_INTERFACE,
      .count = 1,
@@ -116,6 +118,7 @@ static int console_request(struct scanhead_usb *head, uint8_t request, unsigned 
         return value == 0 && length == sizeof head->line_coding ? set_line_coding(head, data) : USB_STALL;
     case USB_CDC_REQ_SET_CONTROL_LINE_STATE:
         if (length != 0 || (value & ~3u) != 0) return USB_STALL;
+        if ((value & DTR) != 0 && !head->session[CONSOLE_SESSION].open) head->state_due = 1; /* to who opens the port */
         set_open(head, CONSOLE_SESSION, (value & DTR) != 0);
         return 0;
     case USB_CDC_REQ_SEND_BREAK: /* there is no line to hold */
@@ -163,8 +166,24 @@ static void on_interface(void *ctx, unsigned interface, int active)
         head->state_due = active;
         memcpy(head->line_coding, line_coding_at_rest, sizeof head->line_coding);
     }
+    const int session = interface == STREAM_INTERFACE ? STREAM_SESSION : CONSOLE_SESSION;
     if (active) return;
-    set_open(head, interface == STREAM_INTERFACE ? STREAM_SESSION : CONSOLE_SESSION, 0);
+    if (head->session[session].open) {
+        head->cut_due = 1;
+        head->cut = usb_device_end(head->device);
+    }
+    set_open(head, session, 0);
+}
+
+const char *scanhead_usb_cut(struct scanhead_usb *head)
+{
+    static const char *const why[] = {
+        [USB_END_CONFIGURED] = "the host configured the device anew: sessions ended, the device stays plugged in",
+        [USB_END_RESET] = "the host reset the bus: sessions ended, the device stays plugged in",
+        [USB_END_UNPLUGGED] = "unplugged: sessions ended"};
+    if (!head->cut_due) return NULL;
+    head->cut_due = 0;
+    return why[head->cut];
 }
 
 int scanhead_usb_create(const struct usb_identity *id, struct scanhead_usb *head, struct sh_err *err)

@@ -36,7 +36,9 @@ struct scanhead_usb {
     struct usb_device *device;
     struct scanhead_usb_session session[SCANHEAD_USB_SESSIONS];
     uint8_t line_coding[7];
-    int state_due; /* the console's serial state is still to be sent */
+    int cut_due; /* the bus has ended a session that its host had not; scanhead_usb_cut says why */
+    enum usb_end cut;
+    int state_due; /* the serial state is still to be sent: the console came to life, or DTR rose */
 };
 
 /* Makes the device of head, which must be zeroed and stay where it is. usb_device_free(head->device). */
@@ -44,6 +46,8 @@ int scanhead_usb_create(const struct usb_identity *id, struct scanhead_usb *head
 /* What follows from the host's transfers rather than its requests: a stream that opens with data, the
  * console's notification. To be called after each of them. */
 void scanhead_usb_update(struct scanhead_usb *head);
+/* One line, each only once: what has cut sessions off. NULL: nothing. */
+const char *scanhead_usb_cut(struct scanhead_usb *head);
 /* The end of a session has been reported to whoever serves it. */
 void scanhead_usb_ended(struct scanhead_usb *head, int session);
 

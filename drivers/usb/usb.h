@@ -88,6 +88,7 @@ struct usb_model {
 struct usb_identity {
     uint16_t vid, pid;
     char serial[64];       /* UTF-8; empty: no serial number string */
+    unsigned number;       /* of this head among those on the machine, from 1; 0: it has none */
     enum usb_rate highest; /* fastest rate it can do */
 };
 
@@ -137,6 +138,9 @@ struct usb_transfer {
     struct usb_transfer *next;
 };
 
+/* Why interfaces ended. Some hosts' drivers don't pass a reset on; they configure the device anew. */
+enum usb_end { USB_END_CONFIGURED, USB_END_RESET, USB_END_UNPLUGGED };
+
 /* What the function gets to know. All may be NULL. Called within the calls of the back end. */
 struct usb_hooks {
     /* A class or vendor request. OUT: data holds wLength bytes; return 0. IN: fill at most wLength bytes,
@@ -182,6 +186,8 @@ int usb_device_cancel(struct usb_device *device, uint64_t id);
 const struct usb_model *usb_device_model(const struct usb_device *device);
 const struct usb_identity *usb_device_identity(const struct usb_device *device);
 enum usb_rate usb_device_rate(const struct usb_device *device);
+/* Why interfaces ended last, or are ending. */
+enum usb_end usb_device_end(const struct usb_device *device);
 /* 0: not configured. */
 int usb_device_configuration(const struct usb_device *device);
 /* The present alternate setting's row; NULL when not configured. */

@@ -68,11 +68,12 @@ static void set_interface(struct usb_device *device, unsigned interface, int act
     if (device->hooks.interface != NULL) device->hooks.interface(device->ctx, interface, active);
 }
 
-void usb_enter(struct usb_device *device, enum usb_state state)
+void usb_enter(struct usb_device *device, enum usb_state state, enum usb_end why)
 {
     const int n = device->model->n_interfaces;
     enum usb_state before = device->state;
     device->state = state;
+    device->end = why;
     for (int i = 0; i < n && before == USB_CONFIGURED; i++)
         set_interface(device, (unsigned)i, 0);
     memset(device->alt, 0, sizeof device->alt);
@@ -83,6 +84,7 @@ void usb_enter(struct usb_device *device, enum usb_state state)
 
 void usb_select_alt(struct usb_device *device, unsigned interface, unsigned alt)
 {
+    device->end = USB_END_CONFIGURED;
     set_interface(device, interface, 0);
     device->alt[interface] = (uint8_t)alt;
     set_interface(device, interface, 1);
@@ -109,13 +111,13 @@ void usb_device_attach(struct usb_device *device, enum usb_rate rate, usb_comple
 
 void usb_device_detach(struct usb_device *device)
 {
-    if (device->state != USB_DETACHED) usb_enter(device, USB_DETACHED);
+    if (device->state != USB_DETACHED) usb_enter(device, USB_DETACHED, USB_END_UNPLUGGED);
 }
 
 void usb_device_reset(struct usb_device *device, enum usb_rate rate)
 {
     if (device->state == USB_DETACHED) return;
-    usb_enter(device, USB_DEFAULT);
+    usb_enter(device, USB_DEFAULT, USB_END_RESET);
     device->rate = rate;
     device->suspended = 0;
 }
@@ -340,6 +342,11 @@ const struct usb_identity *usb_device_identity(const struct usb_device *device)
 enum usb_rate usb_device_rate(const struct usb_device *device)
 {
     return device->rate;
+}
+
+enum usb_end usb_device_end(const struct usb_device *device)
+{
+    return device->end;
 }
 
 int usb_device_configuration(const struct usb_device *device)

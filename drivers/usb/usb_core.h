@@ -24,6 +24,7 @@ struct usb_device {
     void *host_ctx;
     enum usb_state state;
     enum usb_rate rate;
+    enum usb_end end; /* why interfaces ended last */
     int suspended;
     int u1_enabled, u2_enabled;
     uint8_t alt[USB_MAX_INTERFACES];
@@ -32,7 +33,7 @@ struct usb_device {
 
 /* usb_core.c */
 struct usb_pipe *usb_pipe(struct usb_device *device, unsigned address);
-void usb_enter(struct usb_device *device, enum usb_state state);
+void usb_enter(struct usb_device *device, enum usb_state state, enum usb_end why);
 void usb_select_alt(struct usb_device *device, unsigned interface, unsigned alt);
 void usb_set_halt(struct usb_device *device, struct usb_pipe *pipe, int halted);
 

@@ -31,7 +31,8 @@ enum {
     DIR_IN = 1,
 };
 
-#define USBIP_BUSID "1-1"
-enum { USBIP_BUS = 1, USBIP_DEVICE = 2, USBIP_DEVID = USBIP_BUS << 16 | USBIP_DEVICE };
+/* Where a head is on the server's side: device number + 1 of bus 1 (the bus itself is device 1), in its port
+ * `number`, bus id "1-number". */
+enum { USBIP_BUS = 1 };
 
 #endif

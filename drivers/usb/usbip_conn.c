@@ -129,7 +129,7 @@ static void take_urb(struct usbip_conn *conn)
 {
     const uint32_t command = get_be32(conn->head);
     conn->head_len = 0;
-    if (get_be32(conn->head + 8) != USBIP_DEVID)
+    if (get_be32(conn->head + 8) != usbip_devid(conn->device))
         conn->broken = 1;
     else if (command == CMD_SUBMIT)
         take_submit(conn);

@@ -5,6 +5,9 @@
 #include "drivers/usb/usb.h"
 #include "drivers/usb/usbip.h"
 
+/* As URBs and the virtual host controller name the device: bus and device. */
+uint32_t usbip_devid(const struct usb_device *device);
+
 struct usbip_urb; /* a transfer with its header and bytes */
 
 struct usbip_conn {

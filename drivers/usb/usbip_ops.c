@@ -1,5 +1,24 @@
 /* What a USB/IP client asks before it has the device: which there are (DEVLIST), and one of them (IMPORT). */
+#include <stdio.h>
+
 #include "drivers/usb/usbip_private.h"
+
+/* Of this head on the server's side: 1 unless it has a number of its own. */
+static unsigned port_of(const struct usb_device *device)
+{
+    const unsigned number = usb_device_identity(device)->number;
+    return number != 0 ? number : 1;
+}
+
+uint32_t usbip_devid(const struct usb_device *device)
+{
+    return (uint32_t)USBIP_BUS << 16 | (port_of(device) + 1);
+}
+
+static void put_bus_id(const struct usb_device *device, char *out, size_t len)
+{
+    snprintf(out, len, "%d-%u", USBIP_BUS, port_of(device));
+}
 
 static void describe_device(const struct usbip_conn *conn, uint8_t *out)
 {
@@ -7,11 +26,13 @@ static void describe_device(const struct usbip_conn *conn, uint8_t *out)
         [USB_RATE_FULL] = USB_SPEED_FULL, [USB_RATE_HIGH] = USB_SPEED_HIGH, [USB_RATE_SUPER] = USB_SPEED_SUPER};
     const struct usb_model *model = usb_device_model(conn->device);
     const struct usb_identity *id = usb_device_identity(conn->device);
+    char bus_id[BUSID_LEN];
     memset(out, 0, OP_DEVICE);
-    strcpy((char *)out, "/sys/devices/scanhead/" USBIP_BUSID);
-    strcpy((char *)out + 256, USBIP_BUSID);
+    put_bus_id(conn->device, bus_id, sizeof bus_id);
+    snprintf((char *)out, 256, "/sys/devices/scanhead/%s", bus_id);
+    snprintf((char *)out + 256, BUSID_LEN, "%s", bus_id);
     put_be32(out + 288, USBIP_BUS);
-    put_be32(out + 292, USBIP_DEVICE);
+    put_be32(out + 292, usbip_devid(conn->device) & 0xffff);
     put_be32(out + 296, speed[id->highest]);
     put_be16(out + 300, id->vid);
     put_be16(out + 302, id->pid);
@@ -51,7 +72,9 @@ static void list_devices(struct usbip_conn *conn)
 
 static void import_device(struct usbip_conn *conn, const uint8_t *busid)
 {
-    const int known = strncmp((const char *)busid, USBIP_BUSID, BUSID_LEN) == 0;
+    char own[BUSID_LEN];
+    put_bus_id(conn->device, own, sizeof own);
+    const int known = strncmp((const char *)busid, own, BUSID_LEN) == 0;
     const uint32_t status = !known ? OP_FAILED : *conn->taken ? OP_BUSY : OP_OK;
     uint8_t *out = usbip_queue_plain(conn, OP_HEADER + (status == OP_OK ? OP_DEVICE : 0));
     if (out == NULL) return;

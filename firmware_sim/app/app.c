@@ -1,15 +1,38 @@
 #include "firmware_sim/app/app.h"
 
 #include <errno.h>
+#include <math.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
+
+#include "core/newfile.h"
+#include "firmware_sim/app/progress.h"
+#include "firmware_sim/base/clock.h"
 
 static volatile sig_atomic_t interrupted;
 
+/* Signals that come together are one wish to end: `timeout` sends two, one to the process and one to its
+ * group. From the third on, or a second after the first, they mean now. */
+enum { SIGNALS_TOGETHER = 2 };
+static const int64_t TOGETHER_NS = 1000000000;
+
 static void on_signal(int number)
 {
-    (void)number;
+    static _Atomic int64_t first_ns; /* lock-free, as a handler needs it */
+    static atomic_int n;
+    const int saved = errno;
+    int64_t since_ns = 0;
+    const int64_t now_ns = clock_now_ns();
+    if (!atomic_compare_exchange_strong(&first_ns, &since_ns, now_ns) && now_ns - since_ns > TOGETHER_NS)
+        atomic_store(&n, SIGNALS_TOGETHER);
     interrupted = 1;
+    if (atomic_fetch_add(&n, 1) >= SIGNALS_TOGETHER) {
+        signal(number, SIG_DFL);
+        raise(number); /* comes when this function returns */
+    }
+    errno = saved;
 }
 
 int app_interrupted(void)
@@ -21,8 +44,7 @@ void app_catch_signals(void)
 {
     struct sigaction action;
     memset(&action, 0, sizeof action);
-    action.sa_handler = on_signal;
-    action.sa_flags = (int)SA_RESETHAND; /* no SA_RESTART: waits end at once */
+    action.sa_handler = on_signal; /* no SA_RESTART: waits end at once */
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
     signal(SIGPIPE, SIG_IGN);
@@ -35,14 +57,31 @@ int app_fail(const struct sh_err *err)
     return err->code == SH_EINPUT ? APP_USAGE : APP_FAILED;
 }
 
+/* Every fault in its line. */
+static int fail_config(const struct config_faults *faults)
+{
+    int status = APP_USAGE;
+    for (uint32_t i = 0; i < faults->n && i < CONFIG_MAX_FAULTS; i++)
+        status = app_fail(&faults->fault[i]);
+    if (faults->n > CONFIG_MAX_FAULTS) fprintf(stderr, "scanhead: and %u more\n", faults->n - CONFIG_MAX_FAULTS);
+    return status;
+}
+
 int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, void *ctx, struct sh_err *err),
                     void *ctx)
 {
     struct sh_err err = {0};
+    struct config_faults faults;
     struct config *cfg = calloc(1, sizeof *cfg);
-    int rc = cfg != NULL ? config_load(in->operand[0], in->sets.set, in->sets.n, cfg, &err)
-                         : sh_fail(&err, SH_ENOMEM, "no memory");
-    if (rc == SH_OK) rc = work(cfg, ctx, &err);
+    if (cfg == NULL) {
+        sh_fail(&err, SH_ENOMEM, "no memory");
+        return app_fail(&err);
+    }
+    if (config_load_all(in->operand[0], in->sets.set, in->sets.n, cfg, &faults) != SH_OK) {
+        free(cfg);
+        return fail_config(&faults);
+    }
+    const int rc = work(cfg, ctx, &err);
     free(cfg);
     return rc == SH_OK ? APP_OK : app_fail(&err);
 }
@@ -55,11 +94,16 @@ static void print_warning(void *ctx, const char *text)
 
 static void print_progress(void *ctx, const char *what, double fraction)
 {
+    static struct progress_pace pace;
+    const double left_s = progress_left_s(&pace, what, fraction, clock_now_ns());
+    char left[48] = "";
     (void)ctx;
+    if (left_s >= 0.0 && left_s < 120.0) snprintf(left, sizeof left, ", %.0f s left", ceil(left_s));
+    if (left_s >= 120.0) snprintf(left, sizeof left, ", %.0f min left", ceil(left_s / 60.0));
     if (fraction < 0.0)
         fprintf(stderr, "scanhead: %s ...\n", what);
     else
-        fprintf(stderr, "scanhead: %s: %.0f %%\n", what, 100.0 * fraction);
+        fprintf(stderr, "scanhead: %s: %.0f %%%s\n", what, 100.0 * fraction, left);
 }
 
 static int asked_to_stop(void *ctx)
@@ -81,15 +125,32 @@ void app_warn_left_out(uint64_t crowded, uint64_t unfit)
                 (unsigned long long)unfit);
 }
 
+void app_warn_empty(uint64_t pulses, uint64_t with_echo, uint64_t faint)
+{
+    if (pulses == 0 || with_echo >= pulses / 20) return;
+    sh_warn(&app_report_stderr, "mostly empty: %llu of %llu pulses have an echo, %.2g %%; %llu hits were not detected",
+            (unsigned long long)with_echo, (unsigned long long)pulses, 100.0 * (double)with_echo / (double)pulses,
+            (unsigned long long)faint);
+}
+
 int app_write_json(const char *path, void (*put)(struct json *json, const void *ctx), const void *ctx,
                    struct sh_err *err)
 {
-    FILE *out = strcmp(path, "-") == 0 ? stdout : fopen(path, "w");
-    if (out == NULL) return sh_fail(err, SH_EIO, "%s: %s", path, strerror(errno));
+    const int to_stdout = strcmp(path, "-") == 0;
+    struct sh_err why = {0};
+    int fd = -1, rc = to_stdout ? SH_OK : newfile_open(path, &fd, err);
+    if (rc != SH_OK) return rc;
+    FILE *out = to_stdout ? stdout : fdopen(fd, "w");
+    if (out == NULL) {
+        rc = sh_fail(err, SH_EIO, "%s: %s", path, strerror(errno));
+        close(fd);
+        return rc;
+    }
     struct json json;
     json_begin(&json, out);
     put(&json, ctx);
-    int rc = json_end(&json, err);
-    if (out != stdout && fclose(out) != 0 && rc == SH_OK) rc = sh_fail(err, SH_EIO, "%s: %s", path, strerror(errno));
+    if (json_end(&json, &why) != SH_OK)
+        rc = sh_fail(err, why.code, "%s: %s", to_stdout ? "standard output" : path, why.text);
+    if (!to_stdout && fclose(out) != 0 && rc == SH_OK) rc = sh_fail(err, SH_EIO, "%s: %s", path, strerror(errno));
     return rc;
 }

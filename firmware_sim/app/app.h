@@ -1,7 +1,7 @@
 /* What the commands of the command line share: exit status, messages, loading, signals, files of figures.
  *
  * Each command is one file and one struct app_command. Only commands print, and only main exits. An error is
- * one line on standard error. */
+ * one line on standard error; of a configuration each fault is one. */
 #ifndef FIRMWARE_SIM_APP_APP_H
 #define FIRMWARE_SIM_APP_APP_H
 
@@ -14,25 +14,32 @@
 #include "firmware_sim/config/config.h"
 
 /* main.c lists them. */
-extern const struct app_command app_run, app_record, app_plan, app_map, app_report, app_check, app_list;
+extern const struct app_command app_run, app_record, app_plan, app_map, app_report, app_check, app_list, app_init;
 
 /* Prints "scanhead: TEXT" and gives the exit status for the error. */
 int app_fail(const struct sh_err *err);
 
 /* Loads the configuration that the first operand names, with the settings, and gives it to `work`. `work` may
- * change it; it is freed afterwards. Returns the exit status, with the reason of a failure printed. */
+ * change it; it is freed afterwards. Returns the exit status, with the reason of a failure printed: of a
+ * configuration all faults, a line each. */
 int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, void *ctx, struct sh_err *err),
                     void *ctx);
 
-/* Warnings and progress to standard error, each line with the program's name. Asks to stop once interrupted. */
+/* Warnings and progress to standard error, each line with the program's name. Asks to stop once
+ * interrupted. */
 extern const struct sh_report app_report_stderr;
 
-/* 1 after SIGINT or SIGTERM, once app_catch_signals was called. A second signal ends the process at once. */
+/* 1 after SIGINT or SIGTERM, once app_catch_signals was called: the command ends in good order. A second
+ * signal within a second counts as the same one. A third, or one that comes later, ends the process at
+ * once. */
 int app_interrupted(void);
 void app_catch_signals(void);
 
 /* Prints a warning for each kind of echoes that the head left out of the stream. */
 void app_warn_left_out(uint64_t crowded, uint64_t unfit);
+
+/* Prints a warning where fewer than one pulse in twenty has an echo. */
+void app_warn_empty(uint64_t pulses, uint64_t with_echo, uint64_t faint);
 
 /* One JSON value, written by `put`, to a file; path "-" is standard output. */
 int app_write_json(const char *path, void (*put)(struct json *json, const void *ctx), const void *ctx,

@@ -88,7 +88,6 @@ static int check(struct config *cfg, void *ctx, struct sh_err *err)
     struct site *site = NULL;
     int rc = site_load(cfg, &app_report_stderr, &site, err);
     if (rc == SH_OK) rc = check_links(cfg, err);
-    if (rc == SH_OK) rc = check_reach(site, &app_report_stderr, err);
     if (rc == SH_OK) rc = print_summary(cfg, site, err);
     if (rc == SH_OK) rc = print_time(cfg, err);
     site_free(site);
@@ -102,18 +101,46 @@ static int run(int argc, char **argv)
     return status == APP_GO_ON ? app_with_config(&in, check, NULL) : status;
 }
 
-static const struct app_option OPTIONS[] = {OPTION_SET, OPTION_END};
+static int print_example(void *values, const char *text)
+{
+    (void)values;
+    (void)text;
+    struct sh_err err = {0};
+    return config_print_example(stdout, &err) == SH_OK ? APP_OK : app_fail(&err);
+}
+
+static int print_section(const char *section)
+{
+    struct sh_err err = {0};
+    return config_print_section(section, stdout, &err) == SH_OK ? APP_OK : app_fail(&err);
+}
+
+/* clang-format off */
+static const struct app_option OPTIONS[] = {
+    OPTION_SET,
+    {APP_PRINT, "example", NULL, .apply = print_example,
+     .help = "print a configuration with all keys, each with its help and its default, that passes this check"},
+    OPTION_END
+};
+/* clang-format on */
 
 const struct app_command app_check = {
     .name = "check",
     .operand = {"CONFIG"},
     .summary = "validate configuration, scene and links; nothing runs",
     .options = OPTIONS,
-    .notes = "Prints where the scene and each station stand, in every frame that is known. Opens each link but files\n"
-             "and closes it again, so that a taken port or a wrong path shows.\n"
-             "\n"
-             "Configuration keys:\n"
-             "\n",
+    .notes =
+        "Prints where the scene and each station stand, in every frame that is known. Opens each link but files\n"
+        "and closes it again, so that a taken port or a wrong path shows. Of a wrong configuration all faults are\n"
+        "shown, up to 20, each with its line.\n"
+        "\n"
+        "--help SECTION prints the keys of one section: --help head, --help scene.anchor. --help profile prints\n"
+        "those of head profiles.\n"
+        "\n"
+        "Configuration keys:\n"
+        "\n",
     .print_more = config_print_reference,
+    .part = "[SECTION]",
+    .print_part = print_section,
     .run = run,
 };

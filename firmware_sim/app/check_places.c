@@ -4,7 +4,6 @@
 #include <string.h>
 
 #include "core/angle.h"
-#include "core/distance.h"
 #include "core/locate.h"
 #include "core/mat3.h"
 #include "core/vec3.h"
@@ -145,45 +144,4 @@ void check_print_stops(const struct site *site, FILE *out)
                     s->at.place.height_m);
         fputc('\n', out);
     }
-}
-
-/* A vertex within reach settles most cases without an index of distances. */
-static int has_near_vertex(const struct scene *scene, const double p[3], double reach_m)
-{
-    for (uint32_t v = 0; v < scene->n_vertices; v++) {
-        double d[3] = {scene->vertex_m[v][0] - p[0], scene->vertex_m[v][1] - p[1], scene->vertex_m[v][2] - p[2]};
-        if (vec3_dot(d, d) <= reach_m * reach_m) return 1;
-    }
-    return 0;
-}
-
-static int is_reached(const struct scene *scene, const double p[3], double reach_m, int *reached, struct sh_err *err)
-{
-    struct distance *index = NULL;
-    struct distance_hit hit;
-    *reached = has_near_vertex(scene, p, reach_m);
-    for (int i = 0; i < 3; i++)
-        if (p[i] < scene->min_m[i] - reach_m || p[i] > scene->max_m[i] + reach_m) return SH_OK;
-    if (*reached) return SH_OK;
-    int rc = distance_create(scene, &index, err);
-    if (rc == SH_OK) *reached = distance_query(index, p, reach_m, &hit);
-    distance_free(index);
-    return rc;
-}
-
-int check_reach(const struct site *site, const struct sh_report *report, struct sh_err *err)
-{
-    double reach_m = site->cfg->profile.range_max_m;
-    for (uint32_t i = 0; i < site->n_stations; i++) {
-        const double *p = site->station[i].at.position_m;
-        int reached;
-        int rc = is_reached(site->scene, p, reach_m, &reached, err);
-        for (uint32_t k = 0; k < site->n_movers && rc == SH_OK && !reached; k++)
-            rc = is_reached(site->mover[k].scene, p, reach_m, &reached, err);
-        if (rc != SH_OK) return rc;
-        if (!reached)
-            sh_warn(report, "station %u %s at %.10g %.10g %.10g m: nothing within range_max_m, %g m", i + 1,
-                    site->station[i].station->name, p[0], p[1], p[2], reach_m);
-    }
-    return SH_OK;
 }

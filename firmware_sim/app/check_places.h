@@ -12,7 +12,4 @@ int check_print_station(const struct site *site, uint32_t i, FILE *out, struct s
 /* One line for each stop. */
 void check_print_stops(const struct site *site, FILE *out);
 
-/* Warns of each station that has nothing within the head's range, as the scene is at the start. */
-int check_reach(const struct site *site, const struct sh_report *report, struct sh_err *err);
-
 #endif

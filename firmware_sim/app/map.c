@@ -2,6 +2,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 
 #include "core/map.h"
 #include "core/mat3.h"
@@ -113,7 +114,7 @@ static int draw(struct config *cfg, void *ctx, struct sh_err *err)
                                         .ctx = run,
                                         .interrupted = app_interrupted};
     app_catch_signals();
-    int rc = offline_open(cfg, &app_report_stderr, &offline, err);
+    int rc = offline_open(cfg, 0.0, &app_report_stderr, &offline, err);
     if (rc == SH_OK) options.last_station = offline.site->n_stations;
     if (rc == SH_OK) rc = create_map(run, offline.site, err);
     if (rc == SH_OK) rc = recording_run(offline.sh, &options, &result, err);
@@ -140,12 +141,20 @@ static int set_frame(struct app_sets *sets)
     return status;
 }
 
+static int ends_in_png(const char *path)
+{
+    const size_t len = strlen(path);
+    return len > 4 && strcasecmp(path + len - 4, ".png") == 0;
+}
+
 static int run(int argc, char **argv)
 {
     struct map_run run = {0};
     int status = app_parse(&app_map, argc, argv, &run.in, &run);
     if (status != APP_GO_ON) return status;
     if (run.output == NULL) return app_usage(&app_map, "-o FILE.png is needed");
+    if (!ends_in_png(run.output))
+        return app_usage(&app_map, "-o %s: it would hold a PNG; allowed is a name that ends in .png", run.output);
     status = set_frame(&run.in.sets);
     return status == APP_OK ? app_with_config(&run.in, draw, &run) : status;
 }

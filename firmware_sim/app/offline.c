@@ -17,13 +17,14 @@ static int connect_client(struct offline *off, int fd, struct sh_err *err)
     return rc == SCANHEAD_OK ? SH_OK : sh_fail(err, rc, "off line: %s", why);
 }
 
-int offline_open(struct config *cfg, const struct sh_report *report, struct offline *off, struct sh_err *err)
+int offline_open(struct config *cfg, double scan_s, const struct sh_report *report, struct offline *off,
+                 struct sh_err *err)
 {
     int fd[2];
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, fd) != 0)
         return sh_fail(err, SH_EIO, "socket pair: %s", strerror(errno));
     struct link_spec spec = {.type = LINK_FD, .fd = fd[0]};
-    struct device_options device = {0};
+    struct device_options device = {.scan_s = scan_s};
     struct loop_options options = {.extra = &spec, .report = report};
     cfg->loop.pace = PACE_FAST;
     cfg->n_links = 0;

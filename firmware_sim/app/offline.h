@@ -16,9 +16,11 @@ struct offline {
     struct loop *loop;
 };
 
-/* Loads the scene and starts the head. Its own links stay closed. cfg is changed (pace, links) and must live
+/* Loads the scene and starts the head. Its own links stay closed. scan_s > 0: it ends each scan after this device
+ * time, to the pulse. cfg is changed (pace, links) and must live
  * on. `offline` begins as zeros and is to be closed, also after an error. */
-int offline_open(struct config *cfg, const struct sh_report *report, struct offline *offline, struct sh_err *err);
+int offline_open(struct config *cfg, double scan_s, const struct sh_report *report, struct offline *offline,
+                 struct sh_err *err);
 void offline_close(struct offline *offline);
 
 #endif

@@ -7,7 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FIRST_VALUE = 256, HELP_COLUMNS = 110 };
+#include "firmware_sim/base/nearest.h"
+
+enum { FIRST_VALUE = 256, HELP_COLUMNS = 110, APP_MAX_WORDS = 8 };
 
 int app_usage(const struct app_command *command, const char *fmt, ...)
 {
@@ -130,9 +132,10 @@ static void print_row(const struct app_option *row, int width)
 
 static void print_help(const struct app_command *command)
 {
-    static const struct app_option help = {APP_LAST, "help", NULL, .letter = 'h', .help = "this text"};
+    const struct app_option help = {APP_LAST, "help", command->part, .letter = 'h',
+                                    .help = command->part != NULL ? "this text, or only that part" : "this text"};
     char arguments[128];
-    size_t longest = strlen(help.name);
+    size_t longest = strlen(help.name) + (command->part != NULL ? 1 + strlen(command->part) : 0);
     for (const struct app_option *row = command->options; row->kind != APP_LAST; row++) {
         size_t n = strlen(row->name) + (row->argument != NULL ? 1 + strlen(row->argument) : 0);
         if (n > longest) longest = n;
@@ -152,7 +155,7 @@ static void print_help(const struct app_command *command)
 static void list_options(const struct app_option *row, struct option longs[APP_MAX_OPTIONS + 2], char *letters)
 {
     int n = 0;
-    letters += sprintf(letters, ":h");
+    letters += sprintf(letters, "-:h");
     for (; row[n].kind != APP_LAST && n < APP_MAX_OPTIONS; n++) {
         int has = row[n].argument != NULL ? required_argument : no_argument;
         longs[n] = (struct option){row[n].name, has, NULL, FIRST_VALUE + n};
@@ -170,38 +173,153 @@ static const struct app_option *find_row(const struct app_option *row, int opt)
     return row;
 }
 
-static int take_operands(const struct app_command *command, int n, char **words, struct app_input *in)
+const char *app_nearest(const char *word, const char *const *known, size_t n)
+{
+    const char *best = NULL;
+    size_t best_distance = 0;
+    for (size_t i = 0; i < n; i++) {
+        const size_t distance = nearest_distance(word, known[i]);
+        if (!nearest_is_near(word, known[i]) || (best != NULL && distance >= best_distance)) continue;
+        best = known[i];
+        best_distance = distance;
+    }
+    return best;
+}
+
+/* The long option that a word without its dashes may have meant; a value after '=' is none of it. */
+static const char *nearest_option(const struct app_command *command, const char *word)
+{
+    const char *known[APP_MAX_OPTIONS + 1] = {"help"};
+    char name[NEAREST_MAX];
+    size_t n = 1;
+    for (const struct app_option *row = command->options; row->kind != APP_LAST && n <= APP_MAX_OPTIONS; row++)
+        known[n++] = row->name;
+    snprintf(name, sizeof name, "%.*s", (int)strcspn(word, "="), word);
+    return app_nearest(name, known, n);
+}
+
+static int fail_unknown(const struct app_command *command, const char *word)
+{
+    const char *meant = nearest_option(command, word + strspn(word, "-"));
+    if (meant == NULL) return app_usage(command, "unknown option %s", word);
+    return app_usage(command, "unknown option %s, did you mean --%s?", word, meant);
+}
+
+/* "-out x.ply": a long option with one dash, which getopt takes for letters: -o with the value "ut". */
+static int check_dash(const struct app_command *command, const char *word)
+{
+    const struct app_option *row = command->options;
+    const size_t len = strcspn(word + 1, "=");
+    if (word[0] != '-' || word[1] == '-' || len < 3) return APP_OK;
+    while (row->kind != APP_LAST && strncmp(row->name, word + 1, len) != 0)
+        row++;
+    if (row->kind == APP_LAST) return APP_OK;
+    if (row->letter == word[1] && row->argument != NULL)
+        return app_usage(command, "%s: did you mean --%s %s, or -%c %s?", word, row->name, row->argument, row->letter,
+                         row->argument);
+    return app_usage(command, "%s: did you mean --%s?", word, row->name);
+}
+
+/* ---- operands */
+
+/* Files that are no configuration, by their ending, and what takes them: scanhead VERB FILE REST. */
+static const struct {
+    const char *endings, *what, *verb, *rest;
+} others[] = {
+    {".shs", "a recorded stream", "record", " -o points.ply writes its points"},
+    {".obj.stl.gltf.glb.fbx.dae.ifc", "a mesh", "init", " writes a configuration that scans it"},
+    {".ply", "a mesh or a point cloud", "init", " writes a configuration that scans a mesh"},
+    {".las.laz.e57.ptx.pcapng", "a recording", "report CONFIG", " compares points with the scene"},
+};
+
+static int check_ending(const struct app_command *command, const char *label, const char *file)
+{
+    const char *dot = strrchr(file, '.');
+    char ending[16] = "";
+    const int is_source = strcmp(label, "SOURCE") == 0;
+    if (!is_source && strcmp(label, "CONFIG") != 0) return APP_OK;
+    for (size_t i = 0; dot != NULL && dot[i] != '\0' && i < sizeof ending - 1; i++)
+        ending[i] = (char)tolower((unsigned char)dot[i]);
+    for (size_t i = is_source ? 1 : 0; i < sizeof others / sizeof others[0] && strlen(ending) > 1; i++) {
+        const char *at = strstr(others[i].endings, ending);
+        const char after = at != NULL ? at[strlen(ending)] : 'x';
+        if (after != '.' && after != '\0') continue;
+        return app_usage(command, "%s is %s, and %s is %s: scanhead %s %s%s", file, others[i].what, label,
+                         is_source ? "a head, a recorded stream or a configuration" : "a configuration, a YAML file",
+                         others[i].verb, file, others[i].rest);
+    }
+    return APP_OK;
+}
+
+static int too_many(const struct app_command *command, int needed, int n, char *const *words)
+{
+    if (needed == 0) return app_usage(command, "%s: it takes no arguments", words[0]);
+    if (needed == 1)
+        return app_usage(command, "one %s is needed, and %d are given: %s, %s%s", command->operand[0], n, words[0],
+                         words[1], n > 2 ? ", ..." : "");
+    return app_usage(command, "one %s and one %s are needed; %s is one too many", command->operand[0],
+                     command->operand[1], words[needed]);
+}
+
+static int take_operands(const struct app_command *command, int n, char *const *words, struct app_input *in)
 {
     int needed = 0;
     while (needed < APP_MAX_OPERANDS && command->operand[needed] != NULL)
         needed++;
-    if (n != needed && needed == 0) return app_usage(command, "it takes no arguments");
-    if (n != needed && needed == 1) return app_usage(command, "one %s is needed", command->operand[0]);
-    if (n != needed)
-        return app_usage(command, "one %s and one %s are needed", command->operand[0], command->operand[1]);
-    for (int i = 0; i < n; i++)
+    if (n > needed) return too_many(command, needed, n, words);
+    if (n < needed && needed == 1) return app_usage(command, "one %s is needed", command->operand[0]);
+    if (n < needed) return app_usage(command, "one %s and one %s are needed", command->operand[0], command->operand[1]);
+    for (int i = 0; i < n; i++) {
+        if (check_ending(command, command->operand[i], words[i]) != APP_OK) return APP_USAGE;
         in->operand[i] = words[i];
+    }
     return APP_GO_ON;
 }
 
+/* ---- parsing */
+
+/* One option as getopt gave it, from `word`. APP_OK, or the exit status of an error. *done: the command line
+ * ends with it. */
+static int take_option(const struct app_command *command, int opt, const char *word, struct app_input *in, void *values,
+                       int *done)
+{
+    const struct app_option *row = find_row(command->options, opt);
+    if (check_dash(command, word) != APP_OK) return APP_USAGE;
+    if (opt == ':') return app_usage(command, "option %s needs a value", word);
+    if (opt == '?' && optopt >= FIRST_VALUE) return app_usage(command, "%s: the option takes no value", word);
+    if (opt == '?') return fail_unknown(command, word);
+    *done = row->kind == APP_PRINT;
+    return apply(command, row, optarg, in, values);
+}
+
+static int help(const struct app_command *command, const char *part)
+{
+    if (part != NULL && command->print_part != NULL) return command->print_part(part);
+    print_help(command);
+    return APP_OK;
+}
+
+/* Operands may stand among the options: getopt gives each as option 1. */
 int app_parse(const struct app_command *command, int argc, char **argv, struct app_input *in, void *values)
 {
     struct option longs[APP_MAX_OPTIONS + 2];
-    char letters[2 * APP_MAX_OPTIONS + 3];
-    int opt;
+    char letters[2 * APP_MAX_OPTIONS + 4], *words[APP_MAX_WORDS];
+    int opt, n = 0, done = 0;
     memset(in, 0, sizeof *in);
     list_options(command->options, longs, letters);
     opterr = 0;
     optind = 0; /* from the beginning, whatever was parsed before */
-    while ((opt = getopt_long(argc, argv, letters, longs, NULL)) != -1) {
-        if (opt == 'h') {
-            print_help(command);
-            return APP_OK;
+    for (int at = 1; (opt = getopt_long(argc, argv, letters, longs, NULL)) != -1; at = optind) {
+        if (opt == 1) {
+            if (n < APP_MAX_WORDS) words[n++] = optarg;
+            continue;
         }
-        if (opt == ':') return app_usage(command, "option %s needs a value", argv[optind - 1]);
-        if (opt == '?') return app_usage(command, "unknown option %s", argv[optind - 1]);
-        int status = apply(command, find_row(command->options, opt), optarg, in, values);
-        if (status != APP_OK) return status;
+        if (opt == 'h')
+            return help(command, argc > optind && argv[optind][0] != '-' ? argv[optind] : NULL);
+        const int status = take_option(command, opt, argv[at], in, values, &done);
+        if (status != APP_OK || done) return status;
     }
-    return take_operands(command, argc - optind, argv + optind, in);
+    for (; optind < argc && n < APP_MAX_WORDS; optind++)
+        words[n++] = argv[optind]; /* after -- */
+    return take_operands(command, n, words, in);
 }

@@ -23,7 +23,8 @@ enum app_option_kind {
     APP_KEY,       /* stands for a configuration key */
     APP_KEY_GIVEN, /* the same, and sets an int to 1 */
     APP_SET,       /* any configuration key */
-    APP_CALL       /* calls apply */
+    APP_CALL,      /* calls apply */
+    APP_PRINT      /* calls apply, which prints what was asked for: as with --help, the command does nothing else */
 };
 
 /* A row begins with kind, name and argument; the rest goes by name. */
@@ -53,6 +54,8 @@ struct app_command {
     const struct app_option *options;      /* ends with OPTION_END; -h and --help are in no table */
     const char *notes;                     /* printed after the options; NULL: none */
     void (*print_more)(FILE *out);         /* printed last; NULL: nothing */
+    const char *part;                      /* what may follow --help; NULL: nothing */
+    int (*print_part)(const char *part);   /* prints only this part of the help; returns the exit status */
     int (*run)(int argc, char **argv);     /* argv[0] is the command's name; returns the exit status */
 };
 
@@ -79,6 +82,9 @@ int app_add_set(struct app_sets *sets, const char *set);
 
 /* Prints a usage error: one line that ends with where the help is. Returns APP_USAGE. */
 int app_usage(const struct app_command *command, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
+
+/* A command that may have been meant, of `n` words; NULL: none is near. */
+const char *app_nearest(const char *word, const char *const *known, size_t n);
 
 /* What follows the command's name in its usage line: operands, needed options, [options]. */
 void app_arguments(const struct app_command *command, char *buf, size_t len);

@@ -2,6 +2,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/offline.h"
@@ -18,8 +19,17 @@ struct record {
     int crs_given, quiet;
     long station; /* 0: as the head is set; APP_WORD: all */
     double wait_s;
+    struct sh_report notes; /* of the recorders */
+    int interrupted;        /* before the files were completed, which an interrupted recording does, too */
     struct recording_options recording;
 };
+
+/* A signal while files are completed. */
+static int gives_up(void *ctx)
+{
+    const struct record *r = ctx;
+    return app_interrupted() && !r->interrupted;
+}
 
 static int write_frame(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
 {
@@ -35,7 +45,7 @@ static void say_result(const struct record *r, const struct recording_result *re
         snprintf(faint, sizeof faint, ", %llu hits not detected", (unsigned long long)result->faint);
     fprintf(stderr, "scanhead: %llu points, %llu shots without echo%s, %llu scans\n",
             (unsigned long long)result->points, (unsigned long long)result->empty, faint,
-            (unsigned long long)result->scans);
+            (unsigned long long)result->counts.scans);
 }
 
 static void print_note(void *ctx, const char *text)
@@ -44,27 +54,40 @@ static void print_note(void *ctx, const char *text)
     fprintf(stderr, "scanhead: %s\n", text);
 }
 
-static const struct sh_report NOTES = {.warn = print_note};
-
 /* Follows the scans. Files are closed and statistics written also after some failures; the first failure is
  * returned. */
 static int follow(struct record *r, struct scanhead *sh, struct recording_result *result, struct sh_err *err)
 {
     struct sh_err why = {0};
     int rc = recording_run(sh, &r->recording, result, err);
-    const int has_figures = rc == SH_OK || rc == SH_ELOST; /* LOST: an unplugged head has cut the recording */
+    const int has_figures = rc == SH_OK || rc == SH_ELOST || rc == SH_ERESET; /* the bus has cut the recording */
     const int keep = result->points != 0 || (rc == SH_OK && result->missing[0] == '\0');
+    r->interrupted = app_interrupted();
     int after = record_files_close(&r->files, keep, &why);
+    if (rc != SH_OK && after != SH_OK) sh_warn(&app_report_stderr, "%s", why.text);
     if (rc == SH_OK && after != SH_OK) rc = sh_fail(err, after, "%s", why.text);
     if (!has_figures || r->stats == NULL) return rc;
     after = app_write_json(r->stats, recording_put, result, &why);
     return rc == SH_OK && after != SH_OK ? sh_fail(err, after, "%s", why.text) : rc;
 }
 
+static void warn_of_little(const struct record *r, const struct recording_result *result)
+{
+    const uint64_t pulses = result->counts.pulses;
+    if (result->empty <= pulses) app_warn_empty(pulses, pulses - result->empty, result->faint);
+    if (r->files.recorder.colour == COLOUR_REFLECTANCE && result->points != 0 && result->with_reflectance == 0)
+        sh_warn(&app_report_stderr,
+                "--colour reflectance: none of %llu points has one, all have the colour for that; it needs the head's "
+                "signal.model: on",
+                (unsigned long long)result->points);
+}
+
 static int record(struct record *r, struct scanhead *sh, struct sh_err *err)
 {
     struct recording_result result = {0};
     if (r->stats != NULL) scanhead_hash_start(sh);
+    r->notes = (struct sh_report){.ctx = r, .warn = print_note, .stop = gives_up};
+    r->files.recorder.report = &r->notes;
     int rc = record_files_open(&r->files, err);
     if (rc != SH_OK) {
         record_files_close(&r->files, 0, NULL);
@@ -77,6 +100,7 @@ static int record(struct record *r, struct scanhead *sh, struct sh_err *err)
     rc = follow(r, sh, &result, err);
     if (rc == SH_OK || result.points != 0) say_result(r, &result);
     app_warn_left_out(result.crowded, result.unfit);
+    if (rc == SH_OK) warn_of_little(r, &result);
     return rc == SH_OK ? recording_check_complete(&result, err) : rc;
 }
 
@@ -134,7 +158,8 @@ static int record_config(struct config *cfg, void *ctx, struct sh_err *err)
     if (rc == SH_OK) rc = set_layout(r, cfg, err);
     if (rc == SH_OK && cfg->output.layout == LINE_GEO && cfg->output.crs == GEOREF_GEODETIC)
         rc = record_files_check_degrees(&r->files, err);
-    if (rc == SH_OK) rc = offline_open(cfg, &app_report_stderr, &offline, err);
+    if (rc == SH_OK) rc = offline_open(cfg, r->recording.duration_s, &app_report_stderr, &offline, err);
+    r->recording.head_ends = 1;
     if (rc == SH_OK && r->station == APP_WORD) {
         r->recording.first_station = 1;
         r->recording.last_station = offline.site->n_stations;
@@ -165,7 +190,10 @@ static int record_stream(struct record *r, struct sh_err *err)
     char why[512];
     int rc = open_stream(r, &sh, why, sizeof why);
     if (rc != SCANHEAD_OK) return sh_fail(err, rc, "%s", why);
+    struct stat st;
     if (ends_in(r->source, ".shs")) r->recording.listen = 1;
+    if (r->recording.listen && stat(r->source, &st) == 0 && S_ISREG(st.st_mode))
+        r->recording.source_bytes = (uint64_t)st.st_size;
     if (r->station == APP_WORD && !r->recording.listen) {
         char reply[512];
         rc = scanhead_command(sh, "HEAD:STATION? MAX", reply, sizeof reply, 5000);
@@ -186,10 +214,46 @@ static int take_file(void *values, const char *text)
     return record_files_add(&r->files, text, &err) == SH_OK ? APP_OK : app_fail(&err);
 }
 
+/* The index of a word; APP_USAGE with the reason printed. */
+static int take_word(const char *option, const char *const *words, int n, const char *text, int *index)
+{
+    char allowed[64] = "";
+    for (*index = 0; *index < n; ++*index) {
+        if (strcmp(text, words[*index]) == 0) return APP_OK;
+        snprintf(allowed + strlen(allowed), sizeof allowed - strlen(allowed), "%s%s", *index > 0 ? ", " : "",
+                 words[*index]);
+    }
+    return app_usage(&app_record, "--%s %s: allowed are %s", option, text, allowed);
+}
+
+static int take_colour(void *values, const char *text)
+{
+    static const char *const words[] = {
+        [COLOUR_NONE] = "none", [COLOUR_REFLECTANCE] = "reflectance", [COLOUR_LABEL] = "label"};
+    struct record *r = values;
+    int i, status = take_word("colour", words, 3, text, &i);
+    if (status == APP_OK) r->files.recorder.colour = (enum colour_kind)i;
+    return status;
+}
+
+static int take_ply_names(void *values, const char *text)
+{
+    static const char *const words[] = {"scanhead", "cloudcompare"};
+    return take_word("ply-names", words, 2, text, &((struct record *)values)->files.recorder.scalar_names);
+}
+
+static int take_las_version(void *values, const char *text)
+{
+    static const char *const words[] = {"1.2", "1.4"};
+    int i, status = take_word("las-version", words, 2, text, &i);
+    if (status == APP_OK) ((struct record *)values)->files.recorder.las_minor = 2 + 2 * i;
+    return status;
+}
+
 static int run(int argc, char **argv)
 {
     struct sh_err err = {0};
-    struct record r = {.recording = {.frames = -1}, .files = {.recorder = {.report = &NOTES}}};
+    struct record r = {.recording = {.frames = -1}};
     int status = app_parse(&app_record, argc, argv, &r.in, &r);
     if (status != APP_GO_ON) return status;
     if (r.files.n == 0 && r.stats == NULL) return app_usage(&app_record, "-o FILE is needed");
@@ -213,9 +277,11 @@ static const struct app_option OPTIONS[] = {
     {APP_CALL, "output", "FILE", .letter = 'o', .apply = take_file, .help = "where to write; may be repeated"},
     {APP_WHOLE, "station", "N|all", .min = 1, .max = CONFIG_MAX_STOPS, .word = "all", .at = AT(station),
      .help = "scan from station N, or from all one after the other into the same files"},
-    {APP_WHOLE, "frames", "N", .min = 0, .max = 1000000000, .at = AT(recording.frames), .help = "frames per scan"},
+    {APP_WHOLE, "frames", "N", .min = 0, .max = HEAD_MAX_FRAMES, .at = AT(recording.frames),
+     .help = "frames per scan; 0: without end"},
     {APP_NUMBER, "duration", "S", .min = 0.001, .max = 1e8, .at = AT(recording.duration_s),
-     .help = "stop each scan after S seconds of device time"},
+     .help = "end each scan after S seconds of device time: of a CONFIG to the pulse, of a head on a wire as "
+             "soon as it takes the command"},
     {APP_FLAG, "split", NULL, .at = AT(files.split),
      .help = "each scan to files of its own: NAME-1.las, NAME-2.las, ..., in the order of scans"},
     {APP_FLAG, "listen", NULL, .at = AT(recording.listen),
@@ -225,6 +291,12 @@ static const struct app_option OPTIONS[] = {
     {APP_NUMBER, "replug", "S", .min = 0.0, .max = 1e8, .at = AT(recording.replug_s),
      .help = "when the head is unplugged, wait up to S seconds for it and go on in the same files"},
     {APP_FLAG, "ascii", NULL, .at = AT(files.recorder.ascii), .help = "PLY as text"},
+    {APP_CALL, "ply-names", "WHOSE", .apply = take_ply_names,
+     .help = "scanhead: range, time, ... (the default), or cloudcompare: scalar_range, scalar_time, ..., which it shows"},
+    {APP_CALL, "colour", "BY", .apply = take_colour,
+     .help = "reflectance (grey, -30 to 0 dB) or label (a hue per surface): .ply and .las with red, green, blue"},
+    {APP_CALL, "las-version", "1.2|1.4", .apply = take_las_version,
+     .help = "of .las; 1.2 is for older readers and holds no labels, five returns of a pulse (default 1.4)"},
     {APP_FLAG, "empty-shots", NULL, .at = AT(files.recorder.empty_shots),
      .help = "keep shots without echo: .ply with NaN coordinates, .e57 with its invalid state"},
     {APP_TEXT, "stats", "FILE", .at = AT(stats), .help = "write what was received as JSON; - is standard output"},
@@ -251,8 +323,8 @@ static const char HELP_NOTES[] =
     "The ending of FILE says what is written:\n"
     "\n"
     "  .ply                 points, binary or text, with double coordinates, label and station\n"
-    "  .las                 LAS 1.4, point format 6: points with CRS, time, returns, label; station as point\n"
-    "                       source ID\n"
+    "  .las                 LAS 1.4, point format 6 (7 with --colour): points with CRS, time, returns, label;\n"
+    "                       station as point source ID\n"
     "  .ptx                 a grid per scan, with the scan's pose; shots without echo are in it\n"
     "  .e57                 points of each scan, with its pose\n"
     "  .poses.csv           true position and orientation of each scan, or a moving head's trajectory\n"
@@ -270,7 +342,10 @@ static const char HELP_NOTES[] =
     "  Frames or pulses were lost on the way.\n"
     "  The head was away within a scan.\n"
     "\n"
-    "FILE keeps what came.\n";
+    "FILE keeps what came.\n"
+    "\n"
+    "Ctrl-C, or SIGTERM, ends a recording in good order. A second signal within a second counts as the same one;\n"
+    "a third, or one that comes later, ends it at once.\n";
 
 const struct app_command app_record = {
     .name = "record",

@@ -1,10 +1,13 @@
 #include "firmware_sim/app/recording.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/line.h"
 #include "drivers/protocol/native.h"
+#include "firmware_sim/app/progress.h"
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/command/head.h"
 
@@ -20,7 +23,9 @@ struct recording {
     int interrupted;                    /* asked to end the whole recording */
     int stopping;                       /* the scan at hand is to end */
     int scan_started;                   /* SCAN_START or points were seen since SCAN:STAR */
-    int scan_over, cut_short, within_scan, broken;
+    int scan_over, cut_short, broken;
+    double scan_s, into_s; /* how long the scan lasts, 0: not known; how far it is */
+    uint32_t station;      /* at hand */
 };
 
 /* The answer is in r->reply. */
@@ -41,12 +46,14 @@ static int set(struct recording *r, const char *header, long value, struct sh_er
 
 static void count_points(struct recording *r, const struct scanhead_frame *frame)
 {
-    uint64_t empty = 0;
+    uint64_t empty = 0, with_reflectance = 0;
     for (uint32_t i = 0; i < frame->n_points; i++) {
         struct native_point point;
         native_decode_point(frame->payload, i, &point);
         empty += point.echo_count == 0;
+        with_reflectance += point.echo_count != 0 && point.refl_cdb != LINE_REFL_NONE;
     }
+    r->result->with_reflectance += with_reflectance;
     r->result->empty += empty;
     r->result->points += frame->n_points - empty;
 }
@@ -68,27 +75,52 @@ static void count_line(struct recording *r, const struct scanhead_frame *frame)
     r->result->unfit += end.n_unfit;
 }
 
+static int has_lost_frames(const struct recording *r)
+{
+    struct scanhead_stats stats;
+    scanhead_get_stats(r->sh, &stats);
+    return stats.seq_lost + stats.reader_lost + stats.dropped != 0;
+}
+
+static void count_pulses(struct recording *r, const struct scanhead_frame *frame)
+{
+    enum recording_news news = recording_count(&r->result->counts, frame, has_lost_frames(r));
+    if (news == RECORDING_NOTHING) return;
+    if (news == RECORDING_END_LOST) sh_warn(r->o->report, "the scan's end was lost; the head goes on without it");
+    r->scan_over = r->scan_started = 1;
+    r->broken = 0;
+}
+
 static void look_at(struct recording *r, const struct scanhead_frame *frame)
 {
     r->result->frames++;
+    count_pulses(r, frame);
     if (frame->type == SCANHEAD_POINTS) {
-        r->within_scan = r->scan_started = 1;
-        r->result->pulses += frame->n_pulses;
+        r->scan_started = 1;
         if (r->scan_t0_ns < 0) r->scan_t0_ns = frame->t_ns - frame->scan_t0_ns;
     }
+    if (frame->type == SCANHEAD_DESCRIPTOR) r->scan_s = progress_scan_s(frame);
     if (frame->type == SCANHEAD_LINE_END) count_line(r, frame);
     if (frame->type != SCANHEAD_EVENT) return;
     if (frame->event == SCANHEAD_EV_SCAN_START) {
         r->scan_t0_ns = (int64_t)frame->event_value[1];
         r->scan_started = 1;
     }
-    if (frame->event == SCANHEAD_EV_SCAN_END) {
-        r->scan_over = 1;
-        r->within_scan = r->broken = 0;
-        r->result->scans++;
-        r->result->lost_pulses += frame->event_value[2];
-    }
     if (gives_up(frame) && !r->scan_started) r->scan_over = 1;
+}
+
+/* Of all that was asked for; negative where its end is not known. */
+static double fraction_done(const struct recording *r)
+{
+    const struct recording_options *o = r->o;
+    struct scanhead_stats stats;
+    scanhead_get_stats(r->sh, &stats);
+    if (o->source_bytes > 0) return fmin(1.0, (double)stats.bytes / (double)o->source_bytes);
+    double scan_s = r->scan_s;
+    if (o->duration_s > 0.0 && (!(scan_s > 0.0) || o->duration_s < scan_s)) scan_s = o->duration_s;
+    if (o->listen || !(scan_s > 0.0)) return -1.0;
+    const double n = 1.0 + o->last_station - o->first_station, before = (double)r->station - o->first_station;
+    return (before + fmin(1.0, fmax(0.0, r->into_s / scan_s))) / n;
 }
 
 static void report(struct recording *r)
@@ -98,8 +130,8 @@ static void report(struct recording *r)
     r->next_report_ns = now_ns + 1000000000;
     char text[96];
     snprintf(text, sizeof text, "recording: %.2f M points, %.2f M pulses", 1e-6 * (double)r->result->points,
-             1e-6 * (double)r->result->pulses);
-    sh_progress(r->o->report, text, -1.0);
+             1e-6 * (double)r->result->counts.pulses);
+    sh_progress(r->o->report, text, fraction_done(r));
 }
 
 static int is_interrupted(struct recording *r)
@@ -108,9 +140,9 @@ static int is_interrupted(struct recording *r)
     return r->interrupted;
 }
 
-/* The head was unplugged: waits for it. Where it scans no more when it is back, the scan ended meanwhile.
- * Where it still scans, the rest of the scan will come. */
-static int replug(struct recording *r, struct sh_err *err)
+/* The head was unplugged, or its bus reset: waits for it. Where it scans no more when it is back, the scan ended
+ * meanwhile. Where it still scans, the rest of the scan will come. */
+static int replug(struct recording *r, int reset, struct sh_err *err)
 {
     const int64_t end_ns = clock_now_ns() + (int64_t)(1e9 * r->o->replug_s);
     int rc, scanning = 0;
@@ -122,12 +154,20 @@ static int replug(struct recording *r, struct sh_err *err)
     if (rc != SCANHEAD_OK) return sh_fail(err, SH_ELOST, "the head did not come back: %s", scanhead_error(r->sh));
     scanning = strncmp(r->reply, "s", 1) == 0; /* spin-up, scanning, spin-down */
     sh_warn(r->o->report, "the head is back");
-    r->result->replugs++;
-    r->result->broken_scans += (uint64_t)(r->within_scan && !r->broken);
-    r->broken = r->within_scan && scanning;
-    if (r->within_scan && !scanning) r->scan_over = 1;
-    r->within_scan = r->broken;
+    *(reset ? &r->result->bus_resets : &r->result->replugs) += 1;
+    int within = r->result->counts.within;
+    r->result->broken_scans += (uint64_t)(within && !r->broken);
+    r->broken = within && scanning;
+    if (!within || scanning) return 0;
+    r->scan_over = 1;
+    recording_count_end(&r->result->counts);
     return 0;
+}
+
+static int is_long_enough(const struct recording *r, const struct scanhead_frame *frame)
+{
+    if (!(r->o->duration_s > 0.0) || r->o->head_ends || r->scan_t0_ns < 0) return 0;
+    return (double)(frame->t_ns - r->scan_t0_ns) >= 1e9 * r->o->duration_s;
 }
 
 /* Takes one frame. Returns 1: got one; 0: none in time; negative: the recording is over. */
@@ -137,15 +177,16 @@ static int step(struct recording *r, int timeout_ms, struct sh_err *err)
     int rc = scanhead_next(r->sh, &frame, timeout_ms);
     report(r);
     if (rc == SCANHEAD_ETIMEOUT) return 0;
-    if ((rc == SCANHEAD_ELOST || rc == SCANHEAD_ECLOSED) && r->o->replug_s > 0.0) return replug(r, err);
+    if ((rc == SCANHEAD_ELOST || rc == SCANHEAD_ERESET || rc == SCANHEAD_ECLOSED) && r->o->replug_s > 0.0)
+        return replug(r, rc == SCANHEAD_ERESET, err);
     if (rc != SCANHEAD_OK) return sh_fail(err, rc, "%s", scanhead_error(r->sh));
     look_at(r, &frame);
     if (frame.type == SCANHEAD_POINTS) {
         r->heard_ns = clock_now_ns();
         count_points(r, &frame);
     }
-    int64_t into_ns = frame.t_ns - r->scan_t0_ns;
-    if (r->o->duration_s > 0.0 && r->scan_t0_ns >= 0 && (double)into_ns >= 1e9 * r->o->duration_s) r->stopping = 1;
+    if (r->scan_t0_ns >= 0) r->into_s = 1e-9 * (double)(frame.t_ns - r->scan_t0_ns);
+    if (is_long_enough(r, &frame)) r->stopping = 1;
     rc = r->o->frame(r->o->ctx, r->sh, &frame, err);
     return rc == SH_OK ? 1 : rc;
 }
@@ -178,14 +219,13 @@ static int stop_scan(struct recording *r, struct sh_err *err)
 /* No pulses have come for a while. The scan's end may be among frames that a slow reader lost. */
 static int look_for_end(struct recording *r, struct sh_err *err)
 {
-    struct scanhead_stats stats;
-    scanhead_get_stats(r->sh, &stats);
-    if (stats.seq_lost + stats.reader_lost == 0) return SH_OK;
+    if (!has_lost_frames(r)) return SH_OK;
     int rc = command(r, "HEAD:STAT?", err);
     if (rc != SH_OK || strcmp(r->reply, "idle") != 0) return rc;
     sh_warn(r->o->report, "the scan's end was lost; the head is idle");
     r->scan_started = r->scan_over = 1;
-    r->within_scan = r->broken = 0;
+    r->broken = 0;
+    recording_count_end(&r->result->counts);
     return SH_OK;
 }
 
@@ -230,6 +270,8 @@ static int record_scan(struct recording *r, uint32_t station, struct sh_err *err
 {
     r->stopping = r->scan_over = r->scan_started = r->cut_short = 0;
     r->scan_t0_ns = -1;
+    r->into_s = 0.0;
+    r->station = station;
     int rc = r->o->listen ? SH_OK : start_scan(r, station, err);
     r->scan_over = r->scan_started = 0; /* what came before the reply is of another scan */
     if (rc != SH_OK || (r->interrupted && !r->o->listen)) return rc;
@@ -299,6 +341,7 @@ int recording_run(struct scanhead *sh, const struct recording_options *options, 
     scanhead_hash_hex(sh, result->sha256);
     if (rc == SH_ECLOSED && options->listen && result->frames == 0)
         return sh_fail(err, SH_EFORMAT, "the stream ended without a single frame");
-    if (rc == SH_ECLOSED && options->listen && !r.within_scan) return SH_OK;
-    return rc == SH_ECLOSED && r.within_scan ? sh_fail(err, rc, "the stream ended in the middle of a scan") : rc;
+    if (rc == SH_ECLOSED && options->listen && !result->counts.within) return SH_OK;
+    return rc == SH_ECLOSED && result->counts.within ? sh_fail(err, rc, "the stream ended in the middle of a scan")
+                                                     : rc;
 }

@@ -9,15 +9,18 @@
 
 #include "core/err.h"
 #include "drivers/host/scanhead.h"
+#include "firmware_sim/app/recording_counts.h"
 #include "firmware_sim/base/json.h"
 
 struct recording_options {
     int listen;                           /* send nothing; take what comes until the stream or the time ends */
     uint32_t first_station, last_station; /* scanned one after the other, from 1; 0: as the head is set */
     long frames;                          /* per scan; -1: as the head is set */
-    double duration_s;                    /* > 0: stop each scan after this device time */
+    double duration_s;                    /* > 0: stop each scan after this device time ... */
+    int head_ends;                        /* ... which the head does by itself: no command is needed */
     double replug_s;                      /* > 0: how long to wait for a head that was unplugged, to go on then */
     int progress;                         /* 1: to the report, about once a second */
+    uint64_t source_bytes;                /* of a stream in a file, for progress; 0: not known */
     const struct sh_report *report;
     /* Gets each frame, in order. A negative SH_E ends the recording with it. */
     int (*frame)(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
@@ -27,14 +30,16 @@ struct recording_options {
 };
 
 struct recording_result {
-    uint64_t points, empty, frames, scans, pulses; /* received; empty: shots without echo */
-    uint64_t lost_pulses;                          /* cast pulses that the head says it could not compute */
-    uint64_t crowded, faint, unfit;                /* hits that are no echoes, as the line ends count them */
+    uint64_t points, empty, frames; /* received; empty: shots without echo */
+    uint64_t with_reflectance;      /* points whose reflectance is modelled */
+    struct recording_counts counts; /* of pulses and scans */
+    uint64_t crowded, faint, unfit; /* hits that are no echoes, as the line ends count them */
     char missing[128];              /* what was asked for and left out because of `interrupted`; empty: nothing */
     double wall_s;                  /* how long the recording took */
     struct scanhead_stats stream;   /* as the client counts */
     char sha256[65];                /* of the stream, where scanhead_hash_start was called */
     uint64_t replugs, broken_scans; /* how often the head was away and came back; scans in which it was away */
+    uint64_t bus_resets;            /* how often its USB bus was reset, which ended the session */
 };
 
 /* SH_OK, or the first failure. result is filled in both cases. */

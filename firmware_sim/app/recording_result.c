@@ -5,11 +5,17 @@ void recording_put(struct json *json, const void *ctx)
 {
     const struct recording_result *result = ctx;
     const struct scanhead_stats *s = &result->stream;
+    const struct recording_counts *counts = &result->counts;
     json_open_object(json, NULL);
     json_uint(json, "points", result->points);
     json_uint(json, "empty_shots", result->empty);
-    json_uint(json, "pulses", result->pulses);
-    json_uint(json, "scans", result->scans);
+    json_uint(json, "pulses", counts->pulses);
+    json_uint(json, "fired_pulses", counts->fired);
+    json_uint(json, "cast_pulses", counts->cast);
+    json_uint(json, "lost_pulses", counts->lost);
+    json_uint(json, "missing_pulses", counts->missing);
+    json_uint(json, "reader_lost_pulses", counts->left_out);
+    json_uint(json, "scans", counts->scans);
     json_uint(json, "frames", s->frames);
     json_uint(json, "bytes", s->bytes);
     json_uint(json, "bad_payload", s->bad_payload);
@@ -17,14 +23,14 @@ void recording_put(struct json *json, const void *ctx)
     json_uint(json, "seq_lost", s->seq_lost);
     json_uint(json, "dropped", s->dropped);
     json_uint(json, "reader_lost_frames", s->reader_lost);
-    json_uint(json, "lost_pulses", result->lost_pulses);
     json_uint(json, "crowded_echoes", result->crowded);
     json_uint(json, "faint_hits", result->faint);
     json_uint(json, "unfit_echoes", result->unfit);
     json_uint(json, "replugs", result->replugs);
+    json_uint(json, "bus_resets", result->bus_resets);
     json_double(json, "wall_s", result->wall_s);
     json_double(json, "cpu_s", clock_cpu_s());
-    json_double(json, "pulses_per_s", result->wall_s > 0.0 ? (double)result->pulses / result->wall_s : 0.0);
+    json_double(json, "pulses_per_s", result->wall_s > 0.0 ? (double)counts->pulses / result->wall_s : 0.0);
     json_string(json, "stream_sha256", result->sha256);
     json_close_object(json);
 }
@@ -40,15 +46,16 @@ int recording_check_complete(const struct recording_result *result, struct sh_er
 {
     const struct scanhead_stats *s = &result->stream;
     const unsigned long long lost = count_lost(s);
-    const uint64_t pulses = s->pulses_lost > result->lost_pulses ? s->pulses_lost : result->lost_pulses;
+    const uint64_t pulses = s->pulses_lost > result->counts.lost ? s->pulses_lost : result->counts.lost;
     if (result->missing[0] != '\0') return sh_fail(err, SH_ESTATE, "interrupted; missing: %s", result->missing);
     if (result->broken_scans != 0)
-        return sh_fail(
-            err, SH_ELOST,
-            "the recording is not complete: the head was away within %llu scans; %llu frames known to be lost",
-            (unsigned long long)result->broken_scans, lost);
+        return sh_fail(err, SH_ELOST,
+                       "the recording is not complete: %s within %llu scans; %llu frames known to be lost",
+                       result->replugs == 0 && result->bus_resets != 0 ? "the USB bus was reset" : "the head was away",
+                       (unsigned long long)result->broken_scans, lost);
     if (lost == 0 && pulses == 0) return SH_OK;
     return sh_fail(err, SH_EIO,
-                   "the recording is not complete: %llu frames lost to this reader, %llu pulses by the head", lost,
-                   (unsigned long long)pulses);
+                   "the recording is not complete: %llu frames lost to this reader, %llu pulses by the head; "
+                   "of the pulses that it delivered %llu are missing",
+                   lost, (unsigned long long)pulses, (unsigned long long)result->counts.missing);
 }

@@ -17,7 +17,7 @@ struct run_options {
     struct device_options device;
     const char *stats;
     long ready_fd;
-    int quiet;
+    int quiet, frames_given;
 };
 
 static void say_what_runs(const struct config *cfg, const struct site *site, const struct loop *loop)
@@ -62,27 +62,41 @@ static void wait_for_end(struct loop *loop)
     }
 }
 
+struct run_stats {
+    const struct loop *loop;
+    struct loop_stats stats;
+};
+
+static void put_pulses(struct json *json, const struct device_counters *c)
+{
+    json_uint(json, "pulses", c->pulses);
+    json_uint(json, "fired_pulses", c->fired);
+    json_uint(json, "blind_pulses", c->fired - c->cast);
+    json_uint(json, "cast_pulses", c->cast);
+    json_uint(json, "lost_pulses", c->lost_pulses);
+    json_uint(json, "lost_ticks", c->lost_ticks);
+}
+
 static void put_stats(struct json *json, const void *ctx)
 {
-    const struct loop_stats *s = ctx;
+    const struct run_stats *run = ctx;
+    const struct loop_stats *s = &run->stats;
     const struct device_counters *c = &s->counters;
     struct rusage usage;
     getrusage(RUSAGE_SELF, &usage);
     json_open_object(json, NULL);
-    json_uint(json, "pulses", c->pulses);
-    json_uint(json, "fired_pulses", c->fired);
+    put_pulses(json, c);
     json_uint(json, "echoes", c->echoes);
     json_uint(json, "lines", c->lines);
     json_uint(json, "scans", s->scans);
     json_double(json, "wall_s", s->wall_s);
     json_double(json, "cpu_s", clock_cpu_s());
     json_double(json, "pulses_per_s", s->wall_s > 0.0 ? (double)c->pulses / s->wall_s : 0.0);
-    json_uint(json, "lost_pulses", c->lost_pulses);
-    json_uint(json, "lost_ticks", c->lost_ticks);
     json_uint(json, "crowded_echoes", c->crowded);
     json_uint(json, "faint_hits", c->faint);
     json_uint(json, "unfit_echoes", c->unfit);
     json_uint(json, "reader_lost_frames", c->reader_lost_frames);
+    json_uint(json, "reader_lost_pulses", c->reader_lost_pulses);
     json_uint(json, "late_blocks", c->late_blocks);
     json_uint(json, "late_poses", c->late_poses);
     json_uint(json, "bad_poses", c->bad_poses);
@@ -91,6 +105,7 @@ static void put_stats(struct json *json, const void *ctx)
     json_double(json, "late_max_us", 1e-3 * (double)c->late_max_ns);
     json_int(json, "rss_peak_kib", usage.ru_maxrss);
     json_string(json, "stream_sha256", s->have_hash ? s->sha256 : NULL);
+    loop_put_links(run->loop, json);
     json_close_object(json);
 }
 
@@ -99,25 +114,49 @@ static void warn_of_losses(const struct device_counters *c)
     if (c->lost_pulses != 0)
         sh_warn(&app_report_stderr, "%llu pulses could not be computed in time", (unsigned long long)c->lost_pulses);
     app_warn_left_out(c->crowded, c->unfit);
+    app_warn_empty(c->pulses, c->echoes, c->faint);
     if (c->reader_lost_frames != 0)
-        sh_warn(&app_report_stderr, "readers lost %llu frames", (unsigned long long)c->reader_lost_frames);
+        sh_warn(&app_report_stderr, "readers lost %llu frames with %llu pulses",
+                (unsigned long long)c->reader_lost_frames, (unsigned long long)c->reader_lost_pulses);
+}
+
+/* --start --duration, and a scan that was over before. */
+static void say_short_scan(const struct run_options *o, struct device *device)
+{
+    const double scan_s = 1e-9 * (double)device_scan_ns(device), tick_s = 1e-9 * (double)device_tick_ns(device);
+    if (o->quiet || !o->device.start || app_interrupted() || device_scans(device) != 1) return;
+    if (scan_s <= 0.0 || scan_s + 1.5 * tick_s > o->device.duration_s) return;
+    fprintf(stderr, "scanhead: the scan was over after %.3f s, before --duration %.10g: %s\n", scan_s,
+            o->device.duration_s,
+            o->frames_given ? "all its frames were scanned" : "its path ended, or it was stopped");
 }
 
 static int serve(const struct run_options *o, struct loop *loop, struct device *device, struct sh_err *err)
 {
-    struct loop_stats stats;
+    struct run_stats run = {.loop = loop};
+    struct loop_stats *stats = &run.stats;
     int rc = loop_start(loop, err);
     if (rc == SH_OK) rc = say_ready(loop, o->ready_fd, err);
     if (rc == SH_OK)
         wait_for_end(loop);
     else
         loop_end(loop);
-    loop_join(loop, &stats);
-    if (rc == SH_OK && o->stats != NULL) rc = app_write_json(o->stats, put_stats, &stats, err);
+    loop_join(loop, stats);
+    if (rc == SH_OK && o->stats != NULL) rc = app_write_json(o->stats, put_stats, &run, err);
     if (rc == SH_OK) rc = device_close_journal(device, err);
     if (rc == SH_OK) rc = loop_check_links(loop, err);
-    warn_of_losses(&stats.counters);
+    say_short_scan(o, device);
+    warn_of_losses(&stats->counters);
     return rc;
+}
+
+static void warn_of_replay(const struct run_options *o, const struct device *device)
+{
+    if (o->device.replay == NULL || device_replay_ends(device) || o->device.duration_s > 0.0) return;
+    sh_warn(&app_report_stderr,
+            "%s has no end, as its head was killed; after its last command the head runs until it is stopped, or for "
+            "--duration S",
+            o->device.replay);
 }
 
 static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
@@ -128,6 +167,7 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
     struct loop *loop = NULL;
     struct loop_options options = {.hash = o->stats != NULL, .report = &app_report_stderr};
     app_catch_signals();
+    if (o->device.start && o->device.duration_s > 0.0 && !o->frames_given) cfg->head.settings.frames = 0;
     if (cfg->n_links == 0)
         return sh_fail(err, SH_EINPUT, "%s: links: none; run needs at least one of pty, tcp, usb, file, null",
                        cfg->file);
@@ -137,6 +177,7 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
     if (rc == SH_OK) rc = loop_create(site, device, &options, &loop, err);
     if (rc == SH_OK) {
         if (!o->quiet) say_what_runs(cfg, site, loop);
+        warn_of_replay(o, device);
         rc = serve(o, loop, device, err);
     }
     loop_free(loop);
@@ -145,11 +186,21 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
     return rc;
 }
 
+/* By --frames, or by --set. */
+static int gives_frames(const struct app_sets *sets)
+{
+    static const char key[] = "head.frames=";
+    for (int i = 0; i < sets->n; i++)
+        if (strncmp(sets->set[i], key, sizeof key - 1) == 0) return 1;
+    return 0;
+}
+
 static int run(int argc, char **argv)
 {
     struct run_options o = {0};
     int status = app_parse(&app_run, argc, argv, &o.in, &o);
     if (status != APP_GO_ON) return status;
+    o.frames_given = gives_frames(&o.in.sets);
     o.device.one_scan = o.device.one_scan && o.device.start;
     return app_with_config(&o.in, run_head, &o);
 }
@@ -162,16 +213,17 @@ static const struct app_option OPTIONS[] = {
     {APP_KEY, "pace", "PACE", .key = "loop.pace",
      .help = "realtime, fast (as fast as it computes), step (a peer grants time with TIME:STEP)"},
     {APP_NUMBER, "duration", "S", .min = 0.001, .max = 1e8, .at = AT(device.duration_s),
-     .help = "end after S seconds of device time; they count from power-up, with --start from the scan's start"},
+     .help = "end after S seconds of device time; they count from power-up, with --start from the scan's start. With "
+             "--start the scan goes on until then, frame after frame, whatever the file has as head.frames"},
     {APP_KEY_GIVEN, "frames", "N", .key = "head.frames", .at = AT(device.one_scan),
-     .help = "frames per scan; with --start, end after the first scan"},
+     .help = "frames per scan; with --start, end after the first scan, even before --duration"},
     {APP_KEY, "threads", "N", .key = "loop.threads", .help = "threads that cast; 0: one per processor"},
     OPTION_SET,
     {APP_TEXT, "stats", "FILE", .at = AT(stats), .help = "write statistics as JSON at the end; - is standard output"},
     {APP_TEXT, "journal", "FILE", .at = AT(device.journal),
-     .help = "write every command that had an effect, with its device time"},
+     .help = "write every command that had an effect, with its device time, and the end"},
     {APP_TEXT, "replay-journal", "FILE", .at = AT(device.replay),
-     .help = "carry out the commands of a journal at their times"},
+     .help = "carry out the commands of a journal at their times, and end where its run ended"},
     {APP_WHOLE, "ready-fd", "N", .min = 1, .max = 65535, .at = AT(ready_fd),
      .help = "write one JSON line with the endpoints to descriptor N once all links are open"},
     {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no messages but errors and warnings"},
@@ -179,10 +231,15 @@ static const struct app_option OPTIONS[] = {
 };
 /* clang-format on */
 
+static const char NOTES[] =
+    "Ctrl-C, or SIGTERM, ends the head in good order. A second signal within a second counts as the same one; a\n"
+    "third, or one that comes later, ends it at once.\n";
+
 const struct app_command app_run = {
     .name = "run",
     .operand = {"CONFIG"},
     .summary = "serve the head on its links until stopped",
     .options = OPTIONS,
+    .notes = NOTES,
     .run = run,
 };

@@ -41,7 +41,7 @@ static const struct command_setting settings[] = {
                    "SCAN:PAN:STOP", SETTING(pan_stop_udeg), -TURN_UDEG, -1, NULL},
     [PAN_STOP] = {SETTING(pan_stop_udeg), 0, 0, PROFILE(pan_min_udeg), PROFILE(pan_max_udeg),
                   "SCAN:PAN:STARt", SETTING(pan_start_udeg), 1, TURN_UDEG, NULL},
-    [FRAMES] = {SETTING(frames), 1, 0, CONSTANT(0), CONSTANT(UINT32_MAX), NO_OTHER, NULL},
+    [FRAMES] = {SETTING(frames), 1, 0, CONSTANT(0), CONSTANT(HEAD_MAX_FRAMES), NO_OTHER, NULL},
     [ECHOES] = {SETTING(echoes), 1, 0, CONSTANT(0), CONSTANT(3), NO_OTHER, echo_words},
 };
 /* clang-format on */

@@ -40,6 +40,9 @@ int head_next_state(enum head_state state, enum head_event event);
 
 const char *head_state_name(enum head_state state); /* "off", "boot", "idle", "spin-up", ... */
 
+/* The most frames of a scan (0 is without end), for head.frames, SCAN:FRAMes and --frames. */
+enum { HEAD_MAX_FRAMES = 1000000 };
+
 struct head_settings {
     int64_t prr_uhz, lines_uhz, pan_udeg_s;
     int64_t line_start_udeg, line_stop_udeg; /* start < stop, within the field of view */

@@ -1,7 +1,8 @@
 /* The configuration: a YAML file and --set in, struct config out, checked. One table (keys.c) of key, type,
  * unit, default, range and help gives parsing, defaults, errors and the reference.
  *
- * Units: as the key's name says (hz, deg, m). Everything is checked; an error is one line:
+ * Units: as the key's name says (hz, deg, m). Everything is checked. All faults are found at once; each is
+ * one line:
  *   FILE:LINE: KEY: what is wrong; what is allowed
  * Unknown keys, duplicate keys, trailing text ("30 kHz"), NaN, wrong types and values out of range are
  * errors. Relative paths in a file are relative to that file; in --set, to the working directory.
@@ -186,6 +187,7 @@ struct config_scene {
     uint32_t n_meshes;
     double tolerance_m;
     enum config_choice order_exactly; /* surfaces that overlap are ordered in double */
+    int cutouts;                      /* rays pass where a texture's alpha is below a half */
     struct scene_import_limits import;
     struct config_anchor anchor;
 };
@@ -199,7 +201,7 @@ struct config_output {
     enum georef_method georef; /* GEOREF_AUTO: as the plan says */
     double tolerance_m;        /* largest error of a georeferenced position */
     int attributes;            /* amplitude and width of each echo follow the points */
-    double scale_m;            /* 0: the finest of 1e-6 x 10^n m that holds range_max_m in 31 bits */
+    double scale_m;            /* 0: the finest of 1e-6 x 10^n m that holds range_max_m (polar: 32 bits, geo: 31) */
 };
 
 struct config_beam {
@@ -252,9 +254,23 @@ struct config {
     struct config_gnss gnss;
 };
 
+/* What is wrong with a configuration, fault by fault, in the order of the file; then of --set and of the head
+ * profile. */
+enum { CONFIG_MAX_FAULTS = 20 };
+struct config_faults {
+    uint32_t n; /* all that were found; fault has the first CONFIG_MAX_FAULTS of them */
+    struct sh_err fault[CONFIG_MAX_FAULTS];
+    uint64_t place[CONFIG_MAX_FAULTS]; /* what they are ordered by */
+};
+
 /* Reads path, its profile, then the `key=value` settings in order (as from --set, each checked the same way,
- * named `--set KEY` in errors). On failure cfg is unspecified. cfg is large: allocate it. */
+ * named `--set KEY` in errors). On failure cfg is unspecified, and err has the first fault. cfg is large:
+ * allocate it. */
 int config_load(const char *path, const char *const *sets, int n_sets, struct config *cfg, struct sh_err *err);
+
+/* The same, with all faults. Returns SH_OK or the code of the first. */
+int config_load_all(const char *path, const char *const *sets, int n_sets, struct config *cfg,
+                    struct config_faults *faults);
 
 /* What a profile says about the signal; the rest of it (sharp, extinction, seed) is 0. */
 void config_signal_spec(const struct config_profile *profile, struct detect_signal_spec *spec);
@@ -278,9 +294,20 @@ const char *config_beam_moves(const struct config *cfg);
 /* The reference: every key with type, unit, default, range and help. */
 void config_print_reference(FILE *out);
 
+/* The same for one section ("head", "scene.anchor"), for one key, or for "profile": the keys of head
+ * profiles. SH_EINPUT names the sections that there are. */
+int config_print_section(const char *section, FILE *out, struct sh_err *err);
+
+/* A configuration with all keys, each with its help, that loads: the needed ones stand there, the others
+ * behind a '#' with their defaults. It names a profile and a mesh that come with the program. */
+int config_print_example(FILE *out, struct sh_err *err);
+
 /* The profiles in a directory, one line each (name, model, what is data sheet and what is assumed). Returns
  * how many. dir NULL: the first directory of the lookup below that exists, without a configuration. */
 int config_list_profiles(const char *dir, FILE *out, struct sh_err *err);
+
+/* Reads the profile NAME, looked up as for a configuration that lies at config_file. */
+int config_load_profile(const char *name, const char *config_file, struct config_profile *profile, struct sh_err *err);
 
 /* Finds the directory of profiles: $SCANHEAD_HEADS, beside the configuration (heads/), beside the program
  * (installed or in its build folder), or config/heads here. A profile is named by `head.profile: NAME`,

@@ -32,7 +32,7 @@
 /* clang-format off */
 static const struct cfg_key config_keys[] = {
     {"head", .type = CFG_MAP, .help = "The head and its settings at power-up."},
-    {"head.profile", IN_CONFIG(profile_file), CFG_TEXT,
+    {"head.profile", IN_CONFIG(profile_file), CFG_TEXT, .example = "riegl-vz400i",
      .allowed = "the name of a profile, or a path that ends in .yaml",
      .help = "Head profile, from $SCANHEAD_HEADS, heads/ beside this file, the installed or the source directory."},
     {KEY(head.serial), CFG_TEXT, .def = "SIM-0001", .flags = CFG_ASCII, .help = "Serial number, as in *IDN?."},
@@ -50,7 +50,7 @@ static const struct cfg_key config_keys[] = {
      WITHIN("pan_min_deg", "pan_max_deg"), .help = "Pan angle where a frame starts."},
     {"head.pan_stop_deg", SETTING(pan_stop_udeg), CFG_MICRO, "deg", "@pan_max_deg",
      WITHIN("pan_min_deg", "pan_max_deg"), .help = "Pan angle where a frame ends; at most a turn after its start."},
-    {"head.frames", SETTING(frames), CFG_COUNT, NULL, "1", 0, 1000000,
+    {"head.frames", SETTING(frames), CFG_COUNT, NULL, "1", 0, HEAD_MAX_FRAMES,
      .help = "Frames (pan sweeps) per scan; 0: until stopped."},
     {"head.station", SETTING(station), CFG_COUNT, NULL, "1", 1, CONFIG_MAX_STOPS,
      .help = "Station where the head stands, counted from 1."},
@@ -64,12 +64,16 @@ static const struct cfg_key config_keys[] = {
      .help = "resolved: zones of c / (2 prr_hz) that the head tells apart; nothing is seen beyond them."},
 
     {"scene", .type = CFG_MAP, .help = "What is scanned."},
-    {KEY(scene.tolerance_m), CFG_REAL, "m", "1e-6", 1e-9, 1,
-     .help = "Largest error of a vertex. Formats of single precision are refused where coordinates are too large."},
+    {KEY(scene.tolerance_m), CFG_REAL, "m", "", 1e-9, 1, .example = "1e-4",
+     .help = "Largest error of a vertex. Formats of single precision are refused where coordinates are too large. When "
+             "not given: a tenth of plan.tolerance_m, or 1 m where that isn't given either. Above 1e-6 m is a warning."},
     {KEY(scene.order_exactly), CFG_ENUM, .def = "auto",
      WORDS([CHOICE_AUTO] = "auto", [CHOICE_OFF] = "off", [CHOICE_ON] = "on"),
      .help = "Orders surfaces that overlap or cross in double. It costs loading time, and speed where surfaces "
              "overlap. auto: on where float's resolution in the scene is coarser than plan.tolerance_m."},
+    {KEY(scene.cutouts), CFG_BOOL, .def = "on",
+     .help = "Rays pass where a texture's alpha or opacity map is below a half, as between leaves. Textures are then "
+             "read when the scene is loaded; without such a texture it costs nothing more."},
     {"scene.import_memory_mib", IN_CONFIG(scene.import.memory_mib), CFG_COUNT, "MiB", "8192", 16, 1 << 24,
      .help = "Memory that Assimp may take for one mesh (all formats but .obj and .ply); more is an error. Assimp reads "
              "in a process of its own, since broken files make it crash, hang or take all memory."},
@@ -80,10 +84,10 @@ static const struct cfg_key config_keys[] = {
     {"scene.meshes", .type = CFG_LIST, .min = 1, .max = CONFIG_MAX_MESHES, LIST_OF(scene.mesh, scene.n_meshes),
      .help = "Mesh files; together they are the scene."},
     {"scene.meshes[]", .type = CFG_MAP, .help = "A mesh file."},
-    {MESH(file), CFG_PATH, .help = "Path: .obj .ply .stl .gltf .glb .fbx .dae .ifc"},
-    {MESH(up), CFG_ENUM, WORDS([SCENE_UP_Z] = "z", [SCENE_UP_Y] = "y"),
+    {MESH(file), CFG_PATH, .example = "scenes/glass_room.obj", .help = "Path: .obj .ply .stl .gltf .glb .fbx .dae .ifc"},
+    {MESH(up), CFG_ENUM, .example = "z", WORDS([SCENE_UP_Z] = "z", [SCENE_UP_Y] = "y"),
      .help = "Axis that points up in the file; y turns (x, y, z) to (x, -z, y)."},
-    {MESH(scale), CFG_REAL, "m/unit", NULL, 1e-9, 1e9, .help = "Metres per unit of the file."},
+    {MESH(scale), CFG_REAL, "m/unit", NULL, 1e-9, 1e9, .example = "1", .help = "Metres per unit of the file."},
     {MESH(offset_m), CFG_VEC3, "m", "[0, 0, 0]", -1e9, 1e9, .help = "Added after axes and scale."},
     {MESH(move_m_s), CFG_VEC3, "m/s", "[0, 0, 0]", -1000, 1000,
      .help = "Velocity of the mesh, from the scan's start. At a stop it stands where it is at the stop's time."},
@@ -101,24 +105,24 @@ static const struct cfg_key config_keys[] = {
              "as the IFC mesh's IFCSITE says; utm, ecef: the meshes' coordinates are UTM (or UPS), or ECEF."},
     {KEY(scene.anchor.origin_m), CFG_VEC3, "m", "[0, 0, 0]", -1e9, 1e9,
      .help = "explicit: the scene's point that lies at lat_deg, lon_deg, height_m."},
-    {KEY(scene.anchor.lat_deg), CFG_REAL, "deg", "", -90, 90, .help = "explicit: its latitude, WGS 84."},
-    {KEY(scene.anchor.lon_deg), CFG_REAL, "deg", "", -180, 180, .help = "explicit: its longitude."},
-    {KEY(scene.anchor.height_m), CFG_REAL, "m", "", -1000, 10000,
+    {KEY(scene.anchor.lat_deg), CFG_REAL, "deg", "", -90, 90, .example = "49.1", .help = "explicit: its latitude, WGS 84."},
+    {KEY(scene.anchor.lon_deg), CFG_REAL, "deg", "", -180, 180, .example = "8.436", .help = "explicit: its longitude."},
+    {KEY(scene.anchor.height_m), CFG_REAL, "m", "", -1000, 10000, .example = "110",
      .help = "explicit: its height above the ellipsoid; ifc: the same, instead of RefElevation (above the sea)."},
     {KEY(scene.anchor.north_deg), CFG_REAL, "deg", "0", -360, 360,
      .help = "explicit: where true north lies, clockwise from the scene's y axis."},
-    {KEY(scene.anchor.utm_zone), CFG_COUNT, NULL, "", 0, 60,
+    {KEY(scene.anchor.utm_zone), CFG_COUNT, NULL, "", 0, 60, .example = "32",
      .help = "utm: zone of the meshes' coordinates; 0: UPS. Required with source: utm."},
-    {"scene.anchor.hemisphere", IN_CONFIG(scene.anchor.north), CFG_ENUM, .def = "", WORDS("south", "north"),
+    {"scene.anchor.hemisphere", IN_CONFIG(scene.anchor.north), CFG_ENUM, .def = "", .example = "north", WORDS("south", "north"),
      .help = "utm: hemisphere that their northing counts from. Required with source: utm."},
 
     {"stations", .type = CFG_LIST, .min = 1, .max = CONFIG_MAX_STATIONS, LIST_OF(station, n_stations),
      .help = "Places where the head can stand."},
     {"stations[]", .type = CFG_MAP, .help = "A station."},
-    {STATION(name), CFG_TEXT, .def = "", .help = "Name; station-N when not given."},
-    {STATION(position_m), CFG_VEC3, "m", "", -1e9, 1e9,
+    {STATION(name), CFG_TEXT, .def = "", .example = "gate", .help = "Name; station-N when not given."},
+    {STATION(position_m), CFG_VEC3, "m", "", -1e9, 1e9, .example = "[0, 0, 1.7]", .flags = CFG_NEEDED,
      .help = "The head's origin in the scene frame. Required, unless scene.anchor gives it from a place on Earth."},
-    {STATION(instrument_height_m), CFG_REAL, "m", "", 0, 1000,
+    {STATION(instrument_height_m), CFG_REAL, "m", "", 0, 1000, .example = "1.7",
      .help = "The head's origin is this high above the first surface below its place. The search downward begins at z "
              "(or height_m), with 1 cm to spare."},
     {STATION(heading_deg), CFG_REAL, "deg", "0", -360, 360,
@@ -128,20 +132,20 @@ static const struct cfg_key config_keys[] = {
      .help = "After the heading, about the head's x axis: the y axis (forward) rises."},
     {STATION(roll_deg), CFG_REAL, "deg", "0", -180, 180,
      .help = "After the pitch, about the head's y axis: the x axis (right) sinks."},
-    {STATION(lat_deg), CFG_REAL, "deg", "", -90, 90,
+    {STATION(lat_deg), CFG_REAL, "deg", "", -90, 90, .example = "49.1",
      .help = "Geodetic latitude of the head's origin, WGS 84. A place on the Earth, in one form, is required without "
              "scene.anchor unless output.crs is local."},
-    {STATION(lon_deg), CFG_REAL, "deg", "", -180, 180, .help = "Longitude; with lat_deg."},
-    {STATION(height_m), CFG_REAL, "m", "", -1000, 10000,
+    {STATION(lon_deg), CFG_REAL, "deg", "", -180, 180, .example = "8.436", .help = "Longitude; with lat_deg."},
+    {STATION(height_m), CFG_REAL, "m", "", -1000, 10000, .example = "110",
      .help = "Height above the ellipsoid; with lat_deg or easting_m."},
-    {STATION(utm_zone), CFG_COUNT, NULL, "", 0, 60,
+    {STATION(utm_zone), CFG_COUNT, NULL, "", 0, 60, .example = "32",
      .help = "UTM zone, 0: UPS; with easting_m. That of a scene.anchor of source utm when not given."},
-    {"stations[].hemisphere", IN_STATION(north), CFG_ENUM, .def = "", WORDS("south", "north"),
+    {"stations[].hemisphere", IN_STATION(north), CFG_ENUM, .def = "", .example = "north", WORDS("south", "north"),
      .help = "Hemisphere of the zone; that of a scene.anchor of source utm when not given."},
-    {STATION(easting_m), CFG_REAL, "m", "", -1e7, 1e7,
+    {STATION(easting_m), CFG_REAL, "m", "", -1e7, 1e7, .example = "458835",
      .help = "UTM or UPS easting of the head's origin, with false origin."},
-    {STATION(northing_m), CFG_REAL, "m", "", -1e7, 2e7, .help = "Northing; with easting_m."},
-    {STATION(ecef_m), CFG_VEC3, "m", "", -1e7, 1e7, .help = "The head's origin in ECEF, WGS 84: X, Y, Z."},
+    {STATION(northing_m), CFG_REAL, "m", "", -1e7, 2e7, .example = "5438800", .help = "Northing; with easting_m."},
+    {STATION(ecef_m), CFG_VEC3, "m", "", -1e7, 1e7, .example = "[4138400, 613700, 4798000]", .help = "The head's origin in ECEF, WGS 84: X, Y, Z."},
 
     {"platform", .type = CFG_MAP, .help = "What the head stands on: a tripod, or something that moves."},
     {KEY(platform.kind), CFG_ENUM, .def = "static",
@@ -149,10 +153,10 @@ static const struct cfg_key config_keys[] = {
            [PLATFORM_STOPS] = "stops"),
      .help = "static: at the station; trajectory: along a file; stops: standing at some of its poses, which are the "
              "scan's stations; live: as a peer says, by UDP or, with pace step, by TIME:STEP."},
-    {KEY(platform.file), CFG_PATH, .def = "",
+    {KEY(platform.file), CFG_PATH, .def = "", .example = "path.csv",
      .help = "trajectory, stops: CSV with t_s,x_m,y_m,z_m,roll_deg,pitch_deg,heading_deg (or qw,qx,qy,qz), scene "
              "frame."},
-    {KEY(platform.waypoints), CFG_PATH, .def = "",
+    {KEY(platform.waypoints), CFG_PATH, .def = "", .example = "way.csv",
      .help = "trajectory, stops: CSV with x_m,y_m,z_m,speed_m_s[,pause_s] in place of file. The heading follows the "
              "path; the platform is level as a station there."},
     {KEY(platform.start_s), CFG_REAL, "s", "0", 0, 1e9,
@@ -191,7 +195,7 @@ static const struct cfg_key config_keys[] = {
      WORDS([HEIGHTS_ELLIPSOID] = "ellipsoid", [HEIGHTS_GEOID] = "geoid", [HEIGHTS_AUTO] = "auto"),
      .help = "Heights of utm and geodetic points. geoid needs GeographicLib's data; auto uses them where they are "
              "installed."},
-    {KEY(output.tolerance_m), CFG_REAL, "m", "", 1e-7, 1,
+    {KEY(output.tolerance_m), CFG_REAL, "m", "", 1e-7, 1, .example = "1e-6",
      .help = "What georeferencing may add to a point's error; the cheapest method that holds it is used. When not "
              "given: a thousandth of plan.tolerance_m, but at least 1e-7 m."},
     {KEY(output.georef), CFG_ENUM, .def = "auto",
@@ -202,21 +206,22 @@ static const struct cfg_key config_keys[] = {
      .help = "on: each points frame is followed by one with amplitude (needs signal.model: on) and width of its "
              "echoes, 4 bytes a point; .ply and .las recordings have them."},
     {KEY(output.scale_m), CFG_REAL, "m", "0", 0, 1, .allowed = "0 (automatic) or 1e-6 to 1 m",
-     .help = "Metres per count of a range; a count of a coordinate is no larger. The largest range must fit into 31 "
-             "bits."},
+     .help = "Metres per count of a range; a count of a coordinate is no larger. The largest range must fit into 32 "
+             "bits, a coordinate into 31. automatic: 1e-6 m up to 4294 m of range (geo: 2147 m), then ten times as "
+             "much."},
 
     {"links", .type = CFG_LIST, .min = 0, .max = CONFIG_MAX_LINKS, LIST_OF(link, n_links),
      .help = "Where the head can be reached; none is needed to record off line."},
     {"links[]", .type = CFG_MAP, .help = "A link."},
-    {LINK(type), CFG_ENUM,
+    {LINK(type), CFG_ENUM, .example = "tcp",
      WORDS([LINK_NULL] = "null", [LINK_FILE] = "file", [LINK_PTY] = "pty", [LINK_TCP] = "tcp", [LINK_USB] = "usb"),
      .help = "Kind of link."},
     {LINK(protocol), CFG_ENUM, .def = "native", WORDS([PROTOCOL_NATIVE] = "native", [PROTOCOL_NMEA] = "nmea"),
      .help = "native: the head's stream and commands; nmea: the GNSS receiver, NMEA 0183 out, nothing in."},
-    {LINK(path), CFG_PATH, .def = "",
+    {LINK(path), CFG_PATH, .def = "", .example = "port",
      .help = "pty: symbolic link to the terminal (optional); file: file to write (required); usbredir: Unix socket, "
              "instead of a port."},
-    {LINK(address), CFG_TEXT, .def = "",
+    {LINK(address), CFG_TEXT, .def = "", .example = "127.0.0.1",
      .help = "tcp, usb: address to listen on, or with attach to connect to; 127.0.0.1 when not given."},
     {LINK(port), CFG_COUNT, NULL, "0", 0, 65535,
      .help = "tcp, usb: port; 0: the system chooses; usbip, when not given: 3240."},
@@ -227,7 +232,7 @@ static const struct cfg_key config_keys[] = {
     {LINK(attach), CFG_BOOL, .def = "off",
      .help = "usbip: plugs into this machine's vhci_hcd; usbredir: connects to the guest's socket instead of "
              "listening. Both do so again whenever the host disconnects."},
-    {LINK(udc), CFG_TEXT, .def = "", .help = "functionfs: USB device controller; when not given, the first free one."},
+    {LINK(udc), CFG_TEXT, .def = "", .example = "dummy_udc.0", .help = "functionfs: USB device controller; when not given, the first free one."},
     {LINK(speed), CFG_ENUM, .def = "high",
      WORDS([USB_RATE_FULL] = "full", [USB_RATE_HIGH] = "high", [USB_RATE_SUPER] = "super"),
      .help = "usb: full (12 Mbit/s), high (480) or super (5000): the fastest that the device offers."},
@@ -235,7 +240,9 @@ static const struct cfg_key config_keys[] = {
      .help = "usb: vendor id; the default pair is set aside for private tests."},
     {LINK(pid), CFG_COUNT, NULL, "0x0001", 0, 65535, .flags = CFG_HEX, .allowed = "0x0000 to 0xffff",
      .help = "usb: product id."},
-    {LINK(serial), CFG_TEXT, .def = "", .help = "usb: serial number; head.serial when not given."},
+    {LINK(serial), CFG_TEXT, .def = "", .example = "SIM-0002",
+     .help = "usb: serial number. When not given: head.serial where that is given, else SIM-0001 and eight digits that "
+             "are this head's own on this machine. Only the USB device has them, not *IDN?."},
 
     {"beam", .type = CFG_MAP, .help = "The footprint of the pulses."},
     {KEY(beam.mode), CFG_ENUM, .def = "single",
@@ -243,8 +250,10 @@ static const struct cfg_key config_keys[] = {
      .help = "single: one ray per pulse; rings: sub-rays over the footprint; adaptive: sub-rays where the footprint "
              "reaches over an edge, or onto glass or a mirror; auto: as `scanhead plan` says."},
     {KEY(beam.rings), CFG_COUNT, NULL, "4", 0, BEAM_MAX_RINGS,
-     .help = "Rings of sub-rays: n rings have 1 + 3 n (n + 1). adaptive: used where a footprint holds more edges than "
-             "it can tell apart."},
+     .help = "Rings of sub-rays: n rings have 1 + 3 n (n + 1). At a plane's end a range is wrong by up to "
+             "0.35 / n^0.75 of the footprint's radius times the tangent of the incidence: 9 mm with 4 rings, "
+             "0.35 mrad, 100 m and 77 deg. Outlines are exact. adaptive: used where a footprint holds more edges than it can tell "
+             "apart."},
     {"beam.echoes", SETTING(echoes), CFG_ENUM, .def = "all",
      WORDS([BEAM_ALL] = "all", [BEAM_FIRST] = "first", [BEAM_LAST] = "last", [BEAM_STRONGEST] = "strongest"),
      .help = "Which echoes of a pulse are sent. Those of glass, and of what is seen through it, are among them."},
@@ -265,7 +274,8 @@ static const struct cfg_key config_keys[] = {
     {KEY(noise.angle), CFG_BOOL, .def = "off",
      .help = "Angle noise of the profile's mirror_sigma_deg and pan_sigma_deg: the beam deviates, the encoders do not "
              "show it."},
-    {KEY(noise.seed), CFG_COUNT, NULL, "1", 0, 18446744073709551615.0, .help = "Seed of the random numbers."},
+    {KEY(noise.seed), CFG_COUNT, NULL, "1", 0, 18446744073709551615.0, 
+     .help = "Seed of the random numbers. Noise also differs by station, and by scan since power-up at a station."},
     {"noise.ball", .type = CFG_MAP, .help = "Ball-shaped noise: each point moves to anywhere in a ball around it."},
     {KEY(noise.ball.radius_m), CFG_REAL, "m", "0", 0, 100, .help = "Radius of the ball; 0: none."},
     {KEY(noise.ball.distance_1_m), CFG_REAL, "1/m", "0", 0, 100,
@@ -273,7 +283,7 @@ static const struct cfg_key config_keys[] = {
     {KEY(noise.ball.factor), CFG_VEC3, NULL, "[1, 1, 1]", 0, 1000, .help = "Stretches the ball along its axes."},
     {"noise.ball.axes", IN_CONFIG(noise.ball.local), CFG_ENUM, .def = "scene", WORDS("scene", "beam"),
      .help = "Its axes: x, y, z of the scene; or of the beam: along it, to the right, up."},
-    {KEY(noise.ball.seed), CFG_COUNT, NULL, "", 0, 18446744073709551615.0,
+    {KEY(noise.ball.seed), CFG_COUNT, NULL, "", 0, 18446744073709551615.0, .example = "1",
      .help = "Seed of the ball's random numbers; noise.seed when not given."},
 
     {"signal", .type = CFG_MAP, .help = "What comes back: amplitude, reflectance, detection threshold."},
@@ -288,7 +298,7 @@ static const struct cfg_key config_keys[] = {
     {KEY(signal.visibility_m), CFG_REAL, "m", "0", 0, 1e6,
      .help = "Visibility of the air, for its extinction at the profile's wavelength; 0: as the profile's reaches have "
              "it."},
-    {KEY(signal.extinction_1_km), CFG_REAL, "1/km", "", 0, 1000,
+    {KEY(signal.extinction_1_km), CFG_REAL, "1/km", "", 0, 1000, .example = "0.5",
      .help = "Extinction of the air (absorption and scattering), in place of visibility_m."},
 
     {"surfaces", .type = CFG_LIST, .min = 0, .max = CONFIG_MAX_SURFACES, LIST_OF(surface, n_surfaces),
@@ -297,17 +307,20 @@ static const struct cfg_key config_keys[] = {
     {"surfaces[]", .type = CFG_MAP, .help = "An entry."},
     {RULE(material), CFG_TEXT, .def = "*", .help = "Material's name; * and ? stand for others, as in a shell."},
     {RULE(object), CFG_TEXT, .def = "*", .help = "Object's name, in the same way."},
-    {SURFACE(reflectance), CFG_REAL, NULL, "", 0, 1,
-     .help = "Lambertian reflectance; 0 absorbs. When not given: luminance of the mesh's texture (PNG) or colour."},
-    {SURFACE(specular), CFG_REAL, NULL, "", 0, 1, .help = "Share that is reflected in a lobe."},
-    {SURFACE(gloss), CFG_REAL, NULL, "", 0, 1e6, .help = "Exponent of the lobe's cosine; 100 when not given."},
-    {SURFACE(retro), CFG_REAL, NULL, "", 0, 1e6,
+    {SURFACE(reflectance), CFG_REAL, NULL, "", 0, 1, .example = "0.4",
+     .help = "Lambertian reflectance; 0 absorbs. When not given: luminance of the mesh's texture or colour."},
+    {SURFACE(specular), CFG_REAL, NULL, "", 0, 1, .example = "0.1", .help = "Share that is reflected in a lobe."},
+    {SURFACE(gloss), CFG_REAL, NULL, "", 0, 1e6, .example = "100",
+     .help = "Exponent of the lobe's cosine; 100 when not given."},
+    {SURFACE(retro), CFG_REAL, NULL, "", 0, 1e6, .example = "300",
      .help = "Retro-reflector: its signal is that of a white target times this, at any incidence; foils have 100 to "
              "1000."},
-    {SURFACE(glass), CFG_REAL, NULL, "", 0, 1,
-     .help = "Share of the power that passes each surface: the pane and what is seen through it give echoes."},
-    {SURFACE(mirror), CFG_REAL, NULL, "", 0, 1,
-     .help = "Share of the power that is mirrored: ghost points, with surfaces of their own."},
+    {SURFACE(glass), CFG_REAL, NULL, "", 0, 1, .example = "0.9",
+     .help = "Share of the power that passes each surface: the pane and what is seen through it give echoes. It counts "
+             "on the way there and back: beyond two surfaces (a pane) of 0.9 an echo has 0.9^4 of its power."},
+    {SURFACE(mirror), CFG_REAL, NULL, "", 0, 1, .example = "0.9",
+     .help = "Share of the power that is mirrored: ghost points, with surfaces of their own. It counts on the way "
+             "there and back: in a mirror of 0.9 an echo has 0.81 of its power."},
 
     {"optics", .type = CFG_MAP, .help = "Pulses that meet glass or a mirror."},
     {KEY(optics.depth), CFG_COUNT, NULL, "4", 0, CAST_MAX_DEPTH,

@@ -20,20 +20,23 @@ void config_signal_spec(const struct config_profile *p, struct detect_signal_spe
         spec->reach[i] = (struct detect_reach){p->reach[i].reflectance, p->reach[i].range_m};
 }
 
-int cfg_check_reaches(const struct cfg_reader *rd, struct config_profile *profile)
+void cfg_check_reaches(struct cfg_reader *rd, struct config_profile *profile)
 {
     struct detect_signal_spec spec;
     struct detect_signal signal;
     struct sh_err why;
+    if (!CFG_SOUND(rd, 0, "reaches", "range_max_m", "range_sigma_m", "range_sigma_at_m", "range_sigma_reflectance",
+                   "range_sigma_floor_m", "range_sigma_ppm", "threshold_snr", "overlap_m"))
+        return;
+    for (uint32_t i = 0; i < profile->n_reaches; i++)
+        if (!CFG_SOUND(rd, i, "reaches[]")) return;
     if (profile->n_reaches == 0)
         profile->reach[profile->n_reaches++] = (struct config_reach){WHITE, profile->range_max_m, FROM_ASSUMED};
     config_signal_spec(profile, &spec);
     if (detect_signal_set_up(&spec, &signal, &why) != SH_OK)
-        return cfg_fail_key(rd, "reaches", 0,
-                            "%.200s; allowed ranges that rise with the reflectance, and not faster than its square "
-                            "root",
-                            why.text);
-    return SH_OK;
+        cfg_fail_key(rd, "reaches", 0,
+                     "%.200s; allowed ranges that rise with the reflectance, and not faster than its square root",
+                     why.text);
 }
 
 /* NaN for what an entry leaves out. */
@@ -53,41 +56,41 @@ static void mark_unsaid(const struct cfg_reader *rd, uint32_t i, struct surface 
     if (isnan(s->gloss)) s->gloss = 100.0;
 }
 
-static int check_surface(const struct cfg_reader *rd, uint32_t i, const struct surface *s)
+static void check_surface(struct cfg_reader *rd, uint32_t i, const struct surface *s)
 {
     double sum = s->reflectance + s->specular + s->glass + s->mirror;
+    if (!CFG_SOUND(rd, i, "surfaces[]")) return;
     if (s->glass > 0.0 && s->mirror > 0.0)
-        return cfg_fail_key(rd, "surfaces[].mirror", i, "glass and a mirror at once; allowed either glass or mirror");
-    if (sum > 1.0 + 1e-9)
-        return cfg_fail_key(rd, "surfaces[]", i,
-                            "reflectance, specular, glass and mirror add up to %.10g; allowed at most 1", sum);
-    return SH_OK;
+        cfg_fail_key(rd, "surfaces[].mirror", i, "glass and a mirror at once; allowed either glass or mirror");
+    else if (sum > 1.0 + 1e-9)
+        cfg_fail_key(rd, "surfaces[]", i, "reflectance, specular, glass and mirror add up to %.10g; allowed at most 1",
+                     sum);
 }
 
-static int check_noise(const struct cfg_reader *rd, struct config *cfg)
+static void check_noise(struct cfg_reader *rd, struct config *cfg)
 {
     if (!cfg_is_given(rd, "noise.ball.seed", 0)) cfg->noise.ball.seed = cfg->noise.seed;
-    if (cfg->noise.range == RANGE_NOISE_SIGNAL && !cfg->signal.on)
-        return cfg_fail_key(rd, "noise.range", 0, "signal, but no signal is modelled; allowed with signal.model: on");
-    if (cfg->noise.angle && cfg->profile.mirror_sigma_deg == 0.0 && cfg->profile.pan_sigma_deg == 0.0)
-        return cfg_fail_key(rd, "noise.angle", 0,
-                            "head profile %s gives no angle noise; required is mirror_sigma_deg or pan_sigma_deg there",
-                            cfg->profile.name);
-    if (cfg->noise.ball.radius_m > 0.0 && !cfg->noise.ball.local && cfg->platform.kind != PLATFORM_STATIC)
-        return cfg_fail_key(rd, cfg_is_given(rd, "noise.ball.axes", 0) ? "noise.ball.axes" : "noise.ball.radius_m", 0,
-                            "axes of the scene on a platform that moves; allowed axes: beam");
-    return SH_OK;
+    if (cfg->noise.range == RANGE_NOISE_SIGNAL && !cfg->signal.on && CFG_SOUND(rd, 0, "signal.model"))
+        cfg_fail_key(rd, "noise.range", 0, "signal, but no signal is modelled; allowed with signal.model: on");
+    if (cfg->noise.angle && rd->profile_read && cfg->profile.mirror_sigma_deg == 0.0 &&
+        cfg->profile.pan_sigma_deg == 0.0)
+        cfg_fail_key(rd, "noise.angle", 0,
+                     "head profile %s gives no angle noise; required is mirror_sigma_deg or pan_sigma_deg there",
+                     cfg->profile.name);
+    if (cfg->noise.ball.radius_m > 0.0 && !cfg->noise.ball.local && cfg->platform.kind != PLATFORM_STATIC &&
+        CFG_SOUND(rd, 0, "noise.ball", "platform.kind"))
+        cfg_fail_key(rd, cfg_is_given(rd, "noise.ball.axes", 0) ? "noise.ball.axes" : "noise.ball.radius_m", 0,
+                     "axes of the scene on a platform that moves; allowed axes: beam");
 }
 
-int cfg_check_signal(const struct cfg_reader *rd, struct config *cfg)
+void cfg_check_signal(struct cfg_reader *rd, struct config *cfg)
 {
-    int code = check_noise(rd, cfg);
+    check_noise(rd, cfg);
     cfg->signal.has_extinction = cfg_is_given(rd, "signal.extinction_1_km", 0);
-    if (code == SH_OK && cfg->signal.has_extinction && cfg_is_given(rd, "signal.visibility_m", 0))
-        code = cfg_fail_key(rd, "signal.extinction_1_km", 0, "given together with visibility_m; allowed one of them");
-    for (uint32_t i = 0; i < cfg->n_surfaces && code == SH_OK; i++) {
-        code = check_surface(rd, i, &cfg->surface[i].surface);
+    if (cfg->signal.has_extinction && cfg_is_given(rd, "signal.visibility_m", 0))
+        cfg_fail_key(rd, "signal.extinction_1_km", 0, "given together with visibility_m; allowed one of them");
+    for (uint32_t i = 0; i < cfg->n_surfaces; i++) {
+        check_surface(rd, i, &cfg->surface[i].surface);
         mark_unsaid(rd, i, &cfg->surface[i].surface);
     }
-    return code;
 }

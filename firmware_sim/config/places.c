@@ -6,14 +6,14 @@
 #include <string.h>
 
 /* "required, allowed ..." of a key that is missing, after why. */
-static int fail_required(const struct cfg_reader *rd, const char *path, uint32_t item, const char *why)
+static int fail_required(struct cfg_reader *rd, const char *path, uint32_t item, const char *why)
 {
     char allowed[CFG_ALLOWED_MAX];
     return cfg_fail_key(rd, path, item, "missing, and %s; required, %s", why,
-                        cfg_allowed(cfg_find(&rd->table, path), allowed));
+                        cfg_allowed(cfg_find(&rd->table, path), rd->profile, allowed));
 }
 
-static int check_anchor(const struct cfg_reader *rd, struct config *cfg)
+static void check_anchor(struct cfg_reader *rd, struct config *cfg)
 {
     enum { IN_EXPLICIT = 1u << ANCHOR_EXPLICIT, IN_IFC = 1u << ANCHOR_IFC, IN_UTM = 1u << ANCHOR_UTM };
     static const struct {
@@ -35,17 +35,16 @@ static int check_anchor(const struct cfg_reader *rd, struct config *cfg)
                                       [ANCHOR_ECEF] = "source alone"};
     const char *source = cfg_word(rd, "scene.anchor.source", (int)cfg->scene.anchor.source);
     char why[64];
+    cfg->scene.anchor.height_given = cfg_is_given(rd, "scene.anchor.height_m", 0);
+    if (!CFG_SOUND(rd, 0, "scene.anchor.source")) return;
     for (size_t k = 0; k < CFG_LEN(keys); k++) {
         int given = cfg_is_given(rd, keys[k].path, 0);
         if (given && !(keys[k].taken & 1u << cfg->scene.anchor.source))
-            return cfg_fail_key(rd, keys[k].path, 0, "an anchor of source %s has no such key; allowed %s", source,
-                                has[cfg->scene.anchor.source]);
+            cfg_fail_key(rd, keys[k].path, 0, "an anchor of source %s has no such key; allowed %s", source,
+                         has[cfg->scene.anchor.source]);
         snprintf(why, sizeof why, "the anchor's source is %s", source);
-        if (!given && (keys[k].required & 1u << cfg->scene.anchor.source))
-            return fail_required(rd, keys[k].path, 0, why);
+        if (!given && (keys[k].required & 1u << cfg->scene.anchor.source)) fail_required(rd, keys[k].path, 0, why);
     }
-    cfg->scene.anchor.height_given = cfg_is_given(rd, "scene.anchor.height_m", 0);
-    return SH_OK;
 }
 
 /* Keys of the forms; height_m is part of two. */
@@ -60,7 +59,7 @@ static const struct {
 };
 
 /* Which form is given, and that it is one. */
-static int find_form(const struct cfg_reader *rd, struct config_station *station, uint32_t i)
+static int find_form(struct cfg_reader *rd, struct config_station *station, uint32_t i)
 {
     const char *first = NULL;
     station->place = PLACE_NONE;
@@ -82,8 +81,7 @@ static int find_form(const struct cfg_reader *rd, struct config_station *station
 }
 
 /* A form is whole. Zone and hemisphere may come from an anchor in UTM. */
-static int complete_form(const struct cfg_reader *rd, const struct config *cfg, struct config_station *station,
-                         uint32_t i)
+static int complete_form(struct cfg_reader *rd, const struct config *cfg, struct config_station *station, uint32_t i)
 {
     static const char *const why[] = {[PLACE_GEODETIC] = "lat_deg, lon_deg and height_m go together",
                                       [PLACE_UTM] = "utm_zone, hemisphere, easting_m, northing_m, height_m go together",
@@ -108,15 +106,14 @@ static int complete_form(const struct cfg_reader *rd, const struct config *cfg, 
 /* Without an anchor: where it is in the scene, and for a CRS where on the Earth. With one: either, the other
  * follows.
  */
-static int check_station(const struct cfg_reader *rd, const struct config *cfg, struct config_station *station,
-                         uint32_t i)
+static int check_station(struct cfg_reader *rd, const struct config *cfg, struct config_station *station, uint32_t i)
 {
     int code = find_form(rd, station, i);
     int anchored = cfg->scene.anchor.source != ANCHOR_NONE, nowhere = station->place == PLACE_NONE;
     station->has_position = cfg_is_given(rd, "stations[].position_m", i);
     station->has_instrument_height = cfg_is_given(rd, "stations[].instrument_height_m", i);
     if (code == SH_OK && !nowhere) code = complete_form(rd, cfg, station, i);
-    if (code != SH_OK) return code;
+    if (code != SH_OK || !CFG_SOUND(rd, i, "stations[]", "scene.anchor.source")) return code;
     if (!station->has_position && (!anchored || nowhere))
         return fail_required(rd, "stations[].position_m", i,
                              anchored ? "no place on the Earth is given either"
@@ -126,17 +123,17 @@ static int check_station(const struct cfg_reader *rd, const struct config *cfg, 
             rd, "stations[].position_m", i,
             "together with a place on the Earth, and scene.anchor gives one from the other; allowed one "
             "of them");
-    if (!anchored && nowhere && cfg->output.crs != GEOREF_LOCAL)
+    if (anchored || !nowhere) return SH_OK;
+    if (cfg->output.crs != GEOREF_LOCAL)
         return fail_required(rd, "stations[].lat_deg", i, "output.crs is not local and there is no scene.anchor");
-    if (!anchored && nowhere && cfg_nmea_link(cfg) >= 0)
+    if (cfg_nmea_link(cfg) >= 0)
         return fail_required(rd, "stations[].lat_deg", i, "a link has the protocol nmea and there is no scene.anchor");
     return SH_OK;
 }
 
-int cfg_check_places(const struct cfg_reader *rd, struct config *cfg)
+void cfg_check_places(struct cfg_reader *rd, struct config *cfg)
 {
-    int code = check_anchor(rd, cfg);
-    for (uint32_t i = 0; i < cfg->n_stations && code == SH_OK; i++)
-        code = check_station(rd, cfg, &cfg->station[i], i);
-    return code;
+    check_anchor(rd, cfg);
+    for (uint32_t i = 0; i < cfg->n_stations; i++)
+        check_station(rd, cfg, &cfg->station[i], i);
 }

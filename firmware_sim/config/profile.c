@@ -15,21 +15,25 @@ struct profile_dirs {
     int n;
 };
 
-/* Where an installed program, and one in its build folder, have the profiles: beside it. */
-static void find_beside_program(struct profile_dirs *dirs)
+int cfg_shared_path(int i, const char *name, char *buf)
 {
-    static const char *const beside[] = {"../share/scanhead/heads", "../config/heads"};
+    static const char *const beside[] = {"../share/scanhead", "../config"};
     char program[CONFIG_PATH_LEN];
-    ssize_t n = readlink("/proc/self/exe", program, sizeof program - 1);
-    if (n <= 0) return;
-    program[n] = '\0';
-    char *slash = strrchr(program, '/');
-    if (slash == NULL) return;
-    slash[1] = '\0';
-    for (int i = 0; i < 2; i++) {
-        int len = snprintf(dirs->dir[dirs->n], CONFIG_PATH_LEN, "%s%s", program, beside[i]);
-        if (len > 0 && len < CONFIG_PATH_LEN) dirs->n++;
-    }
+    if (i == 2) snprintf(buf, CONFIG_PATH_LEN, "config/%s", name);
+    if (i >= 2) return i == 2;
+    const ssize_t n = readlink("/proc/self/exe", program, sizeof program - 1);
+    char *slash = n > 0 ? memrchr(program, '/', (size_t)n) : NULL;
+    if (slash == NULL) slash = program;
+    const int len = snprintf(buf, CONFIG_PATH_LEN, "%.*s/%s/%s", (int)(slash - program), program, beside[i], name);
+    if (len >= CONFIG_PATH_LEN) buf[0] = '\0'; /* nothing is there */
+    return 1;
+}
+
+int cfg_find_shared(const char *name, char *buf)
+{
+    for (int i = 0; cfg_shared_path(i, name, buf); i++)
+        if (access(buf, R_OK) == 0) return 1;
+    return 0;
 }
 
 static void find_dirs(const char *config_file, struct profile_dirs *dirs)
@@ -41,8 +45,8 @@ static void find_dirs(const char *config_file, struct profile_dirs *dirs)
     if (config_file != NULL)
         snprintf(dirs->dir[dirs->n++], CONFIG_PATH_LEN, "%.*sheads", CONFIG_PATH_LEN - 6,
                  cfg_dir_of(config_file, base));
-    find_beside_program(dirs);
-    snprintf(dirs->dir[dirs->n++], CONFIG_PATH_LEN, "config/heads");
+    for (int i = 0; cfg_shared_path(i, "heads", dirs->dir[dirs->n]); i++)
+        if (dirs->dir[dirs->n][0] != '\0') dirs->n++;
 }
 
 static int is_yaml(const char *name)
@@ -89,75 +93,77 @@ static void known_profiles(const struct profile_dirs *dirs, char *buf, size_t le
 /* ---- one profile */
 
 /* A figure that must not be above another one. strictly: nor equal to it. */
-static int check_order(const struct cfg_reader *rd, const char *low_key, double low, double high, int strictly)
+static void check_order(struct cfg_reader *rd, const char *low_key, double low, const char *high_key, double high,
+                        int strictly)
 {
-    if (low < high || (low == high && !strictly)) return SH_OK;
-    return cfg_fail_key(rd, low_key, 0, "%.15g is too much; allowed %s %.15g", low, strictly ? "below" : "at most",
-                        high);
+    if (low < high || (low == high && !strictly) || !CFG_SOUND(rd, 0, low_key, high_key)) return;
+    cfg_fail_key(rd, low_key, 0, "%.15g is too much; allowed %s %.15g", low, strictly ? "below" : "at most", high);
 }
 
-static int check_sweep(const struct cfg_reader *rd, const struct config_profile *p)
+static void check_sweep(struct cfg_reader *rd, const struct config_profile *p)
 {
     double sweep_deg = 360.0 / p->facets * p->optical_gain,
            fov_deg = (double)(p->fov_max_udeg - p->fov_min_udeg) * 1e-6;
+    if (!CFG_SOUND(rd, 0, "facets", "optical_gain")) return;
     if (sweep_deg > 360.0)
-        return cfg_fail_key(rd, "optical_gain", 0,
-                            "a sweep of 360 / facets * optical_gain is %.10g deg; allowed up to 360", sweep_deg);
+        cfg_fail_key(rd, "optical_gain", 0, "a sweep of 360 / facets * optical_gain is %.10g deg; allowed up to 360",
+                     sweep_deg);
     /* Rounding of the quotient and the product is far below one micro-degree. */
-    if (fov_deg > sweep_deg + 1e-9)
-        return cfg_fail_key(rd, "fov_max_deg", 0,
-                            "a field of view of %.10g deg does not fit into a sweep; allowed up to %.10g deg, "
-                            "360 / facets * optical_gain",
-                            fov_deg, sweep_deg);
-    return SH_OK;
+    else if (fov_deg > sweep_deg + 1e-9 && CFG_SOUND(rd, 0, "fov_min_deg", "fov_max_deg"))
+        cfg_fail_key(rd, "fov_max_deg", 0,
+                     "a field of view of %.10g deg does not fit into a sweep; allowed up to %.10g deg, "
+                     "360 / facets * optical_gain",
+                     fov_deg, sweep_deg);
 }
 
-static int check_profile(const struct cfg_reader *rd, struct config_profile *p)
+static void check_profile(struct cfg_reader *rd, struct config_profile *p)
 {
     const double lines_min_hz = 1e-6 * (double)p->lines_min_uhz, prr_max_hz = 1e-6 * (double)p->prr_max_uhz;
     const double pan_min_deg = 1e-6 * (double)p->pan_min_udeg, pan_max_deg = 1e-6 * (double)p->pan_max_udeg;
-    int code = check_order(rd, "prr_min_hz", 1e-6 * (double)p->prr_min_uhz, prr_max_hz, 0);
-    if (code == SH_OK) code = check_order(rd, "lines_min_hz", lines_min_hz, 1e-6 * (double)p->lines_max_uhz, 0);
-    if (code == SH_OK && prr_max_hz < lines_min_hz)
-        code = cfg_fail_key(rd, "prr_max_hz", 0, "less than a pulse per line; allowed at least %.15g", lines_min_hz);
-    if (code == SH_OK)
-        code = check_order(rd, "fov_min_deg", 1e-6 * (double)p->fov_min_udeg, 1e-6 * (double)p->fov_max_udeg, 1);
-    if (code == SH_OK && (p->pan_min_udeg >= p->pan_max_udeg || p->pan_max_udeg - p->pan_min_udeg > 360000000))
-        code = cfg_fail_key(rd, "pan_max_deg", 0, "%.15g does not fit; allowed above %.15g, up to %.15g", pan_max_deg,
-                            pan_min_deg, pan_min_deg + 360.0);
-    if (code == SH_OK) code = check_order(rd, "range_min_m", p->range_min_m, p->range_max_m, 1);
-    if (code == SH_OK) code = check_sweep(rd, p);
-    if (code == SH_OK) code = check_order(rd, "range_sigma_floor_m", p->range_sigma_floor_m, p->range_sigma_m, 0);
-    return code == SH_OK ? cfg_check_reaches(rd, p) : code;
+    check_order(rd, "prr_min_hz", 1e-6 * (double)p->prr_min_uhz, "prr_max_hz", prr_max_hz, 0);
+    check_order(rd, "lines_min_hz", lines_min_hz, "lines_max_hz", 1e-6 * (double)p->lines_max_uhz, 0);
+    if (prr_max_hz < lines_min_hz && CFG_SOUND(rd, 0, "prr_max_hz", "lines_min_hz"))
+        cfg_fail_key(rd, "prr_max_hz", 0, "less than a pulse per line; allowed at least %.15g", lines_min_hz);
+    check_order(rd, "fov_min_deg", 1e-6 * (double)p->fov_min_udeg, "fov_max_deg", 1e-6 * (double)p->fov_max_udeg, 1);
+    if ((p->pan_min_udeg >= p->pan_max_udeg || p->pan_max_udeg - p->pan_min_udeg > 360000000) &&
+        CFG_SOUND(rd, 0, "pan_min_deg", "pan_max_deg"))
+        cfg_fail_key(rd, "pan_max_deg", 0, "%.15g does not fit; allowed above %.15g, up to %.15g", pan_max_deg,
+                     pan_min_deg, pan_min_deg + 360.0);
+    check_order(rd, "range_min_m", p->range_min_m, "range_max_m", p->range_max_m, 1);
+    check_sweep(rd, p);
+    check_order(rd, "range_sigma_floor_m", p->range_sigma_floor_m, "range_sigma_m", p->range_sigma_m, 0);
+    cfg_check_reaches(rd, p);
 }
 
 /* The file's name is the profile's: two names could differ. */
-static int name_profile(const struct cfg_reader *rd, struct config_profile *profile)
+static int name_profile(struct cfg_reader *rd, struct config_profile *profile)
 {
     const char *slash = strrchr(rd->file, '/');
     const char *base = slash == NULL ? rd->file : slash + 1;
     size_t stem = strlen(base) - 5;
     if (stem >= sizeof profile->name)
-        return sh_fail(rd->err, SH_EINPUT,
-                       "%s: the file's name is the profile's; allowed up to %zu characters and .yaml", rd->file,
-                       sizeof profile->name - 1);
+        return cfg_fail_file(rd, SH_EINPUT, 0,
+                             "the file's name is the profile's; allowed up to %zu characters and .yaml",
+                             sizeof profile->name - 1);
     for (size_t i = 0; i < stem; i++)
         if ((unsigned char)base[i] <= 0x20 || (unsigned char)base[i] >= 0x7f)
-            return sh_fail(rd->err, SH_EINPUT, "%s: the file's name is the profile's; allowed printable ASCII",
-                           rd->file);
+            return cfg_fail_file(rd, SH_EINPUT, 0, "the file's name is the profile's; allowed printable ASCII");
     memcpy(profile->name, base, stem);
     return SH_OK;
 }
 
-static int read_profile(struct cfg_reader *rd, const char *file, struct config_profile *profile, struct sh_err *err)
+/* Returns whether it has no fault. */
+static int read_profile(struct cfg_reader *rd, const char *file, struct config_profile *profile,
+                        struct config_faults *faults)
 {
+    const uint32_t before = faults->n;
     memset(profile, 0, sizeof *profile);
-    cfg_reader_init(rd, file, &cfg_profile_table, profile, err);
-    int code = name_profile(rd, profile);
-    if (code == SH_OK) code = cfg_read_file(rd);
-    if (code == SH_OK) code = cfg_fill_defaults(rd, NULL);
-    if (code == SH_OK) code = check_profile(rd, profile);
-    return code;
+    cfg_reader_init(rd, file, &cfg_profile_table, profile, faults);
+    if (name_profile(rd, profile) == SH_OK && cfg_read_file(rd) == SH_OK) {
+        cfg_fill_defaults(rd, NULL);
+        check_profile(rd, profile);
+    }
+    return faults->n == before;
 }
 
 /* ---- lookup */
@@ -194,16 +200,32 @@ static int find_profile(struct cfg_reader *rd, struct config *cfg)
     return fail_lookup(rd, cfg, &dirs);
 }
 
-int cfg_load_profile(struct cfg_reader *rd, struct config *cfg)
+void cfg_load_profile(struct cfg_reader *rd, struct config *cfg)
 {
-    int code = SH_OK;
-    if (cfg->profile_file[0] == '\0')
-        code = cfg_fail_key(rd, "head.profile", 0,
-                            "missing; required is the name of a profile, or a path that ends in .yaml");
-    if (code == SH_OK) code = find_profile(rd, cfg);
-    if (code != SH_OK) return code;
     struct cfg_reader profile_rd;
-    return read_profile(&profile_rd, cfg->profile_file, &cfg->profile, rd->err);
+    if (!CFG_SOUND(rd, 0, "head.profile")) return;
+    if (cfg->profile_file[0] == '\0')
+        cfg_fail_key(rd, "head.profile", 0, "missing; required is the name of a profile, or a path that ends in .yaml");
+    else if (find_profile(rd, cfg) == SH_OK)
+        rd->profile_read = read_profile(&profile_rd, cfg->profile_file, &cfg->profile, rd->faults);
+}
+
+int config_load_profile(const char *name, const char *config_file, struct config_profile *profile, struct sh_err *err)
+{
+    struct profile_dirs dirs;
+    struct cfg_reader rd;
+    struct config_faults faults = {0};
+    char path[2 * CONFIG_PATH_LEN], known[300];
+    find_dirs(config_file, &dirs);
+    for (int i = 0; i < dirs.n; i++) {
+        snprintf(path, sizeof path, "%s/%s.yaml", dirs.dir[i], name);
+        if (access(path, F_OK) != 0) continue;
+        if (read_profile(&rd, path, profile, &faults)) return SH_OK;
+        return sh_fail(err, faults.fault[0].code, "%s", faults.fault[0].text);
+    }
+    known_profiles(&dirs, known, sizeof known);
+    return sh_fail(err, SH_EINPUT, "no head profile %s; found were: %s; SCANHEAD_HEADS can name their directory", name,
+                   known);
 }
 
 /* ---- listing */
@@ -220,9 +242,10 @@ static int list_profile(const char *dir, const char *entry, FILE *out, struct sh
     char path[2 * CONFIG_PATH_LEN];
     struct cfg_reader rd;
     struct config_profile profile;
+    struct config_faults faults = {0};
     snprintf(path, sizeof path, "%s/%s", dir, entry);
-    int code = read_profile(&rd, path, &profile, err);
-    if (code != SH_OK) return code;
+    if (!read_profile(&rd, path, &profile, &faults))
+        return sh_fail(err, faults.fault[0].code, "%s", faults.fault[0].text);
     fprintf(out, "%-16s %s %s", profile.name, profile.maker, profile.model);
     print_figures(&rd, 1, "; data sheet: ", out);
     print_figures(&rd, 2, "; assumed: ", out);

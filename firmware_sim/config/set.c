@@ -46,7 +46,7 @@ static void to_generic(struct set *set)
     set->path[used] = '\0';
 }
 
-static int fail_unknown(const struct cfg_reader *rd, struct set *set)
+static int fail_unknown(struct cfg_reader *rd, struct set *set)
 {
     char parent[CFG_PATH_MAX];
     snprintf(parent, sizeof parent, "%s", set->path);
@@ -74,31 +74,42 @@ static int reach_item(struct cfg_reader *rd, const struct set *set, const struct
     return SH_OK;
 }
 
-int cfg_apply_set(struct cfg_reader *rd, const char *text)
+/* The key that the text names, in `set`; or a fault. */
+static int take_name(struct cfg_reader *rd, const char *text, const char *equals, struct set *set)
 {
-    struct set set = {.item = 0};
     char shown[CFG_SHOW_MAX];
-    const char *equals = strchr(text, '=');
     if (equals == NULL || equals == text)
         return cfg_fail(rd, CFG_FROM_SET, cfg_show(text, shown), "no %s; allowed KEY=VALUE, as in head.prr_hz=300000",
                         equals == NULL ? "'='" : "key");
-    if ((size_t)(equals - text) >= sizeof set.name / 2)
+    if ((size_t)(equals - text) >= sizeof set->name / 2)
         return cfg_fail(rd, CFG_FROM_SET, cfg_show(text, shown), "unknown key; allowed up to %zu characters",
-                        sizeof set.name / 2 - 1);
-    snprintf(set.name, sizeof set.name, "%.*s", (int)(equals - text), text);
-    to_generic(&set);
-    for (char *p = set.name; *p != '\0'; p++)
+                        sizeof set->name / 2 - 1);
+    snprintf(set->name, sizeof set->name, "%.*s", (int)(equals - text), text);
+    to_generic(set);
+    for (char *p = set->name; *p != '\0'; p++)
         if ((unsigned char)*p < 0x20 || *p == 0x7f) *p = '?';
+    if (strstr(set->name, "[]") != NULL)
+        return cfg_fail(rd, CFG_FROM_SET, set->name, "no index; allowed as in links[0].type");
+    return SH_OK;
+}
+
+void cfg_apply_set(struct cfg_reader *rd, const char *text)
+{
+    struct set set = {.item = 0};
+    const char *equals = strchr(text, '=');
+    if (take_name(rd, text, equals, &set) != SH_OK) return;
     const struct cfg_key *key = cfg_find(&rd->table, set.path);
-    if (strstr(set.name, "[]") != NULL)
-        return cfg_fail(rd, CFG_FROM_SET, set.name, "no index; allowed as in links[0].type");
-    if (key == NULL) return fail_unknown(rd, &set);
-    if (key->type == CFG_MAP || key->type == CFG_LIST)
-        return cfg_fail(rd, CFG_FROM_SET, set.name, "is %s; set one of its keys",
-                        key->type == CFG_MAP ? "a section" : "a list");
+    if (key == NULL) {
+        fail_unknown(rd, &set);
+        return;
+    }
+    if (key->type == CFG_MAP || key->type == CFG_LIST) {
+        cfg_fail(rd, CFG_FROM_SET, set.name, "is %s; set one of its keys",
+                 key->type == CFG_MAP ? "a section" : "a list");
+        return;
+    }
     const struct cfg_key *list = cfg_list_of(&rd->table, key);
-    int code = list != NULL ? reach_item(rd, &set, list) : SH_OK;
-    if (code != SH_OK) return code;
+    if (list != NULL && reach_item(rd, &set, list) != SH_OK) return;
     rd->line[cfg_row(rd, key)][set.item] = CFG_FROM_SET;
-    return cfg_store(rd, key, set.item, CFG_FROM_SET, equals + 1, "");
+    cfg_store(rd, key, set.item, CFG_FROM_SET, equals + 1, "");
 }

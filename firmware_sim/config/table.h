@@ -29,6 +29,7 @@ enum cfg_flags {
     CFG_FIGURE = 1, /* written { value: V, from: data sheet|assumed } */
     CFG_HEX = 4,    /* written 0x1209, and only so: 1209 is read both ways */
     CFG_ASCII = 2,  /* goes into *IDN?: printable ASCII without comma and quotes */
+    CFG_NEEDED = 8, /* has no default that does in most configurations: the example gives it a value */
 };
 
 enum { CFG_MAX_ROWS = 192, CFG_MAX_ITEMS = 64, CFG_PATH_MAX = 96, CFG_FROM_SET = -1 };
@@ -45,6 +46,7 @@ struct cfg_key {
     const char *const *names;      /* enum: by value, NULL at the end */
     size_t count_offset;
     int flags;
+    const char *example; /* a value for the example, where there is no default */
     const char *help;
 };
 
@@ -60,16 +62,19 @@ extern const struct cfg_table cfg_config_table, cfg_profile_table;
 struct cfg_reader {
     const char *file;
     struct cfg_table table;
-    void *base;                            /* struct that the offsets count from */
-    int line[CFG_MAX_ROWS][CFG_MAX_ITEMS]; /* where a key was given: line, CFG_FROM_SET, 0: not given */
+    void *base;                                     /* struct that the offsets count from */
+    int line[CFG_MAX_ROWS][CFG_MAX_ITEMS];          /* where a key was given: line, CFG_FROM_SET, 0: not given */
+    unsigned char bad[CFG_MAX_ROWS][CFG_MAX_ITEMS]; /* 1: a fault of this key was told; its value says nothing */
     int root_line;
-    unsigned char from[CFG_MAX_ROWS]; /* figures: 1 data sheet, 2 assumed */
-    struct sh_err *err;
+    int profile_read;                     /* the head profile has no fault */
+    const struct config_profile *profile; /* for the limits in errors; NULL: not known */
+    unsigned char from[CFG_MAX_ROWS];     /* figures: 1 data sheet, 2 assumed */
+    struct config_faults *faults;
 };
 
-/* ---- reader.c: rows, places and errors */
+/* ---- reader.c: rows and places */
 void cfg_reader_init(struct cfg_reader *rd, const char *file, const struct cfg_table *table, void *base,
-                     struct sh_err *err);
+                     struct config_faults *faults);
 const struct cfg_key *cfg_find(const struct cfg_table *table, const char *path);
 size_t cfg_row(const struct cfg_reader *rd, const struct cfg_key *key);
 /* The list a row's elements belong to, NULL for a row outside lists. */
@@ -83,15 +88,34 @@ const char *cfg_name(const char *path, uint32_t item, char *buf);
 int cfg_is_given(const struct cfg_reader *rd, const char *path, uint32_t item);
 /* The line of a key, or of the nearest section around it that was given. */
 int cfg_where(const struct cfg_reader *rd, const struct cfg_key *key, uint32_t item);
-/* "FILE:LINE: KEY: text", or "--set KEY: text" when line is CFG_FROM_SET. Returns SH_EINPUT. */
-int cfg_fail(const struct cfg_reader *rd, int line, const char *name, const char *fmt, ...)
+/* The section around a path, in place: "links[].type" -> "links[]" -> "links" -> "". */
+void cfg_cut_to_parent(char *path);
+/* The last word of path, when path is a key directly below parent ("": the top); NULL otherwise. */
+const char *cfg_word_below(const char *path, const char *parent);
+
+/* ---- fault.c: what is wrong, and with what. Each call adds a fault to the reader's list and returns its
+ * code, SH_EINPUT. Reading goes on after it. */
+/* "FILE:LINE: text", without the line when it is 0. Returns code. */
+int cfg_fail_file(struct cfg_reader *rd, int code, int line, const char *fmt, ...)
     __attribute__((format(printf, 4, 5)));
-/* The same for a row of the table. */
-int cfg_fail_key(const struct cfg_reader *rd, const char *path, uint32_t item, const char *fmt, ...)
+/* "FILE:LINE: KEY: text", or "--set KEY: text" when line is CFG_FROM_SET. */
+int cfg_fail(struct cfg_reader *rd, int line, const char *name, const char *fmt, ...)
+    __attribute__((format(printf, 4, 5)));
+/* The same for the value of a key, which is bad from now on. */
+int cfg_fail_value(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, const char *fmt, ...)
+    __attribute__((format(printf, 5, 6)));
+/* The same where the key stands, or should. Nothing is added where a fault of it, or of a section around
+ * it, was told before: what follows from a fault is none of its own. */
+int cfg_fail_key(struct cfg_reader *rd, const char *path, uint32_t item, const char *fmt, ...)
     __attribute__((format(printf, 4, 5)));
 /* An unknown key below the section parent ("" for the top): suggests a near one and lists what is known
- * there. */
-int cfg_fail_unknown(const struct cfg_reader *rd, int line, const char *parent, uint32_t item, const char *word);
+ * there. The near one counts as bad: it isn't missing, too. */
+int cfg_fail_unknown(struct cfg_reader *rd, int line, const char *parent, uint32_t item, const char *word);
+/* Whether all of these keys (sections: with all in them) were read well, so that a check can ask them. */
+int cfg_are_sound(const struct cfg_reader *rd, uint32_t item, const char *const *paths, size_t n);
+#define CFG_SOUND(rd, item, ...)                                    \
+    cfg_are_sound((rd), (item), (const char *const[]){__VA_ARGS__}, \
+                  sizeof((const char *const[]){__VA_ARGS__}) / sizeof(const char *))
 /* text as it can stand in one line of an error: cut, without control characters. buf holds CFG_SHOW_MAX. */
 enum { CFG_SHOW_MAX = 64 };
 const char *cfg_show(const char *text, char *buf);
@@ -106,26 +130,41 @@ int cfg_store(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, i
               const char *base_dir);
 int cfg_store_vec3(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, int axis,
                    const char *text);
-/* "allowed 1 to 5 Hz": what a row takes. */
+/* "allowed 1 to 5 Hz": what a row takes. profile gives the limits that depend on it; NULL: those of all
+ * profiles. */
 enum { CFG_ALLOWED_MAX = 200 };
-const char *cfg_allowed(const struct cfg_key *key, char *buf);
+const char *cfg_allowed(const struct cfg_key *key, const struct config_profile *profile, char *buf);
 /* Directory part of a path, with its '/'; empty for a bare name. buf holds CONFIG_PATH_LEN. */
 const char *cfg_dir_of(const char *path, char *buf);
 
-/* ---- yaml.c, set.c, config.c, profile.c, crosscheck.c */
+/* ---- yaml.c, set.c, config.c, profile.c, crosscheck.c. What is wrong with values goes to the list of
+ * faults. */
+/* SH_OK, or the code of a fault that leaves nothing to check: no file, no YAML, no section. */
 int cfg_read_file(struct cfg_reader *rd);
-int cfg_apply_set(struct cfg_reader *rd, const char *set);
-/* Values for what was not given, errors for what must be. profile may be NULL. */
-int cfg_fill_defaults(struct cfg_reader *rd, const struct config_profile *profile);
+void cfg_apply_set(struct cfg_reader *rd, const char *set);
+/* Values for what was not given or is bad, errors for what must be. profile may be NULL. */
+void cfg_fill_defaults(struct cfg_reader *rd, const struct config_profile *profile);
+/* Where a file that comes with the program ("heads", "scenes/x.obj") may be, for i from 0: beside an
+ * installed program, beside one in its build folder, in config/ here. buf holds CONFIG_PATH_LEN. 0: there
+ * is no i-th place. */
+int cfg_shared_path(int i, const char *name, char *buf);
+/* The first of these places that has it; 0: none. */
+int cfg_find_shared(const char *name, char *buf);
+/* A figure of a profile that is written in 1e-6 units. */
+int64_t cfg_figure(const struct config_profile *profile, const char *path);
 /* Finds and reads the profile that head.profile names (cfg->profile_file holds the name, then the path). */
-int cfg_load_profile(struct cfg_reader *rd, struct config *cfg);
-/* Everything that concerns more than one key. */
-int cfg_check(const struct cfg_reader *rd, struct config *cfg);
+void cfg_load_profile(struct cfg_reader *rd, struct config *cfg);
+/* Everything that concerns more than one key, as far as these were read well. */
+void cfg_check(struct cfg_reader *rd, struct config *cfg);
 /* places.c: the anchor, and the forms of a station's place. */
-int cfg_check_places(const struct cfg_reader *rd, struct config *cfg);
+void cfg_check_places(struct cfg_reader *rd, struct config *cfg);
 /* measurement.c: noise, signal, surfaces, and what of a profile concerns them. */
-int cfg_check_signal(const struct cfg_reader *rd, struct config *cfg);
-int cfg_check_reaches(const struct cfg_reader *rd, struct config_profile *profile);
+void cfg_check_signal(struct cfg_reader *rd, struct config *cfg);
+void cfg_check_reaches(struct cfg_reader *rd, struct config_profile *profile);
+/* owned.c: keys that only some kinds of link have, and what a link needs. */
+void cfg_check_links(struct cfg_reader *rd, struct config *cfg);
+/* The same for keys of platforms. Returns whether all of them belong to this kind. */
+int cfg_check_platform_keys(struct cfg_reader *rd, const struct config_platform *platform);
 /* The first link of the GNSS receiver; -1: none. */
 int cfg_nmea_link(const struct config *cfg);
 

@@ -74,17 +74,33 @@ enum cfg_number cfg_parse_decimal(const char *text, int decimals, __int128 *out)
     return CFG_NUMBER_OK;
 }
 
-static void allowed_range(const struct cfg_key *key, char *buf)
+int64_t cfg_figure(const struct config_profile *profile, const char *path)
+{
+    int64_t value;
+    memcpy(&value, (const char *)profile + cfg_find(&cfg_profile_table, path)->offset, sizeof value);
+    return value;
+}
+
+/* A limit that a profile gives: its own figure, or what any profile may have. */
+static void profile_limit(const char *path, double any, const struct config_profile *profile, char *buf)
+{
+    if (path != NULL) snprintf(buf, 64, "%.15g", profile != NULL ? 1e-6 * (double)cfg_figure(profile, path) : any);
+}
+
+static void allowed_range(const struct cfg_key *key, const struct config_profile *profile, char *buf)
 {
     char low[64], high[64];
     const char *kind = key->type == CFG_COUNT ? "a whole number, " : key->type == CFG_VEC3 ? "[x, y, z], each " : "";
     snprintf(low, sizeof low, "%.10g", key->min);
     snprintf(high, sizeof high, "%.10g", key->max);
     if (key->type == CFG_COUNT && key->max >= 0x1p64) snprintf(high, sizeof high, "%" PRIu64, UINT64_MAX);
-    if (key->min_key != NULL) snprintf(low, sizeof low, "%.10g", cfg_find(&cfg_profile_table, key->min_key)->min);
-    if (key->max_key != NULL) snprintf(high, sizeof high, "%.10g", cfg_find(&cfg_profile_table, key->max_key)->max);
+    const struct cfg_key *least = key->min_key != NULL ? cfg_find(&cfg_profile_table, key->min_key) : key;
+    const struct cfg_key *most = key->max_key != NULL ? cfg_find(&cfg_profile_table, key->max_key) : key;
+    profile_limit(key->min_key, least->min, profile, low);
+    profile_limit(key->max_key, most->max, profile, high);
     snprintf(buf, CFG_ALLOWED_MAX, "allowed %s%s to %s%s%s%s", kind, low, high, key->unit != NULL ? " " : "",
-             key->unit != NULL ? key->unit : "", key->max_key != NULL ? ", within the limits of the head profile" : "");
+             key->unit != NULL ? key->unit : "",
+             key->max_key == NULL || profile != NULL ? "" : ", within the limits of the head profile");
 }
 
 static void allowed_words(const struct cfg_key *key, char *buf)
@@ -94,7 +110,7 @@ static void allowed_words(const struct cfg_key *key, char *buf)
         used += snprintf(buf + used, CFG_ALLOWED_MAX - (size_t)used, "%s%s", i > 0 ? ", " : "", key->names[i]);
 }
 
-const char *cfg_allowed(const struct cfg_key *key, char *buf)
+const char *cfg_allowed(const struct cfg_key *key, const struct config_profile *profile, char *buf)
 {
     const char *text = key->allowed;
     if (key->type == CFG_MAP) text = "a section with keys";
@@ -109,7 +125,7 @@ const char *cfg_allowed(const struct cfg_key *key, char *buf)
         snprintf(buf, CFG_ALLOWED_MAX, "allowed %s of 1 to %zu bytes%s", key->type == CFG_PATH ? "a path" : "text",
                  key->size - 1, key->flags & CFG_ASCII ? ", printable ASCII without comma, ';' and quotes" : "");
     else
-        allowed_range(key, buf);
+        allowed_range(key, profile, buf);
     return buf;
 }
 
@@ -123,9 +139,9 @@ struct place {
 /* `"TEXT" is WHAT; allowed ...` for a key's value. */
 static int refuse(const struct place *at, const char *text, const char *what)
 {
-    char name[CFG_PATH_MAX], shown[CFG_SHOW_MAX], allowed[CFG_ALLOWED_MAX];
-    return cfg_fail(at->rd, at->line, cfg_name(at->key->path, at->item, name), "\"%s\" is %s; %s",
-                    cfg_show(text, shown), what, cfg_allowed(at->key, allowed));
+    char shown[CFG_SHOW_MAX], allowed[CFG_ALLOWED_MAX];
+    return cfg_fail_value(at->rd, at->key, at->item, at->line, "\"%s\" is %s; %s", cfg_show(text, shown), what,
+                          cfg_allowed(at->key, at->rd->profile, allowed));
 }
 
 static enum cfg_number parse_hex(const char *digits, __int128 *out)

@@ -1,4 +1,5 @@
 /* YAML to the struct, by the table. libyaml's document API keeps the line of each node. */
+#include "core/infile.h"
 #include "firmware_sim/config/table.h"
 
 #include <errno.h>
@@ -47,15 +48,15 @@ static int has_tag(const yaml_node_t *node)
 
 static int wrong_kind(const struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
 {
-    char name[CFG_PATH_MAX], allowed[CFG_ALLOWED_MAX];
-    return cfg_fail(w->rd, line_of(node), cfg_name(key->path, item, name), "here stands %s; %s", kind_of(node),
-                    cfg_allowed(key, allowed));
+    char allowed[CFG_ALLOWED_MAX];
+    return cfg_fail_value(w->rd, key, item, line_of(node), "here stands %s; %s", kind_of(node),
+                          cfg_allowed(key, w->rd->profile, allowed));
 }
 
 /* A scalar that may stand for a value of this type, or an error. */
 static int check_scalar(const struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
 {
-    char name[CFG_PATH_MAX], allowed[CFG_ALLOWED_MAX], shown[CFG_SHOW_MAX];
+    char allowed[CFG_ALLOWED_MAX], shown[CFG_SHOW_MAX];
     if (node->type != YAML_SCALAR_NODE) return wrong_kind(w, key, item, node);
     int plain = node->data.scalar.style == YAML_PLAIN_SCALAR_STYLE;
     if (plain && node->data.scalar.length == 0) return wrong_kind(w, key, item, node);
@@ -65,106 +66,119 @@ static int check_scalar(const struct walk *w, const struct cfg_key *key, uint32_
     if (!is_text && !plain) why = "a text in quotes or of several lines";
     if (has_tag(node)) why = "a value with a tag, which is not supported";
     if (why == NULL) return SH_OK;
-    return cfg_fail(w->rd, line_of(node), cfg_name(key->path, item, name), "\"%s\" is %s; %s",
-                    cfg_show(text_of(node), shown), why, cfg_allowed(key, allowed));
+    return cfg_fail_value(w->rd, key, item, line_of(node), "\"%s\" is %s; %s", cfg_show(text_of(node), shown), why,
+                          cfg_allowed(key, w->rd->profile, allowed));
 }
 
-static int read_scalar(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
+static void read_scalar(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
 {
-    int code = check_scalar(w, key, item, node);
-    if (code != SH_OK) return code;
-    return cfg_store(w->rd, key, item, line_of(node), text_of(node), w->base_dir);
+    if (check_scalar(w, key, item, node) == SH_OK)
+        cfg_store(w->rd, key, item, line_of(node), text_of(node), w->base_dir);
 }
 
-static int read_vec3(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
+static void read_vec3(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
 {
-    char name[CFG_PATH_MAX], allowed[CFG_ALLOWED_MAX];
-    if (node->type != YAML_SEQUENCE_NODE) return wrong_kind(w, key, item, node);
+    char allowed[CFG_ALLOWED_MAX];
+    if (node->type != YAML_SEQUENCE_NODE) {
+        wrong_kind(w, key, item, node);
+        return;
+    }
     const yaml_node_item_t *first = node->data.sequence.items.start, *top = node->data.sequence.items.top;
-    if (top - first != 3)
-        return cfg_fail(w->rd, line_of(node), cfg_name(key->path, item, name), "has %td numbers instead of 3; %s",
-                        top - first, cfg_allowed(key, allowed));
+    if (top - first != 3) {
+        cfg_fail_value(w->rd, key, item, line_of(node), "has %td numbers instead of 3; %s", top - first,
+                       cfg_allowed(key, w->rd->profile, allowed));
+        return;
+    }
     for (int axis = 0; axis < 3; axis++) {
         const yaml_node_t *number = yaml_document_get_node(w->doc, first[axis]);
-        int code = check_scalar(w, key, item, number);
-        if (code == SH_OK) code = cfg_store_vec3(w->rd, key, item, line_of(number), axis, text_of(number));
-        if (code != SH_OK) return code;
+        if (check_scalar(w, key, item, number) == SH_OK)
+            cfg_store_vec3(w->rd, key, item, line_of(number), axis, text_of(number));
     }
-    return SH_OK;
 }
 
 /* from: data sheet|assumed */
-static int read_source(struct walk *w, const struct cfg_key *key, const yaml_node_t *node)
+static void read_source(struct walk *w, const struct cfg_key *key, const yaml_node_t *node)
 {
     static const char *const sources[] = {"data sheet", "assumed"};
     for (unsigned char i = 0; i < 2 && node->type == YAML_SCALAR_NODE; i++) {
         if (strcmp(text_of(node), sources[i]) != 0) continue;
         w->rd->from[cfg_row(w->rd, key)] = (unsigned char)(i + 1);
-        return SH_OK;
+        return;
     }
-    return cfg_fail(w->rd, line_of(node), key->path,
-                    "\"from\" must say where the figure is from; allowed data sheet, "
-                    "assumed");
+    cfg_fail_value(w->rd, key, 0, line_of(node),
+                   "\"from\" must say where the figure is from; allowed data sheet, assumed");
 }
 
-static int read_figure(struct walk *w, const struct cfg_key *key, const yaml_node_t *node)
+static void read_figure(struct walk *w, const struct cfg_key *key, const yaml_node_t *node)
 {
     static const char form[] = "allowed { value: V, from: data sheet } or { value: V, from: assumed }";
-    if (node->type != YAML_MAPPING_NODE)
-        return cfg_fail(w->rd, line_of(node), key->path, "here stands %s; %s", kind_of(node), form);
     int given[2] = {0, 0};
+    if (node->type != YAML_MAPPING_NODE) {
+        cfg_fail_value(w->rd, key, 0, line_of(node), "here stands %s; %s", kind_of(node), form);
+        return;
+    }
     for (const yaml_node_pair_t *pair = node->data.mapping.pairs.start; pair < node->data.mapping.pairs.top; pair++) {
         const yaml_node_t *word = yaml_document_get_node(w->doc, pair->key);
         const yaml_node_t *value = yaml_document_get_node(w->doc, pair->value);
         const char *text = word->type == YAML_SCALAR_NODE ? text_of(word) : "";
         int which = strcmp(text, "value") == 0 ? 0 : strcmp(text, "from") == 0 ? 1 : -1;
-        if (which < 0 || given[which]++)
-            return cfg_fail(w->rd, line_of(word), key->path, "a key that is unknown or given twice; %s", form);
-        int code = which == 0 ? read_scalar(w, key, 0, value) : read_source(w, key, value);
-        if (code != SH_OK) return code;
+        if (which < 0 || given[which]++) {
+            cfg_fail_value(w->rd, key, 0, line_of(word), "a key that is unknown or given twice; %s", form);
+            return;
+        }
+        if (which == 0)
+            read_scalar(w, key, 0, value);
+        else
+            read_source(w, key, value);
     }
     if (!given[0] || !given[1])
-        return cfg_fail(w->rd, line_of(node), key->path, "\"%s\" is missing; %s", given[0] ? "from" : "value", form);
-    return SH_OK;
+        cfg_fail_value(w->rd, key, 0, line_of(node), "\"%s\" is missing; %s", given[0] ? "from" : "value", form);
 }
 
-static int read_map(struct walk *w, const yaml_node_t *node, const char *path, uint32_t item);
+static void read_map(struct walk *w, const yaml_node_t *node, const char *path, uint32_t item);
 
-static int read_list(struct walk *w, const struct cfg_key *key, const yaml_node_t *node)
+static void read_list(struct walk *w, const struct cfg_key *key, const yaml_node_t *node)
 {
-    if (node->type != YAML_SEQUENCE_NODE) return wrong_kind(w, key, 0, node);
+    char allowed[CFG_ALLOWED_MAX];
+    if (node->type != YAML_SEQUENCE_NODE) {
+        wrong_kind(w, key, 0, node);
+        return;
+    }
     const yaml_node_item_t *first = node->data.sequence.items.start;
     ptrdiff_t n = node->data.sequence.items.top - first;
-    char allowed[CFG_ALLOWED_MAX];
-    if ((double)n > key->max)
-        return cfg_fail(w->rd, line_of(node), key->path, "%td elements are too many; %s", n, cfg_allowed(key, allowed));
+    if ((double)n > key->max) {
+        cfg_fail_value(w->rd, key, 0, line_of(node), "%td elements are too many; %s", n,
+                       cfg_allowed(key, w->rd->profile, allowed));
+        return;
+    }
     const struct cfg_key *element = key + 1;
     for (uint32_t i = 0; i < (uint32_t)n; i++) {
         const yaml_node_t *child = yaml_document_get_node(w->doc, first[i]);
-        if (child->type != YAML_MAPPING_NODE) return wrong_kind(w, element, i, child);
         *cfg_list_count(w->rd, key) = i + 1;
         w->rd->line[cfg_row(w->rd, element)][i] = line_of(child);
-        int code = read_map(w, child, element->path, i);
-        if (code != SH_OK) return code;
+        if (child->type == YAML_MAPPING_NODE)
+            read_map(w, child, element->path, i);
+        else
+            wrong_kind(w, element, i, child);
     }
-    return SH_OK;
 }
 
-static int read_value(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
+static void read_value(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
 {
-    char name[CFG_PATH_MAX];
-    if (node->type != YAML_SCALAR_NODE && has_tag(node))
-        return cfg_fail(w->rd, line_of(node), cfg_name(key->path, item, name), "has a tag; allowed none");
-    if (key->flags & CFG_FIGURE) return read_figure(w, key, node);
-    switch (key->type) {
-    case CFG_MAP:
-        return node->type == YAML_MAPPING_NODE ? read_map(w, node, key->path, item) : wrong_kind(w, key, item, node);
-    case CFG_LIST:
-        return read_list(w, key, node);
-    case CFG_VEC3:
-        return read_vec3(w, key, item, node);
-    default:
-        return read_scalar(w, key, item, node);
+    if (node->type != YAML_SCALAR_NODE && has_tag(node)) {
+        cfg_fail_value(w->rd, key, item, line_of(node), "has a tag; allowed none");
+    } else if (key->flags & CFG_FIGURE) {
+        read_figure(w, key, node);
+    } else if (key->type == CFG_MAP && node->type == YAML_MAPPING_NODE) {
+        read_map(w, node, key->path, item);
+    } else if (key->type == CFG_MAP) {
+        wrong_kind(w, key, item, node);
+    } else if (key->type == CFG_LIST) {
+        read_list(w, key, node);
+    } else if (key->type == CFG_VEC3) {
+        read_vec3(w, key, item, node);
+    } else {
+        read_scalar(w, key, item, node);
     }
 }
 
@@ -177,45 +191,52 @@ static const struct cfg_key *row_below(const struct walk *w, const char *path, c
     return len < (int)sizeof full ? cfg_find(&w->rd->table, full) : NULL;
 }
 
-static int read_map(struct walk *w, const yaml_node_t *node, const char *path, uint32_t item)
+static void read_pair(struct walk *w, const yaml_node_t *word, const yaml_node_t *value, const char *path,
+                      uint32_t item)
 {
-    for (const yaml_node_pair_t *pair = node->data.mapping.pairs.start; pair < node->data.mapping.pairs.top; pair++) {
-        const yaml_node_t *word = yaml_document_get_node(w->doc, pair->key);
-        const yaml_node_t *value = yaml_document_get_node(w->doc, pair->value);
-        int line = line_of(word);
-        if (word->type != YAML_SCALAR_NODE)
-            return cfg_fail(w->rd, line, path[0] != '\0' ? path : "configuration",
-                            "a key that is %s; allowed words only", kind_of(word));
-        const struct cfg_key *key = row_below(w, path, word);
-        if (key == NULL) return cfg_fail_unknown(w->rd, line, path, item, text_of(word));
-        int *given = &w->rd->line[cfg_row(w->rd, key)][item];
-        char name[CFG_PATH_MAX];
-        if (*given != 0)
-            return cfg_fail(w->rd, line, cfg_name(key->path, item, name), "given twice, first on line %d; allowed once",
-                            *given);
-        *given = line;
-        int code = read_value(w, key, item, value);
-        if (code != SH_OK) return code;
+    const int line = line_of(word);
+    if (word->type != YAML_SCALAR_NODE) {
+        cfg_fail(w->rd, line, path[0] != '\0' ? path : "configuration", "a key that is %s; allowed words only",
+                 kind_of(word));
+        return;
     }
-    return SH_OK;
+    const struct cfg_key *key = row_below(w, path, word);
+    if (key == NULL) {
+        cfg_fail_unknown(w->rd, line, path, item, text_of(word));
+        return;
+    }
+    int *given = &w->rd->line[cfg_row(w->rd, key)][item];
+    if (*given != 0) {
+        cfg_fail_value(w->rd, key, item, line, "given twice, first on line %d; allowed once", *given);
+        return;
+    }
+    *given = line;
+    read_value(w, key, item, value);
+}
+
+/* Every fault is told: one does not end the reading. */
+static void read_map(struct walk *w, const yaml_node_t *node, const char *path, uint32_t item)
+{
+    for (const yaml_node_pair_t *pair = node->data.mapping.pairs.start; pair < node->data.mapping.pairs.top; pair++)
+        read_pair(w, yaml_document_get_node(w->doc, pair->key), yaml_document_get_node(w->doc, pair->value), path,
+                  item);
 }
 
 /* ---- the file */
 
-static int read_bytes(const struct cfg_reader *rd, unsigned char **bytes, size_t *len)
+static int read_bytes(struct cfg_reader *rd, unsigned char **bytes, size_t *len)
 {
-    FILE *file = fopen(rd->file, "rb");
-    if (file == NULL)
-        return sh_fail(rd->err, SH_EINPUT, "%s: cannot be opened: %s; a YAML file is needed", rd->file,
-                       strerror(errno));
+    const char *why;
+    FILE *file = infile_open(rd->file, &why);
+    if (file == NULL) return cfg_fail_file(rd, SH_EINPUT, 0, "cannot be opened: %s; a YAML file is needed", why);
     *bytes = malloc(FILE_MAX + 1);
     int code = SH_OK;
-    if (*bytes == NULL) code = sh_fail(rd->err, SH_ENOMEM, "%s: no memory to read it", rd->file);
+    if (*bytes == NULL) code = cfg_fail_file(rd, SH_ENOMEM, 0, "no memory to read it");
     *len = code == SH_OK ? fread(*bytes, 1, FILE_MAX + 1, file) : 0;
     if (code == SH_OK && ferror(file))
-        code = sh_fail(rd->err, SH_EINPUT, "%s: cannot be read: %s; a YAML file is needed", rd->file, strerror(errno));
+        code = cfg_fail_file(rd, SH_EINPUT, 0, "cannot be read: %s; a YAML file is needed", strerror(errno));
     if (code == SH_OK && *len > FILE_MAX)
-        code = sh_fail(rd->err, SH_EINPUT, "%s: larger than 1 MiB; allowed up to 1048576 bytes", rd->file);
+        code = cfg_fail_file(rd, SH_EINPUT, 0, "larger than 1 MiB; allowed up to 1048576 bytes");
     fclose(file);
     return code;
 }
@@ -232,10 +253,10 @@ static int indented_by_tab(const unsigned char *bytes, size_t len, int line)
 }
 
 /* libyaml gives a mark for what it scans and parses, and a byte offset for bytes that are not UTF-8. */
-static int fail_syntax(const struct cfg_reader *rd, const yaml_parser_t *parser, const unsigned char *bytes, size_t len)
+static int fail_syntax(struct cfg_reader *rd, const yaml_parser_t *parser, const unsigned char *bytes, size_t len)
 {
     int line = (int)parser->problem_mark.line + 1;
-    if (parser->error == YAML_MEMORY_ERROR) return sh_fail(rd->err, SH_ENOMEM, "%s: no memory to parse it", rd->file);
+    if (parser->error == YAML_MEMORY_ERROR) return cfg_fail_file(rd, SH_ENOMEM, 0, "no memory to parse it");
     if (parser->error == YAML_READER_ERROR) {
         line = 1;
         for (size_t i = 0; i < parser->problem_offset && i < len; i++)
@@ -243,16 +264,16 @@ static int fail_syntax(const struct cfg_reader *rd, const yaml_parser_t *parser,
     }
     const char *hint = indented_by_tab(bytes, len, line) ? "; indent with spaces, not with tabs" : "";
     if (parser->error == YAML_READER_ERROR) hint = "; allowed UTF-8 text without control characters";
-    return sh_fail(rd->err, SH_EINPUT, "%s:%d: not YAML: %s%s%s%s", rd->file, line,
-                   parser->problem != NULL ? parser->problem : "unknown problem", parser->context != NULL ? " " : "",
-                   parser->context != NULL ? parser->context : "", hint);
+    return cfg_fail_file(rd, SH_EINPUT, line, "not YAML: %s%s%s%s",
+                         parser->problem != NULL ? parser->problem : "unknown problem",
+                         parser->context != NULL ? " " : "", parser->context != NULL ? parser->context : "", hint);
 }
 
 /* A byte order mark is skipped here: libyaml would count it as a column and find the first line indented. */
-static int start_parser(const struct cfg_reader *rd, yaml_parser_t *parser, const unsigned char *bytes, size_t len)
+static int start_parser(struct cfg_reader *rd, yaml_parser_t *parser, const unsigned char *bytes, size_t len)
 {
     size_t skip = len >= 3 && memcmp(bytes, "\xef\xbb\xbf", 3) == 0 ? 3 : 0;
-    if (!yaml_parser_initialize(parser)) return sh_fail(rd->err, SH_ENOMEM, "%s: no memory to parse it", rd->file);
+    if (!yaml_parser_initialize(parser)) return cfg_fail_file(rd, SH_ENOMEM, 0, "no memory to parse it");
     yaml_parser_set_encoding(parser, YAML_UTF8_ENCODING);
     yaml_parser_set_input_string(parser, bytes + skip, len - skip);
     return SH_OK;
@@ -260,7 +281,7 @@ static int start_parser(const struct cfg_reader *rd, yaml_parser_t *parser, cons
 
 /* libyaml's scanner takes time with the square of the depth of "[[[[", and of the number of anchors: both are
  * bounded by a first pass over the events. What else is wrong is left to the second. */
-static int check_depth(const struct cfg_reader *rd, const unsigned char *bytes, size_t len)
+static int check_depth(struct cfg_reader *rd, const unsigned char *bytes, size_t len)
 {
     yaml_parser_t parser;
     yaml_event_t event;
@@ -277,9 +298,9 @@ static int check_depth(const struct cfg_reader *rd, const unsigned char *bytes, 
                    (event.type == YAML_MAPPING_START_EVENT && event.data.mapping_start.anchor != NULL);
         yaml_event_delete(&event);
         if (depth > MAX_DEPTH)
-            code = sh_fail(rd->err, SH_EINPUT, "%s:%d: nested too deep; allowed %d levels", rd->file, line, MAX_DEPTH);
+            code = cfg_fail_file(rd, SH_EINPUT, line, "nested too deep; allowed %d levels", MAX_DEPTH);
         else if (anchors > MAX_ANCHORS)
-            code = sh_fail(rd->err, SH_EINPUT, "%s:%d: too many anchors; allowed %d", rd->file, line, MAX_ANCHORS);
+            code = cfg_fail_file(rd, SH_EINPUT, line, "too many anchors; allowed %d", MAX_ANCHORS);
     }
     yaml_parser_delete(&parser);
     return code;
@@ -289,13 +310,13 @@ static int read_document(struct cfg_reader *rd, yaml_document_t *doc)
 {
     struct walk w = {.rd = rd, .doc = doc};
     const yaml_node_t *root = yaml_document_get_root_node(doc);
-    if (root == NULL) return sh_fail(rd->err, SH_EINPUT, "%s:1: empty; a section with keys is needed", rd->file);
+    if (root == NULL) return cfg_fail_file(rd, SH_EINPUT, 1, "empty; a section with keys is needed");
     cfg_dir_of(rd->file, w.base_dir);
     rd->root_line = line_of(root);
     if (root->type != YAML_MAPPING_NODE)
-        return sh_fail(rd->err, SH_EINPUT, "%s:%d: here stands %s; allowed sections with keys", rd->file, line_of(root),
-                       kind_of(root));
-    return read_map(&w, root, "", 0);
+        return cfg_fail_file(rd, SH_EINPUT, line_of(root), "here stands %s; allowed sections with keys", kind_of(root));
+    read_map(&w, root, "", 0);
+    return SH_OK;
 }
 
 static int read_documents(struct cfg_reader *rd, yaml_parser_t *parser, const unsigned char *bytes, size_t len)
@@ -307,8 +328,7 @@ static int read_documents(struct cfg_reader *rd, yaml_parser_t *parser, const un
     if (code != SH_OK) return code;
     if (!yaml_parser_load(parser, &next)) return fail_syntax(rd, parser, bytes, len);
     const yaml_node_t *more = yaml_document_get_root_node(&next);
-    if (more != NULL)
-        code = sh_fail(rd->err, SH_EINPUT, "%s:%d: a second document; allowed one", rd->file, line_of(more));
+    if (more != NULL) code = cfg_fail_file(rd, SH_EINPUT, line_of(more), "a second document; allowed one");
     yaml_document_delete(&next);
     return code;
 }

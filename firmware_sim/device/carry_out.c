@@ -56,8 +56,7 @@ static void do_command(struct device *device, uint32_t session, const char *line
     command_execute(cmd, session, line, out);
     if (out->took_control) device_push_event(device, NATIVE_EV_CONTROL, session, 0, 0, "taken");
     if (out->error != 0)
-        device_push_event(device, NATIVE_EV_ERROR, (uint64_t)(int64_t)out->error, session, 0,
-                          command_error_text(out->error));
+        device_push_error(device, session, out->error, command_error_text(out->error));
     else if (out->changes && device->journal.out != NULL && out->effect != COMMAND_STEP)
         journal_write(device->journal.out, device->next_tick, cmd->t_ns, session, line);
     if (out->error == 0) carry_out(device, out->effect, released);
@@ -71,12 +70,17 @@ void device_command(struct device *device, uint32_t session, const char *line, u
     pthread_mutex_unlock(&device->lock);
 }
 
-void device_report(struct device *device, int number, const char *text)
+static void report(struct device *device, uint32_t session, int number, const char *text)
 {
     pthread_mutex_lock(&device->lock);
     command_queue_push(&device->cmd.queue, number, text);
-    device_push_event(device, NATIVE_EV_ERROR, (uint64_t)(int64_t)number, 0, 0, text);
+    device_push_error(device, session, number, text);
     pthread_mutex_unlock(&device->lock);
+}
+
+void device_report(struct device *device, int number, const char *text)
+{
+    report(device, 0, number, text);
 }
 
 void device_overlong(struct device *device, uint32_t session, struct command_result *out)
@@ -84,7 +88,7 @@ void device_overlong(struct device *device, uint32_t session, struct command_res
     memset(out, 0, sizeof *out);
     char text[96];
     snprintf(text, sizeof text, "session %u, longest line %d bytes", session, COMMAND_MAX_LINE);
-    device_report(device, CMD_E_OVERRUN, text);
+    report(device, session, CMD_E_OVERRUN, text);
     out->error = CMD_E_OVERRUN;
     snprintf(out->reply, sizeof out->reply, "ERR %d,\"%s; %s\"", CMD_E_OVERRUN, command_error_text(CMD_E_OVERRUN),
              text);

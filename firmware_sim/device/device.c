@@ -49,11 +49,30 @@ static int set_limits(struct device *device, struct sh_err *err)
     return SH_OK;
 }
 
+static void end_run_at(struct device *device, uint64_t tick)
+{
+    if (tick < device->end_tick) device->end_tick = tick;
+}
+
+/* A replayed journal ends the run where its own run ended. */
+static int open_replay(struct device *device, struct sh_err *err)
+{
+    struct device_journal *journal = &device->journal;
+    int rc = journal_read(device->options.replay, &journal->replay, &journal->n_replay, err);
+    if (rc != SH_OK) return rc;
+    for (size_t i = 0; i < journal->n_replay && !journal->ends; i++) {
+        if (!journal_is_end(&journal->replay[i])) continue;
+        end_run_at(device, journal->replay[i].tick);
+        journal->n_replay = i; /* what came after the end had no effect */
+        journal->ends = 1;
+    }
+    return SH_OK;
+}
+
 static int open_journals(struct device *device, struct sh_err *err)
 {
-    int rc = SH_OK;
-    if (device->options.replay != NULL)
-        rc = journal_read(device->options.replay, &device->journal.replay, &device->journal.n_replay, err);
+    int rc = journal_check_paths(device->options.journal, device->options.replay, err);
+    if (rc == SH_OK && device->options.replay != NULL) rc = open_replay(device, err);
     if (rc != SH_OK || device->options.journal == NULL) return rc;
     device->journal.out = journal_open(device->options.journal, err);
     if (device->journal.out == NULL) return err->code;
@@ -77,7 +96,9 @@ int device_create(const struct site *site, const struct device_options *options,
     device->machine.due_tick = device->end_tick = device->overrun.first = UINT64_MAX;
     if (options->duration_s > 0.0 && !options->start)
         device->end_tick = (uint64_t)ceil(options->duration_s * (double)device->tick_hz);
-    int rc = set_limits(device, err);
+    device->station_scans = calloc(site->n_stations, sizeof *device->station_scans);
+    int rc = device->station_scans != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory");
+    if (rc == SH_OK) rc = set_limits(device, err);
     if (rc == SH_OK) rc = check_live(device, err);
     if (rc == SH_OK) rc = head_clock_create(site->cfg, &device->clock, err);
     gnss_init(&device->gnss, site, &device->clock);
@@ -86,13 +107,22 @@ int device_create(const struct site *site, const struct device_options *options,
         device_free(device);
         return rc;
     }
+    device_before_scans(device);
     device_transition(device, HEAD_EV_POWER_ON, 0);
     *out = device;
     return SH_OK;
 }
 
+int device_replay_ends(const struct device *device)
+{
+    return device->journal.ends;
+}
+
 int device_close_journal(struct device *device, struct sh_err *err)
 {
+    const uint64_t tick = device->journal.end_tick;
+    if (device->journal.out != NULL && device->over) /* what went wrong, journal_close says */
+        journal_end(device->journal.out, tick, (int64_t)tick * device->tick_ns);
     int rc = journal_close(device->journal.out, err);
     device->journal.out = NULL;
     return rc;
@@ -103,20 +133,29 @@ void device_free(struct device *device)
     if (device == NULL) return;
     journal_close(device->journal.out, NULL);
     free(device->journal.replay);
+    free(device->station_scans);
     pthread_mutex_destroy(&device->lock);
     free(device);
+}
+
+static int ends_scan(const struct device_work *work)
+{
+    for (uint32_t i = 0; i < work->n_events; i++)
+        if (work->event[i].code == NATIVE_EV_SCAN_END) return 1;
+    return 0;
 }
 
 int device_claim(struct device *device, struct device_work *work)
 {
     pthread_mutex_lock(&device->lock);
     /* What is still to be said has a tick more. */
-    if (device->over && device->events.n == 0 &&
+    if (device->over && device->events.n == 0 && device->held == 0 &&
         device->overrun.ticks_said == atomic_load(&device->counters.lost_ticks)) {
         pthread_mutex_unlock(&device->lock);
         return 1;
     }
     uint64_t tick = device->next_tick;
+    int was_over = device->over;
     memset(work, 0, offsetof(struct device_work, event));
     work->describe = work->scanning = work->telemetry = work->cut_short = work->wake = 0;
     work->surfaces_n = work->n_poses = 0;
@@ -125,18 +164,22 @@ int device_claim(struct device *device, struct device_work *work)
     device_run_replay(device, tick);
     device_run_timers(device, tick);
     device_say_overrun(device, tick);
+    device_say_held(device, tick);
     device_say_pps(device, tick);
-    if (device_is_repeated(device, tick))
-        device_say_time(device, tick); /* who joins now knows it before the first point */
+    const int repeated = device_is_repeated(device, tick);
+    if (repeated) device_say_time(device, tick); /* who joins now knows it before the first point */
     device_take_events(device, work);
     work->n_events_before = work->n_events;
-    if (device->scan.on) device_claim_scan(device, tick, work);
-    if (tick % device->tick_hz == 0) {
-        work->telemetry = 1;
-        device_fill_telemetry(device, tick, &work->telemetry_frame);
-    }
+    if (device->scan.on)
+        device_claim_scan(device, tick, work);
+    else if (repeated)
+        device_describe(device, work);
+    work->telemetry = tick % device->tick_hz == 0;
+    if (work->telemetry || ends_scan(work)) device_fill_telemetry(device, tick, &work->telemetry_frame);
     work->wake = gnss_count(&device->gnss, work->t_ns) != gnss_count(&device->gnss, work->t_ns + device->tick_ns);
-    if (device->ending || tick >= device->end_tick) device->over = 1;
+    int told = device->ending || tick >= device->end_tick; /* to end; else the one scan was over in this tick */
+    if (!was_over && (told || device->over)) device->journal.end_tick = told ? tick : tick + 1;
+    device->over |= told;
     device->next_tick = tick + 1;
     pthread_mutex_unlock(&device->lock);
     return 0;
@@ -147,8 +190,9 @@ int device_is_idle(struct device *device)
     pthread_mutex_lock(&device->lock);
     int still =
         device->machine.state == HEAD_IDLE || device->machine.state == HEAD_FAULT || device->machine.state == HEAD_OFF;
-    int idle = still && device->machine.due_tick == UINT64_MAX && device->events.n == 0 && !device->ending &&
-               !device->over && device->journal.at == device->journal.n_replay && device->end_tick == UINT64_MAX;
+    int idle = still && device->machine.due_tick == UINT64_MAX && device->events.n == 0 && device->held == 0 &&
+               !device->ending && !device->over && device->journal.at == device->journal.n_replay &&
+               device->end_tick == UINT64_MAX;
     pthread_mutex_unlock(&device->lock);
     return idle;
 }
@@ -171,6 +215,15 @@ uint64_t device_scans(struct device *device)
     uint64_t scans = device->scan.number;
     pthread_mutex_unlock(&device->lock);
     return scans;
+}
+
+int64_t device_scan_ns(struct device *device)
+{
+    pthread_mutex_lock(&device->lock);
+    const struct device_scan *scan = &device->scan;
+    int64_t ticks = scan->number != 0 && !scan->on ? (int64_t)(scan->end_tick - scan->tick0) : 0;
+    pthread_mutex_unlock(&device->lock);
+    return ticks * device->tick_ns;
 }
 
 int64_t device_tick_ns(const struct device *device)

@@ -23,13 +23,15 @@
 
 enum { DEVICE_MAX_EVENTS = 24, DEVICE_MAX_POSES = 256, DEVICE_POSE_AHEAD_S = 3600 };
 
-/* Counters that casters, pacing thread and readers share. */
+/* Counters that casters, pacing thread and readers share. What the words mean, PROTOCOL.md defines (What the
+ * counts mean). Once all claimed ticks are released or lost, cast = pulses + lost_pulses. */
 struct device_counters {
-    _Atomic uint64_t pulses, fired, echoes, lines; /* released; pulses: cast ones */
-    _Atomic uint64_t lost_pulses, lost_ticks;      /* cast pulses and ticks not computed in time */
-    _Atomic uint64_t crowded, faint, unfit;        /* hits that are not echoes: struct cast_counters */
+    _Atomic uint64_t fired, cast;             /* claimed */
+    _Atomic uint64_t pulses, echoes, lines;   /* delivered, so released */
+    _Atomic uint64_t lost_pulses, lost_ticks; /* not computed in time */
+    _Atomic uint64_t crowded, faint, unfit;   /* hits that are not echoes: struct cast_counters */
     _Atomic uint64_t late_blocks, late_max_ns;
-    _Atomic uint64_t reader_lost_frames;
+    _Atomic uint64_t reader_lost_frames, reader_lost_pulses; /* left out for readers that were too slow */
     /* live: poses that were made up because none came in time, and poses that came and could not be used */
     _Atomic uint64_t late_poses, bad_poses;
 };
@@ -49,14 +51,17 @@ struct device_work {
     int scanning;
     int64_t scan_t0_ns; /* device time of the scan's start */
     struct schedule_segment segment;
+    uint32_t scan;              /* its number */
     uint64_t pulse0, pulse_end; /* pulses of this tick */
+    uint64_t n_cast, cast0;     /* of these, how many are cast, and the first of them; UINT64_MAX: none */
     int cut_short;              /* the scan stops at pulse_end, within a line */
     uint32_t station;
-    size_t stretch;   /* of a trajectory: the one of the last anchor */
-    uint32_t echoes;  /* enum beam_select */
-    uint32_t n_poses; /* live: the head's poses of this tick; 0: the head stands still or follows a trajectory */
+    uint32_t station_scan; /* which scan it is of that station's since power-up, from 1 */
+    size_t stretch;        /* of a trajectory: the one of the last anchor */
+    uint32_t echoes;       /* enum beam_select */
+    uint32_t n_poses;      /* live: the head's poses of this tick; 0: the head stands still or follows a trajectory */
     struct pose_knot pose[DEVICE_MAX_POSES];
-    int telemetry;
+    int telemetry; /* due at the tick's end; it goes before each SCAN_END, too */
     struct native_telemetry telemetry_frame;
     int wake; /* readers have something to do even without frames: the receiver has a position */
 };
@@ -68,6 +73,7 @@ struct device_options {
     int one_scan; /* end the run when the first scan is over */
     double
         duration_s; /* > 0: end the run after this time, from the first scan's start with `start`, else from power-up */
+    double scan_s;  /* > 0: end each scan after this time, to the pulse */
     const char *journal; /* NULL: none */
     const char *replay;  /* NULL: none */
 };
@@ -76,16 +82,18 @@ struct device_options {
 int device_create(const struct site *site, const struct device_options *options, struct device **out,
                   struct sh_err *err);
 void device_free(struct device *device);
-/* Closes the journal, if there is one. Returns the first error in writing it. After the loop is joined. */
+/* 1: the replayed journal ends the run. 0: it has no end, or there is none. */
+int device_replay_ends(const struct device *device);
+/* Ends and closes the journal, if there is one. Returns the first error in writing it. After the loop is joined. */
 int device_close_journal(struct device *device, struct sh_err *err);
 
 struct device_counters *device_counters(struct device *device);
 
 /* The next tick's work. Returns 0, or 1 when the run is over and there is no next tick. */
 int device_claim(struct device *device, struct device_work *work);
-/* A claimed tick was lost, and n_cast pulses to be cast with it, from first_cast on. They are counted. What
- * else the tick said is said again in a later one. */
-void device_lost(struct device *device, const struct device_work *work, uint64_t n_cast, uint64_t first_cast);
+/* A claimed tick was lost, and with it the pulses that it should have cast. They are counted. What else the
+ * tick said is said again in a later one. */
+void device_lost(struct device *device, const struct device_work *work);
 /* True while nothing happens without a command. The pace `fast` waits then. */
 int device_is_idle(struct device *device);
 /* Ends the run: a running scan is stopped first. Async-signal-unsafe. */
@@ -119,6 +127,8 @@ size_t device_gnss_sentences(struct device *device, uint64_t index, char *dst, s
 
 /* Scans begun so far. */
 uint64_t device_scans(struct device *device);
+/* How long the last scan was, in whole ticks; 0: none has ended. */
+int64_t device_scan_ns(struct device *device);
 
 int64_t device_tick_ns(const struct device *device);
 

@@ -4,6 +4,7 @@
 
 #include <pthread.h>
 
+#include "drivers/link/link.h"
 #include "firmware_sim/device/device.h"
 #include "firmware_sim/device/gnss.h"
 #include "firmware_sim/device/head_clock.h"
@@ -43,12 +44,13 @@ struct device_scan {
     uint64_t tick0;      /* its first */
     uint64_t end_tick;   /* the first one after it, when none is on */
     uint64_t pulse_next; /* next pulse to be claimed */
-    uint64_t lost0;      /* pulses lost before it */
+    uint64_t cast;       /* of the pulses before, those that are cast */
     struct schedule_segment segment;
-    uint32_t station; /* from 0 */
-    size_t stretch;   /* of a trajectory: the one of the last pulse that is claimed */
-    int describe;     /* descriptor and anchor are due, as news */
-    int anchor_lost;  /* they are due as a repetition: a new anchor was in a tick that was lost */
+    uint32_t station;      /* from 0 */
+    uint32_t station_scan; /* which of its scans */
+    size_t stretch;        /* of a trajectory: the one of the last pulse that is claimed */
+    int describe;          /* descriptor and anchor are due, as news */
+    int anchor_lost;       /* they are due as a repetition: a new anchor was in a tick that was lost */
     int stop_requested;
 };
 
@@ -57,6 +59,15 @@ struct device_events {
     struct native_event event[DEVICE_MAX_PENDING];
     uint32_t n, dropped;
 };
+
+/* Errors of a session, or of the head itself, as far as events say them. */
+struct device_errors {
+    uint64_t until_tick; /* of the second at hand */
+    uint32_t said;       /* events in it */
+    uint32_t held;       /* errors since that no event has said */
+    int last;            /* number of the last one of those */
+};
+enum { DEVICE_ERRORS_A_SECOND = 10, DEVICE_MAX_SESSIONS = (CONFIG_MAX_LINKS + 1) * LINK_MAX_SESSIONS };
 
 /* What the head could not compute in time, as far as events have said so. */
 struct device_overrun {
@@ -70,6 +81,8 @@ struct device_journal {
     struct journal *out; /* NULL: none */
     struct journal_entry *replay;
     size_t n_replay, at; /* next entry to carry out */
+    int ends;            /* the replayed one has an end */
+    uint64_t end_tick;   /* where the run at hand ended, once it is over */
 };
 
 struct device {
@@ -89,7 +102,10 @@ struct device {
     int ending, over;
     struct device_machine machine;
     struct device_scan scan;
+    uint32_t *station_scans; /* [n_stations] since power-up */
     struct device_events events;
+    struct device_errors errors[DEVICE_MAX_SESSIONS + 1]; /* of session i; 0: the head */
+    uint64_t held;                                        /* errors in all that no event has said */
     struct device_overrun overrun;
     struct device_live live;
     struct device_journal journal;
@@ -102,6 +118,11 @@ void device_push_event(struct device *device, enum native_event_code code, uint6
                        const char *text);
 /* As many events into the work as fit. */
 void device_take_events(struct device *device, struct device_work *work);
+/* An event for an error of a session, or of the head (0). Of the errors of each, DEVICE_ERRORS_A_SECOND in a second
+ * of device time have one. The others are held back. */
+void device_push_error(struct device *device, uint32_t session, int number, const char *text);
+/* An event for each session that says how many were held back in a second that is over. */
+void device_say_held(struct device *device, uint64_t tick);
 
 /* states.c */
 /* Applies a state event at a tick; does nothing where the machine refuses it. */
@@ -116,8 +137,11 @@ uint64_t device_ticks_of(const struct device *device, double s);
 void device_begin_scan(struct device *device, uint64_t tick);
 /* What the tick has of the scan that is on: descriptor, names, pulses; and the scan's end. */
 void device_claim_scan(struct device *device, uint64_t tick, struct device_work *work);
-/* Descriptor and anchor go out in this tick, for readers that join late or because they were lost. */
+/* Descriptor and anchor go out in this tick, for readers that join late or because they were lost. Between scans
+ * they are those of the last one; before the first, of scan 0 with the settings of power-up. */
 int device_is_repeated(const struct device *device, uint64_t tick);
+void device_before_scans(struct device *device);
+void device_describe(struct device *device, struct device_work *work);
 
 /* overrun.c: an event for what was lost since the last one. */
 void device_say_overrun(struct device *device, uint64_t tick);

@@ -67,16 +67,17 @@ void device_fill_anchor(const struct site *site, uint32_t station, size_t stretc
     a->heights = georef_has_geoid(georef) ? NATIVE_HEIGHTS_GEOID : NATIVE_HEIGHTS_ELLIPSOID;
 }
 
+/* Counts of what was released are filled in at release (stream.c): pulses, echoes and lines. Both counts of lost
+ * pulses have what was cast here; the release takes off what was delivered. */
 void device_fill_telemetry(const struct device *device, uint64_t tick, struct native_telemetry *t)
 {
     const struct device_counters *c = &device->counters;
     memset(t, 0, sizeof *t);
     t->state = (uint32_t)device->machine.state;
     t->scan = device->scan.number;
-    t->pulses = atomic_load(&c->pulses);
-    t->echoes = atomic_load(&c->echoes);
-    t->lines = atomic_load(&c->lines);
-    t->lost_pulses = atomic_load(&c->lost_pulses);
+    t->lost_pulses = atomic_load(&c->cast);
+    t->scan_fired = device->scan.pulse_next;
+    t->scan_cast = t->scan_lost = device->scan.cast;
     t->late_blocks = atomic_load(&c->late_blocks);
     t->late_max_us = (uint32_t)(atomic_load(&c->late_max_ns) / 1000);
     t->errors_queued = device->cmd.queue.count;

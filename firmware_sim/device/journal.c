@@ -6,10 +6,15 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "core/grow.h"
+#include "core/infile.h"
+#include "core/newfile.h"
 
 static const char title[] = "# scanhead journal 1";
+static const char end_line[] = "END"; /* no command has this name */
 
 struct journal {
     FILE *file;
@@ -35,8 +40,18 @@ struct journal *journal_open(const char *path, struct sh_err *err)
         sh_fail(err, SH_ENOMEM, "journal: no memory");
         return NULL;
     }
-    *journal = (struct journal){.path = path, .file = fopen(path, "we")};
-    if (journal->file == NULL) journal->error = errno;
+    struct sh_err why = {0};
+    int fd, rc = newfile_open(path, &fd, &why);
+    if (rc != SH_OK) {
+        sh_fail(err, rc, "journal: %s", why.text);
+        free(journal);
+        return NULL;
+    }
+    *journal = (struct journal){.path = path, .file = fdopen(fd, "w")};
+    if (journal->file == NULL) {
+        journal->error = errno;
+        close(fd);
+    }
     if (put(journal, "%s\n", title) == SH_OK) return journal;
     journal_close(journal, err);
     return NULL;
@@ -55,6 +70,16 @@ int journal_write(struct journal *journal, uint64_t tick, int64_t t_ns, uint32_t
 {
     if (t_ns < 0 || !is_command_line(line)) return SH_EINPUT;
     return put(journal, "%" PRIu64 " %" PRId64 " %" PRIu32 " %s\n", tick, t_ns, session, line);
+}
+
+int journal_end(struct journal *journal, uint64_t tick, int64_t t_ns)
+{
+    return journal_write(journal, tick, t_ns, 0, end_line);
+}
+
+int journal_is_end(const struct journal_entry *entry)
+{
+    return entry->session == 0 && strcmp(entry->line, end_line) == 0;
 }
 
 int journal_note(struct journal *journal, const char *text)
@@ -103,41 +128,59 @@ static const char *parse_entry(const char *text, struct journal_entry *entry)
     return NULL;
 }
 
+/* Longer than any line that is written, and notes of people; and more commands than fit into a day at one
+ * each 10 ms. What is beyond is no journal, and would take the memory. */
+enum { LINE_MAX_LEN = 1023, MAX_ENTRIES = 10000000 };
+
 struct reader {
     const char *path;
     FILE *file;
-    char *text;
-    size_t text_size, line_no;
+    char text[LINE_MAX_LEN + 1];
+    size_t line_no;
     struct journal_entry *entry;
     size_t n, capacity;
 };
 
+__attribute__((format(printf, 3, 4))) static int fail_line(const struct reader *reader, struct sh_err *err,
+                                                           const char *fmt, ...)
+{
+    char what[160];
+    va_list ap;
+    va_start(ap, fmt);
+    vsnprintf(what, sizeof what, fmt, ap);
+    va_end(ap);
+    return sh_fail(err, SH_EINPUT, "journal: %s:%zu: %s", reader->path, reader->line_no, what);
+}
+
 /* 1: a line without its end is in text; 0: end of file; or a failure. */
 static int read_line(struct reader *reader, struct sh_err *err)
 {
+    size_t n = 0;
+    int c;
     errno = 0;
-    const ssize_t len = getline(&reader->text, &reader->text_size, reader->file);
-    if (len < 0 && feof(reader->file)) return 0;
-    if (len < 0) return sh_fail(err, SH_EIO, "journal: %s: %s", reader->path, strerror(errno));
-    reader->line_no++;
-    if (reader->text[len - 1] != '\n')
-        return sh_fail(err, SH_EINPUT, "journal: %s:%zu: the last line is cut; end it or take it out", reader->path,
-                       reader->line_no);
-    reader->text[len - 1] = '\0';
-    if (strlen(reader->text) != (size_t)len - 1)
-        return sh_fail(err, SH_EINPUT, "journal: %s:%zu: a NUL byte", reader->path, reader->line_no);
-    return 1;
+    while ((c = getc(reader->file)) != EOF) {
+        if (n == 0) reader->line_no++;
+        if (c == '\n') {
+            reader->text[n] = '\0';
+            return 1;
+        }
+        if (c == '\0') return fail_line(reader, err, "a NUL byte; a journal is a text");
+        if (n == LINE_MAX_LEN) return fail_line(reader, err, "too long; allowed up to %d bytes a line", LINE_MAX_LEN);
+        reader->text[n++] = (char)c;
+    }
+    if (ferror(reader->file)) return sh_fail(err, SH_EIO, "journal: %s: %s", reader->path, strerror(errno));
+    return n == 0 ? 0 : fail_line(reader, err, "the last line is cut; end it or take it out");
 }
 
 static int add_entry(struct reader *reader, struct sh_err *err)
 {
+    if (reader->n == MAX_ENTRIES)
+        return fail_line(reader, err, "too many commands; allowed up to %d in a journal", MAX_ENTRIES);
     if (!grow(&reader->entry, &reader->capacity, reader->n + 1, sizeof *reader->entry))
         return sh_fail(err, SH_ENOMEM, "journal: %s: no memory", reader->path);
     const char *wrong = parse_entry(reader->text, &reader->entry[reader->n]);
-    if (wrong != NULL)
-        return sh_fail(err, SH_EINPUT, "journal: %s:%zu: %s; a line is <tick> <ns> <session> <command>", reader->path,
-                       reader->line_no, wrong);
-    reader->n++;
+    if (wrong != NULL) return fail_line(reader, err, "%s; a line is <tick> <ns> <session> <command>", wrong);
+    reader->entry[reader->n++].line_no = (uint32_t)reader->line_no;
     return SH_OK;
 }
 
@@ -153,34 +196,37 @@ static int read_all(struct reader *reader, struct sh_err *err)
     return rc;
 }
 
-/* Stable: equal ticks move past nothing. Journals are in order but for a few lines, where this is linear. */
-static void sort_by_tick(struct journal_entry *entry, size_t n)
+/* By tick; commands of one tick as they stand in the file. */
+static int compare(const void *a, const void *b)
 {
-    for (size_t i = 1; i < n; i++) {
-        size_t at = i;
-        while (at > 0 && entry[at - 1].tick > entry[i].tick)
-            at--;
-        if (at == i) continue;
-        const struct journal_entry moved = entry[i];
-        memmove(&entry[at + 1], &entry[at], (i - at) * sizeof *entry);
-        entry[at] = moved;
-    }
+    const struct journal_entry *one = a, *other = b;
+    if (one->tick != other->tick) return one->tick < other->tick ? -1 : 1;
+    return one->line_no < other->line_no ? -1 : one->line_no > other->line_no;
+}
+
+int journal_check_paths(const char *path, const char *replay, struct sh_err *err)
+{
+    struct stat out, in;
+    if (path == NULL || replay == NULL || stat(path, &out) != 0 || stat(replay, &in) != 0) return SH_OK;
+    if (out.st_dev != in.st_dev || out.st_ino != in.st_ino) return SH_OK;
+    return sh_fail(err, SH_EINPUT,
+                   "--journal %s: is the journal to replay, which it would overwrite; allowed another file", path);
 }
 
 int journal_read(const char *path, struct journal_entry **entries, size_t *n, struct sh_err *err)
 {
-    struct reader reader = {.path = path, .file = fopen(path, "re")};
+    const char *why;
+    struct reader reader = {.path = path, .file = infile_open(path, &why)};
     *entries = NULL;
     *n = 0;
-    if (reader.file == NULL) return sh_fail(err, SH_EINPUT, "journal: %s: %s", path, strerror(errno));
+    if (reader.file == NULL) return sh_fail(err, SH_EINPUT, "journal: %s: %s; a journal is a file", path, why);
     const int rc = read_all(&reader, err);
     fclose(reader.file);
-    free(reader.text);
     if (rc != SH_OK) {
         free(reader.entry);
         return rc;
     }
-    sort_by_tick(reader.entry, reader.n);
+    if (reader.n > 1) qsort(reader.entry, reader.n, sizeof *reader.entry, compare);
     *entries = reader.entry;
     *n = reader.n;
     return SH_OK;

@@ -3,7 +3,9 @@
  * In: commands as the device carries them out. Out: a text file, which can be read back. It begins with the
  * line `# scanhead journal 1`. Then there is one line per command
  *   <device tick> <device time, ns> <session> <command line>
- * with decimal numbers and one blank between them. Other lines that begin with '#' and empty lines are notes.
+ * with decimal numbers and one blank between them. The last line has the session 0 and END in place of a command:
+ * the run ended at that tick. It is missing where the head was killed. Other lines that begin with '#' and empty
+ * lines are notes.
  * Not real-time safe: each line is written and flushed at once, so that a crash loses none. */
 #ifndef FIRMWARE_SIM_DEVICE_JOURNAL_H
 #define FIRMWARE_SIM_DEVICE_JOURNAL_H
@@ -25,6 +27,9 @@ struct journal *journal_open(const char *path, struct sh_err *err);
  * reason. */
 int journal_write(struct journal *journal, uint64_t tick, int64_t t_ns, uint32_t session, const char *line);
 
+/* The run ended at this tick. Failures as in journal_write. */
+int journal_end(struct journal *journal, uint64_t tick, int64_t t_ns);
+
 /* A note, which replaying passes over: one printable line. Failures as in journal_write. */
 int journal_note(struct journal *journal, const char *text);
 
@@ -35,13 +40,20 @@ int journal_close(struct journal *journal, struct sh_err *err);
 struct journal_entry {
     uint64_t tick;
     int64_t t_ns;
-    uint32_t session;
+    uint32_t session, line_no; /* line of the file, from 1 */
     char line[COMMAND_MAX_LINE + 1];
 };
 
-/* Reads a whole file, sorted by tick; commands of one tick stay in the file's order. Errors name file:line; a
- * last line without its end is one, since its command may be cut. On failure *entries is NULL. The caller
- * frees it. */
+/* 1: no command, but the end of the run. */
+int journal_is_end(const struct journal_entry *entry);
+
+/* Fails when a journal to write is the one to replay, by whatever path or link: opening it would empty it.
+ * Either may be NULL. */
+int journal_check_paths(const char *path, const char *replay, struct sh_err *err);
+
+/* Reads a whole file, sorted by tick; commands of one tick stay in the file's order. Errors name file:line;
+ * a last line without its end is one, since its command may be cut. Lines have up to 1,023 bytes, a journal
+ * up to 10,000,000 commands. On failure *entries is NULL. The caller frees it. */
 int journal_read(const char *path, struct journal_entry **entries, size_t *n, struct sh_err *err);
 
 #endif

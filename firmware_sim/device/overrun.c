@@ -49,12 +49,14 @@ static void take_back(struct device *device, const struct device_work *work)
     device->events.n += n;
 }
 
-void device_lost(struct device *device, const struct device_work *work, uint64_t n_cast, uint64_t first_cast)
+void device_lost(struct device *device, const struct device_work *work)
 {
     pthread_mutex_lock(&device->lock);
-    atomic_fetch_add(&device->counters.lost_pulses, n_cast);
+    if (work->scanning) {
+        atomic_fetch_add(&device->counters.lost_pulses, work->n_cast);
+        if (work->cast0 < device->overrun.first) device->overrun.first = work->cast0;
+    }
     atomic_fetch_add(&device->counters.lost_ticks, 1);
-    if (first_cast < device->overrun.first) device->overrun.first = first_cast;
     take_back(device, work);
     if (work->describe && work->describe_flags == 0 && device->scan.on) device->scan.describe = 1;
     if (work->scanning && work->stretch != device->scan.stretch)

@@ -10,8 +10,8 @@ void device_begin_scan(struct device *device, uint64_t tick)
     device->scan = (struct device_scan){.on = 1,
                                         .number = device->scan.number + 1,
                                         .tick0 = tick,
-                                        .lost0 = atomic_load(&device->counters.lost_pulses),
                                         .station = device->cmd.settings.station - 1,
+                                        .station_scan = ++device->station_scans[device->cmd.settings.station - 1],
                                         .stretch = site_stretch_at(device->site, 0),
                                         .describe = 1};
     schedule_start(&device->scan.segment, &spec);
@@ -19,8 +19,10 @@ void device_begin_scan(struct device *device, uint64_t tick)
     device->live.next = 0;
     device_push_event(device, NATIVE_EV_SCAN_START, device->scan.number, tick * (uint64_t)device->tick_ns,
                       (uint64_t)device_gps_ns(device, (int64_t)tick * device->tick_ns), "");
-    if (device->options.start && device->options.duration_s > 0.0 && device->scan.number == 1)
-        device->end_tick = tick + device_ticks_of(device, device->options.duration_s);
+    if (device->options.start && device->options.duration_s > 0.0 && device->scan.number == 1) {
+        uint64_t end_tick = tick + device_ticks_of(device, device->options.duration_s);
+        if (end_tick < device->end_tick) device->end_tick = end_tick; /* a journal may end it earlier */
+    }
 }
 
 uint32_t device_tick_pulses(const struct config *cfg)
@@ -46,6 +48,38 @@ static uint64_t tick_room_end(const struct device *device)
     return line.pulse_end < end ? line.pulse_end : schedule_cut(seg, end);
 }
 
+/* Counts the pulses that the tick has: in the work, in the scan and in all. */
+static void count_pulses(struct device *device, struct device_work *work)
+{
+    const struct schedule_segment *seg = &work->segment;
+    work->scan = device->scan.number;
+    work->n_cast = 0;
+    work->cast0 = UINT64_MAX;
+    for (uint64_t k = work->pulse0; k < work->pulse_end;) {
+        struct schedule_line line;
+        schedule_get_line(seg, schedule_line_of(seg, k), &line);
+        uint64_t end = line.pulse_end < work->pulse_end ? line.pulse_end : work->pulse_end;
+        uint64_t first = k > line.cast0 ? k : line.cast0, cast_end = end < line.cast_end ? end : line.cast_end;
+        if (first < cast_end) {
+            work->n_cast += cast_end - first;
+            if (work->cast0 == UINT64_MAX) work->cast0 = first;
+        }
+        k = end;
+    }
+    device->scan.cast += work->n_cast;
+    atomic_fetch_add(&device->counters.fired, work->pulse_end - work->pulse0);
+    atomic_fetch_add(&device->counters.cast, work->n_cast);
+}
+
+/* When the scan ends by itself, whatever its frames: after its time, or where its path ends. Since its start. */
+static int64_t scan_end_ns(const struct device *device)
+{
+    int64_t path_end_ns = device_path_end_ns(device);
+    if (!(device->options.scan_s > 0.0)) return path_end_ns;
+    int64_t end_ns = llround(1e9 * device->options.scan_s);
+    return end_ns < path_end_ns ? end_ns : path_end_ns;
+}
+
 /* Pulses of this tick; ends the scan when it is complete or was told to stop. Returns 1 when the scan is
  * over. */
 static int claim_pulses(struct device *device, uint64_t tick, struct device_work *work)
@@ -57,49 +91,64 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
     work->scan_t0_ns = (int64_t)device->scan.tick0 * device->tick_ns;
     work->segment = *seg;
     work->station = device->scan.station;
+    work->station_scan = device->scan.station_scan;
     work->stretch = device->scan.stretch;
     work->echoes = device->cmd.settings.echoes;
     work->pulse0 = device->scan.pulse_next;
     /* A stop keeps what was fired before this tick began; else the cut leaves whole packets for the next
      * tick. */
-    int64_t path_end_ns = device_path_end_ns(device), until_ns = stop ? since : since + device->tick_ns;
-    int arrives = path_end_ns <= until_ns; /* at the end of a trajectory */
-    uint64_t due = schedule_pulse_at(seg, arrives ? path_end_ns : until_ns);
+    int64_t end_ns = scan_end_ns(device), until_ns = stop ? since : since + device->tick_ns;
+    int ends = end_ns <= until_ns; /* within this tick */
+    uint64_t due = schedule_pulse_at(seg, ends ? end_ns : until_ns);
     uint64_t room_end = tick_room_end(device);
     if (due > room_end) {
         due = room_end;
-        arrives = 0;
+        ends = 0;
     }
-    uint64_t end = stop || arrives ? due : schedule_cut(seg, due);
+    uint64_t end = stop || ends ? due : schedule_cut(seg, due);
     int done = due >= seg->end_pulse && !stop;
     if (done || end > seg->end_pulse) end = seg->end_pulse;
     if (end < work->pulse0) end = work->pulse0;
     work->pulse_end = device->scan.pulse_next = end;
+    count_pulses(device, work);
     if (end > work->pulse0) device->scan.stretch = site_stretch_at(device->site, schedule_time_ns(seg, end - 1));
-    work->cut_short = (stop || arrives) && end < seg->end_pulse;
+    work->cut_short = (stop || ends) && end < seg->end_pulse;
     device_take_poses(device, work);
     struct schedule_line line;
     schedule_get_line(seg, schedule_line_of(seg, end), &line);
     device->cmd.frames_done = end >= seg->end_pulse && seg->spec.frames != 0 ? seg->spec.frames : line.frame;
-    return done || stop || arrives;
+    return done || stop || ends;
 }
 
 int device_is_repeated(const struct device *device, uint64_t tick)
 {
     uint64_t since = tick - device->scan.tick0;
-    return device->scan.on && ((since != 0 && since % device->tick_hz == 0) || device->scan.anchor_lost);
+    if (!device->scan.on) return device->machine.state >= HEAD_IDLE && tick % device->tick_hz == 0;
+    return (since != 0 && since % device->tick_hz == 0) || device->scan.anchor_lost;
+}
+
+void device_before_scans(struct device *device)
+{
+    struct schedule_spec spec;
+    config_fill_spec(&device->site->cfg->profile, &device->cmd.settings, &spec);
+    schedule_start(&device->scan.segment, &spec);
+    device->scan.station = device->cmd.settings.station - 1;
+    device->scan.stretch = site_stretch_at(device->site, 0);
+}
+
+void device_describe(struct device *device, struct device_work *work)
+{
+    work->describe = 1;
+    work->describe_flags = device->scan.describe ? 0 : NATIVE_REPEAT;
+    device_fill_descriptor(device, &work->descriptor);
+    device_fill_anchor(device->site, device->scan.station, device->scan.stretch, &work->anchor);
+    device->scan.describe = device->scan.anchor_lost = 0;
 }
 
 static void describe(struct device *device, uint64_t tick, struct device_work *work)
 {
     uint64_t since = tick - device->scan.tick0;
-    if (device->scan.describe || device_is_repeated(device, tick)) {
-        work->describe = 1;
-        work->describe_flags = device->scan.describe ? 0 : NATIVE_REPEAT;
-        device_fill_descriptor(device, &work->descriptor);
-        device_fill_anchor(device->site, device->scan.station, device->scan.stretch, &work->anchor);
-        device->scan.describe = device->scan.anchor_lost = 0;
-    }
+    if (device->scan.describe || device_is_repeated(device, tick)) device_describe(device, work);
     /* All names at the scan's start, then round and round for those who join late. */
     uint32_t n = device->site->n_surfaces;
     uint64_t chunks = (n + DEVICE_SURFACES_A_FRAME - 1) / DEVICE_SURFACES_A_FRAME;
@@ -112,14 +161,15 @@ static void describe(struct device *device, uint64_t tick, struct device_work *w
     }
 }
 
+/* Ticks before this one may yet be lost. So the event has the pulses that were cast, and its release takes
+ * off those that were delivered (stream.c). */
 static void end_scan(struct device *device, uint64_t tick)
 {
-    uint64_t lost = atomic_load(&device->counters.lost_pulses) - device->scan.lost0;
     int stopped = device->scan.stop_requested;
     device->scan.on = 0;
     device->scan.end_tick = tick;
     device->scan.stop_requested = 0;
-    device_push_event(device, NATIVE_EV_SCAN_END, device->scan.number, device->scan.pulse_next, lost, "");
+    device_push_event(device, NATIVE_EV_SCAN_END, device->scan.number, device->scan.pulse_next, device->scan.cast, "");
     device_transition(device, stopped ? HEAD_EV_STOP : HEAD_EV_DONE, tick);
     if (device->options.one_scan) device->over = 1;
 }

@@ -91,10 +91,7 @@ static void *caster_main(void *arg)
                 continue;
             continue;
         }
-        if (!compute(caster, &work, slot)) {
-            uint64_t first, n_cast = worker_count_cast(&work, &first);
-            device_lost(loop->device, &work, n_cast, first);
-        }
+        if (!compute(caster, &work, slot)) device_lost(loop->device, &work);
         atomic_fetch_sub(&loop->casters.n_computing, 1);
         if (stream->waits) sem_post(&stream->ready);
     }

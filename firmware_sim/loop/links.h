@@ -17,6 +17,14 @@ struct link_place {
     int nmea;       /* speaks for the GNSS receiver, not for the head */
 };
 
+/* What the readers of a link got, and what was left out for them. PROTOCOL.md defines the words (What the counts
+ * mean). */
+struct link_counts {
+    uint64_t received_pulses; /* in frames that were written out to the link as a whole */
+    uint64_t left_out_pulses;
+    uint64_t left_out_frames; /* of the head, or sentences of its GNSS receiver */
+};
+
 struct links {
     /* set by the caller */
     struct stream *stream;

@@ -93,6 +93,24 @@ void loop_put_endpoints(const struct loop *loop, struct json *json)
     json_close_object(json);
 }
 
+void loop_put_links(const struct loop *loop, struct json *json)
+{
+    json_open_array(json, "links");
+    for (uint32_t i = 0; i < loop->links.n; i++) {
+        struct link_place place;
+        struct link_counts counts;
+        pump_get_place(loop->links.pump[i], &place);
+        pump_get_counts(loop->links.pump[i], &counts);
+        json_open_object(json, NULL);
+        json_string(json, "endpoint", place.endpoint);
+        json_uint(json, "received_pulses", counts.received_pulses);
+        json_uint(json, "left_out_pulses", counts.left_out_pulses);
+        json_uint(json, "left_out_frames", counts.left_out_frames);
+        json_close_object(json);
+    }
+    json_close_array(json);
+}
+
 /* What there is, so that nothing the pacing thread touches is paged out or in. Before the threads, whose
  * stacks would be locked whole. */
 static void lock_memory(const struct loop *loop)

@@ -42,6 +42,8 @@ int loop_create(const struct site *site, struct device *device, const struct loo
 
 /* {"endpoints": [...]}: type and endpoint of each link, and of the socket for poses. */
 void loop_put_endpoints(const struct loop *loop, struct json *json);
+/* After loop_join: an array of the links, each with its endpoint and what its readers got and lost. */
+void loop_put_links(const struct loop *loop, struct json *json);
 /* Link i; after the links the socket for poses. 0: there is no such link. */
 int loop_get_place(const struct loop *loop, uint32_t i, struct link_place *place);
 

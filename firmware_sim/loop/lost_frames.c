@@ -6,10 +6,18 @@
 #include "drivers/protocol/native_encode.h"
 #include "firmware_sim/loop/pump_inside.h"
 
-void session_count_lost(struct pump *pump, struct session *s, uint32_t n)
+static void count_lost(struct pump *pump, uint32_t n, uint64_t pulses)
+{
+    pump->counts.left_out_frames += n;
+    pump->counts.left_out_pulses += pulses;
+    atomic_fetch_add(&pump->stream->counters->reader_lost_frames, n);
+    atomic_fetch_add(&pump->stream->counters->reader_lost_pulses, pulses);
+}
+
+void session_count_lost(struct pump *pump, struct session *s, uint32_t n, uint64_t pulses)
 {
     s->lost.frames += n;
-    atomic_fetch_add(&pump->stream->counters->reader_lost_frames, n);
+    count_lost(pump, n, pulses);
     if (!s->lost.lagging) {
         char text[96];
         snprintf(text, sizeof text, "session %u, %.50s", s->id, s->peer);
@@ -19,9 +27,9 @@ void session_count_lost(struct pump *pump, struct session *s, uint32_t n)
 }
 
 /* Announces it to the reader in a frame of its own. */
-static void announce(struct pump *pump, struct session *s, uint32_t frames)
+static void announce(struct pump *pump, struct session *s, uint32_t frames, uint64_t pulses)
 {
-    struct native_event event = {.code = NATIVE_EV_READER_LOST, .a = frames, .c = s->lost.frames};
+    struct native_event event = {.code = NATIVE_EV_READER_LOST, .a = frames, .b = pulses, .c = s->lost.frames};
     int64_t now_ns = (int64_t)stream_released(pump->stream) * pump->stream->tick_ns;
     snprintf(event.text, sizeof event.text, "%u frames lost: the reader is too slow", frames);
     s->out_len +=
@@ -33,21 +41,63 @@ void session_check_lost(struct pump *pump, struct session *s, const struct ring_
     /* An empty tick has a number, too: the last frames for a long time may have been lost. */
     if (s->lost.have_seq && tick->first_seq != s->lost.next_seq) {
         uint32_t frames = tick->first_seq - s->lost.next_seq;
-        session_count_lost(pump, s, frames);
-        announce(pump, s, frames);
+        uint64_t pulses = tick->pulses_before - s->lost.next_pulse;
+        session_count_lost(pump, s, frames, pulses);
+        announce(pump, s, frames, pulses);
     } else if (released - s->cursor < pump->stream->ring.queue_ticks / 8) {
         s->lost.lagging = 0;
     }
     s->lost.have_seq |= tick->n_frames != 0;
     s->lost.next_seq = tick->first_seq + tick->n_frames;
+    s->lost.next_pulse = tick->pulses_before + tick->n_cast;
+    pump->counts.received_pulses += tick->n_cast;
+}
+
+/* Frames of the stream, and pulses in them, that lie in the session's buffer and were not written as a whole.
+ * Reply lines lie between frames, and have no byte that begins one. */
+static uint32_t count_unwritten(const struct session *s, uint64_t *pulses)
+{
+    uint32_t frames = 0;
+    *pulses = 0;
+    for (uint32_t at = 0; at < s->out_len;) {
+        const uint8_t *frame = s->out + at;
+        struct native_header header;
+        struct native_points points;
+        if (frame[0] != NATIVE_SYNC) {
+            at++;
+            continue;
+        }
+        native_read_header(frame, &header);
+        at += (uint32_t)native_frame_len(frame);
+        if (at <= s->out_pos || (header.flags & NATIVE_LOCAL) != 0) continue;
+        frames++;
+        if (header.type == NATIVE_POINTS &&
+            native_decode_points(frame + NATIVE_HEADER_LEN, header.length, &points) == SH_OK)
+            *pulses += points.n_pulses;
+    }
+    return frames;
+}
+
+void session_gone(struct pump *pump, struct session *s)
+{
+    uint64_t pulses;
+    if (pump->nmea) return;
+    count_unwritten(s, &pulses);
+    pump->counts.received_pulses -= pulses;
 }
 
 void session_leave(struct pump *pump, struct session *s)
 {
     struct stream *stream = pump->stream;
-    uint32_t missing = s->lost.have_seq ? stream->seq - s->lost.next_seq : 0; /* the pacing thread is done with seq */
-    if (pump->nmea) missing = pump_nmea_backlog(pump, s);
-    if (s->out_pos < s->out_len) missing++; /* at least the frame it was in the middle of */
-    if (atomic_load(&stream->over)) atomic_fetch_add(&stream->counters->reader_lost_frames, missing);
+    uint64_t pulses = 0, unwritten = 0;
+    uint32_t frames = 0;
+    if (pump->nmea) {
+        frames = pump_nmea_backlog(pump, s) + (s->out_pos < s->out_len); /* at least the one it is in the middle of */
+    } else if (s->lost.have_seq) {                                       /* the pacing thread is done with seq */
+        frames = count_unwritten(s, &unwritten) + stream->seq - s->lost.next_seq;
+        pulses = unwritten + atomic_load(&stream->counters->pulses) - s->lost.next_pulse;
+    }
+    pump->counts.received_pulses -= unwritten;
+    if (atomic_load(&stream->over)) count_lost(pump, frames, pulses);
     stream_set_reader(stream, s->reader, s->cursor, 0);
 }

@@ -40,14 +40,15 @@ static void note_late(struct loop *loop, int64_t late_ns)
     if (ns > atomic_load(&counters->late_max_ns)) atomic_store(&counters->late_max_ns, ns);
 }
 
-/* A tick that is not ready late_ms after its time is given up. What the pacing thread itself overslept is
+/* A tick that is not ready late_ms after its time is given up, even one that will never be: when casters come
+ * late to find that the run is over, the pacing thread may be beyond its end. What the pacing thread itself overslept is
  * added to late_ms (credit) until it has caught up. */
 static void pace_realtime(struct loop *loop)
 {
     struct stream *stream = &loop->stream;
     const int64_t tick_ns = stream->tick_ns, late_ns = (int64_t)(loop->cfg->loop.late_ms * 1e6);
     int64_t epoch_ns = loop->pacer.epoch_ns, credit_ns = 0;
-    for (uint64_t tick = 0; !atomic_load(&loop->stopping) && tick != atomic_load(&loop->final_tick);) {
+    for (uint64_t tick = 0; !atomic_load(&loop->stopping) && tick < atomic_load(&loop->final_tick);) {
         int64_t due_ns = epoch_ns + (int64_t)(tick + 1) * tick_ns;
         int64_t now_ns = clock_now_ns();
         /* Not ready in time: look again on the next beat of the clock. */
@@ -71,7 +72,7 @@ static void pace_realtime(struct loop *loop)
 static void pace_waiting(struct loop *loop)
 {
     struct stream *stream = &loop->stream;
-    for (uint64_t tick = 0; !atomic_load(&loop->stopping) && tick != atomic_load(&loop->final_tick);) {
+    for (uint64_t tick = 0; !atomic_load(&loop->stopping) && tick < atomic_load(&loop->final_tick);) {
         struct ring_slot *slot = ring_peek(&stream->ring, tick);
         if (slot == NULL)
             sem_wait(&stream->ready);

@@ -55,6 +55,11 @@ void pump_get_place(const struct pump *pump, struct link_place *place)
     pump->ops->endpoint(pump->link, place->endpoint, sizeof place->endpoint);
 }
 
+void pump_get_counts(const struct pump *pump, struct link_counts *counts)
+{
+    *counts = pump->counts;
+}
+
 /* The first link that could not write what it had to makes the run a failure. */
 static void fail_link(struct pump *pump, const char *why)
 {
@@ -131,16 +136,18 @@ static void *pump_main(void *arg)
 {
     struct pump *pump = arg;
     uint32_t want_write = 0;
+    int rested = 0;
     for (;;) {
         int over = atomic_load(&pump->stream->over);
         if (over && !has_more(pump)) break;
-        if (take_events(pump, want_write, over ? 50 : -1) < 0) {
+        if (take_events(pump, want_write, rested ? 0 : over ? 50 : -1) < 0) {
             sh_warn(pump->links->report, "link %s: poll failed; the link is given up", pump->ops->name);
             break;
         }
         want_write = 0;
         for (int i = 0; i < LINK_MAX_SESSIONS; i++)
             if (pump->session[i].open && session_write(pump, &pump->session[i], i)) want_write |= 1U << i;
+        rested = pump_rest(pump);
     }
     for (int i = 0; i < LINK_MAX_SESSIONS; i++)
         if (pump->session[i].open) session_leave(pump, &pump->session[i]);

@@ -1,6 +1,7 @@
 /* Commands of a session: lines in, replies out. */
 #include <string.h>
 
+#include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/pump_inside.h"
 
 void pump_add_reply(struct session *s, const char *text)
@@ -36,11 +37,11 @@ static void do_line(struct pump *pump, struct session *s, enum command_line_kind
         device_overlong(device, s->id, &result);
     else
         device_command(device, s->id, s->commands.lines.buf, stream_released(pump->stream), &result);
+    s->commands.wrong += result.error != 0;
     if (result.effect == COMMAND_STEP)
         start_step(pump, s, &result);
     else
         pump_add_reply(s, result.reply);
-    stream_poke(pump->stream);
 }
 
 static int has_reply_room(const struct session_commands *c)
@@ -51,10 +52,26 @@ static int has_reply_room(const struct session_commands *c)
 void pump_take_lines(struct pump *pump, struct session *s)
 {
     struct session_commands *c = &s->commands;
-    while (c->in_pos < c->in_len && !c->stepping && has_reply_room(c)) {
+    int done = 0;
+    while (c->in_pos < c->in_len && !c->stepping && c->wrong < WRONG_AT_ONCE && has_reply_room(c)) {
         enum command_line_kind kind = command_lines_feed(&c->lines, c->in[c->in_pos++]);
-        if (kind != COMMAND_LINE_NONE) do_line(pump, s, kind);
+        if (kind == COMMAND_LINE_NONE) continue;
+        do_line(pump, s, kind);
+        done = 1;
     }
+    if (done && pump->stream->waits) stream_poke(pump->stream); /* in real time nothing waits for a command */
+}
+
+int pump_rest(struct pump *pump)
+{
+    int rests = 0;
+    for (int i = 0; i < LINK_MAX_SESSIONS; i++) {
+        struct session_commands *c = &pump->session[i].commands;
+        rests |= pump->session[i].open && c->wrong >= WRONG_AT_ONCE;
+        if (c->wrong >= WRONG_AT_ONCE) c->wrong = 0;
+    }
+    if (rests) clock_sleep_until_ns(clock_now_ns() + REST_NS);
+    return rests;
 }
 
 void pump_read_commands(struct pump *pump, struct session *s, int index)

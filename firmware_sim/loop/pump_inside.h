@@ -10,6 +10,8 @@ enum {
     REPLY_ROOM = 8192,
     BATCH_BYTES = 131072, /* small ticks are written together up to this */
     READ_BYTES = 65536,
+    WRONG_AT_ONCE = 128, /* wrong lines of a session, and then a rest of so long for its link: */
+    REST_NS = 2000000,
 };
 
 /* Command lines of a client, and the replies to them. */
@@ -20,7 +22,8 @@ struct session_commands {
     char reply[REPLY_ROOM];
     uint32_t reply_len;
     int replies_dropped;
-    int stepping; /* the reply to TIME:STEP waits until all before step_tick has gone out */
+    uint32_t wrong; /* lines since the last rest */
+    int stepping;   /* the reply to TIME:STEP waits until all before step_tick has gone out */
     uint64_t step_tick;
     char step_reply[COMMAND_MAX_REPLY];
 };
@@ -31,8 +34,9 @@ struct session {
     int reader;      /* of the stream */
     uint64_t cursor; /* next tick to take */
     struct {
-        int have_seq; /* next_seq is known */
+        int have_seq; /* next_seq is known, and so is: */
         uint32_t next_seq;
+        uint64_t next_pulse; /* pulses delivered before the frame of that number */
         uint64_t frames;
         int lagging; /* the error queue has heard of it */
     } lost;          /* lost_frames.c */
@@ -44,6 +48,7 @@ struct session {
 };
 
 struct pump {
+    struct link_counts counts; /* of all its sessions so far */
     struct links *links;
     struct stream *stream;
     const struct link_ops *ops;
@@ -63,12 +68,14 @@ void session_close(struct pump *pump, struct session *s);
 /* Writes until the link is full (1) or there is nothing left (0). index: of the session on its link. */
 int session_write(struct pump *pump, struct session *s, int index);
 
-/* lost_frames.c: the one place that counts what a reader lost. */
+/* lost_frames.c: the one place that counts what a reader got and what it lost. */
 /* Compares the number of a tick's first frame with the one expected, and counts and announces a gap.
  * `released`: ticks released when the tick was read. */
 void session_check_lost(struct pump *pump, struct session *s, const struct ring_copy *tick, uint64_t released);
-/* Counts n frames or sentences. The error queue gets an entry once per episode. */
-void session_count_lost(struct pump *pump, struct session *s, uint32_t n);
+/* Counts n frames or sentences, and the pulses in them. The error queue gets an entry once per episode. */
+void session_count_lost(struct pump *pump, struct session *s, uint32_t n, uint64_t pulses);
+/* The client went away: what was not written to it it did not get, nor did it lose it. */
+void session_gone(struct pump *pump, struct session *s);
 /* At the end of the run: what the reader did not get is lost. */
 void session_leave(struct pump *pump, struct session *s);
 
@@ -79,6 +86,9 @@ void pump_add_reply(struct session *s, const char *text);
  * while a step goes on, and while there is no room for their replies. Replies are lost only to a client that
  * sends on and on without reading. */
 void pump_take_lines(struct pump *pump, struct session *s);
+/* A client that is wrong as fast as it can be would cost a processor. So a link rests when one of its sessions had
+ * WRONG_AT_ONCE wrong lines. 1: it did, and more lines may wait. */
+int pump_rest(struct pump *pump);
 /* Reads what the client sent, and takes its lines. */
 void pump_read_commands(struct pump *pump, struct session *s, int index);
 

@@ -32,7 +32,7 @@ static void lose_old(struct pump *pump, struct session *s, uint64_t released)
     uint64_t queue_ticks = pump->stream->ring.queue_ticks;
     if (pump->stream->waits || next_tick(pump, s) + queue_ticks >= released) return;
     uint64_t to = released - queue_ticks / 2;
-    session_count_lost(pump, s, sentences_between(pump, s->cursor, to));
+    session_count_lost(pump, s, sentences_between(pump, s->cursor, to), 0);
     s->cursor = to;
 }
 

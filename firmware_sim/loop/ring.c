@@ -145,6 +145,8 @@ enum ring_read ring_read(struct ring *ring, int reader, uint64_t tick, struct ri
         copy->len = slot->tick.len;
         copy->n_frames = slot->n_frames;
         copy->first_seq = slot->first_seq;
+        copy->n_cast = slot->tick.n_cast;
+        copy->pulses_before = slot->pulses_before;
         if (copy->len != 0 && copy->len <= copy->cap) memcpy(copy->buf, slot->tick.bytes, copy->len);
         result = RING_READ;
     }

@@ -51,6 +51,7 @@ struct ring_tick {
     int broken; /* the frames could not be kept: the line they were of has a gap */
     uint32_t n_marks;
     struct ring_mark *mark;
+    uint32_t scan; /* number of the scan that its pulses are of */
     uint64_t n_fired, n_cast, n_lines;
     struct ring_hits hits; /* of the whole tick */
     struct ring_hits tail; /* after the last mark */
@@ -60,7 +61,8 @@ struct ring_slot {
     _Atomic uint64_t state;       /* tick << 2 | phase */
     _Atomic int busy;             /* a caster has it, even if its tick is lost already */
     struct ring_tick tick;        /* its arrays lie in store */
-    uint32_t n_frames, first_seq; /* set at release */
+    uint32_t n_frames, first_seq; /* set at release; so is: */
+    uint64_t pulses_before;       /* delivered before this tick, since power-up */
     uint8_t *store;
     size_t room; /* of store, in bytes */
 };
@@ -104,6 +106,7 @@ struct ring_copy {
     uint8_t *buf;
     uint32_t cap;                      /* of buf; the reader sets both */
     uint32_t len, n_frames, first_seq; /* first_seq: the first frame's number; without frames that of the next one */
+    uint64_t n_cast, pulses_before;    /* pulses that the frames have, and that were delivered before */
 };
 enum ring_read { RING_READ, RING_NONE, RING_LOST };
 /* Copies the frames of `tick`. RING_NONE: it is not released yet. RING_LOST: it is too old, or the head

@@ -23,6 +23,7 @@ void session_open(struct pump *pump, struct session *s, const char *peer)
     struct session_commands *c = &s->commands;
     c->reply_len = c->in_len = c->in_pos = 0;
     c->stepping = c->replies_dropped = 0;
+    c->wrong = 0;
     memset(&c->lines, 0, sizeof c->lines);
     s->moved_ns = clock_now_ns();
     snprintf(s->peer, sizeof s->peer, "%.63s", peer); /* an address: shorter */
@@ -33,6 +34,7 @@ void session_close(struct pump *pump, struct session *s)
 {
     if (!s->open) return;
     s->open = 0;
+    session_gone(pump, s);
     stream_set_reader(pump->stream, s->reader, s->cursor, 0);
     if (pump->nmea) return; /* it had nothing to say */
     const struct command_lines *lines = &s->commands.lines;

@@ -51,11 +51,49 @@ static void finish_lines(struct stream *stream, struct ring_tick *tick)
     ring_hits_add(&stream->line, &tick->tail);
 }
 
+static struct stream_scan *scan_of(struct stream *stream, uint64_t number)
+{
+    struct stream_scan *scan = &stream->scan[number % STREAM_SCANS];
+    if (scan->number < number) *scan = (struct stream_scan){.number = (uint32_t)number};
+    return scan;
+}
+
+static void complete_telemetry(struct stream *stream, uint8_t *frame, const struct native_header *header)
+{
+    const struct device_counters *c = stream->counters;
+    struct native_telemetry t;
+    if (native_decode_telemetry(frame + NATIVE_HEADER_LEN, header->length, &t) != SH_OK) return;
+    t.pulses = atomic_load(&c->pulses);
+    t.echoes = atomic_load(&c->echoes);
+    t.lines = atomic_load(&c->lines);
+    t.lost_pulses -= t.pulses;
+    t.scan_lost -= scan_of(stream, t.scan)->delivered;
+    native_encode_telemetry(frame, native_frame_len(frame), &t, header->t_ns, header->flags);
+}
+
+static void complete_event(struct stream *stream, uint8_t *frame, const struct native_header *header)
+{
+    struct native_event event;
+    if (native_decode_event(frame + NATIVE_HEADER_LEN, header->length, &event) != SH_OK) return;
+    if (event.code != NATIVE_EV_SCAN_END) return;
+    event.c -= scan_of(stream, event.a)->delivered;
+    native_encode_event(frame, native_frame_len(frame), &event, header->t_ns, header->flags);
+}
+
+/* Lost is what was cast and not delivered. It is known here: all ticks before were released or lost. */
+static void complete_counts(struct stream *stream, uint8_t *frame)
+{
+    struct native_header header;
+    native_read_header(frame, &header);
+    if (header.type == NATIVE_TELEMETRY) complete_telemetry(stream, frame, &header);
+    if (header.type == NATIVE_EVENT) complete_event(stream, frame, &header);
+}
+
 static void count(struct stream *stream, const struct ring_tick *tick, int64_t now_ns)
 {
     struct device_counters *c = stream->counters;
     atomic_fetch_add(&c->pulses, tick->n_cast);
-    atomic_fetch_add(&c->fired, tick->n_fired);
+    if (tick->n_cast != 0) scan_of(stream, tick->scan)->delivered += tick->n_cast;
     atomic_fetch_add(&c->echoes, tick->hits.echoes);
     atomic_fetch_add(&c->crowded, tick->hits.crowded);
     atomic_fetch_add(&c->faint, tick->hits.faint);
@@ -71,10 +109,13 @@ void stream_release(struct stream *stream, struct ring_slot *slot, uint64_t tick
     struct ring_tick *made = &slot->tick;
     finish_lines(stream, made);
     slot->first_seq = stream->seq;
-    for (uint32_t at = 0; at < made->len;)
-        at += (uint32_t)native_seal(made->bytes + at, stream->seq++);
-    slot->n_frames = stream->seq - slot->first_seq;
+    slot->pulses_before = atomic_load(&stream->counters->pulses);
     count(stream, made, now_ns);
+    for (uint32_t at = 0; at < made->len;) {
+        complete_counts(stream, made->bytes + at);
+        at += (uint32_t)native_seal(made->bytes + at, stream->seq++);
+    }
+    slot->n_frames = stream->seq - slot->first_seq;
     /* Where the pacing thread waits for readers, they must see empty ticks pass, too. */
     int wake = made->len != 0 || made->wake || stream->waits;
     ring_release(&stream->ring, tick);

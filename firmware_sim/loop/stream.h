@@ -20,7 +20,8 @@
 enum {
     STREAM_MAX_LINKS = CONFIG_MAX_LINKS + 1,
     STREAM_HASH_READER = STREAM_MAX_LINKS * LINK_MAX_SESSIONS, /* below it: sessions */
-    STREAM_MAX_LISTENERS = STREAM_MAX_LINKS + 1
+    STREAM_MAX_LISTENERS = STREAM_MAX_LINKS + 1,
+    STREAM_SCANS = 8
 };
 _Static_assert((int)STREAM_HASH_READER < (int)RING_MAX_READERS, "each session is a reader, and so is the hash");
 
@@ -39,9 +40,13 @@ struct stream {
     struct stream_reader reader[RING_MAX_READERS];
 
     /* of the pacing thread alone until the stream is over */
-    uint32_t seq;                                  /* of the next frame */
-    struct ring_hits line;                         /* of the line so far */
-    int line_broken;                               /* a tick was lost since the last line end */
+    uint32_t seq;          /* of the next frame */
+    struct ring_hits line; /* of the line so far */
+    int line_broken;       /* a tick was lost since the last line end */
+    struct stream_scan {
+        uint32_t number;
+        uint64_t delivered; /* pulses */
+    } scan[STREAM_SCANS];   /* the last ones, at number % STREAM_SCANS: an end may be said when the next one is on */
     _Atomic int64_t first_pulse_ns, last_pulse_ns; /* when released; 0: not yet */
 
     _Atomic uint64_t granted;    /* step: ticks that may pass */
@@ -63,7 +68,7 @@ int stream_create(struct stream *stream, const struct ring_size *size, int64_t t
 void stream_free(struct stream *stream);
 
 /* ---- the pacing thread; real-time safe */
-/* Completes the slot's line ends, numbers its frames, counts it, publishes it and wakes readers and
+/* Completes the slot's line ends and the counts of its telemetry and of a scan's end, numbers its frames, counts it, publishes it and wakes readers and
  * casters. */
 void stream_release(struct stream *stream, struct ring_slot *slot, uint64_t tick, int64_t now_ns);
 /* Gives a tick up. 0 when it became ready in the same moment. */

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/rng.h"
 #include "drivers/protocol/native_encode.h"
 
 struct worker {
@@ -108,8 +109,14 @@ static void surface_name(void *ctx, uint32_t label, const char **object, const c
     *material = surface->material;
 }
 
+static void add_telemetry(struct worker *worker, const struct device_work *work)
+{
+    added(worker, native_encode_telemetry(end_of(worker), room_of(worker), &work->telemetry_frame, work->t_ns, 0));
+}
+
 static void add_event(struct worker *worker, const struct device_work *work, uint32_t i)
 {
+    if (work->event[i].code == NATIVE_EV_SCAN_END) add_telemetry(worker, work);
     added(worker, native_encode_event(end_of(worker), room_of(worker), &work->event[i], work->t_ns, 0));
 }
 
@@ -296,6 +303,7 @@ static void fill_pulses(struct worker *worker, const struct device_work *work)
     }
     worker->anchored = work->stretch;
     worker->setup.echoes = (enum beam_select)work->echoes;
+    worker->setup.scan_key = rng_scan(work->station + 1, work->station_scan);
     if (worker->site->n_movers != 0)
         site_move(worker->site,
                   site_mover_time(worker->site, work->station, 1e-9 * (double)(work->t_ns - work->scan_t0_ns)),
@@ -321,25 +329,12 @@ const struct ring_tick *worker_fill(struct worker *worker, const struct device_w
 {
     worker->tick = (struct ring_tick){.bytes = worker->tick.bytes, .mark = worker->mark, .wake = work->wake};
     fill_heads(worker, work);
-    if (work->scanning) fill_pulses(worker, work);
+    if (work->scanning) {
+        worker->tick.scan = work->scan;
+        fill_pulses(worker, work);
+    }
     for (uint32_t i = work->n_events_before; i < work->n_events; i++)
         add_event(worker, work, i);
-    if (work->telemetry)
-        added(worker, native_encode_telemetry(end_of(worker), room_of(worker), &work->telemetry_frame, work->t_ns, 0));
+    if (work->telemetry) add_telemetry(worker, work);
     return &worker->tick;
-}
-
-uint64_t worker_count_cast(const struct device_work *work, uint64_t *first)
-{
-    uint64_t n = 0;
-    *first = UINT64_MAX;
-    if (!work->scanning) return 0;
-    struct part part;
-    for (uint64_t k = work->pulse0; k < work->pulse_end; k = part.end) {
-        get_part(work, k, &part);
-        if (part.cast0 >= part.cast_end) continue;
-        n += part.cast_end - part.cast0;
-        if (*first == UINT64_MAX) *first = part.cast0;
-    }
-    return n;
 }

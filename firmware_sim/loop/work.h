@@ -22,7 +22,4 @@ uint32_t worker_usual_bytes(const struct site *site);
 /* Makes the tick. Allocates nothing. The result is good until the next call. */
 const struct ring_tick *worker_fill(struct worker *worker, const struct device_work *work);
 
-/* Pulses of the tick that would have been cast, and the first of them (UINT64_MAX: none). */
-uint64_t worker_count_cast(const struct device_work *work, uint64_t *first);
-
 #endif

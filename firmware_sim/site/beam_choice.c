@@ -27,12 +27,23 @@ static int open_trial(struct trial *trial, struct site *site, const struct sh_re
 
 /* ---- beams */
 
+/* What textures cut out of surfaces has outlines that nobody knows. */
+static const char *has_cutouts(const struct site *site)
+{
+    int cutouts = site->scene->cutout != NULL;
+    for (uint32_t i = 0; i < site->n_movers; i++)
+        cutouts |= site->mover[i].scene->cutout != NULL;
+    return cutouts ? "outlines of what textures cut out (scene.cutouts) are not known" : NULL;
+}
+
 /* Why a beam is not possible here; NULL: it is. */
 static const char *why_not(const struct site *site, enum beam_mode mode)
 {
     if (mode == BEAM_SINGLE) return NULL;
     if (!config_has_footprint(site->cfg)) return "the head profile has no footprint";
-    return mode == BEAM_ADAPTIVE ? config_beam_moves(site->cfg) : NULL;
+    if (mode != BEAM_ADAPTIVE) return NULL;
+    const char *moves = config_beam_moves(site->cfg);
+    return moves != NULL ? moves : has_cutouts(site);
 }
 
 static int make_beam(const struct site *site, struct site_station *s, int adaptive, const struct sh_report *report,
@@ -47,8 +58,8 @@ static int make_beam(const struct site *site, struct site_station *s, int adapti
     beam_rings(BEAM_FINE_RINGS, &beam->fine);
     if (!adaptive || s->outlines != NULL) return SH_OK;
     if (site->scene->n_triangles > MANY_TRIANGLES) sh_progress(report, "looking for outlines", -1.0);
-    const struct beam_outlines_spec spec = {site->scene, s->at.position_m, &beam->beam, p->range_max_m,
-                                            site->detect.kind, report};
+    const struct beam_outlines_spec spec = {site->scene,    s->at.position_m,  &beam->beam,
+                                            p->range_max_m, site->detect.kind, report};
     int rc = cast_outlines(&spec, s->bvh, &s->outlines, err);
     beam->outlines = s->outlines;
     return rc;
@@ -153,6 +164,15 @@ static int try_beams(struct site *site, const struct beam_choice *choice, struct
     return rc;
 }
 
+/* The tolerance is an RMS over all echoes; few are at an end of a plane. */
+static void say_end_error(const struct plan_methods *methods, struct plan_row *row)
+{
+    const size_t used = strlen(row->why);
+    if (methods->beam != BEAM_RINGS) return;
+    snprintf(row->why + used, sizeof row->why - used, "; at a plane's end up to %.2g w tan i (beam radius, incidence)",
+             beam_end_error(methods->rings));
+}
+
 static int choose_beam(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     struct plan_option option[FOOTPRINT_OPTIONS];
@@ -164,6 +184,7 @@ static int choose_beam(struct site *site, const struct sh_report *report, struct
     uint32_t chosen = plan_choose(&ask, &site->plan.beam);
     site->plan.methods.beam = choice[chosen].mode;
     site->plan.methods.rings = choice[chosen].rings;
+    say_end_error(&site->plan.methods, &site->plan.beam);
     return SH_OK;
 }
 
@@ -173,6 +194,10 @@ static int force_beam(struct site *site, const struct sh_report *report, struct 
     const struct config *cfg = site->cfg;
     struct plan_option option;
     struct trial trial = {0};
+    const char *why = cfg->beam.mode == BEAM_ADAPTIVE ? has_cutouts(site) : NULL;
+    if (why != NULL)
+        return sh_fail(err, SH_EINPUT, "%s: beam.mode: adaptive: %s; allowed here are single, rings and auto",
+                       cfg->file, why);
     plan_beam_option(cfg->beam.mode, cfg->beam.rings, &option);
     if (site->measures && config_has_footprint(cfg)) {
         int rc = open_trial(&trial, site, report, err);
@@ -185,6 +210,7 @@ static int force_beam(struct site *site, const struct sh_report *report, struct 
     site->plan.methods.beam = cfg->beam.mode;
     site->plan.methods.rings = cfg->beam.rings;
     plan_choose(&(struct plan_choice){"beam", &option, 1, 0, "beam.mode", cfg->plan}, &site->plan.beam);
+    say_end_error(&site->plan.methods, &site->plan.beam);
     return SH_OK;
 }
 

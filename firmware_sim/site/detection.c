@@ -64,8 +64,9 @@ static int set_up_textures(struct site *site, const uint8_t *said, const struct 
     int rc = SH_OK;
     for (uint32_t i = 0; i < site->n_surfaces && rc == SH_OK; i++) {
         const struct scene_texture *texture = said[i] ? NULL : site_texture(site, i);
-        if (texture == NULL) continue;
-        rc = surface_table_texture(&site->detect.surfaces, i, site_surface(site, i), texture, &why);
+        if (texture == NULL || texture->unreadable) continue;
+        rc = sh_check_stop(report, &why);
+        if (rc == SH_OK) rc = surface_table_texture(&site->detect.surfaces, i, site_surface(site, i), texture, &why);
         if (rc != SH_EINPUT) continue;
         if (failed++ == 0) first = why;
         rc = SH_OK;
@@ -214,14 +215,28 @@ double site_ray_reach_m(const struct site *site, const double station_m[3])
     return beside_m + fmin(beyond_m, site->cfg->profile.range_max_m);
 }
 
+double site_ball_m(const struct site *site)
+{
+    const double *f = site->cfg->noise.ball.factor;
+    return site->cfg->noise.ball.radius_m *
+           (1.0 + site->cfg->noise.ball.distance_1_m * site->cfg->profile.range_max_m) * fmax(f[0], fmax(f[1], f[2]));
+}
+
+static double ten_sigma_m(const struct site *site)
+{
+    const struct config_profile *p = &site->cfg->profile;
+    double sigma_m = p->range_sigma_m + 1e-6 * p->range_sigma_ppm * p->range_max_m;
+    if (site->cfg->noise.range == RANGE_NOISE_SIGNAL)
+        sigma_m += sqrt(site->detect.signal.jitter2); /* at the threshold */
+    return 10.0 * sigma_m;
+}
+
+double site_range_noise_m(const struct site *site)
+{
+    return site->cfg->noise.range == RANGE_NOISE_OFF ? 0.0 : ten_sigma_m(site);
+}
+
 double site_noise_m(const struct site *site)
 {
-    const struct config *cfg = site->cfg;
-    const struct config_profile *p = &cfg->profile;
-    double sigma_m = p->range_sigma_m + 1e-6 * p->range_sigma_ppm * p->range_max_m;
-    if (cfg->noise.range == RANGE_NOISE_SIGNAL) sigma_m += sqrt(site->detect.signal.jitter2); /* at the threshold */
-    const double *f = cfg->noise.ball.factor;
-    double ball_m =
-        cfg->noise.ball.radius_m * (1.0 + cfg->noise.ball.distance_1_m * p->range_max_m) * fmax(f[0], fmax(f[1], f[2]));
-    return 10.0 * sigma_m + ball_m;
+    return ten_sigma_m(site) + site_ball_m(site);
 }

@@ -91,13 +91,22 @@ static int open_geoid(struct site *site, struct sh_err *err)
     return sh_fail(err, rc, "%s: output.heights: %.400s", cfg->file, why.text);
 }
 
-/* Of a station, or of its legs. */
+/* The longest range that may be read: the head's, as its instrument reads it, and ten sigma. */
+static double longest_m(const struct site *site)
+{
+    const struct config_instrument *k = &site->cfg->instrument;
+    const double range_m = site->cfg->profile.range_max_m;
+    return (1.0 + 1e-6 * fabs(k->range_scale_ppm)) * range_m + fabs(k->range_offset_m) + site_range_noise_m(site);
+}
+
+/* Of a station, or of its legs. Points that ball-shaped noise takes further are counted. */
 static int scale_station(const struct site *site, struct site_station *s, double scale_m, struct sh_err *err)
 {
     int rc = SH_OK;
-    if (s->leg == NULL) return georef_scale(s->georef, scale_m, reach_m(site, NULL), s->scale, err);
+    const double most_m = longest_m(site);
+    if (s->leg == NULL) return georef_scale(s->georef, scale_m, most_m + site->live_reach_m, s->scale, err);
     for (size_t i = 0; i < site->n_stretches && rc == SH_OK; i++)
-        rc = georef_scale(s->leg[i].georef, scale_m, reach_m(site, &site->stretch[i]), s->leg[i].scale, err);
+        rc = georef_scale(s->leg[i].georef, scale_m, most_m + site->stretch[i].reach_m, s->leg[i].scale, err);
     return rc;
 }
 
@@ -117,19 +126,49 @@ static int scale_stations(struct site *site, double scale_m, struct sh_err *err)
     return rc;
 }
 
-/* The finest 1e-6 x 10^n m with which the head's whole range fits into 31 bits, in the geo layout from
- * anywhere on its leg, with a hundredth left for noise, unless the configuration names a scale. */
+static const double FINEST_M = 1e-6, MOST_RANGE_COUNTS = 4294967295.0;
+
+/* Polar: a range longer than 32 bits would be read as a short one. */
+static int choose_range_scale(struct site *site, double *scale_m, struct sh_err *err)
+{
+    const struct config *cfg = site->cfg;
+    const double most_m = longest_m(site) + site_ball_m(site), least_m = most_m / MOST_RANGE_COUNTS;
+    for (*scale_m = FINEST_M; *scale_m < least_m;)
+        *scale_m *= 10.0;
+    if (cfg->output.scale_m > 0.0) *scale_m = cfg->output.scale_m;
+    if (*scale_m >= least_m) return SH_OK;
+    return sh_fail(
+        err, SH_EINPUT,
+        "%s: output.scale_m: %g: ranges up to %.6g m do not fit into 32 bits; allowed 0 (automatic) and from "
+        "%.3g m on",
+        cfg->file, *scale_m, most_m, least_m);
+}
+
+/* The finest 1e-6 x 10^n m with which everything fits, unless the configuration names a scale: in the polar
+ * layout ranges into 32 bits, in the geo layout coordinates from anywhere on the leg into 31. */
 static int choose_scale(struct site *site, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
-    if (cfg->output.scale_m > 0.0) return scale_stations(site, cfg->output.scale_m, err);
-    double scale_m = 1e-6;
-    while (cfg->profile.range_max_m * SITE_MARGIN / scale_m > 2147483647.0)
-        scale_m *= 10.0;
-    int rc = scale_stations(site, scale_m, err);
-    while (rc != SH_OK && scale_m < 1.0)
+    double scale_m = cfg->output.scale_m > 0.0 ? cfg->output.scale_m : FINEST_M;
+    int rc = SH_OK;
+    if (cfg->output.layout == LINE_POLAR) rc = choose_range_scale(site, &scale_m, err);
+    if (rc == SH_OK) rc = scale_stations(site, scale_m, err);
+    while (rc != SH_OK && cfg->output.scale_m <= 0.0 && scale_m < 1.0)
         rc = scale_stations(site, scale_m *= 10.0, err);
     return rc;
+}
+
+static void warn_of_coarse_counts(const struct site *site, const struct sh_report *report)
+{
+    const int polar = site->cfg->output.layout == LINE_POLAR;
+    if (site->cfg->output.scale_m > 0.0 || site->scale_m < 2.0 * FINEST_M) return;
+    sh_warn(
+        report,
+        "output.scale_m: a count on the wire is %g m, not %g: %s up to %.6g m have to fit into %d bits, at %g m those "
+        "up to %.0f m do",
+        site->scale_m, FINEST_M, polar ? "ranges" : "coordinates",
+        longest_m(site) + (polar ? site_ball_m(site) : site->live_reach_m), polar ? 32 : 31, FINEST_M,
+        FINEST_M * MOST_RANGE_COUNTS / (polar ? 1.0 : 2.0));
 }
 
 static double count_m(const struct site *site, const struct site_station *s)
@@ -145,6 +184,7 @@ static double count_m(const struct site *site, const struct site_station *s)
 static int scale_all(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     int rc = choose_scale(site, err);
+    if (rc == SH_OK) warn_of_coarse_counts(site, report);
     for (uint32_t i = 0; i < site->n_stations && rc == SH_OK && site->cfg->output.layout == LINE_GEO; i++) {
         double most_m = count_m(site, &site->station[i]);
         if (most_m > site->scale_m * (1.0 + 1e-9))

@@ -13,6 +13,7 @@ static struct scene_mesh_spec mesh_spec(const struct config *cfg, const struct c
         .up = mesh->up,
         .scale = mesh->scale,
         .textures = cfg->signal.on,
+        .cutouts = cfg->scene.cutouts,
         .limits = &cfg->scene.import,
     };
     memcpy(spec.offset_m, mesh->offset_m, sizeof spec.offset_m);
@@ -37,6 +38,7 @@ static int add_mover(struct site *site, const struct config_mesh *mesh, const st
         return sh_fail(err, SH_EINPUT, "%s: too many surfaces; at most %d", mesh->file, SCENE_MAX_SURFACES);
     for (uint32_t i = 0; i < m->scene->n_triangles; i++)
         m->scene->label[i] = (uint16_t)(m->scene->label[i] + site->n_surfaces);
+    m->scene->label0 = site->n_surfaces;
     site->n_surfaces += m->scene->n_surfaces;
     for (int i = 0; i < 3; i++) {
         double half = 0.5 * (m->scene->max_m[i] - m->scene->min_m[i]);
@@ -101,6 +103,7 @@ static int load(struct site *site, const struct sh_report *report, struct sh_err
     if (rc == SH_OK) rc = place_stations(site, report, err);
     if (rc == SH_OK) site_plan_order(site);
     if (rc == SH_OK) rc = build_bvhs(site, report, err);
+    if (rc == SH_OK) rc = site_warn_doubts(site, report, err); /* trying beams may take long where little is seen */
     if (rc == SH_OK) rc = site_georeference(site, report, err);
     if (rc == SH_OK) rc = site_choose_methods(site, report, err);
     return rc;

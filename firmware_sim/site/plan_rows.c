@@ -74,6 +74,15 @@ static int is_zero(const struct config_instrument *k)
     return memcmp(k, &zero, sizeof zero) == 0;
 }
 
+/* What vertices are off by, of what stands still and what moves. */
+static double mesh_error_m(const struct site *site)
+{
+    double error_m = site->scene->error_m;
+    for (uint32_t i = 0; i < site->n_movers; i++)
+        error_m = fmax(error_m, site->mover[i].scene->error_m);
+    return error_m;
+}
+
 static void ask_head(const struct site *site, struct plan_head *head)
 {
     const struct config *cfg = site->cfg;
@@ -104,9 +113,10 @@ int site_plan_rows(struct site *site, struct sh_err *err)
     bvh_get_info(site->station[0].bvh, &bvh);
     size_t n = plan_head(&head, of_head);
     free(plan->row);
-    plan->row = calloc(n + 6 + site->n_stations, sizeof *plan->row);
+    plan->row = calloc(n + 7 + site->n_stations, sizeof *plan->row);
     if (plan->row == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     plan->n = 0;
+    plan_mesh(mesh_error_m(site), &plan->row[plan->n++]);
     plan_cast(bvh.packet, &plan->row[plan->n++]);
     plan->row[plan->n++] = plan->order;
     for (size_t i = 0; i < n; i++) {

@@ -21,8 +21,10 @@ double site_ray_reach_m(const struct site *site, const double station_m[3]);
 
 /* How far the scene goes, without what moves. */
 double site_farthest_m(const struct site *site, const double from_m[3]);
-/* How far noise may take a point. */
+/* How far noise may take a point, whether it is on or not; of that, the ball; a range, ten sigma of its noise. */
 double site_noise_m(const struct site *site);
+double site_ball_m(const struct site *site);
+double site_range_noise_m(const struct site *site);
 
 /* ---- platform.c: a head that moves while it scans, or that scans where its platform stops (platform.kind: stops).
  * In: the configured trajectory and times. Out: its poses (scene frame, metres) and the BVHs that its path
@@ -87,5 +89,11 @@ void site_look_open(struct site_look *look, const struct site *site);
  * optics, and makes the stations' beams. Warns where nothing holds the tolerances. For `plan`
  * (site->measures) the error of what is forced is measured, too. */
 int site_choose_methods(struct site *site, const struct sh_report *report, struct sh_err *err);
+
+/* ---- doubts.c: what is allowed, and hardly meant. Once the scene has its BVHs. */
+
+/* Warns, with figures, of a scene of an unlikely size, of stations that see nothing or little, of lines
+ * without a pulse, and of attributes that nothing fills. */
+int site_warn_doubts(const struct site *site, const struct sh_report *report, struct sh_err *err);
 
 #endif

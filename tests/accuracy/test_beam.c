@@ -71,6 +71,39 @@ static void test_rings(void **state)
     assert_true(fabs(inside - (1.0 - exp(-0.5)) / (1.0 - exp(-2.0))) < 0.03);
 }
 
+/* The middle of those sub-rays that are beyond a line, against that of the part of the footprint beyond it: below what
+ * beam_end_error says, for each line that leaves what may be an echo, and above two fifths of it for some line. */
+static void test_end_of_a_plane(void **state)
+{
+    (void)state;
+    static struct beam_pattern p;
+    struct beam beam;
+    beam_init(&beam, 0.007, 0.00035, 3e-9);
+    for (uint32_t rings = 1; rings <= BEAM_MAX_RINGS; rings++) {
+        double worst = 0.0;
+        beam_rings(rings, &p);
+        for (int turn = 0; turn < 60; turn++) {
+            const double c = cos(turn * M_PI / 30.0), s = sin(turn * M_PI / 30.0);
+            for (double h = -0.95; h <= 0.95; h += 0.01) {
+                double energy, moment, along = 0.0, across = 0.0;
+                uint32_t n = 0;
+                beam_half(&beam, h, &energy, &moment);
+                for (uint32_t i = 0; i < p.n; i++) {
+                    const double u = (double)p.x[i] * c + (double)p.y[i] * s;
+                    if (u <= h) continue;
+                    n++;
+                    along += u;
+                    across += (double)p.y[i] * c - (double)p.x[i] * s;
+                }
+                if (energy < BEAM_LEAST_ENERGY || n < BEAM_LEAST_ENERGY * p.n || n == 0) continue;
+                worst = fmax(worst, hypot(along / n - moment / energy, across / n));
+            }
+        }
+        if (!(worst < beam_end_error(rings) && worst > 0.4 * beam_end_error(rings)))
+            fail_msg("%u rings: %g, of %g", rings, worst, beam_end_error(rings));
+    }
+}
+
 /* A wall at range_m straight ahead, its normal turned away by the incidence. */
 static struct scene *wall(double range_m, double incidence_rad)
 {
@@ -236,8 +269,8 @@ static void test_selection(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_half),      cmocka_unit_test(test_rings),     cmocka_unit_test(test_wall),
-        cmocka_unit_test(test_door_edge), cmocka_unit_test(test_selection),
+        cmocka_unit_test(test_half), cmocka_unit_test(test_rings),     cmocka_unit_test(test_end_of_a_plane),
+        cmocka_unit_test(test_wall), cmocka_unit_test(test_door_edge), cmocka_unit_test(test_selection),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -12,6 +12,7 @@ head_start "{type: usb}" --set head.prr_hz=4000 --set loop.tick_hz=100
 echo "echo 0 >$vhci/detach" >unplug.sh
 echo "usbip attach -r 127.0.0.1 -b 1-1" >plug.sh
 sh plug.sh
+check_reset "TCP"
 check_cut_records "TCP"
 note "cut at $(uptime_s) s"
 REPLUGS=20 UNPLUG="sh unplug.sh" PLUG="sh plug.sh" tap "TCP" test_stream

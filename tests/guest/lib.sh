@@ -21,7 +21,7 @@ guest_pid=
 
 # Modules that the scripts may load; what these need is taken as well.
 GUEST_MODULES="xhci-pci vhci-hcd dummy_hcd usb_f_fs usb_f_acm cdc-acm"
-GUEST_TOOLS="busybox qemu-system-x86_64 cpio depmod lsusb usbip xz dpkg-deb"
+GUEST_TOOLS="busybox qemu-system-x86_64 cpio depmod lsusb usbreset usbip xz dpkg-deb"
 
 guest_skip() {
     echo "1..0 # SKIP $*"
@@ -126,14 +126,14 @@ guest_test_programs() {
 }
 
 guest_prepare_libraries() {
-    libraries=$(guest_libraries "$guest_scanhead" "$(command -v lsusb)" "$(command -v usbip)" $(guest_test_programs))
-    key=$( (ls -lL $libraries "$(command -v lsusb)" "$(command -v busybox)" "$(command -v usbip)") | cksum | tr ' ' '-')
+    libraries=$(guest_libraries "$guest_scanhead" "$(command -v lsusb)" "$(command -v usbreset)" "$(command -v usbip)" $(guest_test_programs))
+    key=$( (ls -lL $libraries "$(command -v lsusb)" "$(command -v usbreset)" "$(command -v busybox)" "$(command -v usbip)") | cksum | tr ' ' '-')
     guest_base=$guest_cache/base-$key.cpio
     [ ! -e "$guest_base" ] || return 0
     rm -rf "$guest_cache/base" "$guest_cache"/base-*.cpio
     mkdir -p "$guest_cache/base/bin"
     for file in $libraries; do guest_copy "$file" "$guest_cache/base"; done
-    cp -L "$(command -v lsusb)" "$(command -v busybox)" "$(command -v usbip)" "$guest_cache/base/bin/"
+    cp -L "$(command -v lsusb)" "$(command -v usbreset)" "$(command -v busybox)" "$(command -v usbip)" "$guest_cache/base/bin/"
     [ ! -e /usr/share/hwdata/usb.ids ] || guest_copy /usr/share/hwdata/usb.ids "$guest_cache/base"
     guest_pack "$guest_cache/base" >"$guest_base.new"
     mv "$guest_base.new" "$guest_base"

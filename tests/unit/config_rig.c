@@ -21,6 +21,7 @@ const char base[] = "head:\n"                     /* 1 */
 char dir[64], config_path[128];
 struct config *cfg;
 struct sh_err err;
+struct config_faults faults;
 
 void write_file(const char *path, const void *bytes, size_t len)
 {
@@ -40,7 +41,9 @@ void write_in(const char *name, const char *text)
 int load_sets(const char *const *sets, int n)
 {
     memset(&err, 0, sizeof err);
-    return config_load(config_path, sets, n, cfg, &err);
+    int code = config_load_all(config_path, sets, n, cfg, &faults);
+    if (code != SH_OK) err = faults.fault[0];
+    return code;
 }
 
 int load_text(const char *text)

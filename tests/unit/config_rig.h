@@ -16,16 +16,15 @@
 
 #include "firmware_sim/config/table.h"
 
-/* clang-format off */
-extern const char base[]/* 1 *//* 2 *//* 3 *//* 4 *//* 5 *//* 6 *//* 7 *//* 8 *//* 9 *//* 10 *//* 11 *//* 12 *//* 13 *//* 14 *//* 15 *//* 16 */;                /* 17 */
-/* clang-format on */
+extern const char base[];
 
 #define PRR   "  prr_hz: 500000\n"
 #define LINES "  lines_hz: 100\n"
 
 extern char dir[64], config_path[128];
 extern struct config *cfg;
-extern struct sh_err err;
+extern struct sh_err err; /* the first of the faults */
+extern struct config_faults faults;
 
 void write_file(const char *path, const void *bytes, size_t len);
 

@@ -44,9 +44,9 @@ int libusb_has_capability(uint32_t capability)
     return capability == LIBUSB_CAP_HAS_HOTPLUG && !bus.no_hotplug;
 }
 
-int libusb_hotplug_register_callback(libusb_context *ctx, int events, int flags, int vendor, int product,
-                                            int class, libusb_hotplug_callback_fn callback, void *data,
-                                            libusb_hotplug_callback_handle *handle)
+int libusb_hotplug_register_callback(libusb_context *ctx, int events, int flags, int vendor, int product, int class,
+                                     libusb_hotplug_callback_fn callback, void *data,
+                                     libusb_hotplug_callback_handle *handle)
 {
     assert_int_equal(events, LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED);
     (void)flags, (void)vendor, (void)product, (void)class, (void)handle;
@@ -157,8 +157,7 @@ void libusb_close(libusb_device_handle *handle)
     free(handle);
 }
 
-int libusb_get_string_descriptor_ascii(libusb_device_handle *handle, uint8_t index, unsigned char *data,
-                                              int length)
+int libusb_get_string_descriptor_ascii(libusb_device_handle *handle, uint8_t index, unsigned char *data, int length)
 {
     const struct libusb_device *d = handle->device;
     const char *text = index == 1 ? d->maker : index == 2 ? d->product : d->serial;
@@ -183,10 +182,16 @@ int libusb_release_interface(libusb_device_handle *handle, int number)
     return 0;
 }
 
-int libusb_control_transfer(libusb_device_handle *handle, uint8_t type, uint8_t request, uint16_t value,
-                                   uint16_t index, unsigned char *data, uint16_t length, unsigned timeout)
+int libusb_control_transfer(libusb_device_handle *handle, uint8_t type, uint8_t request, uint16_t value, uint16_t index,
+                            unsigned char *data, uint16_t length, unsigned timeout)
 {
-    (void)handle, (void)data, (void)timeout;
+    (void)handle, (void)timeout;
+    if (type == 0x80 && request == LIBUSB_REQUEST_GET_STATUS) { /* whether the device is still there */
+        assert_int_equal(length, 2);
+        if (bus.gone) return LIBUSB_ERROR_NO_DEVICE;
+        memset(data, 0, 2);
+        return 2;
+    }
     assert_int_equal(type, 0x41);
     assert_int_equal(request, 0x22);
     assert_int_equal(index, 2);

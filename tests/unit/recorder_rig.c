@@ -7,6 +7,7 @@ char rig_shs[64];
 FILE *rig_stream;
 
 char rig_notes[2048];
+int (*rig_stop)(void *ctx);
 
 void rig_put(const uint8_t *frame, size_t len)
 {
@@ -100,7 +101,7 @@ static void rig_warn(void *ctx, const char *text)
 
 int rig_record(const char *path, struct recorder_options options, int keep, struct sh_err *err)
 {
-    static const struct sh_report report = {.warn = rig_warn};
+    const struct sh_report report = {.warn = rig_warn, .stop = rig_stop};
     struct scanhead *sh;
     struct scanhead_frame frame;
     struct recorder *rec;

@@ -22,7 +22,8 @@ enum { RIG_MAX_POINTS = 4096 };
 
 extern char rig_shs[64];
 extern FILE *rig_stream;
-extern char rig_notes[2048]; /* what the recorder told, a line each */
+extern char rig_notes[2048];       /* what the recorder told, a line each */
+extern int (*rig_stop)(void *ctx); /* asked while files are completed; NULL: never */
 
 void rig_put(const uint8_t *frame, size_t len);
 

@@ -330,10 +330,74 @@ static void noise_has_its_sigma(void **state)
     cast_rig_close(rig);
 }
 
+static struct scene *tetrahedron(const double vertex[4][3])
+{
+    static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}, {1, 3, 2}};
+    static const uint16_t label[4] = {0};
+    const struct scene_surface surface = {.object = "tetrahedron", .material = "plain"};
+    struct scene *scene;
+    struct sh_err err;
+    if (scene_from_arrays(&(struct scene_arrays){vertex, 4, triangle, 4, label, &surface, 1}, &scene, &err) != 0)
+        fail_msg("%s", err.text);
+    return scene;
+}
+
+/* From corner 0 along d to the opposite face, by the ray's shares of the three edges that leave the corner; NaN: it
+ * does not go there, INFINITY: too near to an edge to say. */
+static double opposite_range(const double vertex[4][3], const double d[3])
+{
+    double e[3][3], share[3], sum = 0.0;
+    for (int k = 0; k < 3; k++)
+        vec3_sub(vertex[k + 1], vertex[0], e[k]);
+    for (int k = 0; k < 3; k++) {
+        double n[3];
+        vec3_cross(e[(k + 1) % 3], e[(k + 2) % 3], n);
+        share[k] = vec3_dot(n, d) / vec3_dot(n, e[k]);
+        sum += share[k];
+    }
+    for (int k = 0; k < 3; k++)
+        if (fabs(share[k]) < 1e-6) return INFINITY;
+    return share[0] > 0.0 && share[1] > 0.0 && share[2] > 0.0 ? 1.0 / sum : (double)NAN;
+}
+
+/* A head on a corner of a mesh: the corner is no echo. What lies across is seen, and in other directions nothing is.
+ * The corner is also as far from the BVH's origin as stations that share one may be. */
+static void what_a_ray_begins_on_is_no_hit(void **state)
+{
+    (void)state;
+    enum { RAYS = 512 };
+    static double dx[RAYS], dy[RAYS], dz[RAYS], range[RAYS];
+    static uint32_t triangle[RAYS];
+    uint64_t seed = 7;
+    for (int t = 0; t < 100; t++) {
+        double v[4][3], origin[3];
+        for (int k = 0; k < 4; k++)
+            for (int a = 0; a < 3; a++)
+                v[k][a] = 50.0 * case_unit(&seed) - 25.0;
+        for (int a = 0; a < 3; a++)
+            origin[a] = v[0][a] + (t % 2 != 0 ? case_unit(&seed) - 0.5 : 0.0);
+        struct cast_rig *rig = cast_rig_open(tetrahedron((const double(*)[3])v), origin);
+        for (int i = 0; i < RAYS; i++) {
+            double d[3];
+            any_direction(&seed, d);
+            dx[i] = d[0], dy[i] = d[1], dz[i] = d[2];
+        }
+        hits_from(rig->caster, rig->bvh, v[0], 1000.0, RAYS, dx, dy, dz, range, triangle);
+        for (int i = 0; i < RAYS; i++) {
+            const double d[3] = {dx[i], dy[i], dz[i]}, want = opposite_range((const double(*)[3])v, d);
+            if (isinf(want)) continue;
+            if (isnan(want) ? !isnan(range[i]) : !(fabs(range[i] - want) < 1e-6))
+                fail_msg("tetrahedron %d, ray %d: %g m instead of %g", t, i, range[i], want);
+        }
+        cast_rig_close(rig);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(ranges_in_a_room_are_exact_to_the_planes_tilt),
+        cmocka_unit_test(what_a_ray_begins_on_is_no_hit),
         cmocka_unit_test(ranges_to_a_tilted_plane_are_exact_to_the_planes_tilt),
         cmocka_unit_test(the_width_of_packets_does_not_matter),
         cmocka_unit_test(cuts_leave_no_trace),

@@ -236,11 +236,29 @@ static void losses_of_the_file_are_told(void **state)
     cloud_free(&c);
 }
 
+/* CloudCompare's names of scalar fields, which our recorder writes on request. */
+static void test_scalar_names(void **state)
+{
+    (void)state;
+    static const char text[] = "ply\nformat ascii 1.0\nelement vertex 1\nproperty double x\nproperty double y\n"
+                               "property double z\nproperty uchar scalar_echo\nproperty ushort scalar_label\n"
+                               "property ushort scalar_station\nproperty uchar red\nend_header\n1 2 3 4 5 6 7\n";
+    struct cloud c = must_read("a.ply", text, sizeof text - 1);
+    assert_non_null(c.station);
+    assert_non_null(c.label);
+    assert_non_null(c.echo);
+    assert_true(c.station[0] == 6 && c.label[0] == 5 && c.echo[0] == 4);
+    cloud_free(&c);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(all_encodings_are_read),      cmocka_unit_test(what_is_missing_is_told_apart),
-        cmocka_unit_test(malformed_files_are_refused), cmocka_unit_test(broken_bytes_do_no_harm),
+        cmocka_unit_test(test_scalar_names),
+        cmocka_unit_test(all_encodings_are_read),
+        cmocka_unit_test(what_is_missing_is_told_apart),
+        cmocka_unit_test(malformed_files_are_refused),
+        cmocka_unit_test(broken_bytes_do_no_harm),
         cmocka_unit_test(losses_of_the_file_are_told),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

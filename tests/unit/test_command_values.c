@@ -109,8 +109,8 @@ static void numbers_beyond_64_bits_are_out_of_range(void **ctx)
         expect_error(&dev, 1, line, CMD_E_RANGE, ", allowed 1000 to 1200000\"");
     }
     /* Four frames more than 2^32 must not come out as four. */
-    expect_error(&dev, 1, "SCAN:FRAMES 4294967300", CMD_E_RANGE, "allowed 0 to 4294967295");
-    expect(&dev, "SCAN:FRAMES 4294967295", "OK");
+    expect_error(&dev, 1, "SCAN:FRAMES 4294967300", CMD_E_RANGE, "allowed 0 to 1000000");
+    expect(&dev, "SCAN:FRAMES 1000000", "OK");
     expect_error(&dev, 1, "HEAD:STATION 4294967297", CMD_E_RANGE, "allowed 1 to 3");
 }
 
@@ -126,7 +126,7 @@ static void each_range_holds_at_both_ends(void **ctx)
         {"HEAD:LINES", "0.999999", "1", "2000", "2000.000001", -222, -222},
         {"HEAD:PAN", "-0.000001", "0", "60", "60.000001", -222, -222},
         {"HEAD:STATION", "0", "1", "3", "4", -222, -222},
-        {"SCAN:FRAMES", "-1", "0", "4294967295", "4294967296", -222, -222},
+        {"SCAN:FRAMES", "-1", "0", "1000000", "1000001", -222, -222},
         {"SCAN:LINE:START", "-40.000001", "-40", "49.999999", "50", -222, -221},
         {"SCAN:LINE:STOP", "-30", "-29.999999", "60", "60.000001", -221, -222},
         {"SCAN:PAN:START", "-180.000001", "-180", "179.999999", "180", -222, -221},

@@ -68,7 +68,8 @@ static void malformed_profiles_are_refused(void **state)
         {"{ value: 130, from: data sheet }", "{ value: 130 m, from: assumed }", "range_max_m", "not a number"},
         {"{ value: 130, from: data sheet }", "{ value: 1, value: 2, from: assumed }", "range_max_m", "given twice"},
         {"{ value: 130, from: data sheet }", "{ value: 1, note: 2, from: assumed }", "range_max_m", "unknown"},
-        {"{ value: 130, from: data sheet }", "{ value: 0.4, from: assumed }", "range_min_m", "0.5 is too much; allowed below 0.4"},
+        {"{ value: 130, from: data sheet }", "{ value: 0.4, from: assumed }", "range_min_m",
+         "0.5 is too much; allowed below 0.4"},
         {"{ value: 0.00088, from: assumed }", "{ value: 0.002, from: assumed }", "range_sigma_floor_m",
          "allowed at most 0.001"},
         {"range_m: 130, from: assumed", "range_m: 130", "reaches[0].from", "missing"},
@@ -104,21 +105,27 @@ static void malformed_profiles_are_refused(void **state)
     }
 }
 
-static void a_range_beyond_31_bits_is_refused(void **state)
+static void a_range_beyond_its_bits_is_refused(void **state)
 {
     (void)state;
-    /* 2^31 * 1e-6 m = 2147.48 m: 2147 m fit, 2148 m do not. */
+    /* Polar: 2^32 * 1e-6 m = 4294.97 m. Geo, whose coordinates have a sign: 2^31 * 1e-6 m = 2147.48 m. */
+    static const struct {
+        const char *layout;
+        int far_m, fits;
+    } cases[] = {{"output.layout=polar", 4294, 1},
+                 {"output.layout=polar", 4295, 0},
+                 {"output.layout=geo", 2147, 1},
+                 {"output.layout=geo", 2148, 0}};
     char *text = edited("riegl-vz400i\n  prr_hz: 500000\n  lines_hz: 100", "mine");
-    for (int far_m = 2147; far_m <= 2148; far_m++) {
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         char value[64];
-        snprintf(value, sizeof value, "range_max_m: { value: %d,", far_m);
+        snprintf(value, sizeof value, "range_max_m: { value: %d,", cases[i].far_m);
         assert_loads(load_profile("range_max_m: { value: 130,", value));
-        const char *const sets[] = {"output.scale_m=1e-6"};
+        const char *const sets[] = {"output.scale_m=1e-6", cases[i].layout};
         write_file(config_path, text, strlen(text));
-        int code = load_sets(sets, 1);
-        assert_int_equal(code, far_m == 2147 ? SH_OK : SH_EINPUT);
+        assert_int_equal(load_sets(sets, 2), cases[i].fits ? SH_OK : SH_EINPUT);
+        if (!cases[i].fits) assert_says("--set output.scale_m: 1e-06 is too fine");
     }
-    assert_says("--set output.scale_m: 1e-06 is too fine");
     free(text);
 }
 
@@ -178,7 +185,7 @@ int main(void)
         cmocka_unit_test(shipped_files_load),
         cmocka_unit_test(profiles_give_their_figures),
         cmocka_unit_test(malformed_profiles_are_refused),
-        cmocka_unit_test(a_range_beyond_31_bits_is_refused),
+        cmocka_unit_test(a_range_beyond_its_bits_is_refused),
         cmocka_unit_test(a_slow_pulse_rate_needs_slow_lines),
         cmocka_unit_test(profiles_are_looked_up_in_order),
         cmocka_unit_test(profiles_are_listed),

@@ -1,14 +1,5 @@
-/* The configuration table itself: its reference, and the soundness of its rows. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <cmocka.h>
-
-#include "firmware_sim/config/table.h"
+/* The configuration table itself: its reference, its example, and the soundness of its rows. */
+#include "tests/unit/config_rig.h"
 
 static void the_reference_names_every_key(void **state)
 {
@@ -63,11 +54,76 @@ static void rows_are_sound(void **state)
         }
 }
 
+/* The example as it is printed; free it. */
+static char *print_example(void)
+{
+    char *text = NULL;
+    size_t len = 0;
+    FILE *out = open_memstream(&text, &len);
+    assert_int_equal(config_print_example(out, &err), SH_OK);
+    fclose(out);
+    return text;
+}
+
+static void the_example_loads(void **state)
+{
+    (void)state;
+    char *text = print_example();
+    assert_loads(load_text(text));
+    free(text);
+}
+
+/* "# word": not a key behind a #, which has no blank there, or two and more. */
+static int is_comment(const char *line)
+{
+    return line[1] == ' ' && line[2] != ' ';
+}
+
+/* With every # of the first column away it is a file with every key, each with a value that is read. */
+static void the_example_has_every_key(void **state)
+{
+    (void)state;
+    static struct cfg_reader rd;
+    char *text = print_example(), *to = text;
+    for (const char *from = text; *from != '\0'; from++)
+        if (*from != '#' || (from > text && from[-1] != '\n') || is_comment(from)) *to++ = *from;
+    *to = '\0';
+    write_file(config_path, text, strlen(text));
+    free(text);
+    memset(&faults, 0, sizeof faults);
+    memset(cfg, 0, sizeof *cfg);
+    cfg_reader_init(&rd, config_path, &cfg_config_table, cfg, &faults);
+    assert_int_equal(cfg_read_file(&rd), SH_OK);
+    if (faults.n != 0) fail_msg("%s", faults.fault[0].text);
+    for (size_t i = 0; i < cfg_config_table.n; i++)
+        if (rd.line[i][0] == 0) fail_msg("%s is not in the example", cfg_config_table.keys[i].path);
+}
+
+static void a_section_has_its_keys(void **state)
+{
+    (void)state;
+    char *text = NULL;
+    size_t len = 0;
+    FILE *out = open_memstream(&text, &len);
+    assert_int_equal(config_print_section("noise", out, &err), SH_OK);
+    fclose(out);
+    assert_int_equal(strncmp(text, "noise\n", 6), 0);
+    assert_non_null(strstr(text, "\nnoise.ball.seed\n"));
+    assert_null(strstr(text, "signal.model\n"));
+    free(text);
+    assert_int_equal(config_print_section("noises", stdout, &err), SH_EINPUT);
+    assert_says("no section \"noises\", did you mean noise?; allowed head, scene, ");
+    assert_int_equal(config_print_section("", stdout, &err), SH_EINPUT);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_reference_names_every_key),
         cmocka_unit_test(rows_are_sound),
+        cmocka_unit_test(the_example_loads),
+        cmocka_unit_test(the_example_has_every_key),
+        cmocka_unit_test(a_section_has_its_keys),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, set_up, tear_down);
 }

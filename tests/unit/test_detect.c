@@ -225,7 +225,7 @@ static void the_ball_is_full(void **state)
             pan[i] = case_unit(&seed);
             double before[3], after[3], moved[3], v[3], r = range_m[i], m = mirror[i], p = pan[i];
             point_at(r, m, p, before);
-            detect_move_in_ball(&ball, rotation, &(struct detect_points){1, &key[i], &r, &m, &p});
+            detect_move_in_ball(&ball, rotation, &(struct detect_points){1, &key[i], &r, &m, &p, 0});
             point_at(r, m, p, after);
             double cm = cos(TURN * mirror[i]), sm = sin(TURN * mirror[i]), cp = cos(TURN * pan[i]),
                    sp = sin(TURN * pan[i]);
@@ -267,12 +267,12 @@ static void the_ball_does_not_accumulate(void **state)
     const uint64_t key[3] = {1, 1, 2};
     double range_m[3] = {5.0, 5.0, (double)NAN}, mirror[3] = {0.1, 0.1, 0.1}, pan[3] = {0.2, 0.2, 0.2};
     detect_ball_keys(&ball, 1);
-    detect_move_in_ball(&ball, NULL, &(struct detect_points){3, key, range_m, mirror, pan});
+    detect_move_in_ball(&ball, NULL, &(struct detect_points){3, key, range_m, mirror, pan, 0});
     assert_true(range_m[0] == range_m[1] && mirror[0] == mirror[1] && pan[0] == pan[1] && range_m[0] != 5.0);
     assert_true(isnan(range_m[2]) && mirror[2] == 0.1 && pan[2] == 0.2);
     double other_m = 5.0, other_mirror = 0.1, other_pan = 0.2;
     detect_ball_keys(&ball, 2);
-    detect_move_in_ball(&ball, NULL, &(struct detect_points){1, key, &other_m, &other_mirror, &other_pan});
+    detect_move_in_ball(&ball, NULL, &(struct detect_points){1, key, &other_m, &other_mirror, &other_pan, 0});
     assert_true(other_m != range_m[0]);
 }
 

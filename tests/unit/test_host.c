@@ -17,7 +17,7 @@ static void test_open_refused(void **state)
         {"/nonexistent.shs", SCANHEAD_EINPUT},
         {"/", SCANHEAD_EINPUT},
         {"tty:/dev/null", SCANHEAD_EINPUT},
-        {"tty:/nonexistent", SCANHEAD_EINPUT},
+        {"tty:/nonexistent", SCANHEAD_ELOST},
         {"tcp:localhost", SCANHEAD_EINPUT},
         {"tcp::4000", SCANHEAD_EINPUT},
         {"tcp:h:", SCANHEAD_EINPUT},

@@ -107,6 +107,33 @@ static void test_errors_without_end(void **state)
     expect_lost(sh);
 }
 
+/* Another program resets the bus: the kernel ends all transfers as if the device had gone, and it answers all the same.
+ * That is not an unplugging; what came before is there, and a new session goes on with the same head. */
+static void test_bus_reset(void **state)
+{
+    struct scanhead_frame frame;
+    char reply[64];
+    (void)state;
+    struct scanhead *sh = open_head("usb");
+    script_events(0, 4);
+    for (int i = 0; i < 16; i++)
+        fake_script(FAKE_IN, LIBUSB_TRANSFER_NO_DEVICE, NULL, 0);
+    expect_events(sh, 0, 4);
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(scanhead_next(sh, &frame, TIMEOUT_MS), SCANHEAD_ERESET);
+        assert_non_null(strstr(scanhead_error(sh), "bus was reset"));
+        assert_null(strstr(scanhead_error(sh), "unplugged"));
+        assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, TIMEOUT_MS), SCANHEAD_ERESET);
+    }
+    bus.n_steps = bus.done = 0; /* the reset is over */
+    assert_int_equal(scanhead_reattach(sh, TIMEOUT_MS), 0);
+    script_events(6, 9);
+    expect_events(sh, 6, 9);
+    unplug();
+    assert_int_equal(scanhead_next(sh, &frame, TIMEOUT_MS), SCANHEAD_ELOST); /* and that is one */
+    close_head(sh);
+}
+
 /* ---- writing */
 
 static void ask(struct scanhead *sh)
@@ -212,6 +239,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_unplug_at_once, rig_begin, rig_end),
         cmocka_unit_test_setup_teardown(test_unplug_with_errors, rig_begin, rig_end),
         cmocka_unit_test_setup_teardown(test_errors_without_end, rig_begin, rig_end),
+        cmocka_unit_test_setup_teardown(test_bus_reset, rig_begin, rig_end),
         cmocka_unit_test_setup_teardown(test_write_fails, rig_begin, rig_end),
         cmocka_unit_test_setup_teardown(test_unplug_seen_by_writing, rig_begin, rig_end),
         cmocka_unit_test_setup_teardown(test_unplug_while_writing, rig_begin, rig_end),

@@ -41,9 +41,9 @@ static struct scene *small_scene(void)
     s->surface = calloc(2, sizeof *s->surface);
     s->texture = calloc(1, sizeof *s->texture);
     assert_true(s->surface != NULL && s->texture != NULL);
-    s->surface[0] = (struct scene_surface){"wall", "paint", {0.5f, 0.25f, 1.0f}, .has_colour = 1, .texture = 1};
+    s->surface[0] = (struct scene_surface){"wall", "paint", {0.5f, 0.25f, 1.0f}, .has_colour = 1, .texture = 1, .solid = 0.5f};
     s->surface[1] = (struct scene_surface){.object = "floor"};
-    s->texture[0] = (struct scene_texture){strdup("some/a.dae*0"), copy_of("pixels", 6), 6};
+    s->texture[0] = (struct scene_texture){.file = strdup("some/a.dae*0"), .bytes = copy_of("pixels", 6), .n_bytes = 6};
     s->counts.zero_area = 3;
     return s;
 }

@@ -17,7 +17,7 @@ static struct shot shoot(const struct instrument *k, double mirror_turn, double 
 {
     struct shot shot = {.mirror = mirror_turn, .pan = pan_turn};
     const struct vec3_out s = {&shot.s[0], &shot.s[1], &shot.s[2]}, o = {&shot.o[0], &shot.o[1], &shot.o[2]};
-    instrument_aim(k, &(struct instrument_turns){pulse, 1, &mirror_turn, &pan_turn}, &s, &o);
+    instrument_aim(k, &(struct instrument_turns){pulse, 1, &mirror_turn, &pan_turn, 0}, &s, &o);
     instrument_read(k, 1, &shot.mirror, &shot.pan);
     return shot;
 }

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -43,10 +44,10 @@ static void what_is_written_is_read(void **ctx)
 {
     (void)ctx;
     static const struct journal_entry in[] = {
-        {0, 0, 0, "*RST"},
-        {1, 1000000, 1, "HEAD:PRR 1.2 MHZ"},
-        {1, 1000000, 1, "  scan:start  "},
-        {UINT64_MAX, INT64_MAX, UINT32_MAX, "SCAN:STOP"},
+        {0, 0, 0, 2, "*RST"},
+        {1, 1000000, 1, 3, "HEAD:PRR 1.2 MHZ"},
+        {1, 1000000, 1, 4, "  scan:start  "},
+        {UINT64_MAX, INT64_MAX, UINT32_MAX, 5, "SCAN:STOP"},
     };
     struct sh_err err = {0};
     struct journal *journal = journal_open(path, &err);
@@ -73,13 +74,23 @@ static void the_format_is_as_documented(void **ctx)
     struct journal *journal = journal_open(path, NULL);
     assert_non_null(journal);
     assert_int_equal(journal_write(journal, 12, 12000000, 2, "HEAD:PRR 300000"), 0);
+    assert_int_equal(journal_end(journal, 15, 15000000), 0);
     assert_int_equal(journal_close(journal, NULL), 0);
     char text[128] = "";
     FILE *file = fopen(path, "r");
     assert_non_null(file);
     text[fread(text, 1, sizeof text - 1, file)] = '\0';
     fclose(file);
-    assert_string_equal(text, "# scanhead journal 1\n12 12000000 2 HEAD:PRR 300000\n");
+    assert_string_equal(text, "# scanhead journal 1\n12 12000000 2 HEAD:PRR 300000\n15 15000000 0 END\n");
+    struct journal_entry *out;
+    size_t n;
+    assert_int_equal(journal_read(path, &out, &n, NULL), 0);
+    assert_int_equal(n, 2);
+    assert_false(journal_is_end(&out[0]));
+    assert_true(journal_is_end(&out[1]) && out[1].tick == 15);
+    out[1].session = 1; /* a client that sent it: a wrong command */
+    assert_false(journal_is_end(&out[1]));
+    free(out);
 }
 
 static void sorted_by_tick_and_else_as_in_the_file(void **ctx)
@@ -175,8 +186,81 @@ static void what_is_no_journal_is_refused(void **ctx)
     size_t n;
     assert_int_equal(journal_read("/nonexistent/j", &out, &n, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, "/nonexistent/j: No such file"));
-    assert_int_equal(journal_read("/tmp", &out, &n, &err), SH_EIO);
-    assert_non_null(strstr(err.text, "/tmp: Is a directory"));
+    assert_int_equal(journal_read("/tmp", &out, &n, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "/tmp: a directory, not a file"));
+}
+
+/* What has no end, or would wait for its writer: refused as it is opened. */
+static void what_is_no_file_is_refused_at_once(void **ctx)
+{
+    (void)ctx;
+    char fifo[80];
+    struct sh_err err = {0};
+    struct journal_entry *out;
+    size_t n;
+    snprintf(fifo, sizeof fifo, "%s/fifo", dir);
+    assert_int_equal(mkfifo(fifo, 0600), 0);
+    assert_int_equal(journal_read(fifo, &out, &n, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "fifo: a FIFO, not a file"));
+    unlink(fifo);
+    assert_int_equal(journal_read("/dev/zero", &out, &n, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "/dev/zero: a device, not a file"));
+}
+
+/* A file of one line without an end takes no more memory than a line may have. */
+static void a_line_is_bounded(void **ctx)
+{
+    (void)ctx;
+    static char text[8192];
+    memcpy(text, "# scanhead journal 1\n#", 22);
+    memset(text + 22, 'x', sizeof text - 22);
+    expect_unreadable(text, sizeof text, ":2: too long; allowed up to 1023 bytes a line");
+    text[21 + 1023] = '\n';
+    memset(text, 0, 1);
+    expect_unreadable(text, sizeof text, ":1: a NUL byte");
+}
+
+/* Turned round, insertion would take the square of its length. */
+static void the_order_of_the_file_costs_nothing(void **ctx)
+{
+    (void)ctx;
+    enum { N = 50000 };
+    char *text = malloc(N * 16 + 32), *at = text;
+    struct journal_entry *out;
+    size_t n;
+    assert_non_null(text);
+    at += sprintf(at, "# scanhead journal 1\n");
+    for (int i = N; i > 0; i--)
+        at += sprintf(at, "%d 0 1 a\n", i);
+    write_text(text, (size_t)(at - text));
+    free(text);
+    assert_int_equal(journal_read(path, &out, &n, NULL), 0);
+    assert_int_equal(n, N);
+    for (size_t i = 0; i < n; i++)
+        assert_int_equal(out[i].tick, i + 1);
+    free(out);
+}
+
+static void a_journal_is_not_written_over_the_one_it_replays(void **ctx)
+{
+    (void)ctx;
+    char other[80], around[128];
+    struct sh_err err = {0};
+    snprintf(other, sizeof other, "%s/other", dir);
+    snprintf(around, sizeof around, "%s/../%s/j.txt", dir, dir + 5);
+    write_text("# scanhead journal 1\n", 21);
+    assert_int_equal(journal_check_paths(path, NULL, &err), SH_OK);
+    assert_int_equal(journal_check_paths(NULL, path, &err), SH_OK);
+    assert_int_equal(journal_check_paths(other, path, &err), SH_OK); /* not there yet */
+    assert_int_equal(journal_check_paths(path, path, &err), SH_EINPUT);
+    assert_int_equal(journal_check_paths(around, path, &err), SH_EINPUT);
+    assert_int_equal(symlink("j.txt", other), 0);
+    assert_int_equal(journal_check_paths(other, path, &err), SH_EINPUT);
+    unlink(other);
+    assert_int_equal(link(path, other), 0);
+    assert_int_equal(journal_check_paths(other, path, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "is the journal to replay"));
+    unlink(other);
 }
 
 static void the_writer_refuses_what_the_reader_would(void **ctx)
@@ -210,7 +294,7 @@ static void a_full_disk_is_reported(void **ctx)
     assert_int_equal(err.code, SH_EIO);
     assert_non_null(strstr(err.text, "/dev/full: No space left"));
     assert_null(journal_open("/nonexistent/j", &err));
-    assert_non_null(strstr(err.text, "/nonexistent/j: No such file"));
+    assert_non_null(strstr(err.text, "/nonexistent/j: cannot be opened for writing: No such file"));
     /* Later: the file may grow to 100 bytes, so the second of these lines does not fit. */
     struct rlimit before, small;
     assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);
@@ -241,6 +325,10 @@ int main(void)
         cmocka_unit_test(sorted_by_tick_and_else_as_in_the_file),
         cmocka_unit_test(malformed_lines_are_named),
         cmocka_unit_test(what_is_no_journal_is_refused),
+        cmocka_unit_test(what_is_no_file_is_refused_at_once),
+        cmocka_unit_test(a_line_is_bounded),
+        cmocka_unit_test(the_order_of_the_file_costs_nothing),
+        cmocka_unit_test(a_journal_is_not_written_over_the_one_it_replays),
         cmocka_unit_test(the_writer_refuses_what_the_reader_would),
         cmocka_unit_test(a_full_disk_is_reported),
     };

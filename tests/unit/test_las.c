@@ -15,15 +15,20 @@ enum { N = sizeof points / sizeof points[0] };
 static uint8_t *las;
 static size_t las_len;
 
-static void record_las(void)
+static void record_las_with(struct recorder_options options)
 {
     struct sh_err err = {0};
     const char *path = rig_path("a.las");
-    int rc = rig_record(path, (struct recorder_options){0}, 1, &err);
+    int rc = rig_record(path, options, 1, &err);
     if (rc != 0) fail_msg("%s", err.text);
     free(las);
     las = rig_read(path, &las_len);
     unlink(path);
+}
+
+static void record_las(void)
+{
+    record_las_with((struct recorder_options){0});
 }
 
 static void put_scan(int geo, uint32_t scan, const struct native_anchor *anchor)
@@ -225,6 +230,86 @@ static void test_long(void **state)
     assert_non_null(strstr((char *)find_vlr("LASF_Projection", 2112) + VLR, "GEOCCS["));
 }
 
+/* LAS 1.2, format 1 or 3 with colour: offsets of the ASPRS specification, LAS 1.2 of 2008. */
+static void check_12(int colour)
+{
+    const uint8_t *p = las + rig_uint(las + 96, 4);
+    const size_t len = colour ? 34 : 28;
+    static const uint32_t by_return[5] = {4, 2, 1, 1, 1};
+    assert_int_equal(rig_uint(las + 6, 2), 0);
+    assert_int_equal(las[24] << 8 | las[25], 1 << 8 | 2);
+    assert_int_equal(rig_uint(las + 94, 2), 227);
+    assert_int_equal(las[104], colour ? 3 : 1);
+    assert_int_equal(rig_uint(las + 105, 2), len);
+    assert_int_equal(rig_uint(las + 107, 4), 9);
+    assert_int_equal(las_len, rig_uint(las + 96, 4) + 9 * len);
+    for (int i = 0; i < 5; i++)
+        assert_int_equal(rig_uint(las + 111 + 4 * i, 4), by_return[i]);
+    for (int i = 0; i < 3; i++)
+        assert_true(rig_double(las + 131 + 8 * i) == 1e-3);
+    assert_true(fabs(rig_double(las + 179) - 500003.251) < 1e-9); /* the largest x */
+    assert_int_equal(rig_int32(p), 3000);
+    assert_int_equal(rig_uint(p + 12, 2), -1234 + 32768);
+    assert_int_equal(p[14], 1 | 2 << 3);
+    assert_int_equal(p[len + 14], 2 | 2 << 3);
+    assert_int_equal(p[15] | p[16] | p[17], 0);
+    assert_int_equal(rig_uint(p + 18, 2), 7);
+    assert_true(rig_double(p + 2 * len + 20) == 2e-3); /* its pulse is the third: 1 kHz */
+    for (int i = 0; i < 5; i++)                        /* five of six echoes, and as many as the format counts */
+        assert_int_equal(p[(4 + (size_t)i) * len + 14], (i + 1) | 5 << 3);
+    /* -12.34 dB of -30 to 0: 150 of 255, in 16 bits */
+    for (int i = 0; i < 3 && colour; i++)
+        assert_int_equal(rig_uint(p + 28 + 2 * i, 2), 150 * 257);
+    assert_non_null(strstr(rig_notes, "1 echoes left out: the sixth"));
+    assert_non_null(strstr(rig_notes, "5 points with more echoes than LAS 1.2 counts"));
+    assert_non_null(strstr(rig_notes, "LAS 1.2 has no place for labels and scan angles; they are left out"));
+}
+
+static void test_las_12(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 7);
+    struct rig_point six[6];
+    for (int i = 0; i < 6; i++)
+        six[i] = (struct rig_point){100 + i, 0, 0, 0, 0, (uint8_t)(i + 1), 6};
+    for (int colour = 0; colour < 2; colour++) {
+        rig_begin();
+        put_scan(1, 1, &a);
+        rig_points(1, 10, 10, six, 6);
+        record_las_with((struct recorder_options){.las_minor = 2, .colour = colour ? COLOUR_REFLECTANCE : COLOUR_NONE});
+        check_12(colour);
+        /* GeoTIFF's directory: a projected CRS, its code, metres */
+        const uint8_t *keys = find_vlr("LASF_Projection", 34735);
+        assert_non_null(keys);
+        assert_null(find_vlr("LASF_Projection", 2112));
+        static const uint16_t want[] = {1, 1,     0,    6, 1024, 0,    1,    1, 1025, 0,    1,    1, 3072, 0,
+                                        1, 32632, 3076, 0, 1,    9001, 4096, 0, 1,    5030, 4099, 0, 1,    9001};
+        assert_int_equal(rig_uint(keys + 20, 2), sizeof want);
+        for (size_t i = 0; i < sizeof want / sizeof want[0]; i++)
+            assert_int_equal(rig_uint(keys + VLR + 2 * i, 2), want[i]);
+    }
+}
+
+/* Format 7: red, green and blue between the time and the extra bytes. */
+static void test_colour(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 7);
+    rig_begin();
+    put_scan(1, 1, &a);
+    record_las_with((struct recorder_options){.colour = COLOUR_LABEL});
+    const uint8_t *p = las + rig_uint(las + 96, 4);
+    uint8_t rgb[3];
+    assert_int_equal(las[25], 4);
+    assert_int_equal(las[104], 7);
+    assert_int_equal(rig_uint(las + 105, 2), POINT + 6);
+    colour_of(COLOUR_LABEL, &(struct scanhead_point){.label = 7}, rgb);
+    for (int i = 0; i < 3; i++)
+        assert_int_equal(rig_uint(p + 30 + 2 * i, 2), rgb[i] * 257);
+    assert_int_equal(rig_uint(p + 36, 2), 7);
+    assert_true(rgb[0] != rgb[1] || rgb[1] != rgb[2]); /* a hue */
+}
+
 static int tear_down(void **state)
 {
     free(las);
@@ -236,7 +321,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_header), cmocka_unit_test(test_records),   cmocka_unit_test(test_stations),
         cmocka_unit_test(test_polar),  cmocka_unit_test(test_no_points), cmocka_unit_test(test_disk_full),
-        cmocka_unit_test(test_long),
+        cmocka_unit_test(test_long),   cmocka_unit_test(test_las_12),    cmocka_unit_test(test_colour),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }

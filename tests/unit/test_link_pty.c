@@ -195,6 +195,30 @@ static void test_symlink(void **state)
     assert_int_equal(rmdir(dir), 0); /* and nothing lies about */
 }
 
+/* A head was killed, and another program has got its terminal's number: the link is older than that terminal. */
+static void test_left_symlink(void **state)
+{
+    (void)state;
+    char *dir = test_dir(), slave[64], target[256];
+    struct link_spec spec;
+    int master = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
+    assert_true(master >= 0 && grantpt(master) == 0 && unlockpt(master) == 0);
+    assert_int_equal(ptsname_r(master, slave, sizeof slave), 0);
+    link_path(&spec, dir, "scanner");
+    assert_int_equal(symlink(slave, spec.path), 0);
+    expect_untouched(&spec, "another program"); /* made for this terminal */
+    const struct timespec old[2] = {{.tv_sec = 1000000000}, {.tv_sec = 1000000000}};
+    assert_int_equal(utimensat(AT_FDCWD, spec.path, old, AT_SYMLINK_NOFOLLOW), 0);
+    struct bench bench = bench_open(&spec);
+    ssize_t n = readlink(spec.path, target, sizeof target - 1);
+    assert_true(n > 0);
+    target[n] = '\0';
+    assert_string_not_equal(target, slave);
+    bench_close(&bench);
+    close(master);
+    assert_int_equal(rmdir(dir), 0);
+}
+
 /* Ordinary users cannot open a terminal again on which a client left TIOCEXCL: the head makes a new one. */
 static void exclusive_child(const char *path)
 {
@@ -236,6 +260,7 @@ int main(void)
         cmocka_unit_test(test_raw_both_ways),  cmocka_unit_test(test_full),
         cmocka_unit_test(test_fresh_for_next), cmocka_unit_test(test_written_and_gone),
         cmocka_unit_test(test_unseen_change),  cmocka_unit_test(test_symlink),
+        cmocka_unit_test(test_left_symlink),
         cmocka_unit_test(test_exclusive),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

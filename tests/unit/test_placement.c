@@ -304,22 +304,6 @@ static void headings_and_convergence(void **state)
     assert_near(azimuth_deg, 50 + convergence_deg, 3e-4);
 }
 
-static void a_station_out_of_reach_is_told(void **state)
-{
-    (void)state;
-    write_floor(0, 0, 0);
-    ok(load("", "  - {position_m: [0, 0, 790]}\n  - {position_m: [0, 0, 799]}", "local"));
-    warned[0] = '\0';
-    ok(check_reach(site, &report, &err)); /* 800 m; the corners are 42 m off, the face itself is within */
-    assert_string_equal(warned, "");
-    ok(load("", "  - {position_m: [0, 0, 1]}\n  - {position_m: [0, 0, 801]}", "local"));
-    ok(check_reach(site, &report, &err));
-    assert_non_null(strstr(warned, "station 2 station-2 at 0 0 801 m: nothing within range_max_m, 800 m"));
-    ok(load("", "  - {position_m: [600, 600, 1]}", "local")); /* 570 m off in x and in y: 806 m */
-    ok(check_reach(site, &report, &err));
-    assert_non_null(strstr(warned, "nothing within"));
-}
-
 static void the_house_has_its_site(void **state)
 {
     (void)state;
@@ -401,7 +385,6 @@ int main(void)
         cmocka_unit_test(an_instrument_height_counts_from_the_floor),
         cmocka_unit_test(what_has_no_place_is_refused),
         cmocka_unit_test(headings_and_convergence),
-        cmocka_unit_test(a_station_out_of_reach_is_told),
         cmocka_unit_test(the_house_has_its_site),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

@@ -314,9 +314,70 @@ static void test_crs_change_refused(void **state)
     assert_non_null(strstr(err.text, "65536"));
 }
 
+/* What CloudCompare shows without being asked: red, green, blue, and columns whose names begin with scalar_. */
+static void test_cloudcompare(void **state)
+{
+    (void)state;
+    struct sh_err err;
+    uint8_t rgb[3];
+    begin_stream();
+    put_surfaces(0, 3, NULL);
+    put_descriptor(1, 1, 3);
+    put_anchor(NATIVE_CRS_UTM, 32632, 2);
+    put_points(0);
+    struct recorder_options options = {.scalar_names = 1, .colour = COLOUR_LABEL};
+    assert_int_equal(record(out_path, options, 1, &err), 0);
+    slurp(out_path);
+    const char *header = strstr(text, "element vertex 4\n");
+    static const char want[] =
+        "property double x\nproperty double y\nproperty double z\nproperty double scalar_range\n"
+        "property float scalar_reflectance\nproperty double scalar_time\nproperty uchar scalar_echo\n"
+        "property uchar scalar_echo_count\nproperty ushort scalar_label\nproperty ushort scalar_station\n"
+        "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n";
+    assert_non_null(header);
+    header = strchr(header, '\n') + 1;
+    assert_memory_equal(header, want, sizeof want - 1);
+    size_t at = (size_t)(header - text) + sizeof want - 1;
+    assert_int_equal(text_len, at + 4 * (RECORD + 3));
+    for (int i = 0; i < 4; i++) {
+        colour_of(COLOUR_LABEL, &(struct scanhead_point){.label = label[i < 3 ? i : 4]}, rgb);
+        assert_memory_equal(text + at + (size_t)i * (RECORD + 3) + RECORD, rgb, 3);
+    }
+}
+
+/* Black at -30 dB, white at 0, even steps between; what is not modelled is no grey. */
+static void test_colours(void **state)
+{
+    (void)state;
+    static const struct {
+        double db;
+        uint8_t grey;
+    } cases[] = {{-40, 0}, {-30, 0}, {-15, 128}, {0, 255}, {20, 255}};
+    uint8_t rgb[3], other[3];
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        colour_of(COLOUR_REFLECTANCE, &(struct scanhead_point){.reflectance_db = cases[i].db}, rgb);
+        for (int k = 0; k < 3; k++)
+            assert_int_equal(rgb[k], cases[i].grey);
+    }
+    colour_of(COLOUR_REFLECTANCE, &(struct scanhead_point){.reflectance_db = (double)NAN}, rgb);
+    assert_true(rgb[2] > rgb[0]);
+    for (uint16_t i = 0; i < 1000; i++) { /* neighbours in number differ: 137 degrees of hue apart */
+        int most = 0;
+        colour_of(COLOUR_LABEL, &(struct scanhead_point){.label = i}, rgb);
+        colour_of(COLOUR_LABEL, &(struct scanhead_point){.label = (uint16_t)(i + 1)}, other);
+        for (int k = 0; k < 3; k++)
+            most = abs(rgb[k] - other[k]) > most ? abs(rgb[k] - other[k]) : most;
+        assert_true(most > 100);
+    }
+    colour_of(COLOUR_LABEL, &(struct scanhead_point){.label = SCANHEAD_NO_LABEL}, rgb);
+    assert_true(rgb[0] == 128 && rgb[1] == 128 && rgb[2] == 128);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_cloudcompare),
+        cmocka_unit_test(test_colours),
         cmocka_unit_test(test_geo),
         cmocka_unit_test(test_ascii),
         cmocka_unit_test(test_empty_shots),

@@ -157,6 +157,97 @@ static void test_poses(void **state)
     assert_int_equal(*at, 0);
 }
 
+static const struct rig_point wall = {1000, -2000, 3000, INT16_MIN, 0, 1, 1};
+static const char WALL[] = "2.000000 1.000000 3.000000 0.500000";
+
+/* A scan of 2 frames, each 100 degrees at 10 degrees and 1 line per second, with 20 pulses a second. */
+static void put_descriptor(uint32_t frames)
+{
+    static uint8_t out[1024];
+    struct native_descriptor d = {.idn = "Maker,Model,SN1,1.0",
+                                  .profile = "model",
+                                  .scan = 1,
+                                  .layout = NATIVE_GEO,
+                                  .prr_uhz = 20000000,
+                                  .lines_uhz = 1000000,
+                                  .pan_udeg_s = 10000000,
+                                  .pan_stop_udeg = 100000000,
+                                  .frames = frames};
+    rig_put(out, native_encode_descriptor(out, sizeof out, &d, 0, 0));
+}
+
+static struct native_anchor local_anchor(void)
+{
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
+    memcpy(a.anchor, a.station_m, sizeof a.anchor);
+    return a;
+}
+
+static void put_shots(uint32_t frames, const uint32_t *line, const uint32_t *row, int n)
+{
+    struct native_anchor a = local_anchor();
+    rig_begin();
+    put_descriptor(frames);
+    rig_anchor(&a);
+    for (int i = 0; i < n; i++) /* the rig's pulse is a millisecond, the descriptor's 50 */
+        rig_points(line[i], 100000 * (uint64_t)i, 100000 * (uint64_t)i + 50 * row[i], &wall, 1);
+}
+
+/* Lines and pulses that no scan of this descriptor has are not filled up to: another grid begins, and no point is lost.
+ * A scan has 2 x (10 + 1) lines and 20 + 1 pulses in each, as far as the descriptor says. */
+static void test_far(void **state)
+{
+    (void)state;
+    static const struct {
+        uint32_t frames, line[2], row[2];
+        int columns, rows; /* of the one grid; 0: there are two of one place */
+    } cases[] = {
+        {2, {0, 0xffffffff}, {0, 0}, 0, 0}, {2, {0, 22}, {0, 0}, 0, 0},  {2, {0, 21}, {0, 20}, 22, 21},
+        {2, {0, 1}, {0, 21}, 0, 0},         {0, {0, 40}, {0, 0}, 41, 1}, /* a scan without end has no last line ... */
+        {0, {0, 0xffffffff}, {0, 0}, 0, 0}, /* ... but grids are filled up by 2^24 places at most */
+        {0, {5, 4}, {0, 0}, 0, 0},          {2, {3, 3}, {7, 7}, 0, 0},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const int columns = cases[i].columns, rows = cases[i].rows, two = columns == 0;
+        put_shots(cases[i].frames, cases[i].line, cases[i].row, 2);
+        record_text("a.ptx");
+        expect_head(two ? 1 : columns, two ? 1 : rows, "10.000000000 20.000000000 30.000000000");
+        expect_line(WALL);
+        for (int k = 2; k < columns * rows; k++)
+            expect_line("0 0 0 0.5");
+        if (two) expect_head(1, 1, "10.000000000 20.000000000 30.000000000");
+        expect_line(WALL);
+        assert_int_equal(*at, 0);
+        assert_int_equal(strstr(rig_notes, "1 grids begun within a scan") != NULL, two);
+    }
+}
+
+static int asked, stop_at;
+
+static int stop(void *ctx)
+{
+    (void)ctx;
+    return ++asked >= stop_at;
+}
+
+/* The sweep at the end asks, and gives the file up: at the first column, and within long ones. */
+static void test_stop(void **state)
+{
+    (void)state;
+    struct sh_err err = {0};
+    const char *path = rig_path("a.ptx");
+    for (stop_at = 1; stop_at <= 3; stop_at += 2) {
+        put_shots(0, (const uint32_t[]){0, 3}, (const uint32_t[]){0, 0}, 2);
+        asked = 0;
+        rig_stop = stop;
+        assert_int_equal(rig_record(path, (struct recorder_options){0}, RIG_KEEP, &err), SH_ESTOPPED);
+        rig_stop = NULL;
+        assert_non_null(strstr(err.text, "interrupted"));
+        assert_int_equal(asked, stop_at);
+        assert_int_equal(access(path, F_OK), -1);
+    }
+}
+
 static void test_disk_full(void **state)
 {
     (void)state;
@@ -178,8 +269,9 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_grid),  cmocka_unit_test(test_scans),     cmocka_unit_test(test_polar),
-        cmocka_unit_test(test_poses), cmocka_unit_test(test_disk_full),
+        cmocka_unit_test(test_grid),      cmocka_unit_test(test_scans), cmocka_unit_test(test_polar),
+        cmocka_unit_test(test_poses),     cmocka_unit_test(test_far),   cmocka_unit_test(test_stop),
+        cmocka_unit_test(test_disk_full),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }

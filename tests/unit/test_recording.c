@@ -15,12 +15,15 @@
 
 #include "drivers/protocol/native_encode.h"
 #include "firmware_sim/app/recording.h"
+#include "firmware_sim/command/head.h"
 
 /* What the head does, one after the other. */
 enum deed {
     END,
     PULSES,   /* some of a scan */
     LOSES,    /* frames do not reach the recorder, the scan's end among them */
+    TELLS,    /* that it is idle, and what the scan had */
+    ENDS,     /* the scan, with the same counts */
     IDLE,     /* is asked its state, and says so */
     SCANNING, /* likewise */
     UNPLUGGED /* and plugged in again */
@@ -43,11 +46,20 @@ static void send_frame(uint8_t *frame, size_t len)
     if (send(head.fd, frame, len, MSG_NOSIGNAL) != (ssize_t)len) head.wrong = "a frame was not taken";
 }
 
-static void send_telemetry(void)
+/* Of scan 3 with 100 pulses, 60 of them cast and 7 of those lost by the head. */
+static void send_telemetry(uint32_t state)
 {
     uint8_t frame[256];
-    struct native_telemetry t = {.state = 4};
+    struct native_telemetry t = {.state = state, .scan = 3, .scan_fired = 100, .scan_cast = 60, .scan_lost = 7};
     send_frame(frame, native_encode_telemetry(frame, sizeof frame, &t, 0, 0));
+}
+
+static void send_end(void)
+{
+    uint8_t frame[256];
+    struct native_event end = {.code = NATIVE_EV_SCAN_END, .a = 3, .b = 100, .c = 7};
+    send_telemetry(HEAD_SCANNING);
+    send_frame(frame, native_encode_event(frame, sizeof frame, &end, 0, 0));
 }
 
 static void send_pulse(void)
@@ -89,15 +101,17 @@ static void *play(void *arg)
         if (*deed == SCANNING) answer("scanning\r\n");
         if (*deed == LOSES) {
             head.seq += 5;
-            send_telemetry();
+            send_telemetry(HEAD_SCANNING);
         }
+        if (*deed == TELLS) send_telemetry(HEAD_IDLE);
+        if (*deed == ENDS) send_end();
         if (*deed == UNPLUGGED) {
             close(head.fd);
             head.fd = accept(head.listener, NULL, NULL);
         }
     }
     atomic_store(&head.over, 1);
-    send_telemetry(); /* so that the recorder need not wait to see that it is over */
+    send_telemetry(HEAD_SCANNING); /* so that the recorder need not wait to see that it is over */
     return NULL;
 }
 
@@ -115,6 +129,15 @@ static int take_frame(void *ctx, struct scanhead *sh, const struct scanhead_fram
     return SH_OK;
 }
 
+static double last_fraction;
+
+static void keep_fraction(void *ctx, const char *what, double fraction)
+{
+    (void)ctx;
+    (void)what;
+    last_fraction = fraction;
+}
+
 static void record(const enum deed *script, struct recording_result *result)
 {
     struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
@@ -129,8 +152,16 @@ static void record(const enum deed *script, struct recording_result *result)
     if (scanhead_open(source, &sh, why, sizeof why) != SCANHEAD_OK) fail_msg("%s", why);
     pthread_t thread;
     assert_int_equal(pthread_create(&thread, NULL, play, NULL), 0);
-    const struct recording_options options = {
-        .listen = 1, .frames = -1, .replug_s = 20, .frame = take_frame, .interrupted = is_over};
+    const struct sh_report report = {.progress = keep_fraction};
+    const struct recording_options options = {.listen = 1,
+                                              .frames = -1,
+                                              .replug_s = 20,
+                                              .progress = 1,
+                                              .source_bytes = 1000000,
+                                              .report = &report,
+                                              .frame = take_frame,
+                                              .interrupted = is_over};
+    last_fraction = -1;
     struct sh_err err = {0, ""};
     int rc = recording_run(sh, &options, result, &err);
     scanhead_close(sh);
@@ -150,7 +181,7 @@ static void test_unplugged_within_a_scan(void **state)
     record(once, &result);
     assert_int_equal(result.replugs, 2);
     assert_int_equal(result.broken_scans, 1); /* one scan, however often */
-    assert_int_equal(result.pulses, 2);
+    assert_int_equal(result.counts.pulses, 2);
 }
 
 /* The scan was over, though its end was lost: nothing was left to break. */
@@ -162,6 +193,50 @@ static void test_unplugged_after_a_lost_end(void **state)
     record(after, &result);
     assert_int_equal(result.replugs, 1);
     assert_int_equal(result.broken_scans, 0);
+    /* the silence took two seconds, within which came reports: of a source of a million bytes, two frames */
+    assert_true(last_fraction > 0 && last_fraction < 0.01);
+}
+
+static void check_counts(const struct recording_counts *counts, uint64_t pulses)
+{
+    assert_int_equal(counts->scans, 1);
+    assert_int_equal(counts->fired, 100);
+    assert_int_equal(counts->cast, 60);
+    assert_int_equal(counts->lost, 7);
+    assert_int_equal(counts->pulses, pulses);
+    assert_int_equal(counts->missing, 60 - 7 - pulses);
+}
+
+/* Whoever lost a scan's end has its counts from the next telemetry, and a head that is unplugged then breaks no
+ * scan. */
+static void test_telemetry_after_a_lost_end(void **state)
+{
+    (void)state;
+    static const enum deed script[] = {PULSES, PULSES, LOSES, TELLS, UNPLUGGED, IDLE, END};
+    struct recording_result result;
+    record(script, &result);
+    assert_int_equal(result.broken_scans, 0);
+    check_counts(&result.counts, 2);
+}
+
+/* Whoever joined within a scan knows at its end how much came before. */
+static void test_joined_within_a_scan(void **state)
+{
+    (void)state;
+    static const enum deed script[] = {PULSES, ENDS, UNPLUGGED, IDLE, END};
+    struct recording_result result;
+    record(script, &result);
+    check_counts(&result.counts, 1);
+}
+
+/* A head that is much too slow says an end again after the mirror has come to rest: it is one scan. */
+static void test_an_end_after_telemetry(void **state)
+{
+    (void)state;
+    static const enum deed script[] = {PULSES, LOSES, PULSES, TELLS, ENDS, UNPLUGGED, IDLE, END};
+    struct recording_result result;
+    record(script, &result);
+    check_counts(&result.counts, 2);
 }
 
 /* Nor does the next scan take a break of this one for its own. */
@@ -178,9 +253,9 @@ static void test_broken_once_more_after_a_lost_end(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_unplugged_within_a_scan),
-        cmocka_unit_test(test_unplugged_after_a_lost_end),
-        cmocka_unit_test(test_broken_once_more_after_a_lost_end),
+        cmocka_unit_test(test_unplugged_within_a_scan),    cmocka_unit_test(test_unplugged_after_a_lost_end),
+        cmocka_unit_test(test_telemetry_after_a_lost_end), cmocka_unit_test(test_joined_within_a_scan),
+        cmocka_unit_test(test_an_end_after_telemetry),     cmocka_unit_test(test_broken_once_more_after_a_lost_end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -37,8 +37,8 @@ static const char *stl_text(double x, double y, const char *z)
 static void stl_is_read(void **state)
 {
     (void)state;
-    struct scene *s = load_text("a.STL", stl_text(10, 20, "0.5"));
-    static const double v[3][3] = {{10, 20, 0}, {11, 20, 0.5}, {10, 21, 0}};
+    struct scene *s = load_text("a.STL", stl_text(10, 15, "0.5"));
+    static const double v[3][3] = {{10, 15, 0}, {11, 15, 0.5}, {10, 16, 0}};
     assert_int_equal(s->n_triangles, 1);
     assert_int_equal(s->n_meshes, 1);
     assert_memory_equal(s->vertex_m, v, sizeof v);
@@ -165,6 +165,12 @@ static void units(void **state)
     SKIP_WITHOUT(file);
     struct scene *s = load(file);
     assert_true(s->max_m[0] > 1 && s->max_m[0] < 50);
+    assert_true(fabs(s->says.unit_m - 5.0) < 1e-6); /* its UnitScaleFactor is 500 cm */
+    assert_int_equal(s->says.up, 2);
+    scene_free(s);
+    s = load_text("says.stl", stl_text(0, 0, "1"));
+    assert_true(s->says.unit_m == 0);
+    assert_int_equal(s->says.up, 0);
     scene_free(s);
     static const char z_up[] =
         "<?xml version=\"1.0\"?><COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\" "
@@ -190,6 +196,7 @@ static void units(void **state)
         for (int k = 0; k < 3; k++)
             assert_true(s->vertex_m[i][k] == v[i][k]);
     assert_string_equal(s->surface[0].object, "wall");
+    assert_true(s->says.unit_m == 1 && s->says.up == 2); /* as it comes out of Assimp */
     scene_free(s);
 }
 

@@ -112,6 +112,71 @@ static void a_line_that_lacks_a_tick_has_no_count(void **state)
     }
 }
 
+/* A tick of a scan with n_cast pulses, then telemetry and the scan's end where `cast` is not 0: so many pulses were to
+ * be cast up to it. */
+static struct ring_slot *make_pulses(uint64_t tick, uint32_t scan, uint64_t n_cast, uint64_t cast)
+{
+    uint8_t bytes[512];
+    struct ring_tick made = {.bytes = bytes, .scan = scan, .n_cast = n_cast};
+    struct native_telemetry t = {.scan = scan, .scan_cast = cast, .scan_lost = cast, .lost_pulses = 1000 + cast};
+    struct native_event end = {.code = NATIVE_EV_SCAN_END, .a = scan, .b = 99, .c = cast};
+    struct ring_slot *slot = ring_claim(&stream.ring, tick);
+    assert_non_null(slot);
+    if (cast != 0) {
+        made.len = (uint32_t)native_encode_telemetry(bytes, sizeof bytes, &t, 7, 0);
+        made.len += (uint32_t)native_encode_event(bytes + made.len, sizeof bytes - made.len, &end, 7, 0);
+    }
+    assert_int_equal(ring_put(slot, &made), SH_OK);
+    return slot;
+}
+
+static void read_end(uint64_t tick, struct native_telemetry *t, struct native_event *end)
+{
+    static struct native_parser parser;
+    size_t room;
+    native_parser_init(&parser);
+    struct ring_copy copy = {.buf = native_parser_room(&parser, &room), .cap = 512};
+    assert_int_equal(ring_read(&stream.ring, 0, tick, &copy), RING_READ);
+    native_parser_added(&parser, copy.len);
+    assert_int_equal(native_parser_next(&parser), NATIVE_FRAME); /* its CRC is right */
+    assert_int_equal(native_decode_telemetry(parser.payload, parser.header.length, t), SH_OK);
+    assert_int_equal(native_parser_next(&parser), NATIVE_FRAME);
+    assert_int_equal(native_decode_event(parser.payload, parser.header.length, end), SH_OK);
+}
+
+/* A scan of 10 + 20 + 30 + 40 pulses, of which a tick before the last one is lost after the last one was made. */
+static void a_scan_end_counts_what_was_lost_after_it_was_made(void **state)
+{
+    (void)state;
+    struct native_telemetry t;
+    struct native_event end;
+    atomic_store(&counters.pulses, 1000); /* of scans before */
+    release(make_pulses(0, 3, 10, 0), 0);
+    release(make_pulses(1, 3, 20, 0), 1);
+    struct ring_slot *last = make_pulses(3, 3, 40, 100);
+    assert_true(stream_lose(&stream, 2));
+    release(last, 3);
+    read_end(3, &t, &end);
+    assert_true(end.a == 3 && end.b == 99 && end.c == 30);
+    assert_true(t.scan_cast == 100 && t.scan_lost == 30 && t.pulses == 1070 && t.lost_pulses == 30);
+    struct ring_copy copy = {.buf = NULL};
+    assert_int_equal(ring_read(&stream.ring, 0, 3, &copy), RING_READ);
+    assert_true(copy.pulses_before == 1030 && copy.n_cast == 40);
+}
+
+/* Its tick was lost, too: it is said in a tick of the next scan, whose pulses are not taken for its own. */
+static void a_scan_end_that_comes_late_counts_its_own_scan(void **state)
+{
+    (void)state;
+    struct native_telemetry t;
+    struct native_event end;
+    release(make_pulses(0, 3, 10, 0), 0);
+    release(make_pulses(1, 4, 500, 0), 1);
+    release(make_pulses(2, 3, 0, 25), 2);
+    read_end(2, &t, &end);
+    assert_true(end.c == 15 && t.scan_lost == 15);
+}
+
 static void active_readers_hold_back(void **state)
 {
     (void)state;
@@ -142,6 +207,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         WITH_STREAM(a_line_has_the_echoes_of_all_its_ticks),
         WITH_STREAM(a_line_that_lacks_a_tick_has_no_count),
+        WITH_STREAM(a_scan_end_counts_what_was_lost_after_it_was_made),
+        WITH_STREAM(a_scan_end_that_comes_late_counts_its_own_scan),
         WITH_STREAM(active_readers_hold_back),
         WITH_STREAM(grants_add_up),
     };

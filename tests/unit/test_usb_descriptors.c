@@ -108,10 +108,24 @@ static void test_bos(void **state)
         check(host, 0x0f00, 0, bytes, sizeof bytes);
         host_free(host);
     }
-    /* one that can't do super speed does not claim it, one without compatible ids has no platform capability */
-    static const uint8_t plain[] = {5, 15, 12, 0, 1, 7, 16, 2, 0, 0, 0, 0};
+    /* one that can't do super speed claims nothing of it: its USB 2.0 extension would be empty */
+    uint8_t high[33] = {5, 15, 33, 0, 1};
+    memcpy(high + 5, bytes + 22, 28);
+    struct host *host = host_new(&pair_model, USB_RATE_HIGH, USB_RATE_HIGH);
+    check(host, 0x0f00, 0, high, sizeof high);
+    host_free(host);
+}
+
+/* Below super speed and without compatible ids a BOS has nothing to say: the device is one of USB 2.00. */
+static void test_no_bos(void **state)
+{
+    (void)state;
     struct host *host = host_new(&alt_model, USB_RATE_HIGH, USB_RATE_HIGH);
-    check(host, 0x0f00, 0, plain, sizeof plain);
+    assert_int_equal(host_control(host, 0x80, USB_REQ_GET_DESCRIPTOR, 0x0f00, 0, 200, NULL), USB_STALL);
+    assert_int_equal(host_control(host, 0x80, USB_REQ_GET_DESCRIPTOR, 0x0100, 0, 18, NULL), 18);
+    assert_int_equal(le_get16(host_in + 2), 0x0200);
+    assert_int_equal(host_control(host, 0x80, USB_REQ_GET_DESCRIPTOR, 0x0600, 0, 10, NULL), 10);
+    assert_int_equal(le_get16(host_in + 2), 0x0200);
     assert_int_equal(host_control(host, 0xc0, 0, 0, 7, 200, NULL), USB_STALL);
     host_free(host);
 }
@@ -164,11 +178,12 @@ static void test_head(void **state)
                 assert_int_equal(left, 0);
                 assert_int_equal(d[at + 2], interfaces++);
                 left = d[at + 4];
+                if (d[at + 5] == USB_CLASS_COMM) assert_int_equal(d[at + 7], 0);
                 stream += d[at + 5] == 0xff && d[at + 6] == 0x53 && d[at + 7] == 0x48;
                 break;
             case USB_DT_INTERFACE_ASSOCIATION:
                 assert_int_equal(interfaces, 0);
-                static const uint8_t console[] = {8, 11, 0, 2, 2, 2, 1, 3};
+                static const uint8_t console[] = {8, 11, 0, 2, 2, 2, 0, 3}; /* protocol 0: no AT commands */
                 assert_memory_equal(d + at, console, sizeof console);
                 associations++;
                 break;
@@ -232,7 +247,7 @@ int main(void)
         cmocka_unit_test(test_device),         cmocka_unit_test(test_configuration),
         cmocka_unit_test(test_strings),        cmocka_unit_test(test_bos),
         cmocka_unit_test(test_ms_os),          cmocka_unit_test(test_head),
-        cmocka_unit_test(test_contradictions),
+        cmocka_unit_test(test_contradictions), cmocka_unit_test(test_no_bos),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -32,7 +32,7 @@ static void test_list(void **state)
     struct client c = {.bench = &bench, .fd = client_connect(&bench)};
     const uint8_t request[8] = {0x01, 0x11, 0x80, 0x05}, head[12] = {0x01, 0x11, 0, 5, 0, 0, 0, 0, 0, 0, 0, 1};
     const uint8_t device[16] = {0, 0, 0, 3, 0x12, 0x09, 0x00, 0x01, 0x01, 0x00, 0xef, 2, 1, 0, 1, 3};
-    const uint8_t interfaces[12] = {2, 2, 1, 0, 10, 0, 0, 0, 0xff, 0x53, 0x48, 0};
+    const uint8_t interfaces[12] = {2, 2, 0, 0, 10, 0, 0, 0, 0xff, 0x53, 0x48, 0};
     uint8_t back[12 + 312 + 12];
     for (int i = 0; i < 2; i++) { /* a connection may ask again */
         client_write(&c, request, sizeof request);
@@ -196,18 +196,49 @@ static void test_console_requests(void **state)
     assert_int_equal(client_control(&c, &r, 0x21, 0x24, 0, 0, 0, NULL), EPIPE_WIRE);
     assert_int_equal(client_control(&c, &r, 0x41, 0x22, 2, 2, 0, NULL), EPIPE_WIRE);
     assert_int_equal(client_control(&c, &r, 0x41, 0x22, 1, 0, 0, NULL), EPIPE_WIRE);
-    /* the interrupt endpoint says once that the line is ready */
+    close(c.fd);
+    bench_close(&bench);
+}
+
+static void expect_ready(struct client *c)
+{
     static const uint8_t ready[10] = {0xa1, 0x20, 0, 0, 0, 0, 2, 0, 3, 0};
-    uint32_t seqnum = client_submit(&c, 1, 2, NULL, NULL, 16);
-    assert_true(client_reply(&c, &r, 1));
+    uint32_t seqnum = client_submit(c, 1, 2, NULL, NULL, 16);
+    assert_true(client_reply(c, &r, 1));
     assert_int_equal(r.seqnum, seqnum);
     assert_int_equal(r.actual, sizeof ready);
     assert_memory_equal(r.data, ready, sizeof ready);
-    seqnum = client_submit(&c, 1, 2, NULL, NULL, 16);
-    client_unlink(&c, seqnum); /* it waits, else this came after its answer */
-    assert_true(client_reply(&c, &r, 0));
+}
+
+/* It waits: were it answered, its answer would come before that to the unlink. */
+static void expect_no_notice(struct client *c)
+{
+    client_unlink(c, client_submit(c, 1, 2, NULL, NULL, 16));
+    assert_true(client_reply(c, &r, 0));
     assert_int_equal(r.command, 4);
     assert_int_equal(r.status, ECONNRESET_WIRE);
+}
+
+/* The interrupt endpoint says that the line is ready: when the interface comes to life, and to each program that opens
+ * the port, which is where DTR rises; not while it stays up, and not when it falls. */
+static void test_serial_state(void **state)
+{
+    (void)state;
+    struct bench bench = usbip_bench("N");
+    struct client c;
+    client_import(&c, &bench);
+    configure(&c);
+    expect_ready(&c);
+    expect_no_notice(&c);
+    static const struct {
+        unsigned lines;
+        int told;
+    } steps[] = {{3, 1}, {1, 0}, {3, 0}, {2, 0}, {1, 1}, {0, 0}, {1, 1}};
+    for (size_t i = 0; i < sizeof steps / sizeof steps[0]; i++) {
+        assert_int_equal(client_control(&c, &r, 0x21, 0x22, steps[i].lines, 0, 0, NULL), 0);
+        if (steps[i].told) expect_ready(&c);
+        expect_no_notice(&c);
+    }
     close(c.fd);
     bench_close(&bench);
 }
@@ -391,9 +422,9 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_list),     cmocka_unit_test(test_import),           cmocka_unit_test(test_stream),
-        cmocka_unit_test(test_commands), cmocka_unit_test(test_console_requests), cmocka_unit_test(test_unlink),
-        cmocka_unit_test(test_broken),   cmocka_unit_test(test_garbage),          cmocka_unit_test(test_close),
-        cmocka_unit_test(test_capacity),
+        cmocka_unit_test(test_commands), cmocka_unit_test(test_console_requests), cmocka_unit_test(test_serial_state),
+        cmocka_unit_test(test_unlink),   cmocka_unit_test(test_broken),           cmocka_unit_test(test_garbage),
+        cmocka_unit_test(test_close),    cmocka_unit_test(test_capacity),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -177,6 +177,40 @@ static void test_cancel_and_halt(void **state)
     bench_close(&bench);
 }
 
+static void expect_notice(struct bench *bench, const char *part)
+{
+    const struct link_event event = bench_expect(bench, LINK_NOTICE, 0);
+    if (strstr(event.peer, part) == NULL) fail_msg("\"%s\" has no \"%s\"", event.peer, part);
+}
+
+/* Who runs the head reads why a session was cut off. A guest that enumerates resets the bus, too: no news. */
+static void test_reset_is_no_unplugging(void **state)
+{
+    (void)state;
+    struct bench bench = redir_bench(USB_RATE_HIGH);
+    struct guest *g = guest_new(&bench);
+    usbredirparser_send_reset(g->parser);
+    guest_configure(g);
+    guest_control(g, 0x41, 0x22, 1, 2, 0, NULL);
+    bench_expect(&bench, LINK_OPENED, 0);
+    usbredirparser_send_reset(g->parser);
+    guest_turn(g, 0);
+    bench_expect(&bench, LINK_CLOSED, 0);
+    expect_notice(&bench, "the host reset the bus");
+    guest_configure(g);
+    guest_control(g, 0x41, 0x22, 1, 2, 0, NULL);
+    bench_expect(&bench, LINK_OPENED, 0);
+    guest_configure(g); /* what a host with a reset of its own does here */
+    bench_expect(&bench, LINK_CLOSED, 0);
+    expect_notice(&bench, "configured the device anew");
+    guest_control(g, 0x41, 0x22, 1, 2, 0, NULL);
+    bench_expect(&bench, LINK_OPENED, 0);
+    guest_free(g);
+    bench_expect(&bench, LINK_CLOSED, 0);
+    expect_notice(&bench, "unplugged");
+    bench_close(&bench);
+}
+
 static void test_interrupt(void **state)
 {
     (void)state;
@@ -345,15 +379,11 @@ static void test_early_and_streams(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_connect),
-        cmocka_unit_test(test_requests),
-        cmocka_unit_test(test_stream),
-        cmocka_unit_test(test_cancel_and_halt),
-        cmocka_unit_test(test_interrupt),
-        cmocka_unit_test(test_close),
-        cmocka_unit_test(test_path),
-        cmocka_unit_test(test_garbage),
-        cmocka_unit_test(test_early_and_streams),
+        cmocka_unit_test(test_connect),   cmocka_unit_test(test_requests),
+        cmocka_unit_test(test_stream),    cmocka_unit_test(test_cancel_and_halt),
+        cmocka_unit_test(test_interrupt), cmocka_unit_test(test_reset_is_no_unplugging),
+        cmocka_unit_test(test_close),     cmocka_unit_test(test_path),
+        cmocka_unit_test(test_garbage),   cmocka_unit_test(test_early_and_streams),
     };
     return cmocka_run_group_tests(tests, guest_setup, guest_teardown);
 }

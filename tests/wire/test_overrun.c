@@ -34,7 +34,10 @@ struct account {
     struct oracle oracle;
     uint64_t received, next, gaps, missing;   /* pulses; the last two from jumps of the pulse number */
     uint64_t first_missing, told, told_first; /* by overrun events */
+    uint64_t scan_cast, scan_lost;            /* by the telemetry before the scan's end */
     int events, scan_over;
+    uint64_t end_lost;  /* by the scan's end */
+    uint64_t readers;   /* that were there for the whole scan; 0: this one alone */
     int in_second_half; /* points frames */
     int64_t t_ns, line;
     uint64_t whole_lines, broken_lines;
@@ -102,8 +105,15 @@ static void take(struct account *a, struct scanhead *sh, const struct scanhead_f
         if (a->events++ == 0 || frame->event_value[0] < a->told_first) a->told_first = frame->event_value[0];
         a->told += frame->event_value[1];
     }
+    if (frame->type == SCANHEAD_TELEMETRY) {
+        struct native_telemetry t;
+        assert_int_equal(native_decode_telemetry(frame->payload, frame->payload_len, &t), 0);
+        a->scan_cast = t.scan_cast;
+        a->scan_lost = t.scan_lost;
+    }
     if (is_event(frame, SCANHEAD_EV_SCAN_END)) {
         assert_int_equal(frame->event_value[1], oracle_end(&a->oracle));
+        a->end_lost = frame->event_value[2];
         a->scan_over = 1;
     }
 }
@@ -135,14 +145,42 @@ static void follow(struct account *a, struct scanhead *sh)
     assert_int_equal(stats.pulses_lost, a->told);
 }
 
+/* The statistics: fired = blind + cast, cast = delivered + lost, delivered = to a reader + lost with
+ * frames, for each of so many readers. */
+static void check_sums(const struct wire *wire, const struct oracle *oracle, uint64_t readers)
+{
+    uint64_t fired = oracle_end(oracle), cast = oracle_count_cast(oracle, 0, fired);
+    assert_int_equal(stats_uint(wire, "fired_pulses"), fired);
+    assert_int_equal(stats_uint(wire, "blind_pulses"), fired - cast);
+    assert_int_equal(stats_uint(wire, "cast_pulses"), cast);
+    assert_int_equal(stats_uint(wire, "pulses") + stats_uint(wire, "lost_pulses"), cast);
+    assert_int_equal(stats_link_uint(wire, "received_pulses") + stats_link_uint(wire, "left_out_pulses"),
+                     readers * stats_uint(wire, "pulses"));
+    assert_int_equal(stats_link_uint(wire, "left_out_pulses"), stats_uint(wire, "reader_lost_pulses"));
+}
+
 static void check_balance(const struct account *a, const struct wire *wire)
 {
     uint64_t cast = oracle_count_cast(&a->oracle, 0, oracle_end(&a->oracle));
     assert_int_equal(a->received + a->missing, cast);
     assert_int_equal(a->told, a->missing);
+    assert_int_equal(a->end_lost, a->missing); /* however late it was lost */
+    assert_int_equal(a->scan_cast, cast);
+    assert_int_equal(a->scan_lost, a->missing);
     assert_int_equal(stats_uint(wire, "pulses"), a->received);
     assert_int_equal(stats_uint(wire, "lost_pulses"), a->missing);
     assert_int_equal(stats_uint(wire, "reader_lost_frames"), 0);
+    check_sums(wire, &a->oracle, a->readers != 0 ? a->readers : 1);
+}
+
+/* A recorder counts what the head says, and what this reader counts. */
+static void check_recorder(const struct account *a, const struct wire *wire)
+{
+    assert_int_equal(stats_uint(wire, "fired_pulses"), oracle_end(&a->oracle));
+    assert_int_equal(stats_uint(wire, "cast_pulses"), a->scan_cast);
+    assert_int_equal(stats_uint(wire, "lost_pulses"), a->missing);
+    assert_int_equal(stats_uint(wire, "pulses") + stats_uint(wire, "missing_pulses"), a->received);
+    assert_int_equal(stats_uint(wire, "missing_pulses"), stats_uint(wire, "reader_lost_pulses"));
 }
 
 static void overload(struct wire *wire, const char *threads)
@@ -152,18 +190,25 @@ static void overload(struct wire *wire, const char *threads)
     const char *const more[] = {"--threads", threads, NULL};
     struct head head = head_start(wire, room_config_write(wire, &CONFIG), more);
     struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
-    client_wait_state(sh, "idle");
-    client_tell(sh, "SCAN:STAR");
+    char stats[352];
+    snprintf(stats, sizeof stats, "%s", wire_path(wire, "recorder.json"));
+    const char *const args[] = {"record", head_endpoint(&head, "tcp"), "--quiet", "--stats", stats, NULL};
+    pid_t recorder = wire_spawn(wire, args, "record.out", "record.err", -1);
     follow(&a, sh);
-    assert_true(a.missing > 0); /* a caster computes about a seventh of them in time */
+    assert_int_equal(wire_wait(wire, recorder), 1); /* not complete */
+    assert_true(a.missing > 0);                     /* a caster computes about a seventh of them in time */
     assert_int_equal(a.told_first, a.first_missing);
     /* What can be computed goes on coming; it does not end with what was computed ahead at the start. */
     assert_true(a.in_second_half > 0); /* how much is the machine's affair */
     assert_int_equal(atoi(client_ask(sh, "SYST:ERR?")), 103);
-    assert_int_equal(atoi(client_ask(sh, "SYST:ERR?")), 0); /* once per episode */
+    assert_int_equal(atoi(client_ask(sh, "SYST:ERR?")), 101); /* once per episode; the next one: the recorder left */
+    assert_int_equal(atoi(client_ask(sh, "SYST:ERR?")), 0);
     scanhead_close(sh);
     head_end(&head, SIGTERM);
+    a.readers = 2;
     check_balance(&a, wire);
+    assert_int_equal(rename(stats, wire_path(wire, "stats.json")), 0);
+    check_recorder(&a, wire);
 }
 
 static void test_overload_one_caster(void **state)
@@ -250,11 +295,12 @@ static void test_end_of_an_overloaded_run(void **state)
     struct head head = head_start(wire, room_config_write(wire, &config), more);
     struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
     client_until(sh, SCANHEAD_EV_SCAN_END, &frame);
+    uint64_t lost = frame.event_value[2];
     scanhead_close(sh);
     head_end(&head, 0);
     struct oracle oracle = oracle_of(&config, -40, 60, 100);
-    assert_int_equal(stats_uint(wire, "pulses") + stats_uint(wire, "lost_pulses"),
-                     oracle_count_cast(&oracle, 0, oracle_end(&oracle)));
+    check_sums(wire, &oracle, 1);
+    assert_int_equal(lost, stats_uint(wire, "lost_pulses"));
 }
 
 int main(void)

@@ -163,6 +163,49 @@ static void test_ply(void **state)
     free(text);
 }
 
+/* The stream again, with what older programs and viewers want. */
+static void record_again(const char *name)
+{
+    char from[352], to[352];
+    snprintf(from, sizeof from, "%s", wire_path(wire, "f.shs"));
+    snprintf(to, sizeof to, "%s", wire_path(wire, name));
+    const char *const args[] = {
+        "record", from,          "-o",           to,        "--colour", "label", "--las-version",
+        "1.2",    "--ply-names", "cloudcompare", "--quiet", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+}
+
+static void test_las_12(void **state)
+{
+    (void)state;
+    const double tolerance_m[N_STATIONS] = {DOUBLE_M, 0.5 * scale_m + DOUBLE_M};
+    record_again("f12.las");
+    run_reader("las.mjs", wire_path(wire, "f12.las"), wire_path(wire, "las12.xyz"));
+    char *text = wire_read(wire_path(wire, "las12.xyz"), NULL), *points = strchr(strchr(text, '\n') + 1, '\n') + 1;
+    assert_int_equal(strtoull(text, NULL, 10), n_truth);
+    assert_int_equal(compare(points, 0, tolerance_m), n_truth);
+    tell("LAS 1.2", "@loaders.gl/las", tolerance_m);
+    free(text);
+}
+
+/* CloudCompare lists as columns what it has loaded: colours and scalar fields. Its positions are floats, as for PTX. */
+static void test_ply_cloudcompare(void **state)
+{
+    (void)state;
+    const char *const argv[] = {
+        "CloudCompare",  "-SILENT", "-NO_TIMESTAMP", "-O", "-GLOBAL_SHIFT", "AUTO",         "cc.ply",
+        "-C_EXPORT_FMT", "ASC",     "-PREC",         "9",  "-ADD_HEADER",   "-SAVE_CLOUDS", NULL};
+    const double tolerance_m[N_STATIONS] = {6.1e-5, 6.1e-5};
+    static const char header[] = "//X Y Z R G B range reflectance time echo echo_count label station";
+    record_again("cc.ply");
+    run_well(argv);
+    char *text = wire_read(wire_path(wire, "cc.asc"), NULL);
+    assert_memory_equal(text, header, sizeof header - 1);
+    assert_int_equal(compare(strchr(text, '\n') + 1, 0, tolerance_m), n_truth);
+    tell("PLY", "CloudCompare", tolerance_m);
+    free(text);
+}
+
 /* The Point Cloud Library knows our properties and counts the same. */
 static void test_ply_pcl(void **state)
 {
@@ -268,9 +311,11 @@ static void test_all_crs(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_las), cmocka_unit_test(test_e57),     cmocka_unit_test(test_ptx),
-        cmocka_unit_test(test_ply), cmocka_unit_test(test_ply_pcl), cmocka_unit_test(test_pcapng),
-        cmocka_unit_test(test_crs), cmocka_unit_test(test_all_crs),
+        cmocka_unit_test(test_las),     cmocka_unit_test(test_e57),
+        cmocka_unit_test(test_ptx),     cmocka_unit_test(test_ply),
+        cmocka_unit_test(test_ply_pcl), cmocka_unit_test(test_pcapng),
+        cmocka_unit_test(test_las_12),  cmocka_unit_test(test_ply_cloudcompare),
+        cmocka_unit_test(test_crs),     cmocka_unit_test(test_all_crs),
     };
     return cmocka_run_group_tests(tests, set_up, wire_teardown);
 }

@@ -1,5 +1,8 @@
 /* `scanhead record` and the files it is to write: what can't be is refused before anything is scanned. */
 #include <dirent.h>
+#include <sys/inotify.h>
+
+#include "drivers/protocol/native_encode.h"
 
 #include "tests/wire/room.h"
 
@@ -144,6 +147,139 @@ static void test_duration_of_each(void **state)
     assert_int_equal(stats_uint(wire, "scans"), 2);
 }
 
+/* ---- completing a file */
+
+static void put_shot(FILE *out, uint32_t line, uint64_t pulse0)
+{
+    static uint8_t buf[1024];
+    uint32_t x[1] = {1000}, dt_ns[1] = {0};
+    int16_t refl_cdb[1] = {0};
+    uint16_t label[1] = {0};
+    uint8_t echo[1] = {0x11};
+    struct line_block block = {.line = line,
+                               .pulse0 = pulse0,
+                               .n_pulses = 1,
+                               .n_points = 1,
+                               .dt_ns = dt_ns,
+                               .a = x,
+                               .b = x,
+                               .c = x,
+                               .refl_cdb = refl_cdb,
+                               .echo = echo,
+                               .label = label};
+    size_t len = native_encode_points(buf, sizeof buf, &block, 0);
+    assert_true(len > 0 && fwrite(buf, 1, len, out) == len);
+}
+
+/* A scan whose descriptor says no end, and a shot in each of two lines of it. Returns the file's size. */
+static size_t write_two_lines(const struct wire *wire, const char *name, uint32_t line)
+{
+    static uint8_t buf[1024];
+    struct native_descriptor d = {.idn = "a,b,c,d", .layout = NATIVE_GEO, .prr_uhz = 1000000, .lines_uhz = 1000000};
+    struct native_anchor a = {.station = 1, .scale_m = 1e-3, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    FILE *out = fopen(wire_path(wire, name), "wb");
+    assert_non_null(out);
+    size_t len = native_encode_descriptor(buf, sizeof buf, &d, 0, 0);
+    assert_int_equal(fwrite(buf, 1, len, out), len);
+    len = native_encode_anchor(buf, sizeof buf, &a, 0, 0);
+    assert_int_equal(fwrite(buf, 1, len, out), len);
+    put_shot(out, 0, 0);
+    put_shot(out, line, line);
+    struct native_event end = {.code = NATIVE_EV_SCAN_END, .b = 2};
+    len = native_encode_event(buf, sizeof buf, &end, 0, 0);
+    assert_int_equal(fwrite(buf, 1, len, out), len);
+    len = (size_t)ftell(out);
+    assert_int_equal(fclose(out), 0);
+    return len;
+}
+
+/* A kilobyte of stream with lines 0 and 2^32 - 1: no 43 GB of empty places between. */
+static void test_lines_far_apart(void **state)
+{
+    struct wire *wire = *state;
+    char stream[352], ptx[352];
+    struct stat st;
+    assert_true(write_two_lines(wire, "a.shs", UINT32_MAX) < 1100);
+    snprintf(stream, sizeof stream, "%s", wire_path(wire, "a.shs"));
+    snprintf(ptx, sizeof ptx, "%s", wire_path(wire, "a.ptx"));
+    const char *const args[] = {"record", stream, "-o", ptx, "--quiet", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+    assert_int_equal(stat(ptx, &st), 0);
+    assert_in_range(st.st_size, 1, 2000);
+    char *err = wire_read(wire_path(wire, "err"), NULL);
+    assert_non_null(strstr(err, "1 grids begun within a scan"));
+    free(err);
+}
+
+static int has_bytes(const struct wire *wire, const char *name)
+{
+    struct stat st = {0};
+    return stat(wire_path(wire, name), &st) == 0 && st.st_size > 0;
+}
+
+static int has_percent(const struct wire *wire, const char *name)
+{
+    char *text = access(wire_path(wire, name), F_OK) == 0 ? wire_read(wire_path(wire, name), NULL) : NULL;
+    int has = text != NULL && strchr(text, '%') != NULL;
+    free(text);
+    return has;
+}
+
+/* Waits until the file is written to, and it is so. */
+static void wait_for(const struct wire *wire, const char *name, int (*is_so)(const struct wire *, const char *))
+{
+    _Alignas(struct inotify_event) char buf[4096];
+    struct pollfd p = {.fd = inotify_init1(IN_CLOEXEC), .events = POLLIN};
+    assert_true(inotify_add_watch(p.fd, wire->dir, IN_MODIFY) >= 0);
+    while (!is_so(wire, name)) {
+        assert_int_equal(poll(&p, 1, DEADLINE_MS), 1);
+        assert_true(read(p.fd, buf, sizeof buf) > 0);
+    }
+    close(p.fd);
+}
+
+/* A grid of 16 million places takes a second and more to write. A signal ends it, and leaves nothing behind. */
+static void test_signal_while_completing(void **state)
+{
+    struct wire *wire = *state;
+    char stream[352], ptx[352];
+    write_two_lines(wire, "a.shs", 16000000);
+    snprintf(stream, sizeof stream, "%s", wire_path(wire, "a.shs"));
+    snprintf(ptx, sizeof ptx, "%s", wire_path(wire, "a.ptx"));
+    const char *const args[] = {"record", stream, "-o", ptx, "--quiet", NULL};
+    pid_t pid = wire_spawn(wire, args, "out", "err", -1);
+    wait_for(wire, "a.ptx.part", has_bytes);
+    assert_int_equal(kill(pid, SIGTERM), 0);
+    assert_int_equal(wire_wait(wire, pid), 1);
+    char *err = wire_read(wire_path(wire, "err"), NULL);
+    assert_non_null(strstr(err, "a.ptx: interrupted while it was completed"));
+    free(err);
+    assert_int_equal(access(ptx, F_OK), -1);
+    assert_int_equal(access(wire_path(wire, "a.ptx.part"), F_OK), -1);
+}
+
+/* Two stations, of which the first takes long: less than half of it is done, and the share is known. The first report
+ * comes after a second. */
+static void test_percent(void **state)
+{
+    struct wire *wire = *state;
+    char config[352], path[352];
+    unsigned percent;
+    begin(wire, config);
+    snprintf(path, sizeof path, "%s", wire_path(wire, "a.shs"));
+    const char *const args[] = {"record", config,     "-o",     path,    "--station",
+                                "all",    "--frames", "100000", "--set", "stations.1.position_m=[1, 0, 0]",
+                                NULL};
+    wire_write_text(wire, "err", "");
+    pid_t pid = wire_spawn(wire, args, "out", "err", -1);
+    wait_for(wire, "err", has_percent);
+    assert_int_equal(kill(pid, SIGTERM), 0);
+    assert_int_equal(wire_wait(wire, pid), 1);
+    char *err = wire_read(wire_path(wire, "err"), NULL), *at = strstr(err, " M pulses: ");
+    if (at == NULL || sscanf(at, " M pulses: %u %%", &percent) != 1 || percent >= 50) fail_msg("%s", err);
+    free(err);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -152,6 +288,9 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_degrees, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_crs, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_duration_of_each, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_percent, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_lines_far_apart, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_signal_while_completing, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests_name("record files", tests, NULL, NULL);
 }

@@ -133,6 +133,54 @@ static void take_points(struct scanhead *sh, int frames)
     }
 }
 
+static void replay(struct wire *wire, const char *config, const char *journal, const char *pace, const char *threads,
+                   struct result *result)
+{
+    const char *const more[] = {"--pace", pace, "--threads", threads, "--replay-journal", journal, NULL};
+    struct head head = head_start(wire, config, more);
+    head_end(&head, 0);
+    stats_hash(wire, result->head);
+    result->pulses = stats_uint(wire, "pulses");
+    result->echoes = stats_uint(wire, "echoes");
+}
+
+/* What a head replays ends where its session ended, within a scan, too; a head that was killed left no end. */
+static void test_journal_ends_where_its_session_ended(void **state)
+{
+    struct wire *wire = *state;
+    struct result live, again;
+    struct room_config endless = SHORT;
+    char config[352], journal[352];
+    endless.frames = 0;
+    room_write(wire);
+    snprintf(config, sizeof config, "%s", room_config_write(wire, &endless));
+    snprintf(journal, sizeof journal, "%s", wire_path(wire, "session.journal"));
+    const char *const more[] = {"--journal", journal, NULL};
+    struct head head = head_start(wire, config, more);
+    struct scanhead *sh = listen_to(&head, "tcp");
+    client_tell(sh, "SCAN:STAR");
+    take_points(sh, 20);
+    scanhead_close(sh);
+    head_end(&head, SIGTERM); /* the last tick is the clock's choice */
+    stats_hash(wire, live.head);
+    live.pulses = stats_uint(wire, "pulses");
+    replay(wire, config, journal, "fast", "2", &again);
+    assert_string_equal(again.head, live.head);
+    assert_int_equal(again.pulses, live.pulses);
+    char *text = wire_read(journal, NULL), *end = strstr(text, " 0 END\n");
+    assert_non_null(end);
+    while (end > text && end[-1] != '\n')
+        end--;
+    wire_write(wire, "killed.journal", text, (size_t)(end - text));
+    free(text);
+    const char *const killed[] = {"--replay-journal", wire_path(wire, "killed.journal"), NULL};
+    head = head_start(wire, config, killed);
+    head_end(&head, SIGTERM);
+    char *said = wire_read(wire_path(wire, "head.err"), NULL);
+    assert_non_null(strstr(said, "killed.journal has no end"));
+    free(said);
+}
+
 /* A session in real time: settings change in mid-scan, each at a moment that the clock chose; the first scan
  * is stopped, a second one runs to its end; one command is refused. */
 static void live_session(struct wire *wire, const char *config, const char *journal, struct result *result)
@@ -165,49 +213,21 @@ static void live_session(struct wire *wire, const char *config, const char *jour
     finish(&head, sh, result);
 }
 
-/* duration: device time by which the session was over, with room. */
-static void replay(struct wire *wire, const char *config, const char *journal, const char *pace, const char *threads,
-                   const char *duration, struct result *result)
-{
-    const char *const more[] = {"--pace", pace,         "--threads", threads, "--replay-journal",
-                                journal,  "--duration", duration,    NULL};
-    struct head head = head_start(wire, config, more);
-    head_end(&head, 0);
-    stats_hash(wire, result->head);
-    result->pulses = stats_uint(wire, "pulses");
-    result->echoes = stats_uint(wire, "echoes");
-}
-
-static double journal_end_s(const char *journal)
-{
-    char *text = wire_read(journal, NULL), *last = text;
-    for (char *at = text; (at = strchr(at, '\n')) != NULL && at[1] != '\0';)
-        last = ++at;
-    uint64_t tick;
-    int64_t t_ns;
-    assert_int_equal(sscanf(last, "%" SCNu64 " %" SCNd64, &tick, &t_ns), 2);
-    free(text);
-    return 1e-9 * (double)t_ns;
-}
-
 static void test_journal_brings_back_a_session(void **state)
 {
     struct wire *wire = *state;
     struct result live, again;
-    char config[352], journal[352], duration[32];
+    char config[352], journal[352];
     room_write(wire);
     snprintf(config, sizeof config, "%s", room_config_write(wire, &SHORT));
     snprintf(journal, sizeof journal, "%s", wire_path(wire, "session.journal"));
     live_session(wire, config, journal, &live);
-    /* after the last command, a start: 0.1 s of scanning, spin-up and spin-down of 0.23 s; so 1 s is room
-     * enough */
-    snprintf(duration, sizeof duration, "%.3f", journal_end_s(journal) + 1.0);
-    replay(wire, config, journal, "fast", "1", duration, &again);
+    replay(wire, config, journal, "fast", "1", &again);
     assert_string_equal(again.head, live.head);
     assert_int_equal(again.pulses, live.pulses);
-    replay(wire, config, journal, "fast", "3", duration, &again);
+    replay(wire, config, journal, "fast", "3", &again);
     assert_string_equal(again.head, live.head);
-    replay(wire, config, journal, "realtime", "1", duration, &again);
+    replay(wire, config, journal, "realtime", "1", &again);
     assert_string_equal(again.head, live.head);
     assert_int_equal(again.echoes, live.echoes);
 }
@@ -218,6 +238,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_pace_threads_link, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_hash_tells_streams_apart, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_hash_of_an_idle_head, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_journal_ends_where_its_session_ended, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_journal_brings_back_a_session, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

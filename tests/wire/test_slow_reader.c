@@ -14,7 +14,7 @@ enum { HOLD_BYTES = 40 << 20 };
 /* What a reader has seen. */
 struct tally {
     struct scanhead *sh;
-    uint64_t frames, local, pulses, told_lost, told_events, told_total;
+    uint64_t frames, local, pulses, told_lost, told_pulses, told_events, told_total;
     uint32_t first_seq, last_seq;
     int over;
     int hold_fd; /* written to once HOLD_BYTES have come; -1: not */
@@ -30,6 +30,7 @@ static void take(struct tally *t, const struct scanhead_frame *frame)
     if (is_event(frame, SCANHEAD_EV_READER_LOST)) {
         if ((frame->flags & SCANHEAD_LOCAL) == 0) t->wrong = "a loss of one reader was told to all";
         t->told_lost += frame->event_value[0];
+        t->told_pulses += frame->event_value[1];
         t->told_total = frame->event_value[2];
         t->told_events++;
         return;
@@ -137,8 +138,11 @@ static void overtake(struct wire *wire, const char *more_yaml)
     head_end(&head, SIGTERM);
     /* The third reader, who only asked, may have lost some as well. */
     assert_true(stats_uint(wire, "reader_lost_frames") >= slow.told_lost + fast.told_lost);
-    if (fast.told_events == 0) assert_int_equal(stats_uint(wire, "pulses"), fast.pulses);
     assert_int_equal(stats_uint(wire, "lost_pulses"), 0);
+    assert_int_equal(stats_uint(wire, "cast_pulses"), stats_uint(wire, "pulses"));
+    /* To the pulse, for each: what it got and what it was told is what the head delivered. */
+    assert_int_equal(slow.pulses + slow.told_pulses, stats_uint(wire, "pulses"));
+    assert_int_equal(fast.pulses + fast.told_pulses, stats_uint(wire, "pulses"));
 }
 
 static void test_realtime(void **state)
@@ -184,6 +188,24 @@ static void test_fast(void **state)
     assert_int_equal(stats_uint(wire, "reader_lost_frames"), 0);
 }
 
+/* What the recorder counts, and what the head says. The recorder was there for the whole scan. */
+static void check_recorder(struct wire *wire, const char *stats)
+{
+    uint64_t fired = stats_uint(wire, "fired_pulses"), cast = stats_uint(wire, "cast_pulses"),
+             delivered = stats_uint(wire, "pulses"), lost = stats_uint(wire, "lost_pulses");
+    uint64_t left_out = stats_link_uint(wire, "left_out_pulses");
+    assert_int_equal(cast, delivered + lost);
+    assert_int_equal(stats_link_uint(wire, "received_pulses") + left_out, 2 * delivered); /* and a reader beside it */
+    assert_int_equal(rename(stats, wire_path(wire, "stats.json")), 0);
+    assert_int_equal(stats_uint(wire, "scans"), 1);
+    assert_int_equal(stats_uint(wire, "fired_pulses"), fired);
+    assert_int_equal(stats_uint(wire, "cast_pulses"), cast);
+    assert_int_equal(stats_uint(wire, "lost_pulses"), lost);
+    assert_in_range(stats_uint(wire, "missing_pulses"), 1, left_out);
+    assert_int_equal(stats_uint(wire, "pulses") + stats_uint(wire, "missing_pulses"), delivered);
+    assert_int_equal(stats_uint(wire, "reader_lost_pulses"), stats_uint(wire, "missing_pulses"));
+}
+
 /* A recorder that stands still until the scan is over has lost its end, after which a head says nothing by itself: it
  * is told the loss, asks, and ends. */
 static void test_end_lost(void **state)
@@ -197,7 +219,9 @@ static void test_end_lost(void **state)
     room_write(wire);
     struct head head = head_start(wire, room_config_write(wire, &config), NULL);
     struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
-    const char *const args[] = {"record", head_endpoint(&head, "tcp"), "--quiet", "--stats", "/dev/null", NULL};
+    char stats[352];
+    snprintf(stats, sizeof stats, "%s", wire_path(wire, "recorder.json"));
+    const char *const args[] = {"record", head_endpoint(&head, "tcp"), "--quiet", "--stats", stats, NULL};
     pid_t pid = wire_spawn(wire, args, "record.out", "record.err", -1);
     client_until(sh, SCANHEAD_EV_SCAN_START, &frame);
     assert_int_equal(kill(pid, SIGSTOP), 0);
@@ -211,6 +235,7 @@ static void test_end_lost(void **state)
     free(said);
     scanhead_close(sh);
     head_end(&head, SIGTERM);
+    check_recorder(wire, stats);
 }
 
 int main(void)

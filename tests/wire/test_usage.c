@@ -12,7 +12,8 @@ static const char GOOD[] = "head: {profile: full-sweep, prr_hz: 100000, lines_hz
                            "    - {file: room.obj, up: z, scale: 1}\n"
                            "stations:\n"
                            "  - {position_m: [0, 0, 0]}\n"
-                           "links: [{type: \"null\"}]\n";
+                           "links: [{type: \"null\"}]\n"
+                           "plan: {tolerance_m: 1e-3}\n"; /* and a tenth of it for meshes */
 
 /* How many files the folder holds. */
 static int count_files(const struct wire *wire)
@@ -87,19 +88,16 @@ static const struct config_case CONFIGS[] = {
     {"unit in the value",
      "prr_hz: 100000",
      "prr_hz: 100 kHz",
-     {"config.yaml:1:", "head.prr_hz", "not a number", "1 to 10000000 Hz"}},
-    {"NaN",
-     "prr_hz: 100000",
-     "prr_hz: .nan",
-     {"config.yaml:1:", "head.prr_hz", "not a number", "1 to 10000000 Hz"}},
+     {"config.yaml:1:", "head.prr_hz", "not a number", "1000 to 2200000 Hz"}},
+    {"NaN", "prr_hz: 100000", "prr_hz: .nan", {"config.yaml:1:", "head.prr_hz", "not a number", "1000 to 2200000 Hz"}},
     {"nan", "prr_hz: 100000", "prr_hz: nan", {"config.yaml:1:", "head.prr_hz"}},
-    {"infinity", "lines_hz: 50", "lines_hz: .inf", {"config.yaml:1:", "head.lines_hz", "0.25 to 10000 Hz"}},
+    {"infinity", "lines_hz: 50", "lines_hz: .inf", {"config.yaml:1:", "head.lines_hz", "4 to 1000 Hz"}},
     {"above the profile",
      "prr_hz: 100000",
      "prr_hz: 2200000.1",
      {"config.yaml:1:", "head.prr_hz", "1000 to 2200000 Hz"}},
     {"below the profile", "lines_hz: 50", "lines_hz: 3.9", {"config.yaml:1:", "head.lines_hz", "4 to 1000 Hz"}},
-    {"negative speed", "pan_deg_s: 100", "pan_deg_s: -1", {"config.yaml:1:", "head.pan_deg_s", "0 to 3600 deg/s"}},
+    {"negative speed", "pan_deg_s: 100", "pan_deg_s: -1", {"config.yaml:1:", "head.pan_deg_s", "0 to 360 deg/s"}},
     {"finer than a micro-unit", "lines_hz: 50", "lines_hz: 50.0000001", {"config.yaml:1:", "head.lines_hz"}},
     {"a list for a number", "lines_hz: 50", "lines_hz: [50]", {"config.yaml:1:", "head.lines_hz"}},
     {"text for a number", "lines_hz: 50", "lines_hz: fifty", {"config.yaml:1:", "head.lines_hz", "fifty"}},
@@ -231,9 +229,11 @@ static void test_meshes(void **state)
     write_config(wire, "file: room.obj", "file: dir.obj");
     snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
     expect(wire, "directory", (const char *const[]){"run", config, NULL}, 2,
-           (const char *const[]){"config.yaml:4:", "dir.obj is not a file", NULL});
+           (const char *const[]){"config.yaml:4:", "dir.obj: a directory, not a file", NULL});
     assert_int_equal(complaints, 0);
 }
+
+static const char JOURNAL[] = "# scanhead journal 1\n0 0 1 *RST\n";
 
 /* ---- options. CONFIG stands for a good configuration, DIR for the folder. */
 
@@ -241,11 +241,38 @@ static const struct {
     const char *args[8];
     const char *says[3];
 } OPTIONS[] = {
-    {{"fly"}, {"unknown command fly", "--help"}},
+    {{"fly"}, {"unknown command fly;", "--help"}},
+    {{"recrod", "CONFIG"}, {"unknown command recrod, did you mean record?"}},
     {{"run"}, {"one CONFIG"}},
-    {{"run", "CONFIG", "CONFIG"}, {"one CONFIG"}},
+    {{"run", "CONFIG", "CONFIG"}, {"one CONFIG is needed, and 2 are given", "config.yaml, ", "config.yaml; see"}},
+    {{"run", "--", "CONFIG", "--start"}, {"one CONFIG is needed, and 2 are given", "--start"}},
+    {{"report", "CONFIG", "DIR/x.ply", "DIR/y.ply"}, {"y.ply is one too many"}},
+    {{"run", "DIR/scan.shs"}, {"scan.shs is a recorded stream", "scanhead record ", "scan.shs -o points.ply"}},
+    {{"check", "DIR/SCAN.SHS"}, {"SCAN.SHS is a recorded stream"}},
+    {{"plan", "DIR/room.obj"}, {"room.obj is a mesh", "scanhead init ", "room.obj writes a configuration"}},
+    {{"record", "DIR/room.ifc", "-o", "DIR/x.ply"}, {"room.ifc is a mesh, and SOURCE is a head", "scanhead init "}},
+    {{"report", "DIR/x.ply", "CONFIG"}, {"x.ply is a mesh or a point cloud, and CONFIG is a configuration"}},
+    {{"check", "DIR/x.las"}, {"x.las is a recording", "scanhead report CONFIG "}},
+    {{"run", "CONFIG", "-start"}, {"-start: did you mean --start?"}},
+    {{"run", "CONFIG", "-stats=x"}, {"-stats=x: did you mean --stats?"}},
+    {{"run", "CONFIG", "--strat"}, {"unknown option --strat, did you mean --start?"}},
+    {{"run", "CONFIG", "--thread=2", "--durations", "2"}, {"unknown option --durations, did you mean --duration?"}},
+    {{"run", "CONFIG", "--start=1"}, {"--start=1: the option takes no value"}},
+    {{"record", "CONFIG", "-out", "DIR/x.ply"}, {"-out: did you mean --output FILE, or -o FILE?"}},
+    {{"record", "-out", "DIR/x.ply", "CONFIG"}, {"-out: did you mean --output FILE, or -o FILE?"}},
+    {{"record", "CONFIG", "-o", "DIR/x.ply", "-station", "2"}, {"-station: did you mean --station?"}},
     {{"run", "DIR/none.yaml"}, {"none.yaml", "No such file"}},
     {{"run", "DIR"}, {"irectory"}},
+    {{"run", "DIR/fifo"}, {"fifo: cannot be opened: a FIFO, not a file"}},
+    {{"run", "CONFIG", "--replay-journal", "DIR/fifo"}, {"fifo: a FIFO, not a file"}},
+    {{"run", "CONFIG", "--replay-journal", "/dev/zero"}, {"/dev/zero: a device, not a file"}},
+    {{"run", "CONFIG", "--journal", "DIR/journal", "--replay-journal", "DIR/./journal"}, {"--journal ", "overwrite"}},
+    {{"run", "CONFIG", "--journal", "DIR/link", "--replay-journal", "DIR/journal"}, {"--journal ", "overwrite"}},
+    {{"check", "CONFIG", "--set", "platform.kind=trajectory", "--set", "platform.file=DIR/fifo"},
+     {"fifo: a FIFO, not a file"}},
+    {{"record", "DIR/fifo.shs", "-o", "DIR/x.ply"}, {"fifo.shs: is a FIFO, not a recorded stream"}},
+    {{"report", "CONFIG", "DIR/fifo"}, {"fifo: a FIFO, not a file"}},
+    {{"check", "--help", "haed"}, {"no section \"haed\", did you mean head?", "scene, stations", "profile"}},
     {{"run", "CONFIG", "--fast"}, {"--fast", "run --help"}},
     {{"run", "CONFIG", "--pace"}, {"--pace", "needs a value"}},
     {{"run", "CONFIG", "--pace", "foo"}, {"loop.pace", "realtime", "step"}},
@@ -260,7 +287,7 @@ static const struct {
     {{"run", "CONFIG", "--ready-fd", "zero"}, {"--ready-fd zero", "1 to 65535"}},
     {{"run", "CONFIG", "--quiet", "--ready-fd", "77"}, {"--ready-fd 77"}},
     {{"run", "CONFIG", "--set", "head.prr_hz"}, {"--set", "head.prr_hz"}},
-    {{"run", "CONFIG", "--set", "head.prr_hz=fast"}, {"--set head.prr_hz", "not a number", "1 to 10000000 Hz"}},
+    {{"run", "CONFIG", "--set", "head.prr_hz=fast"}, {"--set head.prr_hz", "not a number", "1000 to 2200000 Hz"}},
     {{"run", "CONFIG", "--set", "head.colour=red"}, {"--set", "head.colour"}},
     {{"run", "CONFIG", "--set", "links[3].type=tcp"}, {"links[3]"}},
     {{"run", "CONFIG", "--set", "links=[]"}, {"links"}},
@@ -270,7 +297,7 @@ static const struct {
     {{"check", "CONFIG", "--pace", "fast"}, {"--pace"}},
     {{"report", "CONFIG"}, {"one CONFIG and one CLOUD", "report --help"}},
     {{"report", "CONFIG", "DIR/x.ply", "--max-m", "0"}, {"--max-m 0", "1000000000"}},
-    {{"report", "CONFIG", "DIR/x.ply", "--json=1"}, {"unknown option --json=1"}},
+    {{"report", "CONFIG", "DIR/x.ply", "--json=1"}, {"--json=1: the option takes no value"}},
     {{"map", "CONFIG", "-o", "DIR/x.png", "--pixel-m", "1m"}, {"--pixel-m 1m", "0.0001 to 10000"}},
     {{"record", "CONFIG", "-o", "DIR/x.ply", "--frames", "1.5"}, {"--frames 1.5", "whole number from 0"}},
     {{"record", "CONFIG"}, {"-o FILE"}},
@@ -282,9 +309,11 @@ static const struct {
     {{"record", "CONFIG", "-o", "DIR/x.ply", "--crs", "moon"}, {"output.crs", "utm"}},
     {{"record", "tcp:localhost", "-o", "DIR/x.ply"}, {"tcp:localhost", "PORT"}},
     {{"record", "DIR/none.shs", "-o", "DIR/x.ply"}, {"none.shs", "No such file"}},
-    {{"record", "tty:DIR/none", "-o", "DIR/x.ply"}, {"none", "No such file"}},
     {{"record", "tty:/dev/null", "-o", "DIR/x.ply"}, {"/dev/null", "terminal"}},
     {{"record", "tcp:localhost:1", "--set", "a=b", "-o", "DIR/x.ply"}, {"--set", "CONFIG"}},
+    {{"record", "CONFIG", "-o", "DIR/x.las", "--las-version", "1.3"}, {"--las-version 1.3", "1.2, 1.4"}},
+    {{"record", "CONFIG", "-o", "DIR/x.ply", "--colour", "red"}, {"--colour red", "reflectance, label"}},
+    {{"record", "CONFIG", "-o", "DIR/x.ply", "--ply-names", "x"}, {"--ply-names x", "scanhead, cloudcompare"}},
     {{"map", "CONFIG"}, {"-o"}},
     {{"list", "all"}, {"no arguments"}},
 };
@@ -308,6 +337,10 @@ static void test_options(void **state)
     complaints = 0;
     room_write(wire);
     wire_write_text(wire, "config.yaml", GOOD);
+    wire_write_text(wire, "journal", JOURNAL);
+    assert_int_equal(symlink("journal", wire_path(wire, "link")), 0);
+    assert_int_equal(mkfifo(wire_path(wire, "fifo"), 0600), 0);
+    assert_int_equal(mkfifo(wire_path(wire, "fifo.shs"), 0600), 0);
     for (size_t i = 0; i < sizeof OPTIONS / sizeof OPTIONS[0]; i++) {
         char word[8][352], what[128] = "";
         const char *args[9] = {0};
@@ -319,6 +352,9 @@ static void test_options(void **state)
                                     OPTIONS[i].says[1] ? OPTIONS[i].says[2] : NULL, NULL};
         expect(wire, what, args, 2, says);
     }
+    char *journal = wire_read(wire_path(wire, "journal"), NULL);
+    assert_string_equal(journal, JOURNAL);
+    free(journal);
     assert_int_equal(complaints, 0);
 }
 
@@ -429,7 +465,7 @@ static void test_system_failures(void **state)
     expect(wire, "statistics in no folder",
            (const char *const[]){"run", config, "--duration", "0.1", "--pace", "fast", "--quiet", "--stats", "/none/x",
                                  NULL},
-           1, (const char *const[]){"/none/x", "No such file", NULL});
+           2, (const char *const[]){"/none/x", "No such file", NULL});
     struct sockaddr_in at = {.sin_family = AF_INET};
     socklen_t len = sizeof at;
     int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);

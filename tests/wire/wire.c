@@ -215,15 +215,27 @@ void head_end(struct head *head, int signal_number)
     assert_int_equal(status, 0);
 }
 
-uint64_t stats_uint(const struct wire *wire, const char *key)
+/* The first value of the key after the text `from`. */
+static uint64_t find_uint(const struct wire *wire, const char *from, const char *key)
 {
     char *text = wire_read(wire_path(wire, "stats.json"), NULL), name[64];
     snprintf(name, sizeof name, "\"%s\":", key);
-    const char *at = strstr(text, name);
+    const char *at = strstr(text, from);
+    if (at != NULL) at = strstr(at, name);
     if (at == NULL) fail_msg("no %s in %s", key, text);
     uint64_t value = strtoull(at + strlen(name), NULL, 10);
     free(text);
     return value;
+}
+
+uint64_t stats_uint(const struct wire *wire, const char *key)
+{
+    return find_uint(wire, "{", key);
+}
+
+uint64_t stats_link_uint(const struct wire *wire, const char *key)
+{
+    return find_uint(wire, "\"links\":", key);
 }
 
 void stats_hash(const struct wire *wire, char hex[65])

@@ -101,6 +101,9 @@ void head_end(struct head *head, int signal_number);
 
 uint64_t stats_uint(const struct wire *wire, const char *key);
 
+/* The same of the first link: received_pulses, left_out_pulses, left_out_frames. */
+uint64_t stats_link_uint(const struct wire *wire, const char *key);
+
 void stats_hash(const struct wire *wire, char hex[65]);
 
 /* ---- clients */

@@ -1,0 +1,30 @@
+#include "core/infile.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+/* NULL: a regular file. */
+static const char *why_none(mode_t mode)
+{
+    if (S_ISREG(mode)) return NULL;
+    if (S_ISDIR(mode)) return "a directory, not a file";
+    if (S_ISFIFO(mode)) return "a FIFO, not a file";
+    return "a device, not a file";
+}
+
+FILE *infile_open(const char *path, const char **why)
+{
+    struct stat st;
+    FILE *file = NULL;
+    /* O_NONBLOCK: opening a FIFO does not wait. Reading a regular file is the same with it. */
+    const int fd = open(path, O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+    if (fd < 0 || fstat(fd, &st) != 0)
+        *why = errno == ENXIO ? "a socket or a device, not a file" : strerror(errno);
+    else if ((*why = why_none(st.st_mode)) == NULL && (file = fdopen(fd, "rb")) == NULL)
+        *why = strerror(errno);
+    if (file == NULL && fd >= 0) close(fd);
+    return file;
+}

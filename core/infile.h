@@ -1,0 +1,14 @@
+/* Opens input files. In: a path. Out: a stream to read; or why there is none, in words for a message.
+ *
+ * Only regular files: a FIFO waits for a writer, perhaps for ever, and a device may have no end. Every reader
+ * of files that a user names opens them here. */
+#ifndef CORE_INFILE_H
+#define CORE_INFILE_H
+
+#include <stdio.h>
+
+/* Opens path for reading; never waits. NULL on failure, with *why: "No such file or directory", "a FIFO,
+ * not a file", ... The words live until the thread's next call of strerror. */
+FILE *infile_open(const char *path, const char **why);
+
+#endif

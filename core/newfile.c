@@ -1,0 +1,211 @@
+#include "core/newfile.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <libgen.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { TRIES = 100 }; /* each lost to another writer that ended at that moment */
+
+static int code_of(int error)
+{
+    switch (error) {
+    case EACCES:
+    case EPERM:
+    case EROFS:
+        return SH_EPERM;
+    case ENOENT:
+    case ENOTDIR:
+    case EISDIR:
+    case ENAMETOOLONG:
+    case ENXIO:
+        return SH_EINPUT;
+    default:
+        return SH_EIO;
+    }
+}
+
+static int fail(const char *path, const char *what, struct sh_err *err)
+{
+    int error = errno;
+    return sh_fail(err, code_of(error), "%s: cannot %s: %s", path, what, strerror(error));
+}
+
+/* ---- what may not be written to */
+
+static int fail_link(const char *path, struct sh_err *err)
+{
+    char to[200];
+    ssize_t n = readlink(path, to, sizeof to - 1);
+    to[n > 0 ? n : 0] = '\0';
+    return sh_fail(err, SH_EINPUT,
+                   "%s: is a symbolic link to %s; links are not followed: remove it, or name its target", path, to);
+}
+
+static int fail_hard_link(const char *path, const struct stat *st, struct sh_err *err)
+{
+    return sh_fail(err, SH_EINPUT, "%s: is a file with %lu names (hard links), which would all change; remove it first",
+                   path, (unsigned long)st->st_nlink);
+}
+
+/* Names in /dev itself and in /proc are the system's, which nobody else can place. */
+static int is_systems(const char *path)
+{
+    char copy[PATH_MAX], folder[PATH_MAX];
+    if (strlen(path) >= sizeof copy) return 0;
+    strcpy(copy, path);
+    if (realpath(dirname(copy), folder) == NULL) return 0;
+    return strcmp(folder, "/dev") == 0 || strncmp(folder, "/proc/", 6) == 0;
+}
+
+static const char *kind_of(mode_t mode)
+{
+    return S_ISDIR(mode)    ? "directory"
+           : S_ISFIFO(mode) ? "FIFO"
+           : S_ISSOCK(mode) ? "socket"
+           : S_ISCHR(mode)  ? "character device"
+                            : "block device";
+}
+
+/* What a rename may replace. */
+static int check_target(const char *path, struct sh_err *err)
+{
+    struct stat st;
+    if (lstat(path, &st) != 0) return errno == ENOENT ? SH_OK : fail(path, "create", err);
+    if (S_ISLNK(st.st_mode)) return fail_link(path, err);
+    if (!S_ISREG(st.st_mode))
+        return sh_fail(err, SH_EINPUT, "%s: is a %s; allowed is the name of a file, or one that is free", path,
+                       kind_of(st.st_mode));
+    return SH_OK;
+}
+
+/* ---- files in place */
+
+int newfile_open(const char *path, int *out, struct sh_err *err)
+{
+    const int flags = O_WRONLY | O_CREAT | O_NONBLOCK | O_NOCTTY | O_CLOEXEC; /* a FIFO can't hold us in open */
+    struct stat st;
+    int fd = open(path, flags | O_NOFOLLOW, 0666);
+    if (fd < 0 && errno == ELOOP) {
+        if (!is_systems(path)) return fail_link(path, err);
+        fd = open(path, flags, 0666);
+    }
+    if (fd < 0 && errno == ENXIO)
+        return sh_fail(err, SH_EINPUT,
+                       "%s: is a FIFO that nobody reads, or a socket; allowed are a regular file, a device, and a FIFO "
+                       "with a reader",
+                       path);
+    if (fd < 0) return fail(path, "be opened for writing", err);
+    int rc = SH_OK;
+    if (fstat(fd, &st) != 0 || fcntl(fd, F_SETFL, 0) != 0) rc = fail(path, "be opened for writing", err);
+    if (rc == SH_OK && S_ISREG(st.st_mode) && st.st_nlink > 1) rc = fail_hard_link(path, &st, err);
+    if (rc == SH_OK && S_ISREG(st.st_mode) && ftruncate(fd, 0) != 0) rc = fail(path, "be emptied", err);
+    if (rc != SH_OK)
+        close(fd);
+    else
+        *out = fd;
+    return rc;
+}
+
+/* ---- files that appear whole */
+
+/* One that is there, and not made just now: left by a writer that was killed, or put there by somebody. */
+static int check_left(const char *part, int fd, struct sh_err *err)
+{
+    struct stat st;
+    if (fstat(fd, &st) != 0) return fail(part, "create", err);
+    if (!S_ISREG(st.st_mode))
+        return sh_fail(err, SH_EINPUT, "%s: is a %s, where a file is to be made; remove it", part, kind_of(st.st_mode));
+    if (st.st_uid != geteuid())
+        return sh_fail(err, SH_EINPUT, "%s: is a file of another user, where one is to be made; remove it", part);
+    return st.st_nlink > 1 ? fail_hard_link(part, &st, err) : SH_OK;
+}
+
+/* 1: part is open. 0: it came or went in between, try again. Negative: it can't be. */
+static int open_part(const char *part, int *fd, struct sh_err *err)
+{
+    const int flags = O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC;
+    *fd = open(part, flags | O_CREAT | O_EXCL, 0666);
+    if (*fd >= 0) return 1;
+    if (errno != EEXIST) return fail(part, "create", err);
+    *fd = open(part, flags);
+    if (*fd < 0 && errno == ENOENT) return 0;
+    if (*fd < 0 && errno == ELOOP) return fail_link(part, err);
+    if (*fd < 0) return fail(part, "create", err);
+    int rc = check_left(part, *fd, err);
+    if (rc != SH_OK) close(*fd);
+    return rc == SH_OK ? 1 : rc;
+}
+
+/* Does part still name what was opened? Another writer may have renamed it before we had the lock. */
+static int is_named(const char *part, int fd)
+{
+    struct stat open_st, named;
+    return fstat(fd, &open_st) == 0 && lstat(part, &named) == 0 && open_st.st_dev == named.st_dev &&
+           open_st.st_ino == named.st_ino;
+}
+
+int newfile_part(const char *path, const char *part, int *out, struct sh_err *err)
+{
+    int rc = check_target(path, err), fd;
+    for (int i = 0; rc == SH_OK && i < TRIES; i++) {
+        rc = open_part(part, &fd, err);
+        if (rc == 0) continue;
+        if (rc < 0) break;
+        rc = SH_OK;
+        if (flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+            rc = sh_fail(err, SH_EINPUT, "%s: is being written by another recording; allowed is a file of its own",
+                         part);
+        /* a file system without locks has none to offer; then the name alone counts */
+        else if (is_named(part, fd)) {
+            if (ftruncate(fd, 0) != 0) rc = fail(part, "create", err);
+            if (rc == SH_OK) {
+                *out = fd;
+                return SH_OK;
+            }
+        }
+        close(fd);
+    }
+    return rc != SH_OK ? rc : sh_fail(err, SH_EIO, "%s: comes and goes; other programs write it", part);
+}
+
+/* So that the new name survives a power cut as well. Some file systems can't sync a directory; then they need
+ * not. */
+static void sync_folder(const char *path)
+{
+    char *copy = strdup(path);
+    if (copy == NULL) return;
+    int fd = open(dirname(copy), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (fd >= 0) {
+        fsync(fd);
+        close(fd);
+    }
+    free(copy);
+}
+
+int newfile_keep(const char *path, const char *part, int fd, struct sh_err *err)
+{
+    int rc = check_target(path, err);
+    if (rc == SH_OK && fsync(fd) != 0) rc = fail(part, "be synced", err);
+    if (rc == SH_OK && rename(part, path) != 0)
+        rc = sh_fail(err, code_of(errno), "%s: cannot be renamed to %s: %s", part, path, strerror(errno));
+    if (rc != SH_OK) {
+        newfile_drop(part, fd);
+        return rc;
+    }
+    close(fd); /* and with it the lock: from here on part is free for the next one */
+    sync_folder(path);
+    return SH_OK;
+}
+
+void newfile_drop(const char *part, int fd)
+{
+    unlink(part); /* ours as long as it is locked */
+    close(fd);
+}

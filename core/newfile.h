@@ -1,0 +1,30 @@
+/* Files that the program makes: recordings, streams, statistics, journals, maps. In: a path. Out: an empty
+ * file behind a descriptor.
+ *
+ * The one rule for links: a symbolic link at the last name of a path is refused, whoever made it. In a folder
+ * like /tmp anybody can put one there, and the program would write where it leads. Links to folders are
+ * followed, and so are the system's own, /dev/stdout, /dev/stderr and /dev/fd/N. A file with further names
+ * (hard links) is not overwritten either.
+ *
+ * Any thread. Errors name the path: SH_EINPUT (no such folder, a link, the wrong kind of file), SH_EPERM,
+ * SH_EIO. */
+#ifndef CORE_NEWFILE_H
+#define CORE_NEWFILE_H
+
+#include "core/err.h"
+
+/* A file that is written in place: made, or emptied. Devices are taken as they are, and pipes that have a
+ * reader. *fd is for writing, and blocks. */
+int newfile_open(const char *path, int *fd, struct sh_err *err);
+
+/* A file that appears at `path` whole or not at all. It is written as `part` in the same folder, and renamed
+ * at the end. `path` is free or a regular file: nothing else is ever replaced. `part` is locked as long as it
+ * has its name, so that a second writer of the same file is refused. What a writer that was killed has left
+ * there is taken over. *fd is for reading and writing. */
+int newfile_part(const char *path, const char *part, int *fd, struct sh_err *err);
+/* Syncs, renames and closes; after a failure part is removed. Takes fd in any case. */
+int newfile_keep(const char *path, const char *part, int fd, struct sh_err *err);
+/* Removes part and closes. */
+void newfile_drop(const char *part, int fd);
+
+#endif

@@ -1,0 +1,23 @@
+/* Private to core/scene/import_*.c: materials of Assimp -> colour and textures of a surface. */
+#ifndef CORE_SCENE_IMPORT_MATERIAL_H
+#define CORE_SCENE_IMPORT_MATERIAL_H
+
+#include "core/scene/build.h"
+
+struct aiScene;
+struct aiMaterial;
+
+/* What the material says of a surface; what is there already stays. */
+int import_material(struct scene_build *b, const struct aiScene *in, const struct aiMaterial *material,
+                    struct scene_surface *surface, struct sh_err *err);
+
+/* How the material's textures lie on a mesh: coordinates of a set, times scale, plus shift. */
+struct import_uv {
+    unsigned set;
+    double scale[2], shift[2];
+    bool is_turned; /* and turned, which is not read: Assimp says it in ways that differ by format */
+};
+/* material: NULL for none. */
+void import_uv(const struct aiMaterial *material, struct import_uv *uv);
+
+#endif

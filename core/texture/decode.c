@@ -1,0 +1,189 @@
+/* Images through stb_image, in memory that is counted: what a hostile file asks for has a limit. */
+#include "core/texture.h"
+
+#include <limits.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "core/text.h"
+
+/* A block's size stands before it. */
+enum { HEAD = 16 };
+static _Thread_local size_t memory_left;
+
+static void *counted_realloc(void *old, size_t size)
+{
+    char *block = old != NULL ? (char *)old - HEAD : NULL;
+    size_t had = 0;
+    if (block != NULL) memcpy(&had, block, sizeof had);
+    if (size > TEXTURE_MAX_MEMORY || (size > had && size - had > memory_left)) return NULL;
+    block = realloc(block, HEAD + size);
+    if (block == NULL) return NULL;
+    memory_left = memory_left + had - size;
+    memcpy(block, &size, sizeof size);
+    return block + HEAD;
+}
+
+static void *counted_alloc(size_t size)
+{
+    return counted_realloc(NULL, size);
+}
+
+static void counted_free(void *p)
+{
+    size_t had;
+    if (p == NULL) return;
+    char *block = (char *)p - HEAD;
+    memcpy(&had, block, sizeof had);
+    memory_left += had;
+    free(block);
+}
+
+/* As a header of the system it gives no warnings; static, its functions that are left out would. */
+#define STB_IMAGE_IMPLEMENTATION
+#define STBI_NO_STDIO
+#define STBI_NO_HDR
+#define STBI_NO_LINEAR
+#define STBI_ONLY_PNG
+#define STBI_ONLY_JPEG
+#define STBI_ONLY_TGA
+#define STBI_ONLY_BMP
+#define STBI_MAX_DIMENSIONS   TEXTURE_MAX_SIDE
+#define STBI_MALLOC(size)     counted_alloc(size)
+#define STBI_REALLOC(p, size) counted_realloc(p, size)
+#define STBI_FREE(p)          counted_free(p)
+#include <stb/stb_image.h>
+
+static int check_size(const char *file, uint32_t width, uint32_t height, struct sh_err *err)
+{
+    if (width > 0 && height > 0 && width <= TEXTURE_MAX_SIDE && height <= TEXTURE_MAX_SIDE &&
+        (uint64_t)width * height <= TEXTURE_MAX_TEXELS)
+        return SH_OK;
+    return sh_fail(err, SH_EINPUT, "%s: %u x %u texels; allowed are 1 to %d a side, and up to %d in all", file, width,
+                   height, TEXTURE_MAX_SIDE, TEXTURE_MAX_TEXELS);
+}
+
+static int fail_read(const char *file, const char *why, struct sh_err *err)
+{
+    return sh_fail(err, SH_EINPUT, "%s: no image that can be read (%s); allowed are PNG, JPEG, TGA and BMP", file, why);
+}
+
+/* Blue, green, red, alpha to red, green, blue, alpha. */
+static int unpack(const struct texture_source *s, struct texture_image *image, struct sh_err *err)
+{
+    size_t n = (size_t)s->raw_width * s->raw_height;
+    int rc = check_size(s->file, s->raw_width, s->raw_height, err);
+    if (rc != SH_OK) return rc;
+    if (s->n_bytes < 4 * n) return fail_read(s->file, "it is cut off", err);
+    memory_left = TEXTURE_MAX_MEMORY;
+    image->rgba = counted_alloc(4 * n);
+    if (image->rgba == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory", s->file);
+    for (size_t i = 0; i < n; i++)
+        for (size_t c = 0; c < 4; c++)
+            image->rgba[4 * i + c] = s->bytes[4 * i + (c < 3 ? 2 - c : 3)];
+    image->width = s->raw_width;
+    image->height = s->raw_height;
+    image->has_alpha = 1;
+    return SH_OK;
+}
+
+/* Many writers of TGA and BMP leave a fourth channel of zeros: that is no alpha. (A PNG's is meant.) */
+static void drop_unused_alpha(const uint8_t *bytes, struct texture_image *image)
+{
+    size_t n = (size_t)image->width * image->height, i = 0;
+    if (!image->has_alpha || bytes[0] == 0x89) return;
+    while (i < n && image->rgba[4 * i + 3] == 0)
+        i++;
+    if (i < n) return;
+    for (i = 0; i < n; i++)
+        image->rgba[4 * i + 3] = 255;
+    image->has_alpha = 0;
+}
+
+/* A PNG without an alpha channel may name a colour that is transparent. */
+static int has_transparent_colour(const uint8_t *bytes, size_t n)
+{
+    const uint8_t *data = memmem(bytes, n, "IDAT", 4);
+    return bytes[0] == 0x89 && memmem(bytes, data != NULL ? (size_t)(data - bytes) : n, "tRNS", 4) != NULL;
+}
+
+/* stb_image fills in what a TGA or BMP lacks, in silence. Both say the bits of a texel; packed ones are as
+ * long as they are. */
+static int is_cut_off(const uint8_t *bytes, size_t n, uint64_t texels)
+{
+    if (n < 31 || bytes[0] == 0x89 || (bytes[0] == 0xff && bytes[1] == 0xd8)) return 0;
+    const int is_bmp = bytes[0] == 'B' && bytes[1] == 'M', is_packed = is_bmp ? bytes[30] == 1 : bytes[2] > 3;
+    const uint64_t first = is_bmp ? bytes[10] + 256U * bytes[11] : 18U + bytes[0]; /* byte of the texels */
+    return !is_packed && first + texels * bytes[is_bmp ? 28 : 16] / 8 > n;
+}
+
+/* A table of a JPEG's Huffman codes that says more than 256 of them: stb_image 2.27 writes them all, past
+ * the end of its array. Every place that looks like such a table is asked, since a decoder may get to any
+ * of them. */
+static int has_long_table(const uint8_t *bytes, size_t n)
+{
+    const uint8_t *end = bytes + n, *marker = bytes;
+    if (bytes[0] != 0xff || bytes[1] != 0xd8) return 0;
+    while ((marker = memmem(marker, (size_t)(end - marker), "\xff\xc4", 2)) != NULL) {
+        const uint8_t *table = marker + 4; /* after the segment's length */
+        for (ptrdiff_t codes = 0; end - table > 1 && table[0] >> 4 <= 1 && (table[0] & 15) <= 3; table += 17 + codes) {
+            codes = 0;
+            for (int i = 1; i <= 16 && i < end - table; i++) /* beyond the end it reads zeros */
+                codes += table[i];
+            if (codes > 256) return 1;
+            if (end - table <= 17 + codes) break;
+        }
+        marker += 2;
+    }
+    return 0;
+}
+
+static int decode(const struct texture_source *source, const uint8_t *bytes, size_t n_bytes,
+                  struct texture_image *image, struct sh_err *err)
+{
+    const char *file = source->file;
+    int width = 0, height = 0, channels = 0;
+    if (n_bytes == 0) return fail_read(file, "it is empty", err);
+    if (n_bytes > TEXTURE_MAX_FILE)
+        return sh_fail(err, SH_EINPUT, "%s: an image of %zu bytes; allowed are up to %d", file, n_bytes,
+                       TEXTURE_MAX_FILE);
+    if (n_bytes > 1 && has_long_table(bytes, n_bytes)) return fail_read(file, "a table of more than 256 codes", err);
+    memory_left = TEXTURE_MAX_MEMORY;
+    if (!stbi_info_from_memory(bytes, (int)n_bytes, &width, &height, &channels))
+        return fail_read(file, stbi_failure_reason(), err);
+    int rc = check_size(file, (uint32_t)width, (uint32_t)height, err);
+    if (rc != SH_OK) return rc;
+    if (is_cut_off(bytes, n_bytes, (uint64_t)width * (uint64_t)height)) return fail_read(file, "it is cut off", err);
+    image->width = (uint32_t)width;
+    image->height = (uint32_t)height;
+    image->has_alpha = channels == 2 || channels == 4 || has_transparent_colour(bytes, n_bytes);
+    if (source->alpha_only && !image->has_alpha) return SH_OK;
+    image->rgba = stbi_load_from_memory(bytes, (int)n_bytes, &width, &height, &channels, 4);
+    if (image->rgba == NULL) return fail_read(file, stbi_failure_reason(), err);
+    drop_unused_alpha(bytes, image);
+    return SH_OK;
+}
+
+int texture_read(const struct texture_source *source, struct texture_image *image, struct sh_err *err)
+{
+    struct text t;
+    struct stat st;
+    *image = (struct texture_image){0};
+    if (source->bytes != NULL && source->raw_height > 0) return unpack(source, image, err);
+    if (source->bytes != NULL) return decode(source, source->bytes, source->n_bytes, image, err);
+    if (stat(source->file, &st) == 0) { /* before it is opened: a pipe would wait for a writer */
+        if (!S_ISREG(st.st_mode)) return fail_read(source->file, "it is not a file", err);
+        if (st.st_size > TEXTURE_MAX_FILE) return decode(source, NULL, (size_t)st.st_size, image, err);
+    }
+    int rc = text_open(&t, source->file, NULL, NULL, err);
+    if (rc == SH_OK) rc = decode(source, (const uint8_t *)t.data, t.size, image, err);
+    text_close(&t);
+    return rc;
+}
+
+void texture_image_free(struct texture_image *image)
+{
+    counted_free(image->rgba);
+    image->rgba = NULL;
+}

@@ -1,0 +1,1229 @@
+"""Client of a scanhead in one file: commands, frames, points as arrays. Python 3.9, standard library.
+
+    head = scanhead.open("tcp:127.0.0.1:5025")
+    head.command("SCAN:STARt")
+    for frame in head.frames(timeout_s=10):
+        if frame.type == scanhead.POINTS:
+            points = head.points(frame)
+            x_m, y_m, z_m = head.to_scene(points)
+        elif frame.is_event(scanhead.EV_SCAN_END):
+            break
+
+The wire is described in drivers/protocol/PROTOCOL.md; this file follows it section by section. Columns of
+points are numpy arrays where numpy is installed, else lists; the numbers are the same, to the last bit those
+of libscanhead. Units are in names: _m metres, _rad radians, _deg degrees, _ns nanoseconds, _db decibels.
+NaN: no value. Errors are exceptions. A Head belongs to one thread at a time.
+
+What is kept is bounded: one frame of bytes (64 KiB), 64 MiB of frames that came while a reply was awaited,
+8192 poses, 65535 names.
+"""
+import array
+import bisect
+import collections
+import hashlib
+import math
+import os
+import select
+import socket
+import struct
+import sys
+import time
+from typing import Dict, Iterator, List, NamedTuple, Optional, Tuple, Union
+
+try:
+    import numpy as np
+except ImportError:  # everything works without, slower
+    np = None
+
+DESCRIPTOR, ANCHOR, POINTS, LINE_END, TELEMETRY, EVENT, SURFACES, POSES, ATTRIBUTES = range(1, 10)
+REPEAT, LOCAL = 1, 2  # flags of a frame
+(EV_STATE, EV_SCAN_START, EV_SCAN_END, EV_OVERRUN, EV_READER_LOST, EV_CONTROL, EV_ERROR, EV_SETTINGS,
+ EV_POSE_LATE, EV_PPS, EV_TIME) = range(1, 12)
+POLAR, GEO = 0, 1  # layouts
+CRS_LOCAL, CRS_ECEF, CRS_UTM, CRS_GEODETIC = range(4)
+NO_LABEL = 0xFFFF
+
+_HASHED = (DESCRIPTOR, ANCHOR, POINTS, LINE_END, POSES, ATTRIBUTES)
+_HEADER_LEN, _MAX_PAYLOAD, _MAX_TEXT = 28, 65536, 512
+_QUEUE_BYTES, _KEEP_POSES, _CHUNK = 64 << 20, 8192, 1 << 16
+_NAN = math.nan
+
+
+class ScanheadError(Exception):
+    """The source, the stream or a call is wrong; the text says which."""
+
+
+class Timeout(ScanheadError, TimeoutError):
+    """Nothing came in time. Call again."""
+
+
+class Closed(ScanheadError):
+    """The head is gone."""
+
+
+class CommandError(ScanheadError):
+    """The head refused a command. number: SCPI's; text: the head's words."""
+
+    def __init__(self, command: str, number: int, text: str) -> None:
+        super().__init__(f"{command}: {number},{text}")
+        self.number, self.text = number, text
+
+
+# ---- CRC-32C
+
+def _crc_tables(n: int) -> List[List[int]]:
+    """Table k: what a byte adds to the register when k bytes follow it."""
+    first = []
+    for byte in range(256):
+        for _ in range(8):
+            byte = byte >> 1 ^ (0x82F63B78 if byte & 1 else 0)
+        first.append(byte)
+    tables = [first]
+    for _ in range(n - 1):
+        tables.append([first[crc & 255] ^ crc >> 8 for crc in tables[-1]])
+    return tables
+
+
+_ROW = 256  # bytes that numpy looks up side by side
+_crc_table = _crc_tables(_ROW if np is not None else 2)
+_crc_pairs = [_crc_table[1][pair & 255] ^ _crc_table[0][pair >> 8] for pair in range(65536)]
+if np is not None:
+    _crc_rows = np.array(_crc_table[::-1], dtype=np.uint32).ravel()
+    _crc_offsets = np.arange(_ROW, dtype=np.intp) * 256
+
+
+def _crc_pure(data: bytes) -> int:
+    """Two bytes a step."""
+    pairs, crc = _crc_pairs, 0xFFFFFFFF
+    for pair in struct.unpack_from("<%dH" % (len(data) // 2), data):
+        crc = pairs[(crc ^ pair) & 0xFFFF] ^ crc >> 16
+    if len(data) & 1:
+        crc = _crc_table[0][(crc ^ data[-1]) & 255] ^ crc >> 8
+    return crc ^ 0xFFFFFFFF
+
+
+def _crc_numpy(data: bytes) -> int:
+    """Rows of 256 bytes: each byte's share by its place, the rows then one after the other. Zeros before the
+    message add nothing, so the first row is filled up with them. The register's start is XORed into the
+    message's first 4 bytes."""
+    rows = -(-len(data) // _ROW)
+    padded = np.zeros(rows * _ROW, dtype=np.uint8)
+    padded[rows * _ROW - len(data):] = np.frombuffer(data, dtype=np.uint8)
+    padded[rows * _ROW - len(data):][:4] ^= 255
+    shares = _crc_rows[padded.reshape(rows, _ROW) + _crc_offsets]
+    a, b, c, d = _crc_table[255], _crc_table[254], _crc_table[253], _crc_table[252]
+    crc = 0
+    for share in np.bitwise_xor.reduce(shares, axis=1).tolist():
+        crc = a[crc & 255] ^ b[crc >> 8 & 255] ^ c[crc >> 16 & 255] ^ d[crc >> 24] ^ share
+    return crc ^ 0xFFFFFFFF
+
+
+def crc32c(data: bytes) -> int:
+    """CRC-32C of RFC 3720."""
+    return _crc_numpy(data) if np is not None and len(data) >= 512 else _crc_pure(data)
+
+
+def _shift_tables() -> List[List[List[int]]]:
+    """Level k, place i: what byte i of a register becomes when 2^k zero bytes follow; linear."""
+    levels = [[[_crc_table[0][v << 8 * i & 255] ^ v << 8 * i >> 8 for v in range(256)] for i in range(4)]]
+    for _ in range(16):
+        a, b, c, d = levels[-1]
+        levels.append([[a[v & 255] ^ b[v >> 8 & 255] ^ c[v >> 16 & 255] ^ d[v >> 24] for v in column]
+                       for column in levels[-1]])
+    return levels
+
+
+class _RunningCrc:
+    """CRCs of any pieces of a buffer, each byte summed once. For a damaged or hostile stream: there payloads
+    that are wrong may overlap, up to 65536 for a byte."""
+    _shifts = None  # type: Optional[List[List[List[int]]]]
+
+    def __init__(self) -> None:
+        self._registers = array.array("I", [0])  # before each byte of the buffer, and after the last
+        self.until = 0  # where the last wrong payload ends
+
+    def dropped(self, n: int) -> None:
+        """The buffer's first n bytes have gone."""
+        del self._registers[:n]
+        self.until -= n
+        if not self._registers:
+            self._registers.append(0)
+
+    def crc(self, data: bytearray, begin: int, end: int) -> int:
+        table, registers = _crc_table[0], self._registers
+        crc = registers[-1]
+        for byte in data[len(registers) - 1:end]:
+            crc = table[(crc ^ byte) & 255] ^ crc >> 8
+            registers.append(crc)
+        if _RunningCrc._shifts is None:
+            _RunningCrc._shifts = _shift_tables()
+        register = registers[begin] ^ 0xFFFFFFFF
+        for level, (a, b, c, d) in enumerate(_RunningCrc._shifts):
+            if (end - begin) >> level & 1:
+                register = (a[register & 255] ^ b[register >> 8 & 255] ^ c[register >> 16 & 255] ^
+                            d[register >> 24])
+        return register ^ registers[end] ^ 0xFFFFFFFF
+
+
+# ---- payloads of fixed layout: (struct format, names; NAME:N is N numbers)
+
+_LAYOUT = {
+    DESCRIPTOR: ("<96s32sII3Q6q5dIIIIQ", "idn profile layout isa prr_uhz lines_uhz pan_udeg_s "
+                 "fov_min_udeg sweep_udeg line_start_udeg line_stop_udeg pan_start_udeg pan_stop_udeg "
+                 "mirror_counts_per_turn pan_counts_per_turn range_scale_m range_min_m range_max_m "
+                 "max_echoes n_surfaces frames scan seed"),
+    ANCHOR: ("<4I3dd3d3d9d3dII9dd", "crs epsg station moving anchor:3 scale_m lat_deg lon_deg height_m "
+             "station_m:3 rotation:9 scale:3 heights until_ms axes:9 frame"),
+    POINTS: ("<IIQqqII", "frame line pulse0 t0_ns line_t0_ns n_pulses n_points"),
+    LINE_END: ("<IIQqq9I", "frame line pulse0 t0_ns t1_ns n_fired n_cast n_echoes mirror_count pan_count "
+               "status n_crowded n_faint n_unfit"),
+    TELEMETRY: ("<II5QIIQq", "state scan pulses echoes lines lost_pulses late_blocks late_max_us "
+                "errors_queued reader_lost_frames utc_ns"),
+    EVENT: ("<IIQQQ96s", "code reserved a b c text"),
+    ATTRIBUTES: ("<QII", "pulse0 line n_points"),
+}
+_MORE = {  # what payloads may have behind that
+    DESCRIPTOR: ("<II", "content reserved"),
+    TELEMETRY: ("<3Q", "scan_fired scan_cast scan_lost"),
+}
+
+
+def _unpacker(form: str, names: str) -> Tuple[struct.Struct, List[Tuple[str, int]]]:
+    parts = [name.partition(":") for name in names.split()]
+    return struct.Struct(form), [(name, int(count or 0)) for name, _, count in parts]
+
+
+_UNPACK = {kind: _unpacker(*layout) for kind, layout in _LAYOUT.items()}
+_UNPACK_MORE = {kind: _unpacker(*layout) for kind, layout in _MORE.items()}
+_POSE = struct.Struct("<q3d4ddII")
+_POINT = struct.Struct("<IIIhHI")
+
+
+def _text(field: bytes) -> str:
+    end = field.find(b"\0")
+    if end < 0:
+        raise ScanheadError("a frame with a good CRC holds a text without an end")
+    return field[:end].decode("ascii", "replace")
+
+
+def _take(layout, payload: bytes, offset: int) -> Dict[str, object]:
+    form, names = layout
+    values, at, fields = form.unpack_from(payload, offset), 0, {}
+    for name, count in names:
+        value = values[at:at + count] if count else values[at]
+        fields[name] = _text(value) if isinstance(value, bytes) else value
+        at += count or 1
+    if not all(math.isfinite(v) for v in values if isinstance(v, float)):
+        raise ScanheadError("a frame with a good CRC holds a number that is not finite")
+    return fields
+
+
+def _decode(kind: int, payload: bytes) -> Dict[str, object]:
+    """The fixed part of a payload by its names. What follows the part that is known is left alone."""
+    form = _UNPACK[kind][0]
+    if len(payload) < form.size:
+        raise ScanheadError(f"a frame of type {kind} with {len(payload)} bytes; {form.size} are the least")
+    fields = _take(_UNPACK[kind], payload, 0)
+    more = _UNPACK_MORE.get(kind)
+    if more is not None and len(payload) >= form.size + more[0].size:
+        fields.update(_take(more, payload, form.size))
+    return fields
+
+
+class Frame(NamedTuple):
+    """A frame as it came. t_ns: device time. fields: the fixed part of the payload by its names."""
+    type: int
+    version: int
+    flags: int
+    seq: int
+    t_ns: int
+    payload: bytes
+    fields: Dict[str, object]
+
+    def is_event(self, code: int) -> bool:
+        return self.type == EVENT and self.fields.get("code") == code
+
+
+# ---- bytes into frames and reply lines ("Resynchronisation")
+
+class Parser:
+    """Takes bytes as they come and gives frames and reply lines. It holds one frame of bytes at most."""
+
+    def __init__(self) -> None:
+        self._bytes, self._at = bytearray(), 0
+        self._in_step, self._next_seq = True, None  # type: bool, Optional[int]
+        self._running = None  # type: Optional[_RunningCrc]
+        self.bytes = self.frames = self.bad_payload = self.bad_bytes = 0
+        self.seq_gaps = self.seq_lost = 0  # jumps of the sequence; frames missing by jumps forward
+
+    def feed(self, data: bytes) -> None:
+        del self._bytes[:self._at]
+        if self._running is not None:
+            self._running.dropped(self._at)
+        self._at = 0
+        self._bytes += data
+        self.bytes += len(data)
+
+    def next(self, last: bool = False) -> Union[Frame, str, None]:
+        """A frame, a reply line without its end, or None: more bytes are needed. last: none will come."""
+        while self._at < len(self._bytes):
+            first, item, wait = self._bytes[self._at], None, False
+            if first == 0xD5:
+                item, wait = self._frame()
+            elif self._in_step and 0x20 <= first <= 0x7E:
+                item, wait = self._line()
+            if item is not None:
+                return item
+            if wait and not last:
+                return None
+            self._skip()
+        return None
+
+    def _skip(self) -> None:
+        sync = self._bytes.find(0xD5, self._at + 1)
+        end = sync if sync >= 0 else len(self._bytes)
+        self.bad_bytes += end - self._at
+        self._at, self._in_step = end, False
+
+    def _frame(self) -> Tuple[Optional[Frame], bool]:
+        header = bytes(self._bytes[self._at:self._at + _HEADER_LEN])
+        if len(header) < _HEADER_LEN:
+            return None, True
+        kind, version, flags, length, seq, crc, t_ns, header_crc = struct.unpack("<xBBBIIIqI", header)
+        if length > _MAX_PAYLOAD or _crc_pure(header[:24]) != header_crc:
+            return None, False
+        begin = self._at + _HEADER_LEN
+        if len(self._bytes) < begin + length:
+            return None, True
+        payload = bytes(self._bytes[begin:begin + length])
+        running = self._running
+        if (crc32c(payload) if running is None else running.crc(self._bytes, begin, begin + length)) != crc:
+            self.bad_payload += 1
+            self._running = running or _RunningCrc()
+            self._running.until = max(self._running.until, begin + length)
+            return None, False
+        self._at, self._in_step = begin + length, True
+        if running is not None and running.until <= self._at:
+            self._running = None
+        self.frames += 1
+        if not flags & LOCAL:
+            self._count(seq)
+        return Frame(kind, version, flags, seq, t_ns, payload, {}), False
+
+    def _count(self, seq: int) -> None:
+        missing = (seq - self._next_seq) % 2**32 if self._next_seq is not None else 0
+        if missing:
+            self.seq_gaps += 1
+            self.seq_lost += missing if missing < 2**31 else 0
+        self._next_seq = (seq + 1) % 2**32
+
+    def _line(self) -> Tuple[Optional[str], bool]:
+        text = bytes(self._bytes[self._at:self._at + _MAX_TEXT])
+        end = text.find(b"\r\n")
+        line = text if end < 0 else text[:end]
+        if end < 0 and line.endswith(b"\r"):
+            line = line[:-1]
+        if not all(0x20 <= c <= 0x7E for c in line):
+            return None, False
+        if end < 0:
+            return None, len(text) < _MAX_TEXT
+        self._at += end + 2
+        return line.decode("ascii"), False
+
+
+# ---- points as columns
+
+class Points:
+    """Columns of one points frame, one entry per record, in order of pulse, then of range.
+
+    x, y, z: polar layout: metres in the head's frame; geo layout: in the CRS (geodetic: degrees of latitude,
+    degrees of longitude within -180..180, metres). range_m; mirror_rad and pan_rad (polar); reflectance_db;
+    t_ns since the scan's start; echo and echo_count (0, 0: a shot without echo, its place is NaN); label."""
+    __slots__ = ("x", "y", "z", "range_m", "mirror_rad", "pan_rad", "reflectance_db", "t_ns", "echo",
+                 "echo_count", "label", "layout")
+
+    def __len__(self) -> int:
+        return len(self.t_ns)
+
+
+def _column(values, n: int):
+    """An iterable of n numbers as a column."""
+    return np.fromiter(values, dtype=np.float64, count=n) if np is not None else list(values)
+
+
+def _mapped(function, *columns):
+    """function of each row, in plain floats: the same numbers with numpy and without."""
+    plain = [c.tolist() if np is not None and isinstance(c, np.ndarray) else c for c in columns]
+    return _column(map(function, *plain), len(plain[0]))
+
+
+_PARTS = 256
+_SIN = [math.sin(6.283185307179586476925 * i / _PARTS) for i in range(_PARTS)]
+_COS = [math.cos(6.283185307179586476925 * i / _PARTS) for i in range(_PARTS)]
+_TWO_PI = 6.283185307179586476925
+if np is not None:
+    _NP_SIN, _NP_COS = np.array(_SIN), np.array(_COS)
+
+
+def _sincos(turns):
+    """sin and cos of turns >= 0, a float or an array: whole 1/256 turns by table, the rest by its series,
+    whose next terms are below 2^-56. libscanhead computes the same, in the same order."""
+    part = turns * _PARTS
+    if np is not None and isinstance(turns, np.ndarray):
+        k = (part + 0.5).astype(np.int64)
+        sk, ck = _NP_SIN[k & _PARTS - 1], _NP_COS[k & _PARTS - 1]
+    else:
+        k = int(part + 0.5)
+        sk, ck = _SIN[k & _PARTS - 1], _COS[k & _PARTS - 1]
+    r = (part - k) * (_TWO_PI / _PARTS)
+    r2 = r * r
+    sin_r = r + r * r2 * (-1.0 / 6 + r2 * (1.0 / 120))
+    cos_r_1 = r2 * (-0.5 + r2 * (1.0 / 24 - r2 * (1.0 / 720)))
+    return sk + (ck * sin_r + sk * cos_r_1), ck + (ck * cos_r_1 - sk * sin_r)
+
+
+def _fold(turns, low: float):
+    """turns within low .. low + 1."""
+    v = turns - low
+    if np is not None and isinstance(v, np.ndarray):
+        whole = v.astype(np.int64).astype(np.float64)
+        return turns - np.where(whole > v, whole - 1, whole)
+    whole = float(int(v))
+    return turns - (whole - 1 if whole > v else whole)
+
+
+def _raw_columns(payload: bytes, n: int):
+    """a, b, c, reflectance, label, tail of n records."""
+    if np is None:
+        rows = _POINT.iter_unpack(payload[40:40 + 20 * n])
+        return list(map(list, zip(*rows))) if n else [[] for _ in range(6)]
+    kind = np.dtype([("a", "<u4"), ("b", "<u4"), ("c", "<u4"), ("r", "<i2"), ("l", "<u2"), ("t", "<u4")])
+    rows = np.frombuffer(payload, dtype=kind, count=n, offset=40)
+    return [rows[name] for name in "abcrlt"]
+
+
+def _common(raw, t0_ns: int, layout: int) -> Points:
+    """What both layouts share."""
+    p = Points()
+    refl, label, tail = raw[3:]
+    if np is not None:
+        tail = tail.astype(np.int64)
+        p.t_ns, p.echo, p.echo_count = t0_ns + (tail & 0xFFFFFF), tail >> 24 & 15, tail >> 28
+        p.reflectance_db = np.where(refl == -32768, _NAN, refl / 100.0)
+        p.label = label.astype(np.int64)
+    else:
+        p.t_ns = [t0_ns + (t & 0xFFFFFF) for t in tail]
+        p.echo, p.echo_count = [t >> 24 & 15 for t in tail], [t >> 28 for t in tail]
+        p.reflectance_db = [_NAN if r == -32768 else r / 100.0 for r in refl]
+        p.label = label
+    p.layout = layout
+    return p
+
+
+def _empty_as_nan(values, count):
+    if np is not None:
+        return np.where(count == 0, _NAN, values)
+    return [_NAN if n == 0 else v for v, n in zip(values, count)]
+
+
+def _polar_points(p: Points, raw, d: Dict) -> None:
+    mirror_turn, pan_turn = 1 / d["mirror_counts_per_turn"], 1 / d["pan_counts_per_turn"]
+    scale = d["range_scale_m"]
+    low = (d["line_start_udeg"] + d["line_stop_udeg"]) / 720e6 - 0.5
+
+    def place(a, b, c):
+        mirror, pan, range_m = b * mirror_turn, c * pan_turn, scale * a
+        sin_m, cos_m = _sincos(mirror)
+        sin_pan, cos_pan = _sincos(pan)
+        flat = range_m * cos_m
+        return (flat * sin_pan, flat * cos_pan, range_m * sin_m, range_m, _TWO_PI * _fold(mirror, low),
+                _TWO_PI * _fold(pan, 0.0))
+
+    if np is not None:
+        columns = place(*(c.astype(np.float64) for c in raw[:3]))
+    else:
+        columns = list(map(list, zip(*map(place, *raw[:3])))) or [[] for _ in range(6)]
+    p.x, p.y, p.z, p.range_m = (_empty_as_nan(c, p.echo_count) for c in columns[:4])
+    p.mirror_rad, p.pan_rad = columns[4:]
+
+
+def _short_way(lon_deg: float) -> float:
+    return lon_deg - 360 if lon_deg > 180 else lon_deg + 360 if lon_deg < -180 else lon_deg
+
+
+def _signed(column):
+    """The coordinates of the geo layout are signed."""
+    if np is not None:
+        return np.ascontiguousarray(column).view(np.int32).astype(np.float64)
+    return [float((v ^ 0x80000000) - 0x80000000) for v in column]
+
+
+def _scaled(column, scale: float, shift: float = 0.0):
+    if np is not None:
+        return shift + scale * column
+    return [shift + scale * v for v in column]
+
+
+def _geo_points(p: Points, raw, a: Dict) -> None:
+    """range_m: from the anchor where that is the station; geodetic: straight through space."""
+    d = [_scaled(_signed(c), s) for c, s in zip(raw[:3], a["scale"])]
+    x, y, z = (_scaled(v, 1.0, shift) for v, shift in zip(d, a["anchor"]))
+    if a["crs"] == CRS_GEODETIC:
+        y = _mapped(_short_way, y)
+        home = geodetic_to_ecef(*a["anchor"])
+        p.range_m = _mapped(lambda *at: _distance(geodetic_to_ecef(*at), home), x, y, z)
+    elif a["moving"] & 1:
+        p.range_m = _column((_NAN for _ in range(len(p))), len(p))
+    else:
+        p.range_m = _mapped(_length, *d)
+    p.x, p.y, p.z, p.range_m = (_empty_as_nan(c, p.echo_count) for c in (x, y, z, p.range_m))
+    p.mirror_rad = p.pan_rad = _column((_NAN for _ in range(len(p))), len(p))
+
+
+def _length(x: float, y: float, z: float) -> float:
+    return math.sqrt(x * x + y * y + z * z)
+
+
+def _distance(a, b) -> float:
+    return _length(a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+# ---- poses of a moving head
+
+def _rotation(q) -> Tuple[float, ...]:
+    """Row by row, of the unit quaternion w, x, y, z."""
+    w, x, y, z = q
+    return (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
+            2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+            2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
+
+
+def _apply(m, v):
+    return tuple(m[3 * i] * v[0] + m[3 * i + 1] * v[1] + m[3 * i + 2] * v[2] for i in range(3))
+
+
+def _apply_transposed(m, v):
+    return tuple(m[i] * v[0] + m[3 + i] * v[1] + m[6 + i] * v[2] for i in range(3))
+
+
+def _multiply(a, b):
+    return tuple(sum(a[3 * row + k] * b[3 * k + column] for k in range(3))
+                 for row in range(3) for column in range(3))
+
+
+def _cross(a, b):
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+class Pose(NamedTuple):
+    """Where the head was: scene frame, metres; quaternion w, x, y, z from the head's frame to the scene's."""
+    t_ns: int
+    position_m: Tuple[float, float, float]
+    quat: Tuple[float, float, float, float]
+    frame: float
+    flags: int
+
+
+class _Leg(NamedTuple):
+    """From one pose to the next: the turn's axis is in the head's frame."""
+    a: Pose
+    b: Pose
+    rotation: Tuple[float, ...]
+    axis: Tuple[float, float, float]
+    angle_rad: float
+
+    def fraction(self, t_ns: int) -> float:
+        return (t_ns - self.a.t_ns) / (self.b.t_ns - self.a.t_ns)
+
+    def position_m(self, f: float) -> Tuple[float, ...]:
+        return tuple(p + f * (q - p) for p, q in zip(self.a.position_m, self.b.position_m))
+
+
+def _quat_times(a, b):
+    return (a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+            a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+            a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+            a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0])
+
+
+def _leg(a: Pose, b: Pose) -> _Leg:
+    d = _quat_times((a.quat[0], -a.quat[1], -a.quat[2], -a.quat[3]), b.quat)
+    sign, sine = -1.0 if d[0] < 0 else 1.0, _length(*d[1:])
+    axis = tuple(sign * v / sine for v in d[1:]) if sine > 0 else (1.0, 0.0, 0.0)
+    return _Leg(a, b, _rotation(a.quat), axis, 2 * math.atan2(sine, sign * d[0]))
+
+
+class _Poses:
+    """The poses frames of late, newest last."""
+
+    def __init__(self) -> None:
+        self.forget()
+
+    def forget(self) -> None:
+        self._frames = collections.deque()
+        self._n = 0
+
+    def absorb(self, payload: bytes) -> None:
+        n = struct.unpack_from("<I", payload)[0] if len(payload) >= 8 else 0
+        if n < 2 or n > (len(payload) - 8) // _POSE.size:
+            raise ScanheadError("a poses frame with a wrong number of poses")
+        records = _POSE.iter_unpack(payload[8:8 + n * _POSE.size])
+        poses = [Pose(p[0], p[1:4], p[4:8], p[8], p[9]) for p in records]
+        times = [p.t_ns for p in poses]
+        if any(a >= b for a, b in zip(times, times[1:])):
+            raise ScanheadError("a poses frame whose times do not rise")
+        if not all(abs(sum(v * v for v in p.quat) - 1) < 1e-9 and
+                   all(map(math.isfinite, p.position_m + (p.frame,))) for p in poses):
+            raise ScanheadError("a poses frame with numbers that are no pose")
+        self._frames.append((times, poses))
+        self._n += n
+        while self._n > _KEEP_POSES:
+            self._n -= len(self._frames.popleft()[0])
+
+    def leg(self, t_ns: int) -> Optional[_Leg]:
+        for times, poses in reversed(self._frames):
+            if times[0] <= t_ns <= times[-1]:
+                i = min(bisect.bisect_right(times, t_ns), len(times) - 1)
+                return _leg(poses[i - 1], poses[i])
+        return None
+
+
+def _place_moving(leg: _Leg, t_ns: int, v) -> Tuple[float, float, float]:
+    """Rodrigues' formula in the head's frame, then the rotation at the leg's begin."""
+    f = leg.fraction(t_ns)
+    angle = f * leg.angle_rad
+    s, versine = math.sin(angle), 1 - math.cos(angle)
+    u = _cross(leg.axis, v)
+    w = _cross(leg.axis, u)
+    turned = _apply(leg.rotation, tuple(v[i] + (s * u[i] + versine * w[i]) for i in range(3)))
+    return tuple(p + t for p, t in zip(leg.position_m(f), turned))
+
+
+# ---- places on the Earth: WGS 84 (NIMA TR8350.2); transverse Mercator as Krueger's series in the form of
+# Karney, Journal of Geodesy 85 (2011) 475; polar stereographic as Snyder, USGS Professional Paper 1395
+# (1987) 161
+
+class _Plain:
+    """The functions of numpy that are used here, for plain floats."""
+    sin, cos, tan, sinh, cosh = math.sin, math.cos, math.tan, math.sinh, math.cosh
+    sqrt, hypot = math.sqrt, math.hypot
+    arctan, arctan2, arcsinh, arctanh = math.atan, math.atan2, math.asinh, math.atanh
+
+
+_A_M, _F, _RAD = 6378137.0, 1 / 298.257223563, math.pi / 180.0
+_E2, _N3 = _F * (2 - _F), _F / (2 - _F)
+_E = math.sqrt(_E2)
+_RADIUS_M = _A_M / (1 + _N3) * (1 + _N3 ** 2 / 4 + _N3 ** 4 / 64)
+# Terms up to the fourth power of the third flattening; what is left out is below 0.1 um within a zone.
+_ALPHA = (_N3 / 2 - _N3 ** 2 * 2 / 3 + _N3 ** 3 * 5 / 16 + _N3 ** 4 * 41 / 180,
+          _N3 ** 2 * 13 / 48 - _N3 ** 3 * 3 / 5 + _N3 ** 4 * 557 / 1440,
+          _N3 ** 3 * 61 / 240 - _N3 ** 4 * 103 / 140, _N3 ** 4 * 49561 / 161280)
+_BETA = (_N3 / 2 - _N3 ** 2 * 2 / 3 + _N3 ** 3 * 37 / 96 - _N3 ** 4 / 360,
+         _N3 ** 2 / 48 + _N3 ** 3 / 15 - _N3 ** 4 * 437 / 1440,
+         _N3 ** 3 * 17 / 480 - _N3 ** 4 * 37 / 840, _N3 ** 4 * 4397 / 161280)
+_UPS_M = 2 * _A_M * 0.994 / math.sqrt((1 + _E) ** (1 + _E) * (1 - _E) ** (1 - _E))
+
+
+def geodetic_to_ecef(lat_deg, lon_deg, height_m, m=_Plain):
+    """X, Y, Z in metres."""
+    s, c = m.sin(lat_deg * _RAD), m.cos(lat_deg * _RAD)
+    n = _A_M / m.sqrt(1 - _E2 * s * s)
+    return (n + height_m) * c * m.cos(lon_deg * _RAD), (n + height_m) * c * m.sin(lon_deg * _RAD), \
+        (n * (1 - _E2) + height_m) * s
+
+
+def ecef_to_geodetic(x_m, y_m, z_m, m=_Plain):
+    """Latitude, longitude in degrees, ellipsoidal height in metres. Bowring's iteration (Survey Review 23,
+    1976); near the Earth three steps leave rounding alone."""
+    p = m.hypot(x_m, y_m)
+    beta = m.arctan2(z_m, (1 - _F) * p)
+    for _ in range(3):
+        s, c = m.sin(beta), m.cos(beta)
+        lat = m.arctan2(z_m + _E2 / (1 - _F) * _A_M * s * s * s, p - _E2 * _A_M * c * c * c)
+        beta = m.arctan2((1 - _F) * m.sin(lat), m.cos(lat))
+    s = m.sin(lat)
+    return lat / _RAD, m.arctan2(y_m, x_m) / _RAD, p * m.cos(lat) + z_m * s - _A_M * m.sqrt(1 - _E2 * s * s)
+
+
+def _conformal(tau, m):
+    """tan of the latitude -> tan of the conformal latitude."""
+    sec = m.sqrt(1 + tau * tau)
+    sigma = m.sinh(_E * m.arctanh(_E * tau / sec))
+    return tau * m.sqrt(1 + sigma * sigma) - sigma * sec
+
+
+def _geographic(tau_c, m):
+    """The way back, by Newton's method: five steps from anywhere (Karney's equations 19 to 21)."""
+    tau = tau_c / (1 - _E2)
+    for _ in range(5):
+        now = _conformal(tau, m)
+        tau = tau + (tau_c - now) / m.sqrt(1 + now * now) * (1 + (1 - _E2) * tau * tau) / \
+            ((1 - _E2) * m.sqrt(1 + tau * tau))
+    return tau
+
+
+def _series(coefficients, xi, eta, m):
+    """The sums of sin 2j xi cosh 2j eta and cos 2j xi sinh 2j eta."""
+    a = b = 0.0
+    for j, c in enumerate(coefficients, 1):
+        a = a + c * m.sin(2 * j * xi) * m.cosh(2 * j * eta)
+        b = b + c * m.cos(2 * j * xi) * m.sinh(2 * j * eta)
+    return a, b
+
+
+class _Grid:
+    """UTM or UPS of an EPSG code: degrees <-> easting, northing in metres."""
+
+    def __init__(self, epsg: int) -> None:
+        self.ups, self.south = epsg in (32661, 32761), epsg // 100 == 327
+        self.lon0_deg = 6 * (epsg % 100) - 183
+        if not self.ups and not (epsg // 100 in (326, 327) and 1 <= epsg % 100 <= 60):
+            raise ScanheadError(f"EPSG {epsg} is neither UTM nor UPS on WGS 84")
+
+    def forward(self, lat_deg, lon_deg, m):
+        tau_c = _conformal(m.tan(lat_deg * _RAD), m)
+        if self.ups:
+            lon, side = lon_deg * _RAD, -1.0 if self.south else 1.0
+            rho = _UPS_M / (side * tau_c + m.sqrt(1 + tau_c * tau_c))
+            return 2e6 + rho * m.sin(lon), 2e6 - side * rho * m.cos(lon)
+        lon = (lon_deg - self.lon0_deg) * _RAD
+        xi, eta = m.arctan2(tau_c, m.cos(lon)), m.arcsinh(m.sin(lon) / m.hypot(tau_c, m.cos(lon)))
+        a, b = _series(_ALPHA, xi, eta, m)
+        north0_m, radius_m = 1e7 if self.south else 0.0, 0.9996 * _RADIUS_M
+        return 5e5 + radius_m * (eta + b), north0_m + radius_m * (xi + a)
+
+    def inverse(self, easting_m, northing_m, m):
+        if self.ups:
+            side = -1.0 if self.south else 1.0
+            x, y = easting_m - 2e6, side * (2e6 - northing_m)
+            t = (m.hypot(x, y) + 1e-30) / _UPS_M
+            return m.arctan(_geographic(side * (1 / t - t) / 2, m)) / _RAD, m.arctan2(x, y) / _RAD
+        xi = (northing_m - (1e7 if self.south else 0.0)) / (0.9996 * _RADIUS_M)
+        eta = (easting_m - 5e5) / (0.9996 * _RADIUS_M)
+        a, b = _series(_BETA, xi, eta, m)
+        xi, eta = xi - a, eta - b
+        tau = _geographic(m.sin(xi) / m.hypot(m.sinh(eta), m.cos(xi)), m)
+        return m.arctan(tau) / _RAD, self.lon0_deg + m.arctan2(m.sinh(eta), m.cos(xi)) / _RAD
+
+    def convergence_rad(self, lat_deg: float, lon_deg: float) -> float:
+        """Bearing of grid north, clockwise from true north: by differences over 22 m, good to 1e-10 rad."""
+        if self.ups:
+            return -lon_deg * _RAD if self.south else lon_deg * _RAD
+        (e0, n0), (e1, n1) = (self.forward(lat_deg + d, lon_deg, _Plain) for d in (-1e-4, 1e-4))
+        return math.atan2(e0 - e1, n1 - n0)
+
+
+def _grid_of(station_m, lat_deg: float, lon_deg: float) -> Optional[int]:
+    """The EPSG code of the grid in which the place has the station's coordinates: that of the scene."""
+    zone = int((lon_deg + 180) // 6)
+    codes = [side + (zone + k) % 60 + 1 for side in (32600, 32700) for k in (-1, 0, 1)] + [32661, 32761]
+    for epsg in codes:
+        at = _Grid(epsg).forward(lat_deg, lon_deg, _Plain)
+        if max(abs(at[0] - station_m[0]), abs(at[1] - station_m[1])) < 1e-3:
+            return epsg
+    return None
+
+
+class _Earth:
+    """From the scene to the CRS and back, as the anchor says: exact but for rounding, the series' 0.1 um, and
+    a geoid that is taken to be as high everywhere as at the station."""
+
+    def __init__(self, anchor: Dict, layout: int) -> None:
+        self.crs, self.station_m = anchor["crs"], anchor["station_m"]
+        self.same = self.crs == CRS_LOCAL
+        self.geoid_m = 0.0
+        if self.same:
+            return
+        place = anchor["lat_deg"], anchor["lon_deg"], anchor["height_m"]
+        if anchor["heights"] == 1:
+            if anchor["moving"] & 1 and layout == GEO:
+                raise ScanheadError("the stream doesn't say how high the geoid is along the trajectory")
+            self.geoid_m = place[2] - anchor["anchor"][2]
+        grid = _grid_of(self.station_m, *place[:2])
+        self.same = grid is not None and grid == anchor["epsg"]
+        if grid is not None and not self.same:
+            raise ScanheadError(f"the scene is in the grid of EPSG {grid}; take output.layout geo")
+        self.grid = _Grid(anchor["epsg"]) if self.crs == CRS_UTM else None
+        self.home = geodetic_to_ecef(*place)
+        self.turn = self._rotation(anchor)
+
+    def _rotation(self, anchor: Dict) -> Tuple[float, ...]:
+        """Scene frame -> ECEF."""
+        turn = anchor["axes"]
+        if self.crs == CRS_ECEF:
+            return turn
+        lat_deg, lon_deg = anchor["anchor"][:2]
+        if self.grid is not None:
+            lat_deg, lon_deg = self.grid.inverse(*anchor["anchor"][:2], _Plain)
+            g = self.grid.convergence_rad(lat_deg, lon_deg)
+            turn = _multiply((math.cos(g), math.sin(g), 0, -math.sin(g), math.cos(g), 0, 0, 0, 1), turn)
+        s, c = math.sin(lat_deg * _RAD), math.cos(lat_deg * _RAD)
+        sl, cl = math.sin(lon_deg * _RAD), math.cos(lon_deg * _RAD)
+        return _multiply((-sl, -s * cl, c * cl, cl, -s * sl, c * sl, 0, c, s), turn)
+
+    def forward(self, x_m, y_m, z_m, m):
+        if self.same:
+            return x_m, y_m, z_m - self.geoid_m
+        d = _apply(self.turn, (x_m - self.station_m[0], y_m - self.station_m[1], z_m - self.station_m[2]))
+        at = tuple(h + v for h, v in zip(self.home, d))
+        if self.crs == CRS_ECEF:
+            return at
+        lat_deg, lon_deg, height_m = ecef_to_geodetic(*at, m)
+        if self.grid is not None:
+            lat_deg, lon_deg = self.grid.forward(lat_deg, lon_deg, m)
+        return lat_deg, lon_deg, height_m - self.geoid_m
+
+    def inverse(self, x, y, z, m):
+        if self.same:
+            return x, y, z + self.geoid_m
+        if self.crs != CRS_ECEF:
+            lat_deg, lon_deg = self.grid.inverse(x, y, m) if self.grid is not None else (x, y)
+            x, y, z = geodetic_to_ecef(lat_deg, lon_deg, z + self.geoid_m, m)
+        d = _apply_transposed(self.turn, (x - self.home[0], y - self.home[1], z - self.home[2]))
+        return tuple(s + v for s, v in zip(self.station_m, d))
+
+
+def _by_row(function, columns):
+    """function(x, y, z, m) -> three columns, on whole arrays or row by row."""
+    if np is not None:
+        with np.errstate(invalid="ignore"):
+            return tuple(function(*columns, np))
+    rows = (function(*row, _Plain) if row[0] == row[0] else (_NAN, _NAN, _NAN) for row in zip(*columns))
+    return tuple(map(list, zip(*rows))) or ([], [], [])
+
+
+# ---- sources
+
+class _Source:
+    """Bytes in and out by a descriptor that does not block. owner: what has to live as long."""
+
+    def __init__(self, name: str, fd: int, owner=None, is_file: bool = False) -> None:
+        self.name, self.fd, self.owner, self.is_file = name, fd, owner, is_file
+        self.is_tty = os.isatty(fd)
+
+    def close(self) -> None:
+        if self.owner is not None:
+            self.owner.close()
+        elif self.fd >= 0:
+            os.close(self.fd)
+        self.fd = -1
+
+
+def _open_tty(path: str) -> int:
+    import termios
+    import tty
+    fd = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    try:
+        tty.setraw(fd, termios.TCSANOW)
+    except termios.error as error:
+        os.close(fd)
+        raise ScanheadError(f"{path}: not a terminal: {error}") from None
+    return fd
+
+
+def _open_source(name: str, timeout_s: float) -> _Source:
+    kind, _, rest = name.partition(":")
+    if kind == "tcp":
+        host, _, port = rest.rpartition(":")
+        if not host or not port.isdigit():
+            raise ScanheadError(f"{name}: not tcp:HOST:PORT")
+        connection = socket.create_connection((host.strip("[]"), int(port)), timeout_s)
+        connection.setblocking(False)
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        return _Source(name, connection.fileno(), connection)
+    if kind == "tty":
+        return _Source(name, _open_tty(rest))
+    return _Source(name, os.open(name, os.O_RDONLY), is_file=True)
+
+
+# ---- the head
+
+class Head:
+    """A head or a recording. State (descriptor, anchor, names, poses, clock, hash) is that of the frame that
+    frames() gave last; points(), to_scene() and to_crs() belong to that frame."""
+
+    def __init__(self, source: _Source) -> None:
+        self._source, self.parser = source, Parser()
+        self._queue, self._queued = collections.deque(), 0
+        self._unsettled = source.is_tty
+        self._ended = self._stuck = False
+        self.dropped = 0  # frames dropped here while a reply was awaited
+        self.reader_lost = self.pulses_lost = 0  # frames and pulses that the head says were lost
+        self.descriptor, self.anchor = None, None  # type: Optional[Dict], Optional[Dict]
+        self.surfaces = {}  # type: Dict[int, Tuple[str, str]]
+        self._poses, self._earth = _Poses(), None
+        self._sha256 = hashlib.sha256()
+        self._scan_t0_ns = self._gps = self._last_pulse0 = self._points_key = None
+
+    def __enter__(self) -> "Head":
+        return self
+
+    def __exit__(self, *_) -> None:
+        self.close()
+
+    def close(self) -> None:
+        self._source.close()
+
+    # -- bytes
+
+    def _fill(self, deadline_s: Optional[float], write: bool = False) -> bool:
+        """Waits for bytes and takes them. write: returns True as soon as the head takes bytes."""
+        if not self._source.is_file:
+            poll = select.poll()
+            poll.register(self._source.fd, select.POLLIN | (select.POLLOUT if write else 0))
+            left_ms = None if deadline_s is None else max(0.0, 1000 * (deadline_s - time.monotonic()))
+            ready = poll.poll(left_ms)
+            if not ready:
+                raise Timeout(f"{self._source.name}: nothing came in time")
+            if write and ready[0][1] & select.POLLOUT and not ready[0][1] & select.POLLIN:
+                return True
+        try:
+            data = os.read(self._source.fd, _CHUNK)
+        except BlockingIOError:
+            return False
+        except OSError:  # a pty whose other end is gone, a connection that was reset
+            data = b""
+        self._ended = not data
+        self.parser.feed(data)
+        return False
+
+    def _next_item(self, deadline_s: Optional[float]) -> Union[Frame, str, None]:
+        """A frame or a line; None at the end."""
+        while True:
+            item = self.parser.next(self._ended)
+            if item is not None or self._ended:
+                return item
+            self._fill(deadline_s)
+
+    # -- commands
+
+    def query(self, line: str, timeout_s: float = 5.0) -> str:
+        """Sends one command line and gives its reply line as it is, also "ERR number,text". Frames that come
+        meanwhile are kept for frames()."""
+        if self._source.is_file:
+            raise ScanheadError(f"{self._source.name}: a recording takes no commands")
+        if self._stuck:
+            raise ScanheadError(f"{self._source.name}: half a command went out before; open the head again")
+        if not line.strip() or len(line) > 256 or not all(" " <= c <= "~" for c in line):
+            raise ScanheadError("not a command: one line of 1 to 256 printable ASCII characters")
+        deadline_s = time.monotonic() + timeout_s
+        if self._unsettled:
+            self._settle(deadline_s)
+        self._discard_stale()
+        self._send(line + "\n", deadline_s)
+        return self._reply(deadline_s)
+
+    def command(self, line: str, timeout_s: float = 5.0) -> str:
+        """The same; "ERR ..." becomes a CommandError."""
+        reply = self.query(line, timeout_s)
+        if reply.startswith("ERR "):
+            number, _, text = reply[4:].partition(",")
+            raise CommandError(line, int(number) if number.lstrip("+-").isdigit() else 0, text)
+        return reply
+
+    def _settle(self, deadline_s: float) -> None:
+        """Comes into step on a terminal, which may have echoed what the head sent: its answer to *IDN? is the
+        only reply with three commas and no quotes."""
+        self._send("\n*IDN?\n", deadline_s)
+        while True:
+            reply = self._reply(deadline_s)
+            if reply.count(",") == 3 and '"' not in reply:
+                break
+        self._unsettled = False
+
+    def _discard_stale(self) -> None:
+        """Replies that are there already answer commands that were given up. Frames may come without end, so
+        this looks at a few chunks only."""
+        for _ in range(32):
+            item = self.parser.next()
+            while item is not None:
+                if isinstance(item, Frame):
+                    self._keep(item)
+                item = self.parser.next()
+            try:
+                self._fill(0.0)
+            except Timeout:
+                return
+            if self._ended:
+                return
+
+    def _send(self, text: str, deadline_s: float) -> None:
+        data, done = text.encode("ascii"), 0
+        try:
+            while done < len(data):
+                try:
+                    done += os.write(self._source.fd, data[done:])
+                except BlockingIOError:  # a head that waits to write itself is read on
+                    self._wait_writable(deadline_s)
+        except Timeout:
+            raise
+        except OSError as error:
+            raise Closed(f"{self._source.name}: {error.strerror}") from None
+        finally:
+            self._stuck = 0 < done < len(data)
+
+    def _wait_writable(self, deadline_s: float) -> None:
+        self._fill(deadline_s, write=True)
+        item = self.parser.next()
+        while item is not None:
+            if isinstance(item, Frame):
+                self._keep(item)
+            item = self.parser.next()
+
+    def _reply(self, deadline_s: float) -> str:
+        while True:
+            item = self._next_item(deadline_s)
+            if isinstance(item, str):
+                return item
+            if item is None:
+                raise Closed(f"{self._source.name}: the head is gone")
+            self._keep(item)
+
+    def _keep(self, frame: Frame) -> None:
+        self._queue.append(frame)
+        self._queued += len(frame.payload) + _HEADER_LEN
+        while self._queued > _QUEUE_BYTES:
+            self._queued -= len(self._queue.popleft().payload) + _HEADER_LEN
+            self.dropped += 1
+
+    # -- frames
+
+    def frames(self, timeout_s: Optional[float] = None) -> Iterator[Frame]:
+        """Frames in order. It ends with a recording. Closed: the head is gone; Timeout: none in timeout_s."""
+        while True:
+            frame = self.next_frame(timeout_s)
+            if frame is None:
+                return
+            yield frame
+
+    def next_frame(self, timeout_s: Optional[float] = None) -> Optional[Frame]:
+        """The next frame; None at a recording's end. Reply lines are skipped: nobody waits for them."""
+        deadline_s = None if timeout_s is None else time.monotonic() + timeout_s
+        frame = None  # type: Union[Frame, str, None]
+        if self._queue:
+            frame = self._queue.popleft()
+            self._queued -= len(frame.payload) + _HEADER_LEN
+        while not isinstance(frame, Frame):
+            frame = self._next_item(deadline_s)
+            if frame is None:
+                if self._source.is_file:
+                    return None
+                raise Closed(f"{self._source.name}: the head is gone")
+        return self._absorb(frame)
+
+    def _absorb(self, frame: Frame) -> Frame:
+        if frame.version != 1:
+            raise ScanheadError(f"the head speaks version {frame.version}; this client reads 1")
+        if not frame.flags & (REPEAT | LOCAL) and frame.type in _HASHED:
+            self._sha256.update(struct.pack("<BI", frame.type, len(frame.payload)))
+            self._sha256.update(frame.payload)
+        if frame.type in _UNPACK:
+            frame = frame._replace(fields=_decode(frame.type, frame.payload))
+        act = {DESCRIPTOR: self._absorb_descriptor, ANCHOR: self._absorb_anchor,
+               POINTS: self._absorb_points, EVENT: self._absorb_event, SURFACES: self._absorb_surfaces,
+               POSES: self._absorb_poses, ATTRIBUTES: self._absorb_attributes}.get(frame.type)
+        if act is not None:
+            act(frame)
+        return frame
+
+    def _forget(self) -> None:
+        self.descriptor = self.anchor = self._last_pulse0 = None
+        self._poses.forget()
+
+    def _absorb_descriptor(self, frame: Frame) -> None:
+        d = frame.fields
+        d.setdefault("content", 0)
+        turns = d["mirror_counts_per_turn"], d["pan_counts_per_turn"]
+        if d["layout"] not in (POLAR, GEO) or d["n_surfaces"] > NO_LABEL:
+            raise ScanheadError("a descriptor of an unknown layout, or with more surfaces than labels")
+        if d["layout"] == POLAR and not (min(turns) >= 1 and d["range_scale_m"] > 0):
+            raise ScanheadError("a polar descriptor without scales")
+        if not frame.flags & REPEAT or self.descriptor is None or self.descriptor["scan"] != d["scan"]:
+            self._forget()
+        self.descriptor = d
+
+    def _absorb_anchor(self, frame: Frame) -> None:
+        a = frame.fields
+        a["scale"] = tuple(s or a["scale_m"] for s in a["scale"])
+        a["axes"] = a["axes"] if any(a["axes"]) else (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+        if a["crs"] > CRS_GEODETIC or a["heights"] > 1:
+            raise ScanheadError("an anchor in a CRS that version 1 doesn't have")
+        if self.descriptor is not None:  # without the one of its scan it may as well be of the scan before
+            self.anchor, self._earth = a, None
+
+    def _absorb_points(self, frame: Frame) -> None:
+        p = frame.fields
+        if p["n_points"] > (len(frame.payload) - 40) // 20:
+            raise ScanheadError("a points frame shorter than its points")
+        if self._last_pulse0 is not None and p["pulse0"] < self._last_pulse0:
+            self._forget()
+        until_ns = 1000000 * self.anchor["until_ms"] if self.anchor is not None else 0
+        if until_ns and p["t0_ns"] >= until_ns:
+            self.anchor = None  # these have an anchor that did not reach us
+        self._last_pulse0 = p["pulse0"]
+        self._scan_t0_ns = frame.t_ns - p["t0_ns"]
+        self._points_key = (frame.seq + 1) % 2**32, p["pulse0"], p["line"], p["n_points"]
+
+    def _absorb_poses(self, frame: Frame) -> None:
+        self._poses.absorb(frame.payload)
+
+    def _absorb_attributes(self, frame: Frame) -> None:
+        if frame.fields["n_points"] > (len(frame.payload) - 16) // 4:
+            raise ScanheadError("an attributes frame shorter than its attributes")
+
+    def _absorb_event(self, frame: Frame) -> None:
+        code, a, b, c = (frame.fields[k] for k in ("code", "a", "b", "c"))
+        if code == EV_READER_LOST:
+            self.reader_lost = c
+        elif code == EV_OVERRUN:
+            self.pulses_lost += b
+        elif code == EV_SCAN_START:
+            if self.descriptor is not None and a != self.descriptor["scan"]:
+                self._forget()
+            self._scan_t0_ns, self._gps = b, (b, c) if c else None
+        elif code == EV_TIME:
+            self._gps = b, c
+        elif code == EV_PPS:
+            self._gps = b, c * 1000000000
+
+    def _absorb_surfaces(self, frame: Frame) -> None:
+        data, names, at = frame.payload, [], 8
+        first, count = struct.unpack_from("<II", data) if len(data) >= 8 else (0, NO_LABEL + 1)
+        if first + count > NO_LABEL:
+            raise ScanheadError("a surfaces frame with labels beyond 65534")
+        for _ in range(2 * count):
+            end = at + 1 + data[at] if at < len(data) else len(data) + 1
+            if end > len(data) or 0 in data[at + 1:end]:
+                raise ScanheadError("a surfaces frame shorter than its names, or with NUL in one")
+            names.append(data[at + 1:end].decode("utf-8", "replace"))
+            at = end
+        self.surfaces.update(zip(range(first, first + count), zip(names[::2], names[1::2])))
+
+    # -- what frames mean
+
+    def points(self, frame: Frame) -> Points:
+        """The points of a points frame, as columns."""
+        if frame.type != POINTS:
+            raise ScanheadError("not a points frame")
+        if self.descriptor is None or self.anchor is None:
+            raise ScanheadError("points before the descriptor and the anchor of their scan")
+        raw = _raw_columns(frame.payload, frame.fields["n_points"])
+        p = _common(raw, frame.fields["t0_ns"], self.descriptor["layout"])
+        if p.layout == POLAR:
+            _polar_points(p, raw, self.descriptor)
+        else:
+            _geo_points(p, raw, self.anchor)
+        return p
+
+    def can_place(self) -> bool:
+        """Whether descriptor and anchor have come, so that points() works."""
+        return self.descriptor is not None and self.anchor is not None
+
+    def attributes(self, frame: Frame) -> Optional[Tuple]:
+        """Columns amplitude_db and width_ns of the points in the frame before; None: those were lost."""
+        n = frame.fields["n_points"]
+        if self._points_key != (frame.seq, frame.fields["pulse0"], frame.fields["line"], n):
+            return None
+        raw = list(struct.iter_unpack("<hH", frame.payload[16:16 + 4 * n]))
+        return (_column((_NAN if a == -32768 else a / 100.0 for a, _ in raw), n),
+                _column((w / 100.0 if w else _NAN for _, w in raw), n))
+
+    def to_scene(self, p: Points) -> Tuple:
+        """x, y, z in the scene frame, metres; of a moving head each point with the pose of its time. NaN: no
+        echo, or no pose because frames were lost."""
+        if p.layout == GEO:
+            return _by_row(self._earth_now().inverse, (p.x, p.y, p.z))
+        if self.anchor["moving"] & 1:
+            return self._to_scene_moving(p)
+        turn, at = self.anchor["rotation"], self.anchor["station_m"]
+        return _by_row(lambda x, y, z, m: [s + v for s, v in zip(at, _apply(turn, (x, y, z)))],
+                       (p.x, p.y, p.z))
+
+    def to_crs(self, p: Points) -> Tuple:
+        """x, y, z in the CRS of the anchor: metres, or degrees, degrees, metres. Points of a tilted or moving
+        head in the polar layout go by the scene frame."""
+        return (p.x, p.y, p.z) if p.layout == GEO else _by_row(self._earth_now().forward, self.to_scene(p))
+
+    def _earth_now(self) -> _Earth:
+        if not self.can_place():
+            raise ScanheadError("points before the descriptor and the anchor of their scan")
+        if self._earth is None:
+            self._earth = _Earth(self.anchor, self.descriptor["layout"])
+        return self._earth
+
+    def _to_scene_moving(self, p: Points) -> Tuple:
+        rows, leg = [], None  # type: List, Optional[_Leg]
+        columns = (p.t_ns, p.x, p.y, p.z)
+        if np is not None:
+            columns = (c.tolist() for c in columns)
+        for t_ns, *v in zip(*columns):
+            if leg is None or not leg.a.t_ns <= t_ns < leg.b.t_ns:
+                leg = self._poses.leg(t_ns)
+            rows.append((_NAN, _NAN, _NAN) if leg is None else _place_moving(leg, t_ns, v))
+        columns = list(zip(*rows)) or [(), (), ()]
+        return tuple(_column(c, len(rows)) for c in columns)
+
+    def pose(self, t_ns: int) -> Optional[Pose]:
+        """Where a moving head was t_ns after the scan's start; None: the stream has not said it."""
+        leg = self._poses.leg(t_ns)
+        if leg is None:
+            return None
+        f = leg.fraction(t_ns)
+        s = math.sin(0.5 * f * leg.angle_rad)
+        turn = (math.cos(0.5 * f * leg.angle_rad), s * leg.axis[0], s * leg.axis[1], s * leg.axis[2])
+        return Pose(t_ns, leg.position_m(f), _quat_times(leg.a.quat, turn),
+                    leg.a.frame + f * (leg.b.frame - leg.a.frame), leg.a.flags | leg.b.flags)
+
+    def gps_time_ns(self, t_ns: int) -> Optional[int]:
+        """GPS time of t_ns after the scan's start: ns since 1980-01-06T00:00:00Z without leap seconds. None:
+        the head does not know the time, or has not said it yet."""
+        if self._gps is None or self._scan_t0_ns is None:
+            return None
+        return self._gps[1] + self._scan_t0_ns + t_ns - self._gps[0]
+
+    def stream_sha256(self) -> str:
+        """The hash of all frames so far, as PROTOCOL.md defines it."""
+        return self._sha256.hexdigest()
+
+
+def open(source: str, timeout_s: float = 5.0) -> Head:  # noqa: A001, the module's name says what is opened
+    """A head or a recording: "tcp:HOST:PORT", "tty:PATH", or the path of a .shs file."""
+    try:
+        return Head(_open_source(source, timeout_s))
+    except OSError as error:
+        raise ScanheadError(f"{source}: {error.strerror or error}") from None
+
+
+def _summary(head: Head) -> None:
+    kinds, echoes = collections.Counter(), 0
+    for frame in head.frames():
+        kinds[frame.type] += 1
+        if frame.type == POINTS and head.can_place():
+            count = head.points(frame).echo_count
+            echoes += int(np.count_nonzero(count)) if np is not None else sum(n > 0 for n in count)
+    names = ("", "descriptors", "anchors", "points frames", "line ends", "telemetry", "events", "names",
+             "poses", "attributes")
+    print(*(f"{kinds[k]} {names[k]}" for k in sorted(kinds) if k < len(names)), sep=", ")
+    print(f"{echoes} echoes; frames lost: {head.parser.seq_lost}, bytes skipped: {head.parser.bad_bytes}")
+    print(f"stream_sha256 {head.stream_sha256()}")
+
+
+def main(arguments: List[str]) -> int:
+    if not arguments:
+        print("usage: scanhead.py tcp:HOST:PORT|tty:PATH|FILE.shs [COMMAND...]\n"
+              "Prints what a recording holds, or who the head is, its state, and the replies to commands.")
+        return 2
+    try:
+        with open(arguments[0]) as head:
+            if head._source.is_file:
+                _summary(head)
+            for line in () if head._source.is_file else ["*IDN?", "HEAD:STATe?"] + arguments[1:]:
+                print(f"{line}  {head.query(line)}")
+    except ScanheadError as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,24 @@
+/* How far long work is, and how long it will take. In: what a stream or a report says. Out: a fraction, and
+ * seconds left. Pure; the caller brings the time. */
+#ifndef FIRMWARE_SIM_APP_PROGRESS_H
+#define FIRMWARE_SIM_APP_PROGRESS_H
+
+#include <stdint.h>
+
+#include "drivers/host/scanhead.h"
+
+/* The pace of one piece of work after the other; zeroed at first. */
+struct progress_pace {
+    char what[64];
+    int64_t since_ns;
+    double fraction; /* then */
+};
+
+/* Seconds left, by the pace since the first report of the same work: `what` up to a colon names it. Negative
+ * where it is not known: the first report, an unknown fraction, or nothing done since. */
+double progress_left_s(struct progress_pace *pace, const char *what, double fraction, int64_t now_ns);
+
+/* How long a scan lasts by its descriptor, from the first pulse on; 0: without end, or the frame is none. */
+double progress_scan_s(const struct scanhead_frame *descriptor);
+
+#endif

@@ -1,0 +1,168 @@
+/* The list of faults: each is one line that says where, which key, what is wrong and what is allowed. */
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "firmware_sim/base/nearest.h"
+#include "firmware_sim/config/table.h"
+
+/* Puts a fault in the order of its place; the last one makes room. */
+static int add(struct cfg_reader *rd, int code, int line, const char *text)
+{
+    struct config_faults *faults = rd->faults;
+    const uint64_t source = line == CFG_FROM_SET ? 1 : rd->table.keys == cfg_profile_table.keys ? 2 : 0;
+    const uint64_t place = source << 32 | (uint32_t)line;
+    uint32_t at = faults->n < CONFIG_MAX_FAULTS ? faults->n : CONFIG_MAX_FAULTS;
+    faults->n++;
+    while (at > 0 && faults->place[at - 1] > place)
+        at--;
+    if (at == CONFIG_MAX_FAULTS) return code;
+    const size_t after = CONFIG_MAX_FAULTS - 1 - at;
+    memmove(&faults->fault[at + 1], &faults->fault[at], after * sizeof faults->fault[0]);
+    memmove(&faults->place[at + 1], &faults->place[at], after * sizeof faults->place[0]);
+    faults->place[at] = place;
+    return sh_fail(&faults->fault[at], code, "%s", text);
+}
+
+static int fail(struct cfg_reader *rd, int code, int line, const char *name, const char *fmt, va_list ap)
+{
+    char what[sizeof rd->faults->fault[0].text], text[sizeof what + 2 * CONFIG_PATH_LEN], place[16] = "";
+    vsnprintf(what, sizeof what, fmt, ap);
+    if (line > 0) snprintf(place, sizeof place, ":%d", line);
+    if (line == CFG_FROM_SET)
+        snprintf(text, sizeof text, "--set %s: %s", name, what);
+    else
+        snprintf(text, sizeof text, "%s%s: %s%s%s", rd->file, place, name, name[0] != '\0' ? ": " : "", what);
+    return add(rd, code, line, text);
+}
+
+int cfg_fail_file(struct cfg_reader *rd, int code, int line, const char *fmt, ...)
+{
+    va_list ap;
+    va_start(ap, fmt);
+    fail(rd, code, line, "", fmt, ap);
+    va_end(ap);
+    return code;
+}
+
+int cfg_fail(struct cfg_reader *rd, int line, const char *name, const char *fmt, ...)
+{
+    va_list ap;
+    va_start(ap, fmt);
+    int code = fail(rd, SH_EINPUT, line, name, fmt, ap);
+    va_end(ap);
+    return code;
+}
+
+int cfg_fail_value(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, const char *fmt, ...)
+{
+    char name[CFG_PATH_MAX];
+    va_list ap;
+    rd->bad[cfg_row(rd, key)][item] = 1;
+    va_start(ap, fmt);
+    int code = fail(rd, SH_EINPUT, line, cfg_name(key->path, item, name), fmt, ap);
+    va_end(ap);
+    return code;
+}
+
+/* The key, or a section around it, is bad. */
+static int is_bad(const struct cfg_reader *rd, const char *of, uint32_t item)
+{
+    char path[CFG_PATH_MAX];
+    snprintf(path, sizeof path, "%s", of);
+    for (; path[0] != '\0'; cfg_cut_to_parent(path)) {
+        const struct cfg_key *row = cfg_find(&rd->table, path);
+        if (row != NULL && rd->bad[cfg_row(rd, row)][strstr(path, "[]") != NULL ? item : 0]) return 1;
+    }
+    return 0;
+}
+
+/* One below the section is bad; in a list, of this item. */
+static int has_bad(const struct cfg_reader *rd, const char *section, uint32_t item)
+{
+    const size_t len = strlen(section);
+    for (size_t i = 0; i < rd->table.n; i++) {
+        const char *path = rd->table.keys[i].path;
+        if (strncmp(path, section, len) != 0 || (path[len] != '.' && path[len] != '[')) continue;
+        if (rd->bad[i][strstr(path, "[]") != NULL ? item : 0]) return 1;
+    }
+    return 0;
+}
+
+int cfg_are_sound(const struct cfg_reader *rd, uint32_t item, const char *const *paths, size_t n)
+{
+    for (size_t i = 0; i < n; i++)
+        if (is_bad(rd, paths[i], item) || has_bad(rd, paths[i], item)) return 0;
+    return 1;
+}
+
+int cfg_fail_key(struct cfg_reader *rd, const char *path, uint32_t item, const char *fmt, ...)
+{
+    const struct cfg_key *key = cfg_find(&rd->table, path);
+    char name[CFG_PATH_MAX];
+    va_list ap;
+    if (is_bad(rd, path, item)) return SH_EINPUT;
+    rd->bad[cfg_row(rd, key)][item] = 1;
+    va_start(ap, fmt);
+    int code = fail(rd, SH_EINPUT, cfg_where(rd, key, item), cfg_name(path, item, name), fmt, ap);
+    va_end(ap);
+    return code;
+}
+
+const char *cfg_show(const char *text, char *buf)
+{
+    size_t n = 0;
+    for (; text[n] != '\0' && n < CFG_SHOW_MAX - 4; n++) {
+        unsigned char c = (unsigned char)text[n];
+        buf[n] = c < 0x20 || c == 0x7f ? '?' : (char)c;
+    }
+    if (text[n] != '\0') {
+        while (n > 0 && ((unsigned char)text[n] & 0xc0) == 0x80)
+            n--; /* not within a UTF-8 character */
+        memcpy(buf + n, "...", 3);
+        n += 3;
+    }
+    buf[n] = '\0';
+    return buf;
+}
+
+/* A known key that the writer may have meant: one letter or two away here, cut short here, or the same word
+ * elsewhere. */
+static const struct cfg_key *suggest(const struct cfg_table *table, const char *parent, const char *word)
+{
+    const struct cfg_key *best = NULL;
+    size_t best_distance = 3, len = strlen(word);
+    for (size_t i = 0; i < table->n; i++) {
+        const char *path = table->keys[i].path, *here = cfg_word_below(path, parent), *dot = strrchr(path, '.');
+        size_t distance = best_distance;
+        if (here != NULL) {
+            distance = nearest_distance(word, here);
+            if (len >= 3 && (strncmp(here, word, len) == 0 || strncmp(here, word, strlen(here)) == 0)) distance = 1;
+        } else if (strcmp(dot != NULL ? dot + 1 : path, word) == 0) {
+            distance = 2;
+        }
+        if (distance >= best_distance || distance >= len) continue;
+        best = &table->keys[i];
+        best_distance = distance;
+    }
+    return best;
+}
+
+int cfg_fail_unknown(struct cfg_reader *rd, int line, const char *parent, uint32_t item, const char *word)
+{
+    /* Far more faults than are shown come from a hostile file: they cost no search of the table each. */
+    if (rd->faults->n >= 10 * CONFIG_MAX_FAULTS) return cfg_fail(rd, line, "configuration", "unknown key");
+    char known[256] = "", section[CFG_PATH_MAX], hint[CFG_PATH_MAX], shown[CFG_SHOW_MAX], name[2 * CFG_PATH_MAX];
+    for (size_t i = 0; i < rd->table.n; i++) {
+        const char *here = cfg_word_below(rd->table.keys[i].path, parent);
+        size_t used = strlen(known);
+        if (here != NULL) snprintf(known + used, sizeof known - used, "%s%s", used > 0 ? ", " : "", here);
+    }
+    cfg_name(parent, item, section);
+    snprintf(name, sizeof name, "%s%s%s", section, section[0] != '\0' ? "." : "", cfg_show(word, shown));
+    const struct cfg_key *near = suggest(&rd->table, parent, word);
+    if (near == NULL) return cfg_fail(rd, line, name, "unknown key; allowed %s", known);
+    rd->bad[cfg_row(rd, near)][strstr(near->path, "[]") != NULL ? item : 0] = 1;
+    return cfg_fail(rd, line, name, "unknown key, did you mean %s? allowed %s", cfg_name(near->path, item, hint),
+                    known);
+}

@@ -1,0 +1,135 @@
+/* Keys that only some kinds of link, back end or platform have, and what a link of a kind needs. */
+#include <stdio.h>
+#include <string.h>
+
+#include "drivers/usb/backend.h"
+#include "firmware_sim/config/table.h"
+
+struct owned_key {
+    const char *path;
+    unsigned kinds; /* bit per kind that has it */
+};
+
+/* Tells each of these keys that is given though the kind does not have it. Returns whether there is none. */
+static int check_owned(struct cfg_reader *rd, const struct owned_key *key, size_t n, int kind, uint32_t item,
+                       const char *owner, const char *allowed)
+{
+    int fits = 1;
+    for (size_t i = 0; i < n; i++) {
+        if (!cfg_is_given(rd, key[i].path, item) || (key[i].kinds & 1u << kind)) continue;
+        cfg_fail_key(rd, key[i].path, item, "%s has no such key; allowed %s", owner, allowed);
+        fits = 0;
+    }
+    return fits;
+}
+
+enum { OF_USBIP = 1u << USB_BACKEND_USBIP, OF_USBREDIR = 1u << USB_BACKEND_USBREDIR };
+enum { OF_FUNCTIONFS = 1u << USB_BACKEND_FUNCTIONFS };
+
+static void check_usb_link(struct cfg_reader *rd, const struct config *cfg, struct link_spec *link, uint32_t i)
+{
+    static const struct owned_key keys[] = {
+        {"links[].path", OF_USBREDIR},
+        {"links[].address", OF_USBIP | OF_USBREDIR},
+        {"links[].port", OF_USBIP | OF_USBREDIR},
+        {"links[].attach", OF_USBIP | OF_USBREDIR},
+        {"links[].udc", OF_FUNCTIONFS},
+    };
+    char owner[64];
+    const int has_port = cfg_is_given(rd, "links[].port", i), has_address = cfg_is_given(rd, "links[].address", i);
+    const int is_redir = link->backend == USB_BACKEND_USBREDIR, has_path = cfg_is_given(rd, "links[].path", i);
+    if (link->serial[0] == '\0') {
+        snprintf(link->serial, sizeof link->serial, "%s", cfg->head.serial);
+        link->own_serial = !cfg_is_given(rd, "head.serial", 0);
+    }
+    if (link->backend == USB_BACKEND_USBIP && !has_port) link->port = USB_BACKEND_USBIP_PORT;
+    if (!CFG_SOUND(rd, i, "links[].backend")) return;
+    snprintf(owner, sizeof owner, "the back end %s", cfg_word(rd, "links[].backend", link->backend));
+    if (!check_owned(rd, keys, CFG_LEN(keys), link->backend, i, owner, "without it")) return;
+    if (has_path && (has_port || has_address))
+        cfg_fail_key(rd, "links[].path", i, "both a path and a port or address; allowed one of them");
+    else if (link->backend == USB_BACKEND_USBIP && link->attach && (has_port || has_address))
+        cfg_fail_key(rd, "links[].attach", i,
+                     "a device that is attached here listens nowhere; allowed without port and address");
+    else if (is_redir && !has_path && !has_port)
+        cfg_fail_key(rd, "links[].backend", i, "usbredir needs a path or a port; allowed with one of them");
+    else if (is_redir && link->attach && !has_path && link->port == 0)
+        cfg_fail_key(rd, "links[].port", i, "0, and the head is to connect to it; allowed 1 to 65535");
+}
+
+static void check_link(struct cfg_reader *rd, struct config *cfg, uint32_t i)
+{
+    static const struct owned_key keys[] = {
+        {"links[].path", 1u << LINK_FILE | 1u << LINK_PTY | 1u << LINK_USB},
+        {"links[].address", 1u << LINK_TCP | 1u << LINK_USB},
+        {"links[].port", 1u << LINK_TCP | 1u << LINK_USB},
+        {"links[].max_sessions", 1u << LINK_TCP},
+        {"links[].protocol", 1u << LINK_NULL | 1u << LINK_FILE | 1u << LINK_PTY | 1u << LINK_TCP},
+        {"links[].backend", 1u << LINK_USB},
+        {"links[].attach", 1u << LINK_USB},
+        {"links[].udc", 1u << LINK_USB},
+        {"links[].speed", 1u << LINK_USB},
+        {"links[].vid", 1u << LINK_USB},
+        {"links[].pid", 1u << LINK_USB},
+        {"links[].serial", 1u << LINK_USB},
+    };
+    static const char *const has[] = {[LINK_NULL] = "type, protocol",
+                                      [LINK_FILE] = "type, path, protocol",
+                                      [LINK_PTY] = "type, path, protocol",
+                                      [LINK_TCP] = "type, address, port, max_sessions, protocol",
+                                      [LINK_USB] =
+                                          "type, backend, address, port, path, attach, udc, speed, vid, pid, serial"};
+    struct link_spec *link = &cfg->link[i];
+    char owner[64];
+    if (!CFG_SOUND(rd, i, "links[].type")) return;
+    snprintf(owner, sizeof owner, "a %s link", cfg_word(rd, "links[].type", (int)link->type));
+    if (!check_owned(rd, keys, CFG_LEN(keys), (int)link->type, i, owner, has[link->type])) return;
+    if (link->type == LINK_FILE && link->path[0] == '\0')
+        cfg_fail_key(rd, "links[].path", i, "missing; required for a file link is the file to write");
+    for (uint32_t k = 0; k < i && link->path[0] != '\0'; k++)
+        if (strcmp(cfg->link[k].path, link->path) == 0)
+            cfg_fail_key(rd, "links[].path", i, "links[%u] has the same path; allowed a path of its own", k);
+    if (link->type == LINK_USB) check_usb_link(rd, cfg, link, i);
+}
+
+void cfg_check_links(struct cfg_reader *rd, struct config *cfg)
+{
+    for (uint32_t i = 0; i < cfg->n_links; i++)
+        check_link(rd, cfg, i);
+}
+
+int cfg_nmea_link(const struct config *cfg)
+{
+    for (uint32_t i = 0; i < cfg->n_links; i++)
+        if (cfg->link[i].protocol == PROTOCOL_NMEA && cfg->link[i].type != LINK_USB) return (int)i; /* check_link */
+    return -1;
+}
+
+int cfg_check_platform_keys(struct cfg_reader *rd, const struct config_platform *p)
+{
+    static const struct owned_key keys[] = {
+        {"platform.file", 1u << PLATFORM_TRAJECTORY | 1u << PLATFORM_STOPS},
+        {"platform.waypoints", 1u << PLATFORM_TRAJECTORY | 1u << PLATFORM_STOPS},
+        {"platform.start_s", 1u << PLATFORM_TRAJECTORY | 1u << PLATFORM_STOPS},
+        {"platform.end_s", 1u << PLATFORM_TRAJECTORY | 1u << PLATFORM_STOPS},
+        {"platform.step_s", 1u << PLATFORM_STOPS},
+        {"platform.at_end", 1u << PLATFORM_TRAJECTORY},
+        {"platform.reach_m", 1u << PLATFORM_LIVE},
+        {"platform.extrapolate_ms", 1u << PLATFORM_LIVE},
+        {"platform.address", 1u << PLATFORM_LIVE},
+        {"platform.port", 1u << PLATFORM_LIVE},
+        {"platform.mount_m", ~1u},
+        {"platform.mount_heading_deg", ~1u},
+        {"platform.mount_pitch_deg", ~1u},
+        {"platform.mount_roll_deg", ~1u},
+    };
+    static const char *const has[] = {
+        [PLATFORM_STATIC] = "kind alone; the station says where the head stands",
+        [PLATFORM_TRAJECTORY] = "file or waypoints, start_s, end_s, at_end, mount_...",
+        [PLATFORM_LIVE] = "reach_m, extrapolate_ms, address, port, mount_...",
+        [PLATFORM_STOPS] = "file or waypoints, start_s, end_s, step_s, mount_...",
+    };
+    char owner[64];
+    snprintf(owner, sizeof owner, "a %s platform", cfg_word(rd, "platform.kind", (int)p->kind));
+    return check_owned(rd, keys, CFG_LEN(keys), (int)p->kind, 0, owner, has[p->kind]);
+}

@@ -1,0 +1,203 @@
+/* What the tables say of all keys, printed: as a reference, and as a configuration to begin with. */
+#include "firmware_sim/config/table.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "firmware_sim/base/nearest.h"
+
+/* The name by which `config_print_section` knows the keys of head profiles. */
+static const char PROFILE[] = "profile";
+
+static const char *type_name(const struct cfg_key *key)
+{
+    static const char *const names[] = {
+        [CFG_MAP] = "section",       [CFG_LIST] = "list",          [CFG_BOOL] = "switch",
+        [CFG_ENUM] = "word",         [CFG_COUNT] = "whole number", [CFG_MICRO] = "number, exact to 1e-6",
+        [CFG_REAL] = "number",       [CFG_TEXT] = "text",          [CFG_PATH] = "path",
+        [CFG_VEC3] = "three numbers"};
+    return names[key->type];
+}
+
+/* Within 100 columns; each line begins with `indent` blanks and `mark`. */
+static void print_wrapped(const char *text, int indent, const char *mark, FILE *out)
+{
+    enum { WIDTH = 100 };
+    const int begin = indent + (int)strlen(mark);
+    int column = 0;
+    while (*text != '\0') {
+        int n = (int)strcspn(text, " ");
+        if (column != 0 && column + 1 + n <= WIDTH)
+            column += fprintf(out, " %.*s", n, text);
+        else
+            column = begin + fprintf(out, "%s%*s%s%.*s", column != 0 ? "\n" : "", indent, "", mark, n, text) - begin;
+        text += n + (text[n] == ' ');
+    }
+    fputc('\n', out);
+}
+
+static void print_key(const struct cfg_key *key, FILE *out)
+{
+    char allowed[CFG_ALLOWED_MAX];
+    fprintf(out, "%s\n    %s", key->path, type_name(key));
+    if (key->type != CFG_MAP) {
+        if (key->unit != NULL) fprintf(out, ", %s", key->unit);
+        fprintf(out, "; %s", cfg_allowed(key, NULL, allowed));
+        if (key->def == NULL && (key->type != CFG_LIST || key->min > 0))
+            fputs("; required", out);
+        else if (key->def != NULL && key->def[0] == '@')
+            fprintf(out, "; default from the head profile, its %s", key->def + 1);
+        else if (key->def != NULL && key->def[0] != '\0')
+            fprintf(out, "; default %s", key->def);
+        else
+            fputs("; optional", out);
+    }
+    fputc('\n', out);
+    print_wrapped(key->help, 4, "", out);
+}
+
+static void print_keys(const struct cfg_table *table, FILE *out)
+{
+    for (size_t i = 0; i < table->n; i++)
+        print_key(&table->keys[i], out);
+}
+
+static void print_profile_keys(FILE *out)
+{
+    fputs("Head profile, heads/NAME.yaml. maker and model are texts; each figure is written\n"
+          "{ value: V, from: data sheet } or { value: V, from: assumed }.\n\n",
+          out);
+    print_keys(&cfg_profile_table, out);
+}
+
+void config_print_reference(FILE *out)
+{
+    /* clang-format off */
+    fputs("Configuration, YAML. Any key can be set with --set KEY=VALUE (elements as in stations[0].name=gate; the\n"
+          "index after the last one appends). Numbers are decimal, as in 300000, 0.5 or 1.2e6, without a unit.\n"
+          "Relative paths start at the file they stand in; in --set, at the working directory.\n\n",
+          out);
+    /* clang-format on */
+    print_keys(&cfg_config_table, out);
+    fputc('\n', out);
+    print_profile_keys(out);
+}
+
+/* path is section, or a key in it. */
+static int is_in(const char *path, const char *section)
+{
+    const size_t len = strlen(section);
+    return strncmp(path, section, len) == 0 && (path[len] == '\0' || path[len] == '.' || path[len] == '[');
+}
+
+static int fail_section(const char *section, struct sh_err *err)
+{
+    char known[300] = "", shown[CFG_SHOW_MAX];
+    const char *near = NULL;
+    for (size_t i = 0; i < cfg_config_table.n; i++) {
+        const char *path = cfg_config_table.keys[i].path;
+        const size_t used = strlen(known);
+        if (cfg_word_below(path, "") == NULL) continue;
+        snprintf(known + used, sizeof known - used, "%s, ", path);
+        if (near == NULL && nearest_is_near(section, path)) near = path;
+    }
+    return sh_fail(err, SH_EINPUT, "no section \"%s\"%s%s%s; allowed %s%s", cfg_show(section, shown),
+                   near != NULL ? ", did you mean " : "", near != NULL ? near : "", near != NULL ? "?" : "", known,
+                   PROFILE);
+}
+
+int config_print_section(const char *section, FILE *out, struct sh_err *err)
+{
+    int n = 0;
+    if (strcmp(section, PROFILE) == 0) {
+        print_profile_keys(out);
+        return SH_OK;
+    }
+    for (size_t i = 0; i < cfg_config_table.n; i++) {
+        if (!is_in(cfg_config_table.keys[i].path, section)) continue;
+        print_key(&cfg_config_table.keys[i], out);
+        n++;
+    }
+    return n > 0 ? SH_OK : fail_section(section, err);
+}
+
+/* ---- the example */
+
+/* A key that a configuration can't do without; the others stand behind a #. */
+static int is_needed(const struct cfg_key *key)
+{
+    const int has_value = key->type != CFG_MAP && key->type != CFG_LIST;
+    return has_value && (key->def == NULL || (key->flags & CFG_NEEDED));
+}
+
+static int has_needed(const char *section)
+{
+    for (size_t i = 0; i < cfg_config_table.n; i++)
+        if (is_in(cfg_config_table.keys[i].path, section) && is_needed(&cfg_config_table.keys[i])) return 1;
+    return 0;
+}
+
+/* Where a key's line begins: sections and elements of lists each take two blanks. */
+static int indent_of(const char *path)
+{
+    int n = 0;
+    for (; *path != '\0'; path++)
+        n += *path == '.' || *path == '[';
+    return 2 * n;
+}
+
+/* The value in the example: the default, that of the profile, or one that shows what may stand there. */
+static const char *value_of(const struct cfg_key *key, const struct config_profile *profile, char *buf, size_t len)
+{
+    const char *text = key->def != NULL && key->def[0] != '\0' ? key->def : key->example;
+    char shared[CONFIG_PATH_LEN], *whole = NULL;
+    if (text == NULL) return "";
+    snprintf(buf, len, "%s", text);
+    if (text[0] == '@') {
+        snprintf(buf, len, "%.15g", 1e-6 * (double)cfg_figure(profile, text + 1));
+    } else if (key->type == CFG_PATH && is_needed(key) && cfg_find_shared(text, shared) &&
+               (whole = realpath(shared, NULL)) != NULL) {
+        snprintf(buf, len, "%s", whole);
+    } else if ((key->type == CFG_TEXT || key->type == CFG_PATH) && strpbrk(text, "*#:?{}[],&!|>'%@`") == text) {
+        snprintf(buf, len, "\"%s\"", text);
+    }
+    free(whole);
+    return buf;
+}
+
+static void print_example_key(const struct cfg_key *key, const struct config_profile *profile, FILE *out)
+{
+    char value[CONFIG_PATH_LEN + 2], allowed[CFG_ALLOWED_MAX], help[1024];
+    const int indent = indent_of(key->path), is_section = key->type == CFG_MAP || key->type == CFG_LIST;
+    const char *dot = strrchr(key->path, '.'), *word = dot != NULL ? dot + 1 : key->path;
+    const int is_element = strcmp(word + strlen(word) - 2, "[]") == 0;
+    const char *hidden = (is_section ? has_needed(key->path) : is_needed(key)) ? "" : "#";
+    if (is_element) {
+        fprintf(out, "%s%*s-\n", hidden, indent, "");
+        return;
+    }
+    if (is_section) {
+        fprintf(out, "%s%s%*s%s:\n", indent == 0 ? "\n" : "", hidden, indent, "", word);
+        print_wrapped(key->help, indent + 2, "# ", out);
+        return;
+    }
+    snprintf(help, sizeof help, "%s (%s)", key->help, cfg_allowed(key, profile, allowed));
+    print_wrapped(help, indent, "# ", out);
+    fprintf(out, "%s%*s%s: %s\n", hidden, indent, "", word, value_of(key, profile, value, sizeof value));
+}
+
+int config_print_example(FILE *out, struct sh_err *err)
+{
+    struct config_profile profile;
+    int code = config_load_profile(cfg_find(&cfg_config_table, "head.profile")->example, NULL, &profile, err);
+    if (code != SH_OK) return code;
+    fputs("# All keys of a configuration. Lines without a # are needed. Each other key stands with its default, or\n"
+          "# with a value that shows its form. To change one, take the # away from the first column, also from the\n"
+          "# sections around it. Not all of them go together: `scanhead check` says which do.\n",
+          out);
+    for (size_t i = 0; i < cfg_config_table.n; i++)
+        print_example_key(&cfg_config_table.keys[i], &profile, out);
+    return SH_OK;
+}

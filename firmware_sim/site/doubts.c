@@ -1,0 +1,213 @@
+/* What is allowed, and hardly meant. Each doubt is one warning with its figures, and the key to look at. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/angle.h"
+#include "core/distance.h"
+#include "core/mat3.h"
+#include "core/vec3.h"
+#include "firmware_sim/site/site_inside.h"
+
+/* Sizes that scenes for such a head don't have, mostly: most likely the scale is wrong by a thousand. */
+static const double SMALL_M = 0.05, LARGE_M = 10000.0;
+
+/* A scan is mostly empty where fewer pulses than this meet anything. */
+static const double EMPTY_SHARE = 0.05;
+
+enum { LOOK_ACROSS = 32, LOOK_UP = 32, LOOKS = LOOK_ACROSS * LOOK_UP, MAX_LINES = 1000 };
+_Static_assert((int)LOOKS <= (int)BVH_CHUNK, "cast at once");
+
+static void doubt_size(const struct site *site, const struct sh_report *report)
+{
+    const struct config *cfg = site->cfg;
+    double size_m = 0.0;
+    for (int i = 0; i < 3; i++)
+        size_m = fmax(size_m, site->scene->max_m[i] - site->scene->min_m[i]);
+    if (size_m >= SMALL_M && size_m <= LARGE_M) return;
+    sh_warn(report,
+            "%s: the scene is %.3g m large, and the head sees from %g to %g m: is scene.meshes[].scale right? It is "
+            "in metres per unit, now %g",
+            cfg->file, size_m, cfg->profile.range_min_m, cfg->profile.range_max_m, cfg->scene.mesh[0].scale);
+}
+
+/* Each line has the same window. Where lines and pulses don't go evenly, some lines may have a pulse in it. */
+static void doubt_lines(const struct site *site, const struct sh_report *report)
+{
+    const struct head_settings *s = &site->cfg->head.settings;
+    struct schedule_spec spec;
+    struct schedule_segment segment;
+    struct schedule_line line;
+    unsigned n = 0, empty = 0;
+    config_fill_spec(&site->cfg->profile, s, &spec);
+    schedule_start(&segment, &spec);
+    for (; n < MAX_LINES; n++) {
+        schedule_get_line(&segment, n, &line);
+        if (line.pulse0 >= segment.end_pulse) break;
+        empty += line.cast_end <= line.cast0;
+    }
+    if (empty == 0) return;
+    sh_warn(report,
+            "%s: head.line_start_deg, line_stop_deg: %u of %u lines cast no pulse: the window is %.4g deg wide, and "
+            "pulses are %.4g deg apart (head.prr_hz, lines_hz)",
+            site->cfg->file, empty, n, 1e-6 * (double)(s->line_stop_udeg - s->line_start_udeg),
+            1e-6 * (double)spec.sweep_udeg * (double)s->lines_uhz / (double)s->prr_uhz);
+}
+
+static void doubt_attributes(const struct site *site, const struct sh_report *report)
+{
+    const struct config *cfg = site->cfg;
+    if (!cfg->output.attributes || cfg->signal.on) return;
+    sh_warn(report, "%s: output.attributes: on, but signal.model is off: no echo has an amplitude%s", cfg->file,
+            cfg->beam.mode == BEAM_SINGLE ? ", and with beam.mode single each has the pulse's width" : "");
+}
+
+/* A vertex within reach settles most cases without an index of distances. */
+static int has_near_vertex(const struct scene *scene, const double p[3], double reach_m)
+{
+    for (uint32_t v = 0; v < scene->n_vertices; v++) {
+        double d[3] = {scene->vertex_m[v][0] - p[0], scene->vertex_m[v][1] - p[1], scene->vertex_m[v][2] - p[2]};
+        if (vec3_dot(d, d) <= reach_m * reach_m) return 1;
+    }
+    return 0;
+}
+
+static int is_reached(const struct scene *scene, const double p[3], double reach_m, int *reached, struct sh_err *err)
+{
+    struct distance *index = NULL;
+    struct distance_hit hit;
+    *reached = has_near_vertex(scene, p, reach_m);
+    for (int i = 0; i < 3; i++)
+        if (p[i] < scene->min_m[i] - reach_m || p[i] > scene->max_m[i] + reach_m) return SH_OK;
+    if (*reached) return SH_OK;
+    int rc = distance_create(scene, &index, err);
+    if (rc == SH_OK) *reached = distance_query(index, p, reach_m, &hit);
+    distance_free(index);
+    return rc;
+}
+
+static int doubt_reach(const struct site *site, uint32_t i, const struct sh_report *report, struct sh_err *err)
+{
+    const double reach_m = site->cfg->profile.range_max_m, *p = site->station[i].at.position_m;
+    int reached, rc = is_reached(site->scene, p, reach_m, &reached, err);
+    for (uint32_t k = 0; k < site->n_movers && rc == SH_OK && !reached; k++)
+        rc = is_reached(site->mover[k].scene, p, reach_m, &reached, err);
+    if (rc == SH_OK && !reached)
+        sh_warn(report, "station %u %s at %.10g %.10g %.10g m: nothing within range_max_m, %g m", i + 1,
+                site->station[i].station->name, p[0], p[1], p[2], reach_m);
+    return rc;
+}
+
+/* ---- what a station sees */
+
+struct look {
+    double x[LOOKS], y[LOOKS], z[LOOKS], range_m[LOOKS];
+    uint32_t triangle[LOOKS];
+};
+
+static void cast(const struct site_station *s, struct bvh_work *work, struct look *look, uint32_t n)
+{
+    const double *p = s->at.position_m;
+    const struct bvh_rays rays = {.n = n,
+                                  .from.at_m = {p[0], p[1], p[2]},
+                                  .dir = {look->x, look->y, look->z},
+                                  .range_max_m = 1e9,
+                                  .scattered = 1,
+                                  .range_m = look->range_m,
+                                  .triangle = look->triangle};
+    bvh_hits(work, s->bvh, &rays);
+}
+
+/* Below a floor there is a surface above the head, and none under it. */
+static int doubt_floor(const struct site *site, uint32_t i, struct bvh_work *work, struct look *look,
+                       const struct sh_report *report, struct sh_err *err)
+{
+    const struct site_station *s = &site->station[i];
+    const double *p = s->at.position_m;
+    double level[9];
+    int rc = SH_OK;
+    memcpy(level, mat3_unit, sizeof level);
+    if (site->anchor.known) rc = geoframe_level(&site->anchor.frame, p, level, err);
+    if (rc != SH_OK) return rc;
+    for (int k = 0; k < 2; k++) {
+        const double sign = k == 0 ? 1.0 : -1.0, dir[3] = {sign * level[2], sign * level[5], sign * level[8]};
+        VEC3_SET(*look, k, dir);
+    }
+    cast(s, work, look, 2);
+    if (!isnan(look->range_m[0]) && isnan(look->range_m[1]))
+        sh_warn(report,
+                "station %u %s at %.10g %.10g %.10g m: no surface below it, and one %.3g m above it: is it under the "
+                "floor?",
+                i + 1, s->station->name, p[0], p[1], p[2], look->range_m[0]);
+    return SH_OK;
+}
+
+/* Directions evenly over the window of a scan, as its pulses are. */
+static void fill_window(const struct site *site, const struct site_station *s, struct look *look)
+{
+    const struct head_settings *set = &site->cfg->head.settings;
+    const double pan_deg = 1e-6 * (double)(set->pan_stop_udeg - set->pan_start_udeg);
+    const double line_deg = 1e-6 * (double)(set->line_stop_udeg - set->line_start_udeg);
+    for (int i = 0; i < LOOKS; i++) {
+        double across = (i % LOOK_ACROSS + 0.5) / LOOK_ACROSS, up = ((double)(i / LOOK_ACROSS) + 0.5) / LOOK_UP;
+        double pan = angle_rad(1e-6 * (double)set->pan_start_udeg + pan_deg * across);
+        double line = angle_rad(1e-6 * (double)set->line_start_udeg + line_deg * up), dir[3];
+        mat3_apply(s->at.rotation, (const double[3]){sin(pan) * cos(line), cos(pan) * cos(line), sin(line)}, dir);
+        VEC3_SET(*look, i, dir);
+    }
+}
+
+static void doubt_view(const struct site *site, uint32_t i, struct bvh_work *work, struct look *look,
+                       const struct sh_report *report)
+{
+    const struct config_profile *profile = &site->cfg->profile;
+    const struct site_station *s = &site->station[i];
+    const double *p = s->at.position_m;
+    int seen = 0, near = 0, far = 0;
+    fill_window(site, s, look);
+    cast(s, work, look, LOOKS);
+    for (int k = 0; k < LOOKS; k++) {
+        near += look->range_m[k] < profile->range_min_m;
+        far += look->range_m[k] > profile->range_max_m;
+        seen += look->range_m[k] >= profile->range_min_m && look->range_m[k] <= profile->range_max_m;
+    }
+    if (near > LOOKS / 2)
+        sh_warn(
+            report,
+            "station %u %s at %.10g %.10g %.10g m: of %d directions %d meet something nearer than range_min_m, %g m: "
+            "does it stand within something?",
+            i + 1, s->station->name, p[0], p[1], p[2], (int)LOOKS, near, profile->range_min_m);
+    if (seen >= EMPTY_SHARE * LOOKS) return;
+    sh_warn(report,
+            "station %u %s at %.10g %.10g %.10g m: the scan is mostly empty: of %d directions %d meet something from "
+            "%g to %g m away, %d something nearer, %d something farther",
+            i + 1, s->station->name, p[0], p[1], p[2], (int)LOOKS, seen, profile->range_min_m, profile->range_max_m,
+            near, far);
+}
+
+/* What moves may fill a view, and a path leads elsewhere: then nothing is said of views. Many stops are not
+ * all looked at. */
+static int doubt_stations(const struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    const uint32_t step = site->n_stations / CONFIG_MAX_STATIONS + 1;
+    struct look *look = malloc(sizeof *look);
+    struct bvh_work *work = NULL;
+    int rc = look != NULL ? bvh_work_create(&work, err) : sh_fail(err, SH_ENOMEM, "no memory to look from stations");
+    for (uint32_t i = 0; i < site->n_stations && rc == SH_OK && !site->moving; i += step) {
+        rc = doubt_reach(site, i, report, err);
+        if (rc != SH_OK || site->n_movers > 0) continue;
+        rc = doubt_floor(site, i, work, look, report, err);
+        if (rc == SH_OK) doubt_view(site, i, work, look, report);
+    }
+    bvh_work_free(work);
+    free(look);
+    return rc;
+}
+
+int site_warn_doubts(const struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    doubt_size(site, report);
+    doubt_lines(site, report);
+    doubt_attributes(site, report);
+    return doubt_stations(site, report, err);
+}

@@ -1,0 +1,131 @@
+#!/bin/sh
+# What make would do elsewhere: for another machine, with both Embrees or the one that is asked for, and what the archive
+# shows of the library. Compilers and headers that aren't here are played by scripts; of those builds only the commands
+# are looked at. Prints TAP.
+set -u
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+tests=0
+
+# check NAME COMMAND...: passes when the command does; else what it wrote is shown.
+check() {
+    tests=$((tests + 1))
+    name=$1
+    shift
+    if "$@" >"$work/out" 2>&1; then
+        echo "ok $tests - $name"
+    else
+        echo "not ok $tests - $name"
+        tail -n 20 "$work/out" | cut -c -300 | sed 's/^/# /'
+    fi
+}
+
+# would TARGET [VARIABLE=...]: the commands that make would run for it in a new folder, without what a make above said.
+would() {
+    target=$1
+    shift
+    env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL -u CC -u CXX PATH="$work/bin:$PATH" make -n V=1 DEPS=no BUILD="$work/build" \
+        "$@" "$work/build/$target" 2>&1
+}
+
+# says FILE WORD... / lacks FILE WORD...: all of these are in it / none of them.
+says() {
+    file=$1
+    shift
+    for word; do grep -q -e "$word" "$file" || { echo "no $word in:"; cat "$file"; return 1; }; done
+}
+lacks() {
+    file=$1
+    shift
+    for word; do ! grep -e "$word" "$file" || return 1; done
+}
+
+# ---- a cross compiler for ARM, its pkg-config, and both Embrees where it looks
+mkdir -p "$work/bin" "$work/include/embree3" "$work/include/embree4"
+: >"$work/include/embree3/rtcore.h"
+: >"$work/include/embree4/rtcore.h"
+cat >"$work/bin/arm64-test-gcc" <<END
+#!/bin/sh
+[ "\$1" != -dumpmachine ] || { echo arm64-test; exit; }
+exec ${CC:-cc} -nostdinc -I$work/include "\$@"
+END
+printf '#!/bin/sh\n[ "$1" = --exists ] || echo "-I/arm64/include"\n' >"$work/bin/arm64-test-pkg-config"
+chmod +x "$work/bin/arm64-test-gcc" "$work/bin/arm64-test-pkg-config"
+
+cross_is_whole() {
+    would scanhead "$@" >"$work/cross"
+    says "$work/cross" '^arm64-test-gcc .*-I/arm64/include .*main\.c' '^arm64-test-g++ ' 'arm64-test-ar rcs' &&
+        lacks "$work/cross" -mprefer-vector-width '/usr/include'
+}
+check "CROSS_COMPILE=: compilers, pkg-config and ar with the prefix, no flag of this machine" cross_is_whole CROSS_COMPILE=arm64-test-
+check "the same by the name of CC" cross_is_whole CC=arm64-test-gcc
+archive_is_whole() {
+    would libscanhead.a CC=arm64-test-gcc >"$work/cross" && says "$work/cross" '^arm64-test-objcopy'
+}
+check "and the library by its objcopy" archive_is_whole
+own_tools() {
+    would scanhead CROSS_COMPILE=arm64-test- PKG_CONFIG="$work/bin/arm64-test-pkg-config" AR=other-ar >"$work/cross"
+    says "$work/cross" 'other-ar rcs' '-I/arm64/include'
+}
+check "what is given stays" own_tools
+without_pkg_config() {
+    rm "$work/bin/arm64-test-pkg-config"
+    ! would scanhead CROSS_COMPILE=arm64-test- >"$work/cross" && says "$work/cross" 'arm64-test-pkg-config does not *find'
+}
+check "without its pkg-config there is one error that says so" without_pkg_config
+
+# ---- Embree
+# embree_is N [VARIABLE=...]: headers and library of version N.
+embree_is() {
+    version=$1
+    shift
+    would scanhead CPPFLAGS="-I$work/include" "$@" >"$work/embree"
+    says "$work/embree" "-DSH_EMBREE=$version .*core/bvh/bvh\.c" "-lembree$version " &&
+        lacks "$work/embree" "SH_EMBREE=$((7 - version))" "lembree$((7 - version))"
+}
+check "both Embrees: headers and library of 3" embree_is 3
+check "EMBREE=4: of 4" embree_is 4 EMBREE=4
+check "EMBREE=3: of 3" embree_is 3 EMBREE=3
+rm -r "$work/include/embree3"
+has_3() {
+    echo '#include <embree3/rtcore.h>' | ${CC:-cc} -E -xc - >/dev/null 2>&1
+}
+refuses_embree() {
+    ! would scanhead CPPFLAGS="-I$work/include" EMBREE="$1" >"$work/embree" && says "$work/embree" "no *Embree $1 for .*allowed 3 and 4"
+}
+has_3 || check "EMBREE=3 without it is refused" refuses_embree 3
+check "EMBREE=5 is refused" refuses_embree 5
+
+# ---- the archive, of the objects of both compilers
+only_the_interface() {
+    archive=$1/libscanhead.a
+    env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -s BUILD="$1" DEPS=no ${2:-} "$archive" || return
+    nm -g --defined-only "$archive" | awk 'NF == 3 && $3 !~ /^scanhead_/ { print; bad = 1 } NF == 3 { n++ }
+        END { exit bad || n < 20 }'
+}
+check "the archive defines scanhead_... and nothing else for others" only_the_interface "$(dirname "${SCANHEAD:-build/scanhead}")"
+if command -v clang >/dev/null; then
+    check "the same of clang's objects" only_the_interface "${BUILD:-build}/clang" "OPT=-O0 CC=clang CFLAGS=-g0"
+fi
+# A client with functions that are called as some of the library's inside are.
+cat >"$work/client.c" <<END
+#include <scanhead.h>
+#include <stdio.h>
+int crc32c(void);
+int crc32c(void) { return 7; }
+int sh_fail(void);
+int sh_fail(void) { return 8; }
+int main(void)
+{
+    char err[200];
+    struct scanhead *head;
+    printf("%d %d %d %s\n", crc32c(), sh_fail(), scanhead_open("none:", &head, err, sizeof err), scanhead_version());
+    return 0;
+}
+END
+own_names() {
+    ${CC:-cc} -Idrivers/host "$work/client.c" "$(dirname "${SCANHEAD:-build/scanhead}")/libscanhead.a" -lnettle -lusb-1.0 -lm \
+        -o "$work/client" && "$work/client" | grep "^7 8 -[0-9]* [0-9.]*$"
+}
+check "a client with a crc32c and an sh_fail of its own links and runs" own_names
+echo "1..$tests"

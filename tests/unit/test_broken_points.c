@@ -1,0 +1,142 @@
+/* Streams whose frames are whole and whose numbers are absurd: nothing is written that is none, and what is left out is
+ * counted. Each file's reader would take infinities, or wrapped integers, for points. */
+#include "tests/unit/recorder_rig.h"
+
+static const struct rig_point points[3] = {
+    {0, 0, 0, 0, 0, 1, 1}, {2, 0, 0, 0, 0, 1, 1}, {0, 0, 0, INT16_MIN, 0xffff, 0, 0}};
+
+static struct native_anchor local_anchor(void)
+{
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
+    memset(a.anchor, 0, sizeof a.anchor);
+    return a;
+}
+
+static int record(const char *name, const struct native_anchor *a, struct sh_err *err)
+{
+    rig_begin();
+    rig_descriptor(1, 1);
+    rig_anchor(a);
+    rig_points(0, 0, 0, points, 3);
+    return rig_record(rig_path(name), (struct recorder_options){.ascii = 1}, RIG_KEEP, err);
+}
+
+/* 2 counts of 1.5e308 are beyond any number. */
+static void test_infinite(void **state)
+{
+    (void)state;
+    static const char *const name[] = {"a.ply", "a.ptx"}, *const absent[] = {"inf", "nan"};
+    for (int i = 0; i < 2; i++) {
+        struct sh_err err = {0};
+        struct native_anchor a = local_anchor();
+        size_t len;
+        a.scale[0] = 1.5e308;
+        assert_int_equal(record(name[i], &a, &err), SH_OK);
+        assert_non_null(strstr(rig_notes, "1 points left out whose coordinates are infinite"));
+        char *text = (char *)rig_read(rig_path(name[i]), &len), *end = strstr(text, "end_header");
+        for (int k = 0; k < 2; k++)
+            assert_null(strstr(end != NULL ? strchr(end, '\n') : text, absent[k]));
+        if (end != NULL) assert_non_null(strstr(text, "element vertex 1\n"));
+        free(text);
+        unlink(rig_path(name[i]));
+    }
+}
+
+/* Finite at first; the pose takes them beyond. */
+static void test_infinite_by_pose(void **state)
+{
+    (void)state;
+    struct sh_err err = {0};
+    struct native_anchor a = local_anchor();
+    for (int i = 0; i < 9; i++)
+        a.rotation[i] = 1.7e308;
+    rig_begin();
+    rig_descriptor(0, 1);
+    rig_anchor(&a);
+    rig_points(0, 0, 0, (const struct rig_point[]){{4000000, 900, 0, 0, 0, 1, 1}}, 1); /* 4 km up */
+    assert_int_equal(rig_record(rig_path("a.ply"), (struct recorder_options){0}, RIG_KEEP, &err), SH_OK);
+    assert_non_null(strstr(rig_notes, "1 points left out whose coordinates are infinite"));
+    unlink(rig_path("a.ply"));
+}
+
+/* A pose of 300 digits: the header's numbers are checked one by one. */
+static void test_long_pose(void **state)
+{
+    (void)state;
+    struct sh_err err = {0};
+    struct native_anchor a = local_anchor();
+    for (int i = 0; i < 9; i++)
+        a.rotation[i] = -1e300;
+    assert_int_equal(record("a.ptx", &a, &err), SH_EFORMAT);
+    assert_non_null(strstr(err.text, "more digits"));
+}
+
+/* The angle comes from the pose taken back; where that is beyond any number, there is none. */
+static void test_no_scan_angle(void **state)
+{
+    (void)state;
+    struct sh_err err = {0};
+    struct native_anchor a = local_anchor();
+    static const double rotation[9] = {1e308, 1e308, 1e308, 1e308, 1e308, 1e308, -1e308, -1e308, -1e308};
+    memcpy(a.rotation, rotation, sizeof rotation);
+    a.scale_m = 1e9;
+    rig_begin();
+    rig_descriptor(1, 1);
+    rig_anchor(&a);
+    rig_points(0, 0, 0, (const struct rig_point[]){{1, 1, 5, 0, 0, 1, 1}, {1, 1, 5, 0, 0, 1, 1}}, 2);
+    assert_int_equal(rig_record(rig_path("a.las"), (struct recorder_options){0}, RIG_KEEP, &err), SH_OK);
+    assert_non_null(strstr(rig_notes, "2 points without a scan angle"));
+    unlink(rig_path("a.las"));
+}
+
+/* Rows beyond 32 bits, by pulse numbers and by times. */
+static void test_far_rows(void **state)
+{
+    (void)state;
+    struct sh_err err = {0};
+    struct native_anchor a = local_anchor();
+    static uint8_t out[1024];
+    struct line_end end = {.line = 0, .pulse0 = 0, .n_fired = 1};
+    for (int i = 0; i < 2; i++) {
+        rig_begin();
+        rig_descriptor(1, 1);
+        rig_anchor(&a);
+        if (i == 0) rig_put(out, native_encode_line_end(out, sizeof out, &end, 0));
+        /* line 1 begins with pulse 1; times: 2^63 ns at 1 kHz are 9e12 pulses */
+        rig_points(1, i == 0 ? 1 : (uint64_t)(INT64_MIN / 1000000), i == 0 ? UINT64_MAX : 9000000000000, points, 3);
+        assert_int_equal(rig_record(rig_path("a.e57"), (struct recorder_options){0}, RIG_KEEP, &err), SH_EFORMAT);
+        assert_non_null(strstr(err.text, "more than 2^32 pulses"));
+    }
+}
+
+/* So few counts that a turn has less than one. */
+static void test_no_counts(void **state)
+{
+    (void)state;
+    static uint8_t out[1024];
+    struct scanhead *sh;
+    struct scanhead_frame frame;
+    struct native_descriptor d = {.idn = "a,b,c,d",
+                                  .layout = NATIVE_POLAR,
+                                  .prr_uhz = 1000000000,
+                                  .mirror_counts_per_turn = 5e-324,
+                                  .pan_counts_per_turn = 3600,
+                                  .range_scale_m = 1e-3};
+    rig_begin();
+    rig_put(out, native_encode_descriptor(out, sizeof out, &d, 0, 0));
+    fclose(rig_stream);
+    rig_stream = NULL;
+    assert_int_equal(scanhead_open(rig_shs, &sh, NULL, 0), 0);
+    assert_int_equal(scanhead_next(sh, &frame, -1), SCANHEAD_EFORMAT);
+    assert_non_null(strstr(scanhead_error(sh), "polar descriptor without scales"));
+    scanhead_close(sh);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_infinite),      cmocka_unit_test(test_infinite_by_pose), cmocka_unit_test(test_long_pose),
+        cmocka_unit_test(test_no_scan_angle), cmocka_unit_test(test_far_rows),         cmocka_unit_test(test_no_counts),
+    };
+    return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
+}

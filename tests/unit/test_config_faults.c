@@ -1,0 +1,152 @@
+/* All faults of a configuration at once, in their order, and none that only follows from another one; and
+ * files that are none. */
+#include "tests/unit/config_rig.h"
+
+/* The faults are these, in this order: each begins with PATH:LINE: KEY, or as it stands here. */
+static void assert_faults(const char *const *starts, uint32_t n)
+{
+    char want[256];
+    for (uint32_t i = 0; i < n || i < faults.n; i++) {
+        const char *got = i < faults.n ? faults.fault[i].text : "nothing";
+        const int of_file = i < n && starts[i][0] >= '0' && starts[i][0] <= '9';
+        snprintf(want, sizeof want, "%s%s%s", of_file ? config_path : "", of_file ? ":" : "",
+                 i < n ? starts[i] : "nothing");
+        if (strncmp(got, want, strlen(want)) != 0) fail_msg("fault %u is \"%s\", expected \"%s\"", i, got, want);
+    }
+}
+#define ASSERT_FAULTS(...) \
+    assert_faults((const char *const[]){__VA_ARGS__}, sizeof((const char *const[]){__VA_ARGS__}) / sizeof(const char *))
+
+static void all_faults_are_told_in_order(void **state)
+{
+    (void)state;
+    static const char text[] = "head: {profile: riegl-vz400i, prr_hz: 30 kHz,\n" /* 1 */
+                               "       lines_hz: 500, serial: a;b, colour: red}\n"
+                               "scene: {meshes: [{file: cube.obj, up: x}]}\n" /* 3 */
+                               "stations:\n"
+                               "  - {position_m: [0, 0], heading_deg: 400}\n"
+                               "links: [{type: pty, port: 1, address: a}]\n" /* 6 */
+                               "output: {crs: local, heights: geoid, utm_zone: 7}\n"
+                               "loop: {tick_hz: 999}\n"; /* 8 */
+    const char *const sets[] = {"head.frames=-1", "gnss.quality=3"};
+    write_file(config_path, text, sizeof text - 1);
+    assert_int_equal(load_sets(sets, 2), SH_EINPUT);
+    ASSERT_FAULTS("1: head.prr_hz: ", "2: head.serial: ", "2: head.colour: ", "2: head.lines_hz: ",
+                  "3: scene.meshes[0].up: ", "3: scene.meshes[0].scale: missing", "5: stations[0].position_m: ",
+                  "5: stations[0].heading_deg: ", "6: links[0].address: ", "6: links[0].port: ", "7: output.utm_zone: ",
+                  "7: output.heights: ", "8: loop.tick_hz: ", "--set head.frames: ", "--set gnss.quality: ");
+    /* The first is what the shorter call gives. */
+    struct sh_err first;
+    assert_int_equal(config_load(config_path, sets, 2, cfg, &first), SH_EINPUT);
+    assert_string_equal(first.text, faults.fault[0].text);
+}
+
+static void what_follows_from_a_fault_is_not_told(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *old, *with, *fault;
+    } one[] = {
+        {"scale: 1", "scal: 1", "9: scene.meshes[0].scal: unknown key, did you mean scene.meshes[0].scale?"},
+        {"scene:", "scen:", "5: scen: unknown key, did you mean scene?"},
+        {"stations:", "station:", "10: station: unknown key, did you mean stations?"},
+        {"position_m", "positon_m", "11: stations[0].positon_m: unknown key"},
+        {"  - position_m: [1, 2, 3]\n    heading_deg: 90\n", "  gate\n", "11: stations: here stands a single value"},
+        {"type: tcp", "type: tpc", "14: links[0].type: "},                    /* what has a port? */
+        {"riegl-vz400i", "riegl", "2: head.profile: "},                       /* what are its limits? */
+        {LINES, "  lines_hz: 1e6\n", "4: head.lines_hz: 1000000 is outside"}, /* more than pulses */
+        {LINES, "  line_start_deg: 99\n  line_stop_deg: 5\n", "4: head.line_start_deg: 99 is outside"},
+        {"output:", "noise: {range: signal}\nsignal: {model: loud}\noutput:", "17: signal.model: "},
+        {"output:", "platform: {kind: car, file: a}\noutput:", "16: platform.kind: "},
+        {"output:", "surfaces: [{glass: 0.8, reflectance: 7}]\noutput:", "16: surfaces[0].reflectance: "},
+    };
+    for (size_t i = 0; i < sizeof one / sizeof one[0]; i++) {
+        assert_int_equal(load_edited(one[i].old, one[i].with), SH_EINPUT);
+        ASSERT_FAULTS(one[i].fault);
+    }
+}
+
+static void faults_of_the_profile_come_last(void **state)
+{
+    (void)state;
+    char text[8192], name[160];
+    FILE *file = fopen("config/heads/leica-rtc360.yaml", "rb");
+    size_t len = fread(text, 1, sizeof text - 1, file);
+    fclose(file);
+    text[len] = '\0';
+    memcpy(strstr(text, "value: 130,"), "value: a30,", 11);
+    memcpy(strstr(text, "value: 0.5,"), "value: b.5,", 11);
+    write_in("heads/mine.yaml", text);
+    snprintf(name, sizeof name, "%s/heads/mine.yaml:", dir);
+    assert_int_equal(load_edited("riegl-vz400i\n  prr_hz: 500000\n  lines_hz: 100", "mine\n  frames: x"), SH_EINPUT);
+    ASSERT_FAULTS("3: head.frames: ", name, name);
+}
+
+static void twenty_are_kept_and_all_are_counted(void **state)
+{
+    (void)state;
+    char text[4096], want[32];
+    int n = snprintf(text, sizeof text, "%s\nsurfaces:\n", base);
+    for (int i = 0; i < 60; i++)
+        n += snprintf(text + n, sizeof text - (size_t)n, "  - {retro: -1}\n");
+    assert_int_equal(load_text(text), SH_EINPUT);
+    assert_int_equal(faults.n, 60);
+    snprintf(want, sizeof want, "surfaces[%d]", CONFIG_MAX_FAULTS - 1);
+    assert_non_null(strstr(faults.fault[CONFIG_MAX_FAULTS - 1].text, want));
+    /* A fault that is found later and stands before the others takes its place before them. */
+    char *first = strstr(text, "  prr_hz: 500000");
+    memcpy(first, "  prr_hz: 999999", 16);
+    memcpy(strstr(text, "lines_hz: 100"), "lines_hz: 2  ", 13); /* outside the profile: found after reading */
+    assert_int_equal(load_text(text), SH_EINPUT);
+    assert_int_equal(faults.n, 61);
+    assert_non_null(strstr(faults.fault[0].text, ":4: head.lines_hz: 2 is outside"));
+}
+
+/* Hostile: thousands of faults cost what reading costs. Nothing is asserted on time but that it ends. */
+static void many_faults_end(void **state)
+{
+    (void)state;
+    enum { LINES_OF_IT = 100000 };
+    char *text = malloc(LINES_OF_IT * 10 + 1), *at = text;
+    assert_non_null(text);
+    for (int i = 0; i < LINES_OF_IT; i++)
+        at += sprintf(at, "k%05d: 1\n", i);
+    assert_int_equal(load_text(text), SH_EINPUT);
+    assert_true(faults.n >= LINES_OF_IT);
+    free(text);
+}
+
+/* ---- files that are none: refused at once, where opening one would wait, or reading it never end */
+
+static void a_fifo_or_a_device_is_refused(void **state)
+{
+    (void)state;
+    char fifo[128], fifo_obj[128];
+    snprintf(fifo, sizeof fifo, "%s/fifo.yaml", dir);
+    snprintf(fifo_obj, sizeof fifo_obj, "%s/fifo.obj", dir);
+    assert_int_equal(mkfifo(fifo, 0600), 0);
+    assert_int_equal(mkfifo(fifo_obj, 0600), 0);
+    assert_int_equal(config_load(fifo, NULL, 0, cfg, &err), SH_EINPUT);
+    assert_says("fifo.yaml: cannot be opened: a FIFO, not a file; a YAML file is needed");
+    assert_int_equal(config_load("/dev/zero", NULL, 0, cfg, &err), SH_EINPUT);
+    assert_says("/dev/zero: cannot be opened: a device, not a file");
+    assert_int_equal(load_edited("cube.obj", "fifo.obj"), SH_EINPUT);
+    assert_says("fifo.obj: a FIFO, not a file; allowed a mesh file that can be read");
+    assert_int_equal(load_edited("riegl-vz400i", "fifo.yaml"), SH_EINPUT);
+    assert_says("fifo.yaml: cannot be opened: a FIFO, not a file");
+    remove(fifo);
+    remove(fifo_obj);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(all_faults_are_told_in_order),
+        cmocka_unit_test(what_follows_from_a_fault_is_not_told),
+        cmocka_unit_test(faults_of_the_profile_come_last),
+        cmocka_unit_test(twenty_are_kept_and_all_are_counted),
+        cmocka_unit_test(many_faults_end),
+        cmocka_unit_test(a_fifo_or_a_device_is_refused),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

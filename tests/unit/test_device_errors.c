@@ -1,0 +1,62 @@
+/* Events of errors: how many of them, and that none is forgotten. */
+#include "tests/unit/device_rig.h"
+
+/* A tick holds 24 events; those of a client that is wrong all the time must not cost the scan's end. */
+static void the_last_events_are_said_however_many(void **state)
+{
+    (void)state;
+    struct rig *rig = rig_open(&(struct device_options){.start = 1, .one_scan = 1}, NULL, 0);
+    struct command_result result;
+    rig_go_to(rig, 230 + 499);
+    for (int i = 0; i < 100; i++)
+        device_command(rig->device, 1, "nonsense", rig->next, &result);
+    uint64_t single = 0, held = 0, ends = 0;
+    while (rig_claim(rig))
+        for (uint32_t i = 0; i < rig->work.n_events; i++) {
+            const struct native_event *event = &rig->work.event[i];
+            ends += event->code == NATIVE_EV_SCAN_END;
+            if (event->code != NATIVE_EV_ERROR) continue;
+            assert_true(event->b == 1 && (int64_t)event->a == CMD_E_HEADER);
+            single += event->c == 0;
+            held += event->c;
+        }
+    assert_int_equal(single, 10);
+    assert_int_equal(held, 90); /* said though the second was not over */
+    assert_int_equal(ends, 1);
+    rig_close(rig);
+}
+
+/* Each session has ten in a second of its own; a second later those held back are counted, and ten more have room. */
+static void errors_are_held_back_by_session(void **state)
+{
+    (void)state;
+    struct rig *rig = rig_open(NULL, NULL, 0);
+    struct command_result result;
+    uint64_t single[3] = {0}, held[3] = {0}, events = 0;
+    for (uint64_t tick = 0; tick < 3500; tick++) {
+        for (uint32_t session = 1; session <= 2 && tick < 2000; session++)
+            if (session == 1 || tick % 400 == 0) device_command(rig->device, session, "nonsense", tick, &result);
+        assert_true(rig_claim(rig));
+        for (uint32_t i = 0; i < rig->work.n_events; i++) {
+            const struct native_event *event = &rig->work.event[i];
+            if (event->code != NATIVE_EV_ERROR) continue;
+            assert_in_range(event->b, 1, 2);
+            single[event->b] += event->c == 0;
+            held[event->b] += event->c;
+            events++;
+        }
+    }
+    assert_true(single[2] == 5 && held[2] == 0); /* who errs seldom is not concerned */
+    assert_int_equal(single[1] + held[1], 2000);
+    assert_in_range(events - 5, 2 * 11, 3 * 11);
+    rig_close(rig);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_last_events_are_said_however_many),
+        cmocka_unit_test(errors_are_held_back_by_session),
+    };
+    return cmocka_run_group_tests_name("device errors", tests, make_folder, remove_folder);
+}

@@ -1,0 +1,110 @@
+/* What single precision takes from a mesh: as much as the format holds is allowed, said, and planned with. */
+#include "tests/unit/scene_files.h"
+
+#include <math.h>
+
+#include "firmware_sim/site/site.h"
+
+/* A hall of 30 m: its farthest coordinate is off by 31 * 6e-8 = 1.86e-6 m, told with two digits. */
+static const char HALL[] = "solid hall\nfacet normal 0 0 1\nouter loop\nvertex -1 -1 0\nvertex 31 -1 0\nvertex 0 31 0\n"
+                           "endloop\nendfacet\nendsolid hall\n";
+
+static int remove_files(void **state)
+{
+    static const char *const file[] = {"hall.stl", "hall.ply", "run.yaml"};
+    char name[160];
+    for (size_t i = 0; i < sizeof file / sizeof *file; i++) {
+        snprintf(name, sizeof name, "%s/%s", folder, file[i]);
+        unlink(name);
+    }
+    return remove_folder(state);
+}
+
+/* site_load or, with its rows of all stages, site_load_plan. */
+static int (*load_site)(const struct config *, const struct sh_report *, struct site **, struct sh_err *) = site_load;
+
+static int load_hall(const char *mesh, const char *tolerance, const char *more, struct config *cfg, struct site **site,
+                     struct sh_err *err)
+{
+    char text[1024];
+    const struct sh_report report = {.warn = keep_warning};
+    snprintf(text, sizeof text,
+             "head: {profile: riegl-vz400i}\nscene:\n%s  meshes:\n    - {file: %s, up: z, scale: 1}\n"
+             "stations:\n  - {position_m: [1, 1, 2]}\noutput: {crs: local}\n%s",
+             tolerance, mesh, more);
+    write_text("run.yaml", text);
+    n_warnings = 0;
+    warnings[0] = '\0';
+    int rc = config_load(path, NULL, 0, cfg, err);
+    return rc == SH_OK ? load_site(cfg, &report, site, err) : rc;
+}
+
+static void check_accepted(const char *mesh, const char *tolerance, const char *more)
+{
+    static struct config cfg;
+    struct site *site;
+    struct sh_err err;
+    if (load_hall(mesh, tolerance, more, &cfg, &site, &err) != SH_OK) fail_msg("%s", err.text);
+    if (strstr(warnings, "in single precision, so good to 1.9e-06 m only: coordinates go up to 31\n") == NULL)
+        fail_msg("warnings: %s", warnings);
+    assert_true(fabs(site->scene->error_m - 1.9e-6) < 1e-12);
+    if (load_site == site_load_plan) {
+        const struct plan_row *row = &site->plan.row[0];
+        assert_string_equal(row->stage, "mesh");
+        assert_string_equal(row->method, "single precision");
+        assert_true(row->error_m == site->scene->error_m);
+    }
+    site_free(site);
+}
+
+static void as_much_as_the_format_holds_is_allowed(void **state)
+{
+    (void)state;
+    write_text("hall.stl", HALL);
+    load_site = site_load_plan;
+    check_accepted("hall.stl", "", "");
+    load_site = site_load;
+    check_accepted("hall.stl", "", "plan: {tolerance_m: 2e-5}\n");
+    check_accepted("hall.stl", "  tolerance_m: 2e-6\n", "plan: {tolerance_m: 1e-6}\n");
+}
+
+/* A tenth of what the plan may be off by, where that is said; the figure that is named is enough. */
+static void a_refusal_names_key_and_figure(void **state)
+{
+    (void)state;
+    static struct config cfg;
+    struct site *site;
+    struct sh_err err;
+    write_text("hall.stl", HALL);
+    assert_int_equal(load_hall("hall.stl", "", "plan: {tolerance_m: 1e-5}\n", &cfg, &site, &err), SH_EINPUT);
+    static const char want[] = "errors up to 1.9e-06 m; allowed are 1e-06 m (scene.tolerance_m, or else a tenth of "
+                               "plan.tolerance_m): set it to 1.9e-06, move";
+    if (strstr(err.text, want) == NULL) fail_msg("%s", err.text);
+    check_accepted("hall.stl", "  tolerance_m: 1.9e-6\n", "plan: {tolerance_m: 1e-5}\n");
+}
+
+/* Float columns of a binary PLY: the reader is exact, the writer was not. */
+static void float_columns_of_ply_are_told(void **state)
+{
+    (void)state;
+    static const char head[] = "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\n"
+                               "property float y\nproperty float z\nelement face 1\n"
+                               "property list uchar int vertex_indices\nend_header\n";
+    static const float v[9] = {-1, -1, 0, 31, -1, 0, 0, 31, 0};
+    static const uint8_t face[13] = {3, 0, 0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0};
+    char ply[sizeof head - 1 + sizeof v + sizeof face];
+    memcpy(ply, head, sizeof head - 1);
+    memcpy(ply + sizeof head - 1, v, sizeof v);
+    memcpy(ply + sizeof head - 1 + sizeof v, face, sizeof face);
+    write_file("hall.ply", ply, sizeof ply);
+    check_accepted("hall.ply", "", "");
+    check_accepted("hall.ply", "  tolerance_m: 1e-9\n", ""); /* what is done is done: never refused */
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(as_much_as_the_format_holds_is_allowed),
+                                       cmocka_unit_test(a_refusal_names_key_and_figure),
+                                       cmocka_unit_test(float_columns_of_ply_are_told)};
+    return cmocka_run_group_tests(tests, make_folder, remove_files);
+}

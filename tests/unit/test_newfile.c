@@ -1,0 +1,293 @@
+/* Files that the program makes: links are not followed, only files are replaced, and two writers never end in one file. */
+#include <errno.h>
+#include <fcntl.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <sys/sysmacros.h>
+#include <sys/un.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+#include "core/newfile.h"
+#include "drivers/record/outfile.h"
+
+static char dir[] = "/tmp/test_newfile_XXXXXX", path[64], part[64], other[64];
+static struct sh_err err;
+
+/* ---- two steps of a writer, before which another one acts */
+
+static void (*before_lock)(void), (*before_rename)(void);
+
+static void act(void (**fn)(void))
+{
+    void (*now)(void) = *fn;
+    *fn = NULL;
+    if (now != NULL) now();
+}
+
+/* In place of libc's. */
+int flock(int fd, int operation)
+{
+    act(&before_lock);
+    return (int)syscall(SYS_flock, fd, operation);
+}
+
+int rename(const char *from, const char *to)
+{
+    act(&before_rename);
+    return (int)syscall(SYS_renameat2, AT_FDCWD, from, AT_FDCWD, to, 0);
+}
+
+/* ---- helpers */
+
+static void write_text(const char *name, const char *text)
+{
+    FILE *out = fopen(name, "w");
+    assert_non_null(out);
+    fputs(text, out);
+    fclose(out);
+}
+
+static void expect_text(const char *name, const char *want)
+{
+    char text[64] = "";
+    FILE *in = fopen(name, "r");
+    assert_non_null(in);
+    size_t n = fread(text, 1, sizeof text - 1, in);
+    fclose(in);
+    text[n] = '\0';
+    assert_string_equal(text, want);
+}
+
+static void expect_error(int rc, int code, const char *name, const char *says)
+{
+    if (rc != code || strstr(err.text, name) == NULL || strstr(err.text, says) == NULL)
+        fail_msg("%d, no '%s' in: %s", rc, says, err.text);
+    err.text[0] = '\0';
+}
+
+static void expect_missing(const char *name)
+{
+    struct stat st;
+    assert_int_equal(lstat(name, &st), -1);
+}
+
+static mode_t kind_of(const char *name)
+{
+    struct stat st;
+    assert_int_equal(lstat(name, &st), 0);
+    return st.st_mode & S_IFMT;
+}
+
+/* ---- links */
+
+static void test_links(void **state)
+{
+    (void)state;
+    struct outfile file;
+    int fd;
+    write_text(other, "precious");
+    assert_int_equal(symlink(other, path), 0);
+    expect_error(newfile_open(path, &fd, &err), SH_EINPUT, path, "symbolic link to");
+    expect_error(outfile_open(&file, path, &err), SH_EINPUT, path, "symbolic link to");
+    unlink(path);
+    assert_int_equal(symlink(other, part), 0);
+    expect_error(outfile_open(&file, path, &err), SH_EINPUT, part, "symbolic link to");
+    unlink(part);
+    assert_int_equal(link(other, path), 0);
+    expect_error(newfile_open(path, &fd, &err), SH_EINPUT, path, "2 names (hard links)");
+    unlink(path);
+    assert_int_equal(link(other, part), 0);
+    expect_error(outfile_open(&file, path, &err), SH_EINPUT, part, "2 names (hard links)");
+    unlink(part);
+    /* one that leads nowhere makes no file there */
+    assert_int_equal(symlink("nowhere", path), 0);
+    expect_error(newfile_open(path, &fd, &err), SH_EINPUT, path, "symbolic link to nowhere");
+    unlink(path);
+    expect_text(other, "precious");
+    unlink(other);
+}
+
+/* A link that comes while the file is written is not followed and stays. */
+static void test_late_link(void **state)
+{
+    (void)state;
+    struct outfile file;
+    write_text(other, "precious");
+    assert_int_equal(outfile_open(&file, path, &err), 0);
+    assert_int_equal(outfile_write(&file, "new", 3, &err), 0);
+    assert_int_equal(symlink(other, path), 0);
+    expect_error(outfile_close(&file, 1, &err), SH_EINPUT, path, "symbolic link to");
+    expect_missing(part);
+    expect_text(other, "precious");
+    unlink(path);
+    unlink(other);
+}
+
+/* /dev/fd/N and the like lead to what we have open. */
+static void test_own_descriptors(void **state)
+{
+    (void)state;
+    char name[32], text[8] = "";
+    int pipe_fd[2], fd;
+    assert_int_equal(pipe(pipe_fd), 0);
+    snprintf(name, sizeof name, "/dev/fd/%d", pipe_fd[1]);
+    assert_int_equal(newfile_open(name, &fd, &err), 0);
+    assert_int_equal(write(fd, "hello", 5), 5);
+    assert_int_equal(read(pipe_fd[0], text, 5), 5);
+    assert_string_equal(text, "hello");
+    close(fd);
+    close(pipe_fd[0]);
+    close(pipe_fd[1]);
+}
+
+/* ---- what is no file */
+
+static void test_kinds(void **state)
+{
+    (void)state;
+    struct outfile file;
+    int fd;
+    assert_int_equal(mkfifo(path, 0600), 0);
+    expect_error(outfile_open(&file, path, &err), SH_EINPUT, path, "is a FIFO");
+    expect_error(newfile_open(path, &fd, &err), SH_EINPUT, path, "FIFO that nobody reads"); /* and did not wait for a reader */
+    assert_int_equal(kind_of(path), S_IFIFO);
+    unlink(path);
+    assert_int_equal(mkfifo(part, 0600), 0);
+    expect_error(outfile_open(&file, path, &err), SH_EINPUT, part, "is a FIFO");
+    unlink(part);
+    struct sockaddr_un at = {.sun_family = AF_UNIX};
+    int s = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    snprintf(at.sun_path, sizeof at.sun_path, "%s", path);
+    assert_int_equal(bind(s, (struct sockaddr *)&at, sizeof at), 0);
+    close(s);
+    expect_error(outfile_open(&file, path, &err), SH_EINPUT, path, "is a socket");
+    assert_int_equal(kind_of(path), S_IFSOCK);
+    unlink(path);
+    assert_int_equal(mkdir(path, 0700), 0);
+    expect_error(outfile_open(&file, path, &err), SH_EINPUT, path, "is a directory");
+    rmdir(path);
+}
+
+/* A node like /dev/full, made here. Before the recording, and while it is written. */
+static void test_device(void **state)
+{
+    (void)state;
+    struct outfile file;
+    if (mknod(path, S_IFCHR | 0600, makedev(1, 7)) != 0) {
+        print_message("skipped: %s: mknod: %s\n", path, strerror(errno));
+        skip();
+    }
+    expect_error(outfile_open(&file, path, &err), SH_EINPUT, path, "is a character device");
+    unlink(path);
+    assert_int_equal(outfile_open(&file, path, &err), 0);
+    assert_int_equal(mknod(path, S_IFCHR | 0600, makedev(1, 7)), 0);
+    expect_error(outfile_close(&file, 1, &err), SH_EINPUT, path, "is a character device");
+    assert_int_equal(kind_of(path), S_IFCHR);
+    unlink(path);
+}
+
+/* ---- part files that are there already */
+
+static void test_left_part(void **state)
+{
+    (void)state;
+    struct outfile file;
+    write_text(part, "left by one that was killed");
+    assert_int_equal(outfile_open(&file, path, &err), 0);
+    assert_int_equal(outfile_write(&file, "new", 3, &err), 0);
+    assert_int_equal(outfile_close(&file, 1, &err), 0);
+    expect_text(path, "new");
+    expect_missing(part);
+    unlink(path);
+    if (geteuid() != 0) return; /* only root can give files away */
+    write_text(part, "of another user");
+    assert_int_equal(chown(part, 65534, 65534), 0);
+    expect_error(outfile_open(&file, path, &err), SH_EINPUT, part, "of another user");
+    expect_text(part, "of another user");
+    unlink(part);
+}
+
+/* ---- two writers */
+
+static struct outfile first, second;
+
+static void end_first(void)
+{
+    assert_int_equal(outfile_close(&first, 1, &err), 0);
+}
+
+static void begin_second(void)
+{
+    expect_error(outfile_open(&second, path, &err), SH_EINPUT, part, "is being written by another recording");
+}
+
+/* The first one ends between the second one's open and its lock: what the second one has opened is the finished file
+ * by then, which it must not empty. */
+static void test_end_between_open_and_lock(void **state)
+{
+    (void)state;
+    assert_int_equal(outfile_open(&first, path, &err), 0);
+    assert_int_equal(outfile_write(&first, "first", 5, &err), 0);
+    before_lock = end_first;
+    assert_int_equal(outfile_open(&second, path, &err), 0);
+    expect_text(path, "first");
+    assert_int_equal(outfile_close(&second, 0, &err), 0);
+    expect_text(path, "first");
+    expect_missing(part);
+    unlink(path);
+}
+
+/* The second one begins just before the first one's file gets its name: it is still being written. */
+static void test_begin_before_rename(void **state)
+{
+    (void)state;
+    assert_int_equal(outfile_open(&first, path, &err), 0);
+    assert_int_equal(outfile_write(&first, "first", 5, &err), 0);
+    before_rename = begin_second;
+    assert_int_equal(outfile_close(&first, 1, &err), 0);
+    assert_null(before_rename);
+    expect_text(path, "first");
+    expect_missing(part);
+    unlink(path);
+}
+
+static int set_up(void **state)
+{
+    (void)state;
+    if (mkdtemp(dir) == NULL) return -1;
+    snprintf(path, sizeof path, "%s/a.shs", dir);
+    snprintf(part, sizeof part, "%s/a.shs.part", dir);
+    snprintf(other, sizeof other, "%s/other", dir);
+    return 0;
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    return rmdir(dir);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_links),
+        cmocka_unit_test(test_late_link),
+        cmocka_unit_test(test_own_descriptors),
+        cmocka_unit_test(test_kinds),
+        cmocka_unit_test(test_device),
+        cmocka_unit_test(test_left_part),
+        cmocka_unit_test(test_end_between_open_and_lock),
+        cmocka_unit_test(test_begin_before_rename),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}

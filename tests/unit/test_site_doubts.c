@@ -1,0 +1,221 @@
+/* What is allowed and hardly meant is said once, with figures; what is usual is not. Run from the top of the
+ * source tree. */
+#include <glob.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+#include "firmware_sim/site/site.h"
+
+static char dir[64], config_path[128], warned[4096];
+static struct config *cfg;
+static struct sh_err err;
+
+static void keep_warning(void *ctx, const char *text)
+{
+    (void)ctx;
+    size_t used = strlen(warned);
+    snprintf(warned + used, sizeof warned - used, "%s\n", text);
+}
+static const struct sh_report report = {.warn = keep_warning};
+
+static void write_in(const char *name, const char *text)
+{
+    char path[256];
+    snprintf(path, sizeof path, "%s/%s", dir, name);
+    FILE *f = fopen(path, "w");
+    assert_non_null(f);
+    fputs(text, f);
+    assert_int_equal(fclose(f), 0);
+}
+
+/* A closed box: 60 x 60 m about the origin, from z0 to z1. */
+static void write_box(double z0, double z1)
+{
+    char text[1024];
+    size_t used = 0;
+    for (int i = 0; i < 8; i++)
+        used += (size_t)snprintf(text + used, sizeof text - used, "v %d %d %g\n", i & 1 ? 30 : -30, i & 2 ? 30 : -30,
+                                 i & 4 ? z1 : z0);
+    snprintf(text + used, sizeof text - used, "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n");
+    write_in("mesh.obj", text);
+}
+
+/* Without the search for a beam, which takes long and has nothing to do with this. */
+static void load_file(const char *path)
+{
+    static const char *const sets[] = {"beam.mode=single", "scene.order_exactly=off"};
+    struct site *site = NULL;
+    warned[0] = '\0';
+    int rc = config_load(path, sets, 2, cfg, &err);
+    if (rc == SH_OK) rc = site_load(cfg, &report, &site, &err);
+    if (rc != SH_OK) fail_msg("%s", err.text);
+    site_free(site);
+}
+
+/* more: further sections; head: further keys of the head. */
+static void load(const char *position, double scale, const char *head, const char *more)
+{
+    char text[1024];
+    snprintf(text, sizeof text,
+             "head: {profile: riegl-vz400i, prr_hz: 600000, lines_hz: 100%s}\n"
+             "scene:\n  meshes: [{file: mesh.obj, up: z, scale: %g}]\nstations:\n  - {position_m: [%s]}\n%s\n",
+             head, scale, position, more);
+    write_in("test.yaml", text);
+    load_file(config_path);
+}
+
+static void says(const char *text)
+{
+    if (strstr(warned, text) == NULL) fail_msg("\"%s\" is missing in:\n%s", text, warned);
+}
+
+static void says_nothing(void)
+{
+    assert_string_equal(warned, "");
+}
+
+static void a_usual_scene_is_silent(void **state)
+{
+    (void)state;
+    write_box(0, 10);
+    load("0, 0, 1.7", 1, "", "");
+    says_nothing();
+}
+
+static void out_of_reach(void **state)
+{
+    (void)state;
+    write_box(-0.2, 0);
+    load("0, 0, 790", 1, "", ""); /* 800 m; the corners are 42 m aside, the face itself is within */
+    assert_null(strstr(warned, "nothing within"));
+    load("0, 0, 801", 1, "", "");
+    says("station 1 station-1 at 0 0 801 m: nothing within range_max_m, 800 m");
+    load("600, 600, 1", 1, "", ""); /* 570 m off in x and in y: 806 m */
+    says("nothing within");
+}
+
+static void under_the_floor(void **state)
+{
+    (void)state;
+    write_box(0, 10);
+    load("0, 0, -2", 1, "", "");
+    says("no surface below it, and one 2 m above it: is it under the floor?");
+}
+
+/* In a slab of 20 cm: whatever is not along it is nearer than the 1.5 m that this head sees. */
+static void within_a_slab(void **state)
+{
+    (void)state;
+    write_box(-0.2, 0);
+    load("0, 0, -0.1", 1, "", "");
+    says("meet something nearer than range_min_m, 1.5 m: does it stand within something?");
+}
+
+/* 300 m beside a slab of 20 cm: seen under 0.04 degrees. */
+static void a_scan_that_is_mostly_empty(void **state)
+{
+    (void)state;
+    write_box(-0.2, 0);
+    load("0, 330, 1.7", 1, "", "");
+    says("the scan is mostly empty: of 1024 directions 0 meet something from 1.5 to 800 m away");
+}
+
+static void a_scale_that_is_a_thousand_times_off(void **state)
+{
+    (void)state;
+    write_box(0, 10);
+    load("0, 0, 5000", 1000, "", "");
+    says("the scene is 6e+04 m large");
+    says("is scene.meshes[].scale right?");
+    write_box(0, 10);
+    load("0, 0, 1", 0.0001, "", "");
+    says("the scene is 0.006 m large");
+}
+
+/* Pulses are 240 deg * 100 / 600,000 = 0.04 deg apart. */
+static void a_window_between_two_pulses(void **state)
+{
+    (void)state;
+    write_box(0, 10);
+    load("0, 0, 1.7", 1, ", pan_deg_s: 100, line_start_deg: 0.001, line_stop_deg: 0.03", "");
+    says("360 of 360 lines cast no pulse: the window is 0.029 deg wide, and pulses are 0.04 deg apart");
+    load("0, 0, 1.7", 1, ", pan_deg_s: 100, line_start_deg: 0.001, line_stop_deg: 0.041", "");
+    says_nothing();
+}
+
+static void attributes_that_nothing_fills(void **state)
+{
+    (void)state;
+    write_box(0, 10);
+    load("0, 0, 1.7", 1, "", "output: {attributes: on}");
+    says("output.attributes: on, but signal.model is off: no echo has an amplitude");
+    says("each has the pulse's width");
+    load("0, 0, 1.7", 1, "", "output: {attributes: on}\nsignal: {model: on}\nsurfaces: [{reflectance: 0.3}]");
+    says_nothing();
+}
+
+/* config/README.md: they are ready to run. */
+static void configurations_of_this_tree_are_silent(void **state)
+{
+    (void)state;
+    glob_t found;
+    assert_int_equal(glob("config/*.yaml", 0, NULL, &found), 0);
+    for (size_t i = 0; i < found.gl_pathc; i++) {
+        struct sh_err why;
+        if (config_load(found.gl_pathv[i], NULL, 0, cfg, &why) != SH_OK) {
+            print_message("%s is left out: %s\n", found.gl_pathv[i], why.text); /* the house is not installed */
+            continue;
+        }
+        load_file(found.gl_pathv[i]);
+        if (strstr(warned, "station ") != NULL || strstr(warned, "scale") != NULL ||
+            strstr(warned, "lines cast") != NULL)
+            fail_msg("%s: %s", found.gl_pathv[i], warned);
+    }
+    globfree(&found);
+}
+
+static int setup(void **state)
+{
+    (void)state;
+    strcpy(dir, "/tmp/scanhead_doubts_XXXXXX");
+    if (mkdtemp(dir) == NULL) return -1;
+    snprintf(config_path, sizeof config_path, "%s/test.yaml", dir);
+    return (cfg = calloc(1, sizeof *cfg)) != NULL ? 0 : -1;
+}
+
+static int teardown(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"mesh.obj", "test.yaml"};
+    for (int i = 0; i < 2; i++) {
+        char path[256];
+        snprintf(path, sizeof path, "%s/%s", dir, names[i]);
+        unlink(path);
+    }
+    rmdir(dir);
+    free(cfg);
+    return 0;
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_usual_scene_is_silent),
+        cmocka_unit_test(out_of_reach),
+        cmocka_unit_test(under_the_floor),
+        cmocka_unit_test(within_a_slab),
+        cmocka_unit_test(a_scan_that_is_mostly_empty),
+        cmocka_unit_test(a_scale_that_is_a_thousand_times_off),
+        cmocka_unit_test(a_window_between_two_pulses),
+        cmocka_unit_test(attributes_that_nothing_fills),
+        cmocka_unit_test(configurations_of_this_tree_are_silent),
+    };
+    return cmocka_run_group_tests(tests, setup, teardown);
+}

@@ -1,0 +1,134 @@
+/* What a count of the stream is, by the head's longest range. Run from the top of the source tree. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+#include "firmware_sim/site/site.h"
+
+static char dir[64], warned[512];
+static struct config *cfg;
+static struct sh_err err;
+
+static void keep_warning(void *ctx, const char *text)
+{
+    (void)ctx;
+    snprintf(warned, sizeof warned, "%s", text);
+}
+static const struct sh_report report = {.warn = keep_warning};
+
+static FILE *open_in(const char *name, const char *mode)
+{
+    char path[128];
+    snprintf(path, sizeof path, "%s/%s", dir, name);
+    FILE *f = fopen(path, mode);
+    assert_non_null(f);
+    return f;
+}
+
+/* The profile of full-sweep with another range. */
+static void write_profile(double range_max_m)
+{
+    char line[512];
+    FILE *from = fopen("config/heads/full-sweep.yaml", "r"), *to = open_in("head.yaml", "w");
+    assert_non_null(from);
+    while (fgets(line, sizeof line, from) != NULL)
+        if (strncmp(line, "range_max_m:", 12) == 0)
+            fprintf(to, "range_max_m: { value: %.3f, from: assumed }\n", range_max_m);
+        else
+            fputs(line, to);
+    fclose(from);
+    assert_int_equal(fclose(to), 0);
+}
+
+/* Metres per count; 0: refused. */
+static double scale_of(double range_max_m, const char *output, const char *noise)
+{
+    char path[128];
+    struct site *site = NULL;
+    write_profile(range_max_m);
+    FILE *f = open_in("test.yaml", "w");
+    fprintf(f,
+            "head: {profile: head.yaml}\nscene:\n  meshes: [{file: floor.obj, up: z, scale: 1}]\n"
+            "stations: [{position_m: [0, 0, 1.7]}]\noutput: {%s}\nnoise: {%s}\n",
+            output, noise);
+    assert_int_equal(fclose(f), 0);
+    snprintf(path, sizeof path, "%s/test.yaml", dir);
+    warned[0] = err.text[0] = '\0';
+    int rc = config_load(path, NULL, 0, cfg, &err);
+    if (rc == SH_OK) rc = site_load(cfg, &report, &site, &err);
+    const double scale_m = rc == SH_OK ? site->scale_m : 0.0;
+    if (rc != SH_OK) assert_int_equal(rc, SH_EINPUT);
+    site_free(site);
+    return scale_m;
+}
+
+static void test_counts(void **state)
+{
+    (void)state;
+    static const struct {
+        double range_max_m;
+        const char *output, *noise;
+        double scale_m;
+        const char *warning; /* NULL: none */
+    } cases[] = {
+        {1000, "layout: polar", "range: off", 1e-6, NULL},
+        {2126, "layout: polar", "range: off", 1e-6, NULL},
+        {2147, "layout: polar", "range: off", 1e-6, NULL}, /* 31 bits end at 2147.48 m */
+        {2147.4, "layout: polar", "range: on", 1e-6, NULL},
+        {4294.9, "layout: polar", "range: off", 1e-6, NULL}, /* 32 bits at 4294.967 m, and a range has no sign */
+        {4294.95, "layout: polar", "range: on", 1e-5, "ranges up to 429"}, /* ten sigma more do not fit */
+        {4300, "layout: polar", "range: off", 1e-5, "4300 m have to fit into 32 bits, at 1e-06 m those up to 4295 m"},
+        {1000, "layout: polar", "ball: {radius_m: 100, distance_1_m: 0.05}", 1e-5, "ranges up to 6100 m"},
+        {2147.4, "layout: geo", "range: off", 1e-6, NULL},
+        {2147.6, "layout: geo", "range: off", 1e-5, "coordinates up to 2147.6 m have to fit into 31 bits"},
+        {3000, "layout: polar, scale_m: 1e-3", "range: off", 1e-3, NULL}, /* as asked for */
+        {5000, "layout: polar, scale_m: 1e-6", "range: off", 0, NULL},    /* by the configuration alone */
+        {4294.9, "layout: polar, scale_m: 1e-6", "ball: {radius_m: 100}", 0, NULL},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const double scale_m = scale_of(cases[i].range_max_m, cases[i].output, cases[i].noise);
+        if (!(scale_m >= 0.999 * cases[i].scale_m && scale_m <= 1.001 * cases[i].scale_m))
+            fail_msg("%g m, %s: %g m instead of %g; %s", cases[i].range_max_m, cases[i].output, scale_m,
+                     cases[i].scale_m, err.text);
+        if (cases[i].warning == NULL ? strstr(warned, "count") != NULL : strstr(warned, cases[i].warning) == NULL)
+            fail_msg("%g m, %s: \"%s\"", cases[i].range_max_m, cases[i].output, warned);
+    }
+    assert_non_null(strstr(err.text, "output.scale_m: 1e-06: ranges up to 4394.9 m do not fit into 32 bits"));
+    assert_non_null(strstr(err.text, "from 1.02e-06 m on"));
+}
+
+static int set_up(void **state)
+{
+    (void)state;
+    snprintf(dir, sizeof dir, "/tmp/test_site_scale.XXXXXX");
+    cfg = calloc(1, sizeof *cfg);
+    if (cfg == NULL || mkdtemp(dir) == NULL) return -1;
+    FILE *f = open_in("floor.obj", "w");
+    fputs("v -9 -9 0\nv 9 -9 0\nv 9 9 0\nv -9 9 0\nf 1 2 3 4\n", f);
+    return fclose(f);
+}
+
+static int tear_down(void **state)
+{
+    static const char *const names[] = {"floor.obj", "head.yaml", "test.yaml"};
+    char path[128];
+    (void)state;
+    for (int i = 0; i < 3; i++) {
+        snprintf(path, sizeof path, "%s/%s", dir, names[i]);
+        unlink(path);
+    }
+    free(cfg);
+    return rmdir(dir);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test_setup_teardown(test_counts, set_up, tear_down)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,269 @@
+"""What test_python.c asks of the Python client. Its answers are binary rows or plain numbers.
+
+    python_client.py FOLDER_OF_THE_CLIENT numpy|plain WHAT ...
+        dump SOURCE OUT     points, attributes, poses and times, frame by frame, as test_python.c reads them
+        live SOURCE         a session with a running head
+        crs POLAR GEO       the same scan in both layouts: the largest differences, m: in the CRS; in the
+                            scene; in the CRS with the formula of PROTOCOL.md
+        count FILE          the parser's counters
+        samples PAGE OUT    decodes the frames in hex of PAGE; what is said below each is what it holds
+        tables PAGE FILE    decodes FILE's frames by PAGE's tables alone; the client must read the same
+        hostile FILE SEED   frames of FILE with wrong contents and good checksums: only ScanheadError comes
+"""
+import math
+import random
+import re
+import resource
+import struct
+import sys
+
+sys.path.insert(0, sys.argv[1])
+if sys.argv[2] == "plain":
+    sys.modules["numpy"] = None
+import scanhead  # noqa: E402
+
+ROW = struct.Struct("<10dqiii")
+NAN3 = ([math.nan], [math.nan], [math.nan])
+
+
+def rows_of(head, points):
+    names = "x y z range_m mirror_rad pan_rad reflectance_db"
+    plain = [list(getattr(points, name)) for name in names.split()]
+    polar = points.layout == scanhead.POLAR
+    scene = [list(c) for c in (head.to_scene(points) if polar else [column * len(points) for column in NAN3])]
+    for row in zip(*plain, *scene, points.t_ns, points.echo, points.echo_count, points.label):
+        yield ROW.pack(*row[:10], *(int(v) for v in row[10:]))
+
+
+def dump(source, out):
+    head = scanhead.open(source)
+    with open(out, "wb") as file:
+        for frame in head.frames():
+            if frame.type == scanhead.POINTS:
+                points = head.points(frame)
+                file.write(struct.pack("<cI", b"P", len(points)))
+                file.writelines(rows_of(head, points))
+                pose = head.pose(frame.fields["t0_ns"] + 1000)
+                gps_ns = head.gps_time_ns(frame.fields["t0_ns"])
+                where = (*pose.position_m, *pose.quat, pose.frame, pose.flags) if pose else (0,) * 8 + (-1,)
+                file.write(struct.pack("<q8di", -1 if gps_ns is None else gps_ns, *where))
+            elif frame.type == scanhead.ATTRIBUTES:
+                columns = head.attributes(frame)
+                file.write(struct.pack("<cI", b"A", len(columns[0])))
+                file.writelines(struct.pack("<2d", *row) for row in zip(*columns))
+        file.write(struct.pack("<cI", b"E", len(head.surfaces)))
+    print(head.stream_sha256())
+
+
+def live(source):
+    head = scanhead.open(source)
+    try:
+        head.command("HEAD:PRR 1 S")
+    except scanhead.CommandError as error:
+        print(error.number)
+    while head.command("HEAD:STATe?") != "idle":
+        head.next_frame()
+    head.command("SCAN:STARt")
+    pulses = 0
+    for frame in head.frames(timeout_s=30):
+        pulses += frame.fields["n_pulses"] if frame.type == scanhead.POINTS else 0
+        if frame.is_event(scanhead.EV_SCAN_END):
+            break
+    print(pulses, head.parser.seq_lost, head.dropped, head.stream_sha256())
+    try:
+        for _ in range(1000000):
+            head.next_frame(0.0)
+    except scanhead.Timeout:
+        print("timeout")
+
+
+def columns_of(path):
+    head, places = scanhead.open(path), []
+    for frame in head.frames():
+        if frame.type == scanhead.POINTS:
+            points = head.points(frame)
+            places += zip(*head.to_crs(points), *head.to_scene(points))
+    return head.anchor, places
+
+
+def by_the_page(anchor, at):
+    """PROTOCOL.md's formula for UTM and UPS, with the point scale by Snyder's equations."""
+    lat, e2 = math.radians(anchor["lat_deg"]), scanhead._E2
+    c = e2 / (1 - e2) * math.cos(lat) ** 2
+    a = math.radians(anchor["lon_deg"] - (6 * (anchor["epsg"] % 100) - 183)) * math.cos(lat)
+    fourth = 5 - 4 * math.tan(lat) ** 2 + 42 * c + 13 * c * c - 28 * e2 / (1 - e2)
+    k0 = 0.9996 * (1 + (1 + c) * a**2 / 2 + fourth * a**4 / 24)
+    if anchor["epsg"] in (32661, 32761):
+        m = math.cos(lat) / math.sqrt(1 - e2 * math.sin(lat) ** 2)
+        k0 = math.hypot(anchor["anchor"][0] - 2e6, anchor["anchor"][1] - 2e6) / (6378137.0 * m)
+    k = k0 * 6.37e6 / (6.37e6 + anchor["height_m"])
+    turned = scanhead._apply(anchor["axes"], [p - s for p, s in zip(at, anchor["station_m"])])
+    return [p + f * t for p, f, t in zip(anchor["anchor"], (k, k, 1), turned)]
+
+
+def crs(polar, geo):
+    (anchor, ours), (_, truth) = columns_of(polar), columns_of(geo)
+    unit = (1, 1, 1)
+    if anchor["crs"] == scanhead.CRS_GEODETIC:
+        unit = 111320, 111320 * math.cos(math.radians(anchor["lat_deg"])), 1
+    worst, n = [0.0, 0.0, 0.0], 0
+    for a, b in zip(ours, truth):
+        if math.isnan(a[0]) or math.isnan(b[0]):
+            assert math.isnan(a[0]) and math.isnan(b[0])
+            continue
+        turn = 360 if anchor["crs"] == scanhead.CRS_GEODETIC else math.inf
+        d = [p - q for p, q in zip(a, b)]
+        d[1] = math.remainder(d[1], turn)
+        worst[0] = max(worst[0], math.hypot(*(u * v for u, v in zip(unit, d))))
+        worst[1] = max(worst[1], math.dist(a[3:], b[3:]))
+        if anchor["crs"] == scanhead.CRS_UTM:
+            worst[2] = max(worst[2], math.dist(by_the_page(anchor, a[3:]), b[:3]))
+        n += 1
+    assert len(ours) == len(truth)
+    print(n, *worst)
+
+
+def count(path):
+    head = scanhead.open(path)
+    frames = sum(1 for _ in head.frames())
+    p = head.parser
+    assert frames == p.frames
+    print(p.bytes, p.frames, p.bad_payload, p.bad_bytes, p.seq_gaps, p.seq_lost)
+
+
+def hostile(path, seed):
+    """Up to 8 places of each payload get other bytes, a tenth another length; checksums are made good."""
+    resource.setrlimit(resource.RLIMIT_AS, (1 << 30, 1 << 30))
+    dice = random.Random(int(seed))
+    frames = [f for f in scanhead.open(path).frames()]
+    edges = [b"\0" * 8, b"\xff" * 8] + [struct.pack("<d", v) for v in (math.inf, 1e308, 5e-324)]
+    with open(path + ".hostile", "wb") as out:
+        for _ in range(700):
+            frame = dice.choice(frames)
+            payload = bytearray(frame.payload)
+            for _ in range(dice.randrange(9)):
+                at = dice.randrange(len(payload) or 1) & -dice.choice((1, 8))
+                piece = dice.choice(edges + [dice.randbytes(4)])
+                payload[at:at + len(piece)] = piece[:max(0, len(payload) - at)]
+            if dice.randrange(10) == 0:
+                payload = payload[:dice.randrange(len(payload) + 1)]
+            kind = frame.type if dice.randrange(20) else dice.randrange(256)
+            head = struct.pack("<BBBBIIIq", 0xD5, kind, 1, dice.choice((0, 0, 0, 1, 2)), len(payload),
+                               dice.randrange(2**32), scanhead.crc32c(bytes(payload)),
+                               dice.choice((0, -2**63, 2**63 - 1, frame.t_ns)))
+            out.write(head + struct.pack("<I", scanhead.crc32c(head)) + payload)
+            out.write(dice.choice((b"", b"\xd5", b"ERR\r\n")))
+    head, taken, refused = scanhead.open(path + ".hostile"), 0, 0
+    while True:
+        try:
+            frame = head.next_frame()
+            if frame is None:
+                break
+            taken += 1
+            if frame.type == scanhead.POINTS:
+                points = head.points(frame)
+                head.to_scene(points), head.to_crs(points)
+                head.pose(frame.fields["t0_ns"]), head.gps_time_ns(frame.fields["t0_ns"])
+            elif frame.type == scanhead.ATTRIBUTES:
+                head.attributes(frame)
+        except scanhead.ScanheadError:
+            refused += 1
+    assert head.parser.frames == 700
+    print(taken, refused)
+    bombs(path)
+
+
+def framed(kind, flags, length, payload):
+    head = struct.pack("<BBBBIIIq", 0xD5, kind, 1, flags, length, 0, scanhead.crc32c(payload), 0)
+    return head + struct.pack("<I", scanhead.crc32c(head)) + payload
+
+
+def bombs(path):
+    """Good headers that promise 64 KiB, small good frames between: if each payload were summed anew this were
+    200 MB, a minute; it must take less than 10 s of processor time."""
+    resource.setrlimit(resource.RLIMIT_CPU, (10, 10))
+    with open(path + ".bombs", "wb") as out:
+        out.write((framed(3, 0, 65536, b"") + framed(200, scanhead.LOCAL, 0, b"")) * 3000)
+    head = scanhead.open(path + ".bombs")
+    assert sum(1 for _ in head.frames()) == 3000 and head.parser.bad_bytes == 3000 * 28
+
+
+def words(value):
+    if isinstance(value, tuple):
+        return " ".join(words(v) for v in value)
+    return repr(value + 0.0) if isinstance(value, float) else str(value)
+
+
+def said_of(head, frame):
+    """The words below a sample: fields as `name value;`, then records, one a line."""
+    names = "? descriptor anchor points line-end telemetry event surfaces poses attributes".split()
+    flags = "".join(f" {name}" for bit, name in ((1, "REPEAT"), (2, "LOCAL")) if frame.flags & bit)
+    text = [f"{names[frame.type]}{flags}; seq {frame.seq}; t_ns {frame.t_ns}"]
+    text += [f"{name} {words(value)}" for name, value in frame.fields.items()]
+    if frame.type == scanhead.POINTS:
+        p = head.points(frame)
+        for i, place in enumerate(zip(p.x, p.y, p.z, *head.to_scene(p))):
+            x, y, z, *scene = (f"{v:.4f}" for v in place)
+            text += [f"echo {p.echo[i]} of {p.echo_count[i]}, label {p.label[i]}, "
+                     f"{p.reflectance_db[i]:.2f} dB, t_ns {p.t_ns[i]}, "
+                     f"head's frame {x} {y} {z}, scene {' '.join(scene)}"]
+    if frame.type == scanhead.ATTRIBUTES:
+        text += [f"amplitude {a:.2f} dB, width {w:.2f} ns" for a, w in zip(*head.attributes(frame))]
+    if frame.type == scanhead.SURFACES:
+        text += [f"label {label}: {names[0]} of {names[1]}" for label, names in head.surfaces.items()]
+    if frame.type == scanhead.POSES:
+        for t_ns in struct.unpack_from("<q72xq", frame.payload, 8):
+            text += ["pose " + "; ".join(f"{n} {words(v)}" for n, v in head.pose(t_ns)._asdict().items())]
+    return "; ".join(text)
+
+
+def samples(page, out):
+    blocks = re.findall(r"```text\n(d5 [0-9a-f \n]*)```\n\n```text\n(.*?)```", open(page).read(), re.S)
+    with open(out, "wb") as file:
+        file.writelines(bytes.fromhex(frame) for frame, _ in blocks)
+    head, types = scanhead.open(out), []
+    for frame, (_, said) in zip(head.frames(), blocks):
+        ours = said_of(head, frame)
+        assert said.split() == ours.split(), f"the page says\n{said}\nthe frame holds\n{ours}"
+        types.append(frame.type)
+    assert head.parser.bad_bytes == 0
+    print(*types, head.stream_sha256())
+
+
+CODES = {"u32": "I", "u64": "Q", "i64": "q", "f64": "d", "char": "s"}
+
+
+def tables_of(page):
+    """For each type of frame, the struct format that the first table of its section gives."""
+    found = {}
+    for kind, section in re.findall(r"\n### ([1-9]) [a-z ]+\n(.*?)(?=\n##)", open(page).read(), re.S):
+        form = "<"
+        for line in section[section.index("| ---"):].split("\n")[1:]:
+            row = re.match(r"\| (\d+) \| ([a-z]+\d*)(?:\[(\d+)\])? \|", line)
+            if row is None:
+                break
+            assert struct.calcsize(form) == int(row[1]), f"type {kind}: a gap before offset {row[1]}"
+            form += (row[3] or "") + CODES[row[2]]
+        found[int(kind)] = struct.Struct(form)
+    return found
+
+
+def flat(fields):
+    for value in fields.values():
+        yield from value if isinstance(value, tuple) else (value,)
+
+
+def tables(page, path):
+    forms, seen = tables_of(page), []
+    for frame in scanhead.open(path).frames():
+        if not frame.fields:
+            continue
+        theirs = [v.split(b"\0")[0].decode() if isinstance(v, bytes) else v
+                  for v in forms[frame.type].unpack_from(frame.payload)]
+        assert theirs == list(flat(frame.fields)), (frame.type, theirs, frame.fields)
+        seen.append(frame.type)
+    print(*seen)
+
+
+if __name__ == "__main__":
+    globals()[sys.argv[3]](*sys.argv[4:])

@@ -1,0 +1,120 @@
+/* Files that the program makes, where others may have put a link or a device; and a standard output that takes nothing. */
+#include "tests/wire/room.h"
+
+static const struct room_config SCAN = {.prr_hz = 20000,
+                                        .lines_hz = 50,
+                                        .pan_deg_s = 150,
+                                        .pan_stop_deg = 60,
+                                        .frames = 1,
+                                        .links = "links: [{type: \"null\"}]\n"};
+
+static void begin(struct wire *wire, char config[352])
+{
+    room_write(wire);
+    snprintf(config, 352, "%s", room_config_write(wire, &SCAN));
+}
+
+/* Ends with this status and one line on standard error that has both texts. */
+static void expect(struct wire *wire, pid_t pid, int want, const char *says, const char *more)
+{
+    int status = wire_wait(wire, pid);
+    char *text = wire_read(wire_path(wire, "err"), NULL), *end = strchr(text, '\n');
+    if (status != want || strstr(text, says) == NULL || strstr(text, more) == NULL || end == NULL || end[1] != '\0')
+        fail_msg("status %d, no '%s' and '%s' in: %s", status, says, more, text);
+    free(text);
+}
+
+/* `name` leads to a file that must stay as it is. */
+static void plant(struct wire *wire, const char *name)
+{
+    wire_write_text(wire, "precious", "keep me\n");
+    assert_int_equal(symlink("precious", wire_path(wire, name)), 0);
+}
+
+static void expect_unharmed(struct wire *wire, const char *name)
+{
+    struct stat st;
+    char *kept = wire_read(wire_path(wire, "precious"), NULL);
+    assert_string_equal(kept, "keep me\n");
+    free(kept);
+    assert_int_equal(lstat(wire_path(wire, name), &st), 0);
+    assert_true(S_ISLNK(st.st_mode));
+    assert_int_equal(unlink(wire_path(wire, name)), 0);
+}
+
+static void test_links(void **state)
+{
+    struct wire *wire = *state;
+    static const struct {
+        const char *link, *command, *option, *file;
+    } made[] = {
+        {"stats.json", "run", "--stats", "stats.json"},    {"journal", "run", "--journal", "journal"},
+        {"stats.json", "record", "--stats", "stats.json"}, {"a.shs", "record", "-o", "a.shs"},
+        {"a.shs.part", "record", "-o", "a.shs"},           {"a.ptx.part", "record", "-o", "a.ptx"},
+        {"a.poses.csv", "record", "-o", "a.poses.csv"},    {"map.png", "map", "-o", "map.png"},
+        {"map.png.part", "map", "-o", "map.png"},
+    };
+    char config[352], path[352];
+    begin(wire, config);
+    for (size_t i = 0; i < sizeof made / sizeof made[0]; i++) {
+        const int run = strcmp(made[i].command, "run") == 0;
+        plant(wire, made[i].link);
+        snprintf(path, sizeof path, "%s", wire_path(wire, made[i].file));
+        const char *const args[] = {made[i].command,           config, made[i].option, path,   "--quiet",
+                                    run ? "--duration" : NULL, "0.01", "--pace",       "fast", NULL};
+        expect(wire, wire_spawn(wire, args, "out", "err", -1), 2, made[i].link, "is a symbolic link to precious");
+        expect_unharmed(wire, made[i].link);
+    }
+    struct room_config stream = SCAN;
+    stream.links = "links: [{type: file, path: stream.shs}]\n";
+    plant(wire, "stream.shs");
+    snprintf(config, sizeof config, "%s", room_config_write(wire, &stream));
+    expect(wire, wire_spawn(wire, (const char *const[]){"run", config, "--duration", "0.01", NULL}, "out", "err", -1),
+           2, "link file:", "is a symbolic link to precious");
+    expect_unharmed(wire, "stream.shs");
+}
+
+/* A map takes nobody's place but a file's. */
+static void test_map_on_a_fifo(void **state)
+{
+    struct wire *wire = *state;
+    char config[352], path[352];
+    struct stat st;
+    begin(wire, config);
+    snprintf(path, sizeof path, "%s", wire_path(wire, "map.png"));
+    assert_int_equal(mkfifo(path, 0600), 0);
+    const char *const args[] = {"map", config, "-o", path, "--quiet", NULL};
+    expect(wire, wire_spawn(wire, args, "out", "err", -1), 2, path, "is a FIFO");
+    assert_int_equal(lstat(path, &st), 0);
+    assert_true(S_ISFIFO(st.st_mode));
+}
+
+/* What can't be written is a failure, by each way: all of it waits for the end, or some is out before. */
+static void test_full_output(void **state)
+{
+    struct wire *wire = *state;
+    static const char *const where[] = {">/dev/full", ">&-"};
+    char config[352], script[64];
+    begin(wire, config);
+    const char *const commands[][3] = {{"list"}, {"--help"}, {"run", "--help"}, {"check", "--help"}, {"check", config}};
+    for (size_t i = 0; i < sizeof commands / sizeof commands[0]; i++)
+        for (int k = 0; k < 2; k++) {
+            snprintf(script, sizeof script, "exec \"$0\" \"$@\" %s", where[k]);
+            const char *const args[] = {"-c", script, wire_program(), commands[i][0], commands[i][1], NULL};
+            expect(wire, wire_spawn_program(wire, "/bin/sh", args, "out", "err", -1), 1, "standard output",
+                   k == 0 ? "No space left" : "Bad file descriptor");
+        }
+    const char *const stats[] = {"run",  config,    "--duration", "0.01",      "--pace",
+                                 "fast", "--quiet", "--stats",    "/dev/full", NULL};
+    expect(wire, wire_spawn(wire, stats, "out", "err", -1), 1, "/dev/full", "No space left");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_links, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_map_on_a_fifo, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_full_output, wire_setup, wire_teardown),
+    };
+    return cmocka_run_group_tests_name("files", tests, NULL, NULL);
+}

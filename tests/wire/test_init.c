@@ -1,0 +1,225 @@
+/* The first ten minutes with a mesh of one's own: `scanhead init`, and what is said where a scan would show
+ * little. */
+#include "tests/wire/room.h"
+
+static char *out, *text; /* of the last command: standard output and error */
+
+static void forget(void)
+{
+    free(out);
+    free(text);
+    out = text = NULL;
+}
+
+/* Runs a command in the folder of the test. */
+static int run_in(struct wire *wire, const char *folder, const char *const *args)
+{
+    char here[512];
+    assert_non_null(getcwd(here, sizeof here));
+    forget();
+    char heads[600];
+    snprintf(heads, sizeof heads, "%s/config/heads", here);
+    setenv("SCANHEAD_HEADS", heads, 1);
+    assert_int_equal(chdir(folder), 0);
+    char program[1024];
+    snprintf(program, sizeof program, "%s%s%s", wire_program()[0] == '/' ? "" : here,
+             wire_program()[0] == '/' ? "" : "/", wire_program());
+    int status = wire_wait(wire, wire_spawn_program(wire, program, args, "out", "err", -1));
+    assert_int_equal(chdir(here), 0);
+    out = wire_read(wire_path(wire, "out"), NULL);
+    text = wire_read(wire_path(wire, "err"), NULL);
+    return status;
+}
+
+#define RUN(wire, ...) run_in(wire, (wire)->dir, (const char *const[]){__VA_ARGS__, NULL})
+
+static void contains(const char *in, const char *what)
+{
+    if (strstr(in, what) == NULL) fail_msg("\"%s\" is missing in:\n%s", what, in);
+}
+
+/* Points in a binary PLY, by its header. */
+static long points_of(const struct wire *wire, const char *name)
+{
+    char *ply = wire_read(wire_path(wire, name), NULL);
+    const char *n = strstr(ply, "element vertex ");
+    assert_non_null(n);
+    long points = strtol(n + strlen("element vertex "), NULL, 10);
+    free(ply);
+    return points;
+}
+
+/* A room of 8 x 6 x 3 units whose walls face inward; y is up in it where that is asked for. */
+static void write_room(const struct wire *wire, const char *name, double unit, int y_up)
+{
+    static const char *const faces = "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n";
+    char obj[1024];
+    size_t used = 0;
+    for (int i = 0; i < 8; i++) {
+        double x = i & 1 ? 8 : 0, y = i & 2 ? 6 : 0, z = i & 4 ? 3 : 0;
+        used += (size_t)snprintf(obj + used, sizeof obj - used, "v %g %g %g\n", unit * x, unit * (y_up ? z : y),
+                                 unit * (y_up ? -y : z));
+    }
+    snprintf(obj + used, sizeof obj - used, "%s", faces);
+    wire_write_text(wire, name, obj);
+}
+
+/* Nothing but init, check and record; all in a few lines, with comments. */
+static void a_mesh_becomes_a_scan(void **state)
+{
+    struct wire *wire = *state;
+    write_room(wire, "room.obj", 1, 0);
+    assert_int_equal(RUN(wire, "init", "room.obj"), 0);
+    contains(out, "size      8 x 6 x 3 m");
+    contains(out, "x 0.000..8.000  y 0.000..6.000  z 0.000..3.000 m");
+    contains(out, "inside, 1.6 m above a floor");
+    contains(out, "written   room.yaml");
+    contains(text, "its unit is not in the file: a metre is assumed, which makes the mesh 8 m large");
+    contains(text, "which axis points up is not in the file: z is assumed");
+    char *yaml = wire_read(wire_path(wire, "room.yaml"), NULL);
+    contains(yaml, "file: \"room.obj\"");
+    contains(yaml, "# inside, 1.6 m above a floor");
+    contains(yaml, "assumed: the file doesn't say");
+    int lines = 0;
+    for (const char *p = yaml; *p != '\0'; p++)
+        lines += *p == '\n';
+    assert_in_range(lines, 10, 20);
+    free(yaml);
+    assert_int_equal(RUN(wire, "check", "room.yaml"), 0);
+    assert_string_equal(text, "");
+    assert_int_equal(RUN(wire, "record", "room.yaml", "-o", "room.ply", "--quiet"), 0);
+    assert_true(points_of(wire, "room.ply") > 100000); /* about 200,000; nearly all of a closed room */
+    forget();
+}
+
+/* Millimetres, y up: as the options say, or as the size makes it likely. */
+static void unit_and_axes_can_be_given(void **state)
+{
+    struct wire *wire = *state;
+    write_room(wire, "mm.obj", 1000, 1);
+    assert_int_equal(RUN(wire, "init", "mm.obj", "--up", "y"), 0);
+    contains(text, "its unit is not in the file: a millimetre is assumed, which makes the mesh 8 m large");
+    assert_null(strstr(text, "axis"));
+    contains(out, "size      8 x 6 x 3 m");
+    contains(out, "inside, 1.6 m above a floor");
+    assert_int_equal(RUN(wire, "init", "mm.obj", "--up", "y", "--scale", "0.002", "-o", "twice.yaml"), 0);
+    assert_string_equal(text, "");
+    contains(out, "size      16 x 12 x 6 m");
+    contains(out, "unit      0.002 m, given by --scale");
+    assert_int_equal(RUN(wire, "check", "twice.yaml"), 0);
+    forget();
+}
+
+/* From another folder, by a path that leads out of that of the configuration. */
+static void the_path_of_the_mesh_starts_at_the_configuration(void **state)
+{
+    struct wire *wire = *state;
+    write_room(wire, "room.obj", 1, 0);
+    assert_int_equal(mkdir(wire_path(wire, "sub"), 0700), 0);
+    assert_int_equal(RUN(wire, "init", "room.obj", "-o", "sub/there.yaml"), 0);
+    char *yaml = wire_read(wire_path(wire, "sub/there.yaml"), NULL);
+    contains(yaml, "file: \"../room.obj\"");
+    free(yaml);
+    assert_int_equal(RUN(wire, "check", "sub/there.yaml"), 0);
+    assert_int_equal(run_in(wire, "/", (const char *const[]){"check", wire_path(wire, "sub/there.yaml"), NULL}), 0);
+    unlink(wire_path(wire, "sub/there.yaml"));
+    rmdir(wire_path(wire, "sub"));
+    forget();
+}
+
+static void what_is_there_stays(void **state)
+{
+    struct wire *wire = *state;
+    write_room(wire, "room.obj", 1, 0);
+    wire_write_text(wire, "room.yaml", "mine\n");
+    assert_int_equal(RUN(wire, "init", "room.obj"), 2);
+    contains(text, "room.yaml is there already; give another name with -o, or --force to replace it");
+    char *yaml = wire_read(wire_path(wire, "room.yaml"), NULL);
+    assert_string_equal(yaml, "mine\n");
+    free(yaml);
+    assert_int_equal(RUN(wire, "init", "room.obj", "--force"), 0);
+    assert_int_equal(RUN(wire, "check", "room.yaml"), 0);
+    forget();
+}
+
+static void wrong_use_says_what_is_allowed(void **state)
+{
+    struct wire *wire = *state;
+    write_room(wire, "room.obj", 1, 0);
+    wire_write_text(wire, "points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\np 1 2 3\n");
+    assert_int_equal(RUN(wire, "init", "room.obj", "-o", "room.txt"), 2);
+    contains(text, "-o room.txt: allowed is a name that ends in .yaml or .yml");
+    assert_int_equal(RUN(wire, "init", "room.obj", "--up", "x"), 2);
+    contains(text, "--up x: allowed y, z");
+    assert_int_equal(RUN(wire, "init", "points.obj"), 2);
+    contains(text, "no triangles in it");
+    contains(text, "export it again");
+    assert_int_equal(RUN(wire, "init", "none.obj"), 2);
+    contains(text, "none.obj: No such file or directory");
+    assert_int_equal(RUN(wire, "init", "room.obj", "-o", "no/room.yaml"), 2);
+    assert_int_equal(RUN(wire, "init", "room.obj", "--scale", "0.000001"), 2); /* 8 um */
+    contains(text, "--scale sets metres per unit");
+    assert_int_not_equal(access(wire_path(wire, "room.yaml"), F_OK), 0);
+    forget();
+}
+
+/* The station is 500 m beside a room of 8 m: at check, run and record. */
+static void a_scan_of_nothing_is_told(void **state)
+{
+    static const char moved[] = "stations.0.position_m=[0, 500, 1]";
+    struct wire *wire = *state;
+    write_room(wire, "room.obj", 1, 0);
+    assert_int_equal(RUN(wire, "init", "room.obj"), 0);
+    assert_int_equal(RUN(wire, "check", "room.yaml", "--set", moved), 0);
+    contains(text, "nothing within range_max_m, 130 m");
+    contains(text, "the scan is mostly empty: of 1024 directions 0 meet something");
+    assert_int_equal(RUN(wire, "record", "room.yaml", "--set", moved, "-o", "no.ply", "--quiet"), 0);
+    contains(text, "the scan is mostly empty");
+    contains(text, "mostly empty: 0 of ");
+    assert_int_equal(
+        RUN(wire, "run", "room.yaml", "--set", moved, "--pace", "fast", "--start", "--frames", "1", "--quiet"), 0);
+    contains(text, "the scan is mostly empty");
+    contains(text, "mostly empty: 0 of ");
+    forget();
+}
+
+static void a_colour_that_nothing_fills_is_told(void **state)
+{
+    struct wire *wire = *state;
+    write_room(wire, "room.obj", 1, 0);
+    assert_int_equal(RUN(wire, "init", "room.obj"), 0);
+    assert_int_equal(RUN(wire, "record", "room.yaml", "-o", "grey.ply", "--colour", "reflectance", "--quiet"), 0);
+    contains(text, "--colour reflectance: none of ");
+    contains(text, "it needs the head's signal.model: on");
+    assert_int_equal(RUN(wire, "record", "room.yaml", "-o", "grey.ply", "--colour", "reflectance", "--quiet", "--set",
+                         "signal.model=on", "--set", "surfaces.0.reflectance=0.5"),
+                     0);
+    assert_string_equal(text, "");
+    forget();
+}
+
+static void a_map_is_a_png(void **state)
+{
+    struct wire *wire = *state;
+    write_room(wire, "room.obj", 1, 0);
+    assert_int_equal(RUN(wire, "init", "room.obj"), 0);
+    assert_int_equal(RUN(wire, "map", "room.yaml", "-o", "x.jpg"), 2);
+    contains(text, "-o x.jpg: it would hold a PNG; allowed is a name that ends in .png");
+    assert_int_not_equal(access(wire_path(wire, "x.jpg"), F_OK), 0);
+    forget();
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(a_mesh_becomes_a_scan, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(unit_and_axes_can_be_given, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(the_path_of_the_mesh_starts_at_the_configuration, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(what_is_there_stays, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(wrong_use_says_what_is_allowed, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(a_scan_of_nothing_is_told, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(a_colour_that_nothing_fills_is_told, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(a_map_is_a_png, wire_setup, wire_teardown),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,387 @@
+/* The client in Python beside libscanhead: every number of every point is the same, with numpy and without. */
+#include "tests/wire/room.h"
+
+#include "drivers/protocol/native.h"
+
+static const char python[] = "/usr/bin/python3"; /* Debian's, for which its numpy is made */
+
+static const char *const flavours[] = {"numpy", "plain"};
+
+/* Runs python_client.py; its output, or NULL where numpy is wanted and missing. Good until the next call. */
+static const char *ask_python(struct wire *wire, const char *flavour, const char *what, const char *a, const char *b)
+{
+    static char *text;
+    const char *const args[] = {"tests/wire/python_client.py", "drivers/host/python", flavour, what, a, b, NULL};
+    const char *const probe[] = {"-c", "import numpy", NULL};
+    static int has_numpy = -1;
+    free(text);
+    text = NULL;
+    if (has_numpy < 0)
+        has_numpy = wire_wait(wire, wire_spawn_program(wire, python, probe, "probe.out", "probe.err", -1)) == 0;
+    if (strcmp(flavour, "numpy") == 0 && !has_numpy) return NULL;
+    int status = wire_wait(wire, wire_spawn_program(wire, python, args, "python.out", "python.err", -1));
+    if (status != 0) wire_show(wire, "python.err");
+    assert_int_equal(status, 0);
+    return text = wire_read(wire_path(wire, "python.out"), NULL);
+}
+
+static int setup(void **state)
+{
+    if (access(python, X_OK) == 0) return wire_setup(state);
+    print_message("# %s is missing\n", python);
+    return wire_setup(state);
+}
+
+static void need_python(void)
+{
+    if (access(python, X_OK) == 0) return;
+    print_message("# %s is missing (Debian: python3-numpy)\n", python);
+    skip();
+}
+
+/* ---- recordings */
+
+static const struct room_config SMALL = {
+    .prr_hz = 20000, .lines_hz = 50, .pan_deg_s = 100, .pan_stop_deg = 5, .frames = 1, .links = LINK_YAML_TCP};
+
+static const struct room_config RIDE = {.prr_hz = 20000,
+                                        .lines_hz = 50,
+                                        .pan_deg_s = 50,
+                                        .pan_stop_deg = 4,
+                                        .frames = 1,
+                                        .links = LINK_YAML_TCP,
+                                        .more = "platform: {kind: trajectory, file: ride.csv}\n"};
+
+#define AT(lat, lon, height)                                                                 \
+    " scene.anchor.source=explicit scene.anchor.lat_deg=" #lat " scene.anchor.lon_deg=" #lon \
+    " scene.anchor.height_m=" #height " scene.anchor.north_deg=17"
+
+/* One station off line, with these keys set; the file's path. */
+static const char *record(struct wire *wire, const struct room_config *c, const char *name, const char *keys)
+{
+    char config[352], path[352], stats[352], set[512], *rest = set;
+    snprintf(config, sizeof config, "%s", room_config_write(wire, c));
+    snprintf(path, sizeof path, "%s", wire_path(wire, name));
+    snprintf(stats, sizeof stats, "%s", wire_path(wire, "stats.json"));
+    snprintf(set, sizeof set, "%s", keys);
+    const char *args[32] = {"record", config, "-o", path, "--stats", stats, "--quiet"};
+    for (int n = 7; (args[n + 1] = strtok_r(rest, " ", &rest)) != NULL; n += 2)
+        args[n] = "--set";
+    int status = wire_wait(wire, wire_spawn(wire, args, "head.out", "head.err", -1));
+    if (status != 0) wire_show(wire, "head.err");
+    assert_int_equal(status, 0);
+    return wire_path(wire, name);
+}
+
+static void write_ride(const struct wire *wire)
+{
+    wire_write_text(wire, "ride.csv",
+                    "t_s,x_m,y_m,z_m,roll_deg,pitch_deg,heading_deg\n0,0.1,-0.5,0,0,0,10\n0.05,0.3,-0.4,0,4,0,40\n"
+                    "0.1,0.4,-0.2,0.1,4,-5,80\n0.15,0.2,0,0.1,0,-3,60\n0.2,0,0.2,0,0,0,10\n");
+}
+
+/* ---- every number of every point */
+
+struct __attribute__((packed)) row {
+    double at[3], range_m, mirror_rad, pan_rad, reflectance_db, scene[3];
+    int64_t t_ns;
+    int32_t echo, echo_count, label;
+};
+struct __attribute__((packed)) beside {
+    int64_t gps_ns;
+    double position_m[3], quat[4], frame;
+    int32_t flags; /* -1: no pose */
+};
+
+struct dump {
+    char *bytes;
+    size_t len, at;
+};
+
+static const void *take(struct dump *dump, size_t len)
+{
+    assert_true(dump->at + len <= dump->len);
+    dump->at += len;
+    return dump->bytes + dump->at - len;
+}
+
+static uint32_t take_block(struct dump *dump, char kind)
+{
+    uint32_t n;
+    assert_int_equal(*(const char *)take(dump, 1), kind);
+    memcpy(&n, take(dump, 4), 4);
+    return n;
+}
+
+/* Bit for bit: both are IEEE 754 doubles, with the same operations in the same order, sine and cosine from the same
+ * C library. NaN has no sign worth comparing. */
+static void same(const char *what, double ours, double theirs)
+{
+    if (memcmp(&ours, &theirs, sizeof ours) == 0 || (isnan(ours) && isnan(theirs))) return;
+    fail_msg("%s: %.17g in Python, %.17g in libscanhead", what, ours, theirs);
+}
+
+static void same_point(const struct row *r, const struct scanhead_point *p, const struct scanhead_point *in_scene)
+{
+    static const char *const names[] = {"x", "y", "z"};
+    const double at[3] = {p->x, p->y, p->z}, scene[3] = {in_scene->x, in_scene->y, in_scene->z};
+    for (int i = 0; i < 3; i++) {
+        same(names[i], r->at[i], at[i]);
+        same("scene", r->scene[i], scene[i]);
+    }
+    same("range_m", r->range_m, p->range_m);
+    same("mirror_rad", r->mirror_rad, p->mirror_rad);
+    same("pan_rad", r->pan_rad, p->pan_rad);
+    same("reflectance_db", r->reflectance_db, p->reflectance_db);
+    assert_int_equal(r->t_ns, p->t_ns);
+    assert_int_equal(r->echo, p->echo);
+    assert_int_equal(r->echo_count, p->echo_count);
+    assert_int_equal(r->label, p->label);
+}
+
+static void same_beside(struct scanhead *sh, const struct beside *b, int64_t t_ns)
+{
+    struct scanhead_pose pose;
+    double gps_s;
+    int known = scanhead_gps_time(sh, t_ns, &gps_s) == SCANHEAD_OK;
+    assert_int_equal(known, b->gps_ns >= 0);
+    if (known)
+        same("gps", (double)(b->gps_ns / 1000000000 - 1000000000) + (double)(b->gps_ns % 1000000000) / 1e9, gps_s);
+    known = scanhead_pose(sh, t_ns + 1000, &pose) == SCANHEAD_OK;
+    assert_int_equal(known ? pose.flags : -1, b->flags);
+    if (!known) return;
+    for (int i = 0; i < 3; i++)
+        same("pose", b->position_m[i], pose.position_m[i]);
+    for (int i = 0; i < 4; i++)
+        same("quat", b->quat[i], pose.quat[i]);
+    same("frame scalar", b->frame, pose.frame);
+}
+
+static void same_points(struct scanhead *sh, const struct scanhead_frame *frame, struct dump *dump)
+{
+    static struct scanhead_point point[NATIVE_MAX_POINTS], in_scene[NATIVE_MAX_POINTS];
+    struct beside beside;
+    int n = scanhead_points(sh, frame, 0, point, NATIVE_MAX_POINTS);
+    assert_int_equal(take_block(dump, 'P'), n);
+    memcpy(in_scene, point, sizeof in_scene);
+    if (scanhead_to_scene(sh, in_scene, (uint32_t)n, NULL) < 0)
+        for (int i = 0; i < n; i++)
+            in_scene[i].x = in_scene[i].y = in_scene[i].z = NAN;
+    for (int i = 0; i < n; i++) {
+        struct row row;
+        memcpy(&row, take(dump, sizeof row), sizeof row);
+        same_point(&row, &point[i], &in_scene[i]);
+    }
+    memcpy(&beside, take(dump, sizeof beside), sizeof beside);
+    same_beside(sh, &beside, frame->scan_t0_ns);
+}
+
+static void same_attributes(struct scanhead *sh, const struct scanhead_frame *frame, struct dump *dump)
+{
+    static struct scanhead_attribute attribute[NATIVE_MAX_POINTS];
+    int n = scanhead_attributes(sh, frame, 0, attribute, NATIVE_MAX_POINTS);
+    assert_int_equal(take_block(dump, 'A'), n);
+    for (int i = 0; i < n; i++) {
+        double pair[2];
+        memcpy(pair, take(dump, sizeof pair), sizeof pair);
+        same("amplitude_db", pair[0], attribute[i].amplitude_db);
+        same("width_ns", pair[1], attribute[i].width_ns);
+    }
+}
+
+static uint64_t same_stream(struct wire *wire, const char *path, const char *hash, const char *flavour)
+{
+    char dump_path[352];
+    struct scanhead_frame frame;
+    snprintf(dump_path, sizeof dump_path, "%s", wire_path(wire, "dump"));
+    const char *said = ask_python(wire, flavour, "dump", path, dump_path);
+    if (said == NULL) return 0;
+    assert_int_equal(strncmp(said, hash, 64), 0); /* as the head counted it */
+    struct dump dump = {.at = 0};
+    dump.bytes = wire_read(dump_path, &dump.len);
+    struct scanhead *sh = client_open(path);
+    uint64_t points = 0;
+    while (scanhead_next(sh, &frame, 0) == SCANHEAD_OK) {
+        if (frame.type == SCANHEAD_POINTS) same_points(sh, &frame, &dump);
+        if (frame.type == SCANHEAD_ATTRIBUTES) same_attributes(sh, &frame, &dump);
+        points += frame.n_points;
+    }
+    assert_int_equal(take_block(&dump, 'E'), 6); /* names */
+    assert_int_equal(dump.at, dump.len);
+    free(dump.bytes);
+    scanhead_close(sh);
+    return points;
+}
+
+static void test_same_numbers(void **state)
+{
+    struct wire *wire = *state;
+    static const struct {
+        const struct room_config *config;
+        const char *keys;
+    } scans[] = {
+        {&SMALL, "output.attributes=on noise.range=on time.epoch=2026-01-01T00:00:00Z signal.model=on"},
+        {&SMALL, "output.layout=geo output.crs=utm" AT(-33.9, 18.4, 1055)},
+        {&SMALL, "output.layout=geo output.crs=geodetic" AT(60, 180, 5)},
+        {&RIDE, "output.layout=polar"},
+        {&RIDE, "output.layout=geo output.crs=ecef" AT(-33.9, 18.4, 1055)},
+    };
+    need_python();
+    room_write(wire);
+    write_ride(wire);
+    for (size_t i = 0; i < sizeof scans / sizeof scans[0]; i++) {
+        char path[352], hash[65];
+        snprintf(path, sizeof path, "%s", record(wire, scans[i].config, "a.shs", scans[i].keys));
+        stats_hash(wire, hash);
+        for (int k = 0; k < 2; k++) {
+            uint64_t points = same_stream(wire, path, hash, flavours[k]);
+            if (points == 0) print_message("# numpy is missing (Debian: python3-numpy): compared without it\n");
+            assert_true(points == 0 || points >= 1000);
+        }
+    }
+}
+
+/* ---- both layouts of one scan, in the CRS and in the scene. Both are made of the same encoder counts. What differs:
+ * the range is a count of range_scale_m in one (0.5 um, half of it), coordinates are counts of 1 um in the other
+ * (sqrt(3) / 2 um), georeferencing is good to output.tolerance_m (set to 1 um), the axes are good to 1e-10 rad. */
+static void test_both_layouts(void **state)
+{
+    struct wire *wire = *state;
+    static const char *const places[] = {
+        "output.crs=ecef" AT(-33.9, 18.4, 1055),
+        "output.crs=utm" AT(-33.9, 18.4, 1055),
+        "output.crs=geodetic" AT(60, 180, 5),
+        "output.crs=utm" AT(83.9, 3.1, 2800),
+        "output.crs=utm" AT(88, -100, 3),
+        "output.crs=utm" AT(-85, 70, 3),
+        "output.crs=local",
+    };
+    need_python();
+    room_write(wire);
+    for (size_t i = 0; i < sizeof places / sizeof places[0]; i++) {
+        char keys[400], polar[352], geo[352];
+        snprintf(keys, sizeof keys, "output.layout=polar output.tolerance_m=1e-6 %s", places[i]);
+        snprintf(polar, sizeof polar, "%s", record(wire, &SMALL, "polar.shs", keys));
+        snprintf(keys, sizeof keys, "output.layout=geo output.tolerance_m=1e-6 %s", places[i]);
+        snprintf(geo, sizeof geo, "%s", record(wire, &SMALL, "geo.shs", keys));
+        const char *said = ask_python(wire, flavours[i % 2], "crs", polar, geo);
+        unsigned n;
+        double crs_m, scene_m, page_m;
+        if (said == NULL) continue;
+        assert_int_equal(sscanf(said, "%u %lf %lf %lf", &n, &crs_m, &scene_m, &page_m), 4);
+        assert_true(n >= 1000);
+        if (!(crs_m < 2.6e-6 && scene_m < 2.6e-6))
+            fail_msg("%s: %g m in the CRS, %g m in the scene", places[i], crs_m, scene_m);
+        /* The map's tangent, 9 m away at most: 81 / 2R = 6.4e-6 m; R is good to half a percent, of 9 m h / R at the
+         * height of 2800 m 2.0e-5 m. */
+        if (!(page_m < 2.9e-5)) fail_msg("%s: the page's formula is %g m off", places[i], page_m);
+    }
+}
+
+/* ---- live */
+
+static void test_live(void **state)
+{
+    struct wire *wire = *state;
+    need_python();
+    room_write(wire);
+    for (int k = 0; k < 2; k++) {
+        const char *const more[] = {"--pace", "fast", NULL};
+        struct room_config c = SMALL;
+        c.links = LINK_YAML_BOTH;
+        struct head head = head_start(wire, room_config_write(wire, &c), more);
+        char source[352], said[512], want[128], hash[65];
+        snprintf(source, sizeof source, "%s", head_endpoint(&head, k == 0 ? "tcp" : "pty"));
+        snprintf(said, sizeof said, "%s", ask_python(wire, "plain", "live", source, NULL));
+        head_end(&head, SIGTERM);
+        stats_hash(wire, hash);
+        struct oracle oracle = oracle_of(&c, -180, 180, 360);
+        snprintf(want, sizeof want, "-131\n%llu 0 0 %s\ntimeout\n", (unsigned long long)oracle_end(&oracle), hash);
+        assert_string_equal(said, want);
+    }
+}
+
+/* ---- streams that were damaged, and hostile ones */
+
+static uint32_t dice;
+static uint32_t roll(uint32_t n)
+{
+    dice = dice * 1664525u + 1013904223u;
+    return (dice >> 8) % n;
+}
+
+/* Bytes lost, changed and put in, headers that promise 64 KiB, line ends. */
+static size_t damage(uint8_t *to, const char *from, size_t len)
+{
+    size_t n = 0;
+    for (size_t i = 0; i < len; i++) {
+        uint32_t fate = roll(3000);
+        if (fate < 2) i += roll(700);
+        if (fate == 2) to[n++] = 0xd5;
+        if (fate == 3) n += (size_t)sprintf((char *)to + n, "OK\r\n");
+        if (i < len) to[n++] = fate == 4 ? (uint8_t)roll(256) : (uint8_t)from[i];
+    }
+    return n;
+}
+
+static void test_damaged(void **state)
+{
+    struct wire *wire = *state;
+    need_python();
+    room_write(wire);
+    size_t len;
+    char *bytes = wire_read(record(wire, &SMALL, "a.shs", ""), &len);
+    uint8_t *out = malloc(2 * len + 16);
+    for (dice = 1; dice < 3; dice++) {
+        const uint32_t seed = dice;
+        const char *path = wire_write(wire, "b.shs", out, damage(out, bytes, len));
+        struct scanhead_stats stats;
+        struct scanhead_frame frame;
+        struct scanhead *sh = client_open(path);
+        while (scanhead_next(sh, &frame, 0) == SCANHEAD_OK)
+            continue;
+        scanhead_get_stats(sh, &stats);
+        char want[256], file[352];
+        snprintf(want, sizeof want, "%llu %llu %llu %llu %llu %llu\n", (unsigned long long)stats.bytes,
+                 (unsigned long long)stats.frames, (unsigned long long)stats.bad_payload,
+                 (unsigned long long)stats.bad_bytes, (unsigned long long)stats.seq_gaps,
+                 (unsigned long long)stats.seq_lost);
+        scanhead_close(sh);
+        snprintf(file, sizeof file, "%s", wire_path(wire, "b.shs"));
+        assert_string_equal(ask_python(wire, "plain", "count", file, NULL), want);
+        assert_true(stats.seq_gaps > 10);
+        dice = seed;
+    }
+    free(out);
+    free(bytes);
+}
+
+static void test_hostile(void **state)
+{
+    struct wire *wire = *state;
+    static const char *const seeds[] = {"1", "2"};
+    need_python();
+    room_write(wire);
+    write_ride(wire);
+    char path[352];
+    snprintf(path, sizeof path, "%s", record(wire, &RIDE, "a.shs", "output.attributes=on"));
+    for (int k = 0; k < 2; k++) {
+        unsigned taken, refused;
+        const char *said = ask_python(wire, flavours[k], "hostile", path, seeds[k]);
+        if (said == NULL) continue;
+        assert_int_equal(sscanf(said, "%u %u", &taken, &refused), 2);
+        assert_true(taken > 200 && refused > 100);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_same_numbers, setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_both_layouts, setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_live, setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_damaged, setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_hostile, setup, wire_teardown),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
