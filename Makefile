@@ -219,6 +219,13 @@ soak-usb: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test all $(BUILD)/test/tests/wire/test_usb_soak
 	@USB_SOAK_EVENTS=1000 SCANHEAD=$(BUILD)/test/scanhead $(BUILD)/test/tests/wire/test_usb_soak
 
+# All 600 broken meshes, with and without sanitizers (`make test`: every tenth): half a minute.
+test-hostile: deps
+	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test $(BUILD)/test/tests/unit/test_hostile_files
+	@$(MAKE) --no-print-directory -j2 $(ASAN) $(BUILD)/asan/tests/unit/test_hostile_files
+	@HOSTILE_EVERY=1 $(BUILD)/test/tests/unit/test_hostile_files
+	@HOSTILE_EVERY=1 $(BUILD)/asan/tests/unit/test_hostile_files
+
 # A million pulses over each kind of USB, each with the hash that TCP gives: some minutes in an emulated machine.
 test-usb-million: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test test-programs
@@ -273,6 +280,6 @@ format:
 clean:
 	rm -rf $(BUILD)
 .PHONY: ALWAYS all deps deps-test deps-build deps-guest demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb \
-	test-usb-million objects test-unit-programs test-programs bench bench-beam bench-plain chart install format clean
+	test-usb-million test-hostile objects test-unit-programs test-programs bench bench-beam bench-plain chart install format clean
 .SECONDARY:
 -include $(shell find $(BUILD) -type f -name '*.d' 2>/dev/null)

@@ -12,7 +12,7 @@
 #include <unistd.h>
 
 enum {
-    AT_ONCE = 1 << 16,       /* elements between two looks at `stop` */
+    AT_ONCE = 1 << 13,       /* elements between two looks at `stop` */
     MAX_TEXTURE_NAME = 8192, /* bytes */
 };
 

@@ -156,6 +156,9 @@ static void defaults_are_those_of_the_table(void **state)
     assert_int_equal(s->frames, 1);
     assert_int_equal(s->station, 1);
     assert_string_equal(cfg->station[0].name, "station-1");
+    assert_true(cfg->scene.import.memory_mib == scene_import_defaults.memory_mib &&
+                cfg->scene.import.time_s == scene_import_defaults.time_s &&
+                cfg->scene.import.files == scene_import_defaults.files);
     assert_true(cfg->scene.tolerance_m == 1.0 && cfg->output.scale_m == 0.0);
     assert_true(cfg->scene.mesh[0].offset_m[0] == 0.0 && cfg->scene.mesh[0].offset_m[2] == 0.0);
     assert_int_equal(cfg->output.crs, GEOREF_LOCAL);

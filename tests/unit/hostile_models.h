@@ -1,0 +1,24 @@
+/* Small whole models of the formats that Assimp reads, for breaking. */
+#ifndef TESTS_UNIT_HOSTILE_MODELS_H
+#define TESTS_UNIT_HOSTILE_MODELS_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+enum { HOSTILE_FORMATS = 5 };
+
+struct hostile_model {
+    const char *ending;
+    char *bytes;
+    size_t n;
+};
+
+/* 0: the package with some of them is missing. */
+int hostile_models_open(void);
+void hostile_models_close(void);
+
+/* By number: its format is number % HOSTILE_FORMATS, and of that format each model in turn. */
+const struct hostile_model *hostile_model(uint64_t number);
+const char *hostile_format(int format);
+
+#endif
