@@ -42,7 +42,7 @@ ask_pkg_config = $(shell $(PKG_CONFIG) $(1) $(PKGS))$(if $(filter-out 0,$(.SHELL
 PKG_CFLAGS = $(eval PKG_CFLAGS := $$(call ask_pkg_config,--cflags))$(PKG_CFLAGS)
 PKG_LIBS = $(eval PKG_LIBS := $$(call ask_pkg_config,--libs))$(PKG_LIBS)
 # Embree: the version of headers and library, decided here alone. EMBREE=4 asks for that one; else 3 where both are.
-has_embree = $(shell echo '\#include <embree$(1)/rtcore.h>' | $(CC) $(CPPFLAGS) -E -xc - >/dev/null 2>&1 && echo $(1))
+has_embree = $(shell $(CC) $(CPPFLAGS) -E -xc -include embree$(1)/rtcore.h /dev/null >/dev/null 2>&1 && echo $(1))
 find_embree = $(or $(firstword $(foreach v,$(filter 3 4,$(or $(EMBREE),3 4)),$(call has_embree,$(v)))),$(error no \
 	Embree $(or $(EMBREE),3 or 4) for $(CC); allowed 3 and 4: make deps-build, or EMBREE= for the one that is there))
 EMBREE_VERSION = $(eval EMBREE_VERSION := $$(call find_embree))$(EMBREE_VERSION)

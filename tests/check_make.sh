@@ -86,15 +86,23 @@ embree_is() {
 check "both Embrees: headers and library of 3" embree_is 3
 check "EMBREE=4: of 4" embree_is 4 EMBREE=4
 check "EMBREE=3: of 3" embree_is 3 EMBREE=3
-rm -r "$work/include/embree3"
-has_3() {
-    echo '#include <embree3/rtcore.h>' | ${CC:-cc} -E -xc - >/dev/null 2>&1
-}
+# The cross compiler finds nothing but these two.
 refuses_embree() {
-    ! would scanhead CPPFLAGS="-I$work/include" EMBREE="$1" >"$work/embree" && says "$work/embree" "no *Embree $1 for .*allowed 3 and 4"
+    ! would scanhead CC=arm64-test-gcc ${1:+EMBREE="$1"} >"$work/embree" &&
+        says "$work/embree" "no *Embree ${1:-3 or 4} for arm64-test-gcc; allowed 3 and 4"
 }
-has_3 || check "EMBREE=3 without it is refused" refuses_embree 3
+alone_is_taken() {
+    would scanhead CC=arm64-test-gcc >"$work/embree" && says "$work/embree" "-DSH_EMBREE=4 .*core/bvh/bvh\.c" "-lembree4 " &&
+        lacks "$work/embree" SH_EMBREE=3 lembree3
+}
+printf '#!/bin/sh\necho "-I/arm64/include"\n' >"$work/bin/arm64-test-pkg-config"
+chmod +x "$work/bin/arm64-test-pkg-config"
 check "EMBREE=5 is refused" refuses_embree 5
+rm -r "$work/include/embree3"
+check "Embree 4 alone: headers and library of 4" alone_is_taken
+check "EMBREE=3 without it is refused" refuses_embree 3
+rm -r "$work/include/embree4"
+check "without either there is one error that says so" refuses_embree ""
 
 # ---- the archive, of the objects of both compilers
 only_the_interface() {
