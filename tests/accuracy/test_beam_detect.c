@@ -139,7 +139,7 @@ static void angle_noise_moves_the_footprint(void **state)
             mirror[p] = schedule_mirror_turn(&l.rig.segment, line.cast0 + p);
             pan[p] = schedule_pan_turn(&l.rig.segment, line.cast0 + p);
         }
-        instrument_aim(&k, &(struct instrument_turns){line.cast0, 16, mirror, pan}, &beams, &origins);
+        instrument_aim(&k, &(struct instrument_turns){line.cast0, 16, mirror, pan, 0}, &beams, &origins);
         beam_rig_line(&l.rig, number);
         for (uint32_t p = 0, i = 0; p < ACROSS.pulses; p++) {
             struct edge e = at_edge(&l, d[0][p], d[1][p]);
