@@ -151,8 +151,8 @@ static void change_word(struct file *f, struct draw *d)
 
 static void break_file(struct file *f, uint64_t number)
 {
-    static void (*const ways[])(struct file *f, struct draw *d) = {change_bytes,  delete_part, double_part, cut_off,
-                                                                   change_number, change_word, change_number};
+    static void (*const ways[])(struct file * f, struct draw * d) = {change_bytes,  delete_part, double_part,  cut_off,
+                                                                     change_number, change_word, change_number};
     struct draw d = {rng_key(13, number), 0};
     for (uint64_t i = 1 + below(&d, 8) / 6; i > 0 && f->n > 1; i--) /* mostly one: more is refused at once */
         ways[below(&d, sizeof ways / sizeof ways[0])](f, &d);
@@ -176,8 +176,10 @@ static int judge(int rc, const struct scene *s, const struct sh_err *err, const 
     static const struct {
         const char *says;
         enum outcome outcome;
-    } ends[] = {{"Assimp crashed on it (SIG", DIED}, {"ended without a word", DIED},
-                {"was killed (SIGKILL)", DIED},      {"has not read it within", TIME},
+    } ends[] = {{"Assimp crashed on it (SIG", DIED},
+                {"ended without a word", DIED},
+                {"was killed (SIGKILL)", DIED},
+                {"has not read it within", TIME},
                 {"takes more than", MEMORY}};
     if (rc == SH_OK) return is_whole(s) ? LOADED : -1;
     size_t len = strlen(path);
@@ -250,8 +252,8 @@ static void broken_files(void **state)
     (void)state;
     const char *text = getenv("HOSTILE_EVERY");
     unsigned every = text != NULL && atoi(text) > 0 ? (unsigned)atoi(text) : 10, wrong = 0;
-    struct tally *tally = mmap(NULL, PROCESSES * sizeof *tally, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS,
-                               -1, 0);
+    struct tally *tally =
+        mmap(NULL, PROCESSES * sizeof *tally, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
     pid_t pid[PROCESSES];
     int status;
     assert_true(tally != MAP_FAILED);

@@ -41,7 +41,8 @@ static struct scene *small_scene(void)
     s->surface = calloc(2, sizeof *s->surface);
     s->texture = calloc(1, sizeof *s->texture);
     assert_true(s->surface != NULL && s->texture != NULL);
-    s->surface[0] = (struct scene_surface){"wall", "paint", {0.5f, 0.25f, 1.0f}, .has_colour = 1, .texture = 1, .solid = 0.5f};
+    s->surface[0] =
+        (struct scene_surface){"wall", "paint", {0.5f, 0.25f, 1.0f}, .has_colour = 1, .texture = 1, .solid = 0.5f};
     s->surface[1] = (struct scene_surface){.object = "floor"};
     s->texture[0] = (struct scene_texture){.file = strdup("some/a.dae*0"), .bytes = copy_of("pixels", 6), .n_bytes = 6};
     s->counts.zero_area = 3;
@@ -174,7 +175,8 @@ static void names_have_an_end(void **state)
     assert_non_null(name);
     memset(name, 'a', SCENE_NAME_LEN);
     assert_int_equal(read_result(bytes, n, &b, &err), SH_EINPUT);
-    assert_string_equal(err.text, "some/a.dae: what Assimp gave back makes no sense: a name of surface 1; the file is broken");
+    assert_string_equal(err.text,
+                        "some/a.dae: what Assimp gave back makes no sense: a name of surface 1; the file is broken");
     build_release(&b);
 }
 
@@ -374,10 +376,10 @@ static void child_dies_with_its_parent(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(result_comes_back),        cmocka_unit_test(broken_result_is_refused),
-        cmocka_unit_test(names_have_an_end),        cmocka_unit_test(hang_ends_in_time),
-        cmocka_unit_test(memory_is_limited),        cmocka_unit_test(crash_is_one_line),
-        cmocka_unit_test(child_has_limits),         cmocka_unit_test(child_dies_with_its_parent),
+        cmocka_unit_test(result_comes_back), cmocka_unit_test(broken_result_is_refused),
+        cmocka_unit_test(names_have_an_end), cmocka_unit_test(hang_ends_in_time),
+        cmocka_unit_test(memory_is_limited), cmocka_unit_test(crash_is_one_line),
+        cmocka_unit_test(child_has_limits),  cmocka_unit_test(child_dies_with_its_parent),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
