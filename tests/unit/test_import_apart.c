@@ -223,6 +223,26 @@ static void hang_ends_in_time(void **state)
     no_child_is_left();
 }
 
+/* As a program may be started: then there is no status of the child, and what it wrote counts. */
+static void signal_of_children_may_be_ignored(void **state)
+{
+    (void)state;
+    static const char text[] = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
+                               "endloop\nendfacet\nendsolid a\n";
+    const struct scene_mesh_spec good = {.file = write_text("a.stl", text), .scale = 1};
+    struct scene *s;
+    struct sh_err err = {0};
+    void (*was)(int) = signal(SIGCHLD, SIG_IGN);
+    if (load_spec(&good, 1e-3, &s, &err) != SH_OK) fail_msg("%s", err.text);
+    assert_int_equal(s->n_triangles, 1);
+    scene_free(s);
+    const struct scene_mesh_spec broken = {.file = write_text("a.stl", "solid a\nfacet"), .scale = 1};
+    assert_int_equal(load_spec(&broken, 1e-3, &s, &err), SH_EINPUT);
+    assert_null(strstr(err.text, "makes no sense")); /* what the child said */
+    signal(SIGCHLD, was);
+    unlink(path);
+}
+
 /* Assimp 5.2 goes on at the word that is no number, and keeps an index each time. */
 static void memory_is_limited(void **state)
 {
@@ -376,10 +396,11 @@ static void child_dies_with_its_parent(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(result_comes_back), cmocka_unit_test(broken_result_is_refused),
-        cmocka_unit_test(names_have_an_end), cmocka_unit_test(hang_ends_in_time),
-        cmocka_unit_test(memory_is_limited), cmocka_unit_test(crash_is_one_line),
-        cmocka_unit_test(child_has_limits),  cmocka_unit_test(child_dies_with_its_parent),
+        cmocka_unit_test(result_comes_back),        cmocka_unit_test(broken_result_is_refused),
+        cmocka_unit_test(names_have_an_end),        cmocka_unit_test(hang_ends_in_time),
+        cmocka_unit_test(memory_is_limited),        cmocka_unit_test(crash_is_one_line),
+        cmocka_unit_test(child_has_limits),         cmocka_unit_test(child_dies_with_its_parent),
+        cmocka_unit_test(signal_of_children_may_be_ignored),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
