@@ -253,8 +253,10 @@ int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err)
     for (int k = 0; k < 3; k++) {
         p[k] = turned[k] * spec->scale + spec->offset_m[k];
         if (!(fabs(p[k]) <= BUILD_MAX_COORDINATE_M))
-            return build_fail(b, SH_EINPUT, err, "vertex %llu is at %g m; allowed are coordinates up to %g m", number,
-                              p[k], BUILD_MAX_COORDINATE_M);
+            return build_fail(b, SH_EINPUT, err,
+                              "vertex %llu is at %g m; allowed are coordinates up to %g m: is the scale of "
+                              "%g metres per unit right?",
+                              number, p[k], BUILD_MAX_COORDINATE_M, spec->scale);
     }
     s->n_vertices++;
     return SH_OK;
