@@ -137,9 +137,10 @@ static int pass_over(struct scanhead *sh, int64_t deadline_ns)
     return 0;
 }
 
-/* Before the first exchange on a terminal, and after a command that was given up. Between open() and raw mode the terminal echoes what the head sends, and
- * the head takes it for commands; another program may have left half a line. So that line is ended, and the
- * answers to all that are passed over up to the one to a question of our own. */
+/* Before the first exchange on a terminal, and after a command that was given up. Between open() and raw mode
+ * the terminal echoes what the head sends, and the head takes it for commands; another program may have left
+ * half a line. So that line is ended, and the answers to all that are passed over up to the one to a question
+ * of our own. */
 static int settle(struct scanhead *sh, int64_t deadline_ns)
 {
     static const char question[] = "\n*IDN?\n";
