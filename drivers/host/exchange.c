@@ -2,6 +2,7 @@
 #include <errno.h>
 #include <poll.h>
 #include <string.h>
+#include <strings.h>
 
 #include "drivers/host/host.h"
 
@@ -136,9 +137,10 @@ static int pass_over(struct scanhead *sh, int64_t deadline_ns)
     return 0;
 }
 
-/* The first exchange on a terminal. Between open() and raw mode the terminal echoes what the head sends, and
- * the head takes it for commands; another program may have left half a line. So that line is ended, and the
- * answers to all that are passed over up to the one to a question of our own. */
+/* Before the first exchange on a terminal, and after a command that was given up. Between open() and raw mode
+ * the terminal echoes what the head sends, and the head takes it for commands; another program may have left
+ * half a line. So that line is ended, and the answers to all that are passed over up to the one to a question
+ * of our own. */
 static int settle(struct scanhead *sh, int64_t deadline_ns)
 {
     static const char question[] = "\n*IDN?\n";
@@ -146,6 +148,13 @@ static int settle(struct scanhead *sh, int64_t deadline_ns)
     if (rc != 0) return rc;
     sh->source.asked++;
     return pass_over(sh, deadline_ns);
+}
+
+/* The reply may come yet, and is not that of the next command: come into step before that. */
+static void give_up(struct host_source *source, const char *command)
+{
+    source->unsettled = 1;
+    source->asked += strcasecmp(command, "*IDN?") == 0;
 }
 
 int scanhead_command(struct scanhead *sh, const char *command, char *reply, size_t reply_len, int timeout_ms)
@@ -168,8 +177,10 @@ int scanhead_command(struct scanhead *sh, const char *command, char *reply, size
         if (sh->ended) return host_gone(sh);
         rc = deadline_ns < host_deadline_ns(0) ? SH_ETIMEOUT : host_fill(sh, deadline_ns);
     }
-    if (rc == SH_ETIMEOUT)
+    if (rc == SH_ETIMEOUT) {
+        give_up(&sh->source, command);
         return sh_fail(&sh->err, SCANHEAD_ETIMEOUT, "%s: no reply to '%s' within %d ms", sh->source.name, command,
                        timeout_ms);
+    }
     return rc;
 }

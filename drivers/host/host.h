@@ -39,7 +39,7 @@ struct host_source {
     int fd;
     struct host_usb *usb;
     int is_file, is_socket;
-    int unsettled;  /* a terminal: the head may have been sent an echo, or half a line, before it was ours */
+    int unsettled;  /* lines may come that answer nothing of ours: on a new terminal, after a time-out */
     int asked;      /* questions that went out to settle that, and have no answer yet */
     char name[256]; /* for messages, and to open it again */
 };

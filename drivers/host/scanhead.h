@@ -99,7 +99,7 @@ int scanhead_list_usb(struct scanhead_usb_head *heads, int max, char *err, size_
  * the oldest and counts them (stats.dropped). A reply "ERR n,..." is returned as it is, with SCANHEAD_OK: the
  * command was answered. Before the first command on a "tty:" it sends an empty line and *IDN?, and skips all
  * reply lines up to the answer to that. For until the terminal was in raw mode, it may have echoed to the
- * head what the head sent. */
+ * head what the head sent. It does the same after SCANHEAD_ETIMEOUT, since the reply may still come. */
 int scanhead_command(struct scanhead *sh, const char *command, char *reply, size_t reply_len, int timeout_ms);
 
 enum scanhead_frame_type { /* as on the wire */

@@ -136,14 +136,20 @@ static void test_bus_reset(void **state)
 
 /* ---- writing */
 
-static void ask(struct scanhead *sh)
+static void ask_after(struct scanhead *sh, const char *settling)
 {
-    char reply[64];
+    char reply[64], written[64];
     memset(bus.written, 0, sizeof bus.written);
     bus.answer = "12\r\n";
     if (scanhead_command(sh, "TIME?", reply, sizeof reply, TIMEOUT_MS) != 0) fail_msg("%s", scanhead_error(sh));
     assert_string_equal(reply, "12");
-    assert_string_equal(bus.written, "TIME?\n"); /* it alone, and once */
+    snprintf(written, sizeof written, "%sTIME?\n", settling);
+    assert_string_equal(bus.written, written); /* it alone, and once */
+}
+
+static void ask(struct scanhead *sh)
+{
+    ask_after(sh, "");
 }
 
 /* The write fails after it was sent off: that command gets no reply, and the next one goes out. */
@@ -158,6 +164,7 @@ static void test_write_fails(void **state)
         const int cleared = bus.n_clear_halts;
         fake_script(FAKE_OUT, failures[i], NULL, 0);
         assert_int_equal(scanhead_command(sh, "SCAN:STOP", reply, sizeof reply, 20), SCANHEAD_ETIMEOUT);
+        ask_after(sh, "\n*IDN?\n"); /* into step first */
         ask(sh);
         assert_int_equal(bus.n_clear_halts, cleared + 1);
     }

@@ -9,6 +9,9 @@
         samples PAGE OUT    decodes the frames in hex of PAGE; what is said below each is what it holds
         tables PAGE FILE    decodes FILE's frames by PAGE's tables alone; the client must read the same
         hostile FILE SEED   frames of FILE with wrong contents and good checksums: only ScanheadError comes
+        older FILE OUT      FILE as heads wrote it whose telemetry had no counts of the scan
+        ends FILE           where scan_over is true, with SCAN_END and without; what says that pulses were lost
+        misuse FILE         wrong sources and calls: only ScanheadError comes; a late reply answers nothing else
 """
 import math
 import random
@@ -183,6 +186,97 @@ def framed(kind, flags, length, payload):
     return head + struct.pack("<I", scanhead.crc32c(head)) + payload
 
 
+def older(path, out):
+    with open(out, "wb") as file:
+        for f in scanhead.open(path).frames():
+            payload = f.payload[:72] if f.type == scanhead.TELEMETRY else f.payload
+            head = struct.pack("<BBBBIIIq", 0xD5, f.type, 1, f.flags, len(payload), f.seq,
+                               scanhead.crc32c(payload), f.t_ns)
+            file.write(head + struct.pack("<I", scanhead.crc32c(head)) + payload)
+    head = scanhead.open(out)
+    assert all("scan_cast" not in f.fields for f in head.frames())
+    print(head.stream_sha256())
+
+
+def event(code, *values):
+    payload = struct.pack("<II3Q96x", code, 0, *(values + (0, 0, 0))[:3])
+    return framed(scanhead.EVENT, 0, len(payload), payload)
+
+
+def telemetry(state, scan):
+    payload = struct.pack("<II88x", state, scan)
+    return framed(scanhead.TELEMETRY, 0, len(payload), payload)
+
+
+def ends_of(path, *frames):
+    """The places where scan_over is true."""
+    with open(path, "wb") as file:
+        file.write(b"".join(frames))
+    head = scanhead.open(path)
+    return [i for i, _ in enumerate(head.frames()) if head.scan_over], head.pulses_lost
+
+
+def ends(path):
+    start, stop = event(scanhead.EV_SCAN_START, 1), event(scanhead.EV_SCAN_END, 1, 100, 7)
+    state, spin_down = event(scanhead.EV_STATE, 5, 4), telemetry(5, 1)
+    lost = event(scanhead.EV_OVERRUN, 90, 3)
+    idle, scanning = telemetry(2, 1), telemetry(4, 1)
+    following = event(scanhead.EV_SCAN_START, 2), telemetry(4, 2)
+    assert ends_of(path, idle, start, scanning, lost, spin_down, stop, state, idle) == ([5], 7)
+    assert ends_of(path, start, lost, scanning, spin_down, state, idle) == ([4], 3)
+    assert ends_of(path, start, scanning, idle, idle) == ([2], 0)
+    for other in following:
+        assert ends_of(path, start, scanning, other, scanning) == ([2, 3] if other == following[0] else [2], 0)
+    print("ends")
+
+
+def refused(function, *arguments):
+    try:
+        function(*arguments)
+    except scanhead.ScanheadError:
+        return
+    assert False, f"{arguments} was taken"
+
+
+def pair():
+    ours, theirs = socket.socketpair()
+    ours.setblocking(False)
+    return scanhead.Head(scanhead._Source("pair", ours.fileno(), ours)), theirs
+
+
+def misuse(path):
+    for source in ("tcp:127.0.0.1:65537", "tcp:127.0.0.1:0", "tcp:127.0.0.1:\xb2", "tcp:5025", "a\0b", "",
+                   "tcp:" + 70 * "a" + ".b:1", "tty:" + path):
+        refused(scanhead.open, source)
+    refused(scanhead.open("/").next_frame)
+    for head in (scanhead.open(path), pair()[0]):
+        head.close()
+        head.close()
+        refused(head.next_frame)
+        refused(head.query, "*IDN?")
+    head, theirs = pair()
+    threading.Timer(0.05, theirs.close).start()
+    refused(head.next_frame, 1e300)  # longer than poll() can wait
+    late_reply()
+    print("refused")
+
+
+def late_reply():
+    """The reply to a command that was given up comes when the next one has been sent."""
+    head, theirs = pair()
+    for line in ("HEAD:PRR?", "*IDN?"):
+        refused(head.query, line, 0.0)
+    replies = {"HEAD:PRR?": "1", "*IDN?": "a,b,c,d", "HEAD:LINes?": "2"}
+
+    def answer():
+        for line in theirs.makefile():
+            if line.strip():
+                theirs.sendall(replies[line.strip()].encode() + b"\r\n")
+
+    threading.Thread(target=answer, daemon=True).start()
+    assert [head.query("HEAD:LINes?") for _ in range(3)] == ["2", "2", "2"]
+
+
 def bombs(path):
     """Good headers that promise 64 KiB, small good frames between: if each payload were summed anew this were
     200 MB, a minute; it must take less than 10 s of processor time."""
@@ -272,7 +366,7 @@ def tables(page, path):
 
 def chatter(data):
     """A head that sends without end and never what is waited for: calls end with their time all the same."""
-    ours, theirs = socket.socketpair()
+    head, theirs = pair()
 
     def send():
         try:
@@ -283,8 +377,6 @@ def chatter(data):
 
     sender = threading.Thread(target=send)
     sender.start()
-    ours.setblocking(False)
-    head = scanhead.Head(scanhead._Source("pair", ours.fileno(), ours))
     try:
         head.query("*IDN?", 0.05) if data[0] == 0xD5 else head.next_frame(0.05)
         assert False, "something came"

@@ -73,6 +73,16 @@ static const char *record(struct wire *wire, const struct room_config *c, const 
     return wire_path(wire, name);
 }
 
+/* A recording into another format. */
+static void convert(struct wire *wire, const char *from, const char *to)
+{
+    char source[352], file[352];
+    snprintf(source, sizeof source, "%s", wire_path(wire, from));
+    snprintf(file, sizeof file, "%s", wire_path(wire, to));
+    const char *const args[] = {"record", source, "-o", file, "--quiet", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "head.out", "head.err", -1)), 0);
+}
+
 static void write_ride(const struct wire *wire)
 {
     wire_write_text(wire, "ride.csv",
@@ -374,6 +384,42 @@ static void test_hostile(void **state)
     }
 }
 
+/* A recording of an older head, whose telemetry ends at 72 bytes, gives the same points and the same hash. */
+static void test_older(void **state)
+{
+    struct wire *wire = *state;
+    char from[352], older[352], hash[65], want[66];
+    need_python();
+    room_write(wire);
+    snprintf(from, sizeof from, "%s", record(wire, &SMALL, "a.shs", ""));
+    snprintf(older, sizeof older, "%s", wire_path(wire, "older.shs"));
+    stats_hash(wire, hash);
+    snprintf(want, sizeof want, "%s\n", hash);
+    assert_string_equal(ask_python(wire, "plain", "older", from, older), want);
+    convert(wire, "a.shs", "a.ply");
+    convert(wire, "older.shs", "older.ply");
+    size_t len, older_len;
+    char *points = wire_read(wire_path(wire, "a.ply"), &len);
+    char *same_points = wire_read(wire_path(wire, "older.ply"), &older_len);
+    assert_int_equal(len, older_len);
+    assert_memory_equal(points, same_points, len);
+    free(points);
+    free(same_points);
+}
+
+static void test_ends(void **state)
+{
+    need_python();
+    assert_string_equal(ask_python(*state, "plain", "ends", wire_path(*state, "ends.shs"), NULL), "ends\n");
+}
+
+static void test_misuse(void **state)
+{
+    need_python();
+    const char *path = wire_write(*state, "a.shs", "", 0);
+    assert_string_equal(ask_python(*state, "plain", "misuse", path, NULL), "refused\n");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -382,6 +428,9 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_live, setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_damaged, setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_hostile, setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_older, setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_ends, setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_misuse, setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -6,7 +6,7 @@
         if frame.type == scanhead.POINTS:
             points = head.points(frame)
             x_m, y_m, z_m = head.to_scene(points)
-        elif frame.is_event(scanhead.EV_SCAN_END):
+        if head.scan_over:
             break
 
 The wire is described in drivers/protocol/PROTOCOL.md; this file follows it section by section. Columns of
@@ -46,6 +46,10 @@ NO_LABEL = 0xFFFF
 _HASHED = (DESCRIPTOR, ANCHOR, POINTS, LINE_END, POSES, ATTRIBUTES)
 _HEADER_LEN, _MAX_PAYLOAD, _MAX_TEXT = 28, 65536, 512
 _QUEUE_BYTES, _KEEP_POSES, _CHUNK = 64 << 20, 8192, 1 << 16
+_FRAME_BYTES = 512  # what a kept frame takes beside its payload
+_POLL_MS = 2**31 - 1  # the longest that poll() waits
+_ANSWERS_S = 0.2  # how long further answers to questions that were given up may take
+_SCANNING, _SPIN_DOWN = 4, 5  # states of the head
 _NAN = math.nan
 
 
@@ -357,10 +361,9 @@ def _mapped(function, *columns):
     return _column(map(function, *plain), len(plain[0]))
 
 
-_PARTS = 256
-_SIN = [math.sin(6.283185307179586476925 * i / _PARTS) for i in range(_PARTS)]
-_COS = [math.cos(6.283185307179586476925 * i / _PARTS) for i in range(_PARTS)]
-_TWO_PI = 6.283185307179586476925
+_PARTS, _TWO_PI = 256, 6.283185307179586476925
+_SIN = [math.sin(_TWO_PI * i / _PARTS) for i in range(_PARTS)]
+_COS = [math.cos(_TWO_PI * i / _PARTS) for i in range(_PARTS)]
 if np is not None:
     _NP_SIN, _NP_COS = np.array(_SIN), np.array(_COS)
 
@@ -825,8 +828,8 @@ def _open_source(name: str, timeout_s: float) -> _Source:
     kind, _, rest = name.partition(":")
     if kind == "tcp":
         host, _, port = rest.rpartition(":")
-        if not host or not port.isdigit():
-            raise ScanheadError(f"{name}: not tcp:HOST:PORT")
+        if not host or not (port.isascii() and port.isdigit() and 1 <= int(port) <= 65535):
+            raise ScanheadError(f"{name}: not tcp:HOST:PORT with a port of 1 to 65535")
         connection = socket.create_connection((host.strip("[]"), int(port)), timeout_s)
         connection.setblocking(False)
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -838,6 +841,10 @@ def _open_source(name: str, timeout_s: float) -> _Source:
 
 # ---- the head
 
+def _is_identity_query(line: str) -> bool:
+    return line.strip().lstrip(":").upper() == "*IDN?"
+
+
 class Head:
     """A head or a recording. State (descriptor, anchor, names, poses, clock, hash) is that of the frame that
     frames() gave last; points(), to_scene() and to_crs() belong to that frame."""
@@ -845,15 +852,17 @@ class Head:
     def __init__(self, source: _Source) -> None:
         self._source, self.parser = source, Parser()
         self._queue, self._queued = collections.deque(), 0
-        self._unsettled = source.is_tty
+        self._unsettled, self._asked = source.is_tty, 0  # _asked: answers to *IDN? that may come yet
         self._ended = self._stuck = False
         self.dropped = 0  # frames dropped here while a reply was awaited
-        self.reader_lost = self.pulses_lost = 0  # frames and pulses that the head says were lost
+        self.reader_lost = 0  # frames that the head says it left out for this reader
+        self._lost_told = self._lost_ended = 0  # pulses, by OVERRUN events and by SCAN_END
         self.descriptor, self.anchor = None, None  # type: Optional[Dict], Optional[Dict]
         self.surfaces = {}  # type: Dict[int, Tuple[str, str]]
         self._poses, self._earth = _Poses(), None
         self._sha256 = hashlib.sha256()
         self._scan_t0_ns = self._gps = self._last_pulse0 = self._points_key = None
+        self._scan, self.scan_over = None, False  # the scan at hand; whether it ends with this frame
 
     def __enter__(self) -> "Head":
         return self
@@ -864,14 +873,23 @@ class Head:
     def close(self) -> None:
         self._source.close()
 
+    @property
+    def pulses_lost(self) -> int:
+        """Pulses that the head says it lost. Two kinds of events count the same; of either, some may be lost."""
+        return max(self._lost_told, self._lost_ended)
+
     # -- bytes
 
     def _fill(self, deadline_s: Optional[float], write: bool = False) -> bool:
         """Waits for bytes and takes them. write: returns True as soon as the head takes bytes."""
+        if self._source.fd < 0:
+            raise Closed(f"{self._source.name}: close() was called")
         if not self._source.is_file:
             poll = select.poll()
             poll.register(self._source.fd, select.POLLIN | (select.POLLOUT if write else 0))
-            left_ms = None if deadline_s is None else max(0.0, 1000 * (deadline_s - time.monotonic()))
+            left_ms = None
+            if deadline_s is not None:
+                left_ms = min(max(0.0, 1000 * (deadline_s - time.monotonic())), _POLL_MS)
             ready = poll.poll(left_ms)
             if not ready:
                 raise Timeout(f"{self._source.name}: nothing came in time")
@@ -881,8 +899,10 @@ class Head:
             data = os.read(self._source.fd, _CHUNK)
         except BlockingIOError:
             return False
-        except OSError:  # a pty whose other end is gone, a connection that was reset
-            data = b""
+        except OSError as error:
+            if self._source.is_file:
+                raise ScanheadError(f"{self._source.name}: {error.strerror}") from None
+            data = b""  # a pty whose other end is gone, a connection that was reset
         self._ended = not data
         self.parser.feed(data)
         return False
@@ -912,8 +932,13 @@ class Head:
         if self._unsettled:
             self._settle(deadline_s)
         self._discard_stale()
-        self._send(line + "\n", deadline_s)
-        return self._reply(deadline_s)
+        try:
+            self._send(line + "\n", deadline_s)
+            return self._reply(deadline_s)
+        except Timeout:  # its reply may come yet, and is not that of the next line
+            self._unsettled = True
+            self._asked += _is_identity_query(line)
+            raise
 
     def command(self, line: str, timeout_s: float = 5.0) -> str:
         """The same; "ERR ..." becomes a CommandError."""
@@ -924,24 +949,31 @@ class Head:
         return reply
 
     def _settle(self, deadline_s: float) -> None:
-        """Comes into step on a terminal, which may have echoed what the head sent: its answer to *IDN? is the
-        only reply with three commas and no quotes."""
+        """Comes into step: on a terminal, which may have echoed what the head sent, and after a command that was
+        given up. The answer to *IDN? is the only reply with three commas and no quotes. All that was asked so
+        must be answered; once one answer is there, the others have a moment, as they may be lost."""
+        self._asked += 1
         self._send("\n*IDN?\n", deadline_s)
-        while True:
-            reply = self._reply(deadline_s)
-            if reply.count(",") == 3 and '"' not in reply:
+        answered = False
+        while self._asked:
+            try:
+                reply = self._reply(deadline_s)
+            except Timeout:
+                if not answered:
+                    raise
+                self._asked = 0
                 break
+            if reply.count(",") == 3 and '"' not in reply:
+                self._asked -= 1
+                if not answered:
+                    answered, deadline_s = True, time.monotonic() + _ANSWERS_S
         self._unsettled = False
 
     def _discard_stale(self) -> None:
         """Replies that are there already answer commands that were given up. Frames may come without end, so
         this looks at a few chunks only."""
         for _ in range(32):
-            item = self.parser.next()
-            while item is not None:
-                if isinstance(item, Frame):
-                    self._keep(item)
-                item = self.parser.next()
+            self._keep_frames()
             try:
                 self._fill(0.0)
             except Timeout:
@@ -974,11 +1006,7 @@ class Head:
         self._fill(deadline_s, write=True)
         if self._ended:
             raise Closed(f"{self._source.name}: the head is gone")
-        item = self.parser.next()
-        while item is not None:
-            if isinstance(item, Frame):
-                self._keep(item)
-            item = self.parser.next()
+        self._keep_frames()
 
     def _reply(self, deadline_s: float) -> str:
         while True:
@@ -990,12 +1018,25 @@ class Head:
             self._keep(item)
             self._check(deadline_s)
 
+    def _keep_frames(self) -> None:
+        """What has come: frames are kept, lines answer what nobody waits for any more."""
+        item = self.parser.next()
+        while item is not None:
+            if isinstance(item, Frame):
+                self._keep(item)
+            item = self.parser.next()
+
     def _keep(self, frame: Frame) -> None:
         self._queue.append(frame)
-        self._queued += len(frame.payload) + _HEADER_LEN
+        self._queued += len(frame.payload) + _FRAME_BYTES
         while self._queued > _QUEUE_BYTES:
-            self._queued -= len(self._queue.popleft().payload) + _HEADER_LEN
+            self._unqueue()
             self.dropped += 1
+
+    def _unqueue(self) -> Frame:
+        frame = self._queue.popleft()
+        self._queued -= len(frame.payload) + _FRAME_BYTES
+        return frame
 
     # -- frames
 
@@ -1012,8 +1053,7 @@ class Head:
         deadline_s = None if timeout_s is None else time.monotonic() + timeout_s
         frame = None  # type: Union[Frame, str, None]
         if self._queue:
-            frame = self._queue.popleft()
-            self._queued -= len(frame.payload) + _HEADER_LEN
+            frame = self._unqueue()
         while not isinstance(frame, Frame):
             frame = self._next_item(deadline_s)
             if frame is None:
@@ -1037,7 +1077,27 @@ class Head:
                POSES: self._absorb_poses, ATTRIBUTES: self._absorb_attributes}.get(frame.type)
         if act is not None:
             act(frame)
+        self._follow_scan(frame)
         return frame
+
+    def _follow_scan(self, frame: Frame) -> None:
+        """SCAN_END may be lost: the next frame that knows better ends the scan, too."""
+        f, now = frame.fields, self._scan
+        if frame.is_event(EV_SCAN_START):
+            now = f["a"]
+        elif frame.type == DESCRIPTOR:
+            now = f["scan"]
+        elif frame.type == TELEMETRY:
+            now = f["scan"] if f["state"] in (_SCANNING, _SPIN_DOWN) else None
+        elif frame.is_event(EV_SCAN_END) or frame.is_event(EV_STATE) and f["b"] == _SCANNING:
+            now = None
+        self.scan_over = self._scan is not None and self._scan != now
+        if self.scan_over:
+            self._scan = None
+        if frame.is_event(EV_SCAN_START):
+            self._scan = now
+        elif frame.type == POINTS and self.descriptor is not None:
+            self._scan = self.descriptor["scan"]
 
     def _forget(self) -> None:
         self.descriptor = self.anchor = self._last_pulse0 = None
@@ -1089,7 +1149,9 @@ class Head:
         if code == EV_READER_LOST:
             self.reader_lost = c
         elif code == EV_OVERRUN:
-            self.pulses_lost += b
+            self._lost_told += b
+        elif code == EV_SCAN_END:
+            self._lost_ended += c
         elif code == EV_SCAN_START:
             if self.descriptor is not None and a != self.descriptor["scan"]:
                 self._forget()
@@ -1205,6 +1267,8 @@ def open(source: str, timeout_s: float = 5.0) -> Head:  # noqa: A001, the module
         return Head(_open_source(source, timeout_s))
     except OSError as error:
         raise ScanheadError(f"{source}: {error.strerror or error}") from None
+    except ValueError as error:  # a NUL in a path, a part of a host's name that is too long
+        raise ScanheadError(f"{source!r}: {error}") from None
 
 
 def _summary(head: Head) -> None:
@@ -1235,6 +1299,8 @@ def main(arguments: List[str]) -> int:
     except ScanheadError as error:
         print(error, file=sys.stderr)
         return 1
+    except KeyboardInterrupt:
+        return 130
     return 0
 
 
