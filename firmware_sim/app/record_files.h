@@ -25,6 +25,8 @@ struct record_files {
 
 /* SH_EINPUT: more than RECORD_MAX_FILES, a path twice, an ending without a recorder. path must live on. */
 int record_files_add(struct record_files *files, const char *path, struct sh_err *err);
+/* Whether one of them has that ending, as recorders name it. */
+int record_files_have(const struct record_files *files, const char *ending);
 /* For a stream of geodetic coordinates: SH_EINPUT where a file can hold only metres. */
 int record_files_check_degrees(const struct record_files *files, struct sh_err *err);
 int record_files_open(struct record_files *files, struct sh_err *err);
