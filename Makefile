@@ -219,7 +219,7 @@ soak-usb: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test all $(BUILD)/test/tests/wire/test_usb_soak
 	@USB_SOAK_EVENTS=1000 SCANHEAD=$(BUILD)/test/scanhead $(BUILD)/test/tests/wire/test_usb_soak
 
-# All 600 broken meshes, with and without sanitizers (`make test`: every tenth): half a minute.
+# 600 broken meshes, with and without sanitizers (there `make test` tries every tenth): half a minute.
 test-hostile: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test $(BUILD)/test/tests/unit/test_hostile_files
 	@$(MAKE) --no-print-directory -j2 $(ASAN) $(BUILD)/asan/tests/unit/test_hostile_files

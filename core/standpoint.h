@@ -35,8 +35,9 @@ struct standpoint {
     int faces_out;               /* outside: there was a room, but its faces point outward */
 };
 
-/* SH_EINPUT: the view is empty. Takes memory for a BVH, and some 10 to 100 ms. */
-int standpoint_find(const struct scene *scene, const struct standpoint_view *view, struct standpoint *out,
-                    struct sh_err *err);
+/* SH_EINPUT: the view is empty. Takes memory and time for a BVH, and some 10 to 100 ms. SH_ESTOPPED: report asks to
+ * stop. */
+int standpoint_find(const struct scene *scene, const struct standpoint_view *view, const struct sh_report *report,
+                    struct standpoint *out, struct sh_err *err);
 
 #endif

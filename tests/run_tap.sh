@@ -5,7 +5,7 @@
 #
 # SECONDS per program; default $TAP_LIMIT_S, or 300. N programs at a time, default 1; one that begins with `+` runs beside
 # these. Those after `--` have the machine to themselves, one after the other.
-# One line per program, in the order given, and the tables of the stability and accuracy programs; of one that fails, all
+# One line per program, in the order given, and the tables of those that have some; of one that fails, all
 # that it printed but its passed tests. The reasons of skips follow.
 # The last line is `N passed, N failed, N skipped`. Exit status 1 when anything failed, 2 for wrong usage.
 # What counts as a failure beside `not ok`: fewer results than planned; a status other than 0, a signal or no end
@@ -119,7 +119,7 @@ report() {
         "$name" "$passed" "$failed" "$skipped" $((took_ms / 1000)) $((took_ms % 1000)) "$why"
     if [ "$failed" -eq 0 ]; then
         case $program in # their tables are what they are for
-        */stability/* | */accuracy/*) grep -a '^# ' "$out" | grep -a -v -E '^# (not )?ok' | sed 's/^# /    /' ;;
+        */stability/* | */accuracy/* | */test_models | */test_hostile_files) grep -a '^# ' "$out" | grep -a -v -E '^# (not )?ok' | sed 's/^# /    /' ;;
         esac
     else
         grep -a -v -i -E '^ok([[:space:]]|$)|^not ok .*# *skip|^1\.\.[0-9]' "$out" | sed 's/^/    /'

@@ -5,8 +5,6 @@
 #include "core/bvh/bvh_inside.h"
 #include "core/vec3.h"
 
-enum { DECIDE_MAX_ROUNDS = 32 };
-
 struct search {
     const struct decide_ray *ray;
     double point_m[3], radius_m; /* of the query, local frame */
@@ -292,7 +290,9 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh
                        .near_prim = RTC_INVALID_GEOMETRY_ID,
                        .near_gap = INFINITY};
     counters->near_border++;
-    for (int round = 0; round < DECIDE_MAX_ROUNDS && prim != RTC_INVALID_GEOMETRY_ID; round++) {
+    /* Each round begins further along the ray, so they end. A ray that passes many wide triangles needs many:
+     * none may be given up, for what lies behind would be lost. */
+    while (prim != RTC_INVALID_GEOMETRY_ID) {
         s.proposed = prim;
         try_triangle(&s, prim);
         /* Inside in double as well, and further from the border than float can blur: the common case. Nearer,

@@ -287,8 +287,8 @@ int trajectory_read_waypoints(const char *path, const struct geoframe *frame, co
     if (rc == SH_OK) rc = trajectory_from_samples(way.points.at, way.points.n, &curve, err);
     walk.curve = curve;
     if (rc == SH_OK && (rc = follow(&walk, way.pause_s, &why)) != SH_OK)
-        rc = rc == SH_ESTOPPED ? sh_fail(err, rc, "%s", why.text)
-                               : text_fail(&csv.text, 0, rc, err, "%.300s", why.text);
+        rc =
+            rc == SH_ESTOPPED ? sh_fail(err, rc, "%s", why.text) : text_fail(&csv.text, 0, rc, err, "%.300s", why.text);
     if (rc == SH_OK) rc = trajectory_from_samples(walk.out.at, walk.out.n, out, err);
     trajectory_free(curve);
     csv_close(&csv);

@@ -22,6 +22,7 @@ static int64_t now_ns(void)
 int build_init(struct scene_build *b, double tolerance_m, const struct sh_report *report, struct sh_err *err)
 {
     *b = (struct scene_build){.tolerance_m = tolerance_m, .report = report, .start_ns = now_ns()};
+    b->polygon.report = report;
     b->scene = calloc(1, sizeof *b->scene);
     if (b->scene == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a scene");
     /* In full, since the tree holds pointers into it: pages that are not used are never touched. */
@@ -252,8 +253,10 @@ int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err)
     for (int k = 0; k < 3; k++) {
         p[k] = turned[k] * spec->scale + spec->offset_m[k];
         if (!(fabs(p[k]) <= BUILD_MAX_COORDINATE_M))
-            return build_fail(b, SH_EINPUT, err, "vertex %llu is at %g m; allowed are coordinates up to %g m", number,
-                              p[k], BUILD_MAX_COORDINATE_M);
+            return build_fail(b, SH_EINPUT, err,
+                              "vertex %llu is at %g m; allowed are coordinates up to %g m: is the scale of "
+                              "%g metres per unit right?",
+                              number, p[k], BUILD_MAX_COORDINATE_M, spec->scale);
     }
     s->n_vertices++;
     return SH_OK;
@@ -332,6 +335,7 @@ int build_polygon(struct scene_build *b, size_t n, uint16_t label, struct sh_err
     for (size_t i = 0; i < n; i++)
         memcpy(t->at[i].p, b->scene->vertex_m[b->corner[i]], sizeof t->at->p);
     triangulate_polygon(t, (uint32_t)n);
+    if (t->stopped) return sh_fail_stopped(err);
     if (!t->simple) b->not_simple++;
     int rc = SH_OK;
     for (size_t i = 0; i + 2 < n && rc == SH_OK; i++)

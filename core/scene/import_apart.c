@@ -128,7 +128,9 @@ static int reap(struct apart *a, int flags)
     for (;;) {
         pid_t got = waitpid(a->pid, &a->status, flags);
         if (got < 0 && errno == EINTR) continue;
-        if (got < 0) a->status = 1 << 8; /* somebody else has waited for it: nothing is known */
+        /* Where SIGCHLD is ignored, as some programs leave it to those they start, or where somebody else has waited, there
+         * is no status. Its error and its result say enough: a result that is not whole is refused. */
+        if (got < 0) a->status = 0;
         return got != 0;
     }
 }
@@ -194,10 +196,10 @@ static int judge(struct apart *a, enum end end, struct sh_err *err)
     if (end == END_TIME) return fail_by_time(a, err);
     if (end == END_MEMORY) return fail_by_memory(a, err);
     if (WIFSIGNALED(a->status)) return fail_by_signal(a, WTERMSIG(a->status), err);
-    if (WEXITSTATUS(a->status) == 0) return SH_OK;
     /* What is refused at once, as larger than all memory, never was in use. */
     if (a->said.code == SH_ENOMEM || strstr(a->said.text, "bad_alloc") != NULL) return fail_by_memory(a, err);
     if (a->said.code != 0) return sh_fail(err, a->said.code, "%s", a->said.text);
+    if (WEXITSTATUS(a->status) == 0) return SH_OK;
     return build_fail(a->task.b, SH_EINPUT, err,
                       "the process in which Assimp read it ended without a word (exit status %d): the file is "
                       "broken: " ELSE_CONVERT,

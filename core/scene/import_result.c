@@ -109,8 +109,8 @@ struct result {
 
 static int wrong(const struct result *r, const char *what, uint64_t number)
 {
-    return build_fail(r->b, SH_EINPUT, r->err, "what Assimp gave back makes no sense: %s %llu; the file is broken", what,
-                      (unsigned long long)number);
+    return build_fail(r->b, SH_EINPUT, r->err, "what Assimp gave back makes no sense: %s %llu; the file is broken",
+                      what, (unsigned long long)number);
 }
 
 /* From any place of the file. What is taken is cut out of it: the scene is not there twice. */

@@ -115,6 +115,7 @@ static bool is_turned_over(const struct triangulate *t, uint32_t a, uint32_t b, 
 void triangulate_polygon(struct triangulate *t, uint32_t n)
 {
     t->simple = true;
+    t->stopped = false;
     t->n_reflex = 0;
     project(t, n);
     for (uint32_t i = 0; i < n; i++) {
@@ -124,7 +125,9 @@ void triangulate_polygon(struct triangulate *t, uint32_t n)
     for (uint32_t i = 0; i < n; i++)
         if (!(turn(t, t->at[i].prev, i, t->at[i].next) > 0)) t->at[t->n_reflex++].reflex = i;
     uint32_t n_out = 0, left = n, tried = 0, i = 1; /* from 1: a convex polygon becomes a fan about corner 0 */
-    while (left > 3) {
+    for (uint32_t step = 1; left > 3; step++) {
+        /* A polygon of the most corners may take seconds. */
+        if (step % 16 == 0 && (t->stopped = sh_stopped(t->report))) return;
         uint32_t next = t->at[i].next;
         if (is_ear(t, i)) {
             clip(t, i, &n_out);

@@ -11,6 +11,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "core/err.h"
+
 /* Entry i of each list; together they are a cache line. */
 struct triangulate_entry {
     double p[3];          /* in: corner i */
@@ -24,7 +26,9 @@ struct triangulate_entry {
 struct triangulate {
     struct triangulate_entry *at;
     size_t cap, n_reflex;
-    bool simple; /* out */
+    bool simple;                    /* out */
+    const struct sh_report *report; /* its stop is heeded; NULL: nothing stops */
+    bool stopped;                   /* out: there are no triangles */
 };
 
 /* Makes room for n corners. 0 or SH_ENOMEM; the old room stays valid then. */

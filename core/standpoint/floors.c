@@ -26,7 +26,6 @@ struct floors {
 };
 
 /* All columns at a time: each ray begins just below what the last one has met. */
-/* All columns at a time: each ray begins just below what the last one has met. */
 struct column {
     double top_m, last_m; /* where the next ray begins; the last surface, INFINITY: none yet */
 };
@@ -170,13 +169,13 @@ static void try(struct survey *s, const struct floors *floors, const struct floo
     }
 }
 
-int survey_floors(struct survey *s, struct survey_best *best, struct sh_err *err)
+int survey_floors(struct survey *s, const struct sh_report *report, struct survey_best *best, struct sh_err *err)
 {
     struct floors floors = {.floor = malloc(N_COLUMNS * MAX_LAYERS * sizeof *floors.floor)};
     if (floors.floor == NULL) return sh_fail(err, SH_ENOMEM, "no memory to look for floors");
     drop(s, &floors);
-    for (uint32_t i = 0; i < floors.n; i++)
+    for (uint32_t i = 0; i < floors.n && !sh_stopped(report); i++)
         try(s, &floors, &floors.floor[i], best);
     free(floors.floor);
-    return SH_OK;
+    return sh_check_stop(report, err);
 }

@@ -5,7 +5,8 @@
 #include "core/standpoint/survey.h"
 #include "core/vec3.h"
 
-int survey_open(struct survey *s, const struct scene *scene, const struct standpoint_view *view, struct sh_err *err)
+int survey_open(struct survey *s, const struct scene *scene, const struct standpoint_view *view,
+                const struct sh_report *report, struct sh_err *err)
 {
     memset(s, 0, sizeof *s);
     s->scene = scene;
@@ -15,8 +16,9 @@ int survey_open(struct survey *s, const struct scene *scene, const struct standp
         s->centre_m[i] = scene->min_m[i] + 0.5 * s->size_m[i];
     }
     s->radius_m = 0.5 * vec3_length(s->size_m);
-    double reach_m = 4.0 * s->radius_m + 2.0 * view->range_min_m; /* the farthest place outside */
-    int rc = bvh_create(scene, s->centre_m, reach_m, 0, NULL, &s->bvh, err);
+    /* Places outside are farther away: from there a ray may take one surface for another at their border, which
+     * a survey can bear. With their reach most hits within would be in doubt. */
+    int rc = bvh_create(scene, s->centre_m, s->radius_m, 0, report, &s->bvh, err);
     return rc == SH_OK ? bvh_work_create(&s->work, err) : rc;
 }
 

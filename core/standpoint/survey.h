@@ -24,7 +24,8 @@ struct survey {
 };
 
 /* survey_close is due in any case. */
-int survey_open(struct survey *s, const struct scene *scene, const struct standpoint_view *view, struct sh_err *err);
+int survey_open(struct survey *s, const struct scene *scene, const struct standpoint_view *view,
+                const struct sh_report *report, struct sh_err *err);
 void survey_close(struct survey *s);
 
 /* Adds a ray; there is room for BVH_CHUNK. */
@@ -52,7 +53,7 @@ struct survey_best {
     struct standpoint inside, ground;
     int faces_out; /* a place inside was left out, since what it sees are backs */
 };
-int survey_floors(struct survey *s, struct survey_best *best, struct sh_err *err);
+int survey_floors(struct survey *s, const struct sh_report *report, struct survey_best *best, struct sh_err *err);
 
 /* outside.c */
 void survey_outside(struct survey *s, struct standpoint *out);

@@ -90,7 +90,9 @@ static void set_leg(struct leg *leg, const struct native_pose *a, const struct n
 
 static double fraction(const struct leg *leg, int64_t t_ns)
 {
-    return (double)(t_ns - leg->a->t_ns) / (double)(leg->b->t_ns - leg->a->t_ns);
+    /* without signs: poses of a broken stream may be further apart than 63 bits */
+    const uint64_t a_ns = (uint64_t)leg->a->t_ns;
+    return (double)((uint64_t)t_ns - a_ns) / (double)((uint64_t)leg->b->t_ns - a_ns);
 }
 
 int scanhead_pose(struct scanhead *sh, int64_t t_ns, struct scanhead_pose *pose)

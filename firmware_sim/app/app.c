@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "core/newfile.h"
+#include "core/text.h"
 #include "firmware_sim/app/progress.h"
 #include "firmware_sim/base/clock.h"
 
@@ -54,7 +55,9 @@ void app_catch_signals(void)
 
 int app_fail(const struct sh_err *err)
 {
-    fprintf(stderr, "scanhead: %s\n", err->text);
+    struct sh_err line = *err;
+    text_keep_line(line.text); /* a path may have any bytes */
+    fprintf(stderr, "scanhead: %s\n", line.text);
     return err->code == SH_EINPUT ? APP_USAGE : APP_FAILED;
 }
 

@@ -44,7 +44,7 @@ static int find_place(const struct init_run *run, const struct scene *scene, str
     const struct standpoint_view view = {profile->range_min_m, profile->range_max_m,
                                          angle_rad(1e-6 * (double)profile->fov_min_udeg),
                                          angle_rad(1e-6 * (double)profile->fov_max_udeg)};
-    rc = standpoint_find(scene, &view, at, err);
+    rc = standpoint_find(scene, &view, &app_report_stderr, at, err);
     if (rc == SH_OK && at->seen == 0.0)
         rc = sh_fail(err, SH_EINPUT,
                      "%s: no place was found from where a head that sees %g to %g m meets anything: the mesh is %.3g m "
@@ -129,6 +129,21 @@ static int write_checked(const struct init_run *run, const struct init_text *tex
     return rc;
 }
 
+/* As a shell takes it for one operand. */
+static void put_operand(const char *path)
+{
+    static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_./+-";
+    if (path[0] == '-') fputs("./", stdout);
+    if (path[strspn(path, plain)] == '\0') {
+        fputs(path, stdout);
+        return;
+    }
+    putchar('\'');
+    for (const char *p = path; *p != '\0'; p++)
+        fputs(*p == '\'' ? "'\\''" : (const char[2]){*p}, stdout);
+    putchar('\'');
+}
+
 static void say_result(const struct init_run *run, const struct scene *s, const struct standpoint *at)
 {
     char where[128];
@@ -143,7 +158,9 @@ static void say_result(const struct init_run *run, const struct scene *s, const 
     printf("station   %.4f %.4f %.4f m, %s; %.0f %% of the view meets something\n", p[0], p[1], p[2], where,
            100.0 * at->seen);
     if (at->faces_out) puts("          there is room inside, but its faces point outward: taken as a closed body");
-    printf("written   %s; next: scanhead record %s -o scan.ply\n", run->output, run->output);
+    printf("written   %s; next: scanhead record ", run->output);
+    put_operand(run->output);
+    puts(" -o scan.ply");
 }
 
 static int write_config(struct init_run *run, const struct scene *scene, struct sh_err *err)

@@ -71,7 +71,7 @@ static void choose_scale(const struct init_wish *wish, const char *name, const s
 }
 
 /* To metres, z up: what the configuration will do. */
-static void turn(struct scene *scene, const struct init_mesh *as)
+static void turn(struct scene *scene, const struct init_mesh *as, double scale)
 {
     const int y_up = as->up == SCENE_UP_Y;
     const double low[3] = {scene->min_m[0], scene->min_m[1], scene->min_m[2]}, *high = scene->max_m;
@@ -80,11 +80,11 @@ static void turn(struct scene *scene, const struct init_mesh *as)
     for (uint32_t i = 0; i < scene->n_vertices; i++) {
         double *v = scene->vertex_m[i], turned[3] = {v[0], y_up ? -v[2] : v[1], y_up ? v[1] : v[2]};
         for (int k = 0; k < 3; k++)
-            v[k] = turned[k] * as->scale;
+            v[k] = turned[k] * scale;
     }
     for (int k = 0; k < 3; k++) {
-        scene->min_m[k] = min[k] * as->scale;
-        scene->max_m[k] = max[k] * as->scale;
+        scene->min_m[k] = min[k] * scale;
+        scene->max_m[k] = max[k] * scale;
     }
 }
 
@@ -101,13 +101,14 @@ int init_load_mesh(const struct init_wish *wish, const char *name, struct scene 
 {
     const struct sh_report *all = &app_report_stderr;
     const struct sh_report quiet = {.ctx = all->ctx, .progress = all->progress, .stop = all->stop};
-    const struct scene_mesh_spec spec = {.file = wish->file, .up = SCENE_UP_Z, .scale = 1.0};
+    const struct scene_mesh_spec spec = {
+        .file = wish->file, .up = SCENE_UP_Z, .scale = wish->scale > 0.0 ? wish->scale : 1.0};
     struct sh_err why = {0};
     if (access(wish->file, R_OK) != 0) return sh_fail(err, SH_EINPUT, "%s: %s", wish->file, strerror(errno));
     int rc = scene_load(&spec, 1, INFINITY, &quiet, scene, &why);
     if (rc != SH_OK) return fail(&why, rc, err);
     choose_up(wish, name, *scene, mesh);
     choose_scale(wish, name, *scene, mesh);
-    turn(*scene, mesh);
+    turn(*scene, mesh, mesh->scale / spec.scale);
     return SH_OK;
 }

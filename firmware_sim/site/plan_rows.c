@@ -74,7 +74,7 @@ static int is_zero(const struct config_instrument *k)
     return memcmp(k, &zero, sizeof zero) == 0;
 }
 
-/* What vertices are off by, of what stands still and what moves. */
+/* The error of the vertices, of what stands still and of what moves. */
 static double mesh_error_m(const struct site *site)
 {
     double error_m = site->scene->error_m;

@@ -93,8 +93,8 @@ struct site {
     double scale_m;      /* of positions and ranges on the wire, metres per count */
 };
 
-/* Stations further than this from a BVH's origin get a BVH of their own: there a float has steps of 0.06
- * mm. */
+/* Stations further than this from a BVH's origin get a BVH of their own, and so do those further than the
+ * scene's size: there a float has steps of 0.06 mm. */
 #define SITE_BVH_REACH_M 1000.0
 
 /* Room left beyond the head's largest range, for noise. */

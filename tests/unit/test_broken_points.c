@@ -109,6 +109,32 @@ static void test_far_rows(void **state)
     }
 }
 
+/* Two poses whose times are further apart than a signed difference holds: half-way is half-way. */
+static void test_poses_far_apart(void **state)
+{
+    (void)state;
+    static uint8_t out[1024];
+    struct sh_err err = {0};
+    struct native_anchor a = local_anchor();
+    const struct native_pose pose[2] = {{.t_ns = INT64_MIN, .quat = {1, 0, 0, 0}},
+                                        {.t_ns = INT64_MAX, .quat = {1, 0, 0, 0}, .position_m = {0, 10, 0}}};
+    double x, y, z;
+    size_t len;
+    a.moving = NATIVE_MOVING;
+    rig_begin();
+    rig_descriptor(0, 1);
+    rig_anchor(&a);
+    rig_put(out, native_encode_poses(out, sizeof out, pose, 2, 0, 0));
+    rig_points(0, 0, 0, (const struct rig_point[]){{1000, 0, 0, 0, 0, 1, 1}}, 1); /* 1 m ahead, at 0 s */
+    assert_int_equal(rig_record(rig_path("a.ply"), (struct recorder_options){.ascii = 1}, RIG_KEEP, &err), SH_OK);
+    char *text = (char *)rig_read(rig_path("a.ply"), &len), *end = strstr(text, "end_header\n");
+    assert_non_null(end);
+    assert_int_equal(sscanf(end, "end_header %lf %lf %lf", &x, &y, &z), 3);
+    assert_true(x == 0.0 && y == 6.0 && z == 0.0);
+    free(text);
+    unlink(rig_path("a.ply"));
+}
+
 /* So few counts that a turn has less than one. */
 static void test_no_counts(void **state)
 {
@@ -137,6 +163,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_infinite),      cmocka_unit_test(test_infinite_by_pose), cmocka_unit_test(test_long_pose),
         cmocka_unit_test(test_no_scan_angle), cmocka_unit_test(test_far_rows),         cmocka_unit_test(test_no_counts),
+        cmocka_unit_test(test_poses_far_apart),
     };
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
 }

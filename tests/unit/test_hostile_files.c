@@ -2,7 +2,7 @@
  * made huge, records of another type, cut off. Each either gives a scene or one line that says what is wrong; this
  * process neither dies nor hangs, whatever becomes of Assimp's.
  *
- * HOSTILE_EVERY: only every so many of the 600 files are tried (default 10; make test-hostile: 1). */
+ * HOSTILE_EVERY: only every so many of the 600 files are tried (default 1, with sanitizers 10; make test-hostile: 1). */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -23,6 +23,12 @@
 #include "tests/unit/hostile_models.h"
 
 enum { N_FILES = 600, PROCESSES = 2, ROOM = 1 << 18 };
+
+#ifdef SH_SANITIZE
+enum { USUAL_EVERY = 10 };
+#else
+enum { USUAL_EVERY = 1 };
+#endif
 
 /* Figures of a broken model are small; what is honest needs a tenth of that. */
 static const struct scene_import_limits LIMITS = {.memory_mib = 128, .time_s = 2, .files = 16};
@@ -151,8 +157,8 @@ static void change_word(struct file *f, struct draw *d)
 
 static void break_file(struct file *f, uint64_t number)
 {
-    static void (*const ways[])(struct file *f, struct draw *d) = {change_bytes,  delete_part, double_part, cut_off,
-                                                                   change_number, change_word, change_number};
+    static void (*const ways[])(struct file * f, struct draw * d) = {change_bytes,  delete_part, double_part,  cut_off,
+                                                                     change_number, change_word, change_number};
     struct draw d = {rng_key(13, number), 0};
     for (uint64_t i = 1 + below(&d, 8) / 6; i > 0 && f->n > 1; i--) /* mostly one: more is refused at once */
         ways[below(&d, sizeof ways / sizeof ways[0])](f, &d);
@@ -176,8 +182,10 @@ static int judge(int rc, const struct scene *s, const struct sh_err *err, const 
     static const struct {
         const char *says;
         enum outcome outcome;
-    } ends[] = {{"Assimp crashed on it (SIG", DIED}, {"ended without a word", DIED},
-                {"was killed (SIGKILL)", DIED},      {"has not read it within", TIME},
+    } ends[] = {{"Assimp crashed on it (SIG", DIED},
+                {"ended without a word", DIED},
+                {"was killed (SIGKILL)", DIED},
+                {"has not read it within", TIME},
                 {"takes more than", MEMORY}};
     if (rc == SH_OK) return is_whole(s) ? LOADED : -1;
     size_t len = strlen(path);
@@ -249,9 +257,9 @@ static void broken_files(void **state)
 {
     (void)state;
     const char *text = getenv("HOSTILE_EVERY");
-    unsigned every = text != NULL && atoi(text) > 0 ? (unsigned)atoi(text) : 10, wrong = 0;
-    struct tally *tally = mmap(NULL, PROCESSES * sizeof *tally, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS,
-                               -1, 0);
+    unsigned every = text != NULL && atoi(text) > 0 ? (unsigned)atoi(text) : USUAL_EVERY, wrong = 0;
+    struct tally *tally =
+        mmap(NULL, PROCESSES * sizeof *tally, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
     pid_t pid[PROCESSES];
     int status;
     assert_true(tally != MAP_FAILED);

@@ -41,7 +41,8 @@ static struct scene *small_scene(void)
     s->surface = calloc(2, sizeof *s->surface);
     s->texture = calloc(1, sizeof *s->texture);
     assert_true(s->surface != NULL && s->texture != NULL);
-    s->surface[0] = (struct scene_surface){"wall", "paint", {0.5f, 0.25f, 1.0f}, .has_colour = 1, .texture = 1, .solid = 0.5f};
+    s->surface[0] =
+        (struct scene_surface){"wall", "paint", {0.5f, 0.25f, 1.0f}, .has_colour = 1, .texture = 1, .solid = 0.5f};
     s->surface[1] = (struct scene_surface){.object = "floor"};
     s->texture[0] = (struct scene_texture){.file = strdup("some/a.dae*0"), .bytes = copy_of("pixels", 6), .n_bytes = 6};
     s->counts.zero_area = 3;
@@ -174,7 +175,8 @@ static void names_have_an_end(void **state)
     assert_non_null(name);
     memset(name, 'a', SCENE_NAME_LEN);
     assert_int_equal(read_result(bytes, n, &b, &err), SH_EINPUT);
-    assert_string_equal(err.text, "some/a.dae: what Assimp gave back makes no sense: a name of surface 1; the file is broken");
+    assert_string_equal(err.text,
+                        "some/a.dae: what Assimp gave back makes no sense: a name of surface 1; the file is broken");
     build_release(&b);
 }
 
@@ -219,6 +221,26 @@ static void hang_ends_in_time(void **state)
     if (strstr(err.text, "endless.gltf: Assimp has not read it within 0.15 s (scene.import_s)") == NULL)
         fail_msg("%s", err.text);
     no_child_is_left();
+}
+
+/* As a program may be started: then there is no status of the child, and what it wrote counts. */
+static void signal_of_children_may_be_ignored(void **state)
+{
+    (void)state;
+    static const char text[] = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
+                               "endloop\nendfacet\nendsolid a\n";
+    const struct scene_mesh_spec good = {.file = write_text("a.stl", text), .scale = 1};
+    struct scene *s;
+    struct sh_err err = {0};
+    void (*was)(int) = signal(SIGCHLD, SIG_IGN);
+    if (load_spec(&good, 1e-3, &s, &err) != SH_OK) fail_msg("%s", err.text);
+    assert_int_equal(s->n_triangles, 1);
+    scene_free(s);
+    const struct scene_mesh_spec broken = {.file = write_text("a.stl", "solid a\nfacet"), .scale = 1};
+    assert_int_equal(load_spec(&broken, 1e-3, &s, &err), SH_EINPUT);
+    assert_null(strstr(err.text, "makes no sense")); /* what the child said */
+    signal(SIGCHLD, was);
+    unlink(path);
 }
 
 /* Assimp 5.2 goes on at the word that is no number, and keeps an index each time. */
@@ -378,6 +400,7 @@ int main(void)
         cmocka_unit_test(names_have_an_end),        cmocka_unit_test(hang_ends_in_time),
         cmocka_unit_test(memory_is_limited),        cmocka_unit_test(crash_is_one_line),
         cmocka_unit_test(child_has_limits),         cmocka_unit_test(child_dies_with_its_parent),
+        cmocka_unit_test(signal_of_children_may_be_ignored),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

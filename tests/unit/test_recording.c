@@ -26,6 +26,7 @@ enum deed {
     ENDS,     /* the scan, with the same counts */
     IDLE,     /* is asked its state, and says so */
     SCANNING, /* likewise */
+    FAR,      /* a scan begins, and a time goes back by all that 64 bits hold */
     UNPLUGGED /* and plugged in again */
 };
 
@@ -80,6 +81,15 @@ static void send_pulse(void)
     send_frame(frame, native_encode_points(frame, sizeof frame, &block, 0));
 }
 
+static void send_far(void)
+{
+    uint8_t frame[256];
+    struct native_event start = {.code = NATIVE_EV_SCAN_START, .a = 3, .b = 1};
+    struct native_telemetry t = {.state = HEAD_SCANNING, .scan = 3};
+    send_frame(frame, native_encode_event(frame, sizeof frame, &start, 0, 0));
+    send_frame(frame, native_encode_telemetry(frame, sizeof frame, &t, INT64_MIN, 0));
+}
+
 static void answer(const char *state)
 {
     char line[64];
@@ -105,6 +115,7 @@ static void *play(void *arg)
         }
         if (*deed == TELLS) send_telemetry(HEAD_IDLE);
         if (*deed == ENDS) send_end();
+        if (*deed == FAR) send_far();
         if (*deed == UNPLUGGED) {
             close(head.fd);
             head.fd = accept(head.listener, NULL, NULL);
@@ -250,12 +261,23 @@ static void test_broken_once_more_after_a_lost_end(void **state)
     assert_int_equal(result.broken_scans, 2);
 }
 
+/* A hostile stream's: the sanitizer sees a difference that does not fit. */
+static void test_times_far_apart(void **state)
+{
+    (void)state;
+    static const enum deed script[] = {FAR, PULSES, END};
+    struct recording_result result;
+    record(script, &result);
+    assert_int_equal(result.counts.pulses, 1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_unplugged_within_a_scan),    cmocka_unit_test(test_unplugged_after_a_lost_end),
         cmocka_unit_test(test_telemetry_after_a_lost_end), cmocka_unit_test(test_joined_within_a_scan),
         cmocka_unit_test(test_an_end_after_telemetry),     cmocka_unit_test(test_broken_once_more_after_a_lost_end),
+        cmocka_unit_test(test_times_far_apart),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

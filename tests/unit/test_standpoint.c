@@ -73,7 +73,7 @@ static void find(void)
     const struct scene_arrays arrays = {
         (const double(*)[3])vertex_m, n_vertices, (const uint32_t(*)[3])triangle, n_triangles, NULL, NULL, 0};
     int rc = scene_from_arrays(&arrays, &scene, &err);
-    if (rc == SH_OK) rc = standpoint_find(scene, &VIEW, &at, &err);
+    if (rc == SH_OK) rc = standpoint_find(scene, &VIEW, NULL, &at, &err);
     if (rc != SH_OK) fail_msg("%s", err.text);
     scene_free(scene);
 }
@@ -196,12 +196,33 @@ static void between_houses(void **state)
     assert_near(at.position_m[2], 1.6, 1e-6);
 }
 
+static int stop(void *ctx)
+{
+    (void)ctx;
+    return 1;
+}
+
+static void the_search_can_be_stopped(void **state)
+{
+    (void)state;
+    static const struct sh_report report = {.stop = stop};
+    struct scene *scene = NULL;
+    struct sh_err err;
+    clear();
+    add_box((const double[3]){-4, 2, 1}, (const double[3]){4, 8, 4}, 1);
+    const struct scene_arrays arrays = {
+        (const double(*)[3])vertex_m, n_vertices, (const uint32_t(*)[3])triangle, n_triangles, NULL, NULL, 0};
+    assert_int_equal(scene_from_arrays(&arrays, &scene, &err), SH_OK);
+    assert_int_equal(standpoint_find(scene, &VIEW, &report, &at, &err), SH_ESTOPPED);
+    scene_free(scene);
+}
+
 static void a_view_without_room_is_refused(void **state)
 {
     (void)state;
     struct sh_err err;
     const struct standpoint_view none = {5, 5, 0, 1};
-    assert_int_equal(standpoint_find(NULL, &none, &at, &err), SH_EINPUT);
+    assert_int_equal(standpoint_find(NULL, &none, NULL, &at, &err), SH_EINPUT);
 }
 
 int main(void)
@@ -214,6 +235,7 @@ int main(void)
         cmocka_unit_test(a_plate_is_looked_at_from_its_side),
         cmocka_unit_test(land_is_stood_on),
         cmocka_unit_test(between_houses),
+        cmocka_unit_test(the_search_can_be_stopped),
         cmocka_unit_test(a_view_without_room_is_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

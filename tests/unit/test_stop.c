@@ -5,6 +5,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,6 +18,7 @@
 #include "core/embree.h"
 #include "core/footprint.h"
 #include "core/pose.h"
+#include "core/scene/triangulate.h"
 #include "tests/common/generate.h"
 
 enum { TRIANGLES = 4000, MANY = 200000 };
@@ -106,12 +108,30 @@ static int follow_way(const struct sh_report *report, struct sh_err *err)
     return rc;
 }
 
+/* One polygon of very many corners, zigzag: its ears are looked for all over it. */
+static int cut_polygon(const struct sh_report *report, struct sh_err *err)
+{
+    enum { CORNERS = 4096 };
+    struct triangulate t = {.report = report};
+    assert_int_equal(triangulate_reserve(&t, CORNERS), SH_OK);
+    for (uint32_t i = 0; i < CORNERS; i++) {
+        const double angle = 2.0 * M_PI * i / CORNERS, r = i % 2 != 0 ? 1.0 : 0.5;
+        t.at[i].p[0] = r * cos(angle);
+        t.at[i].p[1] = r * sin(angle);
+        t.at[i].p[2] = 0.0;
+    }
+    triangulate_polygon(&t, CORNERS);
+    int rc = t.stopped ? sh_fail_stopped(err) : SH_OK;
+    triangulate_free(&t);
+    return rc;
+}
+
 /* How often each asks when nobody stops it is counted first; then it is stopped at its first call and at one halfway. */
 static void work_is_ended(void **state)
 {
     (void)state;
     static int (*const works[])(const struct sh_report *report, struct sh_err *err) = {build_bvh, order, find_outlines,
-                                                                                       follow_way};
+                                                                                       follow_way, cut_polygon};
     for (size_t i = 0; i < sizeof works / sizeof works[0]; i++) {
         struct sh_err err;
         struct asked asked = {0};

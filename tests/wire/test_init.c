@@ -107,6 +107,25 @@ static void unit_and_axes_can_be_given(void **state)
     contains(out, "size      16 x 12 x 6 m");
     contains(out, "unit      0.002 m, given by --scale");
     assert_int_equal(RUN(wire, "check", "twice.yaml"), 0);
+    write_room(wire, "nm.obj", 1e9, 0); /* in metres it would be larger than a scene may be */
+    assert_int_equal(RUN(wire, "init", "nm.obj"), 2);
+    contains(text, "is the scale of 1 metres per unit right?");
+    assert_int_equal(RUN(wire, "init", "nm.obj", "--up", "z", "--scale", "1e-9"), 0);
+    contains(out, "size      8 x 6 x 3 m");
+    forget();
+}
+
+/* The command that comes next can be pasted into a shell; an error is one line. */
+static void names_may_have_any_bytes(void **state)
+{
+    struct wire *wire = *state;
+    write_room(wire, "it's a r\xc3\xb6\xc3\xb6m.obj", 1, 0);
+    assert_int_equal(RUN(wire, "init", "it's a r\xc3\xb6\xc3\xb6m.obj"), 0);
+    contains(out, "next: scanhead record 'it'\\''s a r\xc3\xb6\xc3\xb6m.yaml' -o scan.ply\n");
+    write_room(wire, "two\nlines.obj", 1, 0);
+    assert_int_equal(RUN(wire, "init", "two\nlines.obj", "--up", "z", "--scale", "1"), 2);
+    contains(text, "two?lines.");
+    assert_ptr_equal(strchr(text, '\n'), text + strlen(text) - 1);
     forget();
 }
 
@@ -214,6 +233,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(a_mesh_becomes_a_scan, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(unit_and_axes_can_be_given, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(names_may_have_any_bytes, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(the_path_of_the_mesh_starts_at_the_configuration, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(what_is_there_stays, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(wrong_use_says_what_is_allowed, wire_setup, wire_teardown),

@@ -1,0 +1,180 @@
+/* Options and help of each command. What is wrong has exit status 2 and one line of error, which says what was
+ * meant. */
+#include "tests/wire/room.h"
+#include "tests/wire/usage_rig.h"
+
+#include <sys/resource.h>
+
+static const char JOURNAL[] = "# scanhead journal 1\n0 0 1 *RST\n";
+
+/* ---- options. CONFIG stands for a good configuration, DIR for the folder. */
+
+static const struct {
+    const char *args[8];
+    const char *says[3];
+} OPTIONS[] = {
+    {{"fly"}, {"unknown command fly;", "--help"}},
+    {{"recrod", "CONFIG"}, {"unknown command recrod, did you mean record?"}},
+    {{"run"}, {"one CONFIG"}},
+    {{"run", "CONFIG", "CONFIG"}, {"one CONFIG is needed, and 2 are given", "config.yaml, ", "config.yaml; see"}},
+    {{"run", "--", "CONFIG", "--start"}, {"one CONFIG is needed, and 2 are given", "--start"}},
+    {{"report", "CONFIG", "DIR/x.ply", "DIR/y.ply"}, {"y.ply is one too many"}},
+    {{"run", "DIR/scan.shs"}, {"scan.shs is a recorded stream", "scanhead record ", "scan.shs -o points.ply"}},
+    {{"check", "DIR/SCAN.SHS"}, {"SCAN.SHS is a recorded stream"}},
+    {{"plan", "DIR/room.obj"}, {"room.obj is a mesh", "scanhead init ", "room.obj writes a configuration"}},
+    {{"record", "DIR/room.ifc", "-o", "DIR/x.ply"}, {"room.ifc is a mesh, and SOURCE is a head", "scanhead init "}},
+    {{"report", "DIR/x.ply", "CONFIG"}, {"x.ply is a mesh or a point cloud, and CONFIG is a configuration"}},
+    {{"check", "DIR/x.las"}, {"x.las is a recording", "scanhead report CONFIG "}},
+    {{"run", "CONFIG", "-start"}, {"-start: did you mean --start?"}},
+    {{"run", "CONFIG", "-stats=x"}, {"-stats=x: did you mean --stats?"}},
+    {{"run", "CONFIG", "--strat"}, {"unknown option --strat, did you mean --start?"}},
+    {{"run", "CONFIG", "--thread=2", "--durations", "2"}, {"unknown option --durations, did you mean --duration?"}},
+    {{"run", "CONFIG", "--start=1"}, {"--start=1: the option takes no value"}},
+    {{"record", "CONFIG", "-out", "DIR/x.ply"}, {"-out: did you mean --output FILE, or -o FILE?"}},
+    {{"record", "-out", "DIR/x.ply", "CONFIG"}, {"-out: did you mean --output FILE, or -o FILE?"}},
+    {{"record", "CONFIG", "-o", "DIR/x.ply", "-station", "2"}, {"-station: did you mean --station?"}},
+    {{"run", "DIR/none.yaml"}, {"none.yaml", "No such file"}},
+    {{"run", "DIR"}, {"irectory"}},
+    {{"run", "DIR/fifo"}, {"fifo: cannot be opened: a FIFO, not a file"}},
+    {{"run", "CONFIG", "--replay-journal", "DIR/fifo"}, {"fifo: a FIFO, not a file"}},
+    {{"run", "CONFIG", "--replay-journal", "/dev/zero"}, {"/dev/zero: a device, not a file"}},
+    {{"run", "CONFIG", "--journal", "DIR/journal", "--replay-journal", "DIR/./journal"}, {"--journal ", "overwrite"}},
+    {{"run", "CONFIG", "--journal", "DIR/link", "--replay-journal", "DIR/journal"}, {"--journal ", "overwrite"}},
+    {{"check", "CONFIG", "--set", "platform.kind=trajectory", "--set", "platform.file=DIR/fifo"},
+     {"fifo: a FIFO, not a file"}},
+    {{"record", "DIR/fifo.shs", "-o", "DIR/x.ply"}, {"fifo.shs: is a FIFO, not a recorded stream"}},
+    {{"report", "CONFIG", "DIR/fifo"}, {"fifo: a FIFO, not a file"}},
+    {{"check", "--help", "haed"}, {"no section \"haed\", did you mean head?", "scene, stations", "profile"}},
+    {{"run", "CONFIG", "--fast"}, {"--fast", "run --help"}},
+    {{"run", "CONFIG", "--pace"}, {"--pace", "needs a value"}},
+    {{"run", "CONFIG", "--pace", "foo"}, {"loop.pace", "realtime", "step"}},
+    {{"run", "CONFIG", "--threads", "x"}, {"loop.threads", "0 to 64"}},
+    {{"run", "CONFIG", "--threads", "-1"}, {"loop.threads", "0 to 64"}},
+    {{"run", "CONFIG", "--threads", "2x"}, {"loop.threads", "0 to 64"}},
+    {{"run", "CONFIG", "--duration", "-1"}, {"--duration -1", "0.001"}},
+    {{"run", "CONFIG", "--duration", "nan"}, {"--duration nan"}},
+    {{"run", "CONFIG", "--duration", "5s"}, {"--duration 5s"}},
+    {{"run", "CONFIG", "--duration", ""}, {"--duration"}},
+    {{"run", "CONFIG", "--frames", "many"}, {"head.frames", "0 to 1000000"}},
+    {{"run", "CONFIG", "--ready-fd", "zero"}, {"--ready-fd zero", "1 to 65535"}},
+    {{"run", "CONFIG", "--quiet", "--ready-fd", "77"}, {"--ready-fd 77"}},
+    {{"run", "CONFIG", "--set", "head.prr_hz"}, {"--set", "head.prr_hz"}},
+    {{"run", "CONFIG", "--set", "head.prr_hz=fast"}, {"--set head.prr_hz", "not a number", "1000 to 2200000 Hz"}},
+    {{"run", "CONFIG", "--set", "head.colour=red"}, {"--set", "head.colour"}},
+    {{"run", "CONFIG", "--set", "links[3].type=tcp"}, {"links[3]"}},
+    {{"run", "CONFIG", "--set", "links=[]"}, {"links"}},
+    {{"run", "CONFIG", "--replay-journal", "DIR/none"}, {"none", "No such file"}},
+    {{"run", "CONFIG", "--replay-journal", "CONFIG"}, {"config.yaml:1", "journal"}},
+    {{"check"}, {"one CONFIG"}},
+    {{"check", "CONFIG", "--pace", "fast"}, {"--pace"}},
+    {{"report", "CONFIG"}, {"one CONFIG and one CLOUD", "report --help"}},
+    {{"report", "CONFIG", "DIR/x.ply", "--max-m", "0"}, {"--max-m 0", "1000000000"}},
+    {{"report", "CONFIG", "DIR/x.ply", "--json=1"}, {"--json=1: the option takes no value"}},
+    {{"map", "CONFIG", "-o", "DIR/x.png", "--pixel-m", "1m"}, {"--pixel-m 1m", "0.0001 to 10000"}},
+    {{"record", "CONFIG", "-o", "DIR/x.ply", "--frames", "1.5"}, {"--frames 1.5", "whole number from 0"}},
+    {{"record", "CONFIG"}, {"-o FILE"}},
+    {{"record", "-o", "DIR/x.ply"}, {"one SOURCE"}},
+    {{"record", "CONFIG", "-o", "DIR/x.xyz"}, {"x.xyz", ".ply"}},
+    {{"record", "CONFIG", "-o"}, {"-o", "needs a value"}},
+    {{"record", "CONFIG", "-o", "DIR/x.ply", "--station", "0"}, {"--station 0", "1"}},
+    {{"record", "CONFIG", "-o", "DIR/x.ply", "--frames", "0"}, {"head.frames", "--duration"}},
+    {{"record", "CONFIG", "-o", "DIR/x.ply", "--crs", "moon"}, {"output.crs", "utm"}},
+    {{"record", "tcp:localhost", "-o", "DIR/x.ply"}, {"tcp:localhost", "PORT"}},
+    {{"record", "DIR/none.shs", "-o", "DIR/x.ply"}, {"none.shs", "No such file"}},
+    {{"record", "tty:/dev/null", "-o", "DIR/x.ply"}, {"/dev/null", "terminal"}},
+    {{"record", "tcp:localhost:1", "--set", "a=b", "-o", "DIR/x.ply"}, {"--set", "CONFIG"}},
+    {{"record", "CONFIG", "-o", "DIR/x.las", "--las-version", "1.3"}, {"--las-version 1.3", "1.2, 1.4"}},
+    {{"record", "CONFIG", "-o", "DIR/x.ply", "--colour", "red"}, {"--colour red", "reflectance, label"}},
+    {{"record", "CONFIG", "-o", "DIR/x.ply", "--ply-names", "x"}, {"--ply-names x", "scanhead, cloudcompare"}},
+    {{"map", "CONFIG"}, {"-o"}},
+    {{"list", "all"}, {"no arguments"}},
+};
+
+/* The word with CONFIG and DIR replaced. */
+static const char *fill_in(const struct wire *wire, const char *word, char *buf, size_t len)
+{
+    const char *dir = strstr(word, "DIR");
+    if (strcmp(word, "CONFIG") == 0)
+        snprintf(buf, len, "%s", wire_path(wire, "config.yaml"));
+    else if (dir != NULL)
+        snprintf(buf, len, "%.*s%s%s", (int)(dir - word), word, wire->dir, dir + 3);
+    else
+        return word;
+    return buf;
+}
+
+static void test_options(void **state)
+{
+    struct wire *wire = *state;
+    usage_complaints = 0;
+    room_write(wire);
+    wire_write_text(wire, "config.yaml", USAGE_GOOD);
+    wire_write_text(wire, "journal", JOURNAL);
+    assert_int_equal(symlink("journal", wire_path(wire, "link")), 0);
+    assert_int_equal(mkfifo(wire_path(wire, "fifo"), 0600), 0);
+    assert_int_equal(mkfifo(wire_path(wire, "fifo.shs"), 0600), 0);
+    for (size_t i = 0; i < sizeof OPTIONS / sizeof OPTIONS[0]; i++) {
+        char word[8][352], what[128] = "";
+        const char *args[9] = {0};
+        for (int k = 0; k < 8 && OPTIONS[i].args[k] != NULL; k++) {
+            args[k] = fill_in(wire, OPTIONS[i].args[k], word[k], sizeof word[k]);
+            snprintf(what + strlen(what), sizeof what - strlen(what), "%s ", OPTIONS[i].args[k]);
+        }
+        const char *const says[] = {OPTIONS[i].says[0], OPTIONS[i].says[1],
+                                    OPTIONS[i].says[1] ? OPTIONS[i].says[2] : NULL, NULL};
+        usage_expect(wire, what, args, 2, says);
+    }
+    char *journal = wire_read(wire_path(wire, "journal"), NULL);
+    assert_string_equal(journal, JOURNAL);
+    free(journal);
+    assert_int_equal(usage_complaints, 0);
+}
+
+/* ---- help */
+
+/* -h and --help of a command, on standard output: what it does, the usage, lines of at most 110 columns.
+ * Those of check end where the keys begin. */
+static void expect_help(struct wire *wire, const char *name, const char *option)
+{
+    char want[128];
+    int status = wire_wait(wire, wire_spawn(wire, (const char *const[]){name, option, NULL}, "out", "err", -1));
+    char *out = wire_read(wire_path(wire, "out"), NULL), *err = wire_read(wire_path(wire, "err"), NULL);
+    if (status != 0 || err[0] != '\0') usage_complain("# %s %s: status %d: %s", name, option, status, err);
+    snprintf(want, sizeof want, "scanhead %s: ", name);
+    if (strncmp(out, want, strlen(want)) != 0) usage_complain("# %s %s: begins with %.40s", name, option, out);
+    snprintf(want, sizeof want, "\n\nusage: scanhead %s", name);
+    if (strstr(out, want) == NULL) usage_complain("# %s %s: no usage", name, option);
+    if (strstr(out, "  -h, --help ") == NULL) usage_complain("# %s %s: no --help in it", name, option);
+    char *keys = strstr(out, "Configuration keys:");
+    if (keys != NULL) *keys = '\0';
+    for (char *at = strtok(out, "\n"); at != NULL; at = strtok(NULL, "\n"))
+        if (strlen(at) > 110) usage_complain("# %s %s: %zu columns: %s", name, option, strlen(at), at);
+    free(out);
+    free(err);
+}
+
+static void test_help(void **state)
+{
+    struct wire *wire = *state;
+    int n = 0;
+    usage_complaints = 0;
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, (const char *const[]){"--help", NULL}, "all", "err", -1)), 0);
+    char *all = wire_read(wire_path(wire, "all"), NULL), name[16];
+    for (const char *at = all; (at = strstr(at, "\n  scanhead ")) != NULL; at++, n++) {
+        assert_int_equal(sscanf(at, " scanhead %15s", name), 1);
+        expect_help(wire, name, "--help");
+        expect_help(wire, name, "-h");
+    }
+    free(all);
+    assert_true(n >= 7);
+    assert_int_equal(usage_complaints, 0);
+}
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_options, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_help, wire_setup, wire_teardown),
+    };
+    setrlimit(RLIMIT_CORE, &(struct rlimit){0, 0});
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
