@@ -18,7 +18,7 @@ enum {
     PLAIN_EVERY = 8,    /* one of so many */
     PROBE_RINGS = 4,
     OPTICS_DRAWN = 8192,
-    TRIES = 1 << 20, /* for each pulse: where the field of view is narrow, most are not cast */
+    TRIES = 1 << 23, /* in all, a second or two: where the field of view is narrow, most are not cast */
     ROOM = 64,       /* in the block; more than LINE_MAX_ECHOES */
 };
 
@@ -41,7 +41,8 @@ struct plan_sample {
     const struct sh_report *report;
     struct caster *caster;
     struct line_block block;
-    uint64_t key, tries;
+    uint64_t key, tries, found; /* of the tries: within the field of view */
+    int tries_ended;
     struct look *look; /* of the beam */
     uint32_t n_looks;
     uint64_t drawn, plain, mixed_looks, plain_looks;
@@ -78,18 +79,33 @@ void plan_sample_free(struct plan_sample *s)
     free(s);
 }
 
+static void say_tries_ended(struct plan_sample *s)
+{
+    if (s->tries_ended) return;
+    s->tries_ended = 1;
+    sh_warn(
+        s->report,
+        "the plan drew %d pulses, and only %llu of them lie within the field of view: its bounds are wider for that",
+        TRIES, (unsigned long long)s->found);
+}
+
 /* The next pulse by chance that is cast. Returns 0 where none is found. */
 static int draw(struct plan_sample *s, struct look *look)
 {
-    for (int i = 0; i < TRIES && !sh_stopped(s->report); i++) {
+    while (s->tries < TRIES) {
         uint64_t number = s->tries++;
+        if ((number & 0xfff) == 0 && sh_stopped(s->report)) return 0;
         look->place = (uint32_t)(number % s->n_places);
         const struct plan_place *p = &s->place[look->place];
         struct schedule_line line;
         look->pulse = p->segment.k0 + rng_u64(s->key, number) % p->pulses;
         schedule_get_line(&p->segment, schedule_line_of(&p->segment, look->pulse), &line);
-        if (line.cast0 <= look->pulse && look->pulse < line.cast_end) return 1;
+        if (line.cast0 <= look->pulse && look->pulse < line.cast_end) {
+            s->found++;
+            return 1;
+        }
     }
+    say_tries_ended(s);
     return 0;
 }
 

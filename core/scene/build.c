@@ -191,7 +191,8 @@ static double two_digits_up(double x)
 
 int build_single(struct scene_build *b, double largest, double error, bool refuse, struct sh_err *err)
 {
-    const double most_m = 1.0; /* of the tolerance */
+    const double most_m = 1.0;    /* of the tolerance */
+    const double coarse_m = 1e-3; /* from here on a scan shows it */
     double error_m = error * b->spec->scale;
     char set[48] = "";
     if (!(error_m > 0.0)) return SH_OK;
@@ -206,8 +207,8 @@ int build_single(struct scene_build *b, double largest, double error, bool refus
     }
     b->scene->error_m = fmax(b->scene->error_m, error_m);
     if (error_m > 1e-6)
-        sh_warn(b->report, "%s: in single precision, so good to %.2g m only: coordinates go up to %.9g", b->name,
-                error_m, largest);
+        sh_warn(b->report, "%s: in single precision, so good to %.2g m only: coordinates go up to %.9g%s", b->name,
+                error_m, largest, error_m > coarse_m ? "; move it near its origin, then export it again" : "");
     return SH_OK;
 }
 

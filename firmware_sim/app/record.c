@@ -262,6 +262,18 @@ static int take_las_version(void *values, const char *text)
     return status;
 }
 
+/* An option that is for none of the files is a mistake. */
+static int check_options(const struct record *r)
+{
+    const struct recorder_options *o = &r->files.recorder;
+    const int ply = record_files_have(&r->files, ".ply"), las = record_files_have(&r->files, ".las");
+    const char *option = o->scalar_names && !ply                    ? "--ply-names: no .ply"
+                         : o->las_minor != 0 && !las                ? "--las-version: no .las"
+                         : o->colour != COLOUR_NONE && !ply && !las ? "--colour: no .ply or .las"
+                                                                    : NULL;
+    return option == NULL ? APP_OK : app_usage(&app_record, "%s is among the files", option);
+}
+
 static int run(int argc, char **argv)
 {
     struct sh_err err = {0};
@@ -269,6 +281,7 @@ static int run(int argc, char **argv)
     int status = app_parse(&app_record, argc, argv, &r.in, &r);
     if (status != APP_GO_ON) return status;
     if (r.files.n == 0 && r.stats == NULL) return app_usage(&app_record, "-o FILE is needed");
+    if (check_options(&r) != APP_OK) return APP_USAGE;
     r.source = r.in.operand[0];
     r.recording.progress = !r.quiet;
     if (r.station > 0) r.recording.first_station = r.recording.last_station = (uint32_t)r.station;

@@ -15,6 +15,13 @@ int record_files_add(struct record_files *files, const char *path, struct sh_err
     return SH_OK;
 }
 
+int record_files_have(const struct record_files *files, const char *ending)
+{
+    for (int i = 0; i < files->n; i++)
+        if (strcmp(files->file[i].ops->ending, ending) == 0) return 1;
+    return 0;
+}
+
 int record_files_check_degrees(const struct record_files *files, struct sh_err *err)
 {
     for (int i = 0; i < files->n; i++)
@@ -42,6 +49,7 @@ int record_files_open(struct record_files *files, struct sh_err *err)
 {
     int rc = SH_OK;
     files->part++;
+    files->recorder.padding = &files->padding;
     files->has_points = 0;
     for (int i = 0; i < files->n && rc == SH_OK; i++)
         rc = open_file(files, &files->file[i], err);

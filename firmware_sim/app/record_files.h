@@ -12,6 +12,7 @@ struct record_files {
     int split; /* each scan to files of its own: NAME-1.ply, NAME-2.ply, ... */
     struct recorder_options recorder;
     /* inner state */
+    struct recorder_padding padding; /* in all parts */
     struct record_file {
         const char *path;
         const struct recorder_ops *ops;
@@ -24,6 +25,8 @@ struct record_files {
 
 /* SH_EINPUT: more than RECORD_MAX_FILES, a path twice, an ending without a recorder. path must live on. */
 int record_files_add(struct record_files *files, const char *path, struct sh_err *err);
+/* Whether one of them has that ending, as recorders name it. */
+int record_files_have(const struct record_files *files, const char *ending);
 /* For a stream of geodetic coordinates: SH_EINPUT where a file can hold only metres. */
 int record_files_check_degrees(const struct record_files *files, struct sh_err *err);
 int record_files_open(struct record_files *files, struct sh_err *err);

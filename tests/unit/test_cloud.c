@@ -161,7 +161,8 @@ static void malformed_files_are_refused(void **state)
         const char *text, *expected;
     } table[] = {
         {"", "not a PLY file"},
-        {"solid ply", "not a PLY file"},
+        {"solid ply", "not a PLY file and not a LAS file"},
+        {"ply2\n", "not a PLY file: the first line"},
         {TEXT, "ends within the header"},
         {TEXT "element face 0\nproperty list uchar int vertex_indices\nend_header\n", "no element vertex"},
         {TEXT "element vertex 1\nproperty float x\nproperty float y\nend_header\n1 2\n",

@@ -101,6 +101,30 @@ static void float_columns_of_ply_are_told(void **state)
     check_accepted("hall.ply", "  tolerance_m: 1e-9\n", ""); /* what is done is done: never refused */
 }
 
+/* A millimetre shows in a scan: then the warning says what to do. */
+static void a_coarse_mesh_is_to_be_moved(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *file, *x;
+        int coarse;
+    } at[] = {{"hall.stl", "5000", 0}, {"hall.stl", "391437", 1}};
+    for (int i = 0; i < 2; i++) {
+        char stl[256];
+        struct scene *scene;
+        struct sh_err err;
+        snprintf(stl, sizeof stl,
+                 "solid s\nfacet normal 0 0 1\nouter loop\nvertex %s 0 0\nvertex %s 9 0\nvertex 0 9 0\nendloop\n"
+                 "endfacet\nendsolid s\n",
+                 at[i].x, at[i].x);
+        const struct scene_mesh_spec spec = {.file = write_text(at[i].file, stl), .scale = 1};
+        if (load_spec(&spec, 1.0, &scene, &err) != SH_OK) fail_msg("%s", err.text);
+        assert_int_equal(n_warnings, 1);
+        assert_int_equal(strstr(warnings, "export it again") != NULL, at[i].coarse);
+        scene_free(scene);
+    }
+}
+
 /* Corners at 0 and 1, made 100 times larger and then 100 times smaller: in units of 6e-8 the corner is off
  * by 1, then by 100 and 100 for the factor, then by 2 and 1 for the other factor. That they were at 100 is
  * no error. */
@@ -128,6 +152,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(as_much_as_the_format_holds_is_allowed), cmocka_unit_test(a_refusal_names_key_and_figure),
-        cmocka_unit_test(an_error_is_scaled_as_the_mesh_is), cmocka_unit_test(float_columns_of_ply_are_told)};
+        cmocka_unit_test(an_error_is_scaled_as_the_mesh_is), cmocka_unit_test(float_columns_of_ply_are_told),
+        cmocka_unit_test(a_coarse_mesh_is_to_be_moved)};
     return cmocka_run_group_tests(tests, make_folder, remove_files);
 }

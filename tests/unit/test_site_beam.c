@@ -72,6 +72,29 @@ static void ghosts_have_names(void **state)
     site_free(site);
 }
 
+static int n_bounds;
+
+static void count_bounds(void *ctx, const char *text)
+{
+    (void)ctx;
+    n_bounds += strstr(text, "the plan drew 8388608 pulses") != NULL;
+}
+
+/* Of 300,000 pulses a second a hundred are cast: the search for them ends, and says so. */
+static void the_search_for_pulses_is_bounded(void **state)
+{
+    (void)state;
+    static struct config cfg;
+    const struct sh_report report = {.warn = count_bounds};
+    struct site *site;
+    struct sh_err err;
+    const char *head = "riegl-vz400i, prr_hz: 300000, lines_hz: 100, line_start_deg: 30, line_stop_deg: 30.000001";
+    if (load(head, "beam: {mode: auto}\n", &cfg, &err) != SH_OK || site_load(&cfg, &report, &site, &err) != SH_OK)
+        fail_msg("%s", err.text);
+    assert_int_equal(n_bounds, 1);
+    site_free(site);
+}
+
 /* A profile like that of the VZ-400i, with another pulse width. */
 static void write_head(const char *width)
 {
@@ -116,6 +139,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(ghosts_have_names),
+        cmocka_unit_test(the_search_for_pulses_is_bounded),
         cmocka_unit_test(footprints_need_a_pulse_width),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

@@ -86,6 +86,9 @@ static const struct {
     {{"record", "CONFIG", "-o", "DIR/x.las", "--las-version", "1.3"}, {"--las-version 1.3", "1.2, 1.4"}},
     {{"record", "CONFIG", "-o", "DIR/x.ply", "--colour", "red"}, {"--colour red", "reflectance, label"}},
     {{"record", "CONFIG", "-o", "DIR/x.ply", "--ply-names", "x"}, {"--ply-names x", "scanhead, cloudcompare"}},
+    {{"record", "CONFIG", "-o", "DIR/x.e57", "--ply-names", "cloudcompare"}, {"--ply-names: no .ply"}},
+    {{"record", "CONFIG", "-o", "DIR/x.ply", "--las-version", "1.2"}, {"--las-version: no .las"}},
+    {{"record", "CONFIG", "-o", "DIR/x.ptx", "--colour", "label"}, {"--colour: no .ply or .las"}},
     {{"map", "CONFIG"}, {"-o"}},
     {{"list", "all"}, {"no arguments"}},
 };
