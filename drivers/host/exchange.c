@@ -154,7 +154,7 @@ static int settle(struct scanhead *sh, int64_t deadline_ns)
 static void give_up(struct host_source *source, const char *command)
 {
     source->unsettled = 1;
-    source->asked += strcasecmp(command, "*IDN?") == 0;
+    source->asked += strncasecmp(command + strspn(command, " :"), "*IDN?", 5) == 0;
 }
 
 int scanhead_command(struct scanhead *sh, const char *command, char *reply, size_t reply_len, int timeout_ms)

@@ -112,6 +112,11 @@ static void test_command_refused(void **state)
         .fd = head, .expect = "HEAD:PRR?", .identity = "999\r\nMaker,Model,SN1,1.0\r\n", .reply = "12345678\r\n"};
     assert_int_equal(run_command(sh, &s, reply, sizeof reply), 0);
     assert_string_equal(reply, "12345678");
+    assert_int_equal(scanhead_command(sh, ":*idn?", reply, sizeof reply, 1), SCANHEAD_ETIMEOUT);
+    assert_int_equal(recv(head, back, sizeof back, 0), 7);
+    s.identity = "Maker,Model,SN1,1.0\r\nMaker,Model,SN1,1.0\r\n";
+    assert_int_equal(run_command(sh, &s, reply, sizeof reply), 0);
+    assert_string_equal(reply, "12345678");
     s.identity = NULL;
     assert_int_equal(run_command(sh, &s, reply, 8), SCANHEAD_EINPUT); /* not cut */
     close(head);
