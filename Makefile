@@ -262,19 +262,19 @@ test-unit-programs: $(UNIT)
 test-programs: all $(BUILD)/bench $(TESTS) $(FIGURES)
 
 install: all
-	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib $(DESTDIR)$(PREFIX)/include $(DESTDIR)$(HEADS_DIR) \
-		$(DESTDIR)$(SCENES_DIR) $(DESTDIR)$(UDEV_DIR) $(DESTDIR)$(PC_DIR) $(DESTDIR)$(PREFIX)/share/scanhead/python
-	install $(BUILD)/scanhead $(DESTDIR)$(PREFIX)/bin/
-	install -m 644 $(BUILD)/libscanhead.a $(DESTDIR)$(PREFIX)/lib/
-	install $(BUILD)/libscanhead.so $(DESTDIR)$(PREFIX)/lib/libscanhead.so.1
-	ln -sf libscanhead.so.1 $(DESTDIR)$(PREFIX)/lib/libscanhead.so
-	install -m 644 drivers/host/scanhead.h $(DESTDIR)$(PREFIX)/include/
-	install -m 644 drivers/host/python/scanhead.py $(DESTDIR)$(PREFIX)/share/scanhead/python/
-	install -m 644 config/heads/*.yaml $(DESTDIR)$(HEADS_DIR)/
-	install -m 644 config/scenes/glass_room.obj $(DESTDIR)$(SCENES_DIR)/
-	install -m 644 drivers/host/70-scanhead.rules $(DESTDIR)$(UDEV_DIR)/
+	install -d "$(DESTDIR)$(PREFIX)/bin" "$(DESTDIR)$(PREFIX)/lib" "$(DESTDIR)$(PREFIX)/include" "$(DESTDIR)$(HEADS_DIR)" \
+		"$(DESTDIR)$(SCENES_DIR)" "$(DESTDIR)$(UDEV_DIR)" "$(DESTDIR)$(PC_DIR)" "$(DESTDIR)$(PREFIX)/share/scanhead/python"
+	install $(BUILD)/scanhead "$(DESTDIR)$(PREFIX)/bin/"
+	install -m 644 $(BUILD)/libscanhead.a "$(DESTDIR)$(PREFIX)/lib/"
+	install $(BUILD)/libscanhead.so "$(DESTDIR)$(PREFIX)/lib/libscanhead.so.1"
+	ln -sf libscanhead.so.1 "$(DESTDIR)$(PREFIX)/lib/libscanhead.so"
+	install -m 644 drivers/host/scanhead.h "$(DESTDIR)$(PREFIX)/include/"
+	install -m 644 drivers/host/python/scanhead.py "$(DESTDIR)$(PREFIX)/share/scanhead/python/"
+	install -m 644 config/heads/*.yaml "$(DESTDIR)$(HEADS_DIR)/"
+	install -m 644 config/scenes/glass_room.obj "$(DESTDIR)$(SCENES_DIR)/"
+	install -m 644 drivers/host/70-scanhead.rules "$(DESTDIR)$(UDEV_DIR)/"
 	sed "s|@PREFIX@|$(PREFIX)|; s|@VERSION@|$$(sed -n 's/^#define SCANHEAD_VERSION "\(.*\)"$$/\1/p' \
-		drivers/host/scanhead.h)|" drivers/host/libscanhead.pc.in > $(DESTDIR)$(PC_DIR)/libscanhead.pc
+		drivers/host/scanhead.h)|" drivers/host/libscanhead.pc.in > "$(DESTDIR)$(PC_DIR)/libscanhead.pc"
 format:
 	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')
 clean:

@@ -63,8 +63,8 @@ int surface_table_set(struct surface_table *table, uint32_t label, const struct 
 int surface_kinds(const struct surface_table *table, uint16_t *kind, struct sh_err *err);
 
 /* Entry `label` gets its reflectance from a texture (core/texture.h), its gamma taken for that of sRGB. Beyond a
- * decal the entry's own reflectance counts. SH_EINPUT, naming the file: can't be read. Then, and for glass and mirrors, the entry stays
- * unchanged. */
+ * decal the entry's own reflectance counts. SH_EINPUT, naming the file: can't be read. Then, and for glass and
+ * mirrors, the entry stays unchanged. */
 int surface_table_texture(struct surface_table *table, uint32_t label, const struct scene_surface *named,
                           const struct scene_texture *texture, struct sh_err *err);
 

@@ -24,8 +24,16 @@ check() {
 
 # Without what the make above this one told it.
 install_it() {
-    env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -s install BUILD="$(dirname "$program")" WERROR=-Werror DESTDIR="$work/root" \
-        PREFIX=$prefix
+    env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -s install BUILD="$(dirname "$program")" WERROR=-Werror DESTDIR="$1" \
+        PREFIX="$2"
+}
+
+# All files are where they belong, and none beside it.
+blanks_stay() {
+    mkdir "$work/none" && install_it "$work/none/a root" "/opt/scan head" && test "$(ls "$work/none")" = "a root" &&
+        test "$(ls "$work/none/a root")" = opt && "$work/none/a root/opt/scan head/bin/scanhead" --version &&
+        PKG_CONFIG_PATH="$work/none/a root/opt/scan head/lib/pkgconfig" pkg-config --cflags libscanhead |
+        grep -qF -e '-I/opt/scan\ head/include'
 }
 
 config() {
@@ -74,7 +82,8 @@ END
 
 # The only example in C.
 sed -n '/^```c /,/^```$/p' README.md | sed "/^\`\`\`/d" >"$work/client.c"
-check "make install" install_it
+check "make install" install_it "$work/root" "$prefix"
+check "make install into folders with blanks in their names" blanks_stay
 check "the udev rule is where udev looks below a prefix" test -s "$work/root$prefix/lib/udev/rules.d/70-scanhead.rules"
 # A profile and a mesh come with the program.
 example_passes() {

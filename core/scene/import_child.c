@@ -19,10 +19,12 @@ enum { RESULT_FD = 3, NOTE_FD, FIRST_FREE_FD };
 
 _Static_assert(sizeof(struct import_note) <= 4096, "PIPE_BUF on Linux: written in one piece");
 
+static int note_fd; /* where the pipe is until it is in its place, and then */
+
 /* An error can't be told but by the pipe; where that fails the exit status says that something did. */
 static void send_note(const struct import_note *note)
 {
-    while (write(NOTE_FD, note, sizeof *note) < 0 && errno == EINTR)
+    while (write(note_fd, note, sizeof *note) < 0 && errno == EINTR)
         continue;
 }
 
@@ -65,9 +67,11 @@ static int set_descriptors(const struct import_task *task)
     int result = fcntl(task->result_fd, F_DUPFD, FIRST_FREE_FD), note = fcntl(task->note_fd, F_DUPFD, FIRST_FREE_FD);
     int nothing = open("/dev/null", O_RDWR);
     if (result < 0 || note < 0 || nothing < 0) return 0;
+    note_fd = note;
     for (int fd = 0; fd < 3; fd++)
         if (dup2(nothing, fd) < 0) return 0;
     if (dup2(result, RESULT_FD) < 0 || dup2(note, NOTE_FD) < 0) return 0;
+    note_fd = NOTE_FD;
     return close_range(FIRST_FREE_FD, ~0u, 0) == 0;
 }
 
@@ -104,6 +108,17 @@ static int set_limits(const struct scene_import_limits *limits)
     return done && prctl(PR_SET_DUMPABLE, 0) == 0; /* no core by a pipe either, which asks for no limit */
 }
 
+static int prepare(const struct import_task *task, struct sh_err *err)
+{
+    note_fd = task->note_fd;
+    set_signals();
+    if (!set_descriptors(task))
+        return sh_fail(err, SH_EIO, "the descriptors of the process that reads can't be set: %s", strerror(errno));
+    if (!set_limits(&task->limits))
+        return sh_fail(err, SH_EIO, "the limits of the process that reads can't be set: %s", strerror(errno));
+    return SH_OK;
+}
+
 static int read_scene(const struct import_task *task, struct sh_err *err)
 {
     static const struct sh_report report = {.warn = send_warning, .progress = send_progress};
@@ -122,11 +137,8 @@ _Noreturn void import_child(const struct import_task *task)
     struct sh_err err = {0};
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (getppid() != task->parent) _exit(1); /* it died before that */
-    set_signals();
-    if (!set_descriptors(task)) _exit(1);
-    int rc = set_limits(&task->limits)
-                 ? read_scene(task, &err)
-                 : sh_fail(&err, SH_EIO, "the limits of the process that reads can't be set: %s", strerror(errno));
+    int rc = prepare(task, &err);
+    if (rc == SH_OK) rc = read_scene(task, &err);
     if (rc != SH_OK) send_text(IMPORT_ERROR, rc, 0.0, err.text);
     _exit(rc == SH_OK ? 0 : 1);
 }

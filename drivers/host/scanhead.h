@@ -75,10 +75,10 @@ void scanhead_close(struct scanhead *sh);
 const char *scanhead_error(const struct scanhead *sh);
 
 /* Waits until the same head is there again, and goes on with it. To be called after SCANHEAD_ELOST,
- * SCANHEAD_ERESET or SCANHEAD_ECLOSED, once all frames that had come were taken. Counters, hash and what the stream has said of
- * itself go on too; a jump in the sequence shows what was lost meanwhile. On USB the same head is the one
- * with the same ids and serial number. SCANHEAD_ESTATE for a file or "fd:N". Any other error: it did not come
- * back in time, or a signal came; call again, or close. */
+ * SCANHEAD_ERESET or SCANHEAD_ECLOSED, once all frames that had come were taken. Counters, hash and what the
+ * stream has said of itself go on too; a jump in the sequence shows what was lost meanwhile. On USB the same
+ * head is the one with the same ids and serial number. SCANHEAD_ESTATE for a file or "fd:N". Any other error: it
+ * did not come back in time, or a signal came; call again, or close. */
 int scanhead_reattach(struct scanhead *sh, int timeout_ms);
 
 /* Heads on USB now. */

@@ -8,9 +8,10 @@
  * reported at the end, with counts.
  *
  * Places without a shot are bounded, so that a small stream never makes a huge file. A grid has no more lines,
- * and pulses in a line, than the descriptor says a scan can have. All grids together are filled up by
- * PADDING_FREE places and PADDING_PER_SHOT more for each shot. Where more is missing, or lines go back,
- * another grid begins with the same pose: no point is lost, and the grids are reported. */
+ * and pulses in a line, than the descriptor says a scan can have. All grids of a recording together, also in
+ * files of their own, are filled up by PADDING_FREE places and PADDING_PER_SHOT more for each shot. Where more
+ * is missing, or lines go back, another grid begins with the same pose: no point is lost, and the grids are
+ * reported. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -34,13 +35,15 @@ struct ptx {
     uint32_t last_line, last_row;      /* of the grid's last shot */
     uint64_t n_columns, n_unsaid_rows; /* of the grid, written */
     uint64_t n_left_out, n_too_bright;
-    uint64_t n_ended_shots, n_padded; /* of the grids that are written */
-    uint64_t n_split;                 /* grids that go on with the scan of the one before */
+    uint64_t n_padded; /* places in this file */
+    uint64_t n_split;  /* grids that go on with the scan of the one before */
+    struct recorder_padding own, *padding;
 };
 
 static int ptx_begin(void *rec, struct sh_err *err)
 {
     struct ptx *ptx = rec;
+    ptx->padding = ptx->base.options.padding != NULL ? ptx->base.options.padding : &ptx->own;
     return ptx_grid_open(&ptx->grid, ptx->base.file.path, err);
 }
 
@@ -106,7 +109,8 @@ static int end_scan(struct ptx *ptx, struct sh_err *err)
     if (g->n_shots == 0) return 0;
     uint64_t columns = (uint64_t)g->column_max - g->column_min + 1, rows = (uint64_t)g->row_max - g->row_min + 1;
     ptx->n_padded += columns * rows - g->n_shots;
-    ptx->n_ended_shots += g->n_shots;
+    ptx->padding->n_places += columns * rows - g->n_shots;
+    ptx->padding->n_shots += g->n_shots;
     ptx->n_columns = 0;
     int rc = put_header(ptx, err);
     return rc != 0 ? rc : ptx_grid_drain(g, put_column, ptx, err);
@@ -126,7 +130,8 @@ static int has_room(const struct ptx *ptx, uint32_t n)
         (uint64_t)(last > g->row_max ? last : g->row_max) - (first < g->row_min ? first : g->row_min) + 1;
     const uint64_t shots = g->n_shots + n;
     return columns <= t->max_lines && rows <= t->max_pulses && rows <= ROWS_MAX &&
-           ptx->n_padded + columns * rows <= PADDING_FREE + shots + PADDING_PER_SHOT * (ptx->n_ended_shots + shots);
+           ptx->padding->n_places + columns * rows <=
+               PADDING_FREE + shots + PADDING_PER_SHOT * (ptx->padding->n_shots + shots);
 }
 
 static int ptx_scan(void *rec, struct sh_err *err)

@@ -13,6 +13,11 @@
 #include "drivers/record/outfile.h"
 #include "drivers/record/track.h"
 
+/* Of the grids that are written: shots, and places filled up between them. */
+struct recorder_padding {
+    uint64_t n_shots, n_places;
+};
+
 struct recorder_options {
     int ascii;               /* PLY as text */
     int empty_shots;         /* keep shots without echo, where the format can */
@@ -22,6 +27,8 @@ struct recorder_options {
     /* Is given, at the end, what the format had no room for. Its stop gives up a file that is being completed, which may
      * take long. May be NULL; must live until close. */
     const struct sh_report *report;
+    /* Files of one recording share what may be filled up. NULL: a file alone; else it must live until close. */
+    struct recorder_padding *padding;
 };
 
 struct recorder {

@@ -49,6 +49,7 @@ int record_files_open(struct record_files *files, struct sh_err *err)
 {
     int rc = SH_OK;
     files->part++;
+    files->recorder.padding = &files->padding;
     files->has_points = 0;
     for (int i = 0; i < files->n && rc == SH_OK; i++)
         rc = open_file(files, &files->file[i], err);

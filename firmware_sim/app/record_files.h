@@ -12,6 +12,7 @@ struct record_files {
     int split; /* each scan to files of its own: NAME-1.ply, NAME-2.ply, ... */
     struct recorder_options recorder;
     /* inner state */
+    struct recorder_padding padding; /* in all parts */
     struct record_file {
         const char *path;
         const struct recorder_ops *ops;

@@ -41,8 +41,8 @@ static void note_late(struct loop *loop, int64_t late_ns)
 }
 
 /* A tick that is not ready late_ms after its time is given up, even one that will never be: when casters come
- * late to find that the run is over, the pacing thread may be beyond its end. What the pacing thread itself overslept is
- * added to late_ms (credit) until it has caught up. */
+ * late to find that the run is over, the pacing thread may be beyond its end. What the pacing thread itself
+ * overslept is added to late_ms (credit) until it has caught up. */
 static void pace_realtime(struct loop *loop)
 {
     struct stream *stream = &loop->stream;

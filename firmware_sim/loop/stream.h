@@ -68,8 +68,8 @@ int stream_create(struct stream *stream, const struct ring_size *size, int64_t t
 void stream_free(struct stream *stream);
 
 /* ---- the pacing thread; real-time safe */
-/* Completes the slot's line ends and the counts of its telemetry and of a scan's end, numbers its frames, counts it, publishes it and wakes readers and
- * casters. */
+/* Completes the slot's line ends and the counts of its telemetry and of a scan's end, numbers its frames, counts
+ * it, publishes it and wakes readers and casters. */
 void stream_release(struct stream *stream, struct ring_slot *slot, uint64_t tick, int64_t now_ns);
 /* Gives a tick up. 0 when it became ready in the same moment. */
 int stream_lose(struct stream *stream, uint64_t tick);

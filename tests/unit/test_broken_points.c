@@ -161,8 +161,9 @@ static void test_no_counts(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_infinite),      cmocka_unit_test(test_infinite_by_pose), cmocka_unit_test(test_long_pose),
-        cmocka_unit_test(test_no_scan_angle), cmocka_unit_test(test_far_rows),         cmocka_unit_test(test_no_counts),
+        cmocka_unit_test(test_infinite),        cmocka_unit_test(test_infinite_by_pose),
+        cmocka_unit_test(test_long_pose),       cmocka_unit_test(test_no_scan_angle),
+        cmocka_unit_test(test_far_rows),        cmocka_unit_test(test_no_counts),
         cmocka_unit_test(test_poses_far_apart),
     };
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);

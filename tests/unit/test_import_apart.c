@@ -6,6 +6,7 @@
 #include <signal.h>
 #include <sys/mman.h>
 #include <sys/pidfd.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
@@ -243,6 +244,27 @@ static void signal_of_children_may_be_ignored(void **state)
     unlink(path);
 }
 
+/* The file is not to blame where the process has no descriptors left. */
+static void no_descriptors_are_left(void **state)
+{
+    (void)state;
+    const struct scene_mesh_spec spec = {.file = write_text("a.stl", "solid a\n"), .scale = 1};
+    struct rlimit limit, few;
+    struct scene *s;
+    struct sh_err err = {0};
+    int next = dup(0); /* the lowest that is free */
+    close(next);
+    assert_int_equal(getrlimit(RLIMIT_NOFILE, &limit), 0);
+    few = limit;
+    few.rlim_cur = (rlim_t)next + 4; /* the result, the pipe and the process */
+    assert_int_equal(setrlimit(RLIMIT_NOFILE, &few), 0);
+    int rc = load_spec(&spec, 1e-3, &s, &err);
+    assert_int_equal(setrlimit(RLIMIT_NOFILE, &limit), 0);
+    unlink(path);
+    assert_int_equal(rc, SH_EIO);
+    assert_non_null(strstr(err.text, "the descriptors of the process that reads can't be set: Too many open files"));
+}
+
 /* Assimp 5.2 goes on at the word that is no number, and keeps an index each time. */
 static void memory_is_limited(void **state)
 {
@@ -396,11 +418,16 @@ static void child_dies_with_its_parent(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(result_comes_back),        cmocka_unit_test(broken_result_is_refused),
-        cmocka_unit_test(names_have_an_end),        cmocka_unit_test(hang_ends_in_time),
-        cmocka_unit_test(memory_is_limited),        cmocka_unit_test(crash_is_one_line),
-        cmocka_unit_test(child_has_limits),         cmocka_unit_test(child_dies_with_its_parent),
+        cmocka_unit_test(result_comes_back),
+        cmocka_unit_test(broken_result_is_refused),
+        cmocka_unit_test(names_have_an_end),
+        cmocka_unit_test(hang_ends_in_time),
+        cmocka_unit_test(memory_is_limited),
+        cmocka_unit_test(crash_is_one_line),
+        cmocka_unit_test(child_has_limits),
+        cmocka_unit_test(child_dies_with_its_parent),
         cmocka_unit_test(signal_of_children_may_be_ignored),
+        cmocka_unit_test(no_descriptors_are_left),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -222,6 +222,23 @@ static void test_far(void **state)
     }
 }
 
+/* What earlier files of the recording were filled up by is gone. */
+static void test_shared_padding(void **state)
+{
+    (void)state;
+    struct sh_err err = {0};
+    struct recorder_padding padding = {.n_places = 1 << 24};
+    for (int i = 0; i < 2; i++) {
+        put_shots(0, (const uint32_t[]){0, 40}, (const uint32_t[]){0, 0}, 2);
+        struct recorder_options options = {.padding = i == 0 ? NULL : &padding};
+        assert_int_equal(rig_record(rig_path("a.ptx"), options, RIG_KEEP, &err), SH_OK);
+        assert_int_equal(strstr(rig_notes, "1 grids begun within a scan") != NULL, i);
+        unlink(rig_path("a.ptx"));
+    }
+    assert_int_equal(padding.n_shots, 2);
+    assert_int_equal(padding.n_places, 1 << 24);
+}
+
 static int asked, stop_at;
 
 static int stop(void *ctx)
@@ -269,9 +286,9 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_grid),      cmocka_unit_test(test_scans), cmocka_unit_test(test_polar),
-        cmocka_unit_test(test_poses),     cmocka_unit_test(test_far),   cmocka_unit_test(test_stop),
-        cmocka_unit_test(test_disk_full),
+        cmocka_unit_test(test_grid),           cmocka_unit_test(test_scans),     cmocka_unit_test(test_polar),
+        cmocka_unit_test(test_poses),          cmocka_unit_test(test_far),       cmocka_unit_test(test_stop),
+        cmocka_unit_test(test_shared_padding), cmocka_unit_test(test_disk_full),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }

@@ -274,9 +274,12 @@ static void test_times_far_apart(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_unplugged_within_a_scan),    cmocka_unit_test(test_unplugged_after_a_lost_end),
-        cmocka_unit_test(test_telemetry_after_a_lost_end), cmocka_unit_test(test_joined_within_a_scan),
-        cmocka_unit_test(test_an_end_after_telemetry),     cmocka_unit_test(test_broken_once_more_after_a_lost_end),
+        cmocka_unit_test(test_unplugged_within_a_scan),
+        cmocka_unit_test(test_unplugged_after_a_lost_end),
+        cmocka_unit_test(test_telemetry_after_a_lost_end),
+        cmocka_unit_test(test_joined_within_a_scan),
+        cmocka_unit_test(test_an_end_after_telemetry),
+        cmocka_unit_test(test_broken_once_more_after_a_lost_end),
         cmocka_unit_test(test_times_far_apart),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -257,16 +257,17 @@ def misuse(path):
     head, theirs = pair()
     threading.Timer(0.05, theirs.close).start()
     refused(head.next_frame, 1e300)  # longer than poll() can wait
-    late_reply()
+    for lines in (["HEAD:PRR?"], [":*idn?"], ["HEAD:PRR?", "*IDN?"]):
+        late_replies(lines)
     print("refused")
 
 
-def late_reply():
-    """The reply to a command that was given up comes when the next one has been sent."""
+def late_replies(lines):
+    """The replies to commands that were given up come when the next one has been sent."""
     head, theirs = pair()
-    for line in ("HEAD:PRR?", "*IDN?"):
+    for line in lines:
         refused(head.query, line, 0.0)
-    replies = {"HEAD:PRR?": "1", "*IDN?": "a,b,c,d", "HEAD:LINes?": "2"}
+    replies = {"HEAD:PRR?": "1", "*IDN?": "a,b,c,d", ":*idn?": "a,b,c,d", "HEAD:LINes?": "2"}
 
     def answer():
         for line in theirs.makefile():

@@ -238,6 +238,38 @@ static void test_end_lost(void **state)
     check_recorder(wire, stats);
 }
 
+/* A reader that takes nothing until the head is gone finds what the kernel had by then. The head counts so much as
+ * received, to the pulse, and the rest as left out. */
+static void test_head_ends_first(void **state)
+{
+    struct wire *wire = *state;
+    struct room_config config = RATE;
+    struct scanhead_frame frame;
+    char source[32];
+    uint64_t received = 0;
+    config.frames = 1;
+    config.pan_stop_deg = 54; /* 0.6 s, 12 MB: more than the buffers between */
+    config.more = "loop: {queue_ms: 10000, late_ms: 10000}\n";
+    room_write(wire);
+    struct head head = head_start(wire, room_config_write(wire, &config), NULL);
+    struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
+    client_wait_state(sh, "idle");
+    snprintf(source, sizeof source, "fd:%d", raw_connect(head_endpoint(&head, "tcp")));
+    client_tell(sh, "SCAN:STAR");
+    client_until(sh, SCANHEAD_EV_SCAN_END, &frame);
+    scanhead_close(sh);
+    head_end(&head, SIGTERM);
+    const uint64_t delivered = stats_uint(wire, "pulses"), left_out = stats_link_uint(wire, "left_out_pulses");
+    sh = client_open(source);
+    while (scanhead_next(sh, &frame, DEADLINE_MS) == SCANHEAD_OK)
+        if (frame.type == SCANHEAD_POINTS) received += frame.n_pulses;
+    scanhead_close(sh);
+    assert_in_range(left_out, 1, delivered - 1);
+    assert_int_equal(received + left_out, delivered);
+    assert_int_equal(stats_link_uint(wire, "received_pulses"), delivered + received); /* and the reader beside it */
+    assert_int_equal(stats_uint(wire, "reader_lost_pulses"), left_out);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -245,6 +277,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_attributes, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_fast, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_end_lost, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_head_ends_first, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
