@@ -38,8 +38,8 @@ static void no_number_of_wide_triangles_hides_a_wall(void **state)
     double range_m = 0.0;
     uint32_t triangle = 0;
     struct scene *scene = plates();
-    struct caster *caster;
-    struct bvh *bvh;
+    struct caster *caster = NULL;
+    struct bvh *bvh = NULL;
     struct sh_err err;
     if (bvh_create(scene, origin, 300.0, 1, NULL, &bvh, &err) != SH_OK || caster_create(&caster, &err) != SH_OK)
         fail_msg("%s", err.text);
