@@ -36,6 +36,7 @@ struct head {
     const char *wrong;
     int fd;
     uint32_t seq;
+    _Atomic uint32_t sent, taken; /* frames */
     _Atomic int over;
 };
 
@@ -45,6 +46,7 @@ static void send_frame(uint8_t *frame, size_t len)
 {
     native_seal(frame, head.seq++);
     if (send(head.fd, frame, len, MSG_NOSIGNAL) != (ssize_t)len) head.wrong = "a frame was not taken";
+    atomic_fetch_add(&head.sent, 1);
 }
 
 /* Of scan 3 with 100 pulses, 60 of them cast and 7 of those lost by the head. */
@@ -126,9 +128,10 @@ static void *play(void *arg)
     return NULL;
 }
 
+/* Not before the recorder has seen all of it. */
 static int is_over(void)
 {
-    return atomic_load(&head.over);
+    return atomic_load(&head.over) && atomic_load(&head.taken) >= atomic_load(&head.sent);
 }
 
 static int take_frame(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
@@ -137,6 +140,7 @@ static int take_frame(void *ctx, struct scanhead *sh, const struct scanhead_fram
     (void)sh;
     (void)frame;
     (void)err;
+    atomic_fetch_add(&head.taken, 1);
     return SH_OK;
 }
 
