@@ -127,6 +127,7 @@ static const char *const waypoint_columns[] = {"x_m", "y_m", "z_m", "speed_m_s",
 struct way {
     struct samples points;
     double *pause_s, pauses_s; /* of each; their sum */
+    size_t pauses_room;
 };
 
 static int check_waypoint(const struct csv *csv, struct sh_err *err)
@@ -146,10 +147,9 @@ static int add_waypoint(const struct csv *csv, double speed_m_s, struct way *way
 {
     const double *v = csv->value;
     struct pose_sample *s = add_sample(&way->points);
-    double *pauses = realloc(way->pause_s, way->points.room * sizeof *pauses);
-    if (pauses != NULL) way->pause_s = pauses;
-    if (s == NULL || pauses == NULL) return text_fail(&csv->text, 0, SH_ENOMEM, err, "no memory for its way-points");
-    pauses[way->points.n - 1] = v[PAUSE];
+    if (s == NULL || !grow(&way->pause_s, &way->pauses_room, way->points.n, sizeof *way->pause_s))
+        return text_fail(&csv->text, 0, SH_ENOMEM, err, "no memory for its way-points");
+    way->pause_s[way->points.n - 1] = v[PAUSE];
     way->pauses_s += v[PAUSE];
     memcpy(s->pose.position_m, v + WX, sizeof s->pose.position_m);
     s->pose.quat[0] = 1.0;

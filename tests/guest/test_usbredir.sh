@@ -12,7 +12,7 @@ speed=high
 # head_start [OPTION...]: the head on the host; its TCP port into tcp_port.
 head_start() {
     rm -f "$guest_work/ready"
-    sed "\$alinks: [{type: tcp, port: 0}, {type: usb, backend: usbredir, path: usb, speed: $speed}]" "$guest_work/root/head.yaml" \
+    sed "\$alinks: [{type: tcp, port: 0}, {type: usb, backend: usbredir, path: usb, serial: SIM-0001, speed: $speed}]" "$guest_work/root/head.yaml" \
         >"$guest_work/config.yaml"
     cp tests/guest/room.obj "$guest_work/"
     "$guest_scanhead" run "$guest_work/config.yaml" --ready-fd 9 "$@" 9>"$guest_work/ready" 2>>"$guest_work/head.err" \
