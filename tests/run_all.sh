@@ -4,7 +4,7 @@
 #
 # As many at a time as there are processors, those that take longest first in each folder:
 #   1. accuracy, stability, unit: they compute; the recipes beside them, which mostly wait
-#   2. unit with sanitizers, then wire, which mostly waits; the guests beside both
+#   2. wire, which mostly waits; the guests beside it, which compute
 #   3. those that drive a head at its limits, or that spin: each has the machine to itself
 set -eu
 build=$1
@@ -31,11 +31,11 @@ if wanted unit; then set -- "$@" +tests/check_recipes.sh; fi
 if wanted accuracy; then set -- "$@" $(programs accuracy); fi
 if wanted stability; then set -- "$@" $(programs stability); fi
 if wanted unit; then set -- "$@" tests/check_includes.sh tests/check_make.sh $(programs unit); fi
+if [ -z "$part" ]; then set -- "$@" $(programs unit "$build/asan"); fi
 if wanted guest; then
     export BUILD="$build"
     set -- "$@" +tests/guest/guest.sh # it takes the programs of tests/guest with it
 fi
-if [ -z "$part" ]; then set -- "$@" $(programs unit "$build/asan"); fi
 if wanted wire; then set -- "$@" $(programs wire) tests/check_install.sh; fi
 set -- "$@" --
 for name in $alone; do
