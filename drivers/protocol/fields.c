@@ -59,6 +59,23 @@ static const struct field anchor[] = {
     ANCHOR(frame, FIELD_REAL),
 };
 
+#define EMITTER(member, kind) ROW(native_emitter, member, kind)
+static const struct field emitter[] = {
+    EMITTER(kind, FIELD_32),
+    EMITTER(n_beams, FIELD_32),
+    EMITTER(steps, FIELD_32),
+    EMITTER(first_step, FIELD_32),
+    EMITTER(last_step, FIELD_32),
+    EMITTER(front_step, FIELD_32),
+    EMITTER(turn, FIELD_32),
+    EMITTER(rings, FIELD_32),
+    EMITTER(sequence_ns_num, FIELD_64),
+    EMITTER(sequence_ns_den, FIELD_64),
+    EMITTER(first_ring_udeg, FIELD_64),
+    EMITTER(echoes, FIELD_32),
+    EMITTER(reserved, FIELD_32),
+};
+
 #define POINTS(member, kind) ROW(native_points, member, kind)
 static const struct field points[] = {
     POINTS(frame, FIELD_32),      POINTS(line, FIELD_32),     POINTS(pulse0, FIELD_64),   POINTS(t0_ns, FIELD_64),
@@ -108,6 +125,7 @@ const struct field_table fields_descriptor = {descriptor, sizeof descriptor / si
                                               272, sizeof(struct native_descriptor), NATIVE_DESCRIPTOR};
 const struct field_table fields_descriptor_content = TABLE(descriptor, native_descriptor, 280, NATIVE_DESCRIPTOR);
 const struct field_table fields_anchor = TABLE(anchor, native_anchor, 280, NATIVE_ANCHOR);
+const struct field_table fields_emitter = TABLE(emitter, native_emitter, NATIVE_EMITTER_HEAD_LEN, NATIVE_EMITTER);
 const struct field_table fields_points = TABLE(points, native_points, NATIVE_POINTS_HEAD_LEN, NATIVE_POINTS);
 const struct field_table fields_attributes =
     TABLE(attributes, native_attributes, NATIVE_ATTRIBUTES_HEAD_LEN, NATIVE_ATTRIBUTES);

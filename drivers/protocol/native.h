@@ -41,6 +41,7 @@ enum native_type {
     NATIVE_SURFACES = 7,   /* names of some labels */
     NATIVE_POSES = 8,      /* where a moving head is while it measures what follows */
     NATIVE_ATTRIBUTES = 9, /* amplitude and width of the points in the frame before */
+    NATIVE_EMITTER = 10,   /* how the head's beams are arranged; after the descriptor, unless it is a line head */
 };
 
 enum native_flags {
@@ -84,6 +85,39 @@ struct native_descriptor {
     uint32_t max_echoes, n_surfaces, frames, scan; /* frames per scan (0: endless); scan number from 1 */
     uint64_t seed;
     uint32_t content, reserved; /* enum native_content; where content is 0, neither is sent */
+};
+
+/* How beams are arranged. All of them have the same two angles in a polar point: the mirror count is the
+ * elevation, the pan count the azimuth, clockwise from y seen from above; direction = (sin pan cos mirror, cos pan
+ * cos mirror, sin mirror). */
+enum native_emitter_kind {
+    NATIVE_EMIT_LINE = 0,   /* a mirror sweeps the elevation, the pan turns slowly. No frame is sent. */
+    NATIVE_EMIT_PLANAR = 1, /* one plane, elevation 0: `steps` a turn; a line is a turn, from step 0 on */
+    NATIVE_EMIT_BEAMS = 2,  /* a firing sequence of beams spins about the vertical; a line is a turn, from azimuth 0 */
+    NATIVE_EMIT_SPHERE = 3, /* rings of one elevation each, `steps` a turn; a line is a ring, a frame all of them */
+    NATIVE_EMIT_DIRECTIONS = 4, /* a list; a line and a frame are the list once */
+};
+struct native_emitter { /* begin of an emitter payload, 64 bytes; then n_beams of 12 */
+    uint32_t kind, n_beams;
+    uint32_t steps;                /* planar, sphere: a turn; directions: in the list; beams: 0 */
+    int32_t first_step, last_step; /* planar: cast, both included */
+    int32_t front_step;            /* planar: the step that looks along y; sphere: 0 */
+    int32_t turn;                  /* +1: steps and azimuth go clockwise seen from above, -1: the other way */
+    uint32_t rings;                /* sphere */
+    uint64_t sequence_ns_num, sequence_ns_den; /* beams: a firing sequence lasts num / den ns; else of one pulse */
+    int64_t first_ring_udeg;   /* sphere: elevation of ring 0; the others follow by 180 deg / rings up */
+    uint32_t echoes, reserved; /* enum native_echoes: which of a pulse's are sent */
+};
+enum native_echoes {
+    NATIVE_ECHOES_ALL = 0,
+    NATIVE_ECHOES_FIRST = 1,
+    NATIVE_ECHOES_LAST = 2,
+    NATIVE_ECHOES_STRONGEST = 3
+};
+enum { NATIVE_EMITTER_HEAD_LEN = 64, NATIVE_BEAM_LEN = 12, NATIVE_MAX_BEAMS = 128 };
+struct native_beam { /* 0 i32 elevation, 4 i32 azimuth offset, 8 u32 firing time after the sequence's first, ns */
+    int32_t elevation_udeg, azimuth_udeg;
+    uint32_t offset_ns;
 };
 
 enum native_content { NATIVE_HAS_ATTRIBUTES = 1 }; /* a frame of attributes follows each one of points */
@@ -210,6 +244,9 @@ struct native_event {
 /* ---- decoding payloads: 0, or SH_EFORMAT where length or content is wrong. No pointer is kept. */
 int native_decode_descriptor(const uint8_t *payload, size_t len, struct native_descriptor *out);
 int native_decode_anchor(const uint8_t *payload, size_t len, struct native_anchor *out);
+/* Beams follow at NATIVE_EMITTER_HEAD_LEN; native_decode_beam. */
+int native_decode_emitter(const uint8_t *payload, size_t len, struct native_emitter *out);
+void native_decode_beam(const uint8_t *payload, uint32_t i, struct native_beam *out); /* i < n_beams */
 int native_decode_points(const uint8_t *payload, size_t len, struct native_points *out);
 int native_decode_attributes(const uint8_t *payload, size_t len, struct native_attributes *out);
 void native_decode_attribute(const uint8_t *payload, uint32_t i, struct native_attribute *out); /* i < n_points */
@@ -264,7 +301,7 @@ void native_parser_finish(struct native_parser *parser);
 void native_parser_resume(struct native_parser *parser);
 
 /* 1 if a frame with this header belongs to stream_sha256: the hash runs over u8 type, u32 length (LE) and the
- * payload of each descriptor, anchor, points, line-end, poses and attributes frame that has neither
+ * payload of each descriptor, emitter, anchor, points, line-end, poses and attributes frame that has neither
  * NATIVE_REPEAT nor NATIVE_LOCAL. */
 int native_is_hashed(const struct native_header *header);
 

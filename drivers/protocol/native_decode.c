@@ -28,6 +28,25 @@ int native_decode_anchor(const uint8_t *payload, size_t len, struct native_ancho
     return 0;
 }
 
+int native_decode_emitter(const uint8_t *payload, size_t len, struct native_emitter *out)
+{
+    int rc = fields_decode(&fields_emitter, payload, len, out);
+    if (rc != 0) return rc;
+    if (out->kind > NATIVE_EMIT_DIRECTIONS || out->sequence_ns_den == 0 || (out->turn != 1 && out->turn != -1))
+        return SH_EFORMAT;
+    if (out->n_beams > NATIVE_MAX_BEAMS || out->n_beams > (len - NATIVE_EMITTER_HEAD_LEN) / NATIVE_BEAM_LEN)
+        return SH_EFORMAT;
+    return 0;
+}
+
+void native_decode_beam(const uint8_t *payload, uint32_t i, struct native_beam *out)
+{
+    const uint8_t *p = payload + NATIVE_EMITTER_HEAD_LEN + (size_t)i * NATIVE_BEAM_LEN;
+    out->elevation_udeg = (int32_t)le_get32(p);
+    out->azimuth_udeg = (int32_t)le_get32(p + 4);
+    out->offset_ns = le_get32(p + 8);
+}
+
 int native_decode_points(const uint8_t *payload, size_t len, struct native_points *out)
 {
     int rc = fields_decode(&fields_points, payload, len, out);
@@ -136,5 +155,6 @@ int native_is_hashed(const struct native_header *header)
 {
     if ((header->flags & (NATIVE_REPEAT | NATIVE_LOCAL)) != 0) return 0;
     return header->type == NATIVE_DESCRIPTOR || header->type == NATIVE_ANCHOR || header->type == NATIVE_POINTS ||
-           header->type == NATIVE_LINE_END || header->type == NATIVE_POSES || header->type == NATIVE_ATTRIBUTES;
+           header->type == NATIVE_LINE_END || header->type == NATIVE_POSES || header->type == NATIVE_ATTRIBUTES ||
+           header->type == NATIVE_EMITTER;
 }

@@ -45,6 +45,21 @@ size_t native_encode_anchor(uint8_t *dst, size_t cap, const struct native_anchor
     return encode_fixed(dst, cap, &fields_anchor, a, t_ns, flags);
 }
 
+size_t native_encode_emitter(uint8_t *dst, size_t cap, const struct native_emitter *e, const struct native_beam *beam,
+                             int64_t t_ns, int flags)
+{
+    const size_t len = NATIVE_EMITTER_HEAD_LEN + (size_t)e->n_beams * NATIVE_BEAM_LEN;
+    uint8_t *at = dst + NATIVE_HEADER_LEN + NATIVE_EMITTER_HEAD_LEN;
+    if (e->n_beams > NATIVE_MAX_BEAMS || cap < NATIVE_HEADER_LEN + len) return 0;
+    fields_encode(&fields_emitter, e, dst + NATIVE_HEADER_LEN);
+    for (uint32_t i = 0; i < e->n_beams; i++, at += NATIVE_BEAM_LEN) {
+        le_put32(at, (uint32_t)beam[i].elevation_udeg);
+        le_put32(at + 4, (uint32_t)beam[i].azimuth_udeg);
+        le_put32(at + 8, beam[i].offset_ns);
+    }
+    return put_header(dst, NATIVE_EMITTER, flags, len, t_ns);
+}
+
 size_t native_encode_telemetry(uint8_t *dst, size_t cap, const struct native_telemetry *t, int64_t t_ns, int flags)
 {
     return encode_fixed(dst, cap, &fields_telemetry, t, t_ns, flags);

@@ -13,6 +13,9 @@
 
 size_t native_encode_descriptor(uint8_t *dst, size_t cap, const struct native_descriptor *d, int64_t t_ns, int flags);
 size_t native_encode_anchor(uint8_t *dst, size_t cap, const struct native_anchor *a, int64_t t_ns, int flags);
+/* beam: e->n_beams of them, at most NATIVE_MAX_BEAMS. */
+size_t native_encode_emitter(uint8_t *dst, size_t cap, const struct native_emitter *e, const struct native_beam *beam,
+                             int64_t t_ns, int flags);
 size_t native_encode_telemetry(uint8_t *dst, size_t cap, const struct native_telemetry *t, int64_t t_ns, int flags);
 size_t native_encode_event(uint8_t *dst, size_t cap, const struct native_event *e, int64_t t_ns, int flags);
 

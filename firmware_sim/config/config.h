@@ -25,6 +25,7 @@
 #include "core/schedule.h"
 #include "core/surface.h"
 #include "drivers/link/link.h"
+#include "drivers/protocol/protocol.h"
 #include "firmware_sim/command/head.h"
 
 enum {
@@ -38,8 +39,6 @@ enum {
 };
 
 enum config_heights { HEIGHTS_ELLIPSOID, HEIGHTS_GEOID, HEIGHTS_AUTO };
-/* What the head speaks on a link (link_spec.protocol). */
-enum config_protocol { PROTOCOL_NATIVE, PROTOCOL_NMEA };
 enum config_pace { PACE_REALTIME, PACE_FAST, PACE_STEP };
 
 /* A head profile, config/heads/NAME.yaml: each figure is written `{ value: V, from: data sheet|assumed }`. */

@@ -1,0 +1,11 @@
+#include "drivers/protocol/protocol.h"
+
+/* The one list of protocols. */
+static const struct protocol_ops *const protocols[PROTOCOL_N] = {
+    [PROTOCOL_NATIVE] = NULL,
+};
+
+const struct protocol_ops *protocol_ops_get(enum protocol_id id)
+{
+    return (unsigned)id < PROTOCOL_N ? protocols[id] : NULL;
+}

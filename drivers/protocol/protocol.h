@@ -1,0 +1,113 @@
+/* Protocols: what a head speaks on a link. Native frames of the stream, bytes from a client and device time go
+ * in; units for the client and calls on the device come out.
+ *
+ * A protocol is one file of this folder with one `const struct protocol_ops`, whose members are the contract;
+ * protocol.c has the list. Each session of a link has an instance of its own. A protocol does no I/O and has no
+ * clock: a test drives it from bytes to bytes with a struct protocol_host of its own. One thread makes all calls
+ * on an instance. Nothing is allocated after create().
+ *
+ * A unit is what must stay together: a datagram on udp, a transfer on USB (which a short packet ends). On byte
+ * streams units follow each other without a mark. */
+#ifndef DRIVERS_PROTOCOL_PROTOCOL_H
+#define DRIVERS_PROTOCOL_PROTOCOL_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "core/err.h"
+#include "drivers/protocol/nmea.h"
+
+enum protocol_id {
+    PROTOCOL_NATIVE,
+    PROTOCOL_NMEA,
+    PROTOCOL_SCIP,              /* Hokuyo */
+    PROTOCOL_COLA,              /* SICK: CoLa-A and CoLa-B on one port */
+    PROTOCOL_VELODYNE,          /* data packets */
+    PROTOCOL_VELODYNE_POSITION, /* position packets */
+    PROTOCOL_VELODYNE_HTTP,     /* settings */
+    PROTOCOL_N
+};
+
+/* What a protocol needs of the stream. */
+enum protocol_needs {
+    PROTOCOL_NEEDS_POLAR = 1 << 0,      /* output.layout: polar */
+    PROTOCOL_NEEDS_ATTRIBUTES = 1 << 1, /* output.attributes: on; amplitudes are LINE_AMPLITUDE_NONE without
+                                         * signal.model */
+    PROTOCOL_NEEDS_TIME = 1 << 2,       /* time.epoch is not none */
+};
+
+/* What is counted of a session beside the frames it lost. */
+enum protocol_count {
+    PROTOCOL_UNITS_LOST, /* units that were not sent: no room, or parts of them were missing */
+    PROTOCOL_INPUT_LOST, /* bytes from the client that were thrown away: overlong, out of frame, garbage */
+    PROTOCOL_WRONG,      /* requests that were answered with an error */
+    PROTOCOL_N_COUNTS
+};
+
+/* What the owner of a session does for its protocol. ctx is the owner's. All of it may be called from within
+ * any op but create and destroy. */
+struct protocol_host {
+    void *ctx;
+    /* Queues one unit for the client, whole or not at all. 0; or 1: there was no room, it is lost. The owner
+     * counts that. */
+    int (*send)(void *ctx, const void *unit, size_t len);
+    /* Carries out one line of the native command set (COMMANDS.md), "HEAD:LINES 20" for example, as this
+     * session; control is given back at once. reply (cap 480 and more) gets the reply line without its end.
+     * Returns 0, or the SCPI error number. */
+    int (*command)(void *ctx, const char *line, char *reply, size_t cap);
+    /* UTC of a device time, ns since 1970; INT64_MIN: not known. */
+    int64_t (*utc_ns)(void *ctx, int64_t t_ns);
+    /* What the GNSS receiver knows at a device time. Returns 1, or 0: there is none (no time, no anchor). */
+    int (*fix)(void *ctx, int64_t t_ns, struct nmea_fix *fix);
+    /* Counts n. */
+    void (*count)(void *ctx, enum protocol_count what, uint64_t n);
+    /* Ends the session once what was sent has gone out. */
+    void (*hang_up)(void *ctx);
+};
+
+/* What a protocol says of the head; constant, and outlives the instance. The rest stands in the descriptor. */
+struct protocol_identity {
+    char maker[32], model[64]; /* of the head profile */
+    char profile[32];          /* its name */
+    char firmware[32];
+    char serial[32];
+    char name[32]; /* of the device, as its user calls it */
+};
+
+struct protocol_spec {
+    const struct protocol_identity *identity;
+    struct protocol_host host;
+    uint32_t session;  /* from 1, over all links */
+    uint32_t fixes_hz; /* of the GNSS receiver */
+    /* velodyne_http: where the settings say that data go, and so on; empty: not known */
+    char address[64];
+    int port;
+};
+
+struct protocol_ops {
+    const char *name;  /* of links[].protocol */
+    uint32_t needs;    /* enum protocol_needs */
+    uint32_t max_unit; /* bytes; no unit is longer */
+    int passes_native; /* 1: every frame of the stream goes out as it is; frame() is not called */
+
+    /* When it fails, nothing of it stays. */
+    int (*create)(const struct protocol_spec *spec, void **protocol, struct sh_err *err);
+    void (*destroy)(void *protocol);
+
+    /* The client is there. t_ns: device time of the tick from which on it gets frames. */
+    void (*open)(void *protocol, int64_t t_ns);
+    /* One whole native frame, checked, in the order of the stream. A client that joins late gets descriptor,
+     * emitter and anchor first. Never called with frames of the geo layout where needs has POLAR. */
+    void (*frame)(void *protocol, const uint8_t *frame, size_t len);
+    /* Frames are missing before the next one: the client, or the head, was too slow. */
+    void (*gap)(void *protocol, uint32_t n_frames);
+    /* All frames before device time t_ns have come. Called for each tick, also of those without frames. */
+    void (*time)(void *protocol, int64_t t_ns);
+    /* Bytes from the client, in pieces of any size. */
+    void (*input)(void *protocol, const uint8_t *bytes, size_t len);
+};
+
+/* From the one list, in protocol.c. NULL for an unknown id, or one that is not built in. */
+const struct protocol_ops *protocol_ops_get(enum protocol_id id);
+
+#endif
