@@ -244,8 +244,7 @@ static void get_part(const struct device_work *work, uint64_t k, struct part *pa
 static void cast_run(struct worker *worker, const struct device_work *work, const struct part *part)
 {
     uint64_t k = part->cast0, end = part->cast_end;
-    uint64_t longest = (uint64_t)(MAX_DT_NS / (work->segment.ns_quot + 1));
-    if (longest == 0) longest = 1;
+    const uint64_t longest = schedule_longest_run(&work->segment, MAX_DT_NS);
     while (k < end) {
         struct schedule_run run;
         uint64_t stop = enter_stretch(worker, work, k, end);
