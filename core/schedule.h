@@ -39,7 +39,7 @@ struct schedule_segment {
     uint64_t line0, r0;   /* its line, and place in the sweep as r0/den */
     uint64_t line0_begin; /* first pulse of line0, before k0 where the line began in an earlier segment ... */
     int64_t line0_begin_ns;
-    uint64_t line0_cast; /* ... and how many of its pulses were cast there */
+    uint64_t line0_cast;         /* ... and how many of its pulses were cast there */
     uint64_t tick_num, tick_den; /* a tick: nanoseconds */
     uint64_t num, den;           /* lines per tick */
     int64_t ns_quot;             /* a tick = ns_quot + ns_rem / tick_den nanoseconds */

@@ -23,8 +23,7 @@ static void set_sweep(const struct schedule_segment *seg, const struct schedule_
     run->mirror0_turn = (double)seg->spec.fov_min_udeg / (double)TURN_UDEG;
     run->mirror_turn_per_r = (double)seg->spec.sweep_udeg / (double)TURN_UDEG / (double)seg->den;
     run->pan0_turn = (double)pan_fine(seg, line->pulse0, first_line) / fine_per_turn;
-    run->pan_step_turn =
-        (double)seg->spec.pan_udeg_s * 1e6 / (double)(uint64_t)seg->spec.prr_uhz / (double)TURN_UDEG;
+    run->pan_step_turn = (double)seg->spec.pan_udeg_s * 1e6 / (double)(uint64_t)seg->spec.prr_uhz / (double)TURN_UDEG;
 }
 
 /* One elevation; the pan goes step by step. */

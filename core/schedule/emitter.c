@@ -74,8 +74,8 @@ void emitter_set_sphere(struct emitter *e, int64_t step_udeg)
 
 void emitter_set_directions(struct emitter *e, const struct emitter_firing *direction, uint32_t n)
 {
-    *e = (struct emitter){
-        .kind = EMITTER_DIRECTIONS, .steps = n, .last_step = n - 1, .turn = 1, .direction = direction};
+    *e =
+        (struct emitter){.kind = EMITTER_DIRECTIONS, .steps = n, .last_step = n - 1, .turn = 1, .direction = direction};
 }
 
 int64_t emitter_rate_uhz(const struct emitter *e)

@@ -132,6 +132,9 @@ static void fill_heads(struct worker *worker, const struct device_work *work)
     if (work->describe) {
         int flags = work->describe_flags;
         added(worker, native_encode_descriptor(end_of(worker), room_of(worker), &work->descriptor, work->t_ns, flags));
+        if (work->emitter.kind != NATIVE_EMIT_LINE)
+            added(worker, native_encode_emitter(end_of(worker), room_of(worker), &work->emitter, work->beam, work->t_ns,
+                                                flags));
         add_anchor(worker, &work->anchor, work->t_ns, flags);
     }
     struct native_names names = {work->surfaces_first, work->surfaces_n, surface_name, (void *)(uintptr_t)worker->site};
