@@ -214,18 +214,30 @@ static const struct cfg_key config_keys[] = {
      .help = "Where the head can be reached; none is needed to record off line."},
     {"links[]", .type = CFG_MAP, .help = "A link."},
     {LINK(type), CFG_ENUM, .example = "tcp",
-     WORDS([LINK_NULL] = "null", [LINK_FILE] = "file", [LINK_PTY] = "pty", [LINK_TCP] = "tcp", [LINK_USB] = "usb"),
+     WORDS([LINK_NULL] = "null", [LINK_FILE] = "file", [LINK_PTY] = "pty", [LINK_TCP] = "tcp", [LINK_USB] = "usb",
+           [LINK_UDP] = "udp"),
      .help = "Kind of link."},
-    {LINK(protocol), CFG_ENUM, .def = "native", WORDS([PROTOCOL_NATIVE] = "native", [PROTOCOL_NMEA] = "nmea"),
-     .help = "native: the head's stream and commands; nmea: the GNSS receiver, NMEA 0183 out, nothing in."},
+    {LINK(protocol), CFG_ENUM, .def = "native", 
+     WORDS([PROTOCOL_NATIVE] = "native", [PROTOCOL_NMEA] = "nmea", [PROTOCOL_SCIP] = "scip", [PROTOCOL_COLA] = "cola",
+           [PROTOCOL_VELODYNE] = "velodyne", [PROTOCOL_VELODYNE_POSITION] = "velodyne-position",
+           [PROTOCOL_VELODYNE_HTTP] = "velodyne-http"),
+     .help = "native: the head's stream and commands; nmea: the GNSS receiver, NMEA 0183 out, nothing in; scip: as a "
+             "Hokuyo; cola: as a SICK scanner, CoLa-A and CoLa-B; velodyne: data packets, velodyne-position: position "
+             "packets, velodyne-http: settings, as a VLP-16."},
     {LINK(path), CFG_PATH, .def = "", .example = "port",
      .help = "pty: symbolic link to the terminal (optional); file: file to write (required); usbredir: Unix socket, "
              "instead of a port."},
     {LINK(address), CFG_TEXT, .def = "", .example = "127.0.0.1",
-     .help = "tcp, usb: address to listen on, or with attach to connect to; 127.0.0.1 when not given."},
+     .help = "tcp, usb: address to listen on, or with attach to connect to; udp: where the packets go. 127.0.0.1 when "
+             "not given."},
     {LINK(port), CFG_COUNT, NULL, "0", 0, 65535,
-     .help = "tcp, usb: port; 0: the system chooses; usbip, when not given: 3240."},
-    {LINK(max_sessions), CFG_COUNT, NULL, "4", 1, LINK_MAX_SESSIONS, .help = "tcp: clients at a time."},
+     .help = "tcp, usb: port; 0: the system chooses; usbip, when not given: 3240. udp: the receiver's (required)."},
+    {LINK(interface), CFG_TEXT, .def = "", .example = "eth1",
+     .help = "udp: the packets' source is this interface's address. Required where they are broadcast, to "
+             "255.255.255.255 or to its own broadcast address. Routes still say where packets to other addresses go: "
+             "to bind a socket to an interface takes a privilege."},
+    {LINK(max_sessions), CFG_COUNT, NULL, "4", 1, LINK_MAX_SESSIONS,
+     .help = "tcp: clients at a time; scip, when not given: 1."},
     {LINK(backend), CFG_ENUM, .def = "usbip",
      WORDS([USB_BACKEND_USBIP] = "usbip", [USB_BACKEND_USBREDIR] = "usbredir", [USB_BACKEND_FUNCTIONFS] = "functionfs"),
      .help = "usb: how the device reaches a host."},
