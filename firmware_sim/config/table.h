@@ -171,7 +171,9 @@ void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg);
 void cfg_check_links(struct cfg_reader *rd, struct config *cfg);
 /* The same for keys of platforms. Returns whether all of them belong to this kind. */
 int cfg_check_platform_keys(struct cfg_reader *rd, const struct config_platform *platform);
-/* The first link of the GNSS receiver; -1: none. */
-int cfg_nmea_link(const struct config *cfg);
+/* link_protocol.c: what the protocols of links need. */
+void cfg_check_link_protocols(struct cfg_reader *rd, struct config *cfg);
+/* The first link whose protocol has this need; -1: none. */
+int cfg_link_that_needs(const struct config *cfg, enum protocol_needs need);
 
 #endif
