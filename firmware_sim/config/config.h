@@ -176,7 +176,8 @@ enum config_choice { CHOICE_AUTO, CHOICE_OFF, CHOICE_ON };
 /* Settings at power-up, within the profile (checked). */
 struct config_head {
     struct head_settings settings;
-    char serial[32];
+    char serial[32], name[32];
+    int start; /* scan when booted; run alone looks at it */
     enum detect_ambiguity ambiguity;
     uint32_t mta_zones;
 };

@@ -1,5 +1,6 @@
 /* The scan program: which pulses and frames each tick has while a scan is on. */
 #include <math.h>
+#include <string.h>
 
 #include "firmware_sim/device/device_state.h"
 
@@ -143,6 +144,18 @@ void device_describe(struct device *device, struct device_work *work)
     device_fill_descriptor(device, &work->descriptor);
     device_fill_anchor(device->site, device->scan.station, device->scan.stretch, &work->anchor);
     device->scan.describe = device->scan.anchor_lost = 0;
+}
+
+void device_describe_now(struct device *device, struct device_work *work)
+{
+    memset(work, 0, sizeof *work);
+    pthread_mutex_lock(&device->lock);
+    const struct device_scan was = device->scan;
+    device->scan.describe = 0;
+    device_describe(device, work);
+    device->scan = was;
+    work->t_ns = (int64_t)device->next_tick * device->tick_ns;
+    pthread_mutex_unlock(&device->lock);
 }
 
 static void describe(struct device *device, uint64_t tick, struct device_work *work)

@@ -327,7 +327,7 @@ static void fill_pulses(struct worker *worker, const struct device_work *work)
 
 const struct ring_tick *worker_fill(struct worker *worker, const struct device_work *work)
 {
-    worker->tick = (struct ring_tick){.bytes = worker->tick.bytes, .mark = worker->mark, .wake = work->wake};
+    worker->tick = (struct ring_tick){.bytes = worker->tick.bytes, .mark = worker->mark};
     fill_heads(worker, work);
     if (work->scanning) {
         worker->tick.scan = work->scan;
