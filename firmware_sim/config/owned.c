@@ -42,6 +42,7 @@ static void check_usb_link(struct cfg_reader *rd, const struct config *cfg, stru
         snprintf(link->serial, sizeof link->serial, "%s", cfg->head.serial);
         link->own_serial = !cfg_is_given(rd, "head.serial", 0);
     }
+    if (!cfg_set_usb_look(rd, link, i)) return;
     if (link->backend == USB_BACKEND_USBIP && !has_port) link->port = USB_BACKEND_USBIP_PORT;
     if (!CFG_SOUND(rd, i, "links[].backend")) return;
     snprintf(owner, sizeof owner, "the back end %s", cfg_word(rd, "links[].backend", link->backend));
@@ -64,7 +65,7 @@ static void check_link(struct cfg_reader *rd, struct config *cfg, uint32_t i)
         {"links[].address", 1u << LINK_TCP | 1u << LINK_USB},
         {"links[].port", 1u << LINK_TCP | 1u << LINK_USB},
         {"links[].max_sessions", 1u << LINK_TCP},
-        {"links[].protocol", 1u << LINK_NULL | 1u << LINK_FILE | 1u << LINK_PTY | 1u << LINK_TCP},
+        {"links[].protocol", 1u << LINK_NULL | 1u << LINK_FILE | 1u << LINK_PTY | 1u << LINK_TCP | 1u << LINK_USB},
         {"links[].backend", 1u << LINK_USB},
         {"links[].attach", 1u << LINK_USB},
         {"links[].udc", 1u << LINK_USB},
@@ -78,7 +79,8 @@ static void check_link(struct cfg_reader *rd, struct config *cfg, uint32_t i)
                                       [LINK_PTY] = "type, path, protocol",
                                       [LINK_TCP] = "type, address, port, max_sessions, protocol",
                                       [LINK_USB] =
-                                          "type, backend, address, port, path, attach, udc, speed, vid, pid, serial"};
+                                          "type, protocol, backend, address, port, path, attach, udc, speed, vid, pid, "
+                                          "serial"};
     struct link_spec *link = &cfg->link[i];
     char owner[64];
     if (!CFG_SOUND(rd, i, "links[].type")) return;
