@@ -259,7 +259,7 @@ static const struct cfg_key config_keys[] = {
      .help = "usb: product id. When not given: native 0x0001, scip 0x0000, cola 0x5001."},
     {LINK(serial), CFG_TEXT, .def = "", .example = "SIM-0002",
      .help = "usb: serial number. When not given: head.serial where that is given, else SIM-0001 and eight digits that "
-             "are this head's own on this machine. Only the USB device has them, not *IDN?."},
+             "are this head's own on this machine; with scip none, as the device. Only the USB device has them, not *IDN?."},
 
     {"beam", .type = CFG_MAP, .help = "The footprint of the pulses."},
     {KEY(beam.mode), CFG_ENUM, .def = "single",

@@ -163,11 +163,13 @@ void cfg_check_signal(struct cfg_reader *rd, struct config *cfg);
 void cfg_check_reaches(struct cfg_reader *rd, struct config_profile *profile);
 /* owned.c: keys that only some kinds of link have, and what a link needs. */
 void cfg_check_links(struct cfg_reader *rd, struct config *cfg);
-/* usb_look.c: the look of a usb link and its ids. 0: its protocol has none, which is an error, or was not read. */
-int cfg_set_usb_look(struct cfg_reader *rd, struct link_spec *link, uint32_t item);
+/* usb_look.c: the look of a usb link, by its protocol, and the ids that are not given. */
+void cfg_set_usb_look(struct cfg_reader *rd, struct link_spec *link, uint32_t item);
 /* The same for keys of platforms. Returns whether all of them belong to this kind. */
 int cfg_check_platform_keys(struct cfg_reader *rd, const struct config_platform *platform);
-/* The first link of the GNSS receiver; -1: none. */
-int cfg_nmea_link(const struct config *cfg);
+/* link_protocol.c: what the protocols of links need. */
+void cfg_check_link_protocols(struct cfg_reader *rd, struct config *cfg);
+/* The first link whose protocol has this need; -1: none. */
+int cfg_link_that_needs(const struct config *cfg, enum protocol_needs need);
 
 #endif

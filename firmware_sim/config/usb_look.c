@@ -2,33 +2,22 @@
 #include "drivers/usb/looks.h"
 #include "firmware_sim/config/table.h"
 
-/* -1: no such device. */
-static int look_of(int protocol)
+static enum usb_look_id look_of(int protocol)
 {
     switch (protocol) {
-    case PROTOCOL_NATIVE:
-        return USB_LOOK_NATIVE;
     case PROTOCOL_SCIP:
         return USB_LOOK_HOKUYO;
     case PROTOCOL_COLA:
         return USB_LOOK_SICK;
-    default:
-        return -1;
+    default: /* native; the others are refused (link_protocol.c) */
+        return USB_LOOK_NATIVE;
     }
 }
 
-int cfg_set_usb_look(struct cfg_reader *rd, struct link_spec *link, uint32_t item)
+void cfg_set_usb_look(struct cfg_reader *rd, struct link_spec *link, uint32_t item)
 {
-    if (!CFG_SOUND(rd, item, "links[].protocol")) return 0;
-    const int id = look_of(link->protocol);
-    if (id < 0) {
-        cfg_fail_key(rd, "links[].protocol", item, "%s, which no device on USB speaks; allowed native, scip, cola",
-                     cfg_word(rd, "links[].protocol", link->protocol));
-        return 0;
-    }
-    const struct usb_look *look = usb_look_get((enum usb_look_id)id);
-    link->look = id;
+    const struct usb_look *look = usb_look_get(look_of(link->protocol));
+    link->look = (int)look_of(link->protocol);
     if (!cfg_is_given(rd, "links[].vid", item)) link->vid = look->vid;
     if (!cfg_is_given(rd, "links[].pid", item)) link->pid = look->pid;
-    return 1;
 }

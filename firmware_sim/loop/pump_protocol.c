@@ -29,7 +29,7 @@ static int is_stale(const struct pump *pump, const struct session *s)
 static int host_send(void *ctx, const void *unit, size_t len)
 {
     struct session *s = ctx;
-    if (len == 0) return 0;
+    if (len == 0 || s->hang_up) return s->hang_up;
     if (!is_stale(s->pump, s) && unit_queue_put(&s->units, unit, len, stream_released(s->pump->stream)) == 0) return 0;
     session_count_units(s->pump, s, 1);
     return 1;
@@ -78,7 +78,7 @@ static void host_count(void *ctx, enum protocol_count what, uint64_t n)
 static void host_hang_up(void *ctx)
 {
     struct session *s = ctx;
-    s->hang_up = 1;
+    s->hang_up = s->pump->ops->end != NULL;
 }
 
 /* ---- the session */
@@ -221,7 +221,7 @@ int session_write_protocol(struct pump *pump, struct session *s, int index)
         continue;
     stream_move_reader(pump->stream, s->reader, s->cursor);
     if (s->units.n == 0) s->lost.lagging = 0;
-    if (!full && s->hang_up && pump->ops->end != NULL) pump->ops->end(pump->link, index);
+    if (!full && s->hang_up) pump->ops->end(pump->link, index);
     return full;
 }
 
