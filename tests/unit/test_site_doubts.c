@@ -161,6 +161,7 @@ static void attributes_that_nothing_fills(void **state)
     says_nothing();
 }
 
+#ifndef SH_SANITIZE /* the house is large, and loading it has a test of its own */
 /* config/README.md: they are ready to run. */
 static void configurations_of_this_tree_are_silent(void **state)
 {
@@ -180,6 +181,7 @@ static void configurations_of_this_tree_are_silent(void **state)
     }
     globfree(&found);
 }
+#endif
 
 static int setup(void **state)
 {
@@ -215,7 +217,9 @@ int main(void)
         cmocka_unit_test(a_scale_that_is_a_thousand_times_off),
         cmocka_unit_test(a_window_between_two_pulses),
         cmocka_unit_test(attributes_that_nothing_fills),
+#ifndef SH_SANITIZE
         cmocka_unit_test(configurations_of_this_tree_are_silent),
+#endif
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }
