@@ -2,7 +2,7 @@
  *
  * A kind of link is one file of this folder with one `const struct link_ops`, whose members are the contract;
  * null.c is the skeleton for a new one, link.c has the list. A link has sessions: readers and commanders that
- * come and go. A pty or a file has one, TCP several, USB two (console and stream). One thread owns a link and
+ * come and go. A pty or a file has one, TCP several, USB two (console and stream) or one. One thread owns a link and
  * makes all calls on it. Only poll() waits; write() of `file` may wait for the disk. */
 #ifndef DRIVERS_LINK_LINK_H
 #define DRIVERS_LINK_LINK_H
@@ -31,6 +31,7 @@ struct link_spec {
     int backend; /* enum usb_backend_type */
     int speed;   /* enum usb_rate: the fastest the device can do */
     int attach, retry_ms, vid, pid;
+    int look; /* enum usb_look_id: the device it shows itself as, apart from vid, pid and serial */
     char udc[64];
     char serial[64]; /* empty: no serial number string */
     int own_serial;  /* serial is only its beginning: drivers/usb/own_identity.h has the rest */

@@ -4,12 +4,14 @@
  * two rows here. */
 extern const struct protocol_ops protocol_native;
 extern const struct protocol_ops protocol_nmea;
+extern const struct protocol_ops protocol_scip;
 extern const struct protocol_ops protocol_velodyne;
 extern const struct protocol_ops protocol_velodyne_position;
 
 static const struct protocol_ops *const protocols[PROTOCOL_N] = {
     [PROTOCOL_NATIVE] = &protocol_native,
     [PROTOCOL_NMEA] = &protocol_nmea,
+    [PROTOCOL_SCIP] = &protocol_scip,
     [PROTOCOL_VELODYNE] = &protocol_velodyne,
     [PROTOCOL_VELODYNE_POSITION] = &protocol_velodyne_position,
 };

@@ -42,6 +42,7 @@ static void check_usb_link(struct cfg_reader *rd, const struct config *cfg, stru
         snprintf(link->serial, sizeof link->serial, "%s", cfg->head.serial);
         link->own_serial = !cfg_is_given(rd, "head.serial", 0);
     }
+    cfg_set_usb_look(rd, link, i);
     if (link->backend == USB_BACKEND_USBIP && !has_port) link->port = USB_BACKEND_USBIP_PORT;
     if (!CFG_SOUND(rd, i, "links[].backend")) return;
     snprintf(owner, sizeof owner, "the back end %s", cfg_word(rd, "links[].backend", link->backend));
