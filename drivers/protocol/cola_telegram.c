@@ -144,7 +144,7 @@ static void put_hex(struct cola_out *out, uint32_t v, unsigned least)
 void cola_put_u(struct cola_out *out, unsigned bytes, uint32_t v)
 {
     if (out->form == COLA_A) {
-        put_hex(out, v, 1);
+        put_hex(out, v & most(bytes), 1);
         return;
     }
     const uint8_t wire[4] = {(uint8_t)(v >> 24), (uint8_t)(v >> 16), (uint8_t)(v >> 8), (uint8_t)v};
@@ -153,7 +153,7 @@ void cola_put_u(struct cola_out *out, unsigned bytes, uint32_t v)
 
 void cola_put_i(struct cola_out *out, unsigned bytes, int32_t v)
 {
-    cola_put_u(out, bytes, (uint32_t)v & most(bytes));
+    cola_put_u(out, bytes, (uint32_t)v);
 }
 
 void cola_put_float(struct cola_out *out, float v)
