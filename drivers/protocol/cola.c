@@ -127,6 +127,7 @@ static void take_input(void *protocol, const uint8_t *bytes, size_t len)
 const struct protocol_ops protocol_cola = {
     .name = "cola",
     .needs = PROTOCOL_NEEDS_POLAR,
+    .emitters = 1u << NATIVE_EMIT_PLANAR,
     .max_unit = COLA_MAX_UNIT,
     .create = create,
     .destroy = free,

@@ -62,6 +62,14 @@ static void hang_up(void *ctx)
     ((struct protocol_rig *)ctx)->hung_up = 1;
 }
 
+/* A fix each full second of device time. */
+static int64_t next_fix_ns(void *ctx, int64_t t_ns)
+{
+    const int64_t second_ns = 1000000000;
+    (void)ctx;
+    return (t_ns + second_ns - 1) / second_ns * second_ns;
+}
+
 void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char *maker, const char *model)
 {
     struct sh_err err;
@@ -76,7 +84,7 @@ void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char
     snprintf(rig->identity.firmware, sizeof rig->identity.firmware, "1.2.3");
     snprintf(rig->identity.name, sizeof rig->identity.name, "rig");
     rig->spec = (struct protocol_spec){.identity = &rig->identity,
-                                       .host = {rig, keep_unit, answer, utc_ns, fix, count, hang_up},
+                                       .host = {rig, keep_unit, answer, utc_ns, fix, count, hang_up, next_fix_ns},
                                        .session = 1,
                                        .fixes_hz = 1};
     assert_int_equal(rig->ops->create(&rig->spec, &rig->protocol, &err), SH_OK);
@@ -185,15 +193,16 @@ static void add_point(struct line_block *b, const struct protocol_rig_run *run, 
 
 void protocol_rig_points(struct protocol_rig *rig, const struct protocol_rig_run *run)
 {
-    struct line_block b = {.frame = run->frame,
-                           .line = run->line,
-                           .pulse0 = run->pulse0,
-                           .n_pulses = run->n,
-                           .t0_ns = run->t0_ns,
-                           .line_t0_ns = run->line_t0_ns,
-                           .layout = LINE_POLAR};
+    struct line_block b;
     struct sh_err err;
     assert_int_equal(line_block_alloc(&b, 3 * run->n, &err), SH_OK);
+    b.frame = run->frame;
+    b.line = run->line;
+    b.pulse0 = run->pulse0;
+    b.n_pulses = run->n;
+    b.t0_ns = run->t0_ns;
+    b.line_t0_ns = run->line_t0_ns;
+    b.layout = LINE_POLAR;
     if (rig->attributes) assert_int_equal(line_block_alloc_attributes(&b, &err), SH_OK);
     for (uint32_t i = 0; i < run->n; i++)
         for (uint32_t k = 0; k == 0 || k < run->shot[i].n; k++)
