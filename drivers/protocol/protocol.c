@@ -7,6 +7,7 @@ static const struct protocol_ops *const protocols[PROTOCOL_N] = {
     [PROTOCOL_NATIVE] = NULL,
     [PROTOCOL_VELODYNE] = &protocol_velodyne,
     [PROTOCOL_VELODYNE_POSITION] = &protocol_velodyne_position,
+    [PROTOCOL_VELODYNE_HTTP] = &protocol_velodyne_http,
 };
 
 const struct protocol_ops *protocol_ops_get(enum protocol_id id)
