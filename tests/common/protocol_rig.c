@@ -62,6 +62,14 @@ static void hang_up(void *ctx)
     ((struct protocol_rig *)ctx)->hung_up = 1;
 }
 
+/* A fix each full second of device time. */
+static int64_t next_fix_ns(void *ctx, int64_t t_ns)
+{
+    const int64_t second_ns = 1000000000;
+    (void)ctx;
+    return (t_ns + second_ns - 1) / second_ns * second_ns;
+}
+
 void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char *maker, const char *model)
 {
     struct sh_err err;
@@ -76,7 +84,7 @@ void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char
     snprintf(rig->identity.firmware, sizeof rig->identity.firmware, "1.2.3");
     snprintf(rig->identity.name, sizeof rig->identity.name, "rig");
     rig->spec = (struct protocol_spec){.identity = &rig->identity,
-                                       .host = {rig, keep_unit, answer, utc_ns, fix, count, hang_up},
+                                       .host = {rig, keep_unit, answer, utc_ns, fix, count, hang_up, next_fix_ns},
                                        .session = 1,
                                        .fixes_hz = 1};
     assert_int_equal(rig->ops->create(&rig->spec, &rig->protocol, &err), SH_OK);
