@@ -7,6 +7,7 @@ extern const struct protocol_ops protocol_nmea;
 extern const struct protocol_ops protocol_scip;
 extern const struct protocol_ops protocol_velodyne;
 extern const struct protocol_ops protocol_velodyne_position;
+extern const struct protocol_ops protocol_velodyne_http;
 
 static const struct protocol_ops *const protocols[PROTOCOL_N] = {
     [PROTOCOL_NATIVE] = &protocol_native,

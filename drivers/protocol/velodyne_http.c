@@ -164,6 +164,12 @@ static void no_gap(void *protocol, uint32_t n_frames)
     (void)n_frames;
 }
 
+static int64_t never(const void *protocol)
+{
+    (void)protocol;
+    return INT64_MAX;
+}
+
 const struct protocol_ops protocol_velodyne_http = {
     .name = "velodyne-http",
     .max_unit = MAX_ANSWER,
@@ -174,4 +180,5 @@ const struct protocol_ops protocol_velodyne_http = {
     .gap = no_gap,
     .time = at_time,
     .input = input,
+    .next_ns = never,
 };
