@@ -38,7 +38,6 @@ static const struct status {
     const char *words, *text; /* where nothing more exact is known */
 } statuses[] = {
     {200, "OK", ""},
-    {204, "No Content", ""},
     {400, "Bad Request", "this is not a request of HTTP/1.1"},
     {403, "Forbidden", "settings are not for pages from elsewhere"},
     {404, "Not Found", "no such path"},
@@ -62,29 +61,27 @@ static const struct status *status_of(int number)
     return &statuses[i];
 }
 
-/* One answer. body: text of len bytes; without one, errors have the line of the table. No answer has anything that came
- * from the client. */
+/* One answer, with a body of len bytes. No answer has anything that came from the client. */
 static void answer(struct server *s, int number, const char *type, const char *body, size_t len, const char *more)
 {
     const struct status *status = status_of(number);
-    int n = snprintf(s->answer, sizeof s->answer, "HTTP/1.1 %d %s\r\nConnection: %s\r\nCache-Control: no-store\r\n%s",
-                     status->number, status->words, s->over ? "close" : "keep-alive", more);
-    if (number == 204)
-        n += snprintf(s->answer + n, sizeof s->answer - (size_t)n, "\r\n");
-    else
-        n += snprintf(s->answer + n, sizeof s->answer - (size_t)n,
-                      "Content-Type: %s\r\nX-Content-Type-Options: nosniff\r\nContent-Length: %zu\r\n\r\n%.*s", type,
-                      len, s->no_body ? 0 : (int)len, body);
+    const int n = snprintf(s->answer, sizeof s->answer,
+                           "HTTP/1.1 %d %s\r\nConnection: %s\r\nCache-Control: no-store\r\n%sContent-Type: %s\r\n"
+                           "X-Content-Type-Options: nosniff\r\nContent-Length: %zu\r\n\r\n%.*s",
+                           status->number, status->words, s->over ? "close" : "keep-alive", more, type, len,
+                           s->no_body ? 0 : (int)len, body);
     s->spec.host.send(s->spec.host.ctx, s->answer, (size_t)n);
     if (number >= 400) s->spec.host.count(s->spec.host.ctx, PROTOCOL_WRONG, 1);
     if (s->over) s->spec.host.hang_up(s->spec.host.ctx);
 }
 
+static const char plain[] = "text/plain; charset=us-ascii";
+
 /* A line of plain text; NULL: that of the table. */
 static void answer_error(struct server *s, int number, const char *text, const char *more)
 {
     const int n = snprintf(s->body, sizeof s->body, "%s\n", text != NULL ? text : status_of(number)->text);
-    answer(s, number, "text/plain; charset=us-ascii", s->body, (size_t)n, more);
+    answer(s, number, plain, s->body, (size_t)n, more);
 }
 
 static void carry_out(struct server *s, const struct http_request *q)
@@ -99,9 +96,10 @@ static void carry_out(struct server *s, const struct http_request *q)
     } else if (takes && q->foreign) {
         answer_error(s, 403, NULL, "");
     } else if (takes) {
+        /* The device answers 204. MRPT 2.5.8 takes 200 alone, other clients take both. */
         const int status = velodyne_post(&s->spec, q->path, q->body, q->body_len, text);
-        if (status == 204)
-            answer(s, 204, NULL, NULL, 0, "");
+        if (status == 200)
+            answer(s, 200, plain, "", 0, "");
         else
             answer_error(s, status, text, "");
     } else {

@@ -26,7 +26,7 @@ static int command(const struct posted *p, const char *line)
     char reply[MAX_REPLY];
     const struct protocol_host *host = &p->spec->host;
     const int error = host->command(host->ctx, line, reply, sizeof reply);
-    if (error == 0) return 204;
+    if (error == 0) return 200;
     snprintf(p->text, VELODYNE_TEXT, "the head refuses %s: %s", line, reply);
     return error == -203 ? 409 : error == -222 ? 400 : 503;
 }
@@ -53,7 +53,7 @@ static int read_switch(const char *s, int *on)
     return *on || strcasecmp(s, "off") == 0;
 }
 
-/* ---- the keys. Each is called with apply 0 first, and returns 204 or an error. */
+/* ---- the keys. Each is called with apply 0 first, and returns 200 or an error. */
 
 static int is_scanning(const struct protocol_spec *spec)
 {
@@ -66,7 +66,7 @@ static int set_laser(const struct posted *p, const char *value, int apply)
 {
     int on;
     if (!read_switch(value, &on)) return refuse(p, 400, "laser: on or off");
-    if (!apply || is_scanning(p->spec) == on) return 204;
+    if (!apply || is_scanning(p->spec) == on) return 200;
     return command(p, on ? "SCAN:START" : "SCAN:STOP");
 }
 
@@ -80,7 +80,7 @@ static int set_returns(const struct posted *p, const char *value, int apply)
         char line[32];
         if (strcasecmp(value, returns[i].name) != 0) continue;
         snprintf(line, sizeof line, "SCAN:ECHOES %s", returns[i].word);
-        return apply ? command(p, line) : 204;
+        return apply ? command(p, line) : 200;
     }
     return refuse(p, 400, "returns: Strongest, Last or Dual");
 }
@@ -92,8 +92,8 @@ static int set_rpm(const struct posted *p, const char *value, int apply)
     long rpm;
     if (!read_number(value, &rpm) || (rpm != 0 && (rpm < 300 || rpm > 1200)))
         return refuse(p, 400, "rpm: a whole number, 300 to 1200; 0: the motor stops");
-    if (!apply) return 204;
-    if (rpm == 0) return is_scanning(p->spec) ? command(p, "SCAN:STOP") : 204;
+    if (!apply) return 200;
+    if (rpm == 0) return is_scanning(p->spec) ? command(p, "SCAN:STOP") : 200;
     const long uhz = (rpm * 1000000 + 30) / 60;
     snprintf(line, sizeof line, "HEAD:LINES %ld.%06ld", uhz / 1000000, uhz % 1000000);
     return command(p, line);
@@ -103,7 +103,7 @@ static int set_fov(const struct posted *p, const char *value, long whole, const 
 {
     long deg;
     if (!read_number(value, &deg) || deg > 359) return refuse(p, 400, "start, end: a whole number, 0 to 359 degrees");
-    return deg == whole ? 204 : refuse(p, 409, why);
+    return deg == whole ? 200 : refuse(p, 409, why);
 }
 
 static int set_fov_start(const struct posted *p, const char *value, int apply)
@@ -121,7 +121,7 @@ static int set_fov_end(const struct posted *p, const char *value, int apply)
 static int set_address(const struct posted *p, const char *value, int apply)
 {
     (void)apply;
-    if (strcmp(value, velodyne_host_address(p->spec)) == 0) return 204;
+    if (strcmp(value, velodyne_host_address(p->spec)) == 0) return 200;
     return refuse(p, 409, "addr: addresses are those of the head's configuration (links)");
 }
 
@@ -130,7 +130,7 @@ static int set_data_port(const struct posted *p, const char *value, int apply)
     long port;
     (void)apply;
     if (!read_number(value, &port) || port < 1 || port > 65535) return refuse(p, 400, "dport: 1 to 65535");
-    if (port == velodyne_host_port(p->spec)) return 204;
+    if (port == velodyne_host_port(p->spec)) return 200;
     return refuse(p, 409, "dport: ports are those of the head's configuration (links)");
 }
 
@@ -139,7 +139,7 @@ static int set_position_port(const struct posted *p, const char *value, int appl
     long port;
     (void)apply;
     if (!read_number(value, &port) || port < 1 || port > 65535) return refuse(p, 400, "tport: 1 to 65535");
-    if (port == VELODYNE_POSITION_PORT) return 204;
+    if (port == VELODYNE_POSITION_PORT) return 200;
     return refuse(p, 409, "tport: ports are those of the head's configuration (links)");
 }
 
@@ -155,7 +155,7 @@ static int set_phase_lock(const struct posted *p, const char *value, int apply)
     int on;
     (void)apply;
     if (!read_switch(value, &on)) return refuse(p, 400, "enabled: on or off");
-    return on ? refuse(p, 409, "enabled: off alone; this head has no phase lock") : 204;
+    return on ? refuse(p, 409, "enabled: off alone; this head has no phase lock") : 200;
 }
 
 /* Without a phase lock it has no effect; but what the device doesn't take is refused. */
@@ -164,24 +164,24 @@ static int set_phase(const struct posted *p, const char *value, int apply)
     char *end;
     (void)apply;
     const double offset = value[0] >= '0' && value[0] <= '9' ? strtod(value, &end) : -1.0;
-    if (offset >= 0.0 && offset < 36000.0 && strspn(value, "0123456789.") == strlen(value) && *end == '\0') return 204;
+    if (offset >= 0.0 && offset < 36000.0 && strspn(value, "0123456789.") == strlen(value) && *end == '\0') return 200;
     return refuse(p, 400, "offset: 0 to 35999, in 0.01 degree; offsetInput: in degrees");
 }
 
 static int save(const struct posted *p, const char *value, int apply)
 {
     (void)apply;
-    return strcmp(value, "submit") == 0 ? 204 : refuse(p, 400, "data: submit");
+    return strcmp(value, "submit") == 0 ? 200 : refuse(p, 400, "data: submit");
 }
 
 /* The settings of power-up, and it measures. The device is silent for some seconds then; this head is not. */
 static int reset(const struct posted *p, const char *value, int apply)
 {
     if (strcmp(value, "reset_system") != 0) return refuse(p, 400, "data: reset_system");
-    if (!apply) return 204;
+    if (!apply) return 200;
     int status = command(p, "HEAD:LINES DEF");
-    if (status == 204) status = command(p, "SCAN:ECHOES DEF");
-    if (status == 204 && !is_scanning(p->spec)) status = command(p, "SCAN:START");
+    if (status == 200) status = command(p, "SCAN:ECHOES DEF");
+    if (status == 200 && !is_scanning(p->spec)) status = command(p, "SCAN:START");
     return status;
 }
 
@@ -262,7 +262,7 @@ static int read_pair(const struct posted *p, const char *path, char *s, size_t l
         decode(s, (size_t)(equals - s)) != 0)
         return refuse(p, 400, "the body is not a form: key=value&key=value");
     *out = (struct pair){find_setting(path, s), equals + 1};
-    return out->setting != NULL ? 204 : refuse(p, 400, "this path has no such key");
+    return out->setting != NULL ? 200 : refuse(p, 400, "this path has no such key");
 }
 
 /* The number of pairs, or an error as a status below 0. */
@@ -274,7 +274,7 @@ static int read_form(const struct posted *p, const char *path, char *form, size_
         end = ampersand != NULL ? (size_t)(ampersand - form) : len;
         if (n == MAX_PAIRS) return -refuse(p, 400, "too many keys: at most 8");
         int status = read_pair(p, path, form + at, end - at, &pairs[n]);
-        if (status != 204) return -status;
+        if (status != 200) return -status;
         for (int i = 0; i < n; i++)
             if (pairs[i].setting == pairs[n].setting) return -refuse(p, 400, "a key stands twice");
         n++;
@@ -290,9 +290,9 @@ int velodyne_post(const struct protocol_spec *spec, const char *path, const char
     if (len > VELODYNE_MAX_FORM) return refuse(&posted, 413, "the body is too long");
     memcpy(copy, form, len);
     const int n = read_form(&posted, path, copy, len, pairs);
-    int status = n < 0 ? -n : 204;
+    int status = n < 0 ? -n : 200;
     for (int apply = 0; apply < 2; apply++)
-        for (int i = 0; i < n && status == 204; i++)
+        for (int i = 0; i < n && status == 200; i++)
             status = pairs[i].setting->set(&posted, pairs[i].value, apply);
     return status;
 }
