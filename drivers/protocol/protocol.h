@@ -39,9 +39,10 @@ enum protocol_needs {
 
 /* What is counted of a session beside the frames it lost. */
 enum protocol_count {
-    PROTOCOL_UNITS_LOST, /* units that were not sent: no room, or parts of them were missing */
-    PROTOCOL_INPUT_LOST, /* bytes from the client that were thrown away: overlong, out of frame, garbage */
-    PROTOCOL_WRONG,      /* requests that were answered with an error */
+    PROTOCOL_UNITS_LOST,  /* units that were not sent: no room, or parts of them were missing */
+    PROTOCOL_INPUT_LOST,  /* bytes from the client that were thrown away: overlong, out of frame, garbage */
+    PROTOCOL_WRONG,       /* requests that were answered with an error */
+    PROTOCOL_POINTS_LOST, /* echoes that were sent as none: the protocol has no number for their range */
     PROTOCOL_N_COUNTS
 };
 

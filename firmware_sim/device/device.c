@@ -31,7 +31,8 @@ static int set_limits(struct device *device, struct sh_err *err)
                                               .fov_max_udeg = p->fov_max_udeg,
                                               .pan_min_udeg = p->pan_min_udeg,
                                               .pan_max_udeg = p->pan_max_udeg,
-                                              .n_stations = device->site->n_stations};
+                                              .n_stations = device->site->n_stations,
+                                              .line_pulses = emitter_line_pulses(&p->emitter)};
     device->cmd.settings = device->cmd.defaults = cfg->head.settings;
     int len = snprintf(device->idn, sizeof device->idn, "%s,%s,%s,scanhead native %d", p->maker, p->model,
                        cfg->head.serial, NATIVE_VERSION);

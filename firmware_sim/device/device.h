@@ -45,8 +45,10 @@ struct device_work {
     uint32_t n_events_before; /* of event[]: those that go before the points; the others go after them */
     uint32_t n_events;
     struct native_event event[DEVICE_MAX_EVENTS];
-    int describe, describe_flags; /* descriptor and anchor frames, with these flags */
+    int describe, describe_flags; /* descriptor, emitter and anchor frames, with these flags */
     struct native_descriptor descriptor;
+    struct native_emitter emitter; /* kind NATIVE_EMIT_LINE: none is sent */
+    struct native_beam beam[NATIVE_MAX_BEAMS];
     struct native_anchor anchor;
     uint32_t surfaces_first, surfaces_n; /* names to send; 0: none */
     int scanning;

@@ -29,7 +29,8 @@ void device_begin_scan(struct device *device, uint64_t tick)
 uint32_t device_tick_pulses(const struct config *cfg)
 {
     uint32_t n = (uint32_t)ceil((double)cfg->profile.prr_max_uhz * 1e-6 / cfg->loop.tick_hz);
-    return n + n / 8 + 2 * SCHEDULE_PACKET; /* an eighth: to catch up with */
+    /* An eighth: to catch up with. A firing sequence may begin with all of its pulses. */
+    return n + n / 8 + 2 * SCHEDULE_PACKET + cfg->profile.emitter.n_beams;
 }
 
 uint32_t device_tick_lines(const struct config *cfg)
@@ -142,6 +143,7 @@ void device_describe(struct device *device, struct device_work *work)
     work->describe = 1;
     work->describe_flags = device->scan.describe ? 0 : NATIVE_REPEAT;
     device_fill_descriptor(device, &work->descriptor);
+    device_fill_emitter(device, &work->emitter, work->beam);
     device_fill_anchor(device->site, device->scan.station, device->scan.stretch, &work->anchor);
     device->scan.describe = device->scan.anchor_lost = 0;
 }

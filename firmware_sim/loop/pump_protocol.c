@@ -72,7 +72,8 @@ static void host_count(void *ctx, enum protocol_count what, uint64_t n)
     if (what == PROTOCOL_UNITS_LOST) session_count_units(s->pump, s, n);
     if (what == PROTOCOL_INPUT_LOST) counts->lost_input_bytes += n;
     if (what == PROTOCOL_WRONG) counts->wrong_requests += n;
-    s->commands.wrong += what != PROTOCOL_UNITS_LOST;
+    if (what == PROTOCOL_POINTS_LOST) counts->lost_points += n;
+    s->commands.wrong += what == PROTOCOL_INPUT_LOST || what == PROTOCOL_WRONG;
 }
 
 static void host_hang_up(void *ctx)

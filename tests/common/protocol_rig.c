@@ -193,15 +193,16 @@ static void add_point(struct line_block *b, const struct protocol_rig_run *run, 
 
 void protocol_rig_points(struct protocol_rig *rig, const struct protocol_rig_run *run)
 {
-    struct line_block b = {.frame = run->frame,
-                           .line = run->line,
-                           .pulse0 = run->pulse0,
-                           .n_pulses = run->n,
-                           .t0_ns = run->t0_ns,
-                           .line_t0_ns = run->line_t0_ns,
-                           .layout = LINE_POLAR};
+    struct line_block b;
     struct sh_err err;
     assert_int_equal(line_block_alloc(&b, 3 * run->n, &err), SH_OK);
+    b.frame = run->frame;
+    b.line = run->line;
+    b.pulse0 = run->pulse0;
+    b.n_pulses = run->n;
+    b.t0_ns = run->t0_ns;
+    b.line_t0_ns = run->line_t0_ns;
+    b.layout = LINE_POLAR;
     if (rig->attributes) assert_int_equal(line_block_alloc_attributes(&b, &err), SH_OK);
     for (uint32_t i = 0; i < run->n; i++)
         for (uint32_t k = 0; k == 0 || k < run->shot[i].n; k++)
