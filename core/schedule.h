@@ -16,6 +16,8 @@
 
 #include <stdint.h>
 
+#include "core/emitter.h"
+
 enum { SCHEDULE_PACKET = 16 }; /* pulses are cut at multiples of this from the line's first pulse */
 
 struct schedule_spec {
@@ -24,19 +26,23 @@ struct schedule_spec {
     int64_t line_start_udeg, line_stop_udeg; /* cast window, both ends included */
     int64_t pan_start_udeg, pan_stop_udeg;
     uint32_t frames; /* 0: without end */
+    /* NULL: a line head. Else the pan keeps still; prr_uhz is steps * lines_uhz where the emitter has steps, and
+     * only for show where it has a table; line angles count from azimuth 0 on (planar: emitter_step_udeg) */
+    const struct emitter *emitter;
 };
 
 struct schedule_segment {
     struct schedule_spec spec;
     uint64_t k0;   /* first pulse, in the scan */
-    int64_t t0_ns; /* its time since the scan's start: t0_ns + t0_acc / prr_uhz nanoseconds */
+    int64_t t0_ns; /* its time since the scan's start: t0_ns + t0_acc / tick_den nanoseconds */
     uint64_t t0_acc;
     uint64_t line0, r0;   /* its line, and place in the sweep as r0/den */
     uint64_t line0_begin; /* first pulse of line0, before k0 where the line began in an earlier segment ... */
     int64_t line0_begin_ns;
-    uint64_t line0_cast; /* ... and how many of its pulses were cast there */
-    uint64_t num, den;   /* lines per pulse */
-    int64_t ns_quot;     /* pulse period = ns_quot + ns_rem / prr_uhz nanoseconds */
+    uint64_t line0_cast;         /* ... and how many of its pulses were cast there */
+    uint64_t tick_num, tick_den; /* a tick: nanoseconds */
+    uint64_t num, den;           /* lines per tick */
+    int64_t ns_quot;             /* a tick = ns_quot + ns_rem / tick_den nanoseconds */
     uint64_t ns_rem;
     uint64_t r_first, r_last; /* cast where r_first <= r <= r_last */
     uint32_t frame0;          /* frame at k0 */
@@ -58,6 +64,14 @@ struct schedule_run {
     double pan0_turn, pan_step_turn; /* pan = pan0 + (in_line + j) * step, of the line's first pulse */
     uint64_t ns_acc, ns_rem, ns_den; /* dt(j) = j*ns_quot + floor((ns_acc + j*ns_rem) / ns_den) */
     int64_t ns_quot;
+    /* Where angles or times come from a table, else NULL. Pulse j uses row i = (firing_at + j) mod n_firings.
+     * It fires d(j) = (firing_at + j) div n_firings * sequence_ticks + firing[i].tick - firing[firing_at].tick
+     * ticks after the first one: put d for j in dt above. (Directions: one pulse a tick, sequence_ticks is 0, and
+     * dt as it stands.) mirror = firing[i].mirror_turn, pan = (r + d*num) * pan_turn_per_r + firing[i].pan_turn */
+    const struct emitter_firing *firing;
+    uint32_t n_firings, firing_at;
+    uint64_t sequence_ticks;
+    double pan_turn_per_r;
 };
 
 /* A line's place in a segment. */
@@ -95,6 +109,9 @@ uint64_t schedule_cut(const struct schedule_segment *seg, uint64_t k);
 /* The run of pulses k .. k+n-1, all of `line`. */
 void schedule_get_run(const struct schedule_segment *seg, const struct schedule_line *line, uint64_t k, uint32_t n,
                       struct schedule_run *run);
+
+/* So many pulses, at least one, fire within max_ns. */
+uint64_t schedule_longest_run(const struct schedule_segment *seg, int64_t max_ns);
 
 /* Pan angle and mirror angle of any pulse, in turns, for the encoders. The pan's is not reduced to one
  * turn. */

@@ -1,5 +1,6 @@
 #!/bin/bash
-# The order of the rooms: which folder may use which, by #include and by call; a README in each; C++ in one file.
+# The order of the rooms: which folder may use which, by #include and by call; a README in each; C++ in one file; no file
+# has the marks of an unfinished merge.
 # Prints TAP.
 #
 #   check_includes.sh [ROOT [OBJECTS]]      ROOT: default the tree this script is in
@@ -158,6 +159,15 @@ readme_violations() {
     )
 }
 
+# Prints `FILE:LINE: what is there` for each mark of a merge that was not finished, below the folder $1.
+conflict_violations() {
+    (
+        cd "$1" || exit 1
+        grep -r -n -I -E '^(<{7}|>{7}|\|{7})( |$)' --exclude-dir=.git --exclude-dir='build*' --exclude-dir=node_modules . |
+            sed 's|^\./||'
+    )
+}
+
 root=${1:-$(dirname "$0")/..}
 built=${2:-$root/build/test}
 work=$(mktemp -d) || exit 1
@@ -302,6 +312,17 @@ expect_readme 1
 expect_readme 1 '# cast' '' 'The stages of a pulse.'
 expect_readme 1 '# cast' '' 'The stages of a pulse. They have an order.' '' 'What does not belong here: all else. It is elsewhere.'
 
+expect_conflict() { # violations line...
+    local found
+    rm -rf "$work/tree"
+    plant core/README.md "${@:2}"
+    found=$(conflict_violations "$work/tree")
+    [ "$(printf '%s' "$found" | grep -c '')" = "$1" ]
+    report $? "$([ "$1" = 0 ] && echo passes || echo finds) the marks of a merge: $1 in $2" "found: ${found:-nothing}"
+}
+expect_conflict 0 '# A title' '=======' 'a <<<<<<< b' '<<<<<<<<< c'
+expect_conflict 2 '<<<<<<< HEAD' 'a' '=======' 'b' '>>>>>>> other'
+
 upward_of() { printf '%s\n' "$upward" | grep -c "^$1/"; }
 for folder in core drivers firmware_sim; do
     [ -n "$(find "$root/$folder" -name '*.[ch]' -print -quit 2>/dev/null)" ]
@@ -329,5 +350,8 @@ fi
 found=$(readme_violations "$root")
 [ -z "$found" ]
 report $? "each folder has a README that says what belongs into it" "$found"
+found=$(conflict_violations "$root")
+[ -z "$found" ]
+report $? "no file has the marks of a merge" "$found"
 echo "1..$n"
 exit $failed

@@ -7,20 +7,7 @@ work=$(mktemp -d) || exit 1
 head=
 trap '[ -z "$head" ] || kill "$head"; rm -rf "$work"' EXIT
 prefix=/opt/scanhead
-tests=0
-
-# check NAME COMMAND...: passes when the command does; else what it wrote is shown.
-check() {
-    tests=$((tests + 1))
-    name=$1
-    shift
-    if "$@" >"$work/out" 2>&1; then
-        echo "ok $tests - $name"
-    else
-        echo "not ok $tests - $name"
-        tail -n 20 "$work/out" | sed 's/^/# /'
-    fi
-}
+. tests/tap.sh
 
 # Without what the make above this one told it.
 install_it() {

@@ -5,20 +5,7 @@
 set -u
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
-tests=0
-
-# check NAME COMMAND...: passes when the command does; else what it wrote is shown.
-check() {
-    tests=$((tests + 1))
-    name=$1
-    shift
-    if "$@" >"$work/out" 2>&1; then
-        echo "ok $tests - $name"
-    else
-        echo "not ok $tests - $name"
-        tail -n 20 "$work/out" | cut -c -300 | sed 's/^/# /'
-    fi
-}
+. tests/tap.sh
 
 # would TARGET [VARIABLE=...]: the commands that make would run for it in a new folder, without what a make above said.
 would() {

@@ -1,10 +1,11 @@
 #!/bin/bash
 # Runs test programs that print TAP (cmocka programs, scripts) and adds up.
 #
-#   run_tap.sh [-t SECONDS] [-j N] PROGRAM... [-- PROGRAM...]
+#   run_tap.sh [-t SECONDS] [-j N] PROGRAM... [--M PROGRAM...] [-- PROGRAM...]
 #
 # SECONDS per program; default $TAP_LIMIT_S, or 300. N programs at a time, default 1; one that begins with `+` runs beside
-# these. Those after `--` have the machine to themselves, one after the other.
+# these. Those after `--M` begin once all before have ended, M at a time. Those after `--` have the machine to themselves,
+# one after the other.
 # One line per program, in the order given, and the tables of those that have some; of one that fails, all
 # that it printed but its passed tests. The reasons of skips follow.
 # The last line is `N passed, N failed, N skipped`. Exit status 1 when anything failed, 2 for wrong usage.
@@ -144,9 +145,10 @@ wait_all() {
 beside=0
 for program; do
     case $program in
-    --)
+    --*)
         wait_all
-        at_a_time=1 beside=0
+        at_a_time=${program#--} beside=0
+        at_a_time=${at_a_time:-1}
         ;;
     +*)
         beside=$((beside + 1)) # also once it has ended: one more at a time is no harm

@@ -96,7 +96,10 @@ void caster_aim(struct caster *c, struct chunk *k)
     const struct cast_setup *s = k->s;
     const struct instrument *instrument = s->detect != NULL ? s->detect->instrument : NULL;
     struct echo_list *l = &c->list;
-    kernel_angles(k->run, k->first, k->n, l->mirror_turn, l->pan_turn);
+    if (k->run->firing != NULL)
+        kernel_angles_table(k->run, k->first, k->n, l->mirror_turn, l->pan_turn);
+    else
+        kernel_angles(k->run, k->first, k->n, l->mirror_turn, l->pan_turn);
     k->from = (struct bvh_origins){.at_m = {s->station_m[0], s->station_m[1], s->station_m[2]}};
     if (s->n_knots != 0) k->from.own = VEC3_IN(l->p, 0);
     k->linear = 0;

@@ -19,6 +19,22 @@ void kernel_angles(const struct schedule_run *run, uint32_t first, uint32_t n, d
     }
 }
 
+void kernel_angles_table(const struct schedule_run *run, uint32_t first, uint32_t n, double *restrict mirror_turn,
+                         double *restrict pan_turn)
+{
+    const uint64_t from = run->firing_at + (uint64_t)first, begin = run->firing[run->firing_at].tick;
+    uint32_t at = (uint32_t)(from % run->n_firings);
+    uint64_t r0 = run->r + (from / run->n_firings * run->sequence_ticks - begin) * run->num;
+    for (uint32_t i = 0; i < n; i++) {
+        const struct emitter_firing *f = &run->firing[at];
+        mirror_turn[i] = f->mirror_turn;
+        pan_turn[i] = (double)(r0 + f->tick * run->num) * run->pan_turn_per_r + f->pan_turn;
+        if (++at < run->n_firings) continue;
+        at = 0;
+        r0 += run->sequence_ticks * run->num;
+    }
+}
+
 VEC_CLONES
 void kernel_directions(const struct kernel_turns *turns, const double m[9], const struct vec3_out *out)
 {
@@ -210,9 +226,28 @@ void kernel_scale(const double *restrict range_m, uint32_t n, const struct vec3_
     }
 }
 
+/* A sequence's firings are a few ticks apart. */
+static void times_of_table(const struct schedule_run *run, uint32_t *dt_ns)
+{
+    const uint64_t begin = run->firing[run->firing_at].tick;
+    uint64_t base = 0;
+    uint32_t at = run->firing_at;
+    for (uint32_t i = 0; i < run->n; i++) {
+        const uint64_t d = base + run->firing[at].tick - begin;
+        dt_ns[i] = (uint32_t)(d * (uint64_t)run->ns_quot + (run->ns_acc + d * run->ns_rem) / run->ns_den);
+        if (++at < run->n_firings) continue;
+        at = 0;
+        base += run->sequence_ticks;
+    }
+}
+
 /* The remainder is below the divisor, so each step adds the quotient or one more. */
 void kernel_times(const struct schedule_run *run, uint32_t *dt_ns)
 {
+    if (run->sequence_ticks != 0) {
+        times_of_table(run, dt_ns);
+        return;
+    }
     uint64_t acc = run->ns_acc;
     const uint64_t rem = run->ns_rem, den = run->ns_den;
     uint32_t dt = 0;

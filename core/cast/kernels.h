@@ -7,6 +7,9 @@
 
 /* Mirror and pan angle of n pulses of a run, from its pulse `first` on. */
 void kernel_angles(const struct schedule_run *run, uint32_t first, uint32_t n, double *mirror_turn, double *pan_turn);
+/* The same for a run with a table. */
+void kernel_angles_table(const struct schedule_run *run, uint32_t first, uint32_t n, double *mirror_turn,
+                         double *pan_turn);
 
 /* Angles of the axes, in turns. */
 struct kernel_turns {

@@ -1,25 +1,18 @@
-#include "core/schedule.h"
+#include "core/schedule/schedule_inside.h"
 
 #include <string.h>
 
-__extension__ typedef unsigned __int128 u128;
-
-static const int64_t TURN_UDEG = 360000000;
 static const uint64_t NS_TIMES_UHZ = 1000000000000000; /* ns per second x micro-hertz per hertz */
+static const uint64_t FINE_DEN = 1ull << 40;
 
-static uint64_t gcd_u64(uint64_t a, uint64_t b)
+static u128 gcd(u128 a, u128 b)
 {
     while (b != 0) {
-        uint64_t r = a % b;
+        u128 r = a % b;
         a = b;
         b = r;
     }
     return a;
-}
-
-static uint64_t ceil_div(u128 a, u128 b)
-{
-    return (uint64_t)((a + b - 1) / b);
 }
 
 /* Lines that the pan needs for span_fine (2^-24 micro-degrees), the first of them from r0/den on; at least
@@ -36,31 +29,52 @@ static uint64_t lines_for_span(const struct schedule_segment *seg, int64_t span_
 
 static int pan_is_still(const struct schedule_spec *spec)
 {
-    return spec->pan_udeg_s <= 0 || spec->pan_stop_udeg <= spec->pan_start_udeg;
+    return spec->emitter != NULL || spec->pan_udeg_s <= 0 || spec->pan_stop_udeg <= spec->pan_start_udeg;
 }
 
+/* num/den: lines a tick. */
 static void set_rates(struct schedule_segment *seg, const struct schedule_spec *spec)
+{
+    const int table = spec->emitter != NULL && spec->emitter->kind == EMITTER_BEAMS;
+    seg->tick_num = table ? spec->emitter->tick_num : NS_TIMES_UHZ;
+    seg->tick_den = table ? spec->emitter->tick_den : (uint64_t)spec->prr_uhz;
+    u128 num = (u128)(uint64_t)spec->lines_uhz * seg->tick_num, den = (u128)seg->tick_den * NS_TIMES_UHZ;
+    u128 g = gcd(num, den);
+    seg->num = (uint64_t)(num / g);
+    seg->den = (uint64_t)(den / g);
+    /* A change keeps the phase to 1/den of a line, and den may be small here. */
+    for (; table && seg->den < FINE_DEN; seg->den *= 2)
+        seg->num *= 2;
+    seg->ns_quot = (int64_t)(seg->tick_num / seg->tick_den);
+    seg->ns_rem = seg->tick_num % seg->tick_den;
+}
+
+/* Steps of a planar head lie at line angles that need not be whole micro-degrees: those within one of a limit
+ * count as inside. */
+static void set_window(struct schedule_segment *seg, const struct schedule_spec *spec)
+{
+    const struct emitter *e = spec->emitter;
+    uint64_t sweep = (uint64_t)spec->sweep_udeg;
+    int64_t start = spec->line_start_udeg - spec->fov_min_udeg, stop = spec->line_stop_udeg - spec->fov_min_udeg;
+    if (e != NULL && e->kind == EMITTER_PLANAR) {
+        start = start > 0 ? start - 1 : 0;
+        stop++;
+    }
+    seg->r_first = ceil_div((u128)(uint64_t)start * seg->den, sweep);
+    seg->r_last = (uint64_t)((u128)(uint64_t)stop * seg->den / sweep);
+    if (e == NULL || e->kind != EMITTER_PLANAR) return;
+    if (seg->r_first < e->first_step) seg->r_first = e->first_step;
+    if (seg->r_last > e->last_step) seg->r_last = e->last_step;
+}
+
+static void set_spec(struct schedule_segment *seg, const struct schedule_spec *spec)
 {
     seg->spec = *spec;
     if (pan_is_still(spec)) seg->spec.pan_udeg_s = 0;
-    uint64_t prr = (uint64_t)spec->prr_uhz, lines = (uint64_t)spec->lines_uhz;
-    uint64_t g = gcd_u64(lines, prr);
-    seg->num = lines / g;
-    seg->den = prr / g;
-    seg->ns_quot = (int64_t)(NS_TIMES_UHZ / prr);
-    seg->ns_rem = NS_TIMES_UHZ % prr;
-    uint64_t sweep = (uint64_t)spec->sweep_udeg;
-    seg->r_first = ceil_div((u128)(uint64_t)(spec->line_start_udeg - spec->fov_min_udeg) * seg->den, sweep);
-    seg->r_last = (uint64_t)((u128)(uint64_t)(spec->line_stop_udeg - spec->fov_min_udeg) * seg->den / sweep);
+    set_rates(seg, spec);
+    set_window(seg, spec);
     seg->frame_lines = lines_for_span(seg, (spec->pan_stop_udeg - spec->pan_start_udeg) * (1 << 24));
-}
-
-/* First pulse of line n in the scan: the smallest i with r0 + i*num >= (n - line0)*den. */
-static uint64_t line_first_pulse(const struct schedule_segment *seg, uint64_t n)
-{
-    if (n <= seg->line0) return seg->k0;
-    u128 need = (u128)(n - seg->line0) * seg->den - seg->r0;
-    return seg->k0 + ceil_div(need, seg->num);
+    if (kind_of(seg) == EMITTER_SPHERE) seg->frame_lines = spec->emitter->rings;
 }
 
 /* More pulses than 64 bits can count are without end. */
@@ -72,48 +86,17 @@ static void set_end(struct schedule_segment *seg)
     }
     uint64_t frames = seg->spec.frames > seg->frame0 ? seg->spec.frames : (uint64_t)seg->frame0 + 1;
     u128 line = seg->frame0_end + (u128)(frames - seg->frame0 - 1) * seg->frame_lines;
-    u128 pulses = line > UINT64_MAX ? line : seg->k0 + (line - seg->line0) * seg->den / seg->num;
-    seg->end_pulse = pulses < UINT64_MAX ? line_first_pulse(seg, (uint64_t)line) : UINT64_MAX;
+    u128 ticks = line > UINT64_MAX ? line : seg->k0 + (line - seg->line0) * seg->den / seg->num;
+    seg->end_pulse = ticks < UINT64_MAX ? line_first_pulse(seg, (uint64_t)line) : UINT64_MAX;
 }
 
 void schedule_start(struct schedule_segment *seg, const struct schedule_spec *spec)
 {
     memset(seg, 0, sizeof *seg);
-    set_rates(seg, spec);
+    set_spec(seg, spec);
     seg->pan0_fine = spec->pan_start_udeg * (1 << 24);
     seg->frame0_end = seg->frame_lines;
     set_end(seg);
-}
-
-static uint32_t frame_of_line(const struct schedule_segment *seg, uint64_t n, uint64_t *first_line)
-{
-    if (n < seg->frame0_end) {
-        *first_line = seg->line0;
-        return seg->frame0;
-    }
-    uint64_t f = (n - seg->frame0_end) / seg->frame_lines;
-    *first_line = seg->frame0_end + f * seg->frame_lines;
-    return seg->frame0 + 1 + (uint32_t)f;
-}
-
-/* Pan at pulse k, which belongs to the frame that begins with first_line: whole micro-degrees and 2^-24
- * parts, rounded up, so that a frame that a change cuts in two never needs a line more for what was rounded
- * off. */
-static int64_t pan_fine(const struct schedule_segment *seg, uint64_t k, uint64_t first_line)
-{
-    int64_t base = first_line == seg->line0 ? seg->pan0_fine : seg->spec.pan_start_udeg * (1 << 24);
-    uint64_t i = k - line_first_pulse(seg, first_line);
-    u128 turned = (u128)i * (uint64_t)seg->spec.pan_udeg_s * 1000000;
-    uint64_t prr = (uint64_t)seg->spec.prr_uhz;
-    uint64_t whole = (uint64_t)(turned / prr), rest = (uint64_t)(turned % prr);
-    uint64_t fine = ceil_div((u128)rest << 24, prr);
-    return base + (int64_t)((whole << 24) + fine);
-}
-
-/* Place of pulse k in the sweep of its line n, in 1/den of a line. */
-static uint64_t place_in_sweep(const struct schedule_segment *seg, uint64_t k, uint64_t n)
-{
-    return (uint64_t)((u128)seg->r0 + (u128)(k - seg->k0) * seg->num - (u128)(n - seg->line0) * seg->den);
 }
 
 void schedule_change(struct schedule_segment *seg, const struct schedule_segment *before,
@@ -127,18 +110,18 @@ void schedule_change(struct schedule_segment *seg, const struct schedule_segment
 
     struct schedule_segment next;
     memset(&next, 0, sizeof next);
-    set_rates(&next, spec);
+    set_spec(&next, spec);
     next.k0 = k;
     next.t0_ns = schedule_time_ns(before, k);
-    /* The rest of a nanosecond goes over to the new rate, cut to a part of 1 / prr_uhz: it does not add
-     * up. */
-    u128 rest = (before->t0_acc + (u128)(k - before->k0) * before->ns_rem) % (uint64_t)before->spec.prr_uhz;
-    next.t0_acc = (uint64_t)(rest * (uint64_t)spec->prr_uhz / (uint64_t)before->spec.prr_uhz);
+    /* The rest of a nanosecond goes over to the new rate, cut to a part of 1 / tick_den: it does not add up. */
+    u128 rest = (before->t0_acc + (u128)firing_ticks(before, k) * before->ns_rem) % before->tick_den;
+    next.t0_acc = (uint64_t)(rest * next.tick_den / before->tick_den);
     next.line0 = n;
     next.r0 = (uint64_t)(r * next.den / before->den);
     next.frame0 = frame;
     next.pan0_fine = pan_fine(before, k, first_line);
     next.frame0_end = n + lines_for_span(&next, spec->pan_stop_udeg * (1 << 24) - next.pan0_fine);
+    if (kind_of(&next) == EMITTER_SPHERE) next.frame0_end = n - n % next.frame_lines + next.frame_lines;
     next.line0_begin = was.begin;
     next.line0_begin_ns = was.begin_ns;
     uint64_t cast_end = k < was.cast_end ? k : was.cast_end;
@@ -149,22 +132,30 @@ void schedule_change(struct schedule_segment *seg, const struct schedule_segment
 
 int64_t schedule_time_ns(const struct schedule_segment *seg, uint64_t k)
 {
-    uint64_t i = k - seg->k0;
-    uint64_t part = (uint64_t)((seg->t0_acc + (u128)i * seg->ns_rem) / (uint64_t)seg->spec.prr_uhz);
-    return seg->t0_ns + (int64_t)(i * (uint64_t)seg->ns_quot + part);
+    uint64_t ticks = firing_ticks(seg, k);
+    uint64_t part = (uint64_t)((seg->t0_acc + (u128)ticks * seg->ns_rem) / seg->tick_den);
+    return seg->t0_ns + (int64_t)(ticks * (uint64_t)seg->ns_quot + part);
 }
 
 uint64_t schedule_pulse_at(const struct schedule_segment *seg, int64_t t_ns)
 {
     if (t_ns <= seg->t0_ns) return seg->k0;
-    /* floor(i*1e15/prr) >= x  <=>  i >= x*prr/1e15, x whole */
-    u128 since = (u128)(uint64_t)(t_ns - seg->t0_ns) * (uint64_t)seg->spec.prr_uhz;
-    return seg->k0 + ceil_div(since - seg->t0_acc, NS_TIMES_UHZ);
+    /* floor(i*num/den) >= x  <=>  i >= x*den/num, x whole */
+    u128 since = (u128)(uint64_t)(t_ns - seg->t0_ns) * seg->tick_den;
+    return firing_after(seg, ceil_div(since - seg->t0_acc, seg->tick_num));
 }
 
 uint64_t schedule_line_of(const struct schedule_segment *seg, uint64_t k)
 {
-    return seg->line0 + (uint64_t)(((u128)seg->r0 + (u128)(k - seg->k0) * seg->num) / seg->den);
+    return seg->line0 + (uint64_t)(((u128)seg->r0 + (u128)firing_ticks(seg, k) * seg->num) / seg->den);
+}
+
+/* Where all steps of a ring look along one line. */
+static int is_pole(const struct schedule_segment *seg, uint64_t n)
+{
+    if (kind_of(seg) != EMITTER_SPHERE) return 0;
+    const uint64_t ring = n % seg->spec.emitter->rings;
+    return ring == 0 || ring == seg->spec.emitter->rings - 1;
 }
 
 void schedule_get_line(const struct schedule_segment *seg, uint64_t n, struct schedule_line *line)
@@ -176,8 +167,10 @@ void schedule_get_line(const struct schedule_segment *seg, uint64_t n, struct sc
     uint64_t r = line->r_first_pulse = place_in_sweep(seg, line->pulse0, n);
     uint64_t skip = r >= seg->r_first ? 0 : ceil_div(seg->r_first - r, seg->num);
     uint64_t upto = r > seg->r_last ? 0 : (seg->r_last - r) / seg->num + 1;
-    line->cast0 = line->pulse0 + skip;
-    line->cast_end = line->pulse0 + upto;
+    uint64_t tick0 = firing_ticks(seg, line->pulse0);
+    line->cast0 = firing_after(seg, tick0 + skip);
+    line->cast_end = firing_after(seg, tick0 + upto);
+    if (is_pole(seg, n) && line->cast_end > line->cast0) line->cast_end = line->cast0 + (r <= seg->r_first);
     if (line->cast_end > line->pulse_end) line->cast_end = line->pulse_end;
     if (line->cast0 > line->cast_end) line->cast0 = line->cast_end;
     int at_start = n <= seg->line0;
@@ -194,45 +187,4 @@ uint64_t schedule_cut(const struct schedule_segment *seg, uint64_t k)
     if (k <= seg->k0) return seg->k0;
     uint64_t first = line_first_pulse(seg, schedule_line_of(seg, k));
     return k - (k - first) % SCHEDULE_PACKET;
-}
-
-void schedule_get_run(const struct schedule_segment *seg, const struct schedule_line *line, uint64_t k, uint32_t n,
-                      struct schedule_run *run)
-{
-    uint64_t prr = (uint64_t)seg->spec.prr_uhz;
-    uint64_t first_line, in_line = k - line->pulse0;
-    frame_of_line(seg, line->line, &first_line);
-    memset(run, 0, sizeof *run);
-    run->pulse0 = k;
-    run->n = n;
-    run->in_line = (uint32_t)in_line;
-    run->frame = line->frame;
-    run->line = (uint32_t)line->line;
-    run->t0_ns = schedule_time_ns(seg, k);
-    run->line_t0_ns = line->begin_ns;
-    run->mirror0_turn = (double)seg->spec.fov_min_udeg / (double)TURN_UDEG;
-    run->mirror_turn_per_r = (double)seg->spec.sweep_udeg / (double)TURN_UDEG / (double)seg->den;
-    run->r = line->r_first_pulse + in_line * seg->num;
-    run->num = seg->num;
-    double fine_per_turn = (double)TURN_UDEG * (double)(1 << 24);
-    run->pan0_turn = (double)pan_fine(seg, line->pulse0, first_line) / fine_per_turn;
-    run->pan_step_turn = (double)seg->spec.pan_udeg_s * 1e6 / (double)prr / (double)TURN_UDEG;
-    run->ns_quot = seg->ns_quot;
-    run->ns_rem = seg->ns_rem;
-    run->ns_den = prr;
-    run->ns_acc = (uint64_t)((seg->t0_acc + (u128)(k - seg->k0) * seg->ns_rem) % prr);
-}
-
-double schedule_pan_turn(const struct schedule_segment *seg, uint64_t k)
-{
-    uint64_t first_line;
-    frame_of_line(seg, schedule_line_of(seg, k), &first_line);
-    return (double)pan_fine(seg, k, first_line) / ((double)TURN_UDEG * (double)(1 << 24));
-}
-
-double schedule_mirror_turn(const struct schedule_segment *seg, uint64_t k)
-{
-    uint64_t r = place_in_sweep(seg, k, schedule_line_of(seg, k));
-    return (double)seg->spec.fov_min_udeg / (double)TURN_UDEG +
-           (double)r * ((double)seg->spec.sweep_udeg / (double)TURN_UDEG / (double)seg->den);
 }

@@ -79,6 +79,14 @@ static ssize_t fd_write(void *link, int session, const void *buf, size_t len)
     return fd_done(self, socket_write(self->fd, buf, len));
 }
 
+static void fd_end(void *link, int session)
+{
+    struct fd_link *self = link;
+    if (session != 0 || self->ended) return;
+    shutdown(self->fd, SHUT_WR);
+    self->ended = 1;
+}
+
 static void fd_close(void *link)
 {
     struct fd_link *self = link;
@@ -93,5 +101,6 @@ const struct link_ops link_fd = {
     .poll = fd_poll,
     .read = fd_read,
     .write = fd_write,
+    .end = fd_end,
     .close = fd_close,
 };

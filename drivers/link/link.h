@@ -2,7 +2,7 @@
  *
  * A kind of link is one file of this folder with one `const struct link_ops`, whose members are the contract;
  * null.c is the skeleton for a new one, link.c has the list. A link has sessions: readers and commanders that
- * come and go. A pty or a file has one, TCP several, USB two (console and stream). One thread owns a link and
+ * come and go. A pty or a file has one, TCP several, USB two (console and stream) or one. One thread owns a link and
  * makes all calls on it. Only poll() waits; write() of `file` may wait for the disk. */
 #ifndef DRIVERS_LINK_LINK_H
 #define DRIVERS_LINK_LINK_H
@@ -15,20 +15,23 @@
 
 enum { LINK_MAX_SESSIONS = 8, LINK_MAX_EVENTS = 2 * LINK_MAX_SESSIONS + 2 };
 
-enum link_type { LINK_NULL, LINK_FILE, LINK_PTY, LINK_TCP, LINK_USB, LINK_FD };
+enum link_type { LINK_NULL, LINK_FILE, LINK_PTY, LINK_TCP, LINK_USB, LINK_UDP, LINK_FD };
 
 struct link_spec {
     enum link_type type;
-    char path[256];   /* file: where to write; pty: symlink to the slave, may be empty; usb: see below */
-    char address[64]; /* tcp: numeric or name; empty: 127.0.0.1 */
-    int port;         /* tcp: 0 lets the system choose */
-    int max_sessions; /* tcp: 1..LINK_MAX_SESSIONS */
-    int protocol;     /* what its owner speaks on it; 0: the usual. Links don't look at it */
-    int fd;           /* fd: a connected stream descriptor (socket pair), taken over */
+    char path[256];     /* file: where to write; pty: symlink to the slave, may be empty; usb: see below */
+    char address[64];   /* tcp, udp: numeric or name; empty: 127.0.0.1 */
+    int port;           /* tcp: 0 lets the system choose; udp: of the receiver */
+    char interface[32]; /* udp: its name; needed for broadcasts. Empty: the system chooses */
+    int max_sessions;   /* tcp: 1..LINK_MAX_SESSIONS */
+    int protocol;       /* what its owner speaks on it; 0: the usual. Links don't look at it */
+    int units; /* 1: what is written are units. Each write has one of them, or the rest of one, up to its end */
+    int fd;    /* fd: a connected stream descriptor (socket pair), taken over */
     /* usb; address, port and path as struct usb_backend_spec has them, which explains these as well */
     int backend; /* enum usb_backend_type */
     int speed;   /* enum usb_rate: the fastest the device can do */
     int attach, retry_ms, vid, pid;
+    int look; /* enum usb_look_id: the device it shows itself as, apart from vid, pid and serial */
     char udc[64];
     char serial[64]; /* empty: no serial number string */
     int own_serial;  /* serial is only its beginning: drivers/usb/own_identity.h has the rest */
@@ -72,6 +75,10 @@ struct link_ops {
      * LINK_CLOSED follows from poll). */
     ssize_t (*read)(void *link, int session, void *buf, size_t len);
     ssize_t (*write)(void *link, int session, const void *buf, size_t len);
+
+    /* Ends a session from this side: what was written goes out, and a LINK_CLOSED follows from poll. NULL: sessions of
+     * this link can't be ended. */
+    void (*end)(void *link, int session);
 
     /* Closes everything, removes what open made (symlink). link is void afterwards. */
     void (*close)(void *link);

@@ -166,6 +166,18 @@ static ssize_t tcp_write(void *link, int session, const void *buf, size_t len)
     return n;
 }
 
+/* What was written goes out, then the end of the stream; the client's own end is not waited for. */
+static void tcp_end(void *link, int session)
+{
+    struct tcp_session *self = tcp_session(link, session);
+    char nothing[4096];
+    if (self == NULL) return;
+    shutdown(self->fd, SHUT_WR);
+    while (socket_read(self->fd, nothing, sizeof nothing) > 0) /* else the system would reset the connection */
+        continue;
+    self->state = TCP_ENDED;
+}
+
 static void tcp_close(void *link)
 {
     struct tcp_link *tcp = link;
@@ -183,5 +195,6 @@ const struct link_ops link_tcp = {
     .poll = tcp_poll,
     .read = tcp_read,
     .write = tcp_write,
+    .end = tcp_end,
     .close = tcp_close,
 };

@@ -1,5 +1,5 @@
-/* The usb link: the head as a USB device, with the sessions of its console and its stream
- * (drivers/usb/head_device.h).
+/* The usb link: the head as a USB device, with the sessions of its look (drivers/usb/looks.h): console and stream,
+ * or one alone.
  *
  * The back end carries out the host's acts one at a time. It stops when one has begun or ended a session,
  * until that has been reported: so nothing can happen twice between two polls. The end of a session is
@@ -18,12 +18,16 @@ struct usb_link {
     struct scanhead_usb head;
     const struct usb_backend_ops *ops;
     void *backend;
-    int reported[SCANHEAD_USB_SESSIONS]; /* the caller takes it to be open */
-    const char *news;                    /* the back end's, until reported */
-    int claim;                           /* of the head's own number; -1: its identity is configured */
+    int n;                          /* sessions of the head's look */
+    int reported[USB_MAX_SESSIONS]; /* the caller takes it to be open */
+    const char *news;               /* the back end's, until reported */
+    int claim;                      /* of the head's own number; -1: its identity is configured */
 };
 
-static const char *const session_names[] = {[CONSOLE_SESSION] = "usb console", [STREAM_SESSION] = "usb stream"};
+static const struct usb_session_row *row_of(const struct usb_link *self, int i)
+{
+    return &self->head.look->session[i];
+}
 
 static void free_link(struct usb_link *self)
 {
@@ -48,9 +52,14 @@ static int usb_open(const struct link_spec *spec, void **link, struct sh_err *er
     snprintf(backend.path, sizeof backend.path, "%s", spec->path);
     snprintf(backend.udc, sizeof backend.udc, "%s", spec->udc);
     self->ops = usb_backend_ops_get(backend.type);
-    int rc = self->ops != NULL ? SH_OK : sh_fail(err, SH_EINPUT, "link usb: this build has no such back end");
+    const struct usb_look *look = usb_look_get((enum usb_look_id)spec->look);
+    if (look != NULL) self->n = look->n_sessions;
+    int rc = look != NULL ? SH_OK : sh_fail(err, SH_EINPUT, "link usb: no such look");
+    if (rc == SH_OK)
+        rc = self->ops != NULL ? SH_OK : sh_fail(err, SH_EINPUT, "link usb: this build has no such back end");
     if (rc == SH_OK && spec->own_serial) rc = usb_own_identity(&id, &self->claim, err);
-    if (rc == SH_OK) rc = scanhead_usb_create(&id, &self->head, err);
+    if (rc == SH_OK && spec->own_serial && !look->has_serial) id.serial[0] = '\0';
+    if (rc == SH_OK) rc = scanhead_usb_create(look, &id, &self->head, err);
     if (rc == SH_OK) rc = self->ops->open(&backend, self->head.device, &self->backend, err);
     if (rc != SH_OK) {
         free_link(self);
@@ -79,7 +88,7 @@ static double usb_capacity(const void *link)
 /* What came in a session that is over, and is not read yet. */
 static size_t left_over(const struct usb_link *self, int i)
 {
-    const uint8_t out = self->head.session[i].out;
+    const uint8_t out = row_of(self, i)->out;
     uint32_t epoch = 0;
     size_t n = usb_device_can_read(self->head.device, out, &epoch);
     return n != 0 && epoch != usb_device_epoch(self->head.device, out) ? n : 0;
@@ -89,13 +98,13 @@ static int is_readable(const struct usb_link *self, int i)
 {
     if (!self->reported[i]) return 0;
     if (!self->head.session[i].open) return left_over(self, i) != 0;
-    return usb_device_can_read(self->head.device, self->head.session[i].out, NULL) != 0;
+    return usb_device_can_read(self->head.device, row_of(self, i)->out, NULL) != 0;
 }
 
 static int is_writable(const struct usb_link *self, int i)
 {
     return self->reported[i] && self->head.session[i].open &&
-           usb_device_can_write(self->head.device, self->head.session[i].in);
+           usb_device_can_write(self->head.device, row_of(self, i)->in);
 }
 
 static int has_to_report(const struct usb_link *self, int i)
@@ -107,17 +116,19 @@ static int go_on(void *ctx)
 {
     struct usb_link *self = ctx;
     scanhead_usb_update(&self->head);
-    return !has_to_report(self, CONSOLE_SESSION) && !has_to_report(self, STREAM_SESSION);
+    for (int i = 0; i < self->n; i++)
+        if (has_to_report(self, i)) return 0;
+    return 1;
 }
 
 static void report(struct usb_link *self, int i, uint32_t want_write, struct link_events *events)
 {
     const struct scanhead_usb_session *session = &self->head.session[i];
     if (self->reported[i] && !session->open && !is_readable(self, i))
-        self->reported[i] = !link_events_push(events, LINK_CLOSED, i, session_names[i]);
+        self->reported[i] = !link_events_push(events, LINK_CLOSED, i, row_of(self, i)->name);
     if (!self->reported[i]) scanhead_usb_ended(&self->head, i);
     if (!self->reported[i] && session->open)
-        self->reported[i] = link_events_push(events, LINK_OPENED, i, session_names[i]);
+        self->reported[i] = link_events_push(events, LINK_OPENED, i, row_of(self, i)->name);
     if (is_readable(self, i)) link_events_push(events, LINK_READABLE, i, NULL);
     if ((want_write >> i & 1u) != 0 && is_writable(self, i)) link_events_push(events, LINK_WRITABLE, i, NULL);
 }
@@ -133,7 +144,7 @@ static void take_news(struct usb_link *self)
 static int has_news(const struct usb_link *self, uint32_t want_write)
 {
     int news = (self->ops->more != NULL && self->ops->more(self->backend)) || self->news != NULL || self->head.cut_due;
-    for (int i = 0; i < SCANHEAD_USB_SESSIONS; i++)
+    for (int i = 0; i < self->n; i++)
         news |= has_to_report(self, i) || is_readable(self, i) || ((want_write >> i & 1u) != 0 && is_writable(self, i));
     return news;
 }
@@ -151,7 +162,7 @@ static int usb_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     if (rc != SH_OK) return rc;
     scanhead_usb_update(&self->head);
     self->ops->flush(self->backend);
-    for (int i = 0; i < SCANHEAD_USB_SESSIONS; i++)
+    for (int i = 0; i < self->n; i++)
         report(self, i, want_write, &events);
     take_news(self);
     if (self->news != NULL && link_events_push(&events, LINK_NOTICE, 0, self->news)) self->news = NULL;
@@ -161,9 +172,9 @@ static int usb_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
 static ssize_t usb_read(void *link, int session, void *buf, size_t len)
 {
     struct usb_link *self = link;
-    if (session < 0 || session >= SCANHEAD_USB_SESSIONS || !self->reported[session]) return SH_ECLOSED;
+    if (session < 0 || session >= self->n || !self->reported[session]) return SH_ECLOSED;
     if (!is_readable(self, session)) return 0;
-    size_t n = usb_device_read(self->head.device, self->head.session[session].out, buf, len);
+    size_t n = usb_device_read(self->head.device, row_of(self, session)->out, buf, len);
     self->ops->flush(self->backend);
     return (ssize_t)n;
 }
@@ -172,14 +183,14 @@ static ssize_t usb_read(void *link, int session, void *buf, size_t len)
 static ssize_t usb_write(void *link, int session, const void *buf, size_t len)
 {
     struct usb_link *self = link;
-    if (session < 0 || session >= SCANHEAD_USB_SESSIONS || !self->reported[session]) return SH_ECLOSED;
-    const struct scanhead_usb_session *s = &self->head.session[session];
-    if (s->open) {
-        size_t n = usb_device_write(self->head.device, s->in, buf, len);
+    if (session < 0 || session >= self->n || !self->reported[session]) return SH_ECLOSED;
+    const struct usb_session_row *row = row_of(self, session);
+    if (self->head.session[session].open) {
+        size_t n = usb_device_write(self->head.device, row->in, buf, len);
         if (n != 0) self->ops->flush(self->backend);
         return (ssize_t)n;
     }
-    usb_device_drop(self->head.device, s->out, usb_device_epoch(self->head.device, s->out));
+    usb_device_drop(self->head.device, row->out, usb_device_epoch(self->head.device, row->out));
     self->ops->flush(self->backend);
     return SH_ECLOSED;
 }

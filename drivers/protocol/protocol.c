@@ -1,8 +1,19 @@
 #include "drivers/protocol/protocol.h"
 
-/* The one list of protocols. */
+/* The one list of protocols. A new one is a file of this folder that defines its protocol_ops, an id in protocol.h, and
+ * two rows here. */
+extern const struct protocol_ops protocol_native;
+extern const struct protocol_ops protocol_nmea;
+extern const struct protocol_ops protocol_scip;
+extern const struct protocol_ops protocol_velodyne;
+extern const struct protocol_ops protocol_velodyne_position;
+
 static const struct protocol_ops *const protocols[PROTOCOL_N] = {
-    [PROTOCOL_NATIVE] = NULL,
+    [PROTOCOL_NATIVE] = &protocol_native,
+    [PROTOCOL_NMEA] = &protocol_nmea,
+    [PROTOCOL_SCIP] = &protocol_scip,
+    [PROTOCOL_VELODYNE] = &protocol_velodyne,
+    [PROTOCOL_VELODYNE_POSITION] = &protocol_velodyne_position,
 };
 
 const struct protocol_ops *protocol_ops_get(enum protocol_id id)

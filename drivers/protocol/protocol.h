@@ -34,13 +34,15 @@ enum protocol_needs {
     PROTOCOL_NEEDS_ATTRIBUTES = 1 << 1, /* output.attributes: on; amplitudes are LINE_AMPLITUDE_NONE without
                                          * signal.model */
     PROTOCOL_NEEDS_TIME = 1 << 2,       /* time.epoch is not none */
+    PROTOCOL_NEEDS_PLACE = 1 << 3,      /* each station has a place on the Earth */
 };
 
 /* What is counted of a session beside the frames it lost. */
 enum protocol_count {
-    PROTOCOL_UNITS_LOST, /* units that were not sent: no room, or parts of them were missing */
-    PROTOCOL_INPUT_LOST, /* bytes from the client that were thrown away: overlong, out of frame, garbage */
-    PROTOCOL_WRONG,      /* requests that were answered with an error */
+    PROTOCOL_UNITS_LOST,  /* units that were not sent: no room, or parts of them were missing */
+    PROTOCOL_INPUT_LOST,  /* bytes from the client that were thrown away: overlong, out of frame, garbage */
+    PROTOCOL_WRONG,       /* requests that were answered with an error */
+    PROTOCOL_POINTS_LOST, /* echoes that were sent as none: the protocol has no number for their range */
     PROTOCOL_N_COUNTS
 };
 
@@ -57,12 +59,16 @@ struct protocol_host {
     int (*command)(void *ctx, const char *line, char *reply, size_t cap);
     /* UTC of a device time, ns since 1970; INT64_MIN: not known. */
     int64_t (*utc_ns)(void *ctx, int64_t t_ns);
-    /* What the GNSS receiver knows at a device time. Returns 1, or 0: there is none (no time, no anchor). */
+    /* The last fix of the GNSS receiver at or before a device time. Returns 1, or 0: there is none (no time, or no fix
+     * since power-up). Quality 0 where the head is nowhere on the Earth. */
     int (*fix)(void *ctx, int64_t t_ns, struct nmea_fix *fix);
     /* Counts n. */
     void (*count)(void *ctx, enum protocol_count what, uint64_t n);
-    /* Ends the session once what was sent has gone out. */
+    /* Ends the session once what was sent has gone out. A pty or a USB device has no way to end it: there nothing
+     * happens. */
     void (*hang_up)(void *ctx);
+    /* Device time of the receiver's first fix at or after t_ns; INT64_MAX: it knows no time. */
+    int64_t (*next_fix_ns)(void *ctx, int64_t t_ns);
 };
 
 /* What a protocol says of the head; constant, and outlives the instance. The rest stands in the descriptor. */
@@ -87,8 +93,10 @@ struct protocol_spec {
 struct protocol_ops {
     const char *name;  /* of links[].protocol */
     uint32_t needs;    /* enum protocol_needs */
+    uint32_t emitters; /* bit per enum native_emitter_kind of the heads that it can speak for; 0: all */
+    uint32_t n_beams;  /* that a head of beams must have; 0: any number */
     uint32_t max_unit; /* bytes; no unit is longer */
-    int passes_native; /* 1: every frame of the stream goes out as it is; frame() is not called */
+    int passes_native; /* 1: the native protocol, which its owner speaks; no member below is set */
 
     /* When it fails, nothing of it stays. */
     int (*create)(const struct protocol_spec *spec, void **protocol, struct sh_err *err);
@@ -101,10 +109,14 @@ struct protocol_ops {
     void (*frame)(void *protocol, const uint8_t *frame, size_t len);
     /* Frames are missing before the next one: the client, or the head, was too slow. */
     void (*gap)(void *protocol, uint32_t n_frames);
-    /* All frames before device time t_ns have come. Called for each tick, also of those without frames. */
+    /* All frames before device time t_ns have come. Called for each tick, also of those without frames. Where the client
+     * was too slow, time jumps after a gap. */
     void (*time)(void *protocol, int64_t t_ns);
     /* Bytes from the client, in pieces of any size. */
     void (*input)(void *protocol, const uint8_t *bytes, size_t len);
+    /* Device time that must have passed before time() has something to do, unless frames or bytes come. May be NULL:
+     * each tick. It saves wake-ups, no more: time() is called for the other ticks, too. */
+    int64_t (*next_ns)(const void *protocol);
 };
 
 /* From the one list, in protocol.c. NULL for an unknown id, or one that is not built in. */

@@ -75,7 +75,11 @@ int socket_open(const struct socket_place *place, int *fd, char *name, size_t le
     if (*fd < 0)
         return sh_fail(err, socket_error_code(error), "%s:%s:%d: cannot %s: %s%s", place->what, host, place->port,
                        place->connecting ? "connect" : "listen", strerror(error),
-                       error == EADDRINUSE ? "; port 0 lets the system choose" : "");
+                       error == EADDRINUSE ? "; port 0 lets the system choose"
+                       : error == EACCES && !place->connecting
+                           ? "; ports below 1024 need CAP_NET_BIND_SERVICE (or root, "
+                             "or a lower net.ipv4.ip_unprivileged_port_start)"
+                           : "");
     name_socket(*fd, place->connecting, name, len);
     return SH_OK;
 }

@@ -40,7 +40,7 @@ static int names_interface(const struct usb_device *device, const struct setup *
 static int get_device_status(struct usb_device *device, const struct setup *s, uint8_t *data)
 {
     if (device->state == USB_DEFAULT || s->value != 0 || s->index != 0 || s->length != 2) return USB_STALL;
-    unsigned status = device->model->max_power_ma == 0;
+    unsigned status = (unsigned)usb_is_self_powered(device->model);
     status |= (unsigned)device->u1_enabled << USB_DEV_STAT_U1_ENABLED;
     status |= (unsigned)device->u2_enabled << USB_DEV_STAT_U2_ENABLED;
     return put_status(data, status);

@@ -125,7 +125,7 @@ static void put_association(struct sink *to, const struct usb_model *model, unsi
 {
     for (unsigned i = 0; i < model->n_functions; i++) {
         const struct usb_function_row *function = &model->function[i];
-        if (function->first != interface || function->count < 2) continue;
+        if (function->first != interface || function->count < 2 || model->class != USB_CLASS_MISC) continue;
         PUT(to, USB_DT_INTERFACE_ASSOCIATION_SIZE, USB_DT_INTERFACE_ASSOCIATION, function->first, function->count,
             function->class, function->subclass, function->protocol, function->string);
     }
@@ -140,8 +140,8 @@ size_t usb_describe_config(const struct usb_model *model, const struct usb_ident
         rate = rate == USB_RATE_HIGH ? USB_RATE_FULL : USB_RATE_HIGH;
     }
     const unsigned unit_ma = rate == USB_RATE_SUPER ? 8 : 2;
-    PUT(&to, USB_DT_CONFIG_SIZE, type, U16(LATER), model->n_interfaces, USB_CONFIGURATION, 0,
-        0x80 | (model->max_power_ma == 0 ? SELF_POWERED : 0), U8((model->max_power_ma + unit_ma - 1) / unit_ma));
+    PUT(&to, USB_DT_CONFIG_SIZE, type, U16(LATER), model->n_interfaces, USB_CONFIGURATION, model->configuration,
+        0x80 | (usb_is_self_powered(model) ? SELF_POWERED : 0), U8((model->max_power_ma + unit_ma - 1) / unit_ma));
     for (unsigned i = 0; i < model->n_rows; i++) {
         if (model->interface[i].alt == 0) put_association(&to, model, model->interface[i].number);
         put_interface(&to, &model->interface[i], rate);

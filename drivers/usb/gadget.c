@@ -234,7 +234,7 @@ static int write_configuration(const struct gadget *gadget, const struct usb_mod
 {
     const char *dir = gadget->dir;
     return make_dir(dir, "configs/c.1") |
-           write_text(dir, "configs/c.1/bmAttributes", "0x%02x", model->max_power_ma == 0 ? 0xc0 : 0x80) |
+           write_text(dir, "configs/c.1/bmAttributes", "0x%02x", usb_is_self_powered(model) ? 0xc0 : 0x80) |
            write_text(dir, "configs/c.1/MaxPower", "%u", model->max_power_ma) | write_text(dir, "os_desc/use", "1") |
            write_text(dir, "os_desc/b_vendor_code", "0x%02x", model->ms_vendor_code) |
            write_text(dir, "os_desc/qw_sign", "MSFT100") | make_link(dir, "configs/c.1", "os_desc/c.1");

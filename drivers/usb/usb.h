@@ -16,7 +16,8 @@
  *
  * IN packets: a transfer ends when it is full, or with a short packet. What one usb_device_write() leaves
  * ends with a short packet, or with one of zero length where it is a whole number of packets. Where the bytes
- * filled the transfer exactly, the zero-length packet ends the next transfer, unless more is written first. A
+ * filled the transfer exactly, the zero-length packet ends the next transfer, unless more is written first. On an
+ * endpoint of units that next transfer may be one that waits already, and nothing comes before that packet. A
  * transfer whose rest is smaller than the next packet fails with USB_OVERFLOW, as on a real bus. That packet
  * stays with the function: nothing is lost.
  *
@@ -51,6 +52,7 @@ struct usb_endpoint_row {
     uint16_t packet[USB_N_RATES]; /* wMaxPacketSize by rate */
     uint8_t interval[USB_N_RATES];
     uint8_t burst; /* super speed: bMaxBurst */
+    uint8_t units; /* IN: what one write leaves is a unit, whose end comes at once */
 };
 
 /* One alternate setting of an interface; rows of one interface follow each other, alt 0 first. */
@@ -65,7 +67,7 @@ struct usb_interface_row {
 
 /* What belongs together: one driver of the host. */
 struct usb_function_row {
-    uint8_t first, count; /* interfaces; count above 1 gives an interface association descriptor */
+    uint8_t first, count; /* interfaces; above 1, in devices of class EF: with an association descriptor */
     uint8_t class, subclass, protocol;
     uint8_t string;
     const char *compatible_id; /* Microsoft OS 2.0, "WINUSB" for instance; NULL: none */
@@ -75,14 +77,21 @@ struct usb_function_row {
 struct usb_model {
     uint8_t class, subclass, protocol; /* of the device */
     uint16_t bcd_device;
-    uint16_t max_power_ma;         /* 0: self-powered */
+    uint8_t self_powered;          /* though it takes max_power_ma from the bus; 0 mA say so as well */
+    uint16_t max_power_ma;
     const char *const *string;     /* by index from 1, UTF-8; NULL ends the list */
-    uint8_t manufacturer, product; /* indices; the serial number's is the one after the list */
+    uint8_t manufacturer, product; /* indices, 0 none; the serial number's is the one after the list */
+    uint8_t configuration;         /* index of its name */
     const struct usb_function_row *function;
     const struct usb_interface_row *interface; /* rows */
     uint8_t n_functions, n_interfaces, n_rows;
     uint8_t ms_vendor_code; /* bRequest for the Microsoft OS 2.0 set; unused without compatible ids */
 };
+
+static inline int usb_is_self_powered(const struct usb_model *model)
+{
+    return model->self_powered || model->max_power_ma == 0;
+}
 
 /* What differs from one device of a model to the next. */
 struct usb_identity {

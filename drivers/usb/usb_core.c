@@ -217,6 +217,10 @@ size_t usb_device_write(struct usb_device *device, uint8_t endpoint, const void 
         pipe->zero_due = left == 0 && status == USB_OK && n == pipe->first->length && n % packet == 0;
         finish(device, pipe, status);
     }
+    if (pipe->zero_due && pipe->row->units && usb_device_can_write(device, endpoint)) {
+        pipe->zero_due = 0;
+        finish(device, pipe, USB_OK);
+    }
     return len - left;
 }
 

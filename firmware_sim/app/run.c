@@ -33,7 +33,8 @@ static void say_what_runs(const struct config *cfg, const struct site *site, con
     site_plan_text(site, plan, sizeof plan);
     fprintf(stderr, "scanhead: plan: %s\n", plan);
     for (uint32_t i = 0; loop_get_place(loop, i, &place); i++)
-        fprintf(stderr, "scanhead: link %s\n", place.endpoint);
+        fprintf(stderr, "scanhead: link %s%s%s\n", place.endpoint, place.protocol != NULL ? ", " : "",
+                place.protocol != NULL ? place.protocol : "");
 }
 
 static int say_ready(const struct loop *loop, long fd, struct sh_err *err)
@@ -161,15 +162,17 @@ static void warn_of_replay(const struct run_options *o, const struct device *dev
 
 static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
 {
-    const struct run_options *o = ctx;
+    struct run_options *o = ctx;
     struct site *site = NULL;
     struct device *device = NULL;
     struct loop *loop = NULL;
     struct loop_options options = {.hash = o->stats != NULL, .report = &app_report_stderr};
     app_catch_signals();
+    o->device.start |= cfg->head.start;
+    o->device.one_scan = o->device.one_scan && o->device.start;
     if (o->device.start && o->device.duration_s > 0.0 && !o->frames_given) cfg->head.settings.frames = 0;
     if (cfg->n_links == 0)
-        return sh_fail(err, SH_EINPUT, "%s: links: none; run needs at least one of pty, tcp, usb, file, null",
+        return sh_fail(err, SH_EINPUT, "%s: links: none; run needs at least one of pty, tcp, udp, usb, file, null",
                        cfg->file);
     int rc = site_load(cfg, &app_report_stderr, &site, err);
     if (rc == SH_OK) rc = site_warn_rate(site, &app_report_stderr, err);
@@ -201,7 +204,6 @@ static int run(int argc, char **argv)
     int status = app_parse(&app_run, argc, argv, &o.in, &o);
     if (status != APP_GO_ON) return status;
     o.frames_given = gives_frames(&o.in.sets);
-    o.device.one_scan = o.device.one_scan && o.device.start;
     return app_with_config(&o.in, run_head, &o);
 }
 

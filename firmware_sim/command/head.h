@@ -62,6 +62,7 @@ struct head_limits {
     int64_t fov_min_udeg, fov_max_udeg;
     int64_t pan_min_udeg, pan_max_udeg;
     uint32_t n_stations;
+    uint32_t line_pulses; /* of each line, so that the pulse rate follows from the lines; 0: it doesn't */
 };
 
 #endif

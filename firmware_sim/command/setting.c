@@ -68,6 +68,17 @@ static void narrow_to_rates(const struct command_call *call, int64_t *min, int64
         if (rate[i] <= to) *max = rate[i];
 }
 
+static int is_setting(const struct command_call *call, size_t offset)
+{
+    return call->row->setting->offset == offset;
+}
+
+/* The pulse rate of a head whose lines have a fixed number of pulses. */
+static int64_t rate_of_lines(const struct command_call *call)
+{
+    return call->dev->settings.lines_uhz * call->dev->limits.line_pulses;
+}
+
 /* The range now: that of the profile, narrowed by the other setting. */
 static void current_range(const struct command_call *call, int64_t *min, int64_t *max)
 {
@@ -75,6 +86,11 @@ static void current_range(const struct command_call *call, int64_t *min, int64_t
     *min = read_bound(call, &setting->min);
     *max = read_bound(call, &setting->max);
     if (setting->other == NULL) return;
+    if (call->dev->limits.line_pulses != 0 && is_setting(call, offsetof(struct head_settings, prr_uhz))) {
+        *min = *max = rate_of_lines(call);
+        return;
+    }
+    if (call->dev->limits.line_pulses != 0 && is_setting(call, offsetof(struct head_settings, lines_uhz))) return;
     const int64_t other = read_other(call);
     if (setting->least != COMMAND_UNBOUND && other + setting->least > *min) *min = other + setting->least;
     if (setting->most != COMMAND_UNBOUND && other + setting->most < *max) *max = other + setting->most;
@@ -188,6 +204,7 @@ int command_setting_change(struct command_call *call)
         return command_fail(call, CMD_E_SETTINGS, "%s can't change in state %s", call->row->header,
                             head_state_name(state));
     write_field(&call->dev->settings, setting->offset, setting->is_u32, value);
+    if (call->dev->limits.line_pulses != 0) call->dev->settings.prr_uhz = rate_of_lines(call);
     call->out->effect = COMMAND_SETTINGS;
     return command_reply(call, "OK");
 }

@@ -5,7 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
-static void fail_missing(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item)
+void cfg_fail_missing(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item)
 {
     char allowed[CFG_ALLOWED_MAX];
     cfg_fail_key(rd, key->path, item, "missing, and it has no default; %s", cfg_allowed(key, rd->profile, allowed));
@@ -17,7 +17,7 @@ static void fill_one(struct cfg_reader *rd, const struct cfg_key *key, uint32_t 
 {
     unsigned char *bad = &rd->bad[cfg_row(rd, key)][item];
     if (rd->line[cfg_row(rd, key)][item] != 0 && !*bad) return;
-    if (key->def == NULL && !*bad) fail_missing(rd, key, item);
+    if (key->def == NULL && !*bad) cfg_fail_missing(rd, key, item);
     if (key->def == NULL || key->def[0] == '\0') return; /* an empty text; the struct starts as zeros */
     if (key->def[0] != '@') {
         cfg_store(rd, key, item, rd->root_line, key->def, "");
@@ -35,7 +35,7 @@ void cfg_fill_defaults(struct cfg_reader *rd, const struct config_profile *profi
         const struct cfg_key *key = &rd->table.keys[i], *list = cfg_list_of(&rd->table, key);
         if (key->type == CFG_MAP) continue;
         if (key->type == CFG_LIST) {
-            if (*cfg_list_count(rd, key) < key->min) fail_missing(rd, key, 0);
+            if (*cfg_list_count(rd, key) < key->min) cfg_fail_missing(rd, key, 0);
             continue;
         }
         uint32_t n = list != NULL ? *cfg_list_count(rd, list) : 1;

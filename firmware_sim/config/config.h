@@ -60,10 +60,28 @@ struct config_program {
     uint32_t n_reaches; /* at least 1 */
 };
 
+/* How a head's pulses are arranged (core/emitter.h): the figures of the file. */
+struct config_emitter {
+    enum emitter_kind kind;
+    uint32_t steps_per_turn, first_step, last_step, front_step;
+    enum config_turn { TURN_CLOCKWISE, TURN_COUNTER_CLOCKWISE } step_direction; /* seen from above */
+    int64_t firing_fs;                                                          /* of a whole sequence */
+    struct config_profile_beam {
+        int64_t elevation_udeg, azimuth_udeg;
+        uint32_t offset_ns;
+        enum config_from from;
+    } beam[EMITTER_MAX_BEAMS];
+    uint32_t n_beams;
+    int64_t step_udeg;
+    char directions[CONFIG_PATH_LEN];
+};
+
 /* A head profile, config/heads/NAME.yaml: each figure is written `{ value: V, from: data sheet|quoted|assumed }`,
  * and may have a source and a note. */
 struct config_profile {
-    char name[32], maker[32], model[64];
+    char name[32], maker[32], model[64], firmware[32];
+    struct config_emitter arrangement; /* as it stands in the file ... */
+    struct emitter emitter;            /* ... and as the schedule takes it */
     int64_t prr_min_uhz, prr_max_uhz, lines_min_uhz, lines_max_uhz, pan_max_udeg_s;
     int64_t fov_min_udeg, fov_max_udeg; /* line angle: 0 forward, 90 up, above 90 backward over the zenith */
     int64_t pan_min_udeg, pan_max_udeg;
@@ -201,7 +219,8 @@ enum config_choice { CHOICE_AUTO, CHOICE_OFF, CHOICE_ON };
 /* Settings at power-up, within the profile (checked). */
 struct config_head {
     struct head_settings settings;
-    char serial[32];
+    char serial[32], name[32];
+    int start; /* scan when booted; run alone looks at it */
     enum detect_ambiguity ambiguity;
     uint32_t mta_zones;
 };

@@ -201,15 +201,16 @@ static void check_time(struct cfg_reader *rd, const struct config *cfg)
     enum epoch_source source;
     struct sh_err why;
     char shown[CFG_SHOW_MAX];
-    const int link = cfg_nmea_link(cfg);
+    const int link = cfg_link_that_needs(cfg, PROTOCOL_NEEDS_TIME);
     if (epoch_parse(cfg->time.epoch, utc_table_builtin(), &source, NULL, &why) != SH_OK)
         cfg_fail_key(rd, "time.epoch", 0,
                      "\"%s\": %.80s; allowed none, utc, tai, or a time after 1980-01-06 such as 2026-01-01T00:00:00Z",
                      cfg_show(cfg->time.epoch, shown), why.text);
     else if (source == EPOCH_NONE && link >= 0 && CFG_SOUND(rd, 0, "time.epoch"))
         cfg_fail_key(rd, "links[].protocol", (uint32_t)link,
-                     "nmea, but the time is not known; required is time.epoch: utc, tai, or a time such as "
-                     "2026-01-01T00:00:00Z");
+                     "%s, but the time is not known; required is time.epoch: utc, tai, or a time such as "
+                     "2026-01-01T00:00:00Z",
+                     cfg_word(rd, "links[].protocol", cfg->link[link].protocol));
     if (1000 % cfg->gnss.rate_hz != 0 || cfg->gnss.rate_hz == 8)
         cfg_fail_key(rd, "gnss.rate_hz", 0, "%u is not a rate it has; allowed 1, 2, 4, 5, 10 or 20 Hz",
                      cfg->gnss.rate_hz);
@@ -221,6 +222,7 @@ static void check_time(struct cfg_reader *rd, const struct config *cfg)
 
 void cfg_check(struct cfg_reader *rd, struct config *cfg)
 {
+    cfg_check_emitter_settings(rd, cfg);
     cfg_check_rate(rd, cfg);
     check_limits(rd, cfg);
     check_head(rd, cfg);
@@ -231,6 +233,7 @@ void cfg_check(struct cfg_reader *rd, struct config *cfg)
     check_output(rd, cfg);
     check_platform(rd, cfg);
     cfg_check_links(rd, cfg);
+    cfg_check_link_protocols(rd, cfg);
     check_beam(rd, cfg);
     check_loop(rd, cfg);
     check_time(rd, cfg);

@@ -42,6 +42,7 @@ static void check_usb_link(struct cfg_reader *rd, const struct config *cfg, stru
         snprintf(link->serial, sizeof link->serial, "%s", cfg->head.serial);
         link->own_serial = !cfg_is_given(rd, "head.serial", 0);
     }
+    cfg_set_usb_look(rd, link, i);
     if (link->backend == USB_BACKEND_USBIP && !has_port) link->port = USB_BACKEND_USBIP_PORT;
     if (!CFG_SOUND(rd, i, "links[].backend")) return;
     snprintf(owner, sizeof owner, "the back end %s", cfg_word(rd, "links[].backend", link->backend));
@@ -61,10 +62,10 @@ static void check_link(struct cfg_reader *rd, struct config *cfg, uint32_t i)
 {
     static const struct owned_key keys[] = {
         {"links[].path", 1u << LINK_FILE | 1u << LINK_PTY | 1u << LINK_USB},
-        {"links[].address", 1u << LINK_TCP | 1u << LINK_USB},
-        {"links[].port", 1u << LINK_TCP | 1u << LINK_USB},
+        {"links[].address", 1u << LINK_TCP | 1u << LINK_USB | 1u << LINK_UDP},
+        {"links[].port", 1u << LINK_TCP | 1u << LINK_USB | 1u << LINK_UDP},
+        {"links[].interface", 1u << LINK_UDP},
         {"links[].max_sessions", 1u << LINK_TCP},
-        {"links[].protocol", 1u << LINK_NULL | 1u << LINK_FILE | 1u << LINK_PTY | 1u << LINK_TCP},
         {"links[].backend", 1u << LINK_USB},
         {"links[].attach", 1u << LINK_USB},
         {"links[].udc", 1u << LINK_USB},
@@ -78,7 +79,9 @@ static void check_link(struct cfg_reader *rd, struct config *cfg, uint32_t i)
                                       [LINK_PTY] = "type, path, protocol",
                                       [LINK_TCP] = "type, address, port, max_sessions, protocol",
                                       [LINK_USB] =
-                                          "type, backend, address, port, path, attach, udc, speed, vid, pid, serial"};
+                                          "type, backend, address, port, path, attach, udc, speed, vid, pid, serial, "
+                                          "protocol",
+                                      [LINK_UDP] = "type, address, port, interface, protocol"};
     struct link_spec *link = &cfg->link[i];
     char owner[64];
     if (!CFG_SOUND(rd, i, "links[].type")) return;
@@ -90,19 +93,15 @@ static void check_link(struct cfg_reader *rd, struct config *cfg, uint32_t i)
         if (strcmp(cfg->link[k].path, link->path) == 0)
             cfg_fail_key(rd, "links[].path", i, "links[%u] has the same path; allowed a path of its own", k);
     if (link->type == LINK_USB) check_usb_link(rd, cfg, link, i);
+    if (link->type == LINK_UDP && link->port == 0 && CFG_SOUND(rd, i, "links[].port"))
+        cfg_fail_key(rd, cfg_is_given(rd, "links[].port", i) ? "links[].port" : "links[].type", i,
+                     "a udp link needs the port of its receiver; allowed 1 to 65535");
 }
 
 void cfg_check_links(struct cfg_reader *rd, struct config *cfg)
 {
     for (uint32_t i = 0; i < cfg->n_links; i++)
         check_link(rd, cfg, i);
-}
-
-int cfg_nmea_link(const struct config *cfg)
-{
-    for (uint32_t i = 0; i < cfg->n_links; i++)
-        if (cfg->link[i].protocol == PROTOCOL_NMEA && cfg->link[i].type != LINK_USB) return (int)i; /* check_link */
-    return -1;
 }
 
 int cfg_check_platform_keys(struct cfg_reader *rd, const struct config_platform *p)

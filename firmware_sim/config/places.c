@@ -126,8 +126,13 @@ static int check_station(struct cfg_reader *rd, const struct config *cfg, struct
     if (anchored || !nowhere) return SH_OK;
     if (cfg->output.crs != GEOREF_LOCAL)
         return fail_required(rd, "stations[].lat_deg", i, "output.crs is not local and there is no scene.anchor");
-    if (cfg_nmea_link(cfg) >= 0)
-        return fail_required(rd, "stations[].lat_deg", i, "a link has the protocol nmea and there is no scene.anchor");
+    const int link = cfg_link_that_needs(cfg, PROTOCOL_NEEDS_PLACE);
+    if (link >= 0) {
+        char why[96];
+        snprintf(why, sizeof why, "a link has the protocol %s and there is no scene.anchor",
+                 cfg_word(rd, "links[].protocol", cfg->link[link].protocol));
+        return fail_required(rd, "stations[].lat_deg", i, why);
+    }
     return SH_OK;
 }
 

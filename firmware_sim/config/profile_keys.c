@@ -5,6 +5,8 @@
  * before. */
 #define IN_PROFILE(member) CFG_MEMBER(struct config_profile, member)
 #define KEY(member)        #member, IN_PROFILE(member)
+#define EMITTER(member)    #member, IN_PROFILE(arrangement.member)
+#define BEAM(member)       CFG_MEMBER(struct config_profile_beam, member)
 #define REACH(member)      "reaches[]." #member, CFG_MEMBER(struct config_reach, member)
 
 #define PROGRAM(member) CFG_MEMBER(struct config_program, member)
@@ -22,27 +24,67 @@ static const char *const widths[] = {[BEAM_AT_1_E2] = "1/e2",
                                             [BEAM_AT_HALF_MAXIMUM] = "FWHM",
                                             [BEAM_HALF_AT_1_E2] = "half angle 1/e2",
                                             NULL};
+static const char *const emitter_names[] = {
+    [EMITTER_LINE] = "line",     [EMITTER_PLANAR] = "planar",         [EMITTER_BEAMS] = "beams",
+    [EMITTER_SPHERE] = "sphere", [EMITTER_DIRECTIONS] = "directions", NULL};
+static const char *const turn_names[] = {
+    [TURN_CLOCKWISE] = "clockwise", [TURN_COUNTER_CLOCKWISE] = "counter-clockwise", NULL};
 
 /* clang-format off */
 #define FIGURE .flags = CFG_FIGURE
+/* The default of a key that only some emitters have: emitter.c says which, and asks for it there. */
+#define OWNED ""
 static const struct cfg_key profile_keys[] = {
     {KEY(maker), CFG_TEXT, .flags = CFG_ASCII, .help = "Maker, as in *IDN?."},
     {KEY(model), CFG_TEXT, .flags = CFG_ASCII, .help = "Model, as in *IDN?."},
-    {"prr_min_hz", IN_PROFILE(prr_min_uhz), CFG_MICRO, "Hz", NULL, 1, 1e7, FIGURE, .help = "Lowest pulse rate."},
-    {"prr_max_hz", IN_PROFILE(prr_max_uhz), CFG_MICRO, "Hz", NULL, 1, 1e7, FIGURE, .help = "Highest pulse rate."},
+    {KEY(firmware), CFG_TEXT, .def = "1.0.0", .flags = CFG_ASCII,
+     .help = "Version of the firmware, as the protocols of this head say it."},
+
+    {"emitter", IN_PROFILE(arrangement.kind), CFG_ENUM, .def = "line", .names = emitter_names,
+     .help = "How the pulses are arranged. line: a mirror sweeps lines, the pan turns. planar: one plane, in steps. beams: "
+             "a firing sequence of several beams, which turns about the vertical. sphere: rings from pole to pole. "
+             "directions: a list."},
+    {EMITTER(steps_per_turn), CFG_COUNT, NULL, OWNED, 1, EMITTER_MAX_STEPS, FIGURE,
+     .help = "planar: steps of a turn, each a pulse. The pulse rate is that many times the line rate."},
+    {EMITTER(first_step), CFG_COUNT, NULL, OWNED, 0, EMITTER_MAX_STEPS - 1, FIGURE,
+     .help = "planar: the first step that is cast; a turn begins with step 0."},
+    {EMITTER(last_step), CFG_COUNT, NULL, OWNED, 0, EMITTER_MAX_STEPS - 1, FIGURE, .help = "planar: the last one."},
+    {EMITTER(front_step), CFG_COUNT, NULL, OWNED, 0, EMITTER_MAX_STEPS - 1, FIGURE,
+     .help = "planar: the step that looks ahead, along y. Line angles count from it, in the direction of the steps."},
+    {EMITTER(step_direction), CFG_ENUM, .def = OWNED, .names = turn_names, FIGURE,
+     .help = "planar, beams: how it turns, seen from above; clockwise when not given."},
+    {"firing_ns", IN_PROFILE(arrangement.firing_fs), CFG_MICRO, "ns", OWNED, 0.001, 1e9, FIGURE,
+     .help = "beams: how long a firing sequence lasts, rest and all; a multiple of 0.001 ns."},
+    {"beams", .type = CFG_LIST, .min = 0, .max = EMITTER_MAX_BEAMS,
+     .offset = offsetof(struct config_profile, arrangement.beam), .size = sizeof(struct config_profile_beam),
+     .count_offset = offsetof(struct config_profile, arrangement.n_beams),
+     .help = "beams: in the order in which they fire."},
+    {"beams[]", .type = CFG_MAP,
+     .help = "Written { elevation_deg: E, azimuth_deg: A, offset_ns: T, from: data sheet|assumed }."},
+    {"beams[].elevation_deg", BEAM(elevation_udeg), CFG_MICRO, "deg", NULL, -90, 90, .help = "Above the horizontal."},
+    {"beams[].azimuth_deg", BEAM(azimuth_udeg), CFG_MICRO, "deg", "0", -360, 360,
+     .help = "Clockwise from where the head looks at that time."},
+    {"beams[].offset_ns", BEAM(offset_ns), CFG_COUNT, "ns", NULL, 0, 1e9,
+     .help = "Firing time after the sequence's first; they rise from 0."},
+    {"beams[].from", BEAM(from), CFG_ENUM, .names = cfg_from_names, .help = "Where the figures are from."},
+    {"step_deg", IN_PROFILE(arrangement.step_udeg), CFG_MICRO, "deg", OWNED, 0.01, 90, FIGURE,
+     .help = "sphere: from pulse to pulse and from ring to ring. Rounded to whole steps of a turn and of half a turn."},
+
+    {"prr_min_hz", IN_PROFILE(prr_min_uhz), CFG_MICRO, "Hz", OWNED, 1, 1e7, FIGURE, .help = "Lowest pulse rate."},
+    {"prr_max_hz", IN_PROFILE(prr_max_uhz), CFG_MICRO, "Hz", OWNED, 1, 1e7, FIGURE, .help = "Highest pulse rate."},
     {"lines_min_hz", IN_PROFILE(lines_min_uhz), CFG_MICRO, "Hz", NULL, 0.25, 1e4, FIGURE,
      .help = "Slowest line rate; a line lasts 4 s at most."},
     {"lines_max_hz", IN_PROFILE(lines_max_uhz), CFG_MICRO, "Hz", NULL, 0.25, 1e4, FIGURE, .help = "Fastest line rate."},
-    {"pan_max_deg_s", IN_PROFILE(pan_max_udeg_s), CFG_MICRO, "deg/s", NULL, 0, 3600, FIGURE, .help = "Fastest pan."},
-    {"fov_min_deg", IN_PROFILE(fov_min_udeg), CFG_MICRO, "deg", NULL, -180, 360, FIGURE,
+    {"pan_max_deg_s", IN_PROFILE(pan_max_udeg_s), CFG_MICRO, "deg/s", OWNED, 0, 3600, FIGURE, .help = "Fastest pan."},
+    {"fov_min_deg", IN_PROFILE(fov_min_udeg), CFG_MICRO, "deg", OWNED, -180, 360, FIGURE,
      .help = "Line field of view: 0 forward, 90 up, above 90 backward over the zenith."},
-    {"fov_max_deg", IN_PROFILE(fov_max_udeg), CFG_MICRO, "deg", NULL, -180, 360, FIGURE,
+    {"fov_max_deg", IN_PROFILE(fov_max_udeg), CFG_MICRO, "deg", OWNED, -180, 360, FIGURE,
      .help = "End of the line field of view; it fits into a sweep, 360 / facets * optical_gain."},
-    {"pan_min_deg", IN_PROFILE(pan_min_udeg), CFG_MICRO, "deg", NULL, -360, 360, FIGURE, .help = "Smallest pan angle."},
-    {"pan_max_deg", IN_PROFILE(pan_max_udeg), CFG_MICRO, "deg", NULL, -360, 360, FIGURE,
+    {"pan_min_deg", IN_PROFILE(pan_min_udeg), CFG_MICRO, "deg", OWNED, -360, 360, FIGURE, .help = "Smallest pan angle."},
+    {"pan_max_deg", IN_PROFILE(pan_max_udeg), CFG_MICRO, "deg", OWNED, -360, 360, FIGURE,
      .help = "Largest pan angle; at most a turn from pan_min_deg."},
-    {KEY(facets), CFG_COUNT, NULL, NULL, 1, 360, FIGURE, .help = "Lines per turn of the mirror."},
-    {KEY(optical_gain), CFG_REAL, NULL, NULL, 0.01, 100, FIGURE,
+    {KEY(facets), CFG_COUNT, NULL, OWNED, 1, 360, FIGURE, .help = "Lines per turn of the mirror."},
+    {KEY(optical_gain), CFG_REAL, NULL, OWNED, 0.01, 100, FIGURE,
      .help = "Beam degrees per mirror degree: 2 for a polygon, 1 for a 45-degree mirror."},
     {KEY(range_min_m), CFG_REAL, "m", NULL, 0, 1e5, FIGURE, .help = "Shortest range."},
     {KEY(range_max_m), CFG_REAL, "m", NULL, 0.001, 1e5, FIGURE, .help = "Longest range."},

@@ -98,13 +98,35 @@ static void put_figures(const struct cfg_reader *rd, int grade, FILE *out)
     fputc('\n', out);
 }
 
+/* ---- the emitter: how pulses are arranged, and how fast it turns */
+
+static const char *turn_of(const struct config_profile *p)
+{
+    return p->emitter.turn < 0 ? "counter-clockwise" : "clockwise";
+}
+
+static void put_emitter(const struct cfg_reader *rd, const struct config_profile *p, FILE *out)
+{
+    const struct config_emitter *c = &p->arrangement;
+    fprintf(out, "  %-10s ", cfg_word(rd, "emitter", (int)c->kind));
+    if (c->kind == EMITTER_LINE)
+        fprintf(out, "%.10g to %.10g deg; pan %.10g to %.10g deg, up to %.10g deg/s", from_micro(p->fov_min_udeg),
+                from_micro(p->fov_max_udeg), from_micro(p->pan_min_udeg), from_micro(p->pan_max_udeg),
+                from_micro(p->pan_max_udeg_s));
+    if (c->kind == EMITTER_PLANAR)
+        fprintf(out, "%u steps a turn, %u to %u cast, %u ahead, %s", c->steps_per_turn, c->first_step, c->last_step,
+                c->front_step, turn_of(p));
+    if (c->kind == EMITTER_BEAMS)
+        fprintf(out, "%u beams, %.10g ns a sequence, %s", c->n_beams, from_micro(c->firing_fs), turn_of(p));
+    if (c->kind == EMITTER_SPHERE) fprintf(out, "%u pulses a ring, %u rings", p->emitter.steps, p->emitter.rings);
+    if (c->kind == EMITTER_DIRECTIONS) fprintf(out, "%u directions", p->emitter.steps);
+    fprintf(out, "; %.10g to %.10g lines/s\n", from_micro(p->lines_min_uhz), from_micro(p->lines_max_uhz));
+}
+
 void cfg_list_profile(const struct cfg_reader *rd, const struct config_profile *p, FILE *out)
 {
     fprintf(out, "%s: %s %s\n", p->name, p->maker, p->model);
-    fprintf(out, "  line       %.10g to %.10g deg, %.10g to %.10g lines/s; pan %.10g to %.10g deg, up to %.10g deg/s\n",
-            from_micro(p->fov_min_udeg), from_micro(p->fov_max_udeg), from_micro(p->lines_min_uhz),
-            from_micro(p->lines_max_uhz), from_micro(p->pan_min_udeg), from_micro(p->pan_max_udeg),
-            from_micro(p->pan_max_udeg_s));
+    put_emitter(rd, p, out);
     put_protocols(p, out);
     put_programs(p, out);
     for (int grade = 0; cfg_from_names[grade] != NULL; grade++)

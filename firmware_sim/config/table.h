@@ -32,7 +32,7 @@ enum cfg_flags {
     CFG_NEEDED = 8, /* has no default that does in most configurations: the example gives it a value */
 };
 
-enum { CFG_MAX_ROWS = 192, CFG_MAX_ITEMS = 64, CFG_PATH_MAX = 96, CFG_FROM_SET = -1 };
+enum { CFG_MAX_ROWS = 192, CFG_MAX_ITEMS = 128, CFG_PATH_MAX = 96, CFG_FROM_SET = -1 };
 
 struct cfg_key {
     const char *path;
@@ -144,6 +144,8 @@ const char *cfg_dir_of(const char *path, char *buf);
 /* SH_OK, or the code of a fault that leaves nothing to check: no file, no YAML, no section. */
 int cfg_read_file(struct cfg_reader *rd);
 void cfg_apply_set(struct cfg_reader *rd, const char *set);
+/* A key that is not given and has no default. */
+void cfg_fail_missing(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item);
 /* Values for what was not given or is bad, errors for what must be. profile may be NULL. */
 void cfg_fill_defaults(struct cfg_reader *rd, const struct config_profile *profile);
 /* Where a file that comes with the program ("heads", "scenes/x.obj") may be, for i from 0: beside an
@@ -173,11 +175,19 @@ double cfg_used_share(const struct config_profile *profile);
 void cfg_list_profile(const struct cfg_reader *rd, const struct config_profile *profile, FILE *out);
 /* The words of enum config_from. */
 extern const char *const cfg_from_names[];
+/* emitter.c: which keys of a profile belong to which emitter, and what follows from them. */
+void cfg_check_emitter(struct cfg_reader *rd, struct config_profile *profile);
+/* The settings of a head whose pulse rate follows from its lines. */
+void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg);
 /* owned.c: keys that only some kinds of link have, and what a link needs. */
 void cfg_check_links(struct cfg_reader *rd, struct config *cfg);
+/* usb_look.c: the look of a usb link, by its protocol, and the ids that are not given. */
+void cfg_set_usb_look(struct cfg_reader *rd, struct link_spec *link, uint32_t item);
 /* The same for keys of platforms. Returns whether all of them belong to this kind. */
 int cfg_check_platform_keys(struct cfg_reader *rd, const struct config_platform *platform);
-/* The first link of the GNSS receiver; -1: none. */
-int cfg_nmea_link(const struct config *cfg);
+/* link_protocol.c: what the protocols of links need. */
+void cfg_check_link_protocols(struct cfg_reader *rd, struct config *cfg);
+/* The first link whose protocol has this need; -1: none. */
+int cfg_link_that_needs(const struct config *cfg, enum protocol_needs need);
 
 #endif

@@ -46,7 +46,8 @@ static void carry_out(struct device *device, enum command_effect effect, uint64_
     }
 }
 
-static void do_command(struct device *device, uint32_t session, const char *line, uint64_t released,
+/* once: the session does not keep control. */
+static void do_command(struct device *device, uint32_t session, const char *line, uint64_t released, int once,
                        struct command_result *out)
 {
     struct command_device *cmd = &device->cmd;
@@ -54,7 +55,10 @@ static void do_command(struct device *device, uint32_t session, const char *line
     cmd->t_ns = (int64_t)released * device->tick_ns;
     device_set_time_texts(device);
     command_execute(cmd, session, line, out);
-    if (out->took_control) device_push_event(device, NATIVE_EV_CONTROL, session, 0, 0, "taken");
+    if (out->took_control && once)
+        cmd->control = 0;
+    else if (out->took_control)
+        device_push_event(device, NATIVE_EV_CONTROL, session, 0, 0, "taken");
     if (out->error != 0)
         device_push_error(device, session, out->error, command_error_text(out->error));
     else if (out->changes && device->journal.out != NULL && out->effect != COMMAND_STEP)
@@ -66,7 +70,15 @@ void device_command(struct device *device, uint32_t session, const char *line, u
                     struct command_result *out)
 {
     pthread_mutex_lock(&device->lock);
-    do_command(device, session, line, released, out);
+    do_command(device, session, line, released, 0, out);
+    pthread_mutex_unlock(&device->lock);
+}
+
+void device_command_once(struct device *device, uint32_t session, const char *line, uint64_t released,
+                         struct command_result *out)
+{
+    pthread_mutex_lock(&device->lock);
+    do_command(device, session, line, released, 1, out);
     pthread_mutex_unlock(&device->lock);
 }
 
@@ -115,6 +127,6 @@ void device_run_replay(struct device *device, uint64_t tick)
     while (device->journal.at < device->journal.n_replay && device->journal.replay[device->journal.at].tick <= tick) {
         const struct journal_entry *entry = &device->journal.replay[device->journal.at++];
         struct command_result result;
-        do_command(device, 0, entry->line, (uint64_t)(entry->t_ns / device->tick_ns), &result);
+        do_command(device, 0, entry->line, (uint64_t)(entry->t_ns / device->tick_ns), 0, &result);
     }
 }

@@ -32,7 +32,8 @@ static int set_limits(struct device *device, struct sh_err *err)
                                               .pan_min_udeg = p->pan_min_udeg,
                                               .pan_max_udeg = p->pan_max_udeg,
                                               .n_rates = p->n_programs,
-                                              .n_stations = device->site->n_stations};
+                                              .n_stations = device->site->n_stations,
+                                              .line_pulses = emitter_line_pulses(&p->emitter)};
     for (uint32_t i = 0; i < p->n_programs; i++)
         device->cmd.limits.rate_uhz[i] = p->program[i].prr_uhz;
     device->cmd.settings = device->cmd.defaults = cfg->head.settings;
@@ -160,7 +161,7 @@ int device_claim(struct device *device, struct device_work *work)
     uint64_t tick = device->next_tick;
     int was_over = device->over;
     memset(work, 0, offsetof(struct device_work, event));
-    work->describe = work->scanning = work->telemetry = work->cut_short = work->wake = 0;
+    work->describe = work->scanning = work->telemetry = work->cut_short = 0;
     work->surfaces_n = work->n_poses = 0;
     work->tick = tick;
     work->t_ns = (int64_t)tick * device->tick_ns;
@@ -179,7 +180,6 @@ int device_claim(struct device *device, struct device_work *work)
         device_describe(device, work);
     work->telemetry = tick % device->tick_hz == 0;
     if (work->telemetry || ends_scan(work)) device_fill_telemetry(device, tick, &work->telemetry_frame);
-    work->wake = gnss_count(&device->gnss, work->t_ns) != gnss_count(&device->gnss, work->t_ns + device->tick_ns);
     int told = device->ending || tick >= device->end_tick; /* to end; else the one scan was over in this tick */
     if (!was_over && (told || device->over)) device->journal.end_tick = told ? tick : tick + 1;
     device->over |= told;

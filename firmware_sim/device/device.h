@@ -16,6 +16,7 @@
 
 #include "core/cast.h"
 #include "drivers/protocol/native.h"
+#include "drivers/protocol/nmea.h"
 #include "firmware_sim/command/command.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/device/journal.h"
@@ -44,8 +45,10 @@ struct device_work {
     uint32_t n_events_before; /* of event[]: those that go before the points; the others go after them */
     uint32_t n_events;
     struct native_event event[DEVICE_MAX_EVENTS];
-    int describe, describe_flags; /* descriptor and anchor frames, with these flags */
+    int describe, describe_flags; /* descriptor, emitter and anchor frames, with these flags */
     struct native_descriptor descriptor;
+    struct native_emitter emitter; /* kind NATIVE_EMIT_LINE: none is sent */
+    struct native_beam beam[NATIVE_MAX_BEAMS];
     struct native_anchor anchor;
     uint32_t surfaces_first, surfaces_n; /* names to send; 0: none */
     int scanning;
@@ -63,7 +66,6 @@ struct device_work {
     struct pose_knot pose[DEVICE_MAX_POSES];
     int telemetry; /* due at the tick's end; it goes before each SCAN_END, too */
     struct native_telemetry telemetry_frame;
-    int wake; /* readers have something to do even without frames: the receiver has a position */
 };
 
 struct device;
@@ -102,6 +104,9 @@ void device_end(struct device *device);
 /* Carries out one command line for a session (from 1). */
 void device_command(struct device *device, uint32_t session, const char *line, uint64_t released,
                     struct command_result *out);
+/* The same for a session of another protocol (drivers/protocol): control is given back at once, without a word. */
+void device_command_once(struct device *device, uint32_t session, const char *line, uint64_t released,
+                         struct command_result *out);
 /* A line too long for the command set ended. */
 void device_overlong(struct device *device, uint32_t session, struct command_result *out);
 /* A session has gone; partial: in the middle of a command. Gives control back. */
@@ -120,10 +125,12 @@ void device_report(struct device *device, int number, const char *text);
  * belongs to the device. */
 int device_power_up(struct device *device, int64_t now_ns, const char **warning, struct sh_err *err);
 
-/* The GNSS receiver (gnss.h), and the sentences of a position (from 0) where the head is. Returns their
- * length, 0 when cap is too small. */
-const struct gnss *device_gnss(const struct device *device);
-size_t device_gnss_sentences(struct device *device, uint64_t index, char *dst, size_t cap);
+/* UTC by the head's clock at a device time, ns since 1970; INT64_MIN: not known. */
+int64_t device_utc_ns(const struct device *device, int64_t t_ns);
+/* The GNSS receiver (gnss.h): device time of its first fix at or after t_ns, INT64_MAX where it has none; and its last
+ * fix at or before t_ns, where the head is. 0: there is none. */
+int64_t device_next_fix_ns(const struct device *device, int64_t t_ns);
+int device_fix(struct device *device, int64_t t_ns, struct nmea_fix *fix);
 
 /* Scans begun so far. */
 uint64_t device_scans(struct device *device);
@@ -132,6 +139,8 @@ int64_t device_scan_ns(struct device *device);
 
 int64_t device_tick_ns(const struct device *device);
 
+/* The descriptor and anchor of now, as a repetition, into the work; it has nothing else. */
+void device_describe_now(struct device *device, struct device_work *work);
 /* The anchor of a station's points; the stretch counts only along a trajectory (site_georef). */
 void device_fill_anchor(const struct site *site, uint32_t station, size_t stretch, struct native_anchor *a);
 

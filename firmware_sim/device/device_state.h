@@ -170,6 +170,8 @@ void device_set_time_texts(struct device *device);
 
 /* frames.c: what the frames say. */
 void device_fill_descriptor(const struct device *device, struct native_descriptor *d);
+/* Kind NATIVE_EMIT_LINE for a line head, which has no such frame. beam: [NATIVE_MAX_BEAMS]. */
+void device_fill_emitter(const struct device *device, struct native_emitter *e, struct native_beam *beam);
 void device_fill_telemetry(const struct device *device, uint64_t tick, struct native_telemetry *t);
 
 #endif

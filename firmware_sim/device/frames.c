@@ -39,6 +39,39 @@ void device_fill_descriptor(const struct device *device, struct native_descripto
     d->content = cfg->output.attributes ? (uint32_t)NATIVE_HAS_ATTRIBUTES : 0;
 }
 
+static const uint32_t emit[] = {[EMITTER_LINE] = NATIVE_EMIT_LINE,
+                                [EMITTER_PLANAR] = NATIVE_EMIT_PLANAR,
+                                [EMITTER_BEAMS] = NATIVE_EMIT_BEAMS,
+                                [EMITTER_SPHERE] = NATIVE_EMIT_SPHERE,
+                                [EMITTER_DIRECTIONS] = NATIVE_EMIT_DIRECTIONS};
+static const uint32_t echoes_sent[] = {[BEAM_ALL] = NATIVE_ECHOES_ALL,
+                                       [BEAM_FIRST] = NATIVE_ECHOES_FIRST,
+                                       [BEAM_LAST] = NATIVE_ECHOES_LAST,
+                                       [BEAM_STRONGEST] = NATIVE_ECHOES_STRONGEST};
+
+void device_fill_emitter(const struct device *device, struct native_emitter *e, struct native_beam *beam)
+{
+    const struct emitter *from = device->scan.segment.spec.emitter;
+    memset(e, 0, sizeof *e);
+    if (from == NULL) return;
+    *e = (struct native_emitter){.kind = emit[from->kind],
+                                 .n_beams = from->n_beams,
+                                 .steps = from->steps,
+                                 .first_step = (int32_t)from->first_step,
+                                 .last_step = (int32_t)from->last_step,
+                                 .front_step = (int32_t)from->front_step,
+                                 .turn = from->turn,
+                                 .rings = from->rings,
+                                 .echoes = echoes_sent[device->cmd.settings.echoes]};
+    if (from->kind == EMITTER_SPHERE) e->first_ring_udeg = -90000000;
+    if (from->kind != EMITTER_BEAMS) return;
+    e->sequence_ns_num = from->sequence_ticks * from->tick_num;
+    e->sequence_ns_den = from->tick_den;
+    for (uint32_t i = 0; i < from->n_beams; i++)
+        beam[i] = (struct native_beam){(int32_t)from->beam[i].elevation_udeg, (int32_t)from->beam[i].azimuth_udeg,
+                                       from->beam[i].offset_ns};
+}
+
 void device_fill_anchor(const struct site *site, uint32_t station, size_t stretch, struct native_anchor *a)
 {
     static const uint32_t crs[] = {[GEOREF_LOCAL] = NATIVE_CRS_LOCAL,

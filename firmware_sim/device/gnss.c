@@ -7,14 +7,13 @@
 #include "core/locate.h"
 #include "core/mat3.h"
 #include "core/rng.h"
-#include "drivers/protocol/nmea.h"
 
 void gnss_init(struct gnss *gnss, const struct site *site, const struct head_clock *clock)
 {
     const struct config *cfg = site->cfg;
     *gnss = (struct gnss){.site = site, .clock = clock};
     for (uint32_t i = 0; i < cfg->n_links; i++)
-        if (cfg->link[i].protocol == PROTOCOL_NMEA) gnss->on = 1;
+        if (cfg->link[i].protocol != PROTOCOL_NATIVE && clock->source != EPOCH_NONE) gnss->on = 1;
     if (gnss->on) gnss->period_ns = UTC_SECOND_NS / cfg->gnss.rate_hz;
 }
 
@@ -111,8 +110,8 @@ static void fill_place(const struct gnss *gnss, const struct gnss_place *place, 
     fix->course_deg = fix->speed_m_s > 0.0 ? fmod(angle_deg(atan2(v[0], v[1])) + 360.0, 360.0) : NAN;
 }
 
-size_t gnss_sentences(const struct gnss *gnss, uint64_t index, uint32_t station, const struct gnss_track *track,
-                      char *dst, size_t cap)
+void gnss_fix(const struct gnss *gnss, uint64_t index, uint32_t station, const struct gnss_track *track,
+              struct nmea_fix *fix)
 {
     const struct config_gnss *c = &gnss->site->cfg->gnss;
     double noise_m[3] = {0.0, 0.0, 0.0};
@@ -123,18 +122,17 @@ size_t gnss_sentences(const struct gnss *gnss, uint64_t index, uint32_t station,
     int found = gnss_position(gnss, station, track, noise_m, &place);
     struct utc_time utc;
     utc_from_tai(&gnss->clock->table, head_clock_true_ns(gnss->clock, gnss_time_ns(gnss, index)), &utc);
-    struct nmea_fix fix = {.talker = {'G', c->talker == TALKER_GP ? 'P' : 'N'},
-                           .year = utc.year,
-                           .month = utc.month,
-                           .day = utc.day,
-                           .hour = utc.hour,
-                           .minute = utc.minute,
-                           .second = utc.second,
-                           .hundredth = utc.ns / 10000000,
-                           .quality = found ? (int)c->quality : 0,
-                           .satellites = (int)c->satellites,
-                           .hdop = c->hdop,
-                           .sigma_m = {c->accuracy_m, c->accuracy_m, c->accuracy_m}};
-    fill_place(gnss, &place, &fix);
-    return nmea_encode_all(dst, cap, &fix);
+    *fix = (struct nmea_fix){.talker = {'G', c->talker == TALKER_GP ? 'P' : 'N'},
+                             .year = utc.year,
+                             .month = utc.month,
+                             .day = utc.day,
+                             .hour = utc.hour,
+                             .minute = utc.minute,
+                             .second = utc.second,
+                             .hundredth = utc.ns / 10000000,
+                             .quality = found ? (int)c->quality : 0,
+                             .satellites = (int)c->satellites,
+                             .hdop = c->hdop,
+                             .sigma_m = {c->accuracy_m, c->accuracy_m, c->accuracy_m}};
+    fill_place(gnss, &place, fix);
 }

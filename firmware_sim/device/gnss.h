@@ -1,7 +1,7 @@
 /* The GNSS receiver that stands with the head.
  *
- * In: the head's pose and the true time (head_clock.h). Out: NMEA 0183 sentences with the position of its
- * antenna at multiples of 1/rate_hz of UTC. A sentence comes after the moment that it names.
+ * In: the head's pose and the true time (head_clock.h). Out: fixes with the position of its antenna at multiples
+ * of 1/rate_hz of UTC. drivers/protocol makes NMEA 0183 sentences of them.
  *
  * The receiver runs from power-up on, also while the head does not scan. (In the pace fast device time itself
  * stands still while the head has nothing to do.) The antenna is at the head's origin plus gnss.lever_arm_m
@@ -11,13 +11,14 @@
 #ifndef FIRMWARE_SIM_DEVICE_GNSS_H
 #define FIRMWARE_SIM_DEVICE_GNSS_H
 
+#include "drivers/protocol/nmea.h"
 #include "firmware_sim/device/head_clock.h"
 #include "firmware_sim/site/site.h"
 
 struct gnss {
     const struct site *site;
     const struct head_clock *clock;
-    int on; /* a link speaks NMEA */
+    int on; /* the time is known, and a link speaks a protocol that may ask for fixes */
     int64_t period_ns;
 };
 
@@ -35,10 +36,9 @@ struct gnss_track {
     struct pose before, at, after; /* GNSS_STEP_NS apart */
 };
 
-/* The sentences of a position. track NULL: the head stands at the station (0..n_stations-1). Else it is where
- * track says; there is no fix where that is no place on the Earth. Returns the length, 0 when cap is too
- * small. */
-size_t gnss_sentences(const struct gnss *gnss, uint64_t index, uint32_t station, const struct gnss_track *track,
-                      char *dst, size_t cap);
+/* A position. track NULL: the head stands at the station (0..n_stations-1). Else it is where
+ * track says; its quality is 0 where that is no place on the Earth. */
+void gnss_fix(const struct gnss *gnss, uint64_t index, uint32_t station, const struct gnss_track *track,
+              struct nmea_fix *fix);
 
 #endif

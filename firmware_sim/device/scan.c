@@ -1,5 +1,6 @@
 /* The scan program: which pulses and frames each tick has while a scan is on. */
 #include <math.h>
+#include <string.h>
 
 #include "firmware_sim/device/device_state.h"
 
@@ -28,7 +29,8 @@ void device_begin_scan(struct device *device, uint64_t tick)
 uint32_t device_tick_pulses(const struct config *cfg)
 {
     uint32_t n = (uint32_t)ceil((double)cfg->profile.prr_max_uhz * 1e-6 / cfg->loop.tick_hz);
-    return n + n / 8 + 2 * SCHEDULE_PACKET; /* an eighth: to catch up with */
+    /* An eighth: to catch up with. A firing sequence may begin with all of its pulses. */
+    return n + n / 8 + 2 * SCHEDULE_PACKET + cfg->profile.emitter.n_beams;
 }
 
 uint32_t device_tick_lines(const struct config *cfg)
@@ -141,8 +143,21 @@ void device_describe(struct device *device, struct device_work *work)
     work->describe = 1;
     work->describe_flags = device->scan.describe ? 0 : NATIVE_REPEAT;
     device_fill_descriptor(device, &work->descriptor);
+    device_fill_emitter(device, &work->emitter, work->beam);
     device_fill_anchor(device->site, device->scan.station, device->scan.stretch, &work->anchor);
     device->scan.describe = device->scan.anchor_lost = 0;
+}
+
+void device_describe_now(struct device *device, struct device_work *work)
+{
+    memset(work, 0, sizeof *work);
+    pthread_mutex_lock(&device->lock);
+    const struct device_scan was = device->scan;
+    device->scan.describe = 0;
+    device_describe(device, work);
+    device->scan = was;
+    work->t_ns = (int64_t)device->next_tick * device->tick_ns;
+    pthread_mutex_unlock(&device->lock);
 }
 
 static void describe(struct device *device, uint64_t tick, struct device_work *work)

@@ -53,22 +53,32 @@ void device_set_time_texts(struct device *device)
              (long long)(gps.ns % UTC_SECOND_NS));
 }
 
-const struct gnss *device_gnss(const struct device *device)
+int64_t device_utc_ns(const struct device *device, int64_t t_ns)
 {
-    return &device->gnss;
+    const struct head_clock *clock = &device->clock;
+    return clock->source != EPOCH_NONE ? utc_posix_from_tai(&clock->table, head_clock_ns(clock, t_ns)) : INT64_MIN;
 }
 
-size_t device_gnss_sentences(struct device *device, uint64_t index, char *dst, size_t cap)
+int64_t device_next_fix_ns(const struct device *device, int64_t t_ns)
 {
+    const struct gnss *gnss = &device->gnss;
+    return gnss->on ? gnss_time_ns(gnss, gnss_count(gnss, t_ns)) : INT64_MAX;
+}
+
+int device_fix(struct device *device, int64_t t_ns, struct nmea_fix *fix)
+{
+    const uint64_t n = gnss_count(&device->gnss, t_ns + 1);
+    if (n == 0) return 0;
     struct gnss_track track;
-    int64_t t_ns = gnss_time_ns(&device->gnss, index);
+    const int64_t at_ns = gnss_time_ns(&device->gnss, n - 1);
     pthread_mutex_lock(&device->lock);
     uint32_t station = device->cmd.settings.station - 1;
-    int moves = device_head_pose(device, t_ns, &track.at);
+    int moves = device_head_pose(device, at_ns, &track.at);
     if (moves) {
-        device_head_pose(device, t_ns - GNSS_STEP_NS, &track.before);
-        device_head_pose(device, t_ns + GNSS_STEP_NS, &track.after);
+        device_head_pose(device, at_ns - GNSS_STEP_NS, &track.before);
+        device_head_pose(device, at_ns + GNSS_STEP_NS, &track.after);
     }
     pthread_mutex_unlock(&device->lock);
-    return gnss_sentences(&device->gnss, index, station, moves ? &track : NULL, dst, cap);
+    gnss_fix(&device->gnss, n - 1, station, moves ? &track : NULL, fix);
+    return 1;
 }

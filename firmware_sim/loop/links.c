@@ -1,6 +1,8 @@
 #include "firmware_sim/loop/links.h"
 
 #include <math.h>
+#include <stdio.h>
+#include <string.h>
 
 #include "drivers/protocol/native.h"
 #include "firmware_sim/loop/pump.h"
@@ -17,13 +19,16 @@ static double stream_rate(const struct config *cfg)
     return (double)h->prr_uhz * 1e-6 * (used < 1.0 ? used : 1.0) * point_len;
 }
 
+/* Other protocols have rates of their own, which follow from what their clients ask for. What a link of theirs can't
+ * carry is lost in whole units, and counted. */
 /* A link that can't carry the stream is refused before it loses any of it. */
 static int check_capacity(const struct config *cfg, const struct pump *pump, struct sh_err *err)
 {
     struct link_place place;
     pump_get_place(pump, &place);
+    if (strcmp(place.protocol, "native") != 0) return SH_OK;
     double capacity = place.bytes_s, rate = stream_rate(cfg);
-    if (capacity <= 0.0 || capacity >= rate || place.nmea) return SH_OK;
+    if (capacity <= 0.0 || capacity >= rate) return SH_OK;
     return sh_fail(err, SH_EINPUT,
                    "link %s: the stream has %.2f MB/s, the link carries %.2f MB/s; lower head.prr_hz to %.0f%s",
                    place.endpoint, 1e-6 * rate, 1e-6 * capacity,
@@ -32,9 +37,26 @@ static int check_capacity(const struct config *cfg, const struct pump *pump, str
                    cfg->output.attributes ? ", or leave out output.attributes" : "");
 }
 
+static void identify(struct links *links, const struct config *cfg)
+{
+    struct protocol_identity *id = &links->identity;
+    snprintf(id->maker, sizeof id->maker, "%s", cfg->profile.maker);
+    snprintf(id->model, sizeof id->model, "%s", cfg->profile.model);
+    snprintf(id->profile, sizeof id->profile, "%s", cfg->profile.name);
+    snprintf(id->serial, sizeof id->serial, "%s", cfg->head.serial);
+    snprintf(id->name, sizeof id->name, "%s", cfg->head.name);
+    links->fixes_hz = cfg->gnss.rate_hz;
+    for (uint32_t i = cfg->n_links; i-- > 0;) {
+        if (cfg->link[i].protocol != PROTOCOL_VELODYNE || cfg->link[i].type != LINK_UDP) continue;
+        snprintf(links->data_address, sizeof links->data_address, "%s", cfg->link[i].address);
+        links->data_port = cfg->link[i].port;
+    }
+}
+
 int links_open(struct links *links, const struct config *cfg, const struct link_spec *extra, struct sh_err *err)
 {
     int rc = SH_OK;
+    identify(links, cfg);
     for (uint32_t i = 0; i < cfg->n_links + (extra != NULL) && rc == SH_OK; i++) {
         rc = pump_open(links, i, i < cfg->n_links ? &cfg->link[i] : extra, &links->pump[i], err);
         if (rc != SH_OK) break;

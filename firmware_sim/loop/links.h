@@ -5,6 +5,7 @@
 #ifndef FIRMWARE_SIM_LOOP_LINKS_H
 #define FIRMWARE_SIM_LOOP_LINKS_H
 
+#include "drivers/protocol/protocol.h"
 #include "firmware_sim/loop/stream.h"
 
 struct pump;
@@ -13,8 +14,8 @@ struct pump;
 struct link_place {
     const char *type;
     char endpoint[512];
-    double bytes_s; /* that it can carry; 0: no fixed limit */
-    int nmea;       /* speaks for the GNSS receiver, not for the head */
+    double bytes_s;       /* that it can carry; 0: no fixed limit */
+    const char *protocol; /* its name; NULL: none */
 };
 
 /* What the readers of a link got, and what was left out for them. PROTOCOL.md defines the words (What the counts
@@ -22,7 +23,9 @@ struct link_place {
 struct link_counts {
     uint64_t received_pulses; /* in frames that were written out to the link as a whole */
     uint64_t left_out_pulses;
-    uint64_t left_out_frames; /* of the head, or sentences of its GNSS receiver */
+    uint64_t left_out_frames;
+    /* of protocols but the native one */
+    uint64_t sent_units, lost_units, lost_points, wrong_requests, lost_input_bytes;
 };
 
 struct links {
@@ -30,6 +33,10 @@ struct links {
     struct stream *stream;
     struct device *device;
     const struct sh_report *report; /* NULL: none */
+    struct protocol_identity identity;
+    uint32_t fixes_hz;     /* of the GNSS receiver */
+    char data_address[64]; /* where the first velodyne link sends; empty: there is none */
+    int data_port;
 
     struct pump *pump[STREAM_MAX_LINKS];
     uint32_t n;

@@ -27,6 +27,16 @@ static int create_stream(struct loop *loop, struct sh_err *err)
     return stream_create(&loop->stream, &size, tick_ns, err);
 }
 
+/* Who joins before the head has said anything finds what it is. */
+static void keep_description(struct loop *loop)
+{
+    struct device_work work;
+    device_describe_now(loop->device, &work);
+    const struct ring_tick *tick = worker_fill(loop->casters.caster[0].worker, &work);
+    for (uint32_t at = 0; at < tick->len; at += (uint32_t)native_frame_len(tick->bytes + at))
+        kept_put(&loop->stream.kept, tick->bytes + at);
+}
+
 int loop_create(const struct site *site, struct device *device, const struct loop_options *options, struct loop **out,
                 struct sh_err *err)
 {
@@ -44,6 +54,7 @@ int loop_create(const struct site *site, struct device *device, const struct loo
     atomic_store(&loop->final_tick, UINT64_MAX);
     int rc = create_stream(loop, err);
     if (rc == SH_OK) rc = casters_create(loop, config_threads(cfg), err);
+    if (rc == SH_OK) keep_description(loop);
     if (rc == SH_OK) rc = links_open(&loop->links, cfg, options->extra, err);
     if (rc == SH_OK && cfg->platform.kind == PLATFORM_LIVE && cfg->loop.pace == PACE_REALTIME)
         rc = pose_feed_open(device, cfg, &loop->feed, err);
@@ -86,7 +97,7 @@ void loop_put_endpoints(const struct loop *loop, struct json *json)
         json_open_object(json, NULL);
         json_string(json, "type", place.type);
         json_string(json, "endpoint", place.endpoint);
-        if (place.nmea) json_string(json, "protocol", "nmea");
+        if (place.protocol != NULL) json_string(json, "protocol", place.protocol);
         json_close_object(json);
     }
     json_close_array(json);
@@ -103,9 +114,15 @@ void loop_put_links(const struct loop *loop, struct json *json)
         pump_get_counts(loop->links.pump[i], &counts);
         json_open_object(json, NULL);
         json_string(json, "endpoint", place.endpoint);
+        json_string(json, "protocol", place.protocol);
         json_uint(json, "received_pulses", counts.received_pulses);
         json_uint(json, "left_out_pulses", counts.left_out_pulses);
         json_uint(json, "left_out_frames", counts.left_out_frames);
+        json_uint(json, "sent_units", counts.sent_units);
+        json_uint(json, "lost_units", counts.lost_units);
+        json_uint(json, "lost_points", counts.lost_points);
+        json_uint(json, "wrong_requests", counts.wrong_requests);
+        json_uint(json, "lost_input_bytes", counts.lost_input_bytes);
         json_close_object(json);
     }
     json_close_array(json);

@@ -14,16 +14,22 @@ static void count_lost(struct pump *pump, uint32_t n, uint64_t pulses)
     atomic_fetch_add(&pump->stream->counters->reader_lost_pulses, pulses);
 }
 
-void session_count_lost(struct pump *pump, struct session *s, uint32_t n, uint64_t pulses)
+/* The error queue gets an entry once per episode. */
+static void report(struct pump *pump, struct session *s)
 {
-    s->lost.frames += n;
-    count_lost(pump, n, pulses);
     if (!s->lost.lagging) {
         char text[96];
         snprintf(text, sizeof text, "session %u, %.50s", s->id, s->peer);
         device_report(pump->links->device, CMD_E_READER, text);
     }
     s->lost.lagging = 1;
+}
+
+void session_count_units(struct pump *pump, struct session *s, uint64_t n)
+{
+    pump->counts.lost_units += n;
+    atomic_fetch_add(&pump->stream->counters->reader_lost_frames, n);
+    report(pump, s);
 }
 
 /* Announces it to the reader in a frame of its own. */
@@ -36,21 +42,25 @@ static void announce(struct pump *pump, struct session *s, uint32_t frames, uint
         (uint32_t)native_encode_event(s->out + s->out_len, pump->out_cap - s->out_len, &event, now_ns, NATIVE_LOCAL);
 }
 
-void session_check_lost(struct pump *pump, struct session *s, const struct ring_copy *tick, uint64_t released)
+uint32_t session_check_lost(struct pump *pump, struct session *s, const struct ring_copy *tick, uint64_t released)
 {
+    uint32_t frames = 0;
     /* An empty tick has a number, too: the last frames for a long time may have been lost. */
     if (s->lost.have_seq && tick->first_seq != s->lost.next_seq) {
-        uint32_t frames = tick->first_seq - s->lost.next_seq;
         uint64_t pulses = tick->pulses_before - s->lost.next_pulse;
-        session_count_lost(pump, s, frames, pulses);
-        announce(pump, s, frames, pulses);
-    } else if (released - s->cursor < pump->stream->ring.queue_ticks / 8) {
+        frames = tick->first_seq - s->lost.next_seq;
+        s->lost.frames += frames;
+        count_lost(pump, frames, pulses);
+        report(pump, s);
+        if (pump->protocol->passes_native) announce(pump, s, frames, pulses);
+    } else if (released - s->cursor < pump->stream->ring.queue_ticks / 8 && s->units.n == 0) {
         s->lost.lagging = 0;
     }
     s->lost.have_seq |= tick->n_frames != 0;
     s->lost.next_seq = tick->first_seq + tick->n_frames;
     s->lost.next_pulse = tick->pulses_before + tick->n_cast;
     pump->counts.received_pulses += tick->n_cast;
+    return frames;
 }
 
 /* Frames of the stream, and pulses in them, that lie in the session's buffer and were not written as a whole.
@@ -81,7 +91,7 @@ static uint32_t count_unwritten(const struct session *s, uint64_t *pulses)
 void session_gone(struct pump *pump, struct session *s)
 {
     uint64_t pulses;
-    if (pump->nmea) return;
+    if (!pump->protocol->passes_native) return;
     count_unwritten(s, &pulses);
     pump->counts.received_pulses -= pulses;
 }
@@ -91,13 +101,14 @@ void session_leave(struct pump *pump, struct session *s)
     struct stream *stream = pump->stream;
     uint64_t pulses = 0, unwritten = 0;
     uint32_t frames = 0;
-    if (pump->nmea) {
-        frames = pump_nmea_backlog(pump, s) + (s->out_pos < s->out_len); /* at least the one it is in the middle of */
-    } else if (s->lost.have_seq) {                                       /* the pacing thread is done with seq */
-        frames = count_unwritten(s, &unwritten) + stream->seq - s->lost.next_seq;
+    const int native = pump->protocol->passes_native, over = atomic_load(&stream->over);
+    if (s->lost.have_seq) { /* the pacing thread is done with seq */
+        frames = (native ? count_unwritten(s, &unwritten) : 0) + stream->seq - s->lost.next_seq;
         pulses = unwritten + atomic_load(&stream->counters->pulses) - s->lost.next_pulse;
     }
     pump->counts.received_pulses -= unwritten;
-    if (atomic_load(&stream->over)) count_lost(pump, frames, pulses);
+    if (over) count_lost(pump, frames, pulses);
+    if (over && !native && s->units.n != 0) session_count_units(pump, s, s->units.n);
     stream_set_reader(stream, s->reader, s->cursor, 0);
+    if (!native) session_close_protocol(pump, s);
 }

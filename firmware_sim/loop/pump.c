@@ -19,20 +19,29 @@ int pump_open(struct links *links, uint32_t index, const struct link_spec *spec,
     pump->links = links;
     pump->stream = links->stream;
     pump->ops = link_ops_get(spec->type);
-    pump->nmea = spec->protocol == PROTOCOL_NMEA;
+    pump->protocol = protocol_ops_get((enum protocol_id)spec->protocol);
     pump->out_cap = links->stream->tick_bytes + BATCH_BYTES + REPLY_ROOM;
+    struct link_spec with = *spec;
     pump->wake_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     int rc = pump->wake_fd < 0 ? sh_fail(err, SH_EIO, "eventfd: %s", strerror(errno)) : SH_OK;
     for (uint32_t i = 0; i < LINK_MAX_SESSIONS; i++) {
         pump->session[i].reader = (int)(index * LINK_MAX_SESSIONS + i);
         pump->session[i].id = index * LINK_MAX_SESSIONS + i + 1;
     }
-    if (rc == SH_OK) rc = pump->ops->open(spec, &pump->link, err);
+    if (rc == SH_OK && pump->protocol == NULL)
+        rc = sh_fail(err, SH_EINPUT, "link %s: this build does not have its protocol", pump->ops->name);
+    if (rc == SH_OK && !pump->protocol->passes_native) {
+        with.units = 1;
+        pump->out_cap = QUEUE_UNITS * pump->protocol->max_unit + BATCH_BYTES;
+        pump->tick = malloc(links->stream->tick_bytes);
+        if (pump->tick == NULL) rc = sh_fail(err, SH_ENOMEM, "no memory");
+    }
+    if (rc == SH_OK) rc = pump->ops->open(&with, &pump->link, err);
     if (rc != SH_OK) {
         pump_close(pump);
         return rc;
     }
-    stream_listen(links->stream, pump->wake_fd);
+    pump->listener = stream_listen(links->stream, pump->wake_fd);
     *out = pump;
     return SH_OK;
 }
@@ -42,8 +51,11 @@ void pump_close(struct pump *pump)
     if (pump == NULL) return;
     if (pump->link != NULL) pump->ops->close(pump->link);
     if (pump->wake_fd >= 0) close(pump->wake_fd);
-    for (uint32_t i = 0; i < LINK_MAX_SESSIONS; i++)
+    for (uint32_t i = 0; i < LINK_MAX_SESSIONS; i++) {
         free(pump->session[i].out);
+        unit_queue_free(&pump->session[i].units);
+    }
+    free(pump->tick);
     free(pump);
 }
 
@@ -51,7 +63,7 @@ void pump_get_place(const struct pump *pump, struct link_place *place)
 {
     place->type = pump->ops->name;
     place->bytes_s = pump->ops->capacity != NULL ? pump->ops->capacity(pump->link) : 0.0;
-    place->nmea = pump->nmea;
+    place->protocol = pump->protocol->name;
     pump->ops->endpoint(pump->link, place->endpoint, sizeof place->endpoint);
 }
 
@@ -92,8 +104,8 @@ static void handle(struct pump *pump, const struct link_event *event)
         session_close(pump, s);
         break;
     case LINK_READABLE:
-        if (s->open && pump->nmea)
-            pump_skip_nmea(pump, event->session);
+        if (s->open && !pump->protocol->passes_native)
+            pump_read(pump, s, event->session);
         else if (s->open)
             pump_read_commands(pump, s, event->session);
         break;
@@ -126,28 +138,44 @@ static int has_more(struct pump *pump)
     uint64_t released = stream_released(pump->stream);
     for (int i = 0; i < LINK_MAX_SESSIONS; i++) {
         struct session *s = &pump->session[i];
-        int pending = s->open && (s->out_pos < s->out_len || s->cursor < released || s->commands.reply_len != 0);
+        int pending = s->open && (s->out_pos < s->out_len || s->cursor < released || s->commands.reply_len != 0 ||
+                                  s->units.n != 0);
         if (pending && clock_now_ns() - s->moved_ns < DRAIN_NS) return 1;
     }
     return 0;
+}
+
+/* The stream wakes this thread at ticks with frames, and at those that a protocol needs besides. Returns 1 when such a
+ * tick passed meanwhile. */
+static int set_wake(struct pump *pump)
+{
+    uint64_t tick = UINT64_MAX;
+    if (pump->protocol->passes_native || pump->stream->waits) return 0; /* the latter are woken at each tick */
+    for (int i = 0; i < LINK_MAX_SESSIONS; i++) {
+        const struct session *s = &pump->session[i];
+        uint64_t wake = s->open ? session_wake_tick(pump, s) : UINT64_MAX;
+        if (wake < tick) tick = wake;
+    }
+    return stream_wake_at(pump->stream, pump->listener, tick);
 }
 
 static void *pump_main(void *arg)
 {
     struct pump *pump = arg;
     uint32_t want_write = 0;
-    int rested = 0;
+    int at_once = 0; /* there is something to do before anything happens */
     for (;;) {
         int over = atomic_load(&pump->stream->over);
         if (over && !has_more(pump)) break;
-        if (take_events(pump, want_write, rested ? 0 : over ? 50 : -1) < 0) {
+        if (take_events(pump, want_write, at_once ? 0 : over ? 50 : -1) < 0) {
             sh_warn(pump->links->report, "link %s: poll failed; the link is given up", pump->ops->name);
             break;
         }
         want_write = 0;
         for (int i = 0; i < LINK_MAX_SESSIONS; i++)
             if (pump->session[i].open && session_write(pump, &pump->session[i], i)) want_write |= 1U << i;
-        rested = pump_rest(pump);
+        at_once = pump_rest(pump);
+        at_once |= set_wake(pump);
     }
     for (int i = 0; i < LINK_MAX_SESSIONS; i++)
         if (pump->session[i].open) session_leave(pump, &pump->session[i]);

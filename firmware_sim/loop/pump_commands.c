@@ -74,7 +74,7 @@ int pump_rest(struct pump *pump)
     return rests;
 }
 
-void pump_read_commands(struct pump *pump, struct session *s, int index)
+void pump_read(struct pump *pump, struct session *s, int index)
 {
     struct session_commands *c = &s->commands;
     memmove(c->in, c->in + c->in_pos, c->in_len - c->in_pos);
@@ -83,6 +83,12 @@ void pump_read_commands(struct pump *pump, struct session *s, int index)
     ssize_t n =
         c->in_len < READ_BYTES ? pump->ops->read(pump->link, index, c->in + c->in_len, READ_BYTES - c->in_len) : 0;
     if (n > 0) c->in_len += (uint32_t)n;
+}
+
+void pump_read_commands(struct pump *pump, struct session *s, int index)
+{
+    struct session_commands *c = &s->commands;
+    pump_read(pump, s, index);
     pump_take_lines(pump, s);
     if (c->replies_dropped != 0) {
         device_report(pump->links->device, CMD_E_OVERRUN,

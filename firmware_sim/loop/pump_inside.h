@@ -5,10 +5,12 @@
 #include <pthread.h>
 
 #include "firmware_sim/loop/pump.h"
+#include "firmware_sim/loop/unit_queue.h"
 
 enum {
     REPLY_ROOM = 8192,
     BATCH_BYTES = 131072, /* small ticks are written together up to this */
+    QUEUE_UNITS = 16,     /* longest units of a protocol that a session has room for */
     READ_BYTES = 65536,
     WRONG_AT_ONCE = 128, /* wrong lines of a session, and then a rest of so long for its link: */
     REST_NS = 2000000,
@@ -43,6 +45,11 @@ struct session {
     uint8_t *out;
     uint32_t out_len, out_pos; /* from out_pos on not written yet */
     struct session_commands commands;
+    /* of a protocol that is not native */
+    struct pump *pump;
+    void *protocol;
+    struct unit_queue units;
+    int hang_up; /* the session ends once its units are out */
     char peer[64];
     int64_t moved_ns; /* clock_now_ns() when a byte last went out */
 };
@@ -53,9 +60,11 @@ struct pump {
     struct stream *stream;
     const struct link_ops *ops;
     void *link;
-    int nmea; /* speaks for the GNSS receiver, not for the head */
+    const struct protocol_ops *protocol;
+    uint8_t *tick; /* frames of the tick at hand, for a protocol; NULL: it is native */
     int wake_fd;
-    uint32_t out_cap;
+    struct stream_listener *listener;
+    uint32_t out_cap; /* of each session */
     struct session session[LINK_MAX_SESSIONS];
     pthread_t thread;
     int running;
@@ -65,15 +74,16 @@ struct pump {
 /* session.c */
 void session_open(struct pump *pump, struct session *s, const char *peer);
 void session_close(struct pump *pump, struct session *s);
-/* Writes until the link is full (1) or there is nothing left (0). index: of the session on its link. */
+/* Takes what there is and writes until the link is full (1) or there is nothing left (0). index: of the session on its
+ * link. */
 int session_write(struct pump *pump, struct session *s, int index);
 
 /* lost_frames.c: the one place that counts what a reader got and what it lost. */
-/* Compares the number of a tick's first frame with the one expected, and counts and announces a gap.
- * `released`: ticks released when the tick was read. */
-void session_check_lost(struct pump *pump, struct session *s, const struct ring_copy *tick, uint64_t released);
-/* Counts n frames or sentences, and the pulses in them. The error queue gets an entry once per episode. */
-void session_count_lost(struct pump *pump, struct session *s, uint32_t n, uint64_t pulses);
+/* Compares the number of a tick's first frame with the one expected, and counts a gap; a native reader is told.
+ * `released`: ticks released when the tick was read. Returns how many frames are missing. */
+uint32_t session_check_lost(struct pump *pump, struct session *s, const struct ring_copy *tick, uint64_t released);
+/* Counts n units of a protocol. */
+void session_count_units(struct pump *pump, struct session *s, uint64_t n);
 /* The client went away: what was not written to it it did not get, nor did it lose it. */
 void session_gone(struct pump *pump, struct session *s);
 /* At the end of the run: what the reader did not get is lost. */
@@ -89,15 +99,18 @@ void pump_take_lines(struct pump *pump, struct session *s);
 /* A client that is wrong as fast as it can be would cost a processor. So a link rests when one of its sessions had
  * WRONG_AT_ONCE wrong lines. 1: it did, and more lines may wait. */
 int pump_rest(struct pump *pump);
-/* Reads what the client sent, and takes its lines. */
+/* Reads what the client sent. */
+void pump_read(struct pump *pump, struct session *s, int index);
+/* The same, and takes its lines. */
 void pump_read_commands(struct pump *pump, struct session *s, int index);
 
-/* pump_nmea.c: a session of the GNSS receiver. It has everything before the tick at its cursor. */
-/* Sentences of what was released into the buffer. A reader that is too slow loses those of half a queue. */
-void pump_take_nmea(struct pump *pump, struct session *s);
-/* Throws away what a client sends: the receiver takes no commands. */
-void pump_skip_nmea(struct pump *pump, int index);
-/* Sentences that were released and not taken. */
-uint32_t pump_nmea_backlog(const struct pump *pump, const struct session *s);
+/* pump_protocol.c: a session of a protocol that is not native. It has everything before the tick at its cursor. */
+/* Returns 0 or a negative SH_E. */
+int session_open_protocol(struct pump *pump, struct session *s);
+void session_close_protocol(struct pump *pump, struct session *s);
+/* As session_write. */
+int session_write_protocol(struct pump *pump, struct session *s, int index);
+/* The first tick, from the cursor on, that the protocol must be woken for though it has no frames. */
+uint64_t session_wake_tick(const struct pump *pump, const struct session *s);
 
 #endif

@@ -47,7 +47,6 @@ struct ring_mark {
 struct ring_tick {
     uint8_t *bytes; /* whole frames */
     uint32_t len;
-    int wake;   /* readers are woken at release though there are no frames */
     int broken; /* the frames could not be kept: the line they were of has a gap */
     uint32_t n_marks;
     struct ring_mark *mark;

@@ -9,24 +9,30 @@
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/pump_inside.h"
 
-void session_open(struct pump *pump, struct session *s, const char *peer)
+static void clear(struct session *s)
 {
-    if (s->out == NULL) s->out = malloc(pump->out_cap);
-    if (s->out == NULL) {
-        device_report(pump->links->device, CMD_E_REFUSED, "no memory for a session");
-        return;
-    }
-    s->open = 1;
-    s->cursor = stream_released(pump->stream);
+    struct session_commands *c = &s->commands;
     memset(&s->lost, 0, sizeof s->lost);
     s->out_len = s->out_pos = 0;
-    struct session_commands *c = &s->commands;
     c->reply_len = c->in_len = c->in_pos = 0;
     c->stepping = c->replies_dropped = 0;
     c->wrong = 0;
     memset(&c->lines, 0, sizeof c->lines);
+}
+
+void session_open(struct pump *pump, struct session *s, const char *peer)
+{
+    const int native = pump->protocol->passes_native;
+    clear(s);
     s->moved_ns = clock_now_ns();
+    s->cursor = stream_released(pump->stream);
     snprintf(s->peer, sizeof s->peer, "%.63s", peer); /* an address: shorter */
+    if (native && s->out == NULL) s->out = malloc(pump->out_cap);
+    if (native ? s->out == NULL : session_open_protocol(pump, s) != SH_OK) {
+        device_report(pump->links->device, CMD_E_REFUSED, "no memory for a session");
+        return;
+    }
+    s->open = 1;
     stream_set_reader(pump->stream, s->reader, s->cursor, 1);
 }
 
@@ -36,7 +42,10 @@ void session_close(struct pump *pump, struct session *s)
     s->open = 0;
     session_gone(pump, s);
     stream_set_reader(pump->stream, s->reader, s->cursor, 0);
-    if (pump->nmea) return; /* it had nothing to say */
+    if (!pump->protocol->passes_native) { /* it never keeps control */
+        session_close_protocol(pump, s);
+        return;
+    }
     const struct command_lines *lines = &s->commands.lines;
     device_session_closed(pump->links->device, s->id, s->peer, lines->len != 0 || lines->overrun);
     stream_poke(pump->stream);
@@ -79,8 +88,7 @@ static void fill(struct pump *pump, struct session *s)
     struct session_commands *c = &s->commands;
     s->out_len = s->out_pos = 0;
     take_replies(pump, s);
-    if (pump->nmea) pump_take_nmea(pump, s);
-    while (!pump->nmea && s->out_len < BATCH_BYTES && take_tick(pump, s))
+    while (s->out_len < BATCH_BYTES && take_tick(pump, s))
         continue;
     /* The frames of a step go out before its reply: a client that has the reply has all of them. */
     while (c->stepping && (s->cursor >= c->step_tick || atomic_load(&pump->stream->over))) {
@@ -95,6 +103,7 @@ static void fill(struct pump *pump, struct session *s)
 
 int session_write(struct pump *pump, struct session *s, int index)
 {
+    if (!pump->protocol->passes_native) return session_write_protocol(pump, s, index);
     for (;;) {
         if (s->out_pos == s->out_len) fill(pump, s);
         if (s->out_pos == s->out_len) return 0;

@@ -26,10 +26,12 @@ void stream_free(struct stream *stream)
     sem_destroy(&stream->progress);
 }
 
-static void wake_readers(struct stream *stream)
+/* all: also those that want nothing of this tick. */
+static void wake_readers(struct stream *stream, uint64_t tick, int all)
 {
     for (uint32_t i = 0; i < stream->n_listeners; i++)
-        eventfd_write(stream->listener[i], 1); /* a full counter is a wake-up, too */
+        if (all || atomic_load(&stream->listener[i].wake_tick) <= tick)
+            eventfd_write(stream->listener[i].fd, 1); /* a full counter is a wake-up, too */
 }
 
 /* Line ends get their counts of echoes; 0 says that blocks of the line are missing. */
@@ -112,14 +114,16 @@ void stream_release(struct stream *stream, struct ring_slot *slot, uint64_t tick
     slot->pulses_before = atomic_load(&stream->counters->pulses);
     count(stream, made, now_ns);
     for (uint32_t at = 0; at < made->len;) {
-        complete_counts(stream, made->bytes + at);
-        at += (uint32_t)native_seal(made->bytes + at, stream->seq++);
+        uint8_t *frame = made->bytes + at;
+        complete_counts(stream, frame);
+        at += (uint32_t)native_seal(frame, stream->seq++);
+        kept_put(&stream->kept, frame);
     }
     slot->n_frames = stream->seq - slot->first_seq;
     /* Where the pacing thread waits for readers, they must see empty ticks pass, too. */
-    int wake = made->len != 0 || made->wake || stream->waits;
+    const int all = made->len != 0 || stream->waits;
     ring_release(&stream->ring, tick);
-    if (wake) wake_readers(stream);
+    wake_readers(stream, tick, all);
     sem_post(&stream->work);
 }
 
@@ -160,12 +164,21 @@ void stream_wait_for_readers(struct stream *stream, uint64_t tick)
 void stream_end(struct stream *stream)
 {
     atomic_store(&stream->over, 1);
-    wake_readers(stream);
+    wake_readers(stream, 0, 1);
 }
 
-void stream_listen(struct stream *stream, int fd)
+struct stream_listener *stream_listen(struct stream *stream, int fd)
 {
-    stream->listener[stream->n_listeners++] = fd;
+    struct stream_listener *listener = &stream->listener[stream->n_listeners++];
+    listener->fd = fd;
+    atomic_store(&listener->wake_tick, UINT64_MAX);
+    return listener;
+}
+
+int stream_wake_at(struct stream *stream, struct stream_listener *listener, uint64_t tick)
+{
+    atomic_store(&listener->wake_tick, tick);
+    return tick < stream_released(stream);
 }
 
 void stream_set_reader(struct stream *stream, int reader, uint64_t cursor, int active)

@@ -15,6 +15,7 @@
 
 #include "drivers/link/link.h"
 #include "firmware_sim/device/device.h"
+#include "firmware_sim/loop/kept.h"
 #include "firmware_sim/loop/ring.h"
 
 enum {
@@ -31,8 +32,15 @@ struct stream_reader {
     _Atomic uint64_t cursor; /* next tick it will read */
 };
 
+/* An eventfd that is written to when something was released: a tick with frames, and any tick from wake_tick on. */
+struct stream_listener {
+    int fd;
+    _Atomic uint64_t wake_tick; /* UINT64_MAX: frames are all it wants */
+};
+
 struct stream {
     struct ring ring;
+    struct kept kept; /* what a client that joins needs first */
     int64_t tick_ns;
     uint32_t tick_bytes; /* no tick is longer */
     int waits;           /* paces fast and step: release waits for casters and readers, and nothing is lost */
@@ -58,7 +66,7 @@ struct stream {
     sem_t ready;    /* a tick is ready; only in the paces that wait */
     sem_t progress; /* a reader went on, or time was granted; likewise */
     uint32_t n_casters;
-    int listener[STREAM_MAX_LISTENERS]; /* eventfds that are written to when something was released */
+    struct stream_listener listener[STREAM_MAX_LISTENERS];
     uint32_t n_listeners;
 };
 
@@ -82,8 +90,11 @@ void stream_wait_for_readers(struct stream *stream, uint64_t tick);
 void stream_end(struct stream *stream);
 
 /* ---- readers */
-/* An eventfd to be written to at each release. Before the pacing thread starts. */
-void stream_listen(struct stream *stream, int fd);
+/* An eventfd to be written to at each release of frames. Returns its listener. Before the pacing thread starts. */
+struct stream_listener *stream_listen(struct stream *stream, int fd);
+/* From this tick on it is written to at every tick's release, until it is told otherwise. Returns 1 when that tick was
+ * released already: nobody may have written. */
+int stream_wake_at(struct stream *stream, struct stream_listener *listener, uint64_t tick);
 /* A reader begins (active) or ends, and has read everything before a tick. */
 void stream_set_reader(struct stream *stream, int reader, uint64_t cursor, int active);
 /* It has read everything before a tick. */

@@ -132,6 +132,9 @@ static void fill_heads(struct worker *worker, const struct device_work *work)
     if (work->describe) {
         int flags = work->describe_flags;
         added(worker, native_encode_descriptor(end_of(worker), room_of(worker), &work->descriptor, work->t_ns, flags));
+        if (work->emitter.kind != NATIVE_EMIT_LINE)
+            added(worker, native_encode_emitter(end_of(worker), room_of(worker), &work->emitter, work->beam, work->t_ns,
+                                                flags));
         add_anchor(worker, &work->anchor, work->t_ns, flags);
     }
     struct native_names names = {work->surfaces_first, work->surfaces_n, surface_name, (void *)(uintptr_t)worker->site};
@@ -244,8 +247,7 @@ static void get_part(const struct device_work *work, uint64_t k, struct part *pa
 static void cast_run(struct worker *worker, const struct device_work *work, const struct part *part)
 {
     uint64_t k = part->cast0, end = part->cast_end;
-    uint64_t longest = (uint64_t)(MAX_DT_NS / (work->segment.ns_quot + 1));
-    if (longest == 0) longest = 1;
+    const uint64_t longest = schedule_longest_run(&work->segment, MAX_DT_NS);
     while (k < end) {
         struct schedule_run run;
         uint64_t stop = enter_stretch(worker, work, k, end);
@@ -328,7 +330,7 @@ static void fill_pulses(struct worker *worker, const struct device_work *work)
 
 const struct ring_tick *worker_fill(struct worker *worker, const struct device_work *work)
 {
-    worker->tick = (struct ring_tick){.bytes = worker->tick.bytes, .mark = worker->mark, .wake = work->wake};
+    worker->tick = (struct ring_tick){.bytes = worker->tick.bytes, .mark = worker->mark};
     fill_heads(worker, work);
     if (work->scanning) {
         worker->tick.scan = work->scan;

@@ -66,7 +66,7 @@ static int draw(struct gauge *g, struct plan_place **place, struct schedule_run 
         if (line.cast0 >= line.cast_end) continue;
         uint64_t n = line.cast_end - line.cast0, first = line.cast0 + number % n;
         g->cast += n;
-        uint64_t room = (uint64_t)(MAX_DT_NS / (p->segment.ns_quot + 1)), left = line.cast_end - first;
+        uint64_t room = schedule_longest_run(&p->segment, MAX_DT_NS), left = line.cast_end - first;
         if (left > room) left = room > 1 ? room : 1;
         schedule_get_run(&p->segment, &line, first, (uint32_t)(left < RUN ? left : RUN), run);
         return 1;

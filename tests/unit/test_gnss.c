@@ -68,7 +68,9 @@ static struct fix get_fix(const struct receiver *r, uint64_t index, uint32_t sta
 {
     char text[NMEA_MAX_ALL];
     struct nmea_line line;
-    size_t len = gnss_sentences(&r->gnss, index, station, NULL, text, sizeof text);
+    struct nmea_fix known;
+    gnss_fix(&r->gnss, index, station, NULL, &known);
+    size_t len = nmea_encode_all(text, sizeof text, &known);
     const char *at = strstr(text, "GGA") - 3, *end = strchr(at, '\n') + 1;
     assert_true(len > 0 && at > text);
     read_line(at, (size_t)(end - at), "GNGGA", 15, &line);

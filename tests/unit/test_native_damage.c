@@ -1,6 +1,13 @@
 /* The parser against every single damage. */
 #include "tests/unit/native_stream.h"
 
+/* SH_SANITIZE: sanitizers are for the code, not for the count. Each damage is fed in pieces of one size there. */
+#ifdef SH_SANITIZE
+enum { SIZES_EACH = 1 };
+#else
+enum { SIZES_EACH = 4 };
+#endif
+
 /* How many counted frames a hurt range costs, from the layout of the stream: a jump is only seen between good
  * ones. */
 static void check_seq(size_t hurt_from, size_t hurt_to)
@@ -27,9 +34,9 @@ static void check_seq(size_t hurt_from, size_t hurt_to)
 static void run_hurt(const uint8_t *bytes, size_t len, size_t from, size_t to)
 {
     static const size_t chunks[] = {1, 7, 64, STREAM_MAX};
-    for (size_t i = 0; i < sizeof chunks / sizeof chunks[0]; i++) {
+    for (size_t i = 0; i < SIZES_EACH; i++) {
         begin();
-        feed(bytes, len, chunks[i]);
+        feed(bytes, len, chunks[(from + i) % 4]);
         finish();
         check_got(from, to);
         check_seq(from, to);

@@ -1,40 +1,12 @@
 /* From a configuration to where its stations stand. Run from the top of the source tree. */
+#include "tests/unit/site_rig.h"
+
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
-#include <cmocka.h>
 
 #include "core/locate.h"
 #include "firmware_sim/app/check_places.h"
 
-static char dir[64], config_path[128];
-static struct config *cfg;
 static struct site *site;
-static struct sh_err err;
-static char warned[512];
-
-static void keep_warning(void *ctx, const char *text)
-{
-    (void)ctx;
-    snprintf(warned, sizeof warned, "%s", text);
-}
-static const struct sh_report report = {.warn = keep_warning};
-
-static void write_in(const char *name, const char *text)
-{
-    char path[256];
-    snprintf(path, sizeof path, "%s/%s", dir, name);
-    FILE *f = fopen(path, "w");
-    assert_non_null(f);
-    fputs(text, f);
-    assert_int_equal(fclose(f), 0);
-}
 
 /* A floor of 60 x 60 m about (x, y), at z. */
 static void write_floor(double x, double y, double z)
@@ -55,7 +27,7 @@ static int load(const char *anchor, const char *stations, const char *output)
     write_in("test.yaml", text);
     site_free(site);
     site = NULL;
-    warned[0] = '\0';
+    clear_warned();
     memset(&err, 0, sizeof err);
     int rc = config_load(config_path, NULL, 0, cfg, &err);
     return rc == SH_OK ? site_load(cfg, &report, &site, &err) : rc;
@@ -332,7 +304,7 @@ static void the_house_has_its_site(void **state)
         write_in("test.yaml", edited);
         site_free(site);
         site = NULL;
-        warned[0] = '\0';
+        clear_warned();
         ok(config_load(config_path, NULL, 0, cfg, &err));
         int code = site_load(cfg, &report, &site, &err);
         if (at[i].part != NULL) {
@@ -348,29 +320,10 @@ static void the_house_has_its_site(void **state)
     }
 }
 
-static int set_up(void **state)
-{
-    (void)state;
-    char path[512];
-    snprintf(dir, sizeof dir, "/tmp/test_placement.XXXXXX");
-    if (mkdtemp(dir) == NULL || getcwd(path, sizeof path - 16) == NULL) return -1;
-    strcat(path, "/config/heads");
-    setenv("SCANHEAD_HEADS", path, 1);
-    snprintf(config_path, sizeof config_path, "%s/test.yaml", dir);
-    cfg = malloc(sizeof *cfg);
-    return cfg == NULL ? -1 : 0;
-}
-
 static int tear_down(void **state)
 {
-    (void)state;
-    char path[128];
     site_free(site);
-    free(cfg);
-    snprintf(path, sizeof path, "%s/floor.obj", dir);
-    remove(path);
-    remove(config_path);
-    return rmdir(dir);
+    return site_rig_teardown(state);
 }
 
 int main(void)
@@ -387,5 +340,5 @@ int main(void)
         cmocka_unit_test(headings_and_convergence),
         cmocka_unit_test(the_house_has_its_site),
     };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
+    return cmocka_run_group_tests(tests, site_rig_setup, tear_down);
 }

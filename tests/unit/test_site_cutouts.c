@@ -134,6 +134,7 @@ static void single_rays_and_rings_pass_holes(void **state)
     site_free(site);
 }
 
+#ifndef SH_SANITIZE /* the plan casts for seconds then */
 static void adaptive_beams_do_not_pretend(void **state)
 {
     (void)state;
@@ -153,10 +154,15 @@ static void adaptive_beams_do_not_pretend(void **state)
     if (strstr(err.text, why) == NULL || strstr(err.text, "allowed here are single, rings and auto") == NULL)
         fail_msg("%s", err.text);
 }
+#endif
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(single_rays_and_rings_pass_holes),
-                                       cmocka_unit_test(adaptive_beams_do_not_pretend)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(single_rays_and_rings_pass_holes),
+#ifndef SH_SANITIZE
+        cmocka_unit_test(adaptive_beams_do_not_pretend),
+#endif
+    };
     return cmocka_run_group_tests(tests, make_files, remove_files);
 }

@@ -1,39 +1,8 @@
 /* What is allowed and hardly meant is said once, with figures; what is usual is not. Run from the top of the
  * source tree. */
+#include "tests/unit/site_rig.h"
+
 #include <glob.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
-#include <cmocka.h>
-
-#include "firmware_sim/site/site.h"
-
-static char dir[64], config_path[128], warned[4096];
-static struct config *cfg;
-static struct sh_err err;
-
-static void keep_warning(void *ctx, const char *text)
-{
-    (void)ctx;
-    size_t used = strlen(warned);
-    snprintf(warned + used, sizeof warned - used, "%s\n", text);
-}
-static const struct sh_report report = {.warn = keep_warning};
-
-static void write_in(const char *name, const char *text)
-{
-    char path[256];
-    snprintf(path, sizeof path, "%s/%s", dir, name);
-    FILE *f = fopen(path, "w");
-    assert_non_null(f);
-    fputs(text, f);
-    assert_int_equal(fclose(f), 0);
-}
 
 /* A closed box: 60 x 60 m about the origin, from z0 to z1. */
 static void write_box(double z0, double z1)
@@ -52,7 +21,7 @@ static void load_file(const char *path)
 {
     static const char *const sets[] = {"beam.mode=single", "scene.order_exactly=off"};
     struct site *site = NULL;
-    warned[0] = '\0';
+    clear_warned();
     int rc = config_load(path, sets, 2, cfg, &err);
     if (rc == SH_OK) rc = site_load(cfg, &report, &site, &err);
     if (rc != SH_OK) fail_msg("%s", err.text);
@@ -161,6 +130,7 @@ static void attributes_that_nothing_fills(void **state)
     says_nothing();
 }
 
+#ifndef SH_SANITIZE /* the house is large, and loading it has a test of its own */
 /* config/README.md: they are ready to run. */
 static void configurations_of_this_tree_are_silent(void **state)
 {
@@ -180,29 +150,7 @@ static void configurations_of_this_tree_are_silent(void **state)
     }
     globfree(&found);
 }
-
-static int setup(void **state)
-{
-    (void)state;
-    strcpy(dir, "/tmp/scanhead_doubts_XXXXXX");
-    if (mkdtemp(dir) == NULL) return -1;
-    snprintf(config_path, sizeof config_path, "%s/test.yaml", dir);
-    return (cfg = calloc(1, sizeof *cfg)) != NULL ? 0 : -1;
-}
-
-static int teardown(void **state)
-{
-    (void)state;
-    static const char *const names[] = {"mesh.obj", "test.yaml"};
-    for (int i = 0; i < 2; i++) {
-        char path[256];
-        snprintf(path, sizeof path, "%s/%s", dir, names[i]);
-        unlink(path);
-    }
-    rmdir(dir);
-    free(cfg);
-    return 0;
-}
+#endif
 
 int main(void)
 {
@@ -215,7 +163,9 @@ int main(void)
         cmocka_unit_test(a_scale_that_is_a_thousand_times_off),
         cmocka_unit_test(a_window_between_two_pulses),
         cmocka_unit_test(attributes_that_nothing_fills),
+#ifndef SH_SANITIZE
         cmocka_unit_test(configurations_of_this_tree_are_silent),
+#endif
     };
-    return cmocka_run_group_tests(tests, setup, teardown);
+    return cmocka_run_group_tests(tests, site_rig_setup, site_rig_teardown);
 }

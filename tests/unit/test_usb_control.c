@@ -4,6 +4,13 @@
 
 #include "drivers/usb/head_device.h"
 
+/* SH_SANITIZE: sanitizers are for the code, not for the count. */
+#ifdef SH_SANITIZE
+enum { EVERY = 7 };
+#else
+enum { EVERY = 1 };
+#endif
+
 enum { DEF = 1, ADR = 2, CFG = 4, ALL = 7 };      /* states in which a case succeeds */
 enum { FS = 1, HS = 2, SS = 4, ANY = 7, NO = 0 }; /* and rates */
 
@@ -194,7 +201,7 @@ static void test_all(void **state)
     unsigned answered = 0;
     for (unsigned type = 0; type < 256; type++)
         for (unsigned request = 0; request < 256; request++)
-            for (unsigned k = 0; k < 13 * 13; k++) {
+            for (unsigned k = (type + request) % EVERY; k < 13 * 13; k += EVERY) {
                 const unsigned length = lengths[(k + request) % 8];
                 if (length > 255 && k % 8 != 0) continue;
                 int n =

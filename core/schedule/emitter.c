@@ -1,0 +1,92 @@
+#include "core/emitter.h"
+
+#include <string.h>
+
+static const int64_t TURN_UDEG = 360000000;
+
+static uint64_t gcd(uint64_t a, uint64_t b)
+{
+    while (b != 0) {
+        uint64_t r = a % b;
+        a = b;
+        b = r;
+    }
+    return a;
+}
+
+void emitter_set_planar(struct emitter *e, uint32_t steps, uint32_t first, uint32_t last, uint32_t front, int turn)
+{
+    *e = (struct emitter){.kind = EMITTER_PLANAR,
+                          .steps = steps,
+                          .first_step = first,
+                          .last_step = last,
+                          .front_step = front,
+                          .turn = turn};
+}
+
+static int check_beams(const struct emitter_beam *beam, uint32_t n, uint64_t sequence_ps, struct sh_err *err)
+{
+    if (n < 1 || n > EMITTER_MAX_BEAMS)
+        return sh_fail(err, SH_EINPUT, "%u beams; allowed 1 to %d", n, (int)EMITTER_MAX_BEAMS);
+    if (beam[0].offset_ns != 0)
+        return sh_fail(err, SH_EINPUT, "the first beam fires after %u ns; allowed 0: a sequence begins with it",
+                       beam[0].offset_ns);
+    for (uint32_t i = 1; i < n; i++)
+        if (beam[i].offset_ns <= beam[i - 1].offset_ns)
+            return sh_fail(err, SH_EINPUT, "beam %u fires after %u ns, the one before it after %u ns; allowed more",
+                           i + 1, beam[i].offset_ns, beam[i - 1].offset_ns);
+    if (sequence_ps <= 1000ull * beam[n - 1].offset_ns)
+        return sh_fail(err, SH_EINPUT, "a sequence of %.15g ns ends before its last firing; allowed more than %u ns",
+                       1e-3 * (double)sequence_ps, beam[n - 1].offset_ns);
+    return SH_OK;
+}
+
+int emitter_set_beams(struct emitter *e, const struct emitter_beam *beam, uint32_t n, uint64_t sequence_ps, int turn,
+                      struct sh_err *err)
+{
+    int rc = check_beams(beam, n, sequence_ps, err);
+    if (rc != SH_OK) return rc;
+    *e = (struct emitter){.kind = EMITTER_BEAMS, .n_beams = n, .turn = turn};
+    uint64_t tick_ps = sequence_ps;
+    for (uint32_t i = 0; i < n; i++)
+        tick_ps = gcd(tick_ps, 1000ull * beam[i].offset_ns);
+    const uint64_t g = gcd(tick_ps, 1000);
+    e->tick_num = tick_ps / g;
+    e->tick_den = 1000 / g;
+    e->sequence_ticks = sequence_ps / tick_ps;
+    memcpy(e->beam, beam, n * sizeof *beam);
+    for (uint32_t i = 0; i < n; i++)
+        e->firing[i] = (struct emitter_firing){1000ull * beam[i].offset_ns / tick_ps,
+                                               (double)beam[i].elevation_udeg / (double)TURN_UDEG,
+                                               (double)beam[i].azimuth_udeg / (double)TURN_UDEG};
+    return SH_OK;
+}
+
+void emitter_set_sphere(struct emitter *e, int64_t step_udeg)
+{
+    const int64_t half = step_udeg / 2;
+    *e = (struct emitter){.kind = EMITTER_SPHERE,
+                          .steps = (uint32_t)((TURN_UDEG + half) / step_udeg),
+                          .rings = (uint32_t)((TURN_UDEG / 2 + half) / step_udeg) + 1,
+                          .turn = 1};
+    e->last_step = e->steps - 1;
+}
+
+void emitter_set_directions(struct emitter *e, const struct emitter_firing *direction, uint32_t n)
+{
+    *e =
+        (struct emitter){.kind = EMITTER_DIRECTIONS, .steps = n, .last_step = n - 1, .turn = 1, .direction = direction};
+}
+
+int64_t emitter_rate_uhz(const struct emitter *e)
+{
+    /* n / (sequence_ticks * tick_num / tick_den) per nanosecond */
+    const double sequence_s = 1e-9 * (double)e->sequence_ticks * (double)e->tick_num / (double)e->tick_den;
+    return (int64_t)(1e6 * e->n_beams / sequence_s + 0.5);
+}
+
+int64_t emitter_step_udeg(const struct emitter *e, int64_t step)
+{
+    const int64_t turned = (step - e->front_step) * TURN_UDEG, half = e->steps / 2;
+    return (turned + (turned < 0 ? -half : half)) / (int64_t)e->steps;
+}

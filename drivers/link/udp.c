@@ -1,0 +1,221 @@
+/* The UDP link: one session, open from the start. Each write is one datagram to the receiver.
+ *
+ * Unicast to any address; broadcast only from an interface that the configuration names, to that interface's own
+ * broadcast address or to 255.255.255.255. The packets' source is then the interface's address. That alone makes the
+ * system send 255.255.255.255 there when no route says otherwise, so that the address of the interface's own network
+ * is used for it. (SO_BINDTODEVICE would do without, but takes a privilege.) Multicast is refused.
+ *
+ * A receiver that is not there is no failure: what was sent is gone, and so is what the system had no room for on its
+ * way out. What arrives at the socket can be read. */
+#include <errno.h>
+#include <ifaddrs.h>
+#include <net/if.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "drivers/link/link_poll.h"
+#include "drivers/socket/socket.h"
+
+enum { SEND_BUFFER_BYTES = 1 << 20 };
+
+struct udp_link {
+    int fd;
+    int reported_opened;
+    char name[80];
+};
+
+static const char *host_of(const struct link_spec *spec)
+{
+    return spec->address[0] != '\0' ? spec->address : "127.0.0.1";
+}
+
+static int find_receiver(const struct link_spec *spec, struct sockaddr_storage *to, socklen_t *len, struct sh_err *err)
+{
+    char service[8];
+    struct addrinfo hints = {.ai_socktype = SOCK_DGRAM, .ai_flags = AI_NUMERICSERV}, *list = NULL;
+    if (spec->port < 1 || spec->port > 65535)
+        return sh_fail(err, SH_EINPUT, "link udp:%s:%d: allowed ports are 1 to 65535", host_of(spec), spec->port);
+    snprintf(service, sizeof service, "%d", spec->port & 0xffff);
+    int rc = getaddrinfo(host_of(spec), service, &hints, &list);
+    if (rc != 0)
+        return sh_fail(err, SH_EINPUT, "link udp:%s:%d: no such address: %s", host_of(spec), spec->port,
+                       rc == EAI_SYSTEM ? strerror(errno) : gai_strerror(rc));
+    memcpy(to, list->ai_addr, list->ai_addrlen);
+    *len = list->ai_addrlen;
+    freeaddrinfo(list);
+    return SH_OK;
+}
+
+static in_addr_t ipv4_of(const struct sockaddr *at)
+{
+    return ((const struct sockaddr_in *)(const void *)at)->sin_addr.s_addr;
+}
+
+/* What of an interface the link needs. */
+struct network {
+    int found, has_broadcast;
+    struct sockaddr_storage own; /* its address, of the receiver's family */
+    socklen_t own_len;
+    in_addr_t broadcast;
+};
+
+/* name: of the interface; NULL: any that has `to` as its broadcast address. */
+static int find_network(const char *name, const struct sockaddr *to, struct network *out, struct sh_err *err)
+{
+    struct ifaddrs *list;
+    memset(out, 0, sizeof *out);
+    if (getifaddrs(&list) != 0) return sh_fail(err, SH_EIO, "link udp: the interfaces: %s", strerror(errno));
+    for (const struct ifaddrs *i = list; i != NULL && !out->found; i = i->ifa_next) {
+        if (i->ifa_addr == NULL || i->ifa_addr->sa_family != to->sa_family) continue;
+        int is_v4 = to->sa_family == AF_INET;
+        int broadcasts = is_v4 && (i->ifa_flags & IFF_BROADCAST) != 0 && i->ifa_broadaddr != NULL;
+        if (name != NULL ? strcmp(i->ifa_name, name) != 0 : !broadcasts || ipv4_of(i->ifa_broadaddr) != ipv4_of(to))
+            continue;
+        out->found = 1;
+        out->own_len = is_v4 ? sizeof(struct sockaddr_in) : sizeof(struct sockaddr_in6);
+        memcpy(&out->own, i->ifa_addr, out->own_len);
+        out->has_broadcast = broadcasts;
+        if (broadcasts) out->broadcast = ipv4_of(i->ifa_broadaddr);
+    }
+    freeifaddrs(list);
+    return SH_OK;
+}
+
+static int is_multicast(const struct sockaddr *to)
+{
+    if (to->sa_family == AF_INET) return IN_MULTICAST(ntohl(ipv4_of(to)));
+    return IN6_IS_ADDR_MULTICAST(&((const struct sockaddr_in6 *)(const void *)to)->sin6_addr);
+}
+
+/* Broadcasts go out on the interface that is named, and on no other. `to` becomes that interface's broadcast address
+ * where it was that of all networks. *broadcast: it is one. */
+static int check_receiver(const struct link_spec *spec, struct sockaddr *to, struct network *net, int *broadcast,
+                          struct sh_err *err)
+{
+    const char *host = host_of(spec);
+    const int named = spec->interface[0] != '\0', to_all = to->sa_family == AF_INET && ipv4_of(to) == INADDR_BROADCAST;
+    if (is_multicast(to))
+        return sh_fail(err, SH_EINPUT, "link udp:%s:%d: multicast; allowed an address of one receiver, or a broadcast",
+                       host, spec->port);
+    int rc = find_network(named ? spec->interface : NULL, to, net, err);
+    if (rc != SH_OK) return rc;
+    if (named && !net->found)
+        return sh_fail(err, SH_EINPUT, "link udp:%s:%d: there is no interface %s with such an address", host,
+                       spec->port, spec->interface);
+    *broadcast = to_all || (net->has_broadcast && ipv4_of(to) == net->broadcast);
+    if (*broadcast && !named)
+        return sh_fail(err, SH_EINPUT, "link udp:%s:%d: a broadcast; required is interface, where it goes out", host,
+                       spec->port);
+    if (*broadcast && !net->has_broadcast)
+        return sh_fail(err, SH_EINPUT, "link udp:%s:%d: interface %s has no broadcast; allowed one that has", host,
+                       spec->port, spec->interface);
+    if (to_all) ((struct sockaddr_in *)(void *)to)->sin_addr.s_addr = net->broadcast;
+    return SH_OK;
+}
+
+static int connect_to(int fd, const struct link_spec *spec, const struct sockaddr *to, socklen_t len,
+                      const struct network *net, int broadcast)
+{
+    const int one = 1, size = SEND_BUFFER_BYTES;
+    setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &size, sizeof size);
+    if (broadcast && setsockopt(fd, SOL_SOCKET, SO_BROADCAST, &one, sizeof one) != 0) return -1;
+    if (spec->interface[0] != '\0') {
+        struct sockaddr_storage from = net->own; /* port 0: the system chooses */
+        if (bind(fd, (const struct sockaddr *)&from, net->own_len) != 0) return -1;
+    }
+    return connect(fd, to, len);
+}
+
+static int udp_open(const struct link_spec *spec, void **link, struct sh_err *err)
+{
+    struct sockaddr_storage to;
+    socklen_t len = 0;
+    struct network net;
+    int broadcast = 0;
+    int rc = find_receiver(spec, &to, &len, err);
+    if (rc == SH_OK) rc = check_receiver(spec, (struct sockaddr *)&to, &net, &broadcast, err);
+    if (rc != SH_OK) return rc;
+    struct udp_link *udp = calloc(1, sizeof *udp);
+    if (udp == NULL) return sh_fail(err, SH_ENOMEM, "link udp:%s:%d: no memory", host_of(spec), spec->port);
+    udp->fd = socket(to.ss_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (udp->fd < 0 || connect_to(udp->fd, spec, (struct sockaddr *)&to, len, &net, broadcast) != 0) {
+        rc = sh_fail(err, socket_error_code(errno), "link udp:%s:%d: %s", host_of(spec), spec->port, strerror(errno));
+        if (udp->fd >= 0) close(udp->fd);
+        free(udp);
+        return rc;
+    }
+    char at[72];
+    socket_address_text((struct sockaddr *)&to, len, at, sizeof at);
+    snprintf(udp->name, sizeof udp->name, "udp:%s", at);
+    *link = udp;
+    return SH_OK;
+}
+
+static void udp_endpoint(const void *link, char *buf, size_t len)
+{
+    const struct udp_link *udp = link;
+    snprintf(buf, len, "%s", udp->name);
+}
+
+static int udp_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event, int max)
+{
+    struct udp_link *udp = link;
+    struct link_events events = {event, 0, max};
+    if (!udp->reported_opened) udp->reported_opened = link_events_push(&events, LINK_OPENED, 0, udp->name);
+    struct pollfd fds[2] = {{.fd = wake_fd, .events = POLLIN}, {.fd = udp->fd, .events = POLLIN}};
+    if ((want_write & 1u) != 0) fds[1].events = POLLIN | POLLOUT;
+    int rc = link_wait(fds, 2, events.n > 0 ? 0 : timeout_ms);
+    if (rc != SH_OK) return rc;
+    link_take_wake(&fds[0], &events);
+    if ((fds[1].revents & POLLIN) != 0) link_events_push(&events, LINK_READABLE, 0, NULL);
+    if ((fds[1].revents & POLLOUT) != 0) link_events_push(&events, LINK_WRITABLE, 0, NULL);
+    if ((fds[1].revents & POLLERR) != 0) { /* a refusal that came back, else poll would spin */
+        int error;
+        socklen_t len = sizeof error;
+        getsockopt(udp->fd, SOL_SOCKET, SO_ERROR, &error, &len);
+    }
+    return events.n;
+}
+
+static ssize_t udp_read(void *link, int session, void *buf, size_t len)
+{
+    struct udp_link *udp = link;
+    if (session != 0) return SH_ECLOSED;
+    ssize_t n = recv(udp->fd, buf, len, MSG_DONTWAIT);
+    return n > 0 ? n : 0;
+}
+
+/* A refusal of an earlier datagram is reported by the next send, which sends nothing: so it is tried again. */
+static ssize_t udp_write(void *link, int session, const void *buf, size_t len)
+{
+    struct udp_link *udp = link;
+    if (session != 0) return SH_ECLOSED;
+    for (int tries = 0; tries < 2; tries++) {
+        if (send(udp->fd, buf, len, MSG_DONTWAIT | MSG_NOSIGNAL) >= 0) return (ssize_t)len;
+        if (errno == EAGAIN || errno == EWOULDBLOCK) return 0;
+        if (errno != ECONNREFUSED && errno != EINTR) break;
+    }
+    return (ssize_t)len; /* no route, no memory: gone as on any way */
+}
+
+static void udp_close(void *link)
+{
+    struct udp_link *udp = link;
+    close(udp->fd);
+    free(udp);
+}
+
+const struct link_ops link_udp = {
+    .name = "udp",
+    .open = udp_open,
+    .endpoint = udp_endpoint,
+    .poll = udp_poll,
+    .read = udp_read,
+    .write = udp_write,
+    .close = udp_close,
+};

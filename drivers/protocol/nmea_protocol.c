@@ -1,0 +1,86 @@
+/* The GNSS receiver on a link: after each fix its sentences (nmea.h), all of them as one unit. It takes no commands. */
+#include <stdlib.h>
+
+#include "drivers/protocol/protocol.h"
+
+struct receiver {
+    struct protocol_host host;
+    int64_t from_ns; /* fixes before it were sent, or came before the client */
+    int64_t next_ns; /* the next one; INT64_MIN: to be asked for */
+};
+
+static int create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
+{
+    struct receiver *self = calloc(1, sizeof *self);
+    if (self == NULL) return sh_fail(err, SH_ENOMEM, "protocol nmea: no memory");
+    self->host = spec->host;
+    *protocol = self;
+    return SH_OK;
+}
+
+/* The time of day may not be known yet: a file is opened before power-up. */
+static void open_at(void *protocol, int64_t t_ns)
+{
+    struct receiver *self = protocol;
+    self->from_ns = t_ns;
+    self->next_ns = INT64_MIN;
+}
+
+static void say(struct receiver *self, int64_t t_ns)
+{
+    struct nmea_fix fix;
+    char text[NMEA_MAX_ALL];
+    if (!self->host.fix(self->host.ctx, t_ns, &fix)) return;
+    size_t len = nmea_encode_all(text, sizeof text, &fix);
+    if (len != 0) self->host.send(self->host.ctx, text, len);
+}
+
+static void pass(void *protocol, int64_t t_ns)
+{
+    struct receiver *self = protocol;
+    if (self->next_ns == INT64_MIN) self->next_ns = self->host.next_fix_ns(self->host.ctx, self->from_ns);
+    while (self->next_ns < t_ns) {
+        say(self, self->next_ns);
+        self->next_ns = self->host.next_fix_ns(self->host.ctx, self->next_ns + 1);
+    }
+}
+
+static int64_t next(const void *protocol)
+{
+    const struct receiver *self = protocol;
+    return self->next_ns;
+}
+
+static void skip(void *protocol, const uint8_t *bytes, size_t len)
+{
+    struct receiver *self = protocol;
+    (void)bytes;
+    self->host.count(self->host.ctx, PROTOCOL_INPUT_LOST, len);
+}
+
+static void ignore_frame(void *protocol, const uint8_t *frame, size_t len)
+{
+    (void)protocol;
+    (void)frame;
+    (void)len;
+}
+
+static void ignore_gap(void *protocol, uint32_t n_frames)
+{
+    (void)protocol;
+    (void)n_frames;
+}
+
+const struct protocol_ops protocol_nmea = {
+    .name = "nmea",
+    .needs = PROTOCOL_NEEDS_TIME | PROTOCOL_NEEDS_PLACE,
+    .max_unit = NMEA_MAX_ALL,
+    .create = create,
+    .destroy = free,
+    .open = open_at,
+    .frame = ignore_frame,
+    .gap = ignore_gap,
+    .time = pass,
+    .input = skip,
+    .next_ns = next,
+};

@@ -1,0 +1,129 @@
+#include <stdlib.h>
+#include <string.h>
+
+#include "drivers/protocol/scip_session.h"
+
+/* Hokuyo's SCIP 2.0 and 2.2, the sensor's side: see SCIP.md. Here: the session, and bytes into lines. */
+
+static int create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
+{
+    struct scip *s = calloc(1, sizeof *s);
+    if (s == NULL) return sh_fail(err, SH_ENOMEM, "scip: no memory for a session");
+    s->host = spec->host;
+    s->identity = spec->identity;
+    s->model = scip_model_find(spec->identity->model);
+    scip_scan_init(&s->scan);
+    scip_power_up(s);
+    *protocol = s;
+    return SH_OK;
+}
+
+static void destroy(void *protocol)
+{
+    free(protocol);
+}
+
+void scip_power_up(struct scip *s)
+{
+    s->laser = s->time_mode = s->speed_changed = 0;
+    s->bit_rate = s->model->bit_rate;
+    s->rb_ns = s->reboot_ns = INT64_MIN;
+    s->stream.active = s->single.active = 0;
+    s->simulation = (struct scip_simulation){0};
+    s->n_line = 0;
+    s->n_over = 0;
+    s->foul = 0;
+}
+
+static void open_session(void *protocol, int64_t t_ns)
+{
+    ((struct scip *)protocol)->now_ns = t_ns;
+}
+
+uint32_t scip_time_ms(const struct scip *s, int64_t t_ns)
+{
+    const int64_t ns = t_ns - s->epoch_ns, ms = ns / 1000000 - (ns % 1000000 < 0);
+    return (uint32_t)((uint64_t)ms & 0xffffff);
+}
+
+void scip_send(struct scip *s)
+{
+    scip_reply_end(&s->reply);
+    s->host.send(s->host.ctx, s->reply.bytes, s->reply.len);
+}
+
+void scip_answer(struct scip *s, const char *echo, size_t len, const char *status)
+{
+    if (strcmp(status, "00") != 0 && strcmp(status, "98") != 0) s->host.count(s->host.ctx, PROTOCOL_WRONG, 1);
+    scip_reply_begin(&s->reply, echo, len, status);
+    scip_send(s);
+}
+
+/* A line with bytes that no command has is noise, of a wrong bit rate for example: it gets no answer. */
+static void take_line(struct scip *s)
+{
+    const uint64_t lost = s->foul ? s->n_line + s->n_over : s->n_over;
+    if (lost != 0) s->host.count(s->host.ctx, PROTOCOL_INPUT_LOST, lost);
+    if (!s->foul && s->n_over != 0)
+        scip_answer(s, s->line, s->n_line, "0B");
+    else if (!s->foul && s->n_line != 0)
+        scip_command(s, s->line, s->n_line);
+    s->n_line = 0;
+    s->n_over = 0;
+    s->foul = 0;
+}
+
+static void input(void *protocol, const uint8_t *bytes, size_t len)
+{
+    struct scip *s = protocol;
+    for (size_t i = 0; i < len; i++) {
+        if (bytes[i] == '\n' || bytes[i] == '\r') {
+            take_line(s);
+            continue;
+        }
+        if (bytes[i] < 0x20 || bytes[i] > 0x7e) s->foul = 1;
+        if (s->n_line < sizeof s->line)
+            s->line[s->n_line++] = (char)bytes[i];
+        else
+            s->n_over++;
+    }
+}
+
+static void frame(void *protocol, const uint8_t *bytes, size_t len)
+{
+    struct scip *s = protocol;
+    (void)len;
+    const struct scip_turns turns = scip_scan_frame(&s->scan, bytes);
+    if (turns.whole || turns.broken != 0) scip_scans_came(s, turns);
+}
+
+/* What is missing shows by the turns' times and steps. */
+static void gap(void *protocol, uint32_t n_frames)
+{
+    (void)protocol;
+    (void)n_frames;
+}
+
+static void time_is(void *protocol, int64_t t_ns)
+{
+    struct scip *s = protocol;
+    s->now_ns = t_ns;
+    scip_measure_time(s);
+    if (s->reboot_ns == INT64_MIN || t_ns < s->reboot_ns) return;
+    scip_power_up(s);
+    s->epoch_ns = t_ns;
+    s->host.hang_up(s->host.ctx);
+}
+
+const struct protocol_ops protocol_scip = {
+    .name = "scip",
+    .needs = PROTOCOL_NEEDS_POLAR,
+    .max_unit = SCIP_MAX_UNIT,
+    .create = create,
+    .destroy = destroy,
+    .open = open_session,
+    .frame = frame,
+    .gap = gap,
+    .time = time_is,
+    .input = input,
+};

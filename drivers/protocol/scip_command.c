@@ -1,0 +1,213 @@
+#include <stdio.h>
+#include <string.h>
+
+#include "drivers/protocol/scip_session.h"
+
+/* The command table, and the commands that are neither information nor measurement. */
+
+int32_t scip_number(const char *text, size_t len)
+{
+    int32_t value = 0;
+    for (size_t i = 0; i < len; i++) {
+        if (text[i] < '0' || text[i] > '9') return -1;
+        value = value * 10 + (text[i] - '0');
+    }
+    return value;
+}
+
+static void laser(struct scip *s, const char *line, size_t len)
+{
+    const char *refused;
+    if (s->simulation.broken)
+        refused = "01";
+    else if (s->laser)
+        refused = "02";
+    else if (s->time_mode)
+        refused = "10";
+    else
+        refused = scip_laser_on(s);
+    if (refused != NULL && strcmp(refused, "50") == 0) refused = "01";
+    scip_answer(s, line, len, refused == NULL ? "00" : refused);
+}
+
+static void quit(struct scip *s, const char *line, size_t len)
+{
+    scip_laser_off(s);
+    s->time_mode = 0;
+    scip_answer(s, line, len, "00");
+}
+
+/* RT: RS without the timer and the bit rate. */
+static void reset(struct scip *s, const char *line, size_t len)
+{
+    char reply[512];
+    scip_laser_off(s);
+    s->time_mode = 0;
+    s->simulation = (struct scip_simulation){0};
+    if (s->speed_changed) s->host.command(s->host.ctx, "HEAD:LINES DEF", reply, sizeof reply);
+    s->speed_changed = 0;
+    if (line[1] == 'S') {
+        s->epoch_ns = s->now_ns;
+        s->bit_rate = s->model->bit_rate;
+    }
+    scip_answer(s, line, len, "00");
+}
+
+static void reboot(struct scip *s, const char *line, size_t len)
+{
+    enum { SECOND_NS = 1000000000 };
+    const int again = s->rb_ns != INT64_MIN && s->now_ns - s->rb_ns <= SECOND_NS;
+    if (again) {
+        scip_laser_off(s);
+        s->reboot_ns = s->now_ns + SECOND_NS;
+    }
+    s->rb_ns = again ? INT64_MIN : s->now_ns;
+    if (again) {
+        scip_answer(s, line, len, "00");
+        return;
+    }
+    scip_reply_begin(&s->reply, line, len, "01"); /* what the first of two is answered with: no error */
+    scip_send(s);
+}
+
+static const char *time_mode(struct scip *s, char code)
+{
+    if (code == '0' && s->time_mode) return "02";
+    if (code == '0' && (s->stream.active || s->single.active)) return "10";
+    if (code == '2' && !s->time_mode) return "03";
+    if (code == '1' && !s->time_mode && (s->model->features & SCIP_TIME_ALONE) != 0) return "04";
+    return code < '0' || code > '2' ? "01" : NULL;
+}
+
+static void adjust_time(struct scip *s, const char *line, size_t len)
+{
+    const char *refused = time_mode(s, line[2]);
+    if (refused != NULL) {
+        scip_answer(s, line, len, refused);
+        return;
+    }
+    if (line[2] == '0') scip_laser_off(s);
+    if (line[2] != '1') s->time_mode = line[2] == '0';
+    scip_reply_begin(&s->reply, line, len, "00");
+    if (line[2] == '1') scip_reply_time(&s->reply, scip_time_ms(s, s->now_ns));
+    scip_send(s);
+}
+
+static void bit_rate(struct scip *s, const char *line, size_t len)
+{
+    static const int32_t rates[] = {19200, 38400, 57600, 115200, 250000, 500000, 750000};
+    const int32_t rate = scip_number(line + 2, 6);
+    const char *status = "02";
+    for (size_t i = 0; i < sizeof rates / sizeof *rates; i++)
+        if (rate == rates[i]) status = (uint32_t)rate == s->bit_rate ? "03" : "00";
+    if (rate < 0) status = "01";
+    if ((s->model->features & SCIP_BIT_RATE) == 0) status = "0F";
+    if (strcmp(status, "00") == 0) s->bit_rate = (uint32_t)rate;
+    scip_answer(s, line, len, status);
+}
+
+/* Level 1 to 10: 1 to 10 percent slower. 0 and 99: the default. */
+static const char *motor_speed(struct scip *s, int32_t level)
+{
+    char command[48], reply[512];
+    if ((s->model->features & SCIP_MOTOR_SPEED) == 0) return "04";
+    if (level < 0) return "01";
+    if (level > 10 && level != 99) return "02";
+    const uint64_t now_uhz = scip_lines_uhz(s, "HEAD:LINES?"), normal_uhz = scip_lines_uhz(s, "HEAD:LINES? DEF");
+    const uint64_t wanted_uhz = normal_uhz / 100 * (level == 99 ? 100u : 100u - (uint32_t)level);
+    if (wanted_uhz == now_uhz) return "03";
+    snprintf(command, sizeof command, "HEAD:LINES %llu.%06llu", (unsigned long long)(wanted_uhz / 1000000),
+             (unsigned long long)(wanted_uhz % 1000000));
+    const int error = s->host.command(s->host.ctx, command, reply, sizeof reply);
+    if (error != 0) return error == -222 || error == -221 ? "04" : "10";
+    s->speed_changed = wanted_uhz != normal_uhz;
+    return "00";
+}
+
+static void change_speed(struct scip *s, const char *line, size_t len)
+{
+    scip_answer(s, line, len, motor_speed(s, scip_number(line + 2, 2)));
+}
+
+static void sensitivity(struct scip *s, const char *line, size_t len)
+{
+    scip_answer(s, line, len, line[2] == '0' || line[2] == '1' ? "03" : "01");
+}
+
+static void fall_asleep(struct scip *s, const char *line, size_t len)
+{
+    scip_laser_off(s);
+    scip_answer(s, line, len, "00");
+}
+
+static const struct command {
+    char name[4];
+    uint8_t n_params;  /* characters after the name */
+    uint32_t features; /* all of them, or the command is not there */
+    void (*run)(struct scip *s, const char *line, size_t len);
+} commands[] = {
+    {"VV", 0, 0, scip_info_version},
+    {"PP", 0, 0, scip_info_parameters},
+    {"II", 0, 0, scip_info_state},
+    {"BM", 0, 0, laser},
+    {"QT", 0, 0, quit},
+    {"RS", 0, 0, reset},
+    {"RT", 0, SCIP_REBOOT, reset},
+    {"RB", 0, SCIP_REBOOT, reboot},
+    {"TM", 1, 0, adjust_time},
+    {"SS", 6, 0, bit_rate},
+    {"CR", 2, 0, change_speed},
+    {"HS", 1, 0, sensitivity},
+    {"DB", 2, 0, scip_simulate},
+    {"%SL", 0, SCIP_SLEEP, fall_asleep},
+    {"GD", 10, 0, scip_measure},
+    {"GS", 10, 0, scip_measure},
+    {"GE", 10, SCIP_INTENSITY, scip_measure},
+    {"HD", 10, SCIP_MULTI_ECHO, scip_measure},
+    {"HE", 10, SCIP_MULTI_ECHO | SCIP_INTENSITY, scip_measure},
+    {"MD", 13, 0, scip_measure},
+    {"MS", 13, 0, scip_measure},
+    {"ME", 13, SCIP_INTENSITY, scip_measure},
+    {"ND", 13, SCIP_MULTI_ECHO, scip_measure},
+    {"NE", 13, SCIP_MULTI_ECHO | SCIP_INTENSITY, scip_measure},
+};
+
+static const struct command *find(const struct scip *s, const char *line, size_t len)
+{
+    for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {
+        const struct command *c = &commands[i];
+        const size_t n = strlen(c->name);
+        if (len >= n && memcmp(line, c->name, n) == 0 && (s->model->features & c->features) == c->features) return c;
+    }
+    return NULL;
+}
+
+static const char *check_tag(const char *tag, size_t len)
+{
+    enum { MOST = 16 };
+    if (len > MOST) return "0G";
+    for (size_t i = 0; i < len; i++) {
+        const char c = tag[i];
+        const int letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+        if (!letter && strchr(" ._+@", c) == NULL) return "0H";
+    }
+    return NULL;
+}
+
+void scip_command(struct scip *s, const char *line, size_t len)
+{
+    const char *tag = memchr(line, ';', len);
+    const size_t n = tag == NULL ? len : (size_t)(tag - line);
+    const struct command *c = find(s, line, n);
+    const char *wrong = NULL;
+    if (c == NULL || (s->time_mode && (s->model->features & SCIP_TIME_ALONE) != 0 && c->run != adjust_time))
+        wrong = "0E";
+    else if (tag != NULL && (wrong = check_tag(tag + 1, len - n - 1)) != NULL)
+        ;
+    else if (n != strlen(c->name) + c->n_params)
+        wrong = n < strlen(c->name) + c->n_params ? "0C" : "0D";
+    if (wrong != NULL)
+        scip_answer(s, line, len, wrong);
+    else
+        c->run(s, line, len);
+}

@@ -1,0 +1,39 @@
+/* Hokuyo models: what a head says of itself over SCIP, and which commands it has. A row a model, in scip_model.c.
+ * Geometry, ranges and speed are not here: they come from the stream. Constant data; any thread. */
+#ifndef DRIVERS_PROTOCOL_SCIP_MODEL_H
+#define DRIVERS_PROTOCOL_SCIP_MODEL_H
+
+#include <stdint.h>
+
+enum scip_feature {
+    SCIP_INTENSITY = 1 << 0,   /* GE ME */
+    SCIP_MULTI_ECHO = 1 << 1,  /* HD ND, and HE NE with intensity */
+    SCIP_MOTOR_SPEED = 1 << 2, /* CR; else 04 */
+    SCIP_BIT_RATE = 1 << 3,    /* SS; else 0F, as Ethernet models */
+    SCIP_REBOOT = 1 << 4,      /* RB RT */
+    SCIP_SLEEP = 1 << 5,       /* %SL */
+    SCIP_SIMULATION = 1 << 6,  /* DB; else 04 */
+    SCIP_TIME_ALONE = 1 << 7,  /* in the time mode nothing but TM is taken, and TM1 is taken only there */
+    SCIP_TIME_HEX = 1 << 8,    /* TIME of II is six hexadecimal digits; else four characters */
+};
+
+struct scip_model {
+    const char *name;    /* the profile's `model`; NULL: all others */
+    const char *vendor;  /* VEND; NULL: the profile's maker */
+    const char *product; /* PROD; NULL: the profile's model */
+    const char *model;   /* MODL; NULL: the profile's model */
+    const char *protocol;
+    uint32_t features;
+    uint32_t bit_rate;                                    /* of power-up, bit/s */
+    const char *link;                                     /* SBPS; NULL: the bit rate */
+    const char *speed_before, *speed_after;               /* SCSP: around the number */
+    const char *at_default;                               /* after both while they are those of power-up */
+    const char *mode_idle, *mode_single, *mode_streaming; /* MESM */
+    const char *works;                                    /* STAT, begins as clients look for it */
+    uint16_t no_object, too_near, no_step;                /* instead of a range */
+};
+
+/* Never NULL. */
+const struct scip_model *scip_model_find(const char *model);
+
+#endif

@@ -1,0 +1,46 @@
+/* Replies of SCIP: status, key lines, time stamps and blocks of data go in, the bytes of one unit come out.
+ *
+ *   echo LF  status(2) sum LF  [KEY:VALUE ; sum LF]...  [time(4) sum LF]  [up to 64 characters, sum LF]...  LF
+ *
+ * The sum is 0x30 plus the low six bits of the sum of the line's bytes; that of a key line leaves out the ';'.
+ * A value of n characters is 6 n bits, the most significant six first, each plus 0x30. Pure. */
+#ifndef DRIVERS_PROTOCOL_SCIP_REPLY_H
+#define DRIVERS_PROTOCOL_SCIP_REPLY_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+enum {
+    SCIP_MAX_STEPS = 2880,       /* 0 to the last step that a head may have, less one: a turn of 0.125 degrees */
+    SCIP_MAX_ECHOES = 3,         /* of a step */
+    SCIP_MAX_LINE = 64,          /* of a command; the longest that is defined has 32 characters */
+    SCIP_BLOCK = 64,             /* characters of data in a line */
+    SCIP_STEP_CHARS = 3 * 6 + 2, /* most of a step: three ranges with intensity, two marks */
+    SCIP_MAX_BLOCKS = (SCIP_MAX_STEPS * SCIP_STEP_CHARS + SCIP_BLOCK - 1) / SCIP_BLOCK,
+    SCIP_MAX_UNIT = SCIP_MAX_LINE + 1 + 4 + 6 + SCIP_MAX_BLOCKS * (SCIP_BLOCK + 2) + 1,
+    SCIP_MAX_TEXT = 70, /* a key line with its sum: clients have room for 72 bytes */
+};
+
+struct scip_reply {
+    size_t len;
+    size_t block; /* characters in the block at hand */
+    uint32_t sum; /* of these */
+    char bytes[SCIP_MAX_UNIT];
+};
+
+/* Echo and status; status has two characters. */
+void scip_reply_begin(struct scip_reply *r, const char *echo, size_t len, const char *status);
+/* A value longer than a client's line is cut. */
+void scip_reply_key(struct scip_reply *r, const char *key, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
+/* ms: the low 24 bits. */
+void scip_reply_time(struct scip_reply *r, uint32_t ms);
+/* Data: a value of 2 or 3 characters (the largest that fits, where it is larger), or one character as it is. */
+void scip_reply_value(struct scip_reply *r, uint32_t value, int n_chars);
+void scip_reply_mark(struct scip_reply *r, char mark);
+/* The last block, and the empty line. */
+void scip_reply_end(struct scip_reply *r);
+
+/* Four characters of the low 24 bits. */
+void scip_encode4(char dst[4], uint32_t value);
+
+#endif

@@ -1,0 +1,91 @@
+/* A SCIP session: what scip.c, scip_command.c, scip_info.c, scip_measure.c and scip_simulate.c share. Not for
+ * others. Device times in ns; a status is two characters. */
+#ifndef DRIVERS_PROTOCOL_SCIP_SESSION_H
+#define DRIVERS_PROTOCOL_SCIP_SESSION_H
+
+#include "drivers/protocol/protocol.h"
+#include "drivers/protocol/scip_model.h"
+#include "drivers/protocol/scip_reply.h"
+#include "drivers/protocol/scip_scan.h"
+
+/* A G, H, M or N command that waits for scans. */
+struct scip_request {
+    int active;
+    char echo[SCIP_MAX_LINE];
+    size_t echo_len;
+    int n_chars, intensity, multi_echo;
+    int32_t start, end; /* steps, both included */
+    int32_t cluster;    /* steps that become one value, 1 and more */
+    uint32_t skip;      /* scans left out before each that is sent */
+    uint32_t count;     /* scans in all; 0: endless */
+    uint32_t remaining, skipped, sent;
+    int64_t after_ns; /* step 0 of its scans is at this time or later */
+    int64_t until_ns; /* G, H: answered by then */
+};
+
+/* DB: a malfunction that is played. */
+struct scip_simulation {
+    int mode;           /* of DB: 2 to 5; 0: none */
+    int broken;         /* the laser is out of order */
+    uint32_t n_waiting; /* scans since processing was stopped to verify the error; 0: it was not */
+};
+
+struct scip {
+    struct protocol_host host;
+    const struct protocol_identity *identity;
+    const struct scip_model *model;
+    int64_t now_ns, epoch_ns; /* epoch: when the time stamp was 0 */
+    int64_t laser_ns;         /* since when the laser is on */
+    int laser, time_mode, speed_changed;
+    uint32_t bit_rate;
+    int64_t rb_ns, reboot_ns; /* of the last RB alone, of the end that RB RB asked for; INT64_MIN: none */
+    struct scip_request stream, single;
+    struct scip_simulation simulation;
+    /* the line at hand */
+    char line[SCIP_MAX_LINE];
+    size_t n_line;
+    uint64_t n_over; /* bytes beyond what fits */
+    int foul;        /* a byte that is not printable was in it */
+    struct scip_scan scan;
+    struct scip_reply reply;
+};
+
+/* scip.c */
+void scip_power_up(struct scip *s);
+uint32_t scip_time_ms(const struct scip *s, int64_t t_ns);
+/* Sends the reply at hand, after ending it. */
+void scip_send(struct scip *s);
+/* A whole reply without data. Counts what is an error. */
+void scip_answer(struct scip *s, const char *echo, size_t len, const char *status);
+
+/* scip_command.c: one line without its end. */
+void scip_command(struct scip *s, const char *line, size_t len);
+/* len decimal digits; -1: others are among them. */
+int32_t scip_number(const char *text, size_t len);
+
+/* scip_info.c: VV, PP, II. */
+void scip_info_version(struct scip *s, const char *line, size_t len);
+void scip_info_parameters(struct scip *s, const char *line, size_t len);
+void scip_info_state(struct scip *s, const char *line, size_t len);
+/* Lines per second of the head, 1e-6 Hz: `query` is HEAD:LINES? or that of the default. */
+uint64_t scip_lines_uhz(struct scip *s, const char *query);
+
+/* scip_measure.c */
+/* BM and what switches the laser on by itself. NULL, or the status to refuse with: 10 while the head can't scan, 50
+ * while it is out of order. */
+const char *scip_laser_on(struct scip *s);
+/* Ends stream and laser; a G or H that waits is answered with status 10. */
+void scip_laser_off(struct scip *s);
+void scip_measure(struct scip *s, const char *line, size_t len);
+/* What the scans at hand are for. */
+void scip_scans_came(struct scip *s, struct scip_turns turns);
+/* A G or H that has waited for too long. */
+void scip_measure_time(struct scip *s);
+
+/* scip_simulate.c */
+void scip_simulate(struct scip *s, const char *line, size_t len);
+/* Before a scan of the stream: NULL: it is sent; "": it is not; else the status that is sent in its place. 50 is the
+ * stream's end. */
+const char *scip_simulated(struct scip *s);
+
+#endif

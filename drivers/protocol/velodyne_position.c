@@ -1,0 +1,135 @@
+#include <stdlib.h>
+#include <string.h>
+
+#include "drivers/protocol/bytes.h"
+#include "drivers/protocol/nmea.h"
+#include "drivers/protocol/velodyne.h"
+
+/* A position packet, 512 bytes, little-endian; what isn't named is 0.
+ *
+ *   0xbb u8 top board, deg C       0xbc u8 bottom board            0xbd u8 at the last ADC calibration
+ *   0xbe i16 change since then     0xc0 u32 s since then           0xc4 u8 its reason   0xc5 u8 status
+ *   0xc6 u32 us since the top of the hour                          0xca u8 PPS: 0 absent, 2 locked
+ *   0xcb u8 thermal status         0xcc u8 deg C at shut-down      0xcd u8 deg C at power-up
+ *   0xce $GPRMC,... CR LF */
+enum {
+    AT_TOP = 0xbb,
+    AT_BOTTOM = 0xbc,
+    AT_ADC = 0xbd,
+    AT_CHANGE = 0xbe,
+    AT_CALIBRATED_S = 0xc0,
+    AT_REASON = 0xc4,
+    AT_TIME = 0xc6,
+    AT_PPS = 0xca,
+    AT_POWER_UP = 0xcd,
+    AT_NMEA = 0xce,
+};
+enum { PPS_ABSENT = 0, PPS_LOCKED = 2, REASON_POWER_ON = 1 };
+/* Warm electronics at rest. No temperature is modelled. */
+enum { TOP_DEGC = 42, BOTTOM_DEGC = 39, ADC_DEGC = 40, POWER_UP_DEGC = 25 };
+enum { MOST_AT_ONCE = 64 };
+
+struct position {
+    struct protocol_host host;
+    uint32_t fixes_hz;
+    int64_t next_ns; /* device time of the next packet */
+};
+
+static int create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
+{
+    struct position *p = calloc(1, sizeof *p);
+    if (p == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a session of Velodyne position packets");
+    p->host = spec->host;
+    p->fixes_hz = spec->fixes_hz != 0 ? spec->fixes_hz : 1;
+    *protocol = p;
+    return SH_OK;
+}
+
+static void destroy(void *protocol)
+{
+    free(protocol);
+}
+
+/* Times are multiples of the period, so that sessions agree. */
+static void open_at(void *protocol, int64_t t_ns)
+{
+    struct position *p = protocol;
+    p->next_ns = (t_ns + VELODYNE_POSITION_NS - 1) / VELODYNE_POSITION_NS * VELODYNE_POSITION_NS;
+}
+
+/* The sentence that the receiver sent last: of the last of its full 1 / fixes_hz of UTC. */
+static size_t put_sentence(const struct position *p, char *dst, int64_t t_ns, int64_t utc_ns)
+{
+    char sentence[NMEA_MAX_SENTENCE];
+    struct nmea_fix fix;
+    const int64_t period_ns = 1000000000 / p->fixes_hz;
+    const int64_t fix_ns = t_ns - (utc_ns % 1000000000 + 1000000000) % 1000000000 % period_ns;
+    if (fix_ns < 0 || !p->host.fix(p->host.ctx, fix_ns, &fix)) return 0;
+    memcpy(fix.talker, "GP", 2);
+    size_t len = nmea_encode_rmc(sentence, sizeof sentence, &fix);
+    memcpy(dst, sentence, len);
+    return len;
+}
+
+static void send_packet(const struct position *p, int64_t t_ns)
+{
+    uint8_t packet[VELODYNE_POSITION_LEN] = {0};
+    const int64_t utc_ns = p->host.utc_ns(p->host.ctx, t_ns);
+    packet[AT_TOP] = TOP_DEGC;
+    packet[AT_BOTTOM] = BOTTOM_DEGC;
+    packet[AT_ADC] = ADC_DEGC;
+    le_put16(packet + AT_CHANGE, TOP_DEGC - ADC_DEGC);
+    le_put32(packet + AT_CALIBRATED_S, (uint32_t)(t_ns / 1000000000));
+    packet[AT_REASON] = REASON_POWER_ON;
+    le_put32(packet + AT_TIME, velodyne_hour_us(&p->host, t_ns));
+    packet[AT_PPS] = utc_ns == INT64_MIN ? PPS_ABSENT : PPS_LOCKED;
+    packet[AT_POWER_UP] = POWER_UP_DEGC;
+    if (utc_ns != INT64_MIN) put_sentence(p, (char *)packet + AT_NMEA, t_ns, utc_ns);
+    p->host.send(p->host.ctx, packet, sizeof packet);
+}
+
+/* After a long silence of the head only the newest are sent. */
+static void at_time(void *protocol, int64_t t_ns)
+{
+    struct position *p = protocol;
+    if (t_ns <= p->next_ns) return;
+    const int64_t due = (t_ns - p->next_ns + VELODYNE_POSITION_NS - 1) / VELODYNE_POSITION_NS;
+    if (due > MOST_AT_ONCE) {
+        p->host.count(p->host.ctx, PROTOCOL_UNITS_LOST, (uint64_t)(due - MOST_AT_ONCE));
+        p->next_ns += (due - MOST_AT_ONCE) * VELODYNE_POSITION_NS;
+    }
+    for (; p->next_ns < t_ns; p->next_ns += VELODYNE_POSITION_NS)
+        send_packet(p, p->next_ns);
+}
+
+static void no_frame(void *protocol, const uint8_t *frame, size_t len)
+{
+    (void)protocol;
+    (void)frame;
+    (void)len;
+}
+
+static void no_gap(void *protocol, uint32_t n_frames)
+{
+    (void)protocol;
+    (void)n_frames;
+}
+
+static void input(void *protocol, const uint8_t *bytes, size_t len)
+{
+    const struct position *p = protocol;
+    (void)bytes;
+    p->host.count(p->host.ctx, PROTOCOL_INPUT_LOST, len);
+}
+
+const struct protocol_ops protocol_velodyne_position = {
+    .name = "velodyne-position",
+    .max_unit = VELODYNE_POSITION_LEN,
+    .create = create,
+    .destroy = destroy,
+    .open = open_at,
+    .frame = no_frame,
+    .gap = no_gap,
+    .time = at_time,
+    .input = input,
+};

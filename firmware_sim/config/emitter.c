@@ -1,0 +1,169 @@
+/* Emitters of head profiles: which keys belong to which of them, and what follows from them: pulse rates,
+ * limits of line angles, the schedule of a head. */
+#include "firmware_sim/config/table.h"
+
+#include <math.h>
+
+enum {
+    LINE = 1 << EMITTER_LINE,
+    PLANAR = 1 << EMITTER_PLANAR,
+    BEAMS = 1 << EMITTER_BEAMS,
+    SPHERE = 1 << EMITTER_SPHERE,
+    DIRECTIONS = 1 << EMITTER_DIRECTIONS
+};
+
+static const struct owned_key {
+    const char *path;
+    int emitters, needed;
+} owned[] = {
+    {"prr_min_hz", LINE, 1},    {"prr_max_hz", LINE, 1},
+    {"pan_max_deg_s", LINE, 1}, {"fov_min_deg", LINE, 1},
+    {"fov_max_deg", LINE, 1},   {"pan_min_deg", LINE, 1},
+    {"pan_max_deg", LINE, 1},   {"facets", LINE, 1},
+    {"optical_gain", LINE, 1},  {"steps_per_turn", PLANAR, 1},
+    {"first_step", PLANAR, 1},  {"last_step", PLANAR, 1},
+    {"front_step", PLANAR, 1},  {"firing_ns", BEAMS, 1},
+    {"beams", BEAMS, 1},        {"step_direction", PLANAR | BEAMS, 0},
+    {"step_deg", SPHERE, 1},    {"programs", LINE, 0},
+};
+
+static const double PRR_MOST_HZ = 1e7;
+
+/* "planar, beams" */
+static const char *words_of(const struct cfg_reader *rd, int emitters, char *buf, size_t len)
+{
+    size_t used = 0;
+    buf[0] = '\0';
+    for (int kind = EMITTER_LINE; kind <= EMITTER_DIRECTIONS && used < len; kind++)
+        if (emitters & 1 << kind)
+            used +=
+                (size_t)snprintf(buf + used, len - used, "%s%s", used > 0 ? ", " : "", cfg_word(rd, "emitter", kind));
+    return buf;
+}
+
+static void check_owners(struct cfg_reader *rd, int emitter)
+{
+    char words[64];
+    for (size_t i = 0; i < CFG_LEN(owned); i++) {
+        const struct owned_key *key = &owned[i];
+        const int given = cfg_is_given(rd, key->path, 0), has = (key->emitters & emitter) != 0;
+        if (given && !has)
+            cfg_fail_key(rd, key->path, 0, "no key of this emitter; allowed only with emitter: %s",
+                         words_of(rd, key->emitters, words, sizeof words));
+        else if (!given && has && key->needed)
+            cfg_fail_missing(rd, cfg_find(&rd->table, key->path), 0);
+    }
+}
+
+/* The pulse rates of a head with so many pulses a line. */
+static void set_rates(struct cfg_reader *rd, const char *key, struct config_profile *p)
+{
+    const uint32_t n = p->emitter.steps;
+    const double most_hz = 1e-6 * (double)p->lines_max_uhz * n;
+    p->prr_min_uhz = p->lines_min_uhz * n;
+    p->prr_max_uhz = p->lines_max_uhz * n;
+    if (most_hz > PRR_MOST_HZ && CFG_SOUND(rd, 0, "lines_max_hz"))
+        cfg_fail_key(rd, key, 0, "%u pulses a line and lines_max_hz %.10g make %.10g pulses/s; allowed up to %.10g", n,
+                     1e-6 * (double)p->lines_max_uhz, most_hz, PRR_MOST_HZ);
+}
+
+static void set_planar(struct cfg_reader *rd, struct config_profile *p)
+{
+    const struct config_emitter *c = &p->arrangement;
+    if (!CFG_SOUND(rd, 0, "steps_per_turn", "first_step", "last_step", "front_step", "step_direction")) return;
+    if (c->last_step >= c->steps_per_turn)
+        cfg_fail_key(rd, "last_step", 0, "%u, and a turn has %u steps; allowed up to %u", c->last_step,
+                     c->steps_per_turn, c->steps_per_turn - 1);
+    else if (c->first_step > c->last_step)
+        cfg_fail_key(rd, "first_step", 0, "%u comes after last_step %u; allowed 0 to %u", c->first_step, c->last_step,
+                     c->last_step);
+    else if (c->front_step >= c->steps_per_turn)
+        cfg_fail_key(rd, "front_step", 0, "%u, and a turn has %u steps; allowed up to %u", c->front_step,
+                     c->steps_per_turn, c->steps_per_turn - 1);
+    else {
+        emitter_set_planar(&p->emitter, c->steps_per_turn, c->first_step, c->last_step, c->front_step,
+                           c->step_direction == TURN_CLOCKWISE ? 1 : -1);
+        p->fov_min_udeg = emitter_step_udeg(&p->emitter, c->first_step);
+        p->fov_max_udeg = emitter_step_udeg(&p->emitter, c->last_step);
+        set_rates(rd, "steps_per_turn", p);
+    }
+}
+
+static void set_beams(struct cfg_reader *rd, struct config_profile *p)
+{
+    static const int64_t FS_PER_PS = 1000;
+    const struct config_emitter *c = &p->arrangement;
+    struct emitter_beam beam[EMITTER_MAX_BEAMS];
+    struct sh_err why;
+    if (!CFG_SOUND(rd, 0, "firing_ns", "beams", "step_direction")) return;
+    for (uint32_t i = 0; i < c->n_beams; i++)
+        beam[i] = (struct emitter_beam){c->beam[i].elevation_udeg, c->beam[i].azimuth_udeg, c->beam[i].offset_ns};
+    const double firing_ns = 1e-6 * (double)c->firing_fs, lines_max_hz = 1e-6 * (double)p->lines_max_uhz;
+    if (c->firing_fs % FS_PER_PS != 0)
+        cfg_fail_key(rd, "firing_ns", 0, "%.15g is too fine; allowed multiples of 0.001 ns", firing_ns);
+    else if (emitter_set_beams(&p->emitter, beam, c->n_beams, (uint64_t)(c->firing_fs / FS_PER_PS),
+                               c->step_direction == TURN_CLOCKWISE ? 1 : -1, &why) != SH_OK)
+        cfg_fail_key(rd, "beams", 0, "%s", why.text);
+    else if (firing_ns * lines_max_hz > 1e9)
+        cfg_fail_key(rd, "firing_ns", 0, "%.15g ns are longer than a turn at lines_max_hz; allowed up to %.15g ns",
+                     firing_ns, 1e9 / lines_max_hz);
+    else if (1e9 * c->n_beams / firing_ns > PRR_MOST_HZ)
+        cfg_fail_key(rd, "firing_ns", 0, "%u beams in %.15g ns make %.10g pulses/s; allowed up to %.10g", c->n_beams,
+                     firing_ns, 1e9 * c->n_beams / firing_ns, PRR_MOST_HZ);
+    else
+        p->prr_min_uhz = p->prr_max_uhz = emitter_rate_uhz(&p->emitter);
+}
+
+static void set_sphere(struct cfg_reader *rd, struct config_profile *p)
+{
+    if (!CFG_SOUND(rd, 0, "step_deg")) return;
+    emitter_set_sphere(&p->emitter, p->arrangement.step_udeg);
+    set_rates(rd, "step_deg", p);
+}
+
+void cfg_check_emitter(struct cfg_reader *rd, struct config_profile *p)
+{
+    const enum emitter_kind kind = p->arrangement.kind;
+    if (!CFG_SOUND(rd, 0, "emitter")) return;
+    check_owners(rd, 1 << kind);
+    if (kind == EMITTER_LINE) return;
+    p->facets = 1;
+    p->optical_gain = 1.0;
+    p->fov_min_udeg = 0;
+    p->fov_max_udeg = 360000000;
+    if (kind == EMITTER_PLANAR) set_planar(rd, p);
+    if (kind == EMITTER_BEAMS) set_beams(rd, p);
+    if (kind == EMITTER_SPHERE) set_sphere(rd, p);
+}
+
+void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg)
+{
+    struct head_settings *s = &cfg->head.settings;
+    const uint32_t n = cfg->profile.emitter.steps;
+    if (!rd->profile_read || n == 0 || !CFG_SOUND(rd, 0, "head.lines_hz", "head.prr_hz")) return;
+    const int64_t prr_uhz = s->lines_uhz * n;
+    if (cfg_is_given(rd, "head.prr_hz", 0) && s->prr_uhz != prr_uhz)
+        cfg_fail_key(rd, "head.prr_hz", 0,
+                     "%.15g, but a line of head profile %s has %u pulses; allowed %.15g, or none: it follows from "
+                     "head.lines_hz",
+                     1e-6 * (double)s->prr_uhz, cfg->profile.name, n, 1e-6 * (double)prr_uhz);
+    s->prr_uhz = prr_uhz;
+}
+
+void config_fill_spec(const struct config_profile *profile, const struct head_settings *s, struct schedule_spec *spec)
+{
+    const struct emitter *emitter = &profile->emitter;
+    *spec = (struct schedule_spec){.prr_uhz = s->prr_uhz,
+                                   .lines_uhz = s->lines_uhz,
+                                   .pan_udeg_s = s->pan_udeg_s,
+                                   .fov_min_udeg = profile->fov_min_udeg,
+                                   .sweep_udeg = llround(360e6 * profile->optical_gain / profile->facets),
+                                   .line_start_udeg = s->line_start_udeg,
+                                   .line_stop_udeg = s->line_stop_udeg,
+                                   .pan_start_udeg = s->pan_start_udeg,
+                                   .pan_stop_udeg = s->pan_stop_udeg,
+                                   .frames = s->frames};
+    if (emitter->kind == EMITTER_LINE) return;
+    spec->emitter = emitter;
+    if (emitter->kind == EMITTER_PLANAR) spec->fov_min_udeg = emitter_step_udeg(emitter, 0);
+}

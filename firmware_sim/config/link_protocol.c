@@ -1,0 +1,92 @@
+/* What a link's protocol needs: of the link, of the stream, of the head, of the time. */
+#include <stdio.h>
+#include <string.h>
+
+#include "drivers/protocol/native.h"
+#include "firmware_sim/config/table.h"
+
+/* Kinds of links that each protocol is spoken on. */
+static const struct {
+    unsigned kinds; /* bit per enum link_type */
+    const char *allowed;
+} ways[PROTOCOL_N] = {
+    [PROTOCOL_NATIVE] = {1u << LINK_NULL | 1u << LINK_FILE | 1u << LINK_PTY | 1u << LINK_TCP | 1u << LINK_USB |
+                             1u << LINK_FD,
+                         "null, file, pty, tcp, usb"},
+    [PROTOCOL_NMEA] = {1u << LINK_NULL | 1u << LINK_FILE | 1u << LINK_PTY | 1u << LINK_TCP | 1u << LINK_UDP,
+                       "null, file, pty, tcp, udp"},
+    [PROTOCOL_SCIP] = {1u << LINK_PTY | 1u << LINK_TCP | 1u << LINK_USB | 1u << LINK_FD, "pty, tcp, usb"},
+    [PROTOCOL_COLA] = {1u << LINK_TCP | 1u << LINK_USB | 1u << LINK_FD, "tcp, usb"},
+    [PROTOCOL_VELODYNE] = {1u << LINK_UDP | 1u << LINK_FILE | 1u << LINK_NULL, "udp, file, null"},
+    [PROTOCOL_VELODYNE_POSITION] = {1u << LINK_UDP | 1u << LINK_FILE | 1u << LINK_NULL, "udp, file, null"},
+    [PROTOCOL_VELODYNE_HTTP] = {1u << LINK_TCP | 1u << LINK_FD, "tcp"},
+};
+
+static const char PROTOCOL_KEY[] = "links[].protocol";
+
+static const struct protocol_ops *ops_of(const struct link_spec *link)
+{
+    return protocol_ops_get((enum protocol_id)link->protocol);
+}
+
+int cfg_link_that_needs(const struct config *cfg, enum protocol_needs need)
+{
+    for (uint32_t i = 0; i < cfg->n_links; i++) {
+        const struct protocol_ops *ops = ops_of(&cfg->link[i]);
+        if (ops != NULL && (ops->needs & need) != 0) return (int)i;
+    }
+    return -1;
+}
+
+/* ", as line 12 has it", where a key is given. buf holds 40. */
+static const char *place_of(const struct cfg_reader *rd, const char *path, char *buf)
+{
+    int line = cfg_where(rd, cfg_find(&rd->table, path), 0);
+    if (line == CFG_FROM_SET)
+        snprintf(buf, 40, " (--set)");
+    else
+        snprintf(buf, 40, " (line %d)", line);
+    return buf;
+}
+
+static void check_stream(struct cfg_reader *rd, struct config *cfg, uint32_t i, const struct protocol_ops *ops)
+{
+    char where[40];
+    if ((ops->needs & PROTOCOL_NEEDS_POLAR) != 0 && cfg->output.layout != LINE_POLAR &&
+        CFG_SOUND(rd, 0, "output.layout"))
+        cfg_fail_key(rd, PROTOCOL_KEY, i, "%s needs ranges, but output.layout is geo%s; required is layout: polar",
+                     ops->name, place_of(rd, "output.layout", where));
+    if ((ops->needs & PROTOCOL_NEEDS_ATTRIBUTES) == 0) return;
+    if (!cfg_is_given(rd, "output.attributes", 0))
+        cfg->output.attributes = 1;
+    else if (!cfg->output.attributes && CFG_SOUND(rd, 0, "output.attributes"))
+        cfg_fail_key(rd, PROTOCOL_KEY, i,
+                     "%s needs amplitudes, but output.attributes is off%s; required is on, or no "
+                     "such key",
+                     ops->name, place_of(rd, "output.attributes", where));
+}
+
+static void check_protocol(struct cfg_reader *rd, struct config *cfg, uint32_t i)
+{
+    struct link_spec *link = &cfg->link[i];
+    const struct protocol_ops *ops = ops_of(link);
+    if (!CFG_SOUND(rd, i, "links[].type", PROTOCOL_KEY)) return;
+    if (ops == NULL) {
+        cfg_fail_key(rd, PROTOCOL_KEY, i, "this build does not have it");
+        return;
+    }
+    if ((ways[link->protocol].kinds & 1u << link->type) == 0) {
+        cfg_fail_key(rd, PROTOCOL_KEY, i, "%s is not spoken on a %s link; allowed %s", ops->name,
+                     cfg_word(rd, "links[].type", (int)link->type), ways[link->protocol].allowed);
+        return;
+    }
+    /* As the device: it turns a second client away. */
+    if (link->protocol == PROTOCOL_SCIP && !cfg_is_given(rd, "links[].max_sessions", i)) link->max_sessions = 1;
+    check_stream(rd, cfg, i, ops);
+}
+
+void cfg_check_link_protocols(struct cfg_reader *rd, struct config *cfg)
+{
+    for (uint32_t i = 0; i < cfg->n_links; i++)
+        check_protocol(rd, cfg, i);
+}

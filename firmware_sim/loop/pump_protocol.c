@@ -1,0 +1,236 @@
+/* A session of a protocol that is not native: frames and time go in, and units come out (drivers/protocol/protocol.h).
+ *
+ * In real time the protocol keeps up with the head, whether its client reads or not, as the firmware of a device does.
+ * A unit that has no room, or that comes while one waits that is older than loop.queue_ms, is lost as a whole. In the
+ * paces that wait for readers nothing is lost: the session takes no further tick until there is room. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "firmware_sim/base/clock.h"
+#include "firmware_sim/loop/pump_inside.h"
+
+enum { PIECE_BYTES = 64 }; /* of what a client sends: what answers it finds room */
+
+static int64_t time_of(const struct pump *pump, uint64_t tick)
+{
+    return (int64_t)tick * pump->stream->tick_ns;
+}
+
+/* ---- what the protocol may call */
+
+static int is_stale(const struct pump *pump, const struct session *s)
+{
+    const struct stream *stream = pump->stream;
+    return !stream->waits && s->units.n != 0 &&
+           unit_queue_tick(&s->units) + stream->ring.queue_ticks < stream_released(stream);
+}
+
+static int host_send(void *ctx, const void *unit, size_t len)
+{
+    struct session *s = ctx;
+    if (len == 0 || s->hang_up) return s->hang_up;
+    if (!is_stale(s->pump, s) && unit_queue_put(&s->units, unit, len, stream_released(s->pump->stream)) == 0) return 0;
+    session_count_units(s->pump, s, 1);
+    return 1;
+}
+
+static int host_command(void *ctx, const char *line, char *reply, size_t cap)
+{
+    struct session *s = ctx;
+    struct stream *stream = s->pump->stream;
+    struct command_result result;
+    device_command_once(s->pump->links->device, s->id, line, stream_released(stream), &result);
+    if (stream->waits) stream_poke(stream);
+    snprintf(reply, cap, "%s", result.reply);
+    return result.error;
+}
+
+static int64_t host_utc_ns(void *ctx, int64_t t_ns)
+{
+    const struct session *s = ctx;
+    return device_utc_ns(s->pump->links->device, t_ns);
+}
+
+static int host_fix(void *ctx, int64_t t_ns, struct nmea_fix *fix)
+{
+    const struct session *s = ctx;
+    return device_fix(s->pump->links->device, t_ns, fix);
+}
+
+static int64_t host_next_fix_ns(void *ctx, int64_t t_ns)
+{
+    const struct session *s = ctx;
+    return device_next_fix_ns(s->pump->links->device, t_ns);
+}
+
+static void host_count(void *ctx, enum protocol_count what, uint64_t n)
+{
+    struct session *s = ctx;
+    struct link_counts *counts = &s->pump->counts;
+    if (n == 0) return;
+    if (what == PROTOCOL_UNITS_LOST) session_count_units(s->pump, s, n);
+    if (what == PROTOCOL_INPUT_LOST) counts->lost_input_bytes += n;
+    if (what == PROTOCOL_WRONG) counts->wrong_requests += n;
+    if (what == PROTOCOL_POINTS_LOST) counts->lost_points += n;
+    s->commands.wrong += what == PROTOCOL_INPUT_LOST || what == PROTOCOL_WRONG;
+}
+
+static void host_hang_up(void *ctx)
+{
+    struct session *s = ctx;
+    s->hang_up = s->pump->ops->end != NULL;
+}
+
+/* ---- the session */
+
+/* Descriptor, emitter and anchor as they are before the tick at the cursor. */
+static void greet(struct pump *pump, struct session *s)
+{
+    static _Thread_local uint8_t frames[KEPT_MAX_BYTES];
+    uint32_t version, again;
+    uint32_t len = kept_copy(&pump->stream->kept, frames, &version);
+    do {
+        again = version;
+        s->cursor = stream_released(pump->stream);
+        len = kept_copy(&pump->stream->kept, frames, &version);
+    } while (version != again);
+    pump->protocol->open(s->protocol, time_of(pump, s->cursor));
+    for (uint32_t at = 0; at < len;) {
+        size_t n = native_frame_len(frames + at);
+        pump->protocol->frame(s->protocol, frames + at, n);
+        at += (uint32_t)n;
+    }
+}
+
+int session_open_protocol(struct pump *pump, struct session *s)
+{
+    const struct protocol_spec spec = {
+        .identity = &pump->links->identity,
+        .host = {s, host_send, host_command, host_utc_ns, host_fix, host_count, host_hang_up, host_next_fix_ns},
+        .session = s->id,
+        .fixes_hz = pump->links->fixes_hz,
+    };
+    struct protocol_spec full = spec;
+    snprintf(full.address, sizeof full.address, "%s", pump->links->data_address);
+    full.port = pump->links->data_port;
+    struct sh_err err;
+    s->pump = pump;
+    s->hang_up = 0;
+    if (s->units.bytes == NULL && unit_queue_create(&s->units, pump->out_cap) != SH_OK) return SH_ENOMEM;
+    unit_queue_clear(&s->units);
+    int rc = pump->protocol->create(&full, &s->protocol, &err);
+    if (rc == SH_OK) greet(pump, s);
+    return rc;
+}
+
+void session_close_protocol(struct pump *pump, struct session *s)
+{
+    pump->protocol->destroy(s->protocol);
+    s->protocol = NULL;
+    unit_queue_clear(&s->units);
+}
+
+/* Time has come to the cursor. */
+static void pass_time(struct pump *pump, struct session *s)
+{
+    pump->protocol->time(s->protocol, time_of(pump, s->cursor));
+}
+
+/* The next tick into the protocol. Returns 0 when there is none. */
+static int take_tick(struct pump *pump, struct session *s)
+{
+    struct ring *ring = &pump->stream->ring;
+    const struct protocol_ops *ops = pump->protocol;
+    struct ring_copy tick = {.buf = pump->tick, .cap = pump->stream->tick_bytes};
+    enum ring_read got = ring_read(ring, s->reader, s->cursor, &tick);
+    if (got == RING_NONE || (got == RING_READ && tick.len > tick.cap)) return 0;
+    uint64_t released = stream_released(pump->stream);
+    if (got == RING_LOST && s->cursor + ring->queue_ticks < released) {
+        s->cursor = released - ring->queue_ticks / 2; /* what was lost, the next tick's number says */
+        return 1;
+    }
+    if (got == RING_LOST) ops->gap(s->protocol, 1); /* the head could not compute it */
+    if (got == RING_READ) {
+        uint32_t lost = session_check_lost(pump, s, &tick, released);
+        if (lost != 0) ops->gap(s->protocol, lost);
+        for (uint32_t at = 0; at < tick.len;) {
+            size_t n = native_frame_len(tick.buf + at);
+            ops->frame(s->protocol, tick.buf + at, n);
+            at += (uint32_t)n;
+        }
+    }
+    s->cursor++;
+    pass_time(pump, s);
+    return 1;
+}
+
+static int has_room(const struct session *s)
+{
+    return unit_queue_room(&s->units) >= s->units.cap / 2;
+}
+
+/* What the client sent, as long as answers have room. Where there is none and no more can be read, it goes on all the
+ * same: a client that sends and never reads loses answers. Returns whether there was something. */
+static int take_input(struct pump *pump, struct session *s)
+{
+    struct session_commands *c = &s->commands;
+    const uint32_t from = c->in_pos;
+    while (c->in_pos < c->in_len && c->wrong < WRONG_AT_ONCE && !s->hang_up &&
+           (has_room(s) || c->in_len - c->in_pos == READ_BYTES)) {
+        uint32_t n = c->in_len - c->in_pos < PIECE_BYTES ? c->in_len - c->in_pos : PIECE_BYTES;
+        pump->protocol->input(s->protocol, c->in + c->in_pos, n);
+        c->in_pos += n;
+    }
+    if (s->hang_up) c->in_pos = c->in_len;
+    return c->in_pos != from;
+}
+
+/* Writes until the link is full (1) or there is nothing left (0). Negative: the session is gone. */
+static int flush(struct pump *pump, struct session *s, int index)
+{
+    for (;;) {
+        size_t len;
+        const uint8_t *unit = unit_queue_next(&s->units, &len);
+        if (unit == NULL) return 0;
+        ssize_t n = pump->ops->write(pump->link, index, unit, len);
+        if (n == 0) return 1;
+        if (n < 0) {
+            if (n != SH_ECLOSED) pump->failed = 1; /* the reason comes with LINK_CLOSED */
+            return -1;
+        }
+        s->moved_ns = clock_now_ns();
+        if (unit_queue_written(&s->units, (size_t)n)) pump->counts.sent_units++;
+    }
+}
+
+int session_write_protocol(struct pump *pump, struct session *s, int index)
+{
+    int more = 1, full = 0;
+    while (more && !full) {
+        more = 0;
+        while (has_room(s) && take_tick(pump, s))
+            more = 1;
+        more |= take_input(pump, s);
+        full = flush(pump, s, index);
+        if (full < 0) {
+            session_close(pump, s);
+            return 0;
+        }
+    }
+    while (full && !pump->stream->waits && take_tick(pump, s)) /* time goes on without the client */
+        continue;
+    stream_move_reader(pump->stream, s->reader, s->cursor);
+    if (s->units.n == 0) s->lost.lagging = 0;
+    if (!full && s->hang_up) pump->ops->end(pump->link, index);
+    return full;
+}
+
+uint64_t session_wake_tick(const struct pump *pump, const struct session *s)
+{
+    if (pump->protocol->next_ns == NULL) return s->cursor;
+    int64_t next_ns = pump->protocol->next_ns(s->protocol);
+    if (next_ns == INT64_MAX) return UINT64_MAX;
+    uint64_t tick = next_ns > 0 ? (uint64_t)(next_ns / pump->stream->tick_ns) : 0;
+    return tick > s->cursor ? tick : s->cursor;
+}

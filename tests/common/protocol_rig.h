@@ -1,0 +1,82 @@
+/* A protocol driven from bytes to bytes: a host that keeps what the protocol sends and calls, and native frames of
+ * heads that spin, made from ranges by hand. */
+#ifndef TESTS_COMMON_PROTOCOL_RIG_H
+#define TESTS_COMMON_PROTOCOL_RIG_H
+
+#include "core/line.h"
+#include "drivers/protocol/native.h"
+#include "drivers/protocol/protocol.h"
+
+enum { RIG_UNITS = 4096, RIG_BYTES = 1 << 22, RIG_LINES = 256 };
+
+struct protocol_rig {
+    const struct protocol_ops *ops;
+    void *protocol;
+    struct protocol_identity identity;
+    struct protocol_spec spec;
+    /* what it sent */
+    uint8_t bytes[RIG_BYTES];
+    size_t len;
+    size_t end[RIG_UNITS]; /* of each unit in bytes */
+    uint32_t n_units;
+    size_t room; /* for further bytes; a unit that is longer is refused. SIZE_MAX at first */
+    int hung_up;
+    uint64_t count[PROTOCOL_N_COUNTS];
+    /* what it called: lines, and what is answered: the reply of the first row that is a prefix of the line (the last
+     * row's is {NULL, ...}), "OK" where there is none */
+    char line[RIG_LINES][64];
+    uint32_t n_lines;
+    const struct protocol_rig_reply {
+        const char *prefix, *reply;
+        int error;
+    } * replies;
+    int64_t utc0_ns;     /* UTC of device time 0; INT64_MIN at first: not known */
+    struct nmea_fix fix; /* of all times; quality 0 at first: there is none */
+    /* the head */
+    struct native_descriptor descriptor;
+    struct native_emitter emitter;
+    struct native_beam beam[NATIVE_MAX_BEAMS];
+    int attributes;
+    int64_t scan_t0_ns; /* device time of the scan's start */
+    uint32_t seq;
+};
+
+/* model as in the profile. The rig is large: allocate it, or make it static. Asserts. */
+void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char *maker, const char *model);
+void protocol_rig_close(struct protocol_rig *rig);
+/* Forgets what was sent and called. */
+void protocol_rig_clear(struct protocol_rig *rig);
+void protocol_rig_input(struct protocol_rig *rig, const char *text);
+
+/* The head: before protocol_rig_describe. Range counts of 1e-6 m, 2^32 counts a turn. */
+void protocol_rig_planar(struct protocol_rig *rig, uint32_t steps, int first, int last, int front, int turn,
+                         uint32_t lines_hz);
+/* A VLP-16: 16 beams in 55,296 ns. */
+void protocol_rig_beams(struct protocol_rig *rig, uint32_t lines_hz);
+/* Descriptor and emitter frames. */
+void protocol_rig_describe(struct protocol_rig *rig, int64_t t_ns);
+
+/* Echoes of one pulse, in order of range. */
+struct protocol_rig_shot {
+    uint32_t n; /* 0: without echo */
+    double range_m[3];
+    int16_t refl_cdb[3], amplitude_cdb[3];
+};
+/* One points frame of consecutive pulses of one line; with attributes where the rig has some. turn: pan of each
+ * pulse, mirror_turn: elevation. */
+struct protocol_rig_run {
+    uint32_t frame, line;
+    uint64_t pulse0;
+    uint32_t n;
+    int64_t t0_ns, line_t0_ns; /* since the scan's start */
+    const int64_t *dt_ns;      /* after t0_ns */
+    const double *mirror_turn, *pan_turn;
+    const struct protocol_rig_shot *shot;
+};
+void protocol_rig_points(struct protocol_rig *rig, const struct protocol_rig_run *run);
+void protocol_rig_line_end(struct protocol_rig *rig, const struct line_end *end);
+/* A whole turn of a planar head, shots of the steps first..last, in frames of `part` pulses, and its line end; then
+ * time() of the turn's end. line from 0. */
+void protocol_rig_turn(struct protocol_rig *rig, uint32_t line, const struct protocol_rig_shot *shot, uint32_t part);
+
+#endif

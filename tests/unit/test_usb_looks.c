@@ -1,0 +1,263 @@
+/* The looks of a head on USB: their descriptors, byte by byte, and what begins and ends their sessions.
+ *
+ * The bytes are written out by hand from the layouts of USB 2.0 (tables 9-8, 9-10, 9-12, 9-13) and CDC 1.20 (tables 15
+ * to 18 and PSTN 1.20, tables 3 and 4), with the figures that real devices report: a TiM571 as its `lsusb -v` in
+ * uos/sick_tim issue 29 shows it, an URG's device descriptor as in UrgNetwork/urg_library issue 29. */
+#include "tests/unit/usb_host.h"
+
+#include "drivers/usb/head_device.h"
+
+enum { LANG = 0x0409 };
+
+struct shape {
+    enum usb_look_id look;
+    const char *serial; /* "": none */
+    const uint8_t *device, *full, *high;
+    size_t config_len;
+};
+
+/* ---- native: as it was before there were others */
+
+static const uint8_t native_device[18] = {18, 1, 0x10, 0x02, 0xef, 2, 1, 64, 0x09, 0x12, 0x01, 0, 0, 1, 1, 2, 5, 1};
+
+#define PORT_BYTES(control_string, notify_interval, bulk_low, bulk_high)                                  \
+    9, 4, 0, 0, 1, 2, 2, 0, (control_string),      /* interface 0: communications, ACM, no AT commands */ \
+        5, 0x24, 0, 0x20, 0x01,                    /* header: CDC 1.20 */                                 \
+        5, 0x24, 1, 0, 1,                          /* call management: none, data on interface 1 */       \
+        4, 0x24, 2, 0x06,                          /* ACM: line coding, serial state, break */            \
+        5, 0x24, 6, 0, 1,                          /* union: 0 controls 1 */                              \
+        7, 5, 0x82, 3, 16, 0, (notify_interval),   /* interrupt IN */                                     \
+        9, 4, 1, 0, 2, 10, 0, 0, 0,                /* interface 1: data */                                \
+        7, 5, 0x81, 2, (bulk_low), (bulk_high), 0, /* bulk IN */                                          \
+        7, 5, 0x01, 2, (bulk_low), (bulk_high), 0  /* bulk OUT */
+
+#define NATIVE_BYTES(notify_interval, bulk_low, bulk_high)                                              \
+    9, 2, 98, 0, 3, 1, 0, 0xc0, 0,                           /* 98 bytes, 3 interfaces, self-powered */ \
+        8, 11, 0, 2, 2, 2, 0, 3,                             /* interfaces 0 and 1 belong together */   \
+        PORT_BYTES(3, notify_interval, bulk_low, bulk_high), /* the console */                          \
+        9, 4, 2, 0, 2, 0xff, 0x53, 0x48, 4,                  /* interface 2: the stream */              \
+        7, 5, 0x83, 2, (bulk_low), (bulk_high), 0, 7, 5, 0x03, 2, (bulk_low), (bulk_high), 0
+
+static const uint8_t native_full[] = {NATIVE_BYTES(16, 64, 0)}, native_high[] = {NATIVE_BYTES(8, 0, 2)};
+
+/* ---- hokuyo: class 2, ids 15d1:0000, release 1.00, strings 1 and 2, no serial number, USB 2.00 */
+
+static const uint8_t hokuyo_device[18] = {18, 1, 0, 2, 2, 0, 0, 64, 0xd1, 0x15, 0, 0, 0, 1, 1, 2, 0, 1};
+
+#define HOKUYO_BYTES(notify_interval, bulk_low, bulk_high) \
+    9, 2, 67, 0, 2, 1, 0, 0xc0, 0, /* 67 bytes, 2 interfaces */ PORT_BYTES(0, notify_interval, bulk_low, bulk_high)
+
+static const uint8_t hokuyo_full[] = {HOKUYO_BYTES(16, 64, 0)}, hokuyo_high[] = {HOKUYO_BYTES(8, 0, 2)};
+
+/* ---- sick: as the TiM571's listing, whose 32 bytes are a configuration, an interface and two endpoints */
+
+static const uint8_t sick_device[18] = {18, 1, 0, 2, 0, 0, 0, 64, 0xa2, 0x19, 0x01, 0x50, 0x09, 0x01, 0, 2, 3, 1};
+
+#define SICK_BYTES(bulk_low, bulk_high)                                                                         \
+    9, 2, 32, 0, 1, 1, 1, 0xc0, 1, /* 32 bytes, configuration 1, "Default Configuration", self-powered, 2 mA */ \
+        9, 4, 0, 0, 2, 0xff, 0, 0, 0, 7, 5, 0x81, 2, (bulk_low), (bulk_high), 0, 7, 5, 0x02, 2, (bulk_low),     \
+        (bulk_high), 0
+
+static const uint8_t sick_full[] = {SICK_BYTES(64, 0)}, sick_high[] = {SICK_BYTES(0, 2)};
+
+static const struct shape shapes[] = {
+    {USB_LOOK_NATIVE, "S", native_device, native_full, native_high, sizeof native_full},
+    {USB_LOOK_HOKUYO, "", hokuyo_device, hokuyo_full, hokuyo_high, sizeof hokuyo_full},
+    {USB_LOOK_SICK, "15340291", sick_device, sick_full, sick_high, sizeof sick_full},
+};
+
+struct rig {
+    struct scanhead_usb head;
+    uint8_t in[1024];
+};
+
+static void rig_complete(void *ctx, struct usb_transfer *transfer)
+{
+    int *n_done = ctx;
+    (void)transfer;
+    ++*n_done;
+}
+
+static int n_done;
+
+static void rig_open(struct rig *rig, enum usb_look_id id, const char *serial, enum usb_rate rate)
+{
+    const struct usb_look *look = usb_look_get(id);
+    struct usb_identity identity = {.vid = look->vid, .pid = look->pid, .highest = USB_RATE_HIGH};
+    struct sh_err err = {0, ""};
+    memset(rig, 0, sizeof *rig);
+    n_done = 0;
+    snprintf(identity.serial, sizeof identity.serial, "%s", serial);
+    if (scanhead_usb_create(look, &identity, &rig->head, &err) != SH_OK) fail_msg("%s", err.text);
+    usb_device_attach(rig->head.device, rate, rig_complete, &n_done);
+}
+
+static int control(struct rig *rig, unsigned type, unsigned request, unsigned value, unsigned index, unsigned length)
+{
+    struct usb_ctrlrequest setup = {.bRequestType = (uint8_t)type, .bRequest = (uint8_t)request};
+    le_put16(&setup.wValue, (uint16_t)value);
+    le_put16(&setup.wIndex, (uint16_t)index);
+    le_put16(&setup.wLength, (uint16_t)length);
+    return usb_device_control(rig->head.device, &setup, rig->in, length);
+}
+
+static void configure(struct rig *rig)
+{
+    assert_int_equal(control(rig, 0, USB_REQ_SET_ADDRESS, 5, 0, 0), 0);
+    assert_int_equal(control(rig, 0, USB_REQ_SET_CONFIGURATION, 1, 0, 0), 0);
+}
+
+static void expect_bytes(struct rig *rig, unsigned value, const uint8_t *bytes, size_t n)
+{
+    assert_int_equal(control(rig, 0x80, USB_REQ_GET_DESCRIPTOR, value, 0, sizeof rig->in), (int)n);
+    for (size_t i = 0; i < n; i++)
+        if (rig->in[i] != bytes[i])
+            fail_msg("descriptor %04x: byte %zu is %02x, not %02x", value, i, rig->in[i], bytes[i]);
+}
+
+static void test_descriptors(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < sizeof shapes / sizeof shapes[0]; i++)
+        for (int high = 0; high < 2; high++) {
+            const struct shape *s = &shapes[i];
+            struct rig rig;
+            rig_open(&rig, s->look, s->serial, high ? USB_RATE_HIGH : USB_RATE_FULL);
+            expect_bytes(&rig, 0x0100, s->device, 18);
+            expect_bytes(&rig, 0x0200, high ? s->high : s->full, s->config_len);
+            /* a BOS only where the native look has something to say in it */
+            const int bos = control(&rig, 0x80, USB_REQ_GET_DESCRIPTOR, 0x0f00, 0, 255);
+            assert_true((bos == USB_STALL) == (s->look != USB_LOOK_NATIVE));
+            usb_device_free(rig.head.device);
+        }
+}
+
+static void expect_text(struct rig *rig, unsigned index, const char *text)
+{
+    const int n = control(rig, 0x80, USB_REQ_GET_DESCRIPTOR, 0x0300 | index, LANG, 255);
+    if (text == NULL) {
+        assert_int_equal(n, USB_STALL);
+        return;
+    }
+    assert_int_equal(n, 2 + 2 * (int)strlen(text));
+    for (int k = 0; text[k] != '\0'; k++)
+        assert_int_equal(le_get16(rig->in + 2 + 2 * k), text[k]);
+}
+
+static void test_strings(void **state)
+{
+    (void)state;
+    static const struct {
+        enum usb_look_id look;
+        const char *serial, *string[4];
+    } cases[] = {
+        {USB_LOOK_HOKUYO, "", {"Hokuyo Data Flex for USB", "URG-Series USB Driver", NULL, NULL}},
+        {USB_LOOK_HOKUYO, "H0807111", {"Hokuyo Data Flex for USB", "URG-Series USB Driver", "H0807111", NULL}},
+        {USB_LOOK_SICK, "15340291", {"Default Configuration", "TIM3xx", "15340291", NULL}},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct rig rig;
+        rig_open(&rig, cases[i].look, cases[i].serial, USB_RATE_HIGH);
+        for (unsigned k = 0; k < 4; k++)
+            expect_text(&rig, k + 1, cases[i].string[k]);
+        control(&rig, 0x80, USB_REQ_GET_DESCRIPTOR, 0x0100, 0, 18);
+        assert_int_equal(rig.in[16], cases[i].string[2] != NULL ? 3 : 0);
+        usb_device_free(rig.head.device);
+    }
+}
+
+/* Configured, the status of a device says that it is self-powered: USB 2.0, figure 9-4, bit 0. */
+static void test_status(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < sizeof shapes / sizeof shapes[0]; i++) {
+        struct rig rig;
+        rig_open(&rig, shapes[i].look, "", USB_RATE_HIGH);
+        configure(&rig);
+        assert_int_equal(control(&rig, 0x80, USB_REQ_GET_STATUS, 0, 0, 2), 2);
+        assert_int_equal(rig.in[0], 1);
+        usb_device_free(rig.head.device);
+    }
+}
+
+/* An OUT transfer of the host; the transfer stays the test's. */
+static void send(struct rig *rig, struct usb_transfer *transfer, uint8_t endpoint, const char *text)
+{
+    static uint8_t bytes[256];
+    memcpy(bytes, text, strlen(text));
+    *transfer = (struct usb_transfer){.id = 1, .endpoint = endpoint, .length = (uint32_t)strlen(text), .data = bytes};
+    usb_device_submit(rig->head.device, transfer);
+    scanhead_usb_update(&rig->head);
+}
+
+/* The port of the URG: opened by DTR, or by data where a host leaves DTR alone; closed by DTR. */
+static void test_port(void **state)
+{
+    (void)state;
+    struct rig rig;
+    struct usb_transfer out;
+    char text[8];
+    rig_open(&rig, USB_LOOK_HOKUYO, "", USB_RATE_FULL);
+    configure(&rig);
+    assert_int_equal(rig.head.look->n_sessions, 1);
+    assert_int_equal(control(&rig, 0x21, 0x22, 1, 0, 0), 0);
+    assert_true(rig.head.session[0].open);
+    assert_int_equal(control(&rig, 0x21, 0x22, 0, 0, 0), 0);
+    assert_false(rig.head.session[0].open);
+    send(&rig, &out, CONSOLE_OUT, "VV\n");
+    assert_true(rig.head.session[0].open);
+    assert_int_equal(usb_device_read(rig.head.device, CONSOLE_OUT, text, sizeof text), 3);
+    assert_memory_equal(text, "VV\n", 3);
+    assert_int_equal(control(&rig, 0, USB_REQ_SET_CONFIGURATION, 0, 0, 0), 0);
+    assert_false(rig.head.session[0].open);
+    assert_non_null(scanhead_usb_cut(&rig.head));
+    usb_device_free(rig.head.device);
+}
+
+/* Any bit rate, 8N1: set as drivers do (PSTN 1.20, table 17), and read back. */
+static void test_line_coding(void **state)
+{
+    (void)state;
+    static const uint32_t rates[] = {1, 19200, 57600, 115200, 250000, 500000, 750000, 12345678, UINT32_MAX};
+    struct rig rig;
+    rig_open(&rig, USB_LOOK_HOKUYO, "", USB_RATE_FULL);
+    configure(&rig);
+    for (size_t i = 0; i < sizeof rates / sizeof rates[0]; i++) {
+        const uint8_t coding[7] = {
+            (uint8_t)rates[i], (uint8_t)(rates[i] >> 8), (uint8_t)(rates[i] >> 16), (uint8_t)(rates[i] >> 24), 0, 0, 8};
+        memcpy(rig.in, coding, 7);
+        assert_int_equal(control(&rig, 0x21, 0x20, 0, 0, 7), 0);
+        memset(rig.in, 0, 7);
+        assert_int_equal(control(&rig, 0xa1, 0x21, 0, 0, 7), 7);
+        assert_memory_equal(rig.in, coding, 7);
+    }
+    usb_device_free(rig.head.device);
+}
+
+/* Requests of other looks are refused: a stream request has no place on a TiM, nor a port's. */
+static void test_foreign_requests(void **state)
+{
+    (void)state;
+    struct rig rig;
+    rig_open(&rig, USB_LOOK_SICK, "", USB_RATE_HIGH);
+    configure(&rig);
+    assert_int_equal(control(&rig, 0x41, SCANHEAD_USB_STREAM, 1, 0, 0), USB_STALL);
+    assert_int_equal(control(&rig, 0x21, 0x22, 1, 0, 0), USB_STALL);
+    assert_int_equal(control(&rig, 0xc0, 0x20, 0, 7, 255), USB_STALL); /* Microsoft OS descriptors */
+    assert_false(rig.head.session[0].open);
+    usb_device_free(rig.head.device);
+    rig_open(&rig, USB_LOOK_HOKUYO, "", USB_RATE_HIGH);
+    configure(&rig);
+    assert_int_equal(control(&rig, 0x41, SCANHEAD_USB_STREAM, 1, 0, 0), USB_STALL);
+    assert_int_equal(control(&rig, 0xc0, 0x20, 0, 7, 255), USB_STALL);
+    usb_device_free(rig.head.device);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_descriptors), cmocka_unit_test(test_strings),     cmocka_unit_test(test_status),
+        cmocka_unit_test(test_port),        cmocka_unit_test(test_line_coding), cmocka_unit_test(test_foreign_requests),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

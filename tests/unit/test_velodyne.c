@@ -1,0 +1,229 @@
+/* VLP-16 data packets against their published layout: what a client computes is what the head measured. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "core/rng.h"
+#include "tests/unit/velodyne_head.h"
+
+static struct protocol_rig rig;
+
+/* 0..1, of a fixed seed. */
+static double uniform(uint64_t stream, uint64_t i)
+{
+    return (double)(rng_mix(rng_mix(stream) + i) >> 11) * 0x1p-53;
+}
+
+static int setup(void **state)
+{
+    (void)state;
+    protocol_rig_open(&rig, PROTOCOL_VELODYNE, "Velodyne", "VLP-16");
+    protocol_rig_beams(&rig, 10);
+    rig.emitter.echoes = NATIVE_ECHOES_STRONGEST;
+    return 0;
+}
+
+static int teardown(void **state)
+{
+    (void)state;
+    protocol_rig_close(&rig);
+    return 0;
+}
+
+static const uint8_t *packet(uint32_t i)
+{
+    assert_true(i < rig.n_units);
+    assert_int_equal(rig.end[i], 1206 * (i + 1));
+    return rig.bytes + (size_t)1206 * i;
+}
+
+static uint32_t u16(const uint8_t *p)
+{
+    return (uint32_t)(p[0] | p[1] << 8);
+}
+
+static uint32_t u32(const uint8_t *p)
+{
+    return u16(p) | u16(p + 2) << 16;
+}
+
+/* Every byte of a packet whose ranges and reflectances are all different. */
+static void test_bytes_of_a_packet(void **state)
+{
+    (void)state;
+    struct protocol_rig_shot shot[384];
+    for (int i = 0; i < 384; i++) {
+        shot[i] =
+            (struct protocol_rig_shot){.n = 1, .range_m = {1.0 + 0.002 * i}, .refl_cdb = {(int16_t)(-1000 + 2 * i)}};
+        if (i % 7 == 3) shot[i].n = 0;
+    }
+    rig.utc0_ns = INT64_C(1700000000000000000); /* 800 s into an hour */
+    rig.scan_t0_ns = 5000000999;
+    protocol_rig_describe(&rig, 0);
+    velodyne_head_fire(&rig, 0, 384, shot, 600.0, 0.25);
+    assert_int_equal(rig.n_units, 1);
+    const uint8_t *p = packet(0);
+    for (int block = 0; block < 12; block++, p += 100) {
+        assert_int_equal(p[0], 0xff);
+        assert_int_equal(p[1], 0xee);
+        /* 10 turns a second: 360 * 10 * 110.592e-6 degrees a block */
+        assert_int_equal(u16(p + 2), (int)lround(9000.0 + block * 36000.0 * 10.0 * 110.592e-6));
+        for (int k = 0; k < 32; k++) {
+            const int i = 32 * block + k;
+            const double percent = 100.0 * pow(10.0, (-1000 + 2 * i) / 1000.0);
+            assert_int_equal(u16(p + 4 + 3 * k), i % 7 == 3 ? 0 : 500 + i);
+            assert_int_equal(p[4 + 3 * k + 2], i % 7 == 3 ? 0 : (int)lround(percent));
+        }
+    }
+    assert_int_equal(u32(p), 805000000);
+    assert_int_equal(p[4], 0x37);
+    assert_int_equal(p[5], 0x22);
+    assert_int_equal(rig.count[PROTOCOL_UNITS_LOST] + rig.count[PROTOCOL_POINTS_LOST], 0);
+}
+
+/* A client, from the published layout alone: all blocks of all packets in a row; an entry's azimuth lies between its
+ * block's and the next one's by its time. Up to the block before the last. */
+struct seen {
+    double range_m, elevation_deg, azimuth_deg;
+    int reflectivity;
+};
+static uint32_t parse(struct seen *seen)
+{
+    static const int elevation_deg[16] = {-15, 1, -13, 3, -11, 5, -9, 7, -7, 9, -5, 11, -3, 13, -1, 15};
+    uint32_t n = 0;
+    for (uint32_t b = 0; b + 1 < 12 * rig.n_units; b++) {
+        const uint8_t *block = packet(b / 12) + 100 * (b % 12), *next = packet((b + 1) / 12) + 100 * ((b + 1) % 12);
+        assert_int_equal(u16(block), 0xeeff);
+        const double azimuth = u16(block + 2) * 0.01, turned = fmod(u16(next + 2) * 0.01 - azimuth + 360.0, 360.0);
+        assert_true(u16(block + 2) < 36000);
+        for (int j = 0; j < 32; j++) {
+            const double us = 55.296 * (j / 16) + 2.304 * (j % 16);
+            seen[n++] = (struct seen){.range_m = u16(block + 4 + 3 * j) * 0.002,
+                                      .elevation_deg = elevation_deg[j % 16],
+                                      .azimuth_deg = azimuth + turned * us / 110.592,
+                                      .reflectivity = block[6 + 3 * j]};
+        }
+    }
+    return n;
+}
+
+/* A turn and some more, in frames of all sizes, through 0 degrees: half a unit of range, half a hundredth of a degree. */
+static void test_client_gets_what_was_measured(void **state)
+{
+    (void)state;
+    enum { PULSES = 384 * 80 };
+    static struct protocol_rig_shot shot[PULSES];
+    static struct seen seen[PULSES];
+    uint64_t draw = 0;
+    for (uint32_t i = 0; i < PULSES; i++) {
+        double range_m = 0.4 + 100.0 * uniform(10, i);
+        shot[i] = (struct protocol_rig_shot){.n = uniform(11, i) < 0.9, .range_m = {range_m}};
+    }
+    protocol_rig_describe(&rig, 0);
+    for (uint32_t at = 0, n; at < PULSES; at += n) {
+        n = 1 + (uint32_t)(1500.0 * uniform(20, draw++));
+        if (n > PULSES - at) n = PULSES - at;
+        velodyne_head_fire(&rig, at, n, shot + at, 600.0, 0.123456);
+    }
+    assert_int_equal(rig.n_units, 80);
+    assert_int_equal(parse(seen), PULSES - 32);
+    for (uint32_t i = 0; i < PULSES - 32; i++) {
+        const double azimuth_deg = 360.0 * (0.123456 + velodyne_head_turns(i, 600.0));
+        if (shot[i].n == 0)
+            assert_true(seen[i].range_m == 0.0);
+        else
+            assert_true(fabs(seen[i].range_m - shot[i].range_m[0]) <= 0.001 + 1e-6); /* the rig's counts: 1e-6 m */
+        assert_true(fabs(remainder(seen[i].azimuth_deg - azimuth_deg, 360.0)) <= 0.005 + 1e-6);
+        assert_int_equal(seen[i].elevation_deg, velodyne_head_elevation_deg(i % 16));
+    }
+}
+
+/* The azimuth is rounded, and 360 degrees read 0. */
+static void test_azimuth_wraps(void **state)
+{
+    (void)state;
+    static const struct {
+        double turn;
+        uint32_t azimuth;
+    } cases[] = {{0.0, 0},         {35999.4 / 36000.0, 35999}, {35999.6 / 36000.0, 0},
+                 {0.4 / 36000, 0}, {0.6 / 36000, 1},           {1.0 + 17.0 / 36000.0, 17}};
+    struct protocol_rig_shot shot[384] = {{0}};
+    protocol_rig_describe(&rig, 0);
+    for (uint32_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        velodyne_head_fire(&rig, 384 * i, 384, shot, 600.0, cases[i].turn - velodyne_head_turns(384 * i, 600.0));
+        assert_int_equal(u16(packet(i) + 2), cases[i].azimuth);
+    }
+}
+
+/* t(block, entry) = 55.296 (2 block + entry div 16) + 2.304 (entry mod 16) us after the packet's time stamp, which counts
+ * from the top of the hour: exactly, over an hour and beyond its end. */
+static void test_times_over_an_hour(void **state)
+{
+    (void)state;
+    static const int64_t utc0_ns[] = {INT64_MIN, INT64_C(1767225600000000000), INT64_C(1767227345678901234)};
+    for (int u = 0; u < 3; u++) {
+        rig.utc0_ns = utc0_ns[u];
+        rig.scan_t0_ns = 123456789;
+        rig.descriptor.scan++;
+        protocol_rig_describe(&rig, 0);
+        protocol_rig_clear(&rig);
+        const int64_t start_ns = rig.scan_t0_ns + (utc0_ns[u] == INT64_MIN ? 0 : utc0_ns[u]);
+        uint32_t n = 0;
+        /* every 1801st packet of 65 minutes: all residues of a microsecond, which has 125 of them */
+        for (int64_t m = 0; m < INT64_C(3900000000000) / 1327104; m += 1801) {
+            velodyne_head_fire_alike(&rig, (uint64_t)m * 384, 384, 10.0);
+            const int64_t t_ns = start_ns + m * 1327104;
+            assert_int_equal(u32(packet(n++) + 1200), t_ns / 1000 % 3600000000);
+        }
+        assert_int_equal(rig.count[PROTOCOL_UNITS_LOST], 0);
+    }
+}
+
+/* The time stamp is that of the first firing also where a packet begins in the middle of a frame. */
+static void test_time_of_the_first_firing(void **state)
+{
+    (void)state;
+    protocol_rig_describe(&rig, 0);
+    for (uint32_t at = 0; at < 384 * 10; at += 48)
+        velodyne_head_fire_alike(&rig, at, 48, 10.0);
+    protocol_rig_clear(&rig);
+    velodyne_head_fire_alike(&rig, 3840, 4096, 10.0);
+    for (uint32_t i = 0; i < 10; i++)
+        assert_int_equal(u32(packet(i) + 1200), (uint32_t)((10 + i) * 1327104ull / 1000));
+}
+
+/* 753.5 packets in a second, 1507.04 in two of them; with both returns 1507.04 in one: what is full is sent. */
+static void test_packet_rate(void **state)
+{
+    (void)state;
+    for (int dual = 0; dual < 2; dual++) {
+        rig.emitter.echoes = dual ? NATIVE_ECHOES_ALL : NATIVE_ECHOES_LAST;
+        rig.descriptor.scan++;
+        protocol_rig_describe(&rig, 0);
+        protocol_rig_clear(&rig);
+        const uint32_t pulses = dual ? 289352 : 578704; /* fired before 1 s and 2 s: 16 in 55.296 us */
+        for (uint32_t at = 0, n; at < pulses; at += n) {
+            n = pulses - at < 290 ? pulses - at : 290;
+            velodyne_head_fire_alike(&rig, at, n, 10.0);
+        }
+        assert_int_equal(rig.n_units, 1507);
+        assert_int_equal(u32(packet(1506) + 1200), dual ? 1506 * 663552 / 1000 : 1506 * 1327104ull / 1000);
+    }
+}
+
+static const struct CMUnitTest tests[] = {
+    cmocka_unit_test_setup_teardown(test_bytes_of_a_packet, setup, teardown),
+    cmocka_unit_test_setup_teardown(test_client_gets_what_was_measured, setup, teardown),
+    cmocka_unit_test_setup_teardown(test_azimuth_wraps, setup, teardown),
+    cmocka_unit_test_setup_teardown(test_times_over_an_hour, setup, teardown),
+    cmocka_unit_test_setup_teardown(test_time_of_the_first_firing, setup, teardown),
+    cmocka_unit_test_setup_teardown(test_packet_rate, setup, teardown),
+};
+
+int main(void)
+{
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

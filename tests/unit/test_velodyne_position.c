@@ -1,0 +1,212 @@
+/* VLP-16 position packets: their fields, their rate, the receiver's sentence. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "tests/common/protocol_rig.h"
+
+static struct protocol_rig rig;
+static int64_t asked_ns;
+static int n_asked;
+
+static int setup(void **state)
+{
+    (void)state;
+    protocol_rig_open(&rig, PROTOCOL_VELODYNE_POSITION, "Velodyne", "VLP-16");
+    rig.fix = (struct nmea_fix){.talker = "GN",
+                                .year = 2026,
+                                .month = 1,
+                                .day = 2,
+                                .hour = 3,
+                                .minute = 4,
+                                .second = 5,
+                                .lat_deg = 48.1,
+                                .lon_deg = -11.5,
+                                .quality = 4,
+                                .satellites = 12,
+                                .hdop = 0.9,
+                                .speed_m_s = 1.0,
+                                .course_deg = 90.0};
+    n_asked = 0;
+    return 0;
+}
+
+static int teardown(void **state)
+{
+    (void)state;
+    protocol_rig_close(&rig);
+    return 0;
+}
+
+static uint32_t u32(const uint8_t *p)
+{
+    return (uint32_t)(p[0] | p[1] << 8 | p[2] << 16) | (uint32_t)p[3] << 24;
+}
+
+static const uint8_t *packet(uint32_t i)
+{
+    assert_true(i < rig.n_units);
+    assert_int_equal(rig.end[i], 512 * (i + 1));
+    return rig.bytes + (size_t)512 * i;
+}
+
+/* Another session, opened at a device time, of a receiver with so many fixes a second. */
+static int note_time(void *ctx, int64_t t_ns, struct nmea_fix *fix)
+{
+    const struct protocol_rig *r = ctx;
+    asked_ns = t_ns;
+    n_asked++;
+    *fix = r->fix;
+    return 1;
+}
+
+static void open_again(int64_t t_ns, uint32_t fixes_hz)
+{
+    struct sh_err err;
+    rig.ops->destroy(rig.protocol);
+    rig.spec.fixes_hz = fixes_hz;
+    rig.spec.host.fix = note_time;
+    assert_int_equal(rig.ops->create(&rig.spec, &rig.protocol, &err), 0);
+    rig.ops->open(rig.protocol, t_ns);
+}
+
+/* The fields that VELODYNE.md names, by their offsets; all else is 0. */
+static void test_fields(void **state)
+{
+    (void)state;
+    static const char rmc[] = "$GPRMC,030405.00,A,4806.0000000,N,01130.0000000,W,1.944,90.00,020126,,,R*";
+    uint8_t want[512] = {0};
+    rig.utc0_ns = INT64_C(1767323040000000000); /* 2026-01-02 03:04:00 */
+    rig.ops->time(rig.protocol, 1);             /* the packet of device time 0 */
+    rig.ops->time(rig.protocol, 10000000000);
+    const uint32_t last = rig.n_units - 1;
+    const int64_t t_ns = last == 0 ? 0 : INT64_C(18579456) * (10000000000 / 18579456);
+    assert_true(rig.n_units > 60);
+    const uint8_t *p = packet(last);
+    want[0xbb] = 42;
+    want[0xbc] = 39;
+    want[0xbd] = 40;
+    want[0xbe] = 2;
+    want[0xc0] = 9;
+    want[0xc4] = 1;
+    const uint32_t us = (uint32_t)((4 * 60000000000 + t_ns) / 1000);
+    memcpy(want + 0xc6, (uint8_t[]){(uint8_t)us, (uint8_t)(us >> 8), (uint8_t)(us >> 16), (uint8_t)(us >> 24)}, 4);
+    want[0xca] = 2;
+    want[0xcd] = 25;
+    memcpy(want + 0xce, p + 0xce, 128); /* below */
+    assert_memory_equal(p, want, 512);
+    const char *text = (const char *)p + 206;
+    assert_memory_equal(text, rmc, sizeof rmc - 1);
+    uint8_t sum = 0;
+    for (const char *c = text + 1; *c != '*'; c++)
+        sum ^= (uint8_t)*c;
+    static const char hex[] = "0123456789ABCDEF";
+    const char end[] = {hex[sum >> 4], hex[sum & 15], '\r', '\n', 0};
+    assert_string_equal(text + sizeof rmc - 1, end);
+}
+
+/* One for 14 data packets of a single return: 18.579456 ms, from device time 0 on, whenever the session was opened. */
+static void test_rate(void **state)
+{
+    (void)state;
+    for (int64_t tick = 1; tick <= 2000; tick++)
+        rig.ops->time(rig.protocol, tick * 1000000);
+    assert_int_equal(rig.n_units, 108); /* 2 s / 18.579456 ms = 107.6, and the one of 0 */
+    for (uint32_t i = 0; i < rig.n_units; i++)
+        assert_int_equal(u32(packet(i) + 198), i * 18579456ull / 1000);
+    protocol_rig_clear(&rig);
+    open_again(1000000000, 1);
+    rig.ops->time(rig.protocol, 1003303624); /* 54 x 18.579456 ms = 1.003290624 s is the next */
+    assert_int_equal(rig.n_units, 1);
+    assert_int_equal(u32(packet(0) + 198), 1003290);
+}
+
+/* Without UTC: since power-up, PPS absent, no sentence. It wraps with the hour. */
+static void test_without_utc(void **state)
+{
+    (void)state;
+    const int64_t hour_ns = INT64_C(3600000000000), first_ns = (hour_ns / 18579456 + 1) * 18579456;
+    open_again(hour_ns, 1);
+    rig.ops->time(rig.protocol, first_ns + 1);
+    assert_int_equal(rig.n_units, 1);
+    assert_int_equal(u32(packet(0) + 198), (first_ns - hour_ns) / 1000);
+    assert_int_equal(packet(0)[202], 0);
+    for (int i = 206; i < 512; i++)
+        assert_int_equal(packet(0)[i], 0);
+    assert_int_equal(n_asked, 0);
+}
+
+/* UTC is known, but the receiver gives no position: locked, without a sentence. */
+static void test_without_fix(void **state)
+{
+    (void)state;
+    rig.utc0_ns = 0;
+    rig.fix.quality = 0;
+    rig.ops->time(rig.protocol, 1);
+    assert_int_equal(packet(0)[202], 2);
+    assert_int_equal(packet(0)[206], 0);
+}
+
+/* The sentence is the receiver's last one: of the full second of UTC, or its tenth. */
+static void test_fix_of_the_last_period(void **state)
+{
+    (void)state;
+    static const struct {
+        uint32_t fixes_hz;
+        int64_t fix_ns; /* of the packet at 204 x 18.579456 ms = 3.790209024 s, UTC + 0.3 s */
+    } cases[] = {{1, 3700000000}, {10, 3700000000}, {100, 3790000000}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        rig.utc0_ns = INT64_C(1700000000300000000);
+        protocol_rig_clear(&rig);
+        open_again(3790209024, cases[i].fixes_hz);
+        rig.ops->time(rig.protocol, 3790209025);
+        assert_int_equal(rig.n_units, 1);
+        assert_int_equal(asked_ns, cases[i].fix_ns);
+    }
+}
+
+/* The longest sentence that there is stays within the 128 bytes that clients read. */
+static void test_longest_sentence(void **state)
+{
+    (void)state;
+    rig.utc0_ns = 0;
+    rig.fix.lat_deg = -89.99999999;
+    rig.fix.lon_deg = -179.99999999;
+    rig.fix.speed_m_s = 9999.0;
+    rig.fix.course_deg = 359.999;
+    rig.ops->time(rig.protocol, 1);
+    const char *text = (const char *)packet(0) + 206;
+    assert_true(strlen(text) < 128);
+    assert_string_equal(text + strlen(text) - 2, "\r\n");
+}
+
+/* Time that passed without a call: at most 64 packets at once, the newest; the others are counted. */
+static void test_after_a_long_silence(void **state)
+{
+    (void)state;
+    const int64_t t_ns = INT64_C(1000) * 18579456;
+    rig.ops->time(rig.protocol, t_ns); /* due: 0 .. 999 */
+    assert_int_equal(rig.n_units, 64);
+    assert_int_equal(rig.count[PROTOCOL_UNITS_LOST], 1000 - 64);
+    assert_int_equal(u32(packet(63) + 198), 999 * 18579456ull / 1000);
+    rig.ops->time(rig.protocol, t_ns + 1);
+    assert_int_equal(rig.n_units, 65);
+}
+
+#define TEST(name) cmocka_unit_test_setup_teardown(name, setup, teardown)
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        TEST(test_fields),
+        TEST(test_rate),
+        TEST(test_without_utc),
+        TEST(test_without_fix),
+        TEST(test_fix_of_the_last_period),
+        TEST(test_longest_sentence),
+        TEST(test_after_a_long_silence),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,24 @@
+/* Firings of a VLP-16 for a protocol under test: pulse k of the scan is beam k mod 16 of sequence k div 16, at the times
+ * of the data sheet, at the azimuth that the turn has then. */
+#ifndef TESTS_UNIT_VELODYNE_HEAD_H
+#define TESTS_UNIT_VELODYNE_HEAD_H
+
+#include "tests/common/protocol_rig.h"
+
+enum { SEQUENCE_NS = 55296, FIRING_NS = 2304 };
+
+/* Since the scan's start, of pulse k: 55.296 us a sequence, 2.304 us a firing. */
+int64_t velodyne_head_ns(uint64_t pulse);
+/* Turns of the head at pulse k. rpm: 600. */
+double velodyne_head_turns(uint64_t pulse, double rpm);
+/* Elevation of a beam, degrees. */
+int velodyne_head_elevation_deg(uint32_t beam);
+
+/* One points frame of n pulses from pulse0 on, n <= 4096. turn0: where pulse 0 of the scan looked. */
+void velodyne_head_fire(struct protocol_rig *rig, uint64_t pulse0, uint32_t n, const struct protocol_rig_shot *shot,
+                        double rpm, double turn0);
+/* The same with one range for all. */
+void velodyne_head_fire_alike(struct protocol_rig *rig, uint64_t pulse0, uint32_t n, double range_m);
+void velodyne_head_event(struct protocol_rig *rig, uint32_t code);
+
+#endif
