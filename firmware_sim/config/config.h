@@ -293,7 +293,7 @@ int config_load_all(const char *path, const char *const *sets, int n_sets, struc
 /* What a profile says about the signal; the rest of it (sharp, extinction, seed) is 0. */
 void config_signal_spec(const struct config_profile *profile, struct detect_signal_spec *spec);
 
-/* The schedule of a head with some settings. */
+/* The schedule of a head with some settings; of a list of directions without the list (site_fill_spec). */
 void config_fill_spec(const struct config_profile *profile, const struct head_settings *settings,
                       struct schedule_spec *spec);
 
