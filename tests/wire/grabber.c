@@ -14,10 +14,10 @@ void grabber_start(struct wire *wire, const char *name, const char *sensor, stru
     char text[2048], file[64], path[352];
     *grabber = (struct grabber){.wire = wire};
     snprintf(grabber->name, sizeof grabber->name, "%s", name);
-    /* Sensors are asked 2,000 times a second, as one call reads one packet; what has come is saved every 10 ms. */
+    /* Sensors are asked 10,000 times a second, as one call reads one packet; what has come is saved every 10 ms. */
     snprintf(text, sizeof text,
              "[global]\nrawlog_prefix = %s/%s\ntime_between_launches = 10\nuse_sensoryframes = false\n"
-             "GRABBER_PERIOD_MS = 10\n\n[%s]\nsensorLabel = %s\nprocess_rate = 2000\nmax_queue_len = 10000\n"
+             "GRABBER_PERIOD_MS = 10\n\n[%s]\nsensorLabel = %s\nprocess_rate = 10000\nmax_queue_len = 10000\n"
              "pose_x = 0\npose_y = 0\npose_z = 0\npose_yaw = 0\npose_pitch = 0\npose_roll = 0\n%s",
              wire->dir, name, name, name, sensor);
     snprintf(file, sizeof file, "%s.ini", name);
