@@ -15,7 +15,7 @@ static int load_changed(const char *name, const char *old, const char *with)
     if (at == NULL) fail_msg("%s has no %s", name, old);
     snprintf(changed, sizeof changed, "%.*s%s%s", (int)(at - text), text, with, at + strlen(old));
     write_in("heads/mine.yaml", changed);
-    return load_edited("riegl-vz400i\n" PRR LINES, "mine\n");
+    return load_edited("any-rate\n" PRR LINES, "mine\n");
 }
 
 /* The same with further keys of the head's settings. */
@@ -23,7 +23,7 @@ static int load_settings(const char *name, const char *settings)
 {
     char head[256];
     snprintf(head, sizeof head, "%s\n%s", name, settings);
-    return load_edited("riegl-vz400i\n" PRR LINES, head);
+    return load_edited("any-rate\n" PRR LINES, head);
 }
 
 static void rates_and_angles_follow(void **state)
