@@ -145,7 +145,7 @@ static void planar_heads(void **state)
 {
     struct model utm = {"hokuyo-utm-30lx", 57600, 40, 20, shot_utm, PLANAR(1440, 0, 1080, 540), 20 * 1081, 0};
     struct model ust = utm;
-    struct model urg = {"hokuyo-urg-04lx", 10240, 10, 5, shot_urg, PLANAR(1024, 44, 725, 384), 5 * 682, 5.6};
+    struct model urg = {"hokuyo-urg-04lx", 10240, 10, 15, shot_urg, PLANAR(1024, 44, 725, 384), 15 * 682, 5.6};
     struct model tim = {"sick-tim571", 16200, 15, 10, shot_tim, PLANAR(1080, 0, 810, 405), 10 * 811, 0};
     ust.profile = "hokuyo-ust-20lx";
     /* A pulse lasts 1e9 / rate nanoseconds. */
