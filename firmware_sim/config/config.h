@@ -324,7 +324,7 @@ int64_t config_rate_below(const struct config_profile *profile, int64_t prr_uhz)
 void config_signal_spec(const struct config_profile *profile, const struct config_program *program,
                         struct detect_signal_spec *spec);
 
-/* The schedule of a head with some settings. */
+/* The schedule of a head with some settings; of a list of directions without the list (site_fill_spec). */
 void config_fill_spec(const struct config_profile *profile, const struct head_settings *settings,
                       struct schedule_spec *spec);
 

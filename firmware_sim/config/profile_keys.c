@@ -24,9 +24,6 @@ static const char *const widths[] = {[BEAM_AT_1_E2] = "1/e2",
                                             [BEAM_AT_HALF_MAXIMUM] = "FWHM",
                                             [BEAM_HALF_AT_1_E2] = "half angle 1/e2",
                                             NULL};
-static const char *const emitter_names[] = {
-    [EMITTER_LINE] = "line",     [EMITTER_PLANAR] = "planar",         [EMITTER_BEAMS] = "beams",
-    [EMITTER_SPHERE] = "sphere", [EMITTER_DIRECTIONS] = "directions", NULL};
 static const char *const turn_names[] = {
     [TURN_CLOCKWISE] = "clockwise", [TURN_COUNTER_CLOCKWISE] = "counter-clockwise", NULL};
 
@@ -69,6 +66,10 @@ static const struct cfg_key profile_keys[] = {
     {"beams[].from", BEAM(from), CFG_ENUM, .names = cfg_from_names, .help = "Where the figures are from."},
     {"step_deg", IN_PROFILE(arrangement.step_udeg), CFG_MICRO, "deg", OWNED, 0.01, 90, FIGURE,
      .help = "sphere: from pulse to pulse and from ring to ring. Rounded to whole steps of a turn and of half a turn."},
+
+    {EMITTER(directions), CFG_PATH, .def = OWNED,
+     .help = "directions: a text file with a direction a row: x y z in the head's frame, or azimuth and elevation in "
+             "degrees; # begins a comment."},
 
     {"prr_min_hz", IN_PROFILE(prr_min_uhz), CFG_MICRO, "Hz", OWNED, 1, 1e7, FIGURE, .help = "Lowest pulse rate."},
     {"prr_max_hz", IN_PROFILE(prr_max_uhz), CFG_MICRO, "Hz", OWNED, 1, 1e7, FIGURE, .help = "Highest pulse rate."},

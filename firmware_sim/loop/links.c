@@ -43,6 +43,7 @@ static void identify(struct links *links, const struct config *cfg)
     snprintf(id->maker, sizeof id->maker, "%s", cfg->profile.maker);
     snprintf(id->model, sizeof id->model, "%s", cfg->profile.model);
     snprintf(id->profile, sizeof id->profile, "%s", cfg->profile.name);
+    snprintf(id->firmware, sizeof id->firmware, "%s", cfg->profile.firmware);
     snprintf(id->serial, sizeof id->serial, "%s", cfg->head.serial);
     snprintf(id->name, sizeof id->name, "%s", cfg->head.name);
     links->fixes_hz = cfg->gnss.rate_hz;

@@ -46,7 +46,7 @@ static void doubt_lines(const struct site *site, const struct sh_report *report)
     struct schedule_segment segment;
     struct schedule_line line;
     unsigned n = 0, empty = 0;
-    config_fill_spec(&site->cfg->profile, s, &spec);
+    site_fill_spec(site, s, &spec);
     schedule_start(&segment, &spec);
     for (; n < MAX_LINES; n++) {
         schedule_get_line(&segment, n, &line);
@@ -149,6 +149,29 @@ static int doubt_floor(const struct site *site, uint32_t i, struct bvh_work *wor
     return SH_OK;
 }
 
+/* Pulses evenly over the first frame. */
+static void fill_frame(const struct site *site, const struct site_station *s, struct look *look)
+{
+    struct head_settings settings = site->cfg->head.settings;
+    struct schedule_spec spec;
+    struct schedule_segment segment;
+    struct schedule_line line;
+    settings.frames = 1;
+    site_fill_spec(site, &settings, &spec);
+    schedule_start(&segment, &spec);
+    for (int i = 0; i < LOOKS; i++) {
+        uint64_t k = segment.end_pulse * (2 * (uint64_t)i + 1) / (2 * LOOKS);
+        schedule_get_line(&segment, schedule_line_of(&segment, k), &line);
+        if (line.cast0 < line.cast_end)
+            k = line.cast0 + (k - line.pulse0) * (line.cast_end - line.cast0) / (line.pulse_end - line.pulse0);
+        const double pan = angle_rad(360.0 * schedule_pan_turn(&segment, k));
+        const double mirror = angle_rad(360.0 * schedule_mirror_turn(&segment, k));
+        double dir[3];
+        mat3_apply(s->at.rotation, (const double[3]){sin(pan) * cos(mirror), cos(pan) * cos(mirror), sin(mirror)}, dir);
+        VEC3_SET(*look, i, dir);
+    }
+}
+
 /* Directions evenly over the window of a scan, as its pulses are. */
 static void fill_window(const struct site *site, const struct site_station *s, struct look *look)
 {
@@ -171,7 +194,10 @@ static void doubt_view(const struct site *site, uint32_t i, struct bvh_work *wor
     const struct site_station *s = &site->station[i];
     const double *p = s->at.position_m;
     int seen = 0, near = 0, far = 0;
-    fill_window(site, s, look);
+    if (site->emitter.kind == EMITTER_LINE)
+        fill_window(site, s, look);
+    else
+        fill_frame(site, s, look);
     cast(s, work, look, LOOKS);
     for (int k = 0; k < LOOKS; k++) {
         near += look->range_m[k] < program->range_min_m;

@@ -9,6 +9,12 @@
 #include "core/rng.h"
 #include "core/vec3.h"
 
+void site_fill_spec(const struct site *site, const struct head_settings *settings, struct schedule_spec *spec)
+{
+    config_fill_spec(&site->cfg->profile, settings, spec);
+    if (spec->emitter != NULL) spec->emitter = &site->emitter;
+}
+
 uint32_t site_points_per_pulse(const struct site *site)
 {
     const struct plan_methods *methods = &site->plan.methods;

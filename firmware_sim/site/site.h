@@ -69,6 +69,8 @@ struct site_stretch {
 
 struct site {
     const struct config *cfg;
+    struct emitter emitter; /* the profile's, with its list of directions */
+    struct emitter_firing *direction;
     struct scene *scene; /* what stands still */
     struct placement_anchor anchor;
     struct site_mover mover[CAST_MAX_MOVERS];
@@ -111,6 +113,9 @@ void site_free(struct site *site);
  * anchor or of the first station, unless output.utm_zone or the scene's own grid says it; else by position.
  * The hemisphere of the false northing is that in which the first station is given, if it is given in UTM. */
 void site_grid(const struct site *site, int *zone, int *side);
+
+/* The schedule of its head with some settings. */
+void site_fill_spec(const struct site *site, const struct head_settings *settings, struct schedule_spec *spec);
 
 /* Entries that a pulse may need in a block: its echoes, as far as the plan allows for more than one. */
 uint32_t site_points_per_pulse(const struct site *site);
