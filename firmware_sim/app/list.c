@@ -37,6 +37,10 @@ static int run(int argc, char **argv)
     if (status != APP_GO_ON) return status;
     if (config_list_profiles(NULL, stdout, &err) < 0) return app_fail(&err);
     puts("links: pty (virtual serial port), tcp, udp, usb (usbip, usbredir, functionfs), file, null");
+    printf("protocols:");
+    for (int id = 0; id < PROTOCOL_N; id++)
+        printf("%s %s", id > 0 ? "," : "", protocol_ops_get((enum protocol_id)id)->name);
+    puts("");
     list_usb();
     return APP_OK;
 }
