@@ -5,6 +5,7 @@
 extern const struct protocol_ops protocol_native;
 extern const struct protocol_ops protocol_nmea;
 extern const struct protocol_ops protocol_scip;
+extern const struct protocol_ops protocol_cola;
 extern const struct protocol_ops protocol_velodyne;
 extern const struct protocol_ops protocol_velodyne_position;
 extern const struct protocol_ops protocol_velodyne_http;
@@ -13,6 +14,7 @@ static const struct protocol_ops *const protocols[PROTOCOL_N] = {
     [PROTOCOL_NATIVE] = &protocol_native,
     [PROTOCOL_NMEA] = &protocol_nmea,
     [PROTOCOL_SCIP] = &protocol_scip,
+    [PROTOCOL_COLA] = &protocol_cola,
     [PROTOCOL_VELODYNE] = &protocol_velodyne,
     [PROTOCOL_VELODYNE_POSITION] = &protocol_velodyne_position,
     [PROTOCOL_VELODYNE_HTTP] = &protocol_velodyne_http,
