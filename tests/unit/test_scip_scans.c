@@ -275,6 +275,21 @@ static void skipped_scans(void **state)
     check_turns("MD0000108000999", "9:98 ");
 }
 
+/* A turn that is left out may as well be broken. */
+static void skipped_and_broken(void **state)
+{
+    (void)state;
+    scip_open("UTM-30LX");
+    scip_ask("MD0000108000100\n", "MD0000108000100\n00P\n\n");
+    scip_part(0, 0, 500);
+    scip_line_end(0, 0);
+    scip_line_time(0);
+    scip_turn(1);
+    scip_decode_only(&got, 3, 0);
+    assert_int_equal(got.time_ms, 25);
+    scip_close();
+}
+
 /* A scan goes out once its last step has come, before the turn is over. */
 static void sent_after_the_last_step(void **state)
 {
@@ -459,6 +474,32 @@ static void turns_that_are_not_lost(void **state)
     scip_close();
 }
 
+/* Parts of two turns never make one: of two scans, each with a turn of that number, or the same part sent over again. */
+static void turns_are_not_mixed(void **state)
+{
+    (void)state;
+    scip_open("UTM-30LX");
+    scip_turn(0);
+    scip_ask("MD0000108000000\n", "MD0000108000000\n00P\n\n");
+    scip_turn(1);
+    protocol_rig_clear(&rig);
+    scip_part(2, 0, 600);
+    rig.ops->gap(rig.protocol, 1000); /* the rest of this scan, and the begin of the next one */
+    rig.scan_t0_ns = 10000000000;
+    scip_part(2, 601, 1080);
+    scip_line_end(2, 0);
+    scip_expect("");
+    scip_part(3, 0, 539);
+    scip_part(3, 0, 539);
+    scip_part(3, 0, 0);
+    scip_line_end(3, 0);
+    scip_expect("");
+    scip_turn(4);
+    scip_decode_only(&got, 3, 0);
+    assert_int_equal(got.time_ms, 10100);
+    scip_close();
+}
+
 /* 2^24 ms are 4 h 39 min 37.216 s. The stamp is that of step 0, also of a scan that begins later in the turn. */
 static void the_clock_wraps(void **state)
 {
@@ -556,6 +597,8 @@ int main(void)
         cmocka_unit_test(lost_attributes),
         cmocka_unit_test(the_clock_wraps),
         cmocka_unit_test(turns_that_are_not_lost),
+        cmocka_unit_test(turns_are_not_mixed),
+        cmocka_unit_test(skipped_and_broken),
         cmocka_unit_test(played_malfunctions),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
