@@ -18,11 +18,13 @@
 #ifndef CORE_EMITTER_H
 #define CORE_EMITTER_H
 
+#include <stddef.h>
 #include <stdint.h>
 
 #include "core/err.h"
 
 enum emitter_kind { EMITTER_LINE, EMITTER_PLANAR, EMITTER_BEAMS, EMITTER_SPHERE, EMITTER_DIRECTIONS };
+extern const char *const emitter_names[]; /* by kind; NULL at the end */
 enum { EMITTER_MAX_BEAMS = 128, EMITTER_MAX_STEPS = 1000000 };
 
 /* Firing time after the sequence's first; azimuth against that of the turning head at its firing time. */
@@ -43,6 +45,7 @@ struct emitter {
     uint32_t first_step, last_step, front_step; /* planar: cast, both included; looks along y */
     int turn;                                   /* +1: clockwise seen from above; -1: the other way */
     uint32_t rings;                             /* sphere */
+    int64_t asked_udeg;                         /* sphere: the step that was asked for */
     /* beams */
     uint32_t n_beams;
     uint64_t tick_num, tick_den; /* of a tick, nanoseconds */
@@ -64,6 +67,13 @@ int emitter_set_beams(struct emitter *emitter, const struct emitter_beam *beam, 
 void emitter_set_sphere(struct emitter *emitter, int64_t step_udeg);
 /* A list, which stays the owner's. */
 void emitter_set_directions(struct emitter *emitter, const struct emitter_firing *direction, uint32_t n);
+
+/* Reads such a list: a row each, "x y z" in the head's frame (of any length), or "azimuth elevation" in degrees,
+ * all rows alike; what follows a # is left out. *direction: [*n], the caller's to free. SH_EINPUT names file and
+ * line. */
+int emitter_read_directions(const char *path, struct emitter_firing **direction, uint32_t *n, struct sh_err *err);
+/* "planar, steps 0..1080 of 1440 a turn, ..."; empty for a line head. */
+void emitter_describe(const struct emitter *emitter, char *buf, size_t len);
 
 /* Pulses of a line where that is fixed, so that the pulse rate is that many times the line rate; else 0. */
 static inline uint32_t emitter_line_pulses(const struct emitter *emitter)

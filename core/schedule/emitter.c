@@ -1,8 +1,13 @@
 #include "core/emitter.h"
 
+#include <stdio.h>
 #include <string.h>
 
 static const int64_t TURN_UDEG = 360000000;
+
+const char *const emitter_names[] = {
+    [EMITTER_LINE] = "line",     [EMITTER_PLANAR] = "planar",         [EMITTER_BEAMS] = "beams",
+    [EMITTER_SPHERE] = "sphere", [EMITTER_DIRECTIONS] = "directions", NULL};
 
 static uint64_t gcd(uint64_t a, uint64_t b)
 {
@@ -68,6 +73,7 @@ void emitter_set_sphere(struct emitter *e, int64_t step_udeg)
     *e = (struct emitter){.kind = EMITTER_SPHERE,
                           .steps = (uint32_t)((TURN_UDEG + half) / step_udeg),
                           .rings = (uint32_t)((TURN_UDEG / 2 + half) / step_udeg) + 1,
+                          .asked_udeg = step_udeg,
                           .turn = 1};
     e->last_step = e->steps - 1;
 }
@@ -89,4 +95,38 @@ int64_t emitter_step_udeg(const struct emitter *e, int64_t step)
 {
     const int64_t turned = (step - e->front_step) * TURN_UDEG, half = e->steps / 2;
     return (turned + (turned < 0 ? -half : half)) / (int64_t)e->steps;
+}
+
+static void describe_sphere(const struct emitter *e, char *buf, size_t len)
+{
+    const int exact = TURN_UDEG % e->asked_udeg == 0 && TURN_UDEG / 2 % e->asked_udeg == 0;
+    int n = snprintf(buf, len, "sphere, %u rings %.6g deg apart, of %u steps of %.6g deg", e->rings,
+                     180.0 / (e->rings - 1), e->steps, 360.0 / e->steps);
+    if (!exact && n > 0 && (size_t)n < len)
+        snprintf(buf + n, len - (size_t)n, "; %.6g deg, as asked for, does not divide a turn",
+                 1e-6 * (double)e->asked_udeg);
+}
+
+void emitter_describe(const struct emitter *e, char *buf, size_t len)
+{
+    const char *way = e->turn > 0 ? "clockwise" : "counter-clockwise";
+    switch (e->kind) {
+    case EMITTER_LINE:
+        snprintf(buf, len, "%s", "");
+        break;
+    case EMITTER_PLANAR:
+        snprintf(buf, len, "planar, steps %u..%u of %u a turn, %u ahead, %s", e->first_step, e->last_step, e->steps,
+                 e->front_step, way);
+        break;
+    case EMITTER_BEAMS:
+        snprintf(buf, len, "beams, %u in a sequence of %.10g ns, turning %s", e->n_beams,
+                 (double)e->sequence_ticks * (double)e->tick_num / (double)e->tick_den, way);
+        break;
+    case EMITTER_SPHERE:
+        describe_sphere(e, buf, len);
+        break;
+    case EMITTER_DIRECTIONS:
+        snprintf(buf, len, "directions, a list of %u", e->steps);
+        break;
+    }
 }

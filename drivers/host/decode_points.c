@@ -106,8 +106,9 @@ static void points_polar(const struct scanhead *sh, const struct scanhead_frame 
 {
     const struct native_descriptor *d = &sh->descriptor;
     /* The mirror angle is given in the turn around the middle of the line, so that it runs through without a
-     * jump. */
-    const double lo = ((double)d->line_start_udeg + (double)d->line_stop_udeg) / 720e6 - 0.5;
+     * jump. Other heads' is an elevation. */
+    const double middle = ((double)d->line_start_udeg + (double)d->line_stop_udeg) / 720e6;
+    const double lo = (sh->emitter.kind == NATIVE_EMIT_LINE ? middle : 0) - 0.5;
     const double mirror_turns = 1 / d->mirror_counts_per_turn, pan_turns = 1 / d->pan_counts_per_turn;
     const double scale = d->range_scale_m;
     for (uint32_t i = first; i < first + n; i++, p++) {

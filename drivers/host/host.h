@@ -73,6 +73,8 @@ struct scanhead {
     /* what the stream has said, as of the frame handed out last */
     int have_descriptor, have_anchor, have_pulse;
     struct native_descriptor descriptor;
+    struct native_emitter emitter; /* kind NATIVE_EMIT_LINE: none came after the descriptor */
+    struct native_beam beam[NATIVE_MAX_BEAMS];
     struct native_anchor anchor;
     uint64_t last_pulse0;
     struct host_poses *poses; /* NULL: none came yet */

@@ -35,7 +35,7 @@ extern "C" {
 #endif
 
 /* Of this release, the only place that says it: program, library and libscanhead.pc have the same. */
-#define SCANHEAD_VERSION "1.0.0"
+#define SCANHEAD_VERSION     "1.0.0"
 #define SCANHEAD_API_VERSION 1
 
 /* SCANHEAD_VERSION of the library that the program runs with. */
@@ -112,6 +112,7 @@ enum scanhead_frame_type { /* as on the wire */
                            SCANHEAD_SURFACES = 7,
                            SCANHEAD_POSES = 8,
                            SCANHEAD_ATTRIBUTES = 9,
+                           SCANHEAD_EMITTER = 10,
 };
 enum scanhead_frame_flags { SCANHEAD_REPEAT = 1, SCANHEAD_LOCAL = 2 };
 
@@ -225,6 +226,35 @@ struct scanhead_info {
 };
 /* SCANHEAD_ESTATE before descriptor and anchor have come. */
 int scanhead_get_info(const struct scanhead *sh, struct scanhead_info *info);
+
+/* How the pulses of a head are arranged. */
+enum scanhead_emitter_kind {
+    SCANHEAD_EMIT_LINE = 0,       /* a mirror sweeps lines, the pan turns; nothing else is set */
+    SCANHEAD_EMIT_PLANAR = 1,     /* one plane, in steps; a line is a turn, from step 0 on */
+    SCANHEAD_EMIT_BEAMS = 2,      /* a firing sequence of beams turns about the vertical; a line is a turn */
+    SCANHEAD_EMIT_SPHERE = 3,     /* rings of one elevation each; a line is a ring, a frame all of them */
+    SCANHEAD_EMIT_DIRECTIONS = 4, /* a list; a line is the list once */
+};
+struct scanhead_beam {
+    double elevation_deg, azimuth_deg; /* azimuth: clockwise from where the head looks when it fires */
+    uint32_t offset_ns;                /* firing time after the sequence's first */
+};
+enum { SCANHEAD_MAX_BEAMS = 128 };
+struct scanhead_emitter {
+    int kind;                              /* enum scanhead_emitter_kind */
+    uint32_t steps;                        /* pulses of a line; beams: 0 */
+    int first_step, last_step, front_step; /* planar: cast, both included; looks along y */
+    int turn;                              /* +1: clockwise seen from above, -1: the other way */
+    uint32_t rings;                        /* sphere: elevations first_ring_deg + 180 deg i / (rings - 1) */
+    double first_ring_deg;
+    int echoes;                                /* sent of a pulse's: 0 all, 1 first, 2 last, 3 strongest */
+    uint64_t sequence_ns_num, sequence_ns_den; /* beams: a firing sequence lasts num / den nanoseconds */
+    uint32_t n_beams;                          /* pulse k of a scan is firing k mod n_beams */
+    struct scanhead_beam beam[SCANHEAD_MAX_BEAMS];
+};
+/* SCANHEAD_ESTATE before the descriptor has come. It is that of the points that follow: settings that change
+ * within a scan are said anew. */
+int scanhead_get_emitter(const struct scanhead *sh, struct scanhead_emitter *emitter);
 
 /* Where a moving head was. Between two poses of one frame of SCANHEAD_POSES the position goes along the
  * straight line, and the attitude turns the shorter way about one fixed axis at constant rate (slerp). The

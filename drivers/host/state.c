@@ -25,9 +25,20 @@ static int absorb_descriptor(struct scanhead *sh, const struct native_header *he
     if (!same_scan) {
         sh->have_anchor = sh->have_pulse = 0;
         host_forget_poses(sh);
+        sh->emitter = (struct native_emitter){.kind = NATIVE_EMIT_LINE};
     }
     sh->descriptor = d;
     sh->have_descriptor = 1;
+    return 0;
+}
+
+static int absorb_emitter(struct scanhead *sh, const struct native_header *header, const uint8_t *payload)
+{
+    struct native_emitter e;
+    if (native_decode_emitter(payload, header->length, &e) != 0) return bad(sh, "a wrong emitter");
+    sh->emitter = e;
+    for (uint32_t i = 0; i < e.n_beams; i++)
+        native_decode_beam(payload, i, &sh->beam[i]);
     return 0;
 }
 
@@ -160,6 +171,8 @@ int host_absorb(struct scanhead *sh, const struct native_header *header, const u
     switch (header->type) {
     case NATIVE_DESCRIPTOR:
         return absorb_descriptor(sh, header, payload);
+    case NATIVE_EMITTER:
+        return absorb_emitter(sh, header, payload);
     case NATIVE_ANCHOR:
         return absorb_anchor(sh, header, payload);
     case NATIVE_POINTS:
@@ -211,6 +224,29 @@ int scanhead_get_info(const struct scanhead *sh, struct scanhead_info *info)
     info->moving = (a->moving & NATIVE_MOVING) != 0;
     info->stop = (a->moving & NATIVE_STOP) != 0;
     info->frame = a->frame;
+    return SCANHEAD_OK;
+}
+
+int scanhead_get_emitter(const struct scanhead *sh, struct scanhead_emitter *out)
+{
+    memset(out, 0, sizeof *out);
+    if (!sh->have_descriptor) return SCANHEAD_ESTATE;
+    const struct native_emitter *e = &sh->emitter;
+    out->kind = (int)e->kind;
+    out->steps = e->steps;
+    out->first_step = e->first_step;
+    out->last_step = e->last_step;
+    out->front_step = e->front_step;
+    out->turn = e->turn;
+    out->rings = e->rings;
+    out->first_ring_deg = 1e-6 * (double)e->first_ring_udeg;
+    out->echoes = (int)e->echoes;
+    out->sequence_ns_num = e->sequence_ns_num;
+    out->sequence_ns_den = e->sequence_ns_den;
+    out->n_beams = e->n_beams;
+    for (uint32_t i = 0; i < e->n_beams; i++)
+        out->beam[i] = (struct scanhead_beam){1e-6 * sh->beam[i].elevation_udeg, 1e-6 * sh->beam[i].azimuth_udeg,
+                                              sh->beam[i].offset_ns};
     return SCANHEAD_OK;
 }
 

@@ -94,7 +94,8 @@ enum native_emitter_kind {
     NATIVE_EMIT_LINE = 0,   /* a mirror sweeps the elevation, the pan turns slowly. No frame is sent. */
     NATIVE_EMIT_PLANAR = 1, /* one plane, elevation 0: `steps` a turn; a line is a turn, from step 0 on */
     NATIVE_EMIT_BEAMS = 2,  /* a firing sequence of beams spins about the vertical; a line is a turn, from azimuth 0 */
-    NATIVE_EMIT_SPHERE = 3, /* rings of one elevation each, `steps` a turn; a line is a ring, a frame all of them */
+    NATIVE_EMIT_SPHERE = 3, /* rings of one elevation each, `steps` a turn; a line is a ring, a frame all of them; of the
+                                * first and the last, which are poles, one pulse is cast */
     NATIVE_EMIT_DIRECTIONS = 4, /* a list; a line and a frame are the list once */
 };
 struct native_emitter { /* begin of an emitter payload, 64 bytes; then n_beams of 12 */
@@ -105,7 +106,7 @@ struct native_emitter { /* begin of an emitter payload, 64 bytes; then n_beams o
     int32_t turn;                  /* +1: steps and azimuth go clockwise seen from above, -1: the other way */
     uint32_t rings;                /* sphere */
     uint64_t sequence_ns_num, sequence_ns_den; /* beams: a firing sequence lasts num / den ns; else of one pulse */
-    int64_t first_ring_udeg;   /* sphere: elevation of ring 0; the others follow by 180 deg / rings up */
+    int64_t first_ring_udeg;   /* sphere: elevation of ring 0; the others follow by 180 deg / (rings - 1) */
     uint32_t echoes, reserved; /* enum native_echoes: which of a pulse's are sent */
 };
 enum native_echoes {

@@ -3,6 +3,10 @@
  * the grid without a shot: lines differ by a pulse where the pulse rate is no multiple of the line rate, and
  * lines may have been lost.
  *
+ * The grid of a planar head has a column a turn and a row a step, from the first step that is cast on; that of a
+ * sphere a column a ring, and of a pole one shot. Beams and lists of directions have no rows and columns: they
+ * are refused.
+ *
  * A PTX grid has one point per shot: the first echo. Intensity is the reflectance as a fraction: 1 for a
  * white Lambertian target and for what is brighter, 0.5 where not modelled. What the grid had no room for is
  * reported at the end, with counts.
@@ -137,6 +141,11 @@ static int has_room(const struct ptx *ptx, uint32_t n)
 static int ptx_scan(void *rec, struct sh_err *err)
 {
     struct ptx *ptx = rec;
+    const int kind = ptx->base.track.emitter_kind;
+    if (kind == SCANHEAD_EMIT_BEAMS || kind == SCANHEAD_EMIT_DIRECTIONS)
+        return sh_fail(err, SH_EFORMAT,
+                       "%s: a PTX grid has rows and columns, and this head fires %s; allowed .ply .las .e57 .shs",
+                       ptx->base.track.path, kind == SCANHEAD_EMIT_BEAMS ? "beams in turn" : "along a list");
     int rc = end_scan(ptx, err);
     ptx->pose = ptx->base.track.pose;
     return rc;

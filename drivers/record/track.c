@@ -76,8 +76,20 @@ static void set_limits(struct track *t, const struct native_descriptor *d)
     const double lines_hz = 1e-6 * (double)d->lines_uhz, prr_hz = 1e-6 * (double)d->prr_uhz;
     const double sweep_s =
         d->pan_udeg_s > 0 ? ((double)d->pan_stop_udeg - (double)d->pan_start_udeg) / (double)d->pan_udeg_s : 0;
+    t->emitter_kind = SCANHEAD_EMIT_LINE;
     t->max_pulses = lines_hz > 0 && prr_hz > 0 ? whole_u32(ceil(prr_hz / lines_hz) + 1) : UINT32_MAX;
     t->max_lines = d->frames > 0 ? whole_u32(d->frames * (ceil(fabs(sweep_s) * lines_hz) + 1)) : UINT32_MAX;
+}
+
+/* What an emitter frame says beyond its descriptor. A turn of beams begins anywhere in a firing sequence. */
+static void set_emitter_limits(struct track *t)
+{
+    struct scanhead_emitter e;
+    if (scanhead_get_emitter(t->sh, &e) != 0) return;
+    t->emitter_kind = e.kind;
+    if (e.kind == SCANHEAD_EMIT_BEAMS && t->max_pulses < UINT32_MAX - SCANHEAD_MAX_BEAMS) t->max_pulses += e.n_beams;
+    if (e.kind == SCANHEAD_EMIT_SPHERE && t->max_lines != UINT32_MAX)
+        t->max_lines = whole_u32((double)t->max_lines * e.rings);
 }
 
 /* The end of a line says where the next one begins. Where it was lost, the times in the frame say so, as long
@@ -317,6 +329,7 @@ int track_frame(struct track *t, struct scanhead *sh, const struct scanhead_fram
     struct native_descriptor d;
     if (frame->type == SCANHEAD_DESCRIPTOR && native_decode_descriptor(frame->payload, frame->payload_len, &d) == 0)
         set_limits(t, &d);
+    if (frame->type == SCANHEAD_EMITTER) set_emitter_limits(t);
     if (frame->type == SCANHEAD_DESCRIPTOR && (frame->flags & SCANHEAD_REPEAT) == 0) {
         t->state.new_scan = 1;
         t->state.have_next_line = 0;

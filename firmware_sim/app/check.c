@@ -49,11 +49,14 @@ static void print_output(const struct config *cfg, const struct site *site)
 static int print_summary(const struct config *cfg, const struct site *site, struct sh_err *err)
 {
     const struct scene *scene = site->scene;
+    char emitter[160];
     int rc = SH_OK;
     printf("%s: ok\n", cfg->file);
     printf("head      %s %s (%s), %g Hz pulses, %g lines/s, pan %g deg/s\n", cfg->profile.maker, cfg->profile.model,
            cfg->profile.name, (double)cfg->head.settings.prr_uhz * 1e-6, (double)cfg->head.settings.lines_uhz * 1e-6,
            (double)cfg->head.settings.pan_udeg_s * 1e-6);
+    emitter_describe(&cfg->profile.emitter, emitter, sizeof emitter);
+    if (emitter[0] != '\0') printf("emitter   %s\n", emitter);
     printf("scene     %u triangles, %u surfaces, x %.3f..%.3f  y %.3f..%.3f  z %.3f..%.3f m\n", scene->n_triangles,
            scene->n_surfaces, scene->min_m[0], scene->max_m[0], scene->min_m[1], scene->max_m[1], scene->min_m[2],
            scene->max_m[2]);

@@ -314,7 +314,8 @@ int app_parse(const struct app_command *command, int argc, char **argv, struct a
             if (n < APP_MAX_WORDS) words[n++] = optarg;
             continue;
         }
-        if (opt == 'h') return help(command, argc > optind && argv[optind][0] != '-' ? argv[optind] : NULL);
+        if (opt == 'h')
+            return help(command, argc > optind && argv[optind][0] != '-' ? argv[optind] : NULL);
         const int status = take_option(command, opt, argv[at], in, values, &done);
         if (status != APP_OK || done) return status;
     }

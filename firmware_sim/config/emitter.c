@@ -3,6 +3,7 @@
 #include "firmware_sim/config/table.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 enum {
     LINE = 1 << EMITTER_LINE,
@@ -24,7 +25,8 @@ static const struct owned_key {
     {"first_step", PLANAR, 1},  {"last_step", PLANAR, 1},
     {"front_step", PLANAR, 1},  {"firing_ns", BEAMS, 1},
     {"beams", BEAMS, 1},        {"step_direction", PLANAR | BEAMS, 0},
-    {"step_deg", SPHERE, 1},
+    {"step_deg", SPHERE, 1},    {"directions", DIRECTIONS, 1},
+    {"programs", LINE, 0},
 };
 
 static const double PRR_MOST_HZ = 1e7;
@@ -121,6 +123,22 @@ static void set_sphere(struct cfg_reader *rd, struct config_profile *p)
     set_rates(rd, "step_deg", p);
 }
 
+/* The list itself is read again where it is used (firmware_sim/site). */
+static void set_directions(struct cfg_reader *rd, struct config_profile *p)
+{
+    struct emitter_firing *direction;
+    struct sh_err why;
+    uint32_t n;
+    if (!CFG_SOUND(rd, 0, "directions") || p->arrangement.directions[0] == '\0') return;
+    if (emitter_read_directions(p->arrangement.directions, &direction, &n, &why) != SH_OK) {
+        cfg_fail_key(rd, "directions", 0, "%.300s", why.text);
+        return;
+    }
+    free(direction);
+    emitter_set_directions(&p->emitter, NULL, n);
+    set_rates(rd, "directions", p);
+}
+
 void cfg_check_emitter(struct cfg_reader *rd, struct config_profile *p)
 {
     const enum emitter_kind kind = p->arrangement.kind;
@@ -134,13 +152,43 @@ void cfg_check_emitter(struct cfg_reader *rd, struct config_profile *p)
     if (kind == EMITTER_PLANAR) set_planar(rd, p);
     if (kind == EMITTER_BEAMS) set_beams(rd, p);
     if (kind == EMITTER_SPHERE) set_sphere(rd, p);
+    if (kind == EMITTER_DIRECTIONS) set_directions(rd, p);
+}
+
+/* What is defined for a mirror and a pan alone. */
+static void check_instrument(struct cfg_reader *rd, const struct config *cfg)
+{
+    static const char *const of_mirror[] = {
+        "instrument.collimation_deg",  "instrument.trunnion_deg",     "instrument.mirror_offset_m",
+        "instrument.mirror_index_deg", "instrument.mirror_scale_ppm", "instrument.mirror_eccentricity_deg",
+        "instrument.mirror_phase_deg",
+    };
+    for (size_t i = 0; i < CFG_LEN(of_mirror); i++)
+        if (cfg_is_given(rd, of_mirror[i], 0))
+            cfg_fail_key(rd, of_mirror[i], 0,
+                         "an error of a mirror, and head profile %s has emitter: %s; allowed with a line head",
+                         cfg->profile.name, emitter_names[cfg->profile.emitter.kind]);
+}
+
+static const char *given_line_key(const struct cfg_reader *rd)
+{
+    return cfg_is_given(rd, "head.line_start_deg", 0) ? "head.line_start_deg" : "head.line_stop_deg";
 }
 
 void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg)
 {
     struct head_settings *s = &cfg->head.settings;
+    const enum emitter_kind kind = cfg->profile.emitter.kind;
     const uint32_t n = cfg->profile.emitter.steps;
-    if (!rd->profile_read || n == 0 || !CFG_SOUND(rd, 0, "head.lines_hz", "head.prr_hz")) return;
+    if (!rd->profile_read || kind == EMITTER_LINE) return;
+    check_instrument(rd, cfg);
+    if (kind == EMITTER_BEAMS && cfg->head.ambiguity != DETECT_AMBIGUITY_NONE)
+        cfg_fail_key(rd, "head.ambiguity", 0,
+                     "the pulses of head profile %s are not evenly spaced in time; allowed none", cfg->profile.name);
+    if (kind == EMITTER_DIRECTIONS && (s->line_start_udeg != 0 || s->line_stop_udeg != cfg->profile.fov_max_udeg))
+        cfg_fail_key(rd, given_line_key(rd), 0, "head profile %s has a list of directions; allowed without it",
+                     cfg->profile.name);
+    if (n == 0 || !CFG_SOUND(rd, 0, "head.lines_hz", "head.prr_hz")) return;
     const int64_t prr_uhz = s->lines_uhz * n;
     if (cfg_is_given(rd, "head.prr_hz", 0) && s->prr_uhz != prr_uhz)
         cfg_fail_key(rd, "head.prr_hz", 0,

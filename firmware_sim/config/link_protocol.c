@@ -24,6 +24,11 @@ static const struct {
 
 static const char PROTOCOL_KEY[] = "links[].protocol";
 
+static int is_spoken_on(const struct link_spec *link)
+{
+    return (ways[link->protocol].kinds & 1u << link->type) != 0;
+}
+
 static const struct protocol_ops *ops_of(const struct link_spec *link)
 {
     return protocol_ops_get((enum protocol_id)link->protocol);
@@ -33,7 +38,7 @@ int cfg_link_that_needs(const struct config *cfg, enum protocol_needs need)
 {
     for (uint32_t i = 0; i < cfg->n_links; i++) {
         const struct protocol_ops *ops = ops_of(&cfg->link[i]);
-        if (ops != NULL && (ops->needs & need) != 0) return (int)i;
+        if (ops != NULL && is_spoken_on(&cfg->link[i]) && (ops->needs & need) != 0) return (int)i;
     }
     return -1;
 }
@@ -75,7 +80,7 @@ static void check_protocol(struct cfg_reader *rd, struct config *cfg, uint32_t i
         cfg_fail_key(rd, PROTOCOL_KEY, i, "this build does not have it");
         return;
     }
-    if ((ways[link->protocol].kinds & 1u << link->type) == 0) {
+    if (!is_spoken_on(link)) {
         cfg_fail_key(rd, PROTOCOL_KEY, i, "%s is not spoken on a %s link; allowed %s", ops->name,
                      cfg_word(rd, "links[].type", (int)link->type), ways[link->protocol].allowed);
         return;

@@ -8,7 +8,7 @@ static void change_settings(struct device *device)
 {
     if (!device->scan.on) return;
     struct schedule_spec spec;
-    config_fill_spec(&device->site->cfg->profile, &device->cmd.settings, &spec);
+    site_fill_spec(device->site, &device->cmd.settings, &spec);
     schedule_change(&device->scan.segment, &device->scan.segment, &spec, device->scan.pulse_next);
     device->scan.describe = 1;
     device_push_event(device, NATIVE_EV_SETTINGS, device->scan.pulse_next, 0, 0, "");

@@ -10,6 +10,7 @@ void device_fill_descriptor(const struct device *device, struct native_descripto
     struct cast_setup setup;
     struct bvh_info info;
     site_cast_setup(device->site, device->scan.station, &setup);
+    site_set_program(device->site, spec->prr_uhz, &setup);
     bvh_get_info(setup.bvh, &info);
     memset(d, 0, sizeof *d);
     memcpy(d->idn, device->idn, sizeof d->idn);
@@ -30,7 +31,7 @@ void device_fill_descriptor(const struct device *device, struct native_descripto
     d->range_scale_m = setup.range_scale_m;
     d->range_min_m = setup.range_min_m;
     d->range_max_m = setup.range_max_m;
-    d->max_echoes = cfg->profile.max_echoes;
+    d->max_echoes = setup.max_echoes;
     d->n_surfaces = device->site->n_surfaces;
     d->frames = spec->frames;
     d->scan = device->scan.number;
@@ -48,6 +49,16 @@ static const uint32_t echoes_sent[] = {[BEAM_ALL] = NATIVE_ECHOES_ALL,
                                        [BEAM_LAST] = NATIVE_ECHOES_LAST,
                                        [BEAM_STRONGEST] = NATIVE_ECHOES_STRONGEST};
 
+static uint64_t greatest_divisor(uint64_t a, uint64_t b)
+{
+    while (b != 0) {
+        uint64_t rest = a % b;
+        a = b;
+        b = rest;
+    }
+    return a;
+}
+
 void device_fill_emitter(const struct device *device, struct native_emitter *e, struct native_beam *beam)
 {
     const struct emitter *from = device->scan.segment.spec.emitter;
@@ -62,10 +73,12 @@ void device_fill_emitter(const struct device *device, struct native_emitter *e, 
                                  .turn = from->turn,
                                  .rings = from->rings,
                                  .echoes = echoes_sent[device->cmd.settings.echoes]};
+    const struct schedule_segment *segment = &device->scan.segment;
+    const uint64_t ticks = from->kind == EMITTER_BEAMS ? from->sequence_ticks : 1;
+    const uint64_t common = greatest_divisor(segment->tick_num, segment->tick_den);
+    e->sequence_ns_num = ticks * (segment->tick_num / common);
+    e->sequence_ns_den = segment->tick_den / common;
     if (from->kind == EMITTER_SPHERE) e->first_ring_udeg = -90000000;
-    if (from->kind != EMITTER_BEAMS) return;
-    e->sequence_ns_num = from->sequence_ticks * from->tick_num;
-    e->sequence_ns_den = from->tick_den;
     for (uint32_t i = 0; i < from->n_beams; i++)
         beam[i] = (struct native_beam){(int32_t)from->beam[i].elevation_udeg, (int32_t)from->beam[i].azimuth_udeg,
                                        from->beam[i].offset_ns};

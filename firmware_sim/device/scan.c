@@ -7,7 +7,7 @@
 void device_begin_scan(struct device *device, uint64_t tick)
 {
     struct schedule_spec spec;
-    config_fill_spec(&device->site->cfg->profile, &device->cmd.settings, &spec);
+    site_fill_spec(device->site, &device->cmd.settings, &spec);
     device->scan = (struct device_scan){.on = 1,
                                         .number = device->scan.number + 1,
                                         .tick0 = tick,
@@ -132,7 +132,7 @@ int device_is_repeated(const struct device *device, uint64_t tick)
 void device_before_scans(struct device *device)
 {
     struct schedule_spec spec;
-    config_fill_spec(&device->site->cfg->profile, &device->cmd.settings, &spec);
+    site_fill_spec(device->site, &device->cmd.settings, &spec);
     schedule_start(&device->scan.segment, &spec);
     device->scan.station = device->cmd.settings.station - 1;
     device->scan.stretch = site_stretch_at(device->site, 0);

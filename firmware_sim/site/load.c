@@ -93,11 +93,28 @@ static int build_bvhs(struct site *site, const struct sh_report *report, struct 
     return rc;
 }
 
+/* A list of directions is read again: the configuration keeps no more than its length. */
+static int load_emitter(struct site *site, struct sh_err *err)
+{
+    const struct config_profile *p = &site->cfg->profile;
+    uint32_t n;
+    site->emitter = p->emitter;
+    if (p->emitter.kind != EMITTER_DIRECTIONS) return SH_OK;
+    int rc = emitter_read_directions(p->arrangement.directions, &site->direction, &n, err);
+    if (rc != SH_OK) return rc;
+    if (n != p->emitter.steps)
+        return sh_fail(err, SH_EINPUT, "%s: it had %u directions a moment ago, and now %u", p->arrangement.directions,
+                       p->emitter.steps, n);
+    emitter_set_directions(&site->emitter, site->direction, n);
+    return SH_OK;
+}
+
 /* What is wrong with an IFC file's site shall be reported rather than what follows from it: the anchor comes
  * before the scene. */
 static int load(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
-    int rc = placement_find_anchor(site->cfg, report, &site->anchor, err);
+    int rc = load_emitter(site, err);
+    if (rc == SH_OK) rc = placement_find_anchor(site->cfg, report, &site->anchor, err);
     if (rc == SH_OK) rc = load_scene(site, report, err);
     if (rc == SH_OK) rc = site_set_up_detect(site, report, err);
     if (rc == SH_OK) rc = place_stations(site, report, err);
@@ -138,6 +155,7 @@ int site_load_plan(const struct config *cfg, const struct sh_report *report, str
 void site_free(struct site *site)
 {
     if (site == NULL) return;
+    free(site->direction);
     free(site->knot);
     free(site->stop);
     for (uint32_t i = 0; i < site->n_stations; i++) {

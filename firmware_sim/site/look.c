@@ -17,7 +17,7 @@ static void fill_place(const struct site *site, struct site_look_at *at, struct 
     struct head_settings settings = site->cfg->head.settings;
     struct schedule_spec spec;
     if (settings.frames != 1) settings.frames = site->n_knots != 0 ? 0 : 1;
-    config_fill_spec(&site->cfg->profile, &settings, &spec);
+    site_fill_spec(site, &settings, &spec);
     *place = (struct plan_place){.beam = site->station[at->station].beam, .ctx = at};
     schedule_start(&place->segment, &spec);
     place->pulses = place->segment.end_pulse;

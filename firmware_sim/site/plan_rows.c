@@ -99,8 +99,19 @@ static void ask_head(const struct site *site, struct plan_head *head)
         .instrument = !is_zero(&cfg->instrument),
         .angle_noise = cfg->noise.angle,
     };
-    for (uint32_t i = 0; i < cfg->profile.n_reaches; i++)
-        head->reach_m = fmax(head->reach_m, cfg->profile.reach[i].range_m);
+    const struct config_program *program =
+        &cfg->profile.program[config_program_of(&cfg->profile, cfg->head.settings.prr_uhz)];
+    for (uint32_t i = 0; i < program->n_reaches; i++)
+        head->reach_m = fmax(head->reach_m, program->reach[i].range_m);
+}
+
+/* There is nothing to choose, but no line head either. */
+static void add_emitter(const struct site *site, struct site_plan *plan)
+{
+    char why[160];
+    if (site->emitter.kind == EMITTER_LINE) return;
+    emitter_describe(&site->emitter, why, sizeof why);
+    plan_say(&plan->row[plan->n++], "emitter", emitter_names[site->emitter.kind], 0.0, 0.0, why);
 }
 
 int site_plan_rows(struct site *site, struct sh_err *err)
@@ -113,9 +124,10 @@ int site_plan_rows(struct site *site, struct sh_err *err)
     bvh_get_info(site->station[0].bvh, &bvh);
     size_t n = plan_head(&head, of_head);
     free(plan->row);
-    plan->row = calloc(n + 7 + site->n_stations, sizeof *plan->row);
+    plan->row = calloc(n + 8 + site->n_stations, sizeof *plan->row);
     if (plan->row == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     plan->n = 0;
+    add_emitter(site, plan);
     plan_mesh(mesh_error_m(site), &plan->row[plan->n++]);
     plan_cast(bvh.packet, &plan->row[plan->n++]);
     plan->row[plan->n++] = plan->order;

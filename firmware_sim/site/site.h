@@ -40,10 +40,11 @@ struct site_mover {
 
 /* What scans do between a hit and a point (detection.c). */
 struct site_detect {
-    int on; /* 0: nothing of it, and it costs nothing */
-    struct cast_detect cast;
+    int on;                                     /* 0: nothing of it, and it costs nothing */
+    struct cast_detect cast;                    /* of the program that the configuration has; the others below */
+    struct cast_detect program[HEAD_MAX_RATES]; /* by program of the head profile: each has a signal of its own */
+    struct detect_signal signal[HEAD_MAX_RATES];
     struct surface_table surfaces;
-    struct detect_signal signal;
     struct instrument instrument;
     struct detect_ball ball;
     uint32_t n_real;             /* labels of real surfaces; as many labels of ghosts follow */
@@ -68,6 +69,8 @@ struct site_stretch {
 
 struct site {
     const struct config *cfg;
+    struct emitter emitter; /* the profile's, with its list of directions */
+    struct emitter_firing *direction;
     struct scene *scene; /* what stands still */
     struct placement_anchor anchor;
     struct site_mover mover[CAST_MAX_MOVERS];
@@ -111,6 +114,9 @@ void site_free(struct site *site);
  * The hemisphere of the false northing is that in which the first station is given, if it is given in UTM. */
 void site_grid(const struct site *site, int *zone, int *side);
 
+/* The schedule of its head with some settings. */
+void site_fill_spec(const struct site *site, const struct head_settings *settings, struct schedule_spec *spec);
+
 /* Entries that a pulse may need in a block: its echoes, as far as the plan allows for more than one. */
 uint32_t site_points_per_pulse(const struct site *site);
 
@@ -134,7 +140,9 @@ const struct georef *site_georef(const struct site *site, uint32_t station, size
 void site_move(const struct site *site, double t_s, struct cast_setup *setup);
 double site_mover_time(const struct site *site, uint32_t station, double scan_s);
 
-/* What the casters need to scan from a station (0..n_stations-1). */
+/* What the casters need to scan from a station (0..n_stations-1), at the configured pulse rate. */
 void site_cast_setup(const struct site *site, uint32_t station, struct cast_setup *setup);
+/* What of it depends on the pulse rate: reach, echoes, smallest range. Allocates nothing. */
+void site_set_program(const struct site *site, int64_t prr_uhz, struct cast_setup *setup);
 
 #endif

@@ -48,7 +48,7 @@ const struct bad bad[] = {
     {"up: z", "up: Z", 8, "scene.meshes[0].up", "allowed z, y"},
     {"crs: local", "crs: wgs84", 17, "output.crs", "allowed local, ecef, utm"},
     {"crs: local", "layout: xyz", 17, "output.layout", "allowed polar, geo"},
-    {"type: tcp", "type: udp", 14, "links[0].type", "allowed null, file, pty, tcp, usb"},
+    {"type: tcp", "type: uart", 14, "links[0].type", "allowed null, file, pty, tcp, usb, udp"},
     {"output:", "loop: {pace: slow}\noutput:", 16, "loop.pace", "allowed realtime, fast, step"},
     {"output:", "noise: {range: 1}\noutput:", 16, "noise.range", "allowed off, on, signal"},
     {"output:", "noise: {angle: 1}\noutput:", 16, "noise.angle", "allowed on or off"},
@@ -91,7 +91,7 @@ const struct bad bad[] = {
     {NULL, "- 1\n", 1, NULL, "allowed sections with keys"},
     {NULL, "text\n", 1, NULL, "allowed sections with keys"},
     /* missing */
-    {"  profile: riegl-vz400i\n", "", 1, "head.profile", "missing"},
+    {"  profile: any-rate\n", "", 1, "head.profile", "missing"},
     {"      scale: 1\n", "", 7, "scene.meshes[0].scale", "missing"},
     {"      up: z\n", "", 7, "scene.meshes[0].up", "missing"},
     {"  - type: tcp\n    port: 0", "  - port: 0", 14, "links[0].type", "missing"},
@@ -110,9 +110,9 @@ const struct bad bad[] = {
     {NULL, "# nothing\n", 1, NULL, "empty"},
     {NULL, "\xff\xfeh\n", 1, NULL, "UTF-8"},
     {NULL, "\n\nhead: \x01\n", 3, NULL, "control characters"},
-    /* within the profile: VZ-400i, 100 kHz to 1.2 MHz, 3 to 240 lines/s, -40 to 60 deg, 0 to 360 deg */
+    /* within the profile: any-rate, 100 kHz to 1.2 MHz, 3 to 240 lines/s, -40 to 60 deg, 0 to 360 deg */
     {PRR, "  prr_hz: 1200000.000001\n", 3, "head.prr_hz", "allowed 100000 to 1200000 Hz"},
-    {PRR, "  prr_hz: 99999.999999\n", 3, "head.prr_hz", "99999.999999 is outside the limits of head profile riegl-vz400i"},
+    {PRR, "  prr_hz: 99999.999999\n", 3, "head.prr_hz", "99999.999999 is outside the limits of head profile any-rate"},
     {LINES, "  lines_hz: 241\n", 4, "head.lines_hz", "allowed 3 to 240 Hz"},
     {LINES, "  line_start_deg: -40.000001\n", 4, "head.line_start_deg", "allowed -40 to 60 deg"},
     {LINES, "  line_stop_deg: 61\n", 4, "head.line_stop_deg", "allowed -40 to 60 deg"},
@@ -174,10 +174,16 @@ const struct bad bad[] = {
     {"    port: 0\n", "    protocol: nmea\ntime: {epoch: utc}\n", 11, "stations[0].lat_deg", "a link has the protocol nmea"},
     {"heading_deg: 90\nlinks:\n  - type: tcp\n", "lat_deg: 1\n    lon_deg: 2\n    height_m: 3\n"
      "links:\n  - type: tcp\n    protocol: nmea\n", 17, "links[0].protocol", "time.epoch"},
-    {"type: tcp", "type: tcp\n    protocol: scip", 15, "links[0].protocol", "allowed native, nmea"},
+    {"type: tcp", "type: tcp\n    protocol: sicp", 15, "links[0].protocol", "allowed native, nmea, scip, cola, velodyne"},
     {"port: 0", "backend: usbip", 15, "links[0].backend", "a tcp link has no such key"},
     {"type: tcp", "type: usb\n    max_sessions: 2", 15, "links[0].max_sessions", "a usb link has no such key; allowed type, b"},
-    {"type: tcp", "type: usb\n    protocol: nmea", 15, "links[0].protocol", "nmea is not spoken on a usb link; allowed"},
+    {"type: tcp", "type: usb\n    protocol: nmea", 15, "links[0].protocol", "not spoken on a usb link; allowed null, file, pty, tcp, udp"},
+    {"type: tcp", "type: udp", 14, "links[0].protocol", "not spoken on a udp link"},
+    {"  - type: tcp\n    port: 0", "  - type: udp\n    protocol: velodyne", 14, "links[0].type", "allowed 1 to 65535"},
+    {"  - type: tcp\n    port: 0", "  - type: udp\n    port: 0\n    protocol: velodyne", 15, "links[0].port", "allowed 1 to 65535"},
+    {"type: tcp", "type: tcp\n    interface: lo", 15, "links[0].interface", "a tcp link has no such key"},
+    {"type: tcp\n    port: 0\noutput:", "type: udp\n    port: 1\n    protocol: velodyne\noutput:\n  layout: geo", 16,
+     "links[0].protocol", "needs ranges, but output.layout is geo (line 18); required is layout: polar"},
     {"type: tcp", "type: usb\n    speed: fast", 15, "links[0].speed", "allowed full, high, super"},
     {"type: tcp", "type: usb\n    vid: 0x0", 15, "links[0].vid", "0x0001 to 0xffff"},
     {"type: tcp", "type: usb\n    vid: 0x10000", 15, "links[0].vid", "0x0001 to 0xffff"},
@@ -245,9 +251,9 @@ const struct bad bad[] = {
     {"cube.obj", "cube.xyz", 7, "scene.meshes[0].file", "allowed .obj .ply .stl"},
     {"cube.obj", "cube", 7, "scene.meshes[0].file", "no known ending"},
     {"cube.obj", "dir.obj", 7, "scene.meshes[0].file", "a directory, not a file"},
-    {"riegl-vz400i", "riegl-vz400", 2, "head.profile", "allowed full-sweep, hokuyo-u"},
-    {"riegl-vz400i", "heads/none.yaml", 2, "head.profile", "no profile"},
-    {"riegl-vz400i", "../heads/x", 2, "head.profile", "no profile"},
+    {"any-rate", "riegl-vz400", 2, "head.profile", "allowed any-rate, faro-focus-s350, full-sweep, hokuyo-u"},
+    {"any-rate", "heads/none.yaml", 2, "head.profile", "no profile"},
+    {"any-rate", "../heads/x", 2, "head.profile", "no profile"},
 };
 /* clang-format on */
 

@@ -1,4 +1,4 @@
-/* The links null, file, fd and tcp; the pty has its own program. */
+/* The links null, file, fd and tcp; pty and udp have their own programs. */
 #include "tests/unit/link_test.h"
 
 #include <arpa/inet.h>
@@ -14,13 +14,13 @@
 static void test_table(void **state)
 {
     (void)state;
-    const char *const names[] = {"null", "file", "pty", "tcp", "fd"};
-    const enum link_type types[] = {LINK_NULL, LINK_FILE, LINK_PTY, LINK_TCP, LINK_FD};
-    for (int i = 0; i < 5; i++) {
+    const char *const names[] = {"null", "file", "pty", "tcp", "fd", "udp"};
+    const enum link_type types[] = {LINK_NULL, LINK_FILE, LINK_PTY, LINK_TCP, LINK_FD, LINK_UDP};
+    for (int i = 0; i < 6; i++) {
         assert_string_equal(link_ops_get(types[i])->name, names[i]);
         assert_null(link_ops_get(types[i])->capacity); /* no fixed limit */
     }
-    assert_null(link_ops_get((enum link_type)6));
+    assert_null(link_ops_get((enum link_type)7));
     assert_string_equal(link_ops_get(LINK_USB)->name, "usb");
     assert_null(link_ops_get((enum link_type) - 1));
 }

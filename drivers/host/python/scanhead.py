@@ -35,15 +35,16 @@ try:
 except ImportError:  # everything works without, slower
     np = None
 
-DESCRIPTOR, ANCHOR, POINTS, LINE_END, TELEMETRY, EVENT, SURFACES, POSES, ATTRIBUTES = range(1, 10)
+DESCRIPTOR, ANCHOR, POINTS, LINE_END, TELEMETRY, EVENT, SURFACES, POSES, ATTRIBUTES, EMITTER = range(1, 11)
 REPEAT, LOCAL = 1, 2  # flags of a frame
 (EV_STATE, EV_SCAN_START, EV_SCAN_END, EV_OVERRUN, EV_READER_LOST, EV_CONTROL, EV_ERROR, EV_SETTINGS,
  EV_POSE_LATE, EV_PPS, EV_TIME) = range(1, 12)
 POLAR, GEO = 0, 1  # layouts
+EMIT_LINE, EMIT_PLANAR, EMIT_BEAMS, EMIT_SPHERE, EMIT_DIRECTIONS = range(5)
 CRS_LOCAL, CRS_ECEF, CRS_UTM, CRS_GEODETIC = range(4)
 NO_LABEL = 0xFFFF
 
-_HASHED = (DESCRIPTOR, ANCHOR, POINTS, LINE_END, POSES, ATTRIBUTES)
+_HASHED = (DESCRIPTOR, ANCHOR, POINTS, LINE_END, POSES, ATTRIBUTES, EMITTER)
 _HEADER_LEN, _MAX_PAYLOAD, _MAX_TEXT = 28, 65536, 512
 _QUEUE_BYTES, _KEEP_POSES, _CHUNK = 64 << 20, 8192, 1 << 16
 _FRAME_BYTES = 512  # what a kept frame takes beside its payload
@@ -185,6 +186,8 @@ _LAYOUT = {
                 "errors_queued reader_lost_frames utc_ns"),
     EVENT: ("<IIQQQ96s", "code reserved a b c text"),
     ATTRIBUTES: ("<QII", "pulse0 line n_points"),
+    EMITTER: ("<3I4iIQQqII", "kind n_beams steps first_step last_step front_step turn rings sequence_ns_num "
+              "sequence_ns_den first_ring_udeg echoes reserved"),
 }
 _MORE = {  # what payloads may have behind that
     DESCRIPTOR: ("<II", "content reserved"),
@@ -201,6 +204,7 @@ _UNPACK = {kind: _unpacker(*layout) for kind, layout in _LAYOUT.items()}
 _UNPACK_MORE = {kind: _unpacker(*layout) for kind, layout in _MORE.items()}
 _POSE = struct.Struct("<q3d4ddII")
 _POINT = struct.Struct("<IIIhHI")
+_BEAM = struct.Struct("<iiI")
 
 
 def _text(field: bytes) -> str:
@@ -429,10 +433,10 @@ def _empty_as_nan(values, count):
     return [_NAN if n == 0 else v for v, n in zip(values, count)]
 
 
-def _polar_points(p: Points, raw, d: Dict) -> None:
+def _polar_points(p: Points, raw, d: Dict, is_line_head: bool) -> None:
     mirror_turn, pan_turn = 1 / d["mirror_counts_per_turn"], 1 / d["pan_counts_per_turn"]
     scale = d["range_scale_m"]
-    low = (d["line_start_udeg"] + d["line_stop_udeg"]) / 720e6 - 0.5
+    low = (d["line_start_udeg"] + d["line_stop_udeg"]) / 720e6 - 0.5 if is_line_head else -0.5
 
     def place(a, b, c):
         mirror, pan, range_m = b * mirror_turn, c * pan_turn, scale * a
@@ -858,6 +862,8 @@ class Head:
         self.reader_lost = 0  # frames that the head says it left out for this reader
         self._lost_told = self._lost_ended = 0  # pulses, by OVERRUN events and by SCAN_END
         self.descriptor, self.anchor = None, None  # type: Optional[Dict], Optional[Dict]
+        # None: a line head; "beams": (elevation in degrees, azimuth in degrees, offset in ns) of each
+        self.emitter = None  # type: Optional[Dict]
         self.surfaces = {}  # type: Dict[int, Tuple[str, str]]
         self._poses, self._earth = _Poses(), None
         self._sha256 = hashlib.sha256()
@@ -1074,7 +1080,8 @@ class Head:
             frame = frame._replace(fields=_decode(frame.type, frame.payload))
         act = {DESCRIPTOR: self._absorb_descriptor, ANCHOR: self._absorb_anchor,
                POINTS: self._absorb_points, EVENT: self._absorb_event, SURFACES: self._absorb_surfaces,
-               POSES: self._absorb_poses, ATTRIBUTES: self._absorb_attributes}.get(frame.type)
+               POSES: self._absorb_poses, ATTRIBUTES: self._absorb_attributes,
+               EMITTER: self._absorb_emitter}.get(frame.type)
         if act is not None:
             act(frame)
         self._follow_scan(frame)
@@ -1100,7 +1107,7 @@ class Head:
             self._scan = self.descriptor["scan"]
 
     def _forget(self) -> None:
-        self.descriptor = self.anchor = self._last_pulse0 = None
+        self.descriptor = self.anchor = self.emitter = self._last_pulse0 = None
         self._poses.forget()
 
     def _absorb_descriptor(self, frame: Frame) -> None:
@@ -1114,6 +1121,14 @@ class Head:
         if not frame.flags & REPEAT or self.descriptor is None or self.descriptor["scan"] != d["scan"]:
             self._forget()
         self.descriptor = d
+
+    def _absorb_emitter(self, frame: Frame) -> None:
+        e = frame.fields
+        if e["n_beams"] > (len(frame.payload) - 64) // _BEAM.size:
+            raise ScanheadError("an emitter frame shorter than its beams")
+        beams = (_BEAM.unpack_from(frame.payload, 64 + _BEAM.size * i) for i in range(e["n_beams"]))
+        e["beams"] = [(1e-6 * elevation, 1e-6 * azimuth, offset_ns) for elevation, azimuth, offset_ns in beams]
+        self.emitter = e
 
     def _absorb_anchor(self, frame: Frame) -> None:
         a = frame.fields
@@ -1185,7 +1200,7 @@ class Head:
         raw = _raw_columns(frame.payload, frame.fields["n_points"])
         p = _common(raw, frame.fields["t0_ns"], self.descriptor["layout"])
         if p.layout == POLAR:
-            _polar_points(p, raw, self.descriptor)
+            _polar_points(p, raw, self.descriptor, self.emitter is None)
         else:
             _geo_points(p, raw, self.anchor)
         return p
@@ -1279,7 +1294,7 @@ def _summary(head: Head) -> None:
             count = head.points(frame).echo_count
             echoes += int(np.count_nonzero(count)) if np is not None else sum(n > 0 for n in count)
     names = ("", "descriptors", "anchors", "points frames", "line ends", "telemetry", "events", "names",
-             "poses", "attributes")
+             "poses", "attributes", "emitters")
     print(*(f"{kinds[k]} {names[k]}" for k in sorted(kinds) if k < len(names)), sep=", ")
     print(f"{echoes} echoes; frames lost: {head.parser.seq_lost}, bytes skipped: {head.parser.bad_bytes}")
     print(f"stream_sha256 {head.stream_sha256()}")

@@ -1,0 +1,146 @@
+/* SICK CoLa-A and CoLa-B (SOPAS): TiM5xx, TiM7xx, LMS1xx. COLA.md is its page. */
+#include <stdlib.h>
+
+#include "drivers/protocol/cola.h"
+
+enum { TRY_NS = 100000000, MOST_WAITING = 100 };
+
+void cola_power_up(struct cola *self)
+{
+    cola_settings_reset(self);
+    self->level = COLA_RUN;
+    self->measures = 1;
+    self->streams = self->wants_scan = self->reboots = 0;
+    self->n_waiting = self->since_sent = 0;
+    self->telegrams = 0;
+}
+
+static int create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
+{
+    struct cola *self = calloc(1, sizeof *self);
+    if (self == NULL) return sh_fail(err, SH_ENOMEM, "protocol cola: no memory for %zu bytes", sizeof *self);
+    self->host = spec->host;
+    self->identity = spec->identity;
+    self->model = cola_model_find(spec->identity->model);
+    cola_collect_init(&self->collector);
+    cola_power_up(self);
+    *protocol = self;
+    return SH_OK;
+}
+
+static void open_at(void *protocol, int64_t t_ns)
+{
+    ((struct cola *)protocol)->now_ns = t_ns;
+}
+
+static void send_scan(struct cola *self, const char *head, enum cola_form form)
+{
+    struct cola_out out = {.buf = self->unit, .cap = sizeof self->unit};
+    cola_begin(&out, form, head);
+    cola_put_scan(self, self->collector.last, &out);
+    const size_t len = cola_end(&out);
+    if (len == 0) {
+        self->host.count(self->host.ctx, PROTOCOL_UNITS_LOST, 1);
+        return;
+    }
+    if (self->host.send(self->host.ctx, self->unit, len) == 0) self->telegrams++;
+}
+
+void cola_deliver(struct cola *self)
+{
+    if (!self->pending) return;
+    self->pending = 0;
+    for (; self->n_waiting != 0; self->n_waiting--)
+        send_scan(self, "sRA LMDscandata", self->waiting_form);
+    if (!self->streams || !self->measures || ++self->since_sent < self->set.every) return;
+    self->since_sent = 0;
+    send_scan(self, "sSN LMDscandata", self->stream_form);
+}
+
+static void take_frame(void *protocol, const uint8_t *frame, size_t len)
+{
+    struct cola *self = protocol;
+    struct native_header h;
+    (void)len;
+    native_read_header(frame, &h);
+    if (h.type == NATIVE_POINTS) {
+        if (h.t_ns > self->now_ns) self->now_ns = h.t_ns;
+        cola_deliver(self); /* this scan's place may be needed */
+    }
+    if (cola_collect(&self->collector, frame)) self->pending = 1;
+    if (self->collector.last == NULL) self->pending = 0;
+    if (self->collector.lost == 0) return;
+    if (self->streams && self->measures) self->host.count(self->host.ctx, PROTOCOL_UNITS_LOST, self->collector.lost);
+    self->collector.lost = 0;
+}
+
+/* What is missing shows in the scan that it is missing from. */
+static void pass_gap(void *protocol, uint32_t n_frames)
+{
+    (void)protocol;
+    (void)n_frames;
+}
+
+static void pass_time(void *protocol, int64_t t_ns)
+{
+    struct cola *self = protocol;
+    if (t_ns > self->now_ns) self->now_ns = t_ns;
+    cola_deliver(self);
+    if (!self->wants_scan || t_ns < self->try_ns) return;
+    self->try_ns = t_ns + TRY_NS;
+    cola_start_scan(self);
+}
+
+enum cola_error cola_read_scan(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    const enum cola_error error = cola_args_end(args);
+    if (error != COLA_OK) return error;
+    if (self->collector.last != NULL) {
+        cola_put_scan(self, self->collector.last, out);
+        self->telegrams++;
+        return COLA_OK;
+    }
+    if (self->n_waiting == MOST_WAITING || cola_start_scan(self) != 0) return COLA_CONDITION;
+    self->n_waiting++;
+    self->waiting_form = out->form;
+    return COLA_LATER;
+}
+
+static int64_t next_time(const void *protocol)
+{
+    const struct cola *self = protocol;
+    return self->pending ? self->now_ns : self->wants_scan ? self->try_ns : INT64_MAX;
+}
+
+static void take_input(void *protocol, const uint8_t *bytes, size_t len)
+{
+    struct cola *self = protocol;
+    struct cola_request request;
+    uint64_t lost = 0;
+    while (len != 0) {
+        const size_t n = cola_input_add(&self->input, bytes, len);
+        bytes += n;
+        len -= n;
+        for (int found; (found = cola_input_next(&self->input, &request, &lost)) != 0;)
+            if (found < 0)
+                cola_refuse(self, COLA_A, COLA_TOO_LONG);
+            else
+                cola_carry_out(self, &request);
+    }
+    if (lost != 0) self->host.count(self->host.ctx, PROTOCOL_INPUT_LOST, lost);
+}
+
+const struct protocol_ops protocol_cola = {
+    .name = "cola",
+    .needs = PROTOCOL_NEEDS_POLAR,
+    .emitters = 1u << NATIVE_EMIT_PLANAR,
+    .max_unit = COLA_MAX_UNIT,
+    .create = create,
+    .destroy = free,
+    .open = open_at,
+    .frame = take_frame,
+    .gap = pass_gap,
+    .time = pass_time,
+    .input = take_input,
+    .next_ns = next_time,
+};

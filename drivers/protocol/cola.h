@@ -1,0 +1,99 @@
+/* One session of CoLa, for the files of this module. COLA.md says what it does and doesn't. */
+#ifndef DRIVERS_PROTOCOL_COLA_H
+#define DRIVERS_PROTOCOL_COLA_H
+
+#include "drivers/protocol/cola_model.h"
+#include "drivers/protocol/cola_scan.h"
+#include "drivers/protocol/cola_telegram.h"
+#include "drivers/protocol/protocol.h"
+
+enum {
+    /* sick_tim takes at most 65535 bytes a transfer. The longest telegram: two distances and two signals of each beam as
+     * hexadecimal (5 bytes each), and less than 1000 bytes around them. */
+    COLA_MAX_UNIT = 4 * 5 * COLA_MAX_POINTS + 1000,
+    COLA_MAX_NAME = 32,
+};
+
+/* Who is logged in. */
+enum cola_level { COLA_RUN = 1, COLA_MAINTENANCE = 2, COLA_CLIENT = 3, COLA_SERVICE = 4 };
+
+/* What clients set; as at power-up at the session's start, and after a reboot. */
+struct cola_settings {
+    /* LMDscandatacfg */
+    uint8_t channels[2], rssi, rssi_16bit, unit, encoder[2], position, name, comment, time;
+    uint16_t every; /* so many-th scan is sent */
+    /* LMPoutputRange, 1/10000 deg: as it was written; all 0: all beams */
+    int32_t start_e4, stop_e4;
+    uint32_t first_beam, n_beams; /* what that is; n_beams 0: all */
+    uint8_t filter;               /* FREchoFilter: enum cola_filter */
+    uint32_t scale;               /* LMDscandatascalefactor; 0: the geometry's */
+    char location[COLA_MAX_NAME];
+    int64_t clock_ns; /* what the scanner's clock is ahead of the head's; 0: not set */
+    uint8_t framing;  /* EIHstCola, as it was written */
+};
+enum cola_filter { COLA_FILTER_FIRST = 0, COLA_FILTER_ALL = 1, COLA_FILTER_LAST = 2 };
+
+struct cola {
+    struct protocol_host host;
+    const struct protocol_identity *identity;
+    const struct cola_model *model;
+    struct cola_settings set;
+    enum cola_level level;
+    int measures;   /* LMCstopmeas: 0. Output of this session alone */
+    int reboots;    /* once the answer is sent */
+    int wants_scan; /* measurement was asked for while the head could not start; next try at try_ns */
+    int64_t try_ns;
+    int64_t now_ns;
+    int streams;                /* sEN LMDscandata 1 */
+    enum cola_form stream_form; /* of telegrams without a request */
+    int pending;                /* a scan is done and not yet looked at */
+    uint32_t since_sent;        /* scans since one was sent */
+    uint32_t n_waiting;         /* sRN LMDscandata before there was a scan; answered with the first */
+    enum cola_form waiting_form;
+    uint16_t telegrams; /* counter of LMDscandata */
+    struct cola_input input;
+    struct cola_collector collector;
+    uint8_t unit[COLA_MAX_UNIT];
+};
+
+/* A request: reads its values, and writes those of the answer. An error, or COLA_OK, or COLA_LATER. */
+typedef enum cola_error cola_handler(struct cola *self, struct cola_args *args, struct cola_out *out);
+
+/* cola.c */
+
+/* A scan that is done goes to who waits for it. */
+void cola_deliver(struct cola *self);
+/* sRN LMDscandata: the last scan, or later the first one. */
+cola_handler cola_read_scan;
+/* As at power-up; the settings, too. */
+void cola_power_up(struct cola *self);
+
+/* cola_lmd.c */
+
+/* Writes an LMDscandata telegram of the last scan (there is one) behind its head. */
+void cola_put_scan(const struct cola *self, const struct cola_scan *scan, struct cola_out *out);
+
+/* cola_settings.c: what is set and asked for the measurement. */
+
+void cola_settings_reset(struct cola *self);
+cola_handler cola_read_output_range, cola_write_output_range, cola_read_scan_data_cfg, cola_write_scan_data_cfg,
+    cola_read_scan_cfg, cola_set_scan_cfg, cola_read_filter, cola_write_filter, cola_read_scale, cola_write_scale;
+
+/* cola_device.c: identity, states, log-in, clock, inputs and outputs. */
+
+/* Time of day of the scanner's clock at a device time, ns since 1970. */
+int64_t cola_clock_ns(const struct cola *self, int64_t t_ns);
+/* Lets the head scan if it rests. */
+int cola_start_scan(struct cola *self);
+cola_handler cola_read_ident, cola_read_serial, cola_read_firmware, cola_read_location, cola_write_location,
+    cola_read_state, cola_read_lms_state, cola_read_hours, cola_read_power_ons, cola_read_contamination,
+    cola_read_inputs, cola_read_outputs, cola_read_field_results, cola_read_framing, cola_write_framing, cola_log_in,
+    cola_log_out, cola_get_level, cola_check_password, cola_set_clock, cola_start, cola_stop, cola_load_defaults,
+    cola_keep, cola_reboot;
+
+/* cola_commands.c: one request, and its answer. */
+void cola_carry_out(struct cola *self, const struct cola_request *request);
+/* sFA with that error. */
+void cola_refuse(struct cola *self, enum cola_form form, enum cola_error error);
+
+#endif

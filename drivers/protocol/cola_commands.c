@@ -1,0 +1,197 @@
+/* Requests of CoLa by name. One table: what exists, who may do it, which function does it. */
+#include <stdio.h>
+#include <string.h>
+
+#include "drivers/protocol/cola.h"
+
+static cola_handler read_field, set_event, set_scan_event;
+
+static const struct command {
+    const char *name;
+    char verb;     /* of s?N: R, W, M, E */
+    uint8_t level; /* at least */
+    cola_handler *carry_out;
+} commands[] = {
+    {"0", 'R', COLA_RUN, cola_read_ident},
+    {"DeviceIdent", 'R', COLA_RUN, cola_read_ident},
+    {"SerialNumber", 'R', COLA_RUN, cola_read_serial},
+    {"FirmwareVersion", 'R', COLA_RUN, cola_read_firmware},
+    {"LocationName", 'R', COLA_RUN, cola_read_location},
+    {"LocationName", 'W', COLA_CLIENT, cola_write_location},
+    {"SCdevicestate", 'R', COLA_RUN, cola_read_state},
+    {"STlms", 'R', COLA_RUN, cola_read_lms_state},
+    {"LCMstate", 'R', COLA_RUN, cola_read_contamination},
+    {"ODoprh", 'R', COLA_RUN, cola_read_hours},
+    {"ODpwrc", 'R', COLA_RUN, cola_read_power_ons},
+    {"EIHstCola", 'R', COLA_RUN, cola_read_framing},
+    {"EIHstCola", 'W', COLA_CLIENT, cola_write_framing},
+    {"LMPoutputRange", 'R', COLA_RUN, cola_read_output_range},
+    {"LMPoutputRange", 'W', COLA_CLIENT, cola_write_output_range},
+    {"LMPscancfg", 'R', COLA_RUN, cola_read_scan_cfg},
+    {"LMDscandatacfg", 'R', COLA_RUN, cola_read_scan_data_cfg},
+    {"LMDscandatacfg", 'W', COLA_CLIENT, cola_write_scan_data_cfg},
+    {"LMDscandatascalefactor", 'R', COLA_RUN, cola_read_scale},
+    {"LMDscandatascalefactor", 'W', COLA_CLIENT, cola_write_scale},
+    {"FREchoFilter", 'R', COLA_RUN, cola_read_filter},
+    {"FREchoFilter", 'W', COLA_CLIENT, cola_write_filter},
+    {"LMDscandata", 'R', COLA_RUN, cola_read_scan},
+    {"LIDinputstate", 'R', COLA_RUN, cola_read_inputs},
+    {"LIDoutputstate", 'R', COLA_RUN, cola_read_outputs},
+    {"LFErec", 'R', COLA_RUN, cola_read_field_results},
+    {"SetAccessMode", 'M', COLA_RUN, cola_log_in},
+    {"GetAccessMode", 'M', COLA_RUN, cola_get_level},
+    {"CheckPassword", 'M', COLA_RUN, cola_check_password},
+    {"Run", 'M', COLA_RUN, cola_log_out},
+    {"mLMPsetscancfg", 'M', COLA_CLIENT, cola_set_scan_cfg},
+    {"LMCstartmeas", 'M', COLA_CLIENT, cola_start},
+    {"LMCstopmeas", 'M', COLA_CLIENT, cola_stop},
+    {"LMCstandby", 'M', COLA_CLIENT, cola_stop},
+    {"LSPsetdatetime", 'M', COLA_CLIENT, cola_set_clock},
+    {"mEEwriteall", 'M', COLA_CLIENT, cola_keep},
+    {"mSCloadappdef", 'M', COLA_CLIENT, cola_load_defaults},
+    {"mSCloadfacdef", 'M', COLA_CLIENT, cola_load_defaults},
+    {"mSCreboot", 'M', COLA_CLIENT, cola_reboot},
+    {"LMDscandata", 'E', COLA_RUN, set_scan_event},
+    {"LIDinputstate", 'E', COLA_RUN, set_event},
+    {"LIDoutputstate", 'E', COLA_RUN, set_event},
+    {"LFErec", 'E', COLA_RUN, set_event},
+};
+
+/* field000 .. field047: none is configured. */
+static const struct command any_field = {"field", 'R', COLA_RUN, read_field};
+
+static enum cola_error read_field(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    (void)self;
+    cola_put_u(out, 1, 0);
+    return cola_args_end(args);
+}
+
+static enum cola_error read_switch(struct cola_args *args, int *on)
+{
+    const uint32_t v = cola_arg_u(args, 1);
+    const enum cola_error error = cola_args_end(args);
+    *on = v == 1;
+    return error == COLA_OK && v > 1 ? COLA_INVALID_DATA : error;
+}
+
+/* Events of which none comes: no input changes, and no field is configured. */
+static enum cola_error set_event(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    int on;
+    const enum cola_error error = read_switch(args, &on);
+    (void)self;
+    cola_put_u(out, 1, (uint32_t)on);
+    return error;
+}
+
+static enum cola_error set_scan_event(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    int on;
+    const enum cola_error error = read_switch(args, &on);
+    if (error != COLA_OK) return error;
+    cola_put_u(out, 1, (uint32_t)on);
+    self->streams = on;
+    self->since_sent = self->set.every; /* the next one is sent */
+    if (on && self->measures) cola_start_scan(self);
+    return COLA_OK;
+}
+
+void cola_refuse(struct cola *self, enum cola_form form, enum cola_error error)
+{
+    struct cola_out out = {.buf = self->unit, .cap = sizeof self->unit};
+    cola_begin(&out, form, "sFA");
+    cola_put_u(&out, 2, (uint32_t)error);
+    self->host.count(self->host.ctx, PROTOCOL_WRONG, 1);
+    self->host.send(self->host.ctx, self->unit, cola_end(&out));
+}
+
+/* A request cut into its parts. */
+struct parts {
+    char verb; /* of s?N and sRI; 0: none of them */
+    char name[COLA_MAX_NAME];
+    struct cola_args args;
+};
+
+static struct parts cut(const struct cola_request *r)
+{
+    const uint8_t *at = r->payload, *const end = r->payload + r->len;
+    struct parts p = {.args = {.form = r->form}};
+    size_t n = 0;
+    if (r->len >= 3 && at[0] == 's' && strchr("RWME", at[1]) != NULL && at[1] != 0 && at[2] == 'N')
+        p.verb = (char)at[1];
+    if (r->len >= 3 && memcmp(at, "sRI", 3) == 0) p.verb = 'R'; /* by number: sRI0, sRI 0 */
+    if (p.verb == 0) return p;
+    for (at += 3; at < end && *at == ' '; at++)
+        ;
+    for (; at<end && * at> ' ' && *at <= '~'; at++)
+        if (n + 1 < sizeof p.name) p.name[n++] = (char)*at;
+    if (at < end && *at == ' ') at++;
+    p.args.at = at;
+    p.args.end = end;
+    return p;
+}
+
+static int is_field(const struct cola *self, const char *name)
+{
+    unsigned number = 0;
+    if (strncmp(name, "field", 5) != 0 || strlen(name) != 8) return 0;
+    for (name += 5; *name != 0; name++) {
+        if (*name < '0' || *name > '9') return 0;
+        number = 10 * number + (unsigned)(*name - '0');
+    }
+    return number < self->model->n_fields;
+}
+
+/* The row; NULL and an error: there is none. */
+static const struct command *find(const struct cola *self, const struct parts *p, enum cola_error *error)
+{
+    const struct command *other = NULL;
+    for (size_t i = 0; i < sizeof commands / sizeof commands[0]; i++) {
+        if (strcmp(commands[i].name, p->name) != 0) continue;
+        if (commands[i].verb == p->verb) return &commands[i];
+        other = &commands[i];
+    }
+    if (p->verb == 'R' && is_field(self, p->name)) return &any_field;
+    const int read_only = other != NULL && other->verb == 'R' && p->verb == 'W';
+    *error = p->verb == 'M'   ? COLA_METHOD_UNKNOWN
+             : p->verb == 'E' ? COLA_EVENT_UNKNOWN
+             : read_only      ? COLA_WRITE_DENIED
+                              : COLA_VARIABLE_UNKNOWN;
+    return NULL;
+}
+
+static const char *answer_verb(char verb)
+{
+    return verb == 'R' ? "sRA" : verb == 'W' ? "sWA" : verb == 'M' ? "sAN" : "sEA";
+}
+
+static enum cola_error carry_out(struct cola *self, const struct cola_request *request, struct cola_out *out)
+{
+    struct parts p = cut(request);
+    enum cola_error error = COLA_COMMAND_UNKNOWN;
+    char head[COLA_MAX_NAME + 4];
+    const struct command *c = p.verb != 0 ? find(self, &p, &error) : NULL;
+    if (c == NULL) return error;
+    if (c->level > self->level) return c->verb == 'W' ? COLA_WRITE_DENIED : COLA_METHOD_DENIED;
+    snprintf(head, sizeof head, "%s %s", answer_verb(p.verb), p.name);
+    cola_begin(out, request->form, head);
+    return c->carry_out(self, &p.args, out);
+}
+
+void cola_carry_out(struct cola *self, const struct cola_request *request)
+{
+    struct cola_out out = {.buf = self->unit, .cap = sizeof self->unit};
+    const uint16_t telegrams = self->telegrams;
+    cola_deliver(self);
+    self->stream_form = request->form;
+    const enum cola_error error = carry_out(self, request, &out);
+    if (error == COLA_LATER) return;
+    if (error != COLA_OK)
+        cola_refuse(self, request->form, error);
+    else if (self->host.send(self->host.ctx, self->unit, cola_end(&out)) != 0)
+        self->telegrams = telegrams;
+    if (!self->reboots) return;
+    cola_power_up(self);
+    self->host.hang_up(self->host.ctx);
+}

@@ -1,0 +1,300 @@
+/* Identity, states, log-in, clock, inputs and outputs. */
+#include <stdio.h>
+#include <string.h>
+
+#include "drivers/protocol/cola.h"
+#include "drivers/protocol/cola_clock.h"
+
+enum { MAX_REPLY = 512, MOST_LOCATION = 16, N_OUTPUTS = 5 };
+
+/* ---- identity */
+
+static const char *version(const struct cola *self)
+{
+    return self->identity->firmware[0] != 0 ? self->identity->firmware : self->model->version;
+}
+
+enum cola_error cola_read_ident(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    cola_put_text(out, self->identity->model);
+    cola_put_text(out, version(self));
+    return cola_args_end(args);
+}
+
+enum cola_error cola_read_serial(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    cola_put_text(out, self->identity->serial);
+    return cola_args_end(args);
+}
+
+enum cola_error cola_read_firmware(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    const char *const v = version(self);
+    cola_put_text(out, strcmp(v, self->model->version) == 0 ? self->model->firmware : v);
+    return cola_args_end(args);
+}
+
+enum cola_error cola_read_location(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    cola_put_text(out, self->set.location);
+    return cola_args_end(args);
+}
+
+enum cola_error cola_write_location(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    char name[MOST_LOCATION + 1];
+    (void)out;
+    cola_arg_text(args, name, sizeof name);
+    const enum cola_error error = cola_args_end(args);
+    if (error == COLA_OK) memcpy(self->set.location, name, sizeof name);
+    return error;
+}
+
+/* ---- states */
+
+enum head { UNKNOWN = -1, OFF, BOOT, IDLE, SPIN_UP, SCANNING, SPIN_DOWN, FAULT };
+
+static enum head head_state(struct cola *self)
+{
+    static const char *const names[] = {"off", "boot", "idle", "spin-up", "scanning", "spin-down", "fault"};
+    char state[MAX_REPLY] = "";
+    if (self->host.command(self->host.ctx, "HEAD:STATE?", state, sizeof state) != 0) return UNKNOWN;
+    for (int i = OFF; i <= FAULT; i++)
+        if (strcmp(names[i], state) == 0) return (enum head)i;
+    return UNKNOWN;
+}
+
+enum cola_error cola_read_state(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    enum { BUSY, READY, ERROR };
+    const enum head head = head_state(self);
+    if (head == FAULT)
+        cola_put_u(out, 1, ERROR);
+    else
+        cola_put_u(out, 1, head <= BOOT || !self->collector.geometry.fits ? BUSY : READY);
+    return cola_args_end(args);
+}
+
+/* u16 state, u8 temperature, text time, text date, 3 x u16 LED */
+enum cola_error cola_read_lms_state(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    enum { UNDEFINED, INITIALISATION, CONFIGURATION, REST, ROTATES, PREPARATION, READY, MEASURES };
+    static const uint8_t states[] = {INITIALISATION, INITIALISATION, REST, PREPARATION, MEASURES, ROTATES, UNDEFINED};
+    const struct cola_date d = cola_date_of(cola_clock_ns(self, self->now_ns));
+    const enum head head = head_state(self);
+    uint32_t state = head == UNKNOWN ? (uint32_t)UNDEFINED : states[head];
+    char text[40];
+    if (state == MEASURES && !self->measures) state = READY;
+    cola_put_u(out, 2, state);
+    cola_put_u(out, 1, 0);
+    snprintf(text, sizeof text, "%02u:%02u:%02u", d.hour, d.minute, d.second);
+    cola_put_text(out, text);
+    snprintf(text, sizeof text, "%02u.%02u.%04u", d.day, d.month, d.year);
+    cola_put_text(out, text);
+    for (int i = 0; i < 3; i++)
+        cola_put_u(out, 2, 0);
+    return cola_args_end(args);
+}
+
+enum cola_error cola_read_contamination(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    (void)self;
+    cola_put_u(out, 1, 0);
+    return cola_args_end(args);
+}
+
+enum cola_error cola_read_hours(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    const int64_t tenth_ns = INT64_C(360000000000);
+    cola_put_u(out, 4, (uint32_t)(self->now_ns / tenth_ns));
+    return cola_args_end(args);
+}
+
+enum cola_error cola_read_power_ons(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    (void)self;
+    cola_put_u(out, 4, 1);
+    return cola_args_end(args);
+}
+
+/* ---- inputs, outputs, fields: there are none that are active */
+
+static uint32_t system_count_us(const struct cola *self)
+{
+    return (uint32_t)((uint64_t)self->now_ns / 1000u);
+}
+
+/* u16 version, u32 time, 4 x u8 input, u16 no time of day */
+enum cola_error cola_read_inputs(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    cola_put_u(out, 2, 0);
+    cola_put_u(out, 4, system_count_us(self));
+    for (int i = 0; i < 4; i++)
+        cola_put_u(out, 1, 0);
+    cola_put_u(out, 2, 0);
+    return cola_args_end(args);
+}
+
+/* u16 version, u32 time, 5 x (u8 state, u32 changes), u16 no time of day */
+enum cola_error cola_read_outputs(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    cola_put_u(out, 2, 0);
+    cola_put_u(out, 4, system_count_us(self));
+    for (int i = 0; i < N_OUTPUTS; i++) {
+        cola_put_u(out, 1, 0);
+        cola_put_u(out, 4, 0);
+    }
+    cola_put_u(out, 2, 0);
+    return cola_args_end(args);
+}
+
+/* u16 number of fields */
+enum cola_error cola_read_field_results(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    (void)self;
+    cola_put_u(out, 2, 0);
+    return cola_args_end(args);
+}
+
+/* ---- which form streamed telegrams have */
+
+enum cola_error cola_read_framing(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    cola_put_u(out, 1, self->set.framing);
+    return cola_args_end(args);
+}
+
+enum cola_error cola_write_framing(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    const uint32_t form = cola_arg_u(args, 1);
+    const enum cola_error error = cola_args_end(args);
+    (void)out;
+    if (error != COLA_OK) return error;
+    if (form > COLA_B) return COLA_INVALID_DATA;
+    self->set.framing = (uint8_t)form;
+    self->stream_form = (enum cola_form)form;
+    return COLA_OK;
+}
+
+/* ---- log-in */
+
+static int password_fits(uint32_t level, uint32_t hash)
+{
+    return (level == COLA_MAINTENANCE && hash == 0xb21ace26) || (level == COLA_CLIENT && hash == 0xf4724744) ||
+           (level == COLA_SERVICE && hash == 0x81be23aa);
+}
+
+/* u8 level, u32 hash of the password; u8 1: done */
+enum cola_error cola_log_in(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    const uint32_t level = cola_arg_u(args, 1), hash = cola_arg_u(args, 4);
+    const enum cola_error error = cola_args_end(args);
+    if (error != COLA_OK) return error;
+    if (password_fits(level, hash)) self->level = (enum cola_level)level;
+    cola_put_u(out, 1, (uint32_t)password_fits(level, hash));
+    return COLA_OK;
+}
+
+enum cola_error cola_check_password(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    const uint32_t level = cola_arg_u(args, 1), hash = cola_arg_u(args, 4);
+    (void)self;
+    cola_put_u(out, 1, (uint32_t)password_fits(level, hash));
+    return cola_args_end(args);
+}
+
+enum cola_error cola_get_level(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    cola_put_u(out, 1, (uint32_t)self->level);
+    return cola_args_end(args);
+}
+
+enum cola_error cola_log_out(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    const enum cola_error error = cola_args_end(args);
+    if (error != COLA_OK) return error;
+    self->level = COLA_RUN;
+    cola_put_u(out, 1, 1);
+    return COLA_OK;
+}
+
+/* ---- measurement */
+
+int cola_start_scan(struct cola *self)
+{
+    char reply[MAX_REPLY];
+    const enum head head = head_state(self);
+    self->wants_scan = head == OFF || head == BOOT || head == SPIN_DOWN;
+    if (head == SPIN_UP || head == SCANNING || self->wants_scan) return 0;
+    return head != IDLE || self->host.command(self->host.ctx, "SCAN:START", reply, sizeof reply) != 0;
+}
+
+/* u8 0: measures */
+enum cola_error cola_start(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    const enum cola_error error = cola_args_end(args);
+    if (error != COLA_OK) return error;
+    self->measures = 1;
+    cola_put_u(out, 1, (uint32_t)cola_start_scan(self));
+    return COLA_OK;
+}
+
+/* Of this session alone: the head goes on, since others may read it. */
+enum cola_error cola_stop(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    const enum cola_error error = cola_args_end(args);
+    if (error != COLA_OK) return error;
+    self->measures = self->wants_scan = 0;
+    cola_put_u(out, 1, 0);
+    return COLA_OK;
+}
+
+/* ---- clock */
+
+int64_t cola_clock_ns(const struct cola *self, int64_t t_ns)
+{
+    const int64_t utc_ns = self->host.utc_ns(self->host.ctx, t_ns);
+    return (utc_ns == INT64_MIN ? t_ns : utc_ns) + self->set.clock_ns;
+}
+
+/* u16 year, 5 x u8, u32 us; u8 1: set */
+enum cola_error cola_set_clock(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    struct cola_date d = {.year = cola_arg_u(args, 2)};
+    uint32_t *const parts[] = {&d.month, &d.day, &d.hour, &d.minute, &d.second};
+    int64_t ns;
+    for (int i = 0; i < 5; i++)
+        *parts[i] = cola_arg_u(args, 1);
+    d.us = cola_arg_u(args, 4);
+    const enum cola_error error = cola_args_end(args);
+    if (error != COLA_OK) return error;
+    const int is_date = cola_date_ns(&d, &ns);
+    if (is_date) self->set.clock_ns += ns - cola_clock_ns(self, self->now_ns);
+    cola_put_u(out, 1, (uint32_t)is_date);
+    return COLA_OK;
+}
+
+/* ---- keeping and forgetting */
+
+enum cola_error cola_keep(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    (void)self;
+    cola_put_u(out, 1, 1);
+    return cola_args_end(args);
+}
+
+enum cola_error cola_load_defaults(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    const enum cola_error error = cola_args_end(args);
+    (void)out;
+    if (error == COLA_OK) cola_settings_reset(self);
+    return error;
+}
+
+enum cola_error cola_reboot(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    const enum cola_error error = cola_args_end(args);
+    (void)out;
+    if (error == COLA_OK) self->reboots = 1;
+    return error;
+}

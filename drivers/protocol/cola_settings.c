@@ -1,0 +1,185 @@
+/* What a client sets and asks for the measurement. */
+#include <stdio.h>
+#include <string.h>
+
+#include "drivers/protocol/cola.h"
+
+enum { FREQUENCY_ERROR = 1, RESOLUTION_ERROR = 2, AREA_ERROR = 4, OTHER_ERROR = 5 };
+
+void cola_settings_reset(struct cola *self)
+{
+    const char *name = self->identity->name;
+    self->set = (struct cola_settings){
+        .channels = {1, 0}, .rssi = self->model->rssi, .rssi_16bit = self->model->rssi_16bit, .every = 1};
+    snprintf(self->set.location, sizeof self->set.location, "%s", name[0] != 0 ? name : "not defined");
+}
+
+static const struct cola_geometry *geometry(const struct cola *self)
+{
+    return &self->collector.geometry;
+}
+
+static uint32_t step_e4(const struct cola_geometry *g)
+{
+    return (3600000 + g->steps / 2) / g->steps;
+}
+
+/* ---- LMPoutputRange: u16 1, u32 step, i32 start, i32 stop */
+
+enum cola_error cola_read_output_range(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    const struct cola_geometry *g = geometry(self);
+    const int all = self->set.n_beams == 0;
+    if (!g->fits) return COLA_CONDITION;
+    cola_put_u(out, 2, 1);
+    cola_put_u(out, 4, step_e4(g));
+    cola_put_i(out, 4, all ? g->start_e4 : self->set.start_e4);
+    cola_put_i(out, 4, all ? cola_beam_angle(g, g->n - 1) : self->set.stop_e4);
+    return cola_args_end(args);
+}
+
+enum cola_error cola_write_output_range(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    const struct cola_geometry *g = geometry(self);
+    const uint32_t sectors = cola_arg_u(args, 2), step = cola_arg_u(args, 4);
+    const int32_t start_e4 = cola_arg_i(args, 4), stop_e4 = cola_arg_i(args, 4);
+    uint32_t first = 0, n = 0;
+    (void)out;
+    const enum cola_error error = cola_args_end(args);
+    if (error != COLA_OK) return error;
+    if (!g->fits) return COLA_CONDITION;
+    if (sectors != 1 || step != step_e4(g) || start_e4 > stop_e4) return COLA_INVALID_DATA;
+    if (start_e4 < g->start_e4 || stop_e4 > cola_beam_angle(g, g->n - 1)) return COLA_INVALID_DATA;
+    while (first < g->n && cola_beam_angle(g, first) < start_e4)
+        first++;
+    while (first + n < g->n && cola_beam_angle(g, first + n) <= stop_e4)
+        n++;
+    if (n == 0) return COLA_INVALID_DATA;
+    self->set.start_e4 = start_e4;
+    self->set.stop_e4 = stop_e4;
+    self->set.first_beam = first;
+    self->set.n_beams = n;
+    return COLA_OK;
+}
+
+/* ---- LMDscandatacfg: 2 x u8 channels, u8 RSSI, u8 16 bit, u8 unit, 2 x u8 encoder, u8 position, u8 name, u8 comment,
+ * u8 time, u16 every so many-th scan */
+
+enum cola_error cola_read_scan_data_cfg(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    const struct cola_settings *s = &self->set;
+    const uint8_t bytes[] = {s->channels[0], s->channels[1], s->rssi, s->rssi_16bit, s->unit, s->encoder[0],
+                             s->encoder[1],  s->position,    s->name, s->comment,    s->time};
+    for (size_t i = 0; i < sizeof bytes; i++)
+        cola_put_u(out, 1, bytes[i]);
+    cola_put_u(out, 2, s->every);
+    return cola_args_end(args);
+}
+
+enum cola_error cola_write_scan_data_cfg(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    struct cola_settings s = self->set;
+    uint8_t *const bytes[] = {&s.channels[0], &s.channels[1], &s.rssi, &s.rssi_16bit, &s.unit, &s.encoder[0],
+                              &s.encoder[1],  &s.position,    &s.name, &s.comment,    &s.time};
+    (void)out;
+    for (size_t i = 0; i < sizeof bytes / sizeof bytes[0]; i++)
+        *bytes[i] = (uint8_t)cola_arg_u(args, 1);
+    s.every = (uint16_t)cola_arg_u(args, 2);
+    const enum cola_error error = cola_args_end(args);
+    if (error != COLA_OK) return error;
+    const uint8_t have = (uint8_t)((1u << self->model->echoes) - 1);
+    if (s.channels[0] == 0 || (s.channels[0] & ~have) != 0 || s.channels[1] != 0 || s.unit != 0 || s.every == 0)
+        return COLA_INVALID_DATA;
+    if (s.rssi > 1 || s.rssi_16bit > 1 || s.position > 1 || s.name > 1 || s.comment > 1 || s.time > 1)
+        return COLA_INVALID_DATA;
+    self->set = s;
+    return COLA_OK;
+}
+
+/* ---- LMPscancfg, mLMPsetscancfg: u32 1/100 Hz, i16 sectors, u32 step, i32 start, i32 stop */
+
+static void put_scan_cfg(const struct cola_geometry *g, struct cola_out *out)
+{
+    cola_put_u(out, 4, g->scan_chz);
+    cola_put_i(out, 2, 1);
+    cola_put_u(out, 4, step_e4(g));
+    cola_put_i(out, 4, g->start_e4);
+    cola_put_i(out, 4, cola_beam_angle(g, g->n - 1));
+}
+
+enum cola_error cola_read_scan_cfg(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    if (!geometry(self)->fits) return COLA_CONDITION;
+    put_scan_cfg(geometry(self), out);
+    return cola_args_end(args);
+}
+
+/* What the head has is accepted, all else refused by its status. The answer says what it has. */
+enum cola_error cola_set_scan_cfg(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    const struct cola_geometry *g = geometry(self);
+    const uint32_t scan_chz = cola_arg_u(args, 4);
+    const int32_t sectors = cola_arg_i(args, 2);
+    const uint32_t step = cola_arg_u(args, 4);
+    const int32_t start_e4 = cola_arg_i(args, 4), stop_e4 = cola_arg_i(args, 4);
+    const enum cola_error error = cola_args_end(args);
+    if (error != COLA_OK) return error;
+    if (!g->fits) return COLA_CONDITION;
+    const int area = start_e4 == g->start_e4 && stop_e4 == cola_beam_angle(g, g->n - 1);
+    cola_put_u(out, 1,
+               scan_chz != g->scan_chz ? FREQUENCY_ERROR
+               : step != step_e4(g)    ? RESOLUTION_ERROR
+               : !area                 ? AREA_ERROR
+               : sectors != 1          ? OTHER_ERROR
+                                       : 0);
+    put_scan_cfg(g, out);
+    return COLA_OK;
+}
+
+/* ---- FREchoFilter: u8 */
+
+enum cola_error cola_read_filter(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    cola_put_u(out, 1, self->set.filter);
+    return cola_args_end(args);
+}
+
+enum cola_error cola_write_filter(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    const uint32_t filter = cola_arg_u(args, 1);
+    const enum cola_error error = cola_args_end(args);
+    (void)out;
+    if (error != COLA_OK) return error;
+    if (filter > COLA_FILTER_LAST || (filter == COLA_FILTER_ALL && self->model->echoes < 2)) return COLA_INVALID_DATA;
+    self->set.filter = (uint8_t)filter;
+    return COLA_OK;
+}
+
+/* ---- LMDscandatascalefactor: float, 1 or 2 */
+
+static float scale_in_use(const struct cola *self)
+{
+    return (float)(self->set.scale != 0 ? self->set.scale : geometry(self)->scale);
+}
+
+enum cola_error cola_read_scale(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    if (!geometry(self)->fits) return COLA_CONDITION;
+    cola_put_float(out, scale_in_use(self));
+    return cola_args_end(args);
+}
+
+enum cola_error cola_write_scale(struct cola *self, struct cola_args *args, struct cola_out *out)
+{
+    const uint32_t bits = cola_arg_u(args, 4);
+    const enum cola_error error = cola_args_end(args);
+    float scale;
+    (void)out;
+    memcpy(&scale, &bits, sizeof scale);
+    if (error != COLA_OK) return error;
+    if (!geometry(self)->fits) return COLA_CONDITION;
+    /* 1 would cut off what the head reaches over 65.535 m */
+    if (scale != 2.0f && !(scale == 1.0f && geometry(self)->scale == 1)) return COLA_INVALID_DATA;
+    self->set.scale = (uint32_t)scale;
+    return COLA_OK;
+}

@@ -1,0 +1,512 @@
+/* CoLa's commands: the sequences of real clients, both forms, log-in, errors, and what is no telegram. */
+#include "tests/unit/cola_rig.h"
+
+static int close_rig(void **state)
+{
+    (void)state;
+    cola_close();
+    return 0;
+}
+
+/* ---- start-up sequences of real clients, with the answers that they accept */
+
+static void sick_tim_starts(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    strcpy(cola.identity.firmware, "V2.62-16.02.16"); /* as the profile says */
+    cola_expect("sRI0", "sRA 0 6 TiM571 E V2.62-16.02.16");
+    cola_expect("sRN SerialNumber", "sRA SerialNumber 8 17210001");
+    cola_expect("sRN FirmwareVersion", "sRA FirmwareVersion 8 V2.62-16");
+    cola_expect("sRN SCdevicestate", "sRA SCdevicestate 1");
+    cola_expect("sEN LMDscandata 1", "sEA LMDscandata 1");
+    cola_expect("sEN LMDscandata 0", "sEA LMDscandata 0");
+    cola_expect("sMN SetAccessMode 03 F4724744", "sAN SetAccessMode 1");
+    cola_expect("sMN mSCreboot", "sAN mSCreboot");
+    assert_int_equal(cola.hung_up, 1);
+    assert_int_equal(cola.count[PROTOCOL_WRONG], 0);
+}
+
+/* sick_tim refuses firmware from 2.50 on of a TiM3xx, by this pattern; no model of ours may look like one. */
+static void no_ident_is_an_old_tim(void **state)
+{
+    (void)state;
+    static const char *const models[] = {"TiM561", "TiM571", "TiM781", "LMS111", "Scanner of my own"};
+    for (size_t i = 0; i < sizeof models / sizeof models[0]; i++) {
+        char part[3];
+        cola_open_tim(models[i]);
+        assert_int_not_equal(sscanf(cola_ask("sRI0"), "sRA 0 6 TiM3%1s%1s", part, part + 1), 2);
+        cola_close();
+    }
+    cola_open_tim("Scanner of my own");
+    cola.identity.firmware[0] = 0;
+    cola_expect("sRN DeviceIdent", "sRA DeviceIdent 11 Scanner of my own 5 V1.00");
+}
+
+static void sick_scan_xd_starts_in_a(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    cola_expect("sRN SCdevicestate", "sRA SCdevicestate 1");
+    cola_expect("sMN SetAccessMode 3 F4724744", "sAN SetAccessMode 1");
+    cola_expect("sWN EIHstCola 0", "sWA EIHstCola");
+    cola_expect("sRN FirmwareVersion", "sRA FirmwareVersion 5 1.2.3");
+    cola_expect("sRN ODoprh", "sRA ODoprh 0");
+    cola_expect("sRN ODpwrc", "sRA ODpwrc 1");
+    cola_expect("sRN LocationName", "sRA LocationName 3 rig");
+    cola_expect("sRN LMPoutputRange", "sRA LMPoutputRange 1 D05 FFF92230 225510");
+    cola_expect("sWN LMPoutputRange 1 D05 FFF92230 225510", "sWA LMPoutputRange");
+    cola_expect("sRN LMPoutputRange", "sRA LMPoutputRange 1 D05 FFF92230 225510");
+    cola_expect("sWN LMDscandatacfg 1 0 1 1 0 0 0 0 0 0 1 1", "sWA LMDscandatacfg");
+    cola_expect("sRN LMDscandatacfg", "sRA LMDscandatacfg 1 0 1 1 0 0 0 0 0 0 1 1");
+    cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 0");
+    cola_expect("sMN Run", "sAN Run 1");
+    cola_expect("sEN LMDscandata 1", "sEA LMDscandata 1");
+}
+
+static void sick_scan_xd_starts_in_b(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    EXPECT_B("sRN SCdevicestate", "sRA SCdevicestate \1");
+    EXPECT_B("sMN SetAccessMode \3\xf4\x72\x47\x44", "sAN SetAccessMode \1");
+    EXPECT_B("sWN EIHstCola \1", "sWA EIHstCola ");
+    EXPECT_B("sRN FirmwareVersion", "sRA FirmwareVersion \0\5"
+                                    "1.2.3");
+    EXPECT_B("sRN ODoprh", "sRA ODoprh \0\0\0\0");
+    EXPECT_B("sRN ODpwrc", "sRA ODpwrc \0\0\0\1");
+    EXPECT_B("sRN LocationName", "sRA LocationName \0\3rig");
+#define RANGE "\0\1\0\0\x0d\x05\xff\xf9\x22\x30\x00\x22\x55\x10"
+    EXPECT_B("sRN LMPoutputRange", "sRA LMPoutputRange " RANGE);
+    EXPECT_B("sWN LMPoutputRange " RANGE, "sWA LMPoutputRange ");
+    EXPECT_B("sRN LMPoutputRange", "sRA LMPoutputRange " RANGE);
+#define CFG "\1\0\1\1\0\0\0\0\0\0\1\0\1"
+    EXPECT_B("sWN LMDscandatacfg " CFG, "sWA LMDscandatacfg ");
+    EXPECT_B("sRN LMDscandatacfg", "sRA LMDscandatacfg " CFG);
+    EXPECT_B("sMN LMCstartmeas", "sAN LMCstartmeas \0");
+    EXPECT_B("sMN Run", "sAN Run \1");
+    EXPECT_B("sEN LMDscandata \1", "sEA LMDscandata \1");
+    EXPECT_B("sEN LMDscandata \0", "sEA LMDscandata \0");
+}
+
+static void sick_scan_xd_asks_for_fields(void **state)
+{
+    (void)state;
+    char request[32], answer[32];
+    cola_open_tim("TiM781");
+    for (int i = 0; i < 48; i++) {
+        snprintf(request, sizeof request, "sRN field%03d", i);
+        snprintf(answer, sizeof answer, "sRA field%03d ", i); /* its NUL is the value 0 */
+        cola_expect_b(request, strlen(request), answer, strlen(answer) + 1);
+    }
+    cola_expect("sRN field012", "sRA field012 0");
+    cola_expect("sRN field048", "sFA 3");
+    cola_expect("sRN field+12", "sFA 3");
+    EXPECT_B("sRN LIDinputstate", "sRA LIDinputstate \0\0\0\0\0\0\0\0\0\0\0\0");
+    EXPECT_B("sEN LFErec \1", "sEA LFErec \1");
+    EXPECT_B("sEN LIDoutputstate \1", "sEA LIDoutputstate \1");
+    EXPECT_B("sEN LIDinputstate \1", "sEA LIDinputstate \1");
+    EXPECT_B("sRN LFErec", "sRA LFErec \0\0");
+    /* 33 bytes, as a TiM781S gives them: nothing set, 5 outputs */
+    uint8_t outputs[19 + 33] = "sRA LIDoutputstate ";
+    cola_expect_b("sRN LIDoutputstate", 18, outputs, sizeof outputs);
+}
+
+/* Frames as real scanners sent them, from public captures. */
+static void frames_are_those_of_real_scanners(void **state)
+{
+    (void)state;
+    static const char *const requests[] = {"sRN SCdevicestate", "sRN field010", "sMN SetAccessMode \3\1\1\1\1",
+                                           "sWN EIHstCola \1"};
+    static const size_t sizes[] = {17, 12, 23, 15};
+    static const struct {
+        size_t len;
+        char bytes[40];
+    } answers[] = {
+        {28, "\2\2\2\2\0\0\0\x13sRA SCdevicestate \1\x1e"},
+        {23, "\2\2\2\2\0\0\0\x0esRA field010 \0\x33"},
+        {28, "\2\2\2\2\0\0\0\x13sAN SetAccessMode \0\x39"},
+        {14, "\2\2\2\2\0\0\0\5sFA\0\n~"},
+    };
+    uint8_t frame[64];
+    cola_open_tim("TiM781");
+    for (int i = 0; i < 4; i++) {
+        protocol_rig_clear(&cola);
+        cola_input(frame, cola_frame_b(frame, requests[i], sizes[i]));
+        assert_int_equal(cola.len, answers[i].len);
+        assert_memory_equal(cola.bytes, answers[i].bytes, cola.len);
+    }
+}
+
+static void mrpt_starts(void **state)
+{
+    (void)state;
+    cola_open_lms();
+    cola_expect("sMN SetAccessMode 03 F4724744", "sAN SetAccessMode 1");
+    cola_expect("sMN mLMPsetscancfg +2500 +1 +2500 -450000 +2250000", "sAN mLMPsetscancfg 0 9C4 1 9C4 FFF92230 225510");
+    cola_expect("sWN LMDscandatacfg 01 00 0 1 0 00 00 0 0 0 0 +1", "sWA LMDscandatacfg");
+    cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 0");
+    cola_expect("sRN STlms", "sRA STlms 7 0 8 00:00:00 A 01.01.1970 0 0 0");
+    assert_int_equal(cola.bytes[11], '7'); /* what it looks at */
+}
+
+/* ---- states and the head */
+
+static void states_follow_the_head(void **state)
+{
+    (void)state;
+    static const char *const head[] = {"off", "boot", "idle", "spin-up", "scanning", "spin-down", "fault"};
+    static const char device[] = "0011112", lms[] = "1135740"; /* as the clients name the numbers: COLA.md */
+    cola_open_lms();
+    for (int i = 0; i < 7; i++) {
+        cola_head_state(head[i]);
+        assert_int_equal(cola_ask("sRN SCdevicestate")[18], device[i]);
+        assert_int_equal(cola_ask("sRN STlms")[10], lms[i]);
+    }
+    cola_head_state("scanning");
+    cola_authorise();
+    cola_expect("sMN LMCstopmeas", "sAN LMCstopmeas 0");
+    assert_int_equal(cola_ask("sRN STlms")[10], '6');
+}
+
+static void a_resting_head_is_started(void **state)
+{
+    (void)state;
+    cola_open_lms();
+    cola_authorise();
+    cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 0");
+    assert_int_equal(cola.n_lines, 1); /* it scans already */
+    cola_head_state("idle");
+    cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 0");
+    assert_int_equal(cola.n_lines, 2);
+    assert_string_equal(cola.line[1], "SCAN:START");
+    cola_expect("sEN LMDscandata 1", "sEA LMDscandata 1");
+    assert_string_equal(cola.line[1], "SCAN:START");
+    cola_expect("sMN LMCstopmeas", "sAN LMCstopmeas 0"); /* of this session alone */
+    assert_int_equal(cola.n_lines, 0);
+    cola_head_state("fault");
+    cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 1");
+    cola_head_state("spin-down"); /* as soon as it can */
+    cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 0");
+    cola_head_state("idle");
+    cola.ops->time(cola.protocol, 200000000);
+    assert_string_equal(cola.line[cola.n_lines - 1], "SCAN:START");
+}
+
+/* ---- log-in */
+
+static void writing_needs_its_level(void **state)
+{
+    (void)state;
+    static const char *const writes[] = {"sWN LMPoutputRange 1 9C4 0 0", "sWN EIHstCola 1",
+                                         "sWN LocationName 1 x",         "sWN LMDscandatacfg 1 0 0 0 0 0 0 0 0 0 0 1",
+                                         "sWN FREchoFilter 0",           "sWN LMDscandatascalefactor 3F800000"};
+    static const char *const methods[] = {"sMN LMCstartmeas",
+                                          "sMN LMCstopmeas",
+                                          "sMN mSCreboot",
+                                          "sMN mEEwriteall",
+                                          "sMN mSCloadappdef",
+                                          "sMN mLMPsetscancfg 9C4 1 9C4 FFF92230 225510",
+                                          "sMN LSPsetdatetime 7E8 1 1 0 0 0 0"};
+    cola_open_lms();
+    for (int level = 0; level < 2; level++) {
+        for (size_t i = 0; i < sizeof writes / sizeof writes[0]; i++)
+            cola_expect(writes[i], "sFA A");
+        for (size_t i = 0; i < sizeof methods / sizeof methods[0]; i++)
+            cola_expect(methods[i], "sFA 1");
+        cola_expect("sMN SetAccessMode 02 B21ACE26", "sAN SetAccessMode 1"); /* not enough */
+    }
+    assert_int_equal(cola.count[PROTOCOL_WRONG], 2 * 13);
+    cola_expect("sMN GetAccessMode", "sAN GetAccessMode 2");
+    cola_expect("sMN SetAccessMode 03 81BE23AA", "sAN SetAccessMode 0");
+    cola_expect("sMN SetAccessMode 05 F4724744", "sAN SetAccessMode 0");
+    cola_expect("sMN GetAccessMode", "sAN GetAccessMode 2"); /* as it was */
+    cola_expect("sMN SetAccessMode 04 81BE23AA", "sAN SetAccessMode 1");
+    cola_expect("sWN EIHstCola 1", "sWA EIHstCola");
+    cola_expect("sMN CheckPassword 3 F4724744", "sAN CheckPassword 1");
+    cola_expect("sMN CheckPassword 3 F4724745", "sAN CheckPassword 0");
+    cola_expect("sMN GetAccessMode", "sAN GetAccessMode 4");
+    cola_expect("sMN Run", "sAN Run 1");
+    cola_expect("sWN EIHstCola 1", "sFA A");
+}
+
+/* ---- errors, by SICK's numbers */
+
+static void errors_have_their_numbers(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *request, *answer;
+    } cases[] = {
+        {"sMN NoSuchMethod", "sFA 2"},
+        {"sRN NoSuchVariable", "sFA 3"},
+        {"sWN NoSuchVariable 1", "sFA 3"},
+        {"sEN NoSuchEvent 1", "sFA F"},
+        {"sRI7", "sFA 3"},
+        {"sRIO", "sFA 3"}, /* an MRPT client has an O for the 0 */
+        {"sWN SCdevicestate 1", "sFA A"},
+        {"sWN LMPscancfg 1", "sFA A"},
+        {"sXN LMDscandata", "sFA C"},
+        {"hello", "sFA C"},
+        {"", "sFA C"},
+        {"sWN LMPoutputRange 1 9C4 0", "sFA 8"},
+        {"sWN LMPoutputRange 1 9C4 0 10 1", "sFA 7"},
+        {"sWN LMPoutputRange 1 9C3 0 0", "sFA 5"},
+        {"sWN LMPoutputRange 1 9C4 FFF9222F 0", "sFA 5"},
+        {"sWN LMPoutputRange 1 9C4 0 225511", "sFA 5"},
+        {"sWN LMPoutputRange 1 9C4 +10 +20", "sFA 5"}, /* between two beams */
+        {"sWN LMPoutputRange 1 9C4 +20 +10", "sFA 5"},
+        {"sWN LMDscandatacfg 100 0 1 1 0 0 0 0 0 0 1 1", "sFA 10"},
+        {"sWN LMDscandatacfg -1 0 1 1 0 0 0 0 0 0 1 1", "sFA 10"},
+        {"sWN LMDscandatacfg 0 0 1 1 0 0 0 0 0 0 1 1", "sFA 5"},
+        {"sWN LMDscandatacfg 4 0 1 1 0 0 0 0 0 0 1 1", "sFA 5"},
+        {"sWN LMDscandatacfg 1 0 1 1 0 0 0 0 0 0 1 0", "sFA 5"},
+        {"sWN LMDscandatacfg 1 0 1 1 0 G 0 0 0 0 1 1", "sFA 11"},
+        {"sWN EIHstCola 123456789", "sFA 10"},
+        {"sWN EIHstCola 2", "sFA 5"},
+        {"sWN EIHstCola +", "sFA 8"},
+        {"sEN LMDscandata 2", "sFA 5"},
+        {"sEN LMDscandata", "sFA 8"},
+        {"sRN LMDscandata 1", "sFA 7"},
+        {"sWN LocationName 11 12345678901234567", "sFA 10"},
+        {"sWN LocationName 5 abc", "sFA 8"},
+        {"sWN FREchoFilter 3", "sFA 5"},
+        {"sMN LSPsetdatetime 7E8 2 1E 0 0 0", "sFA 8"},
+    };
+    cola_open_lms();
+    cola_authorise();
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++)
+        cola_expect(cases[i].request, cases[i].answer);
+    assert_int_equal(cola.count[PROTOCOL_WRONG], sizeof cases / sizeof cases[0]);
+    cola_expect("sRN LMPoutputRange", "sRA LMPoutputRange 1 9C4 FFF92230 225510"); /* nothing has changed */
+    EXPECT_B("sRN NoSuchVariable", "sFA\0\3");
+}
+
+static void a_geometry_that_the_head_has_not_is_refused(void **state)
+{
+    (void)state;
+    cola_open_lms();
+    cola_authorise();
+#define HAS " 9C4 1 9C4 FFF92230 225510"
+    cola_expect("sMN mLMPsetscancfg 9C4 1 9C4 FFF92230 225510", "sAN mLMPsetscancfg 0" HAS);
+    cola_expect("sMN mLMPsetscancfg +5000 +1 +2500 -450000 +2250000", "sAN mLMPsetscancfg 1" HAS);
+    cola_expect("sMN mLMPsetscancfg +2500 +1 +5000 -450000 +2250000", "sAN mLMPsetscancfg 2" HAS);
+    cola_expect("sMN mLMPsetscancfg +2500 +1 +2500 0 +1800000", "sAN mLMPsetscancfg 4" HAS);
+    cola_expect("sMN mLMPsetscancfg +2500 +2 +2500 -450000 +2250000", "sAN mLMPsetscancfg 5" HAS);
+    cola_expect("sRN LMPscancfg", "sRA LMPscancfg" HAS);
+    EXPECT_B("sRN LMPscancfg",
+             "sRA LMPscancfg \0\0\x09\xc4\0\1\0\0\x09\xc4\xff\xf9\x22\x30\x00\x22\x55\x10"); /* u32 i16 u32 i32 i32 */
+}
+
+static void settings_are_kept_and_forgotten(void **state)
+{
+    (void)state;
+    cola_open_lms();
+    cola_authorise();
+    cola_expect("sWN LocationName 5 a b c", "sWA LocationName");
+    cola_expect("sRN LocationName", "sRA LocationName 5 a b c");
+    cola_expect("sWN FREchoFilter 2", "sWA FREchoFilter");
+    cola_expect("sRN FREchoFilter", "sRA FREchoFilter 2");
+    cola_expect("sRN LMDscandatascalefactor", "sRA LMDscandatascalefactor 3F800000");
+    cola_expect("sWN LMDscandatascalefactor 40000000", "sWA LMDscandatascalefactor");
+    cola_expect("sRN LMDscandatascalefactor", "sRA LMDscandatascalefactor 40000000");
+    cola_expect("sWN LMDscandatascalefactor 40400000", "sFA 5");
+    cola_expect("sMN mEEwriteall", "sAN mEEwriteall 1");
+    cola_expect("sRN LCMstate", "sRA LCMstate 0");
+    cola_expect("sMN mSCloadappdef", "sAN mSCloadappdef");
+    cola_expect("sRN LocationName", "sRA LocationName 3 rig");
+    cola_expect("sRN FREchoFilter", "sRA FREchoFilter 0");
+    cola_expect("sRN LMDscandatascalefactor", "sRA LMDscandatascalefactor 3F800000");
+    cola_expect("sMN GetAccessMode", "sAN GetAccessMode 3"); /* still logged in */
+    cola_expect("sMN mSCreboot", "sAN mSCreboot");
+    cola_expect("sMN GetAccessMode", "sAN GetAccessMode 1"); /* where the link cannot hang up */
+}
+
+static void the_clock_can_be_set(void **state)
+{
+    (void)state;
+    cola_open_lms();
+    cola_authorise();
+    cola.utc0_ns = INT64_C(1709210096) * 1000000000; /* 2024-02-29T12:34:56Z */
+    cola_expect("sRN STlms", "sRA STlms 7 0 8 12:34:56 A 29.02.2024 0 0 0");
+    cola.ops->time(cola.protocol, INT64_C(3600000000000) * 12);
+    cola_expect("sRN STlms", "sRA STlms 7 0 8 00:34:56 A 01.03.2024 0 0 0");
+    cola_expect("sRN ODoprh", "sRA ODoprh 78"); /* 120 tenths of an hour */
+    cola_expect("sMN LSPsetdatetime 7CF C 1F 17 3B 3A 0", "sAN LSPsetdatetime 1");
+    cola_expect("sRN STlms", "sRA STlms 7 0 8 23:59:58 A 31.12.1999 0 0 0");
+    cola.ops->time(cola.protocol, INT64_C(3600000000000) * 12 + INT64_C(2000000000));
+    cola_expect("sRN STlms", "sRA STlms 7 0 8 00:00:00 A 01.01.2000 0 0 0");
+    cola_expect("sMN LSPsetdatetime 7E7 2 1D 0 0 0 0", "sAN LSPsetdatetime 0"); /* 29 February 2023 */
+    cola_expect("sMN LSPsetdatetime 7E8 D 1 0 0 0 0", "sAN LSPsetdatetime 0");
+    cola_expect("sRN STlms", "sRA STlms 7 0 8 00:00:00 A 01.01.2000 0 0 0");
+}
+
+/* ---- frames */
+
+static void answers_have_the_form_of_the_request(void **state)
+{
+    (void)state;
+    uint8_t bytes[128];
+    cola_open_tim("TiM571");
+    memcpy(bytes, "\2sRN ODpwrc\3", 12);
+    size_t len = 12;
+    len += cola_frame_b(bytes + len, "sRN ODpwrc", 10);
+    memcpy(bytes + len, "\2sRN LCMstate\3", 14);
+    len += 14;
+    for (size_t piece = 1; piece <= len; piece++) { /* in pieces of any size */
+        protocol_rig_clear(&cola);
+        for (size_t at = 0; at < len; at += piece)
+            cola_input(bytes + at, len - at < piece ? len - at : piece);
+        assert_int_equal(cola.n_units, 3);
+        assert_memory_equal(cola.bytes, "\2sRA ODpwrc 1\3", 14);
+        assert_memory_equal(cola.bytes + cola.end[0], "\2\2\2\2\0\0\0\x0fsRA ODpwrc \0\0\0\1", 23);
+        assert_memory_equal(cola.bytes + cola.end[1], "\2sRA LCMstate 0\3", 16);
+    }
+    assert_int_equal(cola.count[PROTOCOL_INPUT_LOST], 0);
+}
+
+/* Before each of these a good request is answered, and after it; what is garbage is counted. */
+static void garbage_is_skipped_and_counted(void **state)
+{
+    (void)state;
+    static const struct {
+        size_t len, lost;
+        char bytes[40];
+    } cases[] = {
+        {5, 5, "hello"},
+        {4, 4, "\0\0\0\0"},
+        {1, 1, "\3"},
+        {6, 6, "\2sRN \1"},                           /* a character that no telegram has */
+        {5, 5, "\2sRN "},                             /* half a telegram: the next one begins */
+        {1, 1, "\2"},                                 /* the mark twice */
+        {3, 3, "\2\2x"},                              /* and thrice */
+        {12, 12, "\2\2\2\2\xff\xff\xff\xff\1\1\1\1"}, /* a length that can't be */
+        {8, 8, "\2\2\2\2\0\0\0\0"},                   /* of nothing */
+        {19, 19, "\2\2\2\2\0\0\0\x0asRN ODpwrc\1"},   /* a wrong check byte */
+        {8, 8, "\2\2\2\2\0\0\0\x05"},                 /* half a telegram, and the next one inside what it claims */
+    };
+    cola_open_tim("TiM571");
+    uint8_t good[64];
+    const size_t good_len = cola_frame_b(good, "sRN LCMstate", 12);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        protocol_rig_clear(&cola);
+        cola.count[PROTOCOL_INPUT_LOST] = 0;
+        cola_input("\2sRN LCMstate\3", 14);
+        cola_input(cases[i].bytes, cases[i].len);
+        cola_input("\2sRN LCMstate\3", 14);
+        cola_input(good, good_len);
+        assert_int_equal(cola.n_units, 3);
+        assert_int_equal(cola.count[PROTOCOL_INPUT_LOST], cases[i].lost);
+    }
+    assert_int_equal(cola.count[PROTOCOL_WRONG], 0);
+}
+
+static void an_overlong_telegram_is_refused_once(void **state)
+{
+    (void)state;
+    static char bytes[100000];
+    cola_open_tim("TiM571");
+    memset(bytes, 'x', sizeof bytes);
+    bytes[0] = 2;
+    cola_input(bytes, sizeof bytes);
+    cola_input("\3", 1);
+    assert_int_equal(cola.n_units, 1);
+    assert_memory_equal(cola.bytes, "\2sFA 7\3", 7);
+    assert_int_equal(cola.count[PROTOCOL_INPUT_LOST], sizeof bytes + 1);
+    cola_expect("sRN LCMstate", "sRA LCMstate 0");
+    memset(bytes, 2, sizeof bytes); /* marks without end */
+    cola_input(bytes, sizeof bytes);
+    cola_expect("sRN LCMstate", "sRA LCMstate 0");
+}
+
+/* The longest names and values that there is room for. */
+static void long_requests_are_answered(void **state)
+{
+    (void)state;
+    char bytes[1400];
+    cola_open_tim("TiM571");
+    for (int len = 1000; len <= 1024; len++) {
+        memset(bytes, 'n', sizeof bytes);
+        memcpy(bytes, "sRN ", 4);
+        bytes[len] = 0;
+        cola_expect(bytes, "sFA 3");
+        cola_expect_b(bytes, (size_t)len, "sFA\0\3", 5);
+    }
+}
+
+static uint32_t random_state;
+
+static uint32_t draw(uint32_t below)
+{
+    random_state = random_state * 1664525u + 1013904223u;
+    return (random_state >> 8) % below;
+}
+
+/* Telegrams broken at random, in random pieces, among scans. The head goes on, every byte is accounted for, and a good
+ * request is answered after it. */
+static void broken_telegrams_do_no_harm(void **state)
+{
+    (void)state;
+    static const char *const seeds[] = {"sMN SetAccessMode 3 F4724744",
+                                        "sWN LMPoutputRange 1 D05 FFF92230 225510",
+                                        "sWN LMDscandatacfg 1 0 1 1 0 1 0 0 1 0 1 1",
+                                        "sEN LMDscandata 1",
+                                        "sRN LMDscandata",
+                                        "sWN LocationName 3 abc",
+                                        "sMN mSCloadappdef",
+                                        "sRI0"};
+    static const uint8_t quiet[1100];
+    uint8_t bytes[128];
+    cola_open_tim("TiM571");
+    random_state = 14;
+    for (int round = 0; round < 20000; round++) {
+        const char *seed = seeds[draw(8)];
+        size_t len = strlen(seed);
+        if (draw(2)) {
+            len = cola_frame_b(bytes, seed, len);
+        } else {
+            memcpy(bytes + 1, seed, len);
+            bytes[0] = 2;
+            bytes[len + 1] = 3;
+            len += 2;
+        }
+        for (uint32_t n = draw(3); n != 0; n--)
+            bytes[draw((uint32_t)len)] = (uint8_t)draw(256);
+        if (draw(8) == 0) len = draw((uint32_t)len) + 1;
+        const size_t first = draw((uint32_t)len);
+        protocol_rig_clear(&cola);
+        cola_input(bytes, first);
+        cola_input(bytes + first, len - first);
+        if (round % 100 == 0) cola_turn((uint32_t)round / 100, 1.0);
+    }
+    cola_input(quiet, sizeof quiet);
+    assert_true(cola.count[PROTOCOL_INPUT_LOST] > 1000 && cola.count[PROTOCOL_WRONG] > 1000);
+    cola_expect("sRN LCMstate", "sRA LCMstate 0");
+}
+
+int main(void)
+{
+#define CASE(f) cmocka_unit_test_teardown(f, close_rig)
+    const struct CMUnitTest tests[] = {
+        CASE(sick_tim_starts),
+        CASE(no_ident_is_an_old_tim),
+        CASE(sick_scan_xd_starts_in_a),
+        CASE(sick_scan_xd_starts_in_b),
+        CASE(sick_scan_xd_asks_for_fields),
+        CASE(frames_are_those_of_real_scanners),
+        CASE(mrpt_starts),
+        CASE(states_follow_the_head),
+        CASE(a_resting_head_is_started),
+        CASE(writing_needs_its_level),
+        CASE(errors_have_their_numbers),
+        CASE(a_geometry_that_the_head_has_not_is_refused),
+        CASE(settings_are_kept_and_forgotten),
+        CASE(the_clock_can_be_set),
+        CASE(answers_have_the_form_of_the_request),
+        CASE(garbage_is_skipped_and_counted),
+        CASE(an_overlong_telegram_is_refused_once),
+        CASE(long_requests_are_answered),
+        CASE(broken_telegrams_do_no_harm),
+    };
+    return cmocka_run_group_tests_name("cola", tests, NULL, NULL);
+}

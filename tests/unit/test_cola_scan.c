@@ -1,0 +1,659 @@
+/* CoLa's LMDscandata: what stands in it against the ranges, times and angles that went in. Read back by the public
+ * layout alone (cola_rig). */
+#include <math.h>
+
+#include "drivers/protocol/native_encode.h"
+#include "tests/unit/cola_rig.h"
+
+static struct cola_lmd lmd;
+static struct protocol_rig_shot shots[3001];
+
+static int close_rig(void **state)
+{
+    (void)state;
+    cola_close();
+    return 0;
+}
+
+static void stream(int b)
+{
+    if (b)
+        EXPECT_B("sEN LMDscandata \1", "sEA LMDscandata \1");
+    else
+        cola_expect("sEN LMDscandata 1", "sEA LMDscandata 1");
+}
+
+/* ---- the telegram as a whole, by hand: 4 beams of a head with 8 steps a turn, 10 Hz */
+
+static void open_small(void)
+{
+    protocol_rig_open(&cola, PROTOCOL_COLA, "SICK", "TiM571");
+    protocol_rig_planar(&cola, 8, 2, 5, 4, -1, 10);
+    cola.scan_t0_ns = INT64_C(1000000000);
+    protocol_rig_describe(&cola, 0);
+    memset(shots, 0, sizeof shots);
+    shots[0] = (struct protocol_rig_shot){1, {1.0}, {0}, {0}};
+    shots[1] = (struct protocol_rig_shot){1, {2.5}, {-3200}, {0}};
+    shots[3] = (struct protocol_rig_shot){2, {4.6554, 9.0}, {-6399, 0}, {0}}; /* 4655 mm; the first echo counts */
+}
+
+static void a_telegram_in_a_is_this_text(void **state)
+{
+    (void)state;
+    open_small();
+    stream(0);
+    protocol_rig_clear(&cola);
+    protocol_rig_turn(&cola, 0, shots, 1);
+    /* Serial number 17210001 = 0x1069A91. Scan start 1 s = F4240 us, sent at the turn's end, 1.1 s = 10C8E0. 10 Hz = 3E8,
+     * 80 pulses a second: 1 (100 Hz). Step 45 deg = 6DDD0, and that is more than 16 bits: DDD0. First beam 90 - 2 x 45
+     * deg = 0. White is FF, -32 dB 80, -63.99 dB 1. */
+    static const char expected[] = "\2sSN LMDscandata 1 1 1069A91 0 0 0 0 F4240 10C8E0 0 0 0 0 0 3E8 1 0 1 "
+                                   "DIST1 3F800000 00000000 0 DDD0 4 3E8 9C4 0 122F "
+                                   "1 RSSI1 3F800000 00000000 0 DDD0 4 FF 80 0 1 0 0 0 0 0\3";
+    assert_int_equal(cola.n_units, 1);
+    cola.bytes[cola.len] = 0;
+    assert_string_equal((char *)cola.bytes, expected);
+}
+
+static void a_telegram_in_b_is_these_bytes(void **state)
+{
+    (void)state;
+    open_small();
+    stream(1);
+    protocol_rig_clear(&cola);
+    protocol_rig_turn(&cola, 0, shots, 1);
+    static const char payload[] = "sSN LMDscandata \0\1\0\1\x01\x06\x9a\x91\0\0\0\0\0\0\0\x0f\x42\x40\0\x10\xc8\xe0"
+                                  "\0\0\0\0\0\0\0\0\3\xe8\0\0\0\1\0\0"
+                                  "\0\1DIST1\x3f\x80\0\0\0\0\0\0\0\0\0\0\xdd\xd0\0\4\x03\xe8\x09\xc4\0\0\x12\x2f"
+                                  "\0\1RSSI1\x3f\x80\0\0\0\0\0\0\0\0\0\0\xdd\xd0\0\4\xff\x80\0\1\0\0\0\0\0\0\0\0\0\0";
+    uint8_t frame[512];
+    assert_int_equal(cola.len, cola_frame_b(frame, payload, sizeof payload - 1));
+    assert_memory_equal(cola.bytes, frame, cola.len);
+}
+
+/* 2552 bytes for 811 points and RSSI of 8 bit: what a TiM571 sends. */
+static void a_tim571_telegram_has_its_length(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    stream(1);
+    protocol_rig_clear(&cola);
+    cola_turn(0, 1.0);
+    assert_int_equal(cola.len, 2552);
+}
+
+/* ---- geometry and rates */
+
+static void ranges_stand_at_their_angles(void **state)
+{
+    (void)state;
+    for (int b = 0; b < 2; b++) {
+        cola_open_tim("TiM571");
+        stream(b);
+        protocol_rig_clear(&cola);
+        cola_turn(0, 1.0);
+        cola_read_lmd(0, &lmd);
+        assert_string_equal(lmd.verb, "sSN");
+        assert_int_equal(lmd.serial, 17210001);
+        assert_int_equal(lmd.scan_chz, 1500);
+        assert_int_equal(lmd.meas_100hz, 162);
+        assert_int_equal(lmd.n_16, 1);
+        assert_int_equal(lmd.n_8, 1);
+        const struct cola_channel *dist = &lmd.channel[0], *rssi = &lmd.channel[1];
+        assert_string_equal(dist->name, "DIST1");
+        assert_string_equal(rssi->name, "RSSI1");
+        assert_int_equal(dist->start_e4, -450000);
+        assert_int_equal(dist->step_e4, 3333);
+        assert_int_equal(dist->n, 811);
+        assert_int_equal(rssi->n, 811);
+        for (uint32_t i = 0; i < 811; i++)
+            assert_int_equal(dist->value[i], 1000 + 10 * i); /* counter-clockwise: with the steps */
+        if (b == 0) cola_close();
+    }
+}
+
+/* sick_tim warns where the step's time and 1 / measurement frequency differ by 10 us. */
+static void rates_agree_as_sick_tim_asks(void **state)
+{
+    (void)state;
+    for (int lms = 0; lms < 2; lms++) {
+        if (lms)
+            cola_open_lms();
+        else
+            cola_open_tim("TiM571");
+        stream(0);
+        protocol_rig_clear(&cola);
+        cola_turn(0, 1.0);
+        cola_read_lmd(0, &lmd);
+        const double scan_s = 100.0 / lmd.scan_chz, step_deg = lmd.channel[0].step_e4 / 1e4;
+        assert_true(fabs(scan_s * step_deg / 360.0 - 1.0 / (100.0 * lmd.meas_100hz)) < 1e-5);
+        assert_int_equal(lmd.meas_100hz, lms ? 360 : 162);
+        if (!lms) cola_close();
+    }
+}
+
+/* A head that turns clockwise seen from above is sent from its last step on: angles always grow counter-clockwise. A
+ * mark at one step, 30 degrees left of the front. */
+static void a_mark_on_the_left_is_on_the_left(void **state)
+{
+    (void)state;
+    for (int turn = -1; turn <= 1; turn += 2) {
+        protocol_rig_open(&cola, PROTOCOL_COLA, "SICK", "mine");
+        protocol_rig_planar(&cola, 720, 100, 500, 300, turn, 10);
+        protocol_rig_describe(&cola, 0);
+        stream(0);
+        for (int i = 0; i < 401; i++)
+            shots[i] = (struct protocol_rig_shot){1, {5.0}, {0}, {0}};
+        shots[300 - 100 - turn * 60].range_m[0] = 3.0; /* left is against the clock */
+        protocol_rig_clear(&cola);
+        protocol_rig_turn(&cola, 0, shots, 50);
+        cola_read_lmd(0, &lmd);
+        assert_int_equal(lmd.channel[0].n, 401);
+        assert_int_equal(lmd.channel[0].start_e4, (90 - 100) * 10000);
+        for (uint32_t i = 0; i < 401; i++) {
+            const int32_t angle_e4 = lmd.channel[0].start_e4 + (int32_t)(i * lmd.channel[0].step_e4);
+            assert_int_equal(lmd.channel[0].value[i], angle_e4 == (90 + 30) * 10000 ? 3000 : 5000);
+        }
+        if (turn < 0) cola_close();
+    }
+}
+
+static void far_heads_count_in_two_millimetres(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    cola.descriptor.range_max_m = 80.0;
+    protocol_rig_describe(&cola, 0);
+    stream(0);
+    protocol_rig_clear(&cola);
+    cola_turn(0, 60.0); /* to 68.1 m */
+    cola_read_lmd(0, &lmd);
+    assert_true(lmd.channel[0].scale == 2.0);
+    for (uint32_t i = 0; i < 811; i++)
+        assert_int_equal(lmd.channel[0].value[i], 30000 + 5 * i);
+    cola_authorise();
+    cola_expect("sWN LMDscandatascalefactor 3F800000", "sFA 5"); /* it would cut off */
+    protocol_rig_clear(&cola);
+    cola_turn(1, 130.0); /* 131.07 m is the end of 16 bits */
+    cola_read_lmd(0, &lmd);
+    assert_int_equal(lmd.channel[0].value[107], 65535);
+    assert_int_equal(lmd.channel[0].value[108], 0);
+    assert_int_equal(cola.count[PROTOCOL_POINTS_LOST], 811 - 108);
+}
+
+static void a_narrowed_range_is_narrower(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    cola_authorise();
+    cola_expect("sWN LMPoutputRange 1 D05 +0 +1800000", "sWA LMPoutputRange");
+    cola_expect("sRN LMPoutputRange", "sRA LMPoutputRange 1 D05 0 1B7740");
+    stream(0);
+    protocol_rig_clear(&cola);
+    cola_turn(0, 1.0);
+    cola_read_lmd(0, &lmd);
+    for (int k = 0; k < 2; k++) {
+        assert_int_equal(lmd.channel[k].start_e4, 0);
+        assert_int_equal(lmd.channel[k].n, 541);
+    }
+    for (uint32_t i = 0; i < 541; i++)
+        assert_int_equal(lmd.channel[0].value[i], 1000 + 10 * (135 + i));
+    cola_expect("sWN LMPoutputRange 1 D05 +900000 +900000", "sWA LMPoutputRange");
+    protocol_rig_clear(&cola);
+    cola_turn(1, 1.0);
+    cola_read_lmd(0, &lmd);
+    assert_int_equal(lmd.channel[0].n, 1);
+    assert_int_equal(lmd.channel[0].value[0], 1000 + 10 * 405);
+    cola_expect("sWN LMPoutputRange 1 D05 +900001 +906666", "sWA LMPoutputRange"); /* one beam, 90.3333 */
+    protocol_rig_clear(&cola);
+    cola_turn(2, 1.0);
+    cola_read_lmd(0, &lmd);
+    assert_int_equal(lmd.channel[0].n, 1);
+    assert_int_equal(lmd.channel[0].start_e4, 903333);
+}
+
+/* ---- echoes and signals */
+
+static void echoes_go_to_their_channels(void **state)
+{
+    (void)state;
+    cola_open_lms();
+    cola.attributes = 1;
+    protocol_rig_describe(&cola, 0);
+    cola_authorise();
+    memset(shots, 0, sizeof shots);
+    for (int i = 0; i < 1081; i++)
+        shots[i] = (struct protocol_rig_shot){(uint32_t)i % 4, {1.0, 2.0, 3.0}, {0, 0, 0}, {1000, 2000, 3000}};
+    for (int filter = 0; filter <= 2; filter += 2)
+        for (int wide = 0; wide < 2; wide++) {
+            char cfg[64];
+            snprintf(cfg, sizeof cfg, "sWN LMDscandatacfg 3 0 1 %d 0 0 0 0 0 0 0 1", wide);
+            cola_expect(cfg, "sWA LMDscandatacfg");
+            cola_expect(filter == 0 ? "sWN FREchoFilter 1" : "sWN FREchoFilter 2", "sWA FREchoFilter");
+            stream(wide);
+            protocol_rig_clear(&cola);
+            protocol_rig_turn(&cola, (uint32_t)(filter + wide), shots, 77);
+            assert_int_equal(cola.n_units, 1);
+            cola_read_lmd(0, &lmd);
+            assert_int_equal(lmd.n_16, wide ? 4 : 2);
+            assert_int_equal(lmd.n_8, wide ? 0 : 2);
+            static const char *const names[] = {"DIST1", "DIST2", "RSSI1", "RSSI2"};
+            for (int k = 0; k < 4; k++)
+                assert_string_equal(lmd.channel[k].name, names[k]);
+            /* 0.25 dB a count of 8 bit, 256 times finer with 16 */
+            const uint32_t db = wide ? 1024 : 4;
+            for (uint32_t i = 0; i < 1081; i++) {
+                const uint32_t n = i % 4, one = filter == 0 && n != 0 ? 1 : n;
+                assert_int_equal(lmd.channel[0].value[i], 1000 * one);
+                assert_int_equal(lmd.channel[1].value[i], n > 1 ? 2000 : 0);
+                assert_int_equal(lmd.channel[2].value[i], 10 * db * one);
+                assert_int_equal(lmd.channel[3].value[i], n > 1 ? 20 * db : 0);
+            }
+        }
+    cola_expect("sWN LMDscandatacfg 2 0 0 0 0 0 0 0 0 0 0 1", "sWA LMDscandatacfg");
+    protocol_rig_clear(&cola);
+    protocol_rig_turn(&cola, 4, shots, 77);
+    cola_read_lmd(0, &lmd);
+    assert_int_equal(lmd.n_16 + lmd.n_8, 1);
+    assert_string_equal(lmd.channel[0].name, "DIST2");
+}
+
+static void signals_end_where_their_scale_ends(void **state)
+{
+    (void)state;
+    static const int16_t refl_cdb[] = {0, 100, -6400, -10000, LINE_REFL_NONE, -2000};
+    static const uint32_t wide[] = {65535, 65535, 1, 1, 0, 44 * 1024}, narrow[] = {255, 255, 1, 1, 0, 176};
+    cola_open_tim("TiM571");
+    cola_authorise();
+    for (int i = 0; i < 811; i++)
+        shots[i] = (struct protocol_rig_shot){1, {1.0}, {refl_cdb[i % 6]}, {0}};
+    for (uint32_t bits = 0; bits < 2; bits++) {
+        cola_expect(bits ? "sWN LMDscandatacfg 1 0 1 1 0 0 0 0 0 0 0 1" : "sWN LMDscandatacfg 1 0 1 0 0 0 0 0 0 0 0 1",
+                    "sWA LMDscandatacfg");
+        stream(0);
+        protocol_rig_clear(&cola);
+        protocol_rig_turn(&cola, bits, shots, 100);
+        cola_read_lmd(0, &lmd);
+        for (uint32_t i = 0; i < 811; i++)
+            assert_int_equal(lmd.channel[1].value[i], bits ? wide[i % 6] : narrow[i % 6]);
+    }
+}
+
+/* ---- times and counters */
+
+static void ticks_count_modulo_32_bits(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    stream(1);
+    /* scans from a second before 2^32 us on: the 15th lies across */
+    cola.scan_t0_ns = INT64_C(4294967296000) - INT64_C(1000000000);
+    protocol_rig_clear(&cola);
+    for (uint32_t line = 0; line < 30; line++) {
+        cola_turn(line, 1.0);
+        cola_read_lmd(line, &lmd);
+        const int64_t start_ns = cola.scan_t0_ns + (int64_t)line * 1000000000 / 15;
+        const int64_t end_ns = cola.scan_t0_ns + (int64_t)(line + 1) * 1000000000 / 15;
+        assert_int_equal(lmd.scan_us, (uint32_t)(start_ns / 1000 % INT64_C(4294967296)));
+        assert_int_equal(lmd.send_us, (uint32_t)(end_ns / 1000 % INT64_C(4294967296)));
+    }
+    assert_true(lmd.scan_us < 1000000);
+}
+
+/* sick_scan_xd fits a line through ticks and the times of arrival; here the latter are device time. Over half an hour
+ * with the wrap in it the line's slope is 1, and no scan lies off it by more than the 1 us of a tick. */
+static void ticks_are_on_a_line_with_time(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    stream(1);
+    cola.scan_t0_ns = INT64_C(4294967296000) - INT64_C(900000000000);
+    double first_us = 0.0;
+    uint32_t before_us = 0;
+    int64_t wraps = 0;
+    for (uint32_t line = 0; line < 27000; line += line % 2 == 0 ? 1 : 899) {
+        protocol_rig_clear(&cola);
+        cola_turn(line, 1.0);
+        cola_read_lmd(0, &lmd);
+        if (lmd.scan_us < before_us) wraps++;
+        before_us = lmd.scan_us;
+        const double tick_us = (double)lmd.scan_us + 4294967296.0 * (double)wraps;
+        const double true_us = (double)cola.scan_t0_ns / 1e3 + line * (1e6 / 15.0);
+        if (line == 0) first_us = tick_us - true_us;
+        assert_true(fabs(tick_us - true_us - first_us) <= 1.0);
+    }
+    assert_int_equal(wraps, 1);
+}
+
+static void counters_count_modulo_16_bits(void **state)
+{
+    (void)state;
+    protocol_rig_open(&cola, PROTOCOL_COLA, "SICK", "TiM571");
+    protocol_rig_planar(&cola, 8, 2, 5, 4, -1, 10);
+    protocol_rig_describe(&cola, 0);
+    stream(1);
+    memset(shots, 0, sizeof shots);
+    for (uint32_t line = 3; line < 65540; line++) {
+        protocol_rig_clear(&cola);
+        protocol_rig_turn(&cola, line, shots, 1);
+        cola_read_lmd(0, &lmd);
+        if (lmd.scan != line % 65536 || lmd.telegram != (line - 3) % 65536)
+            fail_msg("line %u: %u %u", line, lmd.scan, lmd.telegram);
+    }
+    /* the next scan of the head starts its lines again; the scanner's counter goes on */
+    cola.descriptor.scan = 2;
+    protocol_rig_describe(&cola, 0);
+    protocol_rig_clear(&cola);
+    protocol_rig_turn(&cola, 0, shots, 1);
+    cola_read_lmd(0, &lmd);
+    assert_int_equal(lmd.scan, 65540 % 65536);
+}
+
+/* ---- what is lost */
+
+/* Gives steps from `from` on, n of them, of a turn. */
+static void part_of_turn(uint32_t line, uint32_t from, uint32_t n)
+{
+    static const double level[1100];
+    double pan_turn[1100];
+    int64_t dt_ns[1100];
+    const int64_t line_ns = (int64_t)line * 66666667;
+    for (uint32_t i = 0; i < n; i++) {
+        dt_ns[i] = (int64_t)i * 61728;
+        pan_turn[i] = -((double)(from + i) - 405.0) / 1080.0;
+        shots[i] = (struct protocol_rig_shot){1, {5.0}, {0}, {0}};
+    }
+    const struct protocol_rig_run run = {
+        line,     line, (uint64_t)line * 1080 + from, n, line_ns + from * INT64_C(61728), line_ns, dt_ns, level,
+        pan_turn, shots};
+    protocol_rig_points(&cola, &run);
+}
+
+static void a_scan_with_a_hole_is_not_sent(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    stream(0);
+    protocol_rig_clear(&cola);
+    cola_turn(0, 1.0);
+    part_of_turn(1, 0, 200); /* of 811 pulses one is missing */
+    part_of_turn(1, 200, 200);
+    cola.ops->gap(cola.protocol, 1);
+    part_of_turn(1, 401, 200);
+    part_of_turn(1, 601, 210);
+    cola_turn(2, 1.0);
+    cola_turn(5, 1.0); /* and two whole turns */
+    assert_int_equal(cola.n_units, 3);
+    assert_int_equal(cola.count[PROTOCOL_UNITS_LOST], 3);
+    static const uint32_t scan[] = {0, 2, 5};
+    for (uint32_t i = 0; i < 3; i++) {
+        cola_read_lmd(i, &lmd);
+        assert_int_equal(lmd.scan, scan[i]); /* a client sees the gap here, */
+        assert_int_equal(lmd.telegram, i);   /* and not here */
+        assert_int_equal(lmd.channel[0].value[0], 1000);
+    }
+}
+
+/* The same with the attributes of one frame missing: their signals belong to the scan. */
+static void a_scan_without_its_attributes_is_not_sent(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    cola.attributes = 1;
+    protocol_rig_describe(&cola, 0);
+    stream(0);
+    protocol_rig_clear(&cola);
+    cola_turn(0, 1.0);
+    assert_int_equal(cola.n_units, 1);
+    cola.attributes = 0; /* the head sends some; here they are lost */
+    cola_turn(1, 1.0);
+    cola.attributes = 1;
+    cola_turn(2, 1.0);
+    assert_int_equal(cola.n_units, 2);
+    assert_int_equal(cola.count[PROTOCOL_UNITS_LOST], 1);
+}
+
+static void what_nobody_asked_for_is_not_lost(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    part_of_turn(7, 600, 211); /* joined in the middle */
+    stream(0);
+    protocol_rig_clear(&cola);
+    cola_turn(8, 1.0);
+    assert_int_equal(cola.n_units, 1);
+    cola_expect("sEN LMDscandata 0", "sEA LMDscandata 0");
+    protocol_rig_clear(&cola);
+    cola_turn(11, 1.0);
+    assert_int_equal(cola.n_units, 0);
+    stream(0);
+    protocol_rig_clear(&cola);
+    part_of_turn(12, 0, 100); /* the scan is stopped */
+    const struct line_end end = {.frame = 12, .line = 12, .n_fired = 100, .n_cast = 100, .status = LINE_PARTIAL};
+    protocol_rig_line_end(&cola, &end);
+    assert_int_equal(cola.n_units, 0);
+    assert_int_equal(cola.count[PROTOCOL_UNITS_LOST], 0);
+}
+
+static void a_client_that_does_not_read_loses_whole_scans(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    stream(1);
+    protocol_rig_clear(&cola);
+    cola.room = 3000;
+    for (uint32_t line = 0; line < 5; line++)
+        cola_turn(line, 1.0);
+    assert_int_equal(cola.n_units, 1);
+    cola.room = SIZE_MAX;
+    cola_turn(5, 1.0);
+    cola_read_lmd(1, &lmd);
+    assert_int_equal(lmd.telegram, 1);
+    assert_int_equal(lmd.scan, 5);
+}
+
+/* ---- polled, every second one, stopped */
+
+static void a_poll_gets_the_last_scan(void **state)
+{
+    (void)state;
+    cola_open_lms();
+    protocol_rig_input(&cola, "\2sRN LMDscandata\3");
+    EXPECT_B("sRN LCMstate", "sRA LCMstate \0"); /* none yet: it waits, and others are answered */
+    protocol_rig_clear(&cola);
+    cola_turn(0, 1.0);
+    assert_int_equal(cola.n_units, 1);
+    cola_read_lmd(0, &lmd);
+    assert_string_equal(lmd.verb, "sRA");
+    assert_int_equal(lmd.channel[0].n, 1081);
+    protocol_rig_clear(&cola);
+    cola_turn(1, 2.0);
+    assert_int_equal(cola.n_units, 0); /* not asked for */
+    for (int b = 0; b < 2; b++) {
+        uint8_t frame[64];
+        if (b)
+            cola_input(frame, cola_frame_b(frame, "sRN LMDscandata", 15));
+        else
+            protocol_rig_input(&cola, "\2sRN LMDscandata\3");
+        cola_read_lmd((uint32_t)b, &lmd);
+        assert_int_equal(lmd.scan, 1);
+        assert_int_equal(lmd.telegram, 1 + b);
+        assert_int_equal(lmd.channel[0].value[1080], 12800);
+    }
+    cola_head_state("idle"); /* a resting head is woken */
+    cola_close();
+    cola_open_lms();
+    cola_head_state("idle");
+    protocol_rig_input(&cola, "\2sRN LMDscandata\3");
+    assert_string_equal(cola.line[1], "SCAN:START");
+    cola_head_state("fault");
+    cola_expect("sRN LMDscandata", "sFA 4");
+}
+
+static void every_nth_scan_on_request(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    cola_authorise();
+    cola_expect("sWN LMDscandatacfg 1 0 0 0 0 0 0 0 0 0 0 +3", "sWA LMDscandatacfg");
+    stream(0);
+    protocol_rig_clear(&cola);
+    for (uint32_t line = 0; line < 9; line++)
+        cola_turn(line, 1.0);
+    assert_int_equal(cola.n_units, 3);
+    for (uint32_t i = 0; i < 3; i++) {
+        cola_read_lmd(i, &lmd);
+        assert_int_equal(lmd.scan, 3 * i);
+        assert_int_equal(lmd.n_8, 0);
+    }
+    cola_expect("sMN LMCstopmeas", "sAN LMCstopmeas 0");
+    protocol_rig_clear(&cola);
+    cola_turn(9, 1.0);
+    assert_int_equal(cola.n_units, 0);
+    cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 0");
+    protocol_rig_clear(&cola);
+    for (uint32_t line = 10; line < 13; line++)
+        cola_turn(line, 1.0);
+    assert_int_equal(cola.n_units, 1);
+    assert_int_equal(cola.count[PROTOCOL_UNITS_LOST], 0);
+}
+
+/* Streamed telegrams have the form of the last request, or what EIHstCola says. */
+static void the_stream_has_the_chosen_form(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    cola_authorise();
+    stream(0);
+    cola_expect("sWN EIHstCola 1", "sWA EIHstCola");
+    protocol_rig_clear(&cola);
+    cola_turn(0, 1.0);
+    assert_memory_equal(cola.bytes, "\2\2\2\2", 4);
+    cola_expect("sRN EIHstCola", "sRA EIHstCola 1"); /* in the form of this request, */
+    protocol_rig_clear(&cola);
+    cola_turn(1, 1.0);
+    assert_memory_equal(cola.bytes, "\2sSN", 4); /* as is what follows */
+    EXPECT_B("sRN EIHstCola", "sRA EIHstCola \1");
+    protocol_rig_clear(&cola);
+    cola_turn(2, 1.0);
+    assert_memory_equal(cola.bytes, "\2\2\2\2", 4);
+}
+
+/* ---- what LMDscandatacfg adds */
+
+static void name_and_time_where_asked_for(void **state)
+{
+    (void)state;
+    static const uint32_t known[7] = {2024, 2, 29, 12, 34, 57, 66666}, unknown[7] = {1970, 1, 1, 0, 0, 1, 66666};
+    for (int b = 0; b < 2; b++)
+        for (int utc = 0; utc < 2; utc++) {
+            cola_open_tim("TiM571");
+            cola.scan_t0_ns = INT64_C(1000000000);
+            if (utc) cola.utc0_ns = INT64_C(1709210096) * 1000000000; /* 2024-02-29T12:34:56Z */
+            cola_authorise();
+            cola_expect("sWN LocationName C left bumper.", "sWA LocationName");
+            cola_expect("sWN LMDscandatacfg 1 0 0 0 0 0 0 1 1 1 1 1", "sWA LMDscandatacfg");
+            stream(b);
+            cola_turn(0, 1.0);
+            protocol_rig_clear(&cola);
+            cola_turn(1, 1.0);
+            cola_read_lmd(0, &lmd);
+            assert_string_equal(lmd.name, "left bumper.");
+            assert_int_equal(lmd.has_time, 1);
+            /* step 0 of scan 1: 1.0666 s after power-up */
+            assert_memory_equal(lmd.date, utc ? known : unknown, sizeof known);
+            if (b != 1 || utc != 1) cola_close();
+        }
+}
+
+static void give_poses(double x0_m, double x1_m, int64_t t0_ns, int64_t t1_ns)
+{
+    uint8_t frame[1024];
+    const struct native_pose pose[2] = {{t0_ns, {x0_m, 0, 0}, {1, 0, 0, 0}, 0, 0, 0},
+                                        {t1_ns, {x1_m, 0, 0}, {1, 0, 0, 0}, 0, 0, 0}};
+    cola.ops->frame(cola.protocol, frame, native_encode_poses(frame, sizeof frame, pose, 2, cola.scan_t0_ns, 0));
+}
+
+/* The encoder is that of a vehicle: how far it has come, how fast it is. Here 2 m/s, then back at 1 m/s: the way grows. */
+static void the_encoder_counts_the_way(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    cola_authorise();
+    cola_expect("sWN LMDscandatacfg 1 0 0 0 0 1 0 0 0 0 0 1", "sWA LMDscandatacfg");
+    stream(1);
+    protocol_rig_clear(&cola);
+    cola_turn(0, 1.0); /* a head that stands */
+    cola_read_lmd(0, &lmd);
+    assert_int_equal(lmd.n_encoders, 1);
+    assert_int_equal(lmd.position, 0);
+    assert_int_equal(lmd.speed, 0);
+    give_poses(10.0, 10.2, 0, 100000000);
+    cola_turn(1, 1.0); /* its first pulse at 66.67 ms: 133 mm */
+    cola_read_lmd(1, &lmd);
+    assert_in_range(lmd.position, 133, 134);
+    assert_int_equal(lmd.speed, 2000);
+    give_poses(10.2, 10.0, 100000000, 300000000);
+    cola_turn(2, 1.0); /* 133.33 ms: 200 mm, and 33.33 ms at 1 m/s */
+    cola_read_lmd(2, &lmd);
+    assert_in_range(lmd.position, 233, 234);
+    assert_int_equal(lmd.speed, 1000);
+}
+
+/* The longest telegram there is: all channels, 16 bits, hexadecimal, everything in the tail. */
+static void the_longest_telegram_has_room(void **state)
+{
+    (void)state;
+    protocol_rig_open(&cola, PROTOCOL_COLA, "SICK", "LMS111");
+    protocol_rig_planar(&cola, 3600, 0, 2999, 1500, -1, 10);
+    cola.descriptor.range_max_m = 60.0;
+    protocol_rig_describe(&cola, 0);
+    cola_authorise();
+    cola_expect("sWN LMDscandatacfg 3 0 1 1 0 1 0 1 1 1 1 1", "sWA LMDscandatacfg");
+    for (int i = 0; i < 3000; i++)
+        shots[i] = (struct protocol_rig_shot){2, {50.0, 60.0}, {-100, 0}, {0}};
+    stream(0);
+    protocol_rig_clear(&cola);
+    protocol_rig_turn(&cola, 0, shots, 500);
+    cola_read_lmd(0, &lmd); /* the rig has checked it against max_unit */
+    assert_true(cola.len > 60000 && cola.len <= 65535);
+    /* one beam more is more than the module takes: it says so, and nothing is sent */
+    cola.emitter.last_step = 3000;
+    protocol_rig_describe(&cola, 0);
+    protocol_rig_clear(&cola);
+    shots[2999] = shots[0];
+    protocol_rig_turn(&cola, 1, shots, 500);
+    assert_int_equal(cola.n_units, 0);
+    cola_expect("sRN LMPoutputRange", "sFA 4");
+}
+
+int main(void)
+{
+#define CASE(f) cmocka_unit_test_teardown(f, close_rig)
+    const struct CMUnitTest tests[] = {
+        CASE(a_telegram_in_a_is_this_text),
+        CASE(a_telegram_in_b_is_these_bytes),
+        CASE(a_tim571_telegram_has_its_length),
+        CASE(ranges_stand_at_their_angles),
+        CASE(rates_agree_as_sick_tim_asks),
+        CASE(a_mark_on_the_left_is_on_the_left),
+        CASE(far_heads_count_in_two_millimetres),
+        CASE(a_narrowed_range_is_narrower),
+        CASE(echoes_go_to_their_channels),
+        CASE(signals_end_where_their_scale_ends),
+        CASE(ticks_count_modulo_32_bits),
+        CASE(ticks_are_on_a_line_with_time),
+        CASE(counters_count_modulo_16_bits),
+        CASE(a_scan_with_a_hole_is_not_sent),
+        CASE(a_scan_without_its_attributes_is_not_sent),
+        CASE(what_nobody_asked_for_is_not_lost),
+        CASE(a_client_that_does_not_read_loses_whole_scans),
+        CASE(a_poll_gets_the_last_scan),
+        CASE(every_nth_scan_on_request),
+        CASE(the_stream_has_the_chosen_form),
+        CASE(name_and_time_where_asked_for),
+        CASE(the_encoder_counts_the_way),
+        CASE(the_longest_telegram_has_room),
+    };
+    return cmocka_run_group_tests_name("cola scan", tests, NULL, NULL);
+}

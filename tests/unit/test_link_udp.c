@@ -1,0 +1,177 @@
+/* The udp link: a write is a datagram, whoever listens or doesn't; where packets may go, and where not. */
+#include "tests/unit/link_test.h"
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+
+/* A receiver, and the spec of a link to it. */
+static int open_receiver(struct link_spec *spec)
+{
+    struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+    socklen_t len = sizeof at;
+    int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0);
+    assert_int_equal(getsockname(fd, (struct sockaddr *)&at, &len), 0);
+    *spec = (struct link_spec){.type = LINK_UDP, .port = ntohs(at.sin_port)};
+    return fd;
+}
+
+static void expect_datagram(int fd, const void *data, size_t len)
+{
+    char got[4096];
+    struct pollfd wait = {.fd = fd, .events = POLLIN};
+    assert_int_equal(poll(&wait, 1, DEADLINE_MS), 1);
+    assert_int_equal(recv(fd, got, sizeof got, MSG_DONTWAIT), (ssize_t)len);
+    assert_memory_equal(got, data, len);
+}
+
+static void a_write_is_a_datagram(void **state)
+{
+    (void)state;
+    struct link_spec spec;
+    char text[64], want[64], data[1206];
+    int fd = open_receiver(&spec);
+    struct bench bench = bench_open(&spec);
+    snprintf(want, sizeof want, "udp:127.0.0.1:%d", spec.port);
+    bench.ops->endpoint(bench.link, text, sizeof text);
+    assert_string_equal(text, want);
+    assert_null(bench.ops->capacity);
+    assert_null(bench.ops->end);
+    bench_expect(&bench, LINK_OPENED, 0);
+    bench_expect(&bench, LINK_WRITABLE, 1);
+    for (size_t i = 0; i < sizeof data; i++)
+        data[i] = (char)(i * 31);
+    assert_int_equal(bench.ops->write(bench.link, 0, data, sizeof data), sizeof data);
+    assert_int_equal(bench.ops->write(bench.link, 0, "x", 1), 1);
+    assert_int_equal(bench.ops->write(bench.link, 0, data, 512), 512);
+    assert_int_equal(bench.ops->write(bench.link, 1, data, 512), SH_ECLOSED);
+    expect_datagram(fd, data, sizeof data);
+    expect_datagram(fd, "x", 1);
+    expect_datagram(fd, data, 512);
+    assert_int_equal(bench_poll(&bench, 0, 0), 0);
+    bench_close(&bench);
+    close(fd);
+}
+
+/* Nobody there: each send succeeds, poll stays calm; a receiver that comes later gets what is sent then. */
+static void a_receiver_that_is_not_there(void **state)
+{
+    (void)state;
+    struct link_spec spec;
+    struct sockaddr_in at;
+    socklen_t len = sizeof at;
+    int fd = open_receiver(&spec);
+    assert_int_equal(getsockname(fd, (struct sockaddr *)&at, &len), 0);
+    close(fd);
+    struct bench bench = bench_open(&spec);
+    bench_expect(&bench, LINK_OPENED, 0);
+    for (int i = 0; i < 100; i++) {
+        assert_int_equal(bench.ops->write(bench.link, 0, "gone", 4), 4);
+        bench_poll(&bench, 0, 0); /* refusals of the system may wake it; they are taken */
+        assert_int_equal(bench_poll(&bench, 0, 0), 0);
+    }
+    fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0);
+    assert_int_equal(bench.ops->write(bench.link, 0, "here", 4), 4);
+    expect_datagram(fd, "here", 4);
+    bench_close(&bench);
+    close(fd);
+}
+
+/* The same, and the refusal is met by a write, not by poll: nothing that is sent afterwards is lost for it. */
+static void a_refusal_costs_no_later_datagram(void **state)
+{
+    (void)state;
+    struct link_spec spec;
+    struct sockaddr_in at;
+    socklen_t len = sizeof at;
+    int fd = open_receiver(&spec);
+    assert_int_equal(getsockname(fd, (struct sockaddr *)&at, &len), 0);
+    close(fd);
+    struct bench bench = bench_open(&spec);
+    bench_expect(&bench, LINK_OPENED, 0);
+    assert_int_equal(bench.ops->write(bench.link, 0, "gone", 4), 4); /* over lo the refusal is there at once */
+    fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0);
+    assert_int_equal(bench.ops->write(bench.link, 0, "here", 4), 4);
+    expect_datagram(fd, "here", 4);
+    bench_close(&bench);
+    close(fd);
+}
+
+static void what_arrives_can_be_read(void **state)
+{
+    (void)state;
+    struct link_spec spec;
+    struct sockaddr_in from;
+    socklen_t len = sizeof from;
+    char got[16];
+    int fd = open_receiver(&spec);
+    struct bench bench = bench_open(&spec);
+    bench_expect(&bench, LINK_OPENED, 0);
+    assert_int_equal(bench.ops->write(bench.link, 0, "a", 1), 1);
+    assert_int_equal(recvfrom(fd, got, sizeof got, 0, (struct sockaddr *)&from, &len), 1);
+    assert_int_equal(sendto(fd, "back", 4, 0, (struct sockaddr *)&from, len), 4);
+    bench_expect(&bench, LINK_READABLE, 0);
+    assert_int_equal(bench.ops->read(bench.link, 0, got, sizeof got), 4);
+    assert_memory_equal(got, "back", 4);
+    assert_int_equal(bench.ops->read(bench.link, 0, got, sizeof got), 0);
+    assert_int_equal(bench_poll(&bench, 0, 0), 0);
+    bench.wake = eventfd(1, EFD_CLOEXEC);
+    bench_expect(&bench, LINK_WOKEN, 0);
+    close(bench.wake);
+    bench_close(&bench);
+    close(fd);
+}
+
+static void where_packets_may_go(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *address, *interface;
+        int port;
+        const char *why; /* NULL: it opens */
+    } cases[] = {
+        {"", "", 2368, NULL},
+        {"localhost", "", 2368, NULL},
+        {"127.0.0.1", "lo", 2368, NULL},
+        {"127.0.0.1", "", 0, "udp:127.0.0.1:0: allowed ports are 1 to 65535"},
+        {"127.0.0.1", "", 65536, "allowed ports are 1 to 65535"},
+        {"300.1.1.1", "", 2368, "udp:300.1.1.1:2368: no such address"},
+        {"239.1.2.3", "", 2368, "udp:239.1.2.3:2368: multicast"},
+        {"ff02::1", "", 2368, "multicast"},
+        {"255.255.255.255", "", 2368, "a broadcast; required is interface"},
+        {"255.255.255.255", "lo", 2368, "interface lo has no broadcast"},
+        {"127.0.0.1", "no-such-if", 2368, "there is no interface no-such-if"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        struct link_spec spec = {.type = LINK_UDP, .port = cases[i].port};
+        void *link = NULL;
+        struct sh_err err = {0};
+        snprintf(spec.address, sizeof spec.address, "%s", cases[i].address);
+        snprintf(spec.interface, sizeof spec.interface, "%s", cases[i].interface);
+        int rc = link_ops_get(LINK_UDP)->open(&spec, &link, &err);
+        if (cases[i].why == NULL) {
+            assert_int_equal(rc, SH_OK);
+            link_ops_get(LINK_UDP)->close(link);
+            continue;
+        }
+        assert_int_equal(rc, SH_EINPUT);
+        if (strstr(err.text, cases[i].why) == NULL) fail_msg("%s: %s", cases[i].why, err.text);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_write_is_a_datagram),
+        cmocka_unit_test(a_receiver_that_is_not_there),
+        cmocka_unit_test(a_refusal_costs_no_later_datagram),
+        cmocka_unit_test(what_arrives_can_be_read),
+        cmocka_unit_test(where_packets_may_go),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
