@@ -500,6 +500,31 @@ static void turns_are_not_mixed(void **state)
     scip_close();
 }
 
+/* A change of speed within a turn sends descriptor and emitter again, and takes nothing from the turn; another number of
+ * steps begins anew. */
+static void speed_changes_within_a_turn(void **state)
+{
+    (void)state;
+    scip_open("UTM-30LX");
+    scip_ask("MD0000108000000\n", "MD0000108000000\n00P\n\n");
+    scip_part(0, 0, 600);
+    rig.descriptor.lines_uhz = 39000000;
+    rig.emitter.sequence_ns_den = 39 * 1440;
+    protocol_rig_describe(&rig, 10000000);
+    rig.descriptor.lines_uhz = 40000000;
+    scip_part(0, 601, 1080);
+    scip_decode_only(&got, 3, 0);
+    assert_int_equal(got.n_steps, 1081);
+    scip_part(1, 0, 600);
+    rig.emitter.last_step = 600;
+    protocol_rig_describe(&rig, 40000000);
+    scip_part(1, 601, 601);
+    scip_line_end(1, 0);
+    scip_expect("");
+    scip_ask("MD0000060100000\n", "MD0000060100000\n04T\n\n");
+    scip_close();
+}
+
 /* 2^24 ms are 4 h 39 min 37.216 s. The stamp is that of step 0, also of a scan that begins later in the turn. */
 static void the_clock_wraps(void **state)
 {
@@ -598,6 +623,7 @@ int main(void)
         cmocka_unit_test(the_clock_wraps),
         cmocka_unit_test(turns_that_are_not_lost),
         cmocka_unit_test(turns_are_not_mixed),
+        cmocka_unit_test(speed_changes_within_a_turn),
         cmocka_unit_test(skipped_and_broken),
         cmocka_unit_test(played_malfunctions),
     };
