@@ -1,5 +1,6 @@
-/* SCIP, the sensor's side: commands and their answers. What is expected was written from Hokuyo's description of the
- * protocol, sums added up apart from this program; whole replies of an URG-04LX are those that its maker has published. */
+/* SCIP, the sensor's side: commands and their answers. What is expected was written from Hokuyo's description
+ * of the protocol, sums added up apart from this program; whole replies of an URG-04LX are those that its
+ * maker has published. */
 #include "tests/unit/scip_rig.h"
 
 #define VV_URG                                                                                                 \

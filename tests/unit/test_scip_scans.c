@@ -1,11 +1,12 @@
-/* SCIP, the sensor's side: scans. Bytes by hand from the protocol's description, and a decoder written from it. */
+/* SCIP, the sensor's side: scans. Bytes by hand from the protocol's description, and a decoder written from
+ * it. */
 #include "tests/unit/scip_rig.h"
 
 static struct scip_decoded got;
 
-/* Five steps, 0 to 4, and a scan of them with all kinds of value: 1234 mm, 5432 mm, no echo, too near, 30000 mm. The
- * description encodes 1234 as CB in two characters, 5432 as 1Dh in three and 16000000 as m2@0 in four. 30000 is
- * 7 * 4096 + 20 * 64 + 48. */
+/* Five steps, 0 to 4, and a scan of them with all kinds of value: 1234 mm, 5432 mm, no echo, too near, 30000
+ * mm. The description encodes 1234 as CB in two characters, 5432 as 1Dh in three and 16000000 as m2@0 in
+ * four. 30000 is 7 * 4096 + 20 * 64 + 48. */
 static void open_five(const char *model)
 {
     scip_open_head(model, 360, 0, 4, 2, -1, 10);
@@ -68,8 +69,8 @@ static void ranges_to_the_millimetre(void **state)
     scip_close();
 }
 
-/* Without end the two digits stay 00, and a scan is as long as the description makes it: 6717 bytes of 1081 steps with
- * intensity, in lines of 64 characters and a sum. */
+/* Without end the two digits stay 00, and a scan is as long as the description makes it: 6717 bytes of 1081
+ * steps with intensity, in lines of 64 characters and a sum. */
 static void without_end(void **state)
 {
     (void)state;
@@ -87,8 +88,9 @@ static void without_end(void **state)
     scip_close();
 }
 
-/* Steps count counter-clockwise seen from above: what stands to the left, 90 degrees from the front, is a quarter of a
- * turn above the front step. The rig places a shot by its pan, which is clockwise from the front. */
+/* Steps count counter-clockwise seen from above: what stands to the left, 90 degrees from the front, is a
+ * quarter of a turn above the front step. The rig places a shot by its pan, which is clockwise from the
+ * front. */
 static void left_is_left(void **state)
 {
     (void)state;
@@ -157,8 +159,8 @@ static void several_echoes(void)
     shot[1] = (struct protocol_rig_shot){.n = 0};
 }
 
-/* 1000 is 15 * 64 + 40: a matt white surface. 20 dB below it is a tenth: 100, 64 + 36. An amplitude of 0 dB is 100, of
- * 40 dB a hundred times that: 10000, 2 * 4096 + 28 * 64 + 16. */
+/* 1000 is 15 * 64 + 40: a matt white surface. 20 dB below it is a tenth: 100, 64 + 36. An amplitude of 0 dB
+ * is 100, of 40 dB a hundred times that: 10000, 2 * 4096 + 28 * 64 + 16. */
 static void echoes_and_intensity(void **state)
 {
     (void)state;
@@ -333,7 +335,8 @@ static void streams_end(void **state)
     scip_close();
 }
 
-/* M gives what was measured after it was asked for, G the next scan that is whole and was measured with the laser on. */
+/* M gives what was measured after it was asked for, G the next scan that is whole and was measured with the
+ * laser on. */
 static void measured_when(void **state)
 {
     (void)state;
@@ -474,7 +477,8 @@ static void turns_that_are_not_lost(void **state)
     scip_close();
 }
 
-/* Parts of two turns never make one: of two scans, each with a turn of that number, or the same part sent over again. */
+/* Parts of two turns never make one: of two scans, each with a turn of that number, or the same part sent
+ * over again. */
 static void turns_are_not_mixed(void **state)
 {
     (void)state;
@@ -500,8 +504,8 @@ static void turns_are_not_mixed(void **state)
     scip_close();
 }
 
-/* A change of speed within a turn sends descriptor and emitter again, and takes nothing from the turn; another number of
- * steps begins anew. */
+/* A change of speed within a turn sends descriptor and emitter again, and takes nothing from the turn;
+ * another number of steps begins anew. */
 static void speed_changes_within_a_turn(void **state)
 {
     (void)state;
@@ -525,7 +529,7 @@ static void speed_changes_within_a_turn(void **state)
     scip_close();
 }
 
-/* 2^24 ms are 4 h 39 min 37.216 s. The stamp is that of step 0, also of a scan that begins later in the turn. */
+/* 2^24 ms are 4 h 39 min 37.216 s. The stamp is that of step 0, also where a scan begins later in the turn. */
 static void the_clock_wraps(void **state)
 {
     (void)state;
