@@ -19,7 +19,7 @@ enum { SCIP_STEPS = 1500 };
 extern struct protocol_rig rig;
 extern struct protocol_rig_shot shot[SCIP_STEPS]; /* of the steps first..last */
 
-/* A session of that model, whose head has said how it is built: 0.02 to 5.6 m for URG-04LX, else 0.1 to 30. */
+/* A session of that model, whose head is described: 0.02 to 5.6 m for URG-04LX, 0.1 to 30 m else. */
 void scip_open(const char *model);
 /* The same with a head of one's own. */
 void scip_open_head(const char *model, uint32_t steps, int first, int last, int front, int turn, uint32_t lines_hz);

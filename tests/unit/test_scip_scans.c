@@ -529,7 +529,7 @@ static void speed_changes_within_a_turn(void **state)
     scip_close();
 }
 
-/* 2^24 ms are 4 h 39 min 37.216 s. The stamp is that of step 0, also where a scan begins later in the turn. */
+/* 2^24 ms are 4 h 39 min 37.216 s. The stamp is that of step 0, wherever the scan begins. */
 static void the_clock_wraps(void **state)
 {
     (void)state;
