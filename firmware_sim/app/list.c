@@ -48,6 +48,8 @@ const struct app_command app_list = {
     .summary = "head profiles, kinds of links, and the heads that USB shows",
     .options = OPTIONS,
     .notes =
-        "Profiles are looked for in the folder $SCANHEAD_HEADS, else in the installed one, else in config/heads.\n",
+        "Profiles are looked for in the folder $SCANHEAD_HEADS, else in the installed one, else in config/heads.\n"
+        "Heads on USB are those with this project's interface. One that shows itself as another maker's device\n"
+        "(links[].protocol scip, cola) is not among them: it looks like a real one.\n",
     .run = run,
 };
