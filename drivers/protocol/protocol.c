@@ -8,6 +8,7 @@ extern const struct protocol_ops protocol_scip;
 extern const struct protocol_ops protocol_cola;
 extern const struct protocol_ops protocol_velodyne;
 extern const struct protocol_ops protocol_velodyne_position;
+extern const struct protocol_ops protocol_velodyne_http;
 
 static const struct protocol_ops *const protocols[PROTOCOL_N] = {
     [PROTOCOL_NATIVE] = &protocol_native,
@@ -16,6 +17,7 @@ static const struct protocol_ops *const protocols[PROTOCOL_N] = {
     [PROTOCOL_COLA] = &protocol_cola,
     [PROTOCOL_VELODYNE] = &protocol_velodyne,
     [PROTOCOL_VELODYNE_POSITION] = &protocol_velodyne_position,
+    [PROTOCOL_VELODYNE_HTTP] = &protocol_velodyne_http,
 };
 
 const struct protocol_ops *protocol_ops_get(enum protocol_id id)

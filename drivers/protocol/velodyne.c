@@ -289,9 +289,17 @@ static void input(void *protocol, const uint8_t *bytes, size_t len)
     v->host.count(v->host.ctx, PROTOCOL_INPUT_LOST, len);
 }
 
+static int64_t never(const void *protocol)
+{
+    (void)protocol;
+    return INT64_MAX;
+}
+
 const struct protocol_ops protocol_velodyne = {
     .name = "velodyne",
     .needs = PROTOCOL_NEEDS_POLAR,
+    .emitters = 1u << NATIVE_EMIT_BEAMS,
+    .n_beams = VELODYNE_BEAMS,
     .max_unit = VELODYNE_DATA_LEN,
     .create = create,
     .destroy = destroy,
@@ -300,4 +308,5 @@ const struct protocol_ops protocol_velodyne = {
     .gap = gap,
     .time = nothing_at,
     .input = input,
+    .next_ns = never,
 };

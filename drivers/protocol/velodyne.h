@@ -10,8 +10,6 @@
 
 #include "drivers/protocol/protocol.h"
 
-extern const struct protocol_ops protocol_velodyne, protocol_velodyne_position, protocol_velodyne_http;
-
 enum {
     VELODYNE_BEAMS = 16,
     VELODYNE_BLOCKS = 12,

@@ -31,7 +31,6 @@ enum { MOST_AT_ONCE = 64 };
 
 struct position {
     struct protocol_host host;
-    uint32_t fixes_hz;
     int64_t next_ns; /* device time of the next packet */
 };
 
@@ -40,7 +39,6 @@ static int create(const struct protocol_spec *spec, void **protocol, struct sh_e
     struct position *p = calloc(1, sizeof *p);
     if (p == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a session of Velodyne position packets");
     p->host = spec->host;
-    p->fixes_hz = spec->fixes_hz != 0 ? spec->fixes_hz : 1;
     *protocol = p;
     return SH_OK;
 }
@@ -57,18 +55,14 @@ static void open_at(void *protocol, int64_t t_ns)
     p->next_ns = (t_ns + VELODYNE_POSITION_NS - 1) / VELODYNE_POSITION_NS * VELODYNE_POSITION_NS;
 }
 
-/* The sentence that the receiver sent last: of the last of its full 1 / fixes_hz of UTC. */
-static size_t put_sentence(const struct position *p, char *dst, int64_t t_ns, int64_t utc_ns)
+/* The sentence that the receiver sent last. */
+static void put_sentence(const struct position *p, char *dst, int64_t t_ns)
 {
     char sentence[NMEA_MAX_SENTENCE];
     struct nmea_fix fix;
-    const int64_t period_ns = 1000000000 / p->fixes_hz;
-    const int64_t fix_ns = t_ns - (utc_ns % 1000000000 + 1000000000) % 1000000000 % period_ns;
-    if (fix_ns < 0 || !p->host.fix(p->host.ctx, fix_ns, &fix)) return 0;
+    if (!p->host.fix(p->host.ctx, t_ns, &fix)) return;
     memcpy(fix.talker, "GP", 2);
-    size_t len = nmea_encode_rmc(sentence, sizeof sentence, &fix);
-    memcpy(dst, sentence, len);
-    return len;
+    memcpy(dst, sentence, nmea_encode_rmc(sentence, sizeof sentence, &fix));
 }
 
 static void send_packet(const struct position *p, int64_t t_ns)
@@ -84,7 +78,7 @@ static void send_packet(const struct position *p, int64_t t_ns)
     le_put32(packet + AT_TIME, velodyne_hour_us(&p->host, t_ns));
     packet[AT_PPS] = utc_ns == INT64_MIN ? PPS_ABSENT : PPS_LOCKED;
     packet[AT_POWER_UP] = POWER_UP_DEGC;
-    if (utc_ns != INT64_MIN) put_sentence(p, (char *)packet + AT_NMEA, t_ns, utc_ns);
+    put_sentence(p, (char *)packet + AT_NMEA, t_ns);
     p->host.send(p->host.ctx, packet, sizeof packet);
 }
 
@@ -122,6 +116,11 @@ static void input(void *protocol, const uint8_t *bytes, size_t len)
     p->host.count(p->host.ctx, PROTOCOL_INPUT_LOST, len);
 }
 
+static int64_t next_ns(const void *protocol)
+{
+    return ((const struct position *)protocol)->next_ns + 1;
+}
+
 const struct protocol_ops protocol_velodyne_position = {
     .name = "velodyne-position",
     .max_unit = VELODYNE_POSITION_LEN,
@@ -132,4 +131,5 @@ const struct protocol_ops protocol_velodyne_position = {
     .gap = no_gap,
     .time = at_time,
     .input = input,
+    .next_ns = next_ns,
 };

@@ -207,6 +207,23 @@ const char *head_endpoint(const struct head *head, const char *type)
     return endpoint;
 }
 
+const char *head_link(const struct head *head, int i)
+{
+    static const char key[] = "\"endpoint\":\"";
+    static char endpoint[256];
+    const char *at = head->ready;
+    for (; i >= 0 && at != NULL; i--)
+        if ((at = strstr(at, key)) != NULL) at += strlen(key);
+    if (at == NULL) fail_msg("no such link in %s", head->ready);
+    snprintf(endpoint, sizeof endpoint, "%.*s", (int)strcspn(at, "\""), at);
+    return endpoint;
+}
+
+int endpoint_port(const char *endpoint)
+{
+    return atoi(strrchr(endpoint, ':') + 1);
+}
+
 void head_end(struct head *head, int signal_number)
 {
     if (signal_number != 0) assert_int_equal(kill(head->pid, signal_number), 0);

@@ -94,6 +94,12 @@ struct head head_start(struct wire *wire, const char *config, const char *const 
 /* The endpoint of the first link of a type ("tcp", "pty", "file"), as the ready line names it. */
 const char *head_endpoint(const struct head *head, const char *type);
 
+/* The endpoint of link i of the configuration, from 0; good until the next call. */
+const char *head_link(const struct head *head, int i);
+
+/* The port at the end of an endpoint. */
+int endpoint_port(const char *endpoint);
+
 /* Ends the head with a signal (0: it ends by itself) and checks that it went in good order. */
 void head_end(struct head *head, int signal_number);
 

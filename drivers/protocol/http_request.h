@@ -1,0 +1,50 @@
+/* Requests of HTTP/1.0 and 1.1 out of a stream of bytes: what a small device needs of RFC 9112, with bounded memory.
+ *
+ * Bytes go in in pieces of any size. What comes out is one request after the other, or the status that a broken one is
+ * answered with; after such a one the connection can't go on. Bodies have a Content-Length; chunked ones are refused.
+ * Pure; allocates nothing; any thread. */
+#ifndef DRIVERS_PROTOCOL_HTTP_REQUEST_H
+#define DRIVERS_PROTOCOL_HTTP_REQUEST_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+enum {
+    HTTP_MAX_LINE = 512,  /* request line: 414 */
+    HTTP_MAX_HEAD = 4096, /* request line and fields: 431 */
+    HTTP_MAX_BODY = 1024, /* 413 */
+};
+
+enum http_result {
+    HTTP_MORE = 0,       /* bytes are missing */
+    HTTP_REQUEST = 1,    /* one is whole */
+    HTTP_CONTINUE = 100, /* bytes are missing, and the client waits for 100 Continue before it sends them; once */
+    /* 400 and more: the status of the answer, which is the last one */
+};
+
+struct http_request {
+    char method[8], path[64]; /* the path without its query; one that is too long is cut, and so unknown */
+    int minor;                /* of HTTP/1.x */
+    int keep_alive;
+    int foreign;      /* it has an Origin that is not this server: a browser sends it for a page from elsewhere */
+    const char *body; /* body_len bytes */
+    size_t body_len;
+};
+
+struct http_reader {
+    char bytes[HTTP_MAX_HEAD + HTTP_MAX_BODY + 1];
+    size_t len;      /* in bytes */
+    size_t head_len; /* 0: the end of the head has not come */
+    size_t looked;   /* for it, up to here */
+    int continued;
+    struct http_request request;
+};
+
+void http_reader_init(struct http_reader *r);
+/* Takes what there is room for, and returns how much. After HTTP_MORE or HTTP_CONTINUE that is at least one byte. */
+size_t http_reader_add(struct http_reader *r, const uint8_t *bytes, size_t len);
+/* An http_result. HTTP_REQUEST: r->request holds until http_reader_drop, which has to come before the next call. */
+int http_reader_next(struct http_reader *r);
+void http_reader_drop(struct http_reader *r);
+
+#endif

@@ -1,0 +1,321 @@
+#include "drivers/protocol/velodyne_settings.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#include "drivers/protocol/velodyne.h"
+
+enum { MAX_PAIRS = 8, MAX_REPLY = 512 };
+
+struct posted {
+    const struct protocol_spec *spec;
+    char *text; /* of an error */
+};
+
+static int refuse(const struct posted *p, int status, const char *why)
+{
+    snprintf(p->text, VELODYNE_TEXT, "%s", why);
+    return status;
+}
+
+/* Its reply is "OK", or the error that the client gets: another session has control, out of range, not now. */
+static int command(const struct posted *p, const char *line)
+{
+    char reply[MAX_REPLY];
+    const struct protocol_host *host = &p->spec->host;
+    const int error = host->command(host->ctx, line, reply, sizeof reply);
+    if (error == 0) return 200;
+    snprintf(p->text, VELODYNE_TEXT, "the head refuses %s: %s", line, reply);
+    return error == -203 ? 409 : error == -222 ? 400 : 503;
+}
+
+static void ask(const struct protocol_spec *spec, const char *line, char *reply, size_t cap)
+{
+    char whole[MAX_REPLY];
+    if (spec->host.command(spec->host.ctx, line, whole, sizeof whole) != 0) whole[0] = '\0';
+    snprintf(reply, cap, "%.*s", (int)cap - 1, whole);
+}
+
+/* A whole number of at most nine digits: 1, or 0. */
+static int read_number(const char *s, long *out)
+{
+    const size_t len = strlen(s);
+    if (len == 0 || len > 9 || strspn(s, "0123456789") != len) return 0;
+    *out = strtol(s, NULL, 10);
+    return 1;
+}
+
+static int read_switch(const char *s, int *on)
+{
+    *on = strcasecmp(s, "on") == 0;
+    return *on || strcasecmp(s, "off") == 0;
+}
+
+/* ---- the keys. Each is called with apply 0 first, and returns 200 or an error. */
+
+static int is_scanning(const struct protocol_spec *spec)
+{
+    char state[16];
+    ask(spec, "HEAD:STATE?", state, sizeof state);
+    return strcasecmp(state, "scanning") == 0 || strcasecmp(state, "spin-up") == 0;
+}
+
+static int set_laser(const struct posted *p, const char *value, int apply)
+{
+    int on;
+    if (!read_switch(value, &on)) return refuse(p, 400, "laser: on or off");
+    if (!apply || is_scanning(p->spec) == on) return 200;
+    return command(p, on ? "SCAN:START" : "SCAN:STOP");
+}
+
+static const struct {
+    const char *name, *word; /* of the device, of SCAN:ECHOES */
+} returns[] = {{"Strongest", "STRONGEST"}, {"Last", "LAST"}, {"Dual", "ALL"}};
+
+static int set_returns(const struct posted *p, const char *value, int apply)
+{
+    for (size_t i = 0; i < sizeof returns / sizeof returns[0]; i++) {
+        char line[32];
+        if (strcasecmp(value, returns[i].name) != 0) continue;
+        snprintf(line, sizeof line, "SCAN:ECHOES %s", returns[i].word);
+        return apply ? command(p, line) : 200;
+    }
+    return refuse(p, 400, "returns: Strongest, Last or Dual");
+}
+
+/* Turns per second as the head takes them, in steps of 1e-6 Hz. Of what does not divide by 3, so is the error. */
+static int set_rpm(const struct posted *p, const char *value, int apply)
+{
+    char line[40];
+    long rpm;
+    if (!read_number(value, &rpm) || (rpm != 0 && (rpm < 300 || rpm > 1200)))
+        return refuse(p, 400, "rpm: a whole number, 300 to 1200; 0: the motor stops");
+    if (!apply) return 200;
+    if (rpm == 0) return is_scanning(p->spec) ? command(p, "SCAN:STOP") : 200;
+    const long uhz = (rpm * 1000000 + 30) / 60;
+    snprintf(line, sizeof line, "HEAD:LINES %ld.%06ld", uhz / 1000000, uhz % 1000000);
+    return command(p, line);
+}
+
+static int set_fov(const struct posted *p, const char *value, long whole, const char *why)
+{
+    long deg;
+    if (!read_number(value, &deg) || deg > 359) return refuse(p, 400, "start, end: a whole number, 0 to 359 degrees");
+    return deg == whole ? 200 : refuse(p, 409, why);
+}
+
+static int set_fov_start(const struct posted *p, const char *value, int apply)
+{
+    (void)apply;
+    return set_fov(p, value, 0, "start: 0 alone; this head sends the whole turn");
+}
+
+static int set_fov_end(const struct posted *p, const char *value, int apply)
+{
+    (void)apply;
+    return set_fov(p, value, 359, "end: 359 alone; this head sends the whole turn");
+}
+
+static int set_address(const struct posted *p, const char *value, int apply)
+{
+    (void)apply;
+    if (strcmp(value, velodyne_host_address(p->spec)) == 0) return 200;
+    return refuse(p, 409, "addr: addresses are those of the head's configuration (links)");
+}
+
+static int set_data_port(const struct posted *p, const char *value, int apply)
+{
+    long port;
+    (void)apply;
+    if (!read_number(value, &port) || port < 1 || port > 65535) return refuse(p, 400, "dport: 1 to 65535");
+    if (port == velodyne_host_port(p->spec)) return 200;
+    return refuse(p, 409, "dport: ports are those of the head's configuration (links)");
+}
+
+static int set_position_port(const struct posted *p, const char *value, int apply)
+{
+    long port;
+    (void)apply;
+    if (!read_number(value, &port) || port < 1 || port > 65535) return refuse(p, 400, "tport: 1 to 65535");
+    if (port == VELODYNE_POSITION_PORT) return 200;
+    return refuse(p, 409, "tport: ports are those of the head's configuration (links)");
+}
+
+static int set_network(const struct posted *p, const char *value, int apply)
+{
+    (void)value;
+    (void)apply;
+    return refuse(p, 409, "the head's own address is that of its configuration (links)");
+}
+
+static int set_phase_lock(const struct posted *p, const char *value, int apply)
+{
+    int on;
+    (void)apply;
+    if (!read_switch(value, &on)) return refuse(p, 400, "enabled: on or off");
+    return on ? refuse(p, 409, "enabled: off alone; this head has no phase lock") : 200;
+}
+
+/* Without a phase lock it has no effect; but what the device doesn't take is refused. */
+static int set_phase(const struct posted *p, const char *value, int apply)
+{
+    char *end;
+    (void)apply;
+    const double offset = value[0] >= '0' && value[0] <= '9' ? strtod(value, &end) : -1.0;
+    if (offset >= 0.0 && offset < 36000.0 && strspn(value, "0123456789.") == strlen(value) && *end == '\0') return 200;
+    return refuse(p, 400, "offset: 0 to 35999, in 0.01 degree; offsetInput: in degrees");
+}
+
+static int save(const struct posted *p, const char *value, int apply)
+{
+    (void)apply;
+    return strcmp(value, "submit") == 0 ? 200 : refuse(p, 400, "data: submit");
+}
+
+/* The settings of power-up, and it measures. The device is silent for some seconds then; this head is not. */
+static int reset(const struct posted *p, const char *value, int apply)
+{
+    if (strcmp(value, "reset_system") != 0) return refuse(p, 400, "data: reset_system");
+    if (!apply) return 200;
+    int status = command(p, "HEAD:LINES DEF");
+    if (status == 200) status = command(p, "SCAN:ECHOES DEF");
+    if (status == 200 && !is_scanning(p->spec)) status = command(p, "SCAN:START");
+    return status;
+}
+
+static const struct setting {
+    const char *path, *key;
+    int (*set)(const struct posted *p, const char *value, int apply);
+} settings[] = {
+    {"/cgi/setting", "laser", set_laser},
+    {"/cgi/setting", "returns", set_returns},
+    {"/cgi/setting", "rpm", set_rpm},
+    {"/cgi/setting/fov", "start", set_fov_start},
+    {"/cgi/setting/fov", "end", set_fov_end},
+    {"/cgi/setting/host", "addr", set_address},
+    {"/cgi/setting/host", "dport", set_data_port},
+    {"/cgi/setting/host", "tport", set_position_port},
+    {"/cgi/setting/net", "addr", set_network},
+    {"/cgi/setting/net", "mask", set_network},
+    {"/cgi/setting/net", "gateway", set_network},
+    {"/cgi/setting/net", "dhcp", set_network},
+    {"/cgi/setting/phaselock", "enabled", set_phase_lock},
+    {"/cgi/setting/phaselock", "offset", set_phase},
+    {"/cgi/setting/phaselock", "offsetInput", set_phase},
+    {"/cgi/save", "data", save},
+    {"/cgi/reset", "data", reset},
+};
+enum { N_SETTINGS = sizeof settings / sizeof settings[0] };
+
+int velodyne_takes_forms(const char *path)
+{
+    for (int i = 0; i < N_SETTINGS; i++)
+        if (strcmp(settings[i].path, path) == 0) return 1;
+    return 0;
+}
+
+/* ---- forms: key=value&key=value, with + and %41 */
+
+static int hex_digit(char c)
+{
+    if (c >= '0' && c <= '9') return c - '0';
+    if ((c | 32) >= 'a' && (c | 32) <= 'f') return (c | 32) - 'a' + 10;
+    return -1;
+}
+
+/* In place, and puts a NUL after it: there is room for one after len characters. 0, or -1: not a form's text. */
+static int decode(char *s, size_t len)
+{
+    char *to = s;
+    for (size_t i = 0; i < len; i++, to++) {
+        *to = s[i] == '+' ? ' ' : s[i];
+        if (s[i] == '%') {
+            if (i + 2 >= len || hex_digit(s[i + 1]) < 0 || hex_digit(s[i + 2]) < 0) return -1;
+            *to = (char)(hex_digit(s[i + 1]) << 4 | hex_digit(s[i + 2]));
+            i += 2;
+        }
+        if ((unsigned char)*to < 32) return -1;
+    }
+    *to = '\0';
+    return 0;
+}
+
+struct pair {
+    const struct setting *setting;
+    const char *value;
+};
+
+static const struct setting *find_setting(const char *path, const char *key)
+{
+    for (int i = 0; i < N_SETTINGS; i++)
+        if (strcmp(settings[i].path, path) == 0 && strcmp(settings[i].key, key) == 0) return &settings[i];
+    return NULL;
+}
+
+/* One key=value of len characters, with room for a NUL behind it. */
+static int read_pair(const struct posted *p, const char *path, char *s, size_t len, struct pair *out)
+{
+    char *equals = memchr(s, '=', len);
+    if (equals == NULL || decode(equals + 1, (size_t)(s + len - equals - 1)) != 0 ||
+        decode(s, (size_t)(equals - s)) != 0)
+        return refuse(p, 400, "the body is not a form: key=value&key=value");
+    *out = (struct pair){find_setting(path, s), equals + 1};
+    return out->setting != NULL ? 200 : refuse(p, 400, "this path has no such key");
+}
+
+/* The number of pairs, or an error as a status below 0. */
+static int read_form(const struct posted *p, const char *path, char *form, size_t len, struct pair *pairs)
+{
+    int n = 0;
+    for (size_t at = 0, end; at < len; at = end + 1) {
+        const char *ampersand = memchr(form + at, '&', len - at);
+        end = ampersand != NULL ? (size_t)(ampersand - form) : len;
+        if (n == MAX_PAIRS) return -refuse(p, 400, "too many keys: at most 8");
+        int status = read_pair(p, path, form + at, end - at, &pairs[n]);
+        if (status != 200) return -status;
+        for (int i = 0; i < n; i++)
+            if (pairs[i].setting == pairs[n].setting) return -refuse(p, 400, "a key stands twice");
+        n++;
+    }
+    return n != 0 ? n : -refuse(p, 400, "the body is not a form: key=value&key=value");
+}
+
+int velodyne_post(const struct protocol_spec *spec, const char *path, const char *form, size_t len, char *text)
+{
+    struct pair pairs[MAX_PAIRS];
+    const struct posted posted = {spec, text};
+    char copy[VELODYNE_MAX_FORM + 1];
+    if (len > VELODYNE_MAX_FORM) return refuse(&posted, 413, "the body is too long");
+    memcpy(copy, form, len);
+    const int n = read_form(&posted, path, copy, len, pairs);
+    int status = n < 0 ? -n : 200;
+    for (int apply = 0; apply < 2; apply++)
+        for (int i = 0; i < n && status == 200; i++)
+            status = pairs[i].setting->set(&posted, pairs[i].value, apply);
+    return status;
+}
+
+void velodyne_read_state(const struct protocol_spec *spec, struct velodyne_state *out)
+{
+    char reply[32];
+    out->motor_on = out->laser_on = is_scanning(spec);
+    ask(spec, "HEAD:LINES?", reply, sizeof reply);
+    out->rpm = (uint32_t)(strtod(reply, NULL) * 60.0 + 0.5);
+    ask(spec, "SCAN:ECHOES?", reply, sizeof reply);
+    out->returns = "";
+    for (size_t i = 0; i < sizeof returns / sizeof returns[0]; i++)
+        if (strlen(reply) >= 3 && strncasecmp(reply, returns[i].word, strlen(reply)) == 0)
+            out->returns = returns[i].name;
+}
+
+const char *velodyne_host_address(const struct protocol_spec *spec)
+{
+    return spec->address[0] != '\0' ? spec->address : "255.255.255.255";
+}
+
+int velodyne_host_port(const struct protocol_spec *spec)
+{
+    return spec->port != 0 ? spec->port : VELODYNE_DATA_PORT;
+}

@@ -1,0 +1,33 @@
+/* The settings of a VLP-16 as its clients post them: forms go in, native commands to the device and a status of HTTP
+ * come out. And what of the settings can be read. VELODYNE.md has all keys.
+ *
+ * What a form says is checked as a whole before the first command. Then its commands are carried out in order; the
+ * first one that the head refuses ends it. */
+#ifndef DRIVERS_PROTOCOL_VELODYNE_SETTINGS_H
+#define DRIVERS_PROTOCOL_VELODYNE_SETTINGS_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "drivers/protocol/protocol.h"
+
+enum { VELODYNE_TEXT = 600, VELODYNE_MAX_FORM = 1024 }; /* for an error's line; bytes */
+
+/* Whether a path takes forms. */
+int velodyne_takes_forms(const char *path);
+/* Carries out a form. Returns 200; or 400, 409, 413 or 503 with a line of text (cap VELODYNE_TEXT). */
+int velodyne_post(const struct protocol_spec *spec, const char *path, const char *form, size_t len, char *text);
+
+struct velodyne_state {
+    int motor_on, laser_on; /* it turns; it measures */
+    uint32_t rpm;
+    const char *returns; /* "Strongest", "Last", "Dual"; "" for the head's other selection */
+};
+/* As the head says now. */
+void velodyne_read_state(const struct protocol_spec *spec, struct velodyne_state *out);
+
+/* Where data are sent, as far as it is known. */
+const char *velodyne_host_address(const struct protocol_spec *spec);
+int velodyne_host_port(const struct protocol_spec *spec);
+
+#endif

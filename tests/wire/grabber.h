@@ -1,0 +1,57 @@
+/* rawlog-grabber of Debian's mrpt-apps, unmodified: started with a configuration of the test's, ended as its user ends
+ * it, and what it has recorded. A rawlog is a gzip stream of MRPT's serialised objects; of these the rig reads scans,
+ * turns and GPS observations. */
+#ifndef TESTS_WIRE_GRABBER_H
+#define TESTS_WIRE_GRABBER_H
+
+#include "tests/wire/wire.h"
+
+struct grabber {
+    struct wire *wire;
+    pid_t pid;
+    int in_fd, out_fd; /* its standard input and output */
+    char name[16];
+    char said[1 << 16]; /* on standard output and standard error */
+    size_t n_said;
+};
+
+/* Skips the test where the program is not installed. */
+void grabber_or_skip(void);
+
+/* name: of its section, its label and its files. sensor: the lines of its section, the driver's. */
+void grabber_start(struct wire *wire, const char *name, const char *sensor, struct grabber *grabber);
+
+/* Waits until it has saved so many observations. */
+void grabber_wait(struct grabber *grabber, int n_saved);
+
+/* A key is pressed; it must end with status 0. */
+void grabber_end(struct grabber *grabber);
+
+enum { RAWLOG_PACKET_LEN = 1206 };
+
+/* One observation. */
+struct rawlog_item {
+    enum { RAWLOG_SCAN, RAWLOG_TURN, RAWLOG_GPS } kind;
+    int64_t t_100ns; /* since 1601 */
+    uint32_t n;      /* ranges of a scan; packets of a turn */
+    /* of a scan: */
+    double aperture_rad;
+    int right_to_left;
+    const uint8_t *range, *valid; /* n floats, little-endian; n bytes */
+    const uint8_t *packets;       /* of a turn */
+};
+
+struct rawlog {
+    uint8_t *bytes;
+    size_t len;
+    struct rawlog_item *item;
+    uint32_t n_items;
+};
+
+/* What a grabber that has ended has written, in the order of the file. */
+void rawlog_read(const struct grabber *grabber, struct rawlog *log);
+void rawlog_free(struct rawlog *log);
+
+double rawlog_range_m(const struct rawlog_item *scan, uint32_t i);
+
+#endif

@@ -1,0 +1,192 @@
+/* rawlog-grabber reads the ready configuration of a VLP-16, which needs no other key: each packet of some turns comes,
+ * at its time and azimuth, with the ranges of the house, and the receiver's time dates the turns. The grabber takes
+ * two fixed ports of this machine. */
+#include "tests/wire/grabber.h"
+#include "tests/wire/house.h"
+
+enum { TURNS = 12, BLOCKS = 12, SHOTS = 32, PACKET = RAWLOG_PACKET_LEN };
+
+/* As the layout's facts have it: elevation of each laser of a firing sequence, in its order; times in us. */
+static const double ELEVATION_DEG[16] = {-15, 1, -13, 3, -11, 5, -9, 7, -7, 9, -5, 11, -3, 13, -1, 15};
+static const double LASER_US = 2.304, SEQUENCE_US = 55.296, PACKET_US = 24 * 55.296, DEG_PER_US = 3600e-6; /* 600 rpm */
+static const double MIN_M = 0.1, MAX_M = 100.0; /* the room has nothing outside of that */
+
+static uint32_t get16(const uint8_t *at)
+{
+    return at[0] | (uint32_t)at[1] << 8;
+}
+
+static uint32_t get32(const uint8_t *at)
+{
+    return get16(at) | get16(at + 2) << 16;
+}
+
+/* All packets of a log, one after the other. */
+struct packets {
+    struct {
+        const uint8_t *bytes;
+        uint32_t number; /* of those that the head sent since the first, by their time */
+    } * packet;
+    uint32_t n;
+    double azimuth0_deg; /* of the first packet's first firing, finer than the packets say it */
+};
+
+static void collect(const struct rawlog *log, struct packets *all)
+{
+    *all = (struct packets){0};
+    for (uint32_t i = 0; i < log->n_items; i++) {
+        const struct rawlog_item *turn = &log->item[i];
+        if (turn->kind != RAWLOG_TURN) continue;
+        all->packet = realloc(all->packet, (all->n + turn->n) * sizeof *all->packet);
+        assert_non_null(all->packet);
+        for (uint32_t k = 0; k < turn->n; k++)
+            all->packet[all->n++].bytes = turn->packets + (size_t)PACKET * k;
+    }
+    assert_true(all->n > 0);
+}
+
+/* Datagrams that the kernel threw away since a socket's owner did not read them in time: on a busy machine. */
+static uint32_t dropped_at(int port)
+{
+    char line[256];
+    unsigned local, drops, sum = 0;
+    FILE *f = fopen("/proc/net/udp", "r");
+    assert_non_null(f);
+    while (fgets(line, sizeof line, f) != NULL)
+        if (sscanf(line, "%*d: %*x:%x %*s %*s %*s %*s %*s %*s %*s %*s %*s %*s %u", &local, &drops) == 2 &&
+            (int)local == port)
+            sum += drops;
+    fclose(f);
+    return sum;
+}
+
+/* At the device's rate: packet n comes n * 1327.104 us after the first, by its own time. None is missing but those that
+ * the client did not read. */
+static void check_times(struct packets *all, uint32_t dropped)
+{
+    const uint32_t first_us = get32(all->packet[0].bytes + 1200), hour_us = 3600000000u;
+    for (uint32_t i = 0; i < all->n; i++) {
+        const uint8_t *packet = all->packet[i].bytes;
+        const uint32_t us = (get32(packet + 1200) + hour_us - first_us) % hour_us;
+        const uint32_t number = (uint32_t)lround(us / PACKET_US);
+        /* each time is rounded down to a microsecond */
+        if (fabs(us - number * PACKET_US) >= 1.0) fail_msg("packet %u at %u us", i, us);
+        if (number < i || number > i + dropped) fail_msg("packet %u is number %u; %u not read", i, number, dropped);
+        all->packet[i].number = number;
+        assert_int_equal(packet[1204], 0x37); /* strongest return */
+        assert_int_equal(packet[1205], 0x22); /* VLP-16 */
+    }
+}
+
+static double turned_deg(uint32_t n, int sequence, int laser)
+{
+    return DEG_PER_US * (n * PACKET_US + sequence * SEQUENCE_US + laser * LASER_US);
+}
+
+/* Each block's azimuth, rounded to 0.01 degrees, less where it must be then: the mean is the first one's. */
+static void check_azimuths(struct packets *all)
+{
+    const double begin_deg = 0.01 * get16(all->packet[0].bytes + 2);
+    double sum = 0.0, least = INFINITY, most = -INFINITY;
+    for (uint32_t n = 0; n < all->n; n++)
+        for (int b = 0; b < BLOCKS; b++) {
+            const uint8_t *block = all->packet[n].bytes + 100 * b;
+            assert_int_equal(get16(block), 0xeeff);
+            assert_true(get16(block + 2) < 36000);
+            double off =
+                remainder(0.01 * get16(block + 2) - begin_deg - turned_deg(all->packet[n].number, 2 * b, 0), 360.0);
+            sum += off;
+            least = fmin(least, off);
+            most = fmax(most, off);
+        }
+    /* rounding to 0.01, and of the sum of doubles */
+    if (most - least > 0.01 + 1e-6) fail_msg("azimuths are up to %.4f degrees apart", most - least);
+    all->azimuth0_deg = begin_deg + sum / (all->n * BLOCKS);
+}
+
+static void check_ranges(const struct house *house, const struct packets *all, uint32_t n)
+{
+    for (int b = 0; b < BLOCKS; b++)
+        for (int shot = 0; shot < SHOTS; shot++) {
+            const uint8_t *at = all->packet[n].bytes + 100 * b + 4 + 3 * shot;
+            const double azimuth =
+                (all->azimuth0_deg + turned_deg(all->packet[n].number, 2 * b + shot / 16, shot % 16)) * M_PI / 180.0;
+            const double elevation = ELEVATION_DEG[shot % 16] * M_PI / 180.0, range_m = 0.002 * get16(at);
+            /* Half of 2 mm. The mean of azimuths that are rounded in a regular pattern is good to a tenth of 0.01
+             * degrees: 2e-5 rad. */
+            if (!house_agrees(house, azimuth, elevation, 2e-5, range_m, 0.00101, MIN_M, MAX_M))
+                fail_msg("packet %u block %d shot %d: %.3f m instead of %.4f", n, b, shot, range_m,
+                         house_range_m(house, azimuth, elevation));
+        }
+}
+
+/* From the first fix on, turns are dated by the device: hour and day of the receiver, the rest of the packet. */
+static void check_dates(const struct rawlog *log)
+{
+    int fixes = 0, dated = 0;
+    for (uint32_t i = 0; i < log->n_items; i++) {
+        const struct rawlog_item *item = &log->item[i];
+        fixes += item->kind == RAWLOG_GPS;
+        if (item->kind != RAWLOG_TURN) continue;
+        const int64_t us = item->t_100ns / 10 % 3600000000LL, is = get32(item->packets + 1200);
+        /* 1: rounding of seconds in double. The first turn may have begun before the first fix. */
+        if (llabs(us - is) <= 1)
+            dated++;
+        else if (dated > 0)
+            fail_msg("a turn at %lld us is dated %lld us", (long long)is, (long long)us);
+    }
+    assert_true(fixes > 0 && dated > TURNS / 2);
+}
+
+static int is_free(int type, int port)
+{
+    struct sockaddr_in at = {.sin_family = AF_INET, .sin_port = htons((uint16_t)port)};
+    at.sin_addr.s_addr = htonl(INADDR_ANY);
+    int fd = socket(AF_INET, type | SOCK_CLOEXEC, 0), one = 1;
+    if (type == SOCK_STREAM) setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
+    int rc = bind(fd, (struct sockaddr *)&at, sizeof at);
+    close(fd);
+    return rc == 0;
+}
+
+static void ports_or_skip(void)
+{
+    if (is_free(SOCK_DGRAM, 2368) && is_free(SOCK_DGRAM, 8308) && is_free(SOCK_STREAM, 8080)) return;
+    print_message("UDP ports 2368 and 8308 and TCP port 8080 of this machine are not free\n");
+    skip();
+}
+
+static void test_turns(void **state)
+{
+    struct wire *wire = *state;
+    static struct grabber grabber;
+    struct rawlog log;
+    struct packets all;
+    grabber_or_skip();
+    ports_or_skip();
+    const double mark = atan2(1.1, 0.5);
+    grabber_start(wire, "VLP", "driver = CVelodyneScanner\nmodel = VLP16\n", &grabber);
+    struct head head = head_start(wire, "config/velodyne.yaml", house_options(wire, "4", NULL));
+    struct house *house = house_load(wire);
+    assert_true(house_is_mark(house, mark, 0.0) && !house_is_mark(house, -mark, 0.0));
+    grabber_wait(&grabber, TURNS + 2);
+    head_end(&head, SIGTERM);
+    const uint32_t dropped = dropped_at(2368);
+    grabber_end(&grabber);
+    rawlog_read(&grabber, &log);
+    collect(&log, &all);
+    check_times(&all, dropped);
+    check_azimuths(&all);
+    for (uint32_t n = 80; n < 80 + 76; n++) /* more than a turn */
+        check_ranges(house, &all, n);
+    check_dates(&log);
+    free(all.packet);
+    rawlog_free(&log);
+    house_free(house);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test_setup_teardown(test_turns, wire_setup, wire_teardown)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
