@@ -124,7 +124,7 @@ $(BUILD)/scanhead: $(BUILD)/firmware_sim/main.c.o $(BUILD)/modules.a
 #   benches.a   what the programs of tests/bench share                      build/bench and the charts'
 #   its rigs    tests/unit/cast_rig.c where it includes cast_rig.h          tests of a folder; tests/rigs.sh finds which
 #   modules.a   the head, without main.c                                    all of them
-FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_georef chart_widths beam plain)
+FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_georef chart_widths beam plain velodyne)
 BENCH_MAINS = $(FIGURES:$(BUILD)/%=%.c) tests/bench/bench.c
 COMMON = $(wildcard tests/common/*.c)
 BENCHES = $(filter-out $(BENCH_MAINS),$(wildcard tests/bench/*.c))
@@ -248,6 +248,10 @@ bench-beam: deps-build
 bench-plain: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/plain
 	@$(BUILD)/tests/bench/plain
+# The encoder of VLP-16 data packets, ns a firing.
+bench-velodyne: deps-build
+	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/velodyne
+	@$(BUILD)/tests/bench/velodyne
 chart: deps-build
 	$(call install_missing,$(DEPS_CHART))
 	@$(MAKE) --no-print-directory -j2 $(CHARTS)
@@ -280,6 +284,6 @@ format:
 clean:
 	rm -rf $(BUILD)
 .PHONY: ALWAYS all deps deps-test deps-build deps-guest demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb \
-	test-usb-million test-hostile objects test-unit-programs test-programs bench bench-beam bench-plain chart install format clean
+	test-usb-million test-hostile objects test-unit-programs test-programs bench bench-beam bench-plain bench-velodyne chart install format clean
 .SECONDARY:
 -include $(shell find $(BUILD) -type f -name '*.d' 2>/dev/null)

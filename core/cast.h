@@ -91,6 +91,7 @@ struct cast_setup {
      * room for beam->max_echoes entries a pulse. */
     const struct cast_beam *beam;
     enum beam_select echoes; /* which of a pulse's */
+    uint32_t max_echoes;     /* of a pulse, at most those of detect or beam; 0: as many as these say */
     double
         pulse_m; /* c tau / 2 of the pulse, a beam's resolution_m; for the widths of echoes, where a block has room */
     uint32_t n_movers;

@@ -1,7 +1,7 @@
 /* The beam: a pulse is not a ray. Definitions first.
  *
  * Width. Irradiance across the beam is Gaussian, I = I0 exp(-2 r^2 / w^2); w is the 1/e^2 radius. Diameters
- * and divergences are full ones at 1/e^2. (A 1/e figure times 1.41, a FWHM figure times 1.70.)
+ * and divergences are full ones at 1/e^2. Makers define them in other ways; enum beam_definition has these.
  * With exit diameter D and divergence theta, and the waist in the exit plane, w(R)^2 = (D/2)^2 + (R
  * theta/2)^2: the hyperbola of ISO 11146-1, which holds for beams that are not diffraction-limited as well.
  *
@@ -48,6 +48,16 @@
 #include "core/vec3.h"
 
 enum beam_mode { BEAM_SINGLE, BEAM_RINGS, BEAM_ADAPTIVE, BEAM_AUTO };
+
+/* How a diameter or a divergence is defined. Where the irradiance above has fallen to a share q of its peak,
+ * r = w sqrt(ln(1/q) / 2). So a full width times beam_widening() is the full width at 1/e^2 (q = exp(-2)):
+ *   1/e     q = exp(-1)   r = w / sqrt(2)          sqrt(2)         = 1.4142
+ *   FWHM    q = 1/2       r = w sqrt(ln(2) / 2)    sqrt(2 / ln(2)) = 1.6986
+ *   half    the radius, or the half angle, at 1/e^2                = 2
+ * (A. Siegman, Lasers, 1986, section 17.1; ISO 11146-1 has the widths of a Gaussian beam.) */
+enum beam_definition { BEAM_AT_1_E2, BEAM_AT_1_E, BEAM_AT_HALF_MAXIMUM, BEAM_HALF_AT_1_E2 };
+double beam_widening(enum beam_definition definition);
+
 enum beam_select { BEAM_ALL, BEAM_FIRST, BEAM_LAST, BEAM_STRONGEST };
 
 enum {

@@ -142,6 +142,8 @@ void caster_sub_rays(struct caster *c, const struct chunk *k);
 /* Further echoes of a pulse: room for n at the end of the list. Returns the first. */
 uint32_t echoes_further(struct echo_list *list, uint32_t pulse, uint32_t n);
 void caster_echoes(struct caster *c, const struct chunk *k);
+/* How many echoes a pulse may send. */
+uint32_t caster_max_echoes(const struct cast_setup *s);
 
 /* ---- points.c: entries of the block from k->at on. Returns the number of echoes. */
 uint32_t caster_points(struct caster *c, struct chunk *k);

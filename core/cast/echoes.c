@@ -222,13 +222,19 @@ static uint32_t choose(struct heard *h, uint32_t n, enum beam_select select)
     return 1;
 }
 
+uint32_t caster_max_echoes(const struct cast_setup *s)
+{
+    const uint32_t most = s->detect != NULL ? s->detect->max_echoes : s->beam->max_echoes;
+    return s->max_echoes != 0 && s->max_echoes < most ? s->max_echoes : most;
+}
+
 /* Of each pulse with several echoes only those that it sends stay in the list. */
 static void choose_echoes(struct caster *c, const struct chunk *k)
 {
     const struct cast_setup *s = k->s;
     struct echo_list *l = &c->list;
     const double *strength = s->detect != NULL && s->detect->signal != NULL ? l->amplitude : l->rho;
-    const uint32_t most = s->detect != NULL ? s->detect->max_echoes : s->beam->max_echoes;
+    const uint32_t most = caster_max_echoes(s);
     uint32_t end = k->n;
     for (uint32_t g = 0; g < l->n_further; g++) {
         struct heard h[LINE_MAX_ECHOES];

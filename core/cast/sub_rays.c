@@ -190,7 +190,7 @@ static void finish_job(struct caster *c, const struct chunk *k, const struct job
     for (uint32_t i = job->first; i < job->first + job->n; i++)
         add_met(c, k, job, i);
     /* Detection decides which of many are left out. */
-    beam_merging(&k->s->beam->beam, k->s->detect != NULL ? LINE_MAX_ECHOES : k->s->beam->max_echoes, &how);
+    beam_merging(&k->s->beam->beam, k->s->detect != NULL ? LINE_MAX_ECHOES : caster_max_echoes(k->s), &how);
     uint32_t n = beam_merge(&how, w->returns, w->n_returns, &w->echo[w->n_echoes], &c->counters.crowded);
     w->echoes_of[job->pulse].first = w->n_echoes;
     w->echoes_of[job->pulse].n = n;

@@ -56,6 +56,21 @@ static double moment_beyond(double h)
     return 0.25 * (across(h).energy - scale * exp(-2.0) * 2.0 * sqrt(fmax(0.0, 1.0 - h * h)));
 }
 
+double beam_widening(enum beam_definition definition)
+{
+    switch (definition) {
+    case BEAM_AT_1_E:
+        return M_SQRT2;
+    case BEAM_AT_HALF_MAXIMUM:
+        return sqrt(2.0 / M_LN2);
+    case BEAM_HALF_AT_1_E2:
+        return 2.0;
+    case BEAM_AT_1_E2:
+        break;
+    }
+    return 1.0;
+}
+
 void beam_init(struct beam *beam, double exit_m, double divergence_rad, double pulse_width_s)
 {
     memset(beam, 0, sizeof *beam);

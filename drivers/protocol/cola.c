@@ -106,6 +106,12 @@ enum cola_error cola_read_scan(struct cola *self, struct cola_args *args, struct
     return COLA_LATER;
 }
 
+static int64_t next_time(const void *protocol)
+{
+    const struct cola *self = protocol;
+    return self->pending ? self->now_ns : self->wants_scan ? self->try_ns : INT64_MAX;
+}
+
 static void take_input(void *protocol, const uint8_t *bytes, size_t len)
 {
     struct cola *self = protocol;
@@ -136,4 +142,5 @@ const struct protocol_ops protocol_cola = {
     .gap = pass_gap,
     .time = pass_time,
     .input = take_input,
+    .next_ns = next_time,
 };

@@ -9,17 +9,15 @@ enum { MAX_REPLY = 512, MOST_LOCATION = 16, N_OUTPUTS = 5 };
 
 /* ---- identity */
 
-static const char *firmware(const struct cola *self)
+static const char *version(const struct cola *self)
 {
-    return self->identity->firmware[0] != 0 ? self->identity->firmware : self->model->firmware;
+    return self->identity->firmware[0] != 0 ? self->identity->firmware : self->model->version;
 }
 
 enum cola_error cola_read_ident(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
-    const char *version = firmware(self);
-    if (strcmp(version, self->model->firmware) == 0) version = self->model->ident_version;
     cola_put_text(out, self->identity->model);
-    cola_put_text(out, version);
+    cola_put_text(out, version(self));
     return cola_args_end(args);
 }
 
@@ -31,7 +29,8 @@ enum cola_error cola_read_serial(struct cola *self, struct cola_args *args, stru
 
 enum cola_error cola_read_firmware(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
-    cola_put_text(out, firmware(self));
+    const char *const v = version(self);
+    cola_put_text(out, strcmp(v, self->model->version) == 0 ? self->model->firmware : v);
     return cola_args_end(args);
 }
 
@@ -227,10 +226,7 @@ int cola_start_scan(struct cola *self)
     const enum head head = head_state(self);
     self->wants_scan = head == OFF || head == BOOT || head == SPIN_DOWN;
     if (head == SPIN_UP || head == SCANNING || self->wants_scan) return 0;
-    if (head != IDLE || self->host.command(self->host.ctx, "SCAN:START", reply, sizeof reply) != 0) return 1;
-    /* the scan is everybody's: others may stop it */
-    self->host.command(self->host.ctx, "SYST:CONT:REL", reply, sizeof reply);
-    return 0;
+    return head != IDLE || self->host.command(self->host.ctx, "SCAN:START", reply, sizeof reply) != 0;
 }
 
 /* u8 0: measures */

@@ -78,11 +78,15 @@ static void put_distances(const struct cola *self, const uint32_t *range, struct
     const uint32_t scale = self->set.scale != 0 ? self->set.scale : g->scale;
     const double counts = g->mm_per_count / scale;
     const struct beams beams = sent_beams(self);
+    uint64_t lost = 0;
     put_channel_head(g, out, name, scale, beams);
     for (uint32_t i = beams.first; i < beams.first + beams.n; i++) {
         const double v = range[i] * counts + 0.5;
-        cola_put_u(out, 2, v < 65536.0 ? (uint32_t)v : 0);
+        const uint32_t distance = v < 65536.0 ? (uint32_t)v : 0;
+        if (distance == 0 && range[i] != 0) lost++;
+        cola_put_u(out, 2, distance);
     }
+    if (lost != 0) self->host.count(self->host.ctx, PROTOCOL_POINTS_LOST, lost);
 }
 
 static void put_signals(const struct cola *self, const uint16_t *signal, struct cola_out *out, const char *name)

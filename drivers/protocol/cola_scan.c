@@ -137,9 +137,11 @@ static void open_line(struct cola_collector *c, const struct native_points *p, i
     drop_line(c, 1);
     const uint32_t next = c->have_line ? c->line + 1 : 0;
     if (c->present && p->line > next) c->lost += p->line - next;
-    memset(s->range, 0, sizeof s->range);
-    memset(s->signal, 0, sizeof s->signal);
-    memset(s->got, 0, sizeof s->got);
+    for (int k = 0; k < COLA_N_ECHOES; k++) {
+        memset(s->range[k], 0, c->geometry.n * sizeof s->range[k][0]);
+        memset(s->signal[k], 0, c->geometry.n * sizeof s->signal[k][0]);
+    }
+    memset(s->got, 0, c->geometry.n);
     s->t0_ns = scan_t0_ns + p->line_t0_ns;
     s->counter = (uint16_t)(c->counter0 + p->line);
     set_path(c, s, p->t0_ns);

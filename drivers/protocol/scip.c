@@ -115,9 +115,20 @@ static void time_is(void *protocol, int64_t t_ns)
     s->host.hang_up(s->host.ctx);
 }
 
+/* Scans are looked for at each tick; without a request it is enough to keep up with the stream. */
+static int64_t next_ns(const void *protocol)
+{
+    enum { IDLE_NS = 50000000 };
+    const struct scip *s = protocol;
+    if (s->stream.active || s->single.active) return s->now_ns;
+    const int64_t idle_ns = s->now_ns + IDLE_NS;
+    return s->reboot_ns != INT64_MIN && s->reboot_ns < idle_ns ? s->reboot_ns : idle_ns;
+}
+
 const struct protocol_ops protocol_scip = {
     .name = "scip",
     .needs = PROTOCOL_NEEDS_POLAR,
+    .emitters = 1u << NATIVE_EMIT_PLANAR,
     .max_unit = SCIP_MAX_UNIT,
     .create = create,
     .destroy = destroy,
@@ -126,4 +137,5 @@ const struct protocol_ops protocol_scip = {
     .gap = gap,
     .time = time_is,
     .input = input,
+    .next_ns = next_ns,
 };

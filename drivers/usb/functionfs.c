@@ -1,7 +1,10 @@
 /* The functionfs back end: the device on a real device controller of this machine (a board with a UDC), as a
  * gadget of the Linux kernel. The kernel answers the standard requests from the descriptors it was given;
  * what concerns our own interfaces comes as events on ep0. The core hears of a configuration as if it had
- * answered the requests itself. */
+ * answered the requests itself.
+ *
+ * A device that is nothing but a port has no ep0 of ours: the kernel's f_acm is all of it. What the host does then
+ * shows in the state of the controller, and in a port that is hung up. */
 #include <errno.h>
 #include <fcntl.h>
 #include <linux/usb/functionfs.h>
@@ -53,11 +56,12 @@ static int functionfs_open(const struct usb_backend_spec *spec, struct usb_devic
     self->device = device;
     self->ep0 = self->pipes.event_fd = self->console.fd = self->console.timer = -1;
     int rc = gadget_create(&self->gadget, usb_device_model(device), usb_device_identity(device), err);
-    if (rc == SH_OK) rc = open_ep0(self, err);
+    if (rc == SH_OK && gadget_has_functionfs(&self->gadget)) rc = open_ep0(self, err);
     if (rc == SH_OK) rc = ffs_pipes_open(&self->pipes, device, &self->gadget, err);
     if (rc == SH_OK) rc = ffs_console_open(&self->console, device, self->gadget.tty_number, err);
     if (rc == SH_OK) rc = gadget_bind(&self->gadget, spec->udc, err);
     if (rc == SH_OK) rc = gadget_check_rate(&self->gadget, usb_device_identity(device)->highest, err);
+    if (rc == SH_OK && self->ep0 < 0) rc = gadget_watch_state(&self->gadget, err);
     if (rc != SH_OK) {
         take_apart(self);
         return rc;
@@ -78,7 +82,8 @@ static int functionfs_prepare(void *backend, struct pollfd *fds)
 {
     struct functionfs *self = backend;
     const short tty = ffs_console_events(&self->console);
-    fds[AT_EP0] = (struct pollfd){.fd = self->ep0, .events = POLLIN};
+    fds[AT_EP0] = self->ep0 >= 0 ? (struct pollfd){.fd = self->ep0, .events = POLLIN}
+                                 : (struct pollfd){.fd = self->gadget.state_fd, .events = POLLPRI};
     fds[AT_AIO] = (struct pollfd){.fd = self->pipes.event_fd, .events = POLLIN};
     fds[AT_TTY] = (struct pollfd){.fd = tty != 0 ? self->console.fd : -1, .events = tty};
     fds[AT_TIMER] = (struct pollfd){.fd = self->console.timer, .events = POLLIN};
@@ -96,6 +101,20 @@ static void disable(struct functionfs *self, int unplugged)
     ffs_console_stop(&self->console);
 }
 
+/* The controller names endpoints, and not every one has those that the model asks for. */
+static void look_at_addresses(struct functionfs *self)
+{
+    uint8_t given = 0;
+    if (!usb_device_model(self->device)->fixed_addresses || self->moved[0] != '\0') return;
+    const uint8_t wanted = ffs_pipes_moved(&self->pipes, &given);
+    if (wanted == 0) return;
+    snprintf(self->moved, sizeof self->moved,
+             "the controller %.40s has made endpoint %02x of %02x; clients that look for the device's own endpoints "
+             "don't find it: use backend usbip or usbredir",
+             self->gadget.udc, given, wanted);
+    self->moved_due = 1;
+}
+
 /* The host has configured the device. */
 static void enable(struct functionfs *self)
 {
@@ -107,6 +126,7 @@ static void enable(struct functionfs *self)
     usb_device_control(self->device, &setup, NULL, 0);
     ffs_pipes_start(&self->pipes);
     ffs_console_start(&self->console);
+    look_at_addresses(self);
 }
 
 /* A transfer in the wrong direction is FunctionFS's way to stall. */
@@ -147,10 +167,22 @@ static void answer(struct functionfs *self, struct usb_ctrlrequest setup)
     if (n == USB_STALL) stall(self, in);
 }
 
+/* Without ep0: what the controller's state says, now and since. A port that is hung up was down in between. */
+static void take_state(struct functionfs *self, int hung_up)
+{
+    char text[32];
+    const int was = usb_device_configuration(self->device) != 0;
+    const int is = gadget_is_configured(&self->gadget, was);
+    if (pread(self->gadget.state_fd, text, sizeof text, 0) < 0) return; /* read: poll(2) waits for the next change */
+    if (was && (hung_up || !is)) disable(self, !gadget_is_on_bus(&self->gadget));
+    if (is && (hung_up || !was)) enable(self);
+}
+
 /* One event of ep0; 0: there is none. */
 static int take_event(struct functionfs *self)
 {
     struct usb_functionfs_event event;
+    if (self->ep0 < 0) return 0;
     if (read(self->ep0, &event, sizeof event) != sizeof event) return 0;
     switch (event.type) {
     case FUNCTIONFS_ENABLE:
@@ -186,6 +218,8 @@ static int functionfs_handle(void *backend, const struct pollfd *fds, int n, int
     struct functionfs *self = backend;
     if (n != N_FDS) return SH_OK;
     int going = go_on(ctx), any = 1;
+    const int hung_up = fds[AT_TTY].fd == self->console.fd && (fds[AT_TTY].revents & POLLHUP) != 0;
+    if (going && self->ep0 < 0 && (fds[AT_EP0].revents != 0 || hung_up)) take_state(self, hung_up);
     /* What came on the endpoints came before the event on ep0: a session is not closed before its last data
      * are in. */
     for (int events = 0; going && any && events < MAX_EVENTS; events++) {
@@ -200,6 +234,14 @@ static int functionfs_handle(void *backend, const struct pollfd *fds, int n, int
     self->backlog = !going || any;
     functionfs_flush(self);
     return SH_OK;
+}
+
+static const char *functionfs_news(void *backend)
+{
+    struct functionfs *self = backend;
+    if (!self->moved_due) return NULL;
+    self->moved_due = 0;
+    return self->moved;
 }
 
 static int functionfs_more(const void *backend)
@@ -222,6 +264,7 @@ const struct usb_backend_ops usb_backend_functionfs = {
     .prepare = functionfs_prepare,
     .handle = functionfs_handle,
     .more = functionfs_more,
+    .news = functionfs_news,
     .flush = functionfs_flush,
     .close = functionfs_close,
 };

@@ -96,7 +96,7 @@ static void look_at_host(struct ffs_console *console)
     offer_tx(console);
 }
 
-/* A reader takes text only in step, after a whole frame (PROTOCOL.md, Resynchronisation). */
+/* Native: a reader takes text only in step, after a whole frame (PROTOCOL.md, Resynchronisation). */
 static void lead_in(struct ffs_console *console)
 {
     const struct native_event event = {.code = NATIVE_EV_READER_LOST, .text = "the end of an earlier session"};
@@ -146,7 +146,7 @@ static void read_rx(struct ffs_console *console)
     if (n <= 0) return;
     if (!console->session) {
         set_session(console, 1);
-        if (console->cut) lead_in(console);
+        if (console->cut && usb_device_model(console->device) == &scanhead_usb_model) lead_in(console);
     }
     console->rx_busy = 1;
     console->rx =

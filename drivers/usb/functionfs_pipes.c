@@ -2,10 +2,12 @@
  * the kernel's asynchronous I/O, whose completions an eventfd counts. */
 #include <errno.h>
 #include <fcntl.h>
+#include <linux/usb/functionfs.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/eventfd.h>
+#include <sys/ioctl.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
@@ -196,6 +198,18 @@ void ffs_pipes_drain(struct ffs_pipes *pipes, int timeout_ms)
     while (is_under_way(pipes) && poll(&slot, 1, timeout_ms) > 0)
         while (ffs_pipes_take(pipes))
             continue;
+}
+
+uint8_t ffs_pipes_moved(const struct ffs_pipes *pipes, uint8_t *given)
+{
+    for (int i = 0; i < pipes->n; i++) {
+        struct usb_endpoint_descriptor descriptor;
+        const struct ffs_pipe *pipe = &pipes->pipe[i];
+        if (ioctl(pipe->fd, FUNCTIONFS_ENDPOINT_DESC, &descriptor) != 0) continue;
+        *given = descriptor.bEndpointAddress;
+        if (*given != pipe->address) return pipe->address;
+    }
+    return 0;
 }
 
 uint8_t ffs_pipes_address(const struct ffs_pipes *pipes, unsigned number)

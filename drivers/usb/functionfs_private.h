@@ -59,6 +59,9 @@ void ffs_pipes_complete(struct ffs_pipes *pipes, struct usb_transfer *transfer);
 /* Waits until the host has taken what is at the kernel, as long as it takes something within timeout_ms. */
 void ffs_pipes_drain(struct ffs_pipes *pipes, int timeout_ms);
 void ffs_pipes_close(struct ffs_pipes *pipes);
+/* The first endpoint that the controller has given another address than the model's; 0: none, or it does not say.
+ * While a configuration is up. */
+uint8_t ffs_pipes_moved(const struct ffs_pipes *pipes, uint8_t *given);
 /* The model's address of an endpoint by its number in FunctionFS, counted from 1; 0 where there is none. */
 uint8_t ffs_pipes_address(const struct ffs_pipes *pipes, unsigned number);
 
@@ -97,7 +100,9 @@ enum { FFS_MAX_DATA_STAGE = 4096 };
 struct functionfs {
     struct usb_device *device;
     struct gadget gadget;
-    int ep0;
+    int ep0;         /* -1: nothing of the device is FunctionFS's */
+    char moved[200]; /* of endpoints that are not where the device has them; to be told once */
+    int moved_due;
     int backlog; /* stopped before everything was looked at */
     struct ffs_pipes pipes;
     struct ffs_console console;

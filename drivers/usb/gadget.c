@@ -3,7 +3,6 @@
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,60 +10,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-static const char GADGETS[] = "/sys/kernel/config/usb_gadget", CONTROLLERS[] = "/sys/class/udc";
+#include "drivers/usb/sysfile.h"
+
+static const char GADGETS[] = "/sys/kernel/config/usb_gadget";
 static const char PREFIX[] = "scanhead-";
-static const char *const rate_names[] = {
-    [USB_RATE_FULL] = "full", [USB_RATE_HIGH] = "high", [USB_RATE_SUPER] = "super"};
-
-/* ---- configfs */
-
-static int write_text(const char *dir, const char *file, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
-
-/* 0 or -1 with errno. */
-static int write_text(const char *dir, const char *file, const char *fmt, ...)
-{
-    char path[512], text[128];
-    va_list ap;
-    va_start(ap, fmt);
-    int len = vsnprintf(text, sizeof text, fmt, ap);
-    va_end(ap);
-    snprintf(path, sizeof path, "%s/%s", dir, file);
-    int fd = open(path, O_WRONLY | O_CLOEXEC);
-    if (fd < 0) return -1;
-    ssize_t n = write(fd, text, (size_t)len);
-    int error = errno;
-    close(fd);
-    errno = error;
-    return n == len ? 0 : -1;
-}
-
-static int read_text(const char *dir, const char *file, char *text, size_t len)
-{
-    char path[512];
-    snprintf(path, sizeof path, "%s/%s", dir, file);
-    int fd = open(path, O_RDONLY | O_CLOEXEC);
-    if (fd < 0) return -1;
-    ssize_t n = read(fd, text, len - 1);
-    close(fd);
-    text[n > 0 ? n : 0] = '\0';
-    text[strcspn(text, "\n")] = '\0';
-    return n < 0 ? -1 : 0;
-}
-
-static int make_dir(const char *dir, const char *name)
-{
-    char path[512];
-    snprintf(path, sizeof path, "%s/%s", dir, name);
-    return mkdir(path, 0755);
-}
-
-static int make_link(const char *dir, const char *target, const char *name)
-{
-    char from[512], to[512];
-    snprintf(from, sizeof from, "%s/%s", dir, target);
-    snprintf(to, sizeof to, "%s/%s", dir, name);
-    return symlink(from, to);
-}
 
 /* ---- what dead processes left */
 
@@ -89,7 +38,7 @@ static void remove_all(const char *name)
         {"configs/c.1", 0},      {"functions/acm.", 1},   {"functions/ffs.", 1}, {"strings/0x409", 0}};
     char dir[128], path[512];
     snprintf(dir, sizeof dir, "%s/%s", GADGETS, name);
-    if (access(dir, F_OK) == 0) (void)write_text(dir, "UDC", "\n");
+    if (access(dir, F_OK) == 0) (void)sysfile_write(dir, "UDC", "\n");
     unmount(name);
     for (size_t i = 0; i < sizeof part / sizeof part[0]; i++) {
         snprintf(path, sizeof path, "%s/%s%s", dir, part[i].path, part[i].named ? name : "");
@@ -104,7 +53,7 @@ static int started_at(long pid, unsigned long long *ticks)
 {
     char dir[32], text[1024];
     snprintf(dir, sizeof dir, "/proc/%ld", pid);
-    if (read_text(dir, "stat", text, sizeof text) != 0) return -1;
+    if (sysfile_read(dir, "stat", text, sizeof text) != 0) return -1;
     const char *at = strrchr(text, ')'); /* field 2, the name, may hold anything */
     for (int field = 2; at != NULL && field < 22; field++)
         at = strchr(at + 1, ' ');
@@ -215,29 +164,43 @@ static int make_named_dir(struct gadget *gadget, struct sh_err *err)
                    GADGETS, strerror(error));
 }
 
+static int write_string(const char *dir, const char *file, const struct usb_model *model, uint8_t index)
+{
+    return index != 0 ? sysfile_write(dir, file, "%s", model->string[index - 1]) : 0;
+}
+
+static int write_os_descriptors(const char *dir, const struct usb_model *model)
+{
+    return sysfile_write(dir, "os_desc/use", "1") |
+           sysfile_write(dir, "os_desc/b_vendor_code", "0x%02x", model->ms_vendor_code) |
+           sysfile_write(dir, "os_desc/qw_sign", "MSFT100") | sysfile_link(dir, "configs/c.1", "os_desc/c.1");
+}
+
 static int write_identity(const struct gadget *gadget, const struct usb_model *model, const struct usb_identity *id)
 {
     const char *dir = gadget->dir;
-    if (write_text(dir, "max_speed", "%s-speed", rate_names[id->highest]) != 0 && errno != ENOENT)
+    if (sysfile_write(dir, "max_speed", "%s-speed", gadget_rate_name(id->highest)) != 0 && errno != ENOENT)
         return -1; /* since 5.12 */
-    return write_text(dir, "idVendor", "0x%04x", id->vid) | write_text(dir, "idProduct", "0x%04x", id->pid) |
-           write_text(dir, "bcdUSB", "0x0210") | write_text(dir, "bcdDevice", "0x%04x", model->bcd_device) |
-           write_text(dir, "bDeviceClass", "0x%02x", model->class) |
-           write_text(dir, "bDeviceSubClass", "0x%02x", model->subclass) |
-           write_text(dir, "bDeviceProtocol", "0x%02x", model->protocol) | make_dir(dir, "strings/0x409") |
-           write_text(dir, "strings/0x409/manufacturer", "%s", model->string[model->manufacturer - 1]) |
-           write_text(dir, "strings/0x409/product", "%s", model->string[model->product - 1]) |
-           (id->serial[0] != '\0' ? write_text(dir, "strings/0x409/serialnumber", "%s", id->serial) : 0);
+    return sysfile_write(dir, "idVendor", "0x%04x", id->vid) | sysfile_write(dir, "idProduct", "0x%04x", id->pid) |
+           sysfile_write(dir, "bcdUSB", usb_describe_ms_os(model, NULL, 0) != 0 ? "0x0210" : "0x0200") |
+           sysfile_write(dir, "bcdDevice", "0x%04x", model->bcd_device) |
+           sysfile_write(dir, "bDeviceClass", "0x%02x", model->class) |
+           sysfile_write(dir, "bDeviceSubClass", "0x%02x", model->subclass) |
+           sysfile_write(dir, "bDeviceProtocol", "0x%02x", model->protocol) | sysfile_mkdir(dir, "strings/0x409") |
+           write_string(dir, "strings/0x409/manufacturer", model, model->manufacturer) |
+           write_string(dir, "strings/0x409/product", model, model->product) |
+           (id->serial[0] != '\0' ? sysfile_write(dir, "strings/0x409/serialnumber", "%s", id->serial) : 0);
 }
 
 static int write_configuration(const struct gadget *gadget, const struct usb_model *model)
 {
     const char *dir = gadget->dir;
-    return make_dir(dir, "configs/c.1") |
-           write_text(dir, "configs/c.1/bmAttributes", "0x%02x", usb_is_self_powered(model) ? 0xc0 : 0x80) |
-           write_text(dir, "configs/c.1/MaxPower", "%u", model->max_power_ma) | write_text(dir, "os_desc/use", "1") |
-           write_text(dir, "os_desc/b_vendor_code", "0x%02x", model->ms_vendor_code) |
-           write_text(dir, "os_desc/qw_sign", "MSFT100") | make_link(dir, "configs/c.1", "os_desc/c.1");
+    return sysfile_mkdir(dir, "configs/c.1") |
+           sysfile_write(dir, "configs/c.1/bmAttributes", "0x%02x", usb_is_self_powered(model) ? 0xc0 : 0x80) |
+           sysfile_write(dir, "configs/c.1/MaxPower", "%u", model->max_power_ma) |
+           (model->configuration != 0 ? sysfile_mkdir(dir, "configs/c.1/strings/0x409") : 0) |
+           write_string(dir, "configs/c.1/strings/0x409/configuration", model, model->configuration) |
+           (usb_describe_ms_os(model, NULL, 0) != 0 ? write_os_descriptors(dir, model) : 0);
 }
 
 /* The console first: it has the first interfaces. */
@@ -246,12 +209,12 @@ static int make_function(struct gadget *gadget, const char *kind, struct sh_err 
     char function[80], link[96];
     snprintf(function, sizeof function, "functions/%s.%s", kind, gadget->name);
     snprintf(link, sizeof link, "configs/c.1/%s.%s", kind, gadget->name);
-    if (make_dir(gadget->dir, function) != 0)
+    if (sysfile_mkdir(gadget->dir, function) != 0)
         return errno == ENOENT
                    ? sh_fail(err, SH_EINPUT, "functionfs: the kernel has no such function: modprobe usb_f_%s",
                              strcmp(kind, "ffs") == 0 ? "fs" : kind)
                    : sh_fail(err, SH_EIO, "functionfs: %s/%s: %s", gadget->dir, function, strerror(errno));
-    if (make_link(gadget->dir, function, link) != 0)
+    if (sysfile_link(gadget->dir, function, link) != 0)
         return sh_fail(err, SH_EIO, "functionfs: %s/%s: %s", gadget->dir, link, strerror(errno));
     return SH_OK;
 }
@@ -261,7 +224,7 @@ static int set_console_protocol(const struct gadget *gadget, const struct usb_mo
 {
     char file[96];
     snprintf(file, sizeof file, "functions/acm.%s/protocol", gadget->name);
-    if (write_text(gadget->dir, file, "%u", model->function[0].protocol) == 0 || errno == ENOENT) return SH_OK;
+    if (sysfile_write(gadget->dir, file, "%u", model->function[0].protocol) == 0 || errno == ENOENT) return SH_OK;
     return sh_fail(err, SH_EIO, "functionfs: %s/%s: %s", gadget->dir, file, strerror(errno));
 }
 
@@ -269,7 +232,7 @@ static int find_tty(struct gadget *gadget, struct sh_err *err)
 {
     char file[96], text[16];
     snprintf(file, sizeof file, "functions/acm.%s/port_num", gadget->name);
-    if (read_text(gadget->dir, file, text, sizeof text) != 0)
+    if (sysfile_read(gadget->dir, file, text, sizeof text) != 0)
         return sh_fail(err, SH_EIO, "functionfs: %s/%s: %s", gadget->dir, file, strerror(errno));
     gadget->tty_number = atoi(text);
     return SH_OK;
@@ -293,6 +256,7 @@ int gadget_create(struct gadget *gadget, const struct usb_model *model, const st
                   struct sh_err *err)
 {
     memset(gadget, 0, sizeof *gadget);
+    gadget->state_fd = -1;
     int rc = take_part(gadget, model, err);
     if (rc == SH_OK) rc = look_for_configfs(err);
     if (rc != SH_OK) return rc;
@@ -303,88 +267,17 @@ int gadget_create(struct gadget *gadget, const struct usb_model *model, const st
     if (rc == SH_OK && gadget->tty_number >= 0) rc = make_function(gadget, "acm", err);
     if (rc == SH_OK && gadget->tty_number >= 0) rc = set_console_protocol(gadget, model, err);
     if (rc == SH_OK && gadget->tty_number >= 0) rc = find_tty(gadget, err);
-    if (rc == SH_OK) rc = make_function(gadget, "ffs", err);
-    if (rc == SH_OK) rc = mount_instance(gadget, err);
+    if (rc == SH_OK && gadget_has_functionfs(gadget)) rc = make_function(gadget, "ffs", err);
+    if (rc == SH_OK && gadget_has_functionfs(gadget)) rc = mount_instance(gadget, err);
     if (rc != SH_OK) gadget_remove(gadget);
     return rc;
-}
-
-/* ---- plugging in and out */
-
-static int bind_to(struct gadget *gadget, const char *udc)
-{
-    if (write_text(gadget->dir, "UDC", "%s\n", udc) != 0) return -1;
-    snprintf(gadget->udc, sizeof gadget->udc, "%s", udc);
-    return 0;
-}
-
-static int bind_first_free(struct gadget *gadget, struct sh_err *err)
-{
-    DIR *dir = opendir(CONTROLLERS);
-    int n = 0, error = 0;
-    for (struct dirent *entry; dir != NULL && gadget->udc[0] == '\0' && (entry = readdir(dir)) != NULL;) {
-        if (entry->d_name[0] == '.') continue;
-        n++;
-        if (bind_to(gadget, entry->d_name) != 0) error = errno;
-    }
-    if (dir != NULL) closedir(dir);
-    if (gadget->udc[0] != '\0') return SH_OK;
-    if (n == 0)
-        return sh_fail(err, SH_EINPUT,
-                       "functionfs: no USB device controller in %s: the machine has none, or its driver is not loaded "
-                       "(dwc2 on a Raspberry Pi; dummy_hcd to try without one)",
-                       CONTROLLERS);
-    return sh_fail(err, SH_EIO, "functionfs: none of %d device controllers takes the gadget: %s", n, strerror(error));
-}
-
-int gadget_bind(struct gadget *gadget, const char *udc, struct sh_err *err)
-{
-    if (udc[0] == '\0') return bind_first_free(gadget, err);
-    if (bind_to(gadget, udc) == 0) return SH_OK;
-    if (errno == ENODEV || errno == ENOENT)
-        return sh_fail(err, SH_EINPUT, "functionfs: no device controller %s; %s lists what there is", udc, CONTROLLERS);
-    return sh_fail(err, SH_EIO, "functionfs: device controller %s: %s", udc, strerror(errno));
-}
-
-static enum usb_rate read_rate(const struct gadget *gadget, const char *file)
-{
-    char dir[320], text[32] = "";
-    snprintf(dir, sizeof dir, "%s/%s", CONTROLLERS, gadget->udc);
-    read_text(dir, file, text, sizeof text);
-    return strncmp(text, "super", 5) == 0  ? USB_RATE_SUPER
-           : strncmp(text, "high", 4) == 0 ? USB_RATE_HIGH
-                                           : USB_RATE_FULL;
-}
-
-int gadget_is_on_bus(const struct gadget *gadget)
-{
-    char dir[320], state[32] = "";
-    snprintf(dir, sizeof dir, "%s/%s", CONTROLLERS, gadget->udc);
-    return read_text(dir, "state", state, sizeof state) == 0 && strcmp(state, "not attached") != 0;
-}
-
-enum usb_rate gadget_rate(const struct gadget *gadget)
-{
-    return read_rate(gadget, "current_speed");
-}
-
-int gadget_check_rate(const struct gadget *gadget, enum usb_rate wanted, struct sh_err *err)
-{
-    const enum usb_rate fastest = read_rate(gadget, "maximum_speed");
-    if (fastest >= wanted) return SH_OK;
-    return sh_fail(err, SH_EINPUT, "functionfs: device controller %s does not reach %s speed; allowed %s%s",
-                   gadget->udc, rate_names[wanted], fastest == USB_RATE_FULL ? "" : "full, ", rate_names[fastest]);
-}
-
-void gadget_unbind(struct gadget *gadget)
-{
-    if (gadget->udc[0] != '\0') (void)write_text(gadget->dir, "UDC", "\n");
-    gadget->udc[0] = '\0';
 }
 
 void gadget_remove(struct gadget *gadget)
 {
     gadget_unbind(gadget);
+    if (gadget->state_fd >= 0) close(gadget->state_fd);
+    gadget->state_fd = -1;
     if (gadget->mount[0] != '\0' && umount2(gadget->mount, MNT_DETACH) == 0) rmdir(gadget->mount);
     if (gadget->dir[0] != '\0') remove_all(gadget->name);
     gadget->dir[0] = gadget->mount[0] = '\0';

@@ -1,5 +1,6 @@
 /* A USB gadget of the Linux kernel, made through configfs: identity, strings, one configuration, FunctionFS
- * for what this program does itself and f_acm for a CDC-ACM console. Private to the functionfs back end.
+ * for what this program does itself, if there is any, and f_acm for a CDC-ACM console. Private to the functionfs
+ * back end.
  *
  * Why f_acm: FunctionFS takes no class-specific interface descriptors (type 24h), without which no host knows
  * a CDC console. The kernel's has them; what it lacks is described in functionfs_private.h. */
@@ -14,6 +15,7 @@ struct gadget {
     char mount[64]; /* where FunctionFS is mounted; empty: nowhere */
     char udc[256];  /* empty: not bound */
     int tty_number; /* /dev/ttyGSn; -1: no console */
+    int state_fd;   /* of its controller's state, where there is no FunctionFS to report it; -1: none */
     /* What FunctionFS carries, numbered from 0 as it wants it: the model without the console. */
     struct usb_model part;
     struct usb_interface_row row[USB_MAX_INTERFACES];
@@ -26,10 +28,21 @@ struct gadget {
  * be opened. */
 int gadget_create(struct gadget *gadget, const struct usb_model *model, const struct usb_identity *id,
                   struct sh_err *err);
+/* Whether FunctionFS carries something of it. */
+static inline int gadget_has_functionfs(const struct gadget *gadget)
+{
+    return gadget->part.n_interfaces != 0;
+}
 /* Writes the descriptors and strings to ep0. */
 int gadget_describe(const struct gadget *gadget, int ep0, const struct usb_identity *id, struct sh_err *err);
 /* Plugs in: udc, or the first free controller where that is empty. */
 int gadget_bind(struct gadget *gadget, const char *udc, struct sh_err *err);
+/* Without FunctionFS, after binding: state_fd, which poll(2) reports with POLLPRI when the state has changed. */
+int gadget_watch_state(struct gadget *gadget, struct sh_err *err);
+/* The host has configured it. before: what was said last, which still holds while the bus is suspended. */
+int gadget_is_configured(const struct gadget *gadget, int before);
+/* "full", "high", "super". */
+const char *gadget_rate_name(enum usb_rate rate);
 /* 0: its controller sees no host. */
 int gadget_is_on_bus(const struct gadget *gadget);
 /* Of the bus it is on. */

@@ -60,8 +60,13 @@ static int write_descriptors(const struct gadget *gadget, int ep0, const struct 
 {
     uint8_t out[4 * USB_MAX_CONFIG + 256];
     const unsigned n_rates = (unsigned)id->highest + 1;
-    uint32_t os_count = 0, flags = FUNCTIONFS_HAS_MS_OS_DESC;
-    size_t at = 12 + 4 * n_rates + 4; /* after the counts */
+    uint32_t os_count = 0, flags = 0;
+    size_t at = 12 + 4 * n_rates; /* after the counts */
+    const int has_os = usb_describe_ms_os(&gadget->part, NULL, 0) != 0;
+    if (has_os) {
+        flags |= FUNCTIONFS_HAS_MS_OS_DESC;
+        at += 4;
+    }
     for (unsigned rate = 0; rate < n_rates; rate++) {
         uint8_t config[USB_MAX_CONFIG];
         size_t len = usb_describe_config(&gadget->part, id, (enum usb_rate)rate, USB_DT_CONFIG, config, sizeof config);
@@ -77,7 +82,7 @@ static int write_descriptors(const struct gadget *gadget, int ep0, const struct 
     le_put32(out, FUNCTIONFS_DESCRIPTORS_MAGIC_V2);
     le_put32(out + 4, (uint32_t)at);
     le_put32(out + 8, flags);
-    le_put32(out + 12 + 4 * n_rates, os_count);
+    if (has_os) le_put32(out + 12 + 4 * n_rates, os_count);
     return write_all(ep0, out, at);
 }
 

@@ -138,6 +138,7 @@ static const struct usb_model sick_model = {
     .n_functions = 1,
     .n_interfaces = 1,
     .n_rows = 1,
+    .fixed_addresses = 1,
 };
 
 /* Its clients tell it nothing when they come or go. */

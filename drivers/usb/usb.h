@@ -85,6 +85,7 @@ struct usb_model {
     const struct usb_function_row *function;
     const struct usb_interface_row *interface; /* rows */
     uint8_t n_functions, n_interfaces, n_rows;
+    uint8_t fixed_addresses; /* its clients know its endpoints by their addresses, whatever descriptors say */
     uint8_t ms_vendor_code; /* bRequest for the Microsoft OS 2.0 set; unused without compatible ids */
 };
 

@@ -38,18 +38,28 @@ static void choose_window(const struct config_profile *p, const struct standpoin
     scan->line_stop_deg = clamp(ceil(10.0 * angle_deg(at->line1_rad)) / 10.0, fov_min_deg, fov_max_deg);
 }
 
+/* Of a head with fixed pulse rates the next one below; then lines and pan follow from it, so that steps along
+ * and across the lines stay alike. */
+static void choose_rates(const struct config_profile *p, double sweep_deg, struct init_scan *scan)
+{
+    const double most_hz = fmin(MOST_LINES_HZ, floor(from_micro(p->pan_max_udeg_s) / scan->step_deg));
+    const double min_hz = from_micro(p->lines_min_uhz), max_hz = from_micro(p->lines_max_uhz);
+    const double per_line = sweep_deg / scan->step_deg;
+    scan->lines_hz = clamp(most_hz, min_hz, max_hz);
+    scan->prr_hz =
+        clamp(1000.0 * ceil(1e-3 * per_line * scan->lines_hz), from_micro(p->prr_min_uhz), from_micro(p->prr_max_uhz));
+    if (p->n_programs == 0) return;
+    scan->prr_hz = from_micro(config_rate_below(p, llround(1e6 * scan->prr_hz)));
+    scan->lines_hz = clamp(fmin(most_hz, floor(scan->prr_hz / per_line)), min_hz, max_hz);
+}
+
 void init_choose_scan(const struct config_profile *p, const struct standpoint *at, struct init_scan *scan)
 {
-    const double pan_max_deg_s = from_micro(p->pan_max_udeg_s), sweep_deg = 360.0 * p->optical_gain / p->facets;
     choose_window(p, at, scan);
     const double pan_deg = scan->pan_stop_deg - from_micro(p->pan_min_udeg);
-    double step_deg = choose_step(pan_deg * (scan->line_stop_deg - scan->line_start_deg));
-    double lines_hz = fmin(MOST_LINES_HZ, floor(pan_max_deg_s / step_deg));
-    scan->step_deg = step_deg;
-    scan->lines_hz = clamp(lines_hz, from_micro(p->lines_min_uhz), from_micro(p->lines_max_uhz));
-    scan->pan_deg_s = fmin(step_deg * scan->lines_hz, pan_max_deg_s);
-    scan->prr_hz = clamp(1000.0 * ceil(1e-3 * sweep_deg * scan->lines_hz / step_deg), from_micro(p->prr_min_uhz),
-                         from_micro(p->prr_max_uhz));
+    scan->step_deg = choose_step(pan_deg * (scan->line_stop_deg - scan->line_start_deg));
+    choose_rates(p, 360.0 * p->optical_gain / p->facets, scan);
+    scan->pan_deg_s = fmin(scan->step_deg * scan->lines_hz, from_micro(p->pan_max_udeg_s));
     scan->duration_s = pan_deg / scan->pan_deg_s;
 }
 

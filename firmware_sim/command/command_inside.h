@@ -86,6 +86,7 @@ struct command_setting {
     const char *other; /* header of the other setting; NULL: none */
     size_t other_offset;
     int64_t least, most;      /* COMMAND_UNBOUND: no such bound */
+    int is_rate;              /* where the head has fixed pulse rates, only these */
     const char *const *words; /* the values by name, from 0; NULL: values are numbers */
 };
 #define COMMAND_UNBOUND INT64_MIN

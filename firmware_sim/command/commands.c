@@ -8,7 +8,7 @@
 #define SETTING(field) offsetof(struct head_settings, field)
 #define PROFILE(field) {1, (int64_t)offsetof(struct head_limits, field)}
 #define CONSTANT(n)    {0, (n)}
-#define NO_OTHER       NULL, 0, 0, 0
+#define NO_OTHER       NULL, 0, 0, 0, 0
 
 enum { TURN_UDEG = 360000000 };
 
@@ -26,21 +26,21 @@ static const char *const echo_words[] = {"ALL", "FIRSt", "LAST", "STRongest", NU
 /* A pulse rate below the line rate would leave lines without a pulse. A line or a pan sweep without width has
  * nothing to scan. A pan sweep beyond a turn would scan things twice. */
 static const struct command_setting settings[] = {
-    /* field, is_u32, not_in_scan, min, max, other, its field, least, most, words */
+    /* field, is_u32, not_in_scan, min, max, other, its field, least, most, is_rate, words */
     [PRR] = {SETTING(prr_uhz), 0, 0, PROFILE(prr_min_uhz), PROFILE(prr_max_uhz),
-             "HEAD:LINes", SETTING(lines_uhz), 0, COMMAND_UNBOUND, NULL},
+             "HEAD:LINes", SETTING(lines_uhz), 0, COMMAND_UNBOUND, 1, NULL},
     [LINES] = {SETTING(lines_uhz), 0, 0, PROFILE(lines_min_uhz), PROFILE(lines_max_uhz),
-               "HEAD:PRR", SETTING(prr_uhz), COMMAND_UNBOUND, 0, NULL},
+               "HEAD:PRR", SETTING(prr_uhz), COMMAND_UNBOUND, 0, 0, NULL},
     [PAN] = {SETTING(pan_udeg_s), 0, 0, CONSTANT(0), PROFILE(pan_max_udeg_s), NO_OTHER, NULL},
     [STATION] = {SETTING(station), 1, 1, CONSTANT(1), PROFILE(n_stations), NO_OTHER, NULL},
     [LINE_START] = {SETTING(line_start_udeg), 0, 0, PROFILE(fov_min_udeg), PROFILE(fov_max_udeg),
-                    "SCAN:LINE:STOP", SETTING(line_stop_udeg), COMMAND_UNBOUND, -1, NULL},
+                    "SCAN:LINE:STOP", SETTING(line_stop_udeg), COMMAND_UNBOUND, -1, 0, NULL},
     [LINE_STOP] = {SETTING(line_stop_udeg), 0, 0, PROFILE(fov_min_udeg), PROFILE(fov_max_udeg),
-                   "SCAN:LINE:STARt", SETTING(line_start_udeg), 1, COMMAND_UNBOUND, NULL},
+                   "SCAN:LINE:STARt", SETTING(line_start_udeg), 1, COMMAND_UNBOUND, 0, NULL},
     [PAN_START] = {SETTING(pan_start_udeg), 0, 0, PROFILE(pan_min_udeg), PROFILE(pan_max_udeg),
-                   "SCAN:PAN:STOP", SETTING(pan_stop_udeg), -TURN_UDEG, -1, NULL},
+                   "SCAN:PAN:STOP", SETTING(pan_stop_udeg), -TURN_UDEG, -1, 0, NULL},
     [PAN_STOP] = {SETTING(pan_stop_udeg), 0, 0, PROFILE(pan_min_udeg), PROFILE(pan_max_udeg),
-                  "SCAN:PAN:STARt", SETTING(pan_start_udeg), 1, TURN_UDEG, NULL},
+                  "SCAN:PAN:STARt", SETTING(pan_start_udeg), 1, TURN_UDEG, 0, NULL},
     [FRAMES] = {SETTING(frames), 1, 0, CONSTANT(0), CONSTANT(HEAD_MAX_FRAMES), NO_OTHER, NULL},
     [ECHOES] = {SETTING(echoes), 1, 0, CONSTANT(0), CONSTANT(3), NO_OTHER, echo_words},
 };

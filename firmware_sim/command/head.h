@@ -52,9 +52,13 @@ struct head_settings {
     uint32_t echoes;                         /* which echoes of a pulse are sent: enum beam_select */
 };
 
+enum { HEAD_MAX_RATES = 8 };
+
 /* What the head can do: from its profile. */
 struct head_limits {
     int64_t prr_min_uhz, prr_max_uhz, lines_min_uhz, lines_max_uhz, pan_max_udeg_s;
+    uint32_t n_rates;                 /* of a head with fixed pulse rates; 0: any from prr_min to prr_max */
+    int64_t rate_uhz[HEAD_MAX_RATES]; /* they rise, from prr_min to prr_max */
     int64_t fov_min_udeg, fov_max_udeg;
     int64_t pan_min_udeg, pan_max_udeg;
     uint32_t n_stations;

@@ -49,6 +49,25 @@ static struct number in_unit(const struct command_call *call, int64_t value)
     return number;
 }
 
+/* The rates of a head that has only some, of a setting that is one of them; 0: any value in the range. */
+static uint32_t fixed_rates(const struct command_call *call, const int64_t **rate)
+{
+    *rate = call->dev->limits.rate_uhz;
+    return call->row->setting->is_rate ? call->dev->limits.n_rates : 0;
+}
+
+/* The ends of a range move inward to rates that the head has. The other setting leaves one at least. */
+static void narrow_to_rates(const struct command_call *call, int64_t *min, int64_t *max)
+{
+    const int64_t *rate;
+    const uint32_t n = fixed_rates(call, &rate);
+    const int64_t from = *min, to = *max;
+    for (uint32_t i = n; i-- > 0;)
+        if (rate[i] >= from) *min = rate[i];
+    for (uint32_t i = 0; i < n; i++)
+        if (rate[i] <= to) *max = rate[i];
+}
+
 static int is_setting(const struct command_call *call, size_t offset)
 {
     return call->row->setting->offset == offset;
@@ -75,6 +94,7 @@ static void current_range(const struct command_call *call, int64_t *min, int64_t
     const int64_t other = read_other(call);
     if (setting->least != COMMAND_UNBOUND && other + setting->least > *min) *min = other + setting->least;
     if (setting->most != COMMAND_UNBOUND && other + setting->most < *max) *max = other + setting->most;
+    narrow_to_rates(call, min, max);
 }
 
 static int64_t special_value(const struct command_call *call)
@@ -134,6 +154,26 @@ int command_value_in_range(struct command_call *call, int64_t min, int64_t max, 
     return refuse_number(call, CMD_E_RANGE, *value, min, max, "");
 }
 
+/* `HEADER VALUE, allowed A, B, C`: a number that is none of the head's rates. */
+static int check_rate(struct command_call *call)
+{
+    const int64_t *rate;
+    const uint32_t n = fixed_rates(call, &rate);
+    char clip[COMMAND_CLIP_LEN], allowed[HEAD_MAX_RATES * (NUMBER_LEN + 2)] = "";
+    int64_t value;
+    if (n == 0) return 0;
+    const enum command_fit fit =
+        command_decimal_to_int(&call->value.decimal, call->value.shift + call->row->unit->decimals, &value);
+    for (uint32_t i = 0; i < n; i++) {
+        const size_t used = strlen(allowed);
+        if (fit == COMMAND_FIT_EXACT && value == rate[i]) return 0;
+        snprintf(allowed + used, sizeof allowed - used, "%s%s", i > 0 ? ", " : "", in_unit(call, rate[i]).text);
+    }
+    command_clip(clip, call->param, strlen(call->param));
+    return command_fail(call, CMD_E_RANGE, "%s %s, allowed %s %s", call->row->header, clip, allowed,
+                        call->row->unit->name);
+}
+
 /* Checks against the other setting; the range of the profile was checked before. */
 static int check_other(struct command_call *call, int64_t value)
 {
@@ -154,8 +194,8 @@ int command_setting_change(struct command_call *call)
         value = call->value.word;
     else if (call->value.kind != COMMAND_VALUE_NUMBER)
         value = special_value(call);
-    else if (command_value_in_range(call, read_bound(call, &setting->min), read_bound(call, &setting->max), &value) !=
-             0)
+    else if (check_rate(call) != 0 || command_value_in_range(call, read_bound(call, &setting->min),
+                                                             read_bound(call, &setting->max), &value) != 0)
         return -1;
     if (check_other(call, value) != 0) return -1;
     const enum head_state state = call->dev->state;

@@ -41,6 +41,25 @@ enum {
 enum config_heights { HEIGHTS_ELLIPSOID, HEIGHTS_GEOID, HEIGHTS_AUTO };
 enum config_pace { PACE_REALTIME, PACE_FAST, PACE_STEP };
 
+/* How sure a figure of a profile is; config/heads/README.md says what each word means. */
+enum config_from { FROM_DATA_SHEET, FROM_QUOTED, FROM_ASSUMED };
+
+struct config_reach {
+    double reflectance, range_m;
+    enum config_from from;
+};
+
+/* What a head does at one of its pulse rates. */
+struct config_program {
+    int64_t prr_uhz;  /* 0: any rate of a head without programs */
+    int64_t used_uhz; /* pulses within the field of view */
+    uint32_t max_echoes;
+    double range_min_m, range_max_m;
+    double reach_90_m, reach_20_m; /* as the file has them; 0: not given */
+    struct config_reach reach[DETECT_MAX_REACHES];
+    uint32_t n_reaches; /* at least 1 */
+};
+
 /* How a head's pulses are arranged (core/emitter.h): the figures of the file. */
 struct config_emitter {
     enum emitter_kind kind;
@@ -50,14 +69,15 @@ struct config_emitter {
     struct config_profile_beam {
         int64_t elevation_udeg, azimuth_udeg;
         uint32_t offset_ns;
-        enum config_from { FROM_DATA_SHEET, FROM_ASSUMED } from;
+        enum config_from from;
     } beam[EMITTER_MAX_BEAMS];
     uint32_t n_beams;
     int64_t step_udeg;
     char directions[CONFIG_PATH_LEN];
 };
 
-/* A head profile, config/heads/NAME.yaml: each figure is written `{ value: V, from: data sheet|assumed }`. */
+/* A head profile, config/heads/NAME.yaml: each figure is written `{ value: V, from: data sheet|quoted|assumed }`,
+ * and may have a source and a note. */
 struct config_profile {
     char name[32], maker[32], model[64], firmware[32];
     struct config_emitter arrangement; /* as it stands in the file ... */
@@ -71,14 +91,19 @@ struct config_profile {
     double range_sigma_m, range_sigma_ppm; /* one sigma of the range noise: fixed part, and part per distance */
     double range_sigma_at_m, range_sigma_reflectance, range_sigma_floor_m; /* where the fixed part holds; its floor */
     double mirror_sigma_deg, pan_sigma_deg;                                /* one sigma of the angle noise */
-    struct config_reach {
-        double reflectance, range_m;
-        enum config_from from;
-    } reach[DETECT_MAX_REACHES];
+    /* Of the head as a whole: what limits any program. */
+    struct config_reach reach[DETECT_MAX_REACHES];
     uint32_t n_reaches; /* at least 1: range_max_m on 90 % where the file has none */
+    /* One for each pulse rate, which rises. n_programs 0: any rate from prr_min to prr_max; program[0] then holds
+     * for all of them. */
+    struct config_program program[HEAD_MAX_RATES];
+    uint32_t n_programs;
+    double accuracy_m, accuracy_ppm, angle_accuracy_deg; /* shown; noise is drawn from the sigmas alone. 0: not known */
     double threshold_snr, overlap_m, wavelength_nm, visibility_m, pulse_width_ns;
     double mirror_counts, pan_counts;        /* encoder counts per turn of the beam angle; 0: ideal (2^32 counts) */
-    double beam_exit_m, beam_divergence_rad; /* core/footprint.h */
+    double beam_exit_m, beam_divergence_rad; /* full ones at 1/e2 (core/footprint.h) */
+    double beam_exit_given_m, beam_divergence_given_rad;                   /* as the maker gives them, ... */
+    enum beam_definition beam_exit_definition, beam_divergence_definition; /* ... and how it defines them */
     uint32_t max_echoes;
     double boot_s, spin_up_s, spin_down_s;
 };
@@ -290,8 +315,14 @@ int config_load(const char *path, const char *const *sets, int n_sets, struct co
 int config_load_all(const char *path, const char *const *sets, int n_sets, struct config *cfg,
                     struct config_faults *faults);
 
-/* What a profile says about the signal; the rest of it (sharp, extinction, seed) is 0. */
-void config_signal_spec(const struct config_profile *profile, struct detect_signal_spec *spec);
+/* The program of a pulse rate, as an index; 0 for a head without programs. */
+uint32_t config_program_of(const struct config_profile *profile, int64_t prr_uhz);
+/* The largest pulse rate that the head has up to prr_uhz; its smallest one where it has none. */
+int64_t config_rate_below(const struct config_profile *profile, int64_t prr_uhz);
+
+/* What a profile says about the signal in one of its programs; the rest of it (sharp, extinction, seed) is 0. */
+void config_signal_spec(const struct config_profile *profile, const struct config_program *program,
+                        struct detect_signal_spec *spec);
 
 /* The schedule of a head with some settings; of a list of directions without the list (site_fill_spec). */
 void config_fill_spec(const struct config_profile *profile, const struct head_settings *settings,
@@ -320,8 +351,8 @@ int config_print_section(const char *section, FILE *out, struct sh_err *err);
  * behind a '#' with their defaults. It names a profile and a mesh that come with the program. */
 int config_print_example(FILE *out, struct sh_err *err);
 
-/* The profiles in a directory, one line each (name, model, what is data sheet and what is assumed). Returns
- * how many. dir NULL: the first directory of the lookup below that exists, without a configuration. */
+/* The profiles in a directory: name, programs, and how sure their figures are. Returns how many. dir NULL: the
+ * first directory of the lookup below that exists, without a configuration. */
 int config_list_profiles(const char *dir, FILE *out, struct sh_err *err);
 
 /* Reads the profile NAME, looked up as for a configuration that lies at config_file. */

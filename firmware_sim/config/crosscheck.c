@@ -223,6 +223,7 @@ static void check_time(struct cfg_reader *rd, const struct config *cfg)
 void cfg_check(struct cfg_reader *rd, struct config *cfg)
 {
     cfg_check_emitter_settings(rd, cfg);
+    cfg_check_rate(rd, cfg);
     check_limits(rd, cfg);
     check_head(rd, cfg);
     for (uint32_t i = 0; i < cfg->scene.n_meshes; i++)

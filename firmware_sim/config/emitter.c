@@ -26,6 +26,7 @@ static const struct owned_key {
     {"front_step", PLANAR, 1},  {"firing_ns", BEAMS, 1},
     {"beams", BEAMS, 1},        {"step_direction", PLANAR | BEAMS, 0},
     {"step_deg", SPHERE, 1},    {"directions", DIRECTIONS, 1},
+    {"programs", LINE, 0},
 };
 
 static const double PRR_MOST_HZ = 1e7;

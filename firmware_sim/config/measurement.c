@@ -4,11 +4,10 @@
 #include <math.h>
 #include <string.h>
 
-static const double WHITE = 0.9; /* what a data sheet's largest range is given for */
-
-void config_signal_spec(const struct config_profile *p, struct detect_signal_spec *spec)
+void config_signal_spec(const struct config_profile *p, const struct config_program *program,
+                        struct detect_signal_spec *spec)
 {
-    *spec = (struct detect_signal_spec){.n_reaches = p->n_reaches,
+    *spec = (struct detect_signal_spec){.n_reaches = program->n_reaches,
                                         .threshold_snr = p->threshold_snr,
                                         .overlap_m = p->overlap_m,
                                         .sigma_m = p->range_sigma_m,
@@ -16,27 +15,37 @@ void config_signal_spec(const struct config_profile *p, struct detect_signal_spe
                                         .sigma_reflectance = p->range_sigma_reflectance,
                                         .sigma_floor_m = p->range_sigma_floor_m,
                                         .sigma_ppm = p->range_sigma_ppm};
-    for (uint32_t i = 0; i < p->n_reaches; i++)
-        spec->reach[i] = (struct detect_reach){p->reach[i].reflectance, p->reach[i].range_m};
+    for (uint32_t i = 0; i < program->n_reaches; i++)
+        spec->reach[i] = (struct detect_reach){program->reach[i].reflectance, program->reach[i].range_m};
 }
 
-void cfg_check_reaches(struct cfg_reader *rd, struct config_profile *profile)
+/* Whether a program's reaches are such as some air explains. The fault is of the key that they stand in. */
+static void check_signal_of(struct cfg_reader *rd, const struct config_profile *profile, uint32_t program,
+                            const char *key)
 {
     struct detect_signal_spec spec;
     struct detect_signal signal;
     struct sh_err why;
+    config_signal_spec(profile, &profile->program[program], &spec);
+    if (detect_signal_set_up(&spec, &signal, &why) != SH_OK)
+        cfg_fail_key(rd, key, program,
+                     "%.200s; allowed ranges that rise with the reflectance, and not faster than its square root",
+                     why.text);
+}
+
+void cfg_check_reaches(struct cfg_reader *rd, struct config_profile *profile)
+{
+    const uint32_t n = profile->n_programs;
     if (!CFG_SOUND(rd, 0, "reaches", "range_max_m", "range_sigma_m", "range_sigma_at_m", "range_sigma_reflectance",
                    "range_sigma_floor_m", "range_sigma_ppm", "threshold_snr", "overlap_m"))
         return;
     for (uint32_t i = 0; i < profile->n_reaches; i++)
         if (!CFG_SOUND(rd, i, "reaches[]")) return;
-    if (profile->n_reaches == 0)
-        profile->reach[profile->n_reaches++] = (struct config_reach){WHITE, profile->range_max_m, FROM_ASSUMED};
-    config_signal_spec(profile, &spec);
-    if (detect_signal_set_up(&spec, &signal, &why) != SH_OK)
-        cfg_fail_key(rd, "reaches", 0,
-                     "%.200s; allowed ranges that rise with the reflectance, and not faster than its square root",
-                     why.text);
+    for (uint32_t i = 0; i < (n > 0 ? n : 1); i++)
+        if (n > 0 && profile->program[i].reach_90_m > 0.0)
+            check_signal_of(rd, profile, i, "programs[].reach_90_m");
+        else
+            check_signal_of(rd, profile, 0, "reaches");
 }
 
 /* NaN for what an entry leaves out. */

@@ -140,6 +140,8 @@ static void check_profile(struct cfg_reader *rd, struct config_profile *p)
                 0);
     check_order(rd, "range_min_m", p->range_min_m, "range_max_m", p->range_max_m, 1);
     check_order(rd, "range_sigma_floor_m", p->range_sigma_floor_m, "range_sigma_m", p->range_sigma_m, 0);
+    cfg_convert_widths(rd, p);
+    cfg_check_programs(rd, p);
     cfg_check_reaches(rd, p);
 }
 
@@ -238,13 +240,6 @@ int config_load_profile(const char *name, const char *config_file, struct config
 
 /* ---- listing */
 
-static void print_figures(const struct cfg_reader *rd, int from, const char *label, FILE *out)
-{
-    int n = 0;
-    for (size_t i = 0; i < rd->table.n; i++)
-        if (rd->from[i] == from) fprintf(out, "%s%s", n++ == 0 ? label : ", ", rd->table.keys[i].path);
-}
-
 static int list_profile(const char *dir, const char *entry, FILE *out, struct sh_err *err)
 {
     char path[2 * CONFIG_PATH_LEN];
@@ -254,10 +249,7 @@ static int list_profile(const char *dir, const char *entry, FILE *out, struct sh
     snprintf(path, sizeof path, "%s/%s", dir, entry);
     if (!read_profile(&rd, path, &profile, &faults))
         return sh_fail(err, faults.fault[0].code, "%s", faults.fault[0].text);
-    fprintf(out, "%-16s %s %s", profile.name, profile.maker, profile.model);
-    print_figures(&rd, 1, "; data sheet: ", out);
-    print_figures(&rd, 2, "; assumed: ", out);
-    fputc('\n', out);
+    cfg_list_profile(&rd, &profile, out);
     return SH_OK;
 }
 

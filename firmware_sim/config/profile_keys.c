@@ -9,7 +9,21 @@
 #define BEAM(member)       CFG_MEMBER(struct config_profile_beam, member)
 #define REACH(member)      "reaches[]." #member, CFG_MEMBER(struct config_reach, member)
 
-static const char *const from_names[] = {[FROM_DATA_SHEET] = "data sheet", [FROM_ASSUMED] = "assumed", NULL};
+#define PROGRAM(member) CFG_MEMBER(struct config_program, member)
+
+const char *const cfg_from_names[] = {
+    [FROM_DATA_SHEET] = "data sheet", [FROM_QUOTED] = "quoted", [FROM_ASSUMED] = "assumed", NULL};
+
+static const char *const widths[] = {[BEAM_AT_1_E2] = "1/e2",
+                                     [BEAM_AT_1_E] = "1/e",
+                                     [BEAM_AT_HALF_MAXIMUM] = "FWHM",
+                                     [BEAM_HALF_AT_1_E2] = "radius 1/e2",
+                                     NULL},
+                         *const angles[] = {[BEAM_AT_1_E2] = "1/e2",
+                                            [BEAM_AT_1_E] = "1/e",
+                                            [BEAM_AT_HALF_MAXIMUM] = "FWHM",
+                                            [BEAM_HALF_AT_1_E2] = "half angle 1/e2",
+                                            NULL};
 static const char *const turn_names[] = {
     [TURN_CLOCKWISE] = "clockwise", [TURN_COUNTER_CLOCKWISE] = "counter-clockwise", NULL};
 
@@ -49,7 +63,7 @@ static const struct cfg_key profile_keys[] = {
      .help = "Clockwise from where the head looks at that time."},
     {"beams[].offset_ns", BEAM(offset_ns), CFG_COUNT, "ns", NULL, 0, 1e9,
      .help = "Firing time after the sequence's first; they rise from 0."},
-    {"beams[].from", BEAM(from), CFG_ENUM, .names = from_names, .help = "Where the figures are from."},
+    {"beams[].from", BEAM(from), CFG_ENUM, .names = cfg_from_names, .help = "Where the figures are from."},
     {"step_deg", IN_PROFILE(arrangement.step_udeg), CFG_MICRO, "deg", OWNED, 0.01, 90, FIGURE,
      .help = "sphere: from pulse to pulse and from ring to ring. Rounded to whole steps of a turn and of half a turn."},
 
@@ -88,11 +102,34 @@ static const struct cfg_key profile_keys[] = {
     {KEY(pan_sigma_deg), CFG_REAL, "deg", "0", 0, 1, FIGURE, .help = "One sigma of the noise of the pan angle."},
     {"reaches", .type = CFG_LIST, .min = 0, .max = DETECT_MAX_REACHES, .offset = offsetof(struct config_profile, reach),
      .size = sizeof(struct config_reach), .count_offset = offsetof(struct config_profile, n_reaches),
-     .help = "Ranges up to which targets are seen, by reflectance; range_max_m on 0.9 when there are none."},
-    {"reaches[]", .type = CFG_MAP, .help = "Written { reflectance: R, range_m: V, from: data sheet|assumed }."},
+     .help = "Ranges up to which targets are seen, by reflectance; range_max_m on 0.9 when there are none. Programs that "
+             "have reach_90_m say it in place of this."},
+    {"reaches[]", .type = CFG_MAP, .help = "Written { reflectance: R, range_m: V, from: data sheet|quoted|assumed }."},
     {REACH(reflectance), CFG_REAL, NULL, NULL, 0.001, 1, .help = "Of the target, Lambertian, head on."},
     {REACH(range_m), CFG_REAL, "m", NULL, 0.1, 1e5, .help = "Where half of the pulses still see it."},
-    {REACH(from), CFG_ENUM, .names = from_names, .help = "Where the figures are from."},
+    {REACH(from), CFG_ENUM, .names = cfg_from_names, .help = "Where the figures are from."},
+    {"programs", .type = CFG_LIST, .min = 0, .max = HEAD_MAX_RATES, .offset = offsetof(struct config_profile, program),
+     .size = sizeof(struct config_program), .count_offset = offsetof(struct config_profile, n_programs),
+     .help = "The pulse rates of a head that has fixed ones, and what depends on them. The rates rise from prr_min_hz to "
+             "prr_max_hz; no other rate is taken. Without programs any rate between these two is."},
+    {"programs[]", .type = CFG_MAP, .help = "One pulse rate; each entry is a figure."},
+    {"programs[].prr_hz", PROGRAM(prr_uhz), CFG_MICRO, "Hz", NULL, 1, 1e7, FIGURE, .help = "Its pulse rate."},
+    {"programs[].max_echoes", PROGRAM(max_echoes), CFG_COUNT, NULL, "", 1, LINE_MAX_ECHOES, FIGURE,
+     .help = "Echoes per pulse; max_echoes of the head when not given."},
+    {"programs[].reach_90_m", PROGRAM(reach_90_m), CFG_REAL, "m", "", 0.1, 1e5, FIGURE,
+     .help = "Range up to which a target of 90 % is seen; nothing is beyond it. When not given, reaches and range_max_m "
+             "of the head hold."},
+    {"programs[].reach_20_m", PROGRAM(reach_20_m), CFG_REAL, "m", "", 0.1, 1e5, FIGURE,
+     .help = "The same for 20 %; needs reach_90_m."},
+    {"programs[].range_min_m", PROGRAM(range_min_m), CFG_REAL, "m", "", 0, 1e5, FIGURE,
+     .help = "Shortest range; range_min_m of the head when not given."},
+    {"programs[].used_hz", PROGRAM(used_uhz), CFG_MICRO, "Hz", "", 1, 1e7, FIGURE,
+     .help = "Pulses per second that fall into the field of view; within 2 % of prr_hz times its share of the sweep."},
+    {KEY(accuracy_m), CFG_REAL, "m", "0", 0, 10, FIGURE,
+     .help = "Accuracy of ranges, fixed part: shown, never drawn as noise. 0: not known."},
+    {KEY(accuracy_ppm), CFG_REAL, "ppm", "0", 0, 1e4, FIGURE, .help = "Accuracy of ranges, part per distance."},
+    {KEY(angle_accuracy_deg), CFG_REAL, "deg", "0", 0, 1, FIGURE,
+     .help = "Accuracy of angles: shown, never drawn as noise. 0: not known."},
     {KEY(threshold_snr), CFG_REAL, NULL, "8", 1, 1000, FIGURE,
      .help = "Signal-to-noise ratio (amplitudes) at the detection threshold."},
     {KEY(overlap_m), CFG_REAL, "m", "0", 0, 1000, FIGURE,
@@ -103,10 +140,14 @@ static const struct cfg_key profile_keys[] = {
      .help = "Encoder counts per turn of the line angle; 0: ideal."},
     {KEY(pan_counts), CFG_REAL, NULL, NULL, 0, 4294967296.0, FIGURE,
      .help = "Encoder counts per turn of the pan; 0: ideal."},
-    {KEY(beam_exit_m), CFG_REAL, "m", NULL, 0, 1, FIGURE,
-     .help = "Diameter of the beam at the exit, at 1/e2 of its irradiance."},
-    {KEY(beam_divergence_rad), CFG_REAL, "rad", NULL, 0, 0.01, FIGURE,
-     .help = "Full divergence at 1/e2: 1.41 times one at 1/e, 1.70 times one at half maximum."},
+    {"beam_exit_m", IN_PROFILE(beam_exit_given_m), CFG_REAL, "m", NULL, 0, 1, FIGURE, .definitions = widths,
+     .definition_offset = offsetof(struct config_profile, beam_exit_definition),
+     .help = "Diameter of the beam at the exit, as the maker gives it. definition says how: 1/e2 (that is the default), "
+             "1/e, FWHM, radius 1/e2."},
+    {"beam_divergence_rad", IN_PROFILE(beam_divergence_given_rad), CFG_REAL, "rad", NULL, 0, 0.01, FIGURE,
+     .definitions = angles, .definition_offset = offsetof(struct config_profile, beam_divergence_definition),
+     .help = "Divergence, as the maker gives it. definition says how: 1/e2 (full angle; the default), 1/e, FWHM, half "
+             "angle 1/e2. To the full angle at 1/e2 these are times 1.41, 1.70 and 2."},
     {KEY(pulse_width_ns), CFG_REAL, "ns", NULL, 0, 1000, FIGURE,
      .help = "Width of the pulse: echoes nearer to each other than c / 2 of it are one. A beam that has a width needs "
              "at least 0.1 ns in any beam.mode but single."},

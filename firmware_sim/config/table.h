@@ -26,7 +26,7 @@ enum cfg_type {
 };
 
 enum cfg_flags {
-    CFG_FIGURE = 1, /* written { value: V, from: data sheet|assumed } */
+    CFG_FIGURE = 1, /* written { value: V, from: data sheet|quoted|assumed }; source, note, definition may follow */
     CFG_HEX = 4,    /* written 0x1209, and only so: 1209 is read both ways */
     CFG_ASCII = 2,  /* goes into *IDN?: printable ASCII without comma and quotes */
     CFG_NEEDED = 8, /* has no default that does in most configurations: the example gives it a value */
@@ -46,6 +46,8 @@ struct cfg_key {
     const char *const *names;      /* enum: by value, NULL at the end */
     size_t count_offset;
     int flags;
+    const char *const *definitions; /* of a figure: the words of enum beam_definition, and where it goes */
+    size_t definition_offset;
     const char *example; /* a value for the example, where there is no default */
     const char *help;
 };
@@ -66,9 +68,9 @@ struct cfg_reader {
     int line[CFG_MAX_ROWS][CFG_MAX_ITEMS];          /* where a key was given: line, CFG_FROM_SET, 0: not given */
     unsigned char bad[CFG_MAX_ROWS][CFG_MAX_ITEMS]; /* 1: a fault of this key was told; its value says nothing */
     int root_line;
-    int profile_read;                     /* the head profile has no fault */
-    const struct config_profile *profile; /* for the limits in errors; NULL: not known */
-    unsigned char from[CFG_MAX_ROWS];     /* figures: 1 data sheet, 2 assumed */
+    int profile_read;                                /* the head profile has no fault */
+    const struct config_profile *profile;            /* for the limits in errors; NULL: not known */
+    unsigned char from[CFG_MAX_ROWS][CFG_MAX_ITEMS]; /* of figures: 1 + enum config_from; 0: not given */
     struct config_faults *faults;
 };
 
@@ -163,6 +165,16 @@ void cfg_check_places(struct cfg_reader *rd, struct config *cfg);
 /* measurement.c: noise, signal, surfaces, and what of a profile concerns them. */
 void cfg_check_signal(struct cfg_reader *rd, struct config *cfg);
 void cfg_check_reaches(struct cfg_reader *rd, struct config_profile *profile);
+/* programs.c: widths of the beam as this project defines them; programs of a profile, and head.prr_hz among them. */
+void cfg_convert_widths(struct cfg_reader *rd, struct config_profile *profile);
+void cfg_check_programs(struct cfg_reader *rd, struct config_profile *profile);
+void cfg_check_rate(struct cfg_reader *rd, const struct config *cfg);
+/* The share of a sweep that the field of view takes. */
+double cfg_used_share(const struct config_profile *profile);
+/* profile_list.c: one profile that was read, as config_list_profiles shows it. */
+void cfg_list_profile(const struct cfg_reader *rd, const struct config_profile *profile, FILE *out);
+/* The words of enum config_from. */
+extern const char *const cfg_from_names[];
 /* emitter.c: which keys of a profile belong to which emitter, and what follows from them. */
 void cfg_check_emitter(struct cfg_reader *rd, struct config_profile *profile);
 /* The settings of a head whose pulse rate follows from its lines. */

@@ -96,43 +96,87 @@ static void read_vec3(struct walk *w, const struct cfg_key *key, uint32_t item, 
     }
 }
 
-/* from: data sheet|assumed */
-static void read_source(struct walk *w, const struct cfg_key *key, const yaml_node_t *node)
+/* The number of a word among names; -1: none of them. */
+static int word_of(const yaml_node_t *node, const char *const *names)
 {
-    static const char *const sources[] = {"data sheet", "assumed"};
-    for (unsigned char i = 0; i < 2 && node->type == YAML_SCALAR_NODE; i++) {
-        if (strcmp(text_of(node), sources[i]) != 0) continue;
-        w->rd->from[cfg_row(w->rd, key)] = (unsigned char)(i + 1);
-        return;
-    }
-    cfg_fail_value(w->rd, key, 0, line_of(node),
-                   "\"from\" must say where the figure is from; allowed data sheet, assumed");
+    for (int i = 0; names[i] != NULL && node->type == YAML_SCALAR_NODE; i++)
+        if (strcmp(text_of(node), names[i]) == 0) return i;
+    return -1;
 }
 
-static void read_figure(struct walk *w, const struct cfg_key *key, const yaml_node_t *node)
+/* What a figure says beside its value. */
+enum figure_part { FIGURE_VALUE, FIGURE_FROM, FIGURE_SOURCE, FIGURE_NOTE, FIGURE_DEFINITION, FIGURE_PARTS };
+static const char *const figure_parts[] = {"value", "from", "source", "note", "definition", NULL};
+
+static void refuse_part(struct walk *w, const struct cfg_key *key, uint32_t item, enum figure_part part,
+                        const yaml_node_t *node)
 {
-    static const char form[] = "allowed { value: V, from: data sheet } or { value: V, from: assumed }";
-    int given[2] = {0, 0};
+    const char *const *words = part == FIGURE_FROM         ? cfg_from_names
+                               : part == FIGURE_DEFINITION ? key->definitions
+                                                           : NULL;
+    char allowed[CFG_ALLOWED_MAX] = "a text in one line";
+    for (size_t i = 0, used = 0; words != NULL && words[i] != NULL && used < sizeof allowed; i++)
+        used += (size_t)snprintf(allowed + used, sizeof allowed - used, "%s%s", i > 0 ? ", " : "", words[i]);
+    cfg_fail_value(w->rd, key, item, line_of(node), "\"%s\" must say %s; allowed %s", figure_parts[part],
+                   part == FIGURE_FROM         ? "where the figure is from"
+                   : part == FIGURE_DEFINITION ? "how the width is defined"
+                                               : "it in words",
+                   allowed);
+}
+
+static int is_line_of_text(const yaml_node_t *node)
+{
+    if (node->type != YAML_SCALAR_NODE || node->data.scalar.length == 0) return 0;
+    for (size_t i = 0; i < node->data.scalar.length; i++)
+        if (node->data.scalar.value[i] < 0x20 || node->data.scalar.value[i] == 0x7f) return 0;
+    return 1;
+}
+
+static void read_part(struct walk *w, const struct cfg_key *key, uint32_t item, enum figure_part part,
+                      const yaml_node_t *node)
+{
+    int word = 0, sound = 1;
+    switch (part) {
+    case FIGURE_VALUE:
+        read_scalar(w, key, item, node);
+        return;
+    case FIGURE_FROM:
+        word = word_of(node, cfg_from_names);
+        sound = word >= 0;
+        w->rd->from[cfg_row(w->rd, key)][item] = (unsigned char)(word + 1);
+        break;
+    case FIGURE_DEFINITION:
+        word = word_of(node, key->definitions);
+        sound = word >= 0;
+        if (sound) memcpy((char *)w->rd->base + key->definition_offset, &word, sizeof word);
+        break;
+    default: /* kept in the file, for its readers */
+        sound = is_line_of_text(node);
+    }
+    if (!sound) refuse_part(w, key, item, part, node);
+}
+
+static void read_figure(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
+{
+    static const char form[] = "allowed { value: V, from: data sheet }, or from: quoted, from: assumed";
+    int given[FIGURE_PARTS] = {0};
     if (node->type != YAML_MAPPING_NODE) {
-        cfg_fail_value(w->rd, key, 0, line_of(node), "here stands %s; %s", kind_of(node), form);
+        cfg_fail_value(w->rd, key, item, line_of(node), "here stands %s; %s", kind_of(node), form);
         return;
     }
     for (const yaml_node_pair_t *pair = node->data.mapping.pairs.start; pair < node->data.mapping.pairs.top; pair++) {
         const yaml_node_t *word = yaml_document_get_node(w->doc, pair->key);
-        const yaml_node_t *value = yaml_document_get_node(w->doc, pair->value);
-        const char *text = word->type == YAML_SCALAR_NODE ? text_of(word) : "";
-        int which = strcmp(text, "value") == 0 ? 0 : strcmp(text, "from") == 0 ? 1 : -1;
-        if (which < 0 || given[which]++) {
-            cfg_fail_value(w->rd, key, 0, line_of(word), "a key that is unknown or given twice; %s", form);
+        const int part = word_of(word, figure_parts);
+        if (part < 0 || given[part]++ || (part == FIGURE_DEFINITION && key->definitions == NULL)) {
+            cfg_fail_value(w->rd, key, item, line_of(word),
+                           "a key that is unknown or given twice; %s, then source, note%s", form,
+                           key->definitions != NULL ? ", definition" : "");
             return;
         }
-        if (which == 0)
-            read_scalar(w, key, 0, value);
-        else
-            read_source(w, key, value);
+        read_part(w, key, item, (enum figure_part)part, yaml_document_get_node(w->doc, pair->value));
     }
-    if (!given[0] || !given[1])
-        cfg_fail_value(w->rd, key, 0, line_of(node), "\"%s\" is missing; %s", given[0] ? "from" : "value", form);
+    if (!given[FIGURE_VALUE] || !given[FIGURE_FROM])
+        cfg_fail_value(w->rd, key, item, line_of(node), "\"%s\" is missing; %s", given[0] ? "from" : "value", form);
 }
 
 static void read_map(struct walk *w, const yaml_node_t *node, const char *path, uint32_t item);
@@ -168,7 +212,7 @@ static void read_value(struct walk *w, const struct cfg_key *key, uint32_t item,
     if (node->type != YAML_SCALAR_NODE && has_tag(node)) {
         cfg_fail_value(w->rd, key, item, line_of(node), "has a tag; allowed none");
     } else if (key->flags & CFG_FIGURE) {
-        read_figure(w, key, node);
+        read_figure(w, key, item, node);
     } else if (key->type == CFG_MAP && node->type == YAML_MAPPING_NODE) {
         read_map(w, node, key->path, item);
     } else if (key->type == CFG_MAP) {

@@ -31,8 +31,11 @@ static int set_limits(struct device *device, struct sh_err *err)
                                               .fov_max_udeg = p->fov_max_udeg,
                                               .pan_min_udeg = p->pan_min_udeg,
                                               .pan_max_udeg = p->pan_max_udeg,
+                                              .n_rates = p->n_programs,
                                               .n_stations = device->site->n_stations,
                                               .line_pulses = emitter_line_pulses(&p->emitter)};
+    for (uint32_t i = 0; i < p->n_programs; i++)
+        device->cmd.limits.rate_uhz[i] = p->program[i].prr_uhz;
     device->cmd.settings = device->cmd.defaults = cfg->head.settings;
     int len = snprintf(device->idn, sizeof device->idn, "%s,%s,%s,scanhead native %d", p->maker, p->model,
                        cfg->head.serial, NATIVE_VERSION);

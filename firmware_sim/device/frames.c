@@ -10,6 +10,7 @@ void device_fill_descriptor(const struct device *device, struct native_descripto
     struct cast_setup setup;
     struct bvh_info info;
     site_cast_setup(device->site, device->scan.station, &setup);
+    site_set_program(device->site, spec->prr_uhz, &setup);
     bvh_get_info(setup.bvh, &info);
     memset(d, 0, sizeof *d);
     memcpy(d->idn, device->idn, sizeof d->idn);
@@ -30,7 +31,7 @@ void device_fill_descriptor(const struct device *device, struct native_descripto
     d->range_scale_m = setup.range_scale_m;
     d->range_min_m = setup.range_min_m;
     d->range_max_m = setup.range_max_m;
-    d->max_echoes = cfg->profile.max_echoes;
+    d->max_echoes = setup.max_echoes;
     d->n_surfaces = device->site->n_surfaces;
     d->frames = spec->frames;
     d->scan = device->scan.number;

@@ -32,7 +32,8 @@ static int check_capacity(const struct config *cfg, const struct pump *pump, str
     return sh_fail(err, SH_EINPUT,
                    "link %s: the stream has %.2f MB/s, the link carries %.2f MB/s; lower head.prr_hz to %.0f%s",
                    place.endpoint, 1e-6 * rate, 1e-6 * capacity,
-                   floor(1e-6 * (double)cfg->head.settings.prr_uhz * capacity / rate),
+                   floor(1e-6 * (double)config_rate_below(
+                                    &cfg->profile, llround((double)cfg->head.settings.prr_uhz * capacity / rate))),
                    cfg->output.attributes ? ", or leave out output.attributes" : "");
 }
 

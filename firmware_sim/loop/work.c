@@ -305,6 +305,7 @@ static void fill_pulses(struct worker *worker, const struct device_work *work)
     }
     worker->anchored = work->stretch;
     worker->setup.echoes = (enum beam_select)work->echoes;
+    site_set_program(worker->site, work->segment.spec.prr_uhz, &worker->setup);
     worker->setup.scan_key = rng_scan(work->station + 1, work->station_scan);
     if (worker->site->n_movers != 0)
         site_move(worker->site,

@@ -11,22 +11,30 @@
 
 static const char GHOST[] = "ghost of ";
 
-static int set_up_signal(struct site *site, struct sh_err *err)
+static uint32_t n_programs(const struct site *site)
+{
+    return site->cfg->profile.n_programs > 0 ? site->cfg->profile.n_programs : 1;
+}
+
+/* One for each program: changing from one to another in a scan prepares nothing. */
+static int set_up_signals(struct site *site, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
     const struct config_profile *p = &cfg->profile;
     struct detect_signal_spec spec;
     struct sh_err why;
     double wavelength_m = 1e-9 * p->wavelength_nm, day = detect_extinction_1_m(p->visibility_m, wavelength_m);
-    config_signal_spec(p, &spec);
-    spec.sharp = cfg->signal.sharp;
-    spec.seed = cfg->noise.seed;
-    if (cfg->signal.has_extinction)
-        spec.extinction_1_m = 1e-3 * cfg->signal.extinction_1_km - day;
-    else if (cfg->signal.visibility_m > 0.0)
-        spec.extinction_1_m = detect_extinction_1_m(cfg->signal.visibility_m, wavelength_m) - day;
-    if (detect_signal_set_up(&spec, &site->detect.signal, &why) != SH_OK)
-        return sh_fail(err, SH_EINPUT, "%s: %.300s", cfg->profile_file, why.text);
+    for (uint32_t i = 0; i < n_programs(site); i++) {
+        config_signal_spec(p, &p->program[i], &spec);
+        spec.sharp = cfg->signal.sharp;
+        spec.seed = cfg->noise.seed;
+        if (cfg->signal.has_extinction)
+            spec.extinction_1_m = 1e-3 * cfg->signal.extinction_1_km - day;
+        else if (cfg->signal.visibility_m > 0.0)
+            spec.extinction_1_m = detect_extinction_1_m(cfg->signal.visibility_m, wavelength_m) - day;
+        if (detect_signal_set_up(&spec, &site->detect.signal[i], &why) != SH_OK)
+            return sh_fail(err, SH_EINPUT, "%s: %.300s", cfg->profile_file, why.text);
+    }
     return SH_OK;
 }
 
@@ -152,11 +160,12 @@ int site_set_up_detect(struct site *site, const struct sh_report *report, struct
                                    .ambiguity = cfg->head.ambiguity,
                                    .zones = cfg->head.mta_zones};
     if (cfg->signal.on || cfg->n_surfaces > 0) rc = set_up_surfaces(site, report, err);
-    if (rc == SH_OK && cfg->signal.on) rc = set_up_signal(site, err);
+    if (rc == SH_OK && cfg->signal.on) rc = set_up_signals(site, err);
     if (rc != SH_OK) return rc;
     d->cast.depth = d->surfaces.has_optics ? cfg->optics.depth : 0;
     d->cast.surfaces = cfg->signal.on || d->cast.depth > 0 ? &d->surfaces : NULL;
-    d->cast.signal = cfg->signal.on ? &d->signal : NULL;
+    const uint32_t in_use = config_program_of(&cfg->profile, cfg->head.settings.prr_uhz);
+    d->cast.signal = cfg->signal.on ? &d->signal[in_use] : NULL;
     d->cast.noise_by_signal = cfg->noise.range == RANGE_NOISE_SIGNAL;
     d->cast.ghost_label = site->n_surfaces;
     if (d->cast.surfaces != NULL && casts_footprints(site)) {
@@ -185,6 +194,10 @@ void site_set_depth(struct site *site, uint32_t depth)
     d->cast.depth = depth;
     d->on = d->cast.signal != NULL || d->cast.depth > 0 || d->cast.instrument != NULL || d->cast.ball != NULL ||
             d->cast.ambiguity != DETECT_AMBIGUITY_NONE;
+    for (uint32_t i = 0; i < n_programs(site); i++) {
+        d->program[i] = d->cast;
+        if (d->cast.signal != NULL) d->program[i].signal = &d->signal[i];
+    }
 }
 
 void site_free_detect(struct site *site)
@@ -226,8 +239,10 @@ static double ten_sigma_m(const struct site *site)
 {
     const struct config_profile *p = &site->cfg->profile;
     double sigma_m = p->range_sigma_m + 1e-6 * p->range_sigma_ppm * p->range_max_m;
-    if (site->cfg->noise.range == RANGE_NOISE_SIGNAL)
-        sigma_m += sqrt(site->detect.signal.jitter2); /* at the threshold */
+    double jitter2 = 0.0; /* at the threshold, of the program where it is largest */
+    for (uint32_t i = 0; i < n_programs(site); i++)
+        jitter2 = fmax(jitter2, site->detect.signal[i].jitter2);
+    if (site->cfg->noise.range == RANGE_NOISE_SIGNAL) sigma_m += sqrt(jitter2);
     return 10.0 * sigma_m;
 }
 

@@ -18,6 +18,13 @@ static const double EMPTY_SHARE = 0.05;
 enum { LOOK_ACROSS = 32, LOOK_UP = 32, LOOKS = LOOK_ACROSS * LOOK_UP, MAX_LINES = 1000 };
 _Static_assert((int)LOOKS <= (int)BVH_CHUNK, "cast at once");
 
+/* How near and how far the head sees at the configured pulse rate. */
+static const struct config_program *program_of(const struct site *site)
+{
+    const struct config *cfg = site->cfg;
+    return &cfg->profile.program[config_program_of(&cfg->profile, cfg->head.settings.prr_uhz)];
+}
+
 static void doubt_size(const struct site *site, const struct sh_report *report)
 {
     const struct config *cfg = site->cfg;
@@ -28,7 +35,7 @@ static void doubt_size(const struct site *site, const struct sh_report *report)
     sh_warn(report,
             "%s: the scene is %.3g m large, and the head sees from %g to %g m: is scene.meshes[].scale right? It is "
             "in metres per unit, now %g",
-            cfg->file, size_m, cfg->profile.range_min_m, cfg->profile.range_max_m, cfg->scene.mesh[0].scale);
+            cfg->file, size_m, program_of(site)->range_min_m, program_of(site)->range_max_m, cfg->scene.mesh[0].scale);
 }
 
 /* Each line has the same window. Where lines and pulses don't go evenly, some lines may have a pulse in it. */
@@ -88,7 +95,7 @@ static int is_reached(const struct scene *scene, const double p[3], double reach
 
 static int doubt_reach(const struct site *site, uint32_t i, const struct sh_report *report, struct sh_err *err)
 {
-    const double reach_m = site->cfg->profile.range_max_m, *p = site->station[i].at.position_m;
+    const double reach_m = program_of(site)->range_max_m, *p = site->station[i].at.position_m;
     int reached, rc = is_reached(site->scene, p, reach_m, &reached, err);
     for (uint32_t k = 0; k < site->n_movers && rc == SH_OK && !reached; k++)
         rc = is_reached(site->mover[k].scene, p, reach_m, &reached, err);
@@ -183,7 +190,7 @@ static void fill_window(const struct site *site, const struct site_station *s, s
 static void doubt_view(const struct site *site, uint32_t i, struct bvh_work *work, struct look *look,
                        const struct sh_report *report)
 {
-    const struct config_profile *profile = &site->cfg->profile;
+    const struct config_program *program = program_of(site);
     const struct site_station *s = &site->station[i];
     const double *p = s->at.position_m;
     int seen = 0, near = 0, far = 0;
@@ -193,21 +200,21 @@ static void doubt_view(const struct site *site, uint32_t i, struct bvh_work *wor
         fill_frame(site, s, look);
     cast(s, work, look, LOOKS);
     for (int k = 0; k < LOOKS; k++) {
-        near += look->range_m[k] < profile->range_min_m;
-        far += look->range_m[k] > profile->range_max_m;
-        seen += look->range_m[k] >= profile->range_min_m && look->range_m[k] <= profile->range_max_m;
+        near += look->range_m[k] < program->range_min_m;
+        far += look->range_m[k] > program->range_max_m;
+        seen += look->range_m[k] >= program->range_min_m && look->range_m[k] <= program->range_max_m;
     }
     if (near > LOOKS / 2)
         sh_warn(
             report,
             "station %u %s at %.10g %.10g %.10g m: of %d directions %d meet something nearer than range_min_m, %g m: "
             "does it stand within something?",
-            i + 1, s->station->name, p[0], p[1], p[2], (int)LOOKS, near, profile->range_min_m);
+            i + 1, s->station->name, p[0], p[1], p[2], (int)LOOKS, near, program->range_min_m);
     if (seen >= EMPTY_SHARE * LOOKS) return;
     sh_warn(report,
             "station %u %s at %.10g %.10g %.10g m: the scan is mostly empty: of %d directions %d meet something from "
             "%g to %g m away, %d something nearer, %d something farther",
-            i + 1, s->station->name, p[0], p[1], p[2], (int)LOOKS, seen, profile->range_min_m, profile->range_max_m,
+            i + 1, s->station->name, p[0], p[1], p[2], (int)LOOKS, seen, program->range_min_m, program->range_max_m,
             near, far);
 }
 

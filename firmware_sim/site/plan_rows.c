@@ -99,8 +99,10 @@ static void ask_head(const struct site *site, struct plan_head *head)
         .instrument = !is_zero(&cfg->instrument),
         .angle_noise = cfg->noise.angle,
     };
-    for (uint32_t i = 0; i < cfg->profile.n_reaches; i++)
-        head->reach_m = fmax(head->reach_m, cfg->profile.reach[i].range_m);
+    const struct config_program *program =
+        &cfg->profile.program[config_program_of(&cfg->profile, cfg->head.settings.prr_uhz)];
+    for (uint32_t i = 0; i < program->n_reaches; i++)
+        head->reach_m = fmax(head->reach_m, program->reach[i].range_m);
 }
 
 /* There is nothing to choose, but no line head either. */

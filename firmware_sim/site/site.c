@@ -113,6 +113,16 @@ static double counts_or_ideal(double counts)
     return counts > 0.0 ? counts : 4294967296.0;
 }
 
+void site_set_program(const struct site *site, int64_t prr_uhz, struct cast_setup *setup)
+{
+    const struct config_profile *profile = &site->cfg->profile;
+    const uint32_t i = config_program_of(profile, prr_uhz);
+    setup->range_min_m = profile->program[i].range_min_m;
+    setup->range_max_m = profile->program[i].range_max_m;
+    setup->max_echoes = profile->program[i].max_echoes;
+    setup->detect = site->detect.on ? &site->detect.program[i] : NULL;
+}
+
 void site_cast_setup(const struct site *site, uint32_t station, struct cast_setup *setup)
 {
     const struct config_profile *profile = &site->cfg->profile;
@@ -122,15 +132,13 @@ void site_cast_setup(const struct site *site, uint32_t station, struct cast_setu
     setup->georef = s->georef;
     memcpy(setup->station_m, s->at.position_m, sizeof setup->station_m);
     memcpy(setup->rotation, s->at.rotation, sizeof setup->rotation);
-    setup->range_min_m = profile->range_min_m;
-    setup->range_max_m = profile->range_max_m;
     setup->noise_on = site->cfg->noise.range == RANGE_NOISE_ON;
     setup->range_sigma_m = profile->range_sigma_m;
     setup->range_sigma_ppm = profile->range_sigma_ppm;
     setup->noise_key = rng_key(site->cfg->noise.seed, RNG_RANGE);
     setup->mirror_counts = counts_or_ideal(profile->mirror_counts);
     setup->pan_counts = counts_or_ideal(profile->pan_counts);
-    setup->detect = site->detect.on ? &site->detect.cast : NULL;
+    site_set_program(site, site->cfg->head.settings.prr_uhz, setup);
     setup->layout = site->cfg->output.layout;
     setup->beam = s->beam;
     setup->echoes = (enum beam_select)site->cfg->head.settings.echoes;

@@ -40,10 +40,11 @@ struct site_mover {
 
 /* What scans do between a hit and a point (detection.c). */
 struct site_detect {
-    int on; /* 0: nothing of it, and it costs nothing */
-    struct cast_detect cast;
+    int on;                                     /* 0: nothing of it, and it costs nothing */
+    struct cast_detect cast;                    /* of the program that the configuration has; the others below */
+    struct cast_detect program[HEAD_MAX_RATES]; /* by program of the head profile: each has a signal of its own */
+    struct detect_signal signal[HEAD_MAX_RATES];
     struct surface_table surfaces;
-    struct detect_signal signal;
     struct instrument instrument;
     struct detect_ball ball;
     uint32_t n_real;             /* labels of real surfaces; as many labels of ghosts follow */
@@ -139,7 +140,9 @@ const struct georef *site_georef(const struct site *site, uint32_t station, size
 void site_move(const struct site *site, double t_s, struct cast_setup *setup);
 double site_mover_time(const struct site *site, uint32_t station, double scan_s);
 
-/* What the casters need to scan from a station (0..n_stations-1). */
+/* What the casters need to scan from a station (0..n_stations-1), at the configured pulse rate. */
 void site_cast_setup(const struct site *site, uint32_t station, struct cast_setup *setup);
+/* What of it depends on the pulse rate: reach, echoes, smallest range. Allocates nothing. */
+void site_set_program(const struct site *site, int64_t prr_uhz, struct cast_setup *setup);
 
 #endif

@@ -221,6 +221,12 @@ void protocol_rig_line_end(struct protocol_rig *rig, const struct line_end *end)
     give(rig, frame, native_encode_line_end(frame, sizeof frame, end, rig->scan_t0_ns));
 }
 
+/* Exactly, as the head does. */
+static int64_t firing_ns(const struct native_emitter *e, uint64_t pulse)
+{
+    return (int64_t)(pulse * e->sequence_ns_num / e->sequence_ns_den);
+}
+
 void protocol_rig_turn(struct protocol_rig *rig, uint32_t line, const struct protocol_rig_shot *shot, uint32_t part)
 {
     enum { MOST = 4096 };
@@ -229,30 +235,28 @@ void protocol_rig_turn(struct protocol_rig *rig, uint32_t line, const struct pro
     int64_t dt_ns[MOST];
     const struct native_emitter *e = &rig->emitter;
     const uint32_t n = (uint32_t)(e->last_step - e->first_step) + 1;
-    const double pulse_ns = (double)e->sequence_ns_num / (double)e->sequence_ns_den;
-    const int64_t line_ns = (int64_t)floor(pulse_ns * e->steps * line);
+    const uint64_t pulse0 = (uint64_t)line * e->steps;
+    const int64_t line_ns = firing_ns(e, pulse0);
     assert_true(part != 0 && part <= MOST);
     for (uint32_t at = 0; at < n; at += part) {
-        const int64_t t0_ns = line_ns + (int64_t)floor(pulse_ns * (double)((uint32_t)e->first_step + at));
-        struct protocol_rig_run run = {line,     line,  (uint64_t)line * e->steps + (uint32_t)e->first_step + at,
-                                       0,        t0_ns, line_ns,
-                                       dt_ns,    level, pan_turn,
-                                       shot + at};
+        const int64_t t0_ns = firing_ns(e, pulse0 + (uint32_t)e->first_step + at);
+        struct protocol_rig_run run = {
+            line, line, pulse0 + (uint32_t)e->first_step + at, 0, t0_ns, line_ns, dt_ns, level, pan_turn, shot + at};
         run.n = n - at < part ? n - at : part;
         for (uint32_t i = 0; i < run.n; i++) {
             const int step = e->first_step + (int)(at + i);
-            dt_ns[i] = line_ns + (int64_t)floor(pulse_ns * step) - t0_ns;
+            dt_ns[i] = firing_ns(e, pulse0 + (uint32_t)step) - t0_ns;
             pan_turn[i] = (double)(e->turn * (step - e->front_step)) / e->steps;
         }
         protocol_rig_points(rig, &run);
     }
     const struct line_end end = {.frame = line,
                                  .line = line,
-                                 .pulse0 = (uint64_t)line * e->steps,
+                                 .pulse0 = pulse0,
                                  .n_fired = e->steps,
                                  .n_cast = n,
                                  .t0_ns = line_ns,
-                                 .t1_ns = (int64_t)floor(pulse_ns * e->steps * (line + 1.0)),
+                                 .t1_ns = firing_ns(e, pulse0 + e->steps),
                                  .status = LINE_LAST_OF_FRAME};
     protocol_rig_line_end(rig, &end);
     if (rig->ops->time != NULL) rig->ops->time(rig->protocol, rig->scan_t0_ns + end.t1_ns);

@@ -62,6 +62,7 @@ device=$(dirname "$(grep -l 1209 /sys/bus/usb/devices/*/idVendor)")
 echo 0 >$device/bConfigurationValue
 check "$speed: ends without a configuration" ends_soon
 [ $speed = high ] || return 0 # once is enough
+check_hokuyo "$speed" "backend: functionfs, speed: $speed"
 head_start "{type: usb, backend: functionfs, speed: $speed}" --pace fast
 wait_for 10 is_plugged
 head_kill

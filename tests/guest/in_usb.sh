@@ -2,8 +2,15 @@
 
 # head_start YAML [OPTION...]: a head with these links, and TCP on 5025 beside them. head_stop ends it.
 head_start() {
-    sed "\$alinks: [{type: tcp, port: 5025}${1:+, $1}]" /head.yaml >/tmp/config.yaml
+    links="{type: tcp, port: 5025}${1:+, $1}"
     shift
+    head_start_of head "$links" "$@"
+}
+
+# head_start_of NAME YAML [OPTION...]: the head of NAME.yaml with just these links.
+head_start_of() {
+    sed "\$alinks: [$2]" "/$1.yaml" >/tmp/config.yaml
+    shift 2
     cp /room.obj /tmp/
     rm -f /tmp/ready
     scanhead run /tmp/config.yaml --ready-fd 9 "$@" 9>/tmp/ready 2>/tmp/head.err &
@@ -24,13 +31,13 @@ head_kill() {
 # By what the kernel shows, in the shell: a look with lsusb costs an emulated processor a tenth of a second.
 is_plugged() {
     for file in /sys/bus/usb/devices/*/idVendor; do
-        ! read -r vendor <"$file" || [ "$vendor" != 1209 ] || return 0
+        ! read -r vendor <"$file" || [ "$vendor" != "${1:-1209}" ] || return 0
     done 2>/dev/null
     return 1
 }
 
 is_unplugged() {
-    ! is_plugged
+    ! is_plugged "$@"
 }
 
 tty_is_there() {
@@ -145,6 +152,17 @@ check_reset() {
     check "$1: with the count" grep '"bus_resets": 1,' reset.json
     check "$1: and no other" grep '"replugs": 0,' reset.json
     check "$1: the head says so, too" grep 'stays plugged in' /tmp/head.err
+}
+
+# A head that is to its host a Hokuyo. check_hokuyo PREFIX YAML: of its link, without type and protocol
+check_hokuyo() {
+    head_start_of hokuyo "{type: usb, protocol: scip, $2}"
+    check "$1: the stock driver makes a tty of a Hokuyo" wait_for 20 tty_is_there
+    tap "$1" test_scip
+    check "$1: scanhead list takes no other maker's device for a head" sh -c "scanhead list | grep '^heads on USB: none'"
+    head_stop
+    check "$1: the Hokuyo is gone with the head" wait_for 10 is_unplugged 15d1
+    note "$1: Hokuyo at $(uptime_s) s"
 }
 
 # What the USB specification wants of a device. check_chapter9 PREFIX

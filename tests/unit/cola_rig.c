@@ -20,12 +20,12 @@ static void open_model(const char *model, uint32_t steps, int first, int last, i
 
 void cola_open_tim(const char *model)
 {
-    open_model(model, 1080, 135, 945, 540, 15);
+    open_model(model, 1080, 0, 810, 405, 15);
 }
 
 void cola_open_lms(void)
 {
-    open_model("LMS111", 1440, 180, 1260, 720, 25);
+    open_model("LMS111", 1440, 0, 1080, 540, 25);
 }
 
 void cola_close(void)

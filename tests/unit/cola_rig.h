@@ -16,8 +16,8 @@
 
 extern struct protocol_rig cola;
 
-/* A session with a scanner that scans; its geometry is known. TiM: 1080 steps, 811 of them cast, 15 Hz. LMS111: 1440,
- * 1081 cast, 25 Hz. */
+/* A session with a scanner that scans; its geometry is known. TiM: 1080 steps a turn, 0 to 810 cast, 15 Hz.
+ * LMS111: 1440, 0 to 1080 cast, 25 Hz. */
 void cola_open_tim(const char *model);
 void cola_open_lms(void);
 void cola_close(void);

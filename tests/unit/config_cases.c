@@ -91,7 +91,7 @@ const struct bad bad[] = {
     {NULL, "- 1\n", 1, NULL, "allowed sections with keys"},
     {NULL, "text\n", 1, NULL, "allowed sections with keys"},
     /* missing */
-    {"  profile: riegl-vz400i\n", "", 1, "head.profile", "missing"},
+    {"  profile: any-rate\n", "", 1, "head.profile", "missing"},
     {"      scale: 1\n", "", 7, "scene.meshes[0].scale", "missing"},
     {"      up: z\n", "", 7, "scene.meshes[0].up", "missing"},
     {"  - type: tcp\n    port: 0", "  - port: 0", 14, "links[0].type", "missing"},
@@ -110,9 +110,9 @@ const struct bad bad[] = {
     {NULL, "# nothing\n", 1, NULL, "empty"},
     {NULL, "\xff\xfeh\n", 1, NULL, "UTF-8"},
     {NULL, "\n\nhead: \x01\n", 3, NULL, "control characters"},
-    /* within the profile: VZ-400i, 100 kHz to 1.2 MHz, 3 to 240 lines/s, -40 to 60 deg, 0 to 360 deg */
+    /* within the profile: any-rate, 100 kHz to 1.2 MHz, 3 to 240 lines/s, -40 to 60 deg, 0 to 360 deg */
     {PRR, "  prr_hz: 1200000.000001\n", 3, "head.prr_hz", "allowed 100000 to 1200000 Hz"},
-    {PRR, "  prr_hz: 99999.999999\n", 3, "head.prr_hz", "99999.999999 is outside the limits of head profile riegl-vz400i"},
+    {PRR, "  prr_hz: 99999.999999\n", 3, "head.prr_hz", "99999.999999 is outside the limits of head profile any-rate"},
     {LINES, "  lines_hz: 241\n", 4, "head.lines_hz", "allowed 3 to 240 Hz"},
     {LINES, "  line_start_deg: -40.000001\n", 4, "head.line_start_deg", "allowed -40 to 60 deg"},
     {LINES, "  line_stop_deg: 61\n", 4, "head.line_stop_deg", "allowed -40 to 60 deg"},
@@ -251,9 +251,9 @@ const struct bad bad[] = {
     {"cube.obj", "cube.xyz", 7, "scene.meshes[0].file", "allowed .obj .ply .stl"},
     {"cube.obj", "cube", 7, "scene.meshes[0].file", "no known ending"},
     {"cube.obj", "dir.obj", 7, "scene.meshes[0].file", "a directory, not a file"},
-    {"riegl-vz400i", "riegl-vz400", 2, "head.profile", "allowed full-sweep, hokuyo-u"},
-    {"riegl-vz400i", "heads/none.yaml", 2, "head.profile", "no profile"},
-    {"riegl-vz400i", "../heads/x", 2, "head.profile", "no profile"},
+    {"any-rate", "riegl-vz400", 2, "head.profile", "allowed any-rate, faro-focus-s350, full-sweep, hokuyo-u"},
+    {"any-rate", "heads/none.yaml", 2, "head.profile", "no profile"},
+    {"any-rate", "../heads/x", 2, "head.profile", "no profile"},
 };
 /* clang-format on */
 

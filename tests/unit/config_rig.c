@@ -1,7 +1,7 @@
 #include "tests/unit/config_rig.h"
 
 const char base[] = "head:\n"                     /* 1 */
-                    "  profile: riegl-vz400i\n"   /* 2 */
+                    "  profile: any-rate\n"       /* 2 */
                     "  prr_hz: 500000\n"          /* 3 */
                     "  lines_hz: 100\n"           /* 4 */
                     "scene:\n"                    /* 5 */

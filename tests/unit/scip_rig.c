@@ -59,7 +59,7 @@ static int64_t line_ns(uint32_t line)
     return (int64_t)line * (1000000000 / (int64_t)(rig.descriptor.lines_uhz / 1000000));
 }
 
-void scip_part(uint32_t line, int from, int to)
+static void part(uint32_t line, int from, int to)
 {
     static double level[SCIP_STEPS], pan[SCIP_STEPS];
     static int64_t dt_ns[SCIP_STEPS];
@@ -81,6 +81,13 @@ void scip_part(uint32_t line, int from, int to)
                                          .pan_turn = pan,
                                          .shot = shot + from};
     protocol_rig_points(&rig, &run);
+}
+
+/* Frames of at most 150 points: firing times within a frame are below 2^24 ns. */
+void scip_part(uint32_t line, int from, int to)
+{
+    for (; from <= to; from += 150)
+        part(line, from, to - from < 150 ? to : from + 149);
 }
 
 void scip_line_end(uint32_t line, uint32_t status)

@@ -6,7 +6,7 @@
 #include "tests/unit/cola_rig.h"
 
 static struct cola_lmd lmd;
-static struct protocol_rig_shot shots[3000];
+static struct protocol_rig_shot shots[3001];
 
 static int close_rig(void **state)
 {
@@ -178,6 +178,7 @@ static void far_heads_count_in_two_millimetres(void **state)
     cola_read_lmd(0, &lmd);
     assert_int_equal(lmd.channel[0].value[107], 65535);
     assert_int_equal(lmd.channel[0].value[108], 0);
+    assert_int_equal(cola.count[PROTOCOL_POINTS_LOST], 811 - 108);
 }
 
 static void a_narrowed_range_is_narrower(void **state)
@@ -336,7 +337,8 @@ static void counters_count_modulo_16_bits(void **state)
         protocol_rig_clear(&cola);
         protocol_rig_turn(&cola, line, shots, 1);
         cola_read_lmd(0, &lmd);
-        if (lmd.scan != line % 65536 || lmd.telegram != (line - 3) % 65536) fail_msg("line %u: %u %u", line, lmd.scan, lmd.telegram);
+        if (lmd.scan != line % 65536 || lmd.telegram != (line - 3) % 65536)
+            fail_msg("line %u: %u %u", line, lmd.scan, lmd.telegram);
     }
     /* the next scan of the head starts its lines again; the scanner's counter goes on */
     cola.descriptor.scan = 2;
@@ -358,7 +360,7 @@ static void part_of_turn(uint32_t line, uint32_t from, uint32_t n)
     const int64_t line_ns = (int64_t)line * 66666667;
     for (uint32_t i = 0; i < n; i++) {
         dt_ns[i] = (int64_t)i * 61728;
-        pan_turn[i] = -((double)(from + i) - 540.0) / 1080.0;
+        pan_turn[i] = -((double)(from + i) - 405.0) / 1080.0;
         shots[i] = (struct protocol_rig_shot){1, {5.0}, {0}, {0}};
     }
     const struct protocol_rig_run run = {
@@ -374,9 +376,11 @@ static void a_scan_with_a_hole_is_not_sent(void **state)
     stream(0);
     protocol_rig_clear(&cola);
     cola_turn(0, 1.0);
-    part_of_turn(1, 135, 400); /* 400 and 410 of 811: one pulse is missing */
+    part_of_turn(1, 0, 200); /* of 811 pulses one is missing */
+    part_of_turn(1, 200, 200);
     cola.ops->gap(cola.protocol, 1);
-    part_of_turn(1, 536, 410);
+    part_of_turn(1, 401, 200);
+    part_of_turn(1, 601, 210);
     cola_turn(2, 1.0);
     cola_turn(5, 1.0); /* and two whole turns */
     assert_int_equal(cola.n_units, 3);
@@ -413,7 +417,7 @@ static void what_nobody_asked_for_is_not_lost(void **state)
 {
     (void)state;
     cola_open_tim("TiM571");
-    part_of_turn(7, 600, 346); /* joined in the middle */
+    part_of_turn(7, 600, 211); /* joined in the middle */
     stream(0);
     protocol_rig_clear(&cola);
     cola_turn(8, 1.0);
@@ -424,8 +428,8 @@ static void what_nobody_asked_for_is_not_lost(void **state)
     assert_int_equal(cola.n_units, 0);
     stream(0);
     protocol_rig_clear(&cola);
-    part_of_turn(12, 135, 100); /* the scan is stopped */
-    const struct line_end end = {.frame = 12, .line = 12, .n_fired = 235, .n_cast = 100, .status = LINE_PARTIAL};
+    part_of_turn(12, 0, 100); /* the scan is stopped */
+    const struct line_end end = {.frame = 12, .line = 12, .n_fired = 100, .n_cast = 100, .status = LINE_PARTIAL};
     protocol_rig_line_end(&cola, &end);
     assert_int_equal(cola.n_units, 0);
     assert_int_equal(cola.count[PROTOCOL_UNITS_LOST], 0);
@@ -585,14 +589,14 @@ static void the_encoder_counts_the_way(void **state)
     assert_int_equal(lmd.position, 0);
     assert_int_equal(lmd.speed, 0);
     give_poses(10.0, 10.2, 0, 100000000);
-    cola_turn(1, 1.0); /* its first pulse at 75.0 ms: 150 mm */
+    cola_turn(1, 1.0); /* its first pulse at 66.67 ms: 133 mm */
     cola_read_lmd(1, &lmd);
-    assert_in_range(lmd.position, 149, 151);
+    assert_in_range(lmd.position, 133, 134);
     assert_int_equal(lmd.speed, 2000);
     give_poses(10.2, 10.0, 100000000, 300000000);
-    cola_turn(2, 1.0); /* 141.67 ms: 200 mm, and 41.67 at 1 m/s */
+    cola_turn(2, 1.0); /* 133.33 ms: 200 mm, and 33.33 ms at 1 m/s */
     cola_read_lmd(2, &lmd);
-    assert_in_range(lmd.position, 241, 243);
+    assert_in_range(lmd.position, 233, 234);
     assert_int_equal(lmd.speed, 1000);
 }
 

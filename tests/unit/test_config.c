@@ -144,7 +144,7 @@ static void defaults_are_those_of_the_table(void **state)
 {
     (void)state;
     assert_loads(load_edited(PRR LINES, ""));
-    /* the profile's: see config/heads/riegl-vz400i.yaml */
+    /* the profile's: see config/heads/any-rate.yaml */
     const struct head_settings *s = &cfg->head.settings;
     assert_int_equal(s->prr_uhz, 1200000000000);
     assert_int_equal(s->lines_uhz, 240000000);

@@ -6,9 +6,10 @@
 static void shipped_files_load(void **state)
 {
     (void)state;
-    static const char *const heads[] = {"riegl-vz400i",    "riegl-vz600i",    "leica-rtc360",   "hokuyo-urg-04lx",
-                                        "hokuyo-utm-30lx", "hokuyo-ust-20lx", "sick-tim561",    "sick-tim571",
-                                        "sick-tim781",     "sick-lms111",     "velodyne-vlp16", "full-sweep"};
+    static const char *const heads[] = {
+        "riegl-vz400i",    "riegl-vz600i",   "leica-rtc360", "riegl-vz2000i",   "leica-p40",       "leica-blk360",
+        "faro-focus-s350", "zf-imager-5016", "any-rate",     "hokuyo-urg-04lx", "hokuyo-utm-30lx", "hokuyo-ust-20lx",
+        "sick-tim561",     "sick-tim571",    "sick-tim781",  "sick-lms111",     "velodyne-vlp16",  "full-sweep"};
     assert_loads(load_set("head.profile=full-sweep"));
     for (size_t i = 0; i < sizeof heads / sizeof *heads; i++) {
         static struct config_profile profile;
@@ -32,10 +33,10 @@ static void profiles_give_their_figures(void **state)
 {
     (void)state;
     assert_loads(load_set("head.profile=leica-rtc360"));
-    /* Leica RTC360 data sheet: 0.5 to 130 m, 1.0 mm + 10 ppm, 300 deg */
+    /* Leica RTC360: 0.5 to 130 m, 300 deg; 1.0 mm + 10 ppm is its accuracy, and none of it is noise */
     const struct config_profile *p = &cfg->profile;
-    assert_true(p->range_min_m == 0.5 && p->range_max_m == 130 && p->range_sigma_m == 0.001 &&
-                p->range_sigma_ppm == 10);
+    assert_true(p->range_min_m == 0.5 && p->range_max_m == 130 && p->accuracy_m == 0.001 && p->accuracy_ppm == 10);
+    assert_true(p->range_sigma_m < p->accuracy_m && p->range_sigma_ppm == 0.0);
     assert_int_equal(p->fov_max_udeg - p->fov_min_udeg, 300000000);
     assert_string_equal(p->maker, "Leica");
 }
@@ -54,8 +55,11 @@ static int load_profile(const char *old, const char *with)
     assert_non_null(at);
     snprintf(changed, sizeof changed, "%.*s%s%s", (int)(at - text), text, with, at + strlen(old));
     write_in("heads/mine.yaml", changed);
-    return load_edited("riegl-vz400i\n  prr_hz: 500000\n  lines_hz: 100", "mine");
+    return load_edited("any-rate\n  prr_hz: 500000\n  lines_hz: 100", "mine");
 }
+
+#define FARTHEST "{ value: 130, from: quoted, source: \"a reseller's page\" }"
+#define SIGMA    "range_sigma_floor_m: { value: 0.00016,"
 
 static void malformed_profiles_are_refused(void **state)
 {
@@ -63,26 +67,29 @@ static void malformed_profiles_are_refused(void **state)
     static const struct {
         const char *old, *with, *key, *fragment;
     } wrong[] = {
-        {"{ value: 130, from: data sheet }", "130", "range_max_m", "allowed { value: V, from: data sheet }"},
-        {"{ value: 130, from: data sheet }", "{ value: 130 }", "range_max_m", "\"from\" is missing"},
-        {"{ value: 130, from: data sheet }", "{ from: assumed }", "range_max_m", "\"value\" is missing"},
-        {"{ value: 130, from: data sheet }", "{ value: 130, from: hearsay }", "range_max_m",
-         "allowed data sheet, assumed"},
-        {"{ value: 130, from: data sheet }", "{ value: 130, from: [] }", "range_max_m", "allowed data sheet, assumed"},
-        {"{ value: 130, from: data sheet }", "{ value: 130 m, from: assumed }", "range_max_m", "not a number"},
-        {"{ value: 130, from: data sheet }", "{ value: 1, value: 2, from: assumed }", "range_max_m", "given twice"},
-        {"{ value: 130, from: data sheet }", "{ value: 1, note: 2, from: assumed }", "range_max_m", "unknown"},
-        {"{ value: 130, from: data sheet }", "{ value: 0.4, from: assumed }", "range_min_m",
-         "0.5 is too much; allowed below 0.4"},
-        {"{ value: 0.00088, from: assumed }", "{ value: 0.002, from: assumed }", "range_sigma_floor_m",
-         "allowed at most 0.001"},
+        {FARTHEST, "130", "range_max_m", "allowed { value: V, from: data sheet }"},
+        {FARTHEST, "{ value: 130 }", "range_max_m", "\"from\" is missing"},
+        {FARTHEST, "{ from: assumed }", "range_max_m", "\"value\" is missing"},
+        {FARTHEST, "{ value: 130, from: hearsay }", "range_max_m", "allowed data sheet, quoted, assumed"},
+        {FARTHEST, "{ value: 130, from: [] }", "range_max_m", "allowed data sheet, quoted, assumed"},
+        {FARTHEST, "{ value: 130 m, from: assumed }", "range_max_m", "not a number"},
+        {FARTHEST, "{ value: 1, value: 2, from: assumed }", "range_max_m", "given twice"},
+        {FARTHEST, "{ value: 1, remark: 2, from: assumed }", "range_max_m", "unknown"},
+        {FARTHEST, "{ value: 1, from: assumed, definition: FWHM }", "range_max_m", "unknown"},
+        {FARTHEST, "{ value: 1, from: assumed, note: }", "range_max_m", "allowed a text in one line"},
+        {FARTHEST, "{ value: 1, from: assumed, source: [a] }", "range_max_m", "allowed a text in one line"},
+        {"definition: 1/e2,", "definition: 1/e3,", "beam_divergence_rad", "allowed 1/e2, 1/e, FWHM, half angle 1/e2"},
+        {"definition: 1/e2 }", "definition: half angle 1/e2 }", "beam_exit_m", "allowed 1/e2, 1/e, FWHM, radius 1/e2"},
+        {FARTHEST, "{ value: 0.4, from: assumed }", "range_min_m", "0.5 is too much; allowed below 0.4"},
+        {SIGMA, "range_sigma_floor_m: { value: 0.002,", "range_sigma_floor_m", "allowed at most 0.0005"},
         {"range_m: 130, from: assumed", "range_m: 130", "reaches[0].from", "missing"},
-        {"range_m: 130, from: assumed", "range_m: 130, from: memory", "reaches[0].from", "allowed data sheet, assumed"},
+        {"range_m: 130, from: assumed", "range_m: 130, from: memory", "reaches[0].from",
+         "allowed data sheet, quoted, assumed"},
         {"range_m: 130, from: assumed }",
          "range_m: 130, from: assumed }\n  - { reflectance: 0.2, range_m: 140, from: assumed }", "reaches",
          "falls at least with the square of the range"},
         {"range_max_m:", "range_mx_m:", "range_mx_m", "did you mean range_max_m?"},
-        {"range_max_m: { value: 130, from: data sheet }\n", "", "range_max_m", "missing"},
+        {"range_max_m: " FARTHEST "\n", "", "range_max_m", "missing"},
         {"facets: { value: 1,", "facets: { value: 2,", "fov_max_deg", "allowed up to 180 deg"},
         {"facets: { value: 1,", "facets: { value: 0,", "facets", "1 to 360"},
         {"optical_gain: { value: 1,", "optical_gain: { value: 2,", "optical_gain", "allowed up to 360"},
@@ -90,8 +97,8 @@ static void malformed_profiles_are_refused(void **state)
          "0 to 0.01"},
         {"max_echoes: { value: 1,", "max_echoes: { value: 16,", "max_echoes", "1 to 15"},
         {"lines_min_hz: { value: 5,", "lines_min_hz: { value: 0.2,", "lines_min_hz", "allowed 0.25 to"},
-        {"lines_min_hz: { value: 5,", "lines_min_hz: { value: 201,", "lines_min_hz", "allowed at most 200"},
-        {"prr_min_hz: { value: 100000,", "prr_min_hz: { value: 2000001,", "prr_min_hz", "allowed at most 2000000"},
+        {"lines_min_hz: { value: 5,", "lines_min_hz: { value: 101,", "lines_min_hz", "allowed at most 100"},
+        {"prr_min_hz: { value: 10000,", "prr_min_hz: { value: 2000001,", "prr_min_hz", "allowed at most 2000000"},
         {"pan_max_deg: { value: 180,", "pan_max_deg: { value: 0,", "pan_max_deg", "allowed above 0, up to 360"},
         {"fov_min_deg: { value: -60,", "fov_min_deg: { value: 240,", "fov_min_deg", "allowed below 240"},
         {"model: RTC360", "model: a,b", "model", "without comma"},
@@ -120,7 +127,7 @@ static void a_range_beyond_its_bits_is_refused(void **state)
                  {"output.layout=polar", 4295, 0},
                  {"output.layout=geo", 2147, 1},
                  {"output.layout=geo", 2148, 0}};
-    char *text = edited("riegl-vz400i\n  prr_hz: 500000\n  lines_hz: 100", "mine");
+    char *text = edited("any-rate\n  prr_hz: 500000\n  lines_hz: 100", "mine");
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         char value[64];
         snprintf(value, sizeof value, "range_max_m: { value: %d,", cases[i].far_m);
@@ -136,9 +143,8 @@ static void a_range_beyond_its_bits_is_refused(void **state)
 static void a_slow_pulse_rate_needs_slow_lines(void **state)
 {
     (void)state;
-    assert_loads(load_profile("prr_min_hz: { value: 100000,", "prr_min_hz: { value: 10,"));
-    char *text =
-        edited("riegl-vz400i\n  prr_hz: 500000\n  lines_hz: 100", "mine\n  prr_hz: 100\n  lines_hz: 100.000001");
+    assert_loads(load_profile("prr_min_hz: { value: 10000,", "prr_min_hz: { value: 10,"));
+    char *text = edited("any-rate\n  prr_hz: 500000\n  lines_hz: 100", "mine\n  prr_hz: 50\n  lines_hz: 50.000001");
     assert_int_equal(load_text(text), SH_EINPUT);
     assert_says(":3: head.prr_hz: less than a pulse per line");
     free(text);
@@ -152,14 +158,14 @@ static void profiles_are_looked_up_in_order(void **state)
     assert_string_equal(cfg->profile.model, "mine"); /* heads/ beside the configuration */
     snprintf(path, sizeof path, "%s/heads/mine.yaml", dir);
     assert_string_equal(cfg->profile_file, path);
-    assert_loads(load_edited("riegl-vz400i\n  prr_hz: 500000", "heads/mine.yaml")); /* relative to the file */
+    assert_loads(load_edited("any-rate\n  prr_hz: 500000", "heads/mine.yaml")); /* relative to the file */
     assert_string_equal(cfg->profile.name, "mine");
     snprintf(env, sizeof env, "%s", getenv("SCANHEAD_HEADS"));
     snprintf(path, sizeof path, "%s/first", dir);
     mkdir(path, 0700);
     write_in("first/mine.yaml", "maker: first\n");
     setenv("SCANHEAD_HEADS", path, 1);
-    assert_int_equal(load_edited("riegl-vz400i", "mine"), SH_EINPUT);
+    assert_int_equal(load_edited("any-rate", "mine"), SH_EINPUT);
     assert_says("first/mine.yaml:1: model: missing"); /* the variable goes before heads/ */
     setenv("SCANHEAD_HEADS", env, 1);
 }
@@ -189,12 +195,17 @@ static void profiles_are_listed(void **state)
     FILE *out = open_memstream(&text, &len);
     assert_int_equal(config_list_profiles("config/heads", out, &err), n);
     fclose(out);
-    assert_non_null(strstr(text, "leica-rtc360"));
-    assert_non_null(strstr(text, "Leica RTC360; data sheet: range_min_m, range_max_m, range_sigma_m, range_sigma_ppm"));
-    int lines = 0;
-    for (const char *p = text; *p != '\0'; p++)
-        lines += *p == '\n';
-    assert_int_equal(lines, n);
+    /* A head with programs: each with rate, used rate, echoes, nearest range and reach. */
+    const char *head = strstr(text, "\nriegl-vz400i: RIEGL VZ-400i\n");
+    assert_non_null(head);
+    assert_non_null(
+        strstr(head, "\n  600                        250      8     0.5 m  350 m on 90 %, 166 m on 20 %\n"));
+    assert_non_null(strstr(head, "\n  data sheet 10: prr_min_hz, prr_max_hz, fov_min_deg,"));
+    assert_non_null(strstr(text, "\n  any, 10 to 2000           1667      1     0.5 m  130 m on 90 %\n"));
+    for (const char *p = text, *end; *p != '\0'; p = end + 1) {
+        end = strchr(p, '\n');
+        assert_true(end - p <= 120);
+    }
     free(text);
     assert_int_equal(config_list_profiles("/nonexistent", stdout, &err), SH_EINPUT);
     assert_says("/nonexistent");

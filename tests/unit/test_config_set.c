@@ -16,7 +16,8 @@ static void set_changes_values(void **state)
     assert_true(cfg->station[0].position_m[2] == 9);
     assert_loads(load_set("head.serial=A=B"));
     assert_string_equal(cfg->head.serial, "A=B");
-    assert_loads(load_set("head.profile=riegl-vz600i"));
+    static const char *const other[] = {"head.profile=riegl-vz600i", "head.prr_hz=600000"};
+    assert_loads(load_sets(other, 2));
     assert_string_equal(cfg->profile.name, "riegl-vz600i");
     assert_int_equal(cfg->head.settings.line_stop_udeg, 65000000); /* defaults follow the profile */
 }

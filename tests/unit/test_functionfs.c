@@ -31,8 +31,15 @@ static char *file(struct rig *rig, const char *name)
     return rig->path;
 }
 
+/* The same device with telegrams on its IN endpoint. */
+static const struct usb_endpoint_row unit_endpoints[] = {
+    {.address = EP_IN, .type = USB_ENDPOINT_XFER_BULK, .packet = {64, 512, 1024}, .units = 1},
+    {.address = EP_OUT, .type = USB_ENDPOINT_XFER_BULK, .packet = {64, 512, 1024}}};
+static const struct usb_interface_row unit_interfaces[] = {
+    {.class = 0xff, .endpoint = unit_endpoints, .n_endpoints = 2}};
+
 /* out: what stands for the OUT endpoint; NULL: a FIFO. */
-static struct rig rig_open(const char *out)
+static struct rig rig_open_model(const char *out, const struct usb_model *model)
 {
     struct rig rig = {.ops = usb_backend_ops_get(USB_BACKEND_FUNCTIONFS), .dir = "/tmp/test_functionfs.XXXXXX"};
     struct sh_err err = {0, ""};
@@ -43,20 +50,25 @@ static struct rig rig_open(const char *out)
         assert_int_equal(symlink(out, file(&rig, "ep2")), 0);
     else
         assert_int_equal(mkfifo(file(&rig, "ep2"), 0600), 0);
-    rig.host = host_new(&pair_model, USB_RATE_HIGH, USB_RATE_HIGH);
+    rig.host = host_new(model, USB_RATE_HIGH, USB_RATE_HIGH);
     rig.ffs = calloc(1, sizeof *rig.ffs);
     assert_non_null(rig.ffs);
     rig.ffs->device = rig.host->device;
     snprintf(rig.ffs->gadget.mount, sizeof rig.ffs->gadget.mount, "%s", rig.dir);
-    rig.ffs->gadget.tty_number = -1;
-    rig.ffs->gadget.part = pair_model;
-    rig.ffs->gadget.row[0] = pair_interfaces[0];
+    rig.ffs->gadget.tty_number = rig.ffs->gadget.state_fd = -1;
+    rig.ffs->gadget.part = *model;
+    rig.ffs->gadget.row[0] = model->interface[0];
     assert_int_equal(socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK, 0, pair), 0);
     rig.ffs->ep0 = pair[0];
     rig.kernel = pair[1];
     if (ffs_pipes_open(&rig.ffs->pipes, rig.ffs->device, &rig.ffs->gadget, &err) != SH_OK) fail_msg("%s", err.text);
     assert_int_equal(ffs_console_open(&rig.ffs->console, rig.ffs->device, -1, &err), SH_OK);
     return rig;
+}
+
+static struct rig rig_open(const char *out)
+{
+    return rig_open_model(out, &pair_model);
 }
 
 static void rig_close(struct rig *rig)
@@ -227,12 +239,52 @@ static void test_endpoint_request(void **state)
     rig_close(&rig);
 }
 
+/* A telegram of whole packets has a packet of no bytes after it: as a write of its own, which is FunctionFS's way. Where
+ * it fills a buffer to its last byte, that write is all that the next buffer does. */
+static void test_units(void **state)
+{
+    (void)state;
+    static const struct {
+        size_t len;
+        int writes[2]; /* by the first two buffers */
+    } cases[] = {{511, {1, 0}},
+                 {512, {2, 0}},
+                 {513, {1, 0}},
+                 {1024, {2, 0}},
+                 {FFS_SLOT_BYTES - 1, {1, 0}},
+                 {FFS_SLOT_BYTES, {1, 1}},
+                 {FFS_SLOT_BYTES + 512, {1, 2}},
+                 {FFS_SLOT_BYTES + 1, {1, 1}}};
+    static uint8_t telegram[FFS_SLOT_BYTES + 512], back[1 << 16];
+    for (size_t i = 0; i < sizeof telegram; i++)
+        telegram[i] = (uint8_t)(i * 5 + i / 256);
+    struct usb_model model = pair_model;
+    model.interface = unit_interfaces;
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct rig rig = rig_open_model(NULL, &model);
+        const struct ffs_slot *slot = rig.ffs->pipes.pipe[0].slot;
+        event(&rig, FUNCTIONFS_ENABLE);
+        settle(&rig);
+        assert_int_equal(usb_device_write(rig.host->device, EP_IN, telegram, cases[i].len), cases[i].len);
+        for (int k = 0; k < 2; k++)
+            if (slot[k].n_io != cases[i].writes[k])
+                fail_msg("%zu bytes: %d writes by buffer %d, not %d", cases[i].len, slot[k].n_io, k,
+                         cases[i].writes[k]);
+        settle(&rig);
+        int fd = open(file(&rig, "ep1"), O_RDONLY | O_NONBLOCK);
+        assert_int_equal(read(fd, back, sizeof back), cases[i].len);
+        assert_memory_equal(back, telegram, cases[i].len);
+        close(fd);
+        rig_close(&rig);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_deconfigured),     cmocka_unit_test(test_left_over),
         cmocka_unit_test(test_busy_endpoint),    cmocka_unit_test(test_failing_endpoint),
-        cmocka_unit_test(test_endpoint_request),
+        cmocka_unit_test(test_endpoint_request), cmocka_unit_test(test_units),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

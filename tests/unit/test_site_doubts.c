@@ -33,7 +33,7 @@ static void load(const char *position, double scale, const char *head, const cha
 {
     char text[1024];
     snprintf(text, sizeof text,
-             "head: {profile: riegl-vz400i, prr_hz: 600000, lines_hz: 100%s}\n"
+             "head: {profile: any-rate, prr_hz: 600000, lines_hz: 100%s}\n"
              "scene:\n  meshes: [{file: mesh.obj, up: z, scale: %g}]\nstations:\n  - {position_m: [%s]}\n%s\n",
              head, scale, position, more);
     write_in("test.yaml", text);

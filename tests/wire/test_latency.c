@@ -5,7 +5,7 @@
 
 enum { EFFECT_NS = 100000000 };
 
-static const struct room_config ENDLESS = {.profile = "riegl-vz400i",
+static const struct room_config ENDLESS = {.profile = "any-rate",
                                            .prr_hz = 300000,
                                            .lines_hz = 100,
                                            .pan_deg_s = 50,

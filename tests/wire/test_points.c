@@ -222,7 +222,7 @@ static void scan(struct wire *wire, const struct room_config *config, struct che
 
 /* Rates that divide nothing: pulse period and pulses per line are fractions, lines begin at any phase. The
  * window cuts the line within the profile's 100 of 240 deg. */
-static const struct room_config ODD = {.profile = "riegl-vz400i",
+static const struct room_config ODD = {.profile = "any-rate",
                                        .prr_hz = 299999.7,
                                        .lines_hz = 101.3,
                                        .pan_deg_s = 149.9,

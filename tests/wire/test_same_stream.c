@@ -2,7 +2,7 @@
  * hears it and as `record` makes it off line; and a journal brings back a whole session. */
 #include "tests/wire/room.h"
 
-static const struct room_config SHORT = {.profile = "riegl-vz400i",
+static const struct room_config SHORT = {.profile = "any-rate",
                                          .prr_hz = 399999.9,
                                          .lines_hz = 97.7,
                                          .pan_deg_s = 150,

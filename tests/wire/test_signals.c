@@ -3,7 +3,7 @@
 #include <inttypes.h>
 #include "tests/wire/room.h"
 
-static const struct room_config ENDLESS = {.profile = "riegl-vz400i",
+static const struct room_config ENDLESS = {.profile = "any-rate",
                                            .prr_hz = 200000,
                                            .lines_hz = 100,
                                            .pan_deg_s = 20,

@@ -3,7 +3,7 @@
 
 #include "drivers/protocol/native.h"
 
-static const struct room_config SHORT = {.profile = "riegl-vz400i",
+static const struct room_config SHORT = {.profile = "any-rate",
                                          .prr_hz = 333333.3,
                                          .lines_hz = 97.7,
                                          .pan_deg_s = 150,

@@ -5,7 +5,7 @@
 
 enum { POINTS_MAX = 200000, LINES_MAX = 200 };
 
-static const struct room_config SCAN = {.profile = "riegl-vz400i",
+static const struct room_config SCAN = {.profile = "any-rate",
                                         .prr_hz = 123456.7,
                                         .lines_hz = 97.7,
                                         .pan_deg_s = 150,

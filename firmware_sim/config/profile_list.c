@@ -1,0 +1,134 @@
+/* What `scanhead list` shows of a head profile: its programs, the protocols that speak for it, and how sure its
+ * figures are. */
+#include "firmware_sim/config/table.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static double from_micro(int64_t micro)
+{
+    return 1e-6 * (double)micro;
+}
+
+/* ---- protocols */
+
+/* Beside native and nmea, which any head has. */
+static const struct {
+    const char *maker;
+    enum protocol_id id;
+} spoken[] = {{"Hokuyo", PROTOCOL_SCIP},
+              {"SICK", PROTOCOL_COLA},
+              {"Velodyne", PROTOCOL_VELODYNE},
+              {"Velodyne", PROTOCOL_VELODYNE_POSITION},
+              {"Velodyne", PROTOCOL_VELODYNE_HTTP}};
+
+static void put_protocols(const struct config_profile *p, FILE *out)
+{
+    fputs("  protocols  native, nmea", out);
+    for (size_t i = 0; i < CFG_LEN(spoken); i++) {
+        const struct protocol_ops *ops = protocol_ops_get(spoken[i].id);
+        if (ops != NULL && strcmp(spoken[i].maker, p->maker) == 0) fprintf(out, ", %s", ops->name);
+    }
+    fputc('\n', out);
+}
+
+/* ---- programs */
+
+static void put_reach(const struct config_program *program, FILE *out)
+{
+    fputs("  ", out);
+    for (uint32_t i = 0; i < program->n_reaches; i++)
+        fprintf(out, "%s%.4g m on %.3g %%", i > 0 ? ", " : "", program->reach[i].range_m,
+                100.0 * program->reach[i].reflectance);
+    fputc('\n', out);
+}
+
+static void put_program(const struct config_program *program, const char *rates, FILE *out)
+{
+    fprintf(out, "  %-20s %9.4g %6u %7.3g m", rates, from_micro(program->used_uhz) / 1e3, program->max_echoes,
+            program->range_min_m);
+    put_reach(program, out);
+}
+
+static void put_programs(const struct config_profile *p, FILE *out)
+{
+    char rates[64];
+    fputs("  pulse rate, kHz      used kHz echoes   nearest  reach\n", out);
+    for (uint32_t i = 0; i < p->n_programs; i++) {
+        snprintf(rates, sizeof rates, "%.10g", from_micro(p->program[i].prr_uhz) / 1e3);
+        put_program(&p->program[i], rates, out);
+    }
+    if (p->n_programs > 0) return;
+    struct config_program fastest = p->program[0];
+    fastest.used_uhz = (int64_t)((double)p->prr_max_uhz * cfg_used_share(p));
+    snprintf(rates, sizeof rates, "any, %.10g to %.10g", from_micro(p->prr_min_uhz) / 1e3,
+             from_micro(p->prr_max_uhz) / 1e3);
+    put_program(&fastest, rates, out);
+}
+
+/* ---- grades */
+
+static int has_grade(const struct cfg_reader *rd, size_t row, int grade)
+{
+    for (size_t item = 0; item < CFG_MAX_ITEMS; item++)
+        if (rd->from[row][item] == grade + 1) return 1;
+    return 0;
+}
+
+/* `grade  N: key, key, ...`, within 110 columns. */
+static void put_figures(const struct cfg_reader *rd, int grade, FILE *out)
+{
+    enum { WIDTH = 110, INDENT = 13 };
+    char label[32];
+    int column = 0, n = 0;
+    for (size_t row = 0; row < rd->table.n; row++)
+        n += has_grade(rd, row, grade);
+    if (n == 0) return;
+    snprintf(label, sizeof label, "%s", cfg_from_names[grade]);
+    column = fprintf(out, "  %-10s %d:", label, n);
+    for (size_t row = 0, k = 0; row < rd->table.n; row++) {
+        const char *path = rd->table.keys[row].path;
+        if (!has_grade(rd, row, grade)) continue;
+        if (column + (int)strlen(path) + 2 > WIDTH) {
+            fprintf(out, "\n%*s", INDENT - 1, "");
+            column = INDENT - 1;
+        }
+        column += fprintf(out, " %s%s", path, ++k < (size_t)n ? "," : "");
+    }
+    fputc('\n', out);
+}
+
+/* ---- the emitter: how pulses are arranged, and how fast it turns */
+
+static const char *turn_of(const struct config_profile *p)
+{
+    return p->emitter.turn < 0 ? "counter-clockwise" : "clockwise";
+}
+
+static void put_emitter(const struct cfg_reader *rd, const struct config_profile *p, FILE *out)
+{
+    const struct config_emitter *c = &p->arrangement;
+    fprintf(out, "  %-10s ", cfg_word(rd, "emitter", (int)c->kind));
+    if (c->kind == EMITTER_LINE)
+        fprintf(out, "%.10g to %.10g deg; pan %.10g to %.10g deg, up to %.10g deg/s", from_micro(p->fov_min_udeg),
+                from_micro(p->fov_max_udeg), from_micro(p->pan_min_udeg), from_micro(p->pan_max_udeg),
+                from_micro(p->pan_max_udeg_s));
+    if (c->kind == EMITTER_PLANAR)
+        fprintf(out, "%u steps a turn, %u to %u cast, %u ahead, %s", c->steps_per_turn, c->first_step, c->last_step,
+                c->front_step, turn_of(p));
+    if (c->kind == EMITTER_BEAMS)
+        fprintf(out, "%u beams, %.10g ns a sequence, %s", c->n_beams, from_micro(c->firing_fs), turn_of(p));
+    if (c->kind == EMITTER_SPHERE) fprintf(out, "%u pulses a ring, %u rings", p->emitter.steps, p->emitter.rings);
+    if (c->kind == EMITTER_DIRECTIONS) fprintf(out, "%u directions", p->emitter.steps);
+    fprintf(out, "; %.10g to %.10g lines/s\n", from_micro(p->lines_min_uhz), from_micro(p->lines_max_uhz));
+}
+
+void cfg_list_profile(const struct cfg_reader *rd, const struct config_profile *p, FILE *out)
+{
+    fprintf(out, "%s: %s %s\n", p->name, p->maker, p->model);
+    put_emitter(rd, p, out);
+    put_protocols(p, out);
+    put_programs(p, out);
+    for (int grade = 0; cfg_from_names[grade] != NULL; grade++)
+        put_figures(rd, grade, out);
+}

@@ -1,0 +1,431 @@
+/* Schedules of heads that are no line heads, against what their data sheets say: firing times as fractions in
+ * 128-bit integers, steps counted by hand. */
+#include "tests/common/cases.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/schedule.h"
+
+__extension__ typedef unsigned __int128 u128;
+
+#define HZ INT64_C(1000000)
+
+static const int64_t HOUR_NS = INT64_C(3600000000000), DAY_NS = 24 * INT64_C(3600000000000);
+
+/* ---- a VLP-16: 16 firings 2304 ns apart, a sequence each 55296 ns */
+
+static void vlp16(struct emitter *e)
+{
+    struct emitter_beam beam[16];
+    for (uint32_t i = 0; i < 16; i++)
+        beam[i] = (struct emitter_beam){(i % 2 == 0 ? -15 + (int64_t)i : (int64_t)i) * 1000000, 0, 2304 * i};
+    assert_int_equal(emitter_set_beams(e, beam, 16, 55296000, 1, NULL), SH_OK);
+}
+
+static int64_t vlp16_ns(uint64_t k)
+{
+    return (int64_t)(k / 16 * 55296 + k % 16 * 2304);
+}
+
+static struct schedule_spec turning(const struct emitter *e, int64_t lines_uhz)
+{
+    return (struct schedule_spec){.prr_uhz = emitter_rate_uhz(e),
+                                  .lines_uhz = lines_uhz,
+                                  .sweep_udeg = 360000000,
+                                  .line_stop_udeg = 360000000,
+                                  .emitter = e};
+}
+
+static void the_rate_is_no_whole_number(void **state)
+{
+    (void)state;
+    struct emitter e;
+    vlp16(&e);
+    assert_int_equal(e.tick_num, 2304);
+    assert_int_equal(e.tick_den, 1);
+    assert_int_equal(e.sequence_ticks, 24);
+    assert_int_equal(emitter_rate_uhz(&e), 289351851852); /* 16 / 55.296 us is 289351.851 851 851... Hz */
+}
+
+/* Before an hour, a day, and now and then. */
+static uint64_t some_pulse(uint64_t *cases, int i)
+{
+    const uint64_t hour = (uint64_t)HOUR_NS / 55296 * 16;
+    if (i < 100) return (uint64_t)i;
+    return (uint64_t)case_between(cases, 0, (int64_t)(i % 2 == 0 ? hour : 24 * hour)) + (i % 7 == 0 ? hour - 8 : 0);
+}
+
+static void an_hour_and_a_day_are_exact(void **state)
+{
+    (void)state;
+    uint64_t cases = 11;
+    struct emitter e;
+    struct schedule_segment seg;
+    vlp16(&e);
+    const struct schedule_spec spec = turning(&e, 10 * HZ);
+    schedule_start(&seg, &spec);
+    for (int i = 0; i < 20000; i++) {
+        const uint64_t k = some_pulse(&cases, i);
+        const int64_t t_ns = vlp16_ns(k);
+        assert_int_equal(schedule_time_ns(&seg, k), t_ns);
+        assert_int_equal(schedule_pulse_at(&seg, t_ns), k);
+        if (k > 0) assert_int_equal(schedule_pulse_at(&seg, vlp16_ns(k - 1) + 1), k);
+        /* Ten turns a second: the azimuth is t / 100 ms. The share of a turn is good to a rounding of each of its
+         * two terms, which are below 1. */
+        assert_int_equal(schedule_line_of(&seg, k), t_ns / 100000000);
+        assert_true(fabs(schedule_pan_turn(&seg, k) - (double)(t_ns % 100000000) / 1e8) < 0x1p-51);
+        assert_true(schedule_mirror_turn(&seg, k) ==
+                    (k % 2 == 0 ? -15.0 + (double)(k % 16) : (double)(k % 16)) / 360.0);
+    }
+    assert_true(schedule_pulse_at(&seg, DAY_NS) == (uint64_t)DAY_NS / 55296 * 16); /* 86400 s are whole sequences */
+}
+
+/* The sequence of a head whose period is no whole number of nanoseconds. */
+static void rational_sequences_are_exact(void **state)
+{
+    (void)state;
+    static const struct emitter_beam beam[3] = {{0, 0, 0}, {1000000, 0, 7}, {2000000, 0, 400}};
+    uint64_t cases = 12;
+    for (int c = 0; c < 200; c++) {
+        struct emitter e;
+        struct schedule_segment seg;
+        const uint64_t sequence_ps = (uint64_t)case_between(&cases, 400001, 5000000);
+        assert_int_equal(emitter_set_beams(&e, beam, 3, sequence_ps, 1, NULL), SH_OK);
+        const struct schedule_spec spec = turning(&e, 7 * HZ);
+        schedule_start(&seg, &spec);
+        for (int i = 0; i < 50; i++) {
+            const uint64_t k = (uint64_t)case_between(&cases, 0, INT64_C(1) << (i % 40 + 1));
+            const u128 ps = (u128)(k / 3) * sequence_ps + 1000u * (u128)beam[k % 3].offset_ns;
+            assert_int_equal(schedule_time_ns(&seg, k), (int64_t)(ps / 1000));
+            assert_int_equal(schedule_line_of(&seg, k), (uint64_t)(ps * 7 / 1000000000000));
+        }
+    }
+}
+
+/* ---- turns, and changes of their rate */
+
+/* A turn's first pulse is the first that fires at or after the turn's begin, wherever in a sequence. */
+static void turns_take_all_pulses(void **state)
+{
+    (void)state;
+    struct emitter e;
+    struct schedule_segment seg;
+    struct schedule_line line;
+    vlp16(&e);
+    const struct schedule_spec spec = turning(&e, 10 * HZ);
+    schedule_start(&seg, &spec);
+    uint64_t next = 0;
+    int within = 0;
+    for (uint64_t n = 0; n < 2000; n++) {
+        schedule_get_line(&seg, n, &line);
+        assert_int_equal(line.pulse0, next);
+        assert_true(vlp16_ns(line.pulse0) >= (int64_t)n * 100000000);
+        assert_true(n == 0 || vlp16_ns(line.pulse0 - 1) < (int64_t)n * 100000000);
+        assert_int_equal(line.cast0, line.pulse0);
+        assert_int_equal(line.cast_end, line.pulse_end);
+        assert_int_equal(line.begin_ns, vlp16_ns(line.pulse0));
+        assert_int_equal(line.frame, n); /* a turn is a frame */
+        assert_true(line.last_of_frame);
+        within += line.pulse0 % 16 != 0;
+        next = line.pulse_end;
+    }
+    assert_true(within > 500); /* most begin within a sequence */
+}
+
+/* Takes the segment's lines up to pulse k: each pulse once, in order. */
+static void take_lines(const struct schedule_segment *seg, uint64_t *next, uint64_t *cast, uint64_t k)
+{
+    while (*next < k) {
+        struct schedule_line line;
+        schedule_get_line(seg, schedule_line_of(seg, *next), &line);
+        assert_true(line.pulse0 <= *next && *next < line.pulse_end);
+        const uint64_t end = line.pulse_end < k ? line.pulse_end : k;
+        *cast += end - *next;
+        *next = end;
+    }
+}
+
+/* Rates of turns change anywhere, also within a sequence: firing times and the firing's number go on, the azimuth
+ * goes on from where it was, no pulse is lost or doubled. */
+static void turn_rates_change_anywhere(void **state)
+{
+    (void)state;
+    uint64_t cases = 13, next = 0, cast = 0, k = 0;
+    struct emitter e;
+    struct schedule_segment seg;
+    vlp16(&e);
+    struct schedule_spec spec = turning(&e, 10 * HZ);
+    schedule_start(&seg, &spec);
+    /* Turns so far, in parts of a micro-hertz nanosecond, are a sum of whole numbers. */
+    u128 turned = 0;
+    int64_t last_ns = 0;
+    for (int i = 0; i < 3000; i++) {
+        k += (uint64_t)case_between(&cases, 1, 70000);
+        turned += (u128)(uint64_t)spec.lines_uhz * (uint64_t)(vlp16_ns(k) - last_ns);
+        last_ns = vlp16_ns(k);
+        const uint64_t line = schedule_line_of(&seg, k);
+        take_lines(&seg, &next, &cast, k);
+        spec.lines_uhz = case_between(&cases, 5 * HZ, 20 * HZ);
+        schedule_change(&seg, &seg, &spec, k);
+        assert_int_equal(schedule_line_of(&seg, k), line);
+        assert_int_equal(schedule_time_ns(&seg, k), vlp16_ns(k));
+        assert_int_equal(schedule_time_ns(&seg, k + 1000), vlp16_ns(k + 1000));
+        assert_true(schedule_mirror_turn(&seg, k) ==
+                    (k % 2 == 0 ? -15.0 + (double)(k % 16) : (double)(k % 16)) / 360.0);
+        /* Each change cuts the phase to 2^-40 of a turn, so i of them leave it less than i of that behind. */
+        const double within = (double)(turned % 1000000000000000u) / 1e15;
+        double behind = within - schedule_pan_turn(&seg, k);
+        behind -= floor(behind + 0.5);
+        assert_true(behind > -1e-14 && behind < (i + 2) * 0x1p-40);
+    }
+    assert_int_equal(next, k);
+    assert_int_equal(cast, k);
+}
+
+/* What a run says of its pulses is what the schedule says of each. */
+static void runs_say_the_same(void **state)
+{
+    (void)state;
+    uint64_t cases = 14;
+    struct emitter e;
+    struct schedule_segment seg;
+    struct schedule_line line;
+    struct schedule_run run;
+    vlp16(&e);
+    const struct schedule_spec spec = turning(&e, 20 * HZ);
+    schedule_start(&seg, &spec);
+    for (int i = 0; i < 2000; i++) {
+        const uint64_t k = (uint64_t)case_between(&cases, 0, INT64_C(1) << 40);
+        schedule_get_line(&seg, schedule_line_of(&seg, k), &line);
+        schedule_get_run(&seg, &line, k, 1, &run);
+        assert_int_equal(run.t0_ns, vlp16_ns(k));
+        assert_int_equal(run.line_t0_ns, vlp16_ns(line.pulse0));
+        assert_int_equal(run.in_line, k - line.pulse0);
+        assert_ptr_equal(run.firing, e.firing);
+        assert_int_equal(run.firing_at, k % 16);
+        assert_int_equal(run.n_firings, 16);
+        assert_int_equal(run.sequence_ticks, 24);
+        /* 20 turns a second */
+        assert_true(fabs((double)run.r * run.pan_turn_per_r - (double)(vlp16_ns(k) % 50000000) / 5e7) < 0x1p-51);
+    }
+    /* As long a run as fits into so many nanoseconds does fit, wherever it begins. */
+    const uint64_t longest = schedule_longest_run(&seg, 16777215);
+    assert_true(longest > 4700);
+    for (uint64_t k = 0; k < 16; k++)
+        assert_true(vlp16_ns(k + longest - 1) - vlp16_ns(k) <= 16777215);
+    assert_int_equal(schedule_longest_run(&seg, 100), 1);
+}
+
+/* ---- planar heads */
+
+static struct schedule_spec planar(struct emitter *e, uint32_t steps, uint32_t first, uint32_t last, uint32_t front,
+                                   int64_t lines_uhz)
+{
+    emitter_set_planar(e, steps, first, last, front, -1);
+    return (struct schedule_spec){.prr_uhz = lines_uhz * steps,
+                                  .lines_uhz = lines_uhz,
+                                  .fov_min_udeg = emitter_step_udeg(e, 0),
+                                  .sweep_udeg = 360000000,
+                                  .line_start_udeg = emitter_step_udeg(e, first),
+                                  .line_stop_udeg = emitter_step_udeg(e, last),
+                                  .emitter = e};
+}
+
+/* URG-04LX, UTM-30LX, TiM571, whose steps are thirds of a degree, and a turn of a prime number. */
+static void a_turn_has_its_steps(void **state)
+{
+    (void)state;
+    static const uint32_t heads[][4] = {
+        {1024, 44, 725, 384}, {1440, 0, 1080, 540}, {1080, 0, 810, 405}, {7919, 13, 7901, 1000}};
+    for (size_t h = 0; h < 4; h++) {
+        const uint32_t steps = heads[h][0], first = heads[h][1], last = heads[h][2], front = heads[h][3];
+        struct emitter e;
+        struct schedule_segment seg;
+        struct schedule_line line;
+        const struct schedule_spec spec = planar(&e, steps, first, last, front, 15 * HZ);
+        schedule_start(&seg, &spec);
+        for (uint64_t n = 0; n < 100; n += 9) {
+            schedule_get_line(&seg, n, &line);
+            assert_int_equal(line.pulse0, n * steps);
+            assert_int_equal(line.cast0, n * steps + first);
+            assert_int_equal(line.cast_end, n * steps + last + 1);
+            assert_int_equal(line.pulse_end, (n + 1) * steps);
+            assert_int_equal(line.begin_ns, (int64_t)(n * 1000000000 / 15));
+            for (uint32_t s = 0; s < steps; s += 7) { /* counter-clockwise: steps before the front one look right */
+                const uint64_t k = n * steps + s;
+                const double azimuth_turn = ((double)front - (double)s) / steps;
+                assert_int_equal(schedule_time_ns(&seg, k), (int64_t)((u128)k * 1000000000 / (15u * steps)));
+                assert_true(fabs(schedule_pan_turn(&seg, k) - azimuth_turn) < 1e-15);
+                assert_true(schedule_mirror_turn(&seg, k) == 0.0);
+            }
+        }
+    }
+}
+
+/* The window may be narrowed to steps; line angles count from the front on, along the steps. */
+static void a_window_is_whole_steps(void **state)
+{
+    (void)state;
+    struct emitter e;
+    struct schedule_segment seg;
+    struct schedule_line line;
+    struct schedule_spec spec = planar(&e, 1080, 0, 810, 405, 15 * HZ);
+    assert_int_equal(emitter_step_udeg(&e, 404), -333333);
+    assert_int_equal(emitter_step_udeg(&e, 407), 666667);
+    for (uint32_t first = 0; first < 810; first += 31)
+        for (uint32_t last = first + 1; last <= 810; last += 37) {
+            spec.line_start_udeg = emitter_step_udeg(&e, first); /* rounded up or down */
+            spec.line_stop_udeg = emitter_step_udeg(&e, last);
+            schedule_start(&seg, &spec);
+            schedule_get_line(&seg, 3, &line);
+            assert_int_equal(line.cast0, 3 * 1080 + first);
+            assert_int_equal(line.cast_end, 3 * 1080 + last + 1);
+        }
+    spec.line_start_udeg = -200 * INT64_C(1000000); /* no more than the head has */
+    spec.line_stop_udeg = 200 * INT64_C(1000000);
+    schedule_start(&seg, &spec);
+    schedule_get_line(&seg, 0, &line);
+    assert_int_equal(line.cast_end - line.cast0, 811);
+}
+
+/* Another rate in the middle of a turn: the steps go on. */
+static void a_planar_head_keeps_its_steps(void **state)
+{
+    (void)state;
+    uint64_t cases = 15, k = 0, next = 0, pulses = 0;
+    struct emitter e;
+    struct schedule_segment seg;
+    struct schedule_spec spec = planar(&e, 1024, 44, 725, 384, 10 * HZ);
+    schedule_start(&seg, &spec);
+    for (int i = 0; i < 500; i++) {
+        k += (uint64_t)case_between(&cases, 1, 5000);
+        take_lines(&seg, &next, &pulses, k);
+        spec.lines_uhz = case_between(&cases, 9 * HZ, 10 * HZ);
+        spec.prr_uhz = 1024 * spec.lines_uhz;
+        schedule_change(&seg, &seg, &spec, k);
+        assert_int_equal(schedule_line_of(&seg, k), k / 1024);
+        assert_true(fabs(schedule_pan_turn(&seg, k) - (384.0 - (double)(k % 1024)) / 1024) < 1e-15);
+    }
+    assert_int_equal(pulses, k);
+}
+
+/* ---- spheres and lists */
+
+static void a_sphere_goes_from_pole_to_pole(void **state)
+{
+    (void)state;
+    struct emitter e;
+    struct schedule_segment seg;
+    struct schedule_line line;
+    emitter_set_sphere(&e, 30 * INT64_C(1000000)); /* rings at -90, -60 .. 90 deg, of 12 steps */
+    assert_int_equal(e.steps, 12);
+    assert_int_equal(e.rings, 7);
+    struct schedule_spec spec = turning(&e, 4 * HZ);
+    spec.prr_uhz = 48 * HZ;
+    spec.frames = 3;
+    schedule_start(&seg, &spec);
+    assert_int_equal(seg.end_pulse, 3 * 7 * 12);
+    for (uint64_t n = 0; n < 21; n++) {
+        const uint64_t ring = n % 7;
+        schedule_get_line(&seg, n, &line);
+        assert_int_equal(line.frame, n / 7);
+        assert_int_equal(line.last_of_frame, ring == 6);
+        assert_int_equal(line.cast0, 12 * n);
+        assert_int_equal(line.cast_end - line.cast0, ring == 0 || ring == 6 ? 1 : 12);
+        for (uint64_t s = 0; s < 12; s++) {
+            assert_true(fabs(schedule_mirror_turn(&seg, 12 * n + s) - (30.0 * (double)ring - 90.0) / 360) < 1e-15);
+            assert_true(fabs(schedule_pan_turn(&seg, 12 * n + s) - (double)s / 12) < 1e-15);
+        }
+        if (n == 9) { /* in the middle of the second sphere: the frame ends where it would have ended */
+            schedule_change(&seg, &seg, &spec, 12 * n + 5);
+            schedule_get_line(&seg, n, &line);
+            assert_int_equal(line.begin, 12 * n);
+            assert_int_equal(line.cast_before, 5);
+        }
+    }
+}
+
+static void odd_steps_are_rounded(void **state)
+{
+    (void)state;
+    struct emitter e;
+    char text[200];
+    emitter_set_sphere(&e, 3500000); /* 102.86 steps, 51.43 gaps between rings */
+    assert_int_equal(e.steps, 103);
+    assert_int_equal(e.rings, 52);
+    emitter_describe(&e, text, sizeof text);
+    assert_non_null(strstr(text, "3.5 deg, as asked for, does not divide a turn"));
+    emitter_set_sphere(&e, 2000000);
+    emitter_describe(&e, text, sizeof text);
+    assert_null(strstr(text, "does not divide"));
+}
+
+static void a_list_goes_row_by_row(void **state)
+{
+    (void)state;
+    static const struct emitter_firing list[5] = {
+        {0, 0, 0}, {1, 0.125, 0.25}, {2, -0.25, 0}, {3, 0, -0.375}, {4, 0.1, 0.9}};
+    struct emitter e;
+    struct schedule_segment seg;
+    struct schedule_line line;
+    emitter_set_directions(&e, list, 5);
+    struct schedule_spec spec = turning(&e, 3 * HZ);
+    spec.prr_uhz = 15 * HZ;
+    schedule_start(&seg, &spec);
+    for (uint64_t k = 0; k < 300; k++) {
+        schedule_get_line(&seg, schedule_line_of(&seg, k), &line);
+        assert_int_equal(line.pulse0, k / 5 * 5);
+        assert_int_equal(line.cast0, line.pulse0);
+        assert_int_equal(line.cast_end, line.pulse0 + 5);
+        assert_int_equal(schedule_time_ns(&seg, k), (int64_t)(k * 1000000000 / 15));
+        assert_true(schedule_mirror_turn(&seg, k) == list[k % 5].mirror_turn);
+        assert_true(schedule_pan_turn(&seg, k) == list[k % 5].pan_turn);
+    }
+}
+
+/* ---- what is refused */
+
+static void refused(const struct emitter_beam *beam, uint32_t n, uint64_t sequence_ps, const char *says)
+{
+    struct emitter e;
+    struct sh_err err;
+    assert_int_equal(emitter_set_beams(&e, beam, n, sequence_ps, 1, &err), SH_EINPUT);
+    if (strstr(err.text, says) == NULL) fail_msg("%s", err.text);
+}
+
+static void tables_that_do_not_fit_are_refused(void **state)
+{
+    (void)state;
+    static const struct emitter_beam late[2] = {{0, 0, 5}, {0, 0, 9}}, still[2] = {{0, 0, 0}, {0, 0, 0}},
+                                     back[3] = {{0, 0, 0}, {0, 0, 9}, {0, 0, 8}}, good[2] = {{0, 0, 0}, {0, 0, 9}};
+    refused(good, 0, 1000, "0 beams; allowed 1 to 128");
+    refused(good, 129, 1000, "129 beams");
+    refused(late, 2, 100000, "the first beam fires after 5 ns; allowed 0");
+    refused(still, 2, 100000, "beam 2 fires after 0 ns, the one before it after 0 ns; allowed more");
+    refused(back, 3, 100000, "beam 3 fires after 8 ns");
+    refused(good, 2, 9000, "9 ns ends before its last firing; allowed more than 9 ns");
+    struct emitter e;
+    assert_int_equal(emitter_set_beams(&e, good, 2, 9001, 1, NULL), SH_OK);
+    assert_int_equal(e.tick_den, 1000);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_rate_is_no_whole_number),
+        cmocka_unit_test(an_hour_and_a_day_are_exact),
+        cmocka_unit_test(rational_sequences_are_exact),
+        cmocka_unit_test(turns_take_all_pulses),
+        cmocka_unit_test(turn_rates_change_anywhere),
+        cmocka_unit_test(runs_say_the_same),
+        cmocka_unit_test(a_turn_has_its_steps),
+        cmocka_unit_test(a_window_is_whole_steps),
+        cmocka_unit_test(a_planar_head_keeps_its_steps),
+        cmocka_unit_test(a_sphere_goes_from_pole_to_pole),
+        cmocka_unit_test(odd_steps_are_rounded),
+        cmocka_unit_test(a_list_goes_row_by_row),
+        cmocka_unit_test(tables_that_do_not_fit_are_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

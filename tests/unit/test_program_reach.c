@@ -1,0 +1,279 @@
+/* Programs of a head, by command: HEAD:PRR within a scan changes reach, echoes and smallest range as the table
+ * of the head says, from the pulse on at which the rate changes. The tables below were typed from the profiles'
+ * sources, not read from the program. */
+#include <math.h>
+
+#include "tests/unit/device_rig.h"
+
+/* The scene: a strip of a cylinder about the mirror's axis, a metre away, of facets of 0.5 deg. So each pulse of
+ * a line meets it head on to 0.25 deg, and its range is that of the cylinder less 1e-5 of it at most. */
+enum { FACETS = 220 };
+static const double FACET_DEG = 0.5, FIRST_DEG = -42.0;
+
+static int write_cylinder(void)
+{
+    char path[96];
+    snprintf(path, sizeof path, "%s/strip.obj", folder);
+    FILE *f = fopen(path, "w");
+    if (f == NULL) return -1;
+    for (int i = 0; i <= FACETS; i++) {
+        const double at = (FIRST_DEG + FACET_DEG * i) * M_PI / 180.0;
+        for (int side = -1; side <= 1; side += 2)
+            fprintf(f, "v %.12g %.12g %.12g\n", 0.02 * side, cos(at), sin(at));
+    }
+    for (int i = 0; i < FACETS; i++)
+        fprintf(f, "f %d %d %d %d\n", 2 * i + 1, 2 * i + 2, 2 * i + 4, 2 * i + 3);
+    return fclose(f);
+}
+
+static int make_strip(void **state)
+{
+    char path[96];
+    if (make_folder(state) != 0 || write_cylinder() != 0) return -1;
+    snprintf(path, sizeof path, "%s/run.yaml", folder);
+    FILE *f = fopen(path, "w");
+    if (f == NULL) return -1;
+    fputs("head: {profile: riegl-vz400i, lines_hz: 50, pan_deg_s: 0, frames: 0}\n"
+          "scene: {meshes: [{file: strip.obj, up: z, scale: 1}]}\n"
+          "stations: [{position_m: [0, 0, 0]}]\nbeam: {mode: single}\n"
+          "signal: {model: on}\nsurfaces: [{reflectance: 0.9}]\n",
+          f);
+    return fclose(f);
+}
+
+static int remove_strip(void **state)
+{
+    char path[96];
+    snprintf(path, sizeof path, "%s/strip.obj", folder);
+    unlink(path);
+    return remove_folder(state);
+}
+
+struct program {
+    int prr_hz, echoes;
+    double reach_90_m, reach_20_m, nearest_m;
+};
+static const struct head {
+    const char *name;
+    int n;
+    struct program program[5];
+} heads[] = {
+    {"riegl-vz400i",
+     4,
+     {{100000, 15, 800, 400, 1.5},
+      {300000, 15, 480, 230, 1.2},
+      {600000, 8, 350, 166, 0.5},
+      {1200000, 4, 250, 120, 0.5}}},
+    {"riegl-vz600i",
+     4,
+     {{140000, 15, 1000, 500, 0.5},
+      {600000, 15, 480, 235, 0.5},
+      {1200000, 10, 340, 165, 0.5},
+      {2200000, 5, 250, 120, 0.5}}},
+    {"riegl-vz2000i",
+     5,
+     {{50000, 15, 2500, 1300, 1.5},
+      {100000, 15, 1800, 920, 1.5},
+      {300000, 15, 1050, 520, 1.5},
+      {600000, 8, 750, 365, 1.5},
+      {1200000, 4, 530, 255, 1.5}}},
+};
+enum { HEADS = sizeof heads / sizeof *heads };
+
+static struct rig *open_at(const char *head, double range_m, double reflectance, const char *more)
+{
+    char set[5][64];
+    const char *const sets[] = {set[0], set[1], set[2], more};
+    snprintf(set[0], sizeof set[0], "head.profile=%s", head);
+    snprintf(set[1], sizeof set[1], "scene.meshes[0].scale=%.12g", range_m);
+    snprintf(set[2], sizeof set[2], "surfaces[0].reflectance=%.12g", reflectance);
+    struct rig *rig = rig_open(NULL, sets, more != NULL ? 4 : 3);
+    rig_go_to(rig, 300);
+    rig_tell(rig, "SCAN:START", rig->next);
+    while (!rig->work.scanning)
+        assert_true(rig_claim(rig));
+    return rig;
+}
+
+static void tell_rate(struct rig *rig, int prr_hz)
+{
+    char line[32];
+    snprintf(line, sizeof line, "HEAD:PRR %d", prr_hz);
+    rig_tell(rig, line, rig->next);
+}
+
+struct seen {
+    uint64_t shots, echoes;
+};
+
+/* Adds up the points of the last tick claimed, one for each pulse. */
+static void add_tick(struct rig *rig, struct seen *seen)
+{
+    const struct ring_tick *tick = rig_fill(rig);
+    for (uint32_t at = 0; at < tick->len; at += (uint32_t)native_frame_len(tick->bytes + at)) {
+        const uint8_t *frame = tick->bytes + at, *payload = frame + NATIVE_HEADER_LEN;
+        struct native_points points;
+        if (frame[1] != NATIVE_POINTS) continue;
+        assert_int_equal(native_decode_points(payload, native_frame_len(frame) - NATIVE_HEADER_LEN, &points), 0);
+        assert_int_equal(points.n_points, points.n_pulses);
+        for (uint32_t i = 0; i < points.n_points; i++) {
+            struct native_point point;
+            native_decode_point(payload, i, &point);
+            seen->shots++;
+            seen->echoes += point.echo != 0;
+        }
+    }
+}
+
+/* By hand from core/detect.h: the reflectance that is just seen, through the two reaches of the program, and the
+ * share of pulses that see a target: noise of 1/8 of the threshold (threshold_snr). */
+static double expected_share(const struct program *p, double reflectance, double range_m)
+{
+    if (range_m > p->reach_90_m) return 0.0; /* nothing is seen beyond it */
+    const double slope = (log(0.9 / 0.2) - 2.0 * log(p->reach_90_m / p->reach_20_m)) / (p->reach_90_m - p->reach_20_m);
+    const double least = 0.9 * pow(range_m / p->reach_90_m, 2) * exp(slope * (range_m - p->reach_90_m));
+    return 0.5 * erfc(-8.0 * (reflectance / least - 1.0) / M_SQRT2);
+}
+
+/* 2 % before the reach and 2 % behind it, of targets of 90 and 20 %. Each rate is set by command within the scan,
+ * which began at another one. At least 20,000 pulses each: 4.75 standard errors are 0.017 of p = 1/2; 104
+ * comparisons, false alarm 2e-4 in all. Facets and cosines move the range by 1e-5 of it, and so the share by
+ * 1e-4. */
+static void targets_vanish_at_the_reach_of_each_program(void **state)
+{
+    (void)state;
+    for (int k = 0; k < 4 * 13; k++) {
+        static const double where[] = {0.98, 1.02};
+        int i = k / 4, h = 0;
+        for (; i >= heads[h].n; h++)
+            i -= heads[h].n;
+        const struct program *p = &heads[h].program[i];
+        const double reflectance = k & 1 ? 0.2 : 0.9,
+                     range_m = where[k >> 1 & 1] * (k & 1 ? p->reach_20_m : p->reach_90_m);
+        struct rig *rig = open_at(heads[h].name, range_m, reflectance, NULL);
+        struct seen seen = {0};
+        tell_rate(rig, heads[h].program[(i + 1) % heads[h].n].prr_hz);
+        assert_true(rig_claim(rig));
+        tell_rate(rig, p->prr_hz);
+        while (seen.shots < 20000) {
+            assert_true(rig_claim(rig));
+            add_tick(rig, &seen);
+        }
+        const double share = (double)seen.echoes / (double)seen.shots,
+                     expected = expected_share(p, reflectance, range_m);
+        if (fabs(share - expected) > 4.75 * sqrt(0.25 / (double)seen.shots) + 1e-4)
+            fail_msg("%s at %d Hz, %g at %g m: %.4f of the pulses see it, expected %.4f", heads[h].name, p->prr_hz,
+                     reflectance, range_m, share, expected);
+        rig_close(rig);
+    }
+    /* The cases differ: half of the pulses is not what all of them expect. */
+    assert_true(expected_share(&heads[0].program[0], 0.9, 784.0) > 0.6);
+    assert_true(expected_share(&heads[0].program[0], 0.2, 408.0) < 0.4);
+}
+
+/* Signals without noise: a target between the reaches of two rates is seen by each pulse of one and by none of the
+ * other, from the very pulse on at which the command took effect. */
+static void a_rate_changes_the_reach_at_its_pulse(void **state)
+{
+    (void)state;
+    struct rig *rig = open_at("riegl-vz400i", 300.0, 0.9, "signal.detection=sharp");
+    static const struct {
+        int prr_hz, seen;
+    } turns[] = {{600000, 1}, {1200000, 0}, {100000, 1}, {1200000, 0}, {300000, 1}};
+    for (size_t i = 0; i < sizeof turns / sizeof *turns; i++) {
+        struct seen seen = {0};
+        tell_rate(rig, turns[i].prr_hz);
+        do {
+            assert_true(rig_claim(rig));
+            add_tick(rig, &seen);
+        } while (seen.shots < 3000);
+        assert_true(rig->work.segment.spec.prr_uhz == turns[i].prr_hz * INT64_C(1000000));
+        assert_int_equal(seen.echoes, turns[i].seen ? seen.shots : 0);
+    }
+    rig_close(rig);
+}
+
+/* The descriptor that follows a change says what the new rate has. */
+static void the_descriptor_follows(void **state)
+{
+    (void)state;
+    for (int h = 0; h < HEADS; h++) {
+        struct rig *rig = open_at(heads[h].name, 100.0, 0.9, NULL);
+        for (int i = 0; i < 2 * heads[h].n; i++) {
+            const struct program *p = &heads[h].program[i % heads[h].n];
+            tell_rate(rig, p->prr_hz);
+            do
+                assert_true(rig_claim(rig));
+            while (!rig->work.describe);
+            const struct native_descriptor *d = &rig->work.descriptor;
+            assert_true(d->prr_uhz == (uint64_t)p->prr_hz * 1000000);
+            assert_int_equal(d->max_echoes, p->echoes);
+            assert_true(d->range_max_m == p->reach_90_m && d->range_min_m == p->nearest_m);
+        }
+        rig_close(rig);
+    }
+}
+
+/* Nearer than the smallest range of one rate and not of the other; here no signal is modelled. */
+static void a_rate_changes_the_smallest_range(void **state)
+{
+    (void)state;
+    struct rig *rig = open_at("riegl-vz400i", 1.3, 0.9, "signal.model=off");
+    for (int i = 0; i < 4; i++) {
+        static const int rates[] = {100000, 300000, 600000, 100000};
+        struct seen seen = {0};
+        tell_rate(rig, rates[i]);
+        do {
+            assert_true(rig_claim(rig));
+            add_tick(rig, &seen);
+        } while (seen.shots < 1000);
+        assert_int_equal(seen.echoes, rates[i] == 100000 ? 0 : seen.shots);
+    }
+    rig_close(rig);
+}
+
+static void a_rate_between_them_is_refused(void **state)
+{
+    (void)state;
+    struct rig *rig = open_at("riegl-vz400i", 100.0, 0.9, NULL);
+    struct command_result result;
+    tell_rate(rig, 300000);
+    device_command(rig->device, 1, "HEAD:PRR 500000", rig->next, &result);
+    assert_string_equal(result.reply, "ERR -222,\"Data out of range; HEAD:PRR 500000, allowed 100000, 300000, 600000, "
+                                      "1200000 Hz\"");
+    assert_string_equal(rig_tell(rig, "HEAD:PRR?", rig->next), "300000");
+    assert_true(rig_claim(rig) && rig->work.segment.spec.prr_uhz == INT64_C(300000000000));
+    rig_close(rig);
+}
+
+/* A journal is replayed tick by tick: the same commands give the same echoes. */
+static void echoes_are_those_of_the_pulse_rate_in_force(void **state)
+{
+    (void)state;
+    struct rig *one = open_at("riegl-vz400i", 230.0, 0.2, NULL), *two = open_at("riegl-vz400i", 230.0, 0.2, NULL);
+    for (int i = 0; i < 40; i++) {
+        struct seen a = {0}, b = {0};
+        if (i % 8 == 3)
+            tell_rate(one, heads[0].program[i / 8 % 4].prr_hz), tell_rate(two, heads[0].program[i / 8 % 4].prr_hz);
+        assert_true(rig_claim(one) && rig_claim(two));
+        add_tick(one, &a);
+        add_tick(two, &b);
+        assert_true(a.shots == b.shots && a.echoes == b.echoes);
+    }
+    rig_close(one);
+    rig_close(two);
+}
+
+int main(void)
+{
+    setenv("SCANHEAD_HEADS", "config/heads", 1);
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(targets_vanish_at_the_reach_of_each_program),
+        cmocka_unit_test(a_rate_changes_the_reach_at_its_pulse),
+        cmocka_unit_test(the_descriptor_follows),
+        cmocka_unit_test(a_rate_changes_the_smallest_range),
+        cmocka_unit_test(a_rate_between_them_is_refused),
+        cmocka_unit_test(echoes_are_those_of_the_pulse_rate_in_force),
+    };
+    return cmocka_run_group_tests(tests, make_strip, remove_strip);
+}
