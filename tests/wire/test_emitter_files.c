@@ -1,5 +1,8 @@
 /* What becomes of heads that are no line heads: files, plan, map and report. */
+#include "tests/wire/emitter_rig.h"
 #include "tests/wire/room.h"
+
+#include "drivers/protocol/native.h"
 
 static const char *write_config(struct wire *wire, const char *profile, double prr_hz, double lines_hz, unsigned frames)
 {
@@ -64,12 +67,54 @@ static void other_formats_take_them(void **state)
     for (size_t i = 0; i < sizeof name / sizeof name[0]; i++)
         assert_int_equal(record_as(wire, config, name[i]), 0);
     assert_said(wire, "a.ply", "element vertex 28939\n");
-    const char *const report[] = {"report", config, wire_path(wire, "a.ply"), "--quiet", NULL};
+    const char *const report[] = {"report", config, wire_path(wire, "a.ply"), NULL};
     assert_int_equal(run(wire, report), 0);
     assert_said(wire, "out", "points     28939\n");
     assert_said(wire, "out", "beyond     0 farther than 0.001 m\n");
     const char *const map[] = {"map", config, "-o", wire_path(wire, "a.png"), "--quiet", NULL};
     assert_int_equal(run(wire, map), 0);
+}
+
+/* b.shs: a.shs without its line ends, as if they were lost. */
+static void lose_line_ends(struct wire *wire)
+{
+    size_t len, kept = 0;
+    char *bytes = wire_read(wire_path(wire, "a.shs"), &len);
+    for (size_t at = 0; at < len;) {
+        const uint8_t *frame = (const uint8_t *)bytes + at;
+        const size_t size = native_frame_len(frame);
+        if (frame[1] != NATIVE_LINE_END) {
+            memmove(bytes + kept, frame, size);
+            kept += size;
+        }
+        at += size;
+    }
+    assert_true(kept < len);
+    wire_write(wire, "b.shs", bytes, kept);
+    free(bytes);
+}
+
+/* E57 has the number of each shot in its line. Without the line ends, it follows from the exact firing times. */
+static void shots_are_counted_without_line_ends(void **state)
+{
+    struct wire *wire = *state;
+    size_t n[2];
+    char source[128];
+    emitter_write_profile(wire, "emitter: beams\nfiring_ns: {value: 30000, from: assumed}\nbeams:\n"
+                                "  - {elevation_deg: -9, offset_ns: 0, from: assumed}\n"
+                                "  - {elevation_deg: 0, offset_ns: 100, from: assumed}\n"
+                                "  - {elevation_deg: 9, offset_ns: 250, from: assumed}\n");
+    assert_int_equal(record_as(wire, write_config(wire, "own.yaml", 100000, 17.3, 3), "a.shs"), 0);
+    lose_line_ends(wire);
+    for (int i = 0; i < 2; i++) {
+        snprintf(source, sizeof source, "%s", wire_path(wire, i == 0 ? "a.shs" : "b.shs"));
+        assert_int_equal(record_as(wire, source, i == 0 ? "a.e57" : "b.e57"), i); /* the second one is not complete */
+    }
+    char *with = wire_read(wire_path(wire, "a.e57"), &n[0]), *without = wire_read(wire_path(wire, "b.e57"), &n[1]);
+    assert_int_equal(n[0], n[1]);
+    assert_memory_equal(with, without, n[0]);
+    free(with);
+    free(without);
 }
 
 static void plan_and_check_name_the_emitter(void **state)
@@ -93,6 +138,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(grids_of_planar_heads, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(beams_have_no_grid, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(other_formats_take_them, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(shots_are_counted_without_line_ends, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(plan_and_check_name_the_emitter, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
