@@ -381,7 +381,7 @@ static void garbage_is_skipped_and_counted(void **state)
         {1, 1, "\2"},                                 /* the mark twice */
         {3, 3, "\2\2x"},                              /* and thrice */
         {12, 12, "\2\2\2\2\xff\xff\xff\xff\1\1\1\1"}, /* a length that can't be */
-        {8, 8, "\2\2\2\2\0\0\0\0"},                   /* of nothing */
+        {9, 9, "\2\2\2\2\0\0\0\0\0"},                 /* of nothing */
         {19, 19, "\2\2\2\2\0\0\0\x0asRN ODpwrc\1"},   /* a wrong check byte */
         {8, 8, "\2\2\2\2\0\0\0\x05"},                 /* half a telegram, and the next one inside what it claims */
     };
