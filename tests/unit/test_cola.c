@@ -291,6 +291,7 @@ static void a_geometry_that_the_head_has_not_is_refused(void **state)
     cola_expect("sMN mLMPsetscancfg 9C4 1 9C4 FFF92230 225510", "sAN mLMPsetscancfg 0" HAS);
     cola_expect("sMN mLMPsetscancfg +5000 +1 +2500 -450000 +2250000", "sAN mLMPsetscancfg 1" HAS);
     cola_expect("sMN mLMPsetscancfg +2500 +1 +5000 -450000 +2250000", "sAN mLMPsetscancfg 2" HAS);
+    cola_expect("sMN mLMPsetscancfg +2500 +1 +5000 0 +1800000", "sAN mLMPsetscancfg 3" HAS);
     cola_expect("sMN mLMPsetscancfg +2500 +1 +2500 0 +1800000", "sAN mLMPsetscancfg 4" HAS);
     cola_expect("sMN mLMPsetscancfg +2500 +2 +2500 -450000 +2250000", "sAN mLMPsetscancfg 5" HAS);
     cola_expect("sRN LMPscancfg", "sRA LMPscancfg" HAS);
