@@ -1,8 +1,9 @@
-/* Requests of HTTP/1.0 and 1.1 out of a stream of bytes: what a small device needs of RFC 9112, with bounded memory.
+/* Requests of HTTP/1.0 and 1.1 out of a stream of bytes: what a small device needs of RFC 9112, with bounded
+ * memory.
  *
- * Bytes go in in pieces of any size. What comes out is one request after the other, or the status that a broken one is
- * answered with; after such a one the connection can't go on. Bodies have a Content-Length; chunked ones are refused.
- * Pure; allocates nothing; any thread. */
+ * Bytes go in in pieces of any size. What comes out is one request after the other, or the status that a
+ * broken one is answered with; after such a one the connection can't go on. Bodies have a Content-Length;
+ * chunked ones are refused. Pure; allocates nothing; any thread. */
 #ifndef DRIVERS_PROTOCOL_HTTP_REQUEST_H
 #define DRIVERS_PROTOCOL_HTTP_REQUEST_H
 
@@ -41,9 +42,11 @@ struct http_reader {
 };
 
 void http_reader_init(struct http_reader *r);
-/* Takes what there is room for, and returns how much. After HTTP_MORE or HTTP_CONTINUE that is at least one byte. */
+/* Takes what there is room for, and returns how much. After HTTP_MORE or HTTP_CONTINUE that is at least one
+ * byte. */
 size_t http_reader_add(struct http_reader *r, const uint8_t *bytes, size_t len);
-/* An http_result. HTTP_REQUEST: r->request holds until http_reader_drop, which has to come before the next call. */
+/* An http_result. HTTP_REQUEST: r->request holds until http_reader_drop, which has to come before the next
+ * call. */
 int http_reader_next(struct http_reader *r);
 void http_reader_drop(struct http_reader *r);
 

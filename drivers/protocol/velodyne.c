@@ -6,8 +6,9 @@
 
 #include "drivers/protocol/native.h"
 
-/* A data packet, little-endian. Single return: a block is two firing sequences. Dual: a pair of blocks is the same two
- * sequences, the last returns in the even one, the strongest (or second strongest) in the odd one.
+/* A data packet, little-endian. Single return: a block is two firing sequences. Dual: a pair of blocks is
+ * the same two sequences, the last returns in the even one, the strongest (or second strongest) in the odd
+ * one.
  *
  *      0 +----------------------------------------------+
  *        | block 0: u16 0xeeff  u16 azimuth 0.01 deg    |
@@ -146,8 +147,8 @@ static void put_entry(struct velodyne *v, uint8_t *at, const struct native_point
     at[2] = refl;
 }
 
-/* What came back, in 0.01 dB, up to a constant of the head: by reflectance and by the square of the range. Without
- * modelled reflectances all are alike, and the nearest is the strongest. */
+/* What came back, in 0.01 dB, up to a constant of the head: by reflectance and by the square of the range.
+ * Without modelled reflectances all are alike, and the nearest is the strongest. */
 static double strength_cdb(const struct native_point *p)
 {
     const double refl_cdb = p->refl_cdb == (int16_t)LINE_REFL_NONE ? 0.0 : p->refl_cdb;

@@ -1,5 +1,5 @@
-/* Velodyne VLP-16 as protocols: data packets, position packets, settings over HTTP. VELODYNE.md has the layouts, what
- * they are taken from, and what the real device does that this one doesn't.
+/* Velodyne VLP-16 as protocols: data packets, position packets, settings over HTTP. VELODYNE.md has the
+ * layouts, what they are taken from, and what the real device does that this one doesn't.
  *
  * Here is what the three share. Pure; any thread; real-time safe but for what HTTP asks of the device. */
 #ifndef DRIVERS_PROTOCOL_VELODYNE_H
@@ -25,12 +25,13 @@ enum {
 
 enum velodyne_return_mode { VELODYNE_STRONGEST = 0x37, VELODYNE_LAST = 0x38, VELODYNE_DUAL = 0x39 };
 
-/* Microseconds since the top of the hour at a device time, rounded down, 0..3599999999: of UTC, or where that is not
- * known of the time since power-up. */
+/* Microseconds since the top of the hour at a device time, rounded down, 0..3599999999: of UTC, or where
+ * that is not known of the time since power-up. */
 uint32_t velodyne_hour_us(const struct protocol_host *host, int64_t t_ns);
 
-/* Calibrated reflectivity of a reflectance in 0.01 dB (struct native_point): 0..100 for 0..100 % of a white Lambertian
- * target; above it 101..255 in steps of 0.2 dB, ended by 255 from 30.8 dB on. 0 where it is not modelled. */
+/* Calibrated reflectivity of a reflectance in 0.01 dB (struct native_point): 0..100 for 0..100 % of a white
+ * Lambertian target; above it 101..255 in steps of 0.2 dB, ended by 255 from 30.8 dB on. 0 where it is not
+ * modelled. */
 uint8_t velodyne_reflectivity(int refl_cdb);
 
 #endif

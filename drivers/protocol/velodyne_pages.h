@@ -1,5 +1,5 @@
-/* What a VLP-16 shows of itself over HTTP: documents of JSON with the fields that known clients read. VELODYNE.md has
- * them. Values of the head are asked for by native queries; what isn't modelled is constant. */
+/* What a VLP-16 shows of itself over HTTP: documents of JSON with the fields that known clients read.
+ * VELODYNE.md has them. Values of the head are asked for by native queries; what isn't modelled is constant. */
 #ifndef DRIVERS_PROTOCOL_VELODYNE_PAGES_H
 #define DRIVERS_PROTOCOL_VELODYNE_PAGES_H
 
@@ -8,7 +8,8 @@
 
 #include "drivers/protocol/protocol.h"
 
-/* The document of a path, at device time t_ns, ended by a NUL: its length; or 0 where there is none. cap 2048. */
+/* The document of a path, at device time t_ns, ended by a NUL: its length; or 0 where there is none. cap
+ * 2048. */
 size_t velodyne_page(const struct protocol_spec *spec, const char *path, int64_t t_ns, char *dst, size_t cap);
 /* Whether a path has one. */
 int velodyne_has_page(const char *path);

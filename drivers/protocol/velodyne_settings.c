@@ -20,7 +20,7 @@ static int refuse(const struct posted *p, int status, const char *why)
     return status;
 }
 
-/* Its reply is "OK", or the error that the client gets: another session has control, out of range, not now. */
+/* 200, or the status for what the head refuses: another session has control, out of range, not now. */
 static int command(const struct posted *p, const char *line)
 {
     char reply[MAX_REPLY];
@@ -85,7 +85,8 @@ static int set_returns(const struct posted *p, const char *value, int apply)
     return refuse(p, 400, "returns: Strongest, Last or Dual");
 }
 
-/* Turns per second as the head takes them, in steps of 1e-6 Hz. Of what does not divide by 3, so is the error. */
+/* Turns per second as the head takes them, in steps of 1e-6 Hz. Of what does not divide by 3, so is the
+ * error. */
 static int set_rpm(const struct posted *p, const char *value, int apply)
 {
     char line[40];
@@ -225,7 +226,8 @@ static int hex_digit(char c)
     return -1;
 }
 
-/* In place, and puts a NUL after it: there is room for one after len characters. 0, or -1: not a form's text. */
+/* In place, and puts a NUL after it: there is room for one after len characters. 0, or -1: not a form's
+ * text. */
 static int decode(char *s, size_t len)
 {
     char *to = s;

@@ -1,8 +1,8 @@
-/* The settings of a VLP-16 as its clients post them: forms go in, native commands to the device and a status of HTTP
- * come out. And what of the settings can be read. VELODYNE.md has all keys.
+/* The settings of a VLP-16 as its clients post them: forms go in, native commands to the device and a status
+ * of HTTP come out. And what of the settings can be read. VELODYNE.md has all keys.
  *
- * What a form says is checked as a whole before the first command. Then its commands are carried out in order; the
- * first one that the head refuses ends it. */
+ * What a form says is checked as a whole before the first command. Then its commands are carried out in
+ * order; the first one that the head refuses ends it. */
 #ifndef DRIVERS_PROTOCOL_VELODYNE_SETTINGS_H
 #define DRIVERS_PROTOCOL_VELODYNE_SETTINGS_H
 

@@ -84,8 +84,8 @@ static void test_bytes_of_a_packet(void **state)
     assert_int_equal(rig.count[PROTOCOL_UNITS_LOST] + rig.count[PROTOCOL_POINTS_LOST], 0);
 }
 
-/* A client, from the published layout alone: all blocks of all packets in a row; an entry's azimuth lies between its
- * block's and the next one's by its time. Up to the block before the last. */
+/* A client, from the published layout alone: all blocks of all packets in a row; an entry's azimuth lies
+ * between its block's and the next one's by its time. Up to the block before the last. */
 struct seen {
     double range_m, elevation_deg, azimuth_deg;
     int reflectivity;
@@ -110,7 +110,8 @@ static uint32_t parse(struct seen *seen)
     return n;
 }
 
-/* A turn and some more, in frames of all sizes, through 0 degrees: half a unit of range, half a hundredth of a degree. */
+/* A turn and some more, in frames of all sizes, through 0 degrees: half a unit of range, half a hundredth of
+ * a degree. */
 static void test_client_gets_what_was_measured(void **state)
 {
     (void)state;
@@ -158,8 +159,8 @@ static void test_azimuth_wraps(void **state)
     }
 }
 
-/* t(block, entry) = 55.296 (2 block + entry div 16) + 2.304 (entry mod 16) us after the packet's time stamp, which counts
- * from the top of the hour: exactly, over an hour and beyond its end. */
+/* t(block, entry) = 55.296 (2 block + entry div 16) + 2.304 (entry mod 16) us after the packet's time stamp,
+ * which counts from the top of the hour: exactly, over an hour and beyond its end. */
 static void test_times_over_an_hour(void **state)
 {
     (void)state;

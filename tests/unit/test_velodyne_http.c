@@ -458,8 +458,8 @@ static void test_nothing_is_reflected(void **state)
     }
 }
 
-/* Garbage, and whole requests with some bytes wrong, in pieces of all sizes: every answer is one, nothing is written past
- * the buffers (sanitizers), and a new session works. */
+/* Garbage, and whole requests with some bytes wrong, in pieces of all sizes: every answer is one, nothing is
+ * written past the buffers (sanitizers), and a new session works. */
 static void test_garbage(void **state)
 {
     (void)state;

@@ -106,7 +106,8 @@ static void test_fields(void **state)
     assert_string_equal(text + sizeof rmc - 1, end);
 }
 
-/* One for 14 data packets of a single return: 18.579456 ms, from device time 0 on, whenever the session was opened. */
+/* One for 14 data packets of a single return: 18.579456 ms, from device time 0 on, whenever the session was
+ * opened. */
 static void test_rate(void **state)
 {
     (void)state;

@@ -64,8 +64,8 @@ static uint64_t lost(void)
     return rig.count[PROTOCOL_UNITS_LOST];
 }
 
-/* The even block of a pair has the last return, the odd one the strongest, or where that is the last the second
- * strongest; a single return stands in both (user manual, 9.3.2). */
+/* The even block of a pair has the last return, the odd one the strongest, or where that is the last the
+ * second strongest; a single return stands in both (user manual, 9.3.2). */
 static void test_dual_returns(void **state)
 {
     (void)state;
@@ -80,7 +80,8 @@ static void test_dual_returns(void **state)
         {{2, {10.0, 20.0}, {-300, -1000}, {0}}, 10000, 5000, 10, 50},
         /* the last the stronger one: 7 dB more reflectance against 6 dB of range */
         {{2, {10.0, 20.0}, {-1000, -300}, {0}}, 10000, 5000, 50, 10},
-        /* 5 dB of reflectance don't make up for 6 dB of range, but three do where the range is the same within a metre */
+        /* 5 dB of reflectance don't make up for 6 dB of range, but three do where the range is the same
+         * within a metre */
         {{3, {10.0, 20.0, 21.0}, {-1000, -700, -1000}, {0}}, 10500, 5000, 10, 10},
         {{3, {10.0, 20.0, 21.0}, {-2000, -700, -1000}, {0}}, 10500, 10000, 10, 20},
         {{3, {10.0, 11.0, 21.0}, {-1000, -700, 0}, {0}}, 10500, 5500, 100, 20},
@@ -108,7 +109,8 @@ static void test_dual_returns(void **state)
     }
 }
 
-/* Ranges are 2 mm a unit, rounded. Where there is no number for one, the entry says no return, and it is counted. */
+/* Ranges are 2 mm a unit, rounded. Where there is no number for one, the entry says no return, and it is
+ * counted. */
 static void test_range_units(void **state)
 {
     (void)state;
@@ -156,7 +158,8 @@ static void test_reflectivities(void **state)
         assert_int_equal(reflectivity(0, i / 32, i % 32), velodyne_reflectivity(-3000 + 17 * i));
 }
 
-/* After lost pulses the next packet begins with the next firing sequence; what was begun is not sent, and counted. */
+/* After lost pulses the next packet begins with the next firing sequence; what was begun is not sent, and
+ * counted. */
 static void test_lost_pulses(void **state)
 {
     (void)state;
@@ -269,7 +272,8 @@ static void test_rpm_changes(void **state)
     }
 }
 
-/* A head that this device can't be: other beams, a line head, first echoes. Nothing is sent; packets are counted. */
+/* A head that this device can't be: other beams, a line head, first echoes. Nothing is sent; packets are
+ * counted. */
 static void test_other_heads(void **state)
 {
     (void)state;
@@ -295,7 +299,8 @@ static void test_line_head(void **state)
     assert_int_equal(lost(), 1);
 }
 
-/* The model byte by the elevations: those of the Puck Hi-Res in the order of its table; what is neither reads VLP-16. */
+/* The model byte by the elevations: those of the Puck Hi-Res in the order of its table; what is neither
+ * reads VLP-16. */
 static void test_models(void **state)
 {
     (void)state;
