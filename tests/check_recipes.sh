@@ -6,6 +6,7 @@
 # The word after a fenced block's language says what is done with it:
 #
 #   sh run                      run by `sh -eu`; it must exit 0 within the time limit
+#   sh run with PROGRAM         the same, where PROGRAM is installed; else skipped
 #   sh not run: REASON          not run; REASON is for the reader: root, a board, another machine, minutes
 #   c as build/NAME.c           saved under that name, and compiled against the library's header
 #   yaml as build/NAME.yaml     saved under that name, and checked by `scanhead check`
@@ -86,6 +87,7 @@ do_block() {
     case $language/$mark in
     */"not run: "?*) return 0 ;;
     sh/run) within sh -eu "$1" ;;
+    sh/"run with "?*) command -v "${mark#run with }" >/dev/null && within sh -eu "$1" ;;
     c/"as build/"?*) save "$1" "${mark#as }" && within cc -Wall -Wextra -Werror -fsyntax-only -Idrivers/host "${mark#as }" ;;
     yaml/"as build/"?*) save "$1" "${mark#as }" && within build/scanhead check "${mark#as }" ;;
     sh/* | bash/* | shell/* | console/* | c/* | yaml/* | */run | */not*) return 1 ;;
@@ -108,6 +110,9 @@ check_document() { # document, as it is called
     while read -r number line info <&3; do
         if [ "$number" = - ]; then
             unmarked+="$2:$line: $info"$'\n'
+        elif [[ $info == *' run with '* ]] && ! command -v "${info#* run with }" >/dev/null; then
+            n=$((n + 1))
+            echo "ok $n - $2:$line # SKIP ${info#* run with } is not installed"
         elif [[ $info == *' '* ]]; then
             do_block "$work/blocks/$number" "$info"
             report $? "$2:$line: $info" "$(tr -d "\0" <"$work/out")"
@@ -134,6 +139,9 @@ expect() {
 limit_s=2
 expect 0 'a good document' '```sh run' 'echo 1 >build/a' '```' '```sh run' 'grep 1 build/a' '```' '```sh not run: root' 'false' '```' \
     '```c as build/a.c' 'int main(void) { return 0; }' '```' '```sh run' 'cc build/a.c -o build/a; build/a' '```' '```text' 'x' '```'
+expect 0 'a program that is there' '```sh run with true' 'true' '```'
+expect 0 'a program that is not there' '```sh run with no-such-program' 'false' '```'
+expect 1 'a program that is there, and a command that fails' '```sh run with true' 'false' '```'
 expect 1 'a command that fails' '```sh run' 'false' 'true' '```'
 expect 1 'a command that does not end' '```sh run' 'sleep 60' '```'
 expect 1 'a variable that nobody sets' '```sh run' 'echo "$nobody"' '```'

@@ -56,6 +56,9 @@ const struct app_command app_list = {
         "\n"
         "Of each profile: how its pulses are arranged, the protocols that speak for it, and its pulse rates. With each\n"
         "rate stand the pulses that fall into the field of view, echoes per pulse, smallest range and reach. Last are\n"
-        "the figures by grade: from a data sheet, quoted, assumed (config/heads/README.md says what these mean).\n",
+        "the figures by grade: from a data sheet, quoted, assumed (config/heads/README.md says what these mean).\n"
+        "\n"
+        "Heads on USB are those with this project's interface. One that shows itself as another maker's device\n"
+        "(links[].protocol scip, cola) is not among them: it looks like a real one.\n",
     .run = run,
 };

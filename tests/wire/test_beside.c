@@ -1,0 +1,173 @@
+/* A personality's link leaves the native stream as it is: the same hash with it and without. And its ports outlive
+ * clients that come, say half a word and go. */
+#include "tests/wire/wire.h"
+
+enum { CLIENTS = 10000 };
+
+struct personality {
+    const char *config, *asks; /* asks: what makes it send all that it has; NULL: it sends by itself */
+    const char *ptys[2];       /* keys of terminals' paths, or NULL */
+    int native;                /* link */
+    const char *without[8];    /* keys that take the personality away */
+};
+static const struct personality HOKUYO = {"config/hokuyo.yaml",
+                                          "BM\nMD0000108001000\n",
+                                          {"links.1.path", "links.3.path"},
+                                          2,
+                                          {"links.0.protocol=native", "links.1.protocol=native"}};
+static const struct personality SICK = {
+    "config/sick.yaml", "\2sEN LMDscandata 1\3", {"links.2.path"}, 1, {"links.0.protocol=native"}};
+static const struct personality VELODYNE = {"config/velodyne.yaml",
+                                            NULL,
+                                            {"links.4.path"},
+                                            3,
+                                            {"links.0.type=tcp", "links.1.type=tcp", "links.0.protocol=native",
+                                             "links.1.protocol=native", "links.2.protocol=native"}};
+
+static struct head start(struct wire *wire, const struct personality *p, int with, int fast, const char *const *keys)
+{
+    static char path[2][400];
+    const char *args[WIRE_MAX_ARGS];
+    int n = 0;
+    for (int i = 0; i < 2 && p->ptys[i] != NULL; i++) {
+        snprintf(path[i], sizeof path[i], "%s=%s", p->ptys[i], wire_path(wire, p->ptys[i]));
+        args[n++] = "--set";
+        args[n++] = path[i];
+    }
+    for (int i = 0; !with && i < 8 && p->without[i] != NULL; i++) {
+        args[n++] = "--set";
+        args[n++] = p->without[i];
+    }
+    if (fast) {
+        args[n++] = "--pace";
+        args[n++] = "fast";
+    }
+    for (; *keys != NULL; keys++) {
+        args[n++] = "--set";
+        args[n++] = *keys;
+    }
+    args[n] = NULL;
+    return head_start(wire, p->config, args);
+}
+
+/* A child that asks, says so on `asked`, and then takes all that comes until the head is gone. */
+static pid_t ask_and_drain(struct wire *wire, const char *endpoint, const char *asks, int asked)
+{
+    static char bytes[1 << 16];
+    pid_t pid = wire_fork(wire);
+    if (pid != 0) return pid;
+    size_t sum = 0;
+    int fd = raw_connect(endpoint);
+    raw_write(fd, asks, strlen(asks));
+    for (ssize_t n; (n = read(fd, bytes, sizeof bytes)) > 0; sum += (size_t)n)
+        if (sum == 0) raw_write(asked, "!", 1);
+    _exit(sum < 100000); /* scans came, not only replies */
+}
+
+/* Ten seconds of the device's time as fast as it computes, which waits for each client. */
+static void scan(struct wire *wire, const struct personality *p, int with, const char *frames, char hex[65])
+{
+    int udp[2], pipes[2];
+    char port[2][64];
+    for (int i = 0; i < 2; i++) {
+        struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr = {htonl(INADDR_LOOPBACK)}};
+        socklen_t len = sizeof at;
+        udp[i] = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+        assert_int_equal(bind(udp[i], (struct sockaddr *)&at, sizeof at), 0);
+        getsockname(udp[i], (struct sockaddr *)&at, &len);
+        snprintf(port[i], sizeof port[i], "links.%d.port=%d", i, p->asks == NULL && with ? ntohs(at.sin_port) : 0);
+    }
+    const char *keys[] = {port[0], "noise.range=on", "head.start=off", frames, NULL, NULL, NULL};
+    if (p->asks == NULL) keys[4] = port[1], keys[5] = "links.2.port=0";
+    struct head head = start(wire, p, with, 1, keys);
+    struct scanhead *sh = client_open(head_link(&head, p->native));
+    struct scanhead_frame frame;
+    pid_t drain = 0;
+    client_wait_state(sh, "idle");
+    scanhead_hash_start(sh);
+    client_tell(sh, "SCAN:STAR");
+    if (with && p->asks != NULL) {
+        char byte;
+        assert_int_equal(pipe2(pipes, O_CLOEXEC), 0);
+        drain = ask_and_drain(wire, head_link(&head, 0), p->asks, pipes[1]);
+        close(pipes[1]);
+        assert_int_equal(read(pipes[0], &byte, 1), 1);
+        close(pipes[0]);
+    }
+    client_until(sh, SCANHEAD_EV_SCAN_END, &frame);
+    scanhead_close(sh);
+    head_end(&head, SIGTERM);
+    if (drain != 0) assert_int_equal(wire_wait(wire, drain), 0);
+    stats_hash(wire, hex);
+    close(udp[0]);
+    close(udp[1]);
+}
+
+static void check_hash(struct wire *wire, const struct personality *p, const char *frames)
+{
+    char with[65], without[65];
+    scan(wire, p, 1, frames, with);
+    scan(wire, p, 0, frames, without);
+    assert_string_equal(with, without);
+}
+
+static void test_hash_hokuyo(void **state)
+{
+    check_hash(*state, &HOKUYO, "head.frames=400");
+}
+
+static void test_hash_sick(void **state)
+{
+    check_hash(*state, &SICK, "head.frames=150");
+}
+
+static void test_hash_velodyne(void **state)
+{
+    check_hash(*state, &VELODYNE, "head.frames=10");
+}
+
+/* One after the other; then the head answers as if nothing had been. */
+static void crowd(struct wire *wire, const struct personality *p, const char *half, const char *ask, const char *answer)
+{
+    const char *const keys[] = {"links.0.port=0", NULL};
+    char reply[64] = "";
+    struct head head = start(wire, p, 1, 0, keys);
+    for (int i = 0; i < CLIENTS; i++) {
+        int fd = raw_connect(head_link(&head, 0));
+        raw_write(fd, half, strlen(half));
+        close(fd);
+    }
+    int64_t end_ms = wire_now_ms() + DEADLINE_MS;
+    while (strncmp(reply, answer, strlen(answer)) != 0) { /* the last ones may still be in the way */
+        if (wire_now_ms() > end_ms) fail_msg("no answer: %s", reply);
+        int fd = raw_connect(head_link(&head, 0));
+        struct pollfd slot = {.fd = fd, .events = POLLIN};
+        (void)!write(fd, ask, strlen(ask));
+        ssize_t n = poll(&slot, 1, 1000) == 1 ? read(fd, reply, sizeof reply - 1) : 0;
+        reply[n > 0 ? n : 0] = '\0';
+        close(fd);
+    }
+    head_end(&head, SIGTERM);
+}
+
+static void test_crowd_hokuyo(void **state)
+{
+    crowd(*state, &HOKUYO, "MD00001", "QT\n", "QT\n00P\n\n");
+}
+
+static void test_crowd_sick(void **state)
+{
+    crowd(*state, &SICK, "\2\2\2\2sRN", "\2sRN SCdevicestate\3", "\2sRA SCdevicestate 1\3");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_hash_hokuyo, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_hash_sick, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_hash_velodyne, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_crowd_hokuyo, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_crowd_sick, wire_setup, wire_teardown),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
