@@ -57,16 +57,12 @@ static void reboot(struct scip *s, const char *line, size_t len)
 {
     enum { SECOND_NS = 1000000000 };
     const int again = s->rb_ns != INT64_MIN && s->now_ns - s->rb_ns <= SECOND_NS;
+    s->rb_ns = again ? INT64_MIN : s->now_ns;
     if (again) {
         scip_laser_off(s);
         s->reboot_ns = s->now_ns + SECOND_NS;
     }
-    s->rb_ns = again ? INT64_MIN : s->now_ns;
-    if (again) {
-        scip_answer(s, line, len, "00");
-        return;
-    }
-    scip_reply_begin(&s->reply, line, len, "01"); /* what the first of two is answered with: no error */
+    scip_reply_begin(&s->reply, line, len, again ? "00" : "01"); /* 01 to the first of two is no error */
     scip_send(s);
 }
 
@@ -194,18 +190,24 @@ static const char *check_tag(const char *tag, size_t len)
     return NULL;
 }
 
+/* NULL, or what is wrong with the line as such; n: its length without the tag and the ';' before it. */
+static const char *check_line(const struct scip *s, const struct command *c, const char *line, size_t len, size_t n)
+{
+    const int time_alone = s->time_mode && (s->model->features & SCIP_TIME_ALONE) != 0;
+    if (c == NULL || (time_alone && c->run != adjust_time)) return "0E";
+    const char *wrong = n < len ? check_tag(line + n + 1, len - n - 1) : NULL;
+    if (wrong != NULL) return wrong;
+    const size_t wanted = strlen(c->name) + c->n_params;
+    if (n == wanted) return NULL;
+    return n < wanted ? "0C" : "0D";
+}
+
 void scip_command(struct scip *s, const char *line, size_t len)
 {
     const char *tag = memchr(line, ';', len);
     const size_t n = tag == NULL ? len : (size_t)(tag - line);
     const struct command *c = find(s, line, n);
-    const char *wrong = NULL;
-    if (c == NULL || (s->time_mode && (s->model->features & SCIP_TIME_ALONE) != 0 && c->run != adjust_time))
-        wrong = "0E";
-    else if (tag != NULL && (wrong = check_tag(tag + 1, len - n - 1)) != NULL)
-        ;
-    else if (n != strlen(c->name) + c->n_params)
-        wrong = n < strlen(c->name) + c->n_params ? "0C" : "0D";
+    const char *wrong = check_line(s, c, line, len, n);
     if (wrong != NULL)
         scip_answer(s, line, len, wrong);
     else

@@ -68,8 +68,8 @@ static const char *begin(struct scip *s, struct scip_request *q, const char *lin
     return scip_laser_on(s);
 }
 
-/* A second M or N replaces the first, but not when it is refused. A second G or H before the first is answered
- * repeats what is already being processed. */
+/* A second M or N replaces the first, but not when it is refused. A second G or H before the first is
+ * answered repeats what is already being processed. */
 void scip_measure(struct scip *s, const char *line, size_t len)
 {
     enum { WAIT_NS = 2000000000 };
@@ -84,8 +84,12 @@ void scip_measure(struct scip *s, const char *line, size_t len)
     request.active = 1;
     request.after_ns = streams ? s->now_ns : s->laser_ns;
     request.until_ns = s->now_ns + WAIT_NS;
-    *(streams ? &s->stream : &s->single) = request;
-    if (streams) scip_answer(s, line, len, "00");
+    if (!streams) {
+        s->single = request;
+        return;
+    }
+    s->stream = request;
+    scip_answer(s, line, len, "00");
 }
 
 void scip_measure_time(struct scip *s)
@@ -95,7 +99,8 @@ void scip_measure_time(struct scip *s)
     scip_answer(s, s->single.echo, s->single.echo_len, "0A");
 }
 
-/* 100 at the detection threshold, or 1000 of a matt white surface under zero incidence; the root of the power. */
+/* 100 at the detection threshold, or 1000 of a matt white surface under zero incidence; the root of the
+ * power. */
 static uint32_t intensity_of(const struct scip_scan *scan, int16_t level_cdb)
 {
     if (level_cdb == SCIP_LEVEL_NONE) return 0;

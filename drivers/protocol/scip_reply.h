@@ -1,9 +1,9 @@
 /* Replies of SCIP: status, key lines, time stamps and blocks of data go in, the bytes of one unit come out.
  *
- *   echo LF  status(2) sum LF  [KEY:VALUE ; sum LF]...  [time(4) sum LF]  [up to 64 characters, sum LF]...  LF
+ *   echo LF  status(2) sum LF  [KEY:VALUE ; sum LF]...  [time(4) sum LF]  [to 64 characters, sum LF]...  LF
  *
- * The sum is 0x30 plus the low six bits of the sum of the line's bytes; that of a key line leaves out the ';'.
- * A value of n characters is 6 n bits, the most significant six first, each plus 0x30. Pure. */
+ * The sum is 0x30 plus the low six bits of the sum of the line's bytes; that of a key line leaves out the
+ * ';'. A value of n characters is 6 n bits, the most significant six first, each plus 0x30. Pure. */
 #ifndef DRIVERS_PROTOCOL_SCIP_REPLY_H
 #define DRIVERS_PROTOCOL_SCIP_REPLY_H
 
@@ -34,7 +34,7 @@ void scip_reply_begin(struct scip_reply *r, const char *echo, size_t len, const 
 void scip_reply_key(struct scip_reply *r, const char *key, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
 /* ms: the low 24 bits. */
 void scip_reply_time(struct scip_reply *r, uint32_t ms);
-/* Data: a value of 2 or 3 characters (the largest that fits, where it is larger), or one character as it is. */
+/* Data: a value of 2 or 3 characters (at most the largest that fits), or one character as it is. */
 void scip_reply_value(struct scip_reply *r, uint32_t value, int n_chars);
 void scip_reply_mark(struct scip_reply *r, char mark);
 /* The last block, and the empty line. */

@@ -27,9 +27,16 @@ static void take_descriptor(struct scip_scan *s, const struct native_descriptor 
     s->range_scale_mm = d->range_scale_m * 1e3;
 }
 
+static int same_steps(const struct native_emitter *a, const struct native_emitter *b)
+{
+    return a->kind == b->kind && a->steps == b->steps && a->first_step == b->first_step &&
+           a->last_step == b->last_step && a->front_step == b->front_step && a->turn == b->turn;
+}
+
+/* Another speed leaves the turn at hand as it is. */
 static void take_emitter(struct scip_scan *s, const struct native_emitter *e)
 {
-    if (memcmp(e, &s->emitter, sizeof *e) == 0) return;
+    if (same_steps(e, &s->emitter)) return;
     s->emitter = *e;
     s->in_turn = 0;
     s->known = e->kind == NATIVE_EMIT_PLANAR && e->first_step >= 0 && e->first_step <= e->last_step &&

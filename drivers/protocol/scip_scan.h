@@ -1,9 +1,9 @@
 /* Native frames of a planar head go in, whole scans of its steps come out.
  *
- * A scan is a turn of the head: the steps first..last, each with up to three echoes. It is whole once every step has
- * come, with its attributes where the head sends them: that is when the beam has passed the last step. A turn of
- * which something is missing is broken. Steps are counted as SCIP does, counter-clockwise seen from above; those of a
- * head that turns the other way are numbered backward. Pure; allocates nothing. */
+ * A scan is a turn of the head: the steps first..last, each with up to three echoes. It is whole once every
+ * step has come, with its attributes where the head sends them: that is when the beam has passed the last
+ * step. A turn of which something is missing is broken. Steps are counted as SCIP does, counter-clockwise
+ * seen from above; those of a head that turns the other way are numbered backward. Pure. */
 #ifndef DRIVERS_PROTOCOL_SCIP_SCAN_H
 #define DRIVERS_PROTOCOL_SCIP_SCAN_H
 

@@ -71,8 +71,8 @@ void scip_info_state(struct scip *s, const char *line, size_t len);
 uint64_t scip_lines_uhz(struct scip *s, const char *query);
 
 /* scip_measure.c */
-/* BM and what switches the laser on by itself. NULL, or the status to refuse with: 10 while the head can't scan, 50
- * while it is out of order. */
+/* BM and what switches the laser on by itself. NULL, or the status to refuse with: 10 while the head can't
+ * scan, 50 while it is out of order. */
 const char *scip_laser_on(struct scip *s);
 /* Ends stream and laser; a G or H that waits is answered with status 10. */
 void scip_laser_off(struct scip *s);
@@ -84,8 +84,8 @@ void scip_measure_time(struct scip *s);
 
 /* scip_simulate.c */
 void scip_simulate(struct scip *s, const char *line, size_t len);
-/* Before a scan of the stream: NULL: it is sent; "": it is not; else the status that is sent in its place. 50 is the
- * stream's end. */
+/* Before a scan of the stream: NULL: it is sent; "": it is not; else the status that is sent in its place. 50
+ * is the stream's end. */
 const char *scip_simulated(struct scip *s);
 
 #endif

@@ -46,6 +46,20 @@ static void print_output(const struct config *cfg, const struct site *site)
                                                  : ", heights above the ellipsoid");
 }
 
+static void print_links(const struct config *cfg)
+{
+    for (uint32_t i = 0; i < cfg->n_links; i++) {
+        const struct link_spec *link = &cfg->link[i];
+        const int has_port = link->type == LINK_TCP || link->type == LINK_UDP;
+        printf("link      %s", link_ops_get(link->type)->name);
+        if (has_port && link->port != 0)
+            printf(":%s:%d", link->address[0] != '\0' ? link->address : "127.0.0.1", link->port);
+        else if (link->path[0] != '\0')
+            printf(":%s", link->path);
+        printf(", %s\n", protocol_ops_get((enum protocol_id)link->protocol)->name);
+    }
+}
+
 static int print_summary(const struct config *cfg, const struct site *site, struct sh_err *err)
 {
     const struct scene *scene = site->scene;
@@ -66,6 +80,7 @@ static int print_summary(const struct config *cfg, const struct site *site, stru
         rc = check_print_station(site, i, stdout, err);
     print_platform(site);
     print_output(cfg, site);
+    print_links(cfg);
     return rc;
 }
 

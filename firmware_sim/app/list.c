@@ -36,7 +36,11 @@ static int run(int argc, char **argv)
     int status = app_parse(&app_list, argc, argv, &in, NULL);
     if (status != APP_GO_ON) return status;
     if (config_list_profiles(NULL, stdout, &err) < 0) return app_fail(&err);
-    puts("links: pty (virtual serial port), tcp, usb (usbip, usbredir, functionfs), file, null");
+    puts("links: pty (virtual serial port), tcp, udp, usb (usbip, usbredir, functionfs), file, null");
+    printf("protocols:");
+    for (int id = 0; id < PROTOCOL_N; id++)
+        printf("%s %s", id > 0 ? "," : "", protocol_ops_get((enum protocol_id)id)->name);
+    puts("");
     list_usb();
     return APP_OK;
 }
@@ -48,6 +52,13 @@ const struct app_command app_list = {
     .summary = "head profiles, kinds of links, and the heads that USB shows",
     .options = OPTIONS,
     .notes =
-        "Profiles are looked for in the folder $SCANHEAD_HEADS, else in the installed one, else in config/heads.\n",
+        "Profiles are looked for in the folder $SCANHEAD_HEADS, else in the installed one, else in config/heads.\n"
+        "\n"
+        "Of each profile: how its pulses are arranged, the protocols that speak for it, and its pulse rates. With each\n"
+        "rate stand the pulses that fall into the field of view, echoes per pulse, smallest range and reach. Last are\n"
+        "the figures by grade: from a data sheet, quoted, assumed (config/heads/README.md says what these mean).\n"
+        "\n"
+        "Heads on USB are those with this project's interface. One that shows itself as another maker's device\n"
+        "(links[].protocol scip, cola) is not among them: it looks like a real one.\n",
     .run = run,
 };

@@ -15,7 +15,8 @@
  * MIN and MAX are the limits as the profile and the other settings leave them now, so they are never refused.
  * A unit may follow as a suffix: HZ, KHZ, MHZ (mega, as SCPI has it); DEG; DEG/S; of a step NS (also
  * without), US, MS, S. Numbers are taken exactly or refused, never rounded. SCAN:ECHoes takes ALL, FIRSt,
- * LAST, STRongest or DEF: which echoes of a pulse are sent.
+ * LAST, STRongest or DEF: which echoes of a pulse are sent. Of a head with fixed pulse rates HEAD:PRR takes these
+ * alone; another rate is -222 with the list of them.
  *
  * Steps. With a live platform a step may carry the pose at its end: `TIME:STEP 10 MS, x, y, z, roll, pitch,
  * heading`, in metres of the scene frame and degrees (core/pose.h).

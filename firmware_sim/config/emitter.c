@@ -189,6 +189,7 @@ void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg)
         cfg_fail_key(rd, given_line_key(rd), 0, "head profile %s has a list of directions; allowed without it",
                      cfg->profile.name);
     if (n == 0 || !CFG_SOUND(rd, 0, "head.lines_hz", "head.prr_hz")) return;
+    if (s->lines_uhz < cfg->profile.lines_min_uhz || s->lines_uhz > cfg->profile.lines_max_uhz) return;
     const int64_t prr_uhz = s->lines_uhz * n;
     if (cfg_is_given(rd, "head.prr_hz", 0) && s->prr_uhz != prr_uhz)
         cfg_fail_key(rd, "head.prr_hz", 0,

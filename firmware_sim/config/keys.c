@@ -37,13 +37,15 @@ static const struct cfg_key config_keys[] = {
      .help = "Head profile, from $SCANHEAD_HEADS, heads/ beside this file, the installed or the source directory."},
     {KEY(head.serial), CFG_TEXT, .def = "SIM-0001", .flags = CFG_ASCII, .help = "Serial number, as in *IDN?."},
     {"head.prr_hz", SETTING(prr_uhz), CFG_MICRO, "Hz", "@prr_max_hz", WITHIN("prr_min_hz", "prr_max_hz"),
-     .help = "Pulse repetition rate. It counts every firing, also those in the blind part of a sweep."},
+     .help = "Pulse repetition rate. It counts every firing, also those in the blind part of a sweep. It follows from "
+             "lines_hz where a line has a fixed number of pulses, and from the firing sequence of beams."},
     {"head.lines_hz", SETTING(lines_uhz), CFG_MICRO, "Hz", "@lines_max_hz", WITHIN("lines_min_hz", "lines_max_hz"),
-     .help = "Lines per second; at most one per pulse."},
+     .help = "Lines per second, at most one per pulse. Turns per second of a planar or a spinning head."},
     {"head.pan_deg_s", SETTING(pan_udeg_s), CFG_MICRO, "deg/s", "@pan_max_deg_s", 0, 9e12, NULL, "pan_max_deg_s",
      .help = "Pan speed. 0: the pan stands still, each line is a frame."},
     {"head.line_start_deg", SETTING(line_start_udeg), CFG_MICRO, "deg", "@fov_min_deg",
-     WITHIN("fov_min_deg", "fov_max_deg"), .help = "First line angle cast: 0 forward, 90 up, above 90 backward."},
+     WITHIN("fov_min_deg", "fov_max_deg"), .help = "First line angle cast: 0 forward, 90 up, above 90 backward. Of a planar head: from its front step, in the "
+             "direction of its steps; of beams and spheres an azimuth, 0 to 360."},
     {"head.line_stop_deg", SETTING(line_stop_udeg), CFG_MICRO, "deg", "@fov_max_deg",
      WITHIN("fov_min_deg", "fov_max_deg"), .help = "Last line angle cast; above the first one."},
     {"head.pan_start_deg", SETTING(pan_start_udeg), CFG_MICRO, "deg", "@pan_min_deg",
@@ -51,7 +53,7 @@ static const struct cfg_key config_keys[] = {
     {"head.pan_stop_deg", SETTING(pan_stop_udeg), CFG_MICRO, "deg", "@pan_max_deg",
      WITHIN("pan_min_deg", "pan_max_deg"), .help = "Pan angle where a frame ends; at most a turn after its start."},
     {"head.frames", SETTING(frames), CFG_COUNT, NULL, "1", 0, HEAD_MAX_FRAMES,
-     .help = "Frames (pan sweeps) per scan; 0: until stopped."},
+     .help = "Frames (pan sweeps, or turns of a head without a pan) per scan; 0: until stopped."},
     {"head.station", SETTING(station), CFG_COUNT, NULL, "1", 1, CONFIG_MAX_STOPS,
      .help = "Station where the head stands, counted from 1."},
 

@@ -22,6 +22,11 @@ static const struct {
     [PROTOCOL_VELODYNE_HTTP] = {1u << LINK_TCP | 1u << LINK_FD, "tcp"},
 };
 
+_Static_assert((int)EMITTER_PLANAR == (int)NATIVE_EMIT_PLANAR && (int)EMITTER_BEAMS == (int)NATIVE_EMIT_BEAMS &&
+                   (int)EMITTER_SPHERE == (int)NATIVE_EMIT_SPHERE &&
+                   (int)EMITTER_DIRECTIONS == (int)NATIVE_EMIT_DIRECTIONS,
+               "protocols name emitters as the profiles do");
+
 static const char PROTOCOL_KEY[] = "links[].protocol";
 
 static int is_spoken_on(const struct link_spec *link)
@@ -71,6 +76,31 @@ static void check_stream(struct cfg_reader *rd, struct config *cfg, uint32_t i, 
                      ops->name, place_of(rd, "output.attributes", where));
 }
 
+/* The head must be of a kind that the protocol has words for. */
+static void check_head(struct cfg_reader *rd, const struct config *cfg, uint32_t i, const struct protocol_ops *ops)
+{
+    static const char *const kinds[] = {[EMITTER_LINE] = "line",
+                                        [EMITTER_PLANAR] = "planar",
+                                        [EMITTER_BEAMS] = "beams",
+                                        [EMITTER_SPHERE] = "sphere",
+                                        [EMITTER_DIRECTIONS] = "directions"};
+    const struct emitter *emitter = &cfg->profile.emitter;
+    char where[40], allowed[64] = "";
+    if (ops->emitters == 0 || !rd->profile_read) return;
+    for (int kind = EMITTER_LINE; kind <= EMITTER_DIRECTIONS; kind++)
+        if ((ops->emitters & 1u << kind) != 0)
+            snprintf(allowed + strlen(allowed), sizeof allowed - strlen(allowed), "%s%s",
+                     allowed[0] != '\0' ? ", " : "", kinds[kind]);
+    place_of(rd, "head.profile", where);
+    if ((ops->emitters & 1u << emitter->kind) == 0)
+        cfg_fail_key(rd, PROTOCOL_KEY, i,
+                     "%s can't tell of head profile %s%s, whose emitter is %s; allowed emitters: %s", ops->name,
+                     cfg->profile.name, where, kinds[emitter->kind], allowed);
+    else if (emitter->kind == EMITTER_BEAMS && ops->n_beams != 0 && emitter->n_beams != ops->n_beams)
+        cfg_fail_key(rd, PROTOCOL_KEY, i, "%s has %u beams, but head profile %s%s has %u; allowed %u", ops->name,
+                     ops->n_beams, cfg->profile.name, where, emitter->n_beams, ops->n_beams);
+}
+
 static void check_protocol(struct cfg_reader *rd, struct config *cfg, uint32_t i)
 {
     struct link_spec *link = &cfg->link[i];
@@ -88,6 +118,7 @@ static void check_protocol(struct cfg_reader *rd, struct config *cfg, uint32_t i
     /* As the device: it turns a second client away. */
     if (link->protocol == PROTOCOL_SCIP && !cfg_is_given(rd, "links[].max_sessions", i)) link->max_sessions = 1;
     check_stream(rd, cfg, i, ops);
+    check_head(rd, cfg, i, ops);
 }
 
 void cfg_check_link_protocols(struct cfg_reader *rd, struct config *cfg)

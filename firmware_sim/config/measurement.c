@@ -42,10 +42,10 @@ void cfg_check_reaches(struct cfg_reader *rd, struct config_profile *profile)
     for (uint32_t i = 0; i < profile->n_reaches; i++)
         if (!CFG_SOUND(rd, i, "reaches[]")) return;
     for (uint32_t i = 0; i < (n > 0 ? n : 1); i++)
-        if (n > 0 && profile->program[i].reach_90_m > 0.0)
-            check_signal_of(rd, profile, i, "programs[].reach_90_m");
-        else
+        if (n == 0 || profile->program[i].reach_90_m == 0.0)
             check_signal_of(rd, profile, 0, "reaches");
+        else if (CFG_SOUND(rd, i, "programs[]"))
+            check_signal_of(rd, profile, i, "programs[].reach_90_m");
 }
 
 /* NaN for what an entry leaves out. */

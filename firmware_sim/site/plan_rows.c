@@ -114,6 +114,27 @@ static void add_emitter(const struct site *site, struct site_plan *plan)
     plan_say(&plan->row[plan->n++], "emitter", emitter_names[site->emitter.kind], 0.0, 0.0, why);
 }
 
+/* What the configured pulse rate brings with it, where the head has programs. HEAD:PRR changes it. */
+static void add_program(const struct site *site, struct site_plan *plan)
+{
+    const struct config_profile *p = &site->cfg->profile;
+    const uint32_t in_use = config_program_of(p, site->cfg->head.settings.prr_uhz);
+    const struct config_program *program = &p->program[in_use];
+    char method[32], why[sizeof plan->row->why];
+    if (p->n_programs == 0) return;
+    snprintf(method, sizeof method, "%.10g kHz", 1e-9 * (double)program->prr_uhz);
+    size_t used =
+        (size_t)snprintf(why, sizeof why, "%u echoes, %.4g to %.4g m, %.4g kHz used; %s also has", program->max_echoes,
+                         program->range_min_m, program->range_max_m, 1e-9 * (double)program->used_uhz, p->name);
+    if (p->n_programs == 1) used = (size_t)(strrchr(why, ';') - why);
+    for (uint32_t i = 0, k = 0; i < p->n_programs && used < sizeof why; i++)
+        if (i != in_use)
+            used += (size_t)snprintf(why + used, sizeof why - used, "%s %.10g", k++ > 0 ? "," : "",
+                                     1e-9 * (double)p->program[i].prr_uhz);
+    if (used < sizeof why) snprintf(why + used, sizeof why - used, "%s", p->n_programs > 1 ? " kHz" : "");
+    plan_say(&plan->row[plan->n++], "program", method, 0.0, 0.0, why);
+}
+
 int site_plan_rows(struct site *site, struct sh_err *err)
 {
     struct site_plan *plan = &site->plan;
@@ -124,10 +145,11 @@ int site_plan_rows(struct site *site, struct sh_err *err)
     bvh_get_info(site->station[0].bvh, &bvh);
     size_t n = plan_head(&head, of_head);
     free(plan->row);
-    plan->row = calloc(n + 8 + site->n_stations, sizeof *plan->row);
+    plan->row = calloc(n + 9 + site->n_stations, sizeof *plan->row);
     if (plan->row == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     plan->n = 0;
     add_emitter(site, plan);
+    add_program(site, plan);
     plan_mesh(mesh_error_m(site), &plan->row[plan->n++]);
     plan_cast(bvh.packet, &plan->row[plan->n++]);
     plan->row[plan->n++] = plan->order;

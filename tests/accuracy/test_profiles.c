@@ -54,10 +54,10 @@ struct scan {
 };
 
 /* 10^6 pulses within half a degree of the wall's normal: its cosine is 1 to 4e-5. Ranges less the wall's own. */
-static void scan_wall(const char *profile, double range_m, double reflectance, struct scan *scan)
+static void scan_wall(const char *profile, int prr_hz, double range_m, double reflectance, struct scan *scan)
 {
-    char path[96], set[3][64];
-    const char *const sets[] = {set[0], set[1], set[2]};
+    char path[96], set[4][64];
+    const char *const sets[] = {set[0], set[1], set[2], set[3]};
     struct config *cfg = malloc(sizeof *cfg);
     struct site *site;
     struct caster *caster;
@@ -70,7 +70,8 @@ static void scan_wall(const char *profile, double range_m, double reflectance, s
     snprintf(set[0], sizeof set[0], "head.profile=%s", profile);
     snprintf(set[1], sizeof set[1], "scene.meshes[0].scale=%.9g", range_m);
     snprintf(set[2], sizeof set[2], "surfaces[0].reflectance=%.9g", reflectance);
-    if (config_load(path, sets, 3, cfg, &err) != SH_OK || site_load(cfg, NULL, &site, &err) != SH_OK ||
+    snprintf(set[3], sizeof set[3], "head.prr_hz=%d", prr_hz);
+    if (config_load(path, sets, 4, cfg, &err) != SH_OK || site_load(cfg, NULL, &site, &err) != SH_OK ||
         caster_create(&caster, &err) != SH_OK || line_block_alloc(&block, PULSES, &err) != SH_OK)
         fail_msg("%s", err.text);
     site_cast_setup(site, 0, &setup);
@@ -110,16 +111,22 @@ static void walls_vanish_where_the_profiles_say(void **state)
     (void)state;
     static const struct {
         const char *profile;
+        int prr_hz;
         double reflectance, range_m;
-    } says[] = {{"riegl-vz400i", 0.9, 800.0},  {"riegl-vz400i", 0.2, 400.0},
-                {"riegl-vz600i", 0.9, 1000.0}, {"riegl-vz600i", 0.2, 500.0},
-                {"leica-rtc360", 0.9, 130.0},  {"leica-rtc360", 0.225, 65.0}}; /* a quarter of 0.9: half of the range */
+    } says[] = {{"riegl-vz400i", 100000, 0.9, 800.0},    {"riegl-vz400i", 100000, 0.2, 400.0},
+                {"riegl-vz400i", 600000, 0.9, 350.0},    {"riegl-vz600i", 140000, 0.9, 1000.0},
+                {"riegl-vz600i", 140000, 0.2, 500.0},    {"leica-rtc360", 1000000, 0.9, 130.0},
+                {"leica-rtc360", 1000000, 0.225, 65.0}, /* a quarter of 0.9: half of the range */
+                {"leica-p40", 1000000, 0.34, 270.0},     {"leica-blk360", 360000, 0.78, 60.0},
+                {"faro-focus-s350", 122000, 0.9, 350.0}, {"faro-focus-s350", 976000, 0.9, 350.0},
+                {"zf-imager-5016", 1000000, 0.9, 360.0}};
     for (size_t i = 0; i < sizeof says / sizeof *says; i++) {
         struct scan before, behind;
-        scan_wall(says[i].profile, 0.98 * says[i].range_m, says[i].reflectance, &before);
-        scan_wall(says[i].profile, 1.02 * says[i].range_m, says[i].reflectance, &behind);
-        print_message("%s, %g at %g m: %.1f %% of the pulses see it 2 %% before, %.1f %% behind\n", says[i].profile,
-                      says[i].reflectance, says[i].range_m, 100.0 * before.share, 100.0 * behind.share);
+        scan_wall(says[i].profile, says[i].prr_hz, 0.98 * says[i].range_m, says[i].reflectance, &before);
+        scan_wall(says[i].profile, says[i].prr_hz, 1.02 * says[i].range_m, says[i].reflectance, &behind);
+        print_message("%s at %d Hz, %g at %g m: %.1f %% of the pulses see it 2 %% before, %.1f %% behind\n",
+                      says[i].profile, says[i].prr_hz, says[i].reflectance, says[i].range_m, 100.0 * before.share,
+                      100.0 * behind.share);
         assert_true(before.share > 0.55 && behind.share < 0.45);
     }
 }
@@ -132,17 +139,21 @@ static void noise_is_the_profiles(void **state)
     (void)state;
     static const struct {
         const char *profile;
-        double range_m, sigma_m;
-    } says[] = {
-        {"riegl-vz400i", 100.0, 0.003}, {"riegl-vz600i", 100.0, 0.005}, {"leica-rtc360", 20.0, 0.001 + 20.0 * 10e-6}};
+        int prr_hz;
+        double reflectance, range_m, sigma_m;
+    } says[] = {{"riegl-vz400i", 100000, 0.9, 100.0, 0.003},    {"riegl-vz400i", 1200000, 0.9, 100.0, 0.003},
+                {"riegl-vz600i", 140000, 0.9, 100.0, 0.003},    {"riegl-vz2000i", 300000, 0.9, 100.0, 0.003},
+                {"leica-rtc360", 2000000, 0.9, 20.0, 0.0005},   {"leica-p40", 1000000, 0.9, 10.0, 0.0004},
+                {"leica-blk360", 360000, 0.78, 10.0, 0.002},    {"faro-focus-s350", 488000, 0.9, 10.0, 0.0003},
+                {"zf-imager-5016", 1000000, 0.9, 10.0, 0.00025}};
     for (size_t i = 0; i < sizeof says / sizeof *says; i++) {
         struct scan scan;
-        scan_wall(says[i].profile, says[i].range_m, 0.9, &scan);
+        scan_wall(says[i].profile, says[i].prr_hz, says[i].range_m, says[i].reflectance, &scan);
         print_message("%s at %g m: sigma %.3f mm, says %.3f mm; %.3f dB\n", says[i].profile, says[i].range_m,
                       1e3 * scan.sigma_m, 1e3 * says[i].sigma_m, scan.refl_db);
         assert_true(scan.share == 1.0 &&
                     fabs(scan.sigma_m / says[i].sigma_m - 1.0) < 4.75 / sqrt(2.0 * PULSES * LINES));
-        assert_true(fabs(scan.refl_db - 10.0 * log10(0.9)) < 0.01);
+        assert_true(fabs(scan.refl_db - 10.0 * log10(says[i].reflectance)) < 0.01);
     }
 }
 

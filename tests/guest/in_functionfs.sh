@@ -63,6 +63,7 @@ echo 0 >$device/bConfigurationValue
 check "$speed: ends without a configuration" ends_soon
 [ $speed = high ] || return 0 # once is enough
 check_hokuyo "$speed" "backend: functionfs, speed: $speed"
+check_sick "$speed" "backend: functionfs, speed: $speed"
 head_start "{type: usb, backend: functionfs, speed: $speed}" --pace fast
 wait_for 10 is_plugged
 head_kill

@@ -165,6 +165,15 @@ check_hokuyo() {
     note "$1: Hokuyo at $(uptime_s) s"
 }
 
+# A head that is to its host a SICK TiM561: libusb finds it. check_sick PREFIX YAML: of its link, without type and protocol
+check_sick() {
+    head_start_of sick "{type: usb, protocol: cola, $2}"
+    tap "$1" test_cola
+    head_stop
+    check "$1: the TiM is gone with the head" wait_for 10 is_unplugged 19a2
+    note "$1: TiM at $(uptime_s) s"
+}
+
 # What the USB specification wants of a device. check_chapter9 PREFIX
 check_chapter9() {
     tap "$1" test_chapter9

@@ -18,6 +18,10 @@ check_enumeration "usbredir, super" 1024
 record_again "usbredir, super"
 ask_host stop >/dev/null
 note "super at $(uptime_s) s"
+ask_host start_sick >/dev/null
+tap "usbredir" test_cola
+ask_host stop >/dev/null
+note "TiM at $(uptime_s) s"
 # Each time the process is killed with the stream in full flow, and another one takes its place.
 ask_host start --set head.prr_hz=4000 --set loop.tick_hz=100 >/dev/null
 check "usbredir: plugged in again" wait_for 10 is_plugged

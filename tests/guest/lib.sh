@@ -168,6 +168,7 @@ guest_add_head() {
     guest_add tests/guest/in_usb.sh
     guest_add tests/guest/room.obj
     guest_add tests/guest/hokuyo.yaml
+    guest_add tests/guest/sick.yaml
     sed "s/pan_deg_s: .*/pan_deg_s: ${GUEST_PAN_DEG_S:-60}/" tests/guest/head.yaml >"$guest_work/root/head.yaml"
     [ -z "${GUEST_PAN_DEG_S:-}" ] || : >"$guest_work/root/records_only"
 }

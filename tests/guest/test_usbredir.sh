@@ -8,12 +8,14 @@ guest_add_head
 head_pid=
 tcp_port=
 speed=high
+name=head
+protocol=native
 
 # head_start [OPTION...]: the head on the host; its TCP port into tcp_port.
 head_start() {
     rm -f "$guest_work/ready"
-    sed "\$alinks: [{type: tcp, port: 0}, {type: usb, backend: usbredir, path: usb, serial: SIM-0001, speed: $speed}]" "$guest_work/root/head.yaml" \
-        >"$guest_work/config.yaml"
+    sed "\$alinks: [{type: tcp, port: 0}, {type: usb, protocol: $protocol, backend: usbredir, path: usb, serial: SIM-0001, speed: $speed}]" \
+        "$guest_work/root/$name.yaml" >"$guest_work/config.yaml"
     cp tests/guest/room.obj "$guest_work/"
     "$guest_scanhead" run "$guest_work/config.yaml" --ready-fd 9 "$@" 9>"$guest_work/ready" 2>>"$guest_work/head.err" \
         3<&- 4<&- </dev/null >/dev/null &
@@ -44,6 +46,7 @@ host_request() {
     stop) head_end -TERM ;;
     start) shift && head_start "$@" ;;
     start_super) shift && speed=super head_start "$@" ;;
+    start_sick) name=sick protocol=cola head_start ;;
     esac
     echo done
 }

@@ -1,5 +1,5 @@
-/* For tests of SCIP: a head that spins, what its session answers, and a decoder of scans written from the protocol's
- * description alone. */
+/* For tests of SCIP: a head that spins, what its session answers, and a decoder of scans written from the
+ * protocol's description alone. */
 #ifndef TESTS_UNIT_SCIP_RIG_H
 #define TESTS_UNIT_SCIP_RIG_H
 
@@ -19,7 +19,7 @@ enum { SCIP_STEPS = 1500 };
 extern struct protocol_rig rig;
 extern struct protocol_rig_shot shot[SCIP_STEPS]; /* of the steps first..last */
 
-/* A session of that model, whose head has said how it is built: 0.02 to 5.6 m for URG-04LX, 0.1 to 30 m else. */
+/* A session of that model, whose head is described: 0.02 to 5.6 m for URG-04LX, 0.1 to 30 m else. */
 void scip_open(const char *model);
 /* The same with a head of one's own. */
 void scip_open_head(const char *model, uint32_t steps, int first, int last, int front, int turn, uint32_t lines_hz);
@@ -38,7 +38,8 @@ void scip_part(uint32_t line, int from, int to);
 void scip_line_end(uint32_t line, uint32_t status);
 void scip_line_time(uint32_t line);
 
-/* A scan in the bytes at *at, which then are passed. Asserts that sums, line lengths and the empty line are right. */
+/* A scan in the bytes at *at, which then are passed. Asserts that sums, line lengths and the empty line are
+ * right. */
 struct scip_decoded {
     char echo[80], status[3];
     uint32_t time_ms, n_steps;

@@ -308,6 +308,43 @@ static void words(void **state)
     expect_error(&dev, 1, "SCAN:ECHOES", CMD_E_MISSING, "takes a word");
 }
 
+/* A head with fixed pulse rates takes these and no other, and its limits are among them. */
+static void fixed_rates_are_the_only_ones(void **ctx)
+{
+    (void)ctx;
+    struct command_device dev = command_test_device();
+    dev.limits.n_rates = 4;
+    for (int i = 0; i < 4; i++)
+        dev.limits.rate_uhz[i] = (const int64_t[]){1000, 1500, 300000, 1200000}[i] * MICRO;
+    static const char refused[] = "allowed 1000, 1500, 300000, 1200000 Hz";
+    static const char *const others[] = {"1000.000001", "299999.999999", "500 KHZ", "999",
+                                         "1200001",     "1e30",          "1e-9",    "-1000"};
+    for (size_t i = 0; i < N_OF(others); i++) {
+        char line[64];
+        snprintf(line, sizeof line, "HEAD:PRR %s", others[i]);
+        expect_error(&dev, 1, line, CMD_E_RANGE, refused);
+    }
+    expect(&dev, "HEAD:PRR 1.2 MHZ", "OK");
+    expect(&dev, "HEAD:PRR?", "1200000");
+    expect(&dev, "HEAD:PRR DEF", "OK");
+    expect(&dev, "HEAD:PRR?", "300000");
+    expect(&dev, "HEAD:PRR MIN", "OK");
+    expect(&dev, "HEAD:PRR?", "1000");
+    expect(&dev, "HEAD:PRR? MAX", "1200000");
+    /* 1200 lines/s need 1200 pulses/s: the smallest rate above is 1500 */
+    expect(&dev, "HEAD:PRR 300000", "OK");
+    expect(&dev, "HEAD:LINES 1200", "OK");
+    expect(&dev, "HEAD:PRR? MIN", "1500");
+    expect_error(&dev, 1, "HEAD:PRR 1000", CMD_E_SETTINGS,
+                 "HEAD:PRR 1000 Hz, allowed 1500 to 1200000 as HEAD:LINes is 1200");
+    expect(&dev, "HEAD:PRR MIN", "OK");
+    expect(&dev, "HEAD:PRR?", "1500");
+    /* what is no rate keeps its own range */
+    expect(&dev, "HEAD:LINES? MAX", "1500");
+    expect(&dev, "HEAD:LINES 77.7", "OK");
+    expect(&dev, "HEAD:PAN 12.5", "OK");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -322,6 +359,7 @@ int main(void)
         cmocka_unit_test(a_station_stays_during_a_scan),
         cmocka_unit_test(steps_of_time),
         cmocka_unit_test(words),
+        cmocka_unit_test(fixed_rates_are_the_only_ones),
     };
     return cmocka_run_group_tests_name("command values", tests, NULL, NULL);
 }

@@ -199,7 +199,7 @@ static void profiles_are_listed(void **state)
     const char *head = strstr(text, "\nriegl-vz400i: RIEGL VZ-400i\n");
     assert_non_null(head);
     assert_non_null(
-        strstr(head, "\n  600                        250      8     0.5 m  350 m on 90 %, 166 m on 20 %\n"));
+        strstr(head, "\n  600                        250      8     0.5 m  350 m on 90 %, 160 m on 20 %\n"));
     assert_non_null(strstr(head, "\n  data sheet 10: prr_min_hz, prr_max_hz, fov_min_deg,"));
     assert_non_null(strstr(text, "\n  any, 10 to 2000           1667      1     0.5 m  130 m on 90 %\n"));
     for (const char *p = text, *end; *p != '\0'; p = end + 1) {

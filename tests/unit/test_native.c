@@ -283,6 +283,57 @@ static void test_poses(void **state)
     assert_int_equal(native_decode_poses(payload, 8 + 80, &n), SH_EFORMAT);
 }
 
+/* PROTOCOL.md, 10 emitter: each field where the table says, and what is refused. */
+static void test_emitter(void **state)
+{
+    (void)state;
+    const struct native_emitter e = {.kind = NATIVE_EMIT_BEAMS,
+                                     .n_beams = 2,
+                                     .steps = 3,
+                                     .first_step = -4,
+                                     .last_step = 5,
+                                     .front_step = -6,
+                                     .turn = -1,
+                                     .rings = 7,
+                                     .sequence_ns_num = UINT64_C(0x1122334455667788),
+                                     .sequence_ns_den = 9,
+                                     .first_ring_udeg = -90000000,
+                                     .echoes = NATIVE_ECHOES_LAST};
+    const struct native_beam beam[2] = {{-15000000, 1, 2}, {3, -4, 4000000000u}};
+    static const int fields[][3] = {{0, 4, 2},  {4, 4, 2},  {8, 4, 3},  {16, 4, 5},
+                                    {28, 4, 7}, {40, 8, 9}, {56, 4, 2}, {60, 4, 0}};
+    uint8_t *payload = out + NATIVE_HEADER_LEN;
+    struct native_emitter back;
+    struct native_beam second;
+    size_t len = native_encode_emitter(out, sizeof out, &e, beam, 99, NATIVE_REPEAT);
+    check_frame(out, len, 10, NATIVE_REPEAT, 64 + 2 * 12, 99);
+    for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++)
+        assert_int_equal(wire(payload, (size_t)fields[i][0], fields[i][1]), fields[i][2]);
+    assert_int_equal((int32_t)wire(payload, 12, 4), -4);
+    assert_int_equal((int32_t)wire(payload, 20, 4), -6);
+    assert_int_equal((int32_t)wire(payload, 24, 4), -1);
+    assert_int_equal(wire(payload, 32, 8), 0x1122334455667788);
+    assert_int_equal((int64_t)wire(payload, 48, 8), -90000000);
+    assert_int_equal((int32_t)wire(payload, 64, 4), -15000000);
+    assert_int_equal((int32_t)wire(payload, 64 + 12 + 4, 4), -4);
+    assert_int_equal(wire(payload, 64 + 12 + 8, 4), 4000000000u);
+    const size_t body = len - NATIVE_HEADER_LEN;
+    assert_int_equal(native_decode_emitter(payload, body, &back), 0);
+    assert_memory_equal(&back, &e, sizeof e);
+    native_decode_beam(payload, 1, &second);
+    assert_memory_equal(&second, &beam[1], sizeof second);
+    assert_int_equal(native_encode_emitter(out, len - 1, &e, beam, 99, 0), 0);
+    assert_int_equal(native_decode_emitter(payload, body - 1, &back), SH_EFORMAT);
+    assert_int_equal(native_decode_emitter(payload, 63, &back), SH_EFORMAT);
+    for (size_t at = 0; at < 48; at += 4) { /* kinds up to 4, as many beams as there are, turns by 1, a time */
+        const uint32_t was = le_get32(payload + at);
+        le_put32(payload + at, at == 24 ? 2 : at == 40 ? 0 : at == 4 ? 3 : 5);
+        const int wrong = at == 0 || at == 4 || at == 24 || at == 40;
+        assert_int_equal(native_decode_emitter(payload, body, &back), wrong ? SH_EFORMAT : 0);
+        le_put32(payload + at, was);
+    }
+}
+
 static void test_is_hashed(void **state)
 {
     (void)state;
@@ -299,9 +350,11 @@ static void test_is_hashed(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_descriptor), cmocka_unit_test(test_descriptor_refused), cmocka_unit_test(test_anchor),
-        cmocka_unit_test(test_line_end),   cmocka_unit_test(test_telemetry),          cmocka_unit_test(test_event),
-        cmocka_unit_test(test_surfaces),   cmocka_unit_test(test_surfaces_split),     cmocka_unit_test(test_is_hashed),
+        cmocka_unit_test(test_descriptor), cmocka_unit_test(test_descriptor_refused),
+        cmocka_unit_test(test_anchor),     cmocka_unit_test(test_line_end),
+        cmocka_unit_test(test_telemetry),  cmocka_unit_test(test_event),
+        cmocka_unit_test(test_surfaces),   cmocka_unit_test(test_surfaces_split),
+        cmocka_unit_test(test_emitter),    cmocka_unit_test(test_is_hashed),
         cmocka_unit_test(test_poses),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -46,7 +46,8 @@ static void overlong_lines(void **state)
     scip_close();
 }
 
-/* Each of many lines that come at once has its answer, in order; those that have no room are their owner's to count. */
+/* Each of many lines that come at once has its answer, in order; those that have no room are their owner's to
+ * count. */
 static void ten_thousand_at_once(void **state)
 {
     (void)state;
@@ -76,7 +77,8 @@ static void ten_thousand_at_once(void **state)
     scip_close();
 }
 
-/* A scan that has no room is lost; the next one comes, and the count goes on as it would from a sensor on a bad line. */
+/* A scan that has no room is lost; the next one comes, and the count goes on as it would from a sensor on a
+ * bad line. */
 static void scans_without_room(void **state)
 {
     (void)state;
@@ -164,8 +166,9 @@ static size_t odd_line(uint32_t *seed, char *line)
     return len;
 }
 
-/* Odd lines among turns with frames missing: the session goes on, units stay within their bound (the rig asserts it),
- * and at the end it answers as ever. Fixed seed; with sanitizers where the unit tests run with them. */
+/* Odd lines among turns with frames missing: the session goes on, units stay within their bound (the rig
+ * asserts it), and at the end it answers as ever. Fixed seed; with sanitizers where the unit tests run with
+ * them. */
 static void nonsense(void **state)
 {
     (void)state;

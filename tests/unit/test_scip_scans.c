@@ -1,11 +1,12 @@
-/* SCIP, the sensor's side: scans. Bytes by hand from the protocol's description, and a decoder written from it. */
+/* SCIP, the sensor's side: scans. Bytes by hand from the protocol's description, and a decoder written from
+ * it. */
 #include "tests/unit/scip_rig.h"
 
 static struct scip_decoded got;
 
-/* Five steps, 0 to 4, and a scan of them with all kinds of value: 1234 mm, 5432 mm, no echo, too near, 30000 mm. The
- * description encodes 1234 as CB in two characters, 5432 as 1Dh in three and 16000000 as m2@0 in four. 30000 is
- * 7 * 4096 + 20 * 64 + 48. */
+/* Five steps, 0 to 4, and a scan of them with all kinds of value: 1234 mm, 5432 mm, no echo, too near, 30000
+ * mm. The description encodes 1234 as CB in two characters, 5432 as 1Dh in three and 16000000 as m2@0 in
+ * four. 30000 is 7 * 4096 + 20 * 64 + 48. */
 static void open_five(const char *model)
 {
     scip_open_head(model, 360, 0, 4, 2, -1, 10);
@@ -68,8 +69,8 @@ static void ranges_to_the_millimetre(void **state)
     scip_close();
 }
 
-/* Without end the two digits stay 00, and a scan is as long as the description makes it: 6717 bytes of 1081 steps with
- * intensity, in lines of 64 characters and a sum. */
+/* Without end the two digits stay 00, and a scan is as long as the description makes it: 6717 bytes of 1081
+ * steps with intensity, in lines of 64 characters and a sum. */
 static void without_end(void **state)
 {
     (void)state;
@@ -87,8 +88,9 @@ static void without_end(void **state)
     scip_close();
 }
 
-/* Steps count counter-clockwise seen from above: what stands to the left, 90 degrees from the front, is a quarter of a
- * turn above the front step. The rig places a shot by its pan, which is clockwise from the front. */
+/* Steps count counter-clockwise seen from above: what stands to the left, 90 degrees from the front, is a
+ * quarter of a turn above the front step. The rig places a shot by its pan, which is clockwise from the
+ * front. */
 static void left_is_left(void **state)
 {
     (void)state;
@@ -157,8 +159,8 @@ static void several_echoes(void)
     shot[1] = (struct protocol_rig_shot){.n = 0};
 }
 
-/* 1000 is 15 * 64 + 40: a matt white surface. 20 dB below it is a tenth: 100, 64 + 36. An amplitude of 0 dB is 100, of
- * 40 dB a hundred times that: 10000, 2 * 4096 + 28 * 64 + 16. */
+/* 1000 is 15 * 64 + 40: a matt white surface. 20 dB below it is a tenth: 100, 64 + 36. An amplitude of 0 dB
+ * is 100, of 40 dB a hundred times that: 10000, 2 * 4096 + 28 * 64 + 16. */
 static void echoes_and_intensity(void **state)
 {
     (void)state;
@@ -275,6 +277,21 @@ static void skipped_scans(void **state)
     check_turns("MD0000108000999", "9:98 ");
 }
 
+/* A turn that is left out may as well be broken. */
+static void skipped_and_broken(void **state)
+{
+    (void)state;
+    scip_open("UTM-30LX");
+    scip_ask("MD0000108000100\n", "MD0000108000100\n00P\n\n");
+    scip_part(0, 0, 500);
+    scip_line_end(0, 0);
+    scip_line_time(0);
+    scip_turn(1);
+    scip_decode_only(&got, 3, 0);
+    assert_int_equal(got.time_ms, 25);
+    scip_close();
+}
+
 /* A scan goes out once its last step has come, before the turn is over. */
 static void sent_after_the_last_step(void **state)
 {
@@ -318,7 +335,8 @@ static void streams_end(void **state)
     scip_close();
 }
 
-/* M gives what was measured after it was asked for, G the next scan that is whole and was measured with the laser on. */
+/* M gives what was measured after it was asked for, G the next scan that is whole and was measured with the
+ * laser on. */
 static void measured_when(void **state)
 {
     (void)state;
@@ -459,7 +477,59 @@ static void turns_that_are_not_lost(void **state)
     scip_close();
 }
 
-/* 2^24 ms are 4 h 39 min 37.216 s. The stamp is that of step 0, also of a scan that begins later in the turn. */
+/* Parts of two turns never make one: of two scans, each with a turn of that number, or the same part sent
+ * over again. */
+static void turns_are_not_mixed(void **state)
+{
+    (void)state;
+    scip_open("UTM-30LX");
+    scip_turn(0);
+    scip_ask("MD0000108000000\n", "MD0000108000000\n00P\n\n");
+    scip_turn(1);
+    protocol_rig_clear(&rig);
+    scip_part(2, 0, 600);
+    rig.ops->gap(rig.protocol, 1000); /* the rest of this scan, and the begin of the next one */
+    rig.scan_t0_ns = 10000000000;
+    scip_part(2, 601, 1080);
+    scip_line_end(2, 0);
+    scip_expect("");
+    scip_part(3, 0, 539);
+    scip_part(3, 0, 539);
+    scip_part(3, 0, 0);
+    scip_line_end(3, 0);
+    scip_expect("");
+    scip_turn(4);
+    scip_decode_only(&got, 3, 0);
+    assert_int_equal(got.time_ms, 10100);
+    scip_close();
+}
+
+/* A change of speed within a turn sends descriptor and emitter again, and takes nothing from the turn;
+ * another number of steps begins anew. */
+static void speed_changes_within_a_turn(void **state)
+{
+    (void)state;
+    scip_open("UTM-30LX");
+    scip_ask("MD0000108000000\n", "MD0000108000000\n00P\n\n");
+    scip_part(0, 0, 600);
+    rig.descriptor.lines_uhz = 39000000;
+    rig.emitter.sequence_ns_den = 39 * 1440;
+    protocol_rig_describe(&rig, 10000000);
+    rig.descriptor.lines_uhz = 40000000;
+    scip_part(0, 601, 1080);
+    scip_decode_only(&got, 3, 0);
+    assert_int_equal(got.n_steps, 1081);
+    scip_part(1, 0, 600);
+    rig.emitter.last_step = 600;
+    protocol_rig_describe(&rig, 40000000);
+    scip_part(1, 601, 601);
+    scip_line_end(1, 0);
+    scip_expect("");
+    scip_ask("MD0000060100000\n", "MD0000060100000\n04T\n\n");
+    scip_close();
+}
+
+/* 2^24 ms are 4 h 39 min 37.216 s. The stamp is that of step 0, wherever the scan begins. */
 static void the_clock_wraps(void **state)
 {
     (void)state;
@@ -556,6 +626,9 @@ int main(void)
         cmocka_unit_test(lost_attributes),
         cmocka_unit_test(the_clock_wraps),
         cmocka_unit_test(turns_that_are_not_lost),
+        cmocka_unit_test(turns_are_not_mixed),
+        cmocka_unit_test(speed_changes_within_a_turn),
+        cmocka_unit_test(skipped_and_broken),
         cmocka_unit_test(played_malfunctions),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -296,7 +296,7 @@ def words(value):
 
 def said_of(head, frame):
     """The words below a sample: fields as `name value;`, then records, one a line."""
-    names = "? descriptor anchor points line-end telemetry event surfaces poses attributes".split()
+    names = "? descriptor anchor points line-end telemetry event surfaces poses attributes emitter".split()
     flags = "".join(f" {name}" for bit, name in ((1, "REPEAT"), (2, "LOCAL")) if frame.flags & bit)
     text = [f"{names[frame.type]}{flags}; seq {frame.seq}; t_ns {frame.t_ns}"]
     text += [f"{name} {words(value)}" for name, value in frame.fields.items()]
@@ -309,6 +309,9 @@ def said_of(head, frame):
                      f"head's frame {x} {y} {z}, scene {' '.join(scene)}"]
     if frame.type == scanhead.ATTRIBUTES:
         text += [f"amplitude {a:.2f} dB, width {w:.2f} ns" for a, w in zip(*head.attributes(frame))]
+    if frame.type == scanhead.EMITTER:
+        text += [f"beam elevation {words(e)} deg, azimuth {words(a)} deg, {t} ns"
+                 for e, a, t in head.emitter["beams"]]
     if frame.type == scanhead.SURFACES:
         text += [f"label {label}: {names[0]} of {names[1]}" for label, names in head.surfaces.items()]
     if frame.type == scanhead.POSES:
@@ -330,13 +333,13 @@ def samples(page, out):
     print(*types, head.stream_sha256())
 
 
-CODES = {"u32": "I", "u64": "Q", "i64": "q", "f64": "d", "char": "s"}
+CODES = {"u32": "I", "u64": "Q", "i32": "i", "i64": "q", "f64": "d", "char": "s"}
 
 
 def tables_of(page):
     """For each type of frame, the struct format that the first table of its section gives."""
     found = {}
-    for kind, section in re.findall(r"\n### ([1-9]) [a-z ]+\n(.*?)(?=\n##)", open(page).read(), re.S):
+    for kind, section in re.findall(r"\n### ([1-9]|10) [a-z ]+\n(.*?)(?=\n##)", open(page).read(), re.S):
         form = "<"
         for line in section[section.index("| ---"):].split("\n")[1:]:
             row = re.match(r"\| (\d+) \| ([a-z]+\d*)(?:\[(\d+)\])? \|", line)

@@ -157,12 +157,14 @@ static void expect_plan(struct wire *wire, const char *config, const struct want
 static void test_three_plans(void **state)
 {
     struct wire *wire = *state;
-    static const struct want demo[] = {{"beam", "single", "adaptive", "costs more"},
+    static const struct want demo[] = {{"program", "600 kHz", NULL, NULL},
+                                       {"beam", "single", "adaptive", "costs more"},
                                        {"optics", "none", NULL, NULL},
                                        {"signal", "none", NULL, NULL},
                                        {"order", "none", "double", "costs more"},
                                        {"georef", "order2", "order1", "its error is above the tolerance"}};
-    static const struct want foliage[] = {{"beam", "adaptive", "single", "its range error is above 0.005 m"},
+    static const struct want foliage[] = {{"program", "300 kHz", NULL, NULL},
+                                          {"beam", "adaptive", "single", "its range error is above 0.005 m"},
                                           {"beam", "adaptive", "rings 12 (469 rays)", "costs more"},
                                           {"optics", "none", NULL, NULL},
                                           {"georef", "none", NULL, NULL}};
@@ -180,6 +182,19 @@ static void test_three_plans(void **state)
         skip();
     }
     expect_plan(wire, "config/demo.yaml", demo, sizeof demo / sizeof demo[0]);
+}
+
+/* The program of the pulse rate that is set: what it brings, and the other rates. */
+static void test_program(void **state)
+{
+    struct wire *wire = *state;
+    const char *const args[] = {"plan", "config/foliage.yaml", "--json", "--set", "head.prr_hz=1200000", NULL};
+    char *json = plan(wire, args, 0), *text = row(json, "program", 0);
+    assert_non_null(text);
+    assert_non_null(strstr(text, "\"method\": \"1200 kHz\""));
+    assert_non_null(strstr(text, "4 echoes, 0.5 to 250 m, 500 kHz used; riegl-vz400i also has 100, 300, 600 kHz\""));
+    free(text);
+    free(json);
 }
 
 /* What a run applies, by its own account, is what is planned; a tighter tolerance changes both. */
@@ -337,6 +352,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_stations_that_differ, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_text, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_three_plans, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_program, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_run_follows_plan, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_forced, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_total, wire_setup, wire_teardown),

@@ -110,6 +110,16 @@ static size_t encode_poses(const uint8_t *payload, size_t len, int64_t t_ns, uin
     return native_encode_poses(out, room, pose, n, t_ns, 0);
 }
 
+static size_t encode_emitter(const uint8_t *payload, size_t len, int64_t t_ns, uint8_t *out, size_t room)
+{
+    struct native_emitter e;
+    struct native_beam beam[NATIVE_MAX_BEAMS];
+    assert_int_equal(native_decode_emitter(payload, len, &e), 0);
+    for (uint32_t i = 0; i < e.n_beams; i++)
+        native_decode_beam(payload, i, &beam[i]);
+    return native_encode_emitter(out, room, &e, beam, t_ns, 0);
+}
+
 /* Decodes the frame and writes it anew; returns how much, of all frames that come of it. */
 static size_t encode_again(const uint8_t *frame, const uint8_t *next, uint8_t *out, size_t room)
 {
@@ -143,6 +153,8 @@ static size_t encode_again(const uint8_t *frame, const uint8_t *next, uint8_t *o
         return native_encode_event(out, room, &d.event, h.t_ns, h.flags);
     case NATIVE_SURFACES:
         return encode_names(payload, h.length, h.t_ns, out, room);
+    case NATIVE_EMITTER:
+        return encode_emitter(payload, h.length, h.t_ns, out, room);
     case NATIVE_POSES:
         return encode_poses(payload, h.length, h.t_ns, out, room);
     default:
@@ -181,7 +193,7 @@ static void test_frames(void **state)
         assert_memory_equal(again, frame, size);
         at += size;
     }
-    assert_int_equal(types, 0x3fe); /* 1 to 9 */
+    assert_int_equal(types, 0x7fe); /* 1 to 10 */
     uint8_t digest[SHA256_DIGEST_SIZE];
     char hex[2 * SHA256_DIGEST_SIZE + 3] = "`";
     sha256_digest(&sha256, sizeof digest, digest);
@@ -214,13 +226,13 @@ static void test_words(void **state)
     }
     snprintf(stream, sizeof stream, "%s", wire_path(wire, "samples.shs"));
     char *said = ask_python(wire, "samples", page_path, stream), *page = wire_read(page_path, NULL);
-    assert_int_equal(strncmp(said, "6 1 2 3 9 4 7 8 5 6 ", 20), 0);
+    assert_int_equal(strncmp(said, "6 1 2 3 9 4 7 8 5 10 6 ", 23), 0);
     said[strcspn(said, "\n")] = 0;
-    assert_non_null(strstr(page, said + 20));
+    assert_non_null(strstr(page, said + 23));
     free(said);
     free(page);
     said = ask_python(wire, "tables", "drivers/protocol/PROTOCOL.md", stream);
-    assert_string_equal(said, "6 1 2 3 9 4 5 6\n"); /* names and poses have no fixed part that is decoded so */
+    assert_string_equal(said, "6 1 2 3 9 4 5 10 6\n"); /* names and poses have no fixed part that is decoded so */
     free(said);
 }
 

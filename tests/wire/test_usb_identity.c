@@ -1,56 +1,11 @@
 /* Heads on USB/IP with nothing configured of their identity: two that run at a time differ in serial number and bus id,
- * and in nothing that belongs to the stream; what is configured stays as it is. Numbers on the wire: the kernel's
- * Documentation/usb/usbip_protocol.rst, version 1.1.1. */
+ * and in nothing that belongs to the stream; what is configured stays as it is. */
 #include "tests/wire/room.h"
-
-enum { DEVICE_LEN = 312, BUS_ID = 256, BUS_ID_LEN = 32 };
+#include "tests/wire/usbip_host.h"
 
 struct identity {
-    char bus_id[BUS_ID_LEN + 1], serial[128], hash[65];
+    char bus_id[USBIP_BUS_ID_LEN + 1], serial[128], hash[65];
 };
-
-static void read_all(int fd, void *data, size_t len)
-{
-    for (uint8_t *at = data; len > 0;) {
-        struct pollfd slot = {.fd = fd, .events = POLLIN};
-        assert_int_equal(poll(&slot, 1, DEADLINE_MS), 1);
-        const ssize_t n = read(fd, at, len);
-        assert_true(n > 0);
-        at += n;
-        len -= (size_t)n;
-    }
-}
-
-/* Imports the device by the bus id that the list has, and reads its string of the serial number: the one after the
- * model's four. */
-static void ask_device(const char *endpoint, struct identity *out)
-{
-    static const uint8_t list[8] = {0x01, 0x11, 0x80, 0x05};
-    uint8_t import[8 + BUS_ID_LEN] = {0x01, 0x11, 0x80, 0x03}, device[DEVICE_LEN], head[12];
-    uint8_t submit[48] = {[3] = 1, [7] = 1, [15] = 1, [26] = 1, [40] = 0x80, 6, 5, 3, 0x09, 0x04, 0, 1}, reply[48];
-    uint8_t string[256];
-    int fd = raw_connect(endpoint);
-    raw_write(fd, list, sizeof list);
-    read_all(fd, head, 12);
-    read_all(fd, device, DEVICE_LEN);
-    memcpy(out->bus_id, device + BUS_ID, BUS_ID_LEN);
-    read_all(fd, string, 3 * 4); /* its interfaces */
-    memcpy(import + 8, out->bus_id, BUS_ID_LEN);
-    raw_write(fd, import, sizeof import);
-    read_all(fd, head, 8);
-    assert_int_equal(head[7], 0);
-    read_all(fd, device, DEVICE_LEN);
-    memcpy(submit + 8, (const uint8_t[]){device[290], device[291], device[294], device[295]}, 4); /* bus, device */
-    raw_write(fd, submit, sizeof submit);
-    read_all(fd, reply, sizeof reply);
-    assert_int_equal(reply[23], 0);
-    assert_in_range(reply[27], 2, sizeof out->serial);
-    read_all(fd, string, reply[27]);
-    for (int i = 1; i < reply[27] / 2; i++)
-        out->serial[i - 1] = (char)string[2 * i];
-    out->serial[reply[27] / 2 - 1] = '\0';
-    close(fd);
-}
 
 /* The scan over TCP, as its reader hashes it: the descriptor with the head's *IDN? is in it. */
 static void scan(const struct head *head, struct identity *out)
@@ -75,14 +30,14 @@ static struct head start(struct wire *wire, const char *serial)
     return head_start(wire, room_config_write(wire, &c), more);
 }
 
-/* "usbip:127.0.0.1:PORT" as the socket that it is. */
+/* The serial number is the string after the model's four. */
 static void ask(const struct head *head, struct identity *out)
 {
-    char at[128];
-    const char *endpoint = head_endpoint(head, "usb");
+    struct usbip_host host = usbip_host_open(head);
     memset(out, 0, sizeof *out);
-    snprintf(at, sizeof at, "tcp%s", strchr(endpoint, ':'));
-    ask_device(at, out);
+    memcpy(out->bus_id, host.device + USBIP_BUS_ID, USBIP_BUS_ID_LEN);
+    usbip_host_string(&host, 5, out->serial, sizeof out->serial);
+    usbip_host_close(&host);
 }
 
 static void test_two_heads(void **state)

@@ -1127,8 +1127,8 @@ class Head:
         if e["n_beams"] > (len(frame.payload) - 64) // _BEAM.size:
             raise ScanheadError("an emitter frame shorter than its beams")
         beams = (_BEAM.unpack_from(frame.payload, 64 + _BEAM.size * i) for i in range(e["n_beams"]))
-        e["beams"] = [(1e-6 * elevation, 1e-6 * azimuth, offset_ns) for elevation, azimuth, offset_ns in beams]
-        self.emitter = e
+        self.emitter = dict(e, beams=[(1e-6 * elevation, 1e-6 * azimuth, offset_ns)
+                                      for elevation, azimuth, offset_ns in beams])
 
     def _absorb_anchor(self, frame: Frame) -> None:
         a = frame.fields

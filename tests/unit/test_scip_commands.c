@@ -1,5 +1,6 @@
-/* SCIP, the sensor's side: commands and their answers. What is expected was written from Hokuyo's description of the
- * protocol, sums added up apart from this program; whole replies of an URG-04LX are those that its maker has published. */
+/* SCIP, the sensor's side: commands and their answers. What is expected was written from Hokuyo's description
+ * of the protocol, sums added up apart from this program; whole replies of an URG-04LX are those that its
+ * maker has published. */
 #include "tests/unit/scip_rig.h"
 
 #define VV_URG                                                                                                 \
@@ -50,7 +51,7 @@ static void state_of_the_sensor(void **state)
 {
     (void)state;
     open_published();
-    rig.ops->time(rig.protocol, 0x081615 * 1000000LL + 999999);
+    rig.ops->time(rig.protocol, (0x1000000 + 0x081615) * 1000000LL + 999999); /* wrapped once */
     scip_ask("II\n", "II\n00P\nMODL:URG-04LX(Hokuyo Automatic Co.,Ltd.);N\nLASR:OFF;7\n"
                      "SCSP:Initial(600[rpm])<-Default setting by user;A\nMESM:IDLE;:\n"
                      "SBPS:19200[bps]<-Default setting by user;A\nTIME:081615;N\nSTAT:Sensor works well.;8\n\n");

@@ -1,0 +1,197 @@
+/* Emitters of head profiles: what follows from them, and what is refused, with file, line and key. */
+#include "tests/unit/config_rig.h"
+
+/* A shipped profile with its first `old` replaced, as heads/mine.yaml beside the configuration. */
+static int load_changed(const char *name, const char *old, const char *with)
+{
+    char path[128], text[8192], changed[8448];
+    snprintf(path, sizeof path, "config/heads/%s.yaml", name);
+    FILE *file = fopen(path, "rb");
+    assert_non_null(file);
+    size_t len = fread(text, 1, sizeof text - 1, file);
+    fclose(file);
+    text[len] = '\0';
+    char *at = strstr(text, old);
+    if (at == NULL) fail_msg("%s has no %s", name, old);
+    snprintf(changed, sizeof changed, "%.*s%s%s", (int)(at - text), text, with, at + strlen(old));
+    write_in("heads/mine.yaml", changed);
+    return load_edited("any-rate\n" PRR LINES, "mine\n");
+}
+
+/* The same with further keys of the head's settings. */
+static int load_settings(const char *name, const char *settings)
+{
+    char head[256];
+    snprintf(head, sizeof head, "%s\n%s", name, settings);
+    return load_edited("any-rate\n" PRR LINES, head);
+}
+
+static void rates_and_angles_follow(void **state)
+{
+    (void)state;
+    assert_loads(load_settings("hokuyo-ust-20lx", ""));
+    assert_int_equal(cfg->head.settings.prr_uhz, INT64_C(1440) * 40 * 1000000);
+    assert_int_equal(cfg->profile.fov_min_udeg, -135000000);
+    assert_int_equal(cfg->profile.fov_max_udeg, 135000000);
+    assert_int_equal(cfg->head.settings.line_start_udeg, -135000000);
+    assert_string_equal(cfg->profile.firmware, "4.0.0");
+    assert_loads(load_settings("hokuyo-urg-04lx", "  lines_hz: 9.25\n"));
+    assert_int_equal(cfg->head.settings.prr_uhz, INT64_C(1024) * 9250000);
+    assert_int_equal(cfg->profile.fov_min_udeg, -119531250); /* (44 - 384) 360 / 1024 deg */
+    assert_loads(load_settings("hokuyo-urg-04lx", "  lines_hz: 9.25\n  prr_hz: 9472\n"));
+    assert_loads(load_settings("velodyne-vlp16", "  lines_hz: 10\n"));
+    assert_int_equal(cfg->head.settings.prr_uhz, 289351851852);
+    assert_int_equal(cfg->profile.emitter.sequence_ticks, 24);
+    assert_loads(load_settings("riegl-vz400i", ""));
+    assert_int_equal(cfg->profile.emitter.kind, EMITTER_LINE);
+    assert_string_equal(cfg->profile.firmware, "1.0.0");
+}
+
+struct wrong {
+    const char *profile, *old, *with, *key, *fragment;
+};
+
+/* One of the faults; others may follow from the same change. */
+static void check_wrong(const struct wrong *w)
+{
+    char start[128], key[64];
+    if (load_changed(w->profile, w->old, w->with) != SH_EINPUT) fail_msg("%s was taken", w->with);
+    snprintf(start, sizeof start, "%s/heads/mine.yaml:", dir);
+    snprintf(key, sizeof key, ": %s: ", w->key);
+    for (uint32_t i = 0; i < faults.n && i < CONFIG_MAX_FAULTS; i++) {
+        const char *text = faults.fault[i].text, *line = text + strlen(start);
+        if (strncmp(text, start, strlen(start)) == 0 && *line > '0' && *line <= '9' && strstr(text, key) != NULL &&
+            strstr(text, w->fragment) != NULL)
+            return;
+    }
+    fail_msg("%s: none of %u faults says so of %s; the first: %s", w->with, faults.n, w->key, err.text);
+}
+
+static void tables_that_do_not_fit_are_refused(void **state)
+{
+    (void)state;
+    static const char urg[] = "hokuyo-urg-04lx", vlp[] = "velodyne-vlp16";
+    static const struct wrong wrong[] = {
+        {urg, "emitter: planar", "emitter: plane", "emitter", "allowed line, planar, beams, sphere, directions"},
+        {urg, "emitter: planar", "emitter: beams", "steps_per_turn", "allowed only with emitter: planar"},
+        {urg, "emitter: planar\n", "", "steps_per_turn", "allowed only with emitter: planar"},
+        {urg, "steps_per_turn: { value: 1024,", "steps_per_turn: { value: 0,", "steps_per_turn", "1 to 1000000"},
+        {urg, "steps_per_turn: { value: 1024,", "steps_per_turn: { value: 725,", "last_step",
+         "725, and a turn has 725 steps; allowed up to 724"},
+        {urg, "first_step: { value: 44,", "first_step: { value: 726,", "first_step",
+         "726 comes after last_step 725; allowed 0 to 725"},
+        {urg, "front_step: { value: 384,", "front_step: { value: 1024,", "front_step", "allowed up to 1023"},
+        {urg, "front_step: { value: 384, from: data sheet }\n", "", "front_step", "missing"},
+        {urg, "value: counter-clockwise", "value: left", "step_direction", "allowed clockwise, counter-clockwise"},
+        {urg, "lines_max_hz: { value: 10,", "lines_max_hz: { value: 10000,", "steps_per_turn",
+         "make 10240000 pulses/s; allowed up to 10000000"},
+        {urg, "emitter: planar", "emitter: planar\nfacets: { value: 1, from: assumed }", "facets",
+         "allowed only with emitter: line"},
+        {urg, "emitter: planar", "emitter: planar\nprr_max_hz: { value: 10240, from: assumed }", "prr_max_hz",
+         "allowed only with emitter: line"},
+        {vlp, "firing_ns: { value: 55296,", "firing_ns: { value: 34560,", "beams",
+         "34560 ns ends before its last firing; allowed more than 34560 ns"},
+        {vlp, "firing_ns: { value: 55296,", "firing_ns: { value: 55296.0001,", "firing_ns",
+         "too fine; allowed multiples of 0.001 ns"},
+        {vlp, "firing_ns: { value: 55296,", "firing_ns: { value: 60000000,", "firing_ns",
+         "longer than a turn at lines_max_hz; allowed up to 50000000 ns"},
+        {vlp, "offset_ns: 2304,", "offset_ns: 4608,", "beams", "beam 3 fires after 4608 ns, the one before it"},
+        {vlp, "offset_ns: 0,", "offset_ns: 1,", "beams", "the first beam fires after 1 ns; allowed 0"},
+        {vlp, "offset_ns: 0,", "offset_ns: -1,", "beams[0].offset_ns", "allowed a whole number"},
+        {vlp, "elevation_deg: -15,", "elevation_deg: -91,", "beams[0].elevation_deg", "allowed -90 to 90 deg"},
+        {vlp, "elevation_deg: -15, ", "", "beams[0].elevation_deg", "missing"},
+        {vlp, "beams:\n", "step_deg: { value: 1, from: assumed }\nbeams:\n", "step_deg",
+         "allowed only with emitter: sphere"},
+    };
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++)
+        check_wrong(&wrong[i]);
+}
+
+/* What settings can't be with such a head; the line is that of the configuration. */
+static void settings_that_do_not_fit_are_refused(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *profile, *settings, *says;
+    } wrong[] = {
+        {"hokuyo-urg-04lx", "  prr_hz: 10000\n",
+         ":3: head.prr_hz: 10000, but a line of head profile hokuyo-urg-04lx has 1024 pulses; allowed 10240"},
+        {"hokuyo-urg-04lx", "  prr_hz: 10000\n  lines_hz: 9.5\n",
+         ":3: head.prr_hz: 10000, but a line of head profile hokuyo-urg-04lx has 1024 pulses; allowed 9728"},
+        {"hokuyo-urg-04lx", "  lines_hz: 11\n", ":3: head.lines_hz: 11 is outside the limits of head profile"},
+        {"hokuyo-urg-04lx", "  pan_deg_s: 1\n", ":3: head.pan_deg_s: 1 is outside"},
+        {"hokuyo-urg-04lx", "  line_start_deg: -130\n", "allowed -119.53125 to 119.882813"},
+        {"velodyne-vlp16", "  prr_hz: 300000\n", ":3: head.prr_hz: 300000 is outside"},
+        {"velodyne-vlp16", "  ambiguity: folded\n", ":3: head.ambiguity: the pulses of head profile velodyne-vlp16"},
+    };
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        if (load_settings(wrong[i].profile, wrong[i].settings) != SH_EINPUT) fail_msg("%s", wrong[i].settings);
+        assert_says(wrong[i].says);
+    }
+    const char *const sets[] = {"head.profile=sick-lms111", "head.lines_hz=25", "head.prr_hz=36000",
+                                "instrument.mirror_index_deg=0.1"};
+    assert_int_equal(load_sets(sets, 4), SH_EINPUT);
+    assert_says("--set instrument.mirror_index_deg: an error of a mirror, and head profile sick-lms111 has emitter: "
+                "planar; allowed with a line head");
+}
+
+/* ---- lists of directions */
+
+static int load_list(const char *list)
+{
+    char text[256];
+    write_in("heads/list.txt", list);
+    snprintf(text, sizeof text, "emitter: directions\ndirections: list.txt\n");
+    /* in place of the beams */
+    char path[] = "config/heads/velodyne-vlp16.yaml", whole[8192], changed[8448];
+    FILE *file = fopen(path, "rb");
+    assert_non_null(file);
+    whole[fread(whole, 1, sizeof whole - 1, file)] = '\0';
+    fclose(file);
+    const char *from = strstr(whole, "emitter:"), *to = strstr(whole, "lines_min_hz:");
+    snprintf(changed, sizeof changed, "%.*s%s%s", (int)(from - whole), whole, text, to);
+    write_in("heads/mine.yaml", changed);
+    return load_settings("mine", "  lines_hz: 10\n");
+}
+
+static void lists_name_their_line(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *list, *says;
+    } wrong[] = {
+        {"", "list.txt: no direction; allowed 1 to 1000000 rows"},
+        {"# nothing\n", "no direction"},
+        {"0 1 0\n1 0\n", "list.txt, line 2: 2 numbers; allowed 3, x y z, in each row"},
+        {"0 1\n\n1 0 0\n", "list.txt, line 3: 3 numbers; allowed 2, azimuth and elevation in degrees, in each row"},
+        {"0\n", "list.txt, line 1: 1 number; allowed 3, x y z, or 2,"},
+        {"0 1 0 0\n", "list.txt, line 1: not a direction"},
+        {"0 one 0\n", "list.txt, line 1: not a direction"},
+        {"0 nan 0\n", "list.txt, line 1: not a direction"},
+        {"0 0 0\n", "list.txt, line 1: 0 0 0 is no direction"},
+        {"0 90.5\n", "list.txt, line 1: an elevation of 90.5 deg; allowed -90 to 90"},
+    };
+    assert_loads(load_list("0 1 0\n 1 0 0 # right\n\n-1\t-1\t-1\r\n"));
+    assert_int_equal(cfg->profile.emitter.steps, 3);
+    assert_int_equal(cfg->head.settings.prr_uhz, 30000000);
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        if (load_list(wrong[i].list) != SH_EINPUT) fail_msg("%s was taken", wrong[i].list);
+        assert_says("heads/mine.yaml:7: directions: ");
+        assert_says(wrong[i].says);
+    }
+    assert_loads(load_list("0 1 0\n"));
+    const char *const sets[] = {"head.line_start_deg=10"};
+    assert_int_equal(load_sets(sets, 1), SH_EINPUT);
+    assert_says("has a list of directions; allowed without it");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(rates_and_angles_follow),
+        cmocka_unit_test(tables_that_do_not_fit_are_refused),
+        cmocka_unit_test(settings_that_do_not_fit_are_refused),
+        cmocka_unit_test(lists_name_their_line),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}
