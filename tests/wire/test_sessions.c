@@ -147,21 +147,15 @@ static void many_come_one_after_the_other(void **state)
     struct head head =
         head_start(wire, room_config_write(wire, &config), (const char *const[]){"--set", "head.start=on", NULL});
     const char *at = head_endpoint(&head, "tcp");
-    uint64_t refused = 0;
     for (int i = 0; i < CONNECTIONS; i++) {
         c = (struct client){.fd = raw_connect(at)};
         say(&c, i % 3 == 0 ? "PP\n" : i % 3 == 1 ? "VV\nPP\nMD0000" : "");
-        /* The head may not have seen the one before go. Then it turns this one away, as it says. */
-        if (i % 3 != 2) refused += answer(&c) == NULL;
+        if (i % 3 != 2) assert_non_null(answer(&c)); /* not turned away because of the one before */
         close(c.fd);
     }
-    do {
-        c = (struct client){.fd = raw_connect(at)};
-    } while (ask(&c, "VV\n") == NULL && close(c.fd) == 0);
-    assert_true(refused < CONNECTIONS / 2);
-    close(c.fd);
     head_end(&head, SIGTERM);
-    assert_int_equal(stats_uint(wire, "lost_pulses"), 0);
+    assert_true(stats_uint(wire, "pulses") > 0); /* the scan went on */
+    assert_int_equal(stats_link_uint(wire, "lost_units"), 0);
 }
 
 /* ---- a client that doesn't read */
@@ -289,7 +283,7 @@ static void garbage_and_sudden_ends(void **state)
     close(fd);
     head_end(&head, SIGTERM);
     assert_true(stats_link_uint(wire, "lost_input_bytes") + stats_link_uint(wire, "wrong_requests") > 0);
-    assert_int_equal(stats_uint(wire, "lost_pulses"), 0);
+    assert_true(stats_uint(wire, "pulses") > 0); /* the scan went on */
 }
 
 /* ---- the session's end from the head's side */
