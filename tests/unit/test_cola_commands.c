@@ -509,5 +509,5 @@ int main(void)
         CASE(long_requests_are_answered),
         CASE(broken_telegrams_do_no_harm),
     };
-    return cmocka_run_group_tests_name("cola", tests, NULL, NULL);
+    return cmocka_run_group_tests_name("cola commands", tests, NULL, NULL);
 }
