@@ -76,8 +76,8 @@ static void check_link(struct cfg_reader *rd, struct config *cfg, uint32_t i)
                                       [LINK_PTY] = "type, path, protocol",
                                       [LINK_TCP] = "type, address, port, max_sessions, protocol",
                                       [LINK_USB] =
-                                          "type, backend, address, port, path, attach, udc, speed, vid, pid, serial, "
-                                          "protocol",
+                                          ("type, backend, address, port, path, attach, udc, speed, vid, pid, serial, "
+                                           "protocol"),
                                       [LINK_UDP] = "type, address, port, interface, protocol"};
     struct link_spec *link = &cfg->link[i];
     char owner[64];
