@@ -10,9 +10,9 @@
 set -eu
 build=$1
 part=${2:-}
-waiting="slow_reader signals same_stream clients join"
+waiting="three_heads slow_reader grabber_hokuyo grabber_velodyne signals same_stream clients join"
 alone="bench_cli latency overrun ring_threads"
-longest="leaks meshes beam_reference range beam plan coordinates georef_default gpsd attributes moving travel ticks"
+longest="grabber_sick leaks meshes beam_reference range beam plan coordinates georef_default gpsd attributes moving travel ticks"
 
 wanted() {
     [ -z "$part" ] || [ "$part" = "$1" ]
@@ -49,5 +49,5 @@ apart() {
         if [ -z "$part" ] && [ -e "tests/unit/test_$name.c" ]; then echo "$build/asan/tests/unit/test_$name"; fi
     done
 }
-set -- "$@" --4 $(apart $waiting) -- $(apart $alone)
+set -- "$@" --5 $(apart $waiting) -- $(apart $alone)
 exec bash tests/run_tap.sh -j "$(getconf _NPROCESSORS_ONLN)" "$@"

@@ -1,5 +1,7 @@
 #include "tests/wire/grabber.h"
 
+#include <pty.h>
+
 #define PROGRAM "/usr/bin/rawlog-grabber"
 
 void grabber_or_skip(void)
@@ -22,9 +24,12 @@ void grabber_start(struct wire *wire, const char *name, const char *sensor, stru
              wire->dir, name, name, name, sensor);
     snprintf(file, sizeof file, "%s.ini", name);
     snprintf(path, sizeof path, "%s", wire_write_text(wire, file, text));
+    /* It writes to a terminal, and so line by line. */
     int in[2], out[2];
     assert_int_equal(pipe2(in, O_CLOEXEC), 0);
-    assert_int_equal(pipe2(out, O_CLOEXEC), 0);
+    assert_int_equal(openpty(&out[0], &out[1], NULL, NULL, NULL), 0);
+    fcntl(out[0], F_SETFD, FD_CLOEXEC);
+    fcntl(out[1], F_SETFD, FD_CLOEXEC);
     grabber->pid = wire_fork(wire);
     if (grabber->pid == 0) {
         dup2(in[0], 0);
