@@ -34,7 +34,8 @@ struct link_spec {
     int look; /* enum usb_look_id: the device it shows itself as, apart from vid, pid and serial */
     char udc[64];
     char serial[64]; /* empty: no serial number string */
-    int own_serial;  /* serial is only its beginning: drivers/usb/own_identity.h has the rest */
+    int own_serial;  /* serial is only its beginning: drivers/usb/own_identity.h has the rest, */
+    char whose[300]; /* which needs this: what is the same when the head is started again */
 };
 
 enum link_event_kind {

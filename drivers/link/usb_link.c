@@ -21,7 +21,7 @@ struct usb_link {
     int n;                          /* sessions of the head's look */
     int reported[USB_MAX_SESSIONS]; /* the caller takes it to be open */
     const char *news;               /* the back end's, until reported */
-    int claim;                      /* of the head's own number; -1: its identity is configured */
+    struct usb_claims claims;       /* of the head's own identity */
 };
 
 static const struct usb_session_row *row_of(const struct usb_link *self, int i)
@@ -32,7 +32,7 @@ static const struct usb_session_row *row_of(const struct usb_link *self, int i)
 static void free_link(struct usb_link *self)
 {
     usb_device_free(self->head.device);
-    if (self->claim >= 0) close(self->claim);
+    usb_give_up(&self->claims);
     free(self);
 }
 
@@ -47,7 +47,7 @@ static int usb_open(const struct link_spec *spec, void **link, struct sh_err *er
                                        .attach = spec->attach,
                                        .retry_ms = spec->retry_ms};
     snprintf(id.serial, sizeof id.serial, "%s", spec->serial);
-    self->claim = -1;
+    self->claims = USB_NO_CLAIMS;
     snprintf(backend.address, sizeof backend.address, "%s", spec->address);
     snprintf(backend.path, sizeof backend.path, "%s", spec->path);
     snprintf(backend.udc, sizeof backend.udc, "%s", spec->udc);
@@ -57,7 +57,7 @@ static int usb_open(const struct link_spec *spec, void **link, struct sh_err *er
     int rc = look != NULL ? SH_OK : sh_fail(err, SH_EINPUT, "link usb: no such look");
     if (rc == SH_OK)
         rc = self->ops != NULL ? SH_OK : sh_fail(err, SH_EINPUT, "link usb: this build has no such back end");
-    if (rc == SH_OK && spec->own_serial) rc = usb_own_identity(&id, &self->claim, err);
+    if (rc == SH_OK && spec->own_serial) rc = usb_own_identity(&id, spec->whose, &self->claims, err);
     if (rc == SH_OK && spec->own_serial && !look->has_serial) id.serial[0] = '\0';
     if (rc == SH_OK) rc = scanhead_usb_create(look, &id, &self->head, err);
     if (rc == SH_OK) rc = self->ops->open(&backend, self->head.device, &self->backend, err);

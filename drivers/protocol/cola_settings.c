@@ -4,7 +4,8 @@
 
 #include "drivers/protocol/cola.h"
 
-enum { FREQUENCY_ERROR = 1, RESOLUTION_ERROR = 2, AREA_ERROR = 4, OTHER_ERROR = 5 };
+/* of mLMPsetscancfg */
+enum { OK, FREQUENCY_ERROR, RESOLUTION_ERROR, RESOLUTION_AND_AREA_ERROR, AREA_ERROR, OTHER_ERROR };
 
 void cola_settings_reset(struct cola *self)
 {
@@ -125,13 +126,18 @@ enum cola_error cola_set_scan_cfg(struct cola *self, struct cola_args *args, str
     const enum cola_error error = cola_args_end(args);
     if (error != COLA_OK) return error;
     if (!g->fits) return COLA_CONDITION;
-    const int area = start_e4 == g->start_e4 && stop_e4 == cola_beam_angle(g, g->n - 1);
-    cola_put_u(out, 1,
-               scan_chz != g->scan_chz ? FREQUENCY_ERROR
-               : step != step_e4(g)    ? RESOLUTION_ERROR
-               : !area                 ? AREA_ERROR
-               : sectors != 1          ? OTHER_ERROR
-                                       : 0);
+    const int step_fits = step == step_e4(g);
+    const int area_fits = start_e4 == g->start_e4 && stop_e4 == cola_beam_angle(g, g->n - 1);
+    uint32_t status = OK;
+    if (scan_chz != g->scan_chz)
+        status = FREQUENCY_ERROR;
+    else if (!step_fits)
+        status = area_fits ? RESOLUTION_ERROR : RESOLUTION_AND_AREA_ERROR;
+    else if (!area_fits)
+        status = AREA_ERROR;
+    else if (sectors != 1)
+        status = OTHER_ERROR;
+    cola_put_u(out, 1, status);
     put_scan_cfg(g, out);
     return COLA_OK;
 }

@@ -77,7 +77,7 @@ int32_t cola_arg_i(struct cola_args *args, unsigned bytes)
     if (args->form == COLA_B) return extend(read_bytes(args, bytes), bytes);
     const uint32_t v = read_number(args, &sign), half = most(bytes) / 2 + 1;
     if (v > (sign == '+' ? half - 1 : sign == '-' ? half : most(bytes))) return (int32_t)fail(args, COLA_OVERFLOW);
-    return sign == '-' ? (int32_t) - (int64_t)v : extend(v, bytes);
+    return sign == '-' ? (int32_t)(0 - (int64_t)v) : extend(v, bytes);
 }
 
 void cola_arg_text(struct cola_args *args, char *dst, size_t cap)

@@ -141,7 +141,7 @@ static int has_room(const struct ptx *ptx, uint32_t n)
 static int ptx_scan(void *rec, struct sh_err *err)
 {
     struct ptx *ptx = rec;
-    const int kind = ptx->base.track.emitter_kind;
+    const int kind = ptx->base.track.emitter.kind;
     if (kind == SCANHEAD_EMIT_BEAMS || kind == SCANHEAD_EMIT_DIRECTIONS)
         return sh_fail(err, SH_EFORMAT,
                        "%s: a PTX grid has rows and columns, and this head fires %s; allowed .ply .las .e57 .shs",

@@ -5,6 +5,8 @@
 
 #include "drivers/protocol/native.h"
 
+__extension__ typedef unsigned __int128 u128;
+
 int track_start_gps(const struct track *track, double *gps_s)
 {
     if (scanhead_gps_time(track->sh, 0, gps_s) != 0) return 0;
@@ -76,7 +78,7 @@ static void set_limits(struct track *t, const struct native_descriptor *d)
     const double lines_hz = 1e-6 * (double)d->lines_uhz, prr_hz = 1e-6 * (double)d->prr_uhz;
     const double sweep_s =
         d->pan_udeg_s > 0 ? ((double)d->pan_stop_udeg - (double)d->pan_start_udeg) / (double)d->pan_udeg_s : 0;
-    t->emitter_kind = SCANHEAD_EMIT_LINE;
+    t->emitter.kind = SCANHEAD_EMIT_LINE;
     t->max_pulses = lines_hz > 0 && prr_hz > 0 ? whole_u32(ceil(prr_hz / lines_hz) + 1) : UINT32_MAX;
     t->max_lines = d->frames > 0 ? whole_u32(d->frames * (ceil(fabs(sweep_s) * lines_hz) + 1)) : UINT32_MAX;
 }
@@ -84,12 +86,23 @@ static void set_limits(struct track *t, const struct native_descriptor *d)
 /* What an emitter frame says beyond its descriptor. A turn of beams begins anywhere in a firing sequence. */
 static void set_emitter_limits(struct track *t)
 {
-    struct scanhead_emitter e;
-    if (scanhead_get_emitter(t->sh, &e) != 0) return;
-    t->emitter_kind = e.kind;
-    if (e.kind == SCANHEAD_EMIT_BEAMS && t->max_pulses < UINT32_MAX - SCANHEAD_MAX_BEAMS) t->max_pulses += e.n_beams;
-    if (e.kind == SCANHEAD_EMIT_SPHERE && t->max_lines != UINT32_MAX)
-        t->max_lines = whole_u32((double)t->max_lines * e.rings);
+    if (scanhead_get_emitter(t->sh, &t->emitter) != 0) return;
+    const struct scanhead_emitter *e = &t->emitter;
+    if (e->kind == SCANHEAD_EMIT_BEAMS && t->max_pulses < UINT32_MAX - SCANHEAD_MAX_BEAMS) t->max_pulses += e->n_beams;
+    if (e->kind == SCANHEAD_EMIT_SPHERE && t->max_lines != UINT32_MAX)
+        t->max_lines = whole_u32((double)t->max_lines * e->rings);
+}
+
+/* Number in the scan of the beam that fires at t_ns: the last one whose time, in whole nanoseconds, is no later. */
+static uint64_t firing_at(const struct scanhead_emitter *e, uint64_t t_ns)
+{
+    const u128 num = e->sequence_ns_num, den = e->sequence_ns_den, end = ((u128)t_ns + 1) * den;
+    if (num == 0) return 0;
+    const u128 sequence = (end - 1) / num;
+    uint64_t i = 0;
+    while (i + 1 < e->n_beams && sequence * num + e->beam[i + 1].offset_ns * den < end)
+        i++;
+    return (uint64_t)sequence * e->n_beams + i;
 }
 
 /* The end of a line says where the next one begins. Where it was lost, the times in the frame say so, as long
@@ -98,6 +111,10 @@ static uint64_t first_row(const struct track *t, const struct scanhead_frame *fr
 {
     if (t->state.have_next_line && t->state.next_line == frame->scan_line && t->state.next_line_pulse0 <= frame->pulse0)
         return frame->pulse0 - t->state.next_line_pulse0;
+    if (t->emitter.kind == SCANHEAD_EMIT_BEAMS && frame->line_t0_ns >= 0) {
+        const uint64_t first = firing_at(&t->emitter, (uint64_t)frame->line_t0_ns);
+        return first < frame->pulse0 ? frame->pulse0 - first : 0;
+    }
     double since_s = 1e-9 * ((double)frame->scan_t0_ns - (double)frame->line_t0_ns);
     return whole_u32(since_s * t->info.prr_hz);
 }

@@ -68,7 +68,7 @@ struct track {
     struct track_missing missing;
     /* What the descriptor says a scan can have at most: lines, and pulses in one of them; UINT32_MAX: no end. */
     uint32_t max_lines, max_pulses;
-    int emitter_kind; /* enum scanhead_emitter_kind */
+    struct scanhead_emitter emitter; /* of the last descriptor */
     double scale_m; /* of coordinates in the recording: the stream's; coarser where the head moves far */
     struct scanhead_point point[TRACK_BATCH];
     uint32_t row[TRACK_BATCH]; /* of each point: pulses since the line's first, the blind ones included */

@@ -20,29 +20,34 @@ static size_t read_line(const char *path, char *text, size_t len)
     return strlen(text);
 }
 
+static void digest_text(const char *text, size_t len, uint8_t digest[SHA256_DIGEST_SIZE])
+{
+    struct sha256_ctx ctx;
+    sha256_init(&ctx);
+    sha256_update(&ctx, len, (const uint8_t *)text);
+    sha256_digest(&ctx, SHA256_DIGEST_SIZE, digest);
+}
+
 /* A machine has an id for good (machine-id(5), which asks not to show it as it is), or at least one until it is
  * started again. */
-static void put_serial(struct usb_identity *id)
+static void put_serial(struct usb_identity *id, const char *whose, unsigned place)
 {
-    char machine[64], text[96];
+    char machine[64], text[400];
     uint8_t digest[SHA256_DIGEST_SIZE];
-    struct sha256_ctx ctx;
     if (read_line("/etc/machine-id", machine, sizeof machine) == 0)
         read_line("/proc/sys/kernel/random/boot_id", machine, sizeof machine);
-    const int len = snprintf(text, sizeof text, "scanhead %s %u", machine, id->number);
-    sha256_init(&ctx);
-    sha256_update(&ctx, (size_t)len, (const uint8_t *)text);
-    sha256_digest(&ctx, sizeof digest, digest);
+    const int len = snprintf(text, sizeof text, "scanhead %s %u %.299s", machine, place, whose);
+    digest_text(text, (size_t)len, digest);
     const size_t used = strnlen(id->serial, sizeof id->serial - 10);
     snprintf(id->serial + used, sizeof id->serial - used, "-%02x%02x%02x%02x", digest[0], digest[1], digest[2],
              digest[3]);
 }
 
 /* A socket name outside the file system: the kernel gives it to one process, and takes it back when that ends. */
-static int claim_number(unsigned number, int *claim)
+static int claim_name(const char *name, unsigned number, int *claim)
 {
     struct sockaddr_un at = {.sun_family = AF_UNIX};
-    const int len = snprintf(at.sun_path + 1, sizeof at.sun_path - 1, "scanhead-usb-%u", number);
+    const int len = snprintf(at.sun_path + 1, sizeof at.sun_path - 1, "scanhead-usb-%s%u", name, number);
     *claim = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     if (*claim < 0) return errno;
     if (bind(*claim, (struct sockaddr *)&at, (socklen_t)(offsetof(struct sockaddr_un, sun_path) + 1 + (size_t)len)) ==
@@ -54,16 +59,37 @@ static int claim_number(unsigned number, int *claim)
     return error;
 }
 
-int usb_own_identity(struct usb_identity *id, int *claim, struct sh_err *err)
+/* The lowest number from 1 on that is free under that name. 0, or an errno: EADDRINUSE when there is none. */
+static int claim_lowest(const char *name, unsigned *number, int *claim)
 {
     int error = EADDRINUSE;
-    for (id->number = 1; id->number <= USB_MAX_HEADS; id->number++)
-        if ((error = claim_number(id->number, claim)) != EADDRINUSE) break;
+    for (*number = 1; *number <= USB_MAX_HEADS; ++*number)
+        if ((error = claim_name(name, *number, claim)) != EADDRINUSE) break;
+    return error;
+}
+
+int usb_own_identity(struct usb_identity *id, const char *whose, struct usb_claims *claims, struct sh_err *err)
+{
+    uint8_t digest[SHA256_DIGEST_SIZE];
+    char name[24];
+    unsigned place;
+    digest_text(whose, strlen(whose), digest);
+    snprintf(name, sizeof name, "%02x%02x%02x%02x%02x%02x%02x%02x-", digest[0], digest[1], digest[2], digest[3],
+             digest[4], digest[5], digest[6], digest[7]);
+    int error = claim_lowest("", &id->number, &claims->number);
+    if (error == 0) error = claim_lowest(name, &place, &claims->place);
     if (error == EADDRINUSE)
         return sh_fail(err, SH_EINPUT,
                        "usb: %d heads on USB run on this machine; allowed %d: end one, or set links[].serial",
                        USB_MAX_HEADS, USB_MAX_HEADS);
     if (error != 0) return sh_fail(err, SH_EIO, "usb: no number for this head: %s", strerror(error));
-    put_serial(id);
+    put_serial(id, whose, place);
     return SH_OK;
+}
+
+void usb_give_up(struct usb_claims *claims)
+{
+    if (claims->number >= 0) close(claims->number);
+    if (claims->place >= 0) close(claims->place);
+    *claims = USB_NO_CLAIMS;
 }

@@ -1,8 +1,9 @@
-/* A head's own USB identity, where none is configured: its number among the USB heads on this machine, and a
- * serial number that goes with it.
+/* A head's own USB identity, where none is configured: a serial number that is the same whenever it starts again, and a
+ * number among the USB heads that run on this machine, for the bus id of USB/IP.
  *
- * A head has the lowest number that no other one has. It keeps it as long as it runs. So a head that ends and
- * starts again is the same one to its clients, and two that run at a time differ. */
+ * The serial number follows from the machine and from whose head it is (its configuration). So it does not depend on
+ * which other heads run. Where several of the same configuration run at a time, the second and later ones have serial
+ * numbers of their own, in the order in which they start. The number is the lowest that no other head has. */
 #ifndef DRIVERS_USB_OWN_IDENTITY_H
 #define DRIVERS_USB_OWN_IDENTITY_H
 
@@ -10,9 +11,16 @@
 
 enum { USB_MAX_HEADS = 126 }; /* USB/IP shows them as devices 2 to 127 of one bus */
 
-/* Sets id->number, and appends to id->serial "-" and eight hexadecimal digits of the machine and the number.
- * claim: a descriptor that holds the number until it is closed. Heads in different network namespaces don't
- * see each other's numbers. SH_EINPUT: all numbers are taken; SH_EIO. */
-int usb_own_identity(struct usb_identity *id, int *claim, struct sh_err *err);
+/* Descriptors that hold what a head has for itself, until they are closed; -1: none. */
+struct usb_claims {
+    int number, place;
+};
+#define USB_NO_CLAIMS ((struct usb_claims){-1, -1})
+
+/* Sets id->number, and appends to id->serial "-" and eight hexadecimal digits. whose: text that is the same when the
+ * head starts again. Heads in different network namespaces don't see each other. SH_EINPUT: all numbers are taken;
+ * SH_EIO. What was claimed is to be given up in both cases. */
+int usb_own_identity(struct usb_identity *id, const char *whose, struct usb_claims *claims, struct sh_err *err);
+void usb_give_up(struct usb_claims *claims);
 
 #endif

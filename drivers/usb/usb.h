@@ -77,7 +77,7 @@ struct usb_function_row {
 struct usb_model {
     uint8_t class, subclass, protocol; /* of the device */
     uint16_t bcd_device;
-    uint8_t self_powered;          /* though it takes max_power_ma from the bus; 0 mA say so as well */
+    uint8_t self_powered; /* though it takes max_power_ma from the bus; 0 mA say so as well */
     uint16_t max_power_ma;
     const char *const *string;     /* by index from 1, UTF-8; NULL ends the list */
     uint8_t manufacturer, product; /* indices, 0 none; the serial number's is the one after the list */
@@ -86,7 +86,7 @@ struct usb_model {
     const struct usb_interface_row *interface; /* rows */
     uint8_t n_functions, n_interfaces, n_rows;
     uint8_t fixed_addresses; /* its clients know its endpoints by their addresses, whatever descriptors say */
-    uint8_t ms_vendor_code; /* bRequest for the Microsoft OS 2.0 set; unused without compatible ids */
+    uint8_t ms_vendor_code;  /* bRequest for the Microsoft OS 2.0 set; unused without compatible ids */
 };
 
 static inline int usb_is_self_powered(const struct usb_model *model)

@@ -38,10 +38,7 @@ static void check_usb_link(struct cfg_reader *rd, const struct config *cfg, stru
     char owner[64];
     const int has_port = cfg_is_given(rd, "links[].port", i), has_address = cfg_is_given(rd, "links[].address", i);
     const int is_redir = link->backend == USB_BACKEND_USBREDIR, has_path = cfg_is_given(rd, "links[].path", i);
-    if (link->serial[0] == '\0') {
-        snprintf(link->serial, sizeof link->serial, "%s", cfg->head.serial);
-        link->own_serial = !cfg_is_given(rd, "head.serial", 0);
-    }
+    cfg_set_usb_serial(rd, cfg, link, i);
     cfg_set_usb_look(rd, link, i);
     if (link->backend == USB_BACKEND_USBIP && !has_port) link->port = USB_BACKEND_USBIP_PORT;
     if (!CFG_SOUND(rd, i, "links[].backend")) return;
@@ -79,8 +76,8 @@ static void check_link(struct cfg_reader *rd, struct config *cfg, uint32_t i)
                                       [LINK_PTY] = "type, path, protocol",
                                       [LINK_TCP] = "type, address, port, max_sessions, protocol",
                                       [LINK_USB] =
-                                          "type, backend, address, port, path, attach, udc, speed, vid, pid, serial, "
-                                          "protocol",
+                                          ("type, backend, address, port, path, attach, udc, speed, vid, pid, serial, "
+                                           "protocol"),
                                       [LINK_UDP] = "type, address, port, interface, protocol"};
     struct link_spec *link = &cfg->link[i];
     char owner[64];

@@ -10,25 +10,41 @@ static double from_micro(int64_t micro)
     return 1e-6 * (double)micro;
 }
 
+/* `5 to 20`, or `25` where both are the same. */
+static const char *span(double low, double high, char buf[64])
+{
+    snprintf(buf, 64, low < high ? "%.10g to %.10g" : "%.10g", low, high);
+    return buf;
+}
+
 /* ---- protocols */
 
-/* Beside native and nmea, which any head has. */
-static const struct {
-    const char *maker;
-    enum protocol_id id;
-} spoken[] = {{"Hokuyo", PROTOCOL_SCIP},
-              {"SICK", PROTOCOL_COLA},
-              {"Velodyne", PROTOCOL_VELODYNE},
-              {"Velodyne", PROTOCOL_VELODYNE_POSITION},
-              {"Velodyne", PROTOCOL_VELODYNE_HTTP}};
+/* Whose devices speak it; NULL: any head does. */
+static const char *const makers[PROTOCOL_N] = {[PROTOCOL_SCIP] = "Hokuyo",
+                                               [PROTOCOL_COLA] = "SICK",
+                                               [PROTOCOL_VELODYNE] = "Velodyne",
+                                               [PROTOCOL_VELODYNE_POSITION] = "Velodyne",
+                                               [PROTOCOL_VELODYNE_HTTP] = "Velodyne"};
+
+/* A maker's protocols are for its heads, and for those of other makers that have none but the right emitter. */
+static int speaks(const struct config_profile *p, int id)
+{
+    const struct protocol_ops *ops = protocol_ops_get((enum protocol_id)id);
+    const int fits = ops != NULL && (ops->emitters & 1u << p->emitter.kind) != 0 &&
+                     (p->emitter.kind != EMITTER_BEAMS || ops->n_beams == 0 || ops->n_beams == p->emitter.n_beams);
+    int has_own = 0;
+    if (ops == NULL || makers[id] == NULL) return ops != NULL;
+    for (int i = 0; i < PROTOCOL_N; i++)
+        has_own |= makers[i] != NULL && strcmp(makers[i], p->maker) == 0;
+    return has_own ? strcmp(makers[id], p->maker) == 0 && (fits || ops->emitters == 0) : fits;
+}
 
 static void put_protocols(const struct config_profile *p, FILE *out)
 {
-    fputs("  protocols  native, nmea", out);
-    for (size_t i = 0; i < CFG_LEN(spoken); i++) {
-        const struct protocol_ops *ops = protocol_ops_get(spoken[i].id);
-        if (ops != NULL && strcmp(spoken[i].maker, p->maker) == 0) fprintf(out, ", %s", ops->name);
-    }
+    int n = 0;
+    fputs("  protocols ", out);
+    for (int id = 0; id < PROTOCOL_N; id++)
+        if (speaks(p, id)) fprintf(out, "%s %s", n++ > 0 ? "," : "", protocol_ops_get((enum protocol_id)id)->name);
     fputc('\n', out);
 }
 
@@ -61,15 +77,52 @@ static void put_programs(const struct config_profile *p, FILE *out)
     if (p->n_programs > 0) return;
     struct config_program fastest = p->program[0];
     fastest.used_uhz = (int64_t)((double)p->prr_max_uhz * cfg_used_share(p));
-    snprintf(rates, sizeof rates, "any, %.10g to %.10g", from_micro(p->prr_min_uhz) / 1e3,
-             from_micro(p->prr_max_uhz) / 1e3);
-    put_program(&fastest, rates, out);
+    put_program(&fastest, span(from_micro(p->prr_min_uhz) / 1e3, from_micro(p->prr_max_uhz) / 1e3, rates), out);
+}
+
+/* ---- beam and accuracy */
+
+/* `3.5 mm FWHM, 5.95 mm at 1/e2`: as the maker gives it, then as the program takes it. */
+static void put_width(const struct cfg_reader *rd, const char *key, double given, double at_1_e2, FILE *out)
+{
+    const struct cfg_key *row = cfg_find(&rd->table, key);
+    const char *unit = strcmp(row->unit, "rad") == 0 ? "mrad" : "mm";
+    int definition;
+    memcpy(&definition, (const char *)rd->base + row->definition_offset, sizeof definition);
+    fprintf(out, "%.4g %s %s", 1e3 * given, unit, row->definitions[definition]);
+    if (definition != BEAM_AT_1_E2) fprintf(out, " (%.3g %s at 1/e2)", 1e3 * at_1_e2, unit);
+}
+
+static void put_beam(const struct cfg_reader *rd, const struct config_profile *p, FILE *out)
+{
+    fputs("  beam       exit ", out);
+    put_width(rd, "beam_exit_m", p->beam_exit_given_m, p->beam_exit_m, out);
+    fputs(", divergence ", out);
+    put_width(rd, "beam_divergence_rad", p->beam_divergence_given_rad, p->beam_divergence_rad, out);
+    fprintf(out, ", %.4g nm\n", p->wavelength_nm);
+}
+
+static void put_errors(const struct cfg_reader *rd, const struct config_profile *p, FILE *out)
+{
+    fprintf(out, "  noise      %.3g mm", 1e3 * p->range_sigma_m);
+    if (cfg_is_given(rd, "range_sigma_at_m", 0)) fprintf(out, " at %.4g m", p->range_sigma_at_m);
+    if (p->range_sigma_ppm > 0.0) fprintf(out, " + %.4g ppm", p->range_sigma_ppm);
+    if (p->accuracy_m > 0.0 || p->accuracy_ppm > 0.0) fprintf(out, "; accuracy %.3g mm", 1e3 * p->accuracy_m);
+    if (p->accuracy_ppm > 0.0) fprintf(out, " + %.4g ppm", p->accuracy_ppm);
+    if (p->angle_accuracy_deg > 0.0) fprintf(out, ", angles %.4g deg", p->angle_accuracy_deg);
+    fputc('\n', out);
 }
 
 /* ---- grades */
 
 static int has_grade(const struct cfg_reader *rd, size_t row, int grade)
 {
+    const struct config_profile *p = rd->base;
+    const char *path = rd->table.keys[row].path;
+    for (uint32_t i = 0; strcmp(path, "reaches") == 0 && cfg_is_given(rd, path, 0) && i < p->n_reaches; i++)
+        if ((int)p->reach[i].from == grade) return 1;
+    for (uint32_t i = 0; strcmp(path, "beams") == 0 && i < p->arrangement.n_beams; i++)
+        if ((int)p->arrangement.beam[i].from == grade) return 1;
     for (size_t item = 0; item < CFG_MAX_ITEMS; item++)
         if (rd->from[row][item] == grade + 1) return 1;
     return 0;
@@ -108,6 +161,7 @@ static const char *turn_of(const struct config_profile *p)
 static void put_emitter(const struct cfg_reader *rd, const struct config_profile *p, FILE *out)
 {
     const struct config_emitter *c = &p->arrangement;
+    char lines[64];
     fprintf(out, "  %-10s ", cfg_word(rd, "emitter", (int)c->kind));
     if (c->kind == EMITTER_LINE)
         fprintf(out, "%.10g to %.10g deg; pan %.10g to %.10g deg, up to %.10g deg/s", from_micro(p->fov_min_udeg),
@@ -120,13 +174,15 @@ static void put_emitter(const struct cfg_reader *rd, const struct config_profile
         fprintf(out, "%u beams, %.10g ns a sequence, %s", c->n_beams, from_micro(c->firing_fs), turn_of(p));
     if (c->kind == EMITTER_SPHERE) fprintf(out, "%u pulses a ring, %u rings", p->emitter.steps, p->emitter.rings);
     if (c->kind == EMITTER_DIRECTIONS) fprintf(out, "%u directions", p->emitter.steps);
-    fprintf(out, "; %.10g to %.10g lines/s\n", from_micro(p->lines_min_uhz), from_micro(p->lines_max_uhz));
+    fprintf(out, "; %s lines/s\n", span(from_micro(p->lines_min_uhz), from_micro(p->lines_max_uhz), lines));
 }
 
 void cfg_list_profile(const struct cfg_reader *rd, const struct config_profile *p, FILE *out)
 {
     fprintf(out, "%s: %s %s\n", p->name, p->maker, p->model);
     put_emitter(rd, p, out);
+    put_beam(rd, p, out);
+    put_errors(rd, p, out);
     put_protocols(p, out);
     put_programs(p, out);
     for (int grade = 0; cfg_from_names[grade] != NULL; grade++)

@@ -181,7 +181,8 @@ void cfg_check_emitter(struct cfg_reader *rd, struct config_profile *profile);
 void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg);
 /* owned.c: keys that only some kinds of link have, and what a link needs. */
 void cfg_check_links(struct cfg_reader *rd, struct config *cfg);
-/* usb_look.c: the look of a usb link, by its protocol, and the ids that are not given. */
+/* usb_look.c: the look of a usb link, by its protocol, and the ids and the serial number that are not given. */
+void cfg_set_usb_serial(struct cfg_reader *rd, const struct config *cfg, struct link_spec *link, uint32_t item);
 void cfg_set_usb_look(struct cfg_reader *rd, struct link_spec *link, uint32_t item);
 /* The same for keys of platforms. Returns whether all of them belong to this kind. */
 int cfg_check_platform_keys(struct cfg_reader *rd, const struct config_platform *platform);

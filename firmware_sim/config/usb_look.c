@@ -1,4 +1,9 @@
 /* Which device a usb link shows itself as: that whose protocol it speaks, with that device's ids where none are given. */
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
 #include "drivers/usb/looks.h"
 #include "firmware_sim/config/table.h"
 
@@ -20,4 +25,17 @@ void cfg_set_usb_look(struct cfg_reader *rd, struct link_spec *link, uint32_t it
     link->look = (int)look_of(link->protocol);
     if (!cfg_is_given(rd, "links[].vid", item)) link->vid = look->vid;
     if (!cfg_is_given(rd, "links[].pid", item)) link->pid = look->pid;
+}
+
+/* A head is known by its configuration's file and the link's place in it. */
+void cfg_set_usb_serial(struct cfg_reader *rd, const struct config *cfg, struct link_spec *link, uint32_t item)
+{
+    char path[PATH_MAX];
+    if (link->serial[0] != '\0') return;
+    snprintf(link->serial, sizeof link->serial, "%s", cfg->head.serial);
+    link->own_serial = !cfg_is_given(rd, "head.serial", 0);
+    const char *file = realpath(cfg->file, path) != NULL ? path : cfg->file;
+    const size_t len = strlen(file), most = sizeof link->whose - 12; /* the end of a long one tells it from others */
+    snprintf(link->whose, sizeof link->whose, "%u %.*s", item, (int)most - 1,
+             len < most ? file : file + len - most + 1);
 }

@@ -49,7 +49,8 @@ struct session {
     struct pump *pump;
     void *protocol;
     struct unit_queue units;
-    int hang_up; /* the session ends once its units are out */
+    int answering; /* input() is being called */
+    int hang_up;   /* the session ends once its units are out */
     char peer[64];
     int64_t moved_ns; /* clock_now_ns() when a byte last went out */
 };

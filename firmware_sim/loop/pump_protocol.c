@@ -1,8 +1,8 @@
 /* A session of a protocol that is not native: frames and time go in, and units come out (drivers/protocol/protocol.h).
  *
  * In real time the protocol keeps up with the head, whether its client reads or not, as the firmware of a device does.
- * A unit that has no room, or that comes while one waits that is older than loop.queue_ms, is lost as a whole. In the
- * paces that wait for readers nothing is lost: the session takes no further tick until there is room. */
+ * A unit that has no room, or that comes while one waits that is older than loop.queue_ms, is lost as a whole; what
+ * answers a client at once is lost for want of room alone. In the paces that wait for readers nothing is lost: the session takes no further tick until there is room. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -30,7 +30,9 @@ static int host_send(void *ctx, const void *unit, size_t len)
 {
     struct session *s = ctx;
     if (len == 0 || s->hang_up) return s->hang_up;
-    if (!is_stale(s->pump, s) && unit_queue_put(&s->units, unit, len, stream_released(s->pump->stream)) == 0) return 0;
+    if ((s->answering || !is_stale(s->pump, s)) &&
+        unit_queue_put(&s->units, unit, len, stream_released(s->pump->stream)) == 0)
+        return 0;
     session_count_units(s->pump, s, 1);
     return 1;
 }
@@ -179,7 +181,9 @@ static int take_input(struct pump *pump, struct session *s)
     while (c->in_pos < c->in_len && c->wrong < WRONG_AT_ONCE && !s->hang_up &&
            (has_room(s) || c->in_len - c->in_pos == READ_BYTES)) {
         uint32_t n = c->in_len - c->in_pos < PIECE_BYTES ? c->in_len - c->in_pos : PIECE_BYTES;
+        s->answering = 1;
         pump->protocol->input(s->protocol, c->in + c->in_pos, n);
+        s->answering = 0;
         c->in_pos += n;
     }
     if (s->hang_up) c->in_pos = c->in_len;

@@ -183,7 +183,7 @@ const struct bad bad[] = {
     {"  - type: tcp\n    port: 0", "  - type: udp\n    port: 0\n    protocol: velodyne", 15, "links[0].port", "allowed 1 to 65535"},
     {"type: tcp", "type: tcp\n    interface: lo", 15, "links[0].interface", "a tcp link has no such key"},
     {"type: tcp", "type: tcp\n    protocol: scip", 15, "links[0].protocol",
-     "scip can't tell of head profile riegl-vz400i (line 2), whose emitter is line; allowed emitters: planar"},
+     "scip can't tell of head profile any-rate (line 2), whose emitter is line; allowed emitters: planar"},
     {"type: tcp\n    port: 0\noutput:", "type: udp\n    port: 1\n    protocol: velodyne\noutput:\n  layout: geo", 16,
      "links[0].protocol", "needs ranges, but output.layout is geo (line 18); required is layout: polar"},
     {"type: tcp", "type: usb\n    speed: fast", 15, "links[0].speed", "allowed full, high, super"},

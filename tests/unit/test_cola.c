@@ -291,6 +291,7 @@ static void a_geometry_that_the_head_has_not_is_refused(void **state)
     cola_expect("sMN mLMPsetscancfg 9C4 1 9C4 FFF92230 225510", "sAN mLMPsetscancfg 0" HAS);
     cola_expect("sMN mLMPsetscancfg +5000 +1 +2500 -450000 +2250000", "sAN mLMPsetscancfg 1" HAS);
     cola_expect("sMN mLMPsetscancfg +2500 +1 +5000 -450000 +2250000", "sAN mLMPsetscancfg 2" HAS);
+    cola_expect("sMN mLMPsetscancfg +2500 +1 +5000 0 +1800000", "sAN mLMPsetscancfg 3" HAS);
     cola_expect("sMN mLMPsetscancfg +2500 +1 +2500 0 +1800000", "sAN mLMPsetscancfg 4" HAS);
     cola_expect("sMN mLMPsetscancfg +2500 +2 +2500 -450000 +2250000", "sAN mLMPsetscancfg 5" HAS);
     cola_expect("sRN LMPscancfg", "sRA LMPscancfg" HAS);
@@ -381,7 +382,7 @@ static void garbage_is_skipped_and_counted(void **state)
         {1, 1, "\2"},                                 /* the mark twice */
         {3, 3, "\2\2x"},                              /* and thrice */
         {12, 12, "\2\2\2\2\xff\xff\xff\xff\1\1\1\1"}, /* a length that can't be */
-        {8, 8, "\2\2\2\2\0\0\0\0"},                   /* of nothing */
+        {9, 9, "\2\2\2\2\0\0\0\0\0"},                 /* of nothing */
         {19, 19, "\2\2\2\2\0\0\0\x0asRN ODpwrc\1"},   /* a wrong check byte */
         {8, 8, "\2\2\2\2\0\0\0\x05"},                 /* half a telegram, and the next one inside what it claims */
     };

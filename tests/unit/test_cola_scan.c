@@ -34,7 +34,7 @@ static void open_small(void)
     memset(shots, 0, sizeof shots);
     shots[0] = (struct protocol_rig_shot){1, {1.0}, {0}, {0}};
     shots[1] = (struct protocol_rig_shot){1, {2.5}, {-3200}, {0}};
-    shots[3] = (struct protocol_rig_shot){2, {4.6554, 9.0}, {-6399, 0}, {0}}; /* 4655 mm; the first echo counts */
+    shots[3] = (struct protocol_rig_shot){2, {4.6556, 9.0}, {-6399, 0}, {0}}; /* 4656 mm; the first echo counts */
 }
 
 static void a_telegram_in_a_is_this_text(void **state)
@@ -48,7 +48,7 @@ static void a_telegram_in_a_is_this_text(void **state)
      * 80 pulses a second: 1 (100 Hz). Step 45 deg = 6DDD0, and that is more than 16 bits: DDD0. First beam 90 - 2 x 45
      * deg = 0. White is FF, -32 dB 80, -63.99 dB 1. */
     static const char expected[] = "\2sSN LMDscandata 1 1 1069A91 0 0 0 0 F4240 10C8E0 0 0 0 0 0 3E8 1 0 1 "
-                                   "DIST1 3F800000 00000000 0 DDD0 4 3E8 9C4 0 122F "
+                                   "DIST1 3F800000 00000000 0 DDD0 4 3E8 9C4 0 1230 "
                                    "1 RSSI1 3F800000 00000000 0 DDD0 4 FF 80 0 1 0 0 0 0 0\3";
     assert_int_equal(cola.n_units, 1);
     cola.bytes[cola.len] = 0;
@@ -64,7 +64,7 @@ static void a_telegram_in_b_is_these_bytes(void **state)
     protocol_rig_turn(&cola, 0, shots, 1);
     static const char payload[] = "sSN LMDscandata \0\1\0\1\x01\x06\x9a\x91\0\0\0\0\0\0\0\x0f\x42\x40\0\x10\xc8\xe0"
                                   "\0\0\0\0\0\0\0\0\3\xe8\0\0\0\1\0\0"
-                                  "\0\1DIST1\x3f\x80\0\0\0\0\0\0\0\0\0\0\xdd\xd0\0\4\x03\xe8\x09\xc4\0\0\x12\x2f"
+                                  "\0\1DIST1\x3f\x80\0\0\0\0\0\0\0\0\0\0\xdd\xd0\0\4\x03\xe8\x09\xc4\0\0\x12\x30"
                                   "\0\1RSSI1\x3f\x80\0\0\0\0\0\0\0\0\0\0\xdd\xd0\0\4\xff\x80\0\1\0\0\0\0\0\0\0\0\0\0";
     uint8_t frame[512];
     assert_int_equal(cola.len, cola_frame_b(frame, payload, sizeof payload - 1));
@@ -394,7 +394,67 @@ static void a_scan_with_a_hole_is_not_sent(void **state)
     }
 }
 
-/* The same with the attributes of one frame missing: their signals belong to the scan. */
+/* Attributes of another frame: they are not those of the points before. */
+static void give_attributes(uint32_t line, uint64_t pulse0, uint32_t n)
+{
+    uint8_t frame[NATIVE_HEADER_LEN + NATIVE_ATTRIBUTES_HEAD_LEN + 4 * 811] = {NATIVE_SYNC, NATIVE_ATTRIBUTES, 1};
+    uint8_t *payload = frame + NATIVE_HEADER_LEN;
+    le_put32(frame + 4, NATIVE_ATTRIBUTES_HEAD_LEN + 4 * n);
+    le_put64(payload, pulse0);
+    le_put32(payload + 8, line);
+    le_put32(payload + 12, n);
+    cola.ops->frame(cola.protocol, frame, native_frame_len(frame));
+}
+
+/* A turn of which one frame of points has no attributes, others', or its own. */
+static void attributes_of_one_frame(uint32_t line, int own, int others)
+{
+    for (uint32_t from = 0; from < 811; from += 200) {
+        cola.attributes = from != 200;
+        part_of_turn(line, from, from == 800 ? 11 : 200);
+        if (from == 200 && others) give_attributes(line, (uint64_t)line * 1080, 200);
+        if (from == 200 && own) give_attributes(line, (uint64_t)line * 1080 + 200, 200);
+    }
+    cola.ops->time(cola.protocol, (int64_t)line * 66666667 + 60000000);
+}
+
+static void attributes_are_those_of_their_points(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    cola.attributes = 1;
+    protocol_rig_describe(&cola, 0);
+    stream(0);
+    protocol_rig_clear(&cola);
+    attributes_of_one_frame(0, 1, 0);
+    assert_int_equal(cola.n_units, 1);
+    attributes_of_one_frame(1, 0, 0);
+    attributes_of_one_frame(2, 0, 1);
+    attributes_of_one_frame(3, 1, 0);
+    assert_int_equal(cola.n_units, 2);
+    assert_int_equal(cola.count[PROTOCOL_UNITS_LOST], 2);
+}
+
+/* A scan is sent once it is done, also where the next one's points come before a tick's end. */
+static void two_scans_in_a_tick_are_both_sent(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    stream(1);
+    protocol_rig_clear(&cola);
+    for (uint32_t line = 0; line < 3; line++)
+        for (uint32_t from = 0; from < 811; from += 200)
+            part_of_turn(line, from, from == 800 ? 11 : 200);
+    assert_int_equal(cola.n_units, 2);
+    cola.ops->time(cola.protocol, 200000000);
+    assert_int_equal(cola.n_units, 3);
+    for (uint32_t i = 0; i < 3; i++) {
+        cola_read_lmd(i, &lmd);
+        assert_int_equal(lmd.scan, i);
+    }
+}
+
+/* The same with all attributes of a turn missing. */
 static void a_scan_without_its_attributes_is_not_sent(void **state)
 {
     (void)state;
@@ -646,6 +706,8 @@ int main(void)
         CASE(counters_count_modulo_16_bits),
         CASE(a_scan_with_a_hole_is_not_sent),
         CASE(a_scan_without_its_attributes_is_not_sent),
+        CASE(attributes_are_those_of_their_points),
+        CASE(two_scans_in_a_tick_are_both_sent),
         CASE(what_nobody_asked_for_is_not_lost),
         CASE(a_client_that_does_not_read_loses_whole_scans),
         CASE(a_poll_gets_the_last_scan),

@@ -201,7 +201,20 @@ static void profiles_are_listed(void **state)
     assert_non_null(
         strstr(head, "\n  600                        250      8     0.5 m  350 m on 90 %, 160 m on 20 %\n"));
     assert_non_null(strstr(head, "\n  data sheet 10: prr_min_hz, prr_max_hz, fov_min_deg,"));
-    assert_non_null(strstr(text, "\n  any, 10 to 2000           1667      1     0.5 m  130 m on 90 %\n"));
+    assert_non_null(strstr(head, "protocols  native, nmea\n"));
+    head =
+        strstr(text, "\nhokuyo-urg-04lx: Hokuyo URG-04LX\n  planar     1024 steps a turn, 44 to 725 cast, 384 ahead, ");
+    assert_non_null(head);
+    assert_non_null(strstr(head, "protocols  native, nmea, scip\n"));
+    assert_non_null(strstr(strstr(text, "\nsick-tim561: "), "protocols  native, nmea, cola\n"));
+    assert_non_null(strstr(strstr(text, "\nvelodyne-vlp16: "), "\n  beams      16 beams, 55296 ns a sequence"));
+    assert_non_null(strstr(strstr(text, "\nvelodyne-vlp16: "), "nmea, velodyne, velodyne-position, velodyne-http\n"));
+    /* The maker's figures with their definition, then those at 1/e2; accuracy beside the noise. */
+    head = strstr(text, "\nleica-p40: ");
+    assert_non_null(head);
+    assert_non_null(strstr(head, "exit 3.5 mm FWHM (5.95 mm at 1/e2), divergence 0.23 mrad FWHM (0.391 mrad at 1/e2)"));
+    assert_non_null(strstr(head, "\n  noise      0.4 mm at 10 m; accuracy 1.2 mm + 10 ppm, angles 0.0022 deg\n"));
+    assert_non_null(strstr(text, "\n  10 to 2000                1667      1     0.5 m  130 m on 90 %\n"));
     for (const char *p = text, *end; *p != '\0'; p = end + 1) {
         end = strchr(p, '\n');
         assert_true(end - p <= 120);

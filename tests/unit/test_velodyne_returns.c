@@ -170,7 +170,7 @@ static void test_lost_pulses(void **state)
     assert_int_equal(lost(), 1);
     for (uint32_t i = 1; i < rig.n_units; i++) {
         const uint8_t *time = rig.bytes + (size_t)1206 * i + 1200;
-        const uint32_t us = (uint32_t)(time[0] | time[1] << 8 | time[2] << 16 | (uint32_t)time[3] << 24);
+        const uint32_t us = (uint32_t)(time[0] | time[1] << 8 | time[2] << 16) | (uint32_t)time[3] << 24;
         assert_int_equal(us, (63 * 55296ull + (i - 1) * 1327104ull) / 1000); /* 1008 = 63 sequences */
         for (int k = 0; k < 384; k++)
             assert_int_equal(range_units(i, k / 32, k % 32), 10000);

@@ -45,3 +45,27 @@ void shot_list(uint64_t k, struct shot *out)
 {
     *out = (struct shot){(int64_t)(k * 1000000000 / 50), list_deg[k % 5][1], list_deg[k % 5][0], 1};
 }
+
+/* What profiles of our own have beside their emitter. */
+static const char rest_of_profile[] = "maker: tests\nmodel: head\nlines_min_hz: {value: 1, from: assumed}\n"
+                                      "lines_max_hz: {value: 40, from: assumed}\n"
+                                      "range_min_m: {value: 0.01, from: assumed}\n"
+                                      "range_max_m: {value: 50, from: assumed}\n"
+                                      "range_sigma_m: {value: 0, from: assumed}\n"
+                                      "range_sigma_ppm: {value: 0, from: assumed}\n"
+                                      "mirror_counts: {value: 0, from: assumed}\n"
+                                      "pan_counts: {value: 0, from: assumed}\n"
+                                      "beam_exit_m: {value: 0, from: assumed}\n"
+                                      "beam_divergence_rad: {value: 0, from: assumed}\n"
+                                      "pulse_width_ns: {value: 4, from: assumed}\n"
+                                      "max_echoes: {value: 1, from: assumed}\n"
+                                      "boot_s: {value: 0.1, from: assumed}\n"
+                                      "spin_up_s: {value: 0.01, from: assumed}\n"
+                                      "spin_down_s: {value: 0.1, from: assumed}\n";
+
+void emitter_write_profile(const struct wire *wire, const char *emitter)
+{
+    char text[2048];
+    snprintf(text, sizeof text, "%s%s", emitter, rest_of_profile);
+    wire_write_text(wire, "own.yaml", text);
+}

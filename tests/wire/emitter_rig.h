@@ -2,7 +2,7 @@
 #ifndef TESTS_WIRE_EMITTER_RIG_H
 #define TESTS_WIRE_EMITTER_RIG_H
 
-#include <stdint.h>
+#include "tests/wire/wire.h"
 
 enum { VLP_BEAMS = 16 };
 
@@ -26,5 +26,8 @@ extern const double list_deg[5][2];  /* azimuth, elevation */
 
 /* Counts of 2^-32 of a turn leave half of one: 8e-10 rad. */
 static const double ANGLE_RAD = 1e-9;
+
+/* own.yaml in the folder: a head that sees 0.01 to 50 m, with these keys of its emitter. */
+void emitter_write_profile(const struct wire *wire, const char *emitter);
 
 #endif

@@ -145,7 +145,7 @@ static void planar_heads(void **state)
 {
     struct model utm = {"hokuyo-utm-30lx", 57600, 40, 20, shot_utm, PLANAR(1440, 0, 1080, 540), 20 * 1081, 0};
     struct model ust = utm;
-    struct model urg = {"hokuyo-urg-04lx", 10240, 10, 5, shot_urg, PLANAR(1024, 44, 725, 384), 5 * 682, 5.6};
+    struct model urg = {"hokuyo-urg-04lx", 10240, 10, 15, shot_urg, PLANAR(1024, 44, 725, 384), 15 * 682, 5.6};
     struct model tim = {"sick-tim571", 16200, 15, 10, shot_tim, PLANAR(1080, 0, 810, 405), 10 * 811, 0};
     ust.profile = "hokuyo-ust-20lx";
     /* A pulse lasts 1e9 / rate nanoseconds. */
@@ -179,30 +179,6 @@ static void spinning_beams(void **state)
     record(*state, &vlp);
 }
 
-/* What profiles of our own have beside their emitter. */
-static const char rest_of_profile[] = "maker: tests\nmodel: head\nlines_min_hz: {value: 1, from: assumed}\n"
-                                      "lines_max_hz: {value: 40, from: assumed}\n"
-                                      "range_min_m: {value: 0.01, from: assumed}\n"
-                                      "range_max_m: {value: 50, from: assumed}\n"
-                                      "range_sigma_m: {value: 0, from: assumed}\n"
-                                      "range_sigma_ppm: {value: 0, from: assumed}\n"
-                                      "mirror_counts: {value: 0, from: assumed}\n"
-                                      "pan_counts: {value: 0, from: assumed}\n"
-                                      "beam_exit_m: {value: 0, from: assumed}\n"
-                                      "beam_divergence_rad: {value: 0, from: assumed}\n"
-                                      "pulse_width_ns: {value: 4, from: assumed}\n"
-                                      "max_echoes: {value: 1, from: assumed}\n"
-                                      "boot_s: {value: 0.1, from: assumed}\n"
-                                      "spin_up_s: {value: 0.01, from: assumed}\n"
-                                      "spin_down_s: {value: 0.1, from: assumed}\n";
-
-static void write_profile(const struct wire *wire, const char *emitter)
-{
-    char text[2048];
-    snprintf(text, sizeof text, "%s%s", emitter, rest_of_profile);
-    wire_write_text(wire, "own.yaml", text);
-}
-
 static void spheres(void **state)
 {
     const struct model sphere = {"own.yaml",
@@ -219,7 +195,7 @@ static void spheres(void **state)
                                   .sequence_ns_den = 9},
                                  2 * (17 * 36 + 2),
                                  0};
-    write_profile(*state, "emitter: sphere\nstep_deg: {value: 10, from: assumed}\n");
+    emitter_write_profile(*state, "emitter: sphere\nstep_deg: {value: 10, from: assumed}\n");
     record(*state, &sphere);
 }
 
@@ -238,7 +214,7 @@ static void lists_of_directions(void **state)
                                 .sequence_ns_den = 1},
                                20,
                                0};
-    write_profile(*state, "emitter: directions\ndirections: list.txt\n");
+    emitter_write_profile(*state, "emitter: directions\ndirections: list.txt\n");
     wire_write_text(*state, "list.txt", "# azimuth, elevation\n0 0\n90 0 # right\n\n-150 12.5\n300 -60\n45 89\n");
     record(*state, &list);
     char xyz[1024];

@@ -76,7 +76,7 @@ static const struct config_case CONFIGS[] = {
      "links:",
      "output: {scale_m: 1e-9}\nlinks:",
      {"config.yaml:7:", "output.scale_m", "1e-6 to 1 m"}},
-    {"unknown link", "\"null\"", "udp", {"config.yaml:7:", "links[0].type", "pty", "tcp", "file"}},
+    {"unknown link", "\"null\"", "uart", {"config.yaml:7:", "links[0].type", "pty", "tcp", "file"}},
     {"port 65536", "\"null\"", "tcp, port: 65536", {"config.yaml:7:", "links[0].port", "0 to 65535"}},
     {"port of a pty", "\"null\"", "pty, port: 1", {"config.yaml:7:", "links[0].port", "type, path"}},
     {"9 sessions", "\"null\"", "tcp, max_sessions: 9", {"config.yaml:7:", "links[0].max_sessions", "1 to 8"}},

@@ -40,6 +40,41 @@ static void ask(const struct head *head, struct identity *out)
     usbip_host_close(&host);
 }
 
+static struct head start_file(struct wire *wire, const char *name)
+{
+    const char *const more[] = {"--pace", "fast", NULL};
+    return head_start(wire, wire_path(wire, name), more);
+}
+
+/* Two heads of different files, ended and started again the other way round: each has the serial number that it had,
+ * though not the bus id. */
+static void test_started_again(void **state)
+{
+    struct wire *wire = *state;
+    struct identity one, other, again;
+    const struct room_config c = {.prr_hz = 20000,
+                                  .lines_hz = 50,
+                                  .pan_deg_s = 60,
+                                  .pan_stop_deg = 6,
+                                  .frames = 1,
+                                  .links = "links: [{type: usb, port: 0}]\n"};
+    room_write(wire);
+    char *text = wire_read(room_config_write(wire, &c), NULL);
+    wire_write_text(wire, "other.yaml", text);
+    free(text);
+    for (int round = 0; round < 2; round++) {
+        struct head a = start_file(wire, round == 0 ? "config.yaml" : "other.yaml");
+        struct head b = start_file(wire, round == 0 ? "other.yaml" : "config.yaml");
+        ask(&a, round == 0 ? &one : &again);
+        if (round == 1) assert_string_equal(again.serial, other.serial);
+        ask(&b, round == 0 ? &other : &again);
+        if (round == 1) assert_string_equal(again.serial, one.serial);
+        head_end(&a, SIGTERM);
+        head_end(&b, SIGTERM);
+    }
+    assert_string_not_equal(one.serial, other.serial);
+}
+
 static void test_two_heads(void **state)
 {
     struct wire *wire = *state;
@@ -68,6 +103,7 @@ static void test_two_heads(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test_setup_teardown(test_two_heads, wire_setup, wire_teardown)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test_setup_teardown(test_two_heads, wire_setup, wire_teardown),
+                                       cmocka_unit_test_setup_teardown(test_started_again, wire_setup, wire_teardown)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
