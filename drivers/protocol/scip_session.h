@@ -45,8 +45,8 @@ struct scip {
     /* the line at hand */
     char line[SCIP_MAX_LINE];
     size_t n_line;
-    uint64_t n_over; /* bytes beyond what fits */
-    int foul;        /* a byte that is not printable was in it */
+    int is_over; /* it has more bytes than fit; they are counted already */
+    int foul;    /* a byte that is not printable was in it */
     struct scip_scan scan;
     struct scip_reply reply;
 };
