@@ -31,3 +31,6 @@ check_enumeration "socket pair, super" 1024
 record_again "socket pair, super"
 head_stop
 note "super at $(uptime_s) s"
+check "socket pair, super: gone with the head" wait_for 10 is_unplugged
+check_hokuyo "socket pair, full" "attach: on, speed: full"
+check_sick "socket pair, full" "attach: on, speed: full"
