@@ -277,7 +277,7 @@ install: all
 	install -m 644 config/heads/*.yaml "$(DESTDIR)$(HEADS_DIR)/"
 	install -m 644 config/scenes/glass_room.obj "$(DESTDIR)$(SCENES_DIR)/"
 	install -m 644 drivers/host/70-scanhead.rules "$(DESTDIR)$(UDEV_DIR)/"
-	sed "s|@PREFIX@|$(PREFIX)|; s|@VERSION@|$$(sed -n 's/^#define SCANHEAD_VERSION "\(.*\)"$$/\1/p' \
+	sed "s|@PREFIX@|$(PREFIX)|; s|@VERSION@|$$(sed -n 's/^#define SCANHEAD_VERSION  *"\(.*\)"$$/\1/p' \
 		drivers/host/scanhead.h)|" drivers/host/libscanhead.pc.in > "$(DESTDIR)$(PC_DIR)/libscanhead.pc"
 format:
 	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')
