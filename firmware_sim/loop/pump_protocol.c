@@ -71,7 +71,7 @@ static void host_count(void *ctx, enum protocol_count what, uint64_t n)
     struct session *s = ctx;
     struct link_counts *counts = &s->pump->counts;
     if (n == 0) return;
-    if (what == PROTOCOL_UNITS_LOST) session_count_units(s->pump, s, n);
+    if (what == PROTOCOL_UNITS_LOST) counts->lost_units += n; /* not for its reader: session_check_lost has those */
     if (what == PROTOCOL_INPUT_LOST) counts->lost_input_bytes += n;
     if (what == PROTOCOL_WRONG) counts->wrong_requests += n;
     if (what == PROTOCOL_POINTS_LOST) counts->lost_points += n;
