@@ -1,7 +1,8 @@
 /* The TCP link: a listener and up to max_sessions clients.
  *
  * A session is over when its peer shuts down its sending side, resets, or vanishes (keep-alive, about 25 s).
- * A client that finds all sessions taken is accepted and closed at once, so that it does not wait in vain. */
+ * A client that finds all sessions taken is accepted and closed at once, so that it does not wait in vain. One that
+ * comes while another's session is ending gets that session: it waits until what the other sent has been read. */
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
@@ -75,6 +76,27 @@ static int tcp_accept(struct tcp_link *tcp, struct sockaddr_storage *from, sockl
     return fd;
 }
 
+static int free_slot(const struct tcp_link *tcp)
+{
+    int slot = 0;
+    while (slot < tcp->n_sessions && tcp->session[slot].state != TCP_FREE)
+        slot++;
+    return slot;
+}
+
+/* A session whose client has gone, though the owner has not heard of it yet. */
+static int is_any_ending(const struct tcp_link *tcp)
+{
+    struct pollfd fds[LINK_MAX_SESSIONS];
+    int ending = 0;
+    for (int s = 0; s < tcp->n_sessions; s++) {
+        ending |= tcp->session[s].state == TCP_ENDED;
+        fds[s] =
+            (struct pollfd){.fd = tcp->session[s].state == TCP_OPEN ? tcp->session[s].fd : -1, .events = POLLRDHUP};
+    }
+    return ending || poll(fds, (nfds_t)tcp->n_sessions, 0) > 0;
+}
+
 static void tcp_welcome(struct tcp_link *tcp, struct link_events *events)
 {
     const int size = SEND_BUFFER_BYTES;
@@ -82,12 +104,12 @@ static void tcp_welcome(struct tcp_link *tcp, struct link_events *events)
         struct sockaddr_storage from;
         socklen_t len = sizeof from;
         char peer[64];
-        int starved, slot = 0;
+        int starved;
+        const int slot = free_slot(tcp);
+        if (slot == tcp->n_sessions && is_any_ending(tcp)) return; /* poll comes back at once */
         int fd = tcp_accept(tcp, &from, &len, &starved);
         if (fd < 0) return; /* none left, or one that gave up before we came */
         socket_address_text((struct sockaddr *)&from, len, peer, sizeof peer);
-        while (slot < tcp->n_sessions && tcp->session[slot].state != TCP_FREE)
-            slot++;
         if (starved || slot == tcp->n_sessions) {
             if (!starved) close(fd);
             link_events_push(events, LINK_REFUSED, 0, peer);

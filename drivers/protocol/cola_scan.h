@@ -35,7 +35,7 @@ int32_t cola_beam_angle(const struct cola_geometry *g, uint32_t beam);
 struct cola_scan {
     int64_t t0_ns;    /* device time of step 0 */
     uint16_t counter; /* turns of the head; goes on where one was lost */
-    int32_t path_mm;  /* a head that moves: how far it has come since the scan's start; else 0 */
+    int32_t path_mm;  /* a head that moves: its way since the scan began, or the client came; else 0 */
     int16_t speed_mm_s;
     uint32_t range[COLA_N_ECHOES][COLA_MAX_POINTS];  /* counts of the stream; 0: none */
     uint16_t signal[COLA_N_ECHOES][COLA_MAX_POINTS]; /* of COLA.md's RSSI scale, 16 bit; 0: none, or not modelled */

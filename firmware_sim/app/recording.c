@@ -97,6 +97,13 @@ static int64_t ns_since(int64_t t_ns, int64_t from_ns)
     return (int64_t)((uint64_t)t_ns - (uint64_t)from_ns);
 }
 
+/* A frame of a sphere is all its rings. */
+static uint32_t lines_of_frame(const struct scanhead *sh)
+{
+    struct scanhead_emitter e;
+    return scanhead_get_emitter(sh, &e) == SCANHEAD_OK && e.kind == SCANHEAD_EMIT_SPHERE ? e.rings : 1;
+}
+
 static void look_at(struct recording *r, const struct scanhead_frame *frame)
 {
     r->result->frames++;
@@ -106,6 +113,7 @@ static void look_at(struct recording *r, const struct scanhead_frame *frame)
         if (r->scan_t0_ns < 0) r->scan_t0_ns = ns_since(frame->t_ns, frame->scan_t0_ns);
     }
     if (frame->type == SCANHEAD_DESCRIPTOR) r->scan_s = progress_scan_s(frame);
+    if (frame->type == SCANHEAD_EMITTER) r->scan_s *= lines_of_frame(r->sh);
     if (frame->type == SCANHEAD_LINE_END) count_line(r, frame);
     if (frame->type != SCANHEAD_EVENT) return;
     if (frame->event == SCANHEAD_EV_SCAN_START) {

@@ -10,7 +10,7 @@
 #include "core/rng.h"
 #include "firmware_sim/site/site.h"
 
-enum { PULSES = 1666, LINES = 600 };
+enum { PULSES = 1666, WALL_LINES = 20, NOISE_LINES = 200 };
 
 static char folder[64];
 
@@ -53,8 +53,10 @@ struct scan {
     double share, sigma_m, refl_db; /* of the pulses that found the wall; means over these */
 };
 
-/* 10^6 pulses within half a degree of the wall's normal: its cosine is 1 to 4e-5. Ranges less the wall's own. */
-static void scan_wall(const char *profile, int prr_hz, double range_m, double reflectance, struct scan *scan)
+/* `lines` of 1666 pulses within half a degree of the wall's normal: its cosine is 1 to 4e-5. Ranges less the
+ * wall's own. */
+static void scan_wall(const char *profile, int prr_hz, double range_m, double reflectance, uint64_t lines,
+                      struct scan *scan)
 {
     char path[96], set[4][64];
     const char *const sets[] = {set[0], set[1], set[2], set[3]};
@@ -82,7 +84,7 @@ static void scan_wall(const char *profile, int prr_hz, double range_m, double re
                                        .line_start_udeg = -500000,
                                        .line_stop_udeg = 500000};
     schedule_start(&segment, &spec);
-    for (uint64_t k = 0; k < LINES; k++) {
+    for (uint64_t k = 0; k < lines; k++) {
         struct schedule_line line;
         struct schedule_run run;
         schedule_get_line(&segment, k, &line);
@@ -98,14 +100,15 @@ static void scan_wall(const char *profile, int prr_hz, double range_m, double re
             refl += 0.01 * block.refl_cdb[i];
         }
     }
-    *scan = (struct scan){n / (PULSES * LINES), sqrt(sum2 / n - sum / n * (sum / n)), refl / n};
+    *scan = (struct scan){n / (double)(PULSES * lines), sqrt(sum2 / n - sum / n * (sum / n)), refl / n};
     line_block_free(&block);
     caster_free(caster);
     site_free(site);
     free(cfg);
 }
 
-/* 2 % before it more than half of the pulses see the wall, 2 % behind it fewer. */
+/* 2 % before it more than half of the pulses see the wall, 2 % behind it fewer: 63 and 37 % in clear air, and
+ * 33,320 pulses have a standard error of 0.3 %. */
 static void walls_vanish_where_the_profiles_say(void **state)
 {
     (void)state;
@@ -122,8 +125,8 @@ static void walls_vanish_where_the_profiles_say(void **state)
                 {"zf-imager-5016", 1000000, 0.9, 360.0}};
     for (size_t i = 0; i < sizeof says / sizeof *says; i++) {
         struct scan before, behind;
-        scan_wall(says[i].profile, says[i].prr_hz, 0.98 * says[i].range_m, says[i].reflectance, &before);
-        scan_wall(says[i].profile, says[i].prr_hz, 1.02 * says[i].range_m, says[i].reflectance, &behind);
+        scan_wall(says[i].profile, says[i].prr_hz, 0.98 * says[i].range_m, says[i].reflectance, WALL_LINES, &before);
+        scan_wall(says[i].profile, says[i].prr_hz, 1.02 * says[i].range_m, says[i].reflectance, WALL_LINES, &behind);
         print_message("%s at %d Hz, %g at %g m: %.1f %% of the pulses see it 2 %% before, %.1f %% behind\n",
                       says[i].profile, says[i].prr_hz, says[i].reflectance, says[i].range_m, 100.0 * before.share,
                       100.0 * behind.share);
@@ -131,7 +134,7 @@ static void walls_vanish_where_the_profiles_say(void **state)
     }
 }
 
-/* 10^6 pulses: 4.75 standard errors of a sigma are 0.34 %. Counts of 1 um and
+/* 333,200 pulses: 4.75 standard errors of a sigma are 0.58 %. Counts of 1 um and
  * the wall's own plane, 1e-7 of it off at most, add nothing. The mean of the reflectance in dB: 0.01 dB and its noise.
  */
 static void noise_is_the_profiles(void **state)
@@ -148,11 +151,11 @@ static void noise_is_the_profiles(void **state)
                 {"zf-imager-5016", 1000000, 0.9, 10.0, 0.00025}};
     for (size_t i = 0; i < sizeof says / sizeof *says; i++) {
         struct scan scan;
-        scan_wall(says[i].profile, says[i].prr_hz, says[i].range_m, says[i].reflectance, &scan);
+        scan_wall(says[i].profile, says[i].prr_hz, says[i].range_m, says[i].reflectance, NOISE_LINES, &scan);
         print_message("%s at %g m: sigma %.3f mm, says %.3f mm; %.3f dB\n", says[i].profile, says[i].range_m,
                       1e3 * scan.sigma_m, 1e3 * says[i].sigma_m, scan.refl_db);
         assert_true(scan.share == 1.0 &&
-                    fabs(scan.sigma_m / says[i].sigma_m - 1.0) < 4.75 / sqrt(2.0 * PULSES * LINES));
+                    fabs(scan.sigma_m / says[i].sigma_m - 1.0) < 4.75 / sqrt(2.0 * PULSES * NOISE_LINES));
         assert_true(fabs(scan.refl_db - 10.0 * log10(says[i].reflectance)) < 0.01);
     }
 }

@@ -84,6 +84,14 @@ void cola_authorise(void)
     cola_expect("sMN SetAccessMode 03 F4724744", "sAN SetAccessMode 1");
 }
 
+void cola_stream(int is_b)
+{
+    if (is_b)
+        EXPECT_B("sEN LMDscandata \1", "sEA LMDscandata \1");
+    else
+        cola_expect("sEN LMDscandata 1", "sEA LMDscandata 1");
+}
+
 /* ---- the reader. `at` walks over the values; next() gives one of so many bytes. */
 
 static const uint8_t *at;

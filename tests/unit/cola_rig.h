@@ -34,6 +34,8 @@ void cola_expect_b(const void *request, size_t len, const void *answer, size_t a
 size_t cola_frame_b(uint8_t *dst, const void *payload, size_t len);
 void cola_input(const void *bytes, size_t len);
 void cola_authorise(void);
+/* sEN LMDscandata 1 */
+void cola_stream(int is_b);
 
 /* A telegram LMDscandata as read back. */
 struct cola_channel {

@@ -182,6 +182,44 @@ static void turn_rates_change_anywhere(void **state)
     assert_int_equal(cast, k);
 }
 
+/* A window is one of the turning azimuth; where each beam looks from there does not matter. */
+static void a_window_cuts_turns(void **state)
+{
+    (void)state;
+    struct emitter e;
+    struct schedule_segment seg;
+    struct schedule_line line;
+    vlp16(&e);
+    struct schedule_spec spec = turning(&e, 10 * HZ);
+    spec.line_start_udeg = 30 * INT64_C(1000000); /* 25/3 ms of a turn of 100 ms, 50/3 ms */
+    spec.line_stop_udeg = 60 * INT64_C(1000000);
+    schedule_start(&seg, &spec);
+    for (uint64_t n = 0; n < 300; n++) {
+        schedule_get_line(&seg, n, &line);
+        const double first_ns = (double)n * 1e8 + 1e8 / 12, last_ns = (double)n * 1e8 + 1e8 / 6;
+        assert_true((double)vlp16_ns(line.cast0) >= first_ns && (double)vlp16_ns(line.cast0 - 1) < first_ns);
+        assert_true((double)vlp16_ns(line.cast_end) > last_ns && (double)vlp16_ns(line.cast_end - 1) <= last_ns);
+    }
+}
+
+/* The other way round; a beam's own azimuth is clockwise all the same. */
+static void beams_turn_either_way(void **state)
+{
+    (void)state;
+    static const struct emitter_beam beam[2] = {{0, 90000000, 0}, {0, -36000000, 1000}};
+    for (int turn = -1; turn <= 1; turn += 2) {
+        struct emitter e;
+        struct schedule_segment seg;
+        assert_int_equal(emitter_set_beams(&e, beam, 2, 4000000, turn, NULL), SH_OK);
+        const struct schedule_spec spec = turning(&e, 10 * HZ);
+        schedule_start(&seg, &spec);
+        for (uint64_t k = 0; k < 40000; k += 37) {
+            const double at = (double)(k / 2 * 4000 + k % 2 * 1000) / 1e8, own = k % 2 == 0 ? 0.25 : -0.1;
+            assert_true(fabs(schedule_pan_turn(&seg, k) - (turn * at + own)) < 1e-14);
+        }
+    }
+}
+
 /* What a run says of its pulses is what the schedule says of each. */
 static void runs_say_the_same(void **state)
 {
@@ -245,9 +283,14 @@ static void tables_that_do_not_fit_are_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_rate_is_no_whole_number),        cmocka_unit_test(an_hour_and_a_day_are_exact),
-        cmocka_unit_test(rational_sequences_are_exact),       cmocka_unit_test(turns_take_all_pulses),
-        cmocka_unit_test(turn_rates_change_anywhere),         cmocka_unit_test(runs_say_the_same),
+        cmocka_unit_test(the_rate_is_no_whole_number),
+        cmocka_unit_test(an_hour_and_a_day_are_exact),
+        cmocka_unit_test(rational_sequences_are_exact),
+        cmocka_unit_test(turns_take_all_pulses),
+        cmocka_unit_test(turn_rates_change_anywhere),
+        cmocka_unit_test(a_window_cuts_turns),
+        cmocka_unit_test(beams_turn_either_way),
+        cmocka_unit_test(runs_say_the_same),
         cmocka_unit_test(tables_that_do_not_fit_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

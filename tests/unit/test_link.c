@@ -391,6 +391,29 @@ static void test_tcp_refusals(void **state)
     expect_refused(&spec, SH_EINPUT, "tcp:192.0.2.1:0: cannot listen");
 }
 
+/* As a user without rights: the error says which one is needed. */
+static void test_tcp_privileged_port(void **state)
+{
+    (void)state;
+    int least = 0;
+    FILE *f = fopen("/proc/sys/net/ipv4/ip_unprivileged_port_start", "r");
+    if (f == NULL || fscanf(f, "%d", &least) != 1 || least <= 80) skip();
+    fclose(f);
+    pid_t pid = fork();
+    if (pid == 0) {
+        struct link_spec spec = {.type = LINK_TCP, .max_sessions = 1, .port = 80};
+        struct sh_err err = {0};
+        void *link;
+        if (getuid() == 0 && (setgid(65534) != 0 || setuid(65534) != 0)) _exit(2);
+        int rc = link_ops_get(LINK_TCP)->open(&spec, &link, &err);
+        _exit(rc != SH_EPERM || strstr(err.text, "tcp:127.0.0.1:80") == NULL ||
+              strstr(err.text, "CAP_NET_BIND_SERVICE") == NULL);
+    }
+    int status = 0;
+    assert_int_equal(waitpid(pid, &status, 0), pid);
+    assert_int_equal(status, 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -408,6 +431,7 @@ int main(void)
         cmocka_unit_test(test_tcp_descriptors),
         cmocka_unit_test(test_tcp_small_array),
         cmocka_unit_test(test_tcp_refusals),
+        cmocka_unit_test(test_tcp_privileged_port),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,4 +1,4 @@
-/* --duration: of `record` off line, and of `run --start`. Both are device time. */
+/* --duration: of `record` off line, and of `run --start`, or head.start. Both are device time. */
 #include "tests/wire/room.h"
 
 /* A frame takes 0.4 s. */
@@ -78,12 +78,37 @@ static void test_frames_end_it_before(void **state)
     }
 }
 
+/* head.start: on is --start: the same pulses, with --duration and with --frames; a head without either scans nothing. */
+static void test_the_key_is_the_option(void **state)
+{
+    static const char *const runs[][9] = {
+        {"--pace", "fast", "--duration", "0.7", "--start"},
+        {"--pace", "fast", "--duration", "0.7", "--set", "head.start=on"},
+        {"--pace", "fast", "--frames", "2", "--start"},
+        {"--pace", "fast", "--frames", "2", "--set", "head.start=on"},
+        {"--pace", "fast", "--duration", "0.7"},
+    };
+    char said[4096], hash[5][65];
+    uint64_t fired[5];
+    for (int i = 0; i < 5; i++) {
+        fired[i] = run(*state, runs[i], said, sizeof said);
+        stats_hash(*state, hash[i]);
+    }
+    assert_int_equal(fired[0], fired[1]);
+    assert_string_equal(hash[0], hash[1]);
+    assert_int_equal(fired[2], fired[3]);
+    assert_string_equal(hash[2], hash[3]);
+    assert_true(fired[0] != fired[2]);
+    assert_int_equal(fired[4], 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_duration_is_device_time, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_run_scans_until_the_time_is_over, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_frames_end_it_before, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_the_key_is_the_option, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests_name("duration", tests, NULL, NULL);
 }

@@ -1,0 +1,356 @@
+/* CoLa's LMDscandata: its times and counters, what is lost, and when it is sent. */
+#include <math.h>
+
+#include "drivers/protocol/native_encode.h"
+#include "tests/unit/cola_rig.h"
+
+static struct cola_lmd lmd;
+static struct protocol_rig_shot shots[3001];
+
+static int close_rig(void **state)
+{
+    (void)state;
+    cola_close();
+    return 0;
+}
+
+/* ---- times and counters */
+
+static void ticks_count_modulo_32_bits(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    cola_stream(1);
+    /* scans from a second before 2^32 us on: the 15th lies across */
+    cola.scan_t0_ns = INT64_C(4294967296000) - INT64_C(1000000000);
+    protocol_rig_clear(&cola);
+    for (uint32_t line = 0; line < 30; line++) {
+        cola_turn(line, 1.0);
+        cola_read_lmd(line, &lmd);
+        const int64_t start_ns = cola.scan_t0_ns + (int64_t)line * 1000000000 / 15;
+        const int64_t end_ns = cola.scan_t0_ns + (int64_t)(line + 1) * 1000000000 / 15;
+        assert_int_equal(lmd.scan_us, (uint32_t)(start_ns / 1000 % INT64_C(4294967296)));
+        assert_int_equal(lmd.send_us, (uint32_t)(end_ns / 1000 % INT64_C(4294967296)));
+    }
+    assert_true(lmd.scan_us < 1000000);
+}
+
+/* sick_scan_xd fits a line through ticks and the times of arrival; here the latter are device time. Over half an hour
+ * with the wrap in it the line's slope is 1, and no scan lies off it by more than the 1 us of a tick. */
+static void ticks_are_on_a_line_with_time(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    cola_stream(1);
+    cola.scan_t0_ns = INT64_C(4294967296000) - INT64_C(900000000000);
+    double first_us = 0.0;
+    uint32_t before_us = 0;
+    int64_t wraps = 0;
+    for (uint32_t line = 0; line < 27000; line += line % 2 == 0 ? 1 : 899) {
+        protocol_rig_clear(&cola);
+        cola_turn(line, 1.0);
+        cola_read_lmd(0, &lmd);
+        if (lmd.scan_us < before_us) wraps++;
+        before_us = lmd.scan_us;
+        const double tick_us = (double)lmd.scan_us + 4294967296.0 * (double)wraps;
+        const double true_us = (double)cola.scan_t0_ns / 1e3 + line * (1e6 / 15.0);
+        if (line == 0) first_us = tick_us - true_us;
+        assert_true(fabs(tick_us - true_us - first_us) <= 1.0);
+    }
+    assert_int_equal(wraps, 1);
+}
+
+static void counters_count_modulo_16_bits(void **state)
+{
+    (void)state;
+    protocol_rig_open(&cola, PROTOCOL_COLA, "SICK", "TiM571");
+    protocol_rig_planar(&cola, 8, 2, 5, 4, -1, 10);
+    protocol_rig_describe(&cola, 0);
+    cola_stream(1);
+    memset(shots, 0, sizeof shots);
+    for (uint32_t line = 3; line < 65540; line++) {
+        protocol_rig_clear(&cola);
+        protocol_rig_turn(&cola, line, shots, 1);
+        if (line > 10 && line < 65530) continue;
+        cola_read_lmd(0, &lmd);
+        if (lmd.scan != line % 65536 || lmd.telegram != (line - 3) % 65536)
+            fail_msg("line %u: %u %u", line, lmd.scan, lmd.telegram);
+    }
+    /* the next scan of the head starts its lines again; the scanner's counter goes on */
+    cola.descriptor.scan = 2;
+    protocol_rig_describe(&cola, 0);
+    protocol_rig_clear(&cola);
+    protocol_rig_turn(&cola, 0, shots, 1);
+    cola_read_lmd(0, &lmd);
+    assert_int_equal(lmd.scan, 65540 % 65536);
+}
+
+/* ---- what is lost */
+
+/* Gives steps from `from` on, n of them, of a turn. */
+static void part_of_turn(uint32_t line, uint32_t from, uint32_t n)
+{
+    static const double level[1100];
+    double pan_turn[1100];
+    int64_t dt_ns[1100];
+    const int64_t line_ns = (int64_t)line * 66666667;
+    for (uint32_t i = 0; i < n; i++) {
+        dt_ns[i] = (int64_t)i * 61728;
+        pan_turn[i] = -((double)(from + i) - 405.0) / 1080.0;
+        shots[i] = (struct protocol_rig_shot){1, {5.0}, {0}, {0}};
+    }
+    const struct protocol_rig_run run = {
+        line,     line, (uint64_t)line * 1080 + from, n, line_ns + from * INT64_C(61728), line_ns, dt_ns, level,
+        pan_turn, shots};
+    protocol_rig_points(&cola, &run);
+}
+
+static void a_scan_with_a_hole_is_not_sent(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    cola_stream(0);
+    protocol_rig_clear(&cola);
+    cola_turn(0, 1.0);
+    part_of_turn(1, 0, 200); /* of 811 pulses one is missing */
+    part_of_turn(1, 200, 200);
+    cola.ops->gap(cola.protocol, 1);
+    part_of_turn(1, 401, 200);
+    part_of_turn(1, 601, 210);
+    cola_turn(2, 1.0);
+    cola_turn(5, 1.0); /* and two whole turns */
+    assert_int_equal(cola.n_units, 3);
+    assert_int_equal(cola.count[PROTOCOL_UNITS_LOST], 3);
+    static const uint32_t scan[] = {0, 2, 5};
+    for (uint32_t i = 0; i < 3; i++) {
+        cola_read_lmd(i, &lmd);
+        assert_int_equal(lmd.scan, scan[i]); /* a client sees the gap here, */
+        assert_int_equal(lmd.telegram, i);   /* and not here */
+        assert_int_equal(lmd.channel[0].value[0], 1000);
+    }
+}
+
+/* Attributes of another frame: they are not those of the points before. */
+static void give_attributes(uint32_t line, uint64_t pulse0, uint32_t n)
+{
+    uint8_t frame[NATIVE_HEADER_LEN + NATIVE_ATTRIBUTES_HEAD_LEN + 4 * 811] = {NATIVE_SYNC, NATIVE_ATTRIBUTES, 1};
+    uint8_t *payload = frame + NATIVE_HEADER_LEN;
+    le_put32(frame + 4, NATIVE_ATTRIBUTES_HEAD_LEN + 4 * n);
+    le_put64(payload, pulse0);
+    le_put32(payload + 8, line);
+    le_put32(payload + 12, n);
+    cola.ops->frame(cola.protocol, frame, native_frame_len(frame));
+}
+
+/* A turn of which one frame of points has no attributes, others', or its own. */
+static void attributes_of_one_frame(uint32_t line, int own, int others)
+{
+    for (uint32_t from = 0; from < 811; from += 200) {
+        cola.attributes = from != 200;
+        part_of_turn(line, from, from == 800 ? 11 : 200);
+        if (from == 200 && others) give_attributes(line, (uint64_t)line * 1080, 200);
+        if (from == 200 && own) give_attributes(line, (uint64_t)line * 1080 + 200, 200);
+    }
+    cola.ops->time(cola.protocol, (int64_t)line * 66666667 + 60000000);
+}
+
+static void attributes_are_those_of_their_points(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    cola.attributes = 1;
+    protocol_rig_describe(&cola, 0);
+    cola_stream(0);
+    protocol_rig_clear(&cola);
+    attributes_of_one_frame(0, 1, 0);
+    assert_int_equal(cola.n_units, 1);
+    attributes_of_one_frame(1, 0, 0);
+    attributes_of_one_frame(2, 0, 1);
+    attributes_of_one_frame(3, 1, 0);
+    assert_int_equal(cola.n_units, 2);
+    assert_int_equal(cola.count[PROTOCOL_UNITS_LOST], 2);
+}
+
+/* A scan is sent once it is done, also where the next one's points come before a tick's end. */
+static void two_scans_in_a_tick_are_both_sent(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    cola_stream(1);
+    protocol_rig_clear(&cola);
+    for (uint32_t line = 0; line < 3; line++)
+        for (uint32_t from = 0; from < 811; from += 200)
+            part_of_turn(line, from, from == 800 ? 11 : 200);
+    assert_int_equal(cola.n_units, 2);
+    cola.ops->time(cola.protocol, 200000000);
+    assert_int_equal(cola.n_units, 3);
+    for (uint32_t i = 0; i < 3; i++) {
+        cola_read_lmd(i, &lmd);
+        assert_int_equal(lmd.scan, i);
+    }
+}
+
+/* The same with all attributes of a turn missing. */
+static void a_scan_without_its_attributes_is_not_sent(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    cola.attributes = 1;
+    protocol_rig_describe(&cola, 0);
+    cola_stream(0);
+    protocol_rig_clear(&cola);
+    cola_turn(0, 1.0);
+    assert_int_equal(cola.n_units, 1);
+    cola.attributes = 0; /* the head sends some; here they are lost */
+    cola_turn(1, 1.0);
+    cola.attributes = 1;
+    cola_turn(2, 1.0);
+    assert_int_equal(cola.n_units, 2);
+    assert_int_equal(cola.count[PROTOCOL_UNITS_LOST], 1);
+}
+
+static void what_nobody_asked_for_is_not_lost(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    part_of_turn(7, 600, 211); /* joined in the middle */
+    cola_stream(0);
+    protocol_rig_clear(&cola);
+    cola_turn(8, 1.0);
+    assert_int_equal(cola.n_units, 1);
+    cola_expect("sEN LMDscandata 0", "sEA LMDscandata 0");
+    protocol_rig_clear(&cola);
+    cola_turn(11, 1.0);
+    assert_int_equal(cola.n_units, 0);
+    cola_stream(0);
+    protocol_rig_clear(&cola);
+    part_of_turn(12, 0, 100); /* the scan is stopped */
+    const struct line_end end = {.frame = 12, .line = 12, .n_fired = 100, .n_cast = 100, .status = LINE_PARTIAL};
+    protocol_rig_line_end(&cola, &end);
+    assert_int_equal(cola.n_units, 0);
+    assert_int_equal(cola.count[PROTOCOL_UNITS_LOST], 0);
+}
+
+static void a_client_that_does_not_read_loses_whole_scans(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    cola_stream(1);
+    protocol_rig_clear(&cola);
+    cola.room = 3000;
+    for (uint32_t line = 0; line < 5; line++)
+        cola_turn(line, 1.0);
+    assert_int_equal(cola.n_units, 1);
+    cola.room = SIZE_MAX;
+    cola_turn(5, 1.0);
+    cola_read_lmd(1, &lmd);
+    assert_int_equal(lmd.telegram, 1);
+    assert_int_equal(lmd.scan, 5);
+}
+
+/* ---- polled, every second one, stopped */
+
+static void a_poll_gets_the_last_scan(void **state)
+{
+    (void)state;
+    cola_open_lms();
+    protocol_rig_input(&cola, "\2sRN LMDscandata\3");
+    EXPECT_B("sRN LCMstate", "sRA LCMstate \0"); /* none yet: it waits, and others are answered */
+    protocol_rig_clear(&cola);
+    cola_turn(0, 1.0);
+    assert_int_equal(cola.n_units, 1);
+    cola_read_lmd(0, &lmd);
+    assert_string_equal(lmd.verb, "sRA");
+    assert_int_equal(lmd.channel[0].n, 1081);
+    protocol_rig_clear(&cola);
+    cola_turn(1, 2.0);
+    assert_int_equal(cola.n_units, 0); /* not asked for */
+    for (int b = 0; b < 2; b++) {
+        uint8_t frame[64];
+        if (b)
+            cola_input(frame, cola_frame_b(frame, "sRN LMDscandata", 15));
+        else
+            protocol_rig_input(&cola, "\2sRN LMDscandata\3");
+        cola_read_lmd((uint32_t)b, &lmd);
+        assert_int_equal(lmd.scan, 1);
+        assert_int_equal(lmd.telegram, 1 + b);
+        assert_int_equal(lmd.channel[0].value[1080], 12800);
+    }
+    cola_head_state("idle"); /* a resting head is woken */
+    cola_close();
+    cola_open_lms();
+    cola_head_state("idle");
+    protocol_rig_input(&cola, "\2sRN LMDscandata\3");
+    assert_string_equal(cola.line[1], "SCAN:START");
+    cola_head_state("fault");
+    cola_expect("sRN LMDscandata", "sFA 4");
+}
+
+static void every_nth_scan_on_request(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    cola_authorise();
+    cola_expect("sWN LMDscandatacfg 1 0 0 0 0 0 0 0 0 0 0 +3", "sWA LMDscandatacfg");
+    cola_stream(0);
+    protocol_rig_clear(&cola);
+    for (uint32_t line = 0; line < 9; line++)
+        cola_turn(line, 1.0);
+    assert_int_equal(cola.n_units, 3);
+    for (uint32_t i = 0; i < 3; i++) {
+        cola_read_lmd(i, &lmd);
+        assert_int_equal(lmd.scan, 3 * i);
+        assert_int_equal(lmd.n_8, 0);
+    }
+    cola_expect("sMN LMCstopmeas", "sAN LMCstopmeas 0");
+    protocol_rig_clear(&cola);
+    cola_turn(9, 1.0);
+    assert_int_equal(cola.n_units, 0);
+    cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 0");
+    protocol_rig_clear(&cola);
+    for (uint32_t line = 10; line < 13; line++)
+        cola_turn(line, 1.0);
+    assert_int_equal(cola.n_units, 1);
+    assert_int_equal(cola.count[PROTOCOL_UNITS_LOST], 0);
+}
+
+/* Streamed telegrams have the form of the last request, or what EIHstCola says. */
+static void the_stream_has_the_chosen_form(void **state)
+{
+    (void)state;
+    cola_open_tim("TiM571");
+    cola_authorise();
+    cola_stream(0);
+    cola_expect("sWN EIHstCola 1", "sWA EIHstCola");
+    protocol_rig_clear(&cola);
+    cola_turn(0, 1.0);
+    assert_memory_equal(cola.bytes, "\2\2\2\2", 4);
+    cola_expect("sRN EIHstCola", "sRA EIHstCola 1"); /* in the form of this request, */
+    protocol_rig_clear(&cola);
+    cola_turn(1, 1.0);
+    assert_memory_equal(cola.bytes, "\2sSN", 4); /* as is what follows */
+    EXPECT_B("sRN EIHstCola", "sRA EIHstCola \1");
+    protocol_rig_clear(&cola);
+    cola_turn(2, 1.0);
+    assert_memory_equal(cola.bytes, "\2\2\2\2", 4);
+}
+
+int main(void)
+{
+#define CASE(f) cmocka_unit_test_teardown(f, close_rig)
+    const struct CMUnitTest tests[] = {
+        CASE(ticks_count_modulo_32_bits),
+        CASE(ticks_are_on_a_line_with_time),
+        CASE(counters_count_modulo_16_bits),
+        CASE(a_scan_with_a_hole_is_not_sent),
+        CASE(a_scan_without_its_attributes_is_not_sent),
+        CASE(attributes_are_those_of_their_points),
+        CASE(two_scans_in_a_tick_are_both_sent),
+        CASE(what_nobody_asked_for_is_not_lost),
+        CASE(a_client_that_does_not_read_loses_whole_scans),
+        CASE(a_poll_gets_the_last_scan),
+        CASE(every_nth_scan_on_request),
+        CASE(the_stream_has_the_chosen_form),
+    };
+    return cmocka_run_group_tests_name("cola times", tests, NULL, NULL);
+}

@@ -1,0 +1,138 @@
+/* Two SICK clients at once, one in CoLa-A and one in CoLa-B, and others between them that send garbage. Each client
+ * gets every scan; what both have of a scan is the same. */
+#include "tests/wire/house.h"
+#include "tests/wire/wire.h"
+
+enum { SCANS = 15, BEAMS = 1081, PERIOD_US = 40000, ROOM = 1 << 16 };
+
+struct client {
+    int fd, is_b;
+    uint8_t bytes[ROOM];
+    size_t len, used; /* used: by the telegram found last */
+};
+
+/* What is compared of a scan. */
+struct scan {
+    uint32_t telegram, count, start_us, range[BEAMS];
+};
+
+/* Length of the whole telegram at the buffer's begin; 0: there is none yet. */
+static size_t whole(const struct client *c)
+{
+    if (!c->is_b) {
+        const uint8_t *end = memchr(c->bytes, 3, c->len);
+        return end == NULL ? 0 : (size_t)(end - c->bytes) + 1;
+    }
+    const size_t len = c->len < 8 ? 0 : 9 + (size_t)(c->bytes[6] << 8 | c->bytes[7]);
+    return c->len < len ? 0 : len;
+}
+
+static const uint8_t *next_telegram(struct client *c)
+{
+    c->len -= c->used;
+    memmove(c->bytes, c->bytes + c->used, c->len);
+    while ((c->used = whole(c)) == 0) {
+        struct pollfd slot = {.fd = c->fd, .events = POLLIN};
+        assert_int_equal(poll(&slot, 1, DEADLINE_MS), 1);
+        const ssize_t n = read(c->fd, c->bytes + c->len, sizeof c->bytes - c->len);
+        assert_true(n > 0);
+        c->len += (size_t)n;
+    }
+    return c->bytes;
+}
+
+static uint32_t big_endian(const uint8_t *at, int n)
+{
+    uint32_t v = 0;
+    while (n-- > 0)
+        v = v << 8 | *at++;
+    return v;
+}
+
+/* Field i of a telegram in CoLa-A. */
+static uint32_t field(const uint8_t *telegram, int i)
+{
+    const char *at = (const char *)telegram;
+    for (; i > 0; i--)
+        at = strchr(at, ' ') + 1;
+    return (uint32_t)strtoul(at, NULL, 16);
+}
+
+static void read_scan(struct client *c, struct scan *s)
+{
+    const uint8_t *t = next_telegram(c);
+    assert_memory_equal(t + (c->is_b ? 8 : 1), "sSN LMDscandata ", 16);
+    if (c->is_b) {
+        *s = (struct scan){big_endian(t + 34, 2), big_endian(t + 36, 2), big_endian(t + 38, 4), {0}};
+        for (int i = 0; i < BEAMS; i++)
+            s->range[i] = big_endian(t + 64 + 21 + 2 * i, 2);
+        return;
+    }
+    *s = (struct scan){field(t, 7), field(t, 8), field(t, 9), {0}};
+    const char *at = (const char *)t;
+    for (int i = 0; i < 26; i++)
+        at = strchr(at, ' ') + 1;
+    for (int i = 0; i < BEAMS; i++) {
+        char *end;
+        s->range[i] = (uint32_t)strtoul(at, &end, 16);
+        at = end;
+    }
+}
+
+static void start_client(struct client *c, const char *endpoint, int is_b)
+{
+    static const char a[] = "\2sEN LMDscandata 1\3";
+    static const char b[] = "\2\2\2\2\0\0\0\x11sEN LMDscandata \1\x33"; /* 0x11 bytes; their XOR */
+    *c = (struct client){.fd = raw_connect(endpoint), .is_b = is_b};
+    raw_write(c->fd, is_b ? b : a, (is_b ? sizeof b : sizeof a) - 1);
+    assert_memory_equal(next_telegram(c) + (is_b ? 8 : 1), "sEA LMDscandata ", 16);
+}
+
+/* What a port scan may bring: none of it is a request. */
+static void send_garbage(const char *endpoint, int i)
+{
+    static const char *const garbage[] = {"GET / HTTP/1.1\r\n\r\n", "\2\2\2\2\xff\xff\xff\xff", "\2sRN ", "\r\n\r\n"};
+    const int fd = raw_connect(endpoint);
+    raw_write(fd, garbage[i % 4], strlen(garbage[i % 4]));
+    close(fd);
+}
+
+static void test_two_clients(void **state)
+{
+    struct wire *wire = *state;
+    static struct client client[2];
+    static struct scan scan[2][SCANS];
+    char endpoint[64];
+    const char *const more[] = {"--set", "links.0.port=0", "--set", "head.profile=sick-lms111", NULL};
+    struct head head = head_start(wire, "config/sick.yaml", house_options(wire, "2", more));
+    snprintf(endpoint, sizeof endpoint, "%s", head_link(&head, 0));
+    for (int k = 0; k < 2; k++)
+        start_client(&client[k], endpoint, k);
+    for (int n = 0; n < SCANS; n++) {
+        for (int k = 0; k < 2; k++)
+            read_scan(&client[k], &scan[k][n]);
+        send_garbage(endpoint, n);
+    }
+    for (int k = 0; k < 2; k++)
+        for (int n = 1; n < SCANS; n++) {
+            assert_int_equal(scan[k][n].telegram, scan[k][n - 1].telegram + 1);
+            assert_int_equal(scan[k][n].count, scan[k][n - 1].count + 1);
+            assert_int_equal(scan[k][n].start_us, scan[k][n - 1].start_us + PERIOD_US);
+        }
+    /* the second client began within the first scans of the other one */
+    const uint32_t behind = scan[1][0].count - scan[0][0].count;
+    assert_true(behind < SCANS);
+    for (uint32_t n = 0; n + behind < SCANS; n++) {
+        assert_int_equal(scan[0][n + behind].start_us, scan[1][n].start_us);
+        assert_memory_equal(scan[0][n + behind].range, scan[1][n].range, sizeof scan[1][n].range);
+    }
+    for (int k = 0; k < 2; k++)
+        close(client[k].fd);
+    head_end(&head, SIGTERM);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test_setup_teardown(test_two_clients, wire_setup, wire_teardown)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

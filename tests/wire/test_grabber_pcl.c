@@ -1,0 +1,109 @@
+/* PCL's VLPGrabber, where PCL is installed: turns are whole, and each point lies on the house. It takes all lasers of
+ * a firing sequence as fired at once; the test knows better, as it knows the laser by its elevation. */
+#include "tests/wire/house.h"
+
+enum { SWEEPS = 3 };
+
+/* In the order of firing, 2.304 us apart, at 3,600 degrees a second. */
+static const double ELEVATION_DEG[16] = {-15, 1, -13, 3, -11, 5, -9, 7, -7, 9, -5, 11, -3, 13, -1, 15};
+static const double LASER_DEG = 2.304 * 3600e-6;
+
+static int run_shell(struct wire *wire, const char *command)
+{
+    const char *const args[] = {"-c", command, NULL};
+    return wire_wait(wire, wire_spawn_program(wire, "/bin/sh", args, "shell.out", "shell.err", -1));
+}
+
+/* The client's program in the folder; skips the test where it can't be had. */
+static const char *build_or_skip(struct wire *wire)
+{
+    char command[800], program[352];
+    if (run_shell(wire, "pkg-config --exists pcl_io && command -v g++") != 0) {
+        print_message("PCL is not there: package libpcl-dev\n");
+        skip();
+    }
+    snprintf(program, sizeof program, "%s", wire_path(wire, "pcl_vlp16"));
+    snprintf(command, sizeof command,
+             "g++ -O0 -w -x c++ tests/readers/pcl_vlp16.in -o %s $(pkg-config --cflags --libs pcl_io)", program);
+    if (run_shell(wire, command) != 0) {
+        wire_show(wire, "shell.err");
+        fail_msg("the client does not compile");
+    }
+    return wire_path(wire, "pcl_vlp16");
+}
+
+static int free_port(void)
+{
+    struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr = {htonl(INADDR_LOOPBACK)}};
+    socklen_t len = sizeof at;
+    int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0);
+    getsockname(fd, (struct sockaddr *)&at, &len);
+    close(fd);
+    return ntohs(at.sin_port);
+}
+
+/* 1: the point is on the house. */
+static int is_right(const struct house *house, double x, double y, double z)
+{
+    const double range_m = sqrt(x * x + y * y + z * z), elevation = asin(z / range_m);
+    int laser = -1;
+    for (int i = 0; i < 16; i++) /* coordinates are printed to 10 um */
+        if (fabs(elevation * 180.0 / M_PI - ELEVATION_DEG[i]) < 0.01) laser = i;
+    if (laser < 0) fail_msg("no laser at %.4f degrees", elevation * 180.0 / M_PI);
+    const double azimuth = atan2(x, y) + laser * LASER_DEG * M_PI / 180.0;
+    /* Half of 2 mm, and the printed digits; azimuths are rounded to 0.01 degrees on the wire and once more there. */
+    return house_agrees(house, azimuth, ELEVATION_DEG[laser] * M_PI / 180.0, 0.02 * M_PI / 180.0, range_m, 0.00102, 0.1,
+                        100.0);
+}
+
+static void check_sweeps(const struct house *house, const char *text)
+{
+    char *at = strstr(text, "sweep ");
+    int checked = 0, wrong = 0;
+    for (int sweep = 0; sweep < SWEEPS; sweep++) {
+        assert_non_null(at);
+        const long n = strtol(at + strlen("sweep "), &at, 10);
+        /* A turn has 0.1 s / 55.296 us = 1808.4 sequences; a sweep begins with a block, of two. All of them see
+         * something. The first sweep begins anywhere. */
+        if (sweep > 0) assert_in_range(n, 16 * 1806, 16 * 1811);
+        for (long i = 0; i < n; i++) {
+            double x = strtod(at, &at), y = strtod(at, &at), z = strtod(at, &at);
+            if (sweep == 0 || i % 4 != 0) continue;
+            checked++;
+            wrong += !is_right(house, x, y, z);
+        }
+        at = strstr(at, "sweep ");
+    }
+    /* Frames of windows have outlines that are closer together than the rounding of azimuths. */
+    if (wrong > checked / 1000) fail_msg("%d of %d points are not on the house", wrong, checked);
+}
+
+static void test_sweeps(void **state)
+{
+    struct wire *wire = *state;
+    char data[64], position[64], port[16], program[352];
+    snprintf(program, sizeof program, "%s", build_or_skip(wire));
+    snprintf(port, sizeof port, "%d", free_port());
+    snprintf(data, sizeof data, "links.0.port=%s", port);
+    snprintf(position, sizeof position, "links.1.port=%d", free_port());
+    const char *const more[] = {"--set", data, "--set", position, "--set", "links.2.port=0", NULL};
+    char count[8];
+    snprintf(count, sizeof count, "%d", SWEEPS);
+    const char *const args[] = {port, count, NULL};
+    pid_t client = wire_spawn_program(wire, program, args, "sweeps", "pcl.err", -1);
+    struct head head = head_start(wire, "config/velodyne.yaml", house_options(wire, "4", more));
+    struct house *house = house_load(wire);
+    assert_int_equal(wire_wait(wire, client), 0);
+    head_end(&head, SIGTERM);
+    char *text = wire_read(wire_path(wire, "sweeps"), NULL);
+    check_sweeps(house, text);
+    free(text);
+    house_free(house);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test_setup_teardown(test_sweeps, wire_setup, wire_teardown)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
