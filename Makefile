@@ -206,7 +206,7 @@ ONE = $(patsubst $(BUILD)/%,%,$(filter %/$(T),$(TESTS)))
 SCRIPT = $(wildcard tests/$(T).sh tests/guest/$(T).sh)
 test: deps
 	@[ -n '$(ONE)$(SCRIPT)' ] || { echo "T=$(T): no tests/*/$(T).c, tests/$(T).sh or tests/guest/$(T).sh" >&2; exit 2; }
-	$(SUBMAKE) $(STRICT) BUILD=$(BUILD)/test $(if $(filter tests/unit/%,$(ONE)),,all $(BUILD)/test/bench) $(ONE:%=$(BUILD)/test/%) \
+	$(SUBMAKE) $(STRICT) BUILD=$(BUILD)/test $(if $(filter-out tests/unit/%,$(ONE))$(SCRIPT),all $(BUILD)/test/bench) $(ONE:%=$(BUILD)/test/%) \
 		$(if $(filter tests/guest/%,$(SCRIPT)),$(patsubst $(BUILD)/%,$(BUILD)/test/%,$(call PROGRAMS,guest)))
 	@$(RUN) BUILD=$(BUILD) bash tests/run_tap.sh $(ONE:%=$(BUILD)/test/%) $(SCRIPT)
 endif
