@@ -15,8 +15,11 @@ static const struct personality HOKUYO = {"config/hokuyo.yaml",
                                           {"links.1.path", "links.3.path"},
                                           2,
                                           {"links.0.protocol=native", "links.1.protocol=native"}};
-static const struct personality SICK = {
-    "config/sick.yaml", "\2sEN LMDscandata 1\3", {"links.2.path"}, 1, {"links.0.protocol=native"}};
+static const struct personality SICK = {"config/sick.yaml",
+                                        "\2sEN LMDscandata 1\3",
+                                        {"links.1.path", "links.3.path"},
+                                        2,
+                                        {"links.0.protocol=native", "links.1.protocol=native"}};
 static const struct personality VELODYNE = {"config/velodyne.yaml",
                                             NULL,
                                             {"links.4.path"},
