@@ -122,7 +122,7 @@ static void test_polled(void **state)
     close(listener);
     snprintf(sensor, sizeof sensor, "driver = CLMS100Eth\nip_address = 127.0.0.1\nTCP_port = %d\n", port);
     grabber_start(wire, "SICK", sensor, &grabber);
-    grabber_wait(&grabber, SCANS);
+    if (!grabber_wait(&grabber, SCANS)) fail_msg("rawlog-grabber complains:\n%s", grabber.said);
     grabber_end(&grabber);
     assert_int_equal(wire_wait(wire, relay), 0);
     head_end(&head, SIGTERM);

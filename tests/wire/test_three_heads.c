@@ -253,9 +253,9 @@ static void test_nothing_is_lost(void **state)
         head_end(&head[i], SIGTERM);
         for (size_t k = 0; k < sizeof zero / sizeof zero[0]; k++)
             expect_at_most(wire[i], zero[k], 0);
-        /* the VLP-16's last packet, which the end of the scan cuts */
-        expect_at_most(wire[i], "lost_units", i == 2);
-        expect_at_most(wire[i], "reader_lost_frames", i == 2);
+        /* The end of the scan cuts the VLP-16's last packet: no reader was too slow. */
+        expect_at_most(wire[i], "lost_units", 0);
+        expect_at_most(wire[i], "reader_lost_frames", 0);
         assert_int_equal(wire_teardown((void **)&wire[i]), 0);
     }
     close(data);
