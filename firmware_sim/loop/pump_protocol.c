@@ -2,7 +2,8 @@
  *
  * In real time the protocol keeps up with the head, whether its client reads or not, as the firmware of a device does.
  * A unit that has no room, or that comes while one waits that is older than loop.queue_ms, is lost as a whole; what
- * answers a client at once is lost for want of room alone. In the paces that wait for readers nothing is lost: the session takes no further tick until there is room. */
+ * answers a client at once is lost for want of room alone. In the paces that wait for readers nothing is lost: the
+ * session takes no further tick until there is room. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
