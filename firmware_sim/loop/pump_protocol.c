@@ -113,6 +113,7 @@ int session_open_protocol(struct pump *pump, struct session *s)
         .host = {s, host_send, host_command, host_utc_ns, host_fix, host_count, host_hang_up, host_next_fix_ns},
         .session = s->id,
         .fixes_hz = pump->links->fixes_hz,
+        .waits = pump->stream->waits,
     };
     struct protocol_spec full = spec;
     snprintf(full.address, sizeof full.address, "%s", pump->links->data_address);
@@ -187,7 +188,10 @@ static int take_input(struct pump *pump, struct session *s)
         s->answering = 0;
         c->in_pos += n;
     }
-    if (s->hang_up) c->in_pos = c->in_len;
+    if (s->hang_up && c->in_pos != c->in_len) {
+        host_count(s, PROTOCOL_INPUT_LOST, c->in_len - c->in_pos);
+        c->in_pos = c->in_len;
+    }
     return c->in_pos != from;
 }
 
