@@ -75,7 +75,7 @@ static void host_count(void *ctx, enum protocol_count what, uint64_t n)
     if (what == PROTOCOL_INPUT_LOST) counts->lost_input_bytes += n;
     if (what == PROTOCOL_WRONG) counts->wrong_requests += n;
     if (what == PROTOCOL_POINTS_LOST) counts->lost_points += n;
-    if (what == PROTOCOL_PULSES_UNFILLED) counts->unfilled_pulses += n;
+    if (what == PROTOCOL_PULSES_UNSENT) counts->unsent_pulses += n;
     s->commands.wrong += what == PROTOCOL_INPUT_LOST || what == PROTOCOL_WRONG;
 }
 
