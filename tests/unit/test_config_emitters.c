@@ -173,6 +173,7 @@ static void lists_name_their_line(void **state)
         {"0 nan 0\n", "list.txt, line 1: not a direction"},
         {"0 0 0\n", "list.txt, line 1: 0 0 0 is no direction"},
         {"0 90.5\n", "list.txt, line 1: an elevation of 90.5 deg; allowed -90 to 90"},
+        {"360 0\n-360 0\n1e18 0\n", "list.txt, line 3: an azimuth of 1e+18 deg; allowed -360 to 360"},
     };
     assert_loads(load_list("0 1 0\n 1 0 0 # right\n\n-1\t-1\t-1\r\n"));
     assert_int_equal(cfg->profile.emitter.steps, 3);
