@@ -16,7 +16,7 @@ static const struct {
     [PROTOCOL_NMEA] = {1u << LINK_NULL | 1u << LINK_FILE | 1u << LINK_PTY | 1u << LINK_TCP | 1u << LINK_UDP,
                        "null, file, pty, tcp, udp"},
     [PROTOCOL_SCIP] = {1u << LINK_PTY | 1u << LINK_TCP | 1u << LINK_USB | 1u << LINK_FD, "pty, tcp, usb"},
-    [PROTOCOL_COLA] = {1u << LINK_TCP | 1u << LINK_USB | 1u << LINK_FD, "tcp, usb"},
+    [PROTOCOL_COLA] = {1u << LINK_PTY | 1u << LINK_TCP | 1u << LINK_USB | 1u << LINK_FD, "pty, tcp, usb"},
     [PROTOCOL_VELODYNE] = {1u << LINK_UDP | 1u << LINK_FILE | 1u << LINK_NULL, "udp, file, null"},
     [PROTOCOL_VELODYNE_POSITION] = {1u << LINK_UDP | 1u << LINK_FILE | 1u << LINK_NULL, "udp, file, null"},
     [PROTOCOL_VELODYNE_HTTP] = {1u << LINK_TCP | 1u << LINK_FD, "tcp"},

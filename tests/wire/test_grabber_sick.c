@@ -115,7 +115,7 @@ static void test_polled(void **state)
     int port, listener;
     grabber_or_skip();
     const char *const more[] = {"--set", "links.0.port=0", "--set", "head.profile=sick-lms111", NULL};
-    struct head head = head_start(wire, "config/sick.yaml", house_options(wire, "2", more));
+    struct head head = head_start(wire, "config/sick.yaml", house_options(wire, "13", more));
     struct house *house = house_load(wire);
     listener = listen_anywhere(&port);
     pid_t relay = relay_start(wire, listener, head_link(&head, 0));
