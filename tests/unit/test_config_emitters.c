@@ -123,6 +123,8 @@ static void settings_that_do_not_fit_are_refused(void **state)
          ":3: head.prr_hz: 10000, but a line of head profile hokuyo-urg-04lx has 1024 pulses; allowed 9728"},
         {"hokuyo-urg-04lx", "  lines_hz: 11\n", ":3: head.lines_hz: 11 is outside the limits of head profile"},
         {"hokuyo-urg-04lx", "  pan_deg_s: 1\n", ":3: head.pan_deg_s: 1 is outside"},
+        {"hokuyo-ust-20lx", "  lines_hz: 11\n",
+         "11 is outside the limits of head profile hokuyo-ust-20lx; allowed 40 Hz"},
         {"hokuyo-urg-04lx", "  line_start_deg: -130\n", "allowed -119.53125 to 119.882813"},
         {"velodyne-vlp16", "  prr_hz: 300000\n", ":3: head.prr_hz: 300000 is outside"},
         {"velodyne-vlp16", "  ambiguity: folded\n", ":3: head.ambiguity: the pulses of head profile velodyne-vlp16"},
