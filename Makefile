@@ -206,7 +206,7 @@ ONE = $(patsubst $(BUILD)/%,%,$(filter %/$(T),$(TESTS)))
 SCRIPT = $(wildcard tests/$(T).sh tests/guest/$(T).sh)
 test: deps
 	@[ -n '$(ONE)$(SCRIPT)' ] || { echo "T=$(T): no tests/*/$(T).c, tests/$(T).sh or tests/guest/$(T).sh" >&2; exit 2; }
-	$(SUBMAKE) $(STRICT) BUILD=$(BUILD)/test $(if $(filter tests/unit/%,$(ONE)),,all $(BUILD)/test/bench) $(ONE:%=$(BUILD)/test/%) \
+	$(SUBMAKE) $(STRICT) BUILD=$(BUILD)/test $(if $(filter-out tests/unit/%,$(ONE))$(SCRIPT),all $(BUILD)/test/bench) $(ONE:%=$(BUILD)/test/%) \
 		$(if $(filter tests/guest/%,$(SCRIPT)),$(patsubst $(BUILD)/%,$(BUILD)/test/%,$(call PROGRAMS,guest)))
 	@$(RUN) BUILD=$(BUILD) bash tests/run_tap.sh $(ONE:%=$(BUILD)/test/%) $(SCRIPT)
 endif
@@ -277,7 +277,7 @@ install: all
 	install -m 644 config/heads/*.yaml "$(DESTDIR)$(HEADS_DIR)/"
 	install -m 644 config/scenes/glass_room.obj "$(DESTDIR)$(SCENES_DIR)/"
 	install -m 644 drivers/host/70-scanhead.rules "$(DESTDIR)$(UDEV_DIR)/"
-	sed "s|@PREFIX@|$(PREFIX)|; s|@VERSION@|$$(sed -n 's/^#define SCANHEAD_VERSION "\(.*\)"$$/\1/p' \
+	sed "s|@PREFIX@|$(PREFIX)|; s|@VERSION@|$$(sed -n 's/^#define SCANHEAD_VERSION  *"\(.*\)"$$/\1/p' \
 		drivers/host/scanhead.h)|" drivers/host/libscanhead.pc.in > "$(DESTDIR)$(PC_DIR)/libscanhead.pc"
 format:
 	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')

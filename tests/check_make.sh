@@ -91,6 +91,17 @@ check "EMBREE=3 without it is refused" refuses_embree 3
 rm -r "$work/include/embree4"
 check "without either there is one error that says so" refuses_embree ""
 
+# ---- one test by its name. Unit tests alone need no program; a name that another folder has, too, does.
+one_makes_the_program() {
+    env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -n DEPS=no BUILD="$work/one" T="$1" test 2>&1 |
+        grep -c "BUILD=$work/one/test .*all $work/one/test/bench"
+}
+programs_of() {
+    [ "$(one_makes_the_program test_ring)" = 0 ] && [ "$(one_makes_the_program test_gnss)" = 1 ] &&
+        [ "$(one_makes_the_program test_pty)" = 1 ] && [ "$(one_makes_the_program check_includes)" = 1 ]
+}
+check "T=NAME makes the program where a test of that name runs it" programs_of
+
 # ---- the archive, of the objects of both compilers
 only_the_interface() {
     archive=$1/libscanhead.a

@@ -12,7 +12,7 @@ build=$1
 part=${2:-}
 waiting="three_heads slow_reader grabber_hokuyo grabber_velodyne signals same_stream clients join"
 alone="bench_cli latency overrun ring_threads"
-longest="grabber_sick leaks meshes beam_reference range beam plan coordinates georef_default gpsd attributes moving travel ticks"
+longest="beside grabber_sick leaks meshes beam_reference range beam plan coordinates georef_default gpsd attributes moving travel ticks"
 
 wanted() {
     [ -z "$part" ] || [ "$part" = "$1" ]

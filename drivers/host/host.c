@@ -11,7 +11,9 @@ _Static_assert(SCANHEAD_EINPUT == (int)SH_EINPUT && SCANHEAD_EIO == (int)SH_EIO 
                    SCANHEAD_ERESET == (int)SH_ERESET,
                "the library's errors are those of core/err.h");
 _Static_assert(SCANHEAD_POINTS == (int)NATIVE_POINTS && SCANHEAD_POSES == (int)NATIVE_POSES &&
-                   SCANHEAD_ATTRIBUTES == (int)NATIVE_ATTRIBUTES && SCANHEAD_EV_PPS == (int)NATIVE_EV_PPS &&
+                   SCANHEAD_ATTRIBUTES == (int)NATIVE_ATTRIBUTES && SCANHEAD_EMITTER == (int)NATIVE_EMITTER &&
+                   SCANHEAD_EMIT_DIRECTIONS == (int)NATIVE_EMIT_DIRECTIONS &&
+                   SCANHEAD_MAX_BEAMS == (int)NATIVE_MAX_BEAMS && SCANHEAD_EV_PPS == (int)NATIVE_EV_PPS &&
                    SCANHEAD_POSE_NONE == (int)NATIVE_POSE_NONE && SCANHEAD_LOCAL == (int)NATIVE_LOCAL,
                "types, events and flags are those on the wire");
 

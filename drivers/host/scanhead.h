@@ -35,7 +35,7 @@ extern "C" {
 #endif
 
 /* Of this release, the only place that says it: program, library and libscanhead.pc have the same. */
-#define SCANHEAD_VERSION     "1.0.0"
+#define SCANHEAD_VERSION "1.0.0"
 #define SCANHEAD_API_VERSION 1
 
 /* SCANHEAD_VERSION of the library that the program runs with. */

@@ -43,6 +43,7 @@ enum protocol_count {
     PROTOCOL_INPUT_LOST,  /* bytes from the client that were thrown away: overlong, out of frame, garbage */
     PROTOCOL_WRONG,       /* requests that were answered with an error */
     PROTOCOL_POINTS_LOST, /* echoes that were sent as none: the protocol has no number for their range */
+    PROTOCOL_PULSES_UNFILLED, /* pulses in a unit that was begun and never full, since no more pulses followed */
     PROTOCOL_N_COUNTS
 };
 

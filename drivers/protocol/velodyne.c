@@ -75,10 +75,11 @@ static void destroy(void *protocol)
     free(protocol);
 }
 
-/* What comes next does not belong to what came before. The device has no packets with holes. */
+/* What comes next does not belong to what came before. The device has no packets with holes. Nobody was too slow:
+ * the head never sent the pulses that would fill this one. */
 static void fall_out_of_step(struct velodyne *v)
 {
-    if (v->n_firings != 0) v->host.count(v->host.ctx, PROTOCOL_UNITS_LOST, 1);
+    v->host.count(v->host.ctx, PROTOCOL_PULSES_UNFILLED, v->n_firings);
     v->n_firings = 0;
     v->in_step = 0;
 }
@@ -272,8 +273,11 @@ static void frame(void *protocol, const uint8_t *bytes, size_t len)
 
 static void gap(void *protocol, uint32_t n_frames)
 {
+    struct velodyne *v = protocol;
     (void)n_frames;
-    fall_out_of_step(protocol);
+    if (v->n_firings != 0) v->host.count(v->host.ctx, PROTOCOL_UNITS_LOST, 1);
+    v->n_firings = 0;
+    fall_out_of_step(v);
 }
 
 static void nothing_at(void *protocol, int64_t t_ns)

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "drivers/protocol/http_request.h"
+#include "drivers/protocol/native.h"
 #include "drivers/protocol/velodyne.h"
 #include "drivers/protocol/velodyne_pages.h"
 #include "drivers/protocol/velodyne_settings.h"
@@ -170,6 +171,8 @@ static int64_t never(const void *protocol)
 
 const struct protocol_ops protocol_velodyne_http = {
     .name = "velodyne-http",
+    .emitters = 1u << NATIVE_EMIT_BEAMS,
+    .n_beams = VELODYNE_BEAMS,
     .max_unit = MAX_ANSWER,
     .create = create,
     .destroy = destroy,

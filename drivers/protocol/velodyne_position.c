@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "drivers/protocol/bytes.h"
+#include "drivers/protocol/native.h"
 #include "drivers/protocol/nmea.h"
 #include "drivers/protocol/velodyne.h"
 
@@ -123,6 +124,8 @@ static int64_t next_ns(const void *protocol)
 
 const struct protocol_ops protocol_velodyne_position = {
     .name = "velodyne-position",
+    .emitters = 1u << NATIVE_EMIT_BEAMS,
+    .n_beams = VELODYNE_BEAMS,
     .max_unit = VELODYNE_POSITION_LEN,
     .create = create,
     .destroy = destroy,

@@ -113,6 +113,7 @@ static int draw(struct config *cfg, void *ctx, struct sh_err *err)
                                         .ctx = run,
                                         .interrupted = app_interrupted};
     app_catch_signals();
+    cfg->output.layout = LINE_GEO;
     int rc = offline_open(cfg, 0.0, &app_report_stderr, &offline, err);
     if (rc == SH_OK) options.last_station = offline.site->n_stations;
     if (rc == SH_OK) rc = create_map(run, offline.site, err);
@@ -130,10 +131,11 @@ static int draw(struct config *cfg, void *ctx, struct sh_err *err)
     return rc;
 }
 
-/* The map is in the scene's frame, whatever the configuration sends to its clients. */
+/* The map is in the scene's frame, whatever the configuration sends to its clients. The layout is no setting here:
+ * protocols of links forbid geo, and no link is opened. */
 static int set_frame(struct app_sets *sets)
 {
-    static const char *const SETS[] = {"output.crs=local", "output.layout=geo", "output.utm_zone=0"};
+    static const char *const SETS[] = {"output.crs=local", "output.utm_zone=0"};
     int status = APP_OK;
     for (size_t i = 0; i < sizeof SETS / sizeof SETS[0] && status == APP_OK; i++)
         status = app_add_set(sets, SETS[i]);

@@ -167,7 +167,6 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
     struct device *device = NULL;
     struct loop *loop = NULL;
     struct loop_options options = {.hash = o->stats != NULL, .report = &app_report_stderr};
-    app_catch_signals();
     o->device.start |= cfg->head.start;
     o->device.one_scan = o->device.one_scan && o->device.start;
     if (o->device.start && o->device.duration_s > 0.0 && !o->frames_given) cfg->head.settings.frames = 0;
@@ -204,6 +203,7 @@ static int run(int argc, char **argv)
     int status = app_parse(&app_run, argc, argv, &o.in, &o);
     if (status != APP_GO_ON) return status;
     o.frames_given = gives_frames(&o.in.sets);
+    app_catch_signals();
     return app_with_config(&o.in, run_head, &o);
 }
 

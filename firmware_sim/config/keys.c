@@ -255,8 +255,8 @@ static const struct cfg_key config_keys[] = {
      WORDS([USB_RATE_FULL] = "full", [USB_RATE_HIGH] = "high", [USB_RATE_SUPER] = "super"),
      .help = "usb: full (12 Mbit/s), high (480) or super (5000): the fastest that the device offers."},
     {LINK(vid), CFG_COUNT, NULL, "0x1209", 1, 65535, .flags = CFG_HEX, .allowed = "0x0001 to 0xffff",
-     .help = "usb: vendor id. When not given, that of the device whose protocol it is: native 0x1209, scip 0x15d1, cola "
-             "0x19a2; with pid 0x0001, native is set aside for private tests."},
+     .help = "usb: vendor id. When not given, that of the device whose protocol it is: native 0x1209 (with pid 0x0001 "
+             "set aside for private tests), scip 0x15d1, cola 0x19a2."},
     {LINK(pid), CFG_COUNT, NULL, "0x0001", 0, 65535, .flags = CFG_HEX, .allowed = "0x0000 to 0xffff",
      .help = "usb: product id. When not given: native 0x0001, scip 0x0000, cola 0x5001."},
     {LINK(serial), CFG_TEXT, .def = "", .example = "SIM-0002",

@@ -16,7 +16,7 @@ static const struct {
     [PROTOCOL_NMEA] = {1u << LINK_NULL | 1u << LINK_FILE | 1u << LINK_PTY | 1u << LINK_TCP | 1u << LINK_UDP,
                        "null, file, pty, tcp, udp"},
     [PROTOCOL_SCIP] = {1u << LINK_PTY | 1u << LINK_TCP | 1u << LINK_USB | 1u << LINK_FD, "pty, tcp, usb"},
-    [PROTOCOL_COLA] = {1u << LINK_TCP | 1u << LINK_USB | 1u << LINK_FD, "tcp, usb"},
+    [PROTOCOL_COLA] = {1u << LINK_PTY | 1u << LINK_TCP | 1u << LINK_USB | 1u << LINK_FD, "pty, tcp, usb"},
     [PROTOCOL_VELODYNE] = {1u << LINK_UDP | 1u << LINK_FILE | 1u << LINK_NULL, "udp, file, null"},
     [PROTOCOL_VELODYNE_POSITION] = {1u << LINK_UDP | 1u << LINK_FILE | 1u << LINK_NULL, "udp, file, null"},
     [PROTOCOL_VELODYNE_HTTP] = {1u << LINK_TCP | 1u << LINK_FD, "tcp"},
@@ -76,6 +76,17 @@ static void check_stream(struct cfg_reader *rd, struct config *cfg, uint32_t i, 
                      ops->name, place_of(rd, "output.attributes", where));
 }
 
+static int has_kind(const struct protocol_ops *ops, const struct emitter *emitter)
+{
+    return ops->emitters == 0 || (ops->emitters & 1u << emitter->kind) != 0;
+}
+
+int cfg_protocol_fits(const struct protocol_ops *ops, const struct emitter *emitter)
+{
+    return has_kind(ops, emitter) &&
+           (emitter->kind != EMITTER_BEAMS || ops->n_beams == 0 || ops->n_beams == emitter->n_beams);
+}
+
 /* The head must be of a kind that the protocol has words for. */
 static void check_head(struct cfg_reader *rd, const struct config *cfg, uint32_t i, const struct protocol_ops *ops)
 {
@@ -86,17 +97,17 @@ static void check_head(struct cfg_reader *rd, const struct config *cfg, uint32_t
                                         [EMITTER_DIRECTIONS] = "directions"};
     const struct emitter *emitter = &cfg->profile.emitter;
     char where[40], allowed[64] = "";
-    if (ops->emitters == 0 || !rd->profile_read) return;
+    if (!rd->profile_read || cfg_protocol_fits(ops, emitter)) return;
     for (int kind = EMITTER_LINE; kind <= EMITTER_DIRECTIONS; kind++)
         if ((ops->emitters & 1u << kind) != 0)
             snprintf(allowed + strlen(allowed), sizeof allowed - strlen(allowed), "%s%s",
                      allowed[0] != '\0' ? ", " : "", kinds[kind]);
     place_of(rd, "head.profile", where);
-    if ((ops->emitters & 1u << emitter->kind) == 0)
+    if (!has_kind(ops, emitter))
         cfg_fail_key(rd, PROTOCOL_KEY, i,
-                     "%s can't tell of head profile %s%s, whose emitter is %s; allowed emitters: %s", ops->name,
+                     "%s can't speak for head profile %s%s, whose emitter is %s; allowed emitters: %s", ops->name,
                      cfg->profile.name, where, kinds[emitter->kind], allowed);
-    else if (emitter->kind == EMITTER_BEAMS && ops->n_beams != 0 && emitter->n_beams != ops->n_beams)
+    else
         cfg_fail_key(rd, PROTOCOL_KEY, i, "%s has %u beams, but head profile %s%s has %u; allowed %u", ops->name,
                      ops->n_beams, cfg->profile.name, where, emitter->n_beams, ops->n_beams);
 }

@@ -19,32 +19,14 @@ static const char *span(double low, double high, char buf[64])
 
 /* ---- protocols */
 
-/* Whose devices speak it; NULL: any head does. */
-static const char *const makers[PROTOCOL_N] = {[PROTOCOL_SCIP] = "Hokuyo",
-                                               [PROTOCOL_COLA] = "SICK",
-                                               [PROTOCOL_VELODYNE] = "Velodyne",
-                                               [PROTOCOL_VELODYNE_POSITION] = "Velodyne",
-                                               [PROTOCOL_VELODYNE_HTTP] = "Velodyne"};
-
-/* A maker's protocols are for its heads, and for those of other makers that have none but the right emitter. */
-static int speaks(const struct config_profile *p, int id)
-{
-    const struct protocol_ops *ops = protocol_ops_get((enum protocol_id)id);
-    const int fits = ops != NULL && (ops->emitters & 1u << p->emitter.kind) != 0 &&
-                     (p->emitter.kind != EMITTER_BEAMS || ops->n_beams == 0 || ops->n_beams == p->emitter.n_beams);
-    int has_own = 0;
-    if (ops == NULL || makers[id] == NULL) return ops != NULL;
-    for (int i = 0; i < PROTOCOL_N; i++)
-        has_own |= makers[i] != NULL && strcmp(makers[i], p->maker) == 0;
-    return has_own ? strcmp(makers[id], p->maker) == 0 && (fits || ops->emitters == 0) : fits;
-}
-
 static void put_protocols(const struct config_profile *p, FILE *out)
 {
     int n = 0;
     fputs("  protocols ", out);
-    for (int id = 0; id < PROTOCOL_N; id++)
-        if (speaks(p, id)) fprintf(out, "%s %s", n++ > 0 ? "," : "", protocol_ops_get((enum protocol_id)id)->name);
+    for (int id = 0; id < PROTOCOL_N; id++) {
+        const struct protocol_ops *ops = protocol_ops_get((enum protocol_id)id);
+        if (ops != NULL && cfg_protocol_fits(ops, &p->emitter)) fprintf(out, "%s %s", n++ > 0 ? "," : "", ops->name);
+    }
     fputc('\n', out);
 }
 

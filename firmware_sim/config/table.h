@@ -188,6 +188,8 @@ void cfg_set_usb_look(struct cfg_reader *rd, struct link_spec *link, uint32_t it
 int cfg_check_platform_keys(struct cfg_reader *rd, const struct config_platform *platform);
 /* link_protocol.c: what the protocols of links need. */
 void cfg_check_link_protocols(struct cfg_reader *rd, struct config *cfg);
+/* Whether the protocol has words for a head of this emitter. */
+int cfg_protocol_fits(const struct protocol_ops *ops, const struct emitter *emitter);
 /* The first link whose protocol has this need; -1: none. */
 int cfg_link_that_needs(const struct config *cfg, enum protocol_needs need);
 

@@ -71,10 +71,11 @@ static void host_count(void *ctx, enum protocol_count what, uint64_t n)
     struct session *s = ctx;
     struct link_counts *counts = &s->pump->counts;
     if (n == 0) return;
-    if (what == PROTOCOL_UNITS_LOST) session_count_units(s->pump, s, n);
+    if (what == PROTOCOL_UNITS_LOST) counts->lost_units += n; /* not for its reader: session_check_lost has those */
     if (what == PROTOCOL_INPUT_LOST) counts->lost_input_bytes += n;
     if (what == PROTOCOL_WRONG) counts->wrong_requests += n;
     if (what == PROTOCOL_POINTS_LOST) counts->lost_points += n;
+    if (what == PROTOCOL_PULSES_UNFILLED) counts->unfilled_pulses += n;
     s->commands.wrong += what == PROTOCOL_INPUT_LOST || what == PROTOCOL_WRONG;
 }
 
@@ -90,13 +91,12 @@ static void host_hang_up(void *ctx)
 static void greet(struct pump *pump, struct session *s)
 {
     static _Thread_local uint8_t frames[KEPT_MAX_BYTES];
-    uint32_t version, again;
-    uint32_t len = kept_copy(&pump->stream->kept, frames, &version);
-    do {
-        again = version;
+    uint32_t len, version, before;
+    do { /* none may be kept between the two: the session would miss it */
+        kept_copy(&pump->stream->kept, frames, &before);
         s->cursor = stream_released(pump->stream);
         len = kept_copy(&pump->stream->kept, frames, &version);
-    } while (version != again);
+    } while (version != before);
     pump->protocol->open(s->protocol, time_of(pump, s->cursor));
     for (uint32_t at = 0; at < len;) {
         size_t n = native_frame_len(frames + at);
@@ -107,21 +107,20 @@ static void greet(struct pump *pump, struct session *s)
 
 int session_open_protocol(struct pump *pump, struct session *s)
 {
-    const struct protocol_spec spec = {
+    struct protocol_spec spec = {
         .identity = &pump->links->identity,
         .host = {s, host_send, host_command, host_utc_ns, host_fix, host_count, host_hang_up, host_next_fix_ns},
         .session = s->id,
         .fixes_hz = pump->links->fixes_hz,
+        .port = pump->links->data_port,
     };
-    struct protocol_spec full = spec;
-    snprintf(full.address, sizeof full.address, "%s", pump->links->data_address);
-    full.port = pump->links->data_port;
     struct sh_err err;
+    snprintf(spec.address, sizeof spec.address, "%s", pump->links->data_address);
     s->pump = pump;
     s->hang_up = 0;
     if (s->units.bytes == NULL && unit_queue_create(&s->units, pump->out_cap) != SH_OK) return SH_ENOMEM;
     unit_queue_clear(&s->units);
-    int rc = pump->protocol->create(&full, &s->protocol, &err);
+    int rc = pump->protocol->create(&spec, &s->protocol, &err);
     if (rc == SH_OK) greet(pump, s);
     return rc;
 }

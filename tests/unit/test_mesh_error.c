@@ -39,6 +39,19 @@ static int load_hall(const char *mesh, const char *tolerance, const char *more, 
     return rc == SH_OK ? load_site(cfg, &report, site, err) : rc;
 }
 
+/* The one row of a stage. */
+static const struct plan_row *row_of(const char *stage, const struct site *site)
+{
+    const struct plan_row *found = NULL;
+    for (size_t i = 0; i < site->plan.n; i++) {
+        if (strcmp(site->plan.row[i].stage, stage) != 0) continue;
+        if (found != NULL) fail_msg("two rows of %s", stage);
+        found = &site->plan.row[i];
+    }
+    if (found == NULL) fail_msg("no row of %s", stage);
+    return found;
+}
+
 static void check_accepted(const char *mesh, const char *tolerance, const char *more)
 {
     static struct config cfg;
@@ -49,8 +62,7 @@ static void check_accepted(const char *mesh, const char *tolerance, const char *
         fail_msg("warnings: %s", warnings);
     assert_true(fabs(site->scene->error_m - 1.9e-6) < 1e-12);
     if (load_site == site_load_plan) {
-        const struct plan_row *row = &site->plan.row[0];
-        assert_string_equal(row->stage, "mesh");
+        const struct plan_row *row = row_of("mesh", site);
         assert_string_equal(row->method, "single precision");
         assert_true(row->error_m == site->scene->error_m);
     }

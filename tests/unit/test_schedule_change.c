@@ -256,7 +256,7 @@ static void a_pan_that_stops_ends_its_frame_and_keeps_its_angle(void **state)
  * this finds what overflows or divides by zero. */
 static struct schedule_spec wild_spec(uint64_t *seed)
 {
-    struct schedule_spec s;
+    struct schedule_spec s = {0};
     s.prr_uhz = case_between(seed, HZ, case_between(seed, 0, 1) ? 1000 * HZ : 10000000 * HZ);
     s.lines_uhz = case_between(seed, 250000, s.prr_uhz < 10000 * HZ ? s.prr_uhz : 10000 * HZ);
     s.pan_udeg_s = case_between(seed, 0, 4) ? case_between(seed, 0, 3600 * DEG) : case_between(seed, 0, 3);

@@ -64,10 +64,27 @@ static int n_saved(const struct grabber *grabber)
     return n;
 }
 
-void grabber_wait(struct grabber *grabber, int wanted)
+int grabber_wait(struct grabber *grabber, int wanted)
 {
-    while (n_saved(grabber) < wanted)
+    while (n_saved(grabber) < wanted) {
         if (!listen_to(grabber)) fail_msg("rawlog-grabber ended:\n%s", grabber->said);
+        if (strstr(grabber->said, "|ERROR|") != NULL) return 0;
+    }
+    return 1;
+}
+
+void grabber_start_and_wait(struct wire *wire, const char *name, const char *sensor, int wanted,
+                            struct grabber *grabber)
+{
+    for (int i = 1; i <= 5; i++) {
+        char numbered[16];
+        snprintf(numbered, sizeof numbered, "%s%d", name, i);
+        grabber_start(wire, numbered, sensor, grabber);
+        if (grabber_wait(grabber, wanted)) return;
+        print_message("rawlog-grabber complains:\n%s\n", grabber->said);
+        grabber_end(grabber);
+    }
+    fail_msg("rawlog-grabber complains five times");
 }
 
 void grabber_end(struct grabber *grabber)

@@ -21,8 +21,13 @@ void grabber_or_skip(void);
 /* name: of its section, its label and its files. sensor: the lines of its section, the driver's. */
 void grabber_start(struct wire *wire, const char *name, const char *sensor, struct grabber *grabber);
 
-/* Waits until it has saved so many observations. */
-void grabber_wait(struct grabber *grabber, int n_saved);
+/* Waits until it has saved so many observations. 0: it complained before. */
+int grabber_wait(struct grabber *grabber, int n_saved);
+
+/* Both; starts it anew where it complains. This client waits 100 ms for the reply to a command and then does without
+ * it, which a busy machine may not give it; so its user has five tries. */
+void grabber_start_and_wait(struct wire *wire, const char *name, const char *sensor, int n_saved,
+                            struct grabber *grabber);
 
 /* A key is pressed; it must end with status 0. */
 void grabber_end(struct grabber *grabber);

@@ -1,9 +1,9 @@
-/* Two SICK clients at once, one in CoLa-A and one in CoLa-B, and others between them that send garbage. Each client
- * gets every scan; what both have of a scan is the same. */
+/* Three SICK clients at once: CoLa-A and CoLa-B over TCP, CoLa-B over a pty; others between them send garbage. Each
+ * client gets every scan; what all have of a scan is the same. */
 #include "tests/wire/house.h"
 #include "tests/wire/wire.h"
 
-enum { SCANS = 15, BEAMS = 1081, PERIOD_US = 40000, ROOM = 1 << 16 };
+enum { CLIENTS = 3, SCANS = 15, BEAMS = 1081, PERIOD_US = 40000, ROOM = 1 << 16 };
 
 struct client {
     int fd, is_b;
@@ -79,11 +79,20 @@ static void read_scan(struct client *c, struct scan *s)
     }
 }
 
+/* A pty as it is: nobody has made its terminal raw. */
+static int connect_to(const char *endpoint)
+{
+    if (strncmp(endpoint, "tty:", 4) != 0) return raw_connect(endpoint);
+    const int fd = open(endpoint + 4, O_RDWR | O_NOCTTY | O_CLOEXEC);
+    assert_true(fd >= 0);
+    return fd;
+}
+
 static void start_client(struct client *c, const char *endpoint, int is_b)
 {
     static const char a[] = "\2sEN LMDscandata 1\3";
     static const char b[] = "\2\2\2\2\0\0\0\x11sEN LMDscandata \1\x33"; /* 0x11 bytes; their XOR */
-    *c = (struct client){.fd = raw_connect(endpoint), .is_b = is_b};
+    *c = (struct client){.fd = connect_to(endpoint), .is_b = is_b};
     raw_write(c->fd, is_b ? b : a, (is_b ? sizeof b : sizeof a) - 1);
     assert_memory_equal(next_telegram(c) + (is_b ? 8 : 1), "sEA LMDscandata ", 16);
 }
@@ -97,42 +106,41 @@ static void send_garbage(const char *endpoint, int i)
     close(fd);
 }
 
-static void test_two_clients(void **state)
+static void test_clients(void **state)
 {
     struct wire *wire = *state;
-    static struct client client[2];
-    static struct scan scan[2][SCANS];
-    char endpoint[64];
+    static struct client client[CLIENTS];
+    static struct scan scan[CLIENTS][SCANS];
     const char *const more[] = {"--set", "links.0.port=0", "--set", "head.profile=sick-lms111", NULL};
-    struct head head = head_start(wire, "config/sick.yaml", house_options(wire, "2", more));
-    snprintf(endpoint, sizeof endpoint, "%s", head_link(&head, 0));
-    for (int k = 0; k < 2; k++)
-        start_client(&client[k], endpoint, k);
+    struct head head = head_start(wire, "config/sick.yaml", house_options(wire, "13", more));
+    for (int k = 0; k < CLIENTS; k++)
+        start_client(&client[k], head_link(&head, k / 2), k != 0);
     for (int n = 0; n < SCANS; n++) {
-        for (int k = 0; k < 2; k++)
+        for (int k = 0; k < CLIENTS; k++)
             read_scan(&client[k], &scan[k][n]);
-        send_garbage(endpoint, n);
+        send_garbage(head_link(&head, 0), n);
     }
-    for (int k = 0; k < 2; k++)
+    for (int k = 0; k < CLIENTS; k++)
         for (int n = 1; n < SCANS; n++) {
             assert_int_equal(scan[k][n].telegram, scan[k][n - 1].telegram + 1);
             assert_int_equal(scan[k][n].count, scan[k][n - 1].count + 1);
             assert_int_equal(scan[k][n].start_us, scan[k][n - 1].start_us + PERIOD_US);
         }
-    /* the second client began within the first scans of the other one */
-    const uint32_t behind = scan[1][0].count - scan[0][0].count;
-    assert_true(behind < SCANS);
-    for (uint32_t n = 0; n + behind < SCANS; n++) {
-        assert_int_equal(scan[0][n + behind].start_us, scan[1][n].start_us);
-        assert_memory_equal(scan[0][n + behind].range, scan[1][n].range, sizeof scan[1][n].range);
+    for (int k = 1; k < CLIENTS; k++) { /* it began within the first scans of the first one */
+        const uint32_t behind = scan[k][0].count - scan[0][0].count;
+        assert_true(behind < SCANS);
+        for (uint32_t n = 0; n + behind < SCANS; n++) {
+            assert_int_equal(scan[0][n + behind].start_us, scan[k][n].start_us);
+            assert_memory_equal(scan[0][n + behind].range, scan[k][n].range, sizeof scan[k][n].range);
+        }
     }
-    for (int k = 0; k < 2; k++)
+    for (int k = 0; k < CLIENTS; k++)
         close(client[k].fd);
     head_end(&head, SIGTERM);
 }
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test_setup_teardown(test_two_clients, wire_setup, wire_teardown)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test_setup_teardown(test_clients, wire_setup, wire_teardown)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

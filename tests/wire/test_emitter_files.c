@@ -4,14 +4,20 @@
 
 #include "drivers/protocol/native.h"
 
-static const char *write_config(struct wire *wire, const char *profile, double prr_hz, double lines_hz, unsigned frames)
+static const char *write_config_with(struct wire *wire, const char *profile, double prr_hz, double lines_hz,
+                                     unsigned frames, const char *links)
 {
     const struct room_config c = {
-        .profile = profile, .prr_hz = prr_hz, .lines_hz = lines_hz, .frames = frames, .links = "links: []\n"};
+        .profile = profile, .prr_hz = prr_hz, .lines_hz = lines_hz, .frames = frames, .links = links};
     static char path[128];
     room_write(wire);
     snprintf(path, sizeof path, "%s", room_config_write(wire, &c));
     return path;
+}
+
+static const char *write_config(struct wire *wire, const char *profile, double prr_hz, double lines_hz, unsigned frames)
+{
+    return write_config_with(wire, profile, prr_hz, lines_hz, frames, "links: []\n");
 }
 
 static int run(struct wire *wire, const char *const *args)
@@ -132,6 +138,16 @@ static void plan_and_check_name_the_emitter(void **state)
     assert_said(wire, "out", "emitter   planar, steps 44..725 of 1024 a turn, 384 ahead, counter-clockwise\n");
 }
 
+/* What a link's protocol needs of the stream is for clients on the wire. */
+static void links_forbid_no_map(void **state)
+{
+    struct wire *wire = *state;
+    const char *config = write_config_with(wire, "hokuyo-ust-20lx", 57600, 40, 1,
+                                           "links: [{type: tcp, protocol: scip, port: 0}]\n");
+    const char *const map[] = {"map", config, "-o", wire_path(wire, "a.png"), "--quiet", NULL};
+    assert_int_equal(run(wire, map), 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -140,6 +156,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(other_formats_take_them, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(shots_are_counted_without_line_ends, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(plan_and_check_name_the_emitter, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(links_forbid_no_map, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -13,6 +13,7 @@ struct model {
     struct scanhead_emitter emitter; /* as the stream is to say it */
     uint64_t cast;                   /* of the scan */
     double reach_m;                  /* 0: beyond the room */
+    int geo;
 };
 
 /* ---- comparing */
@@ -61,10 +62,30 @@ static void check_range(const struct model *m, const struct scanhead_point *p, c
         fail_msg("pulse %" PRIu64 ": range %.9f m, expected %.9f", k, p->range_m, ray.range_m);
 }
 
+/* In the geo layout a point is where the ray ends, in the scene's frame. A range good to slack_m, and an angle to
+ * ANGLE_RAD at 11 m, move it by less than that and a count of 1e-6 m. */
+static void check_place(const struct scanhead_point *p, const struct shot *s, uint64_t k)
+{
+    const double mirror_rad = s->elevation_deg * M_PI / 180, pan_rad = s->azimuth_deg * M_PI / 180;
+    const double turn = pan_rad + HEADING_DEG * M_PI / 180, xyz[3] = {p->x, p->y, p->z};
+    const double dir[3] = {cos(mirror_rad) * sin(turn), cos(mirror_rad) * cos(turn), sin(mirror_rad)};
+    struct room_ray ray;
+    room_cast(mirror_rad, pan_rad, &ray);
+    for (int i = 0; i < 3; i++)
+        if (fabs(xyz[i] - STATION[i] - ray.range_m * dir[i]) > 0.6e-6)
+            fail_msg("pulse %" PRIu64 ": %.7f along axis %d, expected %.7f", k, xyz[i], i,
+                     STATION[i] + ray.range_m * dir[i]);
+}
+
 static void check_shot(const struct model *m, const struct scanhead_point *p, uint64_t k)
 {
     struct shot s;
     m->shot(k, &s);
+    if (m->geo) {
+        assert_true(s.cast && p->t_ns == s.t_ns);
+        check_place(p, &s, k);
+        return;
+    }
     const double mirror_rad = s.elevation_deg * M_PI / 180, pan_rad = s.azimuth_deg * M_PI / 180;
     assert_true(s.cast);
     assert_int_equal(p->t_ns, s.t_ns);
@@ -120,7 +141,8 @@ static void record(struct wire *wire, const struct model *m)
                                   .lines_hz = m->lines_hz,
                                   .frames = m->frames,
                                   .links = "links: []\n",
-                                  .more = "output: {scale_m: 1e-6}\n"};
+                                  .more = m->geo ? "output: {scale_m: 1e-6, crs: local, layout: geo}\n"
+                                                 : "output: {scale_m: 1e-6}\n"};
     room_write(wire);
     const char *config = room_config_write(wire, &c);
     const char *const args[] = {"record", config, "-o", wire_path(wire, "out.shs"), "--quiet", NULL};
@@ -143,10 +165,10 @@ static void record(struct wire *wire, const struct model *m)
 
 static void planar_heads(void **state)
 {
-    struct model utm = {"hokuyo-utm-30lx", 57600, 40, 20, shot_utm, PLANAR(1440, 0, 1080, 540), 20 * 1081, 0};
+    struct model utm = {"hokuyo-utm-30lx", 57600, 40, 20, shot_utm, PLANAR(1440, 0, 1080, 540), 20 * 1081, 0, 0};
     struct model ust = utm;
-    struct model urg = {"hokuyo-urg-04lx", 10240, 10, 15, shot_urg, PLANAR(1024, 44, 725, 384), 15 * 682, 5.6};
-    struct model tim = {"sick-tim571", 16200, 15, 10, shot_tim, PLANAR(1080, 0, 810, 405), 10 * 811, 0};
+    struct model urg = {"hokuyo-urg-04lx", 10240, 10, 15, shot_urg, PLANAR(1024, 44, 725, 384), 15 * 682, 5.6, 0};
+    struct model tim = {"sick-tim571", 16200, 15, 10, shot_tim, PLANAR(1080, 0, 810, 405), 10 * 811, 0, 0};
     ust.profile = "hokuyo-ust-20lx";
     /* A pulse lasts 1e9 / rate nanoseconds. */
     utm.emitter.sequence_ns_num = ust.emitter.sequence_ns_num = 156250;
@@ -155,6 +177,8 @@ static void planar_heads(void **state)
     urg.emitter.sequence_ns_den = 4;
     tim.emitter.sequence_ns_num = 5000000;
     tim.emitter.sequence_ns_den = 81;
+    record(*state, &utm);
+    utm.geo = 1;
     record(*state, &utm);
     record(*state, &ust);
     record(*state, &urg);
@@ -177,6 +201,8 @@ static void spinning_beams(void **state)
     for (struct shot s = {0}; s.t_ns < 300000000; vlp.shot(++vlp.cast, &s))
         ;
     record(*state, &vlp);
+    vlp.geo = 1;
+    record(*state, &vlp);
 }
 
 static void spheres(void **state)
@@ -194,6 +220,7 @@ static void spheres(void **state)
                                   .sequence_ns_num = 12500000,
                                   .sequence_ns_den = 9},
                                  2 * (17 * 36 + 2),
+                                 0,
                                  0};
     emitter_write_profile(*state, "emitter: sphere\nstep_deg: {value: 10, from: assumed}\n");
     record(*state, &sphere);
@@ -213,6 +240,7 @@ static void lists_of_directions(void **state)
                                 .sequence_ns_num = 20000000,
                                 .sequence_ns_den = 1},
                                20,
+                               0,
                                0};
     emitter_write_profile(*state, "emitter: directions\ndirections: list.txt\n");
     wire_write_text(*state, "list.txt", "# azimuth, elevation\n0 0\n90 0 # right\n\n-150 12.5\n300 -60\n45 89\n");

@@ -60,23 +60,31 @@ static void check_mark(const struct house *house)
     assert_true(fabs(house_range_m(house, azimuth, 0.0) - house_range_m(house, -azimuth, 0.0)) > 0.1);
 }
 
+/* How the client reaches link i: its driver's lines. */
+static const char *sensor_of(const struct head *head, int i)
+{
+    static char text[2][400];
+    if (i == 0)
+        snprintf(text[0], sizeof text[0], "driver = CHokuyoURG\nIP_DIR = 127.0.0.1\nPORT_DIR = %d\n",
+                 endpoint_port(head_link(head, 0)));
+    else
+        snprintf(text[1], sizeof text[1], "driver = CHokuyoURG\nCOM_port_LIN = %s\n",
+                 head_link(head, 1) + strlen("tty:"));
+    return text[i];
+}
+
 static void test_tcp_and_pty(void **state)
 {
     struct wire *wire = *state;
-    struct grabber tcp, pty;
-    char sensor[512];
+    static struct grabber tcp, pty;
     grabber_or_skip();
     const char *const more[] = {"--set", "links.0.port=0", NULL};
     struct head head = head_start(wire, "config/hokuyo.yaml", house_options(wire, "13", more));
     struct house *house = house_load(wire);
     check_mark(house);
-    snprintf(sensor, sizeof sensor, "driver = CHokuyoURG\nIP_DIR = 127.0.0.1\nPORT_DIR = %d\n",
-             endpoint_port(head_link(&head, 0)));
-    grabber_start(wire, "TCP", sensor, &tcp);
-    snprintf(sensor, sizeof sensor, "driver = CHokuyoURG\nCOM_port_LIN = %s\n", head_link(&head, 1) + strlen("tty:"));
-    grabber_start(wire, "PTY", sensor, &pty);
-    grabber_wait(&tcp, SCANS);
-    grabber_wait(&pty, SCANS);
+    grabber_start_and_wait(wire, "TCP", sensor_of(&head, 0), 1, &tcp);
+    grabber_start_and_wait(wire, "PTY", sensor_of(&head, 1), SCANS, &pty);
+    if (!grabber_wait(&tcp, SCANS)) fail_msg("rawlog-grabber complains:\n%s", tcp.said);
     grabber_end(&tcp);
     grabber_end(&pty);
     head_end(&head, SIGTERM);
@@ -88,15 +96,12 @@ static void test_tcp_and_pty(void **state)
 static void test_urg(void **state)
 {
     struct wire *wire = *state;
-    struct grabber pty;
-    char sensor[512];
+    static struct grabber pty;
     grabber_or_skip();
     const char *const more[] = {"--set", "links.0.port=0", "--set", "head.profile=hokuyo-urg-04lx", NULL};
     struct head head = head_start(wire, "config/hokuyo.yaml", house_options(wire, "13", more));
     struct house *house = house_load(wire);
-    snprintf(sensor, sizeof sensor, "driver = CHokuyoURG\nCOM_port_LIN = %s\n", head_link(&head, 1) + strlen("tty:"));
-    grabber_start(wire, "URG", sensor, &pty);
-    grabber_wait(&pty, BY_HOST + 4);
+    grabber_start_and_wait(wire, "URG", sensor_of(&head, 1), BY_HOST + 4, &pty);
     grabber_end(&pty);
     head_end(&head, SIGTERM);
     check_log(house, &URG, &pty, BY_HOST + 4);

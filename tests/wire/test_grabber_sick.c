@@ -115,14 +115,14 @@ static void test_polled(void **state)
     int port, listener;
     grabber_or_skip();
     const char *const more[] = {"--set", "links.0.port=0", "--set", "head.profile=sick-lms111", NULL};
-    struct head head = head_start(wire, "config/sick.yaml", house_options(wire, "2", more));
+    struct head head = head_start(wire, "config/sick.yaml", house_options(wire, "13", more));
     struct house *house = house_load(wire);
     listener = listen_anywhere(&port);
     pid_t relay = relay_start(wire, listener, head_link(&head, 0));
     close(listener);
     snprintf(sensor, sizeof sensor, "driver = CLMS100Eth\nip_address = 127.0.0.1\nTCP_port = %d\n", port);
     grabber_start(wire, "SICK", sensor, &grabber);
-    grabber_wait(&grabber, SCANS);
+    if (!grabber_wait(&grabber, SCANS)) fail_msg("rawlog-grabber complains:\n%s", grabber.said);
     grabber_end(&grabber);
     assert_int_equal(wire_wait(wire, relay), 0);
     head_end(&head, SIGTERM);

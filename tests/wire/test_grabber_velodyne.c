@@ -169,7 +169,7 @@ static void test_turns(void **state)
     struct head head = head_start(wire, "config/velodyne.yaml", house_options(wire, "4", NULL));
     struct house *house = house_load(wire);
     assert_true(house_is_mark(house, mark, 0.0) && !house_is_mark(house, -mark, 0.0));
-    grabber_wait(&grabber, TURNS + 2);
+    if (!grabber_wait(&grabber, TURNS + 2)) fail_msg("rawlog-grabber complains:\n%s", grabber.said);
     head_end(&head, SIGTERM);
     const uint32_t dropped = dropped_at(2368);
     grabber_end(&grabber);

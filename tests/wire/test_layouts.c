@@ -218,9 +218,9 @@ static void cola_scan(char *text, struct scan *scan)
 static void test_cola(void **state)
 {
     struct wire *wire = *state;
-    const char *const ptys[] = {"links.2.path", NULL}, *const sets[] = {"links.0.port=0", NULL};
+    const char *const ptys[] = {"links.1.path", "links.3.path", NULL}, *const sets[] = {"links.0.port=0", NULL};
     struct head head = start(wire, "config/sick.yaml", ptys, sets);
-    struct scanhead *sh = client_open(head_link(&head, 1));
+    struct scanhead *sh = client_open(head_link(&head, 2));
     reader_open(head_link(&head, 0));
     raw_write(reader.fd, "\2sEN LMDscandata 1\3", 19);
     assert_string_equal(read_until("\3"), "\2sEA LMDscandata 1\3");

@@ -229,11 +229,12 @@ static void test_nothing_is_lost(void **state)
         assert_int_equal(wire_setup((void **)&wire[i]), 0);
     head[0] = start(wire[0], "config/hokuyo.yaml",
                     (const char *const[]){"links.0.port=0", "links.1.path", "links.3.path", NULL});
-    head[1] = start(wire[1], "config/sick.yaml", (const char *const[]){"links.0.port=0", "links.2.path", NULL});
+    head[1] = start(wire[1], "config/sick.yaml",
+                    (const char *const[]){"links.0.port=0", "links.1.path", "links.3.path", NULL});
     head[2] = start(wire[2], "config/velodyne.yaml",
                     (const char *const[]){port[0], port[1], "links.2.port=0", "links.4.path", NULL});
     /* The velodyne's first: its packets come from now on. */
-    static const int native[N_HEADS] = {2, 1, 3}, nmea[N_HEADS] = {3, 2, 4};
+    static const int native[N_HEADS] = {2, 2, 3}, nmea[N_HEADS] = {3, 3, 4};
     reader[0] = (struct reader){.read = read_velodyne, .fd = data};
     reader[1] = (struct reader){.read = read_scip, .fd = raw_connect(head_link(&head[0], 0))};
     reader[2] = (struct reader){.read = read_cola, .fd = raw_connect(head_link(&head[1], 0))};
@@ -252,9 +253,9 @@ static void test_nothing_is_lost(void **state)
         head_end(&head[i], SIGTERM);
         for (size_t k = 0; k < sizeof zero / sizeof zero[0]; k++)
             expect_at_most(wire[i], zero[k], 0);
-        /* the VLP-16's last packet, which the end of the scan cuts */
-        expect_at_most(wire[i], "lost_units", i == 2);
-        expect_at_most(wire[i], "reader_lost_frames", i == 2);
+        /* The end of the scan cuts the VLP-16's last packet: no reader was too slow. */
+        expect_at_most(wire[i], "lost_units", 0);
+        expect_at_most(wire[i], "reader_lost_frames", 0);
         assert_int_equal(wire_teardown((void **)&wire[i]), 0);
     }
     close(data);
