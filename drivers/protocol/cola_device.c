@@ -71,7 +71,7 @@ enum cola_error cola_read_state(struct cola *self, struct cola_args *args, struc
     if (head == FAULT)
         cola_put_u(out, 1, ERROR);
     else
-        cola_put_u(out, 1, head <= BOOT || !self->collector.geometry.fits ? BUSY : READY);
+        cola_put_u(out, 1, head <= BOOT || !self->scan.head.known ? BUSY : READY);
     return cola_args_end(args);
 }
 

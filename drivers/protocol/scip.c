@@ -12,7 +12,7 @@ static int create(const struct protocol_spec *spec, void **protocol, struct sh_e
     s->host = spec->host;
     s->identity = spec->identity;
     s->model = scip_model_find(spec->identity->model);
-    scip_scan_init(&s->scan);
+    planar_scan_init(&s->scan);
     scip_power_up(s);
     *protocol = s;
     return SH_OK;
@@ -95,8 +95,8 @@ static void frame(void *protocol, const uint8_t *bytes, size_t len)
 {
     struct scip *s = protocol;
     (void)len;
-    const struct scip_turns turns = scip_scan_frame(&s->scan, bytes);
-    if (turns.whole || turns.broken != 0) scip_scans_came(s, turns);
+    const struct planar_news news = planar_scan_frame(&s->scan, bytes);
+    if (news.whole || news.broken != 0) scip_scans_came(s, news);
 }
 
 /* What is missing shows by the turns' times and steps. */
