@@ -41,7 +41,7 @@ struct gnss_place {
     double velocity_m_s[3]; /* east, north, up */
 };
 
-/* Where a point of the scene lies on the Earth. */
+/* Where a point of the scene lies on the Earth; 0: nowhere. */
 static int locate(const struct site *site, const struct placement *at, const double p_prcs[3], double geodetic[3])
 {
     struct georef_place place;
@@ -53,6 +53,7 @@ static int locate(const struct site *site, const struct placement *at, const dou
         geodetic[2] = place.height_m;
         return 1;
     }
+    if (!at->on_earth) return 0;
     for (int i = 0; i < 3; i++)
         d_m[i] = p_prcs[i] - at->position_m[i];
     georef_geodetic(at->place.lat_deg, at->place.lon_deg, at->place.height_m, d_m, geodetic);

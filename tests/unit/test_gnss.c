@@ -231,12 +231,30 @@ static void noise_is_what_was_asked_for(void **state)
     close_receiver(&r);
 }
 
+/* Position packets of a VLP-16 and its settings need no place: their sentence says V, and not 0 degrees north and east. */
+static void without_a_place_no_fix_is_valid(void **state)
+{
+    (void)state;
+    struct receiver r = open_receiver("48", "11", NULL);
+    char text[NMEA_MAX_SENTENCE + 1] = "";
+    struct nmea_fix fix;
+    start_receiver(&r);
+    gnss_fix(&r.gnss, 0, 0, NULL, &fix);
+    assert_int_equal(fix.quality, 1);
+    r.site->station[0].at.on_earth = 0;
+    gnss_fix(&r.gnss, 0, 0, NULL, &fix);
+    assert_int_equal(fix.quality, 0);
+    nmea_encode_rmc(text, sizeof text, &fix);
+    assert_non_null(strstr(text, "RMC,000001.00,V,,,,,"));
+    close_receiver(&r);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_antenna_is_where_the_arm_puts_it), cmocka_unit_test(at_the_poles),
         cmocka_unit_test(times_are_those_of_the_rate),          cmocka_unit_test(it_stands_where_the_head_stands),
-        cmocka_unit_test(noise_is_what_was_asked_for),
+        cmocka_unit_test(noise_is_what_was_asked_for),          cmocka_unit_test(without_a_place_no_fix_is_valid),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
