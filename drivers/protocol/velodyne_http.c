@@ -150,19 +150,6 @@ static void at_time(void *protocol, int64_t t_ns)
     ((struct server *)protocol)->t_ns = t_ns;
 }
 
-static void no_frame(void *protocol, const uint8_t *frame, size_t len)
-{
-    (void)protocol;
-    (void)frame;
-    (void)len;
-}
-
-static void no_gap(void *protocol, uint32_t n_frames)
-{
-    (void)protocol;
-    (void)n_frames;
-}
-
 static int64_t never(const void *protocol)
 {
     (void)protocol;
@@ -177,8 +164,6 @@ const struct protocol_ops protocol_velodyne_http = {
     .create = create,
     .destroy = destroy,
     .open = at_time,
-    .frame = no_frame,
-    .gap = no_gap,
     .time = at_time,
     .input = input,
     .next_ns = never,
