@@ -22,7 +22,7 @@ static int create(const struct protocol_spec *spec, void **protocol, struct sh_e
     self->host = spec->host;
     self->identity = spec->identity;
     self->model = cola_model_find(spec->identity->model);
-    cola_collect_init(&self->collector);
+    planar_scan_init(&self->scan);
     cola_power_up(self);
     *protocol = self;
     return SH_OK;
@@ -37,7 +37,7 @@ static void send_scan(struct cola *self, const char *head, enum cola_form form)
 {
     struct cola_out out = {.buf = self->unit, .cap = sizeof self->unit};
     cola_begin(&out, form, head);
-    cola_put_scan(self, self->collector.last, &out);
+    cola_put_scan(self, &out);
     const size_t len = cola_end(&out);
     if (len == 0) {
         self->host.count(self->host.ctx, PROTOCOL_UNITS_LOST, 1);
@@ -49,7 +49,7 @@ static void send_scan(struct cola *self, const char *head, enum cola_form form)
 void cola_deliver(struct cola *self)
 {
     if (!self->pending) return;
-    self->pending = 0;
+    self->pending = self->wants_scan = 0;
     for (; self->n_waiting != 0; self->n_waiting--)
         send_scan(self, "sRA LMDscandata", self->waiting_form);
     if (!self->streams || !self->measures || ++self->since_sent < self->set.every) return;
@@ -67,11 +67,14 @@ static void take_frame(void *protocol, const uint8_t *frame, size_t len)
         if (h.t_ns > self->now_ns) self->now_ns = h.t_ns;
         cola_deliver(self); /* this scan's place may be needed */
     }
-    if (cola_collect(&self->collector, frame)) self->pending = 1;
-    if (self->collector.last == NULL) self->pending = 0;
-    if (self->collector.lost == 0) return;
-    if (self->streams && self->measures) self->host.count(self->host.ctx, PROTOCOL_UNITS_LOST, self->collector.lost);
-    self->collector.lost = 0;
+    const struct planar_news news = planar_scan_frame(&self->scan, frame);
+    if (h.type == NATIVE_POSES) cola_way_add(&self->way, self->scan.scan, frame + NATIVE_HEADER_LEN, h.length);
+    if (news.begun) self->encoder_now = cola_way_at(&self->way, self->scan.scan, h.t_ns - self->scan.scan_t0_ns);
+    if (news.whole) self->encoder = self->encoder_now;
+    if (news.whole) self->pending = 1;
+    if (self->scan.whole == NULL) self->pending = 0;
+    if (news.broken != 0 && self->streams && self->measures)
+        self->host.count(self->host.ctx, PROTOCOL_UNITS_LOST, news.broken);
 }
 
 /* What is missing shows in the scan that it is missing from. */
@@ -95,8 +98,8 @@ enum cola_error cola_read_scan(struct cola *self, struct cola_args *args, struct
 {
     const enum cola_error error = cola_args_end(args);
     if (error != COLA_OK) return error;
-    if (self->collector.last != NULL) {
-        cola_put_scan(self, self->collector.last, out);
+    if (self->scan.whole != NULL) {
+        cola_put_scan(self, out);
         self->telegrams++;
         return COLA_OK;
     }

@@ -3,14 +3,15 @@
 #define DRIVERS_PROTOCOL_COLA_H
 
 #include "drivers/protocol/cola_model.h"
-#include "drivers/protocol/cola_scan.h"
 #include "drivers/protocol/cola_telegram.h"
+#include "drivers/protocol/cola_units.h"
+#include "drivers/protocol/cola_way.h"
 #include "drivers/protocol/protocol.h"
 
 enum {
     /* sick_tim takes at most 65535 bytes a transfer. The longest telegram: two distances and two signals of each beam as
      * hexadecimal (5 bytes each), and less than 1000 bytes around them. */
-    COLA_MAX_UNIT = 4 * 5 * COLA_MAX_POINTS + 1000,
+    COLA_MAX_UNIT = 4 * 5 * PLANAR_MAX_STEPS + 1000,
     COLA_MAX_NAME = 32,
 };
 
@@ -41,7 +42,7 @@ struct cola {
     enum cola_level level;
     int measures;   /* LMCstopmeas: 0. Output of this session alone */
     int reboots;    /* once the answer is sent */
-    int wants_scan; /* measurement was asked for while the head could not start; next try at try_ns */
+    int wants_scan; /* measurement was asked for, and no scan has come yet; next look at the head at try_ns */
     int64_t try_ns;
     int64_t now_ns;
     int streams;                /* sEN LMDscandata 1 */
@@ -52,7 +53,9 @@ struct cola {
     enum cola_form waiting_form;
     uint16_t telegrams; /* counter of LMDscandata */
     struct cola_input input;
-    struct cola_collector collector;
+    struct planar_scan scan;
+    struct cola_way way;
+    struct cola_encoder encoder_now, encoder; /* of the turn at hand, and of the last whole one */
     uint8_t unit[COLA_MAX_UNIT];
 };
 
@@ -71,7 +74,7 @@ void cola_power_up(struct cola *self);
 /* cola_lmd.c */
 
 /* Writes an LMDscandata telegram of the last scan (there is one) behind its head. */
-void cola_put_scan(const struct cola *self, const struct cola_scan *scan, struct cola_out *out);
+void cola_put_scan(const struct cola *self, struct cola_out *out);
 
 /* cola_settings.c: what is set and asked for the measurement. */
 

@@ -8,14 +8,19 @@
 uint64_t scip_lines_uhz(struct scip *s, const char *query)
 {
     char reply[512], *end;
-    if (s->host.command(s->host.ctx, query, reply, sizeof reply) != 0) return s->scan.lines_uhz;
+    if (s->host.command(s->host.ctx, query, reply, sizeof reply) != 0) return s->scan.head.lines_uhz;
     const double hz = strtod(reply, &end);
-    return end == reply || !(hz > 0 && hz < 1e6) ? s->scan.lines_uhz : (uint64_t)llround(hz * 1e6);
+    return end == reply || !(hz > 0 && hz < 1e6) ? s->scan.head.lines_uhz : (uint64_t)llround(hz * 1e6);
 }
 
 static unsigned rpm(uint64_t lines_uhz)
 {
     return (unsigned)((lines_uhz * 60 + 500000) / 1000000);
+}
+
+uint32_t scip_millimetres(double range_m)
+{
+    return range_m > 0 && range_m < 4e6 ? (uint32_t)lround(range_m * 1e3) : 0;
 }
 
 static const char *or_else(const char *text, const char *other)
@@ -38,16 +43,16 @@ void scip_info_version(struct scip *s, const char *line, size_t len)
 void scip_info_parameters(struct scip *s, const char *line, size_t len)
 {
     struct scip_reply *r = &s->reply;
-    const struct scip_scan *head = &s->scan;
-    if (!head->known) {
+    const struct planar_head *head = &s->scan.head;
+    if (!scip_has_head(s)) {
         scip_answer(s, line, len, "0A");
         return;
     }
     const unsigned normal_rpm = rpm(scip_lines_uhz(s, "HEAD:LINES? DEF"));
     scip_reply_begin(r, line, len, "00");
     scip_reply_key(r, "MODL", "%s", or_else(s->model->model, s->identity->model));
-    scip_reply_key(r, "DMIN", "%u", (unsigned)head->min_mm);
-    scip_reply_key(r, "DMAX", "%u", (unsigned)head->max_mm);
+    scip_reply_key(r, "DMIN", "%u", (unsigned)scip_millimetres(head->range_min_m));
+    scip_reply_key(r, "DMAX", "%u", (unsigned)scip_millimetres(head->range_max_m));
     scip_reply_key(r, "ARES", "%u", (unsigned)head->steps);
     scip_reply_key(r, "AMIN", "%d", (int)head->first);
     scip_reply_key(r, "AMAX", "%d", (int)head->last);

@@ -6,12 +6,19 @@
 
 /* GD GS GE HD HE, MD MS ME ND NE: requests, and the scans that answer them. */
 
+enum { TRY_NS = 100000000 };
+
+int scip_has_head(const struct scip *s)
+{
+    return s->scan.head.known && s->scan.head.last < SCIP_MAX_STEPS;
+}
+
 /* Where no frames show that the head scans, it is asked, and started from rest. */
 const char *scip_laser_on(struct scip *s)
 {
     enum { LATELY_NS = 500000000 };
     char reply[512];
-    const int scans = s->scan.in_turn && s->now_ns - s->scan.t0_ns < LATELY_NS;
+    const int scans = s->scan.t0_ns != INT64_MIN && s->now_ns - s->scan.t0_ns < LATELY_NS;
     if (!scans && s->host.command(s->host.ctx, "HEAD:STATE?", reply, sizeof reply) == 0) {
         if (strcmp(reply, "fault") == 0) return "50";
         if (strcmp(reply, "boot") == 0 || strcmp(reply, "off") == 0) return "10";
@@ -60,7 +67,7 @@ static const char *begin(struct scip *s, struct scip_request *q, const char *lin
     q->n_chars = line[1] == 'S' ? 2 : 3;
     q->intensity = line[1] == 'E';
     q->multi_echo = line[0] == 'H' || line[0] == 'N';
-    const char *refused = read_request(q, line, streams, s->scan.last);
+    const char *refused = read_request(q, line, streams, s->scan.head.last);
     if (refused != NULL) return refused;
     if (s->time_mode) return "10";
     if (s->simulation.broken) return "50";
@@ -75,7 +82,7 @@ void scip_measure(struct scip *s, const char *line, size_t len)
     enum { WAIT_NS = 2000000000 };
     struct scip_request request;
     const int streams = line[0] == 'M' || line[0] == 'N';
-    const char *refused = s->scan.known ? begin(s, &request, line, len, streams) : "0A";
+    const char *refused = scip_has_head(s) ? begin(s, &request, line, len, streams) : "0A";
     if (refused == NULL && !streams && s->single.active) refused = "0B";
     if (refused != NULL) {
         scip_answer(s, line, len, refused);
@@ -84,6 +91,7 @@ void scip_measure(struct scip *s, const char *line, size_t len)
     request.active = 1;
     request.after_ns = streams ? s->now_ns : s->laser_ns;
     request.until_ns = s->now_ns + WAIT_NS;
+    s->try_ns = s->now_ns + TRY_NS;
     if (!streams) {
         s->single = request;
         return;
@@ -92,59 +100,101 @@ void scip_measure(struct scip *s, const char *line, size_t len)
     scip_answer(s, line, len, "00");
 }
 
+/* The head may have been about to stop when it was asked for scans. Once its first scan has come, who stops the head
+ * means it. */
+static void wake_head(struct scip *s)
+{
+    const int waits = s->single.active || (s->stream.active && s->stream.sent == 0);
+    if (!waits || s->now_ns < s->try_ns) return;
+    s->try_ns = scip_laser_on(s) == NULL ? s->now_ns + TRY_NS : INT64_MAX;
+}
+
 void scip_measure_time(struct scip *s)
 {
+    wake_head(s);
     if (!s->single.active || s->now_ns < s->single.until_ns) return;
     s->single.active = 0;
     scip_answer(s, s->single.echo, s->single.echo_len, "0A");
 }
 
+/* A scan to be sent. */
+struct measured {
+    const struct planar_head *head;
+    const struct planar_turn *turn;
+    double mm_per_count;
+    uint32_t min_mm; /* what is less is an error */
+};
+
+static uint32_t range_mm(const struct measured *m, const struct planar_echo *echo)
+{
+    const double mm = echo->range * m->mm_per_count;
+    return mm < 4e9 ? (uint32_t)(mm + 0.5) : UINT32_MAX;
+}
+
 /* 100 at the detection threshold, or 1000 of a matt white surface under zero incidence; the root of the
  * power. */
-static uint32_t intensity_of(const struct scip_scan *scan, int16_t level_cdb)
+static uint32_t intensity_of(const struct measured *m, const struct planar_echo *echo)
 {
-    if (level_cdb == SCIP_LEVEL_NONE) return 0;
-    const double value = (scan->amplitudes ? 100.0 : 1000.0) * pow(10.0, level_cdb / 2000.0);
+    const int amplitudes = m->head->attributes;
+    const int16_t level_cdb = amplitudes ? echo->amplitude_cdb : echo->refl_cdb;
+    if (level_cdb == (amplitudes ? (int)NATIVE_AMPLITUDE_NONE : (int)LINE_REFL_NONE)) return 0;
+    const double value = (amplitudes ? 100.0 : 1000.0) * pow(10.0, level_cdb / 2000.0);
     return value < 1.0 ? 1 : value > 65535.0 ? 65535 : (uint32_t)lround(value);
 }
 
-static int is_range(const struct scip_scan *scan, int32_t number)
+/* Echoes of a step; 0 also where it can't be measured. */
+static int n_echoes(const struct measured *m, int32_t number)
 {
-    const struct scip_step *step = &scan->step[number];
-    return number >= scan->first && step->n != 0 && step->range_mm[0] >= scan->min_mm;
+    if (number < m->head->first || number > m->head->last) return 0;
+    const int n = m->turn->n[number - m->head->first];
+    return n < SCIP_MAX_ECHOES ? n : SCIP_MAX_ECHOES;
 }
 
 /* The step that stands for a cluster: the one of the least range, or its first where there is none. */
-static int32_t nearest(const struct scip_scan *scan, int32_t from, int32_t to)
+static int32_t nearest(const struct measured *m, int32_t from, int32_t to)
 {
     int32_t best = -1;
-    for (int32_t i = from; i <= to; i++)
-        if (is_range(scan, i) && (best < 0 || scan->step[i].range_mm[0] < scan->step[best].range_mm[0])) best = i;
+    uint32_t least_mm = UINT32_MAX;
+    for (int32_t i = from; i <= to; i++) {
+        if (n_echoes(m, i) == 0) continue;
+        const uint32_t mm = range_mm(m, &m->turn->echo[i - m->head->first][0]);
+        if (mm < m->min_mm || (best >= 0 && mm >= least_mm)) continue;
+        best = i;
+        least_mm = mm;
+    }
     return best < 0 ? from : best;
 }
 
-static void put_step(struct scip *s, const struct scip_request *q, int32_t number)
+static void put_step(struct scip *s, const struct scip_request *q, const struct measured *m, int32_t number)
 {
-    const struct scip_step *step = &s->scan.step[number];
-    const int there = number >= s->scan.first && step->n != 0;
-    const int n = !there ? 1 : q->multi_echo ? step->n : 1;
-    for (int k = 0; k < n; k++) {
-        const int good = there && step->range_mm[k] >= s->scan.min_mm;
-        uint32_t value = good ? step->range_mm[k] : s->model->too_near;
-        if (!there) value = number < s->scan.first ? s->model->no_step : s->model->no_object;
+    const int n = n_echoes(m, number);
+    if (n == 0) {
+        scip_reply_value(&s->reply, number < m->head->first ? s->model->no_step : s->model->no_object, q->n_chars);
+        if (q->intensity) scip_reply_value(&s->reply, 0, 3);
+        return;
+    }
+    const struct planar_echo *echo = m->turn->echo[number - m->head->first];
+    for (int k = 0; k < (q->multi_echo ? n : 1); k++) {
+        const uint32_t mm = range_mm(m, &echo[k]);
+        const int good = mm >= m->min_mm;
         if (k > 0) scip_reply_mark(&s->reply, '&');
-        scip_reply_value(&s->reply, value, q->n_chars);
-        if (q->intensity) scip_reply_value(&s->reply, good ? intensity_of(&s->scan, step->level_cdb[k]) : 0, 3);
+        scip_reply_value(&s->reply, good ? mm : s->model->too_near, q->n_chars);
+        if (q->intensity) scip_reply_value(&s->reply, good ? intensity_of(m, &echo[k]) : 0, 3);
     }
 }
 
 static void send_scan(struct scip *s, const struct scip_request *q, const char *status)
 {
+    const struct planar_head *head = &s->scan.head;
+    const struct measured m = {.head = head,
+                               .turn = s->scan.whole,
+                               .mm_per_count = head->m_per_count * 1e3,
+                               .min_mm = scip_millimetres(head->range_min_m)};
     scip_reply_begin(&s->reply, q->echo, q->echo_len, status);
-    scip_reply_time(&s->reply, scip_time_ms(s, s->scan.t0_ns));
+    scip_reply_time(&s->reply, scip_time_ms(s, m.turn->t0_ns));
     for (int32_t from = q->start; from <= q->end; from += q->cluster) {
         const int32_t to = from + q->cluster - 1;
-        put_step(s, q, nearest(&s->scan, from, to < q->end ? to : q->end));
+        put_step(s, q, &m, nearest(&m, from, to < q->end ? to : q->end));
     }
     scip_send(s);
 }
@@ -185,18 +235,18 @@ static void stream_scan(struct scip *s)
 }
 
 /* A broken scan isn't sent and isn't one of the count: as many whole ones come as were asked for. */
-void scip_scans_came(struct scip *s, struct scip_turns turns)
+void scip_scans_came(struct scip *s, struct planar_news news)
 {
     const int streams = s->stream.active, waits = s->single.active;
-    if ((streams || waits) && turns.broken != 0) {
-        s->host.count(s->host.ctx, PROTOCOL_UNITS_LOST, turns.broken);
+    if ((streams || waits) && news.broken != 0) {
+        s->host.count(s->host.ctx, PROTOCOL_UNITS_LOST, news.broken);
         const uint32_t left_out = s->stream.skip - s->stream.skipped;
-        s->stream.skipped += turns.broken < left_out ? turns.broken : left_out;
+        s->stream.skipped += news.broken < left_out ? news.broken : left_out;
     }
-    if (!turns.whole) return;
-    if (waits && s->scan.t0_ns >= s->single.after_ns) {
+    if (!news.whole) return;
+    if (waits && s->scan.whole->t0_ns >= s->single.after_ns) {
         s->single.active = 0;
         send_scan(s, &s->single, "00");
     }
-    if (streams && s->scan.t0_ns >= s->stream.after_ns) stream_scan(s);
+    if (streams && s->scan.whole->t0_ns >= s->stream.after_ns) stream_scan(s);
 }

@@ -3,10 +3,10 @@
 #ifndef DRIVERS_PROTOCOL_SCIP_SESSION_H
 #define DRIVERS_PROTOCOL_SCIP_SESSION_H
 
+#include "drivers/protocol/planar_scan.h"
 #include "drivers/protocol/protocol.h"
 #include "drivers/protocol/scip_model.h"
 #include "drivers/protocol/scip_reply.h"
-#include "drivers/protocol/scip_scan.h"
 
 /* A G, H, M or N command that waits for scans. */
 struct scip_request {
@@ -36,6 +36,7 @@ struct scip {
     const struct scip_model *model;
     int64_t now_ns, epoch_ns; /* epoch: when the time stamp was 0 */
     int64_t laser_ns;         /* since when the laser is on */
+    int64_t try_ns;           /* a request that no scan has come for: when to look at the head again */
     int laser, time_mode, speed_changed;
     uint32_t bit_rate;
     int64_t rb_ns, reboot_ns; /* of the last RB alone, of the end that RB RB asked for; INT64_MIN: none */
@@ -44,9 +45,9 @@ struct scip {
     /* the line at hand */
     char line[SCIP_MAX_LINE];
     size_t n_line;
-    uint64_t n_over; /* bytes beyond what fits */
-    int foul;        /* a byte that is not printable was in it */
-    struct scip_scan scan;
+    int is_over; /* it has more bytes than fit; they are counted already */
+    int foul;    /* a byte that is not printable was in it */
+    struct planar_scan scan;
     struct scip_reply reply;
 };
 
@@ -69,8 +70,12 @@ void scip_info_parameters(struct scip *s, const char *line, size_t len);
 void scip_info_state(struct scip *s, const char *line, size_t len);
 /* Lines per second of the head, 1e-6 Hz: `query` is HEAD:LINES? or that of the default. */
 uint64_t scip_lines_uhz(struct scip *s, const char *query);
+/* Rounded; 0 where there is no such range. */
+uint32_t scip_millimetres(double range_m);
 
 /* scip_measure.c */
+/* 0: there is no head yet, or it has steps that no command can name. */
+int scip_has_head(const struct scip *s);
 /* BM and what switches the laser on by itself. NULL, or the status to refuse with: 10 while the head can't
  * scan, 50 while it is out of order. */
 const char *scip_laser_on(struct scip *s);
@@ -78,8 +83,8 @@ const char *scip_laser_on(struct scip *s);
 void scip_laser_off(struct scip *s);
 void scip_measure(struct scip *s, const char *line, size_t len);
 /* What the scans at hand are for. */
-void scip_scans_came(struct scip *s, struct scip_turns turns);
-/* A G or H that has waited for too long. */
+void scip_scans_came(struct scip *s, struct planar_news news);
+/* A request that waits: the head is started again where it stopped meanwhile; a G or H may have waited too long. */
 void scip_measure_time(struct scip *s);
 
 /* scip_simulate.c */

@@ -66,6 +66,10 @@ static void check_stream(struct cfg_reader *rd, struct config *cfg, uint32_t i, 
         CFG_SOUND(rd, 0, "output.layout"))
         cfg_fail_key(rd, PROTOCOL_KEY, i, "%s needs ranges, but output.layout is geo%s; required is layout: polar",
                      ops->name, place_of(rd, "output.layout", where));
+    if ((ops->needs & PROTOCOL_NEEDS_LAST) != 0 && cfg->head.settings.echoes == BEAM_FIRST)
+        cfg_fail_key(rd, PROTOCOL_KEY, i,
+                     "%s has no first echoes, but beam.echoes is first%s; required is all, last or strongest",
+                     ops->name, place_of(rd, "beam.echoes", where));
     if ((ops->needs & PROTOCOL_NEEDS_ATTRIBUTES) == 0) return;
     if (!cfg_is_given(rd, "output.attributes", 0))
         cfg->output.attributes = 1;

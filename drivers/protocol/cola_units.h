@@ -1,0 +1,17 @@
+/* The head's geometry, rates and signals in SICK's units; COLA.md has the scales. Angles: 0 is right, 90 degrees
+ * forward, counted counter-clockwise seen from above. Beam 0 has the smallest angle; beams are the places of
+ * struct planar_head. Pure. */
+#ifndef DRIVERS_PROTOCOL_COLA_UNITS_H
+#define DRIVERS_PROTOCOL_COLA_UNITS_H
+
+#include "drivers/protocol/planar_scan.h"
+
+/* Rounded to 1/10000 deg. */
+int32_t cola_beam_angle(const struct planar_head *head, uint32_t beam);
+uint32_t cola_step_angle(const struct planar_head *head);
+uint32_t cola_scan_chz(const struct planar_head *head);    /* scans, 1/100 Hz */
+uint32_t cola_meas_100hz(const struct planar_head *head);  /* pulses, 100 Hz */
+uint32_t cola_head_scale(const struct planar_head *head);  /* mm of a distance's count: 2 beyond 65.535 m, else 1 */
+uint16_t cola_echo_signal(const struct planar_echo *echo); /* RSSI of 16 bit; 0: not modelled */
+
+#endif

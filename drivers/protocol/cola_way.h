@@ -1,0 +1,26 @@
+/* The encoder of a vehicle that carries the head: poses go in, how far it has come and how fast it is come out.
+ * Taken as even from one frame of poses to the next. Times are since the scan's start, ns. Pure. */
+#ifndef DRIVERS_PROTOCOL_COLA_WAY_H
+#define DRIVERS_PROTOCOL_COLA_WAY_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* All 0 at first. */
+struct cola_way {
+    uint32_t scan;
+    int have_pose;
+    int64_t t0_ns, t1_ns; /* from the frame before to the last pose */
+    double at_m[3], path0_m, path1_m;
+};
+
+struct cola_encoder {
+    int32_t path_mm; /* since the head's scan began, or the client came; 0: a head that stands */
+    int16_t speed_mm_s;
+};
+
+/* A payload of poses. Where the scan has another number, the way begins anew. */
+void cola_way_add(struct cola_way *w, uint32_t scan, const uint8_t *payload, size_t len);
+struct cola_encoder cola_way_at(const struct cola_way *w, uint32_t scan, int64_t t_ns);
+
+#endif

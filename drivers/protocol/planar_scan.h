@@ -1,0 +1,73 @@
+/* Native frames of a planar head go in, whole turns of it come out: the echoes of each step, and when step 0 was.
+ *
+ * Steps are numbered counter-clockwise seen from above, first..last; those of a head that turns clockwise are
+ * numbered backward. A place is a step's number less `first`: 0..n-1.
+ *
+ * A turn is whole once each place has its pulse, and its attributes where the head sends them: that is when the
+ * beam has passed the last step. A turn of which something is missing is broken, never comes out, and is counted.
+ * Not counted: the turn within which the first frame came, or the scan ended, or the steps became others.
+ *
+ * Pure. Nothing is allocated; real-time safe. */
+#ifndef DRIVERS_PROTOCOL_PLANAR_SCAN_H
+#define DRIVERS_PROTOCOL_PLANAR_SCAN_H
+
+#include "drivers/protocol/native.h"
+
+enum {
+    PLANAR_MAX_STEPS = 3000, /* that are cast in a turn */
+    PLANAR_ECHOES = 4,       /* kept of a step: where it has more, the first three and the last */
+    PLANAR_UNSEEN = 0xff,
+};
+
+/* What descriptor and emitter frames say. */
+struct planar_head {
+    int known;         /* 0: none came, or it is not planar, or has more steps than fit. The rest is then void */
+    uint32_t steps, n; /* a turn; that are cast */
+    int32_t first, last, front; /* numbers; front looks along y and may lie outside of first..last */
+    uint64_t lines_uhz, prr_uhz;
+    double range_min_m, range_max_m, m_per_count;
+    int attributes; /* points have amplitudes, unless these are not modelled */
+};
+
+struct planar_echo {
+    uint32_t range; /* counts of the stream */
+    int16_t refl_cdb, amplitude_cdb;
+};
+
+struct planar_turn {
+    int64_t t0_ns;               /* device time of step 0 */
+    uint32_t number;             /* of turns since the head's scan began; goes on over scans, and over lost turns */
+    uint8_t n[PLANAR_MAX_STEPS]; /* echoes of each place, to PLANAR_ECHOES; PLANAR_UNSEEN */
+    struct planar_echo echo[PLANAR_MAX_STEPS][PLANAR_ECHOES]; /* in order of range */
+};
+
+struct planar_scan {
+    struct planar_head head;
+    const struct planar_turn *whole; /* the last one; NULL: none yet, of these steps */
+    int64_t t0_ns;                   /* of step 0 of the turn at hand or the last one; INT64_MIN: none yet */
+    /* inside */
+    struct planar_turn turn[2], *now; /* being filled: the one that is not `whole` */
+    struct native_emitter emitter;
+    uint32_t scan, line, number0; /* number0: turns of the scans before */
+    int64_t scan_t0_ns;
+    int seen, fresh, done; /* a turn was seen; what was missed up to now is no loss; the turn at hand needs no more */
+    uint32_t n_seen;       /* places that have their pulse */
+    double pan_counts, steps_per_count;
+    uint32_t pan0_place; /* where pan count 0 is, 0..steps-1 */
+    /* the points frame before, for its attributes */
+    uint64_t pulse0;
+    uint32_t n_waiting;             /* points that have none yet */
+    uint16_t at[NATIVE_MAX_POINTS]; /* place * PLANAR_ECHOES + echo; UINT16_MAX: no place */
+};
+
+/* What one frame did. `whole` and `broken` may concern different turns. */
+struct planar_news {
+    int begun, whole; /* a turn began; one is whole */
+    uint32_t broken;  /* turns */
+};
+
+void planar_scan_init(struct planar_scan *s);
+/* One frame of the stream. */
+struct planar_news planar_scan_frame(struct planar_scan *s, const uint8_t *frame);
+
+#endif
