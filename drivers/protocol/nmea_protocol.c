@@ -58,19 +58,6 @@ static void skip(void *protocol, const uint8_t *bytes, size_t len)
     self->host.count(self->host.ctx, PROTOCOL_INPUT_LOST, len);
 }
 
-static void ignore_frame(void *protocol, const uint8_t *frame, size_t len)
-{
-    (void)protocol;
-    (void)frame;
-    (void)len;
-}
-
-static void ignore_gap(void *protocol, uint32_t n_frames)
-{
-    (void)protocol;
-    (void)n_frames;
-}
-
 const struct protocol_ops protocol_nmea = {
     .name = "nmea",
     .needs = PROTOCOL_NEEDS_TIME | PROTOCOL_NEEDS_PLACE,
@@ -78,8 +65,6 @@ const struct protocol_ops protocol_nmea = {
     .create = create,
     .destroy = free,
     .open = open_at,
-    .frame = ignore_frame,
-    .gap = ignore_gap,
     .time = pass,
     .input = skip,
     .next_ns = next,

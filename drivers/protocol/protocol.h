@@ -109,9 +109,10 @@ struct protocol_ops {
     /* The client is there. t_ns: device time of the tick from which on it gets frames. */
     void (*open)(void *protocol, int64_t t_ns);
     /* One whole native frame, checked, in the order of the stream. A client that joins late gets descriptor,
-     * emitter and anchor first. Never called with frames of the geo layout where needs has POLAR. */
+     * emitter and anchor first. Never called with frames of the geo layout where needs has POLAR. May be NULL: it
+     * needs none. */
     void (*frame)(void *protocol, const uint8_t *frame, size_t len);
-    /* Frames are missing before the next one: the client, or the head, was too slow. */
+    /* Frames are missing before the next one: the client, or the head, was too slow. May be NULL, as frame. */
     void (*gap)(void *protocol, uint32_t n_frames);
     /* All frames before device time t_ns have come. Called for each tick, also of those without frames. Where the client
      * was too slow, time jumps after a gap. */

@@ -175,19 +175,6 @@ static void at_time(void *protocol, int64_t t_ns)
         s->spec.host.hang_up(s->spec.host.ctx);
 }
 
-static void no_frame(void *protocol, const uint8_t *frame, size_t len)
-{
-    (void)protocol;
-    (void)frame;
-    (void)len;
-}
-
-static void no_gap(void *protocol, uint32_t n_frames)
-{
-    (void)protocol;
-    (void)n_frames;
-}
-
 static int64_t next_ns(const void *protocol)
 {
     const struct server *s = protocol;
@@ -202,8 +189,6 @@ const struct protocol_ops protocol_velodyne_http = {
     .create = create,
     .destroy = destroy,
     .open = open_at,
-    .frame = no_frame,
-    .gap = no_gap,
     .time = at_time,
     .input = input,
     .next_ns = next_ns,

@@ -97,19 +97,6 @@ static void at_time(void *protocol, int64_t t_ns)
         send_packet(p, p->next_ns);
 }
 
-static void no_frame(void *protocol, const uint8_t *frame, size_t len)
-{
-    (void)protocol;
-    (void)frame;
-    (void)len;
-}
-
-static void no_gap(void *protocol, uint32_t n_frames)
-{
-    (void)protocol;
-    (void)n_frames;
-}
-
 static void input(void *protocol, const uint8_t *bytes, size_t len)
 {
     const struct position *p = protocol;
@@ -130,8 +117,6 @@ const struct protocol_ops protocol_velodyne_position = {
     .create = create,
     .destroy = destroy,
     .open = open_at,
-    .frame = no_frame,
-    .gap = no_gap,
     .time = at_time,
     .input = input,
     .next_ns = next_ns,

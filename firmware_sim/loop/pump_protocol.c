@@ -88,6 +88,14 @@ static void host_hang_up(void *ctx)
 
 /* ---- the session */
 
+static void give_frames(const struct protocol_ops *ops, struct session *s, const uint8_t *frames, size_t len)
+{
+    for (size_t at = 0, n; ops->frame != NULL && at < len; at += n) {
+        n = native_frame_len(frames + at);
+        ops->frame(s->protocol, frames + at, n);
+    }
+}
+
 /* Descriptor, emitter and anchor as they are before the tick at the cursor. */
 static void greet(struct pump *pump, struct session *s)
 {
@@ -99,11 +107,7 @@ static void greet(struct pump *pump, struct session *s)
         len = kept_copy(&pump->stream->kept, frames, &version);
     } while (version != before);
     pump->protocol->open(s->protocol, time_of(pump, s->cursor));
-    for (uint32_t at = 0; at < len;) {
-        size_t n = native_frame_len(frames + at);
-        pump->protocol->frame(s->protocol, frames + at, n);
-        at += (uint32_t)n;
-    }
+    give_frames(pump->protocol, s, frames, len);
 }
 
 int session_open_protocol(struct pump *pump, struct session *s)
@@ -153,15 +157,11 @@ static int take_tick(struct pump *pump, struct session *s)
         s->cursor = released - ring->queue_ticks / 2; /* what was lost, the next tick's number says */
         return 1;
     }
-    if (got == RING_LOST) ops->gap(s->protocol, 1); /* the head could not compute it */
+    if (got == RING_LOST && ops->gap != NULL) ops->gap(s->protocol, 1); /* the head could not compute it */
     if (got == RING_READ) {
         uint32_t lost = session_check_lost(pump, s, &tick, released);
-        if (lost != 0) ops->gap(s->protocol, lost);
-        for (uint32_t at = 0; at < tick.len;) {
-            size_t n = native_frame_len(tick.buf + at);
-            ops->frame(s->protocol, tick.buf + at, n);
-            at += (uint32_t)n;
-        }
+        if (lost != 0 && ops->gap != NULL) ops->gap(s->protocol, lost);
+        give_frames(ops, s, tick.buf, tick.len);
     }
     s->cursor++;
     pass_time(pump, s);
