@@ -96,6 +96,8 @@ void schedule_change(struct schedule_segment *seg, const struct schedule_segment
 
 /* Time of pulse k since the scan's start; k >= seg->k0. */
 int64_t schedule_time_ns(const struct schedule_segment *seg, uint64_t k);
+/* num/den: how many nanoseconds a firing sequence lasts, or a pulse where there is no sequence. */
+void schedule_sequence_ns(const struct schedule_segment *seg, uint64_t *num, uint64_t *den);
 /* First pulse that fires at or after t_ns; at least seg->k0. */
 uint64_t schedule_pulse_at(const struct schedule_segment *seg, int64_t t_ns);
 /* Line of pulse k. */

@@ -10,7 +10,7 @@
 set -eu
 build=$1
 part=${2:-}
-waiting="three_heads slow_reader grabber_hokuyo grabber_velodyne signals same_stream clients join"
+waiting="three_heads slow_reader pty grabber_hokuyo grabber_velodyne signals same_stream clients join"
 alone="bench_cli latency overrun ring_threads"
 longest="beside grabber_sick leaks meshes beam_reference range beam plan coordinates georef_default gpsd attributes moving travel ticks"
 

@@ -40,6 +40,8 @@ static int add_row(const struct text *t, struct list *list, const double v[3], i
                                               : "3, x y z, or 2, azimuth and elevation in degrees,");
     if (n == 2 && !(fabs(v[1]) <= 90.0))
         return text_fail(t, t->line, SH_EINPUT, err, "an elevation of %.10g deg; allowed -90 to 90", v[1]);
+    if (n == 2 && !(fabs(v[0]) <= TURN_DEG))
+        return text_fail(t, t->line, SH_EINPUT, err, "an azimuth of %.10g deg; allowed -360 to 360", v[0]);
     if (n == 3 && !(v[0] != 0.0 || v[1] != 0.0 || v[2] != 0.0))
         return text_fail(t, t->line, SH_EINPUT, err, "0 0 0 is no direction; allowed any other x y z");
     if (n == 3) {

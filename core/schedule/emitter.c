@@ -3,21 +3,11 @@
 #include <stdio.h>
 #include <string.h>
 
-static const int64_t TURN_UDEG = 360000000;
+#include "core/schedule/schedule_inside.h"
 
 const char *const emitter_names[] = {
     [EMITTER_LINE] = "line",     [EMITTER_PLANAR] = "planar",         [EMITTER_BEAMS] = "beams",
     [EMITTER_SPHERE] = "sphere", [EMITTER_DIRECTIONS] = "directions", NULL};
-
-static uint64_t gcd(uint64_t a, uint64_t b)
-{
-    while (b != 0) {
-        uint64_t r = a % b;
-        a = b;
-        b = r;
-    }
-    return a;
-}
 
 void emitter_set_planar(struct emitter *e, uint32_t steps, uint32_t first, uint32_t last, uint32_t front, int turn)
 {
@@ -54,8 +44,8 @@ int emitter_set_beams(struct emitter *e, const struct emitter_beam *beam, uint32
     *e = (struct emitter){.kind = EMITTER_BEAMS, .n_beams = n, .turn = turn};
     uint64_t tick_ps = sequence_ps;
     for (uint32_t i = 0; i < n; i++)
-        tick_ps = gcd(tick_ps, 1000ull * beam[i].offset_ns);
-    const uint64_t g = gcd(tick_ps, 1000);
+        tick_ps = (uint64_t)gcd(tick_ps, 1000ull * beam[i].offset_ns);
+    const uint64_t g = (uint64_t)gcd(tick_ps, 1000);
     e->tick_num = tick_ps / g;
     e->tick_den = 1000 / g;
     e->sequence_ticks = sequence_ps / tick_ps;

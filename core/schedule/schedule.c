@@ -5,16 +5,6 @@
 static const uint64_t NS_TIMES_UHZ = 1000000000000000; /* ns per second x micro-hertz per hertz */
 static const uint64_t FINE_DEN = 1ull << 40;
 
-static u128 gcd(u128 a, u128 b)
-{
-    while (b != 0) {
-        u128 r = a % b;
-        a = b;
-        b = r;
-    }
-    return a;
-}
-
 /* Lines that the pan needs for span_fine (2^-24 micro-degrees), the first of them from r0/den on; at least
  * one. */
 static uint64_t lines_for_span(const struct schedule_segment *seg, int64_t span_fine)
@@ -128,6 +118,14 @@ void schedule_change(struct schedule_segment *seg, const struct schedule_segment
     next.line0_cast = was.cast_before + (cast_end > was.cast0 ? cast_end - was.cast0 : 0);
     set_end(&next);
     *seg = next;
+}
+
+void schedule_sequence_ns(const struct schedule_segment *seg, uint64_t *num, uint64_t *den)
+{
+    const uint64_t ticks = kind_of(seg) == EMITTER_BEAMS ? seg->spec.emitter->sequence_ticks : 1;
+    const uint64_t common = (uint64_t)gcd(seg->tick_num, seg->tick_den);
+    *num = ticks * (seg->tick_num / common);
+    *den = seg->tick_den / common;
 }
 
 int64_t schedule_time_ns(const struct schedule_segment *seg, uint64_t k)

@@ -14,6 +14,16 @@ __extension__ typedef unsigned __int128 u128;
 
 #define TURN_UDEG 360000000LL
 
+static inline u128 gcd(u128 a, u128 b)
+{
+    while (b != 0) {
+        u128 r = a % b;
+        a = b;
+        b = r;
+    }
+    return a;
+}
+
 static inline uint64_t ceil_div(u128 a, u128 b)
 {
     return (uint64_t)((a + b - 1) / b);

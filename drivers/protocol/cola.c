@@ -49,7 +49,7 @@ static void send_scan(struct cola *self, const char *head, enum cola_form form)
 void cola_deliver(struct cola *self)
 {
     if (!self->pending) return;
-    self->pending = 0;
+    self->pending = self->wants_scan = 0;
     for (; self->n_waiting != 0; self->n_waiting--)
         send_scan(self, "sRA LMDscandata", self->waiting_form);
     if (!self->streams || !self->measures || ++self->since_sent < self->set.every) return;

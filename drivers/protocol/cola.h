@@ -42,7 +42,7 @@ struct cola {
     enum cola_level level;
     int measures;   /* LMCstopmeas: 0. Output of this session alone */
     int reboots;    /* once the answer is sent */
-    int wants_scan; /* measurement was asked for while the head could not start; next try at try_ns */
+    int wants_scan; /* measurement was asked for, and no scan has come yet; next look at the head at try_ns */
     int64_t try_ns;
     int64_t now_ns;
     int streams;                /* sEN LMDscandata 1 */

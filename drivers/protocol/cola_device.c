@@ -224,8 +224,8 @@ int cola_start_scan(struct cola *self)
 {
     char reply[MAX_REPLY];
     const enum head head = head_state(self);
-    self->wants_scan = head == OFF || head == BOOT || head == SPIN_DOWN;
-    if (head == SPIN_UP || head == SCANNING || self->wants_scan) return 0;
+    self->wants_scan = head != IDLE && head != FAULT && head != UNKNOWN; /* one that scans may be about to stop */
+    if (self->wants_scan) return 0;
     return head != IDLE || self->host.command(self->host.ctx, "SCAN:START", reply, sizeof reply) != 0;
 }
 

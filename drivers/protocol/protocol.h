@@ -35,15 +35,17 @@ enum protocol_needs {
                                          * signal.model */
     PROTOCOL_NEEDS_TIME = 1 << 2,       /* time.epoch is not none */
     PROTOCOL_NEEDS_PLACE = 1 << 3,      /* each station has a place on the Earth */
+    PROTOCOL_NEEDS_LAST = 1 << 4,       /* beam.echoes is not first */
 };
 
 /* What is counted of a session beside the frames it lost. */
 enum protocol_count {
-    PROTOCOL_UNITS_LOST,  /* units that were not sent: no room, or parts of them were missing */
-    PROTOCOL_INPUT_LOST,  /* bytes from the client that were thrown away: overlong, out of frame, garbage */
-    PROTOCOL_WRONG,       /* requests that were answered with an error */
-    PROTOCOL_POINTS_LOST, /* echoes that were sent as none: the protocol has no number for their range */
-    PROTOCOL_PULSES_UNFILLED, /* pulses in a unit that was begun and never full, since no more pulses followed */
+    PROTOCOL_UNITS_LOST,    /* units that were not sent: no room, or parts of them were missing */
+    PROTOCOL_INPUT_LOST,    /* bytes from the client that were thrown away: overlong, out of frame, garbage */
+    PROTOCOL_WRONG,         /* requests that were answered with an error */
+    PROTOCOL_POINTS_LOST,   /* echoes that were sent as none: the protocol has no number for their range */
+    PROTOCOL_PULSES_UNSENT, /* pulses that went into no unit, and no reader was too slow: of a unit that was begun and
+                             * never full, or that the protocol has no words for */
     PROTOCOL_N_COUNTS
 };
 
@@ -86,6 +88,7 @@ struct protocol_spec {
     struct protocol_host host;
     uint32_t session;  /* from 1, over all links */
     uint32_t fixes_hz; /* of the GNSS receiver */
+    int waits;         /* 1: paces fast and step: device time says nothing of how long a client takes */
     /* velodyne_http: where the settings say that data go, and so on; empty: not known */
     char address[64];
     int port;

@@ -31,8 +31,7 @@ void scip_power_up(struct scip *s)
     s->stream.active = s->single.active = 0;
     s->simulation = (struct scip_simulation){0};
     s->n_line = 0;
-    s->n_over = 0;
-    s->foul = 0;
+    s->is_over = s->foul = 0;
 }
 
 static void open_session(void *protocol, int64_t t_ns)
@@ -62,31 +61,34 @@ void scip_answer(struct scip *s, const char *echo, size_t len, const char *statu
 /* A line with bytes that no command has is noise, of a wrong bit rate for example: it gets no answer. */
 static void take_line(struct scip *s)
 {
-    const uint64_t lost = s->foul ? s->n_line + s->n_over : s->n_over;
-    if (lost != 0) s->host.count(s->host.ctx, PROTOCOL_INPUT_LOST, lost);
-    if (!s->foul && s->n_over != 0)
+    if (s->foul) s->host.count(s->host.ctx, PROTOCOL_INPUT_LOST, s->n_line);
+    if (!s->foul && s->is_over)
         scip_answer(s, s->line, s->n_line, "0B");
     else if (!s->foul && s->n_line != 0)
         scip_command(s, s->line, s->n_line);
     s->n_line = 0;
-    s->n_over = 0;
-    s->foul = 0;
+    s->is_over = s->foul = 0;
 }
 
+/* What has no room is counted as it comes: the end of such a line may never come. */
 static void input(void *protocol, const uint8_t *bytes, size_t len)
 {
     struct scip *s = protocol;
+    uint64_t n_over = 0;
     for (size_t i = 0; i < len; i++) {
         if (bytes[i] == '\n' || bytes[i] == '\r') {
             take_line(s);
             continue;
         }
         if (bytes[i] < 0x20 || bytes[i] > 0x7e) s->foul = 1;
-        if (s->n_line < sizeof s->line)
+        if (s->n_line < sizeof s->line) {
             s->line[s->n_line++] = (char)bytes[i];
-        else
-            s->n_over++;
+            continue;
+        }
+        s->is_over = 1;
+        n_over++;
     }
+    if (n_over != 0) s->host.count(s->host.ctx, PROTOCOL_INPUT_LOST, n_over);
 }
 
 static void frame(void *protocol, const uint8_t *bytes, size_t len)

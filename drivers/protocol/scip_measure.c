@@ -6,6 +6,8 @@
 
 /* GD GS GE HD HE, MD MS ME ND NE: requests, and the scans that answer them. */
 
+enum { TRY_NS = 100000000 };
+
 int scip_has_head(const struct scip *s)
 {
     return s->scan.head.known && s->scan.head.last < SCIP_MAX_STEPS;
@@ -89,6 +91,7 @@ void scip_measure(struct scip *s, const char *line, size_t len)
     request.active = 1;
     request.after_ns = streams ? s->now_ns : s->laser_ns;
     request.until_ns = s->now_ns + WAIT_NS;
+    s->try_ns = s->now_ns + TRY_NS;
     if (!streams) {
         s->single = request;
         return;
@@ -97,8 +100,18 @@ void scip_measure(struct scip *s, const char *line, size_t len)
     scip_answer(s, line, len, "00");
 }
 
+/* The head may have been about to stop when it was asked for scans. Once its first scan has come, who stops the head
+ * means it. */
+static void wake_head(struct scip *s)
+{
+    const int waits = s->single.active || (s->stream.active && s->stream.sent == 0);
+    if (!waits || s->now_ns < s->try_ns) return;
+    s->try_ns = scip_laser_on(s) == NULL ? s->now_ns + TRY_NS : INT64_MAX;
+}
+
 void scip_measure_time(struct scip *s)
 {
+    wake_head(s);
     if (!s->single.active || s->now_ns < s->single.until_ns) return;
     s->single.active = 0;
     scip_answer(s, s->single.echo, s->single.echo_len, "0A");

@@ -36,6 +36,7 @@ struct scip {
     const struct scip_model *model;
     int64_t now_ns, epoch_ns; /* epoch: when the time stamp was 0 */
     int64_t laser_ns;         /* since when the laser is on */
+    int64_t try_ns;           /* a request that no scan has come for: when to look at the head again */
     int laser, time_mode, speed_changed;
     uint32_t bit_rate;
     int64_t rb_ns, reboot_ns; /* of the last RB alone, of the end that RB RB asked for; INT64_MIN: none */
@@ -44,8 +45,8 @@ struct scip {
     /* the line at hand */
     char line[SCIP_MAX_LINE];
     size_t n_line;
-    uint64_t n_over; /* bytes beyond what fits */
-    int foul;        /* a byte that is not printable was in it */
+    int is_over; /* it has more bytes than fit; they are counted already */
+    int foul;    /* a byte that is not printable was in it */
     struct planar_scan scan;
     struct scip_reply reply;
 };
@@ -83,7 +84,7 @@ void scip_laser_off(struct scip *s);
 void scip_measure(struct scip *s, const char *line, size_t len);
 /* What the scans at hand are for. */
 void scip_scans_came(struct scip *s, struct planar_news news);
-/* A G or H that has waited for too long. */
+/* A request that waits: the head is started again where it stopped meanwhile; a G or H may have waited too long. */
 void scip_measure_time(struct scip *s);
 
 /* scip_simulate.c */

@@ -34,8 +34,7 @@ struct velodyne {
     uint32_t n_firings; /* in it; 0: none is begun */
     int64_t t0_ns;      /* device time of its first one */
     uint64_t next_pulse;
-    int in_step;            /* 1: next_pulse is the one that has to come */
-    uint64_t unsent_pulses; /* while mode is 0, modulo a packet's */
+    int in_step; /* 1: next_pulse is the one that has to come */
     uint8_t packet[VELODYNE_DATA_LEN];
     uint8_t reflectivity[N_REFL];
 };
@@ -79,7 +78,7 @@ static void destroy(void *protocol)
  * the head never sent the pulses that would fill this one. */
 static void fall_out_of_step(struct velodyne *v)
 {
-    v->host.count(v->host.ctx, PROTOCOL_PULSES_UNFILLED, v->n_firings);
+    v->host.count(v->host.ctx, PROTOCOL_PULSES_UNSENT, v->n_firings);
     v->n_firings = 0;
     v->in_step = 0;
 }
@@ -223,21 +222,12 @@ static uint32_t points_of_pulse(const uint8_t *payload, uint32_t i, uint32_t n_p
     return n < n_points - i ? n : n_points - i;
 }
 
-/* Packets that this head's firings would have filled. */
-static void count_unsent(struct velodyne *v, uint32_t n_pulses)
-{
-    v->unsent_pulses += n_pulses;
-    if (v->unsent_pulses < VELODYNE_PACKET_FIRINGS) return;
-    v->host.count(v->host.ctx, PROTOCOL_UNITS_LOST, v->unsent_pulses / VELODYNE_PACKET_FIRINGS);
-    v->unsent_pulses %= VELODYNE_PACKET_FIRINGS;
-}
-
 static void take_points(struct velodyne *v, const uint8_t *payload, size_t len, int64_t frame_t_ns)
 {
     struct native_points head;
     if (native_decode_points(payload, len, &head) != SH_OK) return;
     if (v->mode == 0) {
-        count_unsent(v, head.n_pulses);
+        v->host.count(v->host.ctx, PROTOCOL_PULSES_UNSENT, head.n_pulses);
         return;
     }
     if (v->in_step && head.pulse0 != v->next_pulse) fall_out_of_step(v);
@@ -302,7 +292,7 @@ static int64_t never(const void *protocol)
 
 const struct protocol_ops protocol_velodyne = {
     .name = "velodyne",
-    .needs = PROTOCOL_NEEDS_POLAR,
+    .needs = PROTOCOL_NEEDS_POLAR | PROTOCOL_NEEDS_LAST,
     .emitters = 1u << NATIVE_EMIT_BEAMS,
     .n_beams = VELODYNE_BEAMS,
     .max_unit = VELODYNE_DATA_LEN,

@@ -9,12 +9,15 @@
 #include "drivers/protocol/velodyne_settings.h"
 
 enum { MAX_BODY = 2048, MAX_ANSWER = 512 + MAX_BODY };
+/* A link has a few sessions. Who sends no request, or half of one, does not keep them from others. */
+static const int64_t IDLE_NS = 30000000000;
 
 struct server {
     struct protocol_spec spec;
-    int64_t t_ns; /* device time of the last tick */
-    int over;     /* the last answer is given */
-    int no_body;  /* the answer is to HEAD: it says how long its body is, and has none */
+    int64_t t_ns;     /* device time of the last tick */
+    int64_t until_ns; /* for the next request */
+    int over;         /* the last answer is given */
+    int no_body;      /* the answer is to HEAD: it says how long its body is, and has none */
     struct http_reader reader;
     char body[MAX_BODY], answer[MAX_ANSWER];
 };
@@ -43,6 +46,7 @@ static const struct status {
     {403, "Forbidden", "settings are not for pages from elsewhere"},
     {404, "Not Found", "no such path"},
     {405, "Method Not Allowed", "this path has another method"},
+    {408, "Request Timeout", "a whole request comes within 30 s"},
     {409, "Conflict", ""},
     {411, "Length Required", "a body has a Content-Length; none is chunked"},
     {413, "Content Too Large", "a body has 1024 bytes at most"},
@@ -109,6 +113,11 @@ static void carry_out(struct server *s, const struct http_request *q)
     }
 }
 
+static void give_time(struct server *s)
+{
+    s->until_ns = s->spec.waits ? INT64_MAX : s->t_ns + IDLE_NS;
+}
+
 /* All requests that are whole. */
 static void serve(struct server *s)
 {
@@ -125,6 +134,7 @@ static void serve(struct server *s)
         if (result == HTTP_REQUEST) {
             s->over = !s->reader.request.keep_alive;
             carry_out(s, &s->reader.request);
+            give_time(s);
             http_reader_drop(&s->reader);
         }
     }
@@ -145,9 +155,24 @@ static void input(void *protocol, const uint8_t *bytes, size_t len)
     if (len > 0) s->spec.host.count(s->spec.host.ctx, PROTOCOL_INPUT_LOST, len);
 }
 
+static void open_at(void *protocol, int64_t t_ns)
+{
+    struct server *s = protocol;
+    s->t_ns = t_ns;
+    give_time(s);
+}
+
 static void at_time(void *protocol, int64_t t_ns)
 {
-    ((struct server *)protocol)->t_ns = t_ns;
+    struct server *s = protocol;
+    s->t_ns = t_ns;
+    if (s->over || t_ns < s->until_ns) return;
+    s->over = 1;
+    s->no_body = 0;
+    if (s->reader.len > 0)
+        answer_error(s, 408, NULL, "");
+    else
+        s->spec.host.hang_up(s->spec.host.ctx);
 }
 
 static void no_frame(void *protocol, const uint8_t *frame, size_t len)
@@ -163,10 +188,10 @@ static void no_gap(void *protocol, uint32_t n_frames)
     (void)n_frames;
 }
 
-static int64_t never(const void *protocol)
+static int64_t next_ns(const void *protocol)
 {
-    (void)protocol;
-    return INT64_MAX;
+    const struct server *s = protocol;
+    return s->over ? INT64_MAX : s->until_ns;
 }
 
 const struct protocol_ops protocol_velodyne_http = {
@@ -176,10 +201,10 @@ const struct protocol_ops protocol_velodyne_http = {
     .max_unit = MAX_ANSWER,
     .create = create,
     .destroy = destroy,
-    .open = at_time,
+    .open = open_at,
     .frame = no_frame,
     .gap = no_gap,
     .time = at_time,
     .input = input,
-    .next_ns = never,
+    .next_ns = next_ns,
 };

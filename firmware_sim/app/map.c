@@ -135,7 +135,7 @@ static int draw(struct config *cfg, void *ctx, struct sh_err *err)
  * protocols of links forbid geo, and no link is opened. */
 static int set_frame(struct app_sets *sets)
 {
-    static const char *const SETS[] = {"output.crs=local", "output.utm_zone=0"};
+    static const char *const SETS[] = {"output.crs=local", "output.utm_zone=0", "output.heights=ellipsoid"};
     int status = APP_OK;
     for (size_t i = 0; i < sizeof SETS / sizeof SETS[0] && status == APP_OK; i++)
         status = app_add_set(sets, SETS[i]);

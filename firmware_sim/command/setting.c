@@ -116,9 +116,13 @@ int command_setting_query(struct command_call *call)
     return command_reply(call, "%s", in_unit(call, value).text);
 }
 
-/* `HEADER VALUE, allowed MIN to MAX`; value is what the command said, or its number with the unit. */
+/* `HEADER VALUE, allowed MIN to MAX`, or `allowed MAX` where there is one value; value is what the command said, or
+ * its number with the unit. */
 static int refuse(struct command_call *call, int number, const char *value, int64_t min, int64_t max, const char *with)
 {
+    if (min == max)
+        return command_fail(call, number, "%s %s, allowed %s%s", call->row->header, value, in_unit(call, max).text,
+                            with);
     return command_fail(call, number, "%s %s, allowed %s to %s%s", call->row->header, value, in_unit(call, min).text,
                         in_unit(call, max).text, with);
 }

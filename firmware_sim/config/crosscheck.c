@@ -30,9 +30,11 @@ static void check_limits(struct cfg_reader *rd, const struct config *cfg)
         int64_t value, high = cfg_figure(&cfg->profile, key->max_key);
         int64_t low = key->min_key != NULL ? cfg_figure(&cfg->profile, key->min_key) : (int64_t)(key->min * 1e6);
         memcpy(&value, cfg_address(rd, key, 0), sizeof value);
+        char from[40] = "";
+        if (low < high) snprintf(from, sizeof from, "%.15g to ", from_micro(low));
         if (value < low || value > high)
-            cfg_fail_key(rd, key->path, 0, "%.15g is outside the limits of head profile %s; allowed %.15g to %.15g %s",
-                         from_micro(value), cfg->profile.name, from_micro(low), from_micro(high), key->unit);
+            cfg_fail_key(rd, key->path, 0, "%.15g is outside the limits of head profile %s; allowed %s%.15g %s",
+                         from_micro(value), cfg->profile.name, from, from_micro(high), key->unit);
     }
 }
 

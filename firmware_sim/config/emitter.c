@@ -76,9 +76,13 @@ static void set_planar(struct cfg_reader *rd, struct config_profile *p)
     if (c->last_step >= c->steps_per_turn)
         cfg_fail_key(rd, "last_step", 0, "%u, and a turn has %u steps; allowed up to %u", c->last_step,
                      c->steps_per_turn, c->steps_per_turn - 1);
-    else if (c->first_step > c->last_step)
-        cfg_fail_key(rd, "first_step", 0, "%u comes after last_step %u; allowed 0 to %u", c->first_step, c->last_step,
-                     c->last_step);
+    else if (c->last_step == 0)
+        cfg_fail_key(rd, "last_step", 0,
+                     "0, so that no angle lies between the first step and the last; allowed 1 to %u",
+                     c->steps_per_turn - 1);
+    else if (c->first_step >= c->last_step)
+        cfg_fail_key(rd, "first_step", 0, "%u, but last_step is %u; allowed 0 to %u", c->first_step, c->last_step,
+                     c->last_step - 1);
     else if (c->front_step >= c->steps_per_turn)
         cfg_fail_key(rd, "front_step", 0, "%u, and a turn has %u steps; allowed up to %u", c->front_step,
                      c->steps_per_turn, c->steps_per_turn - 1);

@@ -66,6 +66,10 @@ static void check_stream(struct cfg_reader *rd, struct config *cfg, uint32_t i, 
         CFG_SOUND(rd, 0, "output.layout"))
         cfg_fail_key(rd, PROTOCOL_KEY, i, "%s needs ranges, but output.layout is geo%s; required is layout: polar",
                      ops->name, place_of(rd, "output.layout", where));
+    if ((ops->needs & PROTOCOL_NEEDS_LAST) != 0 && cfg->head.settings.echoes == BEAM_FIRST)
+        cfg_fail_key(rd, PROTOCOL_KEY, i,
+                     "%s has no first echoes, but beam.echoes is first%s; required is all, last or strongest",
+                     ops->name, place_of(rd, "beam.echoes", where));
     if ((ops->needs & PROTOCOL_NEEDS_ATTRIBUTES) == 0) return;
     if (!cfg_is_given(rd, "output.attributes", 0))
         cfg->output.attributes = 1;
@@ -90,23 +94,18 @@ int cfg_protocol_fits(const struct protocol_ops *ops, const struct emitter *emit
 /* The head must be of a kind that the protocol has words for. */
 static void check_head(struct cfg_reader *rd, const struct config *cfg, uint32_t i, const struct protocol_ops *ops)
 {
-    static const char *const kinds[] = {[EMITTER_LINE] = "line",
-                                        [EMITTER_PLANAR] = "planar",
-                                        [EMITTER_BEAMS] = "beams",
-                                        [EMITTER_SPHERE] = "sphere",
-                                        [EMITTER_DIRECTIONS] = "directions"};
     const struct emitter *emitter = &cfg->profile.emitter;
     char where[40], allowed[64] = "";
     if (!rd->profile_read || cfg_protocol_fits(ops, emitter)) return;
     for (int kind = EMITTER_LINE; kind <= EMITTER_DIRECTIONS; kind++)
         if ((ops->emitters & 1u << kind) != 0)
             snprintf(allowed + strlen(allowed), sizeof allowed - strlen(allowed), "%s%s",
-                     allowed[0] != '\0' ? ", " : "", kinds[kind]);
+                     allowed[0] != '\0' ? ", " : "", emitter_names[kind]);
     place_of(rd, "head.profile", where);
     if (!has_kind(ops, emitter))
         cfg_fail_key(rd, PROTOCOL_KEY, i,
                      "%s can't speak for head profile %s%s, whose emitter is %s; allowed emitters: %s", ops->name,
-                     cfg->profile.name, where, kinds[emitter->kind], allowed);
+                     cfg->profile.name, where, emitter_names[emitter->kind], allowed);
     else
         cfg_fail_key(rd, PROTOCOL_KEY, i, "%s has %u beams, but head profile %s%s has %u; allowed %u", ops->name,
                      ops->n_beams, cfg->profile.name, where, emitter->n_beams, ops->n_beams);

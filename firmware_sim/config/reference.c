@@ -68,7 +68,7 @@ static void print_profile_keys(FILE *out)
 {
     fputs(
         "Head profile, heads/NAME.yaml. maker and model are texts; each figure is written { value: V, from: GRADE }.\n"
-        "GRADE is data sheet (a source names the maker's data sheet), quoted (a source says so without naming\n"
+        "GRADE is data sheet (a source names it, or two sources agree), quoted (a source says so without naming\n"
         "it), or assumed. source: TEXT and note: TEXT may follow, for who reads the file.\n\n",
         out);
     print_keys(&cfg_profile_table, out);

@@ -170,9 +170,9 @@ static int store_whole(const struct place *at, void *dst, const char *text)
     case CFG_NUMBER_OK:
         break;
     }
-    /* Limits are doubles; the only one that is not exact is 2^64 - 1, which rounds up to 2^64. */
-    if ((long double)value < (long double)key->min * (long double)unit ||
-        (long double)value > (long double)key->max * (long double)unit || value > (__int128)UINT64_MAX)
+    /* Limits are doubles, so that 0.01 is a little more than that. 2^64 - 1 rounds up to 2^64. */
+    if ((long double)value < roundl((long double)key->min * (long double)unit) ||
+        (long double)value > roundl((long double)key->max * (long double)unit) || value > (__int128)UINT64_MAX)
         return refuse(at, text, "out of range");
     if (key->size == sizeof(uint32_t)) {
         uint32_t narrow = (uint32_t)value;

@@ -49,16 +49,6 @@ static const uint32_t echoes_sent[] = {[BEAM_ALL] = NATIVE_ECHOES_ALL,
                                        [BEAM_LAST] = NATIVE_ECHOES_LAST,
                                        [BEAM_STRONGEST] = NATIVE_ECHOES_STRONGEST};
 
-static uint64_t greatest_divisor(uint64_t a, uint64_t b)
-{
-    while (b != 0) {
-        uint64_t rest = a % b;
-        a = b;
-        b = rest;
-    }
-    return a;
-}
-
 void device_fill_emitter(const struct device *device, struct native_emitter *e, struct native_beam *beam)
 {
     const struct emitter *from = device->scan.segment.spec.emitter;
@@ -73,11 +63,7 @@ void device_fill_emitter(const struct device *device, struct native_emitter *e, 
                                  .turn = from->turn,
                                  .rings = from->rings,
                                  .echoes = echoes_sent[device->cmd.settings.echoes]};
-    const struct schedule_segment *segment = &device->scan.segment;
-    const uint64_t ticks = from->kind == EMITTER_BEAMS ? from->sequence_ticks : 1;
-    const uint64_t common = greatest_divisor(segment->tick_num, segment->tick_den);
-    e->sequence_ns_num = ticks * (segment->tick_num / common);
-    e->sequence_ns_den = segment->tick_den / common;
+    schedule_sequence_ns(&device->scan.segment, &e->sequence_ns_num, &e->sequence_ns_den);
     if (from->kind == EMITTER_SPHERE) e->first_ring_udeg = -90000000;
     for (uint32_t i = 0; i < from->n_beams; i++)
         beam[i] = (struct native_beam){(int32_t)from->beam[i].elevation_udeg, (int32_t)from->beam[i].azimuth_udeg,

@@ -25,7 +25,7 @@ struct link_counts {
     uint64_t left_out_pulses;
     uint64_t left_out_frames;
     /* of protocols but the native one */
-    uint64_t sent_units, lost_units, lost_points, unfilled_pulses, wrong_requests, lost_input_bytes;
+    uint64_t sent_units, lost_units, lost_points, unsent_pulses, wrong_requests, lost_input_bytes;
 };
 
 struct links {

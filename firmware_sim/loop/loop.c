@@ -121,7 +121,7 @@ void loop_put_links(const struct loop *loop, struct json *json)
         json_uint(json, "sent_units", counts.sent_units);
         json_uint(json, "lost_units", counts.lost_units);
         json_uint(json, "lost_points", counts.lost_points);
-        json_uint(json, "unfilled_pulses", counts.unfilled_pulses);
+        json_uint(json, "unsent_pulses", counts.unsent_pulses);
         json_uint(json, "wrong_requests", counts.wrong_requests);
         json_uint(json, "lost_input_bytes", counts.lost_input_bytes);
         json_close_object(json);

@@ -2,7 +2,8 @@
  *
  * In real time the protocol keeps up with the head, whether its client reads or not, as the firmware of a device does.
  * A unit that has no room, or that comes while one waits that is older than loop.queue_ms, is lost as a whole; what
- * answers a client at once is lost for want of room alone. In the paces that wait for readers nothing is lost: the session takes no further tick until there is room. */
+ * answers a client at once is lost for want of room alone. In the paces that wait for readers nothing is lost: the
+ * session takes no further tick until there is room. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -75,7 +76,7 @@ static void host_count(void *ctx, enum protocol_count what, uint64_t n)
     if (what == PROTOCOL_INPUT_LOST) counts->lost_input_bytes += n;
     if (what == PROTOCOL_WRONG) counts->wrong_requests += n;
     if (what == PROTOCOL_POINTS_LOST) counts->lost_points += n;
-    if (what == PROTOCOL_PULSES_UNFILLED) counts->unfilled_pulses += n;
+    if (what == PROTOCOL_PULSES_UNSENT) counts->unsent_pulses += n;
     s->commands.wrong += what == PROTOCOL_INPUT_LOST || what == PROTOCOL_WRONG;
 }
 
@@ -112,6 +113,7 @@ int session_open_protocol(struct pump *pump, struct session *s)
         .host = {s, host_send, host_command, host_utc_ns, host_fix, host_count, host_hang_up, host_next_fix_ns},
         .session = s->id,
         .fixes_hz = pump->links->fixes_hz,
+        .waits = pump->stream->waits,
         .port = pump->links->data_port,
     };
     struct sh_err err;
@@ -185,7 +187,10 @@ static int take_input(struct pump *pump, struct session *s)
         s->answering = 0;
         c->in_pos += n;
     }
-    if (s->hang_up) c->in_pos = c->in_len;
+    if (s->hang_up && c->in_pos != c->in_len) {
+        host_count(s, PROTOCOL_INPUT_LOST, c->in_len - c->in_pos);
+        c->in_pos = c->in_len;
+    }
     return c->in_pos != from;
 }
 

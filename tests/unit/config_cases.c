@@ -190,6 +190,8 @@ const struct bad bad[] = {
      "velodyne-http can't speak for head profile any-rate (line 2), whose emitter is line; allowed emitters: beams"},
     {"type: tcp\n    port: 0\noutput:", "type: udp\n    port: 1\n    protocol: velodyne\noutput:\n  layout: geo", 16,
      "links[0].protocol", "needs ranges, but output.layout is geo (line 18); required is layout: polar"},
+    {"type: tcp\n    port: 0\noutput:", "type: udp\n    port: 1\n    protocol: velodyne\nbeam:\n  echoes: first\noutput:", 16,
+     "links[0].protocol", "has no first echoes, but beam.echoes is first (line 18); required is all, last or strongest"},
     {"type: tcp", "type: usb\n    speed: fast", 15, "links[0].speed", "allowed full, high, super"},
     {"type: tcp", "type: usb\n    vid: 0x0", 15, "links[0].vid", "0x0001 to 0xffff"},
     {"type: tcp", "type: usb\n    vid: 0x10000", 15, "links[0].vid", "0x0001 to 0xffff"},

@@ -191,6 +191,15 @@ static void a_resting_head_is_started(void **state)
     cola_head_state("idle");
     cola.ops->time(cola.protocol, 200000000);
     assert_string_equal(cola.line[cola.n_lines - 1], "SCAN:START");
+    cola_head_state("scanning"); /* but somebody has stopped it: no scan comes */
+    cola_expect("sEN LMDscandata 1", "sEA LMDscandata 1");
+    cola_head_state("idle");
+    cola.ops->time(cola.protocol, 400000000);
+    assert_string_equal(cola.line[cola.n_lines - 1], "SCAN:START");
+    cola_turn(10, 1.0); /* the scan has come: who stops the head now means it */
+    protocol_rig_clear(&cola);
+    cola.ops->time(cola.protocol, 9000000000);
+    assert_int_equal(cola.n_lines, 0);
 }
 
 /* ---- log-in */

@@ -79,7 +79,10 @@ static void tables_that_do_not_fit_are_refused(void **state)
         {urg, "steps_per_turn: { value: 1024,", "steps_per_turn: { value: 725,", "last_step",
          "725, and a turn has 725 steps; allowed up to 724"},
         {urg, "first_step: { value: 44,", "first_step: { value: 726,", "first_step",
-         "726 comes after last_step 725; allowed 0 to 725"},
+         "726, but last_step is 725; allowed 0 to 724"},
+        {urg, "first_step: { value: 44,", "first_step: { value: 725,", "first_step",
+         "725, but last_step is 725; allowed 0 to 724"},
+        {urg, "last_step: { value: 725,", "last_step: { value: 0,", "last_step", "allowed 1 to 1023"},
         {urg, "front_step: { value: 384,", "front_step: { value: 1024,", "front_step", "allowed up to 1023"},
         {urg, "front_step: { value: 384, from: quoted }\n", "", "front_step", "missing"},
         {urg, "value: counter-clockwise", "value: left", "step_direction", "allowed clockwise, counter-clockwise"},
@@ -120,6 +123,8 @@ static void settings_that_do_not_fit_are_refused(void **state)
          ":3: head.prr_hz: 10000, but a line of head profile hokuyo-urg-04lx has 1024 pulses; allowed 9728"},
         {"hokuyo-urg-04lx", "  lines_hz: 11\n", ":3: head.lines_hz: 11 is outside the limits of head profile"},
         {"hokuyo-urg-04lx", "  pan_deg_s: 1\n", ":3: head.pan_deg_s: 1 is outside"},
+        {"hokuyo-ust-20lx", "  lines_hz: 11\n",
+         "11 is outside the limits of head profile hokuyo-ust-20lx; allowed 40 Hz"},
         {"hokuyo-urg-04lx", "  line_start_deg: -130\n", "allowed -119.53125 to 119.882813"},
         {"velodyne-vlp16", "  prr_hz: 300000\n", ":3: head.prr_hz: 300000 is outside"},
         {"velodyne-vlp16", "  ambiguity: folded\n", ":3: head.ambiguity: the pulses of head profile velodyne-vlp16"},
@@ -170,6 +175,7 @@ static void lists_name_their_line(void **state)
         {"0 nan 0\n", "list.txt, line 1: not a direction"},
         {"0 0 0\n", "list.txt, line 1: 0 0 0 is no direction"},
         {"0 90.5\n", "list.txt, line 1: an elevation of 90.5 deg; allowed -90 to 90"},
+        {"360 0\n-360 0\n1e18 0\n", "list.txt, line 3: an azimuth of 1e+18 deg; allowed -360 to 360"},
     };
     assert_loads(load_list("0 1 0\n 1 0 0 # right\n\n-1\t-1\t-1\r\n"));
     assert_int_equal(cfg->profile.emitter.steps, 3);
@@ -186,6 +192,34 @@ static void lists_name_their_line(void **state)
     assert_says("has a list of directions; allowed without it");
 }
 
+/* Limits that doubles don't hold exactly are allowed themselves. */
+static void spheres_go_to_their_limits(void **state)
+{
+    (void)state;
+    static const char own[] =
+        "emitter: sphere\nrange_min_m: {value: 0.1, from: assumed}\nrange_max_m: {value: 100, from: assumed}\n"
+        "range_sigma_m: {value: 0.01, from: assumed}\nrange_sigma_ppm: {value: 0, from: assumed}\n"
+        "wavelength_nm: {value: 903, from: assumed}\nmirror_counts: {value: 0, from: assumed}\n"
+        "pan_counts: {value: 0, from: assumed}\nbeam_exit_m: {value: 0.01, from: assumed}\n"
+        "beam_divergence_rad: {value: 0.003, from: assumed}\npulse_width_ns: {value: 6, from: assumed}\n"
+        "max_echoes: {value: 2, from: assumed}\nboot_s: {value: 0.2, from: assumed}\n"
+        "spin_up_s: {value: 0.03, from: assumed}\nspin_down_s: {value: 0.2, from: assumed}\n"
+        "lines_min_hz: {value: 1, from: assumed}\nlines_max_hz: {value: 20, from: assumed}\n"
+        "maker: A\nmodel: B\nfirmware: \"1\"\nstep_deg: {value: %s, from: assumed}\n";
+    static const struct {
+        const char *step_deg;
+        uint32_t steps; /* 0: refused */
+    } cases[] = {{"0.01", 36000}, {"0.009999", 0}, {"90", 4}, {"90.000001", 0}, {"2.2", 164}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        char text[2048];
+        snprintf(text, sizeof text, own, cases[i].step_deg);
+        write_in("heads/mine.yaml", text);
+        const int rc = load_edited("any-rate\n" PRR LINES, "mine\n");
+        assert_int_equal(rc, cases[i].steps != 0 ? SH_OK : SH_EINPUT);
+        if (rc == SH_OK) assert_int_equal(cfg->profile.emitter.steps, cases[i].steps);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -193,6 +227,7 @@ int main(void)
         cmocka_unit_test(tables_that_do_not_fit_are_refused),
         cmocka_unit_test(settings_that_do_not_fit_are_refused),
         cmocka_unit_test(lists_name_their_line),
+        cmocka_unit_test(spheres_go_to_their_limits),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -56,50 +56,52 @@ static void a_write_is_a_datagram(void **state)
     close(fd);
 }
 
+/* A link to a port that nobody has. */
+static struct bench open_without_receiver(struct sockaddr_in *at)
+{
+    struct link_spec spec;
+    socklen_t len = sizeof *at;
+    const int fd = open_receiver(&spec);
+    assert_int_equal(getsockname(fd, (struct sockaddr *)at, &len), 0);
+    close(fd);
+    struct bench bench = bench_open(&spec);
+    bench_expect(&bench, LINK_OPENED, 0);
+    return bench;
+}
+
+/* A receiver comes to that port, and gets what is sent then. */
+static void end_with_receiver(struct bench *bench, const struct sockaddr_in *at)
+{
+    const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    assert_int_equal(bind(fd, (const struct sockaddr *)at, sizeof *at), 0);
+    assert_int_equal(bench->ops->write(bench->link, 0, "here", 4), 4);
+    expect_datagram(fd, "here", 4);
+    bench_close(bench);
+    close(fd);
+}
+
 /* Nobody there: each send succeeds, poll stays calm; a receiver that comes later gets what is sent then. */
 static void a_receiver_that_is_not_there(void **state)
 {
     (void)state;
-    struct link_spec spec;
     struct sockaddr_in at;
-    socklen_t len = sizeof at;
-    int fd = open_receiver(&spec);
-    assert_int_equal(getsockname(fd, (struct sockaddr *)&at, &len), 0);
-    close(fd);
-    struct bench bench = bench_open(&spec);
-    bench_expect(&bench, LINK_OPENED, 0);
+    struct bench bench = open_without_receiver(&at);
     for (int i = 0; i < 100; i++) {
         assert_int_equal(bench.ops->write(bench.link, 0, "gone", 4), 4);
         bench_poll(&bench, 0, 0); /* refusals of the system may wake it; they are taken */
         assert_int_equal(bench_poll(&bench, 0, 0), 0);
     }
-    fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0);
-    assert_int_equal(bench.ops->write(bench.link, 0, "here", 4), 4);
-    expect_datagram(fd, "here", 4);
-    bench_close(&bench);
-    close(fd);
+    end_with_receiver(&bench, &at);
 }
 
 /* The same, and the refusal is met by a write, not by poll: nothing that is sent afterwards is lost for it. */
 static void a_refusal_costs_no_later_datagram(void **state)
 {
     (void)state;
-    struct link_spec spec;
     struct sockaddr_in at;
-    socklen_t len = sizeof at;
-    int fd = open_receiver(&spec);
-    assert_int_equal(getsockname(fd, (struct sockaddr *)&at, &len), 0);
-    close(fd);
-    struct bench bench = bench_open(&spec);
-    bench_expect(&bench, LINK_OPENED, 0);
+    struct bench bench = open_without_receiver(&at);
     assert_int_equal(bench.ops->write(bench.link, 0, "gone", 4), 4); /* over lo the refusal is there at once */
-    fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0);
-    assert_int_equal(bench.ops->write(bench.link, 0, "here", 4), 4);
-    expect_datagram(fd, "here", 4);
-    bench_close(&bench);
-    close(fd);
+    end_with_receiver(&bench, &at);
 }
 
 static void what_arrives_can_be_read(void **state)

@@ -256,8 +256,28 @@ static void shipped_widths_are_the_makers(void **state)
     }
 }
 
-/* Every line of a profile that has a value has a grade. Who quotes says where from: there, or before the first
- * key for all figures. */
+/* Whether the file's first lines say of all figures of a grade where they are from. */
+static int is_said_of_all(const char *text, const char *grade)
+{
+    char said[32];
+    snprintf(said, sizeof said, "\"%s\": ", grade);
+    const char *at = strstr(text, said);
+    return at != NULL && at < strstr(text, "maker:");
+}
+
+static void check_grade(const char *path, const char *text, const char *figure)
+{
+    static const char *const sourced[] = {"data sheet", "quoted"};
+    const char *end = strchr(figure, '}'), *from = strstr(figure, "from: "), *source = strstr(figure, "source: ");
+    if (end == NULL || from == NULL || from > end) fail_msg("%s: no grade: %.60s", path, figure);
+    for (int i = 0; i < 2; i++)
+        if (strncmp(from + strlen("from: "), sourced[i], strlen(sourced[i])) == 0 &&
+            !is_said_of_all(text, sourced[i]) && (source == NULL || source > end))
+            fail_msg("%s: %s without a source: %.60s", path, sourced[i], figure);
+}
+
+/* Every line of a profile that has a value has a grade. What was found somewhere says where: there, or before the
+ * first key for all figures of the grade. */
 static void shipped_figures_have_a_grade(void **state)
 {
     (void)state;
@@ -275,15 +295,8 @@ static void shipped_figures_have_a_grade(void **state)
         assert_true(len < sizeof text - 1);
         text[len] = '\0';
         files++;
-        const char *begin = strstr(text, "maker:"), *for_all = strstr(text, "\"quoted\": ");
-        if (for_all > begin) for_all = NULL;
-        for (const char *at = text; (at = strstr(at, "{ value: ")) != NULL; at++) {
-            const char *end = strchr(at, '}'), *from = strstr(at, "from: ");
-            if (end == NULL || from == NULL || from > end) fail_msg("%s: no grade: %.60s", path, at);
-            const char *source = strstr(at, "source: ");
-            if (strncmp(from, "from: quoted", 12) == 0 && !for_all && (source == NULL || source > end))
-                fail_msg("%s: quoted without a source: %.60s", path, at);
-        }
+        for (const char *at = text; (at = strstr(at, "{ value: ")) != NULL; at++)
+            check_grade(path, text, at);
     }
     closedir(folder);
     assert_true(files >= 10);

@@ -278,6 +278,33 @@ static void skipped_scans(void **state)
 }
 
 /* A turn that is left out may as well be broken. */
+/* Somebody stops the head, and a client asks for scans while the last ones still come. */
+static void asked_while_it_stops(void **state)
+{
+    (void)state;
+    static const struct protocol_rig_reply stops[] = {{"HEAD:STATE?", "spin-down", 0}, {NULL, NULL, 0}},
+                                           idle[] = {{"HEAD:STATE?", "idle", 0}, {NULL, NULL, 0}};
+    scip_open("UTM-30LX");
+    scip_turn(0);
+    scip_ask("MD0000108001000\n", "MD0000108001000\n00P\n\n");
+    assert_int_equal(rig.n_lines, 0);
+    rig.replies = stops;
+    rig.ops->time(rig.protocol, 900000000);
+    rig.replies = idle;
+    rig.ops->time(rig.protocol, 950000000);
+    assert_int_equal(rig.n_lines, 1); /* ten times a second at most */
+    rig.ops->time(rig.protocol, 1000000000);
+    assert_int_equal(rig.n_lines, 3);
+    assert_string_equal(rig.line[2], "SCAN:START");
+    /* The first scan has come: who stops the head now means it. */
+    scip_turn(41);
+    assert_true(rig.len > 3000);
+    protocol_rig_clear(&rig);
+    rig.ops->time(rig.protocol, 9000000000);
+    assert_int_equal(rig.n_lines, 0);
+    scip_close();
+}
+
 static void skipped_and_broken(void **state)
 {
     (void)state;
@@ -628,6 +655,7 @@ int main(void)
         cmocka_unit_test(turns_that_are_not_lost),
         cmocka_unit_test(turns_are_not_mixed),
         cmocka_unit_test(speed_changes_within_a_turn),
+        cmocka_unit_test(asked_while_it_stops),
         cmocka_unit_test(skipped_and_broken),
         cmocka_unit_test(played_malfunctions),
     };

@@ -20,9 +20,7 @@ static double uniform(uint64_t stream, uint64_t i)
 static int setup(void **state)
 {
     (void)state;
-    protocol_rig_open(&rig, PROTOCOL_VELODYNE, "Velodyne", "VLP-16");
-    protocol_rig_beams(&rig, 10);
-    rig.emitter.echoes = NATIVE_ECHOES_STRONGEST;
+    velodyne_head_open(&rig);
     return 0;
 }
 

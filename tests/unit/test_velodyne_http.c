@@ -116,6 +116,31 @@ static void test_settings(void **state)
     assert_int_equal(http_rig.hung_up, 0);
 }
 
+/* Who sends nothing, or half a request, is sent away 30 s after the last whole request: others want to come in. */
+static void test_idle_clients(void **state)
+{
+    (void)state;
+    const int64_t s = 1000000000;
+    http_rig.ops->time(http_rig.protocol, 29 * s);
+    assert_int_equal(http_rig.hung_up, 0);
+    http_post("/cgi/setting", "rpm=600");
+    assert_int_equal(http_rig.ops->next_ns(http_rig.protocol), 59 * s);
+    http_rig.ops->time(http_rig.protocol, 59 * s - 1);
+    assert_int_equal(http_rig.hung_up, 0);
+    http_send("GET /cgi");
+    http_rig.ops->time(http_rig.protocol, 59 * s);
+    assert_int_equal(http_status(), 408);
+    assert_int_equal(http_rig.hung_up, 1);
+    http_renew();
+    http_rig.ops->time(http_rig.protocol, 30 * s);
+    assert_int_equal(http_rig.hung_up, 1);
+    assert_int_equal(http_rig.n_units, 0);
+    http_rig.spec.waits = 1; /* device time may run ahead */
+    http_renew();
+    http_rig.ops->time(http_rig.protocol, 3600 * s);
+    assert_int_equal(http_rig.hung_up, 0);
+}
+
 /* laser and rpm of a head that stands. A rate alone does not set it going. */
 static void test_head_at_rest(void **state)
 {
@@ -222,15 +247,11 @@ static void test_names_are_escaped(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        TEST(test_curl),
-        TEST(test_mrpt),
-        TEST(test_urllib),
-        TEST(test_settings),
-        TEST(test_head_at_rest),
-        TEST(test_reset),
-        TEST(test_refused_by_the_head),
-        TEST(test_documents),
-        TEST(test_names_are_escaped),
+        TEST(test_curl),         TEST(test_mrpt),
+        TEST(test_urllib),       TEST(test_settings),
+        TEST(test_idle_clients), TEST(test_head_at_rest),
+        TEST(test_reset),        TEST(test_refused_by_the_head),
+        TEST(test_documents),    TEST(test_names_are_escaped),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

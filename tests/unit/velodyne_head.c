@@ -10,6 +10,13 @@
 
 enum { MOST = 4096 };
 
+void velodyne_head_open(struct protocol_rig *rig)
+{
+    protocol_rig_open(rig, PROTOCOL_VELODYNE, "Velodyne", "VLP-16");
+    protocol_rig_beams(rig, 10);
+    rig->emitter.echoes = NATIVE_ECHOES_STRONGEST;
+}
+
 int64_t velodyne_head_ns(uint64_t pulse)
 {
     return (int64_t)(pulse / 16) * SEQUENCE_NS + (int64_t)(pulse % 16) * FIRING_NS;

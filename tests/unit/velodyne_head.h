@@ -7,6 +7,9 @@
 
 enum { SEQUENCE_NS = 55296, FIRING_NS = 2304 };
 
+/* The protocol for a VLP-16 at 10 turns a second that sends the strongest echo. */
+void velodyne_head_open(struct protocol_rig *rig);
+
 /* Since the scan's start, of pulse k: 55.296 us a sequence, 2.304 us a firing. */
 int64_t velodyne_head_ns(uint64_t pulse);
 /* Turns of the head at pulse k. rpm: 600. */

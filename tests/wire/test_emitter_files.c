@@ -142,8 +142,8 @@ static void plan_and_check_name_the_emitter(void **state)
 static void links_forbid_no_map(void **state)
 {
     struct wire *wire = *state;
-    const char *config = write_config_with(wire, "hokuyo-ust-20lx", 57600, 40, 1,
-                                           "links: [{type: tcp, protocol: scip, port: 0}]\n");
+    const char *config =
+        write_config_with(wire, "hokuyo-ust-20lx", 57600, 40, 1, "links: [{type: tcp, protocol: scip, port: 0}]\n");
     const char *const map[] = {"map", config, "-o", wire_path(wire, "a.png"), "--quiet", NULL};
     assert_int_equal(run(wire, map), 0);
 }

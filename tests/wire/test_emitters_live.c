@@ -108,7 +108,7 @@ static void turns_change_within_a_scan(void **state)
     assert_true(live.next > 100000);
     /* What fires at its own times takes no other rate. */
     assert_string_equal(client_ask(live.sh, "HEAD:PRR?"), "289351.851852");
-    assert_non_null(strstr(client_ask(live.sh, "HEAD:PRR 300000"), "allowed 289351.851852 to 289351.851852"));
+    assert_non_null(strstr(client_ask(live.sh, "HEAD:PRR 300000"), "allowed 289351.851852\""));
     client_tell(live.sh, "SCAN:STOP");
     client_tell(live.sh, "TIME:STEP 500 MS");
     take_live(&live);
@@ -130,10 +130,10 @@ static void a_planar_heads_rate_follows(void **state)
     struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
     client_tell(sh, "HEAD:LINES 9.5");
     assert_string_equal(client_ask(sh, "HEAD:PRR?"), "9728");
-    assert_non_null(strstr(client_ask(sh, "HEAD:PRR 10240"), "allowed 9728 to 9728 as HEAD:LINes is 9.5"));
+    assert_non_null(strstr(client_ask(sh, "HEAD:PRR 10240"), "allowed 9728 as HEAD:LINes is 9.5"));
     client_tell(sh, "HEAD:PRR 9728");
     assert_non_null(strstr(client_ask(sh, "HEAD:LINES 11"), "allowed 9 to 10"));
-    assert_non_null(strstr(client_ask(sh, "HEAD:PAN 1"), "allowed 0 to 0"));
+    assert_non_null(strstr(client_ask(sh, "HEAD:PAN 1"), "allowed 0\""));
     scanhead_close(sh);
     head_end(&head, SIGTERM);
 }
