@@ -1,12 +1,13 @@
 #include "drivers/protocol/planar_scan.h"
 
+#include <stddef.h>
 #include <string.h>
 
 enum { NOWHERE = UINT16_MAX };
 
 void planar_scan_init(struct planar_scan *s)
 {
-    memset(s, 0, sizeof *s);
+    memset(s, 0, offsetof(struct planar_scan, at));
     s->now = &s->turn[0];
     s->t0_ns = INT64_MIN;
     s->fresh = s->done = 1;

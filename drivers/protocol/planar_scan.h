@@ -46,7 +46,7 @@ struct planar_scan {
     const struct planar_turn *whole; /* the last one; NULL: none yet, of these steps */
     int64_t t0_ns;                   /* of step 0 of the turn at hand or the last one; INT64_MIN: none yet */
     /* inside */
-    struct planar_turn turn[2], *now; /* being filled: the one that is not `whole` */
+    struct planar_turn *now; /* being filled: the one that is not `whole` */
     struct native_emitter emitter;
     uint32_t scan, line, number0; /* number0: turns of the scans before */
     int64_t scan_t0_ns;
@@ -58,6 +58,7 @@ struct planar_scan {
     uint64_t pulse0;
     uint32_t n_waiting;             /* points that have none yet */
     uint16_t at[NATIVE_MAX_POINTS]; /* place * PLANAR_ECHOES + echo; UINT16_MAX: no place */
+    struct planar_turn turn[2];     /* last: large, and not touched before a turn begins */
 };
 
 /* What one frame did. `whole` and `broken` may concern different turns. */
