@@ -3,8 +3,8 @@
 # them, and the unit tests once more with the sanitizers in. Ends with one line of counts.
 #
 # As many at a time as there are processors, those that take longest first in each folder:
-#   1. accuracy, stability, unit: they compute; the recipes beside them, which mostly wait
-#   2. wire, which mostly waits; the guests beside it, which compute, and begin before the sanitizers' programs
+#   1. accuracy, stability, unit: they compute; beside them the recipes and two of wire, which mostly wait
+#   2. wire, which mostly waits; the guests beside it, which compute, and begin before the programs of unit
 #   3. those that need a head in real time, but mostly wait: beside each other
 #   4. those that drive a head at its limits, or that spin: each has the machine to itself
 set -eu
@@ -12,16 +12,17 @@ build=$1
 part=${2:-}
 waiting="three_heads slow_reader pty grabber_hokuyo grabber_velodyne signals same_stream clients join"
 alone="bench_cli latency overrun ring_threads"
-longest="beside grabber_sick leaks meshes beam_reference range beam plan coordinates georef_default gpsd attributes moving travel ticks"
+beside="grabber_sick gpsd" # other people's clients that take their time
+longest="beside leaks meshes beam_reference range beam plan coordinates georef_default attributes moving travel ticks"
 
 wanted() {
     [ -z "$part" ] || [ "$part" = "$1" ]
 }
 
-# programs FOLDER [BUILD]: the test programs of a folder, the longest first, without those of $waiting and $alone.
+# programs FOLDER [BUILD]: the test programs of a folder, the longest first, without those that run apart.
 programs() {
     for name in $longest $(cd "tests/$1" && ls test_*.c | sed 's/^test_//; s/\.c$//'); do
-        case " $waiting $alone $seen " in *" $name "*) continue ;; esac
+        case " $beside $waiting $alone $seen " in *" $name "*) continue ;; esac
         seen="$seen $name"
         [ ! -e "tests/$1/test_$name.c" ] || echo "${2:-$build/test}/tests/$1/test_$name"
     done
@@ -32,11 +33,12 @@ set --
 if wanted unit; then set -- "$@" +tests/check_recipes.sh; fi
 if wanted accuracy; then set -- "$@" $(programs accuracy); fi
 if wanted stability; then set -- "$@" $(programs stability); fi
-if wanted unit; then set -- "$@" tests/check_includes.sh tests/check_make.sh $(programs unit); fi
+if wanted wire; then for name in $beside; do set -- "$@" "+$build/test/tests/wire/test_$name"; done; fi
 if wanted guest; then
     export BUILD="$build"
     set -- "$@" +tests/guest/guest.sh # it takes the programs of tests/guest with it
 fi
+if wanted unit; then set -- "$@" tests/check_includes.sh tests/check_make.sh $(programs unit); fi
 if [ -z "$part" ]; then set -- "$@" $(programs unit "$build/asan"); fi
 if wanted wire; then set -- "$@" $(programs wire) tests/check_install.sh; fi
 

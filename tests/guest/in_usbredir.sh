@@ -19,7 +19,7 @@ record_again "usbredir, super"
 ask_host stop >/dev/null
 note "super at $(uptime_s) s"
 ask_host start_sick >/dev/null
-tap "usbredir" test_cola
+PATIENT=1 tap "usbredir" test_cola
 ask_host stop >/dev/null
 note "TiM at $(uptime_s) s"
 # Each time the process is killed with the stream in full flow, and another one takes its place.

@@ -163,16 +163,19 @@ static void check_room(void)
     }
 }
 
-/* Each telegram is there, counted by itself (field 7), also with reads that are given up again and again. */
+/* Each telegram is there, counted by itself (field 7), also with reads that are given up again and again. Not so
+ * with PATIENT in the environment: over usbredir an answer may cross the read's cancellation on the socket, and QEMU
+ * drops it then. */
 static void test_events(void **state)
 {
+    const int patient = getenv("PATIENT") != NULL;
     enum { COUNTER = 7, N_SCANS = 20, IMPATIENT_MS = 5 };
     unsigned long before = 0;
     int given_up = 0, whole = 0;
     (void)state;
     ask("sEN LMDscandata 1", "sEA LMDscandata 1");
     for (int i = 0; i < N_SCANS;) {
-        const int impatient = i >= N_SCANS / 2, rc = receive(impatient ? IMPATIENT_MS : WAIT_MS);
+        const int impatient = !patient && i >= N_SCANS / 2, rc = receive(impatient ? IMPATIENT_MS : WAIT_MS);
         if (rc == LIBUSB_ERROR_TIMEOUT && n_in == 0 && impatient) {
             assert_true(++given_up < 10000);
             continue;
@@ -187,7 +190,7 @@ static void test_events(void **state)
         i++;
     }
     print_message("%d reads given up, %d telegrams of whole packets\n", given_up, whole);
-    assert_true(given_up > 0);
+    assert_true(patient || given_up > 0);
     send("\002sEN LMDscandata 0\003", 19);
     do
         assert_int_equal(receive(WAIT_MS), 0); /* a scan may come first */

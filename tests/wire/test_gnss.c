@@ -148,6 +148,9 @@ static void test_receiver_takes_no_commands(void **state)
     client_tell(sh, "SCAN:START");
     memset(&t, 0, sizeof t);
     fd = open(wire_path(wire, "gnss"), O_RDWR | O_NOCTTY | O_CLOEXEC);
+    while (t.moments < 1) /* it may be one that the kernel still held for the reader before */
+        tally_read(&t, fd);
+    t.moments = 0;
     while (t.moments < 3)
         tally_read(&t, fd);
     assert_int_equal(t.last - t.first, 2);
