@@ -164,8 +164,8 @@ static void check_room(void)
 }
 
 /* Each telegram is there, counted by itself (field 7), also with reads that are given up again and again. Not so
- * with PATIENT in the environment: over usbredir an answer may cross the read's cancellation on the socket, and QEMU
- * drops it then. */
+ * with PATIENT in the environment: over usbredir a telegram was lost once, presumably as its answer crossed the read's
+ * cancellation on the socket. */
 static void test_events(void **state)
 {
     const int patient = getenv("PATIENT") != NULL;
