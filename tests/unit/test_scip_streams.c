@@ -1,0 +1,409 @@
+/* SCIP, the sensor's side: how scans follow each other. Streams, their begin and end, what is lost between them, and
+ * time. */
+#include "tests/unit/scip_rig.h"
+
+static struct scip_decoded got;
+
+/* Which of ten turns come, by their time stamps. */
+static void check_turns(const char *command, const char *want)
+{
+    char line[40], times[80] = "";
+    scip_open("UTM-30LX");
+    snprintf(line, sizeof line, "%s\n", command);
+    protocol_rig_input(&rig, line);
+    protocol_rig_clear(&rig);
+    for (uint32_t k = 0; k < 10; k++) {
+        scip_turn(k);
+        if (rig.len == 0) continue;
+        scip_decode_only(&got, 3, 0);
+        snprintf(times + strlen(times), sizeof times - strlen(times), "%u:%.2s ", got.time_ms / 25, got.echo + 13);
+    }
+    assert_string_equal(times, want);
+    scip_close();
+}
+
+static void skipped_scans(void **state)
+{
+    (void)state;
+    check_turns("MD0000108000003", "0:02 1:01 2:00 ");
+    check_turns("MD0000108000103", "1:02 3:01 5:00 ");
+    check_turns("MD0000108000302", "3:01 7:00 ");
+    check_turns("MD0000108000400", "4:00 9:00 ");
+    check_turns("MD0000108000999", "9:98 ");
+}
+
+/* A turn that is left out may as well be broken. */
+/* Somebody stops the head, and a client asks for scans while the last ones still come. */
+static void asked_while_it_stops(void **state)
+{
+    (void)state;
+    static const struct protocol_rig_reply stops[] = {{"HEAD:STATE?", "spin-down", 0}, {NULL, NULL, 0}},
+                                           idle[] = {{"HEAD:STATE?", "idle", 0}, {NULL, NULL, 0}};
+    scip_open("UTM-30LX");
+    scip_turn(0);
+    scip_ask("MD0000108001000\n", "MD0000108001000\n00P\n\n");
+    assert_int_equal(rig.n_lines, 0);
+    rig.replies = stops;
+    rig.ops->time(rig.protocol, 900000000);
+    rig.replies = idle;
+    rig.ops->time(rig.protocol, 950000000);
+    assert_int_equal(rig.n_lines, 1); /* ten times a second at most */
+    rig.ops->time(rig.protocol, 1000000000);
+    assert_int_equal(rig.n_lines, 3);
+    assert_string_equal(rig.line[2], "SCAN:START");
+    /* The first scan has come: who stops the head now means it. */
+    scip_turn(41);
+    assert_true(rig.len > 3000);
+    protocol_rig_clear(&rig);
+    rig.ops->time(rig.protocol, 9000000000);
+    assert_int_equal(rig.n_lines, 0);
+    scip_close();
+}
+
+static void skipped_and_broken(void **state)
+{
+    (void)state;
+    scip_open("UTM-30LX");
+    scip_ask("MD0000108000100\n", "MD0000108000100\n00P\n\n");
+    scip_part(0, 0, 500);
+    scip_line_end(0, 0);
+    scip_line_time(0);
+    scip_turn(1);
+    scip_decode_only(&got, 3, 0);
+    assert_int_equal(got.time_ms, 25);
+    scip_close();
+}
+
+/* A scan goes out once its last step has come, before the turn is over. */
+static void sent_after_the_last_step(void **state)
+{
+    (void)state;
+    scip_open("UTM-30LX");
+    scip_ask("MD0000108000000\n", "MD0000108000000\n00P\n\n");
+    scip_part(0, 0, 700);
+    scip_part(0, 701, 1079);
+    scip_expect("");
+    scip_part(0, 1080, 1080);
+    scip_decode_only(&got, 3, 0);
+    scip_line_end(0, 0);
+    scip_line_time(0);
+    scip_expect("");
+    assert_int_equal(rig.count[PROTOCOL_UNITS_LOST], 0);
+    scip_close();
+}
+
+/* QT ends a stream within a turn; a second M takes the first one's place, a refused one doesn't. */
+static void streams_end(void **state)
+{
+    (void)state;
+    scip_open("UTM-30LX");
+    scip_ask("MD0000108000000\n", "MD0000108000000\n00P\n\n");
+    scip_part(0, 0, 700);
+    scip_ask("QT\n", "QT\n00P\n\n");
+    scip_part(0, 701, 1080);
+    scip_line_end(0, 0);
+    scip_line_time(0);
+    scip_turn(1);
+    scip_expect("");
+    scip_ask("MD0000108000000\nMD0000000301002\n", "MD0000108000000\n00P\n\nMD0000000301002\n00P\n\n");
+    scip_turn(2);
+    scip_decode_only(&got, 3, 0);
+    assert_string_equal(got.echo, "MD0000000301001");
+    assert_int_equal(got.n_steps, 4);
+    scip_ask("MD0003000001002\n", "MD0003000001002\n05U\n\n");
+    scip_turn(3);
+    scip_decode_only(&got, 3, 0);
+    assert_string_equal(got.echo, "MD0000000301000");
+    scip_close();
+}
+
+/* M gives what was measured after it was asked for, G the next scan that is whole and was measured with the
+ * laser on. */
+static void measured_when(void **state)
+{
+    (void)state;
+    scip_open("UTM-30LX");
+    scip_part(0, 0, 700);
+    rig.ops->time(rig.protocol, 12000000);
+    scip_ask("BM\nMD0000108000000\nGD0000000001\n", "BM\n00P\n\nMD0000108000000\n00P\n\n");
+    scip_part(0, 701, 1080);
+    scip_line_end(0, 0);
+    scip_line_time(0);
+    scip_expect("");
+    scip_turn(1);
+    const char *at = (const char *)rig.bytes;
+    scip_decode(&got, &at, 3, 0);
+    assert_string_equal(got.echo, "GD0000000001");
+    assert_string_equal(got.status, "00");
+    assert_int_equal(got.time_ms, 25);
+    scip_decode(&got, &at, 3, 0);
+    assert_string_equal(got.echo, "MD0000108000000");
+    assert_int_equal(got.time_ms, 25);
+    protocol_rig_clear(&rig);
+    scip_part(2, 0, 700);
+    rig.ops->time(rig.protocol, 62000000);
+    scip_ask("QT\nBM\nQT\n", "QT\n00P\n\nBM\n00P\n\nQT\n00P\n\n");
+    scip_close();
+}
+
+static void handshakes(void **state)
+{
+    (void)state;
+    scip_open("UTM-30LX");
+    scip_ask("BM\n", "BM\n00P\n\n");
+    for (uint32_t k = 0; k < 5; k++) {
+        scip_ask("GD0000108001\n", "");
+        scip_turn(k);
+        scip_decode_only(&got, 3, 0);
+        assert_string_equal(got.status, "00");
+        assert_int_equal(got.time_ms, 25 * k);
+    }
+    scip_ask("GD0000108001;a\nGD0000108001;b\n", "GD0000108001;b\n0Bb\n\n");
+    scip_ask("QT\n", "GD0000108001;a\n10Q\n\nQT\n00P\n\n");
+    scip_ask("BM\nGD0000108001;c\n", "BM\n00P\n\n");
+    rig.ops->time(rig.protocol, 125000000 + 1999999999);
+    scip_expect("");
+    rig.ops->time(rig.protocol, 125000000 + 2000000000); /* no scan has come */
+    scip_expect("GD0000108001;c\n0Aa\n\n");
+    rig.ops->time(rig.protocol, 125000000 + 5000000000);
+    scip_expect("");
+    scip_close();
+}
+
+/* A turn with missing frames is not sent and counted; those that were asked for all come. */
+static void lost_frames(void **state)
+{
+    (void)state;
+    scip_open("UTM-30LX");
+    scip_ask("MD0000108000003\n", "MD0000108000003\n00P\n\n");
+    scip_part(0, 0, 500);
+    rig.ops->gap(rig.protocol, 1);
+    scip_part(0, 502, 1080);
+    scip_line_end(0, 0);
+    scip_line_time(0);
+    scip_expect("");
+    assert_int_equal(rig.count[PROTOCOL_UNITS_LOST], 1);
+    scip_turn(1);
+    scip_decode_only(&got, 3, 0);
+    assert_string_equal(got.echo + 13, "02");
+    scip_part(2, 0, 900);
+    rig.ops->gap(rig.protocol, 20); /* the rest of turn 2, turns 3 and 4, the begin of turn 5 */
+    scip_part(5, 100, 1080);
+    scip_line_end(5, 0);
+    scip_expect("");
+    assert_int_equal(rig.count[PROTOCOL_UNITS_LOST], 5);
+    rig.ops->gap(rig.protocol, 1); /* all points of turn 6 */
+    scip_line_end(6, 0);
+    assert_int_equal(rig.count[PROTOCOL_UNITS_LOST], 6);
+    scip_turn(7);
+    scip_decode_only(&got, 3, 0);
+    assert_string_equal(got.echo + 13, "01");
+    assert_int_equal(got.time_ms, 175);
+    scip_close();
+}
+
+/* Points whose attributes are missing have no intensity. The rig's frames alternate: points, attributes. */
+static void (*real_frame)(void *, const uint8_t *, size_t);
+static int n_attributes;
+static void leave_out_one(void *protocol, const uint8_t *frame, size_t len)
+{
+    if (frame[1] == NATIVE_ATTRIBUTES && n_attributes++ == 3) return;
+    real_frame(protocol, frame, len);
+}
+
+static void lost_attributes(void **state)
+{
+    (void)state;
+    struct protocol_ops ops;
+    scip_open("UTM-30LX");
+    rig.attributes = 1;
+    protocol_rig_describe(&rig, 0);
+    scip_ask("ME0000108000000\n", "ME0000108000000\n00P\n\n");
+    ops = *rig.ops;
+    real_frame = ops.frame;
+    ops.frame = leave_out_one;
+    rig.ops = &ops;
+    n_attributes = 0;
+    scip_turn(0);
+    scip_expect("");
+    assert_int_equal(rig.count[PROTOCOL_UNITS_LOST], 1);
+    scip_turn(1);
+    scip_decode_only(&got, 3, 1);
+    assert_int_equal(got.time_ms, 25);
+    n_attributes = 3 - 10; /* the last of the turn's eleven frames */
+    scip_turn(2);
+    scip_expect("");
+    assert_int_equal(rig.count[PROTOCOL_UNITS_LOST], 2);
+    scip_close();
+}
+
+/* What never was, is not lost: the turn within which the scan was stopped, or the client joined. */
+static void turns_that_are_not_lost(void **state)
+{
+    (void)state;
+    scip_open("UTM-30LX");
+    scip_ask("MD0000108000000\n", "MD0000108000000\n00P\n\n");
+    scip_part(0, 300, 1080);
+    scip_line_end(0, 0);
+    scip_turn(1);
+    scip_part(2, 0, 600);
+    scip_line_end(2, LINE_PARTIAL);
+    rig.descriptor.scan = 2;
+    rig.scan_t0_ns = 10000000000;
+    protocol_rig_describe(&rig, rig.scan_t0_ns);
+    protocol_rig_clear(&rig);
+    scip_turn(0);
+    scip_decode_only(&got, 3, 0);
+    assert_int_equal(got.time_ms, 10000);
+    assert_int_equal(rig.count[PROTOCOL_UNITS_LOST], 0);
+    scip_close();
+}
+
+/* Parts of two turns never make one: of two scans, each with a turn of that number, or the same part sent
+ * over again. */
+static void turns_are_not_mixed(void **state)
+{
+    (void)state;
+    scip_open("UTM-30LX");
+    scip_turn(0);
+    scip_ask("MD0000108000000\n", "MD0000108000000\n00P\n\n");
+    scip_turn(1);
+    protocol_rig_clear(&rig);
+    scip_part(2, 0, 600);
+    rig.ops->gap(rig.protocol, 1000); /* the rest of this scan, and the begin of the next one */
+    rig.scan_t0_ns = 10000000000;
+    scip_part(2, 601, 1080);
+    scip_line_end(2, 0);
+    scip_expect("");
+    scip_part(3, 0, 539);
+    scip_part(3, 0, 539);
+    scip_part(3, 0, 0);
+    scip_line_end(3, 0);
+    scip_expect("");
+    scip_turn(4);
+    scip_decode_only(&got, 3, 0);
+    assert_int_equal(got.time_ms, 10100);
+    scip_close();
+}
+
+/* A change of speed within a turn sends descriptor and emitter again, and takes nothing from the turn;
+ * another number of steps begins anew. */
+static void speed_changes_within_a_turn(void **state)
+{
+    (void)state;
+    scip_open("UTM-30LX");
+    scip_ask("MD0000108000000\n", "MD0000108000000\n00P\n\n");
+    scip_part(0, 0, 600);
+    rig.descriptor.lines_uhz = 39000000;
+    rig.emitter.sequence_ns_den = 39 * 1440;
+    protocol_rig_describe(&rig, 10000000);
+    rig.descriptor.lines_uhz = 40000000;
+    scip_part(0, 601, 1080);
+    scip_decode_only(&got, 3, 0);
+    assert_int_equal(got.n_steps, 1081);
+    scip_part(1, 0, 600);
+    rig.emitter.last_step = 600;
+    protocol_rig_describe(&rig, 40000000);
+    scip_part(1, 601, 601);
+    scip_line_end(1, 0);
+    scip_expect("");
+    scip_ask("MD0000060100000\n", "MD0000060100000\n04T\n\n");
+    scip_close();
+}
+
+/* 2^24 ms are 4 h 39 min 37.216 s. The stamp is that of step 0, wherever the scan begins. */
+static void the_clock_wraps(void **state)
+{
+    (void)state;
+    scip_open("URG-04LX");
+    rig.scan_t0_ns = 16777216000000 - 150000000;
+    scip_ask("MD0044072500000\n", "MD0044072500000\n00P\n\n");
+    static const uint32_t want_ms[] = {16777066, 16777166, 50, 150};
+    for (uint32_t k = 0; k < 4; k++) {
+        scip_turn(k);
+        scip_decode_only(&got, 3, 0);
+        assert_int_equal(got.time_ms, want_ms[k]);
+    }
+    protocol_rig_input(&rig, "RS\nMD0044072500000\n");
+    protocol_rig_clear(&rig);
+    scip_turn(4);
+    scip_turn(5);
+    const char *at = (const char *)rig.bytes;
+    scip_decode(&got, &at, 3, 0);
+    assert_int_equal(got.time_ms, 0);
+    scip_decode(&got, &at, 3, 0);
+    assert_int_equal(got.time_ms, 100);
+    scip_close();
+}
+
+/* All that came since, a line each: the two digits of an echo and its status, or only the status. */
+static void check_played(const char *want)
+{
+    char text[512] = "";
+    rig.bytes[rig.len] = 0;
+    for (uint32_t i = 0; i < rig.n_units; i++) {
+        const char *unit = (const char *)rig.bytes + (i == 0 ? 0 : rig.end[i - 1]);
+        snprintf(text + strlen(text), sizeof text - strlen(text), "%.2s:%.2s ", unit + 13, unit + 16);
+    }
+    assert_string_equal(text, want);
+    protocol_rig_clear(&rig);
+}
+
+static void turns_of_a_stream(uint32_t *line, uint32_t n)
+{
+    for (uint32_t i = 0; i < n; i++)
+        scip_turn((*line)++);
+}
+
+static void played_malfunctions(void **state)
+{
+    (void)state;
+    uint32_t line = 0;
+    scip_open("UTM-30LX");
+    scip_ask("DB10\nDB06\nDB0x\nDB01\n", "DB10\n03S\n\nDB06\n01Q\n\nDB0x\n01Q\n\nDB01\n04T\n\n");
+    scip_ask("MD0000108000000\nDB02\n", "MD0000108000000\n00P\n\nMD0000108000000\n50U\n\nDB02\n00P\n\n");
+    scip_ask("DB02\nDB03\nBM\nMD0000108000000\n", "DB02\n02R\n\nDB03\n05U\n\nBM\n01Q\n\nMD0000108000000\n50U\n\n");
+    turns_of_a_stream(&line, 1);
+    scip_expect("");
+    scip_ask("DB10\nBM\nQT\n", "DB10\n00P\n\nBM\n00P\n\nQT\n00P\n\n");
+
+    scip_ask("DB03\nMD0000108000030\n", "DB03\n00P\n\nMD0000108000030\n00P\n\n");
+    turns_of_a_stream(&line, 21);
+    check_played("29:99 28:99 27:99 26:99 25:99 24:99 23:99 22:99 21:99 20:99 20:21 20:98 ");
+    scip_turn(line++);
+    check_played("19:99 ");
+    scip_ask("QT\nDB04\nMD0000108000020\n", "QT\n00P\n\nDB04\n00P\n\nMD0000108000020\n00P\n\n");
+    turns_of_a_stream(&line, 20); /* too short for it */
+    assert_int_equal(rig.n_units, 20);
+    protocol_rig_clear(&rig);
+    scip_ask("MD0000108000021\n", "MD0000108000021\n00P\n\n");
+    turns_of_a_stream(&line, 25);
+    check_played("20:99 19:99 18:99 17:99 16:99 15:99 14:99 13:99 12:99 11:99 11:21 11:50 ");
+    scip_ask("BM\nDB10\nDB05\n", "BM\n01Q\n\nDB10\n00P\n\nDB05\n00P\n\n");
+    scip_ask("MD0000108000000\n", "MD0000108000000\n00P\n\n");
+    turns_of_a_stream(&line, 25);
+    check_played("00:99 00:99 00:99 00:99 00:99 00:99 00:99 00:99 00:99 00:99 00:50 ");
+    scip_ask("RS\nBM\n", "RS\n00P\n\nBM\n00P\n\n");
+    scip_close();
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(skipped_scans),
+        cmocka_unit_test(streams_end),
+        cmocka_unit_test(sent_after_the_last_step),
+        cmocka_unit_test(measured_when),
+        cmocka_unit_test(handshakes),
+        cmocka_unit_test(lost_frames),
+        cmocka_unit_test(lost_attributes),
+        cmocka_unit_test(the_clock_wraps),
+        cmocka_unit_test(turns_that_are_not_lost),
+        cmocka_unit_test(turns_are_not_mixed),
+        cmocka_unit_test(speed_changes_within_a_turn),
+        cmocka_unit_test(asked_while_it_stops),
+        cmocka_unit_test(skipped_and_broken),
+        cmocka_unit_test(played_malfunctions),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
