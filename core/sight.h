@@ -1,0 +1,72 @@
+/* Sight: what a standing station sees in each direction, known before rays are cast.
+ *
+ * In: a BVH (core/bvh.h), the one point where all rays begin, and which directions matter. Out: a map of
+ * directions. For a ray the map says which triangle it meets, or that it meets nothing, without a walk through
+ * the BVH. The hits are those of bvh_hits, bit by bit: range, triangle, label.
+ *
+ * Directions are the cells of a cube around the station. Each cell says one of four things: this triangle
+ * alone; nothing; one of these few (decided ray by ray in double); ask the BVH. Why no cell says too much:
+ * core/sight/sight_inside.h.
+ *
+ * A sight is constant after it is made, and may be used from any thread; each thread has working memory of
+ * its own. The scene must stand still, and have no surface with holes. */
+#ifndef CORE_SIGHT_H
+#define CORE_SIGHT_H
+
+#include <stdint.h>
+
+#include "core/bvh.h"
+
+struct sight;
+
+struct sight_spec {
+    const struct bvh *bvh; /* must outlive the sight */
+    double station_m[3];   /* where the rays begin, prcs */
+    /* Rays that will be cast, if they were spread evenly over all directions. Cells are made no finer than so
+     * many rays pay for. */
+    double rays;
+    uint64_t memory_bytes; /* the sight takes no more, also while it is made; what does not fit asks the BVH */
+    /* 1: surfaces are ordered in double, as bvh_order_exactly has it; the BVH itself needs no such call.
+     * 0: hits are those of the BVH as it is. */
+    int exact;
+    /* False where no ray goes within radius_rad of the unit vector dir (prcs). NULL: rays go everywhere. A ray
+     * where there should be none asks the BVH. */
+    int (*sees)(const void *ctx, const double dir[3], double radius_rad);
+    const void *ctx;
+};
+
+struct sight_info {
+    uint32_t cells;  /* along an edge of the cube's faces */
+    double one, nothing, few, ask; /* shares of the directions that were looked at */
+    uint64_t lists, records;       /* of few: lists; triangles in them, each once a region */
+    uint64_t bytes, peak_bytes;    /* kept; while it was made */
+    double build_s;
+};
+
+/* True where a sight can be had: no surface has holes, and triangles are few enough to be numbered. */
+int sight_possible(const struct scene *scene);
+/* Made by `threads` threads (0: all). SH_ESTOPPED where report asks to stop, SH_ENOMEM. */
+int sight_create(const struct sight_spec *spec, unsigned threads, const struct sh_report *report, struct sight **out,
+                 struct sh_err *err);
+void sight_free(struct sight *sight);
+void sight_get_info(const struct sight *sight, struct sight_info *info);
+
+/* How often rays could not be decided by the map. */
+struct sight_counters {
+    uint64_t few;   /* rays decided among a few triangles */
+    uint64_t asked; /* the BVH was asked: the cell says so, or double precision can't separate two edges or planes */
+};
+
+/* Working memory of one thread. */
+struct sight_work;
+int sight_work_create(struct sight_work **out, struct sh_err *err);
+void sight_work_free(struct sight_work *work);
+const struct sight_counters *sight_work_counters(const struct sight_work *work);
+
+/* Exact hits, as bvh_hits. The rays begin at the station (rays->from.own.x is NULL, at_m the station's, bit by
+ * bit); rays->begins and scattered are not used. What lies beyond range_max_m may or may not be reported.
+ * bvh_work: for what the BVH is asked. Allocates nothing. */
+void sight_hits(struct sight_work *work, struct bvh_work *bvh_work, const struct sight *sight,
+                const struct bvh_rays *rays);
+
+#endif

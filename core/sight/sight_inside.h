@@ -1,0 +1,89 @@
+/* Private to core/sight: the map of directions, and the triangles that rays of it are decided among.
+ *
+ * A direction d belongs to the face of the cube that its largest component points through: face
+ * 2 * axis + (d[axis] < 0). There it has the coordinates u = d[axis + 1] / |d[axis]| and
+ * v = d[axis + 2] / |d[axis]| (axes count modulo 3), both in -1..1. With the face's sign s,
+ * d / |d[axis]| = s e_axis + u e_axis+1 + v e_axis+2: any function that is linear in d is linear in u and v,
+ * and takes its extremes over a square at the corners.
+ *
+ * Of a triangle a, b, c (corners relative to the station) two kinds of such functions matter. The side of an
+ * edge, (a x (b - a)) . d, is positive inside; and plane . d = 1 / range.
+ *
+ * A face has cells x cells squares, in tiles of SIGHT_TILE x SIGHT_TILE. A tile is one leaf, or a block of
+ * leaves. Whoever looks a direction up may round its coordinates: each leaf holds SIGHT_PAD beyond its own
+ * borders. */
+#ifndef CORE_SIGHT_SIGHT_INSIDE_H
+#define CORE_SIGHT_SIGHT_INSIDE_H
+
+#include "core/sight.h"
+
+enum {
+    SIGHT_FACES = 6,
+    SIGHT_TILE = 8, /* cells along the edge of a tile */
+    SIGHT_BLOCK = SIGHT_TILE * SIGHT_TILE,
+    SIGHT_MIN_CELLS = 64,
+    SIGHT_MAX_CELLS = 2048, /* a cell is then a thousand times its pad */
+    SIGHT_MAX_LIST = 12,
+};
+/* Of the coordinates on a face: 8 times what single precision leaves of them. */
+#define SIGHT_PAD 0x1p-20
+
+/* A leaf, or what a tile says: the kind in the two highest bits, a number in the others. */
+enum sight_kind {
+    SIGHT_ONE,   /* the number is that of a triangle, which all rays meet, and nothing before it */
+    SIGHT_FEW,   /* list[number] is how many records follow, list[number + 1] .. which ones */
+    SIGHT_TILED, /* of a tile: leaf[number] .. leaf[number + SIGHT_BLOCK] are its leaves, rows of u */
+    SIGHT_OTHER,
+};
+enum { SIGHT_KIND_SHIFT = 30, SIGHT_NUMBER = (1U << SIGHT_KIND_SHIFT) - 1 };
+static const uint32_t SIGHT_NOTHING = 0xffffffff, SIGHT_ASK = 0xfffffffe;
+
+static inline enum sight_kind sight_kind(uint32_t leaf)
+{
+    return (enum sight_kind)(leaf >> SIGHT_KIND_SHIFT);
+}
+
+/* A triangle of a list, as rays are decided. d is the ray's unit vector. Where q = plane . d:
+ * - inside for certain: all of edge[k] . d >= 1. Outside for certain: one is <= -1. (Edges are divided by
+ *   what double precision leaves in doubt, here and in core/bvh/decide.c together.)
+ * - not met at all for certain, or not to be decided here: q < graze, or q > SIGHT_NEAR.
+ * - of two triangles the one with the larger q comes first for certain where the q differ by more than
+ *   slack + slack' + (rel + rel' + SIGHT_SAME) q. */
+struct sight_record {
+    double edge[3][3];
+    double plane[3];
+    double slack, rel; /* doubt of q: of its arithmetic; of the BVH's order, as a share of q (0 where exact) */
+    double graze;
+    uint32_t triangle;
+} __attribute__((aligned(128)));
+
+/* core/bvh/decide.c takes ranges within 1e-12 of each other for the same: the lowest triangle wins. Below
+ * SIGHT_SURE_SAME they are for certain, above SIGHT_SAME they are not. */
+#define SIGHT_SAME 4e-12
+#define SIGHT_SURE_SAME 0.25e-12
+/* 1 / m. What a ray begins on it does not meet (BVH_AT_ORIGIN_M); nearer than twice that, the BVH decides. */
+#define SIGHT_NEAR 1e6
+
+struct sight {
+    const struct bvh *bvh;
+    double station_m[3];
+    int exact;
+    uint32_t cells; /* power of two */
+    uint32_t *tile; /* [SIGHT_FACES][cells / SIGHT_TILE][cells / SIGHT_TILE], v outside, u inside */
+    uint32_t *leaf; /* blocks */
+    uint32_t *list;
+    struct sight_record *record;
+    struct sight_info info;
+};
+
+/* The face of a direction, and its coordinates there. */
+static inline uint32_t sight_face(const double d[3], double *u, double *v)
+{
+    const double a[3] = {d[0] < 0 ? -d[0] : d[0], d[1] < 0 ? -d[1] : d[1], d[2] < 0 ? -d[2] : d[2]};
+    const uint32_t axis = a[0] >= a[1] && a[0] >= a[2] ? 0 : a[1] >= a[2] ? 1 : 2;
+    *u = d[(axis + 1) % 3] / a[axis];
+    *v = d[(axis + 2) % 3] / a[axis];
+    return 2 * axis + (d[axis] < 0);
+}
+
+#endif
