@@ -22,6 +22,7 @@
 #include "core/pose.h"
 #include "core/scene.h"
 #include "core/schedule.h"
+#include "core/sight.h"
 
 enum { CAST_MAX_MOVERS = 16 };
 
@@ -75,6 +76,9 @@ struct cast_beam {
 /* What stays the same for all pulses of a scan (the movers' poses: of a run). */
 struct cast_setup {
     const struct bvh *bvh;
+    /* NULL: none. Else of the BVH and of station_m: rays that begin there are looked up in it. A head that moves
+     * has none. */
+    const struct sight *sight;
     const struct georef *georef; /* geo layout */
     double station_m[3];         /* the head's origin, prcs */
     double rotation[9];          /* socs -> prcs, row by row */
