@@ -166,6 +166,8 @@ struct bvh_proposals {
 };
 /* Returns how many are in doubt. */
 uint32_t bvh_refine(const struct bvh_proposals *proposals);
+/* Room for the labels of a chunk that nobody asked for. */
+uint32_t *bvh_work_labels(struct bvh_work *work);
 /* 1 / cos^2 for one; RTC_INVALID_GEOMETRY_ID: NaN. */
 float bvh_steep(const struct bvh *bvh, uint32_t prim, const double dir[3]);
 
@@ -186,9 +188,15 @@ void decide_prefetch(const struct bvh *bvh, const uint32_t *prim, const uint32_t
 
 /* What Embree proposed near a border, decided in double: the nearest triangle that the ray really meets.
  * Every triangle near the proposed point is tried with edge functions that two triangles of an edge share bit
- * by bit, so that no ray passes between them; of those that are hit at the same range (to 1e-12) the lowest
- * number wins. When none is hit the ray goes on. */
+ * by bit, so that no ray passes between them; of those that are hit at the same range (to 1e-12 of the nearest)
+ * the lowest number wins. When none is hit the ray goes on. In which order they are tried makes no difference,
+ * nor what else is tried that lies behind. */
 void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh_counters *counters,
                 struct decide_hit *hit);
+/* Among these triangles alone. */
+void decide_among(const struct decide_ray *ray, const uint32_t *prim, uint32_t n, struct bvh_counters *counters,
+                  struct decide_hit *hit);
+/* Whether something else is met before a hit within what float can't order. Rivals need not be known. */
+void decide_again(const struct decide_ray *ray, struct decide_hit *hit);
 
 #endif
