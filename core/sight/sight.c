@@ -26,8 +26,8 @@ uint64_t build_take(struct build_shared *b, struct build_arena *arena, uint64_t 
     return UINT64_MAX;
 }
 
-/* So many cells that FEW_RAYS rays come to each. */
-static uint32_t choose_cells(double rays)
+/* So many that FEW_RAYS rays come to each. */
+uint32_t sight_cells(double rays)
 {
     uint32_t cells = SIGHT_MIN_CELLS;
     while (cells < SIGHT_MAX_CELLS && SIGHT_FACES * 4.0 * cells * cells * FEW_RAYS <= rays)
@@ -142,7 +142,7 @@ int sight_create(const struct sight_spec *spec, unsigned threads, const struct s
     s->bvh = spec->bvh;
     memcpy(s->station_m, spec->station_m, sizeof s->station_m);
     s->exact = spec->exact;
-    s->cells = choose_cells(spec->rays);
+    s->cells = sight_cells(spec->rays);
     struct build_shared b = {.sight = s, .spec = spec, .report = report};
     b.regions = s->cells / SIGHT_TILE < BUILD_REGIONS ? s->cells / SIGHT_TILE : BUILD_REGIONS;
     b.region_cells = s->cells / b.regions;
