@@ -5,15 +5,25 @@
 
 #include "core/grow.h"
 #include "core/sight/build_inside.h"
+#include "core/vecmath.h"
 
 enum { NO_CANDIDATE = 0xffffffff };
 
-/* A square of cells on the face, `size` cells wide. Its middle and half its width reach SIGHT_PAD further than the
- * cells. */
+/* A square of cells on the face, `size` cells wide, and its middle. */
 struct square {
     uint32_t u, v, size;
     double mid_u, mid_v, half;
 };
+
+/* Candidates that may be seen in a square. */
+struct seen {
+    uint32_t *list, n; /* numbers of candidates, with the bit COVERS where it does */
+    uint32_t *above;   /* where the stack is free */
+    uint32_t cover;    /* hides all others that there are; or NO_CANDIDATE */
+    uint32_t *leaf;    /* the leaf of this list, once it has been made; squares with the same list share it */
+    uint32_t own_leaf;
+};
+enum { COVERS = 1U << 31, NO_LEAF = 0xffffffff };
 
 /* What is known of a region while it is divided. */
 struct division {
@@ -22,18 +32,12 @@ struct division {
     uint32_t face;
     uint32_t *block; /* leaves of the tile at hand, where squares are smaller than a tile */
     uint32_t block_u, block_v;
-    int failed;
+    uint64_t cells[4];
 };
 
-static struct square square_of(const struct sight *s, uint32_t u, uint32_t v, uint32_t size)
+static const struct build_candidate *candidate_of(const struct build_work *w, uint32_t listed)
 {
-    const double cell = 2.0 / s->cells;
-    return (struct square){.u = u,
-                           .v = v,
-                           .size = size,
-                           .mid_u = (u + 0.5 * size) * cell - 1.0,
-                           .mid_v = (v + 0.5 * size) * cell - 1.0,
-                           .half = 0.5 * size * cell + SIGHT_PAD};
+    return &w->candidate[listed & ~(uint32_t)COVERS];
 }
 
 static double at_middle(const double f[3], const struct square *q)
@@ -41,60 +45,78 @@ static double at_middle(const double f[3], const struct square *q)
     return f[0] + f[1] * q->mid_u + f[2] * q->mid_v;
 }
 
-enum where { OUTSIDE, PARTLY, COVERS };
-
-/* Rays here are 1 to sqrt(3) long: a direction's largest component is 1. So doubts count twice. */
-static enum where where_is(const struct build_candidate *c, const struct square *q)
-{
-    enum where where = COVERS;
-    for (int k = 0; k < 3; k++) {
-        const double e = at_middle(c->edge[k], q), r = c->edge_slope[k] * q->half;
-        if (e + r < -2.0) return OUTSIDE;
-        if (!(e - r > 2.0)) where = PARTLY;
-    }
-    return where;
-}
-
-/* Whether its plane is seen at so small an angle, or from so near, that its distance says nothing. */
-static int is_grazing(const struct build_candidate *c, const struct square *q, double middle)
-{
-    const double r = c->plane_slope * q->half;
-    return !(middle - r > 2.0 * c->graze) || !(middle + r < SIGHT_NEAR);
-}
-
-/* Whether all of square, c lies behind what covers it. */
+/* Whether all of a square, c lies behind what covers it. Rays here are 1 to sqrt(3) long, since a direction's
+ * largest component is 1: doubts count twice. */
 static int is_behind(const struct build_candidate *c, const struct build_candidate *cover, const struct square *q)
 {
-    const double mine = at_middle(c->plane, q), its = at_middle(cover->plane, q), r = cover->plane_slope * q->half;
-    if (is_grazing(c, q, mine)) return c->near_m * (its - r) > 2.0;
-    const double spread = (fabs(cover->plane[1] - c->plane[1]) + fabs(cover->plane[2] - c->plane[2])) * q->half;
+    const double half = q->half + SIGHT_PAD, mine = at_middle(c->plane, q), its = at_middle(cover->plane, q);
+    const double r = cover->plane_slope * half, own = c->plane_slope * half;
+    if (!(mine - own > 2.0 * c->graze) || !(mine + own < SIGHT_NEAR)) return c->near_m * (its - r) > 2.0;
+    const double spread = (fabs(cover->plane[1] - c->plane[1]) + fabs(cover->plane[2] - c->plane[2])) * half;
     const double doubt = 2.0 * (c->slack + cover->slack) + (c->rel + cover->rel + SIGHT_SAME) * (its + r);
     return its - mine - spread > doubt;
 }
 
-/* Of n candidates those that may be seen in a square -> out. Returns how many; *cover: the one that hides all
- * others there are, or NO_CANDIDATE. */
-static uint32_t look(const struct build_work *w, const struct square *q, const uint32_t *in, uint32_t n, uint32_t *out,
-                     uint32_t *cover)
+/* Four quarters of a square at a time. */
+typedef double quad __attribute__((vector_size(32)));
+typedef int64_t quad_mask __attribute__((vector_size(32)));
+
+struct quarters {
+    struct square square[4];
+    struct seen seen[4];
+};
+
+/* Of a square's candidates, those that may be seen in each quarter, and which one of those that cover it comes
+ * first in its middle. */
+VEC_CLONES
+static void look(const struct build_candidate *candidate, const struct seen *in, struct quarters *out)
 {
-    uint32_t m = 0, kept = 0, best = NO_CANDIDATE;
-    double best_q = 0.0;
-    for (uint32_t i = 0; i < n; i++) {
-        const struct build_candidate *c = &w->candidate[in[i]];
-        const enum where where = where_is(c, q);
-        if (where == OUTSIDE) continue;
-        out[m++] = in[i];
-        if (where != COVERS) continue;
-        const double middle = at_middle(c->plane, q);
-        if (middle <= best_q || is_grazing(c, q, middle)) continue;
-        best = in[i];
-        best_q = middle;
+    const struct square *q = out->square;
+    const quad u = {q[0].mid_u, q[1].mid_u, q[2].mid_u, q[3].mid_u},
+               v = {q[0].mid_v, q[1].mid_v, q[2].mid_v, q[3].mid_v};
+    const double half = q[0].half + SIGHT_PAD;
+    uint32_t n[4] = {0, 0, 0, 0};
+    quad first = {0.0, 0.0, 0.0, 0.0};
+    quad_mask cover = {NO_CANDIDATE, NO_CANDIDATE, NO_CANDIDATE, NO_CANDIDATE};
+    for (uint32_t i = 0; i < in->n; i++) {
+        const uint32_t number = in->list[i] & ~(uint32_t)COVERS;
+        const struct build_candidate *c = &candidate[number];
+        quad_mask outside = {0, 0, 0, 0}, covers = {-1, -1, -1, -1};
+        for (int k = 0; k < 3; k++) {
+            const double *f = c->edge[k], r = 2.0 + c->edge_slope[k] * half;
+            const quad e = f[0] + f[1] * u + f[2] * v;
+            outside |= (quad_mask)(e < -r);
+            covers &= (quad_mask)(e > r);
+        }
+        const double *f = c->plane, r = c->plane_slope * half;
+        const quad middle = f[0] + f[1] * u + f[2] * v;
+        const quad_mask better = covers & (quad_mask)(middle > first) & (quad_mask)(middle - r > 2.0 * c->graze) &
+                                 (quad_mask)(middle + r < SIGHT_NEAR);
+        const quad_mask mine = {number, number, number, number};
+        first = (quad)(((quad_mask)middle & better) | ((quad_mask)first & ~better));
+        cover = (mine & better) | (cover & ~better);
+        for (int k = 0; k < 4; k++) {
+            out->seen[k].list[n[k]] = number | ((uint32_t)covers[k] & COVERS);
+            n[k] += outside[k] == 0;
+        }
     }
-    *cover = best;
-    if (best == NO_CANDIDATE) return m;
-    for (uint32_t i = 0; i < m; i++)
-        if (out[i] == best || !is_behind(&w->candidate[out[i]], &w->candidate[best], q)) out[kept++] = out[i];
-    return kept;
+    for (int k = 0; k < 4; k++) {
+        out->seen[k].n = n[k];
+        out->seen[k].cover = (uint32_t)cover[k];
+    }
+}
+
+/* What lies behind the one that covers is dropped. */
+static void drop_hidden(const struct build_work *w, struct seen *seen, const struct square *q)
+{
+    uint32_t kept = 0;
+    const uint32_t cover = seen->cover;
+    if (cover == NO_CANDIDATE || seen->n == 1) return;
+    for (uint32_t i = 0; i < seen->n; i++) {
+        const struct build_candidate *c = candidate_of(w, seen->list[i]);
+        if (c == &w->candidate[cover] || !is_behind(c, &w->candidate[cover], q)) seen->list[kept++] = seen->list[i];
+    }
+    seen->n = kept;
 }
 
 /* A square's leaf: tiles as a whole, or in the block at hand. */
@@ -102,9 +124,10 @@ static void put_leaf(const struct division *d, const struct square *q, uint32_t 
 {
     struct sight *s = d->b->sight;
     if (q->size < SIGHT_TILE) {
+        uint32_t *to = &d->block[(q->v - d->block_v) * SIGHT_TILE + q->u - d->block_u];
         for (uint32_t v = 0; v < q->size; v++)
             for (uint32_t u = 0; u < q->size; u++)
-                d->block[(q->v - d->block_v + v) * SIGHT_TILE + q->u - d->block_u + u] = leaf;
+                to[v * SIGHT_TILE + u] = leaf;
         return;
     }
     const uint32_t tiles = s->cells / SIGHT_TILE;
@@ -122,62 +145,81 @@ static uint32_t record_of(const struct division *d, struct build_candidate *c)
     return c->record = (uint32_t)at;
 }
 
-static uint32_t make_list(const struct division *d, const uint32_t *in, uint32_t n)
+static uint32_t make_list(const struct division *d, const struct seen *seen)
 {
-    if (n > SIGHT_MAX_LIST) return SIGHT_ASK;
-    const uint64_t at = build_take(d->b, &d->b->list, n + 1, sizeof(uint32_t));
+    if (seen->n > SIGHT_MAX_LIST) return SIGHT_ASK;
+    const uint64_t at = build_take(d->b, &d->b->list, seen->n + 1, sizeof(uint32_t));
     if (at == UINT64_MAX) return SIGHT_ASK;
     uint32_t *list = &d->b->sight->list[at];
-    list[0] = n;
-    for (uint32_t i = 0; i < n; i++) {
-        list[i + 1] = record_of(d, &d->w->candidate[in[i]]);
+    list[0] = seen->n;
+    for (uint32_t i = 0; i < seen->n; i++) {
+        list[i + 1] = record_of(d, &d->w->candidate[seen->list[i] & ~(uint32_t)COVERS]);
         if (list[i + 1] == BUILD_NO_RECORD) return SIGHT_ASK;
     }
     return (uint32_t)SIGHT_FEW << SIGHT_KIND_SHIFT | (uint32_t)at;
 }
 
-static void count(const struct division *d, const struct square *q, int what)
-{
-    atomic_fetch_add_explicit(&d->b->cells[what], (uint64_t)q->size * q->size, memory_order_relaxed);
-}
-
 enum { ONE, NOTHING, FEW, ASK };
 
-static void end_few(const struct division *d, const struct square *q, const uint32_t *in, uint32_t n)
+static void end(struct division *d, const struct square *q, uint32_t leaf, int what)
 {
-    const uint32_t leaf = make_list(d, in, n);
     put_leaf(d, q, leaf);
-    count(d, q, leaf == SIGHT_ASK ? ASK : FEW);
+    d->cells[what] += (uint64_t)q->size * q->size;
 }
 
-/* Where all that is left covers the square, dividing it tells nothing new unless their planes cross. */
-static int all_cover(const struct build_work *w, const struct square *q, const uint32_t *in, uint32_t n)
+static void end_few(struct division *d, const struct square *q, const struct seen *seen)
 {
-    for (uint32_t i = 0; i < n; i++)
-        if (where_is(&w->candidate[in[i]], q) != COVERS) return 0;
-    return 1;
+    if (*seen->leaf == NO_LEAF) *seen->leaf = make_list(d, seen);
+    end(d, q, *seen->leaf, *seen->leaf == SIGHT_ASK ? ASK : FEW);
 }
 
-static void divide(struct division *d, const struct square *q, const uint32_t *in, uint32_t n);
-
-static void divide_quarters(struct division *d, const struct square *q, const uint32_t *in, uint32_t n)
+static int all_cover(const struct seen *seen)
 {
-    const uint32_t half = q->size / 2;
+    uint32_t all = COVERS;
+    for (uint32_t i = 0; i < seen->n; i++)
+        all &= seen->list[i];
+    return all != 0;
+}
+
+static void divide(struct division *d, const struct square *q, const struct seen *seen);
+
+static void make_quarters(const struct square *q, const struct seen *seen, struct quarters *four)
+{
+    const double half = 0.5 * q->half;
     for (uint32_t k = 0; k < 4; k++) {
-        const struct square quarter = square_of(d->b->sight, q->u + (k & 1) * half, q->v + (k >> 1) * half, half);
-        divide(d, &quarter, in, n);
+        four->square[k] = (struct square){.u = q->u + (k & 1) * (q->size / 2),
+                                          .v = q->v + (k >> 1) * (q->size / 2),
+                                          .size = q->size / 2,
+                                          .mid_u = q->mid_u + (k & 1 ? half : -half),
+                                          .mid_v = q->mid_v + (k & 2 ? half : -half),
+                                          .half = half};
+        four->seen[k].list = seen->above + k * (size_t)seen->n;
+        four->seen[k].above = seen->above + 4 * (size_t)seen->n;
+    }
+}
+
+static void divide_quarters(struct division *d, const struct square *q, const struct seen *seen)
+{
+    struct quarters four;
+    make_quarters(q, seen, &four);
+    look(d->w->candidate, seen, &four);
+    for (uint32_t k = 0; k < 4; k++) {
+        struct seen *mine = &four.seen[k];
+        drop_hidden(d->w, mine, &four.square[k]);
+        mine->own_leaf = NO_LEAF;
+        mine->leaf = mine->n == seen->n ? seen->leaf : &mine->own_leaf;
+        divide(d, &four.square[k], mine);
     }
 }
 
 /* A tile whose leaves differ: they are made beside each other, and become a block. */
-static void divide_tile(struct division *d, const struct square *q, const uint32_t *in, uint32_t n)
+static void divide_tile(struct division *d, const struct square *q, const struct seen *seen)
 {
-    struct sight *s = d->b->sight;
     uint32_t block[SIGHT_BLOCK], same = 1;
     d->block = block;
     d->block_u = q->u;
     d->block_v = q->v;
-    divide_quarters(d, q, in, n);
+    divide_quarters(d, q, seen);
     while (same < SIGHT_BLOCK && block[same] == block[0])
         same++;
     if (same == SIGHT_BLOCK) {
@@ -189,28 +231,24 @@ static void divide_tile(struct division *d, const struct square *q, const uint32
         put_leaf(d, q, SIGHT_ASK);
         return;
     }
-    memcpy(&s->leaf[at], block, sizeof block);
+    memcpy(&d->b->sight->leaf[at], block, sizeof block);
     put_leaf(d, q, (uint32_t)SIGHT_TILED << SIGHT_KIND_SHIFT | (uint32_t)at);
 }
 
-static void divide(struct division *d, const struct square *q, const uint32_t *in, uint32_t n)
+/* Where all that is left covers the square, a few of them, their planes cross or lie in each other: rays are
+ * decided. */
+static void divide(struct division *d, const struct square *q, const struct seen *seen)
 {
-    struct build_work *w = d->w;
-    uint32_t *out = (uint32_t *)(uintptr_t)in + n, cover; /* on the stack, above its own */
-    const uint32_t m = look(w, q, in, n, out, &cover);
-    if (m == 0) {
-        put_leaf(d, q, SIGHT_NOTHING);
-        count(d, q, NOTHING);
-    } else if (m == 1 && cover != NO_CANDIDATE) {
-        put_leaf(d, q, w->candidate[cover].triangle);
-        count(d, q, ONE);
-    } else if (q->size == 1 || (m <= SIGHT_MAX_LIST && cover != NO_CANDIDATE && all_cover(w, q, out, m))) {
-        end_few(d, q, out, m);
-    } else if (q->size == SIGHT_TILE) {
-        divide_tile(d, q, out, m);
-    } else {
-        divide_quarters(d, q, out, m);
-    }
+    if (seen->n == 0)
+        end(d, q, SIGHT_NOTHING, NOTHING);
+    else if (seen->n == 1 && seen->cover != NO_CANDIDATE)
+        end(d, q, d->w->candidate[seen->cover].triangle, ONE);
+    else if (q->size == 1 || (seen->n <= SIGHT_MAX_LIST && seen->cover != NO_CANDIDATE && all_cover(seen)))
+        end_few(d, q, seen);
+    else if (q->size == SIGHT_TILE)
+        divide_tile(d, q, seen);
+    else
+        divide_quarters(d, q, seen);
 }
 
 void build_work_free(struct build_work *w)
@@ -219,6 +257,7 @@ void build_work_free(struct build_work *w)
     free(w->stack);
 }
 
+/* Each square's candidates stand above those of the square that it is a quarter of: four lists a level. */
 static int gather(struct build_shared *b, struct build_work *w, uint32_t region, uint32_t face)
 {
     const uint64_t n = b->bin[region + 1] - b->bin[region];
@@ -226,7 +265,7 @@ static int gather(struct build_shared *b, struct build_work *w, uint32_t region,
     for (uint32_t size = b->region_cells; size > 1; size /= 2)
         levels++;
     if (!grow(&w->candidate, &w->room, n + 1, sizeof *w->candidate) ||
-        !grow(&w->stack, &w->stack_room, (n + 1) * (levels + 1), sizeof *w->stack))
+        !grow(&w->stack, &w->stack_room, (n + 1) * (4 * levels + 1), sizeof *w->stack))
         return SH_ENOMEM;
     w->n = 0;
     for (uint64_t i = b->bin[region]; i < b->bin[region + 1]; i++)
@@ -239,12 +278,21 @@ static int gather(struct build_shared *b, struct build_work *w, uint32_t region,
 int build_region(struct build_shared *b, struct build_work *w, uint32_t region)
 {
     const uint32_t face = region / (b->regions * b->regions), at = region % (b->regions * b->regions);
+    const uint32_t size = b->region_cells;
+    const double cell = 2.0 / b->sight->cells;
     struct division d = {.b = b, .w = w, .face = face};
     if (!b->seen[region]) return SH_OK;
     int rc = gather(b, w, region, face);
     if (rc != SH_OK) return rc;
-    const struct square all =
-        square_of(b->sight, at % b->regions * b->region_cells, at / b->regions * b->region_cells, b->region_cells);
-    divide(&d, &all, w->stack, (uint32_t)w->n);
+    struct square all = {
+        .u = at % b->regions * size, .v = at / b->regions * size, .size = size, .half = 0.5 * size * cell};
+    all.mid_u = (all.u + 0.5 * size) * cell - 1.0;
+    all.mid_v = (all.v + 0.5 * size) * cell - 1.0;
+    struct seen seen = {
+        .list = w->stack, .n = (uint32_t)w->n, .above = w->stack + w->n, .cover = NO_CANDIDATE, .own_leaf = NO_LEAF};
+    seen.leaf = &seen.own_leaf;
+    divide(&d, &all, &seen);
+    for (int i = 0; i < 4; i++)
+        atomic_fetch_add_explicit(&b->cells[i], d.cells[i], memory_order_relaxed);
     return SH_OK;
 }
