@@ -385,6 +385,17 @@ static void add_room(struct maker *m)
     add_box(m, half, half, half);
 }
 
+/* One without trouble, so that no scene is empty. */
+static void add_behind(struct maker *m)
+{
+    double p[3][3];
+    m->label = 0;
+    for (int k = 0; k < 3; k++)
+        for (int j = 0; j < 3; j++)
+            p[k][j] = between(m, -5.0, 5.0) + (j == k ? 150.0 : 0.0);
+    add(m, p[0], p[1], p[2]);
+}
+
 static const struct part {
     const char *name;
     void (*add)(struct maker *m);
@@ -493,11 +504,12 @@ void odd_scene_make(uint64_t number, uint32_t at_most, struct odd_scene *out)
     struct maker m = {.odd = out, .at_most = at_most < ODD_MOST ? at_most : ODD_MOST, .random = rng_mix(number + 1)};
     double by_m[3] = {0.0, 0.0, 0.0};
     out->n = out->parts = 0;
+    add_behind(&m);
     if (pick(&m, 4) == 0) {
         add_room(&m);
         out->parts |= 1U << (ODD_PARTS - 1);
     }
-    for (int i = 1 + pick(&m, 5); i > 0 || out->n == 0; i--)
+    for (int i = 1 + pick(&m, 5); i > 0; i--)
         add_part(&m);
     if (pick(&m, 4) == 0) snap(out, pow(2.0, between(&m, -20.0, -3.0) > -10.0 ? -4.0 : -14.0));
     int place = pick(&m, 4);
