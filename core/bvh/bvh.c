@@ -119,7 +119,6 @@ void bvh_free(struct bvh *bvh)
     free(bvh->triangle);
     free(bvh->rival_first);
     free(bvh->rival);
-    free(bvh->marked);
     free(bvh->twin);
     free(bvh);
 }

@@ -46,7 +46,7 @@ enum {
 
 /* The planes lie two to a cache line, and are gathered as doubles (refine.c).
  * The lowest 12 bits of each component of n carry something else: of n[0] the guard (8 bits of a double's
- * exponent, 4 of its mantissa, rounded up), of n[1] and n[2] the label. They are
+ * exponent, 4 of its mantissa, rounded up), of n[1] and n[2] the label and whether it has rivals. They are
  * part of n, and d goes with that n, so the plane still passes exactly through the triangle; it is tilted by
  * less than 2^-40, which at the far end of a triangle of 100 m is 0.1 nm. */
 _Static_assert(sizeof(struct bvh_plane) == 4 * sizeof(double), "gathered as doubles");
@@ -68,6 +68,9 @@ static inline uint16_t bvh_label(const struct bvh_plane *tri)
     return (uint16_t)(bvh_spare(tri->n[1]) | (bvh_spare(tri->n[2]) & 15) << BVH_SPARE_BITS);
 }
 
+/* The last spare bit of n[2]: the triangle has rivals, or a texture with holes; each hit is decided. */
+enum { BVH_RIVAL_BIT = 1 << (BVH_SPARE_BITS - 1) };
+
 struct bvh {
     RTCDevice device;
     RTCScene rtc;
@@ -75,10 +78,8 @@ struct bvh {
     struct bvh_plane *triangle; /* one more than there are: the last stands for a miss, all NaN */
     double origin_m[3];
     uint32_t *rival_first,
-        *rival;       /* rivals of triangle i: rival[rival_first[i] .. rival_first[i + 1]); NULL: there are none */
-    uint32_t *marked; /* bits, one more than triangles: it has rivals or holes, each hit is decided; NULL: none.
-                               Kept apart from the planes, so that ranges are the same with and without rivals. */
-    uint64_t *twin;   /* bits: a face of the same corners stands for this one; NULL: for none */
+        *rival; /* rivals of triangle i: rival[rival_first[i] .. rival_first[i + 1]); NULL: there are none */
+    uint64_t *twin;         /* bits: a face of the same corners stands for this one; NULL: for none */
     double station_reach_m; /* rays begin at most this far from the origin */
     struct bvh_info info;
     int64_t bytes; /* as Embree reports */
@@ -147,8 +148,8 @@ int bvh_commit(struct bvh *bvh, RTCScene scene, const struct sh_report *report, 
  * buffer. */
 int bvh_drop_twins(struct bvh *bvh, float *vertex, const struct sh_report *report, struct sh_err *err);
 
-/* Marks a triangle as having rivals or holes. */
-int bvh_mark(struct bvh *bvh, uint32_t prim, struct sh_err *err);
+/* Marks a triangle as having rivals or holes; its plane is made anew to go with that. */
+void bvh_mark_rival(struct bvh *bvh, uint32_t prim);
 /* ---- refine.c */
 /* What Embree proposed, and what double precision makes of it. */
 struct bvh_proposals {

@@ -34,19 +34,20 @@ VEC_INLINE uint32_t label_of(double ny, double nz)
     return (uint32_t)((low & ((1U << BVH_SPARE_BITS) - 1)) | (high & 15) << BVH_SPARE_BITS);
 }
 
-/* Whether a hit is so near to its triangle's border that the proposal is in doubt. slope: what the guard counts
- * in, bvh_inside.h. */
-VEC_INLINE uint32_t in_doubt(double nx, double slope, float u, float v)
+/* Whether a hit is so near to its triangle's border that the proposal is in doubt, or the triangle has
+ * rivals. slope: what the guard counts in, bvh_inside.h. */
+VEC_INLINE uint32_t in_doubt(double nx, double nz, double slope, float u, float v)
 {
     float w = 1.0f - u - v;
     float least = u < v ? u : v;
     least = w < least ? w : least;
-    uint64_t bits;
+    uint64_t bits, high;
     double guard;
     memcpy(&bits, &nx, sizeof bits);
     bits = ((bits & ((1U << BVH_SPARE_BITS) - 1)) + BVH_GUARD_BASE) << BVH_GUARD_SHIFT;
     memcpy(&guard, &bits, sizeof guard);
-    return (double)least * slope < guard;
+    memcpy(&high, &nz, sizeof high);
+    return ((double)least * slope < guard) | (uint32_t)((high & BVH_RIVAL_BIT) != 0);
 }
 
 enum how { FROM_ONE, FROM_ONE_STEEP, FROM_OWN };
@@ -71,7 +72,7 @@ VEC_INLINE uint32_t refine(const struct bvh_proposals *p, enum how how)
         range_m[i] = (tri[at + 3] - off) / along;
         if (how == FROM_ONE_STEEP) steep[i] = (float)(nx * nx + ny * ny + nz * nz) / (float)(along * along);
         label[i] = label_of(ny, nz);
-        doubt[i] = (in_doubt(nx, slanted ? fabs(along) : 1.0, u[i], v[i]) | (range_m[i] <= BVH_AT_ORIGIN_M)) &
+        doubt[i] = (in_doubt(nx, nz, slanted ? fabs(along) : 1.0, u[i], v[i]) | (range_m[i] <= BVH_AT_ORIGIN_M)) &
                    (prim[i] < n_triangles);
         doubts += doubt[i];
     }
@@ -97,27 +98,9 @@ static uint32_t refine_from_own(const struct bvh_proposals *p)
     return refine(p, FROM_OWN);
 }
 
-/* Hits on marked triangles are in doubt as well. */
-VEC_CLONES
-static uint32_t add_marked(const struct bvh_proposals *p)
-{
-    const uint32_t *marked = p->bvh->marked, *prim = p->prim, n_triangles = p->bvh->scene->n_triangles, n = p->n;
-    uint32_t *doubt = p->doubt, doubts = 0;
-    VEC_LOOP
-    for (uint32_t i = 0; i < n; i++) {
-        uint32_t at = prim[i] < n_triangles ? prim[i] : n_triangles;
-        doubt[i] |= marked[at / 32] >> at % 32 & 1;
-        doubts += doubt[i];
-    }
-    return doubts;
-}
-
 uint32_t bvh_refine(const struct bvh_proposals *p)
 {
-    const uint32_t doubts = p->own.x != NULL   ? refine_from_own(p)
-                            : p->steep != NULL ? refine_steep(p)
-                                               : refine_from_one(p);
-    return p->bvh->marked != NULL ? add_marked(p) : doubts;
+    return p->own.x != NULL ? refine_from_own(p) : p->steep != NULL ? refine_steep(p) : refine_from_one(p);
 }
 
 VEC_CLONES

@@ -159,7 +159,6 @@ static int order_pairs(const void *a, const void *b)
 static int make_lists(struct bvh *bvh, struct pairs *p, struct sh_err *err)
 {
     if (p->n == 0) return SH_OK;
-    int rc = SH_OK;
     uint32_t n = bvh->scene->n_triangles;
     qsort(p->pair, p->n, sizeof *p->pair, order_pairs);
     bvh->rival_first = calloc((size_t)n + 1, sizeof *bvh->rival_first);
@@ -167,15 +166,15 @@ static int make_lists(struct bvh *bvh, struct pairs *p, struct sh_err *err)
     if (bvh->rival_first == NULL || bvh->rival == NULL)
         return sh_fail(err, SH_ENOMEM, "cast: no memory for %zu rivals", p->n);
     uint32_t kept = 0;
-    for (size_t k = 0; k < p->n && rc == SH_OK; k++) {
+    for (size_t k = 0; k < p->n; k++) {
         if (k > 0 && order_pairs(p->pair[k - 1], p->pair[k]) == 0) continue;
         bvh->rival[kept++] = p->pair[k][1];
         bvh->rival_first[p->pair[k][0] + 1]++;
-        rc = bvh_mark(bvh, p->pair[k][0], err);
+        bvh_mark_rival(bvh, p->pair[k][0]);
     }
     for (uint32_t i = 0; i < n; i++)
         bvh->rival_first[i + 1] += bvh->rival_first[i];
-    return rc;
+    return SH_OK;
 }
 
 static int make_boxes(struct bvh *bvh, struct boxes *boxes, const struct sh_report *report, struct sh_err *err)

@@ -123,12 +123,13 @@ static void set_exact(struct bvh_plane *tri, double v[3][3], double guard, uint1
     set_offset(tri, v);
 }
 
-int bvh_mark(struct bvh *bvh, uint32_t prim, struct sh_err *err)
+void bvh_mark_rival(struct bvh *bvh, uint32_t prim)
 {
-    if (bvh->marked == NULL) bvh->marked = calloc((size_t)bvh->scene->n_triangles / 32 + 1, sizeof *bvh->marked);
-    if (bvh->marked == NULL) return sh_fail(err, SH_ENOMEM, "bvh: no memory to mark triangles");
-    bvh->marked[prim / 32] |= 1U << prim % 32;
-    return SH_OK;
+    struct bvh_plane *tri = &bvh->triangle[prim];
+    double v[3][3];
+    bvh_corners(bvh, prim, v);
+    tri->n[2] = with_spare(tri->n[2], bvh_spare(tri->n[2]) | BVH_RIVAL_BIT);
+    set_offset(tri, v);
 }
 
 /* How far the edges have to move within the plane, so that seen from the origin, at a slant, they have moved
@@ -199,7 +200,7 @@ int bvh_fill(struct bvh *bvh, RTCGeometry geometry, const struct sh_report *repo
     for (uint32_t i = 0; i < 3 * n; i++)
         index[i] = i;
     for (uint32_t i = 0; i < n && scene->cutout != NULL; i++)
-        if (scene_cutout(scene, i) != NULL && bvh_mark(bvh, i, err) != SH_OK) return SH_ENOMEM;
+        if (scene_cutout(scene, i) != NULL) bvh_mark_rival(bvh, i);
     bvh->triangle[n] = (struct bvh_plane){
         .n = {NAN, with_spare(NAN, BVH_NO_LABEL & 0xfff), with_spare(NAN, BVH_NO_LABEL >> BVH_SPARE_BITS)}, .d = NAN};
     return bvh_drop_twins(bvh, vertex, report, err);
