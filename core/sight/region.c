@@ -5,15 +5,25 @@
 
 #include "core/grow.h"
 #include "core/sight/build_inside.h"
+#include "core/vecmath.h"
 
 enum { NO_CANDIDATE = 0xffffffff };
 
-/* A square of cells on the face, `size` cells wide. Its middle and half its width reach SIGHT_PAD further than the
- * cells. */
+/* A square of cells on the face, `size` cells wide, and its middle. */
 struct square {
     uint32_t u, v, size;
     double mid_u, mid_v, half;
 };
+
+/* Candidates that may be seen in a square. */
+struct seen {
+    uint32_t *list, n; /* numbers of candidates, with the bit COVERS where it does */
+    uint32_t *above;   /* where the stack is free */
+    uint32_t cover;    /* hides all others that there are; or NO_CANDIDATE */
+    uint32_t *leaf;    /* the leaf of this list, once it has been made; squares with the same list share it */
+    uint32_t own_leaf;
+};
+enum { COVERS = 1U << 31, NO_LEAF = 0xffffffff };
 
 /* What is known of a region while it is divided. */
 struct division {
@@ -22,79 +32,134 @@ struct division {
     uint32_t face;
     uint32_t *block; /* leaves of the tile at hand, where squares are smaller than a tile */
     uint32_t block_u, block_v;
-    int failed;
+    uint64_t cells[4];
 };
 
-static struct square square_of(const struct sight *s, uint32_t u, uint32_t v, uint32_t size)
+/* Four quarters of a square at a time. */
+typedef double quad __attribute__((vector_size(32)));
+typedef int64_t quad_mask __attribute__((vector_size(32)));
+
+struct quarters {
+    struct square square[4];
+    struct seen seen[4];
+    quad u, v;   /* their middles */
+    double half; /* of each, with the pad */
+    /* The planes of what covers each; cover is NO_CANDIDATE, and first 0, where nothing does. */
+    quad_mask cover;
+    quad first, plane[3], slope, slack, rel;
+};
+
+/* What pass by pass becomes known of a candidate in the four quarters. */
+struct build_where {
+    quad_mask outside, covers;
+};
+
+/* Vectors go by address: compilers warn of a changed way to pass them where there is no AVX. */
+VEC_INLINE void at_middles(const double f[3], const struct quarters *four, quad *out)
 {
-    const double cell = 2.0 / s->cells;
-    return (struct square){.u = u,
-                           .v = v,
-                           .size = size,
-                           .mid_u = (u + 0.5 * size) * cell - 1.0,
-                           .mid_v = (v + 0.5 * size) * cell - 1.0,
-                           .half = 0.5 * size * cell + SIGHT_PAD};
+    *out = f[0] + f[1] * four->u + f[2] * four->v;
 }
 
-static double at_middle(const double f[3], const struct square *q)
+VEC_INLINE void choose(const quad_mask *which, const quad *yes, quad *no)
 {
-    return f[0] + f[1] * q->mid_u + f[2] * q->mid_v;
+    *no = (quad)(((quad_mask)*yes & *which) | ((quad_mask)*no & ~*which));
 }
 
-enum where { OUTSIDE, PARTLY, COVERS };
-
-/* Rays here are 1 to sqrt(3) long: a direction's largest component is 1. So doubts count twice. */
-static enum where where_is(const struct build_candidate *c, const struct square *q)
+/* Where the plane is seen at so small an angle, or from so near, that its distance says nothing: 0. */
+VEC_INLINE void find_clear(const struct build_candidate *c, const quad *middle, double half, quad_mask *clear)
 {
-    enum where where = COVERS;
-    for (int k = 0; k < 3; k++) {
-        const double e = at_middle(c->edge[k], q), r = c->edge_slope[k] * q->half;
-        if (e + r < -2.0) return OUTSIDE;
-        if (!(e - r > 2.0)) where = PARTLY;
+    const double r = c->plane_slope * half;
+    *clear = (quad_mask)(*middle - r > 2.0 * c->graze) & (quad_mask)(*middle + r < SIGHT_NEAR);
+}
+
+/* Which candidates lie outside of each quarter, which cover it, and which of those comes first in its middle. Rays
+ * here are 1 to sqrt(3) long, since a direction's largest component is 1: doubts count twice. */
+VEC_INLINE void find_covers(const struct build_work *w, const struct seen *in, struct quarters *four)
+{
+    quad first = {0.0, 0.0, 0.0, 0.0};
+    quad_mask cover = {NO_CANDIDATE, NO_CANDIDATE, NO_CANDIDATE, NO_CANDIDATE};
+    for (uint32_t i = 0; i < in->n; i++) {
+        const uint32_t number = in->list[i] & ~(uint32_t)COVERS;
+        const struct build_candidate *c = &w->candidate[number];
+        quad_mask outside = {0, 0, 0, 0}, covers = {-1, -1, -1, -1}, better;
+        quad e;
+        for (int k = 0; k < 3; k++) {
+            const double r = 2.0 + c->edge_slope[k] * four->half;
+            at_middles(c->edge[k], four, &e);
+            outside |= (quad_mask)(e < -r);
+            covers &= (quad_mask)(e > r);
+        }
+        at_middles(c->plane, four, &e);
+        find_clear(c, &e, four->half, &better);
+        better &= covers & (quad_mask)(e > first);
+        choose(&better, &e, &first);
+        cover = (((quad_mask){number, number, number, number}) & better) | (cover & ~better);
+        w->where[i] = (struct build_where){outside, covers};
     }
-    return where;
+    four->first = first;
+    four->cover = cover;
 }
 
-/* Whether its plane is seen at so small an angle, or from so near, that its distance says nothing. */
-static int is_grazing(const struct build_candidate *c, const struct square *q, double middle)
+/* The planes of what covers, side by side. Returns 0 where nothing covers anything. */
+VEC_INLINE int take_covers(const struct build_work *w, struct quarters *four)
 {
-    const double r = c->plane_slope * q->half;
-    return !(middle - r > 2.0 * c->graze) || !(middle + r < SIGHT_NEAR);
-}
-
-/* Whether all of square, c lies behind what covers it. */
-static int is_behind(const struct build_candidate *c, const struct build_candidate *cover, const struct square *q)
-{
-    const double mine = at_middle(c->plane, q), its = at_middle(cover->plane, q), r = cover->plane_slope * q->half;
-    if (is_grazing(c, q, mine)) return c->near_m * (its - r) > 2.0;
-    const double spread = (fabs(cover->plane[1] - c->plane[1]) + fabs(cover->plane[2] - c->plane[2])) * q->half;
-    const double doubt = 2.0 * (c->slack + cover->slack) + (c->rel + cover->rel + SIGHT_SAME) * (its + r);
-    return its - mine - spread > doubt;
-}
-
-/* Of n candidates those that may be seen in a square -> out. Returns how many; *cover: the one that hides all
- * others there are, or NO_CANDIDATE. */
-static uint32_t look(const struct build_work *w, const struct square *q, const uint32_t *in, uint32_t n, uint32_t *out,
-                     uint32_t *cover)
-{
-    uint32_t m = 0, kept = 0, best = NO_CANDIDATE;
-    double best_q = 0.0;
-    for (uint32_t i = 0; i < n; i++) {
-        const struct build_candidate *c = &w->candidate[in[i]];
-        const enum where where = where_is(c, q);
-        if (where == OUTSIDE) continue;
-        out[m++] = in[i];
-        if (where != COVERS) continue;
-        const double middle = at_middle(c->plane, q);
-        if (middle <= best_q || is_grazing(c, q, middle)) continue;
-        best = in[i];
-        best_q = middle;
+    int any = 0;
+    for (int k = 0; k < 4; k++) {
+        if ((uint32_t)four->cover[k] == NO_CANDIDATE) continue;
+        const struct build_candidate *c = &w->candidate[four->cover[k]];
+        for (int j = 0; j < 3; j++)
+            four->plane[j][k] = c->plane[j];
+        four->slope[k] = c->plane_slope;
+        four->slack[k] = c->slack;
+        four->rel[k] = c->rel;
+        any = 1;
     }
-    *cover = best;
-    if (best == NO_CANDIDATE) return m;
-    for (uint32_t i = 0; i < m; i++)
-        if (out[i] == best || !is_behind(&w->candidate[out[i]], &w->candidate[best], q)) out[kept++] = out[i];
-    return kept;
+    return any;
+}
+
+/* In which quarters all of a candidate lies behind what covers them. One that is seen at too small an angle is
+ * compared as a whole. */
+VEC_INLINE void find_behind(const struct build_candidate *c, const struct quarters *four, quad_mask *behind)
+{
+    const double half = four->half;
+    const quad across = four->plane[1] - c->plane[1], up = four->plane[2] - c->plane[2], reach = four->slope * half;
+    const quad doubt = 2.0 * (c->slack + four->slack) + (c->rel + four->rel + SIGHT_SAME) * (four->first + reach);
+    quad mine, a = -across, b = -up;
+    quad_mask clear;
+    at_middles(c->plane, four, &mine);
+    find_clear(c, &mine, half, &clear);
+    const quad_mask a_less = (quad_mask)(a < across), b_less = (quad_mask)(b < up);
+    choose(&a_less, &across, &a);
+    choose(&b_less, &up, &b);
+    *behind = (clear & (quad_mask)(four->first - mine - (a + b) * half > doubt)) |
+              (~clear & (quad_mask)(c->near_m * (four->first - reach) > 2.0));
+}
+
+/* Of a square's candidates those that may be seen in each quarter. */
+VEC_CLONES
+static void look(const struct build_work *w, const struct seen *in, struct quarters *four)
+{
+    uint32_t n[4] = {0, 0, 0, 0};
+    find_covers(w, in, four);
+    const int hides = take_covers(w, four) && in->n > 1;
+    for (uint32_t i = 0; i < in->n; i++) {
+        const uint32_t number = in->list[i] & ~(uint32_t)COVERS;
+        const quad_mask mine = {number, number, number, number}, covers = w->where[i].covers;
+        quad_mask gone = w->where[i].outside;
+        if (hides) {
+            quad_mask behind;
+            find_behind(&w->candidate[number], four, &behind);
+            gone |= behind & (quad_mask)(mine != four->cover);
+        }
+        for (int k = 0; k < 4; k++) {
+            four->seen[k].list[n[k]] = number | ((uint32_t)covers[k] & COVERS);
+            n[k] += gone[k] == 0;
+        }
+    }
+    for (int k = 0; k < 4; k++) {
+        four->seen[k].n = n[k];
+        four->seen[k].cover = (uint32_t)four->cover[k];
+    }
 }
 
 /* A square's leaf: tiles as a whole, or in the block at hand. */
@@ -102,9 +167,10 @@ static void put_leaf(const struct division *d, const struct square *q, uint32_t 
 {
     struct sight *s = d->b->sight;
     if (q->size < SIGHT_TILE) {
+        uint32_t *to = &d->block[(q->v - d->block_v) * SIGHT_TILE + q->u - d->block_u];
         for (uint32_t v = 0; v < q->size; v++)
             for (uint32_t u = 0; u < q->size; u++)
-                d->block[(q->v - d->block_v + v) * SIGHT_TILE + q->u - d->block_u + u] = leaf;
+                to[v * SIGHT_TILE + u] = leaf;
         return;
     }
     const uint32_t tiles = s->cells / SIGHT_TILE;
@@ -122,62 +188,82 @@ static uint32_t record_of(const struct division *d, struct build_candidate *c)
     return c->record = (uint32_t)at;
 }
 
-static uint32_t make_list(const struct division *d, const uint32_t *in, uint32_t n)
+static uint32_t make_list(const struct division *d, const struct seen *seen)
 {
-    if (n > SIGHT_MAX_LIST) return SIGHT_ASK;
-    const uint64_t at = build_take(d->b, &d->b->list, n + 1, sizeof(uint32_t));
+    if (seen->n > SIGHT_MAX_LIST) return SIGHT_ASK;
+    const uint64_t at = build_take(d->b, &d->b->list, seen->n + 1, sizeof(uint32_t));
     if (at == UINT64_MAX) return SIGHT_ASK;
     uint32_t *list = &d->b->sight->list[at];
-    list[0] = n;
-    for (uint32_t i = 0; i < n; i++) {
-        list[i + 1] = record_of(d, &d->w->candidate[in[i]]);
+    list[0] = seen->n;
+    for (uint32_t i = 0; i < seen->n; i++) {
+        list[i + 1] = record_of(d, &d->w->candidate[seen->list[i] & ~(uint32_t)COVERS]);
         if (list[i + 1] == BUILD_NO_RECORD) return SIGHT_ASK;
     }
     return (uint32_t)SIGHT_FEW << SIGHT_KIND_SHIFT | (uint32_t)at;
 }
 
-static void count(const struct division *d, const struct square *q, int what)
-{
-    atomic_fetch_add_explicit(&d->b->cells[what], (uint64_t)q->size * q->size, memory_order_relaxed);
-}
-
 enum { ONE, NOTHING, FEW, ASK };
 
-static void end_few(const struct division *d, const struct square *q, const uint32_t *in, uint32_t n)
+static void end(struct division *d, const struct square *q, uint32_t leaf, int what)
 {
-    const uint32_t leaf = make_list(d, in, n);
     put_leaf(d, q, leaf);
-    count(d, q, leaf == SIGHT_ASK ? ASK : FEW);
+    d->cells[what] += (uint64_t)q->size * q->size;
 }
 
-/* Where all that is left covers the square, dividing it tells nothing new unless their planes cross. */
-static int all_cover(const struct build_work *w, const struct square *q, const uint32_t *in, uint32_t n)
+static void end_few(struct division *d, const struct square *q, const struct seen *seen)
 {
-    for (uint32_t i = 0; i < n; i++)
-        if (where_is(&w->candidate[in[i]], q) != COVERS) return 0;
-    return 1;
+    if (*seen->leaf == NO_LEAF) *seen->leaf = make_list(d, seen);
+    end(d, q, *seen->leaf, *seen->leaf == SIGHT_ASK ? ASK : FEW);
 }
 
-static void divide(struct division *d, const struct square *q, const uint32_t *in, uint32_t n);
-
-static void divide_quarters(struct division *d, const struct square *q, const uint32_t *in, uint32_t n)
+static int all_cover(const struct seen *seen)
 {
-    const uint32_t half = q->size / 2;
+    uint32_t all = COVERS;
+    for (uint32_t i = 0; i < seen->n; i++)
+        all &= seen->list[i];
+    return all != 0;
+}
+
+static void divide(struct division *d, const struct square *q, const struct seen *seen);
+
+static void make_quarters(const struct square *q, const struct seen *seen, struct quarters *four)
+{
+    const double half = 0.5 * q->half;
     for (uint32_t k = 0; k < 4; k++) {
-        const struct square quarter = square_of(d->b->sight, q->u + (k & 1) * half, q->v + (k >> 1) * half, half);
-        divide(d, &quarter, in, n);
+        four->square[k] = (struct square){.u = q->u + (k & 1) * (q->size / 2),
+                                          .v = q->v + (k >> 1) * (q->size / 2),
+                                          .size = q->size / 2,
+                                          .mid_u = q->mid_u + (k & 1 ? half : -half),
+                                          .mid_v = q->mid_v + (k & 2 ? half : -half),
+                                          .half = half};
+        four->u[k] = four->square[k].mid_u;
+        four->v[k] = four->square[k].mid_v;
+        four->seen[k].list = seen->above + k * (size_t)seen->n;
+        four->seen[k].above = seen->above + 4 * (size_t)seen->n;
+    }
+}
+
+static void divide_quarters(struct division *d, const struct square *q, const struct seen *seen)
+{
+    struct quarters four = {.half = 0.5 * q->half + SIGHT_PAD};
+    make_quarters(q, seen, &four);
+    look(d->w, seen, &four);
+    for (uint32_t k = 0; k < 4; k++) {
+        struct seen *mine = &four.seen[k];
+        mine->own_leaf = NO_LEAF;
+        mine->leaf = mine->n == seen->n ? seen->leaf : &mine->own_leaf;
+        divide(d, &four.square[k], mine);
     }
 }
 
 /* A tile whose leaves differ: they are made beside each other, and become a block. */
-static void divide_tile(struct division *d, const struct square *q, const uint32_t *in, uint32_t n)
+static void divide_tile(struct division *d, const struct square *q, const struct seen *seen)
 {
-    struct sight *s = d->b->sight;
     uint32_t block[SIGHT_BLOCK], same = 1;
     d->block = block;
     d->block_u = q->u;
     d->block_v = q->v;
-    divide_quarters(d, q, in, n);
+    divide_quarters(d, q, seen);
     while (same < SIGHT_BLOCK && block[same] == block[0])
         same++;
     if (same == SIGHT_BLOCK) {
@@ -189,46 +275,78 @@ static void divide_tile(struct division *d, const struct square *q, const uint32
         put_leaf(d, q, SIGHT_ASK);
         return;
     }
-    memcpy(&s->leaf[at], block, sizeof block);
+    memcpy(&d->b->sight->leaf[at], block, sizeof block);
     put_leaf(d, q, (uint32_t)SIGHT_TILED << SIGHT_KIND_SHIFT | (uint32_t)at);
 }
 
-static void divide(struct division *d, const struct square *q, const uint32_t *in, uint32_t n)
+/* Where all that is left covers the square, a few of them, their planes cross or lie in each other: rays are
+ * decided. */
+static void divide(struct division *d, const struct square *q, const struct seen *seen)
 {
-    struct build_work *w = d->w;
-    uint32_t *out = (uint32_t *)(uintptr_t)in + n, cover; /* on the stack, above its own */
-    const uint32_t m = look(w, q, in, n, out, &cover);
-    if (m == 0) {
-        put_leaf(d, q, SIGHT_NOTHING);
-        count(d, q, NOTHING);
-    } else if (m == 1 && cover != NO_CANDIDATE) {
-        put_leaf(d, q, w->candidate[cover].triangle);
-        count(d, q, ONE);
-    } else if (q->size == 1 || (m <= SIGHT_MAX_LIST && cover != NO_CANDIDATE && all_cover(w, q, out, m))) {
-        end_few(d, q, out, m);
-    } else if (q->size == SIGHT_TILE) {
-        divide_tile(d, q, out, m);
-    } else {
-        divide_quarters(d, q, out, m);
-    }
+    if (seen->n == 0)
+        end(d, q, SIGHT_NOTHING, NOTHING);
+    else if (seen->n == 1 && seen->cover != NO_CANDIDATE)
+        end(d, q, d->w->candidate[seen->cover].triangle, ONE);
+    else if (q->size == 1 || (seen->n <= SIGHT_MAX_LIST && seen->cover != NO_CANDIDATE && all_cover(seen)))
+        end_few(d, q, seen);
+    else if (q->size == SIGHT_TILE)
+        divide_tile(d, q, seen);
+    else
+        divide_quarters(d, q, seen);
 }
 
 void build_work_free(struct build_work *w)
 {
     free(w->candidate);
     free(w->stack);
+    free(w->where);
 }
 
-static int gather(struct build_shared *b, struct build_work *w, uint32_t region, uint32_t face)
+/* Its vectors are aligned. */
+static int grow_where(struct build_work *w, size_t n)
 {
-    const uint64_t n = b->bin[region + 1] - b->bin[region];
-    uint32_t levels = 1;
+    if (n <= w->where_room) return 1;
+    free(w->where);
+    w->where_room = n + n / 2;
+    w->where = aligned_alloc(sizeof *w->where, w->where_room * sizeof *w->where);
+    if (w->where == NULL) w->where_room = 0;
+    return w->where != NULL;
+}
+
+/* Each square's candidates stand above those of the square that it is a quarter of: four lists a level. */
+static size_t stacked(const struct build_shared *b, size_t n)
+{
+    size_t lists = 5;
     for (uint32_t size = b->region_cells; size > 1; size /= 2)
-        levels++;
-    if (!grow(&w->candidate, &w->room, n + 1, sizeof *w->candidate) ||
-        !grow(&w->stack, &w->stack_room, (n + 1) * (levels + 1), sizeof *w->stack))
-        return SH_ENOMEM;
+        lists += 4;
+    return lists * n;
+}
+
+/* Whether the memory allows to divide a region of n triangles. What grows does so by half. */
+static int may_take(struct build_shared *b, struct build_work *w, size_t n)
+{
+    const uint64_t each = sizeof *w->candidate + sizeof *w->where;
+    const uint64_t need = 3 * (n * each + stacked(b, n) * sizeof *w->stack) / 2;
+    if (need <= w->taken) return 1;
+    const uint64_t more = need - w->taken;
+    if (atomic_fetch_add(&b->bytes, more) + more > b->spec->memory_bytes) {
+        atomic_fetch_sub(&b->bytes, more);
+        return 0;
+    }
+    w->taken = need;
+    return 1;
+}
+
+/* Candidates of a region. *fits is 0 where there are too many. */
+static int gather(struct build_shared *b, struct build_work *w, uint32_t region, uint32_t face, int *fits)
+{
+    const size_t n = b->bin[region + 1] - b->bin[region];
     w->n = 0;
+    *fits = may_take(b, w, n);
+    if (!*fits) return SH_OK;
+    if (!grow(&w->candidate, &w->room, n, sizeof *w->candidate) || !grow_where(w, n) ||
+        !grow(&w->stack, &w->stack_room, stacked(b, n), sizeof *w->stack))
+        return SH_ENOMEM;
     for (uint64_t i = b->bin[region]; i < b->bin[region + 1]; i++)
         w->n += (size_t)build_candidate(b->sight, face, b->binned[i], &w->candidate[w->n]);
     for (uint32_t i = 0; i < w->n; i++)
@@ -236,15 +354,33 @@ static int gather(struct build_shared *b, struct build_work *w, uint32_t region,
     return SH_OK;
 }
 
+static struct square square_of(const struct build_shared *b, uint32_t region)
+{
+    const uint32_t at = region % (b->regions * b->regions), size = b->region_cells;
+    const double cell = 2.0 / b->sight->cells;
+    struct square q = {
+        .u = at % b->regions * size, .v = at / b->regions * size, .size = size, .half = 0.5 * size * cell};
+    q.mid_u = (q.u + 0.5 * size) * cell - 1.0;
+    q.mid_v = (q.v + 0.5 * size) * cell - 1.0;
+    return q;
+}
+
 int build_region(struct build_shared *b, struct build_work *w, uint32_t region)
 {
-    const uint32_t face = region / (b->regions * b->regions), at = region % (b->regions * b->regions);
-    struct division d = {.b = b, .w = w, .face = face};
+    struct division d = {.b = b, .w = w, .face = region / (b->regions * b->regions)};
+    const struct square all = square_of(b, region);
+    int fits;
     if (!b->seen[region]) return SH_OK;
-    int rc = gather(b, w, region, face);
+    int rc = gather(b, w, region, d.face, &fits);
     if (rc != SH_OK) return rc;
-    const struct square all =
-        square_of(b->sight, at % b->regions * b->region_cells, at / b->regions * b->region_cells, b->region_cells);
-    divide(&d, &all, w->stack, (uint32_t)w->n);
+    struct seen seen = {
+        .list = w->stack, .n = (uint32_t)w->n, .above = w->stack + w->n, .cover = NO_CANDIDATE, .own_leaf = NO_LEAF};
+    seen.leaf = &seen.own_leaf;
+    if (fits)
+        divide(&d, &all, &seen);
+    else
+        end(&d, &all, SIGHT_ASK, ASK);
+    for (int i = 0; i < 4; i++)
+        atomic_fetch_add_explicit(&b->cells[i], d.cells[i], memory_order_relaxed);
     return SH_OK;
 }
