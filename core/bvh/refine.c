@@ -36,7 +36,7 @@ VEC_INLINE uint32_t label_of(double ny, double nz)
 }
 
 /* Whether a hit is so near to its triangle's border that the proposal is in doubt, or the triangle has
- * rivals. slope: what the guard counts in, bvh_inside.h. */
+ * holes. slope: what the guard counts in, bvh_inside.h. */
 VEC_INLINE uint32_t in_doubt(double nx, double nz, double slope, float u, float v)
 {
     float w = 1.0f - u - v;
@@ -48,7 +48,7 @@ VEC_INLINE uint32_t in_doubt(double nx, double nz, double slope, float u, float 
     bits = ((bits & ((1U << BVH_SPARE_BITS) - 1)) + BVH_GUARD_BASE) << BVH_GUARD_SHIFT;
     memcpy(&guard, &bits, sizeof guard);
     memcpy(&high, &nz, sizeof high);
-    return ((double)least * slope < guard) | (uint32_t)((high & BVH_RIVAL_BIT) != 0);
+    return ((double)least * slope < guard) | (uint32_t)((high & BVH_HOLES_BIT) != 0);
 }
 
 enum how { FROM_ONE, FROM_ONE_STEEP, FROM_OWN };
@@ -101,9 +101,27 @@ static uint32_t refine_from_own(const struct bvh_proposals *p)
     return refine(p, FROM_OWN, 1);
 }
 
+/* All hits on triangles that have rivals are in doubt, too. */
+VEC_CLONES
+static uint32_t doubt_rivals(const struct bvh_proposals *p)
+{
+    const uint32_t *first = p->bvh->rival_first, n_triangles = p->bvh->scene->n_triangles, n = p->n, *prim = p->prim;
+    uint32_t *doubt = p->doubt, doubts = 0;
+    VEC_LOOP
+    for (uint32_t i = 0; i < n; i++) {
+        const int64_t at = (int64_t)(prim[i] < n_triangles ? prim[i] : n_triangles);
+        doubt[i] |= first[at] != first[at + 1];
+        doubts += doubt[i];
+    }
+    return doubts;
+}
+
 uint32_t bvh_refine(const struct bvh_proposals *p)
 {
-    return p->own.x != NULL ? refine_from_own(p) : p->steep != NULL ? refine_steep(p) : refine_from_one(p);
+    const uint32_t doubts = p->own.x != NULL   ? refine_from_own(p)
+                            : p->steep != NULL ? refine_steep(p)
+                                               : refine_from_one(p);
+    return p->bvh->rival_first != NULL ? doubt_rivals(p) : doubts;
 }
 
 VEC_CLONES
