@@ -53,6 +53,9 @@ struct bvh_plane {
 } __attribute__((aligned(32))); /* half a cache line */
 const struct bvh_plane *bvh_plane(const struct bvh *bvh, uint32_t triangle);
 
+/* 1: a face of the same corners with a lower number stands for this triangle, which is never met. */
+int bvh_is_twin(const struct bvh *bvh, uint32_t triangle);
+
 enum {
     BVH_CHUNK = 1024, /* rays that are cast together */
     BVH_NO_TRIANGLE = 0xffffffff,

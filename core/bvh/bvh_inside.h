@@ -79,6 +79,7 @@ struct bvh {
     double origin_m[3];
     uint32_t *rival_first,
         *rival; /* rivals of triangle i: rival[rival_first[i] .. rival_first[i + 1]); NULL: there are none */
+    uint64_t *twin;         /* bits: a face of the same corners stands for this one; NULL: for none */
     double station_reach_m; /* rays begin at most this far from the origin */
     struct bvh_info info;
     int64_t bytes; /* as Embree reports */
@@ -145,7 +146,7 @@ int bvh_commit(struct bvh *bvh, RTCScene scene, const struct sh_report *report, 
 
 /* twins.c: of faces with the same three corners, however they are written, only the first stays in the float
  * buffer. */
-int bvh_drop_twins(const struct bvh *bvh, float *vertex, const struct sh_report *report, struct sh_err *err);
+int bvh_drop_twins(struct bvh *bvh, float *vertex, const struct sh_report *report, struct sh_err *err);
 
 /* Marks a triangle as having rivals or holes; its plane is made anew to go with that. */
 void bvh_mark_rival(struct bvh *bvh, uint32_t prim);
