@@ -14,7 +14,8 @@ struct looks {
     quad q[SIGHT_MAX_LIST];                             /* of the records: 1 / range */
     quad_mask met[SIGHT_MAX_LIST], may[SIGHT_MAX_LIST]; /* the ray passes inside for certain; may do so */
     quad first_q;
-    quad_mask first, any, open; /* the one that comes first; something may be met; not decided */
+    quad_mask first, any; /* the one that comes first; something may be met */
+    quad_mask open, asks; /* not decided; nor to be decided in double */
 };
 
 VEC_INLINE void choose(const quad_mask *which, const quad *yes, quad *no)
@@ -29,7 +30,7 @@ VEC_INLINE void look_at(const struct sight *s, const uint32_t *list, struct look
 {
     const quad x = w->x, y = w->y, z = w->z;
     quad first_q = {0.0, 0.0, 0.0, 0.0}, slack = first_q, rel = first_q;
-    quad_mask first = {-1, -1, -1, -1}, any = {0, 0, 0, 0}, open = any;
+    quad_mask first = {-1, -1, -1, -1}, any = {0, 0, 0, 0}, asks = any, open = any;
     const uint32_t n = list[0];
     for (uint32_t k = 0; k < n; k++) {
         const struct sight_record *r = &s->record[list[1 + k]];
@@ -47,7 +48,7 @@ VEC_INLINE void look_at(const struct sight *s, const uint32_t *list, struct look
         w->may[k] = may;
         w->q[k] = q;
         any |= may;
-        open |= may & ~sure;
+        asks |= may & ~sure;
         first = (number & better) | (first & ~better);
         choose(&better, &q, &first_q);
         choose(&better, &its_slack, &slack);
@@ -63,7 +64,8 @@ VEC_INLINE void look_at(const struct sight *s, const uint32_t *list, struct look
     w->first_q = first_q;
     w->first = first;
     w->any = any;
-    w->open = open | (any & (first >> 63));
+    w->asks = asks;
+    w->open = open | asks | (any & (first >> 63));
 }
 
 /* Rays that several planes are met by at the same place, all within the borders: by the rule of core/bvh/decide.c,
@@ -80,7 +82,6 @@ static uint32_t decide_tie(const struct sight *s, const struct bvh_rays *rays, c
         const double q = w->q[k][i];
         range_m[k] = INFINITY;
         if (!w->may[k][i]) continue;
-        if (!(q >= r->graze && q <= SIGHT_NEAR)) return FEW_OPEN;
         if (w->first_q[i] - q > first->slack + r->slack + SIGHT_SAME * w->first_q[i]) continue;
         if (!w->met[k][i]) return FEW_OPEN;
         range_m[k] = bvh_range_of(s->bvh, r->triangle, rays->from.at_m, dir);
@@ -97,6 +98,7 @@ static uint32_t of_lane(const struct sight *s, const struct bvh_rays *rays, cons
 {
     if (!w->any[i]) return BVH_NO_TRIANGLE;
     if (!w->open[i]) return s->record[list[1 + w->first[i]]].triangle;
+    if (w->asks[i]) return FEW_ASK;
     return s->exact && w->first[i] >= 0 ? decide_tie(s, rays, list, w, i) : (uint32_t)FEW_OPEN;
 }
 

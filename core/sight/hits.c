@@ -52,7 +52,8 @@ static void ask(struct sight_work *w, uint32_t from, uint32_t to, uint32_t *aske
 }
 
 /* Of rays that meet one of a few, those that meet the same one are done together. In exact order, what the records
- * can't decide double does, as it would decide the BVH's proposals; else those rays ask. */
+ * can't decide double does, as it would decide the BVH's proposals; else, or where the BVH might propose nothing, those
+ * rays ask. */
 static void do_few(struct sight_work *w, struct bvh_work *bvh_work, const struct sight *s, const struct bvh_rays *rays,
                    const struct sight_run *run, uint32_t *asked)
 {
@@ -62,9 +63,9 @@ static void do_few(struct sight_work *w, struct bvh_work *bvh_work, const struct
         const uint32_t it = w->triangle[i];
         for (end = i + 1; end < n && w->triangle[end] == it;)
             end++;
-        if (it != FEW_OPEN)
+        if (it != FEW_OPEN && it != FEW_ASK)
             bvh_ranges_of(s->bvh, it, rays, run->from + i, run->from + end);
-        else if (!s->exact)
+        else if (it == FEW_ASK || !s->among)
             ask(w, run->from + i, run->from + end, asked);
         else
             decide_open(bvh_work, s, rays, list, run->from + i, run->from + end);
@@ -91,12 +92,12 @@ static uint32_t do_runs(struct sight_work *w, struct bvh_work *bvh_work, const s
 
 /* Which rays are cast for those that ask: in exact order themselves; else their whole packets, as bvh_hits would have
  * cut them from the chunk, so that the BVH proposes the same. */
-static uint32_t gather(struct sight_work *w, const struct bvh *bvh, const struct bvh_rays *rays, int exact)
+static uint32_t gather(struct sight_work *w, const struct sight *s, const struct bvh_rays *rays)
 {
     struct bvh_info info;
     uint32_t m = 0;
-    bvh_get_info(bvh, &info);
-    const uint32_t packet = exact ? 1 : info.packet;
+    bvh_get_info(s->bvh, &info);
+    const uint32_t packet = s->among ? 1 : info.packet;
     for (uint32_t at = 0; at < rays->n; at += packet) {
         const uint32_t end = rays->n - at < packet ? rays->n : at + packet;
         uint32_t any = 0;
@@ -115,7 +116,7 @@ static uint32_t gather(struct sight_work *w, const struct bvh *bvh, const struct
 
 static void ask_bvh(struct sight_work *w, struct bvh_work *bvh_work, const struct sight *s, const struct bvh_rays *rays)
 {
-    struct bvh_rays asked = {.n = gather(w, s->bvh, rays, s->exact),
+    struct bvh_rays asked = {.n = gather(w, s, rays),
                              .from = rays->from,
                              .dir = VEC3_IN(*w, 0),
                              .range_max_m = rays->range_max_m,

@@ -14,16 +14,17 @@ struct sight_run {
 
 /* ---- places.c */
 struct sight_places {
-    uint32_t tile[HITS_ROOM], within[HITS_ROOM];
+    int32_t tile[HITS_ROOM], within[HITS_ROOM];
+    uint8_t changes[HITS_ROOM];
 };
 /* Cuts up to BVH_CHUNK rays into runs. Returns how many; one more then says where the last ends. */
 uint32_t sight_find_runs(const struct sight *sight, const struct vec3_floats *dir, uint32_t n,
                          struct sight_places *places, struct sight_run *run);
 
 /* ---- few.c */
-/* Rays from .. to - 1, which have that list -> triangle[0 ..]: BVH_NO_TRIANGLE for nothing, FEW_OPEN where the
- * records can't decide. */
-enum { FEW_OPEN = 0xfffffffe };
+/* Rays from .. to - 1, which have that list -> triangle[0 ..]: BVH_NO_TRIANGLE for nothing, FEW_OPEN where
+ * the records can't decide; FEW_ASK where one of them is seen at so small an angle that the BVH may not propose it. */
+enum { FEW_OPEN = 0xfffffffe, FEW_ASK = 0xfffffffd };
 void few_decide(const struct sight *sight, const struct bvh_rays *rays, const uint32_t *list, uint32_t from,
                 uint32_t to, uint32_t *triangle);
 
