@@ -32,12 +32,12 @@ static uint64_t tiles_of(uint32_t cells)
     return SIGHT_FACES * edge * edge;
 }
 
-/* So many cells that FEW_RAYS rays come to each, and that most of the memory is left for what they say. */
-static uint32_t choose_cells(const struct sight_spec *spec)
+/* So many that FEW_RAYS rays come to each, and that most of the memory is left for what they say. */
+uint32_t sight_cells(double rays, uint64_t memory_bytes)
 {
     uint32_t cells = SIGHT_MIN_CELLS;
-    while (cells < SIGHT_MAX_CELLS && SIGHT_FACES * 4.0 * cells * cells * FEW_RAYS <= spec->rays &&
-           tiles_of(2 * cells) * sizeof(uint32_t) * 4 <= spec->memory_bytes)
+    while (cells < SIGHT_MAX_CELLS && SIGHT_FACES * 4.0 * cells * cells * FEW_RAYS <= rays &&
+           tiles_of(2 * cells) * sizeof(uint32_t) * 4 <= memory_bytes)
         cells *= 2;
     return cells;
 }
@@ -146,7 +146,7 @@ int sight_create(const struct sight_spec *spec, unsigned threads, const struct s
     s->bvh = spec->bvh;
     memcpy(s->station_m, spec->station_m, sizeof s->station_m);
     s->exact = spec->exact;
-    s->cells = choose_cells(spec);
+    s->cells = sight_cells(spec->rays, spec->memory_bytes);
     struct build_shared b = {.sight = s, .spec = spec, .report = report};
     b.regions = s->cells / SIGHT_TILE < BUILD_REGIONS ? s->cells / SIGHT_TILE : BUILD_REGIONS;
     b.region_cells = s->cells / b.regions;
