@@ -101,15 +101,24 @@ static uint32_t decide_lists(struct sight_work *w, const struct sight *s, const 
     return open;
 }
 
-/* What is left of them. In exact order double decides, as it would decide the BVH's proposals; else those are asked
- * for. Returns for how many. */
+/* Whether the BVH misses nothing that double precision finds. */
+static int is_centred(const struct sight *s)
+{
+    double origin_m[3];
+    bvh_origin(s->bvh, origin_m);
+    return memcmp(origin_m, s->station_m, sizeof origin_m) == 0;
+}
+
+/* What is left of them. In exact order double decides, as it would decide the BVH's proposals; else, or where the BVH
+ * might propose nothing, it is asked. Returns for how many. */
 static uint32_t decide_open(struct sight_work *w, struct bvh_work *bvh_work, const struct sight *s,
                             const struct bvh_rays *rays, uint32_t open)
 {
+    const int among = s->exact && is_centred(s);
     for (uint32_t k = 0; k < open; k++) {
         const uint32_t i = w->chosen[k], *list = s->list + (w->leaf[i] & SIGHT_NUMBER), n = list[0];
         uint32_t triangle[SIGHT_MAX_LIST];
-        if (!s->exact) {
+        if (!among) {
             w->leaf[i] = SIGHT_ASK;
             continue;
         }
@@ -117,18 +126,18 @@ static uint32_t decide_open(struct sight_work *w, struct bvh_work *bvh_work, con
             triangle[j] = s->record[list[1 + j]].triangle;
         bvh_decide_among(bvh_work, s->bvh, rays, i, triangle, n);
     }
-    if (s->exact) w->counters.few += open;
-    return s->exact ? 0 : open;
+    if (among) w->counters.few += open;
+    return among ? 0 : open;
 }
 
 /* Which rays are cast for those that ask: in exact order themselves; else their whole packets, as bvh_hits would have
  * cut them from the chunk, so that the BVH proposes the same. */
-static uint32_t gather(struct sight_work *w, const struct bvh *bvh, const struct bvh_rays *rays, int exact)
+static uint32_t gather(struct sight_work *w, const struct sight *s, const struct bvh_rays *rays)
 {
     struct bvh_info info;
     uint32_t m = 0;
-    bvh_get_info(bvh, &info);
-    const uint32_t packet = exact ? 1 : info.packet;
+    bvh_get_info(s->bvh, &info);
+    const uint32_t packet = s->exact && is_centred(s) ? 1 : info.packet;
     for (uint32_t at = 0; at < rays->n; at += packet) {
         const uint32_t end = rays->n - at < packet ? rays->n : at + packet;
         uint32_t any = 0;
@@ -147,7 +156,7 @@ static uint32_t gather(struct sight_work *w, const struct bvh *bvh, const struct
 
 static void ask_bvh(struct sight_work *w, struct bvh_work *bvh_work, const struct sight *s, const struct bvh_rays *rays)
 {
-    struct bvh_rays asked = {.n = gather(w, s->bvh, rays, s->exact),
+    struct bvh_rays asked = {.n = gather(w, s, rays),
                              .from = rays->from,
                              .dir = VEC3_IN(*w, 0),
                              .range_max_m = rays->range_max_m,
