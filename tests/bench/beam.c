@@ -210,11 +210,11 @@ static void print_scene(const char *name, struct beam_rig *rig, const struct bea
            100.0 * (double)(after.ragged - before.ragged) / n);
 }
 
-/* Of the whole view; made for so many pulses as it has. */
+/* For a scan that is as dense across its lines as along them; a few of its lines are cast. */
 static struct sight *make_sight(const struct beam_rig *rig, const struct beam_view *view)
 {
-    struct sight_spec spec = {
-        .bvh = rig->bvh, .rays = (double)view->lines * view->pulses, .memory_bytes = UINT64_C(64) << 20};
+    const double step = (view->line_stop_deg - view->line_start_deg) * M_PI / 180.0 / view->pulses;
+    struct sight_spec spec = {.bvh = rig->bvh, .rays = 4.0 * M_PI / (step * step), .memory_bytes = UINT64_C(64) << 20};
     struct sight *sight;
     struct sight_info info;
     struct sh_err err;
