@@ -61,7 +61,7 @@ static void ask_need(struct site *site, const struct site_look *look, struct pla
     const double share = site_view_share(&view, SQUARE_RAD);
     need->pulses = pulses_of(&look->place[0], cfg->head.settings.frames);
     site->plan.sight_rays = need->pulses / share;
-    const double edge = sight_cells(site->plan.sight_rays);
+    const double edge = sight_cells(site->plan.sight_rays, (uint64_t)(cfg->cast.sight_mib * 0x1p20));
     need->cells = 6.0 * edge * edge * share;
     need->cell_rad = sqrt(4.0 * M_PI / (6.0 * edge * edge));
     need->n_triangles = site->scene->n_triangles;
