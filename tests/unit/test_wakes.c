@@ -75,17 +75,22 @@ static void rings_are_not_counted(void **state)
 
 struct peer {
     int fd;
-    uint64_t seed, received;
-    uint32_t steps; /* to be granted; 0: it only reads */
+    uint64_t seed, received, leaves; /* after so many bytes it goes away */
+    uint32_t steps;                  /* to be granted; 0: it only reads */
     _Atomic int end;
 };
 
-/* Reads a little at a time, and now and then nothing for a while. */
+/* Reads a little at a time, and now and then nothing for a while. Before it goes away it lets the loop wait for it. */
 static void *read_slowly(void *arg)
 {
     struct peer *peer = arg;
     static uint8_t bytes[65536];
     for (ssize_t n = 1; n > 0; peer->received += (uint64_t)n) {
+        if (peer->received > peer->leaves) {
+            clock_sleep_until_ns(clock_now_ns() + 20000000);
+            shutdown(peer->fd, SHUT_RDWR);
+            break;
+        }
         if (case_between(&peer->seed, 0, 40) == 0) clock_sleep_until_ns(clock_now_ns() + 3000000);
         n = read(peer->fd, bytes, (size_t)case_between(&peer->seed, 1, sizeof bytes));
     }
@@ -121,6 +126,7 @@ static void *grant_steps(void *arg)
 struct loop_case {
     const char *sets[6];
     uint32_t steps;
+    uint64_t leaves;
 };
 
 /* Runs it to its end in time; the stream's hash. */
@@ -130,7 +136,7 @@ static void run_case(const struct loop_case *c, uint64_t seed, char sha256[65])
     assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, fd), 0);
     const struct link_spec spec = {.type = LINK_FD, .fd = fd[0]};
     const struct loop_options options = {.hash = 1, .extra = &spec};
-    struct peer peer = {.fd = fd[1], .seed = seed, .steps = c->steps};
+    struct peer peer = {.fd = fd[1], .seed = seed, .steps = c->steps, .leaves = c->leaves};
     struct sh_err err;
     struct loop *loop;
     struct loop_stats stats;
@@ -177,7 +183,8 @@ static void a_fast_loop_never_stands_still(void **state)
     for (int i = 0; i < 81; i += EVERY) {
         const int t = i % 3;
         const struct loop_case c = {
-            .sets = {ahead[i / 3 % 3], queue[i / 9 % 3], threads[i / 27], ticks[t], "loop.pace=fast", "head.frames=0"}};
+            .sets = {ahead[i / 3 % 3], queue[i / 9 % 3], threads[i / 27], ticks[t], "loop.pace=fast", "head.frames=0"},
+            .leaves = i % 2 == 0 ? UINT64_MAX : 200000};
         run_case(&c, (uint64_t)i + 1, sha256);
         if (first[t][0] == '\0') memcpy(first[t], sha256, sizeof sha256);
         assert_string_equal(sha256, first[t]);
@@ -192,7 +199,8 @@ static void a_stepped_loop_never_stands_still(void **state)
         const struct loop_case c = {.sets = {"loop.pace=step", i == 0 ? "loop.ahead_ms=2" : "loop.ahead_ms=64",
                                              i == 2 ? "loop.threads=3" : "loop.threads=1", "loop.queue_ms=10",
                                              "head.frames=0"},
-                                    .steps = STEPS};
+                                    .steps = STEPS,
+                                    .leaves = UINT64_MAX};
         run_case(&c, (uint64_t)i + 1, sha256);
     }
 }
