@@ -306,12 +306,11 @@ static void to_floats(const struct decide_ray *ray, float org[3], float dir[3])
     }
 }
 
-/* What was tried may lie anywhere on the ray; it counts up to limit_m: beyond, not everything was tried. */
-static int is_found(struct search *s, double limit_m)
+/* What was tried may lie anywhere on the ray. Up to limit_m everything was tried; a hit beyond is one, but something
+ * may lie before it. */
+static int is_found(const struct search *s, double limit_m)
 {
-    if (s->range_m <= limit_m || s->near_range_m <= limit_m) return 1;
-    forget(s);
-    return 0;
+    return s->range_m <= limit_m || s->near_range_m <= limit_m;
 }
 
 static int is_met(void *search, uint32_t prim)
@@ -363,12 +362,12 @@ void decide_hit(const struct decide_ray *ray, uint32_t prim, float t, struct bvh
         if (s.prim == prim && s.border_m > width_m) break;
         counters->decided++;
         if (s.holes) break;
-        double range_m = (double)t, slack = slack_m(ray, prim, width_m), limit_m = range_m + slack;
+        double range_m = (double)t, slack = slack_m(ray, prim, width_m);
         double radius_m = fmin(slack, 0.01 * range_m + 4.0 * width_m);
         try_around(&s, range_m, radius_m);
         try_rivals(&s, prim, range_m);
         if (s.holes) break;
-        if (is_found(&s, limit_m)) break;
+        if (is_found(&s, range_m + radius_m)) break;
         counters->went_on++;
         float org[3], dir[3];
         to_floats(ray, org, dir);

@@ -1,121 +1,130 @@
-/* Rays decided among a few triangles, by rules that sight_inside.h explains. */
+/* Rays decided among a few triangles, by rules that sight_inside.h explains: four rays of a list at a time. */
 #include <math.h>
 
 #include "core/sight/hits_inside.h"
-#include "core/vec3.h"
 #include "core/vecmath.h"
 
-enum {
-    /* Rays ahead whose list, and whose records, are asked for: consecutive rays rarely have the same. */
-    LIST_AHEAD = 12,
-    RECORDS_AHEAD = 6,
-};
+enum { LANES = 4 };
+typedef double quad __attribute__((vector_size(32)));
+typedef int64_t quad_mask __attribute__((vector_size(32)));
 
-/* What a ray makes of the records of its list. No branches where the next ray may well go another way. */
+/* What rays make of the records of a list. Lane by lane. */
 struct looks {
-    double q[SIGHT_MAX_LIST]; /* 1 / range, of those that are met */
-    uint32_t inside;          /* bits: met for certain */
-    uint32_t met;             /* met for certain, or perhaps */
-    uint32_t first;           /* of those that are met for certain the nearest */
-    double first_q;           /* 0: there is none */
-    int open;                 /* one can't be decided here */
+    quad x, y, z;
+    quad q[SIGHT_MAX_LIST];                             /* of the records: 1 / range */
+    quad_mask met[SIGHT_MAX_LIST], may[SIGHT_MAX_LIST]; /* the ray passes inside for certain; may do so */
+    quad first_q;
+    quad_mask first, any; /* the one that comes first; something may be met */
+    quad_mask open, asks; /* not decided; nor to be decided in double */
 };
 
-VEC_INLINE double least(double a, double b)
+VEC_INLINE void choose(const quad_mask *which, const quad *yes, quad *no)
 {
-    return a < b ? a : b;
+    *no = (quad)(((quad_mask)*yes & *which) | ((quad_mask)*no & ~*which));
 }
 
-VEC_INLINE void look(const struct sight_record *record, const double d[3], const uint32_t *list, struct looks *l)
+/* Of each record, on which side of its edges the rays pass, and when they meet its plane. Which of those that are met
+ * for certain comes first. Another one may come before that where it is met, or may be, and its plane does not lie
+ * behind for certain. */
+VEC_INLINE void look_at(const struct sight *s, const uint32_t *list, struct looks *w)
 {
+    const quad x = w->x, y = w->y, z = w->z;
+    quad first_q = {0.0, 0.0, 0.0, 0.0}, slack = first_q, rel = first_q;
+    quad_mask first = {-1, -1, -1, -1}, any = {0, 0, 0, 0}, asks = any, open = any;
     const uint32_t n = list[0];
-    uint32_t inside = 0, met = 0, open = 0, first = 0;
-    double most = 0.0;
-    for (uint32_t i = 0; i < n; i++) {
-        const struct sight_record *r = &record[list[1 + i]];
-        const double a = vec3_dot(r->edge[0], d), b = vec3_dot(r->edge[1], d), c = vec3_dot(r->edge[2], d);
-        const double side = least(a, least(b, c)), q = vec3_dot(r->plane, d);
-        const uint32_t out = side <= -1.0, in = side >= 1.0;
-        const double in_q = in ? q : 0.0;
-        open |= (out ^ 1) & (uint32_t) !((q >= r->graze) & (q <= SIGHT_NEAR));
-        inside |= in << i;
-        met |= (out ^ 1) << i;
-        first = in_q > most ? i : first;
-        most = in_q > most ? in_q : most;
-        l->q[i] = q;
+    for (uint32_t k = 0; k < n; k++) {
+        const struct sight_record *r = &s->record[list[1 + k]];
+        const quad a = r->edge[0][0] * x + r->edge[0][1] * y + r->edge[0][2] * z;
+        const quad b = r->edge[1][0] * x + r->edge[1][1] * y + r->edge[1][2] * z;
+        const quad c = r->edge[2][0] * x + r->edge[2][1] * y + r->edge[2][2] * z;
+        const quad q = r->plane[0] * x + r->plane[1] * y + r->plane[2] * z;
+        const quad_mask may = ~((quad_mask)(a <= -1.0) | (quad_mask)(b <= -1.0) | (quad_mask)(c <= -1.0));
+        const quad_mask sure = (quad_mask)(q >= r->graze) & (quad_mask)(q <= SIGHT_NEAR);
+        const quad_mask met = (quad_mask)(a >= 1.0) & (quad_mask)(b >= 1.0) & (quad_mask)(c >= 1.0);
+        const quad_mask better = met & (quad_mask)(q > first_q);
+        const quad its_slack = {r->slack, r->slack, r->slack, r->slack}, its_rel = {r->rel, r->rel, r->rel, r->rel};
+        const quad_mask number = {k, k, k, k};
+        w->met[k] = met;
+        w->may[k] = may;
+        w->q[k] = q;
+        any |= may;
+        asks |= may & ~sure;
+        first = (number & better) | (first & ~better);
+        choose(&better, &q, &first_q);
+        choose(&better, &its_slack, &slack);
+        choose(&better, &its_rel, &rel);
     }
-    l->inside = inside;
-    l->met = met;
-    l->first = first;
-    l->first_q = most;
-    l->open = open != 0;
+    for (uint32_t k = 0; k < n; k++) {
+        const struct sight_record *r = &s->record[list[1 + k]];
+        const quad_mask number = {k, k, k, k};
+        const quad_mask behind =
+            (quad_mask)(first_q - w->q[k] > slack + r->slack + (rel + r->rel + SIGHT_SAME) * first_q);
+        open |= ~behind & w->may[k] & (quad_mask)(number != first);
+    }
+    w->first_q = first_q;
+    w->first = first;
+    w->any = any;
+    w->asks = asks;
+    w->open = open | asks | (any & (first >> 63));
 }
 
-/* Bits: those that may be met before the nearest, or at the same range. */
-VEC_INLINE uint32_t find_close(const struct sight_record *record, const uint32_t *list, const struct looks *l)
+/* Rays that several planes are met by at the same place, all within the borders: by the rule of core/bvh/decide.c,
+ * and by its ranges. */
+static uint32_t decide_tie(const struct sight *s, const struct bvh_rays *rays, const uint32_t *list,
+                           const struct looks *w, int i)
 {
-    const struct sight_record *best = &record[list[1 + l->first]];
-    const double q = l->first_q, least_q = q - best->slack - (best->rel + SIGHT_SAME) * q;
-    uint32_t close = 0;
-    for (uint32_t i = 0; i < list[0]; i++) {
-        const struct sight_record *r = &record[list[1 + i]];
-        close |= (uint32_t) !(l->q[i] + (r->slack + r->rel * q) < least_q) << i;
+    const double dir[3] = {w->x[i], w->y[i], w->z[i]};
+    const struct sight_record *first = &s->record[list[1 + w->first[i]]];
+    double range_m[SIGHT_MAX_LIST], first_m = INFINITY;
+    uint32_t lowest = FEW_OPEN;
+    for (uint32_t k = 0; k < list[0]; k++) {
+        const struct sight_record *r = &s->record[list[1 + k]];
+        const double q = w->q[k][i];
+        range_m[k] = INFINITY;
+        if (!w->may[k][i]) continue;
+        if (w->first_q[i] - q > first->slack + r->slack + SIGHT_SAME * w->first_q[i]) continue;
+        if (!w->met[k][i]) return FEW_OPEN;
+        range_m[k] = bvh_range_of(s->bvh, r->triangle, rays->from.at_m, dir);
+        first_m = fmin(first_m, range_m[k]);
     }
-    return close & l->met & ~(1U << l->first);
-}
-
-/* Where surfaces lie in one place the lowest number wins, as in core/bvh/decide.c; what the ranges themselves leave in
- * doubt is less than what is left up to 1e-12. BVH_NO_TRIANGLE: they don't for certain. */
-static uint32_t decide_tie(const struct sight *s, const uint32_t *list, const struct looks *l, uint32_t close)
-{
-    const struct sight_record *best = &s->record[list[1 + l->first]];
-    uint32_t lowest = best->triangle;
-    if (!s->exact || (close & ~l->inside) != 0) return BVH_NO_TRIANGLE;
-    for (uint32_t i = 0; i < list[0]; i++) {
-        const struct sight_record *r = &s->record[list[1 + i]];
-        const double same = SIGHT_SURE_SAME * l->first_q;
-        if ((close >> i & 1) == 0) continue;
-        if (l->first_q - l->q[i] > same || best->slack + r->slack > same) return BVH_NO_TRIANGLE;
-        if (r->triangle < lowest) lowest = r->triangle;
-    }
+    for (uint32_t k = 0; k < list[0]; k++)
+        if (range_m[k] <= first_m + 1e-12 * first_m && s->record[list[1 + k]].triangle < lowest)
+            lowest = s->record[list[1 + k]].triangle;
     return lowest;
 }
 
-/* Returns 0 where the records can't decide the ray. */
-VEC_INLINE int decide(const struct sight *s, const double d[3], const uint32_t *list, uint32_t *triangle)
+static uint32_t of_lane(const struct sight *s, const struct bvh_rays *rays, const uint32_t *list, const struct looks *w,
+                        int i)
 {
-    struct looks l;
-    look(s->record, d, list, &l);
-    *triangle = BVH_NO_TRIANGLE;
-    if (l.open) return 0;
-    if (!(l.first_q > 0.0)) return l.met == 0;
-    const uint32_t close = find_close(s->record, list, &l);
-    *triangle = close == 0 ? s->record[list[1 + l.first]].triangle : decide_tie(s, list, &l, close);
-    return *triangle != BVH_NO_TRIANGLE;
+    if (!w->any[i]) return BVH_NO_TRIANGLE;
+    if (!w->open[i]) return s->record[list[1 + w->first[i]]].triangle;
+    if (w->asks[i]) return FEW_ASK;
+    return s->exact && w->first[i] >= 0 ? decide_tie(s, rays, list, w, i) : (uint32_t)FEW_OPEN;
 }
 
-VEC_INLINE void prefetch(const struct sight *s, const uint32_t *leaf, const uint32_t *ray, uint32_t k, uint32_t n)
+VEC_INLINE void take(struct looks *w, const struct vec3_in *dir, uint32_t at, uint32_t n)
 {
-    const uint32_t *list = s->list + (leaf[ray[k + LIST_AHEAD < n ? k + LIST_AHEAD : n - 1]] & SIGHT_NUMBER);
-    __builtin_prefetch(list, 0, 3);
-    list = s->list + (leaf[ray[k + RECORDS_AHEAD < n ? k + RECORDS_AHEAD : n - 1]] & SIGHT_NUMBER);
-    for (uint32_t i = 0; i < 4; i++) { /* of more, the first ones; of fewer, what comes after them, which is harmless */
-        const struct sight_record *r = &s->record[list[1 + (i < list[0] ? i : 0)]];
-        __builtin_prefetch(r, 0, 3);
-        __builtin_prefetch((const char *)r + 64, 0, 3);
+    for (uint32_t i = 0; i < LANES; i++) {
+        const uint32_t from = at + (i < n ? i : 0);
+        w->x[i] = dir->x[from];
+        w->y[i] = dir->y[from];
+        w->z[i] = dir->z[from];
     }
 }
 
 VEC_CLONES
-uint32_t few_decide(const struct sight *s, const struct vec3_in *dir, const uint32_t *leaf, uint32_t *ray, uint32_t n,
-                    uint32_t *triangle)
+void few_decide(const struct sight *s, const struct bvh_rays *rays, const uint32_t *list, uint32_t from, uint32_t to,
+                uint32_t *triangle)
 {
-    uint32_t open = 0;
-    for (uint32_t k = 0; k < n; k++) {
-        const uint32_t i = ray[k];
-        const double d[3] = VEC3_AT(*dir, i);
-        prefetch(s, leaf, ray, k, n);
-        if (!decide(s, d, s->list + (leaf[i] & SIGHT_NUMBER), &triangle[i])) ray[open++] = i;
+    struct looks w;
+    for (uint32_t at = from; at < to; at += LANES) {
+        const uint32_t n = to - at < LANES ? to - at : LANES;
+        if (rays->n - at >= LANES)
+            take(&w, &rays->dir, at, LANES);
+        else
+            take(&w, &rays->dir, at, n);
+        look_at(s, list, &w);
+        for (uint32_t i = 0; i < n; i++)
+            triangle[at - from + i] = of_lane(s, rays, list, &w, (int)i);
     }
-    return open;
 }
