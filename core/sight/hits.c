@@ -13,6 +13,7 @@ enum {
 
 struct sight_work {
     struct sight_counters counters;
+    int32_t tile[ROOM], within[ROOM];
     uint32_t leaf[ROOM], chosen[ROOM];
     /* Rays that the BVH is asked for. */
     uint32_t ray[ROOM]; /* which ones these are, of the chunk */
@@ -39,46 +40,75 @@ const struct sight_counters *sight_work_counters(const struct sight_work *work)
     return &work->counters;
 }
 
+/* Where each ray's leaf is: the number of its tile, and the cell within. Coordinates are those of sight_inside.h in
+ * single precision, counted in cells from 0. With e = 2^-24, the error of b / |a| is 2 e of its value for the rounded
+ * components, and 3 e more for the reciprocal and the products; values are 1 at most. The sum, 2 at most, is rounded
+ * by e. Together 6 e and some e^2, less than half of SIGHT_PAD; so it also is where rounding chooses another face. What
+ * is no direction belongs to `nowhere`. */
+VEC_CLONES
+static void find_cells(uint32_t cells, const struct vec3_floats *dir, uint32_t n, int32_t nowhere,
+                       int32_t *restrict tile, int32_t *restrict within)
+{
+    const float *dx = dir->x, *dy = dir->y, *dz = dir->z, half = 0.5F * (float)cells, end = (float)cells + 1.0F;
+    const int32_t last = (int32_t)cells - 1, tiles = (int32_t)cells / SIGHT_TILE;
+    VEC_LOOP
+    for (uint32_t i = 0; i < n; i++) {
+        const float x = dx[i], y = dy[i], z = dz[i], ax = fabsf(x), ay = fabsf(y), az = fabsf(z);
+        const float xy = ax >= ay ? x : y, axy = ax >= ay ? ax : ay, a = axy >= az ? xy : z, aa = axy >= az ? axy : az;
+        const int32_t axis = axy >= az ? (ax >= ay ? 0 : 2) : 4;
+        const float b = axis == 0 ? y : axis == 2 ? z : x, c = axis == 0 ? z : axis == 2 ? x : y;
+        const float scale = half / aa, u = half + b * scale, v = half + c * scale;
+        const int32_t ok = (int32_t)(u < end) & (int32_t)(v < end);
+        const float from_u = u > 0.0F ? u : 0.0F, from_v = v > 0.0F ? v : 0.0F;
+        int32_t iu = (int32_t)(from_u < end ? from_u : 0.0F), iv = (int32_t)(from_v < end ? from_v : 0.0F);
+        iu = iu < last ? iu : last;
+        iv = iv < last ? iv : last;
+        const int32_t face = axis + (a < 0.0F ? 1 : 0);
+        const int32_t at = (face * tiles + (iv >> 3)) * tiles + (iu >> 3);
+        tile[i] = ok ? at : nowhere;
+        within[i] = (iv & 7) << 3 | (iu & 7);
+    }
+}
+_Static_assert(SIGHT_TILE == 8, "shifts by 3");
+
+/* Two loads a ray that depend on each other: no vectors. */
+static void read_leaves(const struct sight *s, uint32_t n, const int32_t *restrict at, const int32_t *restrict within,
+                        uint32_t *restrict leaf)
+{
+    const uint32_t *tile = s->tile, *block = s->leaf;
+    for (uint32_t i = 0; i < n; i++) {
+        const uint32_t *t = tile + at[i];
+        leaf[i] = *(sight_kind(*t) == SIGHT_TILED ? block + (*t & SIGHT_NUMBER) + within[i] : t);
+    }
+}
+
 /* How many rays of a chunk are neither of one triangle nor of none. */
 struct look_up_counts {
     uint32_t few, ask;
 };
 
-/* Each ray's leaf, and its triangle where the leaf has one. Coordinates are those of sight_inside.h in single
- * precision, counted in cells from 0. With e = 2^-24, the error of b / |a| is 2 e of its value for the rounded
- * components, and 2 e more for the reciprocal and the product; values are 1 at most. The sum, 2 at most, is rounded by
- * e. Together 5 e and some e^2, a third of SIGHT_PAD; so it also is where rounding chooses another face. What is no
- * direction asks the BVH. */
 VEC_CLONES
-static struct look_up_counts look_up(const struct sight *s, const struct vec3_floats *dir, uint32_t n,
-                                     uint32_t *restrict out, uint32_t *restrict triangle)
+static struct look_up_counts read_triangles(const uint32_t *restrict leaf, uint32_t n, uint32_t *restrict triangle)
 {
-    const float *dx = dir->x, *dy = dir->y, *dz = dir->z, half = 0.5F * (float)s->cells, end = (float)s->cells + 1.0F;
-    const int32_t last = (int32_t)s->cells - 1, tiles = (int32_t)s->cells / SIGHT_TILE;
-    const uint32_t *tile = s->tile, *leaf = s->leaf;
     uint32_t few = 0, ask = 0;
     VEC_LOOP
     for (uint32_t i = 0; i < n; i++) {
-        const float x = dx[i], y = dy[i], z = dz[i], ax = fabsf(x), ay = fabsf(y), az = fabsf(z);
-        const int is_x = (ax >= ay) & (ax >= az), is_y = !is_x & (ay >= az);
-        const float a = is_x ? x : is_y ? y : z, b = is_x ? y : is_y ? z : x, c = is_x ? z : is_y ? x : y;
-        const float scale = half / fabsf(a), u = half + b * scale, v = half + c * scale;
-        int32_t iu = (int32_t)(u > 0.0F ? u < end ? u : 0.0F : 0.0F),
-                iv = (int32_t)(v > 0.0F ? v < end ? v : 0.0F : 0.0F);
-        iu = iu < last ? iu : last;
-        iv = iv < last ? iv : last;
-        const int32_t face = (is_x ? 0 : is_y ? 2 : 4) + (a < 0.0F);
-        const uint32_t t = tile[(face * tiles + iv / SIGHT_TILE) * tiles + iu / SIGHT_TILE];
-        const int32_t within = (iv % SIGHT_TILE) * SIGHT_TILE + iu % SIGHT_TILE;
-        uint32_t l = t;
-        if (t >> SIGHT_KIND_SHIFT == SIGHT_TILED) l = leaf[(int32_t)(t & SIGHT_NUMBER) + within];
-        l = (u < end) & (v < end) ? l : SIGHT_ASK;
-        out[i] = l;
-        triangle[i] = l >> SIGHT_KIND_SHIFT == SIGHT_ONE ? l : BVH_NO_TRIANGLE;
-        few += l >> SIGHT_KIND_SHIFT == SIGHT_FEW;
-        ask += l == SIGHT_ASK;
+        const uint32_t kind = leaf[i] >> SIGHT_KIND_SHIFT;
+        triangle[i] = kind == SIGHT_ONE ? leaf[i] : BVH_NO_TRIANGLE;
+        few += kind == SIGHT_FEW ? 1 : 0;
+        ask += leaf[i] == SIGHT_ASK ? 1 : 0;
     }
     return (struct look_up_counts){few, ask};
+}
+
+/* Each ray's leaf, and its triangle where the leaf has one. */
+static struct look_up_counts look_up(struct sight_work *w, const struct sight *s, const struct vec3_floats *dir,
+                                     uint32_t n, uint32_t *triangle)
+{
+    const uint32_t edge = s->cells / SIGHT_TILE;
+    find_cells(s->cells, dir, n, (int32_t)(SIGHT_FACES * edge * edge), w->tile, w->within);
+    read_leaves(s, n, w->tile, w->within, w->leaf);
+    return read_triangles(w->leaf, n, triangle);
 }
 
 /* The rays whose leaf says so -> out. Room is for one more than there are. */
@@ -186,7 +216,7 @@ static void look_up_chunk(struct sight_work *w, struct bvh_work *bvh_work, const
     const struct vec3_floats dir = bvh_work_directions(bvh_work);
     uint32_t open = 0;
     bvh_work_set_directions(bvh_work, &rays->dir, rays->n);
-    struct look_up_counts counts = look_up(s, &dir, rays->n, w->leaf, rays->triangle);
+    struct look_up_counts counts = look_up(w, s, &dir, rays->n, rays->triangle);
     bvh_stage_ends(profile, BVH_STAGE_PREPARE);
     if (counts.few != 0) open = decide_lists(w, s, rays);
     bvh_stage_ends(profile, BVH_STAGE_DECIDE);
