@@ -1,25 +1,20 @@
 /* Rays looked up in the map, a chunk at a time. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/sight/hits_inside.h"
-#include "core/vecmath.h"
-
-enum {
-    TOGETHER = 16,         /* passed at once where none of them matters */
-    ROOM = BVH_CHUNK + 48, /* arrays of a power of two would get into each other's way in a cache */
-};
 
 struct sight_work {
     struct sight_counters counters;
-    int32_t tile[ROOM], within[ROOM];
-    uint32_t leaf[ROOM], chosen[ROOM];
+    struct sight_places places;
+    struct sight_run run[HITS_ROOM];
+    uint32_t triangle[HITS_ROOM]; /* of a run's rays */
     /* Rays that the BVH is asked for. */
-    uint32_t ray[ROOM]; /* which ones these are, of the chunk */
-    double x[ROOM], y[ROOM], z[ROOM], range_m[ROOM];
-    uint32_t triangle[ROOM], label[ROOM];
-    float steep[ROOM];
+    uint8_t asks[HITS_ROOM]; /* 1: of the chunk's */
+    uint32_t ray[HITS_ROOM]; /* which ones are cast */
+    double x[HITS_ROOM], y[HITS_ROOM], z[HITS_ROOM], range_m[HITS_ROOM];
+    uint32_t met[HITS_ROOM], label[HITS_ROOM];
+    float steep[HITS_ROOM];
 };
 
 int sight_work_create(struct sight_work **out, struct sh_err *err)
@@ -40,124 +35,59 @@ const struct sight_counters *sight_work_counters(const struct sight_work *work)
     return &work->counters;
 }
 
-/* Where each ray's leaf is: the number of its tile, and the cell within. Coordinates are those of sight_inside.h in
- * single precision, counted in cells from 0. With e = 2^-24, the error of b / |a| is 2 e of its value for the rounded
- * components, and 3 e more for the reciprocal and the products; values are 1 at most. The sum, 2 at most, is rounded
- * by e. Together 6 e and some e^2, less than half of SIGHT_PAD; so it also is where rounding chooses another face. What
- * is no direction belongs to `nowhere`. */
-VEC_CLONES
-static void find_cells(uint32_t cells, const struct vec3_floats *dir, uint32_t n, int32_t nowhere,
-                       int32_t *restrict tile, int32_t *restrict within)
+static void decide_open(struct bvh_work *bvh_work, const struct sight *s, const struct bvh_rays *rays,
+                        const uint32_t *list, uint32_t from, uint32_t to)
 {
-    const float *dx = dir->x, *dy = dir->y, *dz = dir->z, half = 0.5F * (float)cells, end = (float)cells + 1.0F;
-    const int32_t last = (int32_t)cells - 1, tiles = (int32_t)cells / SIGHT_TILE;
-    VEC_LOOP
-    for (uint32_t i = 0; i < n; i++) {
-        const float x = dx[i], y = dy[i], z = dz[i], ax = fabsf(x), ay = fabsf(y), az = fabsf(z);
-        const float xy = ax >= ay ? x : y, axy = ax >= ay ? ax : ay, a = axy >= az ? xy : z, aa = axy >= az ? axy : az;
-        const int32_t axis = axy >= az ? (ax >= ay ? 0 : 2) : 4;
-        const float b = axis == 0 ? y : axis == 2 ? z : x, c = axis == 0 ? z : axis == 2 ? x : y;
-        const float scale = half / aa, u = half + b * scale, v = half + c * scale;
-        const int32_t ok = (int32_t)(u < end) & (int32_t)(v < end);
-        const float from_u = u > 0.0F ? u : 0.0F, from_v = v > 0.0F ? v : 0.0F;
-        int32_t iu = (int32_t)(from_u < end ? from_u : 0.0F), iv = (int32_t)(from_v < end ? from_v : 0.0F);
-        iu = iu < last ? iu : last;
-        iv = iv < last ? iv : last;
-        const int32_t face = axis + (a < 0.0F ? 1 : 0);
-        const int32_t at = (face * tiles + (iv >> 3)) * tiles + (iu >> 3);
-        tile[i] = ok ? at : nowhere;
-        within[i] = (iv & 7) << 3 | (iu & 7);
-    }
+    uint32_t triangle[SIGHT_MAX_LIST];
+    for (uint32_t j = 0; j < list[0]; j++)
+        triangle[j] = s->record[list[1 + j]].triangle;
+    for (uint32_t i = from; i < to; i++)
+        bvh_decide_among(bvh_work, s->bvh, rays, i, triangle, list[0]);
 }
-_Static_assert(SIGHT_TILE == 8, "shifts by 3");
 
-/* Two loads a ray that depend on each other: no vectors. */
-static void read_leaves(const struct sight *s, uint32_t n, const int32_t *restrict at, const int32_t *restrict within,
-                        uint32_t *restrict leaf)
+static void ask(struct sight_work *w, uint32_t from, uint32_t to, uint32_t *asked)
 {
-    const uint32_t *tile = s->tile, *block = s->leaf;
-    for (uint32_t i = 0; i < n; i++) {
-        const uint32_t *t = tile + at[i];
-        leaf[i] = *(sight_kind(*t) == SIGHT_TILED ? block + (*t & SIGHT_NUMBER) + within[i] : t);
+    memset(w->asks + from, 1, to - from);
+    *asked += to - from;
+}
+
+/* Of rays that meet one of a few, those that meet the same one are done together. In exact order, what the records
+ * can't decide double does, as it would decide the BVH's proposals; else, or where the BVH might propose nothing, those
+ * rays ask. */
+static void do_few(struct sight_work *w, struct bvh_work *bvh_work, const struct sight *s, const struct bvh_rays *rays,
+                   const struct sight_run *run, uint32_t *asked)
+{
+    const uint32_t *list = s->list + (run->leaf & SIGHT_NUMBER), n = run[1].from - run->from;
+    few_decide(s, rays, list, run->from, run[1].from, w->triangle);
+    for (uint32_t i = 0, end; i < n; i = end) {
+        const uint32_t it = w->triangle[i];
+        for (end = i + 1; end < n && w->triangle[end] == it;)
+            end++;
+        if (it != FEW_OPEN && it != FEW_ASK)
+            bvh_ranges_of(s->bvh, it, rays, run->from + i, run->from + end);
+        else if (it == FEW_ASK || !s->among)
+            ask(w, run->from + i, run->from + end, asked);
+        else
+            decide_open(bvh_work, s, rays, list, run->from + i, run->from + end);
     }
 }
 
-/* How many rays of a chunk are neither of one triangle nor of none. */
-struct look_up_counts {
-    uint32_t few, ask;
-};
-
-VEC_CLONES
-static struct look_up_counts read_triangles(const uint32_t *restrict leaf, uint32_t n, uint32_t *restrict triangle)
+/* Later runs after earlier ones: bvh_ranges_of says why. */
+static uint32_t do_runs(struct sight_work *w, struct bvh_work *bvh_work, const struct sight *s,
+                        const struct bvh_rays *rays, uint32_t runs)
 {
-    uint32_t few = 0, ask = 0;
-    VEC_LOOP
-    for (uint32_t i = 0; i < n; i++) {
-        const uint32_t kind = leaf[i] >> SIGHT_KIND_SHIFT;
-        triangle[i] = kind == SIGHT_ONE ? leaf[i] : BVH_NO_TRIANGLE;
-        few += kind == SIGHT_FEW ? 1 : 0;
-        ask += leaf[i] == SIGHT_ASK ? 1 : 0;
-    }
-    return (struct look_up_counts){few, ask};
-}
-
-/* Each ray's leaf, and its triangle where the leaf has one. */
-static struct look_up_counts look_up(struct sight_work *w, const struct sight *s, const struct vec3_floats *dir,
-                                     uint32_t n, uint32_t *triangle)
-{
-    const uint32_t edge = s->cells / SIGHT_TILE;
-    find_cells(s->cells, dir, n, (int32_t)(SIGHT_FACES * edge * edge), w->tile, w->within);
-    read_leaves(s, n, w->tile, w->within, w->leaf);
-    return read_triangles(w->leaf, n, triangle);
-}
-
-/* The rays whose leaf says so -> out. Room is for one more than there are. */
-static uint32_t choose(const struct sight_work *w, uint32_t n, int asks, uint32_t *out)
-{
-    uint32_t m = 0;
-    for (uint32_t i = 0; i < n; i++) {
-        out[m] = i;
-        m += asks ? w->leaf[i] == SIGHT_ASK : sight_kind(w->leaf[i]) == SIGHT_FEW;
-    }
-    return m;
-}
-
-/* Rays of lists, by their records: w->chosen are then those that could not be decided so. Returns how many. */
-static uint32_t decide_lists(struct sight_work *w, const struct sight *s, const struct bvh_rays *rays)
-{
-    const uint32_t few = choose(w, rays->n, 0, w->chosen);
-    const uint32_t open = few_decide(s, &rays->dir, w->leaf, w->chosen, few, rays->triangle);
-    w->counters.few += few - open;
-    return open;
-}
-
-/* Whether the BVH misses nothing that double precision finds. */
-static int is_centred(const struct sight *s)
-{
-    double origin_m[3];
-    bvh_origin(s->bvh, origin_m);
-    return memcmp(origin_m, s->station_m, sizeof origin_m) == 0;
-}
-
-/* What is left of them. In exact order double decides, as it would decide the BVH's proposals; else, or where the BVH
- * might propose nothing, it is asked. Returns for how many. */
-static uint32_t decide_open(struct sight_work *w, struct bvh_work *bvh_work, const struct sight *s,
-                            const struct bvh_rays *rays, uint32_t open)
-{
-    const int among = s->exact && is_centred(s);
-    for (uint32_t k = 0; k < open; k++) {
-        const uint32_t i = w->chosen[k], *list = s->list + (w->leaf[i] & SIGHT_NUMBER), n = list[0];
-        uint32_t triangle[SIGHT_MAX_LIST];
-        if (!among) {
-            w->leaf[i] = SIGHT_ASK;
-            continue;
+    uint32_t asked = 0;
+    for (const struct sight_run *run = w->run; run < w->run + runs; run++) {
+        if (run->leaf == SIGHT_ASK) {
+            ask(w, run->from, run[1].from, &asked);
+        } else if (sight_kind(run->leaf) == SIGHT_FEW) {
+            w->counters.few += run[1].from - run->from;
+            do_few(w, bvh_work, s, rays, run, &asked);
+        } else {
+            bvh_ranges_of(s->bvh, run->leaf, rays, run->from, run[1].from);
         }
-        for (uint32_t j = 0; j < n; j++)
-            triangle[j] = s->record[list[1 + j]].triangle;
-        bvh_decide_among(bvh_work, s->bvh, rays, i, triangle, n);
     }
-    if (among) w->counters.few += open;
-    return among ? 0 : open;
+    return asked;
 }
 
 /* Which rays are cast for those that ask: in exact order themselves; else their whole packets, as bvh_hits would have
@@ -167,12 +97,12 @@ static uint32_t gather(struct sight_work *w, const struct sight *s, const struct
     struct bvh_info info;
     uint32_t m = 0;
     bvh_get_info(s->bvh, &info);
-    const uint32_t packet = s->exact && is_centred(s) ? 1 : info.packet;
+    const uint32_t packet = s->among ? 1 : info.packet;
     for (uint32_t at = 0; at < rays->n; at += packet) {
         const uint32_t end = rays->n - at < packet ? rays->n : at + packet;
         uint32_t any = 0;
         for (uint32_t i = at; i < end; i++)
-            any |= w->leaf[i] == SIGHT_ASK;
+            any |= w->asks[i];
         for (uint32_t i = at; any && i < end; i++)
             w->ray[m++] = i;
     }
@@ -191,7 +121,7 @@ static void ask_bvh(struct sight_work *w, struct bvh_work *bvh_work, const struc
                              .dir = VEC3_IN(*w, 0),
                              .range_max_m = rays->range_max_m,
                              .range_m = w->range_m,
-                             .triangle = w->triangle,
+                             .triangle = w->met,
                              .label = w->label,
                              .steep = rays->steep != NULL ? w->steep : NULL};
     if (s->exact)
@@ -200,12 +130,13 @@ static void ask_bvh(struct sight_work *w, struct bvh_work *bvh_work, const struc
         bvh_hits(bvh_work, s->bvh, &asked);
     for (uint32_t k = 0; k < asked.n; k++) {
         const uint32_t i = w->ray[k];
-        if (w->leaf[i] != SIGHT_ASK) continue;
+        if (!w->asks[i]) continue;
         rays->range_m[i] = w->range_m[k];
-        rays->triangle[i] = w->triangle[k];
+        rays->triangle[i] = w->met[k];
         if (rays->label != NULL) rays->label[i] = w->label[k];
         if (rays->steep != NULL) rays->steep[i] = w->steep[k];
     }
+    memset(w->asks, 0, rays->n);
     bvh_work_set_directions(bvh_work, &rays->dir, rays->n);
 }
 
@@ -214,18 +145,13 @@ static void look_up_chunk(struct sight_work *w, struct bvh_work *bvh_work, const
 {
     struct bvh_profile *profile = bvh_work_profile(bvh_work);
     const struct vec3_floats dir = bvh_work_directions(bvh_work);
-    uint32_t open = 0;
     bvh_work_set_directions(bvh_work, &rays->dir, rays->n);
-    struct look_up_counts counts = look_up(w, s, &dir, rays->n, rays->triangle);
+    const uint32_t runs = sight_find_runs(s, &dir, rays->n, &w->places, w->run);
     bvh_stage_ends(profile, BVH_STAGE_PREPARE);
-    if (counts.few != 0) open = decide_lists(w, s, rays);
-    bvh_stage_ends(profile, BVH_STAGE_DECIDE);
-    bvh_ranges(bvh_work, s->bvh, rays);
+    const uint32_t asked = do_runs(w, bvh_work, s, rays, runs);
     bvh_stage_ends(profile, BVH_STAGE_REFINE);
-    if (open != 0) counts.ask += decide_open(w, bvh_work, s, rays, open);
-    bvh_stage_ends(profile, BVH_STAGE_DECIDE);
-    w->counters.asked += counts.ask;
-    if (counts.ask != 0) ask_bvh(w, bvh_work, s, rays);
+    w->counters.asked += asked;
+    if (asked != 0) ask_bvh(w, bvh_work, s, rays);
 }
 
 void sight_hits(struct sight_work *work, struct bvh_work *bvh_work, const struct sight *sight,
