@@ -36,6 +36,15 @@ VEC_INLINE double vec_round(double x, uint64_t *bits)
     return shifted - magic;
 }
 
+/* A whole number below 2^52 as a double. Below AVX-512 vectors know no conversion from 64 bits. */
+VEC_INLINE double vec_from_u64(uint64_t whole)
+{
+    const uint64_t bits = whole | 0x4330000000000000ULL; /* 2^52 + whole */
+    double x;
+    memcpy(&x, &bits, sizeof x);
+    return x - 0x1p52;
+}
+
 /* Sine and cosine of an angle in turns, |turn| < 2^49: reduction to an eighth of a turn is exact, then Taylor
  * series to y^15 and y^16 with |y| <= pi/4, whose remainders are below 5e-17. Error below 2.5e-16
  * (tests/unit/test_vecmath.c). */
@@ -75,9 +84,8 @@ VEC_INLINE double vec_log(double x)
     uint64_t bits;
     memcpy(&bits, &x, sizeof bits);
     uint64_t shifted = bits - 0x3fe6a09e667f3bcdULL; /* bits of sqrt(1/2) */
-    int64_t e = (int64_t)(shifted & 0xfff0000000000000ULL);
-    uint64_t mbits = bits - (uint64_t)e;
-    double m, k = (double)(int32_t)(e >> 52);
+    uint64_t mbits = bits - (shifted & 0xfff0000000000000ULL);
+    double m, k = vec_from_u64(shifted >> 52 ^ 2048) - 2048.0; /* the exponent has a sign */
     memcpy(&m, &mbits, sizeof m);
     double t = (m - 1.0) / (m + 1.0), z = t * t;
     double p = 1.0 / 21.0;
