@@ -76,6 +76,59 @@ VEC_INLINE void vec_sincos_turn(double turn, double *sine, double *cosine)
     *cosine = (quadrant + 1) & 2 ? -b : b;
 }
 
+/* x * y - product, exact, where the product is x * y rounded: Dekker's (1971), with Veltkamp's splitting. */
+VEC_INLINE double vec_product_rest(double x, double y, double product)
+{
+    double xs = 134217729.0 * x, ys = 134217729.0 * y; /* 2^27 + 1 */
+    double xh = xs - (xs - x), yh = ys - (ys - y), xl = x - xh, yl = y - yh;
+    return ((xh * yh - product) + xh * yl + xl * yh) + xl * yl;
+}
+
+/* x + y - sum, exact, where the sum is x + y rounded: Knuth's. */
+VEC_INLINE double vec_sum_rest(double x, double y, double sum)
+{
+    double t = sum - x;
+    return (x - (sum - t)) + (y - t);
+}
+
+/* Sine and cosine of turn + rest beyond the last bit: s[0] + s[1] and c[0] + c[1], where the second is at most half
+ * the last bit of the first. |rest| is at most a last bit of turn. Sine to y^17. Error below 4e-17
+ * (tests/unit/test_vecmath.c). */
+VEC_INLINE void vec_sincos_turn_fine(double turn, double rest, double sine[2], double cosine[2])
+{
+    const double two_pi = 6.283185307179586477, two_pi_rest = 2.4492935982947064e-16;
+    uint64_t quadrant;
+    double q = vec_round(4.0 * turn, &quadrant), f = turn - 0.25 * q;
+    double y = f * two_pi, y1 = vec_product_rest(f, two_pi, y) + (f * two_pi_rest + rest * two_pi);
+    double z = y * y, z1 = vec_product_rest(y, y, z);
+    double s = 1.0 / 355687428096000.0;
+    s = s * z - 1.0 / 1307674368000.0;
+    s = s * z + 1.0 / 6227020800.0;
+    s = s * z - 1.0 / 39916800.0;
+    s = s * z + 1.0 / 362880.0;
+    s = s * z - 1.0 / 5040.0;
+    s = s * z + 1.0 / 120.0;
+    s = s * z - 1.0 / 6.0;
+    s = y * (z * s);
+    double c = 1.0 / 20922789888000.0;
+    c = c * z - 1.0 / 87178291200.0;
+    c = c * z + 1.0 / 479001600.0;
+    c = c * z - 1.0 / 3628800.0;
+    c = c * z + 1.0 / 40320.0;
+    c = c * z - 1.0 / 720.0;
+    c = c * z + 1.0 / 24.0;
+    c = z * (z * c);
+    double half = 0.5 * z, sh = y + s, ch = 1.0 - half;
+    double sl = (y - sh + s) + y1 * (ch + c), cl = (1.0 - ch - half) + (c - 0.5 * z1 - y1 * sh);
+    double s0 = sh + sl, s1 = sh - s0 + sl, c0 = ch + cl, c1 = ch - c0 + cl;
+    double a = quadrant & 1 ? c0 : s0, b = quadrant & 1 ? s0 : c0;
+    double a1 = quadrant & 1 ? c1 : s1, b1 = quadrant & 1 ? s1 : c1;
+    sine[0] = quadrant & 2 ? -a : a;
+    sine[1] = quadrant & 2 ? -a1 : a1;
+    cosine[0] = (quadrant + 1) & 2 ? -b : b;
+    cosine[1] = (quadrant + 1) & 2 ? -b1 : b1;
+}
+
 /* Natural logarithm of a normal positive number: x = 2^e m, m in [sqrt(1/2), sqrt(2)), log m = 2
  * artanh((m-1)/(m+1)) by its series to the 21st power, whose remainder is below 1e-17; relative error below
  * 1e-15 away from x = 1. */

@@ -32,6 +32,7 @@ int caster_create(struct caster **out, struct sh_err *err)
     c->bvh = NULL; /* the arrays are not touched until they are needed */
     c->sub_rays = NULL;
     c->profile = NULL;
+    c->steps.ready = 0;
     memset(&c->counters, 0, sizeof c->counters);
     int rc = bvh_work_create(&c->bvh, err);
     if (rc == SH_OK) c->sub_rays = aligned_alloc(64, (sizeof *c->sub_rays + 63) / 64 * 64); /* likewise */
