@@ -1,5 +1,5 @@
 /* core/cast/kernels_sweep.c: directions of runs whose axes turn evenly, against long double, against angles taken one
- * by one, and cut in all ways. */
+ * by one, and cut in all ways. And the runs' times. */
 #include "tests/common/cases.h"
 
 #include <float.h>
@@ -204,6 +204,28 @@ static void what_does_not_turn_evenly_is_refused(void **state)
     assert_false(kernel_sweep_steps(&steps, &run));
 }
 
+/* dt(j) = j * quot + floor((acc + j * rem) / den), in 128 bits. */
+static void times_are_whole_nanoseconds(void **state)
+{
+    (void)state;
+    static uint32_t dt_ns[3000];
+    uint64_t seed = 6;
+    for (int k = 0; k < 2000; k++) {
+        const int64_t den = case_between(&seed, 1, k % 2 ? 12 : INT64_C(1000000000000000));
+        const struct schedule_run run = {.n = (uint32_t)case_between(&seed, 1, k % 3 ? 3000 : 70),
+                                         .ns_quot = case_between(&seed, 0, 100000),
+                                         .ns_den = (uint64_t)den,
+                                         .ns_rem = (uint64_t)case_between(&seed, 0, den - 1),
+                                         .ns_acc = (uint64_t)case_between(&seed, 0, den - 1)};
+        kernel_times(&run, dt_ns);
+        for (uint64_t j = 0; j < run.n; j++) {
+            const unsigned __int128 over = run.ns_acc + (unsigned __int128)j * run.ns_rem;
+            if (dt_ns[j] != j * (uint64_t)run.ns_quot + (uint64_t)(over / run.ns_den))
+                fail_msg("pulse %u of %u: %u ns", (uint32_t)j, run.n, dt_ns[j]);
+        }
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -211,6 +233,7 @@ int main(void)
         cmocka_unit_test(encoders_read_whole_counts),
         cmocka_unit_test(cuts_change_nothing),
         cmocka_unit_test(runs_take_turns),
+        cmocka_unit_test(times_are_whole_nanoseconds),
         cmocka_unit_test(what_does_not_turn_evenly_is_refused),
     };
     return cmocka_run_group_tests_name("sweep", tests, need_long_double, NULL);
